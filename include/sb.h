@@ -1,0 +1,3 @@
+/* sb.h - everything. */
+#pragma once
+#include "sbscene.h"

@@ -1,0 +1,125 @@
+/*
+  sbbase.h - layer 0: options described by tables, formulas of time and place, log events, bounded strings.
+*/
+#pragma once
+#include <petsc.h>
+#include <stdint.h>
+
+#include "sbcompat.h"
+
+#define SB_VERSION "0.1.0"
+#define SB_NAME_MAX 64 /* longest name of a body, set or effect, with the terminating zero */
+
+/* ------------------------------------------------------------------ options */
+
+typedef enum {
+  SB_OPTION_BOOL,
+  SB_OPTION_INT,
+  SB_OPTION_REAL,
+  SB_OPTION_REALS,  /* exactly `count` numbers separated by commas */
+  SB_OPTION_STRING, /* free text: a file name, a mesh description */
+  SB_OPTION_NAMES,  /* any number of names separated by commas */
+  SB_OPTION_CHOICE, /* one word out of `range`, "a|b|c" */
+  SB_OPTION_FORMULA /* `count` formulas of t, x, y, z, separated by semicolons; see SbFormula */
+} SbOptionKind;
+
+/*
+  One row describes one option of ours. Rows are `static const` arrays beside the code that reads them; together,
+  registered, they are the table from which -help, the checks, -scenario_view and docs/options.md are made.
+*/
+typedef struct {
+  const char  *key;    /* last part of the name: "young" in -body_liver_young */
+  SbOptionKind kind;
+  PetscInt     count;  /* values of SB_OPTION_REALS, formulas of SB_OPTION_FORMULA; 1 otherwise */
+  const char  *unit;   /* "Pa", "kg/m^3"; "" when there is none */
+  const char  *preset; /* default as it would be typed; NULL: must be given; "": nothing by default */
+  const char  *range;  /* "(0, inf)", "[0, 0.5)" for numbers; "a|b|c" for a choice; "" when free */
+  const char  *help;   /* one sentence */
+} SbOption;
+
+/*
+  Where an option is read: -<klass>_<instance>_<key>, or -<key> when klass is "" (program-wide options).
+  `type` is the registered name of the implementation that reads it ("gravity", "corotated"; "" for what all
+  instances of the class have); it selects the rows, it is not part of the option's name.
+*/
+typedef struct {
+  char klass[SB_NAME_MAX];    /* "", "body", "set", "effect" */
+  char type[SB_NAME_MAX];
+  char instance[SB_NAME_MAX]; /* "liver" */
+} SbScope;
+
+/* Adds rows to the table. `rows` must live as long as the program. Not collective. */
+PetscErrorCode SbOptionsRegister(const char *klass, const char *type, PetscInt n, const SbOption rows[]);
+PetscErrorCode SbScopeSet(SbScope *scope, const char *klass, const char *type, const char *instance);
+
+/*
+  Readers: value given by the user, or else the preset of the row. Each value read is remembered with its text (for
+  SbOptionsView() and SbOptionsCheck()). Errors (PETSC_ERR_USER, one line that names the full option, value, range, unit):
+  unreadable text, value out of range, missing required option. Reading a key without a row is a programming error.
+*/
+PetscErrorCode SbOptionBool(const SbScope *scope, const char *key, PetscBool *value);
+PetscErrorCode SbOptionInt(const SbScope *scope, const char *key, PetscInt *value);
+PetscErrorCode SbOptionReal(const SbScope *scope, const char *key, PetscReal *value);
+PetscErrorCode SbOptionReals(const SbScope *scope, const char *key, PetscReal value[]);
+PetscErrorCode SbOptionString(const SbScope *scope, const char *key, size_t size, char value[]);
+PetscErrorCode SbOptionNames(const SbScope *scope, const char *key, PetscInt *n, char (**names)[SB_NAME_MAX]); /* PetscFree */
+PetscErrorCode SbOptionChoice(const SbScope *scope, const char *key, PetscInt *index); /* position in `range` */
+PetscErrorCode SbOptionGiven(const SbScope *scope, const char *key, PetscBool *given);  /* by the user */
+
+/* Full name, e.g. "-body_liver_young", for messages. */
+PetscErrorCode SbOptionName(const SbScope *scope, const char *key, size_t size, char name[]);
+
+/*
+  SbOptionsCheck - ends the run when the database holds an option of ours that nobody read, with the nearest names.
+  Ours: every name that begins with the prefix of a class (body_, set_, effect_) or equals, or is within two edits of,
+  a program-wide option of ours and does not belong to PETSc. Collective.
+*/
+PetscErrorCode SbOptionsCheck(void);
+/* The complete scenario as an option file that runs again: every option of ours read so far with its value, help as
+   comment, then the PETSc options that the user gave. Collective; rank 0 writes. */
+PetscErrorCode SbOptionsView(PetscViewer ascii);
+PetscErrorCode SbOptionsHelp(MPI_Comm comm);                        /* the manual for -help, from the table */
+PetscErrorCode SbOptionsMarkdown(MPI_Comm comm, const char *file);  /* docs/options.md, from the table */
+PetscErrorCode SbOptionsReset(void);                                /* forgets what was read and registered; at exit and in tests */
+
+/* SbNearest - the names of `n` candidates closest to `word` by edit distance, joined by " or "; "" when none is near. */
+PetscErrorCode SbNearest(const char *word, PetscInt n, const char *const names[], size_t size, char text[]);
+
+/* ------------------------------------------------------------------ formulas */
+
+/*
+  SbFormula - a number as a function of time t (s) and rest position x, y, z (m).
+
+  Text: numbers, t x y z, pi, + - * / ^, parentheses, unary minus, comparison-free functions sin cos tan asin acos atan
+  atan2 exp log sqrt abs min max floor tanh step(a) (0 for a < 0, else 1), ramp(a) (a clamped to [0, 1]), clamp(a, lo, hi);
+  or `table:FILE`, a text file with two columns (t in s, value; comma or blanks; # comments), linear in between, constant outside.
+  Compiled once to a small stack program; evaluation allocates nothing.
+*/
+typedef struct _p_SbFormula *SbFormula;
+PetscErrorCode SbFormulaCreate(MPI_Comm comm, const char *text, const char *where, SbFormula *formula); /* where: option name, for messages */
+PetscReal      SbFormulaEval(SbFormula formula, PetscReal t, const PetscReal x[3]);                     /* x may be NULL when the formula does not use it */
+PetscErrorCode SbFormulaUses(SbFormula formula, PetscBool *time, PetscBool *place);
+PetscErrorCode SbFormulaDestroy(SbFormula *formula);
+/* Reads an option of kind SB_OPTION_FORMULA: `count` formulas as in the row; destroy each. */
+PetscErrorCode SbOptionFormulas(const SbScope *scope, const char *key, SbFormula formulas[]);
+
+/* ------------------------------------------------------------------ log events */
+
+/* One event per phase that can take one percent of a run; registered by SbLogInitialize(). */
+typedef enum {
+  SB_EVENT_MESH_READ,
+  SB_EVENT_MESH_DISTRIBUTE,
+  SB_EVENT_SPACE_SETUP,
+  SB_EVENT_MATRIX_SETUP,
+  SB_EVENT_RESIDUAL,
+  SB_EVENT_TANGENT,
+  SB_EVENT_ENERGY,
+  SB_EVENT_EFFECTS,
+  SB_EVENT_SOLVER_SETUP,
+  SB_EVENT_OUTPUT,
+  SB_EVENT_CHECKPOINT,
+  SB_EVENT_COUNT
+} SbEvent;
+extern PetscLogEvent SbEvents[SB_EVENT_COUNT];
+extern PetscLogStage SbStageSetup, SbStageSolve, SbStageOutput;
+PetscErrorCode       SbLogInitialize(void);

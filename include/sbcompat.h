@@ -1,0 +1,36 @@
+/*
+  sbcompat.h - every difference between the PETSc releases that supple builds with, in one place.
+
+  Supported: 3.18 (Debian 12) and 3.25 or newer. The callback conventions changed one by one in 3.23 and 3.24, so
+  these two (and the untested releases between 3.18 and them) are refused here instead of failing at run time.
+*/
+#pragma once
+#include <petscsys.h>
+
+#if PETSC_VERSION_LT(3, 18, 0) || (PETSC_VERSION_GE(3, 19, 0) && PETSC_VERSION_LT(3, 25, 0))
+  #error "supple needs PETSc 3.18.x, or 3.25 and newer: point PETSC_DIR/PETSC_ARCH or PKG_CONFIG_PATH at one of them"
+#endif
+#if defined(PETSC_USE_COMPLEX) || !defined(PETSC_USE_REAL_DOUBLE)
+  #error "supple needs a PETSc with real double-precision scalars"
+#endif
+
+#ifndef PETSC_SUCCESS
+  #define PETSC_SUCCESS ((PetscErrorCode)0)
+#endif
+
+/* MPI datatype of PetscBool. */
+#if PETSC_VERSION_LT(3, 23, 0)
+  #define SB_MPI_BOOL MPIU_BOOL
+#else
+  #define SB_MPI_BOOL MPI_C_BOOL
+#endif
+
+/*
+  Context of a destroy callback of a MATSHELL, PCSHELL, KSP, SNES: 3.18 hands over ctx, newer releases &ctx, under the
+  same C type. SB_DESTROY_CTX(type, arg) is the pointer to the struct in both.
+*/
+#if PETSC_VERSION_LT(3, 24, 0)
+  #define SB_DESTROY_CTX(type, arg) ((type *)(arg))
+#else
+  #define SB_DESTROY_CTX(type, arg) (*(type **)(arg))
+#endif

@@ -1,0 +1,47 @@
+/*
+  sbelement.h - layer 1: element kernels on batches of SB_BATCH tets with four nodes and constant basis gradients.
+
+  The kernels take arrays and return arrays: no MPI, no allocation, no mesh. Lanes as in sbmaterial.h.
+*/
+#pragma once
+#include "sbmaterial.h"
+
+/* Pairs (a, b) with a <= b in the order of the ten blocks of a symmetric cell matrix. */
+static const int SbPairA[10] = {0, 0, 0, 0, 1, 1, 1, 2, 2, 3};
+static const int SbPairB[10] = {0, 1, 2, 3, 1, 2, 3, 2, 3, 3};
+
+/*
+  SbElement - what tells one element from another. P1 has its nodes at the vertices; nodes at faces (CR) or in cells
+  (DG) differ in `tabulate` and in the mass.
+*/
+typedef struct _p_SbElement *SbElement;
+typedef struct {
+  /* Basis gradients of nodes 1..3 (node 0 has minus their sum) and volumes from vertex positions of one cell.
+     x[4][3] m; g[3][3] row a = grad phi_{a+1}, 1/m; V m^3. */
+  void (*tabulate)(const PetscReal x[4][3], PetscReal g[3][3], PetscReal *V);
+  /* mass of a cell / (density V): lumped share of each node, and consistent M_aa, M_ab */
+  PetscReal mass_lumped, mass_diagonal, mass_coupling; /* P1: 1/4, 1/10, 1/20 */
+} SbElementOps;
+struct _p_SbElement {
+  char         name[SB_NAME_MAX];
+  PetscInt     nodes_per[4]; /* nodes per vertex, edge, face, cell. P1: 1,0,0,0 */
+  SbElementOps ops;
+};
+extern PetscFunctionList SbElementList;
+PetscErrorCode SbElementRegisterAll(void);
+PetscErrorCode SbElementCreate(const char *name, SbElement *e);
+PetscErrorCode SbElementDestroy(SbElement *e);
+
+/* F = I + sum_a u_a (x) grad phi_a. g[3*(a-1)+j] = d phi_a / dX_j for a = 1..3, 1/m; u[3*a+i], a = 0..3, m. */
+void SbCellGradient(const SbLane g[9], const SbLane u[12], SbLane F[9]);
+/* Velocity-like gradient without the identity: H = sum_a v_a (x) grad phi_a. */
+void SbCellGradientRate(const SbLane g[9], const SbLane v[12], SbLane H[9]);
+/* f[3*a+i] = V P_ij grad phi_a,j: internal force of the cell on its nodes, N. */
+void SbCellForce(const SbLane g[9], const SbLane V, const SbLane P[9], SbLane f[12]);
+/*
+  Ten upper blocks of the cell matrix for Hooke's tensor turned by R (R NULL: not turned):
+  K[p][3*i+k] for p = 0..9 as SbPairA/B, K_ab = V (lambda h_a h_b^T + mu h_b h_a^T + mu (h_a . h_b) I), h = R grad phi. N/m.
+*/
+void SbCellBlocksIsotropic(const SbLane g[9], const SbLane V, PetscReal lambda, PetscReal mu, const SbLane R[9], SbLane K[10][9]);
+/* The same for a full tangent C: K_ab,ik = V C_(ij)(kl) grad phi_a,j grad phi_b,l. */
+void SbCellBlocksGeneral(const SbLane g[9], const SbLane V, const SbLane C[81], SbLane K[10][9]);

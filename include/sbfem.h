@@ -1,0 +1,115 @@
+/*
+  sbfem.h - layer 2: nodes and unknowns, batches of cells, assembly by precomputed offsets, constraints, solver set-up.
+*/
+#pragma once
+#include "sbelement.h"
+#include "sbmesh.h"
+
+/* What the integrator asks about: one evaluation. Arrays are local (owned nodes, then ghosts), [nnode][3]. */
+typedef struct {
+  PetscReal        t;      /* s */
+  PetscReal        dt;     /* length of the step being taken, s; 0 in a static run */
+  PetscInt         step;
+  PetscReal        shift_a; /* dA/dU of the integrator, 1/s^2; 0 in a static run: no inertia */
+  PetscReal        shift_v; /* dV/dU of the integrator, 1/s; 0 in a static run: no damping */
+  const PetscReal *u;      /* displacement, m */
+  const PetscReal *v;      /* velocity, m/s; NULL in a static run */
+  const PetscReal *a;      /* acceleration, m/s^2; NULL in a static run */
+} SbStage;
+
+/* Cells of one body and one material, owned or ghost: the unit of dispatch. */
+typedef struct {
+  PetscInt    body;
+  SbMaterial  material;            /* borrowed from the model */
+  SbElement   element;             /* borrowed */
+  PetscInt    cstart, cend;        /* local cells */
+  PetscInt    bstart, bend;        /* batches; the last one may be partly filled */
+  PetscBool   owned;
+  PetscReal   alpha, beta;         /* Rayleigh damping C = alpha M + beta K, 1/s and s; 0 unless an effect set them at set-up */
+} SbRegion;
+
+typedef struct _p_SbSpace *SbSpace;
+struct _p_SbSpace {
+  MPI_Comm  comm;
+  SbMesh    mesh;                  /* borrowed */
+  PetscInt  Nnode, nnode_owned, nnode;
+  PetscInt  gnode_start;
+  PetscInt *gnode;                 /* [nnode] global node numbers; owned first, ghosts ascending */
+  PetscInt *cell_node;             /* [ncell][4] local nodes */
+  PetscReal *node_x;               /* [nnode][3] rest position of each node, m */
+  PetscInt  nregion;
+  SbRegion *region;                /* [nregion] */
+  PetscInt  nbatch;
+  PetscInt *batch_cell;            /* [nbatch] first local cell */
+  PetscInt *batch_n;               /* [nbatch] cells in it, 1..SB_BATCH */
+  PetscInt *batch_node;            /* [nbatch][4][SB_BATCH] local nodes (padding repeats the first cell) */
+  SbLane   *batch_g;               /* [nbatch][9] basis gradients of nodes 1..3, 1/m */
+  SbLane   *batch_V;               /* [nbatch] volumes, m^3; 0 in padding */
+  PetscReal *node_mass;            /* [nnode] lumped mass, kg, complete on owned nodes */
+  PetscBool  consistent_mass;      /* -mass consistent */
+  uint8_t   *fixed;                /* [nnode] bit c set: component c of the node is prescribed */
+  PetscInt   nfixed;               /* local nodes with any bit */
+  PetscInt  *fixed_node;           /* [nfixed] */
+  PetscReal *fixed_value;          /* [nfixed][3] prescribed displacement at the time last asked for, m */
+  Vec        template_vec;         /* ghosted (more than one rank) or sequential; block size 3 */
+  struct _p_SbPlan *plan;          /* cell blocks -> matrix values; NULL before SbSpaceCreateMatrix() */
+  PetscBool  linear;               /* every region's law is linear */
+};
+
+/* Collective. Materials and elements: one per body, borrowed. Options read: -mass. */
+PetscErrorCode SbSpaceCreate(SbMesh mesh, const SbMaterial material[], const SbElement element[], SbSpace *space);
+PetscErrorCode SbSpaceDestroy(SbSpace *space);
+PetscErrorCode SbSpaceValidate(SbSpace space);
+PetscErrorCode SbSpaceRegister(void);
+
+/* A zeroed vector with the layout of the unknowns (3 per node, ghosted in parallel). Collective. Caller destroys. */
+PetscErrorCode SbSpaceCreateVec(SbSpace space, Vec *v);
+/* Brings ghosts up to date and lends the local array [nnode][3] of `v`. Collective; restore in the same function. */
+PetscErrorCode SbSpaceGetLocalRead(SbSpace space, Vec v, const PetscReal **array);
+PetscErrorCode SbSpaceRestoreLocalRead(SbSpace space, Vec v, const PetscReal **array);
+/* Lends the local array of `v` for writing; values in ghost entries are ignored afterwards. Not collective. */
+PetscErrorCode SbSpaceGetLocalWrite(SbSpace space, Vec v, PetscReal **array);
+PetscErrorCode SbSpaceRestoreLocalWrite(SbSpace space, Vec v, PetscReal **array);
+
+/* f[nnode][3] += internal force (stress divergence and beta K v), N. Right on owned nodes. Not collective. */
+PetscErrorCode SbSpaceAddInternalForce(SbSpace space, const SbStage *stage, PetscReal f[]);
+/* f += M (a + alpha v). */
+PetscErrorCode SbSpaceAddInertia(SbSpace space, const SbStage *stage, PetscReal f[]);
+
+typedef enum { SB_MATRIX_AIJ, SB_MATRIX_BAIJ, SB_MATRIX_SBAIJ } SbMatrixKind; /* SBAIJ: one rank only */
+/* Preallocated matrix and the assembly plan. Collective. Caller destroys the matrix. */
+PetscErrorCode SbSpaceCreateMatrix(SbSpace space, SbMatrixKind kind, Mat *A);
+/* A = shift_a M + shift_v C + K(u), rows and columns of prescribed unknowns replaced by a scaled identity
+   after `add` (may be NULL) had its turn to add blocks. Not collective but for the state increase. */
+PetscErrorCode SbSpaceAssembleTangent(SbSpace space, const SbStage *stage, Mat A);
+PetscErrorCode SbSpaceFinishTangent(SbSpace space, Mat A); /* constraints, assembly state */
+/* Between the two: A += a 3x3 block (row-major, N/m) for two nodes a, b = 0..3 of a local cell. Not collective. */
+PetscErrorCode SbSpaceAddCellBlock(SbSpace space, Mat A, PetscInt cell, PetscInt a, PetscInt b, const PetscReal block[9]);
+
+/* Marks components (bits 0..2) of a local node as prescribed; set-up only. All ranks that know the node must do it. */
+PetscErrorCode SbSpaceFix(SbSpace space, PetscInt node, int components);
+/* After all effects were set up: builds fixed_node. */
+PetscErrorCode SbSpaceFixDone(SbSpace space);
+/* Index into fixed_node of a node, or -1. */
+PetscInt       SbSpaceFixedIndex(SbSpace space, PetscInt node);
+
+/* Per owned cell: Cauchy stress sigma[6] = xx yy zz xy yz xz (Pa), J, energy density (J/m^3, rest). Outputs may be NULL. */
+PetscErrorCode SbSpaceCellState(SbSpace space, const PetscReal u[], PetscReal sigma[], PetscReal J[], PetscReal psi[]);
+/* Strain energy of owned cells, J; and the number of inverted owned cells, smallest J. Local sums: reduce them. */
+PetscErrorCode SbSpaceStrainEnergy(SbSpace space, const PetscReal u[], PetscReal *energy, PetscReal *minJ, PetscInt *ninverted);
+/* Largest stable step of an explicit run: min over cells of smallest altitude / wave speed, s. Collective. */
+PetscErrorCode SbSpaceStableStep(SbSpace space, PetscReal *dt);
+
+/* Nodes with weights of a boundary facet: for P1 its three vertices. face = 0..3, opposite local vertex `face`. */
+typedef struct {
+  PetscInt  cell, face;
+  PetscInt  node[3];     /* local nodes, counter-clockwise seen from outside */
+  PetscReal area;        /* rest area, m^2 */
+  PetscReal normal[3];   /* rest outward unit normal */
+} SbFacet;
+/* All local boundary facets (of owned and ghost cells) in set k of the mesh. Allocated here; PetscFree. */
+PetscErrorCode SbSpaceGetSetFacets(SbSpace space, PetscInt k, PetscInt *n, SbFacet **facets);
+/* All local nodes in set k. Allocated here; PetscFree. */
+PetscErrorCode SbSpaceGetSetNodes(SbSpace space, PetscInt k, PetscInt *n, PetscInt **nodes);
+/* Index of a set by name; -1 and an error with the nearest names when there is none (where = option, for the message). */
+PetscErrorCode SbSpaceFindSet(SbSpace space, const char *name, const char *where, PetscInt *k);
