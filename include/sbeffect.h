@@ -10,7 +10,7 @@
 typedef struct _p_SbEffect *SbEffect;
 
 typedef struct {
-  /* reads -effect_<name>_...; scope = {"effect", <type>, <name>} */
+  /* reads -effect_<name>_...; scope = {"effect", <type>, <name>}; called once, by SbEffectCreate() */
   PetscErrorCode (*setfromoptions)(SbEffect e, const SbScope *scope);
   /* finds its nodes, facets, cells; marks prescribed unknowns by SbSpaceFix(). Collective. */
   PetscErrorCode (*setup)(SbEffect e, SbSpace space);
@@ -20,7 +20,7 @@ typedef struct {
   PetscErrorCode (*prestep)(SbEffect e, SbSpace space, PetscReal t, PetscReal dt);
   /* f[nnode][3] += external force, N; must be right on owned nodes without communication */
   PetscErrorCode (*force)(SbEffect e, SbSpace space, const SbStage *stage, PetscReal f[]);
-  /* A -= d force / d u (and shift_v d force / d v) by SbSpaceAddCellBlock() */
+  /* A -= shift_k d force / d u + shift_v d force / d v by SbSpaceAddCellBlock(), called for (a, b) and for (b, a) */
   PetscErrorCode (*tangent)(SbEffect e, SbSpace space, const SbStage *stage, Mat A);
   /* after a step was accepted */
   PetscErrorCode (*accept)(SbEffect e, SbSpace space, const SbStage *stage);
@@ -42,10 +42,18 @@ struct _p_SbEffect {
 };
 
 extern PetscFunctionList SbEffectList;
+/* Adds a type and its option rows; `rows` and the names in them must live as long as the program. Not collective. */
 PetscErrorCode SbEffectRegister(const char *type, PetscErrorCode (*create)(SbEffect), PetscInt nrows, const SbOption rows[]);
-/* type: -effect_<name>_type, by default the name itself. Unknown: error with the nearest types. */
+/*
+  SbEffectCreate - an effect of the scenario by its name, with its options read.
+
+  Not collective, but to be called alike on all ranks. The caller destroys the effect with SbEffectDestroy().
+
+  Options read: -effect_<name>_type (by default the name itself is the type) and those of the type.
+  Errors: PETSC_ERR_USER_INPUT for an unknown type, with the nearest ones; PETSC_ERR_USER* from the options of the type.
+*/
 PetscErrorCode SbEffectCreate(const char *name, SbEffect *e);
-PetscErrorCode SbEffectDestroy(SbEffect *e);
+PetscErrorCode SbEffectDestroy(SbEffect *e); /* sets *e to NULL; NULL is accepted */
 
 /* Constructors, one per file in src/effect/. */
 PetscErrorCode SbEffectRegister_Gravity(void);
@@ -56,3 +64,99 @@ PetscErrorCode SbEffectRegister_PointForce(void);
 PetscErrorCode SbEffectRegister_Support(void);
 PetscErrorCode SbEffectRegister_Drive(void);
 PetscErrorCode SbEffectRegister_Damping(void);
+
+/* ------------------------------------------------------------------ what several effects share */
+
+/*
+  SbEffectFormulas - reads the formulas of an option and says whether they change with time.
+
+  Not collective.
+
+  Input:
+    scope, key - as for SbOptionFormulas(); the row of the key says how many formulas there are (n)
+    n          - how many the caller expects, 1..3
+    place      - whether the formulas may use x, y, z
+  Output:
+    formulas[n] - the caller destroys each
+    steady      - cleared when a formula uses t, untouched otherwise
+
+  Errors: PETSC_ERR_USER_INPUT when a formula uses x, y or z and may not.
+*/
+PetscErrorCode SbEffectFormulas(const SbScope *scope, const char *key, PetscInt n, PetscBool place, SbFormula formulas[],
+                                PetscBool *steady);
+
+/* The sets named by the option -effect_<name>_on, as read by SbEffectReadOn(). */
+typedef struct {
+  char     option[2 * SB_NAME_MAX]; /* full name of the option, for messages */
+  PetscInt n;
+  char (*name)[SB_NAME_MAX]; /* [n] owned */
+} SbEffectOn;
+PetscErrorCode SbEffectReadOn(const SbScope *scope, SbEffectOn *on); /* release with SbEffectFreeOn() */
+PetscErrorCode SbEffectFreeOn(SbEffectOn *on);
+
+/*
+  What the named sets select on this rank, each item once even when it is in several of the sets. Collective; the caller
+  releases the array with PetscFree(). Errors (PETSC_ERR_USER_INPUT, alike on all ranks): no such set; a set that selects
+  nothing of the kind, with what it does select.
+
+  SbEffectFacets - boundary facets of owned and ghost cells.
+  SbEffectNodes  - nodes, ascending, owned ones first.
+  SbEffectCells  - cells, ascending, owned ones first; every local cell when no set is named.
+*/
+PetscErrorCode SbEffectFacets(SbSpace space, const SbEffectOn *on, PetscInt *n, SbFacet **facets);
+PetscErrorCode SbEffectNodes(SbSpace space, const SbEffectOn *on, PetscInt *n, PetscInt **nodes);
+PetscErrorCode SbEffectCells(SbSpace space, const SbEffectOn *on, PetscInt *n, PetscInt **cells);
+
+/*
+  SbDeadLoad - a force per volume or per area, given by three formulas of time and rest position, integrated against the
+  basis functions of the cells or facets that carry it (src/effect/deadload.c). What is kept is one force per node; it is
+  integrated anew only when the formulas use t and t has changed.
+*/
+typedef struct _p_SbDeadLoad *SbDeadLoad;
+/*
+  SbDeadLoadCreate - collects nodes and integrates once.
+
+  Not collective.
+
+  Input:
+    space    - gives the rest positions of the nodes
+    ncorner  - 4 for cells, 3 for facets
+    nitem    - cells or facets on this rank
+    node     - [nitem][ncorner] local nodes of each
+    measure  - [nitem] rest volume, m^3, or rest area, m^2
+    density  - three formulas, N/m^3 or Pa; borrowed, must outlive the load
+  Output:
+    load     - the caller destroys it
+*/
+PetscErrorCode SbDeadLoadCreate(SbSpace space, PetscInt ncorner, PetscInt nitem, const PetscInt node[], const PetscReal measure[],
+                                const SbFormula density[3], SbDeadLoad *load);
+/* f[nnode][3] += factor times the load at time t on owned nodes, N. Not collective. */
+PetscErrorCode SbDeadLoadAdd(SbDeadLoad load, PetscReal t, PetscReal factor, PetscReal f[]);
+PetscErrorCode SbDeadLoadDestroy(SbDeadLoad *load);
+
+/*
+  SbHold - unknowns that an effect prescribes. An unknown belongs to the first effect that asks for it, in the order of
+  the scenario; so no two effects write one value, and no reaction is counted twice.
+*/
+typedef struct {
+  PetscInt n;
+  PetscInt *node;       /* [n] local nodes, ascending, owned ones first; owned by this struct */
+  uint8_t  *components; /* [n] bit c: component c is held by this effect; owned by this struct */
+  PetscInt *row;        /* [n] index into space->fixed_node; filled by the first SbHoldPrescribe() */
+  PetscBool have_rows;
+  PetscInt  nowned;
+} SbHold;
+/*
+  SbHoldSetUp - claims `components` (bits 0..2) of the nodes of the named sets. Collective; release with SbHoldFree().
+
+  Errors: PETSC_ERR_USER_INPUT when earlier effects already hold all of them.
+*/
+PetscErrorCode SbHoldSetUp(SbHold *hold, SbSpace space, const SbEffectOn *on, int components);
+/* Writes value[n][3] (NULL: zero), m, into space->fixed_value. Not collective; after SbSpaceFixDone(). */
+PetscErrorCode SbHoldPrescribe(SbHold *hold, SbSpace space, const PetscReal value[]);
+/* force[3] = sum over the owned held unknowns of the residual: what holds the body, acting on it, N. Not collective. */
+void SbHoldReaction(const SbHold *hold, const PetscReal residual[], PetscReal force[3]);
+PetscErrorCode SbHoldFree(SbHold *hold);
+/* Bits of the choice "x|y|z|xy|yz|xz|xyz", by its position. */
+int SbHoldComponents(PetscInt choice);
+#define SB_HOLD_CHOICES "x|y|z|xy|yz|xz|xyz"
