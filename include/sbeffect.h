@@ -123,13 +123,12 @@ typedef struct _p_SbDeadLoad *SbDeadLoad;
     ncorner  - 4 for cells, 3 for facets
     nitem    - cells or facets on this rank
     node     - [nitem][ncorner] local nodes of each
-    measure  - [nitem] rest volume, m^3, or rest area, m^2
     density  - three formulas, N/m^3 or Pa; borrowed, must outlive the load
   Output:
     load     - the caller destroys it
 */
-PetscErrorCode SbDeadLoadCreate(SbSpace space, PetscInt ncorner, PetscInt nitem, const PetscInt node[], const PetscReal measure[],
-                                const SbFormula density[3], SbDeadLoad *load);
+PetscErrorCode SbDeadLoadCreate(SbSpace space, PetscInt ncorner, PetscInt nitem, const PetscInt node[], const SbFormula density[3],
+                                SbDeadLoad *load);
 /* f[nnode][3] += factor times the load at time t on owned nodes, N. Not collective. */
 PetscErrorCode SbDeadLoadAdd(SbDeadLoad load, PetscReal t, PetscReal factor, PetscReal f[]);
 PetscErrorCode SbDeadLoadDestroy(SbDeadLoad *load);

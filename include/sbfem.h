@@ -12,6 +12,7 @@ typedef struct {
   PetscInt         step;
   PetscReal        shift_a; /* dA/dU of the integrator, 1/s^2; 0 in a static run: no inertia */
   PetscReal        shift_v; /* dV/dU of the integrator, 1/s; 0 in a static run: no damping */
+  PetscReal        shift_k; /* factor on the stiffness: 1, or 0 when only the mass matrix is wanted */
   const PetscReal *u;      /* displacement, m */
   const PetscReal *v;      /* velocity, m/s; NULL in a static run */
   const PetscReal *a;      /* acceleration, m/s^2; NULL in a static run */
@@ -39,12 +40,13 @@ struct _p_SbSpace {
   PetscReal *node_x;               /* [nnode][3] rest position of each node, m */
   PetscInt  nregion;
   SbRegion *region;                /* [nregion] */
-  PetscInt  nbatch;
+  PetscInt  nbatch;                /* SB_BATCH cells side by side; a batch never mixes regions */
   PetscInt *batch_cell;            /* [nbatch] first local cell */
   PetscInt *batch_n;               /* [nbatch] cells in it, 1..SB_BATCH */
   PetscInt *batch_node;            /* [nbatch][4][SB_BATCH] local nodes (padding repeats the first cell) */
-  SbLane   *batch_g;               /* [nbatch][9] basis gradients of nodes 1..3, 1/m */
-  SbLane   *batch_V;               /* [nbatch] volumes, m^3; 0 in padding */
+  SbLane   *batch_g;               /* [nbatch][9] basis gradients of nodes 1..3, 1/m; 64-byte aligned */
+  SbLane   *batch_V;               /* [nbatch] volumes, m^3; 0 in padding; 64-byte aligned */
+  void     *batch_memory;          /* what batch_g and batch_V live in */
   PetscReal *node_mass;            /* [nnode] lumped mass, kg, complete on owned nodes */
   PetscBool  consistent_mass;      /* -mass consistent */
   uint8_t   *fixed;                /* [nnode] bit c set: component c of the node is prescribed */
@@ -53,6 +55,7 @@ struct _p_SbSpace {
   PetscReal *fixed_value;          /* [nfixed][3] prescribed displacement at the time last asked for, m */
   Vec        template_vec;         /* ghosted (more than one rank) or sequential; block size 3 */
   struct _p_SbPlan *plan;          /* cell blocks -> matrix values; NULL before SbSpaceCreateMatrix() */
+  PetscReal  block_scale;          /* factor on blocks of SbSpaceAddCellBlock(): the load factor of a static run, else 1 */
   PetscBool  linear;               /* every region's law is linear */
 };
 
@@ -79,10 +82,10 @@ PetscErrorCode SbSpaceAddInertia(SbSpace space, const SbStage *stage, PetscReal 
 typedef enum { SB_MATRIX_AIJ, SB_MATRIX_BAIJ, SB_MATRIX_SBAIJ } SbMatrixKind; /* SBAIJ: one rank only */
 /* Preallocated matrix and the assembly plan. Collective. Caller destroys the matrix. */
 PetscErrorCode SbSpaceCreateMatrix(SbSpace space, SbMatrixKind kind, Mat *A);
-/* A = shift_a M + shift_v C + K(u), rows and columns of prescribed unknowns replaced by a scaled identity
-   after `add` (may be NULL) had its turn to add blocks. Not collective but for the state increase. */
+/* A = shift_a M + shift_v C + shift_k K(u). No communication; SbSpaceFinishTangent() must follow. */
 PetscErrorCode SbSpaceAssembleTangent(SbSpace space, const SbStage *stage, Mat A);
-PetscErrorCode SbSpaceFinishTangent(SbSpace space, Mat A); /* constraints, assembly state */
+/* Replaces rows and columns of prescribed unknowns by a scaled identity and closes the assembly. */
+PetscErrorCode SbSpaceFinishTangent(SbSpace space, Mat A);
 /* Between the two: A += a 3x3 block (row-major, N/m) for two nodes a, b = 0..3 of a local cell. Not collective. */
 PetscErrorCode SbSpaceAddCellBlock(SbSpace space, Mat A, PetscInt cell, PetscInt a, PetscInt b, const PetscReal block[9]);
 
@@ -95,8 +98,10 @@ PetscInt       SbSpaceFixedIndex(SbSpace space, PetscInt node);
 
 /* Per owned cell: Cauchy stress sigma[6] = xx yy zz xy yz xz (Pa), J, energy density (J/m^3, rest). Outputs may be NULL. */
 PetscErrorCode SbSpaceCellState(SbSpace space, const PetscReal u[], PetscReal sigma[], PetscReal J[], PetscReal psi[]);
-/* Strain energy of owned cells, J; and the number of inverted owned cells, smallest J. Local sums: reduce them. */
-PetscErrorCode SbSpaceStrainEnergy(SbSpace space, const PetscReal u[], PetscReal *energy, PetscReal *minJ, PetscInt *ninverted);
+/* Owned cells: strain energy (J), smallest det F, number with det F <= 0, current volume (m^3). Local: reduce them. */
+PetscErrorCode SbSpaceStrainEnergy(SbSpace space, const PetscReal u[], PetscReal *energy, PetscReal *minJ, PetscInt *ninverted, PetscReal *volume);
+/* v . C v of owned cells, W. Local: reduce it. */
+PetscErrorCode SbSpaceDampingPower(SbSpace space, const PetscReal u[], const PetscReal v[], PetscReal *power);
 /* Largest stable step of an explicit run: min over cells of smallest altitude / wave speed, s. Collective. */
 PetscErrorCode SbSpaceStableStep(SbSpace space, PetscReal *dt);
 

@@ -7,9 +7,7 @@
 */
 #pragma once
 #include "sbbase.h"
-
-#define SB_BATCH 8
-typedef PetscReal SbLane[SB_BATCH]; /* 64-byte aligned where the program allocates it */
+#include "sbkernel.h"
 
 typedef struct _p_SbMaterial *SbMaterial;
 

@@ -41,6 +41,7 @@ struct _p_SbModel {
   PetscBool   linear;           /* laws and effects: the tangent depends on the shifts only */
   PetscReal   mass;             /* kg */
   PetscBool   dynamic;
+  PetscReal   load;             /* load factor: 1, in a static run 0..1; multiplies loads and prescribed displacements */
 };
 
 PetscErrorCode SbModelDestroy(SbModel *model);
@@ -50,10 +51,13 @@ PetscErrorCode SbModelSetUp(SbModel model);
 PetscErrorCode SbModelResidual(SbModel model, PetscReal t, Vec U, Vec V, Vec A, PetscBool constrain, Vec F);
 /* f_ext alone */
 PetscErrorCode SbModelLoads(SbModel model, PetscReal t, Vec U, Vec V, Vec F);
-PetscErrorCode SbModelTangent(SbModel model, PetscReal t, PetscReal shift_v, PetscReal shift_a, Vec U, Vec V, Mat A);
+/* A = shift_a M + shift_v C + shift_k K(u) and the effects' part, prescribed unknowns replaced. Collective. */
+PetscErrorCode SbModelTangent(SbModel model, PetscReal t, PetscReal shift_v, PetscReal shift_a, PetscReal shift_k, Vec U, Vec V, Mat A);
 /* Writes prescribed displacements at t into U. */
 PetscErrorCode SbModelPrescribe(SbModel model, PetscReal t, Vec U);
 /* Initial velocities of bodies (translation and spin). */
 PetscErrorCode SbModelInitialState(SbModel model, Vec U, Vec V);
 /* Instantaneous part of the energies (kinetic, strain, momenta, ...). V may be NULL. Collective. */
 PetscErrorCode SbModelEnergies(SbModel model, Vec U, Vec V, SbEnergies *e);
+/* Power taken by Rayleigh damping, v . C v, W. Collective. */
+PetscErrorCode SbModelDampingPower(SbModel model, Vec U, Vec V, PetscReal *power);

@@ -49,7 +49,8 @@ struct _p_SbRun {
 };
 
 PetscErrorCode SbTimeRegister(void);   /* option rows and the TSType */
-PetscErrorCode SbRunCreate(SbModel model, SbRun *run); /* reads -time, -solver, ...; collective */
+PetscErrorCode SbRunCreate(SbModel model, SbRun *run); /* reads the options -time, -solver, ...; nothing is computed yet */
+PetscErrorCode SbRunSetUp(SbRun run);                  /* after SbModelSetUp(): vectors, matrix, solver, integrator. Collective */
 PetscErrorCode SbRunAddMonitor(SbRun run, SbMonitorFn fn, void *ctx, PetscErrorCode (*destroy)(void *));
 PetscErrorCode SbRunSolve(SbRun run);  /* the whole time loop or load path; an early end is in run->stop_reason, not an error */
 PetscErrorCode SbRunDestroy(SbRun *run);

@@ -1,0 +1,117 @@
+/*
+  sbkernel.h - layer 0: what the batch kernels are made of: lanes, function multiversioning, 3x3 algebra, polar rotation.
+
+  A kernel works on SB_BATCH tets side by side. Every quantity is an array over lanes, and a kernel is a loop over lanes
+  around straight-line code, so that the compiler turns each scalar of the text into one vector register. The functions
+  below are that straight-line code: matrices are row-major, A[3*i+j] is A_ij, on plain doubles of one lane.
+
+  A batch is 8 wide: one AVX-512 register of doubles, two of AVX. 16 was measured too and gained nothing: the cell matrix
+  of a batch (90 numbers per tet) then takes a third of the first-level cache.
+*/
+#pragma once
+#include <petscsys.h>
+#include <math.h>
+
+#define SB_BATCH 8
+typedef PetscReal SbLane[SB_BATCH]; /* 64-byte aligned where the program allocates it */
+
+/*
+  SB_KERNEL in front of a function compiles it for AVX-512, for AVX with fused multiply-add, and for the baseline; the
+  loader picks one when the program starts. Inlined helpers follow their caller. "fma" (which brings AVX) stands for all
+  AVX2 machines: the kernels use no integer vectors. Off where it cannot work or is in the way: other compilers and
+  processors, debug and sanitizer builds.
+*/
+#if defined(__GNUC__) && !defined(__clang__) && defined(__x86_64__) && defined(__gnu_linux__) && !defined(SB_DEBUG) && \
+  !defined(SB_SANITIZE) && !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
+  #define SB_KERNEL __attribute__((target_clones("avx512f", "fma", "default")))
+#else
+  #define SB_KERNEL
+#endif
+
+/* Copies n numbers of lane l out of and into a batch. */
+static inline void SbLaneGet(int n, const SbLane a[], int l, PetscReal x[])
+{
+  for (int k = 0; k < n; k++) x[k] = a[k][l];
+}
+
+static inline void SbLanePut(int n, const PetscReal x[], int l, SbLane a[])
+{
+  for (int k = 0; k < n; k++) a[k][l] = x[k];
+}
+
+static inline PetscReal SbDot3(const PetscReal a[3], const PetscReal b[3])
+{
+  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+/* A : B */
+static inline PetscReal SbDot9(const PetscReal A[9], const PetscReal B[9])
+{
+  return SbDot3(A, B) + SbDot3(A + 3, B + 3) + SbDot3(A + 6, B + 6);
+}
+
+/* c = a x b */
+static inline void SbCross(const PetscReal a[3], const PetscReal b[3], PetscReal c[3])
+{
+  c[0] = a[1] * b[2] - a[2] * b[1];
+  c[1] = a[2] * b[0] - a[0] * b[2];
+  c[2] = a[0] * b[1] - a[1] * b[0];
+}
+
+/* C = A B */
+static inline void SbMatMul(const PetscReal A[9], const PetscReal B[9], PetscReal C[9])
+{
+  for (int i = 0; i < 3; i++) {
+    for (int j = 0; j < 3; j++) C[3 * i + j] = A[3 * i] * B[j] + A[3 * i + 1] * B[3 + j] + A[3 * i + 2] * B[6 + j];
+  }
+}
+
+/* C = A^T B */
+static inline void SbMatTransposeMul(const PetscReal A[9], const PetscReal B[9], PetscReal C[9])
+{
+  for (int i = 0; i < 3; i++) {
+    for (int j = 0; j < 3; j++) C[3 * i + j] = A[i] * B[j] + A[3 + i] * B[3 + j] + A[6 + i] * B[6 + j];
+  }
+}
+
+/* C = A B^T */
+static inline void SbMatMulTranspose(const PetscReal A[9], const PetscReal B[9], PetscReal C[9])
+{
+  for (int i = 0; i < 3; i++) {
+    for (int j = 0; j < 3; j++) C[3 * i + j] = SbDot3(A + 3 * i, B + 3 * j);
+  }
+}
+
+/* cof A = d(det A)/dA, the transposed adjugate; its rows are cross products of the rows of A. */
+static inline void SbMatCofactor(const PetscReal A[9], PetscReal C[9])
+{
+  SbCross(A + 3, A + 6, C);
+  SbCross(A + 6, A, C + 3);
+  SbCross(A, A + 3, C + 6);
+}
+
+static inline PetscReal SbMatDet(const PetscReal A[9])
+{
+  PetscReal c[3];
+
+  SbCross(A + 3, A + 6, c);
+  return SbDot3(A, c);
+}
+
+/*
+  SbPolar - the proper rotation R next to F: det R = +1, the maximiser of R : F, for every F.
+
+  Not collective. Input: F, deformation gradients. Output: R, rotations; R^T F is symmetric. Where the maximiser is not
+  unique (rank one, F = 0, reflections with equal stretches) some maximiser is returned, I for F = 0. A lane that is not
+  finite gives NaN. Error of R about 5 eps |F| / (s2 + s3), s2 + s3 being the sum of the two smaller signed stretches:
+  that is rounding of F seen through the condition number of the problem. A lane's result does not depend on the others.
+*/
+void SbPolar(const SbLane F[9], SbLane R[9]);
+
+/*
+  SbSymEig - eigenvalues s[3] and eigenvectors V (columns, det V = +1) of symmetric matrices S[6] = 00 01 02 11 12 22.
+
+  Not collective. Fixed number of Jacobi sweeps, no order among the eigenvalues. With R from SbPolar() and S = R^T F this
+  is the singular value decomposition F = (R V) diag(s) V^T with two rotations, the sign of det F being in s.
+*/
+void SbSymEig(const SbLane S[6], SbLane s[3], SbLane V[9]);

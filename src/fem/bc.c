@@ -1,0 +1,41 @@
+/*
+  Prescribed unknowns. They stay in the system, so that the block size is three everywhere: their rows are u = prescribed
+  (see tangent.c for the matrix). The initial guess of every solve carries the prescribed values, which makes their
+  residual zero and moves their effect on free unknowns to the right-hand side.
+*/
+#include "fem_impl.h"
+
+PetscErrorCode SbSpaceFix(SbSpace s, PetscInt node, int components)
+{
+  PetscFunctionBeginUser;
+  PetscCheck(!s->fixed_node, PETSC_COMM_SELF, PETSC_ERR_ORDER, "Unknowns can be prescribed during set-up only");
+  s->fixed[node] |= (uint8_t)(components & 7);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbSpaceFixDone(SbSpace s)
+{
+  PetscFunctionBeginUser;
+  s->nfixed = 0;
+  for (PetscInt i = 0; i < s->nnode; i++) s->nfixed += s->fixed[i] != 0;
+  PetscCall(PetscMalloc1(s->nfixed, &s->fixed_node));
+  PetscCall(PetscCalloc1(3 * s->nfixed, &s->fixed_value));
+  s->nfixed = 0;
+  for (PetscInt i = 0; i < s->nnode; i++) {
+    if (s->fixed[i]) s->fixed_node[s->nfixed++] = i;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscInt SbSpaceFixedIndex(SbSpace s, PetscInt node)
+{
+  PetscInt lo = 0, hi = s->nfixed;
+
+  while (lo < hi) {
+    const PetscInt mid = lo + (hi - lo) / 2;
+
+    if (s->fixed_node[mid] < node) lo = mid + 1;
+    else hi = mid;
+  }
+  return lo < s->nfixed && s->fixed_node[lo] == node ? lo : -1;
+}

@@ -1,0 +1,56 @@
+/*
+  fem_impl.h - what the files of src/fem share: the assembly plan and the gather of a batch.
+*/
+#pragma once
+#include "sbfem.h"
+
+/*
+  The plan: sparsity graph of the owned node rows, split as PETSc splits it (diagonal part: owned columns; off-diagonal
+  part: ghost columns), and for each local cell the place of its 16 node blocks in it. A block index k of row i is the same
+  for BAIJ (values 9 k ..) and for AIJ with full 3x3 blocks (see block_position in tangent.c).
+*/
+typedef struct _p_SbPlan {
+  PetscInt *di, *dj;      /* diagonal part: rows [nnode_owned+1], local columns ascending */
+  PetscInt *oi, *oj;      /* off-diagonal part: columns are local ghost nodes, ascending */
+  PetscInt *diagonal;     /* [nnode_owned] block index of (i, i) */
+  PetscInt *offset;       /* [ncell][16] block (a, b) at 4 a + b: k in the diagonal part, ~k in the off-diagonal part,
+                             SB_NOT_OWNED when row a is another rank's */
+  PetscInt *ui;           /* [nnode_owned+1] first upper block of each row, for SBAIJ; NULL otherwise */
+  PetscInt *upper;        /* [ncell][10] block index in the upper triangle of pair p, ~k when it is to be transposed */
+  PetscInt  nfix;         /* blocks that a prescribed unknown touches */
+  PetscInt *fix_block;    /* [nfix] block index as in offset */
+  PetscInt *fix_row;      /* [nfix] local row node */
+  uint8_t  *fix_mask;     /* [nfix] bits 0..2: rows, bits 3..5: columns of the block to clear; bit 6: diagonal block */
+} *SbPlan;
+#define SB_NOT_OWNED PETSC_MIN_INT
+
+PetscErrorCode SbPlanCreate(SbSpace space, SbPlan *plan);
+PetscErrorCode SbPlanDestroy(SbPlan *plan);
+
+/* u[3 a + i][lane] of a batch from a local array [nnode][3]. */
+static inline void sb_gather(const PetscInt node[4 * SB_BATCH], const PetscReal x[], SbLane u[12])
+{
+  for (int a = 0; a < 4; a++) {
+    for (int l = 0; l < SB_BATCH; l++) {
+      const PetscReal *p = x + 3 * node[a * SB_BATCH + l];
+
+      u[3 * a][l]     = p[0];
+      u[3 * a + 1][l] = p[1];
+      u[3 * a + 2][l] = p[2];
+    }
+  }
+}
+
+/* f[nnode][3] += the first n lanes of a batch's nodal vectors. */
+static inline void sb_scatter_add(const PetscInt node[4 * SB_BATCH], PetscInt n, const SbLane fe[12], PetscReal f[])
+{
+  for (int a = 0; a < 4; a++) {
+    for (PetscInt l = 0; l < n; l++) {
+      PetscReal *p = f + 3 * node[a * SB_BATCH + l];
+
+      p[0] += fe[3 * a][l];
+      p[1] += fe[3 * a + 1][l];
+      p[2] += fe[3 * a + 2][l];
+    }
+  }
+}

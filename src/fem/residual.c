@@ -1,0 +1,192 @@
+/*
+  Internal forces, inertia and the state of cells.
+
+  f_a = V P grad phi_a with P from the law, and beta (dP/dF : H) for stiffness-proportional damping, H = grad v. Ghost cells are
+  evaluated too: every owned node then has all its contributions. Energies sum over owned cells only.
+*/
+#include "fem_impl.h"
+#include "sbkernel.h"
+
+static void add_region_force(SbSpace s, const SbRegion *region, const SbStage *stage, PetscReal f[])
+{
+  const SbMaterial m = region->material;
+  const PetscReal  beta = stage->v ? region->beta : 0.;
+
+  for (PetscInt b = region->bstart; b < region->bend; b++) {
+    const PetscInt *node = s->batch_node + 4 * SB_BATCH * b;
+    const SbLane   *g    = s->batch_g + 9 * b;
+    SbLane          u[12], F[9], P[9], fe[12];
+
+    sb_gather(node, stage->u, u);
+    SbCellGradient(g, (const SbLane *)u, F);
+    m->ops.stress(m, (const SbLane *)F, P);
+    if (beta != 0.) {
+      SbLane H[9], dP[9];
+
+      sb_gather(node, stage->v, u);
+      SbCellGradientRate(g, (const SbLane *)u, H);
+      SbMaterialTangentAction(m, (const SbLane *)F, (const SbLane *)H, dP);
+      for (int k = 0; k < 9; k++) {
+        for (int l = 0; l < SB_BATCH; l++) P[k][l] += beta * dP[k][l];
+      }
+    }
+    SbCellForce(g, s->batch_V[b], (const SbLane *)P, fe);
+    sb_scatter_add(node, s->batch_n[b], (const SbLane *)fe, f);
+  }
+}
+
+PetscErrorCode SbSpaceAddInternalForce(SbSpace s, const SbStage *stage, PetscReal f[])
+{
+  PetscFunctionBeginUser;
+  PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_RESIDUAL], 0, 0, 0, 0));
+  for (PetscInt r = 0; r < s->nregion; r++) add_region_force(s, &s->region[r], stage, f);
+  PetscCall(PetscLogEventEnd(SbEvents[SB_EVENT_RESIDUAL], 0, 0, 0, 0));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* w = a + alpha v at the cell's nodes, then the consistent or the lumped mass times w. */
+PetscErrorCode SbSpaceAddInertia(SbSpace s, const SbStage *stage, PetscReal f[])
+{
+  PetscFunctionBeginUser;
+  for (PetscInt r = 0; r < s->nregion; r++) {
+    const SbRegion     *region = &s->region[r];
+    const SbElementOps *e      = &region->element->ops;
+    const PetscReal     alpha = region->alpha, rho = region->material->density;
+
+    for (PetscInt b = region->bstart; b < region->bend; b++) {
+      const PetscInt *node = s->batch_node + 4 * SB_BATCH * b;
+
+      for (PetscInt l = 0; l < s->batch_n[b]; l++) {
+        const PetscReal m = rho * s->batch_V[b][l];
+
+        for (PetscInt i = 0; i < 3; i++) {
+          PetscReal w[4], sum = 0.;
+
+          for (PetscInt a = 0; a < 4; a++) {
+            const PetscInt k = 3 * node[a * SB_BATCH + l] + i;
+
+            w[a] = stage->a[k] + (alpha != 0. ? alpha * stage->v[k] : 0.);
+            sum += w[a];
+          }
+          for (PetscInt a = 0; a < 4; a++) {
+            const PetscReal share = s->consistent_mass ? (e->mass_diagonal - e->mass_coupling) * w[a] + e->mass_coupling * sum : e->mass_lumped * w[a];
+
+            f[3 * node[a * SB_BATCH + l] + i] += m * share;
+          }
+        }
+      }
+    }
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Cauchy stress P F^T / J of one lane, in the order xx yy zz xy yz xz. */
+static void cauchy(const SbLane P[9], const SbLane F[9], PetscInt l, PetscReal J, PetscReal sigma[6])
+{
+  static const int row[6] = {0, 1, 2, 0, 1, 0}, column[6] = {0, 1, 2, 1, 2, 2};
+
+  for (int k = 0; k < 6; k++) {
+    PetscReal sum = 0.;
+
+    for (int j = 0; j < 3; j++) sum += P[3 * row[k] + j][l] * F[3 * column[k] + j][l];
+    sigma[k] = sum / J;
+  }
+}
+
+static PetscReal lane_det(const SbLane F[9], PetscInt l)
+{
+  return F[0][l] * (F[4][l] * F[8][l] - F[5][l] * F[7][l]) - F[1][l] * (F[3][l] * F[8][l] - F[5][l] * F[6][l]) + F[2][l] * (F[3][l] * F[7][l] - F[4][l] * F[6][l]);
+}
+
+PetscErrorCode SbSpaceCellState(SbSpace s, const PetscReal x[], PetscReal sigma[], PetscReal J[], PetscReal psi[])
+{
+  PetscFunctionBeginUser;
+  for (PetscInt r = 0; r < s->nregion; r++) {
+    const SbRegion  *region = &s->region[r];
+    const SbMaterial m      = region->material;
+
+    for (PetscInt b = region->bstart; region->owned && b < region->bend; b++) {
+      SbLane u[12], F[9], P[9], energy;
+
+      sb_gather(s->batch_node + 4 * SB_BATCH * b, x, u);
+      SbCellGradient(s->batch_g + 9 * b, (const SbLane *)u, F);
+      if (sigma) m->ops.stress(m, (const SbLane *)F, P);
+      if (psi) m->ops.energy(m, (const SbLane *)F, energy);
+      for (PetscInt l = 0; l < s->batch_n[b]; l++) {
+        const PetscInt  c   = s->batch_cell[b] + l;
+        const PetscReal det = lane_det((const SbLane *)F, l);
+
+        if (J) J[c] = det;
+        if (psi) psi[c] = energy[l];
+        if (!sigma) continue;
+        /* small strain has one stress: P itself */
+        if (m->linear) {
+          const int entry[6] = {0, 4, 8, 1, 5, 2};
+
+          for (int k = 0; k < 6; k++) sigma[6 * c + k] = P[entry[k]][l];
+        } else cauchy((const SbLane *)P, (const SbLane *)F, l, det, sigma + 6 * c);
+      }
+    }
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbSpaceStrainEnergy(SbSpace s, const PetscReal x[], PetscReal *energy, PetscReal *minJ, PetscInt *ninverted, PetscReal *volume)
+{
+  PetscFunctionBeginUser;
+  *energy    = 0.;
+  *volume    = 0.;
+  *minJ      = PETSC_MAX_REAL;
+  *ninverted = 0;
+  for (PetscInt r = 0; r < s->nregion; r++) {
+    const SbRegion  *region = &s->region[r];
+    const SbMaterial m      = region->material;
+
+    for (PetscInt b = region->bstart; region->owned && b < region->bend; b++) {
+      SbLane u[12], F[9], psi;
+
+      sb_gather(s->batch_node + 4 * SB_BATCH * b, x, u);
+      SbCellGradient(s->batch_g + 9 * b, (const SbLane *)u, F);
+      m->ops.energy(m, (const SbLane *)F, psi);
+      for (PetscInt l = 0; l < s->batch_n[b]; l++) {
+        const PetscReal det = lane_det((const SbLane *)F, l);
+
+        *energy += s->batch_V[b][l] * psi[l];
+        *volume += s->batch_V[b][l] * det;
+        *minJ = PetscMin(*minJ, det);
+        *ninverted += det <= 0.;
+      }
+    }
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbSpaceDampingPower(SbSpace s, const PetscReal x[], const PetscReal v[], PetscReal *power)
+{
+  PetscFunctionBeginUser;
+  *power = 0.;
+  for (PetscInt r = 0; r < s->nregion; r++) {
+    const SbRegion  *region = &s->region[r];
+    const SbMaterial m      = region->material;
+
+    if (!region->owned || (region->alpha == 0. && region->beta == 0.)) continue;
+    for (PetscInt b = region->bstart; b < region->bend; b++) {
+      const PetscInt *node = s->batch_node + 4 * SB_BATCH * b;
+      SbLane          u[12], F[9], H[9], dP[9];
+
+      sb_gather(node, x, u);
+      SbCellGradient(s->batch_g + 9 * b, (const SbLane *)u, F);
+      sb_gather(node, v, u);
+      SbCellGradientRate(s->batch_g + 9 * b, (const SbLane *)u, H);
+      SbMaterialTangentAction(m, (const SbLane *)F, (const SbLane *)H, dP);
+      for (PetscInt l = 0; l < s->batch_n[b]; l++) {
+        PetscReal hooke = 0., inertia = 0.;
+
+        for (int k = 0; k < 9; k++) hooke += H[k][l] * dP[k][l];
+        for (int k = 0; k < 12; k++) inertia += u[k][l] * u[k][l];
+        *power += s->batch_V[b][l] * (region->beta * hooke + region->alpha * m->density * region->element->ops.mass_lumped * inertia);
+      }
+    }
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

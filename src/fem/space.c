@@ -1,0 +1,391 @@
+/*
+  The space: which nodes carry unknowns, which cells belong to which law, and the cells' geometry in batches.
+
+  Nodes are numbered on each rank with the owned ones first and the ghosts after them, which is the storage order of a
+  ghosted PETSc vector: the global vector and the local array that the kernels read are the same memory, and an update
+  moves ghost values only. With one layer of overlap every cell that touches an owned node is local, so a residual or a
+  matrix row is complete without communication.
+
+  Cells are grouped in regions (one body, one law, owned or ghost), each cut into batches of SB_BATCH cells whose
+  gradients and volumes lie side by side.
+
+  Not handled: elements with nodes elsewhere than at the vertices.
+*/
+#include "sbfem.h"
+#include "fem_impl.h"
+
+static const SbOption rows[] = {
+  {"mass", SB_OPTION_CHOICE, 1, "", "lumped", "lumped|consistent", "mass matrix: lumped at the nodes, or consistent with the basis"},
+};
+
+PetscErrorCode SbSpaceRegister(void)
+{
+  PetscFunctionBeginUser;
+  PetscCall(SbOptionsRegister("", "", (PetscInt)PETSC_STATIC_ARRAY_LENGTH(rows), rows));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Nodes of P1 are the mesh's vertices. */
+static PetscErrorCode layout_nodes(SbSpace s, const SbElement element[])
+{
+  SbMesh mesh = s->mesh;
+
+  PetscFunctionBeginUser;
+  for (PetscInt b = 0; b < mesh->nbody; b++) {
+    const PetscInt *per = element[b]->nodes_per;
+
+    PetscCheck(per[0] == 1 && !per[1] && !per[2] && !per[3], PETSC_COMM_SELF, PETSC_ERR_SUP, "Element %s of body %s has nodes off the vertices", element[b]->name,
+               mesh->body[b].name);
+  }
+  s->Nnode       = mesh->Nvert;
+  s->nnode_owned = mesh->nvert_owned;
+  s->nnode       = mesh->nvert;
+  s->gnode_start = mesh->gvert_start;
+  PetscCall(PetscMalloc1(s->nnode, &s->gnode));
+  PetscCall(PetscMalloc1(3 * s->nnode, &s->node_x));
+  PetscCall(PetscMalloc1(4 * mesh->ncell, &s->cell_node));
+  PetscCall(PetscArraycpy(s->gnode, mesh->gvert, s->nnode));
+  PetscCall(PetscArraycpy(s->node_x, mesh->x, 3 * s->nnode));
+  PetscCall(PetscArraycpy(s->cell_node, mesh->cell, 4 * mesh->ncell));
+  PetscCall(PetscCalloc1(s->nnode, &s->fixed));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Owned and ghost cells are each sorted by body: a region is a run of cells. */
+static PetscErrorCode find_regions(SbSpace s, const SbMaterial material[], const SbElement element[])
+{
+  SbMesh mesh = s->mesh;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscCalloc1(2 * mesh->nbody, &s->region));
+  s->linear = PETSC_TRUE;
+  for (PetscInt b = 0; b < mesh->nbody; b++) s->linear = (PetscBool)(s->linear && material[b]->linear);
+  for (PetscInt c = 0; c < mesh->ncell; c++) {
+    const PetscInt body = mesh->cell_body[c];
+
+    if (c == 0 || c == mesh->ncell_owned || body != mesh->cell_body[c - 1]) {
+      SbRegion *r = &s->region[s->nregion++];
+
+      r->body     = body;
+      r->material = material[body];
+      r->element  = element[body];
+      r->cstart   = c;
+      r->owned    = (PetscBool)(c < mesh->ncell_owned);
+      r->bstart   = s->nbatch;
+    }
+    s->region[s->nregion - 1].cend = c + 1;
+    if ((c - s->region[s->nregion - 1].cstart) % SB_BATCH == 0) s->nbatch++;
+    s->region[s->nregion - 1].bend = s->nbatch;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Gradients, volumes and nodes of each batch; padding lanes repeat the first cell with volume zero. */
+static PetscErrorCode tabulate_batches(SbSpace s)
+{
+  const size_t bytes = (size_t)s->nbatch * 10 * sizeof(SbLane);
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscMalloc1(s->nbatch, &s->batch_cell));
+  PetscCall(PetscMalloc1(s->nbatch, &s->batch_n));
+  PetscCall(PetscMalloc1(s->nbatch * 4 * SB_BATCH, &s->batch_node));
+  PetscCall(PetscMalloc(bytes + 64, &s->batch_memory));
+  s->batch_g = (SbLane *)(((uintptr_t)s->batch_memory + 63) & ~(uintptr_t)63);
+  s->batch_V = s->batch_g + (size_t)s->nbatch * 9;
+  for (PetscInt r = 0; r < s->nregion; r++) {
+    const SbRegion *region = &s->region[r];
+
+    for (PetscInt b = region->bstart; b < region->bend; b++) {
+      const PetscInt first = region->cstart + (b - region->bstart) * SB_BATCH;
+
+      s->batch_cell[b] = first;
+      s->batch_n[b]    = PetscMin(SB_BATCH, region->cend - first);
+      for (PetscInt l = 0; l < SB_BATCH; l++) {
+        const PetscInt *node = s->cell_node + 4 * (l < s->batch_n[b] ? first + l : first);
+        PetscReal       x[4][3], g[3][3], V;
+
+        for (PetscInt a = 0; a < 4; a++) {
+          for (PetscInt i = 0; i < 3; i++) x[a][i] = s->node_x[3 * node[a] + i];
+          s->batch_node[(4 * b + a) * SB_BATCH + l] = node[a];
+        }
+        region->element->ops.tabulate((const PetscReal(*)[3])x, g, &V);
+        for (PetscInt k = 0; k < 9; k++) s->batch_g[9 * b + k][l] = g[k / 3][k % 3];
+        s->batch_V[b][l] = l < s->batch_n[b] ? V : 0.;
+      }
+    }
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode lump_mass(SbSpace s)
+{
+  PetscFunctionBeginUser;
+  PetscCall(PetscCalloc1(s->nnode, &s->node_mass));
+  for (PetscInt r = 0; r < s->nregion; r++) {
+    const SbRegion *region = &s->region[r];
+    const PetscReal share  = region->material->density * region->element->ops.mass_lumped;
+
+    for (PetscInt b = region->bstart; b < region->bend; b++) {
+      for (PetscInt l = 0; l < s->batch_n[b]; l++) {
+        for (PetscInt a = 0; a < 4; a++) s->node_mass[s->batch_node[(4 * b + a) * SB_BATCH + l]] += share * s->batch_V[b][l];
+      }
+    }
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode create_template(SbSpace s)
+{
+  PetscMPIInt size;
+
+  PetscFunctionBeginUser;
+  PetscCallMPI(MPI_Comm_size(s->comm, &size));
+  if (size == 1) {
+    PetscCall(VecCreateSeq(s->comm, 3 * s->nnode, &s->template_vec));
+    PetscCall(VecSetBlockSize(s->template_vec, 3));
+  } else {
+    PetscCall(VecCreateGhostBlock(s->comm, 3, 3 * s->nnode_owned, PETSC_DECIDE, s->nnode - s->nnode_owned, s->gnode + s->nnode_owned, &s->template_vec));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbSpaceCreate(SbMesh mesh, const SbMaterial material[], const SbElement element[], SbSpace *space)
+{
+  SbSpace  s;
+  PetscInt mass;
+  SbScope  scope;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_SPACE_SETUP], 0, 0, 0, 0));
+  PetscCall(PetscNew(&s));
+  s->comm        = mesh->comm;
+  s->mesh        = mesh;
+  s->block_scale = 1.;
+  PetscCall(SbScopeSet(&scope, "", "", ""));
+  PetscCall(SbOptionChoice(&scope, "mass", &mass));
+  s->consistent_mass = (PetscBool)(mass == 1);
+  PetscCall(layout_nodes(s, element));
+  PetscCall(find_regions(s, material, element));
+  PetscCall(tabulate_batches(s));
+  PetscCall(lump_mass(s));
+  PetscCall(create_template(s));
+  PetscCall(PetscLogEventEnd(SbEvents[SB_EVENT_SPACE_SETUP], 0, 0, 0, 0));
+  *space = s;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbSpaceDestroy(SbSpace *space)
+{
+  SbSpace s = *space;
+
+  PetscFunctionBeginUser;
+  if (!s) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(SbPlanDestroy(&s->plan));
+  PetscCall(VecDestroy(&s->template_vec));
+  PetscCall(PetscFree(s->gnode));
+  PetscCall(PetscFree(s->cell_node));
+  PetscCall(PetscFree(s->node_x));
+  PetscCall(PetscFree(s->region));
+  PetscCall(PetscFree(s->batch_cell));
+  PetscCall(PetscFree(s->batch_n));
+  PetscCall(PetscFree(s->batch_node));
+  PetscCall(PetscFree(s->batch_memory));
+  PetscCall(PetscFree(s->node_mass));
+  PetscCall(PetscFree(s->fixed));
+  PetscCall(PetscFree(s->fixed_node));
+  PetscCall(PetscFree(s->fixed_value));
+  PetscCall(PetscFree(*space));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbSpaceValidate(SbSpace s)
+{
+  PetscReal sums[2] = {0., 0.}, all[2];
+
+  PetscFunctionBeginUser;
+  for (PetscInt i = 0; i < s->nnode_owned; i++) {
+    PetscCheck(s->gnode[i] == s->gnode_start + i, PETSC_COMM_SELF, PETSC_ERR_PLIB, "Owned node %" PetscInt_FMT " is out of order", i);
+    PetscCheck(s->node_mass[i] > 0., PETSC_COMM_SELF, PETSC_ERR_PLIB, "Node %" PetscInt_FMT " has no mass", i);
+    sums[0] += s->node_mass[i];
+  }
+  for (PetscInt i = s->nnode_owned + 1; i < s->nnode; i++) PetscCheck(s->gnode[i] > s->gnode[i - 1], PETSC_COMM_SELF, PETSC_ERR_PLIB, "Ghost nodes are not sorted");
+  for (PetscInt r = 0; r < s->nregion; r++) {
+    const SbRegion *region = &s->region[r];
+
+    for (PetscInt b = region->bstart; region->owned && b < region->bend; b++) {
+      for (PetscInt l = 0; l < SB_BATCH; l++) sums[1] += region->material->density * s->batch_V[b][l];
+    }
+  }
+  PetscCallMPI(MPI_Allreduce(sums, all, 2, MPIU_REAL, MPI_SUM, s->comm));
+  PetscCheck(PetscAbsReal(all[0] - all[1]) <= 1e-12 * all[1], s->comm, PETSC_ERR_PLIB, "Mass of the nodes %g kg, of the cells %g kg", (double)all[0], (double)all[1]);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbSpaceCreateVec(SbSpace s, Vec *v)
+{
+  PetscFunctionBeginUser;
+  PetscCall(VecDuplicate(s->template_vec, v));
+  PetscCall(VecZeroEntries(*v));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbSpaceGetLocalRead(SbSpace s, Vec v, const PetscReal **array)
+{
+  Vec local = NULL;
+
+  PetscFunctionBeginUser;
+  if (s->nnode == s->nnode_owned && s->Nnode == s->nnode) {
+    PetscCall(VecGetArrayRead(v, array));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  PetscCall(VecGhostUpdateBegin(v, INSERT_VALUES, SCATTER_FORWARD));
+  PetscCall(VecGhostUpdateEnd(v, INSERT_VALUES, SCATTER_FORWARD));
+  PetscCall(VecGhostGetLocalForm(v, &local));
+  PetscCheck(local, s->comm, PETSC_ERR_ARG_WRONG, "The vector has no ghost entries: make it by SbSpaceCreateVec()");
+  PetscCall(VecGetArrayRead(local, array));
+  PetscCall(VecGhostRestoreLocalForm(v, &local));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The local form has one reference, held by v itself: it outlives the restore of the form above. */
+PetscErrorCode SbSpaceRestoreLocalRead(SbSpace s, Vec v, const PetscReal **array)
+{
+  Vec local = NULL;
+
+  PetscFunctionBeginUser;
+  if (s->nnode == s->nnode_owned && s->Nnode == s->nnode) {
+    PetscCall(VecRestoreArrayRead(v, array));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  PetscCall(VecGhostGetLocalForm(v, &local));
+  PetscCall(VecRestoreArrayRead(local, array));
+  PetscCall(VecGhostRestoreLocalForm(v, &local));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbSpaceGetLocalWrite(SbSpace s, Vec v, PetscReal **array)
+{
+  PetscFunctionBeginUser;
+  if (s->nnode != s->nnode_owned || s->Nnode != s->nnode) {
+    Vec local = NULL;
+
+    PetscCall(VecGhostGetLocalForm(v, &local));
+    PetscCheck(local, s->comm, PETSC_ERR_ARG_WRONG, "The vector has no ghost entries: make it by SbSpaceCreateVec()");
+    PetscCall(VecGhostRestoreLocalForm(v, &local));
+  }
+  /* the storage of a ghosted vector goes on behind its owned entries */
+  PetscCall(VecGetArray(v, array));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbSpaceRestoreLocalWrite(SbSpace s, Vec v, PetscReal **array)
+{
+  PetscFunctionBeginUser;
+  (void)s;
+  PetscCall(VecRestoreArray(v, array));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ sets */
+
+PetscErrorCode SbSpaceFindSet(SbSpace s, const char *name, const char *where, PetscInt *k)
+{
+  const char *names[SB_SET_MAX];
+  char        near[256];
+
+  PetscFunctionBeginUser;
+  for (*k = 0; *k < s->mesh->nset; (*k)++) {
+    PetscBool same;
+
+    PetscCall(PetscStrcmp(s->mesh->set[*k].name, name, &same));
+    if (same) PetscFunctionReturn(PETSC_SUCCESS);
+    names[*k] = s->mesh->set[*k].name;
+  }
+  PetscCall(SbNearest(name, s->mesh->nset, names, sizeof(near), near));
+  SETERRQ(PETSC_COMM_SELF, PETSC_ERR_USER, "%s names the set '%s', which does not exist%s%s", where, name, near[0] ? "; nearest: " : "", near);
+}
+
+PetscErrorCode SbSpaceGetSetNodes(SbSpace s, PetscInt k, PetscInt *n, PetscInt **nodes)
+{
+  PetscInt count = 0;
+
+  PetscFunctionBeginUser;
+  for (PetscInt i = 0; i < s->nnode; i++) count += (s->mesh->vert_set[i] & SB_SET_BIT(k)) != 0;
+  PetscCall(PetscMalloc1(count, nodes));
+  *n = 0;
+  for (PetscInt i = 0; i < s->nnode; i++) {
+    if (s->mesh->vert_set[i] & SB_SET_BIT(k)) (*nodes)[(*n)++] = i;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Corners of face f of a positively oriented tet, counter-clockwise seen from outside. */
+static const PetscInt face_corner[4][3] = {{1, 2, 3}, {0, 3, 2}, {0, 1, 3}, {0, 2, 1}};
+
+static void facet_geometry(SbSpace s, SbFacet *facet)
+{
+  PetscReal e1[3], e2[3], n[3], length;
+
+  for (PetscInt a = 0; a < 3; a++) facet->node[a] = s->cell_node[4 * facet->cell + face_corner[facet->face][a]];
+  for (PetscInt i = 0; i < 3; i++) {
+    e1[i] = s->node_x[3 * facet->node[1] + i] - s->node_x[3 * facet->node[0] + i];
+    e2[i] = s->node_x[3 * facet->node[2] + i] - s->node_x[3 * facet->node[0] + i];
+  }
+  for (PetscInt i = 0; i < 3; i++) n[i] = e1[(i + 1) % 3] * e2[(i + 2) % 3] - e1[(i + 2) % 3] * e2[(i + 1) % 3];
+  length      = PetscSqrtReal(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
+  facet->area = 0.5 * length;
+  for (PetscInt i = 0; i < 3; i++) facet->normal[i] = n[i] / length;
+}
+
+PetscErrorCode SbSpaceGetSetFacets(SbSpace s, PetscInt k, PetscInt *n, SbFacet **facets)
+{
+  const uint64_t want  = SB_SET_BIT(k) | SB_ON_BOUNDARY;
+  PetscInt       count = 0;
+
+  PetscFunctionBeginUser;
+  for (PetscInt f = 0; f < 4 * s->mesh->ncell; f++) count += (s->mesh->face_set[f] & want) == want;
+  PetscCall(PetscCalloc1(count, facets));
+  *n = 0;
+  for (PetscInt f = 0; f < 4 * s->mesh->ncell; f++) {
+    SbFacet *facet;
+
+    if ((s->mesh->face_set[f] & want) != want) continue;
+    facet       = &(*facets)[(*n)++];
+    facet->cell = f / 4;
+    facet->face = f % 4;
+    facet_geometry(s, facet);
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbSpaceStableStep(SbSpace s, PetscReal *dt)
+{
+  PetscReal mine = PETSC_MAX_REAL;
+
+  PetscFunctionBeginUser;
+  for (PetscInt r = 0; r < s->nregion; r++) {
+    const PetscReal c = SbMaterialWaveSpeed(s->region[r].material);
+
+    for (PetscInt b = s->region[r].bstart; b < s->region[r].bend; b++) {
+      for (PetscInt l = 0; l < s->batch_n[b]; l++) {
+        const SbLane *g      = s->batch_g + 9 * b;
+        PetscReal     sum[3] = {0., 0., 0.}, largest = 0.;
+
+        /* the altitude over node a is 1 / |grad phi_a| */
+        for (PetscInt a = 0; a < 3; a++) {
+          PetscReal g2 = 0.;
+
+          for (PetscInt j = 0; j < 3; j++) {
+            g2 += g[3 * a + j][l] * g[3 * a + j][l];
+            sum[j] += g[3 * a + j][l];
+          }
+          largest = PetscMax(largest, g2);
+        }
+        largest = PetscMax(largest, sum[0] * sum[0] + sum[1] * sum[1] + sum[2] * sum[2]);
+        mine    = PetscMin(mine, 1. / (PetscSqrtReal(largest) * c));
+      }
+    }
+  }
+  PetscCallMPI(MPI_Allreduce(&mine, dt, 1, MPIU_REAL, MPI_MIN, s->comm));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

@@ -1,0 +1,294 @@
+/*
+  The tangent A = shift_a M + shift_v C + shift_k K(u), written straight into the value arrays of the matrix.
+
+  K is summed from the cells' blocks (sbelement.h) at the places that the plan knows (plan.c); C = alpha M + beta K per
+  region; the lumped M is added to the diagonal blocks. Cells are taken in batches: the kernel works across the lanes, then each
+  lane's blocks are added to the matrix. BAIJ and SBAIJ store a 3x3 block by columns, AIJ as three pieces of rows.
+
+  petsc/private/petscimpl.h: raising the state of the outer parallel matrix, which writing into its parts does not do, has no
+  public call.
+
+  Prescribed unknowns: their rows and columns are cleared but for the diagonal entry, whose magnitude stays what the cells
+  made it, so that the scaling of the matrix is not disturbed.
+*/
+#include "fem_impl.h"
+#include <petsc/private/petscimpl.h>
+
+/* The value arrays of a matrix and how blocks lie in them. */
+typedef struct {
+  SbMatrixKind kind;
+  Mat          part[2];
+  PetscScalar *value[2];
+} Access;
+
+static PetscErrorCode access_begin(Mat A, Access *x)
+{
+  PetscBool is[5];
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscObjectTypeCompare((PetscObject)A, MATSEQAIJ, &is[0]));
+  PetscCall(PetscObjectTypeCompare((PetscObject)A, MATMPIAIJ, &is[1]));
+  PetscCall(PetscObjectTypeCompare((PetscObject)A, MATSEQBAIJ, &is[2]));
+  PetscCall(PetscObjectTypeCompare((PetscObject)A, MATMPIBAIJ, &is[3]));
+  PetscCall(PetscObjectTypeCompare((PetscObject)A, MATSEQSBAIJ, &is[4]));
+  x->part[0] = A;
+  x->part[1] = NULL;
+  if (is[1]) PetscCall(MatMPIAIJGetSeqAIJ(A, &x->part[0], &x->part[1], NULL));
+  if (is[3]) PetscCall(MatMPIBAIJGetSeqBAIJ(A, &x->part[0], &x->part[1], NULL));
+  x->kind     = is[4] ? SB_MATRIX_SBAIJ : is[2] || is[3] ? SB_MATRIX_BAIJ : SB_MATRIX_AIJ;
+  x->value[1] = NULL;
+  PetscCheck(is[0] || is[1] || is[2] || is[3] || is[4], PetscObjectComm((PetscObject)A), PETSC_ERR_SUP, "No direct access to a matrix of type %s",
+             ((PetscObject)A)->type_name);
+  for (int q = 0; q < 2 && x->part[q]; q++) {
+    if (x->kind == SB_MATRIX_AIJ) PetscCall(MatSeqAIJGetArray(x->part[q], &x->value[q]));
+    else if (x->kind == SB_MATRIX_BAIJ) PetscCall(MatSeqBAIJGetArray(x->part[q], &x->value[q]));
+    else PetscCall(MatSeqSBAIJGetArray(x->part[q], &x->value[q]));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode access_end(Access *x)
+{
+  PetscFunctionBeginUser;
+  for (int q = 0; q < 2 && x->part[q]; q++) {
+    if (x->kind == SB_MATRIX_AIJ) PetscCall(MatSeqAIJRestoreArray(x->part[q], &x->value[q]));
+    else if (x->kind == SB_MATRIX_BAIJ) PetscCall(MatSeqBAIJRestoreArray(x->part[q], &x->value[q]));
+    else PetscCall(MatSeqSBAIJRestoreArray(x->part[q], &x->value[q]));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Where block k of row i begins in the value array of part q, and the distance between its rows and columns. */
+static inline PetscScalar *block_position(const Access *x, SbPlan p, PetscInt row, PetscInt k, size_t *row_stride, size_t *column_stride)
+{
+  const int       q   = k < 0;
+  const PetscInt *ptr = q ? p->oi : p->di;
+
+  if (q) k = ~k;
+  if (x->kind == SB_MATRIX_AIJ) {
+    *row_stride    = 3 * (size_t)(ptr[row + 1] - ptr[row]);
+    *column_stride = 1;
+    return x->value[q] + 9 * (size_t)ptr[row] + 3 * (size_t)(k - ptr[row]);
+  }
+  *row_stride    = 1;
+  *column_stride = 3;
+  if (x->kind == SB_MATRIX_SBAIJ) k = p->ui[row] + k - p->diagonal[row];
+  return x->value[q] + 9 * (size_t)k;
+}
+
+/* One cell into BAIJ: block (b, a) is the transposed of (a, b), and a block by columns is its transposed by rows. */
+static inline void add_cell_baij(const Access *x, const PetscInt offset[16], const PetscReal K[10][9])
+{
+  for (int p = 0; p < 10; p++) {
+    const int      a = SbPairA[p], b = SbPairB[p];
+    const PetscInt kab = offset[4 * a + b], kba = offset[4 * b + a];
+
+    if (kab != SB_NOT_OWNED) {
+      PetscScalar *v = kab < 0 ? x->value[1] + 9 * (size_t)~kab : x->value[0] + 9 * (size_t)kab;
+
+      for (int j = 0; j < 3; j++) {
+        for (int i = 0; i < 3; i++) v[3 * j + i] += K[p][3 * i + j];
+      }
+    }
+    if (a != b && kba != SB_NOT_OWNED) {
+      PetscScalar *v = kba < 0 ? x->value[1] + 9 * (size_t)~kba : x->value[0] + 9 * (size_t)kba;
+
+      for (int e = 0; e < 9; e++) v[e] += K[p][e];
+    }
+  }
+}
+
+static inline void add_cell_sbaij(const Access *x, const PetscInt upper[10], const PetscReal K[10][9])
+{
+  for (int p = 0; p < 10; p++) {
+    if (upper[p] >= 0) {
+      PetscScalar *v = x->value[0] + 9 * (size_t)upper[p];
+
+      for (int j = 0; j < 3; j++) {
+        for (int i = 0; i < 3; i++) v[3 * j + i] += K[p][3 * i + j];
+      }
+    } else {
+      PetscScalar *v = x->value[0] + 9 * (size_t)~upper[p];
+
+      for (int e = 0; e < 9; e++) v[e] += K[p][e];
+    }
+  }
+}
+
+static inline void add_cell_aij(const Access *x, SbPlan plan, const PetscInt node[4], const PetscInt offset[16], const PetscReal K[10][9])
+{
+  for (int p = 0; p < 10; p++) {
+    const int a = SbPairA[p], b = SbPairB[p];
+
+    for (int turn = 0; turn < (a == b ? 1 : 2); turn++) {
+      const int      row = turn ? b : a, col = turn ? a : b;
+      const PetscInt k = offset[4 * row + col];
+      size_t         rs, cs;
+      PetscScalar   *v;
+
+      if (k == SB_NOT_OWNED) continue;
+      v = block_position(x, plan, node[row], k, &rs, &cs);
+      for (int i = 0; i < 3; i++) {
+        for (int j = 0; j < 3; j++) v[i * rs + (size_t)j] += turn ? K[p][3 * j + i] : K[p][3 * i + j];
+      }
+    }
+  }
+}
+
+/* Blocks of one batch, with the stiffness factor in the volumes and the consistent mass on top. */
+static void batch_blocks(SbSpace s, const SbRegion *region, const SbStage *stage, PetscInt b, SbLane K[10][9])
+{
+  const PetscReal factor = stage->shift_k + stage->shift_v * region->beta;
+  const PetscReal inertia = region->material->density * (stage->shift_a + stage->shift_v * region->alpha);
+  const SbMaterial m = region->material;
+  const SbLane    *g = s->batch_g + 9 * b;
+  SbLane           u[12], F[9], V;
+
+  for (int l = 0; l < SB_BATCH; l++) V[l] = factor * s->batch_V[b][l];
+  if (m->linear) SbCellBlocksIsotropic(g, V, m->lambda, m->mu, NULL, K);
+  else {
+    sb_gather(s->batch_node + 4 * SB_BATCH * b, stage->u, u);
+    SbCellGradient(g, (const SbLane *)u, F);
+    if (m->ops.frame) {
+      SbLane R[9];
+
+      m->ops.frame(m, (const SbLane *)F, R);
+      SbCellBlocksIsotropic(g, V, m->lambda, m->mu, (const SbLane *)R, K);
+    } else {
+      SbLane C[81];
+
+      m->ops.tangent(m, (const SbLane *)F, C);
+      SbCellBlocksGeneral(g, V, (const SbLane *)C, K);
+    }
+  }
+  if (s->consistent_mass && inertia != 0.) {
+    for (int p = 0; p < 10; p++) {
+      const PetscReal share = inertia * (SbPairA[p] == SbPairB[p] ? region->element->ops.mass_diagonal : region->element->ops.mass_coupling);
+
+      for (int i = 0; i < 3; i++) {
+        for (int l = 0; l < SB_BATCH; l++) K[p][4 * i][l] += share * s->batch_V[b][l];
+      }
+    }
+  }
+}
+
+static void add_region(SbSpace s, const SbRegion *region, const SbStage *stage, const Access *x)
+{
+  SbPlan plan = s->plan;
+
+  for (PetscInt b = region->bstart; b < region->bend; b++) {
+    SbLane K[10][9] __attribute__((aligned(64)));
+
+    batch_blocks(s, region, stage, b, K);
+    for (PetscInt l = 0; l < s->batch_n[b]; l++) {
+      const PetscInt cell = s->batch_cell[b] + l;
+      PetscReal      Ke[10][9];
+
+      for (int p = 0; p < 10; p++) {
+        for (int e = 0; e < 9; e++) Ke[p][e] = K[p][e][l];
+      }
+      if (x->kind == SB_MATRIX_BAIJ) add_cell_baij(x, plan->offset + 16 * cell, (const PetscReal(*)[9])Ke);
+      else if (x->kind == SB_MATRIX_SBAIJ) add_cell_sbaij(x, plan->upper + 10 * cell, (const PetscReal(*)[9])Ke);
+      else add_cell_aij(x, plan, s->cell_node + 4 * cell, plan->offset + 16 * cell, (const PetscReal(*)[9])Ke);
+    }
+  }
+}
+
+/* Damping proportional to mass differs between bodies; nodes belong to one body each. */
+static void add_lumped_mass(SbSpace s, const SbStage *stage, const Access *x)
+{
+  for (PetscInt r = 0; r < s->nregion; r++) {
+    const SbRegion *region = &s->region[r];
+    const PetscReal factor = (stage->shift_a + stage->shift_v * region->alpha) * region->material->density * region->element->ops.mass_lumped;
+
+    for (PetscInt b = region->bstart; b < region->bend; b++) {
+      for (PetscInt l = 0; l < s->batch_n[b]; l++) {
+        for (PetscInt a = 0; a < 4; a++) {
+          const PetscInt node = s->batch_node[(4 * b + a) * SB_BATCH + l];
+          size_t         rs, cs;
+          PetscScalar   *v;
+
+          if (node >= s->nnode_owned) continue;
+          v = block_position(x, s->plan, node, s->plan->diagonal[node], &rs, &cs);
+          for (size_t i = 0; i < 3; i++) v[i * (rs + cs)] += factor * s->batch_V[b][l];
+        }
+      }
+    }
+  }
+}
+
+PetscErrorCode SbSpaceAssembleTangent(SbSpace s, const SbStage *stage, Mat A)
+{
+  Access x;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_TANGENT], A, 0, 0, 0));
+  PetscCall(MatZeroEntries(A));
+  PetscCall(access_begin(A, &x));
+  for (PetscInt r = 0; r < s->nregion; r++) add_region(s, &s->region[r], stage, &x);
+  if (!s->consistent_mass && (stage->shift_a != 0. || stage->shift_v != 0.)) add_lumped_mass(s, stage, &x);
+  PetscCall(access_end(&x));
+  PetscCall(PetscLogEventEnd(SbEvents[SB_EVENT_TANGENT], A, 0, 0, 0));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbSpaceAddCellBlock(SbSpace s, Mat A, PetscInt cell, PetscInt a, PetscInt b, const PetscReal block[9])
+{
+  const PetscInt row = s->cell_node[4 * cell + a], column = s->cell_node[4 * cell + b], k = s->plan->offset[16 * cell + 4 * a + b];
+  Access         x;
+  size_t         rs, cs;
+  PetscScalar   *v;
+
+  PetscFunctionBeginUser;
+  if (k == SB_NOT_OWNED) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(access_begin(A, &x));
+  if (x.kind != SB_MATRIX_SBAIJ || row <= column) {
+    v = block_position(&x, s->plan, row, k, &rs, &cs);
+    for (size_t i = 0; i < 3; i++) {
+      for (size_t j = 0; j < 3; j++) v[i * rs + j * cs] += s->block_scale * block[3 * i + j];
+    }
+  }
+  PetscCall(access_end(&x));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Clears rows and columns of prescribed unknowns, keeping the magnitude on the diagonal. */
+static void clear_fixed(SbSpace s, const Access *x)
+{
+  SbPlan p = s->plan;
+
+  for (PetscInt n = 0; n < p->nfix; n++) {
+    const int    rows = p->fix_mask[n] & 7, columns = (p->fix_mask[n] >> 3) & 7, diagonal = p->fix_mask[n] & 64;
+    size_t       rs, cs;
+    PetscScalar *v;
+
+    if (x->kind == SB_MATRIX_SBAIJ && p->fix_block[n] < p->diagonal[p->fix_row[n]]) continue;
+    v = block_position(x, p, p->fix_row[n], p->fix_block[n], &rs, &cs);
+    for (int i = 0; i < 3; i++) {
+      for (int j = 0; j < 3; j++) {
+        PetscScalar *e = v + (size_t)i * rs + (size_t)j * cs;
+
+        if (!(rows & (1 << i)) && !(columns & (1 << j))) continue;
+        if (diagonal && i == j) *e = *e == 0. ? 1. : PetscAbsScalar(*e);
+        else *e = 0.;
+      }
+    }
+  }
+}
+
+PetscErrorCode SbSpaceFinishTangent(SbSpace s, Mat A)
+{
+  Access x;
+
+  PetscFunctionBeginUser;
+  PetscCall(access_begin(A, &x));
+  clear_fixed(s, &x);
+  PetscCall(access_end(&x));
+  /* the parts' cached diagonals are stale: their own (local) assembly drops them; the outer matrix only needs its state raised */
+  for (int q = 0; q < 2 && x.part[q]; q++) {
+    PetscCall(MatAssemblyBegin(x.part[q], MAT_FINAL_ASSEMBLY));
+    PetscCall(MatAssemblyEnd(x.part[q], MAT_FINAL_ASSEMBLY));
+  }
+  if (x.part[0] != A) PetscCall(PetscObjectStateIncrease((PetscObject)A));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

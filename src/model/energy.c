@@ -1,0 +1,106 @@
+/*
+  Energies and momenta of one instant: 1/2 v.M v, the strain energy of the laws, sum m v, sum x cross m v with the current
+  positions x = X + u, the centre of mass, and the extremes that tell whether a run is healthy. One reduction each for sums,
+  maxima and minima.
+
+  With the consistent mass the kinetic energy and the momenta use it too; the centre of mass is the same for both.
+*/
+#include "sbmodel.h"
+
+typedef enum { KINETIC, STRAIN, VOLUME, INVERTED, MOMENTUM, ANGULAR = MOMENTUM + 3, CENTRE = ANGULAR + 3, NSUM = CENTRE + 3 } Sum;
+
+/* p = M v with the run's mass matrix, [nnode][3]; v holds ghosts. */
+static PetscErrorCode momentum_density(SbModel m, const PetscReal v[], PetscReal p[])
+{
+  SbSpace s = m->space;
+
+  PetscFunctionBeginUser;
+  if (s->consistent_mass) {
+    SbStage    stage = {.a = v, .v = v};
+    PetscReal *zero  = NULL;
+
+    PetscCall(PetscCalloc1(3 * s->nnode, &zero));
+    stage.v = zero; /* inertia only, without mass-proportional damping */
+    PetscCall(SbSpaceAddInertia(s, &stage, p));
+    PetscCall(PetscFree(zero));
+  } else {
+    for (PetscInt i = 0; i < 3 * s->nnode_owned; i++) p[i] = s->node_mass[i / 3] * v[i];
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbModelEnergies(SbModel m, Vec U, Vec V, SbEnergies *e)
+{
+  SbSpace          s = m->space;
+  const PetscReal *u, *v = NULL;
+  PetscReal        sum[NSUM] = {0.}, extreme[3] = {0., 0., 0.}, *p = NULL; /* extreme: speed^2, displacement^2, -min J */
+  PetscInt         ninverted;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_ENERGY], 0, 0, 0, 0));
+  PetscCall(SbSpaceGetLocalRead(s, U, &u));
+  PetscCall(SbSpaceStrainEnergy(s, u, &sum[STRAIN], &extreme[2], &ninverted, &sum[VOLUME]));
+  sum[INVERTED] = (PetscReal)ninverted;
+  extreme[2]    = -extreme[2];
+  if (V) {
+    PetscCall(SbSpaceGetLocalRead(s, V, &v));
+    PetscCall(PetscCalloc1(3 * s->nnode, &p));
+    PetscCall(momentum_density(m, v, p));
+  }
+  for (PetscInt i = 0; i < s->nnode_owned; i++) {
+    PetscReal x[3], v2 = 0., u2 = 0.;
+
+    for (PetscInt k = 0; k < 3; k++) {
+      x[k] = s->node_x[3 * i + k] + u[3 * i + k];
+      u2 += u[3 * i + k] * u[3 * i + k];
+      sum[CENTRE + k] += s->node_mass[i] * x[k];
+    }
+    extreme[1] = PetscMax(extreme[1], u2);
+    for (PetscInt k = 0; v && k < 3; k++) {
+      const PetscInt k1 = (k + 1) % 3, k2 = (k + 2) % 3;
+
+      v2 += v[3 * i + k] * v[3 * i + k];
+      sum[KINETIC] += 0.5 * v[3 * i + k] * p[3 * i + k];
+      sum[MOMENTUM + k] += p[3 * i + k];
+      sum[ANGULAR + k] += x[k1] * p[3 * i + k2] - x[k2] * p[3 * i + k1];
+    }
+    extreme[0] = PetscMax(extreme[0], v2);
+  }
+  if (V) PetscCall(SbSpaceRestoreLocalRead(s, V, &v));
+  PetscCall(SbSpaceRestoreLocalRead(s, U, &u));
+  PetscCall(PetscFree(p));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, sum, NSUM, MPIU_REAL, MPI_SUM, m->comm));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, extreme, 3, MPIU_REAL, MPI_MAX, m->comm));
+  e->kinetic          = sum[KINETIC];
+  e->strain           = sum[STRAIN];
+  e->volume           = sum[VOLUME];
+  e->ninverted        = (PetscInt)sum[INVERTED];
+  e->max_speed        = PetscSqrtReal(extreme[0]);
+  e->max_displacement = PetscSqrtReal(extreme[1]);
+  e->min_J            = -extreme[2];
+  for (PetscInt k = 0; k < 3; k++) {
+    e->momentum[k] = sum[MOMENTUM + k];
+    e->angular[k]  = sum[ANGULAR + k];
+    e->centre[k]   = sum[CENTRE + k] / m->mass;
+  }
+  PetscCall(PetscLogEventEnd(SbEvents[SB_EVENT_ENERGY], 0, 0, 0, 0));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/*
+  Power taken by Rayleigh damping, v . C v, J/s: alpha v.M v + beta v.K(u) v per region. Owned cells, summed over ranks.
+*/
+PetscErrorCode SbModelDampingPower(SbModel m, Vec U, Vec V, PetscReal *power)
+{
+  const PetscReal *u, *v;
+  PetscReal        mine = 0.;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbSpaceGetLocalRead(m->space, U, &u));
+  PetscCall(SbSpaceGetLocalRead(m->space, V, &v));
+  PetscCall(SbSpaceDampingPower(m->space, u, v, &mine));
+  PetscCall(SbSpaceRestoreLocalRead(m->space, V, &v));
+  PetscCall(SbSpaceRestoreLocalRead(m->space, U, &u));
+  PetscCallMPI(MPI_Allreduce(&mine, power, 1, MPIU_REAL, MPI_SUM, m->comm));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

@@ -1,0 +1,240 @@
+/*
+  The model: the semi-discrete equation M a + C v + f_int(u) = f_ext(t, u, v) of everything that a scene names.
+
+  Set-up sorts the effects into one list per operation. An evaluation walks the lists; with no effects it walks empty
+  ones. In a static run there is no M and no C, and loads and prescribed displacements are multiplied by the load factor.
+*/
+#include "sbmodel.h"
+
+PetscErrorCode SbModelDestroy(SbModel *model)
+{
+  SbModel m = *model;
+
+  PetscFunctionBeginUser;
+  if (!m) PetscFunctionReturn(PETSC_SUCCESS);
+  for (PetscInt e = 0; e < m->neffect; e++) PetscCall(SbEffectDestroy(&m->effect[e]));
+  PetscCall(PetscFree(m->effect));
+  PetscCall(PetscFree(m->prescribe));
+  PetscCall(PetscFree(m->prestep));
+  PetscCall(PetscFree(m->force));
+  PetscCall(PetscFree(m->tangent));
+  PetscCall(PetscFree(m->accept));
+  PetscCall(PetscFree(m->history));
+  PetscCall(SbSpaceDestroy(&m->space));
+  PetscCall(SbMeshDestroy(&m->mesh));
+  for (PetscInt b = 0; b < m->nbody; b++) {
+    if (m->material) PetscCall(SbMaterialDestroy(&m->material[b]));
+    if (m->element) PetscCall(SbElementDestroy(&m->element[b]));
+  }
+  PetscCall(PetscFree(m->material));
+  PetscCall(PetscFree(m->element));
+  PetscCall(PetscFree(m->body));
+  PetscCall(PetscFree(m->set));
+  PetscCall(PetscFree(*model));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Effects that have the operation, in scenario order. */
+#define SORT_INTO_LIST(m, op)                                               \
+  do {                                                                      \
+    PetscCall(PetscMalloc1((m)->neffect, &(m)->op));                        \
+    for (PetscInt i_ = 0; i_ < (m)->neffect; i_++) {                        \
+      if ((m)->effect[i_]->ops.op) (m)->op[(m)->n##op++] = (m)->effect[i_]; \
+    }                                                                       \
+  } while (0)
+
+PetscErrorCode SbModelSetUp(SbModel m)
+{
+  PetscReal mass = 0.;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbMeshCreate(m->comm, m->nbody, m->body, m->nset, m->set, &m->mesh));
+  PetscCall(SbSpaceCreate(m->mesh, m->material, m->element, &m->space));
+  m->load   = 1.;
+  m->linear = m->space->linear;
+  for (PetscInt e = 0; e < m->neffect; e++) {
+    if (m->effect[e]->ops.setup) PetscCall(m->effect[e]->ops.setup(m->effect[e], m->space));
+    m->linear = (PetscBool)(m->linear && m->effect[e]->linear);
+  }
+  PetscCall(SbSpaceFixDone(m->space));
+  SORT_INTO_LIST(m, prescribe);
+  SORT_INTO_LIST(m, prestep);
+  SORT_INTO_LIST(m, force);
+  SORT_INTO_LIST(m, tangent);
+  SORT_INTO_LIST(m, accept);
+  SORT_INTO_LIST(m, history);
+  for (PetscInt i = 0; i < m->space->nnode_owned; i++) mass += m->space->node_mass[i];
+  PetscCallMPI(MPI_Allreduce(&mass, &m->mass, 1, MPIU_REAL, MPI_SUM, m->comm));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The arrays of an evaluation. Ghosts of v and a are brought only where something reads them. */
+static PetscErrorCode stage_begin(SbModel m, PetscReal t, Vec U, Vec V, Vec A, SbStage *stage)
+{
+  PetscFunctionBeginUser;
+  PetscCall(PetscMemzero(stage, sizeof(*stage)));
+  stage->t       = t;
+  stage->shift_k = 1.;
+  PetscCall(SbSpaceGetLocalRead(m->space, U, &stage->u));
+  if (V) PetscCall(SbSpaceGetLocalRead(m->space, V, &stage->v));
+  if (A) PetscCall(SbSpaceGetLocalRead(m->space, A, &stage->a));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode stage_end(SbModel m, Vec U, Vec V, Vec A, SbStage *stage)
+{
+  PetscFunctionBeginUser;
+  PetscCall(SbSpaceRestoreLocalRead(m->space, U, &stage->u));
+  if (V) PetscCall(SbSpaceRestoreLocalRead(m->space, V, &stage->v));
+  if (A) PetscCall(SbSpaceRestoreLocalRead(m->space, A, &stage->a));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* f = factor * f_ext. */
+static PetscErrorCode external_forces(SbModel m, const SbStage *stage, PetscReal factor, PetscReal f[])
+{
+  const PetscInt n = 3 * m->space->nnode;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscArrayzero(f, n));
+  if (!m->nforce) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_EFFECTS], 0, 0, 0, 0));
+  for (PetscInt e = 0; e < m->nforce; e++) PetscCall(m->force[e]->ops.force(m->force[e], m->space, stage, f));
+  for (PetscInt i = 0; i < n; i++) f[i] *= factor;
+  PetscCall(PetscLogEventEnd(SbEvents[SB_EVENT_EFFECTS], 0, 0, 0, 0));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Rows of prescribed unknowns: distance to the prescribed value. */
+static PetscErrorCode constrain_residual(SbModel m, PetscReal t, const PetscReal u[], PetscReal f[])
+{
+  SbSpace s = m->space;
+
+  PetscFunctionBeginUser;
+  for (PetscInt e = 0; e < m->nprescribe; e++) PetscCall(m->prescribe[e]->ops.prescribe(m->prescribe[e], s, t));
+  for (PetscInt k = 0; k < s->nfixed; k++) {
+    const PetscInt node = s->fixed_node[k];
+
+    for (PetscInt c = 0; c < 3; c++) {
+      if (s->fixed[node] & (1 << c)) f[3 * node + c] = u[3 * node + c] - m->load * s->fixed_value[3 * k + c];
+    }
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbModelResidual(SbModel m, PetscReal t, Vec U, Vec V, Vec A, PetscBool constrain, Vec F)
+{
+  SbStage    stage;
+  PetscReal *f;
+
+  PetscFunctionBeginUser;
+  PetscCall(stage_begin(m, t, U, V, A, &stage));
+  PetscCall(SbSpaceGetLocalWrite(m->space, F, &f));
+  PetscCall(external_forces(m, &stage, -m->load, f));
+  PetscCall(SbSpaceAddInternalForce(m->space, &stage, f));
+  if (A) PetscCall(SbSpaceAddInertia(m->space, &stage, f));
+  if (constrain) PetscCall(constrain_residual(m, t, stage.u, f));
+  PetscCall(SbSpaceRestoreLocalWrite(m->space, F, &f));
+  PetscCall(stage_end(m, U, V, A, &stage));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbModelLoads(SbModel m, PetscReal t, Vec U, Vec V, Vec F)
+{
+  SbStage    stage;
+  PetscReal *f;
+
+  PetscFunctionBeginUser;
+  PetscCall(stage_begin(m, t, U, V, NULL, &stage));
+  PetscCall(SbSpaceGetLocalWrite(m->space, F, &f));
+  PetscCall(external_forces(m, &stage, m->load, f));
+  PetscCall(SbSpaceRestoreLocalWrite(m->space, F, &f));
+  PetscCall(stage_end(m, U, V, NULL, &stage));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbModelTangent(SbModel m, PetscReal t, PetscReal shift_v, PetscReal shift_a, PetscReal shift_k, Vec U, Vec V, Mat A)
+{
+  SbStage stage;
+
+  PetscFunctionBeginUser;
+  PetscCall(stage_begin(m, t, U, V, NULL, &stage));
+  stage.shift_a = shift_a;
+  stage.shift_v = shift_v;
+  stage.shift_k = shift_k;
+  PetscCall(SbSpaceAssembleTangent(m->space, &stage, A));
+  m->space->block_scale = m->load;
+  for (PetscInt e = 0; e < m->ntangent; e++) PetscCall(m->tangent[e]->ops.tangent(m->tangent[e], m->space, &stage, A));
+  PetscCall(SbSpaceFinishTangent(m->space, A));
+  PetscCall(stage_end(m, U, V, NULL, &stage));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbModelPrescribe(SbModel m, PetscReal t, Vec U)
+{
+  SbSpace      s = m->space;
+  PetscScalar *u;
+
+  PetscFunctionBeginUser;
+  if (!m->nprescribe) PetscFunctionReturn(PETSC_SUCCESS);
+  for (PetscInt e = 0; e < m->nprescribe; e++) PetscCall(m->prescribe[e]->ops.prescribe(m->prescribe[e], s, t));
+  PetscCall(VecGetArray(U, &u));
+  for (PetscInt k = 0; k < s->nfixed && s->fixed_node[k] < s->nnode_owned; k++) {
+    const PetscInt node = s->fixed_node[k];
+
+    for (PetscInt c = 0; c < 3; c++) {
+      if (s->fixed[node] & (1 << c)) u[3 * node + c] = m->load * s->fixed_value[3 * k + c];
+    }
+  }
+  PetscCall(VecRestoreArray(U, &u));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Mass and first moment of each body, summed over ranks: its centre of mass at rest. */
+static PetscErrorCode body_centres(SbModel m, PetscReal centre[][4])
+{
+  SbSpace s = m->space;
+
+  PetscFunctionBeginUser;
+  for (PetscInt i = 0; i < s->nnode_owned; i++) {
+    PetscReal *c = centre[m->mesh->vert_body[i]];
+
+    c[3] += s->node_mass[i];
+    for (PetscInt k = 0; k < 3; k++) c[k] += s->node_mass[i] * s->node_x[3 * i + k];
+  }
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, centre, (PetscMPIInt)(4 * m->nbody), MPIU_REAL, MPI_SUM, m->comm));
+  for (PetscInt b = 0; b < m->nbody; b++) {
+    for (PetscInt k = 0; k < 3; k++) centre[b][k] /= centre[b][3];
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbModelInitialState(SbModel m, Vec U, Vec V)
+{
+  SbSpace      s = m->space;
+  PetscReal  (*centre)[4];
+  PetscScalar *v;
+
+  PetscFunctionBeginUser;
+  PetscCall(VecZeroEntries(U));
+  PetscCall(SbModelPrescribe(m, 0., U));
+  if (!V) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscCalloc1(m->nbody, &centre));
+  PetscCall(body_centres(m, centre));
+  PetscCall(VecGetArray(V, &v));
+  for (PetscInt i = 0; i < s->nnode_owned; i++) {
+    const SbBody    *body = &m->body[m->mesh->vert_body[i]];
+    const PetscReal *w    = body->spin;
+    PetscReal        r[3];
+
+    for (PetscInt k = 0; k < 3; k++) r[k] = s->node_x[3 * i + k] - centre[m->mesh->vert_body[i]][k];
+    for (PetscInt k = 0; k < 3; k++) {
+      const PetscInt k1 = (k + 1) % 3, k2 = (k + 2) % 3;
+
+      v[3 * i + k] = s->fixed[i] & (1 << k) ? 0. : body->velocity[k] + w[k1] * r[k2] - w[k2] * r[k1];
+    }
+  }
+  PetscCall(VecRestoreArray(V, &v));
+  PetscCall(PetscFree(centre));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
