@@ -46,6 +46,8 @@ struct _p_SbRun {
   PetscReal    wall_start, seconds_solve;
   PetscReal    dt;               /* first step */
   char         stop_reason[512]; /* why the run ended early; empty when it reached its end */
+  void        *output;           /* what src/output keeps for this run; NULL when no output was asked for */
+  PetscErrorCode (*output_destroy)(SbRun run); /* frees it; called by SbRunDestroy() when not NULL, before the monitors */
 };
 
 PetscErrorCode SbTimeRegister(void);   /* option rows and the TSType */
