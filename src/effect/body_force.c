@@ -1,0 +1,91 @@
+/*
+  body_force.c - a force per rest volume, given as three formulas of time and rest position.
+
+  f_a = s(t) integral of phi_a b(X, t) over the rest volume, by the quadrature of deadload.c. Every rank integrates its
+  owned and its ghost cells, so rows of owned nodes are complete without communication.
+*/
+#include "sbeffect.h"
+
+typedef struct {
+  SbEffectOn on;
+  SbFormula  density[3], time;
+  SbDeadLoad load;
+} BodyForce;
+
+static const SbOption rows[] = {
+    {"on", SB_OPTION_NAMES, 1, "", "", "", "Sets whose tetrahedra carry the force; everything when none is named."},
+    {"density", SB_OPTION_FORMULA, 3, "N/m^3", NULL, "", "Force per rest volume, three formulas of t, x, y, z (rest position)."},
+    {"time", SB_OPTION_FORMULA, 1, "", "1", "", "Factor on the force, a formula of the time t."},
+};
+
+static PetscErrorCode options_body_force(SbEffect e, const SbScope *scope)
+{
+  BodyForce *b = (BodyForce *)e->data;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbEffectReadOn(scope, &b->on));
+  PetscCall(SbEffectFormulas(scope, "density", 3, PETSC_TRUE, b->density, &e->steady));
+  PetscCall(SbEffectFormulas(scope, "time", 1, PETSC_FALSE, &b->time, &e->steady));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode setup_body_force(SbEffect e, SbSpace space)
+{
+  BodyForce *b = (BodyForce *)e->data;
+  PetscInt   n, *cells, *nodes;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbEffectCells(space, &b->on, &n, &cells));
+  PetscCall(PetscMalloc1(4 * n, &nodes));
+  for (PetscInt i = 0; i < n; i++) {
+    for (int a = 0; a < 4; a++) nodes[4 * i + a] = space->cell_node[4 * cells[i] + a];
+  }
+  PetscCall(SbDeadLoadCreate(space, 4, n, nodes, b->density, &b->load));
+  PetscCall(PetscFree(nodes));
+  PetscCall(PetscFree(cells));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode force_body_force(SbEffect e, SbSpace space, const SbStage *stage, PetscReal f[])
+{
+  const BodyForce *b = (const BodyForce *)e->data;
+
+  PetscFunctionBeginUser;
+  (void)space;
+  PetscCall(SbDeadLoadAdd(b->load, stage->t, SbFormulaEval(b->time, stage->t, NULL), f));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode destroy_body_force(SbEffect e)
+{
+  BodyForce *b = (BodyForce *)e->data;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbEffectFreeOn(&b->on));
+  for (int i = 0; i < 3; i++) PetscCall(SbFormulaDestroy(&b->density[i]));
+  PetscCall(SbFormulaDestroy(&b->time));
+  PetscCall(SbDeadLoadDestroy(&b->load));
+  PetscCall(PetscFree(e->data));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode create_body_force(SbEffect e)
+{
+  BodyForce *b;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscNew(&b));
+  e->data               = b;
+  e->ops.setfromoptions = options_body_force;
+  e->ops.setup          = setup_body_force;
+  e->ops.force          = force_body_force;
+  e->ops.destroy        = destroy_body_force;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbEffectRegister_BodyForce(void)
+{
+  PetscFunctionBeginUser;
+  PetscCall(SbEffectRegister("body_force", create_body_force, PETSC_STATIC_ARRAY_LENGTH(rows), rows));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

@@ -1,0 +1,111 @@
+/*
+  effect.c - the registry of effects, and how one comes to be from its name in the scenario.
+
+  An effect is created by its constructor, which fills the table of operations and the private data; then it reads its
+  options. Everything that needs the mesh waits for its setup operation.
+*/
+#include "sbeffect.h"
+
+PetscFunctionList SbEffectList = NULL;
+
+static const SbOption common_rows[] = {
+    {"type", SB_OPTION_STRING, 1, "", "", "", "What the effect is; by default its own name says so."},
+};
+
+static PetscErrorCode forget_types(void)
+{
+  PetscFunctionBeginUser;
+  PetscCall(PetscFunctionListDestroy(&SbEffectList));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbEffectRegister(const char *type, PetscErrorCode (*create)(SbEffect), PetscInt nrows, const SbOption rows[])
+{
+  PetscFunctionBeginUser;
+  // The first type brings what all types have in common, and the clean-up.
+  if (!SbEffectList) {
+    PetscCall(SbOptionsRegister("effect", "", 1, common_rows));
+    PetscCall(PetscRegisterFinalize(forget_types));
+  }
+  PetscCall(PetscFunctionListAdd(&SbEffectList, type, create));
+  PetscCall(SbOptionsRegister("effect", type, nrows, rows));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Ends the run: no such type. */
+static PetscErrorCode unknown_type(const char *name, const char *type)
+{
+  const char **types;
+  int          n;
+  char         near[512];
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscFunctionListGet(SbEffectList, &types, &n));
+  PetscCall(SbNearest(type, n, types, sizeof(near), near));
+  // Nothing near: list them all.
+  if (!near[0]) {
+    for (int i = 0; i < n; i++) {
+      if (i) PetscCall(PetscStrlcat(near, i + 1 < n ? ", " : " or ", sizeof(near)));
+      PetscCall(PetscStrlcat(near, types[i], sizeof(near)));
+    }
+  }
+  PetscCall(PetscFree(types));
+  SETERRQ(PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
+          "effect %s: there is no effect of type \"%s\"; did you mean %s? Set -effect_%s_type", name, type, near, name);
+}
+
+PetscErrorCode SbEffectCreate(const char *name, SbEffect *effect)
+{
+  PetscErrorCode (*create)(SbEffect) = NULL;
+  SbEffect e;
+  SbScope  scope;
+  char     type[SB_NAME_MAX];
+
+  PetscFunctionBeginUser;
+  *effect = NULL;
+  PetscCall(SbScopeSet(&scope, "effect", "", name));
+  PetscCall(SbOptionString(&scope, "type", sizeof(type), type));
+  if (!type[0]) PetscCall(PetscStrncpy(type, name, sizeof(type)));
+  PetscCall(PetscFunctionListFind(SbEffectList, type, &create));
+  if (!create) PetscCall(unknown_type(name, type));
+
+  PetscCall(PetscNew(&e));
+  PetscCall(PetscStrncpy(e->name, name, sizeof(e->name)));
+  PetscCall(PetscStrncpy(e->type, type, sizeof(e->type)));
+  e->linear = PETSC_TRUE;
+  e->steady = PETSC_TRUE;
+  PetscCall((*create)(e));
+  PetscCall(SbScopeSet(&scope, "effect", type, name));
+  if (e->ops.setfromoptions) PetscCall((*e->ops.setfromoptions)(e, &scope));
+  *effect = e;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbEffectDestroy(SbEffect *effect)
+{
+  PetscFunctionBeginUser;
+  if (!*effect) PetscFunctionReturn(PETSC_SUCCESS);
+  if ((*effect)->ops.destroy) PetscCall((*(*effect)->ops.destroy)(*effect));
+  PetscCall(PetscFree(*effect));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbEffectFormulas(const SbScope *scope, const char *key, PetscInt n, PetscBool place, SbFormula formulas[],
+                                PetscBool *steady)
+{
+  PetscFunctionBeginUser;
+  PetscCall(SbOptionFormulas(scope, key, formulas));
+  for (PetscInt i = 0; i < n; i++) {
+    PetscBool uses_time, uses_place;
+
+    PetscCall(SbFormulaUses(formulas[i], &uses_time, &uses_place));
+    if (uses_time) *steady = PETSC_FALSE;
+    if (uses_place && !place) {
+      char option[3 * SB_NAME_MAX];
+
+      PetscCall(SbOptionName(scope, key, sizeof(option), option));
+      SETERRQ(PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT, "%s: this formula may use the time t only, not x, y or z", option);
+    }
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

@@ -1,0 +1,132 @@
+/*
+  traction.c - a force per rest area on part of the surface, of fixed direction (a dead load).
+
+  f_a = s(t) integral of phi_a q(X, t) over the rest area, by the quadrature of deadload.c. A given total force F is the
+  uniform traction F / |S|, with the area |S| summed over the facets of owned cells of all ranks. Vector and total add up.
+*/
+#include "sbeffect.h"
+
+typedef struct {
+  SbEffectOn on;
+  char       option[3 * SB_NAME_MAX]; /* full name of the option "total" */
+  SbFormula  vector[3], time;
+  PetscReal  total[3];                /* N */
+  SbFormula  uniform[3];              /* total per area, Pa */
+  SbDeadLoad by_vector, by_total;     /* NULL when not given */
+  PetscBool  vector_given, total_given;
+} Traction;
+
+static const SbOption rows[] = {
+    {"on", SB_OPTION_NAMES, 1, "", NULL, "", "Sets whose boundary facets carry the traction."},
+    {"vector", SB_OPTION_FORMULA, 3, "Pa", "0;0;0", "", "Force per rest area, three formulas of t, x, y, z (rest position)."},
+    {"total", SB_OPTION_REALS, 3, "N", "0,0,0", "", "Total force, spread evenly over the rest area of the sets."},
+    {"time", SB_OPTION_FORMULA, 1, "", "1", "", "Factor on the traction, a formula of the time t."},
+};
+
+static PetscErrorCode options_traction(SbEffect e, const SbScope *scope)
+{
+  Traction *q = (Traction *)e->data;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbEffectReadOn(scope, &q->on));
+  PetscCall(SbOptionName(scope, "total", sizeof(q->option), q->option));
+  PetscCall(SbOptionGiven(scope, "vector", &q->vector_given));
+  PetscCall(SbOptionGiven(scope, "total", &q->total_given));
+  PetscCheck(q->vector_given || q->total_given, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
+             "effect %s: give -effect_%s_vector (Pa, three formulas) or -effect_%s_total (N, three numbers)", e->name, e->name, e->name);
+  PetscCall(SbEffectFormulas(scope, "vector", 3, PETSC_TRUE, q->vector, &e->steady));
+  PetscCall(SbOptionReals(scope, "total", q->total));
+  PetscCall(SbEffectFormulas(scope, "time", 1, PETSC_FALSE, &q->time, &e->steady));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The total force as a uniform traction. Collective. */
+static PetscErrorCode spread_total(Traction *q, SbSpace space, PetscInt n, const SbFacet facets[])
+{
+  PetscReal area[2] = {0, 0};
+
+  PetscFunctionBeginUser;
+  for (PetscInt i = 0; i < n; i++) {
+    if (facets[i].cell < space->mesh->ncell_owned) area[0] += facets[i].area;
+  }
+  PetscCallMPI(MPI_Allreduce(&area[0], &area[1], 1, MPIU_REAL, MPI_SUM, space->comm));
+  for (int i = 0; i < 3; i++) {
+    char text[64];
+
+    PetscCall(PetscSNPrintf(text, sizeof(text), "%.17g", (double)(q->total[i] / area[1])));
+    PetscCall(SbFormulaCreate(PETSC_COMM_SELF, text, q->option, &q->uniform[i]));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode setup_traction(SbEffect e, SbSpace space)
+{
+  Traction *q = (Traction *)e->data;
+  SbFacet  *facets;
+  PetscInt  n, *nodes;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbEffectFacets(space, &q->on, &n, &facets));
+  PetscCall(PetscMalloc1(3 * n, &nodes));
+  for (PetscInt i = 0; i < n; i++) {
+    for (int a = 0; a < 3; a++) nodes[3 * i + a] = facets[i].node[a];
+  }
+  if (q->vector_given) PetscCall(SbDeadLoadCreate(space, 3, n, nodes, q->vector, &q->by_vector));
+  if (q->total_given) {
+    PetscCall(spread_total(q, space, n, facets));
+    PetscCall(SbDeadLoadCreate(space, 3, n, nodes, q->uniform, &q->by_total));
+  }
+  PetscCall(PetscFree(nodes));
+  PetscCall(PetscFree(facets));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode force_traction(SbEffect e, SbSpace space, const SbStage *stage, PetscReal f[])
+{
+  const Traction *q = (const Traction *)e->data;
+  const PetscReal s = SbFormulaEval(q->time, stage->t, NULL);
+
+  PetscFunctionBeginUser;
+  (void)space;
+  if (q->by_vector) PetscCall(SbDeadLoadAdd(q->by_vector, stage->t, s, f));
+  if (q->by_total) PetscCall(SbDeadLoadAdd(q->by_total, stage->t, s, f));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode destroy_traction(SbEffect e)
+{
+  Traction *q = (Traction *)e->data;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbEffectFreeOn(&q->on));
+  for (int i = 0; i < 3; i++) {
+    PetscCall(SbFormulaDestroy(&q->vector[i]));
+    PetscCall(SbFormulaDestroy(&q->uniform[i]));
+  }
+  PetscCall(SbFormulaDestroy(&q->time));
+  PetscCall(SbDeadLoadDestroy(&q->by_vector));
+  PetscCall(SbDeadLoadDestroy(&q->by_total));
+  PetscCall(PetscFree(e->data));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode create_traction(SbEffect e)
+{
+  Traction *q;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscNew(&q));
+  e->data               = q;
+  e->ops.setfromoptions = options_traction;
+  e->ops.setup          = setup_traction;
+  e->ops.force          = force_traction;
+  e->ops.destroy        = destroy_traction;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbEffectRegister_Traction(void)
+{
+  PetscFunctionBeginUser;
+  PetscCall(SbEffectRegister("traction", create_traction, PETSC_STATIC_ARRAY_LENGTH(rows), rows));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
