@@ -1,32 +1,160 @@
-# supple - soft bodies by finite elements on PETSc. `make help` lists the targets.
-PKG     := $(shell pkg-config --exists PETSc && echo PETSc || echo petsc)
-CC      := mpicc
-OPT     := -O3 -g -fno-math-errno -fno-trapping-math
-BUILD   := build
-ifdef DEBUG
-OPT     := -O0 -g3 -DSB_DEBUG
-BUILD   := build-debug
-endif
-WARN    := -std=c11 -Wall -Wextra -Wshadow -Wstrict-prototypes -Wmissing-prototypes
-CPPFLAGS += -D_GNU_SOURCE -Iinclude $(patsubst -I%,-isystem %,$(shell pkg-config --cflags-only-I $(PKG) hdf5-openmpi))
-LDLIBS  := $(shell pkg-config --libs $(PKG) hdf5-openmpi) -lmetis -lm
-SRC     := $(filter-out src/main.c,$(wildcard src/*/*.c))
-OBJ     := $(SRC:%.c=$(BUILD)/%.o)
-TESTSRC := $(wildcard tests/unit/*.c tests/verify/*.c tests/perf/*.c)
-TESTBIN := $(TESTSRC:%.c=$(BUILD)/%)
+# supple - soft bodies by finite elements on PETSc. `make help` lists the targets and settings.
+#
+# PETSc is found by pkg-config; PETSC_DIR (and PETSC_ARCH) or PKG_CONFIG_PATH choose another one. MPI compiler, HDF5 and
+# METIS are those that PETSc was configured with, as far as it tells. Objects go to $(BUILD)/ and are made again when a
+# setting changes. Nothing here is installed by hand: `make check` and `make demo` call scripts/install-deps first.
 
-all: bin/supple
-bin/supple: $(BUILD)/src/main.o $(OBJ)
-	@mkdir -p bin
-	$(CC) $(OPT) -o $@ $^ $(LDLIBS)
-tests: $(TESTBIN)
-$(BUILD)/tests/%: $(BUILD)/tests/%.o $(OBJ)
-	$(CC) $(OPT) -o $@ $^ $(LDLIBS)
-$(BUILD)/%.o: %.c
+# ---- settings that a user may give
+BUILD  := build
+OPT    := -O3 -g -fno-math-errno -fno-trapping-math
+PREFIX := /usr/local
+JOBS   := $(shell nproc 2>/dev/null || echo 2)
+ifdef DEBUG
+BUILD  := build-debug
+OPT    := -O0 -g3 -DSB_DEBUG
+endif
+
+# ---- PETSc and what it was built with
+ifdef PETSC_DIR
+PCDIR      := $(wildcard $(PETSC_DIR)/$(PETSC_ARCH)/lib/pkgconfig)
+PKG_CONFIG := PKG_CONFIG_PATH="$(PCDIR):$$PKG_CONFIG_PATH" pkg-config
+PETSC_LOST := $(if $(PCDIR),,there is no $(PETSC_DIR)/$(PETSC_ARCH)/lib/pkgconfig: correct PETSC_DIR and PETSC_ARCH, or unset both)
+else
+PKG_CONFIG := pkg-config
+endif
+PETSC_VERSION := $(shell $(PKG_CONFIG) --modversion PETSc 2>/dev/null)
+PETSC_LIBDIR  := $(shell $(PKG_CONFIG) --variable=libdir PETSc 2>/dev/null)
+petsc_says     = $(shell sed -n 's/^$(1) = //p' $(PETSC_LIBDIR)/petsc/conf/petscvariables 2>/dev/null)
+ifeq ($(origin CC),default)
+CC := $(or $(shell $(PKG_CONFIG) --variable=ccompiler PETSc 2>/dev/null),mpicc)
+endif
+HDF5_LIB   := $(or $(call petsc_says,HDF5_LIB),$(shell $(PKG_CONFIG) --libs hdf5-openmpi 2>/dev/null))
+HDF5_INC   := $(or $(call petsc_says,HDF5_INCLUDE),$(shell $(PKG_CONFIG) --cflags-only-I hdf5-openmpi 2>/dev/null))
+METIS_LIB  := $(or $(call petsc_says,METIS_LIB),-lmetis)
+METIS_INC  := $(call petsc_says,METIS_INCLUDE)
+PETSC_INC  := $(shell $(PKG_CONFIG) --cflags-only-I PETSc 2>/dev/null)
+PETSC_LIB  := $(shell $(PKG_CONFIG) --libs PETSc 2>/dev/null) $(call petsc_says,BLASLAPACK_LIB)
+
+# ---- how things are compiled and linked
+WARN     := -std=c11 -Wall -Wextra -Wshadow -Wstrict-prototypes -Wmissing-prototypes $(if $(WERROR),-Werror)
+INCLUDES := -D_GNU_SOURCE -Iinclude -Itests $(patsubst -I%,-isystem %,$(filter-out -I/usr/include,$(PETSC_INC) $(HDF5_INC) $(METIS_INC)))
+COMPILE   = $(CC) $(WARN) $(OPT) $(INCLUDES) $(CPPFLAGS) $(CFLAGS)
+LIBS     := $(PETSC_LIB) $(HDF5_LIB) $(METIS_LIB) -lm
+comma    := ,
+RPATH    := $(patsubst -L%,-Wl$(comma)-rpath$(comma)%,$(filter-out -L/usr/lib%,$(filter -L%,$(LIBS))))
+LINK      = $(CC) $(OPT) $(CFLAGS) $(LDFLAGS) -Wl,--as-needed
+
+SRC      := $(filter-out src/main.c,$(wildcard src/*/*.c))
+OBJ      := $(SRC:%.c=$(BUILD)/%.o)
+TESTSRC  := $(wildcard tests/unit/*.c tests/verify/*.c tests/perf/*.c)
+TESTBIN  := $(TESTSRC:%.c=$(BUILD)/%)
+MESHES   := $(patsubst %.geo,%.msh,$(wildcard meshes/*.geo))
+
+# A second make, with one job per core unless the user said otherwise: what was missing may have been installed meanwhile.
+AGAIN     = +@$(MAKE) --no-print-directory $(if $(filter -j%,$(MAKEFLAGS)),,-j$(JOBS))
+Q        := $(if $(V),,@)
+SAY       = $(if $(V),@:,@echo)
+
+# ---- program and tests
+all: bin/supple ## the program, bin/supple (default)
+
+bin/supple: $(BUILD)/supple FORCE
+	@mkdir -p bin; cmp -s $< $@ || install -m 755 $< $@
+
+$(BUILD)/supple: $(BUILD)/src/main.o $(BUILD)/libsupple.a
+	$(SAY) "  link     $@"
+	$(Q)$(LINK) -o $@ $^ $(LIBS) $(RPATH)
+
+$(BUILD)/libsupple.a: $(OBJ)
+	$(Q)rm -f $@; ar rcs $@ $^
+
+tests: $(TESTBIN) ## every test and benchmark program, in build/tests
+
+$(BUILD)/tests/%: $(BUILD)/tests/%.o $(BUILD)/libsupple.a
+	$(SAY) "  link     $@"
+	$(Q)$(LINK) -o $@ $^ $(LIBS) $(RPATH)
+
+$(BUILD)/%.o: %.c $(BUILD)/flags
 	@mkdir -p $(@D)
-	$(CC) $(WARN) $(OPT) $(CPPFLAGS) -MMD -MP -c -o $@ $<
-clean:
-	rm -rf build build-* bin
-.PHONY: all tests clean
+	$(SAY) "  compile  $<"
+	$(Q)$(COMPILE) -MMD -MP -c -o $@ $<
+
+# Holds the settings that the objects were made with; it is written, and so everything made again, only when they change.
+$(BUILD)/flags: FORCE
+	$(if $(PETSC_LOST),$(error $(PETSC_LOST)))
+	$(if $(PETSC_VERSION),,$(error PETSc was not found by pkg-config: run scripts/install-deps (Debian, Ubuntu), or set PETSC_DIR and PETSC_ARCH))
+	@mkdir -p $(@D)
+	@new='$(COMPILE) | $(LINK) $(LIBS) | PETSc $(PETSC_VERSION)'; \
+	if [ "$$new" != "$$(cat $@ 2>/dev/null)" ]; then \
+	  printf '#include <petsc.h>\n#include <hdf5.h>\n#include <metis.h>\n' | $(CC) $(INCLUDES) $(CPPFLAGS) -E -xc -o /dev/null - || \
+	    { echo "supple: the headers above are missing: run scripts/install-deps (Debian, Ubuntu), or install PETSc, parallel HDF5 and METIS" >&2; exit 1; }; \
+	  echo "  PETSc $(PETSC_VERSION), $(CC), objects in $(BUILD)/"; printf '%s\n' "$$new" >$@; fi
+
+meshes/%.msh: meshes/%.geo
+	$(SAY) "  mesh     $@"
+	$(Q)gmsh -3 -format msh41 -o $@.tmp $< >$@.log 2>&1 || { cat $@.log; rm -f $@.tmp; exit 1; }
+	@mv $@.tmp $@; rm -f $@.log
+
+# ---- what a user runs
+deps:
+	@scripts/install-deps run
+
+demo: deps ## install what is missing, build, run scenarios/demo.opts on 2 ranks, draw it: out/demo
+	$(AGAIN) bin/supple meshes/organ.msh
+	@scripts/venv
+	@scripts/mpi 2 bin/supple scenarios/demo.opts
+	@.venv/bin/python scripts/render out/demo
+
+CHECK = tests/run --build $(BUILD) $(if $(T),--match '$(T)')
+check: deps ## install what is missing, build, run the tests (about 20 minutes; one of them: T=name)
+	$(AGAIN) bin/supple tests $(MESHES)
+	@scripts/venv
+	@$(CHECK)
+
+check-long: deps ## the tests that take longer
+	$(AGAIN) bin/supple tests $(MESHES)
+	@scripts/venv
+	@$(CHECK) --long
+
+lint: ## format, layers of the include lines, clang-tidy, shellcheck, Python syntax
+	@scripts/install-deps lint
+	@COMPILE_FLAGS='-std=c11 $(INCLUDES)' scripts/lint
+
+SANITIZE = -O1 -g -fno-omit-frame-pointer -fsanitize=address,undefined -fno-sanitize-recover=undefined
+sanitize: deps ## unit tests under the address and undefined-behaviour sanitizers
+	$(AGAIN) BUILD=build-sanitize OPT='$(SANITIZE)' build-sanitize/unit
+	@tests/run --build build-sanitize --group unit --sanitize $(if $(T),--match '$(T)')
+
+memcheck: deps ## unit tests under valgrind
+	@scripts/install-deps lint
+	$(AGAIN) BUILD=build-memcheck OPT='-O1 -g3' build-memcheck/unit
+	@tests/run --build build-memcheck --group unit --valgrind $(if $(T),--match '$(T)')
+
+$(BUILD)/unit: $(filter $(BUILD)/tests/unit/%,$(TESTBIN))
+	@touch $@
+
+bench: deps ## speed, written as CSV to tests/perf/
+	$(AGAIN) bin/supple tests
+	@scripts/bench --build $(BUILD)
+
+docs: bin/supple ## docs/options.md from the option table
+	bin/supple -options_markdown docs/options.md
+
+install: bin/supple $(MESHES) ## program, scenarios and documents to PREFIX=/usr/local (DESTDIR= in front)
+	install -d $(DESTDIR)$(PREFIX)/bin $(DESTDIR)$(PREFIX)/share/supple/scenarios $(DESTDIR)$(PREFIX)/share/supple/meshes $(DESTDIR)$(PREFIX)/share/doc/supple
+	install -m 755 bin/supple $(DESTDIR)$(PREFIX)/bin/supple
+	install -m 644 scenarios/*.opts $(DESTDIR)$(PREFIX)/share/supple/scenarios
+	install -m 644 meshes/*.geo $(MESHES) $(DESTDIR)$(PREFIX)/share/supple/meshes
+	install -m 644 README.md CHANGELOG.md LICENSE $(wildcard docs/*.md) $(DESTDIR)$(PREFIX)/share/doc/supple
+
+clean: ## remove what was built, meshed and run
+	rm -rf build build-* bin out meshes/*.msh
+
+help: ## this list
+	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/  make \1|\2/p' Makefile | awk -F'|' '{ printf "%-20s%s\n", $$1, $$2 }'
+	@echo "settings: DEBUG=1  WERROR=1  V=1 (show commands)  CC=  OPT=  CFLAGS=  BUILD=  JOBS=  PREFIX=  DESTDIR=  PETSC_DIR= PETSC_ARCH="
+
+.PHONY: all tests deps demo check check-long lint sanitize memcheck bench docs install clean help FORCE
 .SECONDARY:
--include $(shell find $(BUILD) -name '*.d' 2>/dev/null)
+.DELETE_ON_ERROR:
+-include $(wildcard $(BUILD)/src/*.d $(BUILD)/src/*/*.d $(BUILD)/tests/*/*.d)
