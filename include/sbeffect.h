@@ -47,7 +47,8 @@ PetscErrorCode SbEffectRegister(const char *type, PetscErrorCode (*create)(SbEff
 /*
   SbEffectCreate - an effect of the scenario by its name, with its options read.
 
-  Not collective, but to be called alike on all ranks. The caller destroys the effect with SbEffectDestroy().
+  Not collective, but to be called alike on all ranks. The caller destroys the effect with SbEffectDestroy(), also when
+  its options were at fault.
 
   Options read: -effect_<name>_type (by default the name itself is the type) and those of the type.
   Errors: PETSC_ERR_USER_INPUT for an unknown type, with the nearest ones; PETSC_ERR_USER* from the options of the type.

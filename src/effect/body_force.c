@@ -1,21 +1,23 @@
 /*
   body_force.c - a force per rest volume, given as three formulas of time and rest position.
 
-  f_a = s(t) integral of phi_a b(X, t) over the rest volume, by the quadrature of deadload.c. Every rank integrates its
-  owned and its ghost cells, so rows of owned nodes are complete without communication.
+  f_a = s(t) integral of phi_a b(X, t) over the rest volume, by the quadrature of deadload.c. Every rank
+  integrates its owned and its ghost cells, so rows of owned nodes are complete without communication.
 */
 #include "sbeffect.h"
 
 typedef struct {
   SbEffectOn on;
-  SbFormula  density[3], time;
+  SbFormula density[3], time;
   SbDeadLoad load;
 } BodyForce;
 
 static const SbOption rows[] = {
-    {"on", SB_OPTION_NAMES, 1, "", "", "", "Sets whose tetrahedra carry the force; everything when none is named."},
-    {"density", SB_OPTION_FORMULA, 3, "N/m^3", NULL, "", "Force per rest volume, three formulas of t, x, y, z (rest position)."},
-    {"time", SB_OPTION_FORMULA, 1, "", "1", "", "Factor on the force, a formula of the time t."},
+    {"on", SB_OPTION_NAMES, 1, "", "", "",
+     "sets whose tetrahedra carry the force; everything when none is named"},
+    {"density", SB_OPTION_FORMULA, 3, "N/m^3", NULL, "",
+     "force per rest volume, three formulas of t, x, y, z (rest position)"},
+    {"time", SB_OPTION_FORMULA, 1, "", "1", "", "factor on the force, a formula of the time t"},
 };
 
 static PetscErrorCode options_body_force(SbEffect e, const SbScope *scope)
@@ -32,7 +34,7 @@ static PetscErrorCode options_body_force(SbEffect e, const SbScope *scope)
 static PetscErrorCode setup_body_force(SbEffect e, SbSpace space)
 {
   BodyForce *b = (BodyForce *)e->data;
-  PetscInt   n, *cells, *nodes;
+  PetscInt n, *cells, *nodes;
 
   PetscFunctionBeginUser;
   PetscCall(SbEffectCells(space, &b->on, &n, &cells));
@@ -75,11 +77,11 @@ static PetscErrorCode create_body_force(SbEffect e)
 
   PetscFunctionBeginUser;
   PetscCall(PetscNew(&b));
-  e->data               = b;
+  e->data = b;
   e->ops.setfromoptions = options_body_force;
-  e->ops.setup          = setup_body_force;
-  e->ops.force          = force_body_force;
-  e->ops.destroy        = destroy_body_force;
+  e->ops.setup = setup_body_force;
+  e->ops.force = force_body_force;
+  e->ops.destroy = destroy_body_force;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -1,21 +1,22 @@
 /*
   damping.c - Rayleigh damping, C = alpha M + beta K, of some bodies or of all.
 
-  A mode of angular frequency w is damped with the ratio zeta = (alpha / w + beta w) / 2: alpha slows the whole motion as
-  in a viscous medium (rigid motion too), beta takes out fast vibration. This effect writes the two numbers into the
-  regions of the space at set-up; the forces come with inertia and with the internal force. Two dampings of one body add up.
+  A mode of angular frequency w is damped with the ratio zeta = (alpha / w + beta w) / 2: alpha slows the
+  whole motion as in a viscous medium (rigid motion too), beta takes out fast vibration. This effect writes
+  the two numbers into the regions of the space at set-up; the forces come with inertia and with the internal
+  force. Two dampings of one body add up.
 */
 #include "sbeffect.h"
 
 typedef struct {
   SbEffectOn on; /* names of bodies */
-  PetscReal  alpha, beta; /* 1/s, s */
+  PetscReal alpha, beta; /* 1/s, s */
 } Damping;
 
 static const SbOption rows[] = {
-    {"on", SB_OPTION_NAMES, 1, "", "", "", "Bodies that are damped; all when none is named."},
-    {"alpha", SB_OPTION_REAL, 1, "1/s", "0", "[0, inf)", "Factor on the mass matrix in the damping matrix."},
-    {"beta", SB_OPTION_REAL, 1, "s", "0", "[0, inf)", "Factor on the stiffness matrix in the damping matrix."},
+    {"on", SB_OPTION_NAMES, 1, "", "", "", "bodies that are damped; all when none is named"},
+    {"alpha", SB_OPTION_REAL, 1, "1/s", "0", "[0, inf)", "factor on the mass matrix in the damping matrix"},
+    {"beta", SB_OPTION_REAL, 1, "s", "0", "[0, inf)", "factor on the stiffness matrix in the damping matrix"},
 };
 
 static PetscErrorCode options_damping(SbEffect e, const SbScope *scope)
@@ -29,47 +30,45 @@ static PetscErrorCode options_damping(SbEffect e, const SbScope *scope)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Number of a body by its name; an error with the nearest names when there is none. */
-static PetscErrorCode find_body(SbMesh mesh, const SbEffectOn *on, const char *name, PetscInt *body)
+/* An error with the nearest names when there is no body of that name. */
+static PetscErrorCode check_body(SbMesh mesh, const SbEffectOn *on, const char *name)
 {
   const char **names;
-  char         near[512];
+  char near[512];
 
   PetscFunctionBeginUser;
-  for (*body = 0; *body < mesh->nbody; (*body)++) {
+  for (PetscInt b = 0; b < mesh->nbody; b++) {
     PetscBool same;
 
-    PetscCall(PetscStrcmp(mesh->body[*body].name, name, &same));
+    PetscCall(PetscStrcmp(mesh->body[b].name, name, &same));
     if (same) PetscFunctionReturn(PETSC_SUCCESS);
   }
   PetscCall(PetscMalloc1(mesh->nbody, &names));
   for (PetscInt b = 0; b < mesh->nbody; b++) names[b] = mesh->body[b].name;
   PetscCall(SbNearest(name, mesh->nbody, names, sizeof(near), near));
   PetscCall(PetscFree(names));
-  SETERRQ(mesh->comm, PETSC_ERR_USER_INPUT, "%s: there is no body %s%s%s; damping acts on bodies, see -bodies", on->option, name,
+  SETERRQ(mesh->comm, PETSC_ERR_USER_INPUT,
+          "%s: there is no body %s%s%s; damping acts on bodies, see -bodies", on->option, name,
           near[0] ? "; did you mean " : "", near);
 }
 
 static PetscErrorCode setup_damping(SbEffect e, SbSpace space)
 {
   const Damping *d = (const Damping *)e->data;
-  PetscBool     *damped;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscCalloc1(space->mesh->nbody, &damped));
-  for (PetscInt b = 0; b < space->mesh->nbody; b++) damped[b] = d->on.n ? PETSC_FALSE : PETSC_TRUE;
-  for (PetscInt i = 0; i < d->on.n; i++) {
-    PetscInt body;
-
-    PetscCall(find_body(space->mesh, &d->on, d->on.name[i], &body));
-    damped[body] = PETSC_TRUE;
-  }
+  for (PetscInt i = 0; i < d->on.n; i++) PetscCall(check_body(space->mesh, &d->on, d->on.name[i]));
   for (PetscInt r = 0; r < space->nregion; r++) {
-    if (!damped[space->region[r].body]) continue;
-    space->region[r].alpha += d->alpha;
-    space->region[r].beta += d->beta;
+    SbRegion *region = &space->region[r];
+    PetscBool damped = d->on.n ? PETSC_FALSE : PETSC_TRUE;
+
+    for (PetscInt i = 0; i < d->on.n && !damped; i++) {
+      PetscCall(PetscStrcmp(d->on.name[i], space->mesh->body[region->body].name, &damped));
+    }
+    if (!damped) continue;
+    region->alpha += d->alpha;
+    region->beta += d->beta;
   }
-  PetscCall(PetscFree(damped));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -89,10 +88,10 @@ static PetscErrorCode create_damping(SbEffect e)
 
   PetscFunctionBeginUser;
   PetscCall(PetscNew(&d));
-  e->data               = d;
+  e->data = d;
   e->ops.setfromoptions = options_damping;
-  e->ops.setup          = setup_damping;
-  e->ops.destroy        = destroy_damping;
+  e->ops.setup = setup_damping;
+  e->ops.destroy = destroy_damping;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -1,30 +1,31 @@
 /*
   deadload.c - a force per volume or area integrated against linear basis functions.
 
-  f_a = integral of phi_a q(X, t) over each cell (or facet), at the rest position. phi_a is the barycentric coordinate of
-  corner a, so one loop serves tetrahedra and triangles:
+  f_a = integral of phi_a q(X, t) over each cell (or facet), at the rest position. phi_a is the barycentric
+  coordinate of corner a, so one loop serves tetrahedra and triangles:
 
     f_a += |T| sum_k w_k b_ka q(sum_c b_kc X_c, t).
 
-  Rules, both with positive weights, inner points and degree 5, hence exact for q of degree 4: 14 points on the
-  tetrahedron (Walkington, "Quadrature on simplices of arbitrary dimension", 2000), 7 points on the triangle (Radon 1948;
-  Stroud, "Approximate calculation of multiple integrals", 1971, T2:5-1). Second-order convergence of linear elements needs
-  degree 2; the rest lowers the constant at no cost, because a load that does not change is integrated once.
+  Rules, both with positive weights, inner points and degree 5, hence exact for q of degree 4: 14 points on
+  the tetrahedron (Walkington, "Quadrature on simplices of arbitrary dimension", 2000), 7 points on the
+  triangle (Radon 1948; Stroud, "Approximate calculation of multiple integrals", 1971, T2:5-1). Second-order
+  convergence of linear elements needs degree 2; the rest lowers the constant at no cost, because a load that
+  does not change is integrated once.
 
-  Sums are kept in a list of the nodes touched, not in a field over the whole body. Corners are nodes: elements whose
-  nodes are not the vertices need their own basis here.
+  Sums are kept in a list of the nodes touched, not in a field over the whole body. Corners are nodes:
+  elements whose nodes are not the vertices need their own basis here.
 */
 #include "sbeffect.h"
 
 struct _p_SbDeadLoad {
-  PetscInt         ncorner, nitem;
-  PetscInt        *corner;  /* [nitem][ncorner] index into node; NULL once a steady load was integrated */
-  const PetscReal *node_x;  /* borrowed from the space */
-  PetscInt         n, nowned;
-  PetscInt        *node;    /* [n] local nodes, ascending, so owned ones first */
-  PetscReal       *value;   /* [n][3] N */
-  PetscReal        t;       /* s, of value */
-  SbFormula        density[3]; /* borrowed */
+  PetscInt ncorner, nitem;
+  PetscInt *corner; /* [nitem][ncorner] index into node; NULL once a steady load was integrated */
+  const PetscReal *node_x; /* borrowed from the space */
+  PetscInt n, nowned;
+  PetscInt *node; /* [n] local nodes, ascending, so owned ones first */
+  PetscReal *value; /* [n][3] N */
+  PetscReal t; /* s, of value */
+  SbFormula density[3]; /* borrowed */
 };
 
 #define NPOINT_MAX 14
@@ -32,18 +33,19 @@ struct _p_SbDeadLoad {
 /* Barycentric points [npoint][4] and weights (sum 1) of the rule for tetrahedra or triangles. */
 static PetscInt tabulate_rule(PetscInt ncorner, PetscReal b[NPOINT_MAX][4], PetscReal w[NPOINT_MAX])
 {
-  const PetscReal s15  = PetscSqrtReal(15.0);
-  const PetscReal a4[] = {0.31088591926330060980, 0.092735250310891226402}, w4[] = {0.11268792571801585080, 0.073493043116361949544};
+  const PetscReal s15 = PetscSqrtReal(15.0);
+  const PetscReal a4[] = {0.31088591926330060980, 0.092735250310891226402},
+                  w4[] = {0.11268792571801585080, 0.073493043116361949544};
   const PetscReal a3[] = {(6 - s15) / 21, (6 + s15) / 21}, w3[] = {(155 - s15) / 1200, (155 + s15) / 1200};
   const PetscReal *a = ncorner == 4 ? a4 : a3, *wa = ncorner == 4 ? w4 : w3;
-  PetscInt         n = 0;
+  PetscInt n = 0;
 
   // Two orbits with one corner apart.
   for (int orbit = 0; orbit < 2; orbit++) {
     for (PetscInt c = 0; c < ncorner; c++, n++) {
       for (PetscInt d = 0; d < ncorner; d++) b[n][d] = a[orbit];
       b[n][c] = 1 - (PetscReal)(ncorner - 1) * a[orbit];
-      w[n]    = wa[orbit];
+      w[n] = wa[orbit];
     }
   }
   if (ncorner == 4) {
@@ -54,7 +56,7 @@ static PetscInt tabulate_rule(PetscInt ncorner, PetscReal b[NPOINT_MAX][4], Pets
       for (int d = c + 1; d < 4; d++, n++) {
         for (int i = 0; i < 4; i++) b[n][i] = e;
         b[n][c] = b[n][d] = 0.5 - e;
-        w[n]              = 0.042546020777081466438;
+        w[n] = 0.042546020777081466438;
       }
     }
   } else {
@@ -83,12 +85,12 @@ static PetscReal simplex_measure(PetscInt ncorner, const PetscReal *const x[4])
 static void integrate(SbDeadLoad load, PetscReal t)
 {
   const PetscInt nc = load->ncorner;
-  PetscReal      b[NPOINT_MAX][4], w[NPOINT_MAX];
+  PetscReal b[NPOINT_MAX][4], w[NPOINT_MAX];
   const PetscInt npoint = tabulate_rule(nc, b, w);
 
   for (PetscInt i = 0; i < 3 * load->n; i++) load->value[i] = 0;
   for (PetscInt item = 0; item < load->nitem; item++) {
-    const PetscInt  *corner = &load->corner[nc * item];
+    const PetscInt *corner = &load->corner[nc * item];
     const PetscReal *x[4];
 
     for (PetscInt c = 0; c < nc; c++) x[c] = &load->node_x[3 * load->node[corner[c]]];
@@ -108,18 +110,18 @@ static void integrate(SbDeadLoad load, PetscReal t)
   load->t = t;
 }
 
-PetscErrorCode SbDeadLoadCreate(SbSpace space, PetscInt ncorner, PetscInt nitem, const PetscInt node[], const SbFormula density[3],
-                                SbDeadLoad *deadload)
+PetscErrorCode SbDeadLoadCreate(SbSpace space, PetscInt ncorner, PetscInt nitem, const PetscInt node[],
+                                const SbFormula density[3], SbDeadLoad *deadload)
 {
   SbDeadLoad load;
-  PetscInt  *slot;
-  PetscBool  steady = PETSC_TRUE;
+  PetscInt *slot;
+  PetscBool steady = PETSC_TRUE;
 
   PetscFunctionBeginUser;
   PetscCall(PetscNew(&load));
   load->ncorner = ncorner;
-  load->nitem   = nitem;
-  load->node_x  = space->node_x;
+  load->nitem = nitem;
+  load->node_x = space->node_x;
   for (int i = 0; i < 3; i++) {
     PetscBool time, place;
 
@@ -137,7 +139,7 @@ PetscErrorCode SbDeadLoadCreate(SbSpace space, PetscInt ncorner, PetscInt nitem,
   load->n = 0;
   for (PetscInt i = 0; i < space->nnode; i++) {
     if (!slot[i]) continue;
-    slot[i]               = load->n;
+    slot[i] = load->n;
     load->node[load->n++] = i;
     if (i < space->nnode_owned) load->nowned = load->n;
   }

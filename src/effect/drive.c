@@ -1,38 +1,40 @@
 /*
   drive.c - nodes moved along a given path: a translation, a rotation about an axis, or both.
 
-  With r = X - c the rest position relative to a point c of the axis, k the unit direction and theta(t) the angle, the
-  prescribed displacement is (Rodrigues 1840)
+  With r = X - c the rest position relative to a point c of the axis, k the unit direction and theta(t) the
+  angle, the prescribed displacement is (Rodrigues 1840)
 
     u(X, t) = d(t, X) + sin(theta) k x r + 2 sin^2(theta/2) k x (k x r).
 
-  Written this way nothing cancels at small angles. Reaction: force of the drive on the body (hold.c has the sign);
-  torque: moment of that force about the axis at rest, taken with the current positions.
+  Written this way nothing cancels at small angles. Reaction: force of the drive on the body (hold.c has the
+  sign); torque: moment of that force about the axis at rest, taken with the current positions.
 */
 #include "sbeffect.h"
 
 typedef struct {
   SbEffectOn on;
-  int        components; /* bits 0..2 */
-  SbFormula  displacement[3], angle;
-  PetscReal  point[3], axis[3]; /* m; unit vector */
-  SbHold     hold;
+  int components; /* bits 0..2 */
+  SbFormula displacement[3], angle;
+  PetscReal point[3], axis[3]; /* m; unit vector */
+  SbHold hold;
   PetscReal *value; /* [hold.n][3] m */
 } Drive;
 
 static const SbOption rows[] = {
-    {"on", SB_OPTION_NAMES, 1, "", NULL, "", "Sets whose nodes are moved."},
-    {"components", SB_OPTION_CHOICE, 1, "", "xyz", SB_HOLD_CHOICES, "Directions that are prescribed."},
-    {"displacement", SB_OPTION_FORMULA, 3, "m", "0;0;0", "", "Translation, three formulas of t, x, y, z (rest position)."},
-    {"angle", SB_OPTION_FORMULA, 1, "degree", "0", "", "Angle of rotation about the axis, a formula of the time t."},
-    {"axis", SB_OPTION_REALS, 3, "", "0,0,1", "", "Direction of the axis of rotation; right-handed."},
-    {"axis_point", SB_OPTION_REALS, 3, "m", "0,0,0", "", "A point on the axis of rotation."},
+    {"on", SB_OPTION_NAMES, 1, "", NULL, "", "sets whose nodes are moved"},
+    {"components", SB_OPTION_CHOICE, 1, "", "xyz", SB_HOLD_CHOICES, "directions that are prescribed"},
+    {"displacement", SB_OPTION_FORMULA, 3, "m", "0;0;0", "",
+     "translation, three formulas of t, x, y, z (rest position)"},
+    {"angle", SB_OPTION_FORMULA, 1, "degree", "0", "",
+     "angle of rotation about the axis, a formula of the time t"},
+    {"axis", SB_OPTION_REALS, 3, "", "0,0,1", "", "direction of the axis of rotation; right-handed"},
+    {"axis_point", SB_OPTION_REALS, 3, "m", "0,0,0", "", "a point on the axis of rotation"},
 };
 
 static PetscErrorCode options_drive(SbEffect e, const SbScope *scope)
 {
-  Drive    *d = (Drive *)e->data;
-  PetscInt  choice;
+  Drive *d = (Drive *)e->data;
+  PetscInt choice;
   PetscBool move, turn;
   PetscReal length = 0;
 
@@ -43,15 +45,17 @@ static PetscErrorCode options_drive(SbEffect e, const SbScope *scope)
   PetscCall(SbOptionGiven(scope, "displacement", &move));
   PetscCall(SbOptionGiven(scope, "angle", &turn));
   PetscCheck(move || turn, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
-             "effect %s: give -effect_%s_displacement (m, three formulas) or -effect_%s_angle (degrees, one formula)", e->name,
-             e->name, e->name);
+             "effect %s: give -effect_%s_displacement (m, three formulas) or -effect_%s_angle (degrees, one "
+             "formula)",
+             e->name, e->name, e->name);
   PetscCall(SbEffectFormulas(scope, "displacement", 3, PETSC_TRUE, d->displacement, &e->steady));
   PetscCall(SbEffectFormulas(scope, "angle", 1, PETSC_FALSE, &d->angle, &e->steady));
   PetscCall(SbOptionReals(scope, "axis", d->axis));
   PetscCall(SbOptionReals(scope, "axis_point", d->point));
   for (int i = 0; i < 3; i++) length += d->axis[i] * d->axis[i];
   length = PetscSqrtReal(length);
-  PetscCheck(length > 0, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT, "-effect_%s_axis: 0,0,0 is no direction", e->name);
+  PetscCheck(length > 0, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT, "-effect_%s_axis: 0,0,0 is no direction",
+             e->name);
   for (int i = 0; i < 3; i++) d->axis[i] /= length;
   e->steady = PETSC_FALSE;
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -76,27 +80,29 @@ static inline void cross(const PetscReal a[3], const PetscReal b[3], PetscReal c
 
 static PetscErrorCode prescribe_drive(SbEffect e, SbSpace space, PetscReal t)
 {
-  Drive          *d     = (Drive *)e->data;
+  Drive *d = (Drive *)e->data;
   const PetscReal theta = SbFormulaEval(d->angle, t, NULL) * PETSC_PI / 180;
-  const PetscReal half  = PetscSinReal(theta / 2);
+  const PetscReal half = PetscSinReal(theta / 2);
 
   PetscFunctionBeginUser;
   for (PetscInt i = 0; i < d->hold.n; i++) {
-    const PetscReal *X    = &space->node_x[3 * d->hold.node[i]];
-    const PetscReal  r[3] = {X[0] - d->point[0], X[1] - d->point[1], X[2] - d->point[2]};
-    PetscReal        kr[3], kkr[3];
+    const PetscReal *X = &space->node_x[3 * d->hold.node[i]];
+    const PetscReal r[3] = {X[0] - d->point[0], X[1] - d->point[1], X[2] - d->point[2]};
+    PetscReal kr[3], kkr[3];
 
     cross(d->axis, r, kr);
     cross(d->axis, kr, kkr);
     for (int c = 0; c < 3; c++) {
-      d->value[3 * i + c] = SbFormulaEval(d->displacement[c], t, X) + PetscSinReal(theta) * kr[c] + 2 * half * half * kkr[c];
+      d->value[3 * i + c] =
+          SbFormulaEval(d->displacement[c], t, X) + PetscSinReal(theta) * kr[c] + 2 * half * half * kkr[c];
     }
   }
   PetscCall(SbHoldPrescribe(&d->hold, space, d->value));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode history_drive(SbEffect e, SbSpace space, const SbStage *stage, const PetscReal residual[], PetscReal values[])
+static PetscErrorCode history_drive(SbEffect e, SbSpace space, const SbStage *stage,
+                                    const PetscReal residual[], PetscReal values[])
 {
   const Drive *d = (const Drive *)e->data;
 
@@ -105,10 +111,10 @@ static PetscErrorCode history_drive(SbEffect e, SbSpace space, const SbStage *st
   values[3] = 0;
   for (PetscInt i = 0; i < d->hold.nowned; i++) {
     const PetscInt node = d->hold.node[i];
-    PetscReal      arm[3], force[3], moment[3];
+    PetscReal arm[3], force[3], moment[3];
 
     for (int c = 0; c < 3; c++) {
-      arm[c]   = space->node_x[3 * node + c] + stage->u[3 * node + c] - d->point[c];
+      arm[c] = space->node_x[3 * node + c] + stage->u[3 * node + c] - d->point[c];
       force[c] = d->hold.components[i] & (1 << c) ? residual[3 * node + c] : 0;
     }
     cross(arm, force, moment);
@@ -134,16 +140,16 @@ static PetscErrorCode destroy_drive(SbEffect e)
 static PetscErrorCode create_drive(SbEffect e)
 {
   static const char *const columns[] = {"reaction_x", "reaction_y", "reaction_z", "torque"};
-  Drive                   *d;
+  Drive *d;
 
   PetscFunctionBeginUser;
   PetscCall(PetscNew(&d));
-  e->data               = d;
+  e->data = d;
   e->ops.setfromoptions = options_drive;
-  e->ops.setup          = setup_drive;
-  e->ops.prescribe      = prescribe_drive;
-  e->ops.history        = history_drive;
-  e->ops.destroy        = destroy_drive;
+  e->ops.setup = setup_drive;
+  e->ops.prescribe = prescribe_drive;
+  e->ops.history = history_drive;
+  e->ops.destroy = destroy_drive;
   for (e->ncolumn = 0; e->ncolumn < 4; e->ncolumn++) e->column[e->ncolumn] = columns[e->ncolumn];
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -1,15 +1,15 @@
 /*
   effect.c - the registry of effects, and how one comes to be from its name in the scenario.
 
-  An effect is created by its constructor, which fills the table of operations and the private data; then it reads its
-  options. Everything that needs the mesh waits for its setup operation.
+  An effect is created by its constructor, which fills the table of operations and the private data; then it
+  reads its options. Everything that needs the mesh waits for its setup operation.
 */
 #include "sbeffect.h"
 
 PetscFunctionList SbEffectList = NULL;
 
 static const SbOption common_rows[] = {
-    {"type", SB_OPTION_STRING, 1, "", "", "", "What the effect is; by default its own name says so."},
+    {"type", SB_OPTION_STRING, 1, "", "", "", "what the effect is; by default its own name says so"},
 };
 
 static PetscErrorCode forget_types(void)
@@ -19,15 +19,14 @@ static PetscErrorCode forget_types(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbEffectRegister(const char *type, PetscErrorCode (*create)(SbEffect), PetscInt nrows, const SbOption rows[])
+PetscErrorCode SbEffectRegister(const char *type, PetscErrorCode (*create)(SbEffect), PetscInt nrows,
+                                const SbOption rows[])
 {
   PetscFunctionBeginUser;
-  // The first type brings what all types have in common, and the clean-up.
-  if (!SbEffectList) {
-    PetscCall(SbOptionsRegister("effect", "", 1, common_rows));
-    PetscCall(PetscRegisterFinalize(forget_types));
-  }
+  // The first type brings the clean-up; what all types have in common may be registered again and again.
+  if (!SbEffectList) PetscCall(PetscRegisterFinalize(forget_types));
   PetscCall(PetscFunctionListAdd(&SbEffectList, type, create));
+  PetscCall(SbOptionsRegister("effect", "", PETSC_STATIC_ARRAY_LENGTH(common_rows), common_rows));
   PetscCall(SbOptionsRegister("effect", type, nrows, rows));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -36,8 +35,8 @@ PetscErrorCode SbEffectRegister(const char *type, PetscErrorCode (*create)(SbEff
 static PetscErrorCode unknown_type(const char *name, const char *type)
 {
   const char **types;
-  int          n;
-  char         near[512];
+  int n;
+  char near[512];
 
   PetscFunctionBeginUser;
   PetscCall(PetscFunctionListGet(SbEffectList, &types, &n));
@@ -51,15 +50,16 @@ static PetscErrorCode unknown_type(const char *name, const char *type)
   }
   PetscCall(PetscFree(types));
   SETERRQ(PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
-          "effect %s: there is no effect of type \"%s\"; did you mean %s? Set -effect_%s_type", name, type, near, name);
+          "effect %s: there is no effect of type \"%s\"; did you mean %s? Set -effect_%s_type", name, type,
+          near, name);
 }
 
 PetscErrorCode SbEffectCreate(const char *name, SbEffect *effect)
 {
   PetscErrorCode (*create)(SbEffect) = NULL;
   SbEffect e;
-  SbScope  scope;
-  char     type[SB_NAME_MAX];
+  SbScope scope;
+  char type[SB_NAME_MAX];
 
   PetscFunctionBeginUser;
   *effect = NULL;
@@ -70,6 +70,7 @@ PetscErrorCode SbEffectCreate(const char *name, SbEffect *effect)
   if (!create) PetscCall(unknown_type(name, type));
 
   PetscCall(PetscNew(&e));
+  *effect = e;
   PetscCall(PetscStrncpy(e->name, name, sizeof(e->name)));
   PetscCall(PetscStrncpy(e->type, type, sizeof(e->type)));
   e->linear = PETSC_TRUE;
@@ -77,7 +78,6 @@ PetscErrorCode SbEffectCreate(const char *name, SbEffect *effect)
   PetscCall((*create)(e));
   PetscCall(SbScopeSet(&scope, "effect", type, name));
   if (e->ops.setfromoptions) PetscCall((*e->ops.setfromoptions)(e, &scope));
-  *effect = e;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -90,8 +90,8 @@ PetscErrorCode SbEffectDestroy(SbEffect *effect)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbEffectFormulas(const SbScope *scope, const char *key, PetscInt n, PetscBool place, SbFormula formulas[],
-                                PetscBool *steady)
+PetscErrorCode SbEffectFormulas(const SbScope *scope, const char *key, PetscInt n, PetscBool place,
+                                SbFormula formulas[], PetscBool *steady)
 {
   PetscFunctionBeginUser;
   PetscCall(SbOptionFormulas(scope, key, formulas));
@@ -104,7 +104,8 @@ PetscErrorCode SbEffectFormulas(const SbScope *scope, const char *key, PetscInt 
       char option[3 * SB_NAME_MAX];
 
       PetscCall(SbOptionName(scope, key, sizeof(option), option));
-      SETERRQ(PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT, "%s: this formula may use the time t only, not x, y or z", option);
+      SETERRQ(PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
+              "%s: this formula may use the time t only, not x, y or z", option);
     }
   }
   PetscFunctionReturn(PETSC_SUCCESS);

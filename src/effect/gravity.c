@@ -1,8 +1,8 @@
 /*
   gravity.c - a uniform acceleration field on all bodies.
 
-  f_a = s(t) m_a g with the lumped mass m_a of each node. For linear elements a row of the consistent mass matrix sums to
-  m_a, so M g is the same vector for both kinds of mass.
+  f_a = s(t) m_a g with the lumped mass m_a of each node. For linear elements a row of the consistent mass
+  matrix sums to m_a, so M g is the same vector for both kinds of mass.
 */
 #include "sbeffect.h"
 
@@ -12,8 +12,8 @@ typedef struct {
 } Gravity;
 
 static const SbOption rows[] = {
-    {"vector", SB_OPTION_REALS, 3, "m/s^2", "0,0,-9.81", "", "Acceleration."},
-    {"time", SB_OPTION_FORMULA, 1, "", "1", "", "Factor on the acceleration, a formula of the time t."},
+    {"vector", SB_OPTION_REALS, 3, "m/s^2", "0,0,-9.81", "", "acceleration"},
+    {"time", SB_OPTION_FORMULA, 1, "", "1", "", "factor on the acceleration, a formula of the time t"},
 };
 
 static PetscErrorCode options_gravity(SbEffect e, const SbScope *scope)
@@ -28,9 +28,9 @@ static PetscErrorCode options_gravity(SbEffect e, const SbScope *scope)
 
 static PetscErrorCode force_gravity(SbEffect e, SbSpace space, const SbStage *stage, PetscReal f[])
 {
-  const Gravity  *gravity = (const Gravity *)e->data;
-  const PetscReal s       = SbFormulaEval(gravity->time, stage->t, NULL);
-  const PetscReal g[3]    = {s * gravity->g[0], s * gravity->g[1], s * gravity->g[2]};
+  const Gravity *gravity = (const Gravity *)e->data;
+  const PetscReal s = SbFormulaEval(gravity->time, stage->t, NULL);
+  const PetscReal g[3] = {s * gravity->g[0], s * gravity->g[1], s * gravity->g[2]};
 
   PetscFunctionBeginUser;
   for (PetscInt i = 0; i < space->nnode_owned; i++) {
@@ -56,10 +56,10 @@ static PetscErrorCode create_gravity(SbEffect e)
 
   PetscFunctionBeginUser;
   PetscCall(PetscNew(&gravity));
-  e->data               = gravity;
+  e->data = gravity;
   e->ops.setfromoptions = options_gravity;
-  e->ops.force          = force_gravity;
-  e->ops.destroy        = destroy_gravity;
+  e->ops.force = force_gravity;
+  e->ops.destroy = destroy_gravity;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -1,23 +1,24 @@
 /*
   point_force.c - a total force shared equally by the nodes of the named sets.
 
-  f_a = s(t) F(t) / n for each of the n nodes, counted once over all ranks. A force on a single node has no limit under mesh
-  refinement (the displacement under it grows like 1/h); use a traction where the area matters.
+  f_a = s(t) F(t) / n for each of the n nodes, counted once over all ranks. A force on a single node has no
+  limit under mesh refinement (the displacement under it grows like 1/h); use a traction where the area
+  matters.
 */
 #include "sbeffect.h"
 
 typedef struct {
   SbEffectOn on;
-  SbFormula  vector[3], time;
-  PetscInt   n;    /* owned nodes of the sets on this rank */
-  PetscInt  *node; /* [n] local */
-  PetscReal  share; /* 1 / global number of nodes */
+  SbFormula vector[3], time;
+  PetscInt n; /* owned nodes of the sets on this rank */
+  PetscInt *node; /* [n] local */
+  PetscReal share; /* 1 / global number of nodes */
 } PointForce;
 
 static const SbOption rows[] = {
-    {"on", SB_OPTION_NAMES, 1, "", NULL, "", "Sets whose nodes share the force equally."},
-    {"vector", SB_OPTION_FORMULA, 3, "N", NULL, "", "Total force, three formulas of the time t."},
-    {"time", SB_OPTION_FORMULA, 1, "", "1", "", "Factor on the force, a formula of the time t."},
+    {"on", SB_OPTION_NAMES, 1, "", NULL, "", "sets whose nodes share the force equally"},
+    {"vector", SB_OPTION_FORMULA, 3, "N", NULL, "", "total force, three formulas of the time t"},
+    {"time", SB_OPTION_FORMULA, 1, "", "1", "", "factor on the force, a formula of the time t"},
 };
 
 static PetscErrorCode options_point_force(SbEffect e, const SbScope *scope)
@@ -34,7 +35,7 @@ static PetscErrorCode options_point_force(SbEffect e, const SbScope *scope)
 static PetscErrorCode setup_point_force(SbEffect e, SbSpace space)
 {
   PointForce *p = (PointForce *)e->data;
-  PetscInt    n, total;
+  PetscInt n, total;
 
   PetscFunctionBeginUser;
   PetscCall(SbEffectNodes(space, &p->on, &n, &p->node));
@@ -48,8 +49,8 @@ static PetscErrorCode setup_point_force(SbEffect e, SbSpace space)
 static PetscErrorCode force_point_force(SbEffect e, SbSpace space, const SbStage *stage, PetscReal f[])
 {
   const PointForce *p = (const PointForce *)e->data;
-  const PetscReal   s = p->share * SbFormulaEval(p->time, stage->t, NULL);
-  PetscReal         F[3];
+  const PetscReal s = p->share * SbFormulaEval(p->time, stage->t, NULL);
+  PetscReal F[3];
 
   PetscFunctionBeginUser;
   (void)space;
@@ -79,11 +80,11 @@ static PetscErrorCode create_point_force(SbEffect e)
 
   PetscFunctionBeginUser;
   PetscCall(PetscNew(&p));
-  e->data               = p;
+  e->data = p;
   e->ops.setfromoptions = options_point_force;
-  e->ops.setup          = setup_point_force;
-  e->ops.force          = force_point_force;
-  e->ops.destroy        = destroy_point_force;
+  e->ops.setup = setup_point_force;
+  e->ops.force = force_point_force;
+  e->ops.destroy = destroy_point_force;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

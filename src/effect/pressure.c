@@ -1,44 +1,48 @@
 /*
   pressure.c - a pressure on part of the surface, pushing inwards where it is positive.
 
-  On a facet with current corners x0, x1, x2, counter-clockwise seen from outside, N = (x1 - x0) x (x2 - x0) is twice the
-  outward area vector, and each corner receives
+  On a facet with current corners x0, x1, x2, counter-clockwise seen from outside, N = (x1 - x0) x (x2 - x0)
+  is twice the outward area vector, and each corner receives
 
     f_a = -p/6 N,   p = value(t) time(t).
 
-  On a closed surface this is -p dV/dx_a, V the enclosed volume: total force and moment vanish and the work is -p times the
-  change of volume.
+  On a closed surface this is -p dV/dx_a, V the enclosed volume: total force and moment vanish and the work is
+  -p times the change of volume.
 
-  Tangent: with the opposite edges c_b = x_{b+1} - x_{b+2} (indices modulo 3), dN/dx_b w = w x c_b, so df_a/dx_b =
-  p/6 [c_b]x, where [c]x w = c x w. It is not symmetric facet by facet; what the facets add to the matrix here is the
-  symmetric part, the blocks p/12 [c_b - c_a]x. On a closed surface, or one whose rim is held, the other part cancels and
-  the tangent is the exact derivative (Bufler, "Pressure loaded structures under large deformations", 1984); at a free rim
-  it is not, and Newton converges a little more slowly to the same answer.
+  Tangent: with the opposite edges c_b = x_{b+1} - x_{b+2} (indices modulo 3), dN/dx_b w = w x c_b, so
+  df_a/dx_b = p/6 [c_b]x, where [c]x w = c x w. It is not symmetric facet by facet; what the facets add to the
+  matrix here is the symmetric part, the blocks p/12 [c_b - c_a]x. On a closed surface, or one whose rim is
+  held, the other part cancels and the tangent is the exact derivative (Bufler, "Pressure loaded structures
+  under large deformations", 1984); at a free rim it is not, and Newton converges a little more slowly to the
+  same answer.
 
-  With follower = no the pressure acts on the rest area and normal, as small-strain theory has it; then there is no tangent.
+  With follower = no the pressure acts on the rest area and normal, as small-strain theory has it; then there
+  is no tangent.
 */
 #include "sbeffect.h"
 
 /* One facet of the loaded surface. */
 typedef struct {
-  PetscInt node[3];   /* local nodes, counter-clockwise seen from outside */
-  PetscInt cell;      /* local cell */
+  PetscInt node[3]; /* local nodes, counter-clockwise seen from outside */
+  PetscInt cell; /* local cell */
   PetscInt corner[3]; /* 0..3, which nodes of the cell these are */
 } Facet;
 
 typedef struct {
   SbEffectOn on;
-  SbFormula  value, time;
-  PetscBool  follower;
-  PetscInt   nfacet;
-  Facet     *facet; /* [nfacet] of owned and ghost cells */
+  SbFormula value, time;
+  PetscBool follower;
+  PetscInt nfacet;
+  Facet *facet; /* [nfacet] of owned and ghost cells */
 } Pressure;
 
 static const SbOption rows[] = {
-    {"on", SB_OPTION_NAMES, 1, "", NULL, "", "Sets whose boundary facets are under pressure."},
-    {"value", SB_OPTION_FORMULA, 1, "Pa", NULL, "", "Pressure, a formula of the time t; positive pushes inwards."},
-    {"follower", SB_OPTION_BOOL, 1, "", "true", "", "Act on the current area and normal; if not, on those at rest."},
-    {"time", SB_OPTION_FORMULA, 1, "", "1", "", "Factor on the pressure, a formula of the time t."},
+    {"on", SB_OPTION_NAMES, 1, "", NULL, "", "sets whose boundary facets are under pressure"},
+    {"value", SB_OPTION_FORMULA, 1, "Pa", NULL, "",
+     "pressure, a formula of the time t; positive pushes inwards"},
+    {"follower", SB_OPTION_BOOL, 1, "", "true", "",
+     "act on the current area and normal; if not, on those at rest"},
+    {"time", SB_OPTION_FORMULA, 1, "", "1", "", "factor on the pressure, a formula of the time t"},
 };
 
 static PetscErrorCode options_pressure(SbEffect e, const SbScope *scope)
@@ -62,7 +66,7 @@ static PetscErrorCode options_pressure(SbEffect e, const SbScope *scope)
 static PetscErrorCode setup_pressure(SbEffect e, SbSpace space)
 {
   Pressure *p = (Pressure *)e->data;
-  SbFacet  *facets;
+  SbFacet *facets;
 
   PetscFunctionBeginUser;
   PetscCall(SbEffectFacets(space, &p->on, &p->nfacet, &facets));
@@ -92,14 +96,14 @@ static inline void corners(const Facet *facet, const PetscReal X[], const PetscR
 
 static PetscErrorCode force_pressure(SbEffect e, SbSpace space, const SbStage *stage, PetscReal f[])
 {
-  const Pressure  *load = (const Pressure *)e->data;
-  const PetscReal  p = SbFormulaEval(load->value, stage->t, NULL) * SbFormulaEval(load->time, stage->t, NULL);
+  const Pressure *load = (const Pressure *)e->data;
+  const PetscReal p = SbFormulaEval(load->value, stage->t, NULL) * SbFormulaEval(load->time, stage->t, NULL);
   const PetscReal *u = load->follower ? stage->u : NULL;
 
   PetscFunctionBeginUser;
   for (PetscInt k = 0; k < load->nfacet; k++) {
     const PetscInt *node = load->facet[k].node;
-    PetscReal       x[3][3], d[3], b[3], N[3];
+    PetscReal x[3][3], d[3], b[3], N[3];
 
     corners(&load->facet[k], space->node_x, u, x);
     for (int i = 0; i < 3; i++) {
@@ -120,13 +124,14 @@ static PetscErrorCode force_pressure(SbEffect e, SbSpace space, const SbStage *s
 static PetscErrorCode tangent_pressure(SbEffect e, SbSpace space, const SbStage *stage, Mat A)
 {
   const Pressure *load = (const Pressure *)e->data;
-  const PetscReal p = stage->shift_k * SbFormulaEval(load->value, stage->t, NULL) * SbFormulaEval(load->time, stage->t, NULL);
+  const PetscReal p =
+      stage->shift_k * SbFormulaEval(load->value, stage->t, NULL) * SbFormulaEval(load->time, stage->t, NULL);
 
   PetscFunctionBeginUser;
   if (p == 0) PetscFunctionReturn(PETSC_SUCCESS);
   for (PetscInt k = 0; k < load->nfacet; k++) {
     const Facet *facet = &load->facet[k];
-    PetscReal    x[3][3], c[3][3];
+    PetscReal x[3][3], c[3][3];
 
     corners(facet, space->node_x, stage->u, x);
     for (int b = 0; b < 3; b++) {
@@ -136,7 +141,8 @@ static PetscErrorCode tangent_pressure(SbEffect e, SbSpace space, const SbStage 
     for (int a = 0; a < 3; a++) {
       for (int b = 0; b < 3; b++) {
         if (a == b) continue;
-        const PetscReal d[3]     = {-p / 12 * (c[b][0] - c[a][0]), -p / 12 * (c[b][1] - c[a][1]), -p / 12 * (c[b][2] - c[a][2])};
+        const PetscReal d[3] = {-p / 12 * (c[b][0] - c[a][0]), -p / 12 * (c[b][1] - c[a][1]),
+                                -p / 12 * (c[b][2] - c[a][2])};
         const PetscReal block[9] = {0, -d[2], d[1], d[2], 0, -d[0], -d[1], d[0], 0};
 
         PetscCall(SbSpaceAddCellBlock(space, A, facet->cell, facet->corner[a], facet->corner[b], block));
@@ -165,12 +171,12 @@ static PetscErrorCode create_pressure(SbEffect e)
 
   PetscFunctionBeginUser;
   PetscCall(PetscNew(&p));
-  e->data               = p;
+  e->data = p;
   e->ops.setfromoptions = options_pressure;
-  e->ops.setup          = setup_pressure;
-  e->ops.force          = force_pressure;
-  e->ops.tangent        = tangent_pressure;
-  e->ops.destroy        = destroy_pressure;
+  e->ops.setup = setup_pressure;
+  e->ops.force = force_pressure;
+  e->ops.tangent = tangent_pressure;
+  e->ops.destroy = destroy_pressure;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -1,9 +1,10 @@
 /*
-  select.c - the cells, boundary facets and nodes that the sets named by -effect_<name>_on select on this rank.
+  select.c - the cells, boundary facets and nodes that the sets named by -effect_<name>_on select on this
+  rank.
 
-  The mesh carries one bit per set on vertices, cells and faces. An item in several of the named sets must act once:
-  cells are tested against the union of the bits, a facet is taken with the first of its sets, nodes are sorted and
-  doubles removed (a node need not be a vertex, so it has no bits of its own).
+  The mesh carries one bit per set on vertices, cells and faces. An item in several of the named sets must act
+  once: cells are tested against the union of the bits, a facet is taken with the first of its sets, nodes are
+  sorted and doubles removed (a node need not be a vertex, so it has no bits of its own).
 */
 #include "sbeffect.h"
 
@@ -25,31 +26,32 @@ PetscErrorCode SbEffectFreeOn(SbEffectOn *on)
 
 typedef enum { CELLS, FACETS, NODES } Kind;
 
-/* Number of the i-th set of `on`; an error when it selects nothing of the kind. */
-static PetscErrorCode find_set(SbSpace space, const SbEffectOn *on, PetscInt i, Kind kind, PetscInt *k)
+/* Numbers k[on->n] of the named sets; an error when one selects nothing of the kind. */
+static PetscErrorCode find_sets(SbSpace space, const SbEffectOn *on, Kind kind, PetscInt k[SB_SET_MAX])
 {
   const char *const need[] = {"tetrahedra", "boundary facets", "vertices"};
-  const char *const hint[] = {"choose a set that encloses whole tetrahedra, such as a body or a larger box",
-                              "choose a set that contains whole triangles of the surface, such as a thicker plane or box",
-                              "choose a larger set"};
-  const SbSet      *set;
-  PetscInt          count;
+  const char *const hint[] = {
+      "take a set that encloses whole tetrahedra, such as a body or a larger box",
+      "take a set that contains whole triangles of the surface, such as a thicker plane or box",
+      "take a larger set"};
 
   PetscFunctionBeginUser;
-  PetscCall(SbSpaceFindSet(space, on->name[i], on->option, k));
-  set   = &space->mesh->set[*k];
-  count = kind == CELLS ? set->ncell : kind == FACETS ? set->nfacet : set->nvert;
-  PetscCheck(count, space->comm, PETSC_ERR_USER_INPUT,
-             "%s: set %s selects no %s (%" PetscInt_FMT " vertices, %" PetscInt_FMT " boundary facets, %" PetscInt_FMT
-             " tetrahedra): %s",
-             on->option, set->name, need[kind], set->nvert, set->nfacet, set->ncell, hint[kind]);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
+  PetscCheck(on->n || kind == CELLS, space->comm, PETSC_ERR_USER_INPUT,
+             "%s: name at least one set, see -sets", on->option);
+  PetscCheck(on->n <= SB_SET_MAX, space->comm, PETSC_ERR_USER_INPUT,
+             "%s names %" PetscInt_FMT " sets, at most %d can be used", on->option, on->n, SB_SET_MAX);
+  for (PetscInt i = 0; i < on->n; i++) {
+    const SbSet *set;
+    PetscInt count;
 
-static PetscErrorCode need_sets(SbSpace space, const SbEffectOn *on)
-{
-  PetscFunctionBeginUser;
-  PetscCheck(on->n, space->comm, PETSC_ERR_USER_INPUT, "%s: name at least one set (see -sets)", on->option);
+    PetscCall(SbSpaceFindSet(space, on->name[i], on->option, &k[i]));
+    set = &space->mesh->set[k[i]];
+    count = kind == CELLS ? set->ncell : kind == FACETS ? set->nfacet : set->nvert;
+    PetscCheck(count, space->comm, PETSC_ERR_USER_INPUT,
+               "%s: set %s selects no %s (%" PetscInt_FMT " vertices, %" PetscInt_FMT
+               " boundary facets, %" PetscInt_FMT " tetrahedra): %s",
+               on->option, set->name, need[kind], set->nvert, set->nfacet, set->ncell, hint[kind]);
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -57,22 +59,22 @@ PetscErrorCode SbEffectFacets(SbSpace space, const SbEffectOn *on, PetscInt *n, 
 {
   SbFacet *list = NULL;
   uint64_t seen = 0;
+  PetscInt k[SB_SET_MAX];
 
   PetscFunctionBeginUser;
   *n = 0;
-  PetscCall(need_sets(space, on));
+  PetscCall(find_sets(space, on, FACETS, k));
   for (PetscInt i = 0; i < on->n; i++) {
     SbFacet *more;
-    PetscInt k, nmore;
+    PetscInt nmore;
 
-    PetscCall(find_set(space, on, i, FACETS, &k));
-    PetscCall(SbSpaceGetSetFacets(space, k, &nmore, &more));
+    PetscCall(SbSpaceGetSetFacets(space, k[i], &nmore, &more));
     PetscCall(PetscRealloc((size_t)(*n + nmore + 1) * sizeof(*list), &list));
     for (PetscInt j = 0; j < nmore; j++) {
       if (!(space->mesh->face_set[4 * more[j].cell + more[j].face] & seen)) list[(*n)++] = more[j];
     }
     PetscCall(PetscFree(more));
-    seen |= SB_SET_BIT(k);
+    seen |= SB_SET_BIT(k[i]);
   }
   *facets = list;
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -80,17 +82,16 @@ PetscErrorCode SbEffectFacets(SbSpace space, const SbEffectOn *on, PetscInt *n, 
 
 PetscErrorCode SbEffectNodes(SbSpace space, const SbEffectOn *on, PetscInt *n, PetscInt **nodes)
 {
-  PetscInt *list = NULL;
+  PetscInt *list = NULL, k[SB_SET_MAX];
 
   PetscFunctionBeginUser;
   *n = 0;
-  PetscCall(need_sets(space, on));
+  PetscCall(find_sets(space, on, NODES, k));
   for (PetscInt i = 0; i < on->n; i++) {
     PetscInt *more;
-    PetscInt  k, nmore;
+    PetscInt nmore;
 
-    PetscCall(find_set(space, on, i, NODES, &k));
-    PetscCall(SbSpaceGetSetNodes(space, k, &nmore, &more));
+    PetscCall(SbSpaceGetSetNodes(space, k[i], &nmore, &more));
     PetscCall(PetscRealloc((size_t)(*n + nmore + 1) * sizeof(*list), &list));
     PetscCall(PetscArraycpy(&list[*n], more, nmore));
     PetscCall(PetscFree(more));
@@ -104,16 +105,13 @@ PetscErrorCode SbEffectNodes(SbSpace space, const SbEffectOn *on, PetscInt *n, P
 PetscErrorCode SbEffectCells(SbSpace space, const SbEffectOn *on, PetscInt *n, PetscInt **cells)
 {
   const SbMesh mesh = space->mesh;
-  uint64_t     mask = 0;
+  uint64_t mask = 0;
+  PetscInt k[SB_SET_MAX];
 
   PetscFunctionBeginUser;
   *n = 0;
-  for (PetscInt i = 0; i < on->n; i++) {
-    PetscInt k;
-
-    PetscCall(find_set(space, on, i, CELLS, &k));
-    mask |= SB_SET_BIT(k);
-  }
+  PetscCall(find_sets(space, on, CELLS, k));
+  for (PetscInt i = 0; i < on->n; i++) mask |= SB_SET_BIT(k[i]);
   PetscCall(PetscMalloc1(mesh->ncell, cells));
   for (PetscInt c = 0; c < mesh->ncell; c++) {
     if (!on->n || (mesh->cell_set[c] & mask)) (*cells)[(*n)++] = c;

@@ -1,20 +1,21 @@
 /*
   support.c - nodes held where they are at rest, in all directions or in some.
 
-  Prescribes u_c = 0 for the chosen components c. The history gets the force of the support on the body (hold.c has the
-  sign). Between effects that want the same unknown, the one named first in the scenario has it.
+  Prescribes u_c = 0 for the chosen components c. The history gets the force of the support on the body
+  (hold.c has the sign). Between effects that want the same unknown, the one named first in the scenario has
+  it.
 */
 #include "sbeffect.h"
 
 typedef struct {
   SbEffectOn on;
-  int        components; /* bits 0..2 */
-  SbHold     hold;
+  int components; /* bits 0..2 */
+  SbHold hold;
 } Support;
 
 static const SbOption rows[] = {
-    {"on", SB_OPTION_NAMES, 1, "", NULL, "", "Sets whose nodes are held."},
-    {"components", SB_OPTION_CHOICE, 1, "", "xyz", SB_HOLD_CHOICES, "Directions that are held."},
+    {"on", SB_OPTION_NAMES, 1, "", NULL, "", "sets whose nodes are held"},
+    {"components", SB_OPTION_CHOICE, 1, "", "xyz", SB_HOLD_CHOICES, "directions that are held"},
 };
 
 static PetscErrorCode options_support(SbEffect e, const SbScope *scope)
@@ -48,7 +49,8 @@ static PetscErrorCode prescribe_support(SbEffect e, SbSpace space, PetscReal t)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode history_support(SbEffect e, SbSpace space, const SbStage *stage, const PetscReal residual[], PetscReal values[])
+static PetscErrorCode history_support(SbEffect e, SbSpace space, const SbStage *stage,
+                                      const PetscReal residual[], PetscReal values[])
 {
   const Support *s = (const Support *)e->data;
 
@@ -73,16 +75,16 @@ static PetscErrorCode destroy_support(SbEffect e)
 static PetscErrorCode create_support(SbEffect e)
 {
   static const char *const columns[] = {"reaction_x", "reaction_y", "reaction_z"};
-  Support                 *s;
+  Support *s;
 
   PetscFunctionBeginUser;
   PetscCall(PetscNew(&s));
-  e->data               = s;
+  e->data = s;
   e->ops.setfromoptions = options_support;
-  e->ops.setup          = setup_support;
-  e->ops.prescribe      = prescribe_support;
-  e->ops.history        = history_support;
-  e->ops.destroy        = destroy_support;
+  e->ops.setup = setup_support;
+  e->ops.prescribe = prescribe_support;
+  e->ops.history = history_support;
+  e->ops.destroy = destroy_support;
   for (e->ncolumn = 0; e->ncolumn < 3; e->ncolumn++) e->column[e->ncolumn] = columns[e->ncolumn];
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -1,26 +1,29 @@
 /*
   traction.c - a force per rest area on part of the surface, of fixed direction (a dead load).
 
-  f_a = s(t) integral of phi_a q(X, t) over the rest area, by the quadrature of deadload.c. A given total force F is the
-  uniform traction F / |S|, with the area |S| summed over the facets of owned cells of all ranks. Vector and total add up.
+  f_a = s(t) integral of phi_a q(X, t) over the rest area, by the quadrature of deadload.c. A given total
+  force F is the uniform traction F / |S|, with the area |S| summed over the facets of owned cells of all
+  ranks. Vector and total add up.
 */
 #include "sbeffect.h"
 
 typedef struct {
   SbEffectOn on;
-  char       option[3 * SB_NAME_MAX]; /* full name of the option "total" */
-  SbFormula  vector[3], time;
-  PetscReal  total[3];                /* N */
-  SbFormula  uniform[3];              /* total per area, Pa */
-  SbDeadLoad by_vector, by_total;     /* NULL when not given */
-  PetscBool  vector_given, total_given;
+  char option[3 * SB_NAME_MAX]; /* full name of the option "total" */
+  SbFormula vector[3], time;
+  PetscReal total[3]; /* N */
+  SbFormula uniform[3]; /* total per area, Pa */
+  SbDeadLoad by_vector, by_total; /* NULL when not given */
+  PetscBool vector_given, total_given;
 } Traction;
 
 static const SbOption rows[] = {
-    {"on", SB_OPTION_NAMES, 1, "", NULL, "", "Sets whose boundary facets carry the traction."},
-    {"vector", SB_OPTION_FORMULA, 3, "Pa", "0;0;0", "", "Force per rest area, three formulas of t, x, y, z (rest position)."},
-    {"total", SB_OPTION_REALS, 3, "N", "0,0,0", "", "Total force, spread evenly over the rest area of the sets."},
-    {"time", SB_OPTION_FORMULA, 1, "", "1", "", "Factor on the traction, a formula of the time t."},
+    {"on", SB_OPTION_NAMES, 1, "", NULL, "", "sets whose boundary facets carry the traction"},
+    {"vector", SB_OPTION_FORMULA, 3, "Pa", "0;0;0", "",
+     "force per rest area, three formulas of t, x, y, z (rest position)"},
+    {"total", SB_OPTION_REALS, 3, "N", "0,0,0", "",
+     "total force, spread evenly over the rest area of the sets"},
+    {"time", SB_OPTION_FORMULA, 1, "", "1", "", "factor on the traction, a formula of the time t"},
 };
 
 static PetscErrorCode options_traction(SbEffect e, const SbScope *scope)
@@ -33,7 +36,8 @@ static PetscErrorCode options_traction(SbEffect e, const SbScope *scope)
   PetscCall(SbOptionGiven(scope, "vector", &q->vector_given));
   PetscCall(SbOptionGiven(scope, "total", &q->total_given));
   PetscCheck(q->vector_given || q->total_given, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
-             "effect %s: give -effect_%s_vector (Pa, three formulas) or -effect_%s_total (N, three numbers)", e->name, e->name, e->name);
+             "effect %s: give -effect_%s_vector (Pa, three formulas) or -effect_%s_total (N, three numbers)",
+             e->name, e->name, e->name);
   PetscCall(SbEffectFormulas(scope, "vector", 3, PETSC_TRUE, q->vector, &e->steady));
   PetscCall(SbOptionReals(scope, "total", q->total));
   PetscCall(SbEffectFormulas(scope, "time", 1, PETSC_FALSE, &q->time, &e->steady));
@@ -62,8 +66,8 @@ static PetscErrorCode spread_total(Traction *q, SbSpace space, PetscInt n, const
 static PetscErrorCode setup_traction(SbEffect e, SbSpace space)
 {
   Traction *q = (Traction *)e->data;
-  SbFacet  *facets;
-  PetscInt  n, *nodes;
+  SbFacet *facets;
+  PetscInt n, *nodes;
 
   PetscFunctionBeginUser;
   PetscCall(SbEffectFacets(space, &q->on, &n, &facets));
@@ -116,11 +120,11 @@ static PetscErrorCode create_traction(SbEffect e)
 
   PetscFunctionBeginUser;
   PetscCall(PetscNew(&q));
-  e->data               = q;
+  e->data = q;
   e->ops.setfromoptions = options_traction;
-  e->ops.setup          = setup_traction;
-  e->ops.force          = force_traction;
-  e->ops.destroy        = destroy_traction;
+  e->ops.setup = setup_traction;
+  e->ops.force = force_traction;
+  e->ops.destroy = destroy_traction;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
