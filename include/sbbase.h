@@ -32,7 +32,8 @@ typedef struct {
   SbOptionKind kind;
   PetscInt     count;  /* values of SB_OPTION_REALS, formulas of SB_OPTION_FORMULA; 1 otherwise */
   const char  *unit;   /* "Pa", "kg/m^3"; "" when there is none */
-  const char  *preset; /* default as it would be typed; NULL: must be given; "": nothing by default */
+  const char  *preset; /* default as it would be typed; NULL: must be given; "": nothing by default, the reader of a
+                          number, truth value or choice leaves *value as it was */
   const char  *range;  /* "(0, inf)", "[0, 0.5)" for numbers; "a|b|c" for a choice; "" when free */
   const char  *help;   /* one sentence */
 } SbOption;
@@ -66,6 +67,8 @@ PetscErrorCode SbOptionNames(const SbScope *scope, const char *key, PetscInt *n,
 PetscErrorCode SbOptionChoice(const SbScope *scope, const char *key, PetscInt *index); /* position in `range` */
 PetscErrorCode SbOptionGiven(const SbScope *scope, const char *key, PetscBool *given);  /* by the user */
 
+/* SbOptionGiven() alone does not count as reading for SbOptionsView(): read the value too. */
+
 /* Full name, e.g. "-body_liver_young", for messages. */
 PetscErrorCode SbOptionName(const SbScope *scope, const char *key, size_t size, char name[]);
 
@@ -75,6 +78,11 @@ PetscErrorCode SbOptionName(const SbScope *scope, const char *key, size_t size, 
   a program-wide option of ours and does not belong to PETSc. Collective.
 */
 PetscErrorCode SbOptionsCheck(void);
+/* Call once, when the user's options are all in the database and before the program adds its own (presets of solvers):
+   what is added later does not count as the user's. Without this call everything counts. Not collective. */
+PetscErrorCode SbOptionsRemember(void);
+/* At the end of a run: warns about each option of the user's that nobody read; n: how many. Collective. */
+PetscErrorCode SbOptionsUnused(MPI_Comm comm, PetscInt *n);
 /* The complete scenario as an option file that runs again: every option of ours read so far with its value, help as
    comment, then the PETSc options that the user gave. Collective; rank 0 writes. */
 PetscErrorCode SbOptionsView(PetscViewer ascii);
@@ -84,6 +92,24 @@ PetscErrorCode SbOptionsReset(void);                                /* forgets w
 
 /* SbNearest - the names of `n` candidates closest to `word` by edit distance, joined by " or "; "" when none is near. */
 PetscErrorCode SbNearest(const char *word, PetscInt n, const char *const names[], size_t size, char text[]);
+
+/* ------------------------------------------------------------------ errors and warnings */
+
+/*
+  SbErrorHandlerInstall - from here on a user error (PETSC_ERR_USER, PETSC_ERR_USER_INPUT, PETSC_ERR_FILE_*, a bad option
+  file) is not printed where it happens, but by SbErrorFinish(). Other errors get PETSc's trace. Collective; after
+  MPI_Init() and before PetscInitialize().
+*/
+PetscErrorCode SbErrorHandlerInstall(void);
+PetscErrorCode SbErrorSetFromOptions(void); /* reads -error_trace */
+/*
+  SbErrorFinish - last call of main() on every rank: `supple: error: ...` on stderr, once for the run; then MPI_Finalize(),
+  or MPI_Abort() when other ranks do not arrive within a few seconds. Returns the exit code, non-zero on all ranks when
+  one failed. `ierr` is the code that came up, 0 after PetscFinalize().
+*/
+int SbErrorFinish(PetscErrorCode ierr);
+/* One line `supple: warning: ...` on stderr by rank 0 of comm; a printf format without newline. Collective. */
+PetscErrorCode SbWarning(MPI_Comm comm, const char *format, ...) PETSC_ATTRIBUTE_FORMAT(2, 3);
 
 /* ------------------------------------------------------------------ formulas */
 

@@ -1,0 +1,127 @@
+/*
+  error.c - how an error reaches the user: one line, once, and every rank ends with a non-zero code.
+
+  PETSc's own handler prints a trace on every rank, which buries the line that matters. A *user error* (a wrong option, an
+  unreadable file) needs no trace; its message is kept while the error code travels up to main(), and SbErrorFinish()
+  prints it. There the ranks find out who has something to say: those that failed alike meet in a non-blocking
+  reduction, and the lowest one prints. A rank that failed alone waits in vain for others that are stuck in a collective
+  call; after a short grace it prints and aborts the run, the last resort against a hang.
+
+  Errors that are not the user's get PETSc's trace at once.
+*/
+#include <stdarg.h>
+#include <unistd.h>
+#include "sbbase.h"
+
+#define GRACE 3.0 /* s that a failed rank waits for the others */
+
+static struct {
+  MPI_Comm  comm;          /* ours alone, so that nothing else can be pending on it */
+  PetscBool pending;       /* a user error is on its way up */
+  PetscBool trace;         /* -error_trace */
+  char      message[2048]; /* of the last user error */
+} state = {.comm = MPI_COMM_NULL};
+
+static const SbOption rows[] = {
+  {"error_trace", SB_OPTION_BOOL, 1, "", "false", "", "print the stack of calls with every error, also with errors of the input"},
+};
+
+static PetscBool is_user_error(PetscErrorCode n, const char *function)
+{
+  switch ((int)n) {
+  case PETSC_ERR_USER:
+  case PETSC_ERR_USER_INPUT:
+  case PETSC_ERR_FILE_OPEN:
+  case PETSC_ERR_FILE_READ:
+  case PETSC_ERR_FILE_WRITE:
+  case PETSC_ERR_FILE_UNEXPECTED: return PETSC_TRUE;
+  default: break;
+  }
+  /* PETSc reads option files itself, under other codes */
+  return (PetscBool)(function && (!strncmp(function, "PetscOptionsInsert", 18) || !strcmp(function, "PetscParseLayerYAML")));
+}
+
+static PetscErrorCode handler(MPI_Comm comm, int line, const char *function, const char *file, PetscErrorCode n, PetscErrorType p,
+                              const char *mess, void *ctx)
+{
+  (void)comm;
+  (void)ctx;
+  if (p == PETSC_ERROR_INITIAL) {
+    state.pending = is_user_error(n, function);
+    (void)snprintf(state.message, sizeof(state.message), "%s", mess ? mess : "unknown error");
+  }
+  if (state.pending && !state.trace) return n;
+  /* PETSC_COMM_SELF: PETSc's handler puts the other ranks of a larger communicator to sleep and ends them with code 0 */
+  return PetscTraceBackErrorHandler(PETSC_COMM_SELF, line, function, file, n, p, mess, NULL);
+}
+
+PetscErrorCode SbErrorHandlerInstall(void)
+{
+  PetscFunctionBeginUser;
+  PetscCallMPI(MPI_Comm_dup(MPI_COMM_WORLD, &state.comm));
+  PetscCall(PetscPushErrorHandler(handler, NULL));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbErrorSetFromOptions(void)
+{
+  SbScope scope;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbOptionsRegister("", "", PETSC_STATIC_ARRAY_LENGTH(rows), rows));
+  PetscCall(SbScopeSet(&scope, "", "", ""));
+  PetscCall(SbOptionBool(&scope, "error_trace", &state.trace));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static void print_error(void)
+{
+  (void)fflush(stdout);
+  (void)fprintf(stderr, "supple: error: %s\n", state.message);
+  (void)fflush(stderr);
+}
+
+int SbErrorFinish(PetscErrorCode ierr)
+{
+  enum { SPEAKER, FAILED };
+  int         mine[2], all[2], done = 0;
+  PetscMPIInt rank, size;
+  MPI_Request request;
+  double      end;
+
+  (void)MPI_Comm_rank(state.comm, &rank);
+  (void)MPI_Comm_size(state.comm, &size);
+  mine[SPEAKER] = ierr && state.pending ? -rank : -size;
+  mine[FAILED]  = ierr ? 1 : 0;
+  (void)MPI_Iallreduce(mine, all, 2, MPI_INT, MPI_MAX, state.comm, &request);
+  end = MPI_Wtime() + GRACE + 0.1 * PetscMin(rank, 20);
+  while (!done && (!ierr || MPI_Wtime() < end)) {
+    (void)MPI_Test(&request, &done, MPI_STATUS_IGNORE);
+    if (!done) (void)usleep(1000);
+  }
+  if (!done) {
+    if (state.pending) print_error();
+    (void)MPI_Abort(state.comm, 1);
+  }
+  if (all[SPEAKER] == -rank && mine[SPEAKER] == -rank) print_error();
+  (void)MPI_Comm_free(&state.comm);
+  (void)MPI_Finalize();
+  return all[FAILED];
+}
+
+PetscErrorCode SbWarning(MPI_Comm comm, const char *format, ...)
+{
+  PetscMPIInt rank;
+  va_list     args;
+
+  PetscFunctionBeginUser;
+  PetscCallMPI(MPI_Comm_rank(comm, &rank));
+  if (rank) PetscFunctionReturn(PETSC_SUCCESS);
+  (void)fflush(stdout);
+  (void)fprintf(stderr, "supple: warning: ");
+  va_start(args, format);
+  (void)vfprintf(stderr, format, args);
+  va_end(args);
+  (void)fprintf(stderr, "\n");
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

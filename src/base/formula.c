@@ -1,0 +1,307 @@
+/*
+  formula.c - formulas of time and place: recursive descent to a postfix program, run on a small stack.
+
+    expression = term { (+|-) term }
+    term       = unary { (*|/) unary }
+    unary      = (+|-) unary | power
+    power      = primary [ ^ unary ]              so -2^2 = -4 and 2^3^2 = 2^9
+    primary    = number | t | x | y | z | pi | function ( expression {, expression} ) | ( expression )
+
+  The program never branches, so its stack depth is known when it is compiled; deeper formulas are refused.
+  Not handled: comparisons (step(a) serves), units, names of the user's own.
+*/
+#include <ctype.h>
+#include "formula.h"
+
+/* ------------------------------------------------------------------ functions */
+
+static PetscReal step_of(PetscReal a)
+{
+  return a < 0 ? 0 : 1;
+}
+
+static PetscReal clamp_of(PetscReal a, PetscReal lo, PetscReal hi)
+{
+  return a < lo ? lo : (a > hi ? hi : a);
+}
+
+static PetscReal ramp_of(PetscReal a)
+{
+  return clamp_of(a, 0, 1);
+}
+
+static const struct {
+  const char *name;
+  int         narg;
+  PetscReal (*f1)(PetscReal);
+  PetscReal (*f2)(PetscReal, PetscReal);
+  PetscReal (*f3)(PetscReal, PetscReal, PetscReal);
+} functions[] = {
+  {"sin", 1, sin, NULL, NULL},      {"cos", 1, cos, NULL, NULL},       {"tan", 1, tan, NULL, NULL},
+  {"asin", 1, asin, NULL, NULL},    {"acos", 1, acos, NULL, NULL},     {"atan", 1, atan, NULL, NULL},
+  {"atan2", 2, NULL, atan2, NULL},  {"exp", 1, exp, NULL, NULL},       {"log", 1, log, NULL, NULL},
+  {"sqrt", 1, sqrt, NULL, NULL},    {"abs", 1, fabs, NULL, NULL},      {"min", 2, NULL, fmin, NULL},
+  {"max", 2, NULL, fmax, NULL},     {"floor", 1, floor, NULL, NULL},   {"tanh", 1, tanh, NULL, NULL},
+  {"step", 1, step_of, NULL, NULL}, {"ramp", 1, ramp_of, NULL, NULL},  {"clamp", 3, NULL, NULL, clamp_of},
+};
+static const char *const variables[] = {"t", "x", "y", "z"};
+
+/* ------------------------------------------------------------------ compiler */
+
+typedef struct {
+  const char *text;  /* the whole formula */
+  const char *next;  /* first character not read yet */
+  const char *where; /* option, for messages */
+  SbFormula   formula;
+  int         nesting, depth; /* of the recursion; of the stack at this point of the program */
+} Parser;
+
+static PetscErrorCode expression(Parser *p);
+
+static void skip_blanks(Parser *p)
+{
+  while (isspace((unsigned char)*p->next)) p->next++;
+}
+
+/* One line that says what is wrong and in which column (from 1). */
+static PetscErrorCode complain(const Parser *p, const char *at, const char *what)
+{
+  PetscFunctionBeginUser;
+  SETERRQ(PETSC_COMM_SELF, PETSC_ERR_USER, "%s: column %d of '%s': %s", p->where, (int)(at - p->text) + 1, p->text, what);
+}
+
+static PetscErrorCode emit(Parser *p, SbFormulaOp op, int index, PetscReal number, int change)
+{
+  SbFormulaStep *s = &p->formula->step[p->formula->nstep++];
+
+  PetscFunctionBeginUser;
+  s->op     = op;
+  s->index  = index;
+  s->number = number;
+  p->depth += change;
+  if (p->depth > SB_FORMULA_STACK) PetscCall(complain(p, p->next, "the formula is nested too deeply"));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode expect(Parser *p, char c)
+{
+  char what[32];
+
+  PetscFunctionBeginUser;
+  skip_blanks(p);
+  PetscCall(PetscSNPrintf(what, sizeof(what), "expected '%c'", c));
+  if (*p->next != c) PetscCall(complain(p, p->next, what));
+  p->next++;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode unknown_name(const Parser *p, const char *at, const char *name)
+{
+  const char *known[PETSC_STATIC_ARRAY_LENGTH(functions) + 5];
+  char        near[128], what[256];
+  PetscInt    n = 0;
+
+  PetscFunctionBeginUser;
+  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(functions); i++) known[n++] = functions[i].name;
+  for (int i = 0; i < 4; i++) known[n++] = variables[i];
+  known[n++] = "pi";
+  if (strlen(name) > 1) PetscCall(SbNearest(name, n, known, sizeof(near), near));
+  else near[0] = 0;
+  PetscCall(PetscSNPrintf(what, sizeof(what), "unknown name '%s'; %s%s%s", name, near[0] ? "did you mean " : "", near,
+                          near[0] ? "?" : "a formula knows t (s), x, y, z (m), pi and functions such as sin, sqrt, ramp"));
+  PetscCall(complain(p, at, what));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* sin(expression), atan2(expression, expression), ...; the name has been read. */
+static PetscErrorCode call(Parser *p, int f)
+{
+  PetscFunctionBeginUser;
+  PetscCall(expect(p, '('));
+  for (int i = 0; i < functions[f].narg; i++) {
+    if (i) PetscCall(expect(p, ','));
+    PetscCall(expression(p));
+  }
+  PetscCall(expect(p, ')'));
+  PetscCall(emit(p, SB_OP_CALL, f, 0, 1 - functions[f].narg));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode word(Parser *p)
+{
+  const char *begin = p->next;
+  char        name[32];
+  size_t      n = 0;
+
+  PetscFunctionBeginUser;
+  for (; isalnum((unsigned char)*p->next) || *p->next == '_'; p->next++)
+    if (n + 1 < sizeof(name)) name[n++] = *p->next;
+  name[n] = 0;
+  for (int i = 0; i < 4; i++) {
+    if (strcmp(name, variables[i])) continue;
+    if (i) p->formula->uses_place = PETSC_TRUE;
+    else p->formula->uses_time = PETSC_TRUE;
+    PetscCall(emit(p, SB_OP_VARIABLE, i, 0, 1));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  if (!strcmp(name, "pi")) {
+    PetscCall(emit(p, SB_OP_NUMBER, 0, PETSC_PI, 1));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(functions); i++) {
+    if (strcmp(name, functions[i].name)) continue;
+    PetscCall(call(p, (int)i));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  PetscCall(unknown_name(p, begin, name));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode primary(Parser *p)
+{
+  unsigned char c;
+
+  PetscFunctionBeginUser;
+  skip_blanks(p);
+  c = (unsigned char)*p->next;
+  if (isdigit(c) || (c == '.' && isdigit((unsigned char)p->next[1]))) {
+    char           *end;
+    const PetscReal number = strtod(p->next, &end);
+
+    p->next = end;
+    PetscCall(emit(p, SB_OP_NUMBER, 0, number, 1));
+  } else if (isalpha(c)) {
+    PetscCall(word(p));
+  } else if (c == '(') {
+    p->next++;
+    PetscCall(expression(p));
+    PetscCall(expect(p, ')'));
+  } else {
+    PetscCall(complain(p, p->next, c ? "expected a number, a name or '('" : "the formula ends too early"));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode unary(Parser *p)
+{
+  PetscFunctionBeginUser;
+  if (++p->nesting > 4 * SB_FORMULA_STACK) PetscCall(complain(p, p->next, "the formula is nested too deeply"));
+  skip_blanks(p);
+  if (*p->next == '-' || *p->next == '+') {
+    const PetscBool minus = (PetscBool)(*p->next++ == '-');
+
+    PetscCall(unary(p));
+    if (minus) PetscCall(emit(p, SB_OP_NEG, 0, 0, 0));
+  } else {
+    PetscCall(primary(p));
+    skip_blanks(p);
+    if (*p->next == '^') {
+      p->next++;
+      PetscCall(unary(p));
+      PetscCall(emit(p, SB_OP_POW, 0, 0, -1));
+    }
+  }
+  p->nesting--;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode term(Parser *p)
+{
+  PetscFunctionBeginUser;
+  PetscCall(unary(p));
+  for (skip_blanks(p); *p->next == '*' || *p->next == '/'; skip_blanks(p)) {
+    const SbFormulaOp op = *p->next++ == '*' ? SB_OP_MUL : SB_OP_DIV;
+
+    PetscCall(unary(p));
+    PetscCall(emit(p, op, 0, 0, -1));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode expression(Parser *p)
+{
+  PetscFunctionBeginUser;
+  PetscCall(term(p));
+  for (skip_blanks(p); *p->next == '+' || *p->next == '-'; skip_blanks(p)) {
+    const SbFormulaOp op = *p->next++ == '+' ? SB_OP_ADD : SB_OP_SUB;
+
+    PetscCall(term(p));
+    PetscCall(emit(p, op, 0, 0, -1));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ operations */
+
+PetscReal SbFormulaEval(SbFormula f, PetscReal t, const PetscReal x[3])
+{
+  PetscReal stack[SB_FORMULA_STACK + 1];
+  int       n = 0; /* values on the stack */
+
+  if (!f->step) return SbFormulaEvalTable(f, t);
+  for (PetscInt i = 0; i < f->nstep; i++) {
+    const SbFormulaStep *s = &f->step[i];
+    PetscReal           *a;
+
+    /* Operands are the top of the stack, the first one deepest; the result takes the place of the first. */
+    switch (s->op) {
+    case SB_OP_NUMBER: stack[n++] = s->number; break;
+    case SB_OP_VARIABLE: stack[n++] = s->index ? x[s->index - 1] : t; break;
+    case SB_OP_ADD: n--; stack[n - 1] += stack[n]; break;
+    case SB_OP_SUB: n--; stack[n - 1] -= stack[n]; break;
+    case SB_OP_MUL: n--; stack[n - 1] *= stack[n]; break;
+    case SB_OP_DIV: n--; stack[n - 1] /= stack[n]; break;
+    case SB_OP_POW: n--; stack[n - 1] = pow(stack[n - 1], stack[n]); break;
+    case SB_OP_NEG: stack[n - 1] = -stack[n - 1]; break;
+    case SB_OP_CALL:
+      n -= functions[s->index].narg - 1;
+      a = &stack[n - 1];
+      if (functions[s->index].f1) a[0] = functions[s->index].f1(a[0]);
+      else if (functions[s->index].f2) a[0] = functions[s->index].f2(a[0], a[1]);
+      else a[0] = functions[s->index].f3(a[0], a[1], a[2]);
+      break;
+    }
+  }
+  return stack[0];
+}
+
+PetscErrorCode SbFormulaUses(SbFormula formula, PetscBool *time, PetscBool *place)
+{
+  PetscFunctionBeginUser;
+  *time  = formula->uses_time;
+  *place = formula->uses_place;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbFormulaDestroy(SbFormula *formula)
+{
+  PetscFunctionBeginUser;
+  if (!*formula) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscFree((*formula)->step));
+  PetscCall(PetscFree((*formula)->time));
+  PetscCall(PetscFree((*formula)->value));
+  PetscCall(PetscFree(*formula));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbFormulaCreate(MPI_Comm comm, const char *text, const char *where, SbFormula *formula)
+{
+  SbFormula f;
+  Parser    p = {.text = text, .next = text, .where = where};
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscNew(&f));
+  *formula = f;
+  skip_blanks(&p);
+  if (!strncmp(p.next, "table:", 6)) {
+    f->uses_time = PETSC_TRUE;
+    PetscCall(SbFormulaReadTable(comm, p.next + 6, where, f));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  /* every step of the program comes from at least one character of the text */
+  PetscCall(PetscMalloc1(strlen(text) + 1, &f->step));
+  p.formula = f;
+  PetscCall(expression(&p));
+  if (*p.next) PetscCall(complain(&p, p.next, "expected an operator"));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

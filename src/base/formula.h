@@ -1,0 +1,29 @@
+/*
+  formula.h - the compiled form of a formula, shared by its compiler and the reader of tables.
+*/
+#pragma once
+#include "sbbase.h"
+
+#define SB_FORMULA_STACK 64 /* deepest stack of a formula */
+
+typedef enum { SB_OP_NUMBER, SB_OP_VARIABLE, SB_OP_ADD, SB_OP_SUB, SB_OP_MUL, SB_OP_DIV, SB_OP_POW, SB_OP_NEG, SB_OP_CALL } SbFormulaOp;
+
+typedef struct {
+  SbFormulaOp op;
+  int         index; /* SB_OP_VARIABLE: 0..3 for t, x, y, z; SB_OP_CALL: row of the table of functions */
+  PetscReal   number;
+} SbFormulaStep;
+
+struct _p_SbFormula {
+  PetscInt       nstep;
+  SbFormulaStep *step; /* [nstep] postfix; NULL for a table */
+  PetscBool      uses_time, uses_place;
+  PetscInt       nrow;
+  PetscReal     *time;  /* [nrow] s, ascending */
+  PetscReal     *value; /* [nrow] */
+};
+
+/* Reads a two-column file on rank 0 and gives it to all. Collective. Errors name option, file and line. */
+PetscErrorCode SbFormulaReadTable(MPI_Comm comm, const char *file, const char *where, SbFormula formula);
+/* Linear in between, constant outside. */
+PetscReal SbFormulaEvalTable(const struct _p_SbFormula *formula, PetscReal t);

@@ -1,0 +1,109 @@
+/*
+  formula_table.c - a function of time given by a text file with two columns.
+
+  Each line: time (s) and value, separated by blanks, a comma or a semicolon; `#` starts a comment; empty lines do not
+  count. Times must ascend. Linear in between, constant outside. Rank 0 reads, so that thousands of ranks do not open one
+  file; an error is known to all ranks, which raise it alike.
+*/
+#include <ctype.h>
+#include <errno.h>
+#include "formula.h"
+
+/* Reads one line: 1 when it holds two numbers, 0 when it holds nothing, -1 otherwise. */
+static int read_line(char *line, PetscReal row[2])
+{
+  char *next = line, *end;
+
+  if (strchr(line, '#')) *strchr(line, '#') = 0;
+  for (int i = 0; i < 2; i++) {
+    while (isspace((unsigned char)*next) || (i && (*next == ',' || *next == ';'))) next++;
+    if (!*next && !i) return 0;
+    row[i] = strtod(next, &end);
+    if (end == next || !isfinite(row[i])) return -1;
+    next = end;
+  }
+  while (isspace((unsigned char)*next)) next++;
+  return *next ? -1 : 1;
+}
+
+/* Reads the whole file; `message` stays empty when all is well. Rank 0 only. */
+static PetscErrorCode read_rows(const char *file, PetscInt *n, PetscReal **rows, size_t size, char message[])
+{
+  FILE    *f = fopen(file, "r");
+  char     line[512];
+  PetscInt room = 0;
+
+  PetscFunctionBeginUser;
+  *n    = 0;
+  *rows = NULL;
+  if (!f) {
+    PetscCall(PetscSNPrintf(message, size, "cannot open %s: %s", file, strerror(errno)));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  for (int number = 1; !message[0] && fgets(line, sizeof(line), f); number++) {
+    PetscReal row[2];
+    const int found = read_line(line, row);
+
+    if (found < 0)
+      PetscCall(PetscSNPrintf(message, size, "%s, line %d: expected two numbers, time (s) and value", file, number));
+    if (found <= 0) continue;
+    if (*n && row[0] <= (*rows)[2 * (*n - 1)])
+      PetscCall(PetscSNPrintf(message, size, "%s, line %d: time %g s does not come after %g s; times must ascend", file,
+                              number, (double)row[0], (double)(*rows)[2 * (*n - 1)]));
+    if (*n == room) {
+      room = 2 * room + 16;
+      PetscCall(PetscRealloc((size_t)(2 * room) * sizeof(PetscReal), rows));
+    }
+    (*rows)[2 * *n]     = row[0];
+    (*rows)[2 * *n + 1] = row[1];
+    (*n)++;
+  }
+  if (!message[0] && ferror(f)) PetscCall(PetscSNPrintf(message, size, "cannot read %s", file));
+  if (!message[0] && !*n) PetscCall(PetscSNPrintf(message, size, "%s holds no numbers", file));
+  (void)fclose(f);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbFormulaReadTable(MPI_Comm comm, const char *file, const char *where, SbFormula formula)
+{
+  PetscMPIInt rank;
+  PetscInt    n    = 0;
+  PetscReal  *rows = NULL;
+  char        message[512] = "";
+
+  PetscFunctionBeginUser;
+  PetscCallMPI(MPI_Comm_rank(comm, &rank));
+  if (!rank) PetscCall(read_rows(file, &n, &rows, sizeof(message), message));
+  PetscCallMPI(MPI_Bcast(message, sizeof(message), MPI_CHAR, 0, comm));
+  if (message[0]) PetscCall(PetscFree(rows));
+  PetscCheck(!message[0], PETSC_COMM_SELF, PETSC_ERR_USER, "%s: %s", where, message);
+  PetscCallMPI(MPI_Bcast(&n, 1, MPIU_INT, 0, comm));
+  if (rank) PetscCall(PetscMalloc1(2 * n, &rows));
+  PetscCallMPI(MPI_Bcast(rows, (PetscMPIInt)(2 * n), MPIU_REAL, 0, comm));
+  formula->nrow = n;
+  PetscCall(PetscMalloc1(n, &formula->time));
+  PetscCall(PetscMalloc1(n, &formula->value));
+  for (PetscInt i = 0; i < n; i++) {
+    formula->time[i]  = rows[2 * i];
+    formula->value[i] = rows[2 * i + 1];
+  }
+  PetscCall(PetscFree(rows));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscReal SbFormulaEvalTable(const struct _p_SbFormula *f, PetscReal t)
+{
+  PetscInt  lo = 0, hi = f->nrow - 1;
+  PetscReal w;
+
+  if (t <= f->time[lo]) return f->value[lo];
+  if (t >= f->time[hi]) return f->value[hi];
+  while (hi - lo > 1) {
+    const PetscInt mid = (lo + hi) / 2;
+
+    if (f->time[mid] <= t) lo = mid;
+    else hi = mid;
+  }
+  w = (t - f->time[lo]) / (f->time[hi] - f->time[lo]);
+  return (1 - w) * f->value[lo] + w * f->value[hi];
+}

@@ -1,0 +1,33 @@
+/*
+  log.c - one PETSc log event per phase that can take one percent of a run, and the three stages of a run.
+
+  The names are what -log_view prints. Events are class-less (PETSC_OBJECT_CLASSID), because they time phases, not
+  objects.
+*/
+#include "sbbase.h"
+
+PetscLogEvent SbEvents[SB_EVENT_COUNT];
+PetscLogStage SbStageSetup, SbStageSolve, SbStageOutput;
+
+static PetscErrorCode stage(const char *name, PetscLogStage *s)
+{
+  PetscFunctionBeginUser;
+  PetscCall(PetscLogStageGetId(name, s));
+  if (*s < 0) PetscCall(PetscLogStageRegister(name, s));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbLogInitialize(void)
+{
+  static const char *const names[SB_EVENT_COUNT] = {
+    "SbMeshRead", "SbMeshDistrib", "SbSpaceSetUp", "SbMatrixSetUp", "SbResidual", "SbTangent",
+    "SbEnergy",   "SbEffects",     "SbSolverSetUp", "SbOutput",     "SbCheckpoint",
+  };
+
+  PetscFunctionBeginUser;
+  for (int i = 0; i < SB_EVENT_COUNT; i++) PetscCall(PetscLogEventRegister(names[i], PETSC_OBJECT_CLASSID, &SbEvents[i]));
+  PetscCall(stage("Setup", &SbStageSetup));
+  PetscCall(stage("Solve", &SbStageSolve));
+  PetscCall(stage("Output", &SbStageOutput));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

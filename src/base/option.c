@@ -1,0 +1,242 @@
+/*
+  option.c - the table of options: which rows are registered, which values were read, what the user gave.
+
+  PETSc's database holds the texts; this table holds their meaning. A row is found by class, type and key; the full name
+  is -<class>_<instance>_<key>. Two rows that lead to one full name (key b_c of body a, key c of body a_b) are found when
+  the second one is read. PETSc compares names without regard to case, so does this table.
+*/
+#include "option.h"
+
+SbOptionTable SbTheOptions;
+
+/* Makes room for one more element of an array of `size` bytes each; doubles, so that growth is cheap. */
+static PetscErrorCode grow(PetscInt n, size_t size, void *array)
+{
+  void *old = *(void **)array, *fresh;
+
+  PetscFunctionBeginUser;
+  if (n && (n & (n - 1))) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscMalloc(PetscMax(2 * (size_t)n, 1) * size, &fresh));
+  if (n) PetscCall(PetscMemcpy(fresh, old, (size_t)n * size));
+  PetscCall(PetscFree(old));
+  *(void **)array = fresh;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbOptionsRegister(const char *klass, const char *type, PetscInt n, const SbOption rows[])
+{
+  SbOptionBlock *block;
+
+  PetscFunctionBeginUser;
+  for (PetscInt i = 0; i < SbTheOptions.nblock; i++) {
+    block = &SbTheOptions.block[i];
+    if (block->rows == rows && !strcmp(block->klass, klass) && !strcmp(block->type, type))
+      PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  if (!SbTheOptions.nblock) PetscCall(PetscRegisterFinalize(SbOptionsReset));
+  PetscCall(grow(SbTheOptions.nblock, sizeof(*block), &SbTheOptions.block));
+  block = &SbTheOptions.block[SbTheOptions.nblock++];
+  PetscCall(PetscStrncpy(block->klass, klass, sizeof(block->klass)));
+  PetscCall(PetscStrncpy(block->type, type, sizeof(block->type)));
+  block->n    = n;
+  block->rows = rows;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbScopeSet(SbScope *scope, const char *klass, const char *type, const char *instance)
+{
+  PetscFunctionBeginUser;
+  PetscCall(PetscStrncpy(scope->klass, klass, sizeof(scope->klass)));
+  PetscCall(PetscStrncpy(scope->type, type, sizeof(scope->type)));
+  PetscCall(PetscStrncpy(scope->instance, instance, sizeof(scope->instance)));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+const SbOption *SbOptionFind(const SbScope *scope, const char *key)
+{
+  for (PetscInt i = 0; i < SbTheOptions.nblock; i++) {
+    const SbOptionBlock *block = &SbTheOptions.block[i];
+
+    if (strcmp(block->klass, scope->klass) || (block->type[0] && strcmp(block->type, scope->type))) continue;
+    for (PetscInt j = 0; j < block->n; j++)
+      if (!strcmp(block->rows[j].key, key)) return &block->rows[j];
+  }
+  return NULL;
+}
+
+PetscErrorCode SbOptionName(const SbScope *scope, const char *key, size_t size, char name[])
+{
+  PetscFunctionBeginUser;
+  if (scope->klass[0]) PetscCall(PetscSNPrintf(name, size, "-%s_%s_%s", scope->klass, scope->instance, key));
+  else PetscCall(PetscSNPrintf(name, size, "-%s", key));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbOptionManualName(const SbOptionBlock *block, const SbOption *row, size_t size, char name[])
+{
+  SbScope scope;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbScopeSet(&scope, block->klass, block->type, "<name>"));
+  PetscCall(SbOptionName(&scope, row->key, size, name));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The record of a full name, made when there is none yet. */
+static PetscErrorCode find_record(const SbScope *scope, const SbOption *row, SbOptionRecord **record)
+{
+  char            name[SB_OPTION_NAME_MAX];
+  SbOptionRecord *r;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbOptionName(scope, row->key, sizeof(name), name));
+  for (PetscInt i = 0; i < SbTheOptions.nrecord; i++) {
+    PetscBool same;
+
+    r = &SbTheOptions.record[i];
+    PetscCall(PetscStrcasecmp(r->name, name, &same));
+    if (!same) continue;
+    PetscCheck(!strcmp(r->row->key, row->key), PETSC_COMM_SELF, PETSC_ERR_USER,
+               "%s has two meanings: %s of %s '%s' and %s of %s '%s'; rename one of the two", name, r->row->key,
+               r->scope.klass, r->scope.instance, row->key, scope->klass, scope->instance);
+    *record = r;
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  PetscCall(grow(SbTheOptions.nrecord, sizeof(*r), &SbTheOptions.record));
+  r = &SbTheOptions.record[SbTheOptions.nrecord++];
+  PetscCall(PetscMemzero(r, sizeof(*r)));
+  PetscCall(PetscStrncpy(r->name, name, sizeof(r->name)));
+  r->scope = *scope;
+  r->row   = row;
+  *record  = r;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbOptionText(const SbScope *scope, const char *key, const SbOptionRecord **record)
+{
+  const SbOption *row = SbOptionFind(scope, key);
+  SbOptionRecord *r     = NULL;
+  const char     *value = NULL;
+
+  PetscFunctionBeginUser;
+  PetscCheck(row, PETSC_COMM_SELF, PETSC_ERR_PLIB, "No row for key '%s' of class '%s', type '%s'", key,
+             scope->klass, scope->type);
+  PetscCall(find_record(scope, row, &r));
+  PetscCall(PetscOptionsFindPair(NULL, NULL, r->name, &value, &r->given));
+  if (r->given && !value && row->kind == SB_OPTION_BOOL) value = "true";
+  PetscCheck(!r->given || value, PETSC_COMM_SELF, PETSC_ERR_USER,
+             "%s has no value: %s (a value that begins with a minus sign and a letter needs a blank before it, in quotes)",
+             r->name, row->help);
+  PetscCheck(r->given || row->preset, PETSC_COMM_SELF, PETSC_ERR_USER, "%s must be given: %s%s%s%s%s", r->name, row->help,
+             row->range[0] ? ", in " : "", row->range, row->unit[0] ? ", unit " : "", row->unit);
+  PetscCall(PetscFree(r->text));
+  PetscCall(PetscStrallocpy(r->given ? value : row->preset, &r->text));
+  *record = r;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbOptionGiven(const SbScope *scope, const char *key, PetscBool *given)
+{
+  char name[SB_OPTION_NAME_MAX];
+
+  PetscFunctionBeginUser;
+  PetscCheck(SbOptionFind(scope, key), PETSC_COMM_SELF, PETSC_ERR_PLIB, "No row for key '%s' of class '%s', type '%s'",
+             key, scope->klass, scope->type);
+  PetscCall(SbOptionName(scope, key, sizeof(name), name));
+  PetscCall(PetscOptionsFindPair(NULL, NULL, name, NULL, given));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Whether a token of PetscOptionsGetAll() is the name of an option that somebody has read, and not part of a value. */
+static PetscErrorCode is_read_name(const char *token, PetscBool *is)
+{
+  PetscFunctionBeginUser;
+  *is = PETSC_FALSE;
+  if (token[0] == '-' && token[1]) PetscCall(PetscOptionsUsed(NULL, token + 1, is));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode add_user(PetscInt *n, SbOptionUser **users, const char *name, const char *value)
+{
+  PetscFunctionBeginUser;
+  PetscCall(grow(*n, sizeof(**users), users));
+  PetscCall(PetscStrallocpy(name, &(*users)[*n].name));
+  (*users)[*n].value = NULL;
+  if (value) PetscCall(PetscStrallocpy(value, &(*users)[*n].value));
+  (*n)++;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/*
+  PETSc tells names and values apart only for options that nobody has read yet. Those that were read come as one
+  string; their names are known by being read, and a value goes on until the next name.
+*/
+PetscErrorCode SbOptionUsersGet(PetscInt *n, SbOptionUser **users)
+{
+  PetscInt nleft;
+  char   **names, **values, *all, *token, *rest;
+
+  PetscFunctionBeginUser;
+  *n     = 0;
+  *users = NULL;
+  PetscCall(PetscOptionsLeftGet(NULL, &nleft, &names, &values));
+  for (PetscInt i = 0; i < nleft; i++) PetscCall(add_user(n, users, names[i], values[i]));
+  PetscCall(PetscOptionsGetAll(NULL, &all));
+  token = strtok_r(all, " ", &rest);
+  while (token) {
+    char      name[PETSC_MAX_OPTION_NAME + 1], value[PETSC_MAX_PATH_LEN] = "";
+    PetscBool is_name, left = PETSC_FALSE;
+
+    PetscCall(is_read_name(token, &is_name));
+    PetscCall(PetscStrncpy(name, token, sizeof(name)));
+    token = strtok_r(NULL, " ", &rest);
+    if (!is_name) continue;
+    while (token && !left) {
+      PetscBool next;
+
+      PetscCall(is_read_name(token, &next));
+      for (PetscInt i = 0; i < nleft && !left; i++) left = (PetscBool)(token[0] == '-' && !strcmp(token + 1, names[i]));
+      if (next || left) break;
+      if (value[0]) PetscCall(PetscStrlcat(value, " ", sizeof(value)));
+      PetscCall(PetscStrlcat(value, token, sizeof(value)));
+      token = strtok_r(NULL, " ", &rest);
+    }
+    PetscCall(add_user(n, users, name + 1, value[0] ? value : NULL));
+  }
+  PetscCall(PetscFree(all));
+  PetscCall(PetscOptionsLeftRestore(NULL, &nleft, &names, &values));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbOptionUsersFree(PetscInt *n, SbOptionUser **users)
+{
+  PetscFunctionBeginUser;
+  for (PetscInt i = 0; i < *n; i++) {
+    PetscCall(PetscFree((*users)[i].name));
+    PetscCall(PetscFree((*users)[i].value));
+  }
+  PetscCall(PetscFree(*users));
+  *n = 0;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbOptionsRemember(void)
+{
+  PetscFunctionBeginUser;
+  if (!SbTheOptions.nblock) PetscCall(PetscRegisterFinalize(SbOptionsReset));
+  PetscCall(SbOptionUsersFree(&SbTheOptions.nuser, &SbTheOptions.user));
+  PetscCall(SbOptionUsersGet(&SbTheOptions.nuser, &SbTheOptions.user));
+  SbTheOptions.remembered = PETSC_TRUE;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbOptionsReset(void)
+{
+  PetscFunctionBeginUser;
+  for (PetscInt i = 0; i < SbTheOptions.nrecord; i++) PetscCall(PetscFree(SbTheOptions.record[i].text));
+  PetscCall(PetscFree(SbTheOptions.record));
+  PetscCall(PetscFree(SbTheOptions.block));
+  PetscCall(SbOptionUsersFree(&SbTheOptions.nuser, &SbTheOptions.user));
+  PetscCall(PetscMemzero(&SbTheOptions, sizeof(SbTheOptions)));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

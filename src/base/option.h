@@ -1,0 +1,49 @@
+/*
+  option.h - what the option files of layer 0 share: the registered rows, and the values read so far.
+*/
+#pragma once
+#include "sbbase.h"
+
+#define SB_OPTION_NAME_MAX (3 * SB_NAME_MAX) /* "-" klass "_" instance "_" key, with the terminating zero */
+
+/* Rows registered by one call. */
+typedef struct {
+  char            klass[SB_NAME_MAX];
+  char            type[SB_NAME_MAX];
+  PetscInt        n;
+  const SbOption *rows; /* [n] borrowed, static */
+} SbOptionBlock;
+
+/* A value that some reader asked for. */
+typedef struct {
+  char            name[SB_OPTION_NAME_MAX]; /* "-body_liver_young" */
+  SbScope         scope;
+  const SbOption *row;
+  PetscBool       given; /* by the user, else `text` is the preset */
+  char           *text;  /* owned */
+} SbOptionRecord;
+
+/* An option of the user's, ours or PETSc's. */
+typedef struct {
+  char *name;  /* without the dash; owned */
+  char *value; /* owned; NULL when there is none */
+} SbOptionUser;
+
+typedef struct {
+  PetscInt        nblock, nrecord, nuser;
+  SbOptionBlock  *block;      /* [nblock] in the order of registration */
+  SbOptionRecord *record;     /* [nrecord] in the order of the first reading */
+  PetscBool       remembered; /* SbOptionsRemember() filled `user` */
+  SbOptionUser   *user;       /* [nuser] */
+} SbOptionTable;
+extern SbOptionTable SbTheOptions; /* the registry of options */
+
+/* The row of a key in a scope; NULL when there is none. */
+const SbOption *SbOptionFind(const SbScope *scope, const char *key);
+/* The text of an option: the user's, or else the preset; recorded. Name, row and text are lent. */
+PetscErrorCode SbOptionText(const SbScope *scope, const char *key, const SbOptionRecord **record);
+/* The database as it is now: every name and value. Free with SbOptionUsersFree(). */
+PetscErrorCode SbOptionUsersGet(PetscInt *n, SbOptionUser **users);
+PetscErrorCode SbOptionUsersFree(PetscInt *n, SbOptionUser **users);
+/* Name as in the manual: "-body_<name>_young", "-ts_dt". */
+PetscErrorCode SbOptionManualName(const SbOptionBlock *block, const SbOption *row, size_t size, char name[]);

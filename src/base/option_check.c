@@ -1,0 +1,237 @@
+/*
+  option_check.c - options that nobody read: which are ours and misspelt, which are PETSc's and did nothing.
+
+  PETSc cannot tell a misspelt option from one that an object created later would read, so it stays silent. Ours are all
+  read before anything is computed. A name is ours when it begins with the prefix of one of our classes, when it is a
+  program-wide key, or when it is within two edits of one and does not begin like an option of PETSc.
+
+  Distance between words: optimal string alignment (Levenshtein's distance, an exchange of neighbours counts as one edit;
+  Damerau, Communications of the ACM 7, 1964). Case does not count, as in PETSc.
+*/
+#include <ctype.h>
+#include "option.h"
+
+#define WORD_MAX SB_OPTION_NAME_MAX
+
+static PetscInt edit_distance(const char *a, const char *b)
+{
+  PetscInt     row[3][WORD_MAX + 1];
+  const size_t na = PetscMin(strlen(a), WORD_MAX), nb = PetscMin(strlen(b), WORD_MAX);
+
+  for (size_t j = 0; j <= nb; j++) row[0][j] = (PetscInt)j;
+  for (size_t i = 1; i <= na; i++) {
+    PetscInt *now = row[i % 3], *before = row[(i + 2) % 3], *older = row[(i + 1) % 3];
+
+    now[0] = (PetscInt)i;
+    for (size_t j = 1; j <= nb; j++) {
+      const int same = tolower((unsigned char)a[i - 1]) == tolower((unsigned char)b[j - 1]);
+
+      now[j] = PetscMin(PetscMin(before[j], now[j - 1]) + 1, before[j - 1] + !same);
+      if (i > 1 && j > 1 && a[i - 1] == b[j - 2] && a[i - 2] == b[j - 1]) now[j] = PetscMin(now[j], older[j - 2] + 1);
+    }
+  }
+  return row[na % 3][nb];
+}
+
+PetscErrorCode SbNearest(const char *word, PetscInt n, const char *const names[], size_t size, char text[])
+{
+  const PetscInt farthest = strlen(word) < 6 ? 1 : 2; /* edits that still look like a slip */
+  PetscInt       best     = farthest + 1, nbest = 0;
+
+  PetscFunctionBeginUser;
+  text[0] = 0;
+  for (PetscInt i = 0; i < n; i++) best = PetscMin(best, edit_distance(word, names[i]));
+  if (best > farthest) PetscFunctionReturn(PETSC_SUCCESS);
+  for (PetscInt i = 0; i < n && nbest < 3; i++) {
+    if (edit_distance(word, names[i]) != best) continue;
+    if (nbest++) PetscCall(PetscStrlcat(text, " or ", size));
+    PetscCall(PetscStrlcat(text, names[i], size));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ whose option */
+
+/* The row of a program-wide option, by its name without dash; NULL when there is none. */
+static const SbOption *program_row(const char *name)
+{
+  for (PetscInt i = 0; i < SbTheOptions.nblock; i++) {
+    const SbOptionBlock *block = &SbTheOptions.block[i];
+
+    for (PetscInt j = 0; !block->klass[0] && j < block->n; j++)
+      if (!strcasecmp(block->rows[j].key, name)) return &block->rows[j];
+  }
+  return NULL;
+}
+
+/* Beginnings of PETSc's own options, as far as a run of ours can meet them. */
+static PetscBool looks_like_petsc(const char *name)
+{
+  static const char *const prefixes[] = {
+    "ksp_", "pc_", "snes_", "ts_", "mat_", "vec_", "dm_", "is_", "sub_", "mg_", "fieldsplit_", "asm_", "log_", "malloc",
+    "options_", "petsc", "on_error_", "memory_", "fp_trap", "start_in_debugger", "stop_for_debugger", "debugger_",
+    "citations", "no_signal_handler", "info", "viewer_", "draw_", "display", "nox", "saws", "objects_", "checkstack",
+    "get_total_flops", "skip_petscrc", "error_output_", "shared_tmp", "not_shared_tmp", "tmp", "partition", "sf_", "history",
+    "python", "blas_", "omp_", "use_gpu", "device", "cuda", "hip", "event_", "help", "version", "redundant_", "est", "esteig",
+    "gamg_", "hypre", "ml_", "superlu", "sbaij", "inner_", "coarse_", "levels_", "prefix_",
+  };
+
+  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(prefixes); i++)
+    if (!strncasecmp(name, prefixes[i], strlen(prefixes[i]))) return PETSC_TRUE;
+  return PETSC_FALSE;
+}
+
+/* The class whose prefix a name begins with; NULL when there is none. */
+static const char *class_of(const char *name)
+{
+  for (PetscInt i = 0; i < SbTheOptions.nblock; i++) {
+    const char  *klass = SbTheOptions.block[i].klass;
+    const size_t n     = strlen(klass);
+
+    if (n && !strncasecmp(name, klass, n) && name[n] == '_') return klass;
+  }
+  return NULL;
+}
+
+static PetscBool is_recorded(const char *name)
+{
+  for (PetscInt i = 0; i < SbTheOptions.nrecord; i++)
+    if (!strcasecmp(SbTheOptions.record[i].name + 1, name)) return PETSC_TRUE;
+  return PETSC_FALSE;
+}
+
+/* Near full names: everything read so far, and every program-wide option. `text` is empty when none is near. */
+static PetscErrorCode near_options(const char *dashed, size_t size, char text[])
+{
+  PetscInt     n = 0, room = SbTheOptions.nrecord;
+  const char **list;
+  char       (*names)[SB_OPTION_NAME_MAX];
+
+  PetscFunctionBeginUser;
+  for (PetscInt i = 0; i < SbTheOptions.nblock; i++) room += SbTheOptions.block[i].n;
+  PetscCall(PetscMalloc2(room, &list, room, &names));
+  for (PetscInt i = 0; i < SbTheOptions.nrecord; i++) list[n++] = SbTheOptions.record[i].name;
+  for (PetscInt i = 0; i < SbTheOptions.nblock; i++) {
+    const SbOptionBlock *block = &SbTheOptions.block[i];
+
+    for (PetscInt j = 0; !block->klass[0] && j < block->n; j++) {
+      if (is_recorded(block->rows[j].key)) continue;
+      PetscCall(PetscSNPrintf(names[n], SB_OPTION_NAME_MAX, "-%s", block->rows[j].key));
+      list[n] = names[n];
+      n++;
+    }
+  }
+  PetscCall(SbNearest(dashed, n, list, size, text));
+  PetscCall(PetscFree2(list, names));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Instances of a class that have been read, "liver, stone"; "" when there are none. */
+static PetscErrorCode instances_of(const char *klass, const char *name, PetscBool *known, size_t size, char text[])
+{
+  const SbOptionRecord *last = NULL;
+
+  PetscFunctionBeginUser;
+  text[0] = 0;
+  *known  = PETSC_FALSE;
+  for (PetscInt i = 0; i < SbTheOptions.nrecord; i++) {
+    const SbOptionRecord *r = &SbTheOptions.record[i];
+    const size_t          n = strlen(r->scope.instance);
+
+    if (strcmp(r->scope.klass, klass)) continue;
+    if (!strncasecmp(name + strlen(klass) + 1, r->scope.instance, n) && name[strlen(klass) + 1 + n] == '_') *known = PETSC_TRUE;
+    if (last && !strcmp(last->scope.instance, r->scope.instance)) continue;
+    if (last) PetscCall(PetscStrlcat(text, ", ", size));
+    PetscCall(PetscStrlcat(text, r->scope.instance, size));
+    last = r;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* A type of the class that has a row with the key that the name ends in; NULL when there is none. */
+static const char *type_with_key(const char *klass, const char *name)
+{
+  const size_t n = strlen(name);
+
+  for (PetscInt i = 0; i < SbTheOptions.nblock; i++) {
+    const SbOptionBlock *block = &SbTheOptions.block[i];
+
+    for (PetscInt j = 0; !strcmp(block->klass, klass) && j < block->n; j++) {
+      const size_t k = strlen(block->rows[j].key);
+
+      if (n > k && name[n - k - 1] == '_' && !strcasecmp(name + n - k, block->rows[j].key)) return block->type;
+    }
+  }
+  return NULL;
+}
+
+/* What to say about an option of ours that nobody read; empty when it is not ours. */
+static PetscErrorCode verdict(const char *name, size_t size, char text[])
+{
+  char            near[3 * SB_OPTION_NAME_MAX], dashed[SB_OPTION_NAME_MAX], instances[256], why[512] = "";
+  const char     *klass = class_of(name), *type;
+  const SbOption *row   = program_row(name);
+  PetscBool       known;
+
+  PetscFunctionBeginUser;
+  text[0] = 0;
+  PetscCall(PetscSNPrintf(dashed, sizeof(dashed), "-%s", name));
+  if (row) {
+    PetscCall(PetscSNPrintf(text, size, "%s does nothing in this scenario: %s", dashed, row->help));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  if (!klass && looks_like_petsc(name)) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(near_options(dashed, sizeof(near), near));
+  if (!klass && !near[0]) PetscFunctionReturn(PETSC_SUCCESS);
+  if (near[0]) PetscCall(PetscSNPrintf(why, sizeof(why), "; did you mean %s?", near));
+  else {
+    PetscCall(instances_of(klass, name, &known, sizeof(instances), instances));
+    type = type_with_key(klass, name);
+    if (!known)
+      PetscCall(PetscSNPrintf(why, sizeof(why), ": it names no %s of this scenario (%s)", klass, instances[0] ? instances : "there are none"));
+    else if (type && type[0]) PetscCall(PetscSNPrintf(why, sizeof(why), " here: it belongs to type %s", type));
+  }
+  PetscCall(PetscSNPrintf(text, size, "%s is not an option of supple%s", dashed, why));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbOptionsCheck(void)
+{
+  PetscInt nleft, nbad = 0;
+  char   **names, first[1024] = "", more[64] = "";
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscOptionsLeftGet(NULL, &nleft, &names, NULL));
+  for (PetscInt i = 0; i < nleft; i++) {
+    char text[1024];
+
+    if (is_recorded(names[i])) continue;
+    PetscCall(verdict(names[i], sizeof(text), text));
+    if (text[0] && !nbad++) PetscCall(PetscStrncpy(first, text, sizeof(first)));
+  }
+  PetscCall(PetscOptionsLeftRestore(NULL, &nleft, &names, NULL));
+  if (nbad > 1) PetscCall(PetscSNPrintf(more, sizeof(more), " (and %" PetscInt_FMT " more like it)", nbad - 1));
+  PetscCheck(!nbad, PETSC_COMM_SELF, PETSC_ERR_USER, "%s%s", first, more);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbOptionsUnused(MPI_Comm comm, PetscInt *n)
+{
+  PetscInt nleft;
+  char   **names, **values;
+
+  PetscFunctionBeginUser;
+  *n = 0;
+  PetscCall(PetscOptionsLeftGet(NULL, &nleft, &names, &values));
+  for (PetscInt i = 0; i < nleft; i++) {
+    PetscBool users = (PetscBool)!SbTheOptions.remembered;
+
+    for (PetscInt j = 0; j < SbTheOptions.nuser && !users; j++)
+      users = (PetscBool)!strcasecmp(SbTheOptions.user[j].name, names[i]);
+    if (!users || is_recorded(names[i])) continue;
+    PetscCall(SbWarning(comm, "nobody read the option -%s%s%s", names[i], values[i] ? " " : "", values[i] ? values[i] : ""));
+    (*n)++;
+  }
+  PetscCall(PetscOptionsLeftRestore(NULL, &nleft, &names, &values));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

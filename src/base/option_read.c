@@ -1,0 +1,288 @@
+/*
+  option_read.c - the readers: from the text of an option to a checked value.
+
+  A number must fill its text; it is compared with the interval of its row, "[a, b)", whose ends may be inf. NaN lies in
+  no interval. The message of a failed check names option, value, interval, unit and what the option means; advice about
+  a forbidden end belongs into the help text of the row.
+*/
+#include <ctype.h>
+#include "option.h"
+
+/* ------------------------------------------------------------------ pieces of text */
+
+/* Copies [begin, end) without blanks at both ends; says whether it fits. */
+static PetscBool copy_trimmed(const char *begin, const char *end, size_t size, char text[])
+{
+  size_t n;
+
+  while (begin < end && isspace((unsigned char)*begin)) begin++;
+  while (end > begin && isspace((unsigned char)end[-1])) end--;
+  n = (size_t)(end - begin);
+  if (n >= size) return PETSC_FALSE;
+  memcpy(text, begin, n);
+  text[n] = 0;
+  return PETSC_TRUE;
+}
+
+/* Pieces between separators: "a,b" has two, "" and "  " have none. */
+static PetscInt count_pieces(const char *text, char separator)
+{
+  PetscInt n = 1;
+
+  while (isspace((unsigned char)*text)) text++;
+  if (!*text) return 0;
+  for (; *text; text++) n += *text == separator;
+  return n;
+}
+
+/* Takes the next piece off *text. */
+static PetscBool next_piece(const char **text, char separator, size_t size, char piece[])
+{
+  const char *end = strchr(*text, separator);
+  PetscBool   fits;
+
+  if (!end) end = *text + strlen(*text);
+  fits  = copy_trimmed(*text, end, size, piece);
+  *text = *end ? end + 1 : end;
+  return fits;
+}
+
+static PetscBool parse_real(const char *text, PetscReal *value)
+{
+  char *end;
+
+  *value = strtod(text, &end);
+  return (PetscBool)(end != text && !*end);
+}
+
+/* ------------------------------------------------------------------ ranges */
+
+/* Whether x lies in "[a, b)"; an empty range holds every number but NaN. Our own rows only: a bad range is our error. */
+static PetscErrorCode in_range(const char *range, PetscReal x, PetscBool *in)
+{
+  char  open, close;
+  char  lo_text[64], hi_text[64];
+  PetscReal lo, hi;
+
+  PetscFunctionBeginUser;
+  *in = (PetscBool)(x == x);
+  if (!range[0]) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCheck(sscanf(range, "%c%63[^,],%63[^])]%c", &open, lo_text, hi_text, &close) == 4 && strchr("([", open) &&
+               strchr(")]", close),
+             PETSC_COMM_SELF, PETSC_ERR_PLIB, "Unreadable range '%s' in a row of the option table", range);
+  lo = strtod(lo_text, NULL);
+  hi = strtod(hi_text, NULL);
+  *in = (PetscBool)((open == '[' ? x >= lo : x > lo) && (close == ']' ? x <= hi : x < hi));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode check_range(const SbOptionRecord *r, PetscReal x)
+{
+  PetscBool   in;
+  const char *unit = r->row->unit, *blank = unit[0] ? " " : "";
+
+  PetscFunctionBeginUser;
+  PetscCall(in_range(r->row->range, x, &in));
+  PetscCheck(in, PETSC_COMM_SELF, PETSC_ERR_USER, "%s %s%s%s is outside %s%s%s: %s", r->name, r->text, blank, unit,
+             r->row->range[0] ? r->row->range : "the numbers", blank, unit, r->row->help);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ readers */
+
+/* The record of an option whose row is of this kind. */
+static PetscErrorCode text_of(const SbScope *scope, const char *key, SbOptionKind kind, const SbOptionRecord **r)
+{
+  PetscFunctionBeginUser;
+  PetscCall(SbOptionText(scope, key, r));
+  PetscCheck((*r)->row->kind == kind, PETSC_COMM_SELF, PETSC_ERR_PLIB, "Option %s has kind %d, asked for as %d",
+             (*r)->name, (int)(*r)->row->kind, (int)kind);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* An empty preset: the caller's value stays. */
+static PetscBool is_absent(const SbOptionRecord *r)
+{
+  return (PetscBool)(!r->given && !r->text[0]);
+}
+
+PetscErrorCode SbOptionBool(const SbScope *scope, const char *key, PetscBool *value)
+{
+  static const char *const   words[2][5] = {{"false", "no", "off", "0", "n"}, {"true", "yes", "on", "1", "y"}};
+  const SbOptionRecord *r;
+
+  PetscFunctionBeginUser;
+  PetscCall(text_of(scope, key, SB_OPTION_BOOL, &r));
+  if (is_absent(r)) PetscFunctionReturn(PETSC_SUCCESS);
+  for (int truth = 0; truth < 2; truth++) {
+    for (int i = 0; i < 5; i++) {
+      PetscBool same;
+
+      PetscCall(PetscStrcasecmp(r->text, words[truth][i], &same));
+      if (!same) continue;
+      *value = truth ? PETSC_TRUE : PETSC_FALSE;
+      PetscFunctionReturn(PETSC_SUCCESS);
+    }
+  }
+  SETERRQ(PETSC_COMM_SELF, PETSC_ERR_USER, "%s %s is neither true nor false: %s", r->name, r->text, r->row->help);
+}
+
+PetscErrorCode SbOptionInt(const SbScope *scope, const char *key, PetscInt *value)
+{
+  const SbOptionRecord *r;
+  char                 *end;
+  long long             n;
+
+  PetscFunctionBeginUser;
+  PetscCall(text_of(scope, key, SB_OPTION_INT, &r));
+  if (is_absent(r)) PetscFunctionReturn(PETSC_SUCCESS);
+  n = strtoll(r->text, &end, 10);
+  PetscCheck(end != r->text && !*end, PETSC_COMM_SELF, PETSC_ERR_USER, "%s %s is not a whole number: %s", r->name, r->text,
+             r->row->help);
+  PetscCall(check_range(r, (PetscReal)n));
+  PetscCheck(n >= PETSC_MIN_INT && n <= PETSC_MAX_INT, PETSC_COMM_SELF, PETSC_ERR_USER,
+             "%s %s is too large for this build of PETSc, whose integers end at %" PetscInt_FMT, r->name, r->text,
+             PETSC_MAX_INT);
+  *value = (PetscInt)n;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbOptionReal(const SbScope *scope, const char *key, PetscReal *value)
+{
+  const SbOptionRecord *r;
+  PetscReal             x;
+
+  PetscFunctionBeginUser;
+  PetscCall(text_of(scope, key, SB_OPTION_REAL, &r));
+  if (is_absent(r)) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCheck(parse_real(r->text, &x), PETSC_COMM_SELF, PETSC_ERR_USER, "%s %s is not a number: %s", r->name, r->text,
+             r->row->help);
+  PetscCall(check_range(r, x));
+  *value = x;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbOptionReals(const SbScope *scope, const char *key, PetscReal value[])
+{
+  const SbOptionRecord *r;
+  const char           *text;
+  PetscInt              n;
+
+  PetscFunctionBeginUser;
+  PetscCall(text_of(scope, key, SB_OPTION_REALS, &r));
+  if (is_absent(r)) PetscFunctionReturn(PETSC_SUCCESS);
+  n = count_pieces(r->text, ',');
+  PetscCheck(n == r->row->count, PETSC_COMM_SELF, PETSC_ERR_USER,
+             "%s %s has %" PetscInt_FMT " numbers, needs %" PetscInt_FMT " with commas between them: %s", r->name, r->text, n,
+             r->row->count, r->row->help);
+  text = r->text;
+  for (PetscInt i = 0; i < n; i++) {
+    char      piece[64];
+    PetscReal x;
+
+    PetscCheck(next_piece(&text, ',', sizeof(piece), piece) && parse_real(piece, &x), PETSC_COMM_SELF, PETSC_ERR_USER,
+               "%s %s: entry %" PetscInt_FMT " is not a number: %s", r->name, r->text, i + 1, r->row->help);
+    PetscCall(check_range(r, x));
+    value[i] = x;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbOptionString(const SbScope *scope, const char *key, size_t size, char value[])
+{
+  const SbOptionRecord *r;
+
+  PetscFunctionBeginUser;
+  PetscCall(text_of(scope, key, SB_OPTION_STRING, &r));
+  PetscCheck(copy_trimmed(r->text, r->text + strlen(r->text), size, value), PETSC_COMM_SELF, PETSC_ERR_USER,
+             "%s is longer than %d characters: %s", r->name, (int)size - 1, r->row->help);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbOptionNames(const SbScope *scope, const char *key, PetscInt *n, char (**names)[SB_NAME_MAX])
+{
+  const SbOptionRecord *r;
+  const char           *text;
+
+  PetscFunctionBeginUser;
+  PetscCall(text_of(scope, key, SB_OPTION_NAMES, &r));
+  *n = count_pieces(r->text, ',');
+  PetscCall(PetscCalloc1(*n, names));
+  text = r->text;
+  for (PetscInt i = 0; i < *n; i++) {
+    char *name = (*names)[i];
+
+    if (next_piece(&text, ',', SB_NAME_MAX, name) && name[0]) continue;
+    PetscCall(PetscFree(*names));
+    SETERRQ(PETSC_COMM_SELF, PETSC_ERR_USER, "%s %s: name %" PetscInt_FMT " is empty or longer than %d characters: %s",
+            r->name, r->text, i + 1, SB_NAME_MAX - 1, r->row->help);
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Names out of "a|b|c", for the search of near ones. */
+static PetscErrorCode nearest_choice(const char *range, const char *word, size_t size, char text[])
+{
+  PetscInt    n = count_pieces(range, '|');
+  char      (*words)[SB_NAME_MAX];
+  const char **list;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscCalloc2(n, &words, n, &list));
+  for (PetscInt i = 0; i < n; i++) {
+    (void)next_piece(&range, '|', SB_NAME_MAX, words[i]);
+    list[i] = words[i];
+  }
+  PetscCall(SbNearest(word, n, list, size, text));
+  PetscCall(PetscFree2(words, list));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbOptionChoice(const SbScope *scope, const char *key, PetscInt *index)
+{
+  const SbOptionRecord *r;
+  const char           *range;
+  char                  word[SB_NAME_MAX], near[2 * SB_NAME_MAX];
+  PetscInt              n;
+
+  PetscFunctionBeginUser;
+  PetscCall(text_of(scope, key, SB_OPTION_CHOICE, &r));
+  if (is_absent(r)) PetscFunctionReturn(PETSC_SUCCESS);
+  range = r->row->range;
+  n     = count_pieces(range, '|');
+  for (PetscInt i = 0; i < n; i++) {
+    if (!next_piece(&range, '|', sizeof(word), word) || strcmp(word, r->text)) continue;
+    *index = i;
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  PetscCall(nearest_choice(r->row->range, r->text, sizeof(near), near));
+  SETERRQ(PETSC_COMM_SELF, PETSC_ERR_USER, "%s %s is not one of %s%s%s%s: %s", r->name, r->text, r->row->range,
+          near[0] ? " (did you mean " : "", near, near[0] ? "?)" : "", r->row->help);
+}
+
+PetscErrorCode SbOptionFormulas(const SbScope *scope, const char *key, SbFormula formulas[])
+{
+  const SbOptionRecord *r;
+  const char           *text;
+  PetscInt              n, count;
+
+  PetscFunctionBeginUser;
+  PetscCall(text_of(scope, key, SB_OPTION_FORMULA, &r));
+  count = r->row->count;
+  for (PetscInt i = 0; i < count; i++) formulas[i] = NULL;
+  if (is_absent(r)) PetscFunctionReturn(PETSC_SUCCESS);
+  n = count_pieces(r->text, ';');
+  PetscCheck(n == count, PETSC_COMM_SELF, PETSC_ERR_USER,
+             "%s %s has %" PetscInt_FMT " formula%s, needs %" PetscInt_FMT "%s: %s", r->name, r->text, n, n == 1 ? "" : "s",
+             count, count == 1 ? "" : " with semicolons between them", r->row->help);
+  text = r->text;
+  for (PetscInt i = 0; i < n; i++) {
+    char piece[PETSC_MAX_PATH_LEN];
+
+    PetscCheck(next_piece(&text, ';', sizeof(piece), piece) && piece[0], PETSC_COMM_SELF, PETSC_ERR_USER,
+               "%s %s: formula %" PetscInt_FMT " is empty or longer than %d characters: %s", r->name, r->text, i + 1,
+               (int)sizeof(piece) - 1, r->row->help);
+    PetscCall(SbFormulaCreate(PETSC_COMM_WORLD, piece, r->name, &formulas[i]));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
