@@ -34,3 +34,10 @@
 #else
   #define SB_DESTROY_CTX(type, arg) (*(type **)(arg))
 #endif
+
+/* "No limit" of an iteration count. */
+#if PETSC_VERSION_LT(3, 22, 0)
+  #define SB_UNLIMITED PETSC_MAX_INT
+#else
+  #define SB_UNLIMITED PETSC_UNLIMITED
+#endif

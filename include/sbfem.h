@@ -76,7 +76,7 @@ PetscErrorCode SbSpaceRestoreLocalWrite(SbSpace space, Vec v, PetscReal **array)
 
 /* f[nnode][3] += internal force (stress divergence and beta K v), N. Right on owned nodes. Not collective. */
 PetscErrorCode SbSpaceAddInternalForce(SbSpace space, const SbStage *stage, PetscReal f[]);
-/* f += M (a + alpha v). */
+/* f += M (a + alpha v); a or v may be NULL. */
 PetscErrorCode SbSpaceAddInertia(SbSpace space, const SbStage *stage, PetscReal f[]);
 
 typedef enum { SB_MATRIX_AIJ, SB_MATRIX_BAIJ, SB_MATRIX_SBAIJ } SbMatrixKind; /* SBAIJ: one rank only */

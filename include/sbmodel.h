@@ -47,7 +47,7 @@ struct _p_SbModel {
 PetscErrorCode SbModelDestroy(SbModel *model);
 /* After bodies, sets, materials, elements and effects are in place: mesh, space, effects' set-up, hook lists. Collective. */
 PetscErrorCode SbModelSetUp(SbModel model);
-/* F = M a + C v + f_int(u) - f_ext(t, u, v); on prescribed unknowns F = s (u - prescribed) when constrain, else the reaction. Collective. */
+/* F = M a + C v + f_int(u) - f_ext(t, u, v); on prescribed unknowns zero when constrain, else the reaction. V, A may be NULL. Collective. */
 PetscErrorCode SbModelResidual(SbModel model, PetscReal t, Vec U, Vec V, Vec A, PetscBool constrain, Vec F);
 /* f_ext alone */
 PetscErrorCode SbModelLoads(SbModel model, PetscReal t, Vec U, Vec V, Vec F);

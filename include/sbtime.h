@@ -33,6 +33,13 @@ struct _p_SbRun {
   SNES         snes;             /* of the TS, or own in a static run; borrowed from ts when there is one */
   Mat          J;
   Vec          U, V, A;          /* A: acceleration of the last step, state of the integrator */
+  PetscBool    dt_given, velocity_predictor, fixed_step, damped;
+  PetscReal    spectral_radius, newmark[2]; /* newmark: beta, gamma */
+  PetscInt     max_cuts, static_steps;
+  PetscBool    tangent_known;    /* J holds the tangent for shift_v, shift_a */
+  PetscReal    shift_v, shift_a;
+  char         solver_choice[SB_NAME_MAX]; /* as the scenario says: "auto" or a name */
+  const struct _SbSolverPreset *solver_used;
   char         solver[SB_NAME_MAX];      /* preset chosen, "cg_gamg" */
   char         solver_reason[256];
   PetscInt     nmonitor;
@@ -44,7 +51,11 @@ struct _p_SbRun {
   PetscReal    t0;
   PetscInt     newton_total, linear_total, rejected_total, steps_total;
   PetscReal    wall_start, seconds_solve;
-  PetscReal    dt;               /* first step */
+  PetscReal    dt, t_end;        /* length of a step (the first one when adaptive) and end, s */
+  PetscInt     newton_step, linear_step, rejected_step; /* iterations and rejections of the current step */
+  PetscInt     rejected_seen;
+  Vec          loads, reaction, previous; /* f_ext and residual at the last step, its displacement: for works; only with want_energies */
+  PetscReal    damping_power;    /* at the last step, W */
   char         stop_reason[512]; /* why the run ended early; empty when it reached its end */
   void        *output;           /* what src/output keeps for this run; NULL when no output was asked for */
   PetscErrorCode (*output_destroy)(SbRun run); /* frees it; called by SbRunDestroy() when not NULL, before the monitors */

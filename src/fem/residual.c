@@ -44,37 +44,62 @@ PetscErrorCode SbSpaceAddInternalForce(SbSpace s, const SbStage *stage, PetscRea
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* w = a + alpha v at the cell's nodes, then the consistent or the lumped mass times w. */
+/* Consistent mass of a region times w = a + alpha v. */
+static void add_consistent_inertia(SbSpace s, const SbRegion *region, const SbStage *stage, PetscReal f[])
+{
+  const SbElementOps *e     = &region->element->ops;
+  const PetscReal     alpha = stage->v ? region->alpha : 0.;
+
+  for (PetscInt b = region->bstart; b < region->bend; b++) {
+    const PetscInt *node = s->batch_node + 4 * SB_BATCH * b;
+    SbLane          w[12], fe[12];
+
+    if (stage->a) sb_gather(node, stage->a, w);
+    else memset(w, 0, sizeof(w));
+    if (alpha != 0.) {
+      SbLane v[12];
+
+      sb_gather(node, stage->v, v);
+      for (int k = 0; k < 12; k++) {
+        for (int l = 0; l < SB_BATCH; l++) w[k][l] += alpha * v[k][l];
+      }
+    }
+    for (int k = 0; k < 12; k++) {
+      for (int l = 0; l < SB_BATCH; l++) {
+        const PetscReal sum = w[k % 3][l] + w[3 + k % 3][l] + w[6 + k % 3][l] + w[9 + k % 3][l];
+
+        fe[k][l] = region->material->density * s->batch_V[b][l] * ((e->mass_diagonal - e->mass_coupling) * w[k][l] + e->mass_coupling * sum);
+      }
+    }
+    sb_scatter_add(node, s->batch_n[b], (const SbLane *)fe, f);
+  }
+}
+
+/* Mass-proportional damping of a region with the lumped mass. */
+static void add_lumped_damping(SbSpace s, const SbRegion *region, const PetscReal v[], PetscReal f[])
+{
+  const PetscReal share = region->alpha * region->material->density * region->element->ops.mass_lumped;
+
+  for (PetscInt b = region->bstart; b < region->bend; b++) {
+    for (PetscInt l = 0; l < s->batch_n[b]; l++) {
+      for (PetscInt a = 0; a < 4; a++) {
+        const PetscInt node = s->batch_node[(4 * b + a) * SB_BATCH + l];
+
+        for (PetscInt i = 0; i < 3; i++) f[3 * node + i] += share * s->batch_V[b][l] * v[3 * node + i];
+      }
+    }
+  }
+}
+
 PetscErrorCode SbSpaceAddInertia(SbSpace s, const SbStage *stage, PetscReal f[])
 {
   PetscFunctionBeginUser;
-  for (PetscInt r = 0; r < s->nregion; r++) {
-    const SbRegion     *region = &s->region[r];
-    const SbElementOps *e      = &region->element->ops;
-    const PetscReal     alpha = region->alpha, rho = region->material->density;
-
-    for (PetscInt b = region->bstart; b < region->bend; b++) {
-      const PetscInt *node = s->batch_node + 4 * SB_BATCH * b;
-
-      for (PetscInt l = 0; l < s->batch_n[b]; l++) {
-        const PetscReal m = rho * s->batch_V[b][l];
-
-        for (PetscInt i = 0; i < 3; i++) {
-          PetscReal w[4], sum = 0.;
-
-          for (PetscInt a = 0; a < 4; a++) {
-            const PetscInt k = 3 * node[a * SB_BATCH + l] + i;
-
-            w[a] = stage->a[k] + (alpha != 0. ? alpha * stage->v[k] : 0.);
-            sum += w[a];
-          }
-          for (PetscInt a = 0; a < 4; a++) {
-            const PetscReal share = s->consistent_mass ? (e->mass_diagonal - e->mass_coupling) * w[a] + e->mass_coupling * sum : e->mass_lumped * w[a];
-
-            f[3 * node[a * SB_BATCH + l] + i] += m * share;
-          }
-        }
-      }
+  if (s->consistent_mass) {
+    for (PetscInt r = 0; r < s->nregion; r++) add_consistent_inertia(s, &s->region[r], stage, f);
+  } else {
+    for (PetscInt i = 0; stage->a && i < 3 * s->nnode_owned; i++) f[i] += s->node_mass[i / 3] * stage->a[i];
+    for (PetscInt r = 0; stage->v && r < s->nregion; r++) {
+      if (s->region[r].alpha != 0.) add_lumped_damping(s, &s->region[r], stage->v, f);
     }
   }
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -194,23 +194,28 @@ static void add_region(SbSpace s, const SbRegion *region, const SbStage *stage, 
   }
 }
 
-/* Damping proportional to mass differs between bodies; nodes belong to one body each. */
+static inline void add_to_diagonal(SbSpace s, const Access *x, PetscInt node, PetscReal value)
+{
+  size_t       rs, cs;
+  PetscScalar *v = block_position(x, s->plan, node, s->plan->diagonal[node], &rs, &cs);
+
+  for (size_t i = 0; i < 3; i++) v[i * (rs + cs)] += value;
+}
+
+/* The lumped mass, and what mass-proportional damping of single bodies adds to it. */
 static void add_lumped_mass(SbSpace s, const SbStage *stage, const Access *x)
 {
+  for (PetscInt i = 0; i < s->nnode_owned; i++) add_to_diagonal(s, x, i, stage->shift_a * s->node_mass[i]);
   for (PetscInt r = 0; r < s->nregion; r++) {
     const SbRegion *region = &s->region[r];
-    const PetscReal factor = (stage->shift_a + stage->shift_v * region->alpha) * region->material->density * region->element->ops.mass_lumped;
+    const PetscReal factor = stage->shift_v * region->alpha * region->material->density * region->element->ops.mass_lumped;
 
-    for (PetscInt b = region->bstart; b < region->bend; b++) {
+    for (PetscInt b = region->bstart; factor != 0. && b < region->bend; b++) {
       for (PetscInt l = 0; l < s->batch_n[b]; l++) {
         for (PetscInt a = 0; a < 4; a++) {
           const PetscInt node = s->batch_node[(4 * b + a) * SB_BATCH + l];
-          size_t         rs, cs;
-          PetscScalar   *v;
 
-          if (node >= s->nnode_owned) continue;
-          v = block_position(x, s->plan, node, s->plan->diagonal[node], &rs, &cs);
-          for (size_t i = 0; i < 3; i++) v[i * (rs + cs)] += factor * s->batch_V[b][l];
+          if (node < s->nnode_owned) add_to_diagonal(s, x, node, factor * s->batch_V[b][l]);
         }
       }
     }

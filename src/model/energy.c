@@ -16,13 +16,9 @@ static PetscErrorCode momentum_density(SbModel m, const PetscReal v[], PetscReal
 
   PetscFunctionBeginUser;
   if (s->consistent_mass) {
-    SbStage    stage = {.a = v, .v = v};
-    PetscReal *zero  = NULL;
+    const SbStage stage = {.a = v}; /* no v: inertia alone, without mass-proportional damping */
 
-    PetscCall(PetscCalloc1(3 * s->nnode, &zero));
-    stage.v = zero; /* inertia only, without mass-proportional damping */
     PetscCall(SbSpaceAddInertia(s, &stage, p));
-    PetscCall(PetscFree(zero));
   } else {
     for (PetscInt i = 0; i < 3 * s->nnode_owned; i++) p[i] = s->node_mass[i / 3] * v[i];
   }

@@ -105,21 +105,16 @@ static PetscErrorCode external_forces(SbModel m, const SbStage *stage, PetscReal
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Rows of prescribed unknowns: distance to the prescribed value. */
-static PetscErrorCode constrain_residual(SbModel m, PetscReal t, const PetscReal u[], PetscReal f[])
+/* Every initial guess carries the prescribed values and no solve changes them: nothing is left to do in their rows. */
+static void constrain_residual(SbSpace s, PetscReal f[])
 {
-  SbSpace s = m->space;
-
-  PetscFunctionBeginUser;
-  for (PetscInt e = 0; e < m->nprescribe; e++) PetscCall(m->prescribe[e]->ops.prescribe(m->prescribe[e], s, t));
   for (PetscInt k = 0; k < s->nfixed; k++) {
     const PetscInt node = s->fixed_node[k];
 
     for (PetscInt c = 0; c < 3; c++) {
-      if (s->fixed[node] & (1 << c)) f[3 * node + c] = u[3 * node + c] - m->load * s->fixed_value[3 * k + c];
+      if (s->fixed[node] & (1 << c)) f[3 * node + c] = 0.;
     }
   }
-  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode SbModelResidual(SbModel m, PetscReal t, Vec U, Vec V, Vec A, PetscBool constrain, Vec F)
@@ -132,8 +127,8 @@ PetscErrorCode SbModelResidual(SbModel m, PetscReal t, Vec U, Vec V, Vec A, Pets
   PetscCall(SbSpaceGetLocalWrite(m->space, F, &f));
   PetscCall(external_forces(m, &stage, -m->load, f));
   PetscCall(SbSpaceAddInternalForce(m->space, &stage, f));
-  if (A) PetscCall(SbSpaceAddInertia(m->space, &stage, f));
-  if (constrain) PetscCall(constrain_residual(m, t, stage.u, f));
+  if (A || V) PetscCall(SbSpaceAddInertia(m->space, &stage, f));
+  if (constrain) constrain_residual(m->space, f);
   PetscCall(SbSpaceRestoreLocalWrite(m->space, F, &f));
   PetscCall(stage_end(m, U, V, A, &stage));
   PetscFunctionReturn(PETSC_SUCCESS);

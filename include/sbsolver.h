@@ -1,0 +1,22 @@
+/*
+  sbsolver.h - layer 2: linear solvers by name, and the choice of one by problem and rank count.
+*/
+#pragma once
+#include "sbfem.h"
+
+/* A row of the solver table: a matrix type and PETSc options that are set where the user is silent. */
+typedef struct _SbSolverPreset {
+  const char  *name;
+  SbMatrixKind matrix;      /* on several ranks SBAIJ becomes BAIJ */
+  const char  *options;     /* "-ksp_type cg -pc_type gamg ..." */
+  const char  *help;
+} SbSolverPreset;
+
+PetscErrorCode SbSolverRegister(void);
+/* Reads -solver: "auto" or a name of the table. */
+PetscErrorCode SbSolverSetFromOptions(char choice[], size_t size);
+/* The preset for `choice`; with "auto" by number of unknowns, ranks and law, the reason in words. Collective. */
+PetscErrorCode SbSolverChoose(SbSpace space, PetscBool dynamic, PetscBool linear, PetscBool explicit_run, const char *choice, const SbSolverPreset **preset,
+                              char reason[], size_t size);
+/* Gives the linear solver of `snes` the preset's options and tolerances; before SNESSetFromOptions(). Collective. */
+PetscErrorCode SbSolverSetUp(SNES snes, SbSpace space, const SbSolverPreset *preset);

@@ -1,0 +1,136 @@
+/*
+  Linear solvers by name. Each is a row of options for PETSc, put into its database where the user is silent, so that
+  everything stays adjustable by PETSc's own options; the matrix type is what the row's preconditioner takes.
+
+  Convergence is judged by the true residual: the preconditioned norm can be off by orders of magnitude for nearly
+  incompressible bodies. A solve that does not reach its tolerance fails; the step is then cut or the run stops.
+*/
+#include "sbsolver.h"
+
+static const SbSolverPreset presets[] = {
+  {"cg", SB_MATRIX_BAIJ, "-ksp_type cg -pc_type none", "conjugate gradients without preconditioner"},
+  {"cg_jacobi", SB_MATRIX_BAIJ, "-ksp_type cg -pc_type jacobi", "CG, diagonal preconditioner"},
+  {"cg_pbjacobi", SB_MATRIX_BAIJ, "-ksp_type cg -pc_type pbjacobi", "CG, 3x3 diagonal blocks"},
+  {"cg_icc", SB_MATRIX_SBAIJ, "-ksp_type cg -pc_type bjacobi -sub_pc_type icc -sub_pc_factor_shift_type positive_definite", "CG, incomplete Cholesky on each rank"},
+  {"cg_ssor", SB_MATRIX_AIJ, "-ksp_type cg -pc_type sor -pc_sor_local_symmetric", "CG, symmetric Gauss-Seidel on each rank"},
+  {"cg_gamg", SB_MATRIX_AIJ, "-ksp_type cg -pc_type gamg", "CG, algebraic multigrid with the rigid-body modes of each body"},
+  {"cg_hypre", SB_MATRIX_AIJ, "-ksp_type cg -pc_type hypre -pc_hypre_type boomeramg -pc_hypre_boomeramg_strong_threshold 0.5", "CG, BoomerAMG of hypre"},
+  {"gauss_seidel", SB_MATRIX_AIJ, "-ksp_type richardson -pc_type sor -pc_sor_omega 1 -ksp_max_it 100000", "Gauss-Seidel iteration (between ranks: block Jacobi)"},
+  {"sor", SB_MATRIX_AIJ, "-ksp_type richardson -pc_type sor -pc_sor_omega 1.6 -ksp_max_it 100000", "successive over-relaxation, omega 1.6 (between ranks: block Jacobi)"},
+  {"cholmod", SB_MATRIX_AIJ, "-ksp_type cg -pc_type cholesky -pc_factor_mat_solver_type cholmod", "sparse Cholesky of SuiteSparse; one rank"},
+  {"mumps", SB_MATRIX_AIJ, "-ksp_type cg -pc_type cholesky -pc_factor_mat_solver_type mumps", "sparse factorisation of MUMPS on any number of ranks"},
+};
+
+static const SbOption rows[] = {
+  {"solver", SB_OPTION_CHOICE, 1, "", "auto", "auto|cg|cg_jacobi|cg_pbjacobi|cg_icc|cg_ssor|cg_gamg|cg_hypre|gauss_seidel|sor|cholmod|mumps",
+   "linear solver; auto chooses by size, ranks and material and says why. PETSc's -ksp_ and -pc_ options refine it"},
+};
+
+PetscErrorCode SbSolverRegister(void)
+{
+  PetscFunctionBeginUser;
+  PetscCall(SbOptionsRegister("", "", (PetscInt)PETSC_STATIC_ARRAY_LENGTH(rows), rows));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbSolverSetFromOptions(char choice[], size_t size)
+{
+  SbScope  scope;
+  PetscInt index;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbScopeSet(&scope, "", "", ""));
+  PetscCall(SbOptionChoice(&scope, "solver", &index));
+  /* the choices are auto and then the rows of the table */
+  PetscCall(PetscStrncpy(choice, index == 0 ? "auto" : presets[index - 1].name, size));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static const SbSolverPreset *find_preset(const char *name)
+{
+  for (size_t k = 0; k < PETSC_STATIC_ARRAY_LENGTH(presets); k++) {
+    if (!strcmp(presets[k].name, name)) return &presets[k];
+  }
+  return NULL;
+}
+
+PetscErrorCode SbSolverChoose(SbSpace s, PetscBool dynamic, PetscBool linear, PetscBool explicit_run, const char *choice, const SbSolverPreset **preset, char reason[],
+                              size_t size)
+{
+  const PetscInt unknowns = 3 * s->Nnode;
+  const char    *name     = choice;
+  PetscReal      nu       = -1.;
+  PetscMPIInt    nrank;
+
+  PetscFunctionBeginUser;
+  PetscCallMPI(MPI_Comm_size(s->comm, &nrank));
+  for (PetscInt r = 0; r < s->nregion; r++) nu = PetscMax(nu, s->region[r].material->nu);
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &nu, 1, MPIU_REAL, MPI_MAX, s->comm));
+  if (explicit_run) {
+    name = "cg";
+    PetscCall(PetscSNPrintf(reason, size, "explicit integrator: no linear system"));
+  } else if (strcmp(choice, "auto")) {
+    PetscCall(PetscSNPrintf(reason, size, "chosen by -solver"));
+  } else if (unknowns <= 30000 && (linear || !dynamic || nu > 0.47)) {
+    name = nrank == 1 ? "cholmod" : "mumps";
+    PetscCall(PetscSNPrintf(reason, size, "%" PetscInt_FMT " unknowns: a factorisation is fast and holds at any Poisson's ratio", unknowns));
+  } else if (dynamic) {
+    name = nu > 0.47 ? "cg_gamg" : "cg_icc";
+    PetscCall(PetscSNPrintf(reason, size, "dynamic, %" PetscInt_FMT " unknowns, Poisson's ratio up to %g", unknowns, (double)nu));
+  } else {
+    name = "cg_gamg";
+    PetscCall(PetscSNPrintf(reason, size, "static, %" PetscInt_FMT " unknowns: multigrid", unknowns));
+  }
+  *preset = find_preset(name);
+  PetscCheck(*preset, s->comm, PETSC_ERR_PLIB, "No solver preset %s", name);
+  PetscCheck(nrank == 1 || strcmp((*preset)->name, "cholmod"), s->comm, PETSC_ERR_USER, "-solver cholmod runs on one rank and there are %d: use mumps", (int)nrank);
+  if (nrank > 1 && (*preset)->matrix == SB_MATRIX_SBAIJ) {
+    static SbSolverPreset parallel;
+
+    parallel        = **preset;
+    parallel.matrix = SB_MATRIX_BAIJ;
+    *preset         = &parallel;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Options of the row that the user did not give. */
+static PetscErrorCode insert_options(const char *text)
+{
+  PetscToken token;
+  char      *word;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscTokenCreate(text, ' ', &token));
+  PetscCall(PetscTokenFind(token, &word));
+  while (word) {
+    char      name[128];
+    PetscBool given;
+
+    PetscCall(PetscStrncpy(name, word, sizeof(name)));
+    PetscCall(PetscTokenFind(token, &word));
+    PetscCall(PetscOptionsHasName(NULL, NULL, name, &given));
+    if (word && word[0] == '-' && (word[1] < '0' || word[1] > '9')) {
+      if (!given) PetscCall(PetscOptionsSetValue(NULL, name, NULL));
+      continue;
+    }
+    if (!given) PetscCall(PetscOptionsSetValue(NULL, name, word));
+    if (word) PetscCall(PetscTokenFind(token, &word));
+  }
+  PetscCall(PetscTokenDestroy(&token));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbSolverSetUp(SNES snes, SbSpace s, const SbSolverPreset *preset)
+{
+  KSP ksp;
+
+  PetscFunctionBeginUser;
+  (void)s;
+  PetscCall(SNESGetKSP(snes, &ksp));
+  PetscCall(KSPSetTolerances(ksp, 1e-8, PETSC_DEFAULT, PETSC_DEFAULT, 5000));
+  PetscCall(KSPSetType(ksp, KSPCG));
+  PetscCall(KSPSetNormType(ksp, KSP_NORM_UNPRECONDITIONED));
+  PetscCall(insert_options(preset->options));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

@@ -1,0 +1,113 @@
+/*
+  The model as PETSc's TS and SNES see it. A tangent that cannot have changed (linear laws, loads that do not depend on the
+  displacement, the same shifts) is not assembled again, and the preconditioner stays.
+*/
+#include "time_impl.h"
+
+/* True when J still holds the tangent for these shifts. */
+static PetscBool tangent_holds(SbRun run, PetscReal shift_v, PetscReal shift_a)
+{
+  const PetscReal tiny = 1e-10;
+
+  return (PetscBool)(run->model->linear && run->tangent_known && PetscAbsReal(run->shift_v - shift_v) <= tiny * shift_v && PetscAbsReal(run->shift_a - shift_a) <= tiny * shift_a);
+}
+
+static PetscErrorCode form_tangent(SbRun run, PetscReal t, PetscReal shift_v, PetscReal shift_a, Vec U, Vec V, Mat P)
+{
+  PetscFunctionBeginUser;
+  if (tangent_holds(run, shift_v, shift_a)) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(SbModelTangent(run->model, t, shift_v, shift_a, 1., U, V, P));
+  run->tangent_known = PETSC_TRUE;
+  run->shift_v       = shift_v;
+  run->shift_a       = shift_a;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbFormI2Function(TS ts, PetscReal t, Vec U, Vec V, Vec A, Vec F, void *ctx)
+{
+  SbRun run = (SbRun)ctx;
+
+  PetscFunctionBeginUser;
+  (void)ts;
+  PetscCall(SbModelResidual(run->model, t, U, V, A, PETSC_TRUE, F));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbFormI2Jacobian(TS ts, PetscReal t, Vec U, Vec V, Vec A, PetscReal shift_v, PetscReal shift_a, Mat J, Mat P, void *ctx)
+{
+  PetscFunctionBeginUser;
+  (void)ts;
+  (void)A;
+  PetscCall(form_tangent((SbRun)ctx, t, shift_v, shift_a, U, V, P));
+  if (J != P) {
+    PetscCall(MatAssemblyBegin(J, MAT_FINAL_ASSEMBLY));
+    PetscCall(MatAssemblyEnd(J, MAT_FINAL_ASSEMBLY));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbFormStaticFunction(SNES snes, Vec U, Vec F, void *ctx)
+{
+  SbRun run = (SbRun)ctx;
+
+  PetscFunctionBeginUser;
+  (void)snes;
+  PetscCall(SbModelResidual(run->model, run->model->load, U, NULL, NULL, PETSC_TRUE, F));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbFormStaticJacobian(SNES snes, Vec U, Mat J, Mat P, void *ctx)
+{
+  SbRun run = (SbRun)ctx;
+
+  PetscFunctionBeginUser;
+  (void)snes;
+  (void)J;
+  PetscCall(form_tangent(run, run->model->load, 0., 0., U, NULL, P));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* With the consistent mass the system is solved by CG to rounding; the lumped mass is a division. */
+static PetscErrorCode solve_consistent_mass(SbRun run, Vec B, Vec A)
+{
+  Mat M;
+  KSP ksp;
+  PC  pc;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbSpaceCreateMatrix(run->model->space, SB_MATRIX_BAIJ, &M));
+  PetscCall(SbModelTangent(run->model, 0., 0., 1., 0., run->U, run->V, M));
+  PetscCall(KSPCreate(run->model->comm, &ksp));
+  PetscCall(KSPSetOptionsPrefix(ksp, "mass_"));
+  PetscCall(KSPSetOperators(ksp, M, M));
+  PetscCall(KSPSetType(ksp, KSPCG));
+  PetscCall(KSPGetPC(ksp, &pc));
+  PetscCall(PCSetType(pc, PCJACOBI));
+  PetscCall(KSPSetTolerances(ksp, 1e-14, PETSC_DEFAULT, PETSC_DEFAULT, 500));
+  PetscCall(KSPSolve(ksp, B, A));
+  PetscCall(KSPDestroy(&ksp));
+  PetscCall(MatDestroy(&M));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbFormAcceleration(SbRun run, PetscReal t, Vec U, Vec V, Vec A)
+{
+  SbSpace      s = run->model->space;
+  PetscScalar *a;
+  Vec          F;
+
+  PetscFunctionBeginUser;
+  PetscCall(VecDuplicate(U, &F));
+  PetscCall(SbModelResidual(run->model, t, U, V, NULL, PETSC_TRUE, F));
+  if (s->consistent_mass) {
+    PetscCall(solve_consistent_mass(run, F, A));
+  } else {
+    PetscCall(VecCopy(F, A));
+    PetscCall(VecGetArray(A, &a));
+    for (PetscInt i = 0; i < 3 * s->nnode_owned; i++) a[i] /= s->node_mass[i / 3];
+    PetscCall(VecRestoreArray(A, &a));
+  }
+  PetscCall(VecScale(A, -1.));
+  PetscCall(VecDestroy(&F));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

@@ -1,0 +1,284 @@
+/*
+  Integrators by name: each preset is a method of second_order.c with its parameters, set where the user is silent; all of
+  PETSc's own options (-ts_, -snes_, -ksp_, -pc_) go on working.
+
+    euler_implicit    first order, damps; never gains energy in linear runs
+    newmark           second order, (1/4, 1/2) conserves energy in linear runs
+    genalpha          second order, damps high frequencies; parameters from the spectral radius at infinity
+    euler_symplectic  explicit, first order, bounded energy below the stable step
+    euler_explicit    explicit, first order, gains energy: the baseline that blows up
+    alpha2            PETSc's TSALPHA2, for comparison
+    static            equilibrium, no inertia: a load path
+*/
+#include "time_impl.h"
+#include "sbsolver.h"
+
+const char *const SbTimePresets = "euler_implicit|newmark|genalpha|euler_symplectic|euler_explicit|alpha2|static";
+
+static const SbOption rows[] = {
+  {"time", SB_OPTION_CHOICE, 1, "", "euler_implicit", "euler_implicit|newmark|genalpha|euler_symplectic|euler_explicit|alpha2|static", "time integrator, or static equilibrium"},
+  {"ts_dt", SB_OPTION_REAL, 1, "s", "0.01", "(0, inf)", "length of a time step (the first one with -ts_adapt_type basic); explicit integrators take 0.9 of the stable step unless told"},
+  {"ts_max_time", SB_OPTION_REAL, 1, "s", "1", "(0, inf)", "end of the simulated time"},
+  {"time_spectral_radius", SB_OPTION_REAL, 1, "", "0.5", "[0, 1]", "genalpha: amplitude that is left of the highest frequencies per step; 1 keeps all, 0 removes them at once"},
+  {"time_newmark_beta", SB_OPTION_REAL, 1, "", "0.25", "(0, 0.5]", "newmark: beta"},
+  {"time_newmark_gamma", SB_OPTION_REAL, 1, "", "0.5", "[0.5, 1]", "newmark: gamma; more than 1/2 damps and is first order"},
+  {"time_predictor", SB_OPTION_CHOICE, 1, "", "none", "none|velocity", "where Newton starts a step: at the old displacement, or moved on by the velocity"},
+  {"time_max_cuts", SB_OPTION_INT, 1, "", "10", "[0, 60]", "how often a step that fails is halved before the run stops"},
+  {"static_steps", SB_OPTION_INT, 1, "", "1", "[1, 1000000]", "static: equal load steps from zero to full load"},
+};
+
+PetscErrorCode SbTimeRegister(void)
+{
+  PetscFunctionBeginUser;
+  PetscCall(SbOptionsRegister("", "", (PetscInt)PETSC_STATIC_ARRAY_LENGTH(rows), rows));
+  PetscCall(SbSolverRegister());
+  PetscCall(SbSecondOrderRegister());
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbRunCreate(SbModel model, SbRun *run)
+{
+  SbRun    r;
+  SbScope  scope;
+  PetscInt preset, predictor;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscNew(&r));
+  r->model = model;
+  PetscCall(SbScopeSet(&scope, "", "", ""));
+  PetscCall(SbOptionChoice(&scope, "time", &preset));
+  r->preset      = (SbTimePreset)preset;
+  model->dynamic = (PetscBool)(r->preset != SB_TIME_STATIC);
+  if (model->dynamic) {
+    PetscCall(SbOptionReal(&scope, "ts_dt", &r->dt));
+    PetscCall(SbOptionGiven(&scope, "ts_dt", &r->dt_given));
+    PetscCall(SbOptionReal(&scope, "ts_max_time", &r->t_end));
+    PetscCall(SbOptionChoice(&scope, "time_predictor", &predictor));
+    r->velocity_predictor = (PetscBool)(predictor == 1);
+  } else {
+    PetscCall(SbOptionInt(&scope, "static_steps", &r->static_steps));
+    r->t_end = 1.;
+    r->dt    = 1. / (PetscReal)r->static_steps;
+  }
+  if (r->preset == SB_TIME_GENALPHA || r->preset == SB_TIME_ALPHA2) PetscCall(SbOptionReal(&scope, "time_spectral_radius", &r->spectral_radius));
+  if (r->preset == SB_TIME_NEWMARK) {
+    PetscCall(SbOptionReal(&scope, "time_newmark_beta", &r->newmark[0]));
+    PetscCall(SbOptionReal(&scope, "time_newmark_gamma", &r->newmark[1]));
+  }
+  PetscCall(SbOptionInt(&scope, "time_max_cuts", &r->max_cuts));
+  PetscCall(SbSolverSetFromOptions(r->solver_choice, sizeof(r->solver_choice)));
+  *run = r;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The method behind a preset. */
+static void method_settings(SbRun run, SbMethodSettings *set)
+{
+  *set = (SbMethodSettings){.method = SB_METHOD_EULER_IMPLICIT, .alpha_m = 1., .alpha_f = 1., .beta = 0.25, .gamma = 0.5,
+                            .velocity_predictor = run->velocity_predictor, .max_cuts = run->max_cuts};
+  if (run->preset == SB_TIME_NEWMARK) {
+    set->method = SB_METHOD_GENERALIZED_ALPHA;
+    set->beta   = run->newmark[0];
+    set->gamma  = run->newmark[1];
+  } else if (run->preset == SB_TIME_GENALPHA) {
+    const PetscReal r = run->spectral_radius;
+
+    set->method  = SB_METHOD_GENERALIZED_ALPHA;
+    set->alpha_m = (2. - r) / (1. + r);
+    set->alpha_f = 1. / (1. + r);
+    set->gamma   = 0.5 + set->alpha_m - set->alpha_f;
+    set->beta    = 0.25 * PetscSqr(1. + set->alpha_m - set->alpha_f);
+  } else if (run->preset == SB_TIME_EULER_EXPLICIT) {
+    set->method = SB_METHOD_EULER_EXPLICIT;
+  } else if (run->preset == SB_TIME_EULER_SYMPLECTIC) {
+    set->method = SB_METHOD_EULER_SYMPLECTIC;
+  }
+}
+
+/* Newton on nonlinear models, one linear solve on linear ones; tolerances that hold in any unit system. */
+static PetscErrorCode set_up_snes(SbRun run)
+{
+  SbModel        m = run->model;
+  PetscReal      force = 0.;
+  SNESLineSearch search;
+
+  PetscFunctionBeginUser;
+  /* rounding of the internal forces: below 1e-13 of (stress modulus) x (area of the body) no residual is meaningful */
+  for (PetscInt b = 0; b < m->nbody; b++) force += m->material[b]->E * PetscPowReal(m->body[b].volume, 2. / 3.);
+  PetscCall(SNESSetType(run->snes, m->linear ? SNESKSPONLY : SNESNEWTONLS));
+  PetscCall(SNESGetLineSearch(run->snes, &search));
+  PetscCall(SNESLineSearchSetType(search, SNESLINESEARCHBT));
+  PetscCall(SNESSetTolerances(run->snes, 1e-13 * force, 1e-8, 0., m->dynamic ? 20 : 50, SB_UNLIMITED));
+  PetscCall(SNESSetErrorIfNotConverged(run->snes, PETSC_FALSE));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode step_accepted(TS ts, PetscInt step, PetscReal t, Vec U, void *ctx)
+{
+  SbRun             run = (SbRun)ctx;
+  TSConvergedReason reason;
+  PetscInt          newton, linear, rejected;
+  PetscReal         previous;
+
+  PetscFunctionBeginUser;
+  (void)U;
+  /* TSSolve calls once more, with step -1, when it has interpolated */
+  if (step < 0) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(TSGetSNESIterations(ts, &newton));
+  PetscCall(TSGetKSPIterations(ts, &linear));
+  PetscCall(TSGetStepRejections(ts, &rejected));
+  PetscCall(TSGetPrevTime(ts, &previous));
+  PetscCall(TSGetConvergedReason(ts, &reason));
+  run->newton_step   = newton - run->newton_total;
+  run->linear_step   = linear - run->linear_total;
+  run->rejected_step = rejected - run->rejected_seen;
+  run->rejected_seen = rejected;
+  PetscCall(SbRunStepAccepted(run, step, t, step == run->step0 ? 0. : t - previous, (PetscBool)(reason > 0 || t >= run->t_end * (1. - 1e-12))));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode explicit_step(SbRun run)
+{
+  PetscReal stable;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbSpaceStableStep(run->model->space, &stable));
+  if (!run->dt_given) run->dt = 0.9 * stable;
+  else if (run->dt > stable) {
+    PetscCall(SbWarning(run->model->comm, "-ts_dt %g s is beyond the stable step of this mesh and material, %g s: expect the solution to blow up", (double)run->dt, (double)stable));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode set_up_ts(SbRun run)
+{
+  SbModel          m = run->model;
+  SbMethodSettings settings;
+  TSAdapt          adapt;
+  PetscReal        size = 0.;
+  Vec              F;
+
+  PetscFunctionBeginUser;
+  if (run->preset == SB_TIME_EULER_EXPLICIT || run->preset == SB_TIME_EULER_SYMPLECTIC) PetscCall(explicit_step(run));
+  PetscCall(SbSpaceCreateVec(m->space, &F));
+  PetscCall(TSCreate(m->comm, &run->ts));
+  PetscCall(TSSetProblemType(run->ts, TS_NONLINEAR));
+  PetscCall(TS2SetSolution(run->ts, run->U, run->V));
+  PetscCall(TSSetI2Function(run->ts, F, SbFormI2Function, run));
+  PetscCall(TSSetI2Jacobian(run->ts, run->J, run->J, SbFormI2Jacobian, run));
+  PetscCall(VecDestroy(&F));
+  if (run->preset == SB_TIME_ALPHA2) {
+    PetscCall(TSSetType(run->ts, TSALPHA2));
+    PetscCall(TSAlpha2SetRadius(run->ts, run->spectral_radius));
+  } else PetscCall(TSSetType(run->ts, SB_TS_SECOND_ORDER));
+  PetscCall(TSGetAdapt(run->ts, &adapt));
+  PetscCall(TSAdaptSetType(adapt, TSADAPTNONE));
+  /* displacement error per step that adaptive runs allow, relative to the size of the scene: unit-free */
+  for (PetscInt b = 0; b < m->nbody; b++) {
+    for (PetscInt i = 0; i < 3; i++) size = PetscMax(size, m->body[b].bbox[3 + i] - m->body[b].bbox[i]);
+  }
+  PetscCall(TSSetTolerances(run->ts, 1e-4 * size, NULL, 0., NULL));
+  PetscCall(TSSetMaxSteps(run->ts, PETSC_MAX_INT));
+  PetscCall(TSSetExactFinalTime(run->ts, TS_EXACTFINALTIME_MATCHSTEP));
+  PetscCall(TSSetErrorIfStepFails(run->ts, PETSC_FALSE));
+  PetscCall(TSGetSNES(run->ts, &run->snes));
+  PetscCall(set_up_snes(run));
+  PetscCall(SbSolverSetUp(run->snes, m->space, run->solver_used));
+  PetscCall(TSSetFromOptions(run->ts));
+  PetscCall(TSSetMaxTime(run->ts, run->t_end));
+  PetscCall(TSSetTimeStep(run->ts, run->dt));
+  PetscCall(TSMonitorSet(run->ts, step_accepted, run, NULL));
+  PetscCall(TSGetAdapt(run->ts, &adapt));
+  PetscCall(PetscObjectTypeCompare((PetscObject)adapt, TSADAPTNONE, &run->fixed_step));
+  method_settings(run, &settings);
+  if (run->preset != SB_TIME_ALPHA2) PetscCall(SbSecondOrderSet(run->ts, run, &settings));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode set_up_static(SbRun run)
+{
+  Vec F;
+
+  PetscFunctionBeginUser;
+  run->fixed_step = PETSC_TRUE;
+  PetscCall(SbSpaceCreateVec(run->model->space, &F));
+  PetscCall(SNESCreate(run->model->comm, &run->snes));
+  PetscCall(SNESSetFunction(run->snes, F, SbFormStaticFunction, run));
+  PetscCall(SNESSetJacobian(run->snes, run->J, run->J, SbFormStaticJacobian, run));
+  PetscCall(VecDestroy(&F));
+  PetscCall(set_up_snes(run));
+  PetscCall(SbSolverSetUp(run->snes, run->model->space, run->solver_used));
+  PetscCall(SNESSetFromOptions(run->snes));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbRunSetUp(SbRun run)
+{
+  SbModel   m        = run->model;
+  PetscBool explicit = (PetscBool)(run->preset == SB_TIME_EULER_EXPLICIT || run->preset == SB_TIME_EULER_SYMPLECTIC);
+
+  PetscFunctionBeginUser;
+  for (PetscInt r = 0; r < m->space->nregion; r++) {
+    if (m->space->region[r].alpha != 0. || m->space->region[r].beta != 0.) run->damped = m->dynamic;
+  }
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &run->damped, 1, SB_MPI_BOOL, MPI_LOR, m->comm));
+  PetscCall(SbSpaceCreateVec(m->space, &run->U));
+  if (m->dynamic) {
+    PetscCall(SbSpaceCreateVec(m->space, &run->V));
+    if (run->preset != SB_TIME_ALPHA2) PetscCall(SbSpaceCreateVec(m->space, &run->A));
+  }
+  PetscCall(SbModelInitialState(m, run->U, run->V));
+  PetscCall(SbSolverChoose(m->space, m->dynamic, m->linear, explicit, run->solver_choice, &run->solver_used, run->solver_reason, sizeof(run->solver_reason)));
+  PetscCall(PetscStrncpy(run->solver, run->solver_used->name, sizeof(run->solver)));
+  if (!explicit) PetscCall(SbSpaceCreateMatrix(m->space, run->solver_used->matrix, &run->J));
+  if (m->dynamic) PetscCall(set_up_ts(run));
+  else PetscCall(set_up_static(run));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbRunAddMonitor(SbRun run, SbMonitorFn fn, void *ctx, PetscErrorCode (*destroy)(void *))
+{
+  PetscFunctionBeginUser;
+  PetscCheck(run->nmonitor < (PetscInt)PETSC_STATIC_ARRAY_LENGTH(run->monitor), PETSC_COMM_SELF, PETSC_ERR_PLIB, "More than %d monitors", (int)PETSC_STATIC_ARRAY_LENGTH(run->monitor));
+  run->monitor[run->nmonitor].fn      = fn;
+  run->monitor[run->nmonitor].ctx     = ctx;
+  run->monitor[run->nmonitor].destroy = destroy;
+  run->nmonitor++;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbRunSolve(SbRun run)
+{
+  PetscFunctionBeginUser;
+  run->wall_start = MPI_Wtime();
+  if (run->ts) {
+    PetscCall(TSSetStepNumber(run->ts, run->step0));
+    PetscCall(TSSetTime(run->ts, run->t0));
+    PetscCall(TSSolve(run->ts, run->U));
+  } else PetscCall(SbStaticSolve(run));
+  run->seconds_solve = MPI_Wtime() - run->wall_start;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbRunDestroy(SbRun *run)
+{
+  SbRun r = *run;
+
+  PetscFunctionBeginUser;
+  if (!r) PetscFunctionReturn(PETSC_SUCCESS);
+  if (r->output_destroy) PetscCall(r->output_destroy(r));
+  for (PetscInt k = 0; k < r->nmonitor; k++) {
+    if (r->monitor[k].destroy) PetscCall(r->monitor[k].destroy(r->monitor[k].ctx));
+  }
+  if (!r->ts) PetscCall(SNESDestroy(&r->snes));
+  PetscCall(TSDestroy(&r->ts));
+  PetscCall(MatDestroy(&r->J));
+  PetscCall(VecDestroy(&r->U));
+  PetscCall(VecDestroy(&r->V));
+  PetscCall(VecDestroy(&r->A));
+  PetscCall(VecDestroy(&r->loads));
+  PetscCall(VecDestroy(&r->reaction));
+  PetscCall(VecDestroy(&r->previous));
+  PetscCall(PetscFree(*run));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

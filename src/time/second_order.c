@@ -1,0 +1,370 @@
+/*
+  The TSType of the second-order integrators, with n unknowns, one residual and one tangent per linear solve.
+
+  The unknown of a step is the end displacement u1; with s = u1 - u0
+    generalized-alpha (Chung and Hulbert 1993; fractions of the new state as in PETSc's TSALPHA2)
+      a1 = (s - h v0 - h^2 (1/2 - beta) a0) / (beta h^2),  v1 = v0 + h ((1 - gamma) a0 + gamma a1)
+      F(t0 + alpha_f h, u0 + alpha_f s, v0 + alpha_f (v1 - v0), a0 + alpha_m (a1 - a0)) = 0
+    Newmark: alpha_m = alpha_f = 1
+    implicit Euler: v1 = s / h, a1 = (v1 - v0) / h (it is not a Newmark method)
+  and, with a0 = M^-1 (f(t0, u0, v0)),
+    explicit Euler: u1 = u0 + h v0, v1 = v0 + h a0;  symplectic Euler: v1 = v0 + h a0, u1 = u0 + h v1.
+
+  The acceleration is state (run->A): nothing is recovered from differences, so a restart continues exactly.
+  A step whose solve fails is halved and repeated; later steps double until the nominal length is back. The local error for TSAdapt
+  is h^2 (beta - 1/6) (a1 - a0) (Zienkiewicz and Xie 1991), for implicit Euler h^2/2 a1.
+
+  petsc/private/tsimpl.h: PETSc has no public way to write a TSType.
+*/
+#include <petsc/private/tsimpl.h>
+#include "time_impl.h"
+
+typedef struct {
+  SbRun            run;
+  SbMethodSettings set;
+  Vec              X0, V0, X1, V1, A1; /* state at the start of the step; end of the step */
+  Vec              Xa, Va, Aa;         /* stage of generalized-alpha; NULL when the stage is the end */
+  Vec              work;
+  PetscReal        nominal;            /* step length asked for, s; 0 before the first step */
+  PetscBool        started;            /* run->A holds the acceleration of the current state */
+} SecondOrder;
+
+static PetscBool is_explicit(const SecondOrder *so)
+{
+  return (PetscBool)(so->set.method == SB_METHOD_EULER_EXPLICIT || so->set.method == SB_METHOD_EULER_SYMPLECTIC);
+}
+
+/* v1 and a1 that belong to the end displacement X. */
+static PetscErrorCode end_state(TS ts, Vec X)
+{
+  SecondOrder    *so = (SecondOrder *)ts->data;
+  const PetscReal h = ts->time_step, beta = so->set.beta, gamma = so->set.gamma;
+
+  PetscFunctionBeginUser;
+  if (so->set.method == SB_METHOD_EULER_IMPLICIT) {
+    PetscCall(VecWAXPY(so->V1, -1., so->X0, X));
+    PetscCall(VecScale(so->V1, 1. / h));
+    PetscCall(VecWAXPY(so->A1, -1., so->V0, so->V1));
+    PetscCall(VecScale(so->A1, 1. / h));
+  } else {
+    PetscCall(VecWAXPY(so->A1, -1., so->X0, X));
+    PetscCall(VecAXPBYPCZ(so->A1, -1. / (beta * h), 1. - 0.5 / beta, 1. / (beta * h * h), so->V0, so->run->A));
+    PetscCall(VecCopy(so->V0, so->V1));
+    PetscCall(VecAXPBYPCZ(so->V1, h * (1. - gamma), h * gamma, 1., so->run->A, so->A1));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Lends the three vectors at which the equation is asked for. */
+static PetscErrorCode stage_state(TS ts, Vec X, PetscReal *t, Vec *U, Vec *V, Vec *A)
+{
+  SecondOrder *so = (SecondOrder *)ts->data;
+
+  PetscFunctionBeginUser;
+  PetscCall(end_state(ts, X));
+  *t = ts->ptime + so->set.alpha_f * ts->time_step;
+  *U = X;
+  *V = so->V1;
+  *A = so->A1;
+  if (so->Xa) {
+    PetscCall(VecWAXPY(so->Xa, -1., so->X0, X));
+    PetscCall(VecAYPX(so->Xa, so->set.alpha_f, so->X0));
+    PetscCall(VecWAXPY(so->Va, -1., so->V0, so->V1));
+    PetscCall(VecAYPX(so->Va, so->set.alpha_f, so->V0));
+    PetscCall(VecWAXPY(so->Aa, -1., so->run->A, so->A1));
+    PetscCall(VecAYPX(so->Aa, so->set.alpha_m, so->run->A));
+    *U = so->Xa;
+    *V = so->Va;
+    *A = so->Aa;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Divided by alpha_f, so that the stiffness enters the tangent with factor one. */
+static PetscErrorCode SNESTSFormFunction_SecondOrder(SNES snes, Vec X, Vec F, TS ts)
+{
+  SecondOrder *so = (SecondOrder *)ts->data;
+  PetscReal    t = 0.;
+  Vec          U = NULL, V = NULL, A = NULL;
+
+  PetscFunctionBeginUser;
+  (void)snes;
+  PetscCall(stage_state(ts, X, &t, &U, &V, &A));
+  PetscCall(TSComputeI2Function(ts, t, U, V, A, F));
+  if (so->set.alpha_f != 1.) PetscCall(VecScale(F, 1. / so->set.alpha_f));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode SNESTSFormJacobian_SecondOrder(SNES snes, Vec X, Mat J, Mat P, TS ts)
+{
+  SecondOrder    *so = (SecondOrder *)ts->data;
+  const PetscReal h  = ts->time_step;
+  PetscReal       t = 0., shift_v = 1. / h, shift_a = 1. / (h * h);
+  Vec             U = NULL, V = NULL, A = NULL;
+
+  PetscFunctionBeginUser;
+  (void)snes;
+  PetscCall(stage_state(ts, X, &t, &U, &V, &A));
+  if (so->set.method == SB_METHOD_GENERALIZED_ALPHA) {
+    shift_v = so->set.gamma / (so->set.beta * h);
+    shift_a = so->set.alpha_m / (so->set.alpha_f * so->set.beta * h * h);
+  }
+  PetscCall(TSComputeI2Jacobian(ts, t, U, V, A, shift_v, shift_a, J, P));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Sets X1 to the initial guess, with prescribed values of the end time in place. */
+static PetscErrorCode predict(TS ts)
+{
+  SecondOrder *so = (SecondOrder *)ts->data;
+  PetscBool    single, warm;
+  KSP          ksp;
+
+  PetscFunctionBeginUser;
+  PetscCall(VecCopy(so->X0, so->X1));
+  if (so->set.velocity_predictor) PetscCall(VecAXPY(so->X1, ts->time_step, so->V0));
+  PetscCall(SbModelPrescribe(so->run->model, ts->ptime + ts->time_step, so->X1));
+  /* one linear solve per step, warm-started: the update (X <- X - Y) begins as that of free flight */
+  PetscCall(PetscObjectTypeCompare((PetscObject)ts->snes, SNESKSPONLY, &single));
+  PetscCall(SNESGetKSP(ts->snes, &ksp));
+  PetscCall(KSPGetInitialGuessNonzero(ksp, &warm));
+  if (single && warm) {
+    Vec Y;
+
+    PetscCall(SNESGetSolutionUpdate(ts->snes, &Y));
+    if (Y && so->set.velocity_predictor) PetscCall(VecZeroEntries(Y));
+    else if (Y) {
+      PetscCall(VecCopy(so->V0, Y));
+      PetscCall(VecScale(Y, -ts->time_step));
+    }
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode solve_implicit(TS ts, PetscBool *ok)
+{
+  SecondOrder        *so = (SecondOrder *)ts->data;
+  SNESConvergedReason reason;
+  PetscInt            newton, linear;
+  PetscReal           size;
+
+  PetscFunctionBeginUser;
+  PetscCall(predict(ts));
+  PetscCall(TSPreStage(ts, ts->ptime + so->set.alpha_f * ts->time_step));
+  PetscCall(SNESSolve(ts->snes, NULL, so->X1));
+  PetscCall(SNESGetConvergedReason(ts->snes, &reason));
+  PetscCall(SNESGetIterationNumber(ts->snes, &newton));
+  PetscCall(SNESGetLinearSolveIterations(ts->snes, &linear));
+  ts->snes_its += newton;
+  ts->ksp_its += linear;
+  PetscCall(end_state(ts, so->X1));
+  PetscCall(VecNorm(so->V1, NORM_INFINITY, &size));
+  *ok = (PetscBool)(reason > 0 && !PetscIsInfOrNanReal(size));
+  if (!*ok) {
+    KSP                ksp;
+    KSPConvergedReason kreason;
+
+    PetscCall(SNESGetKSP(ts->snes, &ksp));
+    PetscCall(KSPGetConvergedReason(ksp, &kreason));
+    PetscCall(SbRunFail(so->run, "step %" PetscInt_FMT " at t = %g s with a length of %g s: %s (linear solver: %s)", ts->steps + 1, (double)ts->ptime, (double)ts->time_step,
+                        reason > 0 ? "the solution is not finite" : SNESConvergedReasons[reason], KSPConvergedReasons[kreason]));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode solve_explicit(TS ts, PetscBool *ok)
+{
+  SecondOrder    *so = (SecondOrder *)ts->data;
+  const PetscReal h  = ts->time_step;
+  PetscReal       size;
+
+  PetscFunctionBeginUser;
+  PetscCall(VecWAXPY(so->V1, h, so->run->A, so->V0));
+  PetscCall(VecWAXPY(so->X1, h, so->set.method == SB_METHOD_EULER_EXPLICIT ? so->V0 : so->V1, so->X0));
+  PetscCall(SbModelPrescribe(so->run->model, ts->ptime + h, so->X1));
+  PetscCall(SbFormAcceleration(so->run, ts->ptime + h, so->X1, so->V1, so->A1));
+  PetscCall(VecNorm(so->A1, NORM_INFINITY, &size));
+  *ok = (PetscBool)!PetscIsInfOrNanReal(size);
+  if (!*ok) PetscCall(SbRunFail(so->run, "step %" PetscInt_FMT " at t = %g s: the explicit solution is not finite; its step of %g s is beyond the stable one (see the header)", ts->steps + 1,
+                                (double)ts->ptime, (double)h));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Length that the next step should have: back towards the nominal one after a cut. */
+static PetscErrorCode wanted_step(TS ts, PetscReal *h)
+{
+  SecondOrder *so = (SecondOrder *)ts->data;
+  PetscBool    fixed;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscObjectTypeCompare((PetscObject)ts->adapt, TSADAPTNONE, &fixed));
+  *h = fixed ? PetscMin(2. * ts->time_step, so->nominal) : ts->time_step;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode TSStep_SecondOrder(TS ts)
+{
+  SecondOrder *so   = (SecondOrder *)ts->data;
+  PetscInt     cuts = 0;
+
+  PetscFunctionBeginUser;
+  if (so->nominal == 0.) so->nominal = ts->time_step;
+  if (!so->started && so->set.method != SB_METHOD_EULER_IMPLICIT) PetscCall(SbFormAcceleration(so->run, ts->ptime, ts->vec_sol, ts->vec_dot, so->run->A));
+  so->started = PETSC_TRUE;
+  PetscCall(VecCopy(ts->vec_sol, so->X0));
+  PetscCall(VecCopy(ts->vec_dot, so->V0));
+  for (;;) {
+    PetscBool ok = PETSC_FALSE, accept = PETSC_FALSE;
+    PetscReal next, h = 0.;
+
+    PetscCall(SbRunStepBegin(so->run, ts->ptime, ts->time_step));
+    if (is_explicit(so)) PetscCall(solve_explicit(ts, &ok));
+    else PetscCall(solve_implicit(ts, &ok));
+    if (ok) {
+      PetscCall(VecCopy(so->X1, ts->vec_sol));
+      PetscCall(VecCopy(so->V1, ts->vec_dot));
+      PetscCall(wanted_step(ts, &h));
+      PetscCall(TSAdaptChoose(ts->adapt, ts, h, NULL, &next, &accept));
+      if (accept) {
+        PetscCall(VecCopy(so->A1, so->run->A));
+        ts->ptime += ts->time_step;
+        ts->time_step = next;
+        so->run->stop_reason[0] = 0;
+        break;
+      }
+    } else next = 0.5 * ts->time_step;
+    /* rejected: the state of the start comes back, and the step is tried with another length */
+    PetscCall(VecCopy(so->X0, ts->vec_sol));
+    PetscCall(VecCopy(so->V0, ts->vec_dot));
+    ts->reject++;
+    so->run->rejected_total++;
+    if (is_explicit(so) || ++cuts > so->set.max_cuts) {
+      ts->reason = TS_DIVERGED_STEP_REJECTED;
+      break;
+    }
+    ts->time_step = next;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode TSEvaluateWLTE_SecondOrder(TS ts, NormType type, PetscInt *order, PetscReal *wlte)
+{
+  SecondOrder    *so = (SecondOrder *)ts->data;
+  const PetscReal h  = ts->time_step;
+  PetscReal       absolute, relative;
+
+  PetscFunctionBeginUser;
+  if (so->set.method == SB_METHOD_GENERALIZED_ALPHA) {
+    PetscCall(VecWAXPY(so->work, -1., so->run->A, so->A1));
+    PetscCall(VecAYPX(so->work, h * h * (so->set.beta - 1. / 6.), so->X1));
+    *order = 2;
+  } else {
+    PetscCall(VecWAXPY(so->work, 0.5 * h * h, so->A1, so->X1));
+    *order = 1;
+  }
+  PetscCall(TSErrorWeightedNorm(ts, so->X1, so->work, type, wlte, &absolute, &relative));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Cubic through both ends; t lies in the last step. */
+static PetscErrorCode TSInterpolate_SecondOrder(TS ts, PetscReal t, Vec X)
+{
+  SecondOrder    *so = (SecondOrder *)ts->data;
+  const PetscReal h = ts->ptime - ts->ptime_prev, s = (t - ts->ptime_prev) / h;
+
+  PetscFunctionBeginUser;
+  PetscCall(VecCopy(so->X0, X));
+  PetscCall(VecScale(X, 1. - s * s * (3. - 2. * s)));
+  PetscCall(VecAXPY(X, s * s * (3. - 2. * s), ts->vec_sol));
+  PetscCall(VecAXPY(X, h * s * (1. - s) * (1. - s), so->V0));
+  PetscCall(VecAXPY(X, -h * s * s * (1. - s), ts->vec_dot));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode TSSetUp_SecondOrder(TS ts)
+{
+  SecondOrder *so = (SecondOrder *)ts->data;
+  SNES         snes;
+
+  PetscFunctionBeginUser;
+  PetscCall(VecDuplicate(ts->vec_sol, &so->X0));
+  PetscCall(VecDuplicate(ts->vec_sol, &so->V0));
+  PetscCall(VecDuplicate(ts->vec_sol, &so->X1));
+  PetscCall(VecDuplicate(ts->vec_sol, &so->V1));
+  PetscCall(VecDuplicate(ts->vec_sol, &so->A1));
+  if (so->set.alpha_f != 1. || so->set.alpha_m != 1.) {
+    PetscCall(VecDuplicate(ts->vec_sol, &so->Xa));
+    PetscCall(VecDuplicate(ts->vec_sol, &so->Va));
+    PetscCall(VecDuplicate(ts->vec_sol, &so->Aa));
+  }
+  PetscCall(TSGetAdapt(ts, &ts->adapt));
+  PetscCall(TSAdaptCandidatesClear(ts->adapt));
+  if (!is_explicit(so)) PetscCall(VecDuplicate(ts->vec_sol, &so->work));
+  PetscCall(TSGetSNES(ts, &snes));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode TSReset_SecondOrder(TS ts)
+{
+  SecondOrder *so = (SecondOrder *)ts->data;
+
+  PetscFunctionBeginUser;
+  PetscCall(VecDestroy(&so->X0));
+  PetscCall(VecDestroy(&so->V0));
+  PetscCall(VecDestroy(&so->X1));
+  PetscCall(VecDestroy(&so->V1));
+  PetscCall(VecDestroy(&so->A1));
+  PetscCall(VecDestroy(&so->Xa));
+  PetscCall(VecDestroy(&so->Va));
+  PetscCall(VecDestroy(&so->Aa));
+  PetscCall(VecDestroy(&so->work));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode TSDestroy_SecondOrder(TS ts)
+{
+  PetscFunctionBeginUser;
+  PetscCall(TSReset_SecondOrder(ts));
+  PetscCall(PetscFree(ts->data));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbSecondOrderSet(TS ts, SbRun run, const SbMethodSettings *settings)
+{
+  SecondOrder *so = (SecondOrder *)ts->data;
+
+  PetscFunctionBeginUser;
+  so->run = run;
+  so->set = *settings;
+  /* a restarted run brings its acceleration along */
+  so->started = (PetscBool)(run->step0 > 0);
+  ts->usessnes = (PetscBool)!is_explicit(so);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode TSCreate_SecondOrder(TS ts)
+{
+  SecondOrder *so;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscNew(&so));
+  ts->data                = so;
+  ts->ops->setup          = TSSetUp_SecondOrder;
+  ts->ops->reset          = TSReset_SecondOrder;
+  ts->ops->destroy        = TSDestroy_SecondOrder;
+  ts->ops->step           = TSStep_SecondOrder;
+  ts->ops->evaluatewlte   = TSEvaluateWLTE_SecondOrder;
+  ts->ops->interpolate    = TSInterpolate_SecondOrder;
+  ts->ops->snesfunction   = SNESTSFormFunction_SecondOrder;
+  ts->ops->snesjacobian   = SNESTSFormJacobian_SecondOrder;
+  ts->default_adapt_type  = TSADAPTNONE;
+  ts->usessnes            = PETSC_TRUE;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbSecondOrderRegister(void)
+{
+  PetscFunctionBeginUser;
+  PetscCall(TSRegister(SB_TS_SECOND_ORDER, TSCreate_SecondOrder));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

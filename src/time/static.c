@@ -1,0 +1,72 @@
+/*
+  The load path of a static run: f_int(u) = lambda f_ext, u = lambda u_prescribed on supports, lambda from 0 to 1 in
+  -static_steps equal steps. There is no mass, no damping and no TS. A step whose solve fails is halved and tried again from the
+  last equilibrium; two steps that succeed double it again.
+*/
+#include "time_impl.h"
+
+/* Newton from the last equilibrium with the prescribed values of the new load factor. */
+static PetscErrorCode solve_at(SbRun run, PetscReal factor, Vec X, PetscBool *ok)
+{
+  SNESConvergedReason reason;
+  KSPConvergedReason  kreason;
+  KSP                 ksp;
+  PetscInt            newton, linear;
+
+  PetscFunctionBeginUser;
+  run->model->load = factor;
+  PetscCall(VecCopy(run->U, X));
+  PetscCall(SbModelPrescribe(run->model, factor, X));
+  PetscCall(SNESSolve(run->snes, NULL, X));
+  PetscCall(SNESGetConvergedReason(run->snes, &reason));
+  PetscCall(SNESGetIterationNumber(run->snes, &newton));
+  PetscCall(SNESGetLinearSolveIterations(run->snes, &linear));
+  run->newton_step += newton;
+  run->linear_step += linear;
+  *ok = (PetscBool)(reason > 0);
+  if (!*ok) {
+    PetscCall(SNESGetKSP(run->snes, &ksp));
+    PetscCall(KSPGetConvergedReason(ksp, &kreason));
+    PetscCall(SbRunFail(run, "load factor %g: %s (linear solver: %s); use more -static_steps, or hold the body so that it cannot move freely", (double)factor,
+                        SNESConvergedReasons[reason], KSPConvergedReasons[kreason]));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbStaticSolve(SbRun run)
+{
+  const PetscReal nominal = 1. / (PetscReal)run->static_steps;
+  PetscReal       factor = run->t0, length = nominal;
+  PetscInt        step = run->step0, cuts = 0;
+  Vec             X;
+
+  PetscFunctionBeginUser;
+  PetscCall(VecDuplicate(run->U, &X));
+  run->model->load = factor;
+  PetscCall(SbRunStepAccepted(run, step, factor, 0., PETSC_FALSE));
+  run->newton_step = run->linear_step = run->rejected_step = 0;
+  while (factor < 1.) {
+    const PetscReal next = factor + length > 1. - 1e-9 ? 1. : factor + length;
+    PetscBool       ok   = PETSC_FALSE;
+
+    PetscCall(SbRunStepBegin(run, factor, next - factor));
+    PetscCall(solve_at(run, next, X, &ok));
+    if (!ok) {
+      run->rejected_step++;
+      run->rejected_total++;
+      length *= 0.5;
+      run->tangent_known = PETSC_FALSE;
+      if (++cuts > run->max_cuts) break;
+      continue;
+    }
+    run->stop_reason[0] = 0;
+    PetscCall(VecCopy(X, run->U));
+    PetscCall(SbRunStepAccepted(run, ++step, next, next - factor, (PetscBool)(next >= 1.)));
+    run->newton_step = run->linear_step = run->rejected_step = 0;
+    factor = next;
+    cuts   = 0;
+    length = PetscMin(2. * length, nominal);
+  }
+  PetscCall(VecDestroy(&X));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

@@ -1,0 +1,35 @@
+/*
+  time_impl.h - what the files of src/time share.
+*/
+#pragma once
+#include "sbtime.h"
+
+#define SB_TS_SECOND_ORDER "sb_second_order"
+
+/* The one-step methods of second_order.c. */
+typedef enum { SB_METHOD_EULER_IMPLICIT, SB_METHOD_GENERALIZED_ALPHA, SB_METHOD_EULER_EXPLICIT, SB_METHOD_EULER_SYMPLECTIC } SbMethod;
+typedef struct {
+  SbMethod  method;
+  PetscReal alpha_m, alpha_f, beta, gamma; /* generalized-alpha; fraction of the new state, as in TSALPHA2 */
+  PetscBool velocity_predictor;            /* Newton starts from u + h v instead of u */
+  PetscInt  max_cuts;                      /* how often a step is halved before the run stops */
+} SbMethodSettings;
+
+PetscErrorCode SbSecondOrderRegister(void);
+/* The run gives prescribed displacements, initial acceleration and the lumped mass; it is borrowed. */
+PetscErrorCode SbSecondOrderSet(TS ts, SbRun run, const SbMethodSettings *settings);
+
+/* hooks.c: what happens around a step. */
+PetscErrorCode SbRunStepBegin(SbRun run, PetscReal t, PetscReal dt);                            /* before an attempt */
+PetscErrorCode SbRunStepAccepted(SbRun run, PetscInt step, PetscReal t, PetscReal dt, PetscBool last); /* after it was accepted; also once at the start */
+PetscErrorCode SbRunFail(SbRun run, const char *format, ...) __attribute__((format(printf, 2, 3)));
+
+/* form.c: the model as PETSc sees it. */
+PetscErrorCode SbFormI2Function(TS ts, PetscReal t, Vec U, Vec V, Vec A, Vec F, void *run);
+PetscErrorCode SbFormI2Jacobian(TS ts, PetscReal t, Vec U, Vec V, Vec A, PetscReal shift_v, PetscReal shift_a, Mat J, Mat P, void *run);
+PetscErrorCode SbFormStaticFunction(SNES snes, Vec U, Vec F, void *run);
+PetscErrorCode SbFormStaticJacobian(SNES snes, Vec U, Mat J, Mat P, void *run);
+/* A = M^-1 (f_ext - C V - f_int), zero on prescribed unknowns. */
+PetscErrorCode SbFormAcceleration(SbRun run, PetscReal t, Vec U, Vec V, Vec A);
+
+PetscErrorCode SbStaticSolve(SbRun run); /* static.c: the load path */
