@@ -88,6 +88,8 @@ PetscErrorCode SbOptionsUnused(MPI_Comm comm, PetscInt *n);
 PetscErrorCode SbOptionsView(PetscViewer ascii);
 PetscErrorCode SbOptionsHelp(MPI_Comm comm);                        /* the manual for -help, from the table */
 PetscErrorCode SbOptionsMarkdown(MPI_Comm comm, const char *file);  /* docs/options.md, from the table */
+/* ASCII viewer on a file, or on standard output when file is "" or "-"; that it cannot be written is an error on every rank. Collective. */
+PetscErrorCode SbViewerOpen(MPI_Comm comm, const char *file, PetscViewer *viewer);
 PetscErrorCode SbOptionsReset(void);                                /* forgets what was read and registered; at exit and in tests */
 
 /* SbNearest - the names of `n` candidates closest to `word` by edit distance, joined by " or "; "" when none is near. */

@@ -16,14 +16,15 @@
 #define GRACE 3.0 /* s that a failed rank waits for the others */
 
 static struct {
-  MPI_Comm  comm;          /* ours alone, so that nothing else can be pending on it */
-  PetscBool pending;       /* a user error is on its way up */
-  PetscBool trace;         /* -error_trace */
-  char      message[2048]; /* of the last user error */
+  MPI_Comm comm;      /* ours alone, so that nothing else can be pending on it */
+  PetscBool pending;  /* a user error is on its way up */
+  PetscBool trace;    /* -error_trace */
+  char message[2048]; /* of the last user error */
 } state = {.comm = MPI_COMM_NULL};
 
 static const SbOption rows[] = {
-  {"error_trace", SB_OPTION_BOOL, 1, "", "false", "", "print the stack of calls with every error, also with errors of the input"},
+  {"error_trace", SB_OPTION_BOOL, 1, "", "false", "",
+   "print the stack of calls with every error, also with errors of the input"},
 };
 
 static PetscBool is_user_error(PetscErrorCode n, const char *function)
@@ -34,15 +35,18 @@ static PetscBool is_user_error(PetscErrorCode n, const char *function)
   case PETSC_ERR_FILE_OPEN:
   case PETSC_ERR_FILE_READ:
   case PETSC_ERR_FILE_WRITE:
-  case PETSC_ERR_FILE_UNEXPECTED: return PETSC_TRUE;
-  default: break;
+  case PETSC_ERR_FILE_UNEXPECTED:
+    return PETSC_TRUE;
+  default:
+    break;
   }
   /* PETSc reads option files itself, under other codes */
-  return (PetscBool)(function && (!strncmp(function, "PetscOptionsInsert", 18) || !strcmp(function, "PetscParseLayerYAML")));
+  return (PetscBool)(function && (!strncmp(function, "PetscOptionsInsert", 18) ||
+                                  !strcmp(function, "PetscParseLayerYAML")));
 }
 
-static PetscErrorCode handler(MPI_Comm comm, int line, const char *function, const char *file, PetscErrorCode n, PetscErrorType p,
-                              const char *mess, void *ctx)
+static PetscErrorCode handler(MPI_Comm comm, int line, const char *function, const char *file,
+                              PetscErrorCode n, PetscErrorType p, const char *mess, void *ctx)
 {
   (void)comm;
   (void)ctx;
@@ -84,15 +88,15 @@ static void print_error(void)
 int SbErrorFinish(PetscErrorCode ierr)
 {
   enum { SPEAKER, FAILED };
-  int         mine[2], all[2], done = 0;
+  int mine[2], all[2], done = 0;
   PetscMPIInt rank, size;
   MPI_Request request;
-  double      end;
+  double end;
 
   (void)MPI_Comm_rank(state.comm, &rank);
   (void)MPI_Comm_size(state.comm, &size);
   mine[SPEAKER] = ierr && state.pending ? -rank : -size;
-  mine[FAILED]  = ierr ? 1 : 0;
+  mine[FAILED] = ierr ? 1 : 0;
   (void)MPI_Iallreduce(mine, all, 2, MPI_INT, MPI_MAX, state.comm, &request);
   end = MPI_Wtime() + GRACE + 0.1 * PetscMin(rank, 20);
   while (!done && (!ierr || MPI_Wtime() < end)) {
@@ -112,7 +116,7 @@ int SbErrorFinish(PetscErrorCode ierr)
 PetscErrorCode SbWarning(MPI_Comm comm, const char *format, ...)
 {
   PetscMPIInt rank;
-  va_list     args;
+  va_list args;
 
   PetscFunctionBeginUser;
   PetscCallMPI(MPI_Comm_rank(comm, &rank));

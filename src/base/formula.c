@@ -32,17 +32,17 @@ static PetscReal ramp_of(PetscReal a)
 
 static const struct {
   const char *name;
-  int         narg;
+  int narg;
   PetscReal (*f1)(PetscReal);
   PetscReal (*f2)(PetscReal, PetscReal);
   PetscReal (*f3)(PetscReal, PetscReal, PetscReal);
 } functions[] = {
-  {"sin", 1, sin, NULL, NULL},      {"cos", 1, cos, NULL, NULL},       {"tan", 1, tan, NULL, NULL},
-  {"asin", 1, asin, NULL, NULL},    {"acos", 1, acos, NULL, NULL},     {"atan", 1, atan, NULL, NULL},
-  {"atan2", 2, NULL, atan2, NULL},  {"exp", 1, exp, NULL, NULL},       {"log", 1, log, NULL, NULL},
-  {"sqrt", 1, sqrt, NULL, NULL},    {"abs", 1, fabs, NULL, NULL},      {"min", 2, NULL, fmin, NULL},
-  {"max", 2, NULL, fmax, NULL},     {"floor", 1, floor, NULL, NULL},   {"tanh", 1, tanh, NULL, NULL},
-  {"step", 1, step_of, NULL, NULL}, {"ramp", 1, ramp_of, NULL, NULL},  {"clamp", 3, NULL, NULL, clamp_of},
+  {"sin", 1, sin, NULL, NULL},      {"cos", 1, cos, NULL, NULL},      {"tan", 1, tan, NULL, NULL},
+  {"asin", 1, asin, NULL, NULL},    {"acos", 1, acos, NULL, NULL},    {"atan", 1, atan, NULL, NULL},
+  {"atan2", 2, NULL, atan2, NULL},  {"exp", 1, exp, NULL, NULL},      {"log", 1, log, NULL, NULL},
+  {"sqrt", 1, sqrt, NULL, NULL},    {"abs", 1, fabs, NULL, NULL},     {"min", 2, NULL, fmin, NULL},
+  {"max", 2, NULL, fmax, NULL},     {"floor", 1, floor, NULL, NULL},  {"tanh", 1, tanh, NULL, NULL},
+  {"step", 1, step_of, NULL, NULL}, {"ramp", 1, ramp_of, NULL, NULL}, {"clamp", 3, NULL, NULL, clamp_of},
 };
 static const char *const variables[] = {"t", "x", "y", "z"};
 
@@ -52,8 +52,8 @@ typedef struct {
   const char *text;  /* the whole formula */
   const char *next;  /* first character not read yet */
   const char *where; /* option, for messages */
-  SbFormula   formula;
-  int         nesting, depth; /* of the recursion; of the stack at this point of the program */
+  SbFormula formula;
+  int nesting, depth; /* of the recursion; of the stack at this point of the program */
 } Parser;
 
 static PetscErrorCode expression(Parser *p);
@@ -67,7 +67,8 @@ static void skip_blanks(Parser *p)
 static PetscErrorCode complain(const Parser *p, const char *at, const char *what)
 {
   PetscFunctionBeginUser;
-  SETERRQ(PETSC_COMM_SELF, PETSC_ERR_USER, "%s: column %d of '%s': %s", p->where, (int)(at - p->text) + 1, p->text, what);
+  SETERRQ(PETSC_COMM_SELF, PETSC_ERR_USER, "%s: column %d of '%s': %s", p->where, (int)(at - p->text) + 1,
+          p->text, what);
 }
 
 static PetscErrorCode emit(Parser *p, SbFormulaOp op, int index, PetscReal number, int change)
@@ -75,8 +76,8 @@ static PetscErrorCode emit(Parser *p, SbFormulaOp op, int index, PetscReal numbe
   SbFormulaStep *s = &p->formula->step[p->formula->nstep++];
 
   PetscFunctionBeginUser;
-  s->op     = op;
-  s->index  = index;
+  s->op = op;
+  s->index = index;
   s->number = number;
   p->depth += change;
   if (p->depth > SB_FORMULA_STACK) PetscCall(complain(p, p->next, "the formula is nested too deeply"));
@@ -98,17 +99,20 @@ static PetscErrorCode expect(Parser *p, char c)
 static PetscErrorCode unknown_name(const Parser *p, const char *at, const char *name)
 {
   const char *known[PETSC_STATIC_ARRAY_LENGTH(functions) + 5];
-  char        near[128], what[256];
-  PetscInt    n = 0;
+  char near[128], what[256];
+  PetscInt n = 0;
 
   PetscFunctionBeginUser;
   for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(functions); i++) known[n++] = functions[i].name;
   for (int i = 0; i < 4; i++) known[n++] = variables[i];
   known[n++] = "pi";
-  if (strlen(name) > 1) PetscCall(SbNearest(name, n, known, sizeof(near), near));
-  else near[0] = 0;
-  PetscCall(PetscSNPrintf(what, sizeof(what), "unknown name '%s'; %s%s%s", name, near[0] ? "did you mean " : "", near,
-                          near[0] ? "?" : "a formula knows t (s), x, y, z (m), pi and functions such as sin, sqrt, ramp"));
+  if (strlen(name) > 1)
+    PetscCall(SbNearest(name, n, known, sizeof(near), near));
+  else
+    near[0] = 0;
+  PetscCall(PetscSNPrintf(
+    what, sizeof(what), "unknown name '%s'; %s%s%s", name, near[0] ? "did you mean " : "", near,
+    near[0] ? "?" : "a formula knows t (s), x, y, z (m), pi and functions such as sin, sqrt, ramp"));
   PetscCall(complain(p, at, what));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -130,8 +134,8 @@ static PetscErrorCode call(Parser *p, int f)
 static PetscErrorCode word(Parser *p)
 {
   const char *begin = p->next;
-  char        name[32];
-  size_t      n = 0;
+  char name[32];
+  size_t n = 0;
 
   PetscFunctionBeginUser;
   for (; isalnum((unsigned char)*p->next) || *p->next == '_'; p->next++)
@@ -139,8 +143,10 @@ static PetscErrorCode word(Parser *p)
   name[n] = 0;
   for (int i = 0; i < 4; i++) {
     if (strcmp(name, variables[i])) continue;
-    if (i) p->formula->uses_place = PETSC_TRUE;
-    else p->formula->uses_time = PETSC_TRUE;
+    if (i)
+      p->formula->uses_place = PETSC_TRUE;
+    else
+      p->formula->uses_time = PETSC_TRUE;
     PetscCall(emit(p, SB_OP_VARIABLE, i, 0, 1));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
@@ -165,7 +171,7 @@ static PetscErrorCode primary(Parser *p)
   skip_blanks(p);
   c = (unsigned char)*p->next;
   if (isdigit(c) || (c == '.' && isdigit((unsigned char)p->next[1]))) {
-    char           *end;
+    char *end;
     const PetscReal number = strtod(p->next, &end);
 
     p->next = end;
@@ -185,7 +191,8 @@ static PetscErrorCode primary(Parser *p)
 static PetscErrorCode unary(Parser *p)
 {
   PetscFunctionBeginUser;
-  if (++p->nesting > 4 * SB_FORMULA_STACK) PetscCall(complain(p, p->next, "the formula is nested too deeply"));
+  if (++p->nesting > 4 * SB_FORMULA_STACK)
+    PetscCall(complain(p, p->next, "the formula is nested too deeply"));
   skip_blanks(p);
   if (*p->next == '-' || *p->next == '+') {
     const PetscBool minus = (PetscBool)(*p->next++ == '-');
@@ -236,29 +243,53 @@ static PetscErrorCode expression(Parser *p)
 PetscReal SbFormulaEval(SbFormula f, PetscReal t, const PetscReal x[3])
 {
   PetscReal stack[SB_FORMULA_STACK + 1];
-  int       n = 0; /* values on the stack */
+  int n = 0; /* values on the stack */
 
   if (!f->step) return SbFormulaEvalTable(f, t);
   for (PetscInt i = 0; i < f->nstep; i++) {
     const SbFormulaStep *s = &f->step[i];
-    PetscReal           *a;
+    PetscReal *a;
 
     /* Operands are the top of the stack, the first one deepest; the result takes the place of the first. */
     switch (s->op) {
-    case SB_OP_NUMBER: stack[n++] = s->number; break;
-    case SB_OP_VARIABLE: stack[n++] = s->index ? x[s->index - 1] : t; break;
-    case SB_OP_ADD: n--; stack[n - 1] += stack[n]; break;
-    case SB_OP_SUB: n--; stack[n - 1] -= stack[n]; break;
-    case SB_OP_MUL: n--; stack[n - 1] *= stack[n]; break;
-    case SB_OP_DIV: n--; stack[n - 1] /= stack[n]; break;
-    case SB_OP_POW: n--; stack[n - 1] = pow(stack[n - 1], stack[n]); break;
-    case SB_OP_NEG: stack[n - 1] = -stack[n - 1]; break;
+    case SB_OP_NUMBER:
+      stack[n++] = s->number;
+      break;
+    case SB_OP_VARIABLE:
+      stack[n++] = s->index ? x[s->index - 1] : t;
+      break;
+    case SB_OP_ADD:
+      n--;
+      stack[n - 1] += stack[n];
+      break;
+    case SB_OP_SUB:
+      n--;
+      stack[n - 1] -= stack[n];
+      break;
+    case SB_OP_MUL:
+      n--;
+      stack[n - 1] *= stack[n];
+      break;
+    case SB_OP_DIV:
+      n--;
+      stack[n - 1] /= stack[n];
+      break;
+    case SB_OP_POW:
+      n--;
+      stack[n - 1] = pow(stack[n - 1], stack[n]);
+      break;
+    case SB_OP_NEG:
+      stack[n - 1] = -stack[n - 1];
+      break;
     case SB_OP_CALL:
       n -= functions[s->index].narg - 1;
       a = &stack[n - 1];
-      if (functions[s->index].f1) a[0] = functions[s->index].f1(a[0]);
-      else if (functions[s->index].f2) a[0] = functions[s->index].f2(a[0], a[1]);
-      else a[0] = functions[s->index].f3(a[0], a[1], a[2]);
+      if (functions[s->index].f1)
+        a[0] = functions[s->index].f1(a[0]);
+      else if (functions[s->index].f2)
+        a[0] = functions[s->index].f2(a[0], a[1]);
+      else
+        a[0] = functions[s->index].f3(a[0], a[1], a[2]);
       break;
     }
   }
@@ -268,7 +299,7 @@ PetscReal SbFormulaEval(SbFormula f, PetscReal t, const PetscReal x[3])
 PetscErrorCode SbFormulaUses(SbFormula formula, PetscBool *time, PetscBool *place)
 {
   PetscFunctionBeginUser;
-  *time  = formula->uses_time;
+  *time = formula->uses_time;
   *place = formula->uses_place;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -287,7 +318,7 @@ PetscErrorCode SbFormulaDestroy(SbFormula *formula)
 PetscErrorCode SbFormulaCreate(MPI_Comm comm, const char *text, const char *where, SbFormula *formula)
 {
   SbFormula f;
-  Parser    p = {.text = text, .next = text, .where = where};
+  Parser p = {.text = text, .next = text, .where = where};
 
   PetscFunctionBeginUser;
   PetscCall(PetscNew(&f));

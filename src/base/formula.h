@@ -6,21 +6,31 @@
 
 #define SB_FORMULA_STACK 64 /* deepest stack of a formula */
 
-typedef enum { SB_OP_NUMBER, SB_OP_VARIABLE, SB_OP_ADD, SB_OP_SUB, SB_OP_MUL, SB_OP_DIV, SB_OP_POW, SB_OP_NEG, SB_OP_CALL } SbFormulaOp;
+typedef enum {
+  SB_OP_NUMBER,
+  SB_OP_VARIABLE,
+  SB_OP_ADD,
+  SB_OP_SUB,
+  SB_OP_MUL,
+  SB_OP_DIV,
+  SB_OP_POW,
+  SB_OP_NEG,
+  SB_OP_CALL
+} SbFormulaOp;
 
 typedef struct {
   SbFormulaOp op;
-  int         index; /* SB_OP_VARIABLE: 0..3 for t, x, y, z; SB_OP_CALL: row of the table of functions */
-  PetscReal   number;
+  int index; /* SB_OP_VARIABLE: 0..3 for t, x, y, z; SB_OP_CALL: row of the table of functions */
+  PetscReal number;
 } SbFormulaStep;
 
 struct _p_SbFormula {
-  PetscInt       nstep;
+  PetscInt nstep;
   SbFormulaStep *step; /* [nstep] postfix; NULL for a table */
-  PetscBool      uses_time, uses_place;
-  PetscInt       nrow;
-  PetscReal     *time;  /* [nrow] s, ascending */
-  PetscReal     *value; /* [nrow] */
+  PetscBool uses_time, uses_place;
+  PetscInt nrow;
+  PetscReal *time;  /* [nrow] s, ascending */
+  PetscReal *value; /* [nrow] */
 };
 
 /* Reads a two-column file on rank 0 and gives it to all. Collective. Errors name option, file and line. */

@@ -29,12 +29,12 @@ static int read_line(char *line, PetscReal row[2])
 /* Reads the whole file; `message` stays empty when all is well. Rank 0 only. */
 static PetscErrorCode read_rows(const char *file, PetscInt *n, PetscReal **rows, size_t size, char message[])
 {
-  FILE    *f = fopen(file, "r");
-  char     line[512];
+  FILE *f = fopen(file, "r");
+  char line[512];
   PetscInt room = 0;
 
   PetscFunctionBeginUser;
-  *n    = 0;
+  *n = 0;
   *rows = NULL;
   if (!f) {
     PetscCall(PetscSNPrintf(message, size, "cannot open %s: %s", file, strerror(errno)));
@@ -45,16 +45,17 @@ static PetscErrorCode read_rows(const char *file, PetscInt *n, PetscReal **rows,
     const int found = read_line(line, row);
 
     if (found < 0)
-      PetscCall(PetscSNPrintf(message, size, "%s, line %d: expected two numbers, time (s) and value", file, number));
+      PetscCall(
+        PetscSNPrintf(message, size, "%s, line %d: expected two numbers, time (s) and value", file, number));
     if (found <= 0) continue;
     if (*n && row[0] <= (*rows)[2 * (*n - 1)])
-      PetscCall(PetscSNPrintf(message, size, "%s, line %d: time %g s does not come after %g s; times must ascend", file,
-                              number, (double)row[0], (double)(*rows)[2 * (*n - 1)]));
+      (void)snprintf(message, size, "%s, line %d: time %g s does not come after %g s; times must ascend",
+                     file, number, (double)row[0], (double)(*rows)[2 * (*n - 1)]);
     if (*n == room) {
       room = 2 * room + 16;
       PetscCall(PetscRealloc((size_t)(2 * room) * sizeof(PetscReal), rows));
     }
-    (*rows)[2 * *n]     = row[0];
+    (*rows)[2 * *n] = row[0];
     (*rows)[2 * *n + 1] = row[1];
     (*n)++;
   }
@@ -67,9 +68,9 @@ static PetscErrorCode read_rows(const char *file, PetscInt *n, PetscReal **rows,
 PetscErrorCode SbFormulaReadTable(MPI_Comm comm, const char *file, const char *where, SbFormula formula)
 {
   PetscMPIInt rank;
-  PetscInt    n    = 0;
-  PetscReal  *rows = NULL;
-  char        message[512] = "";
+  PetscInt n = 0;
+  PetscReal *rows = NULL;
+  char message[512] = "";
 
   PetscFunctionBeginUser;
   PetscCallMPI(MPI_Comm_rank(comm, &rank));
@@ -84,7 +85,7 @@ PetscErrorCode SbFormulaReadTable(MPI_Comm comm, const char *file, const char *w
   PetscCall(PetscMalloc1(n, &formula->time));
   PetscCall(PetscMalloc1(n, &formula->value));
   for (PetscInt i = 0; i < n; i++) {
-    formula->time[i]  = rows[2 * i];
+    formula->time[i] = rows[2 * i];
     formula->value[i] = rows[2 * i + 1];
   }
   PetscCall(PetscFree(rows));
@@ -93,7 +94,7 @@ PetscErrorCode SbFormulaReadTable(MPI_Comm comm, const char *file, const char *w
 
 PetscReal SbFormulaEvalTable(const struct _p_SbFormula *f, PetscReal t)
 {
-  PetscInt  lo = 0, hi = f->nrow - 1;
+  PetscInt lo = 0, hi = f->nrow - 1;
   PetscReal w;
 
   if (t <= f->time[lo]) return f->value[lo];
@@ -101,8 +102,10 @@ PetscReal SbFormulaEvalTable(const struct _p_SbFormula *f, PetscReal t)
   while (hi - lo > 1) {
     const PetscInt mid = (lo + hi) / 2;
 
-    if (f->time[mid] <= t) lo = mid;
-    else hi = mid;
+    if (f->time[mid] <= t)
+      lo = mid;
+    else
+      hi = mid;
   }
   w = (t - f->time[lo]) / (f->time[hi] - f->time[lo]);
   return (1 - w) * f->value[lo] + w * f->value[hi];

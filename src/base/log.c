@@ -20,12 +20,13 @@ static PetscErrorCode stage(const char *name, PetscLogStage *s)
 PetscErrorCode SbLogInitialize(void)
 {
   static const char *const names[SB_EVENT_COUNT] = {
-    "SbMeshRead", "SbMeshDistrib", "SbSpaceSetUp", "SbMatrixSetUp", "SbResidual", "SbTangent",
-    "SbEnergy",   "SbEffects",     "SbSolverSetUp", "SbOutput",     "SbCheckpoint",
+    "SbMeshRead", "SbMeshDistrib", "SbSpaceSetUp",  "SbMatrixSetUp", "SbResidual",   "SbTangent",
+    "SbEnergy",   "SbEffects",     "SbSolverSetUp", "SbOutput",      "SbCheckpoint",
   };
 
   PetscFunctionBeginUser;
-  for (int i = 0; i < SB_EVENT_COUNT; i++) PetscCall(PetscLogEventRegister(names[i], PETSC_OBJECT_CLASSID, &SbEvents[i]));
+  for (int i = 0; i < SB_EVENT_COUNT; i++)
+    PetscCall(PetscLogEventRegister(names[i], PETSC_OBJECT_CLASSID, &SbEvents[i]));
   PetscCall(stage("Setup", &SbStageSetup));
   PetscCall(stage("Solve", &SbStageSolve));
   PetscCall(stage("Output", &SbStageOutput));

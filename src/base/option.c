@@ -38,7 +38,7 @@ PetscErrorCode SbOptionsRegister(const char *klass, const char *type, PetscInt n
   block = &SbTheOptions.block[SbTheOptions.nblock++];
   PetscCall(PetscStrncpy(block->klass, klass, sizeof(block->klass)));
   PetscCall(PetscStrncpy(block->type, type, sizeof(block->type)));
-  block->n    = n;
+  block->n = n;
   block->rows = rows;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -67,8 +67,10 @@ const SbOption *SbOptionFind(const SbScope *scope, const char *key)
 PetscErrorCode SbOptionName(const SbScope *scope, const char *key, size_t size, char name[])
 {
   PetscFunctionBeginUser;
-  if (scope->klass[0]) PetscCall(PetscSNPrintf(name, size, "-%s_%s_%s", scope->klass, scope->instance, key));
-  else PetscCall(PetscSNPrintf(name, size, "-%s", key));
+  if (scope->klass[0])
+    PetscCall(PetscSNPrintf(name, size, "-%s_%s_%s", scope->klass, scope->instance, key));
+  else
+    PetscCall(PetscSNPrintf(name, size, "-%s", key));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -85,7 +87,7 @@ PetscErrorCode SbOptionManualName(const SbOptionBlock *block, const SbOption *ro
 /* The record of a full name, made when there is none yet. */
 static PetscErrorCode find_record(const SbScope *scope, const SbOption *row, SbOptionRecord **record)
 {
-  char            name[SB_OPTION_NAME_MAX];
+  char name[SB_OPTION_NAME_MAX];
   SbOptionRecord *r;
 
   PetscFunctionBeginUser;
@@ -97,8 +99,8 @@ static PetscErrorCode find_record(const SbScope *scope, const SbOption *row, SbO
     PetscCall(PetscStrcasecmp(r->name, name, &same));
     if (!same) continue;
     PetscCheck(!strcmp(r->row->key, row->key), PETSC_COMM_SELF, PETSC_ERR_USER,
-               "%s has two meanings: %s of %s '%s' and %s of %s '%s'; rename one of the two", name, r->row->key,
-               r->scope.klass, r->scope.instance, row->key, scope->klass, scope->instance);
+               "%s has two meanings: %s of %s '%s' and %s of %s '%s'; rename one of the two", name,
+               r->row->key, r->scope.klass, r->scope.instance, row->key, scope->klass, scope->instance);
     *record = r;
     PetscFunctionReturn(PETSC_SUCCESS);
   }
@@ -107,16 +109,16 @@ static PetscErrorCode find_record(const SbScope *scope, const SbOption *row, SbO
   PetscCall(PetscMemzero(r, sizeof(*r)));
   PetscCall(PetscStrncpy(r->name, name, sizeof(r->name)));
   r->scope = *scope;
-  r->row   = row;
-  *record  = r;
+  r->row = row;
+  *record = r;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode SbOptionText(const SbScope *scope, const char *key, const SbOptionRecord **record)
 {
   const SbOption *row = SbOptionFind(scope, key);
-  SbOptionRecord *r     = NULL;
-  const char     *value = NULL;
+  SbOptionRecord *r = NULL;
+  const char *value = NULL;
 
   PetscFunctionBeginUser;
   PetscCheck(row, PETSC_COMM_SELF, PETSC_ERR_PLIB, "No row for key '%s' of class '%s', type '%s'", key,
@@ -125,10 +127,12 @@ PetscErrorCode SbOptionText(const SbScope *scope, const char *key, const SbOptio
   PetscCall(PetscOptionsFindPair(NULL, NULL, r->name, &value, &r->given));
   if (r->given && !value && row->kind == SB_OPTION_BOOL) value = "true";
   PetscCheck(!r->given || value, PETSC_COMM_SELF, PETSC_ERR_USER,
-             "%s has no value: %s (a value that begins with a minus sign and a letter needs a blank before it, in quotes)",
+             "%s has no value: %s (a value that begins with a minus sign and a letter needs a blank before "
+             "it, in quotes)",
              r->name, row->help);
-  PetscCheck(r->given || row->preset, PETSC_COMM_SELF, PETSC_ERR_USER, "%s must be given: %s%s%s%s%s", r->name, row->help,
-             row->range[0] ? ", in " : "", row->range, row->unit[0] ? ", unit " : "", row->unit);
+  PetscCheck(r->given || row->preset, PETSC_COMM_SELF, PETSC_ERR_USER, "%s must be given: %s%s%s%s%s",
+             r->name, row->help, row->range[0] ? ", in " : "", row->range, row->unit[0] ? ", unit " : "",
+             row->unit);
   PetscCall(PetscFree(r->text));
   PetscCall(PetscStrallocpy(r->given ? value : row->preset, &r->text));
   *record = r;
@@ -140,8 +144,8 @@ PetscErrorCode SbOptionGiven(const SbScope *scope, const char *key, PetscBool *g
   char name[SB_OPTION_NAME_MAX];
 
   PetscFunctionBeginUser;
-  PetscCheck(SbOptionFind(scope, key), PETSC_COMM_SELF, PETSC_ERR_PLIB, "No row for key '%s' of class '%s', type '%s'",
-             key, scope->klass, scope->type);
+  PetscCheck(SbOptionFind(scope, key), PETSC_COMM_SELF, PETSC_ERR_PLIB,
+             "No row for key '%s' of class '%s', type '%s'", key, scope->klass, scope->type);
   PetscCall(SbOptionName(scope, key, sizeof(name), name));
   PetscCall(PetscOptionsFindPair(NULL, NULL, name, NULL, given));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -174,17 +178,17 @@ static PetscErrorCode add_user(PetscInt *n, SbOptionUser **users, const char *na
 PetscErrorCode SbOptionUsersGet(PetscInt *n, SbOptionUser **users)
 {
   PetscInt nleft;
-  char   **names, **values, *all, *token, *rest;
+  char **names, **values, *all, *token, *rest;
 
   PetscFunctionBeginUser;
-  *n     = 0;
+  *n = 0;
   *users = NULL;
   PetscCall(PetscOptionsLeftGet(NULL, &nleft, &names, &values));
   for (PetscInt i = 0; i < nleft; i++) PetscCall(add_user(n, users, names[i], values[i]));
   PetscCall(PetscOptionsGetAll(NULL, &all));
   token = strtok_r(all, " ", &rest);
   while (token) {
-    char      name[PETSC_MAX_OPTION_NAME + 1], value[PETSC_MAX_PATH_LEN] = "";
+    char name[PETSC_MAX_OPTION_NAME + 1], value[PETSC_MAX_PATH_LEN] = "";
     PetscBool is_name, left = PETSC_FALSE;
 
     PetscCall(is_read_name(token, &is_name));
@@ -195,7 +199,8 @@ PetscErrorCode SbOptionUsersGet(PetscInt *n, SbOptionUser **users)
       PetscBool next;
 
       PetscCall(is_read_name(token, &next));
-      for (PetscInt i = 0; i < nleft && !left; i++) left = (PetscBool)(token[0] == '-' && !strcmp(token + 1, names[i]));
+      for (PetscInt i = 0; i < nleft && !left; i++)
+        left = (PetscBool)(token[0] == '-' && !strcmp(token + 1, names[i]));
       if (next || left) break;
       if (value[0]) PetscCall(PetscStrlcat(value, " ", sizeof(value)));
       PetscCall(PetscStrlcat(value, token, sizeof(value)));

@@ -8,19 +8,19 @@
 
 /* Rows registered by one call. */
 typedef struct {
-  char            klass[SB_NAME_MAX];
-  char            type[SB_NAME_MAX];
-  PetscInt        n;
+  char klass[SB_NAME_MAX];
+  char type[SB_NAME_MAX];
+  PetscInt n;
   const SbOption *rows; /* [n] borrowed, static */
 } SbOptionBlock;
 
 /* A value that some reader asked for. */
 typedef struct {
-  char            name[SB_OPTION_NAME_MAX]; /* "-body_liver_young" */
-  SbScope         scope;
+  char name[SB_OPTION_NAME_MAX]; /* "-body_liver_young" */
+  SbScope scope;
   const SbOption *row;
-  PetscBool       given; /* by the user, else `text` is the preset */
-  char           *text;  /* owned */
+  PetscBool given; /* by the user, else `text` is the preset */
+  char *text;      /* owned */
 } SbOptionRecord;
 
 /* An option of the user's, ours or PETSc's. */
@@ -30,11 +30,11 @@ typedef struct {
 } SbOptionUser;
 
 typedef struct {
-  PetscInt        nblock, nrecord, nuser;
-  SbOptionBlock  *block;      /* [nblock] in the order of registration */
-  SbOptionRecord *record;     /* [nrecord] in the order of the first reading */
-  PetscBool       remembered; /* SbOptionsRemember() filled `user` */
-  SbOptionUser   *user;       /* [nuser] */
+  PetscInt nblock, nrecord, nuser;
+  SbOptionBlock *block;   /* [nblock] in the order of registration */
+  SbOptionRecord *record; /* [nrecord] in the order of the first reading */
+  PetscBool remembered;   /* SbOptionsRemember() filled `user` */
+  SbOptionUser *user;     /* [nuser] */
 } SbOptionTable;
 extern SbOptionTable SbTheOptions; /* the registry of options */
 

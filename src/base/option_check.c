@@ -15,7 +15,7 @@
 
 static PetscInt edit_distance(const char *a, const char *b)
 {
-  PetscInt     row[3][WORD_MAX + 1];
+  PetscInt row[3][WORD_MAX + 1];
   const size_t na = PetscMin(strlen(a), WORD_MAX), nb = PetscMin(strlen(b), WORD_MAX);
 
   for (size_t j = 0; j <= nb; j++) row[0][j] = (PetscInt)j;
@@ -27,7 +27,8 @@ static PetscInt edit_distance(const char *a, const char *b)
       const int same = tolower((unsigned char)a[i - 1]) == tolower((unsigned char)b[j - 1]);
 
       now[j] = PetscMin(PetscMin(before[j], now[j - 1]) + 1, before[j - 1] + !same);
-      if (i > 1 && j > 1 && a[i - 1] == b[j - 2] && a[i - 2] == b[j - 1]) now[j] = PetscMin(now[j], older[j - 2] + 1);
+      if (i > 1 && j > 1 && a[i - 1] == b[j - 2] && a[i - 2] == b[j - 1])
+        now[j] = PetscMin(now[j], older[j - 2] + 1);
     }
   }
   return row[na % 3][nb];
@@ -36,7 +37,7 @@ static PetscInt edit_distance(const char *a, const char *b)
 PetscErrorCode SbNearest(const char *word, PetscInt n, const char *const names[], size_t size, char text[])
 {
   const PetscInt farthest = strlen(word) < 6 ? 1 : 2; /* edits that still look like a slip */
-  PetscInt       best     = farthest + 1, nbest = 0;
+  PetscInt best = farthest + 1, nbest = 0;
 
   PetscFunctionBeginUser;
   text[0] = 0;
@@ -68,12 +69,69 @@ static const SbOption *program_row(const char *name)
 static PetscBool looks_like_petsc(const char *name)
 {
   static const char *const prefixes[] = {
-    "ksp_", "pc_", "snes_", "ts_", "mat_", "vec_", "dm_", "is_", "sub_", "mg_", "fieldsplit_", "asm_", "log_", "malloc",
-    "options_", "petsc", "on_error_", "memory_", "fp_trap", "start_in_debugger", "stop_for_debugger", "debugger_",
-    "citations", "no_signal_handler", "info", "viewer_", "draw_", "display", "nox", "saws", "objects_", "checkstack",
-    "get_total_flops", "skip_petscrc", "error_output_", "shared_tmp", "not_shared_tmp", "tmp", "partition", "sf_", "history",
-    "python", "blas_", "omp_", "use_gpu", "device", "cuda", "hip", "event_", "help", "version", "redundant_", "est", "esteig",
-    "gamg_", "hypre", "ml_", "superlu", "sbaij", "inner_", "coarse_", "levels_", "prefix_",
+    "ksp_",
+    "pc_",
+    "snes_",
+    "ts_",
+    "mat_",
+    "vec_",
+    "dm_",
+    "is_",
+    "sub_",
+    "mg_",
+    "fieldsplit_",
+    "asm_",
+    "log_",
+    "malloc",
+    "options_",
+    "petsc",
+    "on_error_",
+    "memory_",
+    "fp_trap",
+    "start_in_debugger",
+    "stop_for_debugger",
+    "debugger_",
+    "citations",
+    "no_signal_handler",
+    "info",
+    "viewer_",
+    "draw_",
+    "display",
+    "nox",
+    "saws",
+    "objects_",
+    "checkstack",
+    "get_total_flops",
+    "skip_petscrc",
+    "error_output_",
+    "shared_tmp",
+    "not_shared_tmp",
+    "tmp",
+    "partition",
+    "sf_",
+    "history",
+    "python",
+    "blas_",
+    "omp_",
+    "use_gpu",
+    "device",
+    "cuda",
+    "hip",
+    "event_",
+    "help",
+    "version",
+    "redundant_",
+    "est",
+    "esteig",
+    "gamg_",
+    "hypre",
+    "ml_",
+    "superlu",
+    "sbaij",
+    "inner_",
+    "coarse_",
+    "levels_",
+    "prefix_",
   };
 
   for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(prefixes); i++)
@@ -85,8 +143,8 @@ static PetscBool looks_like_petsc(const char *name)
 static const char *class_of(const char *name)
 {
   for (PetscInt i = 0; i < SbTheOptions.nblock; i++) {
-    const char  *klass = SbTheOptions.block[i].klass;
-    const size_t n     = strlen(klass);
+    const char *klass = SbTheOptions.block[i].klass;
+    const size_t n = strlen(klass);
 
     if (n && !strncasecmp(name, klass, n) && name[n] == '_') return klass;
   }
@@ -103,9 +161,9 @@ static PetscBool is_recorded(const char *name)
 /* Near full names: everything read so far, and every program-wide option. `text` is empty when none is near. */
 static PetscErrorCode near_options(const char *dashed, size_t size, char text[])
 {
-  PetscInt     n = 0, room = SbTheOptions.nrecord;
+  PetscInt n = 0, room = SbTheOptions.nrecord;
   const char **list;
-  char       (*names)[SB_OPTION_NAME_MAX];
+  char(*names)[SB_OPTION_NAME_MAX];
 
   PetscFunctionBeginUser;
   for (PetscInt i = 0; i < SbTheOptions.nblock; i++) room += SbTheOptions.block[i].n;
@@ -127,23 +185,40 @@ static PetscErrorCode near_options(const char *dashed, size_t size, char text[])
 }
 
 /* Instances of a class that have been read, "liver, stone"; "" when there are none. */
-static PetscErrorCode instances_of(const char *klass, const char *name, PetscBool *known, size_t size, char text[])
+static PetscErrorCode instances_of(const char *klass, size_t size, char text[])
 {
   const SbOptionRecord *last = NULL;
 
   PetscFunctionBeginUser;
   text[0] = 0;
-  *known  = PETSC_FALSE;
   for (PetscInt i = 0; i < SbTheOptions.nrecord; i++) {
     const SbOptionRecord *r = &SbTheOptions.record[i];
-    const size_t          n = strlen(r->scope.instance);
 
     if (strcmp(r->scope.klass, klass)) continue;
-    if (!strncasecmp(name + strlen(klass) + 1, r->scope.instance, n) && name[strlen(klass) + 1 + n] == '_') *known = PETSC_TRUE;
     if (last && !strcmp(last->scope.instance, r->scope.instance)) continue;
     if (last) PetscCall(PetscStrlcat(text, ", ", size));
     PetscCall(PetscStrlcat(text, r->scope.instance, size));
     last = r;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Keys that were read for the instance that a name belongs to: "body liver has mesh, young"; "" when there are none. */
+static PetscErrorCode keys_of(const char *klass, const char *name, size_t size, char text[])
+{
+  PetscFunctionBeginUser;
+  text[0] = 0;
+  for (PetscInt i = 0; i < SbTheOptions.nrecord; i++) {
+    const SbOptionRecord *r = &SbTheOptions.record[i];
+    const size_t n = strlen(r->scope.instance);
+    char begin[2 * SB_NAME_MAX + 8];
+
+    if (strcmp(r->scope.klass, klass) || strncasecmp(name + strlen(klass) + 1, r->scope.instance, n))
+      continue;
+    if (name[strlen(klass) + 1 + n] != '_') continue;
+    PetscCall(PetscSNPrintf(begin, sizeof(begin), "%s %s has ", klass, r->scope.instance));
+    PetscCall(PetscStrlcat(text, text[0] ? ", " : begin, size));
+    PetscCall(PetscStrlcat(text, r->row->key, size));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -159,19 +234,38 @@ static const char *type_with_key(const char *klass, const char *name)
     for (PetscInt j = 0; !strcmp(block->klass, klass) && j < block->n; j++) {
       const size_t k = strlen(block->rows[j].key);
 
-      if (n > k && name[n - k - 1] == '_' && !strcasecmp(name + n - k, block->rows[j].key)) return block->type;
+      if (n > k && name[n - k - 1] == '_' && !strcasecmp(name + n - k, block->rows[j].key))
+        return block->type;
     }
   }
   return NULL;
 }
 
+/* Why an option with the prefix of a class was not read, when no name is near. */
+static PetscErrorCode explain(const char *klass, const char *name, size_t size, char why[])
+{
+  char keys[768], instances[256];
+  const char *type = type_with_key(klass, name);
+
+  PetscFunctionBeginUser;
+  PetscCall(keys_of(klass, name, sizeof(keys), keys));
+  PetscCall(instances_of(klass, sizeof(instances), instances));
+  if (!keys[0])
+    PetscCall(PetscSNPrintf(why, size, ": it names no %s of this scenario (%s)", klass,
+                            instances[0] ? instances : "there are none"));
+  else if (type && type[0])
+    PetscCall(PetscSNPrintf(why, size, " here: it belongs to type %s", type));
+  else
+    PetscCall(PetscSNPrintf(why, size, "; %s", keys));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* What to say about an option of ours that nobody read; empty when it is not ours. */
 static PetscErrorCode verdict(const char *name, size_t size, char text[])
 {
-  char            near[3 * SB_OPTION_NAME_MAX], dashed[SB_OPTION_NAME_MAX], instances[256], why[512] = "";
-  const char     *klass = class_of(name), *type;
-  const SbOption *row   = program_row(name);
-  PetscBool       known;
+  char near[3 * SB_OPTION_NAME_MAX], dashed[SB_OPTION_NAME_MAX], why[1024] = "";
+  const char *klass = class_of(name);
+  const SbOption *row = program_row(name);
 
   PetscFunctionBeginUser;
   text[0] = 0;
@@ -183,14 +277,10 @@ static PetscErrorCode verdict(const char *name, size_t size, char text[])
   if (!klass && looks_like_petsc(name)) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(near_options(dashed, sizeof(near), near));
   if (!klass && !near[0]) PetscFunctionReturn(PETSC_SUCCESS);
-  if (near[0]) PetscCall(PetscSNPrintf(why, sizeof(why), "; did you mean %s?", near));
-  else {
-    PetscCall(instances_of(klass, name, &known, sizeof(instances), instances));
-    type = type_with_key(klass, name);
-    if (!known)
-      PetscCall(PetscSNPrintf(why, sizeof(why), ": it names no %s of this scenario (%s)", klass, instances[0] ? instances : "there are none"));
-    else if (type && type[0]) PetscCall(PetscSNPrintf(why, sizeof(why), " here: it belongs to type %s", type));
-  }
+  if (near[0])
+    PetscCall(PetscSNPrintf(why, sizeof(why), "; did you mean %s?", near));
+  else
+    PetscCall(explain(klass, name, sizeof(why), why));
   PetscCall(PetscSNPrintf(text, size, "%s is not an option of supple%s", dashed, why));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -198,7 +288,7 @@ static PetscErrorCode verdict(const char *name, size_t size, char text[])
 PetscErrorCode SbOptionsCheck(void)
 {
   PetscInt nleft, nbad = 0;
-  char   **names, first[1024] = "", more[64] = "";
+  char **names, first[1024] = "", more[64] = "";
 
   PetscFunctionBeginUser;
   PetscCall(PetscOptionsLeftGet(NULL, &nleft, &names, NULL));
@@ -210,7 +300,8 @@ PetscErrorCode SbOptionsCheck(void)
     if (text[0] && !nbad++) PetscCall(PetscStrncpy(first, text, sizeof(first)));
   }
   PetscCall(PetscOptionsLeftRestore(NULL, &nleft, &names, NULL));
-  if (nbad > 1) PetscCall(PetscSNPrintf(more, sizeof(more), " (and %" PetscInt_FMT " more like it)", nbad - 1));
+  if (nbad > 1)
+    PetscCall(PetscSNPrintf(more, sizeof(more), " (and %" PetscInt_FMT " more like it)", nbad - 1));
   PetscCheck(!nbad, PETSC_COMM_SELF, PETSC_ERR_USER, "%s%s", first, more);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -218,7 +309,7 @@ PetscErrorCode SbOptionsCheck(void)
 PetscErrorCode SbOptionsUnused(MPI_Comm comm, PetscInt *n)
 {
   PetscInt nleft;
-  char   **names, **values;
+  char **names, **values;
 
   PetscFunctionBeginUser;
   *n = 0;
@@ -229,7 +320,8 @@ PetscErrorCode SbOptionsUnused(MPI_Comm comm, PetscInt *n)
     for (PetscInt j = 0; j < SbTheOptions.nuser && !users; j++)
       users = (PetscBool)!strcasecmp(SbTheOptions.user[j].name, names[i]);
     if (!users || is_recorded(names[i])) continue;
-    PetscCall(SbWarning(comm, "nobody read the option -%s%s%s", names[i], values[i] ? " " : "", values[i] ? values[i] : ""));
+    PetscCall(SbWarning(comm, "nobody read the option -%s%s%s", names[i], values[i] ? " " : "",
+                        values[i] ? values[i] : ""));
     (*n)++;
   }
   PetscCall(PetscOptionsLeftRestore(NULL, &nleft, &names, &values));

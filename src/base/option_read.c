@@ -39,10 +39,10 @@ static PetscInt count_pieces(const char *text, char separator)
 static PetscBool next_piece(const char **text, char separator, size_t size, char piece[])
 {
   const char *end = strchr(*text, separator);
-  PetscBool   fits;
+  PetscBool fits;
 
   if (!end) end = *text + strlen(*text);
-  fits  = copy_trimmed(*text, end, size, piece);
+  fits = copy_trimmed(*text, end, size, piece);
   *text = *end ? end + 1 : end;
   return fits;
 }
@@ -60,15 +60,15 @@ static PetscBool parse_real(const char *text, PetscReal *value)
 /* Whether x lies in "[a, b)"; an empty range holds every number but NaN. Our own rows only: a bad range is our error. */
 static PetscErrorCode in_range(const char *range, PetscReal x, PetscBool *in)
 {
-  char  open, close;
-  char  lo_text[64], hi_text[64];
+  char open, close;
+  char lo_text[64], hi_text[64];
   PetscReal lo, hi;
 
   PetscFunctionBeginUser;
   *in = (PetscBool)(x == x);
   if (!range[0]) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCheck(sscanf(range, "%c%63[^,],%63[^])]%c", &open, lo_text, hi_text, &close) == 4 && strchr("([", open) &&
-               strchr(")]", close),
+  PetscCheck(sscanf(range, "%c%63[^,],%63[^])]%c", &open, lo_text, hi_text, &close) == 4 &&
+               strchr("([", open) && strchr(")]", close),
              PETSC_COMM_SELF, PETSC_ERR_PLIB, "Unreadable range '%s' in a row of the option table", range);
   lo = strtod(lo_text, NULL);
   hi = strtod(hi_text, NULL);
@@ -78,25 +78,26 @@ static PetscErrorCode in_range(const char *range, PetscReal x, PetscBool *in)
 
 static PetscErrorCode check_range(const SbOptionRecord *r, PetscReal x)
 {
-  PetscBool   in;
+  PetscBool in;
   const char *unit = r->row->unit, *blank = unit[0] ? " " : "";
 
   PetscFunctionBeginUser;
   PetscCall(in_range(r->row->range, x, &in));
-  PetscCheck(in, PETSC_COMM_SELF, PETSC_ERR_USER, "%s %s%s%s is outside %s%s%s: %s", r->name, r->text, blank, unit,
-             r->row->range[0] ? r->row->range : "the numbers", blank, unit, r->row->help);
+  PetscCheck(in, PETSC_COMM_SELF, PETSC_ERR_USER, "%s %s%s%s is outside %s%s%s: %s", r->name, r->text, blank,
+             unit, r->row->range[0] ? r->row->range : "the numbers", blank, unit, r->row->help);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* ------------------------------------------------------------------ readers */
 
 /* The record of an option whose row is of this kind. */
-static PetscErrorCode text_of(const SbScope *scope, const char *key, SbOptionKind kind, const SbOptionRecord **r)
+static PetscErrorCode text_of(const SbScope *scope, const char *key, SbOptionKind kind,
+                              const SbOptionRecord **r)
 {
   PetscFunctionBeginUser;
   PetscCall(SbOptionText(scope, key, r));
-  PetscCheck((*r)->row->kind == kind, PETSC_COMM_SELF, PETSC_ERR_PLIB, "Option %s has kind %d, asked for as %d",
-             (*r)->name, (int)(*r)->row->kind, (int)kind);
+  PetscCheck((*r)->row->kind == kind, PETSC_COMM_SELF, PETSC_ERR_PLIB,
+             "Option %s has kind %d, asked for as %d", (*r)->name, (int)(*r)->row->kind, (int)kind);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -108,7 +109,7 @@ static PetscBool is_absent(const SbOptionRecord *r)
 
 PetscErrorCode SbOptionBool(const SbScope *scope, const char *key, PetscBool *value)
 {
-  static const char *const   words[2][5] = {{"false", "no", "off", "0", "n"}, {"true", "yes", "on", "1", "y"}};
+  static const char *const words[2][5] = {{"false", "no", "off", "0", "n"}, {"true", "yes", "on", "1", "y"}};
   const SbOptionRecord *r;
 
   PetscFunctionBeginUser;
@@ -124,25 +125,26 @@ PetscErrorCode SbOptionBool(const SbScope *scope, const char *key, PetscBool *va
       PetscFunctionReturn(PETSC_SUCCESS);
     }
   }
-  SETERRQ(PETSC_COMM_SELF, PETSC_ERR_USER, "%s %s is neither true nor false: %s", r->name, r->text, r->row->help);
+  SETERRQ(PETSC_COMM_SELF, PETSC_ERR_USER, "%s %s is neither true nor false: %s", r->name, r->text,
+          r->row->help);
 }
 
 PetscErrorCode SbOptionInt(const SbScope *scope, const char *key, PetscInt *value)
 {
   const SbOptionRecord *r;
-  char                 *end;
-  long long             n;
+  char *end;
+  long long n;
 
   PetscFunctionBeginUser;
   PetscCall(text_of(scope, key, SB_OPTION_INT, &r));
   if (is_absent(r)) PetscFunctionReturn(PETSC_SUCCESS);
   n = strtoll(r->text, &end, 10);
-  PetscCheck(end != r->text && !*end, PETSC_COMM_SELF, PETSC_ERR_USER, "%s %s is not a whole number: %s", r->name, r->text,
-             r->row->help);
+  PetscCheck(end != r->text && !*end, PETSC_COMM_SELF, PETSC_ERR_USER, "%s %s is not a whole number: %s",
+             r->name, r->text, r->row->help);
   PetscCall(check_range(r, (PetscReal)n));
   PetscCheck(n >= PETSC_MIN_INT && n <= PETSC_MAX_INT, PETSC_COMM_SELF, PETSC_ERR_USER,
-             "%s %s is too large for this build of PETSc, whose integers end at %" PetscInt_FMT, r->name, r->text,
-             PETSC_MAX_INT);
+             "%s %s is too large for this build of PETSc, whose integers end at %" PetscInt_FMT, r->name,
+             r->text, PETSC_MAX_INT);
   *value = (PetscInt)n;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -150,13 +152,13 @@ PetscErrorCode SbOptionInt(const SbScope *scope, const char *key, PetscInt *valu
 PetscErrorCode SbOptionReal(const SbScope *scope, const char *key, PetscReal *value)
 {
   const SbOptionRecord *r;
-  PetscReal             x;
+  PetscReal x;
 
   PetscFunctionBeginUser;
   PetscCall(text_of(scope, key, SB_OPTION_REAL, &r));
   if (is_absent(r)) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCheck(parse_real(r->text, &x), PETSC_COMM_SELF, PETSC_ERR_USER, "%s %s is not a number: %s", r->name, r->text,
-             r->row->help);
+  PetscCheck(parse_real(r->text, &x), PETSC_COMM_SELF, PETSC_ERR_USER, "%s %s is not a number: %s", r->name,
+             r->text, r->row->help);
   PetscCall(check_range(r, x));
   *value = x;
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -165,23 +167,24 @@ PetscErrorCode SbOptionReal(const SbScope *scope, const char *key, PetscReal *va
 PetscErrorCode SbOptionReals(const SbScope *scope, const char *key, PetscReal value[])
 {
   const SbOptionRecord *r;
-  const char           *text;
-  PetscInt              n;
+  const char *text;
+  PetscInt n;
 
   PetscFunctionBeginUser;
   PetscCall(text_of(scope, key, SB_OPTION_REALS, &r));
   if (is_absent(r)) PetscFunctionReturn(PETSC_SUCCESS);
   n = count_pieces(r->text, ',');
   PetscCheck(n == r->row->count, PETSC_COMM_SELF, PETSC_ERR_USER,
-             "%s %s has %" PetscInt_FMT " numbers, needs %" PetscInt_FMT " with commas between them: %s", r->name, r->text, n,
-             r->row->count, r->row->help);
+             "%s %s has %" PetscInt_FMT " numbers, needs %" PetscInt_FMT " with commas between them: %s",
+             r->name, r->text, n, r->row->count, r->row->help);
   text = r->text;
   for (PetscInt i = 0; i < n; i++) {
-    char      piece[64];
+    char piece[64];
     PetscReal x;
 
-    PetscCheck(next_piece(&text, ',', sizeof(piece), piece) && parse_real(piece, &x), PETSC_COMM_SELF, PETSC_ERR_USER,
-               "%s %s: entry %" PetscInt_FMT " is not a number: %s", r->name, r->text, i + 1, r->row->help);
+    PetscCheck(next_piece(&text, ',', sizeof(piece), piece) && parse_real(piece, &x), PETSC_COMM_SELF,
+               PETSC_ERR_USER, "%s %s: entry %" PetscInt_FMT " is not a number: %s", r->name, r->text, i + 1,
+               r->row->help);
     PetscCall(check_range(r, x));
     value[i] = x;
   }
@@ -202,7 +205,7 @@ PetscErrorCode SbOptionString(const SbScope *scope, const char *key, size_t size
 PetscErrorCode SbOptionNames(const SbScope *scope, const char *key, PetscInt *n, char (**names)[SB_NAME_MAX])
 {
   const SbOptionRecord *r;
-  const char           *text;
+  const char *text;
 
   PetscFunctionBeginUser;
   PetscCall(text_of(scope, key, SB_OPTION_NAMES, &r));
@@ -214,8 +217,9 @@ PetscErrorCode SbOptionNames(const SbScope *scope, const char *key, PetscInt *n,
 
     if (next_piece(&text, ',', SB_NAME_MAX, name) && name[0]) continue;
     PetscCall(PetscFree(*names));
-    SETERRQ(PETSC_COMM_SELF, PETSC_ERR_USER, "%s %s: name %" PetscInt_FMT " is empty or longer than %d characters: %s",
-            r->name, r->text, i + 1, SB_NAME_MAX - 1, r->row->help);
+    SETERRQ(PETSC_COMM_SELF, PETSC_ERR_USER,
+            "%s %s: name %" PetscInt_FMT " is empty or longer than %d characters: %s", r->name, r->text,
+            i + 1, SB_NAME_MAX - 1, r->row->help);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -223,8 +227,8 @@ PetscErrorCode SbOptionNames(const SbScope *scope, const char *key, PetscInt *n,
 /* Names out of "a|b|c", for the search of near ones. */
 static PetscErrorCode nearest_choice(const char *range, const char *word, size_t size, char text[])
 {
-  PetscInt    n = count_pieces(range, '|');
-  char      (*words)[SB_NAME_MAX];
+  PetscInt n = count_pieces(range, '|');
+  char(*words)[SB_NAME_MAX];
   const char **list;
 
   PetscFunctionBeginUser;
@@ -241,30 +245,30 @@ static PetscErrorCode nearest_choice(const char *range, const char *word, size_t
 PetscErrorCode SbOptionChoice(const SbScope *scope, const char *key, PetscInt *index)
 {
   const SbOptionRecord *r;
-  const char           *range;
-  char                  word[SB_NAME_MAX], near[2 * SB_NAME_MAX];
-  PetscInt              n;
+  const char *range;
+  char word[SB_NAME_MAX], near[2 * SB_NAME_MAX];
+  PetscInt n;
 
   PetscFunctionBeginUser;
   PetscCall(text_of(scope, key, SB_OPTION_CHOICE, &r));
   if (is_absent(r)) PetscFunctionReturn(PETSC_SUCCESS);
   range = r->row->range;
-  n     = count_pieces(range, '|');
+  n = count_pieces(range, '|');
   for (PetscInt i = 0; i < n; i++) {
     if (!next_piece(&range, '|', sizeof(word), word) || strcmp(word, r->text)) continue;
     *index = i;
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   PetscCall(nearest_choice(r->row->range, r->text, sizeof(near), near));
-  SETERRQ(PETSC_COMM_SELF, PETSC_ERR_USER, "%s %s is not one of %s%s%s%s: %s", r->name, r->text, r->row->range,
-          near[0] ? " (did you mean " : "", near, near[0] ? "?)" : "", r->row->help);
+  SETERRQ(PETSC_COMM_SELF, PETSC_ERR_USER, "%s %s is not one of %s%s%s%s: %s", r->name, r->text,
+          r->row->range, near[0] ? " (did you mean " : "", near, near[0] ? "?)" : "", r->row->help);
 }
 
 PetscErrorCode SbOptionFormulas(const SbScope *scope, const char *key, SbFormula formulas[])
 {
   const SbOptionRecord *r;
-  const char           *text;
-  PetscInt              n, count;
+  const char *text;
+  PetscInt n, count;
 
   PetscFunctionBeginUser;
   PetscCall(text_of(scope, key, SB_OPTION_FORMULA, &r));
@@ -273,15 +277,15 @@ PetscErrorCode SbOptionFormulas(const SbScope *scope, const char *key, SbFormula
   if (is_absent(r)) PetscFunctionReturn(PETSC_SUCCESS);
   n = count_pieces(r->text, ';');
   PetscCheck(n == count, PETSC_COMM_SELF, PETSC_ERR_USER,
-             "%s %s has %" PetscInt_FMT " formula%s, needs %" PetscInt_FMT "%s: %s", r->name, r->text, n, n == 1 ? "" : "s",
-             count, count == 1 ? "" : " with semicolons between them", r->row->help);
+             "%s %s has %" PetscInt_FMT " formula%s, needs %" PetscInt_FMT "%s: %s", r->name, r->text, n,
+             n == 1 ? "" : "s", count, count == 1 ? "" : " with semicolons between them", r->row->help);
   text = r->text;
   for (PetscInt i = 0; i < n; i++) {
     char piece[PETSC_MAX_PATH_LEN];
 
     PetscCheck(next_piece(&text, ';', sizeof(piece), piece) && piece[0], PETSC_COMM_SELF, PETSC_ERR_USER,
-               "%s %s: formula %" PetscInt_FMT " is empty or longer than %d characters: %s", r->name, r->text, i + 1,
-               (int)sizeof(piece) - 1, r->row->help);
+               "%s %s: formula %" PetscInt_FMT " is empty or longer than %d characters: %s", r->name, r->text,
+               i + 1, (int)sizeof(piece) - 1, r->row->help);
     PetscCall(SbFormulaCreate(PETSC_COMM_WORLD, piece, r->name, &formulas[i]));
   }
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -1,0 +1,158 @@
+/*
+  option_view.c - the complete scenario as an option file that runs again.
+
+  Every value that was read so far, with the user's own text or the preset's, so that no digit is lost; then the user's
+  options for PETSc. PETSc's file format cuts a line at '#', takes quotes off a value and knows no escapes: a value with a
+  blank is quoted; one that begins with a minus sign and a letter gets a blank in front, or PETSc takes it for a name. A
+  value with '#' or a quote can only come from the command line, and the file says so.
+*/
+#include <ctype.h>
+#include <errno.h>
+#include <unistd.h>
+#include "option.h"
+
+/* PETSc 3.18 holds at most 512 options; beyond this many lines the presets become comments. */
+#define LINES_MAX 420
+
+static PetscErrorCode print_value(PetscViewer viewer, const char *value, int width)
+{
+  const PetscBool name_like =
+    (PetscBool)(value[0] == '-' && (isalpha((unsigned char)value[1]) || value[1] == '-'));
+  const char *quote = name_like || !value[0] || strpbrk(value, " \t'") ? "\"" : "";
+  char text[PETSC_MAX_PATH_LEN + 4];
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscSNPrintf(text, sizeof(text), "%s%s%s%s", quote, name_like ? " " : "", value, quote));
+  PetscCall(PetscViewerASCIIPrintf(viewer, " %s", text));
+  for (int n = (int)strlen(text); n < width; n++) PetscCall(PetscViewerASCIIPrintf(viewer, " "));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode print_record(PetscViewer viewer, const SbOptionRecord *r, PetscBool active)
+{
+  const SbOption *row = r->row;
+  const int used = (int)strlen(r->name);
+
+  PetscFunctionBeginUser;
+  if (strpbrk(r->text, "#\""))
+    PetscCall(PetscViewerASCIIPrintf(
+      viewer, "# an option file cannot hold this value; give it on the command line:\n# "));
+  else if (!active)
+    PetscCall(PetscViewerASCIIPrintf(viewer, "# "));
+  PetscCall(PetscViewerASCIIPrintf(viewer, "%s", r->name));
+  PetscCall(print_value(viewer, r->text, PetscMax(1, 48 - used)));
+  PetscCall(PetscViewerASCIIPrintf(viewer, " # %s%s", r->given ? "" : "default; ", row->help));
+  if (row->unit[0]) PetscCall(PetscViewerASCIIPrintf(viewer, ", %s", row->unit));
+  if (row->range[0])
+    PetscCall(
+      PetscViewerASCIIPrintf(viewer, ", %s%s", row->kind == SB_OPTION_CHOICE ? "" : "in ", row->range));
+  PetscCall(PetscViewerASCIIPrintf(viewer, "\n"));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscBool same_instance(const SbOptionRecord *a, const SbOptionRecord *b)
+{
+  return (PetscBool)(!strcmp(a->scope.klass, b->scope.klass) &&
+                     !strcmp(a->scope.instance, b->scope.instance));
+}
+
+/* All records of one instance, or the program-wide ones, under one headline. */
+static PetscErrorCode print_group(PetscViewer viewer, const SbOptionRecord *first, PetscBool with_presets)
+{
+  PetscFunctionBeginUser;
+  if (first->scope.klass[0])
+    PetscCall(PetscViewerASCIIPrintf(viewer, "\n# %s %s\n", first->scope.klass, first->scope.instance));
+  else
+    PetscCall(PetscViewerASCIIPrintf(viewer, "\n# the run\n"));
+  for (const SbOptionRecord *r = first; r < SbTheOptions.record + SbTheOptions.nrecord; r++) {
+    if (!same_instance(r, first)) continue;
+    PetscCall(print_record(viewer, r, (PetscBool)(r->given || (with_presets && r->text[0]))));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscBool is_ours(const char *name)
+{
+  for (PetscInt i = 0; i < SbTheOptions.nrecord; i++)
+    if (!strcasecmp(SbTheOptions.record[i].name + 1, name)) return PETSC_TRUE;
+  return PETSC_FALSE;
+}
+
+static PetscErrorCode print_petsc(PetscViewer viewer, PetscInt n, const SbOptionUser users[])
+{
+  PetscBool any = PETSC_FALSE;
+
+  PetscFunctionBeginUser;
+  for (PetscInt i = 0; i < n; i++) {
+    const char *value = users[i].value;
+
+    if (is_ours(users[i].name)) continue;
+    if (!any) PetscCall(PetscViewerASCIIPrintf(viewer, "\n# for PETSc\n"));
+    any = PETSC_TRUE;
+    if (value && strpbrk(value, "#\"")) PetscCall(PetscViewerASCIIPrintf(viewer, "# "));
+    PetscCall(PetscViewerASCIIPrintf(viewer, "-%s", users[i].name));
+    if (value) PetscCall(print_value(viewer, value, 0));
+    PetscCall(PetscViewerASCIIPrintf(viewer, "\n"));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbOptionsView(PetscViewer viewer)
+{
+  const PetscBool with_presets = (PetscBool)(SbTheOptions.nrecord < LINES_MAX);
+  char folder[PETSC_MAX_PATH_LEN];
+  PetscInt n;
+  SbOptionUser *users;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscGetWorkingDirectory(folder, sizeof(folder)));
+  PetscCall(PetscViewerASCIIPrintf(
+    viewer, "# The complete scenario, written by supple %s; it runs again with\n", SB_VERSION));
+  PetscCall(PetscViewerASCIIPrintf(viewer, "#   supple -options_file THIS_FILE\n"));
+  PetscCall(
+    PetscViewerASCIIPrintf(viewer, "# from this folder, where relative file names begin: %s\n", folder));
+  if (!with_presets)
+    PetscCall(
+      PetscViewerASCIIPrintf(viewer, "# Defaults are comments: PETSc 3.18 holds at most 512 options.\n"));
+  for (PetscInt i = 0; i < SbTheOptions.nrecord; i++) {
+    PetscBool seen = PETSC_FALSE;
+
+    for (PetscInt j = 0; j < i && !seen; j++)
+      seen = same_instance(&SbTheOptions.record[i], &SbTheOptions.record[j]);
+    if (!seen) PetscCall(print_group(viewer, &SbTheOptions.record[i], with_presets));
+  }
+  if (SbTheOptions.remembered) {
+    PetscCall(print_petsc(viewer, SbTheOptions.nuser, SbTheOptions.user));
+  } else {
+    PetscCall(SbOptionUsersGet(&n, &users));
+    PetscCall(print_petsc(viewer, n, users));
+    PetscCall(SbOptionUsersFree(&n, &users));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbViewerOpen(MPI_Comm comm, const char *file, PetscViewer *viewer)
+{
+  PetscMPIInt rank;
+  int error = 0;
+
+  PetscFunctionBeginUser;
+  if (!file[0] || !strcmp(file, "-")) {
+    PetscCall(PetscViewerASCIIOpen(comm, "stdout", viewer));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  /* only rank 0 opens the file; the others must learn that it failed, or they wait for ever */
+  PetscCallMPI(MPI_Comm_rank(comm, &rank));
+  if (!rank) {
+    FILE *f = fopen(file, "w");
+
+    if (f)
+      (void)fclose(f);
+    else
+      error = errno;
+  }
+  PetscCallMPI(MPI_Bcast(&error, 1, MPI_INT, 0, comm));
+  PetscCheck(!error, PETSC_COMM_SELF, PETSC_ERR_FILE_OPEN, "cannot write %s: %s", file, strerror(error));
+  PetscCall(PetscViewerASCIIOpen(comm, file, viewer));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

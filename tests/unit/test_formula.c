@@ -1,0 +1,223 @@
+/*
+  test_formula.c - formulas and tables: values against C's own arithmetic, messages of what cannot be read.
+*/
+// @ranks 1 3
+#include "test.h"
+#include <unistd.h>
+
+static const PetscReal X[3] = {0.5, -2, 3};
+
+static PetscErrorCode value(const char *text, PetscReal expected)
+{
+  SbFormula f;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbFormulaCreate(PETSC_COMM_WORLD, text, "-test", &f));
+  /* the same operations in the same order give the same bits */
+  SB_CHECK(SbFormulaEval(f, 4, X) == expected, "%s is %.17g, expected %.17g", text,
+           (double)SbFormulaEval(f, 4, X), (double)expected);
+  PetscCall(SbFormulaDestroy(&f));
+  SB_CHECK(!f, "destroyed formula is not NULL");
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode test_values(void)
+{
+  const PetscReal t = 4, x = X[0], y = X[1], z = X[2];
+
+  PetscFunctionBeginUser;
+  PetscCall(value("2", 2));
+  PetscCall(value(" .5e1 ", 5));
+  PetscCall(value("1+2*3", 7));
+  PetscCall(value("(1+2)*3", 9));
+  PetscCall(value("10-4-3", 3));
+  PetscCall(value("24/4/3", 2));
+  PetscCall(value("2^3^2", 512));
+  PetscCall(value("-2^2", -4));
+  PetscCall(value("2^-1", 0.5));
+  PetscCall(value("--3", 3));
+  PetscCall(value("2*-3", -6));
+  PetscCall(value("+t", 4));
+  PetscCall(value("x+10*y+100*z+1000*t", x + 10 * y + 100 * z + 1000 * t));
+  PetscCall(value("pi", PETSC_PI));
+  PetscCall(value("sin(2*pi*t/3)", PetscSinReal(2 * PETSC_PI * t / 3)));
+  PetscCall(value("cos(x)+tan(x)", cos(x) + tan(x)));
+  PetscCall(value("asin(x)+acos(x)", asin(x) + acos(x)));
+  PetscCall(value("atan(z)-atan2(y,z)", atan(z) - atan2(y, z)));
+  PetscCall(value("exp(y)*log(z)", exp(y) * log(z)));
+  PetscCall(value("sqrt(abs(y))", sqrt(2.0)));
+  PetscCall(value("min(y,z)+10*max(y,z)", 28));
+  PetscCall(value("floor(y/4)", -1));
+  PetscCall(value("tanh(x)", tanh(x)));
+  PetscCall(value("step(0)+10*step(-1e-300)+100*step(t)", 101));
+  PetscCall(value("ramp(-1)+10*ramp(x)+100*ramp(2)", 105));
+  PetscCall(value("clamp(t,0,3)+10*clamp(y,-1,3)+100*clamp(x,0,1)", 43));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode test_uses(void)
+{
+  static const struct {
+    const char *text;
+    PetscBool time, place;
+  } cases[] = {
+    {"2*pi", PETSC_FALSE, PETSC_FALSE},
+    {"sin(t)", PETSC_TRUE, PETSC_FALSE},
+    {"x*y", PETSC_FALSE, PETSC_TRUE},
+    {"t*z", PETSC_TRUE, PETSC_TRUE},
+  };
+  SbFormula f;
+  PetscBool time, place;
+
+  PetscFunctionBeginUser;
+  for (int i = 0; i < 4; i++) {
+    PetscCall(SbFormulaCreate(PETSC_COMM_WORLD, cases[i].text, "-test", &f));
+    PetscCall(SbFormulaUses(f, &time, &place));
+    SB_CHECK(time == cases[i].time && place == cases[i].place, "%s: time %d, place %d", cases[i].text, time,
+             place);
+    PetscCall(SbFormulaDestroy(&f));
+  }
+  /* without place, x may be NULL */
+  PetscCall(SbFormulaCreate(PETSC_COMM_WORLD, "3*t", "-test", &f));
+  SB_CHECK(SbFormulaEval(f, 2, NULL) == 6, "3*t");
+  PetscCall(SbFormulaDestroy(&f));
+  PetscCall(SbFormulaDestroy(&f));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Creation must fail with this message; what was built so far is freed. */
+static PetscErrorCode refused(const char *text, const char *message)
+{
+  SbFormula f = NULL;
+  PetscErrorCode ierr;
+  char *said;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscPushErrorHandler(PetscReturnErrorHandler, NULL));
+  ierr = SbFormulaCreate(PETSC_COMM_WORLD, text, "-test", &f);
+  PetscCall(PetscPopErrorHandler());
+  SB_CHECK(ierr == PETSC_ERR_USER, "'%s' was accepted", text);
+  PetscCall(PetscErrorMessage(PETSC_ERR_USER, NULL, &said));
+  SB_CHECK(!strcmp(said, message), "message is\n  %s\nexpected\n  %s", said, message);
+  PetscCall(SbFormulaDestroy(&f));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode test_refused(void)
+{
+  char deep[1024], nested[1024], message[2048];
+
+  PetscFunctionBeginUser;
+  PetscCall(refused("", "-test: column 1 of '': the formula ends too early"));
+  PetscCall(refused("2*", "-test: column 3 of '2*': the formula ends too early"));
+  PetscCall(refused("2 3", "-test: column 3 of '2 3': expected an operator"));
+  PetscCall(refused("2x", "-test: column 2 of '2x': expected an operator"));
+  PetscCall(refused("(1+2", "-test: column 5 of '(1+2': expected ')'"));
+  PetscCall(refused("1+2)", "-test: column 4 of '1+2)': expected an operator"));
+  PetscCall(refused("sin t", "-test: column 5 of 'sin t': expected '('"));
+  PetscCall(refused("atan2(1)", "-test: column 8 of 'atan2(1)': expected ','"));
+  PetscCall(refused("sin(1,2)", "-test: column 6 of 'sin(1,2)': expected ')'"));
+  PetscCall(refused("3*sqtr(2)", "-test: column 3 of '3*sqtr(2)': unknown name 'sqtr'; did you mean sqrt?"));
+  PetscCall(refused(
+    "2*s", "-test: column 3 of '2*s': unknown name 's'; a formula knows t (s), x, y, z (m), pi and functions "
+           "such as sin, sqrt, ramp"));
+  PetscCall(refused("t & 1", "-test: column 3 of 't & 1': expected an operator"));
+  PetscCall(
+    refused("inf", "-test: column 1 of 'inf': unknown name 'inf'; a formula knows t (s), x, y, z (m), pi and "
+                   "functions such as sin, sqrt, ramp"));
+
+  /* 300 open brackets; a sum whose terms all wait on the stack */
+  memset(deep, '(', 300);
+  deep[300] = 0;
+  PetscCall(PetscSNPrintf(message, sizeof(message),
+                          "-test: column 257 of '%s': the formula is nested too deeply", deep));
+  PetscCall(refused(deep, message));
+  nested[0] = 0;
+  for (int i = 0; i < 70; i++) PetscCall(PetscStrlcat(nested, "1-(", sizeof(nested)));
+  PetscCall(PetscSNPrintf(message, sizeof(message),
+                          "-test: column 194 of '%s': the formula is nested too deeply", nested));
+  PetscCall(refused(nested, message));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Creates a formula from a table with this content; on the ranks' common folder. */
+static PetscErrorCode table(const char *file, const char *content, const char *problem, SbFormula *f)
+{
+  char text[PETSC_MAX_PATH_LEN], message[2 * PETSC_MAX_PATH_LEN];
+  PetscMPIInt rank;
+
+  PetscFunctionBeginUser;
+  PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
+  if (!rank) {
+    FILE *out = fopen(file, "w");
+
+    PetscCheck(out, PETSC_COMM_SELF, PETSC_ERR_FILE_OPEN, "cannot write %s", file);
+    (void)fputs(content, out);
+    (void)fclose(out);
+  }
+  PetscCallMPI(MPI_Barrier(PETSC_COMM_WORLD));
+  PetscCall(PetscSNPrintf(text, sizeof(text), "table:%s", file));
+  if (problem) {
+    PetscCall(PetscSNPrintf(message, sizeof(message), "-test: %s%s", file, problem));
+    PetscCall(refused(text, message));
+  } else
+    PetscCall(SbFormulaCreate(PETSC_COMM_WORLD, text, "-test", f));
+  PetscCallMPI(MPI_Barrier(PETSC_COMM_WORLD));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode test_tables(void)
+{
+  char file[PETSC_MAX_PATH_LEN] = "/tmp/sb_test_formula_XXXXXX";
+  PetscMPIInt rank;
+  SbFormula f;
+  PetscBool time, place;
+  int fd = -1;
+
+  PetscFunctionBeginUser;
+  PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
+  if (!rank) fd = mkstemp(file);
+  if (!rank) PetscCheck(fd >= 0, PETSC_COMM_SELF, PETSC_ERR_FILE_OPEN, "cannot make a file");
+  if (!rank) (void)close(fd);
+  PetscCallMPI(MPI_Bcast(file, sizeof(file), MPI_CHAR, 0, PETSC_COMM_WORLD));
+
+  PetscCall(table(file, "# t value\n0 1\n\n 1, 3 # here\r\n2\t5\n4;-5", NULL, &f));
+  PetscCall(SbFormulaUses(f, &time, &place));
+  SB_CHECK(time && !place, "a table is a function of time");
+  SB_CHECK(SbFormulaEval(f, -1, NULL) == 1 && SbFormulaEval(f, 9, NULL) == -5, "constant outside");
+  SB_CHECK(SbFormulaEval(f, 1, NULL) == 3 && SbFormulaEval(f, 2, NULL) == 5, "at the rows");
+  SB_CHECK(SbFormulaEval(f, 0.25, NULL) == 1.5 && SbFormulaEval(f, 3, NULL) == 0, "in between");
+  PetscCall(SbFormulaDestroy(&f));
+  PetscCall(table(file, "3 8\n", NULL, &f));
+  SB_CHECK(SbFormulaEval(f, 0, NULL) == 8, "a single row");
+  PetscCall(SbFormulaDestroy(&f));
+
+  PetscCall(table(file, "0 1\n1 x\n", ", line 2: expected two numbers, time (s) and value", &f));
+  PetscCall(table(file, "0 1\n1\n", ", line 2: expected two numbers, time (s) and value", &f));
+  PetscCall(table(file, "0 1 2\n", ", line 1: expected two numbers, time (s) and value", &f));
+  PetscCall(table(file, "0 nan\n", ", line 1: expected two numbers, time (s) and value", &f));
+  PetscCall(
+    table(file, "0 1\n2 1\n2 3\n", ", line 3: time 2 s does not come after 2 s; times must ascend", &f));
+  PetscCall(table(file, "# nothing\n", " holds no numbers", &f));
+  if (!rank) (void)unlink(file);
+  PetscCall(
+    refused("table:/nonexistent.txt", "-test: cannot open /nonexistent.txt: No such file or directory"));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode run_tests(void)
+{
+  PetscFunctionBeginUser;
+  PetscCall(test_values());
+  PetscCall(test_uses());
+  PetscCall(test_refused());
+  PetscCall(test_tables());
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+int main(int argc, char **argv)
+{
+  SB_TEST_BEGIN(argc, argv);
+  PetscCall(run_tests());
+  SB_TEST_END();
+}

@@ -1,0 +1,472 @@
+/*
+  test_option.c - the table of options: readers, ranges, messages, unread options, the printed scenario, the manual.
+*/
+// @ranks 1 3
+#include "test.h"
+#include <unistd.h>
+
+static const SbOption body_rows[] = {
+  {"mesh", SB_OPTION_STRING, 1, "", NULL, "", "mesh file"},
+  {"scale", SB_OPTION_REAL, 1, "", "1", "(0, inf)", "factor on the file's coordinates"},
+  {"translate", SB_OPTION_REALS, 3, "m", "0,0,0", "(-inf, inf)", "shift"},
+  {"poisson", SB_OPTION_REAL, 1, "", "0.3", "[0, 0.5)",
+   "Poisson's ratio; 0.5 itself is incompressible, use 0.499"},
+  {"closed", SB_OPTION_REAL, 1, "", "1", "(0, 1]", "a range with a closed end"},
+  {"tags", SB_OPTION_NAMES, 1, "", "", "", "names"},
+  {"pull", SB_OPTION_FORMULA, 3, "N", "0; 0; 2*t", "", "force"},
+};
+static const SbOption law_rows[] = {
+  {"young", SB_OPTION_REAL, 1, "Pa", NULL, "(0, inf)", "Young's modulus"},
+};
+static const SbOption run_rows[] = {
+  {"bodies", SB_OPTION_NAMES, 1, "", NULL, "", "names of the bodies"},
+  {"verbose", SB_OPTION_BOOL, 1, "", "false", "", "say more"},
+  {"repeat", SB_OPTION_INT, 1, "", "3", "[1, inf)", "how often"},
+  {"integrator", SB_OPTION_CHOICE, 1, "", "newmark", "newmark|genalpha|static", "integrator"},
+  {"limit", SB_OPTION_REAL, 1, "s", "", "(0, inf)", "nothing by default"},
+  {"other", SB_OPTION_REAL, 1, "s", "1", "(0, inf)", "only one integrator reads it"},
+};
+
+static SbScope run_scope, body_scope;
+
+/* A fresh database and table; `options` as on a command line, or a file. */
+static PetscErrorCode begin(const char *options, PetscOptions *database)
+{
+  PetscFunctionBeginUser;
+  PetscCall(PetscOptionsCreate(database));
+  PetscCall(PetscOptionsPush(*database));
+  PetscCall(PetscOptionsInsertString(NULL, options));
+  PetscCall(SbOptionsRegister("", "", PETSC_STATIC_ARRAY_LENGTH(run_rows), run_rows));
+  PetscCall(SbOptionsRegister("body", "", PETSC_STATIC_ARRAY_LENGTH(body_rows), body_rows));
+  PetscCall(SbOptionsRegister("body", "corotated", PETSC_STATIC_ARRAY_LENGTH(law_rows), law_rows));
+  PetscCall(SbScopeSet(&run_scope, "", "", ""));
+  PetscCall(SbScopeSet(&body_scope, "body", "corotated", "liver"));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode end(PetscOptions *database)
+{
+  PetscFunctionBeginUser;
+  PetscCall(SbOptionsReset());
+  PetscCall(PetscOptionsPop());
+  PetscCall(PetscOptionsDestroy(database));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The call must fail with exactly this message. */
+#define EXPECT_MESSAGE(call, expected)                                                                   \
+  do {                                                                                                   \
+    PetscErrorCode expect_ierr;                                                                          \
+    char *expect_text;                                                                                   \
+    PetscCall(PetscPushErrorHandler(PetscReturnErrorHandler, NULL));                                     \
+    expect_ierr = call;                                                                                  \
+    PetscCall(PetscPopErrorHandler());                                                                   \
+    SB_CHECK(expect_ierr == PETSC_ERR_USER, "code %d for: %s", (int)expect_ierr, expected);              \
+    PetscCall(PetscErrorMessage(PETSC_ERR_USER, NULL, &expect_text));                                    \
+    SB_CHECK(!strcmp(expect_text, expected), "message is\n  %s\nexpected\n  %s", expect_text, expected); \
+  } while (0)
+
+/* One option with a text that must be refused. */
+static PetscErrorCode refused_real(const char *options, const char *key, const char *message)
+{
+  PetscOptions database;
+  PetscReal x[3];
+
+  PetscFunctionBeginUser;
+  PetscCall(begin(options, &database));
+  if (!strcmp(key, "translate"))
+    EXPECT_MESSAGE(SbOptionReals(&body_scope, key, x), message);
+  else
+    EXPECT_MESSAGE(SbOptionReal(&body_scope, key, x), message);
+  PetscCall(end(&database));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode test_refused_numbers(void)
+{
+  PetscFunctionBeginUser;
+  PetscCall(refused_real("-body_liver_young -3", "young",
+                         "-body_liver_young -3 Pa is outside (0, inf) Pa: Young's modulus"));
+  PetscCall(refused_real("-body_liver_young 0", "young",
+                         "-body_liver_young 0 Pa is outside (0, inf) Pa: Young's modulus"));
+  PetscCall(refused_real("-body_liver_young inf", "young",
+                         "-body_liver_young inf Pa is outside (0, inf) Pa: Young's modulus"));
+  PetscCall(refused_real("-body_liver_young nan", "young",
+                         "-body_liver_young nan Pa is outside (0, inf) Pa: Young's modulus"));
+  PetscCall(refused_real("-body_liver_young 5e3x", "young",
+                         "-body_liver_young 5e3x is not a number: Young's modulus"));
+  PetscCall(
+    refused_real("", "young", "-body_liver_young must be given: Young's modulus, in (0, inf), unit Pa"));
+  PetscCall(refused_real(
+    "-body_liver_poisson 0.5", "poisson",
+    "-body_liver_poisson 0.5 is outside [0, 0.5): Poisson's ratio; 0.5 itself is incompressible, use 0.499"));
+  PetscCall(refused_real("-body_liver_poisson -1e-9", "poisson",
+                         "-body_liver_poisson -1e-9 is outside [0, 0.5): Poisson's ratio; 0.5 itself is "
+                         "incompressible, use 0.499"));
+  PetscCall(refused_real("-body_liver_closed 0", "closed",
+                         "-body_liver_closed 0 is outside (0, 1]: a range with a closed end"));
+  PetscCall(refused_real("-body_liver_closed 1.0001", "closed",
+                         "-body_liver_closed 1.0001 is outside (0, 1]: a range with a closed end"));
+  PetscCall(refused_real("-body_liver_translate 1,2", "translate",
+                         "-body_liver_translate 1,2 has 2 numbers, needs 3 with commas between them: shift"));
+  PetscCall(
+    refused_real("-body_liver_translate 1,2,3,4", "translate",
+                 "-body_liver_translate 1,2,3,4 has 4 numbers, needs 3 with commas between them: shift"));
+  PetscCall(refused_real("-body_liver_translate 1,,3", "translate",
+                         "-body_liver_translate 1,,3: entry 2 is not a number: shift"));
+  PetscCall(refused_real("-body_liver_translate 1,nan,3", "translate",
+                         "-body_liver_translate 1,nan,3 m is outside (-inf, inf) m: shift"));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode test_refused_words(void)
+{
+  PetscOptions database;
+  PetscBool b;
+  PetscInt n;
+  char(*names)[SB_NAME_MAX], text[8];
+  SbFormula f[3];
+
+  PetscFunctionBeginUser;
+  PetscCall(begin(
+    "-verbose perhaps -repeat 2.5 -integrator newmrk -body_liver_tags a,,b -body_liver_pull 1;2 -bodies "
+    "-body_liver_mesh long_name.msh",
+    &database));
+  EXPECT_MESSAGE(SbOptionBool(&run_scope, "verbose", &b),
+                 "-verbose perhaps is neither true nor false: say more");
+  EXPECT_MESSAGE(SbOptionInt(&run_scope, "repeat", &n), "-repeat 2.5 is not a whole number: how often");
+  EXPECT_MESSAGE(
+    SbOptionChoice(&run_scope, "integrator", &n),
+    "-integrator newmrk is not one of newmark|genalpha|static (did you mean newmark?): integrator");
+  EXPECT_MESSAGE(SbOptionNames(&body_scope, "tags", &n, &names),
+                 "-body_liver_tags a,,b: name 2 is empty or longer than 63 characters: names");
+  EXPECT_MESSAGE(SbOptionFormulas(&body_scope, "pull", f),
+                 "-body_liver_pull 1;2 has 2 formulas, needs 3 with semicolons between them: force");
+  EXPECT_MESSAGE(
+    SbOptionNames(&run_scope, "bodies", &n, &names),
+    "-bodies has no value: names of the bodies (a value that begins with a minus sign and a letter needs a "
+    "blank before it, in quotes)");
+  EXPECT_MESSAGE(SbOptionString(&body_scope, "mesh", sizeof(text), text),
+                 "-body_liver_mesh is longer than 7 characters: mesh file");
+  PetscCall(end(&database));
+  PetscCall(begin("-repeat 0", &database));
+  EXPECT_MESSAGE(SbOptionInt(&run_scope, "repeat", &n), "-repeat 0 is outside [1, inf): how often");
+  SB_CHECK_ERROR(SbOptionReal(&run_scope, "nonesuch", NULL), "a key without a row");
+  PetscCall(end(&database));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Reads every option of the table, as a program would, and checks the values of the user or the presets. */
+static PetscErrorCode read_all(PetscBool given)
+{
+  PetscReal x[3], limit = 77;
+  PetscBool b;
+  PetscInt n, choice, repeat;
+  char(*names)[SB_NAME_MAX], text[64];
+  SbFormula f[3];
+
+  PetscFunctionBeginUser;
+  PetscCall(SbOptionNames(&run_scope, "bodies", &n, &names));
+  SB_CHECK(n == 2 && !strcmp(names[0], "liver") && !strcmp(names[1], "stone"), "%d bodies", (int)n);
+  PetscCall(PetscFree(names));
+  PetscCall(SbOptionBool(&run_scope, "verbose", &b));
+  SB_CHECK(b == given, "verbose");
+  PetscCall(SbOptionInt(&run_scope, "repeat", &repeat));
+  SB_CHECK(repeat == (given ? 12 : 3), "repeat is %d", (int)repeat);
+  PetscCall(SbOptionChoice(&run_scope, "integrator", &choice));
+  SB_CHECK(choice == (given ? 2 : 0), "integrator is %d", (int)choice);
+  PetscCall(SbOptionReal(&run_scope, "limit", &limit));
+  SB_CHECK(limit == (given ? 0.1 : 77), "limit is %g", (double)limit);
+  PetscCall(SbOptionString(&body_scope, "mesh", sizeof(text), text));
+  SB_CHECK(!strcmp(text, "my meshes/liver.msh"), "mesh is '%s'", text);
+  PetscCall(SbOptionReal(&body_scope, "scale", &x[0]));
+  SB_CHECK(x[0] == (given ? 0.10000000000000002 : 1), "scale is %.17g", (double)x[0]);
+  PetscCall(SbOptionReals(&body_scope, "translate", x));
+  SB_CHECK(x[0] == (given ? -1 : 0) && x[1] == (given ? 2.5 : 0) && x[2] == (given ? 1e-300 : 0),
+           "translate");
+  PetscCall(SbOptionReal(&body_scope, "young", &x[0]));
+  SB_CHECK(x[0] == 5e3, "young is %g", (double)x[0]);
+  PetscCall(SbOptionNames(&body_scope, "tags", &n, &names));
+  SB_CHECK(n == (given ? 1 : 0), "%d tags", (int)n);
+  PetscCall(PetscFree(names));
+  PetscCall(SbOptionFormulas(&body_scope, "pull", f));
+  x[0] = 7, x[1] = 8, x[2] = 9;
+  SB_CHECK(SbFormulaEval(f[0], 3, x) == (given ? -7 : 0), "pull 0 is %g", (double)SbFormulaEval(f[0], 3, x));
+  SB_CHECK(SbFormulaEval(f[2], 3, x) == (given ? 10 : 6), "pull 2 is %g", (double)SbFormulaEval(f[2], 3, x));
+  for (int i = 0; i < 3; i++) PetscCall(SbFormulaDestroy(&f[i]));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode write_file(const char *name, const char *text)
+{
+  PetscMPIInt rank;
+  FILE *f;
+
+  PetscFunctionBeginUser;
+  PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
+  if (!rank) {
+    f = fopen(name, "w");
+    PetscCheck(f, PETSC_COMM_SELF, PETSC_ERR_FILE_OPEN, "cannot write %s", name);
+    (void)fputs(text, f);
+    (void)fclose(f);
+  }
+  PetscCallMPI(MPI_Barrier(PETSC_COMM_WORLD));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static const char as_opts[] = "# a comment\n"
+                              "-bodies liver,stone   # another\n"
+                              "-verbose\n"
+                              "-repeat 12\n"
+                              "-integrator static\n"
+                              "-limit 0.1\n"
+                              "-body_liver_mesh \"my meshes/liver.msh\"\n"
+                              "-body_liver_scale 0.10000000000000002\n"
+                              "-body_liver_translate -1,2.5,1e-300\n"
+                              "-body_liver_young 5e3\n"
+                              "-body_liver_tags one\n"
+                              "-body_liver_pull \" -x ; 0 ; t + -3 + 2*(2 + 3)\"\n"
+                              "-ksp_rtoll 1e-7\n";
+static const char as_yaml[] = "# a comment\n"
+                              "bodies: [liver, stone]\n"
+                              "verbose: yes\n"
+                              "repeat: 12\n"
+                              "integrator: static\n"
+                              "limit: 0.1\n"
+                              "body:\n"
+                              "  liver:\n"
+                              "    mesh: my meshes/liver.msh\n"
+                              "    scale: 0.10000000000000002\n"
+                              "    translate: [-1, 2.5, 1e-300]\n"
+                              "    young: 5e3\n"
+                              "    tags: [one]\n"
+                              "    pull: -x ; 0 ; t + -3 + 2*(2 + 3)\n"
+                              "ksp_rtoll: 1e-7\n";
+
+/* Option file, YAML, and the scenario printed from each give the same values; presets are not the user's. */
+static PetscErrorCode test_files(const char *folder)
+{
+  const char *const source[2] = {as_opts, as_yaml};
+  char file[2][PETSC_MAX_PATH_LEN], view[PETSC_MAX_PATH_LEN];
+  PetscOptions database;
+  PetscViewer viewer;
+  PetscInt unused;
+  const char *value;
+  PetscBool set;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscSNPrintf(file[0], sizeof(file[0]), "%s/a.opts", folder));
+  PetscCall(PetscSNPrintf(file[1], sizeof(file[1]), "%s/a.yml", folder));
+  PetscCall(PetscSNPrintf(view, sizeof(view), "%s/view.opts", folder));
+  for (int i = 0; i < 2; i++) {
+    PetscCall(write_file(file[i], source[i]));
+    PetscCall(begin("", &database));
+    PetscCall(PetscOptionsInsertFile(PETSC_COMM_WORLD, NULL, file[i], PETSC_TRUE));
+    PetscCall(SbOptionsRemember());
+    PetscCall(PetscOptionsSetValue(NULL, "-pc_type", "jacobi"));
+    PetscCall(read_all(PETSC_TRUE));
+    PetscCall(SbOptionsCheck());
+    PetscCall(SbViewerOpen(PETSC_COMM_WORLD, view, &viewer));
+    PetscCall(SbOptionsView(viewer));
+    PetscCall(PetscViewerDestroy(&viewer));
+    PetscCall(end(&database));
+
+    PetscCall(begin("", &database));
+    PetscCall(PetscOptionsInsertFile(PETSC_COMM_WORLD, NULL, view, PETSC_TRUE));
+    PetscCall(SbOptionsRemember());
+    PetscCall(read_all(PETSC_TRUE));
+    PetscCall(SbOptionsCheck());
+    PetscCall(SbOptionsUnused(PETSC_COMM_WORLD, &unused));
+    SB_CHECK(unused == 1, "%d options left, not only -ksp_rtoll", (int)unused);
+    PetscCall(PetscOptionsFindPair(NULL, NULL, "-ksp_rtoll", &value, &set));
+    SB_CHECK(set && value && !strcmp(value, "1e-7"), "-ksp_rtoll was lost");
+    PetscCall(PetscOptionsFindPair(NULL, NULL, "-pc_type", &value, &set));
+    SB_CHECK(!set, "a preset of the program was printed as the user's");
+    PetscCall(end(&database));
+  }
+  PetscCall(
+    begin("-bodies liver,stone -body_liver_mesh \"my meshes/liver.msh\" -body_liver_young 5e3", &database));
+  PetscCall(read_all(PETSC_FALSE));
+  PetscCall(SbOptionsCheck());
+  PetscCall(end(&database));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* A presets-only value appears in the printed scenario, active, with its full text. */
+static PetscErrorCode test_view_text(const char *folder)
+{
+  char view[PETSC_MAX_PATH_LEN], line[512];
+  PetscOptions database;
+  PetscViewer viewer;
+  PetscReal x;
+  PetscMPIInt rank;
+  PetscBool preset = PETSC_FALSE, given = PETSC_FALSE;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscSNPrintf(view, sizeof(view), "%s/text.opts", folder));
+  PetscCall(begin("-body_liver_scale 0.123456789012345678", &database));
+  PetscCall(SbOptionReal(&body_scope, "poisson", &x));
+  PetscCall(SbOptionReal(&body_scope, "scale", &x));
+  PetscCall(SbViewerOpen(PETSC_COMM_WORLD, view, &viewer));
+  PetscCall(SbOptionsView(viewer));
+  PetscCall(PetscViewerDestroy(&viewer));
+  PetscCall(end(&database));
+  PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
+  if (!rank) {
+    FILE *f = fopen(view, "r");
+
+    while (f && fgets(line, sizeof(line), f)) {
+      if (!strncmp(line, "-body_liver_poisson 0.3 ", 24) && strstr(line, "# default; Poisson"))
+        preset = PETSC_TRUE;
+      if (!strncmp(line, "-body_liver_scale 0.123456789012345678 ", 39) && !strstr(line, "default"))
+        given = PETSC_TRUE;
+    }
+    if (f) (void)fclose(f);
+    SB_CHECK(preset, "the preset is not in the printed scenario");
+    SB_CHECK(given, "the given value is not in the printed scenario");
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* `options` beside two good ones; everything is read but "other"; the check must say `message`. */
+static PetscErrorCode unread(const char *options, const char *message)
+{
+  PetscOptions database;
+
+  PetscFunctionBeginUser;
+  PetscCall(
+    begin("-bodies liver,stone -body_liver_mesh \"my meshes/liver.msh\" -body_liver_young 5e3", &database));
+  PetscCall(PetscOptionsInsertString(NULL, options));
+  PetscCall(read_all(PETSC_FALSE));
+  if (message)
+    EXPECT_MESSAGE(SbOptionsCheck(), message);
+  else
+    PetscCall(SbOptionsCheck());
+  PetscCall(end(&database));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode test_check(void)
+{
+  PetscFunctionBeginUser;
+  PetscCall(unread("-body_liver_yuong 3",
+                   "-body_liver_yuong is not an option of supple; did you mean -body_liver_young?"));
+  PetscCall(unread("-body_livr_young 3",
+                   "-body_livr_young is not an option of supple; did you mean -body_liver_young?"));
+  PetscCall(unread("-bodeis 3", "-bodeis is not an option of supple; did you mean -bodies?"));
+  PetscCall(unread("-integratr 3", "-integratr is not an option of supple; did you mean -integrator?"));
+  PetscCall(unread("-body_liver_colour red", "-body_liver_colour is not an option of supple; body liver has "
+                                             "mesh, scale, translate, young, tags, pull"));
+  PetscCall(
+    unread("-body_spleen_mesh a.msh",
+           "-body_spleen_mesh is not an option of supple: it names no body of this scenario (liver)"));
+  PetscCall(unread("-other 2", "-other does nothing in this scenario: only one integrator reads it"));
+  PetscCall(unread(
+    "-body_liver_yuong 3 -body_liver_yung 4",
+    "-body_liver_yung is not an option of supple; did you mean -body_liver_young? (and 1 more like it)"));
+  /* not ours: PETSc's, or near nothing */
+  PetscCall(unread("-ksp_rtoll 1e-3 -frobnicate 2", NULL));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Names with underscores are allowed; two meanings of one full name are not. */
+static PetscErrorCode test_underscores(void)
+{
+  static const SbOption long_rows[] = {
+    {"mesh_scale", SB_OPTION_REAL, 1, "", "1", "", "a key with an underscore"}};
+  PetscOptions database;
+  SbScope other;
+  PetscReal x;
+
+  PetscFunctionBeginUser;
+  PetscCall(begin("-body_liver_mesh_scale 3", &database));
+  PetscCall(SbOptionsRegister("body", "", 1, long_rows));
+  PetscCall(SbScopeSet(&other, "body", "corotated", "liver_mesh"));
+  PetscCall(SbOptionReal(&other, "scale", &x));
+  SB_CHECK(x == 3, "scale of liver_mesh is %g", (double)x);
+  EXPECT_MESSAGE(
+    SbOptionReal(&body_scope, "mesh_scale", &x),
+    "-body_liver_mesh_scale has two meanings: scale of body 'liver_mesh' and mesh_scale of body 'liver'; "
+    "rename one of the two");
+  PetscCall(end(&database));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode test_nearest(void)
+{
+  const char *const names[] = {"gravity", "traction", "pressure", "p1", "cr"};
+  char text[64];
+
+  PetscFunctionBeginUser;
+  PetscCall(SbNearest("gravty", 5, names, sizeof(text), text));
+  SB_CHECK(!strcmp(text, "gravity"), "'%s'", text);
+  PetscCall(SbNearest("GRAVITY", 5, names, sizeof(text), text));
+  SB_CHECK(!strcmp(text, "gravity"), "'%s'", text);
+  PetscCall(SbNearest("c1", 5, names, sizeof(text), text));
+  SB_CHECK(!strcmp(text, "p1 or cr"), "'%s'", text);
+  PetscCall(SbNearest("contact", 5, names, sizeof(text), text));
+  SB_CHECK(!text[0], "'%s'", text);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Every row is in the manual. */
+static PetscErrorCode test_manual(const char *folder)
+{
+  char file[PETSC_MAX_PATH_LEN], line[1024];
+  PetscOptions database;
+  PetscMPIInt rank;
+  int rows = 0, headlines = 0, required = 0;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscSNPrintf(file, sizeof(file), "%s/options.md", folder));
+  PetscCall(begin("", &database));
+  PetscCall(SbOptionsMarkdown(PETSC_COMM_WORLD, file));
+  PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
+  if (!rank) {
+    FILE *f = fopen(file, "r");
+
+    while (f && fgets(line, sizeof(line), f)) {
+      if (!strncmp(line, "| `-", 4)) rows++;
+      if (!strncmp(line, "## ", 3)) headlines++;
+      if (!strncmp(line, "| `-body_<name>_young` |", 24) && strstr(line, "| required |")) required++;
+    }
+    if (f) (void)fclose(f);
+    SB_CHECK(rows == 14, "%d rows in the manual", rows);
+    SB_CHECK(headlines == 3, "%d headlines in the manual", headlines);
+    SB_CHECK(required == 1, "young is not marked as required");
+  }
+  SB_CHECK_ERROR(SbOptionsMarkdown(PETSC_COMM_WORLD, "/nonexistent/folder/options.md"),
+                 "a folder that does not exist");
+  PetscCall(end(&database));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode run_tests(void)
+{
+  char folder[PETSC_MAX_PATH_LEN] = "/tmp/sb_test_option_XXXXXX", command[PETSC_MAX_PATH_LEN + 16];
+  PetscMPIInt rank;
+
+  PetscFunctionBeginUser;
+  PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
+  if (!rank) PetscCheck(mkdtemp(folder), PETSC_COMM_SELF, PETSC_ERR_FILE_OPEN, "cannot make a folder");
+  PetscCallMPI(MPI_Bcast(folder, sizeof(folder), MPI_CHAR, 0, PETSC_COMM_WORLD));
+  PetscCall(test_refused_numbers());
+  PetscCall(test_refused_words());
+  PetscCall(test_files(folder));
+  PetscCall(test_view_text(folder));
+  PetscCall(test_check());
+  PetscCall(test_underscores());
+  PetscCall(test_nearest());
+  PetscCall(test_manual(folder));
+  PetscCallMPI(MPI_Barrier(PETSC_COMM_WORLD));
+  PetscCall(PetscSNPrintf(command, sizeof(command), "rm -rf %s", folder));
+  if (!rank) PetscCheck(!system(command), PETSC_COMM_SELF, PETSC_ERR_SYS, "cannot remove %s", folder);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+int main(int argc, char **argv)
+{
+  SB_TEST_BEGIN(argc, argv);
+  PetscCall(run_tests());
+  SB_TEST_END();
+}
