@@ -19,12 +19,12 @@
 
 struct _p_SbDeadLoad {
   PetscInt ncorner, nitem;
-  PetscInt *corner; /* [nitem][ncorner] index into node; NULL once a steady load was integrated */
+  PetscInt *corner;        /* [nitem][ncorner] index into node; NULL once a steady load was integrated */
   const PetscReal *node_x; /* borrowed from the space */
   PetscInt n, nowned;
-  PetscInt *node; /* [n] local nodes, ascending, so owned ones first */
-  PetscReal *value; /* [n][3] N */
-  PetscReal t; /* s, of value */
+  PetscInt *node;       /* [n] local nodes, ascending, so owned ones first */
+  PetscReal *value;     /* [n][3] N */
+  PetscReal t;          /* s, of value */
   SbFormula density[3]; /* borrowed */
 };
 

@@ -21,14 +21,14 @@ typedef struct {
 } Drive;
 
 static const SbOption rows[] = {
-    {"on", SB_OPTION_NAMES, 1, "", NULL, "", "sets whose nodes are moved"},
-    {"components", SB_OPTION_CHOICE, 1, "", "xyz", SB_HOLD_CHOICES, "directions that are prescribed"},
-    {"displacement", SB_OPTION_FORMULA, 3, "m", "0;0;0", "",
-     "translation, three formulas of t, x, y, z (rest position)"},
-    {"angle", SB_OPTION_FORMULA, 1, "degree", "0", "",
-     "angle of rotation about the axis, a formula of the time t"},
-    {"axis", SB_OPTION_REALS, 3, "", "0,0,1", "", "direction of the axis of rotation; right-handed"},
-    {"axis_point", SB_OPTION_REALS, 3, "m", "0,0,0", "", "a point on the axis of rotation"},
+  {"on", SB_OPTION_NAMES, 1, "", NULL, "", "sets whose nodes are moved"},
+  {"components", SB_OPTION_CHOICE, 1, "", "xyz", SB_HOLD_CHOICES, "directions that are prescribed"},
+  {"displacement", SB_OPTION_FORMULA, 3, "m", "0;0;0", "",
+   "translation, three formulas of t, x, y, z (rest position)"},
+  {"angle", SB_OPTION_FORMULA, 1, "degree", "0", "",
+   "angle of rotation about the axis, a formula of the time t"},
+  {"axis", SB_OPTION_REALS, 3, "", "0,0,1", "", "direction of the axis of rotation; right-handed"},
+  {"axis_point", SB_OPTION_REALS, 3, "m", "0,0,0", "", "a point on the axis of rotation"},
 };
 
 static PetscErrorCode options_drive(SbEffect e, const SbScope *scope)
@@ -94,7 +94,7 @@ static PetscErrorCode prescribe_drive(SbEffect e, SbSpace space, PetscReal t)
     cross(d->axis, kr, kkr);
     for (int c = 0; c < 3; c++) {
       d->value[3 * i + c] =
-          SbFormulaEval(d->displacement[c], t, X) + PetscSinReal(theta) * kr[c] + 2 * half * half * kkr[c];
+        SbFormulaEval(d->displacement[c], t, X) + PetscSinReal(theta) * kr[c] + 2 * half * half * kkr[c];
     }
   }
   PetscCall(SbHoldPrescribe(&d->hold, space, d->value));

@@ -9,7 +9,7 @@
 PetscFunctionList SbEffectList = NULL;
 
 static const SbOption common_rows[] = {
-    {"type", SB_OPTION_STRING, 1, "", "", "", "what the effect is; by default its own name says so"},
+  {"type", SB_OPTION_STRING, 1, "", "", "", "what the effect is; by default its own name says so"},
 };
 
 static PetscErrorCode forget_types(void)

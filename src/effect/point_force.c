@@ -10,15 +10,15 @@
 typedef struct {
   SbEffectOn on;
   SbFormula vector[3], time;
-  PetscInt n; /* owned nodes of the sets on this rank */
-  PetscInt *node; /* [n] local */
+  PetscInt n;      /* owned nodes of the sets on this rank */
+  PetscInt *node;  /* [n] local */
   PetscReal share; /* 1 / global number of nodes */
 } PointForce;
 
 static const SbOption rows[] = {
-    {"on", SB_OPTION_NAMES, 1, "", NULL, "", "sets whose nodes share the force equally"},
-    {"vector", SB_OPTION_FORMULA, 3, "N", NULL, "", "total force, three formulas of the time t"},
-    {"time", SB_OPTION_FORMULA, 1, "", "1", "", "factor on the force, a formula of the time t"},
+  {"on", SB_OPTION_NAMES, 1, "", NULL, "", "sets whose nodes share the force equally"},
+  {"vector", SB_OPTION_FORMULA, 3, "N", NULL, "", "total force, three formulas of the time t"},
+  {"time", SB_OPTION_FORMULA, 1, "", "1", "", "factor on the force, a formula of the time t"},
 };
 
 static PetscErrorCode options_point_force(SbEffect e, const SbScope *scope)

@@ -23,8 +23,8 @@
 
 /* One facet of the loaded surface. */
 typedef struct {
-  PetscInt node[3]; /* local nodes, counter-clockwise seen from outside */
-  PetscInt cell; /* local cell */
+  PetscInt node[3];   /* local nodes, counter-clockwise seen from outside */
+  PetscInt cell;      /* local cell */
   PetscInt corner[3]; /* 0..3, which nodes of the cell these are */
 } Facet;
 
@@ -37,12 +37,12 @@ typedef struct {
 } Pressure;
 
 static const SbOption rows[] = {
-    {"on", SB_OPTION_NAMES, 1, "", NULL, "", "sets whose boundary facets are under pressure"},
-    {"value", SB_OPTION_FORMULA, 1, "Pa", NULL, "",
-     "pressure, a formula of the time t; positive pushes inwards"},
-    {"follower", SB_OPTION_BOOL, 1, "", "true", "",
-     "act on the current area and normal; if not, on those at rest"},
-    {"time", SB_OPTION_FORMULA, 1, "", "1", "", "factor on the pressure, a formula of the time t"},
+  {"on", SB_OPTION_NAMES, 1, "", NULL, "", "sets whose boundary facets are under pressure"},
+  {"value", SB_OPTION_FORMULA, 1, "Pa", NULL, "",
+   "pressure, a formula of the time t; positive pushes inwards"},
+  {"follower", SB_OPTION_BOOL, 1, "", "true", "",
+   "act on the current area and normal; if not, on those at rest"},
+  {"time", SB_OPTION_FORMULA, 1, "", "1", "", "factor on the pressure, a formula of the time t"},
 };
 
 static PetscErrorCode options_pressure(SbEffect e, const SbScope *scope)
@@ -125,7 +125,7 @@ static PetscErrorCode tangent_pressure(SbEffect e, SbSpace space, const SbStage 
 {
   const Pressure *load = (const Pressure *)e->data;
   const PetscReal p =
-      stage->shift_k * SbFormulaEval(load->value, stage->t, NULL) * SbFormulaEval(load->time, stage->t, NULL);
+    stage->shift_k * SbFormulaEval(load->value, stage->t, NULL) * SbFormulaEval(load->time, stage->t, NULL);
 
   PetscFunctionBeginUser;
   if (p == 0) PetscFunctionReturn(PETSC_SUCCESS);

@@ -31,9 +31,9 @@ static PetscErrorCode find_sets(SbSpace space, const SbEffectOn *on, Kind kind, 
 {
   const char *const need[] = {"tetrahedra", "boundary facets", "vertices"};
   const char *const hint[] = {
-      "take a set that encloses whole tetrahedra, such as a body or a larger box",
-      "take a set that contains whole triangles of the surface, such as a thicker plane or box",
-      "take a larger set"};
+    "take a set that encloses whole tetrahedra, such as a body or a larger box",
+    "take a set that contains whole triangles of the surface, such as a thicker plane or box",
+    "take a larger set"};
 
   PetscFunctionBeginUser;
   PetscCheck(on->n || kind == CELLS, space->comm, PETSC_ERR_USER_INPUT,

@@ -14,8 +14,8 @@ typedef struct {
 } Support;
 
 static const SbOption rows[] = {
-    {"on", SB_OPTION_NAMES, 1, "", NULL, "", "sets whose nodes are held"},
-    {"components", SB_OPTION_CHOICE, 1, "", "xyz", SB_HOLD_CHOICES, "directions that are held"},
+  {"on", SB_OPTION_NAMES, 1, "", NULL, "", "sets whose nodes are held"},
+  {"components", SB_OPTION_CHOICE, 1, "", "xyz", SB_HOLD_CHOICES, "directions that are held"},
 };
 
 static PetscErrorCode options_support(SbEffect e, const SbScope *scope)

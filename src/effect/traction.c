@@ -11,19 +11,19 @@ typedef struct {
   SbEffectOn on;
   char option[3 * SB_NAME_MAX]; /* full name of the option "total" */
   SbFormula vector[3], time;
-  PetscReal total[3]; /* N */
-  SbFormula uniform[3]; /* total per area, Pa */
+  PetscReal total[3];             /* N */
+  SbFormula uniform[3];           /* total per area, Pa */
   SbDeadLoad by_vector, by_total; /* NULL when not given */
   PetscBool vector_given, total_given;
 } Traction;
 
 static const SbOption rows[] = {
-    {"on", SB_OPTION_NAMES, 1, "", NULL, "", "sets whose boundary facets carry the traction"},
-    {"vector", SB_OPTION_FORMULA, 3, "Pa", "0;0;0", "",
-     "force per rest area, three formulas of t, x, y, z (rest position)"},
-    {"total", SB_OPTION_REALS, 3, "N", "0,0,0", "",
-     "total force, spread evenly over the rest area of the sets"},
-    {"time", SB_OPTION_FORMULA, 1, "", "1", "", "factor on the traction, a formula of the time t"},
+  {"on", SB_OPTION_NAMES, 1, "", NULL, "", "sets whose boundary facets carry the traction"},
+  {"vector", SB_OPTION_FORMULA, 3, "Pa", "0;0;0", "",
+   "force per rest area, three formulas of t, x, y, z (rest position)"},
+  {"total", SB_OPTION_REALS, 3, "N", "0,0,0", "",
+   "total force, spread evenly over the rest area of the sets"},
+  {"time", SB_OPTION_FORMULA, 1, "", "1", "", "factor on the traction, a formula of the time t"},
 };
 
 static PetscErrorCode options_traction(SbEffect e, const SbScope *scope)

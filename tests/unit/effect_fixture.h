@@ -1,0 +1,222 @@
+/*
+  effect_fixture.h - a small scene for the tests of effects: boxes, sets, the space; and what the tests compare.
+
+  The unit box "block" is box:1,1,1:2, or any mesh that the test names. Materials come from the options
+  -body_<name>_young and so on, which fixture_create() sets. The same scene can be made on PETSC_COMM_SELF beside the
+  parallel one: fields of the two are compared by original vertex number.
+*/
+#pragma once
+#include "test.h"
+#include <sbeffect.h>
+
+typedef struct {
+  PetscInt nbody, nset;
+  SbBody *body; /* [nbody] */
+  SbSet *set;   /* [nset] */
+  SbMaterial material[2];
+  SbElement element[2];
+  SbMesh mesh;
+  SbSpace space;
+  PetscReal *u, *f; /* [nnode][3] displacement and force, local */
+} Fixture;
+
+#define DENSITY 1200.0 /* kg/m^3, of every body */
+
+static inline PetscErrorCode fixture_register(void)
+{
+  PetscFunctionBeginUser;
+  PetscCall(SbLogInitialize());
+  PetscCall(SbMeshRegister());
+  PetscCall(SbSpaceRegister());
+  PetscCall(SbMaterialRegisterAll());
+  PetscCall(SbElementRegisterAll());
+  PetscCall(SbEffectRegister_Gravity());
+  PetscCall(SbEffectRegister_BodyForce());
+  PetscCall(SbEffectRegister_Traction());
+  PetscCall(SbEffectRegister_Pressure());
+  PetscCall(SbEffectRegister_PointForce());
+  PetscCall(SbEffectRegister_Support());
+  PetscCall(SbEffectRegister_Drive());
+  PetscCall(SbEffectRegister_Damping());
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Scene of bodies "block" and "other" (at a distance of 3 m along x), and the sets given as "name shape" texts. */
+static inline PetscErrorCode fixture_create(MPI_Comm comm, PetscInt nbody, const char *mesh, PetscInt nset,
+                                            const char *const sets[][2], Fixture *x)
+{
+  static const char *const names[] = {"block", "other"};
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscMemzero(x, sizeof(*x)));
+  x->nbody = nbody;
+  x->nset = nset;
+  PetscCall(PetscCalloc1(nbody, &x->body));
+  PetscCall(PetscCalloc1(nset, &x->set));
+  for (PetscInt b = 0; b < nbody; b++) {
+    SbBody *body = &x->body[b];
+    SbScope scope;
+    char options[256];
+
+    PetscCall(PetscStrncpy(body->name, names[b], sizeof(body->name)));
+    PetscCall(PetscStrncpy(body->mesh, mesh, sizeof(body->mesh)));
+    PetscCall(PetscStrncpy(body->element, "p1", sizeof(body->element)));
+    PetscCall(PetscStrncpy(body->material, "linear", sizeof(body->material)));
+    body->scale = 1;
+    body->rotate[2] = 1;
+    body->translate[0] = 3 * (PetscReal)b;
+    body->density = DENSITY;
+    PetscCall(PetscSNPrintf(options, sizeof(options),
+                            "-body_%s_young 1e5 -body_%s_poisson 0.3 -body_%s_density %g", names[b], names[b],
+                            names[b], DENSITY));
+    PetscCall(PetscOptionsInsertString(NULL, options));
+    PetscCall(SbScopeSet(&scope, "body", "linear", names[b]));
+    PetscCall(SbMaterialCreate("linear", &scope, &x->material[b]));
+    PetscCall(SbElementCreate("p1", &x->element[b]));
+  }
+  for (PetscInt k = 0; k < nset; k++) {
+    PetscCall(SbSetParse(sets[k][0], sets[k][1], &x->set[k]));
+    PetscCall(PetscStrncpy(x->set[k].name, sets[k][0], sizeof(x->set[k].name)));
+  }
+  PetscCall(SbMeshCreate(comm, nbody, x->body, nset, x->set, &x->mesh));
+  PetscCall(SbSpaceCreate(x->mesh, x->material, x->element, &x->space));
+  PetscCall(PetscCalloc2(3 * x->space->nnode, &x->u, 3 * x->space->nnode, &x->f));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static inline PetscErrorCode fixture_destroy(Fixture *x)
+{
+  PetscFunctionBeginUser;
+  PetscCall(PetscFree2(x->u, x->f));
+  PetscCall(SbSpaceDestroy(&x->space));
+  PetscCall(SbMeshDestroy(&x->mesh));
+  for (PetscInt b = 0; b < x->nbody; b++) {
+    PetscCall(SbMaterialDestroy(&x->material[b]));
+    PetscCall(SbElementDestroy(&x->element[b]));
+  }
+  PetscCall(PetscFree(x->body));
+  PetscCall(PetscFree(x->set));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Creates an effect from options and sets it up. */
+static inline PetscErrorCode effect_create(Fixture *x, const char *name, const char *options, SbEffect *e)
+{
+  PetscFunctionBeginUser;
+  PetscCall(PetscOptionsInsertString(NULL, options));
+  PetscCall(SbEffectCreate(name, e));
+  if ((*e)->ops.setup) PetscCall((*(*e)->ops.setup)(*e, x->space));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* x->f = force of the effect at time t and displacement x->u. */
+static inline PetscErrorCode effect_force(Fixture *x, SbEffect e, PetscReal t)
+{
+  SbStage stage;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscMemzero(&stage, sizeof(stage)));
+  stage.t = t;
+  stage.shift_k = 1;
+  stage.u = x->u;
+  PetscCall(PetscArrayzero(x->f, 3 * x->space->nnode));
+  PetscCall((*e->ops.force)(e, x->space, &stage, x->f));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Total force F, N, and moment M about the origin at the current positions, N m: owned nodes of all ranks. */
+static inline PetscErrorCode resultant(const Fixture *x, PetscReal F[3], PetscReal M[3])
+{
+  PetscReal sum[6] = {0}, all[6];
+
+  PetscFunctionBeginUser;
+  for (PetscInt i = 0; i < x->space->nnode_owned; i++) {
+    const PetscReal *X = &x->space->node_x[3 * i], *u = &x->u[3 * i], *f = &x->f[3 * i];
+    const PetscReal p[3] = {X[0] + u[0], X[1] + u[1], X[2] + u[2]};
+
+    for (int c = 0; c < 3; c++) {
+      sum[c] += f[c];
+      sum[3 + c] += p[(c + 1) % 3] * f[(c + 2) % 3] - p[(c + 2) % 3] * f[(c + 1) % 3];
+    }
+  }
+  PetscCallMPI(MPI_Allreduce(sum, all, 6, MPIU_REAL, MPI_SUM, x->space->comm));
+  for (int c = 0; c < 3; c++) {
+    F[c] = all[c];
+    M[c] = all[3 + c];
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Checks force and moment against exact values; `scale` is the size of the single contributions, N. */
+static inline PetscErrorCode check_resultant(const Fixture *x, const PetscReal F[3], const PetscReal M[3],
+                                             PetscReal scale, const char *what)
+{
+  PetscReal sum[3], moment[3];
+
+  PetscFunctionBeginUser;
+  PetscCall(resultant(x, sum, moment));
+  // Some hundred additions of numbers of this size: rounding stays far below 1e-12 of it.
+  for (int c = 0; c < 3; c++) {
+    SB_CHECK_NEAR(sum[c], F[c], 1e-12 * scale, what);
+    SB_CHECK_NEAR(moment[c], M[c], 1e-12 * scale, what);
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The owned part of `parallel` (f of a scene on all ranks) equals that of the same scene on one rank. */
+static inline PetscErrorCode check_serial(const Fixture *parallel, const Fixture *serial, PetscReal scale,
+                                          const char *what)
+{
+  PetscInt *where;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscMalloc1(serial->mesh->nvert, &where));
+  for (PetscInt i = 0; i < serial->mesh->nvert; i++) where[serial->mesh->vert_orig[i]] = i;
+  for (PetscInt i = 0; i < parallel->space->nnode_owned; i++) {
+    const PetscInt j = where[parallel->mesh->vert_orig[i]];
+
+    for (int c = 0; c < 3; c++)
+      SB_CHECK_NEAR(parallel->f[3 * i + c], serial->f[3 * j + c], 1e-12 * scale, what);
+  }
+  PetscCall(PetscFree(where));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* A smooth displacement that bends, twists and stretches, m; amplitude 1 gives strains of about a half. */
+static inline void deform(Fixture *x, PetscReal amplitude)
+{
+  for (PetscInt i = 0; i < x->space->nnode; i++) {
+    const PetscReal *X = &x->space->node_x[3 * i];
+
+    x->u[3 * i + 0] = amplitude * (0.3 * X[1] * X[2] + 0.2 * X[0] + 0.1 * PetscSinReal(3 * X[1]));
+    x->u[3 * i + 1] = amplitude * (-0.4 * X[0] * X[2] + 0.2 * PetscCosReal(2 * X[0]));
+    x->u[3 * i + 2] = amplitude * (0.25 * X[0] * X[0] - 0.15 * X[2] + 0.1 * X[1] * X[0]);
+  }
+}
+
+/* Keeps the text of the last error. */
+static char last_error[1024];
+static inline PetscErrorCode keep_error(MPI_Comm comm, int line, const char *function, const char *file,
+                                        PetscErrorCode code, PetscErrorType type, const char *message,
+                                        void *ctx)
+{
+  (void)comm;
+  (void)line;
+  (void)function;
+  (void)file;
+  (void)ctx;
+  if (type == PETSC_ERROR_INITIAL && message) (void)PetscStrncpy(last_error, message, sizeof(last_error));
+  return code;
+}
+
+/* The call must fail with a message that contains `part`. */
+#define CHECK_MESSAGE(call, part)                                                                      \
+  do {                                                                                                 \
+    PetscErrorCode ierr_;                                                                              \
+    last_error[0] = 0;                                                                                 \
+    PetscCall(PetscPushErrorHandler(keep_error, NULL));                                                \
+    ierr_ = call;                                                                                      \
+    PetscCall(PetscPopErrorHandler());                                                                 \
+    SB_CHECK(ierr_ &&strstr(last_error, part), "error %d \"%s\" lacks \"%s\"", (int)ierr_, last_error, \
+             part);                                                                                    \
+  } while (0)

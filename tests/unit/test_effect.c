@@ -1,0 +1,122 @@
+/*
+  The registry of effects: types by name and by option, unknown types, options of the wrong kind; and that a second
+  registration after a reset of the option table works.
+*/
+// @ranks 1 3
+#include "effect_fixture.h"
+
+static PetscErrorCode no_space(SbEffect e, SbSpace space)
+{
+  PetscFunctionBeginUser;
+  (void)e;
+  (void)space;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode create_bare(SbEffect e)
+{
+  PetscFunctionBeginUser;
+  e->ops.setup = no_space;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode test_types(void)
+{
+  SbEffect e;
+  PetscBool same;
+
+  PetscFunctionBeginUser;
+  // The name is the type unless the option says otherwise.
+  PetscCall(SbEffectCreate("gravity", &e));
+  PetscCall(PetscStrcmp(e->type, "gravity", &same));
+  SB_CHECK(same, "type %s", e->type);
+  SB_CHECK(e->ops.force && !e->ops.tangent && !e->ops.prescribe && !e->ops.setup, "operations of gravity");
+  SB_CHECK(e->linear && e->steady, "gravity is linear and steady");
+  PetscCall(SbEffectDestroy(&e));
+  SB_CHECK(!e, "destroy sets NULL");
+  PetscCall(SbEffectDestroy(&e));
+
+  PetscCall(PetscOptionsInsertString(NULL, "-effect_moon_type gravity -effect_moon_vector 0,0,-1.62"));
+  PetscCall(SbEffectCreate("moon", &e));
+  PetscCall(PetscStrcmp(e->type, "gravity", &same));
+  SB_CHECK(same, "type %s", e->type);
+  PetscCall(PetscStrcmp(e->name, "moon", &same));
+  SB_CHECK(same, "name %s", e->name);
+  PetscCall(SbEffectDestroy(&e));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode test_errors(void)
+{
+  SbEffect e;
+
+  PetscFunctionBeginUser;
+  CHECK_MESSAGE(SbEffectCreate("gravty", &e), "gravity");
+  PetscCall(SbEffectDestroy(&e));
+  // Nothing near: the whole list.
+  CHECK_MESSAGE(SbEffectCreate("qqqqqqqqqqqq", &e), "body_force");
+  PetscCall(SbEffectDestroy(&e));
+  PetscCall(PetscOptionsInsertString(NULL, "-effect_lid_type tractoin"));
+  CHECK_MESSAGE(SbEffectCreate("lid", &e), "-effect_lid_type");
+  CHECK_MESSAGE(SbEffectCreate("lid", &e), "traction");
+  PetscCall(SbEffectDestroy(&e));
+
+  // Neither a traction nor a total force; a load with a place where only time makes sense; what must be given.
+  PetscCall(PetscOptionsInsertString(NULL, "-effect_lid_type traction -effect_lid_on top"));
+  CHECK_MESSAGE(SbEffectCreate("lid", &e), "-effect_lid_total");
+  PetscCall(SbEffectDestroy(&e));
+  PetscCall(
+    PetscOptionsInsertString(NULL, "-effect_air_type pressure -effect_air_on top -effect_air_value 5*x"));
+  CHECK_MESSAGE(SbEffectCreate("air", &e), "-effect_air_value");
+  PetscCall(SbEffectDestroy(&e));
+  PetscCall(PetscOptionsInsertString(NULL, "-effect_hold_type support"));
+  CHECK_MESSAGE(SbEffectCreate("hold", &e), "-effect_hold_on");
+  PetscCall(SbEffectDestroy(&e));
+  PetscCall(PetscOptionsInsertString(NULL, "-effect_push_type drive -effect_push_on top"));
+  CHECK_MESSAGE(SbEffectCreate("push", &e), "-effect_push_displacement");
+  PetscCall(SbEffectDestroy(&e));
+  PetscCall(PetscOptionsInsertString(NULL, "-effect_push_angle 10 -effect_push_axis 0,0,0"));
+  CHECK_MESSAGE(SbEffectCreate("push", &e), "-effect_push_axis");
+  PetscCall(SbEffectDestroy(&e));
+  PetscCall(PetscOptionsInsertString(NULL, "-effect_thick_type damping -effect_thick_alpha -1"));
+  CHECK_MESSAGE(SbEffectCreate("thick", &e), "-effect_thick_alpha");
+  PetscCall(SbEffectDestroy(&e));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode test_registration(void)
+{
+  SbEffect e;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbEffectRegister("bare", create_bare, 0, NULL));
+  PetscCall(SbEffectCreate("bare", &e));
+  SB_CHECK(e->ops.setup == no_space, "constructor of a new type was called");
+  SB_CHECK(e->linear && e->steady && !e->ncolumn, "defaults");
+  PetscCall(SbEffectDestroy(&e));
+
+  // A fresh option table needs the types again.
+  PetscCall(SbOptionsReset());
+  PetscCall(SbEffectRegister_Gravity());
+  PetscCall(SbEffectCreate("gravity", &e));
+  SB_CHECK(e != NULL, "after a reset");
+  PetscCall(SbEffectDestroy(&e));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+int main(int argc, char **argv)
+{
+  SB_TEST_BEGIN(argc, argv);
+  PetscCall(SbEffectRegister_Gravity());
+  PetscCall(SbEffectRegister_BodyForce());
+  PetscCall(SbEffectRegister_Traction());
+  PetscCall(SbEffectRegister_Pressure());
+  PetscCall(SbEffectRegister_PointForce());
+  PetscCall(SbEffectRegister_Support());
+  PetscCall(SbEffectRegister_Drive());
+  PetscCall(SbEffectRegister_Damping());
+  PetscCall(test_types());
+  PetscCall(test_errors());
+  PetscCall(test_registration());
+  SB_TEST_END();
+}

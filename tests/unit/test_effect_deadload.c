@@ -1,0 +1,137 @@
+/*
+  Quadrature of dead loads: force and first moments of polynomial densities up to the degree that the rules promise, on the
+  cells and on one face of a unit cube; degree 5 and above must show an error (or the test would not see the degree);
+  densities that change with time.
+
+  With linear basis functions sum_a f_a = integral q and sum_a f_a x_a = integral q x, exactly when q phi_a is integrated
+  exactly: degree 4 of q on rules of degree 5.
+*/
+// @ranks 1 3
+#include "effect_fixture.h"
+
+static const char *const sets[][2] = {{"top", "plane:0,0,1,1"}};
+
+/* Integral of x^i y^j z^k over the unit cube, or over its face z = 1. */
+static PetscReal exact(PetscInt ncorner, const int p[3])
+{
+  return 1.0 / ((p[0] + 1) * (p[1] + 1) * (ncorner == 4 ? p[2] + 1 : 1));
+}
+
+/* Corners of the local cells, or of the local facets of the top. */
+static PetscErrorCode get_corners(Fixture *x, PetscInt ncorner, PetscInt *n, PetscInt **nodes)
+{
+  PetscFunctionBeginUser;
+  if (ncorner == 4) {
+    *n = x->mesh->ncell;
+    PetscCall(PetscMalloc1(4 * *n, nodes));
+    PetscCall(PetscArraycpy(*nodes, x->space->cell_node, 4 * *n));
+  } else {
+    SbFacet *facets;
+
+    PetscCall(SbSpaceGetSetFacets(x->space, 0, n, &facets));
+    PetscCall(PetscMalloc1(3 * *n, nodes));
+    for (PetscInt i = 0; i < 3 * *n; i++) (*nodes)[i] = facets[i / 3].node[i % 3];
+    PetscCall(PetscFree(facets));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Sums over owned nodes of all ranks: f_x, and f_x x, f_x y, f_x z. */
+static PetscErrorCode moments(Fixture *x, SbDeadLoad load, PetscReal t, PetscReal factor, PetscReal all[4])
+{
+  PetscReal sum[4] = {0};
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscArrayzero(x->f, 3 * x->space->nnode));
+  PetscCall(SbDeadLoadAdd(load, t, factor, x->f));
+  for (PetscInt i = 0; i < x->space->nnode_owned; i++) {
+    sum[0] += x->f[3 * i];
+    for (int c = 0; c < 3; c++) sum[1 + c] += x->f[3 * i] * x->space->node_x[3 * i + c];
+    SB_CHECK(x->f[3 * i + 1] == 0 && x->f[3 * i + 2] == 0, "other components");
+  }
+  PetscCallMPI(MPI_Allreduce(sum, all, 4, MPIU_REAL, MPI_SUM, x->space->comm));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode check_monomial(Fixture *x, PetscInt ncorner, PetscInt n, const PetscInt nodes[],
+                                     const int p[3])
+{
+  SbFormula q[3];
+  SbDeadLoad load;
+  char text[64];
+  PetscReal sum[4];
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscSNPrintf(text, sizeof(text), "x^%d*y^%d*z^%d", p[0], p[1], p[2]));
+  PetscCall(SbFormulaCreate(PETSC_COMM_SELF, text, "test", &q[0]));
+  PetscCall(SbFormulaCreate(PETSC_COMM_SELF, "0", "test", &q[1]));
+  PetscCall(SbFormulaCreate(PETSC_COMM_SELF, "0", "test", &q[2]));
+  PetscCall(SbDeadLoadCreate(x->space, ncorner, n, nodes, q, &load));
+  PetscCall(moments(x, load, 0, 1, sum));
+  if (p[0] + p[1] + p[2] <= 4) {
+    // The published points and weights have 20 digits; rounding of some hundred additions.
+    SB_CHECK_NEAR(sum[0], exact(ncorner, p), 1e-14, text);
+    for (int c = 0; c < 3; c++) {
+      int higher[3] = {p[0], p[1], p[2]};
+
+      higher[c]++;
+      SB_CHECK_NEAR(sum[1 + c], exact(ncorner, higher), 1e-14, text);
+    }
+  } else {
+    SB_CHECK(PetscAbsReal(sum[0] - exact(ncorner, p)) > 1e-10, "%s is beyond the rule, yet exact", text);
+  }
+  PetscCall(SbDeadLoadDestroy(&load));
+  for (int i = 0; i < 3; i++) PetscCall(SbFormulaDestroy(&q[i]));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode check_time(Fixture *x, PetscInt n, const PetscInt nodes[])
+{
+  SbFormula q[3];
+  SbDeadLoad load;
+  PetscReal sum[4];
+
+  PetscFunctionBeginUser;
+  PetscCall(SbFormulaCreate(PETSC_COMM_SELF, "3*t*x", "test", &q[0]));
+  PetscCall(SbFormulaCreate(PETSC_COMM_SELF, "0", "test", &q[1]));
+  PetscCall(SbFormulaCreate(PETSC_COMM_SELF, "0", "test", &q[2]));
+  PetscCall(SbDeadLoadCreate(x->space, 4, n, nodes, q, &load));
+  for (int k = 0; k < 4; k++) {
+    const PetscReal t = k < 2 ? 2.0 : (PetscReal)k - 3; // twice the same time, then back to earlier ones
+
+    PetscCall(moments(x, load, t, 0.5, sum));
+    SB_CHECK_NEAR(sum[0], 0.5 * 3 * t * 0.5, 1e-14, "force that grows with time");
+    SB_CHECK_NEAR(sum[1], 0.5 * 3 * t / 3, 1e-14, "its moment");
+  }
+  PetscCall(SbDeadLoadDestroy(&load));
+  SB_CHECK(!load, "destroy sets NULL");
+  PetscCall(SbDeadLoadDestroy(&load));
+  for (int i = 0; i < 3; i++) PetscCall(SbFormulaDestroy(&q[i]));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+int main(int argc, char **argv)
+{
+  Fixture x;
+
+  SB_TEST_BEGIN(argc, argv);
+  PetscCall(fixture_register());
+  PetscCall(fixture_create(PETSC_COMM_WORLD, 1, "box:1,1,1:2", 1, sets, &x));
+  for (PetscInt ncorner = 3; ncorner <= 4; ncorner++) {
+    const int beyond[2][3] = {{6, 0, 0}, {0, 6, 0}};
+    PetscInt n, *nodes;
+
+    PetscCall(get_corners(&x, ncorner, &n, &nodes));
+    for (int i = 0; i <= 4; i++) {
+      for (int j = 0; i + j <= 4; j++) {
+        for (int k = 0; i + j + k <= 4; k++)
+          PetscCall(check_monomial(&x, ncorner, n, nodes, (const int[3]){i, j, k}));
+      }
+    }
+    for (int i = 0; i < 2; i++) PetscCall(check_monomial(&x, ncorner, n, nodes, beyond[i]));
+    if (ncorner == 4) PetscCall(check_time(&x, n, nodes));
+    PetscCall(PetscFree(nodes));
+  }
+  PetscCall(fixture_destroy(&x));
+  SB_TEST_END();
+}

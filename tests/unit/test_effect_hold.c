@@ -1,0 +1,109 @@
+/*
+  Prescribed unknowns shared by several effects: the first one has them, values and reactions are the owner's alone, and an
+  effect that is left with nothing is an error.
+*/
+// @ranks 1 3
+#include "effect_fixture.h"
+
+static const char *const sets[][2] = {
+  {"bottom", "plane:0,0,1,0"}, {"west", "plane:1,0,0,0"}, {"edge", "box:-1,-1,-0.1,0.1,2,0.1"}};
+
+static PetscErrorCode make_on(const char *name, SbEffectOn *on)
+{
+  PetscFunctionBeginUser;
+  PetscCall(PetscStrncpy(on->option, "-effect_test_on", sizeof(on->option)));
+  on->n = 1;
+  PetscCall(PetscCalloc1(1, &on->name));
+  PetscCall(PetscStrncpy(on->name[0], name, SB_NAME_MAX));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Number of unknowns held, over all ranks. */
+static PetscErrorCode count(const SbHold *hold, PetscInt *all)
+{
+  PetscInt n = 0;
+
+  PetscFunctionBeginUser;
+  for (PetscInt i = 0; i < hold->nowned; i++) {
+    for (int c = 0; c < 3; c++) n += (hold->components[i] >> c) & 1;
+  }
+  PetscCallMPI(MPI_Allreduce(&n, all, 1, MPIU_INT, MPI_SUM, PETSC_COMM_WORLD));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* All local nodes, ghosts too, carry the bits that their place asks for. */
+static void check_bits(const Fixture *x)
+{
+  for (PetscInt i = 0; i < x->space->nnode; i++) {
+    const PetscReal *X = &x->space->node_x[3 * i];
+    const int expected = (X[2] < 1e-9 ? 5 : 0) | (X[0] < 1e-9 ? 7 : 0);
+
+    SB_CHECK(x->space->fixed[i] == expected, "bits %d at (%g, %g, %g), expected %d", x->space->fixed[i],
+             (double)X[0], (double)X[1], (double)X[2], expected);
+  }
+}
+
+/* Values and reactions by the rule: bottom holds x and z of its nodes, west the rest of its own. */
+static PetscErrorCode check_values(Fixture *x, SbHold *bottom, SbHold *west)
+{
+  PetscReal *residual, force[2][3], all[2][3];
+
+  PetscFunctionBeginUser;
+  for (PetscInt i = 0; i < 3 * bottom->n; i++) x->f[i] = 10;
+  PetscCall(SbHoldPrescribe(bottom, x->space, x->f));
+  PetscCall(SbHoldPrescribe(west, x->space, NULL));
+  for (PetscInt k = 0; k < x->space->nfixed; k++) {
+    const PetscBool low = x->space->node_x[3 * x->space->fixed_node[k] + 2] < 1e-9 ? PETSC_TRUE : PETSC_FALSE;
+
+    for (int c = 0; c < 3; c++) {
+      SB_CHECK_NEAR(x->space->fixed_value[3 * k + c], low && c != 1 ? 10 : 0, 0, "prescribed value");
+    }
+  }
+  PetscCall(PetscMalloc1(3 * x->space->nnode, &residual));
+  for (PetscInt i = 0; i < 3 * x->space->nnode; i++) residual[i] = 1 + (PetscReal)(i % 3);
+  SbHoldReaction(bottom, residual, force[0]);
+  SbHoldReaction(west, residual, force[1]);
+  PetscCallMPI(MPI_Allreduce(force, all, 6, MPIU_REAL, MPI_SUM, PETSC_COMM_WORLD));
+  SB_CHECK_NEAR(all[0][0], 9 * 1, 0, "bottom, x");
+  SB_CHECK_NEAR(all[0][1], 0, 0, "bottom, y");
+  SB_CHECK_NEAR(all[0][2], 9 * 3, 0, "bottom, z");
+  SB_CHECK_NEAR(all[1][0], 6 * 1, 0, "west, x");
+  SB_CHECK_NEAR(all[1][1], 9 * 2, 0, "west, y");
+  SB_CHECK_NEAR(all[1][2], 6 * 3, 0, "west, z");
+  PetscCall(PetscFree(residual));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+int main(int argc, char **argv)
+{
+  Fixture x;
+  SbEffectOn on[3];
+  SbHold bottom = {0}, west = {0}, edge = {0};
+  PetscInt n;
+
+  SB_TEST_BEGIN(argc, argv);
+  PetscCall(fixture_register());
+  PetscCall(fixture_create(PETSC_COMM_WORLD, 1, "box:1,1,1:2", PETSC_STATIC_ARRAY_LENGTH(sets), sets, &x));
+  for (int i = 0; i < 3; i++) PetscCall(make_on(sets[i][0], &on[i]));
+  SB_CHECK(SbHoldComponents(0) == 1 && SbHoldComponents(2) == 4 && SbHoldComponents(5) == 5 &&
+             SbHoldComponents(6) == 7,
+           "bits of the choices " SB_HOLD_CHOICES);
+
+  PetscCall(SbHoldSetUp(&bottom, x.space, &on[0], 5));
+  PetscCall(count(&bottom, &n));
+  SB_CHECK_NEAR(n, 18, 0, "unknowns of the bottom");
+  PetscCall(SbHoldSetUp(&west, x.space, &on[1], 7));
+  PetscCall(count(&west, &n));
+  SB_CHECK_NEAR(n, 9 * 3 - 3 * 2, 0, "unknowns of the west side without those of the bottom");
+  check_bits(&x);
+  CHECK_MESSAGE(SbHoldSetUp(&edge, x.space, &on[2], 5), "edge is already prescribed");
+  PetscCall(SbSpaceFixDone(x.space));
+  PetscCall(check_values(&x, &bottom, &west));
+
+  PetscCall(SbHoldFree(&bottom));
+  PetscCall(SbHoldFree(&west));
+  PetscCall(SbHoldFree(&edge));
+  for (int i = 0; i < 3; i++) PetscCall(SbEffectFreeOn(&on[i]));
+  PetscCall(fixture_destroy(&x));
+  SB_TEST_END();
+}

@@ -1,0 +1,138 @@
+/*
+  Selection of cells, facets and nodes by named sets on a unit cube: exact counts and areas over all ranks, each item once
+  when sets overlap, and what a wrong set is answered.
+*/
+// @ranks 1 3
+#include "effect_fixture.h"
+
+static const char *const sets[][2] = {
+  {"bottom", "plane:0,0,1,0"},    {"west", "plane:1,0,0,0"},         {"all", "box:-1,-1,-1,2,2,2"},
+  {"corner", "sphere:0,0,0,0.1"}, {"lower", "box:-1,-1,-1,2,2,0.5"},
+};
+
+/* A list of sets without the option behind it. */
+static PetscErrorCode make_on(const char *a, const char *b, SbEffectOn *on)
+{
+  PetscFunctionBeginUser;
+  PetscCall(PetscStrncpy(on->option, "-effect_test_on", sizeof(on->option)));
+  on->n = b ? 2 : a ? 1 : 0;
+  PetscCall(PetscCalloc1(2, &on->name));
+  if (a) PetscCall(PetscStrncpy(on->name[0], a, SB_NAME_MAX));
+  if (b) PetscCall(PetscStrncpy(on->name[1], b, SB_NAME_MAX));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode check_facets(Fixture *x, const char *a, const char *b, PetscReal area, PetscInt count)
+{
+  SbEffectOn on;
+  SbFacet *facets;
+  PetscInt n;
+  PetscReal sum[2] = {0, 0}, all[2];
+
+  PetscFunctionBeginUser;
+  PetscCall(make_on(a, b, &on));
+  PetscCall(SbEffectFacets(x->space, &on, &n, &facets));
+  for (PetscInt i = 0; i < n; i++) {
+    if (facets[i].cell >= x->mesh->ncell_owned) continue;
+    sum[0] += facets[i].area;
+    sum[1] += 1;
+  }
+  PetscCallMPI(MPI_Allreduce(sum, all, 2, MPIU_REAL, MPI_SUM, PETSC_COMM_WORLD));
+  SB_CHECK_NEAR(all[0], area, 1e-13, "area of the facets");
+  SB_CHECK_NEAR(all[1], count, 0, "number of facets");
+  PetscCall(PetscFree(facets));
+  PetscCall(SbEffectFreeOn(&on));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode check_nodes(Fixture *x, const char *a, const char *b, PetscInt count)
+{
+  SbEffectOn on;
+  PetscInt n, *nodes, owned = 0, all;
+
+  PetscFunctionBeginUser;
+  PetscCall(make_on(a, b, &on));
+  PetscCall(SbEffectNodes(x->space, &on, &n, &nodes));
+  for (PetscInt i = 0; i < n; i++) {
+    owned += nodes[i] < x->space->nnode_owned;
+    SB_CHECK(!i || nodes[i] > nodes[i - 1], "nodes ascend");
+  }
+  PetscCallMPI(MPI_Allreduce(&owned, &all, 1, MPIU_INT, MPI_SUM, PETSC_COMM_WORLD));
+  SB_CHECK_NEAR(all, count, 0, "number of nodes");
+  PetscCall(PetscFree(nodes));
+  PetscCall(SbEffectFreeOn(&on));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode check_cells(Fixture *x, const char *a, const char *b, PetscReal volume)
+{
+  SbEffectOn on;
+  PetscInt n, *cells;
+  PetscReal sum = 0, all;
+
+  PetscFunctionBeginUser;
+  PetscCall(make_on(a, b, &on));
+  PetscCall(SbEffectCells(x->space, &on, &n, &cells));
+  for (PetscInt i = 0; i < n; i++) {
+    PetscReal e[3][3];
+    const PetscInt *v = &x->mesh->cell[4 * cells[i]];
+    const PetscReal *X = x->mesh->x;
+
+    if (cells[i] >= x->mesh->ncell_owned) continue;
+    for (int k = 0; k < 9; k++) e[k / 3][k % 3] = X[3 * v[k / 3 + 1] + k % 3] - X[3 * v[0] + k % 3];
+    for (int k = 0; k < 3; k++) {
+      sum += e[0][k] * (e[1][(k + 1) % 3] * e[2][(k + 2) % 3] - e[1][(k + 2) % 3] * e[2][(k + 1) % 3]) / 6;
+    }
+  }
+  PetscCallMPI(MPI_Allreduce(&sum, &all, 1, MPIU_REAL, MPI_SUM, PETSC_COMM_WORLD));
+  SB_CHECK_NEAR(all, volume, 1e-13, "volume of the cells");
+  PetscCall(PetscFree(cells));
+  PetscCall(SbEffectFreeOn(&on));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode check_errors(Fixture *x)
+{
+  SbEffectOn on;
+  SbFacet *facets;
+  PetscInt n, *items;
+
+  PetscFunctionBeginUser;
+  // One vertex, no facet, no cell: the message names set and counts.
+  PetscCall(make_on("bottom", "corner", &on));
+  CHECK_MESSAGE(SbEffectFacets(x->space, &on, &n, &facets),
+                "corner selects no boundary facets (1 vertices, 0");
+  CHECK_MESSAGE(SbEffectCells(x->space, &on, &n, &items),
+                "-effect_test_on: set bottom selects no tetrahedra");
+  PetscCall(SbEffectFreeOn(&on));
+  PetscCall(make_on("botom", NULL, &on));
+  CHECK_MESSAGE(SbEffectNodes(x->space, &on, &n, &items), "bottom");
+  PetscCall(SbEffectFreeOn(&on));
+  PetscCall(make_on(NULL, NULL, &on));
+  CHECK_MESSAGE(SbEffectNodes(x->space, &on, &n, &items), "-effect_test_on");
+  PetscCall(SbEffectFreeOn(&on));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+int main(int argc, char **argv)
+{
+  Fixture x;
+
+  SB_TEST_BEGIN(argc, argv);
+  PetscCall(fixture_register());
+  PetscCall(fixture_create(PETSC_COMM_WORLD, 1, "box:1,1,1:4", PETSC_STATIC_ARRAY_LENGTH(sets), sets, &x));
+  PetscCall(check_facets(&x, "bottom", NULL, 1, 32));
+  PetscCall(check_facets(&x, "bottom", "west", 2, 64));
+  PetscCall(check_facets(&x, "bottom", "bottom", 1, 32));
+  PetscCall(check_facets(&x, "all", "west", 6, 192));
+  PetscCall(check_facets(&x, "west", "all", 6, 192));
+  PetscCall(check_nodes(&x, "bottom", NULL, 25));
+  PetscCall(check_nodes(&x, "bottom", "west", 45));
+  PetscCall(check_nodes(&x, "all", "corner", 125));
+  PetscCall(check_cells(&x, "lower", NULL, 0.5));
+  PetscCall(check_cells(&x, "lower", "all", 1));
+  PetscCall(check_cells(&x, NULL, NULL, 1));
+  PetscCall(check_errors(&x));
+  PetscCall(fixture_destroy(&x));
+  SB_TEST_END();
+}
