@@ -1,7 +1,8 @@
 /*
   sbelement.h - layer 1: element kernels on batches of SB_BATCH tets with four nodes and constant basis gradients.
 
-  The kernels take arrays and return arrays: no MPI, no allocation, no mesh. Lanes as in sbmaterial.h.
+  The kernels take arrays and return arrays: no MPI, no allocation, no mesh. Lanes as in sbmaterial.h; inputs and outputs
+  never overlap. The four gradients sum to zero: g holds those of nodes 1..3, everything about node 0 follows from them.
 */
 #pragma once
 #include "sbmaterial.h"
@@ -17,18 +18,22 @@ static const int SbPairB[10] = {0, 1, 2, 3, 1, 2, 3, 2, 3, 3};
 typedef struct _p_SbElement *SbElement;
 typedef struct {
   /* Basis gradients of nodes 1..3 (node 0 has minus their sum) and volumes from vertex positions of one cell.
-     x[4][3] m; g[3][3] row a = grad phi_{a+1}, 1/m; V m^3. */
+     x[4][3] m; g[3][3] row a = grad phi_{a+1}, 1/m; V m^3, negative when the cell is inside out. A cell without volume
+     gives gradients that are not finite: the mesh refuses it before. */
   void (*tabulate)(const PetscReal x[4][3], PetscReal g[3][3], PetscReal *V);
   /* mass of a cell / (density V): lumped share of each node, and consistent M_aa, M_ab */
   PetscReal mass_lumped, mass_diagonal, mass_coupling; /* P1: 1/4, 1/10, 1/20 */
 } SbElementOps;
 struct _p_SbElement {
-  char         name[SB_NAME_MAX];
-  PetscInt     nodes_per[4]; /* nodes per vertex, edge, face, cell. P1: 1,0,0,0 */
+  char name[SB_NAME_MAX];
+  PetscInt nodes_per[4]; /* nodes per vertex, edge, face, cell. P1: 1,0,0,0 */
   SbElementOps ops;
 };
 extern PetscFunctionList SbElementList;
+/* Adds an element; create() fills nodes_per and ops. Not collective, same on all ranks. */
+PetscErrorCode SbElementRegister(const char *name, PetscErrorCode (*create)(SbElement));
 PetscErrorCode SbElementRegisterAll(void);
+/* Creates an element by name; owned by the caller. Error: PETSC_ERR_USER for an unknown name. */
 PetscErrorCode SbElementCreate(const char *name, SbElement *e);
 PetscErrorCode SbElementDestroy(SbElement *e);
 
@@ -36,12 +41,14 @@ PetscErrorCode SbElementDestroy(SbElement *e);
 void SbCellGradient(const SbLane g[9], const SbLane u[12], SbLane F[9]);
 /* Velocity-like gradient without the identity: H = sum_a v_a (x) grad phi_a. */
 void SbCellGradientRate(const SbLane g[9], const SbLane v[12], SbLane H[9]);
-/* f[3*a+i] = V P_ij grad phi_a,j: internal force of the cell on its nodes, N. */
+/* f[3*a+i] = V P_ij grad phi_a,j: internal force of the cell on its nodes, N. The four forces sum to zero. */
 void SbCellForce(const SbLane g[9], const SbLane V, const SbLane P[9], SbLane f[12]);
 /*
   Ten upper blocks of the cell matrix for Hooke's tensor turned by R (R NULL: not turned):
   K[p][3*i+k] for p = 0..9 as SbPairA/B, K_ab = V (lambda h_a h_b^T + mu h_b h_a^T + mu (h_a . h_b) I), h = R grad phi. N/m.
+  Diagonal blocks are symmetric to the last bit; the blocks (a, 0..3) sum to zero, (b, a) being the transpose of (a, b).
 */
-void SbCellBlocksIsotropic(const SbLane g[9], const SbLane V, PetscReal lambda, PetscReal mu, const SbLane R[9], SbLane K[10][9]);
-/* The same for a full tangent C: K_ab,ik = V C_(ij)(kl) grad phi_a,j grad phi_b,l. */
+void SbCellBlocksIsotropic(const SbLane g[9], const SbLane V, PetscReal lambda, PetscReal mu,
+                           const SbLane R[9], SbLane K[10][9]);
+/* The same for a full tangent C, symmetric in the pairs: K_ab,ik = V C_(ij)(kl) grad phi_a,j grad phi_b,l. */
 void SbCellBlocksGeneral(const SbLane g[9], const SbLane V, const SbLane C[81], SbLane K[10][9]);

@@ -1,9 +1,10 @@
 /*
   sbmaterial.h - layer 1: material laws on batches of deformation gradients.
 
-  A batch holds SB_BATCH tets side by side: every quantity is an array over lanes, so the compiler vectorises each loop.
-  Laws know neither meshes nor elements. Sign and frame: F = dx/dX, P = dPsi/dF first Piola-Kirchhoff stress (Pa), row = current,
-  column = reference; F[3*i+j] is F_ij.
+  A batch holds SB_BATCH tets side by side (sbkernel.h): every quantity is an array over lanes, so the compiler vectorises
+  each loop, and a lane's result does not depend on the other lanes. Laws know neither meshes nor elements. Sign and frame:
+  F = dx/dX, P = dPsi/dF first Piola-Kirchhoff stress (Pa), row = current, column = reference; F[3*i+j] is F_ij. Inputs and
+  outputs of a kernel never overlap. A lane whose F is not finite gives results that are not finite.
 */
 #pragma once
 #include "sbbase.h"
@@ -11,37 +12,72 @@
 
 typedef struct _p_SbMaterial *SbMaterial;
 
+/* Which tangent a law hands out. A law that has no warped one refuses it. */
+typedef enum {
+  SB_TANGENT_WARPED,   /* Hooke's tensor turned by R: symmetric, positive definite, leaves out dR/dF */
+  SB_TANGENT_EXACT,    /* dP/dF: Newton converges quadratically; indefinite in compression */
+  SB_TANGENT_EXACT_SPD /* dP/dF with its negative eigenvalues raised to zero */
+} SbTangentKind;
+
 typedef struct {
   /* reads -body_<name>_...; scope = {"body", <law>, <name>} */
   PetscErrorCode (*setfromoptions)(SbMaterial m, const SbScope *scope);
-  /* psi = energy per rest volume, J/m^3 */
+  /* checks that the law has this tangent and sets `tangent` and `frame` below; NULL when there is one tangent only */
+  PetscErrorCode (*settangent)(SbMaterial m, SbTangentKind kind);
+  /* psi = energy per rest volume, J/m^3; zero at rest */
   void (*energy)(const struct _p_SbMaterial *m, const SbLane F[9], SbLane psi);
   /* P = dPsi/dF, Pa */
   void (*stress)(const struct _p_SbMaterial *m, const SbLane F[9], SbLane P[9]);
   /* The tangent is the isotropic Hooke tensor (lambda, mu) turned by R: fills R. NULL when the law needs the full tangent.
-     Set or cleared by setfromoptions (co-rotated: warped sets it). */
+     Co-rotated has it with the warped tangent, linear always (R = I). */
   void (*frame)(const struct _p_SbMaterial *m, const SbLane F[9], SbLane R[9]);
-  /* C[9*(3*i+j) + 3*k+l] = dP_ij/dF_kl, Pa; symmetric in the pairs */
+  /* C[9*(3*i+j) + 3*k+l] = dP_ij/dF_kl, Pa; symmetric in the pairs to the last bit */
   void (*tangent)(const struct _p_SbMaterial *m, const SbLane F[9], SbLane C[81]);
   PetscErrorCode (*destroy)(SbMaterial m);
 } SbMaterialOps;
 
 struct _p_SbMaterial {
-  char          law[SB_NAME_MAX];
+  char law[SB_NAME_MAX];
   SbMaterialOps ops;
-  PetscReal     E, nu;      /* Young's modulus, Pa; Poisson's ratio, [0, 0.5) or (-1, 0.5) */
-  PetscReal     lambda, mu; /* Lame parameters, Pa */
-  PetscReal     density;    /* kg/m^3 */
-  PetscBool     linear;     /* stress is linear in F: K is constant */
-  PetscBool     symmetric;  /* always true for hyperelastic laws */
-  void         *data;
+  PetscReal E, nu;       /* Young's modulus, Pa; Poisson's ratio, (-1, 0.5) */
+  PetscReal lambda, mu;  /* Lame parameters, Pa */
+  PetscReal density;     /* kg/m^3 */
+  PetscBool linear;      /* stress is linear in F: K is constant */
+  PetscBool symmetric;   /* always true for hyperelastic laws */
+  SbTangentKind tangent; /* what ops.frame or ops.tangent hands out */
+  void *data;
 };
 
 extern PetscFunctionList SbMaterialList;
-PetscErrorCode SbMaterialRegister(const char *law, PetscErrorCode (*create)(SbMaterial), PetscInt nrows, const SbOption rows[]);
+/*
+  SbMaterialRegister - adds a law and the rows of its own options (class "body", type = law).
+
+  Not collective, same on all ranks. create() fills the table, `tangent` and the flags of a material whose numbers are set.
+*/
+PetscErrorCode SbMaterialRegister(const char *law, PetscErrorCode (*create)(SbMaterial), PetscInt nrows,
+                                  const SbOption rows[]);
+/* linear, corotated, stvk, neohookean, and the rows young, poisson, density that every body has. */
 PetscErrorCode SbMaterialRegisterAll(void);
-/* Creates the law by name and reads young, poisson, density and the law's own options. Not collective, same on all ranks. */
+/*
+  SbMaterialCreate - creates the law by name and reads young, poisson, density and the law's own options.
+
+  Not collective, same on all ranks. Input: law; body, the scope of the body (its `type` is not looked at). Output: material,
+  owned by the caller. Errors: PETSC_ERR_USER for an unknown law and for what the option readers and the next two refuse.
+*/
 PetscErrorCode SbMaterialCreate(const char *law, const SbScope *body, SbMaterial *m);
+/* The same from numbers: E in Pa, nu without unit, density in kg/m^3, first tangent kind of the law. Reads no options. */
+PetscErrorCode SbMaterialCreateElastic(const char *law, PetscReal E, PetscReal nu, PetscReal density,
+                                       SbMaterial *m);
+/* Chooses the tangent. Error: PETSC_ERR_USER when the law does not have it. */
+PetscErrorCode SbMaterialSetTangent(SbMaterial m, SbTangentKind kind);
 PetscErrorCode SbMaterialDestroy(SbMaterial *m);
 /* Largest wave speed sqrt((lambda + 2 mu) / rho) at rest, m/s. */
-PetscReal      SbMaterialWaveSpeed(SbMaterial m);
+PetscReal SbMaterialWaveSpeed(SbMaterial m);
+/*
+  SbMaterialTangentAction - dP = (tangent at F) : H, what the stiffness part of Rayleigh damping needs.
+
+  Not collective. Input: F; H, gradient of a velocity (1/s) or of any increment. Output: dP, Pa times the unit of H. It is
+  the tangent that the law hands out: warped gives R hooke(sym(R^T H)), mu (H + R H^T R) + lambda (R : H) R.
+*/
+void SbMaterialTangentAction(const struct _p_SbMaterial *m, const SbLane F[9], const SbLane H[9],
+                             SbLane dP[9]);

@@ -1,0 +1,195 @@
+/*
+  Cell kernels: tets with four nodes and constant basis gradients, on lanes.
+
+  F = I + sum_a u_a g_a^T and f_a = V P g_a. With Hooke's tensor turned by R, C_(ij)(kl) = R_ip R_kq (lambda d_pj d_ql +
+  mu d_pq d_jl + mu d_pl d_jq), contracting with g_a,j and g_b,l and writing h = R g gives the block
+
+    K_ab = V (lambda h_a h_b^T + mu h_b h_a^T + mu (h_a . h_b) I),
+
+  which needs no triple product. g_0 = -(g_1 + g_2 + g_3): only nodes 1..3 are computed, and since K_ba = K_ab^T only six
+  blocks of them; the blocks of node 0 are minus sums. So a translation of the cell gives no force, to rounding.
+*/
+#include <sbelement.h>
+
+/* H = (u_1 - u_0) g_1^T + (u_2 - u_0) g_2^T + (u_3 - u_0) g_3^T of lane l */
+SB_INLINE void gradient(const SbLane g[9], const SbLane u[12], int l, PetscReal H[9])
+{
+  for (int i = 0; i < 3; i++) {
+    const PetscReal d1 = u[3 + i][l] - u[i][l], d2 = u[6 + i][l] - u[i][l], d3 = u[9 + i][l] - u[i][l];
+
+    for (int j = 0; j < 3; j++) H[3 * i + j] = d1 * g[j][l] + d2 * g[3 + j][l] + d3 * g[6 + j][l];
+  }
+}
+
+SB_KERNEL void SbCellGradient(const SbLane g[restrict 9], const SbLane u[restrict 12], SbLane F[restrict 9])
+{
+  for (int l = 0; l < SB_BATCH; l++) {
+    PetscReal H[9];
+
+    gradient(g, u, l, H);
+    for (int k = 0; k < 9; k++) F[k][l] = H[k] + (k % 4 == 0);
+  }
+}
+
+SB_KERNEL void SbCellGradientRate(const SbLane g[restrict 9], const SbLane v[restrict 12],
+                                  SbLane H[restrict 9])
+{
+  for (int l = 0; l < SB_BATCH; l++) {
+    PetscReal h[9];
+
+    gradient(g, v, l, h);
+    SbLanePut(9, h, l, H);
+  }
+}
+
+SB_KERNEL void SbCellForce(const SbLane g[restrict 9], const PetscReal V[restrict SB_BATCH],
+                           const SbLane P[restrict 9], SbLane f[restrict 12])
+{
+  for (int l = 0; l < SB_BATCH; l++) {
+    for (int i = 0; i < 3; i++) {
+      const PetscReal p0 = V[l] * P[3 * i][l], p1 = V[l] * P[3 * i + 1][l], p2 = V[l] * P[3 * i + 2][l];
+      PetscReal t[3];
+
+      for (int a = 0; a < 3; a++) t[a] = p0 * g[3 * a][l] + p1 * g[3 * a + 1][l] + p2 * g[3 * a + 2][l];
+      f[i][l] = -(t[0] + t[1] + t[2]);
+      for (int a = 0; a < 3; a++) f[3 + 3 * a + i][l] = t[a];
+    }
+  }
+}
+
+/* Block of two rotated gradients, lv = lambda V, mv = mu V, in the form of a diagonal one (symmetric to the last bit). */
+SB_INLINE void diagonal_block(PetscReal lv, PetscReal mv, const PetscReal h[3], PetscReal K[9])
+{
+  const PetscReal d = mv * SbDot3(h, h), c = lv + mv;
+  const PetscReal h0 = c * h[0], h1 = c * h[1];
+
+  K[0] = h0 * h[0] + d;
+  K[1] = K[3] = h0 * h[1];
+  K[2] = K[6] = h0 * h[2];
+  K[4] = h1 * h[1] + d;
+  K[5] = K[7] = h1 * h[2];
+  K[8] = c * h[2] * h[2] + d;
+}
+
+SB_INLINE void coupling_block(PetscReal lv, PetscReal mv, const PetscReal ha[3], const PetscReal hb[3],
+                              PetscReal K[9])
+{
+  const PetscReal d = mv * SbDot3(ha, hb);
+
+  for (int i = 0; i < 3; i++) {
+    const PetscReal x = lv * ha[i], y = mv * hb[i];
+
+    for (int k = 0; k < 3; k++) K[3 * i + k] = x * hb[k] + y * ha[k] + (i == k ? d : 0);
+  }
+}
+
+/* Blocks of node 0 of lane l from those of nodes 1..3. */
+SB_INLINE void node0_blocks(const PetscReal K11[9], const PetscReal K12[9], const PetscReal K13[9],
+                            const PetscReal K22[9], const PetscReal K23[9], const PetscReal K33[9], int l,
+                            SbLane K[10][9])
+{
+  PetscReal K01[9], K02[9], K03[9];
+
+  for (int i = 0; i < 3; i++) {
+    for (int k = 0; k < 3; k++) {
+      const int ik = 3 * i + k, ki = 3 * k + i;
+
+      K01[ik] = -(K11[ik] + K12[ki] + K13[ki]);
+      K02[ik] = -(K12[ik] + K22[ik] + K23[ki]);
+      K03[ik] = -(K13[ik] + K23[ik] + K33[ik]);
+    }
+  }
+  SbLanePut(9, K01, l, K[1]);
+  SbLanePut(9, K02, l, K[2]);
+  SbLanePut(9, K03, l, K[3]);
+  for (int i = 0; i < 3; i++) {
+    for (int k = 0; k < 3; k++) {
+      const int upper = i < k ? 3 * i + k : 3 * k + i;
+
+      K[0][3 * i + k][l] = -(K01[upper] + K02[upper] + K03[upper]);
+    }
+  }
+}
+
+SB_KERNEL void SbCellBlocksIsotropic(const SbLane g[restrict 9], const PetscReal V[restrict SB_BATCH],
+                                     PetscReal lambda, PetscReal mu, const SbLane R[restrict 9],
+                                     SbLane K[restrict 10][9])
+{
+  SbLane identity[9];
+  const SbLane *Q = R;
+
+  if (!R) {
+    for (int k = 0; k < 9; k++) {
+      for (int l = 0; l < SB_BATCH; l++) identity[k][l] = k % 4 == 0;
+    }
+    Q = (const SbLane *)identity;
+  }
+  for (int l = 0; l < SB_BATCH; l++) {
+    const PetscReal lv = lambda * V[l], mv = mu * V[l];
+    PetscReal r[9], e[9], h[9], K11[9], K12[9], K13[9], K22[9], K23[9], K33[9];
+
+    SbLaneGet(9, Q, l, r);
+    SbLaneGet(9, g, l, e);
+    SbMatMulTranspose(e, r, h); /* row a = R g_a */
+    diagonal_block(lv, mv, h, K11);
+    coupling_block(lv, mv, h, h + 3, K12);
+    coupling_block(lv, mv, h, h + 6, K13);
+    diagonal_block(lv, mv, h + 3, K22);
+    coupling_block(lv, mv, h + 3, h + 6, K23);
+    diagonal_block(lv, mv, h + 6, K33);
+    SbLanePut(9, K11, l, K[4]);
+    SbLanePut(9, K12, l, K[5]);
+    SbLanePut(9, K13, l, K[6]);
+    SbLanePut(9, K22, l, K[7]);
+    SbLanePut(9, K23, l, K[8]);
+    SbLanePut(9, K33, l, K[9]);
+    node0_blocks(K11, K12, K13, K22, K23, K33, l, K);
+  }
+}
+
+/*
+  For each pair (i, k) of components the slice M_jl = C_(ij)(kl) gives G M G^T, G holding the gradients as rows: its entry
+  (a, b) is K_ab,ik, and since C_(kj)(il) = M_lj it is K_ba,ki too. Six slices do.
+*/
+SB_KERNEL void SbCellBlocksGeneral(const SbLane g[restrict 9], const PetscReal V[restrict SB_BATCH],
+                                   const SbLane C[restrict 81], SbLane K[restrict 10][9])
+{
+  static const int pair[3][3] = {{4, 5, 6}, {5, 7, 8}, {6, 8, 9}};
+
+  for (int i = 0; i < 3; i++) {
+    for (int k = i; k < 3; k++) {
+      SbLane B[9];
+
+      for (int l = 0; l < SB_BATCH; l++) {
+        PetscReal G[9], M[9], T[9], b[9];
+
+        for (int j = 0; j < 3; j++) {
+          for (int n = 0; n < 3; n++) M[3 * j + n] = C[9 * (3 * i + j) + 3 * k + n][l];
+        }
+        SbLaneGet(9, g, l, G);
+        SbMatMulTranspose(M, G, T);
+        SbMatMul(G, T, b);
+        for (int m = 0; m < 9; m++) B[m][l] = V[l] * b[m];
+      }
+      for (int a = 0; a < 3; a++) {
+        for (int b = a; b < 3; b++) {
+          for (int l = 0; l < SB_BATCH; l++) {
+            K[pair[a][b]][3 * i + k][l] = B[3 * a + b][l];
+            K[pair[a][b]][3 * k + i][l] = B[3 * b + a][l];
+          }
+        }
+      }
+    }
+  }
+  for (int l = 0; l < SB_BATCH; l++) {
+    PetscReal K11[9], K12[9], K13[9], K22[9], K23[9], K33[9];
+
+    SbLaneGet(9, (const SbLane *)K[4], l, K11);
+    SbLaneGet(9, (const SbLane *)K[5], l, K12);
+    SbLaneGet(9, (const SbLane *)K[6], l, K13);
+    SbLaneGet(9, (const SbLane *)K[7], l, K22);
+    SbLaneGet(9, (const SbLane *)K[8], l, K23);
+    SbLaneGet(9, (const SbLane *)K[9], l, K33);
+    node0_blocks(K11, K12, K13, K22, K23, K33, l, K);
+  }
+}

@@ -1,0 +1,209 @@
+/*
+  Co-rotated elasticity: F = R S with the rotation R of SbPolar(), psi = mu |F - R|^2 + lambda/2 (R : F - 3)^2.
+
+  P = 2 mu (F - R) + lambda tr(S - I) R is its exact gradient: R is stationary for R : F, so dR drops out of dpsi.
+
+  Tangents. With q = tr(S), kappa = lambda (q - 3) - 2 mu,
+    dP = 2 mu dF + lambda (R : dF) R + kappa dR,   dR = R [w]x,   (q I - S) w = axial(R^T dF - dF^T R),
+  which follows from R^T F staying symmetric. `exact` is this. The eigenvalues of dP/dF are 2 mu, 2 mu + 3 lambda and, for
+  the twist about the principal axis k, 2 mu + 2 kappa / (q - s_k) with q - s_k = s_i + s_j >= 0 (Smith, de Goes, Kim,
+  "Analytic eigensystems for isotropic distortion energies", 2019, section 4.1): only the twists can be negative, and
+  `exact_spd` raises those to zero by limiting kappa / (s_i + s_j) to -mu. `warped` leaves out kappa dR and replaces the
+  identity by its symmetric part in the rotated frame: Hooke's tensor turned by R.
+
+  Where s_i + s_j = 0 the rotation, and so the force, jumps and there is no derivative: `exact` bounds the determinant of
+  (q I - S) below, `exact_spd` each s_i + s_j.
+*/
+#include "material_impl.h"
+
+#define SMALLEST_DET 1e-9 /* of q I - S, which is 8 at rest */
+#define SMALLEST_SUM 1e-2 /* of two stretches, 2 at rest */
+
+SB_KERNEL static void energy_corotated(const struct _p_SbMaterial *m, const SbLane F[restrict 9], SbLane psi)
+{
+  const PetscReal mu = m->mu, lambda = m->lambda;
+  SbLane R[9];
+
+  SbPolar(F, R);
+  for (int l = 0; l < SB_BATCH; l++) {
+    PetscReal f[9], r[9];
+
+    SbLaneGet(9, F, l, f);
+    SbLaneGet(9, R, l, r);
+    const PetscReal tr = SbDot9(r, f) - 3;
+    for (int k = 0; k < 9; k++) f[k] -= r[k];
+    psi[l] = mu * SbDot9(f, f) + lambda / 2 * tr * tr;
+  }
+}
+
+SB_KERNEL static void stress_corotated(const struct _p_SbMaterial *m, const SbLane F[restrict 9],
+                                       SbLane P[restrict 9])
+{
+  const PetscReal mu = m->mu, lambda = m->lambda;
+  SbLane R[9];
+
+  SbPolar(F, R);
+  for (int l = 0; l < SB_BATCH; l++) {
+    PetscReal f[9], r[9];
+
+    SbLaneGet(9, F, l, f);
+    SbLaneGet(9, R, l, r);
+    const PetscReal p = lambda * (SbDot9(r, f) - 3);
+    for (int k = 0; k < 9; k++) P[k][l] = 2 * mu * (f[k] - r[k]) + p * r[k];
+  }
+}
+
+static void frame_corotated(const struct _p_SbMaterial *m, const SbLane F[9], SbLane R[9])
+{
+  (void)m;
+  SbPolar(F, R);
+}
+
+/* S = sym(R^T F) as 00 01 02 11 12 22, kappa. */
+SB_KERNEL static void stretch(const struct _p_SbMaterial *m, const SbLane F[restrict 9],
+                              const SbLane R[restrict 9], SbLane S[restrict 6], SbLane kappa)
+{
+  const PetscReal mu = m->mu, lambda = m->lambda;
+
+  for (int l = 0; l < SB_BATCH; l++) {
+    PetscReal f[9], r[9], s[9];
+
+    SbLaneGet(9, F, l, f);
+    SbLaneGet(9, R, l, r);
+    SbMatTransposeMul(r, f, s);
+    S[0][l] = s[0];
+    S[1][l] = (s[1] + s[3]) / 2;
+    S[2][l] = (s[2] + s[6]) / 2;
+    S[3][l] = s[4];
+    S[4][l] = (s[5] + s[7]) / 2;
+    S[5][l] = s[8];
+    kappa[l] = lambda * (s[0] + s[4] + s[8] - 3) - 2 * mu;
+  }
+}
+
+/* W = kappa (q I - S)^-1 */
+SB_KERNEL static void twist_exact(const SbLane S[restrict 6], const SbLane kappa, SbLane W[restrict 9])
+{
+  for (int l = 0; l < SB_BATCH; l++) {
+    const PetscReal a = S[3][l] + S[5][l], b = S[0][l] + S[5][l], c = S[0][l] + S[3][l];
+    const PetscReal d = -S[1][l], e = -S[2][l], f = -S[4][l];
+    const PetscReal A0 = b * c - f * f, A1 = e * f - d * c, A2 = d * f - e * b,
+                    det = a * A0 + d * A1 + e * A2;
+    const PetscReal w = kappa[l] / (det > SMALLEST_DET ? det : SMALLEST_DET);
+
+    W[0][l] = w * A0;
+    W[1][l] = W[3][l] = w * A1;
+    W[2][l] = W[6][l] = w * A2;
+    W[4][l] = w * (a * c - e * e);
+    W[5][l] = W[7][l] = w * (d * e - a * f);
+    W[8][l] = w * (a * b - d * d);
+  }
+}
+
+/* The same with kappa / (s_i + s_j) limited to -mu, by the eigenvectors of S. */
+SB_KERNEL static void twist_spd(PetscReal mu, const SbLane S[restrict 6], const SbLane kappa,
+                                SbLane W[restrict 9])
+{
+  SbLane s[3], V[9];
+
+  SbSymEig(S, s, V);
+  for (int l = 0; l < SB_BATCH; l++) {
+    const PetscReal q = s[0][l] + s[1][l] + s[2][l];
+    PetscReal v[9], w[3];
+
+    SbLaneGet(9, (const SbLane *)V, l, v);
+    for (int k = 0; k < 3; k++) {
+      const PetscReal sum = q - s[k][l] > SMALLEST_SUM ? q - s[k][l] : SMALLEST_SUM, limit = -mu * sum;
+
+      w[k] = (kappa[l] > limit ? kappa[l] : limit) / sum;
+    }
+    for (int i = 0; i < 3; i++) {
+      for (int j = 0; j < 3; j++) {
+        W[3 * i + j][l] = w[0] * v[3 * i] * v[3 * j] + w[1] * v[3 * i + 1] * v[3 * j + 1] +
+                          w[2] * v[3 * i + 2] * v[3 * j + 2];
+      }
+    }
+  }
+}
+
+/*
+  C = 2 mu identity + lambda R R + Z W Z^T, the columns of Z being R [e_n]x: of row (i, j) only columns j+1 and j+2 (cyclic)
+  are not zero, -R_i,j+2 and R_i,j+1.
+*/
+SB_KERNEL static void add_modes(const struct _p_SbMaterial *m, const SbLane R[restrict 9],
+                                const SbLane W[restrict 9], SbLane C[restrict 81])
+{
+  const PetscReal mu = m->mu, lambda = m->lambda;
+  SbLane ZW[27];
+
+  for (int l = 0; l < SB_BATCH; l++) {
+    PetscReal r[9], w[9];
+
+    SbLaneGet(9, R, l, r);
+    SbLaneGet(9, W, l, w);
+    for (int ij = 0; ij < 9; ij++) {
+      const int i = ij / 3, j1 = (ij + 1) % 3, j2 = (ij + 2) % 3;
+
+      for (int n = 0; n < 3; n++)
+        ZW[3 * ij + n][l] = r[3 * i + j1] * w[3 * j2 + n] - r[3 * i + j2] * w[3 * j1 + n];
+    }
+  }
+  for (int ij = 0; ij < 9; ij++) {
+    for (int kl = ij; kl < 9; kl++) {
+      const int l1 = (kl + 1) % 3, l2 = (kl + 2) % 3, k = 3 * (kl / 3);
+      const PetscReal identity = ij == kl ? 2 * mu : 0;
+      SbLane c;
+
+      for (int l = 0; l < SB_BATCH; l++) {
+        c[l] = identity + lambda * R[ij][l] * R[kl][l] + ZW[3 * ij + l2][l] * R[k + l1][l] -
+               ZW[3 * ij + l1][l] * R[k + l2][l];
+      }
+      SbTangentPut(c, ij, kl, C);
+    }
+  }
+}
+
+static void tangent_corotated(const struct _p_SbMaterial *m, const SbLane F[9], SbLane C[81])
+{
+  SbLane R[9], S[6], W[9], kappa;
+
+  SbPolar(F, R);
+  stretch(m, F, (const SbLane *)R, S, kappa);
+  if (m->tangent == SB_TANGENT_EXACT_SPD)
+    twist_spd(m->mu, (const SbLane *)S, kappa, W);
+  else
+    twist_exact((const SbLane *)S, kappa, W);
+  add_modes(m, (const SbLane *)R, (const SbLane *)W, C);
+}
+
+static PetscErrorCode settangent_corotated(SbMaterial m, SbTangentKind kind)
+{
+  PetscFunctionBeginUser;
+  m->tangent = kind;
+  m->ops.frame = kind == SB_TANGENT_WARPED ? frame_corotated : NULL;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode setfromoptions_corotated(SbMaterial m, const SbScope *scope)
+{
+  PetscInt kind;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbOptionChoice(scope, "tangent", &kind));
+  PetscCall(SbMaterialSetTangent(m, (SbTangentKind)kind));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbMaterialCreate_Corotated(SbMaterial m)
+{
+  PetscFunctionBeginUser;
+  m->ops.setfromoptions = setfromoptions_corotated;
+  m->ops.settangent = settangent_corotated;
+  m->ops.energy = energy_corotated;
+  m->ops.stress = stress_corotated;
+  m->ops.frame = frame_corotated;
+  m->ops.tangent = tangent_corotated;
+  m->symmetric = PETSC_TRUE;
+  m->tangent = SB_TANGENT_WARPED;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

@@ -1,0 +1,79 @@
+/*
+  Linear elasticity: sigma = 2 mu eps + lambda tr(eps) I with eps = sym(F) - I, psi = mu eps : eps + lambda/2 tr(eps)^2.
+
+  For small strains and small rotations only: a rotation by t shows a false strain cos(t) - 1. The tangent is constant.
+*/
+#include "material_impl.h"
+
+SB_INLINE void strain(const SbLane F[9], int l, PetscReal e[9])
+{
+  SbLaneGet(9, F, l, e);
+  e[1] = e[3] = (e[1] + e[3]) / 2;
+  e[2] = e[6] = (e[2] + e[6]) / 2;
+  e[5] = e[7] = (e[5] + e[7]) / 2;
+  e[0] -= 1;
+  e[4] -= 1;
+  e[8] -= 1;
+}
+
+SB_KERNEL static void energy_linear(const struct _p_SbMaterial *m, const SbLane F[restrict 9], SbLane psi)
+{
+  const PetscReal mu = m->mu, lambda = m->lambda;
+
+  for (int l = 0; l < SB_BATCH; l++) {
+    PetscReal e[9];
+
+    strain(F, l, e);
+    const PetscReal tr = e[0] + e[4] + e[8];
+    psi[l] = mu * SbDot9(e, e) + lambda / 2 * tr * tr;
+  }
+}
+
+SB_KERNEL static void stress_linear(const struct _p_SbMaterial *m, const SbLane F[restrict 9],
+                                    SbLane P[restrict 9])
+{
+  const PetscReal mu = m->mu, lambda = m->lambda;
+
+  for (int l = 0; l < SB_BATCH; l++) {
+    PetscReal e[9];
+
+    strain(F, l, e);
+    const PetscReal p = lambda * (e[0] + e[4] + e[8]);
+    for (int k = 0; k < 9; k++) P[k][l] = 2 * mu * e[k] + (k % 4 == 0 ? p : 0);
+  }
+}
+
+static void frame_linear(const struct _p_SbMaterial *m, const SbLane F[9], SbLane R[9])
+{
+  (void)m;
+  (void)F;
+  for (int k = 0; k < 9; k++) {
+    for (int l = 0; l < SB_BATCH; l++) R[k][l] = k % 4 == 0;
+  }
+}
+
+static void tangent_linear(const struct _p_SbMaterial *m, const SbLane F[9], SbLane C[81])
+{
+  (void)F;
+  for (int i = 0; i < 9; i++) {
+    for (int k = 0; k < 9; k++) {
+      const int turned = 3 * (k % 3) + k / 3;
+      const PetscReal c = m->mu * ((i == k) + (i == turned)) + m->lambda * (i % 4 == 0 && k % 4 == 0);
+
+      for (int l = 0; l < SB_BATCH; l++) C[9 * i + k][l] = c;
+    }
+  }
+}
+
+PetscErrorCode SbMaterialCreate_Linear(SbMaterial m)
+{
+  PetscFunctionBeginUser;
+  m->ops.energy = energy_linear;
+  m->ops.stress = stress_linear;
+  m->ops.frame = frame_linear;
+  m->ops.tangent = tangent_linear;
+  m->linear = PETSC_TRUE;
+  m->symmetric = PETSC_TRUE;
+  m->tangent = SB_TANGENT_EXACT;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

@@ -1,0 +1,218 @@
+/*
+  Creation of material laws by name, their options, and what follows from the tables of all laws alike.
+
+  Lame parameters: mu = E / (2 (1 + nu)), lambda = E nu / ((1 + nu) (1 - 2 nu)).
+*/
+#include "material_impl.h"
+
+PetscFunctionList SbMaterialList = NULL;
+
+static const SbOption body_rows[] = {
+  {"young", SB_OPTION_REAL, 1, "Pa", NULL, "(0, inf)", "Young's modulus."},
+  {"poisson", SB_OPTION_REAL, 1, "", NULL, "(-1, 0.5)",
+   "Poisson's ratio; soft tissue is near 0.5, where p1 elements lock."},
+  {"density", SB_OPTION_REAL, 1, "kg/m^3", "1000", "(0, inf)", "Mass per rest volume."},
+};
+static const SbOption corotated_rows[] = {
+  {"tangent", SB_OPTION_CHOICE, 1, "", "warped", "warped|exact|exact_spd",
+   "Stiffness: Hooke's turned with the cell (positive definite), the exact derivative, or that without "
+   "negative eigenvalues."},
+};
+static const SbOption exact_rows[] = {
+  {"tangent", SB_OPTION_CHOICE, 1, "", "exact", "exact|exact_spd",
+   "Stiffness: the exact derivative of the force, or that without negative eigenvalues (for CG)."},
+};
+
+static PetscErrorCode destroy_list(void)
+{
+  PetscFunctionBeginUser;
+  PetscCall(PetscFunctionListDestroy(&SbMaterialList));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbMaterialRegister(const char *law, PetscErrorCode (*create)(SbMaterial), PetscInt nrows,
+                                  const SbOption rows[])
+{
+  PetscFunctionBeginUser;
+  if (!SbMaterialList) PetscCall(PetscRegisterFinalize(destroy_list));
+  PetscCall(PetscFunctionListAdd(&SbMaterialList, law, create));
+  if (nrows) PetscCall(SbOptionsRegister("body", law, nrows, rows));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbMaterialRegisterAll(void)
+{
+  PetscFunctionBeginUser;
+  PetscCall(SbOptionsRegister("body", "", PETSC_STATIC_ARRAY_LENGTH(body_rows), body_rows));
+  PetscCall(SbMaterialRegister("linear", SbMaterialCreate_Linear, 0, NULL));
+  PetscCall(SbMaterialRegister("corotated", SbMaterialCreate_Corotated,
+                               PETSC_STATIC_ARRAY_LENGTH(corotated_rows), corotated_rows));
+  PetscCall(
+    SbMaterialRegister("stvk", SbMaterialCreate_StVK, PETSC_STATIC_ARRAY_LENGTH(exact_rows), exact_rows));
+  PetscCall(SbMaterialRegister("neohookean", SbMaterialCreate_NeoHookean,
+                               PETSC_STATIC_ARRAY_LENGTH(exact_rows), exact_rows));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The constructor of a law, or an error that lists the laws there are; `where` names what asked for it. */
+static PetscErrorCode find_law(const char *law, const char *where, PetscErrorCode (**create)(SbMaterial))
+{
+  const char **names;
+  int n;
+  char near[256], all[256] = "";
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscFunctionListFind(SbMaterialList, law, create));
+  if (*create) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscFunctionListGet(SbMaterialList, &names, &n));
+  PetscCall(SbNearest(law, n, names, sizeof(near), near));
+  for (int k = 0; k < n; k++) {
+    PetscCall(PetscStrlcat(all, k ? ", " : "", sizeof(all)));
+    PetscCall(PetscStrlcat(all, names[k], sizeof(all)));
+  }
+  PetscCall(PetscFree(names));
+  SETERRQ(PETSC_COMM_SELF, PETSC_ERR_USER, "%s: there is no material law \"%s\"%s%s; the laws are %s", where,
+          law, near[0] ? "; did you mean " : "", near, all);
+}
+
+static PetscErrorCode create_law(const char *law, const char *where, PetscReal E, PetscReal nu,
+                                 PetscReal density, SbMaterial *material)
+{
+  PetscErrorCode (*create)(SbMaterial) = NULL;
+  SbMaterial m;
+
+  PetscFunctionBeginUser;
+  PetscCall(find_law(law, where, &create));
+  PetscCheck(E > 0 && E < PETSC_INFINITY, PETSC_COMM_SELF, PETSC_ERR_USER,
+             "%s: Young's modulus is %g Pa; it must lie in (0, inf)", where, (double)E);
+  PetscCheck(nu > -1 && nu < 0.5, PETSC_COMM_SELF, PETSC_ERR_USER,
+             "%s: Poisson's ratio is %g; it must lie in (-1, 0.5): take 0.499 for an incompressible material",
+             where, (double)nu);
+  PetscCheck(density > 0 && density < PETSC_INFINITY, PETSC_COMM_SELF, PETSC_ERR_USER,
+             "%s: density is %g kg/m^3; it must lie in (0, inf)", where, (double)density);
+  PetscCall(PetscNew(&m));
+  PetscCall(PetscStrncpy(m->law, law, sizeof(m->law)));
+  m->E = E;
+  m->nu = nu;
+  m->density = density;
+  m->mu = E / (2 * (1 + nu));
+  m->lambda = E * nu / ((1 + nu) * (1 - 2 * nu));
+  PetscCall((*create)(m));
+  *material = m;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbMaterialCreateElastic(const char *law, PetscReal E, PetscReal nu, PetscReal density,
+                                       SbMaterial *material)
+{
+  PetscFunctionBeginUser;
+  PetscCall(create_law(law, "material", E, nu, density, material));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbMaterialCreate(const char *law, const SbScope *body, SbMaterial *material)
+{
+  SbScope scope;
+  PetscReal E, nu, density;
+  char where[2 * SB_NAME_MAX];
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscSNPrintf(where, sizeof(where), "-body_%s_material", body->instance));
+  PetscCall(SbScopeSet(&scope, "body", law, body->instance));
+  PetscCall(SbOptionReal(&scope, "young", &E));
+  PetscCall(SbOptionReal(&scope, "poisson", &nu));
+  PetscCall(SbOptionReal(&scope, "density", &density));
+  PetscCall(create_law(law, where, E, nu, density, material));
+  if ((*material)->ops.setfromoptions) PetscCall(((*material)->ops.setfromoptions)(*material, &scope));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbMaterialDestroy(SbMaterial *m)
+{
+  PetscFunctionBeginUser;
+  if (!*m) PetscFunctionReturn(PETSC_SUCCESS);
+  if ((*m)->ops.destroy) PetscCall(((*m)->ops.destroy)(*m));
+  PetscCall(PetscFree(*m));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbMaterialSetTangent(SbMaterial m, SbTangentKind kind)
+{
+  PetscFunctionBeginUser;
+  if (m->ops.settangent) {
+    PetscCall((m->ops.settangent)(m, kind));
+  } else {
+    PetscCheck(kind == m->tangent, PETSC_COMM_SELF, PETSC_ERR_USER,
+               "material law %s has one tangent only: do not choose one", m->law);
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbMaterialSetTangent_Exact(SbMaterial m, SbTangentKind kind)
+{
+  PetscFunctionBeginUser;
+  PetscCheck(kind != SB_TANGENT_WARPED, PETSC_COMM_SELF, PETSC_ERR_USER,
+             "material law %s has no warped tangent: choose exact or exact_spd", m->law);
+  m->tangent = kind;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbMaterialSetFromOptions_Exact(SbMaterial m, const SbScope *scope)
+{
+  PetscInt choice;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbOptionChoice(scope, "tangent", &choice));
+  PetscCall(SbMaterialSetTangent(m, choice ? SB_TANGENT_EXACT_SPD : SB_TANGENT_EXACT));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscReal SbMaterialWaveSpeed(SbMaterial m)
+{
+  return sqrt((m->lambda + 2 * m->mu) / m->density);
+}
+
+/* dP = mu (H + R H^T R) + lambda (R : H) R */
+SB_KERNEL static void action_warped(PetscReal lambda, PetscReal mu, const SbLane R[restrict 9],
+                                    const SbLane H[restrict 9], SbLane dP[restrict 9])
+{
+  for (int l = 0; l < SB_BATCH; l++) {
+    PetscReal r[9], h[9], b[9], t[9];
+
+    SbLaneGet(9, R, l, r);
+    SbLaneGet(9, H, l, h);
+    SbMatTransposeMul(h, r, b);
+    SbMatMul(r, b, t);
+    const PetscReal p = lambda * (b[0] + b[4] + b[8]);
+    for (int k = 0; k < 9; k++) dP[k][l] = mu * (h[k] + t[k]) + p * r[k];
+  }
+}
+
+SB_KERNEL static void action_general(const SbLane C[restrict 81], const SbLane H[restrict 9],
+                                     SbLane dP[restrict 9])
+{
+  for (int ij = 0; ij < 9; ij++) {
+    for (int l = 0; l < SB_BATCH; l++) {
+      PetscReal sum = C[9 * ij][l] * H[0][l];
+
+      for (int kl = 1; kl < 9; kl++) sum += C[9 * ij + kl][l] * H[kl][l];
+      dP[ij][l] = sum;
+    }
+  }
+}
+
+void SbMaterialTangentAction(const struct _p_SbMaterial *m, const SbLane F[9], const SbLane H[9],
+                             SbLane dP[9])
+{
+  if (m->ops.frame) {
+    SbLane R[9];
+
+    m->ops.frame(m, F, R);
+    action_warped(m->lambda, m->mu, (const SbLane *)R, H, dP);
+  } else {
+    SbLane C[81];
+
+    m->ops.tangent(m, F, C);
+    action_general((const SbLane *)C, H, dP);
+  }
+}

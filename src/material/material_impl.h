@@ -1,0 +1,35 @@
+/*
+  material_impl.h - what the laws share: their constructors, and the projection of an isotropic tangent.
+*/
+#pragma once
+#include <sbmaterial.h>
+
+PetscErrorCode SbMaterialCreate_Linear(SbMaterial m);
+PetscErrorCode SbMaterialCreate_Corotated(SbMaterial m);
+PetscErrorCode SbMaterialCreate_StVK(SbMaterial m);
+PetscErrorCode SbMaterialCreate_NeoHookean(SbMaterial m);
+
+/* Options of laws whose tangents are exact and exact_spd: reads `tangent`. And the check behind it. */
+PetscErrorCode SbMaterialSetFromOptions_Exact(SbMaterial m, const SbScope *scope);
+PetscErrorCode SbMaterialSetTangent_Exact(SbMaterial m, SbTangentKind kind);
+
+/*
+  SbStretches - F = U diag(s) V^T with rotations U and V; s[k] in no order, det F = s0 s1 s2 with its sign.
+*/
+void SbStretches(const SbLane F[9], SbLane U[9], SbLane s[3], SbLane V[9]);
+/*
+  SbSpectralTangent - C[81] of an isotropic energy psi(s0, s1, s2), its negative eigenvalues raised to zero.
+
+  Input, Pa, with (i, j, k) cyclic: hessian[6] = d^2 psi / ds_i ds_j as 00 01 02 11 12 22;
+    flip[k]  = (psi_i - psi_j) / (s_i - s_j), eigenvalue of the symmetric shear of the axes i and j;
+    twist[k] = (psi_i + psi_j) / (s_i + s_j), eigenvalue of the rotation about axis k; psi_i = d psi / d s_i.
+*/
+void SbSpectralTangent(const SbLane U[9], const SbLane V[9], const SbLane hessian[6], const SbLane flip[3],
+                       const SbLane twist[3], SbLane C[81]);
+
+/* C_(ij)(kl) = C_(kl)(ij) = c */
+SB_INLINE void SbTangentPut(const SbLane c, int ij, int kl, SbLane C[81])
+{
+  for (int l = 0; l < SB_BATCH; l++) C[9 * ij + kl][l] = c[l];
+  for (int l = 0; l < SB_BATCH; l++) C[9 * kl + ij][l] = c[l];
+}

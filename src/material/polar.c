@@ -1,0 +1,212 @@
+/*
+  Polar rotation of 3x3 matrices.
+
+  R maximises R : F over all rotations. With R written as a unit quaternion q this is q^T N q with a symmetric traceless
+  4x4 matrix N linear in F (Davenport's q-method; Horn, "Closed-form solution of absolute orientation using unit
+  quaternions", 1987), so q is the eigenvector of the largest eigenvalue. In terms of the signed stretches s1 >= s2 >= |s3|
+  that eigenvalue is lambda = s1 + s2 + s3 = tr(R^T F), and the gap to the next one is 2 (s2 + s3). Reflections, singular F
+  and rotations by any angle need no special case; only a small gap is hard, and there the answer itself is ill-conditioned.
+
+  Fast path, all lanes at once and without branches, after Higham and Noferini ("An algorithm to compute the polar
+  decomposition of a 3x3 matrix", 2016), with the adjugate in the place of a factorisation:
+    1. lambda is the largest root of  p(x) = x^4 - 2 a x^2 - 8 d x + a^2 - 4 b,  a = |F|^2, d = det F, b = |cof F|^2.
+       Newton's method from the upper bound sqrt(3 a) falls monotonically onto it. For F = I the bound is the root.
+    2. adj(lambda I - N) is q q^T times p'(lambda) up to the error of lambda: its column with the largest diagonal entry
+       is one step of inverse iteration, multiplying by it once more is another.
+  A lane is trusted when the gap is not small (p' = 8 (s1+s2)(s2+s3)(s3+s1) against lambda^3) and the last Newton step was
+  so short that both steps together leave less than rounding. Other lanes go one by one to the robust path: Jacobi's
+  method on N, which is right to rounding for any symmetric matrix.
+*/
+#include <sbkernel.h>
+
+#define ROOT_STEPS 3
+#define SMALLEST_GAP 1e-3 /* of p'(lambda) / (4 lambda^3), at most 16/27 */
+#define LAST_STEP 1e-3    /* of the last Newton step, relative to the gap */
+
+/* N[10] = 00 01 02 03 11 12 13 22 23 33 with q^T N q = R(q) : F, q = (w, x, y, z). */
+SB_INLINE void davenport(const PetscReal F[9], PetscReal N[10])
+{
+  N[0] = F[0] + F[4] + F[8];
+  N[1] = F[7] - F[5];
+  N[2] = F[2] - F[6];
+  N[3] = F[3] - F[1];
+  N[4] = F[0] - F[4] - F[8];
+  N[5] = F[1] + F[3];
+  N[6] = F[2] + F[6];
+  N[7] = F[4] - F[0] - F[8];
+  N[8] = F[5] + F[7];
+  N[9] = F[8] - F[0] - F[4];
+}
+
+/* Rotation of a quaternion of any length but zero. */
+SB_INLINE void quaternion_rotation(const PetscReal q[4], PetscReal R[9])
+{
+  const PetscReal w = q[0], x = q[1], y = q[2], z = q[3], s = 2 / (w * w + x * x + y * y + z * z);
+  const PetscReal sx = s * x, sy = s * y, sz = s * z;
+
+  R[0] = 1 - (sy * y + sz * z);
+  R[1] = sx * y - sz * w;
+  R[2] = sx * z + sy * w;
+  R[3] = sx * y + sz * w;
+  R[4] = 1 - (sx * x + sz * z);
+  R[5] = sy * z - sx * w;
+  R[6] = sx * z - sy * w;
+  R[7] = sy * z + sx * w;
+  R[8] = 1 - (sx * x + sy * y);
+}
+
+/* Adjugate of a symmetric 4x4 matrix, both as 00 01 02 03 11 12 13 22 23 33, by 2x2 minors of two pairs of rows. */
+SB_INLINE void adjugate4(const PetscReal M[10], PetscReal A[10])
+{
+  /* rows 0 and 1: column pairs 01 02 03 12 13 23; rows 2 and 3: 02 03 12 13 23 (01 equals t5) */
+  const PetscReal t0 = M[0] * M[4] - M[1] * M[1], t1 = M[0] * M[5] - M[1] * M[2],
+                  t2 = M[0] * M[6] - M[1] * M[3];
+  const PetscReal t3 = M[1] * M[5] - M[4] * M[2], t4 = M[1] * M[6] - M[4] * M[3],
+                  t5 = M[2] * M[6] - M[5] * M[3];
+  const PetscReal b1 = M[2] * M[8] - M[3] * M[7], b2 = M[2] * M[9] - M[3] * M[8],
+                  b3 = M[5] * M[8] - M[6] * M[7];
+  const PetscReal b4 = M[5] * M[9] - M[6] * M[8], b5 = M[7] * M[9] - M[8] * M[8];
+
+  A[0] = M[4] * b5 - M[5] * b4 + M[6] * b3;
+  A[1] = M[2] * b4 - M[1] * b5 - M[3] * b3;
+  A[2] = M[6] * t5 - M[8] * t4 + M[9] * t3;
+  A[3] = M[7] * t4 - M[5] * t5 - M[8] * t3;
+  A[4] = M[0] * b5 - M[2] * b2 + M[3] * b1;
+  A[5] = M[8] * t2 - M[3] * t5 - M[9] * t1;
+  A[6] = M[2] * t5 - M[7] * t2 + M[8] * t1;
+  A[7] = M[3] * t4 - M[6] * t2 + M[9] * t0;
+  A[8] = M[5] * t2 - M[2] * t4 - M[8] * t0;
+  A[9] = M[2] * t3 - M[5] * t1 + M[7] * t0;
+}
+
+/* Fast path of one lane. Returns a positive number when the result is to be trusted (a NaN is not positive). */
+SB_INLINE PetscReal polar_fast(const PetscReal F[9], PetscReal R[9])
+{
+  PetscReal cof[9], N[10], A[10], q[4], p[4], best, step = 0, slope = 0;
+
+  /* Largest root of the characteristic polynomial. */
+  SbMatCofactor(F, cof);
+  const PetscReal a = SbDot9(F, F), d2 = 2 * SbDot3(F, cof), c0 = a * a - 4 * SbDot9(cof, cof);
+  PetscReal x = sqrt(3 * a);
+  for (int k = 0; k < ROOT_STEPS; k++) {
+    const PetscReal value = ((x * x - 2 * a) * x - 4 * d2) * x + c0;
+
+    slope = (x * x - a) * x - d2;
+    step = value / (slope + sqrt(9 * slope * slope - 3 * value * (3 * x * x - a)));
+    x -= step;
+  }
+
+  /* Its eigenvector: the largest column of the adjugate, once more through the adjugate. */
+  davenport(F, N);
+  for (int k = 0; k < 10; k++) N[k] = -N[k];
+  N[0] += x;
+  N[4] += x;
+  N[7] += x;
+  N[9] += x;
+  adjugate4(N, A);
+  best = A[0];
+  for (int k = 0; k < 4; k++) q[k] = A[k];
+  {
+    const PetscReal c1[4] = {A[1], A[4], A[5], A[6]}, c2[4] = {A[2], A[5], A[7], A[8]},
+                    c3[4] = {A[3], A[6], A[8], A[9]};
+
+    for (int k = 0; k < 4; k++) q[k] = A[4] > best ? c1[k] : q[k];
+    best = A[4] > best ? A[4] : best;
+    for (int k = 0; k < 4; k++) q[k] = A[7] > best ? c2[k] : q[k];
+    best = A[7] > best ? A[7] : best;
+    for (int k = 0; k < 4; k++) q[k] = A[9] > best ? c3[k] : q[k];
+  }
+  p[0] = A[0] * q[0] + A[1] * q[1] + A[2] * q[2] + A[3] * q[3];
+  p[1] = A[1] * q[0] + A[4] * q[1] + A[5] * q[2] + A[6] * q[3];
+  p[2] = A[2] * q[0] + A[5] * q[1] + A[7] * q[2] + A[8] * q[3];
+  p[3] = A[3] * q[0] + A[6] * q[1] + A[8] * q[2] + A[9] * q[3];
+  quaternion_rotation(p, R);
+
+  /* The gap is at least slope / (2 x^2). The limits on a keep the powers above inside the range of a double. */
+  slope = (a < 1e16 ? slope : 0) > SMALLEST_GAP * x * x * x ? slope : 0;
+  slope = a > 1e-16 ? slope : 0;
+  return LAST_STEP * slope > 2 * x * x * fabs(step) ? 1 : 0;
+}
+
+/* One Jacobi rotation of a symmetric 4x4 matrix N that zeroes N[p][q]; V collects the rotations. */
+static void jacobi4(PetscReal N[4][4], PetscReal V[4][4], int p, int q)
+{
+  const PetscReal tau = (N[q][q] - N[p][p]) / (2 * N[p][q]);
+  const PetscReal t = (tau < 0 ? -1 : 1) / (fabs(tau) + sqrt(1 + tau * tau)), c = 1 / sqrt(1 + t * t),
+                  s = t * c;
+
+  for (int k = 0; k < 4; k++) {
+    const PetscReal kp = N[k][p], kq = N[k][q], vp = V[k][p], vq = V[k][q];
+
+    N[k][p] = c * kp - s * kq;
+    N[k][q] = s * kp + c * kq;
+    V[k][p] = c * vp - s * vq;
+    V[k][q] = s * vp + c * vq;
+  }
+  for (int k = 0; k < 4; k++) {
+    const PetscReal pk = N[p][k], qk = N[q][k];
+
+    N[p][k] = c * pk - s * qk;
+    N[q][k] = s * pk + c * qk;
+  }
+  N[p][q] = N[q][p] = 0;
+}
+
+/* Any F: scaled to largest entry one, Jacobi's method to the end. */
+static void polar_robust(const PetscReal F[9], PetscReal R[9])
+{
+  PetscReal scale = 0, G[9], n[10], V[4][4] = {{1, 0, 0, 0}, {0, 1, 0, 0}, {0, 0, 1, 0}, {0, 0, 0, 1}}, q[4];
+  int best = 0;
+
+  for (int k = 0; k < 9; k++) {
+    if (!isfinite(F[k])) {
+      for (int m = 0; m < 9; m++) R[m] = NAN;
+      return;
+    }
+    scale = fabs(F[k]) > scale ? fabs(F[k]) : scale;
+  }
+  for (int k = 0; k < 9; k++) G[k] = scale > 0 ? F[k] / scale : 0;
+  davenport(G, n);
+  PetscReal N[4][4] = {
+    {n[0], n[1], n[2], n[3]}, {n[1], n[4], n[5], n[6]}, {n[2], n[5], n[7], n[8]}, {n[3], n[6], n[8], n[9]}};
+
+  /* Convergence is quadratic: about six sweeps; the bound only keeps the loop finite. */
+  for (int sweep = 0; sweep < 30; sweep++) {
+    PetscReal largest = 0;
+
+    for (int i = 0; i < 4; i++) {
+      for (int j = i + 1; j < 4; j++) {
+        largest = fabs(N[i][j]) > largest ? fabs(N[i][j]) : largest;
+        if (fabs(N[i][j]) > 1e-20) jacobi4(N, V, i, j);
+      }
+    }
+    if (largest <= 1e-20) break;
+  }
+  for (int k = 1; k < 4; k++) best = N[k][k] > N[best][best] ? k : best;
+  for (int k = 0; k < 4; k++) q[k] = V[k][best];
+  quaternion_rotation(q, R);
+}
+
+SB_KERNEL void SbPolar(const SbLane F[restrict 9], SbLane R[restrict 9])
+{
+  SbLane trust;
+  PetscReal worst = 1;
+
+  for (int l = 0; l < SB_BATCH; l++) {
+    PetscReal f[9], r[9];
+
+    SbLaneGet(9, F, l, f);
+    trust[l] = polar_fast(f, r);
+    SbLanePut(9, r, l, R);
+  }
+  for (int l = 0; l < SB_BATCH; l++) worst = trust[l] > 0 ? worst : 0;
+  if (worst > 0) return;
+  for (int l = 0; l < SB_BATCH; l++) {
+    PetscReal f[9], r[9];
+
+    if (trust[l] > 0) continue;
+    SbLaneGet(9, F, l, f);
+    polar_robust(f, r);
+    SbLanePut(9, r, l, R);
+  }
+}
