@@ -1,0 +1,82 @@
+/*
+  scene.h - a scene from an option string, inside a test program. Each call starts from an empty option database.
+*/
+#pragma once
+#include <sb.h>
+#include "test.h"
+
+typedef struct {
+  SbModel model;
+  SbRun   run;
+} TestScene;
+
+/* Everything of the program but output: model and run are set up and ready for SbRunSolve(). */
+static inline PetscErrorCode test_scene_open(const char *options, TestScene *scene)
+{
+  PetscFunctionBeginUser;
+  PetscCall(PetscOptionsClear(NULL));
+  PetscCall(SbOptionsReset());
+  PetscCall(SbRegisterAll());
+  PetscCall(PetscOptionsInsertString(NULL, options));
+  PetscCall(SbSceneCreate(PETSC_COMM_WORLD, &scene->model));
+  PetscCall(SbRunCreate(scene->model, &scene->run));
+  PetscCall(SbOptionsCheck());
+  PetscCall(SbModelSetUp(scene->model));
+  PetscCall(SbRunSetUp(scene->run));
+  PetscCall(SbMeshValidate(scene->model->mesh));
+  PetscCall(SbSpaceValidate(scene->model->space));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static inline PetscErrorCode test_scene_close(TestScene *scene)
+{
+  PetscFunctionBeginUser;
+  PetscCall(SbRunDestroy(&scene->run));
+  PetscCall(SbModelDestroy(&scene->model));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Displacement (or any vector of the run) at the vertex nearest to a rest position, on every rank. */
+static inline PetscErrorCode test_value_at(SbModel m, Vec U, const PetscReal at[3], PetscReal value[3])
+{
+  SbSpace            s = m->space;
+  const PetscScalar *u;
+  struct {
+    double distance;
+    int    rank;
+  } mine = {1e300, 0}, best;
+  PetscInt    node = 0;
+  PetscMPIInt rank;
+
+  PetscFunctionBeginUser;
+  PetscCallMPI(MPI_Comm_rank(m->comm, &rank));
+  mine.rank = rank;
+  for (PetscInt i = 0; i < s->nnode_owned; i++) {
+    PetscReal d2 = 0.;
+
+    for (PetscInt k = 0; k < 3; k++) d2 += PetscSqr(s->node_x[3 * i + k] - at[k]);
+    if (d2 < mine.distance) {
+      mine.distance = d2;
+      node          = i;
+    }
+  }
+  PetscCallMPI(MPI_Allreduce(&mine, &best, 1, MPI_DOUBLE_INT, MPI_MINLOC, m->comm));
+  PetscCall(VecGetArrayRead(U, &u));
+  for (PetscInt k = 0; k < 3; k++) value[k] = rank == best.rank ? u[3 * node + k] : 0.;
+  PetscCall(VecRestoreArrayRead(U, &u));
+  PetscCallMPI(MPI_Bcast(value, 3, MPIU_REAL, best.rank, m->comm));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Fills a vector from a function of the rest position, so that it does not depend on the partition. */
+static inline PetscErrorCode test_fill(SbModel m, void (*f)(const PetscReal x[3], PetscReal value[3]), Vec U)
+{
+  SbSpace      s = m->space;
+  PetscScalar *u;
+
+  PetscFunctionBeginUser;
+  PetscCall(VecGetArray(U, &u));
+  for (PetscInt i = 0; i < s->nnode_owned; i++) f(s->node_x + 3 * i, u + 3 * i);
+  PetscCall(VecRestoreArray(U, &u));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

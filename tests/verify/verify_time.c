@@ -1,0 +1,147 @@
+// @ranks 1 2
+/*
+  The integrators against exact answers of their own recurrences. One linear tet held at its base is an oscillator: its apex moves
+  along z with w^2 = V (lambda + 2 mu) / (H^2 m), m = rho V / 4. With q = v + i w u an undamped step multiplies q by
+    implicit Euler 1 / (1 - i w h), explicit Euler 1 + i w h, Newmark (1/4, 1/2) (1 + i w h / 2) / (1 - i w h / 2),
+  which is where amplitude factor and period elongation of the field's formulas come from.
+*/
+#include <complex.h>
+#undef I
+#include "../scene.h"
+
+#define HEIGHT 0.5
+static const double complex unit = 1.0i;
+static const PetscReal young = 1000., nu = 0.25, rho = 8., v0 = 0.2;
+
+/* share: part of the tet's mass at the apex, 1/4 lumped and 1/10 consistent */
+static PetscReal frequency(PetscReal share)
+{
+  const PetscReal lambda = young * nu / ((1. + nu) * (1. - 2. * nu)), mu = young / (2. * (1. + nu));
+
+  return PetscSqrtReal((lambda + 2. * mu) / (share * rho * HEIGHT * HEIGHT));
+}
+
+/* Runs n steps of length h; u and v of the apex along z. */
+static PetscErrorCode oscillate(const char *options, PetscInt n, PetscReal h, PetscReal *u, PetscReal *v)
+{
+  const PetscReal apex[3] = {0., 0., HEIGHT};
+  PetscReal       value[3];
+  TestScene       t;
+  char            text[2048];
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscSNPrintf(text, sizeof(text),
+                          "-bodies a -body_a_mesh tests/data/one_tet.msh -body_a_material linear -body_a_young %g -body_a_poisson %g -body_a_density %g "
+                          "-body_a_velocity 0,0,%g -sets base -set_base_at plane:0,0,1,0 -effects hold,damping -effect_hold_type support -effect_hold_on base "
+                          "-ts_dt %.17g -ts_max_time %.17g -ksp_rtol 1e-14 %s",
+                          (double)young, (double)nu, (double)rho, (double)v0, (double)h, (double)(h * n), options));
+  PetscCall(test_scene_open(text, &t));
+  PetscCall(SbRunSolve(t.run));
+  SB_CHECK(!t.run->stop_reason[0] && t.run->steps_total == n, "%s: %s", options, t.run->stop_reason);
+  PetscCall(test_value_at(t.model, t.run->U, apex, value));
+  *u = value[2];
+  PetscCall(test_value_at(t.model, t.run->V, apex, value));
+  *v = value[2];
+  PetscCall(test_scene_close(&t));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode check_oscillator(const char *options, int kind)
+{
+  const PetscReal w = frequency(0.25);
+  const PetscInt  n = 25;
+
+  PetscFunctionBeginUser;
+  for (int k = 0; k < 3; k++) {
+    const PetscReal wh = k == 0 ? 0.1 : k == 1 ? 0.5 : 1.;
+    double complex  factor, q;
+    PetscReal       u, v;
+
+    factor = kind == 0 ? 1. / (1. - unit * wh) : kind == 1 ? 1. + unit * wh : (1. + 0.5 * unit * wh) / (1. - 0.5 * unit * wh);
+    q      = v0 * cpow(factor, (double)n);
+    PetscCall(oscillate(options, n, wh / w, &u, &v));
+    SB_CHECK_NEAR(w * u, cimag(q), 1e-10 * cabs(q), options);
+    SB_CHECK_NEAR(v, creal(q), 1e-10 * cabs(q), options);
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Error at a fixed time against the exact oscillation must fall with the order of the method; damped by alpha and beta. */
+static PetscErrorCode check_order(const char *options, PetscReal share, PetscReal alpha, PetscReal beta, int order)
+{
+  const PetscReal w = frequency(share), zeta = 0.5 * (alpha / w + beta * w), T = 1.3 / w, wd = w * PetscSqrtReal(1. - zeta * zeta);
+  const PetscReal exact = v0 / wd * PetscExpReal(-zeta * w * T) * PetscSinReal(wd * T);
+  PetscReal       error[2], u, v;
+  char            text[512];
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscSNPrintf(text, sizeof(text), "%s -effect_damping_alpha %g -effect_damping_beta %g", options, (double)alpha, (double)beta));
+  for (int k = 0; k < 2; k++) {
+    PetscCall(oscillate(text, 100 << k, T / (100 << k), &u, &v));
+    error[k] = PetscAbsReal(u - exact);
+  }
+  SB_CHECK_NEAR(PetscLog2Real(error[0] / error[1]), order, 0.06, text);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Highest frequencies: one step of generalized-alpha at w h = 1e4 leaves the spectral radius (in a norm of u, v, a: look at the decay over steps). */
+static PetscErrorCode check_dissipation(void)
+{
+  PetscReal u[2], v[2];
+
+  PetscFunctionBeginUser;
+  PetscCall(oscillate("-time genalpha -time_spectral_radius 0.5", 20, 1e4 / frequency(0.25), &u[0], &v[0]));
+  PetscCall(oscillate("-time genalpha -time_spectral_radius 0.5", 24, 1e4 / frequency(0.25), &u[1], &v[1]));
+  /* a double root: the factor per step approaches 0.5 from above, (n + 4)/n 0.5^4 for n = 20 */
+  SB_CHECK(PetscAbsReal(v[1]) < PetscAbsReal(v[0]) * 0.0625 * 1.5, "generalized-alpha damps %g to %g in four steps", (double)v[0], (double)v[1]);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* A free body under gravity: implicit Euler falls g h^2 n (n + 1) / 2, Newmark g t^2 / 2. */
+static PetscErrorCode check_free_fall(const char *preset, PetscReal expected)
+{
+  TestScene t;
+  char      text[1024];
+  PetscReal value[3];
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscSNPrintf(text, sizeof(text),
+                          "-bodies a -body_a_mesh box:0.2,0.1,0.1:2 -body_a_material corotated -body_a_young 1e4 -body_a_poisson 0.3 -body_a_density 1000 "
+                          "-effects gravity -time %s -ts_dt 0.01 -ts_max_time 0.5",
+                          preset));
+  PetscCall(test_scene_open(text, &t));
+  PetscCall(SbRunSolve(t.run));
+  SB_CHECK(t.run->steps_total == 50, "%s: %" PetscInt_FMT " steps instead of 50", preset, t.run->steps_total);
+  for (int k = 0; k < 2; k++) {
+    const PetscReal at[3] = {0.2 * k, 0.1 * k, 0.05};
+
+    PetscCall(test_value_at(t.model, t.run->U, at, value));
+    SB_CHECK_NEAR(value[2], expected, 1e-7 * PetscAbsReal(expected), preset);
+  }
+  PetscCall(test_scene_close(&t));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+int main(int argc, char **argv)
+{
+  SB_TEST_BEGIN(argc, argv);
+  PetscCall(check_oscillator("-time euler_implicit", 0));
+  PetscCall(check_oscillator("-time euler_explicit", 1));
+  PetscCall(check_oscillator("-time newmark", 2));
+  PetscCall(check_oscillator("-time newmark -time_predictor velocity", 2));
+  PetscCall(check_oscillator("-time genalpha -time_spectral_radius 1", 2));
+  PetscCall(check_order("-time euler_implicit", 0.25, 0., 0., 1));
+  PetscCall(check_order("-time euler_implicit", 0.25, 2., 0.002, 1));
+  PetscCall(check_order("-time euler_explicit", 0.25, 2., 0.002, 1));
+  PetscCall(check_order("-time euler_symplectic", 0.25, 0., 0., 1));
+  PetscCall(check_order("-time newmark", 0.25, 0., 0., 2));
+  PetscCall(check_order("-time newmark", 0.25, 2., 0.002, 2));
+  PetscCall(check_order("-time newmark -mass consistent", 0.1, 0., 0., 2));
+  PetscCall(check_order("-time genalpha -time_spectral_radius 0.5", 0.25, 0., 0., 2));
+  PetscCall(check_order("-time genalpha -time_spectral_radius 0", 0.25, 2., 0.002, 2));
+  PetscCall(check_dissipation());
+  PetscCall(check_free_fall("euler_implicit", -9.81 * 1e-4 * 50 * 51 / 2));
+  PetscCall(check_free_fall("newmark", -0.5 * 9.81 * 0.25));
+  PetscCall(check_free_fall("genalpha", -0.5 * 9.81 * 0.25));
+  SB_TEST_END();
+}
