@@ -28,14 +28,15 @@ typedef enum {
   registered, they are the table from which -help, the checks, -scenario_view and docs/options.md are made.
 */
 typedef struct {
-  const char  *key;    /* last part of the name: "young" in -body_liver_young */
+  const char *key; /* last part of the name: "young" in -body_liver_young */
   SbOptionKind kind;
-  PetscInt     count;  /* values of SB_OPTION_REALS, formulas of SB_OPTION_FORMULA; 1 otherwise */
-  const char  *unit;   /* "Pa", "kg/m^3"; "" when there is none */
-  const char  *preset; /* default as it would be typed; NULL: must be given; "": nothing by default, the reader of a
+  PetscInt count;   /* values of SB_OPTION_REALS, formulas of SB_OPTION_FORMULA; 1 otherwise */
+  const char *unit; /* "Pa", "kg/m^3"; "" when there is none */
+  const char
+    *preset; /* default as it would be typed; NULL: must be given; "": nothing by default, the reader of a
                           number, truth value or choice leaves *value as it was */
-  const char  *range;  /* "(0, inf)", "[0, 0.5)" for numbers; "a|b|c" for a choice; "" when free */
-  const char  *help;   /* one sentence */
+  const char *range; /* "(0, inf)", "[0, 0.5)" for numbers; "a|b|c" for a choice; "" when free */
+  const char *help;  /* one sentence */
 } SbOption;
 
 /*
@@ -44,7 +45,7 @@ typedef struct {
   instances of the class have); it selects the rows, it is not part of the option's name.
 */
 typedef struct {
-  char klass[SB_NAME_MAX];    /* "", "body", "set", "effect" */
+  char klass[SB_NAME_MAX]; /* "", "body", "set", "effect" */
   char type[SB_NAME_MAX];
   char instance[SB_NAME_MAX]; /* "liver" */
 } SbScope;
@@ -63,10 +64,16 @@ PetscErrorCode SbOptionInt(const SbScope *scope, const char *key, PetscInt *valu
 PetscErrorCode SbOptionReal(const SbScope *scope, const char *key, PetscReal *value);
 PetscErrorCode SbOptionReals(const SbScope *scope, const char *key, PetscReal value[]);
 PetscErrorCode SbOptionString(const SbScope *scope, const char *key, size_t size, char value[]);
-PetscErrorCode SbOptionNames(const SbScope *scope, const char *key, PetscInt *n, char (**names)[SB_NAME_MAX]); /* PetscFree */
-PetscErrorCode SbOptionChoice(const SbScope *scope, const char *key, PetscInt *index); /* position in `range` */
-PetscErrorCode SbOptionGiven(const SbScope *scope, const char *key, PetscBool *given);  /* by the user */
+PetscErrorCode SbOptionNames(const SbScope *scope, const char *key, PetscInt *n,
+                             char (**names)[SB_NAME_MAX]); /* PetscFree */
+PetscErrorCode SbOptionChoice(const SbScope *scope, const char *key,
+                              PetscInt *index); /* position in `range` */
+PetscErrorCode SbOptionGiven(const SbScope *scope, const char *key, PetscBool *given); /* by the user */
 
+/* Reads and checks a value that is asked for only later, when much has been computed already. */
+PetscErrorCode SbOptionAhead(const SbScope *scope, const char *key);
+/* Whether the scope has a row with this key. */
+PetscErrorCode SbOptionExists(const SbScope *scope, const char *key, PetscBool *exists);
 /* SbOptionGiven() alone does not count as reading for SbOptionsView(): read the value too. */
 
 /* Full name, e.g. "-body_liver_young", for messages. */
@@ -86,11 +93,11 @@ PetscErrorCode SbOptionsUnused(MPI_Comm comm, PetscInt *n);
 /* The complete scenario as an option file that runs again: every option of ours read so far with its value, help as
    comment, then the PETSc options that the user gave. Collective; rank 0 writes. */
 PetscErrorCode SbOptionsView(PetscViewer ascii);
-PetscErrorCode SbOptionsHelp(MPI_Comm comm);                        /* the manual for -help, from the table */
-PetscErrorCode SbOptionsMarkdown(MPI_Comm comm, const char *file);  /* docs/options.md, from the table */
+PetscErrorCode SbOptionsHelp(MPI_Comm comm);                       /* the manual for -help, from the table */
+PetscErrorCode SbOptionsMarkdown(MPI_Comm comm, const char *file); /* docs/options.md, from the table */
 /* ASCII viewer on a file, or on standard output when file is "" or "-"; that it cannot be written is an error on every rank. Collective. */
 PetscErrorCode SbViewerOpen(MPI_Comm comm, const char *file, PetscViewer *viewer);
-PetscErrorCode SbOptionsReset(void);                                /* forgets what was read and registered; at exit and in tests */
+PetscErrorCode SbOptionsReset(void); /* forgets what was read and registered; at exit and in tests */
 
 /* SbNearest - the names of `n` candidates closest to `word` by edit distance, joined by " or "; "" when none is near. */
 PetscErrorCode SbNearest(const char *word, PetscInt n, const char *const names[], size_t size, char text[]);
@@ -103,7 +110,14 @@ PetscErrorCode SbNearest(const char *word, PetscInt n, const char *const names[]
   MPI_Init() and before PetscInitialize().
 */
 PetscErrorCode SbErrorHandlerInstall(void);
+PetscErrorCode SbErrorRegister(void);
 PetscErrorCode SbErrorSetFromOptions(void); /* reads -error_trace */
+/* The option file that PETSc is about to read: PETSc's messages about YAML do not name it. */
+void SbErrorSetFile(const char *file);
+/* An error line at the end of a run whose calls all succeeded: a solver gave up, the output is complete. A printf format. */
+void SbErrorPost(const char *format, ...) PETSC_ATTRIBUTE_FORMAT(1, 2);
+/* The message of the error that is on its way up or was posted; PETSc's text for errors that are not the user's. */
+const char *SbErrorMessage(void);
 /*
   SbErrorFinish - last call of main() on every rank: `supple: error: ...` on stderr, once for the run; then MPI_Finalize(),
   or MPI_Abort() when other ranks do not arrive within a few seconds. Returns the exit code, non-zero on all ranks when
@@ -124,8 +138,10 @@ PetscErrorCode SbWarning(MPI_Comm comm, const char *format, ...) PETSC_ATTRIBUTE
   Compiled once to a small stack program; evaluation allocates nothing.
 */
 typedef struct _p_SbFormula *SbFormula;
-PetscErrorCode SbFormulaCreate(MPI_Comm comm, const char *text, const char *where, SbFormula *formula); /* where: option name, for messages */
-PetscReal      SbFormulaEval(SbFormula formula, PetscReal t, const PetscReal x[3]);                     /* x may be NULL when the formula does not use it */
+PetscErrorCode SbFormulaCreate(MPI_Comm comm, const char *text, const char *where,
+                               SbFormula *formula); /* where: option name, for messages */
+PetscReal SbFormulaEval(SbFormula formula, PetscReal t,
+                        const PetscReal x[3]); /* x may be NULL when the formula does not use it */
 PetscErrorCode SbFormulaUses(SbFormula formula, PetscBool *time, PetscBool *place);
 PetscErrorCode SbFormulaDestroy(SbFormula *formula);
 /* Reads an option of kind SB_OPTION_FORMULA: `count` formulas as in the row; destroy each. */
@@ -150,4 +166,4 @@ typedef enum {
 } SbEvent;
 extern PetscLogEvent SbEvents[SB_EVENT_COUNT];
 extern PetscLogStage SbStageSetup, SbStageSolve, SbStageOutput;
-PetscErrorCode       SbLogInitialize(void);
+PetscErrorCode SbLogInitialize(void);

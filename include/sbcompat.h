@@ -8,7 +8,8 @@
 #include <petscsys.h>
 
 #if PETSC_VERSION_LT(3, 18, 0) || (PETSC_VERSION_GE(3, 19, 0) && PETSC_VERSION_LT(3, 25, 0))
-  #error "supple needs PETSc 3.18.x, or 3.25 and newer: point PETSC_DIR/PETSC_ARCH or PKG_CONFIG_PATH at one of them"
+  #error \
+    "supple needs PETSc 3.18.x, or 3.25 and newer: point PETSC_DIR/PETSC_ARCH or PKG_CONFIG_PATH at one of them"
 #endif
 #if defined(PETSC_USE_COMPLEX) || !defined(PETSC_USE_REAL_DOUBLE)
   #error "supple needs a PETSc with real double-precision scalars"

@@ -1,8 +1,56 @@
 /*
-  sbscene.h - layer 6: from an option file to a model.
+  sbscene.h - layer 6: from the command line and an option file to a model; the names of everything a scenario may use.
 */
 #pragma once
 #include "sboutput.h"
 
-PetscErrorCode SbRegisterAll(void);                       /* every type and option row of the program, in one readable list */
-PetscErrorCode SbSceneCreate(MPI_Comm comm, SbModel *model); /* reads -bodies, -sets, -effects; nothing is computed yet */
+/* What the command line asks of the program beside the options of the scenario. */
+typedef struct {
+  PetscBool help, version;
+  PetscBool view;                     /* -scenario_view */
+  char view_file[PETSC_MAX_PATH_LEN]; /* "" for standard output */
+  char markdown[PETSC_MAX_PATH_LEN];  /* -options_markdown FILE; "" when not asked for */
+  char scenario
+    [PETSC_MAX_PATH_LEN]; /* first word of the command line when it is no option; for PetscInitialize() */
+  char problem[PETSC_MAX_PATH_LEN + 256]; /* what is wrong with the command line; "" when nothing is */
+} SbCommand;
+
+/*
+  SbCommandLine - takes what is for the program itself out of the command line. Collective; after MPI_Init(), before
+  PetscInitialize().
+
+  Taken out: a first word that is no option (the scenario), -help, -version, -scenario_view [FILE], -options_markdown FILE;
+  `-help petsc` becomes PETSc's own -help. A word that belongs to no option and an option file that cannot be read (rank 0
+  looks) are described in command->problem, because PETSc cannot report an error before PetscInitialize(); the file is
+  taken out.
+
+  Input and output:
+    argc, argv - as from main(); words are taken out in place
+*/
+PetscErrorCode SbCommandLine(int *argc, char *argv[], SbCommand *command);
+
+/* Registers every type and option row of the program, in one readable list. Not collective. */
+PetscErrorCode SbRegisterAll(void);
+
+/*
+  SbSceneCreate - the model as the scenario describes it: bodies, sets, materials, elements, effects. Nothing is computed.
+  Collective. The caller destroys the model with SbModelDestroy().
+
+  Options read: -bodies and -body_<name>_..., -sets and -set_<name>_at, -effects and -effect_<name>_...; -mass and
+  -mesh_..., which are used later, so that their values are checked before anything is computed.
+  A set that an effect names in its option `on` and -sets does not define is, in this order: the body of that name, all
+  bodies ("all"), the whole boundary ("boundary"), the physical group of that name in the meshes.
+  Errors: PETSC_ERR_USER for a missing or unknown name, doubled names, values out of range.
+*/
+PetscErrorCode SbSceneCreate(MPI_Comm comm, SbModel *model);
+
+/*
+  SbSceneCheck - what no single option can know: mesh files exist, a static run is held by something. Collective; after
+  SbRunCreate(), which says whether the run is static.
+
+  Errors: PETSC_ERR_USER with names that are near in the folder of a missing file.
+*/
+PetscErrorCode SbSceneCheck(SbModel model);
+
+/* With -validate: the invariants of mesh and space (ordering, ranges, ownership, sums). Collective; after SbModelSetUp(). */
+PetscErrorCode SbSceneValidate(SbModel model);

@@ -17,9 +17,11 @@
 
 static struct {
   MPI_Comm comm;      /* ours alone, so that nothing else can be pending on it */
-  PetscBool pending;  /* a user error is on its way up */
+  PetscBool pending;  /* a user error is on its way up, or was posted */
+  PetscBool posted;   /* by SbErrorPost(): the run counts as failed */
   PetscBool trace;    /* -error_trace */
-  char message[2048]; /* of the last user error */
+  char message[2048]; /* of the last error */
+  char file[256];     /* option files, for messages about YAML */
 } state = {.comm = MPI_COMM_NULL};
 
 static const SbOption rows[] = {
@@ -45,14 +47,23 @@ static PetscBool is_user_error(PetscErrorCode n, const char *function)
                                   !strcmp(function, "PetscParseLayerYAML")));
 }
 
+/* PETSc says what is wrong with a YAML file, but not with which one. */
+static PetscBool is_yaml_error(const char *function)
+{
+  return (PetscBool)(function && (strstr(function, "YAML") != NULL));
+}
+
 static PetscErrorCode handler(MPI_Comm comm, int line, const char *function, const char *file,
                               PetscErrorCode n, PetscErrorType p, const char *mess, void *ctx)
 {
   (void)comm;
   (void)ctx;
   if (p == PETSC_ERROR_INITIAL) {
+    const PetscBool yaml = is_yaml_error(function);
+
     state.pending = is_user_error(n, function);
-    (void)snprintf(state.message, sizeof(state.message), "%s", mess ? mess : "unknown error");
+    (void)snprintf(state.message, sizeof(state.message), "%s%s%s", yaml ? state.file : "",
+                   yaml && state.file[0] ? ": " : "", mess ? mess : "unknown error");
   }
   if (state.pending && !state.trace) return n;
   /* PETSC_COMM_SELF: PETSc's handler puts the other ranks of a larger communicator to sleep and ends them with code 0 */
@@ -67,15 +78,43 @@ PetscErrorCode SbErrorHandlerInstall(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscErrorCode SbErrorRegister(void)
+{
+  PetscFunctionBeginUser;
+  PetscCall(SbOptionsRegister("", "", PETSC_STATIC_ARRAY_LENGTH(rows), rows));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode SbErrorSetFromOptions(void)
 {
   SbScope scope;
 
   PetscFunctionBeginUser;
-  PetscCall(SbOptionsRegister("", "", PETSC_STATIC_ARRAY_LENGTH(rows), rows));
   PetscCall(SbScopeSet(&scope, "", "", ""));
   PetscCall(SbOptionBool(&scope, "error_trace", &state.trace));
   PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+void SbErrorSetFile(const char *file)
+{
+  const size_t n = strlen(state.file);
+
+  (void)snprintf(state.file + n, sizeof(state.file) - n, "%s%s", n ? ", " : "", file);
+}
+
+void SbErrorPost(const char *format, ...)
+{
+  va_list args;
+
+  va_start(args, format);
+  (void)vsnprintf(state.message, sizeof(state.message), format, args);
+  va_end(args);
+  state.pending = state.posted = PETSC_TRUE;
+}
+
+const char *SbErrorMessage(void)
+{
+  return state.message;
 }
 
 static void print_error(void)
@@ -88,15 +127,16 @@ static void print_error(void)
 int SbErrorFinish(PetscErrorCode ierr)
 {
   enum { SPEAKER, FAILED };
-  int mine[2], all[2], done = 0;
+  int mine[2], all[2], failed, done = 0;
   PetscMPIInt rank, size;
   MPI_Request request;
   double end;
 
   (void)MPI_Comm_rank(state.comm, &rank);
   (void)MPI_Comm_size(state.comm, &size);
-  mine[SPEAKER] = ierr && state.pending ? -rank : -size;
-  mine[FAILED] = ierr ? 1 : 0;
+  failed = ierr || state.posted ? 1 : 0;
+  mine[SPEAKER] = failed && state.pending ? -rank : -size;
+  mine[FAILED] = failed;
   (void)MPI_Iallreduce(mine, all, 2, MPI_INT, MPI_MAX, state.comm, &request);
   end = MPI_Wtime() + GRACE + 0.1 * PetscMin(rank, 20);
   while (!done && (!ierr || MPI_Wtime() < end)) {

@@ -130,12 +130,17 @@ PetscErrorCode SbOptionText(const SbScope *scope, const char *key, const SbOptio
              "%s has no value: %s (a value that begins with a minus sign and a letter needs a blank before "
              "it, in quotes)",
              r->name, row->help);
-  PetscCheck(r->given || row->preset, PETSC_COMM_SELF, PETSC_ERR_USER, "%s must be given: %s%s%s%s%s",
-             r->name, row->help, row->range[0] ? ", in " : "", row->range, row->unit[0] ? ", unit " : "",
-             row->unit);
+  if (!r->given && !row->preset) PetscCall(SbOptionMissing(r));
   PetscCall(PetscFree(r->text));
   PetscCall(PetscStrallocpy(r->given ? value : row->preset, &r->text));
   *record = r;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbOptionExists(const SbScope *scope, const char *key, PetscBool *exists)
+{
+  PetscFunctionBeginUser;
+  *exists = (PetscBool)(SbOptionFind(scope, key) != NULL);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -42,6 +42,8 @@ extern SbOptionTable SbTheOptions; /* the registry of options */
 const SbOption *SbOptionFind(const SbScope *scope, const char *key);
 /* The text of an option: the user's, or else the preset; recorded. Name, row and text are lent. */
 PetscErrorCode SbOptionText(const SbScope *scope, const char *key, const SbOptionRecord **record);
+/* The error that a required option is missing; names the option of the user's that looks like a slip of it, if there is one. */
+PetscErrorCode SbOptionMissing(const SbOptionRecord *record);
 /* The database as it is now: every name and value. Free with SbOptionUsersFree(). */
 PetscErrorCode SbOptionUsersGet(PetscInt *n, SbOptionUser **users);
 PetscErrorCode SbOptionUsersFree(PetscInt *n, SbOptionUser **users);

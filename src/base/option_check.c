@@ -285,6 +285,37 @@ static PetscErrorCode verdict(const char *name, size_t size, char text[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Whether a name could be the misspelt form of a required option: of the same instance, and not an option itself. */
+static PetscBool may_be_misspelt(const char *name, const SbOptionRecord *r)
+{
+  const size_t before = strlen(r->name) - strlen(r->row->key) - 1; /* length of "body_liver_" */
+
+  if (strncasecmp(name, r->name + 1, before)) return PETSC_FALSE;
+  if (before) return (PetscBool)!SbOptionFind(&r->scope, name + before);
+  return (PetscBool)(!class_of(name) && !looks_like_petsc(name) && !program_row(name));
+}
+
+PetscErrorCode SbOptionMissing(const SbOptionRecord *r)
+{
+  const SbOption *row = r->row;
+  PetscInt nleft, n = 0;
+  char **names, near[SB_OPTION_NAME_MAX];
+  const char **list;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscOptionsLeftGet(NULL, &nleft, &names, NULL));
+  PetscCall(PetscMalloc1(nleft, &list));
+  for (PetscInt i = 0; i < nleft; i++)
+    if (may_be_misspelt(names[i], r)) list[n++] = names[i];
+  PetscCall(SbNearest(r->name + 1, n, list, sizeof(near), near));
+  PetscCall(PetscFree(list));
+  PetscCall(PetscOptionsLeftRestore(NULL, &nleft, &names, NULL));
+  PetscCheck(!near[0], PETSC_COMM_SELF, PETSC_ERR_USER, "-%s is not an option of supple; did you mean %s?",
+             near, r->name);
+  SETERRQ(PETSC_COMM_SELF, PETSC_ERR_USER, "%s must be given: %s%s%s%s%s", r->name, row->help,
+          row->range[0] ? ", in " : "", row->range, row->unit[0] ? ", unit " : "", row->unit);
+}
+
 PetscErrorCode SbOptionsCheck(void)
 {
   PetscInt nleft, nbad = 0;

@@ -290,3 +290,51 @@ PetscErrorCode SbOptionFormulas(const SbScope *scope, const char *key, SbFormula
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
+
+PetscErrorCode SbOptionAhead(const SbScope *scope, const char *key)
+{
+  const SbOption *row = SbOptionFind(scope, key);
+  PetscReal *x;
+  PetscInt n;
+  PetscBool b;
+  char text[PETSC_MAX_PATH_LEN], (*names)[SB_NAME_MAX];
+  SbFormula *f;
+
+  PetscFunctionBeginUser;
+  PetscCheck(row, PETSC_COMM_SELF, PETSC_ERR_PLIB, "No row for key '%s' of class '%s', type '%s'", key,
+             scope->klass, scope->type);
+  switch (row->kind) {
+  case SB_OPTION_BOOL:
+    PetscCall(SbOptionBool(scope, key, &b));
+    break;
+  case SB_OPTION_INT:
+    PetscCall(SbOptionInt(scope, key, &n));
+    break;
+  case SB_OPTION_REAL:
+  case SB_OPTION_REALS:
+    PetscCall(PetscMalloc1(row->count, &x));
+    if (row->kind == SB_OPTION_REAL)
+      PetscCall(SbOptionReal(scope, key, x));
+    else
+      PetscCall(SbOptionReals(scope, key, x));
+    PetscCall(PetscFree(x));
+    break;
+  case SB_OPTION_STRING:
+    PetscCall(SbOptionString(scope, key, sizeof(text), text));
+    break;
+  case SB_OPTION_NAMES:
+    PetscCall(SbOptionNames(scope, key, &n, &names));
+    PetscCall(PetscFree(names));
+    break;
+  case SB_OPTION_CHOICE:
+    PetscCall(SbOptionChoice(scope, key, &n));
+    break;
+  case SB_OPTION_FORMULA:
+    PetscCall(PetscMalloc1(row->count, &f));
+    PetscCall(SbOptionFormulas(scope, key, f));
+    for (PetscInt i = 0; i < row->count; i++) PetscCall(SbFormulaDestroy(&f[i]));
+    PetscCall(PetscFree(f));
+    break;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

@@ -369,6 +369,54 @@ static PetscErrorCode test_check(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A required option that is missing, with a slip of it in the database: the slip is named. */
+static PetscErrorCode test_missing(void)
+{
+  PetscOptions database;
+  PetscReal x;
+  PetscInt n;
+  char(*names)[SB_NAME_MAX];
+
+  PetscFunctionBeginUser;
+  PetscCall(begin("-body_liver_yuong 3 -bodis liver", &database));
+  EXPECT_MESSAGE(SbOptionReal(&body_scope, "young", &x),
+                 "-body_liver_yuong is not an option of supple; did you mean -body_liver_young?");
+  EXPECT_MESSAGE(SbOptionNames(&run_scope, "bodies", &n, &names),
+                 "-bodis is not an option of supple; did you mean -bodies?");
+  PetscCall(end(&database));
+  /* the same key of another instance is no slip */
+  PetscCall(begin("-body_livre_young 3", &database));
+  EXPECT_MESSAGE(SbOptionReal(&body_scope, "young", &x),
+                 "-body_liver_young must be given: Young's modulus, in (0, inf), unit Pa");
+  PetscCall(end(&database));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Reading ahead checks, and counts as reading. */
+static PetscErrorCode test_ahead(void)
+{
+  static const char *const keys[] = {"scale", "translate", "tags", "pull", "mesh"};
+  PetscOptions database;
+  PetscBool exists;
+
+  PetscFunctionBeginUser;
+  PetscCall(begin("-body_liver_translate 1,2,3 -body_liver_mesh a.msh -verbose -repeat 2 -integrator static",
+                  &database));
+  for (int i = 0; i < 5; i++) PetscCall(SbOptionAhead(&body_scope, keys[i]));
+  for (int i = 1; i < 4; i++) PetscCall(SbOptionAhead(&run_scope, run_rows[i].key));
+  PetscCall(SbOptionsCheck());
+  PetscCall(SbOptionExists(&body_scope, "young", &exists));
+  SB_CHECK(exists, "young exists");
+  PetscCall(SbOptionExists(&run_scope, "young", &exists));
+  SB_CHECK(!exists, "a run has no young");
+  PetscCall(end(&database));
+  PetscCall(begin("-body_liver_scale -1", &database));
+  EXPECT_MESSAGE(SbOptionAhead(&body_scope, "scale"),
+                 "-body_liver_scale -1 is outside (0, inf): factor on the file's coordinates");
+  PetscCall(end(&database));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Names with underscores are allowed; two meanings of one full name are not. */
 static PetscErrorCode test_underscores(void)
 {
@@ -455,6 +503,8 @@ static PetscErrorCode run_tests(void)
   PetscCall(test_files(folder));
   PetscCall(test_view_text(folder));
   PetscCall(test_check());
+  PetscCall(test_missing());
+  PetscCall(test_ahead());
   PetscCall(test_underscores());
   PetscCall(test_nearest());
   PetscCall(test_manual(folder));

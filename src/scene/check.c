@@ -1,0 +1,87 @@
+/*
+  check.c - checks across options, before anything is computed.
+
+  A missing mesh file is found here, with the names in its folder that are near, instead of by the reader after other
+  bodies were read. A static run without a prescribed displacement has no unique answer: its matrix is singular.
+*/
+#include <dirent.h>
+#include <errno.h>
+#include <unistd.h>
+#include "scene_impl.h"
+
+#define NAMES_MAX 1000 /* entries of a folder that are compared */
+
+/* Names in the folder of `path` that are near its own, with the folder; "" when there are none. Rank 0 only. */
+static PetscErrorCode near_files(const char *path, size_t size, char text[])
+{
+  const char *slash = strrchr(path, '/'), *name = slash ? slash + 1 : path;
+  char folder[PETSC_MAX_PATH_LEN], found[PETSC_MAX_PATH_LEN];
+  DIR *dir;
+  struct dirent *entry;
+  const char **list;
+  PetscInt n = 0;
+
+  PetscFunctionBeginUser;
+  text[0] = 0;
+  (void)snprintf(folder, sizeof(folder), "%.*s", slash ? (int)(slash - path) + 1 : 1, slash ? path : ".");
+  dir = opendir(folder);
+  if (!dir) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscMalloc1(NAMES_MAX, &list));
+  while (n < NAMES_MAX && (entry = readdir(dir)))
+    PetscCall(PetscStrallocpy(entry->d_name, (char **)&list[n++]));
+  (void)closedir(dir);
+  PetscCall(SbNearest(name, n, list, sizeof(found), found));
+  if (found[0]) PetscCall(PetscSNPrintf(text, size, "%s%s", slash ? folder : "", found));
+  for (PetscInt i = 0; i < n; i++) PetscCall(PetscFree(list[i]));
+  PetscCall(PetscFree(list));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* A mesh that is made by the program itself: word, colon, description. */
+static PetscBool is_generated(const char *mesh)
+{
+  return (PetscBool)!strncmp(mesh, "box:", 4);
+}
+
+/* Rank 0 looks, all ranks learn the result. */
+static PetscErrorCode check_mesh_file(MPI_Comm comm, const SbBody *body)
+{
+  char near[PETSC_MAX_PATH_LEN] = "", folder[PETSC_MAX_PATH_LEN];
+  int error = 0;
+  PetscMPIInt rank;
+
+  PetscFunctionBeginUser;
+  PetscCallMPI(MPI_Comm_rank(comm, &rank));
+  if (!rank && access(body->mesh, R_OK)) {
+    error = errno;
+    if (error == ENOENT) PetscCall(near_files(body->mesh, sizeof(near), near));
+  }
+  PetscCallMPI(MPI_Bcast(&error, 1, MPI_INT, 0, comm));
+  if (!error) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCallMPI(MPI_Bcast(near, sizeof(near), MPI_CHAR, 0, comm));
+  PetscCall(PetscGetWorkingDirectory(folder, sizeof(folder)));
+  SETERRQ(PETSC_COMM_SELF, PETSC_ERR_USER, "-body_%s_mesh %s: %s%s%s%s", body->name, body->mesh,
+          strerror(error),
+          near[0]                ? "; did you mean "
+          : body->mesh[0] == '/' ? ""
+                                 : "; relative names begin in ",
+          near[0]                ? near
+          : body->mesh[0] == '/' ? ""
+                                 : folder,
+          near[0] ? "?" : "");
+}
+
+PetscErrorCode SbSceneCheck(SbModel model)
+{
+  PetscBool held = model->dynamic;
+
+  PetscFunctionBeginUser;
+  for (PetscInt i = 0; i < model->nbody; i++)
+    if (!is_generated(model->body[i].mesh)) PetscCall(check_mesh_file(model->comm, &model->body[i]));
+  for (PetscInt e = 0; e < model->neffect && !held; e++)
+    held = (PetscBool)(model->effect[e]->ops.prescribe != NULL);
+  PetscCheck(held, PETSC_COMM_SELF, PETSC_ERR_USER,
+             "-time static: nothing holds the bodies, so there is no unique equilibrium; name an effect of "
+             "type support or drive");
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

@@ -1,0 +1,120 @@
+/*
+  command.c - the command line: what is for the program itself, and mistakes that PETSc would pass over.
+
+  PETSc takes the word after an option as its value and skips every other word in silence; so `-translate 0, 0, 1` would
+  become `-translate 0,`. Such words are an error here. PETSc reads option files on rank 0 while the other ranks wait: a
+  file that is not there is found before.
+*/
+#include <errno.h>
+#include <unistd.h>
+#include "scene_impl.h"
+
+static const SbOption rows[] = {
+  {"help", SB_OPTION_BOOL, 1, "", "false", "",
+   "this list, and nothing else; `-help petsc` runs and lists PETSc's own options"},
+  {"version", SB_OPTION_BOOL, 1, "", "false", "", "the versions of supple and of PETSc, and nothing else"},
+  {"options_file", SB_OPTION_STRING, 1, "", "", "",
+   "the scenario, .opts or .yml; its name can also be the first word of the command line"},
+  {"scenario_view", SB_OPTION_STRING, 1, "", "", "",
+   "checks the scenario, writes it with every default filled in to this file (standard output without one), "
+   "and ends"},
+  {"options_markdown", SB_OPTION_STRING, 1, "", "", "",
+   "writes this list as Markdown to a file, and nothing else"},
+};
+
+PetscErrorCode SbCommandRegister(void)
+{
+  PetscFunctionBeginUser;
+  PetscCall(SbOptionsRegister("", "", PETSC_STATIC_ARRAY_LENGTH(rows), rows));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscBool is_one_of(const char *word, const char *a, const char *b)
+{
+  return (PetscBool)(!strcasecmp(word, a) || !strcasecmp(word, b));
+}
+
+/* What keeps rank 0 from reading the file, as an errno; 0 when nothing does. Collective. */
+static int file_error(const char *file)
+{
+  int error = 0;
+  PetscMPIInt rank;
+
+  (void)MPI_Comm_rank(MPI_COMM_WORLD, &rank);
+  if (!rank && access(file, R_OK)) error = errno;
+  (void)MPI_Bcast(&error, 1, MPI_INT, 0, MPI_COMM_WORLD);
+  return error;
+}
+
+/* Whether an option file can be read; else says so in command->problem. */
+static PetscBool readable(const char *file, SbCommand *command)
+{
+  const int error = file_error(file);
+
+  if (!error) return PETSC_TRUE;
+  (void)snprintf(command->problem, sizeof(command->problem), "cannot read the option file %s: %s", file,
+                 strerror(error));
+  return PETSC_FALSE;
+}
+
+/* One option with its value (NULL when it has none); says whether it stays in the command line. */
+static PetscBool take_option(const char *name, const char *value, SbCommand *command)
+{
+  if (is_one_of(name, "-help", "--help") || !strcmp(name, "-h")) {
+    if (value && !strcasecmp(value, "petsc")) return PETSC_TRUE;
+    command->help = PETSC_TRUE;
+    return PETSC_FALSE;
+  }
+  if (is_one_of(name, "-version", "--version")) {
+    command->version = PETSC_TRUE;
+    return PETSC_FALSE;
+  }
+  if (is_one_of(name, "-scenario_view", "--scenario_view")) {
+    command->view = PETSC_TRUE;
+    (void)snprintf(command->view_file, sizeof(command->view_file), "%s", value ? value : "");
+    return PETSC_FALSE;
+  }
+  if (is_one_of(name, "-options_markdown", "--options_markdown")) {
+    (void)snprintf(command->markdown, sizeof(command->markdown), "%s", value ? value : "-");
+    return PETSC_FALSE;
+  }
+  if (is_one_of(name, "-options_file", "-options_file_yaml") && value) {
+    SbErrorSetFile(value);
+    return readable(value, command);
+  }
+  return PETSC_TRUE;
+}
+
+PetscErrorCode SbCommandLine(int *argc, char *argv[], SbCommand *command)
+{
+  int kept = 1;
+
+  PetscFunctionBeginUser;
+  memset(command, 0, sizeof(*command));
+  for (int i = 1; i < *argc;) {
+    PetscBool is_option, next_is_option = PETSC_TRUE;
+    int words;
+
+    PetscCall(PetscOptionsValidKey(argv[i], &is_option));
+    if (i + 1 < *argc) PetscCall(PetscOptionsValidKey(argv[i + 1], &next_is_option));
+    words = is_option && !next_is_option ? 2 : 1;
+    if (is_option) {
+      const PetscBool stays = take_option(argv[i], words == 2 ? argv[i + 1] : NULL, command);
+
+      if (stays) argv[kept++] = argv[i];
+      if (stays && words == 2 && !is_one_of(argv[i], "-help", "--help")) argv[kept++] = argv[i + 1];
+    } else if (i == 1) {
+      SbErrorSetFile(argv[i]);
+      if (readable(argv[i], command))
+        (void)snprintf(command->scenario, sizeof(command->scenario), "%s", argv[i]);
+    } else if (!command->problem[0]) {
+      (void)snprintf(
+        command->problem, sizeof(command->problem),
+        "the word '%s' in the command line belongs to no option (a value with blanks needs quotes)", argv[i]);
+    }
+    i += words;
+  }
+  argv[kept] = NULL;
+  *argc = kept;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

@@ -1,0 +1,34 @@
+/*
+  register.c - everything that a scenario can name: one line per type. A new type is one file in its folder and one line
+  here.
+*/
+#include "scene_impl.h"
+
+PetscErrorCode SbRegisterAll(void)
+{
+  PetscFunctionBeginUser;
+  PetscCall(SbLogInitialize());
+
+  /* what a run has once, in the order of the manual */
+  PetscCall(SbSceneRegister());
+  PetscCall(SbMeshRegister());
+  PetscCall(SbSpaceRegister());
+  PetscCall(SbTimeRegister());
+  PetscCall(SbOutputRegister());
+  PetscCall(SbErrorRegister());
+  PetscCall(SbCommandRegister());
+
+  PetscCall(SbElementRegisterAll());
+  PetscCall(SbMaterialRegisterAll());
+  PetscCall(SbSetsRegister());
+
+  PetscCall(SbEffectRegister_Gravity());
+  PetscCall(SbEffectRegister_BodyForce());
+  PetscCall(SbEffectRegister_Traction());
+  PetscCall(SbEffectRegister_Pressure());
+  PetscCall(SbEffectRegister_PointForce());
+  PetscCall(SbEffectRegister_Support());
+  PetscCall(SbEffectRegister_Drive());
+  PetscCall(SbEffectRegister_Damping());
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

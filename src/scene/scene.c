@@ -1,0 +1,229 @@
+/*
+  scene.c - from options to a model: bodies with material and element, effects, sets. Nothing is computed here.
+
+  Names of bodies, sets and effects become parts of option names: -body_<name>_young. PETSc does not tell upper from lower
+  case there, so neither may names. It also takes `-body_young` for a missing `-body_1_young`; a part of a name that is
+  only digits would silently read another one's options and is refused.
+*/
+#include <ctype.h>
+#include "scene_impl.h"
+
+#define NAME_LENGTH 31 /* PETSc holds 63 characters of an option's name in YAML files */
+
+static const SbOption run_rows[] = {
+  {"bodies", SB_OPTION_NAMES, 1, "", NULL, "", "names of the bodies, with commas between them"},
+  {"sets", SB_OPTION_NAMES, 1, "", "", "",
+   "names of sets given by a shape; physical groups of the meshes, bodies, `all` and `boundary` need no set"},
+  {"effects", SB_OPTION_NAMES, 1, "", "", "",
+   "names of the effects: what acts on the bodies beyond elasticity and inertia"},
+  {"validate", SB_OPTION_BOOL, 1, "", "false", "",
+   "checks the invariants of mesh and space after they are set up"},
+};
+static const SbOption body_rows[] = {
+  {"mesh", SB_OPTION_STRING, 1, "", NULL, "",
+   "tetrahedral mesh: a gmsh .msh file, or box:lx,ly,lz:n, or box:lx,ly,lz:nx,ny,nz (m, cells)"},
+  {"scale", SB_OPTION_REAL, 1, "", "1", "(0, inf)",
+   "factor on the coordinates of the mesh, before rotation; 0.001 for a file in mm"},
+  {"rotate", SB_OPTION_REALS, 4, "", "0,0,1,0", "(-inf, inf)",
+   "axis x,y,z and angle in degrees, before translation"},
+  {"translate", SB_OPTION_REALS, 3, "m", "0,0,0", "(-inf, inf)", "shift of the scaled and rotated mesh"},
+  {"element", SB_OPTION_STRING, 1, "", "p1", "", "finite element"},
+  {"material", SB_OPTION_STRING, 1, "", "", "",
+   "material law, required: linear, corotated, stvk or neohookean"},
+  {"velocity", SB_OPTION_REALS, 3, "m/s", "0,0,0", "(-inf, inf)",
+   "velocity of the centre of mass at the start"},
+  {"spin", SB_OPTION_REALS, 3, "rad/s", "0,0,0", "(-inf, inf)",
+   "angular velocity about the centre of mass at the start"},
+};
+
+PetscErrorCode SbSceneRegister(void)
+{
+  PetscFunctionBeginUser;
+  PetscCall(SbOptionsRegister("", "", PETSC_STATIC_ARRAY_LENGTH(run_rows), run_rows));
+  PetscCall(SbOptionsRegister("body", "", PETSC_STATIC_ARRAY_LENGTH(body_rows), body_rows));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ names */
+
+/* What is wrong with a name; NULL when nothing is. */
+static const char *name_problem(const char *name)
+{
+  PetscBool only_digits = PETSC_FALSE;
+
+  if (strlen(name) > NAME_LENGTH) return "is longer than 31 characters";
+  if (!isalpha((unsigned char)name[0])) return "does not begin with a letter";
+  for (const char *c = name; *c; c++)
+    if (!isalnum((unsigned char)*c) && *c != '_') return "may hold letters, digits and underscores only";
+  for (const char *c = name; *c; c++) {
+    if (*c == '_') {
+      if (!c[1] || c[1] == '_') return "has an underscore without a word after it";
+      only_digits = PETSC_TRUE;
+    } else if (!isdigit((unsigned char)*c))
+      only_digits = PETSC_FALSE;
+    if (only_digits && *c != '_' && (c[1] == '_' || !c[1]))
+      return "has a part of digits only; leave out the underscore before it";
+  }
+  if (!strcasecmp(name, "all") || !strcasecmp(name, "boundary"))
+    return "has a meaning of its own where sets are named";
+  return NULL;
+}
+
+PetscErrorCode SbSceneReadNames(const char *key, const char *what, PetscInt *n, char (**names)[SB_NAME_MAX])
+{
+  SbScope scope;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbScopeSet(&scope, "", "", ""));
+  PetscCall(SbOptionNames(&scope, key, n, names));
+  for (PetscInt i = 0; i < *n; i++) {
+    const char *problem = name_problem((*names)[i]);
+    const char *twice = NULL;
+
+    for (PetscInt j = 0; j < i && !twice; j++)
+      if (!strcasecmp((*names)[i], (*names)[j])) twice = (*names)[j];
+    PetscCheck(!problem, PETSC_COMM_SELF, PETSC_ERR_USER, "-%s: the name '%s' %s", key, (*names)[i], problem);
+    PetscCheck(!twice, PETSC_COMM_SELF, PETSC_ERR_USER,
+               "-%s: two are named '%s'%s; every %s needs a name of its own", key, (*names)[i],
+               strcmp(twice, (*names)[i]) ? " (upper and lower case count as one)" : "", what);
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ bodies */
+
+/* "linear, corotated, ..." and the near ones, for messages. */
+static PetscErrorCode describe_list(PetscFunctionList list, const char *word, size_t size, char all[],
+                                    char near[])
+{
+  const char **names;
+  int n;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscFunctionListGet(list, &names, &n));
+  all[0] = 0;
+  for (int i = 0; i < n; i++) {
+    PetscCall(PetscStrlcat(all, i ? ", " : "", size));
+    PetscCall(PetscStrlcat(all, names[i], size));
+  }
+  PetscCall(SbNearest(word, n, names, size, near));
+  PetscCall(PetscFree(names));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Reads a word that must be a name in a list of types. */
+static PetscErrorCode read_type(const SbScope *scope, const char *key, PetscFunctionList list,
+                                char word[SB_NAME_MAX])
+{
+  char option[3 * SB_NAME_MAX], all[512], near[512];
+  void (*constructor)(void) = NULL;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbOptionName(scope, key, sizeof(option), option));
+  PetscCall(SbOptionString(scope, key, SB_NAME_MAX, word));
+  PetscCall(describe_list(list, word, sizeof(all), all, near));
+  PetscCheck(word[0], PETSC_COMM_SELF, PETSC_ERR_USER, "%s must be given: one of %s", option, all);
+  PetscCall(PetscFunctionListFind(list, word, &constructor));
+  PetscCheck(constructor, PETSC_COMM_SELF, PETSC_ERR_USER, "%s %s is not one of %s%s%s%s", option, word, all,
+             near[0] ? "; did you mean " : "", near, near[0] ? "?" : "");
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode read_body(SbModel model, PetscInt i)
+{
+  SbBody *body = &model->body[i];
+  SbScope scope;
+  PetscReal axis;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbScopeSet(&scope, "body", "", body->name));
+  PetscCall(SbOptionString(&scope, "mesh", sizeof(body->mesh), body->mesh));
+  PetscCheck(body->mesh[0], PETSC_COMM_SELF, PETSC_ERR_USER, "-body_%s_mesh names no file", body->name);
+  PetscCall(SbOptionReal(&scope, "scale", &body->scale));
+  PetscCall(SbOptionReals(&scope, "rotate", body->rotate));
+  axis = PetscAbsReal(body->rotate[0]) + PetscAbsReal(body->rotate[1]) + PetscAbsReal(body->rotate[2]);
+  PetscCheck(
+    axis > 0 || body->rotate[3] == 0, PETSC_COMM_SELF, PETSC_ERR_USER,
+    "-body_%s_rotate: the axis 0,0,0 has no direction; give x,y,z of the axis, then the angle in degrees",
+    body->name);
+  PetscCall(SbOptionReals(&scope, "translate", body->translate));
+  PetscCall(read_type(&scope, "element", SbElementList, body->element));
+  PetscCall(read_type(&scope, "material", SbMaterialList, body->material));
+  PetscCall(SbElementCreate(body->element, &model->element[i]));
+  PetscCall(SbMaterialCreate(body->material, &scope, &model->material[i]));
+  body->density = model->material[i]->density;
+  PetscCall(SbOptionReals(&scope, "velocity", body->velocity));
+  PetscCall(SbOptionReals(&scope, "spin", body->spin));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode read_bodies(SbModel model)
+{
+  char(*names)[SB_NAME_MAX];
+
+  PetscFunctionBeginUser;
+  PetscCall(SbSceneReadNames("bodies", "body", &model->nbody, &names));
+  PetscCheck(model->nbody, PETSC_COMM_SELF, PETSC_ERR_USER, "-bodies names no body; at least one is needed");
+  PetscCall(PetscCalloc1(model->nbody, &model->body));
+  PetscCall(PetscCalloc1(model->nbody, &model->material));
+  PetscCall(PetscCalloc1(model->nbody, &model->element));
+  for (PetscInt i = 0; i < model->nbody; i++) {
+    PetscCall(PetscStrncpy(model->body[i].name, names[i], SB_NAME_MAX));
+    PetscCall(read_body(model, i));
+  }
+  PetscCall(PetscFree(names));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ the whole scene */
+
+static PetscErrorCode read_effects(SbModel model)
+{
+  char(*names)[SB_NAME_MAX];
+  PetscInt n;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbSceneReadNames("effects", "effect", &n, &names));
+  PetscCall(PetscCalloc1(n, &model->effect));
+  for (PetscInt i = 0; i < n; i++, model->neffect++) PetscCall(SbEffectCreate(names[i], &model->effect[i]));
+  PetscCall(PetscFree(names));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Options whose readers come after the mesh: read ahead, so that a bad value is found before it. */
+static PetscErrorCode read_ahead(void)
+{
+  static const char *const keys[] = {"mass", "mesh_partitioner", "mesh_report", "validate"};
+  SbScope scope;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbScopeSet(&scope, "", "", ""));
+  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(keys); i++) PetscCall(SbOptionAhead(&scope, keys[i]));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbSceneCreate(MPI_Comm comm, SbModel *model)
+{
+  PetscFunctionBeginUser;
+  PetscCall(PetscNew(model));
+  (*model)->comm = comm;
+  PetscCall(read_bodies(*model));
+  PetscCall(read_effects(*model));
+  PetscCall(SbSceneReadSets(*model));
+  PetscCall(read_ahead());
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbSceneValidate(SbModel model)
+{
+  SbScope scope;
+  PetscBool validate;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbScopeSet(&scope, "", "", ""));
+  PetscCall(SbOptionBool(&scope, "validate", &validate));
+  if (!validate) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(SbMeshValidate(model->mesh));
+  PetscCall(SbSpaceValidate(model->space));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

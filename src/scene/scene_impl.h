@@ -1,0 +1,20 @@
+/*
+  scene_impl.h - what the files of layer 6 share.
+*/
+#pragma once
+#include "sbscene.h"
+
+/* Option rows of the command line and of the scene. */
+PetscErrorCode SbCommandRegister(void);
+PetscErrorCode SbSceneRegister(void);
+PetscErrorCode SbSetsRegister(void);
+
+/* Sets of -sets, then those that effects name without a definition; fills model->set. Not collective, same on all ranks. */
+PetscErrorCode SbSceneReadSets(SbModel model);
+
+/*
+  Names of bodies, sets or effects, as an option of class "" gives them: each begins with a letter, goes on with letters,
+  digits and underscores, is no word of its own meaning, and is there once. `what` is "body", "set" or "effect".
+  PetscFree the names.
+*/
+PetscErrorCode SbSceneReadNames(const char *key, const char *what, PetscInt *n, char (**names)[SB_NAME_MAX]);

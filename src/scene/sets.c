@@ -1,0 +1,120 @@
+/*
+  sets.c - the named sets of a scene: those that -sets defines by a shape, and those that effects name without more ado.
+
+  An effect says in its option `on` where it acts. A name there that -sets does not define means, in this order: the body
+  of that name, `all` bodies, the whole `boundary`, the physical group of that name. All such names are collected before
+  the mesh is made, because it marks every set while it reads the bodies.
+*/
+#include "scene_impl.h"
+
+static const SbOption set_rows[] = {
+  {"at", SB_OPTION_STRING, 1, "", NULL, "",
+   "where the set is in the placed rest frame (m): box:x0,y0,z0,x1,y1,z1, plane:nx,ny,nz,d[,tolerance], "
+   "sphere:x,y,z,r, "
+   "halfspace:nx,ny,nz,d, or group:name, body:name, boundary"},
+};
+
+PetscErrorCode SbSetsRegister(void)
+{
+  PetscFunctionBeginUser;
+  PetscCall(SbOptionsRegister("set", "", PETSC_STATIC_ARRAY_LENGTH(set_rows), set_rows));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscInt find_body(SbModel model, const char *name)
+{
+  for (PetscInt i = 0; i < model->nbody; i++)
+    if (!strcmp(model->body[i].name, name)) return i;
+  return -1;
+}
+
+static PetscInt find_set(SbModel model, const char *name)
+{
+  for (PetscInt i = 0; i < model->nset; i++)
+    if (!strcmp(model->set[i].name, name)) return i;
+  return -1;
+}
+
+static PetscErrorCode read_set(SbModel model, const char *name)
+{
+  SbSet *set = &model->set[model->nset];
+  SbScope scope;
+  char option[3 * SB_NAME_MAX], text[PETSC_MAX_PATH_LEN];
+
+  PetscFunctionBeginUser;
+  PetscCheck(find_body(model, name) < 0, PETSC_COMM_SELF, PETSC_ERR_USER,
+             "-sets: '%s' is the name of a body and means the whole of it; give the set another name", name);
+  PetscCall(SbScopeSet(&scope, "set", "", name));
+  PetscCall(SbOptionName(&scope, "at", sizeof(option), option));
+  PetscCall(SbOptionString(&scope, "at", sizeof(text), text));
+  PetscCall(SbSetParse(option, text, set));
+  PetscCall(PetscStrncpy(set->name, name, sizeof(set->name)));
+  PetscCheck(set->shape != SB_SET_BODY || find_body(model, set->group) >= 0, PETSC_COMM_SELF, PETSC_ERR_USER,
+             "%s %s: the scenario has no body %s", option, text, set->group);
+  model->nset++;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Adds the set that a name means where no set is defined. */
+static PetscErrorCode use_name(SbModel model, const char *name)
+{
+  SbSet *set = &model->set[model->nset];
+
+  PetscFunctionBeginUser;
+  if (find_set(model, name) >= 0) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscStrncpy(set->name, name, sizeof(set->name)));
+  if (find_body(model, name) >= 0) {
+    set->shape = SB_SET_BODY;
+    PetscCall(PetscStrncpy(set->group, name, sizeof(set->group)));
+  } else if (!strcmp(name, "all")) {
+    /* the half-space that holds every point */
+    set->shape = SB_SET_HALFSPACE;
+    set->p[2] = 1;
+    set->p[3] = PETSC_MAX_REAL;
+  } else if (!strcmp(name, "boundary")) {
+    set->shape = SB_SET_BOUNDARY;
+  } else {
+    set->shape = SB_SET_GROUP;
+    PetscCall(PetscStrncpy(set->group, name, sizeof(set->group)));
+  }
+  model->nset++;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Names of the sets that an effect acts on; none when its type has no such option. */
+static PetscErrorCode names_of_effect(const SbEffect effect, PetscInt *n, char (**names)[SB_NAME_MAX])
+{
+  SbScope scope;
+  PetscBool has_on;
+
+  PetscFunctionBeginUser;
+  *n = 0;
+  *names = NULL;
+  PetscCall(SbScopeSet(&scope, "effect", effect->type, effect->name));
+  PetscCall(SbOptionExists(&scope, "on", &has_on));
+  if (has_on) PetscCall(SbOptionNames(&scope, "on", n, names));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbSceneReadSets(SbModel model)
+{
+  char(*names)[SB_NAME_MAX];
+  PetscInt n, room;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbSceneReadNames("sets", "set", &n, &names));
+  room = n;
+  PetscCall(PetscCalloc1(n + SB_SET_MAX, &model->set));
+  for (PetscInt i = 0; i < n; i++) PetscCall(read_set(model, names[i]));
+  PetscCall(PetscFree(names));
+  for (PetscInt e = 0; e < model->neffect; e++) {
+    PetscCall(names_of_effect(model->effect[e], &n, &names));
+    for (PetscInt i = 0; i < n && model->nset <= SB_SET_MAX; i++) PetscCall(use_name(model, names[i]));
+    PetscCall(PetscFree(names));
+  }
+  PetscCheck(model->nset <= SB_SET_MAX, PETSC_COMM_SELF, PETSC_ERR_USER,
+             "the scenario uses more than %d sets (%" PetscInt_FMT
+             " in -sets, the others named by effects); join some of them",
+             SB_SET_MAX, room);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
