@@ -8,7 +8,8 @@
 #include "sbcompat.h"
 
 #define SB_VERSION "0.1.0"
-#define SB_NAME_MAX 64 /* longest name of a body, set or effect, with the terminating zero */
+#define SB_NAME_MAX 64         /* longest name of a body, set or effect, with the terminating zero */
+#define SB_OPTION_COUNT_MAX 16 /* most numbers or formulas in one option */
 
 /* ------------------------------------------------------------------ options */
 

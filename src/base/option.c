@@ -33,6 +33,9 @@ PetscErrorCode SbOptionsRegister(const char *klass, const char *type, PetscInt n
     if (block->rows == rows && !strcmp(block->klass, klass) && !strcmp(block->type, type))
       PetscFunctionReturn(PETSC_SUCCESS);
   }
+  for (PetscInt i = 0; i < n; i++)
+    PetscCheck(rows[i].count <= SB_OPTION_COUNT_MAX, PETSC_COMM_SELF, PETSC_ERR_PLIB,
+               "Option %s has more than %d values", rows[i].key, SB_OPTION_COUNT_MAX);
   if (!SbTheOptions.nblock) PetscCall(PetscRegisterFinalize(SbOptionsReset));
   PetscCall(grow(SbTheOptions.nblock, sizeof(*block), &SbTheOptions.block));
   block = &SbTheOptions.block[SbTheOptions.nblock++];

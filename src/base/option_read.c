@@ -294,11 +294,11 @@ PetscErrorCode SbOptionFormulas(const SbScope *scope, const char *key, SbFormula
 PetscErrorCode SbOptionAhead(const SbScope *scope, const char *key)
 {
   const SbOption *row = SbOptionFind(scope, key);
-  PetscReal *x;
+  PetscReal x[SB_OPTION_COUNT_MAX];
   PetscInt n;
   PetscBool b;
   char text[PETSC_MAX_PATH_LEN], (*names)[SB_NAME_MAX];
-  SbFormula *f;
+  SbFormula f[SB_OPTION_COUNT_MAX];
 
   PetscFunctionBeginUser;
   PetscCheck(row, PETSC_COMM_SELF, PETSC_ERR_PLIB, "No row for key '%s' of class '%s', type '%s'", key,
@@ -311,13 +311,10 @@ PetscErrorCode SbOptionAhead(const SbScope *scope, const char *key)
     PetscCall(SbOptionInt(scope, key, &n));
     break;
   case SB_OPTION_REAL:
+    PetscCall(SbOptionReal(scope, key, x));
+    break;
   case SB_OPTION_REALS:
-    PetscCall(PetscMalloc1(row->count, &x));
-    if (row->kind == SB_OPTION_REAL)
-      PetscCall(SbOptionReal(scope, key, x));
-    else
-      PetscCall(SbOptionReals(scope, key, x));
-    PetscCall(PetscFree(x));
+    PetscCall(SbOptionReals(scope, key, x));
     break;
   case SB_OPTION_STRING:
     PetscCall(SbOptionString(scope, key, sizeof(text), text));
@@ -330,10 +327,8 @@ PetscErrorCode SbOptionAhead(const SbScope *scope, const char *key)
     PetscCall(SbOptionChoice(scope, key, &n));
     break;
   case SB_OPTION_FORMULA:
-    PetscCall(PetscMalloc1(row->count, &f));
     PetscCall(SbOptionFormulas(scope, key, f));
     for (PetscInt i = 0; i < row->count; i++) PetscCall(SbFormulaDestroy(&f[i]));
-    PetscCall(PetscFree(f));
     break;
   }
   PetscFunctionReturn(PETSC_SUCCESS);

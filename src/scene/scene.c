@@ -69,24 +69,38 @@ static const char *name_problem(const char *name)
   return NULL;
 }
 
+/* The first thing that is wrong with a list of names; "" when nothing is. */
+static PetscErrorCode names_problem(const char *what, PetscInt n, char (*names)[SB_NAME_MAX], size_t size,
+                                    char text[])
+{
+  PetscFunctionBeginUser;
+  text[0] = 0;
+  for (PetscInt i = 0; i < n && !text[0]; i++) {
+    const char *problem = name_problem(names[i]);
+
+    if (problem) PetscCall(PetscSNPrintf(text, size, "the name '%s' %s", names[i], problem));
+    for (PetscInt j = 0; j < i && !text[0]; j++) {
+      const char *hint = strcmp(names[i], names[j]) ? " (upper and lower case count as one)" : "";
+
+      if (strcasecmp(names[i], names[j])) continue;
+      PetscCall(PetscSNPrintf(text, size, "two are named '%s'%s; every %s needs a name of its own", names[i],
+                              hint, what));
+    }
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode SbSceneReadNames(const char *key, const char *what, PetscInt *n, char (**names)[SB_NAME_MAX])
 {
   SbScope scope;
+  char problem[4 * SB_NAME_MAX];
 
   PetscFunctionBeginUser;
   PetscCall(SbScopeSet(&scope, "", "", ""));
   PetscCall(SbOptionNames(&scope, key, n, names));
-  for (PetscInt i = 0; i < *n; i++) {
-    const char *problem = name_problem((*names)[i]);
-    const char *twice = NULL;
-
-    for (PetscInt j = 0; j < i && !twice; j++)
-      if (!strcasecmp((*names)[i], (*names)[j])) twice = (*names)[j];
-    PetscCheck(!problem, PETSC_COMM_SELF, PETSC_ERR_USER, "-%s: the name '%s' %s", key, (*names)[i], problem);
-    PetscCheck(!twice, PETSC_COMM_SELF, PETSC_ERR_USER,
-               "-%s: two are named '%s'%s; every %s needs a name of its own", key, (*names)[i],
-               strcmp(twice, (*names)[i]) ? " (upper and lower case count as one)" : "", what);
-  }
+  PetscCall(names_problem(what, *n, *names, sizeof(problem), problem));
+  if (problem[0]) PetscCall(PetscFree(*names));
+  PetscCheck(!problem[0], PETSC_COMM_SELF, PETSC_ERR_USER, "-%s: %s", key, problem);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -167,11 +181,10 @@ static PetscErrorCode read_bodies(SbModel model)
   PetscCall(PetscCalloc1(model->nbody, &model->body));
   PetscCall(PetscCalloc1(model->nbody, &model->material));
   PetscCall(PetscCalloc1(model->nbody, &model->element));
-  for (PetscInt i = 0; i < model->nbody; i++) {
+  for (PetscInt i = 0; i < model->nbody; i++)
     PetscCall(PetscStrncpy(model->body[i].name, names[i], SB_NAME_MAX));
-    PetscCall(read_body(model, i));
-  }
   PetscCall(PetscFree(names));
+  for (PetscInt i = 0; i < model->nbody; i++) PetscCall(read_body(model, i));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -185,7 +198,12 @@ static PetscErrorCode read_effects(SbModel model)
   PetscFunctionBeginUser;
   PetscCall(SbSceneReadNames("effects", "effect", &n, &names));
   PetscCall(PetscCalloc1(n, &model->effect));
-  for (PetscInt i = 0; i < n; i++, model->neffect++) PetscCall(SbEffectCreate(names[i], &model->effect[i]));
+  for (PetscInt i = 0; i < n; i++) {
+    const PetscErrorCode ierr = SbEffectCreate(names[i], &model->effect[model->neffect++]);
+
+    if (ierr) PetscCall(PetscFree(names));
+    PetscCall(ierr);
+  }
   PetscCall(PetscFree(names));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

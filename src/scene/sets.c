@@ -105,7 +105,12 @@ PetscErrorCode SbSceneReadSets(SbModel model)
   PetscCall(SbSceneReadNames("sets", "set", &n, &names));
   room = n;
   PetscCall(PetscCalloc1(n + SB_SET_MAX, &model->set));
-  for (PetscInt i = 0; i < n; i++) PetscCall(read_set(model, names[i]));
+  for (PetscInt i = 0; i < n; i++) {
+    const PetscErrorCode ierr = read_set(model, names[i]);
+
+    if (ierr) PetscCall(PetscFree(names));
+    PetscCall(ierr);
+  }
   PetscCall(PetscFree(names));
   for (PetscInt e = 0; e < model->neffect; e++) {
     PetscCall(names_of_effect(model->effect[e], &n, &names));
