@@ -39,7 +39,9 @@ static PetscErrorCode unknown_type(const char *name, const char *type)
   char near[512];
 
   PetscFunctionBeginUser;
+  // PETSc counts a closing NULL.
   PetscCall(PetscFunctionListGet(SbEffectList, &types, &n));
+  while (n && !types[n - 1]) n--;
   PetscCall(SbNearest(type, n, types, sizeof(near), near));
   // Nothing near: list them all.
   if (!near[0]) {

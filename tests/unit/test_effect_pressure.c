@@ -5,7 +5,7 @@
 // @ranks 1 3
 #include "effect_fixture.h"
 
-static const char *const sets[][2] = {{"skin", "boundary:block"}, {"top", "plane:0,0,1,1"}};
+static const char *const sets[][2] = {{"skin", "boundary"}, {"top", "plane:0,0,1,1"}};
 
 #define P 250.0 /* Pa */
 
