@@ -1,27 +1,71 @@
 /*
   sboutput.h - layer 5: one folder per run. fields.h5 + fields.xmf, history.csv, scenario.opts, run.json, checkpoints, progress.
 
-  Everything here attaches to a run as a monitor; what the scenario does not ask for is not attached.
+  Everything here attaches to a run as a monitor; what the scenario does not ask for is not attached. Order of calls:
+  SbOutputRegister(), SbRunCreate(), SbOutputSetFromOptions(), SbOptionsCheck(), SbModelSetUp(), SbRunSetUp(),
+  SbOutputAttach(), SbReportHeader(), SbRunSolve(), SbReportSummary(), SbRunDestroy().
+
+  Everything in the files is in original order: bodies as the scenario names them, vertices and cells as in their files.
+  It does not depend on the number of ranks.
+
+  fields.h5
+    /mesh/x        [nvert][3] double, rest position, m
+    /mesh/cells    [ncell][4] int32, vertex numbers, positively oriented
+    /mesh/body     [ncell] int32, number of the body; /mesh/rank likewise when asked for
+    /step/0001/000123   a frame: group with the attributes `step` and `time` (s), one dataset per field. The middle name
+                   counts hundreds of frames, the last one is the step.
+  history.csv: names in the first line, units in the second one behind a '#', then one row per step.
 */
 #pragma once
 #include "sbtime.h"
 
 /* A named field. compute() fills this rank's owned entities (vertices or cells, in the mesh's local order). */
 typedef struct {
-  const char *name;              /* "von_mises" */
+  const char *name;      /* "von_mises" */
   const char *unit;
-  PetscInt    ncomp;             /* 1 scalar, 3 vector, 6 symmetric tensor (XDMF Tensor6 order) */
-  PetscBool   cell;              /* per cell, else per vertex */
-  PetscBool   constant;          /* written once, with the mesh */
+  PetscInt    ncomp;     /* 1 scalar, 3 vector, 6 symmetric tensor: xx xy xz yy yz zz, the Tensor6 order of XDMF */
+  PetscBool   cell;      /* per cell, else per vertex */
+  PetscBool   constant;  /* whole numbers, written once with the mesh */
+  PetscBool   dynamic;   /* does not exist in a static run */
   const char *help;
   PetscErrorCode (*compute)(SbRun run, const SbStep *step, PetscReal *values);
 } SbField;
 
 PetscErrorCode SbOutputRegister(void); /* option rows */
-/* Creates the output folder (error when it cannot be written), writes scenario.opts, attaches the monitors asked for. Collective. */
+
+/* Every field that there is. Not collective. */
+PetscErrorCode SbFieldGetAll(PetscInt *n, const SbField **fields);
+
+/*
+  SbOutputSetFromOptions - reads every option of the output and makes the folder of the run. Collective.
+
+  Before the model is set up, so that nothing is computed for a run whose results have no place.
+  Options read: -output_..., -checkpoint_..., -restart, -probes, -probe_<name>_at, -progress, -quiet.
+  Errors: PETSC_ERR_USER for a field that does not exist; PETSC_ERR_FILE_OPEN when the folder cannot be made or written.
+*/
+PetscErrorCode SbOutputSetFromOptions(SbRun run);
+
+/*
+  SbOutputAttach - attaches the monitors asked for and, with -restart, loads the checkpoint. Collective.
+
+  After SbRunSetUp(). Replaces the files that an earlier run left in the folder (only those named above; a line says so),
+  or continues them after a restart; writes scenario.opts and run.json with the status "running".
+*/
 PetscErrorCode SbOutputAttach(SbRun run);
-/* Reads -restart FILE if given: fills run->U, V, A, step0, t0 and the running totals, on any number of ranks. Collective. */
+
+/*
+  SbCheckpointLoad - state of a run from a file, on any number of ranks. Collective.
+
+  Fills run->U, V, A, step0, t0, dt, the running totals in run->energies and run->energy_start.
+  Input: file - path, or "latest": the newest readable checkpoint of the run's folder (others are named in a warning).
+  Errors: PETSC_ERR_FILE_OPEN / _READ for a missing, truncated or foreign file; PETSC_ERR_USER_INPUT when its mesh, bodies
+  or effects are not those of this run (the message names the first option that differs).
+*/
 PetscErrorCode SbCheckpointLoad(SbRun run, const char *file);
-/* Header before the run, table after it (rank 0 prints); run.json. */
+
+/* What people see: before the run, and after it (rank 0 prints, nothing with -quiet). The latter also ends run.json. Collective. */
 PetscErrorCode SbReportHeader(SbRun run);
 PetscErrorCode SbReportSummary(SbRun run);
+
+/* Writes "status": "failed" and the reason into run.json. Any one rank, for an error handler that ends the program. */
+PetscErrorCode SbReportFailure(SbRun run, const char *reason);

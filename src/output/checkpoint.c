@@ -1,0 +1,456 @@
+/*
+  Checkpoints: the state of a run in one HDF5 file, from which it goes on as if it had not stopped.
+
+  Displacement, velocity and acceleration (the integrator's own) in original order and double precision, the step, its time,
+  the next step's length, works and losses so far. A file is written beside its place, flushed and renamed; the newest ones
+  are kept. What makes it fit a run: a hash of the mesh (every coordinate and cell by its original number), and the text of
+  the options that decide the mechanics. A checksum over the three vectors detects a file that was damaged later. Both sums
+  are of mixed 64-bit words (the finaliser of splitmix64; Steele, Lea and Flood 2014), which do not depend on the order.
+*/
+#include <ctype.h>
+#include <dirent.h>
+#include <errno.h>
+#include <sys/stat.h>
+#include <unistd.h>
+#include "output_impl.h"
+
+#define FORMAT 1
+
+static uint64_t mix(uint64_t x)
+{
+  x += 0x9e3779b97f4a7c15u;
+  x = (x ^ (x >> 30)) * 0xbf58476d1ce4e5b9u;
+  x = (x ^ (x >> 27)) * 0x94d049bb133111ebu;
+  return x ^ (x >> 31);
+}
+
+/* A number at a place. Zero has one sign here. */
+static uint64_t mix_real(uint64_t place, PetscReal value)
+{
+  uint64_t bits;
+
+  value += 0.;
+  memcpy(&bits, &value, sizeof(bits));
+  return mix(place ^ mix(bits));
+}
+
+static PetscErrorCode sum_ranks(MPI_Comm comm, uint64_t mine, uint64_t *sum)
+{
+  PetscFunctionBeginUser;
+  PetscCallMPI(MPI_Allreduce(&mine, sum, 1, MPI_UINT64_T, MPI_SUM, comm));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode hash_mesh(const SbMesh mesh, uint64_t *hash)
+{
+  uint64_t sum = 0;
+
+  PetscFunctionBeginUser;
+  for (PetscInt i = 0; i < mesh->nvert_owned; i++) {
+    for (PetscInt c = 0; c < 3; c++)
+      sum += mix_real(3 * (uint64_t)mesh->vert_orig[i] + (uint64_t)c, mesh->x[3 * i + c]);
+  }
+  for (PetscInt k = 0; k < mesh->ncell_owned; k++) {
+    for (PetscInt a = 0; a < 4; a++)
+      sum += mix(mix((uint64_t)mesh->cell_orig[k]) ^ (uint64_t)mesh->vert_orig[mesh->cell[4 * k + a]]);
+  }
+  PetscCall(sum_ranks(mesh->comm, sum, hash));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbOutputOrder(SbRun run, SbOutput out)
+{
+  const SbMesh mesh = run->model->mesh;
+
+  PetscFunctionBeginUser;
+  if (out->ordered) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(SbOrderCreate(out->comm, mesh->Nvert, mesh->nvert_owned, mesh->vert_orig, &out->vertex));
+  PetscCall(SbOrderCreate(out->comm, mesh->Ncell, mesh->ncell_owned, mesh->cell_orig, &out->cell));
+  PetscCall(hash_mesh(mesh, &out->mesh_hash));
+  out->ordered = PETSC_TRUE;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ what of a run is in the file */
+
+typedef struct {
+  const char *name;
+  Vec vec;
+} Part;
+
+static void parts_of(SbRun run, Part part[3])
+{
+  part[0] = (Part){"u", run->U};
+  part[1] = (Part){"v", run->V};
+  part[2] = (Part){"a", run->A};
+}
+
+/* Running totals, by name. */
+typedef struct {
+  const char *name;
+  PetscReal *value;
+} Total;
+
+#define NTOTAL 6
+static void totals_of(SbRun run, Total total[NTOTAL])
+{
+  SbEnergies *e = &run->energies;
+
+  total[0] = (Total){"load_work", &e->load_work};
+  total[1] = (Total){"drive_work", &e->drive_work};
+  total[2] = (Total){"damping_loss", &e->damping_loss};
+  total[3] = (Total){"integrator_loss", &e->integrator_loss};
+  total[4] = (Total){"energy_start", &run->energy_start};
+  total[5] = (Total){"load_factor", &run->model->load};
+}
+
+static PetscErrorCode checksum_of(const SbOrder *order, uint64_t salt, const PetscReal slice[], uint64_t *sum)
+{
+  uint64_t mine = 0;
+
+  PetscFunctionBeginUser;
+  for (PetscInt i = 0; i < 3 * order->n; i++)
+    mine += mix_real(3 * (uint64_t)order->start + (uint64_t)i + (salt << 48), slice[i]);
+  PetscCall(sum_ranks(order->comm, mine, sum));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ writing */
+
+static PetscErrorCode write_vectors(SbRun run, SbOutput out, SbH5 *h, uint64_t *checksum)
+{
+  Part part[3];
+  PetscReal *slice;
+  const PetscScalar *array;
+
+  PetscFunctionBeginUser;
+  *checksum = 0;
+  parts_of(run, part);
+  PetscCall(PetscMalloc1(3 * out->vertex.n, &slice));
+  for (int k = 0; k < 3; k++) {
+    uint64_t sum;
+
+    if (!part[k].vec) continue;
+    PetscCall(VecGetArrayRead(part[k].vec, &array));
+    PetscCall(SbOrderGather(&out->vertex, 3, array, slice));
+    PetscCall(VecRestoreArrayRead(part[k].vec, &array));
+    PetscCall(SbH5WriteSlice(h, h->file, part[k].name, "SI", &out->vertex, 3, H5T_IEEE_F64LE,
+                             H5T_NATIVE_DOUBLE, slice));
+    PetscCall(checksum_of(&out->vertex, (uint64_t)k, slice, &sum));
+    *checksum += sum;
+  }
+  PetscCall(PetscFree(slice));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode write_numbers(SbRun run, SbOutput out, const SbStep *step, SbH5 *h, uint64_t checksum)
+{
+  Total total[NTOTAL];
+  PetscReal dt = run->dt;
+
+  PetscFunctionBeginUser;
+  if (run->ts) PetscCall(TSGetTimeStep(run->ts, &dt));
+  totals_of(run, total);
+  for (int i = 0; i < NTOTAL; i++) PetscCall(SbH5PutReal(h, h->file, total[i].name, *total[i].value));
+  PetscCall(SbH5PutReal(h, h->file, "time", step->t));
+  PetscCall(SbH5PutReal(h, h->file, "dt_next", dt));
+  PetscCall(SbH5PutReal(h, h->file, "dt", run->dt));
+  PetscCall(SbH5PutReal(h, h->file, "t_end", run->t_end));
+  PetscCall(SbH5PutInt(h, h->file, "step", step->step));
+  PetscCall(SbH5PutInt(h, h->file, "mesh_hash", (int64_t)out->mesh_hash));
+  PetscCall(SbH5PutInt(h, h->file, "checksum", (int64_t)checksum));
+  PetscCall(SbH5PutInt(h, h->file, "format", FORMAT));
+  PetscCall(SbH5WriteText(h, h->file, "options", out->identity));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static int is_checkpoint(const struct dirent *entry)
+{
+  const char *digits = entry->d_name + strlen("checkpoint_");
+  size_t n = 0;
+
+  if (strncmp(entry->d_name, "checkpoint_", strlen("checkpoint_"))) return 0;
+  while (isdigit((unsigned char)digits[n])) n++;
+  return n > 0 && !strcmp(digits + n, ".h5");
+}
+
+static int by_number(const struct dirent **a, const struct dirent **b)
+{
+  const long p = strtol((*a)->d_name + strlen("checkpoint_"), NULL, 10),
+             q = strtol((*b)->d_name + strlen("checkpoint_"), NULL, 10);
+
+  return (p > q) - (p < q);
+}
+
+/* Names of the checkpoints in a folder, oldest first; free with free_names(). */
+static int list_checkpoints(const char *dir, struct dirent ***names)
+{
+  const int n = scandir(dir, names, is_checkpoint, by_number);
+
+  if (n < 0) *names = NULL;
+  return PetscMax(n, 0);
+}
+
+static void free_names(int n, struct dirent **names)
+{
+  for (int i = 0; i < n; i++) free(names[i]);
+  free(names);
+}
+
+/* Removes all but the newest `keep`. Rank 0. */
+static PetscErrorCode prune(SbOutput out, PetscInt keep)
+{
+  struct dirent **names;
+  const int n = list_checkpoints(out->dir, &names);
+  char path[PETSC_MAX_PATH_LEN];
+
+  PetscFunctionBeginUser;
+  for (int i = 0; i < n - (int)keep; i++) {
+    PetscCall(SbOutputPath(out, names[i]->d_name, sizeof(path), path));
+    (void)unlink(path);
+  }
+  free_names(n, names);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbCheckpointFiles(SbOutput out, SbFileFn fn, void *ctx)
+{
+  struct dirent **names;
+  const int n = list_checkpoints(out->dir, &names);
+  char path[PETSC_MAX_PATH_LEN];
+  struct stat info;
+
+  PetscFunctionBeginUser;
+  for (int i = 0; i < n; i++) {
+    PetscCall(SbOutputPath(out, names[i]->d_name, sizeof(path), path));
+    if (!stat(path, &info)) PetscCall(fn(names[i]->d_name, (PetscInt64)info.st_size, ctx));
+  }
+  free_names(n, names);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbCheckpointRemoveAll(SbOutput out)
+{
+  PetscFunctionBeginUser;
+  PetscCall(prune(out, 0));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode write_checkpoint(SbRun run, SbOutput out, const SbStep *step)
+{
+  SbH5 h;
+  char name[SB_FILE_MAX], path[PETSC_MAX_PATH_LEN], tmp[PETSC_MAX_PATH_LEN], message[SB_MESSAGE_MAX] = "";
+  uint64_t checksum;
+
+  PetscFunctionBeginUser;
+  (void)snprintf(name, sizeof(name), "checkpoint_%06" PetscInt_FMT ".h5", step->step);
+  PetscCall(SbOutputPath(out, name, sizeof(path), path));
+  PetscCall(SbOutputPath(out, "checkpoint.tmp", sizeof(tmp), tmp));
+  PetscCall(SbH5Create(out->comm, tmp, &h));
+  PetscCall(SbFileReserve(out->comm, tmp,
+                          (PetscInt64)out->vertex.N * 3 * 24 + (PetscInt64)strlen(out->identity) + 65536));
+  PetscCall(write_vectors(run, out, &h, &checksum));
+  PetscCall(write_numbers(run, out, step, &h, checksum));
+  PetscCall(SbH5Flush(&h));
+  PetscCall(SbH5Close(&h));
+  if (!out->rank) {
+    if (rename(tmp, path))
+      SbFormat(sizeof(message), message, "cannot rename %s to %s: %s", tmp, path, strerror(errno));
+    else
+      PetscCall(prune(out, out->checkpoint_keep));
+  }
+  PetscCall(SbAgree(out->comm, PETSC_ERR_FILE_WRITE, message));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode monitor(SbRun run, const SbStep *step, void *ctx)
+{
+  SbOutput out = (SbOutput)ctx;
+  PetscBool due = step->last;
+
+  PetscFunctionBeginUser;
+  if (step->step == run->step0) PetscFunctionReturn(PETSC_SUCCESS);
+  if (out->checkpoint_every > 0.)
+    due = (PetscBool)(due || SbOutputDue(out->checkpoint_every, step->t, step->dt));
+  if (out->checkpoint_every_steps) due = (PetscBool)(due || step->step % out->checkpoint_every_steps == 0);
+  if (!due) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscLogStagePush(SbStageOutput));
+  PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_CHECKPOINT], 0, 0, 0, 0));
+  PetscCall(write_checkpoint(run, out, step));
+  PetscCall(PetscLogEventEnd(SbEvents[SB_EVENT_CHECKPOINT], 0, 0, 0, 0));
+  PetscCall(PetscLogStagePop());
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbCheckpointAttach(SbRun run, SbOutput out)
+{
+  PetscFunctionBeginUser;
+  if (out->checkpoint_every <= 0. && !out->checkpoint_every_steps) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(SbOutputOrder(run, out));
+  // Works and losses are part of the state.
+  run->want_energies = PETSC_TRUE;
+  PetscCall(SbRunAddMonitor(run, monitor, out, NULL));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ reading */
+
+/* Where two option texts part: the line of each, in `a` and `b`. */
+static void first_difference(const char *theirs, const char *ours, size_t size, char a[], char b[])
+{
+  while (*theirs || *ours) {
+    const size_t n = strcspn(theirs, "\n"), m = strcspn(ours, "\n");
+
+    if (n != m || strncmp(theirs, ours, n)) {
+      (void)snprintf(a, size, "%.*s", (int)n, n ? theirs : "nothing");
+      (void)snprintf(b, size, "%.*s", (int)m, m ? ours : "nothing");
+      if (!n) (void)snprintf(a, size, "nothing");
+      if (!m) (void)snprintf(b, size, "nothing");
+      return;
+    }
+    theirs += n + (theirs[n] == '\n');
+    ours += m + (ours[m] == '\n');
+  }
+}
+
+/* Refuses a checkpoint of other bodies, meshes or effects. */
+static PetscErrorCode check_identity(SbOutput out, SbH5 *h, int64_t mesh_hash)
+{
+  PetscBool ok = PETSC_TRUE;
+  char *options;
+  char a[200] = "", b[200] = "";
+
+  PetscFunctionBeginUser;
+  PetscCall(SbH5ReadText(h, "options", &options, &ok));
+  if (ok && strcmp(options, out->identity)) first_difference(options, out->identity, sizeof(a), a, b);
+  PetscCall(PetscFree(options));
+  PetscCheck(
+    !ok || !a[0], out->comm, PETSC_ERR_USER_INPUT,
+    "cannot restart from %s: it was made with '%s', this run has '%s'; bodies and effects must be the same",
+    h->path, a, b);
+  PetscCheck((uint64_t)mesh_hash == out->mesh_hash, out->comm, PETSC_ERR_USER_INPUT,
+             "cannot restart from %s: it belongs to another mesh (other vertices, cells or placement)",
+             h->path);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The three vectors of an open file; ok is false when one cannot be read or the checksum differs. */
+static PetscErrorCode read_vectors(SbRun run, SbOutput out, SbH5 *h, int64_t checksum, PetscBool *ok)
+{
+  Part part[3];
+  PetscReal *slice;
+  PetscScalar *array;
+  uint64_t all = 0;
+
+  PetscFunctionBeginUser;
+  parts_of(run, part);
+  PetscCall(PetscMalloc1(3 * out->vertex.n, &slice));
+  for (int k = 0; k < 3 && *ok; k++) {
+    uint64_t sum;
+
+    if (!part[k].vec) continue;
+    PetscCall(SbH5ReadSlice(h, part[k].name, &out->vertex, 3, slice, ok));
+    if (!*ok) break;
+    PetscCall(checksum_of(&out->vertex, (uint64_t)k, slice, &sum));
+    all += sum;
+    PetscCall(VecGetArray(part[k].vec, &array));
+    PetscCall(SbOrderScatter(&out->vertex, 3, slice, array));
+    PetscCall(VecRestoreArray(part[k].vec, &array));
+  }
+  PetscCall(PetscFree(slice));
+  if (all != (uint64_t)checksum) *ok = PETSC_FALSE;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/*
+  Length of the step after a restart: that of the uninterrupted run, which may be a short one that would have met t_end. A
+  run of fixed steps that is given another step or another end takes its own.
+*/
+static PetscErrorCode set_step(SbRun run, hid_t file, PetscBool *ok)
+{
+  PetscReal next, dt, t_end;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbH5GetReal(file, "dt_next", &next, ok));
+  PetscCall(SbH5GetReal(file, "dt", &dt, ok));
+  PetscCall(SbH5GetReal(file, "t_end", &t_end, ok));
+  if (!*ok || !run->ts) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!run->fixed_step || (dt == run->dt && t_end == run->t_end)) PetscCall(TSSetTimeStep(run->ts, next));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Loads one file; ok is false when it is truncated, damaged or no checkpoint. One that does not fit the run is an error. */
+static PetscErrorCode load(SbRun run, SbOutput out, const char *path, PetscBool *ok)
+{
+  SbH5 h;
+  Total total[NTOTAL];
+  int64_t step, mesh_hash, checksum, format;
+  PetscReal t, values[NTOTAL];
+
+  PetscFunctionBeginUser;
+  PetscCall(SbH5Open(out->comm, path, PETSC_FALSE, &h, ok));
+  if (!*ok) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(SbH5GetInt(h.file, "format", &format, ok));
+  PetscCall(SbH5GetInt(h.file, "step", &step, ok));
+  PetscCall(SbH5GetInt(h.file, "mesh_hash", &mesh_hash, ok));
+  PetscCall(SbH5GetInt(h.file, "checksum", &checksum, ok));
+  PetscCall(SbH5GetReal(h.file, "time", &t, ok));
+  totals_of(run, total);
+  for (int i = 0; i < NTOTAL; i++) PetscCall(SbH5GetReal(h.file, total[i].name, &values[i], ok));
+  if (*ok && format != FORMAT) *ok = PETSC_FALSE;
+  if (*ok) PetscCall(check_identity(out, &h, mesh_hash));
+  if (*ok) PetscCall(read_vectors(run, out, &h, checksum, ok));
+  if (*ok) PetscCall(set_step(run, h.file, ok));
+  PetscCall(SbH5Close(&h));
+  if (!*ok) PetscFunctionReturn(PETSC_SUCCESS);
+  for (int i = 0; i < NTOTAL; i++) *total[i].value = values[i];
+  run->step0 = (PetscInt)step;
+  run->t0 = t;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Name of the k-th newest checkpoint of the folder, the same on all ranks; empty when there is none. */
+static PetscErrorCode nth_newest(SbOutput out, int k, size_t size, char path[])
+{
+  char name[SB_FILE_MAX] = "";
+
+  PetscFunctionBeginUser;
+  if (!out->rank) {
+    struct dirent **names;
+    const int n = list_checkpoints(out->dir, &names);
+
+    if (k < n) (void)snprintf(name, sizeof(name), "%.63s", names[n - 1 - k]->d_name);
+    free_names(n, names);
+  }
+  PetscCallMPI(MPI_Bcast(name, (PetscMPIInt)sizeof(name), MPI_CHAR, 0, out->comm));
+  path[0] = 0;
+  if (name[0]) PetscCall(SbOutputPath(out, name, size, path));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbCheckpointLoad(SbRun run, const char *file)
+{
+  SbOutput out = (SbOutput)run->output;
+  PetscBool latest = (PetscBool)!strcmp(file, "latest"), ok = PETSC_FALSE;
+  char path[PETSC_MAX_PATH_LEN];
+
+  PetscFunctionBeginUser;
+  PetscCall(SbOutputOrder(run, out));
+  if (!latest) PetscCall(PetscStrncpy(path, file, sizeof(path)));
+  for (int k = 0; !ok; k++) {
+    if (latest) PetscCall(nth_newest(out, k, sizeof(path), path));
+    PetscCheck(path[0], out->comm, PETSC_ERR_FILE_OPEN, "-restart latest: there is no %scheckpoint in %s",
+               k ? "readable " : "", out->dir);
+    PetscCall(load(run, out, path, &ok));
+    if (ok) break;
+    PetscCheck(latest, out->comm, PETSC_ERR_FILE_READ, "cannot restart from %s: %s", path,
+               access(path, R_OK) ? "there is no such file, or it may not be read"
+                                  : "it is truncated, damaged or not a checkpoint");
+    PetscCall(SbWarning(out->comm, "%s is truncated or damaged: trying the checkpoint before it", path));
+  }
+  out->restarted = PETSC_TRUE;
+  if (!out->quiet)
+    PetscCall(PetscPrintf(out->comm, "restart from %s: step %" PetscInt_FMT ", t = %g s\n", path, run->step0,
+                          (double)run->t0));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

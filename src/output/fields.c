@@ -1,0 +1,211 @@
+/*
+  The fields that a run can write: one table, a name, a unit and a function each.
+
+  Vertex fields are taken from the owned part of the vectors (the nodes of P1 are the vertices). Cell fields come from one
+  evaluation of the cells' state per frame, shared by all of them. von Mises: sqrt(3/2 s:s), s the deviator of the Cauchy
+  stress. Reaction: force of the support on the body, that is the residual without constraints at prescribed unknowns.
+*/
+#include "output_impl.h"
+
+/* ------------------------------------------------------------------ per vertex */
+
+static PetscErrorCode copy_owned(SbRun run, Vec x, PetscReal *values)
+{
+  const PetscScalar *array;
+
+  PetscFunctionBeginUser;
+  PetscCall(VecGetArrayRead(x, &array));
+  PetscCall(PetscArraycpy(values, array, 3 * run->model->mesh->nvert_owned));
+  PetscCall(VecRestoreArrayRead(x, &array));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode displacement(SbRun run, const SbStep *step, PetscReal *values)
+{
+  PetscFunctionBeginUser;
+  PetscCall(copy_owned(run, step->U, values));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode velocity(SbRun run, const SbStep *step, PetscReal *values)
+{
+  PetscFunctionBeginUser;
+  PetscCall(copy_owned(run, step->V, values));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode acceleration(SbRun run, const SbStep *step, PetscReal *values)
+{
+  PetscFunctionBeginUser;
+  PetscCall(copy_owned(run, step->A, values));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode reaction(SbRun run, const SbStep *step, PetscReal *values)
+{
+  const SbSpace space = run->model->space;
+
+  PetscFunctionBeginUser;
+  PetscCheck(step->R, PETSC_COMM_SELF, PETSC_ERR_PLIB,
+             "The residual was asked for but not given to the monitors");
+  PetscCall(copy_owned(run, step->R, values));
+  for (PetscInt i = 0; i < space->nnode_owned; i++) {
+    for (PetscInt c = 0; c < 3; c++) {
+      if (!(space->fixed[i] & (1 << c))) values[3 * i + c] = 0.;
+    }
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ per cell */
+
+static PetscErrorCode cell_state(SbRun run, const SbStep *step, SbOutput *out)
+{
+  SbOutput o = (SbOutput)run->output;
+  const PetscReal *u;
+
+  PetscFunctionBeginUser;
+  *out = o;
+  if (o->state_valid) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(SbSpaceGetLocalRead(run->model->space, step->U, &u));
+  PetscCall(SbSpaceCellState(run->model->space, u, o->sigma, o->J, o->psi));
+  PetscCall(SbSpaceRestoreLocalRead(run->model->space, step->U, &u));
+  o->state_valid = PETSC_TRUE;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode stress(SbRun run, const SbStep *step, PetscReal *values)
+{
+  static const int place[6] = {0, 3, 5, 1, 4, 2}; // from xx yy zz xy yz xz to xx xy xz yy yz zz
+  SbOutput out;
+
+  PetscFunctionBeginUser;
+  PetscCall(cell_state(run, step, &out));
+  for (PetscInt c = 0; c < run->model->mesh->ncell_owned; c++) {
+    for (int k = 0; k < 6; k++) values[6 * c + k] = out->sigma[6 * c + place[k]];
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode von_mises(SbRun run, const SbStep *step, PetscReal *values)
+{
+  SbOutput out;
+
+  PetscFunctionBeginUser;
+  PetscCall(cell_state(run, step, &out));
+  for (PetscInt c = 0; c < run->model->mesh->ncell_owned; c++) {
+    const PetscReal *s = out->sigma + 6 * c;
+    const PetscReal a = s[0] - s[1], b = s[1] - s[2], d = s[2] - s[0];
+
+    values[c] = PetscSqrtReal(.5 * (a * a + b * b + d * d) + 3. * (s[3] * s[3] + s[4] * s[4] + s[5] * s[5]));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode jacobian(SbRun run, const SbStep *step, PetscReal *values)
+{
+  SbOutput out;
+
+  PetscFunctionBeginUser;
+  PetscCall(cell_state(run, step, &out));
+  PetscCall(PetscArraycpy(values, out->J, run->model->mesh->ncell_owned));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode energy_density(SbRun run, const SbStep *step, PetscReal *values)
+{
+  SbOutput out;
+
+  PetscFunctionBeginUser;
+  PetscCall(cell_state(run, step, &out));
+  PetscCall(PetscArraycpy(values, out->psi, run->model->mesh->ncell_owned));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode body_number(SbRun run, const SbStep *step, PetscReal *values)
+{
+  PetscFunctionBeginUser;
+  (void)step;
+  for (PetscInt c = 0; c < run->model->mesh->ncell_owned; c++)
+    values[c] = (PetscReal)run->model->mesh->cell_body[c];
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode rank_number(SbRun run, const SbStep *step, PetscReal *values)
+{
+  PetscFunctionBeginUser;
+  (void)step;
+  for (PetscInt c = 0; c < run->model->mesh->ncell_owned; c++)
+    values[c] = (PetscReal)((SbOutput)run->output)->rank;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ the table */
+
+#define VERTEX PETSC_FALSE
+#define CELL PETSC_TRUE
+#define VARIES PETSC_FALSE
+#define CONSTANT PETSC_TRUE
+#define ALWAYS PETSC_FALSE
+#define DYNAMIC PETSC_TRUE
+
+static const SbField table[] = {
+  {"displacement", "m", 3, VERTEX, VARIES, ALWAYS, "displacement from the rest state", displacement},
+  {"velocity", "m/s", 3, VERTEX, VARIES, DYNAMIC, "velocity", velocity},
+  {"acceleration", "m/s^2", 3, VERTEX, VARIES, DYNAMIC, "acceleration, state of the integrator",
+   acceleration},
+  {"reaction", "N", 3, VERTEX, VARIES, ALWAYS, "force of a support on the body", reaction},
+  {"stress", "Pa", 6, CELL, VARIES, ALWAYS, "Cauchy stress", stress},
+  {"von_mises", "Pa", 1, CELL, VARIES, ALWAYS, "von Mises stress", von_mises},
+  {"J", "1", 1, CELL, VARIES, ALWAYS, "volume ratio det F", jacobian},
+  {"energy_density", "J/m^3", 1, CELL, VARIES, ALWAYS, "strain energy per rest volume", energy_density},
+  {"body", "1", 1, CELL, CONSTANT, ALWAYS, "number of the body, always written", body_number},
+  {"rank", "1", 1, CELL, CONSTANT, ALWAYS, "MPI rank that owns the cell", rank_number},
+};
+
+PetscErrorCode SbFieldGetAll(PetscInt *n, const SbField **fields)
+{
+  PetscFunctionBeginUser;
+  *n = (PetscInt)PETSC_STATIC_ARRAY_LENGTH(table);
+  *fields = table;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbFieldFind(const char *name, const SbField **field)
+{
+  const PetscInt n = (PetscInt)PETSC_STATIC_ARRAY_LENGTH(table);
+  const char *names[PETSC_STATIC_ARRAY_LENGTH(table)];
+  char near[256], all[512] = "";
+
+  PetscFunctionBeginUser;
+  for (PetscInt i = 0; i < n; i++) {
+    if (!strcmp(table[i].name, name)) {
+      *field = &table[i];
+      PetscFunctionReturn(PETSC_SUCCESS);
+    }
+    names[i] = table[i].name;
+    PetscCall(PetscStrlcat(all, i ? ", " : "", sizeof(all)));
+    PetscCall(PetscStrlcat(all, names[i], sizeof(all)));
+  }
+  PetscCall(SbNearest(name, n, names, sizeof(near), near));
+  SETERRQ(PETSC_COMM_SELF, PETSC_ERR_USER,
+          "-output_fields: there is no field '%s'%s%s%s; fields are %s, or none", name,
+          near[0] ? ", did you mean " : "", near, near[0] ? "?" : "", all);
+}
+
+PetscErrorCode SbFieldPrepare(SbRun run, SbOutput out)
+{
+  const PetscInt n = run->model->mesh->ncell_owned;
+
+  PetscFunctionBeginUser;
+  for (PetscInt i = 0; i < out->nfield; i++) {
+    const SbField *f = out->field[i];
+
+    if ((f->compute == stress || f->compute == von_mises) && !out->sigma)
+      PetscCall(PetscMalloc1(6 * n, &out->sigma));
+    if (f->compute == jacobian && !out->J) PetscCall(PetscMalloc1(n, &out->J));
+    if (f->compute == energy_density && !out->psi) PetscCall(PetscMalloc1(n, &out->psi));
+    if (f->compute == reaction) run->want_residual = PETSC_TRUE;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

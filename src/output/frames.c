@@ -1,0 +1,401 @@
+/*
+  fields.h5: one group per frame, one dataset per field, written by all ranks together in original order.
+
+  A frame is invisible until it is complete (h5.c says how), and then enters fields.xmf. After a restart in the same folder
+  the frames up to the restart stay and later ones are taken out; their space in the file is used again.
+*/
+#include "output_impl.h"
+
+typedef struct {
+  PetscReal time;
+  PetscInt step;
+  char group[48];
+  PetscInt nfield;
+  const SbField *field[SB_FIELD_MAX];
+  PetscInt bytes[SB_FIELD_MAX];
+} SbFrame;
+
+struct _p_SbFrames {
+  SbH5 h5;
+  hid_t top;             /* /step */
+  hid_t node;            /* group of the current hundred; negative before the first frame */
+  PetscInt nnode, nlink; /* hundreds so far; links in the current one */
+  PetscInt last_step;    /* of the last frame in the file, or -1 */
+  PetscInt nframe;
+  SbXdmf xdmf;              /* rank 0 only */
+  PetscReal *owned, *slice; /* work, six components of the larger kind */
+  void *packed;             /* slice in the type of the file; NULL when that is double */
+};
+
+/* ------------------------------------------------------------------ the mesh */
+
+/* A constant whole number per entity, or the four vertices of each cell. */
+static PetscErrorCode write_whole(SbFrames fr, hid_t where, const char *name, const SbOrder *order,
+                                  PetscInt ncomp)
+{
+  int32_t *whole;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbOrderGather(order, ncomp, fr->owned, fr->slice));
+  PetscCall(PetscMalloc1(order->n * ncomp, &whole));
+  for (PetscInt i = 0; i < order->n * ncomp; i++) whole[i] = (int32_t)fr->slice[i];
+  PetscCall(SbH5WriteSlice(&fr->h5, where, name, "1", order, ncomp, H5T_STD_I32LE, H5T_NATIVE_INT32, whole));
+  PetscCall(PetscFree(whole));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode write_mesh(SbRun run, SbOutput out)
+{
+  SbFrames fr = out->frames;
+  const SbMesh mesh = run->model->mesh;
+  hid_t group;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbFileReserve(out->comm, fr->h5.path,
+                          (PetscInt64)mesh->Nvert * 24 + (PetscInt64)mesh->Ncell * 24 + 65536));
+  PetscCall(SbH5GroupCreate(&fr->h5, 8, 8, &group));
+  PetscCall(SbH5PutInt(&fr->h5, group, "hash", (int64_t)out->mesh_hash));
+  PetscCall(SbOrderGather(&out->vertex, 3, mesh->x, fr->slice));
+  PetscCall(
+    SbH5WriteSlice(&fr->h5, group, "x", "m", &out->vertex, 3, H5T_IEEE_F64LE, H5T_NATIVE_DOUBLE, fr->slice));
+  for (PetscInt i = 0; i < 4 * mesh->ncell_owned; i++)
+    fr->owned[i] = (PetscReal)mesh->vert_orig[mesh->cell[i]];
+  PetscCall(write_whole(fr, group, "cells", &out->cell, 4));
+  for (PetscInt i = 0; i < out->nfield; i++) {
+    if (!out->field[i]->constant) continue;
+    PetscCall(out->field[i]->compute(run, NULL, fr->owned));
+    PetscCall(write_whole(fr, group, out->field[i]->name, &out->cell, 1));
+  }
+  PetscCall(SbH5GroupLink(&fr->h5, group, fr->h5.file, "mesh"));
+  (void)H5Gclose(group);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ a frame */
+
+/* One field of the frame. */
+static PetscErrorCode write_field(SbRun run, SbOutput out, const SbStep *step, const SbField *f, hid_t group)
+{
+  SbFrames fr = out->frames;
+  const SbOrder *order = f->cell ? &out->cell : &out->vertex;
+  const PetscInt n = order->n * f->ncomp;
+
+  PetscFunctionBeginUser;
+  PetscCall(f->compute(run, step, fr->owned));
+  PetscCall(SbOrderGather(order, f->ncomp, fr->owned, fr->slice));
+  if (out->precise) {
+    PetscCall(SbH5WriteSlice(&fr->h5, group, f->name, f->unit, order, f->ncomp, H5T_IEEE_F64LE,
+                             H5T_NATIVE_DOUBLE, fr->slice));
+  } else {
+    float *packed = (float *)fr->packed;
+
+    for (PetscInt i = 0; i < n; i++) packed[i] = (float)fr->slice[i];
+    PetscCall(SbH5WriteSlice(&fr->h5, group, f->name, f->unit, order, f->ncomp, H5T_IEEE_F32LE,
+                             H5T_NATIVE_FLOAT, packed));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Bytes that a frame can take, with its metadata. */
+static PetscInt64 frame_bytes(const SbOutput out)
+{
+  PetscInt64 bytes = 65536;
+
+  for (PetscInt i = 0; i < out->nfield; i++) {
+    const SbField *f = out->field[i];
+
+    bytes += (PetscInt64)(f->cell ? out->cell.N : out->vertex.N) * f->ncomp * (out->precise ? 8 : 4) + 8192;
+  }
+  return bytes;
+}
+
+/* Names the finished frame; a full hundred begins the next one, which is itself finished before it gets its name. */
+static PetscErrorCode commit(SbOutput out, hid_t group, PetscInt step, size_t size, char path[])
+{
+  SbFrames fr = out->frames;
+  char name[16], hundred[16];
+
+  PetscFunctionBeginUser;
+  (void)snprintf(name, sizeof(name), "%06" PetscInt_FMT, step);
+  if (fr->node >= 0 && fr->nlink < SB_H5_NODE_LINKS) {
+    PetscCall(SbH5Flush(&fr->h5));
+    PetscCall(SbH5GroupLink(&fr->h5, group, fr->node, name));
+    (void)snprintf(hundred, sizeof(hundred), "%04" PetscInt_FMT, fr->nnode - 1);
+  } else {
+    if (fr->node >= 0) (void)H5Gclose(fr->node);
+    PetscCall(SbH5GroupCreate(&fr->h5, SB_H5_NODE_LINKS, 6, &fr->node));
+    PetscCall(SbH5GroupLink(&fr->h5, group, fr->node, name));
+    PetscCall(SbH5Flush(&fr->h5));
+    (void)snprintf(hundred, sizeof(hundred), "%04" PetscInt_FMT, fr->nnode);
+    PetscCall(SbH5GroupLink(&fr->h5, fr->node, fr->top, hundred));
+    fr->nnode++;
+    fr->nlink = 0;
+  }
+  PetscCall(SbH5Flush(&fr->h5));
+  fr->nlink++;
+  (void)snprintf(path, size, "/step/%s/%s", hundred, name);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode write_frame(SbRun run, SbOutput out, const SbStep *step)
+{
+  SbFrames fr = out->frames;
+  const SbField *field[SB_FIELD_MAX];
+  PetscInt bytes[SB_FIELD_MAX], n = 0;
+  char path[48], message[SB_MESSAGE_MAX] = "";
+  hid_t group;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbFileReserve(out->comm, fr->h5.path, frame_bytes(out)));
+  PetscCall(SbH5GroupCreate(&fr->h5, (unsigned)out->nfield, 14, &group));
+  PetscCall(SbH5PutReal(&fr->h5, group, "time", step->t));
+  PetscCall(SbH5PutInt(&fr->h5, group, "step", step->step));
+  out->state_valid = PETSC_FALSE;
+  for (PetscInt i = 0; i < out->nfield; i++) {
+    if (out->field[i]->constant) continue;
+    PetscCall(write_field(run, out, step, out->field[i], group));
+    bytes[n] = out->precise ? 8 : 4;
+    field[n++] = out->field[i];
+  }
+  PetscCall(commit(out, group, step->step, sizeof(path), path));
+  (void)H5Gclose(group);
+  fr->last_step = step->step;
+  fr->nframe++;
+  if (fr->xdmf) {
+    PetscCall(SbXdmfAdd(fr->xdmf, step->t, path, n, field, bytes));
+    SbXdmfWrite(fr->xdmf, sizeof(message), message);
+  }
+  PetscCall(SbAgree(out->comm, PETSC_ERR_FILE_WRITE, message));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode monitor(SbRun run, const SbStep *step, void *ctx)
+{
+  SbOutput out = (SbOutput)ctx;
+  const PetscBool first = (PetscBool)(step->step == run->step0);
+  PetscBool due;
+
+  PetscFunctionBeginUser;
+  if (out->every > 0.)
+    due = SbOutputDue(out->every, step->t, step->dt);
+  else
+    due = (PetscBool)(step->step % out->every_steps == 0);
+  if (!first && !due && !step->last) PetscFunctionReturn(PETSC_SUCCESS);
+  // After a restart the first frame may be there already.
+  if (out->frames->last_step >= step->step) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscLogStagePush(SbStageOutput));
+  PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_OUTPUT], 0, 0, 0, 0));
+  PetscCall(write_frame(run, out, step));
+  PetscCall(PetscLogEventEnd(SbEvents[SB_EVENT_OUTPUT], 0, 0, 0, 0));
+  PetscCall(PetscLogStagePop());
+  if (step->last) PetscCall(SbFramesClose(out));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ going on after a restart */
+
+/* Step, time and fields of the frame `name` in an open hundred; ok is false when it is not one of ours. */
+static PetscErrorCode read_frame(hid_t hundred, const char *name, SbFrame *frame, PetscBool *ok)
+{
+  const hid_t group = H5Gopen2(hundred, name, H5P_DEFAULT);
+  int64_t step = 0;
+  PetscInt n;
+  const SbField *fields;
+
+  PetscFunctionBeginUser;
+  *ok = (PetscBool)(group >= 0);
+  if (!*ok) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(SbH5GetInt(group, "step", &step, ok));
+  PetscCall(SbH5GetReal(group, "time", &frame->time, ok));
+  frame->step = (PetscInt)step;
+  frame->nfield = 0;
+  PetscCall(SbFieldGetAll(&n, &fields));
+  for (PetscInt i = 0; i < n; i++) {
+    if (H5Lexists(group, fields[i].name, H5P_DEFAULT) > 0) {
+      const hid_t dataset = H5Dopen2(group, fields[i].name, H5P_DEFAULT), type = H5Dget_type(dataset);
+
+      frame->field[frame->nfield] = &fields[i];
+      frame->bytes[frame->nfield++] = (PetscInt)H5Tget_size(type);
+      (void)H5Tclose(type);
+      (void)H5Dclose(dataset);
+    }
+  }
+  (void)H5Gclose(group);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscInt count_links(hid_t group)
+{
+  H5G_info_t info;
+
+  return H5Gget_info(group, &info) < 0 ? 0 : (PetscInt)info.nlinks;
+}
+
+static PetscBool link_name(hid_t group, PetscInt i, size_t size, char name[])
+{
+  return (PetscBool)(H5Lget_name_by_idx(group, ".", H5_INDEX_NAME, H5_ITER_INC, (hsize_t)i, name, size,
+                                        H5P_DEFAULT) > 0);
+}
+
+/* Visits every frame of the file: those up to step0 are appended to `frames`, later ones are taken out when `drop`. */
+static PetscErrorCode scan(SbFrames fr, PetscInt step0, PetscBool drop, PetscInt *nframe, SbFrame frames[])
+{
+  PetscFunctionBeginUser;
+  *nframe = 0;
+  fr->nnode = count_links(fr->top);
+  for (PetscInt h = 0; h < fr->nnode; h++) {
+    char name[16], frame[16];
+    const hid_t hundred =
+      link_name(fr->top, h, sizeof(name), name) ? H5Gopen2(fr->top, name, H5P_DEFAULT) : -1;
+
+    // Backwards, because taking out a link moves those after it.
+    for (PetscInt i = hundred < 0 ? -1 : count_links(hundred) - 1; i >= 0; i--) {
+      PetscBool ok;
+      SbFrame found;
+
+      if (!link_name(hundred, i, sizeof(frame), frame)) continue;
+      PetscCall(read_frame(hundred, frame, &found, &ok));
+      if (ok && found.step <= step0) {
+        (void)snprintf(found.group, sizeof(found.group), "/step/%s/%s", name, frame);
+        if (frames) frames[*nframe] = found;
+        (*nframe)++;
+      } else if (ok && drop) {
+        (void)H5Ldelete(hundred, frame, H5P_DEFAULT);
+      }
+    }
+    if (hundred >= 0) (void)H5Gclose(hundred);
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static int by_step(const void *a, const void *b)
+{
+  const PetscInt p = ((const SbFrame *)a)->step, q = ((const SbFrame *)b)->step;
+
+  return (p > q) - (p < q);
+}
+
+/* Opens what an earlier part of this run wrote; ok is false when there is nothing that fits. */
+static PetscErrorCode resume(SbRun run, SbOutput out, const char *path, PetscBool *ok)
+{
+  SbFrames fr = out->frames;
+  SbFrame *frames;
+  int64_t hash;
+  hid_t mesh;
+  char message[SB_MESSAGE_MAX] = "";
+
+  PetscFunctionBeginUser;
+  PetscCall(SbH5Open(out->comm, path, PETSC_TRUE, &fr->h5, ok));
+  if (!*ok) PetscFunctionReturn(PETSC_SUCCESS);
+  mesh = H5Gopen2(fr->h5.file, "mesh", H5P_DEFAULT);
+  fr->top = H5Gopen2(fr->h5.file, "step", H5P_DEFAULT);
+  *ok = (PetscBool)(mesh >= 0 && fr->top >= 0);
+  if (*ok) PetscCall(SbH5GetInt(mesh, "hash", &hash, ok));
+  if (mesh >= 0) (void)H5Gclose(mesh);
+  if (!*ok || (uint64_t)hash != out->mesh_hash) {
+    *ok = PETSC_FALSE;
+    if (fr->top >= 0) (void)H5Gclose(fr->top);
+    PetscCall(SbH5Close(&fr->h5));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  PetscCall(scan(fr, run->step0, PETSC_FALSE, &fr->nframe, NULL));
+  PetscCall(PetscMalloc1(fr->nframe, &frames));
+  PetscCall(scan(fr, run->step0, PETSC_FALSE, &fr->nframe, frames));
+  qsort(frames, (size_t)fr->nframe, sizeof(*frames), by_step);
+  if (fr->nframe) fr->last_step = frames[fr->nframe - 1].step;
+  // The index first, so that it never names a frame that is gone.
+  for (PetscInt i = 0; fr->xdmf && i < fr->nframe; i++) {
+    PetscCall(SbXdmfAdd(fr->xdmf, frames[i].time, frames[i].group, frames[i].nfield, frames[i].field,
+                        frames[i].bytes));
+  }
+  if (fr->xdmf) SbXdmfWrite(fr->xdmf, sizeof(message), message);
+  PetscCall(PetscFree(frames));
+  PetscCall(SbAgree(out->comm, PETSC_ERR_FILE_WRITE, message));
+  PetscCall(scan(fr, run->step0, PETSC_TRUE, &fr->nframe, NULL));
+  PetscCall(SbH5Flush(&fr->h5));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ from beginning to end */
+
+static PetscErrorCode create(SbRun run, SbOutput out, const char *path)
+{
+  SbFrames fr = out->frames;
+
+  PetscFunctionBeginUser;
+  // An index without its frames would mislead; the next one comes with the first frame.
+  if (fr->xdmf) PetscCall(SbXdmfRemove(fr->xdmf));
+  PetscCall(SbH5Create(out->comm, path, &fr->h5));
+  PetscCall(SbH5PutText(&fr->h5, fr->h5.file, "program", "supple " SB_VERSION));
+  PetscCall(write_mesh(run, out));
+  PetscCall(SbH5GroupCreate(&fr->h5, SB_H5_NODE_LINKS, 4, &fr->top));
+  PetscCall(SbH5GroupLink(&fr->h5, fr->top, fr->h5.file, "step"));
+  PetscCall(SbH5Flush(&fr->h5));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode allocate(SbRun run, SbOutput out)
+{
+  SbFrames fr = out->frames;
+  const PetscInt nowned = PetscMax(run->model->mesh->nvert_owned, run->model->mesh->ncell_owned);
+  const PetscInt nslice = PetscMax(out->vertex.n, out->cell.n);
+  PetscBool rank = PETSC_FALSE;
+  char path[PETSC_MAX_PATH_LEN];
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscMalloc1(6 * nowned, &fr->owned));
+  PetscCall(PetscMalloc1(6 * nslice, &fr->slice));
+  if (!out->precise) PetscCall(PetscMalloc(6 * (size_t)nslice * sizeof(float), &fr->packed));
+  PetscCall(SbFieldPrepare(run, out));
+  if (out->rank) PetscFunctionReturn(PETSC_SUCCESS);
+  for (PetscInt i = 0; i < out->nfield; i++) rank = (PetscBool)(rank || !strcmp(out->field[i]->name, "rank"));
+  PetscCall(SbOutputPath(out, "fields.xmf", sizeof(path), path));
+  PetscCall(SbXdmfCreate(path, out->vertex.N, out->cell.N, rank, &fr->xdmf));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbFramesAttach(SbRun run, SbOutput out)
+{
+  char path[PETSC_MAX_PATH_LEN];
+  PetscBool resumed = PETSC_FALSE;
+
+  PetscFunctionBeginUser;
+  if (!out->nfield) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscNew(&out->frames));
+  out->frames->h5.file = -1;
+  out->frames->top = -1;
+  out->frames->node = -1;
+  out->frames->last_step = -1;
+  PetscCall(SbOutputOrder(run, out));
+  PetscCall(allocate(run, out));
+  PetscCall(SbOutputPath(out, "fields.h5", sizeof(path), path));
+  if (out->restarted) PetscCall(resume(run, out, path, &resumed));
+  if (!resumed) PetscCall(create(run, out, path));
+  PetscCall(SbRunAddMonitor(run, monitor, out, NULL));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbFramesClose(SbOutput out)
+{
+  SbFrames fr = out->frames;
+
+  PetscFunctionBeginUser;
+  if (!fr || fr->h5.file < 0) PetscFunctionReturn(PETSC_SUCCESS);
+  if (fr->node >= 0) (void)H5Gclose(fr->node);
+  if (fr->top >= 0) (void)H5Gclose(fr->top);
+  PetscCall(SbH5Close(&fr->h5));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbFramesDestroy(SbOutput out)
+{
+  PetscFunctionBeginUser;
+  if (!out->frames) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(SbFramesClose(out));
+  PetscCall(SbXdmfDestroy(&out->frames->xdmf));
+  PetscCall(PetscFree(out->frames->owned));
+  PetscCall(PetscFree(out->frames->slice));
+  PetscCall(PetscFree(out->frames->packed));
+  PetscCall(PetscFree(out->frames));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

@@ -1,0 +1,343 @@
+/*
+  HDF5 through MPI-IO, laid out so that a kill at any moment leaves every completed frame readable.
+
+  HDF5 changes its metadata in place, and an index that is half written is not readable. Here nothing that a reader of
+  the finished part follows is ever written in more than one piece:
+  - A frame is written as a group without a name: new objects at new places, to which nothing points yet. It is flushed,
+    all ranks meet, and only then does it get its name in the group of its hundred.
+  - Such a group keeps its links in its own object header, in the old format (no checksum), with room for all of them from
+    the start: at most 4096 bytes, aligned to 4096 bytes. Naming a frame is one write within one page.
+  - The superblock (96 bytes) is one write within one page, too. It tells where the file ends, and a file that ends earlier
+    counts as truncated: SbFileReserve() makes the file longer than a frame will need before the frame begins.
+
+  Reference: HDF5 File Format Specification Version 3.0, sections II.A (superblock version 0), IV.A.1.a (object header
+  version 1), IV.A.2.g (link message). The old format is asked for explicitly; newer ones would write checksums and flags
+  that mark the file as being in use.
+*/
+#include "output_impl.h"
+
+/* The innermost message of the error that HDF5 has on its stack. */
+static herr_t take_message(unsigned n, const H5E_error2_t *error, void *ctx)
+{
+  if (!n && error->desc) (void)snprintf((char *)ctx, 160, "%s", error->desc);
+  return 0;
+}
+
+static void h5_message(const SbH5 *h, const char *what, size_t size, char message[])
+{
+  char reason[160] = "unknown reason";
+
+  (void)H5Ewalk2(H5E_DEFAULT, H5E_WALK_UPWARD, take_message, reason);
+  SbFormat(size, message, "cannot write %s of %s: HDF5 says '%s'", what, h->path, reason);
+}
+
+/* A call that fails on all ranks alike. */
+#define H5_CALL(h, call, what)                                  \
+  do {                                                          \
+    if ((call) < 0) {                                           \
+      char message_[SB_MESSAGE_MAX];                            \
+      h5_message(h, what, sizeof(message_), message_);          \
+      SETERRQ((h)->comm, PETSC_ERR_FILE_WRITE, "%s", message_); \
+    }                                                           \
+  } while (0)
+
+static hid_t access_list(MPI_Comm comm)
+{
+  const hid_t list = H5Pcreate(H5P_FILE_ACCESS);
+
+  // Errors become one line of ours; HDF5 prints its whole stack otherwise.
+  (void)H5Eset_auto2(H5E_DEFAULT, NULL, NULL);
+  (void)H5Pset_fapl_mpio(list, comm, MPI_INFO_NULL);
+  (void)H5Pset_alignment(list, 3000, 4096);
+  (void)H5Pset_libver_bounds(list, H5F_LIBVER_EARLIEST, H5F_LIBVER_V18);
+  return list;
+}
+
+PetscErrorCode SbH5Create(MPI_Comm comm, const char *path, SbH5 *h)
+{
+  hid_t list;
+
+  PetscFunctionBeginUser;
+  h->comm = comm;
+  PetscCall(PetscStrncpy(h->path, path, sizeof(h->path)));
+  list = access_list(comm);
+  h->file = H5Fcreate(path, H5F_ACC_TRUNC, H5P_DEFAULT, list);
+  (void)H5Pclose(list);
+  H5_CALL(h, h->file, "the beginning");
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbH5Open(MPI_Comm comm, const char *path, PetscBool writable, SbH5 *h, PetscBool *ok)
+{
+  PetscMPIInt here, everywhere;
+  hid_t list;
+
+  PetscFunctionBeginUser;
+  h->comm = comm;
+  PetscCall(PetscStrncpy(h->path, path, sizeof(h->path)));
+  list = access_list(comm);
+  h->file = H5Fopen(path, writable ? H5F_ACC_RDWR : H5F_ACC_RDONLY, list);
+  (void)H5Pclose(list);
+  here = h->file >= 0;
+  PetscCallMPI(MPI_Allreduce(&here, &everywhere, 1, MPI_INT, MPI_MIN, comm));
+  *ok = everywhere ? PETSC_TRUE : PETSC_FALSE;
+  if (!everywhere) {
+    if (here) (void)H5Fclose(h->file);
+    h->file = -1;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbH5Close(SbH5 *h)
+{
+  hid_t file = h->file;
+
+  PetscFunctionBeginUser;
+  if (file < 0) PetscFunctionReturn(PETSC_SUCCESS);
+  h->file = -1;
+  H5_CALL(h, H5Fclose(file), "the end");
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbH5Flush(SbH5 *h)
+{
+  char message[SB_MESSAGE_MAX] = "";
+
+  PetscFunctionBeginUser;
+  if (H5Fflush(h->file, H5F_SCOPE_GLOBAL) < 0) h5_message(h, "a part", sizeof(message), message);
+  PetscCall(SbAgree(h->comm, PETSC_ERR_FILE_WRITE, message));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ groups */
+
+PetscErrorCode SbH5GroupCreate(SbH5 *h, unsigned links, unsigned letters, hid_t *group)
+{
+  const hid_t list = H5Pcreate(H5P_GROUP_CREATE);
+
+  PetscFunctionBeginUser;
+  // Tracking the order of creation is what selects links in the object header under the old format.
+  (void)H5Pset_link_creation_order(list, H5P_CRT_ORDER_TRACKED);
+  (void)H5Pset_link_phase_change(list, 60000, 59999);
+  (void)H5Pset_est_link_info(list, links, letters);
+  *group = H5Gcreate_anon(h->file, list, H5P_DEFAULT);
+  (void)H5Pclose(list);
+  H5_CALL(h, *group, "a group");
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbH5GroupLink(SbH5 *h, hid_t group, hid_t parent, const char *name)
+{
+  PetscFunctionBeginUser;
+  H5_CALL(h, H5Olink(group, parent, name, H5P_DEFAULT, H5P_DEFAULT), name);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ datasets */
+
+/* Selects this rank's rows in the file; the memory holds just them. */
+static void select_slice(const SbOrder *order, PetscInt ncomp, hid_t *filespace, hid_t *memspace)
+{
+  const hsize_t all[2] = {(hsize_t)order->N, (hsize_t)ncomp};
+  const hsize_t count[2] = {(hsize_t)order->n, (hsize_t)ncomp};
+  const hsize_t start[2] = {(hsize_t)order->start, 0};
+  const int rank = ncomp > 1 ? 2 : 1;
+
+  *filespace = H5Screate_simple(rank, all, NULL);
+  *memspace = H5Screate_simple(rank, count, NULL);
+  if (order->n) {
+    (void)H5Sselect_hyperslab(*filespace, H5S_SELECT_SET, start, NULL, count, NULL);
+  } else {
+    (void)H5Sselect_none(*filespace);
+    (void)H5Sselect_none(*memspace);
+  }
+}
+
+static hid_t collective_list(void)
+{
+  const hid_t list = H5Pcreate(H5P_DATASET_XFER);
+
+  (void)H5Pset_dxpl_mpio(list, H5FD_MPIO_COLLECTIVE);
+  return list;
+}
+
+PetscErrorCode SbH5WriteSlice(SbH5 *h, hid_t where, const char *name, const char *unit, const SbOrder *order,
+                              PetscInt ncomp, hid_t filetype, hid_t memtype, const void *slice)
+{
+  const hid_t create = H5Pcreate(H5P_DATASET_CREATE), transfer = collective_list();
+  hid_t filespace, memspace, dataset;
+  char message[SB_MESSAGE_MAX] = "";
+
+  PetscFunctionBeginUser;
+  (void)H5Pset_fill_time(create, H5D_FILL_TIME_NEVER);
+  (void)H5Pset_alloc_time(create, H5D_ALLOC_TIME_EARLY);
+  select_slice(order, ncomp, &filespace, &memspace);
+  dataset = H5Dcreate2(where, name, filetype, filespace, H5P_DEFAULT, create, H5P_DEFAULT);
+  H5_CALL(h, dataset, name);
+  PetscCall(SbH5PutText(h, dataset, "unit", unit));
+  if (H5Dwrite(dataset, memtype, memspace, filespace, transfer, slice) < 0)
+    h5_message(h, name, sizeof(message), message);
+  (void)H5Dclose(dataset);
+  (void)H5Sclose(filespace);
+  (void)H5Sclose(memspace);
+  (void)H5Pclose(create);
+  (void)H5Pclose(transfer);
+  PetscCall(SbAgree(h->comm, PETSC_ERR_FILE_WRITE, message));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Whether the dataset has the shape [N][ncomp]. */
+static PetscBool has_shape(hid_t dataset, const SbOrder *order, PetscInt ncomp)
+{
+  const hid_t space = H5Dget_space(dataset);
+  hsize_t n[2] = {0, 1};
+  PetscBool same;
+
+  if (H5Sget_simple_extent_ndims(space) <= 2) (void)H5Sget_simple_extent_dims(space, n, NULL);
+  same = (PetscBool)(n[0] == (hsize_t)order->N && n[1] == (hsize_t)ncomp);
+  (void)H5Sclose(space);
+  return same;
+}
+
+PetscErrorCode SbH5ReadSlice(SbH5 *h, const char *name, const SbOrder *order, PetscInt ncomp,
+                             PetscReal slice[], PetscBool *ok)
+{
+  const hid_t dataset = H5Dopen2(h->file, name, H5P_DEFAULT);
+  PetscMPIInt here, everywhere;
+
+  PetscFunctionBeginUser;
+  here = dataset >= 0 && has_shape(dataset, order, ncomp);
+  PetscCallMPI(MPI_Allreduce(&here, &everywhere, 1, MPI_INT, MPI_MIN, h->comm));
+  if (everywhere) {
+    const hid_t transfer = collective_list();
+    hid_t filespace, memspace;
+
+    select_slice(order, ncomp, &filespace, &memspace);
+    here = H5Dread(dataset, H5T_NATIVE_DOUBLE, memspace, filespace, transfer, slice) >= 0;
+    (void)H5Sclose(filespace);
+    (void)H5Sclose(memspace);
+    (void)H5Pclose(transfer);
+    PetscCallMPI(MPI_Allreduce(&here, &everywhere, 1, MPI_INT, MPI_MIN, h->comm));
+  }
+  if (dataset >= 0) (void)H5Dclose(dataset);
+  *ok = everywhere ? PETSC_TRUE : PETSC_FALSE;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ attributes */
+
+static PetscErrorCode put(SbH5 *h, hid_t where, const char *name, hid_t filetype, hid_t memtype,
+                          const void *value)
+{
+  const hid_t space = H5Screate(H5S_SCALAR);
+  const hid_t attribute = H5Acreate2(where, name, filetype, space, H5P_DEFAULT, H5P_DEFAULT);
+
+  PetscFunctionBeginUser;
+  H5_CALL(h, attribute, name);
+  H5_CALL(h, H5Awrite(attribute, memtype, value), name);
+  (void)H5Aclose(attribute);
+  (void)H5Sclose(space);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbH5PutReal(SbH5 *h, hid_t where, const char *name, PetscReal value)
+{
+  PetscFunctionBeginUser;
+  PetscCall(put(h, where, name, H5T_IEEE_F64LE, H5T_NATIVE_DOUBLE, &value));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbH5PutInt(SbH5 *h, hid_t where, const char *name, int64_t value)
+{
+  PetscFunctionBeginUser;
+  PetscCall(put(h, where, name, H5T_STD_I64LE, H5T_NATIVE_INT64, &value));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbH5PutText(SbH5 *h, hid_t where, const char *name, const char *text)
+{
+  const hid_t type = H5Tcopy(H5T_C_S1);
+
+  PetscFunctionBeginUser;
+  (void)H5Tset_size(type, strlen(text) + 1);
+  PetscCall(put(h, where, name, type, type, text));
+  (void)H5Tclose(type);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The value of a scalar attribute whose type is of this class. */
+static PetscBool get(hid_t where, const char *name, H5T_class_t klass, hid_t memtype, void *value)
+{
+  const hid_t attribute = H5Aexists(where, name) > 0 ? H5Aopen(where, name, H5P_DEFAULT) : -1;
+  PetscBool good = PETSC_FALSE;
+
+  if (attribute >= 0) {
+    const hid_t type = H5Aget_type(attribute);
+
+    good = (PetscBool)(H5Tget_class(type) == klass && H5Aread(attribute, memtype, value) >= 0);
+    (void)H5Tclose(type);
+    (void)H5Aclose(attribute);
+  }
+  return good;
+}
+
+PetscErrorCode SbH5GetReal(hid_t where, const char *name, PetscReal *value, PetscBool *ok)
+{
+  PetscFunctionBeginUser;
+  if (!get(where, name, H5T_FLOAT, H5T_NATIVE_DOUBLE, value)) *ok = PETSC_FALSE;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbH5GetInt(hid_t where, const char *name, int64_t *value, PetscBool *ok)
+{
+  PetscFunctionBeginUser;
+  if (!get(where, name, H5T_INTEGER, H5T_NATIVE_INT64, value)) *ok = PETSC_FALSE;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ texts */
+
+PetscErrorCode SbH5WriteText(SbH5 *h, hid_t where, const char *name, const char *text)
+{
+  const hid_t type = H5Tcopy(H5T_C_S1), space = H5Screate(H5S_SCALAR), transfer = collective_list();
+  hid_t dataset;
+  char message[SB_MESSAGE_MAX] = "";
+
+  PetscFunctionBeginUser;
+  (void)H5Tset_size(type, strlen(text) + 1);
+  dataset = H5Dcreate2(where, name, type, space, H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT);
+  H5_CALL(h, dataset, name);
+  if (H5Dwrite(dataset, type, H5S_ALL, H5S_ALL, transfer, text) < 0)
+    h5_message(h, name, sizeof(message), message);
+  (void)H5Dclose(dataset);
+  (void)H5Sclose(space);
+  (void)H5Tclose(type);
+  (void)H5Pclose(transfer);
+  PetscCall(SbAgree(h->comm, PETSC_ERR_FILE_WRITE, message));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbH5ReadText(SbH5 *h, const char *name, char **text, PetscBool *ok)
+{
+  const hid_t dataset = H5Dopen2(h->file, name, H5P_DEFAULT);
+  PetscMPIInt here = 0, everywhere;
+
+  PetscFunctionBeginUser;
+  *text = NULL;
+  if (dataset >= 0) {
+    const hid_t type = H5Dget_type(dataset);
+
+    if (H5Tget_class(type) == H5T_STRING && H5Tis_variable_str(type) <= 0) {
+      PetscCall(PetscCalloc1(H5Tget_size(type) + 1, text));
+      here = H5Dread(dataset, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, *text) >= 0;
+    }
+    (void)H5Tclose(type);
+    (void)H5Dclose(dataset);
+  }
+  PetscCallMPI(MPI_Allreduce(&here, &everywhere, 1, MPI_INT, MPI_MIN, h->comm));
+  if (!everywhere) {
+    PetscCall(PetscFree(*text));
+    *ok = PETSC_FALSE;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

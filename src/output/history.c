@@ -1,0 +1,322 @@
+/*
+  history.csv: one row of scalars per step, each written to the file at once and in one piece.
+
+  First line: names. Second line: units behind a '#', so that pandas and numpy skip it with comment='#'. Numbers have 17
+  digits: what is read back is what was computed. `total` is kinetic + strain - load_work - drive_work, which stays what it
+  was at the start as long as nothing is dissipated.
+
+  The sums that effects and probes need travel in one reduction per step. A row that does not fit on the disk is taken back.
+*/
+#include <errno.h>
+#include <fcntl.h>
+#include <stdarg.h>
+#include <sys/stat.h>
+#include <unistd.h>
+#include "output_impl.h"
+
+struct _p_SbHistory {
+  int fd; /* rank 0; -1 elsewhere */
+  char path[PETSC_MAX_PATH_LEN];
+  char *row; /* text of a row or of the header */
+  size_t size, capacity;
+  PetscInt last_step;    /* of the last row in the file, or -1 */
+  PetscInt nextra;       /* columns of effects and probes */
+  PetscReal *mine, *sum; /* [nextra] this rank's part, all ranks' sum */
+};
+
+static const char *const names[] = {
+  "step",       "time",       "dt",           "kinetic",          "strain",
+  "load_work",  "drive_work", "damping_loss", "integrator_loss",  "total",
+  "momentum_x", "momentum_y", "momentum_z",   "angular_x",        "angular_y",
+  "angular_z",  "centre_x",   "centre_y",     "centre_z",         "volume",
+  "min_J",      "inverted",   "max_speed",    "max_displacement", "newton",
+  "linear",     "rejected"};
+static const char *const units[] = {"1",        "s",        "s", "J",      "J",      "J",      "J",
+                                    "J",        "J",        "J", "kg m/s", "kg m/s", "kg m/s", "kg m^2/s",
+                                    "kg m^2/s", "kg m^2/s", "m", "m",      "m",      "m^3",    "1",
+                                    "1",        "m/s",      "m", "1",      "1",      "1"};
+
+/* ------------------------------------------------------------------ text */
+
+static PetscErrorCode begin_row(SbHistory h)
+{
+  PetscFunctionBeginUser;
+  h->size = 0;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The buffer holds any row: it is allocated for the number of columns. */
+static PetscErrorCode put(SbHistory h, const char *format, ...)
+{
+  va_list args;
+
+  PetscFunctionBeginUser;
+  va_start(args, format);
+  h->size += (size_t)vsnprintf(h->row + h->size, h->capacity - h->size, format, args);
+  va_end(args);
+  PetscCheck(h->size < h->capacity, PETSC_COMM_SELF, PETSC_ERR_PLIB,
+             "A row of %s needs more than %zu letters", h->path, h->capacity);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The two lines at the top. */
+static PetscErrorCode put_header(SbRun run, SbOutput out, SbHistory h)
+{
+  PetscFunctionBeginUser;
+  PetscCall(begin_row(h));
+  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(names); i++)
+    PetscCall(put(h, "%s%s", i ? "," : "", names[i]));
+  for (PetscInt e = 0; e < run->model->nhistory; e++) {
+    const SbEffect effect = run->model->history[e];
+
+    for (PetscInt c = 0; c < effect->ncolumn; c++)
+      PetscCall(put(h, ",%s_%s", effect->name, effect->column[c]));
+  }
+  for (PetscInt p = 0; p < out->nprobe; p++) {
+    for (int c = 0; c < 3; c++) PetscCall(put(h, ",%s_u%c", out->probe[p].name, 'x' + c));
+  }
+  PetscCall(put(h, "\n#"));
+  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(units); i++)
+    PetscCall(put(h, "%s%s", i ? "," : "", units[i]));
+  for (PetscInt e = 0; e < run->model->nhistory; e++) {
+    for (PetscInt c = 0; c < run->model->history[e]->ncolumn; c++) PetscCall(put(h, ",SI"));
+  }
+  for (PetscInt p = 0; p < 3 * out->nprobe; p++) PetscCall(put(h, ",m"));
+  PetscCall(put(h, "\n"));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ values */
+
+static PetscErrorCode effect_columns(SbRun run, const SbStep *step, PetscReal *values)
+{
+  SbModel model = run->model;
+  SbStage stage;
+  const PetscReal *residual;
+
+  PetscFunctionBeginUser;
+  PetscCheck(step->R, PETSC_COMM_SELF, PETSC_ERR_PLIB,
+             "The residual was asked for but not given to the monitors");
+  PetscCall(PetscMemzero(&stage, sizeof(stage)));
+  stage.t = step->t;
+  stage.dt = step->dt;
+  stage.step = step->step;
+  PetscCall(SbSpaceGetLocalRead(model->space, step->U, &stage.u));
+  if (step->V) PetscCall(SbSpaceGetLocalRead(model->space, step->V, &stage.v));
+  if (step->A) PetscCall(SbSpaceGetLocalRead(model->space, step->A, &stage.a));
+  PetscCall(SbSpaceGetLocalRead(model->space, step->R, &residual));
+  for (PetscInt e = 0; e < model->nhistory; e++) {
+    const SbEffect effect = model->history[e];
+
+    PetscCall(effect->ops.history(effect, model->space, &stage, residual, values));
+    values += effect->ncolumn;
+  }
+  PetscCall(SbSpaceRestoreLocalRead(model->space, step->R, &residual));
+  PetscCall(SbSpaceRestoreLocalRead(model->space, step->U, &stage.u));
+  if (step->V) PetscCall(SbSpaceRestoreLocalRead(model->space, step->V, &stage.v));
+  if (step->A) PetscCall(SbSpaceRestoreLocalRead(model->space, step->A, &stage.a));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode probe_columns(SbOutput out, const SbStep *step, PetscReal *values)
+{
+  const PetscScalar *u;
+
+  PetscFunctionBeginUser;
+  PetscCall(VecGetArrayRead(step->U, &u));
+  for (PetscInt p = 0; p < out->nprobe; p++) {
+    if (out->probe[p].local >= 0) PetscCall(PetscArraycpy(values + 3 * p, u + 3 * out->probe[p].local, 3));
+  }
+  PetscCall(VecRestoreArrayRead(step->U, &u));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Sums of all ranks for the columns of effects and probes. */
+static PetscErrorCode extra_columns(SbRun run, SbOutput out, const SbStep *step)
+{
+  SbHistory h = out->hist;
+  PetscMPIInt n;
+
+  PetscFunctionBeginUser;
+  if (!h->nextra) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscArrayzero(h->mine, h->nextra));
+  if (run->model->nhistory) PetscCall(effect_columns(run, step, h->mine));
+  if (out->nprobe) PetscCall(probe_columns(out, step, h->mine + h->nextra - 3 * out->nprobe));
+  PetscCall(PetscMPIIntCast(h->nextra, &n));
+  PetscCallMPI(MPI_Allreduce(h->mine, h->sum, n, MPIU_REAL, MPI_SUM, out->comm));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode put_row(SbHistory h, const SbStep *step)
+{
+  const SbEnergies *e = &step->energies;
+  const PetscReal x[] = {e->kinetic,
+                         e->strain,
+                         e->load_work,
+                         e->drive_work,
+                         e->damping_loss,
+                         e->integrator_loss,
+                         e->kinetic + e->strain - e->load_work - e->drive_work,
+                         e->momentum[0],
+                         e->momentum[1],
+                         e->momentum[2],
+                         e->angular[0],
+                         e->angular[1],
+                         e->angular[2],
+                         e->centre[0],
+                         e->centre[1],
+                         e->centre[2],
+                         e->volume,
+                         e->min_J};
+
+  PetscFunctionBeginUser;
+  PetscCall(begin_row(h));
+  PetscCall(put(h, "%" PetscInt_FMT ",%.17g,%.17g", step->step, (double)step->t, (double)step->dt));
+  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(x); i++) PetscCall(put(h, ",%.17g", (double)x[i]));
+  PetscCall(put(h, ",%" PetscInt_FMT ",%.17g,%.17g", e->ninverted, (double)e->max_speed,
+                (double)e->max_displacement));
+  PetscCall(put(h, ",%" PetscInt_FMT ",%" PetscInt_FMT ",%" PetscInt_FMT, step->newton, step->linear,
+                step->rejected));
+  for (PetscInt i = 0; i < h->nextra; i++) PetscCall(put(h, ",%.17g", (double)h->sum[i]));
+  PetscCall(put(h, "\n"));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Brings the row to the file in one call; a row that was cut off by a full disk is taken back. */
+static void write_row(SbHistory h, size_t nmessage, char message[])
+{
+  const off_t before = lseek(h->fd, 0, SEEK_END);
+  const ssize_t n = write(h->fd, h->row, h->size);
+
+  if (n == (ssize_t)h->size) return;
+  SbFormat(nmessage, message, "cannot write %zu bytes to %s: %s", h->size, h->path,
+           strerror(n < 0 ? errno : ENOSPC));
+  if (n > 0 && ftruncate(h->fd, before))
+    SbFormat(nmessage, message, "cannot write to %s, its last row is incomplete", h->path);
+}
+
+static PetscErrorCode monitor(SbRun run, const SbStep *step, void *ctx)
+{
+  SbOutput out = (SbOutput)ctx;
+  SbHistory h = out->hist;
+  const PetscBool first = (PetscBool)(step->step == run->step0);
+  char message[SB_MESSAGE_MAX] = "";
+
+  PetscFunctionBeginUser;
+  if (!first && !step->last && step->step % out->history_every) PetscFunctionReturn(PETSC_SUCCESS);
+  if (h->last_step >= step->step) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_OUTPUT], 0, 0, 0, 0));
+  PetscCall(extra_columns(run, out, step));
+  h->last_step = step->step;
+  if (h->fd >= 0) {
+    PetscCall(put_row(h, step));
+    write_row(h, sizeof(message), message);
+  }
+  PetscCall(SbAgree(out->comm, PETSC_ERR_FILE_WRITE, message));
+  PetscCall(PetscLogEventEnd(SbEvents[SB_EVENT_OUTPUT], 0, 0, 0, 0));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ beginning, and going on after a restart */
+
+/* Keeps the rows up to step0 of a file with the same columns; says so when there is none. Rank 0. */
+static PetscErrorCode keep_rows(SbHistory h, PetscInt step0, PetscBool *kept, size_t nmessage, char message[])
+{
+  char *text, *line, *end;
+  size_t size;
+  SbPiece piece;
+
+  PetscFunctionBeginUser;
+  *kept = PETSC_FALSE;
+  PetscCall(SbFileRead(h->path, &text, &size));
+  if (text && size >= h->size && !strncmp(text, h->row, h->size)) {
+    // Rows are in the order of steps; one without its end was cut off by a kill.
+    for (line = text + h->size; (end = strchr(line, '\n')); line = end + 1) {
+      const long step = strtol(line, NULL, 10);
+
+      if (step > step0) break;
+      h->last_step = (PetscInt)step;
+    }
+    piece.text = text;
+    piece.size = (size_t)(line - text);
+    SbFileReplace(h->path, 1, &piece, nmessage, message);
+    *kept = PETSC_TRUE;
+  }
+  PetscCall(PetscFree(text));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* A history with other columns stays, under another name. */
+static PetscErrorCode set_aside(SbHistory h, PetscInt step0)
+{
+  char other[PETSC_MAX_PATH_LEN + 32];
+
+  PetscFunctionBeginUser;
+  if (access(h->path, F_OK)) PetscFunctionReturn(PETSC_SUCCESS);
+  (void)snprintf(other, sizeof(other), "%.*s_before_%06" PetscInt_FMT ".csv", (int)(strlen(h->path) - 4),
+                 h->path, step0);
+  if (rename(h->path, other)) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscPrintf(PETSC_COMM_SELF, "%s has other columns: kept as %s\n", h->path, other));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode open_file(SbRun run, SbOutput out, size_t nmessage, char message[])
+{
+  SbHistory h = out->hist;
+  PetscBool kept = PETSC_FALSE;
+
+  PetscFunctionBeginUser;
+  PetscCall(put_header(run, out, h));
+  if (out->restarted) {
+    PetscCall(keep_rows(h, run->step0, &kept, nmessage, message));
+    if (!kept) PetscCall(set_aside(h, run->step0));
+  }
+  if (message[0]) PetscFunctionReturn(PETSC_SUCCESS);
+  h->fd = open(h->path, O_WRONLY | O_CREAT | (kept ? O_APPEND : O_TRUNC), 0666);
+  if (h->fd < 0)
+    SbFormat(nmessage, message, "cannot open %s for writing: %s", h->path, strerror(errno));
+  else if (!kept)
+    write_row(h, nmessage, message);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbHistoryAttach(SbRun run, SbOutput out)
+{
+  const SbModel model = run->model;
+  SbHistory h;
+  char message[SB_MESSAGE_MAX] = "";
+
+  PetscFunctionBeginUser;
+  if (!out->history) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(SbProbesFind(run, out));
+  PetscCall(PetscNew(&out->hist));
+  h = out->hist;
+  h->fd = -1;
+  h->last_step = -1;
+  for (PetscInt e = 0; e < model->nhistory; e++) h->nextra += model->history[e]->ncolumn;
+  h->nextra += 3 * out->nprobe;
+  PetscCall(PetscMalloc2(h->nextra, &h->mine, h->nextra, &h->sum));
+  h->capacity = 2 * (PETSC_STATIC_ARRAY_LENGTH(names) + (size_t)h->nextra) * (2 * SB_NAME_MAX) + 256;
+  PetscCall(PetscMalloc1(h->capacity, &h->row));
+  PetscCall(SbOutputPath(out, "history.csv", sizeof(h->path), h->path));
+  if (!out->rank) PetscCall(open_file(run, out, sizeof(message), message));
+  PetscCall(SbAgree(out->comm, PETSC_ERR_FILE_WRITE, message));
+  PetscCallMPI(MPI_Bcast(&h->last_step, 1, MPIU_INT, 0, out->comm));
+  run->want_energies = PETSC_TRUE;
+  if (model->nhistory) run->want_residual = PETSC_TRUE;
+  PetscCall(SbRunAddMonitor(run, monitor, out, NULL));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbHistoryDestroy(SbOutput out)
+{
+  SbHistory h = out->hist;
+
+  PetscFunctionBeginUser;
+  if (!h) PetscFunctionReturn(PETSC_SUCCESS);
+  if (h->fd >= 0) (void)close(h->fd);
+  PetscCall(PetscFree2(h->mine, h->sum));
+  PetscCall(PetscFree(h->row));
+  PetscCall(PetscFree(out->hist));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

@@ -1,0 +1,386 @@
+/*
+  What a run leaves behind: options, the folder, and which monitors are attached.
+
+  The folder is made and tried before anything is computed. What an earlier run left there under our names is replaced only
+  when the model is set up and the run is about to start; files with other names are never touched.
+*/
+#include <errno.h>
+#include <fcntl.h>
+#include <signal.h>
+#include <sys/stat.h>
+#include <time.h>
+#include <unistd.h>
+#include "output_impl.h"
+
+static const SbOption rows[] = {
+  {"output_dir", SB_OPTION_STRING, 1, "", "", "",
+   "folder of the results; empty: out/<name of the scenario file>"},
+  {"output_fields", SB_OPTION_NAMES, 1, "", "displacement,velocity,von_mises", "",
+   "fields in fields.h5: displacement, velocity, acceleration, reaction, stress, von_mises, J, "
+   "energy_density, rank; none: no such file"},
+  {"output_every", SB_OPTION_REAL, 1, "s", "0", "[0, inf)",
+   "simulated time between frames of fields.h5; 0: output_every_steps counts"},
+  {"output_every_steps", SB_OPTION_INT, 1, "", "1", "[1, inf)",
+   "steps between frames of fields.h5, while output_every is 0"},
+  {"output_precision", SB_OPTION_CHOICE, 1, "", "float", "float|double", "numbers in fields.h5"},
+  {"output_history", SB_OPTION_BOOL, 1, "", "true", "", "write history.csv"},
+  {"output_history_every", SB_OPTION_INT, 1, "", "1", "[1, inf)", "steps between rows of history.csv"},
+  {"checkpoint_every_time", SB_OPTION_REAL, 1, "s", "0", "[0, inf)",
+   "simulated time between checkpoints; 0: none by time"},
+  {"checkpoint_every_steps", SB_OPTION_INT, 1, "", "0", "[0, inf)",
+   "steps between checkpoints; 0: none by steps"},
+  {"checkpoint_keep", SB_OPTION_INT, 1, "", "2", "[1, inf)", "checkpoints kept, the newest ones"},
+  {"restart", SB_OPTION_STRING, 1, "", "", "",
+   "checkpoint to go on from, or latest: the newest one in output_dir; empty: start anew"},
+  {"probes", SB_OPTION_NAMES, 1, "", "", "", "names of points whose displacement history.csv follows"},
+  {"progress", SB_OPTION_BOOL, 1, "", "true", "", "print a line on the progress of the run"},
+  {"quiet", SB_OPTION_BOOL, 1, "", "false", "", "print errors and warnings only"},
+};
+
+static const SbOption probe_rows[] = {
+  {"at", SB_OPTION_REALS, 3, "m", NULL, "(-inf, inf)",
+   "place of the probe in the rest state, as placed; the nearest vertex is taken"},
+};
+
+PetscErrorCode SbOutputRegister(void)
+{
+  PetscFunctionBeginUser;
+  PetscCall(SbOptionsRegister("", "", (PetscInt)PETSC_STATIC_ARRAY_LENGTH(rows), rows));
+  PetscCall(SbOptionsRegister("probe", "", (PetscInt)PETSC_STATIC_ARRAY_LENGTH(probe_rows), probe_rows));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbOutputPath(SbOutput out, const char *name, size_t size, char path[])
+{
+  PetscFunctionBeginUser;
+  PetscCheck((size_t)snprintf(path, size, "%s/%s", out->dir, name) < size, PETSC_COMM_SELF, PETSC_ERR_USER,
+             "-output_dir %s is too long", out->dir);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscBool SbOutputDue(PetscReal every, PetscReal t, PetscReal dt)
+{
+  // A step that ends at the multiple but for rounding counts as having reached it.
+  const PetscReal ahead = 1e-6 * dt;
+
+  return (PetscBool)(PetscFloorReal((t + ahead) / every) > PetscFloorReal((t - dt + ahead) / every));
+}
+
+/* ------------------------------------------------------------------ options */
+
+/* Scenario file on the command line; empty without one. */
+static PetscErrorCode find_scenario(size_t size, char file[])
+{
+  char **args;
+  int n;
+
+  PetscFunctionBeginUser;
+  file[0] = 0;
+  PetscCall(PetscGetArgs(&n, &args));
+  for (int i = 1; i < n; i++) {
+    const PetscBool named =
+      (PetscBool)(!strcmp(args[i - 1], "-options_file") || !strcmp(args[i - 1], "-options_file_yaml"));
+    const char *dot = strrchr(args[i], '.');
+
+    if (named || (args[i][0] != '-' && args[i - 1][0] != '-' && dot &&
+                  (!strcmp(dot, ".opts") || !strcmp(dot, ".yml") || !strcmp(dot, ".yaml")))) {
+      PetscCall(PetscStrncpy(file, args[i], size));
+      break;
+    }
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* out/<scenario without folder and ending>. */
+static PetscErrorCode default_folder(SbOutput out)
+{
+  const char *base = strrchr(out->scenario, '/'), *dot;
+
+  PetscFunctionBeginUser;
+  base = base ? base + 1 : out->scenario;
+  dot = strrchr(base, '.');
+  if (!base[0])
+    PetscCall(PetscStrncpy(out->dir, "out/run", sizeof(out->dir)));
+  else
+    (void)snprintf(out->dir, sizeof(out->dir), "out/%.*s",
+                   dot && dot > base ? (int)(dot - base) : (int)strlen(base), base);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Fields asked for, those of a static run only where it is one; body always. */
+static PetscErrorCode read_fields(SbOutput out, const SbScope *scope, PetscBool dynamic)
+{
+  char(*names)[SB_NAME_MAX];
+  PetscInt n;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbOptionNames(scope, "output_fields", &n, &names));
+  for (PetscInt i = 0; i < n; i++) {
+    const SbField *f;
+    PetscBool twice = PETSC_FALSE;
+
+    if (n == 1 && !strcmp(names[i], "none")) break;
+    PetscCall(SbFieldFind(names[i], &f));
+    for (PetscInt k = 0; k < out->nfield; k++) twice = (PetscBool)(twice || out->field[k] == f);
+    if (!twice && (dynamic || !f->dynamic)) out->field[out->nfield++] = f;
+  }
+  PetscCall(PetscFree(names));
+  if (out->nfield) {
+    const SbField *body;
+    PetscBool there = PETSC_FALSE;
+
+    PetscCall(SbFieldFind("body", &body));
+    for (PetscInt k = 0; k < out->nfield; k++) there = (PetscBool)(there || out->field[k] == body);
+    if (!there) out->field[out->nfield++] = body;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode read_probes(SbOutput out, const SbScope *scope)
+{
+  char(*names)[SB_NAME_MAX];
+
+  PetscFunctionBeginUser;
+  PetscCall(SbOptionNames(scope, "probes", &out->nprobe, &names));
+  PetscCall(PetscCalloc1(out->nprobe, &out->probe));
+  for (PetscInt p = 0; p < out->nprobe; p++) {
+    SbScope at;
+
+    PetscCall(PetscStrncpy(out->probe[p].name, names[p], SB_NAME_MAX));
+    PetscCall(SbScopeSet(&at, "probe", "", names[p]));
+    PetscCall(SbOptionReals(&at, "at", out->probe[p].at));
+  }
+  PetscCall(PetscFree(names));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode read_options(SbOutput out, PetscBool dynamic)
+{
+  SbScope scope;
+  PetscInt precision;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbScopeSet(&scope, "", "", ""));
+  PetscCall(find_scenario(sizeof(out->scenario), out->scenario));
+  PetscCall(SbOptionString(&scope, "output_dir", sizeof(out->dir), out->dir));
+  if (!out->dir[0]) PetscCall(default_folder(out));
+  PetscCall(read_fields(out, &scope, dynamic));
+  PetscCall(SbOptionReal(&scope, "output_every", &out->every));
+  PetscCall(SbOptionInt(&scope, "output_every_steps", &out->every_steps));
+  PetscCall(SbOptionChoice(&scope, "output_precision", &precision));
+  out->precise = precision ? PETSC_TRUE : PETSC_FALSE;
+  PetscCall(SbOptionBool(&scope, "output_history", &out->history));
+  PetscCall(SbOptionInt(&scope, "output_history_every", &out->history_every));
+  PetscCall(SbOptionReal(&scope, "checkpoint_every_time", &out->checkpoint_every));
+  PetscCall(SbOptionInt(&scope, "checkpoint_every_steps", &out->checkpoint_every_steps));
+  PetscCall(SbOptionInt(&scope, "checkpoint_keep", &out->checkpoint_keep));
+  PetscCall(SbOptionString(&scope, "restart", sizeof(out->restart), out->restart));
+  PetscCall(read_probes(out, &scope));
+  PetscCall(SbOptionBool(&scope, "progress", &out->progress));
+  PetscCall(SbOptionBool(&scope, "quiet", &out->quiet));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ the folder */
+
+/* Makes the folder with its parents and tries to write into it. Rank 0. */
+static PetscErrorCode make_folder(SbOutput out, size_t nmessage, char message[])
+{
+  char part[PETSC_MAX_PATH_LEN], probe[PETSC_MAX_PATH_LEN];
+  int fd, error = 0;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbOutputPath(out, ".supple_tries_to_write", sizeof(probe), probe));
+  for (size_t i = 1; i <= strlen(out->dir) && !error; i++) {
+    if (out->dir[i] != '/' && out->dir[i]) continue;
+    PetscCall(PetscStrncpy(part, out->dir, i + 1));
+    if (mkdir(part, 0777) && errno != EEXIST && errno != EISDIR && access(part, F_OK)) error = errno;
+  }
+  if (!error) {
+    fd = open(probe, O_WRONLY | O_CREAT | O_TRUNC, 0666);
+    error = fd < 0 ? errno : 0;
+    if (fd >= 0) (void)close(fd);
+    (void)unlink(probe);
+  }
+  if (error) {
+    SbFormat(nmessage, message, "-output_dir %s cannot be written: %s; give another folder", out->dir,
+             strerror(error));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static const char *const ours[] = {"fields.h5", "fields.xmf", "history.csv", "scenario.opts", "run.json"};
+
+/* Removes what an earlier run left under our names, and says so. Rank 0. */
+static PetscErrorCode clear_folder(SbOutput out)
+{
+  static const char *const leftovers[] = {"fields.xmf.tmp", "history.csv.tmp", "scenario.opts.tmp",
+                                          "run.json.tmp", "checkpoint.tmp"};
+  char path[PETSC_MAX_PATH_LEN];
+  PetscBool found = PETSC_FALSE;
+
+  PetscFunctionBeginUser;
+  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(leftovers); i++) {
+    PetscCall(SbOutputPath(out, leftovers[i], sizeof(path), path));
+    (void)unlink(path);
+  }
+  if (out->restarted) PetscFunctionReturn(PETSC_SUCCESS);
+  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(ours); i++) {
+    PetscCall(SbOutputPath(out, ours[i], sizeof(path), path));
+    if (!unlink(path)) found = PETSC_TRUE;
+  }
+  PetscCall(SbCheckpointRemoveAll(out));
+  if (found && !out->quiet)
+    PetscCall(PetscPrintf(PETSC_COMM_SELF, "%s: results of an earlier run are replaced\n", out->dir));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbOutputFiles(SbOutput out, SbFileFn fn, void *ctx)
+{
+  char path[PETSC_MAX_PATH_LEN];
+  struct stat info;
+
+  PetscFunctionBeginUser;
+  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(ours); i++) {
+    PetscCall(SbOutputPath(out, ours[i], sizeof(path), path));
+    if (!stat(path, &info)) PetscCall(fn(ours[i], (PetscInt64)info.st_size, ctx));
+  }
+  PetscCall(SbCheckpointFiles(out, fn, ctx));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ scenario.opts */
+
+/* Of the complete scenario, the lines that decide the mechanics: what a checkpoint must agree with. */
+static PetscErrorCode keep_identity(SbRun run, SbOutput out, const char *text)
+{
+  static const char *const prefix[] = {"-bodies",  "-body_",   "-sets", "-set_",
+                                       "-effects", "-effect_", "-mass"};
+  size_t n = 0;
+  int length;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscMalloc1(strlen(text) + 32, &out->identity));
+  n += (size_t)sprintf(out->identity, "-time %s\n", run->model->dynamic ? "dynamic" : "static");
+  for (const char *line = text; *line; line += strcspn(line, "\n") + (line[strcspn(line, "\n")] == '\n')) {
+    length = (int)strcspn(line, "\n#");
+    while (length && line[length - 1] == ' ') length--;
+    for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(prefix); i++) {
+      if (strncmp(line, prefix[i], strlen(prefix[i]))) continue;
+      // The mesh itself is compared, not the name of its file.
+      if (!memmem(line, strcspn(line, " \n"), "_mesh", 5))
+        n += (size_t)sprintf(out->identity + n, "%.*s\n", length, line);
+      break;
+    }
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The complete scenario as text on rank 0 (free() it), and on all ranks the part of it that checkpoints carry. */
+static PetscErrorCode view_scenario(SbRun run, SbOutput out, char **text, size_t *size)
+{
+  PetscViewer viewer;
+  FILE *memory = out->rank ? NULL : open_memstream(text, size);
+  PetscMPIInt n = 0;
+
+  PetscFunctionBeginUser;
+  PetscCheck(out->rank || memory, PETSC_COMM_SELF, PETSC_ERR_MEM, "No memory for scenario.opts");
+  PetscCall(PetscViewerASCIIOpenWithFILE(out->comm, memory, &viewer));
+  PetscCall(SbOptionsView(viewer));
+  PetscCall(PetscViewerDestroy(&viewer));
+  if (!out->rank) {
+    (void)fclose(memory);
+    PetscCall(keep_identity(run, out, *text));
+    PetscCall(PetscMPIIntCast((PetscInt)strlen(out->identity) + 1, &n));
+  }
+  PetscCallMPI(MPI_Bcast(&n, 1, MPI_INT, 0, out->comm));
+  if (out->rank) PetscCall(PetscMalloc1(n, &out->identity));
+  PetscCallMPI(MPI_Bcast(out->identity, n, MPI_CHAR, 0, out->comm));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode write_scenario(SbOutput out, char *text, size_t size)
+{
+  const SbPiece piece = {text, size};
+  char path[PETSC_MAX_PATH_LEN], message[SB_MESSAGE_MAX] = "";
+
+  PetscFunctionBeginUser;
+  PetscCall(SbOutputPath(out, "scenario.opts", sizeof(path), path));
+  if (!out->rank) SbFileReplace(path, 1, &piece, sizeof(message), message);
+  free(text);
+  PetscCall(SbAgree(out->comm, PETSC_ERR_FILE_WRITE, message));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ life of the output */
+
+static PetscErrorCode destroy(SbRun run)
+{
+  SbOutput out = (SbOutput)run->output;
+
+  PetscFunctionBeginUser;
+  if (!out) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(SbFramesDestroy(out));
+  PetscCall(SbHistoryDestroy(out));
+  PetscCall(SbProgressDestroy(out));
+  if (out->ordered) {
+    PetscCall(SbOrderDestroy(&out->vertex));
+    PetscCall(SbOrderDestroy(&out->cell));
+  }
+  PetscCall(PetscFree(out->probe));
+  PetscCall(PetscFree(out->identity));
+  PetscCall(PetscFree(out->sigma));
+  PetscCall(PetscFree(out->J));
+  PetscCall(PetscFree(out->psi));
+  PetscCall(PetscFree(run->output));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbOutputSetFromOptions(SbRun run)
+{
+  SbOutput out;
+  time_t now = time(NULL);
+  struct tm local;
+  char message[SB_MESSAGE_MAX] = "";
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscNew(&out));
+  run->output = out;
+  run->output_destroy = destroy;
+  out->comm = run->model->comm;
+  PetscCallMPI(MPI_Comm_rank(out->comm, &out->rank));
+  PetscCallMPI(MPI_Comm_size(out->comm, &out->size));
+  PetscCall(PetscTime(&out->wall_start));
+  (void)strftime(out->started, sizeof(out->started), "%Y-%m-%dT%H:%M:%S%z", localtime_r(&now, &local));
+  PetscCall(read_options(out, run->model->dynamic));
+  // A limit on the size of files is met as a failed write, with its message, not as a signal.
+  (void)signal(SIGXFSZ, SIG_IGN);
+  if (!out->rank) PetscCall(make_folder(out, sizeof(message), message));
+  PetscCall(SbAgree(out->comm, PETSC_ERR_FILE_OPEN, message));
+  // The closing table needs the log events.
+  PetscCall(PetscLogDefaultBegin());
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbOutputAttach(SbRun run)
+{
+  SbOutput out = (SbOutput)run->output;
+  char *scenario = NULL;
+  size_t size = 0;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_OUTPUT], 0, 0, 0, 0));
+  PetscCall(view_scenario(run, out, &scenario, &size));
+  // A checkpoint that is refused leaves the folder as it was.
+  if (out->restart[0]) PetscCall(SbCheckpointLoad(run, out->restart));
+  if (!out->rank) PetscCall(clear_folder(out));
+  PetscCall(write_scenario(out, scenario, size));
+  PetscCall(SbRunJson(run, out, "running", ""));
+  out->attached = PETSC_TRUE;
+  PetscCall(SbFramesAttach(run, out));
+  PetscCall(SbHistoryAttach(run, out));
+  PetscCall(SbCheckpointAttach(run, out));
+  PetscCall(SbProgressAttach(run, out));
+  PetscCall(PetscLogEventEnd(SbEvents[SB_EVENT_OUTPUT], 0, 0, 0, 0));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

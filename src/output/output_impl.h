@@ -1,0 +1,192 @@
+/*
+  output_impl.h - what the files of src/output share: the state of a run's output, original order, HDF5 and file helpers.
+*/
+#pragma once
+#include <hdf5.h>
+#include <stdio.h>
+#include "sboutput.h"
+
+#define SB_FIELD_MAX 32
+#define SB_MESSAGE_MAX 1024
+#define SB_FILE_MAX 64 /* longest name of a file inside the folder, with the terminating zero */
+
+/*
+  Original order of vertices or cells, cut into one contiguous slice per rank: how results are written, so that the files
+  do not depend on the partition.
+*/
+typedef struct {
+  MPI_Comm comm;
+  PetscSF sf;      /* leaves: the entities owned here; roots: this rank's slice */
+  PetscInt N;      /* entities of all ranks */
+  PetscInt nowned; /* owned here */
+  PetscInt start;  /* the slice is [start, start + n) */
+  PetscInt n;
+} SbOrder;
+
+PetscErrorCode SbOrderCreate(MPI_Comm comm, PetscInt N, PetscInt nowned, const PetscInt original[],
+                             SbOrder *order);
+PetscErrorCode SbOrderDestroy(SbOrder *order);
+/* slice[n][ncomp] from owned[nowned][ncomp], and back. Collective. */
+PetscErrorCode SbOrderGather(const SbOrder *order, PetscInt ncomp, const PetscReal owned[],
+                             PetscReal slice[]);
+PetscErrorCode SbOrderScatter(const SbOrder *order, PetscInt ncomp, const PetscReal slice[],
+                              PetscReal owned[]);
+
+/* ------------------------------------------------------------------ HDF5 and files */
+
+typedef struct {
+  MPI_Comm comm;
+  hid_t file; /* negative when closed */
+  char path[PETSC_MAX_PATH_LEN];
+} SbH5;
+
+/* Files are opened collectively for MPI-IO; names that exist are truncated by SbH5Create(). */
+PetscErrorCode SbH5Create(MPI_Comm comm, const char *path, SbH5 *h);
+PetscErrorCode SbH5Open(MPI_Comm comm, const char *path, PetscBool writable, SbH5 *h,
+                        PetscBool *ok); /* no error: see ok */
+PetscErrorCode SbH5Close(SbH5 *h);
+/* Brings everything to disk; returns when every rank has written. Collective. */
+PetscErrorCode SbH5Flush(SbH5 *h);
+/* A dataset [order->N][ncomp] of `filetype` below `where` out of slices of `memtype`, with its unit. Collective. */
+PetscErrorCode SbH5WriteSlice(SbH5 *h, hid_t where, const char *name, const char *unit, const SbOrder *order,
+                              PetscInt ncomp, hid_t filetype, hid_t memtype, const void *slice);
+/* The slice of such a dataset as doubles; ok is false when it is missing, has another shape or cannot be read. Collective. */
+PetscErrorCode SbH5ReadSlice(SbH5 *h, const char *name, const SbOrder *order, PetscInt ncomp,
+                             PetscReal slice[], PetscBool *ok);
+PetscErrorCode SbH5PutReal(SbH5 *h, hid_t where, const char *name, PetscReal value);
+PetscErrorCode SbH5PutInt(SbH5 *h, hid_t where, const char *name, int64_t value);
+PetscErrorCode SbH5PutText(SbH5 *h, hid_t where, const char *name, const char *text);
+/* ok turns false when the attribute is missing or of another kind, and is left alone otherwise. Not collective. */
+PetscErrorCode SbH5GetReal(hid_t where, const char *name, PetscReal *value, PetscBool *ok);
+PetscErrorCode SbH5GetInt(hid_t where, const char *name, int64_t *value, PetscBool *ok);
+/* A text of any length as a dataset, the same on all ranks. Collective. Free what was read with PetscFree. */
+PetscErrorCode SbH5WriteText(SbH5 *h, hid_t where, const char *name, const char *text);
+PetscErrorCode SbH5ReadText(SbH5 *h, const char *name, char **text, PetscBool *ok);
+/* A group without a name, whose `links` links with names of up to `letters` letters lie in one block; see h5.c. */
+PetscErrorCode SbH5GroupCreate(SbH5 *h, unsigned links, unsigned letters, hid_t *group);
+/* Gives it a name; the file shows it from the next flush on. Collective. */
+PetscErrorCode SbH5GroupLink(SbH5 *h, hid_t group, hid_t parent, const char *name);
+#define SB_H5_NODE_LINKS 100 /* with 6 letters: a block of 4080 bytes */
+
+/* Prints into text; what does not fit is cut off. */
+void SbFormat(size_t size, char text[], const char *format, ...) __attribute__((format(printf, 3, 4)));
+/* Asks the file system for `bytes` behind the end of a file, before anything in it is touched. Collective. */
+PetscErrorCode SbFileReserve(MPI_Comm comm, const char *path, PetscInt64 bytes);
+/* Ends the run on all ranks when the message of any rank is not empty; the lowest rank's is reported. Collective. */
+PetscErrorCode SbAgree(MPI_Comm comm, PetscErrorCode code, const char *message);
+typedef struct {
+  const char *text;
+  size_t size;
+} SbPiece;
+/* path.tmp is written and takes the place of path in one step. Rank 0 calls; `message` becomes the error, if any. */
+void SbFileReplace(const char *path, int npiece, const SbPiece piece[], size_t nmessage, char message[]);
+/* The whole file; NULL when it cannot be read. One rank. PetscFree. */
+PetscErrorCode SbFileRead(const char *path, char **text, size_t *size);
+
+/* ------------------------------------------------------------------ state */
+
+typedef struct {
+  char name[SB_NAME_MAX];
+  PetscReal at[3];   /* asked for, m */
+  PetscReal x[3];    /* nearest vertex, m */
+  PetscInt original; /* its number */
+  PetscInt local;    /* owned local vertex, or -1 on the other ranks */
+} SbProbe;
+
+typedef struct _p_SbFrames *SbFrames;     /* frames.c */
+typedef struct _p_SbHistory *SbHistory;   /* history.c */
+typedef struct _p_SbProgress *SbProgress; /* progress.c */
+
+typedef struct _p_SbOutput *SbOutput;
+struct _p_SbOutput {
+  MPI_Comm comm;
+  PetscMPIInt rank, size;
+  PetscReal wall_start; /* s */
+
+  /* what the scenario asks for */
+  char dir[PETSC_MAX_PATH_LEN];
+  char scenario[PETSC_MAX_PATH_LEN]; /* file given on the command line; empty without one */
+  char restart[PETSC_MAX_PATH_LEN];
+  PetscInt nfield;
+  const SbField *field[SB_FIELD_MAX];
+  PetscReal every; /* s between frames; 0: every_steps counts */
+  PetscInt every_steps;
+  PetscBool precise; /* double instead of float */
+  PetscBool history;
+  PetscInt history_every;
+  PetscReal checkpoint_every; /* s of simulated time; 0: off */
+  PetscInt checkpoint_every_steps, checkpoint_keep;
+  PetscBool progress, quiet;
+  PetscInt nprobe;
+  SbProbe *probe; /* [nprobe] */
+
+  /* after SbOutputAttach() */
+  SbOrder vertex, cell;
+  PetscBool ordered;  /* the two exist */
+  PetscBool attached; /* run.json exists */
+  uint64_t mesh_hash;
+  char *identity; /* options that decide the mechanics, one per line */
+  PetscBool restarted;
+  /* cell quantities of the instant being written, computed once for all fields that need them */
+  PetscBool state_valid;
+  PetscReal *sigma, *J,
+    *psi; /* [ncell_owned][6] Pa, [ncell_owned], [ncell_owned] J/m^3; NULL when no field needs it */
+
+  SbFrames frames;
+  SbHistory hist;
+  SbProgress line;
+  char started[32]; /* date and time */
+};
+
+/* Path of a file of the run's folder. */
+PetscErrorCode SbOutputPath(SbOutput out, const char *name, size_t size, char path[]);
+/* Whether a multiple of `every` lies in (t - dt, t]. */
+PetscBool SbOutputDue(PetscReal every, PetscReal t, PetscReal dt);
+/* Original orders and the mesh's hash; made once. Collective. */
+PetscErrorCode SbOutputOrder(SbRun run, SbOutput out);
+
+PetscErrorCode SbFieldFind(const char *name, const SbField **field);
+PetscErrorCode SbFieldPrepare(SbRun run, SbOutput out); /* storage for the cell quantities */
+
+PetscErrorCode SbFramesAttach(SbRun run, SbOutput out);
+PetscErrorCode SbFramesClose(SbOutput out);
+PetscErrorCode SbFramesDestroy(SbOutput out);
+PetscErrorCode SbHistoryAttach(SbRun run, SbOutput out);
+PetscErrorCode SbHistoryDestroy(SbOutput out);
+PetscErrorCode SbProbesFind(SbRun run, SbOutput out);
+PetscErrorCode SbCheckpointAttach(SbRun run, SbOutput out);
+PetscErrorCode SbCheckpointRemoveAll(SbOutput out); /* rank 0 */
+typedef PetscErrorCode (*SbFileFn)(const char *name, PetscInt64 bytes, void *ctx);
+PetscErrorCode SbCheckpointFiles(SbOutput out, SbFileFn fn, void *ctx);
+PetscErrorCode SbProgressAttach(SbRun run, SbOutput out);
+PetscErrorCode SbProgressEnd(SbOutput out); /* ends a line that is being rewritten */
+PetscErrorCode SbProgressDestroy(SbOutput out);
+PetscErrorCode SbRunJson(SbRun run, SbOutput out, const char *status, const char *reason); /* collective */
+
+/* xdmf.c: the index of fields.h5, on rank 0. */
+typedef struct _p_SbXdmf *SbXdmf;
+PetscErrorCode SbXdmfCreate(const char *path, PetscInt nvert, PetscInt ncell, PetscBool with_rank, SbXdmf *x);
+PetscErrorCode SbXdmfDestroy(SbXdmf *x);
+PetscErrorCode SbXdmfRemove(SbXdmf x); /* the file, if there is one */
+/* Adds a frame: its group in fields.h5 and its fields. */
+PetscErrorCode SbXdmfAdd(SbXdmf x, PetscReal time, const char *group, PetscInt n,
+                         const SbField *const field[], const PetscInt bytes[]);
+/* Replaces the file; `message` becomes the error, if any. */
+void SbXdmfWrite(SbXdmf x, size_t nmessage, char message[]);
+
+/* phases.c: where the time went, from the log events. */
+#define SB_PHASE_COUNT 8
+typedef struct {
+  const char *name;
+  PetscReal seconds; /* largest of all ranks */
+} SbPhase;
+typedef struct {
+  SbPhase phase[SB_PHASE_COUNT];    /* the last one is what no event covers */
+  PetscReal total;                  /* s */
+  PetscReal memory_max, memory_sum; /* peak resident memory of a rank, of all, bytes */
+} SbPhases;
+PetscErrorCode SbPhasesGet(SbOutput out, SbPhases *phases); /* collective */
+/* Files of the run with their sizes: calls fn for each one that exists. Rank 0. */
+PetscErrorCode SbOutputFiles(SbOutput out, SbFileFn fn, void *ctx);
+/* Name of the time preset, e.g. "newmark". */
+PetscErrorCode SbPresetName(SbRun run, size_t size, char name[]);

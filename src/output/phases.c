@@ -1,0 +1,70 @@
+/*
+  Where the time went: the program's log events, gathered into the phases that the closing table shows.
+
+  The seconds of a phase are those of the slowest rank. Events of a phase do not contain each other; the linear solve is
+  what PETSc's KSP and PC events cover. The last phase is what is left of the wall time.
+*/
+#include <sys/resource.h>
+#include "output_impl.h"
+
+/* Seconds of an event in all stages, on this rank. */
+static PetscErrorCode event_seconds(PetscLogEvent event, PetscReal *seconds)
+{
+  const PetscLogStage stages[] = {0, SbStageSetup, SbStageSolve, SbStageOutput};
+
+  PetscFunctionBeginUser;
+  for (size_t s = 0; s < PETSC_STATIC_ARRAY_LENGTH(stages); s++) {
+    PetscEventPerfInfo info;
+
+    if (s && stages[s] <= 0) continue;
+    PetscCall(PetscLogEventGetPerfInfo(stages[s], event, &info));
+    *seconds += (PetscReal)info.time;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode named_seconds(const char *name, PetscReal *seconds)
+{
+  PetscLogEvent event;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscLogEventGetId(name, &event));
+  if (event >= 0) PetscCall(event_seconds(event, seconds));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbPhasesGet(SbOutput out, SbPhases *p)
+{
+  static const char *const names[SB_PHASE_COUNT] = {"mesh",         "set-up",   "residual", "tangent",
+                                                    "linear solve", "energies", "output",   "other"};
+  static const char *const solve[] = {"KSPSolve", "PCSetUp", "PCSetUpOnBlocks"};
+  static const struct {
+    int phase;
+    SbEvent event;
+  } ours[] = {{0, SB_EVENT_MESH_READ},    {0, SB_EVENT_MESH_DISTRIBUTE}, {1, SB_EVENT_SPACE_SETUP},
+              {1, SB_EVENT_MATRIX_SETUP}, {1, SB_EVENT_SOLVER_SETUP},    {2, SB_EVENT_RESIDUAL},
+              {3, SB_EVENT_TANGENT},      {5, SB_EVENT_ENERGY},          {6, SB_EVENT_OUTPUT},
+              {6, SB_EVENT_CHECKPOINT}};
+  PetscReal mine[SB_PHASE_COUNT] = {0.}, most[SB_PHASE_COUNT], memory;
+  struct rusage usage;
+
+  PetscFunctionBeginUser;
+  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(ours); i++)
+    PetscCall(event_seconds(SbEvents[ours[i].event], &mine[ours[i].phase]));
+  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(solve); i++) PetscCall(named_seconds(solve[i], &mine[4]));
+  PetscCall(PetscTime(&p->total));
+  p->total -= out->wall_start;
+  mine[SB_PHASE_COUNT - 1] = p->total;
+  PetscCallMPI(MPI_Allreduce(mine, most, SB_PHASE_COUNT, MPIU_REAL, MPI_MAX, out->comm));
+  p->total = most[SB_PHASE_COUNT - 1];
+  for (int i = 0; i < SB_PHASE_COUNT - 1; i++) most[SB_PHASE_COUNT - 1] -= most[i];
+  for (int i = 0; i < SB_PHASE_COUNT; i++) {
+    p->phase[i].name = names[i];
+    p->phase[i].seconds = PetscMax(most[i], 0.);
+  }
+  (void)getrusage(RUSAGE_SELF, &usage);
+  memory = 1024. * (PetscReal)usage.ru_maxrss;
+  PetscCallMPI(MPI_Allreduce(&memory, &p->memory_max, 1, MPIU_REAL, MPI_MAX, out->comm));
+  PetscCallMPI(MPI_Allreduce(&memory, &p->memory_sum, 1, MPIU_REAL, MPI_SUM, out->comm));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

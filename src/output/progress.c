@@ -1,0 +1,119 @@
+/*
+  The line that tells how far a run is: rewritten in place on a terminal, else a plain line now and then.
+
+  Open MPI gives its ranks a pseudo-terminal whatever its own output is, so under it the launcher's output decides.
+*/
+#include <stdlib.h>
+#include <unistd.h>
+#include "output_impl.h"
+
+#define WIDTH 79
+
+struct _p_SbProgress {
+  PetscBool terminal;
+  PetscBool open; /* a line is being rewritten */
+  PetscBool titled;
+  PetscReal last; /* wall time of the last line, s since the time loop began */
+  PetscReal t_start;
+  PetscInt newton, linear, steps; /* since the last line */
+};
+
+static PetscBool is_terminal(void)
+{
+  char link[64], target[64];
+  ssize_t n;
+
+  if (!isatty(STDOUT_FILENO)) return PETSC_FALSE;
+  if (!getenv("OMPI_COMM_WORLD_SIZE")) return PETSC_TRUE;
+  (void)snprintf(link, sizeof(link), "/proc/%ld/fd/1", (long)getppid());
+  n = readlink(link, target, sizeof(target) - 1);
+  if (n <= 0) return PETSC_FALSE;
+  target[n] = 0;
+  return (PetscBool)(!strncmp(target, "/dev/pts/", 9) || !strncmp(target, "/dev/tty", 8));
+}
+
+/* 75 s as "1:15", 2 h as "2:00:00". */
+static void duration(PetscReal seconds, size_t size, char text[])
+{
+  const long s = seconds < 359999. ? (long)(seconds + .5) : 359999;
+
+  if (s >= 3600)
+    SbFormat(size, text, "%ld:%02ld:%02ld", s / 3600, s / 60 % 60, s % 60);
+  else
+    SbFormat(size, text, "%ld:%02ld", s / 60, s % 60);
+}
+
+static void format_line(SbRun run, SbProgress p, const SbStep *step, size_t size, char line[])
+{
+  const PetscReal done = step->t - p->t_start, speed = step->wall > 0. ? done / step->wall : 0.;
+  char count[32], left[16] = "-", times[16] = "-";
+
+  if (step->step_end > 0)
+    (void)snprintf(count, sizeof(count), "%" PetscInt_FMT "/%" PetscInt_FMT, step->step, step->step_end);
+  else
+    (void)snprintf(count, sizeof(count), "%" PetscInt_FMT, step->step);
+  if (speed > 0.) {
+    duration(PetscMax(step->t_end - step->t, 0.) / speed, sizeof(left), left);
+    if (run->model->dynamic) (void)snprintf(times, sizeof(times), "%.3gx", (double)speed);
+  }
+  (void)snprintf(line, size, "%13s %10.4g %6.1f %7.1f %10.3e %10.3e %8s %8s", count, (double)step->t,
+                 p->steps ? (double)p->newton / (double)p->steps : 0.,
+                 p->steps ? (double)p->linear / (double)p->steps : 0., (double)step->energies.kinetic,
+                 (double)step->energies.strain, times, left);
+}
+
+/* On rank 0 only: nobody else has anything to say. */
+static PetscErrorCode monitor(SbRun run, const SbStep *step, void *ctx)
+{
+  SbProgress p = (SbProgress)ctx;
+  const PetscReal wait = p->terminal ? .2 : 2.;
+  char line[160];
+
+  PetscFunctionBeginUser;
+  if (!p->titled) {
+    p->titled = PETSC_TRUE;
+    p->t_start = step->t;
+    PetscCall(PetscFPrintf(PETSC_COMM_SELF, PETSC_STDOUT, "\n%13s %10s %6s %7s %10s %10s %8s %8s\n", "step",
+                           run->model->dynamic ? "t (s)" : "load", "newton", "linear", "kinetic J",
+                           "strain J", "speed", "left"));
+  } else {
+    p->newton += step->newton;
+    p->linear += step->linear;
+    p->steps++;
+    if (!step->last && step->wall - p->last < wait) PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  format_line(run, p, step, sizeof(line), line);
+  PetscCall(PetscFPrintf(PETSC_COMM_SELF, PETSC_STDOUT, p->terminal ? "\r%-*s" : "%.*s\n", WIDTH, line));
+  (void)fflush(PETSC_STDOUT);
+  p->open = p->terminal;
+  p->last = step->wall;
+  p->newton = p->linear = p->steps = 0;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbProgressAttach(SbRun run, SbOutput out)
+{
+  PetscFunctionBeginUser;
+  if (!out->progress || out->quiet) PetscFunctionReturn(PETSC_SUCCESS);
+  run->want_energies = PETSC_TRUE;
+  if (out->rank) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscNew(&out->line));
+  out->line->terminal = is_terminal();
+  PetscCall(SbRunAddMonitor(run, monitor, out->line, NULL));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbProgressEnd(SbOutput out)
+{
+  PetscFunctionBeginUser;
+  if (out->line && out->line->open) PetscCall(PetscFPrintf(PETSC_COMM_SELF, PETSC_STDOUT, "\n"));
+  if (out->line) out->line->open = PETSC_FALSE;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbProgressDestroy(SbOutput out)
+{
+  PetscFunctionBeginUser;
+  PetscCall(PetscFree(out->line));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

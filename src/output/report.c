@@ -1,0 +1,249 @@
+/*
+  What a person reads on the screen: a header before the run, a table after it. Eighty columns.
+*/
+#include <stdarg.h>
+#include "output_impl.h"
+
+#define WIDTH 79
+#define INDENT 11
+
+PetscErrorCode SbPresetName(SbRun run, size_t size, char name[])
+{
+  const char *word = SbTimePresets;
+
+  PetscFunctionBeginUser;
+  for (int i = 0; i < (int)run->preset; i++) word = strchr(word, '|') + 1;
+  (void)snprintf(name, size, "%.*s", (int)strcspn(word, "|"), word);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* "title      words ..." with the words wrapped at WIDTH and indented. */
+static PetscErrorCode entry(const char *title, const char *format, ...)
+{
+  char text[2048], *word;
+  int column = INDENT;
+  va_list args;
+
+  PetscFunctionBeginUser;
+  va_start(args, format);
+  (void)vsnprintf(text, sizeof(text), format, args);
+  va_end(args);
+  PetscCall(PetscFPrintf(PETSC_COMM_SELF, PETSC_STDOUT, "%-*s", INDENT - 1, title));
+  for (word = strtok(text, " "); word; word = strtok(NULL, " ")) {
+    const int n = (int)strlen(word);
+
+    if (column + 1 + n > WIDTH && column > INDENT) {
+      PetscCall(PetscFPrintf(PETSC_COMM_SELF, PETSC_STDOUT, "\n%*s", INDENT - 1, ""));
+      column = INDENT;
+    }
+    PetscCall(PetscFPrintf(PETSC_COMM_SELF, PETSC_STDOUT, " %s", word));
+    column += n + 1;
+  }
+  PetscCall(PetscFPrintf(PETSC_COMM_SELF, PETSC_STDOUT, "\n"));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ before the run */
+
+static PetscErrorCode print_bodies(SbModel m)
+{
+  PetscInt tets = 0, vertices = 0;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscFPrintf(PETSC_COMM_SELF, PETSC_STDOUT, "\n%-15s %9s %9s %9s  %15s %13s\n", "body", "tets",
+                         "vertices", "unknowns", "min angle (deg)", "radius ratio"));
+  for (PetscInt b = 0; b < m->nbody; b++) {
+    const SbBody *body = &m->body[b];
+
+    PetscCall(PetscFPrintf(
+      PETSC_COMM_SELF, PETSC_STDOUT,
+      "%-15.15s %9" PetscInt_FMT " %9" PetscInt_FMT " %9" PetscInt_FMT "  %15.1f %13.2f\n", body->name,
+      body->ncell, body->nvert, 3 * body->nvert, (double)body->min_dihedral, (double)body->max_radius_ratio));
+    tets += body->ncell;
+    vertices += body->nvert;
+  }
+  if (m->nbody > 1)
+    PetscCall(PetscFPrintf(PETSC_COMM_SELF, PETSC_STDOUT,
+                           "%-15s %9" PetscInt_FMT " %9" PetscInt_FMT " %9" PetscInt_FMT "\n", "together",
+                           tets, vertices, 3 * vertices));
+  PetscCall(PetscFPrintf(PETSC_COMM_SELF, PETSC_STDOUT, "\n%-15s %-12s %11s %9s %14s %12s\n", "body",
+                         "material", "E (Pa)", "nu", "rho (kg/m^3)", "mass (kg)"));
+  for (PetscInt b = 0; b < m->nbody; b++) {
+    const SbBody *body = &m->body[b];
+    const SbMaterial material = m->material[b];
+
+    PetscCall(PetscFPrintf(PETSC_COMM_SELF, PETSC_STDOUT, "%-15.15s %-12.12s %11.4g %9.6g %14.6g %12.5g\n",
+                           body->name, material->law, (double)material->E, (double)material->nu,
+                           (double)material->density, (double)(material->density * body->volume)));
+  }
+  PetscCall(PetscFPrintf(PETSC_COMM_SELF, PETSC_STDOUT, "\n"));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode print_effects(SbModel m)
+{
+  char text[1024] = "";
+  size_t n = 0;
+
+  PetscFunctionBeginUser;
+  for (PetscInt e = 0; e < m->neffect && n < sizeof(text); e++) {
+    const SbEffect effect = m->effect[e];
+
+    n += (size_t)snprintf(text + n, sizeof(text) - n, "%s%s", e ? ", " : "", effect->name);
+    if (strcmp(effect->name, effect->type) && n < sizeof(text))
+      n += (size_t)snprintf(text + n, sizeof(text) - n, " (%s)", effect->type);
+  }
+  PetscCall(entry("effects", "%s", text[0] ? text : "none"));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode print_time(SbRun run)
+{
+  char name[SB_NAME_MAX];
+
+  PetscFunctionBeginUser;
+  PetscCall(SbPresetName(run, sizeof(name), name));
+  if (!run->model->dynamic)
+    PetscCall(entry("time", "%s, %" PetscInt_FMT " load step%s", name, run->static_steps,
+                    run->static_steps == 1 ? "" : "s"));
+  else if (run->fixed_step)
+    PetscCall(entry("time", "%s, t = %g to %g s in steps of %g s", name, (double)run->t0, (double)run->t_end,
+                    (double)run->dt));
+  else
+    PetscCall(entry("time", "%s, t = %g to %g s, adaptive steps, the first one %g s", name, (double)run->t0,
+                    (double)run->t_end, (double)run->dt));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode print_output(SbOutput out)
+{
+  char text[1024] = "";
+  size_t n = 0;
+
+  PetscFunctionBeginUser;
+  for (PetscInt i = 0; i < out->nfield && n < sizeof(text); i++)
+    n += (size_t)snprintf(text + n, sizeof(text) - n, "%s%s", i ? ", " : "", out->field[i]->name);
+  if (out->nfield && n < sizeof(text)) {
+    if (out->every > 0.)
+      n += (size_t)snprintf(text + n, sizeof(text) - n, " every %g s;", (double)out->every);
+    else if (out->every_steps > 1)
+      n += (size_t)snprintf(text + n, sizeof(text) - n, " every %" PetscInt_FMT " steps;", out->every_steps);
+    else
+      n += (size_t)snprintf(text + n, sizeof(text) - n, " every step;");
+  }
+  if (out->history && n < sizeof(text)) n += (size_t)snprintf(text + n, sizeof(text) - n, " history;");
+  if (n) text[n - 1] = 0;
+  PetscCall(entry("output", "%s%s%s", out->dir, text[0] ? ": " : "", text));
+  for (PetscInt p = 0; p < out->nprobe && out->history; p++) {
+    const SbProbe *probe = &out->probe[p];
+
+    PetscCall(entry(
+      "probe", "%s at vertex %" PetscInt_FMT " (%g, %g, %g) m, %.3g m from the place asked for", probe->name,
+      probe->original, (double)probe->x[0], (double)probe->x[1], (double)probe->x[2],
+      (double)PetscSqrtReal(PetscSqr(probe->x[0] - probe->at[0]) + PetscSqr(probe->x[1] - probe->at[1]) +
+                            PetscSqr(probe->x[2] - probe->at[2]))));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbReportHeader(SbRun run)
+{
+  SbOutput out = (SbOutput)run->output;
+  char petsc[256];
+
+  PetscFunctionBeginUser;
+  if (out->quiet || out->rank) PetscFunctionReturn(PETSC_SUCCESS);
+  (void)snprintf(petsc, sizeof(petsc), "%d.%d.%d", PETSC_VERSION_MAJOR, PETSC_VERSION_MINOR,
+                 PETSC_VERSION_SUBMINOR);
+  PetscCall(PetscFPrintf(PETSC_COMM_SELF, PETSC_STDOUT,
+                         "supple %s with PETSc %s on %d rank%s, one thread each\n", SB_VERSION, petsc,
+                         (int)out->size, out->size == 1 ? "" : "s"));
+  PetscCall(print_bodies(run->model));
+  if (out->scenario[0]) PetscCall(entry("scenario", "%s", out->scenario));
+  PetscCall(print_effects(run->model));
+  PetscCall(print_time(run));
+  PetscCall(entry("solver", "%s: %s", run->solver, run->solver_reason));
+  PetscCall(print_output(out));
+  (void)fflush(PETSC_STDOUT);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ after the run */
+
+static PetscErrorCode print_phases(SbRun run, const SbPhases *p)
+{
+  const PetscReal steps = (PetscReal)run->steps_total, tets = (PetscReal)run->model->mesh->Ncell;
+  const int per_run[] = {0, 1}; // mesh and set-up are not per step
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscFPrintf(PETSC_COMM_SELF, PETSC_STDOUT, "\n%-15s %10s %8s %14s %18s\n", "phase", "seconds",
+                         "share", "ms per step", "us per step, tet"));
+  for (int i = 0; i < SB_PHASE_COUNT; i++) {
+    const SbPhase *phase = &p->phase[i];
+
+    PetscCall(PetscFPrintf(PETSC_COMM_SELF, PETSC_STDOUT, "%-15s %10.3f %7.1f%%", phase->name,
+                           (double)phase->seconds,
+                           (double)(p->total > 0. ? 100. * phase->seconds / p->total : 0.)));
+    if (steps > 0. && i != per_run[0] && i != per_run[1])
+      PetscCall(PetscFPrintf(PETSC_COMM_SELF, PETSC_STDOUT, " %14.3f %18.4f",
+                             (double)(1e3 * phase->seconds / steps),
+                             (double)(1e6 * phase->seconds / steps / tets)));
+    PetscCall(PetscFPrintf(PETSC_COMM_SELF, PETSC_STDOUT, "\n"));
+  }
+  PetscCall(PetscFPrintf(PETSC_COMM_SELF, PETSC_STDOUT, "%-15s %10.3f\n\n", "total", (double)p->total));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static void size_text(PetscReal bytes, size_t size, char text[])
+{
+  if (bytes < 1e3)
+    (void)snprintf(text, size, "%.0f B", (double)bytes);
+  else if (bytes < 1e6)
+    (void)snprintf(text, size, "%.3g kB", (double)bytes / 1e3);
+  else if (bytes < 1e9)
+    (void)snprintf(text, size, "%.3g MB", (double)bytes / 1e6);
+  else
+    (void)snprintf(text, size, "%.3g GB", (double)bytes / 1e9);
+}
+
+static PetscErrorCode add_file(const char *name, PetscInt64 bytes, void *ctx)
+{
+  char *text = (char *)ctx, length[32];
+  size_t n = strlen(text);
+
+  PetscFunctionBeginUser;
+  size_text((PetscReal)bytes, sizeof(length), length);
+  (void)snprintf(text + n, 1024 - n, "%s%s %s", n ? ", " : "", name, length);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbReportSummary(SbRun run)
+{
+  SbOutput out = (SbOutput)run->output;
+  const PetscBool stopped = (PetscBool)(run->stop_reason[0] != 0);
+  SbPhases phases;
+  char files[1024] = "", memory[32], sum[32];
+
+  PetscFunctionBeginUser;
+  PetscCall(SbProgressEnd(out));
+  PetscCall(SbFramesClose(out));
+  PetscCall(SbRunJson(run, out, stopped ? "stopped" : "completed", run->stop_reason));
+  PetscCall(SbPhasesGet(out, &phases));
+  if (out->quiet || out->rank) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(print_phases(run, &phases));
+  PetscCall(entry("steps",
+                  "%" PetscInt_FMT " (%" PetscInt_FMT " attempts rejected), %" PetscInt_FMT
+                  " Newton and %" PetscInt_FMT " linear iterations",
+                  run->steps_total, run->rejected_total, run->newton_total, run->linear_total));
+  size_text(phases.memory_max, sizeof(memory), memory);
+  size_text(phases.memory_sum, sizeof(sum), sum);
+  if (out->size > 1)
+    PetscCall(entry("memory", "%s at the peak of the largest rank, %s together", memory, sum));
+  else
+    PetscCall(entry("memory", "%s at the peak", memory));
+  PetscCall(SbOutputFiles(out, add_file, files));
+  PetscCall(entry("files", "in %s: %s", out->dir, files));
+  if (stopped) PetscCall(entry("stopped", "%s", run->stop_reason));
+  (void)fflush(PETSC_STDOUT);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

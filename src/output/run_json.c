@@ -1,0 +1,201 @@
+/*
+  run.json: what ran, where, with which settings, how long and how it ended. Written when a run starts (status "running")
+  and replaced as a whole when it ends; a run that was killed leaves the first version.
+*/
+#include <time.h>
+#include <unistd.h>
+#include "output_impl.h"
+
+/* A JSON string with its quotes. */
+static void put_string(FILE *f, const char *text)
+{
+  (void)fputc('"', f);
+  for (; *text; text++) {
+    const unsigned char c = (unsigned char)*text;
+
+    if (c == '"' || c == '\\')
+      (void)fprintf(f, "\\%c", c);
+    else if (c < 32)
+      (void)fprintf(f, "\\u%04x", c);
+    else
+      (void)fputc(c, f);
+  }
+  (void)fputc('"', f);
+}
+
+static void put_text(FILE *f, const char *key, const char *text)
+{
+  (void)fprintf(f, "  \"%s\": ", key);
+  put_string(f, text);
+  (void)fputs(",\n", f);
+}
+
+/* JSON has no infinity and no NaN. */
+static void put_real(FILE *f, const char *key, PetscReal value, const char *end)
+{
+  if (PetscIsInfOrNanReal(value))
+    (void)fprintf(f, "\"%s\": null%s", key, end);
+  else
+    (void)fprintf(f, "\"%s\": %.10g%s", key, (double)value, end);
+}
+
+static void put_versions(FILE *f)
+{
+  char petsc[32], mpi[MPI_MAX_LIBRARY_VERSION_STRING];
+  int n;
+
+  put_text(f, "version", SB_VERSION);
+  (void)snprintf(petsc, sizeof(petsc), "%d.%d.%d", PETSC_VERSION_MAJOR, PETSC_VERSION_MINOR,
+                 PETSC_VERSION_SUBMINOR);
+  put_text(f, "petsc", petsc);
+  (void)MPI_Get_library_version(mpi, &n);
+  mpi[strcspn(mpi, ",\n")] = 0;
+  put_text(f, "mpi", mpi);
+  put_text(f, "hdf5", H5_VERS_INFO);
+#if defined(__clang__)
+  put_text(f, "compiler", __VERSION__);
+#else
+  put_text(f, "compiler", "GCC " __VERSION__);
+#endif
+}
+
+static void put_bodies(FILE *f, SbModel m)
+{
+  (void)fprintf(f, "  \"bodies\": [");
+  for (PetscInt b = 0; b < m->nbody; b++) {
+    const SbBody *body = &m->body[b];
+    const SbMaterial material = m->material[b];
+
+    (void)fprintf(f, "%s\n    {\"name\": ", b ? "," : "");
+    put_string(f, body->name);
+    (void)fprintf(f, ", \"mesh\": ");
+    put_string(f, body->mesh);
+    (void)fprintf(f, ", \"tets\": %" PetscInt_FMT ", \"vertices\": %" PetscInt_FMT ", ", body->ncell,
+                  body->nvert);
+    put_real(f, "volume", body->volume, ", ");
+    put_real(f, "min_dihedral", body->min_dihedral, ", ");
+    put_real(f, "max_radius_ratio", body->max_radius_ratio, ",\n     ");
+    (void)fprintf(f, "\"element\": \"%s\", \"material\": \"%s\", ", body->element, material->law);
+    put_real(f, "young", material->E, ", ");
+    put_real(f, "poisson", material->nu, ", ");
+    put_real(f, "density", material->density, "}");
+  }
+  (void)fprintf(f, "\n  ],\n");
+}
+
+static PetscErrorCode put_settings(FILE *f, SbRun run)
+{
+  char name[SB_NAME_MAX];
+  char *options;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbPresetName(run, sizeof(name), name));
+  put_text(f, "time", name);
+  put_text(f, "solver", run->solver);
+  put_text(f, "solver_reason", run->solver_reason);
+  (void)fprintf(f, "  \"unknowns\": %" PetscInt_FMT ",\n  ", 3 * run->model->mesh->Nvert);
+  put_real(f, "dt", run->dt, ",\n  ");
+  put_real(f, "t_start", run->t0, ",\n  ");
+  put_real(f, "t_end", run->t_end, ",\n");
+  (void)fprintf(f, "  \"effects\": [");
+  for (PetscInt e = 0; e < run->model->neffect; e++) {
+    (void)fprintf(f, "%s", e ? ", " : "");
+    put_string(f, run->model->effect[e]->name);
+  }
+  (void)fprintf(f, "],\n");
+  PetscCall(PetscOptionsGetAll(NULL, &options));
+  put_text(f, "options", options);
+  PetscCall(PetscFree(options));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+typedef struct {
+  FILE *f;
+  int n;
+} FileList;
+
+static PetscErrorCode put_file(const char *name, PetscInt64 bytes, void *ctx)
+{
+  FileList *list = (FileList *)ctx;
+
+  PetscFunctionBeginUser;
+  (void)fprintf(list->f, "%s\n    {\"name\": \"%s\", \"bytes\": %" PetscInt64_FMT "}", list->n++ ? "," : "",
+                name, bytes);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode put_costs(FILE *f, SbRun run, SbOutput out, const SbPhases *p)
+{
+  FileList list = {f, 0};
+
+  PetscFunctionBeginUser;
+  (void)fprintf(f,
+                "  \"steps\": %" PetscInt_FMT ",\n  \"newton_iterations\": %" PetscInt_FMT
+                ",\n  \"linear_iterations\": %" PetscInt_FMT ",\n  \"rejected_steps\": %" PetscInt_FMT ",\n",
+                run->steps_total, run->newton_total, run->linear_total, run->rejected_total);
+  (void)fprintf(f, "  \"seconds\": {");
+  for (int i = 0; i < SB_PHASE_COUNT; i++) put_real(f, p->phase[i].name, p->phase[i].seconds, ", ");
+  put_real(f, "time loop", run->seconds_solve, ", ");
+  put_real(f, "total", p->total, "},\n  ");
+  put_real(f, "memory_max_bytes", p->memory_max, ",\n  ");
+  put_real(f, "memory_sum_bytes", p->memory_sum, ",\n");
+  (void)fprintf(f, "  \"files\": [");
+  PetscCall(SbOutputFiles(out, put_file, &list));
+  (void)fprintf(f, "\n  ],\n");
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The whole text, on one rank; phases is NULL when nothing was timed. */
+static PetscErrorCode write_json(SbRun run, SbOutput out, const char *status, const char *reason,
+                                 const SbPhases *phases, size_t nmessage, char message[])
+{
+  char host[256] = "", path[PETSC_MAX_PATH_LEN], *text = NULL;
+  size_t size = 0;
+  FILE *f = open_memstream(&text, &size);
+  SbPiece piece;
+
+  PetscFunctionBeginUser;
+  PetscCheck(f, PETSC_COMM_SELF, PETSC_ERR_MEM, "No memory for run.json");
+  (void)fprintf(f, "{\n  \"program\": \"supple\",\n");
+  put_versions(f);
+  (void)gethostname(host, sizeof(host) - 1);
+  put_text(f, "host", host);
+  (void)fprintf(f, "  \"cores\": %ld,\n  \"ranks\": %d,\n", sysconf(_SC_NPROCESSORS_ONLN), (int)out->size);
+  put_text(f, "started", out->started);
+  put_text(f, "scenario", out->scenario);
+  put_bodies(f, run->model);
+  PetscCall(put_settings(f, run));
+  if (phases) PetscCall(put_costs(f, run, out, phases));
+  put_text(f, "reason", reason);
+  (void)fprintf(f, "  \"status\": \"%s\"\n}\n", status);
+  (void)fclose(f);
+  PetscCall(SbOutputPath(out, "run.json", sizeof(path), path));
+  piece = (SbPiece){text, size};
+  SbFileReplace(path, 1, &piece, nmessage, message);
+  free(text);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbRunJson(SbRun run, SbOutput out, const char *status, const char *reason)
+{
+  SbPhases phases;
+  char message[SB_MESSAGE_MAX] = "";
+
+  PetscFunctionBeginUser;
+  PetscCall(SbPhasesGet(out, &phases));
+  if (!out->rank) PetscCall(write_json(run, out, status, reason, &phases, sizeof(message), message));
+  PetscCall(SbAgree(out->comm, PETSC_ERR_FILE_WRITE, message));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbReportFailure(SbRun run, const char *reason)
+{
+  SbOutput out = run ? (SbOutput)run->output : NULL;
+  char message[SB_MESSAGE_MAX] = "";
+
+  PetscFunctionBeginUser;
+  if (!out || !out->attached) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(SbProgressEnd(out));
+  PetscCall(write_json(run, out, "failed", reason, NULL, sizeof(message), message));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
