@@ -12,7 +12,8 @@
 /* A body as the scenario gives it. Data, no methods. */
 typedef struct {
   char      name[SB_NAME_MAX];
-  char      mesh[PETSC_MAX_PATH_LEN]; /* file, or box:lx,ly,lz:n or box:lx,ly,lz:nx,ny,nz */
+  char      mesh[PETSC_MAX_PATH_LEN]; /* file, or box:lx,ly,lz:n or box:lx,ly,lz:nx,ny,nz, from the origin to (lx, ly, lz);
+                                         n cells along the shortest side; groups xmin xmax ymin ymax zmin zmax */
   PetscReal scale;                    /* factor on the file's coordinates, first */
   PetscReal rotate[4];                /* axis (need not be normed) and angle in degrees, second */
   PetscReal translate[3];             /* m, third */
@@ -28,25 +29,29 @@ typedef struct {
   PetscReal min_dihedral;             /* smallest dihedral angle, degrees */
   PetscReal max_radius_ratio;         /* circumradius / (3 inradius), 1 for the regular tet; the worst cell */
   PetscReal bbox[6];                  /* xmin ymin zmin xmax ymax zmax, placed, m */
+  char      note[256];                /* what was repaired or is odd, "3 unused vertices left out, ..."; "" when nothing */
 } SbBody;
 
 /*
   A named set of the scenario: where loads and supports act. From a gmsh physical group of that name (of any body, or
-  of one when written body.group), or a shape in the placed rest frame.
+  of one when written body.group; a group without a name is called surface_12, volume_3, ...), or a shape in the placed
+  rest frame. A shape holds the vertices inside it, the boundary facets with three and the tets with four of these, with
+  a slack of 1e-6 of the body's diagonal. A group of surfaces holds its triangles (inner ones too) and their vertices; a
+  group of volumes its tets, their vertices and boundary facets.
 */
 typedef enum { SB_SET_GROUP, SB_SET_BOX, SB_SET_PLANE, SB_SET_SPHERE, SB_SET_HALFSPACE, SB_SET_BODY, SB_SET_BOUNDARY } SbSetShape;
 typedef struct {
   char       name[SB_NAME_MAX];
   SbSetShape shape;
   char       group[2 * SB_NAME_MAX]; /* SB_SET_GROUP: group or body.group; SB_SET_BODY: body */
-  PetscReal  p[8];                   /* box: xmin ymin zmin xmax ymax zmax; plane: nx ny nz d tol (|n.x - d| <= tol, n normed here);
-                                        sphere: cx cy cz r; halfspace: nx ny nz d (n.x <= d) */
-  PetscInt   nvert, nfacet, ncell;   /* global counts, found by SbMeshCreate(); all zero is an error there */
+  PetscReal  p[8];                   /* box: xmin ymin zmin xmax ymax zmax; plane: nx ny nz d tol (|n.x - d| <= tol);
+                                        sphere: cx cy cz r; halfspace: nx ny nz d (n.x <= d); n has length 1 here, d is scaled likewise */
+  PetscInt   nvert, nfacet, ncell;   /* global counts, found by SbMeshCreate(); nfacet counts boundary facets; all zero is an error there */
 } SbSet;
 
 /*
   SbMesh - this rank's part of the mesh. Own numbering: vertices and cells owned by this rank first, then the ghosts
-  that one layer of overlap brings (every cell that touches an owned vertex is here). Constant after creation.
+  that touch them: every cell with an owned vertex is here, no ghost cell without one. Constant after creation.
 */
 typedef struct _p_SbMesh *SbMesh;
 struct _p_SbMesh {
@@ -88,5 +93,12 @@ PetscErrorCode SbMeshCreate(MPI_Comm comm, PetscInt nbody, SbBody body[], PetscI
 PetscErrorCode SbMeshDestroy(SbMesh *mesh);
 PetscErrorCode SbMeshValidate(SbMesh mesh); /* ordering, ranges, ownership, sums; for -validate and tests */
 PetscErrorCode SbMeshRegister(void);        /* rows of the option table, the METIS partitioner */
-/* Reads "plane:0,0,1,0.2" and so on into set; errors name the option. */
+/*
+  SbSetParse - reads the description of a set. Not collective.
+
+  Input: option - full name, for messages; text - group:NAME, group:BODY.NAME, box:xmin,ymin,zmin,xmax,ymax,zmax,
+  plane:nx,ny,nz,d[,tolerance], sphere:cx,cy,cz,r, halfspace:nx,ny,nz,d, body:NAME or boundary (lengths in m).
+  Output: shape, group, p of set; its name is left alone.
+  Errors: PETSC_ERR_USER_INPUT, one line that names option, text and the right form.
+*/
 PetscErrorCode SbSetParse(const char *option, const char *text, SbSet *set);

@@ -1,0 +1,232 @@
+/*
+  check.c - what must hold for a body's mesh before anything is computed on it.
+
+  Repaired and counted: vertices that no tet uses are left out, tets with negative orientation get two vertices swapped.
+  Refused: a tet without volume, a tet given twice, a face of three tets; with these the mass or the stiffness would be
+  wrong. Counted: triangles of groups that are no face of a tet, surface edges where more than two facets meet (parts of
+  the body hang together like hinges there).
+
+  A tet is flat when its height over the longest edge L is below 1e-12, or below the rounding of its coordinates:
+  |det| <= (1e-12 L + 8 eps max|x|) L^2. The thinnest slivers worth simulating are nine orders above the first term.
+*/
+#include <stdlib.h>
+#include "mesh_impl.h"
+
+PetscReal SbTetDet(const PetscReal x[], const PetscInt v[4])
+{
+  const PetscReal *p = x + 3 * v[0], *q = x + 3 * v[1], *r = x + 3 * v[2], *s = x + 3 * v[3];
+  const PetscReal a[3] = {q[0] - p[0], q[1] - p[1], q[2] - p[2]};
+  const PetscReal b[3] = {r[0] - p[0], r[1] - p[1], r[2] - p[2]};
+  const PetscReal c[3] = {s[0] - p[0], s[1] - p[1], s[2] - p[2]};
+
+  return a[0] * (b[1] * c[2] - b[2] * c[1]) + a[1] * (b[2] * c[0] - b[0] * c[2]) +
+         a[2] * (b[0] * c[1] - b[1] * c[0]);
+}
+
+/* ------------------------------------------------------------------ unused vertices */
+
+/* Renumbers the vertices of items; drops items that use a vertex which is gone. */
+static PetscErrorCode renumber_items(SbItems *item, int dim, const PetscInt map[], PetscInt *ndropped)
+{
+  PetscInt kept = 0;
+
+  PetscFunctionBeginUser;
+  for (PetscInt i = 0; i < item->n; i++) {
+    const PetscInt *from = item->vert + (dim + 1) * i;
+    PetscInt *to = item->vert + (dim + 1) * kept;
+    PetscBool gone = PETSC_FALSE;
+
+    for (int k = 0; k <= dim; k++) gone = (PetscBool)(gone || map[from[k]] < 0);
+    if (gone) continue;
+    for (int k = 0; k <= dim; k++) to[k] = map[from[k]];
+    item->tags[kept] = item->tags[i];
+    item->number[kept++] = item->number[i];
+  }
+  *ndropped = item->n - kept;
+  item->n = kept;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode drop_unused(SbImport *im)
+{
+  PetscInt *map, nused = 0, ndropped;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscCalloc1(im->nvert, &map));
+  for (PetscInt i = 0; i < 4 * im->item[3].n; i++) map[im->item[3].vert[i]] = 1;
+  for (PetscInt v = 0; v < im->nvert; v++) map[v] = map[v] ? nused++ : -1;
+  im->nunused = im->nvert - nused;
+  if (im->nunused) {
+    for (PetscInt v = 0; v < im->nvert; v++) {
+      if (map[v] < 0) continue;
+      PetscCall(PetscArraymove(im->x + 3 * map[v], im->x + 3 * v, 3));
+      im->vert_number[map[v]] = im->vert_number[v];
+    }
+    for (int d = 0; d < 4; d++) {
+      PetscCall(renumber_items(&im->item[d], d, map, &ndropped));
+      if (d == 2) im->nlost += ndropped;
+    }
+    im->nvert = nused;
+  }
+  PetscCall(PetscFree(map));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ single tets */
+
+/* The error of a flat tet says why it is flat. */
+static PetscErrorCode flat(const SbImport *im, PetscInt c, PetscReal det, PetscReal L)
+{
+  const PetscInt *v = im->item[3].vert + 4 * c;
+
+  PetscFunctionBeginUser;
+  for (int i = 0; i < 4; i++) {
+    for (int j = 0; j < i; j++) {
+      PetscCheck(v[i] != v[j], PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
+                 "%s: tetrahedron %lld uses node %lld twice; remove it", im->where,
+                 (long long)im->item[3].number[c], (long long)im->vert_number[v[i]]);
+    }
+  }
+  SETERRQ(PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
+          "%s: tetrahedron %lld is flat (volume %.3g m^3 with an edge of %.3g m); repair the mesh (gmsh: "
+          "Mesh.Optimize = 1)",
+          im->where, (long long)im->item[3].number[c], (double)PetscAbsReal(det) / 6, (double)L);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static inline PetscReal longest_edge2(const PetscReal x[], const PetscInt v[4])
+{
+  PetscReal L2 = 0;
+
+  for (int i = 0; i < 4; i++) {
+    for (int j = 0; j < i; j++) {
+      const PetscReal *p = x + 3 * v[i], *q = x + 3 * v[j], d[3] = {p[0] - q[0], p[1] - q[1], p[2] - q[2]};
+      const PetscReal l2 = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
+
+      L2 = PetscMax(L2, l2);
+    }
+  }
+  return L2;
+}
+
+static PetscErrorCode orient(SbImport *im)
+{
+  PetscReal largest = 0;
+
+  PetscFunctionBeginUser;
+  for (PetscInt i = 0; i < 3 * im->nvert; i++) largest = PetscMax(largest, PetscAbsReal(im->x[i]));
+  for (PetscInt c = 0; c < im->item[3].n; c++) {
+    PetscInt *v = im->item[3].vert + 4 * c;
+    const PetscReal det = SbTetDet(im->x, v), L2 = longest_edge2(im->x, v), L = PetscSqrtReal(L2);
+
+    if (!(PetscAbsReal(det) > (1e-12 * L + 8 * PETSC_MACHINE_EPSILON * largest) * L2))
+      PetscCall(flat(im, c, det, L));
+    if (det < 0) {
+      const PetscInt keep = v[3];
+
+      v[3] = v[2];
+      v[2] = keep;
+      im->nreoriented++;
+    }
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ tets together */
+
+static PetscErrorCode twice(const SbImport *im, PetscInt c, PetscInt d)
+{
+  PetscFunctionBeginUser;
+  SETERRQ(PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
+          "%s: tetrahedra %lld and %lld have the same four nodes; remove one", im->where,
+          (long long)im->item[3].number[PetscMin(c, d)], (long long)im->item[3].number[PetscMax(c, d)]);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Two cells with equal vertices share all four faces; a third cell at one of these faces makes it a shared one. */
+static PetscErrorCode check_faces(const SbImport *im, const SbFaces *faces)
+{
+  PetscFunctionBeginUser;
+  if (faces->nshared) {
+    const PetscInt *s = faces->shared;
+
+    for (int i = 0; i < 3; i++) {
+      PetscInt a[4], b[4];
+      PetscBool same;
+
+      PetscCall(PetscArraycpy(a, im->item[3].vert + 4 * s[i], 4));
+      PetscCall(PetscArraycpy(b, im->item[3].vert + 4 * s[(i + 1) % 3], 4));
+      PetscCall(PetscSortInt(4, a));
+      PetscCall(PetscSortInt(4, b));
+      PetscCall(PetscArraycmp(a, b, 4, &same));
+      if (same) PetscCall(twice(im, s[i], s[(i + 1) % 3]));
+    }
+    SETERRQ(PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
+            "%s: tetrahedra %lld, %lld and %lld share one face (and %" PetscInt_FMT
+            " such faces in all); a face has at most two, remove what overlaps",
+            im->where, (long long)im->item[3].number[s[0]], (long long)im->item[3].number[s[1]],
+            (long long)im->item[3].number[s[2]], faces->nshared);
+  }
+  for (PetscInt c = 0; c < faces->ncell; c++) {
+    const PetscInt *n = faces->neighbour + 4 * c;
+
+    if (n[0] >= 0 && n[0] == n[1] && n[0] == n[2] && n[0] == n[3]) PetscCall(twice(im, c, n[0]));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode count_lost(SbImport *im, const SbFaces *faces)
+{
+  PetscInt slots[2];
+
+  PetscFunctionBeginUser;
+  for (PetscInt t = 0; t < im->item[2].n; t++)
+    im->nlost += !SbFacesFind(faces, im->item[2].vert + 3 * t, slots);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static int compare_edges(const void *a, const void *b)
+{
+  const uint64_t p = *(const uint64_t *)a, q = *(const uint64_t *)b;
+
+  return (p > q) - (p < q);
+}
+
+/* On a closed surface two facets meet at every edge. */
+static PetscErrorCode count_pinched(SbImport *im, const SbFaces *faces)
+{
+  uint64_t *edge;
+  PetscInt n = 0;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscMalloc1(3 * faces->nboundary, &edge));
+  for (PetscInt s = 0; s < 4 * faces->ncell; s++) {
+    if (faces->neighbour[s] >= 0) continue;
+    for (int i = 0; i < 3; i++) {
+      const PetscInt *v = im->item[3].vert + 4 * (s / 4), a = v[SbFaceVertex[s % 4][i]],
+                     b = v[SbFaceVertex[s % 4][(i + 1) % 3]];
+
+      edge[n++] = (uint64_t)PetscMin(a, b) << 32 | (uint64_t)PetscMax(a, b);
+    }
+  }
+  qsort(edge, (size_t)n, sizeof(*edge), compare_edges);
+  for (PetscInt i = 0, m; i < n; i += m) {
+    for (m = 1; i + m < n && edge[i + m] == edge[i]; m++) {
+    }
+    im->npinched += m > 2;
+  }
+  PetscCall(PetscFree(edge));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbImportCheck(SbImport *im, SbFaces *faces)
+{
+  PetscFunctionBeginUser;
+  PetscCall(drop_unused(im));
+  PetscCall(orient(im));
+  PetscCall(SbFacesCreate(im->nvert, im->item[3].n, im->item[3].vert, faces));
+  PetscCall(check_faces(im, faces));
+  PetscCall(count_lost(im, faces));
+  PetscCall(count_pinched(im, faces));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

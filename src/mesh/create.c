@@ -1,0 +1,153 @@
+/*
+  create.c - the mesh of a scene, from bodies on rank 0 to numbered pieces on all ranks.
+
+  Rank 0 reads and checks alone. When that fails, its message is caught, sent to the others, and raised by all of them,
+  so that nobody waits for a rank that is gone.
+*/
+#include "mesh_impl.h"
+
+static const SbOption rows[] = {
+  {"mesh_partitioner", SB_OPTION_CHOICE, 1, "", "metis", "metis|ptscotch|simple",
+   "who cuts the mesh into one part per rank"},
+  {"mesh_report", SB_OPTION_BOOL, 1, "", "false", "",
+   "print one line per body with the size, shape and groups of its mesh"},
+};
+static const char *const partitioners[] = {"metis", "ptscotch", "simple"}; /* in the order of the row */
+
+PetscErrorCode SbMeshRegister(void)
+{
+  PetscFunctionBeginUser;
+  PetscCall(SbOptionsRegister("", "", (PetscInt)PETSC_STATIC_ARRAY_LENGTH(rows), rows));
+  PetscCall(SbPartitionerRegister());
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ errors of rank 0 */
+
+typedef struct {
+  int code;
+  char text[1024];
+} Caught;
+
+/* Keeps the message. An error that is not the user's is also printed with its trace, for us. */
+static PetscErrorCode catch_error(MPI_Comm comm, int line, const char *function, const char *file,
+                                  PetscErrorCode code, PetscErrorType kind, const char *text, void *ctx)
+{
+  Caught *caught = (Caught *)ctx;
+
+  if (kind == PETSC_ERROR_INITIAL) {
+    caught->code = (int)code;
+    (void)snprintf(caught->text, sizeof(caught->text), "%s", text ? text : "");
+  }
+  if (caught->code != PETSC_ERR_USER_INPUT && caught->code != PETSC_ERR_FILE_OPEN &&
+      caught->code != PETSC_ERR_FILE_READ && caught->code != PETSC_ERR_FILE_UNEXPECTED)
+    (void)PetscTraceBackErrorHandler(comm, line, function, file, code, kind, text, NULL);
+  return code;
+}
+
+/* Collective: builds the whole mesh on rank 0; all ranks fail together, or all know what was found. */
+static PetscErrorCode create_whole(MPI_Comm comm, PetscInt nbody, SbBody body[], PetscInt nset, SbSet set[],
+                                   SbWhole *whole)
+{
+  PetscMPIInt rank;
+  Caught caught = {0, ""};
+
+  PetscFunctionBeginUser;
+  PetscCallMPI(MPI_Comm_rank(comm, &rank));
+  PetscCall(PetscMemzero(whole, sizeof(*whole)));
+  if (!rank) {
+    PetscErrorCode ierr;
+
+    PetscCall(PetscPushErrorHandler(catch_error, &caught));
+    ierr = SbWholeCreate(nbody, body, nset, set, whole);
+    PetscCall(PetscPopErrorHandler());
+    caught.code = (int)ierr;
+  }
+  PetscCallMPI(MPI_Bcast(&caught, (int)sizeof(caught), MPI_BYTE, 0, comm));
+  PetscCheck(!caught.code, comm, (PetscErrorCode)caught.code, "%s", caught.text);
+  PetscCallMPI(MPI_Bcast(body, (int)((size_t)nbody * sizeof(*body)), MPI_BYTE, 0, comm));
+  PetscCallMPI(MPI_Bcast(set, (int)((size_t)nset * sizeof(*set)), MPI_BYTE, 0, comm));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ the mesh */
+
+/* Repairs and oddities always, the rest on request. */
+static PetscErrorCode report(MPI_Comm comm, PetscInt nbody, const SbBody body[], PetscBool full)
+{
+  PetscFunctionBeginUser;
+  for (PetscInt b = 0; b < nbody; b++) {
+    const SbBody *p = &body[b];
+
+    if (full)
+      PetscCall(PetscPrintf(comm,
+                            "body '%s': %" PetscInt_FMT " tets, %" PetscInt_FMT " vertices, %" PetscInt_FMT
+                            " boundary facets, volume %.6g m^3, "
+                            "from (%.4g, %.4g, %.4g) to (%.4g, %.4g, %.4g) m, smallest dihedral angle %.3g "
+                            "degrees, largest radius ratio %.3g%s%s\n",
+                            p->name, p->ncell, p->nvert, p->nfacet, (double)p->volume, (double)p->bbox[0],
+                            (double)p->bbox[1], (double)p->bbox[2], (double)p->bbox[3], (double)p->bbox[4],
+                            (double)p->bbox[5], (double)p->min_dihedral, (double)p->max_radius_ratio,
+                            p->note[0] ? "; " : "", p->note));
+    else if (p->note[0])
+      PetscCall(PetscPrintf(comm, "body '%s': %s: %s\n", p->name, p->mesh, p->note));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbMeshCreate(MPI_Comm comm, PetscInt nbody, SbBody body[], PetscInt nset, SbSet set[],
+                            SbMesh *mesh)
+{
+  SbMesh m;
+  SbScope scope;
+  SbWhole whole;
+  SbPoint *point;
+  PetscInt partitioner;
+  PetscBool full;
+
+  PetscFunctionBeginUser;
+  PetscCheck(nset <= SB_SET_MAX, comm, PETSC_ERR_USER_INPUT,
+             "%" PetscInt_FMT " sets; a scenario may have up to %d", nset, SB_SET_MAX);
+  PetscCall(SbScopeSet(&scope, "", "", ""));
+  PetscCall(SbOptionChoice(&scope, "mesh_partitioner", &partitioner));
+  PetscCall(SbOptionBool(&scope, "mesh_report", &full));
+  PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_MESH_READ], 0, 0, 0, 0));
+  PetscCall(create_whole(comm, nbody, body, nset, set, &whole));
+  PetscCall(PetscLogEventEnd(SbEvents[SB_EVENT_MESH_READ], 0, 0, 0, 0));
+  PetscCall(report(comm, nbody, body, full));
+  PetscCall(PetscNew(&m));
+  m->comm = comm;
+  m->nbody = nbody;
+  m->body = body;
+  m->nset = nset;
+  m->set = set;
+  PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_MESH_DISTRIBUTE], 0, 0, 0, 0));
+  PetscCall(SbDistribute(comm, partitioners[partitioner], &whole, &m->dm, &point));
+  PetscCall(SbWholeDestroy(&whole));
+  PetscCall(SbMeshNumber(m, point));
+  PetscCall(PetscFree(point));
+  PetscCall(PetscLogEventEnd(SbEvents[SB_EVENT_MESH_DISTRIBUTE], 0, 0, 0, 0));
+  *mesh = m;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbMeshDestroy(SbMesh *mesh)
+{
+  SbMesh m = *mesh;
+
+  PetscFunctionBeginUser;
+  if (!m) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(DMDestroy(&m->dm));
+  PetscCall(PetscFree(m->gvert));
+  PetscCall(PetscFree(m->vert_orig));
+  PetscCall(PetscFree(m->vert_body));
+  PetscCall(PetscFree(m->vert_set));
+  PetscCall(PetscFree(m->x));
+  PetscCall(PetscFree(m->cell));
+  PetscCall(PetscFree(m->cell_orig));
+  PetscCall(PetscFree(m->cell_body));
+  PetscCall(PetscFree(m->cell_set));
+  PetscCall(PetscFree(m->face_set));
+  PetscCall(PetscFree(*mesh));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

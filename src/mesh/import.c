@@ -1,0 +1,211 @@
+/*
+  import.c - a body on rank 0: the reader chosen by the name of its mesh, its groups, its placement.
+
+  A new format is one file with one SbReader and one row in the table below.
+
+  Groups: an entity of a file may belong to several physical groups. The set of groups of an item is stored once (a "tag
+  set") and items refer to it; set 0 is the empty one.
+
+  Placement: x <- R (s x) + t, with the rotation R by Rodrigues' formula about an axis through the origin of the file.
+*/
+#include <strings.h>
+#include "mesh_impl.h"
+
+/* ------------------------------------------------------------------ the parts of an import */
+
+/* Room for at least `need` elements of `unit` bytes; doubles, so that appending is cheap. */
+static PetscErrorCode reserve(PetscInt need, PetscInt *capacity, size_t unit, void *array)
+{
+  PetscInt grown = PetscMax(need, 2 * *capacity);
+
+  PetscFunctionBeginUser;
+  if (need <= *capacity) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscRealloc((size_t)PetscMax(grown, 16) * unit, (void **)array));
+  *capacity = PetscMax(grown, 16);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbImportSetVertices(SbImport *im, PetscInt n)
+{
+  PetscFunctionBeginUser;
+  PetscCall(PetscMalloc1(3 * (size_t)n, &im->x));
+  PetscCall(PetscMalloc1(n, &im->vert_number));
+  im->nvert = n;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbImportAddItem(SbImport *im, int dim, const PetscInt vert[], PetscInt tags, int64_t number)
+{
+  SbItems *item = &im->item[dim];
+
+  PetscFunctionBeginUser;
+  if (item->n == item->capacity) {
+    const PetscInt grown = PetscMax(64, 2 * item->capacity);
+
+    PetscCall(PetscRealloc((size_t)grown * (size_t)(dim + 1) * sizeof(PetscInt), &item->vert));
+    PetscCall(PetscRealloc((size_t)grown * sizeof(PetscInt), &item->tags));
+    PetscCall(PetscRealloc((size_t)grown * sizeof(int64_t), &item->number));
+    item->capacity = grown;
+  }
+  for (int i = 0; i <= dim; i++) item->vert[(dim + 1) * item->n + i] = vert[i];
+  item->tags[item->n] = tags;
+  item->number[item->n++] = number;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbImportGroup(SbImport *im, PetscInt dim, int64_t tag, const char *name, PetscInt *group)
+{
+  static const char *const kind[4] = {"point", "curve", "surface", "volume"};
+  PetscInt g;
+
+  PetscFunctionBeginUser;
+  for (g = 0; g < im->ngroup; g++) {
+    if (im->group[g].dim == dim && im->group[g].tag == tag) break;
+  }
+  if (g == im->ngroup) {
+    PetscCall(reserve(g + 1, &im->capacity[0], sizeof(SbGroup), &im->group));
+    im->group[g].dim = dim;
+    im->group[g].tag = tag;
+    (void)snprintf(im->group[g].name, SB_GROUP_MAX, "%s_%lld", kind[dim], (long long)tag);
+    im->ngroup++;
+  }
+  if (name) PetscCall(PetscStrncpy(im->group[g].name, name, SB_GROUP_MAX));
+  *group = g;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbImportTagSet(SbImport *im, PetscInt n, PetscInt groups[], PetscInt *tags)
+{
+  PetscInt start;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscSortRemoveDupsInt(&n, groups));
+  /* Set 0 exists from the first call on. */
+  if (!im->ntags) {
+    PetscCall(reserve(2, &im->capacity[1], sizeof(PetscInt), &im->tags_start));
+    im->tags_start[0] = im->tags_start[1] = 0;
+    im->ntags = 1;
+  }
+  for (*tags = 0; *tags < im->ntags; (*tags)++) {
+    start = im->tags_start[*tags];
+    if (im->tags_start[*tags + 1] - start != n) continue;
+    if (!n || !memcmp(groups, im->tags_group + start, (size_t)n * sizeof(PetscInt)))
+      PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  start = im->tags_start[im->ntags];
+  PetscCall(reserve(start + n, &im->capacity[2], sizeof(PetscInt), &im->tags_group));
+  PetscCall(reserve(im->ntags + 2, &im->capacity[1], sizeof(PetscInt), &im->tags_start));
+  for (PetscInt i = 0; i < n; i++) im->tags_group[start + i] = groups[i];
+  im->tags_start[++im->ntags] = start + n;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbImportDestroy(SbImport *im)
+{
+  PetscFunctionBeginUser;
+  PetscCall(PetscFree(im->x));
+  PetscCall(PetscFree(im->vert_number));
+  for (int d = 0; d < 4; d++) {
+    PetscCall(PetscFree(im->item[d].vert));
+    PetscCall(PetscFree(im->item[d].tags));
+    PetscCall(PetscFree(im->item[d].number));
+  }
+  PetscCall(PetscFree(im->group));
+  PetscCall(PetscFree(im->tags_start));
+  PetscCall(PetscFree(im->tags_group));
+  PetscCall(PetscMemzero(im, sizeof(*im)));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ placement */
+
+/* Rotation by `degrees` about `axis`; exact for quarter turns about the axes of the frame. */
+static PetscErrorCode rotation(const SbBody *body, PetscReal R[3][3])
+{
+  const PetscReal *w = body->rotate;
+  const PetscReal angle = body->rotate[3] * PETSC_PI / 180,
+                  length = PetscSqrtReal(w[0] * w[0] + w[1] * w[1] + w[2] * w[2]);
+  PetscReal c = PetscCosReal(angle), s = PetscSinReal(angle), a[3];
+
+  PetscFunctionBeginUser;
+  PetscCheck(length > 0 && isfinite(length) && isfinite(angle), PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
+             "body '%s': rotation by %g degrees about (%g, %g, %g): the axis must have a length above zero",
+             body->name, (double)w[3], (double)w[0], (double)w[1], (double)w[2]);
+  if (PetscAbsReal(c) < 1e-15) c = 0;
+  if (PetscAbsReal(s) < 1e-15) s = 0;
+  for (int i = 0; i < 3; i++) a[i] = w[i] / length;
+  for (int i = 0; i < 3; i++) {
+    for (int j = 0; j < 3; j++) R[i][j] = (1 - c) * a[i] * a[j] + (i == j ? c : 0);
+    R[i][(i + 1) % 3] -= s * a[(i + 2) % 3];
+    R[i][(i + 2) % 3] += s * a[(i + 1) % 3];
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode place(const SbBody *body, SbImport *im)
+{
+  PetscReal R[3][3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
+
+  PetscFunctionBeginUser;
+  if (body->rotate[3] != 0) PetscCall(rotation(body, R));
+  for (PetscInt v = 0; v < im->nvert; v++) {
+    PetscReal *x = im->x + 3 * v, y[3];
+
+    for (int i = 0; i < 3; i++) y[i] = body->scale * x[i];
+    for (int i = 0; i < 3; i++) {
+      x[i] = R[i][0] * y[0] + R[i][1] * y[1] + R[i][2] * y[2] + body->translate[i];
+      PetscCheck(isfinite(x[i]), PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
+                 "%s: node %lld leaves the range of numbers when scaled by %g; check scale and translate",
+                 im->where, (long long)im->vert_number[v], (double)body->scale);
+    }
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ choice of the reader */
+
+/* Files by their extension. */
+static const struct {
+  const char *extension;
+  SbReader read;
+} readers[] = {
+  {".msh", SbImportRead_Gmsh},
+};
+
+static PetscErrorCode find_reader(const SbBody *body, SbReader *read)
+{
+  const char *dot = strrchr(body->mesh, '.');
+  char known[256] = "";
+
+  PetscFunctionBeginUser;
+  if (!strncmp(body->mesh, "box:", 4)) {
+    *read = SbImportRead_Box;
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(readers); i++) {
+    if (dot && !strcasecmp(dot, readers[i].extension)) {
+      *read = readers[i].read;
+      PetscFunctionReturn(PETSC_SUCCESS);
+    }
+    PetscCall(PetscStrlcat(known, i ? " " : "", sizeof(known)));
+    PetscCall(PetscStrlcat(known, readers[i].extension, sizeof(known)));
+  }
+  SETERRQ(PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
+          "body '%s': mesh '%s' is of no known kind; give a file that ends in %s, or box:lx,ly,lz:n",
+          body->name, body->mesh, known);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbImportRead(const SbBody *body, SbImport *im)
+{
+  SbReader read;
+  PetscInt none;
+
+  PetscFunctionBeginUser;
+  PetscCall(find_reader(body, &read));
+  (void)snprintf(im->where, sizeof(im->where), "body '%s': %s", body->name, body->mesh);
+  PetscCall(SbImportTagSet(im, 0, NULL, &none));
+  PetscCall(read(body->mesh, im));
+  PetscCall(place(body, im));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

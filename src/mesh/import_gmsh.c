@@ -1,0 +1,676 @@
+/*
+  import_gmsh.c - reader of gmsh's .msh files: versions 2.2 and 4.1, text and binary (gmsh reference manual, "File
+  formats"). Own reader, because a body needs every physical group of every entity, also where groups overlap.
+
+  Version 4.1 gives groups per entity of the geometry; an entity may have several. Version 2.2 gives one group per
+  element and writes an element again for each further group: such repeats are merged, groups joined.
+
+  Kept: points, lines, triangles that belong to a group, and all tets. Sections that do not concern us are skipped.
+  Refused: volume elements other than 4-node tets, files cut into partitions, other versions.
+*/
+#include <stdlib.h>
+#include "mesh_impl.h"
+
+/* Types of elements by their number in the file. */
+static const struct {
+  const char *name;
+  int dim, nnode;
+} types[32] = {
+  {NULL, 0, 0},
+  {"2-node lines", 1, 2},
+  {"3-node triangles", 2, 3},
+  {"4-node quadrangles", 2, 4},
+  {"4-node tetrahedra", 3, 4},
+  {"hexahedra", 3, 8},
+  {"prisms", 3, 6},
+  {"pyramids", 3, 5},
+  {"3-node lines", 1, 3},
+  {"6-node triangles", 2, 6},
+  {"9-node quadrangles", 2, 9},
+  {"10-node tetrahedra", 3, 10},
+  {"27-node hexahedra", 3, 27},
+  {"18-node prisms", 3, 18},
+  {"14-node pyramids", 3, 14},
+  {"points", 0, 1},
+  {"8-node quadrangles", 2, 8},
+  {"20-node hexahedra", 3, 20},
+  {"15-node prisms", 3, 15},
+  {"13-node pyramids", 3, 13},
+  {"9-node triangles", 2, 9},
+  {"10-node triangles", 2, 10},
+  {"12-node triangles", 2, 12},
+  {"15-node triangles", 2, 15},
+  {"15-node triangles", 2, 15},
+  {"21-node triangles", 2, 21},
+  {"4-node lines", 1, 4},
+  {"5-node lines", 1, 5},
+  {"6-node lines", 1, 6},
+  {"20-node tetrahedra", 3, 20},
+  {"35-node tetrahedra", 3, 35},
+  {"56-node tetrahedra", 3, 56},
+};
+enum { LINE = 1, TRIANGLE = 2, TET = 4, POINT = 15, NTYPES = 32 };
+
+/* An entity of the geometry in a 4.1 file. */
+typedef struct {
+  PetscInt dim, tags;
+  int64_t tag;
+} Entity;
+
+typedef struct {
+  int64_t number;
+  PetscInt vert;
+} Numbered;
+
+typedef struct {
+  SbScan scan;
+  SbImport *im;
+  int version; /* 22 or 41 */
+  PetscBool binary;
+  /* node numbers to vertices: a table from `first` on when the numbers are dense, else sorted pairs */
+  int64_t first;
+  int64_t ntable;
+  PetscInt *table;  /* [ntable] vertex or -1 */
+  Numbered *sorted; /* [nvert] */
+  PetscInt nentity;
+  Entity *entity;        /* [nentity] */
+  int64_t count[NTYPES]; /* elements read, by type */
+  struct {
+    int dim;
+    int64_t tag;
+    PetscInt tags;
+  } last; /* group of the last element of a 2.2 file: most often also that of the next */
+} Gmsh;
+
+/* ------------------------------------------------------------------ format, names, entities */
+
+static PetscErrorCode read_format(Gmsh *g)
+{
+  SbScan *s = &g->scan;
+  char version[16];
+  int64_t kind, size, one;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbScanWord(s, sizeof(version), version));
+  if (strcmp(version, "2.2") && strcmp(version, "4.1"))
+    SB_SCAN_ERROR(s, "format version '%s'; supple reads 2.2 and 4.1 (gmsh FILE -save -format msh41 converts)",
+                  version);
+  g->version = version[0] == '2' ? 22 : 41;
+  PetscCall(SbScanText(s, "file type 0 or 1", &kind));
+  PetscCall(SbScanText(s, "data size", &size));
+  if (kind != 0 && kind != 1)
+    SB_SCAN_ERROR(s, "file type %lld; expected 0 (text) or 1 (binary)", (long long)kind);
+  if (size != 8) SB_SCAN_ERROR(s, "data size %lld; expected 8", (long long)size);
+  g->binary = (PetscBool)(kind == 1);
+  if (!g->binary) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(SbScanEndOfLine(s));
+  s->binary = s->bytes = PETSC_TRUE;
+  PetscCall(SbScanInt4(s, "number one in binary", &one));
+  if (one == 0x01000000)
+    s->swap = PETSC_TRUE;
+  else if (one != 1)
+    SB_SCAN_ERROR(s, "expected the number one in binary, found %lld; the file is damaged", (long long)one);
+  s->binary = PETSC_FALSE;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Names are text also in binary files. */
+static PetscErrorCode read_names(Gmsh *g)
+{
+  SbScan *s = &g->scan;
+  int64_t n, dim, tag;
+  PetscInt group;
+  char name[SB_GROUP_MAX];
+
+  PetscFunctionBeginUser;
+  PetscCall(SbScanText(s, "number of physical names", &n));
+  PetscCall(SbScanRoom(s, "physical names", n, 6, 6));
+  for (int64_t i = 0; i < n; i++) {
+    PetscCall(SbScanText(s, "dimension of a physical name", &dim));
+    if (dim < 0 || dim > 3)
+      SB_SCAN_ERROR(s, "dimension %lld of a physical name; expected 0 to 3", (long long)dim);
+    PetscCall(SbScanText(s, "number of a physical name", &tag));
+    PetscCall(SbScanQuoted(s, "physical name in quotes", sizeof(name), name));
+    PetscCall(SbImportGroup(g->im, (PetscInt)dim, tag, name, &group));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Physical groups of one entity. A minus sign tells gmsh the orientation; it means nothing here. */
+static PetscErrorCode read_entity_groups(Gmsh *g, int dim, PetscInt *tags)
+{
+  int64_t n, tag;
+  PetscInt *group;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbScanInt8(&g->scan, "number of physical groups of an entity", &n));
+  PetscCall(SbScanRoom(&g->scan, "physical groups", n, 2, 4));
+  PetscCall(PetscMalloc1(n, &group));
+  for (int64_t i = 0; i < n; i++) {
+    const PetscErrorCode ierr = SbScanInt4(&g->scan, "physical group of an entity", &tag);
+
+    if (ierr) {
+      (void)PetscFree(group);
+      PetscFunctionReturn(ierr);
+    }
+    PetscCall(SbImportGroup(g->im, dim, tag < 0 ? -tag : tag, NULL, &group[i]));
+  }
+  PetscCall(SbImportTagSet(g->im, (PetscInt)n, group, tags));
+  PetscCall(PetscFree(group));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode read_entity(Gmsh *g, int dim, Entity *e)
+{
+  SbScan *s = &g->scan;
+  PetscReal box;
+  int64_t n, border;
+
+  PetscFunctionBeginUser;
+  e->dim = dim;
+  PetscCall(SbScanInt4(s, "number of an entity", &e->tag));
+  for (int i = 0; i < (dim ? 6 : 3); i++) PetscCall(SbScanReal(s, "extent of an entity", 0, &box));
+  PetscCall(read_entity_groups(g, dim, &e->tags));
+  if (!dim) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(SbScanInt8(s, "number of bounding entities", &n));
+  PetscCall(SbScanRoom(s, "bounding entities", n, 2, 4));
+  for (int64_t i = 0; i < n; i++) PetscCall(SbScanInt4(s, "bounding entity", &border));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode read_entities(Gmsh *g)
+{
+  SbScan *s = &g->scan;
+  int64_t n[4], total = 0;
+
+  PetscFunctionBeginUser;
+  if (g->entity) SB_SCAN_ERROR(s, "second section $Entities");
+  for (int d = 0; d < 4; d++) {
+    PetscCall(SbScanInt8(s, "number of entities", &n[d]));
+    PetscCall(SbScanRoom(s, "entities", n[d], 10, 28));
+    total += n[d];
+  }
+  PetscCall(PetscMalloc1(total, &g->entity));
+  for (int d = 0; d < 4; d++) {
+    for (int64_t i = 0; i < n[d]; i++) PetscCall(read_entity(g, d, &g->entity[g->nentity++]));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Tag set of an entity; an entity that the file does not list has no groups. */
+static PetscInt entity_tags(const Gmsh *g, int64_t dim, int64_t tag)
+{
+  for (PetscInt i = 0; i < g->nentity; i++) {
+    if (g->entity[i].dim == dim && g->entity[i].tag == tag) return g->entity[i].tags;
+  }
+  return 0;
+}
+
+/* ------------------------------------------------------------------ nodes */
+
+static PetscErrorCode read_node(Gmsh *g, PetscInt v)
+{
+  PetscFunctionBeginUser;
+  for (int i = 0; i < 3; i++) {
+    const long long number = g->im->vert_number[v];
+
+    PetscCall(SbScanReal(&g->scan, "coordinate", number, &g->im->x[3 * v + i]));
+    if (!isfinite(g->im->x[3 * v + i]))
+      SB_SCAN_ERROR(&g->scan, "coordinate of node %lld is not a finite number; repair the file", number);
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode read_nodes_22(Gmsh *g)
+{
+  SbScan *s = &g->scan;
+  int64_t n;
+
+  PetscFunctionBeginUser;
+  s->binary = PETSC_FALSE; /* this one number is text also in binary files */
+  PetscCall(SbScanText(s, "number of nodes", &n));
+  if (g->binary) PetscCall(SbScanEndOfLine(s));
+  s->binary = g->binary;
+  PetscCall(SbScanRoom(s, "nodes", n, 8, 28));
+  PetscCall(SbImportSetVertices(g->im, (PetscInt)n));
+  for (PetscInt v = 0; v < n; v++) {
+    PetscCall(SbScanInt4(s, "number of a node", &g->im->vert_number[v]));
+    PetscCall(read_node(g, v));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* One block: all numbers, then all coordinates with up to three parameters on the entity. */
+static PetscErrorCode read_node_block(Gmsh *g, PetscInt *v)
+{
+  SbScan *s = &g->scan;
+  int64_t dim, tag, parametric, n;
+  PetscReal parameter;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbScanInt4(s, "dimension of a block of nodes", &dim));
+  PetscCall(SbScanInt4(s, "entity of a block of nodes", &tag));
+  PetscCall(SbScanInt4(s, "mark of parametric nodes", &parametric));
+  PetscCall(SbScanInt8(s, "number of nodes in a block", &n));
+  if (dim < 0 || dim > 3)
+    SB_SCAN_ERROR(s, "dimension %lld of a block of nodes; expected 0 to 3", (long long)dim);
+  if (n < 0 || n > g->im->nvert - *v)
+    SB_SCAN_ERROR(s, "block of %lld nodes; only %lld of those announced for the section are left",
+                  (long long)n, (long long)(g->im->nvert - *v));
+  for (PetscInt i = 0; i < n; i++) PetscCall(SbScanInt8(s, "number of a node", &g->im->vert_number[*v + i]));
+  for (PetscInt i = 0; i < n; i++) {
+    PetscCall(read_node(g, *v + i));
+    for (int k = 0; parametric && k < dim; k++)
+      PetscCall(SbScanReal(s, "parameter", g->im->vert_number[*v + i], &parameter));
+  }
+  *v += (PetscInt)n;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode read_nodes_41(Gmsh *g)
+{
+  SbScan *s = &g->scan;
+  int64_t nblock, n, bound;
+  PetscInt v = 0;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbScanInt8(s, "number of blocks of nodes", &nblock));
+  PetscCall(SbScanInt8(s, "number of nodes", &n));
+  PetscCall(SbScanInt8(s, "lowest number of a node", &bound));
+  PetscCall(SbScanInt8(s, "highest number of a node", &bound));
+  PetscCall(SbScanRoom(s, "nodes", n, 8, 32));
+  PetscCall(SbImportSetVertices(g->im, (PetscInt)n));
+  for (int64_t b = 0; b < nblock; b++) PetscCall(read_node_block(g, &v));
+  if (v < n) SB_SCAN_ERROR(s, "%lld nodes are announced, the blocks hold %lld", (long long)n, (long long)v);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static int compare_numbered(const void *a, const void *b)
+{
+  const int64_t p = ((const Numbered *)a)->number, q = ((const Numbered *)b)->number;
+
+  return (p > q) - (p < q);
+}
+
+/* Prepares the way from node numbers to vertices; a number given twice is an error. */
+static PetscErrorCode index_nodes(Gmsh *g)
+{
+  const PetscInt n = g->im->nvert;
+  const int64_t *number = g->im->vert_number;
+  int64_t lo = n ? number[0] : 0, hi = lo, twice = 0;
+  PetscBool repeated = PETSC_FALSE;
+
+  PetscFunctionBeginUser;
+  for (PetscInt v = 1; v < n; v++) {
+    lo = PetscMin(lo, number[v]);
+    hi = PetscMax(hi, number[v]);
+  }
+  g->first = lo;
+  if ((uint64_t)hi - (uint64_t)lo < 16 * (uint64_t)n + 1024) {
+    g->ntable = hi - lo + 1;
+    PetscCall(PetscMalloc1((size_t)g->ntable, &g->table));
+    for (int64_t i = 0; i < g->ntable; i++) g->table[i] = -1;
+    for (PetscInt v = 0; v < n; v++) {
+      if (g->table[number[v] - lo] >= 0) repeated = PETSC_TRUE, twice = number[v];
+      g->table[number[v] - lo] = v;
+    }
+  } else {
+    PetscCall(PetscMalloc1(n, &g->sorted));
+    for (PetscInt v = 0; v < n; v++) g->sorted[v] = (Numbered){number[v], v};
+    qsort(g->sorted, (size_t)n, sizeof(*g->sorted), compare_numbered);
+    for (PetscInt v = 1; v < n; v++) {
+      if (g->sorted[v].number == g->sorted[v - 1].number) repeated = PETSC_TRUE, twice = g->sorted[v].number;
+    }
+  }
+  if (repeated) SB_SCAN_ERROR(&g->scan, "node %lld is given twice; renumber the nodes", (long long)twice);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode read_nodes(Gmsh *g)
+{
+  PetscFunctionBeginUser;
+  if (g->im->x) SB_SCAN_ERROR(&g->scan, "second section $Nodes");
+  if (g->version == 22)
+    PetscCall(read_nodes_22(g));
+  else
+    PetscCall(read_nodes_41(g));
+  PetscCall(index_nodes(g));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Vertex of a node number, -1 when there is none. */
+static PetscInt find_node(const Gmsh *g, int64_t number)
+{
+  const Numbered key = {number, 0};
+  const Numbered *found;
+
+  if (g->table) {
+    const uint64_t i = (uint64_t)number - (uint64_t)g->first;
+
+    return number < g->first || i >= (uint64_t)g->ntable ? -1 : g->table[i];
+  }
+  if (!g->sorted) return -1;
+  found = (const Numbered *)bsearch(&key, g->sorted, (size_t)g->im->nvert, sizeof(key), compare_numbered);
+  return found ? found->vert : -1;
+}
+
+/* ------------------------------------------------------------------ elements */
+
+static PetscErrorCode check_type(Gmsh *g, int64_t type)
+{
+  PetscFunctionBeginUser;
+  if (type < 1 || type >= NTYPES)
+    SB_SCAN_ERROR(&g->scan,
+                  "element type %lld; supple needs 4-node tetrahedra (type 4), with points, lines and "
+                  "triangles for groups",
+                  (long long)type);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Reads the nodes of one element and keeps what is of use. */
+static PetscErrorCode read_element(Gmsh *g, int type, int64_t number, PetscInt tags)
+{
+  SbScan *s = &g->scan;
+  int64_t node;
+  PetscInt vert[64];
+  const int n = types[type].nnode;
+
+  PetscFunctionBeginUser;
+  for (int i = 0; i < n; i++) {
+    if (g->version == 22)
+      PetscCall(SbScanInt4(s, "node of an element", &node));
+    else
+      PetscCall(SbScanInt8(s, "node of an element", &node));
+    vert[i] = find_node(g, node);
+    if (vert[i] < 0)
+      SB_SCAN_ERROR(s, "element %lld uses node %lld, which $Nodes does not list", (long long)number,
+                    (long long)node);
+  }
+  g->count[type]++;
+  if (type == TET || (tags && (type == POINT || type == LINE || type == TRIANGLE)))
+    PetscCall(SbImportAddItem(g->im, types[type].dim, vert, tags, number));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Tags of one element of a 2.2 file: the first is its group, 0 for none; the others do not concern us. */
+static PetscErrorCode read_tags_22(Gmsh *g, int dim, int64_t ntag, PetscInt *tags)
+{
+  int64_t tag = 0, other;
+  PetscInt group;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbScanRoom(&g->scan, "tags of an element", ntag, 2, 4));
+  for (int64_t k = 0; k < ntag; k++) PetscCall(SbScanInt4(&g->scan, "tag of an element", k ? &other : &tag));
+  if (tag && (tag != g->last.tag || dim != g->last.dim)) {
+    PetscCall(SbImportGroup(g->im, dim, tag < 0 ? -tag : tag, NULL, &group));
+    PetscCall(SbImportTagSet(g->im, 1, &group, &g->last.tags));
+    g->last.dim = dim;
+    g->last.tag = tag;
+  }
+  *tags = tag ? g->last.tags : 0;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Elements of one type: as text one, whose line tells type and number of tags; in binary as many as their header says. */
+static PetscErrorCode read_elements_22_run(Gmsh *g, int64_t left, int64_t *nread)
+{
+  SbScan *s = &g->scan;
+  int64_t number = 0, type, ntag, n = 1;
+  PetscInt tags = 0;
+
+  PetscFunctionBeginUser;
+  if (!s->binary) PetscCall(SbScanInt4(s, "number of an element", &number));
+  PetscCall(SbScanInt4(s, "type of an element", &type));
+  PetscCall(check_type(g, type));
+  if (s->binary) PetscCall(SbScanInt4(s, "number of elements in a block", &n));
+  PetscCall(SbScanInt4(s, "number of tags of an element", &ntag));
+  if (n < 1 || n > left)
+    SB_SCAN_ERROR(s, "block of %lld elements; only %lld of those announced for the section are left",
+                  (long long)n, (long long)left);
+  for (int64_t i = 0; i < n; i++) {
+    if (s->binary) PetscCall(SbScanInt4(s, "number of an element", &number));
+    PetscCall(read_tags_22(g, types[type].dim, ntag, &tags));
+    PetscCall(read_element(g, (int)type, number, tags));
+  }
+  *nread = n;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode read_elements_22(Gmsh *g)
+{
+  SbScan *s = &g->scan;
+  int64_t n, nrun = 1;
+
+  PetscFunctionBeginUser;
+  s->binary = PETSC_FALSE;
+  PetscCall(SbScanText(s, "number of elements", &n));
+  if (g->binary) PetscCall(SbScanEndOfLine(s));
+  s->binary = g->binary;
+  PetscCall(SbScanRoom(s, "elements", n, 8, 8));
+  for (int64_t i = 0; i < n; i += nrun) PetscCall(read_elements_22_run(g, n - i, &nrun));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode read_elements_41(Gmsh *g)
+{
+  SbScan *s = &g->scan;
+  int64_t nblock, total, bound, dim, tag, type, n, number, nread = 0;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbScanInt8(s, "number of blocks of elements", &nblock));
+  PetscCall(SbScanInt8(s, "number of elements", &total));
+  PetscCall(SbScanInt8(s, "lowest number of an element", &bound));
+  PetscCall(SbScanInt8(s, "highest number of an element", &bound));
+  PetscCall(SbScanRoom(s, "elements", total, 4, 16));
+  for (int64_t b = 0; b < nblock; b++, nread += n) {
+    PetscCall(SbScanInt4(s, "dimension of a block of elements", &dim));
+    PetscCall(SbScanInt4(s, "entity of a block of elements", &tag));
+    PetscCall(SbScanInt4(s, "type of a block of elements", &type));
+    PetscCall(SbScanInt8(s, "number of elements in a block", &n));
+    PetscCall(check_type(g, type));
+    if (n < 0 || n > total - nread)
+      SB_SCAN_ERROR(s, "block of %lld elements; only %lld of those announced for the section are left",
+                    (long long)n, (long long)(total - nread));
+    tag = entity_tags(g, dim, tag);
+    if (tag && dim != types[type].dim)
+      SB_SCAN_ERROR(s, "%s in a block of dimension %lld; the file is damaged", types[type].name,
+                    (long long)dim);
+    for (int64_t i = 0; i < n; i++) {
+      PetscCall(SbScanInt8(s, "number of an element", &number));
+      PetscCall(read_element(g, (int)type, number, (PetscInt)tag));
+    }
+  }
+  if (nread < total)
+    SB_SCAN_ERROR(s, "%lld elements are announced, the blocks hold %lld", (long long)total, (long long)nread);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode read_elements(Gmsh *g)
+{
+  PetscFunctionBeginUser;
+  if (!g->im->x) SB_SCAN_ERROR(&g->scan, "section $Elements before $Nodes");
+  if (g->version == 22)
+    PetscCall(read_elements_22(g));
+  else
+    PetscCall(read_elements_41(g));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ tets that version 2.2 repeats */
+
+/* Whether two tets have the same vertices. */
+static PetscBool same_tet(const PetscInt a[4], const PetscInt b[4])
+{
+  for (int i = 0; i < 4; i++) {
+    if (a[i] != b[0] && a[i] != b[1] && a[i] != b[2] && a[i] != b[3]) return PETSC_FALSE;
+  }
+  return PETSC_TRUE;
+}
+
+/* Joins the groups of `from` to those of `to`, unless they share one: then the tet is given twice, for check.c to find. */
+static PetscErrorCode join_groups(SbImport *im, PetscInt from, PetscInt to, PetscBool *joined)
+{
+  PetscInt *tags = im->item[3].tags, *group, n = 0;
+
+  PetscFunctionBeginUser;
+  *joined = PETSC_FALSE;
+  for (PetscInt i = im->tags_start[tags[from]]; i < im->tags_start[tags[from] + 1]; i++) {
+    for (PetscInt j = im->tags_start[tags[to]]; j < im->tags_start[tags[to] + 1]; j++) {
+      if (im->tags_group[i] == im->tags_group[j]) PetscFunctionReturn(PETSC_SUCCESS);
+    }
+  }
+  PetscCall(PetscMalloc1(im->ngroup, &group));
+  for (PetscInt i = im->tags_start[tags[from]]; i < im->tags_start[tags[from] + 1]; i++)
+    group[n++] = im->tags_group[i];
+  *joined = (PetscBool)(n > 0);
+  for (PetscInt i = im->tags_start[tags[to]]; i < im->tags_start[tags[to] + 1]; i++)
+    group[n++] = im->tags_group[i];
+  if (*joined) PetscCall(SbImportTagSet(im, n, group, &tags[to]));
+  PetscCall(PetscFree(group));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Lists the tets by their lowest vertex and compares within each list; the first of equal tets stays. */
+static PetscErrorCode merge_repeats(SbImport *im)
+{
+  SbItems *tet = &im->item[3];
+  PetscInt *head, *next, kept = 0;
+  PetscBool joined;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscMalloc2(im->nvert, &head, tet->n, &next));
+  for (PetscInt v = 0; v < im->nvert; v++) head[v] = -1;
+  for (PetscInt c = 0; c < tet->n; c++) {
+    PetscInt *v = tet->vert + 4 * c, lo = PetscMin(PetscMin(v[0], v[1]), PetscMin(v[2], v[3])), same;
+
+    joined = PETSC_FALSE;
+    for (same = head[lo]; same >= 0 && !same_tet(v, tet->vert + 4 * same); same = next[same]) {
+    }
+    if (same >= 0) PetscCall(join_groups(im, c, same, &joined));
+    if (joined) continue;
+    PetscCall(PetscArraymove(tet->vert + 4 * kept, v, 4));
+    tet->tags[kept] = tet->tags[c];
+    tet->number[kept] = tet->number[c];
+    next[kept] = head[lo];
+    head[lo] = kept++;
+  }
+  tet->n = kept;
+  PetscCall(PetscFree2(head, next));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ the file */
+
+/* What was read must be a mesh of tets and of nothing else in the volume. */
+static PetscErrorCode check_content(const Gmsh *g)
+{
+  const char *where = g->im->where;
+
+  PetscFunctionBeginUser;
+  PetscCheck(g->im->x, PETSC_COMM_SELF, PETSC_ERR_FILE_UNEXPECTED,
+             "%s: has no section $Nodes; it is truncated or not a mesh", where);
+  for (int t = 1; t < NTYPES; t++) {
+    const char *advice =
+      strstr(types[t].name, "tetra")
+        ? "supple needs 4-node ones (gmsh: Mesh.ElementOrder = 1)"
+        : "supple simulates tetrahedra only: split them (gmsh: Mesh.SubdivisionAlgorithm = 0, "
+          "Recombine off)";
+
+    PetscCheck(t == TET || types[t].dim < 3 || !g->count[t], PETSC_COMM_SELF, PETSC_ERR_FILE_UNEXPECTED,
+               "%s: holds %lld %s; %s", where, (long long)g->count[t], types[t].name, advice);
+  }
+  for (int t = 1; t < NTYPES && !g->count[TET]; t++) {
+    PetscCheck(types[t].dim < 2 || !g->count[t], PETSC_COMM_SELF, PETSC_ERR_FILE_UNEXPECTED,
+               "%s: is a surface: %lld %s and no tetrahedra; mesh the volume (gmsh -3)", where,
+               (long long)g->count[t], types[t].name);
+  }
+  PetscCheck(g->count[TET], PETSC_COMM_SELF, PETSC_ERR_FILE_UNEXPECTED,
+             "%s: holds no tetrahedra; mesh the volume (gmsh -3) and save all of it", where);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The sections that concern us; all others are skipped. */
+static PetscErrorCode read_section(Gmsh *g, const char *name, PetscBool *known)
+{
+  SbScan *s = &g->scan;
+
+  PetscFunctionBeginUser;
+  *known = PETSC_TRUE;
+  if (!strcmp(name, "$PhysicalNames"))
+    PetscCall(read_names(g));
+  else if (!strcmp(name, "$Entities") || !strcmp(name, "$Nodes") || !strcmp(name, "$Elements")) {
+    PetscCall(SbScanEndOfLine(s));
+    s->binary = g->binary;
+    if (name[2] == 'n')
+      PetscCall(read_entities(g));
+    else if (name[1] == 'N')
+      PetscCall(read_nodes(g));
+    else
+      PetscCall(read_elements(g));
+    s->binary = PETSC_FALSE;
+  } else if (!strcmp(name, "$PartitionedEntities")) {
+    SB_SCAN_ERROR(s, "the mesh is cut into partitions; save it in one piece (gmsh: Mesh, Unpartition)");
+  } else
+    *known = PETSC_FALSE;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode read_sections(Gmsh *g)
+{
+  SbScan *s = &g->scan;
+  char name[64], end[64], closing[72];
+  PetscBool known;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbScanWord(s, sizeof(name), name));
+  if (!strcmp(name, "$NOD"))
+    SB_SCAN_ERROR(s, "gmsh format 1; supple reads 2.2 and 4.1 (gmsh FILE -save -format msh41 converts)");
+  if (strcmp(name, "$MeshFormat")) SB_SCAN_ERROR(s, "expected $MeshFormat; this is no gmsh mesh file");
+  PetscCall(read_format(g));
+  for (;;) {
+    (void)snprintf(closing, sizeof(closing), "$End%s", name + 1);
+    PetscCall(SbScanWord(s, sizeof(end), end));
+    if (!end[0])
+      SB_SCAN_ERROR(s, "the file ends where %s is expected; it is truncated, write or copy it again",
+                    closing);
+    if (strcmp(end, closing))
+      SB_SCAN_ERROR(s, "expected %s, found '%.20s'; the section is longer than announced or damaged", closing,
+                    end);
+    PetscCall(SbScanWord(s, sizeof(name), name));
+    if (!name[0]) break;
+    if (name[0] != '$')
+      SB_SCAN_ERROR(s, "expected the beginning of a section, as $Nodes, found '%.20s'", name);
+    PetscCall(read_section(g, name, &known));
+    (void)snprintf(closing, sizeof(closing), "$End%s", name + 1);
+    if (!known && !SbScanFind(s, closing))
+      SB_SCAN_ERROR(s, "section %s has no end; the file is truncated, write or copy it again", name);
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode read_file(const char *path, Gmsh *g)
+{
+  PetscFunctionBeginUser;
+  PetscCall(SbScanOpen(g->im->where, path, &g->scan));
+  PetscCall(read_sections(g));
+  PetscCall(check_content(g));
+  if (g->version == 22 && g->im->ngroup > 1) PetscCall(merge_repeats(g->im));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbImportRead_Gmsh(const char *path, SbImport *im)
+{
+  Gmsh g;
+  PetscErrorCode ierr;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscMemzero(&g, sizeof(g)));
+  g.im = im;
+  ierr = read_file(path, &g);
+  PetscCall(SbScanClose(&g.scan));
+  PetscCall(PetscFree(g.table));
+  PetscCall(PetscFree(g.sorted));
+  PetscCall(PetscFree(g.entity));
+  PetscCall(ierr);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

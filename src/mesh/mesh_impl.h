@@ -1,0 +1,186 @@
+/*
+  mesh_impl.h - what the files of src/mesh/ share: a body as its reader delivers it, its faces, all bodies in one piece.
+
+  Everything here lives on rank 0 until distribute.c hands the pieces to their ranks.
+*/
+#pragma once
+#include "sbmesh.h"
+
+#define SB_GROUP_MAX (2 * SB_NAME_MAX) /* longest name of a physical group, with the terminating zero */
+
+/* ------------------------------------------------------------------ import.c: one body in memory */
+
+/* A physical group of a file, or a side of a box: a name for entities of one dimension. */
+typedef struct {
+  PetscInt dim; /* 0 points, 1 curves, 2 surfaces, 3 volumes */
+  int64_t tag;  /* number in the file */
+  char name[SB_GROUP_MAX];
+} SbGroup;
+
+/* Simplices of one dimension. */
+typedef struct {
+  PetscInt n, capacity;
+  PetscInt *vert;  /* [n][dim + 1] */
+  PetscInt *tags;  /* [n] tag set */
+  int64_t *number; /* [n] number in the file, for messages */
+} SbItems;
+
+/* A body as its reader delivers it. Zeroed before the reader is called; freed by SbImportDestroy(), also after an error. */
+typedef struct {
+  char where[PETSC_MAX_PATH_LEN + 2 * SB_NAME_MAX]; /* "body 'liver': liver.msh", begins every message */
+  PetscInt nvert;
+  PetscReal *x;         /* [nvert][3] m once placed */
+  int64_t *vert_number; /* [nvert] number in the file */
+  SbItems item[4];      /* by dimension; item[3] are the tets */
+  PetscInt ngroup;
+  SbGroup *group;       /* [ngroup] */
+  PetscInt ntags;       /* tag sets: which groups an item belongs to. Set 0 is empty */
+  PetscInt *tags_start; /* [ntags + 1] */
+  PetscInt *tags_group; /* [tags_start[ntags]] groups, ascending in each set */
+  PetscInt capacity[3]; /* of group, tags_start, tags_group */
+  /* found by SbImportCheck() */
+  PetscInt nunused;     /* vertices left out */
+  PetscInt nreoriented; /* cells turned */
+  PetscInt nlost;       /* triangles of groups that are no face of a tet */
+  PetscInt npinched;    /* surface edges with more than two facets */
+} SbImport;
+
+/* A reader fills x, vert_number, items and groups from the file or description `text`. */
+typedef PetscErrorCode (*SbReader)(const char *text, SbImport *body);
+PetscErrorCode SbImportRead_Gmsh(const char *path, SbImport *body);
+PetscErrorCode SbImportRead_Box(const char *text, SbImport *body);
+
+/* Chooses the reader by the name of the mesh, reads, places. Not collective. */
+PetscErrorCode SbImportRead(const SbBody *body, SbImport *import);
+PetscErrorCode SbImportDestroy(SbImport *import);
+/* Room for n vertices. */
+PetscErrorCode SbImportSetVertices(SbImport *import, PetscInt n);
+/* Appends a simplex; vert[dim + 1]. */
+PetscErrorCode SbImportAddItem(SbImport *import, int dim, const PetscInt vert[], PetscInt tags,
+                               int64_t number);
+/* The group (dim, tag), made when new; a NULL name means "surface_12" until somebody gives one. */
+PetscErrorCode SbImportGroup(SbImport *import, PetscInt dim, int64_t tag, const char *name, PetscInt *group);
+/* The tag set that holds exactly these groups (any order, repeats allowed, reordered here), made when new. */
+PetscErrorCode SbImportTagSet(SbImport *import, PetscInt n, PetscInt groups[], PetscInt *tags);
+
+/* ------------------------------------------------------------------ faces.c: which cells share a face */
+
+typedef struct {
+  uint64_t key;  /* middle and highest vertex */
+  PetscInt slot; /* 4 * cell + face */
+} SbFaceKey;
+
+typedef struct {
+  PetscInt nvert, ncell;
+  PetscInt *start;     /* [nvert + 1] into `face`: faces by lowest vertex */
+  SbFaceKey *face;     /* [4 * ncell] ascending keys below each lowest vertex */
+  PetscInt *neighbour; /* [ncell][4] cell across face f (opposite vertex f), -1 on the boundary */
+  PetscInt nboundary;
+  PetscInt nshared;   /* faces of more than two cells */
+  PetscInt shared[3]; /* three cells at the first one of these */
+} SbFaces;
+
+extern const int
+  SbFaceVertex[4][3]; /* of face f, counter-clockwise seen from outside a positively oriented tet */
+
+PetscErrorCode SbFacesCreate(PetscInt nvert, PetscInt ncell, const PetscInt cell[], SbFaces *faces);
+PetscErrorCode SbFacesDestroy(SbFaces *faces);
+/* Slots of the face with these vertices: 0 (no such face), 1 (boundary) or 2. */
+PetscInt SbFacesFind(const SbFaces *faces, const PetscInt vert[3], PetscInt slots[2]);
+
+/* ------------------------------------------------------------------ check.c, quality.c, sets.c */
+
+/* Drops unused vertices, turns cells, refuses what would make the physics wrong; builds the faces. */
+PetscErrorCode SbImportCheck(SbImport *import, SbFaces *faces);
+/* Volume, shape, extent and number of parts: fills the "found" fields of the body. */
+PetscErrorCode SbImportQuality(const SbImport *import, const SbFaces *faces, SbBody *body);
+/* Six times the signed volume of a tet, m^3. */
+PetscReal SbTetDet(const PetscReal x[], const PetscInt vert[4]);
+
+/* Masks of one body, zero on entry. */
+typedef struct {
+  uint64_t *vert; /* [nvert] */
+  uint64_t *cell; /* [ncell] */
+  uint64_t *face; /* [ncell][4] */
+} SbMasks;
+/* Marks boundary faces and the members of all sets in body b; adds to the counts of the sets. */
+PetscErrorCode SbSetsMark(const SbImport *import, const SbFaces *faces, PetscInt nbody, const SbBody body[],
+                          PetscInt b, PetscInt nset, SbSet set[], SbMasks *masks);
+/* A set that selects nothing is an error, which lists the groups that exist. */
+PetscErrorCode SbSetsCheck(PetscInt nbody, const SbBody body[], const SbImport import[], PetscInt nset,
+                           const SbSet set[]);
+
+/* ------------------------------------------------------------------ whole.c, distribute.c, order.c, number.c: from rank 0 to all */
+
+/* What travels with a point of the DMPlex. */
+typedef struct {
+  PetscInt orig, body;
+  uint64_t set;
+  union {
+    PetscReal x[3];   /* of a vertex */
+    uint64_t face[4]; /* of a cell */
+  } u;
+} SbPoint;
+
+/* All bodies in one piece; on ranks other than 0 it is empty. */
+typedef struct {
+  PetscInt nvert, ncell;
+  PetscInt *cell;      /* [ncell][4] */
+  PetscInt *neighbour; /* [ncell][4] cell across the face, -1 on the boundary */
+  SbPoint *point;      /* [ncell + nvert] cells, then vertices */
+} SbWhole;
+
+/* Rank 0: reads, checks and merges all bodies, fills their "found" fields and those of the sets. */
+PetscErrorCode SbWholeCreate(PetscInt nbody, SbBody body[], PetscInt nset, SbSet set[], SbWhole *whole);
+PetscErrorCode SbWholeDestroy(SbWhole *whole);
+
+/* DMPlex of cells and vertices, distributed with one layer of overlap; point[] of every local point. Collective. */
+PetscErrorCode SbDistribute(MPI_Comm comm, const char *partitioner, const SbWhole *whole, DM *dm,
+                            SbPoint **point);
+/* Hands the neighbours of all cells (on rank 0) to a partitioner of type metis, which then needs no graph from PETSc. */
+PetscErrorCode SbPartitionerSetNeighbours(PetscPartitioner part, PetscInt ncell, const PetscInt neighbour[]);
+PetscErrorCode SbPartitionerRegister(void);
+/* Reverse Cuthill-McKee order: order[i] is the vertex that gets number i. A cell's vertex may be -1: it takes no part. */
+PetscErrorCode SbOrderRCM(PetscInt nvert, PetscInt ncell, const PetscInt cell[], PetscInt order[]);
+/* Own local numbering: fills the arrays and counts of the mesh from its DM. Collective. */
+PetscErrorCode SbMeshNumber(SbMesh mesh, const SbPoint point[]);
+
+/* ------------------------------------------------------------------ scan.c: a file in memory */
+
+typedef struct {
+  const char *where; /* begins every message */
+  char *data;        /* whole file and a terminating zero */
+  const char *end;
+  const char *at;    /* next byte */
+  const char *token; /* what was read last, for messages */
+  PetscBool binary;  /* the numbers that follow are binary */
+  PetscBool bytes;   /* messages count bytes instead of lines */
+  PetscBool swap;    /* from a machine with the other byte order */
+} SbScan;
+
+PetscErrorCode SbScanOpen(const char *where, const char *path, SbScan *scan);
+PetscErrorCode SbScanClose(SbScan *scan);
+/* "line 12" or "byte 4711" of the last token. */
+const char *SbScanPlace(const SbScan *scan, char place[64]);
+/* Numbers, as text or in binary of 4 or 8 bytes; `what` tells what is expected there. */
+PetscErrorCode SbScanText(SbScan *scan, const char *what, int64_t *value); /* always text */
+PetscErrorCode SbScanInt4(SbScan *scan, const char *what, int64_t *value);
+PetscErrorCode SbScanInt8(SbScan *scan, const char *what, int64_t *value);
+PetscErrorCode SbScanReal(SbScan *scan, const char *what, int64_t number,
+                          PetscReal *value); /* `what` of `number` */
+/* A count of things that take at least so many bytes each as text and in binary: more than the file holds is an error. */
+PetscErrorCode SbScanRoom(SbScan *scan, const char *what, int64_t n, int64_t text_bytes,
+                          int64_t binary_bytes);
+PetscErrorCode SbScanQuoted(SbScan *scan, const char *what, size_t size, char value[]); /* "in quotes" */
+/* The next word; empty at the end of the file. */
+PetscErrorCode SbScanWord(SbScan *scan, size_t size, char word[]);
+PetscErrorCode SbScanEndOfLine(SbScan *scan);         /* to the first byte after it */
+PetscBool SbScanFind(SbScan *scan, const char *text); /* moves to its beginning */
+
+#define SB_SCAN_ERROR(scan, ...)                                                    \
+  do {                                                                              \
+    char sb_place[64], sb_text[512];                                                \
+    (void)snprintf(sb_text, sizeof(sb_text), __VA_ARGS__);                          \
+    SETERRQ(PETSC_COMM_SELF, PETSC_ERR_FILE_UNEXPECTED, "%s %s: %s", (scan)->where, \
+            SbScanPlace(scan, sb_place), sb_text);                                  \
+  } while (0)

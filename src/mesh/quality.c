@@ -1,0 +1,137 @@
+/*
+  quality.c - size and shape of a body's mesh.
+
+  With outward area vectors n_i of the faces opposite vertex i, the dihedral angle at the edge that faces i and j share is
+  acos(-n_i . n_j / (|n_i| |n_j|)). The radius ratio is R / (3 r), 1 for the regular tet: r = 3 V / sum |n_i| and
+  R = | |a|^2 b x c + |b|^2 c x a + |c|^2 a x b | / (12 V) with the edges a, b, c from vertex 0 (Shewchuk, "What is a good
+  linear finite element?", 2002).
+*/
+#include "mesh_impl.h"
+
+static inline void cross(const PetscReal a[3], const PetscReal b[3], PetscReal c[3])
+{
+  c[0] = a[1] * b[2] - a[2] * b[1];
+  c[1] = a[2] * b[0] - a[0] * b[2];
+  c[2] = a[0] * b[1] - a[1] * b[0];
+}
+
+static inline PetscReal dot(const PetscReal a[3], const PetscReal b[3])
+{
+  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+/* Volume, largest cosine of a dihedral angle, radius ratio of one tet. */
+static inline void shape(const PetscReal x[], const PetscInt v[4], PetscReal *V, PetscReal *max_cos,
+                         PetscReal *ratio)
+{
+  PetscReal a[3], b[3], c[3], n[4][3], area[4], to_centre[3], sum = 0, det;
+
+  for (int i = 0; i < 3; i++) {
+    a[i] = x[3 * v[1] + i] - x[3 * v[0] + i];
+    b[i] = x[3 * v[2] + i] - x[3 * v[0] + i];
+    c[i] = x[3 * v[3] + i] - x[3 * v[0] + i];
+  }
+  /* Twice the area vectors; they sum to zero. */
+  cross(c, b, n[1]);
+  cross(a, c, n[2]);
+  cross(b, a, n[3]);
+  for (int i = 0; i < 3; i++) n[0][i] = -n[1][i] - n[2][i] - n[3][i];
+  det = -dot(a, n[1]);
+  for (int i = 0; i < 4; i++) {
+    area[i] = PetscSqrtReal(dot(n[i], n[i]));
+    sum += area[i];
+  }
+  *max_cos = -1;
+  for (int i = 0; i < 4; i++) {
+    for (int j = 0; j < i; j++) {
+      const PetscReal cosine = -dot(n[i], n[j]) / (area[i] * area[j]);
+
+      *max_cos = PetscMax(*max_cos, cosine);
+    }
+  }
+  for (int i = 0; i < 3; i++) to_centre[i] = dot(a, a) * n[1][i] + dot(b, b) * n[2][i] + dot(c, c) * n[3][i];
+  *V = det / 6;
+  *ratio = PetscSqrtReal(dot(to_centre, to_centre)) / (2 * det) * sum / (3 * det);
+}
+
+/* Parts of a body that share no vertex: sets of vertices, joined by every tet. */
+static PetscErrorCode count_parts(const SbImport *im, PetscInt *npart)
+{
+  PetscInt *parent;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscMalloc1(im->nvert, &parent));
+  for (PetscInt v = 0; v < im->nvert; v++) parent[v] = v;
+  *npart = im->nvert;
+  for (PetscInt c = 0; c < im->item[3].n; c++) {
+    PetscInt root = im->item[3].vert[4 * c];
+
+    for (; parent[root] != root; root = parent[root]) parent[root] = parent[parent[root]];
+    for (int i = 1; i < 4; i++) {
+      PetscInt other = im->item[3].vert[4 * c + i];
+
+      for (; parent[other] != other; other = parent[other]) parent[other] = parent[parent[other]];
+      if (other == root) continue;
+      parent[PetscMax(root, other)] = PetscMin(root, other);
+      root = PetscMin(root, other);
+      (*npart)--;
+    }
+  }
+  PetscCall(PetscFree(parent));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* What was repaired or is odd, in one line; empty when there is nothing. */
+static PetscErrorCode write_note(const SbImport *im, SbBody *body)
+{
+  const struct {
+    PetscInt n;
+    const char *text;
+  } notes[] = {
+    {im->nunused, "unused vertices left out"},
+    {im->nreoriented, "inverted tets turned"},
+    {body->npart > 1 ? body->npart : 0, "parts that share no vertex"},
+    {im->npinched, "surface edges with more than two facets"},
+    {im->nlost, "triangles of groups that are no face of a tet"},
+  };
+  char one[128];
+
+  PetscFunctionBeginUser;
+  body->note[0] = 0;
+  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(notes); i++) {
+    if (!notes[i].n) continue;
+    (void)snprintf(one, sizeof(one), "%s%" PetscInt_FMT " %s", body->note[0] ? ", " : "", notes[i].n,
+                   notes[i].text);
+    PetscCall(PetscStrlcat(body->note, one, sizeof(body->note)));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbImportQuality(const SbImport *im, const SbFaces *faces, SbBody *body)
+{
+  PetscReal V, cosine, ratio, max_cos = -1, volume = 0, max_ratio = 0;
+
+  PetscFunctionBeginUser;
+  for (PetscInt c = 0; c < im->item[3].n; c++) {
+    shape(im->x, im->item[3].vert + 4 * c, &V, &cosine, &ratio);
+    volume += V;
+    max_cos = PetscMax(max_cos, cosine);
+    max_ratio = PetscMax(max_ratio, ratio);
+  }
+  body->nvert = im->nvert;
+  body->ncell = im->item[3].n;
+  body->nfacet = faces->nboundary;
+  body->volume = volume;
+  body->min_dihedral = acos(PetscMin(max_cos, 1)) * 180 / PETSC_PI;
+  body->max_radius_ratio = max_ratio;
+  for (int i = 0; i < 3; i++) body->bbox[i] = body->bbox[3 + i] = im->x[i];
+  for (PetscInt v = 0; v < im->nvert; v++) {
+    for (int i = 0; i < 3; i++) {
+      body->bbox[i] = PetscMin(body->bbox[i], im->x[3 * v + i]);
+      body->bbox[3 + i] = PetscMax(body->bbox[3 + i], im->x[3 * v + i]);
+    }
+  }
+  PetscCall(count_parts(im, &body->npart));
+  PetscCall(write_note(im, body));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

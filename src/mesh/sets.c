@@ -1,0 +1,378 @@
+/*
+  sets.c - named sets: their text, and which vertices, facets and cells they hold, as bits.
+
+  A shape holds the vertices inside it, the boundary facets with all three vertices inside, and the tets with all four.
+  Inside is meant with a slack of 1e-6 times the diagonal of the body, so that a plane through the nodes of a curved or
+  rotated side finds them. A group of points or curves holds vertices; a group of surfaces holds its triangles (also
+  inner ones, seen from both tets) with their vertices; a group of volumes holds its tets, their vertices and their
+  boundary facets. Groups of one name and several dimensions are joined.
+*/
+#include <stdlib.h>
+#include "mesh_impl.h"
+
+/* ------------------------------------------------------------------ text */
+
+static const struct {
+  const char *name, *form;
+  SbSetShape shape;
+  int least, most; /* numbers; 0: a name */
+} shapes[] = {
+  {"group", "group:NAME or group:BODY.NAME", SB_SET_GROUP, 0, 0},
+  {"box", "box:xmin,ymin,zmin,xmax,ymax,zmax (m)", SB_SET_BOX, 6, 6},
+  {"plane", "plane:nx,ny,nz,d or plane:nx,ny,nz,d,tolerance (m)", SB_SET_PLANE, 4, 5},
+  {"sphere", "sphere:cx,cy,cz,radius (m)", SB_SET_SPHERE, 4, 4},
+  {"halfspace", "halfspace:nx,ny,nz,d (m)", SB_SET_HALFSPACE, 4, 4},
+  {"body", "body:NAME", SB_SET_BODY, 0, 0},
+  {"boundary", "boundary", SB_SET_BOUNDARY, -1, -1},
+};
+enum { NSHAPE = (int)PETSC_STATIC_ARRAY_LENGTH(shapes) };
+
+static PetscErrorCode unknown_shape(const char *option, const char *text)
+{
+  const char *names[NSHAPE];
+  char all[256] = "", near[128], word[64];
+
+  PetscFunctionBeginUser;
+  for (int i = 0; i < NSHAPE; i++) {
+    names[i] = shapes[i].name;
+    PetscCall(PetscStrlcat(all, i ? ", " : "", sizeof(all)));
+    PetscCall(PetscStrlcat(all, names[i], sizeof(all)));
+  }
+  PetscCall(PetscStrncpy(word, text, sizeof(word)));
+  if (strchr(word, ':')) *strchr(word, ':') = 0;
+  PetscCall(SbNearest(word, NSHAPE, names, sizeof(near), near));
+  SETERRQ(PETSC_COMM_SELF, PETSC_ERR_USER_INPUT, "%s '%s': a set begins with one of %s%s%s%s", option, text,
+          all, near[0] ? "; did you mean " : "", near, near[0] ? "?" : "");
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Numbers separated by commas; -1 when there is anything else. */
+static int parse_numbers(const char *text, int most, PetscReal p[])
+{
+  int n = 0;
+  char *end;
+
+  for (;;) {
+    const double value = strtod(text, &end);
+
+    if (end == text || n == most || !isfinite(value)) return -1;
+    p[n++] = value;
+    if (!*end) return n;
+    if (*end != ',') return -1;
+    text = end + 1;
+  }
+}
+
+/* Norms the direction of planes (with their distance), refuses empty shapes. */
+static PetscErrorCode check_shape(const char *option, const char *text, SbSet *set)
+{
+  PetscReal *p = set->p;
+
+  PetscFunctionBeginUser;
+  if (set->shape == SB_SET_BOX) {
+    PetscCheck(p[0] <= p[3] && p[1] <= p[4] && p[2] <= p[5], PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
+               "%s '%s': the first corner must lie below the second in x, y and z", option, text);
+  } else if (set->shape == SB_SET_SPHERE) {
+    PetscCheck(p[3] > 0, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT, "%s '%s': the radius must be above 0 m",
+               option, text);
+  } else if (set->shape == SB_SET_PLANE || set->shape == SB_SET_HALFSPACE) {
+    const PetscReal length = PetscSqrtReal(p[0] * p[0] + p[1] * p[1] + p[2] * p[2]);
+
+    PetscCheck(length > 0, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
+               "%s '%s': the normal must have a length above 0", option, text);
+    PetscCheck(set->shape == SB_SET_HALFSPACE || p[4] >= 0, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
+               "%s '%s': the tolerance must not be below 0 m", option, text);
+    for (int i = 0; i < 4; i++) p[i] /= length;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbSetParse(const char *option, const char *text, SbSet *set)
+{
+  const char *colon = strchr(text, ':');
+  size_t n = colon ? (size_t)(colon - text) : strlen(text);
+  int i;
+
+  PetscFunctionBeginUser;
+  for (i = 0; i < NSHAPE; i++) {
+    if (strlen(shapes[i].name) == n && !strncmp(shapes[i].name, text, n)) break;
+  }
+  if (i == NSHAPE) PetscCall(unknown_shape(option, text));
+  set->shape = shapes[i].shape;
+  set->group[0] = 0;
+  PetscCall(PetscArrayzero(set->p, 8));
+  if (shapes[i].least < 0) {
+    PetscCheck(!colon, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT, "%s '%s': write %s", option, text,
+               shapes[i].form);
+  } else if (shapes[i].least == 0) {
+    PetscCheck(colon && colon[1] && strlen(colon + 1) < sizeof(set->group), PETSC_COMM_SELF,
+               PETSC_ERR_USER_INPUT, "%s '%s': write %s", option, text, shapes[i].form);
+    PetscCall(PetscStrncpy(set->group, colon + 1, sizeof(set->group)));
+  } else {
+    PetscCheck(colon && parse_numbers(colon + 1, shapes[i].most, set->p) >= shapes[i].least, PETSC_COMM_SELF,
+               PETSC_ERR_USER_INPUT, "%s '%s': write %s", option, text, shapes[i].form);
+    PetscCall(check_shape(option, text, set));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ members */
+
+static PetscBool inside(const SbSet *set, const PetscReal x[3], PetscReal slack)
+{
+  const PetscReal *p = set->p;
+
+  switch (set->shape) {
+  case SB_SET_BOX:
+    for (int i = 0; i < 3; i++) {
+      if (x[i] < p[i] - slack || x[i] > p[3 + i] + slack) return PETSC_FALSE;
+    }
+    return PETSC_TRUE;
+  case SB_SET_PLANE:
+    return (PetscBool)(PetscAbsReal(p[0] * x[0] + p[1] * x[1] + p[2] * x[2] - p[3]) <= PetscMax(p[4], slack));
+  case SB_SET_SPHERE: {
+    const PetscReal d[3] = {x[0] - p[0], x[1] - p[1], x[2] - p[2]};
+
+    return (PetscBool)(PetscSqrtReal(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]) <= p[3] + slack);
+  }
+  case SB_SET_HALFSPACE:
+    return (PetscBool)(p[0] * x[0] + p[1] * x[1] + p[2] * x[2] <= p[3] + slack);
+  default:
+    return PETSC_FALSE;
+  }
+}
+
+/* The group that a set means in body b: NULL when it speaks of another body. */
+static const char *group_in_body(const SbSet *set, PetscInt nbody, const SbBody body[], PetscInt b)
+{
+  for (PetscInt i = 0; i < nbody; i++) {
+    const size_t n = strlen(body[i].name);
+
+    if (!strncmp(set->group, body[i].name, n) && set->group[n] == '.')
+      return i == b ? set->group + n + 1 : NULL;
+  }
+  return set->group;
+}
+
+/* Bits of each tag set. */
+static PetscErrorCode mark_tags(const SbImport *im, PetscInt nbody, const SbBody body[], PetscInt b,
+                                PetscInt nset, const SbSet set[], uint64_t bits[])
+{
+  PetscFunctionBeginUser;
+  PetscCall(PetscArrayzero(bits, im->ntags));
+  for (PetscInt k = 0; k < nset; k++) {
+    const char *name = set[k].shape == SB_SET_GROUP ? group_in_body(&set[k], nbody, body, b) : NULL;
+
+    for (PetscInt t = 0; name && t < im->ntags; t++) {
+      for (PetscInt i = im->tags_start[t]; i < im->tags_start[t + 1]; i++) {
+        if (!strcmp(im->group[im->tags_group[i]].name, name)) bits[t] |= SB_SET_BIT(k);
+      }
+    }
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Shapes, whole bodies, the boundary. `all` holds the bits of sets that are this body, `hull` those of the boundary. */
+static PetscErrorCode mark_shapes(const SbImport *im, const SbFaces *faces, const SbBody *body, PetscInt nset,
+                                  const SbSet set[], SbMasks *m)
+{
+  const PetscReal *box = body->bbox, size[3] = {box[3] - box[0], box[4] - box[1], box[5] - box[2]};
+  const PetscReal slack = 1e-6 * PetscSqrtReal(size[0] * size[0] + size[1] * size[1] + size[2] * size[2]);
+  uint64_t all = 0, hull = 0;
+
+  PetscFunctionBeginUser;
+  for (PetscInt k = 0; k < nset; k++) {
+    if (set[k].shape == SB_SET_BODY && !strcmp(set[k].group, body->name))
+      all |= SB_SET_BIT(k);
+    else if (set[k].shape == SB_SET_BOUNDARY)
+      hull |= SB_SET_BIT(k);
+    else if (set[k].shape != SB_SET_BODY && set[k].shape != SB_SET_GROUP) {
+      for (PetscInt v = 0; v < im->nvert; v++)
+        m->vert[v] |= inside(&set[k], im->x + 3 * v, slack) ? SB_SET_BIT(k) : 0;
+    }
+  }
+  for (PetscInt c = 0; c < im->item[3].n; c++) {
+    const PetscInt *v = im->item[3].vert + 4 * c;
+
+    m->cell[c] = all | (m->vert[v[0]] & m->vert[v[1]] & m->vert[v[2]] & m->vert[v[3]]);
+    for (int f = 0; f < 4; f++) {
+      const int *w = SbFaceVertex[f];
+
+      if (faces->neighbour[4 * c + f] < 0)
+        m->face[4 * c + f] =
+          SB_ON_BOUNDARY | hull | all | (m->vert[v[w[0]]] & m->vert[v[w[1]]] & m->vert[v[w[2]]]);
+    }
+  }
+  for (PetscInt v = 0; v < im->nvert; v++) m->vert[v] |= all;
+  for (PetscInt s = 0; hull && s < 4 * im->item[3].n; s++) {
+    if (faces->neighbour[s] >= 0) continue;
+    for (int i = 0; i < 3; i++) m->vert[im->item[3].vert[4 * (s / 4) + SbFaceVertex[s % 4][i]]] |= hull;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode mark_groups(const SbImport *im, const SbFaces *faces, const uint64_t bits[], SbMasks *m)
+{
+  PetscInt slots[2];
+
+  PetscFunctionBeginUser;
+  for (int d = 0; d < 4; d++) {
+    const SbItems *item = &im->item[d];
+
+    for (PetscInt i = 0; i < item->n; i++) {
+      const uint64_t bit = bits[item->tags[i]];
+
+      if (!bit) continue;
+      for (int k = 0; k <= d; k++) m->vert[item->vert[(d + 1) * i + k]] |= bit;
+      if (d == 2) {
+        const PetscInt n = SbFacesFind(faces, item->vert + 3 * i, slots);
+
+        for (PetscInt k = 0; k < n; k++) m->face[slots[k]] |= bit;
+      } else if (d == 3) {
+        m->cell[i] |= bit;
+        for (int f = 0; f < 4; f++) m->face[4 * i + f] |= faces->neighbour[4 * i + f] < 0 ? bit : 0;
+      }
+    }
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static void count_bits(uint64_t mask, PetscInt nset, PetscInt *count, size_t stride)
+{
+  for (PetscInt k = 0; mask && k < nset; k++) {
+    if (mask & SB_SET_BIT(k)) (*(PetscInt *)((char *)count + (size_t)k * stride))++;
+  }
+}
+
+PetscErrorCode SbSetsMark(const SbImport *im, const SbFaces *faces, PetscInt nbody, const SbBody body[],
+                          PetscInt b, PetscInt nset, SbSet set[], SbMasks *m)
+{
+  uint64_t *bits;
+
+  PetscFunctionBeginUser;
+  PetscCall(mark_shapes(im, faces, &body[b], nset, set, m));
+  PetscCall(PetscMalloc1(im->ntags, &bits));
+  PetscCall(mark_tags(im, nbody, body, b, nset, set, bits));
+  PetscCall(mark_groups(im, faces, bits, m));
+  PetscCall(PetscFree(bits));
+  if (!nset) PetscFunctionReturn(PETSC_SUCCESS);
+  for (PetscInt v = 0; v < im->nvert; v++) count_bits(m->vert[v], nset, &set->nvert, sizeof(*set));
+  for (PetscInt c = 0; c < im->item[3].n; c++) count_bits(m->cell[c], nset, &set->ncell, sizeof(*set));
+  for (PetscInt s = 0; s < 4 * im->item[3].n; s++) {
+    if (m->face[s] & SB_ON_BOUNDARY)
+      count_bits(m->face[s] & ~SB_ON_BOUNDARY, nset, &set->nfacet, sizeof(*set));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ sets that hold nothing */
+
+/* "liver: wall, ligament; stone: none" */
+static PetscErrorCode list_groups(PetscInt nbody, const SbBody body[], const SbImport import[], size_t size,
+                                  char text[])
+{
+  PetscFunctionBeginUser;
+  text[0] = 0;
+  for (PetscInt b = 0; b < nbody; b++) {
+    const SbImport *im = &import[b];
+
+    PetscCall(PetscStrlcat(text, b ? "; " : "", size));
+    PetscCall(PetscStrlcat(text, body[b].name, size));
+    PetscCall(PetscStrlcat(text, im->ngroup ? ": " : ": none", size));
+    for (PetscInt g = 0; g < im->ngroup; g++) {
+      PetscBool known = PETSC_FALSE;
+
+      for (PetscInt h = 0; h < g; h++)
+        known = (PetscBool)(known || !strcmp(im->group[h].name, im->group[g].name));
+      if (known) continue;
+      PetscCall(PetscStrlcat(text, g ? ", " : "", size));
+      PetscCall(PetscStrlcat(text, im->group[g].name, size));
+    }
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode empty_group(PetscInt nbody, const SbBody body[], const SbImport import[],
+                                  const SbSet *set)
+{
+  const char **names, *wanted = strchr(set->group, '.') ? strchr(set->group, '.') + 1 : set->group;
+  char groups[1024], near[256];
+  PetscInt n = 0, exists = 0;
+
+  PetscFunctionBeginUser;
+  for (PetscInt b = 0; b < nbody; b++) n += import[b].ngroup;
+  PetscCall(PetscMalloc1(n, &names));
+  n = 0;
+  for (PetscInt b = 0; b < nbody; b++) {
+    const char *name = group_in_body(set, nbody, body, b);
+
+    for (PetscInt g = 0; g < import[b].ngroup; g++) {
+      names[n++] = import[b].group[g].name;
+      exists += name && !strcmp(name, import[b].group[g].name);
+    }
+  }
+  PetscCall(SbNearest(wanted, n, names, sizeof(near), near));
+  PetscCall(PetscFree(names));
+  PetscCall(list_groups(nbody, body, import, sizeof(groups), groups));
+  PetscCheck(!exists, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
+             "set '%s': the physical group '%s' holds no vertex, facet or tet of the mesh; the mesh and its "
+             "groups do not belong together",
+             set->name, set->group);
+  SETERRQ(PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
+          "set '%s': there is no physical group '%s'%s%s%s; groups by body: %s", set->name, set->group,
+          near[0] ? ", did you mean " : "", near, near[0] ? "?" : "", groups);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* A shape beside the bodies. */
+static PetscErrorCode empty_shape(PetscInt nbody, const SbBody body[], const SbSet *set)
+{
+  const char *name = NULL;
+  PetscReal box[6];
+
+  PetscFunctionBeginUser;
+  for (int i = 0; i < NSHAPE; i++) {
+    if (shapes[i].shape == set->shape) name = shapes[i].name;
+  }
+  PetscCall(PetscArraycpy(box, body[0].bbox, 6));
+  for (PetscInt b = 1; b < nbody; b++) {
+    for (int i = 0; i < 3; i++) {
+      box[i] = PetscMin(box[i], body[b].bbox[i]);
+      box[3 + i] = PetscMax(box[3 + i], body[b].bbox[3 + i]);
+    }
+  }
+  SETERRQ(PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
+          "set '%s': no vertex lies in the %s; the placed bodies reach from (%.6g, %.6g, %.6g) to (%.6g, "
+          "%.6g, %.6g) m",
+          set->name, name, (double)box[0], (double)box[1], (double)box[2], (double)box[3], (double)box[4],
+          (double)box[5]);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode empty_body(PetscInt nbody, const SbBody body[], const SbSet *set)
+{
+  const char **names;
+  char near[256];
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscMalloc1(nbody, &names));
+  for (PetscInt b = 0; b < nbody; b++) names[b] = body[b].name;
+  PetscCall(SbNearest(set->group, nbody, names, sizeof(near), near));
+  PetscCall(PetscFree(names));
+  SETERRQ(PETSC_COMM_SELF, PETSC_ERR_USER_INPUT, "set '%s': there is no body '%s'%s%s%s", set->name,
+          set->group, near[0] ? "; did you mean " : "", near, near[0] ? "?" : "");
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbSetsCheck(PetscInt nbody, const SbBody body[], const SbImport import[], PetscInt nset,
+                           const SbSet set[])
+{
+  PetscFunctionBeginUser;
+  for (PetscInt k = 0; k < nset; k++) {
+    if (set[k].nvert || set[k].nfacet || set[k].ncell) continue;
+    if (set[k].shape == SB_SET_GROUP) PetscCall(empty_group(nbody, body, import, &set[k]));
+    if (set[k].shape == SB_SET_BODY) PetscCall(empty_body(nbody, body, &set[k]));
+    PetscCall(empty_shape(nbody, body, &set[k]));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

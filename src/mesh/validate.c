@@ -1,0 +1,166 @@
+/*
+  validate.c - what is promised about a mesh, looked up: ranges, order, ownership, sums over the ranks.
+
+  Every cell that touches an owned vertex is local when the pairs (owned vertex, local cell that holds it), counted on all
+  ranks, number four per cell of the whole mesh. Original numbers are a permutation when each occurs once; that is seen
+  from the sums of the numbers and of their mixed bits.
+*/
+#include "mesh_impl.h"
+
+#define CHECK(cond, ...) PetscCheck(cond, PETSC_COMM_SELF, PETSC_ERR_PLIB, __VA_ARGS__)
+
+static PetscErrorCode check_vertices(SbMesh m)
+{
+  PetscFunctionBeginUser;
+  CHECK(0 <= m->nvert_owned && m->nvert_owned <= m->nvert && m->nvert <= m->Nvert, "Bad numbers of vertices");
+  for (PetscInt v = 0; v < m->nvert; v++) {
+    const PetscInt body = m->vert_body[v];
+
+    if (v < m->nvert_owned)
+      CHECK(m->gvert[v] == m->gvert_start + v,
+            "Owned vertex %" PetscInt_FMT " has global number %" PetscInt_FMT, v, m->gvert[v]);
+    else {
+      CHECK(m->gvert[v] < m->gvert_start || m->gvert[v] >= m->gvert_start + m->nvert_owned,
+            "Ghost vertex %" PetscInt_FMT " has an owned number", v);
+      CHECK(v == m->nvert_owned || m->gvert[v] > m->gvert[v - 1],
+            "Ghost vertices are not ascending at %" PetscInt_FMT, v);
+    }
+    CHECK(0 <= m->gvert[v] && m->gvert[v] < m->Nvert, "Global vertex number %" PetscInt_FMT " out of range",
+          m->gvert[v]);
+    CHECK(0 <= m->vert_orig[v] && m->vert_orig[v] < m->Nvert,
+          "Original vertex number %" PetscInt_FMT " out of range", m->vert_orig[v]);
+    CHECK(0 <= body && body < m->nbody, "Vertex %" PetscInt_FMT " in body %" PetscInt_FMT, v, body);
+    CHECK(!(m->vert_set[v] & SB_ON_BOUNDARY), "Vertex %" PetscInt_FMT " carries the bit of faces", v);
+    for (int i = 0; i < 3; i++) {
+      CHECK(m->body[body].bbox[i] <= m->x[3 * v + i] && m->x[3 * v + i] <= m->body[body].bbox[3 + i],
+            "Vertex %" PetscInt_FMT " outside its body", v);
+    }
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscInt lowest(const PetscInt v[4])
+{
+  return PetscMin(PetscMin(v[0], v[1]), PetscMin(v[2], v[3]));
+}
+
+static PetscErrorCode check_cells(SbMesh m)
+{
+  PetscFunctionBeginUser;
+  CHECK(0 <= m->ncell_owned && m->ncell_owned <= m->ncell && m->ncell <= m->Ncell, "Bad numbers of cells");
+  for (PetscInt c = 0; c < m->ncell; c++) {
+    const PetscInt *v = m->cell + 4 * c;
+
+    for (int a = 0; a < 4; a++) {
+      CHECK(0 <= v[a] && v[a] < m->nvert, "Cell %" PetscInt_FMT " has vertex %" PetscInt_FMT, c, v[a]);
+      CHECK(m->vert_body[v[a]] == m->cell_body[c],
+            "Cell %" PetscInt_FMT " and its vertex %" PetscInt_FMT " are in different bodies", c, v[a]);
+    }
+    CHECK(SbTetDet(m->x, v) > 0, "Cell %" PetscInt_FMT " is not positively oriented", c);
+    CHECK(0 <= m->cell_orig[c] && m->cell_orig[c] < m->Ncell,
+          "Original cell number %" PetscInt_FMT " out of range", m->cell_orig[c]);
+    if (c >= m->ncell_owned)
+      CHECK(lowest(v) < m->nvert_owned, "Ghost cell %" PetscInt_FMT " touches no owned vertex", c);
+    if (c == 0 || c == m->ncell_owned) continue;
+    CHECK(m->cell_body[c - 1] < m->cell_body[c] ||
+            (m->cell_body[c - 1] == m->cell_body[c] && lowest(v - 4) <= lowest(v)),
+          "Cells are out of order at %" PetscInt_FMT, c);
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* A number for a number, without pattern (splitmix64, Steele et al. 2014). */
+static uint64_t mix(PetscInt i)
+{
+  uint64_t z = (uint64_t)i * 0x9e3779b97f4a7c15u + 0x9e3779b97f4a7c15u;
+
+  z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9u;
+  z = (z ^ (z >> 27)) * 0x94d049bb133111ebu;
+  return z ^ (z >> 31);
+}
+
+/* What all ranks must agree on. */
+static PetscErrorCode check_sums(SbMesh m)
+{
+  enum { VERT, CELL, PAIR, VERT_MIX, CELL_MIX, FACET, NSUM };
+  uint64_t mine[NSUM] = {0}, all[NSUM], expected[NSUM] = {0};
+  PetscReal volume = 0, volumes = 0, rest = 0;
+
+  PetscFunctionBeginUser;
+  mine[VERT] = (uint64_t)m->nvert_owned;
+  mine[CELL] = (uint64_t)m->ncell_owned;
+  for (PetscInt v = 0; v < m->nvert_owned; v++) mine[VERT_MIX] += mix(m->vert_orig[v]);
+  for (PetscInt c = 0; c < m->ncell; c++) {
+    for (int a = 0; a < 4; a++) mine[PAIR] += m->cell[4 * c + a] < m->nvert_owned;
+    if (c >= m->ncell_owned) continue;
+    mine[CELL_MIX] += mix(m->cell_orig[c]);
+    for (int f = 0; f < 4; f++) mine[FACET] += m->face_set[4 * c + f] & SB_ON_BOUNDARY;
+    volume += SbTetDet(m->x, m->cell + 4 * c) / 6;
+  }
+  PetscCallMPI(MPI_Allreduce(mine, all, NSUM, MPI_UINT64_T, MPI_SUM, m->comm));
+  PetscCallMPI(MPI_Allreduce(&volume, &volumes, 1, MPIU_REAL, MPI_SUM, m->comm));
+  expected[VERT] = (uint64_t)m->Nvert;
+  expected[CELL] = (uint64_t)m->Ncell;
+  expected[PAIR] = 4 * (uint64_t)m->Ncell;
+  for (PetscInt v = 0; v < m->Nvert; v++) expected[VERT_MIX] += mix(v);
+  for (PetscInt c = 0; c < m->Ncell; c++) expected[CELL_MIX] += mix(c);
+  for (PetscInt b = 0; b < m->nbody; b++) {
+    expected[FACET] += (uint64_t)m->body[b].nfacet;
+    rest += m->body[b].volume;
+  }
+  for (int i = 0; i < NSUM; i++) {
+    static const char *const what[NSUM] = {
+      "owned vertices",          "owned cells",           "cells around owned vertices",
+      "original vertex numbers", "original cell numbers", "boundary facets"};
+
+    PetscCheck(all[i] == expected[i], m->comm, PETSC_ERR_PLIB, "Sum of %s is %llu, expected %llu", what[i],
+               (unsigned long long)all[i], (unsigned long long)expected[i]);
+  }
+  PetscCheck(PetscAbsReal(volumes - rest) <= 1e-10 * rest, m->comm, PETSC_ERR_PLIB, "Volume %g, expected %g",
+             (double)volumes, (double)rest);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Ghost vertices carry what their owners have. */
+static PetscErrorCode check_ghosts(SbMesh m)
+{
+  PetscSF sf;
+  PetscLayout layout;
+  PetscReal *x;
+  PetscInt *orig;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscLayoutCreate(m->comm, &layout));
+  PetscCall(PetscLayoutSetLocalSize(layout, m->nvert_owned));
+  PetscCall(PetscLayoutSetUp(layout));
+  PetscCall(PetscSFCreate(m->comm, &sf));
+  PetscCall(PetscSFSetGraphLayout(sf, layout, m->nvert, NULL, PETSC_OWN_POINTER, m->gvert));
+  PetscCall(PetscMalloc2(3 * (size_t)m->nvert, &x, m->nvert, &orig));
+  PetscCall(PetscSFBcastBegin(sf, MPIU_INT, m->vert_orig, orig, MPI_REPLACE));
+  PetscCall(PetscSFBcastEnd(sf, MPIU_INT, m->vert_orig, orig, MPI_REPLACE));
+  for (PetscInt v = 0; v < m->nvert; v++)
+    CHECK(orig[v] == m->vert_orig[v], "Ghost vertex %" PetscInt_FMT " differs from its owner's", v);
+  for (int i = 0; i < 3; i++) {
+    PetscReal *mine = x + m->nvert;
+
+    for (PetscInt v = 0; v < m->nvert_owned; v++) mine[v] = m->x[3 * v + i];
+    PetscCall(PetscSFBcastBegin(sf, MPIU_REAL, mine, x, MPI_REPLACE));
+    PetscCall(PetscSFBcastEnd(sf, MPIU_REAL, mine, x, MPI_REPLACE));
+    for (PetscInt v = 0; v < m->nvert; v++)
+      CHECK(x[v] == m->x[3 * v + i], "Ghost vertex %" PetscInt_FMT " lies elsewhere than its owner's", v);
+  }
+  PetscCall(PetscFree2(x, orig));
+  PetscCall(PetscSFDestroy(&sf));
+  PetscCall(PetscLayoutDestroy(&layout));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbMeshValidate(SbMesh mesh)
+{
+  PetscFunctionBeginUser;
+  PetscCall(check_vertices(mesh));
+  PetscCall(check_cells(mesh));
+  PetscCall(check_sums(mesh));
+  PetscCall(check_ghosts(mesh));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

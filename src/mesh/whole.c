@@ -1,0 +1,116 @@
+/*
+  whole.c - all bodies in one piece, on rank 0: read, placed, checked, marked by sets, numbered one after the other.
+
+  Original numbers follow from here: bodies in the order of the scenario, vertices and cells in the order of their files.
+*/
+#include "mesh_impl.h"
+
+/* A body before the merge. */
+typedef struct {
+  SbFaces faces;
+  SbMasks masks;
+} Part;
+
+static PetscErrorCode prepare(PetscInt nbody, SbBody body[], PetscInt b, PetscInt nset, SbSet set[],
+                              SbImport *im, Part *part)
+{
+  PetscFunctionBeginUser;
+  PetscCall(SbImportRead(&body[b], im));
+  PetscCall(SbImportCheck(im, &part->faces));
+  PetscCall(SbImportQuality(im, &part->faces, &body[b]));
+  PetscCall(PetscCalloc1(im->nvert, &part->masks.vert));
+  PetscCall(PetscCalloc1(im->item[3].n, &part->masks.cell));
+  PetscCall(PetscCalloc1(4 * (size_t)im->item[3].n, &part->masks.face));
+  PetscCall(SbSetsMark(im, &part->faces, nbody, body, b, nset, set, &part->masks));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Copies body b behind those already there. */
+static PetscErrorCode append(const SbImport *im, const Part *part, PetscInt b, PetscInt vert0, PetscInt cell0,
+                             SbWhole *w)
+{
+  PetscFunctionBeginUser;
+  for (PetscInt c = 0; c < im->item[3].n; c++) {
+    SbPoint *p = &w->point[cell0 + c];
+
+    p->orig = cell0 + c;
+    p->body = b;
+    p->set = part->masks.cell[c];
+    for (int f = 0; f < 4; f++) {
+      const PetscInt n = part->faces.neighbour[4 * c + f];
+
+      w->cell[4 * (cell0 + c) + f] = vert0 + im->item[3].vert[4 * c + f];
+      w->neighbour[4 * (cell0 + c) + f] = n < 0 ? -1 : cell0 + n;
+      p->u.face[f] = part->masks.face[4 * c + f];
+    }
+  }
+  for (PetscInt v = 0; v < im->nvert; v++) {
+    SbPoint *p = &w->point[w->ncell + vert0 + v];
+
+    p->orig = vert0 + v;
+    p->body = b;
+    p->set = part->masks.vert[v];
+    for (int i = 0; i < 3; i++) p->u.x[i] = im->x[3 * v + i];
+    p->u.face[3] = 0;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode build(PetscInt nbody, SbBody body[], PetscInt nset, SbSet set[], SbImport im[],
+                            Part part[], SbWhole *w)
+{
+  PetscInt vert0 = 0, cell0 = 0;
+
+  PetscFunctionBeginUser;
+  for (PetscInt k = 0; k < nset; k++) set[k].nvert = set[k].nfacet = set[k].ncell = 0;
+  for (PetscInt b = 0; b < nbody; b++) {
+    PetscCall(prepare(nbody, body, b, nset, set, &im[b], &part[b]));
+    PetscCheck(w->ncell <= PETSC_MAX_INT / 8 - body[b].ncell && w->nvert <= PETSC_MAX_INT / 8 - body[b].nvert,
+               PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
+               "body '%s': all bodies together have more tets than this build can number", body[b].name);
+    w->ncell += body[b].ncell;
+    w->nvert += body[b].nvert;
+  }
+  PetscCall(SbSetsCheck(nbody, body, im, nset, set));
+  PetscCall(PetscMalloc1(4 * (size_t)w->ncell, &w->cell));
+  PetscCall(PetscMalloc1(4 * (size_t)w->ncell, &w->neighbour));
+  PetscCall(PetscMalloc1(w->ncell + w->nvert, &w->point));
+  for (PetscInt b = 0; b < nbody; b++) {
+    PetscCall(append(&im[b], &part[b], b, vert0, cell0, w));
+    vert0 += body[b].nvert;
+    cell0 += body[b].ncell;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbWholeCreate(PetscInt nbody, SbBody body[], PetscInt nset, SbSet set[], SbWhole *w)
+{
+  SbImport *im;
+  Part *part;
+  PetscErrorCode ierr;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscMemzero(w, sizeof(*w)));
+  PetscCall(PetscCalloc2(nbody, &im, nbody, &part));
+  ierr = build(nbody, body, nset, set, im, part, w);
+  for (PetscInt b = 0; b < nbody; b++) {
+    PetscCall(SbImportDestroy(&im[b]));
+    PetscCall(SbFacesDestroy(&part[b].faces));
+    PetscCall(PetscFree(part[b].masks.vert));
+    PetscCall(PetscFree(part[b].masks.cell));
+    PetscCall(PetscFree(part[b].masks.face));
+  }
+  PetscCall(PetscFree2(im, part));
+  if (ierr) PetscCall(SbWholeDestroy(w));
+  PetscCall(ierr);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbWholeDestroy(SbWhole *w)
+{
+  PetscFunctionBeginUser;
+  PetscCall(PetscFree(w->cell));
+  PetscCall(PetscFree(w->neighbour));
+  PetscCall(PetscFree(w->point));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
