@@ -100,7 +100,8 @@ PetscErrorCode SbOptionsMarkdown(MPI_Comm comm, const char *file); /* docs/optio
 PetscErrorCode SbViewerOpen(MPI_Comm comm, const char *file, PetscViewer *viewer);
 PetscErrorCode SbOptionsReset(void); /* forgets what was read and registered; at exit and in tests */
 
-/* SbNearest - the names of `n` candidates closest to `word` by edit distance, joined by " or "; "" when none is near. */
+/* SbNearest - the names of `n` candidates closest to `word` by edit distance, joined by " or "; "" when none is near. NULL
+   among the names is passed over: PetscFunctionListGet() counts its closing one. */
 PetscErrorCode SbNearest(const char *word, PetscInt n, const char *const names[], size_t size, char text[]);
 
 /* ------------------------------------------------------------------ errors and warnings */

@@ -19,10 +19,10 @@ typedef struct {
   SbCommandLine - takes what is for the program itself out of the command line. Collective; after MPI_Init(), before
   PetscInitialize().
 
-  Taken out: a first word that is no option (the scenario), -help, -version, -scenario_view [FILE], -options_markdown FILE;
-  `-help petsc` becomes PETSc's own -help. A word that belongs to no option and an option file that cannot be read (rank 0
-  looks) are described in command->problem, because PETSc cannot report an error before PetscInitialize(); the file is
-  taken out.
+  Taken out: -help, -version, -scenario_view [FILE], -options_markdown FILE; `-help petsc` becomes PETSc's own -help. A
+  first word that is no option names the scenario; it stays, for PetscGetArgs(), and PETSc passes over it. A word that
+  belongs to no option and an option file that cannot be read (rank 0 looks) are described in command->problem, because
+  PETSc cannot report an error before PetscInitialize(); an -options_file that cannot be read is taken out.
 
   Input and output:
     argc, argv - as from main(); words are taken out in place

@@ -7,6 +7,7 @@
   line and a non-zero code. Open MPI refuses to start as root unless OMPI_ALLOW_RUN_AS_ROOT=1 and
   OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1 are set.
 */
+#include <signal.h>
 #include "sb.h"
 
 /* -help, -version, -options_markdown: answers, and nothing is simulated. */
@@ -79,6 +80,7 @@ static PetscErrorCode supple(int argc, char *argv[])
   PetscCall(SbErrorHandlerInstall());
   PetscCall(SbCommandLine(&argc, argv, &command));
   PetscCall(PetscInitialize(&argc, &argv, command.scenario[0] ? command.scenario : NULL, NULL));
+  (void)signal(SIGPIPE, SIG_IGN); /* a terminal that is gone must not end a run that writes files */
   PetscCheck(!command.problem[0], PETSC_COMM_SELF, PETSC_ERR_USER, "%s", command.problem);
   PetscCall(SbOptionsRemember());
   PetscCall(SbRegisterAll());

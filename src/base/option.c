@@ -129,10 +129,8 @@ PetscErrorCode SbOptionText(const SbScope *scope, const char *key, const SbOptio
   PetscCall(find_record(scope, row, &r));
   PetscCall(PetscOptionsFindPair(NULL, NULL, r->name, &value, &r->given));
   if (r->given && !value && row->kind == SB_OPTION_BOOL) value = "true";
-  PetscCheck(!r->given || value, PETSC_COMM_SELF, PETSC_ERR_USER,
-             "%s has no value: %s (a value that begins with a minus sign and a letter needs a blank before "
-             "it, in quotes)",
-             r->name, row->help);
+  PetscCheck(!r->given || value, PETSC_COMM_SELF, PETSC_ERR_USER, "%s has no value: %s%s", r->name, row->help,
+             row->kind == SB_OPTION_FORMULA ? "; write -x as 0-x, or PETSc takes it for an option" : "");
   if (!r->given && !row->preset) PetscCall(SbOptionMissing(r));
   PetscCall(PetscFree(r->text));
   PetscCall(PetscStrallocpy(r->given ? value : row->preset, &r->text));

@@ -41,10 +41,11 @@ PetscErrorCode SbNearest(const char *word, PetscInt n, const char *const names[]
 
   PetscFunctionBeginUser;
   text[0] = 0;
-  for (PetscInt i = 0; i < n; i++) best = PetscMin(best, edit_distance(word, names[i]));
+  for (PetscInt i = 0; i < n; i++)
+    if (names[i]) best = PetscMin(best, edit_distance(word, names[i]));
   if (best > farthest) PetscFunctionReturn(PETSC_SUCCESS);
   for (PetscInt i = 0; i < n && nbest < 3; i++) {
-    if (edit_distance(word, names[i]) != best) continue;
+    if (!names[i] || edit_distance(word, names[i]) != best) continue;
     if (nbest++) PetscCall(PetscStrlcat(text, " or ", size));
     PetscCall(PetscStrlcat(text, names[i], size));
   }
@@ -223,40 +224,19 @@ static PetscErrorCode keys_of(const char *klass, const char *name, size_t size, 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A type of the class that has a row with the key that the name ends in; NULL when there is none. */
-static const char *type_with_key(const char *klass, const char *name)
-{
-  const size_t n = strlen(name);
-
-  for (PetscInt i = 0; i < SbTheOptions.nblock; i++) {
-    const SbOptionBlock *block = &SbTheOptions.block[i];
-
-    for (PetscInt j = 0; !strcmp(block->klass, klass) && j < block->n; j++) {
-      const size_t k = strlen(block->rows[j].key);
-
-      if (n > k && name[n - k - 1] == '_' && !strcasecmp(name + n - k, block->rows[j].key))
-        return block->type;
-    }
-  }
-  return NULL;
-}
-
 /* Why an option with the prefix of a class was not read, when no name is near. */
 static PetscErrorCode explain(const char *klass, const char *name, size_t size, char why[])
 {
   char keys[768], instances[256];
-  const char *type = type_with_key(klass, name);
 
   PetscFunctionBeginUser;
   PetscCall(keys_of(klass, name, sizeof(keys), keys));
   PetscCall(instances_of(klass, sizeof(instances), instances));
-  if (!keys[0])
+  if (keys[0])
+    PetscCall(PetscSNPrintf(why, size, " here; %s", keys));
+  else
     PetscCall(PetscSNPrintf(why, size, ": it names no %s of this scenario (%s)", klass,
                             instances[0] ? instances : "there are none"));
-  else if (type && type[0])
-    PetscCall(PetscSNPrintf(why, size, " here: it belongs to type %s", type));
-  else
-    PetscCall(PetscSNPrintf(why, size, "; %s", keys));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -172,8 +172,8 @@ PetscErrorCode SbOptionsHelp(MPI_Comm comm)
   PetscCall(SbViewerOpen(comm, "", &viewer));
   PetscCall(
     PetscViewerASCIIPrintf(viewer, "supple %s - soft bodies by finite elements on PETSc\n\n", SB_VERSION));
-  PetscCall(PetscViewerASCIIPrintf(viewer, "  supple -options_file SCENARIO.opts [-option value ...]\n"));
-  PetscCall(PetscViewerASCIIPrintf(viewer, "  mpirun -n 4 supple -options_file SCENARIO.yml\n\n"));
+  PetscCall(PetscViewerASCIIPrintf(viewer, "  supple SCENARIO.opts [-option value ...]\n"));
+  PetscCall(PetscViewerASCIIPrintf(viewer, "  mpirun -n 4 supple SCENARIO.yml\n\n"));
   PetscCall(PetscViewerASCIIPrintf(
     viewer, "The last value given wins. SI units. -help petsc lists PETSc's own options.\n"));
   PetscCall(print_manual(viewer, PETSC_FALSE));

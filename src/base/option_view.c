@@ -28,20 +28,21 @@ static PetscErrorCode print_value(PetscViewer viewer, const char *value, int wid
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode print_record(PetscViewer viewer, const SbOptionRecord *r, PetscBool active)
+static PetscErrorCode print_record(PetscViewer viewer, const SbOptionRecord *r, PetscBool with_presets)
 {
   const SbOption *row = r->row;
-  const int used = (int)strlen(r->name);
+  const int used = (int)strlen(r->name), help = (int)strlen(row->help);
 
   PetscFunctionBeginUser;
   if (strpbrk(r->text, "#\""))
     PetscCall(PetscViewerASCIIPrintf(
       viewer, "# an option file cannot hold this value; give it on the command line:\n# "));
-  else if (!active)
+  else if (!r->given && (!with_presets || !r->text[0]))
     PetscCall(PetscViewerASCIIPrintf(viewer, "# "));
   PetscCall(PetscViewerASCIIPrintf(viewer, "%s", r->name));
   PetscCall(print_value(viewer, r->text, PetscMax(1, 48 - used)));
-  PetscCall(PetscViewerASCIIPrintf(viewer, " # %s%s", r->given ? "" : "default; ", row->help));
+  PetscCall(PetscViewerASCIIPrintf(viewer, " # %s%.*s", r->given ? "" : "default; ",
+                                   help && row->help[help - 1] == '.' ? help - 1 : help, row->help));
   if (row->unit[0]) PetscCall(PetscViewerASCIIPrintf(viewer, ", %s", row->unit));
   if (row->range[0])
     PetscCall(
@@ -56,17 +57,30 @@ static PetscBool same_instance(const SbOptionRecord *a, const SbOptionRecord *b)
                      !strcmp(a->scope.instance, b->scope.instance));
 }
 
-/* All records of one instance, or the program-wide ones, under one headline. */
-static PetscErrorCode print_group(PetscViewer viewer, const SbOptionRecord *first, PetscBool with_presets)
+/* All records of one instance under one headline. */
+static PetscErrorCode print_instance(PetscViewer viewer, const SbOptionRecord *first, PetscBool with_presets)
 {
   PetscFunctionBeginUser;
-  if (first->scope.klass[0])
-    PetscCall(PetscViewerASCIIPrintf(viewer, "\n# %s %s\n", first->scope.klass, first->scope.instance));
-  else
-    PetscCall(PetscViewerASCIIPrintf(viewer, "\n# the run\n"));
-  for (const SbOptionRecord *r = first; r < SbTheOptions.record + SbTheOptions.nrecord; r++) {
-    if (!same_instance(r, first)) continue;
-    PetscCall(print_record(viewer, r, (PetscBool)(r->given || (with_presets && r->text[0]))));
+  PetscCall(PetscViewerASCIIPrintf(viewer, "\n# %s %s\n", first->scope.klass, first->scope.instance));
+  for (const SbOptionRecord *r = first; r < SbTheOptions.record + SbTheOptions.nrecord; r++)
+    if (same_instance(r, first)) PetscCall(print_record(viewer, r, with_presets));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The program-wide records in the order of the manual, which does not depend on who reads first. */
+static PetscErrorCode print_run(PetscViewer viewer, PetscBool with_presets)
+{
+  PetscFunctionBeginUser;
+  PetscCall(PetscViewerASCIIPrintf(viewer, "\n# the run\n"));
+  for (PetscInt i = 0; i < SbTheOptions.nblock; i++) {
+    const SbOptionBlock *block = &SbTheOptions.block[i];
+
+    for (PetscInt j = 0; j < SbTheOptions.nrecord; j++) {
+      const SbOptionRecord *r = &SbTheOptions.record[j];
+
+      if (!r->scope.klass[0] && r->row >= block->rows && r->row < block->rows + block->n)
+        PetscCall(print_record(viewer, r, with_presets));
+    }
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -108,18 +122,19 @@ PetscErrorCode SbOptionsView(PetscViewer viewer)
   PetscCall(PetscGetWorkingDirectory(folder, sizeof(folder)));
   PetscCall(PetscViewerASCIIPrintf(
     viewer, "# The complete scenario, written by supple %s; it runs again with\n", SB_VERSION));
-  PetscCall(PetscViewerASCIIPrintf(viewer, "#   supple -options_file THIS_FILE\n"));
+  PetscCall(PetscViewerASCIIPrintf(viewer, "#   supple THIS_FILE\n"));
   PetscCall(
     PetscViewerASCIIPrintf(viewer, "# from this folder, where relative file names begin: %s\n", folder));
   if (!with_presets)
     PetscCall(
       PetscViewerASCIIPrintf(viewer, "# Defaults are comments: PETSc 3.18 holds at most 512 options.\n"));
+  PetscCall(print_run(viewer, with_presets));
   for (PetscInt i = 0; i < SbTheOptions.nrecord; i++) {
-    PetscBool seen = PETSC_FALSE;
+    PetscBool seen = (PetscBool)!SbTheOptions.record[i].scope.klass[0];
 
     for (PetscInt j = 0; j < i && !seen; j++)
       seen = same_instance(&SbTheOptions.record[i], &SbTheOptions.record[j]);
-    if (!seen) PetscCall(print_group(viewer, &SbTheOptions.record[i], with_presets));
+    if (!seen) PetscCall(print_instance(viewer, &SbTheOptions.record[i], with_presets));
   }
   if (SbTheOptions.remembered) {
     PetscCall(print_petsc(viewer, SbTheOptions.nuser, SbTheOptions.user));

@@ -104,9 +104,10 @@ PetscErrorCode SbCommandLine(int *argc, char *argv[], SbCommand *command)
       if (stays) argv[kept++] = argv[i];
       if (stays && words == 2 && !is_one_of(argv[i], "-help", "--help")) argv[kept++] = argv[i + 1];
     } else if (i == 1) {
-      SbErrorSetFile(argv[i]);
-      if (readable(argv[i], command))
-        (void)snprintf(command->scenario, sizeof(command->scenario), "%s", argv[i]);
+      argv[kept++] = argv[1];
+      SbErrorSetFile(argv[1]);
+      if (readable(argv[1], command))
+        (void)snprintf(command->scenario, sizeof(command->scenario), "%s", argv[1]);
     } else if (!command->problem[0]) {
       (void)snprintf(
         command->problem, sizeof(command->problem),

@@ -116,7 +116,8 @@ static PetscErrorCode describe_list(PetscFunctionList list, const char *word, si
   PetscFunctionBeginUser;
   PetscCall(PetscFunctionListGet(list, &names, &n));
   all[0] = 0;
-  for (int i = 0; i < n; i++) {
+  /* PETSc 3.18 counts the closing NULL */
+  for (int i = 0; i < n && names[i]; i++) {
     PetscCall(PetscStrlcat(all, i ? ", " : "", size));
     PetscCall(PetscStrlcat(all, names[i], size));
   }

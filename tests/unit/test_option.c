@@ -142,10 +142,8 @@ static PetscErrorCode test_refused_words(void)
                  "-body_liver_tags a,,b: name 2 is empty or longer than 63 characters: names");
   EXPECT_MESSAGE(SbOptionFormulas(&body_scope, "pull", f),
                  "-body_liver_pull 1;2 has 2 formulas, needs 3 with semicolons between them: force");
-  EXPECT_MESSAGE(
-    SbOptionNames(&run_scope, "bodies", &n, &names),
-    "-bodies has no value: names of the bodies (a value that begins with a minus sign and a letter needs a "
-    "blank before it, in quotes)");
+  EXPECT_MESSAGE(SbOptionNames(&run_scope, "bodies", &n, &names),
+                 "-bodies has no value: names of the bodies");
   EXPECT_MESSAGE(SbOptionString(&body_scope, "mesh", sizeof(text), text),
                  "-body_liver_mesh is longer than 7 characters: mesh file");
   PetscCall(end(&database));
@@ -355,8 +353,9 @@ static PetscErrorCode test_check(void)
                    "-body_livr_young is not an option of supple; did you mean -body_liver_young?"));
   PetscCall(unread("-bodeis 3", "-bodeis is not an option of supple; did you mean -bodies?"));
   PetscCall(unread("-integratr 3", "-integratr is not an option of supple; did you mean -integrator?"));
-  PetscCall(unread("-body_liver_colour red", "-body_liver_colour is not an option of supple; body liver has "
-                                             "mesh, scale, translate, young, tags, pull"));
+  PetscCall(unread("-body_liver_colour red",
+                   "-body_liver_colour is not an option of supple here; body liver has "
+                   "mesh, scale, translate, young, tags, pull"));
   PetscCall(
     unread("-body_spleen_mesh a.msh",
            "-body_spleen_mesh is not an option of supple: it names no body of this scenario (liver)"));
