@@ -25,13 +25,13 @@ int main(int argc, char **argv)
   PetscCall(fixture_register());
   PetscCall(fixture_create(PETSC_COMM_WORLD, 2, "box:1,1,1:2", 0, NULL, &x));
   check_regions(&x, (const PetscReal[2]){0, 0}, (const PetscReal[2]){0, 0});
-  PetscCall(effect_create(&x, "damping", "-effect_damping_alpha 0.5", &e[0]));
-  check_regions(&x, (const PetscReal[2]){0.5, 0.5}, (const PetscReal[2]){0, 0});
+  PetscCall(effect_create(&x, "damping", "-effect_damping_alpha 0.5 -effect_damping_beta 0.25", &e[0]));
+  check_regions(&x, (const PetscReal[2]){0.5, 0.5}, (const PetscReal[2]){0.25, 0.25});
   PetscCall(effect_create(
     &x, "thick",
     "-effect_thick_type damping -effect_thick_on other,other -effect_thick_alpha 1 -effect_thick_beta 0.01",
     &e[1]));
-  check_regions(&x, (const PetscReal[2]){0.5, 1.5}, (const PetscReal[2]){0, 0.01});
+  check_regions(&x, (const PetscReal[2]){0.5, 1.5}, (const PetscReal[2]){0.25, 0.25 + 0.01});
   for (int i = 0; i < 2; i++) {
     SB_CHECK(!e[i]->ops.force && !e[i]->ops.tangent && !e[i]->ops.prestep && !e[i]->ops.accept,
              "nothing to do at run time");
@@ -40,7 +40,7 @@ int main(int argc, char **argv)
   CHECK_MESSAGE(effect_create(&x, "wrong", "-effect_wrong_type damping -effect_wrong_on blok", &e[2]),
                 "block");
   PetscCall(SbEffectDestroy(&e[2]));
-  check_regions(&x, (const PetscReal[2]){0.5, 1.5}, (const PetscReal[2]){0, 0.01});
+  check_regions(&x, (const PetscReal[2]){0.5, 1.5}, (const PetscReal[2]){0.25, 0.25 + 0.01});
   PetscCall(fixture_destroy(&x));
   SB_TEST_END();
 }

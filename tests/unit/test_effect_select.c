@@ -131,6 +131,7 @@ int main(int argc, char **argv)
   PetscCall(check_nodes(&x, "all", "corner", 125));
   PetscCall(check_cells(&x, "lower", NULL, 0.5));
   PetscCall(check_cells(&x, "lower", "all", 1));
+  PetscCall(check_cells(&x, "all", "lower", 1));
   PetscCall(check_cells(&x, NULL, NULL, 1));
   PetscCall(check_errors(&x));
   PetscCall(fixture_destroy(&x));
