@@ -1,0 +1,282 @@
+/*
+  Order of elimination and structure of the factor, on nodes (3x3 blocks) throughout.
+
+  1. Nested dissection of the graph by METIS.
+  2. Elimination tree (Liu, "The role of elimination trees in sparse factorization", 1990, algorithm 4.2), made postordered:
+     children come right before their parent, so that updates live on a stack.
+  3. Structure of column j: its own entries and those of its children's structures, below j. A column whose structure is
+     that of the previous column less itself continues that one's group (a supernode).
+  4. Groups are merged with their parent while the explicit zeros that this brings stay few: dense kernels on wider panels
+     outweigh them. The limits are those of CHOLMOD (Chen, Davis, Hager, Rajamanickam 2008), in nodes.
+*/
+#include <metis.h>
+#include "factor.h"
+
+/* A group of columns may hold this share of zeros when it has at most this many nodes. */
+static const struct {
+  PetscInt nodes;
+  PetscReal share;
+} limits[] = {{2, 1.}, {6, 0.8}, {16, 0.1}, {PETSC_MAX_INT, 0.05}};
+
+static PetscErrorCode dissect(PetscInt n, const PetscInt ia[], const PetscInt ja[], PetscInt order[])
+{
+  idx_t nvtxs = (idx_t)n, options[METIS_NOPTIONS], *xadj, *adj, *perm, *iperm, k = 0;
+  int status = METIS_OK;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscMalloc4(n + 1, &xadj, ia[n] + 1, &adj, n, &perm, n, &iperm));
+  for (PetscInt i = 0; i < n; i++) {
+    xadj[i] = k;
+    for (PetscInt e = ia[i]; e < ia[i + 1]; e++) {
+      if (ja[e] != i && ja[e] < n) adj[k++] = (idx_t)ja[e];
+    }
+  }
+  xadj[n] = k;
+  METIS_SetDefaultOptions(options);
+  if (n > 0) status = METIS_NodeND(&nvtxs, xadj, adj, NULL, options, perm, iperm);
+  PetscCheck(status == METIS_OK, PETSC_COMM_SELF, PETSC_ERR_LIB, "METIS_NodeND failed with %d", status);
+  for (PetscInt i = 0; i < n; i++) order[i] = (PetscInt)perm[i];
+  PetscCall(PetscFree4(xadj, adj, perm, iperm));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* parent[] of the elimination tree of the free nodes, by places; ancestor[] is work space. */
+static void elimination_tree(const SbElimination *e, const PetscInt ia[], const PetscInt ja[],
+                             PetscInt parent[], PetscInt ancestor[])
+{
+  for (PetscInt j = 0; j < e->nfree; j++) {
+    const PetscInt node = e->order[j];
+
+    parent[j] = ancestor[j] = -1;
+    for (PetscInt k = ia[node]; k < ia[node + 1]; k++) {
+      PetscInt i = e->place[ja[k]];
+
+      while (i >= 0 && i < j) {
+        const PetscInt next = ancestor[i];
+
+        ancestor[i] = j;
+        if (next < 0) parent[i] = j;
+        i = next;
+      }
+    }
+  }
+}
+
+/* Renumbers the places so that every subtree is consecutive and ends with its root. parent[] follows. */
+static PetscErrorCode postorder(SbElimination *e, PetscInt parent[])
+{
+  const PetscInt n = e->nfree;
+  PetscInt *head, *next, *stack, *fresh, *old, top, count = 0;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscMalloc5(n + 1, &head, n, &next, n + 1, &stack, n, &fresh, n, &old));
+  for (PetscInt j = 0; j <= n; j++) head[j] = -1;
+  for (PetscInt j = n - 1; j >= 0; j--) { /* head[n] lists the roots */
+    const PetscInt p = parent[j] < 0 ? n : parent[j];
+
+    next[j] = head[p];
+    head[p] = j;
+  }
+  stack[0] = n;
+  for (top = 0; top >= 0;) {
+    const PetscInt j = stack[top], child = head[j];
+
+    if (child >= 0) {
+      head[j] = next[child];
+      stack[++top] = child;
+    } else {
+      if (j < n) fresh[j] = count++;
+      top--;
+    }
+  }
+  for (PetscInt j = 0; j < n; j++) {
+    old[j] = e->order[j];
+    next[j] = parent[j];
+  }
+  for (PetscInt j = 0; j < n; j++) {
+    e->order[fresh[j]] = old[j];
+    parent[fresh[j]] = next[j] < 0 ? -1 : fresh[next[j]];
+  }
+  for (PetscInt j = 0; j < n; j++) e->place[e->order[j]] = j;
+  PetscCall(PetscFree5(head, next, stack, fresh, old));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* One group of columns while groups are being found: a stack of these, the last one being open. */
+typedef struct {
+  PetscInt first, ncol, nrow; /* first column, columns, rows below them */
+  PetscInt *row;              /* [nrow] places, ascending; owned */
+  PetscReal zeros;            /* blocks of the lower triangle that are zero */
+} Group;
+
+static PetscReal blocks_of(PetscInt ncol, PetscInt nrow)
+{
+  return 0.5 * (PetscReal)ncol * (PetscReal)(ncol + 1) + (PetscReal)ncol * (PetscReal)nrow;
+}
+
+/* Merges groups at the end of the list with their parent, the last one, while the zeros stay few. */
+static PetscErrorCode merge_groups(PetscInt *ngroup, Group group[])
+{
+  PetscFunctionBeginUser;
+  while (*ngroup >= 2) {
+    Group *p = &group[*ngroup - 1], *c = &group[*ngroup - 2];
+    const PetscInt ncol = p->ncol + c->ncol;
+    const PetscReal blocks = blocks_of(ncol, p->nrow);
+    const PetscReal zeros =
+      blocks - (blocks_of(p->ncol, p->nrow) - p->zeros) - (blocks_of(c->ncol, c->nrow) - c->zeros);
+    size_t k = 0;
+
+    /* a child right before its parent has it as its first row */
+    if (!c->nrow || c->row[0] < p->first || c->row[0] >= p->first + p->ncol) break;
+    while (ncol > limits[k].nodes) k++;
+    if (zeros > limits[k].share * blocks) break;
+    PetscCall(PetscFree(c->row));
+    *c = (Group){.first = c->first, .ncol = ncol, .nrow = p->nrow, .row = p->row, .zeros = zeros};
+    (*ngroup)--;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static int compare_int(const void *a, const void *b)
+{
+  const PetscInt x = *(const PetscInt *)a, y = *(const PetscInt *)b;
+
+  return (x > y) - (x < y);
+}
+
+/*
+  Structure of column j without j itself, sorted: own entries and the rows of the groups whose first row is j. Those are
+  linked in child[] (first group of column j) and sibling[]. Returns the count.
+*/
+static PetscInt column_structure(const SbElimination *e, PetscInt j, const PetscInt ia[], const PetscInt ja[],
+                                 const PetscInt child[], const PetscInt sibling[], PetscInt *const rows[],
+                                 const PetscInt nrows[], PetscInt mark[], PetscInt out[])
+{
+  const PetscInt node = e->order[j];
+  PetscInt count = 0;
+
+  mark[j] = j;
+  for (PetscInt k = ia[node]; k < ia[node + 1]; k++) {
+    const PetscInt i = e->place[ja[k]];
+
+    if (i > j && mark[i] != j) {
+      mark[i] = j;
+      out[count++] = i;
+    }
+  }
+  for (PetscInt c = child[j]; c >= 0; c = sibling[c]) {
+    for (PetscInt k = 0; k < nrows[c]; k++) {
+      const PetscInt i = rows[c][k];
+
+      if (i > j && mark[i] != j) {
+        mark[i] = j;
+        out[count++] = i;
+      }
+    }
+  }
+  qsort(out, (size_t)count, sizeof(*out), compare_int);
+  return count;
+}
+
+/* Finds the groups of columns and their rows. rows[j], nrows[j]: structure of column j while its parent still needs it. */
+static PetscErrorCode find_groups(SbElimination *e, const PetscInt ia[], const PetscInt ja[],
+                                  const PetscInt parent[], PetscInt *ngroup, Group group[])
+{
+  const PetscInt n = e->nfree;
+  PetscInt *child, *sibling, *nrows, *mark, *out, **rows;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscMalloc6(n, &child, n, &sibling, n, &nrows, e->n, &mark, e->n, &out, n, &rows));
+  for (PetscInt j = 0; j < n; j++) child[j] = -1;
+  for (PetscInt i = 0; i < e->n; i++) mark[i] = -1;
+  *ngroup = 0;
+  for (PetscInt j = 0; j < n; j++) {
+    nrows[j] = column_structure(e, j, ia, ja, child, sibling, rows, nrows, mark, out);
+    PetscCall(PetscMalloc1(nrows[j], &rows[j]));
+    PetscCall(PetscArraycpy(rows[j], out, nrows[j]));
+    const PetscBool goes_on = (PetscBool)(j > 0 && parent[j - 1] == j && nrows[j - 1] == nrows[j] + 1);
+    for (PetscInt c = child[j]; c >= 0; c = sibling[c]) PetscCall(PetscFree(rows[c]));
+    if (parent[j] >= 0) {
+      sibling[j] = child[parent[j]];
+      child[parent[j]] = j;
+    }
+    if (goes_on) {
+      group[*ngroup - 1].ncol++;
+    } else {
+      if (*ngroup) PetscCall(merge_groups(ngroup, group));
+      group[(*ngroup)++] = (Group){.first = j, .ncol = 1};
+    }
+    /* the rows of a group are those of its last column */
+    Group *g = &group[*ngroup - 1];
+    PetscCall(PetscFree(g->row));
+    g->nrow = nrows[j];
+    PetscCall(PetscMalloc1(g->nrow, &g->row));
+    PetscCall(PetscArraycpy(g->row, rows[j], g->nrow));
+    if (parent[j] < 0) PetscCall(PetscFree(rows[j]));
+  }
+  if (*ngroup) PetscCall(merge_groups(ngroup, group));
+  PetscCall(PetscFree6(child, sibling, nrows, mark, out, rows));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode store_groups(SbElimination *e, PetscInt ngroup, Group group[])
+{
+  PetscInt *owner, total = 0;
+
+  PetscFunctionBeginUser;
+  for (PetscInt g = 0; g < ngroup; g++) total += group[g].ncol + group[g].nrow;
+  e->nsuper = ngroup;
+  PetscCall(PetscMalloc4(ngroup + 1, &e->first, ngroup + 1, &e->start, total, &e->list, ngroup, &e->parent));
+  PetscCall(PetscMalloc1(e->nfree, &owner));
+  e->start[0] = 0;
+  for (PetscInt g = 0; g < ngroup; g++) {
+    PetscInt *list = e->list + e->start[g];
+
+    e->first[g] = group[g].first;
+    e->start[g + 1] = e->start[g] + group[g].ncol + group[g].nrow;
+    for (PetscInt k = 0; k < group[g].ncol; k++) {
+      list[k] = group[g].first + k;
+      owner[list[k]] = g;
+    }
+    PetscCall(PetscArraycpy(list + group[g].ncol, group[g].row, group[g].nrow));
+  }
+  e->first[ngroup] = e->nfree;
+  for (PetscInt g = 0; g < ngroup; g++) {
+    e->parent[g] = group[g].nrow && group[g].row[0] < e->nfree ? owner[group[g].row[0]] : -1;
+    PetscCall(PetscFree(group[g].row));
+  }
+  PetscCall(PetscFree(owner));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbEliminationCreate(PetscInt n, PetscInt nkeep, const PetscInt ia[], const PetscInt ja[],
+                                   SbElimination *e)
+{
+  PetscInt *parent, *ancestor, ngroup = 0;
+  Group *group;
+
+  PetscFunctionBeginUser;
+  e->n = n;
+  e->nfree = n - nkeep;
+  PetscCall(PetscMalloc2(n, &e->order, n, &e->place));
+  PetscCall(dissect(e->nfree, ia, ja, e->order));
+  for (PetscInt k = e->nfree; k < n; k++) e->order[k] = k;
+  for (PetscInt k = 0; k < n; k++) e->place[e->order[k]] = k;
+  PetscCall(PetscMalloc2(e->nfree, &parent, e->nfree, &ancestor));
+  elimination_tree(e, ia, ja, parent, ancestor);
+  PetscCall(postorder(e, parent));
+  PetscCall(PetscMalloc1(e->nfree, &group));
+  PetscCall(find_groups(e, ia, ja, parent, &ngroup, group));
+  PetscCall(store_groups(e, ngroup, group));
+  PetscCall(PetscFree(group));
+  PetscCall(PetscFree2(parent, ancestor));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbEliminationDestroy(SbElimination *e)
+{
+  PetscFunctionBeginUser;
+  PetscCall(PetscFree2(e->order, e->place));
+  PetscCall(PetscFree4(e->first, e->start, e->list, e->parent));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
