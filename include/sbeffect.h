@@ -26,24 +26,26 @@ typedef struct {
   PetscErrorCode (*accept)(SbEffect e, SbSpace space, const SbStage *stage);
   /* numbers for the history: n values with the names given by `columns`; residual[nnode][3] is the unbalanced force, N,
      which on prescribed unknowns is the reaction. Values are this rank's part and are summed. */
-  PetscErrorCode (*history)(SbEffect e, SbSpace space, const SbStage *stage, const PetscReal residual[], PetscReal values[]);
+  PetscErrorCode (*history)(SbEffect e, SbSpace space, const SbStage *stage, const PetscReal residual[],
+                            PetscReal values[]);
   PetscErrorCode (*destroy)(SbEffect e);
 } SbEffectOps;
 
 struct _p_SbEffect {
-  char        name[SB_NAME_MAX];
-  char        type[SB_NAME_MAX];
+  char name[SB_NAME_MAX];
+  char type[SB_NAME_MAX];
   SbEffectOps ops;
-  PetscBool   linear;         /* force does not depend on u: the tangent stays constant. Default PETSC_TRUE */
-  PetscBool   steady;         /* force does not depend on t either */
-  PetscInt    ncolumn;        /* history columns */
-  const char *column[8];      /* "force_x", ...; written as <name>_<column> */
-  void       *data;
+  PetscBool linear;      /* force does not depend on u: the tangent stays constant. Default PETSC_TRUE */
+  PetscBool steady;      /* force does not depend on t either */
+  PetscInt ncolumn;      /* history columns */
+  const char *column[8]; /* "force_x", ...; written as <name>_<column> */
+  void *data;
 };
 
 extern PetscFunctionList SbEffectList;
 /* Adds a type and its option rows; `rows` and the names in them must live as long as the program. Not collective. */
-PetscErrorCode SbEffectRegister(const char *type, PetscErrorCode (*create)(SbEffect), PetscInt nrows, const SbOption rows[]);
+PetscErrorCode SbEffectRegister(const char *type, PetscErrorCode (*create)(SbEffect), PetscInt nrows,
+                                const SbOption rows[]);
 /*
   SbEffectCreate - an effect of the scenario by its name, with its options read.
 
@@ -83,12 +85,12 @@ PetscErrorCode SbEffectRegister_Damping(void);
 
   Errors: PETSC_ERR_USER_INPUT when a formula uses x, y or z and may not.
 */
-PetscErrorCode SbEffectFormulas(const SbScope *scope, const char *key, PetscInt n, PetscBool place, SbFormula formulas[],
-                                PetscBool *steady);
+PetscErrorCode SbEffectFormulas(const SbScope *scope, const char *key, PetscInt n, PetscBool place,
+                                SbFormula formulas[], PetscBool *steady);
 
 /* The sets named by the option -effect_<name>_on, as read by SbEffectReadOn(). */
 typedef struct {
-  char     option[2 * SB_NAME_MAX]; /* full name of the option, for messages */
+  char option[2 * SB_NAME_MAX]; /* full name of the option, for messages */
   PetscInt n;
   char (*name)[SB_NAME_MAX]; /* [n] owned */
 } SbEffectOn;
@@ -128,8 +130,8 @@ typedef struct _p_SbDeadLoad *SbDeadLoad;
   Output:
     load     - the caller destroys it
 */
-PetscErrorCode SbDeadLoadCreate(SbSpace space, PetscInt ncorner, PetscInt nitem, const PetscInt node[], const SbFormula density[3],
-                                SbDeadLoad *load);
+PetscErrorCode SbDeadLoadCreate(SbSpace space, PetscInt ncorner, PetscInt nitem, const PetscInt node[],
+                                const SbFormula density[3], SbDeadLoad *load);
 /* f[nnode][3] += factor times the load at time t on owned nodes, N. Not collective. */
 PetscErrorCode SbDeadLoadAdd(SbDeadLoad load, PetscReal t, PetscReal factor, PetscReal f[]);
 PetscErrorCode SbDeadLoadDestroy(SbDeadLoad *load);
@@ -140,11 +142,11 @@ PetscErrorCode SbDeadLoadDestroy(SbDeadLoad *load);
 */
 typedef struct {
   PetscInt n;
-  PetscInt *node;       /* [n] local nodes, ascending, owned ones first; owned by this struct */
-  uint8_t  *components; /* [n] bit c: component c is held by this effect; owned by this struct */
-  PetscInt *row;        /* [n] index into space->fixed_node; filled by the first SbHoldPrescribe() */
+  PetscInt *node;      /* [n] local nodes, ascending, owned ones first; owned by this struct */
+  uint8_t *components; /* [n] bit c: component c is held by this effect; owned by this struct */
+  PetscInt *row;       /* [n] index into space->fixed_node; filled by the first SbHoldPrescribe() */
   PetscBool have_rows;
-  PetscInt  nowned;
+  PetscInt nowned;
 } SbHold;
 /*
   SbHoldSetUp - claims `components` (bits 0..2) of the nodes of the named sets. Collective; release with SbHoldFree().
