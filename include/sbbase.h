@@ -118,8 +118,8 @@ PetscErrorCode SbErrorSetFromOptions(void); /* reads -error_trace */
 void SbErrorSetFile(const char *file);
 /* An error line at the end of a run whose calls all succeeded: a solver gave up, the output is complete. A printf format. */
 void SbErrorPost(const char *format, ...) PETSC_ATTRIBUTE_FORMAT(1, 2);
-/* The message of the error that is on its way up or was posted; PETSc's text for errors that are not the user's. */
-const char *SbErrorMessage(void);
+/* What one rank does when the run fails, before the error line: with PETSc as it was left, no communication. NULL: nothing. */
+void SbErrorSetFarewell(void (*farewell)(const char *message, void *ctx), void *ctx);
 /*
   SbErrorFinish - last call of main() on every rank: `supple: error: ...` on stderr, once for the run; then MPI_Finalize(),
   or MPI_Abort() when other ranks do not arrive within a few seconds. Returns the exit code, non-zero on all ranks when

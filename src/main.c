@@ -35,9 +35,9 @@ static PetscErrorCode read_scenario(SbModel *model, SbRun *run)
   PetscFunctionBeginUser;
   PetscCall(SbSceneCreate(PETSC_COMM_WORLD, model));
   PetscCall(SbRunCreate(*model, run));
-  PetscCall(SbSceneCheck(*model));
   PetscCall(SbOutputSetFromOptions(*run));
   PetscCall(SbOptionsCheck());
+  PetscCall(SbSceneCheck(*model));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -52,9 +52,16 @@ static PetscErrorCode view_scenario(const char *file)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The run failed: says so in its folder. */
+static void report_failure(const char *message, void *run)
+{
+  (void)SbReportFailure((SbRun)run, message);
+}
+
 static PetscErrorCode simulate(SbModel model, SbRun run)
 {
   PetscFunctionBeginUser;
+  SbErrorSetFarewell(report_failure, run);
   PetscCall(PetscLogStagePush(SbStageSetup));
   PetscCall(SbModelSetUp(model));
   PetscCall(SbSceneValidate(model));
@@ -64,6 +71,7 @@ static PetscErrorCode simulate(SbModel model, SbRun run)
   PetscCall(SbReportHeader(run));
   PetscCall(SbRunSolve(run));
   PetscCall(SbReportSummary(run));
+  SbErrorSetFarewell(NULL, NULL);
   if (run->stop_reason[0]) SbErrorPost("%s", run->stop_reason);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -7,7 +7,7 @@
   reduction, and the lowest one prints. A rank that failed alone waits in vain for others that are stuck in a collective
   call; after a short grace it prints and aborts the run, the last resort against a hang.
 
-  Errors that are not the user's get PETSc's trace at once.
+  Errors that are not the user's get PETSc's trace at once, and the line at the end as well.
 */
 #include <stdarg.h>
 #include <unistd.h>
@@ -22,12 +22,22 @@ static struct {
   PetscBool trace;    /* -error_trace */
   char message[2048]; /* of the last error */
   char file[256];     /* option files, for messages about YAML */
+  void (*farewell)(const char *message, void *ctx); /* called by the rank that speaks for the run */
+  void *farewell_ctx;
 } state = {.comm = MPI_COMM_NULL};
 
 static const SbOption rows[] = {
   {"error_trace", SB_OPTION_BOOL, 1, "", "false", "",
    "print the stack of calls with every error, also with errors of the input"},
 };
+
+/* PETSc's functions that read options; their messages do not always name the option. */
+static PetscBool of_options(const char *function)
+{
+  return (PetscBool)(function && (!strncmp(function, "PetscOptionsInsert", 18) ||
+                                  !strncmp(function, "PetscOptionsStringTo", 20) ||
+                                  !strcmp(function, "PetscParseLayerYAML")));
+}
 
 static PetscBool is_user_error(PetscErrorCode n, const char *function)
 {
@@ -42,9 +52,9 @@ static PetscBool is_user_error(PetscErrorCode n, const char *function)
   default:
     break;
   }
-  /* PETSc reads option files itself, under other codes */
-  return (PetscBool)(function && (!strncmp(function, "PetscOptionsInsert", 18) ||
-                                  !strcmp(function, "PetscParseLayerYAML")));
+  /* PETSc reads its options and option files itself, under other codes */
+  return (PetscBool)(n == PETSC_ERR_ARG_UNKNOWN_TYPE || n == PETSC_ERR_MISSING_FACTOR ||
+                     of_options(function));
 }
 
 /* PETSc says what is wrong with a YAML file, but not with which one. */
@@ -112,13 +122,16 @@ void SbErrorPost(const char *format, ...)
   state.pending = state.posted = PETSC_TRUE;
 }
 
-const char *SbErrorMessage(void)
+void SbErrorSetFarewell(void (*farewell)(const char *message, void *ctx), void *ctx)
 {
-  return state.message;
+  state.farewell = farewell;
+  state.farewell_ctx = ctx;
 }
 
-static void print_error(void)
+/* What the run has to say, by one rank. */
+static void speak(void)
 {
+  if (state.farewell) (*state.farewell)(state.message, state.farewell_ctx);
   (void)fflush(stdout);
   (void)fprintf(stderr, "supple: error: %s\n", state.message);
   (void)fflush(stderr);
@@ -126,28 +139,31 @@ static void print_error(void)
 
 int SbErrorFinish(PetscErrorCode ierr)
 {
-  enum { SPEAKER, FAILED };
-  int mine[2], all[2], failed, done = 0;
+  enum {
+    SPEAKER, /* the lowest rank with a user error, else the lowest one that failed */
+    FAILED
+  };
+  const int failed = ierr || state.posted ? 1 : 0;
+  int mine[2], all[2], done = 0;
   PetscMPIInt rank, size;
   MPI_Request request;
   double end;
 
   (void)MPI_Comm_rank(state.comm, &rank);
   (void)MPI_Comm_size(state.comm, &size);
-  failed = ierr || state.posted ? 1 : 0;
-  mine[SPEAKER] = failed && state.pending ? -rank : -size;
+  mine[SPEAKER] = -rank - (state.pending ? 0 : size) - (failed ? 0 : 2 * size);
   mine[FAILED] = failed;
   (void)MPI_Iallreduce(mine, all, 2, MPI_INT, MPI_MAX, state.comm, &request);
   end = MPI_Wtime() + GRACE + 0.1 * PetscMin(rank, 20);
-  while (!done && (!ierr || MPI_Wtime() < end)) {
+  while (!done && (!failed || MPI_Wtime() < end)) {
     (void)MPI_Test(&request, &done, MPI_STATUS_IGNORE);
     if (!done) (void)usleep(1000);
   }
   if (!done) {
-    if (state.pending) print_error();
+    speak();
     (void)MPI_Abort(state.comm, 1);
   }
-  if (all[SPEAKER] == -rank && mine[SPEAKER] == -rank) print_error();
+  if (all[FAILED] && all[SPEAKER] == mine[SPEAKER]) speak();
   (void)MPI_Comm_free(&state.comm);
   (void)MPI_Finalize();
   return all[FAILED];

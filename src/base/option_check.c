@@ -317,6 +317,20 @@ PetscErrorCode SbOptionsCheck(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Options that PETSc reads in PetscFinalize() only. */
+static PetscBool is_read_at_end(const char *name)
+{
+  static const char *const names[] = {
+    "citations",    "get_total_flops",   "log_",      "malloc_",      "memory_view",
+    "mpidump",      "no_signal_handler", "nox",       "objects_dump", "options_left",
+    "options_view", "saw_options",       "x_virtual",
+  };
+
+  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(names); i++)
+    if (!strncasecmp(name, names[i], strlen(names[i]))) return PETSC_TRUE;
+  return PETSC_FALSE;
+}
+
 PetscErrorCode SbOptionsUnused(MPI_Comm comm, PetscInt *n)
 {
   PetscInt nleft;
@@ -330,7 +344,7 @@ PetscErrorCode SbOptionsUnused(MPI_Comm comm, PetscInt *n)
 
     for (PetscInt j = 0; j < SbTheOptions.nuser && !users; j++)
       users = (PetscBool)!strcasecmp(SbTheOptions.user[j].name, names[i]);
-    if (!users || is_recorded(names[i])) continue;
+    if (!users || is_recorded(names[i]) || is_read_at_end(names[i])) continue;
     PetscCall(SbWarning(comm, "nobody read the option -%s%s%s", names[i], values[i] ? " " : "",
                         values[i] ? values[i] : ""));
     (*n)++;

@@ -52,6 +52,7 @@ static PetscBool readable(const char *file, SbCommand *command)
   const int error = file_error(file);
 
   if (!error) return PETSC_TRUE;
+  if (command->problem[0]) return PETSC_FALSE;
   (void)snprintf(command->problem, sizeof(command->problem), "cannot read the option file %s: %s", file,
                  strerror(error));
   return PETSC_FALSE;

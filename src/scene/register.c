@@ -9,6 +9,9 @@ PetscErrorCode SbRegisterAll(void)
   PetscFunctionBeginUser;
   PetscCall(SbLogInitialize());
 
+  /* or PETSc never frees the partitioners that are registered before the first one is used */
+  PetscCall(PetscPartitionerInitializePackage());
+
   /* what a run has once, in the order of the manual */
   PetscCall(SbSceneRegister());
   PetscCall(SbMeshRegister());

@@ -104,7 +104,7 @@ PetscErrorCode SbSceneReadSets(SbModel model)
   PetscFunctionBeginUser;
   PetscCall(SbSceneReadNames("sets", "set", &n, &names));
   room = n;
-  PetscCall(PetscCalloc1(n + SB_SET_MAX, &model->set));
+  PetscCall(PetscCalloc1(n + SB_SET_MAX + 1, &model->set));
   for (PetscInt i = 0; i < n; i++) {
     const PetscErrorCode ierr = read_set(model, names[i]);
 

@@ -1,0 +1,326 @@
+/*
+  test_scene.c - from options to a model, and what is refused before anything is computed.
+*/
+// @ranks 1 3
+#include "test.h"
+#include "sbscene.h"
+#include <unistd.h>
+
+#define LAW " -body_liver_material corotated -body_liver_young 5e3 -body_liver_poisson 0.45"
+#define LIVER "-bodies liver -body_liver_mesh box:1,1,1:2" LAW
+
+static const char two_bodies[] =
+  "-bodies liver,big_stone -body_liver_mesh box:1,1,1:2" LAW
+  " -body_liver_rotate 1,0,0,90 -body_liver_translate 0,0,2 -body_liver_scale 0.1 -body_liver_spin 0,0,3"
+  " -body_big_stone_mesh box:1,1,1:3 -body_big_stone_material linear -body_big_stone_young 1e6"
+  " -body_big_stone_poisson 0.2 -body_big_stone_density 2500 -body_big_stone_velocity 1,2,3"
+  " -sets left,tip -set_left_at plane:2,0,0,1 -set_tip_at sphere:1,1,1,0.5"
+  " -effects gravity,hold,press,damp -effect_gravity_vector 0,0,-1"
+  " -effect_hold_type support -effect_hold_on left,big_stone,liver.xmin"
+  " -effect_press_type pressure -effect_press_on boundary,left,zmax -effect_press_value 100*t"
+  " -effect_damp_type damping -effect_damp_on all -effect_damp_alpha 0.1";
+
+static PetscErrorCode begin(const char *options, PetscOptions *database)
+{
+  PetscFunctionBeginUser;
+  PetscCall(PetscOptionsCreate(database));
+  PetscCall(PetscOptionsPush(*database));
+  PetscCall(PetscOptionsInsertString(NULL, options));
+  PetscCall(SbRegisterAll());
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode end(PetscOptions *database, SbModel *model)
+{
+  PetscFunctionBeginUser;
+  PetscCall(SbModelDestroy(model));
+  PetscCall(SbOptionsReset());
+  PetscCall(PetscOptionsPop());
+  PetscCall(PetscOptionsDestroy(database));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The model of two_bodies; `where` names the source of the options. */
+static void check_two_bodies(SbModel m, const char *where)
+{
+  const SbBody *liver = &m->body[0], *stone = &m->body[1];
+  static const struct {
+    const char *name, *group;
+    SbSetShape shape;
+  } sets[] = {
+    {"left", "", SB_SET_PLANE},
+    {"tip", "", SB_SET_SPHERE},
+    {"big_stone", "big_stone", SB_SET_BODY},
+    {"liver.xmin", "liver.xmin", SB_SET_GROUP},
+    {"boundary", "", SB_SET_BOUNDARY},
+    {"zmax", "zmax", SB_SET_GROUP},
+    {"all", "", SB_SET_HALFSPACE},
+  };
+
+  SB_CHECK(m->nbody == 2 && m->neffect == 4, "%s: %d bodies, %d effects", where, (int)m->nbody,
+           (int)m->neffect);
+  SB_CHECK(!strcmp(liver->name, "liver") && !strcmp(stone->name, "big_stone"), "%s: names", where);
+  SB_CHECK(!strcmp(liver->mesh, "box:1,1,1:2") && liver->scale == 0.1, "%s: mesh and scale", where);
+  SB_CHECK(liver->rotate[0] == 1 && liver->rotate[3] == 90 && liver->translate[2] == 2, "%s: placement",
+           where);
+  SB_CHECK(liver->spin[2] == 3 && stone->velocity[1] == 2 && stone->spin[0] == 0, "%s: motion", where);
+  SB_CHECK(liver->density == 1000 && stone->density == 2500, "%s: density", where);
+  SB_CHECK(!strcmp(m->material[0]->law, "corotated") && m->material[0]->E == 5e3, "%s: material", where);
+  SB_CHECK(!strcmp(stone->material, "linear") && m->material[1]->nu == 0.2, "%s: second material", where);
+  SB_CHECK(!strcmp(liver->element, "p1") && m->element[1], "%s: elements", where);
+  SB_CHECK(!strcmp(m->effect[2]->name, "press") && !strcmp(m->effect[2]->type, "pressure"), "%s: effects",
+           where);
+  SB_CHECK(m->nset == 7, "%s: %d sets", where, (int)m->nset);
+  for (PetscInt i = 0; i < PetscMin(m->nset, 7); i++) {
+    const SbSet *s = &m->set[i];
+
+    SB_CHECK(!strcmp(s->name, sets[i].name) && s->shape == sets[i].shape && !strcmp(s->group, sets[i].group),
+             "%s: set %d is %s, shape %d, group %s", where, (int)i, s->name, (int)s->shape, s->group);
+  }
+  SB_CHECK(!m->mesh && !m->space, "%s: something was computed", where);
+}
+
+/* From options, from the printed scenario of those, and from YAML. */
+static PetscErrorCode test_model(const char *folder)
+{
+  static const char yaml[] = "bodies: [liver, big_stone]\n"
+                             "body:\n"
+                             "  liver: {mesh: \"box:1,1,1:2\", material: corotated, young: 5e3, poisson: "
+                             "0.45, rotate: [1, 0, 0, 90],\n"
+                             "          translate: [0, 0, 2], scale: 0.1, spin: [0, 0, 3]}\n"
+                             "  big_stone:\n"
+                             "    mesh: box:1,1,1:3\n"
+                             "    material: linear\n"
+                             "    young: 1e6\n"
+                             "    poisson: 0.2\n"
+                             "    density: 2500\n"
+                             "    velocity: 1,2,3\n"
+                             "sets: [left, tip]\n"
+                             "set: {left: {at: \"plane:2,0,0,1\"}, tip: {at: \"sphere:1,1,1,0.5\"}}\n"
+                             "effects: [gravity, hold, press, damp]\n"
+                             "effect:\n"
+                             "  gravity: {vector: [0, 0, -1]}\n"
+                             "  hold: {type: support, on: [left, big_stone, liver.xmin]}\n"
+                             "  press: {type: pressure, on: [boundary, left, zmax], value: 100*t}\n"
+                             "  damp: {type: damping, on: all, alpha: 0.1}\n";
+  char view[PETSC_MAX_PATH_LEN], file[PETSC_MAX_PATH_LEN];
+  PetscOptions database;
+  PetscViewer viewer;
+  PetscMPIInt rank;
+  SbModel model;
+
+  PetscFunctionBeginUser;
+  PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
+  PetscCall(PetscSNPrintf(view, sizeof(view), "%s/view.opts", folder));
+  PetscCall(PetscSNPrintf(file, sizeof(file), "%s/scene.yml", folder));
+
+  PetscCall(begin(two_bodies, &database));
+  PetscCall(SbSceneCreate(PETSC_COMM_WORLD, &model));
+  check_two_bodies(model, "options");
+  model->dynamic = PETSC_TRUE;
+  PetscCall(SbSceneCheck(model));
+  PetscCall(SbOptionsCheck());
+  PetscCall(SbViewerOpen(PETSC_COMM_WORLD, view, &viewer));
+  PetscCall(SbOptionsView(viewer));
+  PetscCall(PetscViewerDestroy(&viewer));
+  PetscCall(end(&database, &model));
+
+  if (!rank) {
+    FILE *f = fopen(file, "w");
+
+    PetscCheck(f, PETSC_COMM_SELF, PETSC_ERR_FILE_OPEN, "cannot write %s", file);
+    (void)fputs(yaml, f);
+    (void)fclose(f);
+  }
+  PetscCallMPI(MPI_Barrier(PETSC_COMM_WORLD));
+  for (int i = 0; i < 2; i++) {
+    PetscCall(begin("", &database));
+    PetscCall(PetscOptionsInsertFile(PETSC_COMM_WORLD, NULL, i ? file : view, PETSC_TRUE));
+    PetscCall(SbSceneCreate(PETSC_COMM_WORLD, &model));
+    check_two_bodies(model, i ? "YAML" : "printed scenario");
+    PetscCall(SbOptionsCheck());
+    PetscCall(end(&database, &model));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Creation, or the check after it, must fail with this message. */
+static PetscErrorCode refused(const char *options, const char *message)
+{
+  PetscOptions database;
+  SbModel model = NULL;
+  PetscErrorCode ierr;
+  char *said;
+
+  PetscFunctionBeginUser;
+  PetscCall(begin(options, &database));
+  PetscCall(PetscPushErrorHandler(PetscReturnErrorHandler, NULL));
+  ierr = SbSceneCreate(PETSC_COMM_WORLD, &model);
+  if (!ierr) ierr = SbOptionsCheck();
+  if (!ierr) ierr = SbSceneCheck(model);
+  PetscCall(PetscPopErrorHandler());
+  SB_CHECK(ierr == PETSC_ERR_USER, "code %d for %s", (int)ierr, options);
+  PetscCall(PetscErrorMessage(PETSC_ERR_USER, NULL, &said));
+  SB_CHECK(!strncmp(said, message, strlen(message)), "message is\n  %s\nexpected\n  %s", said, message);
+  PetscCall(end(&database, &model));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode test_names(void)
+{
+  PetscFunctionBeginUser;
+  PetscCall(refused("", "-bodies must be given: names of the bodies"));
+  PetscCall(refused("-bodies \" \"", "-bodies names no body; at least one is needed"));
+  PetscCall(refused("-bodies liver,stone,liver",
+                    "-bodies: two are named 'liver'; every body needs a name of its own"));
+  PetscCall(refused("-bodies liver,LIVER",
+                    "-bodies: two are named 'LIVER' (upper and lower case count as one); every body"));
+  PetscCall(refused("-bodies 1liver", "-bodies: the name '1liver' does not begin with a letter"));
+  PetscCall(refused("-bodies my-liver",
+                    "-bodies: the name 'my-liver' may hold letters, digits and underscores only"));
+  PetscCall(
+    refused("-bodies liver_", "-bodies: the name 'liver_' has an underscore without a word after it"));
+  PetscCall(refused("-bodies a__b", "-bodies: the name 'a__b' has an underscore without a word after it"));
+  PetscCall(refused("-bodies liver_1", "-bodies: the name 'liver_1' has a part of digits only; leave out"));
+  PetscCall(refused("-bodies a_12_b", "-bodies: the name 'a_12_b' has a part of digits only; leave out"));
+  PetscCall(refused("-bodies a23456789_123456789_123456789_12",
+                    "-bodies: the name 'a23456789_123456789_123456789_12' is longer"));
+  PetscCall(refused("-bodies all", "-bodies: the name 'all' has a meaning of its own where sets are named"));
+  PetscCall(refused(LIVER " -effects gravity,gravity", "-effects: two are named 'gravity'; every effect"));
+  PetscCall(refused(LIVER " -sets boundary", "-sets: the name 'boundary' has a meaning of its own"));
+  PetscCall(refused(LIVER " -sets liver -set_liver_at boundary",
+                    "-sets: 'liver' is the name of a body and means the whole"));
+  PetscCall(refused(LIVER " -sets a", "-set_a_at must be given: where the set is"));
+  PetscCall(
+    refused(LIVER " -sets a -set_a_at body:lver", "-set_a_at body:lver: the scenario has no body lver"));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode test_values(void)
+{
+  PetscFunctionBeginUser;
+  PetscCall(refused("-bodies liver", "-body_liver_mesh must be given: tetrahedral mesh"));
+  PetscCall(refused("-bodies liver -body_liver_mesh box:1,1,1:2",
+                    "-body_liver_material must be given: one of linear, corotated, stvk, neohookean"));
+  PetscCall(refused(LIVER " -body_liver_material corotate",
+                    "-body_liver_material corotate is not one of linear, "
+                    "corotated, stvk, neohookean; did you mean corotated?"));
+  PetscCall(
+    refused(LIVER " -body_liver_element p2", "-body_liver_element p2 is not one of p1; did you mean p1?"));
+  PetscCall(refused(LIVER " -body_liver_scale 0",
+                    "-body_liver_scale 0 is outside (0, inf): factor on the coordinates"));
+  PetscCall(
+    refused(LIVER " -body_liver_rotate 0,0,0,10", "-body_liver_rotate: the axis 0,0,0 has no direction"));
+  PetscCall(refused(LIVER " -body_liver_young -1", "-body_liver_young -1 Pa is outside (0, inf) Pa: "));
+  PetscCall(refused(LIVER " -body_liver_poisson 0.5", "-body_liver_poisson 0.5 is outside (-1, 0.5): "));
+  PetscCall(
+    refused(LIVER " -body_liver_density 0", "-body_liver_density 0 kg/m^3 is outside (0, inf) kg/m^3: "));
+  PetscCall(refused(LIVER " -mass lump", "-mass lump is not one of lumped|consistent"));
+  PetscCall(
+    refused(LIVER " -body_stone_young 1", "-body_stone_young is not an option of supple: it names no body"));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode test_check(const char *folder)
+{
+  char options[2 * PETSC_MAX_PATH_LEN], message[2 * PETSC_MAX_PATH_LEN];
+  PetscOptions database;
+  SbModel model;
+  PetscMPIInt rank;
+
+  PetscFunctionBeginUser;
+  PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
+  PetscCall(PetscSNPrintf(options, sizeof(options), "%s/liver.msh", folder));
+  if (!rank) {
+    FILE *f = fopen(options, "w");
+
+    if (f) (void)fclose(f);
+  }
+  PetscCallMPI(MPI_Barrier(PETSC_COMM_WORLD));
+  PetscCall(
+    PetscSNPrintf(options, sizeof(options), "-bodies liver -body_liver_mesh %s/livr.msh" LAW, folder));
+  PetscCall(PetscSNPrintf(
+    message, sizeof(message),
+    "-body_liver_mesh %s/livr.msh: No such file or directory; did you mean %s/liver.msh?", folder, folder));
+  PetscCall(refused(options, message));
+  PetscCall(refused("-bodies liver -body_liver_mesh nowhere.msh" LAW,
+                    "-body_liver_mesh nowhere.msh: No such file or directory; relative names begin in /"));
+  /* not dynamic, and nothing holds the body */
+  PetscCall(refused(LIVER " -effects gravity", "-time static: nothing holds the bodies"));
+  PetscCall(begin(LIVER " -effects hold -effect_hold_type support -effect_hold_on xmin", &database));
+  PetscCall(SbSceneCreate(PETSC_COMM_WORLD, &model));
+  PetscCall(SbSceneCheck(model));
+  SB_CHECK(model->nset == 1 && model->set[0].shape == SB_SET_GROUP, "the set of the support");
+  PetscCall(end(&database, &model));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* 70 sets are more than one bit each; they must not be written beyond the array. */
+static PetscErrorCode test_many_sets(void)
+{
+  char options[4096] = LIVER " -effects hold -effect_hold_type support -effect_hold_on s0", name[8];
+
+  PetscFunctionBeginUser;
+  for (int i = 1; i < 70; i++) {
+    (void)snprintf(name, sizeof(name), ",s%d", i);
+    PetscCall(PetscStrlcat(options, name, sizeof(options)));
+  }
+  PetscCall(
+    refused(options, "the scenario uses more than 63 sets (0 in -sets, the others named by effects)"));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode test_command(void)
+{
+  char *argv[] = {
+    "supple", "nix.opts", "-ts_dt", "-1", "-Help", "-version", "-scenario_view", "v.opts",
+    "-flag",  "-vector",  "0,",     "0,", "-help", "petsc",    "-options_file",  "/nonexistent/a.yml",
+    NULL};
+  const char *const expected[] = {"supple", "nix.opts", "-ts_dt", "-1", "-flag", "-vector", "0,", "-help"};
+  char *only[] = {"supple", "-options_markdown", NULL};
+  int argc = 16;
+  SbCommand command;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbCommandLine(&argc, argv, &command));
+  SB_CHECK(argc == 8 && !argv[8], "%d words are left", argc);
+  for (int i = 0; i < PetscMin(argc, 8); i++)
+    SB_CHECK(!strcmp(argv[i], expected[i]), "word %d is %s", i, argv[i]);
+  SB_CHECK(command.help && command.version && command.view && !strcmp(command.view_file, "v.opts"),
+           "requests");
+  SB_CHECK(!command.scenario[0] && !command.markdown[0], "scenario '%s'", command.scenario);
+  SB_CHECK(!strcmp(command.problem, "cannot read the option file nix.opts: No such file or directory"), "%s",
+           command.problem);
+  argc = 2;
+  PetscCall(SbCommandLine(&argc, only, &command));
+  SB_CHECK(argc == 1 && !strcmp(command.markdown, "-") && !command.problem[0], "-options_markdown alone");
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode run_tests(void)
+{
+  char folder[PETSC_MAX_PATH_LEN] = "/tmp/sb_test_scene_XXXXXX", command[PETSC_MAX_PATH_LEN + 16];
+  PetscMPIInt rank;
+
+  PetscFunctionBeginUser;
+  PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
+  if (!rank) PetscCheck(mkdtemp(folder), PETSC_COMM_SELF, PETSC_ERR_FILE_OPEN, "cannot make a folder");
+  PetscCallMPI(MPI_Bcast(folder, sizeof(folder), MPI_CHAR, 0, PETSC_COMM_WORLD));
+  PetscCall(test_model(folder));
+  PetscCall(test_names());
+  PetscCall(test_values());
+  PetscCall(test_check(folder));
+  PetscCall(test_many_sets());
+  PetscCall(test_command());
+  PetscCallMPI(MPI_Barrier(PETSC_COMM_WORLD));
+  PetscCall(PetscSNPrintf(command, sizeof(command), "rm -rf %s", folder));
+  if (!rank) PetscCheck(!system(command), PETSC_COMM_SELF, PETSC_ERR_SYS, "cannot remove %s", folder);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+int main(int argc, char **argv)
+{
+  SB_TEST_BEGIN(argc, argv);
+  PetscCall(run_tests());
+  SB_TEST_END();
+}
