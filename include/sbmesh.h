@@ -29,7 +29,7 @@ typedef struct {
   PetscReal min_dihedral;             /* smallest dihedral angle, degrees */
   PetscReal max_radius_ratio;         /* circumradius / (3 inradius), 1 for the regular tet; the worst cell */
   PetscReal bbox[6];                  /* xmin ymin zmin xmax ymax zmax, placed, m */
-  char      note[256];                /* what was repaired or is odd, "3 unused vertices left out, ..."; "" when nothing */
+  char      note[256];                /* what was repaired or is odd, "unused vertices left out: 3, ..."; "" when nothing */
 } SbBody;
 
 /*

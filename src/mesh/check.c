@@ -162,8 +162,8 @@ static PetscErrorCode check_faces(const SbImport *im, const SbFaces *faces)
       if (same) PetscCall(twice(im, s[i], s[(i + 1) % 3]));
     }
     SETERRQ(PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
-            "%s: tetrahedra %lld, %lld and %lld share one face (and %" PetscInt_FMT
-            " such faces in all); a face has at most two, remove what overlaps",
+            "%s: tetrahedra %lld, %lld and %lld share one face (of %" PetscInt_FMT
+            " such faces); a face has at most two, remove what overlaps",
             im->where, (long long)im->item[3].number[s[0]], (long long)im->item[3].number[s[1]],
             (long long)im->item[3].number[s[2]], faces->nshared);
   }

@@ -100,8 +100,8 @@ static PetscErrorCode write_note(const SbImport *im, SbBody *body)
   body->note[0] = 0;
   for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(notes); i++) {
     if (!notes[i].n) continue;
-    (void)snprintf(one, sizeof(one), "%s%" PetscInt_FMT " %s", body->note[0] ? ", " : "", notes[i].n,
-                   notes[i].text);
+    (void)snprintf(one, sizeof(one), "%s%s: %" PetscInt_FMT, body->note[0] ? ", " : "", notes[i].text,
+                   notes[i].n);
     PetscCall(PetscStrlcat(body->note, one, sizeof(body->note)));
   }
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -1,0 +1,214 @@
+// The mesh of a scene on any number of ranks: every piece agrees with the whole, errors reach all ranks.
+// @ranks 1 2 3 4
+#include "mesh_test.h"
+
+#define DATA "tests/data/"
+
+enum { NSET = 5 };
+
+static PetscErrorCode make_scene(SbBody body[3], SbSet set[NSET])
+{
+  PetscFunctionBeginUser;
+  body[0] = test_body("cubes", DATA "two_cubes_22_bin.msh");
+  body[1] = test_body("bar", "box:2,0.5,0.5:4");
+  body[2] = test_body("tets", DATA "odd.msh");
+  body[1].translate[2] = 3;
+  body[2].scale = 0.5;
+  PetscCall(test_set("wall", "group:wall", &set[0]));
+  PetscCall(test_set("inner", "group:inner", &set[1]));
+  PetscCall(test_set("low", "halfspace:1,0,0,0.6", &set[2]));
+  PetscCall(test_set("bar", "body:bar", &set[3]));
+  PetscCall(test_set("hull", "boundary", &set[4]));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Every rank builds the whole mesh once more and looks up what it was given. */
+static PetscErrorCode compare_with_whole(SbMesh mesh, const SbWhole *whole)
+{
+  PetscInt wrong_vert = 0, wrong_cell = 0;
+
+  PetscFunctionBeginUser;
+  SB_CHECK(mesh->Nvert == whole->nvert && mesh->Ncell == whole->ncell, "%d vertices, %d cells",
+           (int)mesh->Nvert, (int)mesh->Ncell);
+  for (PetscInt v = 0; v < mesh->nvert; v++) {
+    const SbPoint *p = &whole->point[whole->ncell + mesh->vert_orig[v]];
+
+    wrong_vert += p->body != mesh->vert_body[v] || p->set != mesh->vert_set[v];
+    for (int i = 0; i < 3; i++) wrong_vert += p->u.x[i] != mesh->x[3 * v + i];
+  }
+  for (PetscInt c = 0; c < mesh->ncell; c++) {
+    const PetscInt orig = mesh->cell_orig[c];
+    const SbPoint *p = &whole->point[orig];
+
+    wrong_cell += p->body != mesh->cell_body[c] || p->set != mesh->cell_set[c];
+    for (int a = 0; a < 4; a++) {
+      wrong_cell += whole->cell[4 * orig + a] != mesh->vert_orig[mesh->cell[4 * c + a]];
+      wrong_cell += p->u.face[a] != mesh->face_set[4 * c + a];
+    }
+  }
+  SB_CHECK(!wrong_vert && !wrong_cell, "%d wrong entries of vertices, %d of cells", (int)wrong_vert,
+           (int)wrong_cell);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The DM has the same points, and each vertex the same place. */
+static PetscErrorCode check_dm(SbMesh mesh)
+{
+  Vec x;
+  PetscInt n;
+  PetscReal sum = 0, sums = 0;
+  PetscScalar total;
+
+  PetscFunctionBeginUser;
+  PetscCall(DMGetCoordinates(mesh->dm, &x));
+  PetscCall(VecGetSize(x, &n));
+  PetscCall(VecSum(x, &total));
+  for (PetscInt i = 0; i < 3 * mesh->nvert_owned; i++) sum += mesh->x[i];
+  PetscCallMPI(MPI_Allreduce(&sum, &sums, 1, MPIU_REAL, MPI_SUM, mesh->comm));
+  SB_CHECK(n == 3 * mesh->Nvert, "%d coordinates in the DM", (int)n);
+  SB_CHECK_NEAR(total, sums, 1e-12 * n,
+                "sum of the coordinates of the DM"); /* rounding of n terms of order one */
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode test_scene(const char *partitioner)
+{
+  SbBody body[3], body_again[3];
+  SbSet set[NSET], set_again[NSET];
+  SbMesh mesh;
+  SbWhole whole;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscOptionsSetValue(NULL, "-mesh_partitioner", partitioner));
+  PetscCall(make_scene(body, set));
+  PetscCall(make_scene(body_again, set_again));
+  PetscCall(SbMeshCreate(PETSC_COMM_WORLD, 3, body, NSET, set, &mesh));
+  PetscCall(SbMeshValidate(mesh));
+  PetscCall(SbWholeCreate(3, body_again, NSET, set_again, &whole));
+  PetscCall(compare_with_whole(mesh, &whole));
+  PetscCall(check_dm(mesh));
+  /* What rank 0 found is known to all. */
+  SB_CHECK(!memcmp(set, set_again, sizeof(set)), "counts of the sets");
+  for (int b = 0; b < 3; b++) {
+    SB_CHECK(body[b].ncell == body_again[b].ncell && body[b].volume == body_again[b].volume &&
+               !strcmp(body[b].note, body_again[b].note),
+             "findings of body %d", b);
+  }
+  SB_CHECK(set[0].nvert == 5 && set[0].nfacet == 4 && set[3].ncell == body[1].ncell,
+           "%d vertices, %d facets in the wall", (int)set[0].nvert, (int)set[0].nfacet);
+  PetscCall(SbWholeDestroy(&whole));
+  PetscCall(SbMeshDestroy(&mesh));
+  SB_CHECK(!mesh, "the mesh is gone");
+  PetscCall(SbMeshDestroy(&mesh));
+  PetscCall(PetscOptionsClearValue(NULL, "-mesh_partitioner"));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Hardly more tets than ranks, or fewer: some ranks are idle, the mesh is whole. */
+static PetscErrorCode test_few(const char *file, PetscInt ncell)
+{
+  SbBody body = test_body("b", file);
+  SbMesh mesh;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbMeshCreate(PETSC_COMM_WORLD, 1, &body, 0, NULL, &mesh));
+  PetscCall(SbMeshValidate(mesh));
+  SB_CHECK(mesh->Ncell == ncell, "%d cells", (int)mesh->Ncell);
+  PetscCall(SbMeshDestroy(&mesh));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Vertices of one rank are near each other in number: the largest distance within a cell of a slender bar. */
+static PetscErrorCode test_order(void)
+{
+  SbBody body = test_body("b", "box:60,2,2:60,2,2");
+  SbMesh mesh;
+  PetscInt width = 0;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbMeshCreate(PETSC_COMM_WORLD, 1, &body, 0, NULL, &mesh));
+  for (PetscInt c = 0; c < mesh->ncell; c++) {
+    for (int a = 0; a < 4; a++) {
+      for (int b = 0; b < a; b++) {
+        const PetscInt v = mesh->cell[4 * c + a], w = mesh->cell[4 * c + b];
+
+        if (v < mesh->nvert_owned && w < mesh->nvert_owned) width = PetscMax(width, PetscAbsInt(v - w));
+      }
+    }
+  }
+  /* three layers of 9 vertices; a middle rank is searched from one of its two ends all the same */
+  SB_CHECK(width <= 27, "bandwidth %d", (int)width);
+  PetscCall(SbMeshDestroy(&mesh));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode create(const char *file, const char *set_text)
+{
+  SbBody body = test_body("liver", file);
+  SbSet set;
+  SbMesh mesh = NULL;
+
+  PetscFunctionBeginUser;
+  if (set_text) PetscCall(test_set("clamp", set_text, &set));
+  PetscCall(SbMeshCreate(PETSC_COMM_WORLD, 1, &body, set_text ? 1 : 0, &set, &mesh));
+  PetscCall(SbMeshDestroy(&mesh));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Only rank 0 reads, but all ranks leave with the same error and message. */
+static PetscErrorCode test_errors(void)
+{
+  PetscFunctionBeginUser;
+  TEST_MESSAGE(create(DATA "none.msh", NULL), PETSC_ERR_FILE_OPEN,
+               "body 'liver': tests/data/none.msh: cannot open the file");
+  TEST_MESSAGE(create(DATA "bad_nan.msh", NULL), PETSC_ERR_FILE_UNEXPECTED,
+               "line 9: coordinate of node 4 is not a finite number");
+  TEST_MESSAGE(create(DATA "bad_twice.msh", NULL), PETSC_ERR_USER_INPUT,
+               "tetrahedra 1 and 3 have the same four nodes");
+  TEST_MESSAGE(create("box:1,1,1:2", "group:ymix"), PETSC_ERR_USER_INPUT,
+               "there is no physical group 'ymix', did you mean");
+  TEST_MESSAGE(create("box:1,1,1:2", "sphere:3,0,0,1"), PETSC_ERR_USER_INPUT, "no vertex lies in the sphere");
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The validation sees what it is there for; damage is done on all ranks, so that all stop at the same check. */
+static PetscErrorCode test_validation(void)
+{
+  SbBody body = test_body("b", "box:1,1,1:4");
+  SbMesh mesh;
+  PetscInt keep;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbMeshCreate(PETSC_COMM_WORLD, 1, &body, 0, NULL, &mesh));
+  keep = mesh->cell[0];
+  mesh->cell[0] = mesh->cell[1];
+  mesh->cell[1] = keep;
+  TEST_MESSAGE(SbMeshValidate(mesh), PETSC_ERR_PLIB, "is not positively oriented");
+  mesh->cell[1] = mesh->cell[0];
+  mesh->cell[0] = keep;
+  keep = mesh->vert_orig[0];
+  mesh->vert_orig[0] = mesh->vert_orig[1];
+  TEST_MESSAGE(SbMeshValidate(mesh), PETSC_ERR_PLIB, "Sum of original vertex numbers");
+  mesh->vert_orig[0] = keep;
+  for (PetscInt s = 0; s < 4 * mesh->ncell_owned; s++) mesh->face_set[s] &= ~SB_ON_BOUNDARY;
+  TEST_MESSAGE(SbMeshValidate(mesh), PETSC_ERR_PLIB, "Sum of boundary facets");
+  PetscCall(SbMeshDestroy(&mesh));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+int main(int argc, char **argv)
+{
+  SB_TEST_BEGIN(argc, argv);
+  PetscCall(SbLogInitialize());
+  PetscCall(SbMeshRegister());
+  PetscCall(test_scene("metis"));
+  PetscCall(test_scene("simple"));
+  PetscCall(test_scene("ptscotch"));
+  PetscCall(test_few(DATA "two_tets.msh", 2));
+  PetscCall(test_few("box:1,1,1:1", 6));
+  PetscCall(test_order());
+  PetscCall(test_errors());
+  PetscCall(test_validation());
+  PetscCall(SbOptionsReset());
+  SB_TEST_END();
+}

@@ -1,0 +1,161 @@
+// Checks, repairs and quality of one body's mesh.
+// @ranks 1
+#include "mesh_test.h"
+
+#define DATA "tests/data/"
+
+typedef struct {
+  SbImport im;
+  SbFaces faces;
+  SbBody body;
+} Checked;
+
+static PetscErrorCode check_mesh(SbBody body, Checked *m)
+{
+  PetscFunctionBeginUser;
+  memset(m, 0, sizeof(*m));
+  m->body = body;
+  PetscCall(SbImportRead(&m->body, &m->im));
+  PetscCall(SbImportCheck(&m->im, &m->faces));
+  PetscCall(SbImportQuality(&m->im, &m->faces, &m->body));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode free_mesh(Checked *m)
+{
+  PetscFunctionBeginUser;
+  PetscCall(SbImportDestroy(&m->im));
+  PetscCall(SbFacesDestroy(&m->faces));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* What is repaired and what is only counted. */
+static PetscErrorCode test_repairs(void)
+{
+  Checked m;
+
+  PetscFunctionBeginUser;
+  PetscCall(check_mesh(test_body("b", DATA "odd.msh"), &m));
+  SB_CHECK(m.im.nunused == 2 && m.im.nvert == 8, "%d unused vertices, %d left", (int)m.im.nunused,
+           (int)m.im.nvert);
+  SB_CHECK(m.im.vert_number[0] == 1 && m.im.vert_number[4] == 60, "numbers of the vertices that stay");
+  SB_CHECK(m.im.x[3 * 4] == 5 && m.im.x[3 * 7 + 2] == 1, "places of the vertices that stay");
+  SB_CHECK(m.im.nreoriented == 1, "%d tets turned", (int)m.im.nreoriented);
+  SB_CHECK(m.im.nlost == 2, "%d triangles beside the tets", (int)m.im.nlost);
+  SB_CHECK(m.im.item[0].n == 0 && m.im.item[2].n == 2, "%d points and %d triangles left", (int)m.im.item[0].n,
+           (int)m.im.item[2].n);
+  for (PetscInt c = 0; c < 2; c++)
+    SB_CHECK_NEAR(SbTetDet(m.im.x, m.im.item[3].vert + 4 * c), 1, 0, "determinant");
+  SB_CHECK(m.body.npart == 2, "%d parts", (int)m.body.npart);
+  SB_CHECK(!strcmp(m.body.note, "unused vertices left out: 2, inverted tets turned: 1, parts that share no "
+                                "vertex: 2, triangles of groups that are no face of a "
+                                "tet: 2"),
+           "'%s'", m.body.note);
+  PetscCall(free_mesh(&m));
+  PetscCall(check_mesh(test_body("b", DATA "odd_edge.msh"), &m));
+  SB_CHECK(m.im.npinched == 1 && m.body.npart == 1, "%d edges with more than two facets, %d parts",
+           (int)m.im.npinched, (int)m.body.npart);
+  SB_CHECK(m.body.nfacet == 8, "%d facets", (int)m.body.nfacet);
+  PetscCall(free_mesh(&m));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode test_refusals(void)
+{
+  static const struct {
+    const char *file, *words;
+  } bad[] = {
+    {"bad_flat.msh",
+     "body 'b': tests/data/bad_flat.msh: tetrahedron 1 is flat (volume 1.67e-15 m^3 with an edge of 1.41 m)"},
+    {"bad_vertex_twice.msh", "tetrahedron 1 uses node 3 twice"},
+    {"bad_twice.msh", "tetrahedra 1 and 3 have the same four nodes"},
+    {"bad_twins.msh", "tetrahedra 1 and 2 have the same four nodes"},
+    {"bad_three.msh", "tetrahedra 1, 2 and 3 share one face"},
+  };
+  Checked m;
+  SbBody body;
+  char path[256];
+
+  PetscFunctionBeginUser;
+  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(bad); i++) {
+    (void)snprintf(path, sizeof(path), DATA "%s", bad[i].file);
+    TEST_MESSAGE(check_mesh(test_body("b", path), &m), PETSC_ERR_USER_INPUT, bad[i].words);
+    PetscCall(free_mesh(&m));
+  }
+  /* Moved so far away that a tet drowns in the rounding of its coordinates. */
+  body = test_body("b", "box:1e-6,1e-6,1e-6:1");
+  body.translate[0] = 1e9;
+  TEST_MESSAGE(check_mesh(body, &m), PETSC_ERR_USER_INPUT, "is flat");
+  PetscCall(free_mesh(&m));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Sizes from a nanometre to a thousand kilometres and a mirrored body are fine; shape does not depend on size. */
+static PetscErrorCode test_scales(void)
+{
+  Checked m;
+  SbBody body = test_body("b", "box:1,1,1:2");
+
+  PetscFunctionBeginUser;
+  for (int e = -9; e <= 6; e += 3) {
+    body.scale = PetscPowRealInt(10, e);
+    PetscCall(check_mesh(body, &m));
+    SB_CHECK_NEAR(m.body.volume / PetscPowRealInt(10, 3 * e), 1, 1e-13, "volume of the scaled cube");
+    SB_CHECK_NEAR(m.body.min_dihedral, 45, 1e-10, "smallest dihedral angle");
+    PetscCall(free_mesh(&m));
+  }
+  body.scale = -1;
+  PetscCall(check_mesh(body, &m));
+  SB_CHECK(m.im.nreoriented == 48, "%d tets turned in a mirrored cube", (int)m.im.nreoriented);
+  SB_CHECK_NEAR(m.body.volume, 1, 1e-14, "volume of the mirrored cube");
+  SB_CHECK(m.body.bbox[0] == -1 && m.body.bbox[3] == 0, "extent from %g to %g", (double)m.body.bbox[0],
+           (double)m.body.bbox[3]);
+  PetscCall(free_mesh(&m));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Known shapes: the regular tet (70.53 degrees, ratio 1), the corner of a cube, a sliver of height h over a square. */
+static PetscErrorCode test_shape(const PetscReal x[12], PetscReal dihedral, PetscReal ratio)
+{
+  SbImport im;
+  SbFaces faces;
+  SbBody body = test_body("b", "");
+  PetscReal worst = 0;
+
+  PetscFunctionBeginUser;
+  memset(&im, 0, sizeof(im));
+  PetscCall(SbImportSetVertices(&im, 4));
+  PetscCall(PetscArraycpy(im.x, x, 12));
+  PetscCall(SbImportAddItem(&im, 3, (PetscInt[]){0, 1, 2, 3}, 0, 1));
+  PetscCall(SbImportCheck(&im, &faces));
+  PetscCall(SbImportQuality(&im, &faces, &body));
+  SB_CHECK_NEAR(body.min_dihedral, dihedral, 1e-9 * dihedral,
+                "smallest dihedral angle"); /* acos near 1 costs digits */
+  SB_CHECK_NEAR(body.max_radius_ratio, ratio, 1e-9 * ratio, "radius ratio");
+  for (int i = 0; i < 3; i++)
+    worst = PetscMax(
+      worst, PetscAbsReal(body.bbox[i] - PetscMin(PetscMin(x[i], x[3 + i]), PetscMin(x[6 + i], x[9 + i]))));
+  SB_CHECK(worst == 0, "extent wrong by %g", (double)worst);
+  PetscCall(SbImportDestroy(&im));
+  PetscCall(SbFacesDestroy(&faces));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+int main(int argc, char **argv)
+{
+  const PetscReal h = 0.01, degree = PETSC_PI / 180;
+
+  SB_TEST_BEGIN(argc, argv);
+  PetscCall(test_repairs());
+  PetscCall(test_refusals());
+  PetscCall(test_scales());
+  PetscCall(test_shape((PetscReal[]){1, 1, 1, 1, -1, -1, -1, 1, -1, -1, -1, 1}, acos(1. / 3) / degree, 1));
+  /* edges 1, 1, 1, sqrt 2 three times: R = sqrt 3 / 2, r = 1 / (3 + sqrt 3) */
+  PetscCall(test_shape((PetscReal[]){0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1},
+                       acos(1 / PetscSqrtReal(3.)) / degree,
+                       PetscSqrtReal(3.) / 2 * (3 + PetscSqrtReal(3.)) / 3));
+  /* the diagonals of a unit square, one lifted by h; four equal faces of area sqrt(1 + 2 h^2) / 2 */
+  PetscCall(test_shape((PetscReal[]){0, 0, 0, 1, 1, 0, 1, 0, h, 0, 1, h}, acos(1 / (1 + 2 * h * h)) / degree,
+                       PetscSqrtReal((2 + h * h) * (1 + 2 * h * h)) / (3 * h)));
+  SB_TEST_END();
+}

@@ -1,0 +1,230 @@
+// The reader of gmsh files: the four variants of one mesh hold the same, each kind of damage has its message.
+// @ranks 1
+#include <stdlib.h>
+#include <unistd.h>
+#include "mesh_test.h"
+
+#define DATA "tests/data/"
+
+static PetscErrorCode read_mesh(const char *path, SbImport *im)
+{
+  const SbBody body = test_body("b", path);
+
+  PetscFunctionBeginUser;
+  memset(im, 0, sizeof(*im));
+  PetscCall(SbImportRead(&body, im));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Reads, checks, frees. */
+static PetscErrorCode use_mesh(const char *path)
+{
+  SbImport im;
+  SbFaces faces;
+  PetscErrorCode ierr;
+
+  PetscFunctionBeginUser;
+  memset(&faces, 0, sizeof(faces));
+  ierr = read_mesh(path, &im);
+  if (!ierr) ierr = SbImportCheck(&im, &faces);
+  PetscCall(SbImportDestroy(&im));
+  PetscCall(SbFacesDestroy(&faces));
+  PetscFunctionReturn(ierr);
+}
+
+/* Items of one dimension that belong to a group; with all their groups, joined by blanks. */
+static PetscInt count_in_group(const SbImport *im, int dim, const char *name)
+{
+  PetscInt n = 0;
+
+  for (PetscInt i = 0; i < im->item[dim].n; i++) {
+    const PetscInt tags = im->item[dim].tags[i];
+
+    for (PetscInt t = im->tags_start[tags]; t < im->tags_start[tags + 1]; t++)
+      n += !strcmp(im->group[im->tags_group[t]].name, name);
+  }
+  return n;
+}
+
+/* Two adjoining unit cubes: 24 tets each, 4 triangles on each side (two_cubes.geo). */
+static PetscErrorCode test_variant(const char *path)
+{
+  SbImport im, reference;
+  PetscReal difference = 0;
+
+  PetscFunctionBeginUser;
+  PetscCall(read_mesh(path, &im));
+  PetscCall(read_mesh(DATA "two_cubes_41.msh", &reference));
+  SB_CHECK(im.nvert == 23, "%s: %d vertices", path, (int)im.nvert);
+  SB_CHECK(im.item[3].n == 48, "%s: %d tets", path, (int)im.item[3].n);
+  SB_CHECK(count_in_group(&im, 3, "left") == 24, "%s: %d tets left", path,
+           (int)count_in_group(&im, 3, "left"));
+  SB_CHECK(count_in_group(&im, 3, "all") == 48, "%s: %d tets in all", path,
+           (int)count_in_group(&im, 3, "all"));
+  SB_CHECK(count_in_group(&im, 2, "wall") == 4, "%s: %d facets in the wall", path,
+           (int)count_in_group(&im, 2, "wall"));
+  SB_CHECK(count_in_group(&im, 2, "both ends") == 8, "%s: %d facets in both ends", path,
+           (int)count_in_group(&im, 2, "both ends"));
+  SB_CHECK(count_in_group(&im, 2, "inner") == 4, "%s: %d inner facets", path,
+           (int)count_in_group(&im, 2, "inner"));
+  SB_CHECK(count_in_group(&im, 2, "surface_77") == 4, "%s: %d facets without a name", path,
+           (int)count_in_group(&im, 2, "surface_77"));
+  SB_CHECK(count_in_group(&im, 1, "edge") == 1, "%s: %d edges", path, (int)count_in_group(&im, 1, "edge"));
+  SB_CHECK(count_in_group(&im, 0, "corner") == 1, "%s: %d corners", path,
+           (int)count_in_group(&im, 0, "corner"));
+  for (PetscInt i = 0; i < 3 * im.nvert && im.nvert == reference.nvert; i++)
+    difference = PetscMax(difference, PetscAbsReal(im.x[i] - reference.x[i]));
+  SB_CHECK(difference == 0, "%s: coordinates differ by %g", path, (double)difference);
+  SB_CHECK(im.item[3].n == reference.item[3].n &&
+             !memcmp(im.item[3].vert, reference.item[3].vert, 4 * 48 * sizeof(PetscInt)),
+           "%s: other tets", path);
+  PetscCall(SbImportDestroy(&im));
+  PetscCall(SbImportDestroy(&reference));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* A binary file from a machine with the other byte order: the 4.1 file with every number of its sections turned round. */
+static PetscErrorCode test_other_byte_order(void)
+{
+  static const unsigned char one[4] = {0, 0, 0, 1};
+  char path[] = "/tmp/sbmesh_XXXXXX.msh";
+  FILE *file;
+  SbImport im;
+  const int fd = mkstemps(path, 4);
+  double x[4][3] = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
+  uint32_t numbers[3 + 1 + 4] = {4, 1, 0, 1, 1, 2, 3, 4};
+
+  PetscFunctionBeginUser;
+  file = fdopen(fd, "wb");
+  fprintf(file, "$MeshFormat\n2.2 1 8\n");
+  fwrite(one, 1, 4, file);
+  fprintf(file, "\n$EndMeshFormat\n$Nodes\n4\n");
+  for (uint32_t v = 0; v < 4; v++) {
+    const uint32_t number = __builtin_bswap32(v + 1);
+
+    fwrite(&number, 4, 1, file);
+    for (int i = 0; i < 3; i++) {
+      uint64_t bits;
+
+      memcpy(&bits, &x[v][i], 8);
+      bits = __builtin_bswap64(bits);
+      fwrite(&bits, 8, 1, file);
+    }
+  }
+  fprintf(file, "\n$EndNodes\n$Elements\n1\n");
+  for (int i = 0; i < 8; i++) {
+    numbers[i] = __builtin_bswap32(numbers[i]);
+    fwrite(&numbers[i], 4, 1, file);
+  }
+  fprintf(file, "\n$EndElements\n");
+  fclose(file);
+  PetscCall(read_mesh(path, &im));
+  (void)unlink(path);
+  SB_CHECK(im.nvert == 4 && im.item[3].n == 1, "%d vertices, %d tets", (int)im.nvert, (int)im.item[3].n);
+  SB_CHECK(im.x[3] == 1 && im.x[11] == 1, "coordinates %g %g", (double)im.x[3], (double)im.x[11]);
+  PetscCall(SbImportDestroy(&im));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Nodes with far-apart numbers, unused nodes, a section of no concern. */
+static PetscErrorCode test_odd(void)
+{
+  SbImport im;
+
+  PetscFunctionBeginUser;
+  PetscCall(read_mesh(DATA "odd.msh", &im));
+  SB_CHECK(im.nvert == 10 && im.item[3].n == 2, "%d vertices, %d tets", (int)im.nvert, (int)im.item[3].n);
+  SB_CHECK(im.item[3].vert[1] == 2, "node 1000000000002 became vertex %d", (int)im.item[3].vert[1]);
+  SB_CHECK(count_in_group(&im, 2, "skin") == 3 && count_in_group(&im, 3, "flesh") == 2,
+           "groups of a file with names");
+  PetscCall(SbImportDestroy(&im));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode test_damage(void)
+{
+  static const struct {
+    const char *file, *words;
+  } bad[] = {
+    {"bad_empty.msh", "body 'b': tests/data/bad_empty.msh: is empty (0 bytes)"},
+    {"bad_text.msh", "bad_text.msh line 1: expected $MeshFormat"},
+    {"bad_format1.msh", "line 1: gmsh format 1; supple reads 2.2 and 4.1"},
+    {"bad_version.msh", "line 2: format version '4.0'; supple reads 2.2 and 4.1"},
+    {"bad_truncated.msh", "line 15: the file ends where the type of an element is expected; it is truncated"},
+    {"bad_truncated_nodes.msh", "line 5: 5 nodes are announced, the rest of the file cannot hold more than "
+                                "3; it is damaged or truncated"},
+    {"bad_truncated_end.msh", "line 15: the file ends where $EndElements is expected; it is truncated"},
+    {"bad_truncated_bin.msh",
+     "byte 1996: the file ends where the number of bounding entities is expected; it is truncated"},
+    {"bad_nan.msh", "line 9: coordinate of node 4 is not a finite number; repair the file"},
+    {"bad_number.msh", "line 9: expected the coordinate of node 4, found '1,5'"},
+    {"bad_count.msh", "line 5: 900000000000 nodes are announced, the rest of the file cannot hold more than"},
+    {"bad_more.msh", "line 10: expected $EndNodes, found '5'"},
+    {"bad_block.msh", "line 6: block of 7 nodes; only 4 of those announced for the section are left"},
+    {"bad_order.msh", "line 4: section $Elements before $Nodes"},
+    {"bad_missing_node.msh", "line 13: element 1 uses node 9, which $Nodes does not list"},
+    {"bad_node_twice.msh", "node 3 is given twice"},
+    {"bad_no_tets.msh", "holds no tetrahedra; mesh the volume"},
+    {"bad_surface.msh", "is a surface: 2 3-node triangles and no tetrahedra; mesh the volume"},
+    {"bad_hexes.msh", "holds 1 hexahedra; supple simulates tetrahedra only: split them (gmsh: "},
+    {"bad_second_order.msh", "holds 1 10-node tetrahedra; supple needs 4-node ones"},
+    {"bad_type.msh", "line 15: element type 140; supple needs 4-node tetrahedra"},
+    {"bad_partitioned.msh", "line 4: the mesh is cut into partitions; save it in one piece"},
+  };
+  char path[256];
+
+  PetscFunctionBeginUser;
+  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(bad); i++) {
+    (void)snprintf(path, sizeof(path), DATA "%s", bad[i].file);
+    TEST_MESSAGE(use_mesh(path), PETSC_ERR_FILE_UNEXPECTED, bad[i].words);
+  }
+  TEST_MESSAGE(use_mesh(DATA "none.msh"), PETSC_ERR_FILE_OPEN,
+               "body 'b': tests/data/none.msh: cannot open the file (No such file or directory)");
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Cut anywhere, each variant ends in an error, never in a crash or a mesh. */
+static PetscErrorCode test_cut(const char *whole_path, size_t step)
+{
+  char path[] = "/tmp/sbmesh_XXXXXX.msh", *data;
+  FILE *file = fopen(whole_path, "rb");
+  size_t size, needed;
+  PetscErrorCode ierr;
+  const int fd = mkstemps(path, 4);
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscMalloc1(20000, &data));
+  size = fread(data, 1, 20000, file);
+  needed = size - 1; /* the last line end is dispensable */
+  fclose(file);
+  close(fd);
+  PetscCall(PetscPushErrorHandler(PetscReturnErrorHandler, NULL));
+  for (size_t n = 0; n < needed; n += step) {
+    file = fopen(path, "wb");
+    fwrite(data, 1, n, file);
+    fclose(file);
+    ierr = use_mesh(path);
+    SB_CHECK(ierr, "%s cut to %zu of %zu bytes was accepted", whole_path, n, size);
+  }
+  PetscCall(PetscPopErrorHandler());
+  (void)unlink(path);
+  PetscCall(PetscFree(data));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+int main(int argc, char **argv)
+{
+  SB_TEST_BEGIN(argc, argv);
+  PetscCall(test_variant(DATA "two_cubes_22.msh"));
+  PetscCall(test_variant(DATA "two_cubes_22_bin.msh"));
+  PetscCall(test_variant(DATA "two_cubes_41.msh"));
+  PetscCall(test_variant(DATA "two_cubes_41_bin.msh"));
+  PetscCall(test_other_byte_order());
+  PetscCall(test_odd());
+  PetscCall(test_damage());
+  PetscCall(test_cut(DATA "two_cubes_22.msh", 7));
+  PetscCall(test_cut(DATA "two_cubes_22_bin.msh", 7));
+  PetscCall(test_cut(DATA "two_cubes_41.msh", 7));
+  PetscCall(test_cut(DATA "two_cubes_41_bin.msh", 7));
+  SB_TEST_END();
+}
