@@ -1,0 +1,135 @@
+#!/usr/bin/env bash
+# Every mistake in the options ends with one clear line, once for all ranks, a non-zero exit code and no trace.
+# Also: what the command line answers (-help, -version, -scenario_view) and that a printed scenario runs again.
+# @timeout 300
+set -uo pipefail
+passed=0 failed=0
+cd "$SB_OUT" || exit 1
+export PETSC_OPTIONS=
+read -ra mpi <<<"$SB_MPI"
+case $SB_SUPPLE in /*) supple=$SB_SUPPLE ;; *) supple=$OLDPWD/$SB_SUPPLE ;; esac
+
+check() { # text of the check, then a command that must succeed
+  if "${@:2}"; then passed=$((passed + 1)); else
+    failed=$((failed + 1))
+    echo "failed: $1"
+  fi
+}
+
+# error RANKS TEXT ARGUMENT...: the run must fail with one line that holds TEXT
+error() {
+  local ranks=$1 text=$2 code
+  shift 2
+  timeout 60 "${mpi[@]}" "$ranks" "$supple" "$@" >out.txt 2>err.txt
+  code=$?
+  check "$*: exit code $code" test "$code" -ne 0 -a "$code" -ne 124
+  check "$*: $(grep -c '^supple: error: ' err.txt) error lines" test "$(grep -c '^supple: error: ' err.txt)" = 1
+  check "$*: not '$text' but '$(grep '^supple: error: ' err.txt)'" grep -qF -- "supple: error: $text" err.txt
+  check "$*: a trace" test -z "$(cat out.txt err.txt | grep 'PETSC ERROR')"
+}
+
+cat >bar.opts <<'END'
+# a bar that swings
+-bodies bar
+-body_bar_mesh box:0.4,0.1,0.1:6,2,2
+-body_bar_material corotated
+-body_bar_young 5e4          # Pa
+-body_bar_poisson 0.4
+-sets left
+-set_left_at plane:1,0,0,0
+-effects gravity,hold,pull
+-effect_hold_type support
+-effect_hold_on left
+-effect_pull_type traction
+-effect_pull_on xmax
+-effect_pull_vector "0; 10*sin(2*pi*t); table:load.txt"
+-ts_dt 0.01
+-ts_max_time 0.03
+END
+printf '0 0\n0.02 5\n' >load.txt
+cat >bar.yml <<'END'
+bodies: bar
+body:
+  bar:
+    mesh: box:0.4,0.1,0.1:6,2,2
+    material: corotated
+    young: 5e4
+    poisson: 0.4
+sets: [left]
+set: {left: {at: "plane:1,0,0,0"}}
+effects: [gravity, hold, pull]
+effect:
+  hold: {type: support, on: left}
+  pull:
+    type: traction
+    on: [xmax]
+    vector: 0; 10*sin(2*pi*t); table:load.txt
+ts_dt: 0.01
+ts_max_time: 0.03
+END
+
+# misspelt, unknown, doubled, missing
+error 1 "-bodies must be given: "
+error 3 "-body_bar_yuong is not an option of supple; did you mean -body_bar_young?" bar.opts -body_bar_yuong 3
+error 1 "-body_bra_young is not an option of supple; did you mean -body_bar_young?" bar.opts -body_bra_young 3
+error 1 "-effcts is not an option of supple; did you mean -effects?" bar.opts -effcts gravity
+error 1 "-effect_pull_radius is not an option of supple here; effect pull has type, on, vector" bar.opts -effect_pull_radius 1
+error 1 "-static_steps does nothing in this scenario: " bar.opts -static_steps 3
+error 1 "-bodies: two are named 'bar'" bar.opts -bodies bar,bar
+error 1 "-body_rod_mesh must be given: " bar.opts -bodies bar,rod
+error 1 "-body_bar_material must be given: one of linear, corotated, stvk, neohookean" -bodies bar -body_bar_mesh box:1,1,1:1
+error 1 "-body_bar_material corotatd is not one of" bar.opts -body_bar_material corotatd
+error 1 "effect gravty: there is no effect of type" bar.opts -effects gravty
+
+# values
+error 3 "-body_bar_young -5 Pa is outside (0, inf) Pa: " bar.opts -body_bar_young -5
+error 1 "-body_bar_young 5e4Pa is not a number: " bar.opts -body_bar_young 5e4Pa
+error 1 "-body_bar_young nan Pa is outside (0, inf) Pa: " bar.opts -body_bar_young nan
+error 1 "-body_bar_poisson 0.5 is outside (-1, 0.5): " bar.opts -body_bar_poisson 0.5
+error 1 "-body_bar_density 0 kg/m^3 is outside (0, inf) kg/m^3: " bar.opts -body_bar_density 0
+error 1 "-ts_dt 0 s is outside (0, inf) s: " bar.opts -ts_dt 0
+error 1 "-body_bar_translate 1,2 has 2 numbers, needs 3" bar.opts -body_bar_translate 1,2
+error 1 "-time newmrk is not one of" bar.opts -time newmrk
+error 1 "-effect_pull_vector: column 4 of '2 *s': unknown name 's'" bar.opts -effect_pull_vector "0; 0; 2 *s"
+error 3 "-effect_pull_vector: cannot open nix.txt: No such file or directory" bar.opts -effect_pull_vector "0; 0; table:nix.txt"
+printf '0 0\n1 2\n1 3\n' >bad.txt
+error 3 "-effect_pull_vector: bad.txt, line 3: time 1 s does not come after 1 s" bar.opts -effect_pull_vector "0; 0; table:bad.txt"
+
+# files
+touch rod.msh
+error 3 "-body_bar_mesh rdo.msh: No such file or directory; did you mean rod.msh?" bar.opts -body_bar_mesh rdo.msh
+error 3 "cannot read the option file nix.opts: No such file or directory" nix.opts
+error 3 "cannot read the option file nix.yml: No such file or directory" -options_file nix.yml
+printf -- '-ts_dt 0.1 0.2\n' >bad.opts
+error 3 "Error in options file bad.opts line 1: extra token 0.2" bad.opts
+printf 'ts_dt: 1\n  bodies: x\n' >bad.yml
+error 3 "bad.yml: YAML" -options_file bad.yml
+error 1 "-effects has no value: " bar.opts -effects
+error 1 "the word '2,' in the command line belongs to no option" bar.opts -body_bar_translate 1, 2, 3
+error 1 "-time static: nothing holds the bodies" -bodies bar -body_bar_mesh box:1,1,1:1 -body_bar_material linear \
+  -body_bar_young 1 -body_bar_poisson 0 -time static
+error 3 "cannot write /nonexistent/view.opts: " bar.opts -scenario_view /nonexistent/view.opts
+
+# a PETSc option that nobody reads is reported loudly, but the run goes on
+"$supple" bar.opts -quiet -output_dir opts -ksp_rtoll 1e-3 >out.txt 2>err.txt
+check "-ksp_rtoll: exit code $?" test $? = 0
+check "-ksp_rtoll is not reported" grep -qxF "supple: warning: nobody read the option -ksp_rtoll 1e-3" err.txt
+
+# the same scene from YAML, and from the printed scenario
+"$supple" bar.yml -quiet -output_dir yml && check "YAML differs" cmp -s opts/history.csv yml/history.csv
+"$supple" bar.opts -scenario_view view.opts && "$supple" view.opts -quiet -output_dir view &&
+  check "the printed scenario differs" cmp -s opts/history.csv view/history.csv
+check "no history" test -s view/history.csv
+"${mpi[@]}" 2 "$supple" bar.opts -scenario_view >view2.opts && check "two views differ" cmp -s view.opts view2.opts
+check "-scenario_view ran the scenario" test ! -e out/bar/history.csv
+"$supple" opts/scenario.opts -quiet -output_dir again 2>/dev/null
+check "scenario.opts differs" cmp -s opts/history.csv again/history.csv
+
+# answers
+check "-version" grep -q '^supple [0-9]' <<<"$("$supple" -version)"
+check "-help | head" test "$("$supple" -help 2>&1 | head -n 1 | cut -c 1-7)" = "supple "
+check "-help lacks -body_<name>_young" grep -qF -- '-body_<name>_young' <<<"$("${mpi[@]}" 2 "$supple" -help)"
+"$supple" -options_markdown options.md && check "-options_markdown" grep -qF -- "-ts_dt" options.md
+
+echo "$passed passed, $failed failed"
+test $failed = 0
