@@ -74,10 +74,12 @@ PetscErrorCode SbMaterialDestroy(SbMaterial *m);
 /* Largest wave speed sqrt((lambda + 2 mu) / rho) at rest, m/s. */
 PetscReal SbMaterialWaveSpeed(SbMaterial m);
 /*
-  SbMaterialTangentAction - dP = (tangent at F) : H, what the stiffness part of Rayleigh damping needs.
+  SbMaterialDampingStress - dP = R hooke(sym(R^T H)) = mu (H + R H^T R) + lambda (R : H) R, R the rotation in F: the stress
+  of stiffness-proportional damping, per second of beta; R = I for the linear law. One rule for every other law and every
+  tangent: it never feeds energy in (H : dP >= 0), and where the cell is unstrained (F = R) it is the law's tangent and
+  vanishes for a spin. In a strained cell a spin is damped in proportion to the strain.
 
-  Not collective. Input: F; H, gradient of a velocity (1/s) or of any increment. Output: dP, Pa times the unit of H. It is
-  the tangent that the law hands out: warped gives R hooke(sym(R^T H)), mu (H + R H^T R) + lambda (R : H) R.
+  Not collective. Input: F; H, gradient of the velocity, 1/s. Output: dP, Pa/s.
 */
-void SbMaterialTangentAction(const struct _p_SbMaterial *m, const SbLane F[9], const SbLane H[9],
+void SbMaterialDampingStress(const struct _p_SbMaterial *m, const SbLane F[9], const SbLane H[9],
                              SbLane dP[9]);

@@ -41,7 +41,7 @@ struct _p_SbModel {
   PetscBool   linear;           /* laws and effects: the tangent depends on the shifts only */
   PetscReal   mass;             /* kg */
   PetscBool   dynamic;
-  PetscReal   load;             /* load factor: 1, in a static run 0..1; multiplies loads and prescribed displacements */
+  PetscReal   load;             /* load factor: 1, in a static run 0..1; multiplies loads and prescribed displacements without t in their formulas */
 };
 
 PetscErrorCode SbModelDestroy(SbModel *model);

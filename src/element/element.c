@@ -40,7 +40,7 @@ PetscErrorCode SbElementCreate(const char *name, SbElement *element)
     char all[256] = "";
 
     PetscCall(PetscFunctionListGet(SbElementList, &names, &n));
-    for (int k = 0; k < n; k++) {
+    for (int k = 0; k < n && names[k]; k++) {
       PetscCall(PetscStrlcat(all, k ? ", " : "", sizeof(all)));
       PetscCall(PetscStrlcat(all, names[k], sizeof(all)));
     }

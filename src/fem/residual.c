@@ -25,7 +25,7 @@ static void add_region_force(SbSpace s, const SbRegion *region, const SbStage *s
 
       sb_gather(node, stage->v, u);
       SbCellGradientRate(g, (const SbLane *)u, H);
-      SbMaterialTangentAction(m, (const SbLane *)F, (const SbLane *)H, dP);
+      SbMaterialDampingStress(m, (const SbLane *)F, (const SbLane *)H, dP);
       for (int k = 0; k < 9; k++) {
         for (int l = 0; l < SB_BATCH; l++) P[k][l] += beta * dP[k][l];
       }
@@ -203,7 +203,7 @@ PetscErrorCode SbSpaceDampingPower(SbSpace s, const PetscReal x[], const PetscRe
       SbCellGradient(s->batch_g + 9 * b, (const SbLane *)u, F);
       sb_gather(node, v, u);
       SbCellGradientRate(s->batch_g + 9 * b, (const SbLane *)u, H);
-      SbMaterialTangentAction(m, (const SbLane *)F, (const SbLane *)H, dP);
+      SbMaterialDampingStress(m, (const SbLane *)F, (const SbLane *)H, dP);
       for (PetscInt l = 0; l < s->batch_n[b]; l++) {
         PetscReal hooke = 0., inertia = 0.;
 

@@ -12,6 +12,7 @@
   made it, so that the scaling of the matrix is not disturbed.
 */
 #include "fem_impl.h"
+#include "sbkernel.h"
 #include <petsc/private/petscimpl.h>
 
 /* The value arrays of a matrix and how blocks lie in them. */
@@ -135,51 +136,81 @@ static inline void add_cell_aij(const Access *x, SbPlan plan, const PetscInt nod
   }
 }
 
-/* Blocks of one batch, with the stiffness factor in the volumes and the consistent mass on top. */
-static void batch_blocks(SbSpace s, const SbRegion *region, const SbStage *stage, PetscInt b, SbLane K[10][9])
+/* What one evaluation multiplies with in a region. */
+typedef struct {
+  PetscReal stiffness; /* on dP/dF */
+  PetscReal damping;   /* on Hooke's tensor turned by R (sbmaterial.h, SbMaterialDampingStress) */
+  PetscReal inertia;   /* on the consistent mass */
+} Factors;
+
+static void add_consistent_mass(const SbElementOps *e, PetscReal inertia, const SbLane V, SbLane K[10][9])
 {
-  const PetscReal factor = stage->shift_k + stage->shift_v * region->beta;
-  const PetscReal inertia = region->material->density * (stage->shift_a + stage->shift_v * region->alpha);
-  const SbMaterial m = region->material;
-  const SbLane    *g = s->batch_g + 9 * b;
-  SbLane           u[12], F[9], V;
+  for (int p = 0; p < 10; p++) {
+    const PetscReal share = inertia * (SbPairA[p] == SbPairB[p] ? e->mass_diagonal : e->mass_coupling);
 
-  for (int l = 0; l < SB_BATCH; l++) V[l] = factor * s->batch_V[b][l];
-  if (m->linear) SbCellBlocksIsotropic(g, V, m->lambda, m->mu, NULL, K);
-  else {
-    sb_gather(s->batch_node + 4 * SB_BATCH * b, stage->u, u);
-    SbCellGradient(g, (const SbLane *)u, F);
-    if (m->ops.frame) {
-      SbLane R[9];
-
-      m->ops.frame(m, (const SbLane *)F, R);
-      SbCellBlocksIsotropic(g, V, m->lambda, m->mu, (const SbLane *)R, K);
-    } else {
-      SbLane C[81];
-
-      m->ops.tangent(m, (const SbLane *)F, C);
-      SbCellBlocksGeneral(g, V, (const SbLane *)C, K);
-    }
-  }
-  if (s->consistent_mass && inertia != 0.) {
-    for (int p = 0; p < 10; p++) {
-      const PetscReal share = inertia * (SbPairA[p] == SbPairB[p] ? region->element->ops.mass_diagonal : region->element->ops.mass_coupling);
-
-      for (int i = 0; i < 3; i++) {
-        for (int l = 0; l < SB_BATCH; l++) K[p][4 * i][l] += share * s->batch_V[b][l];
-      }
+    for (int i = 0; i < 3; i++) {
+      for (int l = 0; l < SB_BATCH; l++) K[p][4 * i][l] += share * V[l];
     }
   }
 }
 
+static void scaled_volumes(const SbLane V, PetscReal factor, SbLane W)
+{
+  for (int l = 0; l < SB_BATCH; l++) W[l] = factor * V[l];
+}
+
+/* A law with the full tangent; its damping comes on top. */
+static void general_blocks(const SbMaterial m, const SbLane *g, const SbLane V, const Factors *x, const SbLane F[9], SbLane K[10][9])
+{
+  SbLane C[81], W;
+
+  m->ops.tangent(m, F, C);
+  scaled_volumes(V, x->stiffness, W);
+  SbCellBlocksGeneral(g, W, (const SbLane *)C, K);
+  if (x->damping != 0.) {
+    SbLane R[9], D[10][9];
+
+    SbPolar(F, R);
+    scaled_volumes(V, x->damping, W);
+    SbCellBlocksIsotropic(g, W, m->lambda, m->mu, (const SbLane *)R, D);
+    for (int k = 0; k < 90; k++) {
+      for (int l = 0; l < SB_BATCH; l++) K[k / 9][k % 9][l] += D[k / 9][k % 9][l];
+    }
+  }
+}
+
+/* Blocks of one batch. */
+static void batch_blocks(SbSpace s, const SbRegion *region, const PetscReal displacement[], const Factors *x, PetscInt b, SbLane K[10][9])
+{
+  const SbMaterial m = region->material;
+  const SbLane    *g = s->batch_g + 9 * b;
+  SbLane           u[12], F[9], R[9], W;
+
+  if (m->linear) {
+    scaled_volumes(s->batch_V[b], x->stiffness + x->damping, W);
+    SbCellBlocksIsotropic(g, W, m->lambda, m->mu, NULL, K);
+  } else {
+    sb_gather(s->batch_node + 4 * SB_BATCH * b, displacement, u);
+    SbCellGradient(g, (const SbLane *)u, F);
+    if (m->ops.frame) {
+      m->ops.frame(m, (const SbLane *)F, R);
+      scaled_volumes(s->batch_V[b], x->stiffness + x->damping, W);
+      SbCellBlocksIsotropic(g, W, m->lambda, m->mu, (const SbLane *)R, K);
+    } else general_blocks(m, g, s->batch_V[b], x, (const SbLane *)F, K);
+  }
+  if (x->inertia != 0.) add_consistent_mass(&region->element->ops, x->inertia, s->batch_V[b], K);
+}
+
 static void add_region(SbSpace s, const SbRegion *region, const SbStage *stage, const Access *x)
 {
-  SbPlan plan = s->plan;
+  const PetscReal inertia = region->material->density * (stage->shift_a + stage->shift_v * region->alpha);
+  const Factors   factors = {stage->shift_k, stage->shift_v * region->beta, s->consistent_mass ? inertia : 0.};
+  SbPlan          plan    = s->plan;
 
   for (PetscInt b = region->bstart; b < region->bend; b++) {
     SbLane K[10][9] __attribute__((aligned(64)));
 
-    batch_blocks(s, region, stage, b, K);
+    batch_blocks(s, region, stage->u, &factors, b, K);
     for (PetscInt l = 0; l < s->batch_n[b]; l++) {
       const PetscInt cell = s->batch_cell[b] + l;
       PetscReal      Ke[10][9];

@@ -66,7 +66,7 @@ static PetscErrorCode find_law(const char *law, const char *where, PetscErrorCod
   if (*create) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscFunctionListGet(SbMaterialList, &names, &n));
   PetscCall(SbNearest(law, n, names, sizeof(near), near));
-  for (int k = 0; k < n; k++) {
+  for (int k = 0; k < n && names[k]; k++) {
     PetscCall(PetscStrlcat(all, k ? ", " : "", sizeof(all)));
     PetscCall(PetscStrlcat(all, names[k], sizeof(all)));
   }
@@ -75,14 +75,12 @@ static PetscErrorCode find_law(const char *law, const char *where, PetscErrorCod
           law, near[0] ? "; did you mean " : "", near, all);
 }
 
-static PetscErrorCode create_law(const char *law, const char *where, PetscReal E, PetscReal nu,
-                                 PetscReal density, SbMaterial *material)
+static PetscErrorCode create_law(const char *law, PetscErrorCode (*create)(SbMaterial), PetscReal E,
+                                 PetscReal nu, PetscReal density, const char *where, SbMaterial *material)
 {
-  PetscErrorCode (*create)(SbMaterial) = NULL;
   SbMaterial m;
 
   PetscFunctionBeginUser;
-  PetscCall(find_law(law, where, &create));
   PetscCheck(E > 0 && E < PETSC_INFINITY, PETSC_COMM_SELF, PETSC_ERR_USER,
              "%s: Young's modulus is %g Pa; it must lie in (0, inf)", where, (double)E);
   PetscCheck(nu > -1 && nu < 0.5, PETSC_COMM_SELF, PETSC_ERR_USER,
@@ -105,24 +103,29 @@ static PetscErrorCode create_law(const char *law, const char *where, PetscReal E
 PetscErrorCode SbMaterialCreateElastic(const char *law, PetscReal E, PetscReal nu, PetscReal density,
                                        SbMaterial *material)
 {
+  PetscErrorCode (*create)(SbMaterial) = NULL;
+
   PetscFunctionBeginUser;
-  PetscCall(create_law(law, "material", E, nu, density, material));
+  PetscCall(find_law(law, "material", &create));
+  PetscCall(create_law(law, create, E, nu, density, "material", material));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode SbMaterialCreate(const char *law, const SbScope *body, SbMaterial *material)
 {
+  PetscErrorCode (*create)(SbMaterial) = NULL;
   SbScope scope;
   PetscReal E, nu, density;
   char where[2 * SB_NAME_MAX];
 
   PetscFunctionBeginUser;
   PetscCall(PetscSNPrintf(where, sizeof(where), "-body_%s_material", body->instance));
+  PetscCall(find_law(law, where, &create));
   PetscCall(SbScopeSet(&scope, "body", law, body->instance));
   PetscCall(SbOptionReal(&scope, "young", &E));
   PetscCall(SbOptionReal(&scope, "poisson", &nu));
   PetscCall(SbOptionReal(&scope, "density", &density));
-  PetscCall(create_law(law, where, E, nu, density, material));
+  PetscCall(create_law(law, create, E, nu, density, where, material));
   if ((*material)->ops.setfromoptions) PetscCall(((*material)->ops.setfromoptions)(*material, &scope));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -173,8 +176,8 @@ PetscReal SbMaterialWaveSpeed(SbMaterial m)
 }
 
 /* dP = mu (H + R H^T R) + lambda (R : H) R */
-SB_KERNEL static void action_warped(PetscReal lambda, PetscReal mu, const SbLane R[restrict 9],
-                                    const SbLane H[restrict 9], SbLane dP[restrict 9])
+SB_KERNEL static void turned_hooke(PetscReal lambda, PetscReal mu, const SbLane R[restrict 9],
+                                   const SbLane H[restrict 9], SbLane dP[restrict 9])
 {
   for (int l = 0; l < SB_BATCH; l++) {
     PetscReal r[9], h[9], b[9], t[9];
@@ -188,31 +191,14 @@ SB_KERNEL static void action_warped(PetscReal lambda, PetscReal mu, const SbLane
   }
 }
 
-SB_KERNEL static void action_general(const SbLane C[restrict 81], const SbLane H[restrict 9],
-                                     SbLane dP[restrict 9])
-{
-  for (int ij = 0; ij < 9; ij++) {
-    for (int l = 0; l < SB_BATCH; l++) {
-      PetscReal sum = C[9 * ij][l] * H[0][l];
-
-      for (int kl = 1; kl < 9; kl++) sum += C[9 * ij + kl][l] * H[kl][l];
-      dP[ij][l] = sum;
-    }
-  }
-}
-
-void SbMaterialTangentAction(const struct _p_SbMaterial *m, const SbLane F[9], const SbLane H[9],
+void SbMaterialDampingStress(const struct _p_SbMaterial *m, const SbLane F[9], const SbLane H[9],
                              SbLane dP[9])
 {
-  if (m->ops.frame) {
-    SbLane R[9];
+  SbLane R[9];
 
+  if (m->linear)
     m->ops.frame(m, F, R);
-    action_warped(m->lambda, m->mu, (const SbLane *)R, H, dP);
-  } else {
-    SbLane C[81];
-
-    m->ops.tangent(m, F, C);
-    action_general((const SbLane *)C, H, dP);
-  }
+  else
+    SbPolar(F, R);
+  turned_hooke(m->lambda, m->mu, (const SbLane *)R, H, dP);
 }

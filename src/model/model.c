@@ -90,8 +90,17 @@ static PetscErrorCode stage_end(SbModel m, Vec U, Vec V, Vec A, SbStage *stage)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* f = factor * f_ext. */
-static PetscErrorCode external_forces(SbModel m, const SbStage *stage, PetscReal factor, PetscReal f[])
+/*
+  Factor on an effect: in a static run the load factor, unless its formulas use t, which is the load factor there: then they
+  describe the path themselves.
+*/
+static inline PetscReal load_factor(SbModel m, SbEffect e)
+{
+  return e->steady ? m->load : 1.;
+}
+
+/* f = sign * f_ext. */
+static PetscErrorCode external_forces(SbModel m, const SbStage *stage, PetscReal sign, PetscReal f[])
 {
   const PetscInt n = 3 * m->space->nnode;
 
@@ -99,8 +108,19 @@ static PetscErrorCode external_forces(SbModel m, const SbStage *stage, PetscReal
   PetscCall(PetscArrayzero(f, n));
   if (!m->nforce) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_EFFECTS], 0, 0, 0, 0));
-  for (PetscInt e = 0; e < m->nforce; e++) PetscCall(m->force[e]->ops.force(m->force[e], m->space, stage, f));
-  for (PetscInt i = 0; i < n; i++) f[i] *= factor;
+  /* the steady ones first: they share their factor */
+  for (PetscInt e = 0; e < m->nforce; e++) {
+    if (m->force[e]->steady) PetscCall(m->force[e]->ops.force(m->force[e], m->space, stage, f));
+  }
+  if (m->load != 1.) {
+    for (PetscInt i = 0; i < n; i++) f[i] *= m->load;
+  }
+  for (PetscInt e = 0; e < m->nforce; e++) {
+    if (!m->force[e]->steady) PetscCall(m->force[e]->ops.force(m->force[e], m->space, stage, f));
+  }
+  if (sign != 1.) {
+    for (PetscInt i = 0; i < n; i++) f[i] *= sign;
+  }
   PetscCall(PetscLogEventEnd(SbEvents[SB_EVENT_EFFECTS], 0, 0, 0, 0));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -125,7 +145,7 @@ PetscErrorCode SbModelResidual(SbModel m, PetscReal t, Vec U, Vec V, Vec A, Pets
   PetscFunctionBeginUser;
   PetscCall(stage_begin(m, t, U, V, A, &stage));
   PetscCall(SbSpaceGetLocalWrite(m->space, F, &f));
-  PetscCall(external_forces(m, &stage, -m->load, f));
+  PetscCall(external_forces(m, &stage, -1., f));
   PetscCall(SbSpaceAddInternalForce(m->space, &stage, f));
   if (A || V) PetscCall(SbSpaceAddInertia(m->space, &stage, f));
   if (constrain) constrain_residual(m->space, f);
@@ -142,7 +162,7 @@ PetscErrorCode SbModelLoads(SbModel m, PetscReal t, Vec U, Vec V, Vec F)
   PetscFunctionBeginUser;
   PetscCall(stage_begin(m, t, U, V, NULL, &stage));
   PetscCall(SbSpaceGetLocalWrite(m->space, F, &f));
-  PetscCall(external_forces(m, &stage, m->load, f));
+  PetscCall(external_forces(m, &stage, 1., f));
   PetscCall(SbSpaceRestoreLocalWrite(m->space, F, &f));
   PetscCall(stage_end(m, U, V, NULL, &stage));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -158,8 +178,10 @@ PetscErrorCode SbModelTangent(SbModel m, PetscReal t, PetscReal shift_v, PetscRe
   stage.shift_v = shift_v;
   stage.shift_k = shift_k;
   PetscCall(SbSpaceAssembleTangent(m->space, &stage, A));
-  m->space->block_scale = m->load;
-  for (PetscInt e = 0; e < m->ntangent; e++) PetscCall(m->tangent[e]->ops.tangent(m->tangent[e], m->space, &stage, A));
+  for (PetscInt e = 0; e < m->ntangent; e++) {
+    m->space->block_scale = load_factor(m, m->tangent[e]);
+    PetscCall(m->tangent[e]->ops.tangent(m->tangent[e], m->space, &stage, A));
+  }
   PetscCall(SbSpaceFinishTangent(m->space, A));
   PetscCall(stage_end(m, U, V, NULL, &stage));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -172,13 +194,19 @@ PetscErrorCode SbModelPrescribe(SbModel m, PetscReal t, Vec U)
 
   PetscFunctionBeginUser;
   if (!m->nprescribe) PetscFunctionReturn(PETSC_SUCCESS);
-  for (PetscInt e = 0; e < m->nprescribe; e++) PetscCall(m->prescribe[e]->ops.prescribe(m->prescribe[e], s, t));
+  for (PetscInt e = 0; e < m->nprescribe; e++) {
+    if (m->prescribe[e]->steady) PetscCall(m->prescribe[e]->ops.prescribe(m->prescribe[e], s, t));
+  }
+  for (PetscInt k = 0; k < 3 * s->nfixed; k++) s->fixed_value[k] *= m->load;
+  for (PetscInt e = 0; e < m->nprescribe; e++) {
+    if (!m->prescribe[e]->steady) PetscCall(m->prescribe[e]->ops.prescribe(m->prescribe[e], s, t));
+  }
   PetscCall(VecGetArray(U, &u));
   for (PetscInt k = 0; k < s->nfixed && s->fixed_node[k] < s->nnode_owned; k++) {
     const PetscInt node = s->fixed_node[k];
 
     for (PetscInt c = 0; c < 3; c++) {
-      if (s->fixed[node] & (1 << c)) u[3 * node + c] = m->load * s->fixed_value[3 * k + c];
+      if (s->fixed[node] & (1 << c)) u[3 * node + c] = s->fixed_value[3 * k + c];
     }
   }
   PetscCall(VecRestoreArray(U, &u));

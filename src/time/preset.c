@@ -113,6 +113,21 @@ static PetscErrorCode set_up_snes(SbRun run)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Newton's linear solves are as accurate as its progress needs (Eisenstat and Walker), unless the user sets a tolerance. */
+static PetscErrorCode forcing_terms(SNES snes)
+{
+  PetscBool newton, asked, rtol;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscObjectTypeCompare((PetscObject)snes, SNESNEWTONLS, &newton));
+  PetscCall(PetscOptionsHasName(NULL, NULL, "-snes_ksp_ew", &asked));
+  PetscCall(PetscOptionsHasName(NULL, NULL, "-ksp_rtol", &rtol));
+  if (!newton || asked || rtol) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(SNESKSPSetUseEW(snes, PETSC_TRUE));
+  PetscCall(SNESKSPSetParametersEW(snes, 2, 0.1, 0.1, PETSC_DEFAULT, PETSC_DEFAULT, PETSC_DEFAULT, PETSC_DEFAULT));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 static PetscErrorCode step_accepted(TS ts, PetscInt step, PetscReal t, Vec U, void *ctx)
 {
   SbRun             run = (SbRun)ctx;
@@ -185,6 +200,7 @@ static PetscErrorCode set_up_ts(SbRun run)
   PetscCall(set_up_snes(run));
   PetscCall(SbSolverSetUp(run->snes, m->space, run->solver_used));
   PetscCall(TSSetFromOptions(run->ts));
+  PetscCall(forcing_terms(run->snes));
   PetscCall(TSSetMaxTime(run->ts, run->t_end));
   PetscCall(TSSetTimeStep(run->ts, run->dt));
   PetscCall(TSMonitorSet(run->ts, step_accepted, run, NULL));
@@ -209,6 +225,7 @@ static PetscErrorCode set_up_static(SbRun run)
   PetscCall(set_up_snes(run));
   PetscCall(SbSolverSetUp(run->snes, run->model->space, run->solver_used));
   PetscCall(SNESSetFromOptions(run->snes));
+  PetscCall(forcing_terms(run->snes));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
