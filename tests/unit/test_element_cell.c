@@ -1,0 +1,384 @@
+// @ranks 1
+/*
+  Cell kernels on random tets, one different tet in each lane: gradients of affine maps, forces as derivatives of the
+  energy, blocks as derivatives of the forces, what must vanish, and a patch of tets under constant strain.
+*/
+#include "material_checks.h"
+#include <sbelement.h>
+
+typedef struct {
+  SbLane X[12], g[9], V; /* corners, gradients, volumes */
+} Cells;
+
+static void make_cells(SbElement e, PetscReal size, Cells *c)
+{
+  for (int l = 0; l < SB_BATCH; l++) {
+    PetscReal x[4][3], g[3][3], V;
+
+    for (int a = 0; a < 4; a++) {
+      for (int i = 0; i < 3; i++) x[a][i] = size * (0.15 * uniform() + (a == i + 1));
+    }
+    e->ops.tabulate((const PetscReal(*)[3])x, g, &V);
+    SbLanePut(12, &x[0][0], l, c->X);
+    SbLanePut(9, &g[0][0], l, c->g);
+    c->V[l] = V;
+  }
+}
+
+/* u = (A - I) X + b, another A and b in each lane. */
+static void affine(const Cells *c, const SbLane A[9], const SbLane b[3], SbLane u[12])
+{
+  for (int l = 0; l < SB_BATCH; l++) {
+    for (int k = 0; k < 12; k++) {
+      const int a = k / 3, i = k % 3;
+
+      u[k][l] = b[i][l] - c->X[k][l];
+      for (int j = 0; j < 3; j++) u[k][l] += A[3 * i + j][l] * c->X[3 * a + j][l];
+    }
+  }
+}
+
+static void force_of(SbMaterial m, const Cells *c, const SbLane u[12], SbLane f[12])
+{
+  SbLane F[9], P[9];
+
+  SbCellGradient(c->g, u, F);
+  m->ops.stress(m, (const SbLane *)F, P);
+  SbCellForce(c->g, c->V, (const SbLane *)P, f);
+}
+
+static void random_state(const Cells *c, PetscReal size, SbLane A[9], SbLane u[12])
+{
+  SbLane b[3];
+
+  for (int l = 0; l < SB_BATCH; l++) {
+    PetscReal F[9];
+
+    random_deformation(size, F);
+    SbLanePut(9, F, l, A);
+    for (int i = 0; i < 3; i++) b[i][l] = c->X[1][l] * uniform();
+  }
+  affine(c, (const SbLane *)A, (const SbLane *)b, u);
+}
+
+static PetscReal lane_difference(int n, const SbLane a[], const SbLane b[])
+{
+  PetscReal worst = 0;
+
+  for (int k = 0; k < n; k++) worst = fmax(worst, difference(SB_BATCH, a[k], b[k]));
+  return worst;
+}
+
+static void test_gradient(SbElement e)
+{
+  for (int t = 0; t < 100; t++) {
+    Cells c;
+    SbLane A[9], u[12], F[9], H[9];
+
+    make_cells(e, pow(10, t % 7 - 3), &c);
+    random_state(&c, 0.5, A, u);
+    SbCellGradient((const SbLane *)c.g, (const SbLane *)u, F);
+    SB_CHECK(lane_difference(9, (const SbLane *)A, (const SbLane *)F) < 1e-13,
+             "F of an affine map is off by %g", lane_difference(9, (const SbLane *)A, (const SbLane *)F));
+    SbCellGradientRate((const SbLane *)c.g, (const SbLane *)u, H);
+    for (int k = 0; k < 9; k += 4) {
+      for (int l = 0; l < SB_BATCH; l++) H[k][l] += 1;
+    }
+    SB_CHECK(lane_difference(9, (const SbLane *)A, (const SbLane *)H) < 1e-13,
+             "the rate of an affine map is wrong");
+    for (int k = 0; k < 12; k++) {
+      for (int l = 0; l < SB_BATCH; l++) u[k][l] = 1e3 * (1 + k % 3);
+    }
+    SbCellGradient((const SbLane *)c.g, (const SbLane *)u, F);
+    for (int k = 0; k < 9; k++) {
+      for (int l = 0; l < SB_BATCH; l++) SB_CHECK(F[k][l] == (k % 4 == 0), "F of a translation is not I");
+    }
+  }
+}
+
+/* Force = d(V psi)/du by central differences of step 1e-5 size: truncation about 1e-10, rounding 1e-11 of E size^2. */
+static void test_force(SbElement e, SbMaterial m)
+{
+  const PetscReal size = 0.01, h = 1e-5 * size;
+
+  for (int t = 0; t < 10; t++) {
+    Cells c;
+    SbLane A[9], u[12], f[12], F[9], plus, minus;
+
+    make_cells(e, size, &c);
+    random_state(&c, 0.25, A, u);
+    force_of(m, &c, (const SbLane *)u, f);
+    for (int k = 0; k < 12; k++) {
+      for (int l = 0; l < SB_BATCH; l++) u[k][l] += h;
+      SbCellGradient((const SbLane *)c.g, (const SbLane *)u, F);
+      m->ops.energy(m, (const SbLane *)F, plus);
+      for (int l = 0; l < SB_BATCH; l++) u[k][l] -= 2 * h;
+      SbCellGradient((const SbLane *)c.g, (const SbLane *)u, F);
+      m->ops.energy(m, (const SbLane *)F, minus);
+      for (int l = 0; l < SB_BATCH; l++) {
+        u[k][l] += h;
+        SB_CHECK_NEAR(f[k][l], c.V[l] * (plus[l] - minus[l]) / (2 * h), 1e-8 * m->E * size * size,
+                      "force against energy");
+      }
+    }
+    for (int k = 0; k < 3; k++) {
+      for (int l = 0; l < SB_BATCH; l++) {
+        SB_CHECK_NEAR(f[k][l] + f[3 + k][l] + f[6 + k][l] + f[9 + k][l], 0, 1e-14 * m->E * size * size,
+                      "sum of forces");
+      }
+    }
+  }
+}
+
+/* Entry (3 a + i, 3 b + k) of the cell matrix from the ten blocks. */
+static PetscReal entry(const SbLane K[10][9], int row, int column, int l)
+{
+  const int a = row / 3, i = row % 3, b = column / 3, k = column % 3;
+
+  for (int p = 0; p < 10; p++) {
+    if (SbPairA[p] == a && SbPairB[p] == b) return K[p][3 * i + k][l];
+    if (SbPairA[p] == b && SbPairB[p] == a) return K[p][3 * k + i][l];
+  }
+  return NAN;
+}
+
+/* Blocks of a row sum to zero; diagonal blocks are symmetric to the last bit. */
+static void check_block_sums(const SbLane K[10][9], PetscReal scale)
+{
+  static const int diagonal[4] = {0, 4, 7, 9};
+
+  for (int l = 0; l < SB_BATCH; l++) {
+    for (int row = 0; row < 12; row++) {
+      for (int k = 0; k < 3; k++) {
+        const PetscReal sum =
+          entry(K, row, k, l) + entry(K, row, 3 + k, l) + entry(K, row, 6 + k, l) + entry(K, row, 9 + k, l);
+
+        SB_CHECK_NEAR(sum, 0, 1e-14 * scale, "sum of blocks");
+      }
+    }
+    for (int a = 0; a < 4; a++) {
+      for (int k = 0; k < 9; k++) {
+        SB_CHECK(K[diagonal[a]][k][l] == K[diagonal[a]][3 * (k % 3) + k / 3][l],
+                 "a diagonal block is not symmetric");
+      }
+    }
+  }
+}
+
+/* Exact tangents: blocks against central differences of the force. */
+static PetscErrorCode test_blocks(SbElement e, SbMaterial m)
+{
+  const PetscReal size = 0.01, h = 1e-5 * size;
+
+  PetscFunctionBeginUser;
+  if (!m->linear) PetscCall(SbMaterialSetTangent(m, SB_TANGENT_EXACT));
+  for (int t = 0; t < 10; t++) {
+    Cells c;
+    SbLane A[9], u[12], F[9], C[81], K[10][9], J[10][9], plus[12], minus[12];
+
+    make_cells(e, size, &c);
+    random_state(&c, 0.25, A, u);
+    SbCellGradient((const SbLane *)c.g, (const SbLane *)u, F);
+    m->ops.tangent(m, (const SbLane *)F, C);
+    SbCellBlocksGeneral((const SbLane *)c.g, c.V, (const SbLane *)C, K);
+    check_block_sums((const SbLane(*)[9])K, (m->E + m->lambda) * size);
+    for (int column = 0; column < 12; column++) {
+      for (int l = 0; l < SB_BATCH; l++) u[column][l] += h;
+      force_of(m, &c, (const SbLane *)u, plus);
+      for (int l = 0; l < SB_BATCH; l++) u[column][l] -= 2 * h;
+      force_of(m, &c, (const SbLane *)u, minus);
+      for (int l = 0; l < SB_BATCH; l++) {
+        u[column][l] += h;
+        for (int row = 0; row < 12; row++) {
+          SB_CHECK_NEAR(entry((const SbLane(*)[9])K, row, column, l),
+                        (plus[row][l] - minus[row][l]) / (2 * h), 1e-7 * m->E * size, "block against force");
+        }
+      }
+    }
+    if (m->linear) {
+      SbCellBlocksIsotropic((const SbLane *)c.g, c.V, m->lambda, m->mu, NULL, J);
+      check_block_sums((const SbLane(*)[9])J, (m->E + m->lambda) * size);
+      for (int p = 0; p < 10; p++) {
+        SB_CHECK(lane_difference(9, (const SbLane *)J[p], (const SbLane *)K[p]) <
+                   1e-14 * (m->E + m->lambda) * size,
+                 "isotropic block %d is not the general one", p);
+      }
+    }
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Warped: K v is the force of R hooke(sym(R^T H(v))), and K is positive semi-definite: v . K v >= 0. */
+static PetscErrorCode test_warped(SbElement e, SbMaterial m)
+{
+  const PetscReal size = 10;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbMaterialSetTangent(m, SB_TANGENT_WARPED));
+  for (int t = 0; t < 50; t++) {
+    Cells c;
+    SbLane A[9], u[12], v[12], F[9], R[9], H[9], dP[9], f[12], K[10][9];
+
+    make_cells(e, size, &c);
+    random_state(&c, 0.6, A, u);
+    for (int k = 0; k < 12; k++) {
+      for (int l = 0; l < SB_BATCH; l++) v[k][l] = uniform();
+    }
+    SbCellGradient((const SbLane *)c.g, (const SbLane *)u, F);
+    m->ops.frame(m, (const SbLane *)F, R);
+    SbCellBlocksIsotropic((const SbLane *)c.g, c.V, m->lambda, m->mu, (const SbLane *)R, K);
+    check_block_sums((const SbLane(*)[9])K, (m->E + m->lambda) * size);
+    SbCellGradientRate((const SbLane *)c.g, (const SbLane *)v, H);
+    SbMaterialDampingStress(m, (const SbLane *)F, (const SbLane *)H, dP);
+    SbCellForce((const SbLane *)c.g, c.V, (const SbLane *)dP, f);
+    for (int l = 0; l < SB_BATCH; l++) {
+      PetscReal power = 0;
+
+      for (int row = 0; row < 12; row++) {
+        PetscReal sum = 0;
+
+        for (int column = 0; column < 12; column++)
+          sum += entry((const SbLane(*)[9])K, row, column, l) * v[column][l];
+        SB_CHECK_NEAR(sum, f[row][l], 1e-13 * (m->E + m->lambda) * size,
+                      "warped K v against the damping stress");
+        power += sum * v[row][l];
+      }
+      SB_CHECK(power > 0, "v . K v is %g", power);
+    }
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* No force after any rotation and translation, in steps of 15 degrees. */
+static void test_rotation(SbElement e, SbMaterial m)
+{
+  const PetscReal axis[3] = {1, 2, 3};
+  Cells c;
+
+  make_cells(e, 1, &c);
+  for (int degree = 0; degree <= 360; degree += 15) {
+    SbLane A[9], b[3], u[12], f[12];
+    PetscReal Q[9];
+
+    axis_rotation(axis, degree * PETSC_PI / 180, Q);
+    for (int l = 0; l < SB_BATCH; l++) {
+      SbLanePut(9, Q, l, A);
+      for (int i = 0; i < 3; i++) b[i][l] = 3 - i;
+    }
+    affine(&c, (const SbLane *)A, (const SbLane *)b, u);
+    force_of(m, &c, (const SbLane *)u, f);
+    for (int k = 0; k < 12; k++) {
+      for (int l = 0; l < SB_BATCH; l++) SB_CHECK_NEAR(f[k][l], 0, 1e-12 * m->E, "force of a rotated cell");
+    }
+  }
+}
+
+/*
+  Patch: the unit cube cut into twelve tets around an inner point that is off the centre. Under constant strain the inner
+  point is in equilibrium, and the forces on the corners sum to zero and to the virial sum_a f_a X_a^T = V P.
+*/
+static void test_patch(SbElement e, SbMaterial m)
+{
+  static const int face[12][3] = {{0, 2, 1}, {1, 2, 3}, {4, 5, 6}, {5, 7, 6}, {0, 1, 4}, {1, 5, 4},
+                                  {2, 6, 3}, {3, 6, 7}, {0, 4, 2}, {2, 4, 6}, {1, 3, 5}, {3, 7, 5}};
+  PetscReal X[9][3] = {{0}}, f[9][3] = {{0}}, F[9], P[9], virial[9] = {0}, volume = 0;
+
+  for (int k = 0; k < 8; k++) {
+    for (int i = 0; i < 3; i++) X[k][i] = (k >> i) & 1;
+  }
+  X[8][0] = 0.35;
+  X[8][1] = 0.6;
+  X[8][2] = 0.45;
+  random_deformation(0.3, F);
+  for (int start = 0; start < 12; start += 4) {
+    Cells c;
+    SbLane A[9], b[3] = {{0}}, u[12], fe[12];
+
+    for (int l = 0; l < SB_BATCH; l++) {
+      const int *corner = face[start + l % 4], node[4] = {8, corner[0], corner[1], corner[2]};
+      PetscReal x[4][3], g[3][3], V;
+
+      for (int a = 0; a < 4; a++) memcpy(x[a], X[node[a]], sizeof(x[a]));
+      e->ops.tabulate((const PetscReal(*)[3])x, g, &V);
+      SbLanePut(12, &x[0][0], l, c.X);
+      SbLanePut(9, &g[0][0], l, c.g);
+      SbLanePut(9, F, l, A);
+      c.V[l] = V;
+    }
+    affine(&c, (const SbLane *)A, (const SbLane *)b, u);
+    force_of(m, &c, (const SbLane *)u, fe);
+    for (int l = 0; l < 4; l++) {
+      const int *corner = face[start + l], node[4] = {8, corner[0], corner[1], corner[2]};
+
+      SB_CHECK(c.V[l] > 0, "tet %d of the patch is inside out", start + l);
+      volume += c.V[l];
+      for (int k = 0; k < 12; k++) f[node[k / 3]][k % 3] += fe[k][l];
+    }
+  }
+  stress_of(m, F, P);
+  SB_CHECK_NEAR(volume, 1, 1e-14, "volume of the patch");
+  for (int i = 0; i < 3; i++) {
+    SB_CHECK_NEAR(f[8][i], 0, 1e-13 * (m->E + m->lambda), "force on the inner point of the patch");
+    for (int j = 0; j < 3; j++) {
+      for (int k = 0; k < 9; k++) virial[3 * i + j] += f[k][i] * X[k][j];
+      SB_CHECK_NEAR(virial[3 * i + j], P[3 * i + j], 1e-13 * (m->E + m->lambda), "virial of the patch");
+    }
+  }
+}
+
+/* Same cell in every lane among others: same bits. */
+static void test_lanes(SbElement e)
+{
+  Cells c;
+  SbLane u[12], R[9], C[81], F[9], f[12], K[10][9], J[10][9];
+  PetscInt different = 0;
+
+  make_cells(e, 1, &c);
+  for (int l = 0; l < SB_BATCH; l++) {
+    /* even lanes equal lane 0 */
+    for (int k = 0; k < 81; k++) C[k][l] = l % 2 ? uniform() : l ? C[k][0] : uniform();
+    for (int k = 0; k < 12; k++) u[k][l] = l % 2 ? NAN : l ? u[k][0] : uniform();
+    for (int k = 0; k < 9; k++) R[k][l] = l % 2 ? uniform() : l ? R[k][0] : uniform();
+    for (int k = 0; k < 9; k++) c.g[k][l] = l % 2 ? c.g[k][l] : c.g[k][0];
+    c.V[l] = l % 2 ? c.V[l] : c.V[0];
+  }
+  SbCellGradient((const SbLane *)c.g, (const SbLane *)u, F);
+  SbCellForce((const SbLane *)c.g, c.V, (const SbLane *)F, f);
+  SbCellBlocksIsotropic((const SbLane *)c.g, c.V, 3, 2, (const SbLane *)R, K);
+  SbCellBlocksGeneral((const SbLane *)c.g, c.V, (const SbLane *)C, J);
+  for (int l = 2; l < SB_BATCH; l += 2) {
+    for (int k = 0; k < 9; k++) different += F[k][l] != F[k][0];
+    for (int k = 0; k < 12; k++) different += f[k][l] != f[k][0];
+    for (int k = 0; k < 90; k++)
+      different += K[k / 9][k % 9][l] != K[k / 9][k % 9][0] || J[k / 9][k % 9][l] != J[k / 9][k % 9][0];
+  }
+  SB_CHECK(!different, "%d numbers depend on their neighbours", (int)different);
+}
+
+int main(int argc, char **argv)
+{
+  const char *laws[4] = {"linear", "corotated", "stvk", "neohookean"};
+  SbElement e;
+
+  SB_TEST_BEGIN(argc, argv);
+  PetscCall(random_begin());
+  PetscCall(SbMaterialRegisterAll());
+  PetscCall(SbElementRegisterAll());
+  PetscCall(SbElementCreate("p1", &e));
+  test_gradient(e);
+  test_lanes(e);
+  for (int k = 0; k < 4; k++) {
+    SbMaterial m;
+
+    PetscCall(SbMaterialCreateElastic(laws[k], 2e4, 0.35, 1000, &m));
+    test_force(e, m);
+    PetscCall(test_blocks(e, m));
+    test_patch(e, m);
+    if (!m->linear) test_rotation(e, m);
+    if (k == 1) PetscCall(test_warped(e, m));
+    PetscCall(SbMaterialDestroy(&m));
+  }
+  PetscCall(SbElementDestroy(&e));
+  PetscCall(PetscRandomDestroy(&the_random));
+  SB_TEST_END();
+}
