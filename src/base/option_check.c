@@ -306,7 +306,6 @@ PetscErrorCode SbOptionsCheck(void)
   for (PetscInt i = 0; i < nleft; i++) {
     char text[1024];
 
-    if (is_recorded(names[i])) continue;
     PetscCall(verdict(names[i], sizeof(text), text));
     if (text[0] && !nbad++) PetscCall(PetscStrncpy(first, text, sizeof(first)));
   }
@@ -344,7 +343,7 @@ PetscErrorCode SbOptionsUnused(MPI_Comm comm, PetscInt *n)
 
     for (PetscInt j = 0; j < SbTheOptions.nuser && !users; j++)
       users = (PetscBool)!strcasecmp(SbTheOptions.user[j].name, names[i]);
-    if (!users || is_recorded(names[i]) || is_read_at_end(names[i])) continue;
+    if (!users || is_read_at_end(names[i])) continue;
     PetscCall(SbWarning(comm, "nobody read the option -%s%s%s", names[i], values[i] ? " " : "",
                         values[i] ? values[i] : ""));
     (*n)++;

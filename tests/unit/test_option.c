@@ -24,6 +24,7 @@ static const SbOption run_rows[] = {
   {"repeat", SB_OPTION_INT, 1, "", "3", "[1, inf)", "how often"},
   {"integrator", SB_OPTION_CHOICE, 1, "", "newmark", "newmark|genalpha|static", "integrator"},
   {"limit", SB_OPTION_REAL, 1, "s", "", "(0, inf)", "nothing by default"},
+  {"ts_dt", SB_OPTION_REAL, 1, "s", "0.01", "(0, inf)", "step"},
   {"other", SB_OPTION_REAL, 1, "s", "1", "(0, inf)", "only one integrator reads it"},
 };
 
@@ -116,6 +117,25 @@ static PetscErrorCode test_refused_numbers(void)
                          "-body_liver_translate 1,,3: entry 2 is not a number: shift"));
   PetscCall(refused_real("-body_liver_translate 1,nan,3", "translate",
                          "-body_liver_translate 1,nan,3 m is outside (-inf, inf) m: shift"));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The ends of an interval that belong to it. */
+static PetscErrorCode test_ends(void)
+{
+  PetscOptions database;
+  PetscReal x;
+  PetscInt n;
+
+  PetscFunctionBeginUser;
+  PetscCall(begin("-body_liver_closed 1 -body_liver_poisson 0 -repeat 1", &database));
+  PetscCall(SbOptionReal(&body_scope, "closed", &x));
+  SB_CHECK(x == 1, "closed is %g", (double)x);
+  PetscCall(SbOptionReal(&body_scope, "poisson", &x));
+  SB_CHECK(x == 0, "poisson is %g", (double)x);
+  PetscCall(SbOptionInt(&run_scope, "repeat", &n));
+  SB_CHECK(n == 1, "repeat is %d", (int)n);
+  PetscCall(end(&database));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -264,6 +284,8 @@ static PetscErrorCode test_files(const char *folder)
     PetscCall(PetscOptionsSetValue(NULL, "-pc_type", "jacobi"));
     PetscCall(read_all(PETSC_TRUE));
     PetscCall(SbOptionsCheck());
+    PetscCall(SbOptionsUnused(PETSC_COMM_WORLD, &unused));
+    SB_CHECK(unused == 1, "%d options left, not only -ksp_rtoll", (int)unused);
     PetscCall(SbViewerOpen(PETSC_COMM_WORLD, view, &viewer));
     PetscCall(SbOptionsView(viewer));
     PetscCall(PetscViewerDestroy(&viewer));
@@ -298,7 +320,8 @@ static PetscErrorCode test_view_text(const char *folder)
   PetscViewer viewer;
   PetscReal x;
   PetscMPIInt rank;
-  PetscBool preset = PETSC_FALSE, given = PETSC_FALSE;
+  PetscBool preset = PETSC_FALSE;
+  int given = 0;
 
   PetscFunctionBeginUser;
   PetscCall(PetscSNPrintf(view, sizeof(view), "%s/text.opts", folder));
@@ -316,12 +339,11 @@ static PetscErrorCode test_view_text(const char *folder)
     while (f && fgets(line, sizeof(line), f)) {
       if (!strncmp(line, "-body_liver_poisson 0.3 ", 24) && strstr(line, "# default; Poisson"))
         preset = PETSC_TRUE;
-      if (!strncmp(line, "-body_liver_scale 0.123456789012345678 ", 39) && !strstr(line, "default"))
-        given = PETSC_TRUE;
+      if (!strncmp(line, "-body_liver_scale 0.123456789012345678 ", 39) && !strstr(line, "default")) given++;
     }
     if (f) (void)fclose(f);
     SB_CHECK(preset, "the preset is not in the printed scenario");
-    SB_CHECK(given, "the given value is not in the printed scenario");
+    SB_CHECK(given == 1, "the given value is %d times in the printed scenario", given);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -364,7 +386,7 @@ static PetscErrorCode test_check(void)
     "-body_liver_yuong 3 -body_liver_yung 4",
     "-body_liver_yung is not an option of supple; did you mean -body_liver_young? (and 1 more like it)"));
   /* not ours: PETSc's, or near nothing */
-  PetscCall(unread("-ksp_rtoll 1e-3 -frobnicate 2", NULL));
+  PetscCall(unread("-ksp_rtoll 1e-3 -frobnicate 2 -ts_st 3", NULL));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -397,6 +419,7 @@ static PetscErrorCode test_ahead(void)
   static const char *const keys[] = {"scale", "translate", "tags", "pull", "mesh"};
   PetscOptions database;
   PetscBool exists;
+  SbScope linear;
 
   PetscFunctionBeginUser;
   PetscCall(begin("-body_liver_translate 1,2,3 -body_liver_mesh a.msh -verbose -repeat 2 -integrator static",
@@ -408,6 +431,9 @@ static PetscErrorCode test_ahead(void)
   SB_CHECK(exists, "young exists");
   PetscCall(SbOptionExists(&run_scope, "young", &exists));
   SB_CHECK(!exists, "a run has no young");
+  PetscCall(SbScopeSet(&linear, "body", "linear", "liver"));
+  PetscCall(SbOptionExists(&linear, "young", &exists));
+  SB_CHECK(!exists, "young belongs to another type");
   PetscCall(end(&database));
   PetscCall(begin("-body_liver_scale -1", &database));
   EXPECT_MESSAGE(SbOptionAhead(&body_scope, "scale"),
@@ -478,7 +504,7 @@ static PetscErrorCode test_manual(const char *folder)
       if (!strncmp(line, "| `-body_<name>_young` |", 24) && strstr(line, "| required |")) required++;
     }
     if (f) (void)fclose(f);
-    SB_CHECK(rows == 14, "%d rows in the manual", rows);
+    SB_CHECK(rows == 15, "%d rows in the manual", rows);
     SB_CHECK(headlines == 3, "%d headlines in the manual", headlines);
     SB_CHECK(required == 1, "young is not marked as required");
   }
@@ -498,6 +524,7 @@ static PetscErrorCode run_tests(void)
   if (!rank) PetscCheck(mkdtemp(folder), PETSC_COMM_SELF, PETSC_ERR_FILE_OPEN, "cannot make a folder");
   PetscCallMPI(MPI_Bcast(folder, sizeof(folder), MPI_CHAR, 0, PETSC_COMM_WORLD));
   PetscCall(test_refused_numbers());
+  PetscCall(test_ends());
   PetscCall(test_refused_words());
   PetscCall(test_files(folder));
   PetscCall(test_view_text(folder));
