@@ -36,7 +36,7 @@ struct _p_SbEffect {
   char type[SB_NAME_MAX];
   SbEffectOps ops;
   PetscBool linear;      /* force does not depend on u: the tangent stays constant. Default PETSC_TRUE */
-  PetscBool steady;      /* force does not depend on t either */
+  PetscBool steady;      /* no formula uses t: a static run multiplies the effect by the load factor */
   PetscInt ncolumn;      /* history columns */
   const char *column[8]; /* "force_x", ...; written as <name>_<column> */
   void *data;

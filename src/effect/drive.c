@@ -57,7 +57,6 @@ static PetscErrorCode options_drive(SbEffect e, const SbScope *scope)
   PetscCheck(length > 0, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT, "-effect_%s_axis: 0,0,0 is no direction",
              e->name);
   for (int i = 0; i < 3; i++) d->axis[i] /= length;
-  e->steady = PETSC_FALSE;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

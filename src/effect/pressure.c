@@ -54,12 +54,10 @@ static PetscErrorCode options_pressure(SbEffect e, const SbScope *scope)
   PetscCall(SbEffectFormulas(scope, "value", 1, PETSC_FALSE, &p->value, &e->steady));
   PetscCall(SbOptionBool(scope, "follower", &p->follower));
   PetscCall(SbEffectFormulas(scope, "time", 1, PETSC_FALSE, &p->time, &e->steady));
-  if (p->follower) {
+  if (p->follower)
     e->linear = PETSC_FALSE;
-    e->steady = PETSC_FALSE;
-  } else {
+  else
     e->ops.tangent = NULL;
-  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
