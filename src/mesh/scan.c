@@ -103,8 +103,8 @@ PetscErrorCode SbScanText(SbScan *s, const char *what, int64_t *value)
   p = s->at;
   minus = (PetscBool)(p < s->end && *p == '-');
   if (p < s->end && (*p == '-' || *p == '+')) p++;
-  for (; p < s->end && *p >= '0' && *p <= '9' && ndigit <= 18; p++, ndigit++) v = 10 * v + (*p - '0');
-  if (!ndigit || ndigit > 18 || !ends_token(s, p)) PetscCall(unexpected(s, what, 0));
+  for (; p < s->end && *p >= '0' && *p <= '9' && ndigit < 18; p++, ndigit++) v = 10 * v + (*p - '0');
+  if (!ndigit || !ends_token(s, p)) PetscCall(unexpected(s, what, 0));
   *value = minus ? -v : v;
   s->at = p;
   PetscFunctionReturn(PETSC_SUCCESS);
