@@ -65,7 +65,7 @@ static PetscReal lane_difference(int n, const SbLane a[], const SbLane b[])
 {
   PetscReal worst = 0;
 
-  for (int k = 0; k < n; k++) worst = fmax(worst, difference(SB_BATCH, a[k], b[k]));
+  for (int k = 0; k < n; k++) worst = larger(worst, difference(SB_BATCH, a[k], b[k]));
   return worst;
 }
 
