@@ -93,7 +93,7 @@ PetscErrorCode SbOptionsRemember(void);
 PetscErrorCode SbOptionsUnused(MPI_Comm comm, PetscInt *n);
 /* The complete scenario as an option file that runs again: every option of ours read so far with its value, help as
    comment, then the PETSc options that the user gave. Collective; rank 0 writes. */
-PetscErrorCode SbOptionsView(PetscViewer ascii);
+PetscErrorCode SbOptionsView(PetscViewer viewer);
 PetscErrorCode SbOptionsHelp(MPI_Comm comm);                       /* the manual for -help, from the table */
 PetscErrorCode SbOptionsMarkdown(MPI_Comm comm, const char *file); /* docs/options.md, from the table */
 /* ASCII viewer on a file, or on standard output when file is "" or "-"; that it cannot be written is an error on every rank. Collective. */
