@@ -18,5 +18,12 @@ PetscErrorCode SbSolverSetFromOptions(char choice[], size_t size);
 /* The preset for `choice`; with "auto" by number of unknowns, ranks and law, the reason in words. Collective. */
 PetscErrorCode SbSolverChoose(SbSpace space, PetscBool dynamic, PetscBool linear, PetscBool explicit_run, const char *choice, const SbSolverPreset **preset,
                               char reason[], size_t size);
+/*
+  SbSolverFallBack - after a solve that failed: a simpler preconditioner when the present one broke down (an incomplete
+  factorisation that is not positive definite), said once as a warning. Collective.
+
+  Output: changed, false when there is nothing simpler or the failure was another one; then the step has to be cut.
+*/
+PetscErrorCode SbSolverFallBack(SNES snes, PetscBool *changed);
 /* Gives the linear solver of `snes` the preset's options and tolerances; before SNESSetFromOptions(). Collective. */
 PetscErrorCode SbSolverSetUp(SNES snes, SbSpace space, const SbSolverPreset *preset);

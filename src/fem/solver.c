@@ -134,3 +134,27 @@ PetscErrorCode SbSolverSetUp(SNES snes, SbSpace s, const SbSolverPreset *preset)
   PetscCall(insert_options(preset->options));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
+
+PetscErrorCode SbSolverFallBack(SNES snes, PetscBool *changed)
+{
+  KSP                ksp;
+  PC                 pc;
+  KSPConvergedReason reason;
+  PetscBool          incomplete, symmetric;
+  Mat                A;
+
+  PetscFunctionBeginUser;
+  *changed = PETSC_FALSE;
+  PetscCall(SNESGetKSP(snes, &ksp));
+  PetscCall(KSPGetConvergedReason(ksp, &reason));
+  PetscCall(KSPGetPC(ksp, &pc));
+  PetscCall(PetscObjectTypeCompareAny((PetscObject)pc, &incomplete, PCICC, PCBJACOBI, ""));
+  if (!incomplete || (reason != KSP_DIVERGED_INDEFINITE_PC && reason != KSP_DIVERGED_PC_FAILED && reason != KSP_DIVERGED_NANORINF)) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(SNESGetJacobian(snes, NULL, &A, NULL, NULL));
+  PetscCall(PetscObjectTypeCompareAny((PetscObject)A, &symmetric, MATSEQSBAIJ, MATMPISBAIJ, ""));
+  PetscCall(PCSetType(pc, symmetric ? PCJACOBI : PCPBJACOBI));
+  PetscCall(SbWarning(PetscObjectComm((PetscObject)snes), "the incomplete factorisation is not positive definite (very flat tets, or nu near 1/2): going on with %s, which is slower; -solver cg_gamg may be faster",
+                      symmetric ? "jacobi" : "pbjacobi"));
+  *changed = PETSC_TRUE;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

@@ -11,12 +11,13 @@
     explicit Euler: u1 = u0 + h v0, v1 = v0 + h a0;  symplectic Euler: v1 = v0 + h a0, u1 = u0 + h v1.
 
   The acceleration is state (run->A): nothing is recovered from differences, so a restart continues exactly.
-  A step whose solve fails is halved and repeated; later steps double until the nominal length is back. The local error for TSAdapt
+  A step whose solve fails is halved and repeated; after four good steps it doubles, until the nominal length is back. The local error for TSAdapt
   is h^2 (beta - 1/6) (a1 - a0) (Zienkiewicz and Xie 1991), for implicit Euler h^2/2 a1.
 
   petsc/private/tsimpl.h: PETSc has no public way to write a TSType.
 */
 #include <petsc/private/tsimpl.h>
+#include "sbsolver.h"
 #include "time_impl.h"
 
 typedef struct {
@@ -26,6 +27,7 @@ typedef struct {
   Vec              Xa, Va, Aa;         /* stage of generalized-alpha; NULL when the stage is the end */
   Vec              work;
   PetscReal        nominal;            /* step length asked for, s; 0 before the first step */
+  PetscInt         good;               /* steps accepted since the last cut */
   PetscBool        started;            /* run->A holds the acceleration of the current state */
 } SecondOrder;
 
@@ -190,7 +192,7 @@ static PetscErrorCode solve_explicit(TS ts, PetscBool *ok)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Length that the next step should have: back towards the nominal one after a cut. */
+/* Length that the next step should have: back towards the nominal one when four steps after a cut went well. */
 static PetscErrorCode wanted_step(TS ts, PetscReal *h)
 {
   SecondOrder *so = (SecondOrder *)ts->data;
@@ -198,7 +200,7 @@ static PetscErrorCode wanted_step(TS ts, PetscReal *h)
 
   PetscFunctionBeginUser;
   PetscCall(PetscObjectTypeCompare((PetscObject)ts->adapt, TSADAPTNONE, &fixed));
-  *h = fixed ? PetscMin(2. * ts->time_step, so->nominal) : ts->time_step;
+  *h = fixed && so->good >= 3 ? PetscMin(2. * ts->time_step, so->nominal) : ts->time_step;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -228,16 +230,25 @@ static PetscErrorCode TSStep_SecondOrder(TS ts)
       if (accept) {
         PetscCall(VecCopy(so->A1, so->run->A));
         ts->ptime += ts->time_step;
+        so->good      = next > ts->time_step ? 0 : so->good + 1;
         ts->time_step = next;
         so->run->stop_reason[0] = 0;
         break;
       }
-    } else next = 0.5 * ts->time_step;
+    } else {
+      PetscBool simpler = PETSC_FALSE;
+
+      /* a preconditioner that broke down is replaced and the same step tried again */
+      if (!is_explicit(so)) PetscCall(SbSolverFallBack(ts->snes, &simpler));
+      if (simpler) cuts--;
+      next = simpler ? ts->time_step : 0.5 * ts->time_step;
+    }
     /* rejected: the state of the start comes back, and the step is tried with another length */
     PetscCall(VecCopy(so->X0, ts->vec_sol));
     PetscCall(VecCopy(so->V0, ts->vec_dot));
     ts->reject++;
     so->run->rejected_total++;
+    so->good = 0;
     if (is_explicit(so) || ++cuts > so->set.max_cuts) {
       ts->reason = TS_DIVERGED_STEP_REJECTED;
       break;

@@ -3,6 +3,7 @@
   -static_steps equal steps. There is no mass, no damping and no TS. A step whose solve fails is halved and tried again from the
   last equilibrium; two steps that succeed double it again.
 */
+#include "sbsolver.h"
 #include "time_impl.h"
 
 /* Newton from the last equilibrium with the prescribed values of the new load factor. */
@@ -52,8 +53,12 @@ PetscErrorCode SbStaticSolve(SbRun run)
     PetscCall(SbRunStepBegin(run, factor, next - factor));
     PetscCall(solve_at(run, next, X, &ok));
     if (!ok) {
+      PetscBool simpler;
+
       run->rejected_step++;
       run->rejected_total++;
+      PetscCall(SbSolverFallBack(run->snes, &simpler));
+      if (simpler) continue;
       length *= 0.5;
       run->tangent_known = PETSC_FALSE;
       if (++cuts > run->max_cuts) break;
