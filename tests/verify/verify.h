@@ -1,0 +1,135 @@
+/*
+  verify.h - what the verification programs share: meshes of boxes with moved vertices, 3x3 algebra, Richardson's
+  extrapolation.
+*/
+#pragma once
+#include <unistd.h>
+#include "../scene.h"
+
+#define VERIFY_TEXT 4096 /* longest scenario of a test */
+
+/* Place of the vertex at[3] = 0..n of a box with n[3] cells; x comes in as the point of the unit cube. */
+typedef void (*VerifyMap)(const PetscInt n[3], const PetscInt at[3], PetscReal x[3], void *ctx);
+
+static inline PetscInt verify_vertex(const PetscInt n[3], const PetscInt at[3])
+{
+  return (at[2] * (n[1] + 1) + at[1]) * (n[0] + 1) + at[0];
+}
+
+/* Six tets of each cell around a diagonal, mirrored from cell to cell as those of a box: mesh. */
+static inline void verify_write_cells(FILE *f, const PetscInt n[3])
+{
+  static const int ways[6][4] = {{0, 1, 3, 7}, {0, 2, 6, 7}, {0, 4, 5, 7},
+                                 {0, 1, 5, 7}, {0, 2, 3, 7}, {0, 4, 6, 7}};
+  PetscInt c[3], count = 0;
+
+  for (c[2] = 0; c[2] < n[2]; c[2]++) {
+    for (c[1] = 0; c[1] < n[1]; c[1]++) {
+      for (c[0] = 0; c[0] < n[0]; c[0]++) {
+        const int mirror = (int)((c[0] & 1) | (c[1] & 1) << 1 | (c[2] & 1) << 2);
+
+        for (int w = 0; w < 6; w++) {
+          const PetscBool swap = (PetscBool)(((c[0] + c[1] + c[2]) & 1) ^ (w >= 3)); /* positive volumes */
+
+          fprintf(f, "%d 4 2 0 1", (int)++count);
+          for (int a = 0; a < 4; a++) {
+            const int corner = ways[w][swap && a >= 2 ? 5 - a : a] ^ mirror;
+            const PetscInt at[3] = {c[0] + (corner & 1), c[1] + (corner >> 1 & 1), c[2] + (corner >> 2)};
+
+            fprintf(f, " %d", (int)verify_vertex(n, at) + 1);
+          }
+          fprintf(f, "\n");
+        }
+      }
+    }
+  }
+}
+
+/*
+  A box of n[0] x n[1] x n[2] cells with its vertices where `map` puts them, as a gmsh file in the folder for temporary
+  files. Collective; the path is the same on all ranks, rank 0 writes. Remove it with verify_mesh_remove().
+*/
+static inline PetscErrorCode verify_mesh_write(const PetscInt n[3], VerifyMap map, void *ctx, char path[512])
+{
+  const char *folder = getenv("TMPDIR");
+  PetscMPIInt rank;
+  PetscInt at[3];
+
+  PetscFunctionBeginUser;
+  PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
+  PetscCall(PetscSNPrintf(path, 512, "%s/supple-XXXXXX.msh", folder ? folder : "/tmp"));
+  if (!rank) {
+    const int fd = mkstemps(path, 4);
+    FILE *f = fd < 0 ? NULL : fdopen(fd, "w");
+
+    PetscCheck(f, PETSC_COMM_SELF, PETSC_ERR_FILE_OPEN, "Cannot write %s", path);
+    fprintf(f, "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n%d\n",
+            (int)((n[0] + 1) * (n[1] + 1) * (n[2] + 1)));
+    for (at[2] = 0; at[2] <= n[2]; at[2]++) {
+      for (at[1] = 0; at[1] <= n[1]; at[1]++) {
+        for (at[0] = 0; at[0] <= n[0]; at[0]++) {
+          PetscReal x[3];
+
+          for (int k = 0; k < 3; k++) x[k] = (PetscReal)at[k] / (PetscReal)n[k];
+          map(n, at, x, ctx);
+          fprintf(f, "%d %.17g %.17g %.17g\n", (int)verify_vertex(n, at) + 1, (double)x[0], (double)x[1],
+                  (double)x[2]);
+        }
+      }
+    }
+    fprintf(f, "$EndNodes\n$Elements\n%d\n", (int)(6 * n[0] * n[1] * n[2]));
+    verify_write_cells(f, n);
+    fprintf(f, "$EndElements\n");
+    PetscCheck(!fclose(f), PETSC_COMM_SELF, PETSC_ERR_FILE_WRITE, "Cannot write %s", path);
+  }
+  PetscCallMPI(MPI_Bcast(path, 512, MPI_CHAR, 0, PETSC_COMM_WORLD));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static inline PetscErrorCode verify_mesh_remove(const char path[])
+{
+  PetscMPIInt rank;
+
+  PetscFunctionBeginUser;
+  PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
+  if (!rank) (void)unlink(path);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Rotation by an angle (rad) about an axis, row by row (Rodrigues). */
+static inline void verify_rotation(const PetscReal axis[3], PetscReal angle, PetscReal R[9])
+{
+  const PetscReal length = PetscSqrtReal(axis[0] * axis[0] + axis[1] * axis[1] + axis[2] * axis[2]);
+  const PetscReal k[3] = {axis[0] / length, axis[1] / length, axis[2] / length};
+  const PetscReal s = PetscSinReal(angle), c = 2. * PetscSqr(PetscSinReal(0.5 * angle)); /* 1 - cos */
+  const PetscReal K[9] = {0., -k[2], k[1], k[2], 0., -k[0], -k[1], k[0], 0.};
+
+  for (int i = 0; i < 3; i++) {
+    for (int j = 0; j < 3; j++) {
+      PetscReal K2 = 0.;
+
+      for (int m = 0; m < 3; m++) K2 += K[3 * i + m] * K[3 * m + j];
+      R[3 * i + j] = (i == j) + s * K[3 * i + j] + c * K2;
+    }
+  }
+}
+
+static inline void verify_apply(const PetscReal A[9], const PetscReal x[3], PetscReal y[3])
+{
+  for (int i = 0; i < 3; i++) y[i] = A[3 * i] * x[0] + A[3 * i + 1] * x[1] + A[3 * i + 2] * x[2];
+}
+
+/* Limit of a sequence whose error falls by the factor 2^order when the mesh is halved. */
+static inline PetscReal verify_extrapolate(PetscReal coarse, PetscReal fine, PetscReal order)
+{
+  return fine + (fine - coarse) / (PetscPowReal(2., order) - 1.);
+}
+
+/* The end of the run must be its planned one. */
+static inline PetscErrorCode verify_solve(TestScene *t, const char *what)
+{
+  PetscFunctionBeginUser;
+  PetscCall(SbRunSolve(t->run));
+  SB_CHECK(!t->run->stop_reason[0], "%s: %s", what, t->run->stop_reason);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

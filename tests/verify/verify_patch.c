@@ -1,0 +1,273 @@
+// @ranks 1 2
+/*
+  The patch test (MacNeal and Harder, "A proposed standard set of problems to test finite element accuracy", 1985): a body
+  that is held on its boundary, or pulled there, as a homogeneous deformation x = F X asks for must take it inside too, on
+  any mesh. Small strains with the displacement of that paper, and a large strain with every law: the stress is compared
+  with the law's formula, which is written down here once more. The linear system is solved directly.
+
+  Tolerances: displacements 1e-10 of the largest. Stresses 1e-9 of the largest, times the condition of the law: rounding of
+  the strain is multiplied by lambda / mu.
+*/
+#include "verify.h"
+
+typedef enum { REGULAR, DISTORTED, SLIVERS } Shape;
+static const char *const shapes[] = {"regular", "distorted", "slivers"};
+static const char *const laws[] = {"linear", "corotated", "stvk", "neohookean"};
+
+typedef struct {
+  Shape shape;
+  PetscRandom random;
+} MeshContext;
+
+/*
+  Inner vertices of the unit cube: moved at random by up to 0.3 cells; or every second one moved onto the plane of a face
+  that it looks at, but for a thousandth, which leaves flat tets.
+*/
+static void move_vertex(const PetscInt n[3], const PetscInt at[3], PetscReal x[3], void *ctx)
+{
+  const MeshContext *m = (const MeshContext *)ctx;
+  PetscReal r[3];
+
+  for (int k = 0; k < 3; k++) (void)PetscRandomGetValueReal(m->random, &r[k]);
+  for (int k = 0; k < 3; k++) {
+    if (at[k] == 0 || at[k] == n[k]) return;
+  }
+  if (m->shape == DISTORTED) {
+    for (int k = 0; k < 3; k++) x[k] += (0.6 * r[k] - 0.3) / (PetscReal)n[k];
+  } else if (m->shape == SLIVERS && at[0] == 3 && at[1] == 2 && at[2] > 1 && at[2] < n[2] - 1) {
+    const PetscReal part = 0.499 * (1. - 0.002 * r[0]);
+
+    x[0] -= part / (PetscReal)n[0];
+    x[1] += part / (PetscReal)n[1];
+  }
+}
+
+static PetscErrorCode write_mesh(Shape shape, PetscInt cells, char path[512])
+{
+  const PetscInt n[3] = {cells, cells, cells};
+  MeshContext m = {.shape = shape};
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscRandomCreate(PETSC_COMM_SELF, &m.random));
+  PetscCall(PetscRandomSetSeed(m.random, 20));
+  PetscCall(PetscRandomSeed(m.random));
+  PetscCall(verify_mesh_write(n, move_vertex, &m, path));
+  PetscCall(PetscRandomDestroy(&m.random));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* C = A^T B, and back with the plain product. */
+static void product(const PetscReal A[9], PetscBool transposed, const PetscReal B[9], PetscReal C[9])
+{
+  for (int i = 0; i < 3; i++) {
+    for (int j = 0; j < 3; j++) {
+      C[3 * i + j] = 0.;
+      for (int k = 0; k < 3; k++) C[3 * i + j] += (transposed ? A[3 * k + i] : A[3 * i + k]) * B[3 * k + j];
+    }
+  }
+}
+
+/* Cofactor, J F^-T; returns J. */
+static PetscReal cofactor(const PetscReal F[9], PetscReal c[9])
+{
+  for (int i = 0; i < 3; i++) {
+    for (int j = 0; j < 3; j++) {
+      const int i1 = (i + 1) % 3, i2 = (i + 2) % 3, j1 = (j + 1) % 3, j2 = (j + 2) % 3;
+
+      c[3 * i + j] = F[3 * i1 + j1] * F[3 * i2 + j2] - F[3 * i1 + j2] * F[3 * i2 + j1];
+    }
+  }
+  return F[0] * c[0] + F[1] * c[1] + F[2] * c[2];
+}
+
+/* First Piola-Kirchhoff stress of each law. */
+static void exact_stress(const char *law, PetscReal E, PetscReal nu, const PetscReal F[9], PetscReal P[9])
+{
+  const PetscReal mu = E / (2. * (1. + nu)), lambda = E * nu / ((1. + nu) * (1. - 2. * nu));
+  PetscReal S[9], R[9], C[9], trace = 0., I1 = 0.;
+
+  for (int k = 0; k < 9; k++) R[k] = F[k];
+  if (!strcmp(law, "neohookean")) {
+    const PetscReal a = 4. * mu / 3., b = lambda + 5. * mu / 6., J = cofactor(F, C);
+
+    for (int k = 0; k < 9; k++) I1 += F[k] * F[k];
+    for (int k = 0; k < 9; k++) P[k] = a * (1. - 1. / (I1 + 1.)) * F[k] + (b * (J - 1.) - 0.75 * a) * C[k];
+    return;
+  }
+  /* polar rotation as the mean of a matrix and its inverse transpose (Higham 1986) */
+  for (int i = 0; i < 30 && !strcmp(law, "corotated"); i++) {
+    const PetscReal J = cofactor(R, C);
+
+    for (int k = 0; k < 9; k++) R[k] = 0.5 * (R[k] + C[k] / J);
+  }
+  if (!strcmp(law, "linear")) {
+    for (int i = 0; i < 3; i++) {
+      for (int j = 0; j < 3; j++) {
+        R[3 * i + j] = i == j;
+        S[3 * i + j] = 0.5 * (F[3 * i + j] + F[3 * j + i]) - (i == j);
+      }
+    }
+  } else if (!strcmp(law, "corotated")) {
+    product(R, PETSC_TRUE, F, S);
+    for (int k = 0; k < 9; k += 4) S[k] -= 1.;
+  } else {
+    product(F, PETSC_TRUE, F, S);
+    for (int k = 0; k < 9; k++) S[k] = 0.5 * (S[k] - (k % 4 == 0));
+  }
+  trace = S[0] + S[4] + S[8];
+  for (int k = 0; k < 9; k++) S[k] = 2. * mu * S[k] + (k % 4 == 0) * lambda * trace;
+  product(R, PETSC_FALSE, S, P);
+}
+
+/* The linear law has one stress, the others Cauchy's P F^T / J; in the order of SbSpaceCellState(). */
+static void exact_cauchy(const char *law, const PetscReal F[9], const PetscReal P[9], PetscReal sigma[6])
+{
+  static const int row[6] = {0, 1, 2, 0, 1, 0}, column[6] = {0, 1, 2, 1, 2, 2};
+  PetscReal C[9];
+  const PetscReal J = cofactor(F, C);
+
+  for (int k = 0; k < 6; k++) {
+    sigma[k] = 0.;
+    for (int j = 0; j < 3; j++) sigma[k] += P[3 * row[k] + j] * F[3 * column[k] + j] / J;
+    if (!strcmp(law, "linear")) sigma[k] = P[3 * row[k] + column[k]];
+  }
+}
+
+/* Largest error of displacements and of stresses, each relative to the largest exact value. */
+static PetscErrorCode errors(TestScene *t, const PetscReal F[9], const PetscReal sigma[6], PetscReal error[2])
+{
+  SbSpace s = t->model->space;
+  const PetscReal *u;
+  PetscReal *cell, size[2] = {0., 0.};
+
+  PetscFunctionBeginUser;
+  error[0] = error[1] = 0.;
+  PetscCall(PetscMalloc1(6 * s->mesh->ncell_owned, &cell));
+  PetscCall(SbSpaceGetLocalRead(s, t->run->U, &u));
+  PetscCall(SbSpaceCellState(s, u, cell, NULL, NULL));
+  for (PetscInt i = 0; i < s->nnode_owned; i++) {
+    PetscReal x[3];
+
+    verify_apply(F, s->node_x + 3 * i, x);
+    for (int k = 0; k < 3; k++) {
+      const PetscReal exact = x[k] - s->node_x[3 * i + k];
+
+      error[0] = PetscMax(error[0], PetscAbsReal(u[3 * i + k] - exact));
+      size[0] = PetscMax(size[0], PetscAbsReal(exact));
+    }
+  }
+  for (PetscInt c = 0; c < s->mesh->ncell_owned; c++) {
+    for (int k = 0; k < 6; k++) {
+      error[1] = PetscMax(error[1], PetscAbsReal(cell[6 * c + k] - sigma[k]));
+      size[1] = PetscMax(size[1], PetscAbsReal(sigma[k]));
+    }
+  }
+  PetscCall(SbSpaceRestoreLocalRead(s, t->run->U, &u));
+  PetscCall(PetscFree(cell));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, error, 2, MPIU_REAL, MPI_MAX, PETSC_COMM_WORLD));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, size, 2, MPIU_REAL, MPI_MAX, PETSC_COMM_WORLD));
+  for (int k = 0; k < 2; k++) error[k] /= size[k];
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Displacement of the boundary, or of x = 0 alone with the traction P N on the other five sides. */
+static PetscErrorCode load_options(PetscBool pulled, const PetscReal F[9], const PetscReal P[9], char text[],
+                                   size_t size)
+{
+  char more[512];
+
+  PetscFunctionBeginUser;
+  PetscCall(
+    PetscSNPrintf(text, size,
+                  " -effect_move_type drive -effect_move_on %s -effect_move_displacement "
+                  "(%.17g)*x+(%.17g)*y+(%.17g)*z;(%.17g)*x+(%.17g)*y+(%.17g)*z;(%.17g)*x+(%.17g)*y+(%.17g)*z",
+                  pulled ? "side0" : "boundary", (double)F[0] - 1., (double)F[1], (double)F[2], (double)F[3],
+                  (double)F[4] - 1., (double)F[5], (double)F[6], (double)F[7], (double)F[8] - 1.));
+  PetscCall(
+    PetscStrlcat(text, pulled ? " -effects move,pull1,pull2,pull3,pull4,pull5" : " -effects move", size));
+  PetscCall(PetscStrlcat(text, pulled ? " -sets side0,side1,side2,side3,side4,side5" : " -sets side0", size));
+  for (int side = 0; side < (pulled ? 6 : 1); side++) {
+    const int d = side / 2;
+
+    PetscCall(PetscSNPrintf(more, sizeof(more), " -set_side%d_at plane:%d,%d,%d,%d", side, d == 0, d == 1,
+                            d == 2, side % 2));
+    PetscCall(PetscStrlcat(text, more, size));
+    if (!side) continue;
+    PetscCall(PetscSNPrintf(
+      more, sizeof(more),
+      " -effect_pull%d_type traction -effect_pull%d_on side%d -effect_pull%d_vector %.17g;%.17g;%.17g", side,
+      side, side, side, (double)P[d] * (side % 2 ? 1. : -1.), (double)P[3 + d] * (side % 2 ? 1. : -1.),
+      (double)P[6 + d] * (side % 2 ? 1. : -1.)));
+    PetscCall(PetscStrlcat(text, more, size));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode check_patch(Shape shape, const char *path, const char *law, PetscReal nu,
+                                  PetscBool pulled, const PetscReal F[9], PetscReal known_normal,
+                                  PetscReal known_shear)
+{
+  const PetscReal E = 1e6, stiff = PetscMax(1., nu / (1. - 2. * nu));
+  TestScene t;
+  PetscReal P[9], sigma[6], error[2];
+  char text[VERIFY_TEXT], loads[VERIFY_TEXT];
+
+  PetscFunctionBeginUser;
+  exact_stress(law, E, nu, F, P);
+  exact_cauchy(law, F, P, sigma);
+  for (int k = 0; k < 6 && known_normal > 0.; k++) {
+    SB_CHECK_NEAR(sigma[k], k < 3 ? known_normal : known_shear, 1e-9 * known_normal, "stress of the paper");
+  }
+  PetscCall(load_options(pulled, F, P, loads, sizeof(loads)));
+  PetscCall(
+    PetscSNPrintf(text, sizeof(text),
+                  "-bodies a -body_a_mesh %s -body_a_material %s -body_a_young %g -body_a_poisson %g "
+                  "-body_a_density 1 -time static -solver %s -ksp_rtol 1e-13 -snes_rtol 1e-13 -snes_atol 0 "
+                  "-snes_stol 1e-13 %s %s",
+                  path, law, (double)E, (double)nu, strcmp(law, "linear") ? "mumps -ksp_type gmres" : "auto",
+                  !strcmp(law, "corotated") ? "-body_a_tangent exact" : "", loads));
+  PetscCall(test_scene_open(text, &t));
+  PetscCall(verify_solve(&t, law));
+  PetscCall(errors(&t, F, sigma, error));
+  PetscCall(PetscPrintf(
+    PETSC_COMM_WORLD, "  %-10s %-10s nu %-6g %-9s smallest angle %7.3f deg: u %.1e, stress %.1e, Newton %d\n",
+    shapes[shape], law, (double)nu, pulled ? "tractions" : "moved", (double)t.model->body[0].min_dihedral,
+    (double)error[0], (double)error[1], (int)t.run->newton_total));
+  SB_CHECK(error[0] <= 1e-10, "%s, %s, nu %g: displacement off by %g", shapes[shape], law, (double)nu,
+           (double)error[0]);
+  SB_CHECK(error[1] <= 1e-9 * stiff, "%s, %s, nu %g: stress off by %g", shapes[shape], law, (double)nu,
+           (double)error[1]);
+  if (shape == SLIVERS) {
+    SB_CHECK(t.model->body[0].min_dihedral > 0.05 && t.model->body[0].min_dihedral < 1.,
+             "smallest dihedral angle of the mesh of slivers is %g degrees",
+             (double)t.model->body[0].min_dihedral);
+  }
+  PetscCall(test_scene_close(&t));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+int main(int argc, char **argv)
+{
+  const PetscReal small[9] = {1. + 1e-3, 5e-4, 5e-4, 5e-4, 1. + 1e-3, 5e-4, 5e-4, 5e-4, 1. + 1e-3};
+  /* a stretch by a quarter with shear and a turn, nearly without change of volume */
+  const PetscReal large[9] = {1.25, 0.1, 0.05, -0.2, 0.9, 0.1, 0.1, -0.15, 0.9};
+
+  SB_TEST_BEGIN(argc, argv);
+  for (Shape shape = REGULAR; shape <= SLIVERS; shape++) {
+    char path[512];
+
+    PetscCall(write_mesh(shape, shape == SLIVERS ? 5 : 3, path));
+    for (int pulled = 0; pulled < 2; pulled++) {
+      PetscCall(check_patch(shape, path, "linear", 0.25, (PetscBool)pulled, small, 2000., 400.));
+      PetscCall(check_patch(shape, path, "linear", 0.4999, (PetscBool)pulled, small, -1., 0.));
+    }
+    for (int law = 0; law < 4; law++) {
+      PetscCall(check_patch(shape, path, laws[law], 0.25, PETSC_FALSE, large, -1., 0.));
+      /* flat tets next to incompressible ones: hundreds of Newton steps lead there, to the same digits */
+      if (shape == SLIVERS && law > 0) continue;
+      PetscCall(check_patch(shape, path, laws[law], 0.4999, PETSC_FALSE, large, -1., 0.));
+    }
+    PetscCall(verify_mesh_remove(path));
+  }
+  SB_TEST_END();
+}
