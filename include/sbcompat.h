@@ -42,3 +42,10 @@
 #else
   #define SB_UNLIMITED PETSC_UNLIMITED
 #endif
+
+/* What PetscErrorMessage() hands out. */
+#if PETSC_VERSION_LT(3, 19, 0)
+typedef char *SbErrorText;
+#else
+typedef const char *SbErrorText;
+#endif

@@ -90,7 +90,7 @@ static PetscErrorCode refused(const char *text, const char *message)
 {
   SbFormula f = NULL;
   PetscErrorCode ierr;
-  char *said;
+  SbErrorText said;
 
   PetscFunctionBeginUser;
   PetscCall(PetscPushErrorHandler(PetscReturnErrorHandler, NULL));

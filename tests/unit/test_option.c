@@ -58,7 +58,7 @@ static PetscErrorCode end(PetscOptions *database)
 #define EXPECT_MESSAGE(call, expected)                                                                   \
   do {                                                                                                   \
     PetscErrorCode expect_ierr;                                                                          \
-    char *expect_text;                                                                                   \
+    SbErrorText expect_text;                                                                             \
     PetscCall(PetscPushErrorHandler(PetscReturnErrorHandler, NULL));                                     \
     expect_ierr = call;                                                                                  \
     PetscCall(PetscPopErrorHandler());                                                                   \

@@ -150,7 +150,7 @@ static PetscErrorCode refused(const char *options, const char *message)
   PetscOptions database;
   SbModel model = NULL;
   PetscErrorCode ierr;
-  char *said;
+  SbErrorText said;
 
   PetscFunctionBeginUser;
   PetscCall(begin(options, &database));
