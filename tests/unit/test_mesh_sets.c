@@ -65,6 +65,16 @@ static PetscErrorCode build(const char *text, SbSet *set, SbWhole *whole)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Whether a neighbour is in the same body and has this cell for a neighbour. */
+static PetscBool sees_back(const SbWhole *whole, PetscInt c, PetscInt neighbour)
+{
+  const PetscInt *n = whole->neighbour + 4 * neighbour;
+
+  if (neighbour < 0) return PETSC_TRUE;
+  return (PetscBool)(whole->point[neighbour].body == whole->point[c].body &&
+                     (n[0] == c || n[1] == c || n[2] == c || n[3] == c));
+}
+
 static PetscErrorCode test_counts(const char *text, PetscInt nvert, PetscInt nfacet, PetscInt ncell)
 {
   SbWhole whole;
@@ -83,6 +93,8 @@ static PetscErrorCode test_counts(const char *text, PetscInt nvert, PetscInt nfa
       const uint64_t mask = whole.point[c].u.face[f];
 
       n[1] += (mask & SB_SET_BIT(0)) && (mask & SB_ON_BOUNDARY);
+      SB_CHECK(sees_back(&whole, c, whole.neighbour[4 * c + f]), "cell %d and its neighbour %d", (int)c,
+               (int)whole.neighbour[4 * c + f]);
       SB_CHECK(!(mask & SB_ON_BOUNDARY) == (whole.neighbour[4 * c + f] >= 0),
                "bit of the boundary on cell %d", (int)c);
     }
