@@ -14,12 +14,12 @@ static const SbOption body_rows[] = {
   {"density", SB_OPTION_REAL, 1, "kg/m^3", "1000", "(0, inf)", "Mass per rest volume."},
 };
 static const SbOption corotated_rows[] = {
-  {"tangent", SB_OPTION_CHOICE, 1, "", "warped", "warped|exact|exact_spd",
+  {"tangent", SB_OPTION_CHOICE, 1, "", "exact_spd", "warped|exact|exact_spd",
    "Stiffness: Hooke's turned with the cell (positive definite), the exact derivative, or that without "
    "negative eigenvalues."},
 };
 static const SbOption exact_rows[] = {
-  {"tangent", SB_OPTION_CHOICE, 1, "", "exact", "exact|exact_spd",
+  {"tangent", SB_OPTION_CHOICE, 1, "", "exact_spd", "exact|exact_spd",
    "Stiffness: the exact derivative of the force, or that without negative eigenvalues (for CG)."},
 };
 
