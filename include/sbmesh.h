@@ -5,31 +5,32 @@
 #pragma once
 #include "sbbase.h"
 
-#define SB_SET_MAX 63                     /* named sets that one scenario may use: one bit each, bit 0 is taken */
-#define SB_ON_BOUNDARY ((uint64_t)1)      /* bit 0 of SbMesh.face_set: the face has no cell on the other side */
+#define SB_SET_MAX 63                /* named sets that one scenario may use: one bit each, bit 0 is taken */
+#define SB_ON_BOUNDARY ((uint64_t)1) /* bit 0 of SbMesh.face_set: the face has no cell on the other side */
 #define SB_SET_BIT(k) ((uint64_t)1 << ((k) + 1))
 
 /* A body as the scenario gives it. Data, no methods. */
 typedef struct {
-  char      name[SB_NAME_MAX];
-  char      mesh[PETSC_MAX_PATH_LEN]; /* file, or box:lx,ly,lz:n or box:lx,ly,lz:nx,ny,nz, from the origin to (lx, ly, lz);
+  char name[SB_NAME_MAX];
+  char mesh
+    [PETSC_MAX_PATH_LEN]; /* file, or box:lx,ly,lz:n or box:lx,ly,lz:nx,ny,nz, from the origin to (lx, ly, lz);
                                          n cells along the shortest side; groups xmin xmax ymin ymax zmin zmax */
-  PetscReal scale;                    /* factor on the file's coordinates, first */
-  PetscReal rotate[4];                /* axis (need not be normed) and angle in degrees, second */
-  PetscReal translate[3];             /* m, third */
-  char      element[SB_NAME_MAX];     /* p1 */
-  char      material[SB_NAME_MAX];    /* linear | corotated | stvk | neohookean */
-  PetscReal density;                  /* kg/m^3 */
-  PetscReal velocity[3];              /* initial velocity of the centre of mass, m/s */
-  PetscReal spin[3];                  /* initial angular velocity about the centre of mass, rad/s */
+  PetscReal scale;        /* factor on the file's coordinates, first */
+  PetscReal rotate[4];    /* axis (need not be normed) and angle in degrees, second */
+  PetscReal translate[3];     /* m, third */
+  char element[SB_NAME_MAX];  /* p1 */
+  char material[SB_NAME_MAX]; /* linear | corotated | stvk | neohookean */
+  PetscReal density;          /* kg/m^3 */
+  PetscReal velocity[3];      /* initial velocity of the centre of mass, m/s */
+  PetscReal spin[3];          /* initial angular velocity about the centre of mass, rad/s */
   /* found by SbMeshCreate(), equal on all ranks */
-  PetscInt  nvert, ncell, nfacet;     /* global counts; nfacet counts boundary facets */
-  PetscInt  npart;                    /* connected parts */
-  PetscReal volume;                   /* rest volume, m^3 */
-  PetscReal min_dihedral;             /* smallest dihedral angle, degrees */
-  PetscReal max_radius_ratio;         /* circumradius / (3 inradius), 1 for the regular tet; the worst cell */
-  PetscReal bbox[6];                  /* xmin ymin zmin xmax ymax zmax, placed, m */
-  char      note[256];                /* what was repaired or is odd, "unused vertices left out: 3, ..."; "" when nothing */
+  PetscInt nvert, ncell, nfacet; /* global counts; nfacet counts boundary facets */
+  PetscInt npart;                /* connected parts */
+  PetscReal volume;              /* rest volume, m^3 */
+  PetscReal min_dihedral;        /* smallest dihedral angle, degrees */
+  PetscReal max_radius_ratio;    /* circumradius / (3 inradius), 1 for the regular tet; the worst cell */
+  PetscReal bbox[6];             /* xmin ymin zmin xmax ymax zmax, placed, m */
+  char note[256]; /* what was repaired or is odd, "unused vertices left out: 3, ..."; "" when nothing */
 } SbBody;
 
 /*
@@ -39,14 +40,23 @@ typedef struct {
   a slack of 1e-6 of the body's diagonal. A group of surfaces holds its triangles (inner ones too) and their vertices; a
   group of volumes its tets, their vertices and boundary facets.
 */
-typedef enum { SB_SET_GROUP, SB_SET_BOX, SB_SET_PLANE, SB_SET_SPHERE, SB_SET_HALFSPACE, SB_SET_BODY, SB_SET_BOUNDARY } SbSetShape;
+typedef enum {
+  SB_SET_GROUP,
+  SB_SET_BOX,
+  SB_SET_PLANE,
+  SB_SET_SPHERE,
+  SB_SET_HALFSPACE,
+  SB_SET_BODY,
+  SB_SET_BOUNDARY
+} SbSetShape;
 typedef struct {
-  char       name[SB_NAME_MAX];
+  char name[SB_NAME_MAX];
   SbSetShape shape;
-  char       group[2 * SB_NAME_MAX]; /* SB_SET_GROUP: group or body.group; SB_SET_BODY: body */
-  PetscReal  p[8];                   /* box: xmin ymin zmin xmax ymax zmax; plane: nx ny nz d tol (|n.x - d| <= tol);
+  char group[2 * SB_NAME_MAX]; /* SB_SET_GROUP: group or body.group; SB_SET_BODY: body */
+  PetscReal p[8]; /* box: xmin ymin zmin xmax ymax zmax; plane: nx ny nz d tol (|n.x - d| <= tol);
                                         sphere: cx cy cz r; halfspace: nx ny nz d (n.x <= d); n has length 1 here, d is scaled likewise */
-  PetscInt   nvert, nfacet, ncell;   /* global counts, found by SbMeshCreate(); nfacet counts boundary facets; all zero is an error there */
+  PetscInt nvert, nfacet,
+    ncell; /* global counts, found by SbMeshCreate(); nfacet counts boundary facets; all zero is an error there */
 } SbSet;
 
 /*
@@ -55,28 +65,31 @@ typedef struct {
 */
 typedef struct _p_SbMesh *SbMesh;
 struct _p_SbMesh {
-  MPI_Comm  comm;
-  DM        dm;             /* DMPlex of cells and vertices, distributed with overlap 1; owned here */
-  PetscInt  nbody;
-  SbBody   *body;           /* [nbody] borrowed: the model owns the bodies */
-  PetscInt  nset;
-  SbSet    *set;            /* [nset] borrowed */
+  MPI_Comm comm;
+  DM dm; /* DMPlex of cells and vertices, distributed with overlap 1; owned here */
+  PetscInt nbody;
+  SbBody *body; /* [nbody] borrowed: the model owns the bodies */
+  PetscInt nset;
+  SbSet *set; /* [nset] borrowed */
 
-  PetscInt  Nvert, Ncell;   /* global counts */
-  PetscInt  nvert_owned, nvert;
-  PetscInt  gvert_start;    /* global number of this rank's first owned vertex; owned ones follow each other */
-  PetscInt *gvert;          /* [nvert] global vertex number (depends on the partition); ghosts ascending */
-  PetscInt *vert_orig;      /* [nvert] original number: bodies in scenario order, vertices in file order, unused ones left out */
-  PetscInt *vert_body;      /* [nvert] */
-  PetscReal *x;             /* [nvert][3] rest position, placed, m */
-  uint64_t *vert_set;       /* [nvert] SB_SET_BIT(k) when in set k */
+  PetscInt Nvert, Ncell; /* global counts */
+  PetscInt nvert_owned, nvert;
+  PetscInt gvert_start; /* global number of this rank's first owned vertex; owned ones follow each other */
+  PetscInt *gvert;      /* [nvert] global vertex number (depends on the partition); ghosts ascending */
+  PetscInt *
+    vert_orig; /* [nvert] original number: bodies in scenario order, vertices in file order, unused ones left out */
+  PetscInt *vert_body; /* [nvert] */
+  PetscReal *x;        /* [nvert][3] rest position, placed, m */
+  uint64_t *vert_set;  /* [nvert] SB_SET_BIT(k) when in set k */
 
-  PetscInt  ncell_owned, ncell;
-  PetscInt *cell;           /* [ncell][4] local vertices, positively oriented: det(x1-x0, x2-x0, x3-x0) > 0 */
-  PetscInt *cell_orig;      /* [ncell] original number, as for vertices */
-  PetscInt *cell_body;      /* [ncell]; owned and ghost cells are each sorted by body, then by lowest local vertex */
-  uint64_t *cell_set;       /* [ncell] */
-  uint64_t *face_set;       /* [ncell][4] face f lies opposite vertex f: SB_ON_BOUNDARY, and SB_SET_BIT(k) when in set k */
+  PetscInt ncell_owned, ncell;
+  PetscInt *cell;      /* [ncell][4] local vertices, positively oriented: det(x1-x0, x2-x0, x3-x0) > 0 */
+  PetscInt *cell_orig; /* [ncell] original number, as for vertices */
+  PetscInt
+    *cell_body; /* [ncell]; owned and ghost cells are each sorted by body, then by lowest local vertex */
+  uint64_t *cell_set; /* [ncell] */
+  uint64_t
+    *face_set; /* [ncell][4] face f lies opposite vertex f: SB_ON_BOUNDARY, and SB_SET_BIT(k) when in set k */
 };
 
 /*
@@ -89,7 +102,8 @@ struct _p_SbMesh {
   tet, face shared by three tets, set that selects nothing. Repaired and reported: unused vertices, negative orientation.
   Reported: several connected parts, non-manifold surface edges.
 */
-PetscErrorCode SbMeshCreate(MPI_Comm comm, PetscInt nbody, SbBody body[], PetscInt nset, SbSet set[], SbMesh *mesh);
+PetscErrorCode SbMeshCreate(MPI_Comm comm, PetscInt nbody, SbBody body[], PetscInt nset, SbSet set[],
+                            SbMesh *mesh);
 PetscErrorCode SbMeshDestroy(SbMesh *mesh);
 PetscErrorCode SbMeshValidate(SbMesh mesh); /* ordering, ranges, ownership, sums; for -validate and tests */
 PetscErrorCode SbMeshRegister(void);        /* rows of the option table, the METIS partitioner */
