@@ -118,3 +118,43 @@ PetscErrorCode SbSpaceGetSetFacets(SbSpace space, PetscInt k, PetscInt *n, SbFac
 PetscErrorCode SbSpaceGetSetNodes(SbSpace space, PetscInt k, PetscInt *n, PetscInt **nodes);
 /* Index of a set by name; -1 and an error with the nearest names when there is none (where = option, for the message). */
 PetscErrorCode SbSpaceFindSet(SbSpace space, const char *name, const char *where, PetscInt *k);
+
+/* ------------------------------------------------------------------ real time: many similar systems, solved fast */
+
+/*
+  SbSpaceCreateFrameOperator - the tangent without a matrix: A = shift_a M + shift_v C + shift_k sum_T R_T K_T R_T^T, applied cell
+  by cell from the cells' rotated gradients.
+
+  Collective. For laws whose tangent is Hooke's tensor turned by a rotation (linear; co-rotated with the warped tangent) and
+  lumped mass. A is a MATSHELL owned by the caller; the space is borrowed. Its state is set by SbSpaceAssembleTangent(), as for
+  any matrix. Prescribed unknowns have a scaled identity. Errors: PETSC_ERR_SUP for other laws and the consistent mass.
+*/
+PetscErrorCode SbSpaceCreateFrameOperator(SbSpace space, Mat *A);
+/* PETSC_TRUE when the space's laws and mass allow a frame operator. Not collective, same on all ranks. */
+PetscErrorCode SbSpaceHasFrames(SbSpace space, PetscBool *has);
+/* Sets the state of a frame operator: u and the shifts of the stage. PETSC_FALSE in `is` (and nothing done) for another matrix. */
+PetscErrorCode SbFrameOperatorSetState(Mat A, const SbStage *stage, PetscBool *is);
+
+/*
+  SbSpaceNodeRotations - how the material around each owned node is turned: the proper rotation next to the volume-weighted
+  mean of the rotations of the cells around it.
+
+  Not collective. Input: u[nnode][3] with ghosts, m. Output: R[nnode_owned][9], row-major; spread[nnode_owned] (may be NULL), the
+  largest |R_cell - R|_F^2 among the cells around, 8 sin^2(angle / 2).
+*/
+PetscErrorCode SbSpaceNodeRotations(SbSpace space, const PetscReal u[], PetscReal R[], PetscReal spread[]);
+
+/*
+  SbPCRotatedCreate - makes pc a preconditioner that factors seldom: P = Q A0 Q^T, A0 a past operator, Q its nodes' rotations since.
+
+  Collective. The operator is a frame operator, or an assembled AIJ or BAIJ matrix of the space on which the displacement
+  belonging to it is composed as "sb_state" (PetscObjectCompose() with a vector of SbSpaceCreateVec()). One factorisation lasts
+  as long as the iterations stay low; it is renewed at the next change of the operator when they do not, when the solver
+  fails, or when SbPCRotatedRenew() is called.
+  Options read: -pc_rotated_spread (rad), from which angle on between a cell and its node the node is solved exactly.
+  Errors: PETSC_ERR_USER when ranks meet at more than 1500 nodes. An operator that is not positive definite fails the solve.
+*/
+PetscErrorCode SbPCRotatedCreate(SbSpace space, PC pc);
+PetscErrorCode SbPCRotatedRenew(PC pc);
+/* Factorisations so far, nodes solved exactly at present (this rank), entries of the factor (this rank). Outputs may be NULL. */
+PetscErrorCode SbPCRotatedGetStats(PC pc, PetscInt *nfactor, PetscInt *nexact, PetscInt64 *entries);

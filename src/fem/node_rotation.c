@@ -1,0 +1,109 @@
+/*
+  Rotations of cells and of nodes.
+
+  A node's rotation is the proper rotation next to sum_T V_T R_T over the cells around it (Markley 2007, "Averaging
+  quaternions", gives the same maximiser of sum_T V_T R : R_T). All cells that touch an owned node are local, so owned nodes
+  need no communication. Where rotations cancel out (cells turned against each other by pi) the result is some rotation.
+*/
+#include "rotated.h"
+
+void SbSpaceCellRotations(SbSpace s, const PetscReal x[], SbLane R[])
+{
+  for (PetscInt r = 0; r < s->nregion; r++) {
+    const SbMaterial m = s->region[r].material;
+
+    for (PetscInt b = s->region[r].bstart; b < s->region[r].bend; b++) {
+      SbLane u[12], F[9];
+
+      if (!x || m->linear) {
+        for (int k = 0; k < 9; k++) {
+          for (int l = 0; l < SB_BATCH; l++) R[9 * b + k][l] = k % 4 == 0;
+        }
+        continue;
+      }
+      sb_gather(s->batch_node + 4 * SB_BATCH * b, x, u);
+      SbCellGradient(s->batch_g + 9 * b, (const SbLane *)u, F);
+      if (m->ops.frame)
+        m->ops.frame(m, (const SbLane *)F, R + 9 * b);
+      else
+        SbPolar((const SbLane *)F, R + 9 * b);
+    }
+  }
+}
+
+/* sum[nnode][9] += V R of every cell at its nodes. */
+static void sum_rotations(SbSpace s, const SbLane R[], PetscReal sum[])
+{
+  for (PetscInt b = 0; b < s->nbatch; b++) {
+    const PetscInt *node = s->batch_node + 4 * SB_BATCH * b;
+
+    for (PetscInt l = 0; l < s->batch_n[b]; l++) {
+      PetscReal VR[9];
+
+      for (int k = 0; k < 9; k++) VR[k] = s->batch_V[b][l] * R[9 * b + k][l];
+      for (int a = 0; a < 4; a++) {
+        PetscReal *to = sum + 9 * node[a * SB_BATCH + l];
+
+        for (int k = 0; k < 9; k++) to[k] += VR[k];
+      }
+    }
+  }
+}
+
+static void find_spread(SbSpace s, const SbLane R[], const PetscReal node_R[], PetscReal spread[])
+{
+  for (PetscInt i = 0; i < s->nnode_owned; i++) spread[i] = 0.;
+  for (PetscInt b = 0; b < s->nbatch; b++) {
+    const PetscInt *node = s->batch_node + 4 * SB_BATCH * b;
+
+    for (PetscInt l = 0; l < s->batch_n[b]; l++) {
+      PetscReal r[9];
+
+      for (int k = 0; k < 9; k++) r[k] = R[9 * b + k][l];
+      for (int a = 0; a < 4; a++) {
+        const PetscInt i = node[a * SB_BATCH + l];
+
+        /* |R - Q|^2 = 6 - 2 R : Q for rotations */
+        if (i < s->nnode_owned) spread[i] = PetscMax(spread[i], 6. - 2. * SbDot9(r, node_R + 9 * i));
+      }
+    }
+  }
+}
+
+PetscErrorCode SbSpaceAverageRotations(SbSpace s, const SbLane R[], PetscReal node_R[], PetscReal spread[])
+{
+  PetscReal *sum;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscCalloc1(9 * s->nnode, &sum));
+  sum_rotations(s, R, sum);
+  for (PetscInt first = 0; first < s->nnode_owned; first += SB_BATCH) {
+    const PetscInt n = PetscMin(SB_BATCH, s->nnode_owned - first);
+    SbLane M[9], Q[9];
+
+    /* the volume around the node is the scale: SbPolar() wants numbers near one */
+    for (PetscInt l = 0; l < SB_BATCH; l++) {
+      const PetscReal *from = sum + 9 * (first + (l < n ? l : 0));
+      const PetscReal size = PetscSqrtReal(SbDot9(from, from) / 3.);
+
+      for (int k = 0; k < 9; k++) M[k][l] = size > 0. ? from[k] / size : 0.;
+    }
+    SbPolar((const SbLane *)M, Q);
+    for (PetscInt l = 0; l < n; l++) SbLaneGet(9, (const SbLane *)Q, (int)l, node_R + 9 * (first + l));
+  }
+  if (spread) find_spread(s, R, node_R, spread);
+  PetscCall(PetscFree(sum));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbSpaceNodeRotations(SbSpace s, const PetscReal u[], PetscReal R[], PetscReal spread[])
+{
+  SbLane *cells;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscMalloc1(9 * s->nbatch, &cells));
+  SbSpaceCellRotations(s, u, cells);
+  PetscCall(SbSpaceAverageRotations(s, (const SbLane *)cells, R, spread));
+  PetscCall(PetscFree(cells));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

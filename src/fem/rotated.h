@@ -1,0 +1,88 @@
+/*
+  rotated.h - what the files of the real-time solver share: rotations of cells, rows of an operator, the exactly solved nodes.
+*/
+#pragma once
+#include "fem_impl.h"
+#include "factor.h"
+
+/*
+  SbSpaceCellRotations - R[nbatch][9]: the frames of the laws, or the polar rotations of F where a law has none.
+
+  Not collective. Input: u[nnode][3] with ghosts, m; NULL: at rest.
+*/
+void SbSpaceCellRotations(SbSpace space, const PetscReal u[], SbLane R[]);
+/* As SbSpaceNodeRotations(), from rotations of cells. */
+PetscErrorCode SbSpaceAverageRotations(SbSpace space, const SbLane R[], PetscReal node_R[],
+                                       PetscReal spread[]);
+
+/* Lends the rotations of cells that a frame operator holds; NULL for another matrix. */
+PetscErrorCode SbFrameOperatorGetRotations(Mat A, const SbLane **R);
+
+/*
+  SbSpaceGetRows - rows of an operator of the space for some owned nodes.
+
+  Not collective. Input: A, frame operator, AIJ or BAIJ; n, node[n] owned local nodes. Output: ia[n+1], ja: local nodes, owned
+  ones first, both ascending; block[ia[n]][9], row-major, N/m. ja and block may be NULL to learn ia. Caller owns the arrays.
+*/
+PetscErrorCode SbSpaceGetRows(SbSpace space, Mat A, PetscInt n, const PetscInt node[], PetscInt ia[],
+                              PetscInt ja[], PetscReal block[]);
+/* The part of it that a frame operator does. */
+PetscErrorCode SbFrameOperatorAddRows(Mat A, PetscInt n, const PetscInt node[], const PetscInt ia[],
+                                      PetscReal block[]);
+
+/* ------------------------------------------------------------------ nodes between the parts of several ranks */
+
+/*
+  The interface: nodes of a rank that touch a node of a lower rank. Without them the parts of the ranks are not coupled. Their
+  Schur complement is inverted densely; each rank keeps some rows of the inverse.
+*/
+typedef struct _p_SbInterface *SbInterface;
+struct _p_SbInterface {
+  MPI_Comm comm;
+  PetscInt n;                    /* nodes of all ranks */
+  PetscInt *index;               /* [nnode] number among them of a local node, -1 for others */
+  PetscInt nmine;                /* owned by this rank */
+  PetscInt *mine;                /* [nmine] local nodes */
+  PetscInt row0, nrow;           /* rows of the inverse here, unknowns */
+  float *inverse;                /* [nrow][3 n] */
+  float *sum;                    /* [3 n] work */
+  PetscMPIInt *counts, *offsets; /* [size] rows of each rank */
+};
+
+/* Finds the interface. Collective. Fully prescribed nodes are left out. Errors: PETSC_ERR_USER when it is too large. */
+PetscErrorCode SbInterfaceCreate(SbSpace space, SbInterface *face);
+PetscErrorCode SbInterfaceDestroy(SbInterface *face);
+/* Inverts. schur[(3 n)^2], column-major, lower triangle: this rank's contributions; destroyed. Collective. */
+PetscErrorCode SbInterfaceInvert(SbInterface face, PetscReal schur[], PetscBool *ok);
+/* x[3 n] <- inverse times the sum of x over ranks. Collective. */
+PetscErrorCode SbInterfaceSolve(SbInterface face, float x[]);
+
+/* ------------------------------------------------------------------ nodes solved exactly */
+
+/*
+  Where cells around a node are turned very differently (creases, inverted cells) no rotation of the node is right, and a few
+  such nodes spoil the whole iteration. They are solved exactly: with B = A_BB^-1 on them the preconditioner is
+  B + (1 - B A) P (1 - A B), symmetric and positive definite for any P that is.
+*/
+typedef struct {
+  PetscInt n;         /* how many */
+  PetscInt *node;     /* [n] owned local nodes */
+  PetscInt *index;    /* [nnode_owned] position in node, -1 for others */
+  PetscInt *ia, *ja;  /* rows of the operator */
+  PetscReal *block;   /* [ia[n]][9] */
+  float *value;       /* [ia[n]][9] the same */
+  PetscInt *ka, *kja; /* graph among the nodes themselves */
+  PetscReal *kblock;
+  float *x, *y; /* [n][3] */
+  SbFactor factor;
+} SbExactNodes;
+
+PetscErrorCode SbExactNodesCreate(SbSpace space, SbExactNodes *e);
+PetscErrorCode SbExactNodesDestroy(SbExactNodes *e);
+/* Chooses the free nodes whose spread exceeds `limit` (raised while they are too many) and whose row is local, and factors. */
+PetscErrorCode SbExactNodesSetUp(SbExactNodes *e, SbSpace space, Mat A, const PetscReal spread[],
+                                 PetscReal limit);
+/* y = B r on the nodes, r -= A B r, in place on r[nnode_owned][3]; to be called before P. */
+void SbExactNodesBefore(SbExactNodes *e, float r[]);
+/* z += B (r - A (z + y)) + y after z = P r; r is the residual from before. */
+void SbExactNodesAfter(SbExactNodes *e, const float r[], float z[]);
