@@ -81,7 +81,7 @@ static PetscErrorCode supple(int argc, char *argv[])
   SbCommand command;
   SbModel model = NULL;
   SbRun run = NULL;
-  PetscBool answered;
+  PetscBool answered, left;
   PetscInt unused;
 
   PetscFunctionBeginUser;
@@ -91,6 +91,8 @@ static PetscErrorCode supple(int argc, char *argv[])
   (void)signal(SIGPIPE, SIG_IGN); /* a terminal that is gone must not end a run that writes files */
   PetscCheck(!command.problem[0], PETSC_COMM_SELF, PETSC_ERR_USER, "%s", command.problem);
   PetscCall(SbOptionsRemember());
+  PetscCall(PetscOptionsHasName(NULL, NULL, "-options_left", &left));
+  if (!left) PetscCall(PetscOptionsSetValue(NULL, "-options_left", "no")); /* SbOptionsUnused() says it */
   PetscCall(SbRegisterAll());
   PetscCall(SbErrorSetFromOptions());
 

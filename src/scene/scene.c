@@ -106,7 +106,12 @@ PetscErrorCode SbSceneReadNames(const char *key, const char *what, PetscInt *n, 
 
 /* ------------------------------------------------------------------ bodies */
 
-/* "linear, corotated, ..." and the near ones, for messages. */
+static int compare_names(const void *a, const void *b)
+{
+  return strcmp(*(const char *const *)a, *(const char *const *)b);
+}
+
+/* "corotated, linear, ..." and the near ones, for messages. */
 static PetscErrorCode describe_list(PetscFunctionList list, const char *word, size_t size, char all[],
                                     char near[])
 {
@@ -115,9 +120,11 @@ static PetscErrorCode describe_list(PetscFunctionList list, const char *word, si
 
   PetscFunctionBeginUser;
   PetscCall(PetscFunctionListGet(list, &names, &n));
+  /* PETSc 3.18 counts the closing NULL; newer releases have no order of their own */
+  while (n && !names[n - 1]) n--;
+  qsort(names, (size_t)n, sizeof(*names), compare_names);
   all[0] = 0;
-  /* PETSc 3.18 counts the closing NULL */
-  for (int i = 0; i < n && names[i]; i++) {
+  for (int i = 0; i < n; i++) {
     PetscCall(PetscStrlcat(all, i ? ", " : "", size));
     PetscCall(PetscStrlcat(all, names[i], size));
   }

@@ -201,7 +201,7 @@ static PetscErrorCode test_values(void)
   PetscFunctionBeginUser;
   PetscCall(refused("-bodies liver", "-body_liver_mesh must be given: tetrahedral mesh"));
   PetscCall(refused("-bodies liver -body_liver_mesh box:1,1,1:2",
-                    "-body_liver_material must be given: one of linear, corotated, stvk, neohookean"));
+                    "-body_liver_material must be given: one of corotated, linear, neohookean, stvk"));
   PetscCall(refused(LIVER " -body_liver_material corotate",
                     "-body_liver_material corotate is not one of linear, "
                     "corotated, stvk, neohookean; did you mean corotated?"));
