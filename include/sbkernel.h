@@ -119,7 +119,7 @@ void SbPolar(const SbLane F[9], SbLane R[9]);
 /*
   SbSymEig - eigenvalues s[3] and eigenvectors V (columns, det V = +1) of symmetric matrices S[6] = 00 01 02 11 12 22.
 
-  Not collective. Fixed number of Jacobi sweeps, no order among the eigenvalues. With R from SbPolar() and S = R^T F this
+  Not collective. Right to rounding of the largest entry; no order among the eigenvalues. With R from SbPolar() and S = R^T F this
   is the singular value decomposition F = (R V) diag(s) V^T with two rotations, the sign of det F being in s.
 */
 void SbSymEig(const SbLane S[6], SbLane s[3], SbLane V[9]);
