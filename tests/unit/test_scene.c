@@ -203,8 +203,8 @@ static PetscErrorCode test_values(void)
   PetscCall(refused("-bodies liver -body_liver_mesh box:1,1,1:2",
                     "-body_liver_material must be given: one of corotated, linear, neohookean, stvk"));
   PetscCall(refused(LIVER " -body_liver_material corotate",
-                    "-body_liver_material corotate is not one of linear, "
-                    "corotated, stvk, neohookean; did you mean corotated?"));
+                    "-body_liver_material corotate is not one of corotated, "
+                    "linear, neohookean, stvk; did you mean corotated?"));
   PetscCall(
     refused(LIVER " -body_liver_element p2", "-body_liver_element p2 is not one of p1; did you mean p1?"));
   PetscCall(refused(LIVER " -body_liver_scale 0",
