@@ -3,7 +3,8 @@
   everything stays adjustable by PETSc's own options; the matrix type is what the row's preconditioner takes.
 
   Convergence is judged by the true residual: the preconditioned norm can be off by orders of magnitude for nearly
-  incompressible bodies. A solve that does not reach its tolerance fails; the step is then cut or the run stops.
+  incompressible bodies. Gauss-Seidel and SOR are wrapped in a PCCOMPOSITE of one: Richardson hands its whole loop to a bare
+  PCSOR, which does the largest number of sweeps without looking at the residual. A solve that does not reach its tolerance fails; the step is then cut or the run stops.
 */
 #include "sbsolver.h"
 
@@ -15,8 +16,8 @@ static const SbSolverPreset presets[] = {
   {"cg_ssor", SB_MATRIX_AIJ, "-ksp_type cg -pc_type sor -pc_sor_local_symmetric", "CG, symmetric Gauss-Seidel on each rank"},
   {"cg_gamg", SB_MATRIX_AIJ, "-ksp_type cg -pc_type gamg", "CG, algebraic multigrid with the rigid-body modes of each body"},
   {"cg_hypre", SB_MATRIX_AIJ, "-ksp_type cg -pc_type hypre -pc_hypre_type boomeramg -pc_hypre_boomeramg_strong_threshold 0.5", "CG, BoomerAMG of hypre"},
-  {"gauss_seidel", SB_MATRIX_AIJ, "-ksp_type richardson -pc_type sor -pc_sor_omega 1 -ksp_max_it 100000", "Gauss-Seidel iteration (between ranks: block Jacobi)"},
-  {"sor", SB_MATRIX_AIJ, "-ksp_type richardson -pc_type sor -pc_sor_omega 1.6 -ksp_max_it 100000", "successive over-relaxation, omega 1.6 (between ranks: block Jacobi)"},
+  {"gauss_seidel", SB_MATRIX_AIJ, "-ksp_type richardson -pc_type composite -pc_composite_pcs sor -sub_0_pc_sor_omega 1 -ksp_max_it 100000", "Gauss-Seidel iteration (between ranks: block Jacobi)"},
+  {"sor", SB_MATRIX_AIJ, "-ksp_type richardson -pc_type composite -pc_composite_pcs sor -sub_0_pc_sor_omega 1.6 -ksp_max_it 100000", "successive over-relaxation, omega 1.6 (between ranks: block Jacobi)"},
   {"cholmod", SB_MATRIX_AIJ, "-ksp_type cg -pc_type cholesky -pc_factor_mat_solver_type cholmod", "sparse Cholesky of SuiteSparse; one rank"},
   {"mumps", SB_MATRIX_AIJ, "-ksp_type cg -pc_type cholesky -pc_factor_mat_solver_type mumps", "sparse factorisation of MUMPS on any number of ranks"},
 };

@@ -1,0 +1,54 @@
+// @ranks 1 2
+/* Every row of the solver table solves the same linear bar; the choice by `auto` has a reason; a solve at its limit fails. */
+#include "../scene.h"
+
+#define BAR \
+  "-bodies bar -body_bar_mesh box:0.3,0.1,0.1:3 -body_bar_material linear -body_bar_young 1e4 -body_bar_poisson 0.3 -body_bar_density 1000 " \
+  "-effects gravity,clamp -effect_clamp_type support -effect_clamp_on xmin -time static -ksp_rtol 1e-10 "
+
+static PetscErrorCode tip(const char *options, PetscReal *z, char stop[512], PetscInt *iterations)
+{
+  const PetscReal at[3] = {0.3, 0.1, 0.1};
+  PetscReal       value[3];
+  char            text[1024];
+  TestScene       t;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscSNPrintf(text, sizeof(text), BAR "%s", options));
+  PetscCall(test_scene_open(text, &t));
+  SB_CHECK(t.run->solver_reason[0], "no reason for the solver %s", t.run->solver);
+  PetscCall(SbRunSolve(t.run));
+  PetscCall(test_value_at(t.model, t.run->U, at, value));
+  PetscCall(PetscStrncpy(stop, t.run->stop_reason, 512));
+  *z          = value[2];
+  *iterations = t.run->linear_total;
+  PetscCall(test_scene_close(&t));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+int main(int argc, char **argv)
+{
+  static const char *const solvers[] = {"auto", "cg", "cg_jacobi", "cg_pbjacobi", "cg_icc", "cg_ssor", "cg_gamg", "cg_hypre", "gauss_seidel", "sor", "cholmod"};
+  PetscReal                z, exact;
+  PetscInt                 iterations;
+  PetscMPIInt              size;
+  char                     stop[512], text[128];
+
+  SB_TEST_BEGIN(argc, argv);
+  PetscCallMPI(MPI_Comm_size(PETSC_COMM_WORLD, &size));
+  PetscCall(tip("-solver mumps", &exact, stop, &iterations));
+  SB_CHECK(exact < -1e-3 && !stop[0], "mumps: tip at %g, %s", (double)exact, stop);
+  for (size_t k = 0; k < PETSC_STATIC_ARRAY_LENGTH(solvers); k++) {
+    if (size > 1 && !strcmp(solvers[k], "cholmod")) continue;
+    PetscCall(PetscSNPrintf(text, sizeof(text), "-solver %s", solvers[k]));
+    PetscCall(tip(text, &z, stop, &iterations));
+    SB_CHECK(!stop[0], "%s: %s", solvers[k], stop);
+    /* residual 1e-10; the condition number of this bar is about 1e4 */
+    SB_CHECK_NEAR(z, exact, 1e-6 * PetscAbsReal(exact), solvers[k]);
+    PetscCall(PetscPrintf(PETSC_COMM_WORLD, "%-14s %" PetscInt_FMT " iterations\n", solvers[k], iterations));
+  }
+  PetscCall(tip("-solver cg_jacobi -ksp_max_it 3 -time_max_cuts 2", &z, stop, &iterations));
+  SB_CHECK(stop[0], "three iterations passed as a solution");
+  SB_CHECK(strstr(stop, "DIVERGED_ITS"), "the reason does not name the limit: %s", stop);
+  SB_TEST_END();
+}
