@@ -50,5 +50,11 @@ void SbCellForce(const SbLane g[9], const SbLane V, const SbLane P[9], SbLane f[
 */
 void SbCellBlocksIsotropic(const SbLane g[9], const SbLane V, PetscReal lambda, PetscReal mu,
                            const SbLane R[9], SbLane K[10][9]);
+/*
+  The same for the tangent that SbMaterialOps.spin describes, R and symmetric W (Pa) from there:
+  K_ab = V (2 mu (h_a . h_b) I + lambda h_a h_b^T + [h_a]x R W R^T [h_b]x^T).
+*/
+void SbCellBlocksSpin(const SbLane g[9], const SbLane V, PetscReal lambda, PetscReal mu, const SbLane R[9],
+                      const SbLane W[9], SbLane K[10][9]);
 /* The same for a full tangent C, symmetric in the pairs: K_ab,ik = V C_(ij)(kl) grad phi_a,j grad phi_b,l. */
 void SbCellBlocksGeneral(const SbLane g[9], const SbLane V, const SbLane C[81], SbLane K[10][9]);

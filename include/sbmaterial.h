@@ -31,6 +31,10 @@ typedef struct {
   /* The tangent is the isotropic Hooke tensor (lambda, mu) turned by R: fills R. NULL when the law needs the full tangent.
      Co-rotated has it with the warped tangent, linear always (R = I). */
   void (*frame)(const struct _p_SbMaterial *m, const SbLane F[9], SbLane R[9]);
+  /* The tangent is dP = 2 mu dF + lambda (R : dF) R + R [W y]x with y = axial(R^T dF - dF^T R), what a law of R^T F has:
+     fills R and the symmetric W (Pa), for SbCellBlocksSpin(), which is cheaper than the full tangent. W = -mu I is Hooke's
+     tensor turned by R. NULL when the law is not of this kind. Co-rotated has it with its exact tangents. */
+  void (*spin)(const struct _p_SbMaterial *m, const SbLane F[9], SbLane R[9], SbLane W[9]);
   /* C[9*(3*i+j) + 3*k+l] = dP_ij/dF_kl, Pa; symmetric in the pairs to the last bit */
   void (*tangent)(const struct _p_SbMaterial *m, const SbLane F[9], SbLane C[81]);
   PetscErrorCode (*destroy)(SbMaterial m);

@@ -6,7 +6,8 @@
 
     K_ab = V (lambda h_a h_b^T + mu h_b h_a^T + mu (h_a . h_b) I),
 
-  which needs no triple product. g_0 = -(g_1 + g_2 + g_3): only nodes 1..3 are computed, and since K_ba = K_ab^T only six
+  which needs no triple product. The term of a changing rotation, dP = R [W y]x with y = axial(R^T dF - dF^T R), adds
+  V [h_a]x R W R^T [h_b]x^T; since [a]x [b]x^T = (a . b) I - b a^T, W = -mu I turns 2 mu dF into Hooke's mu terms. g_0 = -(g_1 + g_2 + g_3): only nodes 1..3 are computed, and since K_ba = K_ab^T only six
   blocks of them; the blocks of node 0 are minus sums. So a translation of the cell gives no force, to rounding.
 */
 #include <sbelement.h>
@@ -137,6 +138,77 @@ SB_KERNEL void SbCellBlocksIsotropic(const SbLane g[restrict 9], const PetscReal
     diagonal_block(lv, mv, h + 3, K22);
     coupling_block(lv, mv, h + 3, h + 6, K23);
     diagonal_block(lv, mv, h + 6, K33);
+    SbLanePut(9, K11, l, K[4]);
+    SbLanePut(9, K12, l, K[5]);
+    SbLanePut(9, K13, l, K[6]);
+    SbLanePut(9, K22, l, K[7]);
+    SbLanePut(9, K23, l, K[8]);
+    SbLanePut(9, K33, l, K[9]);
+    node0_blocks(K11, K12, K13, K22, K23, K33, l, K);
+  }
+}
+
+/* Rows t_i = h x (columns of W), the matrix [h]x W. */
+SB_INLINE void cross_columns(const PetscReal h[3], const PetscReal W[9], PetscReal T[9])
+{
+  for (int n = 0; n < 3; n++) {
+    T[n] = h[1] * W[6 + n] - h[2] * W[3 + n];
+    T[3 + n] = h[2] * W[n] - h[0] * W[6 + n];
+    T[6 + n] = h[0] * W[3 + n] - h[1] * W[n];
+  }
+}
+
+/* K = 2 mu (ha . hb) I + lambda ha hb^T + T [hb]x^T with T = [ha]x W; lv = lambda V, mv = mu V, T holds V already. */
+SB_INLINE void spin_block(PetscReal lv, PetscReal mv, const PetscReal ha[3], const PetscReal T[9],
+                          const PetscReal hb[3], PetscReal K[9])
+{
+  const PetscReal d = 2 * mv * SbDot3(ha, hb);
+
+  for (int i = 0; i < 3; i++) {
+    const PetscReal x = lv * ha[i], *t = T + 3 * i;
+
+    K[3 * i] = x * hb[0] + (hb[1] * t[2] - hb[2] * t[1]);
+    K[3 * i + 1] = x * hb[1] + (hb[2] * t[0] - hb[0] * t[2]);
+    K[3 * i + 2] = x * hb[2] + (hb[0] * t[1] - hb[1] * t[0]);
+    K[3 * i + i] += d;
+  }
+}
+
+SB_INLINE void copy_upper(PetscReal K[9])
+{
+  K[3] = K[1];
+  K[6] = K[2];
+  K[7] = K[5];
+}
+
+SB_KERNEL void SbCellBlocksSpin(const SbLane g[restrict 9], const PetscReal V[restrict SB_BATCH],
+                                PetscReal lambda, PetscReal mu, const SbLane R[restrict 9],
+                                const SbLane W[restrict 9], SbLane K[restrict 10][9])
+{
+  for (int l = 0; l < SB_BATCH; l++) {
+    const PetscReal lv = lambda * V[l], mv = mu * V[l];
+    PetscReal r[9], e[9], h[9], w[9], x[9], T1[9], T2[9], T3[9], K11[9], K12[9], K13[9], K22[9], K23[9],
+      K33[9];
+
+    SbLaneGet(9, R, l, r);
+    SbLaneGet(9, g, l, e);
+    SbLaneGet(9, W, l, w);
+    for (int k = 0; k < 9; k++) w[k] *= V[l];
+    SbMatMulTranspose(e, r, h); /* row a = R g_a */
+    SbMatMul(r, w, x);
+    SbMatMulTranspose(x, r, w);
+    cross_columns(h, w, T1);
+    cross_columns(h + 3, w, T2);
+    cross_columns(h + 6, w, T3);
+    spin_block(lv, mv, h, T1, h, K11);
+    spin_block(lv, mv, h, T1, h + 3, K12);
+    spin_block(lv, mv, h, T1, h + 6, K13);
+    spin_block(lv, mv, h + 3, T2, h + 3, K22);
+    spin_block(lv, mv, h + 3, T2, h + 6, K23);
+    spin_block(lv, mv, h + 6, T3, h + 6, K33);
+    copy_upper(K11);
+    copy_upper(K22);
+    copy_upper(K33);
     SbLanePut(9, K11, l, K[4]);
     SbLanePut(9, K12, l, K[5]);
     SbLanePut(9, K13, l, K[6]);

@@ -163,9 +163,9 @@ SB_KERNEL static void add_modes(const struct _p_SbMaterial *m, const SbLane R[re
   }
 }
 
-static void tangent_corotated(const struct _p_SbMaterial *m, const SbLane F[9], SbLane C[81])
+static void spin_corotated(const struct _p_SbMaterial *m, const SbLane F[9], SbLane R[9], SbLane W[9])
 {
-  SbLane R[9], S[6], W[9], kappa;
+  SbLane S[6], kappa;
 
   SbPolar(F, R);
   stretch(m, F, (const SbLane *)R, S, kappa);
@@ -173,6 +173,13 @@ static void tangent_corotated(const struct _p_SbMaterial *m, const SbLane F[9], 
     twist_spd(m->mu, (const SbLane *)S, kappa, W);
   else
     twist_exact((const SbLane *)S, kappa, W);
+}
+
+static void tangent_corotated(const struct _p_SbMaterial *m, const SbLane F[9], SbLane C[81])
+{
+  SbLane R[9], W[9];
+
+  spin_corotated(m, F, R, W);
   add_modes(m, (const SbLane *)R, (const SbLane *)W, C);
 }
 
@@ -181,6 +188,7 @@ static PetscErrorCode settangent_corotated(SbMaterial m, SbTangentKind kind)
   PetscFunctionBeginUser;
   m->tangent = kind;
   m->ops.frame = kind == SB_TANGENT_WARPED ? frame_corotated : NULL;
+  m->ops.spin = kind == SB_TANGENT_WARPED ? NULL : spin_corotated;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

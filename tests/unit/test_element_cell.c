@@ -165,13 +165,13 @@ static void check_block_sums(const SbLane K[10][9], PetscReal scale)
   }
 }
 
-/* Exact tangents: blocks against central differences of the force. */
-static PetscErrorCode test_blocks(SbElement e, SbMaterial m)
+/* Exact tangents: blocks against central differences of the force. exact_spd: the special form against the general. */
+static PetscErrorCode test_blocks(SbElement e, SbMaterial m, SbTangentKind kind)
 {
   const PetscReal size = 0.01, h = 1e-5 * size;
 
   PetscFunctionBeginUser;
-  if (!m->linear) PetscCall(SbMaterialSetTangent(m, SB_TANGENT_EXACT));
+  if (!m->linear) PetscCall(SbMaterialSetTangent(m, kind));
   for (int t = 0; t < 10; t++) {
     Cells c;
     SbLane A[9], u[12], F[9], C[81], K[10][9], J[10][9], plus[12], minus[12];
@@ -182,7 +182,7 @@ static PetscErrorCode test_blocks(SbElement e, SbMaterial m)
     m->ops.tangent(m, (const SbLane *)F, C);
     SbCellBlocksGeneral((const SbLane *)c.g, c.V, (const SbLane *)C, K);
     check_block_sums((const SbLane(*)[9])K, (m->E + m->lambda) * size);
-    for (int column = 0; column < 12; column++) {
+    for (int column = 0; kind == SB_TANGENT_EXACT && column < 12; column++) {
       for (int l = 0; l < SB_BATCH; l++) u[column][l] += h;
       force_of(m, &c, (const SbLane *)u, plus);
       for (int l = 0; l < SB_BATCH; l++) u[column][l] -= 2 * h;
@@ -193,6 +193,19 @@ static PetscErrorCode test_blocks(SbElement e, SbMaterial m)
           SB_CHECK_NEAR(entry((const SbLane(*)[9])K, row, column, l),
                         (plus[row][l] - minus[row][l]) / (2 * h), 1e-7 * m->E * size, "block against force");
         }
+      }
+    }
+    if (m->ops.spin) {
+      SbLane R[9], W[9];
+
+      m->ops.spin(m, (const SbLane *)F, R, W);
+      SbCellBlocksSpin((const SbLane *)c.g, c.V, m->lambda, m->mu, (const SbLane *)R, (const SbLane *)W, J);
+      check_block_sums((const SbLane(*)[9])J, (m->E + m->lambda) * size);
+      for (int p = 0; p < 10; p++) {
+        SB_CHECK(lane_difference(9, (const SbLane *)J[p], (const SbLane *)K[p]) <
+                   1e-13 * (m->E + m->lambda) * size,
+                 "block %d from the spin is %g from the general one", p,
+                 lane_difference(9, (const SbLane *)J[p], (const SbLane *)K[p]));
       }
     }
     if (m->linear) {
@@ -217,7 +230,7 @@ static PetscErrorCode test_warped(SbElement e, SbMaterial m)
   PetscCall(SbMaterialSetTangent(m, SB_TANGENT_WARPED));
   for (int t = 0; t < 50; t++) {
     Cells c;
-    SbLane A[9], u[12], v[12], F[9], R[9], H[9], dP[9], f[12], K[10][9];
+    SbLane A[9], u[12], v[12], F[9], R[9], H[9], W[9], dP[9], f[12], K[10][9], J[10][9];
 
     make_cells(e, size, &c);
     random_state(&c, 0.6, A, u);
@@ -227,6 +240,15 @@ static PetscErrorCode test_warped(SbElement e, SbMaterial m)
     SbCellGradient((const SbLane *)c.g, (const SbLane *)u, F);
     m->ops.frame(m, (const SbLane *)F, R);
     SbCellBlocksIsotropic((const SbLane *)c.g, c.V, m->lambda, m->mu, (const SbLane *)R, K);
+    for (int k = 0; k < 9; k++) {
+      for (int l = 0; l < SB_BATCH; l++) W[k][l] = k % 4 == 0 ? -m->mu : 0;
+    }
+    SbCellBlocksSpin((const SbLane *)c.g, c.V, m->lambda, m->mu, (const SbLane *)R, (const SbLane *)W, J);
+    for (int p = 0; p < 10; p++) {
+      SB_CHECK(lane_difference(9, (const SbLane *)J[p], (const SbLane *)K[p]) <
+                 1e-14 * (m->E + m->lambda) * size,
+               "block %d with W = -mu I is not Hooke's", p);
+    }
     check_block_sums((const SbLane(*)[9])K, (m->E + m->lambda) * size);
     SbCellGradientRate((const SbLane *)c.g, (const SbLane *)v, H);
     SbMaterialDampingStress(m, (const SbLane *)F, (const SbLane *)H, dP);
@@ -330,7 +352,7 @@ static void test_patch(SbElement e, SbMaterial m)
 static void test_lanes(SbElement e)
 {
   Cells c;
-  SbLane u[12], R[9], C[81], F[9], f[12], K[10][9], J[10][9];
+  SbLane u[12], R[9], C[81], F[9], f[12], K[10][9], J[10][9], S[10][9];
   PetscInt different = 0;
 
   make_cells(e, 1, &c);
@@ -346,11 +368,13 @@ static void test_lanes(SbElement e)
   SbCellForce((const SbLane *)c.g, c.V, (const SbLane *)F, f);
   SbCellBlocksIsotropic((const SbLane *)c.g, c.V, 3, 2, (const SbLane *)R, K);
   SbCellBlocksGeneral((const SbLane *)c.g, c.V, (const SbLane *)C, J);
+  SbCellBlocksSpin((const SbLane *)c.g, c.V, 3, 2, (const SbLane *)R, (const SbLane *)C, S);
   for (int l = 2; l < SB_BATCH; l += 2) {
     for (int k = 0; k < 9; k++) different += F[k][l] != F[k][0];
     for (int k = 0; k < 12; k++) different += f[k][l] != f[k][0];
     for (int k = 0; k < 90; k++)
-      different += K[k / 9][k % 9][l] != K[k / 9][k % 9][0] || J[k / 9][k % 9][l] != J[k / 9][k % 9][0];
+      different += K[k / 9][k % 9][l] != K[k / 9][k % 9][0] || J[k / 9][k % 9][l] != J[k / 9][k % 9][0] ||
+                   S[k / 9][k % 9][l] != S[k / 9][k % 9][0];
   }
   SB_CHECK(!different, "%d numbers depend on their neighbours", (int)different);
 }
@@ -372,7 +396,8 @@ int main(int argc, char **argv)
 
     PetscCall(SbMaterialCreateElastic(laws[k], 2e4, 0.35, 1000, &m));
     test_force(e, m);
-    PetscCall(test_blocks(e, m));
+    PetscCall(test_blocks(e, m, SB_TANGENT_EXACT));
+    PetscCall(test_blocks(e, m, SB_TANGENT_EXACT_SPD));
     test_patch(e, m);
     if (!m->linear) test_rotation(e, m);
     if (k == 1) PetscCall(test_warped(e, m));
