@@ -36,6 +36,7 @@ static PetscBool of_options(const char *function)
 {
   return (PetscBool)(function && (!strncmp(function, "PetscOptionsInsert", 18) ||
                                   !strncmp(function, "PetscOptionsStringTo", 20) ||
+                                  !strncmp(function, "PetscOptionsSetValue", 20) ||
                                   !strcmp(function, "PetscParseLayerYAML")));
 }
 
