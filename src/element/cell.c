@@ -7,8 +7,10 @@
     K_ab = V (lambda h_a h_b^T + mu h_b h_a^T + mu (h_a . h_b) I),
 
   which needs no triple product. The term of a changing rotation, dP = R [W y]x with y = axial(R^T dF - dF^T R), adds
-  V [h_a]x R W R^T [h_b]x^T; since [a]x [b]x^T = (a . b) I - b a^T, W = -mu I turns 2 mu dF into Hooke's mu terms. g_0 = -(g_1 + g_2 + g_3): only nodes 1..3 are computed, and since K_ba = K_ab^T only six
-  blocks of them; the blocks of node 0 are minus sums. So a translation of the cell gives no force, to rounding.
+  V [h_a]x R W R^T [h_b]x^T; since [a]x [b]x^T = (a . b) I - b a^T, W = -mu I turns 2 mu dF into Hooke's mu terms.
+
+  g_0 = -(g_1 + g_2 + g_3): only nodes 1..3 are computed, and since K_ba = K_ab^T only six blocks of them; the blocks of
+  node 0 are minus sums. So a translation of the cell gives no force, to rounding.
 */
 #include <sbelement.h>
 

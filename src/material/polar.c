@@ -9,19 +9,20 @@
 
   Fast path, all lanes at once and without branches, after Higham and Noferini ("An algorithm to compute the polar
   decomposition of a 3x3 matrix", 2016), with the adjugate in the place of a factorisation:
-    1. lambda is the largest root of  p(x) = x^4 - 2 a x^2 - 8 d x + a^2 - 4 b,  a = |F|^2, d = det F, b = |cof F|^2.
-       Newton's method from the upper bound sqrt(3 a) falls monotonically onto it. For F = I the bound is the root.
+    1. lambda is the largest root of  p(x) = x^4 - 2 a x^2 - 8 d x + a^2 - 4 b,  a = |F|^2, d = det F, b = |cof F|^2. All
+       four roots are real: Laguerre's method falls monotonically onto it from the upper bound sqrt(3 a), in the end with
+       order three. For F = I the bound is the root.
     2. adj(lambda I - N) is q q^T times p'(lambda) up to the error of lambda: its column with the largest diagonal entry
        is one step of inverse iteration, multiplying by it once more is another.
-  A lane is trusted when the gap is not small (p' = 8 (s1+s2)(s2+s3)(s3+s1) against lambda^3) and the last Newton step was
-  so short that both steps together leave less than rounding. Other lanes go one by one to the robust path: Jacobi's
-  method on N, which is right to rounding for any symmetric matrix.
+  A lane is trusted when the gap is not small (p' = 8 (s1+s2)(s2+s3)(s3+s1) against lambda^3) and the last step towards
+  the root was so short that both steps together leave less than rounding. Other lanes go one by one to the robust path:
+  Jacobi's method on N, which is right to rounding for any symmetric matrix.
 */
 #include <sbkernel.h>
 
 #define ROOT_STEPS 3
 #define SMALLEST_GAP 1e-3 /* of p'(lambda) / (4 lambda^3), at most 16/27 */
-#define LAST_STEP 1e-3    /* of the last Newton step, relative to the gap */
+#define LAST_STEP 1e-3    /* of the last step towards the root, relative to the gap */
 
 /* N[10] = 00 01 02 03 11 12 13 22 23 33 with q^T N q = R(q) : F, q = (w, x, y, z). */
 SB_INLINE void davenport(const PetscReal F[9], PetscReal N[10])
@@ -79,10 +80,25 @@ SB_INLINE void adjugate4(const PetscReal M[10], PetscReal A[10])
   A[9] = M[2] * t3 - M[5] * t1 + M[7] * t0;
 }
 
-/* Fast path of one lane. Returns a positive number when the result is to be trusted (a NaN is not positive). */
+/* The column of a positive semi-definite A (00 01 02 03 11 12 13 22 23 33) that holds its largest diagonal entry. */
+SB_INLINE void largest_column(const PetscReal A[10], PetscReal q[4])
+{
+  const PetscReal c1[4] = {A[1], A[4], A[5], A[6]}, c2[4] = {A[2], A[5], A[7], A[8]},
+                  c3[4] = {A[3], A[6], A[8], A[9]};
+  PetscReal best = A[0];
+
+  for (int k = 0; k < 4; k++) q[k] = A[k];
+  for (int k = 0; k < 4; k++) q[k] = A[4] > best ? c1[k] : q[k];
+  best = A[4] > best ? A[4] : best;
+  for (int k = 0; k < 4; k++) q[k] = A[7] > best ? c2[k] : q[k];
+  best = A[7] > best ? A[7] : best;
+  for (int k = 0; k < 4; k++) q[k] = A[9] > best ? c3[k] : q[k];
+}
+
+/* Fast path of one lane. Returns 1 when the result is to be trusted, else 0; a NaN is not trusted. */
 SB_INLINE PetscReal polar_fast(const PetscReal F[9], PetscReal R[9])
 {
-  PetscReal cof[9], N[10], A[10], q[4], p[4], best, step = 0, slope = 0;
+  PetscReal cof[9], N[10], A[10], q[4], p[4], step = 0, slope = 0;
 
   /* Largest root of the characteristic polynomial. */
   SbMatCofactor(F, cof);
@@ -104,18 +120,7 @@ SB_INLINE PetscReal polar_fast(const PetscReal F[9], PetscReal R[9])
   N[7] += x;
   N[9] += x;
   adjugate4(N, A);
-  best = A[0];
-  for (int k = 0; k < 4; k++) q[k] = A[k];
-  {
-    const PetscReal c1[4] = {A[1], A[4], A[5], A[6]}, c2[4] = {A[2], A[5], A[7], A[8]},
-                    c3[4] = {A[3], A[6], A[8], A[9]};
-
-    for (int k = 0; k < 4; k++) q[k] = A[4] > best ? c1[k] : q[k];
-    best = A[4] > best ? A[4] : best;
-    for (int k = 0; k < 4; k++) q[k] = A[7] > best ? c2[k] : q[k];
-    best = A[7] > best ? A[7] : best;
-    for (int k = 0; k < 4; k++) q[k] = A[9] > best ? c3[k] : q[k];
-  }
+  largest_column(A, q);
   p[0] = A[0] * q[0] + A[1] * q[1] + A[2] * q[2] + A[3] * q[3];
   p[1] = A[1] * q[0] + A[4] * q[1] + A[5] * q[2] + A[6] * q[3];
   p[2] = A[2] * q[0] + A[5] * q[1] + A[7] * q[2] + A[8] * q[3];
