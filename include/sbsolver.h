@@ -8,7 +8,9 @@
 typedef struct _SbSolverPreset {
   const char  *name;
   SbMatrixKind matrix;      /* on several ranks SBAIJ becomes BAIJ */
+  PetscBool    matrix_free; /* a frame operator in place of the matrix */
   const char  *options;     /* "-ksp_type cg -pc_type gamg ..." */
+  PetscErrorCode (*precondition)(SbSpace space, PC pc); /* a preconditioner of our own; NULL: by the options */
   const char  *help;
 } SbSolverPreset;
 
@@ -27,3 +29,5 @@ PetscErrorCode SbSolverChoose(SbSpace space, PetscBool dynamic, PetscBool linear
 PetscErrorCode SbSolverFallBack(SNES snes, PetscBool *changed);
 /* Gives the linear solver of `snes` the preset's options and tolerances; before SNESSetFromOptions(). Collective. */
 PetscErrorCode SbSolverSetUp(SNES snes, SbSpace space, const SbSolverPreset *preset);
+/* The operator that the preset works on. Collective; caller destroys. */
+PetscErrorCode SbSolverCreateOperator(SbSpace space, const SbSolverPreset *preset, Mat *A);

@@ -9,21 +9,23 @@
 #include "sbsolver.h"
 
 static const SbSolverPreset presets[] = {
-  {"cg", SB_MATRIX_BAIJ, "-ksp_type cg -pc_type none", "conjugate gradients without preconditioner"},
-  {"cg_jacobi", SB_MATRIX_BAIJ, "-ksp_type cg -pc_type jacobi", "CG, diagonal preconditioner"},
-  {"cg_pbjacobi", SB_MATRIX_BAIJ, "-ksp_type cg -pc_type pbjacobi", "CG, 3x3 diagonal blocks"},
-  {"cg_icc", SB_MATRIX_SBAIJ, "-ksp_type cg -pc_type bjacobi -sub_pc_type icc -sub_pc_factor_shift_type positive_definite", "CG, incomplete Cholesky on each rank"},
-  {"cg_ssor", SB_MATRIX_AIJ, "-ksp_type cg -pc_type sor -pc_sor_local_symmetric", "CG, symmetric Gauss-Seidel on each rank"},
-  {"cg_gamg", SB_MATRIX_AIJ, "-ksp_type cg -pc_type gamg", "CG, algebraic multigrid with the rigid-body modes of each body"},
-  {"cg_hypre", SB_MATRIX_AIJ, "-ksp_type cg -pc_type hypre -pc_hypre_type boomeramg -pc_hypre_boomeramg_strong_threshold 0.5", "CG, BoomerAMG of hypre"},
-  {"gauss_seidel", SB_MATRIX_AIJ, "-ksp_type richardson -pc_type composite -pc_composite_pcs sor -sub_0_pc_sor_omega 1 -ksp_max_it 100000", "Gauss-Seidel iteration (between ranks: block Jacobi)"},
-  {"sor", SB_MATRIX_AIJ, "-ksp_type richardson -pc_type composite -pc_composite_pcs sor -sub_0_pc_sor_omega 1.6 -ksp_max_it 100000", "successive over-relaxation, omega 1.6 (between ranks: block Jacobi)"},
-  {"cholmod", SB_MATRIX_AIJ, "-ksp_type cg -pc_type cholesky -pc_factor_mat_solver_type cholmod", "sparse Cholesky of SuiteSparse; one rank"},
-  {"mumps", SB_MATRIX_AIJ, "-ksp_type cg -pc_type cholesky -pc_factor_mat_solver_type mumps", "sparse factorisation of MUMPS on any number of ranks"},
+  {"cg", SB_MATRIX_BAIJ, PETSC_FALSE, "-ksp_type cg -pc_type none", NULL, "conjugate gradients without preconditioner"},
+  {"cg_jacobi", SB_MATRIX_BAIJ, PETSC_FALSE, "-ksp_type cg -pc_type jacobi", NULL, "CG, diagonal preconditioner"},
+  {"cg_pbjacobi", SB_MATRIX_BAIJ, PETSC_FALSE, "-ksp_type cg -pc_type pbjacobi", NULL, "CG, 3x3 diagonal blocks"},
+  {"cg_icc", SB_MATRIX_SBAIJ, PETSC_FALSE, "-ksp_type cg -pc_type bjacobi -sub_pc_type icc -sub_pc_factor_shift_type positive_definite", NULL, "CG, incomplete Cholesky on each rank"},
+  {"cg_ssor", SB_MATRIX_AIJ, PETSC_FALSE, "-ksp_type cg -pc_type sor -pc_sor_local_symmetric", NULL, "CG, symmetric Gauss-Seidel on each rank"},
+  {"cg_gamg", SB_MATRIX_AIJ, PETSC_FALSE, "-ksp_type cg -pc_type gamg", NULL, "CG, algebraic multigrid with the rigid-body modes of each body"},
+  {"cg_hypre", SB_MATRIX_AIJ, PETSC_FALSE, "-ksp_type cg -pc_type hypre -pc_hypre_type boomeramg -pc_hypre_boomeramg_strong_threshold 0.5", NULL, "CG, BoomerAMG of hypre"},
+  {"gauss_seidel", SB_MATRIX_AIJ, PETSC_FALSE, "-ksp_type richardson -pc_type composite -pc_composite_pcs sor -sub_0_pc_sor_omega 1 -ksp_max_it 100000", NULL, "Gauss-Seidel iteration (between ranks: block Jacobi)"},
+  {"sor", SB_MATRIX_AIJ, PETSC_FALSE, "-ksp_type richardson -pc_type composite -pc_composite_pcs sor -sub_0_pc_sor_omega 1.6 -ksp_max_it 100000", NULL, "successive over-relaxation, omega 1.6 (between ranks: block Jacobi)"},
+  {"cholmod", SB_MATRIX_AIJ, PETSC_FALSE, "-ksp_type cg -pc_type cholesky -pc_factor_mat_solver_type cholmod", NULL, "sparse Cholesky of SuiteSparse; one rank"},
+  {"mumps", SB_MATRIX_AIJ, PETSC_FALSE, "-ksp_type cg -pc_type cholesky -pc_factor_mat_solver_type mumps", NULL, "sparse factorisation of MUMPS on any number of ranks"},
+  {"rotated", SB_MATRIX_BAIJ, PETSC_FALSE, "-ksp_type cg", SbPCRotatedCreate, "CG, one factorisation that turns with the nodes and is seldom renewed: dynamic runs of up to about 100k tets"},
+  {"realtime", SB_MATRIX_BAIJ, PETSC_TRUE, "-ksp_type cg -ksp_initial_guess_nonzero", SbPCRotatedCreate, "the same without a matrix, warm-started: linear, or corotated with -body_<name>_tangent warped; fastest with -snes_type ksponly and -ksp_rtol 1e-4"},
 };
 
 static const SbOption rows[] = {
-  {"solver", SB_OPTION_CHOICE, 1, "", "auto", "auto|cg|cg_jacobi|cg_pbjacobi|cg_icc|cg_ssor|cg_gamg|cg_hypre|gauss_seidel|sor|cholmod|mumps",
+  {"solver", SB_OPTION_CHOICE, 1, "", "auto", "auto|cg|cg_jacobi|cg_pbjacobi|cg_icc|cg_ssor|cg_gamg|cg_hypre|gauss_seidel|sor|cholmod|mumps|rotated|realtime",
    "linear solver; auto chooses by size, ranks and material and says why. PETSc's -ksp_ and -pc_ options refine it"},
 };
 
@@ -122,17 +124,34 @@ static PetscErrorCode insert_options(const char *text)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscErrorCode SbSolverCreateOperator(SbSpace s, const SbSolverPreset *preset, Mat *A)
+{
+  PetscBool frames;
+
+  PetscFunctionBeginUser;
+  if (preset->matrix_free) {
+    PetscCall(SbSpaceHasFrames(s, &frames));
+    PetscCheck(frames, s->comm, PETSC_ERR_USER, "-solver %s is for -mass lumped and the materials linear, and corotated with -body_<name>_tangent warped: choose these, or -solver rotated", preset->name);
+    PetscCall(SbSpaceCreateFrameOperator(s, A));
+  } else PetscCall(SbSpaceCreateMatrix(s, preset->matrix, A));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode SbSolverSetUp(SNES snes, SbSpace s, const SbSolverPreset *preset)
 {
   KSP ksp;
+  PC  pc;
 
   PetscFunctionBeginUser;
-  (void)s;
   PetscCall(SNESGetKSP(snes, &ksp));
   PetscCall(KSPSetTolerances(ksp, 1e-8, PETSC_DEFAULT, PETSC_DEFAULT, 5000));
   PetscCall(KSPSetType(ksp, KSPCG));
   PetscCall(KSPSetNormType(ksp, KSP_NORM_UNPRECONDITIONED));
   PetscCall(insert_options(preset->options));
+  if (preset->precondition) {
+    PetscCall(KSPGetPC(ksp, &pc));
+    PetscCall(preset->precondition(s, pc));
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

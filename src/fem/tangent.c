@@ -179,6 +179,22 @@ static void general_blocks(const SbMaterial m, const SbLane *g, const SbLane V, 
   }
 }
 
+/* A law whose tangent is Hooke's tensor turned by R and a part T of the spins (sbelement.h); damping is the same form with T = -mu I. */
+static void spin_blocks(const SbMaterial m, const SbLane *g, const SbLane V, const Factors *x, const SbLane F[9], SbLane K[10][9])
+{
+  const PetscReal both = x->stiffness + x->damping;
+  SbLane          R[9], T[9], W;
+
+  m->ops.spin(m, F, R, T);
+  for (int k = 0; x->damping != 0. && k < 9; k++) {
+    const PetscReal rest = k % 4 ? 0. : x->damping * m->mu;
+
+    for (int l = 0; l < SB_BATCH; l++) T[k][l] = (x->stiffness * T[k][l] - rest) / both;
+  }
+  scaled_volumes(V, both, W);
+  SbCellBlocksSpin(g, W, m->lambda, m->mu, (const SbLane *)R, (const SbLane *)T, K);
+}
+
 /* Blocks of one batch. */
 static void batch_blocks(SbSpace s, const SbRegion *region, const PetscReal displacement[], const Factors *x, PetscInt b, SbLane K[10][9])
 {
@@ -196,7 +212,8 @@ static void batch_blocks(SbSpace s, const SbRegion *region, const PetscReal disp
       m->ops.frame(m, (const SbLane *)F, R);
       scaled_volumes(s->batch_V[b], x->stiffness + x->damping, W);
       SbCellBlocksIsotropic(g, W, m->lambda, m->mu, (const SbLane *)R, K);
-    } else general_blocks(m, g, s->batch_V[b], x, (const SbLane *)F, K);
+    } else if (m->ops.spin && x->stiffness != 0.) spin_blocks(m, g, s->batch_V[b], x, (const SbLane *)F, K);
+    else general_blocks(m, g, s->batch_V[b], x, (const SbLane *)F, K);
   }
   if (x->inertia != 0.) add_consistent_mass(&region->element->ops, x->inertia, s->batch_V[b], K);
 }
@@ -255,10 +272,16 @@ static void add_lumped_mass(SbSpace s, const SbStage *stage, const Access *x)
 
 PetscErrorCode SbSpaceAssembleTangent(SbSpace s, const SbStage *stage, Mat A)
 {
-  Access x;
+  PetscBool matrix_free;
+  Access    x;
 
   PetscFunctionBeginUser;
   PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_TANGENT], A, 0, 0, 0));
+  PetscCall(SbFrameOperatorSetState(A, stage, &matrix_free));
+  if (matrix_free) {
+    PetscCall(PetscLogEventEnd(SbEvents[SB_EVENT_TANGENT], A, 0, 0, 0));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
   PetscCall(MatZeroEntries(A));
   PetscCall(access_begin(A, &x));
   for (PetscInt r = 0; r < s->nregion; r++) add_region(s, &s->region[r], stage, &x);
@@ -314,9 +337,12 @@ static void clear_fixed(SbSpace s, const Access *x)
 
 PetscErrorCode SbSpaceFinishTangent(SbSpace s, Mat A)
 {
-  Access x;
+  PetscBool matrix_free;
+  Access    x;
 
   PetscFunctionBeginUser;
+  PetscCall(PetscObjectTypeCompare((PetscObject)A, MATSHELL, &matrix_free));
+  if (matrix_free) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(access_begin(A, &x));
   clear_fixed(s, &x);
   PetscCall(access_end(&x));

@@ -2,6 +2,7 @@
   The model as PETSc's TS and SNES see it. A tangent that cannot have changed (linear laws, loads that do not depend on the
   displacement, the same shifts) is not assembled again, and the preconditioner stays.
 */
+#include "sbsolver.h"
 #include "time_impl.h"
 
 /* True when J still holds the tangent for these shifts. */
@@ -17,6 +18,8 @@ static PetscErrorCode form_tangent(SbRun run, PetscReal t, PetscReal shift_v, Pe
   PetscFunctionBeginUser;
   if (tangent_holds(run, shift_v, shift_a)) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(SbModelTangent(run->model, t, shift_v, shift_a, 1., U, V, P));
+  /* a preconditioner that turns with the nodes asks for the displacement that the matrix belongs to */
+  if (run->solver_used->precondition) PetscCall(PetscObjectCompose((PetscObject)P, "sb_state", (PetscObject)U));
   run->tangent_known = PETSC_TRUE;
   run->shift_v       = shift_v;
   run->shift_a       = shift_a;

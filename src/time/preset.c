@@ -247,7 +247,9 @@ PetscErrorCode SbRunSetUp(SbRun run)
   PetscCall(SbModelInitialState(m, run->U, run->V));
   PetscCall(SbSolverChoose(m->space, m->dynamic, m->linear, explicit, run->solver_choice, &run->solver_used, run->solver_reason, sizeof(run->solver_reason)));
   PetscCall(PetscStrncpy(run->solver, run->solver_used->name, sizeof(run->solver)));
-  if (!explicit) PetscCall(SbSpaceCreateMatrix(m->space, run->solver_used->matrix, &run->J));
+  if (!explicit) PetscCall(SbSolverCreateOperator(m->space, run->solver_used, &run->J));
+  PetscCheck(!run->solver_used->matrix_free || !m->ntangent, m->comm, PETSC_ERR_USER, "-solver %s works without a matrix, and the effect %s adds to it: use -solver rotated",
+             run->solver, m->tangent[0]->name);
   if (m->dynamic) PetscCall(set_up_ts(run));
   else PetscCall(set_up_static(run));
   PetscFunctionReturn(PETSC_SUCCESS);
