@@ -125,6 +125,12 @@ static inline PetscReal verify_extrapolate(PetscReal coarse, PetscReal fine, Pet
   return fine + (fine - coarse) / (PetscPowReal(2., order) - 1.);
 }
 
+/* Limit of three values, each of half the mesh size of the one before, of unknown order (Aitken). */
+static inline PetscReal verify_aitken(const PetscReal v[3])
+{
+  return v[2] - PetscSqr(v[2] - v[1]) / ((v[2] - v[1]) - (v[1] - v[0]));
+}
+
 /* The end of the run must be its planned one. */
 static inline PetscErrorCode verify_solve(TestScene *t, const char *what)
 {
