@@ -120,7 +120,7 @@ lint: ## format, layers of the include lines, clang-tidy, shellcheck, Python syn
 	@scripts/install-deps lint
 	@COMPILE_FLAGS='-std=c11 $(INCLUDES)' scripts/lint
 
-SANITIZE = -O1 -g -fno-omit-frame-pointer -fsanitize=address,undefined -fno-sanitize-recover=undefined
+SANITIZE = -O1 -g -fno-omit-frame-pointer -fsanitize=address,undefined -fno-sanitize-recover=undefined -Wno-format-truncation
 sanitize: deps ## unit tests under the address and undefined-behaviour sanitizers
 	$(AGAIN) BUILD=build-sanitize OPT='$(SANITIZE)' build-sanitize/unit
 	@tests/run --build build-sanitize --group unit --sanitize $(if $(T),--match '$(T)')
