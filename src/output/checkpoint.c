@@ -247,8 +247,7 @@ static PetscErrorCode write_checkpoint(SbRun run, SbOutput out, const SbStep *st
   PetscCall(SbOutputPath(out, name, sizeof(path), path));
   PetscCall(SbOutputPath(out, "checkpoint.tmp", sizeof(tmp), tmp));
   PetscCall(SbH5Create(out->comm, tmp, &h));
-  PetscCall(SbFileReserve(out->comm, tmp,
-                          (PetscInt64)out->vertex.N * 3 * 24 + (PetscInt64)strlen(out->identity) + 65536));
+  PetscCall(SbH5Reserve(&h, (PetscInt64)out->vertex.N * 3 * 24 + (PetscInt64)strlen(out->identity) + 65536));
   PetscCall(write_vectors(run, out, &h, &checksum));
   PetscCall(write_numbers(run, out, step, &h, checksum));
   PetscCall(SbH5Flush(&h));

@@ -51,8 +51,7 @@ static PetscErrorCode write_mesh(SbRun run, SbOutput out)
   hid_t group;
 
   PetscFunctionBeginUser;
-  PetscCall(SbFileReserve(out->comm, fr->h5.path,
-                          (PetscInt64)mesh->Nvert * 24 + (PetscInt64)mesh->Ncell * 24 + 65536));
+  PetscCall(SbH5Reserve(&fr->h5, (PetscInt64)mesh->Nvert * 24 + (PetscInt64)mesh->Ncell * 24 + 65536));
   PetscCall(SbH5GroupCreate(&fr->h5, 8, 8, &group));
   PetscCall(SbH5PutInt(&fr->h5, group, "hash", (int64_t)out->mesh_hash));
   PetscCall(SbOrderGather(&out->vertex, 3, mesh->x, fr->slice));
@@ -146,7 +145,7 @@ static PetscErrorCode write_frame(SbRun run, SbOutput out, const SbStep *step)
   hid_t group;
 
   PetscFunctionBeginUser;
-  PetscCall(SbFileReserve(out->comm, fr->h5.path, frame_bytes(out)));
+  PetscCall(SbH5Reserve(&fr->h5, frame_bytes(out)));
   PetscCall(SbH5GroupCreate(&fr->h5, (unsigned)out->nfield, 14, &group));
   PetscCall(SbH5PutReal(&fr->h5, group, "time", step->t));
   PetscCall(SbH5PutInt(&fr->h5, group, "step", step->step));

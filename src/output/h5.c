@@ -14,7 +14,32 @@
   version 1), IV.A.2.g (link message). The old format is asked for explicitly; newer ones would write checksums and flags
   that mark the file as being in use.
 */
+#include <unistd.h>
 #include "output_impl.h"
+
+/*
+  After a failed write HDF5 1.10 cannot be closed: it frees the file, keeps its identifier, and crashes when MPI_Finalize()
+  makes it end. The error has been told by then; what is left of the program's end is skipped.
+*/
+static int leave_at_once(MPI_Comm comm, int key, void *attribute, void *state)
+{
+  (void)comm;
+  (void)key;
+  (void)attribute;
+  (void)state;
+  (void)fflush(NULL);
+  _exit(1);
+}
+
+static void spare_the_end(SbH5 *h)
+{
+  int key;
+
+  // Attributes of MPI_COMM_SELF are deleted first by MPI_Finalize(), the newest before the one of HDF5.
+  if (h->failed || MPI_Comm_create_keyval(MPI_COMM_NULL_COPY_FN, leave_at_once, &key, NULL)) return;
+  h->failed = PETSC_TRUE;
+  (void)MPI_Comm_set_attr(MPI_COMM_SELF, key, NULL);
+}
 
 /* The innermost message of the error that HDF5 has on its stack. */
 static herr_t take_message(unsigned n, const H5E_error2_t *error, void *ctx)
@@ -23,22 +48,28 @@ static herr_t take_message(unsigned n, const H5E_error2_t *error, void *ctx)
   return 0;
 }
 
-static void h5_message(const SbH5 *h, const char *what, size_t size, char message[])
+/* Ends the run on all ranks when a call failed on one of them. Collective. */
+static PetscErrorCode agree(SbH5 *h, PetscBool bad)
 {
-  char reason[160] = "unknown reason";
+  char reason[160] = "the reason is unknown", message[SB_MESSAGE_MAX] = "";
+  PetscErrorCode ierr;
 
-  (void)H5Ewalk2(H5E_DEFAULT, H5E_WALK_UPWARD, take_message, reason);
-  SbFormat(size, message, "cannot write %s of %s: HDF5 says '%s'", what, h->path, reason);
+  PetscFunctionBeginUser;
+  if (bad) {
+    (void)H5Ewalk2(H5E_DEFAULT, H5E_WALK_UPWARD, take_message, reason);
+    SbFormat(sizeof(message), message, "cannot write %" PetscInt64_FMT " bytes to %s: HDF5 says '%s'",
+             h->bytes, h->path, reason);
+  }
+  ierr = SbAgree(h->comm, PETSC_ERR_FILE_WRITE, message);
+  if (ierr) spare_the_end(h);
+  PetscCall(ierr);
+  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A call that fails on all ranks alike. */
-#define H5_CALL(h, call, what)                                  \
-  do {                                                          \
-    if ((call) < 0) {                                           \
-      char message_[SB_MESSAGE_MAX];                            \
-      h5_message(h, what, sizeof(message_), message_);          \
-      SETERRQ((h)->comm, PETSC_ERR_FILE_WRITE, "%s", message_); \
-    }                                                           \
+/* A call that changes metadata: it needs no communication and fails on all ranks alike. */
+#define H5_CALL(h, call)                             \
+  do {                                               \
+    if ((call) < 0) PetscCall(agree(h, PETSC_TRUE)); \
   } while (0)
 
 static hid_t access_list(MPI_Comm comm)
@@ -59,11 +90,13 @@ PetscErrorCode SbH5Create(MPI_Comm comm, const char *path, SbH5 *h)
 
   PetscFunctionBeginUser;
   h->comm = comm;
+  h->bytes = 0;
+  h->failed = PETSC_FALSE;
   PetscCall(PetscStrncpy(h->path, path, sizeof(h->path)));
   list = access_list(comm);
   h->file = H5Fcreate(path, H5F_ACC_TRUNC, H5P_DEFAULT, list);
   (void)H5Pclose(list);
-  H5_CALL(h, h->file, "the beginning");
+  H5_CALL(h, h->file);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -74,6 +107,8 @@ PetscErrorCode SbH5Open(MPI_Comm comm, const char *path, PetscBool writable, SbH
 
   PetscFunctionBeginUser;
   h->comm = comm;
+  h->bytes = 0;
+  h->failed = PETSC_FALSE;
   PetscCall(PetscStrncpy(h->path, path, sizeof(h->path)));
   list = access_list(comm);
   h->file = H5Fopen(path, writable ? H5F_ACC_RDWR : H5F_ACC_RDONLY, list);
@@ -95,17 +130,22 @@ PetscErrorCode SbH5Close(SbH5 *h)
   PetscFunctionBeginUser;
   if (file < 0) PetscFunctionReturn(PETSC_SUCCESS);
   h->file = -1;
-  H5_CALL(h, H5Fclose(file), "the end");
+  H5_CALL(h, H5Fclose(file));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode SbH5Flush(SbH5 *h)
 {
-  char message[SB_MESSAGE_MAX] = "";
-
   PetscFunctionBeginUser;
-  if (H5Fflush(h->file, H5F_SCOPE_GLOBAL) < 0) h5_message(h, "a part", sizeof(message), message);
-  PetscCall(SbAgree(h->comm, PETSC_ERR_FILE_WRITE, message));
+  PetscCall(agree(h, (PetscBool)(H5Fflush(h->file, H5F_SCOPE_GLOBAL) < 0)));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbH5Reserve(SbH5 *h, PetscInt64 bytes)
+{
+  PetscFunctionBeginUser;
+  h->bytes = bytes;
+  PetscCall(SbFileReserve(h->comm, h->path, bytes));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -122,14 +162,14 @@ PetscErrorCode SbH5GroupCreate(SbH5 *h, unsigned links, unsigned letters, hid_t 
   (void)H5Pset_est_link_info(list, links, letters);
   *group = H5Gcreate_anon(h->file, list, H5P_DEFAULT);
   (void)H5Pclose(list);
-  H5_CALL(h, *group, "a group");
+  H5_CALL(h, *group);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode SbH5GroupLink(SbH5 *h, hid_t group, hid_t parent, const char *name)
 {
   PetscFunctionBeginUser;
-  H5_CALL(h, H5Olink(group, parent, name, H5P_DEFAULT, H5P_DEFAULT), name);
+  H5_CALL(h, H5Olink(group, parent, name, H5P_DEFAULT, H5P_DEFAULT));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -166,23 +206,22 @@ PetscErrorCode SbH5WriteSlice(SbH5 *h, hid_t where, const char *name, const char
 {
   const hid_t create = H5Pcreate(H5P_DATASET_CREATE), transfer = collective_list();
   hid_t filespace, memspace, dataset;
-  char message[SB_MESSAGE_MAX] = "";
+  PetscBool bad;
 
   PetscFunctionBeginUser;
   (void)H5Pset_fill_time(create, H5D_FILL_TIME_NEVER);
   (void)H5Pset_alloc_time(create, H5D_ALLOC_TIME_EARLY);
   select_slice(order, ncomp, &filespace, &memspace);
   dataset = H5Dcreate2(where, name, filetype, filespace, H5P_DEFAULT, create, H5P_DEFAULT);
-  H5_CALL(h, dataset, name);
+  H5_CALL(h, dataset);
   PetscCall(SbH5PutText(h, dataset, "unit", unit));
-  if (H5Dwrite(dataset, memtype, memspace, filespace, transfer, slice) < 0)
-    h5_message(h, name, sizeof(message), message);
+  bad = (PetscBool)(H5Dwrite(dataset, memtype, memspace, filespace, transfer, slice) < 0);
   (void)H5Dclose(dataset);
   (void)H5Sclose(filespace);
   (void)H5Sclose(memspace);
   (void)H5Pclose(create);
   (void)H5Pclose(transfer);
-  PetscCall(SbAgree(h->comm, PETSC_ERR_FILE_WRITE, message));
+  PetscCall(agree(h, bad));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -233,8 +272,8 @@ static PetscErrorCode put(SbH5 *h, hid_t where, const char *name, hid_t filetype
   const hid_t attribute = H5Acreate2(where, name, filetype, space, H5P_DEFAULT, H5P_DEFAULT);
 
   PetscFunctionBeginUser;
-  H5_CALL(h, attribute, name);
-  H5_CALL(h, H5Awrite(attribute, memtype, value), name);
+  H5_CALL(h, attribute);
+  H5_CALL(h, H5Awrite(attribute, memtype, value));
   (void)H5Aclose(attribute);
   (void)H5Sclose(space);
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -301,19 +340,18 @@ PetscErrorCode SbH5WriteText(SbH5 *h, hid_t where, const char *name, const char 
 {
   const hid_t type = H5Tcopy(H5T_C_S1), space = H5Screate(H5S_SCALAR), transfer = collective_list();
   hid_t dataset;
-  char message[SB_MESSAGE_MAX] = "";
+  PetscBool bad;
 
   PetscFunctionBeginUser;
   (void)H5Tset_size(type, strlen(text) + 1);
   dataset = H5Dcreate2(where, name, type, space, H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT);
-  H5_CALL(h, dataset, name);
-  if (H5Dwrite(dataset, type, H5S_ALL, H5S_ALL, transfer, text) < 0)
-    h5_message(h, name, sizeof(message), message);
+  H5_CALL(h, dataset);
+  bad = (PetscBool)(H5Dwrite(dataset, type, H5S_ALL, H5S_ALL, transfer, text) < 0);
   (void)H5Dclose(dataset);
   (void)H5Sclose(space);
   (void)H5Tclose(type);
   (void)H5Pclose(transfer);
-  PetscCall(SbAgree(h->comm, PETSC_ERR_FILE_WRITE, message));
+  PetscCall(agree(h, bad));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

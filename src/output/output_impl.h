@@ -36,7 +36,9 @@ PetscErrorCode SbOrderScatter(const SbOrder *order, PetscInt ncomp, const PetscR
 
 typedef struct {
   MPI_Comm comm;
-  hid_t file; /* negative when closed */
+  hid_t file;       /* negative when closed */
+  PetscInt64 bytes; /* of what is being written, for messages */
+  PetscBool failed; /* a write failed */
   char path[PETSC_MAX_PATH_LEN];
 } SbH5;
 
@@ -70,6 +72,8 @@ PetscErrorCode SbH5GroupLink(SbH5 *h, hid_t group, hid_t parent, const char *nam
 
 /* Prints into text; what does not fit is cut off. */
 void SbFormat(size_t size, char text[], const char *format, ...) __attribute__((format(printf, 3, 4)));
+/* The same for an open HDF5 file, whose messages name these bytes from then on. Collective. */
+PetscErrorCode SbH5Reserve(SbH5 *h, PetscInt64 bytes);
 /* Asks the file system for `bytes` behind the end of a file, before anything in it is touched. Collective. */
 PetscErrorCode SbFileReserve(MPI_Comm comm, const char *path, PetscInt64 bytes);
 /* Ends the run on all ranks when the message of any rank is not empty; the lowest rank's is reported. Collective. */

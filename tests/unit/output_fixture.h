@@ -1,0 +1,145 @@
+/*
+  output_fixture.h - a scene whose motion is prescribed, for the tests of the output: no solve, exact numbers.
+
+  The vectors of the run are filled from formulas of rest position and time, and the monitors are called as the time loop
+  calls them. Everything goes to a folder of its own, which is removed at the end.
+*/
+#pragma once
+#include <dirent.h>
+#include <errno.h>
+#include <fcntl.h>
+#include <sys/resource.h>
+#include <sys/stat.h>
+#include <unistd.h>
+#include "../scene.h"
+#include "../../src/output/output_impl.h"
+
+#define MATERIAL " -body_a_material linear -body_a_young 1000 -body_a_poisson 0.25 -body_a_density 10"
+#define BOX "-bodies a -body_a_mesh box:0.4,0.1,0.2:4,1,2" MATERIAL
+#define HELD BOX " -sets left -set_left_at plane:1,0,0,0 -effects hold -effect_hold_type support -effect_hold_on left"
+#define EULER " -time euler_implicit -ts_dt 0.1 -ts_max_time 1 -quiet "
+
+/* A folder that does not exist yet, below the system's one for temporary files; the same on all ranks. */
+static inline PetscErrorCode fixture_folder(size_t size, char dir[])
+{
+  PetscMPIInt rank;
+
+  PetscFunctionBeginUser;
+  PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
+  if (!rank) {
+    const char *tmp = getenv("TMPDIR");
+
+    (void)snprintf(dir, size, "%s/supple-test-XXXXXX", tmp && tmp[0] ? tmp : "/tmp");
+    PetscCheck(mkdtemp(dir), PETSC_COMM_SELF, PETSC_ERR_FILE_OPEN, "No temporary folder %s", dir);
+  }
+  PetscCallMPI(MPI_Bcast(dir, (PetscMPIInt)size, MPI_CHAR, 0, PETSC_COMM_WORLD));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Removes a folder of files. */
+static inline PetscErrorCode fixture_remove(const char *dir)
+{
+  PetscMPIInt    rank;
+  DIR           *d;
+  struct dirent *entry;
+  char           path[PETSC_MAX_PATH_LEN];
+
+  PetscFunctionBeginUser;
+  PetscCallMPI(MPI_Barrier(PETSC_COMM_WORLD));
+  PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
+  if (rank || !(d = opendir(dir))) PetscFunctionReturn(PETSC_SUCCESS);
+  while ((entry = readdir(d))) {
+    SbFormat(sizeof(path), path, "%s/%s", dir, entry->d_name);
+    (void)unlink(path);
+  }
+  (void)closedir(d);
+  (void)rmdir(dir);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* A scene with its output attached to `dir`. */
+static inline PetscErrorCode fixture_open(const char *dir, const char *options, TestScene *scene)
+{
+  PetscFunctionBeginUser;
+  PetscCall(PetscOptionsClear(NULL));
+  PetscCall(SbOptionsReset());
+  PetscCall(SbRegisterAll());
+  PetscCall(PetscOptionsInsertString(NULL, options));
+  PetscCall(PetscOptionsSetValue(NULL, "-output_dir", dir));
+  PetscCall(SbSceneCreate(PETSC_COMM_WORLD, &scene->model));
+  PetscCall(SbRunCreate(scene->model, &scene->run));
+  PetscCall(SbOutputSetFromOptions(scene->run));
+  PetscCall(SbModelSetUp(scene->model));
+  PetscCall(SbRunSetUp(scene->run));
+  PetscCall(SbOutputAttach(scene->run));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The motion: u = t G x with a constant gradient, so that stresses are known; v = G x; a = x squared. */
+#define G00 0.01
+#define G11 -0.02
+#define G02 0.03
+static inline void motion(const PetscReal x[3], PetscReal t, PetscReal u[3], PetscReal v[3], PetscReal a[3])
+{
+  v[0] = G00 * x[0] + G02 * x[2];
+  v[1] = G11 * x[1];
+  v[2] = 0.;
+  for (int c = 0; c < 3; c++) {
+    u[c] = t * v[c];
+    a[c] = x[c] * x[c];
+  }
+}
+
+/* What the time loop does at a step: state, then monitors. Energies are numbers that tell their column. */
+static inline PetscErrorCode fixture_step(TestScene *scene, PetscInt k, PetscReal dt, PetscBool last)
+{
+  SbRun        run = scene->run;
+  const SbMesh mesh = scene->model->mesh;
+  SbStep       step = {.step = k, .t = (PetscReal)k * dt, .dt = k == run->step0 ? 0. : dt, .t_end = run->t_end, .step_end = 10, .last = last};
+  PetscScalar *u, *v, *a;
+
+  PetscFunctionBeginUser;
+  PetscCall(VecGetArray(run->U, &u));
+  PetscCall(VecGetArray(run->V, &v));
+  PetscCall(VecGetArray(run->A, &a));
+  for (PetscInt i = 0; i < mesh->nvert_owned; i++) motion(mesh->x + 3 * i, step.t, u + 3 * i, v + 3 * i, a + 3 * i);
+  PetscCall(VecRestoreArray(run->U, &u));
+  PetscCall(VecRestoreArray(run->V, &v));
+  PetscCall(VecRestoreArray(run->A, &a));
+  step.U = run->U;
+  step.V = run->V;
+  step.A = run->A;
+  if (run->want_residual && !run->reaction) PetscCall(VecDuplicate(run->U, &run->reaction));
+  if (run->want_residual) PetscCall(VecSet(run->reaction, 0.5));
+  step.R             = run->reaction;
+  step.energies      = (SbEnergies){.kinetic = 100. + k, .strain = 200. + k, .load_work = 300. + k, .drive_work = 400., .volume = 0.008, .min_J = 1. / 3., .ninverted = 7};
+  run->energies      = step.energies;
+  step.newton        = 2;
+  step.linear        = 30;
+  step.wall          = 0.01 * (PetscReal)k;
+  run->steps_total   = k;
+  for (PetscInt m = 0; m < run->nmonitor; m++) PetscCall(run->monitor[m].fn(run, &step, run->monitor[m].ctx));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* A file of the folder as text, on every rank; empty when it is missing. PetscFree. */
+static inline PetscErrorCode fixture_read(const char *dir, const char *name, char **text)
+{
+  char   path[PETSC_MAX_PATH_LEN];
+  size_t size;
+
+  PetscFunctionBeginUser;
+  PetscCallMPI(MPI_Barrier(PETSC_COMM_WORLD));
+  SbFormat(sizeof(path), path, "%s/%s", dir, name);
+  PetscCall(SbFileRead(path, text, &size));
+  if (!*text) PetscCall(PetscCalloc1(1, text));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static inline PetscBool fixture_exists(const char *dir, const char *name)
+{
+  char path[PETSC_MAX_PATH_LEN];
+
+  SbFormat(sizeof(path), path, "%s/%s", dir, name);
+  return (PetscBool)!access(path, F_OK);
+}

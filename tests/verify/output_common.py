@@ -1,0 +1,100 @@
+"""What the scripts on the output share: a small scenario that writes much, and a reader of its results.
+
+Not a test by itself: running it checks nothing and succeeds.
+"""
+import os
+import shlex
+import subprocess
+import sys
+import xml.etree.ElementTree as ElementTree
+from pathlib import Path
+
+import h5py
+import numpy
+
+SUPPLE = os.environ.get("SB_SUPPLE", "bin/supple")
+MPI = shlex.split(os.environ.get("SB_MPI", "scripts/mpi"))
+OUT = Path(os.environ.get("SB_OUT", "build/test-out/output")).resolve()
+
+# A bar that swings: cheap steps, each of them a frame.
+SCENARIO = """
+-bodies bar
+-body_bar_mesh box:0.4,0.1,0.1:8,2,2
+-body_bar_material linear
+-body_bar_young 5e4
+-body_bar_poisson 0.3
+-body_bar_density 1000
+-sets left
+-set_left_at plane:1,0,0,0
+-effects gravity,hold
+-effect_gravity_vector 0,0,-9.81
+-effect_hold_type support
+-effect_hold_on left
+-time newmark
+-ts_dt 0.01
+-ts_max_time 0.2
+-ksp_rtol 1e-10
+-output_fields displacement,velocity,acceleration,stress,von_mises,J,energy_density,reaction
+"""
+
+
+def scenario():
+    OUT.mkdir(parents=True, exist_ok=True)
+    path = OUT / "bar.opts"
+    path.write_text(SCENARIO)
+    return path
+
+
+def command(ranks, folder, *more):
+    return MPI + [str(ranks), SUPPLE, str(scenario()), "-output_dir", str(OUT / folder)] + [str(m) for m in more]
+
+
+def run(ranks, folder, *more, fails=False, **keywords):
+    """Runs the scenario; returns what it printed."""
+    result = subprocess.run(command(ranks, folder, *more), capture_output=True, text=True, timeout=100, **keywords)
+    text = result.stdout + result.stderr
+    if (result.returncode != 0) != fails:
+        sys.exit(f"{folder}: exit code {result.returncode}\n{text}")
+    return text
+
+
+def frames(folder):
+    """(time, path of the group) of each frame in fields.xmf, which must be well-formed; [] without the file."""
+    path = OUT / folder / "fields.xmf"
+    if not path.exists():
+        return []
+    found = []
+    for grid in ElementTree.parse(path).getroot().iter("Grid"):
+        if grid.get("GridType") != "Uniform":
+            continue
+        items = [item.text.strip() for item in grid.iter("DataItem")]
+        groups = {item.split(":")[1].rsplit("/", 1)[0] for item in items if ":/step/" in item}
+        if len(groups) != 1:
+            sys.exit(f"{path}: a frame has its arrays in {groups}")
+        found.append((float(grid.find("Time").get("Value")), groups.pop()))
+    return found
+
+
+def check_frames(folder):
+    """Every frame of the index is whole: its attributes, its arrays, finite numbers. Returns their number."""
+    listed = frames(folder)
+    if not listed:
+        return 0
+    with h5py.File(OUT / folder / "fields.h5", "r") as f:
+        nvert, ncell = len(f["/mesh/x"]), len(f["/mesh/cells"])
+        for time, group in listed:
+            if f[group].attrs["time"] != time:
+                sys.exit(f"{folder}: time {f[group].attrs['time']} in {group}, {time} in the index")
+            for name, data in f[group].items():
+                values = data[()]
+                if len(values) not in (nvert, ncell) or not numpy.isfinite(values).all():
+                    sys.exit(f"{folder}: {group}/{name} is not whole")
+            if numpy.abs(f[group]["displacement"][()]).max() > 1 or (time > 0 and not numpy.any(f[group]["stress"][()])):
+                sys.exit(f"{folder}: {group} holds wrong numbers")
+    return len(listed)
+
+
+def history(folder):
+    """Names and rows of history.csv."""
+    lines = [line for line in (OUT / folder / "history.csv").read_text().splitlines() if not line.startswith("#")]
+    return lines[0].split(","), numpy.array([[float(x) for x in line.split(",")] for line in lines[1:]])

@@ -1,0 +1,87 @@
+"""A disk that fills up ends a run with one line that names the file and its bytes, and costs nothing that was complete.
+
+A full disk is played by a limit on the size of files, set while the run is going on. Also: a folder that cannot be
+written, which must be found before anything is computed.
+"""
+import os
+import re
+import resource
+import shutil
+import subprocess
+import sys
+import time
+
+from output_common import MPI, OUT, SUPPLE, check_frames, command, history, run, scenario
+from output_kill import ranks_of
+
+
+def fill_up(ranks, folder, frames, *more):
+    """Starts a long run, lets it write a few frames, then lets no file grow. Returns exit code and output."""
+    shutil.rmtree(OUT / folder, ignore_errors=True)
+    args = command(ranks, folder, "-ts_max_time", "100", "-progress", "false", *more)
+    process = subprocess.Popen(args, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, start_new_session=True)
+    index = OUT / folder / "fields.xmf"
+    end = time.time() + 60
+    while not (index.exists() and index.read_text().count("<Time") >= frames) and time.time() < end:
+        time.sleep(0.01)
+    for pid in ranks_of(process.pid):
+        resource.prlimit(pid, resource.RLIMIT_FSIZE, (60000, 60000))
+    try:
+        text, _ = process.communicate(timeout=60)
+    except subprocess.TimeoutExpired:
+        for pid in ranks_of(process.pid):
+            os.kill(pid, 9)
+        sys.exit(f"{folder}: still running a minute after the disk was full")
+    return process.returncode, text
+
+
+def check_full(ranks, folder, file, frames, *more):
+    code, text = fill_up(ranks, folder, frames, *more)
+    if code == 0:
+        sys.exit(f"{folder}: exit code 0 although the disk was full")
+    said = re.findall(r"^.*error: cannot write (\d+) bytes to (\S+): (.+)$", text, re.M)
+    if len(said) != 1 or not said[0][1].endswith(file) or int(said[0][0]) <= 0:
+        sys.exit(f"{folder}: no single line on {file}\n{text}")
+    n = check_frames(folder)
+    names, rows = history(folder)
+    if n < frames or len(rows) < n - 1 or any(len(row) != len(names) for row in rows):
+        sys.exit(f"{folder}: {n} frames, {len(rows)} rows of {len(names)} columns")
+    print(f"{folder}: {said[0]}; {n} frames are readable")
+
+
+def check_unwritable():
+    """A file where the folder should be; this fails for root, too."""
+    (OUT / "file").write_text("")
+    for ranks in (1, 2):
+        text = run(ranks, "file/results", fails=True)
+        if not re.search(r"error: -output_dir \S+file/results cannot be written: Not a directory", text):
+            sys.exit(f"no line on a folder that cannot be made\n{text}")
+        if "tets" in text:
+            sys.exit("the bodies were read before the folder was tried")
+
+
+def check_default_folder():
+    """Without -output_dir: out/<scenario>; the second run says that it replaces the first, and leaves other files."""
+    path = scenario().resolve()
+    shutil.rmtree(OUT / "out", ignore_errors=True)
+    args = [*MPI, "1", os.path.abspath(SUPPLE), str(path), "-ts_max_time", "0.01"]
+    for again in (False, True):
+        text = subprocess.run(args, cwd=OUT, capture_output=True, text=True, timeout=100, check=True).stdout
+        if ("results of an earlier run are replaced" in text) != again:
+            sys.exit(f"replaced results: {text}")
+        (OUT / "out" / "bar" / "notes.txt").write_text("mine")
+    if not (OUT / "out" / "bar" / "notes.txt").exists() or not (OUT / "out" / "bar" / "fields.xmf").exists():
+        sys.exit("a file that is not ours is gone")
+
+
+def main():
+    scenario()
+    for ranks in (1, 2):
+        check_full(ranks, f"fields{ranks}", "fields.h5", 4)
+        check_full(ranks, f"history{ranks}", "history.csv", 1, "-output_every", "1000")
+    check_unwritable()
+    check_default_folder()
+
+
+if __name__ == "__main__":
+    main()

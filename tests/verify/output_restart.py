@@ -1,0 +1,119 @@
+"""A run that is taken up from a checkpoint, on another number of ranks, is the run that was not interrupted.
+
+Displacement, velocity and acceleration of the last frame and every row of history.csv are compared. Also: damaged
+checkpoints, the newest one that is whole, checkpoints that do not fit the run.
+"""
+import re
+import shutil
+import sys
+
+import h5py
+import numpy
+
+from output_common import OUT, frames, history, run
+
+WHOLE = ["-output_precision", "double", "-quiet", "-checkpoint_every_steps", "10", "-checkpoint_keep", "3"]
+# The solves to rounding, so that different sums of different rank counts do not grow.
+WHOLE += ["-ksp_rtol", "1e-13", "-body_bar_material", "corotated", "-snes_rtol", "1e-12"]
+
+
+def last_frame(folder):
+    time, group = frames(folder)[-1]
+    with h5py.File(OUT / folder / "fields.h5", "r") as f:
+        return time, {name: f[group][name][()] for name in ("displacement", "velocity", "acceleration")}
+
+
+def compare(a, b, tolerance, rows_tolerance):
+    (t, left), (s, right) = last_frame(a), last_frame(b)
+    if t != s:
+        sys.exit(f"{a} ends at {t}, {b} at {s}")
+    for name in left:
+        worst = numpy.abs(left[name] - right[name]).max() / numpy.abs(left[name]).max()
+        if not worst <= tolerance:
+            sys.exit(f"{name} differs by {worst:.3g} between {a} and {b}")
+    (names, p), (others, q) = history(a), history(b)
+    if names != others or p.shape != q.shape or not numpy.array_equal(p[:, 0], numpy.arange(len(p))):
+        sys.exit(f"{b}: history.csv has {q.shape} numbers, that of {a} has {p.shape}; steps {q[:, 0]}")
+    for k, name in enumerate(names):
+        if name in ("newton", "linear", "min_J"):
+            continue
+        kind = "strain" if name in ("kinetic", "load_work", "drive_work", "damping_loss", "integrator_loss", "total") else name[:-1]
+        scale = max(numpy.abs(p[:, i]).max() for i, n in enumerate(names) if n == name or n == kind or n[:-1] == kind)
+        worst = numpy.abs(p[:, k] - q[:, k]).max()
+        if not worst <= rows_tolerance * scale:
+            sys.exit(f"history column {name} differs by {worst:.3g} of {scale:.3g} between {a} and {b}")
+
+
+def check_reproduction(time):
+    """Uninterrupted on 2 ranks; stopped at step 10 and taken up on 1, 2 and 3."""
+    run(2, f"whole-{time}", *WHOLE, "-time", time)
+    for ranks in (1, 2, 3):
+        folder = f"parts-{time}-{ranks}"
+        shutil.rmtree(OUT / folder, ignore_errors=True)
+        run(2, folder, *WHOLE, "-time", time, "-ts_max_time", "0.1")
+        text = run(ranks, folder, *WHOLE[:2], *WHOLE[3:], "-time", time, "-restart", "latest", "-progress", "false")
+        if "checkpoint_000010.h5: step 10, t = 0.1 s" not in text:
+            sys.exit(f"{folder}: the restart does not say from where\n{text}")
+        # a few hundred roundings of forces up to 1e4 times the smallest ones
+        compare(f"whole-{time}", folder, 1e-10, 1e-9)
+    print(f"{time}: taken up on 1, 2, 3 ranks as if not interrupted")
+
+
+def expect(pattern, *more, folder="damaged"):
+    text = run(2, folder, *WHOLE, *more, fails=True)
+    lines = [line for line in text.splitlines() if "error:" in line]
+    if len(lines) != 1 or not re.search(pattern, lines[0]):
+        sys.exit(f"{more}: expected one line with '{pattern}'\n{text}")
+
+
+def truncate(path, part):
+    data = path.read_bytes()
+    path.write_bytes(data[: int(len(data) * part)])
+
+
+def check_damage():
+    folder = OUT / "damaged"
+    shutil.rmtree(folder, ignore_errors=True)
+    run(2, "damaged", *WHOLE)
+    kept = sorted(path.name for path in folder.glob("checkpoint_*"))
+    if kept != ["checkpoint_000010.h5", "checkpoint_000020.h5"]:
+        sys.exit(f"checkpoints {kept}")
+    for path in folder.glob("checkpoint_*"):
+        shutil.copy(path, OUT / path.name)
+    # one number changed in the middle of a vector
+    with h5py.File(folder / "checkpoint_000020.h5", "r+") as f:
+        f["v"][17, 1] += 1e-9
+    expect(r"cannot restart from \S+000020.h5: it is truncated, damaged or not a checkpoint", "-restart", folder / "checkpoint_000020.h5")
+    text = run(2, "damaged", *WHOLE[:2], *WHOLE[3:], "-restart", "latest", "-ts_max_time", "0.15")
+    if not re.search(r"warning: \S+000020.h5 is truncated or damaged", text) or "000010.h5: step 10" not in text:
+        sys.exit(f"latest did not fall back to step 10\n{text}")
+    if sorted(path.name for path in folder.glob("checkpoint_*"))[-1] != "checkpoint_000015.h5":
+        sys.exit(f"after the restart there is {sorted(folder.glob('checkpoint_*'))}")
+    for part in (0, 0.1, 0.5, 0.9, 0.999):
+        shutil.copy(OUT / "checkpoint_000020.h5", folder / "cut.h5")
+        truncate(folder / "cut.h5", part)
+        expect("cut.h5: it is truncated, damaged or not a checkpoint", "-restart", folder / "cut.h5")
+    expect("nowhere.h5: there is no such file", "-restart", "nowhere.h5")
+    expect("there is no checkpoint in", "-restart", "latest", folder="empty")
+    print("damaged checkpoints are refused, the newest whole one is found")
+
+
+def check_fit():
+    whole = OUT / "checkpoint_000020.h5"
+    expect(r"made with '-body_bar_young 5e4', this run has '-body_bar_young 6e4'", "-restart", whole, "-body_bar_young", "6e4")
+    expect(r"made with '-effects gravity,hold', this run has '-effects hold'", "-restart", whole, "-effects", "hold")
+    expect("belongs to another mesh", "-restart", whole, "-body_bar_mesh", "box:0.4,0.1,0.1:8,2,3")
+    expect("belongs to another mesh|made with", "-restart", whole, "-body_bar_translate", "0,0,1e-9")
+    expect("made with '-time dynamic', this run has '-time static'", "-restart", whole, "-time", "static")
+    print("checkpoints of other runs are refused")
+
+
+def main():
+    for time in ("newmark", "genalpha", "euler_implicit"):
+        check_reproduction(time)
+    check_damage()
+    check_fit()
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,126 @@
+"""fields.xmf as VTK reads it: frames, times, names, values; and the same datasets on 1, 2, 3 and 4 ranks.
+
+vtkXdmfReader is what PyPI's VTK has; vtkXdmf3Reader is tried where there is one. Values are compared with those of fields.h5
+and, for the first and last frame, with history.csv.
+"""
+import os
+import sys
+
+import h5py
+import numpy
+from vtkmodules.util.numpy_support import vtk_to_numpy
+from vtkmodules.vtkCommonExecutionModel import vtkStreamingDemandDrivenPipeline
+from vtkmodules.vtkIOXdmf2 import vtkXdmfReader
+
+from output_common import OUT, check_frames, frames, history, run
+
+VECTORS = ["displacement", "velocity", "acceleration", "reaction"]
+CELLS = {"stress": 6, "von_mises": 1, "J": 1, "energy_density": 1}
+
+
+def readers():
+    found = [vtkXdmfReader]
+    try:
+        from vtkmodules.vtkIOXdmf3 import vtkXdmf3Reader
+        found.append(vtkXdmf3Reader)
+    except ImportError:
+        pass
+    return found
+
+
+def grid_at(reader, time):
+    reader.UpdateTimeStep(time)
+    grid = reader.GetOutputDataObject(0)
+    while grid.IsA("vtkMultiBlockDataSet"):
+        grid = grid.GetBlock(0)
+    return grid
+
+
+def tensor6(array):
+    """xx xy xz yy yz zz of a tensor that the reader may have made full."""
+    return array[:, [0, 1, 2, 4, 5, 8]] if array.shape[1] == 9 else array
+
+
+def check(condition, text):
+    if not condition:
+        sys.exit(text)
+
+
+def check_reader(make, folder, path):
+    reader = make()
+    reader.SetFileName(path)
+    reader.UpdateInformation()
+    times = reader.GetOutputInformation(0).Get(vtkStreamingDemandDrivenPipeline.TIME_STEPS())
+    names, rows = history(folder)
+    check(numpy.array_equal(times, rows[:, names.index("time")]), f"{make.__name__}: times {times[:4]}...")
+    groups = dict(frames(folder))
+    with h5py.File(OUT / folder / "fields.h5", "r") as f:
+        for k in (0, 7, len(times) - 1):
+            grid, group = grid_at(reader, times[k]), f[groups[times[k]]]
+            check(numpy.array_equal(vtk_to_numpy(grid.GetPoints().GetData()), f["/mesh/x"][()]), f"{make.__name__}: points")
+            cells = numpy.array([[grid.GetCell(c).GetPointId(a) for a in range(4)] for c in range(grid.GetNumberOfCells())])
+            check(grid.GetCellType(0) == 10 and numpy.array_equal(cells, f["/mesh/cells"][()]), f"{make.__name__}: cells")
+            points, on_cells = grid.GetPointData(), grid.GetCellData()
+            check(points.GetNumberOfArrays() == len(VECTORS), f"{make.__name__}: {points.GetNumberOfArrays()} point arrays")
+            for name in VECTORS:
+                check(numpy.array_equal(vtk_to_numpy(points.GetArray(name)), group[name][()]), f"{make.__name__}: {name}")
+            for name, n in CELLS.items():
+                array = vtk_to_numpy(on_cells.GetArray(name))
+                array = tensor6(array) if n == 6 else array
+                check(numpy.array_equal(array, group[name][()]), f"{make.__name__}: {name}")
+            check(numpy.array_equal(vtk_to_numpy(on_cells.GetArray("body")), f["/mesh/body"][()]), f"{make.__name__}: body")
+            largest = numpy.linalg.norm(group["displacement"][()], axis=1).max()
+            told = rows[k, names.index("max_displacement")]
+            check(abs(largest - told) <= 1e-6 * told, f"displacement {largest} in fields.h5, {told} in history.csv")
+            # the reaction balances weight and inertia only in rest; its sum is what history says
+            sums = group["reaction"][()].astype(float).sum(axis=0)
+            told = rows[k, [names.index(f"hold_reaction_{c}") for c in "xyz"]]
+            check(numpy.abs(sums - told).max() <= 1e-5 * numpy.abs(told).max() + 1e-9, f"reactions {sums}, history {told}")
+    print(f"{make.__name__}: {len(times)} frames of {path}")
+
+
+def datasets(folder):
+    found = {}
+    with h5py.File(OUT / folder / "fields.h5", "r") as f:
+        f.visititems(lambda name, item: found.update({name: item[()]}) if isinstance(item, h5py.Dataset) else None)
+    return found
+
+
+def check_ranks(folders, tolerance):
+    """Constant data equal to the bit; fields to a part of the largest value of their kind."""
+    first = datasets(folders[0])
+    for folder in folders[1:]:
+        other = datasets(folder)
+        check(first.keys() == other.keys(), f"{folder} has other datasets: {first.keys() ^ other.keys()}")
+        for name in first:
+            kind = name.rsplit("/", 1)[-1]
+            if name.startswith("mesh/"):
+                check(numpy.array_equal(first[name], other[name]), f"{name} differs between {folders[0]} and {folder}")
+                continue
+            scale = max(numpy.abs(values).max() for other_name, values in first.items() if other_name.endswith("/" + kind))
+            worst = numpy.abs(first[name] - other[name]).max() / scale
+            check(worst <= tolerance, f"{name} differs by {worst:.2g} of the largest between {folders[0]} and {folder}")
+    print(f"{len(first)} datasets are the same in {', '.join(folders)}")
+
+
+def main():
+    folders = []
+    for ranks in (1, 2, 3, 4):
+        folders.append(f"ranks{ranks}")
+        run(ranks, folders[-1], "-output_precision", "double", "-quiet")
+        check(check_frames(folders[-1]) == 21, f"{ranks} ranks: {check_frames(folders[-1])} frames, expected 21")
+    # 20 steps with the linear solves to 1e-10
+    check_ranks(folders, 1e-8)
+    run(2, "float", "-quiet")
+    # rounding to float, beside the difference of two runs
+    check_ranks(["float", "ranks2"], 1e-7)
+    here = os.getcwd()
+    for make in readers():
+        check_reader(make, "float", str(OUT / "float" / "fields.xmf"))
+        os.chdir(OUT / "float")
+        check_reader(make, "float", "./fields.xmf")
+        os.chdir(here)
+
+
+if __name__ == "__main__":
+    main()
