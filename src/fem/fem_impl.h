@@ -10,22 +10,60 @@
   for BAIJ (values 9 k ..) and for AIJ with full 3x3 blocks (see block_position in tangent.c).
 */
 typedef struct _p_SbPlan {
-  PetscInt *di, *dj;      /* diagonal part: rows [nnode_owned+1], local columns ascending */
-  PetscInt *oi, *oj;      /* off-diagonal part: columns are local ghost nodes, ascending */
-  PetscInt *diagonal;     /* [nnode_owned] block index of (i, i) */
-  PetscInt *offset;       /* [ncell][16] block (a, b) at 4 a + b: k in the diagonal part, ~k in the off-diagonal part,
-                             SB_NOT_OWNED when row a is another rank's */
-  PetscInt *ui;           /* [nnode_owned+1] first upper block of each row, for SBAIJ; NULL otherwise */
-  PetscInt *upper;        /* [ncell][10] block index in the upper triangle of pair p, ~k when it is to be transposed */
-  PetscInt  nfix;         /* blocks that a prescribed unknown touches */
-  PetscInt *fix_block;    /* [nfix] block index as in offset */
-  PetscInt *fix_row;      /* [nfix] local row node */
-  uint8_t  *fix_mask;     /* [nfix] bits 0..2: rows, bits 3..5: columns of the block to clear; bit 6: diagonal block */
-} *SbPlan;
+  PetscInt *di, *dj;  /* diagonal part: rows [nnode_owned+1], local columns ascending */
+  PetscInt *oi, *oj;  /* off-diagonal part: columns are local ghost nodes, ascending */
+  PetscInt *diagonal; /* [nnode_owned] block index of (i, i) */
+  PetscInt
+    *offset; /* [nbatch][16][SB_BATCH] block (a, b) at 4 a + b: k in the diagonal part, ~k in the off-diagonal
+                             part, SB_NOT_OWNED when row a is another rank's; padding lanes have those of the first */
+  PetscInt *ui; /* [nnode_owned+1] first upper block of each row, for SBAIJ; NULL otherwise */
+  PetscInt *
+    upper; /* [nbatch][10][SB_BATCH] block index in the upper triangle of pair p, ~k when it is to be transposed */
+  PetscInt *fresh_start; /* [nbatch+1] into fresh */
+  PetscInt *fresh;       /* [nnode_owned] rows in the order in which the batches reach them first */
+  PetscInt nfix;         /* blocks that a prescribed unknown touches */
+  PetscInt *fix_block;   /* [nfix] block index as in offset */
+  PetscInt *fix_row;     /* [nfix] local row node */
+  uint8_t
+    *fix_mask; /* [nfix] bits 0..2: rows, bits 3..5: columns of the block to clear; bit 6: diagonal block */
+} * SbPlan;
 #define SB_NOT_OWNED PETSC_MIN_INT
 
+/* Where a cell's places begin in `offset`: block (a, b) follows at SB_BATCH (4 a + b). */
+size_t SbPlanCellOffset(SbSpace space, PetscInt cell);
 PetscErrorCode SbPlanCreate(SbSpace space, SbPlan *plan);
 PetscErrorCode SbPlanDestroy(SbPlan *plan);
+
+/* The value arrays of a matrix and how blocks lie in them. */
+typedef struct {
+  SbMatrixKind kind;
+  Mat part[2]; /* diagonal and off-diagonal part; the second is NULL on one rank */
+  PetscScalar *value[2];
+} SbValues;
+
+/* Where block k (as in SbPlan.offset) of row i begins in its value array, and the distance between its rows and columns. */
+static inline PetscScalar *sb_block(const SbValues *x, SbPlan p, PetscInt row, PetscInt k, size_t *row_stride,
+                                    size_t *column_stride)
+{
+  const int q = k < 0;
+  const PetscInt *ptr = q ? p->oi : p->di;
+
+  if (q) k = ~k;
+  if (x->kind == SB_MATRIX_AIJ) {
+    *row_stride = 3 * (size_t)(ptr[row + 1] - ptr[row]);
+    *column_stride = 1;
+    return x->value[q] + 9 * (size_t)ptr[row] + 3 * (size_t)(k - ptr[row]);
+  }
+  *row_stride = 1;
+  *column_stride = 3;
+  if (x->kind == SB_MATRIX_SBAIJ) k = p->ui[row] + k - p->diagonal[row];
+  return x->value[q] + 9 * (size_t)k;
+}
+
+/* Clears the rows that batch b reaches first; call it for every batch in turn, each before SbInsertBatch(). */
+void SbInsertClear(SbSpace space, const SbValues *x, PetscInt b);
+/* Adds the ten blocks of each cell of batch b; K is 32-byte aligned. */
+void SbInsertBatch(SbSpace space, const SbValues *x, PetscInt b, const SbLane K[10][9]);
 
 /* u[3 a + i][lane] of a batch from a local array [nnode][3]. */
 static inline void sb_gather(const PetscInt node[4 * SB_BATCH], const PetscReal x[], SbLane u[12])
@@ -34,7 +72,7 @@ static inline void sb_gather(const PetscInt node[4 * SB_BATCH], const PetscReal 
     for (int l = 0; l < SB_BATCH; l++) {
       const PetscReal *p = x + 3 * node[a * SB_BATCH + l];
 
-      u[3 * a][l]     = p[0];
+      u[3 * a][l] = p[0];
       u[3 * a + 1][l] = p[1];
       u[3 * a + 2][l] = p[2];
     }
@@ -42,7 +80,8 @@ static inline void sb_gather(const PetscInt node[4 * SB_BATCH], const PetscReal 
 }
 
 /* f[nnode][3] += the first n lanes of a batch's nodal vectors. */
-static inline void sb_scatter_add(const PetscInt node[4 * SB_BATCH], PetscInt n, const SbLane fe[12], PetscReal f[])
+static inline void sb_scatter_add(const PetscInt node[4 * SB_BATCH], PetscInt n, const SbLane fe[12],
+                                  PetscReal f[])
 {
   for (int a = 0; a < 4; a++) {
     for (PetscInt l = 0; l < n; l++) {

@@ -7,24 +7,33 @@
 */
 #include "fem_impl.h"
 
-/* Cells around each owned node, as 4 cell + a. */
-static PetscErrorCode invert_cells(SbSpace s, PetscInt **start, PetscInt **slot)
+/*
+  Places in batch_node at which each owned node stands: one for each cell around it. Padding lanes count as the cell that they
+  repeat: its columns are marked once more, and they get its places.
+*/
+static PetscErrorCode invert_batches(SbSpace s, PetscInt **start, PetscInt **slot)
 {
-  const PetscInt n = 4 * s->mesh->ncell;
-  PetscInt      *next;
+  const PetscInt n = 4 * SB_BATCH * s->nbatch;
+  PetscInt *next;
 
   PetscFunctionBeginUser;
   PetscCall(PetscCalloc1(s->nnode_owned + 2, start));
   for (PetscInt k = 0; k < n; k++) {
-    if (s->cell_node[k] < s->nnode_owned) (*start)[s->cell_node[k] + 2]++;
+    if (s->batch_node[k] < s->nnode_owned) (*start)[s->batch_node[k] + 2]++;
   }
   for (PetscInt i = 1; i <= s->nnode_owned; i++) (*start)[i + 1] += (*start)[i];
   PetscCall(PetscMalloc1((*start)[s->nnode_owned + 1], slot));
   next = *start + 1;
   for (PetscInt k = 0; k < n; k++) {
-    if (s->cell_node[k] < s->nnode_owned) (*slot)[next[s->cell_node[k]]++] = k;
+    if (s->batch_node[k] < s->nnode_owned) (*slot)[next[s->batch_node[k]]++] = k;
   }
   PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Node 0 of the cell that has node a at slot[a]; its node b follows SB_BATCH b behind. */
+static inline const PetscInt *slot_cell(SbSpace s, PetscInt slot)
+{
+  return s->batch_node + slot / (4 * SB_BATCH) * (4 * SB_BATCH) + slot % SB_BATCH;
 }
 
 /* Insertion sort: rows hold about fifteen columns. */
@@ -32,7 +41,7 @@ static void sort_columns(PetscInt n, PetscInt column[])
 {
   for (PetscInt i = 1; i < n; i++) {
     const PetscInt c = column[i];
-    PetscInt       j = i;
+    PetscInt j = i;
 
     for (; j > 0 && column[j - 1] > c; j--) column[j] = column[j - 1];
     column[j] = c;
@@ -40,16 +49,17 @@ static void sort_columns(PetscInt n, PetscInt column[])
 }
 
 /* Columns of one row, sorted; seen[] marks them with the row's number. Local ghosts are sorted globally, so local order is global order within each part. */
-static PetscInt row_columns(SbSpace s, PetscInt row, PetscInt n, const PetscInt slot[], PetscInt seen[], PetscInt column[])
+static PetscInt row_columns(SbSpace s, PetscInt row, PetscInt n, const PetscInt slot[], PetscInt seen[],
+                            PetscInt column[])
 {
   PetscInt count = 0;
 
   for (PetscInt k = 0; k < n; k++) {
-    const PetscInt *node = s->cell_node + 4 * (slot[k] / 4);
+    const PetscInt *node = slot_cell(s, slot[k]);
 
-    for (PetscInt b = 0; b < 4; b++) {
+    for (PetscInt b = 0; b < 4 * SB_BATCH; b += SB_BATCH) {
       if (seen[node[b]] == row) continue;
-      seen[node[b]]   = row;
+      seen[node[b]] = row;
       column[count++] = node[b];
     }
   }
@@ -57,50 +67,104 @@ static PetscInt row_columns(SbSpace s, PetscInt row, PetscInt n, const PetscInt 
   return count;
 }
 
+/* Regions are runs of cells and of batches. */
+size_t SbPlanCellOffset(SbSpace s, PetscInt cell)
+{
+  PetscInt low = 0, high = s->nregion - 1, lane;
+  const SbRegion *region;
+
+  while (low < high) {
+    const PetscInt middle = (low + high + 1) / 2;
+
+    if (s->region[middle].cstart <= cell)
+      low = middle;
+    else
+      high = middle - 1;
+  }
+  region = &s->region[low];
+  lane = (cell - region->cstart) % SB_BATCH;
+  return (size_t)(region->bstart + (cell - region->cstart) / SB_BATCH) * 16 * SB_BATCH + (size_t)lane;
+}
+
+/* Rows in the order in which the batches reach them. */
+static PetscErrorCode plan_fresh(SbSpace s, SbPlan p)
+{
+  PetscBool *seen;
+  PetscInt n = 0;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscMalloc2(s->nbatch + 1, &p->fresh_start, s->nnode_owned, &p->fresh));
+  PetscCall(PetscCalloc1(s->nnode_owned, &seen));
+  for (PetscInt b = 0; b < s->nbatch; b++) {
+    p->fresh_start[b] = n;
+    for (PetscInt k = 4 * SB_BATCH * b; k < 4 * SB_BATCH * (b + 1); k++) {
+      const PetscInt row = s->batch_node[k];
+
+      if (row >= s->nnode_owned || seen[row]) continue;
+      seen[row] = PETSC_TRUE;
+      p->fresh[n++] = row;
+    }
+  }
+  p->fresh_start[s->nbatch] = n;
+  PetscCall(PetscFree(seen));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Row i: its columns go to the graph, the places of its blocks to the cells around. */
+static void plan_row(SbSpace s, PetscInt i, PetscInt n, const PetscInt slot[], PetscInt ncolumn,
+                     const PetscInt column[], PetscInt place[], SbPlan p)
+{
+  PetscInt nd = p->di[i], no = p->oi[i];
+
+  for (PetscInt k = 0; k < ncolumn; k++) {
+    if (column[k] < s->nnode_owned) {
+      place[column[k]] = nd;
+      p->dj[nd++] = column[k];
+    } else {
+      place[column[k]] = ~no;
+      p->oj[no++] = column[k];
+    }
+  }
+  p->diagonal[i] = place[i];
+  p->di[i + 1] = nd;
+  p->oi[i + 1] = no;
+  for (PetscInt k = 0; k < n; k++) {
+    const PetscInt *node = slot_cell(s, slot[k]), lane = slot[k] % SB_BATCH;
+    PetscInt *offset = p->offset + 4 * (size_t)(slot[k] - lane) + lane;
+
+    for (PetscInt b = 0; b < 4 * SB_BATCH; b += SB_BATCH) offset[b] = place[node[b]];
+  }
+}
+
 PetscErrorCode SbPlanCreate(SbSpace s, SbPlan *plan)
 {
-  const PetscInt ncell = s->mesh->ncell, nrow = s->nnode_owned;
-  PetscInt      *start, *slot, *seen, *place, *column, widest = 0, capacity, nd = 0, no = 0;
-  SbPlan         p;
+  const PetscInt nrow = s->nnode_owned;
+  const size_t nplace = (size_t)s->nbatch * 16 * SB_BATCH;
+  PetscInt *start, *slot, *seen, *place, *column, widest = 0, capacity;
+  SbPlan p;
 
   PetscFunctionBeginUser;
   PetscCall(PetscNew(&p));
-  PetscCall(invert_cells(s, &start, &slot));
+  PetscCall(invert_batches(s, &start, &slot));
   for (PetscInt i = 0; i < nrow; i++) widest = PetscMax(widest, start[i + 1] - start[i]);
   capacity = nrow + 3 * start[nrow];
   PetscCall(PetscMalloc3(s->nnode, &seen, s->nnode, &place, 3 * widest + 1, &column));
   PetscCall(PetscMalloc4(nrow + 1, &p->di, capacity, &p->dj, nrow + 1, &p->oi, capacity, &p->oj));
   PetscCall(PetscMalloc1(nrow, &p->diagonal));
-  PetscCall(PetscMalloc1(16 * ncell, &p->offset));
+  PetscCall(PetscMalloc1(nplace, &p->offset));
   for (PetscInt i = 0; i < s->nnode; i++) seen[i] = -1;
-  for (PetscInt k = 0; k < 16 * ncell; k++) p->offset[k] = SB_NOT_OWNED;
+  for (size_t k = 0; k < nplace; k++) p->offset[k] = SB_NOT_OWNED;
+  p->di[0] = p->oi[0] = 0;
   for (PetscInt i = 0; i < nrow; i++) {
     const PetscInt n = start[i + 1] - start[i], *around = slot + start[i];
-    const PetscInt count = row_columns(s, i, n, around, seen, column);
+    const PetscInt ncolumn = row_columns(s, i, n, around, seen, column);
 
-    p->di[i] = nd;
-    p->oi[i] = no;
-    for (PetscInt k = 0; k < count; k++) {
-      if (column[k] < nrow) {
-        place[column[k]] = nd;
-        p->dj[nd++]      = column[k];
-      } else {
-        place[column[k]] = ~no;
-        p->oj[no++]      = column[k];
-      }
-    }
-    p->diagonal[i] = place[i];
-    for (PetscInt k = 0; k < n; k++) {
-      const PetscInt *node = s->cell_node + 4 * (around[k] / 4);
-
-      for (PetscInt b = 0; b < 4; b++) p->offset[4 * around[k] + b] = place[node[b]];
-    }
+    plan_row(s, i, n, around, ncolumn, column, place, p);
   }
-  p->di[nrow] = nd;
-  p->oi[nrow] = no;
   PetscCall(PetscFree(start));
   PetscCall(PetscFree(slot));
   PetscCall(PetscFree3(seen, place, column));
+  PetscCall(plan_fresh(s, p));
   *plan = p;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -116,12 +180,13 @@ PetscErrorCode SbPlanDestroy(SbPlan *plan)
   PetscCall(PetscFree(p->offset));
   PetscCall(PetscFree(p->ui));
   PetscCall(PetscFree(p->upper));
+  PetscCall(PetscFree2(p->fresh_start, p->fresh));
   PetscCall(PetscFree3(p->fix_block, p->fix_row, p->fix_mask));
   PetscCall(PetscFree(*plan));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Upper block of each row and the ten places of each cell, for the symmetric storage of one rank. */
+/* First upper block of each row and the ten places of each cell, for the symmetric storage of one rank. */
 static PetscErrorCode plan_upper(SbSpace s, SbPlan p)
 {
   const PetscInt nrow = s->nnode_owned;
@@ -129,16 +194,23 @@ static PetscErrorCode plan_upper(SbSpace s, SbPlan p)
   PetscFunctionBeginUser;
   if (p->upper) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscMalloc1(nrow + 1, &p->ui));
-  PetscCall(PetscMalloc1(10 * s->mesh->ncell, &p->upper));
+  PetscCall(PetscMalloc1((size_t)s->nbatch * 10 * SB_BATCH, &p->upper));
   p->ui[0] = 0;
   for (PetscInt i = 0; i < nrow; i++) p->ui[i + 1] = p->ui[i] + p->di[i + 1] - p->diagonal[i];
-  for (PetscInt c = 0; c < s->mesh->ncell; c++) {
-    for (PetscInt q = 0; q < 10; q++) {
-      const PetscInt a = SbPairA[q], b = SbPairB[q], na = s->cell_node[4 * c + a], nb = s->cell_node[4 * c + b];
-      const PetscInt row = PetscMin(na, nb), k = na <= nb ? p->offset[16 * c + 4 * a + b] : p->offset[16 * c + 4 * b + a];
-      const PetscInt u = p->ui[row] + k - p->diagonal[row];
+  for (PetscInt b = 0; b < s->nbatch; b++) {
+    const PetscInt *node = s->batch_node + 4 * SB_BATCH * b, *offset = p->offset + (size_t)b * 16 * SB_BATCH;
+    PetscInt *upper = p->upper + (size_t)b * 10 * SB_BATCH;
 
-      p->upper[10 * c + q] = na <= nb ? u : ~u;
+    for (PetscInt q = 0; q < 10; q++) {
+      for (PetscInt l = 0; l < SB_BATCH; l++) {
+        const PetscInt na = node[SB_BATCH * SbPairA[q] + l], nb = node[SB_BATCH * SbPairB[q] + l],
+                       row = PetscMin(na, nb);
+        const PetscInt k =
+          offset[SB_BATCH * (na <= nb ? 4 * SbPairA[q] + SbPairB[q] : 4 * SbPairB[q] + SbPairA[q]) + l];
+        const PetscInt u = p->ui[row] + k - p->diagonal[row];
+
+        upper[SB_BATCH * q + l] = na <= nb ? u : ~u;
+      }
     }
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -147,18 +219,20 @@ static PetscErrorCode plan_upper(SbSpace s, SbPlan p)
 /* Inserts zero blocks row by row: afterwards the matrix has its pattern and is assembled. */
 static PetscErrorCode fill_pattern(SbSpace s, SbPlan p, Mat A, PetscBool upper)
 {
-  PetscInt     widest = 0, *column;
+  PetscInt widest = 0, *column;
   PetscScalar *zeros;
 
   PetscFunctionBeginUser;
-  for (PetscInt i = 0; i < s->nnode_owned; i++) widest = PetscMax(widest, p->di[i + 1] - p->di[i] + p->oi[i + 1] - p->oi[i]);
+  for (PetscInt i = 0; i < s->nnode_owned; i++)
+    widest = PetscMax(widest, p->di[i + 1] - p->di[i] + p->oi[i + 1] - p->oi[i]);
   PetscCall(PetscMalloc1(widest, &column));
   PetscCall(PetscCalloc1(9 * widest, &zeros));
   for (PetscInt i = 0; i < s->nnode_owned; i++) {
     const PetscInt grow = s->gnode_start + i;
-    PetscInt       n    = 0;
+    PetscInt n = 0;
 
-    for (PetscInt k = upper ? p->diagonal[i] : p->di[i]; k < p->di[i + 1]; k++) column[n++] = s->gnode_start + p->dj[k];
+    for (PetscInt k = upper ? p->diagonal[i] : p->di[i]; k < p->di[i + 1]; k++)
+      column[n++] = s->gnode_start + p->dj[k];
     for (PetscInt k = p->oi[i]; k < p->oi[i + 1]; k++) column[n++] = s->gnode[p->oj[k]];
     PetscCall(MatSetValuesBlocked(A, 1, &grow, n, column, zeros, INSERT_VALUES));
   }
@@ -189,8 +263,8 @@ static PetscErrorCode plan_fixed(SbSpace s, SbPlan p)
           if (!(mask & 63)) continue;
           if (pass) {
             p->fix_block[n] = part ? ~k : k;
-            p->fix_row[n]   = i;
-            p->fix_mask[n]  = (uint8_t)mask;
+            p->fix_row[n] = i;
+            p->fix_mask[n] = (uint8_t)mask;
           }
           n++;
         }
@@ -224,14 +298,14 @@ static void rigid_mode(PetscInt kind, const PetscReal x[3], const PetscReal box[
 */
 static PetscErrorCode attach_rigid_modes(SbSpace s, Mat A)
 {
-  Vec          mode[6];
-  PetscInt     kept = 0;
+  Vec mode[6];
+  PetscInt kept = 0;
   MatNullSpace near;
 
   PetscFunctionBeginUser;
   for (PetscInt m = 0; m < 6; m++) {
     PetscScalar *v, dot;
-    PetscReal    norm;
+    PetscReal norm;
 
     PetscCall(MatCreateVecs(A, &mode[kept], NULL));
     PetscCall(VecGetArray(mode[kept], &v));
@@ -249,8 +323,10 @@ static PetscErrorCode attach_rigid_modes(SbSpace s, Mat A)
       PetscCall(VecAXPY(mode[kept], -dot, mode[k]));
     }
     PetscCall(VecNormalize(mode[kept], &norm));
-    if (norm > 1e-8) kept++;
-    else PetscCall(VecDestroy(&mode[kept]));
+    if (norm > 1e-8)
+      kept++;
+    else
+      PetscCall(VecDestroy(&mode[kept]));
   }
   PetscCall(MatNullSpaceCreate(s->comm, PETSC_FALSE, kept, mode, &near));
   PetscCall(MatSetNearNullSpace(A, near));
@@ -262,14 +338,15 @@ static PetscErrorCode attach_rigid_modes(SbSpace s, Mat A)
 PetscErrorCode SbSpaceCreateMatrix(SbSpace s, SbMatrixKind kind, Mat *A)
 {
   static const MatType types[] = {MATAIJ, MATBAIJ, MATSBAIJ};
-  PetscInt            *dnnz, *onnz, *unnz;
-  PetscMPIInt          size;
-  SbPlan               p;
+  PetscInt *dnnz, *onnz, *unnz;
+  PetscMPIInt size;
+  SbPlan p;
 
   PetscFunctionBeginUser;
   PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_MATRIX_SETUP], 0, 0, 0, 0));
   PetscCallMPI(MPI_Comm_size(s->comm, &size));
-  PetscCheck(kind != SB_MATRIX_SBAIJ || size == 1, s->comm, PETSC_ERR_SUP, "Symmetric block storage is for one rank: there is no public access to its parallel parts");
+  PetscCheck(kind != SB_MATRIX_SBAIJ || size == 1, s->comm, PETSC_ERR_SUP,
+             "Symmetric block storage is for one rank: there is no public access to its parallel parts");
   if (!s->plan) PetscCall(SbPlanCreate(s, &s->plan));
   p = s->plan;
   PetscCall(plan_fixed(s, p));

@@ -2,8 +2,8 @@
   The tangent A = shift_a M + shift_v C + shift_k K(u), written straight into the value arrays of the matrix.
 
   K is summed from the cells' blocks (sbelement.h) at the places that the plan knows (plan.c); C = alpha M + beta K per
-  region; the lumped M is added to the diagonal blocks. Cells are taken in batches: the kernel works across the lanes, then each
-  lane's blocks are added to the matrix. BAIJ and SBAIJ store a 3x3 block by columns, AIJ as three pieces of rows.
+  region; the lumped M is added to the diagonal blocks. Cells are taken in batches: the kernel works across the lanes, and the
+  blocks of all lanes are added to the matrix (insert.c), whose rows are cleared on the way.
 
   petsc/private/petscimpl.h: raising the state of the outer parallel matrix, which writing into its parts does not do, has no
   public call.
@@ -15,14 +15,7 @@
 #include "sbkernel.h"
 #include <petsc/private/petscimpl.h>
 
-/* The value arrays of a matrix and how blocks lie in them. */
-typedef struct {
-  SbMatrixKind kind;
-  Mat          part[2];
-  PetscScalar *value[2];
-} Access;
-
-static PetscErrorCode access_begin(Mat A, Access *x)
+static PetscErrorCode access_begin(Mat A, SbValues *x)
 {
   PetscBool is[5];
 
@@ -36,104 +29,33 @@ static PetscErrorCode access_begin(Mat A, Access *x)
   x->part[1] = NULL;
   if (is[1]) PetscCall(MatMPIAIJGetSeqAIJ(A, &x->part[0], &x->part[1], NULL));
   if (is[3]) PetscCall(MatMPIBAIJGetSeqBAIJ(A, &x->part[0], &x->part[1], NULL));
-  x->kind     = is[4] ? SB_MATRIX_SBAIJ : is[2] || is[3] ? SB_MATRIX_BAIJ : SB_MATRIX_AIJ;
+  x->kind = is[4] ? SB_MATRIX_SBAIJ : is[2] || is[3] ? SB_MATRIX_BAIJ : SB_MATRIX_AIJ;
   x->value[1] = NULL;
-  PetscCheck(is[0] || is[1] || is[2] || is[3] || is[4], PetscObjectComm((PetscObject)A), PETSC_ERR_SUP, "No direct access to a matrix of type %s",
-             ((PetscObject)A)->type_name);
+  PetscCheck(is[0] || is[1] || is[2] || is[3] || is[4], PetscObjectComm((PetscObject)A), PETSC_ERR_SUP,
+             "No direct access to a matrix of type %s", ((PetscObject)A)->type_name);
   for (int q = 0; q < 2 && x->part[q]; q++) {
-    if (x->kind == SB_MATRIX_AIJ) PetscCall(MatSeqAIJGetArray(x->part[q], &x->value[q]));
-    else if (x->kind == SB_MATRIX_BAIJ) PetscCall(MatSeqBAIJGetArray(x->part[q], &x->value[q]));
-    else PetscCall(MatSeqSBAIJGetArray(x->part[q], &x->value[q]));
+    if (x->kind == SB_MATRIX_AIJ)
+      PetscCall(MatSeqAIJGetArray(x->part[q], &x->value[q]));
+    else if (x->kind == SB_MATRIX_BAIJ)
+      PetscCall(MatSeqBAIJGetArray(x->part[q], &x->value[q]));
+    else
+      PetscCall(MatSeqSBAIJGetArray(x->part[q], &x->value[q]));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode access_end(Access *x)
+static PetscErrorCode access_end(SbValues *x)
 {
   PetscFunctionBeginUser;
   for (int q = 0; q < 2 && x->part[q]; q++) {
-    if (x->kind == SB_MATRIX_AIJ) PetscCall(MatSeqAIJRestoreArray(x->part[q], &x->value[q]));
-    else if (x->kind == SB_MATRIX_BAIJ) PetscCall(MatSeqBAIJRestoreArray(x->part[q], &x->value[q]));
-    else PetscCall(MatSeqSBAIJRestoreArray(x->part[q], &x->value[q]));
+    if (x->kind == SB_MATRIX_AIJ)
+      PetscCall(MatSeqAIJRestoreArray(x->part[q], &x->value[q]));
+    else if (x->kind == SB_MATRIX_BAIJ)
+      PetscCall(MatSeqBAIJRestoreArray(x->part[q], &x->value[q]));
+    else
+      PetscCall(MatSeqSBAIJRestoreArray(x->part[q], &x->value[q]));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Where block k of row i begins in the value array of part q, and the distance between its rows and columns. */
-static inline PetscScalar *block_position(const Access *x, SbPlan p, PetscInt row, PetscInt k, size_t *row_stride, size_t *column_stride)
-{
-  const int       q   = k < 0;
-  const PetscInt *ptr = q ? p->oi : p->di;
-
-  if (q) k = ~k;
-  if (x->kind == SB_MATRIX_AIJ) {
-    *row_stride    = 3 * (size_t)(ptr[row + 1] - ptr[row]);
-    *column_stride = 1;
-    return x->value[q] + 9 * (size_t)ptr[row] + 3 * (size_t)(k - ptr[row]);
-  }
-  *row_stride    = 1;
-  *column_stride = 3;
-  if (x->kind == SB_MATRIX_SBAIJ) k = p->ui[row] + k - p->diagonal[row];
-  return x->value[q] + 9 * (size_t)k;
-}
-
-/* One cell into BAIJ: block (b, a) is the transposed of (a, b), and a block by columns is its transposed by rows. */
-static inline void add_cell_baij(const Access *x, const PetscInt offset[16], const PetscReal K[10][9])
-{
-  for (int p = 0; p < 10; p++) {
-    const int      a = SbPairA[p], b = SbPairB[p];
-    const PetscInt kab = offset[4 * a + b], kba = offset[4 * b + a];
-
-    if (kab != SB_NOT_OWNED) {
-      PetscScalar *v = kab < 0 ? x->value[1] + 9 * (size_t)~kab : x->value[0] + 9 * (size_t)kab;
-
-      for (int j = 0; j < 3; j++) {
-        for (int i = 0; i < 3; i++) v[3 * j + i] += K[p][3 * i + j];
-      }
-    }
-    if (a != b && kba != SB_NOT_OWNED) {
-      PetscScalar *v = kba < 0 ? x->value[1] + 9 * (size_t)~kba : x->value[0] + 9 * (size_t)kba;
-
-      for (int e = 0; e < 9; e++) v[e] += K[p][e];
-    }
-  }
-}
-
-static inline void add_cell_sbaij(const Access *x, const PetscInt upper[10], const PetscReal K[10][9])
-{
-  for (int p = 0; p < 10; p++) {
-    if (upper[p] >= 0) {
-      PetscScalar *v = x->value[0] + 9 * (size_t)upper[p];
-
-      for (int j = 0; j < 3; j++) {
-        for (int i = 0; i < 3; i++) v[3 * j + i] += K[p][3 * i + j];
-      }
-    } else {
-      PetscScalar *v = x->value[0] + 9 * (size_t)~upper[p];
-
-      for (int e = 0; e < 9; e++) v[e] += K[p][e];
-    }
-  }
-}
-
-static inline void add_cell_aij(const Access *x, SbPlan plan, const PetscInt node[4], const PetscInt offset[16], const PetscReal K[10][9])
-{
-  for (int p = 0; p < 10; p++) {
-    const int a = SbPairA[p], b = SbPairB[p];
-
-    for (int turn = 0; turn < (a == b ? 1 : 2); turn++) {
-      const int      row = turn ? b : a, col = turn ? a : b;
-      const PetscInt k = offset[4 * row + col];
-      size_t         rs, cs;
-      PetscScalar   *v;
-
-      if (k == SB_NOT_OWNED) continue;
-      v = block_position(x, plan, node[row], k, &rs, &cs);
-      for (int i = 0; i < 3; i++) {
-        for (int j = 0; j < 3; j++) v[i * rs + (size_t)j] += turn ? K[p][3 * j + i] : K[p][3 * i + j];
-      }
-    }
-  }
 }
 
 /* What one evaluation multiplies with in a region. */
@@ -160,7 +82,8 @@ static void scaled_volumes(const SbLane V, PetscReal factor, SbLane W)
 }
 
 /* A law with the full tangent; its damping comes on top. */
-static void general_blocks(const SbMaterial m, const SbLane *g, const SbLane V, const Factors *x, const SbLane F[9], SbLane K[10][9])
+static void general_blocks(const SbMaterial m, const SbLane *g, const SbLane V, const Factors *x,
+                           const SbLane F[9], SbLane K[10][9])
 {
   SbLane C[81], W;
 
@@ -180,10 +103,11 @@ static void general_blocks(const SbMaterial m, const SbLane *g, const SbLane V, 
 }
 
 /* A law whose tangent is Hooke's tensor turned by R and a part T of the spins (sbelement.h); damping is the same form with T = -mu I. */
-static void spin_blocks(const SbMaterial m, const SbLane *g, const SbLane V, const Factors *x, const SbLane F[9], SbLane K[10][9])
+static void spin_blocks(const SbMaterial m, const SbLane *g, const SbLane V, const Factors *x,
+                        const SbLane F[9], SbLane K[10][9])
 {
   const PetscReal both = x->stiffness + x->damping;
-  SbLane          R[9], T[9], W;
+  SbLane R[9], T[9], W;
 
   m->ops.spin(m, F, R, T);
   for (int k = 0; x->damping != 0. && k < 9; k++) {
@@ -196,11 +120,12 @@ static void spin_blocks(const SbMaterial m, const SbLane *g, const SbLane V, con
 }
 
 /* Blocks of one batch. */
-static void batch_blocks(SbSpace s, const SbRegion *region, const PetscReal displacement[], const Factors *x, PetscInt b, SbLane K[10][9])
+static void batch_blocks(SbSpace s, const SbRegion *region, const PetscReal displacement[], const Factors *x,
+                         PetscInt b, SbLane K[10][9])
 {
   const SbMaterial m = region->material;
-  const SbLane    *g = s->batch_g + 9 * b;
-  SbLane           u[12], F[9], R[9], W;
+  const SbLane *g = s->batch_g + 9 * b;
+  SbLane u[12], F[9], R[9], W;
 
   if (m->linear) {
     scaled_volumes(s->batch_V[b], x->stiffness + x->damping, W);
@@ -212,51 +137,44 @@ static void batch_blocks(SbSpace s, const SbRegion *region, const PetscReal disp
       m->ops.frame(m, (const SbLane *)F, R);
       scaled_volumes(s->batch_V[b], x->stiffness + x->damping, W);
       SbCellBlocksIsotropic(g, W, m->lambda, m->mu, (const SbLane *)R, K);
-    } else if (m->ops.spin && x->stiffness != 0.) spin_blocks(m, g, s->batch_V[b], x, (const SbLane *)F, K);
-    else general_blocks(m, g, s->batch_V[b], x, (const SbLane *)F, K);
+    } else if (m->ops.spin && x->stiffness != 0.)
+      spin_blocks(m, g, s->batch_V[b], x, (const SbLane *)F, K);
+    else
+      general_blocks(m, g, s->batch_V[b], x, (const SbLane *)F, K);
   }
   if (x->inertia != 0.) add_consistent_mass(&region->element->ops, x->inertia, s->batch_V[b], K);
 }
 
-static void add_region(SbSpace s, const SbRegion *region, const SbStage *stage, const Access *x)
+static void add_region(SbSpace s, const SbRegion *region, const SbStage *stage, const SbValues *x)
 {
   const PetscReal inertia = region->material->density * (stage->shift_a + stage->shift_v * region->alpha);
-  const Factors   factors = {stage->shift_k, stage->shift_v * region->beta, s->consistent_mass ? inertia : 0.};
-  SbPlan          plan    = s->plan;
+  const Factors factors = {stage->shift_k, stage->shift_v * region->beta, s->consistent_mass ? inertia : 0.};
 
   for (PetscInt b = region->bstart; b < region->bend; b++) {
     SbLane K[10][9] __attribute__((aligned(64)));
 
     batch_blocks(s, region, stage->u, &factors, b, K);
-    for (PetscInt l = 0; l < s->batch_n[b]; l++) {
-      const PetscInt cell = s->batch_cell[b] + l;
-      PetscReal      Ke[10][9];
-
-      for (int p = 0; p < 10; p++) {
-        for (int e = 0; e < 9; e++) Ke[p][e] = K[p][e][l];
-      }
-      if (x->kind == SB_MATRIX_BAIJ) add_cell_baij(x, plan->offset + 16 * cell, (const PetscReal(*)[9])Ke);
-      else if (x->kind == SB_MATRIX_SBAIJ) add_cell_sbaij(x, plan->upper + 10 * cell, (const PetscReal(*)[9])Ke);
-      else add_cell_aij(x, plan, s->cell_node + 4 * cell, plan->offset + 16 * cell, (const PetscReal(*)[9])Ke);
-    }
+    SbInsertClear(s, x, b);
+    SbInsertBatch(s, x, b, (const SbLane(*)[9])K);
   }
 }
 
-static inline void add_to_diagonal(SbSpace s, const Access *x, PetscInt node, PetscReal value)
+static inline void add_to_diagonal(SbSpace s, const SbValues *x, PetscInt node, PetscReal value)
 {
-  size_t       rs, cs;
-  PetscScalar *v = block_position(x, s->plan, node, s->plan->diagonal[node], &rs, &cs);
+  size_t rs, cs;
+  PetscScalar *v = sb_block(x, s->plan, node, s->plan->diagonal[node], &rs, &cs);
 
   for (size_t i = 0; i < 3; i++) v[i * (rs + cs)] += value;
 }
 
 /* The lumped mass, and what mass-proportional damping of single bodies adds to it. */
-static void add_lumped_mass(SbSpace s, const SbStage *stage, const Access *x)
+static void add_lumped_mass(SbSpace s, const SbStage *stage, const SbValues *x)
 {
   for (PetscInt i = 0; i < s->nnode_owned; i++) add_to_diagonal(s, x, i, stage->shift_a * s->node_mass[i]);
   for (PetscInt r = 0; r < s->nregion; r++) {
     const SbRegion *region = &s->region[r];
-    const PetscReal factor = stage->shift_v * region->alpha * region->material->density * region->element->ops.mass_lumped;
+    const PetscReal factor =
+      stage->shift_v * region->alpha * region->material->density * region->element->ops.mass_lumped;
 
     for (PetscInt b = region->bstart; factor != 0. && b < region->bend; b++) {
       for (PetscInt l = 0; l < s->batch_n[b]; l++) {
@@ -273,7 +191,7 @@ static void add_lumped_mass(SbSpace s, const SbStage *stage, const Access *x)
 PetscErrorCode SbSpaceAssembleTangent(SbSpace s, const SbStage *stage, Mat A)
 {
   PetscBool matrix_free;
-  Access    x;
+  SbValues x;
 
   PetscFunctionBeginUser;
   PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_TANGENT], A, 0, 0, 0));
@@ -282,7 +200,6 @@ PetscErrorCode SbSpaceAssembleTangent(SbSpace s, const SbStage *stage, Mat A)
     PetscCall(PetscLogEventEnd(SbEvents[SB_EVENT_TANGENT], A, 0, 0, 0));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
-  PetscCall(MatZeroEntries(A));
   PetscCall(access_begin(A, &x));
   for (PetscInt r = 0; r < s->nregion; r++) add_region(s, &s->region[r], stage, &x);
   if (!s->consistent_mass && (stage->shift_a != 0. || stage->shift_v != 0.)) add_lumped_mass(s, stage, &x);
@@ -291,18 +208,20 @@ PetscErrorCode SbSpaceAssembleTangent(SbSpace s, const SbStage *stage, Mat A)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbSpaceAddCellBlock(SbSpace s, Mat A, PetscInt cell, PetscInt a, PetscInt b, const PetscReal block[9])
+PetscErrorCode SbSpaceAddCellBlock(SbSpace s, Mat A, PetscInt cell, PetscInt a, PetscInt b,
+                                   const PetscReal block[9])
 {
-  const PetscInt row = s->cell_node[4 * cell + a], column = s->cell_node[4 * cell + b], k = s->plan->offset[16 * cell + 4 * a + b];
-  Access         x;
-  size_t         rs, cs;
-  PetscScalar   *v;
+  const PetscInt row = s->cell_node[4 * cell + a], column = s->cell_node[4 * cell + b],
+                 k = s->plan->offset[SbPlanCellOffset(s, cell) + (size_t)(SB_BATCH * (4 * a + b))];
+  SbValues x;
+  size_t rs, cs;
+  PetscScalar *v;
 
   PetscFunctionBeginUser;
   if (k == SB_NOT_OWNED) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(access_begin(A, &x));
   if (x.kind != SB_MATRIX_SBAIJ || row <= column) {
-    v = block_position(&x, s->plan, row, k, &rs, &cs);
+    v = sb_block(&x, s->plan, row, k, &rs, &cs);
     for (size_t i = 0; i < 3; i++) {
       for (size_t j = 0; j < 3; j++) v[i * rs + j * cs] += s->block_scale * block[3 * i + j];
     }
@@ -312,24 +231,26 @@ PetscErrorCode SbSpaceAddCellBlock(SbSpace s, Mat A, PetscInt cell, PetscInt a, 
 }
 
 /* Clears rows and columns of prescribed unknowns, keeping the magnitude on the diagonal. */
-static void clear_fixed(SbSpace s, const Access *x)
+static void clear_fixed(SbSpace s, const SbValues *x)
 {
   SbPlan p = s->plan;
 
   for (PetscInt n = 0; n < p->nfix; n++) {
-    const int    rows = p->fix_mask[n] & 7, columns = (p->fix_mask[n] >> 3) & 7, diagonal = p->fix_mask[n] & 64;
-    size_t       rs, cs;
+    const int rows = p->fix_mask[n] & 7, columns = (p->fix_mask[n] >> 3) & 7, diagonal = p->fix_mask[n] & 64;
+    size_t rs, cs;
     PetscScalar *v;
 
     if (x->kind == SB_MATRIX_SBAIJ && p->fix_block[n] < p->diagonal[p->fix_row[n]]) continue;
-    v = block_position(x, p, p->fix_row[n], p->fix_block[n], &rs, &cs);
+    v = sb_block(x, p, p->fix_row[n], p->fix_block[n], &rs, &cs);
     for (int i = 0; i < 3; i++) {
       for (int j = 0; j < 3; j++) {
         PetscScalar *e = v + (size_t)i * rs + (size_t)j * cs;
 
         if (!(rows & (1 << i)) && !(columns & (1 << j))) continue;
-        if (diagonal && i == j) *e = *e == 0. ? 1. : PetscAbsScalar(*e);
-        else *e = 0.;
+        if (diagonal && i == j)
+          *e = *e == 0. ? 1. : PetscAbsScalar(*e);
+        else
+          *e = 0.;
       }
     }
   }
@@ -338,7 +259,7 @@ static void clear_fixed(SbSpace s, const Access *x)
 PetscErrorCode SbSpaceFinishTangent(SbSpace s, Mat A)
 {
   PetscBool matrix_free;
-  Access    x;
+  SbValues x;
 
   PetscFunctionBeginUser;
   PetscCall(PetscObjectTypeCompare((PetscObject)A, MATSHELL, &matrix_free));

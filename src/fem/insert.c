@@ -1,0 +1,172 @@
+/*
+  From lanes to the matrix: the ten blocks of a batch of cells, added at their places in the value arrays.
+
+  The kernel leaves the blocks with the lanes side by side, K[pair][entry][lane]; BAIJ and SBAIJ keep the nine entries of a
+  block together, by columns. So the entries of four lanes are transposed in registers, and each block is added as two
+  vectors of four and a last number: measured in cache 20 ns per tet for SBAIJ, where one number after the other took 52.
+  Lanes are added one after the other: neighbouring cells of a batch share blocks.
+
+  A row of the matrix is cleared by the first batch that adds to it (the plan knows which): its lines are in the cache then,
+  and main memory is crossed once in the place of twice. Measured at 200,000 tets, SBAIJ: 33 ns per tet in the place of 49.
+
+  AIJ keeps the rows of a block apart, and batches next to another rank's nodes have blocks in two arrays or in none:
+  these go block by block.
+*/
+#include "fem_impl.h"
+#include "sbkernel.h"
+
+void SbInsertClear(SbSpace s, const SbValues *x, PetscInt b)
+{
+  const SbPlan p = s->plan;
+
+  for (PetscInt k = p->fresh_start[b]; k < p->fresh_start[b + 1]; k++) {
+    const PetscInt i = p->fresh[k], *ptr = x->kind == SB_MATRIX_SBAIJ ? p->ui : p->di;
+
+    memset(x->value[0] + 9 * (size_t)ptr[i], 0, 72 * (size_t)(ptr[i + 1] - ptr[i]));
+    if (x->value[1]) memset(x->value[1] + 9 * (size_t)p->oi[i], 0, 72 * (size_t)(p->oi[i + 1] - p->oi[i]));
+  }
+}
+
+/* Any storage, any rank: the cell in lane l of batch b, block by block. */
+static void insert_cell(SbSpace s, const SbValues *x, PetscInt b, PetscInt l, const SbLane K[10][9])
+{
+  const PetscInt *node = s->cell_node + 4 * (s->batch_cell[b] + l);
+  const PetscInt *offset = s->plan->offset + (size_t)b * 16 * SB_BATCH + l;
+
+  for (int p = 0; p < 10; p++) {
+    PetscReal k[9];
+
+    SbLaneGet(9, K[p], (int)l, k);
+    for (int turn = 0; turn < (SbPairA[p] == SbPairB[p] ? 1 : 2); turn++) {
+      const int row = turn ? SbPairB[p] : SbPairA[p], column = turn ? SbPairA[p] : SbPairB[p];
+      const PetscInt place = offset[SB_BATCH * (4 * row + column)];
+      size_t rs, cs;
+      PetscScalar *v;
+
+      if (place == SB_NOT_OWNED || (x->kind == SB_MATRIX_SBAIJ && node[row] > node[column])) continue;
+      v = sb_block(x, s->plan, node[row], place, &rs, &cs);
+      for (size_t i = 0; i < 3; i++) {
+        for (size_t j = 0; j < 3; j++) v[i * rs + j * cs] += turn ? k[3 * j + i] : k[3 * i + j];
+      }
+    }
+  }
+}
+
+/* ------------------------------------------------------------------ four lanes at a time */
+
+#if defined(__GNUC__)
+typedef double Four __attribute__((vector_size(32), aligned(8), may_alias));
+typedef int64_t Mask __attribute__((vector_size(32), aligned(8), may_alias));
+  #if defined(__clang__)
+    #define SHUFFLE(a, b, i, j, k, l) __builtin_shufflevector(a, b, i, j, k, l)
+  #else
+    #define SHUFFLE(a, b, i, j, k, l) __builtin_shuffle(a, b, (Mask){i, j, k, l})
+  #endif
+
+/* Entry e of the transposed block. */
+static const int swapped[9] = {0, 3, 6, 1, 4, 7, 2, 5, 8};
+
+/* out[l][e] = in[e][l] */
+SB_INLINE void transpose(const Four in[4], Four out[4])
+{
+  const Four a = SHUFFLE(in[0], in[1], 0, 4, 2, 6), b = SHUFFLE(in[0], in[1], 1, 5, 3, 7);
+  const Four c = SHUFFLE(in[2], in[3], 0, 4, 2, 6), d = SHUFFLE(in[2], in[3], 1, 5, 3, 7);
+
+  out[0] = SHUFFLE(a, c, 0, 1, 4, 5);
+  out[1] = SHUFFLE(b, d, 0, 1, 4, 5);
+  out[2] = SHUFFLE(a, c, 2, 3, 6, 7);
+  out[3] = SHUFFLE(b, d, 2, 3, 6, 7);
+}
+
+/* One block in each of four lanes: k[e] its entries by columns, place[l] its number. */
+SB_INLINE void add_blocks(const Four k[9], const PetscInt place[4], PetscScalar value[])
+{
+  Four head[4], middle[4];
+
+  transpose(k, head);
+  transpose(k + 4, middle);
+  for (int l = 0; l < 4; l++) {
+    PetscScalar *v = value + 9 * (size_t)place[l];
+
+    *(Four *)v += head[l];
+    *(Four *)(v + 4) += middle[l];
+    v[8] += k[8][l];
+  }
+}
+
+/* All blocks of the batch are in value[]. Padding lanes have volume zero and add nothing to the blocks of the first. */
+SB_KERNEL static void insert_baij(const SbLane K[restrict 10][9],
+                                  const PetscInt offset[restrict 16 * SB_BATCH], PetscScalar value[restrict])
+{
+  for (int p = 0; p < 10; p++) {
+    const int ab = 4 * SbPairA[p] + SbPairB[p], ba = 4 * SbPairB[p] + SbPairA[p];
+
+    for (int h = 0; h < SB_BATCH; h += 4) {
+      Four k[9];
+
+      for (int e = 0; e < 9; e++) k[e] = *(const Four *)&K[p][swapped[e]][h];
+      add_blocks(k, offset + SB_BATCH * ab + h, value);
+      if (ab == ba) continue;
+      for (int e = 0; e < 9; e++) k[e] = *(const Four *)&K[p][e][h];
+      add_blocks(k, offset + SB_BATCH * ba + h, value);
+    }
+  }
+}
+
+/* The stored block is K_ab, or K_ba = K_ab^T when that lies in the row of the lower node. */
+SB_KERNEL static void insert_sbaij(const SbLane K[restrict 10][9],
+                                   const PetscInt upper[restrict 10 * SB_BATCH], PetscScalar value[restrict])
+{
+  for (int p = 0; p < 10; p++) {
+    for (int h = 0; h < SB_BATCH; h += 4) {
+      PetscInt place[4];
+      Mask turn;
+      Four k[9];
+
+      for (int l = 0; l < 4; l++) {
+        const PetscInt u = upper[SB_BATCH * p + h + l];
+
+        turn[l] = -(int64_t)(u < 0);
+        place[l] = u < 0 ? ~u : u;
+      }
+      for (int e = 0; e < 9; e++) {
+        const Mask ab = *(const Mask *)&K[p][swapped[e]][h], ba = *(const Mask *)&K[p][e][h];
+
+        k[e] = (Four)((turn & ba) | (~turn & ab));
+      }
+      add_blocks(k, place, value);
+    }
+  }
+}
+
+static PetscBool all_owned(SbSpace s, const PetscInt node[4 * SB_BATCH])
+{
+  PetscInt last = 0;
+
+  for (int k = 0; k < 4 * SB_BATCH; k++) last = node[k] > last ? node[k] : last;
+  return (PetscBool)(last < s->nnode_owned);
+}
+
+static PetscBool insert_fast(SbSpace s, const SbValues *x, PetscInt b, const SbLane K[10][9])
+{
+  if (x->kind == SB_MATRIX_SBAIJ)
+    insert_sbaij(K, s->plan->upper + (size_t)b * 10 * SB_BATCH, x->value[0]);
+  else if (x->kind == SB_MATRIX_BAIJ && all_owned(s, s->batch_node + 4 * SB_BATCH * b))
+    insert_baij(K, s->plan->offset + (size_t)b * 16 * SB_BATCH, x->value[0]);
+  else
+    return PETSC_FALSE;
+  return PETSC_TRUE;
+}
+#else
+static PetscBool insert_fast(SbSpace s, const SbValues *x, PetscInt b, const SbLane K[10][9])
+{
+  (void)s, (void)x, (void)b, (void)K;
+  return PETSC_FALSE;
+}
+#endif
+
+void SbInsertBatch(SbSpace s, const SbValues *x, PetscInt b, const SbLane K[10][9])
+{
+  if (insert_fast(s, x, b, K)) return;
+  for (PetscInt l = 0; l < s->batch_n[b]; l++) insert_cell(s, x, b, l, K);
+}
