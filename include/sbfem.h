@@ -147,7 +147,7 @@ PetscErrorCode SbSpaceNodeRotations(SbSpace space, const PetscReal u[], PetscRea
 /*
   SbPCRotatedCreate - makes pc a preconditioner that factors seldom: P = Q A0 Q^T, A0 a past operator, Q its nodes' rotations since.
 
-  Collective. The operator is a frame operator, or an assembled AIJ or BAIJ matrix of the space on which the displacement
+  Collective. The operator is a frame operator, or an assembled matrix of the space on which the displacement
   belonging to it is composed as "sb_state" (PetscObjectCompose() with a vector of SbSpaceCreateVec()). One factorisation lasts
   as long as the iterations stay low; it is renewed at the next change of the operator when they do not, when the solver
   fails, or when SbPCRotatedRenew() is called.

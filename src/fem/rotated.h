@@ -21,7 +21,7 @@ PetscErrorCode SbFrameOperatorGetRotations(Mat A, const SbLane **R);
 /*
   SbSpaceGetRows - rows of an operator of the space for some owned nodes.
 
-  Not collective. Input: A, frame operator, AIJ or BAIJ; n, node[n] owned local nodes. Output: ia[n+1], ja: local nodes, owned
+  Not collective. Input: A, frame operator, AIJ, BAIJ or SBAIJ of the space; n, node[n] owned local nodes. Output: ia[n+1], ja: local nodes, owned
   ones first, both ascending; block[ia[n]][9], row-major, N/m. ja and block may be NULL to learn ia. Caller owns the arrays.
 */
 PetscErrorCode SbSpaceGetRows(SbSpace space, Mat A, PetscInt n, const PetscInt node[], PetscInt ia[],

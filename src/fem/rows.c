@@ -1,8 +1,8 @@
 /*
-  Rows of an operator as 3x3 blocks with local columns, whatever the operator is: a frame operator, AIJ or BAIJ.
+  Rows of an operator as 3x3 blocks with local columns, whatever the operator is: a frame operator, AIJ, BAIJ or SBAIJ.
 
-  The assembled matrices are read by MatGetRow(): three times slower than knowing their storage, and done for all rows only
-  when something is factored.
+  The block storages are read in place, by the plan that they were assembled with (both keep a block by columns; the
+  symmetric one keeps only the upper triangle). AIJ goes through MatGetRow(), three times slower.
 */
 #include "rotated.h"
 
@@ -26,8 +26,8 @@ static PetscInt find_column(SbSpace s, PetscInt row, PetscInt g)
   return -1;
 }
 
-static PetscErrorCode read_rows(SbSpace s, Mat A, PetscInt n, const PetscInt node[], const PetscInt ia[],
-                                PetscReal block[])
+static PetscErrorCode read_any(SbSpace s, Mat A, PetscInt n, const PetscInt node[], const PetscInt ia[],
+                               PetscReal block[])
 {
   PetscFunctionBeginUser;
   for (PetscInt k = 0; k < n; k++) {
@@ -47,11 +47,69 @@ static PetscErrorCode read_rows(SbSpace s, Mat A, PetscInt n, const PetscInt nod
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A block by columns to one by rows; `turned`: of the transposed block. */
+static inline void copy_block(const PetscScalar *from, PetscBool turned, PetscReal to[9])
+{
+  for (int e = 0; e < 9; e++) to[e] = from[turned ? e : 3 * (e % 3) + e / 3];
+}
+
+static PetscErrorCode read_baij(SbSpace s, Mat A, PetscInt n, const PetscInt node[], const PetscInt ia[],
+                                PetscReal block[])
+{
+  const SbPlan p = s->plan;
+  PetscScalar *diagonal, *other = NULL;
+  Mat part[2] = {A, NULL};
+  PetscBool parallel;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscObjectTypeCompare((PetscObject)A, MATMPIBAIJ, &parallel));
+  if (parallel) PetscCall(MatMPIBAIJGetSeqBAIJ(A, &part[0], &part[1], NULL));
+  PetscCall(MatSeqBAIJGetArray(part[0], &diagonal));
+  if (part[1]) PetscCall(MatSeqBAIJGetArray(part[1], &other));
+  for (PetscInt k = 0; k < n; k++) {
+    PetscReal *to = block + 9 * ia[k];
+
+    for (PetscInt e = p->di[node[k]]; e < p->di[node[k] + 1]; e++, to += 9)
+      copy_block(diagonal + 9 * (size_t)e, PETSC_FALSE, to);
+    for (PetscInt e = p->oi[node[k]]; e < p->oi[node[k] + 1]; e++, to += 9)
+      copy_block(other + 9 * (size_t)e, PETSC_FALSE, to);
+  }
+  PetscCall(MatSeqBAIJRestoreArray(part[0], &diagonal));
+  if (part[1]) PetscCall(MatSeqBAIJRestoreArray(part[1], &other));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Blocks left of the diagonal are found, transposed, in the rows of their columns. */
+static PetscErrorCode read_sbaij(SbSpace s, Mat A, PetscInt n, const PetscInt node[], const PetscInt ia[],
+                                 PetscReal block[])
+{
+  const SbPlan p = s->plan;
+  PetscScalar *value;
+
+  PetscFunctionBeginUser;
+  PetscCall(MatSeqSBAIJGetArray(A, &value));
+  for (PetscInt k = 0; k < n; k++) {
+    const PetscInt i = node[k];
+    PetscReal *to = block + 9 * ia[k];
+
+    for (PetscInt e = p->di[i]; e < p->di[i + 1]; e++, to += 9) {
+      const PetscBool lower = (PetscBool)(p->dj[e] < i);
+      const PetscInt row = lower ? p->dj[e] : i;
+      const PetscInt at = lower ? p->di[row] + find_column(s, row, s->gnode[i]) : e;
+
+      copy_block(value + 9 * (size_t)(p->ui[row] + at - p->diagonal[row]), lower, to);
+    }
+  }
+  PetscCall(MatSeqSBAIJRestoreArray(A, &value));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode SbSpaceGetRows(SbSpace s, Mat A, PetscInt n, const PetscInt node[], PetscInt ia[],
                               PetscInt ja[], PetscReal block[])
 {
   const SbPlan p = s->plan;
   const SbLane *R;
+  PetscBool baij, sbaij;
 
   PetscFunctionBeginUser;
   ia[0] = 0;
@@ -64,11 +122,17 @@ PetscErrorCode SbSpaceGetRows(SbSpace s, Mat A, PetscInt n, const PetscInt node[
     PetscCall(PetscArraycpy(ja + ia[k] + nd, p->oj + p->oi[i], no));
   }
   if (!block) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(PetscArrayzero(block, 9 * ia[n]));
+  PetscCall(PetscObjectTypeCompareAny((PetscObject)A, &baij, MATSEQBAIJ, MATMPIBAIJ, ""));
+  PetscCall(PetscObjectTypeCompare((PetscObject)A, MATSEQSBAIJ, &sbaij));
   PetscCall(SbFrameOperatorGetRotations(A, &R));
+  PetscCall(PetscArrayzero(block, 9 * ia[n]));
   if (R)
     PetscCall(SbFrameOperatorAddRows(A, n, node, ia, block));
+  else if (baij)
+    PetscCall(read_baij(s, A, n, node, ia, block));
+  else if (sbaij)
+    PetscCall(read_sbaij(s, A, n, node, ia, block));
   else
-    PetscCall(read_rows(s, A, n, node, ia, block));
+    PetscCall(read_any(s, A, n, node, ia, block));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

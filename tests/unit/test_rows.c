@@ -1,5 +1,5 @@
 // @ranks 1 2 3
-/* Rows of an operator as blocks: those of AIJ, BAIJ and a frame operator are the same, and they are what MatMult does. */
+/* Rows of an operator as blocks: those of AIJ, BAIJ, a frame operator and (one rank) SBAIJ are the same, and they are what MatMult does. */
 #include "../../src/fem/rotated.h"
 #include "../scene.h"
 
@@ -98,14 +98,16 @@ static PetscErrorCode against_product(SbSpace s, Mat A, const Rows *r, Vec X, Pe
 
 int main(int argc, char **argv)
 {
-  static const char *const names[3] = {"AIJ", "BAIJ", "frame operator"};
+  static const char *const names[4] = {"AIJ", "BAIJ", "frame operator", "SBAIJ"};
   TestScene t;
   SbStage stage = {.shift_a = 50., .shift_v = 0., .shift_k = 1.};
   PetscReal worst;
   PetscBool is;
+  PetscMPIInt size;
+  int kinds;
   SbSpace s;
-  Rows rows[3];
-  Mat A[3];
+  Rows rows[4];
+  Mat A[4];
   Vec U, X;
 
   SB_TEST_BEGIN(argc, argv);
@@ -120,11 +122,17 @@ int main(int argc, char **argv)
   PetscCall(SbSpaceCreateFrameOperator(s, &A[2]));
   for (int k = 0; k < 2; k++)
     PetscCall(SbModelTangent(t.model, 0., stage.shift_v, stage.shift_a, 1., U, NULL, A[k]));
+  PetscCallMPI(MPI_Comm_size(PETSC_COMM_WORLD, &size));
+  kinds = size == 1 ? 4 : 3;
+  if (kinds == 4) {
+    PetscCall(SbSpaceCreateMatrix(s, SB_MATRIX_SBAIJ, &A[3]));
+    PetscCall(SbModelTangent(t.model, 0., stage.shift_v, stage.shift_a, 1., U, NULL, A[3]));
+  }
   PetscCall(SbSpaceGetLocalRead(s, U, &stage.u));
   PetscCall(SbFrameOperatorSetState(A[2], &stage, &is));
   PetscCall(SbSpaceRestoreLocalRead(s, U, &stage.u));
-  for (int k = 0; k < 3; k++) PetscCall(get(s, A[k], &rows[k]));
-  for (int k = 0; k < 3; k++) {
+  for (int k = 0; k < kinds; k++) PetscCall(get(s, A[k], &rows[k]));
+  for (int k = 0; k < kinds; k++) {
     SB_CHECK(rows[k].n == (s->nnode_owned + 1) / 2, "%s: %" PetscInt_FMT " rows", names[k], rows[k].n);
     /* entries are up to about 1e3 */
     worst = difference(s, &rows[k], &rows[1]);
@@ -132,7 +140,7 @@ int main(int argc, char **argv)
     PetscCall(against_product(s, A[k], &rows[k], X, &worst));
     SB_CHECK(worst < 1e-10, "%s: rows differ from the product by %g", names[k], (double)worst);
   }
-  for (int k = 0; k < 3; k++) {
+  for (int k = 0; k < kinds; k++) {
     PetscCall(put(&rows[k]));
     PetscCall(MatDestroy(&A[k]));
   }
