@@ -1,0 +1,392 @@
+/*
+  The coarse space of the two-level preconditioner: modes of the aggregates, which rank knows what of them, and the two maps
+  between nodes and modes. An application gathers 6 N numbers on every rank, and each solves for itself.
+
+  Modes that vanish, as the rotations of an aggregate of one node, are found once from the Gram matrix sum Z_i^T Z_i: its
+  eigenvectors with eigenvalues near zero. They are all that can make E = Z^T A Z singular (coarse_operator.c).
+*/
+#include "coarse.h"
+#include <petscblaslapack.h>
+
+#define SB_VANISHING 1e-8 /* squared size of a mode over that of the largest one of its aggregate */
+
+/* ------------------------------------------------------------------ set-up, once */
+
+/* Brings three numbers per node to the ghosts. */
+static PetscErrorCode update_ghosts(SbSpace s, PetscReal x[])
+{
+  const PetscReal *all;
+  PetscScalar *own;
+  Vec v;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbSpaceCreateVec(s, &v));
+  PetscCall(VecGetArray(v, &own));
+  PetscCall(PetscArraycpy(own, x, 3 * s->nnode_owned));
+  PetscCall(VecRestoreArray(v, &own));
+  PetscCall(SbSpaceGetLocalRead(s, v, &all));
+  PetscCall(PetscArraycpy(x, all, 3 * s->nnode));
+  PetscCall(SbSpaceRestoreLocalRead(s, v, &all));
+  PetscCall(VecDestroy(&v));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Own nodes by aggregate; agg still counts from 0 on this rank. */
+static PetscErrorCode list_members(SbCoarse c)
+{
+  const PetscInt nnode = c->space->nnode_owned;
+  PetscInt *next;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscMalloc2(c->n + 1, &c->member_start, nnode, &c->member));
+  PetscCall(PetscCalloc1(c->n + 1, &next));
+  for (PetscInt i = 0; i < nnode; i++) {
+    if (c->agg[i] >= 0) next[c->agg[i] + 1]++;
+  }
+  for (PetscInt a = 0; a < c->n; a++) next[a + 1] += next[a];
+  PetscCall(PetscArraycpy(c->member_start, next, c->n + 1));
+  for (PetscInt i = 0; i < nnode; i++) {
+    if (c->agg[i] >= 0) c->member[next[c->agg[i]]++] = i;
+  }
+  PetscCall(PetscFree(next));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Places relative to the centre in units of the radius; 1 / nodes. */
+static void find_places(SbCoarse c, PetscReal weight[])
+{
+  SbSpace s = c->space;
+
+  for (PetscInt a = 0; a < c->n; a++) {
+    const PetscInt n = c->member_start[a + 1] - c->member_start[a], *node = c->member + c->member_start[a];
+    PetscReal x0[3] = {0., 0., 0.}, r2 = 0.;
+
+    for (PetscInt k = 0; k < 3 * n; k++) x0[k % 3] += s->node_x[3 * node[k / 3] + k % 3] / (PetscReal)n;
+    for (PetscInt k = 0; k < 3 * n; k++) {
+      const PetscReal d = s->node_x[3 * node[k / 3] + k % 3] - x0[k % 3];
+
+      c->d[3 * node[k / 3] + k % 3] = d;
+      r2 += d * d / (PetscReal)n;
+    }
+    for (PetscInt k = 0; k < 3 * n && n > 1; k++) c->d[3 * node[k / 3] + k % 3] /= PetscSqrtReal(r2);
+    weight[a] = 1. / (PetscReal)n;
+  }
+}
+
+/* Projector onto the modes of one aggregate that vanish: eigenvectors of the Gram matrix. */
+static PetscErrorCode find_vanishing(SbCoarse c, PetscInt a, PetscReal projector[36])
+{
+  SbSpace s = c->space;
+  PetscReal gram[36] = {0.}, eigen[6], work[64];
+  PetscBLASInt n = 6, nwork = 64, info;
+
+  PetscFunctionBeginUser;
+  for (PetscInt k = c->member_start[a]; k < c->member_start[a + 1]; k++) {
+    const PetscInt i = c->member[k];
+
+    for (int m = 0; m < 6; m++) {
+      PetscReal unit[6] = {0.}, u[3];
+
+      unit[m] = 1.;
+      SbCoarseMotion(c->d + 3 * i, unit, u);
+      for (int q = 0; q < 3; q++) u[q] = s->fixed[i] & (1 << q) ? 0. : u[q];
+      SbCoarseAddMoments(c->d + 3 * i, u, gram + 6 * m);
+    }
+  }
+  PetscCallBLAS("LAPACKsyev", LAPACKsyev_("V", "U", &n, gram, &n, eigen, work, &nwork, &info));
+  PetscCheck(!info, PETSC_COMM_SELF, PETSC_ERR_LIB, "LAPACK syev failed with %d", (int)info);
+  PetscCall(PetscArrayzero(projector, 36));
+  for (int v = 0; v < 6 && eigen[v] <= SB_VANISHING * eigen[5]; v++) {
+    for (int e = 0; e < 36; e++) projector[e] += gram[6 * v + e / 6] * gram[6 * v + e % 6];
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Which aggregates meet: those at the neighbours of an aggregate's nodes, from the aggregate itself on. */
+static PetscErrorCode find_pattern(SbCoarse c)
+{
+  SbPlan p = c->space->plan;
+  PetscInt *mark, nz = 0;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscMalloc1(c->N, &mark));
+  PetscCall(PetscMalloc1(c->n + 1, &c->start));
+  for (PetscInt pass = 0; pass < 2; pass++) {
+    for (PetscInt b = 0; b < c->N; b++) mark[b] = -1;
+    nz = 0;
+    for (PetscInt a = 0; a < c->n; a++) {
+      c->start[a] = nz;
+      mark[c->first + a] = a;
+      if (pass) c->column[nz] = c->first + a;
+      nz++;
+      for (PetscInt k = c->member_start[a]; k < c->member_start[a + 1]; k++) {
+        const PetscInt i = c->member[k], nd = p->di[i + 1] - p->di[i], no = p->oi[i + 1] - p->oi[i];
+
+        for (PetscInt e = 0; e < nd + no; e++) {
+          const PetscInt b = c->agg[e < nd ? p->dj[p->di[i] + e] : p->oj[p->oi[i] + e - nd]];
+
+          if (b < c->first + a || mark[b] == a) continue;
+          mark[b] = a;
+          if (pass) c->column[nz] = b;
+          nz++;
+        }
+      }
+      if (pass) PetscCall(PetscSortInt(nz - c->start[a], c->column + c->start[a]));
+    }
+    if (!pass) PetscCall(PetscMalloc1(nz, &c->column));
+  }
+  c->start[c->n] = nz;
+  PetscCall(PetscCalloc1(36 * nz, &c->value));
+  PetscCall(PetscFree(mark));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* How a coarse vector is put together from the ranks' parts. */
+static PetscErrorCode plan_parts(SbCoarse c)
+{
+  PetscMPIInt size, mine, sum = 0;
+
+  PetscFunctionBeginUser;
+  PetscCallMPI(MPI_Comm_size(c->space->comm, &size));
+  PetscCall(PetscMPIIntCast(6 * c->n + 1, &mine));
+  PetscCall(PetscMalloc5(size, &c->npart, size, &c->part, size + 1, &c->part_start, mine, &c->send,
+                         6 * c->N + size, &c->receive));
+  PetscCallMPI(MPI_Allgather(&mine, 1, MPI_INT, c->npart, 1, MPI_INT, c->space->comm));
+  c->part_start[0] = 0;
+  for (PetscMPIInt r = 0; r < size; r++) {
+    c->part[r] = sum;
+    sum += c->npart[r];
+    c->part_start[r + 1] = c->part_start[r] + (c->npart[r] - 1) / 6;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* How E is put together from the ranks' blocks. */
+static PetscErrorCode plan_blocks(SbCoarse c)
+{
+  PetscMPIInt size, mine, sum = 0;
+
+  PetscFunctionBeginUser;
+  PetscCallMPI(MPI_Comm_size(c->space->comm, &size));
+  PetscCall(PetscMPIIntCast(36 * c->start[c->n], &mine));
+  PetscCall(PetscMalloc2(size, &c->nvalue, size, &c->at));
+  PetscCallMPI(MPI_Allgather(&mine, 1, MPI_INT, c->nvalue, 1, MPI_INT, c->space->comm));
+  for (PetscMPIInt r = 0; r < size; r++) {
+    c->at[r] = sum;
+    sum += c->nvalue[r];
+  }
+  c->nblock = sum / 36;
+  c->all = c->value;
+  if (size > 1) PetscCall(PetscMalloc1(sum, &c->all));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The blocks of all ranks: number of blocks in each row of blocks, and their columns. */
+static PetscErrorCode gather_pattern(SbCoarse c, PetscInt start[], PetscInt column[])
+{
+  MPI_Comm comm = c->space->comm;
+  PetscMPIInt size, *count, *offset;
+  PetscInt *length;
+
+  PetscFunctionBeginUser;
+  PetscCallMPI(MPI_Comm_size(comm, &size));
+  PetscCall(PetscMalloc3(c->n, &length, size, &count, size, &offset));
+  for (PetscInt a = 0; a < c->n; a++) length[a] = c->start[a + 1] - c->start[a];
+  for (PetscMPIInt r = 0; r < size; r++) {
+    count[r] = c->npart[r] / 6;
+    offset[r] = (PetscMPIInt)c->part_start[r];
+  }
+  start[0] = 0;
+  PetscCallMPI(MPI_Allgatherv(length, (PetscMPIInt)c->n, MPIU_INT, start + 1, count, offset, MPIU_INT, comm));
+  for (PetscInt a = 0; a < c->N; a++) start[a + 1] += start[a];
+  for (PetscMPIInt r = 0; r < size; r++) {
+    count[r] = c->nvalue[r] / 36;
+    offset[r] = c->at[r] / 36;
+  }
+  PetscCallMPI(
+    MPI_Allgatherv(c->column, (PetscMPIInt)c->start[c->n], MPIU_INT, column, count, offset, MPIU_INT, comm));
+  PetscCall(PetscFree3(length, count, offset));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* E as a matrix of PETSc, its values in c->av, and the symbolic part of its factor. */
+static PetscErrorCode create_matrix(SbCoarse c)
+{
+  PetscInt *start, *column, nz = 0;
+  PetscBool has;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscMalloc2(c->N + 1, &start, c->nblock, &column));
+  PetscCall(gather_pattern(c, start, column));
+  PetscCall(PetscMalloc3(6 * c->N + 1, &c->ai, 36 * c->nblock, &c->aj, 36 * c->nblock, &c->av));
+  PetscCall(PetscArrayzero(c->av, 36 * c->nblock));
+  for (PetscInt row = 0; row < 6 * c->N; row++) {
+    c->ai[row] = nz;
+    for (PetscInt k = start[row / 6]; k < start[row / 6 + 1]; k++) {
+      for (PetscInt q = column[k] == row / 6 ? row % 6 : 0; q < 6; q++) c->aj[nz++] = 6 * column[k] + q;
+    }
+  }
+  c->ai[6 * c->N] = nz;
+  PetscCall(PetscFree2(start, column));
+  PetscCall(MatCreateSeqSBAIJWithArrays(PETSC_COMM_SELF, 1, 6 * c->N, 6 * c->N, c->ai, c->aj, c->av, &c->E));
+  PetscCall(MatSetOption(c->E, MAT_SYMMETRIC, PETSC_TRUE));
+  PetscCall(MatCreateVecs(c->E, &c->c, &c->y));
+  PetscCall(MatGetFactorAvailable(c->E, MATSOLVERCHOLMOD, MAT_FACTOR_CHOLESKY, &has));
+  PetscCall(MatGetFactor(c->E, has ? MATSOLVERCHOLMOD : MATSOLVERMUMPS, MAT_FACTOR_CHOLESKY, &c->factor));
+  PetscCall(MatCholeskyFactorSymbolic(c->factor, c->E, NULL, NULL));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The numbers and places of the nodes on every rank that knows them, the weights on all. */
+static PetscErrorCode share_aggregates(SbCoarse c, const PetscReal weight[])
+{
+  SbSpace s = c->space;
+  PetscReal *number;
+  PetscMPIInt size, *count, *offset;
+
+  PetscFunctionBeginUser;
+  PetscCallMPI(MPI_Comm_size(s->comm, &size));
+  PetscCall(PetscCalloc1(3 * s->nnode, &number));
+  for (PetscInt i = 0; i < s->nnode_owned; i++)
+    number[3 * i] = c->agg[i] < 0 ? -1. : (PetscReal)(c->first + c->agg[i]);
+  PetscCall(update_ghosts(s, number));
+  PetscCall(update_ghosts(s, c->d));
+  for (PetscInt i = 0; i < s->nnode; i++) c->agg[i] = (PetscInt)number[3 * i];
+  PetscCall(PetscFree(number));
+  PetscCall(PetscMalloc2(size, &count, size, &offset));
+  for (PetscMPIInt r = 0; r < size; r++) {
+    count[r] = c->npart[r] / 6;
+    offset[r] = (PetscMPIInt)c->part_start[r];
+  }
+  PetscCall(PetscMalloc1(c->N, &c->weight));
+  PetscCallMPI(
+    MPI_Allgatherv(weight, (PetscMPIInt)c->n, MPIU_REAL, c->weight, count, offset, MPIU_REAL, s->comm));
+  PetscCall(PetscFree2(count, offset));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbCoarseCreate(SbSpace s, PetscInt wanted, SbCoarse *coarse)
+{
+  PetscInt nfree = 0, total;
+  PetscReal *weight;
+  SbCoarse c;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscNew(&c));
+  c->space = s;
+  PetscCall(PetscMalloc1(s->nnode, &c->agg));
+  PetscCall(PetscCalloc1(3 * s->nnode, &c->d));
+  for (PetscInt i = 0; i < s->nnode_owned; i++) nfree += s->fixed[i] != 7;
+  PetscCallMPI(MPI_Allreduce(&nfree, &total, 1, MPIU_INT, MPI_SUM, s->comm));
+  wanted = (PetscInt)(0.5 + (PetscReal)wanted * (PetscReal)nfree / (PetscReal)PetscMax(1, total));
+  PetscCall(SbAggregate(s, wanted, &c->n, c->agg));
+  PetscCallMPI(MPI_Allreduce(&c->n, &c->N, 1, MPIU_INT, MPI_SUM, s->comm));
+  PetscCallMPI(MPI_Scan(&c->n, &c->first, 1, MPIU_INT, MPI_SUM, s->comm));
+  c->first -= c->n;
+  PetscCall(list_members(c));
+  PetscCall(PetscMalloc1(c->n, &weight));
+  find_places(c, weight);
+  PetscCall(PetscMalloc1(36 * c->n, &c->null));
+  for (PetscInt a = 0; a < c->n; a++) PetscCall(find_vanishing(c, a, c->null + 36 * a));
+  PetscCall(plan_parts(c));
+  PetscCall(share_aggregates(c, weight));
+  PetscCall(find_pattern(c));
+  PetscCall(plan_blocks(c));
+  if (c->N) PetscCall(create_matrix(c));
+  PetscCall(PetscFree(weight));
+  *coarse = c;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbCoarseDestroy(SbCoarse *coarse)
+{
+  SbCoarse c = *coarse;
+
+  PetscFunctionBeginUser;
+  if (!c) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(MatDestroy(&c->factor));
+  PetscCall(MatDestroy(&c->E));
+  PetscCall(VecDestroy(&c->c));
+  PetscCall(VecDestroy(&c->y));
+  PetscCall(PetscFree3(c->ai, c->aj, c->av));
+  if (c->all != c->value) PetscCall(PetscFree(c->all));
+  PetscCall(PetscFree(c->value));
+  PetscCall(PetscFree(c->column));
+  PetscCall(PetscFree(c->start));
+  PetscCall(PetscFree2(c->nvalue, c->at));
+  PetscCall(PetscFree5(c->npart, c->part, c->part_start, c->send, c->receive));
+  PetscCall(PetscFree2(c->member_start, c->member));
+  PetscCall(PetscFree(c->null));
+  PetscCall(PetscFree(c->weight));
+  PetscCall(PetscFree(c->d));
+  PetscCall(PetscFree(c->agg));
+  PetscCall(PetscFree(*coarse));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ application */
+
+PetscErrorCode SbCoarseRestrict(SbCoarse c, Vec R, PetscReal *share)
+{
+  SbSpace s = c->space;
+  PetscReal norm2 = 0., c2 = 0.;
+  const PetscScalar *r;
+  PetscScalar *all;
+  PetscMPIInt size;
+
+  PetscFunctionBeginUser;
+  *share = 0.;
+  if (!c->N) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCallMPI(MPI_Comm_size(s->comm, &size));
+  PetscCall(PetscArrayzero(c->send, 6 * c->n));
+  PetscCall(VecGetArrayRead(R, &r));
+  for (PetscInt i = 0; i < s->nnode_owned; i++) {
+    PetscReal f[3];
+
+    if (c->agg[i] < 0) continue;
+    for (int q = 0; q < 3; q++) {
+      f[q] = s->fixed[i] & (1 << q) ? 0. : r[3 * i + q];
+      norm2 += f[q] * f[q];
+    }
+    SbCoarseAddMoments(c->d + 3 * i, f, c->send + 6 * (c->agg[i] - c->first));
+  }
+  PetscCall(VecRestoreArrayRead(R, &r));
+  c->send[6 * c->n] = norm2;
+  PetscCallMPI(MPI_Allgatherv(c->send, 6 * (PetscMPIInt)c->n + 1, MPIU_REAL, c->receive, c->npart, c->part,
+                              MPIU_REAL, s->comm));
+  PetscCall(VecGetArrayWrite(c->c, &all));
+  norm2 = 0.;
+  for (PetscMPIInt p = 0; p < size; p++) {
+    const PetscReal *from = c->receive + c->part[p];
+
+    PetscCall(PetscArraycpy(all + 6 * c->part_start[p], from, c->npart[p] - 1));
+    norm2 += from[c->npart[p] - 1];
+  }
+  for (PetscInt k = 0; k < 6 * c->N; k++) c2 += all[k] * all[k] * c->weight[k / 6];
+  PetscCall(VecRestoreArrayWrite(c->c, &all));
+  *share = norm2 > 0. ? PetscSqrtReal(c2 / norm2) : 0.;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbCoarseAdd(SbCoarse c, Vec Z)
+{
+  SbSpace s = c->space;
+  const PetscScalar *y;
+  PetscScalar *z;
+
+  PetscFunctionBeginUser;
+  if (!c->N) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(MatSolve(c->factor, c->c, c->y));
+  PetscCall(VecGetArrayRead(c->y, &y));
+  PetscCall(VecGetArray(Z, &z));
+  for (PetscInt i = 0; i < s->nnode_owned; i++) {
+    PetscReal u[3];
+
+    if (c->agg[i] < 0) continue;
+    SbCoarseMotion(c->d + 3 * i, y + 6 * c->agg[i], u);
+    for (int q = 0; q < 3; q++) z[3 * i + q] += s->fixed[i] & (1 << q) ? 0. : u[q];
+  }
+  PetscCall(VecRestoreArray(Z, &z));
+  PetscCall(VecRestoreArrayRead(c->y, &y));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

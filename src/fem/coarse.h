@@ -1,0 +1,70 @@
+/*
+  coarse.h - aggregates of nodes, their rigid-body modes, and the operator on them: what pc_coarse.c corrects with.
+*/
+#pragma once
+#include "fem_impl.h"
+
+/*
+  SbAggregate - parts the free nodes of this rank into connected, round aggregates of about equal size.
+
+  Not collective. Input: space with its plan; wanted, about how many. Output: n, how many; agg[nnode_owned], number of
+  each node's aggregate, -1 for fully prescribed nodes. Parts that do not touch (bodies) share no aggregate.
+*/
+PetscErrorCode SbAggregate(SbSpace space, PetscInt wanted, PetscInt *n, PetscInt agg[]);
+
+/*
+  The coarse space: columns Z of six modes per aggregate, u(x) = t + w x d with d the place relative to the aggregate's centre
+  in units of its radius; zero on prescribed unknowns. E = Z^T A Z is the same on every rank.
+*/
+typedef struct _p_SbCoarse *SbCoarse;
+struct _p_SbCoarse {
+  SbSpace space;
+  PetscInt n, first, N;   /* aggregates of this rank, number of its first one, all of them */
+  PetscInt *agg;          /* [nnode] aggregate by global number, -1 for fully prescribed nodes */
+  PetscReal *d;           /* [nnode][3] */
+  PetscReal *weight;      /* [N] 1 / nodes in the aggregate */
+  PetscReal *null;        /* [n][36] projector onto the modes that vanish (single nodes, nodes on a line) */
+  PetscInt *member_start; /* [n+1] */
+  PetscInt *member;       /* own nodes by aggregate */
+  PetscInt *start,
+    *column; /* [n+1] blocks of own rows, upper triangle: the aggregate itself, then higher ones ascending */
+  PetscReal *value;          /* [start[n]][36], row-major, N/m */
+  PetscInt nblock;           /* blocks of all ranks */
+  PetscReal *all;            /* [nblock][36]; `value` on one rank */
+  PetscMPIInt *nvalue, *at;  /* [size] numbers in `value` of each rank and their offsets in `all` */
+  PetscMPIInt *npart, *part; /* [size] numbers of each rank in a gathered coarse vector, and offsets */
+  PetscInt *part_start;      /* [size+1] first aggregate of each rank */
+  PetscReal *send,
+    *receive;        /* the coarse vector of this rank and of all, each with the squared norm behind it */
+  PetscInt *ai, *aj; /* E by rows of its upper triangle */
+  PetscScalar *av;
+  Mat E, factor;
+  Vec c, y; /* [6 N] */
+  PetscBool ok;
+};
+
+/* Collective. wanted: aggregates of all ranks, about. */
+PetscErrorCode SbCoarseCreate(SbSpace space, PetscInt wanted, SbCoarse *coarse);
+PetscErrorCode SbCoarseDestroy(SbCoarse *coarse);
+/* E = Z^T A Z for a BAIJ or SBAIJ matrix of the space, and its factor. coarse->ok: E is positive definite. Collective. */
+PetscErrorCode SbCoarseSetUp(SbCoarse coarse, Mat A);
+/* c = Z^T r on every rank; share: |c|, weighted so that it is about |r| when r is in the span of Z, over |r|. Collective. */
+PetscErrorCode SbCoarseRestrict(SbCoarse coarse, Vec r, PetscReal *share);
+/* z += Z E^-1 c with the c of the last SbCoarseRestrict(). Not collective. */
+PetscErrorCode SbCoarseAdd(SbCoarse coarse, Vec z);
+
+/* Z^T f of one node, added: force and torque. */
+SB_INLINE void SbCoarseAddMoments(const PetscReal d[3], const PetscReal f[3], PetscReal m[6])
+{
+  for (int c = 0; c < 3; c++) m[c] += f[c];
+  m[3] += d[1] * f[2] - d[2] * f[1];
+  m[4] += d[2] * f[0] - d[0] * f[2];
+  m[5] += d[0] * f[1] - d[1] * f[0];
+}
+
+SB_INLINE void SbCoarseMotion(const PetscReal d[3], const PetscReal m[6], PetscReal u[3])
+{
+  u[0] = m[0] + m[4] * d[2] - m[5] * d[1];
+  u[1] = m[1] + m[5] * d[0] - m[3] * d[2];
+  u[2] = m[2] + m[3] * d[1] - m[4] * d[0];
+}

@@ -1,0 +1,316 @@
+/*
+  Two-level preconditioner for CG: an incomplete factorisation and a coarse correction, joined as balancing does,
+
+      P^-1 = Q + (1 - Q A) M (1 - A Q),   Q = Z E^-1 Z^T,   E = Z^T A Z
+
+  with M the fine level, Z six rigid-body modes for each of some hundred aggregates of nodes. It is symmetric and positive
+  definite when M and A are. Mandel (1993), Balancing domain decomposition; Tang, Nabben, Vuik, Erlangga (2009),
+  Comparison of two-level preconditioners derived from deflation, domain decomposition and multigrid methods, J. Sci. Comput. 39.
+
+  When the start of the iteration makes Z^T r = 0, which the hook before a solve does, it stays so and the right factor is 1: what
+  is left is their A-DEF2, with one product by A and one coarse solve for each application. That is looked at each time; a
+  residual with a part in the span of Z gets the whole.
+
+  Fine level: ICC(0) of the rows of each rank; where it breaks down (very flat tets), point-block Jacobi.
+*/
+#include "coarse.h"
+#include "sbsolver.h"
+
+#define NAME "two-level"
+#define IN_SPAN \
+  1e-5 /* share of the residual in the span of Z that rounding may leave; below it the right factor is 1 */
+
+typedef struct {
+  SbSpace space;
+  SbCoarse coarse;
+  PetscInt wanted; /* aggregates, 0: by size */
+  PC fine;
+  PetscBool simple; /* the incomplete factorisation broke down */
+  Vec s, w, t;
+  PetscInt nsetup;
+  PetscBool guess_given;
+} TwoLevel;
+
+/* 300 at 36,000 nodes (192,000 tets) was best; the coarse solve grows faster than the number of aggregates. */
+static PetscInt default_aggregates(SbSpace s)
+{
+  return PetscMax(1, (PetscInt)(300. * PetscPowReal((PetscReal)s->Nnode / 36000., 0.7) + 0.5));
+}
+
+/* ------------------------------------------------------------------ set-up */
+
+static PetscErrorCode create_fine(TwoLevel *p, PC pc)
+{
+  const char *prefix;
+  PetscMPIInt size;
+
+  PetscFunctionBeginUser;
+  PetscCall(PCDestroy(&p->fine));
+  PetscCallMPI(MPI_Comm_size(p->space->comm, &size));
+  PetscCall(PCCreate(p->space->comm, &p->fine));
+  PetscCall(PCGetOptionsPrefix(pc, &prefix));
+  PetscCall(PCSetOptionsPrefix(p->fine, prefix));
+  PetscCall(PCAppendOptionsPrefix(p->fine, "fine_"));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Incomplete Cholesky of the rows of each rank, or what replaces it. */
+static PetscErrorCode set_fine_type(TwoLevel *p, Mat A)
+{
+  PetscMPIInt size;
+  PetscBool symmetric;
+  KSP *sub;
+  PC pc;
+
+  PetscFunctionBeginUser;
+  PetscCallMPI(MPI_Comm_size(p->space->comm, &size));
+  PetscCall(PetscObjectTypeCompare((PetscObject)A, MATSEQSBAIJ, &symmetric));
+  PetscCall(PCSetOperators(p->fine, A, A));
+  if (p->simple)
+    PetscCall(PCSetType(p->fine, symmetric ? PCJACOBI : PCPBJACOBI));
+  else if (size == 1) {
+    PetscCall(PCSetType(p->fine, PCICC));
+    PetscCall(PCSetFromOptions(p->fine));
+  } else {
+    PetscCall(PCSetType(p->fine, PCBJACOBI));
+    PetscCall(PCSetUp(p->fine));
+    PetscCall(PCBJacobiGetSubKSP(p->fine, NULL, NULL, &sub));
+    PetscCall(KSPGetPC(sub[0], &pc));
+    PetscCall(PCSetType(pc, PCICC));
+    PetscCall(PCSetFromOptions(p->fine));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode set_up_fine(TwoLevel *p, PC pc, Mat A, PetscBool *ok)
+{
+  PCFailedReason reason;
+
+  PetscFunctionBeginUser;
+  if (!p->fine) {
+    PetscCall(create_fine(p, pc));
+    PetscCall(set_fine_type(p, A));
+  }
+  PetscCall(PCSetOperators(p->fine, A, A));
+  PetscCall(PCSetUp(p->fine));
+  PetscCall(PCSetUpOnBlocks(p->fine));
+  PetscCall(PCGetFailedReason(p->fine, &reason));
+  *ok = (PetscBool)(reason == PC_NOERROR);
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, ok, 1, SB_MPI_BOOL, MPI_LAND, p->space->comm));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* From here on without the incomplete factorisation. */
+static PetscErrorCode simplify(TwoLevel *p)
+{
+  PetscFunctionBeginUser;
+  p->simple = PETSC_TRUE;
+  PetscCall(PCDestroy(&p->fine));
+  PetscCall(
+    SbWarning(p->space->comm,
+              "the incomplete factorisation is not positive definite (very flat tets, or nu near 1/2): "
+              "going on with the diagonal in its place, which is slower; -solver cg_gamg may be faster"));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode PCSetUp_Coarse(PC pc)
+{
+  PetscBool ok;
+  TwoLevel *p;
+  Mat A;
+
+  PetscFunctionBeginUser;
+  PetscCall(PCShellGetContext(pc, &p));
+  PetscCall(PCGetOperators(pc, NULL, &A));
+  PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_SOLVER_SETUP], pc, 0, 0, 0));
+  if (!p->coarse) {
+    PetscCall(SbCoarseCreate(p->space, p->wanted ? p->wanted : default_aggregates(p->space), &p->coarse));
+    PetscCall(MatCreateVecs(A, &p->s, &p->w));
+    PetscCall(VecDuplicate(p->s, &p->t));
+  }
+  PetscCall(set_up_fine(p, pc, A, &ok));
+  if (!ok && !p->simple) {
+    PetscCall(simplify(p));
+    PetscCall(set_up_fine(p, pc, A, &ok));
+  }
+  PetscCall(SbCoarseSetUp(p->coarse, A));
+  p->nsetup++;
+  PetscCall(PetscInfo(pc, "%" PetscInt_FMT " aggregates%s\n", p->coarse->N,
+                      p->coarse->ok ? "" : ": the coarse operator is not positive definite"));
+  PetscCall(PCSetFailedReason(pc, ok && p->coarse->ok ? PC_NOERROR : PC_FACTOR_NUMERIC_ZEROPIVOT));
+  PetscCall(PetscLogEventEnd(SbEvents[SB_EVENT_SOLVER_SETUP], pc, 0, 0, 0));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ application */
+
+static PetscErrorCode PCApply_Coarse(PC pc, Vec r, Vec z)
+{
+  PetscReal share;
+  PetscBool whole;
+  TwoLevel *p;
+  Vec s = r;
+  Mat A;
+
+  PetscFunctionBeginUser;
+  PetscCall(PCShellGetContext(pc, &p));
+  PetscCall(PCGetOperators(pc, NULL, &A));
+  PetscCall(SbCoarseRestrict(p->coarse, r, &share));
+  whole = (PetscBool)(share > IN_SPAN);
+  if (whole) { /* z = Q r, s = r - A z */
+    s = p->s;
+    PetscCall(VecSet(z, 0.));
+    PetscCall(SbCoarseAdd(p->coarse, z));
+    PetscCall(MatMult(A, z, s));
+    PetscCall(VecAYPX(s, -1., r));
+  }
+  /* w = M s + Q (s - A M s) */
+  PetscCall(PCApply(p->fine, s, p->w));
+  PetscCall(MatMult(A, p->w, p->t));
+  PetscCall(VecAYPX(p->t, -1., s));
+  PetscCall(SbCoarseRestrict(p->coarse, p->t, &share));
+  PetscCall(SbCoarseAdd(p->coarse, p->w));
+  if (whole)
+    PetscCall(VecAXPY(z, 1., p->w));
+  else
+    PetscCall(VecCopy(p->w, z));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Corrects the first guess, so that its residual has no part in the span of Z. */
+static PetscErrorCode PCPreSolve_Coarse(PC pc, KSP ksp, Vec b, Vec x)
+{
+  PetscReal share;
+  TwoLevel *p;
+  Mat A;
+
+  PetscFunctionBeginUser;
+  PetscCall(PCShellGetContext(pc, &p));
+  PetscCall(PCGetOperators(pc, &A, NULL));
+  PetscCall(KSPGetInitialGuessNonzero(ksp, &p->guess_given));
+  if (!p->coarse->ok) PetscFunctionReturn(PETSC_SUCCESS);
+  if (p->guess_given) {
+    PetscCall(MatMult(A, x, p->s));
+    PetscCall(VecAYPX(p->s, -1., b));
+  } else
+    PetscCall(VecSet(x, 0.));
+  PetscCall(SbCoarseRestrict(p->coarse, p->guess_given ? p->s : b, &share));
+  PetscCall(SbCoarseAdd(p->coarse, x));
+  PetscCall(KSPSetInitialGuessNonzero(ksp, PETSC_TRUE));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode PCPostSolve_Coarse(PC pc, KSP ksp, Vec b, Vec x)
+{
+  TwoLevel *p;
+
+  PetscFunctionBeginUser;
+  (void)b;
+  (void)x;
+  PetscCall(PCShellGetContext(pc, &p));
+  PetscCall(KSPSetInitialGuessNonzero(ksp, p->guess_given));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ life */
+
+static PetscErrorCode PCView_Coarse(PC pc, PetscViewer viewer)
+{
+  TwoLevel *p;
+
+  PetscFunctionBeginUser;
+  PetscCall(PCShellGetContext(pc, &p));
+  if (p->coarse)
+    PetscCall(PetscViewerASCIIPrintf(
+      viewer, "  %" PetscInt_FMT " aggregates with six rigid-body modes each; fine level:\n", p->coarse->N));
+  if (p->fine) PetscCall(PCView(p->fine, viewer));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode PCDestroy_Coarse(PC pc)
+{
+  TwoLevel *p;
+
+  PetscFunctionBeginUser;
+  PetscCall(PCShellGetContext(pc, &p));
+  PetscCall(SbCoarseDestroy(&p->coarse));
+  PetscCall(PCDestroy(&p->fine));
+  PetscCall(VecDestroy(&p->s));
+  PetscCall(VecDestroy(&p->w));
+  PetscCall(VecDestroy(&p->t));
+  PetscCall(PetscFree(p));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbPCCoarseCreate(SbSpace s, PC pc)
+{
+  const char *prefix;
+  TwoLevel *p;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscNew(&p));
+  p->space = s;
+  PetscCall(PCGetOptionsPrefix(pc, &prefix));
+  PetscCall(PetscOptionsGetInt(NULL, prefix, "-pc_coarse_aggregates", &p->wanted, NULL));
+  PetscCheck(p->wanted >= 0, s->comm, PETSC_ERR_USER,
+             "-pc_coarse_aggregates %" PetscInt_FMT
+             " is negative: give a number of aggregates, or 0 to choose by size",
+             p->wanted);
+  PetscCall(PCSetType(pc, PCSHELL));
+  PetscCall(PCShellSetContext(pc, p));
+  PetscCall(PCShellSetName(pc, NAME));
+  PetscCall(PCShellSetSetUp(pc, PCSetUp_Coarse));
+  PetscCall(PCShellSetApply(pc, PCApply_Coarse));
+  PetscCall(PCShellSetPreSolve(pc, PCPreSolve_Coarse));
+  PetscCall(PCShellSetPostSolve(pc, PCPostSolve_Coarse));
+  PetscCall(PCShellSetView(pc, PCView_Coarse));
+  PetscCall(PCShellSetDestroy(pc, PCDestroy_Coarse));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The context when pc is one of these, else NULL. */
+static PetscErrorCode context_of(PC pc, TwoLevel **p)
+{
+  PetscBool is;
+  const char *name = NULL;
+
+  PetscFunctionBeginUser;
+  *p = NULL;
+  PetscCall(PetscObjectTypeCompare((PetscObject)pc, PCSHELL, &is));
+  if (is) PetscCall(PCShellGetName(pc, &name));
+  if (name && !strcmp(name, NAME)) PetscCall(PCShellGetContext(pc, p));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbPCCoarseFallBack(PC pc, KSPConvergedReason reason, PetscBool *changed)
+{
+  PetscBool ok;
+  TwoLevel *p;
+  Mat A;
+
+  PetscFunctionBeginUser;
+  *changed = PETSC_FALSE;
+  PetscCall(context_of(pc, &p));
+  if (!p || p->simple || !p->coarse || !p->coarse->ok) PetscFunctionReturn(PETSC_SUCCESS);
+  if (reason != KSP_DIVERGED_INDEFINITE_PC && reason != KSP_DIVERGED_PC_FAILED &&
+      reason != KSP_DIVERGED_NANORINF)
+    PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(simplify(p));
+  PetscCall(PCGetOperators(pc, NULL, &A));
+  PetscCall(set_up_fine(p, pc, A, &ok));
+  *changed = ok;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbPCCoarseGetStats(PC pc, PetscInt *naggregate, PetscInt *nsetup, PetscBool *simple)
+{
+  TwoLevel *p;
+
+  PetscFunctionBeginUser;
+  PetscCall(context_of(pc, &p));
+  PetscCheck(p, PetscObjectComm((PetscObject)pc), PETSC_ERR_ARG_WRONG, "Not a two-level preconditioner");
+  if (naggregate) *naggregate = p->coarse ? p->coarse->N : 0;
+  if (nsetup) *nsetup = p->nsetup;
+  if (simple) *simple = p->simple;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
