@@ -74,7 +74,10 @@ PetscErrorCode SbSolverChoose(SbSpace s, PetscBool dynamic, PetscBool linear, Pe
     PetscCall(PetscSNPrintf(reason, size, "explicit integrator: no linear system"));
   } else if (strcmp(choice, "auto")) {
     PetscCall(PetscSNPrintf(reason, size, "chosen by -solver"));
-  } else if (unknowns <= 30000 && (linear || !dynamic || nu > 0.47)) {
+  } else if (dynamic && !linear && unknowns <= 60000) {
+    name = "rotated";
+    PetscCall(PetscSNPrintf(reason, size, "dynamic, %" PetscInt_FMT " unknowns: one factorisation turns with the nodes and serves many steps", unknowns));
+  } else if (unknowns <= 30000) {
     name = nrank == 1 ? "cholmod" : "mumps";
     PetscCall(PetscSNPrintf(reason, size, "%" PetscInt_FMT " unknowns: a factorisation is fast and holds at any Poisson's ratio", unknowns));
   } else if (dynamic) {

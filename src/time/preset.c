@@ -108,7 +108,7 @@ static PetscErrorCode set_up_snes(SbRun run)
   PetscCall(SNESSetType(run->snes, m->linear ? SNESKSPONLY : SNESNEWTONLS));
   PetscCall(SNESGetLineSearch(run->snes, &search));
   PetscCall(SNESLineSearchSetType(search, SNESLINESEARCHBT));
-  PetscCall(SNESSetTolerances(run->snes, 1e-13 * force, 1e-8, 0., m->dynamic ? 20 : 50, SB_UNLIMITED));
+  PetscCall(SNESSetTolerances(run->snes, 1e-13 * force, m->dynamic ? 1e-6 : 1e-8, 0., 50, SB_UNLIMITED));
   PetscCall(SNESSetErrorIfNotConverged(run->snes, PETSC_FALSE));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
