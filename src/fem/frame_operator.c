@@ -348,16 +348,16 @@ PetscErrorCode SbFrameOperatorAddRows(Mat A, PetscInt n, const PetscInt node[], 
       SbCellBlocksIsotropic(s->batch_g + 9 * b, s->batch_V[b], o->lambda[r], o->mu[r],
                             (const SbLane *)o->R + 9 * b, K);
       for (PetscInt l = 0; l < s->batch_n[b]; l++) {
-        const PetscInt *offset = p->offset + 16 * (s->batch_cell[b] + l);
-
         for (int q = 0; q < 16; q++) {
           const int a = q / 4, c = q % 4, lo = PetscMin(a, c), hi = PetscMax(a, c);
           const int pair = lo * (7 - lo) / 2 + hi;
           const PetscInt i = corner[a * SB_BATCH + l], k = wanted[i];
 
           if (k < 0) continue;
+          const PetscInt place = p->offset[(16 * (size_t)b + (size_t)q) * SB_BATCH + (size_t)l];
           const PetscInt at =
-            ia[k] + (offset[q] >= 0 ? offset[q] - p->di[i] : p->di[i + 1] - p->di[i] + ~offset[q] - p->oi[i]);
+            ia[k] + (place >= 0 ? place - p->di[i] : p->di[i + 1] - p->di[i] + ~place - p->oi[i]);
+
           for (int e = 0; e < 9; e++) block[9 * at + e] += K[pair][a <= c ? e : 3 * (e % 3) + e / 3][l];
         }
       }
