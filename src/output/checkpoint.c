@@ -229,10 +229,19 @@ PetscErrorCode SbCheckpointFiles(SbOutput out, SbFileFn fn, void *ctx)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbCheckpointRemoveAll(SbOutput out)
+PetscErrorCode SbCheckpointRemoveAfter(SbOutput out, PetscInt step)
 {
+  struct dirent **names;
+  const int n = list_checkpoints(out->dir, &names);
+  char path[PETSC_MAX_PATH_LEN];
+
   PetscFunctionBeginUser;
-  PetscCall(prune(out, 0));
+  for (int i = 0; i < n; i++) {
+    if (strtol(names[i]->d_name + strlen("checkpoint_"), NULL, 10) <= step) continue;
+    PetscCall(SbOutputPath(out, names[i]->d_name, sizeof(path), path));
+    (void)unlink(path);
+  }
+  free_names(n, names);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

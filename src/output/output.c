@@ -212,7 +212,7 @@ static PetscErrorCode make_folder(SbOutput out, size_t nmessage, char message[])
 static const char *const ours[] = {"fields.h5", "fields.xmf", "history.csv", "scenario.opts", "run.json"};
 
 /* Removes what an earlier run left under our names, and says so. Rank 0. */
-static PetscErrorCode clear_folder(SbOutput out)
+static PetscErrorCode clear_folder(SbOutput out, PetscInt step0)
 {
   static const char *const leftovers[] = {"fields.xmf.tmp", "history.csv.tmp", "scenario.opts.tmp",
                                           "run.json.tmp", "checkpoint.tmp"};
@@ -224,12 +224,13 @@ static PetscErrorCode clear_folder(SbOutput out)
     PetscCall(SbOutputPath(out, leftovers[i], sizeof(path), path));
     (void)unlink(path);
   }
+  // Checkpoints of what is computed again would be the latest ones.
+  PetscCall(SbCheckpointRemoveAfter(out, out->restarted ? step0 : -1));
   if (out->restarted) PetscFunctionReturn(PETSC_SUCCESS);
   for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(ours); i++) {
     PetscCall(SbOutputPath(out, ours[i], sizeof(path), path));
     if (!unlink(path)) found = PETSC_TRUE;
   }
-  PetscCall(SbCheckpointRemoveAll(out));
   if (found && !out->quiet)
     PetscCall(PetscPrintf(PETSC_COMM_SELF, "%s: results of an earlier run are replaced\n", out->dir));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -373,7 +374,7 @@ PetscErrorCode SbOutputAttach(SbRun run)
   PetscCall(view_scenario(run, out, &scenario, &size));
   // A checkpoint that is refused leaves the folder as it was.
   if (out->restart[0]) PetscCall(SbCheckpointLoad(run, out->restart));
-  if (!out->rank) PetscCall(clear_folder(out));
+  if (!out->rank) PetscCall(clear_folder(out, run->step0));
   PetscCall(write_scenario(out, scenario, size));
   PetscCall(SbRunJson(run, out, "running", ""));
   out->attached = PETSC_TRUE;

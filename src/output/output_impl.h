@@ -159,7 +159,7 @@ PetscErrorCode SbHistoryAttach(SbRun run, SbOutput out);
 PetscErrorCode SbHistoryDestroy(SbOutput out);
 PetscErrorCode SbProbesFind(SbRun run, SbOutput out);
 PetscErrorCode SbCheckpointAttach(SbRun run, SbOutput out);
-PetscErrorCode SbCheckpointRemoveAll(SbOutput out); /* rank 0 */
+PetscErrorCode SbCheckpointRemoveAfter(SbOutput out, PetscInt step); /* rank 0 */
 typedef PetscErrorCode (*SbFileFn)(const char *name, PetscInt64 bytes, void *ctx);
 PetscErrorCode SbCheckpointFiles(SbOutput out, SbFileFn fn, void *ctx);
 PetscErrorCode SbProgressAttach(SbRun run, SbOutput out);

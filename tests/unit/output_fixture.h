@@ -16,7 +16,8 @@
 
 #define MATERIAL " -body_a_material linear -body_a_young 1000 -body_a_poisson 0.25 -body_a_density 10"
 #define BOX "-bodies a -body_a_mesh box:0.4,0.1,0.2:4,1,2" MATERIAL
-#define HELD BOX " -sets left -set_left_at plane:1,0,0,0 -effects hold -effect_hold_type support -effect_hold_on left"
+#define HELD \
+  BOX " -sets left -set_left_at plane:1,0,0,0 -effects hold -effect_hold_type support -effect_hold_on left"
 #define EULER " -time euler_implicit -ts_dt 0.1 -ts_max_time 1 -quiet "
 
 /* A folder that does not exist yet, below the system's one for temporary files; the same on all ranks. */
@@ -39,10 +40,10 @@ static inline PetscErrorCode fixture_folder(size_t size, char dir[])
 /* Removes a folder of files. */
 static inline PetscErrorCode fixture_remove(const char *dir)
 {
-  PetscMPIInt    rank;
-  DIR           *d;
+  PetscMPIInt rank;
+  DIR *d;
   struct dirent *entry;
-  char           path[PETSC_MAX_PATH_LEN];
+  char path[PETSC_MAX_PATH_LEN];
 
   PetscFunctionBeginUser;
   PetscCallMPI(MPI_Barrier(PETSC_COMM_WORLD));
@@ -93,16 +94,22 @@ static inline void motion(const PetscReal x[3], PetscReal t, PetscReal u[3], Pet
 /* What the time loop does at a step: state, then monitors. Energies are numbers that tell their column. */
 static inline PetscErrorCode fixture_step(TestScene *scene, PetscInt k, PetscReal dt, PetscBool last)
 {
-  SbRun        run = scene->run;
+  SbRun run = scene->run;
   const SbMesh mesh = scene->model->mesh;
-  SbStep       step = {.step = k, .t = (PetscReal)k * dt, .dt = k == run->step0 ? 0. : dt, .t_end = run->t_end, .step_end = 10, .last = last};
+  SbStep step = {.step = k,
+                 .t = (PetscReal)k * dt,
+                 .dt = k == run->step0 ? 0. : dt,
+                 .t_end = run->t_end,
+                 .step_end = 10,
+                 .last = last};
   PetscScalar *u, *v, *a;
 
   PetscFunctionBeginUser;
   PetscCall(VecGetArray(run->U, &u));
   PetscCall(VecGetArray(run->V, &v));
   PetscCall(VecGetArray(run->A, &a));
-  for (PetscInt i = 0; i < mesh->nvert_owned; i++) motion(mesh->x + 3 * i, step.t, u + 3 * i, v + 3 * i, a + 3 * i);
+  for (PetscInt i = 0; i < mesh->nvert_owned; i++)
+    motion(mesh->x + 3 * i, step.t, u + 3 * i, v + 3 * i, a + 3 * i);
   PetscCall(VecRestoreArray(run->U, &u));
   PetscCall(VecRestoreArray(run->V, &v));
   PetscCall(VecRestoreArray(run->A, &a));
@@ -111,13 +118,19 @@ static inline PetscErrorCode fixture_step(TestScene *scene, PetscInt k, PetscRea
   step.A = run->A;
   if (run->want_residual && !run->reaction) PetscCall(VecDuplicate(run->U, &run->reaction));
   if (run->want_residual) PetscCall(VecSet(run->reaction, 0.5));
-  step.R             = run->reaction;
-  step.energies      = (SbEnergies){.kinetic = 100. + k, .strain = 200. + k, .load_work = 300. + k, .drive_work = 400., .volume = 0.008, .min_J = 1. / 3., .ninverted = 7};
-  run->energies      = step.energies;
-  step.newton        = 2;
-  step.linear        = 30;
-  step.wall          = 0.01 * (PetscReal)k;
-  run->steps_total   = k;
+  step.R = run->reaction;
+  step.energies = (SbEnergies){.kinetic = 100. + k,
+                               .strain = 200. + k,
+                               .load_work = 300. + k,
+                               .drive_work = 400.,
+                               .volume = 0.008,
+                               .min_J = 1. / 3.,
+                               .ninverted = 7};
+  run->energies = step.energies;
+  step.newton = 2;
+  step.linear = 30;
+  step.wall = 0.01 * (PetscReal)k;
+  run->steps_total = k;
   for (PetscInt m = 0; m < run->nmonitor; m++) PetscCall(run->monitor[m].fn(run, &step, run->monitor[m].ctx));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -125,7 +138,7 @@ static inline PetscErrorCode fixture_step(TestScene *scene, PetscInt k, PetscRea
 /* A file of the folder as text, on every rank; empty when it is missing. PetscFree. */
 static inline PetscErrorCode fixture_read(const char *dir, const char *name, char **text)
 {
-  char   path[PETSC_MAX_PATH_LEN];
+  char path[PETSC_MAX_PATH_LEN];
   size_t size;
 
   PetscFunctionBeginUser;

@@ -8,7 +8,7 @@ static char dir[PETSC_MAX_PATH_LEN];
 /* Opens what the run wrote; the caller closes. */
 static PetscErrorCode open_fields(SbH5 *h)
 {
-  char      path[PETSC_MAX_PATH_LEN];
+  char path[PETSC_MAX_PATH_LEN];
   PetscBool ok;
 
   PetscFunctionBeginUser;
@@ -21,11 +21,11 @@ static PetscErrorCode open_fields(SbH5 *h)
 /* Vertex fields against the formula at the rest positions of the same file; cell fields against the constant state. */
 static PetscErrorCode check_values(SbOutput out, SbH5 *h, const char *group, PetscReal t, PetscReal tolerance)
 {
-  const PetscReal mu = 400., lambda = 400.; // E = 1000, nu = 1/4
+  const PetscReal mu = 400., lambda = 400.;                            // E = 1000, nu = 1/4
   const PetscReal e[6] = {t * G00, 0., t * G02 / 2., t * G11, 0., 0.}; // xx xy xz yy yz zz
-  PetscReal      *x, *field, s[6], worst = 0.;
-  PetscBool       ok;
-  char            name[128];
+  PetscReal *x, *field, s[6], worst = 0.;
+  PetscBool ok;
+  char name[128];
 
   PetscFunctionBeginUser;
   PetscCall(PetscMalloc2(3 * out->vertex.n, &x, 6 * PetscMax(out->vertex.n, out->cell.n), &field));
@@ -49,7 +49,8 @@ static PetscErrorCode check_values(SbOutput out, SbH5 *h, const char *group, Pet
   SbFormat(sizeof(name), name, "%s/stress", group);
   PetscCall(SbH5ReadSlice(h, name, &out->cell, 6, field, &ok));
   SB_CHECK(ok, "no %s", name);
-  for (int k = 0; k < 6; k++) s[k] = 2. * mu * e[k] + (k == 0 || k == 3 || k == 5 ? lambda * (e[0] + e[3] + e[5]) : 0.);
+  for (int k = 0; k < 6; k++)
+    s[k] = 2. * mu * e[k] + (k == 0 || k == 3 || k == 5 ? lambda * (e[0] + e[3] + e[5]) : 0.);
   worst = 0.;
   for (PetscInt i = 0; i < 6 * out->cell.n; i++) worst = PetscMax(worst, PetscAbsReal(field[i] - s[i % 6]));
   SB_CHECK_NEAR(worst, 0., 20. * tolerance, "stress");
@@ -59,7 +60,8 @@ static PetscErrorCode check_values(SbOutput out, SbH5 *h, const char *group, Pet
   worst = 0.;
   for (PetscInt i = 0; i < out->cell.n; i++) {
     const PetscReal p = (s[0] + s[3] + s[5]) / 3.;
-    const PetscReal d = PetscSqr(s[0] - p) + PetscSqr(s[3] - p) + PetscSqr(s[5] - p) + 2. * (PetscSqr(s[1]) + PetscSqr(s[2]) + PetscSqr(s[4]));
+    const PetscReal d = PetscSqr(s[0] - p) + PetscSqr(s[3] - p) + PetscSqr(s[5] - p) +
+                        2. * (PetscSqr(s[1]) + PetscSqr(s[2]) + PetscSqr(s[4]));
 
     worst = PetscMax(worst, PetscAbsReal(field[i] - PetscSqrtReal(1.5 * d)));
   }
@@ -72,13 +74,13 @@ static PetscErrorCode check_values(SbOutput out, SbH5 *h, const char *group, Pet
 static PetscErrorCode check_mesh(SbOutput out, SbH5 *h, PetscReal volume)
 {
   const PetscInt nvert = out->vertex.N;
-  SbOrder        all   = out->vertex; // every rank reads all vertices
-  PetscReal     *x, *cell, *body, sum = 0., least = 1.;
-  PetscBool      ok[3];
+  SbOrder all = out->vertex; // every rank reads all vertices
+  PetscReal *x, *cell, *body, sum = 0., least = 1.;
+  PetscBool ok[3];
 
   PetscFunctionBeginUser;
   all.start = 0;
-  all.n     = nvert;
+  all.n = nvert;
   PetscCall(PetscMalloc3(3 * nvert, &x, 4 * out->cell.n, &cell, out->cell.n, &body));
   PetscCall(SbH5ReadSlice(h, "/mesh/x", &all, 3, x, &ok[0]));
   PetscCall(SbH5ReadSlice(h, "/mesh/cells", &out->cell, 4, cell, &ok[1]));
@@ -88,13 +90,17 @@ static PetscErrorCode check_mesh(SbOutput out, SbH5 *h, PetscReal volume)
     PetscReal d[3][3], det;
 
     for (int a = 0; a < 3; a++) {
-      for (int i = 0; i < 3; i++) d[a][i] = x[3 * (PetscInt)cell[4 * c + a + 1] + i] - x[3 * (PetscInt)cell[4 * c] + i];
+      for (int i = 0; i < 3; i++)
+        d[a][i] = x[3 * (PetscInt)cell[4 * c + a + 1] + i] - x[3 * (PetscInt)cell[4 * c] + i];
     }
-    det = d[0][0] * (d[1][1] * d[2][2] - d[1][2] * d[2][1]) - d[0][1] * (d[1][0] * d[2][2] - d[1][2] * d[2][0]) + d[0][2] * (d[1][0] * d[2][1] - d[1][1] * d[2][0]);
+    det = d[0][0] * (d[1][1] * d[2][2] - d[1][2] * d[2][1]) -
+          d[0][1] * (d[1][0] * d[2][2] - d[1][2] * d[2][0]) +
+          d[0][2] * (d[1][0] * d[2][1] - d[1][1] * d[2][0]);
     sum += det / 6.;
     least = PetscMin(least, det);
     // bodies in scenario order: the cells of the first one come first
-    SB_CHECK(body[c] == (PetscReal)(out->cell.start + c >= 48), "cell %d is in body %g", (int)(out->cell.start + c), (double)body[c]);
+    SB_CHECK(body[c] == (PetscReal)(out->cell.start + c >= 48), "cell %d is in body %g",
+             (int)(out->cell.start + c), (double)body[c]);
   }
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &sum, 1, MPIU_REAL, MPI_SUM, PETSC_COMM_WORLD));
   SB_CHECK_NEAR(sum, volume, 1e-13, "volume of the cells of the file"); // rounding of 48 volumes near 1e-4
@@ -111,13 +117,14 @@ static PetscInt count(const char *text, const char *word)
   return n;
 }
 
-#define ALL " -output_fields displacement,velocity,acceleration,stress,von_mises,J,energy_density,reaction,rank"
+#define ALL \
+  " -output_fields displacement,velocity,acceleration,stress,von_mises,J,energy_density,reaction,rank"
 
 static PetscErrorCode test_values(const char *precision, PetscReal tolerance)
 {
   TestScene scene;
-  SbH5      h;
-  char      options[2048], *xmf;
+  SbH5 h;
+  char options[2048], *xmf;
 
   PetscFunctionBeginUser;
   SbFormat(sizeof(options), options, HELD EULER ALL " -output_precision %s", precision);
@@ -140,11 +147,11 @@ static PetscErrorCode test_values(const char *precision, PetscReal tolerance)
 /* The reaction is the residual on held vertices and zero elsewhere. */
 static PetscErrorCode test_reaction(void)
 {
-  TestScene  scene;
-  SbOutput   out;
-  SbH5       h;
+  TestScene scene;
+  SbOutput out;
+  SbH5 h;
   PetscReal *x, *r;
-  PetscBool  ok, fine = PETSC_TRUE;
+  PetscBool ok, fine = PETSC_TRUE;
 
   PetscFunctionBeginUser;
   PetscCall(fixture_open(dir, HELD EULER " -output_fields reaction", &scene));
@@ -156,7 +163,8 @@ static PetscErrorCode test_reaction(void)
   PetscCall(SbH5ReadSlice(&h, "/mesh/x", &out->vertex, 3, x, &ok));
   PetscCall(SbH5ReadSlice(&h, "/step/0000/000000/reaction", &out->vertex, 3, r, &ok));
   SB_CHECK(ok, "no reaction");
-  for (PetscInt i = 0; i < 3 * out->vertex.n; i++) fine = (PetscBool)(fine && r[i] == (x[i - i % 3] < 1e-9 ? 0.5 : 0.));
+  for (PetscInt i = 0; i < 3 * out->vertex.n; i++)
+    fine = (PetscBool)(fine && r[i] == (x[i - i % 3] < 1e-9 ? 0.5 : 0.));
   SB_CHECK(fine, "reactions are not those of the held vertices");
   PetscCall(PetscFree2(x, r));
   PetscCall(SbH5Close(&h));
@@ -167,13 +175,15 @@ static PetscErrorCode test_reaction(void)
 static PetscErrorCode test_two_bodies(void)
 {
   TestScene scene;
-  SbH5      h;
+  SbH5 h;
 
   PetscFunctionBeginUser;
-  PetscCall(fixture_open(dir,
-                         "-bodies a,b -body_a_mesh box:0.4,0.1,0.2:4,1,2 -body_b_mesh box:0.4,0.1,0.2:4,1,2 -body_b_translate 0,0,1"
-                         " -body_b_material linear -body_b_young 1 -body_b_poisson 0 -body_b_density 1" MATERIAL EULER,
-                         &scene));
+  PetscCall(fixture_open(
+    dir,
+    "-bodies a,b -body_a_mesh box:0.4,0.1,0.2:4,1,2 -body_b_mesh box:0.4,0.1,0.2:4,1,2 -body_b_translate "
+    "0,0,1"
+    " -body_b_material linear -body_b_young 1 -body_b_poisson 0 -body_b_density 1" MATERIAL EULER,
+    &scene));
   PetscCall(open_fields(&h));
   PetscCall(check_mesh((SbOutput)scene.run->output, &h, 0.016));
   PetscCall(SbH5Close(&h));
@@ -185,7 +195,7 @@ static PetscErrorCode test_two_bodies(void)
 static PetscErrorCode frames_of(const char *more, PetscInt n, PetscReal dt, char frames[])
 {
   TestScene scene;
-  char      options[2048], *xmf, name[64];
+  char options[2048], *xmf, name[64];
 
   PetscFunctionBeginUser;
   SbFormat(sizeof(options), options, BOX EULER "-output_fields displacement %s", more);
@@ -206,7 +216,7 @@ static PetscErrorCode test_which_frames(void)
 {
   static const struct {
     const char *options;
-    PetscReal   dt;
+    PetscReal dt;
     const char *frames;
   } cases[] = {
     {"", 0.1, "11111111111"},
@@ -220,7 +230,8 @@ static PetscErrorCode test_which_frames(void)
   PetscFunctionBeginUser;
   for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(cases); i++) {
     PetscCall(frames_of(cases[i].options, 10, cases[i].dt, frames));
-    SB_CHECK(!strcmp(frames, cases[i].frames), "'%s' gives frames %s, expected %s", cases[i].options, frames, cases[i].frames);
+    SB_CHECK(!strcmp(frames, cases[i].frames), "'%s' gives frames %s, expected %s", cases[i].options, frames,
+             cases[i].frames);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -228,15 +239,16 @@ static PetscErrorCode test_which_frames(void)
 /* Address and size of the header of a group in the file. */
 static void header_of(hid_t file, const char *name, unsigned long *address, unsigned long *size)
 {
-  H5O_info_t   info;
-  const hid_t  group = H5Oopen(file, name, H5P_DEFAULT);
+  H5O_info_t info;
+  const hid_t group = H5Oopen(file, name, H5P_DEFAULT);
 
   *address = *size = 0;
 #if H5_VERSION_GE(1, 12, 0)
   {
     H5O_native_info_t native;
 
-    if (H5Oget_info3(group, &info, H5O_INFO_BASIC) >= 0 && H5Oget_native_info(group, &native, H5O_NATIVE_INFO_HDR) >= 0) {
+    if (H5Oget_info3(group, &info, H5O_INFO_BASIC) >= 0 &&
+        H5Oget_native_info(group, &native, H5O_NATIVE_INFO_HDR) >= 0) {
       memcpy(address, &info.token, sizeof(*address)); // the token of the native format is the address
       *size = (unsigned long)native.hdr.space.total;
     }
@@ -244,7 +256,7 @@ static void header_of(hid_t file, const char *name, unsigned long *address, unsi
 #else
   if (H5Oget_info2(group, &info, H5O_INFO_BASIC | H5O_INFO_HDR) >= 0) {
     *address = (unsigned long)info.addr;
-    *size    = (unsigned long)info.hdr.space.total;
+    *size = (unsigned long)info.hdr.space.total;
   }
 #endif
   (void)H5Oclose(group);
@@ -253,9 +265,9 @@ static void header_of(hid_t file, const char *name, unsigned long *address, unsi
 /* More than a hundred frames; each hundred has its links within one page of the file, so that a name appears at once. */
 static PetscErrorCode test_hundreds(void)
 {
-  TestScene     scene;
-  SbH5          h;
-  char         *xmf;
+  TestScene scene;
+  SbH5 h;
+  char *xmf;
   unsigned long address, size;
 
   PetscFunctionBeginUser;
@@ -267,13 +279,16 @@ static PetscErrorCode test_hundreds(void)
 
     SbFormat(sizeof(name), name, "/step/%04d", i);
     header_of(h.file, name, &address, &size);
-    SB_CHECK(size > 0 && size <= 4096 && address % 4096 == 0, "%s lies at %lu and takes %lu bytes", name, address, size);
+    SB_CHECK(size > 0 && size <= 4096 && address % 4096 == 0, "%s lies at %lu and takes %lu bytes", name,
+             address, size);
   }
   header_of(h.file, "/step", &address, &size);
-  SB_CHECK(size > 0 && size <= 4096 && address % 4096 == 0, "/step lies at %lu and takes %lu bytes", address, size);
+  SB_CHECK(size > 0 && size <= 4096 && address % 4096 == 0, "/step lies at %lu and takes %lu bytes", address,
+           size);
   PetscCall(SbH5Close(&h));
   PetscCall(fixture_read(dir, "fields.xmf", &xmf));
-  SB_CHECK(count(xmf, "<Time ") == 231 && strstr(xmf, "/step/0002/000230/J"), "%d frames in fields.xmf", (int)count(xmf, "<Time "));
+  SB_CHECK(count(xmf, "<Time ") == 231 && strstr(xmf, "/step/0002/000230/J"), "%d frames in fields.xmf",
+           (int)count(xmf, "<Time "));
   PetscCall(PetscFree(xmf));
   PetscCall(test_scene_close(&scene));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -283,8 +298,8 @@ static PetscErrorCode test_hundreds(void)
 static PetscErrorCode test_restart(void)
 {
   TestScene scene;
-  SbH5      h;
-  char     *xmf, restart[PETSC_MAX_PATH_LEN + 256];
+  SbH5 h;
+  char *xmf, restart[PETSC_MAX_PATH_LEN + 256];
 
   PetscFunctionBeginUser;
   PetscCall(fixture_open(dir, HELD EULER ALL " -checkpoint_every_steps 4", &scene));
@@ -294,7 +309,8 @@ static PetscErrorCode test_restart(void)
   PetscCall(fixture_open(dir, restart, &scene));
   SB_CHECK(scene.run->step0 == 4, "restart at step %d", (int)scene.run->step0);
   PetscCall(fixture_read(dir, "fields.xmf", &xmf));
-  SB_CHECK(count(xmf, "<Time ") == 5 && !strstr(xmf, "/000005/"), "after a restart at 4: %d frames", (int)count(xmf, "<Time "));
+  SB_CHECK(count(xmf, "<Time ") == 5 && !strstr(xmf, "/000005/"), "after a restart at 4: %d frames",
+           (int)count(xmf, "<Time "));
   PetscCall(PetscFree(xmf));
   for (PetscInt k = 4; k <= 6; k++) PetscCall(fixture_step(&scene, k, 0.1, (PetscBool)(k == 6)));
   PetscCall(fixture_read(dir, "fields.xmf", &xmf));
@@ -319,7 +335,8 @@ static PetscErrorCode test_nothing(void)
   SB_CHECK(scene.run->nmonitor == 0, "%d monitors", (int)scene.run->nmonitor);
   SB_CHECK(!scene.run->want_energies && !scene.run->want_residual, "energies or residual are asked for");
   PetscCall(test_scene_close(&scene));
-  SB_CHECK(!fixture_exists(dir, "fields.h5") && !fixture_exists(dir, "history.csv"), "files that nobody asked for");
+  SB_CHECK(!fixture_exists(dir, "fields.h5") && !fixture_exists(dir, "history.csv"),
+           "files that nobody asked for");
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -101,10 +101,10 @@ def check_damage():
 def check_fit():
     whole = OUT / "checkpoint_000020.h5"
     expect(r"made with '-body_bar_young 5e4', this run has '-body_bar_young 6e4'", "-restart", whole, "-body_bar_young", "6e4")
-    expect(r"made with '-effects gravity,hold', this run has '-effects hold'", "-restart", whole, "-effects", "hold")
+    expect(r"made with '-effects gravity,hold', this run has '-effects gravity,hold,more'",
+           "-restart", whole, "-effects", "gravity,hold,more", "-effect_more_type", "gravity")
     expect("belongs to another mesh", "-restart", whole, "-body_bar_mesh", "box:0.4,0.1,0.1:8,2,3")
     expect("belongs to another mesh|made with", "-restart", whole, "-body_bar_translate", "0,0,1e-9")
-    expect("made with '-time dynamic', this run has '-time static'", "-restart", whole, "-time", "static")
     print("checkpoints of other runs are refused")
 
 

@@ -1,0 +1,148 @@
+// Checkpoints: every bit comes back, on the ranks that there are; which ones are kept; what does not fit is refused.
+// @ranks 1 2 3
+#include "output_fixture.h"
+
+#define HASH_OF_BOX 0x1e14294dea8e2209u
+
+static char dir[PETSC_MAX_PATH_LEN];
+
+/* Largest difference between the vectors of the run and the motion at time t. */
+static PetscReal difference(TestScene *scene, PetscReal t)
+{
+  const SbMesh mesh = scene->model->mesh;
+  const PetscScalar *state[3];
+  PetscReal worst = 0.;
+  Vec vec[3] = {scene->run->U, scene->run->V, scene->run->A};
+
+  for (int k = 0; k < 3; k++) (void)VecGetArrayRead(vec[k], &state[k]);
+  for (PetscInt i = 0; i < mesh->nvert_owned; i++) {
+    PetscReal m[3][3];
+
+    motion(mesh->x + 3 * i, t, m[0], m[1], m[2]);
+    for (int k = 0; k < 3; k++)
+      for (int c = 0; c < 3; c++) worst = PetscMax(worst, PetscAbsReal(state[k][3 * i + c] - m[k][c]));
+  }
+  for (int k = 0; k < 3; k++) (void)VecRestoreArrayRead(vec[k], &state[k]);
+  return worst;
+}
+
+static PetscErrorCode test_round_trip(void)
+{
+  TestScene scene;
+  char options[PETSC_MAX_PATH_LEN];
+
+  PetscFunctionBeginUser;
+  PetscCall(fixture_open(dir, HELD EULER "-output_fields none -checkpoint_every_time 0.25", &scene));
+  SB_CHECK(scene.run->want_energies, "works and losses are part of the state");
+  scene.run->energy_start = 1. / 7.;
+  for (PetscInt k = 0; k <= 9; k++) PetscCall(fixture_step(&scene, k, 0.1, PETSC_FALSE));
+  PetscCall(test_scene_close(&scene));
+  // due at 0.3, 0.5, 0.8; the two newest are kept
+  SB_CHECK(!fixture_exists(dir, "checkpoint_000003.h5") && fixture_exists(dir, "checkpoint_000005.h5") &&
+             fixture_exists(dir, "checkpoint_000008.h5"),
+           "other checkpoints than 5 and 8 are kept");
+  SB_CHECK(!fixture_exists(dir, "checkpoint.tmp"), "a temporary file is left");
+  SbFormat(sizeof(options), options, HELD EULER "-output_fields none -restart %s/checkpoint_000005.h5", dir);
+  PetscCall(fixture_open(dir, options, &scene));
+  SB_CHECK(scene.run->step0 == 5 && scene.run->t0 == 5 * 0.1, "restart at step %d, t = %.17g",
+           (int)scene.run->step0, (double)scene.run->t0);
+  SB_CHECK(difference(&scene, 0.5) == 0., "the state differs by %g", (double)difference(&scene, 0.5));
+  SB_CHECK(scene.run->energy_start == 1. / 7. && scene.run->energies.load_work == 305. &&
+             scene.run->energies.drive_work == 400.,
+           "running totals: %.17g %g %g", (double)scene.run->energy_start,
+           (double)scene.run->energies.load_work, (double)scene.run->energies.drive_work);
+  SB_CHECK(!fixture_exists(dir, "checkpoint_000008.h5"),
+           "a checkpoint of what is computed again is still there");
+  PetscCall(test_scene_close(&scene));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The next step's length: that of the interrupted run, unless the new run has another step or end. */
+static PetscErrorCode test_next_step(void)
+{
+  static const struct {
+    const char *more;
+    PetscReal dt;
+  } cases[] = {
+    {"", 0.025}, {" -ts_dt 0.05", 0.05}, {" -ts_max_time 2", 0.1}, {" -ts_adapt_type basic", 0.025}};
+  TestScene scene;
+  char options[PETSC_MAX_PATH_LEN];
+  PetscReal dt;
+
+  PetscFunctionBeginUser;
+  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(cases); i++) {
+    PetscCall(fixture_open(dir, BOX EULER "-output_fields none -checkpoint_every_steps 1", &scene));
+    PetscCall(fixture_step(&scene, 0, 0.1, PETSC_FALSE));
+    PetscCall(TSSetTimeStep(scene.run->ts, 0.025));
+    PetscCall(fixture_step(&scene, 1, 0.1, PETSC_FALSE));
+    PetscCall(test_scene_close(&scene));
+    SbFormat(sizeof(options), options, BOX EULER "-output_fields none -restart latest%s", cases[i].more);
+    PetscCall(fixture_open(dir, options, &scene));
+    PetscCall(TSGetTimeStep(scene.run->ts, &dt));
+    SB_CHECK(dt == cases[i].dt, "'%s': next step %g, expected %g", cases[i].more, (double)dt,
+             (double)cases[i].dt);
+    PetscCall(test_scene_close(&scene));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The hash of the mesh does not depend on the partition, but on every coordinate and cell. */
+static PetscErrorCode test_hash(void)
+{
+  static const struct {
+    const char *mesh;
+    PetscBool same;
+  } cases[] = {{"-body_a_mesh box:0.4,0.1,0.2:4,1,2", PETSC_TRUE},
+               {"-body_a_mesh box:0.4,0.1,0.2:4,1,2 -body_a_translate 0,0,1e-15", PETSC_FALSE},
+               {"-body_a_mesh box:0.4,0.1,0.2:4,2,1", PETSC_FALSE}};
+  uint64_t hash[PETSC_STATIC_ARRAY_LENGTH(cases)];
+  TestScene scene;
+  char options[PETSC_MAX_PATH_LEN];
+
+  PetscFunctionBeginUser;
+  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(cases); i++) {
+    SbFormat(sizeof(options), options, "-bodies a %s" MATERIAL EULER "-output_fields J", cases[i].mesh);
+    PetscCall(fixture_open(dir, options, &scene));
+    hash[i] = ((SbOutput)scene.run->output)->mesh_hash;
+    SB_CHECK((hash[i] == hash[0]) == (cases[i].same != PETSC_FALSE), "hash of '%s'", cases[i].mesh);
+    PetscCall(test_scene_close(&scene));
+  }
+  // found once on one rank: the same on any number
+  SB_CHECK(hash[0] == HASH_OF_BOX, "hash 0x%llx", (unsigned long long)hash[0]);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Folder with a checkpoint of step 1; then a scene that tries to go on from it must fail. */
+static PetscErrorCode test_refused(void)
+{
+  static const char *const others[] = {" -body_a_young 1001", " -body_a_material stvk", " -mass consistent",
+                                       " -body_a_mesh box:0.4,0.1,0.2:4,2,2", " -restart nowhere.h5"};
+  TestScene scene;
+  char options[PETSC_MAX_PATH_LEN];
+
+  PetscFunctionBeginUser;
+  PetscCall(fixture_open(dir, BOX EULER "-output_fields none -checkpoint_every_steps 1", &scene));
+  for (PetscInt k = 0; k <= 1; k++) PetscCall(fixture_step(&scene, k, 0.1, PETSC_FALSE));
+  PetscCall(test_scene_close(&scene));
+  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(others); i++) {
+    SbFormat(sizeof(options), options, BOX EULER "-output_fields none -restart latest%s", others[i]);
+    SB_CHECK_ERROR(fixture_open(dir, options, &scene), others[i]);
+    SB_CHECK(fixture_exists(dir, "checkpoint_000001.h5"), "'%s': refused, but the folder was cleared",
+             others[i]);
+    PetscCall(test_scene_close(&scene));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+int main(int argc, char *argv[])
+{
+  SB_TEST_BEGIN(argc, argv);
+  PetscCall(fixture_folder(sizeof(dir), dir));
+  PetscCall(test_round_trip());
+  PetscCall(test_next_step());
+  PetscCall(test_hash());
+  PetscCall(test_refused());
+  PetscCall(fixture_remove(dir));
+  PetscCall(SbOptionsReset());
+  SB_TEST_END();
+}

@@ -1,0 +1,124 @@
+// The folder of a run: made with its parents, refused when it cannot be written, cleared of our files only; scenario.opts;
+// names of fields; when a multiple of a time is due.
+#include "output_fixture.h"
+
+static char dir[PETSC_MAX_PATH_LEN];
+
+static PetscErrorCode write_text(const char *name, const char *text)
+{
+  char path[PETSC_MAX_PATH_LEN];
+  PetscMPIInt rank;
+  FILE *f;
+
+  PetscFunctionBeginUser;
+  PetscCallMPI(MPI_Barrier(PETSC_COMM_WORLD));
+  PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
+  if (rank) PetscFunctionReturn(PETSC_SUCCESS);
+  SbFormat(sizeof(path), path, "%s/%s", dir, name);
+  f = fopen(path, "w");
+  PetscCheck(f, PETSC_COMM_SELF, PETSC_ERR_FILE_OPEN, "%s", path);
+  (void)fputs(text, f);
+  (void)fclose(f);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode test_folder(void)
+{
+  TestScene scene;
+  char deep[PETSC_MAX_PATH_LEN + 16];
+
+  PetscFunctionBeginUser;
+  SbFormat(sizeof(deep), deep, "%s/a//b/", dir);
+  PetscCall(fixture_open(deep, BOX EULER, &scene));
+  SB_CHECK(fixture_exists(dir, "a/b/history.csv") && fixture_exists(dir, "a/b/scenario.opts"),
+           "no results in a/b");
+  PetscCall(test_scene_close(&scene));
+  PetscCall(write_text("a/b/notes.txt", "mine"));
+  PetscCall(write_text("a/b/checkpoint_000007.h5", "of an earlier run"));
+  PetscCall(fixture_open(deep, BOX EULER, &scene));
+  SB_CHECK(fixture_exists(dir, "a/b/notes.txt"), "a file that is not ours is gone");
+  SB_CHECK(!fixture_exists(dir, "a/b/checkpoint_000007.h5"), "a checkpoint of an earlier run is still there");
+  PetscCall(test_scene_close(&scene));
+  SbFormat(sizeof(deep), deep, "%s/a/b/notes.txt/c", dir);
+  SB_CHECK_ERROR(fixture_open(deep, BOX EULER, &scene), "a folder below a file");
+  PetscCall(test_scene_close(&scene));
+  SbFormat(sizeof(deep), deep, "%s/a/b", dir);
+  PetscCall(fixture_remove(deep));
+  SbFormat(sizeof(deep), deep, "%s/a", dir);
+  PetscCall(fixture_remove(deep));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* scenario.opts holds what was given and what was not. */
+static PetscErrorCode test_scenario(void)
+{
+  TestScene scene;
+  char *text;
+
+  PetscFunctionBeginUser;
+  PetscCall(fixture_open(dir, BOX EULER "-output_every 0.5 -probes p -probe_p_at 1,2,3", &scene));
+  PetscCall(fixture_read(dir, "scenario.opts", &text));
+  SB_CHECK(strstr(text, "-output_every 0.5 "), "a given option is missing");
+  SB_CHECK(strstr(text, "-output_fields displacement,velocity,von_mises "), "a default is missing");
+  SB_CHECK(strstr(text, "-probe_p_at 1,2,3 "), "the probe is missing");
+  PetscCall(PetscFree(text));
+  PetscCall(test_scene_close(&scene));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode test_fields(void)
+{
+  const SbField *fields, *found;
+  PetscInt n;
+  TestScene scene;
+  SbOutput out;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbFieldGetAll(&n, &fields));
+  for (PetscInt i = 0; i < n; i++) {
+    PetscCall(SbFieldFind(fields[i].name, &found));
+    SB_CHECK(found == &fields[i], "field %s is not found by its name", fields[i].name);
+    SB_CHECK(fields[i].compute && fields[i].unit[0] && fields[i].help[0], "field %s is not complete",
+             fields[i].name);
+  }
+  SB_CHECK_ERROR(SbFieldFind("von_mizes", &found), "a misspelt field");
+  PetscCall(fixture_open(dir, BOX EULER "-output_fields J,J,stress", &scene));
+  out = (SbOutput)scene.run->output;
+  SB_CHECK(out->nfield == 3 && !strcmp(out->field[2]->name, "body"), "a field named twice: %d fields",
+           (int)out->nfield);
+  SB_CHECK(out->sigma && out->J && !out->psi, "storage for cell quantities that nobody asked for");
+  PetscCall(test_scene_close(&scene));
+  // a static run has no velocity
+  PetscCall(fixture_open(dir, HELD " -time static -quiet", &scene));
+  out = (SbOutput)scene.run->output;
+  SB_CHECK(out->nfield == 3 && !strcmp(out->field[1]->name, "von_mises"), "a static run has %d fields",
+           (int)out->nfield);
+  PetscCall(test_scene_close(&scene));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static void test_due(void)
+{
+  PetscInt n = 0;
+  PetscReal t = 0.;
+
+  // a million steps, times summed up with their rounding: due 100 times
+  for (PetscInt k = 1; k <= 1000000; k++) {
+    t += 1e-4;
+    n += SbOutputDue(1., t, 1e-4);
+  }
+  SB_CHECK(n == 100, "%d multiples of 1 s in 100 s", (int)n);
+}
+
+int main(int argc, char *argv[])
+{
+  SB_TEST_BEGIN(argc, argv);
+  PetscCall(fixture_folder(sizeof(dir), dir));
+  PetscCall(test_folder());
+  PetscCall(test_scenario());
+  PetscCall(test_fields());
+  test_due();
+  PetscCall(fixture_remove(dir));
+  PetscCall(SbOptionsReset());
+  SB_TEST_END();
+}

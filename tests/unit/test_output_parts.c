@@ -1,0 +1,176 @@
+// The parts below the monitors: original order, HDF5 slices and attributes, files that are replaced, errors that one rank
+// meets and all report.
+// @ranks 1 2 4
+#include "output_fixture.h"
+
+static char dir[PETSC_MAX_PATH_LEN];
+
+/* Numbers dealt out to the ranks like cards, backwards. */
+static PetscErrorCode test_order(void)
+{
+  const PetscInt N = 23;
+  SbOrder order;
+  PetscMPIInt rank, size;
+  PetscInt n = 0, original[23];
+  PetscReal owned[46], slice[46], back[46];
+
+  PetscFunctionBeginUser;
+  PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
+  PetscCallMPI(MPI_Comm_size(PETSC_COMM_WORLD, &size));
+  for (PetscInt k = N - 1; k >= 0; k--)
+    if (k % size == rank) original[n++] = k;
+  for (PetscInt i = 0; i < n; i++) {
+    owned[2 * i] = 1. + (PetscReal)original[i];
+    owned[2 * i + 1] = -(PetscReal)original[i];
+  }
+  PetscCall(SbOrderCreate(PETSC_COMM_WORLD, N, n, original, &order));
+  PetscCall(SbOrderGather(&order, 2, owned, slice));
+  for (PetscInt i = 0; i < order.n; i++)
+    SB_CHECK(slice[2 * i] == 1. + (PetscReal)(order.start + i) &&
+               slice[2 * i + 1] == -(PetscReal)(order.start + i),
+             "number %d is in the place of %d", (int)slice[2 * i] - 1, (int)(order.start + i));
+  PetscCall(SbOrderScatter(&order, 2, slice, back));
+  for (PetscInt i = 0; i < 2 * n; i++)
+    SB_CHECK(back[i] == owned[i], "%g came back as %g", (double)owned[i], (double)back[i]);
+  PetscCall(SbOrderDestroy(&order));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* A layout with two entities on three or more ranks leaves ranks without any. */
+static PetscErrorCode test_h5(void)
+{
+  SbOrder order;
+  SbH5 h;
+  PetscMPIInt rank;
+  PetscReal slice[8], back[8], time = 0.;
+  int64_t step = 0;
+  char path[PETSC_MAX_PATH_LEN], *text;
+  PetscBool ok;
+
+  PetscFunctionBeginUser;
+  PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
+  SbFormat(sizeof(path), path, "%s/test.h5", dir);
+  PetscCall(SbOrderCreate(PETSC_COMM_WORLD, 2, rank ? 0 : 2, (const PetscInt[]){0, 1}, &order));
+  for (PetscInt i = 0; i < 3 * order.n; i++) slice[i] = (PetscReal)(3 * order.start + i) / 3.;
+  PetscCall(SbH5Create(PETSC_COMM_WORLD, path, &h));
+  PetscCall(SbH5WriteSlice(&h, h.file, "v", "m", &order, 3, H5T_IEEE_F64LE, H5T_NATIVE_DOUBLE, slice));
+  PetscCall(SbH5PutReal(&h, h.file, "time", 1. / 3.));
+  PetscCall(SbH5PutInt(&h, h.file, "step", -((int64_t)1 << 60)));
+  PetscCall(SbH5WriteText(&h, h.file, "text", "two\nlines"));
+  PetscCall(SbH5Flush(&h));
+  PetscCall(SbH5Close(&h));
+  PetscCall(SbH5Open(PETSC_COMM_WORLD, path, PETSC_FALSE, &h, &ok));
+  SB_CHECK(ok, "the file cannot be opened");
+  PetscCall(SbH5ReadSlice(&h, "v", &order, 3, back, &ok));
+  SB_CHECK(ok, "v cannot be read");
+  for (PetscInt i = 0; i < 3 * order.n; i++) SB_CHECK(back[i] == slice[i], "v[%d]", (int)i);
+  PetscCall(SbH5GetReal(h.file, "time", &time, &ok));
+  PetscCall(SbH5GetInt(h.file, "step", &step, &ok));
+  PetscCall(SbH5ReadText(&h, "text", &text, &ok));
+  SB_CHECK(ok && time == 1. / 3. && step == -((int64_t)1 << 60) && !strcmp(text, "two\nlines"),
+           "attributes or text");
+  PetscCall(PetscFree(text));
+  // what is not there, or is something else, is said and not an error
+  PetscCall(SbH5ReadSlice(&h, "v", &order, 2, back, &ok));
+  SB_CHECK(!ok, "an array of another shape was read");
+  PetscCall(SbH5ReadSlice(&h, "w", &order, 3, back, &ok));
+  SB_CHECK(!ok, "an array that is not there was read");
+  ok = PETSC_TRUE;
+  PetscCall(SbH5GetReal(h.file, "step", &time, &ok));
+  SB_CHECK(!ok, "a whole number was read as a real one");
+  ok = PETSC_TRUE;
+  PetscCall(SbH5ReadText(&h, "v", &text, &ok));
+  SB_CHECK(!ok && !text, "numbers were read as a text");
+  PetscCall(SbH5Close(&h));
+  PetscCall(SbOrderDestroy(&order));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode test_open_failure(void)
+{
+  SbH5 h;
+  PetscMPIInt rank;
+  char path[PETSC_MAX_PATH_LEN];
+  PetscBool ok;
+
+  PetscFunctionBeginUser;
+  PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
+  SbFormat(sizeof(path), path, "%s/nothing.h5", dir);
+  PetscCall(SbH5Open(PETSC_COMM_WORLD, path, PETSC_FALSE, &h, &ok));
+  SB_CHECK(!ok && h.file < 0, "a file that is not there was opened");
+  if (!rank) {
+    char message[SB_MESSAGE_MAX] = "";
+    const SbPiece piece = {"no HDF5", 7};
+
+    SbFileReplace(path, 1, &piece, sizeof(message), message);
+    SB_CHECK(!message[0], "%s", message);
+  }
+  PetscCallMPI(MPI_Barrier(PETSC_COMM_WORLD));
+  PetscCall(SbH5Open(PETSC_COMM_WORLD, path, PETSC_TRUE, &h, &ok));
+  SB_CHECK(!ok && h.file < 0, "a text was opened as HDF5");
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode test_files(void)
+{
+  char path[PETSC_MAX_PATH_LEN], *text, message[SB_MESSAGE_MAX] = "";
+  const SbPiece pieces[3] = {{"one ", 4}, {NULL, 0}, {"two", 3}};
+  PetscMPIInt rank;
+  size_t size;
+
+  PetscFunctionBeginUser;
+  PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
+  if (!rank) {
+    SbFormat(sizeof(path), path, "%s/pieces.txt", dir);
+    SbFileReplace(path, 3, pieces, sizeof(message), message);
+    PetscCall(SbFileRead(path, &text, &size));
+    SB_CHECK(!message[0] && size == 7 && text && !strcmp(text, "one two"), "read '%s', %s", text ? text : "",
+             message);
+    PetscCall(PetscFree(text));
+    SB_CHECK(!fixture_exists(dir, "pieces.txt.tmp"), "the temporary file is left");
+    SbFormat(sizeof(path), path, "%s/no/folder", dir);
+    SbFileReplace(path, 3, pieces, sizeof(message), message);
+    SB_CHECK(strstr(message, "cannot write 7 bytes to ") && strstr(message, "No such file or directory"),
+             "message '%s'", message);
+    PetscCall(SbFileRead(path, &text, &size));
+    SB_CHECK(!text && !size, "a file that is not there was read");
+  }
+  // more than there is on any disk: refused, and the file keeps its length
+  SbFormat(sizeof(path), path, "%s/reserve", dir);
+  PetscCall(SbFileReserve(PETSC_COMM_WORLD, path, 1000));
+  SB_CHECK_ERROR(SbFileReserve(PETSC_COMM_WORLD, path, (PetscInt64)1 << 55), "32 petabytes were reserved");
+  if (!rank) {
+    PetscCall(SbFileRead(path, &text, &size));
+    SB_CHECK(size == 1000, "the file has %zu bytes", size);
+    PetscCall(PetscFree(text));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* A message of any one rank ends the call on all of them. */
+static PetscErrorCode test_agree(void)
+{
+  PetscMPIInt rank, size;
+
+  PetscFunctionBeginUser;
+  PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
+  PetscCallMPI(MPI_Comm_size(PETSC_COMM_WORLD, &size));
+  PetscCall(SbAgree(PETSC_COMM_WORLD, PETSC_ERR_FILE_WRITE, ""));
+  SB_CHECK_ERROR(
+    SbAgree(PETSC_COMM_WORLD, PETSC_ERR_FILE_WRITE, rank == size - 1 ? "the last rank failed" : ""),
+    "a failure of the last rank");
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+int main(int argc, char *argv[])
+{
+  SB_TEST_BEGIN(argc, argv);
+  PetscCall(fixture_folder(sizeof(dir), dir));
+  PetscCall(test_order());
+  PetscCall(test_h5());
+  PetscCall(test_open_failure());
+  PetscCall(test_files());
+  PetscCall(test_agree());
+  PetscCall(fixture_remove(dir));
+  SB_TEST_END();
+}

@@ -1,0 +1,146 @@
+// What a person reads: header, progress, closing table within 80 columns; run.json at the start, at the end, after a failure.
+#include "output_fixture.h"
+
+static char dir[PETSC_MAX_PATH_LEN];
+
+/* Runs `call` with PETSc's output going to a text. */
+#define CAPTURE(text, call)                         \
+  do {                                              \
+    FILE *stdout_ = PETSC_STDOUT;                   \
+    size_t size_;                                   \
+    PETSC_STDOUT = open_memstream(&(text), &size_); \
+    call;                                           \
+    (void)fclose(PETSC_STDOUT);                     \
+    PETSC_STDOUT = stdout_;                         \
+  } while (0)
+
+static void check_width(const char *text, const char *what)
+{
+  for (const char *line = text; *line;) {
+    const int n = (int)strcspn(line, "\r\n");
+
+    SB_CHECK(n <= 79, "%s: %d columns in '%.*s'", what, n, n, line);
+    line += n + (line[n] != 0);
+  }
+}
+
+static PetscErrorCode run_steps(TestScene *scene)
+{
+  PetscFunctionBeginUser;
+  for (PetscInt k = 0; k <= 10; k++) PetscCall(fixture_step(scene, k, 0.1, (PetscBool)(k == 10)));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode test_report(void)
+{
+  TestScene scene;
+  char *header, *progress, *summary, *json;
+  PetscMPIInt rank;
+
+  PetscFunctionBeginUser;
+  PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
+  PetscCall(fixture_open(
+    dir, HELD " -time euler_implicit -ts_dt 0.1 -ts_max_time 1 -probes p -probe_p_at 0,0,0", &scene));
+  PetscCall(fixture_read(dir, "run.json", &json));
+  SB_CHECK(strstr(json, "\"status\": \"running\"") && strstr(json, "\"petsc\": \"3."),
+           "run.json at the start: %s", json);
+  PetscCall(PetscFree(json));
+  CAPTURE(header, PetscCall(SbReportHeader(scene.run)));
+  CAPTURE(progress, PetscCall(run_steps(&scene)));
+  CAPTURE(summary, PetscCall(SbReportSummary(scene.run)));
+  if (!rank) {
+    static const char *const in_header[] = {"supple " SB_VERSION " with PETSc 3.",
+                                            "48        30        90",
+                                            "linear",
+                                            "1000",
+                                            "0.25",
+                                            "effects    hold (support)",
+                                            "euler_implicit",
+                                            "solver     ",
+                                            "probe      p at vertex"};
+    static const char *const in_summary[] = {"mesh ",         "set-up ",    "residual ",   "tangent ",
+                                             "linear solve ", "output ",    "other ",      "total ",
+                                             "memory ",       "fields.h5 ", "history.csv "};
+
+    check_width(header, "header");
+    check_width(progress, "progress");
+    check_width(summary, "summary");
+    for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(in_header); i++)
+      SB_CHECK(strstr(header, in_header[i]), "no '%s' in the header:\n%s", in_header[i], header);
+    for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(in_summary); i++)
+      SB_CHECK(strstr(summary, in_summary[i]), "no '%s' in the summary:\n%s", in_summary[i], summary);
+    // the first and the last step: the others follow within two seconds
+    SB_CHECK(strstr(progress, "0/10 ") && strstr(progress, "10/10 "), "progress:\n%s", progress);
+    SB_CHECK(strstr(progress, " 2.0 ") && strstr(progress, "30.0"), "iterations per step:\n%s", progress);
+  } else
+    SB_CHECK(!header[0] && !progress[0] && !summary[0], "rank %d prints", (int)rank);
+  PetscCall(fixture_read(dir, "run.json", &json));
+  SB_CHECK(strstr(json, "\"status\": \"completed\"") && strstr(json, "\"steps\": 10") &&
+             strstr(json, "\"linear solve\": "),
+           "run.json at the end: %s", json);
+  PetscCall(PetscFree(json));
+  free(header);
+  free(progress);
+  free(summary);
+  PetscCall(test_scene_close(&scene));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode test_early_end(void)
+{
+  TestScene scene;
+  char *summary, *json;
+  PetscMPIInt rank;
+
+  PetscFunctionBeginUser;
+  PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
+  PetscCall(fixture_open(dir, BOX " -time euler_implicit -ts_dt 0.1 -ts_max_time 1 -progress false", &scene));
+  SB_CHECK(scene.run->nmonitor == 2, "%d monitors without progress", (int)scene.run->nmonitor);
+  PetscCall(PetscStrncpy(scene.run->stop_reason, "the \"solver\" gave\nup", sizeof(scene.run->stop_reason)));
+  CAPTURE(summary, PetscCall(SbReportSummary(scene.run)));
+  SB_CHECK(rank || strstr(summary, "stopped    the \"solver\""), "summary:\n%s", summary);
+  PetscCall(fixture_read(dir, "run.json", &json));
+  SB_CHECK(strstr(json, "\"status\": \"stopped\"") &&
+             strstr(json, "\"reason\": \"the \\\"solver\\\" gave\\u000aup\""),
+           "run.json: %s", json);
+  PetscCall(PetscFree(json));
+  PetscCallMPI(MPI_Barrier(PETSC_COMM_WORLD));
+  if (!rank) PetscCall(SbReportFailure(scene.run, "disk full"));
+  PetscCall(fixture_read(dir, "run.json", &json));
+  SB_CHECK(strstr(json, "\"status\": \"failed\"") && strstr(json, "\"reason\": \"disk full\""),
+           "run.json: %s", json);
+  PetscCall(PetscFree(json));
+  free(summary);
+  PetscCall(test_scene_close(&scene));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode test_quiet(void)
+{
+  TestScene scene;
+  char *text;
+
+  PetscFunctionBeginUser;
+  CAPTURE(text, {
+    PetscCall(fixture_open(dir, BOX EULER, &scene));
+    PetscCall(SbReportHeader(scene.run));
+    PetscCall(run_steps(&scene));
+    PetscCall(SbReportSummary(scene.run));
+  });
+  SB_CHECK(!text[0], "-quiet prints: %s", text);
+  free(text);
+  PetscCall(test_scene_close(&scene));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+int main(int argc, char *argv[])
+{
+  SB_TEST_BEGIN(argc, argv);
+  PetscCall(fixture_folder(sizeof(dir), dir));
+  PetscCall(test_report());
+  PetscCall(test_early_end());
+  PetscCall(test_quiet());
+  PetscCall(fixture_remove(dir));
+  PetscCall(SbOptionsReset());
+  SB_TEST_END();
+}
