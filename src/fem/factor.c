@@ -7,9 +7,11 @@
 
   A solve touches every entry of L twice and does little with it: it is as fast as the memory. Entries are therefore
   kept as 16-bit integers times a scale per column: the rounding, 1.5e-5 of the largest entry of a column, does not change
-  the iterations of a preconditioned solver, and 4 bytes less per entry make it two to three times faster. Columns of a group
-  are cut into panels of at most PANEL nodes, whose diagonal block is stored inverted; the rows below lie in blocks of
-  ROWS, each [column][row], so that both passes read memory in order.
+  the iterations of a preconditioned solver, and 2 bytes instead of 8 per entry make it three to four times faster. Two
+  entries share a 32-bit word, so that reading them takes little more than a conversion: shifted up, the word is the
+  lower one; as it is, it is the upper one, the lower one being a fraction that was taken into account in rounding.
+  Columns of a group are cut into panels of at most PANEL nodes, whose diagonal block is stored inverted; the rows below lie
+  in blocks of ROWS, each [column][row], so that both passes read memory in order.
 
   Not handled: indefinite matrices (reported), refinement.
 */
@@ -23,35 +25,38 @@
 #define PANEL 32      /* nodes across a panel */
 #define ROWS 64       /* unknowns in a block of rows */
 #define WIDTH 16      /* floats side by side */
+#define PAIR 32       /* entries in so many words */
+#define HALF 65536    /* a word over its upper entry */
+#define AHEAD 512     /* words to fetch ahead */
 #define LARGEST 32767 /* largest magnitude of a stored entry */
 #define HUGE_PAGE ((size_t)1 << 21)
 
 typedef float Lanes __attribute__((vector_size(4 * WIDTH)));
 typedef int IntLanes __attribute__((vector_size(4 * WIDTH)));
-typedef int16_t ShortLanes __attribute__((vector_size(2 * WIDTH)));
 
 typedef struct {
   PetscInt first, ncol; /* first place, nodes across */
   PetscInt group;
   PetscInt nrow;       /* nodes below */
   const PetscInt *row; /* [nrow] their places, borrowed from the elimination */
-  size_t offset;       /* of the inverted diagonal block in value[]; the rows below follow it */
+  size_t offset;       /* of the inverted diagonal block in word[]; the rows below follow it */
 } Panel;
 
 struct _p_SbFactor {
   SbElimination e;
   PetscInt npanel, widest, tallest; /* unknowns in the widest and the tallest front */
   Panel *panel;
-  size_t nvalue;
-  int16_t *value; /* [nvalue] */
-  float *scale;   /* [3 nfree][2] of each column, in the diagonal block and below */
-  float *w;       /* [3 n] right-hand side and solution in order of elimination */
-  float *below;   /* [tallest] rows below a panel */
+  size_t nword;
+  int32_t *word; /* [nword] */
+  float *scale;  /* [3 nfree][2] of each column, in the diagonal block and below */
+  float *w;      /* [3 n] right-hand side and solution in order of elimination */
+  float *below;  /* [tallest] rows below a panel */
 };
 
+/* Rows that are stored for n of them. */
 static inline size_t round_up(PetscInt n)
 {
-  return ((size_t)n + WIDTH - 1) / WIDTH * WIDTH;
+  return ((size_t)n + PAIR - 1) / PAIR * PAIR;
 }
 
 /* Zeroed memory; large pieces on pages of 2 MB where the system has them: fewer misses of the address cache. */
@@ -92,8 +97,8 @@ static PetscErrorCode cut_panels(SbFactor f)
 
       *p = (Panel){.first = e->first[g] + from, .ncol = to - from, .group = g, .nrow = nall - to};
       p->row = e->list + e->start[g] + to;
-      p->offset = f->nvalue;
-      f->nvalue += 3 * (size_t)p->ncol * (round_up(3 * p->ncol) + round_up(3 * p->nrow));
+      p->offset = f->nword;
+      f->nword += 3 * (size_t)p->ncol * (round_up(3 * p->ncol) + round_up(3 * p->nrow)) / 2;
     }
     f->widest = PetscMax(f->widest, 3 * ncol);
     f->tallest = PetscMax(f->tallest, 3 * nall);
@@ -111,7 +116,7 @@ PetscErrorCode SbFactorCreate(PetscInt n, PetscInt nkeep, const PetscInt ia[], c
   PetscCall(SbEliminationCreate(n, nkeep, ia, ja, &f->e));
   PetscCall(cut_panels(f));
   /* reading may run ahead of the last panel */
-  PetscCall(allocate(sizeof(*f->value) * (f->nvalue + 4096), &f->value));
+  PetscCall(allocate(sizeof(*f->word) * (f->nword + 4096), &f->word));
   PetscCall(allocate(sizeof(float) * 6 * (size_t)f->e.nfree, &f->scale));
   PetscCall(allocate(sizeof(float) * (3 * (size_t)n + WIDTH), &f->w));
   PetscCall(allocate(sizeof(float) * (size_t)(f->tallest + ROWS), &f->below));
@@ -125,7 +130,7 @@ PetscErrorCode SbFactorDestroy(SbFactor *f)
   if (!*f) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(SbEliminationDestroy(&(*f)->e));
   PetscCall(PetscFree((*f)->panel));
-  free((*f)->value);
+  free((*f)->word);
   free((*f)->scale);
   free((*f)->w);
   free((*f)->below);
@@ -141,7 +146,7 @@ void SbFactorSize(SbFactor f, PetscInt64 *entries, PetscInt64 *bytes)
 
     *entries += ncol * (ncol + 1) / 2 + ncol * 3 * f->panel[q].nrow;
   }
-  *bytes = (PetscInt64)(sizeof(*f->value) * f->nvalue);
+  *bytes = (PetscInt64)(sizeof(*f->word) * f->nword);
 }
 
 /* ------------------------------------------------------------------ numeric factorisation */
@@ -195,28 +200,36 @@ static void add_update(const PetscScalar *update, PetscInt nrow, const PetscInt 
   }
 }
 
-/* Place of entry (i, j) in a panel of ncol columns: blocks of ROWS rows, each [column][row]. */
-static inline size_t panel_index(size_t height, size_t ncol, size_t i, size_t j)
+/* Word of row i of column j in a panel of ncol columns: blocks of ROWS rows, each [column][row]. */
+static inline int32_t *panel_word(int32_t *panel, size_t height, size_t ncol, size_t i, size_t j)
 {
-  const size_t top = i / ROWS * ROWS;
+  const size_t top = i / ROWS * ROWS, tall = PetscMin(ROWS, height - top), pair = (i - top) / PAIR;
 
-  return top * ncol + j * PetscMin(ROWS, height - top) + i - top;
+  return panel + (top * ncol + j * tall + pair * PAIR) / 2 + i % WIDTH;
 }
 
-/* Rounds column j, entries from..n-1, and returns its scale. */
-static float store_column(size_t n, size_t from, const PetscScalar y[], size_t ncol, size_t j, int16_t *to)
+/* Rounds column j, of which entries from..n-1 are not zero, and returns its scale. */
+static float store_column(size_t n, size_t from, const PetscScalar y[], size_t ncol, size_t j, int32_t *panel)
 {
   const size_t height = round_up((PetscInt)n);
-  PetscScalar largest = PETSC_MACHINE_EPSILON * PETSC_MACHINE_EPSILON;
+  PetscScalar largest = PETSC_MACHINE_EPSILON * PETSC_MACHINE_EPSILON, unit;
 
   for (size_t i = from; i < n; i++) largest = PetscMax(largest, PetscAbsScalar(y[i]));
-  for (size_t i = from; i < n; i++)
-    to[panel_index(height, ncol, i, j)] = (int16_t)rint(y[i] * LARGEST / largest);
-  return (float)(largest / LARGEST);
+  unit = LARGEST / largest;
+  for (size_t top = from / PAIR * PAIR; top < n; top += PAIR) {
+    for (size_t i = top; i < top + WIDTH; i++) {
+      const PetscScalar upper = i < n ? unit * y[i] : 0., lower = i + WIDTH < n ? unit * y[i + WIDTH] : 0.;
+      const uint16_t fraction = (uint16_t)(int16_t)rint(lower);
+
+      *panel_word(panel, height, ncol, i, j) =
+        (int32_t)rint(upper - (PetscScalar)fraction / HALF) * HALF + fraction;
+    }
+  }
+  return (float)(largest / LARGEST / HALF);
 }
 
 /* Inverse of a lower triangle of order n <= 3 PANEL, column by column, into the panel. */
-static void store_diagonal(size_t n, const PetscScalar *L, size_t ld, int16_t *to, float *scale)
+static void store_diagonal(size_t n, const PetscScalar *L, size_t ld, int32_t *to, float *scale)
 {
   for (size_t j = 0; j < n; j++) {
     PetscScalar y[3 * PANEL] = {0.};
@@ -239,9 +252,9 @@ static PetscInt store_group(SbFactor f, PetscInt g, PetscInt q, const PetscScala
     const PetscScalar *L = front + (size_t)from * (size_t)(ld + 1);
     float *scale = f->scale + 6 * p->first;
 
-    int16_t *below = f->value + p->offset + (size_t)ncol * round_up(ncol);
+    int32_t *below = f->word + p->offset + (size_t)ncol * round_up(ncol) / 2;
 
-    store_diagonal((size_t)ncol, L, (size_t)ld, f->value + p->offset, scale);
+    store_diagonal((size_t)ncol, L, (size_t)ld, f->word + p->offset, scale);
     for (size_t j = 0; j < (size_t)ncol; j++)
       scale[2 * j + 1] =
         store_column(3 * (size_t)p->nrow, 0, L + ncol + j * (size_t)ld, (size_t)ncol, j, below);
@@ -346,8 +359,9 @@ PetscErrorCode SbFactorNumeric(SbFactor f, const PetscInt ia[], const PetscInt j
 
 /* ------------------------------------------------------------------ solves */
 
-/* Sixteen entries as floats. */
-#define LOAD(p) __builtin_convertvector(__builtin_convertvector(*(const ShortLanes *)(p), IntLanes), Lanes)
+/* The two entries of sixteen words, times HALF. */
+#define UPPER(w) __builtin_convertvector(w, Lanes)
+#define LOWER(w) __builtin_convertvector((w) << 16, Lanes)
 
 SB_INLINE float sum_lanes(const Lanes *lanes)
 {
@@ -359,94 +373,82 @@ SB_INLINE float sum_lanes(const Lanes *lanes)
   return v[0] + v[1];
 }
 
-/* y = A (s x) for a block of m * WIDTH rows, [column][row]. m is a constant where this is inlined. */
-SB_INLINE const int16_t *multiply(int m, PetscInt ncol, const int16_t *a, const float x[], float y[])
+/* y = A x for a block of m * PAIR rows, [column][row]. m is a constant where this is inlined. */
+SB_INLINE const int32_t *multiply(int m, PetscInt ncol, const int32_t *a, const float x[], float y[])
 {
   Lanes sum[4] = {{0}, {0}, {0}, {0}};
 
   for (PetscInt j = 0; j < ncol; j++, a += m * WIDTH) {
     const Lanes xj = x[j] - (Lanes){0};
 
-    __builtin_prefetch(a + 1024);
-    __builtin_prefetch(a + 1056);
-    for (int i = 0; i < m; i++) sum[i] += LOAD(a + i * WIDTH) * xj;
+    __builtin_prefetch(a + AHEAD);
+    __builtin_prefetch(a + AHEAD + WIDTH);
+    for (int i = 0; i < m; i++) {
+      const IntLanes w = *(const IntLanes *)(a + i * WIDTH);
+
+      sum[2 * i] += UPPER(w) * xj;
+      sum[2 * i + 1] += LOWER(w) * xj;
+    }
   }
-  for (int i = 0; i < m; i++) ((Lanes *)y)[i] = sum[i];
+  for (int i = 0; i < 2 * m; i++) ((Lanes *)y)[i] = sum[i];
   return a;
 }
 
 /* sum[j] += A^T x for the same block. */
-SB_INLINE const int16_t *multiply_transposed(int m, PetscInt ncol, const int16_t *a, const float x[],
+SB_INLINE const int32_t *multiply_transposed(int m, PetscInt ncol, const int32_t *a, const float x[],
                                              Lanes sum[])
 {
   Lanes v[4];
 
-  for (int i = 0; i < m; i++) v[i] = ((const Lanes *)x)[i];
+  for (int i = 0; i < 2 * m; i++) v[i] = ((const Lanes *)x)[i];
   for (PetscInt j = 0; j < ncol; j++, a += m * WIDTH) {
-    __builtin_prefetch(a + 1024);
-    __builtin_prefetch(a + 1056);
-    for (int i = 0; i < m; i++) sum[j] += LOAD(a + i * WIDTH) * v[i];
+    __builtin_prefetch(a + AHEAD);
+    __builtin_prefetch(a + AHEAD + WIDTH);
+    for (int i = 0; i < m; i++) {
+      const IntLanes w = *(const IntLanes *)(a + i * WIDTH);
+
+      sum[j] += UPPER(w) * v[2 * i] + LOWER(w) * v[2 * i + 1];
+    }
   }
   return a;
 }
 
 /* y[height] = A (s x), x and s by column; s holds two scales per column. */
-SB_INLINE const int16_t *panel_multiply(size_t height, PetscInt ncol, const int16_t *a, const float x[],
+SB_INLINE const int32_t *panel_multiply(size_t height, PetscInt ncol, const int32_t *a, const float x[],
                                         const float s[], float y[])
 {
   float sx[3 * PANEL];
   size_t i = 0;
 
   for (PetscInt j = 0; j < ncol; j++) sx[j] = s[2 * j] * x[j];
-  for (; i + ROWS <= height; i += ROWS) a = multiply(4, ncol, a, sx, y + i);
-  switch ((height - i) / WIDTH) {
-  case 1:
-    return multiply(1, ncol, a, sx, y + i);
-  case 2:
-    return multiply(2, ncol, a, sx, y + i);
-  case 3:
-    return multiply(3, ncol, a, sx, y + i);
-  default:
-    return a;
-  }
+  for (; i + ROWS <= height; i += ROWS) a = multiply(2, ncol, a, sx, y + i);
+  return i < height ? multiply(1, ncol, a, sx, y + i) : a;
 }
 
 /* y[ncol] = s A^T x[height] */
-SB_INLINE void panel_transposed(size_t height, PetscInt ncol, const int16_t *a, const float x[],
+SB_INLINE void panel_transposed(size_t height, PetscInt ncol, const int32_t *a, const float x[],
                                 const float s[], float y[])
 {
   Lanes sum[3 * PANEL];
   size_t i = 0;
 
   for (PetscInt j = 0; j < ncol; j++) sum[j] = (Lanes){0};
-  for (; i + ROWS <= height; i += ROWS) a = multiply_transposed(4, ncol, a, x + i, sum);
-  switch ((height - i) / WIDTH) {
-  case 1:
-    multiply_transposed(1, ncol, a, x + i, sum);
-    break;
-  case 2:
-    multiply_transposed(2, ncol, a, x + i, sum);
-    break;
-  case 3:
-    multiply_transposed(3, ncol, a, x + i, sum);
-    break;
-  default:
-    break;
-  }
+  for (; i + ROWS <= height; i += ROWS) a = multiply_transposed(2, ncol, a, x + i, sum);
+  if (i < height) multiply_transposed(1, ncol, a, x + i, sum);
   for (PetscInt j = 0; j < ncol; j++) y[j] = s[2 * j] * sum_lanes(&sum[j]);
 }
 
 /* The diagonal block in the layout of the rows below it. */
 SB_KERNEL static void forward(SbFactor f)
 {
-  float *w = f->w, *below = f->below, pivot[3 * PANEL + WIDTH] __attribute__((aligned(64)));
+  float *w = f->w, *below = f->below, pivot[3 * PANEL + PAIR] __attribute__((aligned(64)));
 
   for (PetscInt q = 0; q < f->npanel; q++) {
     const Panel *p = &f->panel[q];
     const PetscInt ncol = 3 * p->ncol;
     const float *scale = f->scale + 6 * p->first;
     float *x = w + 3 * p->first;
-    const int16_t *a = panel_multiply(round_up(ncol), ncol, f->value + p->offset, x, scale, pivot);
+    const int32_t *a = panel_multiply(round_up(ncol), ncol, f->word + p->offset, x, scale, pivot);
 
     for (PetscInt j = 0; j < ncol; j++) x[j] = pivot[j];
     panel_multiply(round_up(3 * p->nrow), ncol, a, pivot, scale + 1, below);
@@ -462,14 +464,14 @@ SB_KERNEL static void forward(SbFactor f)
 
 SB_KERNEL static void backward(SbFactor f)
 {
-  float *w = f->w, *below = f->below, pivot[3 * PANEL + WIDTH] __attribute__((aligned(64)));
+  float *w = f->w, *below = f->below, pivot[3 * PANEL + PAIR] __attribute__((aligned(64)));
 
   for (PetscInt q = f->npanel - 1; q >= 0; q--) {
     const Panel *p = &f->panel[q];
     const PetscInt ncol = 3 * p->ncol;
     const size_t height = round_up(3 * p->nrow), square = round_up(ncol);
     const float *scale = f->scale + 6 * p->first;
-    const int16_t *a = f->value + p->offset;
+    const int32_t *a = f->word + p->offset;
     float *x = w + 3 * p->first;
 
     for (PetscInt k = 0; k < p->nrow; k++) {
@@ -480,7 +482,7 @@ SB_KERNEL static void backward(SbFactor f)
       below[3 * k + 2] = from[2];
     }
     for (size_t k = 3 * (size_t)p->nrow; k < height; k++) below[k] = 0.f;
-    panel_transposed(height, ncol, a + (size_t)ncol * square, below, scale + 1, pivot);
+    panel_transposed(height, ncol, a + (size_t)ncol * square / 2, below, scale + 1, pivot);
     for (PetscInt j = 0; j < ncol; j++) pivot[j] = x[j] - pivot[j];
     for (size_t j = (size_t)ncol; j < square; j++) pivot[j] = 0.f;
     panel_transposed(square, ncol, a, pivot, scale, x);
