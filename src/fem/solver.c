@@ -4,7 +4,8 @@
 
   Convergence is judged by the true residual: the preconditioned norm can be off by orders of magnitude for nearly
   incompressible bodies. Gauss-Seidel and SOR are wrapped in a PCCOMPOSITE of one: Richardson hands its whole loop to a bare
-  PCSOR, which does the largest number of sweeps without looking at the residual. A solve that does not reach its tolerance fails; the step is then cut or the run stops.
+  PCSOR, which does the largest number of sweeps without looking at the residual. A solve that does not reach its tolerance fails; the
+  step is then cut or the run stops.
 */
 #include "sbsolver.h"
 
@@ -63,13 +64,10 @@ PetscErrorCode SbSolverChoose(SbSpace s, PetscBool dynamic, PetscBool linear, Pe
 {
   const PetscInt unknowns = 3 * s->Nnode;
   const char    *name     = choice;
-  PetscReal      nu       = -1.;
   PetscMPIInt    nrank;
 
   PetscFunctionBeginUser;
   PetscCallMPI(MPI_Comm_size(s->comm, &nrank));
-  for (PetscInt r = 0; r < s->nregion; r++) nu = PetscMax(nu, s->region[r].material->nu);
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &nu, 1, MPIU_REAL, MPI_MAX, s->comm));
   if (explicit_run) {
     name = "cg";
     PetscCall(PetscSNPrintf(reason, size, "explicit integrator: no linear system"));
@@ -81,24 +79,14 @@ PetscErrorCode SbSolverChoose(SbSpace s, PetscBool dynamic, PetscBool linear, Pe
   } else if (unknowns <= 30000) {
     name = nrank == 1 ? "cholmod" : "mumps";
     PetscCall(PetscSNPrintf(reason, size, "%" PetscInt_FMT " unknowns: a factorisation is fast and holds at any Poisson's ratio", unknowns));
-  } else if (nu > 0.495) {
-    name = "cg_gamg";
-    PetscCall(PetscSNPrintf(reason, size, "%s, %" PetscInt_FMT " unknowns, Poisson's ratio up to %g: multigrid", dynamic ? "dynamic" : "static", unknowns, (double)nu));
   } else {
-    /* 192k tets, CPU s of one rank: static 0.36 (cg_gamg 1.7, cg_icc 1.4), dynamic with h = 0.01 s 0.22 (1.7, 0.40) */
+    /* 192k tets, CPU s of one rank. Static: 0.36 (cg_gamg 1.7, cg_icc 1.4), at nu 0.45 0.7 (2.3), at 0.499 4.2 (18); dynamic, h = 0.01 s: 0.22 (1.7, 0.40) */
     name = "cg_two_level";
     PetscCall(PetscSNPrintf(reason, size, "%s, %" PetscInt_FMT " unknowns: motions of large parts are solved directly, the rest takes few iterations", dynamic ? "dynamic" : "static", unknowns));
   }
   *preset = find_preset(name);
   PetscCheck(*preset, s->comm, PETSC_ERR_PLIB, "No solver preset %s", name);
   PetscCheck(nrank == 1 || strcmp((*preset)->name, "cholmod"), s->comm, PETSC_ERR_USER, "-solver cholmod runs on one rank and there are %d: use mumps", (int)nrank);
-  if (nrank > 1 && (*preset)->matrix == SB_MATRIX_SBAIJ) {
-    static SbSolverPreset parallel;
-
-    parallel        = **preset;
-    parallel.matrix = SB_MATRIX_BAIJ;
-    *preset         = &parallel;
-  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -131,14 +119,16 @@ static PetscErrorCode insert_options(const char *text)
 
 PetscErrorCode SbSolverCreateOperator(SbSpace s, const SbSolverPreset *preset, Mat *A)
 {
-  PetscBool frames;
+  PetscBool   frames;
+  PetscMPIInt nrank;
 
   PetscFunctionBeginUser;
+  PetscCallMPI(MPI_Comm_size(s->comm, &nrank));
   if (preset->matrix_free) {
     PetscCall(SbSpaceHasFrames(s, &frames));
     PetscCheck(frames, s->comm, PETSC_ERR_USER, "-solver %s is for -mass lumped and the materials linear, and corotated with -body_<name>_tangent warped: choose these, or -solver rotated", preset->name);
     PetscCall(SbSpaceCreateFrameOperator(s, A));
-  } else PetscCall(SbSpaceCreateMatrix(s, preset->matrix, A));
+  } else PetscCall(SbSpaceCreateMatrix(s, nrank > 1 && preset->matrix == SB_MATRIX_SBAIJ ? SB_MATRIX_BAIJ : preset->matrix, A));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
