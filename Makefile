@@ -133,9 +133,9 @@ memcheck: deps ## unit tests under valgrind
 $(BUILD)/unit: $(filter $(BUILD)/tests/unit/%,$(TESTBIN))
 	@touch $@
 
-bench: deps ## speed, written as CSV to tests/perf/
+bench: deps ## speed, kept as CSV below tests/perf/results; QUICK=1 measures less
 	$(AGAIN) bin/supple tests
-	@scripts/bench --build $(BUILD)
+	@scripts/bench --build $(BUILD) $(if $(QUICK),--quick)
 
 docs: bin/supple ## docs/options.md from the option table
 	bin/supple -options_markdown docs/options.md
@@ -152,7 +152,7 @@ clean: ## remove what was built, meshed and run
 
 help: ## this list
 	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/  make \1|\2/p' Makefile | awk -F'|' '{ printf "%-20s%s\n", $$1, $$2 }'
-	@echo "settings: DEBUG=1  WERROR=1  V=1 (show commands)  CC=  OPT=  CFLAGS=  BUILD=  JOBS=  PREFIX=  DESTDIR=  PETSC_DIR= PETSC_ARCH="
+	@echo "settings: T=name (tests)  QUICK=1 (bench)  DEBUG=1  WERROR=1  V=1 (show commands)  CC=  OPT=  CFLAGS=  BUILD=  JOBS=  PREFIX=  DESTDIR=  PETSC_DIR= PETSC_ARCH="
 
 .PHONY: all tests deps demo check check-long lint sanitize memcheck bench docs install clean help FORCE
 .SECONDARY:
