@@ -49,3 +49,10 @@ typedef char *SbErrorText;
 #else
 typedef const char *SbErrorText;
 #endif
+
+/* Any function, as MatShellSetOperation() takes it: SB_OPERATION(f). */
+#if PETSC_VERSION_LT(3, 25, 0)
+  #define SB_OPERATION(f) ((void (*)(void))(f))
+#else
+  #define SB_OPERATION(f) ((PetscErrorCodeFn *)(f))
+#endif

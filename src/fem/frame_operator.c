@@ -215,8 +215,8 @@ PetscErrorCode SbSpaceCreateFrameOperator(SbSpace s, Mat *A)
   PetscCall(
     MatCreateShell(s->comm, 3 * s->nnode_owned, 3 * s->nnode_owned, PETSC_DETERMINE, PETSC_DETERMINE, o, A));
   PetscCall(MatSetBlockSize(*A, 3));
-  PetscCall(MatShellSetOperation(*A, MATOP_MULT, (void (*)(void))MatMult_Frames));
-  PetscCall(MatShellSetOperation(*A, MATOP_DESTROY, (void (*)(void))MatDestroy_Frames));
+  PetscCall(MatShellSetOperation(*A, MATOP_MULT, SB_OPERATION(MatMult_Frames)));
+  PetscCall(MatShellSetOperation(*A, MATOP_DESTROY, SB_OPERATION(MatDestroy_Frames)));
   PetscCall(MatSetOption(*A, MAT_SYMMETRIC, PETSC_TRUE));
   PetscCall(MatSetOption(*A, MAT_SYMMETRY_ETERNAL, PETSC_TRUE));
   PetscCall(MatSetUp(*A));
