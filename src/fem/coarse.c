@@ -233,6 +233,12 @@ static PetscErrorCode create_matrix(SbCoarse c)
   PetscCall(MatCreateVecs(c->E, &c->c, &c->y));
   PetscCall(MatGetFactorAvailable(c->E, MATSOLVERCHOLMOD, MAT_FACTOR_CHOLESKY, &has));
   PetscCall(MatGetFactor(c->E, has ? MATSOLVERCHOLMOD : MATSOLVERMUMPS, MAT_FACTOR_CHOLESKY, &c->factor));
+  /* groups of columns always: CHOLMOD's other way is L D L^T, which takes indefinite matrices without a word */
+  PetscCall(MatSetOptionsPrefix(c->factor, "pc_coarse_"));
+  if (has) {
+    PetscCall(PetscOptionsSetValue(NULL, "-pc_coarse_mat_cholmod_factor", "supernodal"));
+    PetscCall(PetscOptionsSetValue(NULL, "-pc_coarse_mat_cholmod_print", "0"));
+  }
   PetscCall(MatCholeskyFactorSymbolic(c->factor, c->E, NULL, NULL));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
