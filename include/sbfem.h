@@ -7,60 +7,63 @@
 
 /* What the integrator asks about: one evaluation. Arrays are local (owned nodes, then ghosts), [nnode][3]. */
 typedef struct {
-  PetscReal        t;      /* s */
-  PetscReal        dt;     /* length of the step being taken, s; 0 in a static run */
-  PetscInt         step;
-  PetscReal        shift_a; /* dA/dU of the integrator, 1/s^2; 0 in a static run: no inertia */
-  PetscReal        shift_v; /* dV/dU of the integrator, 1/s; 0 in a static run: no damping */
-  PetscReal        shift_k; /* factor on the stiffness: 1, or 0 when only the mass matrix is wanted */
-  const PetscReal *u;      /* displacement, m */
-  const PetscReal *v;      /* velocity, m/s; NULL in a static run */
-  const PetscReal *a;      /* acceleration, m/s^2; NULL in a static run */
+  PetscReal t;  /* s */
+  PetscReal dt; /* length of the step being taken, s; 0 in a static run */
+  PetscInt step;
+  PetscReal shift_a;  /* dA/dU of the integrator, 1/s^2; 0 in a static run: no inertia */
+  PetscReal shift_v;  /* dV/dU of the integrator, 1/s; 0 in a static run: no damping */
+  PetscReal shift_k;  /* factor on the stiffness: 1, or 0 when only the mass matrix is wanted */
+  const PetscReal *u; /* displacement, m */
+  const PetscReal *v; /* velocity, m/s; NULL in a static run */
+  const PetscReal *a; /* acceleration, m/s^2; NULL in a static run */
 } SbStage;
 
 /* Cells of one body and one material, owned or ghost: the unit of dispatch. */
 typedef struct {
-  PetscInt    body;
-  SbMaterial  material;            /* borrowed from the model */
-  SbElement   element;             /* borrowed */
-  PetscInt    cstart, cend;        /* local cells */
-  PetscInt    bstart, bend;        /* batches; the last one may be partly filled */
-  PetscBool   owned;
-  PetscReal   alpha, beta;         /* Rayleigh damping C = alpha M + beta K, 1/s and s; 0 unless an effect set them at set-up */
+  PetscInt body;
+  SbMaterial material;   /* borrowed from the model */
+  SbElement element;     /* borrowed */
+  PetscInt cstart, cend; /* local cells */
+  PetscInt bstart, bend; /* batches; the last one may be partly filled */
+  PetscBool owned;
+  PetscReal alpha,
+    beta; /* Rayleigh damping C = alpha M + beta K, 1/s and s; 0 unless an effect set them at set-up */
 } SbRegion;
 
 typedef struct _p_SbSpace *SbSpace;
 struct _p_SbSpace {
-  MPI_Comm  comm;
-  SbMesh    mesh;                  /* borrowed */
-  PetscInt  Nnode, nnode_owned, nnode;
-  PetscInt  gnode_start;
-  PetscInt *gnode;                 /* [nnode] global node numbers; owned first, ghosts ascending */
-  PetscInt *cell_node;             /* [ncell][4] local nodes */
-  PetscReal *node_x;               /* [nnode][3] rest position of each node, m */
-  PetscInt  nregion;
-  SbRegion *region;                /* [nregion] */
-  PetscInt  nbatch;                /* SB_BATCH cells side by side; a batch never mixes regions */
-  PetscInt *batch_cell;            /* [nbatch] first local cell */
-  PetscInt *batch_n;               /* [nbatch] cells in it, 1..SB_BATCH */
-  PetscInt *batch_node;            /* [nbatch][4][SB_BATCH] local nodes (padding repeats the first cell) */
-  SbLane   *batch_g;               /* [nbatch][9] basis gradients of nodes 1..3, 1/m; 64-byte aligned */
-  SbLane   *batch_V;               /* [nbatch] volumes, m^3; 0 in padding; 64-byte aligned */
-  void     *batch_memory;          /* what batch_g and batch_V live in */
-  PetscReal *node_mass;            /* [nnode] lumped mass, kg, complete on owned nodes */
-  PetscBool  consistent_mass;      /* -mass consistent */
-  uint8_t   *fixed;                /* [nnode] bit c set: component c of the node is prescribed */
-  PetscInt   nfixed;               /* local nodes with any bit */
-  PetscInt  *fixed_node;           /* [nfixed] */
-  PetscReal *fixed_value;          /* [nfixed][3] prescribed displacement at the time last asked for, m */
-  Vec        template_vec;         /* ghosted (more than one rank) or sequential; block size 3 */
-  struct _p_SbPlan *plan;          /* cell blocks -> matrix values; NULL before SbSpaceCreateMatrix() */
-  PetscReal  block_scale;          /* factor on blocks of SbSpaceAddCellBlock(): the load factor of a static run, else 1 */
-  PetscBool  linear;               /* every region's law is linear */
+  MPI_Comm comm;
+  SbMesh mesh; /* borrowed */
+  PetscInt Nnode, nnode_owned, nnode;
+  PetscInt gnode_start;
+  PetscInt *gnode;     /* [nnode] global node numbers; owned first, ghosts ascending */
+  PetscInt *cell_node; /* [ncell][4] local nodes */
+  PetscReal *node_x;   /* [nnode][3] rest position of each node, m */
+  PetscInt nregion;
+  SbRegion *region;          /* [nregion] */
+  PetscInt nbatch;           /* SB_BATCH cells side by side; a batch never mixes regions */
+  PetscInt *batch_cell;      /* [nbatch] first local cell */
+  PetscInt *batch_n;         /* [nbatch] cells in it, 1..SB_BATCH */
+  PetscInt *batch_node;      /* [nbatch][4][SB_BATCH] local nodes (padding repeats the first cell) */
+  SbLane *batch_g;           /* [nbatch][9] basis gradients of nodes 1..3, 1/m; 64-byte aligned */
+  SbLane *batch_V;           /* [nbatch] volumes, m^3; 0 in padding; 64-byte aligned */
+  void *batch_memory;        /* what batch_g and batch_V live in */
+  PetscReal *node_mass;      /* [nnode] lumped mass, kg, complete on owned nodes */
+  PetscBool consistent_mass; /* -mass consistent */
+  uint8_t *fixed;            /* [nnode] bit c set: component c of the node is prescribed */
+  PetscInt nfixed;           /* local nodes with any bit */
+  PetscInt *fixed_node;      /* [nfixed] */
+  PetscReal *fixed_value;    /* [nfixed][3] prescribed displacement at the time last asked for, m */
+  Vec template_vec;          /* ghosted (more than one rank) or sequential; block size 3 */
+  struct _p_SbPlan *plan;    /* cell blocks -> matrix values; NULL before SbSpaceCreateMatrix() */
+  PetscReal
+    block_scale;    /* factor on blocks of SbSpaceAddCellBlock(): the load factor of a static run, else 1 */
+  PetscBool linear; /* every region's law is linear */
 };
 
 /* Collective. Materials and elements: one per body, borrowed. Options read: -mass. */
-PetscErrorCode SbSpaceCreate(SbMesh mesh, const SbMaterial material[], const SbElement element[], SbSpace *space);
+PetscErrorCode SbSpaceCreate(SbMesh mesh, const SbMaterial material[], const SbElement element[],
+                             SbSpace *space);
 PetscErrorCode SbSpaceDestroy(SbSpace *space);
 PetscErrorCode SbSpaceValidate(SbSpace space);
 PetscErrorCode SbSpaceRegister(void);
@@ -87,19 +90,22 @@ PetscErrorCode SbSpaceAssembleTangent(SbSpace space, const SbStage *stage, Mat A
 /* Replaces rows and columns of prescribed unknowns by a scaled identity and closes the assembly. */
 PetscErrorCode SbSpaceFinishTangent(SbSpace space, Mat A);
 /* Between the two: A += a 3x3 block (row-major, N/m) for two nodes a, b = 0..3 of a local cell. Not collective. */
-PetscErrorCode SbSpaceAddCellBlock(SbSpace space, Mat A, PetscInt cell, PetscInt a, PetscInt b, const PetscReal block[9]);
+PetscErrorCode SbSpaceAddCellBlock(SbSpace space, Mat A, PetscInt cell, PetscInt a, PetscInt b,
+                                   const PetscReal block[9]);
 
 /* Marks components (bits 0..2) of a local node as prescribed; set-up only. All ranks that know the node must do it. */
 PetscErrorCode SbSpaceFix(SbSpace space, PetscInt node, int components);
 /* After all effects were set up: builds fixed_node. */
 PetscErrorCode SbSpaceFixDone(SbSpace space);
 /* Index into fixed_node of a node, or -1. */
-PetscInt       SbSpaceFixedIndex(SbSpace space, PetscInt node);
+PetscInt SbSpaceFixedIndex(SbSpace space, PetscInt node);
 
 /* Per owned cell: Cauchy stress sigma[6] = xx yy zz xy yz xz (Pa), J, energy density (J/m^3, rest). Outputs may be NULL. */
-PetscErrorCode SbSpaceCellState(SbSpace space, const PetscReal u[], PetscReal sigma[], PetscReal J[], PetscReal psi[]);
+PetscErrorCode SbSpaceCellState(SbSpace space, const PetscReal u[], PetscReal sigma[], PetscReal J[],
+                                PetscReal psi[]);
 /* Owned cells: strain energy (J), smallest det F, number with det F <= 0, current volume (m^3). Local: reduce them. */
-PetscErrorCode SbSpaceStrainEnergy(SbSpace space, const PetscReal u[], PetscReal *energy, PetscReal *minJ, PetscInt *ninverted, PetscReal *volume);
+PetscErrorCode SbSpaceStrainEnergy(SbSpace space, const PetscReal u[], PetscReal *energy, PetscReal *minJ,
+                                   PetscInt *ninverted, PetscReal *volume);
 /* v . C v of owned cells, W. Local: reduce it. */
 PetscErrorCode SbSpaceDampingPower(SbSpace space, const PetscReal u[], const PetscReal v[], PetscReal *power);
 /* Largest stable step of an explicit run: min over cells of smallest altitude / wave speed, s. Collective. */
@@ -107,10 +113,10 @@ PetscErrorCode SbSpaceStableStep(SbSpace space, PetscReal *dt);
 
 /* Nodes with weights of a boundary facet: for P1 its three vertices. face = 0..3, opposite local vertex `face`. */
 typedef struct {
-  PetscInt  cell, face;
-  PetscInt  node[3];     /* local nodes, counter-clockwise seen from outside */
-  PetscReal area;        /* rest area, m^2 */
-  PetscReal normal[3];   /* rest outward unit normal */
+  PetscInt cell, face;
+  PetscInt node[3];    /* local nodes, counter-clockwise seen from outside */
+  PetscReal area;      /* rest area, m^2 */
+  PetscReal normal[3]; /* rest outward unit normal */
 } SbFacet;
 /* All local boundary facets (of owned and ghost cells) in set k of the mesh. Allocated here; PetscFree. */
 PetscErrorCode SbSpaceGetSetFacets(SbSpace space, PetscInt k, PetscInt *n, SbFacet **facets);

@@ -6,42 +6,44 @@
 
 /* Scalars of one instant, summed over all ranks. SI. */
 typedef struct {
-  PetscReal kinetic;            /* 1/2 v.M v, J */
-  PetscReal strain;             /* J */
-  PetscReal load_work;          /* work done by the loads since the start (minus their potential when they have one), J */
-  PetscReal drive_work;         /* work done by moving supports since the start, J */
-  PetscReal damping_loss;       /* dissipated by Rayleigh damping since the start, J */
-  PetscReal integrator_loss;    /* what is missing: start + works - damping_loss - now, J */
-  PetscReal momentum[3];        /* kg m/s */
-  PetscReal angular[3];         /* about the origin, kg m^2/s */
-  PetscReal centre[3];          /* centre of mass, m */
-  PetscReal volume;             /* current volume, m^3 */
-  PetscReal min_J;              /* smallest det F */
-  PetscReal max_speed;          /* largest nodal speed, m/s */
-  PetscReal max_displacement;   /* m */
-  PetscInt  ninverted;          /* cells with det F <= 0 */
+  PetscReal kinetic; /* 1/2 v.M v, J */
+  PetscReal strain;  /* J */
+  PetscReal
+    load_work; /* work done by the loads since the start (minus their potential when they have one), J */
+  PetscReal drive_work;       /* work done by moving supports since the start, J */
+  PetscReal damping_loss;     /* dissipated by Rayleigh damping since the start, J */
+  PetscReal integrator_loss;  /* what is missing: start + works - damping_loss - now, J */
+  PetscReal momentum[3];      /* kg m/s */
+  PetscReal angular[3];       /* about the origin, kg m^2/s */
+  PetscReal centre[3];        /* centre of mass, m */
+  PetscReal volume;           /* current volume, m^3 */
+  PetscReal min_J;            /* smallest det F */
+  PetscReal max_speed;        /* largest nodal speed, m/s */
+  PetscReal max_displacement; /* m */
+  PetscInt ninverted;         /* cells with det F <= 0 */
 } SbEnergies;
 
 typedef struct _p_SbModel *SbModel;
 struct _p_SbModel {
-  MPI_Comm    comm;
-  PetscInt    nbody;
-  SbBody     *body;
-  PetscInt    nset;
-  SbSet      *set;
-  SbMaterial *material;         /* [nbody] */
-  SbElement  *element;          /* [nbody] */
-  SbMesh      mesh;
-  SbSpace     space;
-  PetscInt    neffect;
-  SbEffect   *effect;
+  MPI_Comm comm;
+  PetscInt nbody;
+  SbBody *body;
+  PetscInt nset;
+  SbSet *set;
+  SbMaterial *material; /* [nbody] */
+  SbElement *element;   /* [nbody] */
+  SbMesh mesh;
+  SbSpace space;
+  PetscInt neffect;
+  SbEffect *effect;
   /* one list per operation, holding only the effects that implement it */
-  PetscInt    nprescribe, nprestep, nforce, ntangent, naccept, nhistory;
-  SbEffect   *prescribe, *prestep, *force, *tangent, *accept, *history;
-  PetscBool   linear;           /* laws and effects: the tangent depends on the shifts only */
-  PetscReal   mass;             /* kg */
-  PetscBool   dynamic;
-  PetscReal   load;             /* load factor: 1, in a static run 0..1; multiplies loads and prescribed displacements without t in their formulas */
+  PetscInt nprescribe, nprestep, nforce, ntangent, naccept, nhistory;
+  SbEffect *prescribe, *prestep, *force, *tangent, *accept, *history;
+  PetscBool linear; /* laws and effects: the tangent depends on the shifts only */
+  PetscReal mass;   /* kg */
+  PetscBool dynamic;
+  PetscReal
+    load; /* load factor: 1, in a static run 0..1; multiplies loads and prescribed displacements without t in their formulas */
 };
 
 PetscErrorCode SbModelDestroy(SbModel *model);
@@ -52,7 +54,8 @@ PetscErrorCode SbModelResidual(SbModel model, PetscReal t, Vec U, Vec V, Vec A, 
 /* f_ext alone */
 PetscErrorCode SbModelLoads(SbModel model, PetscReal t, Vec U, Vec V, Vec F);
 /* A = shift_a M + shift_v C + shift_k K(u) and the effects' part, prescribed unknowns replaced. Collective. */
-PetscErrorCode SbModelTangent(SbModel model, PetscReal t, PetscReal shift_v, PetscReal shift_a, PetscReal shift_k, Vec U, Vec V, Mat A);
+PetscErrorCode SbModelTangent(SbModel model, PetscReal t, PetscReal shift_v, PetscReal shift_a,
+                              PetscReal shift_k, Vec U, Vec V, Mat A);
 /* Writes prescribed displacements at t into U. */
 PetscErrorCode SbModelPrescribe(SbModel model, PetscReal t, Vec U);
 /* Initial velocities of bodies (translation and spin). */

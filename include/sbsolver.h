@@ -6,20 +6,21 @@
 
 /* A row of the solver table: a matrix type and PETSc options that are set where the user is silent. */
 typedef struct _SbSolverPreset {
-  const char  *name;
-  SbMatrixKind matrix;      /* on several ranks SBAIJ becomes BAIJ */
-  PetscBool    matrix_free; /* a frame operator in place of the matrix */
-  const char  *options;     /* "-ksp_type cg -pc_type gamg ..." */
-  PetscErrorCode (*precondition)(SbSpace space, PC pc); /* a preconditioner of our own; NULL: by the options */
-  const char  *help;
+  const char *name;
+  SbMatrixKind matrix;   /* on several ranks SBAIJ becomes BAIJ */
+  PetscBool matrix_free; /* a frame operator in place of the matrix */
+  const char *options;   /* "-ksp_type cg -pc_type gamg ..." */
+  PetscErrorCode (*precondition)(SbSpace space,
+                                 PC pc); /* a preconditioner of our own; NULL: by the options */
+  const char *help;
 } SbSolverPreset;
 
 PetscErrorCode SbSolverRegister(void);
 /* Reads -solver: "auto" or a name of the table. */
 PetscErrorCode SbSolverSetFromOptions(char choice[], size_t size);
 /* The preset for `choice`; with "auto" by number of unknowns, ranks and law, the reason in words. Collective. */
-PetscErrorCode SbSolverChoose(SbSpace space, PetscBool dynamic, PetscBool linear, PetscBool explicit_run, const char *choice, const SbSolverPreset **preset,
-                              char reason[], size_t size);
+PetscErrorCode SbSolverChoose(SbSpace space, PetscBool dynamic, PetscBool linear, PetscBool explicit_run,
+                              const char *choice, const SbSolverPreset **preset, char reason[], size_t size);
 /*
   SbSolverFallBack - after a solve that failed: a simpler preconditioner when the present one broke down (an incomplete
   factorisation that is not positive definite), said once as a warning. Collective.

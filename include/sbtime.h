@@ -4,22 +4,30 @@
 #pragma once
 #include "sbmodel.h"
 
-typedef enum { SB_TIME_EULER_IMPLICIT, SB_TIME_NEWMARK, SB_TIME_GENALPHA, SB_TIME_EULER_SYMPLECTIC, SB_TIME_EULER_EXPLICIT, SB_TIME_ALPHA2, SB_TIME_STATIC } SbTimePreset;
+typedef enum {
+  SB_TIME_EULER_IMPLICIT,
+  SB_TIME_NEWMARK,
+  SB_TIME_GENALPHA,
+  SB_TIME_EULER_SYMPLECTIC,
+  SB_TIME_EULER_EXPLICIT,
+  SB_TIME_ALPHA2,
+  SB_TIME_STATIC
+} SbTimePreset;
 extern const char *const SbTimePresets; /* "euler_implicit|newmark|..." in the order of the enum */
 
 /* What a monitor sees after each accepted step (and once before the first). */
 typedef struct {
-  PetscInt   step;
-  PetscReal  t, dt;              /* s; in a static run t is the load factor, 0..1 */
-  PetscReal  t_end;
-  PetscInt   step_end;           /* last step if it is known from dt, else -1 */
-  Vec        U, V, A;            /* V, A NULL in a static run */
-  Vec        R;                  /* residual without constraints: reactions on prescribed unknowns; NULL unless somebody asked */
-  SbEnergies energies;           /* filled when some monitor needs them (SbRun.want_energies) */
-  PetscInt   newton, linear;     /* iterations of this step */
-  PetscInt   rejected;           /* attempts given up, this step */
-  PetscReal  wall;               /* seconds since the time loop began */
-  PetscBool  last;
+  PetscInt step;
+  PetscReal t, dt; /* s; in a static run t is the load factor, 0..1 */
+  PetscReal t_end;
+  PetscInt step_end; /* last step if it is known from dt, else -1 */
+  Vec U, V, A;       /* V, A NULL in a static run */
+  Vec R; /* residual without constraints: reactions on prescribed unknowns; NULL unless somebody asked */
+  SbEnergies energies;     /* filled when some monitor needs them (SbRun.want_energies) */
+  PetscInt newton, linear; /* iterations of this step */
+  PetscInt rejected;       /* attempts given up, this step */
+  PetscReal wall;          /* seconds since the time loop began */
+  PetscBool last;
 } SbStep;
 
 typedef struct _p_SbRun *SbRun;
@@ -27,43 +35,52 @@ typedef PetscErrorCode (*SbMonitorFn)(SbRun run, const SbStep *step, void *ctx);
 
 /* One simulation: model, solver, integrator, monitors. */
 struct _p_SbRun {
-  SbModel      model;            /* borrowed */
+  SbModel model; /* borrowed */
   SbTimePreset preset;
-  TS           ts;               /* NULL in a static run */
-  SNES         snes;             /* of the TS, or own in a static run; borrowed from ts when there is one */
-  Mat          J;
-  Vec          U, V, A;          /* A: acceleration of the last step, state of the integrator */
-  PetscBool    dt_given, velocity_predictor, fixed_step, damped;
-  PetscReal    spectral_radius, newmark[2]; /* newmark: beta, gamma */
-  PetscInt     max_cuts, static_steps;
-  PetscBool    tangent_known;    /* J holds the tangent for shift_v, shift_a */
-  PetscReal    shift_v, shift_a;
-  char         solver_choice[SB_NAME_MAX]; /* as the scenario says: "auto" or a name */
+  TS ts;     /* NULL in a static run */
+  SNES snes; /* of the TS, or own in a static run; borrowed from ts when there is one */
+  Mat J;
+  Vec U, V, A; /* A: acceleration of the last step, state of the integrator */
+  PetscBool dt_given, velocity_predictor, fixed_step, damped;
+  PetscReal spectral_radius, newmark[2]; /* newmark: beta, gamma */
+  PetscInt max_cuts, static_steps;
+  PetscBool tangent_known; /* J holds the tangent for shift_v, shift_a */
+  PetscReal shift_v, shift_a;
+  char solver_choice[SB_NAME_MAX]; /* as the scenario says: "auto" or a name */
   const struct _SbSolverPreset *solver_used;
-  char         solver[SB_NAME_MAX];      /* preset chosen, "cg_gamg" */
-  char         solver_reason[256];
-  PetscInt     nmonitor;
-  struct { SbMonitorFn fn; void *ctx; PetscErrorCode (*destroy)(void *ctx); } monitor[8];
-  PetscBool    want_energies, want_residual;
-  SbEnergies   energies;         /* running totals of works and losses */
-  PetscReal    energy_start;     /* kinetic + strain at the start of the run (kept over restarts), J */
-  PetscInt     step0;            /* first step and time when restarted */
-  PetscReal    t0;
-  PetscInt     newton_total, linear_total, rejected_total, steps_total;
-  PetscReal    wall_start, seconds_solve;
-  PetscReal    dt, t_end;        /* length of a step (the first one when adaptive) and end, s */
-  PetscInt     newton_step, linear_step, rejected_step; /* iterations and rejections of the current step */
-  PetscInt     rejected_seen;
-  Vec          loads, reaction, previous; /* f_ext and residual at the last step, its displacement: for works; only with want_energies */
-  PetscReal    damping_power;    /* at the last step, W */
-  char         stop_reason[512]; /* why the run ended early; empty when it reached its end */
-  void        *output;           /* what src/output keeps for this run; NULL when no output was asked for */
-  PetscErrorCode (*output_destroy)(SbRun run); /* frees it; called by SbRunDestroy() when not NULL, before the monitors */
+  char solver[SB_NAME_MAX]; /* preset chosen, "cg_gamg" */
+  char solver_reason[256];
+  PetscInt nmonitor;
+  struct {
+    SbMonitorFn fn;
+    void *ctx;
+    PetscErrorCode (*destroy)(void *ctx);
+  } monitor[8];
+  PetscBool want_energies, want_residual;
+  SbEnergies energies;    /* running totals of works and losses */
+  PetscReal energy_start; /* kinetic + strain at the start of the run (kept over restarts), J */
+  PetscInt step0;         /* first step and time when restarted */
+  PetscReal t0;
+  PetscInt newton_total, linear_total, rejected_total, steps_total;
+  PetscReal wall_start, seconds_solve;
+  PetscReal dt, t_end; /* length of a step (the first one when adaptive) and end, s */
+  PetscInt newton_step, linear_step, rejected_step; /* iterations and rejections of the current step */
+  PetscInt rejected_seen;
+  Vec loads, reaction,
+    previous; /* f_ext and residual at the last step, its displacement: for works; only with want_energies */
+  PetscReal damping_power; /* at the last step, W */
+  char stop_reason[512];   /* why the run ended early; empty when it reached its end */
+  void *output;            /* what src/output keeps for this run; NULL when no output was asked for */
+  PetscErrorCode (*output_destroy)(
+    SbRun run); /* frees it; called by SbRunDestroy() when not NULL, before the monitors */
 };
 
-PetscErrorCode SbTimeRegister(void);   /* option rows and the TSType */
-PetscErrorCode SbRunCreate(SbModel model, SbRun *run); /* reads the options -time, -solver, ...; nothing is computed yet */
-PetscErrorCode SbRunSetUp(SbRun run);                  /* after SbModelSetUp(): vectors, matrix, solver, integrator. Collective */
+PetscErrorCode SbTimeRegister(void); /* option rows and the TSType */
+PetscErrorCode SbRunCreate(SbModel model,
+                           SbRun *run); /* reads the options -time, -solver, ...; nothing is computed yet */
+PetscErrorCode
+SbRunSetUp(SbRun run); /* after SbModelSetUp(): vectors, matrix, solver, integrator. Collective */
 PetscErrorCode SbRunAddMonitor(SbRun run, SbMonitorFn fn, void *ctx, PetscErrorCode (*destroy)(void *));
-PetscErrorCode SbRunSolve(SbRun run);  /* the whole time loop or load path; an early end is in run->stop_reason, not an error */
+PetscErrorCode SbRunSolve(
+  SbRun run); /* the whole time loop or load path; an early end is in run->stop_reason, not an error */
 PetscErrorCode SbRunDestroy(SbRun *run);

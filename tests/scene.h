@@ -7,7 +7,7 @@
 
 typedef struct {
   SbModel model;
-  SbRun   run;
+  SbRun run;
 } TestScene;
 
 /* Everything of the program but output: model and run are set up and ready for SbRunSolve(). */
@@ -39,13 +39,13 @@ static inline PetscErrorCode test_scene_close(TestScene *scene)
 /* Displacement (or any vector of the run) at the vertex nearest to a rest position, on every rank. */
 static inline PetscErrorCode test_value_at(SbModel m, Vec U, const PetscReal at[3], PetscReal value[3])
 {
-  SbSpace            s = m->space;
+  SbSpace s = m->space;
   const PetscScalar *u;
   struct {
     double distance;
-    int    rank;
+    int rank;
   } mine = {1e300, 0}, best;
-  PetscInt    node = 0;
+  PetscInt node = 0;
   PetscMPIInt rank;
 
   PetscFunctionBeginUser;
@@ -57,7 +57,7 @@ static inline PetscErrorCode test_value_at(SbModel m, Vec U, const PetscReal at[
     for (PetscInt k = 0; k < 3; k++) d2 += PetscSqr(s->node_x[3 * i + k] - at[k]);
     if (d2 < mine.distance) {
       mine.distance = d2;
-      node          = i;
+      node = i;
     }
   }
   PetscCallMPI(MPI_Allreduce(&mine, &best, 1, MPI_DOUBLE_INT, MPI_MINLOC, m->comm));
@@ -71,7 +71,7 @@ static inline PetscErrorCode test_value_at(SbModel m, Vec U, const PetscReal at[
 /* Fills a vector from a function of the rest position, so that it does not depend on the partition. */
 static inline PetscErrorCode test_fill(SbModel m, void (*f)(const PetscReal x[3], PetscReal value[3]), Vec U)
 {
-  SbSpace      s = m->space;
+  SbSpace s = m->space;
   PetscScalar *u;
 
   PetscFunctionBeginUser;

@@ -8,7 +8,8 @@
 PetscErrorCode SbSpaceFix(SbSpace s, PetscInt node, int components)
 {
   PetscFunctionBeginUser;
-  PetscCheck(!s->fixed_node, PETSC_COMM_SELF, PETSC_ERR_ORDER, "Unknowns can be prescribed during set-up only");
+  PetscCheck(!s->fixed_node, PETSC_COMM_SELF, PETSC_ERR_ORDER,
+             "Unknowns can be prescribed during set-up only");
   s->fixed[node] |= (uint8_t)(components & 7);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -34,8 +35,10 @@ PetscInt SbSpaceFixedIndex(SbSpace s, PetscInt node)
   while (lo < hi) {
     const PetscInt mid = lo + (hi - lo) / 2;
 
-    if (s->fixed_node[mid] < node) lo = mid + 1;
-    else hi = mid;
+    if (s->fixed_node[mid] < node)
+      lo = mid + 1;
+    else
+      hi = mid;
   }
   return lo < s->nfixed && s->fixed_node[lo] == node ? lo : -1;
 }

@@ -10,12 +10,12 @@
 static void add_region_force(SbSpace s, const SbRegion *region, const SbStage *stage, PetscReal f[])
 {
   const SbMaterial m = region->material;
-  const PetscReal  beta = stage->v ? region->beta : 0.;
+  const PetscReal beta = stage->v ? region->beta : 0.;
 
   for (PetscInt b = region->bstart; b < region->bend; b++) {
     const PetscInt *node = s->batch_node + 4 * SB_BATCH * b;
-    const SbLane   *g    = s->batch_g + 9 * b;
-    SbLane          u[12], F[9], P[9], fe[12];
+    const SbLane *g = s->batch_g + 9 * b;
+    SbLane u[12], F[9], P[9], fe[12];
 
     sb_gather(node, stage->u, u);
     SbCellGradient(g, (const SbLane *)u, F);
@@ -47,15 +47,17 @@ PetscErrorCode SbSpaceAddInternalForce(SbSpace s, const SbStage *stage, PetscRea
 /* Consistent mass of a region times w = a + alpha v. */
 static void add_consistent_inertia(SbSpace s, const SbRegion *region, const SbStage *stage, PetscReal f[])
 {
-  const SbElementOps *e     = &region->element->ops;
-  const PetscReal     alpha = stage->v ? region->alpha : 0.;
+  const SbElementOps *e = &region->element->ops;
+  const PetscReal alpha = stage->v ? region->alpha : 0.;
 
   for (PetscInt b = region->bstart; b < region->bend; b++) {
     const PetscInt *node = s->batch_node + 4 * SB_BATCH * b;
-    SbLane          w[12], fe[12];
+    SbLane w[12], fe[12];
 
-    if (stage->a) sb_gather(node, stage->a, w);
-    else memset(w, 0, sizeof(w));
+    if (stage->a)
+      sb_gather(node, stage->a, w);
+    else
+      memset(w, 0, sizeof(w));
     if (alpha != 0.) {
       SbLane v[12];
 
@@ -68,7 +70,8 @@ static void add_consistent_inertia(SbSpace s, const SbRegion *region, const SbSt
       for (int l = 0; l < SB_BATCH; l++) {
         const PetscReal sum = w[k % 3][l] + w[3 + k % 3][l] + w[6 + k % 3][l] + w[9 + k % 3][l];
 
-        fe[k][l] = region->material->density * s->batch_V[b][l] * ((e->mass_diagonal - e->mass_coupling) * w[k][l] + e->mass_coupling * sum);
+        fe[k][l] = region->material->density * s->batch_V[b][l] *
+                   ((e->mass_diagonal - e->mass_coupling) * w[k][l] + e->mass_coupling * sum);
       }
     }
     sb_scatter_add(node, s->batch_n[b], (const SbLane *)fe, f);
@@ -120,15 +123,18 @@ static void cauchy(const SbLane P[9], const SbLane F[9], PetscInt l, PetscReal J
 
 static PetscReal lane_det(const SbLane F[9], PetscInt l)
 {
-  return F[0][l] * (F[4][l] * F[8][l] - F[5][l] * F[7][l]) - F[1][l] * (F[3][l] * F[8][l] - F[5][l] * F[6][l]) + F[2][l] * (F[3][l] * F[7][l] - F[4][l] * F[6][l]);
+  return F[0][l] * (F[4][l] * F[8][l] - F[5][l] * F[7][l]) -
+         F[1][l] * (F[3][l] * F[8][l] - F[5][l] * F[6][l]) +
+         F[2][l] * (F[3][l] * F[7][l] - F[4][l] * F[6][l]);
 }
 
-PetscErrorCode SbSpaceCellState(SbSpace s, const PetscReal x[], PetscReal sigma[], PetscReal J[], PetscReal psi[])
+PetscErrorCode SbSpaceCellState(SbSpace s, const PetscReal x[], PetscReal sigma[], PetscReal J[],
+                                PetscReal psi[])
 {
   PetscFunctionBeginUser;
   for (PetscInt r = 0; r < s->nregion; r++) {
-    const SbRegion  *region = &s->region[r];
-    const SbMaterial m      = region->material;
+    const SbRegion *region = &s->region[r];
+    const SbMaterial m = region->material;
 
     for (PetscInt b = region->bstart; region->owned && b < region->bend; b++) {
       SbLane u[12], F[9], P[9], energy;
@@ -138,7 +144,7 @@ PetscErrorCode SbSpaceCellState(SbSpace s, const PetscReal x[], PetscReal sigma[
       if (sigma) m->ops.stress(m, (const SbLane *)F, P);
       if (psi) m->ops.energy(m, (const SbLane *)F, energy);
       for (PetscInt l = 0; l < s->batch_n[b]; l++) {
-        const PetscInt  c   = s->batch_cell[b] + l;
+        const PetscInt c = s->batch_cell[b] + l;
         const PetscReal det = lane_det((const SbLane *)F, l);
 
         if (J) J[c] = det;
@@ -149,23 +155,25 @@ PetscErrorCode SbSpaceCellState(SbSpace s, const PetscReal x[], PetscReal sigma[
           const int entry[6] = {0, 4, 8, 1, 5, 2};
 
           for (int k = 0; k < 6; k++) sigma[6 * c + k] = P[entry[k]][l];
-        } else cauchy((const SbLane *)P, (const SbLane *)F, l, det, sigma + 6 * c);
+        } else
+          cauchy((const SbLane *)P, (const SbLane *)F, l, det, sigma + 6 * c);
       }
     }
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbSpaceStrainEnergy(SbSpace s, const PetscReal x[], PetscReal *energy, PetscReal *minJ, PetscInt *ninverted, PetscReal *volume)
+PetscErrorCode SbSpaceStrainEnergy(SbSpace s, const PetscReal x[], PetscReal *energy, PetscReal *minJ,
+                                   PetscInt *ninverted, PetscReal *volume)
 {
   PetscFunctionBeginUser;
-  *energy    = 0.;
-  *volume    = 0.;
-  *minJ      = PETSC_MAX_REAL;
+  *energy = 0.;
+  *volume = 0.;
+  *minJ = PETSC_MAX_REAL;
   *ninverted = 0;
   for (PetscInt r = 0; r < s->nregion; r++) {
-    const SbRegion  *region = &s->region[r];
-    const SbMaterial m      = region->material;
+    const SbRegion *region = &s->region[r];
+    const SbMaterial m = region->material;
 
     for (PetscInt b = region->bstart; region->owned && b < region->bend; b++) {
       SbLane u[12], F[9], psi;
@@ -191,13 +199,13 @@ PetscErrorCode SbSpaceDampingPower(SbSpace s, const PetscReal x[], const PetscRe
   PetscFunctionBeginUser;
   *power = 0.;
   for (PetscInt r = 0; r < s->nregion; r++) {
-    const SbRegion  *region = &s->region[r];
-    const SbMaterial m      = region->material;
+    const SbRegion *region = &s->region[r];
+    const SbMaterial m = region->material;
 
     if (!region->owned || (region->alpha == 0. && region->beta == 0.)) continue;
     for (PetscInt b = region->bstart; b < region->bend; b++) {
       const PetscInt *node = s->batch_node + 4 * SB_BATCH * b;
-      SbLane          u[12], F[9], H[9], dP[9];
+      SbLane u[12], F[9], H[9], dP[9];
 
       sb_gather(node, x, u);
       SbCellGradient(s->batch_g + 9 * b, (const SbLane *)u, F);
@@ -209,7 +217,8 @@ PetscErrorCode SbSpaceDampingPower(SbSpace s, const PetscReal x[], const PetscRe
 
         for (int k = 0; k < 9; k++) hooke += H[k][l] * dP[k][l];
         for (int k = 0; k < 12; k++) inertia += u[k][l] * u[k][l];
-        *power += s->batch_V[b][l] * (region->beta * hooke + region->alpha * m->density * region->element->ops.mass_lumped * inertia);
+        *power += s->batch_V[b][l] * (region->beta * hooke + region->alpha * m->density *
+                                                               region->element->ops.mass_lumped * inertia);
       }
     }
   }

@@ -10,25 +10,48 @@
 #include "sbsolver.h"
 
 static const SbSolverPreset presets[] = {
-  {"cg", SB_MATRIX_BAIJ, PETSC_FALSE, "-ksp_type cg -pc_type none", NULL, "conjugate gradients without preconditioner"},
-  {"cg_jacobi", SB_MATRIX_BAIJ, PETSC_FALSE, "-ksp_type cg -pc_type jacobi", NULL, "CG, diagonal preconditioner"},
-  {"cg_pbjacobi", SB_MATRIX_BAIJ, PETSC_FALSE, "-ksp_type cg -pc_type pbjacobi", NULL, "CG, 3x3 diagonal blocks"},
-  {"cg_icc", SB_MATRIX_SBAIJ, PETSC_FALSE, "-ksp_type cg -pc_type bjacobi -sub_pc_type icc -sub_pc_factor_shift_type positive_definite", NULL, "CG, incomplete Cholesky on each rank"},
-  {"cg_ssor", SB_MATRIX_AIJ, PETSC_FALSE, "-ksp_type cg -pc_type sor -pc_sor_local_symmetric", NULL, "CG, symmetric Gauss-Seidel on each rank"},
-  {"cg_two_level", SB_MATRIX_SBAIJ, PETSC_FALSE, "-ksp_type cg", SbPCCoarseCreate, "CG, incomplete Cholesky on each rank and the rigid-body modes of some hundred aggregates of nodes"},
-  {"cg_gamg", SB_MATRIX_AIJ, PETSC_FALSE, "-ksp_type cg -pc_type gamg", NULL, "CG, algebraic multigrid with the rigid-body modes of each body"},
-  {"cg_hypre", SB_MATRIX_AIJ, PETSC_FALSE, "-ksp_type cg -pc_type hypre -pc_hypre_type boomeramg -pc_hypre_boomeramg_strong_threshold 0.5", NULL, "CG, BoomerAMG of hypre"},
-  {"gauss_seidel", SB_MATRIX_AIJ, PETSC_FALSE, "-ksp_type richardson -pc_type composite -pc_composite_pcs sor -sub_0_pc_sor_omega 1 -ksp_max_it 100000", NULL, "Gauss-Seidel iteration (between ranks: block Jacobi)"},
-  {"sor", SB_MATRIX_AIJ, PETSC_FALSE, "-ksp_type richardson -pc_type composite -pc_composite_pcs sor -sub_0_pc_sor_omega 1.6 -ksp_max_it 100000", NULL, "successive over-relaxation, omega 1.6 (between ranks: block Jacobi)"},
-  {"cholmod", SB_MATRIX_AIJ, PETSC_FALSE, "-ksp_type cg -pc_type cholesky -pc_factor_mat_solver_type cholmod", NULL, "sparse Cholesky of SuiteSparse; one rank"},
-  {"mumps", SB_MATRIX_AIJ, PETSC_FALSE, "-ksp_type cg -pc_type cholesky -pc_factor_mat_solver_type mumps", NULL, "sparse factorisation of MUMPS on any number of ranks"},
-  {"rotated", SB_MATRIX_BAIJ, PETSC_FALSE, "-ksp_type cg", SbPCRotatedCreate, "CG, one factorisation that turns with the nodes and is seldom renewed: dynamic runs of up to about 100k tets"},
-  {"realtime", SB_MATRIX_BAIJ, PETSC_TRUE, "-ksp_type cg -ksp_initial_guess_nonzero", SbPCRotatedCreate, "the same without a matrix, warm-started: linear, or corotated with -body_<name>_tangent warped; fastest with -snes_type ksponly and -ksp_rtol 1e-4"},
+  {"cg", SB_MATRIX_BAIJ, PETSC_FALSE, "-ksp_type cg -pc_type none", NULL,
+   "conjugate gradients without preconditioner"},
+  {"cg_jacobi", SB_MATRIX_BAIJ, PETSC_FALSE, "-ksp_type cg -pc_type jacobi", NULL,
+   "CG, diagonal preconditioner"},
+  {"cg_pbjacobi", SB_MATRIX_BAIJ, PETSC_FALSE, "-ksp_type cg -pc_type pbjacobi", NULL,
+   "CG, 3x3 diagonal blocks"},
+  {"cg_icc", SB_MATRIX_SBAIJ, PETSC_FALSE,
+   "-ksp_type cg -pc_type bjacobi -sub_pc_type icc -sub_pc_factor_shift_type positive_definite", NULL,
+   "CG, incomplete Cholesky on each rank"},
+  {"cg_ssor", SB_MATRIX_AIJ, PETSC_FALSE, "-ksp_type cg -pc_type sor -pc_sor_local_symmetric", NULL,
+   "CG, symmetric Gauss-Seidel on each rank"},
+  {"cg_two_level", SB_MATRIX_SBAIJ, PETSC_FALSE, "-ksp_type cg", SbPCCoarseCreate,
+   "CG, incomplete Cholesky on each rank and the rigid-body modes of some hundred aggregates of nodes"},
+  {"cg_gamg", SB_MATRIX_AIJ, PETSC_FALSE, "-ksp_type cg -pc_type gamg", NULL,
+   "CG, algebraic multigrid with the rigid-body modes of each body"},
+  {"cg_hypre", SB_MATRIX_AIJ, PETSC_FALSE,
+   "-ksp_type cg -pc_type hypre -pc_hypre_type boomeramg -pc_hypre_boomeramg_strong_threshold 0.5", NULL,
+   "CG, BoomerAMG of hypre"},
+  {"gauss_seidel", SB_MATRIX_AIJ, PETSC_FALSE,
+   "-ksp_type richardson -pc_type composite -pc_composite_pcs sor -sub_0_pc_sor_omega 1 -ksp_max_it 100000",
+   NULL, "Gauss-Seidel iteration (between ranks: block Jacobi)"},
+  {"sor", SB_MATRIX_AIJ, PETSC_FALSE,
+   "-ksp_type richardson -pc_type composite -pc_composite_pcs sor -sub_0_pc_sor_omega 1.6 -ksp_max_it 100000",
+   NULL, "successive over-relaxation, omega 1.6 (between ranks: block Jacobi)"},
+  {"cholmod", SB_MATRIX_AIJ, PETSC_FALSE, "-ksp_type cg -pc_type cholesky -pc_factor_mat_solver_type cholmod",
+   NULL, "sparse Cholesky of SuiteSparse; one rank"},
+  {"mumps", SB_MATRIX_AIJ, PETSC_FALSE, "-ksp_type cg -pc_type cholesky -pc_factor_mat_solver_type mumps",
+   NULL, "sparse factorisation of MUMPS on any number of ranks"},
+  {"rotated", SB_MATRIX_BAIJ, PETSC_FALSE, "-ksp_type cg", SbPCRotatedCreate,
+   "CG, one factorisation that turns with the nodes and is seldom renewed: dynamic runs of up to about 100k "
+   "tets"},
+  {"realtime", SB_MATRIX_BAIJ, PETSC_TRUE, "-ksp_type cg -ksp_initial_guess_nonzero", SbPCRotatedCreate,
+   "the same without a matrix, warm-started: linear, or corotated with -body_<name>_tangent warped; fastest "
+   "with -snes_type ksponly and -ksp_rtol 1e-4"},
 };
 
 static const SbOption rows[] = {
-  {"solver", SB_OPTION_CHOICE, 1, "", "auto", "auto|cg|cg_jacobi|cg_pbjacobi|cg_icc|cg_ssor|cg_two_level|cg_gamg|cg_hypre|gauss_seidel|sor|cholmod|mumps|rotated|realtime",
-   "linear solver; auto chooses by size, ranks and material and says why. PETSc's -ksp_ and -pc_ options refine it"},
+  {"solver", SB_OPTION_CHOICE, 1, "", "auto",
+   "auto|cg|cg_jacobi|cg_pbjacobi|cg_icc|cg_ssor|cg_two_level|cg_gamg|cg_hypre|gauss_seidel|sor|cholmod|"
+   "mumps|rotated|realtime",
+   "linear solver; auto chooses by size, ranks and material and says why. PETSc's -ksp_ and -pc_ options "
+   "refine it"},
 };
 
 PetscErrorCode SbSolverRegister(void)
@@ -40,7 +63,7 @@ PetscErrorCode SbSolverRegister(void)
 
 PetscErrorCode SbSolverSetFromOptions(char choice[], size_t size)
 {
-  SbScope  scope;
+  SbScope scope;
   PetscInt index;
 
   PetscFunctionBeginUser;
@@ -59,12 +82,12 @@ static const SbSolverPreset *find_preset(const char *name)
   return NULL;
 }
 
-PetscErrorCode SbSolverChoose(SbSpace s, PetscBool dynamic, PetscBool linear, PetscBool explicit_run, const char *choice, const SbSolverPreset **preset, char reason[],
-                              size_t size)
+PetscErrorCode SbSolverChoose(SbSpace s, PetscBool dynamic, PetscBool linear, PetscBool explicit_run,
+                              const char *choice, const SbSolverPreset **preset, char reason[], size_t size)
 {
   const PetscInt unknowns = 3 * s->Nnode;
-  const char    *name     = choice;
-  PetscMPIInt    nrank;
+  const char *name = choice;
+  PetscMPIInt nrank;
 
   PetscFunctionBeginUser;
   PetscCallMPI(MPI_Comm_size(s->comm, &nrank));
@@ -75,18 +98,28 @@ PetscErrorCode SbSolverChoose(SbSpace s, PetscBool dynamic, PetscBool linear, Pe
     PetscCall(PetscSNPrintf(reason, size, "chosen by -solver"));
   } else if (dynamic && !linear && unknowns <= 60000) {
     name = "rotated";
-    PetscCall(PetscSNPrintf(reason, size, "dynamic, %" PetscInt_FMT " unknowns: one factorisation turns with the nodes and serves many steps", unknowns));
+    PetscCall(PetscSNPrintf(reason, size,
+                            "dynamic, %" PetscInt_FMT
+                            " unknowns: one factorisation turns with the nodes and serves many steps",
+                            unknowns));
   } else if (unknowns <= 30000) {
     name = nrank == 1 ? "cholmod" : "mumps";
-    PetscCall(PetscSNPrintf(reason, size, "%" PetscInt_FMT " unknowns: a factorisation is fast and holds at any Poisson's ratio", unknowns));
+    PetscCall(PetscSNPrintf(
+      reason, size, "%" PetscInt_FMT " unknowns: a factorisation is fast and holds at any Poisson's ratio",
+      unknowns));
   } else {
     /* 192k tets, CPU s of one rank. Static: 0.36 (cg_gamg 1.7, cg_icc 1.4), at nu 0.45 0.7 (2.3), at 0.499 4.2 (18); dynamic, h = 0.01 s: 0.22 (1.7, 0.40) */
     name = "cg_two_level";
-    PetscCall(PetscSNPrintf(reason, size, "%s, %" PetscInt_FMT " unknowns: motions of large parts are solved directly, the rest takes few iterations", dynamic ? "dynamic" : "static", unknowns));
+    PetscCall(
+      PetscSNPrintf(reason, size,
+                    "%s, %" PetscInt_FMT
+                    " unknowns: motions of large parts are solved directly, the rest takes few iterations",
+                    dynamic ? "dynamic" : "static", unknowns));
   }
   *preset = find_preset(name);
   PetscCheck(*preset, s->comm, PETSC_ERR_PLIB, "No solver preset %s", name);
-  PetscCheck(nrank == 1 || strcmp((*preset)->name, "cholmod"), s->comm, PETSC_ERR_USER, "-solver cholmod runs on one rank and there are %d: use mumps", (int)nrank);
+  PetscCheck(nrank == 1 || strcmp((*preset)->name, "cholmod"), s->comm, PETSC_ERR_USER,
+             "-solver cholmod runs on one rank and there are %d: use mumps", (int)nrank);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -94,13 +127,13 @@ PetscErrorCode SbSolverChoose(SbSpace s, PetscBool dynamic, PetscBool linear, Pe
 static PetscErrorCode insert_options(const char *text)
 {
   PetscToken token;
-  char      *word;
+  char *word;
 
   PetscFunctionBeginUser;
   PetscCall(PetscTokenCreate(text, ' ', &token));
   PetscCall(PetscTokenFind(token, &word));
   while (word) {
-    char      name[128];
+    char name[128];
     PetscBool given;
 
     PetscCall(PetscStrncpy(name, word, sizeof(name)));
@@ -119,23 +152,28 @@ static PetscErrorCode insert_options(const char *text)
 
 PetscErrorCode SbSolverCreateOperator(SbSpace s, const SbSolverPreset *preset, Mat *A)
 {
-  PetscBool   frames;
+  PetscBool frames;
   PetscMPIInt nrank;
 
   PetscFunctionBeginUser;
   PetscCallMPI(MPI_Comm_size(s->comm, &nrank));
   if (preset->matrix_free) {
     PetscCall(SbSpaceHasFrames(s, &frames));
-    PetscCheck(frames, s->comm, PETSC_ERR_USER, "-solver %s is for -mass lumped and the materials linear, and corotated with -body_<name>_tangent warped: choose these, or -solver rotated", preset->name);
+    PetscCheck(frames, s->comm, PETSC_ERR_USER,
+               "-solver %s is for -mass lumped and the materials linear, and corotated with "
+               "-body_<name>_tangent warped: choose these, or -solver rotated",
+               preset->name);
     PetscCall(SbSpaceCreateFrameOperator(s, A));
-  } else PetscCall(SbSpaceCreateMatrix(s, nrank > 1 && preset->matrix == SB_MATRIX_SBAIJ ? SB_MATRIX_BAIJ : preset->matrix, A));
+  } else
+    PetscCall(SbSpaceCreateMatrix(
+      s, nrank > 1 && preset->matrix == SB_MATRIX_SBAIJ ? SB_MATRIX_BAIJ : preset->matrix, A));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode SbSolverSetUp(SNES snes, SbSpace s, const SbSolverPreset *preset)
 {
   KSP ksp;
-  PC  pc;
+  PC pc;
 
   PetscFunctionBeginUser;
   PetscCall(SNESGetKSP(snes, &ksp));
@@ -152,11 +190,11 @@ PetscErrorCode SbSolverSetUp(SNES snes, SbSpace s, const SbSolverPreset *preset)
 
 PetscErrorCode SbSolverFallBack(SNES snes, PetscBool *changed)
 {
-  KSP                ksp;
-  PC                 pc;
+  KSP ksp;
+  PC pc;
   KSPConvergedReason reason;
-  PetscBool          incomplete, symmetric;
-  Mat                A;
+  PetscBool incomplete, symmetric;
+  Mat A;
 
   PetscFunctionBeginUser;
   *changed = PETSC_FALSE;
@@ -166,11 +204,15 @@ PetscErrorCode SbSolverFallBack(SNES snes, PetscBool *changed)
   PetscCall(SbPCCoarseFallBack(pc, reason, changed));
   if (*changed) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscObjectTypeCompareAny((PetscObject)pc, &incomplete, PCICC, PCBJACOBI, ""));
-  if (!incomplete || (reason != KSP_DIVERGED_INDEFINITE_PC && reason != KSP_DIVERGED_PC_FAILED && reason != KSP_DIVERGED_NANORINF)) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!incomplete || (reason != KSP_DIVERGED_INDEFINITE_PC && reason != KSP_DIVERGED_PC_FAILED &&
+                      reason != KSP_DIVERGED_NANORINF))
+    PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(SNESGetJacobian(snes, NULL, &A, NULL, NULL));
   PetscCall(PetscObjectTypeCompareAny((PetscObject)A, &symmetric, MATSEQSBAIJ, MATMPISBAIJ, ""));
   PetscCall(PCSetType(pc, symmetric ? PCJACOBI : PCPBJACOBI));
-  PetscCall(SbWarning(PetscObjectComm((PetscObject)snes), "the incomplete factorisation is not positive definite (very flat tets, or nu near 1/2): going on with %s, which is slower; -solver cg_gamg may be faster",
+  PetscCall(SbWarning(PetscObjectComm((PetscObject)snes),
+                      "the incomplete factorisation is not positive definite (very flat tets, or nu near "
+                      "1/2): going on with %s, which is slower; -solver cg_gamg may be faster",
                       symmetric ? "jacobi" : "pbjacobi"));
   *changed = PETSC_TRUE;
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -15,7 +15,8 @@
 #include "fem_impl.h"
 
 static const SbOption rows[] = {
-  {"mass", SB_OPTION_CHOICE, 1, "", "lumped", "lumped|consistent", "mass matrix: lumped at the nodes, or consistent with the basis"},
+  {"mass", SB_OPTION_CHOICE, 1, "", "lumped", "lumped|consistent",
+   "mass matrix: lumped at the nodes, or consistent with the basis"},
 };
 
 PetscErrorCode SbSpaceRegister(void)
@@ -34,12 +35,12 @@ static PetscErrorCode layout_nodes(SbSpace s, const SbElement element[])
   for (PetscInt b = 0; b < mesh->nbody; b++) {
     const PetscInt *per = element[b]->nodes_per;
 
-    PetscCheck(per[0] == 1 && !per[1] && !per[2] && !per[3], PETSC_COMM_SELF, PETSC_ERR_SUP, "Element %s of body %s has nodes off the vertices", element[b]->name,
-               mesh->body[b].name);
+    PetscCheck(per[0] == 1 && !per[1] && !per[2] && !per[3], PETSC_COMM_SELF, PETSC_ERR_SUP,
+               "Element %s of body %s has nodes off the vertices", element[b]->name, mesh->body[b].name);
   }
-  s->Nnode       = mesh->Nvert;
+  s->Nnode = mesh->Nvert;
   s->nnode_owned = mesh->nvert_owned;
-  s->nnode       = mesh->nvert;
+  s->nnode = mesh->nvert;
   s->gnode_start = mesh->gvert_start;
   PetscCall(PetscMalloc1(s->nnode, &s->gnode));
   PetscCall(PetscMalloc1(3 * s->nnode, &s->node_x));
@@ -66,12 +67,12 @@ static PetscErrorCode find_regions(SbSpace s, const SbMaterial material[], const
     if (c == 0 || c == mesh->ncell_owned || body != mesh->cell_body[c - 1]) {
       SbRegion *r = &s->region[s->nregion++];
 
-      r->body     = body;
+      r->body = body;
       r->material = material[body];
-      r->element  = element[body];
-      r->cstart   = c;
-      r->owned    = (PetscBool)(c < mesh->ncell_owned);
-      r->bstart   = s->nbatch;
+      r->element = element[body];
+      r->cstart = c;
+      r->owned = (PetscBool)(c < mesh->ncell_owned);
+      r->bstart = s->nbatch;
     }
     s->region[s->nregion - 1].cend = c + 1;
     if ((c - s->region[s->nregion - 1].cstart) % SB_BATCH == 0) s->nbatch++;
@@ -99,10 +100,10 @@ static PetscErrorCode tabulate_batches(SbSpace s)
       const PetscInt first = region->cstart + (b - region->bstart) * SB_BATCH;
 
       s->batch_cell[b] = first;
-      s->batch_n[b]    = PetscMin(SB_BATCH, region->cend - first);
+      s->batch_n[b] = PetscMin(SB_BATCH, region->cend - first);
       for (PetscInt l = 0; l < SB_BATCH; l++) {
         const PetscInt *node = s->cell_node + 4 * (l < s->batch_n[b] ? first + l : first);
-        PetscReal       x[4][3], g[3][3], V;
+        PetscReal x[4][3], g[3][3], V;
 
         for (PetscInt a = 0; a < 4; a++) {
           for (PetscInt i = 0; i < 3; i++) x[a][i] = s->node_x[3 * node[a] + i];
@@ -123,11 +124,12 @@ static PetscErrorCode lump_mass(SbSpace s)
   PetscCall(PetscCalloc1(s->nnode, &s->node_mass));
   for (PetscInt r = 0; r < s->nregion; r++) {
     const SbRegion *region = &s->region[r];
-    const PetscReal share  = region->material->density * region->element->ops.mass_lumped;
+    const PetscReal share = region->material->density * region->element->ops.mass_lumped;
 
     for (PetscInt b = region->bstart; b < region->bend; b++) {
       for (PetscInt l = 0; l < s->batch_n[b]; l++) {
-        for (PetscInt a = 0; a < 4; a++) s->node_mass[s->batch_node[(4 * b + a) * SB_BATCH + l]] += share * s->batch_V[b][l];
+        for (PetscInt a = 0; a < 4; a++)
+          s->node_mass[s->batch_node[(4 * b + a) * SB_BATCH + l]] += share * s->batch_V[b][l];
       }
     }
   }
@@ -144,22 +146,24 @@ static PetscErrorCode create_template(SbSpace s)
     PetscCall(VecCreateSeq(s->comm, 3 * s->nnode, &s->template_vec));
     PetscCall(VecSetBlockSize(s->template_vec, 3));
   } else {
-    PetscCall(VecCreateGhostBlock(s->comm, 3, 3 * s->nnode_owned, PETSC_DECIDE, s->nnode - s->nnode_owned, s->gnode + s->nnode_owned, &s->template_vec));
+    PetscCall(VecCreateGhostBlock(s->comm, 3, 3 * s->nnode_owned, PETSC_DECIDE, s->nnode - s->nnode_owned,
+                                  s->gnode + s->nnode_owned, &s->template_vec));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbSpaceCreate(SbMesh mesh, const SbMaterial material[], const SbElement element[], SbSpace *space)
+PetscErrorCode SbSpaceCreate(SbMesh mesh, const SbMaterial material[], const SbElement element[],
+                             SbSpace *space)
 {
-  SbSpace  s;
+  SbSpace s;
   PetscInt mass;
-  SbScope  scope;
+  SbScope scope;
 
   PetscFunctionBeginUser;
   PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_SPACE_SETUP], 0, 0, 0, 0));
   PetscCall(PetscNew(&s));
-  s->comm        = mesh->comm;
-  s->mesh        = mesh;
+  s->comm = mesh->comm;
+  s->mesh = mesh;
   s->block_scale = 1.;
   PetscCall(SbScopeSet(&scope, "", "", ""));
   PetscCall(SbOptionChoice(&scope, "mass", &mass));
@@ -204,11 +208,14 @@ PetscErrorCode SbSpaceValidate(SbSpace s)
 
   PetscFunctionBeginUser;
   for (PetscInt i = 0; i < s->nnode_owned; i++) {
-    PetscCheck(s->gnode[i] == s->gnode_start + i, PETSC_COMM_SELF, PETSC_ERR_PLIB, "Owned node %" PetscInt_FMT " is out of order", i);
-    PetscCheck(s->node_mass[i] > 0., PETSC_COMM_SELF, PETSC_ERR_PLIB, "Node %" PetscInt_FMT " has no mass", i);
+    PetscCheck(s->gnode[i] == s->gnode_start + i, PETSC_COMM_SELF, PETSC_ERR_PLIB,
+               "Owned node %" PetscInt_FMT " is out of order", i);
+    PetscCheck(s->node_mass[i] > 0., PETSC_COMM_SELF, PETSC_ERR_PLIB, "Node %" PetscInt_FMT " has no mass",
+               i);
     sums[0] += s->node_mass[i];
   }
-  for (PetscInt i = s->nnode_owned + 1; i < s->nnode; i++) PetscCheck(s->gnode[i] > s->gnode[i - 1], PETSC_COMM_SELF, PETSC_ERR_PLIB, "Ghost nodes are not sorted");
+  for (PetscInt i = s->nnode_owned + 1; i < s->nnode; i++)
+    PetscCheck(s->gnode[i] > s->gnode[i - 1], PETSC_COMM_SELF, PETSC_ERR_PLIB, "Ghost nodes are not sorted");
   for (PetscInt r = 0; r < s->nregion; r++) {
     const SbRegion *region = &s->region[r];
 
@@ -218,7 +225,9 @@ PetscErrorCode SbSpaceValidate(SbSpace s)
   }
   PetscCallMPI(MPI_Allreduce(sums, all, 2, MPIU_REAL, MPI_SUM, s->comm));
   /* many equal terms are rounded alike: the error of a sum grows with their number */
-  PetscCheck(PetscAbsReal(all[0] - all[1]) <= (1e-12 + PETSC_MACHINE_EPSILON * (PetscReal)s->mesh->Ncell) * all[1], s->comm, PETSC_ERR_PLIB, "Mass of the nodes %g kg, of the cells %g kg", (double)all[0], (double)all[1]);
+  PetscCheck(
+    PetscAbsReal(all[0] - all[1]) <= (1e-12 + PETSC_MACHINE_EPSILON * (PetscReal)s->mesh->Ncell) * all[1],
+    s->comm, PETSC_ERR_PLIB, "Mass of the nodes %g kg, of the cells %g kg", (double)all[0], (double)all[1]);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -242,7 +251,8 @@ PetscErrorCode SbSpaceGetLocalRead(SbSpace s, Vec v, const PetscReal **array)
   PetscCall(VecGhostUpdateBegin(v, INSERT_VALUES, SCATTER_FORWARD));
   PetscCall(VecGhostUpdateEnd(v, INSERT_VALUES, SCATTER_FORWARD));
   PetscCall(VecGhostGetLocalForm(v, &local));
-  PetscCheck(local, s->comm, PETSC_ERR_ARG_WRONG, "The vector has no ghost entries: make it by SbSpaceCreateVec()");
+  PetscCheck(local, s->comm, PETSC_ERR_ARG_WRONG,
+             "The vector has no ghost entries: make it by SbSpaceCreateVec()");
   PetscCall(VecGetArrayRead(local, array));
   PetscCall(VecGhostRestoreLocalForm(v, &local));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -271,7 +281,8 @@ PetscErrorCode SbSpaceGetLocalWrite(SbSpace s, Vec v, PetscReal **array)
     Vec local = NULL;
 
     PetscCall(VecGhostGetLocalForm(v, &local));
-    PetscCheck(local, s->comm, PETSC_ERR_ARG_WRONG, "The vector has no ghost entries: make it by SbSpaceCreateVec()");
+    PetscCheck(local, s->comm, PETSC_ERR_ARG_WRONG,
+               "The vector has no ghost entries: make it by SbSpaceCreateVec()");
     PetscCall(VecGhostRestoreLocalForm(v, &local));
   }
   /* the storage of a ghosted vector goes on behind its owned entries */
@@ -292,7 +303,7 @@ PetscErrorCode SbSpaceRestoreLocalWrite(SbSpace s, Vec v, PetscReal **array)
 PetscErrorCode SbSpaceFindSet(SbSpace s, const char *name, const char *where, PetscInt *k)
 {
   const char *names[SB_SET_MAX];
-  char        near[256];
+  char near[256];
 
   PetscFunctionBeginUser;
   for (*k = 0; *k < s->mesh->nset; (*k)++) {
@@ -303,7 +314,8 @@ PetscErrorCode SbSpaceFindSet(SbSpace s, const char *name, const char *where, Pe
     names[*k] = s->mesh->set[*k].name;
   }
   PetscCall(SbNearest(name, s->mesh->nset, names, sizeof(near), near));
-  SETERRQ(PETSC_COMM_SELF, PETSC_ERR_USER, "%s names the set '%s', which does not exist%s%s", where, name, near[0] ? "; nearest: " : "", near);
+  SETERRQ(PETSC_COMM_SELF, PETSC_ERR_USER, "%s names the set '%s', which does not exist%s%s", where, name,
+          near[0] ? "; nearest: " : "", near);
 }
 
 PetscErrorCode SbSpaceGetSetNodes(SbSpace s, PetscInt k, PetscInt *n, PetscInt **nodes)
@@ -327,21 +339,23 @@ static void facet_geometry(SbSpace s, SbFacet *facet)
 {
   PetscReal e1[3], e2[3], n[3], length;
 
-  for (PetscInt a = 0; a < 3; a++) facet->node[a] = s->cell_node[4 * facet->cell + face_corner[facet->face][a]];
+  for (PetscInt a = 0; a < 3; a++)
+    facet->node[a] = s->cell_node[4 * facet->cell + face_corner[facet->face][a]];
   for (PetscInt i = 0; i < 3; i++) {
     e1[i] = s->node_x[3 * facet->node[1] + i] - s->node_x[3 * facet->node[0] + i];
     e2[i] = s->node_x[3 * facet->node[2] + i] - s->node_x[3 * facet->node[0] + i];
   }
-  for (PetscInt i = 0; i < 3; i++) n[i] = e1[(i + 1) % 3] * e2[(i + 2) % 3] - e1[(i + 2) % 3] * e2[(i + 1) % 3];
-  length      = PetscSqrtReal(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
+  for (PetscInt i = 0; i < 3; i++)
+    n[i] = e1[(i + 1) % 3] * e2[(i + 2) % 3] - e1[(i + 2) % 3] * e2[(i + 1) % 3];
+  length = PetscSqrtReal(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
   facet->area = 0.5 * length;
   for (PetscInt i = 0; i < 3; i++) facet->normal[i] = n[i] / length;
 }
 
 PetscErrorCode SbSpaceGetSetFacets(SbSpace s, PetscInt k, PetscInt *n, SbFacet **facets)
 {
-  const uint64_t want  = SB_SET_BIT(k) | SB_ON_BOUNDARY;
-  PetscInt       count = 0;
+  const uint64_t want = SB_SET_BIT(k) | SB_ON_BOUNDARY;
+  PetscInt count = 0;
 
   PetscFunctionBeginUser;
   for (PetscInt f = 0; f < 4 * s->mesh->ncell; f++) count += (s->mesh->face_set[f] & want) == want;
@@ -351,7 +365,7 @@ PetscErrorCode SbSpaceGetSetFacets(SbSpace s, PetscInt k, PetscInt *n, SbFacet *
     SbFacet *facet;
 
     if ((s->mesh->face_set[f] & want) != want) continue;
-    facet       = &(*facets)[(*n)++];
+    facet = &(*facets)[(*n)++];
     facet->cell = f / 4;
     facet->face = f % 4;
     facet_geometry(s, facet);
@@ -369,8 +383,8 @@ PetscErrorCode SbSpaceStableStep(SbSpace s, PetscReal *dt)
 
     for (PetscInt b = s->region[r].bstart; b < s->region[r].bend; b++) {
       for (PetscInt l = 0; l < s->batch_n[b]; l++) {
-        const SbLane *g      = s->batch_g + 9 * b;
-        PetscReal     sum[3] = {0., 0., 0.}, largest = 0.;
+        const SbLane *g = s->batch_g + 9 * b;
+        PetscReal sum[3] = {0., 0., 0.}, largest = 0.;
 
         /* the altitude over node a is 1 / |grad phi_a| */
         for (PetscInt a = 0; a < 3; a++) {
@@ -383,7 +397,7 @@ PetscErrorCode SbSpaceStableStep(SbSpace s, PetscReal *dt)
           largest = PetscMax(largest, g2);
         }
         largest = PetscMax(largest, sum[0] * sum[0] + sum[1] * sum[1] + sum[2] * sum[2]);
-        mine    = PetscMin(mine, 1. / (PetscSqrtReal(largest) * c));
+        mine = PetscMin(mine, 1. / (PetscSqrtReal(largest) * c));
       }
     }
   }

@@ -7,7 +7,16 @@
 */
 #include "sbmodel.h"
 
-typedef enum { KINETIC, STRAIN, VOLUME, INVERTED, MOMENTUM, ANGULAR = MOMENTUM + 3, CENTRE = ANGULAR + 3, NSUM = CENTRE + 3 } Sum;
+typedef enum {
+  KINETIC,
+  STRAIN,
+  VOLUME,
+  INVERTED,
+  MOMENTUM,
+  ANGULAR = MOMENTUM + 3,
+  CENTRE = ANGULAR + 3,
+  NSUM = CENTRE + 3
+} Sum;
 
 /* p = M v with the run's mass matrix, [nnode][3]; v holds ghosts. */
 static PetscErrorCode momentum_density(SbModel m, const PetscReal v[], PetscReal p[])
@@ -27,17 +36,18 @@ static PetscErrorCode momentum_density(SbModel m, const PetscReal v[], PetscReal
 
 PetscErrorCode SbModelEnergies(SbModel m, Vec U, Vec V, SbEnergies *e)
 {
-  SbSpace          s = m->space;
+  SbSpace s = m->space;
   const PetscReal *u, *v = NULL;
-  PetscReal        sum[NSUM] = {0.}, extreme[3] = {0., 0., 0.}, *p = NULL; /* extreme: speed^2, displacement^2, -min J */
-  PetscInt         ninverted;
+  PetscReal sum[NSUM] = {0.}, extreme[3] = {0., 0., 0.},
+            *p = NULL; /* extreme: speed^2, displacement^2, -min J */
+  PetscInt ninverted;
 
   PetscFunctionBeginUser;
   PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_ENERGY], 0, 0, 0, 0));
   PetscCall(SbSpaceGetLocalRead(s, U, &u));
   PetscCall(SbSpaceStrainEnergy(s, u, &sum[STRAIN], &extreme[2], &ninverted, &sum[VOLUME]));
   sum[INVERTED] = (PetscReal)ninverted;
-  extreme[2]    = -extreme[2];
+  extreme[2] = -extreme[2];
   if (V) {
     PetscCall(SbSpaceGetLocalRead(s, V, &v));
     PetscCall(PetscCalloc1(3 * s->nnode, &p));
@@ -67,17 +77,17 @@ PetscErrorCode SbModelEnergies(SbModel m, Vec U, Vec V, SbEnergies *e)
   PetscCall(PetscFree(p));
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, sum, NSUM, MPIU_REAL, MPI_SUM, m->comm));
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, extreme, 3, MPIU_REAL, MPI_MAX, m->comm));
-  e->kinetic          = sum[KINETIC];
-  e->strain           = sum[STRAIN];
-  e->volume           = sum[VOLUME];
-  e->ninverted        = (PetscInt)sum[INVERTED];
-  e->max_speed        = PetscSqrtReal(extreme[0]);
+  e->kinetic = sum[KINETIC];
+  e->strain = sum[STRAIN];
+  e->volume = sum[VOLUME];
+  e->ninverted = (PetscInt)sum[INVERTED];
+  e->max_speed = PetscSqrtReal(extreme[0]);
   e->max_displacement = PetscSqrtReal(extreme[1]);
-  e->min_J            = -extreme[2];
+  e->min_J = -extreme[2];
   for (PetscInt k = 0; k < 3; k++) {
     e->momentum[k] = sum[MOMENTUM + k];
-    e->angular[k]  = sum[ANGULAR + k];
-    e->centre[k]   = sum[CENTRE + k] / m->mass;
+    e->angular[k] = sum[ANGULAR + k];
+    e->centre[k] = sum[CENTRE + k] / m->mass;
   }
   PetscCall(PetscLogEventEnd(SbEvents[SB_EVENT_ENERGY], 0, 0, 0, 0));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -89,7 +99,7 @@ PetscErrorCode SbModelEnergies(SbModel m, Vec U, Vec V, SbEnergies *e)
 PetscErrorCode SbModelDampingPower(SbModel m, Vec U, Vec V, PetscReal *power)
 {
   const PetscReal *u, *v;
-  PetscReal        mine = 0.;
+  PetscReal mine = 0.;
 
   PetscFunctionBeginUser;
   PetscCall(SbSpaceGetLocalRead(m->space, U, &u));

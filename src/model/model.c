@@ -50,7 +50,7 @@ PetscErrorCode SbModelSetUp(SbModel m)
   PetscFunctionBeginUser;
   PetscCall(SbMeshCreate(m->comm, m->nbody, m->body, m->nset, m->set, &m->mesh));
   PetscCall(SbSpaceCreate(m->mesh, m->material, m->element, &m->space));
-  m->load   = 1.;
+  m->load = 1.;
   m->linear = m->space->linear;
   for (PetscInt e = 0; e < m->neffect; e++) {
     if (m->effect[e]->ops.setup) PetscCall(m->effect[e]->ops.setup(m->effect[e], m->space));
@@ -73,7 +73,7 @@ static PetscErrorCode stage_begin(SbModel m, PetscReal t, Vec U, Vec V, Vec A, S
 {
   PetscFunctionBeginUser;
   PetscCall(PetscMemzero(stage, sizeof(*stage)));
-  stage->t       = t;
+  stage->t = t;
   stage->shift_k = 1.;
   PetscCall(SbSpaceGetLocalRead(m->space, U, &stage->u));
   if (V) PetscCall(SbSpaceGetLocalRead(m->space, V, &stage->v));
@@ -139,7 +139,7 @@ static void constrain_residual(SbSpace s, PetscReal f[])
 
 PetscErrorCode SbModelResidual(SbModel m, PetscReal t, Vec U, Vec V, Vec A, PetscBool constrain, Vec F)
 {
-  SbStage    stage;
+  SbStage stage;
   PetscReal *f;
 
   PetscFunctionBeginUser;
@@ -156,7 +156,7 @@ PetscErrorCode SbModelResidual(SbModel m, PetscReal t, Vec U, Vec V, Vec A, Pets
 
 PetscErrorCode SbModelLoads(SbModel m, PetscReal t, Vec U, Vec V, Vec F)
 {
-  SbStage    stage;
+  SbStage stage;
   PetscReal *f;
 
   PetscFunctionBeginUser;
@@ -168,7 +168,8 @@ PetscErrorCode SbModelLoads(SbModel m, PetscReal t, Vec U, Vec V, Vec F)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbModelTangent(SbModel m, PetscReal t, PetscReal shift_v, PetscReal shift_a, PetscReal shift_k, Vec U, Vec V, Mat A)
+PetscErrorCode SbModelTangent(SbModel m, PetscReal t, PetscReal shift_v, PetscReal shift_a, PetscReal shift_k,
+                              Vec U, Vec V, Mat A)
 {
   SbStage stage;
 
@@ -189,7 +190,7 @@ PetscErrorCode SbModelTangent(SbModel m, PetscReal t, PetscReal shift_v, PetscRe
 
 PetscErrorCode SbModelPrescribe(SbModel m, PetscReal t, Vec U)
 {
-  SbSpace      s = m->space;
+  SbSpace s = m->space;
   PetscScalar *u;
 
   PetscFunctionBeginUser;
@@ -234,8 +235,8 @@ static PetscErrorCode body_centres(SbModel m, PetscReal centre[][4])
 
 PetscErrorCode SbModelInitialState(SbModel m, Vec U, Vec V)
 {
-  SbSpace      s = m->space;
-  PetscReal  (*centre)[4];
+  SbSpace s = m->space;
+  PetscReal(*centre)[4];
   PetscScalar *v;
 
   PetscFunctionBeginUser;
@@ -246,9 +247,9 @@ PetscErrorCode SbModelInitialState(SbModel m, Vec U, Vec V)
   PetscCall(body_centres(m, centre));
   PetscCall(VecGetArray(V, &v));
   for (PetscInt i = 0; i < s->nnode_owned; i++) {
-    const SbBody    *body = &m->body[m->mesh->vert_body[i]];
-    const PetscReal *w    = body->spin;
-    PetscReal        r[3];
+    const SbBody *body = &m->body[m->mesh->vert_body[i]];
+    const PetscReal *w = body->spin;
+    PetscReal r[3];
 
     for (PetscInt k = 0; k < 3; k++) r[k] = s->node_x[3 * i + k] - centre[m->mesh->vert_body[i]][k];
     for (PetscInt k = 0; k < 3; k++) {

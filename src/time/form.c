@@ -10,19 +10,23 @@ static PetscBool tangent_holds(SbRun run, PetscReal shift_v, PetscReal shift_a)
 {
   const PetscReal tiny = 1e-10;
 
-  return (PetscBool)(run->model->linear && run->tangent_known && PetscAbsReal(run->shift_v - shift_v) <= tiny * shift_v && PetscAbsReal(run->shift_a - shift_a) <= tiny * shift_a);
+  return (PetscBool)(run->model->linear && run->tangent_known &&
+                     PetscAbsReal(run->shift_v - shift_v) <= tiny * shift_v &&
+                     PetscAbsReal(run->shift_a - shift_a) <= tiny * shift_a);
 }
 
-static PetscErrorCode form_tangent(SbRun run, PetscReal t, PetscReal shift_v, PetscReal shift_a, Vec U, Vec V, Mat P)
+static PetscErrorCode form_tangent(SbRun run, PetscReal t, PetscReal shift_v, PetscReal shift_a, Vec U, Vec V,
+                                   Mat P)
 {
   PetscFunctionBeginUser;
   if (tangent_holds(run, shift_v, shift_a)) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(SbModelTangent(run->model, t, shift_v, shift_a, 1., U, V, P));
   /* a preconditioner that turns with the nodes asks for the displacement that the matrix belongs to */
-  if (run->solver_used->precondition) PetscCall(PetscObjectCompose((PetscObject)P, "sb_state", (PetscObject)U));
+  if (run->solver_used->precondition)
+    PetscCall(PetscObjectCompose((PetscObject)P, "sb_state", (PetscObject)U));
   run->tangent_known = PETSC_TRUE;
-  run->shift_v       = shift_v;
-  run->shift_a       = shift_a;
+  run->shift_v = shift_v;
+  run->shift_a = shift_a;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -36,7 +40,8 @@ PetscErrorCode SbFormI2Function(TS ts, PetscReal t, Vec U, Vec V, Vec A, Vec F, 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbFormI2Jacobian(TS ts, PetscReal t, Vec U, Vec V, Vec A, PetscReal shift_v, PetscReal shift_a, Mat J, Mat P, void *ctx)
+PetscErrorCode SbFormI2Jacobian(TS ts, PetscReal t, Vec U, Vec V, Vec A, PetscReal shift_v, PetscReal shift_a,
+                                Mat J, Mat P, void *ctx)
 {
   PetscFunctionBeginUser;
   (void)ts;
@@ -75,7 +80,7 @@ static PetscErrorCode solve_consistent_mass(SbRun run, Vec B, Vec A)
 {
   Mat M;
   KSP ksp;
-  PC  pc;
+  PC pc;
 
   PetscFunctionBeginUser;
   PetscCall(SbSpaceCreateMatrix(run->model->space, SB_MATRIX_BAIJ, &M));
@@ -95,9 +100,9 @@ static PetscErrorCode solve_consistent_mass(SbRun run, Vec B, Vec A)
 
 PetscErrorCode SbFormAcceleration(SbRun run, PetscReal t, Vec U, Vec V, Vec A)
 {
-  SbSpace      s = run->model->space;
+  SbSpace s = run->model->space;
   PetscScalar *a;
-  Vec          F;
+  Vec F;
 
   PetscFunctionBeginUser;
   PetscCall(VecDuplicate(U, &F));

@@ -27,20 +27,22 @@ PetscErrorCode SbRunStepBegin(SbRun run, PetscReal t, PetscReal dt)
   SbModel m = run->model;
 
   PetscFunctionBeginUser;
-  for (PetscInt e = 0; e < m->nprestep; e++) PetscCall(m->prestep[e]->ops.prestep(m->prestep[e], m->space, t, dt));
+  for (PetscInt e = 0; e < m->nprestep; e++)
+    PetscCall(m->prestep[e]->ops.prestep(m->prestep[e], m->space, t, dt));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 static PetscErrorCode accept_effects(SbRun run, PetscInt step, PetscReal t, PetscReal dt)
 {
-  SbModel m     = run->model;
+  SbModel m = run->model;
   SbStage stage = {.t = t, .dt = dt, .step = step, .shift_k = 1.};
 
   PetscFunctionBeginUser;
   if (!m->naccept) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(SbSpaceGetLocalRead(m->space, run->U, &stage.u));
   if (run->V) PetscCall(SbSpaceGetLocalRead(m->space, run->V, &stage.v));
-  for (PetscInt e = 0; e < m->naccept; e++) PetscCall(m->accept[e]->ops.accept(m->accept[e], m->space, &stage));
+  for (PetscInt e = 0; e < m->naccept; e++)
+    PetscCall(m->accept[e]->ops.accept(m->accept[e], m->space, &stage));
   if (run->V) PetscCall(SbSpaceRestoreLocalRead(m->space, run->V, &stage.v));
   PetscCall(SbSpaceRestoreLocalRead(m->space, run->U, &stage.u));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -57,7 +59,7 @@ static PetscErrorCode unconstrained_residual(SbRun run, PetscReal t, Vec R)
 /* Work of a force field over a displacement, on all or only on prescribed unknowns; two times it, this rank's part. */
 static PetscErrorCode works(SbRun run, Vec loads, Vec reaction, PetscReal sums[2])
 {
-  SbSpace            s = run->model->space;
+  SbSpace s = run->model->space;
   const PetscScalar *u, *u0, *f, *f0, *r, *r0;
 
   PetscFunctionBeginUser;
@@ -87,10 +89,10 @@ static PetscErrorCode works(SbRun run, Vec loads, Vec reaction, PetscReal sums[2
 /* Energies of the new state and the account of the step; `first` opens the account. */
 static PetscErrorCode account(SbRun run, PetscReal t, PetscReal dt, PetscBool first)
 {
-  SbModel     m = run->model;
+  SbModel m = run->model;
   SbEnergies *e = &run->energies;
-  PetscReal   sums[2] = {0., 0.}, power = 0.;
-  Vec         loads, reaction;
+  PetscReal sums[2] = {0., 0.}, power = 0.;
+  Vec loads, reaction;
 
   PetscFunctionBeginUser;
   PetscCall(SbModelEnergies(m, run->U, run->V, e));
@@ -105,12 +107,14 @@ static PetscErrorCode account(SbRun run, PetscReal t, PetscReal dt, PetscBool fi
     e->load_work += 0.5 * sums[0];
     e->drive_work += 0.5 * sums[1];
     e->damping_loss += 0.5 * dt * (power + run->damping_power);
-  } else if (run->step0 == 0) run->energy_start = e->kinetic + e->strain;
-  e->integrator_loss = run->energy_start + e->load_work + e->drive_work - e->damping_loss - e->kinetic - e->strain;
+  } else if (run->step0 == 0)
+    run->energy_start = e->kinetic + e->strain;
+  e->integrator_loss =
+    run->energy_start + e->load_work + e->drive_work - e->damping_loss - e->kinetic - e->strain;
   run->damping_power = power;
   PetscCall(VecDestroy(&run->loads));
   PetscCall(VecDestroy(&run->reaction));
-  run->loads    = loads;
+  run->loads = loads;
   run->reaction = reaction;
   if (!run->previous) PetscCall(VecDuplicate(run->U, &run->previous));
   PetscCall(VecCopy(run->U, run->previous));
@@ -120,22 +124,24 @@ static PetscErrorCode account(SbRun run, PetscReal t, PetscReal dt, PetscBool fi
 PetscErrorCode SbRunStepAccepted(SbRun run, PetscInt step, PetscReal t, PetscReal dt, PetscBool last)
 {
   const PetscBool first = (PetscBool)(step == run->step0);
-  SbStep          now   = {.step = step, .t = t, .dt = dt, .t_end = run->t_end, .U = run->U, .V = run->V, .A = run->A, .last = last};
+  SbStep now = {
+    .step = step, .t = t, .dt = dt, .t_end = run->t_end, .U = run->U, .V = run->V, .A = run->A, .last = last};
 
   PetscFunctionBeginUser;
   if (!first) PetscCall(accept_effects(run, step, t, dt));
-  if (run->want_energies) PetscCall(account(run, t, dt, first));
+  if (run->want_energies)
+    PetscCall(account(run, t, dt, first));
   else if (run->want_residual) {
     if (!run->reaction) PetscCall(VecDuplicate(run->U, &run->reaction));
     PetscCall(unconstrained_residual(run, t, run->reaction));
   }
-  now.R        = run->reaction;
+  now.R = run->reaction;
   now.energies = run->energies;
   now.step_end = run->fixed_step ? step + (PetscInt)PetscCeilReal((run->t_end - t) / run->dt - 1e-6) : -1;
-  now.newton   = run->newton_step;
-  now.linear   = run->linear_step;
+  now.newton = run->newton_step;
+  now.linear = run->linear_step;
   now.rejected = run->rejected_step;
-  now.wall     = MPI_Wtime() - run->wall_start;
+  now.wall = MPI_Wtime() - run->wall_start;
   run->newton_total += now.newton;
   run->linear_total += now.linear;
   run->steps_total += !first;

@@ -13,18 +13,29 @@
 #include "time_impl.h"
 #include "sbsolver.h"
 
-const char *const SbTimePresets = "euler_implicit|newmark|genalpha|euler_symplectic|euler_explicit|alpha2|static";
+const char *const SbTimePresets =
+  "euler_implicit|newmark|genalpha|euler_symplectic|euler_explicit|alpha2|static";
 
 static const SbOption rows[] = {
-  {"time", SB_OPTION_CHOICE, 1, "", "euler_implicit", "euler_implicit|newmark|genalpha|euler_symplectic|euler_explicit|alpha2|static", "time integrator, or static equilibrium"},
-  {"ts_dt", SB_OPTION_REAL, 1, "s", "0.01", "(0, inf)", "length of a time step (the first one with -ts_adapt_type basic); explicit integrators take 0.9 of the stable step unless told"},
+  {"time", SB_OPTION_CHOICE, 1, "", "euler_implicit",
+   "euler_implicit|newmark|genalpha|euler_symplectic|euler_explicit|alpha2|static",
+   "time integrator, or static equilibrium"},
+  {"ts_dt", SB_OPTION_REAL, 1, "s", "0.01", "(0, inf)",
+   "length of a time step (the first one with -ts_adapt_type basic); explicit integrators take 0.9 of the "
+   "stable step unless told"},
   {"ts_max_time", SB_OPTION_REAL, 1, "s", "1", "(0, inf)", "end of the simulated time"},
-  {"time_spectral_radius", SB_OPTION_REAL, 1, "", "0.5", "[0, 1]", "genalpha: amplitude that is left of the highest frequencies per step; 1 keeps all, 0 removes them at once"},
+  {"time_spectral_radius", SB_OPTION_REAL, 1, "", "0.5", "[0, 1]",
+   "genalpha: amplitude that is left of the highest frequencies per step; 1 keeps all, 0 removes them at "
+   "once"},
   {"time_newmark_beta", SB_OPTION_REAL, 1, "", "0.25", "(0, 0.5]", "newmark: beta"},
-  {"time_newmark_gamma", SB_OPTION_REAL, 1, "", "0.5", "[0.5, 1]", "newmark: gamma; more than 1/2 damps and is first order"},
-  {"time_predictor", SB_OPTION_CHOICE, 1, "", "none", "none|velocity", "where Newton starts a step: at the old displacement, or moved on by the velocity"},
-  {"time_max_cuts", SB_OPTION_INT, 1, "", "10", "[0, 60]", "how often a step that fails is halved before the run stops"},
-  {"static_steps", SB_OPTION_INT, 1, "", "1", "[1, 1000000]", "static: equal load steps from zero to full load"},
+  {"time_newmark_gamma", SB_OPTION_REAL, 1, "", "0.5", "[0.5, 1]",
+   "newmark: gamma; more than 1/2 damps and is first order"},
+  {"time_predictor", SB_OPTION_CHOICE, 1, "", "none", "none|velocity",
+   "where Newton starts a step: at the old displacement, or moved on by the velocity"},
+  {"time_max_cuts", SB_OPTION_INT, 1, "", "10", "[0, 60]",
+   "how often a step that fails is halved before the run stops"},
+  {"static_steps", SB_OPTION_INT, 1, "", "1", "[1, 1000000]",
+   "static: equal load steps from zero to full load"},
 };
 
 PetscErrorCode SbTimeRegister(void)
@@ -38,8 +49,8 @@ PetscErrorCode SbTimeRegister(void)
 
 PetscErrorCode SbRunCreate(SbModel model, SbRun *run)
 {
-  SbRun    r;
-  SbScope  scope;
+  SbRun r;
+  SbScope scope;
   PetscInt preset, predictor;
 
   PetscFunctionBeginUser;
@@ -47,7 +58,7 @@ PetscErrorCode SbRunCreate(SbModel model, SbRun *run)
   r->model = model;
   PetscCall(SbScopeSet(&scope, "", "", ""));
   PetscCall(SbOptionChoice(&scope, "time", &preset));
-  r->preset      = (SbTimePreset)preset;
+  r->preset = (SbTimePreset)preset;
   model->dynamic = (PetscBool)(r->preset != SB_TIME_STATIC);
   if (model->dynamic) {
     PetscCall(SbOptionReal(&scope, "ts_dt", &r->dt));
@@ -58,9 +69,10 @@ PetscErrorCode SbRunCreate(SbModel model, SbRun *run)
   } else {
     PetscCall(SbOptionInt(&scope, "static_steps", &r->static_steps));
     r->t_end = 1.;
-    r->dt    = 1. / (PetscReal)r->static_steps;
+    r->dt = 1. / (PetscReal)r->static_steps;
   }
-  if (r->preset == SB_TIME_GENALPHA || r->preset == SB_TIME_ALPHA2) PetscCall(SbOptionReal(&scope, "time_spectral_radius", &r->spectral_radius));
+  if (r->preset == SB_TIME_GENALPHA || r->preset == SB_TIME_ALPHA2)
+    PetscCall(SbOptionReal(&scope, "time_spectral_radius", &r->spectral_radius));
   if (r->preset == SB_TIME_NEWMARK) {
     PetscCall(SbOptionReal(&scope, "time_newmark_beta", &r->newmark[0]));
     PetscCall(SbOptionReal(&scope, "time_newmark_gamma", &r->newmark[1]));
@@ -74,20 +86,25 @@ PetscErrorCode SbRunCreate(SbModel model, SbRun *run)
 /* The method behind a preset. */
 static void method_settings(SbRun run, SbMethodSettings *set)
 {
-  *set = (SbMethodSettings){.method = SB_METHOD_EULER_IMPLICIT, .alpha_m = 1., .alpha_f = 1., .beta = 0.25, .gamma = 0.5,
-                            .velocity_predictor = run->velocity_predictor, .max_cuts = run->max_cuts};
+  *set = (SbMethodSettings){.method = SB_METHOD_EULER_IMPLICIT,
+                            .alpha_m = 1.,
+                            .alpha_f = 1.,
+                            .beta = 0.25,
+                            .gamma = 0.5,
+                            .velocity_predictor = run->velocity_predictor,
+                            .max_cuts = run->max_cuts};
   if (run->preset == SB_TIME_NEWMARK) {
     set->method = SB_METHOD_GENERALIZED_ALPHA;
-    set->beta   = run->newmark[0];
-    set->gamma  = run->newmark[1];
+    set->beta = run->newmark[0];
+    set->gamma = run->newmark[1];
   } else if (run->preset == SB_TIME_GENALPHA) {
     const PetscReal r = run->spectral_radius;
 
-    set->method  = SB_METHOD_GENERALIZED_ALPHA;
+    set->method = SB_METHOD_GENERALIZED_ALPHA;
     set->alpha_m = (2. - r) / (1. + r);
     set->alpha_f = 1. / (1. + r);
-    set->gamma   = 0.5 + set->alpha_m - set->alpha_f;
-    set->beta    = 0.25 * PetscSqr(1. + set->alpha_m - set->alpha_f);
+    set->gamma = 0.5 + set->alpha_m - set->alpha_f;
+    set->beta = 0.25 * PetscSqr(1. + set->alpha_m - set->alpha_f);
   } else if (run->preset == SB_TIME_EULER_EXPLICIT) {
     set->method = SB_METHOD_EULER_EXPLICIT;
   } else if (run->preset == SB_TIME_EULER_SYMPLECTIC) {
@@ -98,13 +115,14 @@ static void method_settings(SbRun run, SbMethodSettings *set)
 /* Newton on nonlinear models, one linear solve on linear ones; tolerances that hold in any unit system. */
 static PetscErrorCode set_up_snes(SbRun run)
 {
-  SbModel        m = run->model;
-  PetscReal      force = 0.;
+  SbModel m = run->model;
+  PetscReal force = 0.;
   SNESLineSearch search;
 
   PetscFunctionBeginUser;
   /* rounding of the internal forces: below 1e-13 of (stress modulus) x (area of the body) no residual is meaningful */
-  for (PetscInt b = 0; b < m->nbody; b++) force += m->material[b]->E * PetscPowReal(m->body[b].volume, 2. / 3.);
+  for (PetscInt b = 0; b < m->nbody; b++)
+    force += m->material[b]->E * PetscPowReal(m->body[b].volume, 2. / 3.);
   PetscCall(SNESSetType(run->snes, m->linear ? SNESKSPONLY : SNESNEWTONLS));
   PetscCall(SNESGetLineSearch(run->snes, &search));
   PetscCall(SNESLineSearchSetType(search, SNESLINESEARCHBT));
@@ -124,16 +142,17 @@ static PetscErrorCode forcing_terms(SNES snes)
   PetscCall(PetscOptionsHasName(NULL, NULL, "-ksp_rtol", &rtol));
   if (!newton || asked || rtol) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(SNESKSPSetUseEW(snes, PETSC_TRUE));
-  PetscCall(SNESKSPSetParametersEW(snes, 2, 0.1, 0.1, PETSC_DEFAULT, PETSC_DEFAULT, PETSC_DEFAULT, PETSC_DEFAULT));
+  PetscCall(
+    SNESKSPSetParametersEW(snes, 2, 0.1, 0.1, PETSC_DEFAULT, PETSC_DEFAULT, PETSC_DEFAULT, PETSC_DEFAULT));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 static PetscErrorCode step_accepted(TS ts, PetscInt step, PetscReal t, Vec U, void *ctx)
 {
-  SbRun             run = (SbRun)ctx;
+  SbRun run = (SbRun)ctx;
   TSConvergedReason reason;
-  PetscInt          newton, linear, rejected;
-  PetscReal         previous;
+  PetscInt newton, linear, rejected;
+  PetscReal previous;
 
   PetscFunctionBeginUser;
   (void)U;
@@ -144,11 +163,12 @@ static PetscErrorCode step_accepted(TS ts, PetscInt step, PetscReal t, Vec U, vo
   PetscCall(TSGetStepRejections(ts, &rejected));
   PetscCall(TSGetPrevTime(ts, &previous));
   PetscCall(TSGetConvergedReason(ts, &reason));
-  run->newton_step   = newton - run->newton_total;
-  run->linear_step   = linear - run->linear_total;
+  run->newton_step = newton - run->newton_total;
+  run->linear_step = linear - run->linear_total;
   run->rejected_step = rejected - run->rejected_seen;
   run->rejected_seen = rejected;
-  PetscCall(SbRunStepAccepted(run, step, t, step == run->step0 ? 0. : t - previous, (PetscBool)(reason > 0 || t >= run->t_end * (1. - 1e-12))));
+  PetscCall(SbRunStepAccepted(run, step, t, step == run->step0 ? 0. : t - previous,
+                              (PetscBool)(reason > 0 || t >= run->t_end * (1. - 1e-12))));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -158,23 +178,28 @@ static PetscErrorCode explicit_step(SbRun run)
 
   PetscFunctionBeginUser;
   PetscCall(SbSpaceStableStep(run->model->space, &stable));
-  if (!run->dt_given) run->dt = 0.9 * stable;
+  if (!run->dt_given)
+    run->dt = 0.9 * stable;
   else if (run->dt > stable) {
-    PetscCall(SbWarning(run->model->comm, "-ts_dt %g s is beyond the stable step of this mesh and material, %g s: expect the solution to blow up", (double)run->dt, (double)stable));
+    PetscCall(SbWarning(
+      run->model->comm,
+      "-ts_dt %g s is beyond the stable step of this mesh and material, %g s: expect the solution to blow up",
+      (double)run->dt, (double)stable));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 static PetscErrorCode set_up_ts(SbRun run)
 {
-  SbModel          m = run->model;
+  SbModel m = run->model;
   SbMethodSettings settings;
-  TSAdapt          adapt;
-  PetscReal        size = 0.;
-  Vec              F;
+  TSAdapt adapt;
+  PetscReal size = 0.;
+  Vec F;
 
   PetscFunctionBeginUser;
-  if (run->preset == SB_TIME_EULER_EXPLICIT || run->preset == SB_TIME_EULER_SYMPLECTIC) PetscCall(explicit_step(run));
+  if (run->preset == SB_TIME_EULER_EXPLICIT || run->preset == SB_TIME_EULER_SYMPLECTIC)
+    PetscCall(explicit_step(run));
   PetscCall(SbSpaceCreateVec(m->space, &F));
   PetscCall(TSCreate(m->comm, &run->ts));
   PetscCall(TSSetProblemType(run->ts, TS_NONLINEAR));
@@ -185,7 +210,8 @@ static PetscErrorCode set_up_ts(SbRun run)
   if (run->preset == SB_TIME_ALPHA2) {
     PetscCall(TSSetType(run->ts, TSALPHA2));
     PetscCall(TSAlpha2SetRadius(run->ts, run->spectral_radius));
-  } else PetscCall(TSSetType(run->ts, SB_TS_SECOND_ORDER));
+  } else
+    PetscCall(TSSetType(run->ts, SB_TS_SECOND_ORDER));
   PetscCall(TSGetAdapt(run->ts, &adapt));
   PetscCall(TSAdaptSetType(adapt, TSADAPTNONE));
   /* displacement error per step that adaptive runs allow, relative to the size of the scene: unit-free */
@@ -231,8 +257,9 @@ static PetscErrorCode set_up_static(SbRun run)
 
 PetscErrorCode SbRunSetUp(SbRun run)
 {
-  SbModel   m        = run->model;
-  PetscBool explicit = (PetscBool)(run->preset == SB_TIME_EULER_EXPLICIT || run->preset == SB_TIME_EULER_SYMPLECTIC);
+  SbModel m = run->model;
+  PetscBool explicit =
+    (PetscBool)(run->preset == SB_TIME_EULER_EXPLICIT || run->preset == SB_TIME_EULER_SYMPLECTIC);
 
   PetscFunctionBeginUser;
   for (PetscInt r = 0; r < m->space->nregion; r++) {
@@ -245,22 +272,27 @@ PetscErrorCode SbRunSetUp(SbRun run)
     if (run->preset != SB_TIME_ALPHA2) PetscCall(SbSpaceCreateVec(m->space, &run->A));
   }
   PetscCall(SbModelInitialState(m, run->U, run->V));
-  PetscCall(SbSolverChoose(m->space, m->dynamic, m->linear, explicit, run->solver_choice, &run->solver_used, run->solver_reason, sizeof(run->solver_reason)));
+  PetscCall(SbSolverChoose(m->space, m->dynamic, m->linear, explicit, run->solver_choice, &run->solver_used,
+                           run->solver_reason, sizeof(run->solver_reason)));
   PetscCall(PetscStrncpy(run->solver, run->solver_used->name, sizeof(run->solver)));
   if (!explicit) PetscCall(SbSolverCreateOperator(m->space, run->solver_used, &run->J));
-  PetscCheck(!run->solver_used->matrix_free || !m->ntangent, m->comm, PETSC_ERR_USER, "-solver %s works without a matrix, and the effect %s adds to it: use -solver rotated",
+  PetscCheck(!run->solver_used->matrix_free || !m->ntangent, m->comm, PETSC_ERR_USER,
+             "-solver %s works without a matrix, and the effect %s adds to it: use -solver rotated",
              run->solver, m->tangent[0]->name);
-  if (m->dynamic) PetscCall(set_up_ts(run));
-  else PetscCall(set_up_static(run));
+  if (m->dynamic)
+    PetscCall(set_up_ts(run));
+  else
+    PetscCall(set_up_static(run));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode SbRunAddMonitor(SbRun run, SbMonitorFn fn, void *ctx, PetscErrorCode (*destroy)(void *))
 {
   PetscFunctionBeginUser;
-  PetscCheck(run->nmonitor < (PetscInt)PETSC_STATIC_ARRAY_LENGTH(run->monitor), PETSC_COMM_SELF, PETSC_ERR_PLIB, "More than %d monitors", (int)PETSC_STATIC_ARRAY_LENGTH(run->monitor));
-  run->monitor[run->nmonitor].fn      = fn;
-  run->monitor[run->nmonitor].ctx     = ctx;
+  PetscCheck(run->nmonitor < (PetscInt)PETSC_STATIC_ARRAY_LENGTH(run->monitor), PETSC_COMM_SELF,
+             PETSC_ERR_PLIB, "More than %d monitors", (int)PETSC_STATIC_ARRAY_LENGTH(run->monitor));
+  run->monitor[run->nmonitor].fn = fn;
+  run->monitor[run->nmonitor].ctx = ctx;
   run->monitor[run->nmonitor].destroy = destroy;
   run->nmonitor++;
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -274,7 +306,8 @@ PetscErrorCode SbRunSolve(SbRun run)
     PetscCall(TSSetStepNumber(run->ts, run->step0));
     PetscCall(TSSetTime(run->ts, run->t0));
     PetscCall(TSSolve(run->ts, run->U));
-  } else PetscCall(SbStaticSolve(run));
+  } else
+    PetscCall(SbStaticSolve(run));
   run->seconds_solve = MPI_Wtime() - run->wall_start;
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -21,25 +21,26 @@
 #include "time_impl.h"
 
 typedef struct {
-  SbRun            run;
+  SbRun run;
   SbMethodSettings set;
-  Vec              X0, V0, X1, V1, A1; /* state at the start of the step; end of the step */
-  Vec              Xa, Va, Aa;         /* stage of generalized-alpha; NULL when the stage is the end */
-  Vec              work;
-  PetscReal        nominal;            /* step length asked for, s; 0 before the first step */
-  PetscInt         good;               /* steps accepted since the last cut */
-  PetscBool        started;            /* run->A holds the acceleration of the current state */
+  Vec X0, V0, X1, V1, A1; /* state at the start of the step; end of the step */
+  Vec Xa, Va, Aa;         /* stage of generalized-alpha; NULL when the stage is the end */
+  Vec work;
+  PetscReal nominal; /* step length asked for, s; 0 before the first step */
+  PetscInt good;     /* steps accepted since the last cut */
+  PetscBool started; /* run->A holds the acceleration of the current state */
 } SecondOrder;
 
 static PetscBool is_explicit(const SecondOrder *so)
 {
-  return (PetscBool)(so->set.method == SB_METHOD_EULER_EXPLICIT || so->set.method == SB_METHOD_EULER_SYMPLECTIC);
+  return (PetscBool)(so->set.method == SB_METHOD_EULER_EXPLICIT ||
+                     so->set.method == SB_METHOD_EULER_SYMPLECTIC);
 }
 
 /* v1 and a1 that belong to the end displacement X. */
 static PetscErrorCode end_state(TS ts, Vec X)
 {
-  SecondOrder    *so = (SecondOrder *)ts->data;
+  SecondOrder *so = (SecondOrder *)ts->data;
   const PetscReal h = ts->time_step, beta = so->set.beta, gamma = so->set.gamma;
 
   PetscFunctionBeginUser;
@@ -50,7 +51,8 @@ static PetscErrorCode end_state(TS ts, Vec X)
     PetscCall(VecScale(so->A1, 1. / h));
   } else {
     PetscCall(VecWAXPY(so->A1, -1., so->X0, X));
-    PetscCall(VecAXPBYPCZ(so->A1, -1. / (beta * h), 1. - 0.5 / beta, 1. / (beta * h * h), so->V0, so->run->A));
+    PetscCall(
+      VecAXPBYPCZ(so->A1, -1. / (beta * h), 1. - 0.5 / beta, 1. / (beta * h * h), so->V0, so->run->A));
     PetscCall(VecCopy(so->V0, so->V1));
     PetscCall(VecAXPBYPCZ(so->V1, h * (1. - gamma), h * gamma, 1., so->run->A, so->A1));
   }
@@ -86,8 +88,8 @@ static PetscErrorCode stage_state(TS ts, Vec X, PetscReal *t, Vec *U, Vec *V, Ve
 static PetscErrorCode SNESTSFormFunction_SecondOrder(SNES snes, Vec X, Vec F, TS ts)
 {
   SecondOrder *so = (SecondOrder *)ts->data;
-  PetscReal    t = 0.;
-  Vec          U = NULL, V = NULL, A = NULL;
+  PetscReal t = 0.;
+  Vec U = NULL, V = NULL, A = NULL;
 
   PetscFunctionBeginUser;
   (void)snes;
@@ -99,10 +101,10 @@ static PetscErrorCode SNESTSFormFunction_SecondOrder(SNES snes, Vec X, Vec F, TS
 
 static PetscErrorCode SNESTSFormJacobian_SecondOrder(SNES snes, Vec X, Mat J, Mat P, TS ts)
 {
-  SecondOrder    *so = (SecondOrder *)ts->data;
-  const PetscReal h  = ts->time_step;
-  PetscReal       t = 0., shift_v = 1. / h, shift_a = 1. / (h * h);
-  Vec             U = NULL, V = NULL, A = NULL;
+  SecondOrder *so = (SecondOrder *)ts->data;
+  const PetscReal h = ts->time_step;
+  PetscReal t = 0., shift_v = 1. / h, shift_a = 1. / (h * h);
+  Vec U = NULL, V = NULL, A = NULL;
 
   PetscFunctionBeginUser;
   (void)snes;
@@ -119,8 +121,8 @@ static PetscErrorCode SNESTSFormJacobian_SecondOrder(SNES snes, Vec X, Mat J, Ma
 static PetscErrorCode predict(TS ts)
 {
   SecondOrder *so = (SecondOrder *)ts->data;
-  PetscBool    single, warm;
-  KSP          ksp;
+  PetscBool single, warm;
+  KSP ksp;
 
   PetscFunctionBeginUser;
   PetscCall(VecCopy(so->X0, so->X1));
@@ -134,7 +136,8 @@ static PetscErrorCode predict(TS ts)
     Vec Y;
 
     PetscCall(SNESGetSolutionUpdate(ts->snes, &Y));
-    if (Y && so->set.velocity_predictor) PetscCall(VecZeroEntries(Y));
+    if (Y && so->set.velocity_predictor)
+      PetscCall(VecZeroEntries(Y));
     else if (Y) {
       PetscCall(VecCopy(so->V0, Y));
       PetscCall(VecScale(Y, -ts->time_step));
@@ -145,10 +148,10 @@ static PetscErrorCode predict(TS ts)
 
 static PetscErrorCode solve_implicit(TS ts, PetscBool *ok)
 {
-  SecondOrder        *so = (SecondOrder *)ts->data;
+  SecondOrder *so = (SecondOrder *)ts->data;
   SNESConvergedReason reason;
-  PetscInt            newton, linear;
-  PetscReal           size;
+  PetscInt newton, linear;
+  PetscReal size;
 
   PetscFunctionBeginUser;
   PetscCall(predict(ts));
@@ -163,22 +166,25 @@ static PetscErrorCode solve_implicit(TS ts, PetscBool *ok)
   PetscCall(VecNorm(so->V1, NORM_INFINITY, &size));
   *ok = (PetscBool)(reason > 0 && !PetscIsInfOrNanReal(size));
   if (!*ok) {
-    KSP                ksp;
+    KSP ksp;
     KSPConvergedReason kreason;
 
     PetscCall(SNESGetKSP(ts->snes, &ksp));
     PetscCall(KSPGetConvergedReason(ksp, &kreason));
-    PetscCall(SbRunFail(so->run, "step %" PetscInt_FMT " at t = %g s with a length of %g s: %s (linear solver: %s)", ts->steps + 1, (double)ts->ptime, (double)ts->time_step,
-                        reason > 0 ? "the solution is not finite" : SNESConvergedReasons[reason], KSPConvergedReasons[kreason]));
+    PetscCall(SbRunFail(so->run,
+                        "step %" PetscInt_FMT " at t = %g s with a length of %g s: %s (linear solver: %s)",
+                        ts->steps + 1, (double)ts->ptime, (double)ts->time_step,
+                        reason > 0 ? "the solution is not finite" : SNESConvergedReasons[reason],
+                        KSPConvergedReasons[kreason]));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 static PetscErrorCode solve_explicit(TS ts, PetscBool *ok)
 {
-  SecondOrder    *so = (SecondOrder *)ts->data;
-  const PetscReal h  = ts->time_step;
-  PetscReal       size;
+  SecondOrder *so = (SecondOrder *)ts->data;
+  const PetscReal h = ts->time_step;
+  PetscReal size;
 
   PetscFunctionBeginUser;
   PetscCall(VecWAXPY(so->V1, h, so->run->A, so->V0));
@@ -187,8 +193,11 @@ static PetscErrorCode solve_explicit(TS ts, PetscBool *ok)
   PetscCall(SbFormAcceleration(so->run, ts->ptime + h, so->X1, so->V1, so->A1));
   PetscCall(VecNorm(so->A1, NORM_INFINITY, &size));
   *ok = (PetscBool)!PetscIsInfOrNanReal(size);
-  if (!*ok) PetscCall(SbRunFail(so->run, "step %" PetscInt_FMT " at t = %g s: the explicit solution is not finite; its step of %g s is beyond the stable one (see the header)", ts->steps + 1,
-                                (double)ts->ptime, (double)h));
+  if (!*ok)
+    PetscCall(SbRunFail(so->run,
+                        "step %" PetscInt_FMT " at t = %g s: the explicit solution is not finite; its step "
+                                              "of %g s is beyond the stable one (see the header)",
+                        ts->steps + 1, (double)ts->ptime, (double)h));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -196,7 +205,7 @@ static PetscErrorCode solve_explicit(TS ts, PetscBool *ok)
 static PetscErrorCode wanted_step(TS ts, PetscReal *h)
 {
   SecondOrder *so = (SecondOrder *)ts->data;
-  PetscBool    fixed;
+  PetscBool fixed;
 
   PetscFunctionBeginUser;
   PetscCall(PetscObjectTypeCompare((PetscObject)ts->adapt, TSADAPTNONE, &fixed));
@@ -206,12 +215,13 @@ static PetscErrorCode wanted_step(TS ts, PetscReal *h)
 
 static PetscErrorCode TSStep_SecondOrder(TS ts)
 {
-  SecondOrder *so   = (SecondOrder *)ts->data;
-  PetscInt     cuts = 0;
+  SecondOrder *so = (SecondOrder *)ts->data;
+  PetscInt cuts = 0;
 
   PetscFunctionBeginUser;
   if (so->nominal == 0.) so->nominal = ts->time_step;
-  if (!so->started && so->set.method != SB_METHOD_EULER_IMPLICIT) PetscCall(SbFormAcceleration(so->run, ts->ptime, ts->vec_sol, ts->vec_dot, so->run->A));
+  if (!so->started && so->set.method != SB_METHOD_EULER_IMPLICIT)
+    PetscCall(SbFormAcceleration(so->run, ts->ptime, ts->vec_sol, ts->vec_dot, so->run->A));
   so->started = PETSC_TRUE;
   PetscCall(VecCopy(ts->vec_sol, so->X0));
   PetscCall(VecCopy(ts->vec_dot, so->V0));
@@ -220,8 +230,10 @@ static PetscErrorCode TSStep_SecondOrder(TS ts)
     PetscReal next, h = 0.;
 
     PetscCall(SbRunStepBegin(so->run, ts->ptime, ts->time_step));
-    if (is_explicit(so)) PetscCall(solve_explicit(ts, &ok));
-    else PetscCall(solve_implicit(ts, &ok));
+    if (is_explicit(so))
+      PetscCall(solve_explicit(ts, &ok));
+    else
+      PetscCall(solve_implicit(ts, &ok));
     if (ok) {
       PetscCall(VecCopy(so->X1, ts->vec_sol));
       PetscCall(VecCopy(so->V1, ts->vec_dot));
@@ -230,7 +242,7 @@ static PetscErrorCode TSStep_SecondOrder(TS ts)
       if (accept) {
         PetscCall(VecCopy(so->A1, so->run->A));
         ts->ptime += ts->time_step;
-        so->good      = next > ts->time_step ? 0 : so->good + 1;
+        so->good = next > ts->time_step ? 0 : so->good + 1;
         ts->time_step = next;
         so->run->stop_reason[0] = 0;
         break;
@@ -260,9 +272,9 @@ static PetscErrorCode TSStep_SecondOrder(TS ts)
 
 static PetscErrorCode TSEvaluateWLTE_SecondOrder(TS ts, NormType type, PetscInt *order, PetscReal *wlte)
 {
-  SecondOrder    *so = (SecondOrder *)ts->data;
-  const PetscReal h  = ts->time_step;
-  PetscReal       absolute, relative;
+  SecondOrder *so = (SecondOrder *)ts->data;
+  const PetscReal h = ts->time_step;
+  PetscReal absolute, relative;
 
   PetscFunctionBeginUser;
   if (so->set.method == SB_METHOD_GENERALIZED_ALPHA) {
@@ -280,7 +292,7 @@ static PetscErrorCode TSEvaluateWLTE_SecondOrder(TS ts, NormType type, PetscInt 
 /* Cubic through both ends; t lies in the last step. */
 static PetscErrorCode TSInterpolate_SecondOrder(TS ts, PetscReal t, Vec X)
 {
-  SecondOrder    *so = (SecondOrder *)ts->data;
+  SecondOrder *so = (SecondOrder *)ts->data;
   const PetscReal h = ts->ptime - ts->ptime_prev, s = (t - ts->ptime_prev) / h;
 
   PetscFunctionBeginUser;
@@ -295,7 +307,7 @@ static PetscErrorCode TSInterpolate_SecondOrder(TS ts, PetscReal t, Vec X)
 static PetscErrorCode TSSetUp_SecondOrder(TS ts)
 {
   SecondOrder *so = (SecondOrder *)ts->data;
-  SNES         snes;
+  SNES snes;
 
   PetscFunctionBeginUser;
   PetscCall(VecDuplicate(ts->vec_sol, &so->X0));
@@ -359,17 +371,17 @@ static PetscErrorCode TSCreate_SecondOrder(TS ts)
 
   PetscFunctionBeginUser;
   PetscCall(PetscNew(&so));
-  ts->data                = so;
-  ts->ops->setup          = TSSetUp_SecondOrder;
-  ts->ops->reset          = TSReset_SecondOrder;
-  ts->ops->destroy        = TSDestroy_SecondOrder;
-  ts->ops->step           = TSStep_SecondOrder;
-  ts->ops->evaluatewlte   = TSEvaluateWLTE_SecondOrder;
-  ts->ops->interpolate    = TSInterpolate_SecondOrder;
-  ts->ops->snesfunction   = SNESTSFormFunction_SecondOrder;
-  ts->ops->snesjacobian   = SNESTSFormJacobian_SecondOrder;
-  ts->default_adapt_type  = TSADAPTNONE;
-  ts->usessnes            = PETSC_TRUE;
+  ts->data = so;
+  ts->ops->setup = TSSetUp_SecondOrder;
+  ts->ops->reset = TSReset_SecondOrder;
+  ts->ops->destroy = TSDestroy_SecondOrder;
+  ts->ops->step = TSStep_SecondOrder;
+  ts->ops->evaluatewlte = TSEvaluateWLTE_SecondOrder;
+  ts->ops->interpolate = TSInterpolate_SecondOrder;
+  ts->ops->snesfunction = SNESTSFormFunction_SecondOrder;
+  ts->ops->snesjacobian = SNESTSFormJacobian_SecondOrder;
+  ts->default_adapt_type = TSADAPTNONE;
+  ts->usessnes = PETSC_TRUE;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

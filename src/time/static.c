@@ -10,9 +10,9 @@
 static PetscErrorCode solve_at(SbRun run, PetscReal factor, Vec X, PetscBool *ok)
 {
   SNESConvergedReason reason;
-  KSPConvergedReason  kreason;
-  KSP                 ksp;
-  PetscInt            newton, linear;
+  KSPConvergedReason kreason;
+  KSP ksp;
+  PetscInt newton, linear;
 
   PetscFunctionBeginUser;
   run->model->load = factor;
@@ -28,8 +28,10 @@ static PetscErrorCode solve_at(SbRun run, PetscReal factor, Vec X, PetscBool *ok
   if (!*ok) {
     PetscCall(SNESGetKSP(run->snes, &ksp));
     PetscCall(KSPGetConvergedReason(ksp, &kreason));
-    PetscCall(SbRunFail(run, "load factor %g: %s (linear solver: %s); use more -static_steps, or hold the body so that it cannot move freely", (double)factor,
-                        SNESConvergedReasons[reason], KSPConvergedReasons[kreason]));
+    PetscCall(SbRunFail(run,
+                        "load factor %g: %s (linear solver: %s); use more -static_steps, or hold the body so "
+                        "that it cannot move freely",
+                        (double)factor, SNESConvergedReasons[reason], KSPConvergedReasons[kreason]));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -37,9 +39,9 @@ static PetscErrorCode solve_at(SbRun run, PetscReal factor, Vec X, PetscBool *ok
 PetscErrorCode SbStaticSolve(SbRun run)
 {
   const PetscReal nominal = 1. / (PetscReal)run->static_steps;
-  PetscReal       factor = run->t0, length = nominal;
-  PetscInt        step = run->step0, cuts = 0;
-  Vec             X;
+  PetscReal factor = run->t0, length = nominal;
+  PetscInt step = run->step0, cuts = 0;
+  Vec X;
 
   PetscFunctionBeginUser;
   PetscCall(VecDuplicate(run->U, &X));
@@ -48,7 +50,7 @@ PetscErrorCode SbStaticSolve(SbRun run)
   run->newton_step = run->linear_step = run->rejected_step = 0;
   while (factor < 1.) {
     const PetscReal next = factor + length > 1. - 1e-9 ? 1. : factor + length;
-    PetscBool       ok   = PETSC_FALSE;
+    PetscBool ok = PETSC_FALSE;
 
     PetscCall(SbRunStepBegin(run, factor, next - factor));
     PetscCall(solve_at(run, next, X, &ok));
@@ -69,7 +71,7 @@ PetscErrorCode SbStaticSolve(SbRun run)
     PetscCall(SbRunStepAccepted(run, ++step, next, next - factor, (PetscBool)(next >= 1.)));
     run->newton_step = run->linear_step = run->rejected_step = 0;
     factor = next;
-    cuts   = 0;
+    cuts = 0;
     length = PetscMin(2. * length, nominal);
   }
   PetscCall(VecDestroy(&X));

@@ -2,16 +2,17 @@
 /* Every row of the solver table solves the same linear bar; the choice by `auto` has a reason; a solve at its limit fails. */
 #include "../scene.h"
 
-#define BAR \
-  "-bodies bar -body_bar_mesh box:0.3,0.1,0.1:3 -body_bar_material linear -body_bar_young 1e4 -body_bar_poisson 0.3 -body_bar_density 1000 " \
+#define BAR                                                                                     \
+  "-bodies bar -body_bar_mesh box:0.3,0.1,0.1:3 -body_bar_material linear -body_bar_young 1e4 " \
+  "-body_bar_poisson 0.3 -body_bar_density 1000 "                                               \
   "-effects gravity,clamp -effect_clamp_type support -effect_clamp_on xmin -time static -ksp_rtol 1e-10 "
 
 static PetscErrorCode tip(const char *options, PetscReal *z, char stop[512], PetscInt *iterations)
 {
   const PetscReal at[3] = {0.3, 0.1, 0.1};
-  PetscReal       value[3];
-  char            text[1024];
-  TestScene       t;
+  PetscReal value[3];
+  char text[1024];
+  TestScene t;
 
   PetscFunctionBeginUser;
   PetscCall(PetscSNPrintf(text, sizeof(text), BAR "%s", options));
@@ -20,7 +21,7 @@ static PetscErrorCode tip(const char *options, PetscReal *z, char stop[512], Pet
   PetscCall(SbRunSolve(t.run));
   PetscCall(test_value_at(t.model, t.run->U, at, value));
   PetscCall(PetscStrncpy(stop, t.run->stop_reason, 512));
-  *z          = value[2];
+  *z = value[2];
   *iterations = t.run->linear_total;
   PetscCall(test_scene_close(&t));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -28,11 +29,13 @@ static PetscErrorCode tip(const char *options, PetscReal *z, char stop[512], Pet
 
 int main(int argc, char **argv)
 {
-  static const char *const solvers[] = {"auto", "cg", "cg_jacobi", "cg_pbjacobi", "cg_icc", "cg_ssor", "cg_gamg", "cg_hypre", "gauss_seidel", "sor", "cholmod", "rotated", "realtime"};
-  PetscReal                z, exact;
-  PetscInt                 iterations;
-  PetscMPIInt              size;
-  char                     stop[512], text[128];
+  static const char *const solvers[] = {"auto",    "cg",      "cg_jacobi", "cg_pbjacobi",  "cg_icc",
+                                        "cg_ssor", "cg_gamg", "cg_hypre",  "gauss_seidel", "sor",
+                                        "cholmod", "rotated", "realtime"};
+  PetscReal z, exact;
+  PetscInt iterations;
+  PetscMPIInt size;
+  char stop[512], text[128];
 
   SB_TEST_BEGIN(argc, argv);
   PetscCallMPI(MPI_Comm_size(PETSC_COMM_WORLD, &size));

@@ -2,10 +2,14 @@
 /* Residual, tangent and matrices of a space: the three storages agree, the tangent is the derivative, forces balance. */
 #include "../scene.h"
 
-static const char *const scene_text = "-bodies a,b -body_a_mesh box:1,0.5,0.4:3 -body_a_material %s -body_a_young 1e3 -body_a_poisson 0.3 -body_a_density 10 "
-                                      "-body_b_mesh box:0.3,0.5,0.4:2 -body_b_translate 0,0,2 -body_b_material %s -body_b_young 2e3 -body_b_poisson 0.4 -body_b_density 7 "
-                                      "-sets left -set_left_at plane:1,0,0,0 -effects clamp,damping -effect_clamp_type support -effect_clamp_on left "
-                                      "-effect_damping_alpha 0.3 -effect_damping_beta 0.02 -mass %s %s";
+static const char *const scene_text =
+  "-bodies a,b -body_a_mesh box:1,0.5,0.4:3 -body_a_material %s -body_a_young 1e3 -body_a_poisson 0.3 "
+  "-body_a_density 10 "
+  "-body_b_mesh box:0.3,0.5,0.4:2 -body_b_translate 0,0,2 -body_b_material %s -body_b_young 2e3 "
+  "-body_b_poisson 0.4 -body_b_density 7 "
+  "-sets left -set_left_at plane:1,0,0,0 -effects clamp,damping -effect_clamp_type support -effect_clamp_on "
+  "left "
+  "-effect_damping_alpha 0.3 -effect_damping_beta 0.02 -mass %s %s";
 
 static void wave(const PetscReal x[3], PetscReal v[3])
 {
@@ -38,9 +42,9 @@ static PetscErrorCode storage(TestScene *t, SbMatrixKind kind, Vec U, Vec V, Vec
 static PetscErrorCode taylor(TestScene *t, int exact, Vec U, Vec V, Vec W)
 {
   const PetscReal shift_v = 10., shift_a = 100.;
-  Vec             F0, F1, X, Vx, A, JW;
-  Mat             J;
-  PetscReal       error[2] = {0., 0.}, scale;
+  Vec F0, F1, X, Vx, A, JW;
+  Mat J;
+  PetscReal error[2] = {0., 0.}, scale;
 
   PetscFunctionBeginUser;
   PetscCall(VecDuplicate(U, &F0));
@@ -67,7 +71,10 @@ static PetscErrorCode taylor(TestScene *t, int exact, Vec U, Vec V, Vec W)
     PetscCall(VecAXPY(F1, -h, JW));
     PetscCall(VecNorm(F1, NORM_2, &error[k]));
   }
-  if (exact) SB_CHECK(error[0] < 1e-11 * scale || error[0] / error[1] > 3.7, "Taylor remainder falls from %g to %g (scale %g)", (double)error[0], (double)error[1], (double)scale);
+  if (exact)
+    SB_CHECK(error[0] < 1e-11 * scale || error[0] / error[1] > 3.7,
+             "Taylor remainder falls from %g to %g (scale %g)", (double)error[0], (double)error[1],
+             (double)scale);
   PetscCall(MatDestroy(&J));
   PetscCall(VecDestroy(&F0));
   PetscCall(VecDestroy(&F1));
@@ -80,10 +87,10 @@ static PetscErrorCode taylor(TestScene *t, int exact, Vec U, Vec V, Vec W)
 
 static PetscErrorCode one_scene(const char *law, const char *mass, const char *extra, PetscBool exact)
 {
-  TestScene   t;
-  char        text[2048];
-  Vec         U, V, W, Y[3];
-  PetscReal   norm, diff, total;
+  TestScene t;
+  char text[2048];
+  Vec U, V, W, Y[3];
+  PetscReal norm, diff, total;
   PetscMPIInt size;
 
   PetscFunctionBeginUser;
@@ -104,7 +111,8 @@ static PetscErrorCode one_scene(const char *law, const char *mass, const char *e
   PetscCall(PetscPrintf(PETSC_COMM_WORLD, "%s %s %s: |J w| = %.12g\n", law, mass, extra, (double)norm));
   PetscCall(VecAXPY(Y[1], -1., Y[0]));
   PetscCall(VecNorm(Y[1], NORM_2, &diff));
-  SB_CHECK(norm > 0. && diff < 1e-13 * norm, "%s: AIJ and BAIJ differ by %g of %g", law, (double)diff, (double)norm);
+  SB_CHECK(norm > 0. && diff < 1e-13 * norm, "%s: AIJ and BAIJ differ by %g of %g", law, (double)diff,
+           (double)norm);
   if (size == 1) {
     PetscCall(storage(&t, SB_MATRIX_SBAIJ, U, V, W, Y[2]));
     PetscCall(VecAXPY(Y[2], -1., Y[0]));
@@ -120,7 +128,9 @@ static PetscErrorCode one_scene(const char *law, const char *mass, const char *e
   for (PetscInt c = 0; c < 3; c++) {
     PetscCall(VecStrideNorm(Y[0], c, NORM_1, &norm));
     PetscCall(VecStrideSum(Y[0], c, &total));
-    SB_CHECK(PetscAbsReal(total) < 1e-12 * norm, "%s: internal forces along %" PetscInt_FMT " sum to %g of %g", law, c, (double)total, (double)norm);
+    SB_CHECK(PetscAbsReal(total) < 1e-12 * norm,
+             "%s: internal forces along %" PetscInt_FMT " sum to %g of %g", law, c, (double)total,
+             (double)norm);
   }
   PetscCall(VecDestroy(&U));
   PetscCall(VecDestroy(&V));
@@ -137,10 +147,13 @@ int main(int argc, char **argv)
   PetscCall(one_scene("linear", "consistent", "", PETSC_TRUE));
   PetscCall(one_scene("corotated", "lumped", "", PETSC_FALSE));
   /* beta K v: the tangent leaves out dK/du, so the exact check runs without damping */
-  PetscCall(one_scene("corotated", "lumped", "-body_a_tangent exact -body_b_tangent exact -effect_damping_beta 0", PETSC_TRUE));
+  PetscCall(one_scene("corotated", "lumped",
+                      "-body_a_tangent exact -body_b_tangent exact -effect_damping_beta 0", PETSC_TRUE));
   PetscCall(one_scene("corotated", "lumped", "-body_a_tangent exact -body_b_tangent exact", PETSC_FALSE));
   PetscCall(one_scene("neohookean", "lumped", "-body_a_tangent exact -body_b_tangent exact", PETSC_FALSE));
-  PetscCall(one_scene("stvk", "consistent", "-body_a_tangent exact -body_b_tangent exact -effect_damping_beta 0", PETSC_TRUE));
-  PetscCall(one_scene("neohookean", "lumped", "-body_a_tangent exact -body_b_tangent exact -effect_damping_beta 0", PETSC_TRUE));
+  PetscCall(one_scene("stvk", "consistent",
+                      "-body_a_tangent exact -body_b_tangent exact -effect_damping_beta 0", PETSC_TRUE));
+  PetscCall(one_scene("neohookean", "lumped",
+                      "-body_a_tangent exact -body_b_tangent exact -effect_damping_beta 0", PETSC_TRUE));
   SB_TEST_END();
 }

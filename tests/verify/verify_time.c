@@ -25,16 +25,19 @@ static PetscReal frequency(PetscReal share)
 static PetscErrorCode oscillate(const char *options, PetscInt n, PetscReal h, PetscReal *u, PetscReal *v)
 {
   const PetscReal apex[3] = {0., 0., HEIGHT};
-  PetscReal       value[3];
-  TestScene       t;
-  char            text[2048];
+  PetscReal value[3];
+  TestScene t;
+  char text[2048];
 
   PetscFunctionBeginUser;
   PetscCall(PetscSNPrintf(text, sizeof(text),
-                          "-bodies a -body_a_mesh tests/data/one_tet.msh -body_a_material linear -body_a_young %g -body_a_poisson %g -body_a_density %g "
-                          "-body_a_velocity 0,0,%g -sets base -set_base_at plane:0,0,1,0 -effects hold,damping -effect_hold_type support -effect_hold_on base "
+                          "-bodies a -body_a_mesh tests/data/one_tet.msh -body_a_material linear "
+                          "-body_a_young %g -body_a_poisson %g -body_a_density %g "
+                          "-body_a_velocity 0,0,%g -sets base -set_base_at plane:0,0,1,0 -effects "
+                          "hold,damping -effect_hold_type support -effect_hold_on base "
                           "-ts_dt %.17g -ts_max_time %.17g -ksp_rtol 1e-14 %s",
-                          (double)young, (double)nu, (double)rho, (double)v0, (double)h, (double)(h * n), options));
+                          (double)young, (double)nu, (double)rho, (double)v0, (double)h, (double)(h * n),
+                          options));
   PetscCall(test_scene_open(text, &t));
   PetscCall(SbRunSolve(t.run));
   SB_CHECK(!t.run->stop_reason[0] && t.run->steps_total == n, "%s: %s", options, t.run->stop_reason);
@@ -49,16 +52,18 @@ static PetscErrorCode oscillate(const char *options, PetscInt n, PetscReal h, Pe
 static PetscErrorCode check_oscillator(const char *options, int kind)
 {
   const PetscReal w = frequency(0.25);
-  const PetscInt  n = 25;
+  const PetscInt n = 25;
 
   PetscFunctionBeginUser;
   for (int k = 0; k < 3; k++) {
     const PetscReal wh = k == 0 ? 0.1 : k == 1 ? 0.5 : 1.;
-    double complex  factor, q;
-    PetscReal       u, v;
+    double complex factor, q;
+    PetscReal u, v;
 
-    factor = kind == 0 ? 1. / (1. - unit * wh) : kind == 1 ? 1. + unit * wh : (1. + 0.5 * unit * wh) / (1. - 0.5 * unit * wh);
-    q      = v0 * cpow(factor, (double)n);
+    factor = kind == 0   ? 1. / (1. - unit * wh)
+             : kind == 1 ? 1. + unit * wh
+                         : (1. + 0.5 * unit * wh) / (1. - 0.5 * unit * wh);
+    q = v0 * cpow(factor, (double)n);
     PetscCall(oscillate(options, n, wh / w, &u, &v));
     SB_CHECK_NEAR(w * u, cimag(q), 1e-10 * cabs(q), options);
     SB_CHECK_NEAR(v, creal(q), 1e-10 * cabs(q), options);
@@ -67,16 +72,19 @@ static PetscErrorCode check_oscillator(const char *options, int kind)
 }
 
 /* Error at a fixed time against the exact oscillation must fall with the order of the method; damped by alpha and beta. */
-static PetscErrorCode check_order(const char *options, PetscReal share, PetscReal alpha, PetscReal beta, int order)
+static PetscErrorCode check_order(const char *options, PetscReal share, PetscReal alpha, PetscReal beta,
+                                  int order)
 {
-  const PetscReal w = frequency(share), zeta = 0.5 * (alpha / w + beta * w), T = 1.3 / w, wd = w * PetscSqrtReal(1. - zeta * zeta);
+  const PetscReal w = frequency(share), zeta = 0.5 * (alpha / w + beta * w), T = 1.3 / w,
+                  wd = w * PetscSqrtReal(1. - zeta * zeta);
   const PetscReal decay = v0 * PetscExpReal(-zeta * w * T), exact_u = decay / wd * PetscSinReal(wd * T);
   const PetscReal exact_v = decay * (PetscCosReal(wd * T) - zeta * w / wd * PetscSinReal(wd * T));
-  PetscReal       error[2], u, v;
-  char            text[512];
+  PetscReal error[2], u, v;
+  char text[512];
 
   PetscFunctionBeginUser;
-  PetscCall(PetscSNPrintf(text, sizeof(text), "%s -effect_damping_alpha %g -effect_damping_beta %g", options, (double)alpha, (double)beta));
+  PetscCall(PetscSNPrintf(text, sizeof(text), "%s -effect_damping_alpha %g -effect_damping_beta %g", options,
+                          (double)alpha, (double)beta));
   for (int k = 0; k < 2; k++) {
     PetscCall(oscillate(text, 100 << k, T / (100 << k), &u, &v));
     error[k] = PetscAbsReal(w * (u - exact_u)) + PetscAbsReal(v - exact_v);
@@ -94,7 +102,8 @@ static PetscErrorCode check_dissipation(void)
   PetscCall(oscillate("-time genalpha -time_spectral_radius 0.5", 20, 1e4 / frequency(0.25), &u[0], &v[0]));
   PetscCall(oscillate("-time genalpha -time_spectral_radius 0.5", 24, 1e4 / frequency(0.25), &u[1], &v[1]));
   /* a double root: the factor per step approaches 0.5 from above, (n + 4)/n 0.5^4 for n = 20 */
-  SB_CHECK(PetscAbsReal(v[1]) < PetscAbsReal(v[0]) * 0.0625 * 1.5, "generalized-alpha damps %g to %g in four steps", (double)v[0], (double)v[1]);
+  SB_CHECK(PetscAbsReal(v[1]) < PetscAbsReal(v[0]) * 0.0625 * 1.5,
+           "generalized-alpha damps %g to %g in four steps", (double)v[0], (double)v[1]);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -102,12 +111,13 @@ static PetscErrorCode check_dissipation(void)
 static PetscErrorCode check_free_fall(const char *preset, PetscReal expected)
 {
   TestScene t;
-  char      text[1024];
+  char text[1024];
   PetscReal value[3];
 
   PetscFunctionBeginUser;
   PetscCall(PetscSNPrintf(text, sizeof(text),
-                          "-bodies a -body_a_mesh box:0.2,0.1,0.1:2 -body_a_material corotated -body_a_young 1e4 -body_a_poisson 0.3 -body_a_density 1000 "
+                          "-bodies a -body_a_mesh box:0.2,0.1,0.1:2 -body_a_material corotated -body_a_young "
+                          "1e4 -body_a_poisson 0.3 -body_a_density 1000 "
                           "-effects gravity -time %s -ts_dt 0.01 -ts_max_time 0.5",
                           preset));
   PetscCall(test_scene_open(text, &t));
