@@ -54,8 +54,9 @@ struct _p_SbSpace {
   PetscInt nfixed;           /* local nodes with any bit */
   PetscInt *fixed_node;      /* [nfixed] */
   PetscReal *fixed_value;    /* [nfixed][3] prescribed displacement at the time last asked for, m */
-  Vec template_vec;          /* ghosted (more than one rank) or sequential; block size 3 */
-  struct _p_SbPlan *plan;    /* cell blocks -> matrix values; NULL before SbSpaceCreateMatrix() */
+  PetscBool ghosted; /* more than one rank: vectors carry ghosts, also where a rank happens to have none */
+  Vec template_vec;  /* ghosted (more than one rank) or sequential; block size 3 */
+  struct _p_SbPlan *plan; /* cell blocks -> matrix values; NULL before SbSpaceCreateMatrix() */
   PetscReal
     block_scale;    /* factor on blocks of SbSpaceAddCellBlock(): the load factor of a static run, else 1 */
   PetscBool linear; /* every region's law is linear */

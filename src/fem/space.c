@@ -142,6 +142,7 @@ static PetscErrorCode create_template(SbSpace s)
 
   PetscFunctionBeginUser;
   PetscCallMPI(MPI_Comm_size(s->comm, &size));
+  s->ghosted = (PetscBool)(size > 1);
   if (size == 1) {
     PetscCall(VecCreateSeq(s->comm, 3 * s->nnode, &s->template_vec));
     PetscCall(VecSetBlockSize(s->template_vec, 3));
@@ -244,7 +245,7 @@ PetscErrorCode SbSpaceGetLocalRead(SbSpace s, Vec v, const PetscReal **array)
   Vec local = NULL;
 
   PetscFunctionBeginUser;
-  if (s->nnode == s->nnode_owned && s->Nnode == s->nnode) {
+  if (!s->ghosted) {
     PetscCall(VecGetArrayRead(v, array));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
@@ -264,7 +265,7 @@ PetscErrorCode SbSpaceRestoreLocalRead(SbSpace s, Vec v, const PetscReal **array
   Vec local = NULL;
 
   PetscFunctionBeginUser;
-  if (s->nnode == s->nnode_owned && s->Nnode == s->nnode) {
+  if (!s->ghosted) {
     PetscCall(VecRestoreArrayRead(v, array));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
@@ -277,7 +278,7 @@ PetscErrorCode SbSpaceRestoreLocalRead(SbSpace s, Vec v, const PetscReal **array
 PetscErrorCode SbSpaceGetLocalWrite(SbSpace s, Vec v, PetscReal **array)
 {
   PetscFunctionBeginUser;
-  if (s->nnode != s->nnode_owned || s->Nnode != s->nnode) {
+  if (s->ghosted) {
     Vec local = NULL;
 
     PetscCall(VecGhostGetLocalForm(v, &local));

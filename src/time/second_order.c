@@ -146,22 +146,37 @@ static PetscErrorCode predict(TS ts)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode solve_implicit(TS ts, PetscBool *ok)
+/* One attempt at the end displacement, from the predicted one. */
+static PetscErrorCode solve_end(TS ts, SNESConvergedReason *reason)
 {
   SecondOrder *so = (SecondOrder *)ts->data;
-  SNESConvergedReason reason;
   PetscInt newton, linear;
-  PetscReal size;
 
   PetscFunctionBeginUser;
   PetscCall(predict(ts));
   PetscCall(TSPreStage(ts, ts->ptime + so->set.alpha_f * ts->time_step));
   PetscCall(SNESSolve(ts->snes, NULL, so->X1));
-  PetscCall(SNESGetConvergedReason(ts->snes, &reason));
+  PetscCall(SNESGetConvergedReason(ts->snes, reason));
   PetscCall(SNESGetIterationNumber(ts->snes, &newton));
   PetscCall(SNESGetLinearSolveIterations(ts->snes, &linear));
   ts->snes_its += newton;
   ts->ksp_its += linear;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode solve_implicit(TS ts, PetscBool *ok)
+{
+  SecondOrder *so = (SecondOrder *)ts->data;
+  SNESConvergedReason reason;
+  PetscReal size;
+
+  PetscFunctionBeginUser;
+  PetscCall(solve_end(ts, &reason));
+  if (reason < 0 && so->run->may_search) {
+    PetscCall(SbRunSearch(so->run, PETSC_TRUE));
+    PetscCall(solve_end(ts, &reason));
+    PetscCall(SbRunSearch(so->run, PETSC_FALSE));
+  }
   PetscCall(end_state(ts, so->X1));
   PetscCall(VecNorm(so->V1, NORM_INFINITY, &size));
   *ok = (PetscBool)(reason > 0 && !PetscIsInfOrNanReal(size));
@@ -196,7 +211,7 @@ static PetscErrorCode solve_explicit(TS ts, PetscBool *ok)
   if (!*ok)
     PetscCall(SbRunFail(so->run,
                         "step %" PetscInt_FMT " at t = %g s: the explicit solution is not finite; its step "
-                                              "of %g s is beyond the stable one (see the header)",
+                        "of %g s is beyond the stable one (see the header)",
                         ts->steps + 1, (double)ts->ptime, (double)h));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -220,7 +235,8 @@ static PetscErrorCode TSStep_SecondOrder(TS ts)
 
   PetscFunctionBeginUser;
   if (so->nominal == 0.) so->nominal = ts->time_step;
-  if (!so->started && so->set.method != SB_METHOD_EULER_IMPLICIT)
+  /* a restarted run brings its acceleration along: that of generalized-alpha does not follow from the state */
+  if (!so->started && so->run->step0 == 0 && so->set.method != SB_METHOD_EULER_IMPLICIT)
     PetscCall(SbFormAcceleration(so->run, ts->ptime, ts->vec_sol, ts->vec_dot, so->run->A));
   so->started = PETSC_TRUE;
   PetscCall(VecCopy(ts->vec_sol, so->X0));
@@ -359,8 +375,6 @@ PetscErrorCode SbSecondOrderSet(TS ts, SbRun run, const SbMethodSettings *settin
   PetscFunctionBeginUser;
   so->run = run;
   so->set = *settings;
-  /* a restarted run brings its acceleration along */
-  so->started = (PetscBool)(run->step0 > 0);
   ts->usessnes = (PetscBool)!is_explicit(so);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
