@@ -11,12 +11,13 @@
   is left is their A-DEF2, with one product by A and one coarse solve for each application. That is looked at each time; a
   residual with a part in the span of Z gets the whole.
 
-  Fine level: ICC(0) of the rows of each rank. Where that is not positive definite (from Poisson's ratio 0.42 on, very flat
-  tets), the diagonal: twice the iterations, each at half the price. Bar of 192,000 tets, one rank, residual 1e-8, iterations
+  Fine level: ICC(0) of the rows of each rank. Where that is not positive definite (at Poisson's ratio 0.45, not yet at 0.4;
+  very flat tets), the diagonal: twice the iterations, each at half the price. Bar of 192,000 tets, one rank, residual 1e-8, iterations
   and CPU s: at nu 0.3 ICC 39, 0.37 and diagonal 84, 0.48; at 0.45 diagonal 143, 0.70.
 
-  PETSc's PCDEFLATION on the same aggregates takes AIJ only: 0.64 s on one rank, 0.83 on two (this: 0.37, 0.54); its projection
-  starts from an exact zero that rounding destroys: on a bar sixty times as long as thick it fails, this takes 49 iterations.
+  PETSc's PCDEFLATION on the same aggregates takes AIJ only: 0.64 s on one rank, 0.83 on two (this: 0.37, 0.54). On a bar
+  sixty times as long as thick CG stopped there with an indefinite preconditioner after 41 iterations (why was not found out; its
+  fine level was the ICC of AIJ); this takes 49.
 */
 #include "coarse.h"
 #include "sbsolver.h"
