@@ -117,17 +117,43 @@ static PetscErrorCode set_up_snes(SbRun run)
 {
   SbModel m = run->model;
   PetscReal force = 0.;
-  SNESLineSearch search;
 
   PetscFunctionBeginUser;
   /* rounding of the internal forces: below 1e-13 of (stress modulus) x (area of the body) no residual is meaningful */
   for (PetscInt b = 0; b < m->nbody; b++)
     force += m->material[b]->E * PetscPowReal(m->body[b].volume, 2. / 3.);
   PetscCall(SNESSetType(run->snes, m->linear ? SNESKSPONLY : SNESNEWTONLS));
-  PetscCall(SNESGetLineSearch(run->snes, &search));
-  PetscCall(SNESLineSearchSetType(search, SNESLINESEARCHBT));
+  PetscCall(SbRunSearch(run, PETSC_FALSE));
+  PetscCall(SNESSetDivergenceTolerance(run->snes, -1.));
   PetscCall(SNESSetTolerances(run->snes, 1e-13 * force, m->dynamic ? 1e-6 : 1e-8, 0., 50, SB_UNLIMITED));
   PetscCall(SNESSetErrorIfNotConverged(run->snes, PETSC_FALSE));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/*
+  Full Newton steps first, a line search when they fail. In bending and in rotation a full step has a residual thousands of
+  times larger than before, because it stretches what it should turn, and the next one removes that: a search for a smaller
+  residual creeps along where full steps need five.
+*/
+PetscErrorCode SbRunSearch(SbRun run, PetscBool on)
+{
+  SNESLineSearch search;
+
+  PetscFunctionBeginUser;
+  PetscCall(SNESGetLineSearch(run->snes, &search));
+  PetscCall(SNESLineSearchSetType(search, on ? SNESLINESEARCHBT : SNESLINESEARCHBASIC));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Newton's method without a line search of the user's choice has one to fall back on. */
+static PetscErrorCode find_search(SbRun run)
+{
+  PetscBool newton, asked;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscObjectTypeCompare((PetscObject)run->snes, SNESNEWTONLS, &newton));
+  PetscCall(PetscOptionsHasName(NULL, NULL, "-snes_linesearch_type", &asked));
+  run->may_search = (PetscBool)(newton && !asked);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -226,6 +252,7 @@ static PetscErrorCode set_up_ts(SbRun run)
   PetscCall(set_up_snes(run));
   PetscCall(SbSolverSetUp(run->snes, m->space, run->solver_used));
   PetscCall(TSSetFromOptions(run->ts));
+  PetscCall(find_search(run));
   PetscCall(forcing_terms(run->snes));
   PetscCall(TSSetMaxTime(run->ts, run->t_end));
   PetscCall(TSSetTimeStep(run->ts, run->dt));
@@ -251,6 +278,7 @@ static PetscErrorCode set_up_static(SbRun run)
   PetscCall(set_up_snes(run));
   PetscCall(SbSolverSetUp(run->snes, run->model->space, run->solver_used));
   PetscCall(SNESSetFromOptions(run->snes));
+  PetscCall(find_search(run));
   PetscCall(forcing_terms(run->snes));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

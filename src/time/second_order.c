@@ -172,7 +172,7 @@ static PetscErrorCode solve_implicit(TS ts, PetscBool *ok)
 
   PetscFunctionBeginUser;
   PetscCall(solve_end(ts, &reason));
-  if (reason < 0 && so->run->may_search) {
+  if (SbRunWorthSearch(so->run, reason)) {
     PetscCall(SbRunSearch(so->run, PETSC_TRUE));
     PetscCall(solve_end(ts, &reason));
     PetscCall(SbRunSearch(so->run, PETSC_FALSE));

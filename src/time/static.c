@@ -7,11 +7,8 @@
 #include "time_impl.h"
 
 /* Newton from the last equilibrium with the prescribed values of the new load factor. */
-static PetscErrorCode solve_at(SbRun run, PetscReal factor, Vec X, PetscBool *ok)
+static PetscErrorCode attempt(SbRun run, PetscReal factor, Vec X, SNESConvergedReason *reason)
 {
-  SNESConvergedReason reason;
-  KSPConvergedReason kreason;
-  KSP ksp;
   PetscInt newton, linear;
 
   PetscFunctionBeginUser;
@@ -19,11 +16,27 @@ static PetscErrorCode solve_at(SbRun run, PetscReal factor, Vec X, PetscBool *ok
   PetscCall(VecCopy(run->U, X));
   PetscCall(SbModelPrescribe(run->model, factor, X));
   PetscCall(SNESSolve(run->snes, NULL, X));
-  PetscCall(SNESGetConvergedReason(run->snes, &reason));
+  PetscCall(SNESGetConvergedReason(run->snes, reason));
   PetscCall(SNESGetIterationNumber(run->snes, &newton));
   PetscCall(SNESGetLinearSolveIterations(run->snes, &linear));
   run->newton_step += newton;
   run->linear_step += linear;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode solve_at(SbRun run, PetscReal factor, Vec X, PetscBool *ok)
+{
+  SNESConvergedReason reason;
+  KSPConvergedReason kreason;
+  KSP ksp;
+
+  PetscFunctionBeginUser;
+  PetscCall(attempt(run, factor, X, &reason));
+  if (SbRunWorthSearch(run, reason)) {
+    PetscCall(SbRunSearch(run, PETSC_TRUE));
+    PetscCall(attempt(run, factor, X, &reason));
+    PetscCall(SbRunSearch(run, PETSC_FALSE));
+  }
   *ok = (PetscBool)(reason > 0);
   if (!*ok) {
     PetscCall(SNESGetKSP(run->snes, &ksp));

@@ -22,6 +22,12 @@ PetscErrorCode SbSecondOrderSet(TS ts, SbRun run, const SbMethodSettings *settin
 /* hooks.c: what happens around a step. */
 PetscErrorCode SbRunStepBegin(SbRun run, PetscReal t, PetscReal dt);                            /* before an attempt */
 PetscErrorCode SbRunStepAccepted(SbRun run, PetscInt step, PetscReal t, PetscReal dt, PetscBool last); /* after it was accepted; also once at the start */
+PetscErrorCode SbRunSearch(SbRun run, PetscBool on); /* preset.c: Newton with a line search, or with full steps */
+/* Whether Newton's method, which failed with full steps, should be tried with a line search. */
+static inline PetscBool SbRunWorthSearch(SbRun run, SNESConvergedReason reason)
+{
+  return (PetscBool)(run->may_search && reason < 0 && reason != SNES_DIVERGED_LINEAR_SOLVE);
+}
 PetscErrorCode SbRunFail(SbRun run, const char *format, ...) __attribute__((format(printf, 2, 3)));
 
 /* form.c: the model as PETSc sees it. */
