@@ -1,0 +1,63 @@
+/*
+  Milliseconds per step of the swinging bar (perf.h) with one linear solver, without output.
+
+    swing -mesh box:0.4,0.1,0.1:8 -solver realtime -steps 120 -seconds 10
+
+  The bar is let go at rest, falls and swings for 2 s in 120 steps of 1/60 s. Ends early after so many seconds. The first
+  step is told apart: it holds what a solver sets up once. Iterations are those of CG.
+*/
+#include "perf.h"
+
+typedef struct {
+  double limit, before; /* s of wall time: after these the run ends; at the end of the last step */
+} Watch;
+
+static PetscErrorCode watch(SbRun run, const SbStep *step, void *ctx)
+{
+  Watch *w = (Watch *)ctx;
+  double wall = step->wall;
+
+  PetscFunctionBeginUser;
+  /* all ranks must agree on the end */
+  PetscCallMPI(MPI_Bcast(&wall, 1, MPI_DOUBLE, 0, PETSC_COMM_WORLD));
+  if (step->step > 0) {
+    PetscCall(perf_sample(step->step == 1 ? "first_step" : "step", "ms", 1e3 * (wall - w->before)));
+    if (step->step > 1) PetscCall(perf_sample("iterations", "1", (double)step->linear));
+  }
+  if (wall > w->limit) PetscCall(TSSetConvergedReason(run->ts, TS_CONVERGED_USER));
+  w->before = wall;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+int main(int argc, char **argv)
+{
+  char mesh[512] = "box:0.4,0.1,0.1:8", solver[64] = "cg_icc", more[256], text[PERF_TEXT];
+  PetscInt steps = 120;
+  PetscReal seconds = 10.;
+  Watch w = {0., 0.};
+  PerfClock start;
+  TestScene t;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscInitialize(&argc, &argv, NULL, NULL));
+  PetscCall(perf_argument("-mesh", sizeof(mesh), mesh));
+  PetscCall(perf_argument("-solver", sizeof(solver), solver));
+  PetscCall(PetscOptionsGetInt(NULL, NULL, "-steps", &steps, NULL));
+  PetscCall(PetscOptionsGetReal(NULL, NULL, "-seconds", &seconds, NULL));
+  PetscCall(PetscSNPrintf(more, sizeof(more), "-solver %s -ts_max_time %.10g -time_max_cuts 0", solver,
+                          (double)steps / 60.));
+  PetscCall(perf_bar(mesh, more, text));
+  PetscCall(perf_open(text, &t));
+  w.limit = (double)seconds;
+  PetscCall(perf_fact("tets", (double)t.model->mesh->Ncell));
+  PetscCall(SbRunAddMonitor(t.run, watch, &w, NULL));
+  start = perf_start();
+  PetscCall(SbRunSolve(t.run));
+  PetscCall(
+    perf_fact("cpu_per_step_ms", 1e3 * perf_stop(start).cpu / (double)PetscMax(t.run->steps_total, 1)));
+  if (t.run->stop_reason[0])
+    PetscCall(PetscPrintf(PETSC_COMM_WORLD, "fact failed 1\nnote %s\n", t.run->stop_reason));
+  PetscCall(test_scene_close(&t));
+  PetscCall(PetscFinalize());
+  return 0;
+}
