@@ -30,7 +30,7 @@ static PetscErrorCode tip(const char *options, PetscReal *z, char stop[512], Pet
 int main(int argc, char **argv)
 {
   static const char *const solvers[] = {"auto",    "cg",      "cg_jacobi", "cg_pbjacobi",  "cg_icc",
-                                        "cg_ssor", "cg_gamg", "cg_hypre",  "gauss_seidel", "sor",
+                                        "cg_ssor", "cg_two_level", "cg_gamg", "cg_hypre",  "gauss_seidel", "sor",
                                         "cholmod", "rotated", "realtime"};
   PetscReal z, exact;
   PetscInt iterations;
