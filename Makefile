@@ -51,7 +51,7 @@ TESTBIN  := $(TESTSRC:%.c=$(BUILD)/%)
 MESHES   := $(patsubst %.geo,%.msh,$(wildcard meshes/*.geo))
 
 # A second make, with one job per core unless the user said otherwise: what was missing may have been installed meanwhile.
-AGAIN     = +@$(MAKE) --no-print-directory $(if $(filter -j%,$(MAKEFLAGS)),,-j$(JOBS))
+AGAIN     = +@$(MAKE) $(if $(V),,-s) --no-print-directory $(if $(filter -j%,$(MAKEFLAGS)),,-j$(JOBS))
 Q        := $(if $(V),,@)
 SAY       = $(if $(V),@:,@echo)
 
@@ -147,8 +147,8 @@ install: bin/supple $(MESHES) ## program, scenarios and documents to PREFIX=/usr
 	install -m 644 meshes/*.geo $(MESHES) $(DESTDIR)$(PREFIX)/share/supple/meshes
 	install -m 644 README.md CHANGELOG.md LICENSE $(wildcard docs/*.md) $(DESTDIR)$(PREFIX)/share/doc/supple
 
-clean: ## remove what was built, meshed and run
-	rm -rf build build-* bin out meshes/*.msh
+clean: ## remove what was built and meshed; results in out/ stay
+	rm -rf build build-* bin meshes/*.msh
 
 help: ## this list
 	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/  make \1|\2/p' Makefile | awk -F'|' '{ printf "%-20s%s\n", $$1, $$2 }'
