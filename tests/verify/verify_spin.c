@@ -1,0 +1,176 @@
+// @ranks 1 2
+/*
+  Rotation.
+
+    turned     a body turned as a whole by 15 degree steps through a full turn: no force with the laws that know rotation,
+               |f|_max / (E L^2) <= 1e-12, and sigma_xx = 2 (mu + lambda)(cos t - 1) about z with the linear one
+    spin       a stiff free body that spins about a principal axis, implicit Euler. A step minimises the distance to
+               x0 + h v0 under rigidity: the nearest rotation to it. In the plane of the spin x0 + h v0 is x0 times the
+               complex number 2 - e^(-i d), d being the turn of the last step, so that the turns obey
+
+                 d' = arg(2 - e^(-i d)),  first one atan(w0 h),
+
+               for small w0 h the law w(t) = w0 / sqrt(1 + 2 w0^2 h t), whatever the stiffness
+    rod        a thin rod at rest in a turning frame stretches by u = rho w^2 l^3 / (3 E) on each side: what a body that
+               spins with the steady angular velocity of symplectic Euler shows on the average
+*/
+#include <complex.h>
+#undef I
+#include "verify.h"
+
+#define SOLVER ""
+
+static const double complex unit = 1.0i;
+
+/* ------------------------------------------------------------------ turned */
+
+static PetscErrorCode turn(TestScene *t, const PetscReal axis[3], PetscReal angle)
+{
+  SbSpace s = t->model->space;
+  PetscReal R[9];
+  PetscScalar *u;
+
+  PetscFunctionBeginUser;
+  verify_rotation(axis, angle, R);
+  PetscCall(VecGetArray(t->run->U, &u));
+  for (PetscInt i = 0; i < s->nnode_owned; i++) {
+    verify_apply(R, s->node_x + 3 * i, u + 3 * i);
+    for (int k = 0; k < 3; k++) u[3 * i + k] -= s->node_x[3 * i + k];
+  }
+  PetscCall(VecRestoreArray(t->run->U, &u));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Largest error of sigma_xx over the cells, relative to 2 (mu + lambda). */
+static PetscErrorCode linear_stress(TestScene *t, PetscReal angle, PetscReal *error)
+{
+  SbSpace s = t->model->space;
+  const SbMaterial m = t->model->material[0];
+  const PetscReal modulus = 2. * (m->mu + m->lambda);
+  const PetscReal *u;
+  PetscReal *sigma;
+
+  PetscFunctionBeginUser;
+  *error = 0.;
+  PetscCall(PetscMalloc1(6 * s->mesh->ncell_owned, &sigma));
+  PetscCall(SbSpaceGetLocalRead(s, t->run->U, &u));
+  PetscCall(SbSpaceCellState(s, u, sigma, NULL, NULL));
+  PetscCall(SbSpaceRestoreLocalRead(s, t->run->U, &u));
+  for (PetscInt c = 0; c < s->mesh->ncell_owned; c++)
+    *error = PetscMax(*error, PetscAbsReal(sigma[6 * c] / modulus - (PetscCosReal(angle) - 1.)));
+  PetscCall(PetscFree(sigma));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, error, 1, MPIU_REAL, MPI_MAX, PETSC_COMM_WORLD));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode check_turned(const char *law)
+{
+  const PetscReal askew[3] = {1., 2., 3.}, z[3] = {0., 0., 1.}, E = 1e5;
+  const PetscBool linear = (PetscBool)!strcmp(law, "linear");
+  PetscReal worst = 0.;
+  Vec F;
+  TestScene t;
+  char text[VERIFY_TEXT];
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscSNPrintf(
+    text, sizeof(text),
+    "-bodies a -body_a_mesh box:1,0.8,0.6:3 -body_a_translate -0.3,-0.2,-0.1 -body_a_material %s "
+    "-body_a_young %g -body_a_poisson 0.4 -body_a_density 1000",
+    law, (double)E));
+  PetscCall(test_scene_open(text, &t));
+  PetscCall(VecDuplicate(t.run->U, &F));
+  for (int k = 1; k <= 24; k++) {
+    const PetscReal angle = k * PETSC_PI / 12.;
+    PetscReal size;
+
+    PetscCall(turn(&t, linear ? z : askew, angle));
+    if (linear) {
+      PetscCall(linear_stress(&t, angle, &size));
+    } else {
+      PetscCall(SbModelResidual(t.model, 0., t.run->U, NULL, NULL, PETSC_TRUE, F));
+      PetscCall(VecNorm(F, NORM_INFINITY, &size));
+      size /= E;
+    }
+    worst = PetscMax(worst, size);
+  }
+  PetscCall(PetscPrintf(PETSC_COMM_WORLD, "  turned through 360 degrees, %-10s: %s %.1e\n", law,
+                        linear ? "stress from 2 (mu + lambda)(cos t - 1)" : "largest force / (E L^2)",
+                        (double)worst));
+  SB_CHECK(worst <= 1e-12, "%s: %g", law, (double)worst);
+  PetscCall(VecDestroy(&F));
+  PetscCall(test_scene_close(&t));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ spin */
+
+typedef struct {
+  PetscReal last[2], d, w0h, worst; /* direction of an edge of the body, turn expected next, largest error */
+} Spin;
+
+static PetscErrorCode watch_spin(SbRun run, const SbStep *step, void *ctx)
+{
+  const PetscReal left[3] = {-0.15, 0., 0.}, right[3] = {0.15, 0., 0.};
+  Spin *s = (Spin *)ctx;
+  PetscReal a[3], b[3], e[2], turned;
+
+  PetscFunctionBeginUser;
+  PetscCall(test_value_at(run->model, step->U, left, a));
+  PetscCall(test_value_at(run->model, step->U, right, b));
+  for (int k = 0; k < 2; k++) e[k] = right[k] + b[k] - left[k] - a[k];
+  if (step->step > 0) {
+    turned = PetscAtan2Real(s->last[0] * e[1] - s->last[1] * e[0], s->last[0] * e[0] + s->last[1] * e[1]);
+    s->d = step->step == 1 ? PetscAtanReal(s->w0h) : carg(2. - cexp(-unit * s->d));
+    s->worst = PetscMax(s->worst, PetscAbsReal(turned / s->d - 1.));
+    s->d = turned;
+  }
+  for (int k = 0; k < 2; k++) s->last[k] = e[k];
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode check_spin(const char *law, PetscReal E, PetscReal w0, PetscReal h, PetscReal tolerance,
+                                 PetscReal near)
+{
+  const PetscInt steps = 100;
+  const PetscReal wt = w0 / PetscSqrtReal(1. + 2. * w0 * w0 * h * h * (PetscReal)steps);
+  Spin s = {.w0h = w0 * h};
+  TestScene t;
+  char text[VERIFY_TEXT];
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscSNPrintf(text, sizeof(text),
+                          "-bodies a -body_a_mesh box:0.3,0.1,0.1:2 -body_a_translate -0.15,-0.05,-0.05 "
+                          "-body_a_material %s -body_a_young %g -body_a_poisson 0.3 -body_a_density 1000 "
+                          "-body_a_spin 0,0,%.17g -time euler_implicit -ts_dt %.17g -ts_max_time %.17g "
+                          "-snes_rtol 1e-10 " SOLVER,
+                          law, (double)E, (double)w0, (double)h, (double)(h * (PetscReal)steps)));
+  PetscCall(test_scene_open(text, &t));
+  PetscCall(SbRunAddMonitor(t.run, watch_spin, &s, NULL));
+  PetscCall(verify_solve(&t, "spin"));
+  PetscCall(PetscPrintf(
+    PETSC_COMM_WORLD,
+    "  spin, implicit Euler, %s, E %g, w0 h %g: turns of %d steps within %.1e of the recurrence; end %.5f "
+    "rad/s, law %.5f\n",
+    law, (double)E, (double)(w0 * h), (int)steps, (double)s.worst, (double)(s.d / h), (double)wt));
+  SB_CHECK(t.run->steps_total == steps, "%d steps were taken", (int)t.run->steps_total);
+  SB_CHECK(s.worst <= tolerance, "%s, E %g: turns are off by %g", law, (double)E, (double)s.worst);
+  SB_CHECK_NEAR(s.d / h, wt, near * wt, "w(t)");
+  PetscCall(test_scene_close(&t));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+int main(int argc, char **argv)
+{
+  SB_TEST_BEGIN(argc, argv);
+  PetscCall(check_turned("corotated"));
+  PetscCall(check_turned("stvk"));
+  PetscCall(check_turned("neohookean"));
+  PetscCall(check_turned("linear"));
+  PetscCall(check_spin("corotated", 1e9, 10., 0.01, 1e-6, 0.02));
+  PetscCall(check_spin("corotated", 1e11, 10., 0.01, 1e-8, 0.02));
+  PetscCall(check_spin("stvk", 1e9, 10., 0.01, 1e-6, 0.02));
+  PetscCall(check_spin("neohookean", 1e9, 10., 0.01, 1e-6, 0.02));
+  PetscCall(check_spin("corotated", 1e9, 100., 0.01, 1e-3, 1.));
+  SB_TEST_END();
+}
