@@ -5,7 +5,8 @@
   digits: what is read back is what was computed. `total` is kinetic + strain - load_work - drive_work, which stays what it
   was at the start as long as nothing is dissipated.
 
-  The sums that effects and probes need travel in one reduction per step. A row that does not fit on the disk is taken back.
+  The sums that effects and probes need travel in one reduction per row; with them the news that the row before could not be
+  written. Such a row is taken back.
 */
 #include <errno.h>
 #include <fcntl.h>
@@ -19,9 +20,11 @@ struct _p_SbHistory {
   char path[PETSC_MAX_PATH_LEN];
   char *row; /* text of a row or of the header */
   size_t size, capacity;
-  PetscInt last_step;    /* of the last row in the file, or -1 */
-  PetscInt nextra;       /* columns of effects and probes */
-  PetscReal *mine, *sum; /* [nextra] this rank's part, all ranks' sum */
+  PetscInt last_step; /* of the last row in the file, or -1 */
+  PetscInt nextra;    /* columns of effects and probes */
+  PetscReal *mine,
+    *sum; /* [nextra + 1] this rank's part, all ranks' sum; the last one: the row before failed */
+  char message[SB_MESSAGE_MAX]; /* why it failed; empty when it did not */
 };
 
 static const char *const names[] = {
@@ -131,19 +134,20 @@ static PetscErrorCode probe_columns(SbOutput out, const SbStep *step, PetscReal 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Sums of all ranks for the columns of effects and probes. */
+/* Sums of all ranks for the columns of effects and probes; ends the run when the row before could not be written. */
 static PetscErrorCode extra_columns(SbRun run, SbOutput out, const SbStep *step)
 {
   SbHistory h = out->hist;
   PetscMPIInt n;
 
   PetscFunctionBeginUser;
-  if (!h->nextra) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(PetscArrayzero(h->mine, h->nextra));
+  PetscCall(PetscArrayzero(h->mine, h->nextra + 1));
   if (run->model->nhistory) PetscCall(effect_columns(run, step, h->mine));
   if (out->nprobe) PetscCall(probe_columns(out, step, h->mine + h->nextra - 3 * out->nprobe));
-  PetscCall(PetscMPIIntCast(h->nextra, &n));
+  h->mine[h->nextra] = h->message[0] ? 1. : 0.;
+  PetscCall(PetscMPIIntCast(h->nextra + 1, &n));
   PetscCallMPI(MPI_Allreduce(h->mine, h->sum, n, MPIU_REAL, MPI_SUM, out->comm));
+  if (h->sum[h->nextra] > 0.) PetscCall(SbAgree(out->comm, PETSC_ERR_FILE_WRITE, h->message));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -200,7 +204,6 @@ static PetscErrorCode monitor(SbRun run, const SbStep *step, void *ctx)
   SbOutput out = (SbOutput)ctx;
   SbHistory h = out->hist;
   const PetscBool first = (PetscBool)(step->step == run->step0);
-  char message[SB_MESSAGE_MAX] = "";
 
   PetscFunctionBeginUser;
   if (!first && !step->last && step->step % out->history_every) PetscFunctionReturn(PETSC_SUCCESS);
@@ -210,9 +213,9 @@ static PetscErrorCode monitor(SbRun run, const SbStep *step, void *ctx)
   h->last_step = step->step;
   if (h->fd >= 0) {
     PetscCall(put_row(h, step));
-    write_row(h, sizeof(message), message);
+    write_row(h, sizeof(h->message), h->message);
   }
-  PetscCall(SbAgree(out->comm, PETSC_ERR_FILE_WRITE, message));
+  if (step->last) PetscCall(SbAgree(out->comm, PETSC_ERR_FILE_WRITE, h->message));
   PetscCall(PetscLogEventEnd(SbEvents[SB_EVENT_OUTPUT], 0, 0, 0, 0));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -295,7 +298,7 @@ PetscErrorCode SbHistoryAttach(SbRun run, SbOutput out)
   h->last_step = -1;
   for (PetscInt e = 0; e < model->nhistory; e++) h->nextra += model->history[e]->ncolumn;
   h->nextra += 3 * out->nprobe;
-  PetscCall(PetscMalloc2(h->nextra, &h->mine, h->nextra, &h->sum));
+  PetscCall(PetscMalloc2(h->nextra + 1, &h->mine, h->nextra + 1, &h->sum));
   h->capacity = 2 * (PETSC_STATIC_ARRAY_LENGTH(names) + (size_t)h->nextra) * (2 * SB_NAME_MAX) + 256;
   PetscCall(PetscMalloc1(h->capacity, &h->row));
   PetscCall(SbOutputPath(out, "history.csv", sizeof(h->path), h->path));

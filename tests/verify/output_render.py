@@ -1,0 +1,81 @@
+"""scripts/render draws a run without a display: a picture with the body in the colours of the scale, an animation.
+
+@timeout 180
+"""
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import matplotlib
+import numpy
+from PIL import Image
+
+from output_common import OUT, run
+
+RENDER = [sys.executable, str(Path(__file__).resolve().parents[2] / "scripts" / "render")]
+WITHOUT_DISPLAY = {name: value for name, value in os.environ.items() if name not in ("DISPLAY", "WAYLAND_DISPLAY")}
+
+
+def render(*args, fails=False):
+    result = subprocess.run(RENDER + [str(a) for a in args], capture_output=True, text=True, env=WITHOUT_DISPLAY, timeout=100)
+    if (result.returncode != 0) != fails:
+        sys.exit(f"render {args}: exit code {result.returncode}\n{result.stdout}{result.stderr}")
+    if fails and (len(result.stderr.strip().splitlines()) != 1 or "Traceback" in result.stderr):
+        sys.exit(f"render {args}: not one line\n{result.stderr}")
+    return result.stdout + result.stderr
+
+
+def check(condition, text):
+    if not condition:
+        sys.exit(text)
+
+
+def body_pixels(path, scale_width):
+    """Saturated pixels left of the scale: the background is nearly grey."""
+    pixels = numpy.asarray(Image.open(path).convert("RGB")).astype(int)
+    left = pixels[:, : pixels.shape[1] - scale_width]
+    return left, left.max(axis=2) - left.min(axis=2) > 40
+
+
+def main():
+    run(1, "run", "-ts_max_time", "0.1", "-quiet", "-output_fields", "displacement,von_mises,stress")
+    folder = OUT / "run"
+
+    render(folder, "--rest")
+    picture = folder / "picture.png"
+    check(Image.open(picture).size == (1200, 800), f"size {Image.open(picture).size}")
+    left, body = body_pixels(picture, 230)
+    rows, columns = numpy.nonzero(body)
+    # the bar is drawn large, whole, and not beyond the picture or into the scale
+    check(0.15 < body.mean() < 0.8, f"the body covers {body.mean():.0%} of the picture")
+    check(columns.min() > 20 and columns.max() < left.shape[1] - 20 and rows.min() > 20 and rows.max() < left.shape[0] - 20,
+          f"the body reaches from {columns.min()} to {columns.max()}, {rows.min()} to {rows.max()}")
+    # the held end is at the left and more stressed: warmer than the free one
+    warm = left[:, :, 0] - left[:, :, 2]
+    third = (columns.max() - columns.min()) // 3
+    held, free = (warm[rows[side], columns[side]].mean() for side in (columns < columns.min() + third, columns > columns.max() - third))
+    check(held > free + 30, f"held end {held:.0f}, free end {free:.0f}")
+
+    other = OUT / "other.png"
+    render(folder, "--field", "stress_xx", "--frame", "0", "--range", "-1", "1", "--colours", "viridis", "--size", "600x400", "-o", other)
+    left, body = body_pixels(other, 150)
+    middle = numpy.array(matplotlib.colormaps["viridis"](0.5)[:3])
+    drawn = left[body].mean(axis=0) / left[body].mean()
+    # no stress at rest: one colour, but for light and shade
+    check(numpy.abs(drawn - middle / middle.mean()).max() < 0.15, f"colour {drawn}, of the scale {middle / middle.mean()}")
+
+    render(folder, "--animate", OUT / "bar.gif", "--size", "300x200", "--fps", "50")
+    check(Image.open(OUT / "bar.gif").n_frames == 6, f"{Image.open(OUT / 'bar.gif').n_frames} pictures for 0.1 s at 50 a second")
+    render(folder, "--animate", OUT / "bar.png", "--size", "300x200", "--fps", "50", "--field", "displacement_z")
+    check(len(list(OUT.glob("bar_0*.png"))) == 6, "the sequence of pictures")
+
+    check("has no field 'von_mizes'; it has displacement" in render(folder, "--field", "von_mizes", fails=True), "unknown field")
+    check("is a tensor" in render(folder, "--field", "stress", fails=True), "tensor")
+    check("there is no frame 99" in render(folder, "--frame", "99", fails=True), "unknown frame")
+    check("does not exist" in render(OUT, fails=True), "no results")
+    print("pictures and animations are drawn")
+
+
+if __name__ == "__main__":
+    main()
