@@ -126,27 +126,20 @@ PetscErrorCode SbSolverChoose(SbSpace s, PetscBool dynamic, PetscBool linear, Pe
 /* Options of the row that the user did not give. */
 static PetscErrorCode insert_options(const char *text)
 {
-  PetscToken token;
-  char *word;
+  char **word;
+  int n;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscTokenCreate(text, ' ', &token));
-  PetscCall(PetscTokenFind(token, &word));
-  while (word) {
-    char name[128];
+  PetscCall(PetscStrToArray(text, ' ', &n, &word));
+  for (int k = 0; k < n; k++) {
+    const char *name = word[k], *value = NULL;
     PetscBool given;
 
-    PetscCall(PetscStrncpy(name, word, sizeof(name)));
-    PetscCall(PetscTokenFind(token, &word));
+    if (k + 1 < n && word[k + 1][0] != '-') value = word[++k];
     PetscCall(PetscOptionsHasName(NULL, NULL, name, &given));
-    if (word && word[0] == '-' && (word[1] < '0' || word[1] > '9')) {
-      if (!given) PetscCall(PetscOptionsSetValue(NULL, name, NULL));
-      continue;
-    }
-    if (!given) PetscCall(PetscOptionsSetValue(NULL, name, word));
-    if (word) PetscCall(PetscTokenFind(token, &word));
+    if (!given) PetscCall(PetscOptionsSetValue(NULL, name, value));
   }
-  PetscCall(PetscTokenDestroy(&token));
+  PetscCall(PetscStrToArrayDestroy(n, word));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
