@@ -56,3 +56,10 @@ typedef const char *SbErrorText;
 #else
   #define SB_OPERATION(f) ((PetscErrorCodeFn *)(f))
 #endif
+
+/* Newton without a line search. */
+#if PETSC_VERSION_LT(3, 26, 0)
+  #define SB_LINESEARCH_NONE SNESLINESEARCHBASIC
+#else
+  #define SB_LINESEARCH_NONE SNESLINESEARCHNONE
+#endif

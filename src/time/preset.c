@@ -141,7 +141,7 @@ PetscErrorCode SbRunSearch(SbRun run, PetscBool on)
 
   PetscFunctionBeginUser;
   PetscCall(SNESGetLineSearch(run->snes, &search));
-  PetscCall(SNESLineSearchSetType(search, on ? SNESLINESEARCHBT : SNESLINESEARCHBASIC));
+  PetscCall(SNESLineSearchSetType(search, on ? SNESLINESEARCHBT : SB_LINESEARCH_NONE));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
