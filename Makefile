@@ -103,7 +103,9 @@ demo: deps ## install what is missing, build, run scenarios/demo.opts on 2 ranks
 	$(AGAIN) bin/supple meshes/organ.msh
 	@scripts/venv
 	@scripts/mpi 2 bin/supple scenarios/demo.opts
-	@.venv/bin/python scripts/render out/demo
+	@scripts/render out/demo
+	@scripts/render out/demo --animate out/demo/animation.gif
+	@echo "open out/demo/fields.xmf in ParaView; out/demo/picture.png and animation.gif show the run"
 
 CHECK = tests/run --build $(BUILD) $(if $(T),--match '$(T)')
 check: deps ## install what is missing, build, run the tests (about 20 minutes; one of them: T=name)
