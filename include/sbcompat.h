@@ -63,3 +63,10 @@ typedef const char *SbErrorText;
 #else
   #define SB_LINESEARCH_NONE SNESLINESEARCHNONE
 #endif
+
+/* Whether PETSc calls -ts_dt deprecated, in favour of -ts_time_step; here both names work with every release. */
+#if PETSC_VERSION_LT(3, 26, 0)
+  #define SB_TS_DT_RENAMED 0
+#else
+  #define SB_TS_DT_RENAMED 1
+#endif

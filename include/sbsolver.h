@@ -10,6 +10,7 @@ typedef struct _SbSolverPreset {
   SbMatrixKind matrix;   /* on several ranks SBAIJ becomes BAIJ */
   PetscBool matrix_free; /* a frame operator in place of the matrix */
   const char *options;   /* "-ksp_type cg -pc_type gamg ..." */
+  const char *package;   /* of PETSc's that the row needs; NULL: none */
   PetscErrorCode (*precondition)(SbSpace space,
                                  PC pc); /* a preconditioner of our own; NULL: by the options */
   const char *help;

@@ -10,38 +10,38 @@
 #include "sbsolver.h"
 
 static const SbSolverPreset presets[] = {
-  {"cg", SB_MATRIX_BAIJ, PETSC_FALSE, "-ksp_type cg -pc_type none", NULL,
+  {"cg", SB_MATRIX_BAIJ, PETSC_FALSE, "-ksp_type cg -pc_type none", NULL, NULL,
    "conjugate gradients without preconditioner"},
-  {"cg_jacobi", SB_MATRIX_BAIJ, PETSC_FALSE, "-ksp_type cg -pc_type jacobi", NULL,
+  {"cg_jacobi", SB_MATRIX_BAIJ, PETSC_FALSE, "-ksp_type cg -pc_type jacobi", NULL, NULL,
    "CG, diagonal preconditioner"},
-  {"cg_pbjacobi", SB_MATRIX_BAIJ, PETSC_FALSE, "-ksp_type cg -pc_type pbjacobi", NULL,
+  {"cg_pbjacobi", SB_MATRIX_BAIJ, PETSC_FALSE, "-ksp_type cg -pc_type pbjacobi", NULL, NULL,
    "CG, 3x3 diagonal blocks"},
   {"cg_icc", SB_MATRIX_SBAIJ, PETSC_FALSE,
-   "-ksp_type cg -pc_type bjacobi -sub_pc_type icc -sub_pc_factor_shift_type positive_definite", NULL,
+   "-ksp_type cg -pc_type bjacobi -sub_pc_type icc -sub_pc_factor_shift_type positive_definite", NULL, NULL,
    "CG, incomplete Cholesky on each rank"},
-  {"cg_ssor", SB_MATRIX_AIJ, PETSC_FALSE, "-ksp_type cg -pc_type sor -pc_sor_local_symmetric", NULL,
+  {"cg_ssor", SB_MATRIX_AIJ, PETSC_FALSE, "-ksp_type cg -pc_type sor -pc_sor_local_symmetric", NULL, NULL,
    "CG, symmetric Gauss-Seidel on each rank"},
-  {"cg_two_level", SB_MATRIX_SBAIJ, PETSC_FALSE, "-ksp_type cg", SbPCCoarseCreate,
+  {"cg_two_level", SB_MATRIX_SBAIJ, PETSC_FALSE, "-ksp_type cg", NULL, SbPCCoarseCreate,
    "CG, incomplete Cholesky on each rank and the rigid-body modes of some hundred aggregates of nodes"},
-  {"cg_gamg", SB_MATRIX_AIJ, PETSC_FALSE, "-ksp_type cg -pc_type gamg", NULL,
+  {"cg_gamg", SB_MATRIX_AIJ, PETSC_FALSE, "-ksp_type cg -pc_type gamg", NULL, NULL,
    "CG, algebraic multigrid with the rigid-body modes of each body"},
   {"cg_hypre", SB_MATRIX_AIJ, PETSC_FALSE,
-   "-ksp_type cg -pc_type hypre -pc_hypre_type boomeramg -pc_hypre_boomeramg_strong_threshold 0.5", NULL,
-   "CG, BoomerAMG of hypre"},
+   "-ksp_type cg -pc_type hypre -pc_hypre_type boomeramg -pc_hypre_boomeramg_strong_threshold 0.5", "hypre",
+   NULL, "CG, BoomerAMG of hypre"},
   {"gauss_seidel", SB_MATRIX_AIJ, PETSC_FALSE,
    "-ksp_type richardson -pc_type composite -pc_composite_pcs sor -sub_0_pc_sor_omega 1 -ksp_max_it 100000",
-   NULL, "Gauss-Seidel iteration (between ranks: block Jacobi)"},
+   NULL, NULL, "Gauss-Seidel iteration (between ranks: block Jacobi)"},
   {"sor", SB_MATRIX_AIJ, PETSC_FALSE,
    "-ksp_type richardson -pc_type composite -pc_composite_pcs sor -sub_0_pc_sor_omega 1.6 -ksp_max_it 100000",
-   NULL, "successive over-relaxation, omega 1.6 (between ranks: block Jacobi)"},
+   NULL, NULL, "successive over-relaxation, omega 1.6 (between ranks: block Jacobi)"},
   {"cholmod", SB_MATRIX_AIJ, PETSC_FALSE, "-ksp_type cg -pc_type cholesky -pc_factor_mat_solver_type cholmod",
-   NULL, "sparse Cholesky of SuiteSparse; one rank"},
+   "suitesparse", NULL, "sparse Cholesky of SuiteSparse; one rank"},
   {"mumps", SB_MATRIX_AIJ, PETSC_FALSE, "-ksp_type cg -pc_type cholesky -pc_factor_mat_solver_type mumps",
-   NULL, "sparse factorisation of MUMPS on any number of ranks"},
-  {"rotated", SB_MATRIX_BAIJ, PETSC_FALSE, "-ksp_type cg", SbPCRotatedCreate,
+   "mumps", NULL, "sparse factorisation of MUMPS on any number of ranks"},
+  {"rotated", SB_MATRIX_BAIJ, PETSC_FALSE, "-ksp_type cg", NULL, SbPCRotatedCreate,
    "CG, one factorisation that turns with the nodes and is seldom renewed: dynamic runs of up to about 100k "
    "tets"},
-  {"realtime", SB_MATRIX_BAIJ, PETSC_TRUE, "-ksp_type cg -ksp_initial_guess_nonzero", SbPCRotatedCreate,
+  {"realtime", SB_MATRIX_BAIJ, PETSC_TRUE, "-ksp_type cg -ksp_initial_guess_nonzero", NULL, SbPCRotatedCreate,
    "the same without a matrix, warm-started: linear, or corotated with -body_<name>_tangent warped; fastest "
    "with -snes_type ksponly and -ksp_rtol 1e-4"},
 };
@@ -87,10 +87,12 @@ PetscErrorCode SbSolverChoose(SbSpace s, PetscBool dynamic, PetscBool linear, Pe
 {
   const PetscInt unknowns = 3 * s->Nnode;
   const char *name = choice;
+  PetscBool direct, has = PETSC_TRUE;
   PetscMPIInt nrank;
 
   PetscFunctionBeginUser;
   PetscCallMPI(MPI_Comm_size(s->comm, &nrank));
+  PetscCall(PetscHasExternalPackage(nrank == 1 ? "suitesparse" : "mumps", &direct));
   if (explicit_run) {
     name = "cg";
     PetscCall(PetscSNPrintf(reason, size, "explicit integrator: no linear system"));
@@ -102,7 +104,7 @@ PetscErrorCode SbSolverChoose(SbSpace s, PetscBool dynamic, PetscBool linear, Pe
                             "dynamic, %" PetscInt_FMT
                             " unknowns: one factorisation turns with the nodes and serves many steps",
                             unknowns));
-  } else if (unknowns <= 30000) {
+  } else if (unknowns <= 30000 && direct) {
     name = nrank == 1 ? "cholmod" : "mumps";
     PetscCall(PetscSNPrintf(
       reason, size, "%" PetscInt_FMT " unknowns: a factorisation is fast and holds at any Poisson's ratio",
@@ -118,6 +120,10 @@ PetscErrorCode SbSolverChoose(SbSpace s, PetscBool dynamic, PetscBool linear, Pe
   }
   *preset = find_preset(name);
   PetscCheck(*preset, s->comm, PETSC_ERR_PLIB, "No solver preset %s", name);
+  if ((*preset)->package) PetscCall(PetscHasExternalPackage((*preset)->package, &has));
+  PetscCheck(has, s->comm, PETSC_ERR_USER,
+             "-solver %s needs %s, which this PETSc was built without: choose another solver, or auto",
+             (*preset)->name, (*preset)->package);
   PetscCheck(nrank == 1 || strcmp((*preset)->name, "cholmod"), s->comm, PETSC_ERR_USER,
              "-solver cholmod runs on one rank and there are %d: use mumps", (int)nrank);
   PetscFunctionReturn(PETSC_SUCCESS);

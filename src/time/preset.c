@@ -47,6 +47,19 @@ PetscErrorCode SbTimeRegister(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Both names of the step option work with every PETSc: -ts_time_step is the new one. */
+static PetscErrorCode step_option_names(void)
+{
+  char text[64];
+  PetscBool given, given_new;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscOptionsHasName(NULL, NULL, "-ts_dt", &given));
+  PetscCall(PetscOptionsGetString(NULL, NULL, "-ts_time_step", text, sizeof(text), &given_new));
+  if (given_new && !given) PetscCall(PetscOptionsSetValue(NULL, "-ts_dt", text));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode SbRunCreate(SbModel model, SbRun *run)
 {
   SbRun r;
@@ -61,6 +74,7 @@ PetscErrorCode SbRunCreate(SbModel model, SbRun *run)
   r->preset = (SbTimePreset)preset;
   model->dynamic = (PetscBool)(r->preset != SB_TIME_STATIC);
   if (model->dynamic) {
+    PetscCall(step_option_names());
     PetscCall(SbOptionReal(&scope, "ts_dt", &r->dt));
     PetscCall(SbOptionGiven(&scope, "ts_dt", &r->dt_given));
     PetscCall(SbOptionReal(&scope, "ts_max_time", &r->t_end));
@@ -251,6 +265,8 @@ static PetscErrorCode set_up_ts(SbRun run)
   PetscCall(TSGetSNES(run->ts, &run->snes));
   PetscCall(set_up_snes(run));
   PetscCall(SbSolverSetUp(run->snes, m->space, run->solver_used));
+  /* read already, and set below */
+  if (SB_TS_DT_RENAMED) PetscCall(PetscOptionsClearValue(NULL, "-ts_dt"));
   PetscCall(TSSetFromOptions(run->ts));
   PetscCall(find_search(run));
   PetscCall(forcing_terms(run->snes));

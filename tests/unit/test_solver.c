@@ -29,9 +29,9 @@ static PetscErrorCode tip(const char *options, PetscReal *z, char stop[512], Pet
 
 int main(int argc, char **argv)
 {
-  static const char *const solvers[] = {"auto",    "cg",      "cg_jacobi", "cg_pbjacobi",  "cg_icc",
-                                        "cg_ssor", "cg_two_level", "cg_gamg", "cg_hypre",  "gauss_seidel", "sor",
-                                        "cholmod", "rotated", "realtime"};
+  static const char *const solvers[] = {"auto",    "cg",           "cg_jacobi", "cg_pbjacobi", "cg_icc",
+                                        "cg_ssor", "cg_two_level", "cg_gamg",   "cg_hypre",    "gauss_seidel",
+                                        "sor",     "cholmod",      "rotated",   "realtime"};
   PetscReal z, exact;
   PetscInt iterations;
   PetscMPIInt size;
@@ -42,7 +42,11 @@ int main(int argc, char **argv)
   PetscCall(tip("-solver mumps", &exact, stop, &iterations));
   SB_CHECK(exact < -1e-3 && !stop[0], "mumps: tip at %g, %s", (double)exact, stop);
   for (size_t k = 0; k < PETSC_STATIC_ARRAY_LENGTH(solvers); k++) {
+    PetscBool has = PETSC_TRUE;
+
     if (size > 1 && !strcmp(solvers[k], "cholmod")) continue;
+    if (!strcmp(solvers[k], "cg_hypre")) PetscCall(PetscHasExternalPackage("hypre", &has));
+    if (!has) continue;
     PetscCall(PetscSNPrintf(text, sizeof(text), "-solver %s", solvers[k]));
     PetscCall(tip(text, &z, stop, &iterations));
     SB_CHECK(!stop[0], "%s: %s", solvers[k], stop);
