@@ -21,12 +21,12 @@
 
 /* A named field. compute() fills this rank's owned entities (vertices or cells, in the mesh's local order). */
 typedef struct {
-  const char *name;      /* "von_mises" */
+  const char *name; /* "von_mises" */
   const char *unit;
-  PetscInt    ncomp;     /* 1 scalar, 3 vector, 6 symmetric tensor: xx xy xz yy yz zz, the Tensor6 order of XDMF */
-  PetscBool   cell;      /* per cell, else per vertex */
-  PetscBool   constant;  /* whole numbers, written once with the mesh */
-  PetscBool   dynamic;   /* does not exist in a static run */
+  PetscInt ncomp; /* 1 scalar, 3 vector, 6 symmetric tensor: xx xy xz yy yz zz, the Tensor6 order of XDMF */
+  PetscBool cell; /* per cell, else per vertex */
+  PetscBool constant; /* whole numbers, written once with the mesh */
+  PetscBool dynamic;  /* does not exist in a static run */
   const char *help;
   PetscErrorCode (*compute)(SbRun run, const SbStep *step, PetscReal *values);
 } SbField;

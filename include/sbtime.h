@@ -42,7 +42,7 @@ struct _p_SbRun {
   Mat J;
   Vec U, V, A; /* A: acceleration of the last step, state of the integrator */
   PetscBool dt_given, velocity_predictor, fixed_step, damped;
-  PetscBool may_search; /* Newton may try a failed step again with a line search */
+  PetscBool may_search;                  /* Newton may try a failed step again with a line search */
   PetscReal spectral_radius, newmark[2]; /* newmark: beta, gamma */
   PetscInt max_cuts, static_steps;
   PetscBool tangent_known; /* J holds the tangent for shift_v, shift_a */

@@ -7,12 +7,17 @@
 #define SB_TS_SECOND_ORDER "sb_second_order"
 
 /* The one-step methods of second_order.c. */
-typedef enum { SB_METHOD_EULER_IMPLICIT, SB_METHOD_GENERALIZED_ALPHA, SB_METHOD_EULER_EXPLICIT, SB_METHOD_EULER_SYMPLECTIC } SbMethod;
+typedef enum {
+  SB_METHOD_EULER_IMPLICIT,
+  SB_METHOD_GENERALIZED_ALPHA,
+  SB_METHOD_EULER_EXPLICIT,
+  SB_METHOD_EULER_SYMPLECTIC
+} SbMethod;
 typedef struct {
-  SbMethod  method;
+  SbMethod method;
   PetscReal alpha_m, alpha_f, beta, gamma; /* generalized-alpha; fraction of the new state, as in TSALPHA2 */
   PetscBool velocity_predictor;            /* Newton starts from u + h v instead of u */
-  PetscInt  max_cuts;                      /* how often a step is halved before the run stops */
+  PetscInt max_cuts;                       /* how often a step is halved before the run stops */
 } SbMethodSettings;
 
 PetscErrorCode SbSecondOrderRegister(void);
@@ -20,9 +25,11 @@ PetscErrorCode SbSecondOrderRegister(void);
 PetscErrorCode SbSecondOrderSet(TS ts, SbRun run, const SbMethodSettings *settings);
 
 /* hooks.c: what happens around a step. */
-PetscErrorCode SbRunStepBegin(SbRun run, PetscReal t, PetscReal dt);                            /* before an attempt */
-PetscErrorCode SbRunStepAccepted(SbRun run, PetscInt step, PetscReal t, PetscReal dt, PetscBool last); /* after it was accepted; also once at the start */
-PetscErrorCode SbRunSearch(SbRun run, PetscBool on); /* preset.c: Newton with a line search, or with full steps */
+PetscErrorCode SbRunStepBegin(SbRun run, PetscReal t, PetscReal dt); /* before an attempt */
+PetscErrorCode SbRunStepAccepted(SbRun run, PetscInt step, PetscReal t, PetscReal dt,
+                                 PetscBool last); /* after it was accepted; also once at the start */
+PetscErrorCode SbRunSearch(SbRun run,
+                           PetscBool on); /* preset.c: Newton with a line search, or with full steps */
 /* Whether Newton's method, which failed with full steps, should be tried with a line search. */
 static inline PetscBool SbRunWorthSearch(SbRun run, SNESConvergedReason reason)
 {
@@ -32,7 +39,8 @@ PetscErrorCode SbRunFail(SbRun run, const char *format, ...) __attribute__((form
 
 /* form.c: the model as PETSc sees it. */
 PetscErrorCode SbFormI2Function(TS ts, PetscReal t, Vec U, Vec V, Vec A, Vec F, void *run);
-PetscErrorCode SbFormI2Jacobian(TS ts, PetscReal t, Vec U, Vec V, Vec A, PetscReal shift_v, PetscReal shift_a, Mat J, Mat P, void *run);
+PetscErrorCode SbFormI2Jacobian(TS ts, PetscReal t, Vec U, Vec V, Vec A, PetscReal shift_v, PetscReal shift_a,
+                                Mat J, Mat P, void *run);
 PetscErrorCode SbFormStaticFunction(SNES snes, Vec U, Vec F, void *run);
 PetscErrorCode SbFormStaticJacobian(SNES snes, Vec U, Mat J, Mat P, void *run);
 /* A = M^-1 (f_ext - C V - f_int), zero on prescribed unknowns. */
