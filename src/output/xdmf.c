@@ -101,7 +101,7 @@ PetscErrorCode SbXdmfAdd(SbXdmf x, PetscReal time, const char *group, PetscInt n
   for (PetscInt i = 0; i < n; i++) {
     const SbField *f = field[i];
     const char *type = f->ncomp == 1 ? "Scalar" : f->ncomp == 3 ? "Vector" : "Tensor6";
-    char components[8] = "";
+    char components[16] = "";
 
     if (f->ncomp > 1) (void)snprintf(components, sizeof(components), " %d", (int)f->ncomp);
     PetscCall(append(x,

@@ -102,6 +102,9 @@ static void test_due(void)
   PetscInt n = 0;
   PetscReal t = 0.;
 
+  // a step that ends at the multiple but for rounding has reached it; the next one has not
+  SB_CHECK(SbOutputDue(0.1, 0.3 * (1. - 1e-13), 0.01), "0.3 s less a rounding is not due");
+  SB_CHECK(!SbOutputDue(0.1, 0.3 * (1. - 1e-13) + 0.01, 0.01), "0.3 s is due twice");
   // a million steps, times summed up with their rounding: due 100 times
   for (PetscInt k = 1; k <= 1000000; k++) {
     t += 1e-4;

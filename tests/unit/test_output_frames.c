@@ -221,7 +221,7 @@ static PetscErrorCode test_which_frames(void)
   } cases[] = {
     {"", 0.1, "11111111111"},
     {"-output_every_steps 4", 0.1, "10001000101"}, // the last step always
-    {"-output_every 0.3", 0.1, "10010010011"},     // 3 * 0.1 is above 0.3 by rounding, 6 * 0.1 below 0.6
+    {"-output_every 0.3", 0.1, "10010010011"},     // 3 * 0.1 is above 0.3 by rounding
     {"-output_every 0.25", 0.1, "10010100101"},    // the first step at or after each multiple
     {"-output_every 0.01", 0.1, "11111111111"},    // shorter than a step: every step, once
   };
