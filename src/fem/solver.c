@@ -36,7 +36,7 @@ static const SbSolverPreset presets[] = {
    NULL, NULL, "successive over-relaxation, omega 1.6 (between ranks: block Jacobi)"},
   {"cholmod", SB_MATRIX_AIJ, PETSC_FALSE, "-ksp_type cg -pc_type cholesky -pc_factor_mat_solver_type cholmod",
    "suitesparse", NULL, "sparse Cholesky of SuiteSparse; one rank"},
-  {"mumps", SB_MATRIX_AIJ, PETSC_FALSE, "-ksp_type cg -pc_type cholesky -pc_factor_mat_solver_type mumps",
+  {"mumps", SB_MATRIX_AIJ, PETSC_FALSE, "-ksp_type fgmres -pc_type cholesky -pc_factor_mat_solver_type mumps",
    "mumps", NULL, "sparse factorisation of MUMPS on any number of ranks"},
   {"rotated", SB_MATRIX_BAIJ, PETSC_FALSE, "-ksp_type cg", NULL, SbPCRotatedCreate,
    "CG, one factorisation that turns with the nodes and is seldom renewed: dynamic runs of up to about 100k "
@@ -82,17 +82,32 @@ static const SbSolverPreset *find_preset(const char *name)
   return NULL;
 }
 
+/* Whether some law hands out its exact tangent, which is indefinite in compression: CHOLMOD ends the program there. */
+static PetscErrorCode may_be_indefinite(SbSpace s, PetscBool *maybe)
+{
+  PetscFunctionBeginUser;
+  *maybe = PETSC_FALSE;
+  for (PetscInt r = 0; r < s->nregion; r++) {
+    const SbMaterial m = s->region[r].material;
+
+    if (!m->linear && m->tangent == SB_TANGENT_EXACT) *maybe = PETSC_TRUE;
+  }
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, maybe, 1, SB_MPI_BOOL, MPI_LOR, s->comm));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode SbSolverChoose(SbSpace s, PetscBool dynamic, PetscBool linear, PetscBool explicit_run,
                               const char *choice, const SbSolverPreset **preset, char reason[], size_t size)
 {
   const PetscInt unknowns = 3 * s->Nnode;
   const char *name = choice;
-  PetscBool direct, has = PETSC_TRUE;
+  PetscBool direct, indefinite, has = PETSC_TRUE;
   PetscMPIInt nrank;
 
   PetscFunctionBeginUser;
   PetscCallMPI(MPI_Comm_size(s->comm, &nrank));
-  PetscCall(PetscHasExternalPackage(nrank == 1 ? "suitesparse" : "mumps", &direct));
+  PetscCall(may_be_indefinite(s, &indefinite));
+  PetscCall(PetscHasExternalPackage(nrank == 1 && !indefinite ? "suitesparse" : "mumps", &direct));
   if (explicit_run) {
     name = "cg";
     PetscCall(PetscSNPrintf(reason, size, "explicit integrator: no linear system"));
@@ -105,10 +120,10 @@ PetscErrorCode SbSolverChoose(SbSpace s, PetscBool dynamic, PetscBool linear, Pe
                             " unknowns: one factorisation turns with the nodes and serves many steps",
                             unknowns));
   } else if (unknowns <= 30000 && direct) {
-    name = nrank == 1 ? "cholmod" : "mumps";
+    name = nrank == 1 && !indefinite ? "cholmod" : "mumps";
     PetscCall(PetscSNPrintf(
-      reason, size, "%" PetscInt_FMT " unknowns: a factorisation is fast and holds at any Poisson's ratio",
-      unknowns));
+      reason, size, "%" PetscInt_FMT " unknowns: a factorisation is fast and holds at any Poisson's ratio%s",
+      unknowns, indefinite ? "; the exact tangent may be indefinite" : ""));
   } else {
     /* 192k tets, CPU s of one rank. Static: 0.36 (cg_gamg 1.7, cg_icc 1.4), at nu 0.45 0.7 (2.3), at 0.499 4.2 (18); dynamic, h = 0.01 s: 0.22 (1.7, 0.40) */
     name = "cg_two_level";

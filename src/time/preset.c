@@ -315,6 +315,7 @@ PetscErrorCode SbRunSetUp(SbRun run)
     PetscCall(SbSpaceCreateVec(m->space, &run->V));
     if (run->preset != SB_TIME_ALPHA2) PetscCall(SbSpaceCreateVec(m->space, &run->A));
   }
+  if (!m->dynamic) m->load = run->t0; /* a static run begins without loads and prescribed displacements */
   PetscCall(SbModelInitialState(m, run->U, run->V));
   PetscCall(SbSolverChoose(m->space, m->dynamic, m->linear, explicit, run->solver_choice, &run->solver_used,
                            run->solver_reason, sizeof(run->solver_reason)));

@@ -76,7 +76,7 @@ static PetscErrorCode check_csm(const char *what, PetscReal mu, PetscReal ux, Pe
                     "-body_a_density 1000 -sets front,back -set_front_at sphere:0.2,0.2,0,0.05 "
                     "-set_back_at sphere:0.2,0.2,%.17g,0.05 -effects root,plane,gravity "
                     "-effect_root_type support -effect_root_on front,back -effect_gravity_vector 0,-2,0 "
-                    "-solver mumps -ksp_type gmres ",
+                    " ",
                     (double)(2.8 * mu), thickness));
     PetscCall(solve(what, n, beam, text, tip, u[k]));
   }
