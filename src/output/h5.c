@@ -48,18 +48,24 @@ static herr_t take_message(unsigned n, const H5E_error2_t *error, void *ctx)
   return 0;
 }
 
-/* Ends the run on all ranks when a call failed on one of them. Collective. */
-static PetscErrorCode agree(SbH5 *h, PetscBool bad)
+/* Keeps why a call failed on this rank, the first time. */
+static void note(SbH5 *h, PetscBool bad)
 {
-  char reason[160] = "the reason is unknown", message[SB_MESSAGE_MAX] = "";
+  if (!bad || h->reason[0]) return;
+  SbFormat(sizeof(h->reason), h->reason, "the reason is unknown");
+  (void)H5Ewalk2(H5E_DEFAULT, H5E_WALK_UPWARD, take_message, h->reason);
+}
+
+/* Ends the run on all ranks when a call has failed on one of them. Collective. */
+static PetscErrorCode agree(SbH5 *h)
+{
+  char message[SB_MESSAGE_MAX] = "";
   PetscErrorCode ierr;
 
   PetscFunctionBeginUser;
-  if (bad) {
-    (void)H5Ewalk2(H5E_DEFAULT, H5E_WALK_UPWARD, take_message, reason);
+  if (h->reason[0])
     SbFormat(sizeof(message), message, "cannot write %" PetscInt64_FMT " bytes to %s: HDF5 says '%s'",
-             h->bytes, h->path, reason);
-  }
+             h->bytes, h->path, h->reason);
   ierr = SbAgree(h->comm, PETSC_ERR_FILE_WRITE, message);
   if (ierr) spare_the_end(h);
   PetscCall(ierr);
@@ -67,9 +73,12 @@ static PetscErrorCode agree(SbH5 *h, PetscBool bad)
 }
 
 /* A call that changes metadata: it needs no communication and fails on all ranks alike. */
-#define H5_CALL(h, call)                             \
-  do {                                               \
-    if ((call) < 0) PetscCall(agree(h, PETSC_TRUE)); \
+#define H5_CALL(h, call)   \
+  do {                     \
+    if ((call) < 0) {      \
+      note(h, PETSC_TRUE); \
+      PetscCall(agree(h)); \
+    }                      \
   } while (0)
 
 static hid_t access_list(MPI_Comm comm)
@@ -92,6 +101,7 @@ PetscErrorCode SbH5Create(MPI_Comm comm, const char *path, SbH5 *h)
   h->comm = comm;
   h->bytes = 0;
   h->failed = PETSC_FALSE;
+  h->reason[0] = 0;
   PetscCall(PetscStrncpy(h->path, path, sizeof(h->path)));
   list = access_list(comm);
   h->file = H5Fcreate(path, H5F_ACC_TRUNC, H5P_DEFAULT, list);
@@ -109,6 +119,7 @@ PetscErrorCode SbH5Open(MPI_Comm comm, const char *path, PetscBool writable, SbH
   h->comm = comm;
   h->bytes = 0;
   h->failed = PETSC_FALSE;
+  h->reason[0] = 0;
   PetscCall(PetscStrncpy(h->path, path, sizeof(h->path)));
   list = access_list(comm);
   h->file = H5Fopen(path, writable ? H5F_ACC_RDWR : H5F_ACC_RDONLY, list);
@@ -137,7 +148,8 @@ PetscErrorCode SbH5Close(SbH5 *h)
 PetscErrorCode SbH5Flush(SbH5 *h)
 {
   PetscFunctionBeginUser;
-  PetscCall(agree(h, (PetscBool)(H5Fflush(h->file, H5F_SCOPE_GLOBAL) < 0)));
+  note(h, (PetscBool)(H5Fflush(h->file, H5F_SCOPE_GLOBAL) < 0));
+  PetscCall(agree(h));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -206,7 +218,6 @@ PetscErrorCode SbH5WriteSlice(SbH5 *h, hid_t where, const char *name, const char
 {
   const hid_t create = H5Pcreate(H5P_DATASET_CREATE), transfer = collective_list();
   hid_t filespace, memspace, dataset;
-  PetscBool bad;
 
   PetscFunctionBeginUser;
   (void)H5Pset_fill_time(create, H5D_FILL_TIME_NEVER);
@@ -215,13 +226,12 @@ PetscErrorCode SbH5WriteSlice(SbH5 *h, hid_t where, const char *name, const char
   dataset = H5Dcreate2(where, name, filetype, filespace, H5P_DEFAULT, create, H5P_DEFAULT);
   H5_CALL(h, dataset);
   PetscCall(SbH5PutText(h, dataset, "unit", unit));
-  bad = (PetscBool)(H5Dwrite(dataset, memtype, memspace, filespace, transfer, slice) < 0);
+  note(h, (PetscBool)(H5Dwrite(dataset, memtype, memspace, filespace, transfer, slice) < 0));
   (void)H5Dclose(dataset);
   (void)H5Sclose(filespace);
   (void)H5Sclose(memspace);
   (void)H5Pclose(create);
   (void)H5Pclose(transfer);
-  PetscCall(agree(h, bad));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -340,18 +350,16 @@ PetscErrorCode SbH5WriteText(SbH5 *h, hid_t where, const char *name, const char 
 {
   const hid_t type = H5Tcopy(H5T_C_S1), space = H5Screate(H5S_SCALAR), transfer = collective_list();
   hid_t dataset;
-  PetscBool bad;
 
   PetscFunctionBeginUser;
   (void)H5Tset_size(type, strlen(text) + 1);
   dataset = H5Dcreate2(where, name, type, space, H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT);
   H5_CALL(h, dataset);
-  bad = (PetscBool)(H5Dwrite(dataset, type, H5S_ALL, H5S_ALL, transfer, text) < 0);
+  note(h, (PetscBool)(H5Dwrite(dataset, type, H5S_ALL, H5S_ALL, transfer, text) < 0));
   (void)H5Dclose(dataset);
   (void)H5Sclose(space);
   (void)H5Tclose(type);
   (void)H5Pclose(transfer);
-  PetscCall(agree(h, bad));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -38,7 +38,8 @@ typedef struct {
   MPI_Comm comm;
   hid_t file;       /* negative when closed */
   PetscInt64 bytes; /* of what is being written, for messages */
-  PetscBool failed; /* a write failed */
+  PetscBool failed; /* a write failed, and all ranks know */
+  char reason[160]; /* why a write failed on this rank; the next flush tells the others */
   char path[PETSC_MAX_PATH_LEN];
 } SbH5;
 
@@ -47,7 +48,8 @@ PetscErrorCode SbH5Create(MPI_Comm comm, const char *path, SbH5 *h);
 PetscErrorCode SbH5Open(MPI_Comm comm, const char *path, PetscBool writable, SbH5 *h,
                         PetscBool *ok); /* no error: see ok */
 PetscErrorCode SbH5Close(SbH5 *h);
-/* Brings everything to disk; returns when every rank has written. Collective. */
+/* Brings everything to disk; returns when every rank has written. What failed since the last flush ends the run here.
+   Collective. */
 PetscErrorCode SbH5Flush(SbH5 *h);
 /* A dataset [order->N][ncomp] of `filetype` below `where` out of slices of `memtype`, with its unit. Collective. */
 PetscErrorCode SbH5WriteSlice(SbH5 *h, hid_t where, const char *name, const char *unit, const SbOrder *order,

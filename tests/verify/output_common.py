@@ -1,7 +1,4 @@
-"""What the scripts on the output share: a small scenario that writes much, and a reader of its results.
-
-Not a test by itself: running it checks nothing and succeeds.
-"""
+"""What the scripts on the output share: a small scenario that writes much, and a reader of its results."""
 import os
 import shlex
 import subprocess
@@ -12,8 +9,9 @@ from pathlib import Path
 import h5py
 import numpy
 
-SUPPLE = os.environ.get("SB_SUPPLE", "bin/supple")
-MPI = shlex.split(os.environ.get("SB_MPI", "scripts/mpi"))
+SUPPLE = str(Path(os.environ.get("SB_SUPPLE", "bin/supple")).resolve())
+LAUNCHER, *FLAGS = shlex.split(os.environ.get("SB_MPI", "scripts/mpi"))
+MPI = [str(Path(LAUNCHER).resolve()) if "/" in LAUNCHER else LAUNCHER, *FLAGS]
 OUT = Path(os.environ.get("SB_OUT", "build/test-out/output")).resolve()
 
 # A bar that swings: cheap steps, each of them a frame.

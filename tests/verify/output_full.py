@@ -64,7 +64,7 @@ def check_default_folder():
     """Without -output_dir: out/<scenario>; the second run says that it replaces the first, and leaves other files."""
     path = scenario().resolve()
     shutil.rmtree(OUT / "out", ignore_errors=True)
-    args = [*MPI, "1", os.path.abspath(SUPPLE), str(path), "-ts_max_time", "0.01"]
+    args = [*MPI, "1", SUPPLE, str(path), "-ts_max_time", "0.01"]
     for again in (False, True):
         text = subprocess.run(args, cwd=OUT, capture_output=True, text=True, timeout=100, check=True).stdout
         if ("results of an earlier run are replaced" in text) != again:
