@@ -109,7 +109,8 @@ PetscErrorCode SbSpaceStrainEnergy(SbSpace space, const PetscReal u[], PetscReal
                                    PetscInt *ninverted, PetscReal *volume);
 /* v . C v of owned cells, W. Local: reduce it. */
 PetscErrorCode SbSpaceDampingPower(SbSpace space, const PetscReal u[], const PetscReal v[], PetscReal *power);
-/* Largest stable step of an explicit run: min over cells of smallest altitude / wave speed, s. Collective. */
+/* Largest stable step of an explicit run at rest, with its damping, s; a few percent too large at most. Collective, after
+   SbSpaceFixDone(). */
 PetscErrorCode SbSpaceStableStep(SbSpace space, PetscReal *dt);
 
 /* Nodes with weights of a boundary facet: for P1 its three vertices. face = 0..3, opposite local vertex `face`. */

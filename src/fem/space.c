@@ -373,35 +373,3 @@ PetscErrorCode SbSpaceGetSetFacets(SbSpace s, PetscInt k, PetscInt *n, SbFacet *
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
-
-PetscErrorCode SbSpaceStableStep(SbSpace s, PetscReal *dt)
-{
-  PetscReal mine = PETSC_MAX_REAL;
-
-  PetscFunctionBeginUser;
-  for (PetscInt r = 0; r < s->nregion; r++) {
-    const PetscReal c = SbMaterialWaveSpeed(s->region[r].material);
-
-    for (PetscInt b = s->region[r].bstart; b < s->region[r].bend; b++) {
-      for (PetscInt l = 0; l < s->batch_n[b]; l++) {
-        const SbLane *g = s->batch_g + 9 * b;
-        PetscReal sum[3] = {0., 0., 0.}, largest = 0.;
-
-        /* the altitude over node a is 1 / |grad phi_a| */
-        for (PetscInt a = 0; a < 3; a++) {
-          PetscReal g2 = 0.;
-
-          for (PetscInt j = 0; j < 3; j++) {
-            g2 += g[3 * a + j][l] * g[3 * a + j][l];
-            sum[j] += g[3 * a + j][l];
-          }
-          largest = PetscMax(largest, g2);
-        }
-        largest = PetscMax(largest, sum[0] * sum[0] + sum[1] * sum[1] + sum[2] * sum[2]);
-        mine = PetscMin(mine, 1. / (PetscSqrtReal(largest) * c));
-      }
-    }
-  }
-  PetscCallMPI(MPI_Allreduce(&mine, dt, 1, MPIU_REAL, MPI_MIN, s->comm));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}

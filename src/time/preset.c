@@ -229,6 +229,34 @@ static PetscErrorCode explicit_step(SbRun run)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Twice the largest distance of a node from the middle of its body, m: like the length, but of no direction. */
+static PetscErrorCode largest_body(SbModel m, PetscReal *size)
+{
+  SbSpace s = m->space;
+  PetscReal(*middle)[4], far = 0.;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscCalloc1(m->nbody, &middle));
+  for (PetscInt i = 0; i < s->nnode_owned; i++) {
+    PetscReal *c = middle[m->mesh->vert_body[i]];
+
+    for (PetscInt k = 0; k < 3; k++) c[k] += s->node_mass[i] * s->node_x[3 * i + k];
+    c[3] += s->node_mass[i];
+  }
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, middle, (PetscMPIInt)(4 * m->nbody), MPIU_REAL, MPI_SUM, m->comm));
+  for (PetscInt i = 0; i < s->nnode_owned; i++) {
+    const PetscReal *c = middle[m->mesh->vert_body[i]];
+    PetscReal square = 0.;
+
+    for (PetscInt k = 0; k < 3; k++) square += PetscSqr(s->node_x[3 * i + k] - c[k] / c[3]);
+    far = PetscMax(far, square);
+  }
+  PetscCall(PetscFree(middle));
+  PetscCallMPI(MPI_Allreduce(&far, size, 1, MPIU_REAL, MPI_MAX, m->comm));
+  *size = 2. * PetscSqrtReal(*size);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 static PetscErrorCode set_up_ts(SbRun run)
 {
   SbModel m = run->model;
@@ -254,10 +282,8 @@ static PetscErrorCode set_up_ts(SbRun run)
     PetscCall(TSSetType(run->ts, SB_TS_SECOND_ORDER));
   PetscCall(TSGetAdapt(run->ts, &adapt));
   PetscCall(TSAdaptSetType(adapt, TSADAPTNONE));
-  /* displacement error per step that adaptive runs allow, relative to the size of the scene: unit-free */
-  for (PetscInt b = 0; b < m->nbody; b++) {
-    for (PetscInt i = 0; i < 3; i++) size = PetscMax(size, m->body[b].bbox[3 + i] - m->body[b].bbox[i]);
-  }
+  /* displacement error per step that adaptive runs allow, relative to the size of the bodies: unit-free */
+  PetscCall(largest_body(m, &size));
   PetscCall(TSSetTolerances(run->ts, 1e-4 * size, NULL, 0., NULL));
   PetscCall(TSSetMaxSteps(run->ts, PETSC_MAX_INT));
   PetscCall(TSSetExactFinalTime(run->ts, TS_EXACTFINALTIME_MATCHSTEP));

@@ -96,6 +96,37 @@ static inline PetscErrorCode verify_mesh_remove(const char path[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A vector of the run by original vertex number on every rank, [Nvert][3]; the caller frees it with PetscFree(). */
+static inline PetscErrorCode verify_gather(SbModel m, Vec U, PetscReal **value)
+{
+  const SbMesh mesh = m->mesh;
+  const PetscScalar *u;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscCalloc1(3 * mesh->Nvert, value));
+  PetscCall(VecGetArrayRead(U, &u));
+  for (PetscInt i = 0; i < mesh->nvert_owned; i++) {
+    for (int k = 0; k < 3; k++) (*value)[3 * mesh->vert_orig[i] + k] = u[3 * i + k];
+  }
+  PetscCall(VecRestoreArrayRead(U, &u));
+  PetscCallMPI(
+    MPI_Allreduce(MPI_IN_PLACE, *value, (PetscMPIInt)(3 * mesh->Nvert), MPIU_REAL, MPI_SUM, m->comm));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Largest difference of two arrays, relative to the largest value of the first. */
+static inline PetscReal verify_difference(PetscInt n, const PetscReal a[], const PetscReal b[])
+{
+  PetscReal size = 0., difference = 0.;
+
+  for (PetscInt i = 0; i < n; i++) {
+    size = PetscMax(size, PetscAbsReal(a[i]));
+    difference = PetscMax(difference, PetscAbsReal(a[i] - b[i]));
+    if (PetscIsInfOrNanReal(b[i])) return PETSC_MAX_REAL;
+  }
+  return difference / size;
+}
+
 /* Rotation by an angle (rad) about an axis, row by row (Rodrigues). */
 static inline void verify_rotation(const PetscReal axis[3], PetscReal angle, PetscReal R[9])
 {

@@ -1,0 +1,154 @@
+// @ranks 1 2
+/*
+  Nothing depends on the units or on the directions of the axes: a scene in m, kg, s is run again in mm, g, ms, with all
+  lengths times 1e-6 and times 1e3 (density and stiffness kept, so times go with lengths), with stiffness and density times
+  1e-9 and 1e9, and turned by 37 degrees about (1,2,3). The displacements, in the units of the first, agree to 1e-8 of the
+  largest (turned: 1e-9). Tolerances, initial guesses, step control and the choice of the explicit step are the
+  program's own: none of them may have a unit or a direction. Newton's tolerance alone is made smaller: the preconditioner
+  works in single precision, and what it leaves in the answer has a direction.
+*/
+#include "verify.h"
+
+/* How many new units one m, kg, s is; angle of the turn, rad. */
+typedef struct {
+  const char *what;
+  PetscReal m, kg, s, angle, tolerance;
+} Units;
+
+static const PetscReal axis[3] = {1., 2., 3.};
+
+static PetscErrorCode add(char text[], const char *format, ...)
+{
+  const size_t n = strlen(text);
+  va_list args;
+
+  PetscFunctionBeginUser;
+  va_start(args, format);
+  SB_CHECK((size_t)vsnprintf(text + n, VERIFY_TEXT - n, format, args) < VERIFY_TEXT - n,
+           "scenario is too long");
+  va_end(args);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Two bars, one of them flying, all kinds of loads. */
+static PetscErrorCode scenario(const char *law, const char *time, PetscReal seconds, const Units *q,
+                               char text[])
+{
+  const double m = q->m, s = q->s, pa = q->kg / (m * s * s), rho = q->kg / (m * m * m);
+  PetscReal R[9], g[3], pull[3], v[3], spin[3];
+
+  PetscFunctionBeginUser;
+  verify_rotation(axis, q->angle, R);
+  verify_apply(R, (const PetscReal[3]){1., 0.5, -9.81}, g);
+  verify_apply(R, (const PetscReal[3]){500., 0., 200.}, pull);
+  verify_apply(R, (const PetscReal[3]){0.5, 0.2, 0.}, v);
+  verify_apply(R, (const PetscReal[3]){1., 2., 4.}, spin);
+  text[0] = 0;
+  PetscCall(
+    add(text,
+        "-bodies bar%s -body_bar_mesh box:%.17g,%.17g,%.17g:2 -body_bar_material %s -body_bar_young %.17g "
+        "-body_bar_poisson 0.4 -body_bar_density %.17g -body_bar_rotate 1,2,3,%.17g",
+        strstr(time, "static") ? "" : ",block", 0.4 * m, 0.1 * m, 0.1 * m, law, 1e5 * pa, 1e3 * rho,
+        q->angle * 180. / PETSC_PI));
+  if (!strstr(time, "static")) {
+    PetscReal at[3];
+
+    verify_apply(R, (const PetscReal[3]){0., 0.3, 0.1}, at);
+    PetscCall(add(text,
+                  " -body_block_mesh box:%.17g,%.17g,%.17g:1 -body_block_material %s -body_block_young %.17g "
+                  "-body_block_poisson 0.3 -body_block_density %.17g -body_block_rotate 1,2,3,%.17g",
+                  0.2 * m, 0.1 * m, 0.1 * m, law, 2e5 * pa, 5e2 * rho, q->angle * 180. / PETSC_PI));
+    PetscCall(add(text,
+                  " -body_block_translate %.17g,%.17g,%.17g -body_block_velocity %.17g,%.17g,%.17g "
+                  "-body_block_spin %.17g,%.17g,%.17g",
+                  at[0] * m, at[1] * m, at[2] * m, v[0] * m / s, v[1] * m / s, v[2] * m / s, spin[0] / s,
+                  spin[1] / s, spin[2] / s));
+    PetscCall(add(text, " -effect_damping_alpha %.17g -effect_damping_beta %.17g -ts_max_time %.17g", 0.5 / s,
+                  1e-3 * s, seconds * s));
+    if (strstr(time, "euler_symplectic") == NULL) PetscCall(add(text, " -ts_dt %.17g", 0.01 * s));
+  }
+  PetscCall(
+    add(text,
+        " -effects clamp,gravity,pull,air%s -effect_clamp_type support -effect_clamp_on bar.xmin "
+        "-effect_gravity_vector %.17g,%.17g,%.17g -effect_pull_type traction -effect_pull_on bar.xmax "
+        "-effect_pull_vector %.17g;%.17g;%.17g -effect_air_type pressure -effect_air_on bar.zmax "
+        "-effect_air_value %.17g %s",
+        strstr(time, "static") ? "" : ",damping", g[0] * m / (s * s), g[1] * m / (s * s), g[2] * m / (s * s),
+        pull[0] * pa, pull[1] * pa, pull[2] * pa, 100. * pa, time));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Displacements in m and turned back. */
+static PetscErrorCode solve(const char *law, const char *time, PetscReal seconds, const Units *q, PetscInt *n,
+                            PetscReal **u, PetscInt *steps)
+{
+  TestScene t;
+  PetscReal R[9];
+  char text[VERIFY_TEXT];
+
+  PetscFunctionBeginUser;
+  PetscCall(scenario(law, time, seconds, q, text));
+  PetscCall(test_scene_open(text, &t));
+  PetscCall(verify_solve(&t, q->what));
+  *steps = t.run->steps_total;
+  *n = t.model->mesh->Nvert;
+  PetscCall(verify_gather(t.model, t.run->U, u));
+  verify_rotation(axis, -q->angle, R);
+  for (PetscInt i = 0; i < *n; i++) {
+    PetscReal x[3];
+
+    verify_apply(R, *u + 3 * i, x);
+    for (int k = 0; k < 3; k++) (*u)[3 * i + k] = x[k] / q->m;
+  }
+  PetscCall(test_scene_close(&t));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode check(const char *law, const char *time, PetscReal seconds)
+{
+  static const Units units[] = {
+    {"m, kg, s", 1., 1., 1., 0., 0.},
+    {"mm, g, ms", 1e3, 1e3, 1e3, 0., 1e-8},
+    {"lengths 1e-6", 1e-6, 1e-18, 1e-6, 0., 1e-8},
+    {"lengths 1e3", 1e3, 1e9, 1e3, 0., 1e-8},
+    {"mass 1e-9", 1., 1e-9, 1., 0., 1e-8},
+    {"mass 1e9", 1., 1e9, 1., 0., 1e-8},
+    {"turned", 1., 1., 1., 37. * PETSC_PI / 180., 1e-9},
+  };
+  PetscReal *first = NULL, *u;
+  PetscInt n, first_steps = 0, steps;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscPrintf(PETSC_COMM_WORLD, "  %s, %s:", law, time));
+  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(units); i++) {
+    PetscCall(solve(law, time, seconds, &units[i], &n, &u, &steps));
+    if (!first) {
+      first = u;
+      first_steps = steps;
+      PetscCall(PetscPrintf(PETSC_COMM_WORLD, " %d steps", (int)steps));
+      continue;
+    }
+    const PetscReal difference = verify_difference(3 * n, first, u);
+    PetscCall(PetscPrintf(PETSC_COMM_WORLD, "; %s %.1e", units[i].what, (double)difference));
+    SB_CHECK(steps == first_steps, "%s, %s, %s: %d steps instead of %d", law, time, units[i].what, (int)steps,
+             (int)first_steps);
+    SB_CHECK(difference <= units[i].tolerance, "%s, %s, %s: %g", law, time, units[i].what,
+             (double)difference);
+    PetscCall(PetscFree(u));
+  }
+  PetscCall(PetscPrintf(PETSC_COMM_WORLD, "\n"));
+  PetscCall(PetscFree(first));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+int main(int argc, char **argv)
+{
+  SB_TEST_BEGIN(argc, argv);
+  PetscCall(check("linear", "-time static", 0.));
+  PetscCall(check("neohookean", "-time static", 0.));
+  PetscCall(check("corotated", "-time newmark -snes_rtol 1e-8", 0.3));
+  PetscCall(check("stvk", "-time genalpha -snes_rtol 1e-8", 0.3));
+  PetscCall(check("corotated", "-time newmark -ts_adapt_type basic -snes_rtol 1e-8", 0.3));
+  PetscCall(check("neohookean", "-time euler_symplectic", 0.1));
+  SB_TEST_END();
+}
