@@ -1,0 +1,140 @@
+// @ranks 2 3 4
+/*
+  The same scene on one rank and on all of them: every rank runs it alone and then all run it together. Displacements,
+  velocities (by original vertex number) and scalars of the last state must agree.
+
+  Tolerances, of the largest value: 1e-10 where the linear system is solved directly or not at all; 1e-8 where Newton ends at
+  1e-9 of its first residual, which is what the solvers of different rank counts may differ by.
+*/
+#include "verify.h"
+
+typedef struct {
+  PetscInt n, steps;
+  PetscReal *u, *v; /* [n][3], v is NULL in a static run */
+  SbEnergies e;
+} State;
+
+static PetscErrorCode solve(MPI_Comm comm, const char *options, State *state)
+{
+  TestScene t;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscOptionsClear(NULL));
+  PetscCall(SbOptionsReset());
+  PetscCall(SbRegisterAll());
+  PetscCall(PetscOptionsInsertString(NULL, options));
+  PetscCall(SbSceneCreate(comm, &t.model));
+  PetscCall(SbRunCreate(t.model, &t.run));
+  PetscCall(SbModelSetUp(t.model));
+  PetscCall(SbRunSetUp(t.run));
+  PetscCall(SbMeshValidate(t.model->mesh));
+  PetscCall(SbSpaceValidate(t.model->space));
+  t.run->want_energies = PETSC_TRUE;
+  PetscCall(verify_solve(&t, options));
+  *state = (State){.n = t.model->mesh->Nvert, .steps = t.run->steps_total, .e = t.run->energies};
+  PetscCall(verify_gather(t.model, t.run->U, &state->u));
+  if (t.run->V) PetscCall(verify_gather(t.model, t.run->V, &state->v));
+  PetscCall(test_scene_close(&t));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode destroy(State *state)
+{
+  PetscFunctionBeginUser;
+  PetscCall(PetscFree(state->u));
+  PetscCall(PetscFree(state->v));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Largest difference of energies, momenta and volume, each relative to the largest of its kind. */
+static PetscReal scalars(const SbEnergies *a, const SbEnergies *b)
+{
+  const PetscReal ea[6] = {a->kinetic,    a->strain,       a->load_work,
+                           a->drive_work, a->damping_loss, a->integrator_loss};
+  const PetscReal eb[6] = {b->kinetic,    b->strain,       b->load_work,
+                           b->drive_work, b->damping_loss, b->integrator_loss};
+  PetscReal d = verify_difference(6, ea, eb);
+
+  d = PetscMax(d, verify_difference(3, a->centre, b->centre));
+  d = PetscMax(d, verify_difference(1, &a->volume, &b->volume));
+  d = PetscMax(d, verify_difference(1, &a->min_J, &b->min_J));
+  if (a->kinetic > 0.) {
+    d = PetscMax(d, verify_difference(3, a->momentum, b->momentum));
+    d = PetscMax(d, verify_difference(3, a->angular, b->angular));
+  }
+  return d;
+}
+
+static PetscErrorCode check(const char *what, PetscReal tolerance, const char *options)
+{
+  State alone, together;
+  PetscReal du, dv = 0., de;
+
+  PetscFunctionBeginUser;
+  PetscCall(solve(PETSC_COMM_SELF, options, &alone));
+  PetscCall(solve(PETSC_COMM_WORLD, options, &together));
+  du = verify_difference(3 * alone.n, alone.u, together.u);
+  if (alone.v) dv = verify_difference(3 * alone.n, alone.v, together.v);
+  de = scalars(&alone.e, &together.e);
+  PetscCall(PetscPrintf(PETSC_COMM_WORLD,
+                        "  %-28s %3d steps: displacement %.1e, velocity %.1e, scalars %.1e\n", what,
+                        (int)alone.steps, (double)du, (double)dv, (double)de));
+  SB_CHECK(alone.n == together.n && alone.steps == together.steps,
+           "%s: %d vertices and %d steps, %d and %d alone", what, (int)together.n, (int)together.steps,
+           (int)alone.n, (int)alone.steps);
+  SB_CHECK(du <= tolerance && dv <= tolerance && de <= tolerance,
+           "%s: displacement %g, velocity %g, scalars %g", what, (double)du, (double)dv, (double)de);
+  PetscCall(destroy(&alone));
+  PetscCall(destroy(&together));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+#define BAR                                                                                 \
+  "-bodies bar -body_bar_mesh box:0.4,0.1,0.1:3 -body_bar_young 1e5 -body_bar_poisson 0.4 " \
+  "-body_bar_density 1000 "
+#define CLAMP "-effect_clamp_type support -effect_clamp_on xmin "
+#define TWO                                                                                             \
+  "-bodies bar,block -body_bar_mesh box:0.4,0.1,0.1:2 -body_bar_young 1e5 -body_bar_poisson 0.4 "       \
+  "-body_bar_density 1000 "                                                                             \
+  "-body_block_mesh tests/data/two_cubes_41.msh -body_block_scale 0.1 -body_block_translate 0,0,0.5 "   \
+  "-body_block_young 2e5 -body_block_poisson 0.3 -body_block_density 500 -body_block_velocity 0.3,0,1 " \
+  "-body_block_spin 1,2,3 "
+
+int main(int argc, char **argv)
+{
+  SB_TEST_BEGIN(argc, argv);
+  PetscCall(check("static, linear", 1e-10,
+                  BAR CLAMP "-body_bar_material linear -effects gravity,clamp -time static"));
+  PetscCall(check(
+    "static, neohookean, driven", 1e-8,
+    BAR CLAMP "-body_bar_material neohookean -effects clamp,pull,air -effect_pull_type drive -effect_pull_on "
+              "xmax -effect_pull_angle 60*t -effect_pull_axis 1,0,0 -effect_pull_axis_point 0,0.05,0.05 "
+              "-effect_air_type pressure -effect_air_on zmax -effect_air_value 1000 -time static "
+              "-static_steps 3 -snes_rtol 1e-9"));
+  PetscCall(check(
+    "newmark, linear, two bodies", 1e-10,
+    TWO CLAMP "-body_bar_material linear -body_block_material linear -effects gravity,clamp,damping "
+              "-effect_damping_alpha 0.3 -effect_damping_beta 0.001 -effect_clamp_on bar.xmin -time newmark "
+              "-ts_dt 0.01 -ts_max_time 0.3 -ksp_rtol 1e-13"));
+  PetscCall(
+    check("newmark, co-rotated", 1e-8,
+          BAR CLAMP
+          "-body_bar_material corotated -effects gravity,clamp -time newmark -ts_dt 0.01 -ts_max_time 0.3 "
+          "-snes_rtol 1e-9"));
+  PetscCall(check(
+    "genalpha, two bodies", 1e-8,
+    TWO
+    "-body_bar_material stvk -body_block_material neohookean -effects gravity,hold,push -effect_hold_type "
+    "support -effect_hold_on bar.xmin -effect_push_type traction -effect_push_on bar.xmax "
+    "-effect_push_vector 0;300*sin(9*t);0 -time genalpha -ts_dt 0.01 -ts_max_time 0.3 -snes_rtol 1e-9"));
+  PetscCall(
+    check("adaptive", 1e-8,
+          BAR CLAMP
+          "-body_bar_material corotated -effects gravity,clamp -time newmark -ts_dt 0.01 -ts_max_time 0.3 "
+          "-ts_adapt_type basic -snes_rtol 1e-9"));
+  PetscCall(check("explicit, consistent mass", 1e-10,
+                  TWO CLAMP
+                  "-body_bar_material corotated -body_block_material stvk -effects gravity,clamp "
+                  "-effect_clamp_on bar.xmin -mass consistent -time euler_symplectic -ts_max_time 0.05"));
+  SB_TEST_END();
+}
