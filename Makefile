@@ -114,6 +114,7 @@ check: deps ## install what is missing, build, run the tests (about 20 minutes; 
 	@$(CHECK)
 
 check-long: deps ## the tests that take longer
+	@scripts/install-deps long
 	$(AGAIN) bin/supple tests $(MESHES)
 	@scripts/venv
 	@$(CHECK) --long
