@@ -21,6 +21,9 @@ with open(folder + "/history.csv") as f:
     rows = list(csv.DictReader(line for line in f if not line.startswith("#")))
 history = {round(float(r["time"]), 9): float(r["max_displacement"]) for r in rows}
 assert len(times) == 5 and abs(times[-1] - 0.2) < 1e-12, times
+# The reader knows the names of the arrays after its first update only.
+UpdatePipeline(time=times[0], proxy=reader)
+UpdatePipeline(time=times[-1], proxy=reader)
 for t in times:
     UpdatePipeline(time=t, proxy=reader)
     grid = paraview.servermanager.Fetch(reader)
