@@ -106,6 +106,10 @@ int main(int argc, char **argv)
   PetscCall(check("static, linear", 1e-10,
                   BAR CLAMP "-body_bar_material linear -effects gravity,clamp -time static"));
   PetscCall(check(
+    "static, iterative solver", 1e-8,
+    BAR CLAMP "-body_bar_material linear -effects gravity,clamp -time static -solver cg_two_level -ksp_rtol "
+              "1e-11"));
+  PetscCall(check(
     "static, neohookean, driven", 1e-8,
     BAR CLAMP "-body_bar_material neohookean -effects clamp,pull,air -effect_pull_type drive -effect_pull_on "
               "xmax -effect_pull_angle 60*t -effect_pull_axis 1,0,0 -effect_pull_axis_point 0,0.05,0.05 "
