@@ -9,7 +9,7 @@ cat >"$SB_OUT/read.py" <<'PYTHON'
 import csv
 import sys
 
-from paraview.simple import Xdmf3ReaderS, UpdatePipeline
+from paraview.simple import Xdmf3ReaderS
 from vtkmodules.util.numpy_support import vtk_to_numpy
 import paraview.servermanager
 
@@ -22,10 +22,9 @@ with open(folder + "/history.csv") as f:
 history = {round(float(r["time"]), 9): float(r["max_displacement"]) for r in rows}
 assert len(times) == 5 and abs(times[-1] - 0.2) < 1e-12, times
 # The reader knows the names of the arrays after its first update only.
-UpdatePipeline(time=times[0], proxy=reader)
-UpdatePipeline(time=times[-1], proxy=reader)
+reader.UpdatePipeline(times[-1])
 for t in times:
-    UpdatePipeline(time=t, proxy=reader)
+    reader.UpdatePipeline(t)
     grid = paraview.servermanager.Fetch(reader)
     u = vtk_to_numpy(grid.GetPointData().GetArray("displacement"))
     largest = (u**2).sum(axis=1).max() ** 0.5
