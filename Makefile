@@ -108,12 +108,13 @@ demo: deps ## install what is missing, build, run scenarios/demo.opts on 2 ranks
 	@echo "open out/demo/fields.xmf in ParaView; out/demo/picture.png and animation.gif show the run"
 
 CHECK = tests/run --build $(BUILD) $(if $(T),--match '$(T)')
-check: deps ## install what is missing, build, run the tests (about 20 minutes; one of them: T=name)
+check: deps ## install what is missing, build, run the tests (5 to 10 minutes; one of them: T=name)
 	$(AGAIN) bin/supple tests $(MESHES)
 	@scripts/venv
 	@$(CHECK)
 
-check-long: deps ## the tests that take longer
+check-long: deps ## the tests that take longer or need ParaView
+	@scripts/install-deps long
 	@scripts/install-deps long
 	$(AGAIN) bin/supple tests $(MESHES)
 	@scripts/venv
