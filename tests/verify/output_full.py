@@ -3,6 +3,7 @@
 A full disk is played by a limit on the size of files, set while the run is going on. Also: a folder that cannot be
 written, which must be found before anything is computed.
 """
+import json
 import os
 import re
 import resource
@@ -46,6 +47,9 @@ def check_full(ranks, folder, file, frames, *more):
     names, rows = history(folder)
     if n < frames or len(rows) < n - 1 or any(len(row) != len(names) for row in rows):
         sys.exit(f"{folder}: {n} frames, {len(rows)} rows of {len(names)} columns")
+    told = json.loads((OUT / folder / "run.json").read_text())
+    if told["status"] != "failed" or file not in told["reason"]:
+        sys.exit(f"{folder}: run.json says {told['status']}: {told['reason']}")
     print(f"{folder}: {said[0]}; {n} frames are readable")
 
 
@@ -70,6 +74,9 @@ def check_default_folder():
         if ("results of an earlier run are replaced" in text) != again:
             sys.exit(f"replaced results: {text}")
         (OUT / "out" / "bar" / "notes.txt").write_text("mine")
+    told = json.loads((OUT / "out" / "bar" / "run.json").read_text())
+    if told["status"] != "completed" or told["steps"] != 1 or "fields.h5" not in [f["name"] for f in told["files"]]:
+        sys.exit(f"run.json of a run that ended well: {told}")
     if not (OUT / "out" / "bar" / "notes.txt").exists() or not (OUT / "out" / "bar" / "fields.xmf").exists():
         sys.exit("a file that is not ours is gone")
 
