@@ -36,6 +36,13 @@
   #define SB_DESTROY_CTX(type, arg) (*(type **)(arg))
 #endif
 
+/* Destroy callback of a PetscContainer, which gets its pointer as SB_DESTROY_CTX() takes it. */
+#if PETSC_VERSION_LT(3, 24, 0)
+  #define SbContainerSetDestroy(container, f) PetscContainerSetUserDestroy(container, f)
+#else
+  #define SbContainerSetDestroy(container, f) PetscContainerSetCtxDestroy(container, f)
+#endif
+
 /* "No limit" of an iteration count. */
 #if PETSC_VERSION_LT(3, 22, 0)
   #define SB_UNLIMITED PETSC_MAX_INT

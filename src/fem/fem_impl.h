@@ -65,6 +65,9 @@ void SbInsertClear(SbSpace space, const SbValues *x, PetscInt b);
 /* Adds the ten blocks of each cell of batch b; K is 32-byte aligned. */
 void SbInsertBatch(SbSpace space, const SbValues *x, PetscInt b, const SbLane K[10][9]);
 
+/* Gives a BAIJ or SBAIJ matrix of the space the fast product of product.c. Collective. */
+PetscErrorCode SbProductAttach(SbSpace space, SbMatrixKind kind, Mat A);
+
 /* u[3 a + i][lane] of a batch from a local array [nnode][3]. */
 static inline void sb_gather(const PetscInt node[4 * SB_BATCH], const PetscReal x[], SbLane u[12])
 {

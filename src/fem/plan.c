@@ -406,7 +406,10 @@ PetscErrorCode SbSpaceCreateMatrix(SbSpace s, SbMatrixKind kind, Mat *A)
   PetscCall(MatSetOption(*A, MAT_NEW_NONZERO_LOCATION_ERR, PETSC_TRUE));
   PetscCall(MatSetOption(*A, MAT_SYMMETRIC, PETSC_TRUE));
   PetscCall(MatSetOption(*A, MAT_SYMMETRY_ETERNAL, PETSC_TRUE));
-  if (kind == SB_MATRIX_AIJ) PetscCall(attach_rigid_modes(s, *A));
+  if (kind == SB_MATRIX_AIJ)
+    PetscCall(attach_rigid_modes(s, *A));
+  else
+    PetscCall(SbProductAttach(s, kind, *A));
   PetscCall(PetscLogEventEnd(SbEvents[SB_EVENT_MATRIX_SETUP], 0, 0, 0, 0));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -1,0 +1,212 @@
+/*
+  Products with block matrices, from the upper triangle of the diagonal part alone: the matrices of this program are symmetric.
+
+  A product is paid in bytes. BAIJ holds both triangles and moves twice what SBAIJ moves; PETSc has SBAIJ's product for one
+  rank, not vectorised, and gives no access to the parallel one. Here a row i takes y_i += A_ij x_j and y_j += A_ij^T x_i block by block,
+  four numbers at a time. Of BAIJ the upper blocks are copied together when the values have changed, which costs about two
+  products; a product then reads them without gaps, which defeat the prefetching of the processor (measured: three times
+  slower than reading both triangles). The columns of other ranks are added by PETSc.
+
+  petsc/private/petscimpl.h: asking a matrix whether its values have changed has no public call.
+
+  Measured at 200,000 tets on one rank: 0.9 ms in the place of 1.4 (SBAIJ) and 1.7 (BAIJ); in cache half the time.
+*/
+#include "fem_impl.h"
+#include "sbkernel.h"
+#include <petsc/private/petscimpl.h>
+
+typedef struct {
+  SbPlan plan; /* borrowed: the space outlives its matrices */
+  PetscInt nrow;
+  size_t nupper;       /* blocks on and above the diagonal of the diagonal part, whose graph is symmetric */
+  Mat diagonal, other; /* parts of the matrix, borrowed; other NULL on one rank */
+  PetscScalar *full;   /* values of BAIJ's diagonal part; NULL for SBAIJ */
+  PetscScalar *upper;  /* upper blocks, by rows: the matrix's own of SBAIJ, a copy of BAIJ's */
+  PetscObjectState copied; /* state of `diagonal` that the copy belongs to */
+  VecScatter scatter;      /* x -> ghosts */
+  Vec ghosts;
+} Product;
+
+/*
+  Row i: y_i += A_ii x_i, and for each block behind the diagonal y_i += A_ij x_j and y_j += A_ij^T x_i. a: the row's blocks by
+  columns; column: their n columns, i first.
+*/
+#if defined(__GNUC__)
+typedef double Two __attribute__((vector_size(16), aligned(8), may_alias));
+typedef double Four __attribute__((vector_size(32), aligned(8), may_alias));
+typedef int64_t Mask __attribute__((vector_size(32)));
+  #if defined(__clang__)
+    #define SHUFFLE(a, b, i, j, k, l) __builtin_shufflevector(a, b, i, j, k, l)
+  #else
+    #define SHUFFLE(a, b, i, j, k, l) __builtin_shuffle(a, b, (Mask){i, j, k, l})
+  #endif
+
+SB_INLINE void row_product(const PetscScalar *a, PetscInt n, const PetscInt column[], const PetscScalar x[],
+                           PetscScalar y[])
+{
+  const PetscScalar *u = x + 3 * (size_t)column[0];
+  PetscScalar *w = y + 3 * (size_t)column[0];
+  const Four xi = {u[0], u[1], u[2], 0.}, last = {a[6], a[7], a[8], 0.};
+  Four sum = *(const Four *)a * u[0] + *(const Four *)(a + 3) * u[1] + last * u[2];
+
+  for (PetscInt k = 1; k < n; k++) {
+    /* the columns of the block; what else is in the fourth lane meets the zero of xi, and is left out of y_i */
+    const PetscScalar *b = a + 9 * k, *xj = x + 3 * (size_t)column[k];
+    PetscScalar *yj = y + 3 * (size_t)column[k];
+    const Four c0 = *(const Four *)b, c1 = *(const Four *)(b + 3), c5 = *(const Four *)(b + 5);
+    const Four c2 = SHUFFLE(c5, c5, 1, 2, 3, 0), p0 = c0 * xi, p1 = c1 * xi, p2 = c2 * xi;
+    const Four s = SHUFFLE(p0, p1, 0, 4, 2, 6) + SHUFFLE(p0, p1, 1, 5, 3, 7);
+    const Two low = {s[0], s[1]}, high = {s[2], s[3]};
+
+    sum += c0 * xj[0] + c1 * xj[1] + c2 * xj[2];
+    *(Two *)yj += low + high;
+    yj[2] += (p2[0] + p2[2]) + (p2[1] + p2[3]);
+  }
+  for (int k = 0; k < 3; k++) w[k] += sum[k];
+}
+#else
+SB_INLINE void row_product(const PetscScalar *a, PetscInt n, const PetscInt column[], const PetscScalar x[],
+                           PetscScalar y[])
+{
+  const PetscScalar *xi = x + 3 * (size_t)column[0];
+  PetscScalar *yi = y + 3 * (size_t)column[0];
+
+  for (PetscInt k = 0; k < n; k++) {
+    const PetscScalar *b = a + 9 * k, *xj = x + 3 * (size_t)column[k];
+    PetscScalar *yj = y + 3 * (size_t)column[k];
+
+    for (int c = 0; c < 3; c++) yi[c] += b[c] * xj[0] + b[3 + c] * xj[1] + b[6 + c] * xj[2];
+    for (int c = 0; k > 0 && c < 3; c++) yj[c] += SbDot3(b + 3 * c, xi);
+  }
+}
+#endif
+
+/* y += A x; row i has the columns column[first[i]..end[i]), the first of them i. */
+SB_KERNEL static void multiply(PetscInt nrow, const PetscInt first[restrict], const PetscInt end[restrict],
+                               const PetscInt column[restrict], const PetscScalar a[restrict],
+                               const PetscScalar x[restrict], PetscScalar y[restrict])
+{
+  for (PetscInt i = 0; i < nrow; i++) {
+    row_product(a, end[i] - first[i], column + first[i], x, y);
+    a += 9 * (size_t)(end[i] - first[i]);
+  }
+}
+
+/* Brings the copy of BAIJ's upper blocks up to date. */
+static PetscErrorCode copy_upper(Product *p)
+{
+  const SbPlan plan = p->plan;
+  PetscScalar *to = p->upper;
+  PetscObjectState state;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscObjectStateGet((PetscObject)p->diagonal, &state));
+  if (!p->full || state == p->copied) PetscFunctionReturn(PETSC_SUCCESS);
+  for (PetscInt i = 0; i < p->nrow; i++) {
+    const size_t n = 9 * (size_t)(plan->di[i + 1] - plan->diagonal[i]);
+
+    PetscCall(PetscArraycpy(to, p->full + 9 * (size_t)plan->diagonal[i], n));
+    to += n;
+  }
+  p->copied = state;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode MatMult_Product(Mat A, Vec x, Vec y)
+{
+  PetscObject container;
+  const PetscScalar *in;
+  PetscScalar *out;
+  Product *p;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscObjectQuery((PetscObject)A, "sb_product", &container));
+  PetscCall(PetscContainerGetPointer((PetscContainer)container, (void **)&p));
+  PetscCall(copy_upper(p));
+  if (p->other) PetscCall(VecScatterBegin(p->scatter, x, p->ghosts, INSERT_VALUES, SCATTER_FORWARD));
+  PetscCall(VecGetArrayRead(x, &in));
+  PetscCall(VecGetArrayWrite(y, &out));
+  PetscCall(PetscArrayzero(out, 3 * p->nrow));
+  multiply(p->nrow, p->plan->diagonal, p->plan->di + 1, p->plan->dj, p->upper, in, out);
+  PetscCall(VecRestoreArrayWrite(y, &out));
+  PetscCall(VecRestoreArrayRead(x, &in));
+  if (p->other) {
+    PetscCall(VecScatterEnd(p->scatter, x, p->ghosts, INSERT_VALUES, SCATTER_FORWARD));
+    PetscCall(MatMultAdd(p->other, p->ghosts, y, y));
+  }
+  PetscCall(PetscLogFlops(36. * (double)p->nupper));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode destroy_product(void *ctx)
+{
+  Product *p = SB_DESTROY_CTX(Product, ctx);
+
+  PetscFunctionBeginUser;
+  if (p->full) PetscCall(PetscFree(p->upper));
+  PetscCall(VecScatterDestroy(&p->scatter));
+  PetscCall(VecDestroy(&p->ghosts));
+  PetscCall(PetscFree(p));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Ghosts in the order in which the off-diagonal part numbers its columns. */
+static PetscErrorCode create_scatter(Mat A, const PetscInt columns[], Product *p)
+{
+  PetscInt n;
+  Vec x;
+  IS from;
+
+  PetscFunctionBeginUser;
+  PetscCall(MatCreateVecs(p->other, &p->ghosts, NULL));
+  PetscCall(MatCreateVecs(A, &x, NULL));
+  PetscCall(VecGetLocalSize(p->ghosts, &n));
+  PetscCall(ISCreateBlock(PETSC_COMM_SELF, 3, n / 3, columns, PETSC_COPY_VALUES, &from));
+  PetscCall(VecScatterCreate(x, from, p->ghosts, NULL, &p->scatter));
+  PetscCall(ISDestroy(&from));
+  PetscCall(VecDestroy(&x));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The arrays of values stay where they are for the life of the matrix: its pattern is fixed. */
+static PetscErrorCode find_parts(Mat A, SbMatrixKind kind, Product *p)
+{
+  const PetscInt *columns;
+  PetscBool parallel;
+
+  PetscFunctionBeginUser;
+  p->diagonal = A;
+  if (kind == SB_MATRIX_SBAIJ) {
+    PetscCall(MatSeqSBAIJGetArray(A, &p->upper));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  PetscCall(PetscObjectTypeCompare((PetscObject)A, MATMPIBAIJ, &parallel));
+  if (parallel) {
+    PetscCall(MatMPIBAIJGetSeqBAIJ(A, &p->diagonal, &p->other, &columns));
+    PetscCall(create_scatter(A, columns, p));
+  }
+  PetscCall(MatSeqBAIJGetArray(p->diagonal, &p->full));
+  PetscCall(PetscMalloc1(9 * p->nupper, &p->upper));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbProductAttach(SbSpace s, SbMatrixKind kind, Mat A)
+{
+  PetscContainer container;
+  Product *p;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscNew(&p));
+  p->plan = s->plan;
+  p->nrow = s->nnode_owned;
+  p->nupper = (size_t)(s->plan->di[p->nrow] + p->nrow) / 2;
+  p->copied = -1;
+  PetscCall(find_parts(A, kind, p));
+  PetscCall(PetscContainerCreate(PetscObjectComm((PetscObject)A), &container));
+  PetscCall(PetscContainerSetPointer(container, p));
+  PetscCall(SbContainerSetDestroy(container, destroy_product));
+  PetscCall(PetscObjectCompose((PetscObject)A, "sb_product", (PetscObject)container));
+  PetscCall(PetscContainerDestroy(&container));
+  PetscCall(MatSetOperation(A, MATOP_MULT, SB_OPERATION(MatMult_Product)));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
