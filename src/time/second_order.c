@@ -286,6 +286,7 @@ static PetscErrorCode TSStep_SecondOrder(TS ts)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* order: power of h with which the error of one step falls. */
 static PetscErrorCode TSEvaluateWLTE_SecondOrder(TS ts, NormType type, PetscInt *order, PetscReal *wlte)
 {
   SecondOrder *so = (SecondOrder *)ts->data;
@@ -296,10 +297,10 @@ static PetscErrorCode TSEvaluateWLTE_SecondOrder(TS ts, NormType type, PetscInt 
   if (so->set.method == SB_METHOD_GENERALIZED_ALPHA) {
     PetscCall(VecWAXPY(so->work, -1., so->run->A, so->A1));
     PetscCall(VecAYPX(so->work, h * h * (so->set.beta - 1. / 6.), so->X1));
-    *order = 2;
+    *order = 3;
   } else {
     PetscCall(VecWAXPY(so->work, 0.5 * h * h, so->A1, so->X1));
-    *order = 1;
+    *order = 2;
   }
   PetscCall(TSErrorWeightedNorm(ts, so->X1, so->work, type, wlte, &absolute, &relative));
   PetscFunctionReturn(PETSC_SUCCESS);
