@@ -115,7 +115,6 @@ check: deps ## install what is missing, build, run the tests (5 to 10 minutes; o
 
 check-long: deps ## the tests that take longer or need ParaView
 	@scripts/install-deps long
-	@scripts/install-deps long
 	$(AGAIN) bin/supple tests $(MESHES)
 	@scripts/venv
 	@$(CHECK) --long
