@@ -182,7 +182,7 @@ int main(int argc, char **argv)
   Trace first;
 
   /* the count of bytes wants PETSc's own malloc */
-  (void)setenv("PETSC_OPTIONS", "-malloc_debug true", 1);
+  (void)setenv("PETSC_OPTIONS", "-malloc_dump", 1);
   SB_TEST_BEGIN(argc, argv);
   PetscCall(PetscLogDefaultBegin());
   /* parts of PETSc are set up by the first run that needs them */

@@ -172,7 +172,7 @@ static PetscErrorCode check_rod(const char *law)
   PetscFunctionBeginUser;
   PetscCall(PetscSNPrintf(
     text, sizeof(text),
-    "-bodies a -body_a_mesh box:1,0.05,0.05:20,1,1 -body_a_translate -0.5,-0.025,-0.025 "
+    "-bodies a -body_a_mesh box:1,0.05,0.05:20,2,2 -body_a_translate -0.5,-0.025,-0.025 "
     "-body_a_material %s -body_a_young %g -body_a_poisson 0 -body_a_density %g -body_a_spin 0,0,%g "
     "-effects damping -effect_damping_beta 0.01 -time newmark -ts_dt 0.002 -ts_max_time 0.4 "
     "-snes_rtol 1e-9",
