@@ -3,30 +3,8 @@
 # Also: what the command line answers (-help, -version, -scenario_view) and that a printed scenario runs again.
 # @timeout 300
 set -uo pipefail
-passed=0 failed=0
-cd "$SB_OUT" || exit 1
-export PETSC_OPTIONS=
-read -ra mpi <<<"$SB_MPI"
-case $SB_SUPPLE in /*) supple=$SB_SUPPLE ;; *) supple=$OLDPWD/$SB_SUPPLE ;; esac
-
-check() { # text of the check, then a command that must succeed
-  if "${@:2}"; then passed=$((passed + 1)); else
-    failed=$((failed + 1))
-    echo "failed: $1"
-  fi
-}
-
-# error RANKS TEXT ARGUMENT...: the run must fail with one line that holds TEXT
-error() {
-  local ranks=$1 text=$2 code
-  shift 2
-  timeout 60 "${mpi[@]}" "$ranks" "$supple" "$@" >out.txt 2>err.txt
-  code=$?
-  check "$*: exit code $code" test "$code" -ne 0 -a "$code" -ne 124
-  check "$*: $(grep -c '^supple: error: ' err.txt) error lines" test "$(grep -c '^supple: error: ' err.txt)" = 1
-  check "$*: not '$text' but '$(grep '^supple: error: ' err.txt)'" grep -qF -- "supple: error: $text" err.txt
-  check "$*: a trace" test -z "$(cat out.txt err.txt | grep 'PETSC ERROR')"
-}
+# shellcheck source=tests/scenario/scenario_common.sh
+source tests/scenario/scenario_common.sh
 
 cat >bar.opts <<'END'
 # a bar that swings
@@ -131,5 +109,4 @@ check "-help | head" test "$("$supple" -help 2>&1 | head -n 1 | cut -c 1-7)" = "
 check "-help lacks -body_<name>_young" grep -qF -- '-body_<name>_young' <<<"$("${mpi[@]}" 2 "$supple" -help)"
 "$supple" -options_markdown options.md && check "-options_markdown" grep -qF -- "-ts_dt" options.md
 
-echo "$passed passed, $failed failed"
-test $failed = 0
+finish
