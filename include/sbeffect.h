@@ -122,15 +122,15 @@ typedef struct _p_SbDeadLoad *SbDeadLoad;
   Not collective.
 
   Input:
-    space    - gives the rest positions of the nodes
+    space    - gives elements and rest positions; borrowed, must outlive the load
     ncorner  - 4 for cells, 3 for facets
     nitem    - cells or facets on this rank
-    node     - [nitem][ncorner] local nodes of each
+    corner   - [nitem][ncorner] 4 c + a for vertex a of local cell c; those of an item are of one cell
     density  - three formulas, N/m^3 or Pa; borrowed, must outlive the load
   Output:
     load     - the caller destroys it
 */
-PetscErrorCode SbDeadLoadCreate(SbSpace space, PetscInt ncorner, PetscInt nitem, const PetscInt node[],
+PetscErrorCode SbDeadLoadCreate(SbSpace space, PetscInt ncorner, PetscInt nitem, const PetscInt corner[],
                                 const SbFormula density[3], SbDeadLoad *load);
 /* f[nnode][3] += factor times the load at time t on owned nodes, N. Not collective. */
 PetscErrorCode SbDeadLoadAdd(SbDeadLoad load, PetscReal t, PetscReal factor, PetscReal f[]);

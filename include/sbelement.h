@@ -12,8 +12,9 @@ static const int SbPairA[10] = {0, 0, 0, 0, 1, 1, 1, 2, 2, 3};
 static const int SbPairB[10] = {0, 1, 2, 3, 1, 2, 3, 2, 3, 3};
 
 /*
-  SbElement - what tells one element from another. P1 has its nodes at the vertices; nodes at faces (CR) or in cells
-  (DG) differ in `tabulate` and in the mass.
+  SbElement - what tells one element from another. All are linear in a cell and have four nodes there: P1 at the vertices, CR
+  and DG at the centroids of the faces, node a opposite vertex a. CR shares a node between the two cells of a face; in DG each
+  cell has its own. They differ in `tabulate`, in the mass, and in the face terms (src/fem/jump.c).
 */
 typedef struct _p_SbElement *SbElement;
 typedef struct {
@@ -23,18 +24,29 @@ typedef struct {
   void (*tabulate)(const PetscReal x[4][3], PetscReal g[3][3], PetscReal *V);
   /* mass of a cell / (density V): lumped share of each node, and consistent M_aa, M_ab */
   PetscReal mass_lumped, mass_diagonal, mass_coupling; /* P1: 1/4, 1/10, 1/20 */
+  PetscReal vertex[4]
+                  [4]; /* value of basis function a at vertex v of the cell: vertex[v][a]. P1: the identity */
 } SbElementOps;
 struct _p_SbElement {
   char name[SB_NAME_MAX];
-  PetscInt nodes_per[4]; /* nodes per vertex, edge, face, cell. P1: 1,0,0,0 */
+  PetscInt nodes_per[4]; /* nodes per vertex, edge, face, cell. P1: 1,0,0,0; CR: 0,0,1,0; DG: 0,0,0,4 */
+  PetscReal gamma0;      /* DG: factor on the penalty of mean jumps */
+  PetscReal gamma1;      /* CR and DG: factor on the penalty of jumps */
   SbElementOps ops;
 };
 extern PetscFunctionList SbElementList;
-/* Adds an element; create() fills nodes_per and ops. Not collective, same on all ranks. */
-PetscErrorCode SbElementRegister(const char *name, PetscErrorCode (*create)(SbElement));
+/*
+  Adds an element; create() fills nodes_per and ops, and gammas with their defaults. `rows`: its options, class "body", type
+  `name`. Not collective, same on all ranks.
+*/
+PetscErrorCode SbElementRegister(const char *name, PetscErrorCode (*create)(SbElement), PetscInt nrows,
+                                 const SbOption rows[]);
 PetscErrorCode SbElementRegisterAll(void);
-/* Creates an element by name; owned by the caller. Error: PETSC_ERR_USER for an unknown name. */
-PetscErrorCode SbElementCreate(const char *name, SbElement *e);
+/*
+  Creates an element by name and reads the options of body (NULL: their defaults; its `type` is not looked at); owned by the
+  caller. Error: PETSC_ERR_USER for an unknown name, and what the option readers refuse.
+*/
+PetscErrorCode SbElementCreate(const char *name, const SbScope *body, SbElement *e);
 PetscErrorCode SbElementDestroy(SbElement *e);
 
 /* F = I + sum_a u_a (x) grad phi_a. g[3*(a-1)+j] = d phi_a / dX_j for a = 1..3, 1/m; u[3*a+i], a = 0..3, m. */

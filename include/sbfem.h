@@ -26,9 +26,16 @@ typedef struct {
   PetscInt cstart, cend; /* local cells */
   PetscInt bstart, bend; /* batches; the last one may be partly filled */
   PetscBool owned;
+  PetscBool broken; /* DG: strains come from the means of the two sides of each face */
   PetscReal alpha,
     beta; /* Rayleigh damping C = alpha M + beta K, 1/s and s; 0 unless an effect set them at set-up */
 } SbRegion;
+
+/*
+  The face terms of CR and DG (src/fem/jump.c), in batches of SB_BATCH faces between two cells of one body, all with a node
+  that this rank owns.
+*/
+typedef struct _p_SbJump *SbJump;
 
 typedef struct _p_SbSpace *SbSpace;
 struct _p_SbSpace {
@@ -39,14 +46,29 @@ struct _p_SbSpace {
   PetscInt *gnode;     /* [nnode] global node numbers; owned first, ghosts ascending */
   PetscInt *cell_node; /* [ncell][4] local nodes */
   PetscReal *node_x;   /* [nnode][3] rest position of each node, m */
+  PetscInt *
+    node_orig; /* [nnode] number that no partition changes, right on owned nodes: vert_orig of a vertex, Nvert +
+                          4 cell_orig + a of node a of a cell, the lower of the two that share it */
+  PetscInt *node_body;      /* [nnode] */
+  uint64_t *node_set;       /* [nnode] SB_SET_BIT(k) when in set k */
+  PetscBool faces;          /* some body has its nodes at faces; if not, nodes are the mesh's vertices */
+  PetscInt *neighbour;      /* [ncell][4] local cell across each face, -1: none; NULL without face nodes */
+  const SbElement *element; /* [nbody] borrowed */
   PetscInt nregion;
-  SbRegion *region;          /* [nregion] */
-  PetscInt nbatch;           /* SB_BATCH cells side by side; a batch never mixes regions */
-  PetscInt *batch_cell;      /* [nbatch] first local cell */
-  PetscInt *batch_n;         /* [nbatch] cells in it, 1..SB_BATCH */
-  PetscInt *batch_node;      /* [nbatch][4][SB_BATCH] local nodes (padding repeats the first cell) */
-  SbLane *batch_g;           /* [nbatch][9] basis gradients of nodes 1..3, 1/m; 64-byte aligned */
-  SbLane *batch_V;           /* [nbatch] volumes, m^3; 0 in padding; 64-byte aligned */
+  SbRegion *region;     /* [nregion] */
+  PetscInt nbatch;      /* SB_BATCH cells side by side; a batch never mixes regions */
+  PetscInt *batch_cell; /* [nbatch] first local cell */
+  PetscInt *batch_n;    /* [nbatch] cells in it, 1..SB_BATCH */
+  PetscInt *batch_node; /* [nbatch][4][SB_BATCH] local nodes (padding repeats the first cell) */
+  PetscInt width;       /* nodes that the stress of a cell acts on: 4, or 8 with a DG body */
+  PetscInt *
+    batch_clique; /* [nbatch][width][SB_BATCH] these nodes: the four of batch_node, then those across the faces
+                                (again its own where there is no other); batch_node itself when width is 4 */
+  SbLane
+    *batch_weight; /* [nbatch][4] weight of a cell's own node in the mean of the two; NULL when width is 4 */
+  SbJump jump;     /* NULL without face nodes */
+  SbLane *batch_g; /* [nbatch][9] basis gradients of nodes 1..3, 1/m; 64-byte aligned */
+  SbLane *batch_V; /* [nbatch] volumes, m^3; 0 in padding; 64-byte aligned */
   void *batch_memory;        /* what batch_g and batch_V live in */
   PetscReal *node_mass;      /* [nnode] lumped mass, kg, complete on owned nodes */
   PetscBool consistent_mass; /* -mass consistent */
@@ -113,13 +135,22 @@ PetscErrorCode SbSpaceDampingPower(SbSpace space, const PetscReal u[], const Pet
    SbSpaceFixDone(). */
 PetscErrorCode SbSpaceStableStep(SbSpace space, PetscReal *dt);
 
-/* Nodes with weights of a boundary facet: for P1 its three vertices. face = 0..3, opposite local vertex `face`. */
+/*
+  A boundary facet. face = 0..3, opposite local vertex `face`. The displacement of its corner k is
+  sum_a element->ops.vertex[corner[k]][a] u[cell_node[4 cell + a]], the element being that of the cell's body.
+*/
 typedef struct {
   PetscInt cell, face;
-  PetscInt node[3];    /* local nodes, counter-clockwise seen from outside */
+  PetscInt corner[3];  /* 0..3, which vertices of the cell, counter-clockwise seen from outside */
+  PetscInt vertex[3];  /* the same as local vertices of the mesh */
   PetscReal area;      /* rest area, m^2 */
   PetscReal normal[3]; /* rest outward unit normal */
 } SbFacet;
+/* The element of a local cell. */
+static inline SbElement SbSpaceCellElement(SbSpace space, PetscInt cell)
+{
+  return space->element[space->mesh->cell_body[cell]];
+}
 /* All local boundary facets (of owned and ghost cells) in set k of the mesh. Allocated here; PetscFree. */
 PetscErrorCode SbSpaceGetSetFacets(SbSpace space, PetscInt k, PetscInt *n, SbFacet **facets);
 /* All local nodes in set k. Allocated here; PetscFree. */

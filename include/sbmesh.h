@@ -18,7 +18,8 @@ typedef struct {
   PetscReal scale;        /* factor on the file's coordinates, first */
   PetscReal rotate[4];    /* axis (need not be normed) and angle in degrees, second */
   PetscReal translate[3];     /* m, third */
-  char element[SB_NAME_MAX];  /* p1 */
+  char element[SB_NAME_MAX];  /* p1, cr, dg */
+  PetscBool face_nodes;       /* the element has its nodes at faces: every cell of the overlap is needed */
   char material[SB_NAME_MAX]; /* linear | corotated | stvk | neohookean */
   PetscReal density;          /* kg/m^3 */
   PetscReal velocity[3];      /* initial velocity of the centre of mass, m/s */
@@ -61,7 +62,8 @@ typedef struct {
 
 /*
   SbMesh - this rank's part of the mesh. Own numbering: vertices and cells owned by this rank first, then the ghosts
-  that touch them: every cell with an owned vertex is here, no ghost cell without one. Constant after creation.
+  that touch them: every cell with an owned vertex is here. With nodes at faces every cell that shares a vertex with an owned
+  cell is here; else no ghost cell without an owned vertex. Constant after creation.
 */
 typedef struct _p_SbMesh *SbMesh;
 struct _p_SbMesh {
@@ -87,7 +89,8 @@ struct _p_SbMesh {
   PetscInt *cell_orig; /* [ncell] original number, as for vertices */
   PetscInt
     *cell_body; /* [ncell]; owned and ghost cells are each sorted by body, then by lowest local vertex */
-  uint64_t *cell_set; /* [ncell] */
+  PetscInt *cell_point; /* [ncell] point of the DM */
+  uint64_t *cell_set;   /* [ncell] */
   uint64_t
     *face_set; /* [ncell][4] face f lies opposite vertex f: SB_ON_BOUNDARY, and SB_SET_BIT(k) when in set k */
 };
@@ -105,6 +108,14 @@ struct _p_SbMesh {
 PetscErrorCode SbMeshCreate(MPI_Comm comm, PetscInt nbody, SbBody body[], PetscInt nset, SbSet set[],
                             SbMesh *mesh);
 PetscErrorCode SbMeshDestroy(SbMesh *mesh);
+/*
+  SbMeshNeighbours - which local cell lies across each face.
+
+  Not collective. Output: neighbour[ncell][4], -1 on the boundary and where the other cell is not on this rank; PetscFree().
+*/
+PetscErrorCode SbMeshNeighbours(SbMesh mesh, PetscInt **neighbour);
+/* Brings the n numbers of each owned cell to its ghost copies: value[ncell][n]. Collective. */
+PetscErrorCode SbMeshBroadcastCells(SbMesh mesh, PetscInt n, PetscInt value[]);
 PetscErrorCode SbMeshValidate(SbMesh mesh); /* ordering, ranges, ownership, sums; for -validate and tests */
 PetscErrorCode SbMeshRegister(void);        /* rows of the option table, the METIS partitioner */
 /*

@@ -34,16 +34,14 @@ static PetscErrorCode options_body_force(SbEffect e, const SbScope *scope)
 static PetscErrorCode setup_body_force(SbEffect e, SbSpace space)
 {
   BodyForce *b = (BodyForce *)e->data;
-  PetscInt n, *cells, *nodes;
+  PetscInt n, *cells, *corners;
 
   PetscFunctionBeginUser;
   PetscCall(SbEffectCells(space, &b->on, &n, &cells));
-  PetscCall(PetscMalloc1(4 * n, &nodes));
-  for (PetscInt i = 0; i < n; i++) {
-    for (int a = 0; a < 4; a++) nodes[4 * i + a] = space->cell_node[4 * cells[i] + a];
-  }
-  PetscCall(SbDeadLoadCreate(space, 4, n, nodes, b->density, &b->load));
-  PetscCall(PetscFree(nodes));
+  PetscCall(PetscMalloc1(4 * n, &corners));
+  for (PetscInt i = 0; i < 4 * n; i++) corners[i] = 4 * cells[i / 4] + i % 4;
+  PetscCall(SbDeadLoadCreate(space, 4, n, corners, b->density, &b->load));
+  PetscCall(PetscFree(corners));
   PetscCall(PetscFree(cells));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -1,10 +1,12 @@
 /*
   deadload.c - a force per volume or area integrated against linear basis functions.
 
-  f_a = integral of phi_a q(X, t) over each cell (or facet), at the rest position. phi_a is the barycentric
-  coordinate of corner a, so one loop serves tetrahedra and triangles:
+  f_a = integral of psi_a q(X, t) over each cell (or facet), at the rest position. With the barycentric coordinates b_c
+  of the corners c one loop serves tetrahedra and triangles:
 
-    f_a += |T| sum_k w_k b_ka q(sum_c b_kc X_c, t).
+    l_c += |T| sum_k w_k b_kc q(sum_d b_kd X_d, t),   f_a = sum_c psi_a(X_c) l_c,
+
+  psi_a the basis of the element, of which b_c are the combinations (for P1 they are the same).
 
   Rules, both with positive weights, inner points and degree 5, hence exact for q of degree 4: 14 points on
   the tetrahedron (Walkington, "Quadrature on simplices of arbitrary dimension", 2000), 7 points on the
@@ -12,15 +14,15 @@
   convergence of linear elements needs degree 2; the rest lowers the constant at no cost, because a load that
   does not change is integrated once.
 
-  Sums are kept in a list of the nodes touched, not in a field over the whole body. Corners are nodes:
-  elements whose nodes are not the vertices need their own basis here.
+  Sums are kept in a list of the nodes touched, not in a field over the whole body.
 */
 #include "sbeffect.h"
 
 struct _p_SbDeadLoad {
   PetscInt ncorner, nitem;
-  PetscInt *corner;        /* [nitem][ncorner] index into node; NULL once a steady load was integrated */
-  const PetscReal *node_x; /* borrowed from the space */
+  PetscInt *corner; /* [nitem][ncorner] 4 cell + vertex of the cell; NULL once a steady load was integrated */
+  PetscInt *slot;   /* [nitem][4] index into node of the cell's nodes, -1: not touched; NULL likewise */
+  SbSpace space;    /* borrowed */
   PetscInt n, nowned;
   PetscInt *node;       /* [n] local nodes, ascending, so owned ones first */
   PetscReal *value;     /* [n][3] N */
@@ -81,6 +83,33 @@ static PetscReal simplex_measure(PetscInt ncorner, const PetscReal *const x[4])
   return PetscAbsReal(n[0] * e[2][0] + n[1] * e[2][1] + n[2] * e[2][2]) / 6;
 }
 
+/* l[ncorner][3] of one item: what its barycentric coordinates receive. */
+static void integrate_item(SbDeadLoad load, PetscReal t, PetscInt npoint, PetscReal (*const b)[4],
+                           const PetscReal w[], const PetscInt corner[], PetscReal l[4][3])
+{
+  const PetscInt nc = load->ncorner;
+  const SbMesh mesh = load->space->mesh;
+  const PetscReal *x[4];
+  PetscReal measure;
+
+  for (PetscInt c = 0; c < nc; c++) {
+    x[c] = &mesh->x[3 * mesh->cell[corner[c]]];
+    for (int i = 0; i < 3; i++) l[c][i] = 0;
+  }
+  measure = simplex_measure(nc, x);
+  for (PetscInt k = 0; k < npoint; k++) {
+    PetscReal p[3] = {0, 0, 0}, q[3];
+
+    for (PetscInt c = 0; c < nc; c++) {
+      for (int i = 0; i < 3; i++) p[i] += b[k][c] * x[c][i];
+    }
+    for (int i = 0; i < 3; i++) q[i] = measure * w[k] * SbFormulaEval(load->density[i], t, p);
+    for (PetscInt c = 0; c < nc; c++) {
+      for (int i = 0; i < 3; i++) l[c][i] += b[k][c] * q[i];
+    }
+  }
+}
+
 /* value = the load at time t. */
 static void integrate(SbDeadLoad load, PetscReal t)
 {
@@ -91,37 +120,67 @@ static void integrate(SbDeadLoad load, PetscReal t)
   for (PetscInt i = 0; i < 3 * load->n; i++) load->value[i] = 0;
   for (PetscInt item = 0; item < load->nitem; item++) {
     const PetscInt *corner = &load->corner[nc * item];
-    const PetscReal *x[4];
+    const SbElementOps *e = &SbSpaceCellElement(load->space, corner[0] / 4)->ops;
+    PetscReal l[4][3];
 
-    for (PetscInt c = 0; c < nc; c++) x[c] = &load->node_x[3 * load->node[corner[c]]];
-    const PetscReal measure = simplex_measure(nc, x);
-    for (PetscInt k = 0; k < npoint; k++) {
-      PetscReal p[3] = {0, 0, 0}, q[3];
+    integrate_item(load, t, npoint, b, w, corner, l);
+    for (PetscInt a = 0; a < 4; a++) {
+      const PetscInt slot = load->slot[4 * item + a];
 
-      for (PetscInt c = 0; c < nc; c++) {
-        for (int i = 0; i < 3; i++) p[i] += b[k][c] * x[c][i];
-      }
-      for (int i = 0; i < 3; i++) q[i] = measure * w[k] * SbFormulaEval(load->density[i], t, p);
-      for (PetscInt c = 0; c < nc; c++) {
-        for (int i = 0; i < 3; i++) load->value[3 * corner[c] + i] += b[k][c] * q[i];
+      for (PetscInt c = 0; slot >= 0 && c < nc; c++) {
+        for (int i = 0; i < 3; i++) load->value[3 * slot + i] += e->vertex[corner[c] % 4][a] * l[c][i];
       }
     }
   }
   load->t = t;
 }
 
-PetscErrorCode SbDeadLoadCreate(SbSpace space, PetscInt ncorner, PetscInt nitem, const PetscInt node[],
+/* The nodes touched, ascending, and where each cell finds its own. */
+static PetscErrorCode find_nodes(SbDeadLoad load)
+{
+  const SbSpace space = load->space;
+  PetscInt *at;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscCalloc1(space->nnode, &at));
+  PetscCall(PetscMalloc1(4 * load->nitem, &load->slot));
+  for (PetscInt k = 0; k < 4 * load->nitem; k++) {
+    const PetscInt *corner = &load->corner[load->ncorner * (k / 4)];
+    const SbElementOps *e = &SbSpaceCellElement(space, corner[0] / 4)->ops;
+
+    load->slot[k] = -1;
+    for (PetscInt c = 0; c < load->ncorner; c++) {
+      if (e->vertex[corner[c] % 4][k % 4] != 0) load->slot[k] = space->cell_node[corner[0] / 4 * 4 + k % 4];
+    }
+    if (load->slot[k] >= 0) at[load->slot[k]] = 1;
+  }
+  for (PetscInt i = 0; i < space->nnode; i++) load->n += at[i];
+  PetscCall(PetscMalloc2(load->n, &load->node, 3 * load->n, &load->value));
+  load->n = 0;
+  for (PetscInt i = 0; i < space->nnode; i++) {
+    if (!at[i]) continue;
+    at[i] = load->n;
+    load->node[load->n++] = i;
+    if (i < space->nnode_owned) load->nowned = load->n;
+  }
+  for (PetscInt k = 0; k < 4 * load->nitem; k++) {
+    if (load->slot[k] >= 0) load->slot[k] = at[load->slot[k]];
+  }
+  PetscCall(PetscFree(at));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbDeadLoadCreate(SbSpace space, PetscInt ncorner, PetscInt nitem, const PetscInt corner[],
                                 const SbFormula density[3], SbDeadLoad *deadload)
 {
   SbDeadLoad load;
-  PetscInt *slot;
   PetscBool steady = PETSC_TRUE;
 
   PetscFunctionBeginUser;
   PetscCall(PetscNew(&load));
   load->ncorner = ncorner;
   load->nitem = nitem;
-  load->node_x = space->node_x;
+  load->space = space;
   for (int i = 0; i < 3; i++) {
     PetscBool time, place;
 
@@ -129,27 +188,14 @@ PetscErrorCode SbDeadLoadCreate(SbSpace space, PetscInt ncorner, PetscInt nitem,
     PetscCall(SbFormulaUses(density[i], &time, &place));
     if (time) steady = PETSC_FALSE;
   }
-
-  // The nodes touched, ascending, and where each corner finds its own.
-  PetscCall(PetscCalloc1(space->nnode, &slot));
-  for (PetscInt i = 0; i < ncorner * nitem; i++) slot[node[i]] = 1;
-  for (PetscInt i = 0; i < space->nnode; i++) load->n += slot[i];
   PetscCall(PetscMalloc1(ncorner * nitem, &load->corner));
-  PetscCall(PetscMalloc2(load->n, &load->node, 3 * load->n, &load->value));
-  load->n = 0;
-  for (PetscInt i = 0; i < space->nnode; i++) {
-    if (!slot[i]) continue;
-    slot[i] = load->n;
-    load->node[load->n++] = i;
-    if (i < space->nnode_owned) load->nowned = load->n;
-  }
-  for (PetscInt i = 0; i < ncorner * nitem; i++) load->corner[i] = slot[node[i]];
-  PetscCall(PetscFree(slot));
-
+  PetscCall(PetscArraycpy(load->corner, corner, ncorner * nitem));
+  PetscCall(find_nodes(load));
   integrate(load, 0);
   if (steady) {
     load->nitem = 0;
     PetscCall(PetscFree(load->corner));
+    PetscCall(PetscFree(load->slot));
   }
   *deadload = load;
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -173,6 +219,7 @@ PetscErrorCode SbDeadLoadDestroy(SbDeadLoad *load)
   PetscFunctionBeginUser;
   if (!*load) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscFree((*load)->corner));
+  PetscCall(PetscFree((*load)->slot));
   PetscCall(PetscFree2((*load)->node, (*load)->value));
   PetscCall(PetscFree(*load));
   PetscFunctionReturn(PETSC_SUCCESS);

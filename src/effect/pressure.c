@@ -21,19 +21,12 @@
 */
 #include "sbeffect.h"
 
-/* One facet of the loaded surface. */
-typedef struct {
-  PetscInt node[3];   /* local nodes, counter-clockwise seen from outside */
-  PetscInt cell;      /* local cell */
-  PetscInt corner[3]; /* 0..3, which nodes of the cell these are */
-} Facet;
-
 typedef struct {
   SbEffectOn on;
   SbFormula value, time;
   PetscBool follower;
   PetscInt nfacet;
-  Facet *facet; /* [nfacet] of owned and ghost cells */
+  SbFacet *facet; /* [nfacet] of owned and ghost cells */
 } Pressure;
 
 static const SbOption rows[] = {
@@ -64,31 +57,23 @@ static PetscErrorCode options_pressure(SbEffect e, const SbScope *scope)
 static PetscErrorCode setup_pressure(SbEffect e, SbSpace space)
 {
   Pressure *p = (Pressure *)e->data;
-  SbFacet *facets;
 
   PetscFunctionBeginUser;
-  PetscCall(SbEffectFacets(space, &p->on, &p->nfacet, &facets));
-  PetscCall(PetscMalloc1(p->nfacet, &p->facet));
-  for (PetscInt i = 0; i < p->nfacet; i++) {
-    Facet *facet = &p->facet[i];
-
-    facet->cell = facets[i].cell;
-    for (int k = 0; k < 3; k++) {
-      facet->node[k] = facets[i].node[k];
-      for (int a = 0; a < 4; a++) {
-        if (space->cell_node[4 * facet->cell + a] == facet->node[k]) facet->corner[k] = a;
-      }
-    }
-  }
-  PetscCall(PetscFree(facets));
+  PetscCall(SbEffectFacets(space, &p->on, &p->nfacet, &p->facet));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Corners of a facet, one per row, m: at rest when u is NULL, else where they are now. */
-static inline void corners(const Facet *facet, const PetscReal X[], const PetscReal u[], PetscReal x[3][3])
+static inline void corners(SbSpace space, const SbFacet *facet, const PetscReal u[], PetscReal x[3][3])
 {
+  const SbElementOps *e = &SbSpaceCellElement(space, facet->cell)->ops;
+  const PetscInt *node = space->cell_node + 4 * facet->cell;
+
   for (int k = 0; k < 3; k++) {
-    for (int i = 0; i < 3; i++) x[k][i] = X[3 * facet->node[k] + i] + (u ? u[3 * facet->node[k] + i] : 0);
+    for (int i = 0; i < 3; i++) x[k][i] = space->mesh->x[3 * facet->vertex[k] + i];
+    for (int a = 0; u && a < 4; a++) {
+      for (int i = 0; i < 3; i++) x[k][i] += e->vertex[facet->corner[k]][a] * u[3 * node[a] + i];
+    }
   }
 }
 
@@ -100,23 +85,52 @@ static PetscErrorCode force_pressure(SbEffect e, SbSpace space, const SbStage *s
 
   PetscFunctionBeginUser;
   for (PetscInt k = 0; k < load->nfacet; k++) {
-    const PetscInt *node = load->facet[k].node;
+    const SbFacet *facet = &load->facet[k];
+    const SbElementOps *element = &SbSpaceCellElement(space, facet->cell)->ops;
     PetscReal x[3][3], d[3], b[3], N[3];
 
-    corners(&load->facet[k], space->node_x, u, x);
+    corners(space, facet, u, x);
     for (int i = 0; i < 3; i++) {
       d[i] = x[1][i] - x[0][i];
       b[i] = x[2][i] - x[0][i];
     }
-    N[0] = d[1] * b[2] - d[2] * b[1];
-    N[1] = d[2] * b[0] - d[0] * b[2];
-    N[2] = d[0] * b[1] - d[1] * b[0];
-    for (int a = 0; a < 3; a++) {
-      for (int i = 0; i < 3; i++) f[3 * node[a] + i] -= p / 6 * N[i];
+    SbCross(d, b, N);
+    /* each corner has -p/6 N */
+    for (int a = 0; a < 4; a++) {
+      const PetscInt node = space->cell_node[4 * facet->cell + a];
+      PetscReal share = 0;
+
+      for (int c = 0; c < 3; c++) share += element->vertex[facet->corner[c]][a];
+      for (int i = 0; i < 3; i++) f[3 * node + i] -= share * p / 6 * N[i];
     }
   }
   PetscCall(PetscLogFlops(45.0 * (PetscLogDouble)load->nfacet));
   PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/*
+  What the facet adds to the matrix for nodes a and b of its cell: minus the derivative of the force between corners k and l,
+  -p/12 [c_l - c_k]x, which the element spreads over its nodes. The diagonal blocks of the corners vanish.
+*/
+static void facet_block(const SbElementOps *e, const SbFacet *facet, PetscReal p, PetscReal (*const c)[3],
+                        int a, int b, PetscReal block[9])
+{
+  PetscReal d[3] = {0, 0, 0};
+
+  for (int k = 0; k < 3; k++) {
+    for (int l = 0; l < 3; l++) {
+      const PetscReal weight = e->vertex[facet->corner[k]][a] * e->vertex[facet->corner[l]][b];
+
+      for (int i = 0; k != l && i < 3; i++) d[i] -= weight * p / 12 * (c[l][i] - c[k][i]);
+    }
+  }
+  block[0] = block[4] = block[8] = 0;
+  block[1] = -d[2];
+  block[2] = d[1];
+  block[3] = d[2];
+  block[5] = -d[0];
+  block[6] = -d[1];
+  block[7] = d[0];
 }
 
 static PetscErrorCode tangent_pressure(SbEffect e, SbSpace space, const SbStage *stage, Mat A)
@@ -128,22 +142,19 @@ static PetscErrorCode tangent_pressure(SbEffect e, SbSpace space, const SbStage 
   PetscFunctionBeginUser;
   if (p == 0) PetscFunctionReturn(PETSC_SUCCESS);
   for (PetscInt k = 0; k < load->nfacet; k++) {
-    const Facet *facet = &load->facet[k];
-    PetscReal x[3][3], c[3][3];
+    const SbFacet *facet = &load->facet[k];
+    const SbElementOps *element = &SbSpaceCellElement(space, facet->cell)->ops;
+    PetscReal x[3][3], c[3][3], block[9];
 
-    corners(facet, space->node_x, stage->u, x);
+    corners(space, facet, stage->u, x);
     for (int b = 0; b < 3; b++) {
       for (int i = 0; i < 3; i++) c[b][i] = x[(b + 1) % 3][i] - x[(b + 2) % 3][i];
     }
-    // Minus the derivative of the force: -p/12 [c_b - c_a]x; the diagonal blocks vanish.
-    for (int a = 0; a < 3; a++) {
-      for (int b = 0; b < 3; b++) {
-        if (a == b) continue;
-        const PetscReal d[3] = {-p / 12 * (c[b][0] - c[a][0]), -p / 12 * (c[b][1] - c[a][1]),
-                                -p / 12 * (c[b][2] - c[a][2])};
-        const PetscReal block[9] = {0, -d[2], d[1], d[2], 0, -d[0], -d[1], d[0], 0};
-
-        PetscCall(SbSpaceAddCellBlock(space, A, facet->cell, facet->corner[a], facet->corner[b], block));
+    for (int a = 0; a < 4; a++) {
+      for (int b = 0; b < 4; b++) {
+        facet_block(element, facet, p, c, a, b, block);
+        if (block[1] == 0 && block[2] == 0 && block[5] == 0) continue;
+        PetscCall(SbSpaceAddCellBlock(space, A, facet->cell, a, b, block));
       }
     }
   }

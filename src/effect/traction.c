@@ -67,20 +67,20 @@ static PetscErrorCode setup_traction(SbEffect e, SbSpace space)
 {
   Traction *q = (Traction *)e->data;
   SbFacet *facets;
-  PetscInt n, *nodes;
+  PetscInt n, *corners;
 
   PetscFunctionBeginUser;
   PetscCall(SbEffectFacets(space, &q->on, &n, &facets));
-  PetscCall(PetscMalloc1(3 * n, &nodes));
+  PetscCall(PetscMalloc1(3 * n, &corners));
   for (PetscInt i = 0; i < n; i++) {
-    for (int a = 0; a < 3; a++) nodes[3 * i + a] = facets[i].node[a];
+    for (int a = 0; a < 3; a++) corners[3 * i + a] = 4 * facets[i].cell + facets[i].corner[a];
   }
-  if (q->vector_given) PetscCall(SbDeadLoadCreate(space, 3, n, nodes, q->vector, &q->by_vector));
+  if (q->vector_given) PetscCall(SbDeadLoadCreate(space, 3, n, corners, q->vector, &q->by_vector));
   if (q->total_given) {
     PetscCall(spread_total(q, space, n, facets));
-    PetscCall(SbDeadLoadCreate(space, 3, n, nodes, q->uniform, &q->by_total));
+    PetscCall(SbDeadLoadCreate(space, 3, n, corners, q->uniform, &q->by_total));
   }
-  PetscCall(PetscFree(nodes));
+  PetscCall(PetscFree(corners));
   PetscCall(PetscFree(facets));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

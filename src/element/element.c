@@ -1,9 +1,17 @@
 /*
-  Creation of elements by name.
+  Creation of elements by name, and their options.
 */
 #include "element_impl.h"
 
 PetscFunctionList SbElementList = NULL;
+
+static const SbOption cr_rows[] = {
+  {"gamma1", SB_OPTION_REAL, 1, "", "1", "(0, inf)", "factor on the penalty of jumps across faces"},
+};
+static const SbOption dg_rows[] = {
+  {"gamma0", SB_OPTION_REAL, 1, "", "4", "(0, inf)", "factor on the penalty of the mean jump across a face"},
+  {"gamma1", SB_OPTION_REAL, 1, "", "1", "(0, inf)", "factor on the penalty of jumps across faces"},
+};
 
 static PetscErrorCode destroy_list(void)
 {
@@ -12,22 +20,37 @@ static PetscErrorCode destroy_list(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbElementRegister(const char *name, PetscErrorCode (*create)(SbElement))
+PetscErrorCode SbElementRegister(const char *name, PetscErrorCode (*create)(SbElement), PetscInt nrows,
+                                 const SbOption rows[])
 {
   PetscFunctionBeginUser;
   if (!SbElementList) PetscCall(PetscRegisterFinalize(destroy_list));
   PetscCall(PetscFunctionListAdd(&SbElementList, name, create));
+  if (nrows) PetscCall(SbOptionsRegister("body", name, nrows, rows));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode SbElementRegisterAll(void)
 {
   PetscFunctionBeginUser;
-  PetscCall(SbElementRegister("p1", SbElementCreate_P1));
+  PetscCall(SbElementRegister("p1", SbElementCreate_P1, 0, NULL));
+  PetscCall(SbElementRegister("cr", SbElementCreate_CR, PETSC_STATIC_ARRAY_LENGTH(cr_rows), cr_rows));
+  PetscCall(SbElementRegister("dg", SbElementCreate_DG, PETSC_STATIC_ARRAY_LENGTH(dg_rows), dg_rows));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbElementCreate(const char *name, SbElement *element)
+static PetscErrorCode read_options(const SbScope *body, SbElement e)
+{
+  SbScope scope;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbScopeSet(&scope, "body", e->name, body->instance));
+  if (e->gamma0 > 0.) PetscCall(SbOptionReal(&scope, "gamma0", &e->gamma0));
+  if (e->gamma1 > 0.) PetscCall(SbOptionReal(&scope, "gamma1", &e->gamma1));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbElementCreate(const char *name, const SbScope *body, SbElement *element)
 {
   PetscErrorCode (*create)(SbElement) = NULL;
   SbElement e;
@@ -51,6 +74,7 @@ PetscErrorCode SbElementCreate(const char *name, SbElement *element)
   PetscCall(PetscStrncpy(e->name, name, sizeof(e->name)));
   PetscCall((*create)(e));
   *element = e;
+  if (body) PetscCall(read_options(body, e));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -6,7 +6,7 @@
 */
 #include "element_impl.h"
 
-static void tabulate_p1(const PetscReal x[4][3], PetscReal g[3][3], PetscReal *V)
+void SbTabulateP1(const PetscReal x[4][3], PetscReal g[3][3], PetscReal *V)
 {
   PetscReal e[3][3];
 
@@ -25,9 +25,10 @@ PetscErrorCode SbElementCreate_P1(SbElement e)
 {
   PetscFunctionBeginUser;
   e->nodes_per[0] = 1;
-  e->ops.tabulate = tabulate_p1;
+  e->ops.tabulate = SbTabulateP1;
   e->ops.mass_lumped = 1. / 4;
   e->ops.mass_diagonal = 1. / 10;
   e->ops.mass_coupling = 1. / 20;
+  for (int a = 0; a < 4; a++) e->ops.vertex[a][a] = 1.;
   PetscFunctionReturn(PETSC_SUCCESS);
 }

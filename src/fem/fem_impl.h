@@ -4,32 +4,52 @@
 #pragma once
 #include "sbfem.h"
 
+/* layout.c: nodes of the space; then, with batches in place, the nodes that each cell's stress acts on. Collective. */
+PetscErrorCode SbLayoutNodes(SbSpace space);
+PetscErrorCode SbLayoutCliques(SbSpace space);
+PetscErrorCode SbLayoutDestroy(SbSpace space);
+
+/* jump.c: face terms of CR and DG, as stiffness or times the body's beta. Not collective. */
+typedef enum { SB_JUMP_STIFFNESS, SB_JUMP_DAMPING } SbJumpFactor;
+PetscErrorCode SbJumpCreate(SbSpace space, SbJump *jump);
+PetscErrorCode SbJumpDestroy(SbJump *jump);
+/* f[nnode][3] += (factor) K_F x; right on owned nodes. x[nnode][3] with ghosts. */
+void SbJumpAdd(SbSpace space, const PetscReal x[], SbJumpFactor factor, PetscReal f[]);
+/* 1/2 x . (factor) K_F x, this rank's part. */
+PetscReal SbJumpEnergy(SbSpace space, const PetscReal x[], SbJumpFactor factor);
+/* node[nbatch][8][SB_BATCH] of the faces, borrowed; returns nbatch. */
+PetscInt SbJumpCliques(SbSpace space, const PetscInt **node);
+/* The matrix of the face in lane l of batch b, times the 3x3 identity; zero in padding. */
+void SbJumpMatrix(SbSpace space, PetscInt b, PetscInt l, PetscReal K[8][8]);
+
 /*
   The plan: sparsity graph of the owned node rows, split as PETSc splits it (diagonal part: owned columns; off-diagonal
-  part: ghost columns), and for each local cell the place of its 16 node blocks in it. A block index k of row i is the same
+  part: ghost columns), and for each local cell the place of its width^2 node blocks in it. A block index k of row i is the same
   for BAIJ (values 9 k ..) and for AIJ with full 3x3 blocks (see block_position in tangent.c).
 */
 typedef struct _p_SbPlan {
   PetscInt *di, *dj;  /* diagonal part: rows [nnode_owned+1], local columns ascending */
   PetscInt *oi, *oj;  /* off-diagonal part: columns are local ghost nodes, ascending */
   PetscInt *diagonal; /* [nnode_owned] block index of (i, i) */
-  PetscInt
-    *offset; /* [nbatch][16][SB_BATCH] block (a, b) at 4 a + b: k in the diagonal part, ~k in the off-diagonal
+  PetscInt *
+    offset; /* [nbatch][width^2][SB_BATCH] block (a, b) at width a + b: k in the diagonal part, ~k in the off-diagonal
                              part, SB_NOT_OWNED when row a is another rank's; padding lanes have those of the first */
   PetscInt *ui; /* [nnode_owned+1] first upper block of each row, for SBAIJ; NULL otherwise */
   PetscInt *
     upper; /* [nbatch][10][SB_BATCH] block index in the upper triangle of pair p, ~k when it is to be transposed */
   PetscInt *fresh_start; /* [nbatch+1] into fresh */
   PetscInt *fresh;       /* [nnode_owned] rows in the order in which the batches reach them first */
-  PetscInt nfix;         /* blocks that a prescribed unknown touches */
-  PetscInt *fix_block;   /* [nfix] block index as in offset */
-  PetscInt *fix_row;     /* [nfix] local row node */
+  PetscReal
+    *glue[2]; /* face terms: factor of the identity in each block of the two parts, N/m; NULL without them */
+  PetscInt nfix;       /* blocks that a prescribed unknown touches */
+  PetscInt *fix_block; /* [nfix] block index as in offset */
+  PetscInt *fix_row;   /* [nfix] local row node */
   uint8_t
     *fix_mask; /* [nfix] bits 0..2: rows, bits 3..5: columns of the block to clear; bit 6: diagonal block */
 } * SbPlan;
 #define SB_NOT_OWNED PETSC_MIN_INT
 
-/* Where a cell's places begin in `offset`: block (a, b) follows at SB_BATCH (4 a + b). */
+/* Where a cell's places begin in `offset`: block (a, b) follows at SB_BATCH (width a + b). */
 size_t SbPlanCellOffset(SbSpace space, PetscInt cell);
 PetscErrorCode SbPlanCreate(SbSpace space, SbPlan *plan);
 PetscErrorCode SbPlanDestroy(SbPlan *plan);
@@ -39,6 +59,8 @@ typedef struct {
   SbMatrixKind kind;
   Mat part[2]; /* diagonal and off-diagonal part; the second is NULL on one rank */
   PetscScalar *value[2];
+  const PetscReal *
+    glue; /* [nbody] factor on the face terms that the rows of a body begin with; NULL: they begin with zero */
 } SbValues;
 
 /* Where block k (as in SbPlan.offset) of row i begins in its value array, and the distance between its rows and columns. */
@@ -60,10 +82,12 @@ static inline PetscScalar *sb_block(const SbValues *x, SbPlan p, PetscInt row, P
   return x->value[q] + 9 * (size_t)k;
 }
 
-/* Clears the rows that batch b reaches first; call it for every batch in turn, each before SbInsertBatch(). */
+/* Clears the rows that batch b reaches first, or fills them with the face terms; call it for every batch in turn, each before SbInsertBatch(). */
 void SbInsertClear(SbSpace space, const SbValues *x, PetscInt b);
 /* Adds the ten blocks of each cell of batch b; K is 32-byte aligned. */
 void SbInsertBatch(SbSpace space, const SbValues *x, PetscInt b, const SbLane K[10][9]);
+/* The same for DG cells, whose blocks stand between the means of their faces. */
+void SbInsertBroken(SbSpace space, const SbValues *x, PetscInt b, const SbLane K[10][9]);
 
 /* Gives a BAIJ or SBAIJ matrix of the space the fast product of product.c. Collective. */
 PetscErrorCode SbProductAttach(SbSpace space, SbMatrixKind kind, Mat A);
@@ -82,6 +106,25 @@ static inline void sb_gather(const PetscInt node[4 * SB_BATCH], const PetscReal 
   }
 }
 
+/*
+  What strains are computed from: the nodes of the cells; for DG the means m = p + w (u - p) of the own node u and the one
+  across the face p.
+*/
+static inline void sb_gather_strain(SbSpace s, const SbRegion *region, PetscInt b, const PetscReal x[],
+                                    SbLane u[12])
+{
+  sb_gather(s->batch_node + 4 * SB_BATCH * b, x, u);
+  if (region->broken) {
+    SbLane p[12];
+
+    sb_gather(s->batch_clique + (8 * b + 4) * SB_BATCH, x, p);
+    for (int k = 0; k < 12; k++) {
+      for (int l = 0; l < SB_BATCH; l++)
+        u[k][l] = p[k][l] + s->batch_weight[4 * b + k / 3][l] * (u[k][l] - p[k][l]);
+    }
+  }
+}
+
 /* f[nnode][3] += the first n lanes of a batch's nodal vectors. */
 static inline void sb_scatter_add(const PetscInt node[4 * SB_BATCH], PetscInt n, const SbLane fe[12],
                                   PetscReal f[])
@@ -95,4 +138,24 @@ static inline void sb_scatter_add(const PetscInt node[4 * SB_BATCH], PetscInt n,
       p[2] += fe[3 * a + 2][l];
     }
   }
+}
+
+/* The transpose of sb_gather_strain(): forces on the means go to the two nodes by their weights. */
+static inline void sb_scatter_strain(SbSpace s, const SbRegion *region, PetscInt b, SbLane fe[12],
+                                     PetscReal f[])
+{
+  if (region->broken) {
+    SbLane p[12];
+
+    for (int k = 0; k < 12; k++) {
+      for (int l = 0; l < SB_BATCH; l++) {
+        const PetscReal own = s->batch_weight[4 * b + k / 3][l] * fe[k][l];
+
+        p[k][l] = fe[k][l] - own;
+        fe[k][l] = own;
+      }
+    }
+    sb_scatter_add(s->batch_clique + (8 * b + 4) * SB_BATCH, s->batch_n[b], (const SbLane *)p, f);
+  }
+  sb_scatter_add(s->batch_node + 4 * SB_BATCH * b, s->batch_n[b], (const SbLane *)fe, f);
 }

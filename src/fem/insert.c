@@ -14,6 +14,21 @@
 #include "fem_impl.h"
 #include "sbkernel.h"
 
+/* Row i begins with the face terms, glue times the identity in each block of part q. */
+static void begin_with_glue(SbSpace s, const SbValues *x, PetscInt i, int q)
+{
+  const SbPlan p = s->plan;
+  const PetscInt *ptr = q ? p->oi : p->di, first = x->kind == SB_MATRIX_SBAIJ ? p->diagonal[i] : ptr[i];
+  const PetscReal factor = x->glue[s->node_body[i]];
+
+  for (PetscInt k = first; k < ptr[i + 1]; k++) {
+    size_t rs, cs;
+    PetscScalar *v = sb_block(x, p, i, q ? ~k : k, &rs, &cs);
+
+    for (size_t c = 0; c < 3; c++) v[c * (rs + cs)] = factor * p->glue[q][k];
+  }
+}
+
 void SbInsertClear(SbSpace s, const SbValues *x, PetscInt b)
 {
   const SbPlan p = s->plan;
@@ -23,14 +38,30 @@ void SbInsertClear(SbSpace s, const SbValues *x, PetscInt b)
 
     memset(x->value[0] + 9 * (size_t)ptr[i], 0, 72 * (size_t)(ptr[i + 1] - ptr[i]));
     if (x->value[1]) memset(x->value[1] + 9 * (size_t)p->oi[i], 0, 72 * (size_t)(p->oi[i + 1] - p->oi[i]));
+    if (!x->glue) continue;
+    for (int q = 0; q < (x->value[1] ? 2 : 1); q++) begin_with_glue(s, x, i, q);
+  }
+}
+
+/* A block, or its transpose, times a factor, at its place in a row that this rank owns. */
+static inline void add_block(SbSpace s, const SbValues *x, PetscInt row, PetscInt column, PetscInt place,
+                             PetscReal factor, PetscBool turn, const PetscReal k[9])
+{
+  size_t rs, cs;
+  PetscScalar *v;
+
+  if (place == SB_NOT_OWNED || (x->kind == SB_MATRIX_SBAIJ && row > column)) return;
+  v = sb_block(x, s->plan, row, place, &rs, &cs);
+  for (size_t i = 0; i < 3; i++) {
+    for (size_t j = 0; j < 3; j++) v[i * rs + j * cs] += factor * (turn ? k[3 * j + i] : k[3 * i + j]);
   }
 }
 
 /* Any storage, any rank: the cell in lane l of batch b, block by block. */
 static void insert_cell(SbSpace s, const SbValues *x, PetscInt b, PetscInt l, const SbLane K[10][9])
 {
-  const PetscInt *node = s->cell_node + 4 * (s->batch_cell[b] + l);
-  const PetscInt *offset = s->plan->offset + (size_t)b * 16 * SB_BATCH + l;
+  const PetscInt w = s->width, *node = s->cell_node + 4 * (s->batch_cell[b] + l);
+  const PetscInt *offset = s->plan->offset + (size_t)(b * w * w) * SB_BATCH + l;
 
   for (int p = 0; p < 10; p++) {
     PetscReal k[9];
@@ -38,15 +69,36 @@ static void insert_cell(SbSpace s, const SbValues *x, PetscInt b, PetscInt l, co
     SbLaneGet(9, K[p], (int)l, k);
     for (int turn = 0; turn < (SbPairA[p] == SbPairB[p] ? 1 : 2); turn++) {
       const int row = turn ? SbPairB[p] : SbPairA[p], column = turn ? SbPairA[p] : SbPairB[p];
-      const PetscInt place = offset[SB_BATCH * (4 * row + column)];
-      size_t rs, cs;
-      PetscScalar *v;
 
-      if (place == SB_NOT_OWNED || (x->kind == SB_MATRIX_SBAIJ && node[row] > node[column])) continue;
-      v = sb_block(x, s->plan, node[row], place, &rs, &cs);
-      for (size_t i = 0; i < 3; i++) {
-        for (size_t j = 0; j < 3; j++) v[i * rs + j * cs] += turn ? k[3 * j + i] : k[3 * i + j];
-      }
+      add_block(s, x, node[row], node[column], offset[SB_BATCH * (w * row + column)], 1., (PetscBool)turn, k);
+    }
+  }
+}
+
+/* Each block between means is spread over the own nodes and those across the faces. */
+static void insert_broken_cell(SbSpace s, const SbValues *x, PetscInt b, PetscInt l, const SbLane K[10][9])
+{
+  const PetscInt *node = s->batch_clique + (size_t)b * 8 * SB_BATCH + l;
+  const PetscInt *offset = s->plan->offset + (size_t)b * 64 * SB_BATCH + l;
+  PetscReal weight[8];
+
+  for (int a = 0; a < 4; a++) {
+    weight[a] = s->batch_weight[4 * b + a][l];
+    weight[4 + a] = 1. - weight[a];
+  }
+  for (int p = 0; p < 10; p++) {
+    const int twice = SbPairA[p] == SbPairB[p] ? 1 : 2;
+    PetscReal k[9];
+
+    SbLaneGet(9, K[p], (int)l, k);
+    for (int n = 0; n < 4 * twice; n++) {
+      const int turn = n / 4, row = (turn ? SbPairB[p] : SbPairA[p]) + 4 * (n & 1),
+                column = (turn ? SbPairA[p] : SbPairB[p]) + 2 * (n & 2);
+      const PetscReal factor = weight[row] * weight[column];
+
+      if (factor != 0.)
+        add_block(s, x, node[SB_BATCH * row], node[SB_BATCH * column], offset[SB_BATCH * (8 * row + column)],
+                  factor, (PetscBool)turn, k);
     }
   }
 }
@@ -101,11 +153,11 @@ SB_INLINE void add_blocks(const Four k[9], const PetscInt place[4], PetscBool ed
 }
 
 /* Padding lanes have volume zero and add nothing to the blocks of the first. */
-SB_INLINE void insert_both(const SbLane K[10][9], const PetscInt offset[16 * SB_BATCH], PetscBool edge,
+SB_INLINE void insert_both(const SbLane K[10][9], const PetscInt offset[], PetscInt width, PetscBool edge,
                            PetscScalar *const value[2])
 {
   for (int p = 0; p < 10; p++) {
-    const int ab = 4 * SbPairA[p] + SbPairB[p], ba = 4 * SbPairB[p] + SbPairA[p];
+    const PetscInt ab = width * SbPairA[p] + SbPairB[p], ba = width * SbPairB[p] + SbPairA[p];
 
     for (int h = 0; h < SB_BATCH; h += 4) {
       Four k[9];
@@ -119,18 +171,17 @@ SB_INLINE void insert_both(const SbLane K[10][9], const PetscInt offset[16 * SB_
   }
 }
 
-SB_KERNEL static void insert_baij(const SbLane K[restrict 10][9],
-                                  const PetscInt offset[restrict 16 * SB_BATCH], PetscScalar *const value[2])
+SB_KERNEL static void insert_baij(const SbLane K[restrict 10][9], const PetscInt offset[restrict],
+                                  PetscInt width, PetscScalar *const value[2])
 {
-  insert_both(K, offset, PETSC_FALSE, value);
+  insert_both(K, offset, width, PETSC_FALSE, value);
 }
 
 /* Batches that touch nodes of another rank. */
-SB_KERNEL static void insert_baij_edge(const SbLane K[restrict 10][9],
-                                       const PetscInt offset[restrict 16 * SB_BATCH],
-                                       PetscScalar *const value[2])
+SB_KERNEL static void insert_baij_edge(const SbLane K[restrict 10][9], const PetscInt offset[restrict],
+                                       PetscInt width, PetscScalar *const value[2])
 {
-  insert_both(K, offset, PETSC_TRUE, value);
+  insert_both(K, offset, width, PETSC_TRUE, value);
 }
 
 /* The stored block is K_ab, or K_ba = K_ab^T when that lies in the row of the lower node. */
@@ -169,15 +220,15 @@ static PetscBool all_owned(SbSpace s, const PetscInt node[4 * SB_BATCH])
 
 static PetscBool insert_fast(SbSpace s, const SbValues *x, PetscInt b, const SbLane K[10][9])
 {
-  const PetscInt *offset = s->plan->offset + (size_t)b * 16 * SB_BATCH;
+  const PetscInt *offset = s->plan->offset + (size_t)(b * s->width * s->width) * SB_BATCH;
 
   if (x->kind == SB_MATRIX_AIJ) return PETSC_FALSE;
   if (x->kind == SB_MATRIX_SBAIJ)
     insert_sbaij(K, s->plan->upper + (size_t)b * 10 * SB_BATCH, x->value);
   else if (all_owned(s, s->batch_node + 4 * SB_BATCH * b))
-    insert_baij(K, offset, x->value);
+    insert_baij(K, offset, s->width, x->value);
   else
-    insert_baij_edge(K, offset, x->value);
+    insert_baij_edge(K, offset, s->width, x->value);
   return PETSC_TRUE;
 }
 #else
@@ -192,4 +243,9 @@ void SbInsertBatch(SbSpace s, const SbValues *x, PetscInt b, const SbLane K[10][
 {
   if (insert_fast(s, x, b, K)) return;
   for (PetscInt l = 0; l < s->batch_n[b]; l++) insert_cell(s, x, b, l, K);
+}
+
+void SbInsertBroken(SbSpace s, const SbValues *x, PetscInt b, const SbLane K[10][9])
+{
+  for (PetscInt l = 0; l < s->batch_n[b]; l++) insert_broken_cell(s, x, b, l, K);
 }

@@ -1,42 +1,53 @@
 /*
-  The assembly plan: the graph of node blocks and, for each cell, where its 16 blocks lie in it.
+  The assembly plan: the graph of node blocks and, for each cell, where its blocks lie in it.
 
-  Built in one sweep over nodes: the cells around an owned node give the columns of its row; while they are at hand, the
-  places of the blocks of that row are written into the cells' tables. There is no search. Measured at 200k tets this
+  Built in one sweep over nodes: the cells (and with CR and DG the faces) around an owned node give the columns of its row;
+  while they are at hand, the places of the blocks of that row are written into the cells' tables. The face terms are constant:
+  they are summed here once, and every assembly begins with them. There is no search. Measured at 200k tets this
   takes a small part of what DMCreateMatrix takes for the same graph (`make bench`, row matrix_setup).
 */
 #include "fem_impl.h"
 
 /*
-  Places in batch_node at which each owned node stands: one for each cell around it. Padding lanes count as the cell that they
-  repeat: its columns are marked once more, and they get its places.
+  Groups of nodes that are all coupled, in lanes: the cells' (width nodes each) and the faces' (eight), node a of lane l of
+  batch b at SB_BATCH (nodes b + a) + l. A slot is such a place.
 */
-static PetscErrorCode invert_batches(SbSpace s, PetscInt **start, PetscInt **slot)
+typedef struct {
+  const PetscInt *node;
+  PetscInt nodes; /* in a group */
+  PetscInt nbatch;
+  PetscInt *start,
+    *slot;          /* [nnode_owned+2] slots at which each owned node stands, one for each group around it */
+  PetscInt *offset; /* [nbatch][nodes^2][SB_BATCH] to be filled; NULL: not wanted */
+} Groups;
+
+/* Padding lanes count as the group that they repeat: its columns are marked once more, and they get its places. */
+static PetscErrorCode invert_groups(SbSpace s, Groups *g)
 {
-  const PetscInt n = 4 * SB_BATCH * s->nbatch;
+  const PetscInt n = g->nodes * SB_BATCH * g->nbatch;
   PetscInt *next;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscCalloc1(s->nnode_owned + 2, start));
+  PetscCall(PetscCalloc1(s->nnode_owned + 2, &g->start));
   for (PetscInt k = 0; k < n; k++) {
-    if (s->batch_node[k] < s->nnode_owned) (*start)[s->batch_node[k] + 2]++;
+    if (g->node[k] < s->nnode_owned) g->start[g->node[k] + 2]++;
   }
-  for (PetscInt i = 1; i <= s->nnode_owned; i++) (*start)[i + 1] += (*start)[i];
-  PetscCall(PetscMalloc1((*start)[s->nnode_owned + 1], slot));
-  next = *start + 1;
+  for (PetscInt i = 1; i <= s->nnode_owned; i++) g->start[i + 1] += g->start[i];
+  PetscCall(PetscMalloc1(g->start[s->nnode_owned + 1], &g->slot));
+  next = g->start + 1;
   for (PetscInt k = 0; k < n; k++) {
-    if (s->batch_node[k] < s->nnode_owned) (*slot)[next[s->batch_node[k]]++] = k;
+    if (g->node[k] < s->nnode_owned) g->slot[next[g->node[k]]++] = k;
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Node 0 of the cell that has node a at slot[a]; its node b follows SB_BATCH b behind. */
-static inline const PetscInt *slot_cell(SbSpace s, PetscInt slot)
+/* Node 0 of the group that has a node at a slot; its node b follows SB_BATCH b behind. */
+static inline const PetscInt *slot_group(const Groups *g, PetscInt slot)
 {
-  return s->batch_node + slot / (4 * SB_BATCH) * (4 * SB_BATCH) + slot % SB_BATCH;
+  return g->node + slot / (g->nodes * SB_BATCH) * (g->nodes * SB_BATCH) + slot % SB_BATCH;
 }
 
-/* Insertion sort: rows hold about fifteen columns. */
+/* Insertion sort: rows hold about fifteen columns, with face terms thirty. */
 static void sort_columns(PetscInt n, PetscInt column[])
 {
   for (PetscInt i = 1; i < n; i++) {
@@ -48,22 +59,18 @@ static void sort_columns(PetscInt n, PetscInt column[])
   }
 }
 
-/* Columns of one row, sorted; seen[] marks them with the row's number. Local ghosts are sorted globally, so local order is global order within each part. */
-static PetscInt row_columns(SbSpace s, PetscInt row, PetscInt n, const PetscInt slot[], PetscInt seen[],
-                            PetscInt column[])
+/* Adds the columns of one row; seen[] marks them with the row's number. */
+static PetscInt row_columns(const Groups *g, PetscInt row, PetscInt count, PetscInt seen[], PetscInt column[])
 {
-  PetscInt count = 0;
+  for (PetscInt k = g->start[row]; k < g->start[row + 1]; k++) {
+    const PetscInt *node = slot_group(g, g->slot[k]);
 
-  for (PetscInt k = 0; k < n; k++) {
-    const PetscInt *node = slot_cell(s, slot[k]);
-
-    for (PetscInt b = 0; b < 4 * SB_BATCH; b += SB_BATCH) {
+    for (PetscInt b = 0; b < g->nodes * SB_BATCH; b += SB_BATCH) {
       if (seen[node[b]] == row) continue;
       seen[node[b]] = row;
       column[count++] = node[b];
     }
   }
-  sort_columns(count, column);
   return count;
 }
 
@@ -83,7 +90,9 @@ size_t SbPlanCellOffset(SbSpace s, PetscInt cell)
   }
   region = &s->region[low];
   lane = (cell - region->cstart) % SB_BATCH;
-  return (size_t)(region->bstart + (cell - region->cstart) / SB_BATCH) * 16 * SB_BATCH + (size_t)lane;
+  return (size_t)(region->bstart + (cell - region->cstart) / SB_BATCH) * (size_t)(s->width * s->width) *
+           SB_BATCH +
+         (size_t)lane;
 }
 
 /* Rows in the order in which the batches reach them. */
@@ -97,8 +106,8 @@ static PetscErrorCode plan_fresh(SbSpace s, SbPlan p)
   PetscCall(PetscCalloc1(s->nnode_owned, &seen));
   for (PetscInt b = 0; b < s->nbatch; b++) {
     p->fresh_start[b] = n;
-    for (PetscInt k = 4 * SB_BATCH * b; k < 4 * SB_BATCH * (b + 1); k++) {
-      const PetscInt row = s->batch_node[k];
+    for (PetscInt k = s->width * SB_BATCH * b; k < s->width * SB_BATCH * (b + 1); k++) {
+      const PetscInt row = s->batch_clique[k];
 
       if (row >= s->nnode_owned || seen[row]) continue;
       seen[row] = PETSC_TRUE;
@@ -110,9 +119,9 @@ static PetscErrorCode plan_fresh(SbSpace s, SbPlan p)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Row i: its columns go to the graph, the places of its blocks to the cells around. */
-static void plan_row(SbSpace s, PetscInt i, PetscInt n, const PetscInt slot[], PetscInt ncolumn,
-                     const PetscInt column[], PetscInt place[], SbPlan p)
+/* Row i: its columns go to the graph. */
+static void plan_row(SbSpace s, PetscInt i, PetscInt ncolumn, const PetscInt column[], PetscInt place[],
+                     SbPlan p)
 {
   PetscInt nd = p->di[i], no = p->oi[i];
 
@@ -128,41 +137,110 @@ static void plan_row(SbSpace s, PetscInt i, PetscInt n, const PetscInt slot[], P
   p->diagonal[i] = place[i];
   p->di[i + 1] = nd;
   p->oi[i + 1] = no;
-  for (PetscInt k = 0; k < n; k++) {
-    const PetscInt *node = slot_cell(s, slot[k]), lane = slot[k] % SB_BATCH;
-    PetscInt *offset = p->offset + 4 * (size_t)(slot[k] - lane) + lane;
+}
 
-    for (PetscInt b = 0; b < 4 * SB_BATCH; b += SB_BATCH) offset[b] = place[node[b]];
+/* The places of the blocks of row i go to the groups around. */
+static void place_row(const Groups *g, PetscInt i, const PetscInt place[])
+{
+  for (PetscInt k = g->start[i]; k < g->start[i + 1]; k++) {
+    const PetscInt *node = slot_group(g, g->slot[k]), lane = g->slot[k] % SB_BATCH;
+    PetscInt *offset = g->offset + g->nodes * (size_t)(g->slot[k] - lane) + lane;
+
+    for (PetscInt b = 0; b < g->nodes * SB_BATCH; b += SB_BATCH) offset[b] = place[node[b]];
+  }
+}
+
+/* The face terms, which do not change: their factor of the identity in each block. */
+static PetscErrorCode plan_glue(SbSpace s, const Groups *faces, SbPlan p)
+{
+  PetscFunctionBeginUser;
+  PetscCall(PetscCalloc2(p->di[s->nnode_owned], &p->glue[0], p->oi[s->nnode_owned], &p->glue[1]));
+  for (PetscInt b = 0; b < faces->nbatch; b++) {
+    for (PetscInt l = 0; l < SB_BATCH; l++) {
+      const PetscInt *place = faces->offset + (size_t)b * 64 * SB_BATCH + l;
+      PetscReal K[8][8];
+
+      SbJumpMatrix(s, b, l, K);
+      for (int k = 0; k < 64; k++) {
+        const PetscInt at = place[SB_BATCH * k];
+
+        if (at != SB_NOT_OWNED) p->glue[at < 0][at < 0 ? ~at : at] += K[k / 8][k % 8];
+      }
+    }
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode create_groups(SbSpace s, const PetscInt node[], PetscInt nodes, PetscInt nbatch,
+                                    Groups *g)
+{
+  const size_t nplace = (size_t)nbatch * (size_t)(nodes * nodes) * SB_BATCH;
+
+  PetscFunctionBeginUser;
+  g->node = node;
+  g->nodes = nodes;
+  g->nbatch = nbatch;
+  PetscCall(invert_groups(s, g));
+  PetscCall(PetscMalloc1(nplace, &g->offset));
+  for (size_t k = 0; k < nplace; k++) g->offset[k] = SB_NOT_OWNED;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Most columns that a row can have, and that all rows can have together. */
+static void bound_columns(PetscInt nrow, PetscInt ngroup, const Groups group[], PetscInt *widest,
+                          PetscInt *all)
+{
+  *widest = 1;
+  *all = nrow;
+  for (PetscInt i = 0; i < nrow; i++) {
+    PetscInt width = 1;
+
+    for (PetscInt k = 0; k < ngroup; k++)
+      width += (group[k].nodes - 1) * (group[k].start[i + 1] - group[k].start[i]);
+    *widest = PetscMax(*widest, width);
+    *all += width - 1;
   }
 }
 
 PetscErrorCode SbPlanCreate(SbSpace s, SbPlan *plan)
 {
-  const PetscInt nrow = s->nnode_owned;
-  const size_t nplace = (size_t)s->nbatch * 16 * SB_BATCH;
-  PetscInt *start, *slot, *seen, *place, *column, widest = 0, capacity;
+  const PetscInt nrow = s->nnode_owned, *node, ngroup = s->jump ? 2 : 1;
+  PetscInt *seen, *place, *column, widest, capacity;
+  Groups group[2];
   SbPlan p;
 
   PetscFunctionBeginUser;
   PetscCall(PetscNew(&p));
-  PetscCall(invert_batches(s, &start, &slot));
-  for (PetscInt i = 0; i < nrow; i++) widest = PetscMax(widest, start[i + 1] - start[i]);
-  capacity = nrow + 3 * start[nrow];
-  PetscCall(PetscMalloc3(s->nnode, &seen, s->nnode, &place, 3 * widest + 1, &column));
+  PetscCall(create_groups(s, s->batch_clique, s->width, s->nbatch, &group[0]));
+  if (s->jump) {
+    const PetscInt nbatch = SbJumpCliques(s, &node);
+
+    PetscCall(create_groups(s, node, 8, nbatch, &group[1]));
+  }
+  bound_columns(nrow, ngroup, group, &widest, &capacity);
+  PetscCall(PetscMalloc3(s->nnode, &seen, s->nnode, &place, widest, &column));
   PetscCall(PetscMalloc4(nrow + 1, &p->di, capacity, &p->dj, nrow + 1, &p->oi, capacity, &p->oj));
   PetscCall(PetscMalloc1(nrow, &p->diagonal));
-  PetscCall(PetscMalloc1(nplace, &p->offset));
   for (PetscInt i = 0; i < s->nnode; i++) seen[i] = -1;
-  for (size_t k = 0; k < nplace; k++) p->offset[k] = SB_NOT_OWNED;
   p->di[0] = p->oi[0] = 0;
   for (PetscInt i = 0; i < nrow; i++) {
-    const PetscInt n = start[i + 1] - start[i], *around = slot + start[i];
-    const PetscInt ncolumn = row_columns(s, i, n, around, seen, column);
+    PetscInt n = 0;
 
-    plan_row(s, i, n, around, ncolumn, column, place, p);
+    for (PetscInt k = 0; k < ngroup; k++) n = row_columns(&group[k], i, n, seen, column);
+    /* local ghosts are sorted globally, so local order is global order within each part */
+    sort_columns(n, column);
+    plan_row(s, i, n, column, place, p);
+    for (PetscInt k = 0; k < ngroup; k++) place_row(&group[k], i, place);
   }
-  PetscCall(PetscFree(start));
-  PetscCall(PetscFree(slot));
+  p->offset = group[0].offset;
+  if (s->jump) {
+    PetscCall(plan_glue(s, &group[1], p));
+    PetscCall(PetscFree(group[1].offset));
+  }
+  for (PetscInt k = 0; k < ngroup; k++) {
+    PetscCall(PetscFree(group[k].start));
+    PetscCall(PetscFree(group[k].slot));
+  }
   PetscCall(PetscFree3(seen, place, column));
   PetscCall(plan_fresh(s, p));
   *plan = p;
@@ -180,6 +258,7 @@ PetscErrorCode SbPlanDestroy(SbPlan *plan)
   PetscCall(PetscFree(p->offset));
   PetscCall(PetscFree(p->ui));
   PetscCall(PetscFree(p->upper));
+  PetscCall(PetscFree2(p->glue[0], p->glue[1]));
   PetscCall(PetscFree2(p->fresh_start, p->fresh));
   PetscCall(PetscFree3(p->fix_block, p->fix_row, p->fix_mask));
   PetscCall(PetscFree(*plan));
@@ -198,15 +277,17 @@ static PetscErrorCode plan_upper(SbSpace s, SbPlan p)
   p->ui[0] = 0;
   for (PetscInt i = 0; i < nrow; i++) p->ui[i + 1] = p->ui[i] + p->di[i + 1] - p->diagonal[i];
   for (PetscInt b = 0; b < s->nbatch; b++) {
-    const PetscInt *node = s->batch_node + 4 * SB_BATCH * b, *offset = p->offset + (size_t)b * 16 * SB_BATCH;
+    const PetscInt *node = s->batch_node + 4 * SB_BATCH * b,
+                   *offset = p->offset + (size_t)b * (size_t)(s->width * s->width) * SB_BATCH;
     PetscInt *upper = p->upper + (size_t)b * 10 * SB_BATCH;
 
     for (PetscInt q = 0; q < 10; q++) {
       for (PetscInt l = 0; l < SB_BATCH; l++) {
         const PetscInt na = node[SB_BATCH * SbPairA[q] + l], nb = node[SB_BATCH * SbPairB[q] + l],
                        row = PetscMin(na, nb);
-        const PetscInt k =
-          offset[SB_BATCH * (na <= nb ? 4 * SbPairA[q] + SbPairB[q] : 4 * SbPairB[q] + SbPairA[q]) + l];
+        const PetscInt k = offset[SB_BATCH * (na <= nb ? s->width * SbPairA[q] + SbPairB[q]
+                                                       : s->width * SbPairB[q] + SbPairA[q]) +
+                                  l];
         const PetscInt u = p->ui[row] + k - p->diagonal[row];
 
         upper[SB_BATCH * q + l] = na <= nb ? u : ~u;
@@ -351,7 +432,7 @@ static PetscErrorCode attach_rigid_modes(SbSpace s, Mat A)
     for (PetscInt i = 0; i < s->nnode_owned; i++) {
       PetscReal value[3];
 
-      rigid_mode(m, s->node_x + 3 * i, s->mesh->body[s->mesh->vert_body[i]].bbox, value);
+      rigid_mode(m, s->node_x + 3 * i, s->mesh->body[s->node_body[i]].bbox, value);
       for (PetscInt c = 0; c < 3; c++) v[3 * i + c] = s->fixed[i] & (1 << c) ? 0. : value[c];
     }
     PetscCall(VecRestoreArray(mode[kept], &v));

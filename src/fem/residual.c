@@ -13,17 +13,16 @@ static void add_region_force(SbSpace s, const SbRegion *region, const SbStage *s
   const PetscReal beta = stage->v ? region->beta : 0.;
 
   for (PetscInt b = region->bstart; b < region->bend; b++) {
-    const PetscInt *node = s->batch_node + 4 * SB_BATCH * b;
     const SbLane *g = s->batch_g + 9 * b;
     SbLane u[12], F[9], P[9], fe[12];
 
-    sb_gather(node, stage->u, u);
+    sb_gather_strain(s, region, b, stage->u, u);
     SbCellGradient(g, (const SbLane *)u, F);
     m->ops.stress(m, (const SbLane *)F, P);
     if (beta != 0.) {
       SbLane H[9], dP[9];
 
-      sb_gather(node, stage->v, u);
+      sb_gather_strain(s, region, b, stage->v, u);
       SbCellGradientRate(g, (const SbLane *)u, H);
       SbMaterialDampingStress(m, (const SbLane *)F, (const SbLane *)H, dP);
       for (int k = 0; k < 9; k++) {
@@ -31,7 +30,7 @@ static void add_region_force(SbSpace s, const SbRegion *region, const SbStage *s
       }
     }
     SbCellForce(g, s->batch_V[b], (const SbLane *)P, fe);
-    sb_scatter_add(node, s->batch_n[b], (const SbLane *)fe, f);
+    sb_scatter_strain(s, region, b, fe, f);
   }
 }
 
@@ -40,6 +39,10 @@ PetscErrorCode SbSpaceAddInternalForce(SbSpace s, const SbStage *stage, PetscRea
   PetscFunctionBeginUser;
   PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_RESIDUAL], 0, 0, 0, 0));
   for (PetscInt r = 0; r < s->nregion; r++) add_region_force(s, &s->region[r], stage, f);
+  if (s->jump) {
+    SbJumpAdd(s, stage->u, SB_JUMP_STIFFNESS, f);
+    if (stage->v) SbJumpAdd(s, stage->v, SB_JUMP_DAMPING, f);
+  }
   PetscCall(PetscLogEventEnd(SbEvents[SB_EVENT_RESIDUAL], 0, 0, 0, 0));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -139,7 +142,7 @@ PetscErrorCode SbSpaceCellState(SbSpace s, const PetscReal x[], PetscReal sigma[
     for (PetscInt b = region->bstart; region->owned && b < region->bend; b++) {
       SbLane u[12], F[9], P[9], energy;
 
-      sb_gather(s->batch_node + 4 * SB_BATCH * b, x, u);
+      sb_gather_strain(s, region, b, x, u);
       SbCellGradient(s->batch_g + 9 * b, (const SbLane *)u, F);
       if (sigma) m->ops.stress(m, (const SbLane *)F, P);
       if (psi) m->ops.energy(m, (const SbLane *)F, energy);
@@ -178,7 +181,7 @@ PetscErrorCode SbSpaceStrainEnergy(SbSpace s, const PetscReal x[], PetscReal *en
     for (PetscInt b = region->bstart; region->owned && b < region->bend; b++) {
       SbLane u[12], F[9], psi;
 
-      sb_gather(s->batch_node + 4 * SB_BATCH * b, x, u);
+      sb_gather_strain(s, region, b, x, u);
       SbCellGradient(s->batch_g + 9 * b, (const SbLane *)u, F);
       m->ops.energy(m, (const SbLane *)F, psi);
       for (PetscInt l = 0; l < s->batch_n[b]; l++) {
@@ -191,6 +194,7 @@ PetscErrorCode SbSpaceStrainEnergy(SbSpace s, const PetscReal x[], PetscReal *en
       }
     }
   }
+  if (s->jump) *energy += SbJumpEnergy(s, x, SB_JUMP_STIFFNESS);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -204,14 +208,14 @@ PetscErrorCode SbSpaceDampingPower(SbSpace s, const PetscReal x[], const PetscRe
 
     if (!region->owned || (region->alpha == 0. && region->beta == 0.)) continue;
     for (PetscInt b = region->bstart; b < region->bend; b++) {
-      const PetscInt *node = s->batch_node + 4 * SB_BATCH * b;
       SbLane u[12], F[9], H[9], dP[9];
 
-      sb_gather(node, x, u);
+      sb_gather_strain(s, region, b, x, u);
       SbCellGradient(s->batch_g + 9 * b, (const SbLane *)u, F);
-      sb_gather(node, v, u);
+      sb_gather_strain(s, region, b, v, u);
       SbCellGradientRate(s->batch_g + 9 * b, (const SbLane *)u, H);
       SbMaterialDampingStress(m, (const SbLane *)F, (const SbLane *)H, dP);
+      sb_gather(s->batch_node + 4 * SB_BATCH * b, v, u);
       for (PetscInt l = 0; l < s->batch_n[b]; l++) {
         PetscReal hooke = 0., inertia = 0.;
 
@@ -222,5 +226,6 @@ PetscErrorCode SbSpaceDampingPower(SbSpace s, const PetscReal x[], const PetscRe
       }
     }
   }
+  if (s->jump) *power += 2. * SbJumpEnergy(s, v, SB_JUMP_DAMPING);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -7,9 +7,7 @@
   matrix row is complete without communication.
 
   Cells are grouped in regions (one body, one law, owned or ghost), each cut into batches of SB_BATCH cells whose
-  gradients and volumes lie side by side.
-
-  Not handled: elements with nodes elsewhere than at the vertices.
+  gradients and volumes lie side by side. Which nodes there are is in layout.c, the face terms of CR and DG in jump.c.
 */
 #include "sbfem.h"
 #include "fem_impl.h"
@@ -23,32 +21,6 @@ PetscErrorCode SbSpaceRegister(void)
 {
   PetscFunctionBeginUser;
   PetscCall(SbOptionsRegister("", "", (PetscInt)PETSC_STATIC_ARRAY_LENGTH(rows), rows));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Nodes of P1 are the mesh's vertices. */
-static PetscErrorCode layout_nodes(SbSpace s, const SbElement element[])
-{
-  SbMesh mesh = s->mesh;
-
-  PetscFunctionBeginUser;
-  for (PetscInt b = 0; b < mesh->nbody; b++) {
-    const PetscInt *per = element[b]->nodes_per;
-
-    PetscCheck(per[0] == 1 && !per[1] && !per[2] && !per[3], PETSC_COMM_SELF, PETSC_ERR_SUP,
-               "Element %s of body %s has nodes off the vertices", element[b]->name, mesh->body[b].name);
-  }
-  s->Nnode = mesh->Nvert;
-  s->nnode_owned = mesh->nvert_owned;
-  s->nnode = mesh->nvert;
-  s->gnode_start = mesh->gvert_start;
-  PetscCall(PetscMalloc1(s->nnode, &s->gnode));
-  PetscCall(PetscMalloc1(3 * s->nnode, &s->node_x));
-  PetscCall(PetscMalloc1(4 * mesh->ncell, &s->cell_node));
-  PetscCall(PetscArraycpy(s->gnode, mesh->gvert, s->nnode));
-  PetscCall(PetscArraycpy(s->node_x, mesh->x, 3 * s->nnode));
-  PetscCall(PetscArraycpy(s->cell_node, mesh->cell, 4 * mesh->ncell));
-  PetscCall(PetscCalloc1(s->nnode, &s->fixed));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -72,6 +44,7 @@ static PetscErrorCode find_regions(SbSpace s, const SbMaterial material[], const
       r->element = element[body];
       r->cstart = c;
       r->owned = (PetscBool)(c < mesh->ncell_owned);
+      r->broken = (PetscBool)(element[body]->nodes_per[3] > 0);
       r->bstart = s->nbatch;
     }
     s->region[s->nregion - 1].cend = c + 1;
@@ -102,11 +75,11 @@ static PetscErrorCode tabulate_batches(SbSpace s)
       s->batch_cell[b] = first;
       s->batch_n[b] = PetscMin(SB_BATCH, region->cend - first);
       for (PetscInt l = 0; l < SB_BATCH; l++) {
-        const PetscInt *node = s->cell_node + 4 * (l < s->batch_n[b] ? first + l : first);
+        const PetscInt cell = l < s->batch_n[b] ? first + l : first, *node = s->cell_node + 4 * cell;
         PetscReal x[4][3], g[3][3], V;
 
         for (PetscInt a = 0; a < 4; a++) {
-          for (PetscInt i = 0; i < 3; i++) x[a][i] = s->node_x[3 * node[a] + i];
+          for (PetscInt i = 0; i < 3; i++) x[a][i] = s->mesh->x[3 * s->mesh->cell[4 * cell + a] + i];
           s->batch_node[(4 * b + a) * SB_BATCH + l] = node[a];
         }
         region->element->ops.tabulate((const PetscReal(*)[3])x, g, &V);
@@ -169,9 +142,12 @@ PetscErrorCode SbSpaceCreate(SbMesh mesh, const SbMaterial material[], const SbE
   PetscCall(SbScopeSet(&scope, "", "", ""));
   PetscCall(SbOptionChoice(&scope, "mass", &mass));
   s->consistent_mass = (PetscBool)(mass == 1);
-  PetscCall(layout_nodes(s, element));
+  s->element = element;
+  PetscCall(SbLayoutNodes(s));
   PetscCall(find_regions(s, material, element));
   PetscCall(tabulate_batches(s));
+  PetscCall(SbLayoutCliques(s));
+  if (s->faces) PetscCall(SbJumpCreate(s, &s->jump));
   PetscCall(lump_mass(s));
   PetscCall(create_template(s));
   PetscCall(PetscLogEventEnd(SbEvents[SB_EVENT_SPACE_SETUP], 0, 0, 0, 0));
@@ -187,16 +163,15 @@ PetscErrorCode SbSpaceDestroy(SbSpace *space)
   if (!s) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(SbPlanDestroy(&s->plan));
   PetscCall(VecDestroy(&s->template_vec));
-  PetscCall(PetscFree(s->gnode));
-  PetscCall(PetscFree(s->cell_node));
-  PetscCall(PetscFree(s->node_x));
+  PetscCall(SbJumpDestroy(&s->jump));
+  PetscCall(SbLayoutDestroy(s));
+  if (s->width > 4) PetscCall(PetscFree2(s->batch_clique, s->batch_weight));
   PetscCall(PetscFree(s->region));
   PetscCall(PetscFree(s->batch_cell));
   PetscCall(PetscFree(s->batch_n));
   PetscCall(PetscFree(s->batch_node));
   PetscCall(PetscFree(s->batch_memory));
   PetscCall(PetscFree(s->node_mass));
-  PetscCall(PetscFree(s->fixed));
   PetscCall(PetscFree(s->fixed_node));
   PetscCall(PetscFree(s->fixed_value));
   PetscCall(PetscFree(*space));
@@ -324,11 +299,11 @@ PetscErrorCode SbSpaceGetSetNodes(SbSpace s, PetscInt k, PetscInt *n, PetscInt *
   PetscInt count = 0;
 
   PetscFunctionBeginUser;
-  for (PetscInt i = 0; i < s->nnode; i++) count += (s->mesh->vert_set[i] & SB_SET_BIT(k)) != 0;
+  for (PetscInt i = 0; i < s->nnode; i++) count += (s->node_set[i] & SB_SET_BIT(k)) != 0;
   PetscCall(PetscMalloc1(count, nodes));
   *n = 0;
   for (PetscInt i = 0; i < s->nnode; i++) {
-    if (s->mesh->vert_set[i] & SB_SET_BIT(k)) (*nodes)[(*n)++] = i;
+    if (s->node_set[i] & SB_SET_BIT(k)) (*nodes)[(*n)++] = i;
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -336,19 +311,20 @@ PetscErrorCode SbSpaceGetSetNodes(SbSpace s, PetscInt k, PetscInt *n, PetscInt *
 /* Corners of face f of a positively oriented tet, counter-clockwise seen from outside. */
 static const PetscInt face_corner[4][3] = {{1, 2, 3}, {0, 3, 2}, {0, 1, 3}, {0, 2, 1}};
 
-static void facet_geometry(SbSpace s, SbFacet *facet)
+static void facet_geometry(SbMesh mesh, SbFacet *facet)
 {
   PetscReal e1[3], e2[3], n[3], length;
 
-  for (PetscInt a = 0; a < 3; a++)
-    facet->node[a] = s->cell_node[4 * facet->cell + face_corner[facet->face][a]];
-  for (PetscInt i = 0; i < 3; i++) {
-    e1[i] = s->node_x[3 * facet->node[1] + i] - s->node_x[3 * facet->node[0] + i];
-    e2[i] = s->node_x[3 * facet->node[2] + i] - s->node_x[3 * facet->node[0] + i];
+  for (PetscInt a = 0; a < 3; a++) {
+    facet->corner[a] = face_corner[facet->face][a];
+    facet->vertex[a] = mesh->cell[4 * facet->cell + facet->corner[a]];
   }
-  for (PetscInt i = 0; i < 3; i++)
-    n[i] = e1[(i + 1) % 3] * e2[(i + 2) % 3] - e1[(i + 2) % 3] * e2[(i + 1) % 3];
-  length = PetscSqrtReal(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
+  for (PetscInt i = 0; i < 3; i++) {
+    e1[i] = mesh->x[3 * facet->vertex[1] + i] - mesh->x[3 * facet->vertex[0] + i];
+    e2[i] = mesh->x[3 * facet->vertex[2] + i] - mesh->x[3 * facet->vertex[0] + i];
+  }
+  SbCross(e1, e2, n);
+  length = PetscSqrtReal(SbDot3(n, n));
   facet->area = 0.5 * length;
   for (PetscInt i = 0; i < 3; i++) facet->normal[i] = n[i] / length;
 }
@@ -369,7 +345,7 @@ PetscErrorCode SbSpaceGetSetFacets(SbSpace s, PetscInt k, PetscInt *n, SbFacet *
     facet = &(*facets)[(*n)++];
     facet->cell = f / 4;
     facet->face = f % 4;
-    facet_geometry(s, facet);
+    facet_geometry(s->mesh, facet);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -31,6 +31,7 @@ static PetscErrorCode access_begin(Mat A, SbValues *x)
   if (is[3]) PetscCall(MatMPIBAIJGetSeqBAIJ(A, &x->part[0], &x->part[1], NULL));
   x->kind = is[4] ? SB_MATRIX_SBAIJ : is[2] || is[3] ? SB_MATRIX_BAIJ : SB_MATRIX_AIJ;
   x->value[1] = NULL;
+  x->glue = NULL;
   PetscCheck(is[0] || is[1] || is[2] || is[3] || is[4], PetscObjectComm((PetscObject)A), PETSC_ERR_SUP,
              "No direct access to a matrix of type %s", ((PetscObject)A)->type_name);
   for (int q = 0; q < 2 && x->part[q]; q++) {
@@ -119,7 +120,7 @@ static void spin_blocks(const SbMaterial m, const SbLane *g, const SbLane V, con
   SbCellBlocksSpin(g, W, m->lambda, m->mu, (const SbLane *)R, (const SbLane *)T, K);
 }
 
-/* Blocks of one batch. */
+/* Blocks of one batch, without mass. */
 static void batch_blocks(SbSpace s, const SbRegion *region, const PetscReal displacement[], const Factors *x,
                          PetscInt b, SbLane K[10][9])
 {
@@ -131,7 +132,7 @@ static void batch_blocks(SbSpace s, const SbRegion *region, const PetscReal disp
     scaled_volumes(s->batch_V[b], x->stiffness + x->damping, W);
     SbCellBlocksIsotropic(g, W, m->lambda, m->mu, NULL, K);
   } else {
-    sb_gather(s->batch_node + 4 * SB_BATCH * b, displacement, u);
+    sb_gather_strain(s, region, b, displacement, u);
     SbCellGradient(g, (const SbLane *)u, F);
     if (m->ops.frame) {
       m->ops.frame(m, (const SbLane *)F, R);
@@ -142,7 +143,6 @@ static void batch_blocks(SbSpace s, const SbRegion *region, const PetscReal disp
     else
       general_blocks(m, g, s->batch_V[b], x, (const SbLane *)F, K);
   }
-  if (x->inertia != 0.) add_consistent_mass(&region->element->ops, x->inertia, s->batch_V[b], K);
 }
 
 static void add_region(SbSpace s, const SbRegion *region, const SbStage *stage, const SbValues *x)
@@ -155,8 +155,26 @@ static void add_region(SbSpace s, const SbRegion *region, const SbStage *stage, 
 
     batch_blocks(s, region, stage->u, &factors, b, K);
     SbInsertClear(s, x, b);
+    if (region->broken) {
+      SbInsertBroken(s, x, b, (const SbLane(*)[9])K);
+      memset(K, 0, sizeof(K));
+    }
+    if (factors.inertia != 0.)
+      add_consistent_mass(&region->element->ops, factors.inertia, s->batch_V[b], K);
+    else if (region->broken)
+      continue;
     SbInsertBatch(s, x, b, (const SbLane(*)[9])K);
   }
+}
+
+/* What the rows of each body begin with: its face terms, as stiffness and damping. */
+static PetscErrorCode glue_factors(SbSpace s, const SbStage *stage, PetscReal **glue)
+{
+  PetscFunctionBeginUser;
+  PetscCall(PetscCalloc1(s->mesh->nbody, glue));
+  for (PetscInt r = 0; r < s->nregion; r++)
+    (*glue)[s->region[r].body] = stage->shift_k + stage->shift_v * s->region[r].beta;
+  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 static inline void add_to_diagonal(SbSpace s, const SbValues *x, PetscInt node, PetscReal value)
@@ -191,6 +209,7 @@ static void add_lumped_mass(SbSpace s, const SbStage *stage, const SbValues *x)
 PetscErrorCode SbSpaceAssembleTangent(SbSpace s, const SbStage *stage, Mat A)
 {
   PetscBool matrix_free;
+  PetscReal *glue = NULL;
   SbValues x;
 
   PetscFunctionBeginUser;
@@ -201,9 +220,12 @@ PetscErrorCode SbSpaceAssembleTangent(SbSpace s, const SbStage *stage, Mat A)
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   PetscCall(access_begin(A, &x));
+  if (s->jump) PetscCall(glue_factors(s, stage, &glue));
+  x.glue = glue;
   for (PetscInt r = 0; r < s->nregion; r++) add_region(s, &s->region[r], stage, &x);
   if (!s->consistent_mass && (stage->shift_a != 0. || stage->shift_v != 0.)) add_lumped_mass(s, stage, &x);
   PetscCall(access_end(&x));
+  PetscCall(PetscFree(glue));
   PetscCall(PetscLogEventEnd(SbEvents[SB_EVENT_TANGENT], A, 0, 0, 0));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -212,7 +234,7 @@ PetscErrorCode SbSpaceAddCellBlock(SbSpace s, Mat A, PetscInt cell, PetscInt a, 
                                    const PetscReal block[9])
 {
   const PetscInt row = s->cell_node[4 * cell + a], column = s->cell_node[4 * cell + b],
-                 k = s->plan->offset[SbPlanCellOffset(s, cell) + (size_t)(SB_BATCH * (4 * a + b))];
+                 k = s->plan->offset[SbPlanCellOffset(s, cell) + (size_t)(SB_BATCH * (s->width * a + b))];
   SbValues x;
   size_t rs, cs;
   PetscScalar *v;

@@ -146,6 +146,7 @@ PetscErrorCode SbMeshDestroy(SbMesh *mesh)
   PetscCall(PetscFree(m->cell));
   PetscCall(PetscFree(m->cell_orig));
   PetscCall(PetscFree(m->cell_body));
+  PetscCall(PetscFree(m->cell_point));
   PetscCall(PetscFree(m->cell_set));
   PetscCall(PetscFree(m->face_set));
   PetscCall(PetscFree(*mesh));

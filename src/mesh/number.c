@@ -5,8 +5,8 @@
   one rank after the other, are the global numbers. Cells: owned ones first, then ghosts; both sorted by body, then by
   lowest local vertex, so that a loop over cells walks through the vertices.
 
-  Overlap 1 brings every cell that touches a cell of this rank. A ghost cell that touches no owned vertex adds to no row
-  of this rank and is left out here, with its vertices; the DM keeps it.
+  Overlap 1 brings every cell that touches a cell of this rank. Where all nodes are vertices, a ghost cell that touches no
+  owned vertex adds to no row of this rank and is left out here, with its vertices; the DM keeps it.
 */
 #include <petscdmplex.h>
 #include "mesh_impl.h"
@@ -106,18 +106,20 @@ static PetscErrorCode number_globally(Work *w, SbMesh mesh)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Keeps cells that are owned or touch an owned vertex; ghost vertices of these get own numbers. */
+/* Keeps cells that are owned or touch an owned vertex, all with face nodes; ghost vertices of these get own numbers. */
 static PetscErrorCode number_ghosts(Work *w, SbMesh mesh)
 {
   PetscInt *ghost, *key, n = 0;
+  PetscBool all = PETSC_FALSE;
 
   PetscFunctionBeginUser;
+  for (PetscInt b = 0; b < mesh->nbody; b++) all = (PetscBool)(all || mesh->body[b].face_nodes);
   mesh->ncell = 0;
   PetscCall(PetscMalloc2(w->nvert, &ghost, w->nvert, &key));
   for (PetscInt c = 0; c < w->ncell; c++) {
     const PetscInt *v = w->cone + 4 * c;
 
-    w->kept[c] = (PetscBool)!w->ghost[w->cStart + c];
+    w->kept[c] = (PetscBool)(all || !w->ghost[w->cStart + c]);
     for (int a = 0; a < 4; a++) w->kept[c] = (PetscBool)(w->kept[c] || !w->ghost[w->vStart + v[a]]);
     mesh->ncell += w->kept[c];
     for (int a = 0; w->kept[c] && a < 4; a++) {
@@ -205,11 +207,13 @@ static PetscErrorCode fill_cells(const Work *w, SbMesh mesh)
   PetscCall(PetscMalloc1(4 * (size_t)mesh->ncell, &mesh->cell));
   PetscCall(PetscMalloc1(mesh->ncell, &mesh->cell_orig));
   PetscCall(PetscMalloc1(mesh->ncell, &mesh->cell_body));
+  PetscCall(PetscMalloc1(mesh->ncell, &mesh->cell_point));
   PetscCall(PetscMalloc1(mesh->ncell, &mesh->cell_set));
   PetscCall(PetscMalloc1(4 * (size_t)mesh->ncell, &mesh->face_set));
   for (PetscInt c = 0; c < mesh->ncell; c++) {
     const SbPoint *p = &w->point[w->cStart + order[c]];
 
+    mesh->cell_point[c] = w->cStart + order[c];
     mesh->cell_orig[c] = p->orig;
     mesh->cell_body[c] = p->body;
     mesh->cell_set[c] = p->set;

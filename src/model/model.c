@@ -48,6 +48,7 @@ PetscErrorCode SbModelSetUp(SbModel m)
   PetscReal mass = 0.;
 
   PetscFunctionBeginUser;
+  for (PetscInt b = 0; b < m->nbody; b++) m->body[b].face_nodes = (PetscBool)!m->element[b]->nodes_per[0];
   PetscCall(SbMeshCreate(m->comm, m->nbody, m->body, m->nset, m->set, &m->mesh));
   PetscCall(SbSpaceCreate(m->mesh, m->material, m->element, &m->space));
   m->load = 1.;
@@ -221,7 +222,7 @@ static PetscErrorCode body_centres(SbModel m, PetscReal centre[][4])
 
   PetscFunctionBeginUser;
   for (PetscInt i = 0; i < s->nnode_owned; i++) {
-    PetscReal *c = centre[m->mesh->vert_body[i]];
+    PetscReal *c = centre[m->space->node_body[i]];
 
     c[3] += s->node_mass[i];
     for (PetscInt k = 0; k < 3; k++) c[k] += s->node_mass[i] * s->node_x[3 * i + k];
@@ -247,11 +248,11 @@ PetscErrorCode SbModelInitialState(SbModel m, Vec U, Vec V)
   PetscCall(body_centres(m, centre));
   PetscCall(VecGetArray(V, &v));
   for (PetscInt i = 0; i < s->nnode_owned; i++) {
-    const SbBody *body = &m->body[m->mesh->vert_body[i]];
+    const SbBody *body = &m->body[m->space->node_body[i]];
     const PetscReal *w = body->spin;
     PetscReal r[3];
 
-    for (PetscInt k = 0; k < 3; k++) r[k] = s->node_x[3 * i + k] - centre[m->mesh->vert_body[i]][k];
+    for (PetscInt k = 0; k < 3; k++) r[k] = s->node_x[3 * i + k] - centre[m->space->node_body[i]][k];
     for (PetscInt k = 0; k < 3; k++) {
       const PetscInt k1 = (k + 1) % 3, k2 = (k + 2) % 3;
 

@@ -27,7 +27,7 @@ static const SbOption body_rows[] = {
   {"rotate", SB_OPTION_REALS, 4, "", "0,0,1,0", "(-inf, inf)",
    "axis x,y,z and angle in degrees, before translation"},
   {"translate", SB_OPTION_REALS, 3, "m", "0,0,0", "(-inf, inf)", "shift of the scaled and rotated mesh"},
-  {"element", SB_OPTION_STRING, 1, "", "p1", "", "finite element"},
+  {"element", SB_OPTION_STRING, 1, "", "p1", "", "finite element: p1; cr or dg, which do not lock when poisson is near 0.5"},
   {"material", SB_OPTION_STRING, 1, "", "", "",
    "material law, required: linear, corotated, stvk or neohookean"},
   {"velocity", SB_OPTION_REALS, 3, "m/s", "0,0,0", "(-inf, inf)",
@@ -171,7 +171,7 @@ static PetscErrorCode read_body(SbModel model, PetscInt i)
   PetscCall(SbOptionReals(&scope, "translate", body->translate));
   PetscCall(read_type(&scope, "element", SbElementList, body->element));
   PetscCall(read_type(&scope, "material", SbMaterialList, body->material));
-  PetscCall(SbElementCreate(body->element, &model->element[i]));
+  PetscCall(SbElementCreate(body->element, &scope, &model->element[i]));
   PetscCall(SbMaterialCreate(body->material, &scope, &model->material[i]));
   body->density = model->material[i]->density;
   PetscCall(SbOptionReals(&scope, "velocity", body->velocity));

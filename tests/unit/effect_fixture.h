@@ -72,7 +72,7 @@ static inline PetscErrorCode fixture_create(MPI_Comm comm, PetscInt nbody, const
     PetscCall(PetscOptionsInsertString(NULL, options));
     PetscCall(SbScopeSet(&scope, "body", "linear", names[b]));
     PetscCall(SbMaterialCreate("linear", &scope, &x->material[b]));
-    PetscCall(SbElementCreate("p1", &x->element[b]));
+    PetscCall(SbElementCreate("p1", NULL, &x->element[b]));
   }
   for (PetscInt k = 0; k < nset; k++) {
     PetscCall(SbSetParse(sets[k][0], sets[k][1], &x->set[k]));

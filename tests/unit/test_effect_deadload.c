@@ -24,13 +24,13 @@ static PetscErrorCode get_corners(Fixture *x, PetscInt ncorner, PetscInt *n, Pet
   if (ncorner == 4) {
     *n = x->mesh->ncell;
     PetscCall(PetscMalloc1(4 * *n, nodes));
-    PetscCall(PetscArraycpy(*nodes, x->space->cell_node, 4 * *n));
+    for (PetscInt i = 0; i < 4 * *n; i++) (*nodes)[i] = i;
   } else {
     SbFacet *facets;
 
     PetscCall(SbSpaceGetSetFacets(x->space, 0, n, &facets));
     PetscCall(PetscMalloc1(3 * *n, nodes));
-    for (PetscInt i = 0; i < 3 * *n; i++) (*nodes)[i] = facets[i / 3].node[i % 3];
+    for (PetscInt i = 0; i < 3 * *n; i++) (*nodes)[i] = 4 * facets[i / 3].cell + facets[i / 3].corner[i % 3];
     PetscCall(PetscFree(facets));
   }
   PetscFunctionReturn(PETSC_SUCCESS);

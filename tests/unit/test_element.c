@@ -59,8 +59,8 @@ int main(int argc, char **argv)
 
   SB_TEST_BEGIN(argc, argv);
   PetscCall(SbElementRegisterAll());
-  SB_CHECK_ERROR(SbElementCreate("p2", &e), "unknown element");
-  PetscCall(SbElementCreate("p1", &e));
+  SB_CHECK_ERROR(SbElementCreate("p2", NULL, &e), "unknown element");
+  PetscCall(SbElementCreate("p1", NULL, &e));
   SB_CHECK(e->nodes_per[0] == 1 && !e->nodes_per[1] && !e->nodes_per[2] && !e->nodes_per[3], "nodes of p1");
   SB_CHECK_NEAR(4 * e->ops.mass_lumped, 1, 1e-15, "lumped mass");
   SB_CHECK_NEAR(4 * e->ops.mass_diagonal + 12 * e->ops.mass_coupling, 1, 1e-15, "consistent mass");

@@ -388,7 +388,7 @@ int main(int argc, char **argv)
   PetscCall(random_begin());
   PetscCall(SbMaterialRegisterAll());
   PetscCall(SbElementRegisterAll());
-  PetscCall(SbElementCreate("p1", &e));
+  PetscCall(SbElementCreate("p1", NULL, &e));
   test_gradient(e);
   test_lanes(e);
   for (int k = 0; k < 4; k++) {

@@ -206,7 +206,7 @@ static PetscErrorCode test_values(void)
                     "-body_liver_material corotate is not one of corotated, "
                     "linear, neohookean, stvk; did you mean corotated?"));
   PetscCall(
-    refused(LIVER " -body_liver_element p2", "-body_liver_element p2 is not one of p1; did you mean p1?"));
+    refused(LIVER " -body_liver_element p2", "-body_liver_element p2 is not one of cr, dg, p1; did you mean p1?"));
   PetscCall(refused(LIVER " -body_liver_scale 0",
                     "-body_liver_scale 0 is outside (0, inf): factor on the coordinates"));
   PetscCall(

@@ -1,0 +1,294 @@
+/*
+  The face terms of CR and DG: what holds the two sides of a face together beyond the means that they share.
+
+  On a face F between cells + and -, with [u] the jump and [u]_0 its mean,
+
+    W_F = 1/2 kappa1 int_F |[u]|^2 + 1/2 kappa0 |F| |[u]_0|^2,
+    kappa1 = gamma1 H(2 mu |F| / V),   kappa0 = gamma0 H((2 mu + lambda) |F| / V)  (DG only),
+
+  H(k) = 2 k+ k- / (k+ + k-) the harmonic mean of the two sides; for one material H(mu |F| / V) = mu / h with
+  h = (V+ + V-) / (2 |F|) (Hansbo and Larson 2002). The terms take world vectors, are isotropic and constant: no rotation
+  changes them, and rigid motions have no jumps.
+
+  A cell's function at vertex v is S - 3 u_v, S the sum of its four nodes and u_v the one opposite v. So the jump at the three
+  vertices i of the face is J_i = (S+ - 3 u+_i) - (S- - 3 u-_i), and since J is linear there
+
+    int_F |[u]|^2 = |F| / 12 (sum |J_i|^2 + |sum J_i|^2),   [u]_0 = sum J_i / 3.
+
+  dW/dJ_i = c1 J_i + (c1 + c0) sum J,  c1 = kappa1 |F| / 12,  c0 = kappa0 |F| / 9, is spread over the eight nodes as J was
+  gathered. For CR the two sides have the node of the face in common, and its parts cancel.
+*/
+#include "fem_impl.h"
+
+struct _p_SbJump {
+  PetscInt nbatch;
+  PetscInt *region; /* [nbatch] region of the first side: damping is that of its body */
+  PetscInt *n;      /* [nbatch] faces in it */
+  PetscInt *node;   /* [nbatch][8][SB_BATCH]; padding lanes repeat the first face */
+  SbLane *c0, *c1;  /* [nbatch] N/m; zero in padding */
+  SbLane *share;    /* [nbatch] how much of a face's energy this rank counts: 1, or 1/2 between ranks */
+};
+
+/* A face between two local cells. */
+typedef struct {
+  PetscInt cell[2], face[2], region;
+} Face;
+
+/* Nodes of a face: for each side the one on the face, then those opposite the three vertices, in one order for both. */
+static void face_nodes(SbSpace s, const Face *face, PetscInt node[8])
+{
+  const PetscInt *v = s->mesh->cell + 4 * face->cell[0], *w = s->mesh->cell + 4 * face->cell[1];
+
+  for (int side = 0; side < 2; side++) node[4 * side] = s->cell_node[4 * face->cell[side] + face->face[side]];
+  for (PetscInt i = 1; i < 4; i++) {
+    const PetscInt a = (face->face[0] + i) % 4;
+    PetscInt b = 0;
+
+    while (b < 3 && w[b] != v[a]) b++;
+    node[i] = s->cell_node[4 * face->cell[0] + a];
+    node[4 + i] = s->cell_node[4 * face->cell[1] + b];
+  }
+}
+
+static PetscReal face_area(SbMesh mesh, PetscInt cell, PetscInt face)
+{
+  const PetscInt *v = mesh->cell + 4 * cell;
+  const PetscReal *a = mesh->x + 3 * v[(face + 1) % 4], *b = mesh->x + 3 * v[(face + 2) % 4],
+                  *c = mesh->x + 3 * v[(face + 3) % 4];
+  PetscReal p[3], q[3], n[3];
+
+  for (int i = 0; i < 3; i++) {
+    p[i] = b[i] - a[i];
+    q[i] = c[i] - a[i];
+  }
+  SbCross(p, q, n);
+  return 0.5 * PetscSqrtReal(SbDot3(n, n));
+}
+
+static inline PetscReal harmonic(PetscReal a, PetscReal b)
+{
+  return a + b > 0. ? 2. * a * b / (a + b) : 0.;
+}
+
+/* c0 and c1 of a face. */
+static void face_factors(SbSpace s, const Face *face, const PetscInt region_of[], const PetscReal V[],
+                         PetscReal *c0, PetscReal *c1)
+{
+  const PetscReal area = face_area(s->mesh, face->cell[0], (PetscInt)face->face[0]);
+  const SbElement e = s->region[face->region].element;
+  PetscReal k0[2], k1[2];
+
+  for (int side = 0; side < 2; side++) {
+    const SbMaterial m = s->region[region_of[face->cell[side]]].material;
+
+    k1[side] = 2. * m->mu * area / V[face->cell[side]];
+    k0[side] = k1[side] + m->lambda * area / V[face->cell[side]];
+  }
+  *c1 = e->gamma1 * harmonic(k1[0], k1[1]) * area / 12.;
+  *c0 = e->gamma0 * harmonic(k0[0], k0[1]) * area / 9.;
+}
+
+/* Faces with an owned node, those of one body together. */
+static PetscErrorCode find_faces(SbSpace s, const PetscInt region_of[], PetscInt *nface, Face **faces)
+{
+  PetscInt n = 0;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscMalloc1(2 * s->mesh->ncell, faces));
+  for (PetscInt b = 0; b < s->mesh->nbody; b++) {
+    if (s->element[b]->nodes_per[0]) continue;
+    for (PetscInt i = 0; i < 4 * s->mesh->ncell; i++) {
+      Face *face = &(*faces)[n];
+      PetscInt node[8], f = 0;
+      PetscBool owned = PETSC_FALSE;
+
+      if (s->mesh->cell_body[i / 4] != b || s->neighbour[i] < i / 4) continue;
+      while (f < 3 && s->neighbour[4 * s->neighbour[i] + f] != i / 4) f++;
+      *face = (Face){{i / 4, s->neighbour[i]}, {i % 4, f}, region_of[i / 4]};
+      face_nodes(s, face, node);
+      for (int k = 0; k < 8; k++) owned = (PetscBool)(owned || node[k] < s->nnode_owned);
+      n += owned;
+    }
+  }
+  *nface = n;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode fill_batches(SbSpace s, const PetscInt region_of[], const PetscReal V[], PetscInt nface,
+                                   const Face faces[], SbJump j)
+{
+  PetscInt b = -1;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscMalloc3(j->nbatch, &j->region, j->nbatch, &j->n, j->nbatch * 8 * SB_BATCH, &j->node));
+  PetscCall(PetscCalloc3(j->nbatch, &j->c0, j->nbatch, &j->c1, j->nbatch, &j->share));
+  for (PetscInt i = 0; i < nface; i++) {
+    const Face *face = &faces[i];
+    PetscInt node[8], l;
+
+    if (i == 0 || j->n[b] == SB_BATCH || s->region[face->region].body != s->region[j->region[b]].body) {
+      j->region[++b] = face->region;
+      j->n[b] = 0;
+    }
+    l = j->n[b]++;
+    face_nodes(s, face, node);
+    for (int k = 0; k < 8; k++) {
+      for (PetscInt lane = l; lane < (l ? l + 1 : SB_BATCH); lane++)
+        j->node[(8 * b + k) * SB_BATCH + lane] = node[k];
+    }
+    face_factors(s, face, region_of, V, &j->c0[b][l], &j->c1[b][l]);
+    for (int side = 0; side < 2; side++) j->share[b][l] += face->cell[side] < s->mesh->ncell_owned ? 0.5 : 0.;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbJumpCreate(SbSpace s, SbJump *jump)
+{
+  PetscInt nface = 0, *region_of;
+  PetscReal *V;
+  Face *faces;
+  SbJump j;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscNew(&j));
+  PetscCall(PetscMalloc2(s->mesh->ncell, &region_of, s->mesh->ncell, &V));
+  for (PetscInt r = 0; r < s->nregion; r++) {
+    const SbRegion *region = &s->region[r];
+
+    for (PetscInt c = region->cstart; c < region->cend; c++) {
+      const PetscInt k = c - region->cstart;
+
+      region_of[c] = r;
+      V[c] = s->batch_V[region->bstart + k / SB_BATCH][k % SB_BATCH];
+    }
+  }
+  PetscCall(find_faces(s, region_of, &nface, &faces));
+  /* a batch never mixes bodies: one more each at most */
+  j->nbatch = nface / SB_BATCH + s->mesh->nbody;
+  PetscCall(fill_batches(s, region_of, V, nface, faces, j));
+  j->nbatch = 0;
+  for (PetscInt i = 0; i < nface; i += j->n[j->nbatch++]) {
+  }
+  PetscCall(PetscFree2(region_of, V));
+  PetscCall(PetscFree(faces));
+  *jump = j;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbJumpDestroy(SbJump *jump)
+{
+  SbJump j = *jump;
+
+  PetscFunctionBeginUser;
+  if (!j) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscFree3(j->region, j->n, j->node));
+  PetscCall(PetscFree3(j->c0, j->c1, j->share));
+  PetscCall(PetscFree(*jump));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Jumps at the three vertices, J[3 i + c], and their sum. */
+SB_INLINE void gather_jumps(const PetscInt node[8 * SB_BATCH], const PetscReal x[], int l, PetscReal J[9],
+                            PetscReal sum[3])
+{
+  for (int c = 0; c < 3; c++) {
+    PetscReal u[8], S;
+
+    for (int k = 0; k < 8; k++) u[k] = x[3 * node[k * SB_BATCH + l] + c];
+    S = (u[0] - u[4]) + (u[1] - u[5]) + (u[2] - u[6]) + (u[3] - u[7]);
+    for (int i = 0; i < 3; i++) J[3 * i + c] = S - 3. * (u[1 + i] - u[5 + i]);
+    sum[c] = 3. * (u[0] - u[4]);
+  }
+}
+
+/* t[8][3] of each lane: forces on the nodes. */
+SB_KERNEL static void jump_forces(const PetscInt node[restrict 8 * SB_BATCH],
+                                  const PetscReal c0[restrict SB_BATCH],
+                                  const PetscReal c1[restrict SB_BATCH], const PetscReal x[restrict],
+                                  SbLane t[restrict 12])
+{
+  for (int l = 0; l < SB_BATCH; l++) {
+    PetscReal J[9], sum[3];
+
+    gather_jumps(node, x, l, J, sum);
+    for (int c = 0; c < 3; c++) {
+      const PetscReal common = (c1[l] + c0[l]) * sum[c];
+      const PetscReal t0 = c1[l] * J[c] + common, t1 = c1[l] * J[3 + c] + common,
+                      t2 = c1[l] * J[6 + c] + common, all = t0 + t1 + t2;
+
+      t[c][l] = all;
+      t[3 + c][l] = all - 3. * t0;
+      t[6 + c][l] = all - 3. * t1;
+      t[9 + c][l] = all - 3. * t2;
+    }
+  }
+}
+
+void SbJumpAdd(SbSpace s, const PetscReal x[], SbJumpFactor factor, PetscReal f[])
+{
+  const SbJump j = s->jump;
+
+  for (PetscInt b = 0; b < j->nbatch; b++) {
+    const PetscInt *node = j->node + 8 * SB_BATCH * b;
+    const PetscReal scale = factor == SB_JUMP_STIFFNESS ? 1. : s->region[j->region[b]].beta;
+    SbLane t[12];
+
+    if (scale == 0.) continue;
+    jump_forces(node, j->c0[b], j->c1[b], x, t);
+    for (PetscInt l = 0; l < j->n[b]; l++) {
+      for (int k = 0; k < 4; k++) {
+        PetscReal *plus = f + 3 * node[k * SB_BATCH + l], *minus = f + 3 * node[(4 + k) * SB_BATCH + l];
+
+        for (int c = 0; c < 3; c++) {
+          plus[c] += scale * t[3 * k + c][l];
+          minus[c] -= scale * t[3 * k + c][l];
+        }
+      }
+    }
+  }
+}
+
+PetscReal SbJumpEnergy(SbSpace s, const PetscReal x[], SbJumpFactor factor)
+{
+  const SbJump j = s->jump;
+  PetscReal energy = 0.;
+
+  for (PetscInt b = 0; b < j->nbatch; b++) {
+    const PetscReal scale = factor == SB_JUMP_STIFFNESS ? 1. : s->region[j->region[b]].beta;
+
+    for (int l = 0; l < j->n[b] && scale != 0.; l++) {
+      PetscReal J[9], sum[3], squares = 0.;
+
+      gather_jumps(j->node + 8 * SB_BATCH * b, x, l, J, sum);
+      for (int k = 0; k < 9; k++) squares += J[k] * J[k];
+      energy += 0.5 * scale * j->share[b][l] *
+                (j->c1[b][l] * squares + (j->c1[b][l] + j->c0[b][l]) * SbDot3(sum, sum));
+    }
+  }
+  return energy;
+}
+
+/* ------------------------------------------------------------------ the matrix of the face terms */
+
+PetscInt SbJumpCliques(SbSpace s, const PetscInt **node)
+{
+  *node = s->jump->node;
+  return s->jump->nbatch;
+}
+
+/* Entry (a, b) of the 8x8 matrix of a face, the same in each component: sum_i d_ia d_ib c1 + (c1 + c0) D_a D_b. */
+void SbJumpMatrix(SbSpace s, PetscInt b, PetscInt l, PetscReal K[8][8])
+{
+  static const PetscReal d[3][4] = {{1, -2, 1, 1}, {1, 1, -2, 1}, {1, 1, 1, -2}}, D[4] = {3, 0, 0, 0};
+  const PetscReal c1 = s->jump->c1[b][l], c0 = s->jump->c0[b][l];
+
+  for (int p = 0; p < 8; p++) {
+    for (int q = 0; q < 8; q++) {
+      const PetscReal sign = p / 4 == q / 4 ? 1. : -1.;
+      PetscReal sum = (c1 + c0) * D[p % 4] * D[q % 4];
+
+      for (int i = 0; i < 3; i++) sum += c1 * d[i][p % 4] * d[i][q % 4];
+      K[p][q] = sign * sum;
+    }
+  }
+}

@@ -1,0 +1,298 @@
+/*
+  Which nodes there are, who owns them, and which four belong to each cell.
+
+  P1 has its nodes at the vertices: when every body is P1, nodes are the mesh's vertices and nothing is done here. CR has one
+  node per face, DG four per cell, on its faces; node a of a cell lies opposite vertex a. A rank owns all nodes of its DG cells
+  and, of the CR faces between it and another rank, about every second one.
+
+  Owned nodes are numbered in the order of the cells. Each rank knows the numbers of its own ones; two broadcasts over the
+  cells tell the others: after the first a cell has the numbers that belong to the rank of its neighbour, the second brings
+  complete cells to the ghosts, also on faces whose other side is not on this rank.
+*/
+#include "fem_impl.h"
+
+#define UNKNOWN (-1)
+
+/* The face of cell `other` that it shares with `cell`. */
+static inline PetscInt face_towards(SbSpace s, PetscInt other, PetscInt cell)
+{
+  PetscInt f = 0;
+
+  while (f < 3 && s->neighbour[4 * other + f] != cell) f++;
+  return f;
+}
+
+/* Whether this rank numbers the CR node between an owned cell and a ghost: both ranks decide alike. */
+static inline PetscBool takes_face(SbMesh mesh, PetscInt owned, PetscInt ghost)
+{
+  const PetscInt a = mesh->cell_orig[owned], b = mesh->cell_orig[ghost];
+
+  return (PetscBool)((a < b) == ((a + b) % 2 != 0));
+}
+
+/* Number of a CR node of an owned cell, UNKNOWN when it is another rank's. */
+static PetscInt number_face(SbSpace s, const PetscInt node[], PetscInt cell, PetscInt face, PetscInt *n)
+{
+  const PetscInt other = s->neighbour[4 * cell + face];
+
+  if (other >= 0 && other < cell) return node[4 * other + face_towards(s, other, cell)];
+  if (other >= s->mesh->ncell_owned && !takes_face(s->mesh, cell, other)) return UNKNOWN;
+  return (*n)++;
+}
+
+/* Owned nodes from zero on: node[ncell][4], UNKNOWN elsewhere. */
+static PetscErrorCode number_owned(SbSpace s, PetscInt node[])
+{
+  SbMesh mesh = s->mesh;
+  PetscInt *at, n = 0;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscMalloc1(mesh->nvert, &at));
+  for (PetscInt v = 0; v < mesh->nvert; v++) at[v] = UNKNOWN;
+  for (PetscInt i = 0; i < 4 * mesh->ncell; i++) node[i] = UNKNOWN;
+  for (PetscInt c = 0; c < mesh->ncell_owned; c++) {
+    const PetscInt *per = SbSpaceCellElement(s, c)->nodes_per;
+
+    for (PetscInt a = 0; a < 4; a++) {
+      const PetscInt v = mesh->cell[4 * c + a];
+
+      if (per[3]) {
+        node[4 * c + a] = n++;
+      } else if (per[2]) {
+        node[4 * c + a] = number_face(s, node, c, a, &n);
+      } else if (v < mesh->nvert_owned) {
+        if (at[v] == UNKNOWN) at[v] = n++;
+        node[4 * c + a] = at[v];
+      }
+    }
+  }
+  s->nnode_owned = n;
+  PetscCall(PetscFree(at));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* After the first broadcast: owned cells get what their ghost neighbours know. */
+static PetscErrorCode complete_owned(SbSpace s, PetscInt node[])
+{
+  SbMesh mesh = s->mesh;
+  PetscInt *at;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscMalloc1(mesh->nvert, &at));
+  for (PetscInt v = 0; v < mesh->nvert; v++) at[v] = UNKNOWN;
+  for (PetscInt i = 4 * mesh->ncell_owned; i < 4 * mesh->ncell; i++) {
+    if (SbSpaceCellElement(s, i / 4)->nodes_per[0] && node[i] != UNKNOWN) at[mesh->cell[i]] = node[i];
+  }
+  for (PetscInt i = 0; i < 4 * mesh->ncell_owned; i++) {
+    if (node[i] != UNKNOWN) continue;
+    if (SbSpaceCellElement(s, i / 4)->nodes_per[0]) {
+      node[i] = at[mesh->cell[i]];
+    } else {
+      const PetscInt other = s->neighbour[i];
+
+      node[i] = node[4 * other + face_towards(s, other, i / 4)];
+    }
+    PetscCheck(node[i] != UNKNOWN, PETSC_COMM_SELF, PETSC_ERR_PLIB, "No rank has numbered node %d of cell %d",
+               (int)(i % 4), (int)(i / 4));
+  }
+  PetscCall(PetscFree(at));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* From global numbers in s->cell_node to local ones: owned nodes, then ghosts by global number. */
+static PetscErrorCode localise(SbSpace s)
+{
+  const PetscInt n = 4 * s->mesh->ncell, end = s->gnode_start + s->nnode_owned;
+  PetscInt *ghost, nghost = 0;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscMalloc1(n, &ghost));
+  for (PetscInt i = 0; i < n; i++) {
+    if (s->cell_node[i] < s->gnode_start || s->cell_node[i] >= end) ghost[nghost++] = s->cell_node[i];
+  }
+  PetscCall(PetscSortRemoveDupsInt(&nghost, ghost));
+  s->nnode = s->nnode_owned + nghost;
+  PetscCall(PetscMalloc1(s->nnode, &s->gnode));
+  for (PetscInt i = 0; i < s->nnode_owned; i++) s->gnode[i] = s->gnode_start + i;
+  PetscCall(PetscArraycpy(s->gnode + s->nnode_owned, ghost, nghost));
+  for (PetscInt i = 0; i < n; i++) {
+    PetscInt at;
+
+    if (s->cell_node[i] >= s->gnode_start && s->cell_node[i] < end) {
+      s->cell_node[i] -= s->gnode_start;
+    } else {
+      PetscCall(PetscFindInt(s->cell_node[i], nghost, ghost, &at));
+      s->cell_node[i] = s->nnode_owned + at;
+    }
+  }
+  PetscCall(PetscFree(ghost));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/*
+  Sets of a node at a face. On the boundary those of the face. Inside: a set that holds the triangle or its three vertices;
+  both cells of the face, and a rank that has one of them, find the same.
+*/
+static uint64_t face_sets(SbMesh mesh, PetscInt cell, PetscInt face)
+{
+  const uint64_t own = mesh->face_set[4 * cell + face];
+  uint64_t common = ~(uint64_t)0;
+
+  if (own & SB_ON_BOUNDARY) return own & ~SB_ON_BOUNDARY;
+  for (PetscInt a = 0; a < 4; a++) {
+    if (a != face) common &= mesh->vert_set[mesh->cell[4 * cell + a]];
+  }
+  return own | common;
+}
+
+/* Place, body and sets of every node. */
+static PetscErrorCode describe_nodes(SbSpace s)
+{
+  SbMesh mesh = s->mesh;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscCalloc1(3 * (size_t)s->nnode, &s->node_x));
+  PetscCall(PetscMalloc3(s->nnode, &s->node_body, s->nnode, &s->node_set, s->nnode, &s->node_orig));
+  for (PetscInt i = 0; i < s->nnode; i++) s->node_orig[i] = PETSC_MAX_INT;
+  for (PetscInt i = 0; i < 4 * mesh->ncell; i++) {
+    const PetscInt *v = mesh->cell + 4 * (i / 4), node = s->cell_node[i], face = i % 4;
+    PetscReal *x = s->node_x + 3 * node;
+
+    s->node_body[node] = mesh->cell_body[i / 4];
+    if (SbSpaceCellElement(s, i / 4)->nodes_per[0]) {
+      s->node_set[node] = mesh->vert_set[v[face]];
+      s->node_orig[node] = mesh->vert_orig[v[face]];
+      for (int k = 0; k < 3; k++) x[k] = mesh->x[3 * v[face] + k];
+    } else {
+      const PetscInt a = v[(face + 1) % 4], b = v[(face + 2) % 4], c = v[(face + 3) % 4];
+
+      s->node_set[node] = face_sets(mesh, i / 4, face);
+      s->node_orig[node] = PetscMin(s->node_orig[node], mesh->Nvert + 4 * mesh->cell_orig[i / 4] + face);
+      for (int k = 0; k < 3; k++) x[k] = (mesh->x[3 * a + k] + mesh->x[3 * b + k] + mesh->x[3 * c + k]) / 3.;
+    }
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Nodes are the mesh's vertices. */
+static PetscErrorCode layout_vertices(SbSpace s)
+{
+  SbMesh mesh = s->mesh;
+
+  PetscFunctionBeginUser;
+  s->Nnode = mesh->Nvert;
+  s->nnode_owned = mesh->nvert_owned;
+  s->nnode = mesh->nvert;
+  s->gnode_start = mesh->gvert_start;
+  PetscCall(PetscMalloc1(s->nnode, &s->gnode));
+  PetscCall(PetscMalloc1(3 * s->nnode, &s->node_x));
+  PetscCall(PetscMalloc1(4 * mesh->ncell, &s->cell_node));
+  PetscCall(PetscArraycpy(s->gnode, mesh->gvert, s->nnode));
+  PetscCall(PetscArraycpy(s->node_x, mesh->x, 3 * s->nnode));
+  PetscCall(PetscArraycpy(s->cell_node, mesh->cell, 4 * mesh->ncell));
+  s->node_body = mesh->vert_body;
+  s->node_set = mesh->vert_set;
+  s->node_orig = mesh->vert_orig;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode layout_faces(SbSpace s)
+{
+  SbMesh mesh = s->mesh;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbMeshNeighbours(mesh, &s->neighbour));
+  PetscCall(PetscMalloc1(4 * (size_t)mesh->ncell, &s->cell_node));
+  PetscCall(number_owned(s, s->cell_node));
+  PetscCallMPI(MPI_Scan(&s->nnode_owned, &s->gnode_start, 1, MPIU_INT, MPI_SUM, s->comm));
+  PetscCallMPI(MPI_Allreduce(&s->nnode_owned, &s->Nnode, 1, MPIU_INT, MPI_SUM, s->comm));
+  s->gnode_start -= s->nnode_owned;
+  for (PetscInt i = 0; i < 4 * mesh->ncell_owned; i++) {
+    if (s->cell_node[i] != UNKNOWN) s->cell_node[i] += s->gnode_start;
+  }
+  PetscCall(SbMeshBroadcastCells(mesh, 4, s->cell_node));
+  PetscCall(complete_owned(s, s->cell_node));
+  PetscCall(SbMeshBroadcastCells(mesh, 4, s->cell_node));
+  PetscCall(localise(s));
+  PetscCall(describe_nodes(s));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbLayoutNodes(SbSpace s)
+{
+  PetscFunctionBeginUser;
+  for (PetscInt b = 0; b < s->mesh->nbody; b++) {
+    if (!s->element[b]->nodes_per[0]) s->faces = PETSC_TRUE;
+  }
+  if (s->faces)
+    PetscCall(layout_faces(s));
+  else
+    PetscCall(layout_vertices(s));
+  PetscCall(PetscCalloc1(s->nnode, &s->fixed));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbLayoutDestroy(SbSpace s)
+{
+  PetscFunctionBeginUser;
+  PetscCall(PetscFree(s->gnode));
+  PetscCall(PetscFree(s->cell_node));
+  PetscCall(PetscFree(s->node_x));
+  if (s->faces) PetscCall(PetscFree3(s->node_body, s->node_set, s->node_orig));
+  PetscCall(PetscFree(s->neighbour));
+  PetscCall(PetscFree(s->fixed));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The node across face a of a cell with its own nodes, and the weight of the cell's own one in the mean of the two. */
+static void across(SbSpace s, const PetscReal stiffness[], PetscInt cell, PetscInt a, PetscInt *node,
+                   PetscReal *weight)
+{
+  const PetscInt other = s->neighbour[4 * cell + a];
+
+  *node = s->cell_node[4 * cell + a];
+  *weight = 1.;
+  if (other < 0) return;
+  *node = s->cell_node[4 * other + face_towards(s, other, cell)];
+  *weight = stiffness[cell] / (stiffness[cell] + stiffness[other]);
+}
+
+/*
+  Nodes across the faces of DG cells. The mean of the two sides of a face is weighted by (2 mu + lambda) / |T|: then the
+  constant in the bound of the lifting does not depend on the volumes and moduli on the two sides (docs/theory.md).
+*/
+PetscErrorCode SbLayoutCliques(SbSpace s)
+{
+  PetscReal *stiffness;
+
+  PetscFunctionBeginUser;
+  s->width = 4;
+  s->batch_clique = s->batch_node;
+  for (PetscInt b = 0; b < s->mesh->nbody; b++) {
+    if (s->element[b]->nodes_per[3]) s->width = 8;
+  }
+  if (s->width == 4) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscMalloc1(s->mesh->ncell, &stiffness));
+  for (PetscInt r = 0; r < s->nregion; r++) {
+    const SbRegion *region = &s->region[r];
+    const PetscReal modulus = 2. * region->material->mu + region->material->lambda;
+
+    for (PetscInt b = region->bstart; b < region->bend; b++) {
+      for (PetscInt l = 0; l < s->batch_n[b]; l++)
+        stiffness[s->batch_cell[b] + l] = modulus / s->batch_V[b][l];
+    }
+  }
+  PetscCall(PetscMalloc2(s->nbatch * 8 * SB_BATCH, &s->batch_clique, s->nbatch * 4, &s->batch_weight));
+  for (PetscInt k = 0; k < 4 * SB_BATCH * s->nbatch; k++) {
+    const PetscInt b = k / (4 * SB_BATCH), a = k / SB_BATCH % 4, l = k % SB_BATCH,
+                   cell = s->batch_cell[b] + (l < s->batch_n[b] ? l : 0);
+    PetscInt *node = s->batch_clique + 8 * SB_BATCH * b + SB_BATCH * a + l;
+
+    node[0] = node[4 * SB_BATCH] = s->batch_node[k];
+    s->batch_weight[4 * b + a][l] = 1.;
+    if (SbSpaceCellElement(s, cell)->nodes_per[3])
+      across(s, stiffness, cell, a, &node[4 * SB_BATCH], &s->batch_weight[4 * b + a][l]);
+  }
+  PetscCall(PetscFree(stiffness));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
