@@ -84,7 +84,8 @@ struct _p_SbSpace {
   PetscBool linear; /* every region's law is linear */
 };
 
-/* Collective. Materials and elements: one per body, borrowed. Options read: -mass. */
+/* Collective. Borrowed: materials by the numbers in the mesh (one per body, then those of inclusions), elements one per body. Options
+   read: -mass. */
 PetscErrorCode SbSpaceCreate(SbMesh mesh, const SbMaterial material[], const SbElement element[],
                              SbSpace *space);
 PetscErrorCode SbSpaceDestroy(SbSpace *space);

@@ -54,7 +54,7 @@ struct _p_SbMaterial {
 
 extern PetscFunctionList SbMaterialList;
 /*
-  SbMaterialRegister - adds a law and the rows of its own options (class "body", type = law).
+  SbMaterialRegister - adds a law and the rows of its own options (classes "body" and "inclusion", type = law).
 
   Not collective, same on all ranks. create() fills the table, `tangent` and the flags of a material whose numbers are set.
 */
@@ -65,7 +65,7 @@ PetscErrorCode SbMaterialRegisterAll(void);
 /*
   SbMaterialCreate - creates the law by name and reads young, poisson, density and the law's own options.
 
-  Not collective, same on all ranks. Input: law; body, the scope of the body (its `type` is not looked at). Output: material,
+  Not collective, same on all ranks. Input: law; body, the scope of the body or inclusion (its `type` is not looked at). Output: material,
   owned by the caller. Errors: PETSC_ERR_USER for an unknown law and for what the option readers and the next two refuse.
 */
 PetscErrorCode SbMaterialCreate(const char *law, const SbScope *body, SbMaterial *m);

@@ -8,6 +8,7 @@
 #define SB_SET_MAX 63                /* named sets that one scenario may use: one bit each, bit 0 is taken */
 #define SB_ON_BOUNDARY ((uint64_t)1) /* bit 0 of SbMesh.face_set: the face has no cell on the other side */
 #define SB_SET_BIT(k) ((uint64_t)1 << ((k) + 1))
+#define SB_INCLUSION_MAX 16 /* inclusions of a body: tets with a material of their own */
 
 /* A body as the scenario gives it. Data, no methods. */
 typedef struct {
@@ -24,6 +25,10 @@ typedef struct {
   PetscReal density;          /* kg/m^3 */
   PetscReal velocity[3];      /* initial velocity of the centre of mass, m/s */
   PetscReal spin[3];          /* initial angular velocity about the centre of mass, rad/s */
+  PetscInt ninclusion;        /* inclusions: tets with a material of their own */
+  struct {
+    PetscInt set, material; /* set that holds the tets; number of the material */
+  } inclusion[SB_INCLUSION_MAX];
   /* found by SbMeshCreate(), equal on all ranks */
   PetscInt nvert, ncell, nfacet; /* global counts; nfacet counts boundary facets */
   PetscInt npart;                /* connected parts */
@@ -88,7 +93,9 @@ struct _p_SbMesh {
   PetscInt *cell;      /* [ncell][4] local vertices, positively oriented: det(x1-x0, x2-x0, x3-x0) > 0 */
   PetscInt *cell_orig; /* [ncell] original number, as for vertices */
   PetscInt
-    *cell_body; /* [ncell]; owned and ghost cells are each sorted by body, then by lowest local vertex */
+    *cell_body; /* [ncell]; owned and ghost cells are each sorted by body, inclusion, lowest local vertex */
+  PetscInt *
+    cell_material; /* [ncell] number of the body, or the material of its first inclusion that holds the cell */
   PetscInt *cell_point; /* [ncell] point of the DM */
   uint64_t *cell_set;   /* [ncell] */
   uint64_t

@@ -30,8 +30,10 @@ struct _p_SbModel {
   SbBody *body;
   PetscInt nset;
   SbSet *set;
-  SbMaterial *material; /* [nbody] */
-  SbElement *element;   /* [nbody] */
+  PetscInt nmaterial;
+  SbMaterial *material;           /* [nmaterial] one per body, then those of inclusions */
+  char (*inclusion)[SB_NAME_MAX]; /* [nmaterial - nbody] names of the inclusions */
+  SbElement *element;             /* [nbody] */
   SbMesh mesh;
   SbSpace space;
   PetscInt neffect;

@@ -24,23 +24,30 @@ PetscErrorCode SbSpaceRegister(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Owned and ghost cells are each sorted by body: a region is a run of cells. */
+/* Owned and ghost cells are each sorted by body and inclusion: a region is a run of cells. */
 static PetscErrorCode find_regions(SbSpace s, const SbMaterial material[], const SbElement element[])
 {
   SbMesh mesh = s->mesh;
+  PetscInt most = 0;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscCalloc1(2 * mesh->nbody, &s->region));
   s->linear = PETSC_TRUE;
-  for (PetscInt b = 0; b < mesh->nbody; b++) s->linear = (PetscBool)(s->linear && material[b]->linear);
+  for (PetscInt b = 0; b < mesh->nbody; b++) {
+    s->linear = (PetscBool)(s->linear && material[b]->linear);
+    for (PetscInt k = 0; k < mesh->body[b].ninclusion; k++)
+      s->linear = (PetscBool)(s->linear && material[mesh->body[b].inclusion[k].material]->linear);
+    most += 2 * (1 + mesh->body[b].ninclusion);
+  }
+  PetscCall(PetscCalloc1(most, &s->region));
   for (PetscInt c = 0; c < mesh->ncell; c++) {
-    const PetscInt body = mesh->cell_body[c];
+    const PetscInt body = mesh->cell_body[c], m = mesh->cell_material[c];
 
-    if (c == 0 || c == mesh->ncell_owned || body != mesh->cell_body[c - 1]) {
+    if (c == 0 || c == mesh->ncell_owned || body != mesh->cell_body[c - 1] ||
+        m != mesh->cell_material[c - 1]) {
       SbRegion *r = &s->region[s->nregion++];
 
       r->body = body;
-      r->material = material[body];
+      r->material = material[m];
       r->element = element[body];
       r->cstart = c;
       r->owned = (PetscBool)(c < mesh->ncell_owned);

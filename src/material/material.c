@@ -37,6 +37,7 @@ PetscErrorCode SbMaterialRegister(const char *law, PetscErrorCode (*create)(SbMa
   if (!SbMaterialList) PetscCall(PetscRegisterFinalize(destroy_list));
   PetscCall(PetscFunctionListAdd(&SbMaterialList, law, create));
   if (nrows) PetscCall(SbOptionsRegister("body", law, nrows, rows));
+  if (nrows) PetscCall(SbOptionsRegister("inclusion", law, nrows, rows));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -44,6 +45,7 @@ PetscErrorCode SbMaterialRegisterAll(void)
 {
   PetscFunctionBeginUser;
   PetscCall(SbOptionsRegister("body", "", PETSC_STATIC_ARRAY_LENGTH(body_rows), body_rows));
+  PetscCall(SbOptionsRegister("inclusion", "", PETSC_STATIC_ARRAY_LENGTH(body_rows), body_rows));
   PetscCall(SbMaterialRegister("linear", SbMaterialCreate_Linear, 0, NULL));
   PetscCall(SbMaterialRegister("corotated", SbMaterialCreate_Corotated,
                                PETSC_STATIC_ARRAY_LENGTH(corotated_rows), corotated_rows));
@@ -116,12 +118,12 @@ PetscErrorCode SbMaterialCreate(const char *law, const SbScope *body, SbMaterial
   PetscErrorCode (*create)(SbMaterial) = NULL;
   SbScope scope;
   PetscReal E, nu, density;
-  char where[2 * SB_NAME_MAX];
+  char where[3 * SB_NAME_MAX];
 
   PetscFunctionBeginUser;
-  PetscCall(PetscSNPrintf(where, sizeof(where), "-body_%s_material", body->instance));
+  PetscCall(PetscSNPrintf(where, sizeof(where), "-%s_%s_material", body->klass, body->instance));
   PetscCall(find_law(law, where, &create));
-  PetscCall(SbScopeSet(&scope, "body", law, body->instance));
+  PetscCall(SbScopeSet(&scope, body->klass, law, body->instance));
   PetscCall(SbOptionReal(&scope, "young", &E));
   PetscCall(SbOptionReal(&scope, "poisson", &nu));
   PetscCall(SbOptionReal(&scope, "density", &density));

@@ -145,7 +145,7 @@ PetscErrorCode SbMeshDestroy(SbMesh *mesh)
   PetscCall(PetscFree(m->x));
   PetscCall(PetscFree(m->cell));
   PetscCall(PetscFree(m->cell_orig));
-  PetscCall(PetscFree(m->cell_body));
+  PetscCall(PetscFree2(m->cell_body, m->cell_material));
   PetscCall(PetscFree(m->cell_point));
   PetscCall(PetscFree(m->cell_set));
   PetscCall(PetscFree(m->face_set));

@@ -2,7 +2,7 @@
   number.c - own local numbering of what DMPlex brought to this rank.
 
   Vertices: owned ones first, in reverse Cuthill-McKee order, then ghosts by global number. The owned ones of all ranks,
-  one rank after the other, are the global numbers. Cells: owned ones first, then ghosts; both sorted by body, then by
+  one rank after the other, are the global numbers. Cells: owned ones first, then ghosts; both sorted by body and inclusion, then by
   lowest local vertex, so that a loop over cells walks through the vertices.
 
   Overlap 1 brings every cell that touches a cell of this rank. Where all nodes are vertices, a ghost cell that touches no
@@ -175,6 +175,17 @@ static PetscErrorCode sort_by_key(PetscInt n, const PetscInt from[], PetscInt nk
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The inclusion of its body that a cell belongs to: 0 for the bulk, else one more than its place in the list. */
+static PetscInt inclusion_of(SbMesh mesh, const SbPoint *cell)
+{
+  const SbBody *body = &mesh->body[cell->body];
+
+  for (PetscInt k = 0; k < body->ninclusion; k++) {
+    if (cell->set & SB_SET_BIT(body->inclusion[k].set)) return k + 1;
+  }
+  return 0;
+}
+
 /* The kept DM cells in the order of their own numbers. */
 static PetscErrorCode order_cells(const Work *w, SbMesh mesh, PetscInt order[])
 {
@@ -190,9 +201,13 @@ static PetscErrorCode order_cells(const Work *w, SbMesh mesh, PetscInt order[])
     order[n++] = c;
   }
   PetscCall(sort_by_key(n, order, mesh->nvert, key, some));
-  for (PetscInt c = 0; c < w->ncell; c++)
-    key[c] = w->point[w->cStart + c].body + (w->ghost[w->cStart + c] ? mesh->nbody : 0);
-  PetscCall(sort_by_key(n, some, 2 * mesh->nbody, key, order));
+  for (PetscInt c = 0; c < w->ncell; c++) {
+    const SbPoint *p = &w->point[w->cStart + c];
+
+    key[c] = (SB_INCLUSION_MAX + 1) * (p->body + (w->ghost[w->cStart + c] ? mesh->nbody : 0)) +
+             inclusion_of(mesh, p);
+  }
+  PetscCall(sort_by_key(n, some, 2 * (SB_INCLUSION_MAX + 1) * mesh->nbody, key, order));
   PetscCall(PetscFree2(key, some));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -206,16 +221,18 @@ static PetscErrorCode fill_cells(const Work *w, SbMesh mesh)
   PetscCall(order_cells(w, mesh, order));
   PetscCall(PetscMalloc1(4 * (size_t)mesh->ncell, &mesh->cell));
   PetscCall(PetscMalloc1(mesh->ncell, &mesh->cell_orig));
-  PetscCall(PetscMalloc1(mesh->ncell, &mesh->cell_body));
+  PetscCall(PetscMalloc2(mesh->ncell, &mesh->cell_body, mesh->ncell, &mesh->cell_material));
   PetscCall(PetscMalloc1(mesh->ncell, &mesh->cell_point));
   PetscCall(PetscMalloc1(mesh->ncell, &mesh->cell_set));
   PetscCall(PetscMalloc1(4 * (size_t)mesh->ncell, &mesh->face_set));
   for (PetscInt c = 0; c < mesh->ncell; c++) {
     const SbPoint *p = &w->point[w->cStart + order[c]];
+    const PetscInt inclusion = inclusion_of(mesh, p);
 
     mesh->cell_point[c] = w->cStart + order[c];
     mesh->cell_orig[c] = p->orig;
     mesh->cell_body[c] = p->body;
+    mesh->cell_material[c] = inclusion ? mesh->body[p->body].inclusion[inclusion - 1].material : p->body;
     mesh->cell_set[c] = p->set;
     for (int a = 0; a < 4; a++) {
       mesh->cell[4 * c + a] = w->local[w->cone[4 * order[c] + a]];

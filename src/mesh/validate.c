@@ -66,7 +66,8 @@ static PetscErrorCode check_cells(SbMesh m)
       CHECK(lowest(v) < m->nvert_owned, "Ghost cell %" PetscInt_FMT " touches no owned vertex", c);
     if (c == 0 || c == m->ncell_owned) continue;
     CHECK(m->cell_body[c - 1] < m->cell_body[c] ||
-            (m->cell_body[c - 1] == m->cell_body[c] && lowest(v - 4) <= lowest(v)),
+            (m->cell_body[c - 1] == m->cell_body[c] &&
+             (m->cell_material[c - 1] != m->cell_material[c] || lowest(v - 4) <= lowest(v))),
           "Cells are out of order at %" PetscInt_FMT, c);
   }
   PetscFunctionReturn(PETSC_SUCCESS);

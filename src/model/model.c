@@ -22,15 +22,37 @@ PetscErrorCode SbModelDestroy(SbModel *model)
   PetscCall(PetscFree(m->history));
   PetscCall(SbSpaceDestroy(&m->space));
   PetscCall(SbMeshDestroy(&m->mesh));
-  for (PetscInt b = 0; b < m->nbody; b++) {
-    if (m->material) PetscCall(SbMaterialDestroy(&m->material[b]));
-    if (m->element) PetscCall(SbElementDestroy(&m->element[b]));
-  }
+  for (PetscInt k = 0; k < m->nmaterial; k++) PetscCall(SbMaterialDestroy(&m->material[k]));
+  for (PetscInt b = 0; m->element && b < m->nbody; b++) PetscCall(SbElementDestroy(&m->element[b]));
+  PetscCall(PetscFree(m->inclusion));
   PetscCall(PetscFree(m->material));
   PetscCall(PetscFree(m->element));
   PetscCall(PetscFree(m->body));
   PetscCall(PetscFree(m->set));
   PetscCall(PetscFree(*model));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* An inclusion without tets is a slip of the pen. */
+static PetscErrorCode check_inclusions(SbModel m)
+{
+  PetscInt *count;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscCalloc1(m->nmaterial, &count));
+  for (PetscInt c = 0; c < m->mesh->ncell_owned; c++) count[m->mesh->cell_material[c]]++;
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, count, (PetscMPIInt)m->nmaterial, MPIU_INT, MPI_SUM, m->comm));
+  for (PetscInt b = 0; b < m->nbody; b++) {
+    for (PetscInt k = 0; k < m->body[b].ninclusion; k++) {
+      const PetscInt i = m->body[b].inclusion[k].material;
+
+      PetscCheck(
+        count[i], m->comm, PETSC_ERR_USER_INPUT,
+        "-body_%s_inclusions: '%s' holds no tetrahedra of this body that an earlier inclusion has not taken",
+        m->body[b].name, m->inclusion[i - m->nbody]);
+    }
+  }
+  PetscCall(PetscFree(count));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -50,6 +72,7 @@ PetscErrorCode SbModelSetUp(SbModel m)
   PetscFunctionBeginUser;
   for (PetscInt b = 0; b < m->nbody; b++) m->body[b].face_nodes = (PetscBool)!m->element[b]->nodes_per[0];
   PetscCall(SbMeshCreate(m->comm, m->nbody, m->body, m->nset, m->set, &m->mesh));
+  if (m->nmaterial > m->nbody) PetscCall(check_inclusions(m));
   PetscCall(SbSpaceCreate(m->mesh, m->material, m->element, &m->space));
   m->load = 1.;
   m->linear = m->space->linear;

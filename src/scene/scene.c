@@ -27,18 +27,25 @@ static const SbOption body_rows[] = {
   {"rotate", SB_OPTION_REALS, 4, "", "0,0,1,0", "(-inf, inf)",
    "axis x,y,z and angle in degrees, before translation"},
   {"translate", SB_OPTION_REALS, 3, "m", "0,0,0", "(-inf, inf)", "shift of the scaled and rotated mesh"},
-  {"element", SB_OPTION_STRING, 1, "", "p1", "", "finite element: p1; cr or dg, which do not lock when poisson is near 0.5"},
+  {"element", SB_OPTION_STRING, 1, "", "p1", "",
+   "finite element: p1; cr or dg, which do not lock when poisson is near 0.5"},
   {"material", SB_OPTION_STRING, 1, "", "", "",
    "material law, required: linear, corotated, stvk or neohookean"},
+  {"inclusions", SB_OPTION_NAMES, 1, "", "", "",
+   "sets or volume groups whose tetrahedra have a material of their own, -inclusion_<name>_..."},
   {"velocity", SB_OPTION_REALS, 3, "m/s", "0,0,0", "(-inf, inf)",
    "velocity of the centre of mass at the start"},
   {"spin", SB_OPTION_REALS, 3, "rad/s", "0,0,0", "(-inf, inf)",
    "angular velocity about the centre of mass at the start"},
 };
+static const SbOption inclusion_rows[] = {
+  {"material", SB_OPTION_STRING, 1, "", "", "", "material law, required"},
+};
 
 PetscErrorCode SbSceneRegister(void)
 {
   PetscFunctionBeginUser;
+  PetscCall(SbOptionsRegister("inclusion", "", PETSC_STATIC_ARRAY_LENGTH(inclusion_rows), inclusion_rows));
   PetscCall(SbOptionsRegister("", "", PETSC_STATIC_ARRAY_LENGTH(run_rows), run_rows));
   PetscCall(SbOptionsRegister("body", "", PETSC_STATIC_ARRAY_LENGTH(body_rows), body_rows));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -179,6 +186,33 @@ static PetscErrorCode read_body(SbModel model, PetscInt i)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The materials of the inclusions of body i, behind those that are there. */
+static PetscErrorCode read_inclusions(SbModel model, PetscInt i)
+{
+  SbBody *body = &model->body[i];
+  char(*names)[SB_NAME_MAX], law[SB_NAME_MAX];
+  SbScope scope;
+  PetscInt n;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbScopeSet(&scope, "body", "", body->name));
+  PetscCall(SbOptionNames(&scope, "inclusions", &n, &names));
+  PetscCheck(n <= SB_INCLUSION_MAX, PETSC_COMM_SELF, PETSC_ERR_USER,
+             "-body_%s_inclusions names %" PetscInt_FMT " sets; a body may have up to %d", body->name, n,
+             SB_INCLUSION_MAX);
+  PetscCall(PetscRealloc((size_t)(model->nmaterial + n) * sizeof(*model->material), &model->material));
+  PetscCall(PetscRealloc((size_t)(model->nmaterial + n - model->nbody + 1) * SB_NAME_MAX, &model->inclusion));
+  for (PetscInt k = 0; k < n; k++) {
+    PetscCall(PetscStrncpy(model->inclusion[model->nmaterial - model->nbody], names[k], SB_NAME_MAX));
+    PetscCall(SbScopeSet(&scope, "inclusion", "", names[k]));
+    PetscCall(read_type(&scope, "material", SbMaterialList, law));
+    PetscCall(SbMaterialCreate(law, &scope, &model->material[model->nmaterial]));
+    body->inclusion[body->ninclusion++].material = model->nmaterial++;
+  }
+  PetscCall(PetscFree(names));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 static PetscErrorCode read_bodies(SbModel model)
 {
   char(*names)[SB_NAME_MAX];
@@ -192,7 +226,9 @@ static PetscErrorCode read_bodies(SbModel model)
   for (PetscInt i = 0; i < model->nbody; i++)
     PetscCall(PetscStrncpy(model->body[i].name, names[i], SB_NAME_MAX));
   PetscCall(PetscFree(names));
+  model->nmaterial = model->nbody;
   for (PetscInt i = 0; i < model->nbody; i++) PetscCall(read_body(model, i));
+  for (PetscInt i = 0; i < model->nbody; i++) PetscCall(read_inclusions(model, i));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

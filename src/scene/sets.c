@@ -1,7 +1,7 @@
 /*
   sets.c - the named sets of a scene: those that -sets defines by a shape, and those that effects name without more ado.
 
-  An effect says in its option `on` where it acts. A name there that -sets does not define means, in this order: the body
+  An effect says in its option `on` where it acts, a body in `inclusions` which of its tets are of another material. A name there that -sets does not define means, in this order: the body
   of that name, `all` bodies, the whole `boundary`, the physical group of that name. All such names are collected before
   the mesh is made, because it marks every set while it reads the bodies.
 */
@@ -117,9 +117,19 @@ PetscErrorCode SbSceneReadSets(SbModel model)
     for (PetscInt i = 0; i < n && model->nset <= SB_SET_MAX; i++) PetscCall(use_name(model, names[i]));
     PetscCall(PetscFree(names));
   }
+  for (PetscInt b = 0; b < model->nbody; b++) {
+    SbBody *body = &model->body[b];
+
+    for (PetscInt k = 0; k < body->ninclusion && model->nset <= SB_SET_MAX; k++) {
+      const char *name = model->inclusion[body->inclusion[k].material - model->nbody];
+
+      PetscCall(use_name(model, name));
+      body->inclusion[k].set = find_set(model, name);
+    }
+  }
   PetscCheck(model->nset <= SB_SET_MAX, PETSC_COMM_SELF, PETSC_ERR_USER,
              "the scenario uses more than %d sets (%" PetscInt_FMT
-             " in -sets, the others named by effects); join some of them",
+             " in -sets, the others named by effects and inclusions); join some of them",
              SB_SET_MAX, room);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
