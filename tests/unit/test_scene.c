@@ -205,8 +205,8 @@ static PetscErrorCode test_values(void)
   PetscCall(refused(LIVER " -body_liver_material corotate",
                     "-body_liver_material corotate is not one of corotated, "
                     "linear, neohookean, stvk; did you mean corotated?"));
-  PetscCall(
-    refused(LIVER " -body_liver_element p2", "-body_liver_element p2 is not one of cr, dg, p1; did you mean p1?"));
+  PetscCall(refused(LIVER " -body_liver_element p2",
+                    "-body_liver_element p2 is not one of cr, dg, p1; did you mean p1?"));
   PetscCall(refused(LIVER " -body_liver_scale 0",
                     "-body_liver_scale 0 is outside (0, inf): factor on the coordinates"));
   PetscCall(
@@ -265,8 +265,8 @@ static PetscErrorCode test_many_sets(void)
     (void)snprintf(name, sizeof(name), ",s%d", i);
     PetscCall(PetscStrlcat(options, name, sizeof(options)));
   }
-  PetscCall(
-    refused(options, "the scenario uses more than 63 sets (0 in -sets, the others named by effects)"));
+  PetscCall(refused(
+    options, "the scenario uses more than 63 sets (0 in -sets, the others named by effects and inclusions)"));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
