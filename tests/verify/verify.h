@@ -96,21 +96,30 @@ static inline PetscErrorCode verify_mesh_remove(const char path[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A vector of the run by original vertex number on every rank, [Nvert][3]; the caller frees it with PetscFree(). */
+/* How many numbers SbSpace.node_orig draws from: the vertices, with nodes at faces also four for each cell. */
+static inline PetscInt verify_numbers(SbModel m)
+{
+  return m->mesh->Nvert + (m->space->faces ? 4 * m->mesh->Ncell : 0);
+}
+
+/*
+  A vector of the run by the number of each node that no partition changes, on every rank: [verify_numbers()][3], zero at
+  numbers without a node; the caller frees it with PetscFree().
+*/
 static inline PetscErrorCode verify_gather(SbModel m, Vec U, PetscReal **value)
 {
-  const SbMesh mesh = m->mesh;
+  const SbSpace s = m->space;
+  const PetscInt n = verify_numbers(m);
   const PetscScalar *u;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscCalloc1(3 * mesh->Nvert, value));
+  PetscCall(PetscCalloc1(3 * n, value));
   PetscCall(VecGetArrayRead(U, &u));
-  for (PetscInt i = 0; i < mesh->nvert_owned; i++) {
-    for (int k = 0; k < 3; k++) (*value)[3 * mesh->vert_orig[i] + k] = u[3 * i + k];
+  for (PetscInt i = 0; i < s->nnode_owned; i++) {
+    for (int k = 0; k < 3; k++) (*value)[3 * s->node_orig[i] + k] = u[3 * i + k];
   }
   PetscCall(VecRestoreArrayRead(U, &u));
-  PetscCallMPI(
-    MPI_Allreduce(MPI_IN_PLACE, *value, (PetscMPIInt)(3 * mesh->Nvert), MPIU_REAL, MPI_SUM, m->comm));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, *value, (PetscMPIInt)(3 * n), MPIU_REAL, MPI_SUM, m->comm));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -1,0 +1,195 @@
+// @ranks 1 2 3 4
+/*
+  Which nodes a space has: P1 at vertices, CR one per face, DG four per cell, also side by side in one space. Their number,
+  their places, what they are shared by, and that all of it is the same on one rank and on several.
+*/
+#include "../scene.h"
+
+#define BODY(name, element, at)                                                                         \
+  " -body_" name "_mesh box:0.5,0.4,0.3:2 -body_" name "_translate 0,0," at " -body_" name              \
+  "_material corotated -body_" name "_young 1e5 -body_" name "_poisson 0.3 -body_" name "_density 1000" \
+  " -body_" name "_element " element
+#define SETS                                                                         \
+  " -sets low,ball -set_low_at plane:0,0,1,0 -set_ball_at sphere:0.25,0.2,0.15,0.16" \
+  " -effects clamp,push -effect_clamp_type support -effect_clamp_on low"             \
+  " -effect_push_type support -effect_push_on ball -effect_push_components y"
+
+static const char *const scenes[] = {
+  "-bodies a" BODY("a", "p1", "0") SETS,
+  "-bodies a" BODY("a", "cr", "0") SETS,
+  "-bodies a" BODY("a", "dg", "0") SETS,
+  "-bodies a,b,c,d" BODY("a", "dg", "0") BODY("b", "p1", "1") BODY("c", "cr", "2") BODY("d", "dg", "3") SETS,
+};
+
+static PetscErrorCode open_on(MPI_Comm comm, const char *options, SbModel *m)
+{
+  PetscFunctionBeginUser;
+  PetscCall(PetscOptionsClear(NULL));
+  PetscCall(SbOptionsReset());
+  PetscCall(SbRegisterAll());
+  PetscCall(PetscOptionsInsertString(NULL, options));
+  PetscCall(SbSceneCreate(comm, m));
+  PetscCall(SbModelSetUp(*m));
+  PetscCall(SbMeshValidate((*m)->mesh));
+  PetscCall(SbSpaceValidate((*m)->space));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscInt expected_nodes(SbModel m)
+{
+  PetscInt n = 0;
+
+  for (PetscInt b = 0; b < m->mesh->nbody; b++) {
+    const SbBody *body = &m->mesh->body[b];
+    const PetscInt *per = m->space->element[b]->nodes_per;
+
+    /* each inner face is one of two cells */
+    n += per[0] ? body->nvert : per[3] ? 4 * body->ncell : (4 * body->ncell + body->nfacet) / 2;
+  }
+  return n;
+}
+
+/* Cells: node a lies where the element says, and the two sides of a face share it in CR and do not in DG. */
+static void check_cells(SbModel m)
+{
+  const SbMesh mesh = m->mesh;
+  const SbSpace s = m->space;
+
+  for (PetscInt i = 0; i < 4 * mesh->ncell; i++) {
+    const PetscInt *v = mesh->cell + 4 * (i / 4), *per = SbSpaceCellElement(s, i / 4)->nodes_per;
+    const PetscInt node = s->cell_node[i], other = s->faces ? s->neighbour[i] : -1;
+
+    SB_CHECK(node >= 0 && node < s->nnode, "node %d of %d", (int)node, (int)s->nnode);
+    SB_CHECK(s->node_body[node] == mesh->cell_body[i / 4], "a node belongs to another body");
+    for (int k = 0; k < 3; k++) {
+      PetscReal sum = 0.;
+
+      for (PetscInt a = 0; a < 4; a++) sum += (a == i % 4) == (per[0] > 0) ? mesh->x[3 * v[a] + k] : 0.;
+      SB_CHECK_NEAR(s->node_x[3 * node + k], per[0] ? sum : sum / 3., 1e-15, "place of a node");
+    }
+    if (other < 0 || per[0]) continue;
+    PetscInt same = 0;
+    for (PetscInt a = 0; a < 4; a++) same += s->cell_node[4 * other + a] == node;
+    SB_CHECK(same == (per[2] > 0), "the cell across a face has its node %d times", (int)same);
+  }
+}
+
+/* What an owned node is known by, at 8 node_orig: place, mass, sets, body, components prescribed, and one as a count. */
+static PetscErrorCode describe(SbModel m, PetscInt n, PetscReal **table)
+{
+  const SbSpace s = m->space;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscCalloc1(8 * n, table));
+  for (PetscInt i = 0; i < s->nnode_owned; i++) {
+    PetscReal *row = *table + 8 * s->node_orig[i];
+
+    SB_CHECK(s->node_orig[i] >= 0 && s->node_orig[i] < n, "number %d", (int)s->node_orig[i]);
+    for (int k = 0; k < 3; k++) row[k] += s->node_x[3 * i + k];
+    row[3] += s->node_mass[i];
+    row[4] += (PetscReal)s->node_set[i];
+    row[5] += (PetscReal)s->node_body[i];
+    row[6] += s->fixed[i];
+    row[7] += 1.;
+  }
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, *table, (PetscMPIInt)(8 * n), MPIU_REAL, MPI_SUM, m->comm));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Every node has one owner, and the space of all ranks has the nodes of the space of one. */
+static PetscErrorCode compare(SbModel m, SbModel alone)
+{
+  const PetscInt n = m->mesh->Nvert + 4 * m->mesh->Ncell;
+  PetscReal *one, *all, mass = 0.;
+  PetscInt count = 0, fixed = 0, in_set = 0;
+
+  PetscFunctionBeginUser;
+  PetscCall(describe(alone, n, &one));
+  PetscCall(describe(m, n, &all));
+  for (PetscInt i = 0; i < n; i++) {
+    SB_CHECK(all[8 * i + 7] == one[8 * i + 7] && one[8 * i + 7] <= 1., "number %d belongs to %g nodes",
+             (int)i, (double)all[8 * i + 7]);
+    for (int k = 0; k < 7; k++)
+      SB_CHECK_NEAR(all[8 * i + k], one[8 * i + k], 1e-15 * PetscAbsReal(one[8 * i + k]),
+                    "node on several ranks");
+    count += one[8 * i + 7] > 0.;
+    fixed += one[8 * i + 6] > 0.;
+    in_set += one[8 * i + 4] > 0.;
+    mass += one[8 * i + 3];
+  }
+  SB_CHECK(count == expected_nodes(m) && m->space->Nnode == count && alone->space->Nnode == count,
+           "%d nodes, and the space has %d, the meshes %d", (int)count, (int)m->space->Nnode,
+           (int)expected_nodes(m));
+  SB_CHECK(fixed > 0 && fixed < count && in_set == fixed, "%d nodes are held, %d in sets", (int)fixed,
+           (int)in_set);
+  SB_CHECK_NEAR(mass, 1000. * 0.5 * 0.4 * 0.3 * (PetscReal)m->mesh->nbody, 1e-12 * mass, "mass of all nodes");
+  PetscCall(PetscFree(one));
+  PetscCall(PetscFree(all));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Ghosts are the nodes that their owners mean: places sent by the owners arrive where the place is that. */
+static PetscErrorCode check_ghosts(SbSpace s)
+{
+  const PetscReal *x;
+  PetscScalar *own;
+  Vec X;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbSpaceCreateVec(s, &X));
+  PetscCall(VecGetArray(X, &own));
+  PetscCall(PetscArraycpy(own, s->node_x, 3 * s->nnode_owned));
+  PetscCall(VecRestoreArray(X, &own));
+  PetscCall(SbSpaceGetLocalRead(s, X, &x));
+  for (PetscInt i = 0; i < 3 * s->nnode; i++) SB_CHECK_NEAR(x[i], s->node_x[i], 1e-15, "place of a ghost");
+  PetscCall(SbSpaceRestoreLocalRead(s, X, &x));
+  PetscCall(VecDestroy(&X));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Means of DG: own node and the one across its face lie at one place, weights of the two sides add up to one. */
+static void check_cliques(SbSpace s)
+{
+  PetscBool broken = PETSC_FALSE;
+
+  for (PetscInt r = 0; r < s->nregion; r++) broken = (PetscBool)(broken || s->region[r].broken);
+  SB_CHECK(s->width >= (broken ? 8 : 4), "width %d", (int)s->width);
+  if (s->width == 4) SB_CHECK(s->batch_clique == s->batch_node && !s->batch_weight, "four nodes twice");
+  for (PetscInt k = 0; s->width == 8 && k < 4 * SB_BATCH * s->nbatch; k++) {
+    const PetscInt b = k / (4 * SB_BATCH), a = k / SB_BATCH % 4, l = k % SB_BATCH;
+    const PetscInt *node = s->batch_clique + 8 * SB_BATCH * b + SB_BATCH * a + l, cell = s->batch_cell[b] + l;
+    const PetscReal weight = s->batch_weight[4 * b + a][l];
+
+    if (l >= s->batch_n[b]) continue;
+    SB_CHECK(node[0] == s->cell_node[4 * cell + a], "own node of a clique");
+    if (!SbSpaceCellElement(s, cell)->nodes_per[3] || s->neighbour[4 * cell + a] < 0) {
+      SB_CHECK(node[4 * SB_BATCH] == node[0] && weight == 1., "a side without another has weight %g",
+               (double)weight);
+      continue;
+    }
+    SB_CHECK(node[4 * SB_BATCH] != node[0] && weight > 0. && weight < 1., "weight %g", (double)weight);
+    for (int i = 0; i < 3; i++)
+      SB_CHECK_NEAR(s->node_x[3 * node[4 * SB_BATCH] + i], s->node_x[3 * node[0] + i], 1e-15,
+                    "node across a face");
+  }
+}
+
+int main(int argc, char **argv)
+{
+  SB_TEST_BEGIN(argc, argv);
+  for (size_t k = 0; k < PETSC_STATIC_ARRAY_LENGTH(scenes); k++) {
+    SbModel m, alone;
+
+    PetscCall(open_on(PETSC_COMM_SELF, scenes[k], &alone));
+    PetscCall(open_on(PETSC_COMM_WORLD, scenes[k], &m));
+    check_cells(m);
+    PetscCall(check_ghosts(m->space));
+    check_cliques(m->space);
+    PetscCall(compare(m, alone));
+    PetscCall(PetscPrintf(PETSC_COMM_WORLD, "  scene %d: %d cells, %d vertices, %d nodes\n", (int)k,
+                          (int)m->mesh->Ncell, (int)m->mesh->Nvert, (int)m->space->Nnode));
+    PetscCall(SbModelDestroy(&m));
+    PetscCall(SbModelDestroy(&alone));
+  }
+  SB_TEST_END();
+}
