@@ -1,0 +1,277 @@
+// @ranks 1 3
+/*
+  Face terms of CR and DG against their formula: for each face the jump at three points of a rule that is exact for squares,
+  from the two cells' own functions at places in space, with no use of the nodes that the face has in jump.c.
+*/
+#include "../../src/fem/fem_impl.h"
+#include "../scene.h"
+
+/* Two bodies, one of them of tets of many shapes; gammas unlike the defaults. */
+static const char *const scene =
+  "-bodies a,b -body_a_mesh box:0.5,0.4,0.3:2 -body_a_material corotated -body_a_young 1e5 -body_a_poisson "
+  "0.3 "
+  "-body_a_density 1000 -body_a_element %s -body_a_gamma1 0.7 %s -body_b_mesh tests/data/two_cubes_41.msh "
+  "-body_b_scale 0.1 "
+  "-body_b_translate 0,0,2 -body_b_material neohookean -body_b_young 3e5 -body_b_poisson 0.45 "
+  "-body_b_density 500 "
+  "-body_b_element %s -effects damping -effect_damping_beta 0.02";
+
+static void wave(const PetscReal x[3], PetscReal v[3])
+{
+  v[0] = 0.05 * PetscSinReal(30. * x[0] + x[1]);
+  v[1] = 0.04 * PetscCosReal(20. * x[1] - x[2]) * x[0];
+  v[2] = 0.06 * PetscSinReal(x[0] + 40. * x[2]) * x[0];
+}
+
+static void affine(const PetscReal x[3], PetscReal v[3])
+{
+  v[0] = 0.3 + 0.1 * x[0] - 0.7 * x[1];
+  v[1] = 0.2 * x[2] - 0.4 * x[1] + 0.1 * x[0];
+  v[2] = 0.1 - 0.3 * x[2] + 0.5 * x[0];
+}
+
+/* Adds something to every node that no two nodes share, the same on any rank. */
+static PetscErrorCode roughen(SbSpace s, PetscReal size, Vec U)
+{
+  PetscScalar *u;
+
+  PetscFunctionBeginUser;
+  PetscCall(VecGetArray(U, &u));
+  for (PetscInt i = 0; i < 3 * s->nnode_owned; i++)
+    u[i] += size * PetscSinReal(17. * (PetscReal)(3 * s->node_orig[i / 3] + i % 3));
+  PetscCall(VecRestoreArray(U, &u));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* A cell's function at a place: nodal values times 1 - 3 times a ratio of volumes. */
+static void cell_value(SbSpace s, PetscInt cell, const PetscReal u[], const PetscReal at[3],
+                       PetscReal value[3])
+{
+  const PetscInt *v = s->mesh->cell + 4 * cell;
+
+  for (int k = 0; k < 3; k++) value[k] = 0.;
+  for (int a = 0; a < 4; a++) {
+    const PetscReal *o = s->mesh->x + 3 * v[(a + 1) % 4], *p = s->mesh->x + 3 * v[(a + 2) % 4],
+                    *q = s->mesh->x + 3 * v[(a + 3) % 4], *top = s->mesh->x + 3 * v[a];
+    PetscReal e[3], f[3], n[3], here[3], there[3];
+
+    for (int k = 0; k < 3; k++) {
+      e[k] = p[k] - o[k];
+      f[k] = q[k] - o[k];
+      here[k] = at[k] - o[k];
+      there[k] = top[k] - o[k];
+    }
+    SbCross(e, f, n);
+    for (int k = 0; k < 3; k++)
+      value[k] += (1. - 3. * SbDot3(here, n) / SbDot3(there, n)) * u[3 * s->cell_node[4 * cell + a] + k];
+  }
+}
+
+static PetscReal cell_volume(SbMesh mesh, PetscInt cell)
+{
+  PetscReal e[9], n[3];
+
+  for (int k = 0; k < 9; k++)
+    e[k] = mesh->x[3 * mesh->cell[4 * cell + 1 + k / 3] + k % 3] - mesh->x[3 * mesh->cell[4 * cell] + k % 3];
+  SbCross(e + 3, e + 6, n);
+  return SbDot3(e, n) / 6.;
+}
+
+/* Energy of the face i % 4 of cell i / 4. */
+static PetscReal face_energy(SbModel m, PetscInt i, const PetscReal u[])
+{
+  const SbSpace s = m->space;
+  const SbElement e = SbSpaceCellElement(s, i / 4);
+  const SbMaterial law = m->material[s->mesh->cell_body[i / 4]];
+  const PetscReal *corner[3];
+  PetscReal edge[6], n[3], area, h, mean[3] = {0., 0., 0.}, square = 0.;
+
+  for (PetscInt a = 0, k = 0; a < 4; a++) {
+    if (a != i % 4) corner[k++] = s->mesh->x + 3 * s->mesh->cell[4 * (i / 4) + a];
+  }
+  for (int k = 0; k < 6; k++) edge[k] = corner[1 + k / 3][k % 3] - corner[0][k % 3];
+  SbCross(edge, edge + 3, n);
+  area = 0.5 * PetscSqrtReal(SbDot3(n, n));
+  h = (cell_volume(s->mesh, i / 4) + cell_volume(s->mesh, s->neighbour[i])) / (2. * area);
+  for (int k = 0; k < 3; k++) {
+    PetscReal at[3], a[3], b[3];
+
+    for (int c = 0; c < 3; c++) at[c] = 0.5 * (corner[k][c] + corner[(k + 1) % 3][c]);
+    cell_value(s, i / 4, u, at, a);
+    cell_value(s, s->neighbour[i], u, at, b);
+    for (int c = 0; c < 3; c++) {
+      mean[c] += (a[c] - b[c]) / 3.;
+      square += PetscSqr(a[c] - b[c]) / 3.;
+    }
+  }
+  return 0.5 * area / h *
+         (e->gamma1 * 2. * law->mu * square + e->gamma0 * (2. * law->mu + law->lambda) * SbDot3(mean, mean));
+}
+
+/* Sum over all faces; each rank takes half of a face for each of its cells. */
+static PetscErrorCode formula(SbModel m, const PetscReal u[], PetscReal *energy)
+{
+  const SbSpace s = m->space;
+
+  PetscFunctionBeginUser;
+  *energy = 0.;
+  for (PetscInt i = 0; i < 4 * s->mesh->ncell_owned; i++) {
+    if (!SbSpaceCellElement(s, i / 4)->nodes_per[0] && s->neighbour[i] >= 0)
+      *energy += 0.5 * face_energy(m, i, u);
+  }
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, energy, 1, MPIU_REAL, MPI_SUM, m->comm));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode energy_of(SbSpace s, const PetscReal u[], SbJumpFactor factor, PetscReal *energy)
+{
+  PetscFunctionBeginUser;
+  *energy = SbJumpEnergy(s, u, factor);
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, energy, 1, MPIU_REAL, MPI_SUM, s->comm));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* sum over owned unknowns */
+static PetscErrorCode dot(SbSpace s, const PetscReal f[], const PetscReal u[], PetscReal *sum)
+{
+  PetscFunctionBeginUser;
+  *sum = 0.;
+  for (PetscInt i = 0; i < 3 * s->nnode_owned; i++) *sum += f[i] * u[i];
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, sum, 1, MPIU_REAL, MPI_SUM, s->comm));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Largest difference of K u by the matrices of the faces from the forces f, relative to the largest of these. */
+static PetscErrorCode by_matrix(SbSpace s, const PetscReal u[], const PetscReal f[], PetscReal *worst)
+{
+  const PetscInt *node, nbatch = SbJumpCliques(s, &node);
+  PetscReal *g, largest = 0.;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscCalloc1(3 * s->nnode, &g));
+  for (PetscInt k = 0; k < nbatch * SB_BATCH; k++) {
+    const PetscInt *face = node + k / SB_BATCH * 8 * SB_BATCH + k % SB_BATCH;
+    PetscReal K[8][8];
+
+    SbJumpMatrix(s, k / SB_BATCH, k % SB_BATCH, K);
+    for (int p = 0; p < 8; p++) {
+      PetscReal sum = 0., size = 0.;
+
+      for (int q = 0; q < 8; q++) {
+        SB_CHECK(K[p][q] == K[q][p], "the matrix of a face is not symmetric");
+        sum += K[p][q];
+        size += PetscAbsReal(K[p][q]);
+        for (int c = 0; c < 3; c++) g[3 * face[p * SB_BATCH] + c] += K[p][q] * u[3 * face[q * SB_BATCH] + c];
+      }
+      SB_CHECK_NEAR(sum, 0., 1e-15 * size, "force of a translation");
+    }
+  }
+  *worst = 0.;
+  for (PetscInt i = 0; i < 3 * s->nnode_owned; i++) {
+    largest = PetscMax(largest, PetscAbsReal(f[i]));
+    *worst = PetscMax(*worst, PetscAbsReal(f[i] - g[i]));
+  }
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &largest, 1, MPIU_REAL, MPI_MAX, s->comm));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, worst, 1, MPIU_REAL, MPI_MAX, s->comm));
+  *worst /= largest;
+  PetscCall(PetscFree(g));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Energy, force and matrix of one state, and the force on another one: the form is symmetric. */
+static PetscErrorCode check_state(SbModel m, const char *what, const PetscReal u[], const PetscReal w[])
+{
+  const SbSpace s = m->space;
+  PetscReal *f, *fw, energy, exact, product, other, damping, worst, beta, largest = 0.;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscCalloc1(3 * s->nnode, &f));
+  PetscCall(PetscCalloc1(3 * s->nnode, &fw));
+  SbJumpAdd(s, u, SB_JUMP_STIFFNESS, f);
+  SbJumpAdd(s, w, SB_JUMP_STIFFNESS, fw);
+  PetscCall(formula(m, u, &exact));
+  PetscCall(energy_of(s, u, SB_JUMP_STIFFNESS, &energy));
+  PetscCall(PetscPrintf(m->comm, "  %s: energy %.12g J, by the formula %.12g J\n", what, (double)energy,
+                        (double)exact));
+  SB_CHECK(energy > 0., "%s: energy %g", what, (double)energy);
+  SB_CHECK_NEAR(energy, exact, 1e-12 * exact, "energy against the formula");
+  PetscCall(dot(s, f, u, &product));
+  SB_CHECK_NEAR(0.5 * product, energy, 1e-13 * energy, "1/2 x . K x");
+  PetscCall(dot(s, f, w, &product));
+  PetscCall(dot(s, fw, u, &other));
+  SB_CHECK_NEAR(product, other, 1e-13 * energy, "w . K x and x . K w");
+  PetscCall(by_matrix(s, u, f, &worst));
+  SB_CHECK(worst < 1e-14, "%s: matrices and forces differ by %g", what, (double)worst);
+  PetscCall(PetscArrayzero(fw, 3 * s->nnode));
+  SbJumpAdd(s, u, SB_JUMP_DAMPING, fw);
+  beta = s->region[0].beta;
+  SB_CHECK(beta == 0.02, "beta is %g", (double)beta);
+  for (PetscInt i = 0; i < 3 * s->nnode_owned; i++) largest = PetscMax(largest, PetscAbsReal(f[i]));
+  for (PetscInt i = 0; i < 3 * s->nnode_owned; i++)
+    SB_CHECK_NEAR(fw[i], beta * f[i], 1e-14 * beta * largest, "force of damping");
+  PetscCall(energy_of(s, u, SB_JUMP_DAMPING, &damping));
+  SB_CHECK_NEAR(damping, beta * energy, 1e-13 * beta * energy, "power of damping");
+  PetscCall(PetscFree(f));
+  PetscCall(PetscFree(fw));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* A field without jumps: rounding alone, measured by the stiffness of a node times the displacement. */
+static PetscErrorCode check_affine(SbModel m, const PetscReal u[])
+{
+  const SbSpace s = m->space;
+  PetscReal *f, energy, worst = 0.;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscCalloc1(3 * s->nnode, &f));
+  SbJumpAdd(s, u, SB_JUMP_STIFFNESS, f);
+  PetscCall(energy_of(s, u, SB_JUMP_STIFFNESS, &energy));
+  for (PetscInt i = 0; i < 3 * s->nnode_owned; i++) worst = PetscMax(worst, PetscAbsReal(f[i]));
+  SB_CHECK(worst < 1e-11 * 1e5 && energy < 1e-24 * 1e5, "affine: force %g N, energy %g J", (double)worst,
+           (double)energy);
+  PetscCall(PetscFree(f));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode check_scene(const char *first, const char *second)
+{
+  TestScene t;
+  char text[1024], what[64];
+  const PetscReal *u, *w;
+  Vec U, W;
+
+  PetscFunctionBeginUser;
+  PetscCall(
+    PetscSNPrintf(text, sizeof(text), scene, first, strcmp(first, "dg") ? "" : "-body_a_gamma0 3", second));
+  PetscCall(PetscSNPrintf(what, sizeof(what), "%s and %s", first, second));
+  PetscCall(test_scene_open(text, &t));
+  PetscCall(SbSpaceCreateVec(t.model->space, &U));
+  PetscCall(SbSpaceCreateVec(t.model->space, &W));
+  PetscCall(test_fill(t.model, affine, U));
+  PetscCall(SbSpaceGetLocalRead(t.model->space, U, &u));
+  PetscCall(check_affine(t.model, u));
+  PetscCall(SbSpaceRestoreLocalRead(t.model->space, U, &u));
+  PetscCall(test_fill(t.model, wave, U));
+  PetscCall(roughen(t.model->space, 0.01, U));
+  PetscCall(test_fill(t.model, affine, W));
+  PetscCall(roughen(t.model->space, 0.003, W));
+  PetscCall(SbSpaceGetLocalRead(t.model->space, U, &u));
+  PetscCall(SbSpaceGetLocalRead(t.model->space, W, &w));
+  PetscCall(check_state(t.model, what, u, w));
+  PetscCall(SbSpaceRestoreLocalRead(t.model->space, W, &w));
+  PetscCall(SbSpaceRestoreLocalRead(t.model->space, U, &u));
+  PetscCall(VecDestroy(&U));
+  PetscCall(VecDestroy(&W));
+  PetscCall(test_scene_close(&t));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+int main(int argc, char **argv)
+{
+  SB_TEST_BEGIN(argc, argv);
+  PetscCall(check_scene("cr", "cr"));
+  PetscCall(check_scene("dg", "dg"));
+  PetscCall(check_scene("cr", "dg"));
+  PetscCall(check_scene("dg", "p1"));
+  SB_TEST_END();
+}
