@@ -1,7 +1,7 @@
 /*
   Milliseconds per step of the swinging bar (perf.h) with one linear solver, without output.
 
-    swing -mesh box:0.4,0.1,0.1:8 -solver realtime -steps 120 -seconds 10
+    swing -mesh box:0.4,0.1,0.1:8 -solver realtime -element p1 -steps 120 -seconds 10
 
   The bar is let go at rest, falls and swings for 2 s in 120 steps of 1/60 s. Ends early after so many seconds. The first
   step is told apart: it holds what a solver sets up once. Iterations are those of CG.
@@ -31,7 +31,7 @@ static PetscErrorCode watch(SbRun run, const SbStep *step, void *ctx)
 
 int main(int argc, char **argv)
 {
-  char mesh[512] = "box:0.4,0.1,0.1:8", solver[64] = "cg_icc", more[256], text[PERF_TEXT];
+  char mesh[512] = "box:0.4,0.1,0.1:8", solver[64] = "cg_icc", element[64] = "p1", more[256], text[PERF_TEXT];
   PetscInt steps = 120;
   PetscReal seconds = 10.;
   Watch w = {0., 0.};
@@ -42,10 +42,12 @@ int main(int argc, char **argv)
   PetscCall(PetscInitialize(&argc, &argv, NULL, NULL));
   PetscCall(perf_argument("-mesh", sizeof(mesh), mesh));
   PetscCall(perf_argument("-solver", sizeof(solver), solver));
+  PetscCall(perf_argument("-element", sizeof(element), element));
   PetscCall(PetscOptionsGetInt(NULL, NULL, "-steps", &steps, NULL));
   PetscCall(PetscOptionsGetReal(NULL, NULL, "-seconds", &seconds, NULL));
-  PetscCall(PetscSNPrintf(more, sizeof(more), "-solver %s -ts_max_time %.10g -time_max_cuts 0", solver,
-                          (double)steps / 60.));
+  PetscCall(PetscSNPrintf(more, sizeof(more),
+                          "-solver %s -body_bar_element %s -ts_max_time %.10g -time_max_cuts 0", solver,
+                          element, (double)steps / 60.));
   PetscCall(perf_bar(mesh, more, text));
   PetscCall(perf_open(text, &t));
   w.limit = (double)seconds;

@@ -1,0 +1,105 @@
+/*
+  What the elements cost beside each other on the same mesh: microseconds per tet of residual and tangent, seconds per million
+  tets to plan and create the matrix, bytes and unknowns per tet.
+
+    elements -element cr -mesh box:0.4,0.1,0.1:8 -rounds 5
+
+  Matrix: the symmetric one on one rank, blocks on several. The displacement bends and twists the bar.
+*/
+#include "perf.h"
+
+typedef struct {
+  TestScene scene;
+  SbSpace s;
+  Vec U, F;
+  SbStage stage;
+  Mat A;
+} Case;
+
+static void bend(const PetscReal x[3], PetscReal v[3])
+{
+  const PetscReal angle = 6. * x[0];
+
+  v[0] = 0.1 * x[2] * x[0];
+  v[1] = (PetscCosReal(angle) - 1.) * (x[1] - 0.05) - PetscSinReal(angle) * (x[2] - 0.05);
+  v[2] = PetscSinReal(angle) * (x[1] - 0.05) + (PetscCosReal(angle) - 1.) * (x[2] - 0.05);
+}
+
+static PetscErrorCode residual(Case *c)
+{
+  PetscReal *f;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbSpaceGetLocalWrite(c->s, c->F, &f));
+  PetscCall(PetscArrayzero(f, 3 * c->s->nnode));
+  PetscCall(SbSpaceAddInternalForce(c->s, &c->stage, f));
+  PetscCall(SbSpaceRestoreLocalWrite(c->s, c->F, &f));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode measure(Case *c, PetscInt rounds)
+{
+  const double tets = (double)c->scene.model->mesh->Ncell;
+
+  PetscFunctionBeginUser;
+  for (PetscInt k = 0; k < rounds; k++) {
+    PerfClock start = perf_start();
+
+    for (int i = 0; i < 3; i++) PetscCall(residual(c));
+    PetscCall(perf_sample("residual", "us/tet", 1e6 * perf_stop(start).cpu / (3. * tets)));
+    start = perf_start();
+    for (int i = 0; i < 3; i++) {
+      PetscCall(SbSpaceAssembleTangent(c->s, &c->stage, c->A));
+      PetscCall(SbSpaceFinishTangent(c->s, c->A));
+    }
+    PetscCall(perf_sample("tangent", "us/tet", 1e6 * perf_stop(start).cpu / (3. * tets)));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+int main(int argc, char **argv)
+{
+  char mesh[512] = "box:0.4,0.1,0.1:8", element[64] = "p1", more[256], text[PERF_TEXT];
+  PetscInt rounds = 5;
+  PetscMPIInt size;
+  PerfClock start;
+  MatInfo info;
+  Case c;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscInitialize(&argc, &argv, NULL, NULL));
+  PetscCallMPI(MPI_Comm_size(PETSC_COMM_WORLD, &size));
+  PetscCall(perf_argument("-mesh", sizeof(mesh), mesh));
+  PetscCall(perf_argument("-element", sizeof(element), element));
+  PetscCall(PetscOptionsGetInt(NULL, NULL, "-rounds", &rounds, NULL));
+  PetscCall(PetscSNPrintf(more, sizeof(more), "-solver cg_pbjacobi -body_bar_element %s", element));
+  PetscCall(perf_bar(mesh, more, text));
+  PetscCall(perf_read(text, &c.scene));
+  start = perf_start();
+  PetscCall(SbModelSetUp(c.scene.model));
+  c.s = c.scene.model->space;
+  PetscCall(perf_fact("tets", (double)c.scene.model->mesh->Ncell));
+  PetscCall(perf_fact("setup_s", perf_stop(start).cpu));
+  PetscCall(SbSpaceCreateVec(c.s, &c.U));
+  PetscCall(SbSpaceCreateVec(c.s, &c.F));
+  PetscCall(test_fill(c.scene.model, bend, c.U));
+  PetscCall(SbSpaceGetLocalRead(c.s, c.U, &c.stage.u));
+  c.stage = (SbStage){.u = c.stage.u, .shift_k = 1.};
+  start = perf_start();
+  PetscCall(SbSpaceCreateMatrix(c.s, size > 1 ? SB_MATRIX_BAIJ : SB_MATRIX_SBAIJ, &c.A));
+  PetscCall(perf_sample("plan_and_matrix", "s/Mtet",
+                        1e6 * perf_stop(start).cpu / (double)c.scene.model->mesh->Ncell));
+  PetscCall(measure(&c, rounds));
+  PetscCall(MatGetInfo(c.A, MAT_GLOBAL_SUM, &info));
+  /* a number and, for each block of nine, its column */
+  PetscCall(
+    perf_sample("matrix", "B/tet", info.nz_used * (8. + 4. / 9.) / (double)c.scene.model->mesh->Ncell));
+  PetscCall(perf_sample("unknowns", "1/tet", 3. * (double)c.s->Nnode / (double)c.scene.model->mesh->Ncell));
+  PetscCall(MatDestroy(&c.A));
+  PetscCall(SbSpaceRestoreLocalRead(c.s, c.U, &c.stage.u));
+  PetscCall(VecDestroy(&c.U));
+  PetscCall(VecDestroy(&c.F));
+  PetscCall(test_scene_close(&c.scene));
+  PetscCall(PetscFinalize());
+  return 0;
+}
