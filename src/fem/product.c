@@ -5,13 +5,15 @@
   rank, not vectorised, and gives no access to the parallel one. Here a row i takes y_i += A_ij x_j and y_j += A_ij^T x_i block by block,
   four numbers at a time. Of BAIJ the upper blocks are copied together when the values have changed, which costs about two
   products; a product then reads them without gaps, which defeat the prefetching of the processor (measured: three times
-  slower than reading both triangles). The columns of other ranks are added by PETSc.
+  slower than reading both triangles). The columns of other ranks are added by PETSc. The copy is a SBAIJ matrix of its own, so that
+  an incomplete factorisation can take it and need not make one (SbProductGetSymmetric).
 
   petsc/private/petscimpl.h: asking a matrix whether its values have changed has no public call.
 
   Measured at 200,000 tets on one rank: 0.9 ms in the place of 1.4 (SBAIJ) and 1.7 (BAIJ); in cache half the time.
 */
 #include "fem_impl.h"
+#include "product.h"
 #include "sbkernel.h"
 #include <petsc/private/petscimpl.h>
 
@@ -21,7 +23,9 @@ typedef struct {
   size_t nupper;       /* blocks on and above the diagonal of the diagonal part, whose graph is symmetric */
   Mat diagonal, other; /* parts of the matrix, borrowed; other NULL on one rank */
   PetscScalar *full;   /* values of BAIJ's diagonal part; NULL for SBAIJ */
-  PetscScalar *upper;  /* upper blocks, by rows: the matrix's own of SBAIJ, a copy of BAIJ's */
+  Mat
+    symmetric; /* holds the upper blocks: the matrix itself when it is SBAIJ (borrowed), a copy of BAIJ's (owned) */
+  PetscScalar *upper;      /* its values, by rows */
   PetscObjectState copied; /* state of `diagonal` that the copy belongs to */
   VecScatter scatter;      /* x -> ghosts */
   Vec ghosts;
@@ -109,20 +113,42 @@ static PetscErrorCode copy_upper(Product *p)
     to += n;
   }
   p->copied = state;
+  PetscCall(PetscObjectStateIncrease((PetscObject)p->symmetric));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The data of A, its copy up to date. */
+static PetscErrorCode product_of(Mat A, Product **p)
+{
+  PetscObject container;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscObjectQuery((PetscObject)A, "sb_product", &container));
+  PetscCheck(container, PetscObjectComm((PetscObject)A), PETSC_ERR_ARG_WRONG,
+             "Not a block matrix of a space");
+  PetscCall(PetscContainerGetPointer((PetscContainer)container, (void **)p));
+  PetscCall(copy_upper(*p));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbProductGetSymmetric(Mat A, Mat *local)
+{
+  Product *p;
+
+  PetscFunctionBeginUser;
+  PetscCall(product_of(A, &p));
+  *local = p->symmetric;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 static PetscErrorCode MatMult_Product(Mat A, Vec x, Vec y)
 {
-  PetscObject container;
   const PetscScalar *in;
   PetscScalar *out;
   Product *p;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscObjectQuery((PetscObject)A, "sb_product", &container));
-  PetscCall(PetscContainerGetPointer((PetscContainer)container, (void **)&p));
-  PetscCall(copy_upper(p));
+  PetscCall(product_of(A, &p));
   if (p->other) PetscCall(VecScatterBegin(p->scatter, x, p->ghosts, INSERT_VALUES, SCATTER_FORWARD));
   PetscCall(VecGetArrayRead(x, &in));
   PetscCall(VecGetArrayWrite(y, &out));
@@ -143,7 +169,7 @@ static PetscErrorCode destroy_product(void *ctx)
   Product *p = SB_DESTROY_CTX(Product, ctx);
 
   PetscFunctionBeginUser;
-  if (p->full) PetscCall(PetscFree(p->upper));
+  if (p->full) PetscCall(MatDestroy(&p->symmetric));
   PetscCall(VecScatterDestroy(&p->scatter));
   PetscCall(VecDestroy(&p->ghosts));
   PetscCall(PetscFree(p));
@@ -168,6 +194,31 @@ static PetscErrorCode create_scatter(Mat A, const PetscInt columns[], Product *p
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* An empty SBAIJ matrix with the graph of the diagonal part. */
+static PetscErrorCode create_symmetric(Product *p)
+{
+  const SbPlan plan = p->plan;
+  PetscInt *start, *column;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscMalloc2(p->nrow + 1, &start, p->nupper, &column));
+  start[0] = 0;
+  for (PetscInt i = 0; i < p->nrow; i++) {
+    const PetscInt n = plan->di[i + 1] - plan->diagonal[i];
+
+    PetscCall(PetscArraycpy(column + start[i], plan->dj + plan->diagonal[i], n));
+    start[i + 1] = start[i] + n;
+  }
+  PetscCall(MatCreate(PETSC_COMM_SELF, &p->symmetric));
+  PetscCall(MatSetSizes(p->symmetric, 3 * p->nrow, 3 * p->nrow, 3 * p->nrow, 3 * p->nrow));
+  PetscCall(MatSetType(p->symmetric, MATSEQSBAIJ));
+  PetscCall(MatSeqSBAIJSetPreallocationCSR(p->symmetric, 3, start, column, NULL));
+  PetscCall(MatSetOption(p->symmetric, MAT_SYMMETRIC, PETSC_TRUE));
+  PetscCall(MatSetOption(p->symmetric, MAT_SYMMETRY_ETERNAL, PETSC_TRUE));
+  PetscCall(PetscFree2(start, column));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* The arrays of values stay where they are for the life of the matrix: its pattern is fixed. */
 static PetscErrorCode find_parts(Mat A, SbMatrixKind kind, Product *p)
 {
@@ -177,6 +228,7 @@ static PetscErrorCode find_parts(Mat A, SbMatrixKind kind, Product *p)
   PetscFunctionBeginUser;
   p->diagonal = A;
   if (kind == SB_MATRIX_SBAIJ) {
+    p->symmetric = A;
     PetscCall(MatSeqSBAIJGetArray(A, &p->upper));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
@@ -186,7 +238,8 @@ static PetscErrorCode find_parts(Mat A, SbMatrixKind kind, Product *p)
     PetscCall(create_scatter(A, columns, p));
   }
   PetscCall(MatSeqBAIJGetArray(p->diagonal, &p->full));
-  PetscCall(PetscMalloc1(9 * p->nupper, &p->upper));
+  PetscCall(create_symmetric(p));
+  PetscCall(MatSeqSBAIJGetArray(p->symmetric, &p->upper));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

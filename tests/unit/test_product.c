@@ -1,5 +1,9 @@
-/* Products with block matrices: they agree with those of AIJ, follow every change of the values, and survive a copy of the matrix. */
+/*
+  Products with block matrices: they agree with those of AIJ, follow every change of the values, and survive a copy of the matrix. The
+  same for the symmetric matrix of the rows and columns of this rank.
+*/
 #include "../scene.h"
+#include "../../src/fem/product.h"
 
 static const char *const scene_text =
   "-bodies a,b -body_a_mesh box:1,0.5,0.4:3 -body_a_material linear -body_a_young 1e3 -body_a_poisson 0.3 "
@@ -37,6 +41,23 @@ static PetscErrorCode compare(Mat A, Mat B, Vec x, const char *what)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The part of this rank alone. */
+static PetscErrorCode compare_own(Mat A, Mat B, Vec x, const char *what)
+{
+  Mat own, part;
+  Vec xown;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbProductGetSymmetric(A, &own));
+  PetscCall(MatGetDiagonalBlock(B, &part));
+  PetscCall(VecCreateLocalVector(x, &xown));
+  PetscCall(VecGetLocalVectorRead(x, xown));
+  PetscCall(compare(own, part, xown, what));
+  PetscCall(VecRestoreLocalVectorRead(x, xown));
+  PetscCall(VecDestroy(&xown));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 static PetscErrorCode one_storage(TestScene *t, SbMatrixKind kind, const char *name, Vec x)
 {
   SbSpace s = t->model->space;
@@ -50,9 +71,11 @@ static PetscErrorCode one_storage(TestScene *t, SbMatrixKind kind, const char *n
     PetscCall(SbModelTangent(t->model, 0., 0., k ? 50. : 3000., 1., x, NULL, A));
     PetscCall(SbModelTangent(t->model, 0., 0., k ? 50. : 3000., 1., x, NULL, B));
     PetscCall(compare(A, B, x, name));
+    PetscCall(compare_own(A, B, x, name));
   }
   PetscCall(MatScale(A, 3.));
   PetscCall(MatScale(B, 3.));
+  PetscCall(compare_own(A, B, x, name));
   PetscCall(compare(A, B, x, name));
   PetscCall(MatDuplicate(A, MAT_COPY_VALUES, &C));
   PetscCall(MatDestroy(&A));
