@@ -127,6 +127,8 @@ PetscInt SbSpaceFixedIndex(SbSpace space, PetscInt node);
 /* Per owned cell: Cauchy stress sigma[6] = xx yy zz xy yz xz (Pa), J, energy density (J/m^3, rest). Outputs may be NULL. */
 PetscErrorCode SbSpaceCellState(SbSpace space, const PetscReal u[], PetscReal sigma[], PetscReal J[],
                                 PetscReal psi[]);
+/* Per owned cell: the law's pressure -lambda theta, Pa (SbMaterialOps.pressure). Not collective. */
+PetscErrorCode SbSpaceCellPressure(SbSpace space, const PetscReal u[], PetscReal pressure[]);
 /* Owned cells: strain energy (J), smallest det F, number with det F <= 0, current volume (m^3). Local: reduce them. */
 PetscErrorCode SbSpaceStrainEnergy(SbSpace space, const PetscReal u[], PetscReal *energy, PetscReal *minJ,
                                    PetscInt *ninverted, PetscReal *volume);

@@ -26,6 +26,10 @@ typedef struct {
   PetscErrorCode (*settangent)(SbMaterial m, SbTangentKind kind);
   /* psi = energy per rest volume, J/m^3; zero at rest */
   void (*energy)(const struct _p_SbMaterial *m, const SbLane F[9], SbLane psi);
+  /* Every law is psi = psi_mu(F) + lambda/2 theta(F)^2 with theta the law's measure of the change of volume: tr(eps) (linear),
+     tr(S - I) (corotated), tr(E) (stvk), J - 1 (neohookean). p = -lambda theta, Pa, positive in compression: what resists the
+     change of volume, and what oscillates from cell to cell where an element locks. */
+  void (*pressure)(const struct _p_SbMaterial *m, const SbLane F[9], SbLane p);
   /* P = dPsi/dF, Pa */
   void (*stress)(const struct _p_SbMaterial *m, const SbLane F[9], SbLane P[9]);
   /* The tangent is the isotropic Hooke tensor (lambda, mu) turned by R: fills R. NULL when the law needs the full tangent.

@@ -53,6 +53,20 @@ SB_KERNEL static void stress_corotated(const struct _p_SbMaterial *m, const SbLa
   }
 }
 
+SB_KERNEL static void pressure_corotated(const struct _p_SbMaterial *m, const SbLane F[restrict 9], SbLane p)
+{
+  SbLane R[9];
+
+  SbPolar(F, R);
+  for (int l = 0; l < SB_BATCH; l++) {
+    PetscReal f[9], r[9];
+
+    SbLaneGet(9, F, l, f);
+    SbLaneGet(9, R, l, r);
+    p[l] = -m->lambda * (SbDot9(r, f) - 3);
+  }
+}
+
 static void frame_corotated(const struct _p_SbMaterial *m, const SbLane F[9], SbLane R[9])
 {
   (void)m;
@@ -209,6 +223,7 @@ PetscErrorCode SbMaterialCreate_Corotated(SbMaterial m)
   m->ops.settangent = settangent_corotated;
   m->ops.energy = energy_corotated;
   m->ops.stress = stress_corotated;
+  m->ops.pressure = pressure_corotated;
   m->ops.frame = frame_corotated;
   m->ops.tangent = tangent_corotated;
   m->symmetric = PETSC_TRUE;

@@ -43,6 +43,11 @@ SB_KERNEL static void stress_linear(const struct _p_SbMaterial *m, const SbLane 
   }
 }
 
+SB_KERNEL static void pressure_linear(const struct _p_SbMaterial *m, const SbLane F[restrict 9], SbLane p)
+{
+  for (int l = 0; l < SB_BATCH; l++) p[l] = -m->lambda * ((F[0][l] - 1) + (F[4][l] - 1) + (F[8][l] - 1));
+}
+
 static void frame_linear(const struct _p_SbMaterial *m, const SbLane F[9], SbLane R[9])
 {
   (void)m;
@@ -70,6 +75,7 @@ PetscErrorCode SbMaterialCreate_Linear(SbMaterial m)
   PetscFunctionBeginUser;
   m->ops.energy = energy_linear;
   m->ops.stress = stress_linear;
+  m->ops.pressure = pressure_linear;
   m->ops.frame = frame_linear;
   m->ops.tangent = tangent_linear;
   m->linear = PETSC_TRUE;

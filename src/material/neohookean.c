@@ -59,6 +59,21 @@ SB_KERNEL static void stress_neohookean(const struct _p_SbMaterial *m, const SbL
   }
 }
 
+/* J - 1 from H = F - I as in the energy. */
+SB_KERNEL static void pressure_neohookean(const struct _p_SbMaterial *m, const SbLane F[restrict 9], SbLane p)
+{
+  for (int l = 0; l < SB_BATCH; l++) {
+    PetscReal h[9], c[9];
+
+    SbLaneGet(9, F, l, h);
+    h[0] -= 1;
+    h[4] -= 1;
+    h[8] -= 1;
+    SbMatCofactor(h, c);
+    p[l] = -m->lambda * (h[0] + h[4] + h[8] + c[0] + c[4] + c[8] + SbDot3(h, c));
+  }
+}
+
 SB_KERNEL static void tangent_exact(const struct _p_SbMaterial *m, const SbLane F[restrict 9],
                                     SbLane C[restrict 81])
 {
@@ -134,6 +149,7 @@ PetscErrorCode SbMaterialCreate_NeoHookean(SbMaterial m)
   m->ops.settangent = SbMaterialSetTangent_Exact;
   m->ops.energy = energy_neohookean;
   m->ops.stress = stress_neohookean;
+  m->ops.pressure = pressure_neohookean;
   m->ops.tangent = tangent_neohookean;
   m->symmetric = PETSC_TRUE;
   m->tangent = SB_TANGENT_EXACT;

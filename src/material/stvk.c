@@ -46,6 +46,16 @@ SB_KERNEL static void stress_stvk(const struct _p_SbMaterial *m, const SbLane F[
   }
 }
 
+SB_KERNEL static void pressure_stvk(const struct _p_SbMaterial *m, const SbLane F[restrict 9], SbLane p)
+{
+  for (int l = 0; l < SB_BATCH; l++) {
+    PetscReal f[9], e[9];
+
+    green_strain(F, l, f, e);
+    p[l] = -m->lambda * (e[0] + e[4] + e[8]);
+  }
+}
+
 SB_KERNEL static void tangent_exact(const struct _p_SbMaterial *m, const SbLane F[restrict 9],
                                     SbLane C[restrict 81])
 {
@@ -120,6 +130,7 @@ PetscErrorCode SbMaterialCreate_StVK(SbMaterial m)
   m->ops.settangent = SbMaterialSetTangent_Exact;
   m->ops.energy = energy_stvk;
   m->ops.stress = stress_stvk;
+  m->ops.pressure = pressure_stvk;
   m->ops.tangent = tangent_stvk;
   m->symmetric = PETSC_TRUE;
   m->tangent = SB_TANGENT_EXACT;

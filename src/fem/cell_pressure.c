@@ -1,0 +1,26 @@
+/*
+  The pressure of each cell that goes with lambda: p = -lambda theta(F), theta the change of volume as the law measures it.
+
+  Where poisson is near 0.5 lambda is large and theta small. P1 has fewer displacements than such cells have conditions on
+  their volume: it locks, and p alternates between neighbours. CR and DG satisfy the conditions in the mean of each cell and
+  p converges (Crouzeix and Raviart 1973; Hansbo and Larson 2002). For DG the strain is that of the means of the two sides.
+*/
+#include "fem_impl.h"
+
+PetscErrorCode SbSpaceCellPressure(SbSpace s, const PetscReal x[], PetscReal pressure[])
+{
+  PetscFunctionBeginUser;
+  for (PetscInt r = 0; r < s->nregion; r++) {
+    const SbRegion *region = &s->region[r];
+
+    for (PetscInt b = region->bstart; region->owned && b < region->bend; b++) {
+      SbLane u[12], F[9], p;
+
+      sb_gather_strain(s, region, b, x, u);
+      SbCellGradient(s->batch_g + 9 * b, (const SbLane *)u, F);
+      region->material->ops.pressure(region->material, (const SbLane *)F, p);
+      PetscCall(PetscArraycpy(pressure + s->batch_cell[b], p, s->batch_n[b]));
+    }
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
