@@ -8,9 +8,14 @@
   Everything in the files is in original order: bodies as the scenario names them, vertices and cells as in their files.
   It does not depend on the number of ranks.
 
+  Vertex fields of bodies with nodes at faces (cr, dg) hold at each vertex the mean of the cells around it, weighted with
+  their volumes; forces are handed from the faces to their vertices in equal parts. With -output_discontinuous each cell has
+  its own four points and the values that it has there. Probes show vertex fields. Checkpoints hold the unknowns themselves.
+
   fields.h5
-    /mesh/x        [nvert][3] double, rest position, m
-    /mesh/cells    [ncell][4] int32, vertex numbers, positively oriented
+    /mesh/x        [npoint][3] double, rest position, m; points are the vertices, or 4 c + a for corner a of cell c
+    /mesh/cells    [ncell][4] int32, point numbers, positively oriented
+    /mesh/vertices [ncell][4] int32, vertex numbers; only with -output_discontinuous
     /mesh/body     [ncell] int32, number of the body; /mesh/rank likewise when asked for
     /step/0001/000123   a frame: group with the attributes `step` and `time` (s), one dataset per field. The middle name
                    counts hundreds of frames, the last one is the step.
@@ -19,12 +24,13 @@
 #pragma once
 #include "sbtime.h"
 
-/* A named field. compute() fills this rank's owned entities (vertices or cells, in the mesh's local order). */
+/* A named field. compute() fills this rank's owned entities (points or cells, in the mesh's local order). */
 typedef struct {
   const char *name; /* "von_mises" */
   const char *unit;
   PetscInt ncomp; /* 1 scalar, 3 vector, 6 symmetric tensor: xx xy xz yy yz zz, the Tensor6 order of XDMF */
-  PetscBool cell; /* per cell, else per vertex */
+  PetscBool
+    cell; /* per cell, else per point: the vertices, or each cell's four corners with -output_discontinuous */
   PetscBool constant; /* whole numbers, written once with the mesh */
   PetscBool dynamic;  /* does not exist in a static run */
   const char *help;

@@ -1,7 +1,7 @@
 /*
   Checkpoints: the state of a run in one HDF5 file, from which it goes on as if it had not stopped.
 
-  Displacement, velocity and acceleration (the integrator's own) in original order and double precision, the step, its time,
+  Displacement, velocity and acceleration (the integrator's own) of all nodes in original order and double precision, the step, its time,
   the next step's length, works and losses so far. A file is written beside its place, flushed and renamed; the newest ones
   are kept. What makes it fit a run: a hash of the mesh (every coordinate and cell by its original number), and the text of
   the options that decide the mechanics. A checksum over the three vectors detects a file that was damaged later. Both sums
@@ -61,11 +61,22 @@ static PetscErrorCode hash_mesh(const SbMesh mesh, uint64_t *hash)
 PetscErrorCode SbOutputOrder(SbRun run, SbOutput out)
 {
   const SbMesh mesh = run->model->mesh;
+  const SbSpace space = run->model->space;
 
   PetscFunctionBeginUser;
   if (out->ordered) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(SbOrderCreate(out->comm, mesh->Nvert, mesh->nvert_owned, mesh->vert_orig, &out->vertex));
   PetscCall(SbOrderCreate(out->comm, mesh->Ncell, mesh->ncell_owned, mesh->cell_orig, &out->cell));
+  if (space->faces) {
+    PetscCall(SbOrderCreateSparse(out->comm, mesh->Nvert + 4 * mesh->Ncell, space->nnode_owned,
+                                  space->node_orig, &out->node));
+  } else {
+    PetscCall(SbOrderRepeat(&out->vertex, 1, &out->node));
+  }
+  if (out->discontinuous)
+    PetscCall(SbOrderRepeat(&out->cell, 4, &out->point));
+  else
+    PetscCall(SbOrderRepeat(&out->vertex, 1, &out->point));
   PetscCall(hash_mesh(mesh, &out->mesh_hash));
   out->ordered = PETSC_TRUE;
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -126,17 +137,17 @@ static PetscErrorCode write_vectors(SbRun run, SbOutput out, SbH5 *h, uint64_t *
   PetscFunctionBeginUser;
   *checksum = 0;
   parts_of(run, part);
-  PetscCall(PetscMalloc1(3 * out->vertex.n, &slice));
+  PetscCall(PetscMalloc1(3 * out->node.n, &slice));
   for (int k = 0; k < 3; k++) {
     uint64_t sum;
 
     if (!part[k].vec) continue;
     PetscCall(VecGetArrayRead(part[k].vec, &array));
-    PetscCall(SbOrderGather(&out->vertex, 3, array, slice));
+    PetscCall(SbOrderGather(&out->node, 3, array, slice));
     PetscCall(VecRestoreArrayRead(part[k].vec, &array));
-    PetscCall(SbH5WriteSlice(h, h->file, part[k].name, "SI", &out->vertex, 3, H5T_IEEE_F64LE,
-                             H5T_NATIVE_DOUBLE, slice));
-    PetscCall(checksum_of(&out->vertex, (uint64_t)k, slice, &sum));
+    PetscCall(SbH5WriteSlice(h, h->file, part[k].name, "SI", &out->node, 3, H5T_IEEE_F64LE, H5T_NATIVE_DOUBLE,
+                             slice));
+    PetscCall(checksum_of(&out->node, (uint64_t)k, slice, &sum));
     *checksum += sum;
   }
   PetscCall(PetscFree(slice));
@@ -256,7 +267,7 @@ static PetscErrorCode write_checkpoint(SbRun run, SbOutput out, const SbStep *st
   PetscCall(SbOutputPath(out, name, sizeof(path), path));
   PetscCall(SbOutputPath(out, "checkpoint.tmp", sizeof(tmp), tmp));
   PetscCall(SbH5Create(out->comm, tmp, &h));
-  PetscCall(SbH5Reserve(&h, (PetscInt64)out->vertex.N * 3 * 24 + (PetscInt64)strlen(out->identity) + 65536));
+  PetscCall(SbH5Reserve(&h, (PetscInt64)out->node.N * 3 * 24 + (PetscInt64)strlen(out->identity) + 65536));
   PetscCall(write_vectors(run, out, &h, &checksum));
   PetscCall(write_numbers(run, out, step, &h, checksum));
   PetscCall(SbH5Flush(&h));
@@ -352,17 +363,17 @@ static PetscErrorCode read_vectors(SbRun run, SbOutput out, SbH5 *h, int64_t che
 
   PetscFunctionBeginUser;
   parts_of(run, part);
-  PetscCall(PetscMalloc1(3 * out->vertex.n, &slice));
+  PetscCall(PetscMalloc1(3 * out->node.n, &slice));
   for (int k = 0; k < 3 && *ok; k++) {
     uint64_t sum;
 
     if (!part[k].vec) continue;
-    PetscCall(SbH5ReadSlice(h, part[k].name, &out->vertex, 3, slice, ok));
+    PetscCall(SbH5ReadSlice(h, part[k].name, &out->node, 3, slice, ok));
     if (!*ok) break;
-    PetscCall(checksum_of(&out->vertex, (uint64_t)k, slice, &sum));
+    PetscCall(checksum_of(&out->node, (uint64_t)k, slice, &sum));
     all += sum;
     PetscCall(VecGetArray(part[k].vec, &array));
-    PetscCall(SbOrderScatter(&out->vertex, 3, slice, array));
+    PetscCall(SbOrderScatter(&out->node, 3, slice, array));
     PetscCall(VecRestoreArray(part[k].vec, &array));
   }
   PetscCall(PetscFree(slice));

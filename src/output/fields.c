@@ -1,59 +1,45 @@
 /*
   The fields that a run can write: one table, a name, a unit and a function each.
 
-  Vertex fields are taken from the owned part of the vectors (the nodes of P1 are the vertices). Cell fields come from one
-  evaluation of the cells' state per frame, shared by all of them. von Mises: sqrt(3/2 s:s), s the deviator of the Cauchy
-  stress. Reaction: force of the support on the body, that is the residual without constraints at prescribed unknowns.
+  Vertex fields are made from the vectors by points.c. Cell fields come from one evaluation of the cells' state per frame,
+  shared by all of them. von Mises: sqrt(3/2 s:s), s the deviator of the Cauchy stress. Reaction: force of the support on
+  the body, that is the residual without constraints at prescribed unknowns.
+
+  Two pressures, both positive in compression: `mean_pressure` is -tr(sigma)/3 of the Cauchy stress, as it is measured;
+  `pressure` is the law's -lambda theta with theta its measure of the change of volume (SbMaterialOps.pressure). The two
+  differ by 2/3 mu theta for small strains, and for nu near 0.5 hardly.
 */
 #include "output_impl.h"
 
 /* ------------------------------------------------------------------ per vertex */
 
-static PetscErrorCode copy_owned(SbRun run, Vec x, PetscReal *values)
-{
-  const PetscScalar *array;
-
-  PetscFunctionBeginUser;
-  PetscCall(VecGetArrayRead(x, &array));
-  PetscCall(PetscArraycpy(values, array, 3 * run->model->mesh->nvert_owned));
-  PetscCall(VecRestoreArrayRead(x, &array));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 static PetscErrorCode displacement(SbRun run, const SbStep *step, PetscReal *values)
 {
   PetscFunctionBeginUser;
-  PetscCall(copy_owned(run, step->U, values));
+  PetscCall(SbPointsValues(run, (SbOutput)run->output, step->U, values));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 static PetscErrorCode velocity(SbRun run, const SbStep *step, PetscReal *values)
 {
   PetscFunctionBeginUser;
-  PetscCall(copy_owned(run, step->V, values));
+  PetscCall(SbPointsValues(run, (SbOutput)run->output, step->V, values));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 static PetscErrorCode acceleration(SbRun run, const SbStep *step, PetscReal *values)
 {
   PetscFunctionBeginUser;
-  PetscCall(copy_owned(run, step->A, values));
+  PetscCall(SbPointsValues(run, (SbOutput)run->output, step->A, values));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 static PetscErrorCode reaction(SbRun run, const SbStep *step, PetscReal *values)
 {
-  const SbSpace space = run->model->space;
-
   PetscFunctionBeginUser;
   PetscCheck(step->R, PETSC_COMM_SELF, PETSC_ERR_PLIB,
              "The residual was asked for but not given to the monitors");
-  PetscCall(copy_owned(run, step->R, values));
-  for (PetscInt i = 0; i < space->nnode_owned; i++) {
-    for (PetscInt c = 0; c < 3; c++) {
-      if (!(space->fixed[i] & (1 << c))) values[3 * i + c] = 0.;
-    }
-  }
+  PetscCall(SbPointsReactions(run, (SbOutput)run->output, step->R, values));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -68,7 +54,8 @@ static PetscErrorCode cell_state(SbRun run, const SbStep *step, SbOutput *out)
   *out = o;
   if (o->state_valid) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(SbSpaceGetLocalRead(run->model->space, step->U, &u));
-  PetscCall(SbSpaceCellState(run->model->space, u, o->sigma, o->J, o->psi));
+  if (o->sigma || o->J || o->psi) PetscCall(SbSpaceCellState(run->model->space, u, o->sigma, o->J, o->psi));
+  if (o->pressure) PetscCall(SbSpaceCellPressure(run->model->space, u, o->pressure));
   PetscCall(SbSpaceRestoreLocalRead(run->model->space, step->U, &u));
   o->state_valid = PETSC_TRUE;
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -98,6 +85,30 @@ static PetscErrorCode von_mises(SbRun run, const SbStep *step, PetscReal *values
     const PetscReal a = s[0] - s[1], b = s[1] - s[2], d = s[2] - s[0];
 
     values[c] = PetscSqrtReal(.5 * (a * a + b * b + d * d) + 3. * (s[3] * s[3] + s[4] * s[4] + s[5] * s[5]));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode pressure(SbRun run, const SbStep *step, PetscReal *values)
+{
+  SbOutput out;
+
+  PetscFunctionBeginUser;
+  PetscCall(cell_state(run, step, &out));
+  PetscCall(PetscArraycpy(values, out->pressure, run->model->mesh->ncell_owned));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode mean_pressure(SbRun run, const SbStep *step, PetscReal *values)
+{
+  SbOutput out;
+
+  PetscFunctionBeginUser;
+  PetscCall(cell_state(run, step, &out));
+  for (PetscInt c = 0; c < run->model->mesh->ncell_owned; c++) {
+    const PetscReal *s = out->sigma + 6 * c;
+
+    values[c] = -(s[0] + s[1] + s[2]) / 3.;
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -157,6 +168,10 @@ static const SbField table[] = {
   {"reaction", "N", 3, VERTEX, VARIES, ALWAYS, "force of a support on the body", reaction},
   {"stress", "Pa", 6, CELL, VARIES, ALWAYS, "Cauchy stress", stress},
   {"von_mises", "Pa", 1, CELL, VARIES, ALWAYS, "von Mises stress", von_mises},
+  {"pressure", "Pa", 1, CELL, VARIES, ALWAYS, "pressure of the law, -lambda times its change of volume",
+   pressure},
+  {"mean_pressure", "Pa", 1, CELL, VARIES, ALWAYS, "minus a third of the trace of the Cauchy stress",
+   mean_pressure},
   {"J", "1", 1, CELL, VARIES, ALWAYS, "volume ratio det F", jacobian},
   {"energy_density", "J/m^3", 1, CELL, VARIES, ALWAYS, "strain energy per rest volume", energy_density},
   {"body", "1", 1, CELL, CONSTANT, ALWAYS, "number of the body, always written", body_number},
@@ -201,11 +216,16 @@ PetscErrorCode SbFieldPrepare(SbRun run, SbOutput out)
   for (PetscInt i = 0; i < out->nfield; i++) {
     const SbField *f = out->field[i];
 
-    if ((f->compute == stress || f->compute == von_mises) && !out->sigma)
+    if ((f->compute == stress || f->compute == von_mises || f->compute == mean_pressure) && !out->sigma)
       PetscCall(PetscMalloc1(6 * n, &out->sigma));
     if (f->compute == jacobian && !out->J) PetscCall(PetscMalloc1(n, &out->J));
     if (f->compute == energy_density && !out->psi) PetscCall(PetscMalloc1(n, &out->psi));
-    if (f->compute == reaction) run->want_residual = PETSC_TRUE;
+    if (f->compute == pressure && !out->pressure) PetscCall(PetscMalloc1(n, &out->pressure));
+    if (!f->cell) PetscCall(SbPointsPrepare(run, out));
+    if (f->compute == reaction) {
+      run->want_residual = PETSC_TRUE;
+      if (run->model->space->faces || out->discontinuous) PetscCall(SbPointsPrepareForces(run, out));
+    }
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -1,6 +1,8 @@
 /*
   fields.h5: one group per frame, one dataset per field, written by all ranks together in original order.
 
+  With -output_discontinuous point 4 c + a is corner a of cell c, and /mesh/vertices tells which vertices coincide.
+
   A frame is invisible until it is complete (h5.c says how), and then enters fields.xmf. After a restart in the same folder
   the frames up to the restart stay and later ones are taken out; their space in the file is used again.
 */
@@ -23,7 +25,7 @@ struct _p_SbFrames {
   PetscInt last_step;    /* of the last frame in the file, or -1 */
   PetscInt nframe;
   SbXdmf xdmf;              /* rank 0 only */
-  PetscReal *owned, *slice; /* work, six components of the larger kind */
+  PetscReal *owned, *slice; /* work: six numbers per cell or three per point */
   void *packed;             /* slice in the type of the file; NULL when that is double */
 };
 
@@ -44,22 +46,42 @@ static PetscErrorCode write_whole(SbFrames fr, hid_t where, const char *name, co
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode write_mesh(SbRun run, SbOutput out)
+/* Places of the points, and which four make a cell. */
+static PetscErrorCode write_points(SbRun run, SbOutput out, hid_t group)
 {
   SbFrames fr = out->frames;
   const SbMesh mesh = run->model->mesh;
+  const PetscReal *x = mesh->x;
+
+  PetscFunctionBeginUser;
+  if (out->discontinuous) {
+    for (PetscInt i = 0; i < 12 * mesh->ncell_owned; i++)
+      fr->owned[i] = mesh->x[3 * mesh->cell[i / 3] + i % 3];
+    x = fr->owned;
+  }
+  PetscCall(SbOrderGather(&out->point, 3, x, fr->slice));
+  PetscCall(
+    SbH5WriteSlice(&fr->h5, group, "x", "m", &out->point, 3, H5T_IEEE_F64LE, H5T_NATIVE_DOUBLE, fr->slice));
+  for (PetscInt i = 0; i < 4 * mesh->ncell_owned; i++)
+    fr->owned[i] = (PetscReal)mesh->vert_orig[mesh->cell[i]];
+  PetscCall(write_whole(fr, group, out->discontinuous ? "vertices" : "cells", &out->cell, 4));
+  if (!out->discontinuous) PetscFunctionReturn(PETSC_SUCCESS);
+  for (PetscInt i = 0; i < 4 * mesh->ncell_owned; i++)
+    fr->owned[i] = (PetscReal)(4 * mesh->cell_orig[i / 4] + i % 4);
+  PetscCall(write_whole(fr, group, "cells", &out->cell, 4));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode write_mesh(SbRun run, SbOutput out)
+{
+  SbFrames fr = out->frames;
   hid_t group;
 
   PetscFunctionBeginUser;
-  PetscCall(SbH5Reserve(&fr->h5, (PetscInt64)mesh->Nvert * 24 + (PetscInt64)mesh->Ncell * 24 + 65536));
+  PetscCall(SbH5Reserve(&fr->h5, (PetscInt64)out->point.N * 24 + (PetscInt64)out->cell.N * 40 + 65536));
   PetscCall(SbH5GroupCreate(&fr->h5, 8, 8, &group));
   PetscCall(SbH5PutInt(&fr->h5, group, "hash", (int64_t)out->mesh_hash));
-  PetscCall(SbOrderGather(&out->vertex, 3, mesh->x, fr->slice));
-  PetscCall(
-    SbH5WriteSlice(&fr->h5, group, "x", "m", &out->vertex, 3, H5T_IEEE_F64LE, H5T_NATIVE_DOUBLE, fr->slice));
-  for (PetscInt i = 0; i < 4 * mesh->ncell_owned; i++)
-    fr->owned[i] = (PetscReal)mesh->vert_orig[mesh->cell[i]];
-  PetscCall(write_whole(fr, group, "cells", &out->cell, 4));
+  PetscCall(write_points(run, out, group));
   for (PetscInt i = 0; i < out->nfield; i++) {
     if (!out->field[i]->constant) continue;
     PetscCall(out->field[i]->compute(run, NULL, fr->owned));
@@ -76,7 +98,7 @@ static PetscErrorCode write_mesh(SbRun run, SbOutput out)
 static PetscErrorCode write_field(SbRun run, SbOutput out, const SbStep *step, const SbField *f, hid_t group)
 {
   SbFrames fr = out->frames;
-  const SbOrder *order = f->cell ? &out->cell : &out->vertex;
+  const SbOrder *order = f->cell ? &out->cell : &out->point;
   const PetscInt n = order->n * f->ncomp;
 
   PetscFunctionBeginUser;
@@ -103,7 +125,7 @@ static PetscInt64 frame_bytes(const SbOutput out)
   for (PetscInt i = 0; i < out->nfield; i++) {
     const SbField *f = out->field[i];
 
-    bytes += (PetscInt64)(f->cell ? out->cell.N : out->vertex.N) * f->ncomp * (out->precise ? 8 : 4) + 8192;
+    bytes += (PetscInt64)(f->cell ? out->cell.N : out->point.N) * f->ncomp * (out->precise ? 8 : 4) + 8192;
   }
   return bytes;
 }
@@ -274,24 +296,32 @@ static int by_step(const void *a, const void *b)
   return (p > q) - (p < q);
 }
 
+/* Hash of the mesh in an open file of frames; ok is false when there is none. */
+static PetscErrorCode mesh_hash(hid_t file, int64_t *hash, PetscBool *ok)
+{
+  const hid_t mesh = H5Gopen2(file, "mesh", H5P_DEFAULT);
+
+  PetscFunctionBeginUser;
+  *ok = (PetscBool)(mesh >= 0);
+  if (*ok) PetscCall(SbH5GetInt(mesh, "hash", hash, ok));
+  if (mesh >= 0) (void)H5Gclose(mesh);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Opens what an earlier part of this run wrote; ok is false when there is nothing that fits. */
 static PetscErrorCode resume(SbRun run, SbOutput out, const char *path, PetscBool *ok)
 {
   SbFrames fr = out->frames;
   SbFrame *frames;
-  int64_t hash;
-  hid_t mesh;
+  int64_t hash = 0;
   char message[SB_MESSAGE_MAX] = "";
 
   PetscFunctionBeginUser;
   PetscCall(SbH5Open(out->comm, path, PETSC_TRUE, &fr->h5, ok));
   if (!*ok) PetscFunctionReturn(PETSC_SUCCESS);
-  mesh = H5Gopen2(fr->h5.file, "mesh", H5P_DEFAULT);
+  PetscCall(mesh_hash(fr->h5.file, &hash, ok));
   fr->top = H5Gopen2(fr->h5.file, "step", H5P_DEFAULT);
-  *ok = (PetscBool)(mesh >= 0 && fr->top >= 0);
-  if (*ok) PetscCall(SbH5GetInt(mesh, "hash", &hash, ok));
-  if (mesh >= 0) (void)H5Gclose(mesh);
-  if (!*ok || (uint64_t)hash != out->mesh_hash) {
+  if (!*ok || fr->top < 0 || (uint64_t)hash != out->mesh_hash) {
     *ok = PETSC_FALSE;
     if (fr->top >= 0) (void)H5Gclose(fr->top);
     PetscCall(SbH5Close(&fr->h5));
@@ -312,6 +342,32 @@ static PetscErrorCode resume(SbRun run, SbOutput out, const char *path, PetscBoo
   PetscCall(SbAgree(out->comm, PETSC_ERR_FILE_WRITE, message));
   PetscCall(scan(fr, run->step0, PETSC_TRUE, &fr->nframe, NULL));
   PetscCall(SbH5Flush(&fr->h5));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbFramesCheck(SbRun run, SbOutput out)
+{
+  SbH5 h;
+  char path[PETSC_MAX_PATH_LEN];
+  int64_t hash = 0;
+  PetscBool ok, corners;
+
+  PetscFunctionBeginUser;
+  if (!out->nfield) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(SbOutputOrder(run, out));
+  PetscCall(SbOutputPath(out, "fields.h5", sizeof(path), path));
+  PetscCall(SbH5Open(out->comm, path, PETSC_FALSE, &h, &ok));
+  if (!ok) PetscFunctionReturn(PETSC_SUCCESS);
+  corners = (PetscBool)(H5Lexists(h.file, "mesh", H5P_DEFAULT) > 0 &&
+                        H5Lexists(h.file, "mesh/vertices", H5P_DEFAULT) > 0);
+  PetscCall(mesh_hash(h.file, &hash, &ok));
+  PetscCall(SbH5Close(&h));
+  // Frames of another mesh are replaced.
+  PetscCheck(
+    !ok || (uint64_t)hash != out->mesh_hash || corners == out->discontinuous, out->comm, PETSC_ERR_USER_INPUT,
+    "-output_discontinuous is %s, but the frames in %s were written with %s: go on with the same, or give "
+    "another -output_dir",
+    out->discontinuous ? "true" : "false", path, corners ? "true" : "false");
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -336,20 +392,20 @@ static PetscErrorCode create(SbRun run, SbOutput out, const char *path)
 static PetscErrorCode allocate(SbRun run, SbOutput out)
 {
   SbFrames fr = out->frames;
-  const PetscInt nowned = PetscMax(run->model->mesh->nvert_owned, run->model->mesh->ncell_owned);
-  const PetscInt nslice = PetscMax(out->vertex.n, out->cell.n);
+  const PetscInt nowned = PetscMax(3 * out->point.nowned, 6 * out->cell.nowned);
+  const PetscInt nslice = PetscMax(3 * out->point.n, 6 * out->cell.n);
   PetscBool rank = PETSC_FALSE;
   char path[PETSC_MAX_PATH_LEN];
 
   PetscFunctionBeginUser;
-  PetscCall(PetscMalloc1(6 * nowned, &fr->owned));
-  PetscCall(PetscMalloc1(6 * nslice, &fr->slice));
-  if (!out->precise) PetscCall(PetscMalloc(6 * (size_t)nslice * sizeof(float), &fr->packed));
+  PetscCall(PetscMalloc1(nowned, &fr->owned));
+  PetscCall(PetscMalloc1(nslice, &fr->slice));
+  if (!out->precise) PetscCall(PetscMalloc((size_t)nslice * sizeof(float), &fr->packed));
   PetscCall(SbFieldPrepare(run, out));
   if (out->rank) PetscFunctionReturn(PETSC_SUCCESS);
   for (PetscInt i = 0; i < out->nfield; i++) rank = (PetscBool)(rank || !strcmp(out->field[i]->name, "rank"));
   PetscCall(SbOutputPath(out, "fields.xmf", sizeof(path), path));
-  PetscCall(SbXdmfCreate(path, out->vertex.N, out->cell.N, rank, &fr->xdmf));
+  PetscCall(SbXdmfCreate(path, out->point.N, out->cell.N, rank, &fr->xdmf));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

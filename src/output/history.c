@@ -121,16 +121,23 @@ static PetscErrorCode effect_columns(SbRun run, const SbStep *step, PetscReal *v
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode probe_columns(SbOutput out, const SbStep *step, PetscReal *values)
+static PetscErrorCode probe_columns(SbRun run, SbOutput out, const SbStep *step, PetscReal *values)
 {
-  const PetscScalar *u;
+  const PetscBool faces = run->model->space->faces; // then ghosts are needed
+  const PetscReal *u;
 
   PetscFunctionBeginUser;
-  PetscCall(VecGetArrayRead(step->U, &u));
+  if (faces)
+    PetscCall(SbSpaceGetLocalRead(run->model->space, step->U, &u));
+  else
+    PetscCall(VecGetArrayRead(step->U, &u));
   for (PetscInt p = 0; p < out->nprobe; p++) {
-    if (out->probe[p].local >= 0) PetscCall(PetscArraycpy(values + 3 * p, u + 3 * out->probe[p].local, 3));
+    if (out->probe[p].local >= 0) SbPointsVertex(run, out, out->probe[p].local, u, values + 3 * p);
   }
-  PetscCall(VecRestoreArrayRead(step->U, &u));
+  if (faces)
+    PetscCall(SbSpaceRestoreLocalRead(run->model->space, step->U, &u));
+  else
+    PetscCall(VecRestoreArrayRead(step->U, &u));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -143,7 +150,7 @@ static PetscErrorCode extra_columns(SbRun run, SbOutput out, const SbStep *step)
   PetscFunctionBeginUser;
   PetscCall(PetscArrayzero(h->mine, h->nextra + 1));
   if (run->model->nhistory) PetscCall(effect_columns(run, step, h->mine));
-  if (out->nprobe) PetscCall(probe_columns(out, step, h->mine + h->nextra - 3 * out->nprobe));
+  if (out->nprobe) PetscCall(probe_columns(run, out, step, h->mine + h->nextra - 3 * out->nprobe));
   h->mine[h->nextra] = h->message[0] ? 1. : 0.;
   PetscCall(PetscMPIIntCast(h->nextra + 1, &n));
   PetscCallMPI(MPI_Allreduce(h->mine, h->sum, n, MPIU_REAL, MPI_SUM, out->comm));

@@ -1,8 +1,11 @@
 /*
-  Original order: vertices and cells by their number in the scenario, whatever the partition.
+  Original order: vertices, cells and nodes by their number in the scenario, whatever the partition.
 
   Rank r of p holds the slice of numbers [N r / p, N (r + 1) / p) (PETSc's usual layout). A star forest connects each owned
   entity (a leaf) with its place in a slice (a root); it is built once and moves any number of components at once.
+
+  Numbers of nodes at faces have gaps. They are closed once, when an order is made: every number that is taken marks its
+  place among all possible ones, and counting the marks from the lowest rank on gives the new numbers.
 */
 #include "output_impl.h"
 
@@ -21,10 +24,50 @@ PetscErrorCode SbOrderCreate(MPI_Comm comm, PetscInt N, PetscInt nowned, const P
   order->N = N;
   order->n = end - order->start;
   order->nowned = nowned;
+  order->each = 1;
   PetscCall(PetscSFCreate(comm, &order->sf));
   PetscCall(PetscSFSetGraphLayout(order->sf, layout, nowned, NULL, PETSC_COPY_VALUES, original));
   PetscCall(PetscSFSetUp(order->sf));
   PetscCall(PetscLayoutDestroy(&layout));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbOrderCreateSparse(MPI_Comm comm, PetscInt bound, PetscInt nowned, const PetscInt key[],
+                                   SbOrder *order)
+{
+  SbOrder all;
+  PetscInt *mark, *number, before = 0, N;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbOrderCreate(comm, bound, nowned, key, &all));
+  PetscCall(PetscCalloc1(all.n, &mark));
+  PetscCall(PetscMalloc1(nowned, &number));
+  for (PetscInt i = 0; i < nowned; i++) number[i] = 1;
+  PetscCall(PetscSFReduceBegin(all.sf, MPIU_INT, number, mark, MPI_REPLACE));
+  PetscCall(PetscSFReduceEnd(all.sf, MPIU_INT, number, mark, MPI_REPLACE));
+  for (PetscInt i = 0; i < all.n; i++) before += mark[i];
+  PetscCallMPI(MPI_Allreduce(&before, &N, 1, MPIU_INT, MPI_SUM, comm));
+  PetscCallMPI(MPI_Scan(MPI_IN_PLACE, &before, 1, MPIU_INT, MPI_SUM, comm));
+  for (PetscInt i = all.n - 1; i >= 0; i--) before = mark[i] ? mark[i] = before - 1 : before;
+  PetscCall(PetscSFBcastBegin(all.sf, MPIU_INT, mark, number, MPI_REPLACE));
+  PetscCall(PetscSFBcastEnd(all.sf, MPIU_INT, mark, number, MPI_REPLACE));
+  PetscCall(SbOrderCreate(comm, N, nowned, number, order));
+  PetscCall(PetscFree(mark));
+  PetscCall(PetscFree(number));
+  PetscCall(SbOrderDestroy(&all));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbOrderRepeat(const SbOrder *order, PetscInt each, SbOrder *repeated)
+{
+  PetscFunctionBeginUser;
+  *repeated = *order;
+  repeated->each = order->each * each;
+  repeated->N *= each;
+  repeated->nowned *= each;
+  repeated->start *= each;
+  repeated->n *= each;
+  PetscCall(PetscObjectReference((PetscObject)order->sf));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -51,7 +94,7 @@ PetscErrorCode SbOrderGather(const SbOrder *order, PetscInt ncomp, const PetscRe
   MPI_Datatype unit;
 
   PetscFunctionBeginUser;
-  PetscCall(unit_create(ncomp, &unit));
+  PetscCall(unit_create(order->each * ncomp, &unit));
   PetscCall(PetscSFReduceBegin(order->sf, unit, owned, slice, MPI_REPLACE));
   PetscCall(PetscSFReduceEnd(order->sf, unit, owned, slice, MPI_REPLACE));
   PetscCallMPI(MPI_Type_free(&unit));
@@ -64,7 +107,7 @@ PetscErrorCode SbOrderScatter(const SbOrder *order, PetscInt ncomp, const PetscR
   MPI_Datatype unit;
 
   PetscFunctionBeginUser;
-  PetscCall(unit_create(ncomp, &unit));
+  PetscCall(unit_create(order->each * ncomp, &unit));
   PetscCall(PetscSFBcastBegin(order->sf, unit, slice, owned, MPI_REPLACE));
   PetscCall(PetscSFBcastEnd(order->sf, unit, slice, owned, MPI_REPLACE));
   PetscCallMPI(MPI_Type_free(&unit));

@@ -16,13 +16,15 @@ static const SbOption rows[] = {
   {"output_dir", SB_OPTION_STRING, 1, "", "", "",
    "folder of the results; empty: out/<name of the scenario file>"},
   {"output_fields", SB_OPTION_NAMES, 1, "", "displacement,velocity,von_mises", "",
-   "fields in fields.h5: displacement, velocity, acceleration, reaction, stress, von_mises, J, "
-   "energy_density, rank; none: no such file"},
+   "fields in fields.h5: displacement, velocity, acceleration, reaction, stress, von_mises, pressure, "
+   "mean_pressure, J, energy_density, rank; none: no such file"},
   {"output_every", SB_OPTION_REAL, 1, "s", "0", "[0, inf)",
    "simulated time between frames of fields.h5; 0: output_every_steps counts"},
   {"output_every_steps", SB_OPTION_INT, 1, "", "1", "[1, inf)",
    "steps between frames of fields.h5, while output_every is 0"},
   {"output_precision", SB_OPTION_CHOICE, 1, "", "float", "float|double", "numbers in fields.h5"},
+  {"output_discontinuous", SB_OPTION_BOOL, 1, "", "false", "",
+   "each tet in fields.h5 has four points of its own: cr and dg as they are, else averaged around vertices"},
   {"output_history", SB_OPTION_BOOL, 1, "", "true", "", "write history.csv"},
   {"output_history_every", SB_OPTION_INT, 1, "", "1", "[1, inf)", "steps between rows of history.csv"},
   {"checkpoint_every_time", SB_OPTION_REAL, 1, "s", "0", "[0, inf)",
@@ -169,6 +171,7 @@ static PetscErrorCode read_options(SbOutput out, PetscBool dynamic)
   PetscCall(SbOptionInt(&scope, "output_every_steps", &out->every_steps));
   PetscCall(SbOptionChoice(&scope, "output_precision", &precision));
   out->precise = precision ? PETSC_TRUE : PETSC_FALSE;
+  PetscCall(SbOptionBool(&scope, "output_discontinuous", &out->discontinuous));
   PetscCall(SbOptionBool(&scope, "output_history", &out->history));
   PetscCall(SbOptionInt(&scope, "output_history_every", &out->history_every));
   PetscCall(SbOptionReal(&scope, "checkpoint_every_time", &out->checkpoint_every));
@@ -327,12 +330,16 @@ static PetscErrorCode destroy(SbRun run)
   if (out->ordered) {
     PetscCall(SbOrderDestroy(&out->vertex));
     PetscCall(SbOrderDestroy(&out->cell));
+    PetscCall(SbOrderDestroy(&out->node));
+    PetscCall(SbOrderDestroy(&out->point));
   }
   PetscCall(PetscFree(out->probe));
   PetscCall(PetscFree(out->identity));
   PetscCall(PetscFree(out->sigma));
   PetscCall(PetscFree(out->J));
   PetscCall(PetscFree(out->psi));
+  PetscCall(PetscFree(out->pressure));
+  PetscCall(SbPointsDestroy(out));
   PetscCall(PetscFree(run->output));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -374,6 +381,7 @@ PetscErrorCode SbOutputAttach(SbRun run)
   PetscCall(view_scenario(run, out, &scenario, &size));
   // A checkpoint that is refused leaves the folder as it was.
   if (out->restart[0]) PetscCall(SbCheckpointLoad(run, out->restart));
+  if (out->restart[0]) PetscCall(SbFramesCheck(run, out));
   if (!out->rank) PetscCall(clear_folder(out, run->step0));
   PetscCall(write_scenario(out, scenario, size));
   PetscCall(SbRunJson(run, out, "running", ""));

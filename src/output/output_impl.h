@@ -11,12 +11,13 @@
 #define SB_FILE_MAX 64 /* longest name of a file inside the folder, with the terminating zero */
 
 /*
-  Original order of vertices or cells, cut into one contiguous slice per rank: how results are written, so that the files
-  do not depend on the partition.
+  Original order of vertices, cells or nodes, cut into one contiguous slice per rank: how results are written, so that the
+  files do not depend on the partition.
 */
 typedef struct {
   MPI_Comm comm;
-  PetscSF sf;      /* leaves: the entities owned here; roots: this rank's slice */
+  PetscSF sf;      /* leaves: the entities owned here, `each` at a time; roots: this rank's slice */
+  PetscInt each;   /* entities that stay together: 1; 4 for the corners of cells */
   PetscInt N;      /* entities of all ranks */
   PetscInt nowned; /* owned here */
   PetscInt start;  /* the slice is [start, start + n) */
@@ -25,6 +26,11 @@ typedef struct {
 
 PetscErrorCode SbOrderCreate(MPI_Comm comm, PetscInt N, PetscInt nowned, const PetscInt original[],
                              SbOrder *order);
+/* The same for numbers key[nowned] in [0, bound) with gaps, which are closed: N is how many there are. Collective. */
+PetscErrorCode SbOrderCreateSparse(MPI_Comm comm, PetscInt bound, PetscInt nowned, const PetscInt key[],
+                                   SbOrder *order);
+/* An order of `each` entities in the place of every one of `order`: a cell's corners for a cell. Destroy both. */
+PetscErrorCode SbOrderRepeat(const SbOrder *order, PetscInt each, SbOrder *repeated);
 PetscErrorCode SbOrderDestroy(SbOrder *order);
 /* slice[n][ncomp] from owned[nowned][ncomp], and back. Collective. */
 PetscErrorCode SbOrderGather(const SbOrder *order, PetscInt ncomp, const PetscReal owned[],
@@ -102,6 +108,7 @@ typedef struct {
 typedef struct _p_SbFrames *SbFrames;     /* frames.c */
 typedef struct _p_SbHistory *SbHistory;   /* history.c */
 typedef struct _p_SbProgress *SbProgress; /* progress.c */
+typedef struct _p_SbPoints *SbPoints;     /* points.c */
 
 typedef struct _p_SbOutput *SbOutput;
 struct _p_SbOutput {
@@ -117,7 +124,8 @@ struct _p_SbOutput {
   const SbField *field[SB_FIELD_MAX];
   PetscReal every; /* s between frames; 0: every_steps counts */
   PetscInt every_steps;
-  PetscBool precise; /* double instead of float */
+  PetscBool precise;       /* double instead of float */
+  PetscBool discontinuous; /* each cell has four points of its own */
   PetscBool history;
   PetscInt history_every;
   PetscReal checkpoint_every; /* s of simulated time; 0: off */
@@ -128,7 +136,9 @@ struct _p_SbOutput {
 
   /* after SbOutputAttach() */
   SbOrder vertex, cell;
-  PetscBool ordered;  /* the two exist */
+  SbOrder node;  /* the unknowns: that of the vertices when no body has its nodes at faces */
+  SbOrder point; /* of vertex fields: vertices, or 4 cell + a of the corners of cells when discontinuous */
+  PetscBool ordered;  /* the four exist */
   PetscBool attached; /* run.json exists */
   uint64_t mesh_hash;
   char *identity; /* options that decide the mechanics, one per line */
@@ -137,6 +147,9 @@ struct _p_SbOutput {
   PetscBool state_valid;
   PetscReal *sigma, *J,
     *psi; /* [ncell_owned][6] Pa, [ncell_owned], [ncell_owned] J/m^3; NULL when no field needs it */
+  PetscReal *pressure; /* [ncell_owned] Pa; NULL likewise */
+
+  SbPoints points; /* NULL when nothing needs values at vertices */
 
   SbFrames frames;
   SbHistory hist;
@@ -154,6 +167,19 @@ PetscErrorCode SbOutputOrder(SbRun run, SbOutput out);
 PetscErrorCode SbFieldFind(const char *name, const SbField **field);
 PetscErrorCode SbFieldPrepare(SbRun run, SbOutput out); /* storage for the cell quantities */
 
+/* points.c: vectors at the points of vertex fields. The first two before the others. */
+PetscErrorCode SbPointsPrepare(SbRun run, SbOutput out);       /* not collective */
+PetscErrorCode SbPointsPrepareForces(SbRun run, SbOutput out); /* for SbPointsReactions(). Collective */
+PetscErrorCode SbPointsDestroy(SbOutput out);
+/* values[out->point.nowned][3] of a vector of the space: nodal values of P1, means of the cells around, or each cell's own. Collective. */
+PetscErrorCode SbPointsValues(SbRun run, SbOutput out, Vec x, PetscReal values[]);
+/* The same for forces at prescribed nodes, 0 elsewhere: resultant and moment of the nodal forces are kept. Collective. */
+PetscErrorCode SbPointsReactions(SbRun run, SbOutput out, Vec R, PetscReal values[]);
+/* The value at an owned vertex of a local array x[nnode][3] with ghosts, as vertex fields have it. */
+void SbPointsVertex(SbRun run, SbOutput out, PetscInt vertex, const PetscReal x[], PetscReal value[3]);
+
+/* Before the folder is touched: refuses to go on with frames that have other points. Collective. */
+PetscErrorCode SbFramesCheck(SbRun run, SbOutput out);
 PetscErrorCode SbFramesAttach(SbRun run, SbOutput out);
 PetscErrorCode SbFramesClose(SbOutput out);
 PetscErrorCode SbFramesDestroy(SbOutput out);
@@ -171,7 +197,8 @@ PetscErrorCode SbRunJson(SbRun run, SbOutput out, const char *status, const char
 
 /* xdmf.c: the index of fields.h5, on rank 0. */
 typedef struct _p_SbXdmf *SbXdmf;
-PetscErrorCode SbXdmfCreate(const char *path, PetscInt nvert, PetscInt ncell, PetscBool with_rank, SbXdmf *x);
+PetscErrorCode SbXdmfCreate(const char *path, PetscInt npoint, PetscInt ncell, PetscBool with_rank,
+                            SbXdmf *x);
 PetscErrorCode SbXdmfDestroy(SbXdmf *x);
 PetscErrorCode SbXdmfRemove(SbXdmf x); /* the file, if there is one */
 /* Adds a frame: its group in fields.h5 and its fields. */
@@ -194,5 +221,7 @@ typedef struct {
 PetscErrorCode SbPhasesGet(SbOutput out, SbPhases *phases); /* collective */
 /* Files of the run with their sizes: calls fn for each one that exists. Rank 0. */
 PetscErrorCode SbOutputFiles(SbOutput out, SbFileFn fn, void *ctx);
+/* Nodes of a body by its element: vertices, faces, or four per cell. Not collective. */
+PetscInt SbBodyNodes(SbModel model, PetscInt body);
 /* Name of the time preset, e.g. "newmark". */
 PetscErrorCode SbPresetName(SbRun run, size_t size, char name[]);

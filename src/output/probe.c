@@ -1,6 +1,7 @@
 /*
   Probes: points of the bodies whose displacement the history follows. Each sits at the vertex nearest to the point asked
-  for in the rest state; of equally near ones, at that with the smallest original number.
+  for in the rest state; of equally near ones, at that with the smallest original number. It shows what vertex fields show
+  there: the unknown of P1, the mean of the cells around it for CR and DG.
 */
 #include <math.h>
 #include "output_impl.h"
@@ -26,6 +27,7 @@ PetscErrorCode SbProbesFind(SbRun run, SbOutput out)
   const SbMesh mesh = run->model->mesh;
 
   PetscFunctionBeginUser;
+  if (out->nprobe) PetscCall(SbPointsPrepare(run, out));
   for (PetscInt p = 0; p < out->nprobe; p++) {
     SbProbe *probe = &out->probe[p];
     PetscReal mine, all, here[3] = {0., 0., 0.};

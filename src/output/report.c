@@ -17,6 +17,14 @@ PetscErrorCode SbPresetName(SbRun run, size_t size, char name[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscInt SbBodyNodes(SbModel m, PetscInt b)
+{
+  const SbBody *body = &m->body[b];
+  const PetscInt *per = m->element[b]->nodes_per, nface = (4 * body->ncell + body->nfacet) / 2;
+
+  return per[0] * body->nvert + per[2] * nface + per[3] * body->ncell;
+}
+
 /* "title      words ..." with the words wrapped at WIDTH and indented. */
 static PetscErrorCode entry(const char *title, const char *format, ...)
 {
@@ -47,25 +55,27 @@ static PetscErrorCode entry(const char *title, const char *format, ...)
 
 static PetscErrorCode print_bodies(SbModel m)
 {
-  PetscInt tets = 0, vertices = 0;
+  PetscInt tets = 0, nodes = 0;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscFPrintf(PETSC_COMM_SELF, PETSC_STDOUT, "\n%-15s %9s %9s %9s  %15s %13s\n", "body", "tets",
-                         "vertices", "unknowns", "min angle (deg)", "radius ratio"));
+  PetscCall(PetscFPrintf(PETSC_COMM_SELF, PETSC_STDOUT, "\n%-15s %-7s %8s %9s %9s %13s %12s\n", "body",
+                         "element", "tets", "nodes", "unknowns", "min angle deg", "radius ratio"));
   for (PetscInt b = 0; b < m->nbody; b++) {
     const SbBody *body = &m->body[b];
 
+    const PetscInt n = SbBodyNodes(m, b);
+
     PetscCall(PetscFPrintf(
       PETSC_COMM_SELF, PETSC_STDOUT,
-      "%-15.15s %9" PetscInt_FMT " %9" PetscInt_FMT " %9" PetscInt_FMT "  %15.1f %13.2f\n", body->name,
-      body->ncell, body->nvert, 3 * body->nvert, (double)body->min_dihedral, (double)body->max_radius_ratio));
+      "%-15.15s %-7.7s %8" PetscInt_FMT " %9" PetscInt_FMT " %9" PetscInt_FMT " %13.1f %12.2f\n", body->name,
+      body->element, body->ncell, n, 3 * n, (double)body->min_dihedral, (double)body->max_radius_ratio));
     tets += body->ncell;
-    vertices += body->nvert;
+    nodes += n;
   }
   if (m->nbody > 1)
     PetscCall(PetscFPrintf(PETSC_COMM_SELF, PETSC_STDOUT,
-                           "%-15s %9" PetscInt_FMT " %9" PetscInt_FMT " %9" PetscInt_FMT "\n", "together",
-                           tets, vertices, 3 * vertices));
+                           "%-15s %-7s %8" PetscInt_FMT " %9" PetscInt_FMT " %9" PetscInt_FMT "\n",
+                           "together", "", tets, nodes, 3 * nodes));
   PetscCall(PetscFPrintf(PETSC_COMM_SELF, PETSC_STDOUT, "\n%-15s %-12s %11s %9s %14s %12s\n", "body",
                          "material", "E (Pa)", "nu", "rho (kg/m^3)", "mass (kg)"));
   for (PetscInt b = 0; b < m->nbody; b++) {

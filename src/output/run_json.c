@@ -75,7 +75,9 @@ static void put_bodies(FILE *f, SbModel m)
     put_real(f, "volume", body->volume, ", ");
     put_real(f, "min_dihedral", body->min_dihedral, ", ");
     put_real(f, "max_radius_ratio", body->max_radius_ratio, ",\n     ");
-    (void)fprintf(f, "\"element\": \"%s\", \"material\": \"%s\", ", body->element, material->law);
+    (void)fprintf(f, "\"element\": \"%s\", \"nodes\": %" PetscInt_FMT ", \"unknowns\": %" PetscInt_FMT ", ",
+                  body->element, SbBodyNodes(m, b), 3 * SbBodyNodes(m, b));
+    (void)fprintf(f, "\"material\": \"%s\", ", material->law);
     put_real(f, "young", material->E, ", ");
     put_real(f, "poisson", material->nu, ", ");
     put_real(f, "density", material->density, "}");
@@ -93,7 +95,7 @@ static PetscErrorCode put_settings(FILE *f, SbRun run)
   put_text(f, "time", name);
   put_text(f, "solver", run->solver);
   put_text(f, "solver_reason", run->solver_reason);
-  (void)fprintf(f, "  \"unknowns\": %" PetscInt_FMT ",\n  ", 3 * run->model->mesh->Nvert);
+  (void)fprintf(f, "  \"unknowns\": %" PetscInt_FMT ",\n  ", 3 * run->model->space->Nnode);
   put_real(f, "dt", run->dt, ",\n  ");
   put_real(f, "t_start", run->t0, ",\n  ");
   put_real(f, "t_end", run->t_end, ",\n");

@@ -11,13 +11,13 @@
 
 struct _p_SbXdmf {
   char path[PETSC_MAX_PATH_LEN];
-  PetscInt nvert, ncell;
+  PetscInt npoint, ncell;
   char mesh[1024]; /* topology, geometry and constant arrays: the same in every frame */
   char *text;      /* [size] frames so far; capacity grows by doubling */
   size_t size, capacity;
 };
 
-PetscErrorCode SbXdmfCreate(const char *path, PetscInt nvert, PetscInt ncell, PetscBool with_rank, SbXdmf *x)
+PetscErrorCode SbXdmfCreate(const char *path, PetscInt npoint, PetscInt ncell, PetscBool with_rank, SbXdmf *x)
 {
   SbXdmf xdmf;
   const char *numbers[2] = {"body", "rank"};
@@ -26,7 +26,7 @@ PetscErrorCode SbXdmfCreate(const char *path, PetscInt nvert, PetscInt ncell, Pe
   PetscFunctionBeginUser;
   PetscCall(PetscNew(&xdmf));
   PetscCall(PetscStrncpy(xdmf->path, path, sizeof(xdmf->path)));
-  xdmf->nvert = nvert;
+  xdmf->npoint = npoint;
   xdmf->ncell = ncell;
   n = (size_t)snprintf(
     xdmf->mesh, sizeof(xdmf->mesh),
@@ -36,7 +36,7 @@ PetscErrorCode SbXdmfCreate(const char *path, PetscInt nvert, PetscInt ncell, Pe
     "<Geometry GeometryType=\"XYZ\">"
     "<DataItem Dimensions=\"%" PetscInt_FMT " 3\" NumberType=\"Float\" Precision=\"8\" Format=\"HDF\">"
     "fields.h5:/mesh/x</DataItem></Geometry>\n",
-    ncell, ncell, nvert);
+    ncell, ncell, npoint);
   for (int i = 0; i < (with_rank ? 2 : 1); i++) {
     n += (size_t)snprintf(xdmf->mesh + n, sizeof(xdmf->mesh) - n,
                           "<Attribute Name=\"%s\" AttributeType=\"Scalar\" Center=\"Cell\">"
@@ -109,7 +109,7 @@ PetscErrorCode SbXdmfAdd(SbXdmf x, PetscReal time, const char *group, PetscInt n
                      "<DataItem Dimensions=\"%" PetscInt_FMT
                      "%s\" NumberType=\"Float\" Precision=\"%" PetscInt_FMT
                      "\" Format=\"HDF\">fields.h5:%s/%s</DataItem></Attribute>\n",
-                     f->name, type, f->cell ? "Cell" : "Node", f->cell ? x->ncell : x->nvert, components,
+                     f->name, type, f->cell ? "Cell" : "Node", f->cell ? x->ncell : x->npoint, components,
                      bytes[i], group, f->name));
   }
   PetscCall(append(x, "</Grid>\n"));

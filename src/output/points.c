@@ -1,0 +1,225 @@
+/*
+  Values at points, whatever the element: what vertex fields and probes are made of.
+
+  P1 has the values at vertices as its unknowns. Of CR and DG the value at vertex v of a cell is sum_a vertex[v][a] u_a
+  (SbElementOps), another one in each cell around the vertex: a vertex field holds their mean, weighted with the volumes of
+  the cells and summed by the cells' original numbers, so that no partition changes a bit of it. With -output_discontinuous
+  nothing is averaged: each cell has four points of its own.
+
+  A nodal force of CR or DG acts at the centroid of a face. One third of it goes to each vertex of the face, which keeps its
+  resultant and its moment. Where a node belongs to several cells and these have points of their own, each has an equal part.
+*/
+#include "output_impl.h"
+
+struct _p_SbPoints {
+  PetscInt *start;    /* [nvert_owned + 1] into corner; NULL where nodes are vertices */
+  PetscInt *corner;   /* 4 cell + a of the cells around an owned vertex, by original cell number */
+  PetscReal *V;       /* [ncell] m^3 */
+  PetscReal *valence; /* [nnode] cells that have the node; NULL when no field needs it */
+};
+
+/* ------------------------------------------------------------------ set-up */
+
+/* The cells around each owned vertex: all of them are local. */
+static PetscErrorCode find_around(SbMesh mesh, SbPoints p)
+{
+  PetscInt *key;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscCalloc1(mesh->nvert_owned + 1, &p->start));
+  for (PetscInt i = 0; i < 4 * mesh->ncell; i++) {
+    if (mesh->cell[i] < mesh->nvert_owned) p->start[mesh->cell[i] + 1]++;
+  }
+  for (PetscInt v = 0; v < mesh->nvert_owned; v++) p->start[v + 1] += p->start[v];
+  PetscCall(PetscMalloc1(p->start[mesh->nvert_owned], &p->corner));
+  PetscCall(PetscMalloc1(p->start[mesh->nvert_owned], &key));
+  for (PetscInt i = 0; i < 4 * mesh->ncell; i++) {
+    if (mesh->cell[i] >= mesh->nvert_owned) continue;
+    key[p->start[mesh->cell[i]]] = mesh->cell_orig[i / 4];
+    p->corner[p->start[mesh->cell[i]]++] = i;
+  }
+  // Filling has moved every start to the next one.
+  for (PetscInt v = mesh->nvert_owned; v > 0; v--) p->start[v] = p->start[v - 1];
+  p->start[0] = 0;
+  for (PetscInt v = 0; v < mesh->nvert_owned; v++)
+    PetscCall(
+      PetscSortIntWithArray(p->start[v + 1] - p->start[v], key + p->start[v], p->corner + p->start[v]));
+  PetscCall(PetscFree(key));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode find_volumes(SbSpace s, SbPoints p)
+{
+  PetscFunctionBeginUser;
+  PetscCall(PetscMalloc1(s->mesh->ncell, &p->V));
+  for (PetscInt b = 0; b < s->nbatch; b++)
+    PetscCall(PetscArraycpy(p->V + s->batch_cell[b], s->batch_V[b], s->batch_n[b]));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbPointsPrepare(SbRun run, SbOutput out)
+{
+  const SbSpace s = run->model->space;
+
+  PetscFunctionBeginUser;
+  if (out->points) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscNew(&out->points));
+  if (!s->faces) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(find_around(s->mesh, out->points));
+  PetscCall(find_volumes(s, out->points));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Each rank knows all cells of its own nodes; the ghosts hear it from their owners. */
+PetscErrorCode SbPointsPrepareForces(SbRun run, SbOutput out)
+{
+  const SbSpace s = run->model->space;
+  const PetscReal *all;
+  PetscReal *count;
+  Vec v;
+
+  PetscFunctionBeginUser;
+  if (out->points->valence) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(SbSpaceCreateVec(s, &v));
+  PetscCall(SbSpaceGetLocalWrite(s, v, &count));
+  for (PetscInt i = 0; i < 4 * s->mesh->ncell; i++) count[3 * s->cell_node[i]] += 1.;
+  PetscCall(SbSpaceRestoreLocalWrite(s, v, &count));
+  PetscCall(SbSpaceGetLocalRead(s, v, &all));
+  PetscCall(PetscMalloc1(s->nnode, &out->points->valence));
+  for (PetscInt i = 0; i < s->nnode; i++) out->points->valence[i] = all[3 * i];
+  PetscCall(SbSpaceRestoreLocalRead(s, v, &all));
+  PetscCall(VecDestroy(&v));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbPointsDestroy(SbOutput out)
+{
+  PetscFunctionBeginUser;
+  if (!out->points) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscFree(out->points->start));
+  PetscCall(PetscFree(out->points->corner));
+  PetscCall(PetscFree(out->points->V));
+  PetscCall(PetscFree(out->points->valence));
+  PetscCall(PetscFree(out->points));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ values */
+
+/* x at a corner of a cell, as the cell has it; corner = 4 cell + a. */
+static void corner_value(SbSpace s, PetscInt corner, const PetscReal x[], PetscReal value[3])
+{
+  const SbElement e = SbSpaceCellElement(s, corner / 4);
+  const PetscInt *node = s->cell_node + 4 * (corner / 4);
+
+  for (int k = 0; k < 3; k++) {
+    if (e->nodes_per[0]) {
+      value[k] = x[3 * node[corner % 4] + k];
+      continue;
+    }
+    value[k] = 0.;
+    for (int a = 0; a < 4; a++) value[k] += e->ops.vertex[corner % 4][a] * x[3 * node[a] + k];
+  }
+}
+
+/* The node at an owned vertex, or -1 where the body has its nodes at faces. */
+static PetscInt vertex_node(SbSpace s, SbPoints p, PetscInt vertex)
+{
+  const PetscInt corner = s->faces ? p->corner[p->start[vertex]] : 0;
+
+  if (!s->faces) return vertex;
+  return SbSpaceCellElement(s, corner / 4)->nodes_per[0] ? s->cell_node[corner] : -1;
+}
+
+void SbPointsVertex(SbRun run, SbOutput out, PetscInt vertex, const PetscReal x[], PetscReal value[3])
+{
+  const SbSpace s = run->model->space;
+  const SbPoints p = out->points;
+  const PetscInt node = vertex_node(s, p, vertex);
+  PetscReal V = 0.;
+
+  for (int k = 0; k < 3; k++) value[k] = node < 0 ? 0. : x[3 * node + k];
+  if (node >= 0) return;
+  for (PetscInt i = p->start[vertex]; i < p->start[vertex + 1]; i++) {
+    PetscReal there[3];
+
+    corner_value(s, p->corner[i], x, there);
+    for (int k = 0; k < 3; k++) value[k] += p->V[p->corner[i] / 4] * there[k];
+    V += p->V[p->corner[i] / 4];
+  }
+  for (int k = 0; k < 3; k++) value[k] /= V;
+}
+
+PetscErrorCode SbPointsValues(SbRun run, SbOutput out, Vec x, PetscReal values[])
+{
+  const SbSpace s = run->model->space;
+  const PetscReal *array;
+
+  PetscFunctionBeginUser;
+  if (!s->faces && !out->discontinuous) {
+    PetscCall(VecGetArrayRead(x, &array));
+    PetscCall(PetscArraycpy(values, array, 3 * s->mesh->nvert_owned));
+    PetscCall(VecRestoreArrayRead(x, &array));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  PetscCall(SbSpaceGetLocalRead(s, x, &array));
+  if (out->discontinuous) {
+    for (PetscInt i = 0; i < 4 * s->mesh->ncell_owned; i++) corner_value(s, i, array, values + 3 * i);
+  } else {
+    for (PetscInt v = 0; v < s->mesh->nvert_owned; v++) SbPointsVertex(run, out, v, array, values + 3 * v);
+  }
+  PetscCall(SbSpaceRestoreLocalRead(s, x, &array));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ forces */
+
+/* value += factor times the prescribed components of r at a node */
+static void add_reaction(SbSpace s, PetscInt node, PetscReal factor, const PetscReal r[], PetscReal value[3])
+{
+  for (int k = 0; k < 3; k++) {
+    if (s->fixed[node] & (1 << k)) value[k] += factor * r[3 * node + k];
+  }
+}
+
+/* What a cell's share of the forces at its nodes brings to one of its corners. */
+static void add_corner_reaction(SbSpace s, const PetscReal valence[], PetscInt corner, const PetscReal r[],
+                                PetscReal value[3])
+{
+  const PetscInt *node = s->cell_node + 4 * (corner / 4);
+
+  if (SbSpaceCellElement(s, corner / 4)->nodes_per[0]) {
+    add_reaction(s, node[corner % 4], 1. / valence[node[corner % 4]], r, value);
+  } else {
+    // node a lies opposite vertex a: this corner belongs to the faces of the others
+    for (int a = 0; a < 4; a++) {
+      if (a != corner % 4) add_reaction(s, node[a], 1. / (3. * valence[node[a]]), r, value);
+    }
+  }
+}
+
+PetscErrorCode SbPointsReactions(SbRun run, SbOutput out, Vec R, PetscReal values[])
+{
+  const SbSpace s = run->model->space;
+  const SbPoints p = out->points;
+  const PetscInt n = out->discontinuous ? 4 * s->mesh->ncell_owned : s->mesh->nvert_owned;
+  const PetscReal *r;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscArrayzero(values, 3 * n));
+  PetscCall(SbSpaceGetLocalRead(s, R, &r));
+  for (PetscInt i = 0; i < n; i++) {
+    const PetscInt node = out->discontinuous ? -1 : vertex_node(s, p, i);
+
+    if (out->discontinuous) {
+      add_corner_reaction(s, p->valence, i, r, values + 3 * i);
+    } else if (node >= 0) {
+      add_reaction(s, node, 1., r, values + 3 * i);
+    } else {
+      for (PetscInt k = p->start[i]; k < p->start[i + 1]; k++)
+        add_corner_reaction(s, p->valence, p->corner[k], r, values + 3 * i);
+    }
+  }
+  PetscCall(SbSpaceRestoreLocalRead(s, R, &r));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
