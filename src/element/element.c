@@ -6,11 +6,13 @@
 PetscFunctionList SbElementList = NULL;
 
 static const SbOption cr_rows[] = {
-  {"gamma1", SB_OPTION_REAL, 1, "", "1", "(0, inf)", "factor on the penalty of jumps across faces"},
+  {"gamma1", SB_OPTION_REAL, 1, "", "0.6", "(0, inf)",
+   "factor on the penalty of jumps across faces; less is softer, much more locks"},
 };
 static const SbOption dg_rows[] = {
   {"gamma0", SB_OPTION_REAL, 1, "", "4", "(0, inf)", "factor on the penalty of the mean jump across a face"},
-  {"gamma1", SB_OPTION_REAL, 1, "", "1", "(0, inf)", "factor on the penalty of jumps across faces"},
+  {"gamma1", SB_OPTION_REAL, 1, "", "0.6", "(0, inf)",
+   "factor on the penalty of jumps across faces; less is softer, much more locks"},
 };
 
 static PetscErrorCode destroy_list(void)
