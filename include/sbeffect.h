@@ -35,10 +35,11 @@ struct _p_SbEffect {
   char name[SB_NAME_MAX];
   char type[SB_NAME_MAX];
   SbEffectOps ops;
-  PetscBool linear;      /* force does not depend on u: the tangent stays constant. Default PETSC_TRUE */
-  PetscBool steady;      /* no formula uses t: a static run multiplies the effect by the load factor */
-  PetscInt ncolumn;      /* history columns */
-  const char *column[8]; /* "force_x", ...; written as <name>_<column> */
+  PetscBool linear; /* force does not depend on u: the tangent stays constant. Default PETSC_TRUE */
+  PetscBool steady; /* no formula uses t: a static run multiplies the effect by the load factor */
+  const struct SbEffectOn_ *held; /* the sets whose nodes it prescribes in all directions; NULL: none */
+  PetscInt ncolumn;               /* history columns */
+  const char *column[8];          /* "force_x", ...; written as <name>_<column> */
   void *data;
 };
 
@@ -57,6 +58,12 @@ PetscErrorCode SbEffectRegister(const char *type, PetscErrorCode (*create)(SbEff
 */
 PetscErrorCode SbEffectCreate(const char *name, SbEffect *e);
 PetscErrorCode SbEffectDestroy(SbEffect *e); /* sets *e to NULL; NULL is accepted */
+/*
+  SbEffectMarkHeld - marks the sets that the effect holds in all directions (SbSet.held), for the space to be made.
+
+  Not collective. Call it for every effect between SbMeshCreate() and SbSpaceCreate(). Names without a set are left to set-up.
+*/
+PetscErrorCode SbEffectMarkHeld(SbEffect e, PetscInt nset, SbSet set[]);
 
 /* Constructors, one per file in src/effect/. */
 PetscErrorCode SbEffectRegister_Gravity(void);
@@ -89,7 +96,7 @@ PetscErrorCode SbEffectFormulas(const SbScope *scope, const char *key, PetscInt 
                                 SbFormula formulas[], PetscBool *steady);
 
 /* The sets named by the option -effect_<name>_on, as read by SbEffectReadOn(). */
-typedef struct {
+typedef struct SbEffectOn_ {
   char option[2 * SB_NAME_MAX]; /* full name of the option, for messages */
   PetscInt n;
   char (*name)[SB_NAME_MAX]; /* [n] owned */
@@ -103,11 +110,14 @@ PetscErrorCode SbEffectFreeOn(SbEffectOn *on);
   nothing of the kind, with what it does select.
 
   SbEffectFacets - boundary facets of owned and ghost cells.
-  SbEffectNodes  - nodes, ascending, owned ones first.
+  SbEffectNodes  - nodes that can be held, ascending, owned ones first. An error for a body with nodes at faces of which the
+                   sets hold vertices but no face.
+  SbEffectVertices - vertices of the mesh, ascending, owned ones first.
   SbEffectCells  - cells, ascending, owned ones first; every local cell when no set is named.
 */
 PetscErrorCode SbEffectFacets(SbSpace space, const SbEffectOn *on, PetscInt *n, SbFacet **facets);
 PetscErrorCode SbEffectNodes(SbSpace space, const SbEffectOn *on, PetscInt *n, PetscInt **nodes);
+PetscErrorCode SbEffectVertices(SbSpace space, const SbEffectOn *on, PetscInt *n, PetscInt **vertices);
 PetscErrorCode SbEffectCells(SbSpace space, const SbEffectOn *on, PetscInt *n, PetscInt **cells);
 
 /*

@@ -32,6 +32,7 @@ struct _p_SbElement {
   PetscInt nodes_per[4]; /* nodes per vertex, edge, face, cell. P1: 1,0,0,0; CR: 0,0,1,0; DG: 0,0,0,4 */
   PetscReal gamma0;      /* DG: factor on the penalty of mean jumps */
   PetscReal gamma1;      /* CR and DG: factor on the penalty of jumps */
+  PetscBool weak;        /* DG: a held boundary face gets a node of its own, to which the cell is tied */
   SbElementOps ops;
 };
 extern PetscFunctionList SbElementList;

@@ -48,11 +48,13 @@ struct _p_SbSpace {
   PetscReal *node_x;   /* [nnode][3] rest position of each node, m */
   PetscInt *
     node_orig; /* [nnode] number that no partition changes, right on owned nodes: vert_orig of a vertex, Nvert +
-                          4 cell_orig + a of node a of a cell, the lower of the two that share it */
-  PetscInt *node_body;      /* [nnode] */
-  uint64_t *node_set;       /* [nnode] SB_SET_BIT(k) when in set k */
-  PetscBool faces;          /* some body has its nodes at faces; if not, nodes are the mesh's vertices */
-  PetscInt *neighbour;      /* [ncell][4] local cell across each face, -1: none; NULL without face nodes */
+                          4 cell_orig + a of node a of a cell, the lower of the two that share it; 4 Ncell more for its support */
+  PetscInt *node_body; /* [nnode] */
+  uint64_t *node_set;  /* [nnode] SB_SET_BIT(k) when held with set k: a face with a support is held there */
+  PetscBool faces;     /* some body has its nodes at faces; if not, nodes are the mesh's vertices */
+  PetscInt *neighbour; /* [ncell][4] local cell across each face, -1: none; NULL without face nodes */
+  PetscInt *
+    support; /* [ncell][4] node without mass that a held boundary face of a DG cell is tied to, -1: none; NULL without any */
   const SbElement *element; /* [nbody] borrowed */
   PetscInt nregion;
   SbRegion *region;     /* [nregion] */
@@ -156,8 +158,6 @@ static inline SbElement SbSpaceCellElement(SbSpace space, PetscInt cell)
 }
 /* All local boundary facets (of owned and ghost cells) in set k of the mesh. Allocated here; PetscFree. */
 PetscErrorCode SbSpaceGetSetFacets(SbSpace space, PetscInt k, PetscInt *n, SbFacet **facets);
-/* All local nodes in set k. Allocated here; PetscFree. */
-PetscErrorCode SbSpaceGetSetNodes(SbSpace space, PetscInt k, PetscInt *n, PetscInt **nodes);
 /* Index of a set by name; -1 and an error with the nearest names when there is none (where = option, for the message). */
 PetscErrorCode SbSpaceFindSet(SbSpace space, const char *name, const char *where, PetscInt *k);
 

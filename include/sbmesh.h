@@ -63,6 +63,7 @@ typedef struct {
                                         sphere: cx cy cz r; halfspace: nx ny nz d (n.x <= d); n has length 1 here, d is scaled likewise */
   PetscInt nvert, nfacet,
     ncell; /* global counts, found by SbMeshCreate(); nfacet counts boundary facets; all zero is an error there */
+  PetscBool held; /* an effect prescribes every displacement there */
 } SbSet;
 
 /*

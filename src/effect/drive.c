@@ -42,6 +42,7 @@ static PetscErrorCode options_drive(SbEffect e, const SbScope *scope)
   PetscCall(SbEffectReadOn(scope, &d->on));
   PetscCall(SbOptionChoice(scope, "components", &choice));
   d->components = SbHoldComponents(choice);
+  if (d->components == 7) e->held = &d->on;
   PetscCall(SbOptionGiven(scope, "displacement", &move));
   PetscCall(SbOptionGiven(scope, "angle", &turn));
   PetscCheck(move || turn, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,

@@ -92,6 +92,20 @@ PetscErrorCode SbEffectDestroy(SbEffect *effect)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscErrorCode SbEffectMarkHeld(SbEffect e, PetscInt nset, SbSet set[])
+{
+  PetscFunctionBeginUser;
+  for (PetscInt i = 0; e->held && i < e->held->n; i++) {
+    for (PetscInt k = 0; k < nset; k++) {
+      PetscBool same;
+
+      PetscCall(PetscStrcmp(set[k].name, e->held->name[i], &same));
+      if (same) set[k].held = PETSC_TRUE;
+    }
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode SbEffectFormulas(const SbScope *scope, const char *key, PetscInt n, PetscBool place,
                                 SbFormula formulas[], PetscBool *steady)
 {

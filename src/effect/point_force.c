@@ -1,22 +1,26 @@
 /*
-  point_force.c - a total force shared equally by the nodes of the named sets.
+  point_force.c - a total force shared equally by the vertices of the named sets.
 
-  f_a = s(t) F(t) / n for each of the n nodes, counted once over all ranks. A force on a single node has no
-  limit under mesh refinement (the displacement under it grows like 1/h); use a traction where the area
-  matters.
+  Each of the n vertices, counted once over all ranks, has s(t) F(t) / n. With P1 that is the force on its node. With CR
+  and DG the displacement of vertex v is the mean over the cells c around it, weighted by their volumes w_c, and the force
+  goes the same way back: node a of cell c has w_c psi_a(v) / sum w of it, psi_a(v) being 1 or -2. Since both the mean and
+  the elements reproduce linear functions, total force and moment are those of the force on the vertices.
+
+  A force on a single vertex has no limit under mesh refinement (the displacement under it grows like 1/h); use a
+  traction where the area matters.
 */
 #include "sbeffect.h"
 
 typedef struct {
   SbEffectOn on;
   SbFormula vector[3], time;
-  PetscInt n;      /* owned nodes of the sets on this rank */
-  PetscInt *node;  /* [n] local */
-  PetscReal share; /* 1 / global number of nodes */
+  PetscInt n;       /* owned nodes that have a part */
+  PetscInt *node;   /* [n] local */
+  PetscReal *share; /* [n] of the total force */
 } PointForce;
 
 static const SbOption rows[] = {
-  {"on", SB_OPTION_NAMES, 1, "", NULL, "", "sets whose nodes share the force equally"},
+  {"on", SB_OPTION_NAMES, 1, "", NULL, "", "sets whose vertices share the force equally"},
   {"vector", SB_OPTION_FORMULA, 3, "N", NULL, "", "total force, three formulas of the time t"},
   {"time", SB_OPTION_FORMULA, 1, "", "1", "", "factor on the force, a formula of the time t"},
 };
@@ -32,31 +36,87 @@ static PetscErrorCode options_point_force(SbEffect e, const SbScope *scope)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Adds the share of vertex k of a cell to its nodes; part: the cell's of the volume around the vertex. */
+static void spread(SbSpace space, PetscInt cell, int k, PetscReal share, PetscReal part,
+                   PetscReal node_share[])
+{
+  const SbElement element = SbSpaceCellElement(space, cell);
+
+  for (int a = 0; a < 4; a++) {
+    const PetscInt node = space->cell_node[4 * cell + a];
+
+    // A P1 node is the vertex: the parts of its cells add up to one.
+    if (element->nodes_per[0])
+      node_share[node] = a == k ? share : node_share[node];
+    else
+      node_share[node] += part * share * element->ops.vertex[k][a];
+  }
+}
+
+/* node_share[nnode] = part of the total force that each node has, right on owned ones; share: that of a vertex. */
+static PetscErrorCode spread_all(SbSpace space, PetscInt n, const PetscInt vertices[], PetscReal share,
+                                 PetscReal node_share[])
+{
+  const SbMesh mesh = space->mesh;
+  PetscReal *volume; /* of the cells around each selected vertex, m^3 */
+  PetscBool *chosen;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscCalloc2(mesh->nvert, &volume, mesh->nvert, &chosen));
+  for (PetscInt i = 0; i < n; i++) chosen[vertices[i]] = PETSC_TRUE;
+  for (int pass = 0; pass < 2; pass++) {
+    for (PetscInt i = 0; i < 4 * SB_BATCH * space->nbatch; i++) {
+      const PetscInt b = i / (4 * SB_BATCH), l = i % SB_BATCH, cell = space->batch_cell[b] + l;
+      const int k = (int)(i / SB_BATCH % 4);
+      const PetscInt v = l < space->batch_n[b] ? mesh->cell[4 * cell + k] : -1;
+
+      if (v < 0 || !chosen[v]) continue;
+      if (pass)
+        spread(space, cell, k, share, space->batch_V[b][l] / volume[v], node_share);
+      else
+        volume[v] += space->batch_V[b][l];
+    }
+  }
+  PetscCall(PetscFree2(volume, chosen));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 static PetscErrorCode setup_point_force(SbEffect e, SbSpace space)
 {
   PointForce *p = (PointForce *)e->data;
-  PetscInt n, total;
+  PetscInt n, total = 0, *vertices;
+  PetscReal *node_share;
 
   PetscFunctionBeginUser;
-  PetscCall(SbEffectNodes(space, &p->on, &n, &p->node));
-  // Owned nodes come first.
-  while (p->n < n && p->node[p->n] < space->nnode_owned) p->n++;
-  PetscCallMPI(MPI_Allreduce(&p->n, &total, 1, MPIU_INT, MPI_SUM, space->comm));
-  p->share = 1 / (PetscReal)total;
+  PetscCall(SbEffectVertices(space, &p->on, &n, &vertices));
+  while (total < n && vertices[total] < space->mesh->nvert_owned) total++;
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &total, 1, MPIU_INT, MPI_SUM, space->comm));
+  PetscCall(PetscCalloc1(space->nnode, &node_share));
+  PetscCall(spread_all(space, n, vertices, 1 / (PetscReal)total, node_share));
+  for (PetscInt i = 0; i < space->nnode_owned; i++) p->n += node_share[i] != 0;
+  PetscCall(PetscMalloc2(p->n, &p->node, p->n, &p->share));
+  p->n = 0;
+  for (PetscInt i = 0; i < space->nnode_owned; i++) {
+    if (node_share[i] == 0) continue;
+    p->node[p->n] = i;
+    p->share[p->n++] = node_share[i];
+  }
+  PetscCall(PetscFree(node_share));
+  PetscCall(PetscFree(vertices));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 static PetscErrorCode force_point_force(SbEffect e, SbSpace space, const SbStage *stage, PetscReal f[])
 {
   const PointForce *p = (const PointForce *)e->data;
-  const PetscReal s = p->share * SbFormulaEval(p->time, stage->t, NULL);
+  const PetscReal s = SbFormulaEval(p->time, stage->t, NULL);
   PetscReal F[3];
 
   PetscFunctionBeginUser;
   (void)space;
   for (int c = 0; c < 3; c++) F[c] = s * SbFormulaEval(p->vector[c], stage->t, NULL);
   for (PetscInt i = 0; i < p->n; i++) {
-    for (int c = 0; c < 3; c++) f[3 * p->node[i] + c] += F[c];
+    for (int c = 0; c < 3; c++) f[3 * p->node[i] + c] += p->share[i] * F[c];
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -69,7 +129,7 @@ static PetscErrorCode destroy_point_force(SbEffect e)
   PetscCall(SbEffectFreeOn(&p->on));
   for (int c = 0; c < 3; c++) PetscCall(SbFormulaDestroy(&p->vector[c]));
   PetscCall(SbFormulaDestroy(&p->time));
-  PetscCall(PetscFree(p->node));
+  PetscCall(PetscFree2(p->node, p->share));
   PetscCall(PetscFree(e->data));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -2,9 +2,12 @@
   select.c - the cells, boundary facets and nodes that the sets named by -effect_<name>_on select on this
   rank.
 
-  The mesh carries one bit per set on vertices, cells and faces. An item in several of the named sets must act
-  once: cells are tested against the union of the bits, a facet is taken with the first of its sets, nodes are
-  sorted and doubles removed (a node need not be a vertex, so it has no bits of its own).
+  The mesh carries one bit per set on vertices, cells and faces, the space on nodes. An item in several of the named
+  sets must act once: all are tested against the union of the bits, but a facet, which is taken with the first of its
+  sets.
+
+  Nodes of P1 bodies are vertices; those of CR and DG lie at faces. A set that holds a corner or an edge of such a body
+  holds none of its nodes. To take no notice would let go what a P1 body is held by, so that is an error.
 */
 #include "sbeffect.h"
 
@@ -24,7 +27,7 @@ PetscErrorCode SbEffectFreeOn(SbEffectOn *on)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-typedef enum { CELLS, FACETS, NODES } Kind;
+typedef enum { CELLS, FACETS, VERTICES } Kind;
 
 /* Numbers k[on->n] of the named sets; an error when one selects nothing of the kind. */
 static PetscErrorCode find_sets(SbSpace space, const SbEffectOn *on, Kind kind, PetscInt k[SB_SET_MAX])
@@ -80,41 +83,90 @@ PetscErrorCode SbEffectFacets(SbSpace space, const SbEffectOn *on, PetscInt *n, 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbEffectNodes(SbSpace space, const SbEffectOn *on, PetscInt *n, PetscInt **nodes)
+/* Items with a bit of the mask, ascending. */
+static PetscErrorCode collect(PetscInt nitem, const uint64_t sets[], uint64_t mask, PetscInt *n,
+                              PetscInt **items)
 {
-  PetscInt *list = NULL, k[SB_SET_MAX];
-
   PetscFunctionBeginUser;
   *n = 0;
-  PetscCall(find_sets(space, on, NODES, k));
-  for (PetscInt i = 0; i < on->n; i++) {
-    PetscInt *more;
-    PetscInt nmore;
-
-    PetscCall(SbSpaceGetSetNodes(space, k[i], &nmore, &more));
-    PetscCall(PetscRealloc((size_t)(*n + nmore + 1) * sizeof(*list), &list));
-    PetscCall(PetscArraycpy(&list[*n], more, nmore));
-    PetscCall(PetscFree(more));
-    *n += nmore;
+  PetscCall(PetscMalloc1(nitem, items));
+  for (PetscInt i = 0; i < nitem; i++) {
+    if (sets[i] & mask) (*items)[(*n)++] = i;
   }
-  PetscCall(PetscSortRemoveDupsInt(n, list));
-  *nodes = list;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static uint64_t union_of(const SbEffectOn *on, const PetscInt k[])
+{
+  uint64_t mask = 0;
+
+  for (PetscInt i = 0; i < on->n; i++) mask |= SB_SET_BIT(k[i]);
+  return mask;
+}
+
+/* A body with nodes at faces that has vertices in the sets must have nodes there. Collective. */
+static PetscErrorCode check_nodes(SbSpace space, const SbEffectOn *on, uint64_t mask)
+{
+  const SbMesh mesh = space->mesh;
+  PetscInt *count; /* vertices and nodes of each body */
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscCalloc1(2 * mesh->nbody, &count));
+  for (PetscInt v = 0; v < mesh->nvert_owned; v++)
+    count[2 * mesh->vert_body[v]] += !!(mesh->vert_set[v] & mask);
+  for (PetscInt i = 0; i < space->nnode_owned; i++)
+    count[2 * space->node_body[i] + 1] += !!(space->node_set[i] & mask);
+  PetscCallMPI(
+    MPI_Allreduce(MPI_IN_PLACE, count, (PetscMPIInt)(2 * mesh->nbody), MPIU_INT, MPI_SUM, space->comm));
+  for (PetscInt b = 0; b < mesh->nbody; b++) {
+    const PetscInt nvert = count[2 * b], nnode = count[2 * b + 1];
+
+    if (!nvert || nnode) continue;
+    PetscCall(PetscFree(count));
+    SETERRQ(space->comm, PETSC_ERR_USER_INPUT,
+            "%s selects %" PetscInt_FMT
+            " vertices of body %s but none of its triangles, where element %s has its "
+            "nodes: take a set that contains whole triangles, such as a thicker plane or box",
+            on->option, nvert, mesh->body[b].name, space->element[b]->name);
+  }
+  PetscCall(PetscFree(count));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbEffectNodes(SbSpace space, const SbEffectOn *on, PetscInt *n, PetscInt **nodes)
+{
+  PetscInt k[SB_SET_MAX];
+
+  PetscFunctionBeginUser;
+  PetscCall(find_sets(space, on, VERTICES, k));
+  if (space->faces) PetscCall(check_nodes(space, on, union_of(on, k)));
+  PetscCall(collect(space->nnode, space->node_set, union_of(on, k), n, nodes));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbEffectVertices(SbSpace space, const SbEffectOn *on, PetscInt *n, PetscInt **vertices)
+{
+  PetscInt k[SB_SET_MAX];
+
+  PetscFunctionBeginUser;
+  PetscCall(find_sets(space, on, VERTICES, k));
+  PetscCall(collect(space->mesh->nvert, space->mesh->vert_set, union_of(on, k), n, vertices));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode SbEffectCells(SbSpace space, const SbEffectOn *on, PetscInt *n, PetscInt **cells)
 {
   const SbMesh mesh = space->mesh;
-  uint64_t mask = 0;
   PetscInt k[SB_SET_MAX];
 
   PetscFunctionBeginUser;
-  *n = 0;
   PetscCall(find_sets(space, on, CELLS, k));
-  for (PetscInt i = 0; i < on->n; i++) mask |= SB_SET_BIT(k[i]);
-  PetscCall(PetscMalloc1(mesh->ncell, cells));
-  for (PetscInt c = 0; c < mesh->ncell; c++) {
-    if (!on->n || (mesh->cell_set[c] & mask)) (*cells)[(*n)++] = c;
+  if (on->n) {
+    PetscCall(collect(mesh->ncell, mesh->cell_set, union_of(on, k), n, cells));
+    PetscFunctionReturn(PETSC_SUCCESS);
   }
+  *n = mesh->ncell;
+  PetscCall(PetscMalloc1(*n, cells));
+  for (PetscInt c = 0; c < *n; c++) (*cells)[c] = c;
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -27,6 +27,7 @@ static PetscErrorCode options_support(SbEffect e, const SbScope *scope)
   PetscCall(SbEffectReadOn(scope, &s->on));
   PetscCall(SbOptionChoice(scope, "components", &choice));
   s->components = SbHoldComponents(choice);
+  if (s->components == 7) e->held = &s->on;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

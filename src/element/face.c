@@ -46,5 +46,6 @@ PetscErrorCode SbElementCreate_DG(SbElement e)
   fill_face(e);
   e->nodes_per[3] = 4;
   e->gamma0 = 4.;
+  e->weak = PETSC_TRUE;
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -17,6 +17,9 @@
 
   dW/dJ_i = c1 J_i + (c1 + c0) sum J,  c1 = kappa1 |F| / 12,  c0 = kappa0 |F| / 9, is spread over the eight nodes as J was
   gathered. For CR the two sides have the node of the face in common, and its parts cancel.
+
+  A boundary face with a support (layout.c): the other side is constant, the displacement of the support, and infinitely
+  stiff. H(k) is 2 k then; there is no kappa1, because supports prescribe means.
 */
 #include "fem_impl.h"
 
@@ -29,24 +32,29 @@ struct _p_SbJump {
   SbLane *share;    /* [nbatch] how much of a face's energy this rank counts: 1, or 1/2 between ranks */
 };
 
-/* A face between two local cells. */
+/* A face between two local cells; cell[1] = SUPPORT: between a cell and a support. */
 typedef struct {
   PetscInt cell[2], face[2], region;
 } Face;
+#define SUPPORT (-1)
 
 /* Nodes of a face: for each side the one on the face, then those opposite the three vertices, in one order for both. */
 static void face_nodes(SbSpace s, const Face *face, PetscInt node[8])
 {
-  const PetscInt *v = s->mesh->cell + 4 * face->cell[0], *w = s->mesh->cell + 4 * face->cell[1];
+  const PetscInt plus = 4 * face->cell[0], minus = 4 * face->cell[1];
 
-  for (int side = 0; side < 2; side++) node[4 * side] = s->cell_node[4 * face->cell[side] + face->face[side]];
+  for (PetscInt i = 0; i < 4; i++) node[i] = s->cell_node[plus + (face->face[0] + i) % 4];
+  if (face->cell[1] == SUPPORT) {
+    for (int i = 4; i < 8; i++) node[i] = s->support[plus + face->face[0]];
+    return;
+  }
+  node[4] = s->cell_node[minus + face->face[1]];
   for (PetscInt i = 1; i < 4; i++) {
-    const PetscInt a = (face->face[0] + i) % 4;
+    const PetscInt v = s->mesh->cell[plus + (face->face[0] + i) % 4];
     PetscInt b = 0;
 
-    while (b < 3 && w[b] != v[a]) b++;
-    node[i] = s->cell_node[4 * face->cell[0] + a];
-    node[4 + i] = s->cell_node[4 * face->cell[1] + b];
+    while (b < 3 && s->mesh->cell[minus + b] != v) b++;
+    node[4 + i] = s->cell_node[minus + b];
   }
 }
 
@@ -78,14 +86,19 @@ static void face_factors(SbSpace s, const Face *face, const PetscInt region_of[]
   const SbElement e = s->region[face->region].element;
   PetscReal k0[2], k1[2];
 
-  for (int side = 0; side < 2; side++) {
+  for (int side = 0; side < (face->cell[1] == SUPPORT ? 1 : 2); side++) {
     const SbMaterial m = s->region[region_of[face->cell[side]]].material;
 
     k1[side] = 2. * m->mu * area / V[face->cell[side]];
     k0[side] = k1[side] + m->lambda * area / V[face->cell[side]];
   }
-  *c1 = e->gamma1 * harmonic(k1[0], k1[1]) * area / 12.;
-  *c0 = e->gamma0 * harmonic(k0[0], k0[1]) * area / 9.;
+  if (face->cell[1] == SUPPORT) {
+    *c1 = 0.;
+    *c0 = e->gamma0 * 2. * k0[0] * area / 9.;
+  } else {
+    *c1 = e->gamma1 * harmonic(k1[0], k1[1]) * area / 12.;
+    *c0 = e->gamma0 * harmonic(k0[0], k0[1]) * area / 9.;
+  }
 }
 
 /* Faces with an owned node, those of one body together. */
@@ -94,17 +107,18 @@ static PetscErrorCode find_faces(SbSpace s, const PetscInt region_of[], PetscInt
   PetscInt n = 0;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscMalloc1(2 * s->mesh->ncell, faces));
+  PetscCall(PetscMalloc1(4 * s->mesh->ncell, faces));
   for (PetscInt b = 0; b < s->mesh->nbody; b++) {
     if (s->element[b]->nodes_per[0]) continue;
     for (PetscInt i = 0; i < 4 * s->mesh->ncell; i++) {
       Face *face = &(*faces)[n];
+      const PetscBool held = (PetscBool)(s->support && s->support[i] >= 0);
       PetscInt node[8], f = 0;
       PetscBool owned = PETSC_FALSE;
 
-      if (s->mesh->cell_body[i / 4] != b || s->neighbour[i] < i / 4) continue;
-      while (f < 3 && s->neighbour[4 * s->neighbour[i] + f] != i / 4) f++;
-      *face = (Face){{i / 4, s->neighbour[i]}, {i % 4, f}, region_of[i / 4]};
+      if (s->mesh->cell_body[i / 4] != b || (!held && s->neighbour[i] < i / 4)) continue;
+      while (!held && f < 3 && s->neighbour[4 * s->neighbour[i] + f] != i / 4) f++;
+      *face = (Face){{i / 4, held ? SUPPORT : s->neighbour[i]}, {i % 4, f}, region_of[i / 4]};
       face_nodes(s, face, node);
       for (int k = 0; k < 8; k++) owned = (PetscBool)(owned || node[k] < s->nnode_owned);
       n += owned;
@@ -137,7 +151,11 @@ static PetscErrorCode fill_batches(SbSpace s, const PetscInt region_of[], const 
         j->node[(8 * b + k) * SB_BATCH + lane] = node[k];
     }
     face_factors(s, face, region_of, V, &j->c0[b][l], &j->c1[b][l]);
-    for (int side = 0; side < 2; side++) j->share[b][l] += face->cell[side] < s->mesh->ncell_owned ? 0.5 : 0.;
+    for (int side = 0; side < 2; side++) {
+      const PetscInt cell = face->cell[face->cell[1] == SUPPORT ? 0 : side];
+
+      j->share[b][l] += cell < s->mesh->ncell_owned ? 0.5 : 0.;
+    }
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }

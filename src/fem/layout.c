@@ -5,6 +5,10 @@
   node per face, DG four per cell, on its faces; node a of a cell lies opposite vertex a. A rank owns all nodes of its DG cells
   and, of the CR faces between it and another rank, about every second one.
 
+  A boundary face of a DG cell that an effect holds in all directions has one more node, its support, which the effect
+  prescribes. To the cell it is what a neighbour of infinite stiffness would be: the mean of the two sides is the support's
+  displacement, and the face terms (jump.c) tie the cell to it. What the cell does to it is the reaction.
+
   Owned nodes are numbered in the order of the cells. Each rank knows the numbers of its own ones; two broadcasts over the
   cells tell the others: after the first a cell has the numbers that belong to the rank of its neighbour, the second brings
   complete cells to the ghosts, also on faces whose other side is not on this rank.
@@ -40,8 +44,19 @@ static PetscInt number_face(SbSpace s, const PetscInt node[], PetscInt cell, Pet
   return (*n)++;
 }
 
-/* Owned nodes from zero on: node[ncell][4], UNKNOWN elsewhere. */
-static PetscErrorCode number_owned(SbSpace s, PetscInt node[])
+/* Sets that an effect holds; none when no body ties its faces to supports. */
+static uint64_t held_sets(SbSpace s)
+{
+  uint64_t held = 0;
+  PetscBool weak = PETSC_FALSE;
+
+  for (PetscInt b = 0; b < s->mesh->nbody; b++) weak = (PetscBool)(weak || s->element[b]->weak);
+  for (PetscInt k = 0; weak && k < s->mesh->nset; k++) held |= s->mesh->set[k].held ? SB_SET_BIT(k) : 0;
+  return held;
+}
+
+/* Owned nodes from zero on: node[ncell][4] and, for faces in these sets, s->support[ncell][4]; UNKNOWN elsewhere. */
+static PetscErrorCode number_owned(SbSpace s, uint64_t held, PetscInt node[])
 {
   SbMesh mesh = s->mesh;
   PetscInt *at, n = 0;
@@ -57,7 +72,11 @@ static PetscErrorCode number_owned(SbSpace s, PetscInt node[])
       const PetscInt v = mesh->cell[4 * c + a];
 
       if (per[3]) {
+        const uint64_t sets = mesh->face_set[4 * c + a];
+
         node[4 * c + a] = n++;
+        if (SbSpaceCellElement(s, c)->weak && (sets & SB_ON_BOUNDARY) && (sets & held))
+          s->support[4 * c + a] = n++;
       } else if (per[2]) {
         node[4 * c + a] = number_face(s, node, c, a, &n);
       } else if (v < mesh->nvert_owned) {
@@ -99,33 +118,52 @@ static PetscErrorCode complete_owned(SbSpace s, PetscInt node[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* From global numbers in s->cell_node to local ones: owned nodes, then ghosts by global number. */
+/* Adds the numbers that are another rank's to a list. */
+static void add_ghosts(SbSpace s, const PetscInt number[], PetscInt *nghost, PetscInt ghost[])
+{
+  for (PetscInt i = 0; i < 4 * s->mesh->ncell; i++) {
+    const PetscInt own = number[i] - s->gnode_start;
+
+    if (number[i] != UNKNOWN && (own < 0 || own >= s->nnode_owned)) ghost[(*nghost)++] = number[i];
+  }
+}
+
+/* From global numbers to local ones: owned nodes, then ghosts by global number. */
+static PetscErrorCode make_local(SbSpace s, PetscInt number[])
+{
+  PetscFunctionBeginUser;
+  for (PetscInt i = 0; i < 4 * s->mesh->ncell; i++) {
+    const PetscInt own = number[i] - s->gnode_start;
+    PetscInt at;
+
+    if (number[i] == UNKNOWN) continue;
+    if (own >= 0 && own < s->nnode_owned) {
+      number[i] = own;
+    } else {
+      PetscCall(PetscFindInt(number[i], s->nnode - s->nnode_owned, s->gnode + s->nnode_owned, &at));
+      number[i] = s->nnode_owned + at;
+    }
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Ghosts, and local numbers in s->cell_node and s->support. */
 static PetscErrorCode localise(SbSpace s)
 {
-  const PetscInt n = 4 * s->mesh->ncell, end = s->gnode_start + s->nnode_owned;
   PetscInt *ghost, nghost = 0;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscMalloc1(n, &ghost));
-  for (PetscInt i = 0; i < n; i++) {
-    if (s->cell_node[i] < s->gnode_start || s->cell_node[i] >= end) ghost[nghost++] = s->cell_node[i];
-  }
+  PetscCall(PetscMalloc1(8 * (size_t)s->mesh->ncell, &ghost));
+  add_ghosts(s, s->cell_node, &nghost, ghost);
+  if (s->support) add_ghosts(s, s->support, &nghost, ghost);
   PetscCall(PetscSortRemoveDupsInt(&nghost, ghost));
   s->nnode = s->nnode_owned + nghost;
   PetscCall(PetscMalloc1(s->nnode, &s->gnode));
   for (PetscInt i = 0; i < s->nnode_owned; i++) s->gnode[i] = s->gnode_start + i;
   PetscCall(PetscArraycpy(s->gnode + s->nnode_owned, ghost, nghost));
-  for (PetscInt i = 0; i < n; i++) {
-    PetscInt at;
-
-    if (s->cell_node[i] >= s->gnode_start && s->cell_node[i] < end) {
-      s->cell_node[i] -= s->gnode_start;
-    } else {
-      PetscCall(PetscFindInt(s->cell_node[i], nghost, ghost, &at));
-      s->cell_node[i] = s->nnode_owned + at;
-    }
-  }
   PetscCall(PetscFree(ghost));
+  PetscCall(make_local(s, s->cell_node));
+  if (s->support) PetscCall(make_local(s, s->support));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -143,6 +181,21 @@ static uint64_t face_sets(SbMesh mesh, PetscInt cell, PetscInt face)
     if (a != face) common &= mesh->vert_set[mesh->cell[4 * cell + a]];
   }
   return own | common;
+}
+
+/* A support lies where the node of its face lies, and takes over its sets: what holds the face holds the support. */
+static void describe_supports(SbSpace s)
+{
+  for (PetscInt i = 0; i < 4 * s->mesh->ncell; i++) {
+    const PetscInt own = s->cell_node[i], node = s->support[i];
+
+    if (node == UNKNOWN) continue;
+    s->node_body[node] = s->node_body[own];
+    s->node_set[node] = s->node_set[own];
+    s->node_set[own] = 0;
+    s->node_orig[node] = s->mesh->Nvert + 4 * (s->mesh->Ncell + s->mesh->cell_orig[i / 4]) + i % 4;
+    for (int k = 0; k < 3; k++) s->node_x[3 * node + k] = s->node_x[3 * own + k];
+  }
 }
 
 /* Place, body and sets of every node. */
@@ -171,6 +224,7 @@ static PetscErrorCode describe_nodes(SbSpace s)
       for (int k = 0; k < 3; k++) x[k] = (mesh->x[3 * a + k] + mesh->x[3 * b + k] + mesh->x[3 * c + k]) / 3.;
     }
   }
+  if (s->support) describe_supports(s);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -199,20 +253,27 @@ static PetscErrorCode layout_vertices(SbSpace s)
 static PetscErrorCode layout_faces(SbSpace s)
 {
   SbMesh mesh = s->mesh;
+  const uint64_t held = held_sets(s);
 
   PetscFunctionBeginUser;
   PetscCall(SbMeshNeighbours(mesh, &s->neighbour));
   PetscCall(PetscMalloc1(4 * (size_t)mesh->ncell, &s->cell_node));
-  PetscCall(number_owned(s, s->cell_node));
+  if (held) {
+    PetscCall(PetscMalloc1(4 * (size_t)mesh->ncell, &s->support));
+    for (PetscInt i = 0; i < 4 * mesh->ncell; i++) s->support[i] = UNKNOWN;
+  }
+  PetscCall(number_owned(s, held, s->cell_node));
   PetscCallMPI(MPI_Scan(&s->nnode_owned, &s->gnode_start, 1, MPIU_INT, MPI_SUM, s->comm));
   PetscCallMPI(MPI_Allreduce(&s->nnode_owned, &s->Nnode, 1, MPIU_INT, MPI_SUM, s->comm));
   s->gnode_start -= s->nnode_owned;
   for (PetscInt i = 0; i < 4 * mesh->ncell_owned; i++) {
     if (s->cell_node[i] != UNKNOWN) s->cell_node[i] += s->gnode_start;
+    if (s->support && s->support[i] != UNKNOWN) s->support[i] += s->gnode_start;
   }
   PetscCall(SbMeshBroadcastCells(mesh, 4, s->cell_node));
   PetscCall(complete_owned(s, s->cell_node));
   PetscCall(SbMeshBroadcastCells(mesh, 4, s->cell_node));
+  if (s->support) PetscCall(SbMeshBroadcastCells(mesh, 4, s->support));
   PetscCall(localise(s));
   PetscCall(describe_nodes(s));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -240,6 +301,7 @@ PetscErrorCode SbLayoutDestroy(SbSpace s)
   PetscCall(PetscFree(s->node_x));
   if (s->faces) PetscCall(PetscFree3(s->node_body, s->node_set, s->node_orig));
   PetscCall(PetscFree(s->neighbour));
+  PetscCall(PetscFree(s->support));
   PetscCall(PetscFree(s->fixed));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -252,6 +314,10 @@ static void across(SbSpace s, const PetscReal stiffness[], PetscInt cell, PetscI
 
   *node = s->cell_node[4 * cell + a];
   *weight = 1.;
+  if (s->support && s->support[4 * cell + a] != UNKNOWN) {
+    *node = s->support[4 * cell + a];
+    *weight = 0.;
+  }
   if (other < 0) return;
   *node = s->cell_node[4 * other + face_towards(s, other, cell)];
   *weight = stiffness[cell] / (stiffness[cell] + stiffness[other]);

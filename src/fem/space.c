@@ -193,8 +193,8 @@ PetscErrorCode SbSpaceValidate(SbSpace s)
   for (PetscInt i = 0; i < s->nnode_owned; i++) {
     PetscCheck(s->gnode[i] == s->gnode_start + i, PETSC_COMM_SELF, PETSC_ERR_PLIB,
                "Owned node %" PetscInt_FMT " is out of order", i);
-    PetscCheck(s->node_mass[i] > 0., PETSC_COMM_SELF, PETSC_ERR_PLIB, "Node %" PetscInt_FMT " has no mass",
-               i);
+    PetscCheck(s->node_mass[i] > 0. || (s->support && s->fixed[i] == 7), PETSC_COMM_SELF, PETSC_ERR_PLIB,
+               "Node %" PetscInt_FMT " has no mass", i);
     sums[0] += s->node_mass[i];
   }
   for (PetscInt i = s->nnode_owned + 1; i < s->nnode; i++)
@@ -299,20 +299,6 @@ PetscErrorCode SbSpaceFindSet(SbSpace s, const char *name, const char *where, Pe
   PetscCall(SbNearest(name, s->mesh->nset, names, sizeof(near), near));
   SETERRQ(PETSC_COMM_SELF, PETSC_ERR_USER, "%s names the set '%s', which does not exist%s%s", where, name,
           near[0] ? "; nearest: " : "", near);
-}
-
-PetscErrorCode SbSpaceGetSetNodes(SbSpace s, PetscInt k, PetscInt *n, PetscInt **nodes)
-{
-  PetscInt count = 0;
-
-  PetscFunctionBeginUser;
-  for (PetscInt i = 0; i < s->nnode; i++) count += (s->node_set[i] & SB_SET_BIT(k)) != 0;
-  PetscCall(PetscMalloc1(count, nodes));
-  *n = 0;
-  for (PetscInt i = 0; i < s->nnode; i++) {
-    if (s->node_set[i] & SB_SET_BIT(k)) (*nodes)[(*n)++] = i;
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Corners of face f of a positively oriented tet, counter-clockwise seen from outside. */

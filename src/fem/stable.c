@@ -102,7 +102,8 @@ static PetscErrorCode highest_frequency(SbSpace s, PetscReal *w)
     PetscCall(SbSpaceGetLocalRead(s, X, &local));
     multiply_stiffness(s, local, f);
     PetscCall(SbSpaceRestoreLocalRead(s, X, &local));
-    for (PetscInt i = 0; i < n; i++) f[i] /= s->node_mass[i / 3];
+    /* supports have no mass, and do not move */
+    for (PetscInt i = 0; i < n; i++) f[i] = s->node_mass[i / 3] > 0. ? f[i] / s->node_mass[i / 3] : 0.;
   }
   PetscCall(PetscFree(f));
   PetscCall(VecDestroy(&X));

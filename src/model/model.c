@@ -73,6 +73,7 @@ PetscErrorCode SbModelSetUp(SbModel m)
   for (PetscInt b = 0; b < m->nbody; b++) m->body[b].face_nodes = (PetscBool)!m->element[b]->nodes_per[0];
   PetscCall(SbMeshCreate(m->comm, m->nbody, m->body, m->nset, m->set, &m->mesh));
   if (m->nmaterial > m->nbody) PetscCall(check_inclusions(m));
+  for (PetscInt e = 0; e < m->neffect; e++) PetscCall(SbEffectMarkHeld(m->effect[e], m->nset, m->set));
   PetscCall(SbSpaceCreate(m->mesh, m->material, m->element, &m->space));
   m->load = 1.;
   m->linear = m->space->linear;

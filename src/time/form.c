@@ -112,7 +112,9 @@ PetscErrorCode SbFormAcceleration(SbRun run, PetscReal t, Vec U, Vec V, Vec A)
   } else {
     PetscCall(VecCopy(F, A));
     PetscCall(VecGetArray(A, &a));
-    for (PetscInt i = 0; i < 3 * s->nnode_owned; i++) a[i] /= s->node_mass[i / 3];
+    /* supports have no mass, and are prescribed */
+    for (PetscInt i = 0; i < 3 * s->nnode_owned; i++)
+      a[i] = s->node_mass[i / 3] > 0. ? a[i] / s->node_mass[i / 3] : 0.;
     PetscCall(VecRestoreArray(A, &a));
   }
   PetscCall(VecScale(A, -1.));
