@@ -9,16 +9,16 @@ static char dir[PETSC_MAX_PATH_LEN];
 /* Largest difference between the vectors of the run and the motion at time t. */
 static PetscReal difference(TestScene *scene, PetscReal t)
 {
-  const SbMesh mesh = scene->model->mesh;
+  const SbSpace space = scene->model->space;
   const PetscScalar *state[3];
   PetscReal worst = 0.;
   Vec vec[3] = {scene->run->U, scene->run->V, scene->run->A};
 
   for (int k = 0; k < 3; k++) (void)VecGetArrayRead(vec[k], &state[k]);
-  for (PetscInt i = 0; i < mesh->nvert_owned; i++) {
+  for (PetscInt i = 0; i < space->nnode_owned; i++) {
     PetscReal m[3][3];
 
-    motion(mesh->x + 3 * i, t, m[0], m[1], m[2]);
+    motion(space->node_x + 3 * i, t, m[0], m[1], m[2]);
     for (int k = 0; k < 3; k++)
       for (int c = 0; c < 3; c++) worst = PetscMax(worst, PetscAbsReal(state[k][3 * i + c] - m[k][c]));
   }
@@ -54,6 +54,40 @@ static PetscErrorCode test_round_trip(void)
   SB_CHECK(!fixture_exists(dir, "checkpoint_000008.h5"),
            "a checkpoint of what is computed again is still there");
   PetscCall(test_scene_close(&scene));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Every node comes back to its place, whatever the elements; another element is refused. */
+static PetscErrorCode test_elements(void)
+{
+  static const char *const elements[] = {
+    "-body_a_element p1", "-body_a_element cr", "-body_a_element dg",
+    "-body_a_element cr -bodies a,b,c -body_b_element p1 -body_c_element dg"};
+  static const char more[] =
+    " -body_b_mesh box:0.4,0.1,0.2:4,1,2 -body_b_translate 0,0.3,0 -body_b_material linear "
+    "-body_b_young 1 -body_b_poisson 0 -body_c_mesh box:0.4,0.1,0.2:2,2,2 -body_c_translate "
+    "0,0.6,0 -body_c_material linear -body_c_young 1 -body_c_poisson 0 -output_fields none ";
+  TestScene scene;
+  char options[2048];
+
+  PetscFunctionBeginUser;
+  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(elements); i++) {
+    SbFormat(sizeof(options), options, BOX EULER "%s %s -checkpoint_every_steps 1",
+             i == 3 ? more : "-output_fields none", elements[i]);
+    PetscCall(fixture_open(dir, options, &scene));
+    for (PetscInt k = 0; k <= 1; k++) PetscCall(fixture_step(&scene, k, 0.1, PETSC_FALSE));
+    PetscCall(test_scene_close(&scene));
+    SbFormat(sizeof(options), options, BOX EULER "%s %s -restart latest",
+             i == 3 ? more : "-output_fields none", elements[i]);
+    PetscCall(fixture_open(dir, options, &scene));
+    SB_CHECK(difference(&scene, 0.1) == 0., "'%s': the state differs by %g", elements[i],
+             (double)difference(&scene, 0.1));
+    PetscCall(test_scene_close(&scene));
+    SbFormat(sizeof(options), options, BOX EULER "%s %s -body_a_element %s -restart latest",
+             i == 3 ? more : "-output_fields none", elements[i], i == 0 || i == 2 ? "cr" : "dg");
+    SB_CHECK_ERROR(fixture_open(dir, options, &scene), "a checkpoint of other elements");
+    PetscCall(test_scene_close(&scene));
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -139,6 +173,7 @@ int main(int argc, char *argv[])
   SB_TEST_BEGIN(argc, argv);
   PetscCall(fixture_folder(sizeof(dir), dir));
   PetscCall(test_round_trip());
+  PetscCall(test_elements());
   PetscCall(test_next_step());
   PetscCall(test_hash());
   PetscCall(test_refused());

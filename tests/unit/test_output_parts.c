@@ -36,6 +36,40 @@ static PetscErrorCode test_order(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Numbers 3 k^2 + k, dealt out backwards: their gaps are closed, and each brings two entities along. */
+static PetscErrorCode test_order_with_gaps(void)
+{
+  const PetscInt N = 17;
+  SbOrder order, pairs;
+  PetscMPIInt rank, size;
+  PetscInt n = 0, key[17];
+  PetscReal owned[34], slice[34];
+
+  PetscFunctionBeginUser;
+  PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
+  PetscCallMPI(MPI_Comm_size(PETSC_COMM_WORLD, &size));
+  for (PetscInt k = N - 1; k >= 0; k--) {
+    if (k % size != rank) continue;
+    owned[2 * n] = (PetscReal)k;
+    owned[2 * n + 1] = k + 0.5;
+    key[n++] = 3 * k * k + k;
+  }
+  PetscCall(SbOrderCreateSparse(PETSC_COMM_WORLD, 3 * N * N, n, key, &order));
+  PetscCall(SbOrderRepeat(&order, 2, &pairs));
+  SB_CHECK(order.N == N && pairs.N == 2 * N && pairs.nowned == 2 * n, "%d numbers, %d pairs", (int)order.N,
+           (int)pairs.N);
+  PetscCall(SbOrderGather(&pairs, 1, owned, slice));
+  for (PetscInt i = 0; i < pairs.n; i++)
+    SB_CHECK(slice[i] == 0.5 * (PetscReal)(pairs.start + i), "%g is in the place of %g", (double)slice[i],
+             0.5 * (double)(pairs.start + i));
+  PetscCall(SbOrderDestroy(&pairs));
+  PetscCall(SbOrderGather(&order, 2, owned, slice)); // outlives the other
+  SB_CHECK(!order.n || slice[0] == (PetscReal)order.start, "%g is in the place of %d", (double)slice[0],
+           (int)order.start);
+  PetscCall(SbOrderDestroy(&order));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* A layout with two entities on three or more ranks leaves ranks without any. */
 static PetscErrorCode test_h5(void)
 {
@@ -167,6 +201,7 @@ int main(int argc, char *argv[])
   SB_TEST_BEGIN(argc, argv);
   PetscCall(fixture_folder(sizeof(dir), dir));
   PetscCall(test_order());
+  PetscCall(test_order_with_gaps());
   PetscCall(test_h5());
   PetscCall(test_open_failure());
   PetscCall(test_files());

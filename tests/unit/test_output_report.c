@@ -86,6 +86,42 @@ static PetscErrorCode test_report(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Nodes and unknowns are those of the element: 30 vertices, 124 faces, 48 cells with four each. */
+static PetscErrorCode test_elements(void)
+{
+  static const struct {
+    const char *element, *in_header, *in_json;
+  } cases[] = {
+    {"p1", "p1            48        30        90", "\"nodes\": 30, \"unknowns\": 90,"},
+    {"cr", "cr            48       124       372", "\"nodes\": 124, \"unknowns\": 372,"},
+    {"dg", "dg            48       192       576", "\"nodes\": 192, \"unknowns\": 576,"},
+  };
+  TestScene scene;
+  char options[1024], *header, *json;
+  PetscMPIInt rank;
+
+  PetscFunctionBeginUser;
+  PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
+  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(cases); i++) {
+    SbFormat(sizeof(options), options,
+             BOX " -time euler_implicit -ts_dt 0.1 -ts_max_time 1 -progress false -body_a_element %s",
+             cases[i].element);
+    PetscCall(fixture_open(dir, options, &scene));
+    CAPTURE(header, PetscCall(SbReportHeader(scene.run)));
+    SB_CHECK(rank || strstr(header, cases[i].in_header), "no '%s' in the header:\n%s", cases[i].in_header,
+             header);
+    check_width(header, "header");
+    PetscCall(fixture_read(dir, "run.json", &json));
+    SB_CHECK(strstr(json, cases[i].in_json), "no '%s' in run.json: %s", cases[i].in_json, json);
+    SB_CHECK(SbBodyNodes(scene.model, 0) == scene.model->space->Nnode, "%s: %d nodes are told, there are %d",
+             cases[i].element, (int)SbBodyNodes(scene.model, 0), (int)scene.model->space->Nnode);
+    PetscCall(PetscFree(json));
+    free(header);
+    PetscCall(test_scene_close(&scene));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 static PetscErrorCode test_early_end(void)
 {
   TestScene scene;
@@ -138,6 +174,7 @@ int main(int argc, char *argv[])
   SB_TEST_BEGIN(argc, argv);
   PetscCall(fixture_folder(sizeof(dir), dir));
   PetscCall(test_report());
+  PetscCall(test_elements());
   PetscCall(test_early_end());
   PetscCall(test_quiet());
   PetscCall(fixture_remove(dir));
