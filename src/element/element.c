@@ -11,14 +11,10 @@ static const SbOption cr_rows[] = {
 };
 static const SbOption dg_rows[] = {
   {"gamma0", SB_OPTION_REAL, 1, "", "4", "(0, inf)", "factor on the penalty of the mean jump across a face"},
-<<<<<<< HEAD
   {"gamma1", SB_OPTION_REAL, 1, "", "0.6", "(0, inf)",
    "factor on the penalty of jumps across faces; less is softer, much more locks"},
-=======
-  {"gamma1", SB_OPTION_REAL, 1, "", "1", "(0, inf)", "factor on the penalty of jumps across faces"},
   {"supports", SB_OPTION_CHOICE, 1, "", "weak", "weak|strong",
    "boundary faces held in all directions: by a penalty, or the mean displacement itself"},
->>>>>>> f55ff56 (wip)
 };
 
 static PetscErrorCode destroy_list(void)

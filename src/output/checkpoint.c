@@ -68,7 +68,7 @@ PetscErrorCode SbOutputOrder(SbRun run, SbOutput out)
   PetscCall(SbOrderCreate(out->comm, mesh->Nvert, mesh->nvert_owned, mesh->vert_orig, &out->vertex));
   PetscCall(SbOrderCreate(out->comm, mesh->Ncell, mesh->ncell_owned, mesh->cell_orig, &out->cell));
   if (space->faces) {
-    PetscCall(SbOrderCreateSparse(out->comm, mesh->Nvert + 4 * mesh->Ncell, space->nnode_owned,
+    PetscCall(SbOrderCreateSparse(out->comm, mesh->Nvert + 8 * mesh->Ncell, space->nnode_owned,
                                   space->node_orig, &out->node));
   } else {
     PetscCall(SbOrderRepeat(&out->vertex, 1, &out->node));
