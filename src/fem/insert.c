@@ -14,19 +14,32 @@
 #include "fem_impl.h"
 #include "sbkernel.h"
 
-/* Row i begins with the face terms, glue times the identity in each block of part q. */
+/* Part q of row i begins with the face terms, glue times the identity in each block; one pass where blocks lie together. */
 static void begin_with_glue(SbSpace s, const SbValues *x, PetscInt i, int q)
 {
   const SbPlan p = s->plan;
   const PetscInt *ptr = q ? p->oi : p->di, first = x->kind == SB_MATRIX_SBAIJ ? p->diagonal[i] : ptr[i];
   const PetscReal factor = x->glue[s->node_body[i]];
+  size_t rs, cs;
 
   for (PetscInt k = first; k < ptr[i + 1]; k++) {
-    size_t rs, cs;
+    const PetscReal glue = factor * p->glue[q][k];
     PetscScalar *v = sb_block(x, p, i, q ? ~k : k, &rs, &cs);
 
-    for (size_t c = 0; c < 3; c++) v[c * (rs + cs)] = factor * p->glue[q][k];
+    if (x->kind == SB_MATRIX_AIJ) {
+      for (size_t c = 0; c < 3; c++) v[c * (rs + cs)] = glue;
+    } else {
+      for (int e = 0; e < 9; e++) v[e] = e % 4 == 0 ? glue : 0.;
+    }
   }
+}
+
+static void clear_row(SbSpace s, const SbValues *x, PetscInt i, int q)
+{
+  const SbPlan p = s->plan;
+  const PetscInt *ptr = q ? p->oi : x->kind == SB_MATRIX_SBAIJ ? p->ui : p->di;
+
+  memset(x->value[q] + 9 * (size_t)ptr[i], 0, 72 * (size_t)(ptr[i + 1] - ptr[i]));
 }
 
 void SbInsertClear(SbSpace s, const SbValues *x, PetscInt b)
@@ -34,12 +47,10 @@ void SbInsertClear(SbSpace s, const SbValues *x, PetscInt b)
   const SbPlan p = s->plan;
 
   for (PetscInt k = p->fresh_start[b]; k < p->fresh_start[b + 1]; k++) {
-    const PetscInt i = p->fresh[k], *ptr = x->kind == SB_MATRIX_SBAIJ ? p->ui : p->di;
-
-    memset(x->value[0] + 9 * (size_t)ptr[i], 0, 72 * (size_t)(ptr[i + 1] - ptr[i]));
-    if (x->value[1]) memset(x->value[1] + 9 * (size_t)p->oi[i], 0, 72 * (size_t)(p->oi[i + 1] - p->oi[i]));
-    if (!x->glue) continue;
-    for (int q = 0; q < (x->value[1] ? 2 : 1); q++) begin_with_glue(s, x, i, q);
+    for (int q = 0; q < (x->value[1] ? 2 : 1); q++) {
+      if (!x->glue || x->kind == SB_MATRIX_AIJ) clear_row(s, x, p->fresh[k], q);
+      if (x->glue) begin_with_glue(s, x, p->fresh[k], q);
+    }
   }
 }
 
