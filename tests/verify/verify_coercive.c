@@ -1,0 +1,192 @@
+// @ranks 1
+/*
+  Is the stiffness of CR and DG positive on every mesh, for every Poisson ratio and every penalty? All eigenvalues of
+  D^-1/2 K D^-1/2, D the diagonal of K, of free bodies on small meshes by LAPACK: six are zero, the rigid motions, and no other,
+  none is negative. The scaling takes sizes out: the largest eigenvalue is between 1 and the number of entries of a row.
+
+    meshes    vertices moved at random; sizes of tets in the ratio 1000 to 1; tets of 0.06 degrees
+    gammas    CR and DG as they come, and DG with both gammas at 0.01: positive for every positive gamma
+    state     at rest, where all laws are Hooke's, and turned by two rad, where K is that at rest turned
+    not so    with gamma1 = 1e-12 CR keeps many motions without energy (Falk 1991): the test sees them
+
+  Rounding: the matrix is right to 1e-15 of its largest entry, so eigenvalues are to about 1e-14 of the largest one.
+*/
+#include "verify.h"
+
+#include <petscblaslapack.h>
+
+#define ROUNDING 1e-13
+
+typedef enum { MOVED, GRADED, SLIVERS } Shape;
+static const char *const shapes[] = {"moved", "graded", "slivers"};
+
+typedef struct {
+  Shape shape;
+  PetscRandom random;
+} MeshContext;
+
+static void place_vertex(const PetscInt n[3], const PetscInt at[3], PetscReal x[3], void *ctx)
+{
+  const MeshContext *m = (const MeshContext *)ctx;
+  PetscReal r[3];
+
+  for (int k = 0; k < 3; k++) (void)PetscRandomGetValueReal(m->random, &r[k]);
+  if (m->shape == MOVED) {
+    for (int k = 0; k < 3; k++) x[k] += (0.5 * r[k] - 0.25) / (PetscReal)n[k];
+  } else if (m->shape == GRADED) {
+    /* a cone cut off at a thousandth of its length */
+    const PetscReal size = PetscPowReal(10., 3. * (x[0] - 1.));
+
+    x[0] = size;
+    x[1] *= size * (1. + 0.1 * r[1]);
+    x[2] *= size * (1. + 0.1 * r[2]);
+  } else if (at[0] == 1 && at[1] == 0) {
+    /* a line of vertices moved onto the plane of faces that it looks at, but for a thousandth */
+    const PetscReal part = 0.499 * (1. - 0.002 * r[0]);
+
+    x[0] -= part / (PetscReal)n[0];
+    x[1] += part / (PetscReal)n[1];
+  }
+}
+
+static PetscErrorCode write_mesh(Shape shape, char path[512])
+{
+  static const PetscInt cells[][3] = {{2, 2, 2}, {6, 1, 1}, {2, 2, 2}};
+  MeshContext m = {.shape = shape};
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscRandomCreate(PETSC_COMM_SELF, &m.random));
+  PetscCall(PetscRandomSetSeed(m.random, 7));
+  PetscCall(PetscRandomSeed(m.random));
+  PetscCall(verify_mesh_write(cells[shape], place_vertex, &m, path));
+  PetscCall(PetscRandomDestroy(&m.random));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The whole body turned about (1, 2, 3). */
+static PetscErrorCode turn(TestScene *t, PetscReal angle)
+{
+  const PetscReal axis[3] = {1., 2., 3.};
+  const SbSpace s = t->model->space;
+  PetscReal R[9];
+  PetscScalar *u;
+
+  PetscFunctionBeginUser;
+  verify_rotation(axis, angle, R);
+  PetscCall(VecGetArray(t->run->U, &u));
+  for (PetscInt i = 0; i < s->nnode_owned; i++) {
+    verify_apply(R, s->node_x + 3 * i, u + 3 * i);
+    for (int k = 0; k < 3; k++) u[3 * i + k] -= s->node_x[3 * i + k];
+  }
+  PetscCall(VecRestoreArray(t->run->U, &u));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Eigenvalues of the scaled tangent, ascending; the caller frees them. */
+static PetscErrorCode spectrum(TestScene *t, PetscInt *count, PetscReal **w)
+{
+  PetscBLASInt n, lwork, info;
+  PetscScalar *a, *work;
+  PetscReal *d;
+  Mat K, dense;
+
+  PetscFunctionBeginUser;
+  *count = 3 * t->model->space->Nnode;
+  PetscCall(PetscBLASIntCast(*count, &n));
+  PetscCall(PetscBLASIntCast(40 * *count, &lwork));
+  PetscCall(SbSpaceCreateMatrix(t->model->space, SB_MATRIX_AIJ, &K));
+  PetscCall(SbModelTangent(t->model, 0., 0., 0., 1., t->run->U, NULL, K));
+  PetscCall(MatConvert(K, MATDENSE, MAT_INITIAL_MATRIX, &dense));
+  PetscCall(PetscMalloc1(*count, w));
+  PetscCall(PetscMalloc2(*count, &d, lwork, &work));
+  PetscCall(MatDenseGetArray(dense, &a));
+  for (PetscInt i = 0; i < *count; i++) d[i] = PetscSqrtReal(a[i + *count * i]);
+  for (PetscInt i = 0; i < *count * *count; i++) a[i] /= d[i % *count] * d[i / *count];
+  PetscCallBLAS("LAPACKsyev", LAPACKsyev_("N", "U", &n, a, &n, *w, work, &lwork, &info));
+  SB_CHECK(info == 0, "LAPACK: %d", (int)info);
+  PetscCall(MatDenseRestoreArray(dense, &a));
+  PetscCall(PetscFree2(d, work));
+  PetscCall(MatDestroy(&K));
+  PetscCall(MatDestroy(&dense));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+typedef struct {
+  const char *element, *law, *gammas;
+  PetscReal nu, angle;
+} Case;
+
+/* Zero modes are those of rounding; with spurious ones there are more of them, or hardly stiffer ones. */
+static PetscErrorCode check_case(Shape shape, const char *path, const Case *c, PetscBool sound)
+{
+  TestScene t;
+  PetscInt n, zeros = 0, soft = 0;
+  PetscReal *w;
+  char text[VERIFY_TEXT];
+
+  PetscFunctionBeginUser;
+  PetscCall(
+    PetscSNPrintf(text, sizeof(text),
+                  "-bodies a -body_a_mesh %s -body_a_element %s -body_a_material %s -body_a_young 1e5 "
+                  "-body_a_poisson %.17g -body_a_density 1 -solver cg_jacobi %s",
+                  path, c->element, c->law, (double)c->nu, c->gammas));
+  PetscCall(test_scene_open(text, &t));
+  PetscCall(turn(&t, c->angle));
+  PetscCall(spectrum(&t, &n, &w));
+  for (PetscInt i = 0; i < n; i++) {
+    zeros += w[i] <= ROUNDING * w[n - 1];
+    soft += w[i] <= 1e-9 * w[n - 1];
+  }
+  PetscCall(PetscPrintf(
+    PETSC_COMM_WORLD,
+    "  %s %-10s %-7s nu %-8g %s: %4d unknowns, eigenvalues %9.1e .. %8.1e | %.3e .. %.2f, %d zero\n",
+    c->element, c->law, shapes[shape], (double)c->nu, c->gammas, (int)n, (double)w[0], (double)w[5],
+    (double)w[6], (double)w[n - 1], (int)zeros));
+  if (shape == SLIVERS)
+    SB_CHECK(t.model->body[0].min_dihedral < 1., "the flattest tet has %g degrees",
+             (double)t.model->body[0].min_dihedral);
+  if (sound) {
+    SB_CHECK(w[0] > -ROUNDING * w[n - 1], "%s, %s, nu %g %s: eigenvalue %g", c->element, shapes[shape],
+             (double)c->nu, c->gammas, (double)w[0]);
+    SB_CHECK(zeros == 6, "%s, %s, nu %g %s: %d motions without energy", c->element, shapes[shape],
+             (double)c->nu, c->gammas, (int)zeros);
+  } else {
+    SB_CHECK(soft > 30, "%s, %s %s: %d soft motions, which the test should see", c->element, shapes[shape],
+             c->gammas, (int)soft);
+  }
+  PetscCall(PetscFree(w));
+  PetscCall(test_scene_close(&t));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode check_mesh(Shape shape)
+{
+  static const PetscReal nus[] = {0.3, 0.4999, 0.499999};
+  static const char *const laws[] = {"corotated -body_a_tangent warped", "corotated -body_a_tangent exact",
+                                     "stvk", "neohookean"};
+  static const char *const little = "-body_a_gamma0 0.01 -body_a_gamma1 0.01";
+  char path[512];
+
+  PetscFunctionBeginUser;
+  PetscCall(write_mesh(shape, path));
+  for (int k = 0; k < 3; k++) {
+    PetscCall(check_case(shape, path, &(Case){"cr", "linear", "", nus[k], 0.}, PETSC_TRUE));
+    PetscCall(check_case(shape, path, &(Case){"dg", "linear", "", nus[k], 0.}, PETSC_TRUE));
+  }
+  PetscCall(check_case(shape, path, &(Case){"dg", "linear", little, 0.3, 0.}, PETSC_TRUE));
+  PetscCall(check_case(shape, path, &(Case){"cr", "linear", "-body_a_gamma1 1e-12", 0.3, 0.}, PETSC_FALSE));
+  PetscCall(check_case(shape, path, &(Case){"dg", "linear", "-body_a_gamma1 1e-12", 0.3, 0.}, PETSC_FALSE));
+  for (int law = 0; law < 4 && shape == MOVED; law++) {
+    PetscCall(check_case(shape, path, &(Case){"cr", laws[law], "", 0.4999, 2.}, PETSC_TRUE));
+    PetscCall(check_case(shape, path, &(Case){"dg", laws[law], "", 0.4999, 2.}, PETSC_TRUE));
+  }
+  PetscCall(verify_mesh_remove(path));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+int main(int argc, char **argv)
+{
+  SB_TEST_BEGIN(argc, argv);
+  for (Shape shape = MOVED; shape <= SLIVERS; shape++) PetscCall(check_mesh(shape));
+  SB_TEST_END();
+}
