@@ -1,7 +1,7 @@
 // @ranks 1 2 3 4
 /*
-  Which nodes a space has: P1 at vertices, CR one per face, DG four per cell, also side by side in one space. Their number,
-  their places, what they are shared by, and that all of it is the same on one rank and on several.
+  Which nodes a space has: P1 at vertices, CR one per face, DG four per cell and one for each held face, also side by side in
+  one space. Their number, their places, what they are shared by, and that all of it is the same on one rank and on several.
 */
 #include "../scene.h"
 
@@ -45,6 +45,8 @@ static PetscInt expected_nodes(SbModel m)
 
     /* each inner face is one of two cells */
     n += per[0] ? body->nvert : per[3] ? 4 * body->ncell : (4 * body->ncell + body->nfacet) / 2;
+    /* the first body stands on the plane that is held: 3 x 3 squares of two triangles */
+    if (b == 0 && per[3]) n += 18;
   }
   return n;
 }
@@ -99,7 +101,7 @@ static PetscErrorCode describe(SbModel m, PetscInt n, PetscReal **table)
 /* Every node has one owner, and the space of all ranks has the nodes of the space of one. */
 static PetscErrorCode compare(SbModel m, SbModel alone)
 {
-  const PetscInt n = m->mesh->Nvert + 4 * m->mesh->Ncell;
+  const PetscInt n = m->mesh->Nvert + 8 * m->mesh->Ncell;
   PetscReal *one, *all, mass = 0.;
   PetscInt count = 0, fixed = 0, in_set = 0;
 
@@ -147,7 +149,7 @@ static PetscErrorCode check_ghosts(SbSpace s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Means of DG: own node and the one across its face lie at one place, weights of the two sides add up to one. */
+/* Means of DG: the own node and the one across its face, or its support, lie at one place. */
 static void check_cliques(SbSpace s)
 {
   PetscBool broken = PETSC_FALSE;
@@ -162,12 +164,16 @@ static void check_cliques(SbSpace s)
 
     if (l >= s->batch_n[b]) continue;
     SB_CHECK(node[0] == s->cell_node[4 * cell + a], "own node of a clique");
-    if (!SbSpaceCellElement(s, cell)->nodes_per[3] || s->neighbour[4 * cell + a] < 0) {
+    if (s->support && s->support[4 * cell + a] >= 0) {
+      SB_CHECK(node[4 * SB_BATCH] == s->support[4 * cell + a] && weight == 0. &&
+                 s->fixed[s->support[4 * cell + a]] == 7,
+               "a held face has weight %g", (double)weight);
+    } else if (!SbSpaceCellElement(s, cell)->nodes_per[3] || s->neighbour[4 * cell + a] < 0) {
       SB_CHECK(node[4 * SB_BATCH] == node[0] && weight == 1., "a side without another has weight %g",
                (double)weight);
-      continue;
+    } else {
+      SB_CHECK(node[4 * SB_BATCH] != node[0] && weight > 0. && weight < 1., "weight %g", (double)weight);
     }
-    SB_CHECK(node[4 * SB_BATCH] != node[0] && weight > 0. && weight < 1., "weight %g", (double)weight);
     for (int i = 0; i < 3; i++)
       SB_CHECK_NEAR(s->node_x[3 * node[4 * SB_BATCH] + i], s->node_x[3 * node[0] + i], 1e-15,
                     "node across a face");

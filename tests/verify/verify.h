@@ -96,10 +96,10 @@ static inline PetscErrorCode verify_mesh_remove(const char path[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* How many numbers SbSpace.node_orig draws from: the vertices, with nodes at faces also four for each cell. */
+/* How many numbers SbSpace.node_orig draws from: vertices; with nodes at faces also four of each cell and their supports. */
 static inline PetscInt verify_numbers(SbModel m)
 {
-  return m->mesh->Nvert + (m->space->faces ? 4 * m->mesh->Ncell : 0);
+  return m->mesh->Nvert + (m->space->faces ? 8 * m->mesh->Ncell : 0);
 }
 
 /*
