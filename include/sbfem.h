@@ -119,6 +119,13 @@ PetscErrorCode SbSpaceFinishTangent(SbSpace space, Mat A);
 PetscErrorCode SbSpaceAddCellBlock(SbSpace space, Mat A, PetscInt cell, PetscInt a, PetscInt b,
                                    const PetscReal block[9]);
 
+/* f[nnode][3] += factor dV/du, V the current volume of a body (m^3) at displacement u. Right on owned nodes. Not collective. */
+void SbSpaceAddVolumeForce(SbSpace space, PetscInt body, const PetscReal u[], PetscReal factor,
+                           PetscReal f[]);
+/* A += factor d^2V/du^2 times block_scale, as SbSpaceAddCellBlock() does. Not collective. */
+PetscErrorCode SbSpaceAddVolumeTangent(SbSpace space, PetscInt body, const PetscReal u[], PetscReal factor,
+                                       Mat A);
+
 /* Marks components (bits 0..2) of a local node as prescribed; set-up only. All ranks that know the node must do it. */
 PetscErrorCode SbSpaceFix(SbSpace space, PetscInt node, int components);
 /* After all effects were set up: builds fixed_node. */

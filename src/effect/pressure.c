@@ -16,6 +16,11 @@
   under large deformations", 1984); at a free rim it is not, and Newton converges a little more slowly to the
   same answer.
 
+  The facets of CR and DG bodies do not meet at their edges, so that forces facet by facet do not quite add up to
+  zero. Where the pressure acts on the whole surface of such a body, it is taken as -p dV/du of the volume inside
+  (src/fem/volume.c): at rest that is the same, and force and moment vanish for every displacement. On part of the
+  surface the gaps stay; they close with the mesh.
+
   With follower = no the pressure acts on the rest area and normal, as small-strain theory has it; then there
   is no tangent.
 */
@@ -26,7 +31,8 @@ typedef struct {
   SbFormula value, time;
   PetscBool follower;
   PetscInt nfacet;
-  SbFacet *facet; /* [nfacet] of owned and ghost cells */
+  SbFacet *facet;   /* [nfacet] of owned and ghost cells */
+  PetscBool *whole; /* [nbody] taken by its volume: its facets are not in the list */
 } Pressure;
 
 static const SbOption rows[] = {
@@ -54,12 +60,35 @@ static PetscErrorCode options_pressure(SbEffect e, const SbScope *scope)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Bodies with nodes at faces whose every boundary facet is in the list: their facets leave it. Collective. */
+static PetscErrorCode find_whole(Pressure *p, SbSpace space)
+{
+  const SbMesh mesh = space->mesh;
+  PetscInt *count, n = 0;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscCalloc1(mesh->nbody, &count));
+  for (PetscInt k = 0; k < p->nfacet; k++)
+    count[mesh->cell_body[p->facet[k].cell]] += p->facet[k].cell < mesh->ncell_owned;
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, count, (PetscMPIInt)mesh->nbody, MPIU_INT, MPI_SUM, space->comm));
+  for (PetscInt b = 0; b < mesh->nbody; b++)
+    p->whole[b] = (PetscBool)(!space->element[b]->nodes_per[0] && count[b] == mesh->body[b].nfacet);
+  for (PetscInt k = 0; k < p->nfacet; k++) {
+    if (!p->whole[mesh->cell_body[p->facet[k].cell]]) p->facet[n++] = p->facet[k];
+  }
+  p->nfacet = n;
+  PetscCall(PetscFree(count));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 static PetscErrorCode setup_pressure(SbEffect e, SbSpace space)
 {
   Pressure *p = (Pressure *)e->data;
 
   PetscFunctionBeginUser;
   PetscCall(SbEffectFacets(space, &p->on, &p->nfacet, &p->facet));
+  PetscCall(PetscCalloc1(space->mesh->nbody, &p->whole));
+  if (space->faces && p->follower) PetscCall(find_whole(p, space));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -84,6 +113,9 @@ static PetscErrorCode force_pressure(SbEffect e, SbSpace space, const SbStage *s
   const PetscReal *u = load->follower ? stage->u : NULL;
 
   PetscFunctionBeginUser;
+  for (PetscInt b = 0; b < space->mesh->nbody; b++) {
+    if (load->whole[b]) SbSpaceAddVolumeForce(space, b, u, -p, f);
+  }
   for (PetscInt k = 0; k < load->nfacet; k++) {
     const SbFacet *facet = &load->facet[k];
     const SbElementOps *element = &SbSpaceCellElement(space, facet->cell)->ops;
@@ -141,6 +173,9 @@ static PetscErrorCode tangent_pressure(SbEffect e, SbSpace space, const SbStage 
 
   PetscFunctionBeginUser;
   if (p == 0) PetscFunctionReturn(PETSC_SUCCESS);
+  for (PetscInt b = 0; b < space->mesh->nbody; b++) {
+    if (load->whole[b]) PetscCall(SbSpaceAddVolumeTangent(space, b, stage->u, p, A));
+  }
   for (PetscInt k = 0; k < load->nfacet; k++) {
     const SbFacet *facet = &load->facet[k];
     const SbElementOps *element = &SbSpaceCellElement(space, facet->cell)->ops;
@@ -170,6 +205,7 @@ static PetscErrorCode destroy_pressure(SbEffect e)
   PetscCall(SbFormulaDestroy(&p->value));
   PetscCall(SbFormulaDestroy(&p->time));
   PetscCall(PetscFree(p->facet));
+  PetscCall(PetscFree(p->whole));
   PetscCall(PetscFree(e->data));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -63,6 +63,10 @@ typedef struct {
     glue; /* [nbody] factor on the face terms that the rows of a body begin with; NULL: they begin with zero */
 } SbValues;
 
+/* tangent.c: the values of a matrix of the space; what was changed shows after SbSpaceFinishTangent(). Not collective. */
+PetscErrorCode SbValuesBegin(Mat A, SbValues *x);
+PetscErrorCode SbValuesEnd(SbValues *x);
+
 /* Where block k (as in SbPlan.offset) of row i begins in its value array, and the distance between its rows and columns. */
 static inline PetscScalar *sb_block(const SbValues *x, SbPlan p, PetscInt row, PetscInt k, size_t *row_stride,
                                     size_t *column_stride)

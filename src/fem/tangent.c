@@ -15,7 +15,7 @@
 #include "sbkernel.h"
 #include <petsc/private/petscimpl.h>
 
-static PetscErrorCode access_begin(Mat A, SbValues *x)
+PetscErrorCode SbValuesBegin(Mat A, SbValues *x)
 {
   PetscBool is[5];
 
@@ -45,7 +45,7 @@ static PetscErrorCode access_begin(Mat A, SbValues *x)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode access_end(SbValues *x)
+PetscErrorCode SbValuesEnd(SbValues *x)
 {
   PetscFunctionBeginUser;
   for (int q = 0; q < 2 && x->part[q]; q++) {
@@ -219,12 +219,12 @@ PetscErrorCode SbSpaceAssembleTangent(SbSpace s, const SbStage *stage, Mat A)
     PetscCall(PetscLogEventEnd(SbEvents[SB_EVENT_TANGENT], A, 0, 0, 0));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
-  PetscCall(access_begin(A, &x));
+  PetscCall(SbValuesBegin(A, &x));
   if (s->jump) PetscCall(glue_factors(s, stage, &glue));
   x.glue = glue;
   for (PetscInt r = 0; r < s->nregion; r++) add_region(s, &s->region[r], stage, &x);
   if (!s->consistent_mass && (stage->shift_a != 0. || stage->shift_v != 0.)) add_lumped_mass(s, stage, &x);
-  PetscCall(access_end(&x));
+  PetscCall(SbValuesEnd(&x));
   PetscCall(PetscFree(glue));
   PetscCall(PetscLogEventEnd(SbEvents[SB_EVENT_TANGENT], A, 0, 0, 0));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -241,14 +241,14 @@ PetscErrorCode SbSpaceAddCellBlock(SbSpace s, Mat A, PetscInt cell, PetscInt a, 
 
   PetscFunctionBeginUser;
   if (k == SB_NOT_OWNED) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(access_begin(A, &x));
+  PetscCall(SbValuesBegin(A, &x));
   if (x.kind != SB_MATRIX_SBAIJ || row <= column) {
     v = sb_block(&x, s->plan, row, k, &rs, &cs);
     for (size_t i = 0; i < 3; i++) {
       for (size_t j = 0; j < 3; j++) v[i * rs + j * cs] += s->block_scale * block[3 * i + j];
     }
   }
-  PetscCall(access_end(&x));
+  PetscCall(SbValuesEnd(&x));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -286,9 +286,9 @@ PetscErrorCode SbSpaceFinishTangent(SbSpace s, Mat A)
   PetscFunctionBeginUser;
   PetscCall(PetscObjectTypeCompare((PetscObject)A, MATSHELL, &matrix_free));
   if (matrix_free) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(access_begin(A, &x));
+  PetscCall(SbValuesBegin(A, &x));
   clear_fixed(s, &x);
-  PetscCall(access_end(&x));
+  PetscCall(SbValuesEnd(&x));
   /* the parts' cached diagonals are stale: their own (local) assembly drops them; the outer matrix only needs its state raised */
   for (int q = 0; q < 2 && x.part[q]; q++) {
     PetscCall(MatAssemblyBegin(x.part[q], MAT_FINAL_ASSEMBLY));

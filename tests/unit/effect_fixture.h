@@ -3,7 +3,10 @@
 
   The unit box "block" is box:1,1,1:2, or any mesh that the test names. Materials come from the options
   -body_<name>_young and so on, which fixture_create() sets. The same scene can be made on PETSC_COMM_SELF beside the
-  parallel one: fields of the two are compared by original vertex number.
+  parallel one: fields of the two are compared by original node number.
+
+  fixture_use() says which elements the next scenes are made of, and whether their sets are held: then DG faces in them
+  have supports.
 */
 #pragma once
 #include "test.h"
@@ -19,6 +22,17 @@ typedef struct {
   SbSpace space;
   PetscReal *u, *f; /* [nnode][3] displacement and force, local */
 } Fixture;
+
+/* Elements of "block" and "other" in the scenes to come. */
+static const char *fixture_element[2] = {"p1", "p1"};
+static PetscBool fixture_held = PETSC_FALSE;
+
+static inline void fixture_use(const char *block, const char *other, PetscBool held)
+{
+  fixture_element[0] = block;
+  fixture_element[1] = other;
+  fixture_held = held;
+}
 
 #define DENSITY 1200.0 /* kg/m^3, of every body */
 
@@ -60,7 +74,7 @@ static inline PetscErrorCode fixture_create(MPI_Comm comm, PetscInt nbody, const
 
     PetscCall(PetscStrncpy(body->name, names[b], sizeof(body->name)));
     PetscCall(PetscStrncpy(body->mesh, mesh, sizeof(body->mesh)));
-    PetscCall(PetscStrncpy(body->element, "p1", sizeof(body->element)));
+    PetscCall(PetscStrncpy(body->element, fixture_element[b], sizeof(body->element)));
     PetscCall(PetscStrncpy(body->material, "linear", sizeof(body->material)));
     body->scale = 1;
     body->rotate[2] = 1;
@@ -72,11 +86,13 @@ static inline PetscErrorCode fixture_create(MPI_Comm comm, PetscInt nbody, const
     PetscCall(PetscOptionsInsertString(NULL, options));
     PetscCall(SbScopeSet(&scope, "body", "linear", names[b]));
     PetscCall(SbMaterialCreate("linear", &scope, &x->material[b]));
-    PetscCall(SbElementCreate("p1", NULL, &x->element[b]));
+    PetscCall(SbElementCreate(body->element, NULL, &x->element[b]));
+    body->face_nodes = (PetscBool)!x->element[b]->nodes_per[0];
   }
   for (PetscInt k = 0; k < nset; k++) {
     PetscCall(SbSetParse(sets[k][0], sets[k][1], &x->set[k]));
     PetscCall(PetscStrncpy(x->set[k].name, sets[k][0], sizeof(x->set[k].name)));
+    x->set[k].held = fixture_held;
   }
   PetscCall(SbMeshCreate(comm, nbody, x->body, nset, x->set, &x->mesh));
   PetscCall(SbSpaceCreate(x->mesh, x->material, x->element, &x->space));
@@ -170,10 +186,10 @@ static inline PetscErrorCode check_serial(const Fixture *parallel, const Fixture
   PetscInt *where;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscMalloc1(serial->mesh->nvert, &where));
-  for (PetscInt i = 0; i < serial->mesh->nvert; i++) where[serial->mesh->vert_orig[i]] = i;
+  PetscCall(PetscMalloc1(serial->mesh->Nvert + 8 * serial->mesh->Ncell, &where));
+  for (PetscInt i = 0; i < serial->space->nnode; i++) where[serial->space->node_orig[i]] = i;
   for (PetscInt i = 0; i < parallel->space->nnode_owned; i++) {
-    const PetscInt j = where[parallel->mesh->vert_orig[i]];
+    const PetscInt j = where[parallel->space->node_orig[i]];
 
     for (int c = 0; c < 3; c++)
       SB_CHECK_NEAR(parallel->f[3 * i + c], serial->f[3 * j + c], 1e-12 * scale, what);

@@ -1,6 +1,6 @@
 /*
   Body force: force and moment of quadratic densities on everything and on a part; time in the density and as a factor; the
-  same on every number of ranks.
+  same on every number of ranks; with every element.
 */
 // @ranks 1 3
 #include "effect_fixture.h"
@@ -68,12 +68,12 @@ static PetscErrorCode check_time(Fixture *x)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-int main(int argc, char **argv)
+static PetscErrorCode check_element(const char *element)
 {
   Fixture x, serial;
 
-  SB_TEST_BEGIN(argc, argv);
-  PetscCall(fixture_register());
+  PetscFunctionBeginUser;
+  fixture_use(element, element, PETSC_FALSE);
   PetscCall(fixture_create(PETSC_COMM_WORLD, 1, "box:1,1,1:2", PETSC_STATIC_ARRAY_LENGTH(sets), sets, &x));
   PetscCall(
     fixture_create(PETSC_COMM_SELF, 1, "box:1,1,1:2", PETSC_STATIC_ARRAY_LENGTH(sets), sets, &serial));
@@ -82,5 +82,16 @@ int main(int argc, char **argv)
   PetscCall(check_time(&x));
   PetscCall(fixture_destroy(&x));
   PetscCall(fixture_destroy(&serial));
+  PetscCall(PetscOptionsClear(NULL));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+int main(int argc, char **argv)
+{
+  SB_TEST_BEGIN(argc, argv);
+  PetscCall(fixture_register());
+  PetscCall(check_element("p1"));
+  PetscCall(check_element("cr"));
+  PetscCall(check_element("dg"));
   SB_TEST_END();
 }

@@ -1,10 +1,11 @@
 /*
-  Gravity: weight and its moment about the origin for two boxes; the factor of time; nothing on other ranks' nodes lost.
+  Gravity: weight and its moment about the origin for two boxes; the factor of time; nothing on other ranks' nodes
+  lost; with every element, also mixed.
 */
 // @ranks 1 3
 #include "effect_fixture.h"
 
-int main(int argc, char **argv)
+static PetscErrorCode check_elements(const char *block, const char *other)
 {
   // Unit boxes centred at (0.5, 0.5, 0.5) and (3.5, 0.5, 0.5), 1200 kg each: W = 2400 g at their common centre (2, .5, .5).
   const PetscReal W[3] = {2400.0, -2.0 * 2400, 3.0 * 2400};
@@ -13,8 +14,8 @@ int main(int argc, char **argv)
   SbEffect e, es;
   PetscReal F2[3], M2[3], F0[3] = {0, 0, 0};
 
-  SB_TEST_BEGIN(argc, argv);
-  PetscCall(fixture_register());
+  PetscFunctionBeginUser;
+  fixture_use(block, other, PETSC_FALSE);
   PetscCall(fixture_create(PETSC_COMM_WORLD, 2, "box:1,1,1:2", 0, NULL, &x));
   PetscCall(fixture_create(PETSC_COMM_SELF, 2, "box:1,1,1:2", 0, NULL, &serial));
   PetscCall(effect_create(&x, "gravity", "-effect_gravity_vector 1,-2,3", &e));
@@ -50,5 +51,17 @@ int main(int argc, char **argv)
   PetscCall(SbEffectDestroy(&e));
   PetscCall(fixture_destroy(&x));
   PetscCall(fixture_destroy(&serial));
+  PetscCall(PetscOptionsClear(NULL));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+int main(int argc, char **argv)
+{
+  SB_TEST_BEGIN(argc, argv);
+  PetscCall(fixture_register());
+  PetscCall(check_elements("p1", "p1"));
+  PetscCall(check_elements("cr", "cr"));
+  PetscCall(check_elements("dg", "p1"));
+  PetscCall(check_elements("cr", "dg"));
   SB_TEST_END();
 }

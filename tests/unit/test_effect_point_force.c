@@ -1,21 +1,58 @@
 /*
-  Point force: the total on one vertex and on a face, each node its share; time; the same on every number of ranks.
+  Point force: the total on one vertex and on a face, each node its share; the work is that of the vertex, whose displacement
+  is averaged over the cells around it; time; the same on every number of ranks; with every element.
 */
 // @ranks 1 3
 #include "effect_fixture.h"
 
 static const char *const sets[][2] = {{"top", "plane:0,0,1,1"}, {"tip", "sphere:1,1,1,0.1"}};
 
-int main(int argc, char **argv)
+/* Work of x->f on a displacement: that of the force G at the vertex at X, taken from the cells there. */
+static PetscErrorCode check_work(Fixture *x, const PetscReal X[3], const PetscReal G[3])
+{
+  const SbSpace s = x->space;
+  PetscReal sum[5] = {0}, all[5], expected = 0; // mean displacement, its weight; work
+
+  PetscFunctionBeginUser;
+  // Numbers without order, the same on every number of ranks.
+  for (PetscInt i = 0; i < 3 * s->nnode_owned; i++)
+    sum[4] += x->f[i] * PetscSinReal((PetscReal)(i % 3 + 1) * (PetscReal)s->node_orig[i / 3]);
+  for (PetscInt cell = 0; cell < x->mesh->ncell_owned; cell++) {
+    const PetscReal volume = 1.0 / 48; // all tets of the box are alike
+
+    for (int k = 0; k < 4; k++) {
+      const PetscReal *at = &x->mesh->x[3 * x->mesh->cell[4 * cell + k]];
+
+      if (PetscAbsReal(at[0] - X[0]) + PetscAbsReal(at[1] - X[1]) + PetscAbsReal(at[2] - X[2]) > 1e-9)
+        continue;
+      sum[3] += volume;
+      for (int a = 0; a < 4; a++) {
+        const PetscInt number = s->node_orig[s->cell_node[4 * cell + a]];
+
+        for (int c = 0; c < 3; c++)
+          sum[c] += volume * SbSpaceCellElement(s, cell)->ops.vertex[k][a] *
+                    PetscSinReal((PetscReal)(c + 1) * (PetscReal)number);
+      }
+    }
+  }
+  PetscCallMPI(MPI_Allreduce(sum, all, 5, MPIU_REAL, MPI_SUM, s->comm));
+  for (int c = 0; c < 3; c++) expected += G[c] * all[c] / all[3];
+  SB_CHECK_NEAR(all[4], expected, 1e-12, "work of a force on a vertex");
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode check_element(const char *element, PetscBool held)
 {
   // 9 nodes on the top, symmetric about (.5, .5, 1).
   const PetscReal F[3] = {9, -18, 27}, M[3] = {0.5 * 27 + 18, 9 - 0.5 * 27, -9 - 4.5};
   const PetscReal G[3] = {0, 12, 0}, N[3] = {-12, 0, 12};
   Fixture x, serial;
   SbEffect e, es;
+  PetscBool p1;
 
-  SB_TEST_BEGIN(argc, argv);
-  PetscCall(fixture_register());
+  PetscFunctionBeginUser;
+  fixture_use(element, element, held);
+  PetscCall(PetscStrcmp(element, "p1", &p1));
   PetscCall(fixture_create(PETSC_COMM_WORLD, 1, "box:1,1,1:2", PETSC_STATIC_ARRAY_LENGTH(sets), sets, &x));
   PetscCall(
     fixture_create(PETSC_COMM_SELF, 1, "box:1,1,1:2", PETSC_STATIC_ARRAY_LENGTH(sets), sets, &serial));
@@ -27,7 +64,7 @@ int main(int argc, char **argv)
   PetscCall(effect_force(&serial, es, 0));
   PetscCall(check_resultant(&x, F, M, 30, "force on the nodes of the top"));
   PetscCall(check_serial(&x, &serial, 30, "parallel and serial force at a node"));
-  for (PetscInt i = 0; i < x.space->nnode_owned; i++) {
+  for (PetscInt i = 0; p1 && i < x.space->nnode_owned; i++) {
     SB_CHECK_NEAR(x.f[3 * i + 2], x.space->node_x[3 * i + 2] > 1 - 1e-9 ? 3 : 0, 1e-14, "share of a node");
   }
   PetscCall(SbEffectDestroy(&e));
@@ -39,6 +76,7 @@ int main(int argc, char **argv)
   SB_CHECK(!e->steady, "changes with time");
   PetscCall(effect_force(&x, e, 2));
   PetscCall(check_resultant(&x, G, N, 12, "force on one vertex"));
+  PetscCall(check_work(&x, (const PetscReal[3]){1, 1, 1}, G));
   PetscCall(SbEffectDestroy(&e));
   CHECK_MESSAGE(
     effect_create(&x, "bad", "-effect_bad_type point_force -effect_bad_on tip -effect_bad_vector 0;x;0", &e),
@@ -46,5 +84,17 @@ int main(int argc, char **argv)
   PetscCall(SbEffectDestroy(&e));
   PetscCall(fixture_destroy(&x));
   PetscCall(fixture_destroy(&serial));
+  PetscCall(PetscOptionsClear(NULL));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+int main(int argc, char **argv)
+{
+  SB_TEST_BEGIN(argc, argv);
+  PetscCall(fixture_register());
+  PetscCall(check_element("p1", PETSC_FALSE));
+  PetscCall(check_element("cr", PETSC_FALSE));
+  PetscCall(check_element("dg", PETSC_FALSE));
+  PetscCall(check_element("dg", PETSC_TRUE));
   SB_TEST_END();
 }

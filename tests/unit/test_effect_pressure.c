@@ -1,6 +1,6 @@
 /*
   Pressure: no resultant and the work -p dV on a closed deformed surface; force on one face; the tangent by Taylor's
-  remainder on a closed surface and on an open one with its rim held, and its symmetry on any; rest normals on demand.
+  remainder on a closed surface and on an open one with its rim held, and its symmetry on any; rest normals on demand; with every element.
 */
 // @ranks 1 3
 #include "effect_fixture.h"
@@ -9,13 +9,15 @@ static const char *const sets[][2] = {{"skin", "boundary"}, {"top", "plane:0,0,1
 
 #define P 250.0 /* Pa */
 
-/* Current volume over all ranks, m^3: sum of det / 6 over owned cells. */
+/* Current volume over all ranks, m^3: with nodes at vertices the sum of det / 6 over owned cells. */
 static PetscErrorCode volume(const Fixture *x, const PetscReal u[], PetscReal *all)
 {
-  PetscReal sum = 0;
+  PetscReal sum = 0, energy, minJ;
+  PetscInt ninverted;
 
   PetscFunctionBeginUser;
-  for (PetscInt cell = 0; cell < x->mesh->ncell_owned; cell++) {
+  if (x->space->faces) PetscCall(SbSpaceStrainEnergy(x->space, u, &energy, &minJ, &ninverted, &sum));
+  for (PetscInt cell = 0; !x->space->faces && cell < x->mesh->ncell_owned; cell++) {
     const PetscInt *node = &x->space->cell_node[4 * cell];
     PetscReal p[4][3], e[3][3];
 
@@ -220,7 +222,8 @@ static PetscErrorCode check_tangent(Fixture *x)
   PetscCall(SbSpaceFixDone(x->space));
   PetscCall(SbSpaceCreateMatrix(x->space, SB_MATRIX_BAIJ, &A));
   PetscCall(check_taylor(x, closed, A, PETSC_FALSE));
-  PetscCall(check_taylor(x, open, A, PETSC_TRUE));
+  // The facets of CR and DG do not meet at their edges: there the tangent of an open surface is near, not exact.
+  if (!x->space->faces) PetscCall(check_taylor(x, open, A, PETSC_TRUE));
 
   // Symmetric also where the rim is free, and absent where no stiffness is wanted.
   PetscCall(PetscMalloc3(3 * n, &v, 3 * n, &w, 3 * n, &y));
@@ -244,12 +247,12 @@ static PetscErrorCode check_tangent(Fixture *x)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-int main(int argc, char **argv)
+static PetscErrorCode check_element(const char *element)
 {
   Fixture x, serial;
 
-  SB_TEST_BEGIN(argc, argv);
-  PetscCall(fixture_register());
+  PetscFunctionBeginUser;
+  fixture_use(element, element, PETSC_FALSE);
   PetscCall(fixture_create(PETSC_COMM_WORLD, 1, "box:1,1,1:3", PETSC_STATIC_ARRAY_LENGTH(sets), sets, &x));
   PetscCall(
     fixture_create(PETSC_COMM_SELF, 1, "box:1,1,1:3", PETSC_STATIC_ARRAY_LENGTH(sets), sets, &serial));
@@ -258,5 +261,16 @@ int main(int argc, char **argv)
   PetscCall(check_tangent(&x));
   PetscCall(fixture_destroy(&x));
   PetscCall(fixture_destroy(&serial));
+  PetscCall(PetscOptionsClear(NULL));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+int main(int argc, char **argv)
+{
+  SB_TEST_BEGIN(argc, argv);
+  PetscCall(fixture_register());
+  PetscCall(check_element("p1"));
+  PetscCall(check_element("cr"));
+  PetscCall(check_element("dg"));
   SB_TEST_END();
 }

@@ -114,12 +114,41 @@ static PetscErrorCode check_errors(Fixture *x)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Facets and cells do not depend on the element; the nodes of CR and DG are faces. */
+static PetscErrorCode check_faces(const char *element, PetscInt all, PetscInt bottom)
+{
+  Fixture x;
+  SbEffectOn on;
+  PetscInt n, *items;
+
+  PetscFunctionBeginUser;
+  fixture_use(element, element, PETSC_FALSE);
+  PetscCall(fixture_create(PETSC_COMM_WORLD, 1, "box:1,1,1:4", PETSC_STATIC_ARRAY_LENGTH(sets), sets, &x));
+  PetscCall(check_facets(&x, "all", "west", 6, 192));
+  PetscCall(check_cells(&x, "lower", "all", 1));
+  PetscCall(check_nodes(&x, "bottom", NULL, bottom));
+  PetscCall(check_nodes(&x, "bottom", "west", 2 * bottom));
+  PetscCall(check_nodes(&x, "west", "bottom", 2 * bottom));
+  PetscCall(check_nodes(&x, "all", "corner", all));
+  PetscCall(check_errors(&x));
+  PetscCall(make_on("corner", NULL, &on));
+  CHECK_MESSAGE(SbEffectNodes(x.space, &on, &n, &items),
+                "-effect_test_on selects 1 vertices of body block but none of its triangles");
+  PetscCall(SbEffectFreeOn(&on));
+  PetscCall(fixture_destroy(&x));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 int main(int argc, char **argv)
 {
   Fixture x;
 
   SB_TEST_BEGIN(argc, argv);
   PetscCall(fixture_register());
+  // 64 cubes of six tets: 192 faces on the boundary, (6 * 64 * 4 - 192) / 2 inside.
+  PetscCall(check_faces("cr", 864, 32));
+  PetscCall(check_faces("dg", 1536, 32));
+  fixture_use("p1", "p1", PETSC_FALSE);
   PetscCall(fixture_create(PETSC_COMM_WORLD, 1, "box:1,1,1:4", PETSC_STATIC_ARRAY_LENGTH(sets), sets, &x));
   PetscCall(check_facets(&x, "bottom", NULL, 1, 32));
   PetscCall(check_facets(&x, "bottom", "west", 2, 64));

@@ -1,6 +1,6 @@
 /*
   Traction: force and moment on one face and on two faces that are named with an overlap; a total force; a dead load does
-  not follow the deformation; time; the same on every number of ranks.
+  not follow the deformation; time; the same on every number of ranks; with every element.
 */
 // @ranks 1 3
 #include "effect_fixture.h"
@@ -60,13 +60,13 @@ static PetscErrorCode check_total(Fixture *x)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-int main(int argc, char **argv)
+static PetscErrorCode check_element(const char *element, PetscBool held)
 {
   Fixture x, serial;
   SbEffect e;
 
-  SB_TEST_BEGIN(argc, argv);
-  PetscCall(fixture_register());
+  PetscFunctionBeginUser;
+  fixture_use(element, element, held);
   PetscCall(fixture_create(PETSC_COMM_WORLD, 1, "box:1,1,1:2", PETSC_STATIC_ARRAY_LENGTH(sets), sets, &x));
   PetscCall(
     fixture_create(PETSC_COMM_SELF, 1, "box:1,1,1:2", PETSC_STATIC_ARRAY_LENGTH(sets), sets, &serial));
@@ -78,5 +78,18 @@ int main(int argc, char **argv)
   PetscCall(SbEffectDestroy(&e));
   PetscCall(fixture_destroy(&x));
   PetscCall(fixture_destroy(&serial));
+  PetscCall(PetscOptionsClear(NULL));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+int main(int argc, char **argv)
+{
+  SB_TEST_BEGIN(argc, argv);
+  PetscCall(fixture_register());
+  PetscCall(check_element("p1", PETSC_FALSE));
+  PetscCall(check_element("cr", PETSC_FALSE));
+  PetscCall(check_element("dg", PETSC_FALSE));
+  // A face with a support bears loads as any other.
+  PetscCall(check_element("dg", PETSC_TRUE));
   SB_TEST_END();
 }

@@ -1,0 +1,80 @@
+/*
+  The current volume of a body, V = sum |T| det F over its cells, and its derivatives: what a pressure on the whole surface
+  works on.
+
+  For P1 dV/du is a force on the surface alone. For CR and DG, whose surface has gaps at its edges, the sum of the facets'
+  forces does not vanish, but V, made of strains, changes neither under translations nor rotations: force and moment vanish
+  to rounding, and the tangent is exact and symmetric.
+
+    dV/dF = |T| cof F,   d cof F_ij / dF_kl = eps_ikm eps_jln F_mn.
+*/
+#include "fem_impl.h"
+#include "sbkernel.h"
+
+/* F of each lane of batch b. */
+static void batch_gradient(SbSpace s, const SbRegion *region, PetscInt b, const PetscReal x[], SbLane F[9])
+{
+  SbLane u[12];
+
+  sb_gather_strain(s, region, b, x, u);
+  SbCellGradient(s->batch_g + 9 * b, (const SbLane *)u, F);
+}
+
+void SbSpaceAddVolumeForce(SbSpace s, PetscInt body, const PetscReal x[], PetscReal factor, PetscReal f[])
+{
+  for (PetscInt r = 0; r < s->nregion; r++) {
+    const SbRegion *region = &s->region[r];
+
+    for (PetscInt b = region->bstart; region->body == body && b < region->bend; b++) {
+      SbLane F[9], P[9], fe[12];
+
+      batch_gradient(s, region, b, x, F);
+      for (int l = 0; l < SB_BATCH; l++) {
+        PetscReal one[9], cofactor[9];
+
+        SbLaneGet(9, (const SbLane *)F, l, one);
+        SbMatCofactor(one, cofactor);
+        for (int k = 0; k < 9; k++) P[k][l] = factor * cofactor[k];
+      }
+      SbCellForce(s->batch_g + 9 * b, s->batch_V[b], (const SbLane *)P, fe);
+      sb_scatter_strain(s, region, b, fe, f);
+    }
+  }
+}
+
+/* C = factor d cof F / dF. The two indices that i and k leave free make one term each way. */
+static void cofactor_tangent(const SbLane F[9], PetscReal factor, SbLane C[81])
+{
+  for (int c = 0; c < 81; c++) {
+    const int i = c / 27, j = c / 9 % 3, k = c / 3 % 3, n = c % 3;
+    const PetscReal sign = ((k + 3 - i) % 3 == 1 ? 1. : -1.) * ((n + 3 - j) % 3 == 1 ? 1. : -1.);
+    const PetscReal scale = i == k || j == n ? 0. : sign * factor;
+
+    for (int l = 0; l < SB_BATCH; l++) C[c][l] = scale == 0. ? 0. : scale * F[3 * (3 - i - k) + 3 - j - n][l];
+  }
+}
+
+PetscErrorCode SbSpaceAddVolumeTangent(SbSpace s, PetscInt body, const PetscReal x[], PetscReal factor, Mat A)
+{
+  SbValues values;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbValuesBegin(A, &values));
+  for (PetscInt r = 0; r < s->nregion; r++) {
+    const SbRegion *region = &s->region[r];
+
+    for (PetscInt b = region->bstart; region->body == body && b < region->bend; b++) {
+      SbLane F[9], C[81], K[10][9] __attribute__((aligned(64)));
+
+      batch_gradient(s, region, b, x, F);
+      cofactor_tangent((const SbLane *)F, s->block_scale * factor, C);
+      SbCellBlocksGeneral(s->batch_g + 9 * b, s->batch_V[b], (const SbLane *)C, K);
+      if (region->broken)
+        SbInsertBroken(s, &values, b, (const SbLane(*)[9])K);
+      else
+        SbInsertBatch(s, &values, b, (const SbLane(*)[9])K);
+    }
+  }
+  PetscCall(SbValuesEnd(&values));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
