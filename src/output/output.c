@@ -339,6 +339,7 @@ static PetscErrorCode destroy(SbRun run)
   PetscCall(PetscFree(out->J));
   PetscCall(PetscFree(out->psi));
   PetscCall(PetscFree(out->pressure));
+  PetscCall(PetscFree(out->body_nodes));
   PetscCall(SbPointsDestroy(out));
   PetscCall(PetscFree(run->output));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -370,6 +371,18 @@ PetscErrorCode SbOutputSetFromOptions(SbRun run)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+static PetscErrorCode count_nodes(SbSpace space, SbOutput out)
+{
+  PetscMPIInt n;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscCalloc1(space->mesh->nbody, &out->body_nodes));
+  for (PetscInt i = 0; i < space->nnode_owned; i++) out->body_nodes[space->node_body[i]]++;
+  PetscCall(PetscMPIIntCast(space->mesh->nbody, &n));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, out->body_nodes, n, MPIU_INT, MPI_SUM, out->comm));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode SbOutputAttach(SbRun run)
 {
   SbOutput out = (SbOutput)run->output;
@@ -378,6 +391,7 @@ PetscErrorCode SbOutputAttach(SbRun run)
 
   PetscFunctionBeginUser;
   PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_OUTPUT], 0, 0, 0, 0));
+  PetscCall(count_nodes(run->model->space, out));
   PetscCall(view_scenario(run, out, &scenario, &size));
   // A checkpoint that is refused leaves the folder as it was.
   if (out->restart[0]) PetscCall(SbCheckpointLoad(run, out->restart));

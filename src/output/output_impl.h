@@ -138,8 +138,9 @@ struct _p_SbOutput {
   SbOrder vertex, cell;
   SbOrder node;  /* the unknowns: that of the vertices when no body has its nodes at faces */
   SbOrder point; /* of vertex fields: vertices, or 4 cell + a of the corners of cells when discontinuous */
-  PetscBool ordered;  /* the four exist */
-  PetscBool attached; /* run.json exists */
+  PetscBool ordered;    /* the four exist */
+  PetscBool attached;   /* run.json exists */
+  PetscInt *body_nodes; /* [nbody] nodes of each body, supports of faces among them */
   uint64_t mesh_hash;
   char *identity; /* options that decide the mechanics, one per line */
   PetscBool restarted;
@@ -221,7 +222,5 @@ typedef struct {
 PetscErrorCode SbPhasesGet(SbOutput out, SbPhases *phases); /* collective */
 /* Files of the run with their sizes: calls fn for each one that exists. Rank 0. */
 PetscErrorCode SbOutputFiles(SbOutput out, SbFileFn fn, void *ctx);
-/* Nodes of a body by its element: vertices, faces, or four per cell. Not collective. */
-PetscInt SbBodyNodes(SbModel model, PetscInt body);
 /* Name of the time preset, e.g. "newmark". */
 PetscErrorCode SbPresetName(SbRun run, size_t size, char name[]);

@@ -8,6 +8,7 @@
 
   A nodal force of CR or DG acts at the centroid of a face. One third of it goes to each vertex of the face, which keeps its
   resultant and its moment. Where a node belongs to several cells and these have points of their own, each has an equal part.
+  What a DG cell does to the support of a face is a force of that face, too.
 */
 #include "output_impl.h"
 
@@ -193,7 +194,11 @@ static void add_corner_reaction(SbSpace s, const PetscReal valence[], PetscInt c
   } else {
     // node a lies opposite vertex a: this corner belongs to the faces of the others
     for (int a = 0; a < 4; a++) {
-      if (a != corner % 4) add_reaction(s, node[a], 1. / (3. * valence[node[a]]), r, value);
+      const PetscInt support = s->support ? s->support[corner - corner % 4 + a] : -1;
+
+      if (a == corner % 4) continue;
+      add_reaction(s, node[a], 1. / (3. * valence[node[a]]), r, value);
+      if (support >= 0) add_reaction(s, support, 1. / 3., r, value);
     }
   }
 }

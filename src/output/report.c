@@ -17,14 +17,6 @@ PetscErrorCode SbPresetName(SbRun run, size_t size, char name[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscInt SbBodyNodes(SbModel m, PetscInt b)
-{
-  const SbBody *body = &m->body[b];
-  const PetscInt *per = m->element[b]->nodes_per, nface = (4 * body->ncell + body->nfacet) / 2;
-
-  return per[0] * body->nvert + per[2] * nface + per[3] * body->ncell;
-}
-
 /* "title      words ..." with the words wrapped at WIDTH and indented. */
 static PetscErrorCode entry(const char *title, const char *format, ...)
 {
@@ -53,7 +45,7 @@ static PetscErrorCode entry(const char *title, const char *format, ...)
 
 /* ------------------------------------------------------------------ before the run */
 
-static PetscErrorCode print_bodies(SbModel m)
+static PetscErrorCode print_bodies(SbModel m, SbOutput out)
 {
   PetscInt tets = 0, nodes = 0;
 
@@ -63,7 +55,7 @@ static PetscErrorCode print_bodies(SbModel m)
   for (PetscInt b = 0; b < m->nbody; b++) {
     const SbBody *body = &m->body[b];
 
-    const PetscInt n = SbBodyNodes(m, b);
+    const PetscInt n = out->body_nodes[b];
 
     PetscCall(PetscFPrintf(
       PETSC_COMM_SELF, PETSC_STDOUT,
@@ -168,7 +160,7 @@ PetscErrorCode SbReportHeader(SbRun run)
   PetscCall(PetscFPrintf(PETSC_COMM_SELF, PETSC_STDOUT,
                          "supple %s with PETSc %s on %d rank%s, one thread each\n", SB_VERSION, petsc,
                          (int)out->size, out->size == 1 ? "" : "s"));
-  PetscCall(print_bodies(run->model));
+  PetscCall(print_bodies(run->model, out));
   if (out->scenario[0]) PetscCall(entry("scenario", "%s", out->scenario));
   PetscCall(print_effects(run->model));
   PetscCall(print_time(run));

@@ -59,7 +59,7 @@ static void put_versions(FILE *f)
 #endif
 }
 
-static void put_bodies(FILE *f, SbModel m)
+static void put_bodies(FILE *f, SbModel m, SbOutput out)
 {
   (void)fprintf(f, "  \"bodies\": [");
   for (PetscInt b = 0; b < m->nbody; b++) {
@@ -76,7 +76,7 @@ static void put_bodies(FILE *f, SbModel m)
     put_real(f, "min_dihedral", body->min_dihedral, ", ");
     put_real(f, "max_radius_ratio", body->max_radius_ratio, ",\n     ");
     (void)fprintf(f, "\"element\": \"%s\", \"nodes\": %" PetscInt_FMT ", \"unknowns\": %" PetscInt_FMT ", ",
-                  body->element, SbBodyNodes(m, b), 3 * SbBodyNodes(m, b));
+                  body->element, out->body_nodes[b], 3 * out->body_nodes[b]);
     (void)fprintf(f, "\"material\": \"%s\", ", material->law);
     put_real(f, "young", material->E, ", ");
     put_real(f, "poisson", material->nu, ", ");
@@ -165,7 +165,7 @@ static PetscErrorCode write_json(SbRun run, SbOutput out, const char *status, co
   (void)fprintf(f, "  \"cores\": %ld,\n  \"ranks\": %d,\n", sysconf(_SC_NPROCESSORS_ONLN), (int)out->size);
   put_text(f, "started", out->started);
   put_text(f, "scenario", out->scenario);
-  put_bodies(f, run->model);
+  put_bodies(f, run->model, out);
   PetscCall(put_settings(f, run));
   if (phases) PetscCall(put_costs(f, run, out, phases));
   put_text(f, "reason", reason);

@@ -72,18 +72,18 @@ static PetscErrorCode test_elements(void)
 
   PetscFunctionBeginUser;
   for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(elements); i++) {
-    SbFormat(sizeof(options), options, BOX EULER "%s %s -checkpoint_every_steps 1",
+    SbFormat(sizeof(options), options, HELD EULER "%s %s -checkpoint_every_steps 1",
              i == 3 ? more : "-output_fields none", elements[i]);
     PetscCall(fixture_open(dir, options, &scene));
     for (PetscInt k = 0; k <= 1; k++) PetscCall(fixture_step(&scene, k, 0.1, PETSC_FALSE));
     PetscCall(test_scene_close(&scene));
-    SbFormat(sizeof(options), options, BOX EULER "%s %s -restart latest",
+    SbFormat(sizeof(options), options, HELD EULER "%s %s -restart latest",
              i == 3 ? more : "-output_fields none", elements[i]);
     PetscCall(fixture_open(dir, options, &scene));
     SB_CHECK(difference(&scene, 0.1) == 0., "'%s': the state differs by %g", elements[i],
              (double)difference(&scene, 0.1));
     PetscCall(test_scene_close(&scene));
-    SbFormat(sizeof(options), options, BOX EULER "%s %s -body_a_element %s -restart latest",
+    SbFormat(sizeof(options), options, HELD EULER "%s %s -body_a_element %s -restart latest",
              i == 3 ? more : "-output_fields none", elements[i], i == 0 || i == 2 ? "cr" : "dg");
     SB_CHECK_ERROR(fixture_open(dir, options, &scene), "a checkpoint of other elements");
     PetscCall(test_scene_close(&scene));

@@ -187,7 +187,8 @@ static PetscErrorCode test_reactions(const char *more)
     sums[12] += 0.5 * x[2];
   }
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, sums, 14, MPIU_REAL, MPI_SUM, PETSC_COMM_WORLD));
-  SB_CHECK(sums[7] == 0.5 * (6 + 8 + 8), "%g N at the nodes", (double)sums[7]); // vertices, faces, faces
+  SB_CHECK(sums[7] == 0.5 * (6 + 8 + 8), "%g N at the nodes",
+           (double)sums[7]); // vertices, faces, supports of faces
   for (int k = 0; k < 6; k++)
     SB_CHECK_NEAR(sums[k], sums[7 + k], 1e-13, "resultant or moment of the reactions");
   SB_CHECK(away == 0., "a reaction away from the support: %g", (double)away);
@@ -286,6 +287,7 @@ int main(int argc, char *argv[])
   PetscCall(test_mean(PETSC_FALSE));
   PetscCall(test_mean(PETSC_TRUE));
   PetscCall(test_reactions(""));
+  PetscCall(test_reactions(" -body_c_supports strong"));
   PetscCall(test_reactions(" -output_discontinuous"));
   PetscCall(test_probes(""));
   PetscCall(test_probes("-output_fields none"));

@@ -113,8 +113,6 @@ static PetscErrorCode test_elements(void)
     check_width(header, "header");
     PetscCall(fixture_read(dir, "run.json", &json));
     SB_CHECK(strstr(json, cases[i].in_json), "no '%s' in run.json: %s", cases[i].in_json, json);
-    SB_CHECK(SbBodyNodes(scene.model, 0) == scene.model->space->Nnode, "%s: %d nodes are told, there are %d",
-             cases[i].element, (int)SbBodyNodes(scene.model, 0), (int)scene.model->space->Nnode);
     PetscCall(PetscFree(json));
     free(header);
     PetscCall(test_scene_close(&scene));

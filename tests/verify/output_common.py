@@ -36,6 +36,17 @@ SCENARIO = """
 """
 
 
+# Two more bars beside it, so that all elements are in one scene.
+MIXED = ["-bodies", "bar,crouzeix,galerkin", "-body_bar_element", "p1"]
+for k, (body, element) in enumerate((("crouzeix", "cr"), ("galerkin", "dg"))):
+    for option, value in (("element", element), ("mesh", "box:0.3,0.1,0.1:4,2,2"), ("translate", f"0,{0.2 * (k + 1)},0"),
+                          ("material", "linear"), ("young", "4e4"), ("poisson", "0.45"), ("density", "1000")):
+        MIXED += [f"-body_{body}_{option}", value]
+# Options by the name of what is tested; a direct solver serves all of them.
+ELEMENTS = {element: ["-body_bar_element", element, "-solver", "mumps"] for element in ("p1", "cr", "dg")}
+ELEMENTS["mixed"] = [*MIXED, "-solver", "mumps"]
+
+
 def scenario():
     OUT.mkdir(parents=True, exist_ok=True)
     path = OUT / "bar.opts"
@@ -79,13 +90,13 @@ def check_frames(folder):
     if not listed:
         return 0
     with h5py.File(OUT / folder / "fields.h5", "r") as f:
-        nvert, ncell = len(f["/mesh/x"]), len(f["/mesh/cells"])
+        npoint, ncell = len(f["/mesh/x"]), len(f["/mesh/cells"])
         for time, group in listed:
             if f[group].attrs["time"] != time:
                 sys.exit(f"{folder}: time {f[group].attrs['time']} in {group}, {time} in the index")
             for name, data in f[group].items():
                 values = data[()]
-                if len(values) not in (nvert, ncell) or not numpy.isfinite(values).all():
+                if len(values) not in (npoint, ncell) or not numpy.isfinite(values).all():
                     sys.exit(f"{folder}: {group}/{name} is not whole")
             if numpy.abs(f[group]["displacement"][()]).max() > 1 or (time > 0 and not numpy.any(f[group]["stress"][()])):
                 sys.exit(f"{folder}: {group} holds wrong numbers")

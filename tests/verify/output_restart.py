@@ -1,7 +1,9 @@
 """A run that is taken up from a checkpoint, on another number of ranks, is the run that was not interrupted.
 
-Displacement, velocity and acceleration of the last frame and every row of history.csv are compared. Also: damaged
-checkpoints, the newest one that is whole, checkpoints that do not fit the run.
+Displacement, velocity and acceleration of the last frame and every row of history.csv are compared, for every element and
+for all of them in one scene. Also: damaged checkpoints, the newest one that is whole, checkpoints that do not fit the run.
+
+@timeout 240
 """
 import re
 import shutil
@@ -10,7 +12,7 @@ import sys
 import h5py
 import numpy
 
-from output_common import OUT, frames, history, run
+from output_common import ELEMENTS, OUT, frames, history, run
 
 WHOLE = ["-output_precision", "double", "-quiet", "-checkpoint_every_steps", "10", "-checkpoint_keep", "3"]
 # The solves to rounding, so that different sums of different rank counts do not grow.
@@ -44,19 +46,20 @@ def compare(a, b, tolerance, rows_tolerance):
             sys.exit(f"history column {name} differs by {worst:.3g} of {scale:.3g} between {a} and {b}")
 
 
-def check_reproduction(time):
-    """Uninterrupted on 2 ranks; stopped at step 10 and taken up on 1, 2 and 3."""
-    run(2, f"whole-{time}", *WHOLE, "-time", time)
-    for ranks in (1, 2, 3):
-        folder = f"parts-{time}-{ranks}"
+def check_reproduction(name, several, *options):
+    """Uninterrupted on 2 ranks; stopped at step 10 and taken up on several numbers of ranks."""
+    run(2, f"whole-{name}", *WHOLE, *options)
+    run(2, f"half-{name}", *WHOLE, *options, "-ts_max_time", "0.1")
+    for ranks in several:
+        folder = f"parts-{name}-{ranks}"
         shutil.rmtree(OUT / folder, ignore_errors=True)
-        run(2, folder, *WHOLE, "-time", time, "-ts_max_time", "0.1")
-        text = run(ranks, folder, *WHOLE[:2], *WHOLE[3:], "-time", time, "-restart", "latest", "-progress", "false")
+        shutil.copytree(OUT / f"half-{name}", OUT / folder)
+        text = run(ranks, folder, *WHOLE[:2], *WHOLE[3:], *options, "-restart", "latest", "-progress", "false")
         if "checkpoint_000010.h5: step 10, t = 0.1 s" not in text:
             sys.exit(f"{folder}: the restart does not say from where\n{text}")
         # a few hundred roundings of forces up to 1e4 times the smallest ones
-        compare(f"whole-{time}", folder, 1e-10, 1e-9)
-    print(f"{time}: taken up on 1, 2, 3 ranks as if not interrupted")
+        compare(f"whole-{name}", folder, 1e-10, 1e-9)
+    print(f"{name}: taken up on {several} ranks as if not interrupted")
 
 
 def expect(pattern, *more, folder="damaged"):
@@ -104,13 +107,17 @@ def check_fit():
     expect(r"made with '-effects gravity,hold', this run has '-effects gravity,hold,more'",
            "-restart", whole, "-effects", "gravity,hold,more", "-effect_more_type", "gravity")
     expect("belongs to another mesh", "-restart", whole, "-body_bar_mesh", "box:0.4,0.1,0.1:8,2,3")
+    expect(r"made with '-body_bar_element p1', this run has '-body_bar_element cr'", "-restart", whole, "-body_bar_element", "cr")
     expect("belongs to another mesh|made with", "-restart", whole, "-body_bar_translate", "0,0,1e-9")
     print("checkpoints of other runs are refused")
 
 
 def main():
     for time in ("newmark", "genalpha", "euler_implicit"):
-        check_reproduction(time)
+        check_reproduction(time, (1, 2, 3), "-time", time)
+    for element in ("cr", "dg", "mixed"):
+        # dg with points of its own, so that frames of this kind go on, too
+        check_reproduction(element, (1, 3), *ELEMENTS[element], *(["-output_discontinuous"] if element == "dg" else []))
     check_damage()
     check_fit()
 
