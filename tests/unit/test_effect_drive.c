@@ -1,6 +1,6 @@
 /*
   Drive: translation by formulas and by a table, rotation about an axis off the origin, both at once, single components;
-  reaction and torque.
+  reaction and torque; with every element, and on the supports of DG faces.
 */
 // @ranks 1 3
 #include <unistd.h>
@@ -56,6 +56,7 @@ static void table_and_stretch(const PetscReal X[3], PetscReal t, PetscReal u[3])
 /* A residual that turns about the drive's axis: force k x (x - c) at each node of the top, once at rest, once turned. */
 static PetscErrorCode check_torque(Fixture *x, SbEffect e)
 {
+  const PetscReal n = x->space->faces ? 8 : 9; // nodes of the top
   PetscReal mine[4], all[4], expected = 0;
   SbStage stage;
 
@@ -70,17 +71,23 @@ static PetscErrorCode check_torque(Fixture *x, SbEffect e)
     x->f[3 * i + 1] = X[0] + x->u[3 * i] - 1;
     x->f[3 * i + 2] = 1;
   }
-  // Moment of k x r about k: r^2, over 3 x 3 nodes at distances (x - 1)^2 + y^2.
-  for (int i = 0; i < 3; i++) {
-    for (int j = 0; j < 3; j++) expected += (0.5 * i - 1) * (0.5 * i - 1) + 0.25 * j * j;
+  if (!x->space->faces) {
+    // Moment of k x r about k: r^2, over 3 x 3 nodes at distances (x - 1)^2 + y^2.
+    for (int i = 0; i < 3; i++) {
+      for (int j = 0; j < 3; j++) expected += (0.5 * i - 1) * (0.5 * i - 1) + 0.25 * j * j;
+    }
+  } else {
+    // The eight triangles of the top: seen from its middle their centroids are at 1/6 and 1/3 along x and y, however the
+    // diagonals run; so (x - 1)^2 and y^2 both sum to 4 (1/36 + 1/9) + 8/4.
+    expected = 46.0 / 9;
   }
   PetscCall((*e->ops.history)(e, x->space, &stage, x->f, mine));
   PetscCallMPI(MPI_Allreduce(mine, all, 4, MPIU_REAL, MPI_SUM, PETSC_COMM_WORLD));
-  SB_CHECK_NEAR(all[2], 9, 1e-14, "reaction along the axis");
+  SB_CHECK_NEAR(all[2], n, 1e-14, "reaction along the axis");
   SB_CHECK_NEAR(all[3], expected, 1e-13, "torque");
-  // Turned by 90 degrees the sum of forces has turned: r sums to (-4.5, 4.5), turned to (-4.5, -4.5), k x r to (4.5, -4.5).
-  SB_CHECK_NEAR(all[0], 4.5, 1e-13, "reaction x");
-  SB_CHECK_NEAR(all[1], -4.5, 1e-13, "reaction y");
+  // Turned by 90 degrees the sum of forces has turned: r sums to n (-.5, .5), turned to n (-.5, -.5), k x r to n (.5, -.5).
+  SB_CHECK_NEAR(all[0], 0.5 * n, 1e-13, "reaction x");
+  SB_CHECK_NEAR(all[1], -0.5 * n, 1e-13, "reaction y");
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -103,14 +110,14 @@ static PetscErrorCode write_table(size_t size, char name[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-int main(int argc, char **argv)
+static PetscErrorCode check_element(const char *element, PetscBool held)
 {
   Fixture x;
   SbEffect twist, pull;
   char table[64], options[256];
 
-  SB_TEST_BEGIN(argc, argv);
-  PetscCall(fixture_register());
+  PetscFunctionBeginUser;
+  fixture_use(element, element, held);
   PetscCall(write_table(sizeof(table), table));
   PetscCall(fixture_create(PETSC_COMM_WORLD, 1, "box:1,1,1:2", PETSC_STATIC_ARRAY_LENGTH(sets), sets, &x));
   PetscCall(effect_create(
@@ -137,5 +144,17 @@ int main(int argc, char **argv)
   PetscCall(fixture_destroy(&x));
   PetscCallMPI(MPI_Barrier(PETSC_COMM_WORLD));
   (void)remove(table);
+  PetscCall(PetscOptionsClear(NULL));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+int main(int argc, char **argv)
+{
+  SB_TEST_BEGIN(argc, argv);
+  PetscCall(fixture_register());
+  PetscCall(check_element("p1", PETSC_FALSE));
+  PetscCall(check_element("cr", PETSC_FALSE));
+  PetscCall(check_element("dg", PETSC_FALSE));
+  PetscCall(check_element("dg", PETSC_TRUE));
   SB_TEST_END();
 }

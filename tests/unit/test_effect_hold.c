@@ -1,6 +1,6 @@
 /*
   Prescribed unknowns shared by several effects: the first one has them, values and reactions are the owner's alone, and an
-  effect that is left with nothing is an error.
+  effect that is left with nothing is an error; with every element; supports of DG faces.
 */
 // @ranks 1 3
 #include "effect_fixture.h"
@@ -46,6 +46,7 @@ static void check_bits(const Fixture *x)
 /* Values and reactions by the rule: bottom holds x and z of its nodes, west the rest of its own. */
 static PetscErrorCode check_values(Fixture *x, SbHold *bottom, SbHold *west)
 {
+  const PetscInt side = x->space->faces ? 8 : 9, shared = x->space->faces ? 0 : 3; // nodes
   PetscReal *residual, force[2][3], all[2][3];
 
   PetscFunctionBeginUser;
@@ -64,25 +65,26 @@ static PetscErrorCode check_values(Fixture *x, SbHold *bottom, SbHold *west)
   SbHoldReaction(bottom, residual, force[0]);
   SbHoldReaction(west, residual, force[1]);
   PetscCallMPI(MPI_Allreduce(force, all, 6, MPIU_REAL, MPI_SUM, PETSC_COMM_WORLD));
-  SB_CHECK_NEAR(all[0][0], 9 * 1, 0, "bottom, x");
+  SB_CHECK_NEAR(all[0][0], side, 0, "bottom, x");
   SB_CHECK_NEAR(all[0][1], 0, 0, "bottom, y");
-  SB_CHECK_NEAR(all[0][2], 9 * 3, 0, "bottom, z");
-  SB_CHECK_NEAR(all[1][0], 6 * 1, 0, "west, x");
-  SB_CHECK_NEAR(all[1][1], 9 * 2, 0, "west, y");
-  SB_CHECK_NEAR(all[1][2], 6 * 3, 0, "west, z");
+  SB_CHECK_NEAR(all[0][2], side * 3, 0, "bottom, z");
+  SB_CHECK_NEAR(all[1][0], side - shared, 0, "west, x");
+  SB_CHECK_NEAR(all[1][1], side * 2, 0, "west, y");
+  SB_CHECK_NEAR(all[1][2], (side - shared) * 3, 0, "west, z");
   PetscCall(PetscFree(residual));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-int main(int argc, char **argv)
+static PetscErrorCode check_element(const char *element)
 {
+  const PetscBool p1 = element[0] == 'p' ? PETSC_TRUE : PETSC_FALSE;
   Fixture x;
   SbEffectOn on[3];
   SbHold bottom = {0}, west = {0}, edge = {0};
   PetscInt n;
 
-  SB_TEST_BEGIN(argc, argv);
-  PetscCall(fixture_register());
+  PetscFunctionBeginUser;
+  fixture_use(element, element, PETSC_FALSE);
   PetscCall(fixture_create(PETSC_COMM_WORLD, 1, "box:1,1,1:2", PETSC_STATIC_ARRAY_LENGTH(sets), sets, &x));
   for (int i = 0; i < 3; i++) PetscCall(make_on(sets[i][0], &on[i]));
   SB_CHECK(SbHoldComponents(0) == 1 && SbHoldComponents(2) == 4 && SbHoldComponents(5) == 5 &&
@@ -91,12 +93,13 @@ int main(int argc, char **argv)
 
   PetscCall(SbHoldSetUp(&bottom, x.space, &on[0], 5));
   PetscCall(count(&bottom, &n));
-  SB_CHECK_NEAR(n, 18, 0, "unknowns of the bottom");
+  SB_CHECK_NEAR(n, p1 ? 18 : 16, 0, "unknowns of the bottom");
   PetscCall(SbHoldSetUp(&west, x.space, &on[1], 7));
   PetscCall(count(&west, &n));
-  SB_CHECK_NEAR(n, 9 * 3 - 3 * 2, 0, "unknowns of the west side without those of the bottom");
+  SB_CHECK_NEAR(n, p1 ? 9 * 3 - 3 * 2 : 8 * 3, 0, "unknowns of the west side without those of the bottom");
   check_bits(&x);
-  CHECK_MESSAGE(SbHoldSetUp(&edge, x.space, &on[2], 5), "edge is already prescribed");
+  CHECK_MESSAGE(SbHoldSetUp(&edge, x.space, &on[2], 5),
+                p1 ? "edge is already prescribed" : "vertices of body block but none of its triangles");
   PetscCall(SbSpaceFixDone(x.space));
   PetscCall(check_values(&x, &bottom, &west));
 
@@ -105,5 +108,52 @@ int main(int argc, char **argv)
   PetscCall(SbHoldFree(&edge));
   for (int i = 0; i < 3; i++) PetscCall(SbEffectFreeOn(&on[i]));
   PetscCall(fixture_destroy(&x));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The face of a DG cell with a support is held there, whoever comes first, and its own node is free. */
+static PetscErrorCode check_supports(void)
+{
+  Fixture x;
+  SbEffectOn on;
+  SbHold hold[2] = {0};
+  PetscInt n[2], supports = 0;
+
+  PetscFunctionBeginUser;
+  fixture_use("dg", "dg", PETSC_TRUE);
+  PetscCall(fixture_create(PETSC_COMM_WORLD, 1, "box:1,1,1:2", PETSC_STATIC_ARRAY_LENGTH(sets), sets, &x));
+  PetscCall(make_on(sets[0][0], &on));
+  for (int i = 0; i < 2; i++) {
+    PetscCall(SbHoldSetUp(&hold[i], x.space, &on, i ? 7 : 4));
+    PetscCall(count(&hold[i], &n[i]));
+  }
+  SB_CHECK(n[0] == 8 && n[1] == 16, "z of the first, the rest of the second: %d, %d unknowns", (int)n[0],
+           (int)n[1]);
+  for (PetscInt i = 0; i < 4 * x.mesh->ncell; i++) {
+    const PetscInt own = x.space->cell_node[i], node = x.space->support[i];
+
+    SB_CHECK(!x.space->fixed[own], "a cell's own node is held");
+    if (node < 0) continue;
+    supports += i < 4 * x.mesh->ncell_owned;
+    SB_CHECK(x.space->fixed[node] == 7 && x.space->node_mass[node] == 0, "a support is free or heavy");
+    SB_CHECK_NEAR(x.space->node_x[3 * node + 2], 0, 0, "place of a support");
+  }
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &supports, 1, MPIU_INT, MPI_SUM, PETSC_COMM_WORLD));
+  SB_CHECK(supports == 8 && x.space->Nnode == 4 * x.mesh->Ncell + 8, "%d supports", (int)supports);
+  PetscCall(SbSpaceValidate(x.space));
+  for (int i = 0; i < 2; i++) PetscCall(SbHoldFree(&hold[i]));
+  PetscCall(SbEffectFreeOn(&on));
+  PetscCall(fixture_destroy(&x));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+int main(int argc, char **argv)
+{
+  SB_TEST_BEGIN(argc, argv);
+  PetscCall(fixture_register());
+  PetscCall(check_element("p1"));
+  PetscCall(check_element("cr"));
+  PetscCall(check_element("dg"));
+  PetscCall(check_supports());
   SB_TEST_END();
 }
