@@ -3,7 +3,7 @@
 Displacement, velocity and acceleration of the last frame and every row of history.csv are compared, for every element and
 for all of them in one scene. Also: damaged checkpoints, the newest one that is whole, checkpoints that do not fit the run.
 
-@timeout 240
+@timeout 300
 """
 import re
 import shutil

@@ -1,4 +1,7 @@
-"""fields.xmf as VTK reads it: frames, times, names, values; and the same datasets on 1, 2, 3 and 4 ranks.
+"""fields.xmf as VTK reads it: frames, times, names, values; and the same datasets on 1, 2, 3 and 4 ranks; by element, and
+with points of its own for each cell.
+
+@timeout 300
 
 vtkXdmfReader is what PyPI's VTK has; vtkXdmf3Reader is tried where there is one. Values are compared with those of fields.h5
 and, for the first and last frame, with history.csv.
@@ -12,10 +15,11 @@ from vtkmodules.util.numpy_support import vtk_to_numpy
 from vtkmodules.vtkCommonExecutionModel import vtkStreamingDemandDrivenPipeline
 from vtkmodules.vtkIOXdmf2 import vtkXdmfReader
 
-from output_common import OUT, check_frames, frames, history, run
+from output_common import ELEMENTS, OUT, check_frames, frames, history, run
 
 VECTORS = ["displacement", "velocity", "acceleration", "reaction"]
 CELLS = {"stress": 6, "von_mises": 1, "J": 1, "energy_density": 1}
+PRESSURES = {"pressure": 1, "mean_pressure": 1}
 
 
 def readers():
@@ -46,7 +50,8 @@ def check(condition, text):
         sys.exit(text)
 
 
-def check_reader(make, folder, path):
+def check_reader(make, folder, path, vertices=True, fields=CELLS):
+    """vertices: unknowns are those of vertices, whose largest displacement history.csv tells."""
     reader = make()
     reader.SetFileName(path)
     reader.UpdateInformation()
@@ -55,7 +60,7 @@ def check_reader(make, folder, path):
     check(numpy.array_equal(times, rows[:, names.index("time")]), f"{make.__name__}: times {times[:4]}...")
     groups = dict(frames(folder))
     with h5py.File(OUT / folder / "fields.h5", "r") as f:
-        for k in (0, 7, len(times) - 1):
+        for k in (0, len(times) // 3, len(times) - 1):
             grid, group = grid_at(reader, times[k]), f[groups[times[k]]]
             check(numpy.array_equal(vtk_to_numpy(grid.GetPoints().GetData()), f["/mesh/x"][()]), f"{make.__name__}: points")
             cells = numpy.array([[grid.GetCell(c).GetPointId(a) for a in range(4)] for c in range(grid.GetNumberOfCells())])
@@ -64,14 +69,14 @@ def check_reader(make, folder, path):
             check(points.GetNumberOfArrays() == len(VECTORS), f"{make.__name__}: {points.GetNumberOfArrays()} point arrays")
             for name in VECTORS:
                 check(numpy.array_equal(vtk_to_numpy(points.GetArray(name)), group[name][()]), f"{make.__name__}: {name}")
-            for name, n in CELLS.items():
+            for name, n in fields.items():
                 array = vtk_to_numpy(on_cells.GetArray(name))
                 array = tensor6(array) if n == 6 else array
                 check(numpy.array_equal(array, group[name][()]), f"{make.__name__}: {name}")
             check(numpy.array_equal(vtk_to_numpy(on_cells.GetArray("body")), f["/mesh/body"][()]), f"{make.__name__}: body")
             largest = numpy.linalg.norm(group["displacement"][()], axis=1).max()
             told = rows[k, names.index("max_displacement")]
-            check(abs(largest - told) <= 1e-6 * told, f"displacement {largest} in fields.h5, {told} in history.csv")
+            check(not vertices or abs(largest - told) <= 1e-6 * told, f"displacement {largest} in fields.h5, {told} in history.csv")
             # the reaction balances weight and inertia only in rest; its sum is what history says
             sums = group["reaction"][()].astype(float).sum(axis=0)
             told = rows[k, [names.index(f"hold_reaction_{c}") for c in "xyz"]]
@@ -103,6 +108,50 @@ def check_ranks(folders, tolerance):
     print(f"{len(first)} datasets are the same in {', '.join(folders)}")
 
 
+def check_elements():
+    """Each element, and all in one scene: the same on any number of ranks, and what the readers find."""
+    more = ["-ts_max_time", "0.04", "-output_precision", "double", "-quiet",
+            "-output_fields", ",".join([*VECTORS, *CELLS, *PRESSURES])]
+    for element in ("cr", "dg", "mixed"):
+        for name, option in ((element, []), (f"{element}-corners", ["-output_discontinuous"])):
+            folders = [f"{name}{ranks}" for ranks in (1, 2, 3)]
+            for ranks, folder in zip((1, 2, 3), folders):
+                run(ranks, folder, *ELEMENTS[element], *more, *option)
+                check(check_frames(folder) == 5, f"{folder}: {check_frames(folder)} frames, expected 5")
+            # direct solves to rounding, of matrices with condition numbers near 1e5
+            check_ranks(folders, 1e-9)
+            for make in readers():
+                check_reader(make, folders[2], str(OUT / folders[2] / "fields.xmf"), vertices=False, fields=CELLS | PRESSURES)
+        check_corners(f"{element}1", f"{element}-corners1")
+
+
+def check_corners(mean, corners):
+    """The corners of the cells around a vertex: their mean by volume is the vertex's value, and they are not all alike."""
+    path = frames(mean)[-1][1]
+    with h5py.File(OUT / mean / "fields.h5", "r") as f, h5py.File(OUT / corners / "fields.h5", "r") as g:
+        x, cells, u = (f[name][()] for name in ("/mesh/x", "/mesh/cells", f"{path}/displacement"))
+        own = g[f"{path}/displacement"][()].reshape(len(cells), 4, 3)
+        check(numpy.array_equal(g["/mesh/vertices"][()], cells), f"{corners}: other vertices than {mean} has")
+        check(numpy.array_equal(g["/mesh/cells"][()], numpy.arange(4 * len(cells)).reshape(-1, 4)), f"{corners}: cells")
+        check(numpy.array_equal(g["/mesh/x"][()].reshape(-1, 4, 3), x[cells]), f"{corners}: places of the corners")
+        p, q = g[f"{path}/pressure"][()], f[f"{path}/pressure"][()]
+        # two runs, each with direct solves to rounding
+        check(numpy.abs(p - q).max() <= 1e-9 * numpy.abs(p).max(), f"{corners}: another pressure")
+        reactions = [file[f"{path}/reaction"][()].sum(axis=0) for file in (f, g)]
+    check(numpy.abs(reactions[0] - reactions[1]).max() <= 1e-9 * numpy.abs(reactions[0]).max(), f"reactions {reactions}")
+    edges = x[cells[:, 1:]] - x[cells[:, :1]]
+    volume = numpy.abs(numpy.linalg.det(edges)) / 6
+    sums, weights = numpy.zeros_like(x), numpy.zeros(len(x))
+    for a in range(4):
+        numpy.add.at(sums, cells[:, a], volume[:, None] * own[:, a])
+        numpy.add.at(weights, cells[:, a], volume)
+    worst = numpy.abs(sums / weights[:, None] - u).max() / numpy.abs(u).max()
+    check(worst <= 1e-9, f"{mean}: a vertex differs by {worst:.2g} from the mean of the corners in {corners}")
+    jump = numpy.abs(own - u[cells]).max() / numpy.abs(u).max()
+    check(1e-5 < jump < 0.2, f"{corners}: jumps of {jump:.2g} of the largest displacement")
+    print(f"{corners}: jumps up to {jump:.2g} of the largest displacement")
+
+
 def main():
     folders = []
     for ranks in (1, 2, 3, 4):
@@ -120,6 +169,9 @@ def main():
         os.chdir(OUT / "float")
         check_reader(make, "float", "./fields.xmf")
         os.chdir(here)
+    check_elements()
+    run(2, "p1-corners", "-quiet", "-output_discontinuous", "-ts_max_time", "0.04")
+    check_reader(vtkXdmfReader, "p1-corners", str(OUT / "p1-corners" / "fields.xmf"))
 
 
 if __name__ == "__main__":
