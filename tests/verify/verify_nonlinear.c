@@ -3,7 +3,7 @@
   Newton's method and what happens when it fails.
 
     quadratic   with an exact tangent the number of right digits doubles; with the warped one convergence is linear, and the
-                answer the same
+                answer the same; so with CR and DG
     load steps  a static state does not depend on the number of load steps, and passes through the states of partial load
     long steps  implicit Euler with steps of 1 s, many periods long, settles at the static answer
     adaptive    the error of an adaptive run follows its tolerance
@@ -47,7 +47,8 @@ static PetscErrorCode one_step(TestScene *t, Vec U, PetscReal size, PetscReal *e
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode check_order(const char *law, const char *tangent, PetscReal expected, PetscReal at[3])
+static PetscErrorCode check_order(const char *element, const char *law, const char *tangent,
+                                  PetscReal expected, PetscReal at[3])
 {
   PetscReal error[2], order;
   TestScene t;
@@ -56,9 +57,10 @@ static PetscErrorCode check_order(const char *law, const char *tangent, PetscRea
   PetscFunctionBeginUser;
   PetscCall(PetscSNPrintf(
     text, sizeof(text),
-    BAR CLAMP "-body_a_material %s -body_a_tangent %s -effects gravity,clamp,air -effect_air_type "
-              "pressure -effect_air_on boundary -effect_air_value 2000 -time static " TIGHT,
-    law, tangent));
+    BAR CLAMP
+    "-body_a_element %s -body_a_material %s -body_a_tangent %s -effects gravity,clamp,air -effect_air_type "
+    "pressure -effect_air_on boundary -effect_air_value 2000 %s -time static " TIGHT,
+    element, law, tangent, strcmp(element, "p1") ? "-effect_air_follower false -body_a_young 1e6" : ""));
   PetscCall(test_scene_open(text, &t));
   PetscCall(verify_solve(&t, law));
   PetscCall(test_value_at(t.model, t.run->U, end, at));
@@ -66,26 +68,31 @@ static PetscErrorCode check_order(const char *law, const char *tangent, PetscRea
   order = PetscLog10Real(error[0] / error[1]);
   PetscCall(PetscPrintf(
     PETSC_COMM_WORLD,
-    "  %-10s %-9s: %2d iterations to the answer; a disturbance of 1e-3, 1e-4 becomes %.1e, %.1e: order "
+    "  %s %-10s %-9s: %2d iterations to the answer; a disturbance of 1e-3, 1e-4 becomes %.1e, %.1e: order "
     "%.2f\n",
-    law, tangent, (int)t.run->newton_total, (double)error[0], (double)error[1], (double)order));
+    element, law, tangent, (int)t.run->newton_total, (double)error[0], (double)error[1], (double)order));
   SB_CHECK_NEAR(order, expected, 0.1, "order of Newton's method");
   PetscCall(test_scene_close(&t));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode check_orders(void)
+/*
+  All laws and tangents of an element. P1 on this mesh is twice too stiff; CR and DG are not, and get a stiffer bar. Their
+  pressure keeps its direction: a surface with gaps has a tangent that is not symmetric, of which the matrix has the symmetric
+  part (src/effect/pressure.c).
+*/
+static PetscErrorCode check_orders(const char *element)
 {
   PetscReal exact[3], other[3];
 
   PetscFunctionBeginUser;
-  PetscCall(check_order("stvk", "exact", 2., exact));
-  PetscCall(check_order("neohookean", "exact", 2., exact));
-  PetscCall(check_order("corotated", "exact", 2., exact));
-  PetscCall(check_order("corotated", "warped", 1., other));
+  PetscCall(check_order(element, "stvk", "exact", 2., exact));
+  PetscCall(check_order(element, "neohookean", "exact", 2., exact));
+  PetscCall(check_order(element, "corotated", "exact", 2., exact));
+  PetscCall(check_order(element, "corotated", "warped", 1., other));
   for (int k = 0; k < 3; k++)
     SB_CHECK_NEAR(other[k], exact[k], 1e-9 * PetscAbsReal(exact[2]), "answer with warped");
-  PetscCall(check_order("corotated", "exact_spd", 1., other));
+  PetscCall(check_order(element, "corotated", "exact_spd", 1., other));
   for (int k = 0; k < 3; k++)
     SB_CHECK_NEAR(other[k], exact[k], 1e-9 * PetscAbsReal(exact[2]), "answer with exact_spd");
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -111,8 +118,8 @@ static PetscErrorCode watch_path(SbRun run, const SbStep *step, void *ctx)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Everything constant is multiplied by the load factor: gravity, pressure, a pushed end. */
-static PetscErrorCode follow(const char *law, int steps, PetscReal load, Path *path)
+/* Everything constant is multiplied by the load factor: gravity, pressure, a pushed end. A stiffer bar for CR and DG, as above. */
+static PetscErrorCode follow(const char *element, const char *law, int steps, PetscReal load, Path *path)
 {
   TestScene t;
   char text[VERIFY_TEXT];
@@ -121,11 +128,13 @@ static PetscErrorCode follow(const char *law, int steps, PetscReal load, Path *p
   *path = (Path){.n = 0};
   PetscCall(PetscSNPrintf(
     text, sizeof(text),
-    BAR CLAMP "-body_a_material %s -effects gravity,clamp,air,push -effect_gravity_vector 0,0,%g "
-              "-effect_air_type pressure -effect_air_on zmax -effect_air_value %g -effect_push_type "
-              "drive -effect_push_on xmax -effect_push_components y -effect_push_displacement 0;%g;0 "
-              "-time static -static_steps %d " TIGHT,
-    law, -9.81 * (double)load, 100. * (double)load, 0.1 * (double)load, steps));
+    BAR CLAMP
+    "-body_a_element %s -body_a_material %s -effects gravity,clamp,air,push -effect_gravity_vector 0,0,%g "
+    "-effect_air_type pressure -effect_air_on zmax -effect_air_value %g -effect_push_type "
+    "drive -effect_push_on xmax -effect_push_components y -effect_push_displacement 0;%g;0 "
+    "-time static -static_steps %d %s " TIGHT,
+    element, law, -9.81 * (double)load, 100. * (double)load, 0.1 * (double)load, steps,
+    strcmp(element, "p1") ? "-body_a_young 1e6" : ""));
   PetscCall(test_scene_open(text, &t));
   t.run->want_energies = PETSC_TRUE;
   PetscCall(SbRunAddMonitor(t.run, watch_path, path, NULL));
@@ -134,24 +143,27 @@ static PetscErrorCode follow(const char *law, int steps, PetscReal load, Path *p
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode check_path(const char *law)
+static PetscErrorCode check_path(const char *element, const char *law)
 {
+  /* a stiffer bar has larger first residuals, which is where Newton's tolerance comes from */
+  const PetscReal tolerance = strcmp(element, "p1") ? 1e-8 : 1e-9;
   Path four, one, half;
 
   PetscFunctionBeginUser;
-  PetscCall(follow(law, 4, 1., &four));
-  PetscCall(follow(law, 1, 1., &one));
-  PetscCall(follow(law, 1, 0.5, &half));
+  PetscCall(follow(element, law, 4, 1., &four));
+  PetscCall(follow(element, law, 1, 1., &one));
+  PetscCall(follow(element, law, 1, 0.5, &half));
   SB_CHECK(four.n == 5 && four.load[2] == 0.5, "%s: %d states", law, (int)four.n);
   SB_CHECK(four.strain0 == 0. && four.u[0][2] == 0., "%s: the path begins with a strain energy of %g J", law,
            (double)four.strain0);
   PetscCall(
     PetscPrintf(PETSC_COMM_WORLD,
-                "  %-10s: end of the bar, 4 load steps and 1 differ by %.1e, the halfway state by %.1e\n",
-                law, (double)verify_difference(3, one.u[one.n - 1], four.u[4]),
+                "  %s %-10s: end of the bar, 4 load steps and 1 differ by %.1e, the halfway state by %.1e\n",
+                element, law, (double)verify_difference(3, one.u[one.n - 1], four.u[4]),
                 (double)verify_difference(3, half.u[half.n - 1], four.u[2])));
-  SB_CHECK(verify_difference(3, one.u[one.n - 1], four.u[4]) < 1e-9, "%s: one step and four differ", law);
-  SB_CHECK(verify_difference(3, half.u[half.n - 1], four.u[2]) < 1e-9,
+  SB_CHECK(verify_difference(3, one.u[one.n - 1], four.u[4]) < tolerance, "%s: one step and four differ",
+           law);
+  SB_CHECK(verify_difference(3, half.u[half.n - 1], four.u[2]) < tolerance,
            "%s: half the load and half the way differ", law);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -322,11 +334,15 @@ static PetscErrorCode check_one_solve(void)
 int main(int argc, char **argv)
 {
   SB_TEST_BEGIN(argc, argv);
-  PetscCall(check_orders());
-  PetscCall(check_path("linear"));
-  PetscCall(check_path("corotated"));
-  PetscCall(check_path("stvk"));
-  PetscCall(check_path("neohookean"));
+  PetscCall(check_orders("p1"));
+  PetscCall(check_orders("cr"));
+  PetscCall(check_orders("dg"));
+  PetscCall(check_path("p1", "linear"));
+  PetscCall(check_path("p1", "corotated"));
+  PetscCall(check_path("p1", "stvk"));
+  PetscCall(check_path("p1", "neohookean"));
+  PetscCall(check_path("cr", "corotated"));
+  PetscCall(check_path("dg", "neohookean"));
   PetscCall(check_long_steps());
   PetscCall(check_adaptive("newmark"));
   PetscCall(check_adaptive("euler_implicit"));

@@ -7,8 +7,12 @@
     memory      a scene allocates the same number of bytes whether the program knows an effect of another type or not, and
                 the type's constructor is not called
     trajectory  bit by bit the same with that type in the program; with effects that are named and do nothing too
+    elements    with P1 alone there is nothing of CR and DG: no neighbours, no face terms, no second list of nodes; the nodes
+                are the mesh's own arrays. Named or not, the run is the same to the last bit and byte. Beside a body of another
+                element a P1 body moves as alone, but for rounding
     linear      a linear run assembles its tangent once; a static run has no mass, no velocity and no integrator
 */
+#include "../../src/fem/fem_impl.h"
 #include "verify.h"
 
 /* A type that nobody names. Its constructor must not be called. */
@@ -69,7 +73,7 @@ static PetscErrorCode run(const char *options, PetscBool storm, Trace *trace)
   PetscCall(count_events(trace->events));
   for (int e = 0; e < SB_EVENT_COUNT; e++) trace->events[e] -= first[e];
   trace->bytes = after - before;
-  trace->n = t.model->mesh->Nvert;
+  trace->n = verify_numbers(t.model);
   trace->v = NULL;
   PetscCall(verify_gather(t.model, t.run->U, &trace->u));
   if (t.run->V) PetscCall(verify_gather(t.model, t.run->V, &trace->v));
@@ -177,6 +181,64 @@ static PetscErrorCode check_static(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The space of a P1 scene, with its plan. */
+static PetscErrorCode check_plain_space(void)
+{
+  TestScene t;
+  SbSpace s;
+  Mat A;
+
+  PetscFunctionBeginUser;
+  PetscCall(test_scene_open(FREE "-body_a_material corotated -time newmark", &t));
+  s = t.model->space;
+  PetscCall(SbSpaceCreateMatrix(s, SB_MATRIX_BAIJ, &A));
+  SB_CHECK(!s->faces && !s->neighbour && !s->support && !s->jump && !s->batch_weight && s->width == 4,
+           "a space of vertices holds something of faces");
+  SB_CHECK(s->batch_clique == s->batch_node && s->node_body == s->mesh->vert_body &&
+             s->node_set == s->mesh->vert_set && s->node_orig == s->mesh->vert_orig,
+           "a space of vertices has copies of what the mesh holds");
+  SB_CHECK(s->plan && !s->plan->glue[0] && !s->plan->glue[1], "the plan has face terms");
+  PetscCall(MatDestroy(&A));
+  PetscCall(test_scene_close(&t));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* An explicit run: no tolerance of a solver between the two. */
+static PetscErrorCode check_elements(const char *law, const char *other)
+{
+  Trace plain, named, beside;
+  char text[VERIFY_TEXT];
+
+  PetscFunctionBeginUser;
+  PetscCall(
+    PetscSNPrintf(text, sizeof(text), FREE "-body_a_material %s -time euler_symplectic -ts_dt 0.0005", law));
+  PetscCall(run(text, PETSC_FALSE, &plain));
+  PetscCall(PetscStrlcat(text, " -body_a_element p1", sizeof(text)));
+  PetscCall(run(text, PETSC_FALSE, &named));
+  SB_CHECK(plain.bytes == named.bytes, "%g bytes, and %g with the element named", plain.bytes, named.bytes);
+  SB_CHECK(!memcmp(plain.u, named.u, sizeof(PetscReal) * 3 * (size_t)plain.n) &&
+             !memcmp(plain.v, named.v, sizeof(PetscReal) * 3 * (size_t)plain.n),
+           "%s: the trajectory changes when the element is named", law);
+  PetscCall(
+    PetscSNPrintf(text, sizeof(text),
+                  FREE "-body_a_material %s -time euler_symplectic -ts_dt 0.0005 -bodies a,b -body_b_mesh "
+                       "box:0.1,0.1,0.1:1 -body_b_translate 0,0,9 -body_b_material linear -body_b_young 1e3 "
+                       "-body_b_poisson 0.3 -body_b_density 1000 -body_b_element %s",
+                  law, other));
+  PetscCall(run(text, PETSC_FALSE, &beside));
+  PetscCall(PetscPrintf(PETSC_COMM_WORLD,
+                        "  %-10s beside %s: the p1 body moves as alone, but for %.1e and %.1e\n", law, other,
+                        (double)verify_difference(3 * plain.n, plain.u, beside.u),
+                        (double)verify_difference(3 * plain.n, plain.v, beside.v)));
+  SB_CHECK(verify_difference(3 * plain.n, plain.u, beside.u) < 1e-12 &&
+             verify_difference(3 * plain.n, plain.v, beside.v) < 1e-12,
+           "%s: a body of %s changes the trajectory of one of p1", law, other);
+  PetscCall(destroy(&plain));
+  PetscCall(destroy(&named));
+  PetscCall(destroy(&beside));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 int main(int argc, char **argv)
 {
   Trace first;
@@ -198,5 +260,8 @@ int main(int argc, char **argv)
   PetscCall(check_idle("pull", "-effect_pull_type traction -effect_pull_on xmin -effect_pull_vector 0;0;0"));
   PetscCall(check_idle("air", "-effect_air_type pressure -effect_air_on zmax -effect_air_value 0"));
   PetscCall(check_static());
+  PetscCall(check_plain_space());
+  PetscCall(check_elements("neohookean", "cr"));
+  PetscCall(check_elements("corotated", "dg"));
   SB_TEST_END();
 }

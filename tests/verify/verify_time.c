@@ -3,7 +3,8 @@
   The integrators against exact answers of their own recurrences. One linear tet held at its base is an oscillator: its apex moves
   along z with w^2 = V (lambda + 2 mu) / (H^2 m), m = rho V / 4. With q = v + i w u an undamped step multiplies q by
     implicit Euler 1 / (1 - i w h), explicit Euler 1 + i w h, Newmark (1/4, 1/2) (1 + i w h / 2) / (1 - i w h / 2),
-  which is where amplitude factor and period elongation of the field's formulas come from.
+  which is where amplitude factor and period elongation of the field's formulas come from. With CR and DG, whose tet has more
+  than one motion: the order from steps of h, h/2 and h/4 of a small bar, and free fall.
 */
 #include <complex.h>
 #undef I
@@ -108,18 +109,19 @@ static PetscErrorCode check_dissipation(void)
 }
 
 /* A free body under gravity: implicit Euler falls g h^2 n (n + 1) / 2, Newmark g t^2 / 2. */
-static PetscErrorCode check_free_fall(const char *preset, PetscReal expected)
+static PetscErrorCode check_free_fall(const char *element, const char *preset, PetscReal expected)
 {
   TestScene t;
   char text[1024];
   PetscReal value[3];
 
   PetscFunctionBeginUser;
-  PetscCall(PetscSNPrintf(text, sizeof(text),
-                          "-bodies a -body_a_mesh box:0.2,0.1,0.1:2 -body_a_material corotated -body_a_young "
-                          "1e4 -body_a_poisson 0.3 -body_a_density 1000 "
-                          "-effects gravity -time %s -ts_dt 0.01 -ts_max_time 0.5",
-                          preset));
+  PetscCall(
+    PetscSNPrintf(text, sizeof(text),
+                  "-bodies a -body_a_mesh box:0.2,0.1,0.1:2 -body_a_element %s "
+                  "-body_a_material corotated -body_a_young 1e4 -body_a_poisson 0.3 -body_a_density 1000 "
+                  "-effects gravity -time %s -ts_dt 0.01 -ts_max_time 0.5 -snes_rtol 1e-10",
+                  element, preset));
   PetscCall(test_scene_open(text, &t));
   PetscCall(SbRunSolve(t.run));
   SB_CHECK(t.run->steps_total == 50, "%s: %" PetscInt_FMT " steps instead of 50", preset, t.run->steps_total);
@@ -133,8 +135,50 @@ static PetscErrorCode check_free_fall(const char *preset, PetscReal expected)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* End of a bar that gravity bends, and how fast it goes there. */
+static PetscErrorCode bend(const char *element, const char *options, PetscInt n, PetscReal value[6])
+{
+  const PetscReal end[3] = {0.2, 0.05, 0.05}, T = 0.02;
+  TestScene t;
+  char text[1024];
+
+  PetscFunctionBeginUser;
+  PetscCall(
+    PetscSNPrintf(text, sizeof(text),
+                  "-bodies a -body_a_mesh box:0.2,0.1,0.1:1 -body_a_element %s -body_a_material linear "
+                  "-body_a_young 1e4 -body_a_poisson 0.3 -body_a_density 1000 -effects gravity,hold,damping "
+                  "-effect_damping_alpha 2 -effect_damping_beta 0.002 -effect_hold_type support "
+                  "-effect_hold_on xmin -ts_dt %.17g -ts_max_time %.17g -ksp_rtol 1e-14 -solver mumps %s",
+                  element, (double)(T / (PetscReal)n), (double)T, options));
+  PetscCall(test_scene_open(text, &t));
+  PetscCall(SbRunSolve(t.run));
+  SB_CHECK(!t.run->stop_reason[0] && t.run->steps_total == n, "%s: %s", options, t.run->stop_reason);
+  PetscCall(test_value_at(t.model, t.run->U, end, value));
+  PetscCall(test_value_at(t.model, t.run->V, end, value + 3));
+  PetscCall(test_scene_close(&t));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Steps of h, h/2, h/4: the differences fall with the order of the method. */
+static PetscErrorCode check_bar_order(const char *element, const char *options, int order)
+{
+  PetscReal x[3][6], order_u, order_v;
+
+  PetscFunctionBeginUser;
+  for (int k = 0; k < 3; k++) PetscCall(bend(element, options, 40 << k, x[k]));
+  order_u = PetscLog2Real((x[0][2] - x[1][2]) / (x[1][2] - x[2][2]));
+  order_v = PetscLog2Real((x[0][5] - x[1][5]) / (x[1][5] - x[2][5]));
+  PetscCall(PetscPrintf(PETSC_COMM_WORLD, "  %s %s: order %.3f of displacements, %.3f of velocities\n",
+                        element, options, (double)order_u, (double)order_v));
+  SB_CHECK_NEAR(order_u, order, 0.1, options);
+  SB_CHECK_NEAR(order_v, order, 0.1, options);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 int main(int argc, char **argv)
 {
+  static const char *const elements[] = {"p1", "cr", "dg"};
+
   SB_TEST_BEGIN(argc, argv);
   PetscCall(check_oscillator("-time euler_implicit", 0));
   PetscCall(check_oscillator("-time euler_explicit", 1));
@@ -151,8 +195,13 @@ int main(int argc, char **argv)
   PetscCall(check_order("-time genalpha -time_spectral_radius 0.5", 0.25, 0., 0., 2));
   PetscCall(check_order("-time genalpha -time_spectral_radius 0", 0.25, 2., 0.002, 2));
   PetscCall(check_dissipation());
-  PetscCall(check_free_fall("euler_implicit", -9.81 * 1e-4 * 50 * 51 / 2));
-  PetscCall(check_free_fall("newmark", -0.5 * 9.81 * 0.25));
-  PetscCall(check_free_fall("genalpha", -0.5 * 9.81 * 0.25));
+  for (int e = 0; e < 3; e++) {
+    PetscCall(check_bar_order(elements[e], "-time euler_implicit", 1));
+    PetscCall(check_bar_order(elements[e], "-time newmark", 2));
+    PetscCall(check_bar_order(elements[e], "-time newmark -mass consistent", 2));
+    PetscCall(check_free_fall(elements[e], "euler_implicit", -9.81 * 1e-4 * 50 * 51 / 2));
+    PetscCall(check_free_fall(elements[e], "newmark", -0.5 * 9.81 * 0.25));
+    PetscCall(check_free_fall(elements[e], "genalpha", -0.5 * 9.81 * 0.25));
+  }
   SB_TEST_END();
 }
