@@ -1,4 +1,5 @@
-"""fields.xmf in ParaView itself: each of its three XDMF readers gives the frames, times, names and values of fields.h5.
+"""fields.xmf in ParaView itself: each of its three XDMF readers gives the frames, times, names and values of fields.h5; of P1, and
+of the other elements with points of their own for each cell.
 
 @long
 @timeout 300
@@ -13,7 +14,7 @@ import sys
 import h5py
 import numpy
 
-from output_common import OUT, frames, history, run
+from output_common import ELEMENTS, OUT, frames, history, run
 
 READERS = ["XDMFReader", "Xdmf3ReaderT", "Xdmf3ReaderS"]
 POINTS = ["displacement", "velocity", "acceleration", "reaction"]
@@ -73,22 +74,28 @@ def check_array(reader, name, found, expected):
         check(numpy.array_equal(numpy.array(got, dtype=rows.dtype), row), f"{reader}: {name} holds {got}, expected {row}")
 
 
-def main():
-    pvpython = os.environ.get("PVPYTHON") or shutil.which("pvpython")
-    check(pvpython, "pvpython is missing: apt-get install --no-install-recommends python3-paraview, or name it by PVPYTHON")
-    run(2, "run", "-quiet")
-    names, rows = history("run")
-    time, group = frames("run")[11]
-    with h5py.File(OUT / "run" / "fields.h5", "r") as f:
+def check_readers(pvpython, folder, *options):
+    run(2, folder, "-quiet", *options)
+    names, rows = history(folder)
+    time, group = frames(folder)[len(rows) // 2]
+    with h5py.File(OUT / folder / "fields.h5", "r") as f:
         for reader in READERS:
-            times, npoint, ncell, corner, point, arrays = read(pvpython, reader, OUT / "run" / "fields.xmf", time)
+            times, npoint, ncell, corner, point, arrays = read(pvpython, reader, OUT / folder / "fields.xmf", time)
             check(numpy.array_equal(times, rows[:, names.index("time")]), f"{reader}: times {times}")
             check(npoint == len(f["/mesh/x"]) and ncell == len(f["/mesh/cells"]), f"{reader}: {npoint} points, {ncell} cells")
             check(corner == list(f["/mesh/cells"][7]) and point == list(f["/mesh/x"][corner[2]]), f"{reader}: cell 7 {corner} {point}")
             for name in POINTS + CELLS:
                 check(name in arrays, f"{reader}: {name} is missing among {list(arrays)}")
                 check_array(reader, name, arrays[name], f["/mesh/body" if name == "body" else f"{group}/{name}"][()])
-            print(f"{reader}: {len(times)} frames, {len(arrays)} arrays")
+            print(f"{reader}: {len(times)} frames, {len(arrays)} arrays, {npoint} points of {folder}")
+
+
+def main():
+    pvpython = os.environ.get("PVPYTHON") or shutil.which("pvpython")
+    check(pvpython, "pvpython is missing: apt-get install --no-install-recommends python3-paraview, or name it by PVPYTHON")
+    check_readers(pvpython, "run")
+    for element in ("cr", "dg", "mixed"):
+        check_readers(pvpython, element, *ELEMENTS[element], "-output_discontinuous", "-ts_max_time", "0.04")
 
 
 if __name__ == "__main__":

@@ -11,7 +11,7 @@ import matplotlib
 import numpy
 from PIL import Image
 
-from output_common import OUT, run
+from output_common import ELEMENTS, OUT, run
 
 RENDER = [sys.executable, str(Path(__file__).resolve().parents[2] / "scripts" / "render")]
 WITHOUT_DISPLAY = {name: value for name, value in os.environ.items() if name not in ("DISPLAY", "WAYLAND_DISPLAY")}
@@ -69,6 +69,19 @@ def main():
     check(Image.open(OUT / "bar.gif").n_frames == 6, f"{Image.open(OUT / 'bar.gif').n_frames} pictures for 0.1 s at 50 a second")
     render(folder, "--animate", OUT / "bar.png", "--size", "300x200", "--fps", "50", "--field", "displacement_z")
     check(len(list(OUT.glob("bar_0*.png"))) == 6, "the sequence of pictures")
+
+    # points of their own change shades and, where cells part, a few pixels
+    run(1, "cr", "-ts_max_time", "0.05", "-quiet", "-output_fields", "displacement,pressure", *ELEMENTS["cr"])
+    run(1, "corners", "-ts_max_time", "0.05", "-quiet", "-output_fields", "displacement,pressure", "-output_discontinuous", *ELEMENTS["cr"])
+    pictures = []
+    for name in ("cr", "corners"):
+        render(OUT / name, "--field", "pressure", "--range", "-200", "200", "--size", "600x400", "-o", OUT / f"{name}.png")
+        left, body = body_pixels(OUT / f"{name}.png", 150)
+        check(0.1 < body.mean() < 0.8, f"{name}: the body covers {body.mean():.0%} of the picture")
+        pictures.append(left)
+    apart = (numpy.abs(pictures[0] - pictures[1]).max(axis=2) > 40).mean()
+    print(f"points of their own change {apart:.2%} of the picture")
+    check(apart < 0.05, f"points of their own change {apart:.1%} of the picture")
 
     check("has no field 'von_mizes'; it has displacement" in render(folder, "--field", "von_mizes", fails=True), "unknown field")
     check("is a tensor" in render(folder, "--field", "stress", fails=True), "tensor")

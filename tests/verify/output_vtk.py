@@ -77,6 +77,11 @@ def check_reader(make, folder, path, vertices=True, fields=CELLS):
             largest = numpy.linalg.norm(group["displacement"][()], axis=1).max()
             told = rows[k, names.index("max_displacement")]
             check(not vertices or abs(largest - told) <= 1e-6 * told, f"displacement {largest} in fields.h5, {told} in history.csv")
+            x, cells, J = f["/mesh/x"][()], f["/mesh/cells"][()], group["J"][()].astype(float)
+            volume = numpy.abs(numpy.linalg.det(x[cells[:, 1:]] - x[cells[:, :1]])) @ J / 6
+            told = rows[k, [names.index(name) for name in ("volume", "min_J")]]
+            # the rounding of J to a float
+            check(numpy.abs(told / (volume, J.min()) - 1).max() <= 1e-6, f"volume and least J {volume}, {J.min()}, history {told}")
             # the reaction balances weight and inertia only in rest; its sum is what history says
             sums = group["reaction"][()].astype(float).sum(axis=0)
             told = rows[k, [names.index(f"hold_reaction_{c}") for c in "xyz"]]
