@@ -3,9 +3,11 @@
   The patch test (MacNeal and Harder, "A proposed standard set of problems to test finite element accuracy", 1985): a body
   that is held on its boundary, or pulled there, as a homogeneous deformation x = F X asks for must take it inside too, on
   any mesh. Small strains with the displacement of that paper, and a large strain with every law: the stress is compared
-  with the law's formula, which is written down here once more. The linear system is solved directly.
+  with the law's formula, which is written down here once more. The linear system is solved directly. The same for CR and DG:
+  their nodes on the boundary are moved or pulled, and those inside, among them all jumps, must follow.
 
-  Tolerances: displacements 1e-10 of the largest. Stresses 1e-9 of the largest, times the condition of the law: rounding of
+  Tolerances: displacements 1e-10 of the largest; 1e-9 with CR and DG at nu = 0.4999, whose many unknowns inside feel the
+  condition of the law. Stresses 1e-9 of the largest, times the condition of the law: rounding of
   the strain is multiplied by lambda / mu.
 */
 #include "verify.h"
@@ -203,9 +205,16 @@ static PetscErrorCode load_options(PetscBool pulled, const PetscReal F[9], const
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode check_patch(Shape shape, const char *path, const char *law, PetscReal nu,
-                                  PetscBool pulled, const PetscReal F[9], PetscReal known_normal,
-                                  PetscReal known_shear)
+/* A mesh with the element that is tried on it. */
+typedef struct {
+  Shape shape;
+  const char *element;
+  char path[512];
+} Patch;
+
+/* known: normal and shear stress of the paper; NULL: not looked at. */
+static PetscErrorCode check_patch(const Patch *p, const char *law, PetscReal nu, PetscBool pulled,
+                                  const PetscReal F[9], const PetscReal known[2])
 {
   const PetscReal E = 1e6, stiff = PetscMax(1., nu / (1. - 2. * nu));
   TestScene t;
@@ -215,28 +224,30 @@ static PetscErrorCode check_patch(Shape shape, const char *path, const char *law
   PetscFunctionBeginUser;
   exact_stress(law, E, nu, F, P);
   exact_cauchy(law, F, P, sigma);
-  for (int k = 0; k < 6 && known_normal > 0.; k++) {
-    SB_CHECK_NEAR(sigma[k], k < 3 ? known_normal : known_shear, 1e-9 * known_normal, "stress of the paper");
-  }
+  for (int k = 0; k < 6 && known; k++)
+    SB_CHECK_NEAR(sigma[k], k < 3 ? known[0] : known[1], 1e-9 * known[0], "stress of the paper");
   PetscCall(load_options(pulled, F, P, loads, sizeof(loads)));
-  PetscCall(PetscSNPrintf(text, sizeof(text),
-                          "-bodies a -body_a_mesh %s -body_a_material %s -body_a_young %g -body_a_poisson %g "
-                          "-body_a_density 1 -time static -ksp_rtol 1e-13 -snes_rtol 1e-13 -snes_atol 0 "
-                          "-snes_stol 1e-13 %s %s",
-                          path, law, (double)E, (double)nu,
-                          !strcmp(law, "corotated") ? "-body_a_tangent exact" : "", loads));
+  PetscCall(PetscSNPrintf(
+    text, sizeof(text),
+    "-bodies a -body_a_mesh %s -body_a_element %s -body_a_material %s -body_a_young %g "
+    "-body_a_poisson %g -body_a_density 1 -time static -ksp_rtol 1e-13 -snes_rtol 1e-13 "
+    "-snes_atol 0 -snes_stol 1e-13 %s %s %s",
+    p->path, p->element, law, (double)E, (double)nu, !strcmp(law, "corotated") ? "-body_a_tangent exact" : "",
+    !strcmp(p->element, "p1") ? "" : "-solver mumps", loads));
   PetscCall(test_scene_open(text, &t));
   PetscCall(verify_solve(&t, law));
   PetscCall(errors(&t, F, sigma, error));
   PetscCall(PetscPrintf(
-    PETSC_COMM_WORLD, "  %-10s %-10s nu %-6g %-9s smallest angle %7.3f deg: u %.1e, stress %.1e, Newton %d\n",
-    shapes[shape], law, (double)nu, pulled ? "tractions" : "moved", (double)t.model->body[0].min_dihedral,
+    PETSC_COMM_WORLD,
+    "  %s %-10s %-10s nu %-6g %-9s smallest angle %7.3f deg: u %.1e, stress %.1e, Newton %d\n", p->element,
+    shapes[p->shape], law, (double)nu, pulled ? "tractions" : "moved", (double)t.model->body[0].min_dihedral,
     (double)error[0], (double)error[1], (int)t.run->newton_total));
-  SB_CHECK(error[0] <= 1e-10, "%s, %s, nu %g: displacement off by %g", shapes[shape], law, (double)nu,
+  SB_CHECK(error[0] <= (nu > 0.4 && strcmp(p->element, "p1") ? 1e-9 : 1e-10),
+           "%s, %s, %s, nu %g: displacement off by %g", p->element, shapes[p->shape], law, (double)nu,
            (double)error[0]);
-  SB_CHECK(error[1] <= 1e-9 * stiff, "%s, %s, nu %g: stress off by %g", shapes[shape], law, (double)nu,
-           (double)error[1]);
-  if (shape == SLIVERS) {
+  SB_CHECK(error[1] <= 1e-9 * stiff, "%s, %s, %s, nu %g: stress off by %g", p->element, shapes[p->shape], law,
+           (double)nu, (double)error[1]);
+  if (p->shape == SLIVERS) {
     SB_CHECK(t.model->body[0].min_dihedral > 0.05 && t.model->body[0].min_dihedral < 1.,
              "smallest dihedral angle of the mesh of slivers is %g degrees",
              (double)t.model->body[0].min_dihedral);
@@ -245,28 +256,45 @@ static PetscErrorCode check_patch(Shape shape, const char *path, const char *law
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-int main(int argc, char **argv)
+/* All that is asked of an element on one mesh. */
+static PetscErrorCode check_mesh(const Patch *p)
 {
   const PetscReal small[9] = {1. + 1e-3, 5e-4, 5e-4, 5e-4, 1. + 1e-3, 5e-4, 5e-4, 5e-4, 1. + 1e-3};
   /* a stretch by a quarter with shear and a turn, nearly without change of volume */
   const PetscReal large[9] = {1.25, 0.1, 0.05, -0.2, 0.9, 0.1, 0.1, -0.15, 0.9};
+  /* CR and DG with nonlinear laws are not stable under pressures above their shear modulus: without change of volume */
+  const PetscReal even[9] = {1. + 2e-3, 5e-4, 5e-4, 5e-4, 1. - 1e-3, 5e-4, 5e-4, 5e-4, 1. - 1e-3};
+  const PetscReal paper[2] = {2000., 400.};
+
+  PetscFunctionBeginUser;
+  for (int pulled = 0; pulled < 2; pulled++) {
+    PetscCall(check_patch(p, "linear", 0.25, (PetscBool)pulled, small, paper));
+    PetscCall(check_patch(p, "linear", 0.4999, (PetscBool)pulled, small, NULL));
+  }
+  for (int law = 0; law < 4; law++) {
+    PetscCall(check_patch(p, laws[law], 0.25, PETSC_FALSE, large, NULL));
+    /* flat tets next to incompressible ones: hundreds of Newton steps lead there, to the same digits */
+    if (p->shape == SLIVERS && law > 0) continue;
+    PetscCall(check_patch(p, laws[law], 0.4999, PETSC_FALSE, strcmp(p->element, "p1") ? even : large, NULL));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+int main(int argc, char **argv)
+{
+  static const char *const elements[] = {"p1", "cr", "dg"};
+  Patch p;
 
   SB_TEST_BEGIN(argc, argv);
-  for (Shape shape = REGULAR; shape <= SLIVERS; shape++) {
-    char path[512];
-
-    PetscCall(write_mesh(shape, shape == SLIVERS ? 5 : 3, path));
-    for (int pulled = 0; pulled < 2; pulled++) {
-      PetscCall(check_patch(shape, path, "linear", 0.25, (PetscBool)pulled, small, 2000., 400.));
-      PetscCall(check_patch(shape, path, "linear", 0.4999, (PetscBool)pulled, small, -1., 0.));
+  for (p.shape = REGULAR; p.shape <= SLIVERS; p.shape++) {
+    PetscCall(write_mesh(p.shape, p.shape == SLIVERS ? 5 : 3, p.path));
+    for (int e = 0; e < 3; e++) {
+      /* CR and DG: one mesh without slivers is enough */
+      if (e > 0 && p.shape == REGULAR) continue;
+      p.element = elements[e];
+      PetscCall(check_mesh(&p));
     }
-    for (int law = 0; law < 4; law++) {
-      PetscCall(check_patch(shape, path, laws[law], 0.25, PETSC_FALSE, large, -1., 0.));
-      /* flat tets next to incompressible ones: hundreds of Newton steps lead there, to the same digits */
-      if (shape == SLIVERS && law > 0) continue;
-      PetscCall(check_patch(shape, path, laws[law], 0.4999, PETSC_FALSE, large, -1., 0.));
-    }
-    PetscCall(verify_mesh_remove(path));
+    PetscCall(verify_mesh_remove(p.path));
   }
   SB_TEST_END();
 }
