@@ -1,0 +1,99 @@
+/*
+  cells.h - what any element's function is in a cell and at a vertex, and boxes whose inner vertices were moved.
+*/
+#pragma once
+#include "verify.h"
+
+/* The linear function of an element in one cell. */
+typedef struct {
+  PetscReal x[4][3]; /* vertices at rest, m */
+  PetscReal u[4][3]; /* values there, seen from this cell */
+  PetscReal H[9];    /* gradient, H[3*i+j] = du_i/dX_j */
+  PetscReal V;       /* volume, m^3 */
+} VerifyCell;
+
+/* u[nnode][3] with ghosts. */
+static inline void verify_cell(SbSpace s, const PetscReal u[], PetscInt c, VerifyCell *cell)
+{
+  const SbElement e = SbSpaceCellElement(s, c);
+  const PetscInt *vertex = s->mesh->cell + 4 * c, *node = s->cell_node + 4 * c;
+  PetscReal g[3][3];
+
+  for (int v = 0; v < 4; v++) {
+    for (int k = 0; k < 3; k++) {
+      cell->x[v][k] = s->mesh->x[3 * vertex[v] + k];
+      cell->u[v][k] = 0.;
+      for (int a = 0; a < 4; a++) cell->u[v][k] += e->ops.vertex[v][a] * u[3 * node[a] + k];
+    }
+  }
+  e->ops.tabulate((const PetscReal(*)[3])cell->x, g, &cell->V);
+  for (int k = 0; k < 9; k++) {
+    cell->H[k] = 0.;
+    for (int a = 0; a < 3; a++)
+      cell->H[k] += (u[3 * node[a + 1] + k / 3] - u[3 * node[0] + k / 3]) * g[a][k % 3];
+  }
+}
+
+/* Value at the vertex nearest to a rest position: the mean of what the cells around it say, on every rank. Collective. */
+static inline PetscErrorCode verify_value_at(SbModel m, Vec U, const PetscReal at[3], PetscReal value[3])
+{
+  SbSpace s = m->space;
+  const PetscReal *u;
+  PetscReal nearest = PETSC_MAX_REAL, sum[4] = {0., 0., 0., 0.};
+
+  PetscFunctionBeginUser;
+  PetscCall(SbSpaceGetLocalRead(s, U, &u));
+  for (int pass = 0; pass < 2; pass++) {
+    for (PetscInt i = 0; i < 4 * s->mesh->ncell_owned; i++) {
+      const PetscReal *x = s->mesh->x + 3 * s->mesh->cell[i];
+      const PetscReal d = PetscSqr(x[0] - at[0]) + PetscSqr(x[1] - at[1]) + PetscSqr(x[2] - at[2]);
+      VerifyCell cell;
+
+      if (!pass) nearest = PetscMin(nearest, d);
+      if (!pass || d > nearest) continue;
+      verify_cell(s, u, i / 4, &cell);
+      for (int k = 0; k < 3; k++) sum[k] += cell.u[i % 4][k];
+      sum[3] += 1.;
+    }
+    if (!pass) PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &nearest, 1, MPIU_REAL, MPI_MIN, m->comm));
+  }
+  PetscCall(SbSpaceRestoreLocalRead(s, U, &u));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, sum, 4, MPIU_REAL, MPI_SUM, m->comm));
+  for (int k = 0; k < 3; k++) value[k] = sum[k] / sum[3];
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+typedef struct {
+  PetscRandom random;
+  PetscReal size[3]; /* of the box, m */
+} VerifyBox;
+
+/* Inner vertices moved at random by up to 0.2 cells. */
+static inline void verify_move_vertex(const PetscInt n[3], const PetscInt at[3], PetscReal x[3], void *ctx)
+{
+  const VerifyBox *box = (const VerifyBox *)ctx;
+  PetscBool inner = PETSC_TRUE;
+
+  for (int k = 0; k < 3; k++) inner = (PetscBool)(inner && at[k] > 0 && at[k] < n[k]);
+  for (int k = 0; k < 3; k++) {
+    PetscReal r = 0.5;
+
+    if (inner) (void)PetscRandomGetValueReal(box->random, &r);
+    x[k] = (x[k] + (0.4 * r - 0.2) / (PetscReal)n[k]) * box->size[k];
+  }
+}
+
+/* Such a box as a file; the same for the same n on any number of ranks. verify_mesh_remove() it. Collective. */
+static inline PetscErrorCode verify_distorted_box(const PetscInt n[3], const PetscReal size[3],
+                                                  char path[512])
+{
+  VerifyBox box = {NULL, {size[0], size[1], size[2]}};
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscRandomCreate(PETSC_COMM_SELF, &box.random));
+  PetscCall(PetscRandomSetSeed(box.random, 8));
+  PetscCall(PetscRandomSeed(box.random));
+  PetscCall(verify_mesh_write(n, verify_move_vertex, &box, path));
+  PetscCall(PetscRandomDestroy(&box.random));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

@@ -1,0 +1,75 @@
+// @ranks 1
+/*
+  Bending near nu = 1/2 with CR and DG, and with P1 beside them: the clamped bar under its weight and Cook's membrane
+  (references: elements of high order, mixed at nu near 1/2). The penalty gamma1 is a compromise of both problems and of
+  verify_locking.c; docs/locking.md has finer meshes.
+*/
+#include "locking.h"
+
+#define ELEMENTS 3
+static const char *const elements[ELEMENTS] = {"p1", "cr", "dg"};
+
+/* End displacement of the bar: n = 4 cells across, then 8 with CR alone where nu is large. */
+static PetscErrorCode check_bar(PetscReal nu, PetscReal tip, PetscReal energy)
+{
+  PetscReal value[2];
+  LockingCost cost;
+  char more[256];
+
+  PetscFunctionBeginUser;
+  for (int e = 0; e < ELEMENTS + (nu > 0.4); e++) {
+    const char *element = elements[e < ELEMENTS ? e : 1];
+    const PetscInt n = e < ELEMENTS ? 4 : 8;
+
+    PetscCall(PetscSNPrintf(more, sizeof(more), "-body_a_element %s -solver cholmod", element));
+    PetscCall(locking_bar(n, nu, more, value, &cost));
+    PetscCall(PetscPrintf(PETSC_COMM_WORLD, "  bar, nu %-6g %s n %d: %.6f (%.2f %%), %.5f J (%.2f %%)\n",
+                          (double)nu, element, (int)n, (double)value[0],
+                          (double)(100. * (value[0] / tip - 1.)), (double)value[1],
+                          (double)(100. * (value[1] / energy - 1.))));
+    if (e == 0) {
+      SB_CHECK(value[0] / tip < (nu > 0.4 ? 0.8 : 0.9), "P1 bends by %g: too much for this test",
+               (double)value[0]);
+    } else {
+      SB_CHECK_NEAR(value[0], tip, (n == 4 ? 0.02 : 0.01) * PetscAbsReal(tip), element);
+      SB_CHECK_NEAR(value[1], energy, (n == 4 ? 0.03 : 0.01) * energy, element);
+    }
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* u_y at (48,60) and (48,52); edges of 4 m. */
+static PetscErrorCode check_cook(PetscReal nu, PetscReal corner, PetscReal middle)
+{
+  PetscReal value[2];
+  LockingCost cost;
+  char more[256];
+
+  PetscFunctionBeginUser;
+  for (int e = 0; e < ELEMENTS; e++) {
+    PetscCall(PetscSNPrintf(more, sizeof(more), "-body_a_element %s -solver cholmod", elements[e]));
+    PetscCall(locking_cook("meshes/cook.msh", nu, more, value, &cost));
+    PetscCall(PetscPrintf(PETSC_COMM_WORLD, "  Cook, nu %-8g %s: %.4f (%.2f %%), %.4f (%.2f %%)\n",
+                          (double)nu, elements[e], (double)value[0],
+                          (double)(100. * (value[0] / corner - 1.)), (double)value[1],
+                          (double)(100. * (value[1] / middle - 1.))));
+    if (e) {
+      SB_CHECK_NEAR(value[0], corner, 0.015 * corner, elements[e]);
+      SB_CHECK_NEAR(value[1], middle, 0.015 * middle, elements[e]);
+    } else if (nu > 0.49) {
+      SB_CHECK(value[0] < 0.75 * corner, "P1 moves by %g: too much for this test", (double)value[0]);
+    }
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+int main(int argc, char **argv)
+{
+  SB_TEST_BEGIN(argc, argv);
+  PetscCall(check_bar(0.3, -0.785713, 6.38808));
+  PetscCall(check_bar(0.49, -0.762295, 6.18476));
+  PetscCall(check_cook(1. / 3., 22.6106, 21.5246));
+  PetscCall(check_cook(0.49, 19.6653, 18.7368));
+  PetscCall(check_cook(0.4999, 19.4285, 18.5120));
+  SB_TEST_END();
+}

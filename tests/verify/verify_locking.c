@@ -1,0 +1,57 @@
+// @ranks 1 2
+/*
+  CR and DG do not lock: a solution without divergence (manufactured.h) at nu = 0.3, 0.49, 0.4999, 0.499999, meshes with moved
+  vertices. Orders 2 in L2 and 1 in H1 at every nu, and nearly the same errors. P1 does lock on these meshes: its answer stays at
+  zero. verify_locking_fine.c has finer meshes.
+*/
+#include "locking.h"
+
+static PetscErrorCode measure(const char *element, PetscInt n, PetscReal nu, PetscReal error[2])
+{
+  char more[256];
+  LockingCost cost;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscSNPrintf(more, sizeof(more), "-body_a_element %s -solver mumps", element));
+  PetscCall(locking_cube(n, "", nu, more, error, &cost));
+  PetscCall(PetscPrintf(PETSC_COMM_WORLD, "  %s nu %-8g n %2d: L2 %.5f  H1 %.5f\n", element, (double)nu,
+                        (int)n, (double)error[0], (double)error[1]));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* `times`: how much larger the errors may be than those at nu = 0.3. */
+static PetscErrorCode check_element(const char *element, PetscInt nnu, const PetscReal nu[], PetscReal times)
+{
+  PetscReal first[2] = {0., 0.};
+
+  PetscFunctionBeginUser;
+  for (PetscInt i = 0; i < nnu; i++) {
+    PetscReal coarse[2], fine[2], order[2];
+
+    PetscCall(measure(element, 4, nu[i], coarse));
+    PetscCall(measure(element, 8, nu[i], fine));
+    for (int k = 0; k < 2; k++) {
+      order[k] = PetscLog2Real(coarse[k] / fine[k]);
+      if (i == 0) first[k] = fine[k];
+      SB_CHECK(fine[k] <= times * first[k], "%s: nu %g multiplies the error by %g", element, (double)nu[i],
+               (double)(fine[k] / first[k]));
+    }
+    SB_CHECK(order[0] >= 1.9, "%s, nu %g: order %g in L2", element, (double)nu[i], (double)order[0]);
+    SB_CHECK(order[1] >= 0.95, "%s, nu %g: order %g in H1", element, (double)nu[i], (double)order[1]);
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+int main(int argc, char **argv)
+{
+  const PetscReal nu[4] = {0.3, 0.49, 0.4999, 0.499999}, ends[2] = {0.3, 0.499999};
+  PetscReal locked[2];
+
+  SB_TEST_BEGIN(argc, argv);
+  PetscCall(check_element("cr", 4, nu, 1.2));
+  PetscCall(check_element("dg", 2, ends, 1.2));
+  /* the reason for the other two */
+  PetscCall(measure("p1", 8, 0.4999, locked));
+  SB_CHECK(locked[0] > 0.9, "P1 has an error of %g only: this mesh shows no locking", (double)locked[0]);
+  SB_TEST_END();
+}

@@ -1,0 +1,47 @@
+// @long
+// @ranks 2
+// @timeout 1500
+/*
+  The last refinement of the convergence that verify_locking.c begins: n = 8 and 16 at four Poisson's ratios with CR, at the
+  smallest and the largest with DG. 152,064 and 294,912 unknowns.
+*/
+#include "locking.h"
+
+static PetscErrorCode measure(const char *element, PetscInt n, PetscReal nu, PetscReal error[2])
+{
+  char more[256];
+  LockingCost cost;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscSNPrintf(more, sizeof(more), "-body_a_element %s -solver mumps", element));
+  PetscCall(locking_cube(n, "", nu, more, error, &cost));
+  PetscCall(PetscPrintf(PETSC_COMM_WORLD, "  %s nu %-8g n %2d: L2 %.5f  H1 %.5f, %.1f s\n", element,
+                        (double)nu, (int)n, (double)error[0], (double)error[1], cost.seconds));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode check_order(const char *element, PetscReal nu)
+{
+  PetscReal coarse[2], fine[2], order[2];
+
+  PetscFunctionBeginUser;
+  PetscCall(measure(element, 8, nu, coarse));
+  PetscCall(measure(element, 16, nu, fine));
+  for (int k = 0; k < 2; k++) order[k] = PetscLog2Real(coarse[k] / fine[k]);
+  PetscCall(PetscPrintf(PETSC_COMM_WORLD, "  %s nu %-8g orders %.3f %.3f\n", element, (double)nu,
+                        (double)order[0], (double)order[1]));
+  SB_CHECK(order[0] >= 1.9, "%s, nu %g: order %g in L2", element, (double)nu, (double)order[0]);
+  SB_CHECK(order[1] >= 0.95, "%s, nu %g: order %g in H1", element, (double)nu, (double)order[1]);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+int main(int argc, char **argv)
+{
+  static const PetscReal nu[4] = {0.3, 0.49, 0.4999, 0.499999};
+
+  SB_TEST_BEGIN(argc, argv);
+  for (int i = 0; i < 4; i++) PetscCall(check_order("cr", nu[i]));
+  PetscCall(check_order("dg", nu[0]));
+  PetscCall(check_order("dg", nu[3]));
+  SB_TEST_END();
+}
