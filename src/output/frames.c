@@ -66,8 +66,9 @@ static PetscErrorCode write_points(SbRun run, SbOutput out, hid_t group)
     fr->owned[i] = (PetscReal)mesh->vert_orig[mesh->cell[i]];
   PetscCall(write_whole(fr, group, out->discontinuous ? "vertices" : "cells", &out->cell, 4));
   if (!out->discontinuous) PetscFunctionReturn(PETSC_SUCCESS);
-  for (PetscInt i = 0; i < 4 * mesh->ncell_owned; i++)
-    fr->owned[i] = (PetscReal)(4 * mesh->cell_orig[i / 4] + i % 4);
+  for (PetscInt c = 0; c < mesh->ncell_owned; c++) {
+    for (PetscInt a = 0; a < 4; a++) fr->owned[4 * c + a] = (PetscReal)(4 * mesh->cell_orig[c] + a);
+  }
   PetscCall(write_whole(fr, group, "cells", &out->cell, 4));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
