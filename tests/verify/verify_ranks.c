@@ -1,7 +1,7 @@
 // @ranks 2 3 4
 /*
   The same scene on one rank and on all of them: every rank runs it alone and then all run it together. Displacements,
-  velocities (by original vertex number) and scalars of the last state must agree.
+  velocities (by original number of the node) and scalars of the last state must agree.
 
   Tolerances, of the largest value: 1e-10 where the linear system is solved directly or not at all; 1e-8 where Newton ends at
   1e-9 of its first residual, which is what the solvers of different rank counts may differ by.
@@ -31,7 +31,7 @@ static PetscErrorCode solve(MPI_Comm comm, const char *options, State *state)
   PetscCall(SbSpaceValidate(t.model->space));
   t.run->want_energies = PETSC_TRUE;
   PetscCall(verify_solve(&t, options));
-  *state = (State){.n = t.model->mesh->Nvert, .steps = t.run->steps_total, .e = t.run->energies};
+  *state = (State){.n = verify_numbers(t.model), .steps = t.run->steps_total, .e = t.run->energies};
   PetscCall(verify_gather(t.model, t.run->U, &state->u));
   if (t.run->V) PetscCall(verify_gather(t.model, t.run->V, &state->v));
   PetscCall(test_scene_close(&t));
@@ -80,8 +80,8 @@ static PetscErrorCode check(const char *what, PetscReal tolerance, const char *o
                         "  %-28s %3d steps: displacement %.1e, velocity %.1e, scalars %.1e\n", what,
                         (int)alone.steps, (double)du, (double)dv, (double)de));
   SB_CHECK(alone.n == together.n && alone.steps == together.steps,
-           "%s: %d vertices and %d steps, %d and %d alone", what, (int)together.n, (int)together.steps,
-           (int)alone.n, (int)alone.steps);
+           "%s: %d numbers of nodes and %d steps, %d and %d alone", what, (int)together.n,
+           (int)together.steps, (int)alone.n, (int)alone.steps);
   SB_CHECK(du <= tolerance && dv <= tolerance && de <= tolerance,
            "%s: displacement %g, velocity %g, scalars %g", what, (double)du, (double)dv, (double)de);
   PetscCall(destroy(&alone));
@@ -99,6 +99,51 @@ static PetscErrorCode check(const char *what, PetscReal tolerance, const char *o
   "-body_block_mesh tests/data/two_cubes_41.msh -body_block_scale 0.1 -body_block_translate 0,0,0.5 "   \
   "-body_block_young 2e5 -body_block_poisson 0.3 -body_block_density 500 -body_block_velocity 0.3,0,1 " \
   "-body_block_spin 1,2,3 "
+
+/* Bodies with nodes at faces, alone and beside one of P1: held, pulled, pressed, damped. */
+static PetscErrorCode check_element(const char *bar, const char *block)
+{
+  char text[VERIFY_TEXT], what[64], elements[1024];
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscSNPrintf(what, sizeof(what), "static, %s", bar));
+  PetscCall(PetscSNPrintf(
+    text, sizeof(text),
+    BAR CLAMP
+    "-body_bar_mesh box:0.4,0.1,0.1:2 -body_bar_element %s -body_bar_young 1e6 -body_bar_material neohookean "
+    "-body_bar_tangent exact -effects "
+    "gravity,clamp,pull,air -effect_pull_type traction -effect_pull_on xmax "
+    "-effect_pull_vector 0;300;100 -effect_air_type pressure -effect_air_on zmax "
+    "-effect_air_value 500 -time static -snes_rtol 1e-9 -solver mumps",
+    bar));
+  PetscCall(check(what, 1e-8, text));
+  PetscCall(PetscSNPrintf(elements, sizeof(elements),
+                          TWO CLAMP "-body_bar_element %s -body_block_element %s -effect_clamp_on bar.xmin ",
+                          bar, block));
+  PetscCall(PetscSNPrintf(what, sizeof(what), "newmark, %s and %s", bar, block));
+  PetscCall(
+    PetscSNPrintf(text, sizeof(text),
+                  "%s -body_bar_material linear -body_block_material linear -effects gravity,clamp,damping "
+                  "-effect_damping_alpha 0.3 -effect_damping_beta 0.001 -time newmark -ts_dt 0.01 "
+                  "-ts_max_time 0.1 -solver mumps -ksp_rtol 1e-13",
+                  elements));
+  PetscCall(check(what, 1e-10, text));
+  PetscCall(PetscSNPrintf(what, sizeof(what), "genalpha, %s and %s", bar, block));
+  PetscCall(PetscSNPrintf(text, sizeof(text),
+                          "%s -body_bar_material stvk -body_bar_tangent exact -body_block_material corotated "
+                          "-effects gravity,clamp "
+                          "-time genalpha -ts_dt 0.01 -ts_max_time 0.05 -snes_rtol 1e-9 -solver mumps",
+                          elements));
+  PetscCall(check(what, 1e-8, text));
+  PetscCall(PetscSNPrintf(what, sizeof(what), "explicit, %s and %s", bar, block));
+  PetscCall(
+    PetscSNPrintf(text, sizeof(text),
+                  "%s -body_bar_material corotated -body_block_material neohookean -effects gravity,clamp "
+                  "-time euler_symplectic -ts_max_time 0.005",
+                  elements));
+  PetscCall(check(what, 1e-10, text));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
 
 int main(int argc, char **argv)
 {
@@ -140,5 +185,7 @@ int main(int argc, char **argv)
                   TWO CLAMP
                   "-body_bar_material corotated -body_block_material stvk -effects gravity,clamp "
                   "-effect_clamp_on bar.xmin -mass consistent -time euler_symplectic -ts_max_time 0.05"));
+  PetscCall(check_element("cr", "p1"));
+  PetscCall(check_element("dg", "cr"));
   SB_TEST_END();
 }
