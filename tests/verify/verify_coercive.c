@@ -7,6 +7,9 @@
     meshes    vertices moved at random; sizes of tets in the ratio 1000 to 1; tets of 0.06 degrees
     gammas    CR and DG as they come, and DG with both gammas at 0.01: positive for every positive gamma
     state     at rest, where all laws are Hooke's, and turned by two rad, where K is that at rest turned
+    pressed   nu = 0.499, squeezed or stretched evenly to a pressure of half the shear modulus, the boundary held: still
+              positive. The face terms are as stiff as the shear modulus, so that a pressure above it makes CR and DG unstable
+              where the solid is not; how far they go is printed
     not so    with gamma1 = 1e-12 CR keeps many motions without energy (Falk 1991): the test sees them
 
   Rounding: the matrix is right to 1e-15 of its largest entry, so eigenvalues are to about 1e-14 of the largest one.
@@ -159,6 +162,56 @@ static PetscErrorCode check_case(Shape shape, const char *path, const Case *c, P
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Smallest eigenvalue, relative to the largest, of a cube under an even pressure of `ratio` times mu. */
+static PetscErrorCode pressed(const char *element, const char *law, PetscReal ratio, PetscReal *smallest)
+{
+  TestScene t;
+  PetscInt n;
+  PetscReal *w, eps;
+  PetscScalar *u;
+  char text[VERIFY_TEXT];
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscSNPrintf(
+    text, sizeof(text),
+    "-bodies a -body_a_mesh box:1,1,1:2 -body_a_element %s -body_a_material %s -body_a_tangent exact "
+    "-body_a_young 1e5 -body_a_poisson 0.499 -body_a_density 1 -solver cg_jacobi -effects hold "
+    "-effect_hold_type support -effect_hold_on boundary",
+    element, law));
+  PetscCall(test_scene_open(text, &t));
+  eps =
+    ratio * t.model->material[0]->mu / (3. * t.model->material[0]->lambda + 2. * t.model->material[0]->mu);
+  PetscCall(VecGetArray(t.run->U, &u));
+  for (PetscInt i = 0; i < 3 * t.model->space->nnode_owned; i++) u[i] = -eps * t.model->space->node_x[i];
+  PetscCall(VecRestoreArray(t.run->U, &u));
+  PetscCall(spectrum(&t, &n, &w));
+  *smallest = w[0] / w[n - 1];
+  PetscCall(PetscFree(w));
+  PetscCall(test_scene_close(&t));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode check_pressed(const char *element, const char *law)
+{
+  static const PetscReal ratios[] = {0.5, 1., 2., 5., 10., 50.};
+  PetscReal smallest, reached[2] = {0., 0.};
+
+  PetscFunctionBeginUser;
+  for (int stretched = 0; stretched < 2; stretched++) {
+    for (size_t k = 0; k < PETSC_STATIC_ARRAY_LENGTH(ratios); k++) {
+      PetscCall(pressed(element, law, stretched ? -ratios[k] : ratios[k], &smallest));
+      if (smallest <= 0.) break;
+      reached[stretched] = ratios[k];
+    }
+  }
+  PetscCall(PetscPrintf(PETSC_COMM_WORLD,
+                        "  %s %-10s squeezed: positive up to %g mu; stretched: up to %g mu\n", element, law,
+                        (double)reached[0], (double)reached[1]));
+  SB_CHECK(reached[0] >= 0.5 && reached[1] >= 0.5,
+           "%s, %s: not stable under a pressure of half the shear modulus", element, law);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 static PetscErrorCode check_mesh(Shape shape)
 {
   static const PetscReal nus[] = {0.3, 0.4999, 0.499999};
@@ -188,5 +241,12 @@ int main(int argc, char **argv)
 {
   SB_TEST_BEGIN(argc, argv);
   for (Shape shape = MOVED; shape <= SLIVERS; shape++) PetscCall(check_mesh(shape));
+  for (int e = 0; e < 3; e++) {
+    static const char *const elements[] = {"p1", "cr", "dg"};
+
+    PetscCall(check_pressed(elements[e], "corotated"));
+    PetscCall(check_pressed(elements[e], "stvk"));
+    PetscCall(check_pressed(elements[e], "neohookean"));
+  }
   SB_TEST_END();
 }
