@@ -1,7 +1,8 @@
 // @ranks 1 3
 /*
   Face terms of CR and DG against their formula: for each face the jump at three points of a rule that is exact for squares,
-  from the two cells' own functions at places in space, with no use of the nodes that the face has in jump.c.
+  from the two cells' own functions at places in space, with no use of the nodes that the face has in jump.c. DG faces that are
+  held add the mean against that of their support.
 */
 #include "../../src/fem/fem_impl.h"
 #include "../scene.h"
@@ -14,7 +15,8 @@ static const char *const scene =
   "-body_b_scale 0.1 "
   "-body_b_translate 0,0,2 -body_b_material neohookean -body_b_young 3e5 -body_b_poisson 0.45 "
   "-body_b_density 500 "
-  "-body_b_element %s -effects damping -effect_damping_beta 0.02";
+  "-body_b_element %s -effects damping,clamp -effect_damping_beta 0.02 -effect_clamp_type support "
+  "-effect_clamp_on a.xmin";
 
 static void wave(const PetscReal x[3], PetscReal v[3])
 {
@@ -77,21 +79,28 @@ static PetscReal cell_volume(SbMesh mesh, PetscInt cell)
   return SbDot3(e, n) / 6.;
 }
 
-/* Energy of the face i % 4 of cell i / 4. */
+/* Vertices of the face i % 4 of cell i / 4; returns its area. */
+static PetscReal face_corners(SbMesh mesh, PetscInt i, const PetscReal *corner[3])
+{
+  PetscReal edge[6], n[3];
+
+  for (PetscInt a = 0, k = 0; a < 4; a++) {
+    if (a != i % 4) corner[k++] = mesh->x + 3 * mesh->cell[4 * (i / 4) + a];
+  }
+  for (int k = 0; k < 6; k++) edge[k] = corner[1 + k / 3][k % 3] - corner[0][k % 3];
+  SbCross(edge, edge + 3, n);
+  return 0.5 * PetscSqrtReal(SbDot3(n, n));
+}
+
+/* Energy of an inner face. */
 static PetscReal face_energy(SbModel m, PetscInt i, const PetscReal u[])
 {
   const SbSpace s = m->space;
   const SbElement e = SbSpaceCellElement(s, i / 4);
   const SbMaterial law = m->material[s->mesh->cell_body[i / 4]];
-  const PetscReal *corner[3];
-  PetscReal edge[6], n[3], area, h, mean[3] = {0., 0., 0.}, square = 0.;
+  const PetscReal *corner[3], area = face_corners(s->mesh, i, corner);
+  PetscReal h, mean[3] = {0., 0., 0.}, square = 0.;
 
-  for (PetscInt a = 0, k = 0; a < 4; a++) {
-    if (a != i % 4) corner[k++] = s->mesh->x + 3 * s->mesh->cell[4 * (i / 4) + a];
-  }
-  for (int k = 0; k < 6; k++) edge[k] = corner[1 + k / 3][k % 3] - corner[0][k % 3];
-  SbCross(edge, edge + 3, n);
-  area = 0.5 * PetscSqrtReal(SbDot3(n, n));
   h = (cell_volume(s->mesh, i / 4) + cell_volume(s->mesh, s->neighbour[i])) / (2. * area);
   for (int k = 0; k < 3; k++) {
     PetscReal at[3], a[3], b[3];
@@ -108,6 +117,19 @@ static PetscReal face_energy(SbModel m, PetscInt i, const PetscReal u[])
          (e->gamma1 * 2. * law->mu * square + e->gamma0 * (2. * law->mu + law->lambda) * SbDot3(mean, mean));
 }
 
+/* A DG face that is held: its mean against that of the support, which is infinitely stiff. */
+static PetscReal support_energy(SbModel m, PetscInt i, const PetscReal u[])
+{
+  const SbSpace s = m->space;
+  const SbMaterial law = m->material[s->mesh->cell_body[i / 4]];
+  const PetscReal *corner[3], area = face_corners(s->mesh, i, corner),
+                              k = (2. * law->mu + law->lambda) * area / cell_volume(s->mesh, i / 4);
+  PetscReal square = 0.;
+
+  for (int c = 0; c < 3; c++) square += PetscSqr(u[3 * s->cell_node[i] + c] - u[3 * s->support[i] + c]);
+  return SbSpaceCellElement(s, i / 4)->gamma0 * k * area * square;
+}
+
 /* Sum over all faces; each rank takes half of a face for each of its cells. */
 static PetscErrorCode formula(SbModel m, const PetscReal u[], PetscReal *energy)
 {
@@ -118,6 +140,7 @@ static PetscErrorCode formula(SbModel m, const PetscReal u[], PetscReal *energy)
   for (PetscInt i = 0; i < 4 * s->mesh->ncell_owned; i++) {
     if (!SbSpaceCellElement(s, i / 4)->nodes_per[0] && s->neighbour[i] >= 0)
       *energy += 0.5 * face_energy(m, i, u);
+    if (s->support && s->support[i] >= 0) *energy += support_energy(m, i, u);
   }
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, energy, 1, MPIU_REAL, MPI_SUM, m->comm));
   PetscFunctionReturn(PETSC_SUCCESS);
