@@ -6,7 +6,7 @@
 
     u(X, t) = d(t, X) + sin(theta) k x r + 2 sin^2(theta/2) k x (k x r).
 
-  Written this way nothing cancels at small angles. Reaction: force of the drive on the body (hold.c has the
+  X being a vertex, or with CR and DG the centroid of a triangle. Written this way nothing cancels at small angles. Reaction: force of the drive on the body (hold.c has the
   sign); torque: moment of that force about the axis at rest, taken with the current positions.
 */
 #include "sbeffect.h"
@@ -21,7 +21,8 @@ typedef struct {
 } Drive;
 
 static const SbOption rows[] = {
-  {"on", SB_OPTION_NAMES, 1, "", NULL, "", "sets whose nodes are moved"},
+  {"on", SB_OPTION_NAMES, 1, "", NULL, "",
+   "sets whose nodes are moved: vertices, with cr and dg the means over triangles"},
   {"components", SB_OPTION_CHOICE, 1, "", "xyz", SB_HOLD_CHOICES, "directions that are prescribed"},
   {"displacement", SB_OPTION_FORMULA, 3, "m", "0;0;0", "",
    "translation, three formulas of t, x, y, z (rest position)"},

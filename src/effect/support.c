@@ -4,6 +4,11 @@
   Prescribes u_c = 0 for the chosen components c. The history gets the force of the support on the body
   (hold.c has the sign). Between effects that want the same unknown, the one named first in the scenario has
   it.
+
+  CR and DG are held at the triangles of their surface, in the mean: one triangle alone, or two, leave rotations
+  free. A DG face that is held in all directions has a node of its own that is prescribed, to which its cell is tied
+  by a penalty (src/fem/layout.c; -body_X_supports strong: the mean itself is prescribed). Single directions are
+  held in the mean itself.
 */
 #include "sbeffect.h"
 
@@ -14,7 +19,8 @@ typedef struct {
 } Support;
 
 static const SbOption rows[] = {
-  {"on", SB_OPTION_NAMES, 1, "", NULL, "", "sets whose nodes are held"},
+  {"on", SB_OPTION_NAMES, 1, "", NULL, "",
+   "sets whose nodes are held: vertices, with cr and dg the means over triangles"},
   {"components", SB_OPTION_CHOICE, 1, "", "xyz", SB_HOLD_CHOICES, "directions that are held"},
 };
 
