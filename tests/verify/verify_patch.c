@@ -271,7 +271,8 @@ static PetscErrorCode check_mesh(const Patch *p)
     PetscCall(check_patch(p, "linear", 0.25, (PetscBool)pulled, small, paper));
     PetscCall(check_patch(p, "linear", 0.4999, (PetscBool)pulled, small, NULL));
   }
-  for (int law = 0; law < 4; law++) {
+  /* the laws ask for many solves, and the mesh of slivers is the largest */
+  for (int law = 0; law < (p->shape == SLIVERS && strcmp(p->element, "p1") ? 1 : 4); law++) {
     PetscCall(check_patch(p, laws[law], 0.25, PETSC_FALSE, large, NULL));
     /* flat tets next to incompressible ones: hundreds of Newton steps lead there, to the same digits */
     if (p->shape == SLIVERS && law > 0) continue;
