@@ -133,9 +133,10 @@ static PetscErrorCode set_up_snes(SbRun run)
   PetscReal force = 0.;
 
   PetscFunctionBeginUser;
-  /* rounding of the internal forces: below 1e-13 of (stress modulus) x (area of the body) no residual is meaningful */
+  /* rounding of the internal forces: below 1e-13 of (stress modulus) x (area of the body) no residual is meaningful; near
+     nu = 1/2 it is the pressure that rounds, lambda times the last digit of the change of volume */
   for (PetscInt b = 0; b < m->nbody; b++)
-    force += m->material[b]->E * PetscPowReal(m->body[b].volume, 2. / 3.);
+    force += (m->material[b]->E + 0.01 * m->material[b]->lambda) * PetscPowReal(m->body[b].volume, 2. / 3.);
   PetscCall(SNESSetType(run->snes, m->linear ? SNESKSPONLY : SNESNEWTONLS));
   PetscCall(SbRunSearch(run, PETSC_FALSE));
   PetscCall(SNESSetDivergenceTolerance(run->snes, -1.));
