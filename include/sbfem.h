@@ -55,7 +55,8 @@ struct _p_SbSpace {
   PetscInt *neighbour; /* [ncell][4] local cell across each face, -1: none; NULL without face nodes */
   PetscInt *
     support; /* [ncell][4] node without mass that a held boundary face of a DG cell is tied to, -1: none; NULL without any */
-  const SbElement *element; /* [nbody] borrowed */
+  const SbElement *element;   /* [nbody] borrowed */
+  const SbMaterial *material; /* by SbMesh.cell_material; borrowed */
   PetscInt nregion;
   SbRegion *region;     /* [nregion] */
   PetscInt nbatch;      /* SB_BATCH cells side by side; a batch never mixes regions */

@@ -41,6 +41,9 @@ typedef struct {
   void (*spin)(const struct _p_SbMaterial *m, const SbLane F[9], SbLane R[9], SbLane W[9]);
   /* C[9*(3*i+j) + 3*k+l] = dP_ij/dF_kl, Pa; symmetric in the pairs to the last bit */
   void (*tangent)(const struct _p_SbMaterial *m, const SbLane F[9], SbLane C[81]);
+  /* D = d theta/dF (pressure, above): the tangent holds lambda D D^T, and nothing else of it grows with lambda but the stress.
+     At rest D = I. With a frame or a spin D is their R. */
+  void (*volumetric)(const struct _p_SbMaterial *m, const SbLane F[9], SbLane D[9]);
   PetscErrorCode (*destroy)(SbMaterial m);
 } SbMaterialOps;
 

@@ -14,6 +14,7 @@ typedef struct _SbSolverPreset {
   PetscErrorCode (*precondition)(SbSpace space,
                                  PC pc); /* a preconditioner of our own; NULL: by the options */
   const char *help;
+  PetscErrorCode (*create)(SbSpace space, Mat *K); /* an operator of our own; NULL: the matrix */
 } SbSolverPreset;
 
 PetscErrorCode SbSolverRegister(void);
@@ -50,3 +51,24 @@ PetscErrorCode SbPCCoarseCreate(SbSpace space, PC pc);
 PetscErrorCode SbPCCoarseFallBack(PC pc, KSPConvergedReason reason, PetscBool *changed);
 /* Aggregates of all ranks, set-ups so far, whether the diagonal is the fine level. Outputs may be NULL. Not collective. */
 PetscErrorCode SbPCCoarseGetStats(PC pc, PetscInt *naggregate, PetscInt *nsetup, PetscBool *simple);
+
+/*
+  SbPressureOperatorCreate - the tangent of a space with CR or DG bodies, its volumetric part apart, so that a large lambda
+  does no harm.
+
+  Collective, after SbSpaceFixDone(). K is a MATSHELL owned by the caller; the space is borrowed. It is filled by
+  SbSpaceAssembleTangent() and SbSpaceFinishTangent() as a matrix is, and effects may add to it. Errors: PETSC_ERR_USER for a space
+  without face nodes.
+*/
+PetscErrorCode SbPressureOperatorCreate(SbSpace space, Mat *K);
+/*
+  SbPCPressureCreate - makes pc the solver for such an operator: GMRES in nodes and pressures. Put it into KSPRICHARDSON with
+  the unpreconditioned norm, which then refines until -ksp_rtol holds for the true residual, or it is one of rounding.
+
+  Collective. The space is borrowed. -ksp_max_it limits the iterations of GMRES, and they are what the KSP reports. A residual
+  that two corrections no longer halve fails the solve (KSP_DIVERGED_BREAKDOWN).
+  Options read: -pressure_ksp_ (GMRES), -pressure_coarse_ (P1), -pressure_sweeps.
+*/
+PetscErrorCode SbPCPressureCreate(SbSpace space, PC pc);
+/* Solves so far, iterations of all of them, most in one. Outputs may be NULL. Not collective. */
+PetscErrorCode SbPCPressureGetStats(PC pc, PetscInt *nsolve, PetscInt *total, PetscInt *most);

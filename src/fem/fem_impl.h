@@ -93,6 +93,29 @@ void SbInsertBatch(SbSpace space, const SbValues *x, PetscInt b, const SbLane K[
 /* The same for DG cells, whose blocks stand between the means of their faces. */
 void SbInsertBroken(SbSpace space, const SbValues *x, PetscInt b, const SbLane K[10][9]);
 
+/*
+  The volumetric part of a tangent, kept out of the matrix: sum over cells of modulus / V b b^T, b_a = V D grad psi_a with D from
+  SbMaterialOps.volumetric. Cells of P1 bodies and of laws with lambda <= 0 are kept whole: b and both moduli are zero.
+*/
+typedef struct {
+  SbLane *b;       /* [nbatch][12] m^2; 0 in padding */
+  SbLane *modulus; /* [nbatch] lambda times the factor of stiffness and damping, Pa */
+  SbLane *shear;   /* [nbatch] mu likewise, Pa */
+} SbVolumetric;
+/*
+  SbSpaceAssembleSplit - the tangent without its volumetric part, in up to three spaces of the mesh at once: space[0] is s.
+
+  Not collective. The strains are those of s. Where space[k] has its nodes at vertices and s at faces, A[k] is the same form
+  there. out NULL: nothing is left out.
+*/
+PetscErrorCode SbSpaceAssembleSplit(SbSpace s, const SbStage *stage, PetscInt n, const SbSpace space[],
+                                    const Mat A[], const SbVolumetric *out);
+/* pc_pressure_operator.c, for an operator of SbPressureOperatorCreate(); other matrices are left alone. */
+PetscErrorCode SbPressureOperatorAssemble(Mat A, const SbStage *stage, PetscBool *is);
+PetscErrorCode SbPressureOperatorFinish(Mat A);
+/* Its matrix; A itself when A is not one. */
+PetscErrorCode SbPressureOperatorMatrix(Mat A, Mat *inner);
+
 /* Gives a BAIJ or SBAIJ matrix of the space the fast product of product.c. Collective. */
 PetscErrorCode SbProductAttach(SbSpace space, SbMatrixKind kind, Mat A);
 

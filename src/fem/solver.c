@@ -9,47 +9,66 @@
 */
 #include "sbsolver.h"
 
+static PetscErrorCode create_frames(SbSpace s, Mat *A)
+{
+  PetscBool frames;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbSpaceHasFrames(s, &frames));
+  PetscCheck(frames, s->comm, PETSC_ERR_USER,
+             "-solver realtime is for -mass lumped and the materials linear, and corotated with "
+             "-body_<name>_tangent warped: choose these, or -solver rotated");
+  PetscCall(SbSpaceCreateFrameOperator(s, A));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 static const SbSolverPreset presets[] = {
   {"cg", SB_MATRIX_BAIJ, PETSC_FALSE, "-ksp_type cg -pc_type none", NULL, NULL,
-   "conjugate gradients without preconditioner"},
+   "conjugate gradients without preconditioner", NULL},
   {"cg_jacobi", SB_MATRIX_BAIJ, PETSC_FALSE, "-ksp_type cg -pc_type jacobi", NULL, NULL,
-   "CG, diagonal preconditioner"},
+   "CG, diagonal preconditioner", NULL},
   {"cg_pbjacobi", SB_MATRIX_BAIJ, PETSC_FALSE, "-ksp_type cg -pc_type pbjacobi", NULL, NULL,
-   "CG, 3x3 diagonal blocks"},
+   "CG, 3x3 diagonal blocks", NULL},
   {"cg_icc", SB_MATRIX_SBAIJ, PETSC_FALSE,
    "-ksp_type cg -pc_type bjacobi -sub_pc_type icc -sub_pc_factor_shift_type positive_definite", NULL, NULL,
-   "CG, incomplete Cholesky on each rank"},
+   "CG, incomplete Cholesky on each rank", NULL},
   {"cg_ssor", SB_MATRIX_AIJ, PETSC_FALSE, "-ksp_type cg -pc_type sor -pc_sor_local_symmetric", NULL, NULL,
-   "CG, symmetric Gauss-Seidel on each rank"},
+   "CG, symmetric Gauss-Seidel on each rank", NULL},
   {"cg_two_level", SB_MATRIX_SBAIJ, PETSC_FALSE, "-ksp_type cg", NULL, SbPCCoarseCreate,
-   "CG, incomplete Cholesky on each rank and the rigid-body modes of some hundred aggregates of nodes"},
+   "CG, incomplete Cholesky on each rank and the rigid-body modes of some hundred aggregates of nodes", NULL},
   {"cg_gamg", SB_MATRIX_AIJ, PETSC_FALSE, "-ksp_type cg -pc_type gamg", NULL, NULL,
-   "CG, algebraic multigrid with the rigid-body modes of each body"},
+   "CG, algebraic multigrid with the rigid-body modes of each body", NULL},
   {"cg_hypre", SB_MATRIX_AIJ, PETSC_FALSE,
    "-ksp_type cg -pc_type hypre -pc_hypre_type boomeramg -pc_hypre_boomeramg_strong_threshold 0.5", "hypre",
-   NULL, "CG, BoomerAMG of hypre"},
+   NULL, "CG, BoomerAMG of hypre", NULL},
   {"gauss_seidel", SB_MATRIX_AIJ, PETSC_FALSE,
    "-ksp_type richardson -pc_type composite -pc_composite_pcs sor -sub_0_pc_sor_omega 1 -ksp_max_it 100000",
-   NULL, NULL, "Gauss-Seidel iteration (between ranks: block Jacobi)"},
+   NULL, NULL, "Gauss-Seidel iteration (between ranks: block Jacobi)", NULL},
   {"sor", SB_MATRIX_AIJ, PETSC_FALSE,
    "-ksp_type richardson -pc_type composite -pc_composite_pcs sor -sub_0_pc_sor_omega 1.6 -ksp_max_it 100000",
-   NULL, NULL, "successive over-relaxation, omega 1.6 (between ranks: block Jacobi)"},
+   NULL, NULL, "successive over-relaxation, omega 1.6 (between ranks: block Jacobi)", NULL},
   {"cholmod", SB_MATRIX_AIJ, PETSC_FALSE, "-ksp_type cg -pc_type cholesky -pc_factor_mat_solver_type cholmod",
-   "suitesparse", NULL, "sparse Cholesky of SuiteSparse; one rank"},
+   "suitesparse", NULL, "sparse Cholesky of SuiteSparse; one rank", NULL},
   {"mumps", SB_MATRIX_AIJ, PETSC_FALSE, "-ksp_type fgmres -pc_type cholesky -pc_factor_mat_solver_type mumps",
-   "mumps", NULL, "sparse factorisation of MUMPS on any number of ranks"},
+   "mumps", NULL, "sparse factorisation of MUMPS on any number of ranks", NULL},
   {"rotated", SB_MATRIX_BAIJ, PETSC_FALSE, "-ksp_type cg", NULL, SbPCRotatedCreate,
    "CG, one factorisation that turns with the nodes and is seldom renewed: dynamic runs of up to about 100k "
-   "tets"},
+   "tets",
+   NULL},
   {"realtime", SB_MATRIX_BAIJ, PETSC_TRUE, "-ksp_type cg -ksp_initial_guess_nonzero", NULL, SbPCRotatedCreate,
    "the same without a matrix, warm-started: linear, or corotated with -body_<name>_tangent warped; fastest "
-   "with -snes_type ksponly and -ksp_rtol 1e-4"},
+   "with -snes_type ksponly and -ksp_rtol 1e-4",
+   create_frames},
+  {"pressure", SB_MATRIX_BAIJ, PETSC_FALSE, "-ksp_type richardson", NULL, SbPCPressureCreate,
+   "GMRES with the pressures of the cells as unknowns and multigrid on P1: CR and DG bodies at any Poisson's "
+   "ratio",
+   SbPressureOperatorCreate},
 };
 
 static const SbOption rows[] = {
   {"solver", SB_OPTION_CHOICE, 1, "", "auto",
    "auto|cg|cg_jacobi|cg_pbjacobi|cg_icc|cg_ssor|cg_two_level|cg_gamg|cg_hypre|gauss_seidel|sor|cholmod|"
-   "mumps|rotated|realtime",
+   "mumps|rotated|realtime|pressure",
    "linear solver; auto chooses by size, ranks and material and says why. PETSc's -ksp_ and -pc_ options "
    "refine it"},
 };
@@ -166,19 +185,13 @@ static PetscErrorCode insert_options(const char *text)
 
 PetscErrorCode SbSolverCreateOperator(SbSpace s, const SbSolverPreset *preset, Mat *A)
 {
-  PetscBool frames;
   PetscMPIInt nrank;
 
   PetscFunctionBeginUser;
   PetscCallMPI(MPI_Comm_size(s->comm, &nrank));
-  if (preset->matrix_free) {
-    PetscCall(SbSpaceHasFrames(s, &frames));
-    PetscCheck(frames, s->comm, PETSC_ERR_USER,
-               "-solver %s is for -mass lumped and the materials linear, and corotated with "
-               "-body_<name>_tangent warped: choose these, or -solver rotated",
-               preset->name);
-    PetscCall(SbSpaceCreateFrameOperator(s, A));
-  } else
+  if (preset->create)
+    PetscCall(preset->create(s, A));
+  else
     PetscCall(SbSpaceCreateMatrix(
       s, nrank > 1 && preset->matrix == SB_MATRIX_SBAIJ ? SB_MATRIX_BAIJ : preset->matrix, A));
   PetscFunctionReturn(PETSC_SUCCESS);

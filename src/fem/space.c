@@ -150,6 +150,7 @@ PetscErrorCode SbSpaceCreate(SbMesh mesh, const SbMaterial material[], const SbE
   PetscCall(SbOptionChoice(&scope, "mass", &mass));
   s->consistent_mass = (PetscBool)(mass == 1);
   s->element = element;
+  s->material = material;
   PetscCall(SbLayoutNodes(s));
   PetscCall(find_regions(s, material, element));
   PetscCall(tabulate_batches(s));

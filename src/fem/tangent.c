@@ -20,6 +20,7 @@ PetscErrorCode SbValuesBegin(Mat A, SbValues *x)
   PetscBool is[5];
 
   PetscFunctionBeginUser;
+  PetscCall(SbPressureOperatorMatrix(A, &A));
   PetscCall(PetscObjectTypeCompare((PetscObject)A, MATSEQAIJ, &is[0]));
   PetscCall(PetscObjectTypeCompare((PetscObject)A, MATMPIAIJ, &is[1]));
   PetscCall(PetscObjectTypeCompare((PetscObject)A, MATSEQBAIJ, &is[2]));
@@ -82,13 +83,34 @@ static void scaled_volumes(const SbLane V, PetscReal factor, SbLane W)
   for (int l = 0; l < SB_BATCH; l++) W[l] = factor * V[l];
 }
 
-/* A law with the full tangent; its damping comes on top. */
+/* What a cell's blocks leave out: D (SbMaterialOps.volumetric) and the factor on lambda and mu. */
+typedef struct {
+  SbLane D[9];
+  PetscReal factor;
+} Split;
+
+/* C -= lambda D D^T */
+SB_KERNEL static void remove_volumetric(PetscReal lambda, const SbLane D[restrict 9], SbLane C[restrict 81])
+{
+  for (int i = 0; i < 9; i++) {
+    for (int k = 0; k < 9; k++) {
+      for (int l = 0; l < SB_BATCH; l++) C[9 * i + k][l] -= lambda * (D[i][l] * D[k][l]);
+    }
+  }
+}
+
+/* A law with the full tangent; its damping comes on top and stays whole. */
 static void general_blocks(const SbMaterial m, const SbLane *g, const SbLane V, const Factors *x,
-                           const SbLane F[9], SbLane K[10][9])
+                           const SbLane F[9], Split *split, SbLane K[10][9])
 {
   SbLane C[81], W;
 
   m->ops.tangent(m, F, C);
+  if (split) {
+    m->ops.volumetric(m, F, split->D);
+    split->factor = x->stiffness;
+    remove_volumetric(m->lambda, (const SbLane *)split->D, C);
+  }
   scaled_volumes(V, x->stiffness, W);
   SbCellBlocksGeneral(g, W, (const SbLane *)C, K);
   if (x->damping != 0.) {
@@ -105,9 +127,9 @@ static void general_blocks(const SbMaterial m, const SbLane *g, const SbLane V, 
 
 /* A law whose tangent is Hooke's tensor turned by R and a part T of the spins (sbelement.h); damping is the same form with T = -mu I. */
 static void spin_blocks(const SbMaterial m, const SbLane *g, const SbLane V, const Factors *x,
-                        const SbLane F[9], SbLane K[10][9])
+                        const SbLane F[9], Split *split, SbLane K[10][9])
 {
-  const PetscReal both = x->stiffness + x->damping;
+  const PetscReal both = x->stiffness + x->damping, lambda = split ? 0. : m->lambda;
   SbLane R[9], T[9], W;
 
   m->ops.spin(m, F, R, T);
@@ -117,53 +139,131 @@ static void spin_blocks(const SbMaterial m, const SbLane *g, const SbLane V, con
     for (int l = 0; l < SB_BATCH; l++) T[k][l] = (x->stiffness * T[k][l] - rest) / both;
   }
   scaled_volumes(V, both, W);
-  SbCellBlocksSpin(g, W, m->lambda, m->mu, (const SbLane *)R, (const SbLane *)T, K);
-}
-
-/* Blocks of one batch, without mass. */
-static void batch_blocks(SbSpace s, const SbRegion *region, const PetscReal displacement[], const Factors *x,
-                         PetscInt b, SbLane K[10][9])
-{
-  const SbMaterial m = region->material;
-  const SbLane *g = s->batch_g + 9 * b;
-  SbLane u[12], F[9], R[9], W;
-
-  if (m->linear) {
-    scaled_volumes(s->batch_V[b], x->stiffness + x->damping, W);
-    SbCellBlocksIsotropic(g, W, m->lambda, m->mu, NULL, K);
-  } else {
-    sb_gather_strain(s, region, b, displacement, u);
-    SbCellGradient(g, (const SbLane *)u, F);
-    if (m->ops.frame) {
-      m->ops.frame(m, (const SbLane *)F, R);
-      scaled_volumes(s->batch_V[b], x->stiffness + x->damping, W);
-      SbCellBlocksIsotropic(g, W, m->lambda, m->mu, (const SbLane *)R, K);
-    } else if (m->ops.spin && x->stiffness != 0.)
-      spin_blocks(m, g, s->batch_V[b], x, (const SbLane *)F, K);
-    else
-      general_blocks(m, g, s->batch_V[b], x, (const SbLane *)F, K);
+  SbCellBlocksSpin(g, W, lambda, m->mu, (const SbLane *)R, (const SbLane *)T, K);
+  if (split) {
+    memcpy(split->D, R, sizeof(R));
+    split->factor = both;
   }
 }
 
-static void add_region(SbSpace s, const SbRegion *region, const SbStage *stage, const SbValues *x)
+/* Hooke's tensor turned by R, with its damping. */
+static void isotropic_blocks(const SbMaterial m, const SbLane *g, const SbLane V, const Factors *x,
+                             const SbLane R[9], Split *split, SbLane K[10][9])
 {
+  const PetscReal both = x->stiffness + x->damping;
+  SbLane W;
+
+  scaled_volumes(V, both, W);
+  SbCellBlocksIsotropic(g, W, split ? 0. : m->lambda, m->mu, m->linear ? NULL : R, K);
+  if (split) {
+    memcpy(split->D, R, sizeof(split->D));
+    split->factor = both;
+  }
+}
+
+/* Blocks of one batch, without mass; `split` NULL: whole. */
+static void batch_blocks(SbSpace s, const SbRegion *region, const PetscReal displacement[], const Factors *x,
+                         PetscInt b, Split *split, SbLane K[10][9])
+{
+  const SbMaterial m = region->material;
+  const SbLane *g = s->batch_g + 9 * b, *V = s->batch_V + b;
+  SbLane u[12], F[9], R[9];
+
+  if (!m->linear) {
+    sb_gather_strain(s, region, b, displacement, u);
+    SbCellGradient(g, (const SbLane *)u, F);
+  }
+  if (m->linear || m->ops.frame) {
+    m->ops.frame(m, (const SbLane *)F, R);
+    isotropic_blocks(m, g, *V, x, (const SbLane *)R, split, K);
+  } else if (m->ops.spin && x->stiffness != 0.)
+    spin_blocks(m, g, *V, x, (const SbLane *)F, split, K);
+  else
+    general_blocks(m, g, *V, x, (const SbLane *)F, split, K);
+}
+
+/* b_a = V D grad psi_a and the moduli of a batch. */
+static void keep_volumetric(SbSpace s, const SbMaterial m, PetscInt batch, const Split *split,
+                            const SbVolumetric *out)
+{
+  const SbLane *g = s->batch_g + 9 * batch;
+  SbLane *b = out->b + 12 * batch;
+
+  for (int l = 0; l < SB_BATCH; l++) {
+    out->modulus[batch][l] = split ? split->factor * m->lambda : 0.;
+    out->shear[batch][l] = split ? split->factor * m->mu : 0.;
+    for (int i = 0; i < 3; i++) {
+      b[i][l] = 0.;
+      for (int a = 0; a < 3; a++) {
+        PetscReal sum = 0.;
+
+        for (int j = 0; j < 3 && split; j++) sum += split->D[3 * i + j][l] * g[3 * a + j][l];
+        b[3 * a + 3 + i][l] = s->batch_V[batch][l] * sum;
+        b[i][l] -= b[3 * a + 3 + i][l];
+      }
+    }
+  }
+}
+
+/* A matrix that an assembly fills. */
+typedef struct {
+  SbSpace space;
+  SbValues x;
+  PetscReal *glue;
+} Fill;
+
+/* Adds the blocks of a batch and its consistent mass; K is overwritten. */
+static void fill_batch(const Fill *fill, PetscInt r, PetscInt b, PetscReal inertia, SbLane K[10][9])
+{
+  const SbSpace s = fill->space;
+  const SbRegion *region = &s->region[r];
+
+  SbInsertClear(s, &fill->x, b);
+  if (region->broken) {
+    SbInsertBroken(s, &fill->x, b, (const SbLane(*)[9])K);
+    memset(K, 0, 90 * sizeof(SbLane));
+  }
+  if (inertia != 0.)
+    add_consistent_mass(&region->element->ops, inertia, s->batch_V[b], K);
+  else if (region->broken)
+    return;
+  SbInsertBatch(s, &fill->x, b, (const SbLane(*)[9])K);
+}
+
+/*
+  The same cells in another space of the mesh. Between vertices the gradients are a third of those between faces, with the
+  opposite sign: the blocks a ninth.
+*/
+static void fill_other(const Fill *fill, PetscInt r, PetscInt b, PetscBool faces, PetscReal inertia,
+                       const SbLane K[10][9])
+{
+  const PetscReal scale = faces && fill->space->region[r].element->nodes_per[0] ? 1. / 9. : 1.;
+  SbLane copy[10][9] __attribute__((aligned(64)));
+
+  for (int k = 0; k < 90; k++) {
+    for (int l = 0; l < SB_BATCH; l++) copy[k / 9][k % 9][l] = scale * K[k / 9][k % 9][l];
+  }
+  fill_batch(fill, r, b, inertia, copy);
+}
+
+/* fill[0] is the matrix of the space itself. */
+static void fill_region(SbSpace s, PetscInt r, const SbStage *stage, PetscInt nfill, const Fill fill[],
+                        const SbVolumetric *out)
+{
+  const SbRegion *region = &s->region[r];
   const PetscReal inertia = region->material->density * (stage->shift_a + stage->shift_v * region->alpha);
   const Factors factors = {stage->shift_k, stage->shift_v * region->beta, s->consistent_mass ? inertia : 0.};
+  const PetscBool faces = (PetscBool)!region->element->nodes_per[0];
+  Split kept, *split = out && faces && region->material->lambda > 0. ? &kept : NULL;
 
   for (PetscInt b = region->bstart; b < region->bend; b++) {
     SbLane K[10][9] __attribute__((aligned(64)));
 
-    batch_blocks(s, region, stage->u, &factors, b, K);
-    SbInsertClear(s, x, b);
-    if (region->broken) {
-      SbInsertBroken(s, x, b, (const SbLane(*)[9])K);
-      memset(K, 0, sizeof(K));
-    }
-    if (factors.inertia != 0.)
-      add_consistent_mass(&region->element->ops, factors.inertia, s->batch_V[b], K);
-    else if (region->broken)
-      continue;
-    SbInsertBatch(s, x, b, (const SbLane(*)[9])K);
+    batch_blocks(s, region, stage->u, &factors, b, split, K);
+    if (out) keep_volumetric(s, region->material, b, split, out);
+    for (PetscInt n = nfill - 1; n > 0; n--)
+      fill_other(&fill[n], r, b, faces, factors.inertia, (const SbLane(*)[9])K);
+    fill_batch(&fill[0], r, b, factors.inertia, K);
   }
 }
 
@@ -171,6 +271,8 @@ static void add_region(SbSpace s, const SbRegion *region, const SbStage *stage, 
 static PetscErrorCode glue_factors(SbSpace s, const SbStage *stage, PetscReal **glue)
 {
   PetscFunctionBeginUser;
+  *glue = NULL;
+  if (!s->jump) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscCalloc1(s->mesh->nbody, glue));
   for (PetscInt r = 0; r < s->nregion; r++)
     (*glue)[s->region[r].body] = stage->shift_k + stage->shift_v * s->region[r].beta;
@@ -206,26 +308,37 @@ static void add_lumped_mass(SbSpace s, const SbStage *stage, const SbValues *x)
   }
 }
 
+PetscErrorCode SbSpaceAssembleSplit(SbSpace s, const SbStage *stage, PetscInt n, const SbSpace space[],
+                                    const Mat A[], const SbVolumetric *out)
+{
+  Fill fill[3];
+
+  PetscFunctionBeginUser;
+  for (PetscInt k = 0; k < n; k++) {
+    fill[k].space = space[k];
+    PetscCall(SbValuesBegin(A[k], &fill[k].x));
+    PetscCall(glue_factors(space[k], stage, &fill[k].glue));
+    fill[k].x.glue = fill[k].glue;
+  }
+  for (PetscInt r = 0; r < s->nregion; r++) fill_region(s, r, stage, n, fill, out);
+  for (PetscInt k = 0; k < n; k++) {
+    if (!s->consistent_mass && (stage->shift_a != 0. || stage->shift_v != 0.))
+      add_lumped_mass(space[k], stage, &fill[k].x);
+    PetscCall(SbValuesEnd(&fill[k].x));
+    PetscCall(PetscFree(fill[k].glue));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode SbSpaceAssembleTangent(SbSpace s, const SbStage *stage, Mat A)
 {
-  PetscBool matrix_free;
-  PetscReal *glue = NULL;
-  SbValues x;
+  PetscBool done;
 
   PetscFunctionBeginUser;
   PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_TANGENT], A, 0, 0, 0));
-  PetscCall(SbFrameOperatorSetState(A, stage, &matrix_free));
-  if (matrix_free) {
-    PetscCall(PetscLogEventEnd(SbEvents[SB_EVENT_TANGENT], A, 0, 0, 0));
-    PetscFunctionReturn(PETSC_SUCCESS);
-  }
-  PetscCall(SbValuesBegin(A, &x));
-  if (s->jump) PetscCall(glue_factors(s, stage, &glue));
-  x.glue = glue;
-  for (PetscInt r = 0; r < s->nregion; r++) add_region(s, &s->region[r], stage, &x);
-  if (!s->consistent_mass && (stage->shift_a != 0. || stage->shift_v != 0.)) add_lumped_mass(s, stage, &x);
-  PetscCall(SbValuesEnd(&x));
-  PetscCall(PetscFree(glue));
+  PetscCall(SbFrameOperatorSetState(A, stage, &done));
+  if (!done) PetscCall(SbPressureOperatorAssemble(A, stage, &done));
+  if (!done) PetscCall(SbSpaceAssembleSplit(s, stage, 1, &s, &A, NULL));
   PetscCall(PetscLogEventEnd(SbEvents[SB_EVENT_TANGENT], A, 0, 0, 0));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -284,6 +397,7 @@ PetscErrorCode SbSpaceFinishTangent(SbSpace s, Mat A)
   SbValues x;
 
   PetscFunctionBeginUser;
+  PetscCall(SbPressureOperatorFinish(A));
   PetscCall(PetscObjectTypeCompare((PetscObject)A, MATSHELL, &matrix_free));
   if (matrix_free) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(SbValuesBegin(A, &x));

@@ -226,6 +226,7 @@ PetscErrorCode SbMaterialCreate_Corotated(SbMaterial m)
   m->ops.pressure = pressure_corotated;
   m->ops.frame = frame_corotated;
   m->ops.tangent = tangent_corotated;
+  m->ops.volumetric = frame_corotated;
   m->symmetric = PETSC_TRUE;
   m->tangent = SB_TANGENT_WARPED;
   PetscFunctionReturn(PETSC_SUCCESS);

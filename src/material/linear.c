@@ -78,6 +78,7 @@ PetscErrorCode SbMaterialCreate_Linear(SbMaterial m)
   m->ops.pressure = pressure_linear;
   m->ops.frame = frame_linear;
   m->ops.tangent = tangent_linear;
+  m->ops.volumetric = frame_linear;
   m->linear = PETSC_TRUE;
   m->symmetric = PETSC_TRUE;
   m->tangent = SB_TANGENT_EXACT;

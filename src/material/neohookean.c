@@ -142,6 +142,19 @@ static void tangent_neohookean(const struct _p_SbMaterial *m, const SbLane F[9],
     tangent_exact(m, F, C);
 }
 
+SB_KERNEL static void volumetric_neohookean(const struct _p_SbMaterial *m, const SbLane F[restrict 9],
+                                            SbLane D[restrict 9])
+{
+  (void)m;
+  for (int l = 0; l < SB_BATCH; l++) {
+    PetscReal f[9], c[9];
+
+    SbLaneGet(9, F, l, f);
+    SbMatCofactor(f, c);
+    SbLanePut(9, c, l, D);
+  }
+}
+
 PetscErrorCode SbMaterialCreate_NeoHookean(SbMaterial m)
 {
   PetscFunctionBeginUser;
@@ -151,6 +164,7 @@ PetscErrorCode SbMaterialCreate_NeoHookean(SbMaterial m)
   m->ops.stress = stress_neohookean;
   m->ops.pressure = pressure_neohookean;
   m->ops.tangent = tangent_neohookean;
+  m->ops.volumetric = volumetric_neohookean;
   m->symmetric = PETSC_TRUE;
   m->tangent = SB_TANGENT_EXACT;
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -123,6 +123,13 @@ static void tangent_stvk(const struct _p_SbMaterial *m, const SbLane F[9], SbLan
     tangent_exact(m, F, C);
 }
 
+/* theta = tr(F^T F - I) / 2 */
+static void volumetric_stvk(const struct _p_SbMaterial *m, const SbLane F[9], SbLane D[9])
+{
+  (void)m;
+  memcpy(D, F, 9 * sizeof(SbLane));
+}
+
 PetscErrorCode SbMaterialCreate_StVK(SbMaterial m)
 {
   PetscFunctionBeginUser;
@@ -132,6 +139,7 @@ PetscErrorCode SbMaterialCreate_StVK(SbMaterial m)
   m->ops.stress = stress_stvk;
   m->ops.pressure = pressure_stvk;
   m->ops.tangent = tangent_stvk;
+  m->ops.volumetric = volumetric_stvk;
   m->symmetric = PETSC_TRUE;
   m->tangent = SB_TANGENT_EXACT;
   PetscFunctionReturn(PETSC_SUCCESS);

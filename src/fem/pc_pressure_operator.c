@@ -1,0 +1,348 @@
+/*
+  The tangent with the volumetric part apart: K = A + B^T C^-1 B.
+
+  Every law's tangent is A + sum over cells of lambda / V b b^T, b_a = V D grad psi_a (SbMaterialOps.volumetric). A has no large
+  number in it and is stored; a row of B is the vector b of a cell; C = V / lambda is a number per cell. K x is formed from
+  these: nothing is ever subtracted to get rid of lambda.
+
+  Unknowns p of the cells stand behind the nodes' in the vectors of the iteration. A cell's pressure lives on the rank that owns
+  the cell; B^T p brings those of the ghost cells. Prescribed unknowns: their columns of B are zero.
+*/
+#include "pressure.h"
+#include "sbkernel.h"
+#include "sbsolver.h"
+
+#define PRESSURE_OPERATOR "SbPressureOperator"
+#define S0 1.5 /* B A^-1 B^T is about S0 V / (2 mu): fewest iterations among 0.5, 1 and 1.5 */
+
+/* ------------------------------------------------------------------ B and its transpose */
+
+static void clear_fixed(SbSpace s, PetscInt nnode, PetscReal x[])
+{
+  for (PetscInt k = 0; k < s->nfixed && s->fixed_node[k] < nnode; k++) {
+    const PetscInt i = s->fixed_node[k];
+
+    for (PetscInt c = 0; c < 3; c++) {
+      if (s->fixed[i] & (1 << c)) x[3 * i + c] = 0.;
+    }
+  }
+}
+
+/* d[ncell_owned] = B x of owned cells; x[nnode][3] with ghosts. */
+static void divergence(SbPressureOperator op, const PetscReal x[], PetscBool absolute, PetscReal d[])
+{
+  SbSpace s = op->space;
+
+  for (PetscInt r = 0; r < s->nregion; r++) {
+    const SbRegion *region = &s->region[r];
+
+    for (PetscInt b = region->bstart; region->owned && b < region->bend; b++) {
+      const SbLane *v = (const SbLane *)op->volume.b + 12 * b;
+      SbLane u[12], sum = {0};
+
+      sb_gather_strain(s, region, b, x, u);
+      for (int k = 0; k < 12; k++) {
+        for (int l = 0; l < SB_BATCH; l++) sum[l] += (absolute ? PetscAbsReal(v[k][l]) : v[k][l]) * u[k][l];
+      }
+      for (PetscInt l = 0; l < s->batch_n[b]; l++) d[s->batch_cell[b] + l] = sum[l];
+    }
+  }
+}
+
+/* y[nnode][3] += B^T p, right on owned nodes; p[ncell] with ghosts. */
+static void gradient(SbPressureOperator op, const PetscReal p[], PetscBool absolute, PetscReal y[])
+{
+  SbSpace s = op->space;
+
+  for (PetscInt r = 0; r < s->nregion; r++) {
+    const SbRegion *region = &s->region[r];
+
+    for (PetscInt b = region->bstart; b < region->bend; b++) {
+      const SbLane *v = (const SbLane *)op->volume.b + 12 * b;
+      const PetscReal *q = p + s->batch_cell[b];
+      SbLane f[12], lane = {0};
+
+      for (PetscInt l = 0; l < s->batch_n[b]; l++) lane[l] = q[l];
+      for (int k = 0; k < 12; k++) {
+        for (int l = 0; l < SB_BATCH; l++) f[k][l] = (absolute ? PetscAbsReal(v[k][l]) : v[k][l]) * lane[l];
+      }
+      sb_scatter_strain(s, region, b, f, y);
+    }
+  }
+}
+
+/* d = B u. */
+static PetscErrorCode apply_divergence(SbPressureOperator op, const PetscScalar u[], PetscBool absolute,
+                                       PetscScalar d[])
+{
+  SbSpace s = op->space;
+  PetscScalar *x;
+  const PetscReal *local;
+
+  PetscFunctionBeginUser;
+  PetscCall(VecGetArray(op->u, &x));
+  for (PetscInt i = 0; i < 3 * s->nnode_owned; i++) x[i] = absolute ? PetscAbsScalar(u[i]) : u[i];
+  clear_fixed(s, s->nnode_owned, x);
+  PetscCall(VecRestoreArray(op->u, &x));
+  PetscCall(SbSpaceGetLocalRead(s, op->u, &local));
+  divergence(op, local, absolute, d);
+  PetscCall(SbSpaceRestoreLocalRead(s, op->u, &local));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* y += factor B^T p. */
+static PetscErrorCode add_gradient(SbPressureOperator op, const PetscScalar p[], PetscBool absolute,
+                                   PetscReal factor, PetscScalar y[])
+{
+  SbSpace s = op->space;
+  const PetscScalar *q;
+  PetscScalar *x;
+  PetscReal *f;
+  Vec local = op->p;
+
+  PetscFunctionBeginUser;
+  PetscCall(VecGetArray(op->p, &x));
+  PetscCall(PetscArraycpy(x, p, s->mesh->ncell_owned));
+  PetscCall(VecRestoreArray(op->p, &x));
+  if (s->ghosted) {
+    PetscCall(VecGhostUpdateBegin(op->p, INSERT_VALUES, SCATTER_FORWARD));
+    PetscCall(VecGhostUpdateEnd(op->p, INSERT_VALUES, SCATTER_FORWARD));
+    PetscCall(VecGhostGetLocalForm(op->p, &local));
+  }
+  PetscCall(VecGetArrayRead(local, &q));
+  PetscCall(SbSpaceGetLocalWrite(s, op->y, &f));
+  PetscCall(PetscArrayzero(f, 3 * s->nnode));
+  gradient(op, q, absolute, f);
+  clear_fixed(s, s->nnode_owned, f);
+  for (PetscInt i = 0; i < 3 * s->nnode_owned; i++) y[i] += factor * f[i];
+  PetscCall(SbSpaceRestoreLocalWrite(s, op->y, &f));
+  PetscCall(VecRestoreArrayRead(local, &q));
+  if (s->ghosted) PetscCall(VecGhostRestoreLocalForm(op->p, &local));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbPressureOperatorSubtract(SbPressureOperator op, const PetscScalar p[], PetscScalar y[])
+{
+  PetscFunctionBeginUser;
+  PetscCall(add_gradient(op, p, PETSC_FALSE, -1., y));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbPressureOperatorApply(SbPressureOperator op, const PetscScalar u[], const PetscScalar p[],
+                                       PetscScalar y[], PetscScalar d[])
+{
+  PetscFunctionBeginUser;
+  PetscCall(VecPlaceArray(op->a, u));
+  PetscCall(VecPlaceArray(op->b, y));
+  PetscCall(MatMult(op->levels->A[0], op->a, op->b));
+  PetscCall(VecResetArray(op->a));
+  PetscCall(VecResetArray(op->b));
+  if (d) PetscCall(apply_divergence(op, u, PETSC_FALSE, d));
+  if (p) PetscCall(add_gradient(op, p, PETSC_FALSE, 1., y));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Y += B^T C^-1 B X, or that of the absolute values. */
+static PetscErrorCode add_volumetric(SbPressureOperator op, PetscBool absolute, Vec X, Vec Y)
+{
+  const PetscScalar *x;
+  PetscScalar *y, *d;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscMalloc1(op->space->mesh->ncell_owned, &d));
+  PetscCall(VecGetArrayRead(X, &x));
+  PetscCall(VecGetArray(Y, &y));
+  PetscCall(apply_divergence(op, x, absolute, d));
+  for (PetscInt c = 0; c < op->space->mesh->ncell_owned; c++) d[c] *= op->Cinv[c];
+  PetscCall(add_gradient(op, d, absolute, 1., y));
+  PetscCall(VecRestoreArrayRead(X, &x));
+  PetscCall(VecRestoreArray(Y, &y));
+  PetscCall(PetscFree(d));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbPressureOperatorRounding(SbPressureOperator op, Vec X, PetscReal *level)
+{
+  Vec Y;
+
+  PetscFunctionBeginUser;
+  PetscCall(VecDuplicate(X, &Y));
+  PetscCall(MatGetDiagonal(op->levels->A[0], Y));
+  PetscCall(VecPointwiseMult(Y, Y, X));
+  PetscCall(VecAbs(Y));
+  PetscCall(add_volumetric(op, PETSC_TRUE, X, Y));
+  PetscCall(VecNorm(Y, NORM_2, level));
+  *level *= PETSC_MACHINE_EPSILON;
+  PetscCall(VecDestroy(&Y));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ the matrix */
+
+static PetscErrorCode MatMult_Pressure(Mat K, Vec X, Vec Y)
+{
+  SbPressureOperator op;
+
+  PetscFunctionBeginUser;
+  PetscCall(MatShellGetContext(K, &op));
+  PetscCall(MatMult(op->levels->A[0], X, Y));
+  PetscCall(add_volumetric(op, PETSC_FALSE, X, Y));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbPressureOperatorGet(Mat K, SbPressureOperator *op)
+{
+  void (*mark)(void) = NULL;
+
+  PetscFunctionBeginUser;
+  *op = NULL;
+  PetscCall(PetscObjectQueryFunction((PetscObject)K, PRESSURE_OPERATOR, &mark));
+  if (mark) PetscCall(MatShellGetContext(K, op));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbPressureOperatorMatrix(Mat K, Mat *inner)
+{
+  SbPressureOperator op;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbPressureOperatorGet(K, &op));
+  *inner = op ? op->levels->A[0] : K;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbPressureOperatorAssemble(Mat K, const SbStage *stage, PetscBool *is)
+{
+  SbPressureOperator op;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbPressureOperatorGet(K, &op));
+  *is = (PetscBool)(op != NULL);
+  if (op) PetscCall(SbLevelsAssemble(op->levels, stage, &op->volume));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Numbers of the cells, from the moduli of the last assembly. */
+static void cell_numbers(SbPressureOperator op)
+{
+  SbSpace s = op->space;
+
+  for (PetscInt r = 0; r < s->nregion; r++) {
+    const SbRegion *region = &s->region[r];
+
+    for (PetscInt b = region->bstart; region->owned && b < region->bend; b++) {
+      for (PetscInt l = 0; l < s->batch_n[b]; l++) {
+        const PetscInt c = s->batch_cell[b] + l;
+        const PetscReal V = s->batch_V[b][l], modulus = op->volume.modulus[b][l];
+        PetscReal square = 0.;
+
+        for (int k = 0; k < 12; k++) square += PetscSqr(op->volume.b[12 * b + k][l]);
+        op->norm[c] = PetscSqrtReal(square);
+        op->Cinv[c] = modulus / V;
+        op->C[c] = modulus > 0. ? V / modulus : 1.;
+        op->S[c] = op->C[c] + (modulus > 0. ? S0 * V / (2. * op->volume.shear[b][l]) : 0.);
+      }
+    }
+  }
+}
+
+PetscErrorCode SbPressureOperatorFinish(Mat K)
+{
+  SbPressureOperator op;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbPressureOperatorGet(K, &op));
+  if (!op) PetscFunctionReturn(PETSC_SUCCESS);
+  for (PetscInt k = 0; k < op->levels->n; k++)
+    PetscCall(SbSpaceFinishTangent(op->levels->at[k], op->levels->A[k]));
+  cell_numbers(op);
+  PetscCall(MatAssemblyBegin(K, MAT_FINAL_ASSEMBLY)); /* says that it has changed */
+  PetscCall(MatAssemblyEnd(K, MAT_FINAL_ASSEMBLY));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ life */
+
+static PetscErrorCode MatDestroy_Pressure(Mat K)
+{
+  SbPressureOperator op;
+
+  PetscFunctionBeginUser;
+  PetscCall(MatShellGetContext(K, &op));
+  PetscCall(PetscObjectComposeFunction((PetscObject)K, PRESSURE_OPERATOR, NULL));
+  PetscCall(SbLevelsDestroy(&op->levels));
+  PetscCall(PetscFree(op->memory));
+  PetscCall(PetscFree4(op->C, op->Cinv, op->S, op->norm));
+  PetscCall(VecDestroy(&op->u));
+  PetscCall(VecDestroy(&op->y));
+  PetscCall(VecDestroy(&op->p));
+  PetscCall(VecDestroy(&op->a));
+  PetscCall(VecDestroy(&op->b));
+  PetscCall(PetscFree(op));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* A vector of cells with ghosts. */
+static PetscErrorCode create_cell_vector(SbMesh mesh, Vec *p)
+{
+  PetscMPIInt size;
+  PetscInt *number, first;
+
+  PetscFunctionBeginUser;
+  PetscCallMPI(MPI_Comm_size(mesh->comm, &size));
+  if (size == 1) {
+    PetscCall(VecCreateSeq(mesh->comm, mesh->ncell_owned, p));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  PetscCallMPI(MPI_Scan(&mesh->ncell_owned, &first, 1, MPIU_INT, MPI_SUM, mesh->comm));
+  first -= mesh->ncell_owned;
+  PetscCall(PetscMalloc1(mesh->ncell, &number));
+  for (PetscInt c = 0; c < mesh->ncell_owned; c++) number[c] = first + c;
+  PetscCall(SbMeshBroadcastCells(mesh, 1, number));
+  PetscCall(VecCreateGhost(mesh->comm, mesh->ncell_owned, PETSC_DECIDE, mesh->ncell - mesh->ncell_owned,
+                           number + mesh->ncell_owned, p));
+  PetscCall(PetscFree(number));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode allocate(SbPressureOperator op)
+{
+  SbSpace s = op->space;
+  const PetscInt n = s->mesh->ncell_owned;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscMalloc((size_t)s->nbatch * 14 * sizeof(SbLane) + 64, &op->memory));
+  op->volume.b = (SbLane *)(((uintptr_t)op->memory + 63) & ~(uintptr_t)63);
+  op->volume.modulus = op->volume.b + 12 * (size_t)s->nbatch;
+  op->volume.shear = op->volume.modulus + s->nbatch;
+  PetscCall(PetscMalloc4(n, &op->C, n, &op->Cinv, n, &op->S, n, &op->norm));
+  PetscCall(SbSpaceCreateVec(s, &op->u));
+  PetscCall(SbSpaceCreateVec(s, &op->y));
+  PetscCall(create_cell_vector(s->mesh, &op->p));
+  PetscCall(MatCreateVecs(op->levels->A[0], &op->a, &op->b));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbPressureOperatorCreate(SbSpace s, Mat *K)
+{
+  SbPressureOperator op;
+
+  PetscFunctionBeginUser;
+  PetscCheck(s->faces, s->comm, PETSC_ERR_USER,
+             "-solver pressure is for bodies with -body_<name>_element cr or dg, and there are none: choose "
+             "auto, or cg_two_level");
+  PetscCall(PetscNew(&op));
+  op->space = s;
+  PetscCall(SbLevelsCreate(s, &op->levels));
+  PetscCall(allocate(op));
+  PetscCall(
+    MatCreateShell(s->comm, 3 * s->nnode_owned, 3 * s->nnode_owned, PETSC_DETERMINE, PETSC_DETERMINE, op, K));
+  PetscCall(MatSetBlockSize(*K, 3));
+  PetscCall(MatShellSetOperation(*K, MATOP_MULT, SB_OPERATION(MatMult_Pressure)));
+  PetscCall(MatShellSetOperation(*K, MATOP_DESTROY, SB_OPERATION(MatDestroy_Pressure)));
+  PetscCall(MatSetOption(*K, MAT_SYMMETRIC, PETSC_TRUE));
+  PetscCall(MatSetOption(*K, MAT_SYMMETRY_ETERNAL, PETSC_TRUE));
+  PetscCall(MatSetUp(*K));
+  PetscCall(PetscObjectComposeFunction((PetscObject)*K, PRESSURE_OPERATOR, MatMult_Pressure));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
