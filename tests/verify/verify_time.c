@@ -165,7 +165,7 @@ static PetscErrorCode check_bar_order(const char *element, const char *options, 
   PetscReal x[3][6], order_u, order_v;
 
   PetscFunctionBeginUser;
-  for (int k = 0; k < 3; k++) PetscCall(bend(element, options, 40 << k, x[k]));
+  for (int k = 0; k < 3; k++) PetscCall(bend(element, options, 20 << k, x[k]));
   order_u = PetscLog2Real((x[0][2] - x[1][2]) / (x[1][2] - x[2][2]));
   order_v = PetscLog2Real((x[0][5] - x[1][5]) / (x[1][5] - x[2][5]));
   PetscCall(PetscPrintf(PETSC_COMM_WORLD, "  %s %s: order %.3f of displacements, %.3f of velocities\n",
@@ -195,10 +195,12 @@ int main(int argc, char **argv)
   PetscCall(check_order("-time genalpha -time_spectral_radius 0.5", 0.25, 0., 0., 2));
   PetscCall(check_order("-time genalpha -time_spectral_radius 0", 0.25, 2., 0.002, 2));
   PetscCall(check_dissipation());
-  for (int e = 0; e < 3; e++) {
+  for (int e = 1; e < 3; e++) {
     PetscCall(check_bar_order(elements[e], "-time euler_implicit", 1));
     PetscCall(check_bar_order(elements[e], "-time newmark", 2));
     PetscCall(check_bar_order(elements[e], "-time newmark -mass consistent", 2));
+  }
+  for (int e = 0; e < 3; e++) {
     PetscCall(check_free_fall(elements[e], "euler_implicit", -9.81 * 1e-4 * 50 * 51 / 2));
     PetscCall(check_free_fall(elements[e], "newmark", -0.5 * 9.81 * 0.25));
     PetscCall(check_free_fall(elements[e], "genalpha", -0.5 * 9.81 * 0.25));
