@@ -32,6 +32,8 @@ PetscErrorCode SbSolverChoose(SbSpace space, PetscBool dynamic, PetscBool linear
 PetscErrorCode SbSolverFallBack(SNES snes, PetscBool *changed);
 /* Gives the linear solver of `snes` the preset's options and tolerances; before SNESSetFromOptions(). Collective. */
 PetscErrorCode SbSolverSetUp(SNES snes, SbSpace space, const SbSolverPreset *preset);
+/* Solves of ksp whose true residual is far above the tolerance fail (KSP_DIVERGED_BREAKDOWN). Not collective. */
+PetscErrorCode SbSolverLookAtResidual(KSP ksp);
 /* The operator that the preset works on. Collective; caller destroys. */
 PetscErrorCode SbSolverCreateOperator(SbSpace space, const SbSolverPreset *preset, Mat *A);
 

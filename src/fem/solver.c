@@ -49,8 +49,9 @@ static const SbSolverPreset presets[] = {
    NULL, NULL, "successive over-relaxation, omega 1.6 (between ranks: block Jacobi)", NULL},
   {"cholmod", SB_MATRIX_AIJ, PETSC_FALSE, "-ksp_type cg -pc_type cholesky -pc_factor_mat_solver_type cholmod",
    "suitesparse", NULL, "sparse Cholesky of SuiteSparse; one rank", NULL},
-  {"mumps", SB_MATRIX_AIJ, PETSC_FALSE, "-ksp_type fgmres -pc_type cholesky -pc_factor_mat_solver_type mumps",
-   "mumps", NULL, "sparse factorisation of MUMPS on any number of ranks", NULL},
+  {"mumps", SB_MATRIX_AIJ, PETSC_FALSE,
+   "-ksp_type fgmres -pc_type cholesky -pc_factor_mat_solver_type mumps -mat_mumps_icntl_14 100", "mumps",
+   NULL, "sparse factorisation of MUMPS on any number of ranks", NULL},
   {"rotated", SB_MATRIX_BAIJ, PETSC_FALSE, "-ksp_type cg", NULL, SbPCRotatedCreate,
    "CG, one factorisation that turns with the nodes and is seldom renewed: dynamic runs of up to about 100k "
    "tets",
@@ -208,6 +209,7 @@ PetscErrorCode SbSolverSetUp(SNES snes, SbSpace s, const SbSolverPreset *preset)
   PetscCall(KSPSetType(ksp, KSPCG));
   PetscCall(KSPSetNormType(ksp, KSP_NORM_UNPRECONDITIONED));
   PetscCall(insert_options(preset->options));
+  if (strstr(preset->options, "-pc_type cholesky")) PetscCall(SbSolverLookAtResidual(ksp));
   if (preset->precondition) {
     PetscCall(KSPGetPC(ksp, &pc));
     PetscCall(preset->precondition(s, pc));
