@@ -1,9 +1,9 @@
 // @long
-// @ranks 2
+// @ranks 1
 // @timeout 1500
 /*
-  The last refinement of the convergence that verify_locking.c begins: n = 8 and 16 at four Poisson's ratios with CR, at the
-  smallest and the largest with DG. 152,064 and 294,912 unknowns.
+  The last refinement of the convergence that verify_locking.c begins, n = 8 and 16, at the smallest and the largest Poisson's
+  ratio: 152,064 unknowns with CR, 294,912 with DG.
 */
 #include "locking.h"
 
@@ -13,7 +13,7 @@ static PetscErrorCode measure(const char *element, PetscInt n, PetscReal nu, Pet
   LockingCost cost;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscSNPrintf(more, sizeof(more), "-body_a_element %s -solver mumps", element));
+  PetscCall(PetscSNPrintf(more, sizeof(more), "-body_a_element %s -solver pressure", element));
   PetscCall(locking_cube(n, "", nu, more, error, &cost));
   PetscCall(PetscPrintf(PETSC_COMM_WORLD, "  %s nu %-8g n %2d: L2 %.5f  H1 %.5f, %.1f s\n", element,
                         (double)nu, (int)n, (double)error[0], (double)error[1], cost.seconds));
@@ -37,11 +37,10 @@ static PetscErrorCode check_order(const char *element, PetscReal nu)
 
 int main(int argc, char **argv)
 {
-  static const PetscReal nu[4] = {0.3, 0.49, 0.4999, 0.499999};
-
   SB_TEST_BEGIN(argc, argv);
-  for (int i = 0; i < 4; i++) PetscCall(check_order("cr", nu[i]));
-  PetscCall(check_order("dg", nu[0]));
-  PetscCall(check_order("dg", nu[3]));
+  PetscCall(check_order("cr", 0.3));
+  PetscCall(check_order("cr", 0.499999));
+  PetscCall(check_order("dg", 0.3));
+  PetscCall(check_order("dg", 0.499999));
   SB_TEST_END();
 }
