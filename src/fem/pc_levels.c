@@ -13,6 +13,7 @@
   inequalities for piecewise H1 functions.
 */
 #include "pressure.h"
+#include "sweep.h"
 
 /* ------------------------------------------------------------------ spaces */
 
@@ -198,12 +199,11 @@ static PetscErrorCode add_from_vertices(SbLevels v, Vec z)
 static PetscErrorCode cycle_faces(SbLevels v, Vec r, Vec z)
 {
   const PetscInt k = v->n - 2;
-  const MatSORType before = v->sweeps == 1 ? SOR_LOCAL_FORWARD_SWEEP : SOR_LOCAL_SYMMETRIC_SWEEP,
-                   after = v->sweeps == 1 ? SOR_LOCAL_BACKWARD_SWEEP : SOR_LOCAL_SYMMETRIC_SWEEP;
+  SbSpace at = v->at[k];
   Mat A = v->A[k];
 
   PetscFunctionBeginUser;
-  PetscCall(MatSOR(A, r, 1., (MatSORType)(before | SOR_ZERO_INITIAL_GUESS), 0., 1, 1, z));
+  PetscCall(SbSweep(at, A, v->inverse, SB_SWEEP_FORWARD, r, z));
   PetscCall(MatMult(A, z, v->t[k]));
   PetscCall(VecAYPX(v->t[k], -1., r));
   PetscCall(restrict_to_vertices(v, v->t[k]));
@@ -211,7 +211,7 @@ static PetscErrorCode cycle_faces(SbLevels v, Vec r, Vec z)
   PetscCall(add_from_vertices(v, z));
   PetscCall(MatMult(A, z, v->t[k]));
   PetscCall(VecAYPX(v->t[k], -1., r));
-  PetscCall(MatSOR(A, v->t[k], 1., (MatSORType)(after | SOR_ZERO_INITIAL_GUESS), 0., 1, 1, v->w[k]));
+  PetscCall(SbSweep(at, A, v->inverse, SB_SWEEP_BACKWARD, v->t[k], v->w[k]));
   PetscCall(VecAXPY(z, 1., v->w[k]));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -361,6 +361,7 @@ PetscErrorCode SbLevelsSetUp(SbLevels v)
 {
   PetscFunctionBeginUser;
   if (v->n == 3) PetscCall(jump_stiffness(v));
+  PetscCall(SbSweepSetUp(v->at[v->n - 2], v->A[v->n - 2], v->inverse));
   PetscCall(KSPSetOperators(v->coarse, v->A[v->n - 1], v->A[v->n - 1]));
   PetscCall(KSPSetUp(v->coarse));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -389,10 +390,6 @@ PetscErrorCode SbLevelsCreate(SbSpace s, SbLevels *levels)
   PetscCall(PetscNew(&v));
   v->space = v->at[0] = s;
   v->n = 1;
-  v->sweeps = 1;
-  PetscCall(PetscOptionsGetInt(NULL, NULL, "-pressure_sweeps", &v->sweeps, NULL));
-  PetscCheck(v->sweeps == 1 || v->sweeps == 2, s->comm, PETSC_ERR_USER,
-             "-pressure_sweeps %" PetscInt_FMT " is not 1 or 2", v->sweeps);
   PetscCall(SbSpaceCreateMatrix(s, SB_MATRIX_BAIJ, &v->A[0]));
   if (s->width > 4) {
     PetscCall(add_level(v, PETSC_FALSE));
@@ -406,6 +403,7 @@ PetscErrorCode SbLevelsCreate(SbSpace s, SbLevels *levels)
     PetscCall(SbSpaceCreateVec(v->at[k], &v->g[k]));
     PetscCall(MatCreateVecs(v->A[k], &v->t[k], &v->w[k]));
   }
+  PetscCall(PetscMalloc1(9 * (size_t)v->at[v->n - 2]->nnode_owned, &v->inverse));
   PetscCall(create_coarse(v));
   *levels = v;
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -417,6 +415,7 @@ PetscErrorCode SbLevelsDestroy(SbLevels *levels)
 
   PetscFunctionBeginUser;
   if (!v) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscFree(v->inverse));
   for (PetscInt k = 0; k < v->n; k++) {
     PetscCall(MatDestroy(&v->A[k]));
     if (k) PetscCall(SbSpaceDestroy(&v->at[k]));

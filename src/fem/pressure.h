@@ -25,9 +25,9 @@ struct _p_SbLevels {
   Vec r[3], z[3], g[3]; /* work vectors of each level, with ghosts */
   Vec t[3], w[3];       /* and without; t[0] is the diagonal of A[0] with a DG body */
   KSP coarse;
-  PetscInt sweeps; /* 1: forward before and backward after; 2: both both times */
+  PetscReal *inverse; /* [nodes of at[n-2]][9] inverses of the diagonal blocks there, m/N */
 };
-/* Collective. The space's prescribed unknowns are known. Options read: -pressure_sweeps, -pressure_coarse_. */
+/* Collective. The space's prescribed unknowns are known. Options read: -pressure_coarse_. */
 PetscErrorCode SbLevelsCreate(SbSpace space, SbLevels *levels);
 PetscErrorCode SbLevelsDestroy(SbLevels *levels);
 /* Fills the matrices; `out` gets the volumetric part. Not collective. */
