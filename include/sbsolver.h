@@ -69,7 +69,7 @@ PetscErrorCode SbPressureOperatorCreate(SbSpace space, Mat *K);
 
   Collective. The space is borrowed. -ksp_max_it limits the iterations of GMRES, and they are what the KSP reports. A residual
   that two corrections no longer halve fails the solve (KSP_DIVERGED_BREAKDOWN).
-  Options read: -pressure_ksp_ (GMRES), -pressure_coarse_ (P1), -pressure_sweeps.
+  Options read: -pressure_ksp_ (GMRES), -pressure_coarse_ (P1).
 */
 PetscErrorCode SbPCPressureCreate(SbSpace space, PC pc);
 /* Solves so far, iterations of all of them, most in one. Outputs may be NULL. Not collective. */
