@@ -9,6 +9,8 @@
   CR: Gauss-Seidel forward, a correction by P1, Gauss-Seidel backward (between ranks: block Jacobi). A P1 function has at the
   centroid of a face the mean of its values at the three vertices; its jumps vanish and its strains are the same, so the Galerkin
   product is P1's own matrix, which is assembled from the same blocks. A vertex of a face with a prescribed unknown is held.
+  A DG cell that touches this rank's cells with a vertex only may have neighbours that are not here; its strain is that of its own
+  nodes there, so that in a strained body the P1 matrix is slightly unsymmetric at the border of ranks. GMRES does not mind.
   P1 by algebraic multigrid. Hiptmair and Xu (2007), Nodal auxiliary space preconditioning; Brenner (2003), Poincare-Friedrichs
   inequalities for piecewise H1 functions.
 */
