@@ -77,3 +77,11 @@ typedef const char *SbErrorText;
 #else
   #define SB_TS_DT_RENAMED 1
 #endif
+
+/* Gram-Schmidt of GMRES is repeated where it loses digits; renamed in 3.26. */
+#if PETSC_VERSION_GE(3, 26, 0)
+  #define SbKSPRefineOrthogonalization(ksp) \
+    KSPOrthogonalizationSetCGSRefinementType(ksp, KSP_ORTHOGONALIZATION_CGS_REFINE_IFNEEDED)
+#else
+  #define SbKSPRefineOrthogonalization(ksp) KSPGMRESSetCGSRefinementType(ksp, KSP_GMRES_CGS_REFINE_IFNEEDED)
+#endif

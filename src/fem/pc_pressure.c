@@ -112,7 +112,7 @@ static PetscErrorCode create_inner(Pressure *s)
   PetscCall(KSPSetOperators(s->inner, s->M, s->M));
   PetscCall(KSPSetType(s->inner, KSPGMRES));
   PetscCall(KSPGMRESSetRestart(s->inner, RESTART));
-  PetscCall(KSPGMRESSetCGSRefinementType(s->inner, KSP_GMRES_CGS_REFINE_IFNEEDED));
+  PetscCall(SbKSPRefineOrthogonalization(s->inner));
   PetscCall(KSPSetPCSide(s->inner, PC_RIGHT));
   PetscCall(KSPSetNormType(s->inner, KSP_NORM_UNPRECONDITIONED));
   PetscCall(KSPGetPC(s->inner, &pc));
