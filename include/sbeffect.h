@@ -18,6 +18,15 @@ typedef struct {
   PetscErrorCode (*prescribe)(SbEffect e, SbSpace space, PetscReal t);
   /* once before each attempt at a step */
   PetscErrorCode (*prestep)(SbEffect e, SbSpace space, PetscReal t, PetscReal dt);
+  /* contact, before the first solve of an attempt at a step from t to t + dt: local displacements u0 at t and u as predicted at
+     t + dt, m. Not collective. */
+  PetscErrorCode (*touch)(SbEffect e, SbSpace space, PetscReal t, PetscReal dt, const PetscReal u0[],
+                          const PetscReal u[]);
+  /* writes what contact holds by SbSpaceHold(). Not collective. */
+  PetscErrorCode (*hold)(SbEffect e, SbSpace space);
+  /* after a solve, with the residual r without constraints, N: sets `changed` when another solve is needed. Collective. */
+  PetscErrorCode (*settle)(SbEffect e, SbSpace space, const PetscReal u[], const PetscReal r[],
+                           PetscBool *changed);
   /* f[nnode][3] += external force, N; must be right on owned nodes without communication */
   PetscErrorCode (*force)(SbEffect e, SbSpace space, const SbStage *stage, PetscReal f[]);
   /* A -= shift_k d force / d u + shift_v d force / d v by SbSpaceAddCellBlock(), called for (a, b) and for (b, a) */
@@ -74,6 +83,7 @@ PetscErrorCode SbEffectRegister_PointForce(void);
 PetscErrorCode SbEffectRegister_Support(void);
 PetscErrorCode SbEffectRegister_Drive(void);
 PetscErrorCode SbEffectRegister_Damping(void);
+PetscErrorCode SbEffectRegister_Contact(void);
 
 /* ------------------------------------------------------------------ what several effects share */
 

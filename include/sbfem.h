@@ -36,6 +36,7 @@ typedef struct {
   that this rank owns.
 */
 typedef struct _p_SbJump *SbJump;
+typedef struct _p_SbHeld *SbHeld; /* src/fem/held.c */
 
 typedef struct _p_SbSpace *SbSpace;
 struct _p_SbSpace {
@@ -70,6 +71,7 @@ struct _p_SbSpace {
   SbLane
     *batch_weight; /* [nbatch][4] weight of a cell's own node in the mean of the two; NULL when width is 4 */
   SbJump jump;     /* NULL without face nodes */
+  SbHeld held;     /* NULL unless an effect may hold nodes along directions of their own */
   SbLane *batch_g; /* [nbatch][9] basis gradients of nodes 1..3, 1/m; 64-byte aligned */
   SbLane *batch_V; /* [nbatch] volumes, m^3; 0 in padding; 64-byte aligned */
   void *batch_memory;        /* what batch_g and batch_V live in */
@@ -133,6 +135,25 @@ PetscErrorCode SbSpaceFix(SbSpace space, PetscInt node, int components);
 PetscErrorCode SbSpaceFixDone(SbSpace space);
 /* Index into fixed_node of a node, or -1. */
 PetscInt SbSpaceFixedIndex(SbSpace space, PetscInt node);
+
+/*
+  Nodes held along directions of their own for the moment (contact). SbSpaceHoldCreate() during set-up of an effect that may
+  need it. Then, as often as the directions change: SbSpaceHoldClear(), SbSpaceHold() for owned nodes on each rank,
+  SbSpaceHoldDone() (collective). SbModelPrescribe(), residuals and tangents follow.
+*/
+PetscErrorCode SbSpaceHoldCreate(SbSpace space);
+void SbSpaceHoldClear(SbSpace space);
+/* n . u = value (m) at an owned node, n of length one. Returns the number of the direction at the node, 0..2, or -1 when the
+   node's earlier directions or prescribed unknowns hold it already: nothing is done then. */
+PetscInt SbSpaceHold(SbSpace space, PetscInt node, const PetscReal n[3], PetscReal value);
+PetscErrorCode SbSpaceHoldDone(SbSpace space);
+/* u <- (I - Q) u + d, and f <- (I - Q) f, on owned nodes [nnode_owned][3]. Not collective. */
+void SbHeldPrescribe(SbSpace space, PetscReal u[]);
+void SbHeldConstrain(SbSpace space, PetscReal f[]);
+/* Leaves of a residual what the constraints must push with: Q f, and f at prescribed unknowns. */
+void SbHeldReaction(SbSpace space, PetscReal f[]);
+/* Force along direction k of an owned node that the residual r (N, unconstrained) there asks for, N. */
+PetscReal SbSpaceHoldForce(SbSpace space, PetscInt node, PetscInt k, const PetscReal r[3]);
 
 /* Per owned cell: Cauchy stress sigma[6] = xx yy zz xy yz xz (Pa), J, energy density (J/m^3, rest). Outputs may be NULL. */
 PetscErrorCode SbSpaceCellState(SbSpace space, const PetscReal u[], PetscReal sigma[], PetscReal J[],

@@ -39,8 +39,8 @@ struct _p_SbModel {
   PetscInt neffect;
   SbEffect *effect;
   /* one list per operation, holding only the effects that implement it */
-  PetscInt nprescribe, nprestep, nforce, ntangent, naccept, nhistory;
-  SbEffect *prescribe, *prestep, *force, *tangent, *accept, *history;
+  PetscInt nprescribe, nprestep, nforce, ntangent, naccept, nhistory, ntouch, nhold, nsettle;
+  SbEffect *prescribe, *prestep, *touch, *hold, *settle, *force, *tangent, *accept, *history;
   PetscBool linear; /* laws and effects: the tangent depends on the shifts only */
   PetscReal mass;   /* kg */
   PetscBool dynamic;
@@ -60,6 +60,13 @@ PetscErrorCode SbModelTangent(SbModel model, PetscReal t, PetscReal shift_v, Pet
                               PetscReal shift_k, Vec U, Vec V, Mat A);
 /* Writes prescribed displacements at t into U. */
 PetscErrorCode SbModelPrescribe(SbModel model, PetscReal t, Vec U);
+/*
+  Contact, for effects that have it (model->ntouch > 0). Begin: before the first solve of a step from t to t + dt, U0 at t; U, the
+  guess at t + dt, is put where contact holds it. Settle: after a solve with the residual R without constraints; `again` when
+  what is held has changed: U is put there, and has to be solved for once more. Collective.
+*/
+PetscErrorCode SbModelContactBegin(SbModel model, PetscReal t, PetscReal dt, Vec U0, Vec U);
+PetscErrorCode SbModelContactSettle(SbModel model, PetscReal t, Vec U, Vec R, PetscBool *again);
 /* Initial velocities of bodies (translation and spin). */
 PetscErrorCode SbModelInitialState(SbModel model, Vec U, Vec V);
 /* Instantaneous part of the energies (kinetic, strain, momenta, ...). V may be NULL. Collective. */

@@ -116,6 +116,11 @@ PetscErrorCode SbPressureOperatorFinish(Mat A);
 /* Its matrix; A itself when A is not one. */
 PetscErrorCode SbPressureOperatorMatrix(Mat A, Mat *inner);
 
+/* held.c. Not collective; arrays of owned nodes. */
+PetscErrorCode SbHeldDestroy(SbHeld *held);
+/* Projects an assembled matrix. */
+void SbHeldProject(SbSpace space, const SbValues *x);
+
 /* Gives a BAIJ or SBAIJ matrix of the space the fast product of product.c. Collective. */
 PetscErrorCode SbProductAttach(SbSpace space, SbMatrixKind kind, Mat A);
 

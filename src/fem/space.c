@@ -171,6 +171,7 @@ PetscErrorCode SbSpaceDestroy(SbSpace *space)
   if (!s) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(SbPlanDestroy(&s->plan));
   PetscCall(VecDestroy(&s->template_vec));
+  PetscCall(SbHeldDestroy(&s->held));
   PetscCall(SbJumpDestroy(&s->jump));
   PetscCall(SbLayoutDestroy(s));
   if (s->width > 4) PetscCall(PetscFree2(s->batch_clique, s->batch_weight));

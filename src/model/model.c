@@ -17,6 +17,9 @@ PetscErrorCode SbModelDestroy(SbModel *model)
   PetscCall(PetscFree(m->prescribe));
   PetscCall(PetscFree(m->prestep));
   PetscCall(PetscFree(m->force));
+  PetscCall(PetscFree(m->touch));
+  PetscCall(PetscFree(m->hold));
+  PetscCall(PetscFree(m->settle));
   PetscCall(PetscFree(m->tangent));
   PetscCall(PetscFree(m->accept));
   PetscCall(PetscFree(m->history));
@@ -84,6 +87,9 @@ PetscErrorCode SbModelSetUp(SbModel m)
   PetscCall(SbSpaceFixDone(m->space));
   SORT_INTO_LIST(m, prescribe);
   SORT_INTO_LIST(m, prestep);
+  SORT_INTO_LIST(m, touch);
+  SORT_INTO_LIST(m, hold);
+  SORT_INTO_LIST(m, settle);
   SORT_INTO_LIST(m, force);
   SORT_INTO_LIST(m, tangent);
   SORT_INTO_LIST(m, accept);
@@ -174,6 +180,7 @@ PetscErrorCode SbModelResidual(SbModel m, PetscReal t, Vec U, Vec V, Vec A, Pets
   PetscCall(SbSpaceAddInternalForce(m->space, &stage, f));
   if (A || V) PetscCall(SbSpaceAddInertia(m->space, &stage, f));
   if (constrain) constrain_residual(m->space, f);
+  if (constrain && m->space->held) SbHeldConstrain(m->space, f);
   PetscCall(SbSpaceRestoreLocalWrite(m->space, F, &f));
   PetscCall(stage_end(m, U, V, A, &stage));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -219,7 +226,7 @@ PetscErrorCode SbModelPrescribe(SbModel m, PetscReal t, Vec U)
   PetscScalar *u;
 
   PetscFunctionBeginUser;
-  if (!m->nprescribe) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!m->nprescribe && !s->held) PetscFunctionReturn(PETSC_SUCCESS);
   for (PetscInt e = 0; e < m->nprescribe; e++) {
     if (m->prescribe[e]->steady) PetscCall(m->prescribe[e]->ops.prescribe(m->prescribe[e], s, t));
   }
@@ -235,6 +242,7 @@ PetscErrorCode SbModelPrescribe(SbModel m, PetscReal t, Vec U)
       if (s->fixed[node] & (1 << c)) u[3 * node + c] = s->fixed_value[3 * k + c];
     }
   }
+  if (s->held) SbHeldPrescribe(s, u);
   PetscCall(VecRestoreArray(U, &u));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

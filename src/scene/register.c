@@ -33,5 +33,6 @@ PetscErrorCode SbRegisterAll(void)
   PetscCall(SbEffectRegister_Support());
   PetscCall(SbEffectRegister_Drive());
   PetscCall(SbEffectRegister_Damping());
+  PetscCall(SbEffectRegister_Contact());
   PetscFunctionReturn(PETSC_SUCCESS);
 }

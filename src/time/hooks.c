@@ -53,6 +53,13 @@ static PetscErrorCode unconstrained_residual(SbRun run, PetscReal t, Vec R)
 {
   PetscFunctionBeginUser;
   PetscCall(SbModelResidual(run->model, t, run->U, run->V, run->A, PETSC_FALSE, R));
+  if (run->model->space->held) {
+    PetscScalar *r;
+
+    PetscCall(VecGetArray(R, &r));
+    SbHeldReaction(run->model->space, r);
+    PetscCall(VecRestoreArray(R, &r));
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -76,6 +83,10 @@ static PetscErrorCode works(SbRun run, Vec loads, Vec reaction, PetscReal sums[2
     for (PetscInt i = 3 * node; i < 3 * node + 3; i++) {
       if (s->fixed[node] & (1 << (i - 3 * node))) sums[1] += (r[i] + r0[i]) * (u[i] - u0[i]);
     }
+  }
+  /* elsewhere what is left of it is what contact pushes with, now or a step ago */
+  for (PetscInt i = 0; s->held && i < 3 * s->nnode_owned; i++) {
+    if (!(s->fixed[i / 3] & (1 << i % 3))) sums[1] += (r[i] + r0[i]) * (u[i] - u0[i]);
   }
   PetscCall(VecRestoreArrayRead(run->U, &u));
   PetscCall(VecRestoreArrayRead(run->previous, &u0));

@@ -326,6 +326,31 @@ static PetscErrorCode set_up_static(SbRun run)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* What contact needs: several solves in a step, and a matrix that can be projected. */
+static PetscErrorCode check_contact(SbRun run, PetscBool explicit)
+{
+  const SbModel m = run->model;
+  const char *name;
+  PetscBool split;
+
+  PetscFunctionBeginUser;
+  if (!m->ntouch) PetscFunctionReturn(PETSC_SUCCESS);
+  name = m->touch[0]->name;
+  PetscCheck(!explicit && run->preset != SB_TIME_ALPHA2, m->comm, PETSC_ERR_USER_INPUT,
+             "The effect %s needs several solves in a step: use -time euler_implicit, genalpha or static",
+             name);
+  PetscCheck(run->preset != SB_TIME_NEWMARK, m->comm, PETSC_ERR_USER_INPUT,
+             "-time newmark gains energy where the effect %s stops nodes: use euler_implicit, genalpha or "
+             "static",
+             name);
+  PetscCall(PetscStrcmp(run->solver, "pressure", &split));
+  PetscCheck(!run->solver_used->matrix_free && (!split || !m->nhold), m->comm, PETSC_ERR_USER_INPUT,
+             "-solver %s has no matrix of everything, in which the effect %s could hold nodes: use -solver "
+             "rotated or cg_two_level",
+             run->solver, name);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode SbRunSetUp(SbRun run)
 {
   SbModel m = run->model;
@@ -347,6 +372,7 @@ PetscErrorCode SbRunSetUp(SbRun run)
   PetscCall(SbSolverChoose(m->space, m->dynamic, m->linear, explicit, run->solver_choice, &run->solver_used,
                            run->solver_reason, sizeof(run->solver_reason)));
   PetscCall(PetscStrncpy(run->solver, run->solver_used->name, sizeof(run->solver)));
+  PetscCall(check_contact(run, explicit));
   if (!explicit) PetscCall(SbSolverCreateOperator(m->space, run->solver_used, &run->J));
   PetscCheck(!run->solver_used->matrix_free || !m->ntangent, m->comm, PETSC_ERR_USER,
              "-solver %s works without a matrix, and the effect %s adds to it: use -solver rotated",

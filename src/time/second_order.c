@@ -146,14 +146,13 @@ static PetscErrorCode predict(TS ts)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* One attempt at the end displacement, from the predicted one. */
-static PetscErrorCode solve_end(TS ts, SNESConvergedReason *reason)
+/* Solves for the end displacement, from the one that X1 holds. */
+static PetscErrorCode solve_once(TS ts, SNESConvergedReason *reason)
 {
   SecondOrder *so = (SecondOrder *)ts->data;
   PetscInt newton, linear;
 
   PetscFunctionBeginUser;
-  PetscCall(predict(ts));
   PetscCall(TSPreStage(ts, ts->ptime + so->set.alpha_f * ts->time_step));
   PetscCall(SNESSolve(ts->snes, NULL, so->X1));
   PetscCall(SNESGetConvergedReason(ts->snes, reason));
@@ -161,6 +160,50 @@ static PetscErrorCode solve_end(TS ts, SNESConvergedReason *reason)
   PetscCall(SNESGetLinearSolveIterations(ts->snes, &linear));
   ts->snes_its += newton;
   ts->ksp_its += linear;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* After a solve: whether contact wants another one. */
+static PetscErrorCode settle(TS ts, PetscBool *again)
+{
+  SecondOrder *so = (SecondOrder *)ts->data;
+  PetscReal t = 0.;
+  Vec U = NULL, V = NULL, A = NULL, R;
+
+  PetscFunctionBeginUser;
+  PetscCall(VecDuplicate(so->X1, &R));
+  PetscCall(stage_state(ts, so->X1, &t, &U, &V, &A));
+  PetscCall(SbModelResidual(so->run->model, t, U, V, A, PETSC_FALSE, R));
+  PetscCall(VecScale(R, 1. / so->set.alpha_f));
+  PetscCall(SbModelContactSettle(so->run->model, ts->ptime + ts->time_step, so->X1, R, again));
+  if (*again) so->run->tangent_known = PETSC_FALSE;
+  PetscCall(VecDestroy(&R));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* One attempt at the end displacement, from the predicted one; with contact as many solves as its set of nodes takes. */
+static PetscErrorCode solve_end(TS ts, SNESConvergedReason *reason)
+{
+  SecondOrder *so = (SecondOrder *)ts->data;
+  SbModel m = so->run->model;
+  PetscBool again = (PetscBool)(m->ntouch > 0);
+
+  PetscFunctionBeginUser;
+  PetscCall(predict(ts));
+  if (again) {
+    PetscCall(SbModelContactBegin(m, ts->ptime, ts->time_step, so->X0, so->X1));
+    so->run->tangent_known = PETSC_FALSE;
+  }
+  PetscCall(solve_once(ts, reason));
+  for (PetscInt round = 1; again && *reason > 0; round++) {
+    PetscCall(settle(ts, &again));
+    if (!again) break;
+    if (round == SB_CONTACT_ROUNDS) {
+      *reason = SNES_DIVERGED_MAX_IT;
+      break;
+    }
+    PetscCall(solve_once(ts, reason));
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

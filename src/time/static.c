@@ -6,15 +6,12 @@
 #include "sbsolver.h"
 #include "time_impl.h"
 
-/* Newton from the last equilibrium with the prescribed values of the new load factor. */
-static PetscErrorCode attempt(SbRun run, PetscReal factor, Vec X, SNESConvergedReason *reason)
+/* Newton from the displacement that X holds. */
+static PetscErrorCode solve_once(SbRun run, Vec X, SNESConvergedReason *reason)
 {
   PetscInt newton, linear;
 
   PetscFunctionBeginUser;
-  run->model->load = factor;
-  PetscCall(VecCopy(run->U, X));
-  PetscCall(SbModelPrescribe(run->model, factor, X));
   PetscCall(SNESSolve(run->snes, NULL, X));
   PetscCall(SNESGetConvergedReason(run->snes, reason));
   PetscCall(SNESGetIterationNumber(run->snes, &newton));
@@ -24,17 +21,62 @@ static PetscErrorCode attempt(SbRun run, PetscReal factor, Vec X, SNESConvergedR
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode solve_at(SbRun run, PetscReal factor, Vec X, PetscBool *ok)
+/* After a solve: whether contact wants another one. */
+static PetscErrorCode settle(SbRun run, PetscReal factor, Vec X, PetscBool *again)
+{
+  Vec R;
+
+  PetscFunctionBeginUser;
+  PetscCall(VecDuplicate(X, &R));
+  PetscCall(SbModelResidual(run->model, factor, X, NULL, NULL, PETSC_FALSE, R));
+  PetscCall(SbModelContactSettle(run->model, factor, X, R, again));
+  if (*again) run->tangent_known = PETSC_FALSE;
+  PetscCall(VecDestroy(&R));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/*
+  From the last equilibrium with the prescribed values of the new load factor; with contact as many solves as its set of nodes
+  takes.
+*/
+static PetscErrorCode attempt(SbRun run, PetscReal factor, PetscReal length, Vec X,
+                              SNESConvergedReason *reason)
+{
+  SbModel m = run->model;
+  PetscBool again = (PetscBool)(m->ntouch > 0);
+
+  PetscFunctionBeginUser;
+  m->load = factor;
+  PetscCall(VecCopy(run->U, X));
+  PetscCall(SbModelPrescribe(m, factor, X));
+  if (again) {
+    PetscCall(SbModelContactBegin(m, factor - length, length, run->U, X));
+    run->tangent_known = PETSC_FALSE;
+  }
+  PetscCall(solve_once(run, X, reason));
+  for (PetscInt round = 1; again && *reason > 0; round++) {
+    PetscCall(settle(run, factor, X, &again));
+    if (!again) break;
+    if (round == SB_CONTACT_ROUNDS) {
+      *reason = SNES_DIVERGED_MAX_IT;
+      break;
+    }
+    PetscCall(solve_once(run, X, reason));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode solve_at(SbRun run, PetscReal factor, PetscReal length, Vec X, PetscBool *ok)
 {
   SNESConvergedReason reason;
   KSPConvergedReason kreason;
   KSP ksp;
 
   PetscFunctionBeginUser;
-  PetscCall(attempt(run, factor, X, &reason));
+  PetscCall(attempt(run, factor, length, X, &reason));
   if (SbRunWorthSearch(run, reason)) {
     PetscCall(SbRunSearch(run, PETSC_TRUE));
-    PetscCall(attempt(run, factor, X, &reason));
+    PetscCall(attempt(run, factor, length, X, &reason));
     PetscCall(SbRunSearch(run, PETSC_FALSE));
   }
   *ok = (PetscBool)(reason > 0);
@@ -66,7 +108,7 @@ PetscErrorCode SbStaticSolve(SbRun run)
     PetscBool ok = PETSC_FALSE;
 
     PetscCall(SbRunStepBegin(run, factor, next - factor));
-    PetscCall(solve_at(run, next, X, &ok));
+    PetscCall(solve_at(run, next, next - factor, X, &ok));
     if (!ok) {
       PetscBool simpler;
 

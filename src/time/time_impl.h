@@ -2,6 +2,7 @@
   time_impl.h - what the files of src/time share.
 */
 #pragma once
+#define SB_CONTACT_ROUNDS 100 /* solves of one step before contact counts as failed */
 #include "sbtime.h"
 
 #define SB_TS_SECOND_ORDER "sb_second_order"

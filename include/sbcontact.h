@@ -1,0 +1,36 @@
+/*
+  sbcontact.h - layer 3: what bodies meet. Rigid obstacles, still or on a given path.
+*/
+#pragma once
+#include "sbfem.h"
+
+typedef struct _p_SbObstacle *SbObstacle;
+/*
+  SbObstacleCreate - reads the description of a rigid obstacle.
+
+  Not collective.
+
+  Input: option - full name, for messages; text (lengths in m)
+    plane:nx,ny,nz,d                 the half-space n.x <= d is solid
+    sphere:x,y,z,r   box:x0,y0,z0,x1,y1,z1   capsule:x0,y0,z0,x1,y1,z1,r   cylinder:x0,y0,z0,x1,y1,z1,r
+    bowl:x,y,z,r                     everything outside the sphere is solid
+  Output: obstacle; the caller destroys it.
+  Errors: PETSC_ERR_USER_INPUT, one line that names option, text and the right form.
+*/
+PetscErrorCode SbObstacleCreate(const char *option, const char *text, SbObstacle *obstacle);
+PetscErrorCode SbObstacleDestroy(SbObstacle *obstacle);
+/*
+  SbObstacleDistance - signed distance of a point from the obstacle at rest, m, negative inside, and the unit outward normal
+  at the nearest point of its surface. Where the nearest point is not unique (centre of a sphere), one of them. Not collective.
+*/
+PetscReal SbObstacleDistance(SbObstacle obstacle, const PetscReal x[3], PetscReal normal[3]);
+
+/* A rigid motion: x = c + R (X - c) + d. */
+typedef struct {
+  PetscReal R[9], c[3], d[3];
+} SbPose;
+/* Rotation by an angle (rad) about the unit axis through c, then the translation d. */
+void SbPoseSet(const PetscReal axis[3], PetscReal angle, const PetscReal c[3], const PetscReal d[3],
+               SbPose *pose);
+void SbPoseApply(const SbPose *pose, const PetscReal X[3], PetscReal x[3]);
+void SbPoseInvert(const SbPose *pose, const PetscReal x[3], PetscReal X[3]);

@@ -1,0 +1,239 @@
+/*
+  obstacle.c - rigid obstacles by their signed distance.
+
+  Each shape is a core with a radius: distance = |x - nearest point of the core| - r, the core being a point (sphere), a segment
+  (capsule), a solid box or a solid cylinder (r = 0; inside them the nearest side counts). A bowl is a sphere inside out.
+*/
+#include "sbcontact.h"
+
+typedef enum { PLANE, SPHERE, BOX, CAPSULE, CYLINDER, BOWL } Shape;
+
+struct _p_SbObstacle {
+  Shape shape;
+  PetscReal p[7];
+};
+
+static const struct {
+  const char *name, *form;
+  int numbers;
+} shapes[] = {
+  {"plane", "plane:nx,ny,nz,d", 4},
+  {"sphere", "sphere:x,y,z,r", 4},
+  {"box", "box:x0,y0,z0,x1,y1,z1", 6},
+  {"capsule", "capsule:x0,y0,z0,x1,y1,z1,r", 7},
+  {"cylinder", "cylinder:x0,y0,z0,x1,y1,z1,r", 7},
+  {"bowl", "bowl:x,y,z,r", 4},
+};
+
+/* Numbers with commas; how many there are, -1 when the text is something else or holds more than `most`. */
+static int read_numbers(const char *text, int most, PetscReal p[])
+{
+  int n = 0;
+
+  for (;;) {
+    char *end;
+    const double value = strtod(text, &end);
+
+    if (end == text || n == most || PetscIsInfOrNanReal((PetscReal)value)) return -1;
+    p[n++] = (PetscReal)value;
+    if (!*end) return n;
+    if (*end != ',') return -1;
+    text = end + 1;
+  }
+}
+
+/* What is wrong with the numbers of a shape; NULL when nothing is. Makes the normal of a plane a unit vector. */
+static const char *normalise(SbObstacle o)
+{
+  const PetscReal length = PetscSqrtReal(SbDot3(o->p, o->p));
+
+  switch (o->shape) {
+  case PLANE:
+    if (length <= 0) return "the normal 0,0,0 has no direction";
+    for (int i = 0; i < 4; i++) o->p[i] /= length;
+    return NULL;
+  case SPHERE:
+  case BOWL:
+    return o->p[3] > 0 ? NULL : "the radius must be positive";
+  case BOX:
+    for (int i = 0; i < 3; i++) {
+      if (o->p[i] >= o->p[3 + i]) return "the first corner must be the lower one in x, y and z";
+    }
+    return NULL;
+  default:
+    if (o->p[6] <= 0) return "the radius must be positive";
+    for (int i = 0; i < 3; i++) {
+      if (o->p[i] != o->p[3 + i]) return NULL;
+    }
+    return "its two ends are one point";
+  }
+}
+
+PetscErrorCode SbObstacleCreate(const char *option, const char *text, SbObstacle *obstacle)
+{
+  const char *colon = strchr(text, ':'), *problem;
+  SbObstacle o;
+  size_t k = 0;
+
+  PetscFunctionBeginUser;
+  while (k < PETSC_STATIC_ARRAY_LENGTH(shapes) &&
+         (!colon || strlen(shapes[k].name) != (size_t)(colon - text) ||
+          strncmp(shapes[k].name, text, (size_t)(colon - text))))
+    k++;
+  PetscCheck(k < PETSC_STATIC_ARRAY_LENGTH(shapes), PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
+             "%s %s: write one of plane:..., sphere:..., box:..., capsule:..., cylinder:..., bowl:...",
+             option, text);
+  PetscCall(PetscNew(&o));
+  *obstacle = o;
+  o->shape = (Shape)k;
+  PetscCheck(read_numbers(colon + 1, 7, o->p) == shapes[k].numbers, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
+             "%s %s: write %s, lengths in m", option, text, shapes[k].form);
+  problem = normalise(o);
+  PetscCheck(!problem, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT, "%s %s: %s", option, text, problem);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbObstacleDestroy(SbObstacle *obstacle)
+{
+  PetscFunctionBeginUser;
+  PetscCall(PetscFree(*obstacle));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Unit vector from v; `other` where v vanishes. Returns its length. */
+static PetscReal unit(const PetscReal v[3], const PetscReal other[3], PetscReal n[3])
+{
+  const PetscReal length = PetscSqrtReal(SbDot3(v, v));
+
+  for (int i = 0; i < 3; i++) n[i] = length > 0 ? v[i] / length : other[i];
+  return length;
+}
+
+static PetscReal from_box(const PetscReal p[6], const PetscReal x[3], PetscReal n[3])
+{
+  PetscReal v[3], depth = PETSC_MAX_REAL;
+  PetscBool inside = PETSC_TRUE;
+
+  for (int i = 0; i < 3; i++) {
+    v[i] = x[i] < p[i] ? x[i] - p[i] : x[i] > p[3 + i] ? x[i] - p[3 + i] : 0;
+    if (v[i] != 0) inside = PETSC_FALSE;
+  }
+  if (!inside) return unit(v, v, n);
+  for (int side = 0; side < 6; side++) {
+    const int i = side % 3;
+    const PetscReal d = side < 3 ? x[i] - p[i] : p[3 + i] - x[i];
+
+    if (d >= depth) continue;
+    depth = d;
+    for (int k = 0; k < 3; k++) n[k] = k == i ? (side < 3 ? -1 : 1) : 0;
+  }
+  return -depth;
+}
+
+/* Some unit vector at right angles to the unit vector a. */
+static void across(const PetscReal a[3], PetscReal n[3])
+{
+  const int i = PetscAbsReal(a[0]) < 0.6 ? 0 : 1;
+  PetscReal e[3] = {0, 0, 0}, c[3];
+
+  e[i] = 1;
+  SbCross(a, e, c);
+  (void)unit(c, c, n);
+}
+
+/* Place s along the axis (m from the first end), distance from the axis, directions along and away from it. */
+static PetscReal axial(const PetscReal p[6], const PetscReal x[3], PetscReal *s, PetscReal *length,
+                       PetscReal a[3], PetscReal away[3])
+{
+  PetscReal axis[3], v[3], other[3];
+
+  for (int i = 0; i < 3; i++) axis[i] = p[3 + i] - p[i];
+  *length = unit(axis, axis, a);
+  for (int i = 0; i < 3; i++) v[i] = x[i] - p[i];
+  *s = SbDot3(v, a);
+  for (int i = 0; i < 3; i++) v[i] -= *s * a[i];
+  across(a, other);
+  return unit(v, other, away);
+}
+
+static PetscReal from_capsule(const PetscReal p[7], const PetscReal x[3], PetscReal n[3])
+{
+  PetscReal s, length, a[3], away[3], v[3];
+
+  (void)axial(p, x, &s, &length, a, away);
+  s = PetscMax(0, PetscMin(s, length));
+  for (int i = 0; i < 3; i++) v[i] = x[i] - p[i] - s * a[i];
+  return unit(v, away, n) - p[6];
+}
+
+static PetscReal from_cylinder(const PetscReal p[7], const PetscReal x[3], PetscReal n[3])
+{
+  PetscReal s, length, a[3], away[3];
+  const PetscReal radial = axial(p, x, &s, &length, a, away) - p[6];
+  const PetscReal end = PetscMax(-s, s - length), sign = s > 0.5 * length ? 1 : -1;
+
+  if (radial > 0 && end > 0) {
+    PetscReal v[3];
+
+    for (int i = 0; i < 3; i++) v[i] = radial * away[i] + end * sign * a[i];
+    return unit(v, v, n);
+  }
+  for (int i = 0; i < 3; i++) n[i] = radial > end ? away[i] : sign * a[i];
+  return PetscMax(radial, end);
+}
+
+PetscReal SbObstacleDistance(SbObstacle o, const PetscReal x[3], PetscReal n[3])
+{
+  static const PetscReal up[3] = {0, 0, 1};
+  const PetscReal *p = o->p, v[3] = {x[0] - p[0], x[1] - p[1], x[2] - p[2]};
+  PetscReal distance;
+
+  switch (o->shape) {
+  case PLANE:
+    for (int i = 0; i < 3; i++) n[i] = p[i];
+    return SbDot3(p, x) - p[3];
+  case SPHERE:
+    return unit(v, up, n) - p[3];
+  case BOWL:
+    distance = p[3] - unit(v, up, n);
+    for (int i = 0; i < 3; i++) n[i] = -n[i];
+    return distance;
+  case BOX:
+    return from_box(p, x, n);
+  case CAPSULE:
+    return from_capsule(p, x, n);
+  default:
+    return from_cylinder(p, x, n);
+  }
+}
+
+void SbPoseSet(const PetscReal axis[3], PetscReal angle, const PetscReal c[3], const PetscReal d[3],
+               SbPose *pose)
+{
+  const PetscReal half = PetscSinReal(angle / 2), s = PetscSinReal(angle), v = 2 * half * half;
+  const PetscReal K[9] = {0, -axis[2], axis[1], axis[2], 0, -axis[0], -axis[1], axis[0], 0};
+  PetscReal K2[9];
+
+  SbMatMul(K, K, K2);
+  for (int k = 0; k < 9; k++) pose->R[k] = (k % 4 == 0) + s * K[k] + v * K2[k];
+  for (int i = 0; i < 3; i++) {
+    pose->c[i] = c[i];
+    pose->d[i] = d[i];
+  }
+}
+
+void SbPoseApply(const SbPose *pose, const PetscReal X[3], PetscReal x[3])
+{
+  const PetscReal r[3] = {X[0] - pose->c[0], X[1] - pose->c[1], X[2] - pose->c[2]};
+
+  for (int i = 0; i < 3; i++) x[i] = pose->c[i] + SbDot3(pose->R + 3 * i, r) + pose->d[i];
+}
+
+void SbPoseInvert(const SbPose *pose, const PetscReal x[3], PetscReal X[3])
+{
+  PetscReal r[3];
+
+  for (int i = 0; i < 3; i++) r[i] = x[i] - pose->c[i] - pose->d[i];
+  for (int i = 0; i < 3; i++)
+    X[i] = pose->c[i] + pose->R[i] * r[0] + pose->R[3 + i] * r[1] + pose->R[6 + i] * r[2];
+}

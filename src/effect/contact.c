@@ -1,0 +1,576 @@
+/*
+  contact.c - nodes of the surface against a rigid obstacle, still or on a given path, with Coulomb friction.
+
+  A node at x has the gap g = signed distance from the obstacle where it is at that time, and the normal n there. Nodes are
+  those that carry the surface: vertices of P1, centroids of boundary faces of CR and DG (there g is the mean gap of the face).
+
+  Response `projected`: touching nodes are held on the obstacle (src/fem/held.c): n . u is prescribed, and the force that this
+  takes is the multiplier lambda. After each solve a pulling one leaves, a penetrated node enters, the normal is taken anew on a
+  curved obstacle, and the solve is repeated until nothing changes (Kikuchi and Oden 1988; Hueeber and Wohlmuth 2005). A node that
+  has left and come back several times within a step stays: the loop ends.
+
+  Response `penalty`: springs, N = k <-g>, with k from the stiffness of the cell behind. `augmented`: the penalty with a multiplier,
+  N = <lambda - k g>, which is raised after each solve until the penetration is within the tolerance (Simo and Laursen 1992).
+
+  Friction: a tangential spring of stiffness k to the place where the node began to stick, which lets go at mu N and slides at
+  mu_k N (the elastic slip and return mapping of Wriggers 2006). During a solve N is that of the solve before, so the force has a
+  potential and a symmetric tangent; solves are repeated until N has settled (the fixed point of Necas, Jarusek and Haslinger 1980).
+*/
+#include "sbcontact.h"
+#include "sbeffect.h"
+
+#define TOGGLES 3      /* how often a node may come within a step before it stays */
+#define PULLING 1e-6   /* of the largest contact force: what a node must pull with to leave */
+#define SETTLED 1e-3   /* of the largest contact force: change of the N that friction assumed */
+#define UPDATES 8      /* of that N within a step */
+#define TOLERANCE 1e-7 /* of the size of the bodies: largest penetration that counts as touching */
+
+typedef enum { PROJECTED, AUGMENTED, PENALTY } Response;
+/* A node of the surface that this rank owns. */
+typedef struct {
+  PetscInt node, cell, a; /* local node, a cell that has it, as its node a */
+  PetscReal k;            /* stiffness of the springs, N/m */
+  PetscBool on;           /* it touches; with springs: it did at the end of the last step */
+  int toggles;            /* how often it came within the step */
+  PetscBool slips;        /* it slid at the end of the last step */
+  PetscInt along;         /* number of its direction at the node, -1: held by something else */
+  PetscReal n[3];         /* normal at the last look, outwards from the obstacle */
+  PetscReal value;        /* n . u that puts it on the obstacle, m */
+  PetscReal gap;          /* after the last solve, m */
+  PetscReal lambda;       /* multiplier of the last solve, N */
+  PetscReal pressing;     /* N that friction assumes, N */
+  PetscReal anchor[3];    /* where it began to stick, in the obstacle's rest frame */
+} Touch;
+
+typedef struct {
+  SbEffectOn on;
+  SbObstacle obstacle;
+  Response response;
+  PetscReal mu, mu_kinetic, stiffness;
+  SbFormula displacement[3], angle;
+  PetscReal axis[3], point[3];
+  PetscInt n;
+  Touch *touch;   /* [n] */
+  PetscReal size; /* of the bodies, m */
+  int updates;    /* of the N of friction within the step */
+  SbPose to;      /* at the end of the step */
+} Contact;
+
+static const SbOption rows[] = {
+  {"on", SB_OPTION_NAMES, 1, "", "boundary", "", "sets whose surface may touch"},
+  {"obstacle", SB_OPTION_STRING, 1, "", NULL, "",
+   "rigid obstacle (m): plane:nx,ny,nz,d (n.x <= d is solid), sphere:x,y,z,r, box:x0,y0,z0,x1,y1,z1, "
+   "capsule:x0,y0,z0,x1,y1,z1,r, cylinder:x0,y0,z0,x1,y1,z1,r, bowl:x,y,z,r (solid outside the sphere)"},
+  {"response", SB_OPTION_CHOICE, 1, "", "projected", "projected|augmented|penalty",
+   "hold touching nodes on the obstacle; multipliers raised on springs; springs"},
+  {"friction", SB_OPTION_REAL, 1, "", "0", "[0, inf)", "Coulomb's coefficient for sticking"},
+  {"friction_kinetic", SB_OPTION_REAL, 1, "", "-1", "[-1, inf)",
+   "Coulomb's coefficient for slipping; negative: that for sticking"},
+  {"stiffness", SB_OPTION_REAL, 1, "", "20", "(0, inf)",
+   "springs of penalty and augmented: factor on (lambda + 2 mu) area / height of the cell behind"},
+  {"displacement", SB_OPTION_FORMULA, 3, "m", "0;0;0", "",
+   "path of the obstacle, three formulas of the time t"},
+  {"angle", SB_OPTION_FORMULA, 1, "degree", "0", "",
+   "rotation of the obstacle about the axis, a formula of t"},
+  {"axis", SB_OPTION_REALS, 3, "", "0,0,1", "", "direction of the axis of rotation; right-handed"},
+  {"axis_point", SB_OPTION_REALS, 3, "m", "0,0,0", "", "a point on the axis; torques are about it"},
+};
+
+static PetscErrorCode read_path(SbEffect e, const SbScope *scope)
+{
+  Contact *c = (Contact *)e->data;
+  PetscBool steady = PETSC_TRUE;
+  PetscReal length;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbEffectFormulas(scope, "displacement", 3, PETSC_FALSE, c->displacement, &steady));
+  PetscCall(SbEffectFormulas(scope, "angle", 1, PETSC_FALSE, &c->angle, &steady));
+  PetscCall(SbOptionReals(scope, "axis", c->axis));
+  PetscCall(SbOptionReals(scope, "axis_point", c->point));
+  length = PetscSqrtReal(SbDot3(c->axis, c->axis));
+  PetscCheck(length > 0, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT, "-effect_%s_axis: 0,0,0 is no direction",
+             e->name);
+  for (int i = 0; i < 3; i++) c->axis[i] /= length;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode options_contact(SbEffect e, const SbScope *scope)
+{
+  Contact *c = (Contact *)e->data;
+  char option[3 * SB_NAME_MAX], text[PETSC_MAX_PATH_LEN];
+  PetscInt choice;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbEffectReadOn(scope, &c->on));
+  PetscCall(SbOptionName(scope, "obstacle", sizeof(option), option));
+  PetscCall(SbOptionString(scope, "obstacle", sizeof(text), text));
+  PetscCall(SbObstacleCreate(option, text, &c->obstacle));
+  PetscCall(SbOptionChoice(scope, "response", &choice));
+  c->response = (Response)choice;
+  PetscCall(SbOptionReal(scope, "friction", &c->mu));
+  PetscCall(SbOptionReal(scope, "friction_kinetic", &c->mu_kinetic));
+  if (c->mu_kinetic < 0) c->mu_kinetic = c->mu;
+  PetscCheck(c->mu_kinetic <= c->mu, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
+             "-effect_%s_friction_kinetic %g is above -effect_%s_friction %g: a slipping node would stop and "
+             "go at once",
+             e->name, (double)c->mu_kinetic, e->name, (double)c->mu);
+  PetscCall(SbOptionReal(scope, "stiffness", &c->stiffness));
+  PetscCall(read_path(e, scope));
+  if (c->response == PROJECTED) {
+    if (c->mu <= 0) e->ops.tangent = NULL;
+    e->linear = (PetscBool)(c->mu <= 0);
+  } else {
+    e->linear = PETSC_FALSE;
+    e->ops.hold = NULL;
+  }
+  if (c->response == PENALTY && c->mu <= 0) e->ops.settle = NULL;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Adds a facet's share of area and stiffness to one of its nodes; slot[] holds the place of owned nodes, -1: none yet. */
+static void add_share(SbSpace space, const SbFacet *facet, PetscInt a, PetscReal share, PetscReal height,
+                      PetscInt slot[], Contact *c)
+{
+  const PetscInt node = space->cell_node[4 * facet->cell + a];
+  SbMaterial m = NULL;
+  Touch *touch;
+
+  if (node >= space->nnode_owned) return;
+  for (PetscInt r = 0; r < space->nregion; r++) {
+    if (space->region[r].cstart <= facet->cell && facet->cell < space->region[r].cend)
+      m = space->region[r].material;
+  }
+  if (slot[node] < 0) {
+    slot[node] = c->n++;
+    c->touch[slot[node]] = (Touch){.node = node, .cell = facet->cell, .a = a};
+  }
+  touch = &c->touch[slot[node]];
+  touch->k += c->stiffness * (m->lambda + 2 * m->mu) * share / height;
+}
+
+static PetscErrorCode setup_contact(SbEffect e, SbSpace space)
+{
+  Contact *c = (Contact *)e->data;
+  PetscReal box[6] = {0};
+  SbFacet *facet;
+  PetscInt n, *slot;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbEffectFacets(space, &c->on, &n, &facet));
+  PetscCall(PetscMalloc1(3 * n, &c->touch));
+  PetscCall(PetscMalloc1(space->nnode, &slot));
+  for (PetscInt i = 0; i < space->nnode; i++) slot[i] = -1;
+  for (PetscInt i = 0; i < n; i++) {
+    const PetscInt cell = facet[i].cell, *v = space->mesh->cell + 4 * cell;
+    PetscReal height = 0;
+
+    for (int k = 0; k < 3; k++)
+      height += facet[i].normal[k] *
+                (space->mesh->x[3 * facet[i].vertex[0] + k] - space->mesh->x[3 * v[facet[i].face] + k]);
+    if (SbSpaceCellElement(space, cell)->nodes_per[0]) {
+      for (int k = 0; k < 3; k++)
+        add_share(space, &facet[i], facet[i].corner[k], facet[i].area / 3, height, slot, c);
+    } else
+      add_share(space, &facet[i], facet[i].face, facet[i].area, height, slot, c);
+  }
+  PetscCall(PetscFree(slot));
+  PetscCall(PetscFree(facet));
+  for (PetscInt b = 0; b < space->mesh->nbody; b++) {
+    for (int k = 0; k < 3; k++)
+      box[k] = PetscMax(box[k], space->mesh->body[b].bbox[3 + k] - space->mesh->body[b].bbox[k]);
+  }
+  c->size = PetscSqrtReal(SbDot3(box, box));
+  if (c->response == PROJECTED) PetscCall(SbSpaceHoldCreate(space));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ geometry */
+
+static void pose_at(const Contact *c, PetscReal t, SbPose *pose)
+{
+  PetscReal d[3];
+
+  for (int i = 0; i < 3; i++) d[i] = SbFormulaEval(c->displacement[i], t, NULL);
+  SbPoseSet(c->axis, SbFormulaEval(c->angle, t, NULL) * PETSC_PI / 180, c->point, d, pose);
+}
+
+static inline void place(SbSpace space, PetscInt node, const PetscReal u[], PetscReal x[3])
+{
+  for (int i = 0; i < 3; i++) x[i] = space->node_x[3 * node + i] + u[3 * node + i];
+}
+
+/* Gap of a point, m, and the normal there. */
+static PetscReal gap_of(const Contact *c, const SbPose *pose, const PetscReal x[3], PetscReal n[3])
+{
+  PetscReal X[3], N[3], gap;
+
+  SbPoseInvert(pose, x, X);
+  gap = SbObstacleDistance(c->obstacle, X, N);
+  for (int i = 0; i < 3; i++) n[i] = SbDot3(pose->R + 3 * i, N);
+  return gap;
+}
+
+/* Gap of the node at x, with its normal and the value of n . u that closes it. */
+static PetscReal look(const Contact *c, SbSpace space, const PetscReal x[3], Touch *touch)
+{
+  const PetscReal gap = gap_of(c, &c->to, x, touch->n);
+
+  touch->value = SbDot3(touch->n, x) - gap - SbDot3(touch->n, space->node_x + 3 * touch->node);
+  return gap;
+}
+
+/* v less its part along n; returns the length of what is left. */
+static PetscReal tangential(const PetscReal n[3], const PetscReal v[3], PetscReal t[3])
+{
+  const PetscReal along = SbDot3(n, v);
+
+  for (int i = 0; i < 3; i++) t[i] = v[i] - along * n[i];
+  return PetscSqrtReal(SbDot3(t, t));
+}
+
+/* ------------------------------------------------------------------ who touches */
+
+static PetscErrorCode touch_contact(SbEffect e, SbSpace space, PetscReal t, PetscReal dt,
+                                    const PetscReal u0[], const PetscReal u[])
+{
+  Contact *c = (Contact *)e->data;
+  SbPose from;
+
+  PetscFunctionBeginUser;
+  pose_at(c, t, &from);
+  pose_at(c, t + dt, &c->to);
+  c->updates = 0;
+  for (PetscInt i = 0; i < c->n; i++) {
+    Touch *touch = &c->touch[i];
+    PetscReal x0[3], x[3];
+
+    touch->toggles = 0;
+    place(space, touch->node, u, x);
+    place(space, touch->node, u0, x0);
+    if (!touch->on) { /* a node that arrives in this step sticks to where it was at its start */
+      SbPoseInvert(&from, x0, touch->anchor);
+      touch->pressing = 0;
+      touch->slips = PETSC_FALSE;
+    }
+    if (look(c, space, x, touch) < 0 && c->response == PROJECTED) touch->on = PETSC_TRUE;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode hold_contact(SbEffect e, SbSpace space)
+{
+  Contact *c = (Contact *)e->data;
+
+  PetscFunctionBeginUser;
+  for (PetscInt i = 0; i < c->n; i++) {
+    Touch *touch = &c->touch[i];
+
+    touch->along = touch->on ? SbSpaceHold(space, touch->node, touch->n, touch->value) : -1;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Normal force of the springs, N. */
+static inline PetscReal spring(const Touch *touch, PetscReal gap)
+{
+  return PetscMax(0, touch->lambda - touch->k * gap);
+}
+
+/* Gap and multiplier of every node after a solve; the largest multiplier of all ranks. */
+static PetscErrorCode measure(const Contact *c, SbSpace space, const PetscReal u[], const PetscReal r[],
+                              PetscReal *largest)
+{
+  PetscFunctionBeginUser;
+  *largest = 0;
+  for (PetscInt i = 0; i < c->n; i++) {
+    Touch *touch = &c->touch[i];
+    const PetscInt node = touch->node;
+    PetscReal x[3];
+
+    if (c->response == PROJECTED)
+      touch->lambda =
+        touch->on && touch->along >= 0 ? SbSpaceHoldForce(space, node, touch->along, r + 3 * node) : 0;
+    place(space, node, u, x);
+    touch->gap = look(c, space, x, touch);
+    *largest = PetscMax(*largest, c->response == PROJECTED ? touch->lambda : spring(touch, touch->gap));
+  }
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, largest, 1, MPIU_REAL, MPI_MAX, space->comm));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Whether a node is held, or not, as it should be; changes it if not. */
+static PetscBool settle_held(const Contact *c, PetscReal largest, Touch *touch)
+{
+  if (!touch->on) {
+    if (touch->gap >= -TOLERANCE * c->size) return PETSC_TRUE;
+    touch->on = PETSC_TRUE;
+    touch->toggles++;
+    return PETSC_FALSE;
+  }
+  if (touch->along < 0) return PETSC_TRUE;
+  if (touch->lambda < -PULLING * largest && touch->toggles < TOGGLES) {
+    touch->on = PETSC_FALSE;
+    touch->lambda = 0;
+    return PETSC_FALSE;
+  }
+  touch->lambda = PetscMax(0, touch->lambda);
+  return (PetscBool)(PetscAbsReal(touch->gap) <= TOLERANCE * c->size);
+}
+
+/* The multiplier of `augmented`, raised until what is left of the penetration does not matter. */
+static PetscBool settle_multiplier(const Contact *c, Touch *touch)
+{
+  const PetscReal force = spring(touch, touch->gap);
+  const PetscBool right =
+    (PetscBool)(force > 0 ? PetscAbsReal(touch->gap) <= TOLERANCE * c->size : touch->lambda <= 0);
+
+  if (!right) touch->lambda = force;
+  return right;
+}
+
+/* Once who touches is settled everywhere: the N that friction assumes, from its second half on with half steps. */
+static PetscErrorCode settle_friction(Contact *c, SbSpace space, PetscReal largest, PetscBool *changed)
+{
+  PetscBool wait = *changed;
+
+  PetscFunctionBeginUser;
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &wait, 1, SB_MPI_BOOL, MPI_LOR, space->comm));
+  if (wait || c->updates == UPDATES) PetscFunctionReturn(PETSC_SUCCESS);
+  c->updates++;
+  for (PetscInt i = 0; i < c->n; i++) {
+    Touch *touch = &c->touch[i];
+    const PetscReal normal = c->response == PROJECTED ? touch->lambda : spring(touch, touch->gap);
+    const PetscReal change = normal - touch->pressing;
+
+    if (PetscAbsReal(change) > SETTLED * largest) *changed = PETSC_TRUE;
+    touch->pressing += 2 * c->updates > UPDATES ? 0.5 * change : change;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode settle_contact(SbEffect e, SbSpace space, const PetscReal u[], const PetscReal r[],
+                                     PetscBool *changed)
+{
+  Contact *c = (Contact *)e->data;
+  PetscReal largest;
+  PetscBool mine = PETSC_FALSE;
+
+  PetscFunctionBeginUser;
+  PetscCall(measure(c, space, u, r, &largest));
+  for (PetscInt i = 0; c->response != PENALTY && i < c->n; i++) {
+    Touch *touch = &c->touch[i];
+    const PetscBool right =
+      c->response == AUGMENTED ? settle_multiplier(c, touch) : settle_held(c, largest, touch);
+
+    if (!right) mine = PETSC_TRUE;
+  }
+  if (c->mu > 0) PetscCall(settle_friction(c, space, largest, &mine));
+  if (mine) *changed = PETSC_TRUE;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ forces */
+
+/* Normal force on a node at x, N; n: the normal there. */
+static PetscReal normal_force(const Contact *c, const SbPose *pose, const Touch *touch, const PetscReal x[3],
+                              PetscReal n[3])
+{
+  const PetscReal gap = gap_of(c, pose, x, n);
+
+  if (c->response == PROJECTED) return touch->on && touch->along >= 0 ? touch->lambda : 0;
+  return spring(touch, gap);
+}
+
+/* Force of friction on a node, N. Returns its share of what the spring alone would pull with: 1 while it sticks. */
+static PetscReal drag(const Contact *c, const SbPose *pose, const Touch *touch, const PetscReal x[3],
+                      const PetscReal n[3], PetscReal f[3])
+{
+  const PetscReal most = (touch->slips ? c->mu_kinetic : c->mu) * touch->pressing;
+  PetscReal target[3], trial[3], length, share = 1;
+
+  SbPoseApply(pose, touch->anchor, target);
+  for (int i = 0; i < 3; i++) trial[i] = -touch->k * (x[i] - target[i]);
+  length = tangential(n, trial, f);
+  if (length > most) share = most / length;
+  for (int i = 0; i < 3; i++) f[i] *= share;
+  return share;
+}
+
+static PetscErrorCode force_contact(SbEffect e, SbSpace space, const SbStage *stage, PetscReal f[])
+{
+  const Contact *c = (const Contact *)e->data;
+  SbPose pose;
+
+  PetscFunctionBeginUser;
+  pose_at(c, stage->t, &pose);
+  for (PetscInt i = 0; i < c->n; i++) {
+    const Touch *touch = &c->touch[i];
+    PetscReal *fi = f + 3 * touch->node, x[3], n[3], t[3];
+
+    place(space, touch->node, stage->u, x);
+    if (c->response != PROJECTED) {
+      const PetscReal normal = normal_force(c, &pose, touch, x, n);
+
+      for (int k = 0; k < 3; k++) fi[k] += normal * n[k];
+    } else
+      (void)gap_of(c, &pose, x, n);
+    if (touch->pressing <= 0) continue;
+    (void)drag(c, &pose, touch, x, n, t);
+    for (int k = 0; k < 3; k++) fi[k] += t[k];
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Minus the derivative of a node's force at x, N/m; the turning of the normal is left out. False when there is none. */
+static PetscBool stiffness_of(const Contact *c, const SbPose *pose, const Touch *touch, const PetscReal x[3],
+                              PetscReal block[9])
+{
+  PetscReal n[3], t[3], along, across = 0, length, sliding = 0;
+
+  along = normal_force(c, pose, touch, x, n) > 0 && c->response != PROJECTED ? touch->k : 0;
+  if (touch->pressing > 0) {
+    const PetscReal share = drag(c, pose, touch, x, n, t);
+
+    across = touch->k * share;
+    length = SbDot3(t, t);
+    if (share < 1 && length > 0) sliding = across / length; /* along the slip the force does not change */
+  }
+  for (int k = 0; k < 9; k++) {
+    const PetscReal nn = n[k / 3] * n[k % 3];
+
+    block[k] = along * nn + across * ((k % 4 == 0) - nn);
+    if (sliding > 0) block[k] -= sliding * t[k / 3] * t[k % 3];
+  }
+  return (PetscBool)(along > 0 || across > 0);
+}
+
+static PetscErrorCode tangent_contact(SbEffect e, SbSpace space, const SbStage *stage, Mat A)
+{
+  const Contact *c = (const Contact *)e->data;
+  SbPose pose;
+
+  PetscFunctionBeginUser;
+  pose_at(c, stage->t, &pose);
+  for (PetscInt i = 0; i < c->n; i++) {
+    const Touch *touch = &c->touch[i];
+    PetscReal x[3], block[9];
+
+    place(space, touch->node, stage->u, x);
+    if (!stiffness_of(c, &pose, touch, x, block)) continue;
+    for (int k = 0; k < 9; k++) block[k] *= stage->shift_k;
+    PetscCall(SbSpaceAddCellBlock(space, A, touch->cell, touch->a, touch->a, block));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ after a step */
+
+/* Who slid takes the anchor along, at the distance that the force asks for. */
+static PetscErrorCode accept_contact(SbEffect e, SbSpace space, const SbStage *stage)
+{
+  Contact *c = (Contact *)e->data;
+  SbPose pose;
+
+  PetscFunctionBeginUser;
+  pose_at(c, stage->t, &pose);
+  for (PetscInt i = 0; i < c->n; i++) {
+    Touch *touch = &c->touch[i];
+    PetscReal x[3], n[3], t[3], normal;
+
+    place(space, touch->node, stage->u, x);
+    normal = normal_force(c, &pose, touch, x, n);
+    if (c->response != PROJECTED) touch->on = (PetscBool)(normal > 0);
+    if (touch->pressing <= 0) continue;
+    touch->slips = (PetscBool)(drag(c, &pose, touch, x, n, t) < 1);
+    if (!touch->slips) continue;
+    for (int k = 0; k < 3; k++) x[k] += t[k] / touch->k;
+    SbPoseInvert(&pose, x, touch->anchor);
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Force and torque of the obstacle on the bodies, touching nodes, deepest penetration. */
+static PetscErrorCode history_contact(SbEffect e, SbSpace space, const SbStage *stage,
+                                      const PetscReal residual[], PetscReal values[])
+{
+  Contact *c = (Contact *)e->data;
+  PetscReal deepest[2] = {0, 0};
+  PetscMPIInt rank;
+  SbPose pose;
+
+  PetscFunctionBeginUser;
+  pose_at(c, stage->t, &pose);
+  for (int k = 0; k < 8; k++) values[k] = 0;
+  for (PetscInt i = 0; i < c->n; i++) {
+    const Touch *touch = &c->touch[i];
+    PetscReal x[3], n[3], f[3] = {0, 0, 0}, arm[3], moment[3], normal;
+
+    place(space, touch->node, stage->u, x);
+    deepest[0] = PetscMax(deepest[0], -gap_of(c, &pose, x, n));
+    normal = normal_force(c, &pose, touch, x, n);
+    if (normal <= 0) continue;
+    if (touch->pressing > 0) (void)drag(c, &pose, touch, x, n, f);
+    if (c->response == PROJECTED)
+      normal = SbSpaceHoldForce(space, touch->node, touch->along, residual + 3 * touch->node);
+    for (int k = 0; k < 3; k++) {
+      f[k] += normal * n[k];
+      arm[k] = x[k] - c->point[k] - pose.d[k];
+    }
+    SbCross(arm, f, moment);
+    for (int k = 0; k < 3; k++) {
+      values[k] += f[k];
+      values[3 + k] += moment[k];
+    }
+    values[6]++;
+  }
+  PetscCallMPI(MPI_Allreduce(&deepest[0], &deepest[1], 1, MPIU_REAL, MPI_MAX, space->comm));
+  PetscCallMPI(MPI_Comm_rank(space->comm, &rank));
+  /* less is the rounding of where nodes are put */
+  if (!rank && deepest[1] > TOLERANCE * c->size) values[7] = deepest[1];
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode destroy_contact(SbEffect e)
+{
+  Contact *c = (Contact *)e->data;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbEffectFreeOn(&c->on));
+  PetscCall(SbObstacleDestroy(&c->obstacle));
+  for (int i = 0; i < 3; i++) PetscCall(SbFormulaDestroy(&c->displacement[i]));
+  PetscCall(SbFormulaDestroy(&c->angle));
+  PetscCall(PetscFree(c->touch));
+  PetscCall(PetscFree(e->data));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode create_contact(SbEffect e)
+{
+  static const char *const columns[] = {"force_x",  "force_y",  "force_z",  "torque_x",
+                                        "torque_y", "torque_z", "contacts", "penetration"};
+  Contact *c;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscNew(&c));
+  e->data = c;
+  e->steady = PETSC_FALSE; /* a load factor does not make an obstacle softer */
+  e->ops.setfromoptions = options_contact;
+  e->ops.setup = setup_contact;
+  e->ops.touch = touch_contact;
+  e->ops.hold = hold_contact;
+  e->ops.settle = settle_contact;
+  e->ops.force = force_contact;
+  e->ops.tangent = tangent_contact;
+  e->ops.accept = accept_contact;
+  e->ops.history = history_contact;
+  e->ops.destroy = destroy_contact;
+  for (e->ncolumn = 0; e->ncolumn < 8; e->ncolumn++) e->column[e->ncolumn] = columns[e->ncolumn];
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbEffectRegister_Contact(void)
+{
+  PetscFunctionBeginUser;
+  PetscCall(SbEffectRegister("contact", create_contact, PETSC_STATIC_ARRAY_LENGTH(rows), rows));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

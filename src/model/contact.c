@@ -1,0 +1,55 @@
+/*
+  Contact around the solves of a step: who touches, what is held, whether that was right.
+*/
+#include "sbmodel.h"
+
+/* All effects write what they hold, and the displacement goes there. */
+static PetscErrorCode hold(SbModel m, PetscReal t, Vec U)
+{
+  SbSpace s = m->space;
+
+  PetscFunctionBeginUser;
+  if (!m->nhold) PetscFunctionReturn(PETSC_SUCCESS);
+  SbSpaceHoldClear(s);
+  for (PetscInt e = 0; e < m->nhold; e++) PetscCall(m->hold[e]->ops.hold(m->hold[e], s));
+  PetscCall(SbSpaceHoldDone(s));
+  PetscCall(SbModelPrescribe(m, t, U));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbModelContactBegin(SbModel m, PetscReal t, PetscReal dt, Vec U0, Vec U)
+{
+  const PetscReal *u0, *u;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_CONTACT], 0, 0, 0, 0));
+  PetscCall(SbSpaceGetLocalRead(m->space, U0, &u0));
+  PetscCall(SbSpaceGetLocalRead(m->space, U, &u));
+  for (PetscInt e = 0; e < m->ntouch; e++)
+    PetscCall(m->touch[e]->ops.touch(m->touch[e], m->space, t, dt, u0, u));
+  PetscCall(SbSpaceRestoreLocalRead(m->space, U, &u));
+  PetscCall(SbSpaceRestoreLocalRead(m->space, U0, &u0));
+  PetscCall(hold(m, t + dt, U));
+  PetscCall(PetscLogEventEnd(SbEvents[SB_EVENT_CONTACT], 0, 0, 0, 0));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbModelContactSettle(SbModel m, PetscReal t, Vec U, Vec R, PetscBool *again)
+{
+  const PetscReal *u, *r;
+
+  PetscFunctionBeginUser;
+  *again = PETSC_FALSE;
+  if (!m->nsettle) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_CONTACT], 0, 0, 0, 0));
+  PetscCall(SbSpaceGetLocalRead(m->space, U, &u));
+  PetscCall(SbSpaceGetLocalRead(m->space, R, &r));
+  for (PetscInt e = 0; e < m->nsettle; e++)
+    PetscCall(m->settle[e]->ops.settle(m->settle[e], m->space, u, r, again));
+  PetscCall(SbSpaceRestoreLocalRead(m->space, R, &r));
+  PetscCall(SbSpaceRestoreLocalRead(m->space, U, &u));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, again, 1, SB_MPI_BOOL, MPI_LOR, m->comm));
+  if (*again) PetscCall(hold(m, t, U));
+  PetscCall(PetscLogEventEnd(SbEvents[SB_EVENT_CONTACT], 0, 0, 0, 0));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
