@@ -1,0 +1,293 @@
+/*
+  Contact as an effect: options and their errors, who may not go with it, what a scene without it has of it, forces of the
+  springs and of friction, and the tangent against differences of the force.
+*/
+// @ranks 1 3
+#include "../scene.h"
+#include "effect_fixture.h"
+
+#define FLOOR "-effect_floor_type contact -effect_floor_obstacle plane:0,0,1,0.01 "
+
+static const char *const hull[][2] = {{"boundary", "boundary"}};
+
+/* ------------------------------------------------------------------ options */
+
+static PetscErrorCode check_error(Fixture *x, const char *options, const char *part)
+{
+  SbEffect e = NULL;
+
+  PetscFunctionBeginUser;
+  CHECK_MESSAGE(effect_create(x, "floor", options, &e), part);
+  PetscCall(SbEffectDestroy(&e));
+  PetscCall(PetscOptionsClear(NULL));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode check_options(void)
+{
+  Fixture x;
+  SbEffect e;
+
+  PetscFunctionBeginUser;
+  PetscCall(fixture_create(PETSC_COMM_WORLD, 1, "box:1,1,1:2", 1, hull, &x));
+  PetscCall(check_error(&x, "-effect_floor_type contact", "-effect_floor_obstacle"));
+  PetscCall(check_error(&x, "-effect_floor_type contact -effect_floor_obstacle ball:1,2,3,4",
+                        "-effect_floor_obstacle ball:1,2,3,4: write one of plane:"));
+  PetscCall(check_error(&x, FLOOR "-effect_floor_response glue", "projected"));
+  PetscCall(check_error(&x, FLOOR "-effect_floor_friction -1", "-effect_floor_friction"));
+  PetscCall(check_error(&x, FLOOR "-effect_floor_friction 0.2 -effect_floor_friction_kinetic 0.3",
+                        "-effect_floor_friction_kinetic 0.3 is above"));
+  PetscCall(check_error(&x, FLOOR "-effect_floor_axis 0,0,0", "-effect_floor_axis: 0,0,0 is no direction"));
+  PetscCall(check_error(&x, FLOOR "-effect_floor_displacement x;0;0", "-effect_floor_displacement"));
+  PetscCall(effect_create(&x, "floor", FLOOR, &e));
+  SB_CHECK(e->linear && !e->steady && !e->ops.tangent && e->ops.hold && e->ops.settle && x.space->held,
+           "projected, without friction");
+  SB_CHECK(e->ncolumn == 8, "columns");
+  PetscCall(SbEffectDestroy(&e));
+  PetscCall(PetscOptionsClear(NULL));
+  PetscCall(fixture_destroy(&x));
+
+  PetscCall(fixture_create(PETSC_COMM_WORLD, 1, "box:1,1,1:2", 1, hull, &x));
+  PetscCall(effect_create(&x, "floor", FLOOR "-effect_floor_response penalty", &e));
+  SB_CHECK(!e->linear && e->ops.tangent && !e->ops.hold && !e->ops.settle && !x.space->held, "penalty");
+  PetscCall(SbEffectDestroy(&e));
+  PetscCall(PetscOptionsClear(NULL));
+  PetscCall(fixture_destroy(&x));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ forces and tangent */
+
+/* Shear and a slight twist, pushed into the obstacle: some nodes slip, some stick. */
+static void push(Fixture *x, PetscReal amplitude)
+{
+  for (PetscInt i = 0; i < x->space->nnode; i++) {
+    const PetscReal *X = &x->space->node_x[3 * i];
+
+    x->u[3 * i] = amplitude * (0.3 * X[1] * X[1] + 0.01 * X[0]);
+    x->u[3 * i + 1] = amplitude * 0.2 * X[0] * X[1];
+    x->u[3 * i + 2] = -0.02 - 0.01 * X[0];
+  }
+}
+
+/* Steps of the loop of solves: touch at rest, then N of friction from the displacement. */
+static PetscErrorCode press(Fixture *x, SbEffect e)
+{
+  PetscBool changed = PETSC_FALSE;
+  PetscReal *u0;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscCalloc1(3 * x->space->nnode, &u0));
+  PetscCall((*e->ops.touch)(e, x->space, 0, 0.1, u0, u0));
+  push(x, 1);
+  if (e->ops.settle) PetscCall((*e->ops.settle)(e, x->space, x->u, x->f, &changed));
+  PetscCall(PetscFree(u0));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode to_vec(const Fixture *x, const PetscReal values[], Vec v)
+{
+  PetscScalar *a;
+
+  PetscFunctionBeginUser;
+  PetscCall(VecGetArray(v, &a));
+  for (PetscInt i = 0; i < 3 * x->space->nnode_owned; i++) a[i] = values[i];
+  PetscCall(VecRestoreArray(v, &a));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Force at u + h w, w a smooth field. */
+static PetscErrorCode force_beside(Fixture *x, SbEffect e, PetscReal h, Vec F)
+{
+  PetscFunctionBeginUser;
+  push(x, 1);
+  for (PetscInt i = 0; i < x->space->nnode; i++) {
+    const PetscReal *X = &x->space->node_x[3 * i];
+
+    x->u[3 * i] += h * (0.3 + X[1]);
+    x->u[3 * i + 1] += h * (X[0] - 0.4 * X[1]);
+    x->u[3 * i + 2] += h * (X[0] * X[1] - 0.2);
+  }
+  PetscCall(effect_force(x, e, 0.1));
+  PetscCall(to_vec(x, x->f, F));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* On a plane the tangent is the derivative, sticking or slipping. */
+static PetscErrorCode check_tangent(const char *element, const char *options)
+{
+  const PetscReal h = 1e-6;
+  SbStage stage;
+  Fixture x;
+  SbEffect e;
+  PetscReal difference, size;
+  Vec w, more, less;
+  Mat A;
+
+  PetscFunctionBeginUser;
+  fixture_use(element, element, PETSC_FALSE);
+  PetscCall(fixture_create(PETSC_COMM_WORLD, 1, "box:1,1,1:2", 1, hull, &x));
+  PetscCall(effect_create(&x, "floor", options, &e));
+  PetscCall(SbSpaceFixDone(x.space));
+  PetscCall(SbSpaceCreateMatrix(x.space, SB_MATRIX_AIJ, &A));
+  PetscCall(press(&x, e));
+  PetscCall(PetscMemzero(&stage, sizeof(stage)));
+  stage.t = 0.1;
+  stage.shift_k = 1;
+  stage.u = x.u;
+  x.space->block_scale = 1;
+  PetscCall(MatZeroEntries(A));
+  PetscCall((*e->ops.tangent)(e, x.space, &stage, A));
+  PetscCall(SbSpaceFinishTangent(x.space, A));
+  PetscCall(SbSpaceCreateVec(x.space, &w));
+  PetscCall(VecDuplicate(w, &more));
+  PetscCall(VecDuplicate(w, &less));
+  PetscCall(force_beside(&x, e, h, more));
+  PetscCall(force_beside(&x, e, -h, less));
+  for (PetscInt i = 0; i < x.space->nnode; i++) {
+    const PetscReal *X = &x.space->node_x[3 * i];
+
+    x.u[3 * i] = 0.3 + X[1];
+    x.u[3 * i + 1] = X[0] - 0.4 * X[1];
+    x.u[3 * i + 2] = X[0] * X[1] - 0.2;
+  }
+  PetscCall(to_vec(&x, x.u, w));
+  PetscCall(VecAXPY(more, -1, less));
+  PetscCall(VecScale(more, 0.5 / h));
+  PetscCall(MatMult(A, w, less));
+  PetscCall(VecNorm(less, NORM_2, &size));
+  PetscCall(VecAXPY(less, 1, more));
+  PetscCall(VecNorm(less, NORM_2, &difference));
+  SB_CHECK(size > 1 && difference < 1e-6 * size, "%s, %s: tangent and differences are %g of %g apart",
+           element, options, (double)difference, (double)size);
+  PetscCall(VecDestroy(&w));
+  PetscCall(VecDestroy(&more));
+  PetscCall(VecDestroy(&less));
+  PetscCall(MatDestroy(&A));
+  PetscCall(SbEffectDestroy(&e));
+  PetscCall(fixture_destroy(&x));
+  PetscCall(PetscOptionsClear(NULL));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Coulomb's cone at every node, friction against the motion, and the same on any number of ranks. */
+static PetscErrorCode check_friction(const char *element)
+{
+  const char *options = FLOOR "-effect_floor_response penalty -effect_floor_friction 0.4 "
+                              "-effect_floor_friction_kinetic 0.4";
+  Fixture x, alone;
+  SbEffect e, other;
+  PetscInt slip = 0, stick = 0, mine[2], all[2];
+
+  PetscFunctionBeginUser;
+  fixture_use(element, element, PETSC_FALSE);
+  PetscCall(fixture_create(PETSC_COMM_WORLD, 1, "box:1,1,1:3", 1, hull, &x));
+  PetscCall(effect_create(&x, "floor", options, &e));
+  PetscCall(press(&x, e));
+  push(&x, 0.15);
+  PetscCall(effect_force(&x, e, 0.1));
+  for (PetscInt i = 0; i < x.space->nnode_owned; i++) {
+    const PetscReal *f = x.f + 3 * i, *u = x.u + 3 * i;
+    const PetscReal t = PetscSqrtReal(f[0] * f[0] + f[1] * f[1]);
+
+    if (f[2] <= 0) {
+      SB_CHECK(t == 0 && x.space->node_x[3 * i + 2] > 1e-9, "a node off the floor feels nothing");
+      continue;
+    }
+    SB_CHECK(t <= 0.4 * f[2] * (1 + 1e-12), "friction %g at a normal force of %g", (double)t, (double)f[2]);
+    SB_CHECK(f[0] * u[0] + f[1] * u[1] <= 0, "friction pulls back");
+    if (t > 0.4 * f[2] * (1 - 1e-12))
+      slip++;
+    else
+      stick++;
+  }
+  mine[0] = slip;
+  mine[1] = stick;
+  PetscCallMPI(MPI_Allreduce(mine, all, 2, MPIU_INT, MPI_SUM, PETSC_COMM_WORLD));
+  SB_CHECK(all[0] > 0 && all[1] > 0, "%d nodes slip, %d stick", (int)all[0], (int)all[1]);
+  PetscCall(fixture_create(PETSC_COMM_SELF, 1, "box:1,1,1:3", 1, hull, &alone));
+  PetscCall(effect_create(&alone, "floor", options, &other));
+  PetscCall(press(&alone, other));
+  push(&alone, 0.15);
+  PetscCall(effect_force(&alone, other, 0.1));
+  PetscCall(check_serial(&x, &alone, 1e5, "friction"));
+  PetscCall(SbEffectDestroy(&other));
+  PetscCall(fixture_destroy(&alone));
+  PetscCall(SbEffectDestroy(&e));
+  PetscCall(fixture_destroy(&x));
+  PetscCall(PetscOptionsClear(NULL));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ in a scene */
+
+#define BLOCK                                                                                            \
+  "-bodies a -body_a_mesh box:1,1,1:2 -body_a_material corotated -body_a_young 1e5 -body_a_poisson 0.3 " \
+  "-body_a_density 1000 -ts_dt 0.01 -ts_max_time 0.02 "
+
+static PetscErrorCode open_only(const char *options)
+{
+  TestScene t;
+
+  PetscFunctionBeginUser;
+  PetscCall(test_scene_open(options, &t));
+  PetscCall(test_scene_close(&t));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode check_scene(void)
+{
+  PetscEventPerfInfo before, info;
+  TestScene t;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscLogDefaultBegin());
+  PetscCall(test_scene_open(BLOCK "-effects gravity,floor " FLOOR, &t));
+  SB_CHECK(t.model->ntouch == 1 && t.model->nhold == 1 && t.model->nsettle == 1 && t.model->space->held,
+           "a scene with contact");
+  PetscCall(SbRunSolve(t.run));
+  PetscCall(PetscLogEventGetPerfInfo(PETSC_DETERMINE, SbEvents[SB_EVENT_CONTACT], &before));
+  SB_CHECK(before.count > 0, "contact is logged");
+  PetscCall(test_scene_close(&t));
+  PetscCall(test_scene_open(BLOCK "-effects gravity", &t));
+  SB_CHECK(!t.model->ntouch && !t.model->nhold && !t.model->nsettle && !t.model->space->held,
+           "a scene without contact has nothing of it");
+  PetscCall(SbRunSolve(t.run));
+  PetscCall(PetscLogEventGetPerfInfo(PETSC_DETERMINE, SbEvents[SB_EVENT_CONTACT], &info));
+  SB_CHECK(info.count == before.count, "%d events of contact without contact", info.count - before.count);
+  PetscCall(test_scene_close(&t));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode check_refused(void)
+{
+  PetscFunctionBeginUser;
+  CHECK_MESSAGE(open_only(BLOCK "-effects gravity,floor -time euler_symplectic " FLOOR),
+                "The effect floor needs several solves in a step");
+  CHECK_MESSAGE(open_only(BLOCK "-effects gravity,floor -time alpha2 " FLOOR),
+                "The effect floor needs several solves in a step");
+  CHECK_MESSAGE(open_only(BLOCK "-effects gravity,floor -time newmark " FLOOR),
+                "-time newmark gains energy where the effect floor stops nodes");
+  CHECK_MESSAGE(open_only(BLOCK "-body_a_tangent warped -effects gravity,floor -solver realtime " FLOOR),
+                "-solver realtime has no matrix of everything, in which the effect floor could hold nodes");
+  CHECK_MESSAGE(open_only(BLOCK "-body_a_element cr -effects gravity,floor -solver pressure " FLOOR),
+                "-solver pressure has no matrix of everything");
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+int main(int argc, char **argv)
+{
+  SB_TEST_BEGIN(argc, argv);
+  PetscCall(fixture_register());
+  PetscCall(SbEffectRegister_Contact());
+  PetscCall(check_options());
+  PetscCall(check_tangent("p1", FLOOR "-effect_floor_response penalty"));
+  PetscCall(check_tangent("p1", FLOOR "-effect_floor_response penalty -effect_floor_friction 0.2"));
+  PetscCall(check_tangent("cr", FLOOR "-effect_floor_response augmented -effect_floor_friction 100"));
+  PetscCall(check_tangent("dg", FLOOR "-effect_floor_response augmented -effect_floor_friction 0.2"));
+  PetscCall(check_friction("p1"));
+  PetscCall(check_friction("cr"));
+  PetscCall(check_scene());
+  PetscCall(check_refused());
+  SB_TEST_END();
+}

@@ -1,0 +1,170 @@
+// @ranks 1
+/*
+  Rigid obstacles: signed distances at points where they are known, normals against differences of the distance, the foot
+  point on the surface; poses; errors of the description.
+*/
+#include "effect_fixture.h"
+#include <sbcontact.h>
+
+static const char *const texts[] = {"plane:0,3,4,5",
+                                    "sphere:0.3,0.2,-0.1,0.7",
+                                    "box:-0.5,-0.4,-0.3,0.6,0.5,0.7",
+                                    "capsule:-0.4,0.1,0,0.5,0.3,0.2,0.35",
+                                    "cylinder:-0.4,0.1,0,0.5,0.3,0.2,0.35",
+                                    "bowl:0.1,0,0.2,1.3"};
+
+/* Numbers in -1..1 that are the same everywhere. */
+static PetscReal number(unsigned *state)
+{
+  *state = *state * 1664525u + 1013904223u;
+  return (PetscReal)(*state >> 8) / (1 << 23) - 1;
+}
+
+/* At a kink of the distance differences mean nothing: whether the normal jumps between the points around x. */
+static PetscBool smooth(SbObstacle o, const PetscReal x[3], PetscReal h)
+{
+  PetscReal n[3], other[3];
+
+  (void)SbObstacleDistance(o, x, n);
+  for (int k = 0; k < 6; k++) {
+    PetscReal y[3] = {x[0], x[1], x[2]};
+
+    y[k / 2] += k % 2 ? h : -h;
+    (void)SbObstacleDistance(o, y, other);
+    if (SbDot3(n, other) < 0.999) return PETSC_FALSE;
+  }
+  return PETSC_TRUE;
+}
+
+static PetscErrorCode check_shape(const char *text)
+{
+  const PetscReal h = 1e-5;
+  SbObstacle o;
+  PetscInt seen[2] = {0, 0};
+  unsigned state = 7;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbObstacleCreate("-o", text, &o));
+  for (int i = 0; i < 1000; i++) {
+    PetscReal x[3], n[3], foot[3], m[3], d;
+
+    for (int k = 0; k < 3; k++) x[k] = 0.9 * number(&state);
+    d = SbObstacleDistance(o, x, n);
+    SB_CHECK_NEAR(SbDot3(n, n), 1, 1e-14, text);
+    if (!smooth(o, x, h)) continue;
+    seen[d < 0]++;
+    for (int k = 0; k < 3; k++) {
+      PetscReal y[3] = {x[0], x[1], x[2]}, more, less;
+
+      foot[k] = x[k] - d * n[k];
+      y[k] = x[k] + h;
+      more = SbObstacleDistance(o, y, m);
+      y[k] = x[k] - h;
+      less = SbObstacleDistance(o, y, m);
+      /* third derivatives are at most 1/r^2 at distances r from the core of 0.03 and more: h^2/6/r^2 is below 2e-8 */
+      SB_CHECK_NEAR((more - less) / (2 * h), n[k], 1e-6, text);
+    }
+    SB_CHECK_NEAR(SbObstacleDistance(o, foot, m), 0, 1e-12, text);
+  }
+  SB_CHECK(seen[0] > 20 && seen[1] > 20, "%s: %d points outside, %d inside", text, (int)seen[0],
+           (int)seen[1]);
+  PetscCall(SbObstacleDestroy(&o));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode check_point(const char *text, const PetscReal x[3], PetscReal distance,
+                                  const PetscReal normal[3])
+{
+  SbObstacle o;
+  PetscReal n[3];
+
+  PetscFunctionBeginUser;
+  PetscCall(SbObstacleCreate("-o", text, &o));
+  SB_CHECK_NEAR(SbObstacleDistance(o, x, n), distance, 1e-14, text);
+  for (int k = 0; k < 3; k++) SB_CHECK_NEAR(n[k], normal[k], 1e-14, text);
+  PetscCall(SbObstacleDestroy(&o));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode check_points(void)
+{
+  const PetscReal X[3] = {1, 0, 0}, Z[3] = {0, 0, 1}, Zm[3] = {0, 0, -1}, Xm[3] = {-1, 0, 0};
+  const PetscReal edge[3] = {PETSC_SQRT2 / 2, PETSC_SQRT2 / 2, 0};
+
+  PetscFunctionBeginUser;
+  PetscCall(check_point("plane:0,0,2,1", (PetscReal[3]){4, 5, 0.25}, -0.25, Z));
+  PetscCall(check_point("sphere:1,2,3,0.5", (PetscReal[3]){3, 2, 3}, 1.5, X));
+  PetscCall(check_point("sphere:1,2,3,0.5", (PetscReal[3]){1, 2, 3}, -0.5, Z));
+  PetscCall(check_point("bowl:0,0,0,2", (PetscReal[3]){0, 0, 1.5}, 0.5, Zm));
+  PetscCall(check_point("bowl:0,0,0,2", (PetscReal[3]){3, 0, 0}, -1, Xm));
+  PetscCall(check_point("box:0,0,0,1,2,3", (PetscReal[3]){2, 3, 1}, PETSC_SQRT2, edge));
+  PetscCall(check_point("box:0,0,0,1,2,3", (PetscReal[3]){0.5, 1, 2.75}, -0.25, Z));
+  PetscCall(check_point("capsule:0,0,0,0,0,2,0.5", (PetscReal[3]){1, 0, 1}, 0.5, X));
+  PetscCall(check_point("capsule:0,0,0,0,0,2,0.5", (PetscReal[3]){0, 0, -1}, 0.5, Zm));
+  PetscCall(check_point("cylinder:0,0,0,0,0,2,0.5", (PetscReal[3]){0.25, 0, -1}, 1, Zm));
+  PetscCall(check_point("cylinder:0,0,0,0,0,2,0.5", (PetscReal[3]){0.25, 0, 1}, -0.25, X));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static void check_poses(void)
+{
+  const PetscReal axis[3] = {2. / 3, 1. / 3, -2. / 3}, c[3] = {0.1, 0.2, 0.3}, d[3] = {1, -2, 0.5};
+  const PetscReal z[3] = {0, 0, 1}, none[3] = {0, 0, 0}, e[3] = {1, 0, 0};
+  PetscReal x[3], X[3];
+  unsigned state = 3;
+  SbPose pose;
+
+  SbPoseSet(z, PETSC_PI / 2, none, d, &pose);
+  SbPoseApply(&pose, e, x);
+  SB_CHECK_NEAR(x[0], 1, 1e-15, "a right-handed quarter turn, then the shift");
+  SB_CHECK_NEAR(x[1], -1, 1e-15, "a right-handed quarter turn, then the shift");
+  SbPoseSet(axis, 1.1, c, d, &pose);
+  SbPoseApply(&pose, c, x);
+  for (int k = 0; k < 3; k++) SB_CHECK_NEAR(x[k], c[k] + d[k], 1e-15, "the centre is only shifted");
+  for (int i = 0; i < 9; i++)
+    SB_CHECK_NEAR(SbDot3(pose.R + 3 * (i / 3), pose.R + 3 * (i % 3)), i % 4 == 0, 1e-15, "R R^T");
+  for (int i = 0; i < 20; i++) {
+    PetscReal p[3];
+
+    for (int k = 0; k < 3; k++) p[k] = number(&state);
+    SbPoseApply(&pose, p, x);
+    SbPoseInvert(&pose, x, X);
+    for (int k = 0; k < 3; k++) SB_CHECK_NEAR(X[k], p[k], 1e-15, "there and back");
+  }
+}
+
+static PetscErrorCode check_errors(void)
+{
+  SbObstacle o = NULL;
+
+  PetscFunctionBeginUser;
+  CHECK_MESSAGE(SbObstacleCreate("-floor", "cone:1,2,3", &o), "-floor cone:1,2,3: write one of plane:");
+  CHECK_MESSAGE(SbObstacleCreate("-floor", "plane", &o), "write one of plane:");
+  CHECK_MESSAGE(SbObstacleCreate("-floor", "plane:0,0,1", &o), "write plane:nx,ny,nz,d");
+  PetscCall(SbObstacleDestroy(&o));
+  CHECK_MESSAGE(SbObstacleCreate("-floor", "plane:0,0,0,1", &o), "has no direction");
+  PetscCall(SbObstacleDestroy(&o));
+  CHECK_MESSAGE(SbObstacleCreate("-floor", "sphere:0,0,0,-1", &o), "the radius must be positive");
+  PetscCall(SbObstacleDestroy(&o));
+  CHECK_MESSAGE(SbObstacleCreate("-floor", "sphere:0,0,0,1,5", &o), "write sphere:x,y,z,r");
+  PetscCall(SbObstacleDestroy(&o));
+  CHECK_MESSAGE(SbObstacleCreate("-floor", "sphere:0,0,nan,1", &o), "write sphere:x,y,z,r");
+  PetscCall(SbObstacleDestroy(&o));
+  CHECK_MESSAGE(SbObstacleCreate("-floor", "box:0,0,0,1,-1,1", &o), "the first corner must be the lower one");
+  PetscCall(SbObstacleDestroy(&o));
+  CHECK_MESSAGE(SbObstacleCreate("-floor", "capsule:1,1,1,1,1,1,1", &o), "its two ends are one point");
+  PetscCall(SbObstacleDestroy(&o));
+  CHECK_MESSAGE(SbObstacleCreate("-floor", "cylinder:1,1,1,1,1,2,0", &o), "the radius must be positive");
+  PetscCall(SbObstacleDestroy(&o));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+int main(int argc, char **argv)
+{
+  SB_TEST_BEGIN(argc, argv);
+  for (size_t k = 0; k < PETSC_STATIC_ARRAY_LENGTH(texts); k++) PetscCall(check_shape(texts[k]));
+  PetscCall(check_points());
+  check_poses();
+  PetscCall(check_errors());
+  SB_TEST_END();
+}
