@@ -149,7 +149,8 @@ PetscErrorCode SbSolverChoose(SbSpace s, PetscBool dynamic, PetscBool linear, Pe
     PetscCall(PetscSNPrintf(reason, size, "explicit integrator: no linear system"));
   } else if (strcmp(choice, "auto")) {
     PetscCall(PetscSNPrintf(reason, size, "chosen by -solver"));
-  } else if (dynamic && !linear && unknowns <= 60000) {
+  } else if (dynamic && !linear && unknowns <= (s->faces && nrank > 1 ? 20000 : 60000)) {
+    /* face terms join more nodes between ranks, and the dense interface is bounded */
     name = "rotated";
     PetscCall(PetscSNPrintf(reason, size,
                             "dynamic, %" PetscInt_FMT
@@ -160,7 +161,7 @@ PetscErrorCode SbSolverChoose(SbSpace s, PetscBool dynamic, PetscBool linear, Pe
     PetscCall(PetscSNPrintf(
       reason, size, "%" PetscInt_FMT " unknowns: a factorisation is fast and holds at any Poisson's ratio%s",
       unknowns, indefinite ? "; the exact tangent may be indefinite" : ""));
-  } else if (s->faces && (!dynamic || nu > NU_PRESSURE)) {
+  } else if (s->faces && !s->held && (!dynamic || nu > NU_PRESSURE)) {
     /* 24k tets, CPU s of one rank, this and cg_two_level. Static at nu 0.3: CR 3.4 (3.2), DG 4.2 (5.6); at 0.45: 4.3 (3.6), 5.1
        (12), more with every refinement. Dynamic, CR, three steps: at 0.3 12 (7), at 0.45 15 (11), at 0.49 17 (17) */
     name = "pressure";
