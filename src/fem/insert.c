@@ -11,8 +11,7 @@
 
   AIJ keeps the rows of a block apart: its blocks go one by one, number by number.
 */
-#include "fem_impl.h"
-#include "sbkernel.h"
+#include "four.h"
 
 /* Part q of row i begins with the face terms, glue times the identity in each block; one pass where blocks lie together. */
 static void begin_with_glue(SbSpace s, const SbValues *x, PetscInt i, int q)
@@ -116,15 +115,7 @@ static void insert_broken_cell(SbSpace s, const SbValues *x, PetscInt b, PetscIn
 
 /* ------------------------------------------------------------------ four lanes at a time */
 
-#if defined(__GNUC__)
-typedef double Four __attribute__((vector_size(32), aligned(8), may_alias));
-typedef int64_t Mask __attribute__((vector_size(32), aligned(8), may_alias));
-  #if defined(__clang__)
-    #define SHUFFLE(a, b, i, j, k, l) __builtin_shufflevector(a, b, i, j, k, l)
-  #else
-    #define SHUFFLE(a, b, i, j, k, l) __builtin_shuffle(a, b, (Mask){i, j, k, l})
-  #endif
-
+#if defined(SB_HAS_FOUR)
 /* Entry e of the transposed block. */
 static const int swapped[9] = {0, 3, 6, 1, 4, 7, 2, 5, 8};
 

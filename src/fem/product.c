@@ -12,9 +12,8 @@
 
   Measured at 200,000 tets on one rank: 0.9 ms in the place of 1.4 (SBAIJ) and 1.7 (BAIJ); in cache half the time.
 */
-#include "fem_impl.h"
+#include "four.h"
 #include "product.h"
-#include "sbkernel.h"
 #include <petsc/private/petscimpl.h>
 
 typedef struct {
@@ -35,16 +34,7 @@ typedef struct {
   Row i: y_i += A_ii x_i, and for each block behind the diagonal y_i += A_ij x_j and y_j += A_ij^T x_i. a: the row's blocks by
   columns; column: their n columns, i first.
 */
-#if defined(__GNUC__)
-typedef double Two __attribute__((vector_size(16), aligned(8), may_alias));
-typedef double Four __attribute__((vector_size(32), aligned(8), may_alias));
-typedef int64_t Mask __attribute__((vector_size(32)));
-  #if defined(__clang__)
-    #define SHUFFLE(a, b, i, j, k, l) __builtin_shufflevector(a, b, i, j, k, l)
-  #else
-    #define SHUFFLE(a, b, i, j, k, l) __builtin_shuffle(a, b, (Mask){i, j, k, l})
-  #endif
-
+#if defined(SB_HAS_FOUR)
 SB_INLINE void row_product(const PetscScalar *a, PetscInt n, const PetscInt column[], const PetscScalar x[],
                            PetscScalar y[])
 {

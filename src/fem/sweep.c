@@ -6,19 +6,11 @@
     backward  z = (D + L^T)^-1 r:  from the last row z_i = D_i^-1 (r_i - sum_{j > i} A_ij z_j).
   Each reads the stored half of the matrix once. PETSc's MatSOR() reads whole rows, block by block: three times as slow here.
 */
+#include "four.h"
 #include "product.h"
 #include "sweep.h"
 
-#if defined(__GNUC__)
-typedef double Two __attribute__((vector_size(16), aligned(8), may_alias));
-typedef double Four __attribute__((vector_size(32), aligned(8), may_alias));
-typedef int64_t Mask __attribute__((vector_size(32)));
-  #if defined(__clang__)
-    #define SHUFFLE(a, b, i, j, k, l) __builtin_shufflevector(a, b, i, j, k, l)
-  #else
-    #define SHUFFLE(a, b, i, j, k, l) __builtin_shuffle(a, b, (Mask){i, j, k, l})
-  #endif
-
+#if defined(SB_HAS_FOUR)
 /* z_j -= A_ij^T x for the n blocks behind the diagonal; what is in the fourth lane meets a zero of x. */
 SB_INLINE void push(const PetscScalar *a, PetscInt n, const PetscInt column[], const PetscReal x[3],
                     PetscScalar z[])
