@@ -33,7 +33,7 @@ runs() {
   timeout 60 "${mpi[@]}" "$1" "$supple" body.opts -body_it_mesh "$2" -output_dir "run$1" >out.txt 2>err.txt
   check "$2 on $1 ranks: exit code $?" test $? = 0
   check "$2 on $1 ranks: no '$4'" grep -qF -- "$4" out.txt
-  check "$2 on $1 ranks: not $3 vertices" grep -qE "^it +[0-9]+ +$3 " out.txt
+  check "$2 on $1 ranks: not $3 vertices" grep -qE "^it +p1 +[0-9]+ +$3 " out.txt
   check "$2 on $1 ranks: $(tail -n +2 "run$1/history.csv" 2>/dev/null | wc -l) rows" test -s "run$1/history.csv" -a -s "run$1/fields.h5"
 }
 
