@@ -26,6 +26,7 @@
 #define TOLERANCE 1e-7 /* of the size of the bodies: largest penetration that counts as touching */
 
 typedef enum { PROJECTED, AUGMENTED, PENALTY } Response;
+
 /* A node of the surface that this rank owns. */
 typedef struct {
   PetscInt node, cell, a; /* local node, a cell that has it, as its node a */
@@ -132,14 +133,10 @@ static void add_share(SbSpace space, const SbFacet *facet, PetscInt a, PetscReal
                       PetscInt slot[], Contact *c)
 {
   const PetscInt node = space->cell_node[4 * facet->cell + a];
-  SbMaterial m = NULL;
+  const SbMaterial m = space->material[space->mesh->cell_material[facet->cell]];
   Touch *touch;
 
   if (node >= space->nnode_owned) return;
-  for (PetscInt r = 0; r < space->nregion; r++) {
-    if (space->region[r].cstart <= facet->cell && facet->cell < space->region[r].cend)
-      m = space->region[r].material;
-  }
   if (slot[node] < 0) {
     slot[node] = c->n++;
     c->touch[slot[node]] = (Touch){.node = node, .cell = facet->cell, .a = a};
