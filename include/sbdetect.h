@@ -1,0 +1,112 @@
+/*
+  sbdetect.h - layer 3: where the surfaces of bodies come near each other.
+
+  A surface is a set of triangles. What looks for it are points: the nodes that carry a surface, vertices of P1 and
+  centroids of boundary faces of CR and DG. SbSurface brings to each rank what its points may meet; a detector then is
+  geometry alone: arrays in, arrays out, no communication.
+*/
+#pragma once
+#include "sbfem.h"
+
+/*
+  What a detector works on. Arrays are borrowed. A part is a body: points do not meet facets of their own part unless `self`.
+  Identities (facet_id, facet_vertex, point_id) are the same on all ranks and for any partition: ties are broken by them.
+*/
+typedef struct {
+  PetscInt ncorner;
+  const PetscReal *x; /* [ncorner][3] where the corners are, m */
+  const PetscReal
+    *x0; /* [ncorner][3] where they were at the start of the step, m; NULL: motion is not looked at */
+  const PetscReal *X; /* [ncorner][3] rest position, m */
+  PetscInt nfacet;
+  const PetscInt *facet; /* [nfacet][3] corners, counter-clockwise seen from outside */
+  const PetscInt
+    *facet_vertex; /* [nfacet][3] identity of the mesh vertex at each: facets that share two are neighbours,
+                                   also where their corners are apart (CR, DG) */
+  const PetscInt *facet_part; /* [nfacet] */
+  const PetscInt *facet_id;   /* [nfacet] */
+  PetscInt npoint;
+  const PetscReal *p, *p0, *P; /* [npoint][3] like x, x0, X */
+  const PetscReal *p_normal;   /* [npoint][3] outward unit normal of the point's own surface now */
+  const PetscInt *point_part;  /* [npoint] */
+  const PetscInt *point_id;    /* [npoint] */
+  const PetscInt
+    *point_vertex; /* [npoint] identity of the mesh vertex that the point is, -1: the centroid of a facet */
+  const PetscInt *point_facet; /* [npoint] identity of that facet, -1: a vertex */
+  PetscBool self;              /* parts may meet themselves */
+  PetscReal reach;             /* pairs up to this distance are wanted, m; penetration likewise */
+  PetscInt version;            /* changes when the facets are other ones, not only elsewhere */
+} SbDetectScene;
+
+/*
+  A point and the nearest point of another part's surface. The gap is the signed distance, negative inside; the normal is the
+  direction in which it grows, outwards from the facet's part.
+*/
+typedef struct {
+  PetscInt point, facet;
+  PetscReal weight[3]; /* of the facet's corners, sum 1, none negative */
+  PetscReal normal[3];
+  PetscReal gap;     /* m */
+  PetscBool crossed; /* found by its motion: within the step it went through the facet */
+} SbNear;
+
+typedef enum { SB_DETECT_HASH, SB_DETECT_BVH, SB_DETECT_BRUTE } SbDetectKind;
+typedef struct {
+  PetscInt64 candidates; /* pairs of point and facet that were looked at closely */
+  PetscInt found;
+  PetscInt64 memory; /* bytes held by the search structure */
+  PetscInt rebuilt;  /* how often it was built anew, of all calls so far */
+  char text[256];    /* what the detector says of itself: cell size, table, tree */
+} SbDetectStats;
+
+typedef struct _p_SbDetector *SbDetector;
+/* Not collective. What each kind does is told in its file in src/contact. */
+PetscErrorCode SbDetectorCreate(SbDetectKind kind, SbDetector *detector);
+PetscErrorCode SbDetectorDestroy(SbDetector *detector);
+/*
+  SbDetectorFind - all contacts of the scene within its reach: for each point and each other part at most one, the nearest.
+
+  Not collective. Every kind of detector returns the same contacts, ordered by point and then by the facet's part. For `self`, pairs that
+  are near each other at rest already (within twice the reach) do not count. A pair counts when the normals of point and facet oppose
+  each other.
+
+  Output: n; near[n], owned by the detector, valid until the next call.
+*/
+PetscErrorCode SbDetectorFind(SbDetector detector, const SbDetectScene *scene, PetscInt *n,
+                              const SbNear **near);
+PetscErrorCode SbDetectorGetStats(SbDetector detector, SbDetectStats *stats);
+
+/*
+  SbSurface - the surfaces that may meet, distributed: the scene of this rank, and which nodes its points and facets belong to.
+  Own corners, facets and points come first, then the facets of other ranks that are near points of this one.
+*/
+typedef struct _p_SbSurface *SbSurface;
+struct _p_SbSurface {
+  SbSpace space; /* borrowed */
+  SbDetectScene scene;
+  PetscInt nfacet_owned;
+  PetscInt *point_node;  /* [npoint] local node, owned by this rank */
+  PetscReal *point_area; /* [npoint] rest area of its share of the surface, complete, m^2 */
+  PetscInt *facet_node;  /* [nfacet][4] global numbers of the nodes of the facet's cell */
+  PetscReal *
+    facet_weight; /* [nfacet][3][4] displacement of corner k = sum_a facet_weight[3 f + k][a] u[facet_node[4 f + a]] */
+  PetscReal size; /* of all bodies at rest, m */
+  PetscReal edge; /* mean rest edge of all facets, m */
+  void *data;     /* private */
+};
+/*
+  SbSurfaceCreate - from boundary facets as SbEffectFacets() gives them (of owned and ghost cells; copied). Collective.
+  A part is a body; own facets are those of owned cells.
+*/
+PetscErrorCode SbSurfaceCreate(SbSpace space, PetscInt n, const SbFacet facet[], SbSurface *surface);
+PetscErrorCode SbSurfaceDestroy(SbSurface *surface);
+/*
+  SbSurfaceUpdate - moves corners and points to the local displacements u (m) and, when u0 is not NULL, those at the start of the step,
+  and brings the facets of other ranks that may come within `reach` of own points. Collective.
+
+  Output: close, whether two parts' boxes (swept, and grown by the reach) meet anywhere, the same on all ranks; when not, and no self-contact
+  is wanted, nothing but the boxes has been exchanged and the scene holds no facets of others.
+  The list of facets from other ranks is kept while nothing has moved by more than half the margin it was made with.
+*/
+PetscErrorCode SbSurfaceUpdate(SbSurface surface, const PetscReal u0[], const PetscReal u[], PetscReal reach,
+                               PetscBool self, PetscBool *close);
