@@ -36,7 +36,8 @@ typedef struct {
   that this rank owns.
 */
 typedef struct _p_SbJump *SbJump;
-typedef struct _p_SbHeld *SbHeld; /* src/fem/held.c */
+typedef struct _p_SbHeld *SbHeld;     /* src/fem/held.c */
+typedef struct _p_SbCouple *SbCouple; /* src/fem/couple.c */
 
 typedef struct _p_SbSpace *SbSpace;
 struct _p_SbSpace {
@@ -72,6 +73,7 @@ struct _p_SbSpace {
     *batch_weight; /* [nbatch][4] weight of a cell's own node in the mean of the two; NULL when width is 4 */
   SbJump jump;     /* NULL without face nodes */
   SbHeld held;     /* NULL unless an effect may hold nodes along directions of their own */
+  SbCouple couple; /* NULL unless an effect may join nodes by rows */
   SbLane *batch_g; /* [nbatch][9] basis gradients of nodes 1..3, 1/m; 64-byte aligned */
   SbLane *batch_V; /* [nbatch] volumes, m^3; 0 in padding; 64-byte aligned */
   void *batch_memory;        /* what batch_g and batch_V live in */
@@ -154,6 +156,34 @@ void SbHeldConstrain(SbSpace space, PetscReal f[]);
 void SbHeldReaction(SbSpace space, PetscReal f[]);
 /* Force along direction k of an owned node that the residual r (N, unconstrained) there asks for, N. */
 PetscReal SbSpaceHoldForce(SbSpace space, PetscInt node, PetscInt k, const PetscReal r[3]);
+
+/*
+  Rows that join nodes of any rank (contact between bodies, src/fem/couple.c): sum_k coef_k . u_k = value, exactly or by a spring.
+
+  SbSpaceCoupleCreate() during set-up of an effect that may need them. Then, as often as they change: SbSpaceCoupleClear(), rows on
+  any rank, SbSpaceCoupleDone() (collective). SbModelPrescribe(), residuals and solves follow: solves run in the null space of
+  the exact rows.
+*/
+PetscErrorCode SbSpaceCoupleCreate(SbSpace space);
+void SbSpaceCoupleClear(SbSpace space);
+/* gnode[n]: global numbers of nodes; coef[n][3]; value in m. Output: row, its number on this rank. Not collective. */
+PetscErrorCode SbSpaceCoupleRow(SbSpace space, PetscInt n, const PetscInt gnode[], const PetscReal coef[],
+                                PetscReal value, PetscInt *row);
+/* A force of constant + stiffness (value - sum_k coef_k . u_k) along the row, N; stiffness >= 0, N/m. Not collective. */
+PetscErrorCode SbSpaceCoupleSpring(SbSpace space, PetscInt n, const PetscInt gnode[], const PetscReal coef[],
+                                   PetscReal value, PetscReal stiffness, PetscReal constant, PetscInt *row);
+PetscErrorCode SbSpaceCoupleDone(SbSpace space);
+/* What rows push with and where they are, for the displacement U and its residual R without constraints (N); then, for each row:
+   force (N, positive: it raises the sum) and sum_k coef_k . u_k (m). Collective. */
+PetscErrorCode SbSpaceCoupleMeasure(SbSpace space, Vec U, Vec R);
+void SbSpaceCoupleGet(SbSpace space, PetscInt row, PetscReal *force, PetscReal *sum);
+/* U <- nearest displacement on which the exact rows hold. Collective. */
+PetscErrorCode SbCouplePrescribe(SbSpace space, Vec U);
+/* F <- F less the springs' forces, and without what the exact rows take when `constrain`. Collective. */
+PetscErrorCode SbCoupleResidual(SbSpace space, Vec U, PetscBool constrain, Vec F);
+/* The operator of solves: K, its springs, projected. singular: K may be so, because only rows hold some body: it is made regular for
+   preconditioners, but for the operator. Collective; the caller destroys it; K is borrowed until then. */
+PetscErrorCode SbCoupleCreateOperator(SbSpace space, Mat K, PetscBool singular, Mat *A);
 
 /* Per owned cell: Cauchy stress sigma[6] = xx yy zz xy yz xz (Pa), J, energy density (J/m^3, rest). Outputs may be NULL. */
 PetscErrorCode SbSpaceCellState(SbSpace space, const PetscReal u[], PetscReal sigma[], PetscReal J[],

@@ -34,6 +34,15 @@ PetscErrorCode SbSolverFallBack(SNES snes, PetscBool *changed);
 PetscErrorCode SbSolverSetUp(SNES snes, SbSpace space, const SbSolverPreset *preset);
 /* Solves of ksp whose true residual is far above the tolerance fail (KSP_DIVERGED_BREAKDOWN). Not collective. */
 PetscErrorCode SbSolverLookAtResidual(KSP ksp);
+/*
+  SbPCCoupleCreate - for a space with rows between nodes: makes pc a preconditioner in the null space of the exact ones, P^-1 = P M^-1 P^T.
+
+  Collective. Output: inner, M; borrowed. It takes the options of pc, which gives up its prefix. inner is pc itself for a space
+  without such rows.
+*/
+PetscErrorCode SbPCCoupleCreate(SbSpace space, PC pc, PC *inner);
+/* M of such a pc, else pc itself. Not collective. */
+PetscErrorCode SbPCCoupleGetInner(PC pc, PC *inner);
 /* The operator that the preset works on. Collective; caller destroys. */
 PetscErrorCode SbSolverCreateOperator(SbSpace space, const SbSolverPreset *preset, Mat *A);
 

@@ -120,6 +120,11 @@ PetscErrorCode SbPressureOperatorMatrix(Mat A, Mat *inner);
 PetscErrorCode SbHeldDestroy(SbHeld *held);
 /* Projects an assembled matrix. */
 void SbHeldProject(SbSpace space, const SbValues *x);
+/* The 3x3 projector of a node's held directions; NULL when nothing is held anywhere. */
+const PetscReal *SbHeldProjector(SbSpace space, PetscInt node);
+/* couple.c: adds what makes an assembled matrix regular. Not collective. */
+PetscErrorCode SbCoupleAnchor(SbSpace space, const SbValues *x);
+PetscErrorCode SbCoupleDestroy(SbCouple *couple);
 
 /* Gives a BAIJ or SBAIJ matrix of the space the fast product of product.c. Collective. */
 PetscErrorCode SbProductAttach(SbSpace space, SbMatrixKind kind, Mat A);

@@ -220,3 +220,8 @@ void SbHeldProject(SbSpace s, const SbValues *x)
     }
   }
 }
+
+const PetscReal *SbHeldProjector(SbSpace s, PetscInt node)
+{
+  return s->held && s->held->ntotal ? s->held->Q + 9 * node : NULL;
+}

@@ -161,7 +161,7 @@ PetscErrorCode SbSolverChoose(SbSpace s, PetscBool dynamic, PetscBool linear, Pe
     PetscCall(PetscSNPrintf(
       reason, size, "%" PetscInt_FMT " unknowns: a factorisation is fast and holds at any Poisson's ratio%s",
       unknowns, indefinite ? "; the exact tangent may be indefinite" : ""));
-  } else if (s->faces && !s->held && (!dynamic || nu > NU_PRESSURE)) {
+  } else if (s->faces && !s->held && !s->couple && (!dynamic || nu > NU_PRESSURE)) {
     /* 24k tets, CPU s of one rank, this and cg_two_level. Static at nu 0.3: CR 3.4 (3.2), DG 4.2 (5.6); at 0.45: 4.3 (3.6), 5.1
        (12), more with every refinement. Dynamic, CR, three steps: at 0.3 12 (7), at 0.45 15 (11), at 0.49 17 (17) */
     name = "pressure";
@@ -235,10 +235,9 @@ PetscErrorCode SbSolverSetUp(SNES snes, SbSpace s, const SbSolverPreset *preset)
   PetscCall(KSPSetNormType(ksp, KSP_NORM_UNPRECONDITIONED));
   PetscCall(insert_options(preset->options));
   if (strstr(preset->options, "-pc_type cholesky")) PetscCall(SbSolverLookAtResidual(ksp));
-  if (preset->precondition) {
-    PetscCall(KSPGetPC(ksp, &pc));
-    PetscCall(preset->precondition(s, pc));
-  }
+  PetscCall(KSPGetPC(ksp, &pc));
+  PetscCall(SbPCCoupleCreate(s, pc, &pc));
+  if (preset->precondition) PetscCall(preset->precondition(s, pc));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -255,6 +254,7 @@ PetscErrorCode SbSolverFallBack(SNES snes, PetscBool *changed)
   PetscCall(SNESGetKSP(snes, &ksp));
   PetscCall(KSPGetConvergedReason(ksp, &reason));
   PetscCall(KSPGetPC(ksp, &pc));
+  PetscCall(SbPCCoupleGetInner(pc, &pc));
   PetscCall(SbPCCoarseFallBack(pc, reason, changed));
   if (*changed) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscObjectTypeCompareAny((PetscObject)pc, &incomplete, PCICC, PCBJACOBI, ""));

@@ -172,6 +172,7 @@ PetscErrorCode SbSpaceDestroy(SbSpace *space)
   PetscCall(SbPlanDestroy(&s->plan));
   PetscCall(VecDestroy(&s->template_vec));
   PetscCall(SbHeldDestroy(&s->held));
+  PetscCall(SbCoupleDestroy(&s->couple));
   PetscCall(SbJumpDestroy(&s->jump));
   PetscCall(SbLayoutDestroy(s));
   if (s->width > 4) PetscCall(PetscFree2(s->batch_clique, s->batch_weight));

@@ -10,9 +10,11 @@ static PetscErrorCode hold(SbModel m, PetscReal t, Vec U)
 
   PetscFunctionBeginUser;
   if (!m->nhold) PetscFunctionReturn(PETSC_SUCCESS);
-  SbSpaceHoldClear(s);
+  if (s->held) SbSpaceHoldClear(s);
+  if (s->couple) SbSpaceCoupleClear(s);
   for (PetscInt e = 0; e < m->nhold; e++) PetscCall(m->hold[e]->ops.hold(m->hold[e], s));
-  PetscCall(SbSpaceHoldDone(s));
+  if (s->held) PetscCall(SbSpaceHoldDone(s));
+  if (s->couple) PetscCall(SbSpaceCoupleDone(s));
   PetscCall(SbModelPrescribe(m, t, U));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -42,6 +44,7 @@ PetscErrorCode SbModelContactSettle(SbModel m, PetscReal t, Vec U, Vec R, PetscB
   *again = PETSC_FALSE;
   if (!m->nsettle) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_CONTACT], 0, 0, 0, 0));
+  if (m->space->couple) PetscCall(SbSpaceCoupleMeasure(m->space, U, R));
   PetscCall(SbSpaceGetLocalRead(m->space, U, &u));
   PetscCall(SbSpaceGetLocalRead(m->space, R, &r));
   for (PetscInt e = 0; e < m->nsettle; e++)

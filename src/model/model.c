@@ -183,6 +183,7 @@ PetscErrorCode SbModelResidual(SbModel m, PetscReal t, Vec U, Vec V, Vec A, Pets
   if (constrain && m->space->held) SbHeldConstrain(m->space, f);
   PetscCall(SbSpaceRestoreLocalWrite(m->space, F, &f));
   PetscCall(stage_end(m, U, V, A, &stage));
+  if (m->space->couple) PetscCall(SbCoupleResidual(m->space, U, constrain, F));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -226,7 +227,7 @@ PetscErrorCode SbModelPrescribe(SbModel m, PetscReal t, Vec U)
   PetscScalar *u;
 
   PetscFunctionBeginUser;
-  if (!m->nprescribe && !s->held) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!m->nprescribe && !s->held && !s->couple) PetscFunctionReturn(PETSC_SUCCESS);
   for (PetscInt e = 0; e < m->nprescribe; e++) {
     if (m->prescribe[e]->steady) PetscCall(m->prescribe[e]->ops.prescribe(m->prescribe[e], s, t));
   }
@@ -244,6 +245,7 @@ PetscErrorCode SbModelPrescribe(SbModel m, PetscReal t, Vec U)
   }
   if (s->held) SbHeldPrescribe(s, u);
   PetscCall(VecRestoreArray(U, &u));
+  if (s->couple) PetscCall(SbCouplePrescribe(s, U));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

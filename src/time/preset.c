@@ -274,7 +274,7 @@ static PetscErrorCode set_up_ts(SbRun run)
   PetscCall(TSSetProblemType(run->ts, TS_NONLINEAR));
   PetscCall(TS2SetSolution(run->ts, run->U, run->V));
   PetscCall(TSSetI2Function(run->ts, F, SbFormI2Function, run));
-  PetscCall(TSSetI2Jacobian(run->ts, run->J, run->J, SbFormI2Jacobian, run));
+  PetscCall(TSSetI2Jacobian(run->ts, run->operator, run->J, SbFormI2Jacobian, run));
   PetscCall(VecDestroy(&F));
   if (run->preset == SB_TIME_ALPHA2) {
     PetscCall(TSSetType(run->ts, TSALPHA2));
@@ -316,7 +316,7 @@ static PetscErrorCode set_up_static(SbRun run)
   PetscCall(SbSpaceCreateVec(run->model->space, &F));
   PetscCall(SNESCreate(run->model->comm, &run->snes));
   PetscCall(SNESSetFunction(run->snes, F, SbFormStaticFunction, run));
-  PetscCall(SNESSetJacobian(run->snes, run->J, run->J, SbFormStaticJacobian, run));
+  PetscCall(SNESSetJacobian(run->snes, run->operator, run->J, SbFormStaticJacobian, run));
   PetscCall(VecDestroy(&F));
   PetscCall(set_up_snes(run));
   PetscCall(SbSolverSetUp(run->snes, run->model->space, run->solver_used));
@@ -351,6 +351,22 @@ static PetscErrorCode check_contact(SbRun run, PetscBool explicit)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The matrix, and what solves see of it when rows join nodes. */
+static PetscErrorCode create_operator(SbRun run)
+{
+  const SbModel m = run->model;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbSolverCreateOperator(m->space, run->solver_used, &run->J));
+  if (m->space->couple)
+    PetscCall(SbCoupleCreateOperator(m->space, run->J, (PetscBool)!m->dynamic, &run->operator));
+  else {
+    PetscCall(PetscObjectReference((PetscObject)run->J));
+    run->operator= run->J;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode SbRunSetUp(SbRun run)
 {
   SbModel m = run->model;
@@ -373,7 +389,7 @@ PetscErrorCode SbRunSetUp(SbRun run)
                            run->solver_reason, sizeof(run->solver_reason)));
   PetscCall(PetscStrncpy(run->solver, run->solver_used->name, sizeof(run->solver)));
   PetscCall(check_contact(run, explicit));
-  if (!explicit) PetscCall(SbSolverCreateOperator(m->space, run->solver_used, &run->J));
+  if (!explicit) PetscCall(create_operator(run));
   PetscCheck(!run->solver_used->matrix_free || !m->ntangent, m->comm, PETSC_ERR_USER,
              "-solver %s works without a matrix, and the effect %s adds to it: use -solver rotated",
              run->solver, m->tangent[0]->name);
@@ -422,6 +438,7 @@ PetscErrorCode SbRunDestroy(SbRun *run)
   }
   if (!r->ts) PetscCall(SNESDestroy(&r->snes));
   PetscCall(TSDestroy(&r->ts));
+  PetscCall(MatDestroy(&r->operator));
   PetscCall(MatDestroy(&r->J));
   PetscCall(VecDestroy(&r->U));
   PetscCall(VecDestroy(&r->V));

@@ -176,7 +176,7 @@ static PetscErrorCode settle(TS ts, PetscBool *again)
   PetscCall(SbModelResidual(so->run->model, t, U, V, A, PETSC_FALSE, R));
   PetscCall(VecScale(R, 1. / so->set.alpha_f));
   PetscCall(SbModelContactSettle(so->run->model, ts->ptime + ts->time_step, so->X1, R, again));
-  if (*again) so->run->tangent_known = PETSC_FALSE;
+  if (*again && so->run->model->space->held) so->run->tangent_known = PETSC_FALSE;
   PetscCall(VecDestroy(&R));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -192,7 +192,7 @@ static PetscErrorCode solve_end(TS ts, SNESConvergedReason *reason)
   PetscCall(predict(ts));
   if (again) {
     PetscCall(SbModelContactBegin(m, ts->ptime, ts->time_step, so->X0, so->X1));
-    so->run->tangent_known = PETSC_FALSE;
+    if (m->space->held) so->run->tangent_known = PETSC_FALSE; /* it is projected there */
   }
   PetscCall(solve_once(ts, reason));
   for (PetscInt round = 1; again && *reason > 0; round++) {

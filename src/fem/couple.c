@@ -1,0 +1,694 @@
+/*
+  Rows that join nodes anywhere: what contact between bodies needs. G u = c exactly, S u = s by springs.
+
+  Solves run in the null space of G (Gould, Hribar, Nocedal 2001, On the solution of equality constrained quadratic programming
+  problems arising in optimization): with D a diagonal, one number per node, about the inverse of K's,
+
+    P = I - D G^T (G D G^T)^-1 G,   A = P^T (K + S^T k S) P,   M_A^-1 = P M^-1 P^T
+
+  D makes the projection blind to units and to stiffness: a hard body's node moves less than a soft one's. Every preconditioner M
+  of K serves, and neither the matrix nor M are renewed when rows come and go. What the rows push with is the least-squares
+  multiplier lambda = (G D G^T)^-1 G D r of the residual r. Rows that say the same twice (two surfaces whose vertices meet) leave
+  P right; lambda then is shared between them.
+
+  G D G^T has the rows of all ranks, which are few, and is factored on each of them.
+
+  Nodes that are prescribed or held (held.c) have no say: their columns are cleared or projected.
+*/
+#include "sbsolver.h"
+#include "fem_impl.h"
+
+#define REGULAR \
+  1e-8 /* relative, on the diagonal of what is factored: keeps rows that depend on others solvable */
+
+/* Rows of one kind as a matrix with three columns per node. */
+typedef struct {
+  PetscInt n;             /* rows of this rank */
+  PetscInt N;             /* of all ranks */
+  Mat whole, free;        /* G, and G without prescribed and held directions */
+  Vec value, force, work; /* by rows */
+} Rows;
+
+struct _p_SbCouple {
+  PetscInt n, size; /* rows, room */
+  PetscInt *start;  /* [n+1] */
+  PetscInt nentry, entry_size;
+  PetscInt *gnode;                         /* [nentry] */
+  PetscReal *coef;                         /* [nentry][3] */
+  PetscReal *value, *stiffness, *constant; /* [n]; stiffness -1: exact */
+  PetscInt *place;                         /* [n] row in its matrix on this rank */
+  PetscReal *force, *sum;                  /* [n] */
+  Rows exact, spring;
+  Vec k, constants;   /* of springs */
+  Mat K;              /* borrowed; NULL before SbCoupleCreateOperator() */
+  Mat DGt;            /* D G^T */
+  Mat gram, factored; /* G D G^T, and the same with a slightly larger diagonal */
+  KSP solver;         /* of gram, by the factor and one correction, which leaves REGULAR squared */
+  Vec anchor,
+    added;  /* squares of the coefficients, and what K holds beside the tangent, N/m; NULL: nothing */
+  Vec free; /* 1 at unknowns that are not prescribed, else 0 */
+  Vec d;    /* D */
+  Vec w[2];
+};
+
+PetscErrorCode SbSpaceCoupleCreate(SbSpace s)
+{
+  SbCouple c;
+
+  PetscFunctionBeginUser;
+  if (s->couple) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscNew(&c));
+  PetscCall(PetscCalloc1(1, &c->start));
+  s->couple = c;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode destroy_rows(Rows *r)
+{
+  PetscFunctionBeginUser;
+  PetscCall(MatDestroy(&r->whole));
+  PetscCall(MatDestroy(&r->free));
+  PetscCall(VecDestroy(&r->value));
+  PetscCall(VecDestroy(&r->force));
+  PetscCall(VecDestroy(&r->work));
+  r->n = r->N = 0;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode destroy_matrices(SbCouple c)
+{
+  PetscFunctionBeginUser;
+  PetscCall(destroy_rows(&c->exact));
+  PetscCall(destroy_rows(&c->spring));
+  PetscCall(VecDestroy(&c->k));
+  PetscCall(VecDestroy(&c->constants));
+  PetscCall(MatDestroy(&c->DGt));
+  PetscCall(MatDestroy(&c->gram));
+  PetscCall(MatDestroy(&c->factored));
+  PetscCall(KSPDestroy(&c->solver));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbCoupleDestroy(SbCouple *couple)
+{
+  SbCouple c = *couple;
+
+  PetscFunctionBeginUser;
+  if (!c) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(destroy_matrices(c));
+  PetscCall(VecDestroy(&c->anchor));
+  PetscCall(VecDestroy(&c->added));
+  PetscCall(VecDestroy(&c->free));
+  PetscCall(VecDestroy(&c->d));
+  PetscCall(VecDestroy(&c->w[0]));
+  PetscCall(VecDestroy(&c->w[1]));
+  PetscCall(PetscFree(c->start));
+  PetscCall(PetscFree(c->gnode));
+  PetscCall(PetscFree(c->coef));
+  PetscCall(PetscFree6(c->value, c->stiffness, c->constant, c->place, c->force, c->sum));
+  PetscCall(PetscFree(*couple));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ rows */
+
+void SbSpaceCoupleClear(SbSpace s)
+{
+  s->couple->n = 0;
+  s->couple->nentry = 0;
+}
+
+static PetscErrorCode make_room(SbCouple c, PetscInt more)
+{
+  PetscFunctionBeginUser;
+  if (c->n == c->size) {
+    const PetscInt size = PetscMax(64, 2 * c->size);
+    PetscReal *value, *stiffness, *constant, *force, *sum;
+    PetscInt *place;
+
+    PetscCall(
+      PetscMalloc6(size, &value, size, &stiffness, size, &constant, size, &place, size, &force, size, &sum));
+    PetscCall(PetscArraycpy(value, c->value, c->n));
+    PetscCall(PetscArraycpy(stiffness, c->stiffness, c->n));
+    PetscCall(PetscArraycpy(constant, c->constant, c->n));
+    PetscCall(PetscFree6(c->value, c->stiffness, c->constant, c->place, c->force, c->sum));
+    c->value = value;
+    c->stiffness = stiffness;
+    c->constant = constant;
+    c->place = place;
+    c->force = force;
+    c->sum = sum;
+    c->size = size;
+    PetscCall(PetscRealloc((size_t)(size + 1) * sizeof(PetscInt), &c->start));
+  }
+  if (c->nentry + more > c->entry_size) {
+    c->entry_size = PetscMax(256, 2 * (c->nentry + more));
+    PetscCall(PetscRealloc((size_t)c->entry_size * sizeof(PetscInt), &c->gnode));
+    PetscCall(PetscRealloc(3 * (size_t)c->entry_size * sizeof(PetscReal), &c->coef));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbSpaceCoupleSpring(SbSpace s, PetscInt n, const PetscInt gnode[], const PetscReal coef[],
+                                   PetscReal value, PetscReal stiffness, PetscReal constant, PetscInt *row)
+{
+  SbCouple c = s->couple;
+
+  PetscFunctionBeginUser;
+  PetscCall(make_room(c, n));
+  PetscCall(PetscArraycpy(c->gnode + c->nentry, gnode, n));
+  PetscCall(PetscArraycpy(c->coef + 3 * c->nentry, coef, 3 * n));
+  c->start[c->n] = c->nentry;
+  c->value[c->n] = value;
+  c->stiffness[c->n] = stiffness;
+  c->constant[c->n] = constant;
+  c->force[c->n] = c->sum[c->n] = 0.;
+  c->nentry += n;
+  c->start[c->n + 1] = c->nentry;
+  *row = c->n++;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbSpaceCoupleRow(SbSpace s, PetscInt n, const PetscInt gnode[], const PetscReal coef[],
+                                PetscReal value, PetscInt *row)
+{
+  PetscFunctionBeginUser;
+  PetscCall(SbSpaceCoupleSpring(s, n, gnode, coef, value, -1., 0., row));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The rows of one kind as a matrix. */
+static PetscErrorCode create_rows(SbSpace s, PetscBool exact, Rows *r)
+{
+  SbCouple c = s->couple;
+  PetscInt widest = 1, first;
+  PetscScalar *value;
+
+  PetscFunctionBeginUser;
+  r->n = 0;
+  for (PetscInt i = 0; i < c->n; i++) {
+    if ((c->stiffness[i] < 0.) != exact) continue;
+    widest = PetscMax(widest, 3 * (c->start[i + 1] - c->start[i]));
+    c->place[i] = r->n++;
+  }
+  PetscCallMPI(MPI_Allreduce(&r->n, &r->N, 1, MPIU_INT, MPI_SUM, s->comm));
+  if (!r->N) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(MatCreateAIJ(s->comm, r->n, 3 * s->nnode_owned, PETSC_DETERMINE, 3 * s->Nnode, widest, NULL,
+                         widest, NULL, &r->whole));
+  PetscCall(MatCreateVecs(r->whole, NULL, &r->value));
+  PetscCall(VecDuplicate(r->value, &r->force));
+  PetscCall(VecDuplicate(r->value, &r->work));
+  PetscCall(MatGetOwnershipRange(r->whole, &first, NULL));
+  PetscCall(VecGetArrayWrite(r->value, &value));
+  for (PetscInt i = 0; i < c->n; i++) {
+    if ((c->stiffness[i] < 0.) != exact) continue;
+    value[c->place[i]] = c->value[i];
+    for (PetscInt e = c->start[i]; e < c->start[i + 1]; e++) {
+      const PetscInt row = first + c->place[i], g = 3 * c->gnode[e], column[3] = {g, g + 1, g + 2};
+
+      PetscCall(MatSetValues(r->whole, 1, &row, 3, column, c->coef + 3 * e, ADD_VALUES));
+    }
+  }
+  PetscCall(VecRestoreArrayWrite(r->value, &value));
+  PetscCall(MatAssemblyBegin(r->whole, MAT_FINAL_ASSEMBLY));
+  PetscCall(MatAssemblyEnd(r->whole, MAT_FINAL_ASSEMBLY));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* I - Q on the nodes' blocks. */
+static PetscErrorCode create_projector(SbSpace s, Mat *H)
+{
+  PetscInt first;
+
+  PetscFunctionBeginUser;
+  PetscCall(MatCreateAIJ(s->comm, 3 * s->nnode_owned, 3 * s->nnode_owned, 3 * s->Nnode, 3 * s->Nnode, 3, NULL,
+                         0, NULL, H));
+  PetscCall(MatGetOwnershipRange(*H, &first, NULL));
+  for (PetscInt i = 0; i < s->nnode_owned; i++) {
+    const PetscReal *Q = SbHeldProjector(s, i);
+    PetscScalar block[9];
+    PetscInt at[3];
+
+    for (PetscInt k = 0; k < 9; k++) block[k] = (k % 4 ? 0. : 1.) - Q[k];
+    for (PetscInt k = 0; k < 3; k++) at[k] = first + 3 * i + k;
+    PetscCall(MatSetValues(*H, 3, at, 3, at, block, INSERT_VALUES));
+  }
+  PetscCall(MatAssemblyBegin(*H, MAT_FINAL_ASSEMBLY));
+  PetscCall(MatAssemblyEnd(*H, MAT_FINAL_ASSEMBLY));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Clears what prescribed unknowns and held directions would say in the rows. */
+static PetscErrorCode free_rows(SbSpace s, Rows *r)
+{
+  PetscFunctionBeginUser;
+  if (!r->N) PetscFunctionReturn(PETSC_SUCCESS);
+  /* the same on all ranks: held nodes are counted over all of them */
+  if (SbHeldProjector(s, 0)) {
+    Mat H;
+
+    PetscCall(create_projector(s, &H));
+    PetscCall(MatMatMult(r->whole, H, MAT_INITIAL_MATRIX, PETSC_DEFAULT, &r->free));
+    PetscCall(MatDestroy(&H));
+  } else
+    PetscCall(MatDuplicate(r->whole, MAT_COPY_VALUES, &r->free));
+  PetscCall(MatDiagonalScale(r->free, NULL, s->couple->free));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ the projection */
+
+/* One vector each that the solves work with, and which unknowns are free. */
+static PetscErrorCode create_vectors(SbSpace s)
+{
+  SbCouple c = s->couple;
+  PetscScalar *x;
+
+  PetscFunctionBeginUser;
+  if (c->free) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(SbSpaceCreateVec(s, &c->free));
+  PetscCall(VecDuplicate(c->free, &c->d));
+  PetscCall(VecDuplicate(c->free, &c->w[0]));
+  PetscCall(VecDuplicate(c->free, &c->w[1]));
+  PetscCall(VecGetArray(c->free, &x));
+  for (PetscInt i = 0; i < 3 * s->nnode_owned; i++) x[i] = s->fixed[i / 3] & (1 << (i % 3)) ? 0. : 1.;
+  PetscCall(VecRestoreArray(c->free, &x));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* D: inverse of the mean of K's diagonal at each node; before there is a K, of the mass, which keeps momentum. */
+static PetscErrorCode weigh_nodes(SbSpace s)
+{
+  SbCouple c = s->couple;
+  PetscReal largest = 0.;
+  PetscBool known;
+  PetscScalar *d;
+
+  PetscFunctionBeginUser;
+  if (c->K) { /* it begins as zero */
+    PetscCall(MatGetDiagonal(c->K, c->d));
+    PetscCall(VecNorm(c->d, NORM_INFINITY, &largest));
+  }
+  known = (PetscBool)(largest > 0.);
+  PetscCall(VecGetArray(c->d, &d));
+  for (PetscInt i = 0; i < s->nnode_owned; i++) {
+    PetscReal mean = known ? 0. : s->node_mass[i];
+
+    for (PetscInt k = 0; k < 3 && known; k++) mean += PetscAbsScalar(d[3 * i + k]) / 3.;
+    for (PetscInt k = 0; k < 3; k++) d[3 * i + k] = mean > 0. ? 1. / mean : 0.;
+  }
+  PetscCall(VecRestoreArray(c->d, &d));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Keeps the factorisation solvable: rows that depend on others, rows without a free node. */
+static PetscErrorCode regularise(Mat gram)
+{
+  PetscScalar *x;
+  PetscInt n;
+  Vec d;
+
+  PetscFunctionBeginUser;
+  PetscCall(MatCreateVecs(gram, &d, NULL));
+  PetscCall(MatGetDiagonal(gram, d));
+  PetscCall(VecGetLocalSize(d, &n));
+  PetscCall(VecGetArray(d, &x));
+  for (PetscInt i = 0; i < n; i++) x[i] = x[i] > 0. ? x[i] * (1. + REGULAR) : 1.;
+  PetscCall(VecRestoreArray(d, &x));
+  PetscCall(MatDiagonalSet(gram, d, INSERT_VALUES));
+  PetscCall(VecDestroy(&d));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode create_solver(SbSpace s)
+{
+  SbCouple c = s->couple;
+  PetscMPIInt size;
+  KSP inner;
+  PC pc;
+
+  PetscFunctionBeginUser;
+  PetscCallMPI(MPI_Comm_size(s->comm, &size));
+  PetscCall(KSPCreate(s->comm, &c->solver));
+  PetscCall(KSPSetOptionsPrefix(c->solver, "rows_"));
+  PetscCall(KSPSetOperators(c->solver, c->gram, c->factored));
+  PetscCall(KSPSetType(c->solver, KSPRICHARDSON));
+  PetscCall(KSPSetNormType(c->solver, KSP_NORM_NONE));
+  PetscCall(KSPSetConvergenceTest(c->solver, KSPConvergedSkip, NULL, NULL));
+  PetscCall(KSPSetTolerances(c->solver, PETSC_DEFAULT, PETSC_DEFAULT, PETSC_DEFAULT, 2));
+  PetscCall(KSPGetPC(c->solver, &pc));
+  if (size > 1) {
+    PetscCall(PCSetType(pc, PCREDUNDANT));
+    PetscCall(PCRedundantGetKSP(pc, &inner));
+    PetscCall(KSPSetType(inner, KSPPREONLY));
+    PetscCall(KSPGetPC(inner, &pc));
+  }
+  PetscCall(PCSetType(pc, PCCHOLESKY));
+  PetscCall(KSPSetUp(c->solver));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/*
+  A body that only rows hold makes K singular, which no factorisation takes. In a static run the matrix gets s_i times the squares
+  of the rows' coefficients on its diagonal, s_i the size of the node's block; the operator takes it away again, so that only M
+  knows of it.
+*/
+static PetscErrorCode find_anchors(SbSpace s)
+{
+  SbCouple c = s->couple;
+
+  PetscFunctionBeginUser;
+  if (!c->anchor) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(VecZeroEntries(c->anchor));
+  for (PetscInt e = 0; e < 3 * c->nentry; e++)
+    PetscCall(VecSetValue(c->anchor, 3 * c->gnode[e / 3] + e % 3, c->coef[e] * c->coef[e], ADD_VALUES));
+  PetscCall(VecAssemblyBegin(c->anchor));
+  PetscCall(VecAssemblyEnd(c->anchor));
+  PetscCall(VecPointwiseMult(c->anchor, c->anchor, c->free));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbCoupleAnchor(SbSpace s, const SbValues *x)
+{
+  SbCouple c = s->couple;
+  const PetscScalar *a;
+  PetscScalar *added;
+
+  PetscFunctionBeginUser;
+  if (!c->anchor) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(VecGetArrayRead(c->anchor, &a));
+  PetscCall(VecGetArray(c->added, &added));
+  for (PetscInt i = 0; i < s->nnode_owned; i++) {
+    size_t rs, cs;
+    PetscScalar *v;
+    PetscReal size;
+
+    for (PetscInt k = 0; k < 3; k++) added[3 * i + k] = 0.;
+    if (a[3 * i] + a[3 * i + 1] + a[3 * i + 2] == 0.) continue;
+    v = sb_block(x, s->plan, i, s->plan->diagonal[i], &rs, &cs);
+    size = (PetscAbsReal(v[0]) + PetscAbsReal(v[rs + cs]) + PetscAbsReal(v[2 * (rs + cs)])) / 3.;
+    for (size_t k = 0; k < 3; k++) {
+      added[3 * (size_t)i + k] = size * a[3 * (size_t)i + k];
+      v[k * (rs + cs)] += added[3 * (size_t)i + k];
+    }
+  }
+  PetscCall(VecRestoreArray(c->added, &added));
+  PetscCall(VecRestoreArrayRead(c->anchor, &a));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbSpaceCoupleDone(SbSpace s)
+{
+  SbCouple c = s->couple;
+
+  PetscFunctionBeginUser;
+  PetscCall(destroy_matrices(c));
+  PetscCall(create_vectors(s));
+  PetscCall(find_anchors(s));
+  PetscCall(create_rows(s, PETSC_TRUE, &c->exact));
+  PetscCall(create_rows(s, PETSC_FALSE, &c->spring));
+  PetscCall(free_rows(s, &c->exact));
+  PetscCall(free_rows(s, &c->spring));
+  if (c->exact.N) {
+    PetscCall(weigh_nodes(s));
+    PetscCall(MatTranspose(c->exact.free, MAT_INITIAL_MATRIX, &c->DGt));
+    PetscCall(MatDiagonalScale(c->DGt, c->d, NULL));
+    PetscCall(MatMatMult(c->exact.free, c->DGt, MAT_INITIAL_MATRIX, PETSC_DEFAULT, &c->gram));
+    PetscCall(MatDuplicate(c->gram, MAT_COPY_VALUES, &c->factored));
+    PetscCall(regularise(c->factored));
+    PetscCall(create_solver(s));
+  }
+  if (c->spring.N) {
+    PetscScalar *k, *constant;
+
+    PetscCall(VecDuplicate(c->spring.value, &c->k));
+    PetscCall(VecDuplicate(c->spring.value, &c->constants));
+    PetscCall(VecGetArray(c->k, &k));
+    PetscCall(VecGetArray(c->constants, &constant));
+    for (PetscInt i = 0; i < c->n; i++) {
+      if (c->stiffness[i] < 0.) continue;
+      k[c->place[i]] = c->stiffness[i];
+      constant[c->place[i]] = c->constant[i];
+    }
+    PetscCall(VecRestoreArray(c->k, &k));
+    PetscCall(VecRestoreArray(c->constants, &constant));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* x <- P x */
+static PetscErrorCode project(SbCouple c, Vec x)
+{
+  PetscFunctionBeginUser;
+  if (!c->exact.N) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(MatMult(c->exact.free, x, c->exact.work));
+  PetscCall(KSPSolve(c->solver, c->exact.work, c->exact.force));
+  PetscCall(VecScale(c->exact.force, -1.));
+  PetscCall(MatMultAdd(c->DGt, c->exact.force, x, x));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* r <- P^T r; the multipliers stay in c->exact.force. */
+static PetscErrorCode project_force(SbCouple c, Vec r)
+{
+  PetscFunctionBeginUser;
+  if (!c->exact.N) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(MatMultTranspose(c->DGt, r, c->exact.work));
+  PetscCall(KSPSolve(c->solver, c->exact.work, c->exact.force));
+  PetscCall(VecScale(c->exact.force, -1.));
+  PetscCall(MatMultTransposeAdd(c->exact.free, c->exact.force, r, r));
+  PetscCall(VecScale(c->exact.force, -1.));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbCouplePrescribe(SbSpace s, Vec U)
+{
+  SbCouple c = s->couple;
+
+  PetscFunctionBeginUser;
+  if (!c->exact.N) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(MatMult(c->exact.whole, U, c->exact.work));
+  PetscCall(VecAYPX(c->exact.work, -1., c->exact.value));
+  PetscCall(KSPSolve(c->solver, c->exact.work, c->exact.force));
+  PetscCall(MatMultAdd(c->DGt, c->exact.force, U, U));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Forces of the springs into c->spring.force, where they are into c->spring.work. */
+static PetscErrorCode stretch(SbCouple c, Vec U)
+{
+  PetscFunctionBeginUser;
+  PetscCall(MatMult(c->spring.whole, U, c->spring.work));
+  PetscCall(VecWAXPY(c->spring.force, -1., c->spring.work, c->spring.value));
+  PetscCall(VecPointwiseMult(c->spring.force, c->spring.force, c->k));
+  PetscCall(VecAXPY(c->spring.force, 1., c->constants));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbCoupleResidual(SbSpace s, Vec U, PetscBool constrain, Vec F)
+{
+  SbCouple c = s->couple;
+
+  PetscFunctionBeginUser;
+  if (c->spring.N) {
+    PetscCall(stretch(c, U));
+    PetscCall(VecScale(c->spring.force, -1.));
+    PetscCall(MatMultTransposeAdd(constrain ? c->spring.free : c->spring.whole, c->spring.force, F, F));
+  }
+  if (constrain) PetscCall(project_force(c, F));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Values of a kind's rows for the effect that made them. */
+static PetscErrorCode hand_out(SbCouple c, PetscBool exact, Vec from, PetscReal to[])
+{
+  const PetscScalar *x;
+
+  PetscFunctionBeginUser;
+  PetscCall(VecGetArrayRead(from, &x));
+  for (PetscInt i = 0; i < c->n; i++) {
+    if ((c->stiffness[i] < 0.) == exact) to[i] = x[c->place[i]];
+  }
+  PetscCall(VecRestoreArrayRead(from, &x));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbSpaceCoupleMeasure(SbSpace s, Vec U, Vec R)
+{
+  SbCouple c = s->couple;
+
+  PetscFunctionBeginUser;
+  if (c->exact.N) {
+    PetscCall(VecPointwiseMult(c->w[0], R, c->free));
+    PetscCall(project_force(c, c->w[0]));
+    PetscCall(hand_out(c, PETSC_TRUE, c->exact.force, c->force));
+    PetscCall(MatMult(c->exact.whole, U, c->exact.work));
+    PetscCall(hand_out(c, PETSC_TRUE, c->exact.work, c->sum));
+  }
+  if (c->spring.N) {
+    PetscCall(stretch(c, U));
+    PetscCall(hand_out(c, PETSC_FALSE, c->spring.force, c->force));
+    PetscCall(hand_out(c, PETSC_FALSE, c->spring.work, c->sum));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+void SbSpaceCoupleGet(SbSpace s, PetscInt row, PetscReal *force, PetscReal *sum)
+{
+  *force = s->couple->force[row];
+  *sum = s->couple->sum[row];
+}
+
+/* ------------------------------------------------------------------ operator and preconditioner */
+
+/* y = P^T (K + S^T k S) x for x in the null space, where the iteration stays. */
+static PetscErrorCode multiply(Mat A, Vec x, Vec y)
+{
+  SbSpace s;
+  SbCouple c;
+
+  PetscFunctionBeginUser;
+  PetscCall(MatShellGetContext(A, &s));
+  c = s->couple;
+  PetscCall(MatMult(c->K, x, y));
+  if (c->added) {
+    PetscCall(VecPointwiseMult(c->w[0], c->added, x));
+    PetscCall(VecAXPY(y, -1., c->w[0]));
+  }
+  if (c->spring.N) {
+    PetscCall(MatMult(c->spring.free, x, c->spring.work));
+    PetscCall(VecPointwiseMult(c->spring.work, c->spring.work, c->k));
+    PetscCall(MatMultTransposeAdd(c->spring.free, c->spring.work, y, y));
+  }
+  PetscCall(project_force(c, y));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbCoupleCreateOperator(SbSpace s, Mat K, PetscBool singular, Mat *A)
+{
+  PetscInt m, n, M, N;
+
+  PetscFunctionBeginUser;
+  PetscCall(MatGetLocalSize(K, &m, &n));
+  PetscCall(MatGetSize(K, &M, &N));
+  PetscCall(MatCreateShell(s->comm, m, n, M, N, s, A));
+  PetscCall(MatShellSetOperation(*A, MATOP_MULT, SB_OPERATION(multiply)));
+  PetscCall(MatSetOption(*A, MAT_SYMMETRIC, PETSC_TRUE));
+  s->couple->K = K;
+  if (singular) {
+    PetscCall(SbSpaceCreateVec(s, &s->couple->anchor));
+    PetscCall(SbSpaceCreateVec(s, &s->couple->added));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+#define NAME "null space of rows"
+
+typedef struct {
+  SbSpace space;
+  PC inner;
+  PetscBool configured;
+} Wrapped;
+
+static PetscErrorCode setup_wrapped(PC pc)
+{
+  PCFailedReason reason;
+  Wrapped *w;
+  Mat K;
+
+  PetscFunctionBeginUser;
+  PetscCall(PCShellGetContext(pc, &w));
+  PetscCall(PCGetOperators(pc, NULL, &K));
+  PetscCall(PCSetOperators(w->inner, K, K));
+  if (!w->configured) PetscCall(PCSetFromOptions(w->inner));
+  w->configured = PETSC_TRUE;
+  PetscCall(PCSetUp(w->inner));
+  PetscCall(PCGetFailedReason(w->inner, &reason));
+  PetscCall(PCSetFailedReason(pc, reason));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode apply_wrapped(PC pc, Vec r, Vec z)
+{
+  PCFailedReason reason;
+  Wrapped *w;
+  SbCouple c;
+
+  PetscFunctionBeginUser;
+  PetscCall(PCShellGetContext(pc, &w));
+  c = w->space->couple;
+  if (!c->exact.N)
+    PetscCall(PCApply(w->inner, r, z));
+  else {
+    PetscCall(VecCopy(r, c->w[1]));
+    PetscCall(project_force(c, c->w[1]));
+    PetscCall(PCApply(w->inner, c->w[1], z));
+    PetscCall(project(c, z));
+  }
+  PetscCall(PCGetFailedReason(w->inner, &reason));
+  if (reason) PetscCall(PCSetFailedReason(pc, reason));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode view_wrapped(PC pc, PetscViewer viewer)
+{
+  Wrapped *w;
+
+  PetscFunctionBeginUser;
+  PetscCall(PCShellGetContext(pc, &w));
+  PetscCall(PetscViewerASCIIPrintf(viewer, "  between projections into the null space:\n"));
+  PetscCall(PCView(w->inner, viewer));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode destroy_wrapped(PC pc)
+{
+  Wrapped *w;
+
+  PetscFunctionBeginUser;
+  PetscCall(PCShellGetContext(pc, &w));
+  PetscCall(PCDestroy(&w->inner));
+  PetscCall(PetscFree(w));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbPCCoupleCreate(SbSpace s, PC pc, PC *inner)
+{
+  const char *prefix;
+  Wrapped *w;
+
+  PetscFunctionBeginUser;
+  *inner = pc;
+  if (!s->couple) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscNew(&w));
+  w->space = s;
+  PetscCall(PCCreate(s->comm, &w->inner));
+  PetscCall(PCGetOptionsPrefix(pc, &prefix));
+  PetscCall(PCSetOptionsPrefix(w->inner, prefix));
+  PetscCall(PCSetOptionsPrefix(pc, "rows_"));
+  PetscCall(PCSetType(pc, PCSHELL));
+  PetscCall(PCShellSetContext(pc, w));
+  PetscCall(PCShellSetName(pc, NAME));
+  PetscCall(PCShellSetSetUp(pc, setup_wrapped));
+  PetscCall(PCShellSetApply(pc, apply_wrapped));
+  PetscCall(PCShellSetView(pc, view_wrapped));
+  PetscCall(PCShellSetDestroy(pc, destroy_wrapped));
+  *inner = w->inner;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbPCCoupleGetInner(PC pc, PC *inner)
+{
+  PetscBool is;
+  const char *name = NULL;
+  Wrapped *w;
+
+  PetscFunctionBeginUser;
+  *inner = pc;
+  PetscCall(PetscObjectTypeCompare((PetscObject)pc, PCSHELL, &is));
+  if (is) PetscCall(PCShellGetName(pc, &name));
+  if (!name || strcmp(name, NAME)) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PCShellGetContext(pc, &w));
+  *inner = w->inner;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
