@@ -45,9 +45,10 @@ struct _p_SbDetector {
   PetscInt *candidate; /* [start[npoint]], grown by SbCandidatesReserve() */
   PetscInt candidate_size;
   /* detect.c and near.c */
-  PetscInt facet_size, point_size, ring_size, near_size; /* what is allocated, in items */
-  PetscInt version, nfacet;                              /* of the last call; nfacet = -1: none yet */
+  PetscInt facet_size, point_size, ring_size, hit_size, near_size; /* what is allocated, in items */
+  PetscInt version, nfacet; /* of the last call; nfacet = -1: none yet */
   SbDetectRings rings;
+  struct SbDetectHit *hit; /* [2 hit_size] of one point: near facets, then those it went through */
   SbNear *near;
   SbDetectStats stats;
 };
@@ -76,6 +77,38 @@ static inline PetscBool SbDetectPairWanted(const SbDetectScene *s, PetscInt poin
 PetscErrorCode SbDetectNarrow(SbDetector d, const SbDetectScene *scene, PetscInt *n);
 /* Makes or keeps d->rings (d->same_facets). Not collective. */
 PetscErrorCode SbDetectRingsUpdate(SbDetector d, const SbDetectScene *scene);
+PetscErrorCode SbDetectRingsDestroy(SbDetector d);
+
+/* Where on a triangle: its corner 0, 1 or 2, its edge from corner 0 to 1, 1 to 2, 2 to 0, or its inside. */
+typedef enum {
+  SB_CORNER_0,
+  SB_CORNER_1,
+  SB_CORNER_2,
+  SB_EDGE_0,
+  SB_EDGE_1,
+  SB_EDGE_2,
+  SB_INSIDE
+} SbTrianglePlace;
+
+/*
+  SbClosestPoint - the point of a triangle nearest to p.
+
+  Not collective. Input: p[3]; x[k][3], corners, m. Output: weight[3], none negative, sum 1; d2, squared distance, m^2. Triangles without
+  area are segments or points; the place then is never SB_INSIDE. NaN in, NaN out.
+*/
+SbTrianglePlace SbClosestPoint(const PetscReal p[3], const PetscReal *const x[3], PetscReal weight[3],
+                               PetscReal *d2);
+
+/*
+  SbCrossing - whether a point goes through a triangle from its front to its back and stays behind it.
+
+  Not collective. Point and corners move on straight lines. Input: p0[3], p1[3], point at the start and end of the step; x0[k][3], x1[k][3],
+  corners, m; slack, a start behind the triangle by no more than this is in front of it; rest, an end behind it by no more than this does not count, m.
+  Output: time, of the step, in [0, 1]; behind, the start was behind it.
+*/
+PetscBool SbCrossing(const PetscReal p0[3], const PetscReal p1[3], const PetscReal *const x0[3],
+                     const PetscReal *const x1[3], const PetscReal tolerance[2], PetscReal *time,
+                     PetscBool *behind);
 
 /* Constructors: fill d->ops and d->data. */
 PetscErrorCode sb_detector_hash(SbDetector d);

@@ -1,0 +1,138 @@
+/*
+  detect.c - contact detection on one rank: boxes of facets and points, candidates by a kind of detector, then near.c.
+
+  A box holds its facet at the end and, when the motion is looked at, at the start of the step, and so everything in between: corners
+  move on straight lines. Two that come within the reach, or cross, have boxes that meet.
+*/
+#include "detect.h"
+
+#define ROUNDING 16 /* in units of eps |x|: what the corners of a box may be off */
+
+static PetscErrorCode (*const constructors[])(SbDetector) = {
+  [SB_DETECT_HASH] = sb_detector_hash,
+  [SB_DETECT_BRUTE] = sb_detector_brute,
+};
+
+PetscErrorCode SbDetectorCreate(SbDetectKind kind, SbDetector *detector)
+{
+  SbDetector d;
+
+  PetscFunctionBeginUser;
+  PetscCheck((size_t)kind < PETSC_STATIC_ARRAY_LENGTH(constructors) && constructors[kind], PETSC_COMM_SELF,
+             PETSC_ERR_ARG_OUTOFRANGE, "there is no contact detector of kind %d", (int)kind);
+  PetscCall(PetscNew(&d));
+  *detector = d;
+  d->nfacet = -1;
+  PetscCall(constructors[kind](d));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbDetectorDestroy(SbDetector *detector)
+{
+  SbDetector d = *detector;
+
+  PetscFunctionBeginUser;
+  if (!d) PetscFunctionReturn(PETSC_SUCCESS);
+  if (d->ops.destroy) PetscCall(d->ops.destroy(d));
+  PetscCall(PetscFree(d->facet_box));
+  PetscCall(PetscFree2(d->point_box, d->start));
+  PetscCall(PetscFree(d->candidate));
+  PetscCall(SbDetectRingsDestroy(d));
+  PetscCall(PetscFree(d->hit));
+  PetscCall(PetscFree(d->near));
+  PetscCall(PetscFree(*detector));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbCandidatesReserve(SbDetector d, PetscInt64 n)
+{
+  PetscInt size;
+
+  PetscFunctionBeginUser;
+  if (n <= d->candidate_size) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscIntCast(PetscMin(n + n / 2 + 64, PetscMax(n, (PetscInt64)PETSC_MAX_INT)), &size));
+  PetscCall(PetscRealloc(sizeof(*d->candidate) * (size_t)size, &d->candidate));
+  d->candidate_size = size;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Storage for this scene; it grows by half as much again, so that a scene that grows slowly does not allocate each time. */
+static PetscErrorCode reserve(SbDetector d, const SbDetectScene *s)
+{
+  PetscFunctionBeginUser;
+  if (s->nfacet > d->facet_size) {
+    d->facet_size = s->nfacet + s->nfacet / 2;
+    PetscCall(PetscFree(d->facet_box));
+    PetscCall(PetscMalloc1(6 * (size_t)d->facet_size, &d->facet_box));
+  }
+  if (s->npoint > d->point_size || !d->start) {
+    d->point_size = s->npoint + s->npoint / 2;
+    PetscCall(PetscFree2(d->point_box, d->start));
+    PetscCall(PetscMalloc2(6 * (size_t)d->point_size, &d->point_box, d->point_size + 1, &d->start));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static inline void box_of(const PetscReal x[3], PetscReal box[6])
+{
+  for (int k = 0; k < 3; k++) box[k] = box[3 + k] = x[k];
+}
+
+static inline void box_add(const PetscReal x[3], PetscReal box[6])
+{
+  for (int k = 0; k < 3; k++) {
+    box[k] = PetscMin(box[k], x[k]);
+    box[3 + k] = PetscMax(box[3 + k], x[k]);
+  }
+}
+
+static void boxes(SbDetector d, const SbDetectScene *s)
+{
+  const PetscReal *x = s->x, *x0 = s->x0, *p0 = s->x0 ? s->p0 : NULL;
+
+  for (PetscInt f = 0; f < s->nfacet; f++) {
+    PetscReal *box = d->facet_box + 6 * f;
+    const PetscInt *c = s->facet + 3 * f;
+
+    box_of(x + 3 * c[0], box);
+    for (int k = 1; k < 3; k++) box_add(x + 3 * c[k], box);
+    for (int k = 0; x0 && k < 3; k++) box_add(x0 + 3 * c[k], box);
+    for (int k = 0; k < 3; k++) {
+      const PetscReal far = PetscMax(PetscAbsReal(box[k]), PetscAbsReal(box[3 + k]));
+      const PetscReal margin = s->reach + ROUNDING * PETSC_MACHINE_EPSILON * (far + s->reach);
+
+      box[k] -= margin;
+      box[3 + k] += margin;
+    }
+  }
+  for (PetscInt i = 0; i < s->npoint; i++) {
+    box_of(s->p + 3 * i, d->point_box + 6 * i);
+    if (p0) box_add(p0 + 3 * i, d->point_box + 6 * i);
+  }
+}
+
+PetscErrorCode SbDetectorFind(SbDetector d, const SbDetectScene *s, PetscInt *n, const SbNear **near)
+{
+  PetscFunctionBeginUser;
+  PetscCheck(s->reach > 0 && !PetscIsInfOrNanReal(s->reach), PETSC_COMM_SELF, PETSC_ERR_ARG_OUTOFRANGE,
+             "the reach of contact detection is %g m: it must be positive and finite", (double)s->reach);
+  d->same_facets = (PetscBool)(d->nfacet == s->nfacet && d->version == s->version);
+  d->nfacet = -1; /* should the search fail, the next call begins anew */
+  PetscCall(reserve(d, s));
+  boxes(d, s);
+  PetscCall(SbDetectRingsUpdate(d, s));
+  PetscCall(d->ops.search(d, s));
+  PetscCall(SbDetectNarrow(d, s, n));
+  d->version = s->version;
+  d->nfacet = s->nfacet;
+  d->stats.found = *n;
+  *near = d->near;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbDetectorGetStats(SbDetector d, SbDetectStats *stats)
+{
+  PetscFunctionBeginUser;
+  *stats = d->stats;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
