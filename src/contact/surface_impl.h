@@ -1,0 +1,105 @@
+/*
+  surface_impl.h - what surface.c and halo.c share: the private data of an SbSurface.
+*/
+#pragma once
+#include "sbdetect.h"
+#include "sbkernel.h"
+
+/* A facet of an owned or a ghost cell. */
+typedef struct {
+  PetscInt at[3];     /* 4 cell + corner: which vertices of its cell */
+  PetscInt vertex[3]; /* their numbers among the vertices of the surface on this rank */
+  PetscInt own;       /* number among own facets, -1: of a ghost cell */
+} SbSurfaceFacet;
+
+/* A facet of a P1 cell around an owned point. */
+typedef struct {
+  PetscInt node[3];  /* local nodes at its corners */
+  PetscInt point[3]; /* points there, -1: owned by another rank */
+} SbSurfaceFan;
+
+/* What is sent and received (halo.c). */
+typedef struct {
+  MPI_Comm comm; /* with these tags messages mix with no others */
+  PetscMPIInt size, rank, tag[4];
+  PetscReal *reduced; /* [6 npart + 2] parts' boxes, motion of the step, motion since the list was made */
+  PetscBool built;    /* there is a list */
+  PetscBool self;     /* it was made for self-contact */
+  PetscReal reach, margin; /* that it was made with, m */
+  PetscReal *
+    swept; /* [ncorner_owned + npoint][6] boxes of the motion of own corners and points when it was made, m */
+  PetscInt nto, nfrom;             /* ranks that get facets of this one, ranks whose facets are here */
+  PetscMPIInt *to, *from;          /* [nto], [nfrom] */
+  PetscInt *to_start, *from_start; /* [nto+1] into send, [nfrom+1] into the facets of others */
+  PetscInt *send;                  /* [to_start[nto]] own facets */
+  PetscReal *buffer;               /* [2][to_start[nto]][3][3] positions to send: x, x0 */
+  MPI_Request *request;            /* [2 (nto + nfrom)] */
+  PetscInt nbuild;                 /* how often it was made */
+} SbHalo;
+
+typedef struct {
+  PetscInt npart;
+  PetscInt ncorner_owned;
+  PetscInt *corner_at;   /* [ncorner_owned] 4 cell + corner */
+  PetscInt *corner_part; /* [ncorner_owned] */
+  PetscInt nlocal;       /* facets of owned and ghost cells */
+  SbSurfaceFacet *local; /* [nlocal] */
+  PetscInt nvertex;      /* vertices of these */
+  PetscInt nfan;
+  SbSurfaceFan *fan;     /* [nfan] in the order of facet_id: sums do not depend on the partition */
+  PetscInt *point_own;   /* [npoint] own facet whose centroid the point is, -1: a vertex */
+  PetscInt foreign_size; /* facets of others that there is room for */
+  /* the arrays of the scene, to be written; x0 and p0 are those of x and p when there is no start of the step */
+  PetscReal *x, *x0, *X, *p, *p0, *P, *p_normal;
+  PetscInt *facet, *facet_vertex, *facet_part, *facet_id, *point_part, *point_id, *point_vertex, *point_facet;
+  SbHalo halo;
+} SbSurfaceData;
+
+/* Boxes: lower and upper corner, m. An empty one has its lower corner above the upper. */
+static inline void SbBoxClear(PetscReal box[6])
+{
+  for (int k = 0; k < 3; k++) {
+    box[k] = PETSC_MAX_REAL;
+    box[3 + k] = -PETSC_MAX_REAL;
+  }
+}
+
+/* Places that are no numbers are passed over: then a diverged solve makes no difference between ranks. */
+static inline void SbBoxJoin(PetscReal box[6], const PetscReal low[3], const PetscReal high[3])
+{
+  for (int k = 0; k < 3; k++) {
+    if (low[k] < box[k]) box[k] = low[k];
+    if (high[k] > box[3 + k]) box[3 + k] = high[k];
+  }
+}
+
+static inline void SbBoxAdd(PetscReal box[6], const PetscReal x[3])
+{
+  SbBoxJoin(box, x, x);
+}
+
+static inline void SbBoxUnite(PetscReal box[6], const PetscReal other[6])
+{
+  SbBoxJoin(box, other, other + 3);
+}
+
+/* Whether two boxes are nearer than `grown` in every coordinate. Empty ones never are. */
+static inline PetscBool SbBoxNear(const PetscReal a[6], const PetscReal b[6], PetscReal grown)
+{
+  for (int k = 0; k < 3; k++) {
+    if (a[k] - grown > b[3 + k] || b[k] - grown > a[3 + k]) return PETSC_FALSE;
+  }
+  return PETSC_TRUE;
+}
+
+/* Where vertex `at` = 4 cell + corner of a local cell is at local displacements u, m. */
+void SbSurfacePlace(SbSpace space, PetscInt at, const PetscReal u[], PetscReal x[3]);
+/* Makes the scene hold n facets of others behind its own ones; what they are is written afterwards. Not collective. */
+PetscErrorCode SbSurfaceSetForeign(SbSurface surface, PetscInt n);
+
+PetscErrorCode SbHaloCreate(SbSurface surface);
+PetscErrorCode SbHaloDestroy(SbHalo *halo);
+/* Finds, with boxes grown by `grown`, which facets go to which rank: fills nto, to, to_start, send, nfrom, from, swept. Collective. */
+PetscErrorCode SbHaloPlan(SbSurface surface, const PetscReal u0[], const PetscReal u[], PetscReal grown);
+/* Brings facets of others, own corners and points having been moved. `moving`: u0 is not NULL. Collective. */
+PetscErrorCode SbHaloUpdate(SbSurface surface, const PetscReal u0[], const PetscReal u[], PetscBool *close);

@@ -1,0 +1,565 @@
+// @ranks 1 2 3 4
+/*
+  The distributed surface: what a rank sees of it holds every facet within reach of its points, at the place where the owner has it;
+  areas, normals and identities are those of one rank; the list of foreign facets is kept, renewed and given up when it should; and a
+  contact of small extent moves few facets.
+*/
+#include "../../src/contact/surface_impl.h"
+#include "../scene.h"
+
+#define BODY(name, element, mesh, at)                                                               \
+  " -body_" name "_mesh " mesh " -body_" name "_translate " at " -body_" name "_material corotated" \
+  " -body_" name "_young 1e5 -body_" name "_poisson 0.3 -body_" name "_density 1000 -body_" name    \
+  "_element " element
+#define SETS " -sets skin,low -set_skin_at boundary -set_low_at plane:0,0,1,0 "
+#define PAIR(first, second)                                       \
+  SETS "-bodies a,b" BODY("a", first, "box:1,0.8,0.3:3", "0,0,0") \
+    BODY("b", second, "box:0.6,0.5,0.4:2", "0.2,0.1,0.32")
+
+/* A surface with displacements at the start of the step and now. */
+typedef struct {
+  SbModel m;
+  SbSurface s;
+  PetscReal *u0, *u; /* [nnode][3] */
+} Case;
+
+/* The whole surface, on every rank. */
+typedef struct {
+  PetscInt n;
+  PetscReal *row; /* [n][ROW] */
+  PetscInt *at;   /* [4 Ncell] row of each facet by identity, -1: none */
+  PetscReal *u;   /* [Nnode][3] by global number */
+} Whole;
+
+#define ROW 36 /* part 0, vertices 1, nodes 4, x 8, x0 17, X 26, identity 35 */
+
+static PetscErrorCode open_on(MPI_Comm comm, const char *options, PetscInt set, Case *c)
+{
+  SbFacet *facet;
+  PetscInt n;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscOptionsClear(NULL));
+  PetscCall(SbOptionsReset());
+  PetscCall(SbRegisterAll());
+  PetscCall(PetscOptionsInsertString(NULL, options));
+  PetscCall(SbSceneCreate(comm, &c->m));
+  PetscCall(SbModelSetUp(c->m));
+  PetscCall(SbSpaceGetSetFacets(c->m->space, set, &n, &facet));
+  PetscCall(SbSurfaceCreate(c->m->space, n, facet, &c->s));
+  PetscCall(PetscFree(facet));
+  PetscCall(PetscCalloc2(3 * c->m->space->nnode, &c->u0, 3 * c->m->space->nnode, &c->u));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode close_case(Case *c)
+{
+  PetscFunctionBeginUser;
+  PetscCall(PetscFree2(c->u0, c->u));
+  PetscCall(SbSurfaceDestroy(&c->s));
+  PetscCall(SbModelDestroy(&c->m));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* A number in [-1, 1] that belongs to a node, not to a partition. */
+static PetscReal noise(PetscInt id, int k, int seed)
+{
+  const PetscReal x = 43758.5453 * PetscSinReal(12.9898 * (PetscReal)id + 78.233 * k + 37.719 * seed);
+
+  return 2 * (x - PetscFloorReal(x)) - 1;
+}
+
+/* Local displacements: noise, and bodies moved by lift times their number along z. */
+static PetscErrorCode fill(const Case *c, int seed, PetscReal amplitude, PetscReal shift, PetscReal lift,
+                           PetscReal u[])
+{
+  const SbSpace s = c->m->space;
+  const PetscReal *read;
+  PetscReal *write;
+  Vec U;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbSpaceCreateVec(s, &U));
+  PetscCall(SbSpaceGetLocalWrite(s, U, &write));
+  for (PetscInt i = 0; i < s->nnode_owned; i++) {
+    for (int k = 0; k < 3; k++) write[3 * i + k] = amplitude * noise(s->node_orig[i], k, seed);
+    write[3 * i] += shift * (PetscReal)s->node_body[i];
+    write[3 * i + 2] += lift * (PetscReal)s->node_body[i];
+  }
+  PetscCall(SbSpaceRestoreLocalWrite(s, U, &write));
+  PetscCall(SbSpaceGetLocalRead(s, U, &read));
+  PetscCall(PetscArraycpy(u, read, 3 * s->nnode));
+  PetscCall(SbSpaceRestoreLocalRead(s, U, &read));
+  PetscCall(VecDestroy(&U));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static void describe(const Case *c, PetscReal row[])
+{
+  const SbDetectScene *g = &c->s->scene;
+
+  for (PetscInt f = 0; f < c->s->nfacet_owned; f++, row += ROW) {
+    row[0] = (PetscReal)g->facet_part[f];
+    for (int k = 0; k < 3; k++) row[1 + k] = (PetscReal)g->facet_vertex[3 * f + k];
+    for (int k = 0; k < 4; k++) row[4 + k] = (PetscReal)c->s->facet_node[4 * f + k];
+    for (int k = 0; k < 9; k++) {
+      const PetscInt at = 3 * g->facet[3 * f + k / 3] + k % 3;
+
+      row[8 + k] = g->x[at];
+      row[17 + k] = (g->x0 ? g->x0 : g->x)[at];
+      row[26 + k] = g->X[at];
+    }
+    row[35] = (PetscReal)g->facet_id[f];
+  }
+}
+
+/* Numbers of all ranks one after the other: n of this rank, *total in all. */
+static PetscErrorCode gather_numbers(MPI_Comm comm, PetscInt n, const PetscReal mine[], PetscInt *total,
+                                     PetscReal **all)
+{
+  PetscMPIInt size, *count, *start, own;
+
+  PetscFunctionBeginUser;
+  PetscCallMPI(MPI_Comm_size(comm, &size));
+  PetscCall(PetscMalloc2(size, &count, size + 1, &start));
+  PetscCall(PetscMPIIntCast(n, &own));
+  PetscCallMPI(MPI_Allgather(&own, 1, MPI_INT, count, 1, MPI_INT, comm));
+  start[0] = 0;
+  for (PetscMPIInt r = 0; r < size; r++) start[r + 1] = start[r] + count[r];
+  *total = start[size];
+  PetscCall(PetscMalloc1(*total, all));
+  PetscCallMPI(MPI_Allgatherv(mine, own, MPIU_REAL, *all, count, start, MPIU_REAL, comm));
+  PetscCall(PetscFree2(count, start));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Every facet has one owner. */
+static PetscErrorCode gather(const Case *c, Whole *w)
+{
+  const SbSpace s = c->m->space;
+  const PetscInt nid = 4 * c->m->mesh->Ncell;
+  PetscReal *mine;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscMalloc1(ROW * c->s->nfacet_owned, &mine));
+  describe(c, mine);
+  PetscCall(gather_numbers(c->m->comm, ROW * c->s->nfacet_owned, mine, &w->n, &w->row));
+  w->n /= ROW;
+  PetscCall(PetscFree(mine));
+  PetscCall(PetscMalloc1(nid, &w->at));
+  for (PetscInt i = 0; i < nid; i++) w->at[i] = -1;
+  for (PetscInt f = 0; f < w->n; f++) {
+    PetscInt *at = &w->at[(PetscInt)w->row[ROW * f + 35]];
+
+    SB_CHECK(*at < 0, "a facet has two owners");
+    *at = f;
+  }
+  PetscCall(gather_numbers(c->m->comm, 3 * s->nnode_owned, c->u, &(PetscInt){0}, &w->u));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode free_whole(Whole *w)
+{
+  PetscFunctionBeginUser;
+  PetscCall(PetscFree(w->row));
+  PetscCall(PetscFree(w->at));
+  PetscCall(PetscFree(w->u));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The facets of this rank, own and foreign ones, are what their owners have, and their weights give their places. */
+static void check_facets(const Case *c, const Whole *w)
+{
+  const SbDetectScene *g = &c->s->scene;
+
+  for (PetscInt f = 0; f < g->nfacet; f++) {
+    const PetscReal *row = w->row + ROW * w->at[g->facet_id[f]];
+
+    SB_CHECK(w->at[g->facet_id[f]] >= 0 && row[0] == (PetscReal)g->facet_part[f], "facet %d is of part %g",
+             (int)g->facet_id[f], (double)row[0]);
+    for (int k = 0; k < 3; k++) SB_CHECK(row[1 + k] == (PetscReal)g->facet_vertex[3 * f + k], "vertex");
+    for (int k = 0; k < 4; k++) SB_CHECK(row[4 + k] == (PetscReal)c->s->facet_node[4 * f + k], "node");
+    for (int k = 0; k < 9; k++) {
+      const PetscInt at = 3 * g->facet[3 * f + k / 3] + k % 3;
+      PetscReal x = g->X[at];
+
+      SB_CHECK(g->facet[3 * f + k / 3] >= 0 && g->facet[3 * f + k / 3] < g->ncorner, "corner");
+      SB_CHECK(row[8 + k] == g->x[at], "x of facet %d is %g, on its owner %g", (int)g->facet_id[f],
+               (double)g->x[at], (double)row[8 + k]);
+      SB_CHECK(!g->x0 || row[17 + k] == g->x0[at], "x0 of facet %d", (int)g->facet_id[f]);
+      SB_CHECK(row[26 + k] == g->X[at], "X of facet %d", (int)g->facet_id[f]);
+      for (int a = 0; a < 4; a++)
+        x += c->s->facet_weight[12 * f + 4 * (k / 3) + a] * w->u[3 * c->s->facet_node[4 * f + a] + k % 3];
+      SB_CHECK_NEAR(g->x[at], x, 1e-14, "place by weights");
+    }
+  }
+}
+
+/* Boxes of the motion of n places. */
+static void bounds(PetscInt n, const PetscReal x[], const PetscReal x0[], PetscReal box[6])
+{
+  for (int k = 0; k < 3; k++) {
+    box[k] = 1e30;
+    box[3 + k] = -1e30;
+    for (PetscInt i = 0; i < n; i++) {
+      box[k] = PetscMin(box[k], PetscMin(x[3 * i + k], x0[3 * i + k]));
+      box[3 + k] = PetscMax(box[3 + k], PetscMax(x[3 * i + k], x0[3 * i + k]));
+    }
+  }
+}
+
+static PetscBool meet(const PetscReal a[6], const PetscReal b[6], PetscReal grown)
+{
+  for (int k = 0; k < 3; k++) {
+    if (a[k] - grown > b[3 + k] || b[k] - grown > a[3 + k]) return PETSC_FALSE;
+  }
+  return PETSC_TRUE;
+}
+
+/* Every facet whose box, grown by the reach, meets that of a point here is in this rank's scene, once. Returns how many pairs. */
+static PetscErrorCode check_seen(const Case *c, const Whole *w, PetscInt *npair)
+{
+  const SbDetectScene *g = &c->s->scene;
+  PetscInt *seen, missing = 0;
+
+  PetscFunctionBeginUser;
+  *npair = 0;
+  PetscCall(PetscCalloc1(w->n, &seen));
+  for (PetscInt f = 0; f < g->nfacet; f++) seen[w->at[g->facet_id[f]]]++;
+  for (PetscInt f = 0; f < w->n; f++) {
+    const PetscReal *row = w->row + ROW * f;
+    PetscReal box[6], at[6];
+
+    SB_CHECK(seen[f] <= 1, "facet %d is here %d times", (int)f, (int)seen[f]);
+    bounds(3, row + 8, row + 17, box);
+    for (PetscInt i = 0; i < g->npoint; i++) {
+      if (!g->self && (PetscReal)g->point_part[i] == row[0]) continue;
+      bounds(1, g->p + 3 * i, (g->p0 ? g->p0 : g->p) + 3 * i, at);
+      if (!meet(box, at, g->reach)) continue;
+      ++*npair;
+      missing += !seen[f];
+    }
+  }
+  SB_CHECK(missing == 0, "%d of %d pairs of point and facet are missing", (int)missing, (int)*npair);
+  PetscCall(PetscFree(seen));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, npair, 1, MPIU_INT, MPI_SUM, c->m->comm));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Points have one owner, and identity, place, area and normal are, to the last bit, those of one rank. */
+static PetscErrorCode check_points(const Case *c, const Case *alone, PetscReal area)
+{
+  const SbDetectScene *g = &c->s->scene, *one = &alone->s->scene;
+  const PetscInt n = c->m->mesh->Nvert + 8 * c->m->mesh->Ncell;
+  PetscReal sum = 0;
+  PetscInt *count, *where;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscCalloc2(n, &count, n, &where));
+  for (PetscInt i = 0; i < one->npoint; i++) where[one->point_id[i]] = i;
+  for (PetscInt i = 0; i < g->npoint; i++) {
+    const PetscInt j = where[g->point_id[i]], node = c->s->point_node[i];
+
+    count[g->point_id[i]]++;
+    sum += c->s->point_area[i];
+    SB_CHECK(node >= 0 && node < c->m->space->nnode_owned && g->point_id[i] == c->m->space->node_orig[node],
+             "point %d is node %d", (int)i, (int)node);
+    SB_CHECK(g->point_id[i] == one->point_id[j] && g->point_part[i] == one->point_part[j] &&
+               g->point_vertex[i] == one->point_vertex[j] && g->point_facet[i] == one->point_facet[j] &&
+               (g->point_vertex[i] < 0) != (g->point_facet[i] < 0),
+             "point %d is another one on one rank", (int)g->point_id[i]);
+    SB_CHECK(c->s->point_area[i] == alone->s->point_area[j], "area %g of point %d is %g on one rank",
+             (double)c->s->point_area[i], (int)g->point_id[i], (double)alone->s->point_area[j]);
+    SB_CHECK_NEAR(SbDot3(g->p_normal + 3 * i, g->p_normal + 3 * i), 1, 1e-14, "length of a normal");
+    for (int k = 0; k < 3; k++) {
+      SB_CHECK(g->p[3 * i + k] == one->p[3 * j + k] && g->P[3 * i + k] == one->P[3 * j + k],
+               "place of a point");
+      SB_CHECK(g->p_normal[3 * i + k] == one->p_normal[3 * j + k],
+               "normal of point %d: %.16g, on one rank %.16g", (int)g->point_id[i],
+               (double)g->p_normal[3 * i + k], (double)one->p_normal[3 * j + k]);
+    }
+  }
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, count, (PetscMPIInt)n, MPIU_INT, MPI_SUM, c->m->comm));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &sum, 1, MPIU_REAL, MPI_SUM, c->m->comm));
+  SB_CHECK_NEAR(sum, area, 1e-13 * area, "area of all points");
+  for (PetscInt i = 0; i < one->npoint; i++)
+    SB_CHECK(count[one->point_id[i]] == 1, "point %d has %d owners", (int)one->point_id[i],
+             (int)count[one->point_id[i]]);
+  PetscCall(PetscFree2(count, where));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Updates, and checks what the rank sees. */
+static PetscErrorCode look(Case *c, PetscBool moving, PetscReal reach, PetscBool self, PetscInt *npair)
+{
+  PetscBool close;
+  Whole w;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbSurfaceUpdate(c->s, moving ? c->u0 : NULL, c->u, reach, self, &close));
+  SB_CHECK(close, "the bodies are close");
+  SB_CHECK((c->s->scene.x0 != NULL) == moving && (c->s->scene.p0 != NULL) == moving, "start of the step");
+  SB_CHECK(c->s->scene.reach == reach && c->s->scene.self == self, "what the scene says");
+  PetscCall(gather(c, &w));
+  check_facets(c, &w);
+  PetscCall(check_seen(c, &w, npair));
+  PetscCall(free_whole(&w));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static const SbHalo *halo_of(const Case *c)
+{
+  return &((const SbSurfaceData *)c->s->data)->halo;
+}
+
+/* Many small steps: some lists, never one that is too old; the version tells whether the facets are other ones. */
+static PetscErrorCode test_steps(Case *c, PetscInt *nchange)
+{
+  const PetscInt first = halo_of(c)->nbuild, nstep = 12;
+  PetscInt *before, changes = 0, npair;
+  PetscMPIInt size;
+
+  PetscFunctionBeginUser;
+  PetscCallMPI(MPI_Comm_size(PETSC_COMM_WORLD, &size));
+  PetscCall(PetscMalloc1(4 * c->m->mesh->Ncell, &before));
+  for (PetscInt step = 0; step < nstep; step++) {
+    const PetscInt version = c->s->scene.version, nfacet = c->s->scene.nfacet;
+    PetscBool same;
+
+    PetscCall(PetscArraycpy(before, c->s->scene.facet_id, nfacet));
+    PetscCall(PetscArraycpy(c->u0, c->u, 3 * c->m->space->nnode));
+    PetscCall(
+      fill(c, (int)(3 + step % 2), 0.02, 0.03 + 0.025 * (PetscReal)step, 0.002 * (PetscReal)step, c->u));
+    PetscCall(look(c, PETSC_TRUE, 0.05, PETSC_FALSE, &npair));
+    same = (PetscBool)(nfacet == c->s->scene.nfacet);
+    for (PetscInt f = 0; f < nfacet && same; f++) same = (PetscBool)(before[f] == c->s->scene.facet_id[f]);
+    SB_CHECK((version == c->s->scene.version) == same, "version %d after %d, the facets are %s",
+             (int)c->s->scene.version, (int)version, same ? "the same" : "other ones");
+    changes += !same;
+  }
+  PetscCall(PetscFree(before));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &changes, 1, MPIU_INT, MPI_SUM, PETSC_COMM_WORLD));
+  *nchange += changes;
+  if (size > 1)
+    SB_CHECK(halo_of(c)->nbuild > first && halo_of(c)->nbuild < first + nstep, "%d lists in %d steps",
+             (int)(halo_of(c)->nbuild - first), (int)nstep);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode test_motion(const char *options, PetscReal area, PetscInt *nchange)
+{
+  Case c, alone;
+  PetscInt npair, same, nbuild, version;
+  PetscBool close;
+  PetscMPIInt size;
+
+  PetscFunctionBeginUser;
+  PetscCall(open_on(PETSC_COMM_SELF, options, 0, &alone));
+  PetscCall(open_on(PETSC_COMM_WORLD, options, 0, &c));
+  PetscCallMPI(MPI_Comm_size(PETSC_COMM_WORLD, &size));
+  for (int k = 0; k < 2; k++) {
+    Case *x = k ? &alone : &c;
+
+    PetscCall(fill(x, 1, 0.01, 0, 0, x->u0));
+    PetscCall(fill(x, 2, 0.01, 0.03, 0, x->u));
+    PetscCall(look(x, PETSC_TRUE, 0.05, PETSC_FALSE, k ? &same : &npair));
+  }
+  SB_CHECK(npair > 20 && npair == same, "%d pairs, %d on one rank", (int)npair, (int)same);
+  SB_CHECK_NEAR(c.s->edge, alone.s->edge, 1e-14, "mean edge");
+  SB_CHECK(c.s->size == alone.s->size && c.s->edge > 0, "size");
+  PetscCall(check_points(&c, &alone, area));
+
+  /* other places, hardly moved: the same list; less reach asks for nothing new */
+  nbuild = halo_of(&c)->nbuild;
+  version = c.s->scene.version;
+  SB_CHECK(nbuild == (size > 1), "%d lists", (int)nbuild);
+  PetscCall(fill(&c, 2, 0.012, 0.03, 0, c.u));
+  PetscCall(look(&c, PETSC_TRUE, 0.05, PETSC_FALSE, &npair));
+  PetscCall(look(&c, PETSC_FALSE, 0.04, PETSC_FALSE, &npair));
+  SB_CHECK(halo_of(&c)->nbuild == nbuild && c.s->scene.version == version, "a list made without need");
+
+  PetscCall(test_steps(&c, nchange));
+
+  /* more reach, self-contact */
+  nbuild = halo_of(&c)->nbuild;
+  PetscCall(look(&c, PETSC_TRUE, 0.4, PETSC_FALSE, &npair));
+  SB_CHECK(halo_of(&c)->nbuild == nbuild + (size > 1), "the reach has grown");
+  PetscCall(look(&c, PETSC_TRUE, 0.05, PETSC_TRUE, &npair));
+  SB_CHECK(halo_of(&c)->nbuild == nbuild + 2 * (size > 1), "self-contact");
+
+  /* apart */
+  PetscCall(fill(&c, 2, 0.01, 0, 0.5, c.u));
+  PetscCall(SbSurfaceUpdate(c.s, c.u, c.u, 0.05, PETSC_FALSE, &close));
+  SB_CHECK(!close && c.s->scene.nfacet == c.s->nfacet_owned, "apart, with %d facets of others",
+           (int)(c.s->scene.nfacet - c.s->nfacet_owned));
+  nbuild = halo_of(&c)->nbuild;
+  PetscCall(SbSurfaceUpdate(c.s, c.u, c.u, 0.05, PETSC_FALSE, &close));
+  SB_CHECK(!close && halo_of(&c)->nbuild == nbuild, "apart");
+  /* within the step one passed the other */
+  PetscCall(fill(&c, 2, 0.01, 0, -0.5, c.u0));
+  PetscCall(look(&c, PETSC_TRUE, 0.05, PETSC_FALSE, &npair));
+  SB_CHECK(npair > 0, "a motion through a body is not seen");
+  PetscCall(close_case(&c));
+  PetscCall(close_case(&alone));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* At rest: normals of a box. Those of centroids and of vertices inside a side are the side's. */
+static PetscErrorCode test_normals(const char *element)
+{
+  const PetscReal high[3] = {1, 0.8, 0.3};
+  char options[1024];
+  PetscBool close;
+  Case c;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscSNPrintf(options, sizeof(options),
+                          SETS "-bodies a" BODY("a", "%s", "box:1,0.8,0.3:3", "0,0,0"), element));
+  PetscCall(open_on(PETSC_COMM_WORLD, options, 0, &c));
+  PetscCall(SbSurfaceUpdate(c.s, NULL, c.u, 0.1, PETSC_FALSE, &close));
+  SB_CHECK(!close, "one body is not close to another");
+  for (PetscInt i = 0; i < c.s->scene.npoint; i++) {
+    const PetscReal *x = c.s->scene.p + 3 * i, *n = c.s->scene.p_normal + 3 * i;
+    PetscReal side[3];
+    int nside = 0;
+
+    for (int k = 0; k < 3; k++) {
+      side[k] = x[k] > high[k] - 1e-12 ? 1 : x[k] < 1e-12 ? -1 : 0;
+      nside += side[k] != 0;
+    }
+    SB_CHECK(nside >= 1, "a point inside the body");
+    for (int k = 0; k < 3; k++) {
+      if (nside == 1) SB_CHECK_NEAR(n[k], side[k], 1e-14, "normal of a side");
+      if (nside > 1)
+        SB_CHECK(side[k] != 0 ? n[k] * side[k] > 0.1 : PetscAbsReal(n[k]) < 1e-14, "normal %g", (double)n[k]);
+    }
+  }
+  PetscCall(close_case(&c));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Only the undersides: areas are theirs, ranks may be without facets, and they meet nothing but in self-contact. */
+static PetscErrorCode test_part(const char *options, PetscReal area)
+{
+  Case c, alone;
+  PetscInt npair;
+  PetscBool close;
+
+  PetscFunctionBeginUser;
+  PetscCall(open_on(PETSC_COMM_SELF, options, 1, &alone));
+  PetscCall(open_on(PETSC_COMM_WORLD, options, 1, &c));
+  for (int k = 0; k < 2; k++) {
+    Case *x = k ? &alone : &c;
+
+    PetscCall(fill(x, 1, 0.01, 0, 0, x->u));
+    PetscCall(SbSurfaceUpdate(x->s, NULL, x->u, 0.05, PETSC_FALSE, &close));
+    SB_CHECK(!close, "one part");
+  }
+  PetscCall(check_points(&c, &alone, area));
+  PetscCall(fill(&c, 1, 0.01, 0, 0, c.u0));
+  PetscCall(close_case(&alone));
+  PetscCall(SbSurfaceUpdate(c.s, NULL, c.u, 0.05, PETSC_TRUE, &close));
+  {
+    Whole w;
+
+    PetscCall(gather(&c, &w));
+    check_facets(&c, &w);
+    PetscCall(check_seen(&c, &w, &npair));
+    PetscCall(free_whole(&w));
+  }
+  PetscCall(close_case(&c));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Facets of all ranks: those that came from others, own ones, those that were sent. */
+static PetscErrorCode count_facets(const Case *c, PetscInt n[3])
+{
+  PetscFunctionBeginUser;
+  n[0] = c->s->scene.nfacet - c->s->nfacet_owned;
+  n[1] = c->s->nfacet_owned;
+  n[2] = halo_of(c)->to_start[halo_of(c)->nto];
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, n, 3, MPIU_INT, MPI_SUM, PETSC_COMM_WORLD));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Two long bars that overlap at their ends: what moves is a small part of the surface, also while one slides along the other. */
+static PetscErrorCode test_local(void)
+{
+  const PetscInt nstep = 40;
+  PetscInt n[3], npair;
+  PetscMPIInt size;
+  Case c;
+
+  PetscFunctionBeginUser;
+  PetscCallMPI(MPI_Comm_size(PETSC_COMM_WORLD, &size));
+  PetscCall(open_on(PETSC_COMM_WORLD,
+                    SETS "-bodies a,b" BODY("a", "p1", "box:4,0.4,0.4:4", "0,0,0")
+                      BODY("b", "p1", "box:4,0.4,0.4:4", "3.8,0,0.41"),
+                    0, &c));
+  PetscCall(look(&c, PETSC_FALSE, 0.02, PETSC_FALSE, &npair));
+  PetscCall(count_facets(&c, n));
+  SB_CHECK(n[0] == n[2], "%d facets are sent, %d arrive", (int)n[2], (int)n[0]);
+  SB_CHECK(npair > 20 && (size == 1 || n[0] > 20), "%d pairs, %d facets", (int)npair, (int)n[0]);
+  SB_CHECK(20 * n[0] < n[1], "%d of %d facets are sent", (int)n[0], (int)n[1]);
+  for (PetscInt step = 1; step <= nstep; step++) {
+    PetscCall(PetscArraycpy(c.u0, c.u, 3 * c.m->space->nnode));
+    PetscCall(fill(&c, 1, 0, -0.02 * (PetscReal)step, 0, c.u));
+    PetscCall(look(&c, PETSC_TRUE, 0.02, PETSC_FALSE, &npair));
+  }
+  PetscCall(count_facets(&c, n));
+  PetscCall(PetscPrintf(PETSC_COMM_WORLD, "  bars: %d facets, %d sent, %d lists in %d steps\n", (int)n[1],
+                        (int)n[0], (int)halo_of(&c)->nbuild, (int)nstep));
+  if (size > 1)
+    SB_CHECK(halo_of(&c)->nbuild > 3 && 2 * halo_of(&c)->nbuild < nstep, "%d lists in %d steps",
+             (int)halo_of(&c)->nbuild, (int)nstep);
+  SB_CHECK(4 * n[0] < n[1], "%d of %d facets are sent", (int)n[0], (int)n[1]);
+  PetscCall(close_case(&c));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* More ranks than tets. */
+static PetscErrorCode test_few(const char *element)
+{
+  char options[1024];
+  PetscInt npair;
+  Case c;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscSNPrintf(options, sizeof(options),
+                          SETS "-bodies a,b" BODY("a", "%s", "tests/data/one_tet.msh", "0,0,0")
+                            BODY("b", "%s", "tests/data/one_tet.msh", "0,0,-0.52"),
+                          element, element));
+  PetscCall(open_on(PETSC_COMM_WORLD, options, 0, &c));
+  PetscCall(look(&c, PETSC_FALSE, 0.1, PETSC_FALSE, &npair));
+  SB_CHECK(npair > 0, "no pair");
+  PetscCall(look(&c, PETSC_FALSE, 0.1, PETSC_TRUE, &npair));
+  PetscCall(close_case(&c));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+int main(int argc, char **argv)
+{
+  static const char *const elements[] = {"p1", "cr", "dg"};
+  const PetscReal a = 2 * (1 * 0.8 + 1 * 0.3 + 0.8 * 0.3), b = 2 * (0.6 * 0.5 + 0.6 * 0.4 + 0.5 * 0.4);
+  PetscInt nchange = 0;
+  PetscMPIInt size;
+
+  SB_TEST_BEGIN(argc, argv);
+  PetscCall(test_motion(PAIR("p1", "p1"), a + b, &nchange));
+  PetscCall(test_motion(PAIR("cr", "cr"), a + b, &nchange));
+  PetscCall(test_motion(PAIR("dg", "dg"), a + b, &nchange));
+  PetscCall(test_motion(SETS "-bodies a,b,c" BODY("a", "p1", "box:1,0.8,0.3:3", "0,0,0")
+                          BODY("b", "cr", "box:0.6,0.5,0.4:2", "0.2,0.1,0.32")
+                            BODY("c", "dg", "box:0.6,0.5,0.4:2", "0.1,0.2,0.74"),
+                        a + 2 * b, &nchange));
+  for (int k = 0; k < 3; k++) {
+    PetscCall(test_normals(elements[k]));
+    PetscCall(test_few(elements[k]));
+  }
+  PetscCall(test_part(PAIR("p1", "p1"), 0.8));
+  PetscCall(test_part(PAIR("cr", "dg"), 0.8));
+  PetscCall(test_local());
+  PetscCallMPI(MPI_Comm_size(PETSC_COMM_WORLD, &size));
+  SB_CHECK((nchange > 0) == (size > 1), "the facets were other ones %d times", (int)nchange);
+  SB_TEST_END();
+}
