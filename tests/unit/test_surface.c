@@ -119,14 +119,40 @@ static PetscBool meet(const PetscReal a[6], const PetscReal b[6], PetscReal grow
   return PETSC_TRUE;
 }
 
-/* Every facet whose box, grown by the reach, meets that of a point here is in this rank's scene, once. Returns how many pairs. */
+/* Boxes of all copies of each vertex, by its identity. */
+static PetscErrorCode bound_vertices(const Case *c, const Whole *w, PetscReal **box)
+{
+  const PetscInt n = c->m->mesh->Nvert;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscMalloc1(6 * n, box));
+  for (PetscInt v = 0; v < n; v++) bounds(0, NULL, NULL, *box + 6 * v);
+  for (PetscInt i = 0; i < 3 * w->n; i++) {
+    const PetscReal *row = w->row + ROW * (i / 3);
+    PetscReal one[6], *all = *box + 6 * (PetscInt)row[1 + i % 3];
+
+    bounds(1, row + 8 + 3 * (i % 3), row + 17 + 3 * (i % 3), one);
+    for (int k = 0; k < 3; k++) {
+      all[k] = PetscMin(all[k], one[k]);
+      all[3 + k] = PetscMax(all[3 + k], one[3 + k]);
+    }
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/*
+  Every facet whose box, grown by the reach, meets that of a point here is in this rank's scene, once; its box holds all copies of its
+  vertices, for then what adjoins the nearest facet is there too. Gives the number of pairs of all ranks.
+*/
 static PetscErrorCode check_seen(const Case *c, const Whole *w, PetscInt *npair)
 {
   const SbDetectScene *g = &c->s->scene;
   PetscInt *seen, missing = 0;
+  PetscReal *vertex;
 
   PetscFunctionBeginUser;
   *npair = 0;
+  PetscCall(bound_vertices(c, w, &vertex));
   PetscCall(PetscCalloc1(w->n, &seen));
   for (PetscInt f = 0; f < g->nfacet; f++) seen[w->at[g->facet_id[f]]]++;
   for (PetscInt f = 0; f < w->n; f++) {
@@ -135,6 +161,11 @@ static PetscErrorCode check_seen(const Case *c, const Whole *w, PetscInt *npair)
 
     SB_CHECK(seen[f] <= 1, "facet %d is here %d times", (int)f, (int)seen[f]);
     bounds(3, row + 8, row + 17, box);
+    for (int k = 0; k < 18; k++) {
+      const PetscReal *copies = vertex + 6 * (PetscInt)row[1 + k / 6];
+
+      box[k % 6] = k % 6 < 3 ? PetscMin(box[k % 6], copies[k % 6]) : PetscMax(box[k % 6], copies[k % 6]);
+    }
     for (PetscInt i = 0; i < g->npoint; i++) {
       if (!g->self && (PetscReal)g->point_part[i] == row[0]) continue;
       bounds(1, g->p + 3 * i, (g->p0 ? g->p0 : g->p) + 3 * i, at);
@@ -145,6 +176,7 @@ static PetscErrorCode check_seen(const Case *c, const Whole *w, PetscInt *npair)
   }
   SB_CHECK(missing == 0, "%d of %d pairs of point and facet are missing", (int)missing, (int)*npair);
   PetscCall(PetscFree(seen));
+  PetscCall(PetscFree(vertex));
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, npair, 1, MPIU_INT, MPI_SUM, c->m->comm));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -282,6 +314,11 @@ static PetscErrorCode test_motion(const char *options, PetscReal area, PetscInt 
   SB_CHECK(halo_of(&c)->nbuild == nbuild && c.s->scene.version == version, "a list made without need");
 
   PetscCall(test_steps(&c, nchange));
+
+  /* torn apart: copies of a vertex are farther from each other than any margin */
+  PetscCall(fill(&c, 4, 0.2, 0, 0, c.u));
+  PetscCall(look(&c, PETSC_FALSE, 0.01, PETSC_FALSE, &npair));
+  PetscCall(fill(&c, 5, 0.02, 0.3, 0, c.u));
 
   /* more reach, self-contact */
   nbuild = halo_of(&c)->nbuild;
