@@ -8,6 +8,7 @@
 
   For each point and each other part, of the facets within reach the nearest counts that
   - is a nearest place of the surface around it, not only of its own facet: elsewhere the pseudonormal means nothing;
+  - sees the point on the side where the nearest facet of all sees it: behind a thin plate one is not inside;
   - faces the point: their normals oppose each other. In a thin plate that a point has entered the back may be nearer than the front,
     but the way out is the front;
   - agrees with the motion: when the point went through the part's surface in this step, the normal must not point to the far side of
@@ -349,8 +350,8 @@ static PetscBool is_nearest_around(const Look *look, const Hit *h)
   return PETSC_TRUE;
 }
 
-/* The hit as a contact: signed distance and its direction. False when it is none. */
-static PetscBool contact(const Look *look, const Hit *h, SbNear *near)
+/* Signed distance and its direction at a hit; false when it has none. */
+static PetscBool measure(const Look *look, const Hit *h, SbNear *near)
 {
   const PetscReal *x[3];
   PetscReal r[3], n[3], side;
@@ -373,7 +374,7 @@ static PetscBool contact(const Look *look, const Hit *h, SbNear *near)
     near->weight[k] = h->weight[k];
     near->normal[k] = n[k];
   }
-  return (PetscBool)(SbDot3(look->normal, n) < -FACING);
+  return PETSC_TRUE;
 }
 
 /* ------------------------------------------------------------------ one point */
@@ -493,11 +494,18 @@ static PetscInt ties(PetscInt n, Hit h[], PetscReal tolerance)
 /* The nearest of n hits of one part that is a contact; `entry`: normal of where the point came in, NULL: it did not. */
 static PetscBool nearest(const Look *look, PetscInt n, Hit h[], const PetscReal entry[3], SbNear *near)
 {
+  PetscBool sided = PETSC_FALSE, inside = PETSC_FALSE;
+
   for (PetscInt i = 0; i < n;) {
     const PetscInt end = i + ties(n - i, h + i, TIE * look->s->reach);
 
     for (; i < end; i++) {
-      if (contact(look, h + i, near) && (!entry || SbDot3(near->normal, entry) > FACING)) return PETSC_TRUE;
+      if (!measure(look, h + i, near)) continue;
+      if (!sided) inside = (PetscBool)(near->gap < 0);
+      sided = PETSC_TRUE;
+      if ((near->gap < 0) == inside && SbDot3(look->normal, near->normal) < -FACING &&
+          (!entry || SbDot3(near->normal, entry) > FACING))
+        return PETSC_TRUE;
     }
   }
   return PETSC_FALSE;
