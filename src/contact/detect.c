@@ -10,6 +10,7 @@
 
 static PetscErrorCode (*const constructors[])(SbDetector) = {
   [SB_DETECT_HASH] = sb_detector_hash,
+  [SB_DETECT_BVH] = sb_detector_bvh,
   [SB_DETECT_BRUTE] = sb_detector_brute,
 };
 

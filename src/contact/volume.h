@@ -1,0 +1,73 @@
+/*
+  volume.h - bounding volumes of a tree: intersections of slabs (k-DOP), or spheres; and cones of normals.
+
+  A volume is a column of numbers: lower and upper bound along each of k/2 directions, or centre and radius; then its cone: axis,
+  cosine and sine of the half-angle. A node of the tree holds the columns of its children as a block, either row by row (a number of
+  all children side by side: what is tested against) or column by column (what is tested).
+
+  Numbers are single precision, relative to an origin and rounded outwards: half the memory, and four at a time everywhere.
+*/
+#pragma once
+#include "detect.h"
+
+typedef float SbBound;
+
+enum {
+  SB_VOLUME_CONE = 5,                  /* rows of the cone, the last ones */
+  SB_VOLUME_ROWS = 26 + SB_VOLUME_CONE /* most rows of a column */
+};
+
+/*
+  Children of a node of points against those of a node of facets: bit l of hit[c] is set when what column c of `a` holds may meet what
+  lane l of block f holds. Only the n first columns that are in `mask` are looked at; hit[] of the others is 0.
+*/
+typedef void (*SbVolumeMeet)(const SbBound a[], PetscInt n, unsigned mask, const SbBound f[], unsigned hit[]);
+
+typedef struct {
+  PetscInt k, width;
+  PetscInt lanes; /* children that a block has room for: width, at least 4 */
+  int nslab;      /* k/2; 0: spheres */
+  int cone;       /* the first row of the cone */
+  int rows;       /* of a column; the distance of columns */
+  PetscReal origin[3];
+  SbVolumeMeet meet[2]; /* without and with a look at the cones */
+} SbVolume;
+
+/* k = 0, 6, 14, 18 or 26; width = 2, 4 or 8. The origin is 0. */
+void SbVolumeSet(PetscInt k, PetscInt width, SbVolume *volume);
+/*
+  SbVolumeOf - column of n corners, m, all within `box` grown by `grow` to all sides, m; rounding is allowed for.
+
+  `grow` widens what box does not tell: the slanted slabs and the sphere. The cone is not set.
+*/
+void SbVolumeOf(const SbVolume *volume, int n, const PetscReal *const corner[], const PetscReal box[6],
+                PetscReal grow, SbBound column[]);
+/*
+  SbVolumeMerge - column around the first n children of a block, without the cone; n > 0.
+
+  The number in row r of child l is block[row * r + lane * l].
+*/
+void SbVolumeMerge(const SbVolume *volume, const SbBound block[], PetscInt row, PetscInt lane, PetscInt n,
+                   SbBound column[]);
+/* A column that meets nothing. */
+void SbVolumeNone(const SbVolume *volume, SbBound column[]);
+/* What stands for the surface of a volume, m^2. */
+PetscReal SbVolumeSize(const SbVolume *volume, const SbBound column[]);
+
+/* ------------------------------------------------------------------ cones of normals, cone.c */
+
+/* Room for the rounding of products of unit vectors and of sums of angles along all levels. */
+#define SB_CONE_GUARD 2e-5f
+
+/* Cone of one normal of any length; without length the widest one. */
+void SbConeOf(const PetscReal normal[3], SbBound cone[SB_VOLUME_CONE]);
+/* Cone around the first n cones of a block; the number in row r of cone l is block[row * r + lane * l]. */
+void SbConeMerge(const SbBound block[], PetscInt row, PetscInt lane, PetscInt n,
+                 SbBound cone[SB_VOLUME_CONE]);
+/*
+  SbConesOfVertices - for each vertex of the rings the cone of all contact normals there; the widest where none is known.
+
+  Not collective. Input: open - as in SbFacetLinks. Work: normal[nfacet][3]. Output: cone[nvertex][SB_VOLUME_CONE].
+*/
+void SbConesOfVertices(const SbDetectScene *scene, const SbDetectRings *rings, const PetscBool open[],
+                       PetscReal normal[], SbBound cone[]);

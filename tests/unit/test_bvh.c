@@ -1,0 +1,570 @@
+// @ranks 1
+/*
+  Detection by trees of bounding volumes: all pairs that are near each other are candidates, and the contacts are those of the
+  detector by brute force, with every branching, volume and build, on random, degenerate and moving scenes; refitting and building
+  anew; what self-contact costs; how the number of visits grows.
+*/
+#include "bvh_scene.h"
+#include "../../src/contact/bvh.h"
+#include "../../src/contact/detect.h"
+
+enum { NSETTING = 30 };
+
+/* Two to four bodies of all sorts that overlap a little. */
+static PetscErrorCode random_scene(Scene *c, unsigned seed)
+{
+  unsigned state = seed;
+  const PetscInt nbody = 2 + below(&state, 3);
+  const PetscReal scale = seed % 7 == 0 ? 1e-6 : seed % 7 == 1 ? 1e3 : 1;
+  const PetscReal speed = seed % 2 ? scale * (below(&state, 2) ? 2 : 0.1) : 0;
+
+  PetscFunctionBeginUser;
+  scene_clear(c);
+  for (PetscInt part = 0; part < nbody; part++) {
+    const PetscInt v0 = c->s.ncorner, f0 = c->s.nfacet, kind = below(&state, 6);
+    PetscReal size = 0.4 + 0.2 * number(&state);
+
+    if (kind == 0)
+      add_box(c, part);
+    else if (kind == 1)
+      add_sphere(c, part, 1 + below(&state, 4));
+    else if (kind == 2)
+      add_soup(c, part, 20 + below(&state, 40), &state);
+    else if (kind == 3) {
+      /* one facet much larger than all others */
+      (void)add_vertex(c, -3, -3, 0);
+      (void)add_vertex(c, 3, -3, 0);
+      (void)add_vertex(c, 0, 3, 0);
+      add_facet(c, part, v0, v0 + 1, v0 + 2);
+    } else if (kind == 4) {
+      /* crumpled: closed, with ridges, saddles and folds */
+      add_sphere(c, part, 2 + below(&state, 5));
+      for (PetscInt i = 3 * v0; i < 3 * c->s.ncorner; i++) c->x[i] += 0.15 * number(&state);
+    } else {
+      add_box(c, part);
+      if (!below(&state, 4)) size *= 1e-3;
+    }
+    if (part == 1 && kind == 0 && below(&state, 2)) {
+      /* the same box at the same place: faces that coincide */
+      add_points(c, part, v0, f0, 2);
+      continue;
+    }
+    move(c, v0, scale * size, scale * (part == 3 ? 1e4 : 0.5), speed, &state);
+    add_points(c, part, v0, f0, 2);
+  }
+  c->s.self = (PetscBool)(seed % 3 == 0);
+  c->s.reach = scale * (seed % 5 == 0 ? 1e-9 : seed % 5 == 1 ? 0.5 : 0.05);
+  if (seed % 2) {
+    c->s.x0 = c->x0;
+    c->s.p0 = c->p0;
+  }
+  /* everything was far apart at rest, so that all pairs of self-contact count */
+  for (PetscInt i = 0; i < 3 * c->s.ncorner && c->s.self; i++) c->X[i] *= 1e3;
+  PetscCall(scene_finish(c));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ what must be found */
+
+/* Squared distance of p from the segment a b. */
+static PetscReal from_segment(const PetscReal p[3], const PetscReal a[3], const PetscReal b[3])
+{
+  PetscReal e[3], r[3], t;
+
+  for (int i = 0; i < 3; i++) {
+    e[i] = b[i] - a[i];
+    r[i] = p[i] - a[i];
+  }
+  t = SbDot3(e, e) > 0 ? PetscMax(0, PetscMin(1, SbDot3(e, r) / SbDot3(e, e))) : 0;
+  for (int i = 0; i < 3; i++) r[i] -= t * e[i];
+  return SbDot3(r, r);
+}
+
+/* Distance of point and facet now: to the three edges, or to the plane where the foot is inside. inside: it is. */
+static PetscReal distance(const Scene *c, PetscInt point, PetscInt facet, PetscBool *inside)
+{
+  const PetscReal *p = c->p + 3 * point, *x[3];
+  PetscReal n[3], d2 = PETSC_MAX_REAL, n2;
+  int left = 0;
+
+  for (int k = 0; k < 3; k++) x[k] = c->x + 3 * c->facet[3 * facet + k];
+  facet_normal(c, facet, n);
+  n2 = SbDot3(n, n);
+  for (int k = 0; k < 3; k++) {
+    const PetscReal *a = x[k], *b = x[(k + 1) % 3];
+    PetscReal e[3], r[3], side[3];
+
+    for (int i = 0; i < 3; i++) {
+      e[i] = b[i] - a[i];
+      r[i] = p[i] - a[i];
+    }
+    SbCross(e, r, side);
+    left += SbDot3(side, n) > 0;
+    d2 = PetscMin(d2, from_segment(p, a, b));
+  }
+  *inside = (PetscBool)(left == 3 && n2 > 0);
+  if (*inside) {
+    const PetscReal r[3] = {p[0] - x[0][0], p[1] - x[0][1], p[2] - x[0][2]};
+
+    return PetscAbsReal(SbDot3(r, n)) / PetscSqrtReal(n2);
+  }
+  return PetscSqrtReal(d2);
+}
+
+typedef struct {
+  PetscInt64 near, candidates, contacts, crossed, culled;
+} Totals;
+
+/*
+  Each pair within reach must be a candidate. With self-contact and no motion those that do not face each other need not be; whether
+  one that is left out matters is told by the contacts.
+*/
+static void check_candidates(const Scene *c, SbDetector d, const char *what, Totals *sum)
+{
+  PetscInt missing = 0, twice = 0;
+  PetscBool *seen;
+
+  if (PetscCalloc1(c->s.nfacet, &seen)) return;
+  for (PetscInt p = 0; p < c->s.npoint; p++) {
+    for (PetscInt k = d->start[p]; k < d->start[p + 1]; k++) {
+      if (seen[d->candidate[k]]) twice++;
+      seen[d->candidate[k]] = PETSC_TRUE;
+    }
+    sum->candidates += d->start[p + 1] - d->start[p];
+    for (PetscInt f = 0; f < c->s.nfacet; f++) {
+      PetscBool inside;
+      PetscReal n[3];
+
+      if (!SbDetectPairWanted(&c->s, p, f) || distance(c, p, f, &inside) > c->s.reach) continue;
+      facet_normal(c, f, n);
+      sum->near++;
+      if (seen[f]) continue;
+      if (c->s.x0 || !c->s.self || SbDot3(n, c->normal + 3 * p) < 0)
+        missing++;
+      else
+        sum->culled++;
+    }
+    for (PetscInt k = d->start[p]; k < d->start[p + 1]; k++) seen[d->candidate[k]] = PETSC_FALSE;
+  }
+  SB_CHECK(!missing && !twice, "%s: %d pairs within reach are no candidates, %d are twice", what,
+           (int)missing, (int)twice);
+  (void)PetscFree(seen);
+}
+
+static PetscInt differences(PetscInt n, const SbNear a[], PetscInt m, const SbNear b[])
+{
+  PetscInt sum = PetscAbsInt(n - m);
+
+  for (PetscInt i = 0; i < PetscMin(n, m); i++)
+    sum += a[i].point != b[i].point || a[i].facet != b[i].facet || a[i].gap != b[i].gap ||
+           a[i].crossed != b[i].crossed;
+  return sum;
+}
+
+static SbBvhSettings setting(int i)
+{
+  static const PetscInt k[5] = {0, 6, 14, 18, 26};
+  SbBvhSettings s;
+
+  SbBvhSettingsDefault(&s);
+  s.branching = 2 << (i % 3);
+  s.k = k[i / 3 % 5];
+  s.build = (SbBvhBuild)(i / 15);
+  return s;
+}
+
+static PetscErrorCode check_random(Scene *c)
+{
+  SbDetector brute, bvh[NSETTING];
+  Totals sum = {0};
+
+  PetscFunctionBeginUser;
+  PetscCall(SbDetectorCreate(SB_DETECT_BRUTE, &brute));
+  for (int i = 0; i < NSETTING; i++) {
+    const SbBvhSettings s = setting(i);
+
+    PetscCall(SbDetectorCreate(SB_DETECT_BVH, &bvh[i]));
+    PetscCall(SbBvhSet(bvh[i], &s));
+  }
+  for (unsigned seed = 1; seed <= 240; seed++) {
+    const SbNear *expected, *near;
+    PetscInt n, m;
+    char what[64];
+
+    PetscCall(random_scene(c, seed));
+    PetscCall(SbDetectorFind(brute, &c->s, &n, &expected));
+    sum.contacts += n;
+    for (PetscInt i = 0; i < n; i++) sum.crossed += expected[i].crossed ? 1 : 0;
+    for (int i = 0; i < NSETTING; i++) {
+      PetscCall(SbDetectorFind(bvh[i], &c->s, &m, &near));
+      PetscCall(PetscSNPrintf(what, sizeof(what), "scene %u, setting %d", seed, i));
+      SB_CHECK(!differences(n, expected, m, near), "%s: %d contacts, brute force finds %d, or they differ",
+               what, (int)m, (int)n);
+      /* the long test, by turns */
+      if ((unsigned)i % 5 == seed % 5) check_candidates(c, bvh[i], what, &sum);
+    }
+  }
+  SB_CHECK(sum.contacts > 1000 && sum.crossed > 50 && sum.culled > 1000,
+           "few contacts (%d), crossings (%d), culled pairs (%d)", (int)sum.contacts, (int)sum.crossed,
+           (int)sum.culled);
+  PetscCall(SbDetectorDestroy(&brute));
+  for (int i = 0; i < NSETTING; i++) PetscCall(SbDetectorDestroy(&bvh[i]));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ motion */
+
+/* Two spheres that roll on each other: refitted trees find what new ones find; scattered vertices make the trees anew. */
+static PetscErrorCode check_refit(Scene *c, SbBvhBuild build)
+{
+  SbDetector kept, fresh;
+  SbBvhSettings s;
+  SbDetectStats stats;
+  unsigned state = 5;
+  PetscInt found = 0;
+
+  PetscFunctionBeginUser;
+  SbBvhSettingsDefault(&s);
+  s.build = build;
+  scene_clear(c);
+  for (PetscInt part = 0; part < 2; part++) {
+    const PetscInt v0 = c->s.ncorner, f0 = c->s.nfacet;
+
+    add_sphere(c, part, 6);
+    for (PetscInt v = v0; v < c->s.ncorner; v++) c->x[3 * v] += 1.95 * (PetscReal)part;
+    add_points(c, part, v0, f0, 3);
+  }
+  c->s.reach = 0.1;
+  PetscCall(SbDetectorCreate(SB_DETECT_BVH, &kept));
+  PetscCall(SbBvhSet(kept, &s));
+  for (int step = 0; step < 20; step++) {
+    const SbNear *a, *b;
+    PetscInt n, m;
+
+    /* turns about z and a flattening that grows; the last steps throw all vertices about */
+    for (PetscInt v = 0; v < c->s.ncorner; v++) {
+      PetscReal *x = c->x + 3 * v;
+      const PetscReal angle = v < c->s.ncorner / 2 ? 0.1 : -0.13, centre = v < c->s.ncorner / 2 ? 0 : 1.95;
+      const PetscReal y[2] = {x[0] - centre, x[1]};
+
+      x[0] = centre + y[0] * PetscCosReal(angle) - y[1] * PetscSinReal(angle);
+      x[1] = y[0] * PetscSinReal(angle) + y[1] * PetscCosReal(angle);
+      for (int i = 0; i < 3 && step >= 15; i++) x[i] = 2 * number(&state);
+    }
+    PetscCall(scene_finish(c));
+    PetscCall(SbDetectorFind(kept, &c->s, &n, &a));
+    PetscCall(SbDetectorCreate(SB_DETECT_BVH, &fresh));
+    PetscCall(SbBvhSet(fresh, &s));
+    PetscCall(SbDetectorFind(fresh, &c->s, &m, &b));
+    SB_CHECK(!differences(n, a, m, b),
+             "step %d: refitted trees find %d contacts, new ones %d, or they differ", step, (int)n, (int)m);
+    PetscCall(SbDetectorDestroy(&fresh));
+    PetscCall(SbDetectorGetStats(kept, &stats));
+    if (step < 15) {
+      found += n;
+      SB_CHECK(stats.rebuilt == 1, "step %d: the trees are built %d times", step, (int)stats.rebuilt);
+    }
+  }
+  SB_CHECK(found > 100, "the spheres hardly touch: %d contacts", (int)found);
+  PetscCall(SbDetectorDestroy(&kept));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Many small bodies of one part that change places: the tree over them no longer fits, and is built anew once. */
+static PetscErrorCode check_rebuild(Scene *c)
+{
+  enum { NBODY = 200 };
+  SbDetector d;
+  SbDetectStats stats;
+  SbBvhCounts counts;
+  PetscInt64 visits[3] = {0, 0, 0};
+  unsigned state = 11;
+
+  PetscFunctionBeginUser;
+  scene_clear(c);
+  for (PetscInt body = 0; body < NBODY; body++) {
+    const PetscInt v0 = c->s.ncorner, f0 = c->s.nfacet, part = body % 2, row = body / 20;
+
+    add_box(c, part);
+    for (PetscInt v = v0; v < c->s.ncorner; v++) {
+      c->x[3 * v] = 0.6 * c->X[3 * v] + (PetscReal)(body % 20);
+      c->x[3 * v + 1] = 0.6 * c->X[3 * v + 1] + (PetscReal)row;
+    }
+    add_points(c, part, v0, f0, 0);
+  }
+  c->s.reach = 0.5;
+  PetscCall(SbDetectorCreate(SB_DETECT_BVH, &d));
+  for (int round = 0; round < 3; round++) {
+    const SbNear *near;
+    PetscInt n;
+
+    /* the second time they have changed places */
+    for (PetscInt body = NBODY - 1; body > 0 && round == 1; body--) {
+      const PetscInt other = below(&state, body + 1);
+
+      for (PetscInt i = 0; i < 24; i++) {
+        const PetscReal x = c->x[24 * body + i];
+
+        c->x[24 * body + i] = c->x[24 * other + i];
+        c->x[24 * other + i] = x;
+      }
+    }
+    PetscCall(scene_finish(c));
+    PetscCall(SbDetectorFind(d, &c->s, &n, &near));
+    PetscCall(SbDetectorGetStats(d, &stats));
+    PetscCall(SbBvhGetCounts(d, &counts));
+    visits[round] = counts.visits;
+    SB_CHECK(stats.rebuilt == (round ? 2 : 1), "round %d: the trees are built %d times", round,
+             (int)stats.rebuilt);
+  }
+  SB_CHECK(visits[1] < 2 * visits[0] && visits[2] == visits[1], "visits: %ld, built anew %ld, then %ld",
+           (long)visits[0], (long)visits[1], (long)visits[2]);
+  SB_CHECK(strstr(stats.text, "boxes") && stats.memory > 0, "text %s, %ld bytes", stats.text,
+           (long)stats.memory);
+  PetscCall(SbDetectorDestroy(&d));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ self-contact */
+
+/* A strip folded to a hairpin: two legs 0.02 apart, outsides outwards, and an arc of 0.8 between them. */
+static void hairpin(PetscReal u, PetscReal v, PetscReal x[3])
+{
+  const PetscReal s = 3 * u - 1.5, R = 0.01, half = R * PETSC_PI / 2;
+
+  x[1] = 0.3 * v;
+  if (PetscAbsReal(s) < half) {
+    x[0] = R * PetscCosReal(s / R);
+    x[2] = R * PetscSinReal(s / R);
+  } else {
+    x[0] = half - PetscAbsReal(s);
+    x[2] = s > 0 ? R : -R;
+  }
+}
+
+static void flat_strip(PetscReal u, PetscReal v, PetscReal x[3])
+{
+  x[0] = 3 * u - 1.5;
+  x[1] = 0.3 * v;
+  x[2] = 0;
+}
+
+/* What a tree with these settings does in a scene; its contacts are checked against brute force. */
+typedef struct {
+  PetscInt found, inside; /* contacts, those with a negative gap */
+  PetscInt64 candidates, visits;
+} Outcome;
+
+static PetscErrorCode find_both(const Scene *c, const SbBvhSettings *settings, Outcome *out)
+{
+  SbDetector brute, d;
+  SbBvhCounts counts;
+  const SbNear *a, *b;
+  PetscInt n;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbDetectorCreate(SB_DETECT_BRUTE, &brute));
+  PetscCall(SbDetectorCreate(SB_DETECT_BVH, &d));
+  PetscCall(SbBvhSet(d, settings));
+  PetscCall(SbDetectorFind(brute, &c->s, &n, &a));
+  PetscCall(SbDetectorFind(d, &c->s, &out->found, &b));
+  SB_CHECK(!differences(n, a, out->found, b), "%d contacts by brute force, %d by the tree, or they differ",
+           (int)n, (int)out->found);
+  PetscCall(SbBvhGetCounts(d, &counts));
+  out->inside = 0;
+  for (PetscInt i = 0; i < out->found; i++) out->inside += b[i].gap < 0;
+  out->candidates = d->start[c->s.npoint];
+  out->visits = counts.visits;
+  PetscCall(SbDetectorDestroy(&brute));
+  PetscCall(SbDetectorDestroy(&d));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* A strip with the normals towards the other leg: two sides that touch; or away from it: each leg is behind the other one. */
+static PetscErrorCode check_folded(Scene *c, PetscBool towards)
+{
+  SbBvhSettings s;
+  Outcome out;
+
+  PetscFunctionBeginUser;
+  SbBvhSettingsDefault(&s);
+  scene_clear(c);
+  add_sheet(c, 0, 30, (PetscBool)!towards, flat_strip);
+  for (PetscInt v = 0; v < c->s.ncorner; v++)
+    hairpin((c->X[3 * v] + 1.5) / 3, c->X[3 * v + 1] / 0.3, c->x + 3 * v);
+  add_points(c, 0, 0, 0, 0);
+  c->s.self = PETSC_TRUE;
+  c->s.reach = 0.03;
+  PetscCall(scene_finish(c));
+  PetscCall(find_both(c, &s, &out));
+  /* of the 31 rows of points the one on the fold is too close to its neighbours at rest */
+  SB_CHECK(out.found >= 29 * 31 && out.found <= 31 * 31 && out.inside == (towards ? 0 : out.found),
+           "folded strip: %d contacts, %d of them inside", (int)out.found, (int)out.inside);
+  SB_CHECK(out.candidates < 40 * (PetscInt64)out.found, "folded strip: %ld candidates", (long)out.candidates);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* A sphere at rest that may meet itself: finer, and the visits per point fall, since whole regions cannot face each other. */
+static PetscErrorCode check_sphere(Scene *c, PetscInt k, PetscInt branching)
+{
+  static const PetscInt sizes[] = {4, 8, 16, 32};
+  PetscReal each[4];
+  SbBvhSettings s;
+
+  PetscFunctionBeginUser;
+  SbBvhSettingsDefault(&s);
+  s.k = k;
+  s.branching = branching;
+  for (int i = 0; i < 4; i++) {
+    Outcome out;
+
+    scene_clear(c);
+    add_sphere(c, 0, sizes[i]);
+    add_points(c, 0, 0, 0, 0);
+    c->s.self = PETSC_TRUE;
+    c->s.reach = 0.5 / (PetscReal)sizes[i];
+    PetscCall(scene_finish(c));
+    PetscCall(find_both(c, &s, &out));
+    each[i] = (PetscReal)out.visits / (PetscReal)c->s.npoint;
+    SB_CHECK(!out.found, "sphere of %d facets at rest: %d contacts with itself", (int)c->s.nfacet,
+             (int)out.found);
+    SB_CHECK(out.candidates <= (i ? 0 : 7 * c->s.npoint), "sphere of %d facets at rest: %ld candidates",
+             (int)c->s.nfacet, (long)out.candidates);
+  }
+  SB_CHECK(each[3] < 0.5 * each[2] && each[2] < 0.8 * each[1] && each[3] < 1.5,
+           "visits per point, finer and finer: %g %g %g %g", (double)each[0], (double)each[1],
+           (double)each[2], (double)each[3]);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ cost */
+
+static void wavy(PetscReal u, PetscReal v, PetscReal x[3])
+{
+  x[0] = u;
+  x[1] = v;
+  x[2] = 0.1 * PetscSinReal(9 * u) * PetscCosReal(7 * v);
+}
+
+/* Two wavy sheets face to face: visits and candidates per point hardly grow with the number of facets. */
+static PetscErrorCode check_growth(Scene *c, int which)
+{
+  static const PetscInt sizes[] = {10, 40, 130};
+  const SbBvhSettings s = setting(which);
+  PetscReal each[3], per_near[3];
+  SbDetector d;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbDetectorCreate(SB_DETECT_BVH, &d));
+  PetscCall(SbBvhSet(d, &s));
+  for (int i = 0; i < 3; i++) {
+    const SbNear *near;
+    SbBvhCounts counts;
+    PetscInt n;
+
+    scene_clear(c);
+    add_sheet(c, 0, sizes[i], PETSC_FALSE, wavy);
+    add_points(c, 0, 0, 0, 0);
+    const PetscInt v0 = c->s.ncorner;
+
+    add_sheet(c, 1, sizes[i], PETSC_TRUE, wavy);
+    for (PetscInt v = v0; v < c->s.ncorner; v++) {
+      c->x[3 * v] += 0.3 / (PetscReal)sizes[i];
+      c->x[3 * v + 2] += 0.3 / (PetscReal)sizes[i];
+    }
+    add_points(c, 1, v0, 0, 0);
+    c->s.reach = 0.6 / (PetscReal)sizes[i];
+    PetscCall(scene_finish(c));
+    PetscCall(SbDetectorFind(d, &c->s, &n, &near));
+    PetscCall(SbBvhGetCounts(d, &counts));
+    each[i] = (PetscReal)counts.visits / (PetscReal)c->s.npoint;
+    per_near[i] = (PetscReal)d->start[c->s.npoint] / (PetscReal)n;
+    SB_CHECK(n > c->s.npoint * 8 / 10, "only %d of %d points meet the other sheet", (int)n, (int)c->s.npoint);
+  }
+  /* below a few levels all boxes look alike; growth with the square root would be 3.2 */
+  SB_CHECK(each[2] < 1.4 * each[1], "setting %d: visits per point %g, %g, %g", which, (double)each[0],
+           (double)each[1], (double)each[2]);
+  SB_CHECK(per_near[2] < 12, "setting %d: %g candidates per contact", which, (double)per_near[2]);
+  PetscCall(SbDetectorDestroy(&d));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode check_errors(void)
+{
+  SbBvhSettings s;
+  SbDetector d;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbDetectorCreate(SB_DETECT_BVH, &d));
+  SbBvhSettingsDefault(&s);
+  PetscCall(SbBvhSet(d, &s));
+  s.branching = 3;
+  SB_CHECK_ERROR(SbBvhSet(d, &s), "branching 3");
+  SbBvhSettingsDefault(&s);
+  s.k = 12;
+  SB_CHECK_ERROR(SbBvhSet(d, &s), "12-DOPs");
+  SbBvhSettingsDefault(&s);
+  s.growth = 1;
+  SB_CHECK_ERROR(SbBvhSet(d, &s), "growth 1");
+  SbBvhSettingsDefault(&s);
+  s.build = (SbBvhBuild)2;
+  SB_CHECK_ERROR(SbBvhSet(d, &s), "a third way to build");
+  PetscCall(SbDetectorDestroy(&d));
+  PetscCall(SbDetectorCreate(SB_DETECT_BRUTE, &d));
+  SbBvhSettingsDefault(&s);
+  SB_CHECK_ERROR(SbBvhSet(d, &s), "settings of the tree for another kind");
+  PetscCall(SbDetectorDestroy(&d));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Nothing to look for, and a single facet and point. */
+static PetscErrorCode check_small(Scene *c)
+{
+  SbBvhSettings s;
+  Outcome out;
+
+  PetscFunctionBeginUser;
+  SbBvhSettingsDefault(&s);
+  scene_clear(c);
+  c->s.reach = 0.1;
+  PetscCall(find_both(c, &s, &out));
+  SB_CHECK(!out.found && !out.visits, "an empty scene: %d contacts, %ld visits", (int)out.found,
+           (long)out.visits);
+  (void)add_vertex(c, 0, 0, 0);
+  (void)add_vertex(c, 1, 0, 0);
+  (void)add_vertex(c, 0, 1, 0);
+  (void)add_vertex(c, 0.2, 0.2, 0.05);
+  add_point(c, 1, 3, -1);
+  PetscCall(scene_finish(c));
+  PetscCall(find_both(c, &s, &out));
+  SB_CHECK(!out.found, "a point without facets: %d contacts", (int)out.found);
+  add_facet(c, 0, 0, 1, 2);
+  PetscCall(scene_finish(c));
+  c->normal[2] = -1;
+  PetscCall(find_both(c, &s, &out));
+  SB_CHECK(out.found == 1 && out.candidates == 1 && out.visits == 1, "one facet, one point: %d contacts",
+           (int)out.found);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+int main(int argc, char **argv)
+{
+  Scene c;
+
+  SB_TEST_BEGIN(argc, argv);
+  PetscCall(scene_create(&c));
+  PetscCall(check_random(&c));
+  PetscCall(check_refit(&c, SB_BVH_CONNECTIVITY));
+  PetscCall(check_refit(&c, SB_BVH_TOP_DOWN));
+  PetscCall(check_rebuild(&c));
+  PetscCall(check_folded(&c, PETSC_TRUE));
+  PetscCall(check_folded(&c, PETSC_FALSE));
+  PetscCall(check_sphere(&c, 6, 4));
+  PetscCall(check_sphere(&c, 0, 2));
+  PetscCall(check_sphere(&c, 18, 8));
+  for (int i = 0; i < NSETTING; i += 4) PetscCall(check_growth(&c, i));
+  PetscCall(check_small(&c));
+  PetscCall(check_errors());
+  PetscCall(scene_destroy(&c));
+  SB_TEST_END();
+}
