@@ -2,9 +2,10 @@
   hash.c - contact detection by spatial hashing.
 
   Teschner, Heidelberger, Mueller, Pomeranets, Gross, "Optimized spatial hashing for collision detection of deformable objects", VMV
-  2003: space is cut into cubic cells, cell (i, j, k) has slot (i p1 xor j p2 xor k p3) mod n of a table. Points are put into the slots of
-  the cells that they passed through; each facet then looks up the cells of its box. Instead of chains the entries lie in one array
-  sorted by slot (counting sort).
+  2003: space is cut into cubic cells, and (i p1 xor j p2 xor k p3) mod n says where in a table a cell is. Points are put into the slots of
+  the cells that they passed through; each facet then looks up the cells of its box. Two things are done for the cache: instead of chains
+  the entries lie in one array sorted by slot (counting sort), and what is hashed are blocks of 4 x 4 x 4 cells, whose 64 slots lie
+  together.
 
   The cells are as wide as the boxes of the facets on average, which hold the reach and the motion; the table has two to four slots per
   entry. What would cover very many cells is not put into them: a facet is then tested against all points, a point against all facets.
@@ -13,11 +14,12 @@
 */
 #include "detect.h"
 
-#define CELL_WIDTH 1.0     /* of the mean extent of the facets' boxes */
+#define CELL_WIDTH 1.0     /* of the mean extent of the facets' boxes; half and twice that are slower */
 #define POINT_CELLS 64     /* a point that passed through more is tested against all facets */
 #define CELL_FAR (1 << 28) /* cells beyond are one; boxes decide there */
 #define SLOTS_MIN 64
 #define PARTS_MAX 64 /* with more parts they are not told apart by their boxes */
+#define BLOCK 4      /* cells along each side of what is hashed; a power of two */
 
 /* A point in one of the cells that it passed through. */
 typedef struct {
@@ -152,7 +154,11 @@ static inline int cell_of(const Hash *h, PetscReal x, int axis)
 
 static inline unsigned slot_of(const Hash *h, int i, int j, int k)
 {
-  return (((unsigned)i * 73856093u) ^ ((unsigned)j * 19349663u) ^ ((unsigned)k * 83492791u)) & h->mask;
+  const unsigned block =
+    ((unsigned)i / BLOCK * 73856093u) ^ ((unsigned)j / BLOCK * 19349663u) ^ ((unsigned)k / BLOCK * 83492791u);
+
+  return (block * (BLOCK * BLOCK * BLOCK) & h->mask) +
+         (((unsigned)k % BLOCK * BLOCK + (unsigned)j % BLOCK) * BLOCK + (unsigned)i % BLOCK);
 }
 
 /* Cells of a box; how many, at most `most` + 1. */
@@ -280,22 +286,27 @@ static PetscErrorCode test_all(Hash *h, SbDetector d, const SbDetectScene *s, Pe
 }
 
 /*
-  The points in the slot of a cell. A point in several cells of the facet's box counts in the lowest of those they share. Others that are
-  only in the same slot have another cell.
+  The points in cells first..last, j, k of a box, all in one block. A point in several cells of the box counts in the lowest of those that
+  both have. Others that are only in the same slots have another cell.
 */
-static PetscErrorCode look_up(Hash *h, SbDetector d, const SbDetectScene *s, PetscInt facet,
-                              const int cell[3], unsigned above)
+static PetscErrorCode look_up(Hash *h, SbDetector d, const SbDetectScene *s, PetscInt facet, const int lo[3],
+                              int first, int last, int j, int k)
 {
-  const unsigned slot = slot_of(h, cell[0], cell[1], cell[2]);
-  const PetscInt end = h->slot[slot + 1], own = s->self ? PETSC_MIN_INT : s->facet_part[facet];
+  const unsigned slot = slot_of(h, first, j, k), above = (unsigned)(j > lo[1]) << 1 | (unsigned)(k > lo[2])
+                                                                                        << 2;
+  const PetscInt begin = h->slot[slot], end = h->slot[slot + (unsigned)(last - first) + 1];
+  const PetscInt own = s->self ? PETSC_MIN_INT : s->facet_part[facet];
 
   PetscFunctionBeginUser;
-  PetscCall(reserve_pairs(h, end - h->slot[slot]));
-  for (PetscInt e = h->slot[slot]; e < end; e++) {
+  if (begin == end) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(reserve_pairs(h, end - begin));
+  for (PetscInt e = begin; e < end; e++) {
     const Entry *a = h->entry + e;
+    const int i = a->cell[0];
 
-    if (a->part != own && !(a->above & above) && a->cell[0] == cell[0] && a->cell[1] == cell[1] &&
-        a->cell[2] == cell[2] && SbBoxesMeet(d->point_box + 6 * a->point, d->facet_box + 6 * facet))
+    if (a->part != own && i >= first && i <= last && a->cell[1] == j && a->cell[2] == k &&
+        !(a->above & (above | (i > lo[0]))) &&
+        SbBoxesMeet(d->point_box + 6 * a->point, d->facet_box + 6 * facet))
       pair(h, d, a->point, facet);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -306,7 +317,7 @@ static PetscErrorCode find_pairs(Hash *h, SbDetector d, const SbDetectScene *s)
   PetscFunctionBeginUser;
   for (PetscInt n = 0; n < h->nfacet; n++) {
     const PetscInt facet = h->facet[n];
-    int lo[3], hi[3], c[3];
+    int lo[3], hi[3];
 
     if (h->nlone) PetscCall(test_all(h, d, s, h->nlone, h->kept + h->nkept, facet));
     if (cells_of(h, d->facet_box + 6 * facet, h->nkept, lo, hi) > h->nkept) {
@@ -314,13 +325,11 @@ static PetscErrorCode find_pairs(Hash *h, SbDetector d, const SbDetectScene *s)
       PetscCall(test_all(h, d, s, h->nkept, h->kept, facet));
       continue;
     }
-    for (c[2] = lo[2]; c[2] <= hi[2]; c[2]++) {
-      for (c[1] = lo[1]; c[1] <= hi[1]; c[1]++) {
-        for (c[0] = lo[0]; c[0] <= hi[0]; c[0]++) {
-          const unsigned above =
-            (c[0] > lo[0]) | (unsigned)(c[1] > lo[1]) << 1 | (unsigned)(c[2] > lo[2]) << 2;
-
-          PetscCall(look_up(h, d, s, facet, c, above));
+    for (int k = lo[2]; k <= hi[2]; k++) {
+      for (int j = lo[1]; j <= hi[1]; j++) {
+        for (int i = lo[0], last; i <= hi[0]; i = last + 1) {
+          last = PetscMin(hi[0], i | (BLOCK - 1));
+          PetscCall(look_up(h, d, s, facet, lo, i, last, j, k));
         }
       }
     }

@@ -41,6 +41,7 @@ typedef struct SbDetectHit Hit;
 
 /* One point and what it meets. */
 typedef struct {
+  const struct _p_SbDetector *d;
   const SbDetectScene *s;
   const SbDetectRings *rings;
   PetscInt point;
@@ -402,6 +403,15 @@ static void set_hit(const Look *look, PetscInt facet, PetscReal key, Hit *h)
   h->key = key;
 }
 
+/* Whether the boxes come so near each other, over the step, that the point may have been in the facet or just behind it. */
+static PetscBool may_cross(const struct _p_SbDetector *d, PetscReal reach, PetscInt point, PetscInt facet)
+{
+  const PetscReal *p = d->point_box + 6 * point, *f = d->facet_box + 6 * facet, less = (1 - START) * reach;
+
+  return (PetscBool)(p[0] <= f[3] - less && f[0] + less <= p[3] && p[1] <= f[4] - less &&
+                     f[1] + less <= p[4] && p[2] <= f[5] - less && f[2] + less <= p[5]);
+}
+
 /* Whether the point went through the facet. One that lay behind it from the start counts only when they face each other. */
 static PetscBool crossed(const Look *look, PetscInt facet, Hit *h)
 {
@@ -436,7 +446,7 @@ static void look_closely(Look *look, PetscInt n, const PetscInt candidate[], Pet
     corners(s, s->x, f, x);
     h->place = SbClosestPoint(look->p, x, h->weight, &d2);
     close = (PetscBool)(d2 <= reach2);
-    through = (PetscBool)(s->x0 && crossed(look, f, c));
+    through = (PetscBool)(s->x0 && may_cross(look->d, s->reach, look->point, f) && crossed(look, f, c));
     if (!close && !through) continue;
     if (s->point_part[look->point] == s->facet_part[f] && belong_together(s, look->point, f)) continue;
     if (close) {
@@ -579,7 +589,7 @@ static PetscErrorCode reserve_near(SbDetector d, PetscInt used, PetscInt n)
 
 PetscErrorCode SbDetectNarrow(SbDetector d, const SbDetectScene *s, PetscInt *n)
 {
-  Look look = {.s = s, .rings = &d->rings};
+  Look look = {.d = d, .s = s, .rings = &d->rings};
   PetscInt most = 0;
 
   PetscFunctionBeginUser;
