@@ -6,6 +6,7 @@
 */
 #pragma once
 #include <petscsys.h>
+#include <string.h>
 
 #if PETSC_VERSION_LT(3, 18, 0) || (PETSC_VERSION_GE(3, 19, 0) && PETSC_VERSION_LT(3, 25, 0))
   #error \
@@ -85,3 +86,12 @@ typedef const char *SbErrorText;
 #else
   #define SbKSPRefineOrthogonalization(ksp) KSPGMRESSetCGSRefinementType(ksp, KSP_GMRES_CGS_REFINE_IFNEEDED)
 #endif
+
+/* PetscHasExternalPackage() for CHOLMOD too: older releases know SuiteSparse as a whole, newer ones each part of it. */
+static inline PetscErrorCode SbHasPackage(const char name[], PetscBool *has)
+{
+  PetscFunctionBeginUser;
+  PetscCall(PetscHasExternalPackage(name, has));
+  if (!*has && !strcmp(name, "cholmod")) PetscCall(PetscHasExternalPackage("suitesparse", has));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

@@ -216,13 +216,6 @@ static PetscErrorCode converged(KSP ksp, PetscInt it, PetscReal norm, KSPConverg
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode destroy_test(void *ctx)
-{
-  PetscFunctionBeginUser;
-  PetscCall(KSPConvergedDefaultDestroy(SB_DESTROY_CTX(void, ctx)));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 static PetscErrorCode PCPreSolve_Pressure(PC pc, KSP ksp, Vec b, Vec x)
 {
   PetscReal rtol, atol, norm;
@@ -234,7 +227,7 @@ static PetscErrorCode PCPreSolve_Pressure(PC pc, KSP ksp, Vec b, Vec x)
   PetscCall(PCShellGetContext(pc, &s));
   if (s->ksp != ksp) {
     PetscCall(KSPConvergedDefaultCreate(&test));
-    PetscCall(KSPSetConvergenceTest(ksp, converged, test, destroy_test));
+    PetscCall(KSPSetConvergenceTest(ksp, converged, test, KSPConvergedDefaultDestroy));
     s->ksp = ksp;
   }
   PetscCall(KSPGetTolerances(ksp, &rtol, &atol, NULL, &s->limit));

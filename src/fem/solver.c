@@ -50,7 +50,7 @@ static const SbSolverPreset presets[] = {
    "-ksp_type richardson -pc_type composite -pc_composite_pcs sor -sub_0_pc_sor_omega 1.6 -ksp_max_it 100000",
    NULL, NULL, "successive over-relaxation, omega 1.6 (between ranks: block Jacobi)", NULL},
   {"cholmod", SB_MATRIX_AIJ, PETSC_FALSE, "-ksp_type cg -pc_type cholesky -pc_factor_mat_solver_type cholmod",
-   "suitesparse", NULL, "sparse Cholesky of SuiteSparse; one rank", NULL},
+   "cholmod", NULL, "sparse Cholesky of SuiteSparse; one rank", NULL},
   {"mumps", SB_MATRIX_AIJ, PETSC_FALSE,
    "-ksp_type fgmres -pc_type cholesky -pc_factor_mat_solver_type mumps -mat_mumps_icntl_14 100", "mumps",
    NULL, "sparse factorisation of MUMPS on any number of ranks", NULL},
@@ -143,7 +143,7 @@ PetscErrorCode SbSolverChoose(SbSpace s, PetscBool dynamic, PetscBool linear, Pe
   PetscCallMPI(MPI_Comm_size(s->comm, &nrank));
   PetscCall(may_be_indefinite(s, &indefinite));
   PetscCall(largest_poisson(s, &nu));
-  PetscCall(PetscHasExternalPackage(nrank == 1 && !indefinite ? "suitesparse" : "mumps", &direct));
+  PetscCall(SbHasPackage(nrank == 1 && !indefinite ? "cholmod" : "mumps", &direct));
   if (explicit_run) {
     name = "cg";
     PetscCall(PetscSNPrintf(reason, size, "explicit integrator: no linear system"));
@@ -180,7 +180,7 @@ PetscErrorCode SbSolverChoose(SbSpace s, PetscBool dynamic, PetscBool linear, Pe
   }
   *preset = find_preset(name);
   PetscCheck(*preset, s->comm, PETSC_ERR_PLIB, "No solver preset %s", name);
-  if ((*preset)->package) PetscCall(PetscHasExternalPackage((*preset)->package, &has));
+  if ((*preset)->package) PetscCall(SbHasPackage((*preset)->package, &has));
   PetscCheck(has, s->comm, PETSC_ERR_USER,
              "-solver %s needs %s, which this PETSc was built without: choose another solver, or auto",
              (*preset)->name, (*preset)->package);

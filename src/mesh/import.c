@@ -176,6 +176,7 @@ static PetscErrorCode find_reader(const SbBody *body, SbReader *read)
 {
   const char *dot = strrchr(body->mesh, '.');
   char known[256] = "";
+  size_t used;
 
   PetscFunctionBeginUser;
   if (!strncmp(body->mesh, "box:", 4)) {
@@ -187,8 +188,8 @@ static PetscErrorCode find_reader(const SbBody *body, SbReader *read)
       *read = readers[i].read;
       PetscFunctionReturn(PETSC_SUCCESS);
     }
-    PetscCall(PetscStrlcat(known, i ? " " : "", sizeof(known)));
-    PetscCall(PetscStrlcat(known, readers[i].extension, sizeof(known)));
+    used = strlen(known);
+    (void)snprintf(known + used, sizeof(known) - used, "%s%s", i ? " " : "", readers[i].extension);
   }
   SETERRQ(PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
           "body '%s': mesh '%s' is of no known kind; give a file that ends in %s, or box:lx,ly,lz:n",

@@ -356,7 +356,7 @@ static PetscErrorCode solve_bounded(SbModel m, Mat A, PetscReal floor, Vec U)
   PetscCall(SNESSetJacobian(snes, A, A, vi_jacobian, m));
   PetscCall(SNESVISetVariableBounds(snes, lower, upper));
   PetscCall(SNESGetLineSearch(snes, &search));
-  PetscCall(SNESLineSearchSetType(search, SNESLINESEARCHBASIC));
+  PetscCall(SNESLineSearchSetType(search, SB_LINESEARCH_NONE));
   PetscCall(SNESSetTolerances(snes, 1e-7, 1e-9, 0, 200, PETSC_DEFAULT));
   PetscCall(SNESGetKSP(snes, &ksp));
   PetscCall(KSPSetType(ksp, KSPCG));
