@@ -123,6 +123,9 @@ PetscErrorCode SbSpaceFinishTangent(SbSpace space, Mat A);
 /* Between the two: A += a 3x3 block (row-major, N/m) for two nodes a, b = 0..3 of a local cell. Not collective. */
 PetscErrorCode SbSpaceAddCellBlock(SbSpace space, Mat A, PetscInt cell, PetscInt a, PetscInt b,
                                    const PetscReal block[9]);
+/* The same for a spring from node a to something rigid, which may be all that holds a body: it reaches the coarse spaces of
+   -solver pressure too. The block is not negative; the rank that owns the node must be among the callers. */
+PetscErrorCode SbSpaceAddSpring(SbSpace space, Mat A, PetscInt cell, PetscInt a, const PetscReal block[9]);
 
 /* f[nnode][3] += factor dV/du, V the current volume of a body (m^3) at displacement u. Right on owned nodes. Not collective. */
 void SbSpaceAddVolumeForce(SbSpace space, PetscInt body, const PetscReal u[], PetscReal factor,

@@ -455,7 +455,7 @@ static PetscErrorCode tangent_contact(SbEffect e, SbSpace space, const SbStage *
     place(space, touch->node, stage->u, x);
     if (!stiffness_of(c, &pose, touch, x, block)) continue;
     for (int k = 0; k < 9; k++) block[k] *= stage->shift_k;
-    PetscCall(SbSpaceAddCellBlock(space, A, touch->cell, touch->a, touch->a, block));
+    PetscCall(SbSpaceAddSpring(space, A, touch->cell, touch->a, block));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -113,6 +113,8 @@ PetscErrorCode SbSpaceAssembleSplit(SbSpace s, const SbStage *stage, PetscInt n,
 /* pc_pressure_operator.c, for an operator of SbPressureOperatorCreate(); other matrices are left alone. */
 PetscErrorCode SbPressureOperatorAssemble(Mat A, const SbStage *stage, PetscBool *is);
 PetscErrorCode SbPressureOperatorFinish(Mat A);
+/* Between the two, factor times a block (N/m) that is in its matrix already, for the coarse spaces. Not collective. */
+PetscErrorCode SbPressureOperatorAddSpring(Mat A, PetscInt node, PetscReal factor, const PetscReal block[9]);
 /* Its matrix; A itself when A is not one. */
 PetscErrorCode SbPressureOperatorMatrix(Mat A, Mat *inner);
 

@@ -11,6 +11,7 @@
   product is P1's own matrix, which is assembled from the same blocks. A vertex of a face with a prescribed unknown is held.
   A DG cell that touches this rank's cells with a vertex only may have neighbours that are not here; its strain is that of its own
   nodes there, so that in a strained body the P1 matrix is slightly unsymmetric at the border of ranks. GMRES does not mind.
+  Springs of effects are in P1's matrix as the Galerkin product has them: they may be all that holds a body.
   P1 by algebraic multigrid. Hiptmair and Xu (2007), Nodal auxiliary space preconditioning; Brenner (2003), Poincare-Friedrichs
   inequalities for piecewise H1 functions.
 */
@@ -341,6 +342,70 @@ static PetscErrorCode jump_stiffness(SbLevels v)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* ------------------------------------------------------------------ springs */
+
+PetscErrorCode SbLevelsAddSpring(SbLevels v, PetscInt node, PetscReal factor, const PetscReal block[9])
+{
+  PetscFunctionBeginUser;
+  if (node >= v->space->nnode_owned) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!v->spring) PetscCall(PetscCalloc1(9 * (size_t)v->space->nnode_owned, &v->spring));
+  v->sprung = PETSC_TRUE;
+  for (int k = 0; k < 9; k++) v->spring[9 * node + k] += factor * block[k];
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Springs of all ranks at the nodes of at[n-2], ghosts among them, one row of the blocks after the other. */
+static PetscErrorCode gather_springs(SbLevels v)
+{
+  const SbSpace s = v->space;
+  const size_t size = 9 * (size_t)v->at[v->n - 2]->nnode;
+
+  PetscFunctionBeginUser;
+  if (!v->shared) PetscCall(PetscMalloc1(size, &v->shared));
+  PetscCall(PetscArrayzero(v->shared, size));
+  for (PetscInt row = 0; row < 3; row++) {
+    const PetscReal *x;
+    PetscScalar *own;
+
+    PetscCall(VecGetArray(v->r[0], &own));
+    for (PetscInt k = 0; k < 3 * s->nnode_owned; k++)
+      own[k] = v->spring ? v->spring[9 * (k / 3) + 3 * row + k % 3] : 0.;
+    PetscCall(VecRestoreArray(v->r[0], &own));
+    PetscCall(SbSpaceGetLocalRead(s, v->r[0], &x));
+    for (PetscInt k = 0; k < 3 * s->nnode; k++)
+      v->shared[9 * (v->mean ? v->mean[k / 3] : k / 3) + 3 * row + k % 3] += x[k];
+    PetscCall(SbSpaceRestoreLocalRead(s, v->r[0], &x));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbLevelsShareSprings(SbLevels v)
+{
+  const SbSpace s = v->at[v->n - 2], p = v->at[v->n - 1];
+  PetscBool any = v->sprung;
+
+  PetscFunctionBeginUser;
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &any, 1, SB_MPI_BOOL, MPI_LOR, v->space->comm));
+  if (!any) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(gather_springs(v));
+  for (PetscInt i = 0; i < 4 * s->mesh->ncell; i++) {
+    const PetscInt c = i / 4, a = i % 4;
+    const PetscBool face = (PetscBool)!SbSpaceCellElement(s, c)->nodes_per[0];
+    PetscReal *d = v->shared + 9 * s->cell_node[i], ninth[9];
+
+    if (d[0] + d[4] + d[8] == 0.) continue;
+    if (v->n == 3) PetscCall(SbSpaceAddCellBlock(s, v->A[v->n - 2], c, a, a, d));
+    for (int k = 0; k < 9; k++) ninth[k] = d[k] / 9.;
+    for (PetscInt k = 1; k < 4; k++) {
+      for (PetscInt l = 1; l < 4; l++)
+        PetscCall(
+          SbSpaceAddCellBlock(p, v->A[v->n - 1], c, face ? (a + k) % 4 : a, face ? (a + l) % 4 : a, ninth));
+    }
+    PetscCall(PetscArrayzero(d, 9)); /* another cell has this node too */
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* ------------------------------------------------------------------ assembly and life */
 
 PetscErrorCode SbLevelsAssemble(SbLevels v, const SbStage *stage, const SbVolumetric *out)
@@ -349,6 +414,8 @@ PetscErrorCode SbLevelsAssemble(SbLevels v, const SbStage *stage, const SbVolume
   v->shift_a = stage->shift_a;
   v->shift_v = stage->shift_v;
   v->shift_k = stage->shift_k;
+  if (v->sprung) PetscCall(PetscArrayzero(v->spring, 9 * (size_t)v->space->nnode_owned));
+  v->sprung = PETSC_FALSE;
   for (PetscInt k = 1; k < v->n; k++) {
     for (PetscInt r = 0; r < v->space->nregion; r++) {
       v->at[k]->region[r].alpha = v->space->region[r].alpha;
@@ -418,6 +485,8 @@ PetscErrorCode SbLevelsDestroy(SbLevels *levels)
   PetscFunctionBeginUser;
   if (!v) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscFree(v->inverse));
+  PetscCall(PetscFree(v->spring));
+  PetscCall(PetscFree(v->shared));
   for (PetscInt k = 0; k < v->n; k++) {
     PetscCall(MatDestroy(&v->A[k]));
     if (k) PetscCall(SbSpaceDestroy(&v->at[k]));

@@ -222,6 +222,16 @@ PetscErrorCode SbPressureOperatorAssemble(Mat K, const SbStage *stage, PetscBool
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscErrorCode SbPressureOperatorAddSpring(Mat K, PetscInt node, PetscReal factor, const PetscReal block[9])
+{
+  SbPressureOperator op;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbPressureOperatorGet(K, &op));
+  if (op) PetscCall(SbLevelsAddSpring(op->levels, node, factor, block));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Numbers of the cells, from the moduli of the last assembly. */
 static void cell_numbers(SbPressureOperator op)
 {
@@ -253,6 +263,7 @@ PetscErrorCode SbPressureOperatorFinish(Mat K)
   PetscFunctionBeginUser;
   PetscCall(SbPressureOperatorGet(K, &op));
   if (!op) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(SbLevelsShareSprings(op->levels));
   for (PetscInt k = 0; k < op->levels->n; k++)
     PetscCall(SbSpaceFinishTangent(op->levels->at[k], op->levels->A[k]));
   cell_numbers(op);

@@ -24,6 +24,9 @@ struct _p_SbLevels {
   PetscInt *corner; /* [nodes of at[n-2]][3] local vertices of the face; a P1 node has its vertex thrice */
   Vec r[3], z[3], g[3]; /* work vectors of each level, with ghosts */
   Vec t[3], w[3];       /* and without; t[0] is the diagonal of A[0] with a DG body */
+  PetscBool sprung;     /* this rank has springs since the last assembly */
+  PetscReal *spring;    /* [nnode_owned][9] their sum at each node, N/m; NULL before the first one */
+  PetscReal *shared;    /* [nodes of at[n-2]][9] the same there; NULL before the first one of any rank */
   KSP coarse;
   PetscReal *inverse; /* [nodes of at[n-2]][9] inverses of the diagonal blocks there, m/N */
 };
@@ -32,6 +35,10 @@ PetscErrorCode SbLevelsCreate(SbSpace space, SbLevels *levels);
 PetscErrorCode SbLevelsDestroy(SbLevels *levels);
 /* Fills the matrices; `out` gets the volumetric part. Not collective. */
 PetscErrorCode SbLevelsAssemble(SbLevels levels, const SbStage *stage, const SbVolumetric *out);
+/* factor times a block at a node, which is in A[0] already; nodes of other ranks are left to these. Not collective. */
+PetscErrorCode SbLevelsAddSpring(SbLevels levels, PetscInt node, PetscReal factor, const PetscReal block[9]);
+/* Brings the springs of all ranks into the other matrices, before these are finished. Collective. */
+PetscErrorCode SbLevelsShareSprings(SbLevels levels);
 /* After the matrices have been finished. Collective. */
 PetscErrorCode SbLevelsSetUp(SbLevels levels);
 /* z = a symmetric approximation of A[0]^-1 times r. Collective. */

@@ -365,6 +365,14 @@ PetscErrorCode SbSpaceAddCellBlock(SbSpace s, Mat A, PetscInt cell, PetscInt a, 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscErrorCode SbSpaceAddSpring(SbSpace s, Mat A, PetscInt cell, PetscInt a, const PetscReal block[9])
+{
+  PetscFunctionBeginUser;
+  PetscCall(SbSpaceAddCellBlock(s, A, cell, a, a, block));
+  PetscCall(SbPressureOperatorAddSpring(A, s->cell_node[4 * cell + a], s->block_scale, block));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Clears rows and columns of prescribed unknowns, keeping the magnitude on the diagonal. */
 static void clear_fixed(SbSpace s, const SbValues *x)
 {
