@@ -30,6 +30,7 @@
 #define RESTART 80         /* vectors that GMRES keeps */
 #define LARGEST_WEIGHT 1e4 /* lambda / mu in the norm of GMRES */
 #define MARGIN 0.3         /* how far below the target GMRES aims */
+#define TIGHTER 0.03       /* times that after a correction that did not help */
 #define ROUNDING 4.        /* times the rounding errors of K u: what is accepted */
 
 typedef struct {
@@ -41,6 +42,7 @@ typedef struct {
   PetscReal *weight;         /* [ncell_owned] on the rows of the cells, N/m^3 */
   KSP ksp;                   /* that has the convergence test below; borrowed */
   PetscReal target, last;    /* residual wanted, the one before, N */
+  PetscReal margin;          /* of the next correction */
   PetscInt its, limit, slow; /* of GMRES in this solve; corrections that did not help */
   PetscInt nsolve, total, most;
 } Pressure;
@@ -169,7 +171,7 @@ static PetscErrorCode PCApply_Pressure(PC pc, Vec r, Vec z)
   PetscCall(PetscArraycpy(to, from, n));
   PetscCall(VecRestoreArrayRead(r, &from));
   PetscCall(VecRestoreArray(s->b, &to));
-  PetscCall(KSPSetTolerances(s->inner, PetscMin(0.5, PetscMax(1e-10, MARGIN * s->target / norm)), 0.,
+  PetscCall(KSPSetTolerances(s->inner, PetscMin(0.5, PetscMax(1e-10, s->margin * s->target / norm)), 0.,
                              PETSC_DEFAULT, PetscMax(1, s->limit - s->its)));
   PetscCall(KSPSolve(s->inner, s->b, s->x));
   PetscCall(KSPGetIterationNumber(s->inner, &its));
@@ -203,7 +205,10 @@ static PetscErrorCode converged(KSP ksp, PetscInt it, PetscReal norm, KSPConverg
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   if (s->its >= s->limit) *reason = KSP_DIVERGED_ITS;
-  if (norm > 0.5 * s->last) s->slow++;
+  if (norm > 0.5 * s->last) {
+    s->slow++;
+    s->margin *= TIGHTER;
+  }
   s->last = norm;
   PetscCall(KSPGetSolution(ksp, &x));
   PetscCall(SbPressureOperatorRounding(s->op, x, &level));
@@ -234,6 +239,7 @@ static PetscErrorCode PCPreSolve_Pressure(PC pc, KSP ksp, Vec b, Vec x)
   PetscCall(VecNorm(b, NORM_2, &norm));
   s->target = PetscMax(rtol * norm, atol);
   s->its = s->slow = 0;
+  s->margin = MARGIN;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
