@@ -16,7 +16,7 @@
 static const struct {
   const char *name;
   SbDetectKind kind;
-} kinds[] = {{"hash", SB_DETECT_HASH}, {"brute", SB_DETECT_BRUTE}};
+} kinds[] = {{"hash", SB_DETECT_HASH}, {"bvh", SB_DETECT_BVH}, {"brute", SB_DETECT_BRUTE}};
 
 /* Both sheets: corners are points. */
 typedef struct {

@@ -111,7 +111,7 @@ static void random_world(World *w, unsigned k)
   if (k % 7 == 3) huge_and_far(w);
   if (k % 2) set_going(w, &state, k % 4 == 1 ? 0.05 : 0.8);
   if (k % 3 == 2) flatten(w, &state);
-  w->scene.self = (PetscBool)(k % 6 == 5);
+  w->scene.self = (PetscBool)(k % 6 >= 4);
   world_scene(w, (PetscBool)(k % 4 != 2), k % 8 == 6 ? 1e-3 : 0, k % 9 == 1 ? 0.4 : 0.06);
   if (!(k % 2)) w->scene.x0 = w->scene.p0 = NULL;
 }

@@ -298,26 +298,23 @@ static PetscErrorCode check_stars(SbDetector d, World *w)
 
 /* ------------------------------------------------------------------ self-contact */
 
-#define STRIP_HALF 0.05   /* half the thickness */
-#define STRIP_RADIUS 0.08 /* of the bend of the middle surface */
-
-/* A strip along x, flat at rest, folded so that its two arms stand 2 (radius - half) = 0.06 apart. */
-static void fold(World *w)
+/* A strip along x, flat at rest, folded to that radius of its middle surface: two arms, 2 (radius - half its thickness) apart. */
+static void fold(World *w, PetscReal radius)
 {
   for (PetscInt v = 0; v < w->nvertex; v++) {
     const PetscReal s = w->X[v][0], z = w->X[v][2], bend = PETSC_PI / 2;
-    const PetscReal a = PetscMax(-bend, PetscMin(bend, s / STRIP_RADIUS)),
-                    more = PetscAbsReal(s) - bend * STRIP_RADIUS;
+    const PetscReal a = PetscMax(-bend, PetscMin(bend, s / radius)), more = PetscAbsReal(s) - bend * radius;
 
-    w->x[v][0] = (STRIP_RADIUS - z) * PetscSinReal(a);
+    w->x[v][0] = (radius - z) * PetscSinReal(a);
     w->x[v][1] = w->X[v][1];
-    w->x[v][2] = STRIP_RADIUS - (STRIP_RADIUS - z) * PetscCosReal(a) + PetscMax(0, more);
+    w->x[v][2] = radius - (radius - z) * PetscCosReal(a) + PetscMax(0, more);
   }
 }
 
-static PetscErrorCode check_strip(SbDetector d, World *w, PetscBool vertices)
+static PetscErrorCode check_strip(SbDetector d, World *w, PetscReal thick, PetscReal radius,
+                                  PetscBool vertices, PetscBool motion)
 {
-  const PetscReal half[3] = {1, 0.2, STRIP_HALF}, gap = 2 * (STRIP_RADIUS - STRIP_HALF);
+  const PetscReal half[3] = {1, 0.2, thick}, gap = 2 * (radius - thick);
   const PetscInt n[3] = {60, 4, 1};
   PetscInt expected = 0, found, arms = 0;
   const SbNear *near;
@@ -329,20 +326,21 @@ static PetscErrorCode check_strip(SbDetector d, World *w, PetscBool vertices)
   world_scene(w, vertices, 0, 0.08);
   PetscCall(SbDetectorFind(d, &w->scene, &found, &near));
   SB_CHECK(found == 0, "a flat strip at rest has %d contacts with itself", (int)found);
-  fold(w);
+  fold(w, radius);
   world_scene(w, vertices, 0, 0.08);
+  if (!motion) w->scene.x0 = w->scene.p0 = NULL;
   /* the inner side of the arms, away from the bend and from the tips */
   for (PetscInt i = 0; i < w->scene.npoint; i++) {
     const PetscReal *P = w->scene.P + 3 * i;
 
-    if (P[2] > 0.99 * STRIP_HALF && PetscAbsReal(P[0]) > 0.25) expected++;
+    if (P[2] > 0.99 * thick && PetscAbsReal(P[0]) > 0.25) expected++;
   }
   PetscCall(SbDetectorFind(d, &w->scene, &found, &near));
   for (PetscInt j = 0; j < found; j++) {
     const PetscReal *P = w->scene.P + 3 * near[j].point;
 
     if (PetscAbsReal(P[0]) < 0.25) continue;
-    SB_CHECK(P[2] > 0.99 * STRIP_HALF, "the outer side is in contact");
+    SB_CHECK(P[2] > 0.99 * thick, "the outer side is in contact");
     SB_CHECK_NEAR(near[j].gap, gap, 1e-13, "gap between the arms");
     SB_CHECK_NEAR(near[j].normal[0], P[0] > 0 ? 1 : -1, 1e-12, "normal between the arms");
     arms++;
@@ -568,14 +566,17 @@ int main(int argc, char **argv)
   SB_TEST_BEGIN(argc, argv);
   check_triangles();
   PetscCall(world_create(&w));
-  for (int i = 0; i < 2; i++) {
+  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(kinds); i++) {
     PetscCall(SbDetectorCreate(kinds[i], &d));
     PetscCall(check_box(d, &w));
     PetscCall(check_touching(d, &w));
     PetscCall(check_sphere(d, &w));
     PetscCall(check_stars(d, &w));
-    PetscCall(check_strip(d, &w, PETSC_TRUE));
-    PetscCall(check_strip(d, &w, PETSC_FALSE));
+    for (int k = 0; k < 4; k++) {
+      PetscCall(check_strip(d, &w, 0.05, 0.08, (PetscBool)(k % 2), (PetscBool)(k / 2)));
+      /* thin: the far side of the other arm is within reach, too */
+      PetscCall(check_strip(d, &w, 0.01, 0.02, (PetscBool)(k % 2), (PetscBool)(k / 2)));
+    }
     PetscCall(check_grazing(d, &w));
     PetscCall(check_stack(d, &w));
     SbPoseSet(z, 0, none, none, &pose);
