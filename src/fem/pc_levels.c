@@ -426,11 +426,13 @@ PetscErrorCode SbLevelsAssemble(SbLevels v, const SbStage *stage, const SbVolume
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbLevelsSetUp(SbLevels v)
+PetscErrorCode SbLevelsSetUp(SbLevels v, PetscBool *positive)
 {
   PetscFunctionBeginUser;
   if (v->n == 3) PetscCall(jump_stiffness(v));
-  PetscCall(SbSweepSetUp(v->at[v->n - 2], v->A[v->n - 2], v->inverse));
+  PetscCall(SbSweepSetUp(v->at[v->n - 2], v->A[v->n - 2], v->inverse, positive));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, positive, 1, SB_MPI_BOOL, MPI_LAND, v->space->comm));
+  if (!*positive) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(KSPSetOperators(v->coarse, v->A[v->n - 1], v->A[v->n - 1]));
   PetscCall(KSPSetUp(v->coarse));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -15,7 +15,7 @@
   asks; the iterations reported are those of GMRES. f - K u = r_u - B^T C^-1 r_p has
   the residual of the cells times lambda, and GMRES minimises both with these weights, up to lambda = 1e4 mu. Beyond that
   doubles end: with nu = 0.499999 K u is known no better than eps |B^T| C^-1 |B| |u|, whoever has solved. A residual below four times
-  this is accepted, said by -info.
+  this is accepted, said by -info, unless it is so large that the matrix must be singular.
 
   Not handled: with inertia S takes no notice of it; time steps far below the time in which a shear wave crosses a cell cost more
   iterations.
@@ -31,6 +31,7 @@
 #define LARGEST_WEIGHT 1e4 /* lambda / mu in the norm of GMRES */
 #define MARGIN 0.3         /* how far below the target GMRES aims */
 #define TIGHTER 0.03       /* times that after a correction that did not help */
+#define AT_MOST 1e-2       /* of the right-hand side: more is never accepted */
 #define ROUNDING 4.        /* times the rounding errors of K u: what is accepted */
 
 typedef struct {
@@ -42,7 +43,7 @@ typedef struct {
   PetscReal *weight;         /* [ncell_owned] on the rows of the cells, N/m^3 */
   KSP ksp;                   /* that has the convergence test below; borrowed */
   PetscReal target, last;    /* residual wanted, the one before, N */
-  PetscReal margin;          /* of the next correction */
+  PetscReal size, margin;    /* of the right-hand side, N; of the next correction */
   PetscInt its, limit, slow; /* of GMRES in this solve; corrections that did not help */
   PetscInt nsolve, total, most;
 } Pressure;
@@ -130,6 +131,7 @@ static PetscErrorCode create_inner(Pressure *s)
 
 static PetscErrorCode PCSetUp_Pressure(PC pc)
 {
+  PetscBool positive;
   Pressure *s;
   Mat K;
 
@@ -141,7 +143,8 @@ static PetscErrorCode PCSetUp_Pressure(PC pc)
   PetscCheck(s->op, s->space->comm, PETSC_ERR_ARG_WRONG,
              "The operator is not one of SbPressureOperatorCreate()");
   if (!s->inner) PetscCall(create_inner(s));
-  PetscCall(SbLevelsSetUp(s->op->levels));
+  PetscCall(SbLevelsSetUp(s->op->levels, &positive));
+  PetscCall(PCSetFailedReason(pc, positive ? PC_NOERROR : PC_FACTOR_NUMERIC_ZEROPIVOT));
   for (PetscInt c = 0; c < s->space->mesh->ncell_owned; c++) {
     const PetscReal limit = LARGEST_WEIGHT / (s->op->S[c] - s->op->C[c]);
 
@@ -214,7 +217,7 @@ static PetscErrorCode converged(KSP ksp, PetscInt it, PetscReal norm, KSPConverg
   PetscCall(SbPressureOperatorRounding(s->op, x, &level));
   PetscCall(PetscInfo(ksp, "residual %g after %" PetscInt_FMT " iterations, wanted %g, rounding of K u %g\n",
                       (double)norm, s->its, (double)s->target, (double)level));
-  if (norm <= ROUNDING * level)
+  if (norm <= PetscMin(ROUNDING * level, AT_MOST * s->size))
     *reason = KSP_CONVERGED_ATOL;
   else if (s->slow > 2)
     *reason = KSP_DIVERGED_BREAKDOWN;
@@ -238,6 +241,7 @@ static PetscErrorCode PCPreSolve_Pressure(PC pc, KSP ksp, Vec b, Vec x)
   PetscCall(KSPGetTolerances(ksp, &rtol, &atol, NULL, &s->limit));
   PetscCall(VecNorm(b, NORM_2, &norm));
   s->target = PetscMax(rtol * norm, atol);
+  s->size = norm;
   s->its = s->slow = 0;
   s->margin = MARGIN;
   PetscFunctionReturn(PETSC_SUCCESS);

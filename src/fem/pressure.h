@@ -39,8 +39,8 @@ PetscErrorCode SbLevelsAssemble(SbLevels levels, const SbStage *stage, const SbV
 PetscErrorCode SbLevelsAddSpring(SbLevels levels, PetscInt node, PetscReal factor, const PetscReal block[9]);
 /* Brings the springs of all ranks into the other matrices, before these are finished. Collective. */
 PetscErrorCode SbLevelsShareSprings(SbLevels levels);
-/* After the matrices have been finished. Collective. */
-PetscErrorCode SbLevelsSetUp(SbLevels levels);
+/* After the matrices have been finished. *positive = false: a diagonal block is not, and nothing may be applied. Collective. */
+PetscErrorCode SbLevelsSetUp(SbLevels levels, PetscBool *positive);
 /* z = a symmetric approximation of A[0]^-1 times r. Collective. */
 PetscErrorCode SbLevelsApply(SbLevels levels, Vec r, Vec z);
 

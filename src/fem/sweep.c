@@ -101,7 +101,7 @@ SB_KERNEL static void backward(PetscInt nrow, const PetscInt first[restrict], co
   }
 }
 
-PetscErrorCode SbSweepSetUp(SbSpace s, Mat A, PetscReal inverse[])
+PetscErrorCode SbSweepSetUp(SbSpace s, Mat A, PetscReal inverse[], PetscBool *positive)
 {
   const SbPlan p = s->plan;
   PetscScalar *a;
@@ -110,14 +110,14 @@ PetscErrorCode SbSweepSetUp(SbSpace s, Mat A, PetscReal inverse[])
   PetscFunctionBeginUser;
   PetscCall(SbProductGetSymmetric(A, &local));
   PetscCall(MatSeqSBAIJGetArray(local, &a));
+  *positive = PETSC_TRUE;
   for (PetscInt i = 0; i < s->nnode_owned; i++) {
     PetscReal C[9], det;
 
     SbMatCofactor(a, C);
     det = SbDot3(a, C);
-    PetscCheck(det > 0., PETSC_COMM_SELF, PETSC_ERR_MAT_CH_ZRPVT,
-               "The block of node %" PetscInt_FMT " is not positive", s->gnode[i]);
-    for (int k = 0; k < 9; k++) inverse[9 * (size_t)i + (size_t)k] = C[k] / det;
+    if (!(det > 0.)) *positive = PETSC_FALSE;
+    for (int k = 0; k < 9; k++) inverse[9 * (size_t)i + (size_t)k] = det > 0. ? C[k] / det : 0.;
     a += 9 * (size_t)(p->di[i + 1] - p->diagonal[i]);
   }
   PetscCall(MatSeqSBAIJRestoreArray(local, &a));

@@ -22,6 +22,7 @@ static PetscErrorCode compare(const char *element)
   SbStage stage = {.shift_k = 1.};
   PetscReal *inverse, error, size;
   Vec r, z, reference;
+  PetscBool positive;
   Mat A;
 
   PetscFunctionBeginUser;
@@ -39,7 +40,7 @@ static PetscErrorCode compare(const char *element)
   PetscCall(VecDuplicate(z, &reference));
   PetscCall(test_fill(t.model, pattern, r));
   PetscCall(PetscMalloc1(9 * s->nnode_owned, &inverse));
-  PetscCall(SbSweepSetUp(s, A, inverse));
+  PetscCall(SbSweepSetUp(s, A, inverse, &positive));
   for (int k = 0; k < 2; k++) {
     PetscCall(SbSweep(s, A, inverse, k ? SB_SWEEP_BACKWARD : SB_SWEEP_FORWARD, r, z));
     PetscCall(MatSOR(A, r, 1., (MatSORType)(types[k] | SOR_ZERO_INITIAL_GUESS), 0., 1, 1, reference));
@@ -49,6 +50,10 @@ static PetscErrorCode compare(const char *element)
     SB_CHECK(error <= 1e-13 * size, "%s, sweep %d: difference %g of %g", element, k, (double)error,
              (double)size);
   }
+  SB_CHECK(positive, "%s: a block is not positive", element);
+  PetscCall(MatScale(A, -1.));
+  PetscCall(SbSweepSetUp(s, A, inverse, &positive));
+  SB_CHECK(!positive, "%s: negative blocks pass", element);
   PetscCall(PetscFree(inverse));
   PetscCall(VecDestroy(&r));
   PetscCall(VecDestroy(&z));
