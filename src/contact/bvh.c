@@ -10,9 +10,10 @@
   the facet's node in one sweep (volume.c), and the pairs that meet are followed. What meets at the leaves are the candidates, in the
   order of the walk; a counting sort brings them to their points.
 
-  Self-contact without motion (x0 = NULL): pairs of nodes whose normals cannot face each other are not followed; cone.c tells why no
-  contact is lost. A smooth closed body then costs little: nodes that touch are neighbours, and their normals agree. Between different
-  bodies the cones would save less than they cost.
+  With self-contact there are two walks. The first one follows only what may face each other (cone.c), and marks the points that face some
+  facet: the others have no contact. The second one, over the marked points, leaves out nothing, since which of the facets near a
+  point is its contact depends also on those that do not face it (near.c). A smooth closed body then costs little: nodes that touch
+  are neighbours, and their normals agree. Between different bodies the cones would save less than they cost.
 */
 #include "bvh.h"
 #include "detect.h"
@@ -43,6 +44,8 @@ typedef struct {
   PetscReal *normal;    /* [nfacet][3] */
   PetscInt nvertex;
   PetscBool cull;  /* in this call normals are looked at */
+  PetscBool first; /* in this walk */
+  unsigned *live; /* [nnode of points] children that are walked to; in the first walk: points that are done */
   PetscReal built; /* relative size of the volumes at the last build */
   PetscBool stale; /* other settings */
   Visit *stack;
@@ -181,10 +184,10 @@ static PetscErrorCode fitted_create(const SbBinary *binary, const SbVolume *v, F
 static PetscErrorCode cones_create(const SbDetector d, const SbDetectScene *s, const PetscBool open[], Bvh *b)
 {
   PetscFunctionBeginUser;
-  PetscCall(PetscFree3(b->open, b->vertex_cone, b->normal));
+  PetscCall(PetscFree4(b->open, b->vertex_cone, b->normal, b->live));
   b->nvertex = d->rings.nvertex;
-  PetscCall(PetscMalloc3(b->nvertex, &b->open, SB_VOLUME_CONE * b->nvertex, &b->vertex_cone, 3 * s->nfacet,
-                         &b->normal));
+  PetscCall(PetscMalloc4(b->nvertex, &b->open, SB_VOLUME_CONE * b->nvertex, &b->vertex_cone, 3 * s->nfacet,
+                         &b->normal, b->points.tree.nnode, &b->live));
   PetscCall(PetscArraycpy(b->open, open, b->nvertex));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -231,7 +234,7 @@ static void find_origin(const SbDetectScene *s, PetscReal origin[3])
 
 static void fit_both(SbDetector d, const SbDetectScene *s, Bvh *b)
 {
-  b->cull = (PetscBool)(s->self && !s->x0);
+  b->cull = s->self;
   if (b->cull) SbConesOfVertices(s, &d->rings, b->open, b->normal, b->vertex_cone);
   find_origin(s, b->volume.origin);
   fit(d, s, b, PETSC_FALSE, &b->facets);
@@ -305,13 +308,14 @@ static PetscBool meet(Bvh *b, const Visit *v, PetscBool self, unsigned hit[])
   const size_t stride = (size_t)volume->lanes * (size_t)volume->rows;
   const PetscInt n = b->points.tree.nchild[v->a], *part = b->points.part + v->a * volume->width;
   const PetscInt common = b->points.common[v->a], facets = b->facets.common[v->f];
+  const unsigned live = v->am & (b->first ? ~b->live[v->a] : b->live[v->a]);
   unsigned any = 0;
 
   if (!self && common == facets && common != NO_PART) return PETSC_FALSE;
-  volume->meet[b->cull ? 1 : 0](b->points.block + stride * v->a, n, v->am, b->facets.block + stride * v->f,
-                                hit);
+  volume->meet[b->first ? 1 : 0](b->points.block + stride * v->a, n, live, b->facets.block + stride * v->f,
+                                 hit);
   for (PetscInt c = 0; c < n; c++) {
-    b->counts.visits += v->am >> c & 1;
+    b->counts.visits += live >> c & 1;
     hit[c] &= v->fm;
     if (hit[c] && !self && part[c] != NO_PART && (facets == NO_PART || facets == part[c]))
       hit[c] = without_part(b, v->f, part[c], hit[c]);
@@ -336,6 +340,8 @@ static PetscInt follow(Bvh *b, const Visit *v, PetscInt c, unsigned hit, unsigne
         leaves |= 1u << l;
     } else if (facet[l] >= 0)
       single[l] |= 1u << c;
+    else if (b->first)
+      b->live[v->a] |= 1u << c;
     else {
       b->pair[b->npair][0] = SB_TREE_ITEM(child);
       b->pair[b->npair++][1] = SB_TREE_ITEM(facet[l]);
@@ -345,15 +351,13 @@ static PetscInt follow(Bvh *b, const Visit *v, PetscInt c, unsigned hit, unsigne
   return nstack;
 }
 
-/* All pairs that meet, into b->pair. */
+/* All pairs that meet, into b->pair; in the first walk into b->live. */
 static PetscErrorCode walk(Bvh *b, PetscBool self)
 {
   const PetscInt w = b->volume.width;
   PetscInt nstack = 0;
 
   PetscFunctionBeginUser;
-  b->npair = 0;
-  b->counts.visits = 0;
   if (!b->facets.tree.nnode || !b->points.tree.nnode) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(make_room(b, 1));
   b->stack[nstack++] = (Visit){0, 0, ~0u, ~0u};
@@ -370,6 +374,31 @@ static PetscErrorCode walk(Bvh *b, PetscBool self)
       if (single[l]) b->stack[nstack++] = (Visit){v.a, b->facets.tree.child[v.f * w + l], single[l], ~0u};
     }
   }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The candidates; for self-contact only those of points that face something. */
+static PetscErrorCode find_pairs(Bvh *b, PetscBool self)
+{
+  const SbTree *t = &b->points.tree;
+
+  PetscFunctionBeginUser;
+  b->npair = 0;
+  b->counts.visits = 0;
+  for (PetscInt g = 0; g < t->nnode; g++) b->live[g] = self ? 0 : ~0u;
+  b->first = self;
+  if (self) {
+    PetscCall(walk(b, self));
+    for (PetscInt g = t->nnode - 1; g >= 0; g--) {
+      for (PetscInt l = 0; l < t->nchild[g]; l++) {
+        const PetscInt child = t->child[g * t->width + l];
+
+        if (child >= 0 && b->live[child]) b->live[g] |= 1u << l;
+      }
+    }
+  }
+  b->first = PETSC_FALSE;
+  PetscCall(walk(b, self));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -414,7 +443,7 @@ static PetscErrorCode search(SbDetector d, const SbDetectScene *s)
 
   PetscFunctionBeginUser;
   PetscCall(prepare(d, s, b));
-  PetscCall(walk(b, s->self));
+  PetscCall(find_pairs(b, s->self));
   PetscCall(sort_pairs(d, s, b));
   d->stats.memory = bytes(b);
   if (b->settings.k == 6)
@@ -436,7 +465,7 @@ static PetscErrorCode destroy(SbDetector d)
   PetscFunctionBeginUser;
   PetscCall(fitted_destroy(&b->facets));
   PetscCall(fitted_destroy(&b->points));
-  PetscCall(PetscFree3(b->open, b->vertex_cone, b->normal));
+  PetscCall(PetscFree4(b->open, b->vertex_cone, b->normal, b->live));
   PetscCall(PetscFree(b->stack));
   PetscCall(PetscFree(b->pair));
   PetscCall(PetscFree(d->data));

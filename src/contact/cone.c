@@ -20,11 +20,9 @@
 
   Hence the cone of a facet is that around all normals of the facets at its three vertices. It is the widest one where the surface has
   a border, three facets at an edge, a facet almost without area (near.c then looks further), or bends by more than 45 degrees. A
-  pair that is left out by its cones never is a contact. This needs no test of contours (Volino and Magnenat-Thalmann 1994): they ask
-  whether a region can meet itself, for which normals in one half-space are not enough (a spiral), and here such a meeting
-  does not count.
-
-  With motion, a facet that was gone through matters also to points that do not face it (near.c): bvh.c then looks at no cones.
+  contact always faces its point, also one that was found by its motion; so a point whose normal is on the same side as the cones of all
+  facets that its volume meets has none. This needs no test of contours (Volino and Magnenat-Thalmann 1994): they ask whether a region
+  can meet itself, for which normals in one half-space are not enough (a spiral), and here such a meeting does not count.
 */
 #include "volume.h"
 

@@ -21,7 +21,7 @@ static PetscErrorCode random_scene(Scene *c, unsigned seed)
   PetscFunctionBeginUser;
   scene_clear(c);
   for (PetscInt part = 0; part < nbody; part++) {
-    const PetscInt v0 = c->s.ncorner, f0 = c->s.nfacet, kind = below(&state, 6);
+    const PetscInt v0 = c->s.ncorner, f0 = c->s.nfacet, kind = below(&state, 7);
     PetscReal size = 0.4 + 0.2 * number(&state);
 
     if (kind == 0)
@@ -40,6 +40,15 @@ static PetscErrorCode random_scene(Scene *c, unsigned seed)
       /* crumpled: closed, with ridges, saddles and folds */
       add_sphere(c, part, 2 + below(&state, 5));
       for (PetscInt i = 3 * v0; i < 3 * c->s.ncorner; i++) c->x[i] += 0.15 * number(&state);
+    } else if (kind == 5) {
+      /* thin plates in a stack: facets on far sides are within reach of each other */
+      for (int plate = 0; plate < 3; plate++) {
+        const PetscInt first = c->s.ncorner;
+
+        add_sphere(c, part, 3);
+        for (PetscInt v = first; v < c->s.ncorner; v++)
+          c->x[3 * v + 2] = 0.01 * c->x[3 * v + 2] + 0.03 * plate + 0.1 * PetscSqr(c->x[3 * v]);
+      }
     } else {
       add_box(c, part);
       if (!below(&state, 4)) size *= 1e-3;
@@ -139,7 +148,7 @@ static void check_candidates(const Scene *c, SbDetector d, const char *what, Tot
       facet_normal(c, f, n);
       sum->near++;
       if (seen[f]) continue;
-      if (c->s.x0 || !c->s.self || SbDot3(n, c->normal + 3 * p) < 0)
+      if (!c->s.self || SbDot3(n, c->normal + 3 * p) < 0)
         missing++;
       else
         sum->culled++;
@@ -195,13 +204,14 @@ static PetscErrorCode check_random(Scene *c)
     PetscCall(SbDetectorFind(brute, &c->s, &n, &expected));
     sum.contacts += n;
     for (PetscInt i = 0; i < n; i++) sum.crossed += expected[i].crossed ? 1 : 0;
+    /* each third setting by turns, which do not go with those of the scenes (self-contact, motion, scale, reach) */
     for (int i = 0; i < NSETTING; i++) {
+      if (((unsigned)(i + i / 3) + seed / 42) % 3) continue;
       PetscCall(SbDetectorFind(bvh[i], &c->s, &m, &near));
       PetscCall(PetscSNPrintf(what, sizeof(what), "scene %u, setting %d", seed, i));
       SB_CHECK(!differences(n, expected, m, near), "%s: %d contacts, brute force finds %d, or they differ",
                what, (int)m, (int)n);
-      /* the long test, by turns */
-      if ((unsigned)i % 5 == seed % 5) check_candidates(c, bvh[i], what, &sum);
+      if (((unsigned)i + seed / 35) % 5 == 0) check_candidates(c, bvh[i], what, &sum);
     }
   }
   SB_CHECK(sum.contacts > 1000 && sum.crossed > 50 && sum.culled > 1000,
@@ -400,7 +410,7 @@ static PetscErrorCode check_folded(Scene *c, PetscBool towards)
   /* of the 31 rows of points the one on the fold is too close to its neighbours at rest */
   SB_CHECK(out.found >= 29 * 31 && out.found <= 31 * 31 && out.inside == (towards ? 0 : out.found),
            "folded strip: %d contacts, %d of them inside", (int)out.found, (int)out.inside);
-  SB_CHECK(out.candidates < 40 * (PetscInt64)out.found, "folded strip: %ld candidates", (long)out.candidates);
+  SB_CHECK(out.candidates < 70 * (PetscInt64)out.found, "folded strip: %ld candidates", (long)out.candidates);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
