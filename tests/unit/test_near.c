@@ -296,6 +296,51 @@ static PetscErrorCode check_stars(SbDetector d, World *w)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/*
+  A wedge whose sharp edge is whole in the facet above, halved in the two below, with a facet without area in between: the facets on the two
+  sides of the edge are no neighbours by identity.
+*/
+static PetscErrorCode check_sliver(SbDetector d, World *w)
+{
+  static const PetscReal X[5][3] = {{0, -1, 0}, {0, 1, 0}, {-1, 0, 0.05}, {-1, 0, -0.05}, {0, 0, 0}};
+  static const PetscInt facets[6][3] = {{0, 1, 2}, {1, 4, 3}, {4, 0, 3}, {1, 0, 4}, {1, 3, 2}, {0, 2, 3}};
+  PetscReal p[100][3], normal[100][3];
+  const SbNear *near[100];
+  unsigned state = 41;
+
+  PetscFunctionBeginUser;
+  for (int first = 0; first < 6; first++) {
+    w->nvertex = w->nfacet = 0;
+    w->npart = 1;
+    for (int v = 0; v < 5; v++) (void)world_vertex(w, X[v], 0, PETSC_FALSE);
+    /* each facet once is the one with the lowest identity */
+    for (int f = 0; f < 6; f++) {
+      const PetscInt *v = facets[(first + f) % 6];
+
+      world_facet(w, v[0], v[1], v[2]);
+    }
+    world_scene(w, PETSC_TRUE, 0, 0.2);
+    for (int i = 0; i < 100; i++) {
+      const PetscReal angle = 1.4 * number(&state);
+
+      normal[i][0] = -PetscCosReal(angle);
+      normal[i][1] = 0;
+      normal[i][2] = -PetscSinReal(angle);
+      for (int k = 0; k < 3; k++) p[i][k] = -0.1 * normal[i][k];
+      p[i][1] = i ? 0.8 * number(&state) : 0;
+    }
+    world_probe(w, 100, p, NULL, normal);
+    PetscCall(find(d, w, near));
+    for (int i = 0; i < 100; i++) {
+      SB_CHECK(near[i], "wedge: nothing at point %d", i);
+      if (!near[i]) continue;
+      SB_CHECK_NEAR(near[i]->gap, 0.1, 1e-15, "distance to the edge of a wedge");
+      SB_CHECK_NEAR(SbDot3(near[i]->normal, normal[i]), -1, 1e-14, "normal at the edge of a wedge");
+    }
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* ------------------------------------------------------------------ self-contact */
 
 /* A strip along x, flat at rest, folded to that radius of its middle surface: two arms, 2 (radius - half its thickness) apart. */
@@ -572,6 +617,7 @@ int main(int argc, char **argv)
     PetscCall(check_touching(d, &w));
     PetscCall(check_sphere(d, &w));
     PetscCall(check_stars(d, &w));
+    PetscCall(check_sliver(d, &w));
     for (int k = 0; k < 4; k++) {
       PetscCall(check_strip(d, &w, 0.05, 0.08, (PetscBool)(k % 2), (PetscBool)(k / 2)));
       /* thin: the far side of the other arm is within reach, too */
