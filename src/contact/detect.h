@@ -14,7 +14,7 @@
   search - candidates of each point of the scene, from d->facet_box and d->point_box into d->start and d->candidate. Each pair once. A
   pair may be missing only when its boxes do not meet (SbBoxesMeet), or when the kind proves that point and facet stay farther apart
   than the reach and do not cross, or when the scene does not want it (SbDetectPairWanted). Facets that do not face the point must not be
-  missing: near.c learns from them whether the point is inside. The candidates of one point may come in any order. The scene may be
+  missing where others are there: near.c learns from them whether the point is inside. The candidates of one point may come in any order. The scene may be
   empty, and may differ in all counts from that of the last call: what depends on the choice of facets is kept while d->same_facets
   holds. Sets d->stats.memory, .rebuilt and .text.
   destroy - frees d->data. NULL when there is nothing.

@@ -5,7 +5,7 @@
 */
 #include "detect_fixture.h"
 
-static const SbDetectKind kinds[] = {SB_DETECT_BRUTE, SB_DETECT_HASH};
+static const SbDetectKind kinds[] = {SB_DETECT_BRUTE, SB_DETECT_HASH, SB_DETECT_BVH};
 #define KINDS ((int)PETSC_STATIC_ARRAY_LENGTH(kinds))
 
 /* How often something happened, over all scenes: the tests must not be empty. */
