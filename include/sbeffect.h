@@ -84,6 +84,7 @@ PetscErrorCode SbEffectRegister_Support(void);
 PetscErrorCode SbEffectRegister_Drive(void);
 PetscErrorCode SbEffectRegister_Damping(void);
 PetscErrorCode SbEffectRegister_Contact(void);
+PetscErrorCode SbEffectRegister_Collision(void);
 
 /* ------------------------------------------------------------------ what several effects share */
 

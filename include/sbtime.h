@@ -41,6 +41,7 @@ struct _p_SbRun {
   SNES snes;       /* of the TS, or own in a static run; borrowed from ts when there is one */
   Mat J, operator; /* tangent; what solves see of it: J itself, or its projection (sbfem.h, SbCouple) */
   Vec U, V, A;     /* A: acceleration of the last step, state of the integrator */
+  Vec R;           /* residual for contact; NULL without */
   PetscBool dt_given, velocity_predictor, fixed_step, damped;
   PetscBool may_search;                  /* Newton may try a failed step again with a line search */
   PetscReal spectral_radius, newmark[2]; /* newmark: beta, gamma */

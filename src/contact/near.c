@@ -20,8 +20,9 @@
 
 #define TIE 1e-12     /* of the reach: distances that are equal; the lower identity of the facet then wins */
 #define TIE_TIME 1e-9 /* of the step: passages at the same time */
-#define TOUCH \
-  1e-9 /* of the reach: nearer than this the normal is the pseudonormal, the way to the surface has no direction */
+#define TOUCH 1e-9    /* of the reach: places that are one */
+#define AT \
+  1e-2 /* of the reach: nearer than this the way to an edge or corner is no direction to push along */
 #define FACING 1e-6 /* cosine: normals oppose each other by more than rounding */
 #define START \
   0.1 /* of the reach: so far behind a facet a point may begin the step and still be in front: it lay in contact */
@@ -331,6 +332,25 @@ static PetscBool pseudonormal(const Look *look, const Hit *h, const PetscReal r[
   return normalise(sum);
 }
 
+/* Of the facets around a hit's edge or corner, the normal that opposes the point's most: flush rims press along their faces. */
+static PetscBool opposing_normal(const Look *look, const Hit *h, PetscReal normal[3])
+{
+  PetscReal least = -FACING;
+  PetscInt j = -1, g;
+  int corner;
+
+  while (next_around(look->rings, h->facet, h->place, &j, &g, &corner)) {
+    const PetscReal *x[3];
+    PetscReal n[3];
+
+    corners(look->s, look->s->x, g, x);
+    if (!unit_normal(x, n) || SbDot3(look->normal, n) >= least) continue;
+    least = SbDot3(look->normal, n);
+    for (int k = 0; k < 3; k++) normal[k] = n[k];
+  }
+  return (PetscBool)(least < -FACING);
+}
+
 /* Whether none of the facets around the place is nearer. */
 static PetscBool is_nearest_around(const Look *look, const Hit *h)
 {
@@ -362,11 +382,14 @@ static PetscBool measure(const Look *look, const Hit *h, SbNear *near)
   if (h->place == SB_INSIDE) {
     if (!unit_normal(x, n)) return PETSC_FALSE;
     near->gap = SbDot3(r, n);
+  } else if (h->key < AT * look->s->reach) {
+    if (!is_nearest_around(look, h) || !opposing_normal(look, h, n)) return PETSC_FALSE;
+    near->gap = SbDot3(r, n);
   } else {
     if (!is_nearest_around(look, h) || !pseudonormal(look, h, r, n)) return PETSC_FALSE;
     side = SbDot3(r, n) < 0 ? -1 : 1;
     near->gap = side * h->key;
-    for (int k = 0; h->key > TOUCH * look->s->reach && k < 3; k++) n[k] = side * r[k] / h->key;
+    for (int k = 0; k < 3; k++) n[k] = side * r[k] / h->key;
   }
   near->point = look->point;
   near->facet = h->facet;

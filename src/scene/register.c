@@ -34,5 +34,6 @@ PetscErrorCode SbRegisterAll(void)
   PetscCall(SbEffectRegister_Drive());
   PetscCall(SbEffectRegister_Damping());
   PetscCall(SbEffectRegister_Contact());
+  PetscCall(SbEffectRegister_Collision());
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -438,6 +438,7 @@ PetscErrorCode SbRunDestroy(SbRun *run)
   }
   if (!r->ts) PetscCall(SNESDestroy(&r->snes));
   PetscCall(TSDestroy(&r->ts));
+  PetscCall(VecDestroy(&r->R));
   PetscCall(MatDestroy(&r->operator));
   PetscCall(MatDestroy(&r->J));
   PetscCall(VecDestroy(&r->U));

@@ -163,47 +163,40 @@ static PetscErrorCode solve_once(TS ts, SNESConvergedReason *reason)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* After a solve: whether contact wants another one. */
-static PetscErrorCode settle(TS ts, PetscBool *again)
+/* The two things that the loop of contact (contact.c) asks for. */
+static PetscErrorCode contact_solve(void *ts, Vec U, SNESConvergedReason *reason)
 {
-  SecondOrder *so = (SecondOrder *)ts->data;
-  PetscReal t = 0.;
-  Vec U = NULL, V = NULL, A = NULL, R;
-
   PetscFunctionBeginUser;
-  PetscCall(VecDuplicate(so->X1, &R));
-  PetscCall(stage_state(ts, so->X1, &t, &U, &V, &A));
-  PetscCall(SbModelResidual(so->run->model, t, U, V, A, PETSC_FALSE, R));
-  PetscCall(VecScale(R, 1. / so->set.alpha_f));
-  PetscCall(SbModelContactSettle(so->run->model, ts->ptime + ts->time_step, so->X1, R, again));
-  if (*again && so->run->model->space->held) so->run->tangent_known = PETSC_FALSE;
-  PetscCall(VecDestroy(&R));
+  (void)U; /* X1 itself */
+  PetscCall(solve_once((TS)ts, reason));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* One attempt at the end displacement, from the predicted one; with contact as many solves as its set of nodes takes. */
+static PetscErrorCode contact_residual(void *ts, Vec X, Vec R)
+{
+  SecondOrder *so = (SecondOrder *)((TS)ts)->data;
+  PetscReal t = 0.;
+  Vec U = NULL, V = NULL, A = NULL;
+
+  PetscFunctionBeginUser;
+  PetscCall(stage_state((TS)ts, X, &t, &U, &V, &A));
+  PetscCall(SbModelResidual(so->run->model, t, U, V, A, PETSC_FALSE, R));
+  PetscCall(VecScale(R, 1. / so->set.alpha_f));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* One attempt at the end displacement, from the predicted one. */
 static PetscErrorCode solve_end(TS ts, SNESConvergedReason *reason)
 {
   SecondOrder *so = (SecondOrder *)ts->data;
-  SbModel m = so->run->model;
-  PetscBool again = (PetscBool)(m->ntouch > 0);
+  const SbContactSolve solve = {contact_solve, contact_residual, ts};
 
   PetscFunctionBeginUser;
   PetscCall(predict(ts));
-  if (again) {
-    PetscCall(SbModelContactBegin(m, ts->ptime, ts->time_step, so->X0, so->X1));
-    if (m->space->held) so->run->tangent_known = PETSC_FALSE; /* it is projected there */
-  }
-  PetscCall(solve_once(ts, reason));
-  for (PetscInt round = 1; again && *reason > 0; round++) {
-    PetscCall(settle(ts, &again));
-    if (!again) break;
-    if (round == SB_CONTACT_ROUNDS) {
-      *reason = SNES_DIVERGED_MAX_IT;
-      break;
-    }
+  if (so->run->model->ntouch)
+    PetscCall(SbRunSolveContact(so->run, ts->snes, ts->ptime, ts->time_step, so->X0, so->X1, &solve, reason));
+  else
     PetscCall(solve_once(ts, reason));
-  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

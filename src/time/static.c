@@ -7,8 +7,9 @@
 #include "time_impl.h"
 
 /* Newton from the displacement that X holds. */
-static PetscErrorCode solve_once(SbRun run, Vec X, SNESConvergedReason *reason)
+static PetscErrorCode solve_once(void *ctx, Vec X, SNESConvergedReason *reason)
 {
+  SbRun run = (SbRun)ctx;
   PetscInt newton, linear;
 
   PetscFunctionBeginUser;
@@ -21,48 +22,30 @@ static PetscErrorCode solve_once(SbRun run, Vec X, SNESConvergedReason *reason)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* After a solve: whether contact wants another one. */
-static PetscErrorCode settle(SbRun run, PetscReal factor, Vec X, PetscBool *again)
+static PetscErrorCode contact_residual(void *ctx, Vec X, Vec R)
 {
-  Vec R;
+  SbRun run = (SbRun)ctx;
 
   PetscFunctionBeginUser;
-  PetscCall(VecDuplicate(X, &R));
-  PetscCall(SbModelResidual(run->model, factor, X, NULL, NULL, PETSC_FALSE, R));
-  PetscCall(SbModelContactSettle(run->model, factor, X, R, again));
-  if (*again) run->tangent_known = PETSC_FALSE;
-  PetscCall(VecDestroy(&R));
+  PetscCall(SbModelResidual(run->model, run->model->load, X, NULL, NULL, PETSC_FALSE, R));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/*
-  From the last equilibrium with the prescribed values of the new load factor; with contact as many solves as its set of nodes
-  takes.
-*/
+/* From the last equilibrium with the prescribed values of the new load factor. */
 static PetscErrorCode attempt(SbRun run, PetscReal factor, PetscReal length, Vec X,
                               SNESConvergedReason *reason)
 {
   SbModel m = run->model;
-  PetscBool again = (PetscBool)(m->ntouch > 0);
+  const SbContactSolve solve = {solve_once, contact_residual, run};
 
   PetscFunctionBeginUser;
   m->load = factor;
   PetscCall(VecCopy(run->U, X));
   PetscCall(SbModelPrescribe(m, factor, X));
-  if (again) {
-    PetscCall(SbModelContactBegin(m, factor - length, length, run->U, X));
-    run->tangent_known = PETSC_FALSE;
-  }
-  PetscCall(solve_once(run, X, reason));
-  for (PetscInt round = 1; again && *reason > 0; round++) {
-    PetscCall(settle(run, factor, X, &again));
-    if (!again) break;
-    if (round == SB_CONTACT_ROUNDS) {
-      *reason = SNES_DIVERGED_MAX_IT;
-      break;
-    }
+  if (m->ntouch)
+    PetscCall(SbRunSolveContact(run, run->snes, factor - length, length, run->U, X, &solve, reason));
+  else
     PetscCall(solve_once(run, X, reason));
-  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

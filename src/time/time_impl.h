@@ -48,3 +48,16 @@ PetscErrorCode SbFormStaticJacobian(SNES snes, Vec U, Mat J, Mat P, void *run);
 PetscErrorCode SbFormAcceleration(SbRun run, PetscReal t, Vec U, Vec V, Vec A);
 
 PetscErrorCode SbStaticSolve(SbRun run); /* static.c: the load path */
+
+/* How a step is solved, for the loop of contact. */
+typedef struct {
+  PetscErrorCode (*solve)(void *ctx, Vec U, SNESConvergedReason *reason); /* from the displacement in U */
+  PetscErrorCode (*residual)(void *ctx, Vec U, Vec R);                    /* without constraints, N */
+  void *ctx;
+} SbContactSolve;
+/*
+  SbRunSolveContact - a step from t to t + dt with contact: as many solves as its set of touching nodes takes, U from its guess to the
+  solution. Collective. U0 is the displacement at t. reason: that of the last solve, SNES_DIVERGED_MAX_IT when the set does not settle.
+*/
+PetscErrorCode SbRunSolveContact(SbRun run, SNES snes, PetscReal t, PetscReal dt, Vec U0, Vec U,
+                                 const SbContactSolve *solve, SNESConvergedReason *reason);

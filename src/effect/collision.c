@@ -1,0 +1,694 @@
+/*
+  collision.c - bodies against each other and themselves, with Coulomb friction.
+
+  Points (vertices of P1, centroids of boundary faces of CR and DG) of one surface meet facets of another. What a detector finds (src/contact)
+  becomes a row: with n the normal and b the weights of the nearest point on the facet,
+
+      gap = n . (x_p - sum_k b_k x_k) >= 0,     linear in u while n and b stay.
+
+  Forces act along n at p and, by the same weights, on the facet: momentum is kept, and so is angular momentum where the gap is closed.
+
+  Response `projected`: rows that touch are exact (src/fem/couple.c); their multiplier is the force. After each solve the
+  surfaces are looked at again: a pulling row leaves, a penetrated point enters, n and b are taken anew, until nothing changes.
+  A row that has come several times within a step stays, and n and b are kept after some looks: the loop ends. `penalty`: springs
+  N = <-k g>. `augmented`: N = <lambda - k g> with a multiplier that is raised after each solve (Simo and Laursen 1992).
+
+  Friction: a spring of stiffness k stretched by what the point has slid over the facet, which lets go at mu N (return mapping,
+  Wriggers 2006). A solve takes its tangent at the solve before, with the N of that: symmetric, and Newton's method on a convex
+  potential for given N; where that goes too far, the secant (Kacanov's method), which is slow and sure.
+
+  With one surface looking for the other (`sides one`), the finer one looks: rows then are not more than the surface can take. A thin
+  or much coarser partner wants both.
+*/
+#include "sbdetect.h"
+#include "sbeffect.h"
+
+#define TOGGLES 3    /* how often a row may come within a step before it stays */
+#define LOOKS 8      /* how often its normal and weights may change within a step */
+#define PULLING 1e-6 /* of the largest contact force: what a row must pull with to leave */
+#define SETTLED 1e-4 /* of the largest contact force: change of the friction that a solve assumed */
+#define LATE 1e-2    /* the same after UPDATES solves: what does not come to rest by then is cut */
+#define UPDATES 30
+#define TOLERANCE 1e-7 /* of the size of the bodies: largest penetration that counts as touching */
+#define NODES 5        /* of a row: the point's, and those of the facet's cell */
+
+typedef enum { PROJECTED, AUGMENTED, PENALTY } Response;
+
+/* A point and the surface of another part, or its own, near it. */
+typedef struct {
+  PetscInt point, part;
+  PetscInt n, node[NODES]; /* global numbers; the point's first */
+  PetscReal weight[NODES]; /* of the relative displacement w: 1, minus the facet's */
+  PetscReal normal[3];
+  PetscReal value;            /* n . w that closes the gap, m */
+  PetscReal gap;              /* at the last look, m */
+  PetscReal start[3], now[3]; /* w at the start of the step and at the last look, m */
+  PetscReal allowed;          /* penetration that was there before and is taken back step by step, m */
+  PetscReal k;                /* stiffness of springs, N/m */
+  PetscBool on;               /* it touches */
+  PetscBool was;              /* it touched at the end of the last step */
+  int toggles, looks;         /* within the step */
+  PetscInt row, slide[2];     /* rows of the space, -1: none */
+  PetscReal lambda;           /* multiplier, N */
+  PetscReal pressing;         /* N that friction assumes */
+  PetscReal stretch[3];       /* of the friction spring at the start of the step, m */
+  PetscReal tangent[2][3];
+  PetscBool newton;        /* sliding by Newton's method in the last solve */
+  int overshoots, careful; /* within the step: how often that went too far; solves left with the secant */
+  PetscReal drag[3];       /* force of friction in the last solve, N */
+  PetscBool slips;         /* at the end of the last step */
+} Hit;
+
+typedef struct {
+  SbEffectOn on;
+  SbSurface surface;
+  SbDetector detector;
+  Response response;
+  PetscBool self, both;
+  PetscReal mu, mu_kinetic, stiffness, reach, recovery;
+  PetscReal *edge;    /* [nbody] mean edge of the surfaces, m: the finer one looks */
+  PetscReal *point_k; /* [npoint] N/m */
+  PetscReal *u0;      /* [nnode][3] displacement at the start of the step, m */
+  PetscInt nhit, size, nspare;
+  Hit *hit, *spare;     /* by point and part */
+  int updates;          /* of friction within the step */
+  PetscReal work, loss; /* of the contact forces and of friction since the start, this rank, J */
+  PetscInt most;        /* rounds of a step, most so far */
+} Collision;
+
+static const SbOption rows[] = {
+  {"on", SB_OPTION_NAMES, 1, "", "boundary", "", "sets whose surfaces may meet"},
+  {"response", SB_OPTION_CHOICE, 1, "", "projected", "projected|augmented|penalty",
+   "exact rows in the solve; multipliers raised on springs; springs"},
+  {"detection", SB_OPTION_CHOICE, 1, "", "hash", "hash|bvh|brute",
+   "spatial hash, hierarchy of bounding volumes, or every pair: the same contacts"},
+  {"sides", SB_OPTION_CHOICE, 1, "", "both", "one|both",
+   "points of the finer of two surfaces look for the other one, or both do"},
+  {"self", SB_OPTION_BOOL, 1, "", "no", "", "bodies may meet themselves"},
+  {"friction", SB_OPTION_REAL, 1, "", "0", "[0, inf)", "Coulomb's coefficient for sticking"},
+  {"friction_kinetic", SB_OPTION_REAL, 1, "", "-1", "[-1, inf)",
+   "Coulomb's coefficient for slipping; negative: that for sticking"},
+  {"stiffness", SB_OPTION_REAL, 1, "", "20", "(0, inf)",
+   "springs of penalty, augmented and friction: factor on (lambda + 2 mu) area / height of the cell behind"},
+  {"reach", SB_OPTION_REAL, 1, "m", "0", "[0, inf)",
+   "how far points look for surfaces, and the deepest penetration that is found at rest; 0: half the mean "
+   "edge"},
+  {"recovery", SB_OPTION_REAL, 1, "steps", "30", "[1, inf)",
+   "bodies that overlap before they meet are parted slowly: to 1/e of the depth in so many steps; 1: at "
+   "once"},
+};
+
+static PetscErrorCode options_collision(SbEffect e, const SbScope *scope)
+{
+  Collision *c = (Collision *)e->data;
+  PetscInt choice;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbEffectReadOn(scope, &c->on));
+  PetscCall(SbOptionChoice(scope, "response", &choice));
+  c->response = (Response)choice;
+  PetscCall(SbOptionChoice(scope, "detection", &choice));
+  PetscCall(SbDetectorCreate((SbDetectKind)choice, &c->detector));
+  PetscCall(SbOptionChoice(scope, "sides", &choice));
+  c->both = (PetscBool)(choice == 1);
+  PetscCall(SbOptionBool(scope, "self", &c->self));
+  PetscCall(SbOptionReal(scope, "friction", &c->mu));
+  PetscCall(SbOptionReal(scope, "friction_kinetic", &c->mu_kinetic));
+  if (c->mu_kinetic < 0) c->mu_kinetic = c->mu;
+  PetscCheck(
+    c->mu_kinetic <= c->mu, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
+    "-effect_%s_friction_kinetic %g is above -effect_%s_friction %g: a slipping point would stop and "
+    "go at once",
+    e->name, (double)c->mu_kinetic, e->name, (double)c->mu);
+  PetscCall(SbOptionReal(scope, "stiffness", &c->stiffness));
+  PetscCall(SbOptionReal(scope, "reach", &c->reach));
+  PetscCall(SbOptionReal(scope, "recovery", &c->recovery));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ set-up */
+
+static PetscReal height_over(SbSpace space, const SbFacet *facet)
+{
+  const PetscInt *v = space->mesh->cell + 4 * facet->cell;
+  PetscReal height = 0;
+
+  for (int k = 0; k < 3; k++)
+    height +=
+      facet->normal[k] * (space->mesh->x[3 * facet->vertex[0] + k] - space->mesh->x[3 * v[facet->face] + k]);
+  return height;
+}
+
+/* Springs: (lambda + 2 mu) area / height, summed over the facets at a point. */
+static PetscErrorCode find_stiffness(Collision *c, SbSpace space, PetscInt n, const SbFacet facet[])
+{
+  PetscInt *slot;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscCalloc1(c->surface->scene.npoint, &c->point_k));
+  PetscCall(PetscMalloc1(space->nnode, &slot));
+  for (PetscInt i = 0; i < space->nnode; i++) slot[i] = -1;
+  for (PetscInt i = 0; i < c->surface->scene.npoint; i++) slot[c->surface->point_node[i]] = i;
+  for (PetscInt i = 0; i < n; i++) {
+    const SbMaterial m = space->material[space->mesh->cell_material[facet[i].cell]];
+    const PetscReal k =
+      c->stiffness * (m->lambda + 2 * m->mu) * facet[i].area / height_over(space, &facet[i]);
+    const PetscBool vertices = (PetscBool)(SbSpaceCellElement(space, facet[i].cell)->nodes_per[0] > 0);
+
+    for (int q = 0; q < (vertices ? 3 : 1); q++) {
+      const PetscInt a = vertices ? facet[i].corner[q] : facet[i].face;
+      const PetscInt at = slot[space->cell_node[4 * facet[i].cell + a]];
+
+      if (at >= 0) c->point_k[at] += vertices ? k / 3 : k;
+    }
+  }
+  PetscCall(PetscFree(slot));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Mean edge of each body's surface: the root of its mean facet area. */
+static PetscErrorCode find_edges(Collision *c, SbSpace space, PetscInt n, const SbFacet facet[])
+{
+  const PetscInt nbody = space->mesh->nbody;
+  PetscReal *count;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscCalloc1(nbody, &c->edge));
+  PetscCall(PetscCalloc1(nbody, &count));
+  for (PetscInt i = 0; i < n; i++) {
+    const PetscInt b = space->mesh->cell_body[facet[i].cell];
+
+    if (facet[i].cell >= space->mesh->ncell_owned) continue;
+    c->edge[b] += facet[i].area;
+    count[b]++;
+  }
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, c->edge, (PetscMPIInt)nbody, MPIU_REAL, MPI_SUM, space->comm));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, count, (PetscMPIInt)nbody, MPIU_REAL, MPI_SUM, space->comm));
+  for (PetscInt b = 0; b < nbody; b++) c->edge[b] = count[b] > 0 ? PetscSqrtReal(c->edge[b] / count[b]) : 0;
+  PetscCall(PetscFree(count));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode setup_collision(SbEffect e, SbSpace space)
+{
+  Collision *c = (Collision *)e->data;
+  SbFacet *facet;
+  PetscInt n;
+
+  PetscFunctionBeginUser;
+  PetscCheck(
+    space->mesh->nbody > 1 || c->self, space->comm, PETSC_ERR_USER_INPUT,
+    "The effect %s has only one body to look at: give -effect_%s_self yes for a body that may meet itself",
+    e->name, e->name);
+  PetscCall(SbEffectFacets(space, &c->on, &n, &facet));
+  PetscCall(SbSurfaceCreate(space, n, facet, &c->surface));
+  PetscCall(find_stiffness(c, space, n, facet));
+  PetscCall(find_edges(c, space, n, facet));
+  PetscCall(PetscFree(facet));
+  PetscCall(PetscMalloc1(3 * space->nnode, &c->u0));
+  if (c->reach == 0) c->reach = 0.5 * c->surface->edge;
+  PetscCall(SbSpaceCoupleCreate(space));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ looking */
+
+/* Of two surfaces, whether the points of `mine` look for `other`. */
+static PetscBool looks_for(const Collision *c, PetscInt mine, PetscInt other)
+{
+  if (c->both || mine == other) return PETSC_TRUE;
+  if (c->edge[mine] != c->edge[other]) return (PetscBool)(c->edge[mine] < c->edge[other]);
+  return (PetscBool)(mine < other);
+}
+
+/* Displacement of a point less that of its place on the facet, from places x and X. */
+static void relative(const SbNear *near, const SbDetectScene *s, const PetscReal p[], const PetscReal x[],
+                     PetscReal w[3])
+{
+  const PetscInt *corner = s->facet + 3 * near->facet;
+
+  for (int i = 0; i < 3; i++) {
+    w[i] = p[3 * near->point + i] - s->P[3 * near->point + i];
+    for (int k = 0; k < 3; k++) w[i] -= near->weight[k] * (x[3 * corner[k] + i] - s->X[3 * corner[k] + i]);
+  }
+}
+
+/*
+  Normal, weights and gap of a pair as the detector sees it now. A point that was behind this facet when the step began, and not held
+  there, was not seen before (it came over a rim, or bodies overlap from the start): putting it in front at once would
+  throw it out.
+*/
+static void take_geometry(const Collision *c, const SbNear *near, Hit *hit)
+{
+  const SbSurface f = c->surface;
+  const SbDetectScene *s = &f->scene;
+
+  const PetscReal turned = SbDot3(hit->normal, near->normal);
+
+  hit->n = 1;
+  hit->node[0] = f->space->gnode[f->point_node[near->point]];
+  hit->weight[0] = 1;
+  for (int a = 0; a < 4; a++) {
+    PetscReal w = 0;
+
+    for (int k = 0; k < 3; k++) w += near->weight[k] * f->facet_weight[12 * near->facet + 4 * k + a];
+    if (PetscAbsReal(w) < 1e-14) continue;
+    hit->node[hit->n] = f->facet_node[4 * near->facet + a];
+    hit->weight[hit->n++] = -w;
+  }
+  for (int i = 0; i < 3; i++) hit->normal[i] = near->normal[i];
+  relative(near, s, s->p, s->x, hit->now);
+  relative(near, s, s->p0 ? s->p0 : s->p, s->x0 ? s->x0 : s->x, hit->start);
+  hit->gap = near->gap;
+  hit->value = SbDot3(hit->normal, hit->now) - near->gap;
+  if (!hit->was || turned < 0.7)
+    hit->allowed = PetscMax(0, SbDot3(hit->normal, hit->now) - SbDot3(hit->normal, hit->start) - near->gap);
+}
+
+static PetscErrorCode make_room(Collision *c, PetscInt n)
+{
+  PetscFunctionBeginUser;
+  if (n > c->size) {
+    c->size = PetscMax(n, 2 * c->size);
+    PetscCall(PetscRealloc((size_t)c->size * sizeof(Hit), &c->hit));
+    PetscCall(PetscRealloc((size_t)c->size * sizeof(Hit), &c->spare));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static inline PetscBool before(const Hit *a, PetscInt point, PetscInt part)
+{
+  return (PetscBool)(a->point < point || (a->point == point && a->part < part));
+}
+
+/*
+  The pairs found, each with what is known of it from before. Within a step (`keep`) a pair that touches and was not found stays
+  as it is: it slid over a rim.
+*/
+static PetscErrorCode merge(Collision *c, PetscInt n, const SbNear near[], PetscBool keep)
+{
+  const SbDetectScene *s = &c->surface->scene;
+  PetscInt old = 0, m = 0;
+  Hit *swap;
+
+  PetscFunctionBeginUser;
+  PetscCall(make_room(c, n + c->nhit));
+  for (PetscInt i = 0; i < n; i++) {
+    const PetscInt part = s->facet_part[near[i].facet];
+    Hit hit = {
+      .point = near[i].point, .part = part, .k = c->point_k[near[i].point], .row = -1, .slide = {-1, -1}};
+
+    if (!looks_for(c, s->point_part[near[i].point], part)) continue;
+    for (; old < c->nhit && before(&c->hit[old], hit.point, part); old++) {
+      if (keep && c->hit[old].on) c->spare[m++] = c->hit[old];
+    }
+    if (old < c->nhit && c->hit[old].point == hit.point && c->hit[old].part == part) hit = c->hit[old++];
+    if (!keep || !hit.on || hit.looks++ < LOOKS) take_geometry(c, &near[i], &hit);
+    c->spare[m++] = hit;
+  }
+  for (; old < c->nhit; old++) {
+    if (keep && c->hit[old].on) c->spare[m++] = c->hit[old];
+  }
+  swap = c->hit;
+  c->hit = c->spare;
+  c->spare = swap;
+  c->nhit = m;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode look(Collision *c, const PetscReal u[], PetscBool keep)
+{
+  const SbNear *near = NULL;
+  PetscInt n = 0;
+  PetscBool close;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbSurfaceUpdate(c->surface, c->u0, u, c->reach, c->self, &close));
+  if (close) PetscCall(SbDetectorFind(c->detector, &c->surface->scene, &n, &near));
+  PetscCall(merge(c, n, near, keep));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Gap beyond what is allowed for now, m. */
+static inline PetscReal excess(const Hit *hit)
+{
+  return hit->gap + hit->allowed;
+}
+
+static PetscErrorCode touch_collision(SbEffect e, SbSpace space, PetscReal t, PetscReal dt,
+                                      const PetscReal u0[], const PetscReal u[])
+{
+  Collision *c = (Collision *)e->data;
+
+  PetscFunctionBeginUser;
+  (void)t;
+  (void)dt;
+  PetscCall(PetscArraycpy(c->u0, u0, 3 * space->nnode));
+  c->updates = 0;
+  PetscCall(look(c, u, PETSC_FALSE));
+  for (PetscInt i = 0; i < c->nhit; i++) {
+    Hit *hit = &c->hit[i];
+
+    hit->toggles = hit->looks = 0;
+    hit->overshoots = hit->careful = 0;
+    hit->allowed *= c->recovery > 1 ? PetscExpReal(-1 / c->recovery) : 0;
+    if (!hit->on) { /* a point that arrives in this step sticks to where it was at its start */
+      for (int k = 0; k < 3; k++) hit->stretch[k] = 0;
+      hit->pressing = hit->lambda = 0;
+      hit->slips = PETSC_FALSE;
+    }
+    if (c->response != PROJECTED)
+      hit->on = (PetscBool)(hit->lambda - hit->k * (excess(hit) - TOLERANCE * c->surface->size) >= 0);
+    else if (excess(hit) <= TOLERANCE * c->surface->size)
+      hit->on = PETSC_TRUE;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ rows */
+
+/* Two directions across n. */
+static void frame(const PetscReal n[3], PetscReal t[2][3])
+{
+  const int k = PetscAbsReal(n[0]) < 0.6 ? 0 : 1;
+  PetscReal length;
+
+  for (int i = 0; i < 3; i++) t[0][i] = (i == k) - n[k] * n[i];
+  length = PetscSqrtReal(SbDot3(t[0], t[0]));
+  for (int i = 0; i < 3; i++) t[0][i] /= length;
+  SbCross(n, t[0], t[1]);
+}
+
+/* Stretch of the friction spring across the normal, m; returns its length. */
+static PetscReal stretch(const Hit *hit, const PetscReal w[3], PetscReal s[3])
+{
+  PetscReal along;
+
+  for (int i = 0; i < 3; i++) s[i] = hit->stretch[i] + w[i] - hit->start[i];
+  along = SbDot3(hit->normal, s);
+  for (int i = 0; i < 3; i++) s[i] -= along * hit->normal[i];
+  return PetscSqrtReal(SbDot3(s, s));
+}
+
+/* Most that friction holds, N. */
+static PetscReal limit(const Collision *c, const Hit *hit)
+{
+  return (hit->slips ? c->mu_kinetic : c->mu) * hit->pressing;
+}
+
+static void coefficients(const Hit *hit, const PetscReal direction[3], PetscReal coef[3 * NODES])
+{
+  for (PetscInt k = 0; k < 3 * hit->n; k++) coef[k] = hit->weight[k / 3] * direction[k % 3];
+}
+
+/* Force of friction for a stretch s of the given length, N. */
+static PetscReal drag(const Collision *c, const Hit *hit, PetscReal length)
+{
+  return PetscMin(hit->k * length, limit(c, hit));
+}
+
+/*
+  Two springs across the normal. Sticking: of stiffness k. Sliding: the force mu N along the slip does not change, across it has the
+  stiffness mu N / stretch: Newton's method on friction's potential for given N. Should that turn the slip around, both have the secant's.
+*/
+static PetscErrorCode add_friction(const Collision *c, SbSpace space, Hit *hit)
+{
+  PetscReal s[3], coef[3 * NODES], length, stiffness;
+  PetscBool sliding;
+
+  PetscFunctionBeginUser;
+  hit->slide[0] = hit->slide[1] = -1;
+  hit->newton = PETSC_FALSE;
+  if (hit->pressing <= 0) PetscFunctionReturn(PETSC_SUCCESS);
+  length = stretch(hit, hit->now, s);
+  sliding = (PetscBool)(hit->k * length > limit(c, hit));
+  hit->newton = (PetscBool)(sliding && !hit->careful);
+  stiffness = sliding ? limit(c, hit) / length : hit->k;
+  if (sliding) {
+    for (int k = 0; k < 3; k++) hit->tangent[0][k] = s[k] / length;
+    SbCross(hit->normal, hit->tangent[0], hit->tangent[1]);
+  } else
+    frame(hit->normal, hit->tangent);
+  for (int q = 0; q < 2; q++) {
+    const PetscReal *t = hit->tangent[q], rest = SbDot3(t, hit->start) - SbDot3(t, hit->stretch);
+    const PetscBool constant = (PetscBool)(hit->newton && q == 0);
+
+    coefficients(hit, t, coef);
+    PetscCall(SbSpaceCoupleSpring(space, hit->n, hit->node, coef, rest, constant ? 0 : stiffness,
+                                  constant ? -limit(c, hit) : 0, &hit->slide[q]));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode hold_collision(SbEffect e, SbSpace space)
+{
+  Collision *c = (Collision *)e->data;
+
+  PetscFunctionBeginUser;
+  for (PetscInt i = 0; i < c->nhit; i++) {
+    Hit *hit = &c->hit[i];
+    PetscReal coef[3 * NODES];
+
+    hit->row = -1;
+    if (!hit->on) continue;
+    coefficients(hit, hit->normal, coef);
+    if (c->response == PROJECTED)
+      PetscCall(SbSpaceCoupleRow(space, hit->n, hit->node, coef, hit->value - hit->allowed, &hit->row));
+    else
+      PetscCall(SbSpaceCoupleSpring(space, hit->n, hit->node, coef, hit->value - hit->allowed, hit->k,
+                                    hit->lambda, &hit->row));
+    if (c->mu > 0) PetscCall(add_friction(c, space, hit));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ settling */
+
+/* Normal force after a solve, N. */
+static inline PetscReal normal_force(const Collision *c, const Hit *hit)
+{
+  if (c->response == PROJECTED) return hit->lambda;
+  return PetscMax(0, hit->lambda - hit->k * excess(hit));
+}
+
+/* Whether an exact row is there, or not, as it should be; changes it if not. */
+static PetscBool settle_row(const Collision *c, PetscReal largest, Hit *hit)
+{
+  const PetscReal small = TOLERANCE * c->surface->size;
+
+  if (!hit->on) {
+    if (excess(hit) >= -small) return PETSC_TRUE;
+    hit->on = PETSC_TRUE;
+    hit->toggles++;
+    return PETSC_FALSE;
+  }
+  if (hit->lambda < -PULLING * largest && hit->toggles < TOGGLES) {
+    hit->on = PETSC_FALSE;
+    hit->lambda = 0;
+    return PETSC_FALSE;
+  }
+  hit->lambda = PetscMax(0, hit->lambda);
+  return (PetscBool)(PetscAbsReal(excess(hit)) <= small || hit->looks >= LOOKS);
+}
+
+/* The same for springs: who pushes, and with `augmented` the multiplier. */
+static PetscBool settle_spring(const Collision *c, Hit *hit)
+{
+  const PetscReal force = normal_force(c, hit);
+  const PetscBool was = hit->on;
+
+  hit->on = (PetscBool)(force > 0);
+  if (c->response == AUGMENTED &&
+      (force > 0 ? PetscAbsReal(excess(hit)) > TOLERANCE * c->surface->size : hit->lambda > 0)) {
+    hit->lambda = force;
+    return PETSC_FALSE;
+  }
+  return (PetscBool)(was == hit->on);
+}
+
+/* Once who touches is settled everywhere: the N that friction assumes, from the second half on with half steps. */
+static PetscErrorCode settle_friction(Collision *c, SbSpace space, PetscReal largest, PetscBool *changed)
+{
+  PetscBool wait = *changed;
+
+  PetscFunctionBeginUser;
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &wait, 1, SB_MPI_BOOL, MPI_LOR, space->comm));
+  if (wait) PetscFunctionReturn(PETSC_SUCCESS);
+  c->updates++;
+  if (c->updates > UPDATES) largest *= LATE / SETTLED;
+  for (PetscInt i = 0; i < c->nhit; i++) {
+    Hit *hit = &c->hit[i];
+    PetscReal s[3], change, length, wrong[3];
+
+    if (!hit->on) continue;
+    length = stretch(hit, hit->now, s);
+    if (hit->careful) hit->careful--;
+    if (hit->newton && (SbDot3(hit->drag, s) > 0 || hit->k * length < 0.9 * limit(c, hit)))
+      hit->careful = 1 << PetscMin(5, ++hit->overshoots);
+    change = normal_force(c, hit) - hit->pressing;
+    hit->pressing += 2 * c->updates > UPDATES ? 0.5 * change : change;
+    for (int k = 0; k < 3; k++)
+      wrong[k] = hit->drag[k] + (length > 0 ? drag(c, hit, length) / length * s[k] : 0);
+    if (SbDot3(wrong, wrong) > PetscSqr(SETTLED * c->mu * largest)) *changed = PETSC_TRUE;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* What a solve made of the rows of a pair: its multiplier, gap and place, should its normal and weights stay. */
+static void read_rows(const Collision *c, SbSpace space, Hit *hit)
+{
+  PetscReal force, along, across[2] = {0, 0};
+
+  for (int k = 0; k < 3; k++) hit->drag[k] = 0;
+  if (hit->row < 0) return;
+  SbSpaceCoupleGet(space, hit->row, &force, &along);
+  if (c->response == PROJECTED) hit->lambda = force;
+  hit->gap = along - hit->value;
+  if (c->mu <= 0 || hit->slide[0] < 0) return;
+  for (int q = 0; q < 2; q++) {
+    SbSpaceCoupleGet(space, hit->slide[q], &force, &across[q]);
+    for (int k = 0; k < 3; k++) hit->drag[k] += force * hit->tangent[q][k];
+  }
+  for (int k = 0; k < 3; k++)
+    hit->now[k] = along * hit->normal[k] + across[0] * hit->tangent[0][k] + across[1] * hit->tangent[1][k];
+}
+
+static PetscErrorCode settle_collision(SbEffect e, SbSpace space, const PetscReal u[], const PetscReal r[],
+                                       PetscBool *changed)
+{
+  Collision *c = (Collision *)e->data;
+  PetscReal largest = 0;
+  PetscBool mine = PETSC_FALSE;
+
+  PetscFunctionBeginUser;
+  (void)r;
+  for (PetscInt i = 0; i < c->nhit; i++) read_rows(c, space, &c->hit[i]);
+  PetscCall(look(c, u, PETSC_TRUE));
+  for (PetscInt i = 0; i < c->nhit; i++) largest = PetscMax(largest, normal_force(c, &c->hit[i]));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &largest, 1, MPIU_REAL, MPI_MAX, space->comm));
+  for (PetscInt i = 0; i < c->nhit; i++) {
+    Hit *hit = &c->hit[i];
+    const PetscBool right = c->response == PROJECTED ? settle_row(c, largest, hit) : settle_spring(c, hit);
+
+    if (!right) mine = PETSC_TRUE;
+  }
+  if (c->mu > 0) PetscCall(settle_friction(c, space, largest, &mine));
+  if (mine) *changed = PETSC_TRUE;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ after a step */
+
+/* Who slid keeps the stretch that the force asks for; work of the forces on the way from the start of the step. */
+static PetscErrorCode accept_collision(SbEffect e, SbSpace space, const SbStage *stage)
+{
+  Collision *c = (Collision *)e->data;
+
+  PetscFunctionBeginUser;
+  (void)space;
+  (void)stage;
+  for (PetscInt i = 0; i < c->nhit; i++) {
+    Hit *hit = &c->hit[i];
+    const PetscReal normal = hit->on ? normal_force(c, hit) : 0;
+    PetscReal s[3], slid[3], length, held;
+
+    hit->was = hit->on;
+    if (normal <= 0) continue;
+    for (int k = 0; k < 3; k++) slid[k] = hit->now[k] - hit->start[k];
+    c->work += normal * SbDot3(hit->normal, slid);
+    length = stretch(hit, hit->now, s);
+    held = drag(c, hit, length);
+    hit->slips = (PetscBool)(hit->k * length > limit(c, hit));
+    if (length > 0) {
+      c->loss += held / length * SbDot3(s, slid);
+      for (int k = 0; k < 3; k++) hit->stretch[k] = s[k] * held / (hit->k * length);
+    }
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode history_collision(SbEffect e, SbSpace space, const SbStage *stage,
+                                        const PetscReal residual[], PetscReal values[])
+{
+  Collision *c = (Collision *)e->data;
+  PetscReal deepest = 0, sum[2] = {0, 0};
+  PetscMPIInt rank;
+
+  PetscFunctionBeginUser;
+  (void)stage;
+  (void)residual;
+  for (int k = 0; k < 7; k++) values[k] = 0;
+  for (PetscInt i = 0; i < c->nhit; i++) {
+    const Hit *hit = &c->hit[i];
+
+    if (hit->gap < -TOLERANCE * c->surface->size) {
+      deepest = PetscMax(deepest, -hit->gap);
+      sum[0] -= hit->gap;
+      sum[1]++;
+    }
+    if (!hit->on || normal_force(c, hit) <= 0) continue;
+    values[0]++;
+    values[3] += normal_force(c, hit);
+    if (hit->pressing > 0) {
+      PetscReal s[3];
+
+      values[4] += drag(c, hit, stretch(hit, hit->now, s));
+    }
+  }
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &deepest, 1, MPIU_REAL, MPI_MAX, space->comm));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, sum, 2, MPIU_REAL, MPI_SUM, space->comm));
+  PetscCallMPI(MPI_Comm_rank(space->comm, &rank));
+  if (!rank) {
+    values[1] = deepest;
+    values[2] = sum[1] > 0 ? sum[0] / sum[1] : 0;
+  }
+  values[5] = c->work;
+  values[6] = c->loss;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode destroy_collision(SbEffect e)
+{
+  Collision *c = (Collision *)e->data;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbEffectFreeOn(&c->on));
+  PetscCall(SbSurfaceDestroy(&c->surface));
+  PetscCall(SbDetectorDestroy(&c->detector));
+  PetscCall(PetscFree(c->point_k));
+  PetscCall(PetscFree(c->edge));
+  PetscCall(PetscFree(c->u0));
+  PetscCall(PetscFree(c->hit));
+  PetscCall(PetscFree(c->spare));
+  PetscCall(PetscFree(e->data));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode create_collision(SbEffect e)
+{
+  static const char *const columns[] = {"contacts",       "penetration", "penetration_mean", "normal_force",
+                                        "friction_force", "work",        "friction_loss"};
+  Collision *c;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscNew(&c));
+  e->data = c;
+  e->steady = PETSC_FALSE; /* a load factor does not make bodies pass through each other */
+  e->ops.setfromoptions = options_collision;
+  e->ops.setup = setup_collision;
+  e->ops.touch = touch_collision;
+  e->ops.hold = hold_collision;
+  e->ops.settle = settle_collision;
+  e->ops.accept = accept_collision;
+  e->ops.history = history_collision;
+  e->ops.destroy = destroy_collision;
+  for (e->ncolumn = 0; e->ncolumn < 7; e->ncolumn++) e->column[e->ncolumn] = columns[e->ncolumn];
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbEffectRegister_Collision(void)
+{
+  PetscFunctionBeginUser;
+  PetscCall(SbEffectRegister("collision", create_collision, PETSC_STATIC_ARRAY_LENGTH(rows), rows));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

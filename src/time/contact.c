@@ -1,0 +1,83 @@
+/*
+  The solves of a step with contact: who touches is guessed, the equations are solved, the guess is looked at, and so on until it was
+  right.
+
+  A later solve begins next to its solution, and a tolerance relative to its own start would ask for digits that rounding does not
+  leave beside large contact forces. So all solves of a step aim at what the first one aims at.
+*/
+#include "time_impl.h"
+
+/* Tolerances of the solvers as the user left them. */
+typedef struct {
+  PetscReal atol, rtol, stol, linear_rtol, linear_atol, dtol;
+  PetscInt max_it, max_f, linear_max;
+  PetscBool single; /* one linear solve in the place of Newton */
+} Aim;
+
+static PetscErrorCode get_aim(SNES snes, Aim *aim)
+{
+  KSP ksp;
+
+  PetscFunctionBeginUser;
+  PetscCall(SNESGetKSP(snes, &ksp));
+  PetscCall(SNESGetTolerances(snes, &aim->atol, &aim->rtol, &aim->stol, &aim->max_it, &aim->max_f));
+  PetscCall(KSPGetTolerances(ksp, &aim->linear_rtol, &aim->linear_atol, &aim->dtol, &aim->linear_max));
+  PetscCall(PetscObjectTypeCompare((PetscObject)snes, SNESKSPONLY, &aim->single));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Absolute tolerances for solves of a step whose first residual is `size`, N; 0: those of the user. */
+static PetscErrorCode set_aim(SNES snes, const Aim *aim, PetscReal size)
+{
+  const PetscReal atol = PetscMax(aim->atol, aim->rtol * size);
+  const PetscReal linear = aim->single ? aim->linear_rtol * size : 0.1 * aim->rtol * size;
+  KSP ksp;
+
+  PetscFunctionBeginUser;
+  PetscCall(SNESGetKSP(snes, &ksp));
+  PetscCall(SNESSetTolerances(snes, atol, aim->rtol, aim->stol, aim->max_it, aim->max_f));
+  PetscCall(
+    KSPSetTolerances(ksp, PETSC_DEFAULT, PetscMax(aim->linear_atol, linear), PETSC_DEFAULT, PETSC_DEFAULT));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode first_residual(SNES snes, Vec U, Vec R, PetscReal *size)
+{
+  PetscFunctionBeginUser;
+  PetscCall(SNESComputeFunction(snes, U, R));
+  PetscCall(VecNorm(R, NORM_2, size));
+  if (PetscIsInfOrNanReal(*size)) *size = 0;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbRunSolveContact(SbRun run, SNES snes, PetscReal t, PetscReal dt, Vec U0, Vec U,
+                                 const SbContactSolve *solve, SNESConvergedReason *reason)
+{
+  const SbModel m = run->model;
+  PetscBool again = PETSC_TRUE;
+  PetscReal size;
+  Aim aim;
+
+  PetscFunctionBeginUser;
+  if (!run->R) PetscCall(VecDuplicate(U, &run->R));
+  PetscCall(get_aim(snes, &aim));
+  PetscCall(SbModelContactBegin(m, t, dt, U0, U));
+  /* the matrix holds what was held before */
+  if (m->space->held || !m->dynamic) run->tangent_known = PETSC_FALSE;
+  PetscCall(first_residual(snes, U, run->R, &size));
+  PetscCall(set_aim(snes, &aim, size));
+  PetscCall((*solve->solve)(solve->ctx, U, reason));
+  for (PetscInt round = 1; *reason > 0; round++) {
+    PetscCall((*solve->residual)(solve->ctx, U, run->R));
+    PetscCall(SbModelContactSettle(m, t + dt, U, run->R, &again));
+    if (!again) break;
+    if (m->space->held || !m->dynamic) run->tangent_known = PETSC_FALSE;
+    if (round == SB_CONTACT_ROUNDS) {
+      *reason = SNES_DIVERGED_MAX_IT;
+      break;
+    }
+    PetscCall((*solve->solve)(solve->ctx, U, reason));
+  }
+  PetscCall(set_aim(snes, &aim, 0));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
