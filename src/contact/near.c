@@ -22,7 +22,7 @@
 #define TIE_TIME 1e-9 /* of the step: passages at the same time */
 #define TOUCH 1e-9    /* of the reach: places that are one */
 #define AT \
-  1e-2 /* of the reach: nearer than this the way to an edge or corner is no direction to push along */
+  1e-4 /* of the reach: nearer than this the way to an edge or corner is no direction to push along */
 #define FACING 1e-6 /* cosine: normals oppose each other by more than rounding */
 #define START \
   0.1 /* of the reach: so far behind a facet a point may begin the step and still be in front: it lay in contact */

@@ -147,9 +147,10 @@ static void check_contact(const SbDetectScene *s, const SbNear *a, unsigned k)
   SB_CHECK_NEAR(along, a->gap, 1e-9 * s->reach, "the gap along the normal");
   if (!a->crossed) {
     /* very near an edge or corner the gap is along a facet's normal there */
-    SB_CHECK_NEAR(SbDot3(r, r), a->gap * a->gap, 1e-4 * s->reach * s->reach, "the gap to the nearest point");
-    if (SbDot3(r, r) > 1e-4 * s->reach * s->reach)
-      SB_CHECK_NEAR(SbDot3(r, r), a->gap * a->gap, 1e-9 * s->reach * s->reach, "the gap to the nearest point");
+    SB_CHECK_NEAR(SbDot3(r, r), a->gap * a->gap, 1e-8 * s->reach * s->reach, "the gap to the nearest point");
+    if (SbDot3(r, r) > 1e-8 * s->reach * s->reach)
+      SB_CHECK_NEAR(SbDot3(r, r), a->gap * a->gap, 1e-9 * s->reach * s->reach,
+                    "the gap to the nearest point");
   }
 }
 
