@@ -23,6 +23,7 @@
 typedef struct {
   PetscInt a, f;   /* node of the points, node of the facets */
   unsigned am, fm; /* which children of each; all bits for all */
+  PetscBool apart; /* they are of two parts */
 } Visit;
 
 typedef struct {
@@ -43,9 +44,9 @@ typedef struct {
   SbBound *vertex_cone; /* [nvertex][SB_VOLUME_CONE] */
   PetscReal *normal;    /* [nfacet][3] */
   PetscInt nvertex;
-  PetscBool cull;  /* in this call normals are looked at */
+  PetscBool cull;  /* the trees have cones, for self-contact */
   PetscBool first; /* in this walk */
-  unsigned *live; /* [nnode of points] children that are walked to; in the first walk: points that are done */
+  unsigned *live;  /* [nnode of points] children that are walked to */
   PetscReal built; /* relative size of the volumes at the last build */
   PetscBool stale; /* other settings */
   Visit *stack;
@@ -62,12 +63,14 @@ typedef struct {
 static void facet_column(const SbDetector d, const SbDetectScene *s, const SbVolume *v, PetscInt f,
                          SbBound column[])
 {
-  const PetscInt *c = s->facet + 3 * f;
   const PetscReal *x[6];
-  int n = 3;
+  int n = 0;
 
-  for (int i = 0; i < 3; i++) x[i] = s->x + 3 * c[i];
-  for (int i = 0; i < 3 && s->x0; i++) x[n++] = s->x0 + 3 * c[i];
+  /* of a box all is known */
+  for (int i = 0; i < 3 && v->k != 6; i++) {
+    x[n++] = s->x + 3 * s->facet[3 * f + i];
+    if (s->x0) x[n++] = s->x0 + 3 * s->facet[3 * f + i];
+  }
   SbVolumeOf(v, n, x, d->facet_box + 6 * f, s->reach, column);
 }
 
@@ -124,7 +127,6 @@ static void fit(const SbDetector d, const SbDetectScene *s, const Bvh *b, PetscB
   const SbVolume *v = &b->volume;
   const PetscInt w = v->width, row = points ? 1 : v->lanes, lane = points ? v->rows : 1;
   const size_t stride = (size_t)v->lanes * (size_t)v->rows;
-  const int rows = b->cull ? v->rows : v->cone;
   SbBound column[SB_VOLUME_ROWS];
 
   t->inner = t->leaves = 0;
@@ -146,7 +148,7 @@ static void fit(const SbDetector d, const SbDetectScene *s, const Bvh *b, PetscB
         fit_item(d, s, b, points, SB_TREE_ITEM(child), column, part + l);
         t->leaves += SbVolumeSize(v, column);
       }
-      for (int r = 0; r < rows; r++) block[r * row] = column[r];
+      for (int r = 0; r < v->rows; r++) block[r * row] = column[r];
     }
     t->common[g] = common_part(t->tree.nchild[g], part);
   }
@@ -201,7 +203,8 @@ static PetscErrorCode build(SbDetector d, const SbDetectScene *s, Bvh *b)
   SbFacetLinks links;
 
   PetscFunctionBeginUser;
-  SbVolumeSet(b->settings.k, b->settings.branching, &b->volume);
+  SbVolumeSet(b->settings.k, b->settings.branching, s->self, &b->volume);
+  b->cull = s->self;
   PetscCall(SbFacetLinksCreate(s, &d->rings, &links));
   PetscCall(SbBinaryCreate(&facets, linked ? links.start : NULL, links.list, &over_facets));
   PetscCall(SbBinaryHang(&over_facets, links.seat, &points, &over_points));
@@ -234,7 +237,6 @@ static void find_origin(const SbDetectScene *s, PetscReal origin[3])
 
 static void fit_both(SbDetector d, const SbDetectScene *s, Bvh *b)
 {
-  b->cull = s->self;
   if (b->cull) SbConesOfVertices(s, &d->rings, b->open, b->normal, b->vertex_cone);
   find_origin(s, b->volume.origin);
   fit(d, s, b, PETSC_FALSE, &b->facets);
@@ -251,8 +253,8 @@ static PetscReal relative_size(const Bvh *b)
 
 static PetscErrorCode prepare(SbDetector d, const SbDetectScene *s, Bvh *b)
 {
-  PetscBool anew = (PetscBool)(b->stale || !d->same_facets || b->facets.tree.n != s->nfacet ||
-                               b->points.tree.n != s->npoint);
+  PetscBool anew = (PetscBool)(b->stale || !d->same_facets || b->cull != s->self ||
+                               b->facets.tree.n != s->nfacet || b->points.tree.n != s->npoint);
 
   PetscFunctionBeginUser;
   if (!anew) {
@@ -301,27 +303,33 @@ static unsigned without_part(const Bvh *b, PetscInt f, PetscInt part, unsigned m
   return mask;
 }
 
-/* Which children of the two nodes meet; false when none do. Parts do not meet themselves unless `self`. */
-static PetscBool meet(Bvh *b, const Visit *v, PetscBool self, unsigned hit[])
+/*
+  Which children of the two nodes meet: bits of the point node's, and hit[] for them. Parts do not meet themselves unless `self`; below
+  nodes of two parts there is nothing to compare.
+*/
+static unsigned meet(Bvh *b, Visit *v, PetscBool self, unsigned hit[])
 {
   const SbVolume *volume = &b->volume;
   const size_t stride = (size_t)volume->lanes * (size_t)volume->rows;
-  const PetscInt n = b->points.tree.nchild[v->a], *part = b->points.part + v->a * volume->width;
-  const PetscInt common = b->points.common[v->a], facets = b->facets.common[v->f];
-  const unsigned live = v->am & (b->first ? ~b->live[v->a] : b->live[v->a]);
-  unsigned any = 0;
+  const PetscInt *part = b->points.part + v->a * volume->width;
+  const unsigned mask = v->am & b->live[v->a];
+  unsigned any;
 
-  if (!self && common == facets && common != NO_PART) return PETSC_FALSE;
-  volume->meet[b->first ? 1 : 0](b->points.block + stride * v->a, n, live, b->facets.block + stride * v->f,
-                                 hit);
-  for (PetscInt c = 0; c < n; c++) {
-    b->counts.visits += live >> c & 1;
-    hit[c] &= v->fm;
-    if (hit[c] && !self && part[c] != NO_PART && (facets == NO_PART || facets == part[c]))
-      hit[c] = without_part(b, v->f, part[c], hit[c]);
-    any |= hit[c];
+  if (!self && !v->apart) {
+    const PetscInt common = b->points.common[v->a], other = b->facets.common[v->f];
+
+    if (common == other && common != NO_PART) return 0;
+    v->apart = (PetscBool)(common != NO_PART && other != NO_PART);
   }
-  return (PetscBool)(any != 0);
+  any = volume->meet[b->first ? 1 : 0](b->points.block + stride * v->a, volume->rows, mask,
+                                       b->facets.block + stride * v->f, hit);
+  for (int c = 0; mask >> c; c++) {
+    b->counts.visits += mask >> c & 1;
+    if (!(any >> c & 1)) continue;
+    hit[c] &= v->fm;
+    if (!self && !v->apart && part[c] != NO_PART) hit[c] = without_part(b, v->f, part[c], hit[c]);
+  }
+  return any;
 }
 
 /* A child of a point node against those of a facet node that it meets: follows them. Returns the new end of the stack. */
@@ -335,23 +343,23 @@ static PetscInt follow(Bvh *b, const Visit *v, PetscInt c, unsigned hit, unsigne
     if (!(hit >> l & 1)) continue;
     if (child >= 0) {
       if (facet[l] >= 0)
-        b->stack[nstack++] = (Visit){child, facet[l], ~0u, ~0u};
+        b->stack[nstack++] = (Visit){child, facet[l], ~0u, ~0u, v->apart};
       else
         leaves |= 1u << l;
     } else if (facet[l] >= 0)
       single[l] |= 1u << c;
     else if (b->first)
-      b->live[v->a] |= 1u << c;
+      b->live[v->a] &= ~(1u << c);
     else {
       b->pair[b->npair][0] = SB_TREE_ITEM(child);
       b->pair[b->npair++][1] = SB_TREE_ITEM(facet[l]);
     }
   }
-  if (leaves) b->stack[nstack++] = (Visit){child, v->f, ~0u, leaves};
+  if (leaves) b->stack[nstack++] = (Visit){child, v->f, ~0u, leaves, v->apart};
   return nstack;
 }
 
-/* All pairs that meet, into b->pair; in the first walk into b->live. */
+/* All pairs that meet, into b->pair; in the first walk points that meet anything are taken out of b->live. */
 static PetscErrorCode walk(Bvh *b, PetscBool self)
 {
   const PetscInt w = b->volume.width;
@@ -360,42 +368,54 @@ static PetscErrorCode walk(Bvh *b, PetscBool self)
   PetscFunctionBeginUser;
   if (!b->facets.tree.nnode || !b->points.tree.nnode) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(make_room(b, 1));
-  b->stack[nstack++] = (Visit){0, 0, ~0u, ~0u};
+  b->stack[nstack++] = (Visit){0, 0, ~0u, ~0u, PETSC_FALSE};
   while (nstack) {
-    const Visit v = b->stack[--nstack];
+    Visit v = b->stack[--nstack];
     unsigned hit[8], single[8] = {0}; /* points that go on alone to each child of the facet node */
+    unsigned any = meet(b, &v, self, hit), alone = 0;
 
-    if (!meet(b, &v, self, hit)) continue;
     if (PetscMin(b->stack_size - nstack, b->pair_size - b->npair) < ROOM) PetscCall(make_room(b, nstack));
-    for (PetscInt c = 0; c < b->points.tree.nchild[v.a]; c++) {
-      if (hit[c]) nstack = follow(b, &v, c, hit[c], single, nstack);
+    for (PetscInt c = 0; any >> c; c++) {
+      if (any >> c & 1) nstack = follow(b, &v, c, hit[c], single, nstack);
     }
-    for (PetscInt l = 0; l < w; l++) {
-      if (single[l]) b->stack[nstack++] = (Visit){v.a, b->facets.tree.child[v.f * w + l], single[l], ~0u};
+    for (PetscInt l = 0; l < w; l++) alone |= single[l];
+    for (PetscInt l = 0; alone && l < w; l++) {
+      if (single[l])
+        b->stack[nstack++] = (Visit){v.a, b->facets.tree.child[v.f * w + l], single[l], ~0u, v.apart};
     }
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The candidates; for self-contact only those of points that face something. */
-static PetscErrorCode find_pairs(Bvh *b, PetscBool self)
+/* After the first walk: points that met something are walked to again, the others no more. */
+static void turn_live(Bvh *b)
 {
   const SbTree *t = &b->points.tree;
 
+  for (PetscInt g = t->nnode - 1; g >= 0; g--) {
+    for (PetscInt l = 0; l < t->nchild[g]; l++) {
+      const PetscInt child = t->child[g * t->width + l];
+      const PetscBool met = (PetscBool)(child >= 0 ? b->live[child] != 0 : !(b->live[g] >> l & 1));
+
+      if (met)
+        b->live[g] |= 1u << l;
+      else
+        b->live[g] &= ~(1u << l);
+    }
+  }
+}
+
+/* The candidates; for self-contact only those of points that face something. */
+static PetscErrorCode find_pairs(Bvh *b, PetscBool self)
+{
   PetscFunctionBeginUser;
   b->npair = 0;
   b->counts.visits = 0;
-  for (PetscInt g = 0; g < t->nnode; g++) b->live[g] = self ? 0 : ~0u;
+  for (PetscInt g = 0; g < b->points.tree.nnode; g++) b->live[g] = (1u << b->points.tree.nchild[g]) - 1;
   b->first = self;
   if (self) {
     PetscCall(walk(b, self));
-    for (PetscInt g = t->nnode - 1; g >= 0; g--) {
-      for (PetscInt l = 0; l < t->nchild[g]; l++) {
-        const PetscInt child = t->child[g * t->width + l];
-
-        if (child >= 0 && b->live[child]) b->live[g] |= 1u << l;
-      }
-    }
+    turn_live(b);
   }
   b->first = PETSC_FALSE;
   PetscCall(walk(b, self));

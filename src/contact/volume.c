@@ -98,23 +98,27 @@ SB_INLINE unsigned four_lanes(const int nslab, const int lanes, const int cull, 
   return in_lanes(out);
 }
 
-SB_INLINE void meet(const int nslab, const int lanes, const int cull, const float a[], PetscInt n,
-                    unsigned mask, const float f[], unsigned hit[])
+SB_INLINE unsigned meet(const int nslab, const int lanes, const int cull, const float a[], PetscInt rows,
+                        unsigned mask, const float f[], unsigned hit[])
 {
-  const int rows = (nslab ? 2 * nslab : 4) + SB_VOLUME_CONE;
+  unsigned any = 0;
 
-  for (PetscInt c = 0; c < n; c++) {
-    hit[c] = 0;
+  for (int c = 0; mask >> c; c++) {
+    unsigned in = 0;
+
     if (!(mask >> c & 1)) continue;
-    for (int l = 0; l < lanes; l += 4) hit[c] |= four_lanes(nslab, lanes, cull, a + c * rows, f + l) << l;
+    for (int l = 0; l < lanes; l += 4) in |= four_lanes(nslab, lanes, cull, a + c * rows, f + l) << l;
+    hit[c] = in;
+    any |= in ? 1u << c : 0;
   }
+  return any;
 }
 
-#define MEET(nslab, lanes, cull)                                                                           \
-  static void meet_##nslab##_##lanes##_##cull(const float a[], PetscInt n, unsigned mask, const float f[], \
-                                              unsigned hit[])                                              \
-  {                                                                                                        \
-    meet(nslab, lanes, cull, a, n, mask, f, hit);                                                          \
+#define MEET(nslab, lanes, cull)                                                                 \
+  static unsigned meet_##nslab##_##lanes##_##cull(const float a[], PetscInt rows, unsigned mask, \
+                                                  const float f[], unsigned hit[])               \
+  {                                                                                              \
+    return meet(nslab, lanes, cull, a, rows, mask, f, hit);                                      \
   }
 #define MEETS(nslab) MEET(nslab, 4, 0) MEET(nslab, 8, 0) MEET(nslab, 4, 1) MEET(nslab, 8, 1)
 MEETS(0)
@@ -133,7 +137,7 @@ MEETS(13)
   }
 static const SbVolumeMeet meets[5][2][2] = {ENTRIES(0), ENTRIES(3), ENTRIES(7), ENTRIES(9), ENTRIES(13)};
 
-void SbVolumeSet(PetscInt k, PetscInt width, SbVolume *v)
+void SbVolumeSet(PetscInt k, PetscInt width, PetscBool cones, SbVolume *v)
 {
   const int kind = k == 0 ? 0 : k == 6 ? 1 : k == 14 ? 2 : k == 18 ? 3 : 4;
 
@@ -142,7 +146,7 @@ void SbVolumeSet(PetscInt k, PetscInt width, SbVolume *v)
   v->lanes = PetscMax(width, 4);
   v->nslab = (int)k / 2;
   v->cone = k ? (int)k : 4;
-  v->rows = v->cone + SB_VOLUME_CONE;
+  v->rows = v->cone + (cones ? SB_VOLUME_CONE : 0);
   for (int i = 0; i < 3; i++) v->origin[i] = 0;
   for (int cull = 0; cull < 2; cull++) v->meet[cull] = meets[kind][cull][width == 8 ? 1 : 0];
 }

@@ -1,7 +1,7 @@
 /*
   volume.h - bounding volumes of a tree: intersections of slabs (k-DOP), or spheres; and cones of normals.
 
-  A volume is a column of numbers: lower and upper bound along each of k/2 directions, or centre and radius; then its cone: axis,
+  A volume is a column of numbers: lower and upper bound along each of k/2 directions, or centre and radius; then, for self-contact, its cone: axis,
   cosine and sine of the half-angle. A node of the tree holds the columns of its children as a block, either row by row (a number of
   all children side by side: what is tested against) or column by column (what is tested).
 
@@ -18,23 +18,24 @@ enum {
 };
 
 /*
-  Children of a node of points against those of a node of facets: bit l of hit[c] is set when what column c of `a` holds may meet what
-  lane l of block f holds. Only the n first columns that are in `mask` are looked at; hit[] of the others is 0.
+  Children of a node of points, those in `mask`, against those of a node of facets: bit l of hit[c] is set when what column c of `a` holds
+  may meet what lane l of block f holds. Columns are `rows` apart. Returns which c meet any; hit[] is set for those in `mask`.
 */
-typedef void (*SbVolumeMeet)(const SbBound a[], PetscInt n, unsigned mask, const SbBound f[], unsigned hit[]);
+typedef unsigned (*SbVolumeMeet)(const SbBound a[], PetscInt rows, unsigned mask, const SbBound f[],
+                                 unsigned hit[]);
 
 typedef struct {
   PetscInt k, width;
   PetscInt lanes; /* children that a block has room for: width, at least 4 */
   int nslab;      /* k/2; 0: spheres */
   int cone;       /* the first row of the cone */
-  int rows;       /* of a column; the distance of columns */
+  int rows;       /* of a column, with its cone where there are cones */
   PetscReal origin[3];
   SbVolumeMeet meet[2]; /* without and with a look at the cones */
 } SbVolume;
 
-/* k = 0, 6, 14, 18 or 26; width = 2, 4 or 8. The origin is 0. */
-void SbVolumeSet(PetscInt k, PetscInt width, SbVolume *volume);
+/* k = 0, 6, 14, 18 or 26; width = 2, 4 or 8; cones: there is room for them. The origin is 0. */
+void SbVolumeSet(PetscInt k, PetscInt width, PetscBool cones, SbVolume *volume);
 /*
   SbVolumeOf - column of n corners, m, all within `box` grown by `grow` to all sides, m; rounding is allowed for.
 
