@@ -38,7 +38,7 @@ static PetscErrorCode binary_start(const SbTreeItems *items, SbBinary *tree)
   tree->n = tree->nnode = items->n;
   tree->root = -1;
   PetscCall(PetscMalloc2(PetscMax(items->n - 1, 0), &tree->child, PetscMax(2 * items->n - 1, 0), &tree->box));
-  PetscCall(PetscArraycpy(&tree->box[0][0], items->box, 6 * (size_t)items->n));
+  if (items->n) PetscCall(PetscArraycpy(&tree->box[0][0], items->box, 6 * (size_t)items->n));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
