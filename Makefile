@@ -144,6 +144,10 @@ locking: deps ## how P1, CR and DG behave near nu = 1/2, measured into docs/lock
 	$(AGAIN) $(BUILD)/tests/perf/locking
 	@scripts/locking --build $(BUILD)
 
+solvers: deps ## linear solvers for CR and DG near nu = 1/2, measured into docs/solvers.md; QUICK=1 measures less and writes nothing
+	$(AGAIN) $(BUILD)/tests/perf/solvers
+	@scripts/solvers --build $(BUILD) $(if $(QUICK),--quick)
+
 docs: bin/supple ## docs/options.md from the option table
 	bin/supple -options_markdown docs/options.md
 
@@ -161,7 +165,7 @@ help: ## this list
 	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/  make \1|\2/p' Makefile | awk -F'|' '{ printf "%-20s%s\n", $$1, $$2 }'
 	@echo "settings: T=name (tests)  QUICK=1 (bench)  DEBUG=1  WERROR=1  V=1 (show commands)  CC=  OPT=  CFLAGS=  BUILD=  JOBS=  PREFIX=  DESTDIR=  PETSC_DIR= PETSC_ARCH="
 
-.PHONY: all tests deps demo check check-long lint sanitize memcheck bench locking docs install clean help FORCE
+.PHONY: all tests deps demo check check-long lint sanitize memcheck bench locking solvers docs install clean help FORCE
 .SECONDARY:
 .DELETE_ON_ERROR:
 -include $(wildcard $(BUILD)/src/*.d $(BUILD)/src/*/*.d $(BUILD)/tests/*/*.d)
