@@ -51,6 +51,13 @@
   #define SB_UNLIMITED PETSC_UNLIMITED
 #endif
 
+/* "No limit" of a tolerance: -1 means PETSc's own default since 3.22. */
+#if PETSC_VERSION_LT(3, 22, 0)
+  #define SB_UNLIMITED_REAL (-1.)
+#else
+  #define SB_UNLIMITED_REAL ((PetscReal)PETSC_UNLIMITED)
+#endif
+
 /* What PetscErrorMessage() hands out. */
 #if PETSC_VERSION_LT(3, 19, 0)
 typedef char *SbErrorText;

@@ -75,6 +75,8 @@ static PetscErrorCode create_fine(TwoLevel *p, PC pc, Mat A)
   PetscCall(PCAppendOptionsPrefix(p->fine, "fine_"));
   if (p->simple)
     PetscCall(PCSetType(p->fine, symmetric ? PCJACOBI : PCPBJACOBI));
+  else if (!p->space->nnode_owned) /* PETSc 3.26 does not survive the factorisation of nothing */
+    PetscCall(PCSetType(p->fine, PCNONE));
   else {
     PetscCall(PCSetType(p->fine, PCICC));
     PetscCall(PCFactorSetShiftType(p->fine, MAT_SHIFT_POSITIVE_DEFINITE));

@@ -139,7 +139,7 @@ static PetscErrorCode set_up_snes(SbRun run)
     force += (m->material[b]->E + 0.01 * m->material[b]->lambda) * PetscPowReal(m->body[b].volume, 2. / 3.);
   PetscCall(SNESSetType(run->snes, m->linear ? SNESKSPONLY : SNESNEWTONLS));
   PetscCall(SbRunSearch(run, PETSC_FALSE));
-  PetscCall(SNESSetDivergenceTolerance(run->snes, -1.));
+  PetscCall(SNESSetDivergenceTolerance(run->snes, SB_UNLIMITED_REAL));
   PetscCall(SNESSetTolerances(run->snes, 1e-13 * force, m->dynamic ? 1e-6 : 1e-8, 0., 50, SB_UNLIMITED));
   PetscCall(SNESSetErrorIfNotConverged(run->snes, PETSC_FALSE));
   PetscFunctionReturn(PETSC_SUCCESS);
