@@ -169,9 +169,10 @@ PetscReal SbSpaceHoldForce(SbSpace space, PetscInt node, PetscInt k, const Petsc
 */
 PetscErrorCode SbSpaceCoupleCreate(SbSpace space);
 void SbSpaceCoupleClear(SbSpace space);
-/* gnode[n]: global numbers of nodes; coef[n][3]; value in m. Output: row, its number on this rank. Not collective. */
-PetscErrorCode SbSpaceCoupleRow(SbSpace space, PetscInt n, const PetscInt gnode[], const PetscReal coef[],
-                                PetscReal value, PetscInt *row);
+/* gnode[n]: global numbers of nodes; coef[n][3]; value in m; id: rows that say nearly what those of lower ids say rest, so that no
+   partition changes which. Output: row, its number on this rank. Not collective. */
+PetscErrorCode SbSpaceCoupleRow(SbSpace space, PetscInt id, PetscInt n, const PetscInt gnode[],
+                                const PetscReal coef[], PetscReal value, PetscInt *row);
 /* A force of constant + stiffness (value - sum_k coef_k . u_k) along the row, N; stiffness >= 0, N/m. Not collective. */
 PetscErrorCode SbSpaceCoupleSpring(SbSpace space, PetscInt n, const PetscInt gnode[], const PetscReal coef[],
                                    PetscReal value, PetscReal stiffness, PetscReal constant, PetscInt *row);
@@ -179,6 +180,8 @@ PetscErrorCode SbSpaceCoupleDone(SbSpace space);
 /* What rows push with and where they are, for the displacement U and its residual R without constraints (N); then, for each row:
    force (N, positive: it raises the sum) and sum_k coef_k . u_k (m). Collective. */
 PetscErrorCode SbSpaceCoupleMeasure(SbSpace space, Vec U, Vec R);
+/* Whether an exact row rests: it has no force, and its sum is not looked after. */
+PetscBool SbSpaceCoupleRests(SbSpace space, PetscInt row);
 void SbSpaceCoupleGet(SbSpace space, PetscInt row, PetscReal *force, PetscReal *sum);
 /* U <- nearest displacement on which the exact rows hold. Collective. */
 PetscErrorCode SbCouplePrescribe(SbSpace space, Vec U);

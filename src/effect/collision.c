@@ -48,6 +48,7 @@ typedef struct {
   PetscBool on;               /* it touches */
   PetscBool was;              /* it touched at the end of the last step */
   int toggles, looks;         /* within the step */
+  PetscBool rests;            /* other rows say it */
   PetscInt row, slide[2];     /* rows of the space, -1: none */
   PetscReal lambda;           /* multiplier, N */
   PetscReal pressing;         /* N that friction assumes */
@@ -324,7 +325,7 @@ static PetscErrorCode look(Collision *c, const PetscReal u[], PetscBool keep)
 
   PetscFunctionBeginUser;
   PetscCall(SbSurfaceUpdate(c->surface, c->u0, u, c->reach, c->self, &close));
-  if (close) PetscCall(SbDetectorFind(c->detector, &c->surface->scene, &n, &near));
+  if (close || c->self) PetscCall(SbDetectorFind(c->detector, &c->surface->scene, &n, &near));
   PetscCall(merge(c, n, near, keep));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -440,6 +441,12 @@ static PetscErrorCode add_friction(const Collision *c, SbSpace space, Hit *hit)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Identity of a row: the same for any partition. */
+static PetscInt row_id(const Collision *c, const Hit *hit)
+{
+  return c->surface->scene.point_id[hit->point] * c->surface->space->mesh->nbody + hit->part;
+}
+
 static PetscErrorCode hold_collision(SbEffect e, SbSpace space)
 {
   Collision *c = (Collision *)e->data;
@@ -453,7 +460,8 @@ static PetscErrorCode hold_collision(SbEffect e, SbSpace space)
     if (!hit->on) continue;
     coefficients(hit, hit->normal, coef);
     if (c->response == PROJECTED)
-      PetscCall(SbSpaceCoupleRow(space, hit->n, hit->node, coef, hit->value - hit->allowed, &hit->row));
+      PetscCall(SbSpaceCoupleRow(space, row_id(c, hit), hit->n, hit->node, coef, hit->value - hit->allowed,
+                                 &hit->row));
     else
       PetscCall(SbSpaceCoupleSpring(space, hit->n, hit->node, coef, hit->value - hit->allowed, hit->k,
                                     hit->lambda, &hit->row));
@@ -488,6 +496,7 @@ static PetscBool settle_row(const Collision *c, PetscReal largest, Hit *hit)
     return PETSC_FALSE;
   }
   hit->lambda = PetscMax(0, hit->lambda);
+  if (hit->rests) return PETSC_TRUE;
   return (PetscBool)(PetscAbsReal(excess(hit)) <= small || hit->looks >= LOOKS);
 }
 
@@ -540,8 +549,14 @@ static void read_rows(const Collision *c, SbSpace space, Hit *hit)
   PetscReal force, along, across[2] = {0, 0};
 
   for (int k = 0; k < 3; k++) hit->drag[k] = 0;
+  hit->rests = PETSC_FALSE;
   if (hit->row < 0) return;
   SbSpaceCoupleGet(space, hit->row, &force, &along);
+  hit->rests = SbSpaceCoupleRests(space, hit->row);
+  if (hit->rests) {
+    hit->lambda = 0;
+    return;
+  }
   if (c->response == PROJECTED) hit->lambda = force;
   hit->gap = along - hit->value;
   if (c->mu <= 0 || hit->slide[0] < 0) return;

@@ -9,47 +9,17 @@
   D makes the projection blind to units and to stiffness: a hard body's node moves less than a soft one's. Every preconditioner M
   of K serves, and neither the matrix nor M are renewed when rows come and go. What the rows push with is the least-squares
   multiplier lambda = (G D G^T)^-1 G D r of the residual r. Rows that say the same twice (two surfaces whose vertices meet) leave
-  P right; lambda then is shared between them.
+  P right; (couple_select.c lets most of them rest).
 
   G D G^T has the rows of all ranks, which are few, and is factored on each of them.
 
   Nodes that are prescribed or held (held.c) have no say: their columns are cleared or projected.
 */
+#include "couple.h"
 #include "sbsolver.h"
-#include "fem_impl.h"
 
 #define REGULAR \
   1e-8 /* relative, on the diagonal of what is factored: keeps rows that depend on others solvable */
-
-/* Rows of one kind as a matrix with three columns per node. */
-typedef struct {
-  PetscInt n;                   /* rows of this rank */
-  PetscInt N;                   /* of all ranks */
-  Mat whole, free;              /* G, and G without prescribed and held directions */
-  Vec value, force, work, step; /* by rows */
-} Rows;
-
-struct _p_SbCouple {
-  PetscInt n, size; /* rows, room */
-  PetscInt *start;  /* [n+1] */
-  PetscInt nentry, entry_size;
-  PetscInt *gnode;                         /* [nentry] */
-  PetscReal *coef;                         /* [nentry][3] */
-  PetscReal *value, *stiffness, *constant; /* [n]; stiffness -1: exact */
-  PetscInt *place;                         /* [n] row in its matrix on this rank */
-  PetscReal *force, *sum;                  /* [n] */
-  Rows exact, spring;
-  Vec k, constants; /* of springs */
-  Mat K;            /* borrowed; NULL before SbCoupleCreateOperator() */
-  Mat DGt;          /* D G^T */
-  Mat gram;         /* G D G^T, its diagonal slightly larger */
-  KSP solver;
-  Vec anchor,
-    added;  /* squares of the coefficients, and what K holds beside the tangent, N/m; NULL: nothing */
-  Vec free; /* 1 at unknowns that are not prescribed, else 0 */
-  Vec d;    /* D */
-  Vec w[2];
-};
 
 PetscErrorCode SbSpaceCoupleCreate(SbSpace s)
 {
@@ -102,10 +72,11 @@ PetscErrorCode SbCoupleDestroy(SbCouple *couple)
   PetscCall(VecDestroy(&c->d));
   PetscCall(VecDestroy(&c->w[0]));
   PetscCall(VecDestroy(&c->w[1]));
+  PetscCall(PetscFree(c->rests));
   PetscCall(PetscFree(c->start));
   PetscCall(PetscFree(c->gnode));
   PetscCall(PetscFree(c->coef));
-  PetscCall(PetscFree6(c->value, c->stiffness, c->constant, c->place, c->force, c->sum));
+  PetscCall(PetscFree7(c->value, c->stiffness, c->constant, c->place, c->force, c->sum, c->id));
   PetscCall(PetscFree(*couple));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -124,18 +95,24 @@ static PetscErrorCode make_room(SbCouple c, PetscInt more)
   if (c->n == c->size) {
     const PetscInt size = PetscMax(64, 2 * c->size);
     PetscReal *value, *stiffness, *constant, *force, *sum;
-    PetscInt *place;
+    PetscInt *place, *id;
+    PetscBool *rests;
 
-    PetscCall(
-      PetscMalloc6(size, &value, size, &stiffness, size, &constant, size, &place, size, &force, size, &sum));
+    PetscCall(PetscMalloc7(size, &value, size, &stiffness, size, &constant, size, &place, size, &force, size,
+                           &sum, size, &id));
     PetscCall(PetscArraycpy(value, c->value, c->n));
     PetscCall(PetscArraycpy(stiffness, c->stiffness, c->n));
     PetscCall(PetscArraycpy(constant, c->constant, c->n));
-    PetscCall(PetscFree6(c->value, c->stiffness, c->constant, c->place, c->force, c->sum));
+    PetscCall(PetscArraycpy(id, c->id, c->n));
+    PetscCall(PetscMalloc1(size, &rests));
+    PetscCall(PetscFree(c->rests));
+    PetscCall(PetscFree7(c->value, c->stiffness, c->constant, c->place, c->force, c->sum, c->id));
     c->value = value;
     c->stiffness = stiffness;
     c->constant = constant;
     c->place = place;
+    c->id = id;
+    c->rests = rests;
     c->force = force;
     c->sum = sum;
     c->size = size;
@@ -163,18 +140,25 @@ PetscErrorCode SbSpaceCoupleSpring(SbSpace s, PetscInt n, const PetscInt gnode[]
   c->stiffness[c->n] = stiffness;
   c->constant[c->n] = constant;
   c->force[c->n] = c->sum[c->n] = 0.;
+  c->id[c->n] = 0;
   c->nentry += n;
   c->start[c->n + 1] = c->nentry;
   *row = c->n++;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbSpaceCoupleRow(SbSpace s, PetscInt n, const PetscInt gnode[], const PetscReal coef[],
-                                PetscReal value, PetscInt *row)
+PetscErrorCode SbSpaceCoupleRow(SbSpace s, PetscInt id, PetscInt n, const PetscInt gnode[],
+                                const PetscReal coef[], PetscReal value, PetscInt *row)
 {
   PetscFunctionBeginUser;
   PetscCall(SbSpaceCoupleSpring(s, n, gnode, coef, value, -1., 0., row));
+  s->couple->id[*row] = id;
   PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static inline PetscBool of_kind(SbCouple c, PetscInt i, PetscBool exact)
+{
+  return (PetscBool)((c->stiffness[i] < 0.) == exact && !c->rests[i]);
 }
 
 /* The rows of one kind as a matrix. */
@@ -187,7 +171,7 @@ static PetscErrorCode create_rows(SbSpace s, PetscBool exact, Rows *r)
   PetscFunctionBeginUser;
   r->n = 0;
   for (PetscInt i = 0; i < c->n; i++) {
-    if ((c->stiffness[i] < 0.) != exact) continue;
+    if (!of_kind(c, i, exact)) continue;
     widest = PetscMax(widest, 3 * (c->start[i + 1] - c->start[i]));
     c->place[i] = r->n++;
   }
@@ -202,7 +186,7 @@ static PetscErrorCode create_rows(SbSpace s, PetscBool exact, Rows *r)
   PetscCall(MatGetOwnershipRange(r->whole, &first, NULL));
   PetscCall(VecGetArrayWrite(r->value, &value));
   for (PetscInt i = 0; i < c->n; i++) {
-    if ((c->stiffness[i] < 0.) != exact) continue;
+    if (!of_kind(c, i, exact)) continue;
     value[c->place[i]] = c->value[i];
     for (PetscInt e = c->start[i]; e < c->start[i + 1]; e++) {
       const PetscInt row = first + c->place[i], g = 3 * c->gnode[e], column[3] = {g, g + 1, g + 2};
@@ -402,6 +386,7 @@ PetscErrorCode SbSpaceCoupleDone(SbSpace s)
   PetscFunctionBeginUser;
   PetscCall(destroy_matrices(c));
   PetscCall(create_vectors(s));
+  PetscCall(SbCoupleSelect(s));
   PetscCall(find_anchors(s));
   PetscCall(create_rows(s, PETSC_TRUE, &c->exact));
   PetscCall(create_rows(s, PETSC_FALSE, &c->spring));
@@ -519,7 +504,7 @@ static PetscErrorCode hand_out(SbCouple c, PetscBool exact, Vec from, PetscReal 
   PetscFunctionBeginUser;
   PetscCall(VecGetArrayRead(from, &x));
   for (PetscInt i = 0; i < c->n; i++) {
-    if ((c->stiffness[i] < 0.) == exact) to[i] = x[c->place[i]];
+    if (of_kind(c, i, exact)) to[i] = x[c->place[i]];
   }
   PetscCall(VecRestoreArrayRead(from, &x));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -543,6 +528,11 @@ PetscErrorCode SbSpaceCoupleMeasure(SbSpace s, Vec U, Vec R)
     PetscCall(hand_out(c, PETSC_FALSE, c->spring.work, c->sum));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscBool SbSpaceCoupleRests(SbSpace s, PetscInt row)
+{
+  return s->couple->rests[row];
 }
 
 void SbSpaceCoupleGet(SbSpace s, PetscInt row, PetscReal *force, PetscReal *sum)

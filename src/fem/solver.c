@@ -236,6 +236,8 @@ PetscErrorCode SbSolverSetUp(SNES snes, SbSpace s, const SbSolverPreset *preset)
   PetscCall(insert_options(preset->options));
   if (strstr(preset->options, "-pc_type cholesky")) PetscCall(SbSolverLookAtResidual(ksp));
   PetscCall(KSPGetPC(ksp, &pc));
+  /* in a null space the residual of CG may grow a long way before it falls */
+  if (s->couple) PetscCall(KSPSetTolerances(ksp, PETSC_DEFAULT, PETSC_DEFAULT, 1e10, PETSC_DEFAULT));
   PetscCall(SbPCCoupleCreate(s, pc, &pc));
   if (preset->precondition) PetscCall(preset->precondition(s, pc));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -74,7 +74,8 @@ static PetscErrorCode join(SbSpace s, PetscReal stiffness, PetscBool twice)
         coef[3 + k] = -1;
         for (int again = 0; again <= (int)twice; again++) {
           if (stiffness < 0)
-            PetscCall(SbSpaceCoupleRow(s, 2, g, coef, 0, &row));
+            PetscCall(SbSpaceCoupleRow(s, 6 * (int)(1e4 * node[b].x[1] + 1e2 * node[b].x[2]) + 2 * k + again,
+                                       2, g, coef, 0, &row));
           else
             PetscCall(SbSpaceCoupleSpring(s, 2, g, coef, 0, stiffness, 0, &row));
         }
