@@ -27,6 +27,9 @@ typedef struct {
   /* after a solve, with the residual r without constraints, N: sets `changed` when another solve is needed. Collective. */
   PetscErrorCode (*settle)(SbEffect e, SbSpace space, const PetscReal u[], const PetscReal r[],
                            PetscBool *changed);
+  /* f[nnode][3] += what contact pushes owned nodes with, N, residual r as for history(). For output only; rows that join nodes add
+     theirs without it. Not collective. */
+  PetscErrorCode (*push)(SbEffect e, SbSpace space, const SbStage *stage, const PetscReal r[], PetscReal f[]);
   /* f[nnode][3] += external force, N; must be right on owned nodes without communication */
   PetscErrorCode (*force)(SbEffect e, SbSpace space, const SbStage *stage, PetscReal f[]);
   /* A -= shift_k d force / d u + shift_v d force / d v by SbSpaceAddCellBlock(), called for (a, b) and for (b, a) */

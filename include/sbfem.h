@@ -183,6 +183,8 @@ PetscErrorCode SbSpaceCoupleMeasure(SbSpace space, Vec U, Vec R);
 /* Whether an exact row rests: it has no force, and its sum is not looked after. */
 PetscBool SbSpaceCoupleRests(SbSpace space, PetscInt row);
 void SbSpaceCoupleGet(SbSpace space, PetscInt row, PetscReal *force, PetscReal *sum);
+/* F += what all rows push with at the displacement U, R as above. Collective. */
+PetscErrorCode SbSpaceCoupleForce(SbSpace space, Vec U, Vec R, Vec F);
 /* U <- nearest displacement on which the exact rows hold. Collective. */
 PetscErrorCode SbCouplePrescribe(SbSpace space, Vec U);
 /* F <- F less the springs' forces, and without what the exact rows take when `constrain`. Collective. */

@@ -67,6 +67,9 @@ PetscErrorCode SbModelPrescribe(SbModel model, PetscReal t, Vec U);
 */
 PetscErrorCode SbModelContactBegin(SbModel model, PetscReal t, PetscReal dt, Vec U0, Vec U);
 PetscErrorCode SbModelContactSettle(SbModel model, PetscReal t, Vec U, Vec R, PetscBool *again);
+/* F = what contact pushes the nodes with, N, after the step that ended at t with the displacement U and the residual R without
+   constraints. Collective. */
+PetscErrorCode SbModelContactForce(SbModel model, PetscReal t, Vec U, Vec R, Vec F);
 /* Initial velocities of bodies (translation and spin). */
 PetscErrorCode SbModelInitialState(SbModel model, Vec U, Vec V);
 /* Instantaneous part of the energies (kinetic, strain, momenta, ...). V may be NULL. Collective. */

@@ -486,6 +486,38 @@ static PetscErrorCode accept_contact(SbEffect e, SbSpace space, const SbStage *s
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Force of the obstacle on a node at x, N. */
+static void force_on(const Contact *c, const SbPose *pose, SbSpace space, const Touch *touch,
+                     const PetscReal x[3], const PetscReal residual[], PetscReal f[3])
+{
+  PetscReal n[3], normal = normal_force(c, pose, touch, x, n);
+
+  f[0] = f[1] = f[2] = 0;
+  if (normal <= 0) return;
+  if (touch->pressing > 0) (void)drag(c, pose, touch, x, n, f);
+  if (c->response == PROJECTED)
+    normal = SbSpaceHoldForce(space, touch->node, touch->along, residual + 3 * touch->node);
+  for (int k = 0; k < 3; k++) f[k] += normal * n[k];
+}
+
+static PetscErrorCode push_contact(SbEffect e, SbSpace space, const SbStage *stage,
+                                   const PetscReal residual[], PetscReal f[])
+{
+  const Contact *c = (const Contact *)e->data;
+  SbPose pose;
+
+  PetscFunctionBeginUser;
+  pose_at(c, stage->t, &pose);
+  for (PetscInt i = 0; i < c->n; i++) {
+    PetscReal x[3], force[3];
+
+    place(space, c->touch[i].node, stage->u, x);
+    force_on(c, &pose, space, &c->touch[i], x, residual, force);
+    for (int k = 0; k < 3; k++) f[3 * c->touch[i].node + k] += force[k];
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Force and torque of the obstacle on the bodies, touching nodes, deepest penetration. */
 static PetscErrorCode history_contact(SbEffect e, SbSpace space, const SbStage *stage,
                                       const PetscReal residual[], PetscReal values[])
@@ -500,19 +532,13 @@ static PetscErrorCode history_contact(SbEffect e, SbSpace space, const SbStage *
   for (int k = 0; k < 8; k++) values[k] = 0;
   for (PetscInt i = 0; i < c->n; i++) {
     const Touch *touch = &c->touch[i];
-    PetscReal x[3], n[3], f[3] = {0, 0, 0}, arm[3], moment[3], normal;
+    PetscReal x[3], n[3], f[3], arm[3], moment[3];
 
     place(space, touch->node, stage->u, x);
     deepest[0] = PetscMax(deepest[0], -gap_of(c, &pose, x, n));
-    normal = normal_force(c, &pose, touch, x, n);
-    if (normal <= 0) continue;
-    if (touch->pressing > 0) (void)drag(c, &pose, touch, x, n, f);
-    if (c->response == PROJECTED)
-      normal = SbSpaceHoldForce(space, touch->node, touch->along, residual + 3 * touch->node);
-    for (int k = 0; k < 3; k++) {
-      f[k] += normal * n[k];
-      arm[k] = x[k] - c->point[k] - pose.d[k];
-    }
+    if (normal_force(c, &pose, touch, x, n) <= 0) continue;
+    force_on(c, &pose, space, touch, x, residual, f);
+    for (int k = 0; k < 3; k++) arm[k] = x[k] - c->point[k] - pose.d[k];
     SbCross(arm, f, moment);
     for (int k = 0; k < 3; k++) {
       values[k] += f[k];
@@ -559,6 +585,7 @@ static PetscErrorCode create_contact(SbEffect e)
   e->ops.force = force_contact;
   e->ops.tangent = tangent_contact;
   e->ops.accept = accept_contact;
+  e->ops.push = push_contact;
   e->ops.history = history_contact;
   e->ops.destroy = destroy_contact;
   for (e->ncolumn = 0; e->ncolumn < 8; e->ncolumn++) e->column[e->ncolumn] = columns[e->ncolumn];

@@ -530,6 +530,23 @@ PetscErrorCode SbSpaceCoupleMeasure(SbSpace s, Vec U, Vec R)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscErrorCode SbSpaceCoupleForce(SbSpace s, Vec U, Vec R, Vec F)
+{
+  SbCouple c = s->couple;
+
+  PetscFunctionBeginUser;
+  if (c->exact.N) {
+    PetscCall(VecPointwiseMult(c->w[0], R, c->free));
+    PetscCall(project_force(c, c->w[0]));
+    PetscCall(MatMultTransposeAdd(c->exact.whole, c->exact.force, F, F));
+  }
+  if (c->spring.N) {
+    PetscCall(stretch(c, U));
+    PetscCall(MatMultTransposeAdd(c->spring.whole, c->spring.force, F, F));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscBool SbSpaceCoupleRests(SbSpace s, PetscInt row)
 {
   return s->couple->rests[row];

@@ -56,3 +56,24 @@ PetscErrorCode SbModelContactSettle(SbModel m, PetscReal t, Vec U, Vec R, PetscB
   PetscCall(PetscLogEventEnd(SbEvents[SB_EVENT_CONTACT], 0, 0, 0, 0));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
+
+PetscErrorCode SbModelContactForce(SbModel m, PetscReal t, Vec U, Vec R, Vec F)
+{
+  SbStage stage = {.t = t, .shift_k = 1.};
+  const PetscReal *r;
+  PetscReal *f;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbSpaceGetLocalRead(m->space, U, &stage.u));
+  PetscCall(SbSpaceGetLocalRead(m->space, R, &r));
+  PetscCall(SbSpaceGetLocalWrite(m->space, F, &f));
+  PetscCall(PetscArrayzero(f, 3 * m->space->nnode));
+  for (PetscInt e = 0; e < m->ntouch; e++) {
+    if (m->touch[e]->ops.push) PetscCall(m->touch[e]->ops.push(m->touch[e], m->space, &stage, r, f));
+  }
+  PetscCall(SbSpaceRestoreLocalWrite(m->space, F, &f));
+  PetscCall(SbSpaceRestoreLocalRead(m->space, R, &r));
+  PetscCall(SbSpaceRestoreLocalRead(m->space, U, &stage.u));
+  if (m->space->couple) PetscCall(SbSpaceCoupleForce(m->space, U, R, F));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

@@ -3,7 +3,7 @@
 
   Vertex fields are made from the vectors by points.c. Cell fields come from one evaluation of the cells' state per frame,
   shared by all of them. von Mises: sqrt(3/2 s:s), s the deviator of the Cauchy stress. Reaction: force of the support on
-  the body, that is the residual without constraints at prescribed unknowns.
+  the body, that is the residual without constraints at prescribed unknowns. Contact force: what obstacles and other bodies push with.
 
   Two pressures, both positive in compression: `mean_pressure` is -tr(sigma)/3 of the Cauchy stress, as it is measured;
   `pressure` is the law's -lambda theta with theta its measure of the change of volume (SbMaterialOps.pressure). The two
@@ -39,7 +39,21 @@ static PetscErrorCode reaction(SbRun run, const SbStep *step, PetscReal *values)
   PetscFunctionBeginUser;
   PetscCheck(step->R, PETSC_COMM_SELF, PETSC_ERR_PLIB,
              "The residual was asked for but not given to the monitors");
-  PetscCall(SbPointsReactions(run, (SbOutput)run->output, step->R, values));
+  PetscCall(SbPointsForces(run, (SbOutput)run->output, PETSC_TRUE, step->R, values));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode contact_force(SbRun run, const SbStep *step, PetscReal *values)
+{
+  Vec F;
+
+  PetscFunctionBeginUser;
+  PetscCheck(step->R, PETSC_COMM_SELF, PETSC_ERR_PLIB,
+             "The residual was asked for but not given to the monitors");
+  PetscCall(VecDuplicate(step->U, &F));
+  PetscCall(SbModelContactForce(run->model, step->t, step->U, step->R, F));
+  PetscCall(SbPointsForces(run, (SbOutput)run->output, PETSC_FALSE, F, values));
+  PetscCall(VecDestroy(&F));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -166,6 +180,7 @@ static const SbField table[] = {
   {"acceleration", "m/s^2", 3, VERTEX, VARIES, DYNAMIC, "acceleration, state of the integrator",
    acceleration},
   {"reaction", "N", 3, VERTEX, VARIES, ALWAYS, "force of a support on the body", reaction},
+  {"contact_force", "N", 3, VERTEX, VARIES, ALWAYS, "force of contact on the body", contact_force},
   {"stress", "Pa", 6, CELL, VARIES, ALWAYS, "Cauchy stress", stress},
   {"von_mises", "Pa", 1, CELL, VARIES, ALWAYS, "von Mises stress", von_mises},
   {"pressure", "Pa", 1, CELL, VARIES, ALWAYS, "pressure of the law, -lambda times its change of volume",
@@ -222,7 +237,7 @@ PetscErrorCode SbFieldPrepare(SbRun run, SbOutput out)
     if (f->compute == energy_density && !out->psi) PetscCall(PetscMalloc1(n, &out->psi));
     if (f->compute == pressure && !out->pressure) PetscCall(PetscMalloc1(n, &out->pressure));
     if (!f->cell) PetscCall(SbPointsPrepare(run, out));
-    if (f->compute == reaction) {
+    if (f->compute == reaction || f->compute == contact_force) {
       run->want_residual = PETSC_TRUE;
       if (run->model->space->faces || out->discontinuous) PetscCall(SbPointsPrepareForces(run, out));
     }

@@ -170,12 +170,12 @@ PetscErrorCode SbFieldPrepare(SbRun run, SbOutput out); /* storage for the cell 
 
 /* points.c: vectors at the points of vertex fields. The first two before the others. */
 PetscErrorCode SbPointsPrepare(SbRun run, SbOutput out);       /* not collective */
-PetscErrorCode SbPointsPrepareForces(SbRun run, SbOutput out); /* for SbPointsReactions(). Collective */
+PetscErrorCode SbPointsPrepareForces(SbRun run, SbOutput out); /* for SbPointsForces(). Collective */
 PetscErrorCode SbPointsDestroy(SbOutput out);
 /* values[out->point.nowned][3] of a vector of the space: nodal values of P1, means of the cells around, or each cell's own. Collective. */
 PetscErrorCode SbPointsValues(SbRun run, SbOutput out, Vec x, PetscReal values[]);
-/* The same for forces at prescribed nodes, 0 elsewhere: resultant and moment of the nodal forces are kept. Collective. */
-PetscErrorCode SbPointsReactions(SbRun run, SbOutput out, Vec R, PetscReal values[]);
+/* The same for forces at nodes, or at their prescribed unknowns only: resultant and moment of the nodal forces are kept. Collective. */
+PetscErrorCode SbPointsForces(SbRun run, SbOutput out, PetscBool prescribed, Vec R, PetscReal values[]);
 /* The value at an owned vertex of a local array x[nnode][3] with ghosts, as vertex fields have it. */
 void SbPointsVertex(SbRun run, SbOutput out, PetscInt vertex, const PetscReal x[], PetscReal value[3]);
 

@@ -175,56 +175,63 @@ PetscErrorCode SbPointsValues(SbRun run, SbOutput out, Vec x, PetscReal values[]
 
 /* ------------------------------------------------------------------ forces */
 
-/* value += factor times the prescribed components of r at a node */
-static void add_reaction(SbSpace s, PetscInt node, PetscReal factor, const PetscReal r[], PetscReal value[3])
+/* Forces at nodes: r itself, or its prescribed components only. */
+typedef struct {
+  SbSpace s;
+  const PetscReal *r;
+  PetscBool prescribed;
+} Forces;
+
+/* value += factor times the force at a node */
+static void add_force(const Forces *f, PetscInt node, PetscReal factor, PetscReal value[3])
 {
   for (int k = 0; k < 3; k++) {
-    if (s->fixed[node] & (1 << k)) value[k] += factor * r[3 * node + k];
+    if (!f->prescribed || f->s->fixed[node] & (1 << k)) value[k] += factor * f->r[3 * node + k];
   }
 }
 
 /* What a cell's share of the forces at its nodes brings to one of its corners. */
-static void add_corner_reaction(SbSpace s, const PetscReal valence[], PetscInt corner, const PetscReal r[],
-                                PetscReal value[3])
+static void add_corner_force(const Forces *f, const PetscReal valence[], PetscInt corner, PetscReal value[3])
 {
+  const SbSpace s = f->s;
   const PetscInt *node = s->cell_node + 4 * (corner / 4);
 
   if (SbSpaceCellElement(s, corner / 4)->nodes_per[0]) {
-    add_reaction(s, node[corner % 4], 1. / valence[node[corner % 4]], r, value);
+    add_force(f, node[corner % 4], 1. / valence[node[corner % 4]], value);
   } else {
     // node a lies opposite vertex a: this corner belongs to the faces of the others
     for (int a = 0; a < 4; a++) {
       const PetscInt support = s->support ? s->support[corner - corner % 4 + a] : -1;
 
       if (a == corner % 4) continue;
-      add_reaction(s, node[a], 1. / (3. * valence[node[a]]), r, value);
-      if (support >= 0) add_reaction(s, support, 1. / 3., r, value);
+      add_force(f, node[a], 1. / (3. * valence[node[a]]), value);
+      if (support >= 0) add_force(f, support, 1. / 3., value);
     }
   }
 }
 
-PetscErrorCode SbPointsReactions(SbRun run, SbOutput out, Vec R, PetscReal values[])
+PetscErrorCode SbPointsForces(SbRun run, SbOutput out, PetscBool prescribed, Vec R, PetscReal values[])
 {
   const SbSpace s = run->model->space;
   const SbPoints p = out->points;
   const PetscInt n = out->discontinuous ? 4 * s->mesh->ncell_owned : s->mesh->nvert_owned;
-  const PetscReal *r;
+  Forces f = {.s = s, .prescribed = prescribed};
 
   PetscFunctionBeginUser;
   PetscCall(PetscArrayzero(values, 3 * n));
-  PetscCall(SbSpaceGetLocalRead(s, R, &r));
+  PetscCall(SbSpaceGetLocalRead(s, R, &f.r));
   for (PetscInt i = 0; i < n; i++) {
     const PetscInt node = out->discontinuous ? -1 : vertex_node(s, p, i);
 
     if (out->discontinuous) {
-      add_corner_reaction(s, p->valence, i, r, values + 3 * i);
+      add_corner_force(&f, p->valence, i, values + 3 * i);
     } else if (node >= 0) {
-      add_reaction(s, node, 1., r, values + 3 * i);
+      add_force(&f, node, 1., values + 3 * i);
     } else {
       for (PetscInt k = p->start[i]; k < p->start[i + 1]; k++)
-        add_corner_reaction(s, p->valence, p->corner[k], r, values + 3 * i);
+        add_corner_force(&f, p->valence, p->corner[k], values + 3 * i);
     }
   }
-  PetscCall(SbSpaceRestoreLocalRead(s, R, &r));
+  PetscCall(SbSpaceRestoreLocalRead(s, R, &f.r));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -167,7 +167,7 @@ static PetscErrorCode test_reactions(const char *more)
   s = scene.model->space;
   out = (SbOutput)scene.run->output;
   PetscCall(PetscMalloc1(3 * out->point.nowned, &r));
-  PetscCall(SbPointsReactions(scene.run, out, scene.run->reaction, r));
+  PetscCall(SbPointsForces(scene.run, out, PETSC_TRUE, scene.run->reaction, r));
   for (PetscInt i = 0; i < out->point.nowned; i++) {
     const PetscReal *x = s->mesh->x + 3 * (out->discontinuous ? s->mesh->cell[i] : i);
 
