@@ -66,6 +66,30 @@ static PetscErrorCode stress_error(TestScene *t, PetscReal *worst)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The field of contact forces: what the lower block carries the upper one with, and nothing in all. */
+static PetscErrorCode check_forces(TestScene *t)
+{
+  const SbModel m = t->model;
+  const PetscScalar *f;
+  PetscReal sum[2] = {0, 0};
+  Vec R, F;
+
+  PetscFunctionBeginUser;
+  PetscCall(VecDuplicate(t->run->U, &R));
+  PetscCall(VecDuplicate(R, &F));
+  PetscCall(SbModelResidual(m, 1, t->run->U, NULL, NULL, PETSC_FALSE, R));
+  PetscCall(SbModelContactForce(m, 1, t->run->U, R, F));
+  PetscCall(VecGetArrayRead(F, &f));
+  for (PetscInt i = 0; i < m->space->nnode_owned; i++) sum[m->space->node_body[i]] += f[3 * i + 2];
+  PetscCall(VecRestoreArrayRead(F, &f));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, sum, 2, MPIU_REAL, MPI_SUM, m->comm));
+  SB_CHECK_NEAR(sum[1], LOAD * 0.01, 1e-6 * LOAD * 0.01, "contact force on the upper block");
+  SB_CHECK_NEAR(sum[0] + sum[1], 0, 1e-9 * LOAD * 0.01, "contact forces of both blocks");
+  PetscCall(VecDestroy(&R));
+  PetscCall(VecDestroy(&F));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 static PetscErrorCode check_stack(const char *element, const char *response, const char *sides, int upper,
                                   PetscReal tolerance)
 {
@@ -97,6 +121,7 @@ static PetscErrorCode check_stack(const char *element, const char *response, con
            response, sides, upper, (double)worst);
   SB_CHECK_NEAR(values[NORMAL], LOAD * 0.01, 1e-6 * LOAD * 0.01, "the lower block carries the load");
   SB_CHECK_NEAR(values[DEEPEST], 0, 1e-7 * 0.2, "penetration");
+  PetscCall(check_forces(&t));
   PetscCall(test_scene_close(&t));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
