@@ -1,4 +1,5 @@
 // @ranks 1 2 3 4
+// @needs mumps
 /*
   Rows between nodes: two halves of a bar joined vertex by vertex are the whole bar, with every solver, by exact rows and in
   the limit by springs; rows said twice change nothing; the rows' forces carry the weight of the free half; the projected

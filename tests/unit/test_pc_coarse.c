@@ -1,4 +1,5 @@
 // @ranks 1 2 3
+// @needs mumps
 /*
   The two-level preconditioner: symmetric and positive definite; iterations that hardly grow with the mesh, also on a slender
   bar where incomplete Cholesky alone fails; the solution of a factorisation, with several and held bodies; failures said.

@@ -1,4 +1,5 @@
 // @ranks 1 2 3
+// @needs mumps
 /*
   The solver with the pressures of the cells apart: its operator is the tangent, for every law and element; what it keeps in the
   matrix does not grow with lambda; the preconditioner is symmetric and positive; solutions are those of a factorisation;

@@ -1,4 +1,5 @@
 // @ranks 1 2
+// @needs mumps
 /* Every row of the solver table solves the same linear bar; the choice by `auto` has a reason; a solve at its limit fails. */
 #include "../scene.h"
 

@@ -2,6 +2,7 @@
 of the other elements with points of their own for each cell.
 
 @long
+@needs mumps
 @timeout 300
 Needs pvpython, from PATH or named by PVPYTHON; on Debian: apt-get install --no-install-recommends python3-paraview
 """

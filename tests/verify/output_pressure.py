@@ -4,6 +4,7 @@ Measured by the root mean square of the jumps between neighbouring cells, over t
 numbers in the cells have sqrt(2) = 1.41, alternating ones up to 2; for a smooth pressure it goes down with the size of the
 cells. All laws must find the same pressure, because strains are small; on two ranks it must be the same as on one.
 
+@needs mumps
 @timeout 180
 """
 import itertools

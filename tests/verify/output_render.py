@@ -1,5 +1,6 @@
 """scripts/render draws a run without a display: a picture with the body in the colours of the scale, an animation.
 
+@needs mumps
 @timeout 180
 """
 import os

@@ -1,6 +1,7 @@
 """fields.xmf as VTK reads it: frames, times, names, values; and the same datasets on 1, 2, 3 and 4 ranks; by element, and
 with points of its own for each cell.
 
+@needs mumps
 @timeout 300
 
 vtkXdmfReader is what PyPI's VTK has; vtkXdmf3Reader is tried where there is one. Values are compared with those of fields.h5

@@ -1,4 +1,5 @@
 // @ranks 1
+// @needs mumps
 /*
   The bar 0.4 x 0.1 x 0.1 m, clamped, E = 5e4, nu = 0.3, rho = 1000, small strains.
 

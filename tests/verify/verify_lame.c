@@ -1,4 +1,5 @@
 // @ranks 1 2
+// @needs mumps
 /*
   Lame's thick-walled sphere, radii 1 and 2, pressure 1 inside, E = 1, nu = 0.49999, one eighth of it between planes of symmetry
   (supports of one component), edges of 0.3: displacement, radial and hoop stress of the cells against

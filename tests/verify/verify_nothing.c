@@ -1,4 +1,5 @@
 // @ranks 1 2
+// @needs mumps
 /*
   What a scene does not name costs nothing.
 

@@ -1,4 +1,5 @@
 // @ranks 1 2
+// @needs mumps
 /*
   The patch test (MacNeal and Harder, "A proposed standard set of problems to test finite element accuracy", 1985): a body
   that is held on its boundary, or pulled there, as a homogeneous deformation x = F X asks for must take it inside too, on

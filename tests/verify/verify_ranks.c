@@ -1,4 +1,5 @@
 // @ranks 2 3 4
+// @needs mumps
 /*
   The same scene on one rank and on all of them: every rank runs it alone and then all run it together. Displacements,
   velocities (by original number of the node) and scalars of the last state must agree.

@@ -1,4 +1,5 @@
 // @ranks 1 2 3
+// @needs mumps
 /*
   The integrators against exact answers of their own recurrences. One linear tet held at its base is an oscillator: its apex moves
   along z with w^2 = V (lambda + 2 mu) / (H^2 m), m = rho V / 4. With q = v + i w u an undamped step multiplies q by

@@ -1,4 +1,5 @@
 // @ranks 1
+// @needs mumps
 /*
   Large rotations with CR and DG: Turek and Hron's CSM1 and CSM2 (St. Venant-Kirchhoff, and co-rotated, which is the same to
   small strains), and the swinging bar at nu = 0.499: CR and DG agree, and approach a finer mesh. verify_twist.c has a

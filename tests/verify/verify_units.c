@@ -1,4 +1,5 @@
 // @ranks 1 2
+// @needs mumps
 /*
   Nothing depends on the units or on the directions of the axes: a scene in m, kg, s is run again in mm, g, ms, with all
   lengths times 1e-6 and times 1e3 (density and stiffness kept, so times go with lengths), with stiffness and density times
