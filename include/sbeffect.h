@@ -19,10 +19,10 @@ typedef struct {
   /* once before each attempt at a step */
   PetscErrorCode (*prestep)(SbEffect e, SbSpace space, PetscReal t, PetscReal dt);
   /* contact, before the first solve of an attempt at a step from t to t + dt: local displacements u0 at t and u as predicted at
-     t + dt, m. Not collective. */
+     t + dt, m. Collective. */
   PetscErrorCode (*touch)(SbEffect e, SbSpace space, PetscReal t, PetscReal dt, const PetscReal u0[],
                           const PetscReal u[]);
-  /* writes what contact holds by SbSpaceHold(). Not collective. */
+  /* writes what contact holds by SbSpaceHold(), and its rows by SbSpaceCoupleRow(). Not collective. */
   PetscErrorCode (*hold)(SbEffect e, SbSpace space);
   /* after a solve, with the residual r without constraints, N: sets `changed` when another solve is needed. Collective. */
   PetscErrorCode (*settle)(SbEffect e, SbSpace space, const PetscReal u[], const PetscReal r[],

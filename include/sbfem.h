@@ -168,6 +168,7 @@ PetscReal SbSpaceHoldForce(SbSpace space, PetscInt node, PetscInt k, const Petsc
   the exact rows.
 */
 PetscErrorCode SbSpaceCoupleCreate(SbSpace space);
+/* Not collective. */
 void SbSpaceCoupleClear(SbSpace space);
 /* gnode[n]: global numbers of nodes; coef[n][3]; value in m; id: rows that say nearly what those of lower ids say rest, so that no
    partition changes which. Output: row, its number on this rank. Not collective. */
@@ -176,12 +177,14 @@ PetscErrorCode SbSpaceCoupleRow(SbSpace space, PetscInt id, PetscInt n, const Pe
 /* A force of constant + stiffness (value - sum_k coef_k . u_k) along the row, N; stiffness >= 0, N/m. Not collective. */
 PetscErrorCode SbSpaceCoupleSpring(SbSpace space, PetscInt n, const PetscInt gnode[], const PetscReal coef[],
                                    PetscReal value, PetscReal stiffness, PetscReal constant, PetscInt *row);
+/* Makes matrices of the rows; without rows on any rank it exchanges no more than their number. Collective. */
 PetscErrorCode SbSpaceCoupleDone(SbSpace space);
-/* What rows push with and where they are, for the displacement U and its residual R without constraints (N); then, for each row:
-   force (N, positive: it raises the sum) and sum_k coef_k . u_k (m). Collective. */
+/* What rows push with and where they are, for the displacement U and its residual R without constraints (N). R <- R less the
+   forces of the exact rows: what is left is for supports and obstacles. Collective. */
 PetscErrorCode SbSpaceCoupleMeasure(SbSpace space, Vec U, Vec R);
-/* Whether an exact row rests: it has no force, and its sum is not looked after. */
+/* Whether an exact row rests: others say it, or it has no free direction. It has no force, and its sum is not looked after. */
 PetscBool SbSpaceCoupleRests(SbSpace space, PetscInt row);
+/* What SbSpaceCoupleMeasure() found: force (N, positive: it raises the sum) and sum_k coef_k . u_k (m). Not collective. */
 void SbSpaceCoupleGet(SbSpace space, PetscInt row, PetscReal *force, PetscReal *sum);
 /* F += what all rows push with at the displacement U, R as above. Collective. */
 PetscErrorCode SbSpaceCoupleForce(SbSpace space, Vec U, Vec R, Vec F);

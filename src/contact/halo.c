@@ -69,26 +69,21 @@ static PetscErrorCode reduce_motion(SbSurface s)
 }
 
 /* Whether two parts' boxes meet; they are looked through in the order of their lower x. */
-static PetscErrorCode are_close(PetscInt npart, const PetscReal box[], PetscReal reach, PetscBool *close)
+static PetscErrorCode are_close(SbHalo *h, PetscInt npart, PetscReal reach, PetscBool *close)
 {
-  PetscReal *low;
-  PetscInt *order;
-
   PetscFunctionBeginUser;
   *close = PETSC_FALSE;
-  PetscCall(PetscMalloc2(npart, &low, npart, &order));
   for (PetscInt b = 0; b < npart; b++) {
-    low[b] = box[6 * b];
-    order[b] = b;
+    h->low[b] = h->reduced[6 * b];
+    h->order[b] = b;
   }
-  PetscCall(PetscSortRealWithArrayInt(npart, low, order));
+  PetscCall(PetscSortRealWithArrayInt(npart, h->low, h->order));
   for (PetscInt i = 0; i < npart && !*close; i++) {
-    const PetscReal *a = box + 6 * order[i];
+    const PetscReal *a = h->reduced + 6 * h->order[i];
 
-    for (PetscInt j = i + 1; j < npart && low[j] - reach <= a[3] && !*close; j++)
-      *close = SbBoxNear(a, box + 6 * order[j], reach);
+    for (PetscInt j = i + 1; j < npart && h->low[j] - reach <= a[3] && !*close; j++)
+      *close = SbBoxNear(a, h->reduced + 6 * h->order[j], reach);
   }
-  PetscCall(PetscFree2(low, order));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -282,7 +277,7 @@ PetscErrorCode SbHaloUpdate(SbSurface s, const PetscReal u0[], const PetscReal u
 
   PetscFunctionBeginUser;
   PetscCall(reduce_motion(s));
-  PetscCall(are_close(d->npart, h->reduced, s->scene.reach, close));
+  PetscCall(are_close(h, d->npart, s->scene.reach, close));
   if (h->size == 1) PetscFunctionReturn(PETSC_SUCCESS);
   if (!*close && !s->scene.self) {
     if (h->built) PetscCall(unpack(s, 0, NULL, NULL));
@@ -306,6 +301,7 @@ PetscErrorCode SbHaloCreate(SbSurface s)
   PetscCallMPI(MPI_Comm_size(h->comm, &h->size));
   PetscCallMPI(MPI_Comm_rank(h->comm, &h->rank));
   PetscCall(PetscMalloc1(6 * d->npart + 2, &h->reduced));
+  PetscCall(PetscMalloc2(d->npart, &h->low, d->npart, &h->order));
   PetscCall(PetscMalloc1(6 * (d->ncorner_owned + s->scene.npoint), &h->swept));
   PetscCall(PetscMalloc3(h->size, &h->to, h->size, &h->from, 4 * h->size, &h->request));
   PetscCall(PetscCalloc2(h->size + 1, &h->to_start, h->size + 1, &h->from_start));
@@ -316,6 +312,7 @@ PetscErrorCode SbHaloDestroy(SbHalo *h)
 {
   PetscFunctionBeginUser;
   PetscCall(PetscFree(h->reduced));
+  PetscCall(PetscFree2(h->low, h->order));
   PetscCall(PetscFree(h->swept));
   PetscCall(PetscFree3(h->to, h->from, h->request));
   PetscCall(PetscFree2(h->to_start, h->from_start));

@@ -23,6 +23,8 @@ typedef struct {
   MPI_Comm comm; /* with these tags messages mix with no others */
   PetscMPIInt size, rank, tag[4];
   PetscReal *reduced; /* [6 npart + 2] parts' boxes, motion of the step, motion since the list was made */
+  PetscReal *low;     /* [npart] lower x of the parts' boxes, ascending */
+  PetscInt *order;    /* [npart] the parts in that order */
   PetscBool built;    /* there is a list */
   PetscBool self;     /* it was made for self-contact */
   PetscReal reach, margin; /* that it was made with, m */

@@ -20,62 +20,13 @@
   With one surface looking for the other (`sides one`), the finer one looks: rows then are not more than the surface can take. A thin
   or much coarser partner wants both.
 */
-#include "sbdetect.h"
-#include "sbeffect.h"
+#include "collision.h"
 
 #define TOGGLES 3    /* how often a row may come within a step before it stays */
-#define LOOKS 8      /* how often its normal and weights may change within a step */
 #define PULLING 1e-6 /* of the largest contact force: what a row must pull with to leave */
 #define SETTLED 1e-4 /* of the largest contact force: change of the friction that a solve assumed */
 #define LATE 1e-2    /* the same after UPDATES solves: what does not come to rest by then is cut */
 #define UPDATES 30
-#define TOLERANCE 1e-7 /* of the size of the bodies: largest penetration that counts as touching */
-#define NODES 5        /* of a row: the point's, and those of the facet's cell */
-
-typedef enum { PROJECTED, AUGMENTED, PENALTY } Response;
-
-/* A point and the surface of another part, or its own, near it. */
-typedef struct {
-  PetscInt point, part;
-  PetscInt n, node[NODES]; /* global numbers; the point's first */
-  PetscReal weight[NODES]; /* of the relative displacement w: 1, minus the facet's */
-  PetscReal normal[3];
-  PetscReal value;            /* n . w that closes the gap, m */
-  PetscReal gap;              /* at the last look, m */
-  PetscReal start[3], now[3]; /* w at the start of the step and at the last look, m */
-  PetscReal allowed;          /* penetration that was there before and is taken back step by step, m */
-  PetscReal k;                /* stiffness of springs, N/m */
-  PetscBool on;               /* it touches */
-  PetscBool was;              /* it touched at the end of the last step */
-  int toggles, looks;         /* within the step */
-  PetscBool rests;            /* other rows say it */
-  PetscInt row, slide[2];     /* rows of the space, -1: none */
-  PetscReal lambda;           /* multiplier, N */
-  PetscReal pressing;         /* N that friction assumes */
-  PetscReal stretch[3];       /* of the friction spring at the start of the step, m */
-  PetscReal tangent[2][3];
-  PetscBool newton;        /* sliding by Newton's method in the last solve */
-  int overshoots, careful; /* within the step: how often that went too far; solves left with the secant */
-  PetscReal drag[3];       /* force of friction in the last solve, N */
-  PetscBool slips;         /* at the end of the last step */
-} Hit;
-
-typedef struct {
-  SbEffectOn on;
-  SbSurface surface;
-  SbDetector detector;
-  Response response;
-  PetscBool self, both;
-  PetscReal mu, mu_kinetic, stiffness, reach, recovery;
-  PetscReal *edge;    /* [nbody] mean edge of the surfaces, m: the finer one looks */
-  PetscReal *point_k; /* [npoint] N/m */
-  PetscReal *u0;      /* [nnode][3] displacement at the start of the step, m */
-  PetscInt nhit, size, nspare;
-  Hit *hit, *spare;     /* by point and part */
-  int updates;          /* of friction within the step */
-  PetscReal work, loss; /* of the contact forces and of friction since the start, this rank, J */
-  PetscInt most;        /* rounds of a step, most so far */
-} Collision;
 
 static const SbOption rows[] = {
   {"on", SB_OPTION_NAMES, 1, "", "boundary", "", "sets whose surfaces may meet"},
@@ -124,6 +75,7 @@ static PetscErrorCode options_collision(SbEffect e, const SbScope *scope)
   PetscCall(SbOptionReal(scope, "stiffness", &c->stiffness));
   PetscCall(SbOptionReal(scope, "reach", &c->reach));
   PetscCall(SbOptionReal(scope, "recovery", &c->recovery));
+  c->recovery = c->recovery > 1 ? PetscExpReal(-1 / c->recovery) : 0;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -167,8 +119,9 @@ static PetscErrorCode find_stiffness(Collision *c, SbSpace space, PetscInt n, co
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Mean edge of each body's surface: the root of its mean facet area. */
-static PetscErrorCode find_edges(Collision *c, SbSpace space, PetscInt n, const SbFacet facet[])
+/* Mean edge of each body's surface: the root of its mean facet area. Output: bodies that have one. */
+static PetscErrorCode find_edges(Collision *c, SbSpace space, PetscInt n, const SbFacet facet[],
+                                 PetscInt *nskin)
 {
   const PetscInt nbody = space->mesh->nbody;
   PetscReal *count;
@@ -185,7 +138,11 @@ static PetscErrorCode find_edges(Collision *c, SbSpace space, PetscInt n, const 
   }
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, c->edge, (PetscMPIInt)nbody, MPIU_REAL, MPI_SUM, space->comm));
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, count, (PetscMPIInt)nbody, MPIU_REAL, MPI_SUM, space->comm));
-  for (PetscInt b = 0; b < nbody; b++) c->edge[b] = count[b] > 0 ? PetscSqrtReal(c->edge[b] / count[b]) : 0;
+  *nskin = 0;
+  for (PetscInt b = 0; b < nbody; b++) {
+    *nskin += count[b] > 0;
+    c->edge[b] = count[b] > 0 ? PetscSqrtReal(c->edge[b] / count[b]) : 0;
+  }
   PetscCall(PetscFree(count));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -194,141 +151,25 @@ static PetscErrorCode setup_collision(SbEffect e, SbSpace space)
 {
   Collision *c = (Collision *)e->data;
   SbFacet *facet;
-  PetscInt n;
+  PetscInt n, nskin;
 
   PetscFunctionBeginUser;
-  PetscCheck(
-    space->mesh->nbody > 1 || c->self, space->comm, PETSC_ERR_USER_INPUT,
-    "The effect %s has only one body to look at: give -effect_%s_self yes for a body that may meet itself",
-    e->name, e->name);
   PetscCall(SbEffectFacets(space, &c->on, &n, &facet));
   PetscCall(SbSurfaceCreate(space, n, facet, &c->surface));
   PetscCall(find_stiffness(c, space, n, facet));
-  PetscCall(find_edges(c, space, n, facet));
+  PetscCall(find_edges(c, space, n, facet, &nskin));
   PetscCall(PetscFree(facet));
+  PetscCheck(nskin > 1 || c->self, space->comm, PETSC_ERR_USER_INPUT,
+             "The effect %s has only one body to look at: give -effect_%s_self yes for a body that may meet "
+             "itself, or more sets with -effect_%s_on",
+             e->name, e->name, e->name);
   PetscCall(PetscMalloc1(3 * space->nnode, &c->u0));
   if (c->reach == 0) c->reach = 0.5 * c->surface->edge;
   PetscCall(SbSpaceCoupleCreate(space));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* ------------------------------------------------------------------ looking */
-
-/* Of two surfaces, whether the points of `mine` look for `other`. */
-static PetscBool looks_for(const Collision *c, PetscInt mine, PetscInt other)
-{
-  if (c->both || mine == other) return PETSC_TRUE;
-  if (c->edge[mine] != c->edge[other]) return (PetscBool)(c->edge[mine] < c->edge[other]);
-  return (PetscBool)(mine < other);
-}
-
-/* Displacement of a point less that of its place on the facet, from places x and X. */
-static void relative(const SbNear *near, const SbDetectScene *s, const PetscReal p[], const PetscReal x[],
-                     PetscReal w[3])
-{
-  const PetscInt *corner = s->facet + 3 * near->facet;
-
-  for (int i = 0; i < 3; i++) {
-    w[i] = p[3 * near->point + i] - s->P[3 * near->point + i];
-    for (int k = 0; k < 3; k++) w[i] -= near->weight[k] * (x[3 * corner[k] + i] - s->X[3 * corner[k] + i]);
-  }
-}
-
-/*
-  Normal, weights and gap of a pair as the detector sees it now. A point that was behind this facet when the step began, and not held
-  there, was not seen before (it came over a rim, or bodies overlap from the start): putting it in front at once would
-  throw it out.
-*/
-static void take_geometry(const Collision *c, const SbNear *near, Hit *hit)
-{
-  const SbSurface f = c->surface;
-  const SbDetectScene *s = &f->scene;
-
-  const PetscReal turned = SbDot3(hit->normal, near->normal);
-
-  hit->n = 1;
-  hit->node[0] = f->space->gnode[f->point_node[near->point]];
-  hit->weight[0] = 1;
-  for (int a = 0; a < 4; a++) {
-    PetscReal w = 0;
-
-    for (int k = 0; k < 3; k++) w += near->weight[k] * f->facet_weight[12 * near->facet + 4 * k + a];
-    if (PetscAbsReal(w) < 1e-14) continue;
-    hit->node[hit->n] = f->facet_node[4 * near->facet + a];
-    hit->weight[hit->n++] = -w;
-  }
-  for (int i = 0; i < 3; i++) hit->normal[i] = near->normal[i];
-  relative(near, s, s->p, s->x, hit->now);
-  relative(near, s, s->p0 ? s->p0 : s->p, s->x0 ? s->x0 : s->x, hit->start);
-  hit->gap = near->gap;
-  hit->value = SbDot3(hit->normal, hit->now) - near->gap;
-  if (!hit->was || turned < 0.7)
-    hit->allowed = PetscMax(0, SbDot3(hit->normal, hit->now) - SbDot3(hit->normal, hit->start) - near->gap);
-}
-
-static PetscErrorCode make_room(Collision *c, PetscInt n)
-{
-  PetscFunctionBeginUser;
-  if (n > c->size) {
-    c->size = PetscMax(n, 2 * c->size);
-    PetscCall(PetscRealloc((size_t)c->size * sizeof(Hit), &c->hit));
-    PetscCall(PetscRealloc((size_t)c->size * sizeof(Hit), &c->spare));
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static inline PetscBool before(const Hit *a, PetscInt point, PetscInt part)
-{
-  return (PetscBool)(a->point < point || (a->point == point && a->part < part));
-}
-
-/*
-  The pairs found, each with what is known of it from before. Within a step (`keep`) a pair that touches and was not found stays
-  as it is: it slid over a rim.
-*/
-static PetscErrorCode merge(Collision *c, PetscInt n, const SbNear near[], PetscBool keep)
-{
-  const SbDetectScene *s = &c->surface->scene;
-  PetscInt old = 0, m = 0;
-  Hit *swap;
-
-  PetscFunctionBeginUser;
-  PetscCall(make_room(c, n + c->nhit));
-  for (PetscInt i = 0; i < n; i++) {
-    const PetscInt part = s->facet_part[near[i].facet];
-    Hit hit = {
-      .point = near[i].point, .part = part, .k = c->point_k[near[i].point], .row = -1, .slide = {-1, -1}};
-
-    if (!looks_for(c, s->point_part[near[i].point], part)) continue;
-    for (; old < c->nhit && before(&c->hit[old], hit.point, part); old++) {
-      if (keep && c->hit[old].on) c->spare[m++] = c->hit[old];
-    }
-    if (old < c->nhit && c->hit[old].point == hit.point && c->hit[old].part == part) hit = c->hit[old++];
-    if (!keep || !hit.on || hit.looks++ < LOOKS) take_geometry(c, &near[i], &hit);
-    c->spare[m++] = hit;
-  }
-  for (; old < c->nhit; old++) {
-    if (keep && c->hit[old].on) c->spare[m++] = c->hit[old];
-  }
-  swap = c->hit;
-  c->hit = c->spare;
-  c->spare = swap;
-  c->nhit = m;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode look(Collision *c, const PetscReal u[], PetscBool keep)
-{
-  const SbNear *near = NULL;
-  PetscInt n = 0;
-  PetscBool close;
-
-  PetscFunctionBeginUser;
-  PetscCall(SbSurfaceUpdate(c->surface, c->u0, u, c->reach, c->self, &close));
-  if (close || c->self) PetscCall(SbDetectorFind(c->detector, &c->surface->scene, &n, &near));
-  PetscCall(merge(c, n, near, keep));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
+/* ------------------------------------------------------------------ who touches */
 
 /* Gap beyond what is allowed for now, m. */
 static inline PetscReal excess(const Hit *hit)
@@ -346,13 +187,13 @@ static PetscErrorCode touch_collision(SbEffect e, SbSpace space, PetscReal t, Pe
   (void)dt;
   PetscCall(PetscArraycpy(c->u0, u0, 3 * space->nnode));
   c->updates = 0;
-  PetscCall(look(c, u, PETSC_FALSE));
+  PetscCall(SbCollisionRestore(c));
+  PetscCall(SbCollisionLook(c, u, PETSC_FALSE));
   for (PetscInt i = 0; i < c->nhit; i++) {
     Hit *hit = &c->hit[i];
 
     hit->toggles = hit->looks = 0;
     hit->overshoots = hit->careful = 0;
-    hit->allowed *= c->recovery > 1 ? PetscExpReal(-1 / c->recovery) : 0;
     if (!hit->on) { /* a point that arrives in this step sticks to where it was at its start */
       for (int k = 0; k < 3; k++) hit->stretch[k] = 0;
       hit->pressing = hit->lambda = 0;
@@ -418,7 +259,6 @@ static PetscErrorCode add_friction(const Collision *c, SbSpace space, Hit *hit)
   PetscBool sliding;
 
   PetscFunctionBeginUser;
-  hit->slide[0] = hit->slide[1] = -1;
   hit->newton = PETSC_FALSE;
   if (hit->pressing <= 0) PetscFunctionReturn(PETSC_SUCCESS);
   length = stretch(hit, hit->now, s);
@@ -456,7 +296,7 @@ static PetscErrorCode hold_collision(SbEffect e, SbSpace space)
     Hit *hit = &c->hit[i];
     PetscReal coef[3 * NODES];
 
-    hit->row = -1;
+    hit->row = hit->slide[0] = hit->slide[1] = -1;
     if (!hit->on) continue;
     coefficients(hit, hit->normal, coef);
     if (c->response == PROJECTED)
@@ -518,13 +358,14 @@ static PetscBool settle_spring(const Collision *c, Hit *hit)
 /* Once who touches is settled everywhere: the N that friction assumes, from the second half on with half steps. */
 static PetscErrorCode settle_friction(Collision *c, SbSpace space, PetscReal largest, PetscBool *changed)
 {
+  const PetscReal most = c->mu * largest;
   PetscBool wait = *changed;
 
   PetscFunctionBeginUser;
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &wait, 1, SB_MPI_BOOL, MPI_LOR, space->comm));
   if (wait) PetscFunctionReturn(PETSC_SUCCESS);
   c->updates++;
-  if (c->updates > UPDATES) largest *= LATE / SETTLED;
+  c->unsettled = 0;
   for (PetscInt i = 0; i < c->nhit; i++) {
     Hit *hit = &c->hit[i];
     PetscReal s[3], change, length, wrong[3];
@@ -538,8 +379,9 @@ static PetscErrorCode settle_friction(Collision *c, SbSpace space, PetscReal lar
     hit->pressing += 2 * c->updates > UPDATES ? 0.5 * change : change;
     for (int k = 0; k < 3; k++)
       wrong[k] = hit->drag[k] + (length > 0 ? drag(c, hit, length) / length * s[k] : 0);
-    if (SbDot3(wrong, wrong) > PetscSqr(SETTLED * c->mu * largest)) *changed = PETSC_TRUE;
+    if (most > 0) c->unsettled = PetscMax(c->unsettled, PetscSqrtReal(SbDot3(wrong, wrong)) / most);
   }
+  if (c->unsettled > (c->updates > UPDATES ? LATE : SETTLED)) *changed = PETSC_TRUE;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -551,6 +393,10 @@ static void read_rows(const Collision *c, SbSpace space, Hit *hit)
   for (int k = 0; k < 3; k++) hit->drag[k] = 0;
   hit->rests = PETSC_FALSE;
   if (hit->row < 0) return;
+  for (int q = 0; q < 2 && hit->slide[q] >= 0; q++) {
+    SbSpaceCoupleGet(space, hit->slide[q], &force, &across[q]);
+    for (int k = 0; k < 3; k++) hit->drag[k] += force * hit->tangent[q][k];
+  }
   SbSpaceCoupleGet(space, hit->row, &force, &along);
   hit->rests = SbSpaceCoupleRests(space, hit->row);
   if (hit->rests) {
@@ -559,11 +405,7 @@ static void read_rows(const Collision *c, SbSpace space, Hit *hit)
   }
   if (c->response == PROJECTED) hit->lambda = force;
   hit->gap = along - hit->value;
-  if (c->mu <= 0 || hit->slide[0] < 0) return;
-  for (int q = 0; q < 2; q++) {
-    SbSpaceCoupleGet(space, hit->slide[q], &force, &across[q]);
-    for (int k = 0; k < 3; k++) hit->drag[k] += force * hit->tangent[q][k];
-  }
+  if (hit->slide[0] < 0) return;
   for (int k = 0; k < 3; k++)
     hit->now[k] = along * hit->normal[k] + across[0] * hit->tangent[0][k] + across[1] * hit->tangent[1][k];
 }
@@ -578,7 +420,7 @@ static PetscErrorCode settle_collision(SbEffect e, SbSpace space, const PetscRea
   PetscFunctionBeginUser;
   (void)r;
   for (PetscInt i = 0; i < c->nhit; i++) read_rows(c, space, &c->hit[i]);
-  PetscCall(look(c, u, PETSC_TRUE));
+  PetscCall(SbCollisionLook(c, u, PETSC_TRUE));
   for (PetscInt i = 0; i < c->nhit; i++) largest = PetscMax(largest, normal_force(c, &c->hit[i]));
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &largest, 1, MPIU_REAL, MPI_MAX, space->comm));
   for (PetscInt i = 0; i < c->nhit; i++) {
@@ -594,31 +436,54 @@ static PetscErrorCode settle_collision(SbEffect e, SbSpace space, const PetscRea
 
 /* ------------------------------------------------------------------ after a step */
 
+/* Says once that friction was taken as it was. Collective. */
+static PetscErrorCode warn_unsettled(SbEffect e, SbSpace space, const SbStage *stage)
+{
+  Collision *c = (Collision *)e->data;
+  PetscReal most = c->unsettled;
+
+  PetscFunctionBeginUser;
+  if (c->updates <= UPDATES || c->said) PetscFunctionReturn(PETSC_SUCCESS); /* alike on all ranks */
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &most, 1, MPIU_REAL, MPI_MAX, space->comm));
+  if (most <= SETTLED) PetscFunctionReturn(PETSC_SUCCESS);
+  c->said = PETSC_TRUE;
+  PetscCall(SbWarning(space->comm,
+                      "at t = %g s the friction of the effect %s settled to %.1g of the largest only, not to "
+                      "%g; said once: smaller steps make it more exact",
+                      (double)stage->t, e->name, (double)most, SETTLED));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Who slid keeps the stretch that the force asks for; work of the forces on the way from the start of the step. */
 static PetscErrorCode accept_collision(SbEffect e, SbSpace space, const SbStage *stage)
 {
   Collision *c = (Collision *)e->data;
 
   PetscFunctionBeginUser;
-  (void)space;
-  (void)stage;
+  PetscCall(warn_unsettled(e, space, stage));
   for (PetscInt i = 0; i < c->nhit; i++) {
     Hit *hit = &c->hit[i];
     const PetscReal normal = hit->on ? normal_force(c, hit) : 0;
-    PetscReal s[3], slid[3], length, held;
+    PetscReal s[3], slid[3], length;
 
     hit->was = hit->on;
-    if (normal <= 0) continue;
+    hit->held = 0;
+    if (normal <= 0) { /* nothing holds it where it was */
+      for (int k = 0; k < 3; k++) hit->stretch[k] = 0;
+      hit->slips = PETSC_FALSE;
+      continue;
+    }
     for (int k = 0; k < 3; k++) slid[k] = hit->now[k] - hit->start[k];
     c->work += normal * SbDot3(hit->normal, slid);
     length = stretch(hit, hit->now, s);
-    held = drag(c, hit, length);
+    hit->held = drag(c, hit, length);
     hit->slips = (PetscBool)(hit->k * length > limit(c, hit));
     if (length > 0) {
-      c->loss += held / length * SbDot3(s, slid);
-      for (int k = 0; k < 3; k++) hit->stretch[k] = s[k] * held / (hit->k * length);
+      c->loss += hit->held / length * SbDot3(s, slid);
+      for (int k = 0; k < 3; k++) hit->stretch[k] = s[k] * hit->held / (hit->k * length);
     }
   }
+  PetscCall(SbCollisionKeep(c));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -644,11 +509,7 @@ static PetscErrorCode history_collision(SbEffect e, SbSpace space, const SbStage
     if (!hit->on || normal_force(c, hit) <= 0) continue;
     values[0]++;
     values[3] += normal_force(c, hit);
-    if (hit->pressing > 0) {
-      PetscReal s[3];
-
-      values[4] += drag(c, hit, stretch(hit, hit->now, s));
-    }
+    values[4] += hit->held;
   }
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &deepest, 1, MPIU_REAL, MPI_MAX, space->comm));
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, sum, 2, MPIU_REAL, MPI_SUM, space->comm));
@@ -675,6 +536,7 @@ static PetscErrorCode destroy_collision(SbEffect e)
   PetscCall(PetscFree(c->u0));
   PetscCall(PetscFree(c->hit));
   PetscCall(PetscFree(c->spare));
+  PetscCall(PetscFree(c->past));
   PetscCall(PetscFree(e->data));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -16,10 +16,10 @@
   Nodes that are prescribed or held (held.c) have no say: their columns are cleared or projected.
 */
 #include "couple.h"
-#include "sbsolver.h"
 
 #define REGULAR \
   1e-8 /* relative, on the diagonal of what is factored: keeps rows that depend on others solvable */
+#define NOTHING 1e-20 /* of the largest on that diagonal: rows below it have no free node but for rounding */
 
 PetscErrorCode SbSpaceCoupleCreate(SbSpace s)
 {
@@ -103,6 +103,8 @@ static PetscErrorCode make_room(SbCouple c, PetscInt more)
     PetscCall(PetscArraycpy(value, c->value, c->n));
     PetscCall(PetscArraycpy(stiffness, c->stiffness, c->n));
     PetscCall(PetscArraycpy(constant, c->constant, c->n));
+    PetscCall(PetscArraycpy(force, c->force, c->n));
+    PetscCall(PetscArraycpy(sum, c->sum, c->n));
     PetscCall(PetscArraycpy(id, c->id, c->n));
     PetscCall(PetscMalloc1(size, &rests));
     PetscCall(PetscFree(c->rests));
@@ -228,8 +230,7 @@ static PetscErrorCode free_rows(SbSpace s, Rows *r)
 {
   PetscFunctionBeginUser;
   if (!r->N) PetscFunctionReturn(PETSC_SUCCESS);
-  /* the same on all ranks: held nodes are counted over all of them */
-  if (SbHeldProjector(s, 0)) {
+  if (SbHeldAny(s)) {
     Mat H;
 
     PetscCall(create_projector(s, &H));
@@ -286,21 +287,29 @@ static PetscErrorCode weigh_nodes(SbSpace s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Keeps the factorisation solvable: rows that depend on others, rows without a free node. */
-static PetscErrorCode regularise(Mat gram)
+/* Keeps the factorisation solvable: rows that depend on others. Rows without a free direction can do nothing and rest. */
+static PetscErrorCode regularise(SbCouple c)
 {
+  PetscReal largest;
   PetscScalar *x;
-  PetscInt n;
   Vec d;
 
   PetscFunctionBeginUser;
-  PetscCall(MatCreateVecs(gram, &d, NULL));
-  PetscCall(MatGetDiagonal(gram, d));
-  PetscCall(VecGetLocalSize(d, &n));
+  PetscCall(MatCreateVecs(c->gram, &d, NULL));
+  PetscCall(MatGetDiagonal(c->gram, d));
+  PetscCall(VecNorm(d, NORM_INFINITY, &largest));
   PetscCall(VecGetArray(d, &x));
-  for (PetscInt i = 0; i < n; i++) x[i] = x[i] > 0. ? x[i] * (1. + REGULAR) : 1.;
+  for (PetscInt i = 0; i < c->n; i++) {
+    if (!of_kind(c, i, PETSC_TRUE)) continue;
+    if (x[c->place[i]] > NOTHING * largest)
+      x[c->place[i]] *= 1. + REGULAR;
+    else {
+      x[c->place[i]] = largest > 0. ? largest : 1.;
+      c->rests[i] = PETSC_TRUE;
+    }
+  }
   PetscCall(VecRestoreArray(d, &x));
-  PetscCall(MatDiagonalSet(gram, d, INSERT_VALUES));
+  PetscCall(MatDiagonalSet(c->gram, d, INSERT_VALUES));
   PetscCall(VecDestroy(&d));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -379,12 +388,55 @@ PetscErrorCode SbCoupleAnchor(SbSpace s, const SbValues *x)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbSpaceCoupleDone(SbSpace s)
+/* G D G^T of the exact rows, and its factorisation. */
+static PetscErrorCode create_gram(SbSpace s)
 {
   SbCouple c = s->couple;
 
   PetscFunctionBeginUser;
+  if (!c->exact.N) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(weigh_nodes(s));
+  PetscCall(MatTranspose(c->exact.free, MAT_INITIAL_MATRIX, &c->DGt));
+  PetscCall(MatDiagonalScale(c->DGt, c->d, NULL));
+  PetscCall(MatMatMult(c->exact.free, c->DGt, MAT_INITIAL_MATRIX, PETSC_DEFAULT, &c->gram));
+  PetscCall(regularise(c));
+  PetscCall(create_solver(s));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Stiffness and constant force of the springs. */
+static PetscErrorCode create_springs(SbCouple c)
+{
+  PetscScalar *k, *constant;
+
+  PetscFunctionBeginUser;
+  if (!c->spring.N) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(VecDuplicate(c->spring.value, &c->k));
+  PetscCall(VecDuplicate(c->spring.value, &c->constants));
+  PetscCall(VecGetArray(c->k, &k));
+  PetscCall(VecGetArray(c->constants, &constant));
+  for (PetscInt i = 0; i < c->n; i++) {
+    if (c->stiffness[i] < 0.) continue;
+    k[c->place[i]] = c->stiffness[i];
+    constant[c->place[i]] = c->constant[i];
+  }
+  PetscCall(VecRestoreArray(c->k, &k));
+  PetscCall(VecRestoreArray(c->constants, &constant));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbSpaceCoupleDone(SbSpace s)
+{
+  SbCouple c = s->couple;
+  PetscInt total;
+
+  PetscFunctionBeginUser;
   PetscCall(destroy_matrices(c));
+  PetscCallMPI(MPI_Allreduce(&c->n, &total, 1, MPIU_INT, MPI_SUM, s->comm));
+  if (!total) { /* bodies are apart: nothing more is exchanged or made */
+    if (c->anchor) PetscCall(VecZeroEntries(c->anchor));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
   PetscCall(create_vectors(s));
   PetscCall(SbCoupleSelect(s));
   PetscCall(find_anchors(s));
@@ -392,29 +444,8 @@ PetscErrorCode SbSpaceCoupleDone(SbSpace s)
   PetscCall(create_rows(s, PETSC_FALSE, &c->spring));
   PetscCall(free_rows(s, &c->exact));
   PetscCall(free_rows(s, &c->spring));
-  if (c->exact.N) {
-    PetscCall(weigh_nodes(s));
-    PetscCall(MatTranspose(c->exact.free, MAT_INITIAL_MATRIX, &c->DGt));
-    PetscCall(MatDiagonalScale(c->DGt, c->d, NULL));
-    PetscCall(MatMatMult(c->exact.free, c->DGt, MAT_INITIAL_MATRIX, PETSC_DEFAULT, &c->gram));
-    PetscCall(regularise(c->gram));
-    PetscCall(create_solver(s));
-  }
-  if (c->spring.N) {
-    PetscScalar *k, *constant;
-
-    PetscCall(VecDuplicate(c->spring.value, &c->k));
-    PetscCall(VecDuplicate(c->spring.value, &c->constants));
-    PetscCall(VecGetArray(c->k, &k));
-    PetscCall(VecGetArray(c->constants, &constant));
-    for (PetscInt i = 0; i < c->n; i++) {
-      if (c->stiffness[i] < 0.) continue;
-      k[c->place[i]] = c->stiffness[i];
-      constant[c->place[i]] = c->constant[i];
-    }
-    PetscCall(VecRestoreArray(c->k, &k));
-    PetscCall(VecRestoreArray(c->constants, &constant));
-  }
+  PetscCall(create_gram(s));
+  PetscCall(create_springs(c));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -426,8 +457,7 @@ static PetscErrorCode solve_rows(SbCouple c)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* x <- P x */
-static PetscErrorCode project(SbCouple c, Vec x)
+PetscErrorCode SbCoupleProject(SbCouple c, Vec x)
 {
   PetscFunctionBeginUser;
   for (int pass = 0; c->exact.N && pass < 2; pass++) {
@@ -443,7 +473,7 @@ static PetscErrorCode project(SbCouple c, Vec x)
   r <- P^T r; the multipliers into c->exact.force. They may be much larger than what is left: the second pass also takes away
   their rounding, which would be a residual that no iteration lowers.
 */
-static PetscErrorCode project_force(SbCouple c, Vec r)
+PetscErrorCode SbCoupleProjectForce(SbCouple c, Vec r)
 {
   PetscFunctionBeginUser;
   if (c->exact.N) PetscCall(VecZeroEntries(c->exact.force));
@@ -492,7 +522,7 @@ PetscErrorCode SbCoupleResidual(SbSpace s, Vec U, PetscBool constrain, Vec F)
     PetscCall(VecScale(c->spring.force, -1.));
     PetscCall(MatMultTransposeAdd(constrain ? c->spring.free : c->spring.whole, c->spring.force, F, F));
   }
-  if (constrain) PetscCall(project_force(c, F));
+  if (constrain) PetscCall(SbCoupleProjectForce(c, F));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -517,8 +547,11 @@ PetscErrorCode SbSpaceCoupleMeasure(SbSpace s, Vec U, Vec R)
   PetscFunctionBeginUser;
   if (c->exact.N) {
     PetscCall(VecPointwiseMult(c->w[0], R, c->free));
-    PetscCall(project_force(c, c->w[0]));
+    PetscCall(SbCoupleProjectForce(c, c->w[0]));
     PetscCall(hand_out(c, PETSC_TRUE, c->exact.force, c->force));
+    /* the rest is what supports and obstacles push with */
+    PetscCall(VecScale(c->exact.force, -1.));
+    PetscCall(MatMultTransposeAdd(c->exact.whole, c->exact.force, R, R));
     PetscCall(MatMult(c->exact.whole, U, c->exact.work));
     PetscCall(hand_out(c, PETSC_TRUE, c->exact.work, c->sum));
   }
@@ -556,158 +589,4 @@ void SbSpaceCoupleGet(SbSpace s, PetscInt row, PetscReal *force, PetscReal *sum)
 {
   *force = s->couple->force[row];
   *sum = s->couple->sum[row];
-}
-
-/* ------------------------------------------------------------------ operator and preconditioner */
-
-/* y = P^T (K + S^T k S) x for x in the null space, where the iteration stays. */
-static PetscErrorCode multiply(Mat A, Vec x, Vec y)
-{
-  SbSpace s;
-  SbCouple c;
-
-  PetscFunctionBeginUser;
-  PetscCall(MatShellGetContext(A, &s));
-  c = s->couple;
-  PetscCall(MatMult(c->K, x, y));
-  if (c->added) {
-    PetscCall(VecPointwiseMult(c->w[0], c->added, x));
-    PetscCall(VecAXPY(y, -1., c->w[0]));
-  }
-  if (c->spring.N) {
-    PetscCall(MatMult(c->spring.free, x, c->spring.work));
-    PetscCall(VecPointwiseMult(c->spring.work, c->spring.work, c->k));
-    PetscCall(MatMultTransposeAdd(c->spring.free, c->spring.work, y, y));
-  }
-  PetscCall(project_force(c, y));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode SbCoupleCreateOperator(SbSpace s, Mat K, PetscBool singular, Mat *A)
-{
-  PetscInt m, n, M, N;
-
-  PetscFunctionBeginUser;
-  PetscCall(MatGetLocalSize(K, &m, &n));
-  PetscCall(MatGetSize(K, &M, &N));
-  PetscCall(MatCreateShell(s->comm, m, n, M, N, s, A));
-  PetscCall(MatShellSetOperation(*A, MATOP_MULT, SB_OPERATION(multiply)));
-  PetscCall(MatSetOption(*A, MAT_SYMMETRIC, PETSC_TRUE));
-  s->couple->K = K;
-  if (singular) {
-    PetscCall(SbSpaceCreateVec(s, &s->couple->anchor));
-    PetscCall(SbSpaceCreateVec(s, &s->couple->added));
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-#define NAME "null space of rows"
-
-typedef struct {
-  SbSpace space;
-  PC inner;
-  PetscBool configured;
-} Wrapped;
-
-static PetscErrorCode setup_wrapped(PC pc)
-{
-  PCFailedReason reason;
-  Wrapped *w;
-  Mat K;
-
-  PetscFunctionBeginUser;
-  PetscCall(PCShellGetContext(pc, &w));
-  PetscCall(PCGetOperators(pc, NULL, &K));
-  PetscCall(PCSetOperators(w->inner, K, K));
-  if (!w->configured) PetscCall(PCSetFromOptions(w->inner));
-  w->configured = PETSC_TRUE;
-  PetscCall(PCSetUp(w->inner));
-  PetscCall(PCGetFailedReason(w->inner, &reason));
-  PetscCall(PCSetFailedReason(pc, reason));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode apply_wrapped(PC pc, Vec r, Vec z)
-{
-  PCFailedReason reason;
-  Wrapped *w;
-  SbCouple c;
-
-  PetscFunctionBeginUser;
-  PetscCall(PCShellGetContext(pc, &w));
-  c = w->space->couple;
-  if (!c->exact.N)
-    PetscCall(PCApply(w->inner, r, z));
-  else {
-    PetscCall(VecCopy(r, c->w[1]));
-    PetscCall(project_force(c, c->w[1]));
-    PetscCall(PCApply(w->inner, c->w[1], z));
-    PetscCall(project(c, z));
-  }
-  PetscCall(PCGetFailedReason(w->inner, &reason));
-  if (reason) PetscCall(PCSetFailedReason(pc, reason));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode view_wrapped(PC pc, PetscViewer viewer)
-{
-  Wrapped *w;
-
-  PetscFunctionBeginUser;
-  PetscCall(PCShellGetContext(pc, &w));
-  PetscCall(PetscViewerASCIIPrintf(viewer, "  between projections into the null space:\n"));
-  PetscCall(PCView(w->inner, viewer));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode destroy_wrapped(PC pc)
-{
-  Wrapped *w;
-
-  PetscFunctionBeginUser;
-  PetscCall(PCShellGetContext(pc, &w));
-  PetscCall(PCDestroy(&w->inner));
-  PetscCall(PetscFree(w));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode SbPCCoupleCreate(SbSpace s, PC pc, PC *inner)
-{
-  const char *prefix;
-  Wrapped *w;
-
-  PetscFunctionBeginUser;
-  *inner = pc;
-  if (!s->couple) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(PetscNew(&w));
-  w->space = s;
-  PetscCall(PCCreate(s->comm, &w->inner));
-  PetscCall(PCGetOptionsPrefix(pc, &prefix));
-  PetscCall(PCSetOptionsPrefix(w->inner, prefix));
-  PetscCall(PCSetOptionsPrefix(pc, "rows_"));
-  PetscCall(PCSetType(pc, PCSHELL));
-  PetscCall(PCShellSetContext(pc, w));
-  PetscCall(PCShellSetName(pc, NAME));
-  PetscCall(PCShellSetSetUp(pc, setup_wrapped));
-  PetscCall(PCShellSetApply(pc, apply_wrapped));
-  PetscCall(PCShellSetView(pc, view_wrapped));
-  PetscCall(PCShellSetDestroy(pc, destroy_wrapped));
-  *inner = w->inner;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode SbPCCoupleGetInner(PC pc, PC *inner)
-{
-  PetscBool is;
-  const char *name = NULL;
-  Wrapped *w;
-
-  PetscFunctionBeginUser;
-  *inner = pc;
-  PetscCall(PetscObjectTypeCompare((PetscObject)pc, PCSHELL, &is));
-  if (is) PetscCall(PCShellGetName(pc, &name));
-  if (!name || strcmp(name, NAME)) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(PCShellGetContext(pc, &w));
-  *inner = w->inner;
-  PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -1,5 +1,5 @@
 /*
-  couple.h - rows between nodes: what couple.c and couple_select.c share.
+  couple.h - rows between nodes: what couple.c, couple_operator.c and couple_select.c share.
 */
 #pragma once
 #include "fem_impl.h"
@@ -38,3 +38,7 @@ struct _p_SbCouple {
 
 /* Finds the exact rows that rest: c->rests. Collective. */
 PetscErrorCode SbCoupleSelect(SbSpace space);
+/* x <- P x. Collective. */
+PetscErrorCode SbCoupleProject(SbCouple c, Vec x);
+/* r <- P^T r; the multipliers into c->exact.force, N. Collective. */
+PetscErrorCode SbCoupleProjectForce(SbCouple c, Vec r);

@@ -122,6 +122,8 @@ PetscErrorCode SbPressureOperatorMatrix(Mat A, Mat *inner);
 PetscErrorCode SbHeldDestroy(SbHeld *held);
 /* Projects an assembled matrix. */
 void SbHeldProject(SbSpace space, const SbValues *x);
+/* Whether nodes are held on any rank: the same on all of them. */
+PetscBool SbHeldAny(SbSpace space);
 /* The 3x3 projector of a node's held directions; NULL when nothing is held anywhere. */
 const PetscReal *SbHeldProjector(SbSpace space, PetscInt node);
 /* couple.c: adds what makes an assembled matrix regular. Not collective. */

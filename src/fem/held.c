@@ -221,6 +221,11 @@ void SbHeldProject(SbSpace s, const SbValues *x)
   }
 }
 
+PetscBool SbHeldAny(SbSpace s)
+{
+  return (PetscBool)(s->held && s->held->ntotal);
+}
+
 const PetscReal *SbHeldProjector(SbSpace s, PetscInt node)
 {
   return s->held && s->held->ntotal ? s->held->Q + 9 * node : NULL;

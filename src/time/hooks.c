@@ -48,11 +48,13 @@ static PetscErrorCode accept_effects(SbRun run, PetscInt step, PetscReal t, Pets
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* R with the acceleration of the integrator; where it keeps none (TSALPHA2) inertia is left out of the reactions. */
+/* R with the acceleration of the integrator; where it keeps none (TSALPHA2) inertia is left out of the reactions.
+   Forces between bodies are taken out. */
 static PetscErrorCode unconstrained_residual(SbRun run, PetscReal t, Vec R)
 {
   PetscFunctionBeginUser;
   PetscCall(SbModelResidual(run->model, t, run->U, run->V, run->A, PETSC_FALSE, R));
+  if (run->model->space->couple) PetscCall(SbSpaceCoupleMeasure(run->model->space, run->U, R));
   if (run->model->space->held) {
     PetscScalar *r;
 

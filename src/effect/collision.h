@@ -1,0 +1,72 @@
+/*
+  collision.h - pairs of a point and a surface near it: what collision.c and collision_look.c share.
+*/
+#pragma once
+#include "sbdetect.h"
+#include "sbeffect.h"
+
+#define LOOKS 8        /* how often its normal and weights may change within a step */
+#define TOLERANCE 1e-7 /* of the size of the bodies: largest penetration that counts as touching */
+#define NODES 5        /* of a row: the point's, and those of the facet's cell */
+
+typedef enum { PROJECTED, AUGMENTED, PENALTY } Response;
+
+/* A point and the surface of another part, or its own, near it. */
+typedef struct {
+  PetscInt point, part;
+  PetscInt n, node[NODES]; /* global numbers; the point's first */
+  PetscReal weight[NODES]; /* of the relative displacement w: 1, minus the facet's */
+  PetscReal normal[3];
+  PetscReal value;            /* n . w that closes the gap, m */
+  PetscReal gap;              /* at the last look, m */
+  PetscReal start[3], now[3]; /* w at the start of the step and at the last look, m */
+  PetscReal allowed;          /* penetration that was there before and is taken back step by step, m */
+  PetscReal k;                /* stiffness of springs, N/m */
+  PetscBool on;               /* it touches */
+  PetscBool was;              /* it touched at the end of the last step */
+  int toggles, looks;         /* within the step */
+  PetscBool rests;            /* other rows say it */
+  PetscInt row, slide[2];     /* rows of the space, -1: none */
+  PetscReal lambda;           /* multiplier, N */
+  PetscReal pressing;         /* N that friction assumes */
+  PetscReal stretch[3];       /* of the friction spring at the start of the step, m */
+  PetscReal tangent[2][3];
+  PetscBool newton;        /* sliding by Newton's method in the last solve */
+  int overshoots, careful; /* within the step: how often that went too far; solves left with the secant */
+  PetscReal drag[3];       /* force of friction in the last solve, N */
+  PetscReal held;          /* the same, its size, at the end of the last step */
+  PetscBool slips;         /* at the end of the last step */
+} Hit;
+
+typedef struct {
+  SbEffectOn on;
+  SbSurface surface;
+  SbDetector detector;
+  Response response;
+  PetscBool self, both;
+  PetscReal mu, mu_kinetic, stiffness, reach;
+  PetscReal recovery; /* part of a depth that is left after a step */
+  PetscReal *edge;    /* [nbody] mean edge of the surfaces, m: the finer one looks */
+  PetscReal *point_k; /* [npoint] N/m */
+  PetscReal *u0;      /* [nnode][3] displacement at the start of the step, m */
+  PetscInt nhit, size, npast, past_size;
+  Hit *hit, *spare; /* by point and part */
+  Hit *past;        /* [npast] as the last step left them: each attempt at a step begins there */
+  int updates;      /* of friction within the step */
+  PetscReal
+    unsettled; /* largest change of friction that the last solve did not see, as a part of the largest friction */
+  PetscBool said;       /* that friction did not settle */
+  PetscReal work, loss; /* of the contact forces and of friction since the start, this rank, J */
+} Collision;
+
+/*
+  SbCollisionLook - finds the pairs anew for local displacements u, m, each with what is known of it from before.
+
+  Collective. `within`: a look within a step; what touches then stays, found or not. Else only what is found stays.
+*/
+PetscErrorCode SbCollisionLook(Collision *c, const PetscReal u[], PetscBool within);
+/* The pairs as the last step left them; what an attempt at this step that failed has made of them is forgotten,
+   but for the multipliers of `augmented`. Not collective. */
+PetscErrorCode SbCollisionRestore(Collision *c);
+/* Remembers the pairs as this step leaves them. Not collective. */
+PetscErrorCode SbCollisionKeep(Collision *c);

@@ -1,0 +1,175 @@
+/*
+  collision_look.c - pairs of a point and a surface near it, from look to look: what the detector finds now, with what was known
+  of the pair before.
+
+  A step may be tried several times. Each attempt begins with the pairs as the last step left them, so that a failed one leaves no
+  trace but for the multipliers of `augmented`: a guess, raised until gaps close, that may take more than one attempt.
+*/
+#include "collision.h"
+
+/* Of two surfaces, whether the points of `mine` look for `other`. Edges that rounding alone tells apart are the same. */
+static PetscBool looks_for(const Collision *c, PetscInt mine, PetscInt other)
+{
+  const PetscReal difference = c->edge[mine] - c->edge[other];
+
+  if (c->both || mine == other) return PETSC_TRUE;
+  if (PetscAbsReal(difference) > 1e-6 * c->edge[mine]) return (PetscBool)(difference < 0);
+  return (PetscBool)(mine < other);
+}
+
+/* Displacement of a point less that of its place on the facet, from places x and X. */
+static void relative(const SbNear *near, const SbDetectScene *s, const PetscReal p[], const PetscReal x[],
+                     PetscReal w[3])
+{
+  const PetscInt *corner = s->facet + 3 * near->facet;
+
+  for (int i = 0; i < 3; i++) {
+    w[i] = p[3 * near->point + i] - s->P[3 * near->point + i];
+    for (int k = 0; k < 3; k++) w[i] -= near->weight[k] * (x[3 * corner[k] + i] - s->X[3 * corner[k] + i]);
+  }
+}
+
+/*
+  Normal, weights and gap of a pair as the detector sees it now. A point that was behind this facet when the step began, and not held
+  there, was not seen before (it came over a rim, or bodies overlap from the start): putting it in front at once would
+  throw it out.
+*/
+static void take_geometry(const Collision *c, const SbNear *near, Hit *hit)
+{
+  const SbSurface f = c->surface;
+  const SbDetectScene *s = &f->scene;
+  const PetscReal turned = SbDot3(hit->normal, near->normal);
+
+  hit->n = 1;
+  hit->node[0] = f->space->gnode[f->point_node[near->point]];
+  hit->weight[0] = 1;
+  for (int a = 0; a < 4; a++) {
+    PetscReal w = 0;
+
+    for (int k = 0; k < 3; k++) w += near->weight[k] * f->facet_weight[12 * near->facet + 4 * k + a];
+    if (PetscAbsReal(w) < 1e-14) continue;
+    hit->node[hit->n] = f->facet_node[4 * near->facet + a];
+    hit->weight[hit->n++] = -w;
+  }
+  for (int i = 0; i < 3; i++) hit->normal[i] = near->normal[i];
+  relative(near, s, s->p, s->x, hit->now);
+  relative(near, s, s->p0 ? s->p0 : s->p, s->x0 ? s->x0 : s->x, hit->start);
+  hit->gap = near->gap;
+  hit->value = SbDot3(hit->normal, hit->now) - near->gap;
+  if (!hit->was || turned < 0.7)
+    hit->allowed =
+      c->recovery * PetscMax(0, SbDot3(hit->normal, hit->now) - SbDot3(hit->normal, hit->start) - near->gap);
+}
+
+static PetscErrorCode make_room(Collision *c, PetscInt n)
+{
+  PetscFunctionBeginUser;
+  if (n > c->size) {
+    c->size = PetscMax(n, 2 * c->size);
+    PetscCall(PetscRealloc((size_t)c->size * sizeof(Hit), &c->hit));
+    PetscCall(PetscRealloc((size_t)c->size * sizeof(Hit), &c->spare));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static inline PetscBool before(const Hit *a, PetscInt point, PetscInt part)
+{
+  return (PetscBool)(a->point < point || (a->point == point && a->part < part));
+}
+
+/*
+  The pairs found, each with what is known of it from before. Within a step (`within`) a pair that touches and was not found stays
+  as it is: it slid over a rim.
+*/
+static PetscErrorCode merge(Collision *c, PetscInt n, const SbNear near[], PetscBool within)
+{
+  const SbDetectScene *s = &c->surface->scene;
+  PetscInt old = 0, m = 0;
+  Hit *swap;
+
+  PetscFunctionBeginUser;
+  PetscCall(make_room(c, n + c->nhit));
+  for (PetscInt i = 0; i < n; i++) {
+    const PetscInt part = s->facet_part[near[i].facet];
+    Hit hit = {
+      .point = near[i].point, .part = part, .k = c->point_k[near[i].point], .row = -1, .slide = {-1, -1}};
+
+    if (!looks_for(c, s->point_part[near[i].point], part)) continue;
+    for (; old < c->nhit && before(&c->hit[old], hit.point, part); old++) {
+      if (within && c->hit[old].on) c->spare[m++] = c->hit[old];
+    }
+    if (old < c->nhit && c->hit[old].point == hit.point && c->hit[old].part == part) hit = c->hit[old++];
+    if (!within || !hit.on || hit.looks++ < LOOKS) take_geometry(c, &near[i], &hit);
+    c->spare[m++] = hit;
+  }
+  for (; old < c->nhit; old++) {
+    if (within && c->hit[old].on) c->spare[m++] = c->hit[old];
+  }
+  swap = c->hit;
+  c->hit = c->spare;
+  c->spare = swap;
+  c->nhit = m;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbCollisionLook(Collision *c, const PetscReal u[], PetscBool within)
+{
+  const SbNear *near = NULL;
+  PetscInt n = 0;
+  PetscBool close;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbSurfaceUpdate(c->surface, c->u0, u, c->reach, c->self, &close));
+  if (close || c->self) PetscCall(SbDetectorFind(c->detector, &c->surface->scene, &n, &near));
+  PetscCall(merge(c, n, near, within));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The multipliers that a failed attempt has raised, with the pairs that have them. */
+static void keep_multipliers(Collision *c)
+{
+  PetscInt old = 0, m = 0;
+  Hit *swap;
+
+  for (PetscInt i = 0; i < c->npast; i++) {
+    Hit hit = c->past[i];
+
+    while (old < c->nhit && before(&c->hit[old], hit.point, hit.part)) c->spare[m++] = c->hit[old++];
+    if (old < c->nhit && c->hit[old].point == hit.point && c->hit[old].part == hit.part) {
+      hit.lambda = c->hit[old].lambda;
+      hit.on = c->hit[old++].on;
+    }
+    c->spare[m++] = hit;
+  }
+  while (old < c->nhit) c->spare[m++] = c->hit[old++];
+  swap = c->hit;
+  c->hit = c->spare;
+  c->spare = swap;
+  c->nhit = m;
+}
+
+PetscErrorCode SbCollisionRestore(Collision *c)
+{
+  PetscFunctionBeginUser;
+  PetscCall(make_room(c, c->npast + c->nhit));
+  if (c->response == AUGMENTED)
+    keep_multipliers(c);
+  else {
+    PetscCall(PetscArraycpy(c->hit, c->past, c->npast));
+    c->nhit = c->npast;
+  }
+  for (PetscInt i = 0; i < c->nhit; i++) c->hit[i].allowed *= c->recovery;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbCollisionKeep(Collision *c)
+{
+  PetscFunctionBeginUser;
+  if (c->nhit > c->past_size) {
+    c->past_size = c->size;
+    PetscCall(PetscRealloc((size_t)c->past_size * sizeof(Hit), &c->past));
+  }
+  PetscCall(PetscArraycpy(c->past, c->hit, c->nhit));
+  c->npast = c->nhit;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

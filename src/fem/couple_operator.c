@@ -1,0 +1,157 @@
+/*
+  What solves see of the rows of couple.c: the operator A = P^T (K + S^T k S) P, and M_A^-1 = P M^-1 P^T around any preconditioner M.
+*/
+#include "couple.h"
+#include "sbsolver.h"
+
+/* y = P^T (K + S^T k S) x for x in the null space, where the iteration stays. */
+static PetscErrorCode multiply(Mat A, Vec x, Vec y)
+{
+  SbSpace s;
+  SbCouple c;
+
+  PetscFunctionBeginUser;
+  PetscCall(MatShellGetContext(A, &s));
+  c = s->couple;
+  PetscCall(MatMult(c->K, x, y));
+  if (c->added) {
+    PetscCall(VecPointwiseMult(c->w[0], c->added, x));
+    PetscCall(VecAXPY(y, -1., c->w[0]));
+  }
+  if (c->spring.N) {
+    PetscCall(MatMult(c->spring.free, x, c->spring.work));
+    PetscCall(VecPointwiseMult(c->spring.work, c->spring.work, c->k));
+    PetscCall(MatMultTransposeAdd(c->spring.free, c->spring.work, y, y));
+  }
+  PetscCall(SbCoupleProjectForce(c, y));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbCoupleCreateOperator(SbSpace s, Mat K, PetscBool singular, Mat *A)
+{
+  PetscInt m, n, M, N;
+
+  PetscFunctionBeginUser;
+  PetscCall(MatGetLocalSize(K, &m, &n));
+  PetscCall(MatGetSize(K, &M, &N));
+  PetscCall(MatCreateShell(s->comm, m, n, M, N, s, A));
+  PetscCall(MatShellSetOperation(*A, MATOP_MULT, SB_OPERATION(multiply)));
+  PetscCall(MatSetOption(*A, MAT_SYMMETRIC, PETSC_TRUE));
+  s->couple->K = K;
+  if (singular) {
+    PetscCall(SbSpaceCreateVec(s, &s->couple->anchor));
+    PetscCall(SbSpaceCreateVec(s, &s->couple->added));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+#define NAME "null space of rows"
+
+typedef struct {
+  SbSpace space;
+  PC inner;
+  PetscBool configured;
+} Wrapped;
+
+static PetscErrorCode setup_wrapped(PC pc)
+{
+  PCFailedReason reason;
+  Wrapped *w;
+  Mat K;
+
+  PetscFunctionBeginUser;
+  PetscCall(PCShellGetContext(pc, &w));
+  PetscCall(PCGetOperators(pc, NULL, &K));
+  PetscCall(PCSetOperators(w->inner, K, K));
+  if (!w->configured) PetscCall(PCSetFromOptions(w->inner));
+  w->configured = PETSC_TRUE;
+  PetscCall(PCSetUp(w->inner));
+  PetscCall(PCGetFailedReason(w->inner, &reason));
+  PetscCall(PCSetFailedReason(pc, reason));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode apply_wrapped(PC pc, Vec r, Vec z)
+{
+  PCFailedReason reason;
+  Wrapped *w;
+  SbCouple c;
+
+  PetscFunctionBeginUser;
+  PetscCall(PCShellGetContext(pc, &w));
+  c = w->space->couple;
+  if (!c->exact.N)
+    PetscCall(PCApply(w->inner, r, z));
+  else {
+    PetscCall(VecCopy(r, c->w[1]));
+    PetscCall(SbCoupleProjectForce(c, c->w[1]));
+    PetscCall(PCApply(w->inner, c->w[1], z));
+    PetscCall(SbCoupleProject(c, z));
+  }
+  PetscCall(PCGetFailedReason(w->inner, &reason));
+  if (reason) PetscCall(PCSetFailedReason(pc, reason));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode view_wrapped(PC pc, PetscViewer viewer)
+{
+  Wrapped *w;
+
+  PetscFunctionBeginUser;
+  PetscCall(PCShellGetContext(pc, &w));
+  PetscCall(PetscViewerASCIIPrintf(viewer, "  between projections into the null space:\n"));
+  PetscCall(PCView(w->inner, viewer));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode destroy_wrapped(PC pc)
+{
+  Wrapped *w;
+
+  PetscFunctionBeginUser;
+  PetscCall(PCShellGetContext(pc, &w));
+  PetscCall(PCDestroy(&w->inner));
+  PetscCall(PetscFree(w));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbPCCoupleCreate(SbSpace s, PC pc, PC *inner)
+{
+  const char *prefix;
+  Wrapped *w;
+
+  PetscFunctionBeginUser;
+  *inner = pc;
+  if (!s->couple) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscNew(&w));
+  w->space = s;
+  PetscCall(PCCreate(s->comm, &w->inner));
+  PetscCall(PCGetOptionsPrefix(pc, &prefix));
+  PetscCall(PCSetOptionsPrefix(w->inner, prefix));
+  PetscCall(PCSetOptionsPrefix(pc, "rows_"));
+  PetscCall(PCSetType(pc, PCSHELL));
+  PetscCall(PCShellSetContext(pc, w));
+  PetscCall(PCShellSetName(pc, NAME));
+  PetscCall(PCShellSetSetUp(pc, setup_wrapped));
+  PetscCall(PCShellSetApply(pc, apply_wrapped));
+  PetscCall(PCShellSetView(pc, view_wrapped));
+  PetscCall(PCShellSetDestroy(pc, destroy_wrapped));
+  *inner = w->inner;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbPCCoupleGetInner(PC pc, PC *inner)
+{
+  PetscBool is;
+  const char *name = NULL;
+  Wrapped *w;
+
+  PetscFunctionBeginUser;
+  *inner = pc;
+  PetscCall(PetscObjectTypeCompare((PetscObject)pc, PCSHELL, &is));
+  if (is) PetscCall(PCShellGetName(pc, &name));
+  if (!name || strcmp(name, NAME)) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PCShellGetContext(pc, &w));
+  *inner = w->inner;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
