@@ -186,8 +186,8 @@ PetscErrorCode SbSpaceCoupleMeasure(SbSpace space, Vec U, Vec R);
 PetscBool SbSpaceCoupleRests(SbSpace space, PetscInt row);
 /* What SbSpaceCoupleMeasure() found: force (N, positive: it raises the sum) and sum_k coef_k . u_k (m). Not collective. */
 void SbSpaceCoupleGet(SbSpace space, PetscInt row, PetscReal *force, PetscReal *sum);
-/* F += what all rows push with at the displacement U, R as above. Collective. */
-PetscErrorCode SbSpaceCoupleForce(SbSpace space, Vec U, Vec R, Vec F);
+/* F += what all rows push with at the displacement U, as SbSpaceCoupleMeasure() has found it. Collective. */
+PetscErrorCode SbSpaceCoupleForce(SbSpace space, Vec U, Vec F);
 /* U <- nearest displacement on which the exact rows hold. Collective. */
 PetscErrorCode SbCouplePrescribe(SbSpace space, Vec U);
 /* F <- F less the springs' forces, and without what the exact rows take when `constrain`. Collective. */

@@ -552,6 +552,7 @@ PetscErrorCode SbSpaceCoupleMeasure(SbSpace s, Vec U, Vec R)
     /* the rest is what supports and obstacles push with */
     PetscCall(VecScale(c->exact.force, -1.));
     PetscCall(MatMultTransposeAdd(c->exact.whole, c->exact.force, R, R));
+    PetscCall(VecScale(c->exact.force, -1.));
     PetscCall(MatMult(c->exact.whole, U, c->exact.work));
     PetscCall(hand_out(c, PETSC_TRUE, c->exact.work, c->sum));
   }
@@ -563,16 +564,12 @@ PetscErrorCode SbSpaceCoupleMeasure(SbSpace s, Vec U, Vec R)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbSpaceCoupleForce(SbSpace s, Vec U, Vec R, Vec F)
+PetscErrorCode SbSpaceCoupleForce(SbSpace s, Vec U, Vec F)
 {
   SbCouple c = s->couple;
 
   PetscFunctionBeginUser;
-  if (c->exact.N) {
-    PetscCall(VecPointwiseMult(c->w[0], R, c->free));
-    PetscCall(project_force(c, c->w[0]));
-    PetscCall(MatMultTransposeAdd(c->exact.whole, c->exact.force, F, F));
-  }
+  if (c->exact.N) PetscCall(MatMultTransposeAdd(c->exact.whole, c->exact.force, F, F));
   if (c->spring.N) {
     PetscCall(stretch(c, U));
     PetscCall(MatMultTransposeAdd(c->spring.whole, c->spring.force, F, F));

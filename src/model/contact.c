@@ -74,6 +74,6 @@ PetscErrorCode SbModelContactForce(SbModel m, PetscReal t, Vec U, Vec R, Vec F)
   PetscCall(SbSpaceRestoreLocalWrite(m->space, F, &f));
   PetscCall(SbSpaceRestoreLocalRead(m->space, R, &r));
   PetscCall(SbSpaceRestoreLocalRead(m->space, U, &stage.u));
-  if (m->space->couple) PetscCall(SbSpaceCoupleForce(m->space, U, R, F));
+  if (m->space->couple) PetscCall(SbSpaceCoupleForce(m->space, U, F));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
