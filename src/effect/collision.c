@@ -373,8 +373,10 @@ static PetscErrorCode settle_friction(Collision *c, SbSpace space, PetscReal lar
     if (!hit->on) continue;
     length = stretch(hit, hit->now, s);
     if (hit->careful) hit->careful--;
-    if (hit->newton && (SbDot3(hit->drag, s) > 0 || hit->k * length < 0.9 * limit(c, hit)))
-      hit->careful = 1 << PetscMin(5, ++hit->overshoots);
+    if (hit->newton && (SbDot3(hit->drag, s) > 0 || hit->k * length < 0.9 * limit(c, hit))) {
+      hit->overshoots++;
+      hit->careful = 1 << PetscMin(5, hit->overshoots);
+    }
     change = normal_force(c, hit) - hit->pressing;
     hit->pressing += 2 * c->updates > UPDATES ? 0.5 * change : change;
     for (int k = 0; k < 3; k++)
