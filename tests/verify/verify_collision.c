@@ -386,7 +386,10 @@ static PetscErrorCode check_slope(void)
 
 int main(int argc, char **argv)
 {
+  PetscMPIInt size;
+
   SB_TEST_BEGIN(argc, argv);
+  PetscCallMPI(MPI_Comm_size(PETSC_COMM_WORLD, &size));
   PetscCall(check_stack("p1", "projected", "one", 2, 1e-6));
   PetscCall(check_stack("p1", "projected", "one", 3, 1));
   PetscCall(check_stack("p1", "projected", "both", 3, 1));
@@ -399,8 +402,9 @@ int main(int argc, char **argv)
   PetscCall(check_momentum("p1", "augmented", 0));
   PetscCall(check_momentum("dg", "projected", 0));
   PetscCall(check_momentum("p1", "projected", 0.3));
-  PetscCall(check_responses());
   PetscCall(check_miss());
+  if (size > 1) SB_TEST_END(); /* many solves of a small system: on one rank only */
+  PetscCall(check_responses());
   PetscCall(check_slope());
   SB_TEST_END();
 }
