@@ -25,8 +25,8 @@
 #define TOGGLES 3    /* how often a row may come within a step before it stays */
 #define PULLING 1e-6 /* of the largest contact force: what a row must pull with to leave */
 #define SETTLED 1e-4 /* of the largest contact force: change of the friction that a solve assumed */
-#define LATE 1e-2    /* the same after UPDATES solves: what does not come to rest by then is cut */
-#define UPDATES 30
+#define LATE 1e-2    /* the same after UPDATES solves, with a warning; what does not get there is cut */
+#define UPDATES 30   /* of friction within a step; from half of them on N changes by half steps */
 
 static const SbOption rows[] = {
   {"on", SB_OPTION_NAMES, 1, "", "boundary", "", "sets whose surfaces may meet"},

@@ -9,7 +9,7 @@
   D makes the projection blind to units and to stiffness: a hard body's node moves less than a soft one's. Every preconditioner M
   of K serves, and neither the matrix nor M are renewed when rows come and go. What the rows push with is the least-squares
   multiplier lambda = (G D G^T)^-1 G D r of the residual r. Rows that say the same twice (two surfaces whose vertices meet) leave
-  P right; (couple_select.c lets most of them rest).
+  P right; couple_select.c lets most of them rest.
 
   G D G^T has the rows of all ranks, which are few, and is factored on each of them.
 

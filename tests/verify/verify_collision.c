@@ -391,8 +391,8 @@ int main(int argc, char **argv)
   SB_TEST_BEGIN(argc, argv);
   PetscCallMPI(MPI_Comm_size(PETSC_COMM_WORLD, &size));
   PetscCall(check_stack("p1", "projected", "one", 2, 1e-6));
-  PetscCall(check_stack("p1", "projected", "one", 3, 1));
-  PetscCall(check_stack("p1", "projected", "both", 3, 1));
+  PetscCall(check_stack("p1", "projected", "one", 3, 0.2));
+  PetscCall(check_stack("p1", "projected", "both", 3, 1e-6));
   PetscCall(check_stack("p1", "augmented", "one", 2, 1e-4));
   PetscCall(check_stack("cr", "projected", "one", 2, 1e-6));
   PetscCall(check_bars("p1"));
