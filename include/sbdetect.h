@@ -9,6 +9,18 @@
 #include "sbfem.h"
 
 /*
+  Edges between two facets of one part. The first two corners are its ends, counter-clockwise in that of its facets with the lower identity; the
+  third is the third one of this facet, the fourth that of the other facet. The identity is 3 facet + side of the first facet.
+*/
+typedef struct {
+  PetscInt n, nown;
+  PetscInt *corner; /* [n][4] */
+  PetscInt *vertex; /* [n][2] identities of the mesh vertices at its ends */
+  PetscInt *part;   /* [n] */
+  PetscInt *id;     /* [n] */
+} SbEdges;
+
+/*
   What a detector works on. Arrays are borrowed. A part is a body: points do not meet facets of their own part unless `self`.
   Identities (facet_id, facet_vertex, point_id) are the same on all ranks and for any partition: ties are broken by them.
 */
@@ -25,6 +37,7 @@ typedef struct {
                                    also where their corners are apart (CR, DG) */
   const PetscInt *facet_part; /* [nfacet] */
   const PetscInt *facet_id;   /* [nfacet] */
+  const SbEdges *edges;       /* own ones first; NULL: none */
   PetscInt npoint;
   const PetscReal *p, *p0, *P; /* [npoint][3] like x, x0, X */
   const PetscReal *p_normal;   /* [npoint][3] outward unit normal of the point's own surface now */
@@ -35,7 +48,7 @@ typedef struct {
   const PetscInt *point_facet; /* [npoint] identity of that facet, -1: a vertex */
   PetscBool self;              /* parts may meet themselves */
   PetscReal reach;             /* pairs up to this distance are wanted, m; penetration likewise */
-  PetscInt version;            /* changes when the facets are other ones, not only elsewhere */
+  PetscInt version;            /* changes when facets or edges are other ones, not only elsewhere */
 } SbDetectScene;
 
 /*
@@ -49,6 +62,18 @@ typedef struct {
   PetscReal gap;     /* m */
   PetscBool crossed; /* found by its motion: within the step it went through the facet */
 } SbNear;
+
+/*
+  Two edges of different parts that cross each other seen along the normal, which is perpendicular to both. The gap is the distance along it,
+  negative when the edges are in each other's part; it grows when the first edge moves along the normal.
+*/
+typedef struct {
+  PetscInt edge[2]; /* the first one is an own one, with the lower identity */
+  PetscReal at[2];  /* the nearest places, 0 at the first end of the edge, 1 at its second */
+  PetscReal normal[3];
+  PetscReal gap;     /* m */
+  PetscBool crossed; /* found by its motion: within the step the edges went through each other */
+} SbEdgePair;
 
 typedef enum { SB_DETECT_HASH, SB_DETECT_BVH, SB_DETECT_BRUTE } SbDetectKind;
 typedef struct {
@@ -74,11 +99,25 @@ PetscErrorCode SbDetectorDestroy(SbDetector *detector);
 */
 PetscErrorCode SbDetectorFind(SbDetector detector, const SbDetectScene *scene, PetscInt *n,
                               const SbNear **near);
+/*
+  SbDetectorFindEdges - all pairs of sharp edges of two parts that meet within the reach, or went through each other within the step.
+
+  Not collective. Every kind of detector returns the same pairs, ordered by the first edge and by the identity of the second. An edge is sharp
+  where the surface is convex and its facets' normals are more than 26 degrees apart. A pair counts when its normal leads away
+  from both parts: where it does not, points and facets are nearer. For `self` as above.
+
+  Output: n; pair[n], owned by the detector, valid until the next call.
+*/
+PetscErrorCode SbDetectorFindEdges(SbDetector detector, const SbDetectScene *scene, PetscInt *n,
+                                   const SbEdgePair **pair);
 PetscErrorCode SbDetectorGetStats(SbDetector detector, SbDetectStats *stats);
 
 /*
   SbSurface - the surfaces that may meet, distributed: the scene of this rank, and which nodes its points and facets belong to.
-  Own corners, facets and points come first, then the facets of other ranks that are near points of this one.
+  Own corners, facets and points come first, then the facets of other ranks that are near points or edges of this one.
+
+  Each edge is owned by one rank: with P1 by the owner of that of its vertices with the lower identity, else by the owner of its first
+  facet. The pairs that a rank finds are those of its own edges.
 */
 typedef struct _p_SbSurface *SbSurface;
 struct _p_SbSurface {
@@ -90,9 +129,12 @@ struct _p_SbSurface {
   PetscInt *facet_node;  /* [nfacet][4] global numbers of the nodes of the facet's cell */
   PetscReal *
     facet_weight; /* [nfacet][3][4] displacement of corner k = sum_a facet_weight[3 f + k][a] u[facet_node[4 f + a]] */
-  PetscReal size; /* of all bodies at rest, m */
-  PetscReal edge; /* mean rest edge of all facets, m */
-  void *data;     /* private */
+  PetscInt *edge_node;    /* [nedge][4] like facet_node, of the edge's first facet */
+  PetscReal *edge_weight; /* [nedge][2][4] like facet_weight, of its ends */
+  PetscInt *edge_facet;   /* [edges->nown] the first facet, as one of those given to SbSurfaceCreate() */
+  PetscReal size;         /* of all bodies at rest, m */
+  PetscReal edge;         /* mean rest edge of all facets, m */
+  void *data;             /* private */
 };
 /*
   SbSurfaceCreate - from boundary facets as SbEffectFacets() gives them (of owned and ghost cells; copied). Collective.
@@ -102,7 +144,7 @@ PetscErrorCode SbSurfaceCreate(SbSpace space, PetscInt n, const SbFacet facet[],
 PetscErrorCode SbSurfaceDestroy(SbSurface *surface);
 /*
   SbSurfaceUpdate - moves corners and points to the local displacements u (m) and, when u0 is not NULL, those at the start of the step,
-  and brings the facets of other ranks that may come within `reach` of own points. Collective.
+  and brings the facets of other ranks that may come within `reach` of own points or own edges. Collective.
 
   Output: close, whether two parts' boxes (swept, and grown by the reach) meet anywhere, the same on all ranks; when not, and no self-contact
   is wanted, nothing but the boxes has been exchanged and the scene holds no facets of others.

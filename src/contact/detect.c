@@ -6,8 +6,6 @@
 */
 #include "detect.h"
 
-#define ROUNDING 16 /* in units of eps |x|: what the corners of a box may be off */
-
 static PetscErrorCode (*const constructors[])(SbDetector) = {
   [SB_DETECT_HASH] = sb_detector_hash,
   [SB_DETECT_BVH] = sb_detector_bvh,
@@ -24,6 +22,7 @@ PetscErrorCode SbDetectorCreate(SbDetectKind kind, SbDetector *detector)
   PetscCall(PetscNew(&d));
   *detector = d;
   d->nfacet = -1;
+  d->kind = kind;
   PetscCall(constructors[kind](d));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -39,6 +38,7 @@ PetscErrorCode SbDetectorDestroy(SbDetector *detector)
   PetscCall(PetscFree2(d->point_box, d->start));
   PetscCall(PetscFree(d->candidate));
   PetscCall(SbDetectRingsDestroy(d));
+  PetscCall(SbDetectSharpDestroy(d));
   PetscCall(PetscFree(d->hit));
   PetscCall(PetscFree(d->near));
   PetscCall(PetscFree(*detector));
@@ -98,13 +98,7 @@ static void boxes(SbDetector d, const SbDetectScene *s)
     box_of(x + 3 * c[0], box);
     for (int k = 1; k < 3; k++) box_add(x + 3 * c[k], box);
     for (int k = 0; x0 && k < 3; k++) box_add(x0 + 3 * c[k], box);
-    for (int k = 0; k < 3; k++) {
-      const PetscReal far = PetscMax(PetscAbsReal(box[k]), PetscAbsReal(box[3 + k]));
-      const PetscReal margin = s->reach + ROUNDING * PETSC_MACHINE_EPSILON * (far + s->reach);
-
-      box[k] -= margin;
-      box[3 + k] += margin;
-    }
+    SbDetectBoxGrow(s->reach, box);
   }
   for (PetscInt i = 0; i < s->npoint; i++) {
     box_of(s->p + 3 * i, d->point_box + 6 * i);
@@ -112,17 +106,31 @@ static void boxes(SbDetector d, const SbDetectScene *s)
   }
 }
 
+PetscErrorCode SbDetectBegin(SbDetector d, const SbDetectScene *s)
+{
+  PetscFunctionBeginUser;
+  d->same_facets = (PetscBool)(d->nfacet == s->nfacet && d->version == s->version);
+  d->nfacet = -1; /* should the search fail, the next call begins anew */
+  PetscCall(reserve(d, s));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbDetectCandidates(SbDetector d, const SbDetectScene *s)
+{
+  PetscFunctionBeginUser;
+  PetscCall(SbDetectRingsUpdate(d, s));
+  PetscCall(d->ops.search(d, s));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode SbDetectorFind(SbDetector d, const SbDetectScene *s, PetscInt *n, const SbNear **near)
 {
   PetscFunctionBeginUser;
   PetscCheck(s->reach > 0 && !PetscIsInfOrNanReal(s->reach), PETSC_COMM_SELF, PETSC_ERR_ARG_OUTOFRANGE,
              "the reach of contact detection is %g m: it must be positive and finite", (double)s->reach);
-  d->same_facets = (PetscBool)(d->nfacet == s->nfacet && d->version == s->version);
-  d->nfacet = -1; /* should the search fail, the next call begins anew */
-  PetscCall(reserve(d, s));
+  PetscCall(SbDetectBegin(d, s));
   boxes(d, s);
-  PetscCall(SbDetectRingsUpdate(d, s));
-  PetscCall(d->ops.search(d, s));
+  PetscCall(SbDetectCandidates(d, s));
   PetscCall(SbDetectNarrow(d, s, n));
   d->version = s->version;
   d->nfacet = s->nfacet;

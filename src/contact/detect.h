@@ -8,6 +8,8 @@
 #include "sbdetect.h"
 #include "sbkernel.h"
 
+#define SB_BOX_ROUNDING 16 /* in units of eps |x|: what the corners of a box may be off */
+
 /*
   A kind of detector. Not collective.
 
@@ -34,6 +36,7 @@ typedef struct {
 } SbDetectRings;
 
 struct _p_SbDetector {
+  SbDetectKind kind;
   SbDetectorOps ops;
   void *data; /* the kind's own */
   /* of the scene in this call; the kind reads them */
@@ -51,8 +54,28 @@ struct _p_SbDetector {
   SbDetectRings rings;
   struct SbDetectHit *hit; /* [2 hit_size] of one point: near facets, then those it went through */
   SbNear *near;
+  struct SbDetectSharp *sharp; /* edge_find.c; NULL until edges are looked for */
   SbDetectStats stats;
 };
+
+/* Room for the boxes of this scene; d->same_facets. Not collective. */
+PetscErrorCode SbDetectBegin(SbDetector d, const SbDetectScene *scene);
+/* The candidates, boxes being there. Not collective. */
+PetscErrorCode SbDetectCandidates(SbDetector d, const SbDetectScene *scene);
+/* Not collective. */
+PetscErrorCode SbDetectSharpDestroy(SbDetector d);
+
+/* Grows the box of what is within it now to what may come within the reach. */
+static inline void SbDetectBoxGrow(PetscReal reach, PetscReal box[6])
+{
+  for (int k = 0; k < 3; k++) {
+    const PetscReal far = PetscMax(PetscAbsReal(box[k]), PetscAbsReal(box[3 + k]));
+    const PetscReal margin = reach + SB_BOX_ROUNDING * PETSC_MACHINE_EPSILON * (far + reach);
+
+    box[k] -= margin;
+    box[3 + k] += margin;
+  }
+}
 
 /* Makes room for n candidates; those there are kept. Not collective. */
 PetscErrorCode SbCandidatesReserve(SbDetector d, PetscInt64 n);
@@ -110,6 +133,16 @@ SbTrianglePlace SbClosestPoint(const PetscReal p[3], const PetscReal *const x[3]
 PetscBool SbCrossing(const PetscReal p0[3], const PetscReal p1[3], const PetscReal *const x0[3],
                      const PetscReal *const x1[3], const PetscReal tolerance[2], PetscReal *time,
                      PetscBool *behind);
+
+/*
+  SbEdgeCrossing - whether an edge goes through another one from its front to its back and stays behind it.
+
+  Not collective. In front is where (e[0] - f[0]) . (e x f) is positive, e and f from the first to the second end; with the ends of
+  one edge exchanged it is the other side. Input: ends at the start and end of the step, m. The rest as for SbCrossing().
+*/
+PetscBool SbEdgeCrossing(const PetscReal *const e0[2], const PetscReal *const e1[2],
+                         const PetscReal *const f0[2], const PetscReal *const f1[2],
+                         const PetscReal tolerance[2], PetscReal *time, PetscBool *behind);
 
 /* Constructors: fill d->ops and d->data. */
 PetscErrorCode sb_detector_hash(SbDetector d);

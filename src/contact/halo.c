@@ -1,5 +1,5 @@
 /*
-  halo.c - facets of other ranks that are near the points of this one, and where they are now.
+  halo.c - facets of other ranks that are near the points and edges of this one, and where they are now.
 
   Each update first learns, by one reduction, the box of each part over all ranks, the motion of the step, and how far
   anything has moved since the list was made. Boxes are swept: they hold the start of the step and now. Parts whose boxes, grown
@@ -129,7 +129,10 @@ static PetscErrorCode unpack(SbSurface s, PetscInt n, const PetscInt number[], c
     for (int a = 0; a < 12; a++) s->facet_weight[12 * f + a] = real[a];
     for (int k = 0; k < 9; k++) d->X[3 * c + k] = real[12 + k];
   }
-  if (!same) s->scene.version++;
+  if (!same) {
+    s->scene.version++;
+    PetscCall(SbSurfaceOtherEdges(s));
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -1,34 +1,38 @@
 /*
   halo_plan.c - which facets go to which rank.
 
-  A rank tells all others the boxes of its points and of its facets, part by part; two ranks whose boxes, grown by reach and margin, meet
-  are neighbours, and both see it. A rank cuts its points that lie within the facet boxes of neighbours, again part by part, by a
+  What looks are own points and own edges; the latter with the box of their motion. A rank tells all others the boxes of what looks and of
+  its facets, part by part; two ranks whose boxes, grown by reach and margin, meet
+  are neighbours, and both see it. A rank cuts what looks and lies within the facet boxes of neighbours, again part by part, by a
   recursive median split into at most 64 boxes, and sends these. It gets every facet whose own box meets one of them: a contact of
   small extent moves few facets, however large the surface. Ranks that share nothing say nothing to each other.
 
   At an edge or a vertex a detector asks for all facets there. The nearest place q of a facet is within reach of the point; a
-  facet that shares the edge or vertex has q in its box, so it comes too, whoever owns it. With CR and DG the copies of a vertex lie
+  facet that shares the edge or vertex has q in its box, so it comes too, whoever owns it. The same holds for the place of an edge that is
+  near an own edge: both its facets come. With CR and DG the copies of a vertex lie
   apart: there the box of a facet holds all copies of its vertices.
 */
 #include "surface_impl.h"
 
-#define SPLITS 6 /* the points of a part are cut into 2^6 boxes at most */
-#define LEAST 4  /* points that are not cut further */
-#define ENTRY 13 /* part, box of points, box of facets */
+#define SPLITS 6 /* what looks of a part is cut into 2^6 boxes at most */
+#define LEAST 4  /* points and edges that are not cut further */
+#define ENTRY 13 /* part, box of what looks, box of facets */
 
 /* What is needed while the list is made. */
 typedef struct {
   PetscReal grown;    /* reach and margin, m */
   PetscReal *facet;   /* [nfacet_owned][6] boxes of own facets */
+  PetscInt nlook;     /* own points and own edges */
+  PetscReal *look;    /* [nlook][6] their boxes */
   PetscInt nmine;     /* parts that have facets or points here */
   PetscReal *mine;    /* [nmine][ENTRY] */
   PetscReal *entry;   /* [start[size]][ENTRY] those of all ranks */
   PetscMPIInt *start; /* [size+1] */
   PetscInt nnear;
-  PetscReal (*near)[7]; /* [nnear] part and box of own points within the facet boxes of neighbours */
+  PetscReal (*near)[7]; /* [nnear] part and box of what looks within the facet boxes of neighbours */
 } Plan;
 
-/* Boxes of own corners, points and facets; a facet's holds all copies of its vertices. */
+/* Boxes of own corners, points, edges and facets; a facet's holds all copies of its vertices. */
 static PetscErrorCode sweep(SbSurface s, const PetscReal u0[], const PetscReal u[], Plan *plan)
 {
   SbSurfaceData *d = (SbSurfaceData *)s->data;
@@ -41,6 +45,15 @@ static PetscErrorCode sweep(SbSurface s, const PetscReal u0[], const PetscReal u
     SbBoxClear(swept + 6 * i);
     SbBoxAdd(swept + 6 * i, j < 0 ? d->x + 3 * i : d->p + 3 * j);
     SbBoxAdd(swept + 6 * i, j < 0 ? d->x0 + 3 * i : d->p0 + 3 * j);
+  }
+  plan->nlook = s->scene.npoint + d->edges.nown;
+  PetscCall(PetscMalloc1(6 * plan->nlook, &plan->look));
+  PetscCall(PetscArraycpy(plan->look, swept + 6 * d->ncorner_owned, 6 * s->scene.npoint));
+  for (PetscInt i = 0; i < d->edges.nown; i++) {
+    PetscReal *box = plan->look + 6 * (s->scene.npoint + i);
+
+    SbBoxClear(box);
+    for (int k = 0; k < 2; k++) SbBoxUnite(box, swept + 6 * d->edges.corner[4 * i + k]);
   }
   PetscCall(PetscMalloc1(6 * s->nfacet_owned, &plan->facet));
   PetscCall(PetscMalloc1(6 * d->nvertex, &vertex));
@@ -64,7 +77,15 @@ static PetscErrorCode sweep(SbSurface s, const PetscReal u0[], const PetscReal u
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The parts on each rank, with the boxes of their points and facets there. */
+/* The part of what looks. */
+static inline PetscInt look_part(SbSurface s, PetscInt i)
+{
+  const SbSurfaceData *d = (const SbSurfaceData *)s->data;
+
+  return i < s->scene.npoint ? d->point_part[i] : d->edges.part[i - s->scene.npoint];
+}
+
+/* The parts on each rank, with the boxes of what looks and of their facets there. */
 static PetscErrorCode gather_parts(SbSurface s, Plan *plan)
 {
   const SbSurfaceData *d = (const SbSurfaceData *)s->data;
@@ -78,9 +99,11 @@ static PetscErrorCode gather_parts(SbSurface s, Plan *plan)
     SbBoxClear(plan->mine + ENTRY * b + 1);
     SbBoxClear(plan->mine + ENTRY * b + 7);
   }
-  for (PetscInt i = 0; i < s->scene.npoint; i++) {
-    plan->mine[ENTRY * d->point_part[i]] = (PetscReal)d->point_part[i];
-    SbBoxUnite(plan->mine + ENTRY * d->point_part[i] + 1, h->swept + 6 * (d->ncorner_owned + i));
+  for (PetscInt i = 0; i < plan->nlook; i++) {
+    const PetscInt part = look_part(s, i);
+
+    plan->mine[ENTRY * part] = (PetscReal)part;
+    SbBoxUnite(plan->mine + ENTRY * part + 1, plan->look + 6 * i);
   }
   for (PetscInt f = 0; f < s->nfacet_owned; f++) {
     plan->mine[ENTRY * d->facet_part[f]] = (PetscReal)d->facet_part[f];
@@ -200,21 +223,20 @@ static void split(const PetscReal swept[], PetscReal part, int depth, PetscInt n
   split(swept, part, depth - 1, n - n / 2, index + n / 2, plan);
 }
 
-/* Boxes of own points within the facet boxes of neighbours. */
+/* Boxes of what looks within the facet boxes of neighbours. */
 static PetscErrorCode find_near(SbSurface s, Plan *plan)
 {
   const SbSurfaceData *d = (const SbSurfaceData *)s->data;
   const SbHalo *h = &d->halo;
-  const PetscReal *swept = h->swept + 6 * d->ncorner_owned;
   PetscInt n = 0, *index, *part;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscMalloc2(s->scene.npoint, &index, s->scene.npoint, &part));
-  for (PetscInt i = 0; i < s->scene.npoint; i++) {
+  PetscCall(PetscMalloc2(plan->nlook, &index, plan->nlook, &part));
+  for (PetscInt i = 0; i < plan->nlook; i++) {
     for (PetscInt k = 0; k < h->nfrom; k++) {
-      if (!near_rank(h, plan, h->from[k], (PetscReal)d->point_part[i], swept + 6 * i)) continue;
+      if (!near_rank(h, plan, h->from[k], (PetscReal)look_part(s, i), plan->look + 6 * i)) continue;
       index[n] = i;
-      part[n++] = d->point_part[i];
+      part[n++] = look_part(s, i);
       break;
     }
   }
@@ -223,7 +245,7 @@ static PetscErrorCode find_near(SbSurface s, Plan *plan)
   for (PetscInt i = 0, end; i < n; i = end) {
     for (end = i + 1; end < n && part[end] == part[i]; end++)
       ;
-    split(swept, (PetscReal)part[i], SPLITS, end - i, index + i, plan);
+    split(plan->look, (PetscReal)part[i], SPLITS, end - i, index + i, plan);
   }
   PetscCall(PetscFree2(index, part));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -320,6 +342,7 @@ PetscErrorCode SbHaloPlan(SbSurface s, const PetscReal u0[], const PetscReal u[]
   PetscCall(find_neighbours(&d->halo, &plan));
   PetscCall(agree(s, &plan));
   PetscCall(PetscFree(plan.facet));
+  PetscCall(PetscFree(plan.look));
   PetscCall(PetscFree(plan.mine));
   PetscCall(PetscFree(plan.entry));
   PetscCall(PetscFree(plan.start));

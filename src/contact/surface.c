@@ -10,7 +10,7 @@
   are complete without communication. Around a vertex facets are summed in the order of their identities: the normal is
   the same to the last bit on any number of ranks. A normal is zero where the facets around a point cancel.
 
-  Facets of other ranks, which follow the own ones, are the work of halo.c.
+  Facets of other ranks, which follow the own ones, are the work of halo.c; edges that of surface_edges.c.
 */
 #include "surface_impl.h"
 
@@ -60,7 +60,26 @@ static PetscErrorCode list_local(SbSurface s, PetscInt n, const SbFacet facet[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Corners of own facets: a vertex of P1 once, others for each facet. Fills facet[]. */
+/* The number of vertex k of a local facet among own corners, a new one when it is none yet. */
+static PetscInt corner_of(SbSurface s, PetscInt corner[], PetscInt facet, int k)
+{
+  SbSurfaceData *d = (SbSurfaceData *)s->data;
+  const SbSurfaceFacet *f = &d->local[facet];
+  const PetscInt cell = f->at[0] / 4;
+  PetscInt c = at_vertices(s->space, cell) ? corner[f->vertex[k]] : -1;
+
+  if (c < 0) {
+    c = corner[f->vertex[k]] = d->ncorner_owned++;
+    d->corner_at[c] = f->at[k];
+    d->corner_part[c] = s->space->mesh->cell_body[cell];
+  }
+  return c;
+}
+
+/*
+  Corners of own facets: a vertex of P1 once, others for each facet. Fills facet[]. Behind them what else own edges need: corners of
+  facets of ghost cells.
+*/
 static PetscErrorCode make_corners(SbSurface s)
 {
   SbSurfaceData *d = (SbSurfaceData *)s->data;
@@ -69,22 +88,19 @@ static PetscErrorCode make_corners(SbSurface s)
 
   PetscFunctionBeginUser;
   PetscCall(PetscMalloc1(d->nvertex, &corner));
-  PetscCall(PetscMalloc2(3 * s->nfacet_owned, &d->corner_at, 3 * s->nfacet_owned, &d->corner_part));
+  PetscCall(PetscMalloc2(3 * s->nfacet_owned + 4 * d->edges.nown, &d->corner_at,
+                         3 * s->nfacet_owned + 4 * d->edges.nown, &d->corner_part));
   for (PetscInt v = 0; v < d->nvertex; v++) corner[v] = -1;
   for (PetscInt i = 0; i < d->nlocal; i++) {
-    const SbSurfaceFacet *f = &d->local[i];
-    const PetscInt cell = f->at[0] / 4;
+    const PetscInt own = d->local[i].own;
 
-    for (int k = 0; k < 3 && f->own >= 0; k++) {
-      PetscInt c = at_vertices(s->space, cell) ? corner[f->vertex[k]] : -1;
+    for (int k = 0; k < 3 && own >= 0; k++) d->facet[3 * own + k] = corner_of(s, corner, i, k);
+  }
+  for (PetscInt i = 0; i < 4 * d->edges.nown; i++) {
+    const PetscInt at = d->side[i / 4][i % 4 == 3], facet = at / 3, own = d->local[facet].own;
+    const int k = (int)((at + (i % 4 == 3 ? 2 : i % 4)) % 3);
 
-      if (c < 0) {
-        c = corner[f->vertex[k]] = d->ncorner_owned++;
-        d->corner_at[c] = f->at[k];
-        d->corner_part[c] = mesh->cell_body[cell];
-      }
-      d->facet[3 * f->own + k] = c;
-    }
+    d->edges.corner[i] = own >= 0 ? d->facet[3 * own + k] : corner_of(s, corner, facet, k);
   }
   PetscCall(PetscFree(corner));
   PetscCall(PetscMalloc1(3 * d->ncorner_owned, &d->x));
@@ -260,6 +276,7 @@ static void publish(SbSurface s)
   scene->point_id = d->point_id;
   scene->point_vertex = d->point_vertex;
   scene->point_facet = d->point_facet;
+  scene->edges = &d->edges;
 }
 
 PetscErrorCode SbSurfaceSetForeign(SbSurface s, PetscInt n)
@@ -303,6 +320,7 @@ PetscErrorCode SbSurfaceCreate(SbSpace space, PetscInt n, const SbFacet facet[],
   d->npart = space->mesh->nbody;
   PetscCall(list_local(s, n, facet));
   PetscCall(make_facets(s, facet));
+  PetscCall(SbSurfaceOwnEdges(s, facet));
   PetscCall(make_corners(s));
   PetscCall(PetscMalloc1(space->nnode_owned, &point));
   PetscCall(make_points(s, facet, point));
@@ -310,6 +328,7 @@ PetscErrorCode SbSurfaceCreate(SbSpace space, PetscInt n, const SbFacet facet[],
   PetscCall(PetscFree(point));
   PetscCall(measure(s));
   PetscCall(SbSurfaceSetForeign(s, 0));
+  PetscCall(SbSurfaceOtherEdges(s));
   PetscCall(SbHaloCreate(s));
   *surface = s;
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -323,6 +342,7 @@ PetscErrorCode SbSurfaceDestroy(SbSurface *surface)
   if (!*surface) PetscFunctionReturn(PETSC_SUCCESS);
   d = (SbSurfaceData *)(*surface)->data;
   PetscCall(SbHaloDestroy(&d->halo));
+  PetscCall(SbSurfaceFreeEdges(*surface));
   PetscCall(PetscFree2(d->corner_at, d->corner_part));
   PetscCall(PetscFree(d->local));
   PetscCall(PetscFree(d->fan));

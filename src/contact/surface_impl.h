@@ -48,8 +48,13 @@ typedef struct {
   SbSurfaceFacet *local; /* [nlocal] */
   PetscInt nvertex;      /* vertices of these */
   PetscInt nfan;
-  SbSurfaceFan *fan;     /* [nfan] in the order of facet_id: sums do not depend on the partition */
-  PetscInt *point_own;   /* [npoint] own facet whose centroid the point is, -1: a vertex */
+  SbSurfaceFan *fan;   /* [nfan] in the order of facet_id: sums do not depend on the partition */
+  PetscInt *point_own; /* [npoint] own facet whose centroid the point is, -1: a vertex */
+  SbEdges edges;
+  PetscInt edge_size;    /* edges that there is room for */
+  PetscInt (*side)[2];   /* [edges.nown] sides of the first and the second facet, 3 local + k */
+  PetscInt nopen, *open; /* sides of own facets, 3 facet + k, whose edge is no own one */
+  PetscInt *own_id;      /* [edges.nown] identities of own edges, ascending */
   PetscInt foreign_size; /* facets of others that there is room for */
   /* the arrays of the scene, to be written; x0 and p0 are those of x and p when there is no start of the step */
   PetscReal *x, *x0, *X, *p, *p0, *P, *p_normal;
@@ -98,6 +103,12 @@ static inline PetscBool SbBoxNear(const PetscReal a[6], const PetscReal b[6], Pe
 void SbSurfacePlace(SbSpace space, PetscInt at, const PetscReal u[], PetscReal x[3]);
 /* Makes the scene hold n facets of others behind its own ones; what they are is written afterwards. Not collective. */
 PetscErrorCode SbSurfaceSetForeign(SbSurface surface, PetscInt n);
+
+/* The own edges but for their corners; allocates. Not collective. */
+PetscErrorCode SbSurfaceOwnEdges(SbSurface surface, const SbFacet facet[]);
+/* The edges behind the own ones, after the facets of others have changed. Not collective. */
+PetscErrorCode SbSurfaceOtherEdges(SbSurface surface);
+PetscErrorCode SbSurfaceFreeEdges(SbSurface surface);
 
 PetscErrorCode SbHaloCreate(SbSurface surface);
 PetscErrorCode SbHaloDestroy(SbHalo *halo);

@@ -6,6 +6,8 @@
 
       gap = n . (x_p - sum_k b_k x_k) >= 0,     linear in u while n and b stay.
 
+  Two sharp edges of different bodies that cross each other are a pair, too: with places s and t on them gap = n . (x(s) - y(t)).
+
   Forces act along n at p and, by the same weights, on the facet: momentum is kept, and so is angular momentum where the gap is closed.
 
   Response `projected`: rows that touch are exact (src/fem/couple.c); their multiplier is the force. After each solve the
@@ -26,6 +28,7 @@
 #define PULLING 1e-6 /* of the largest contact force: what a row must pull with to leave */
 #define SETTLED 1e-4 /* of the largest contact force: change of the friction that a solve assumed */
 #define LATE 1e-2    /* the same after UPDATES solves, with a warning; what does not get there is cut */
+#define EDGE_PAIRS 8 /* of one edge, that have identities of their own */
 #define UPDATES 30   /* of friction within a step; from half of them on N changes by half steps */
 
 static const SbOption rows[] = {
@@ -92,7 +95,14 @@ static PetscReal height_over(SbSpace space, const SbFacet *facet)
   return height;
 }
 
-/* Springs: (lambda + 2 mu) area / height, summed over the facets at a point. */
+static PetscReal facet_stiffness(const Collision *c, SbSpace space, const SbFacet *facet)
+{
+  const SbMaterial m = space->material[space->mesh->cell_material[facet->cell]];
+
+  return c->stiffness * (m->lambda + 2 * m->mu) * facet->area / height_over(space, facet);
+}
+
+/* Springs: (lambda + 2 mu) area / height, summed over the facets at a point; of an edge that of its first facet. */
 static PetscErrorCode find_stiffness(Collision *c, SbSpace space, PetscInt n, const SbFacet facet[])
 {
   PetscInt *slot;
@@ -103,9 +113,7 @@ static PetscErrorCode find_stiffness(Collision *c, SbSpace space, PetscInt n, co
   for (PetscInt i = 0; i < space->nnode; i++) slot[i] = -1;
   for (PetscInt i = 0; i < c->surface->scene.npoint; i++) slot[c->surface->point_node[i]] = i;
   for (PetscInt i = 0; i < n; i++) {
-    const SbMaterial m = space->material[space->mesh->cell_material[facet[i].cell]];
-    const PetscReal k =
-      c->stiffness * (m->lambda + 2 * m->mu) * facet[i].area / height_over(space, &facet[i]);
+    const PetscReal k = facet_stiffness(c, space, &facet[i]);
     const PetscBool vertices = (PetscBool)(SbSpaceCellElement(space, facet[i].cell)->nodes_per[0] > 0);
 
     for (int q = 0; q < (vertices ? 3 : 1); q++) {
@@ -116,6 +124,9 @@ static PetscErrorCode find_stiffness(Collision *c, SbSpace space, PetscInt n, co
     }
   }
   PetscCall(PetscFree(slot));
+  PetscCall(PetscMalloc1(c->surface->scene.edges->nown, &c->edge_k));
+  for (PetscInt i = 0; i < c->surface->scene.edges->nown; i++)
+    c->edge_k[i] = facet_stiffness(c, space, &facet[c->surface->edge_facet[i]]);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -281,10 +292,20 @@ static PetscErrorCode add_friction(const Collision *c, SbSpace space, Hit *hit)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Identity of a row: the same for any partition. */
-static PetscInt row_id(const Collision *c, const Hit *hit)
+/* Identity of the row of hit i: the same for any partition. Edges come after points, which so are preferred where both say the same. */
+static PetscInt row_id(const Collision *c, PetscInt i)
 {
-  return c->surface->scene.point_id[hit->point] * c->surface->space->mesh->nbody + hit->part;
+  const Hit *hit = &c->hit[i];
+  const SbDetectScene *s = &c->surface->scene;
+  const SbMesh mesh = c->surface->space->mesh;
+  const PetscInt64 points = (mesh->Nvert + 8 * (PetscInt64)mesh->Ncell) * mesh->nbody;
+  PetscInt before = 0;
+
+  if (!SbCollisionOfEdges(c, hit)) return s->point_id[hit->point] * mesh->nbody + hit->part;
+  while (before < i && c->hit[i - before - 1].point == hit->point) before++;
+  return (PetscInt)((points + s->edges->id[hit->point - s->npoint] * (PetscInt64)EDGE_PAIRS +
+                     PetscMin(before, EDGE_PAIRS - 1)) %
+                    PETSC_MAX_INT);
 }
 
 static PetscErrorCode hold_collision(SbEffect e, SbSpace space)
@@ -300,8 +321,8 @@ static PetscErrorCode hold_collision(SbEffect e, SbSpace space)
     if (!hit->on) continue;
     coefficients(hit, hit->normal, coef);
     if (c->response == PROJECTED)
-      PetscCall(SbSpaceCoupleRow(space, row_id(c, hit), hit->n, hit->node, coef, hit->value - hit->allowed,
-                                 &hit->row));
+      PetscCall(
+        SbSpaceCoupleRow(space, row_id(c, i), hit->n, hit->node, coef, hit->value - hit->allowed, &hit->row));
     else
       PetscCall(SbSpaceCoupleSpring(space, hit->n, hit->node, coef, hit->value - hit->allowed, hit->k,
                                     hit->lambda, &hit->row));
@@ -534,6 +555,7 @@ static PetscErrorCode destroy_collision(SbEffect e)
   PetscCall(SbSurfaceDestroy(&c->surface));
   PetscCall(SbDetectorDestroy(&c->detector));
   PetscCall(PetscFree(c->point_k));
+  PetscCall(PetscFree(c->edge_k));
   PetscCall(PetscFree(c->edge));
   PetscCall(PetscFree(c->u0));
   PetscCall(PetscFree(c->hit));

@@ -1,5 +1,5 @@
 /*
-  collision.h - pairs of a point and a surface near it: what collision.c and collision_look.c share.
+  collision.h - pairs of a point and a surface near it, and of two edges: what collision.c and collision_look.c share.
 */
 #pragma once
 #include "sbdetect.h"
@@ -7,15 +7,19 @@
 
 #define LOOKS 8        /* how often its normal and weights may change within a step */
 #define TOLERANCE 1e-7 /* of the size of the bodies: largest penetration that counts as touching */
-#define NODES 5        /* of a row: the point's, and those of the facet's cell */
+#define NODES 8        /* of a row, at most: of two cells; with a point one, and those of the facet's cell */
 
 typedef enum { PROJECTED, AUGMENTED, PENALTY } Response;
 
-/* A point and the surface of another part, or its own, near it. */
+/*
+  A point and the surface of another part, or its own, near it: `point` and `part`. Or two edges: `point` is the number of points and own
+  edge, `part` the identity of the other edge. Hits are in the order of both, those of points first.
+*/
 typedef struct {
   PetscInt point, part;
   PetscInt n, node[NODES]; /* global numbers; the point's first */
-  PetscReal weight[NODES]; /* of the relative displacement w: 1, minus the facet's */
+  PetscReal weight
+    [NODES]; /* of the relative displacement w: 1, minus the facet's; those of the first edge, minus the other's */
   PetscReal normal[3];
   PetscReal value;            /* n . w that closes the gap, m */
   PetscReal gap;              /* at the last look, m */
@@ -48,6 +52,7 @@ typedef struct {
   PetscReal recovery; /* part of a depth that is left after a step */
   PetscReal *edge;    /* [nbody] mean edge of the surfaces, m: the finer one looks */
   PetscReal *point_k; /* [npoint] N/m */
+  PetscReal *edge_k;  /* [own edges] the same of an edge, N/m */
   PetscReal *u0;      /* [nnode][3] displacement at the start of the step, m */
   PetscInt nhit, size, npast, past_size;
   Hit *hit, *spare; /* by point and part */
@@ -70,3 +75,9 @@ PetscErrorCode SbCollisionLook(Collision *c, const PetscReal u[], PetscBool with
 PetscErrorCode SbCollisionRestore(Collision *c);
 /* Remembers the pairs as this step leaves them. Not collective. */
 PetscErrorCode SbCollisionKeep(Collision *c);
+
+/* Whether the pair is one of edges. */
+static inline PetscBool SbCollisionOfEdges(const Collision *c, const Hit *hit)
+{
+  return (PetscBool)(hit->point >= c->surface->scene.npoint);
+}

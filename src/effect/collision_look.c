@@ -1,5 +1,5 @@
 /*
-  collision_look.c - pairs of a point and a surface near it, from look to look: what the detector finds now, with what was known
+  collision_look.c - pairs of a point and a surface near it, and of two edges, from look to look: what the detector finds now, with what was known
   of the pair before.
 
   A step may be tried several times. Each attempt begins with the pairs as the last step left them, so that a failed one leaves no
@@ -17,6 +17,31 @@ static PetscBool looks_for(const Collision *c, PetscInt mine, PetscInt other)
   return (PetscBool)(mine < other);
 }
 
+/* What the detector found: points first. */
+typedef struct {
+  PetscInt nnear, npair;
+  const SbNear *near;
+  const SbEdgePair *pair;
+} Found;
+
+/* The pair of something found, by which it is known from look to look. */
+static void name_of(const Collision *c, const Found *found, PetscInt i, Hit *hit)
+{
+  const SbDetectScene *s = &c->surface->scene;
+
+  if (i < found->nnear) {
+    hit->point = found->near[i].point;
+    hit->part = s->facet_part[found->near[i].facet];
+    hit->k = c->point_k[hit->point];
+  } else {
+    const SbEdgePair *pair = &found->pair[i - found->nnear];
+
+    hit->point = s->npoint + pair->edge[0];
+    hit->part = s->edges->id[pair->edge[1]];
+    hit->k = c->edge_k[pair->edge[0]];
+  }
+}
+
 /* Displacement of a point less that of its place on the facet, from places x and X. */
 static void relative(const SbNear *near, const SbDetectScene *s, const PetscReal p[], const PetscReal x[],
                      PetscReal w[3])
@@ -29,36 +54,82 @@ static void relative(const SbNear *near, const SbDetectScene *s, const PetscReal
   }
 }
 
-/*
-  Normal, weights and gap of a pair as the detector sees it now. A point that was behind this facet when the step began, and not held
-  there, was not seen before (it came over a rim, or bodies overlap from the start): putting it in front at once would
-  throw it out.
-*/
-static void take_geometry(const Collision *c, const SbNear *near, Hit *hit)
+/* The same of the place on the first edge less that on the second. */
+static void relative_edges(const SbEdgePair *pair, const SbDetectScene *s, const PetscReal x[],
+                           PetscReal w[3])
+{
+  w[0] = w[1] = w[2] = 0;
+  for (int q = 0; q < 4; q++) {
+    const PetscInt corner = s->edges->corner[4 * pair->edge[q / 2] + q % 2];
+    const PetscReal t = pair->at[q / 2], weight = (q < 2 ? 1 : -1) * (q % 2 ? t : 1 - t);
+
+    for (int i = 0; i < 3; i++) w[i] += weight * (x[3 * corner + i] - s->X[3 * corner + i]);
+  }
+}
+
+static inline void add_node(Hit *hit, PetscInt node, PetscReal weight)
+{
+  if (PetscAbsReal(weight) < 1e-14) return;
+  hit->node[hit->n] = node;
+  hit->weight[hit->n++] = weight;
+}
+
+/* Nodes and weights of a pair, where it is, and where it was when the step began. */
+static void take_point(const Collision *c, const SbNear *near, Hit *hit)
 {
   const SbSurface f = c->surface;
   const SbDetectScene *s = &f->scene;
-  const PetscReal turned = SbDot3(hit->normal, near->normal);
 
-  hit->n = 1;
-  hit->node[0] = f->space->gnode[f->point_node[near->point]];
-  hit->weight[0] = 1;
+  hit->n = 0;
+  add_node(hit, f->space->gnode[f->point_node[near->point]], 1);
   for (int a = 0; a < 4; a++) {
     PetscReal w = 0;
 
     for (int k = 0; k < 3; k++) w += near->weight[k] * f->facet_weight[12 * near->facet + 4 * k + a];
-    if (PetscAbsReal(w) < 1e-14) continue;
-    hit->node[hit->n] = f->facet_node[4 * near->facet + a];
-    hit->weight[hit->n++] = -w;
+    add_node(hit, f->facet_node[4 * near->facet + a], -w);
   }
-  for (int i = 0; i < 3; i++) hit->normal[i] = near->normal[i];
   relative(near, s, s->p, s->x, hit->now);
   relative(near, s, s->p0 ? s->p0 : s->p, s->x0 ? s->x0 : s->x, hit->start);
-  hit->gap = near->gap;
-  hit->value = SbDot3(hit->normal, hit->now) - near->gap;
+}
+
+static void take_edges(const Collision *c, const SbEdgePair *pair, Hit *hit)
+{
+  const SbSurface f = c->surface;
+  const SbDetectScene *s = &f->scene;
+
+  hit->n = 0;
+  for (int q = 0; q < 2; q++) {
+    const PetscReal *weight = f->edge_weight + 8 * pair->edge[q], t = pair->at[q];
+
+    for (int a = 0; a < 4; a++)
+      add_node(hit, f->edge_node[4 * pair->edge[q] + a],
+               (q ? -1 : 1) * ((1 - t) * weight[a] + t * weight[4 + a]));
+  }
+  relative_edges(pair, s, s->x, hit->now);
+  relative_edges(pair, s, s->x0 ? s->x0 : s->x, hit->start);
+}
+
+/*
+  Normal, weights and gap of a pair as the detector sees it now. A point that was behind this facet when the step began, and not held
+  there, was not seen before (it came over a rim, or bodies overlap from the start): putting it in front at once would
+  throw it out. So with edges.
+*/
+static void take_geometry(const Collision *c, const Found *found, PetscInt i, Hit *hit)
+{
+  const SbEdgePair *pair = i < found->nnear ? NULL : &found->pair[i - found->nnear];
+  const PetscReal *normal = pair ? pair->normal : found->near[i].normal;
+  const PetscReal turned = SbDot3(hit->normal, normal);
+
+  if (pair)
+    take_edges(c, pair, hit);
+  else
+    take_point(c, &found->near[i], hit);
+  for (int k = 0; k < 3; k++) hit->normal[k] = normal[k];
+  hit->gap = pair ? pair->gap : found->near[i].gap;
+  hit->value = SbDot3(hit->normal, hit->now) - hit->gap;
   if (!hit->was || turned < 0.7)
     hit->allowed =
-      c->recovery * PetscMax(0, SbDot3(hit->normal, hit->now) - SbDot3(hit->normal, hit->start) - near->gap);
+      c->recovery * PetscMax(0, SbDot3(hit->normal, hit->now) - SbDot3(hit->normal, hit->start) - hit->gap);
 }
 
 static PetscErrorCode make_room(Collision *c, PetscInt n)
@@ -81,25 +152,25 @@ static inline PetscBool before(const Hit *a, PetscInt point, PetscInt part)
   The pairs found, each with what is known of it from before. Within a step (`within`) a pair that touches and was not found stays
   as it is: it slid over a rim.
 */
-static PetscErrorCode merge(Collision *c, PetscInt n, const SbNear near[], PetscBool within)
+static PetscErrorCode merge(Collision *c, const Found *found, PetscBool within)
 {
   const SbDetectScene *s = &c->surface->scene;
+  const PetscInt n = found->nnear + found->npair;
   PetscInt old = 0, m = 0;
   Hit *swap;
 
   PetscFunctionBeginUser;
   PetscCall(make_room(c, n + c->nhit));
   for (PetscInt i = 0; i < n; i++) {
-    const PetscInt part = s->facet_part[near[i].facet];
-    Hit hit = {
-      .point = near[i].point, .part = part, .k = c->point_k[near[i].point], .row = -1, .slide = {-1, -1}};
+    Hit hit = {.row = -1, .slide = {-1, -1}};
 
-    if (!looks_for(c, s->point_part[near[i].point], part)) continue;
-    for (; old < c->nhit && before(&c->hit[old], hit.point, part); old++) {
+    name_of(c, found, i, &hit);
+    if (hit.point < s->npoint && !looks_for(c, s->point_part[hit.point], hit.part)) continue;
+    for (; old < c->nhit && before(&c->hit[old], hit.point, hit.part); old++) {
       if (within && c->hit[old].on) c->spare[m++] = c->hit[old];
     }
-    if (old < c->nhit && c->hit[old].point == hit.point && c->hit[old].part == part) hit = c->hit[old++];
-    if (!within || !hit.on || hit.looks++ < LOOKS) take_geometry(c, &near[i], &hit);
+    if (old < c->nhit && c->hit[old].point == hit.point && c->hit[old].part == hit.part) hit = c->hit[old++];
+    if (!within || !hit.on || hit.looks++ < LOOKS) take_geometry(c, found, i, &hit);
     c->spare[m++] = hit;
   }
   for (; old < c->nhit; old++) {
@@ -114,14 +185,17 @@ static PetscErrorCode merge(Collision *c, PetscInt n, const SbNear near[], Petsc
 
 PetscErrorCode SbCollisionLook(Collision *c, const PetscReal u[], PetscBool within)
 {
-  const SbNear *near = NULL;
-  PetscInt n = 0;
+  const SbDetectScene *s = &c->surface->scene;
+  Found found = {0};
   PetscBool close;
 
   PetscFunctionBeginUser;
   PetscCall(SbSurfaceUpdate(c->surface, c->u0, u, c->reach, c->self, &close));
-  if (close || c->self) PetscCall(SbDetectorFind(c->detector, &c->surface->scene, &n, &near));
-  PetscCall(merge(c, n, near, within));
+  if (close || c->self) {
+    PetscCall(SbDetectorFind(c->detector, s, &found.nnear, &found.near));
+    PetscCall(SbDetectorFindEdges(c->detector, s, &found.npair, &found.pair));
+  }
+  PetscCall(merge(c, &found, within));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -3,9 +3,10 @@
 
   Two wavy sheets of squares cut in two lie in each other, a hundred facets to a wave whatever their number, so that each point has the same
   surroundings. The sheets shift a little from call to call. Printed are microseconds per point of a call, `sample NAME us VALUE`, the
-  detectors taking turns, and what was found. -motion: the way since the last call is looked at too. -shuffled: facets and
+  detectors taking turns, and the same of the look for sharp edges, of which there are none; and what was found. -motion: the way since the last call is looked at too. -shuffled: facets and
   vertices in random order, the worst that a mesh can do to the cache.
 */
+#include "../../src/contact/edge.h"
 #include "perf.h"
 #include <sbdetect.h>
 
@@ -23,6 +24,7 @@ typedef struct {
   PetscInt m; /* squares along a side of each */
   PetscReal *x, *x0, *X, *normal;
   PetscInt *facet, *facet_part, *facet_id, *point_part, *point_id, *point_facet, *place;
+  SbEdges edges;
   SbDetectScene scene;
 } Sheets;
 
@@ -94,12 +96,15 @@ static PetscErrorCode sheets_create(PetscInt facets, PetscBool shuffled, PetscBo
   if (motion) s->scene.x0 = s->scene.p0 = s->x0;
   s->scene.reach = REACH * EDGE;
   s->scene.version = 1;
+  PetscCall(SbEdgesCreate(&s->scene, &s->edges));
+  s->scene.edges = &s->edges;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 static PetscErrorCode sheets_destroy(Sheets *s)
 {
   PetscFunctionBeginUser;
+  PetscCall(SbEdgesDestroy(&s->edges));
   PetscCall(PetscFree4(s->x, s->x0, s->X, s->normal));
   PetscCall(
     PetscFree7(s->facet, s->facet_part, s->facet_id, s->point_part, s->point_id, s->point_facet, s->place));
@@ -147,15 +152,23 @@ static PetscErrorCode measure(Sheets *s, const char *names, PetscInt rounds)
     PetscCall(sheets_move(s, round));
     for (size_t k = 0; k < PETSC_STATIC_ARRAY_LENGTH(kinds); k++) {
       const SbNear *near;
-      PerfClock clock;
-      PetscInt n;
+      const SbEdgePair *pair;
+      PerfClock clock, edges;
+      PetscInt n, npair;
+      char name[32];
 
       if (!detector[k]) continue;
       clock = perf_start();
       PetscCall(SbDetectorFind(detector[k], &s->scene, &n, &near));
       clock = perf_stop(clock);
+      edges = perf_start();
+      PetscCall(SbDetectorFindEdges(detector[k], &s->scene, &npair, &pair));
+      edges = perf_stop(edges);
+      PetscCheck(!npair, PETSC_COMM_SELF, PETSC_ERR_PLIB, "The sheets have sharp edges");
       /* the first call allocates and finds the neighbours: it is not counted */
       if (round > 1) PetscCall(perf_sample(kinds[k].name, "us", 1e6 * clock.cpu / (double)s->scene.npoint));
+      PetscCall(PetscSNPrintf(name, sizeof(name), "%s_edges", kinds[k].name));
+      if (round > 1) PetscCall(perf_sample(name, "us", 1e6 * edges.cpu / (double)s->scene.npoint));
     }
   }
   PetscCall(perf_fact("facets", s->scene.nfacet));

@@ -2,6 +2,7 @@
   bvh_scene.h - scenes for tests of contact detection: a container that owns its arrays, and bodies to put into it.
 */
 #pragma once
+#include "../../src/contact/edge.h"
 #include "test.h"
 #include <sbdetect.h>
 #include <sbkernel.h>
@@ -24,6 +25,7 @@ typedef struct {
   PetscInt nvertex, nfacet;
   PetscReal *X, *x, *x0, *P, *p, *p0, *normal;
   PetscInt *facet, *vertex, *part, *id, *point_part, *point_id, *point_vertex, *point_facet;
+  SbEdges edges;
 } Scene;
 
 enum { MOST_FACETS = 70000, MOST_POINTS = 140000 };
@@ -58,6 +60,7 @@ static inline PetscErrorCode scene_create(Scene *c)
 static inline PetscErrorCode scene_destroy(Scene *c)
 {
   PetscFunctionBeginUser;
+  PetscCall(SbEdgesDestroy(&c->edges));
   PetscCall(PetscFree7(c->X, c->x, c->x0, c->P, c->p, c->p0, c->normal));
   PetscCall(PetscFree4(c->facet, c->vertex, c->part, c->id));
   PetscCall(PetscFree4(c->point_part, c->point_id, c->point_vertex, c->point_facet));

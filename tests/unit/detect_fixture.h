@@ -5,6 +5,7 @@
 #include <sbcontact.h>
 #include <sbdetect.h>
 #include <test.h>
+#include "../../src/contact/edge.h"
 
 #define WORLD_MAX 20000 /* most vertices, and facets */
 
@@ -17,6 +18,7 @@ typedef struct {
   /* owned by the world, borrowed by the scene */
   PetscReal *corner[3], *point[3], *normal;
   PetscInt *corners, *corner_vertex, *part, *facet_id, *point_part, *point_id, *point_vertex, *point_facet;
+  SbEdges edges;
   SbDetectScene scene;
 } World;
 
@@ -55,6 +57,7 @@ static inline PetscErrorCode world_create(World *w)
 static inline PetscErrorCode world_destroy(World *w)
 {
   PetscFunctionBeginUser;
+  PetscCall(SbEdgesDestroy(&w->edges));
   PetscCall(PetscFree6(w->X, w->x, w->x0, w->vertex_part, w->facet, w->facet_part));
   for (int i = 0; i < 3; i++) {
     PetscCall(PetscFree(w->corner[i]));
@@ -280,7 +283,18 @@ static inline void world_scene(World *w, PetscBool vertices, PetscReal apart, Pe
   s->point_vertex = w->point_vertex;
   s->point_facet = w->point_facet;
   s->reach = reach;
+  s->edges = NULL;
   s->version++;
+}
+
+/* Puts the edges of all facets into the scene. Kept until the next world_scene(). */
+static inline PetscErrorCode world_edges(World *w)
+{
+  PetscFunctionBeginUser;
+  PetscCall(SbEdgesDestroy(&w->edges));
+  PetscCall(SbEdgesCreate(&w->scene, &w->edges));
+  w->scene.edges = &w->edges;
+  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Instead of the world's own points: one of a part that has no facets. Kept until the next world_scene(). */

@@ -13,6 +13,10 @@
 #define PAIR(first, second)                                       \
   SETS "-bodies a,b" BODY("a", first, "box:1,0.8,0.3:3", "0,0,0") \
     BODY("b", second, "box:0.6,0.5,0.4:2", "0.2,0.1,0.32")
+/* Two bars, one across the other. */
+#define CROSS(first, second)                                      \
+  SETS "-bodies a,b" BODY("a", first, "box:1,0.3,0.3:3", "0,0,0") \
+    BODY("b", second, "box:0.3,1,0.3:3", "0.35,-0.35,0.32")
 
 /* A surface with displacements at the start of the step and now. */
 typedef struct {

@@ -10,6 +10,16 @@
 
 enum { NSETTING = 30 };
 
+/* The edges of a finished scene. */
+static PetscErrorCode add_edges(Scene *c)
+{
+  PetscFunctionBeginUser;
+  PetscCall(SbEdgesDestroy(&c->edges));
+  PetscCall(SbEdgesCreate(&c->s, &c->edges));
+  c->s.edges = &c->edges;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Two to four bodies of all sorts that overlap a little. */
 static PetscErrorCode random_scene(Scene *c, unsigned seed)
 {
@@ -70,6 +80,7 @@ static PetscErrorCode random_scene(Scene *c, unsigned seed)
   /* everything was far apart at rest, so that all pairs of self-contact count */
   for (PetscInt i = 0; i < 3 * c->s.ncorner && c->s.self; i++) c->X[i] *= 1e3;
   PetscCall(scene_finish(c));
+  PetscCall(add_edges(c));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -121,7 +132,7 @@ static PetscReal distance(const Scene *c, PetscInt point, PetscInt facet, PetscB
 }
 
 typedef struct {
-  PetscInt64 near, candidates, contacts, crossed, culled;
+  PetscInt64 near, candidates, contacts, crossed, culled, edges;
 } Totals;
 
 /*
@@ -170,6 +181,17 @@ static PetscInt differences(PetscInt n, const SbNear a[], PetscInt m, const SbNe
   return sum;
 }
 
+/* Whether two lists of pairs of edges are the same. */
+static PetscBool same_edges(PetscInt n, const SbEdgePair a[], PetscInt m, const SbEdgePair b[])
+{
+  for (PetscInt i = 0; i < PetscMin(n, m); i++) {
+    if (a[i].edge[0] != b[i].edge[0] || a[i].edge[1] != b[i].edge[1] || a[i].gap != b[i].gap ||
+        a[i].crossed != b[i].crossed)
+      return PETSC_FALSE;
+  }
+  return (PetscBool)(n == m);
+}
+
 static SbBvhSettings setting(int i)
 {
   static const PetscInt k[5] = {0, 6, 14, 18, 26};
@@ -196,13 +218,16 @@ static PetscErrorCode check_random(Scene *c)
     PetscCall(SbBvhSet(bvh[i], &s));
   }
   for (unsigned seed = 1; seed <= 240; seed++) {
+    const SbEdgePair *expected_edges, *edges;
     const SbNear *expected, *near;
-    PetscInt n, m;
+    PetscInt n, m, nedges, medges;
     char what[64];
 
     PetscCall(random_scene(c, seed));
     PetscCall(SbDetectorFind(brute, &c->s, &n, &expected));
+    PetscCall(SbDetectorFindEdges(brute, &c->s, &nedges, &expected_edges));
     sum.contacts += n;
+    sum.edges += nedges;
     for (PetscInt i = 0; i < n; i++) sum.crossed += expected[i].crossed ? 1 : 0;
     /* each third setting by turns, which do not go with those of the scenes (self-contact, motion, scale, reach) */
     for (int i = 0; i < NSETTING; i++) {
@@ -211,6 +236,9 @@ static PetscErrorCode check_random(Scene *c)
       PetscCall(PetscSNPrintf(what, sizeof(what), "scene %u, setting %d", seed, i));
       SB_CHECK(!differences(n, expected, m, near), "%s: %d contacts, brute force finds %d, or they differ",
                what, (int)m, (int)n);
+      PetscCall(SbDetectorFindEdges(bvh[i], &c->s, &medges, &edges));
+      SB_CHECK(same_edges(nedges, expected_edges, medges, edges),
+               "%s: %d pairs of edges, brute force finds %d, or they differ", what, (int)medges, (int)nedges);
       if (((unsigned)i + seed / 35) % 5 == 0) check_candidates(c, bvh[i], what, &sum);
     }
   }

@@ -10,7 +10,7 @@ static const SbDetectKind kinds[] = {SB_DETECT_BRUTE, SB_DETECT_HASH, SB_DETECT_
 
 /* How often something happened, over all scenes: the tests must not be empty. */
 static struct {
-  PetscInt scenes, contacts, inside, crossed, none;
+  PetscInt scenes, contacts, inside, crossed, none, edges, edges_in, edges_crossed;
 } seen;
 
 /* ------------------------------------------------------------------ random worlds */
@@ -99,10 +99,11 @@ static void huge_and_far(World *w)
 }
 
 /* Scene number k of many, with all that the number switches on. */
-static void random_world(World *w, unsigned k)
+static PetscErrorCode random_world(World *w, unsigned k)
 {
   unsigned state = 77 * k + 1;
 
+  PetscFunctionBeginUser;
   w->nvertex = w->nfacet = w->npart = 0;
   if (k % 5 == 4)
     touching_boxes(w, &state);
@@ -114,6 +115,8 @@ static void random_world(World *w, unsigned k)
   w->scene.self = (PetscBool)(k % 6 >= 4);
   world_scene(w, (PetscBool)(k % 4 != 2), k % 8 == 6 ? 1e-3 : 0, k % 9 == 1 ? 0.4 : 0.06);
   if (!(k % 2)) w->scene.x0 = w->scene.p0 = NULL;
+  PetscCall(world_edges(w));
+  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* ------------------------------------------------------------------ the same from all */
@@ -154,6 +157,87 @@ static void check_contact(const SbDetectScene *s, const SbNear *a, unsigned k)
   }
 }
 
+static PetscBool equal_pairs(const SbEdgePair *a, const SbEdgePair *b)
+{
+  for (int k = 0; k < 3; k++) {
+    if (a->normal[k] != b->normal[k]) return PETSC_FALSE;
+  }
+  for (int k = 0; k < 2; k++) {
+    if (a->edge[k] != b->edge[k] || a->at[k] != b->at[k]) return PETSC_FALSE;
+  }
+  return (PetscBool)(a->gap == b->gap && a->crossed == b->crossed);
+}
+
+/* Corner k of an edge. */
+static const PetscReal *end_of(const SbDetectScene *s, PetscInt edge, int k)
+{
+  return s->x + 3 * s->edges->corner[4 * edge + k];
+}
+
+/* What is true of any pair of edges. */
+static void check_pair(const SbDetectScene *s, const SbEdgePair *a, unsigned k)
+{
+  const SbEdges *e = s->edges;
+  PetscReal r[3], e0, e1, part = 0;
+
+  SB_CHECK(e->id[a->edge[0]] < e->id[a->edge[1]], "scene %u: edges in the wrong order", k);
+  SB_CHECK(s->self || e->part[a->edge[0]] != e->part[a->edge[1]], "scene %u: edges of one part", k);
+  for (int q = 0; q < 2; q++) {
+    const PetscReal *const x[4] = {end_of(s, a->edge[q], 0), end_of(s, a->edge[q], 1),
+                                   end_of(s, a->edge[q], 2), end_of(s, a->edge[q], 3)};
+    PetscReal d[3], along;
+
+    SB_CHECK(a->at[q] >= 0 && a->at[q] <= 1, "scene %u: place %g", k, (double)a->at[q]);
+    SB_CHECK(SbEdgeSharp(x), "scene %u: a smooth edge", k);
+    for (int i = 0; i < 3; i++) d[i] = x[1][i] - x[0][i];
+    along = SbDot3(d, a->normal) / PetscSqrtReal(SbDot3(d, d));
+    SB_CHECK_NEAR(along, 0, 1e-12, "normal across the edge");
+  }
+  for (int i = 0; i < 3; i++) {
+    e0 = (1 - a->at[0]) * end_of(s, a->edge[0], 0)[i] + a->at[0] * end_of(s, a->edge[0], 1)[i];
+    e1 = (1 - a->at[1]) * end_of(s, a->edge[1], 0)[i] + a->at[1] * end_of(s, a->edge[1], 1)[i];
+    r[i] = e0 - e1;
+    part = PetscMax(part, PetscAbsReal(e0));
+  }
+  SB_CHECK_NEAR(SbDot3(a->normal, a->normal), 1, 1e-13, "length of the normal");
+  SB_CHECK_NEAR(SbDot3(r, a->normal), a->gap, 1e-12 * (part + s->reach), "the gap along the normal");
+  if (a->crossed) return;
+  SB_CHECK(PetscAbsReal(a->gap) <= s->reach, "scene %u: gap %g", k, (double)a->gap);
+  SB_CHECK_NEAR(PetscSqrtReal(SbDot3(r, r)), PetscAbsReal(a->gap), 1e-9 * (part + s->reach),
+                "nearest places");
+}
+
+static PetscErrorCode check_same_edges(SbDetector detector[], const World *w, unsigned k)
+{
+  const SbEdgePair *pair[KINDS];
+  const PetscInt *id = w->edges.id;
+  PetscInt n[KINDS];
+
+  PetscFunctionBeginUser;
+  for (int i = 0; i < KINDS; i++) {
+    PetscCall(SbDetectorFindEdges(detector[i], &w->scene, &n[i], &pair[i]));
+    SB_CHECK(n[i] == n[0], "scene %u: kind %d finds %d pairs of edges, brute force %d", k, i, (int)n[i],
+             (int)n[0]);
+    for (PetscInt j = 0; n[i] == n[0] && j < n[0]; j++) {
+      if (equal_pairs(pair[0] + j, pair[i] + j)) continue;
+      SB_CHECK(0, "scene %u: pair of edges %d of kind %d is another one", k, (int)j, i);
+      break;
+    }
+  }
+  for (PetscInt j = 0; j < n[0]; j++) {
+    const SbEdgePair *a = pair[0] + j;
+
+    check_pair(&w->scene, a, k);
+    seen.edges_in += a->gap < 0;
+    seen.edges_crossed += a->crossed;
+    SB_CHECK(!j || a[-1].edge[0] < a->edge[0] ||
+               (a[-1].edge[0] == a->edge[0] && id[a[-1].edge[1]] < id[a->edge[1]]),
+             "scene %u: pair of edges %d is out of order", k, (int)j);
+  }
+  seen.edges += n[0];
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 static PetscErrorCode check_same(SbDetector detector[], const World *w, unsigned k)
 {
   const SbNear *near[KINDS];
@@ -182,6 +266,7 @@ static PetscErrorCode check_same(SbDetector detector[], const World *w, unsigned
   seen.scenes++;
   seen.contacts += n[0];
   seen.none += n[0] == 0;
+  PetscCall(check_same_edges(detector, w, k));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -194,7 +279,7 @@ static PetscErrorCode check_random(void)
   PetscCall(world_create(&w));
   for (int i = 0; i < KINDS; i++) PetscCall(SbDetectorCreate(kinds[i], &detector[i]));
   for (unsigned k = 0; k < 720; k++) {
-    random_world(&w, k);
+    PetscCall(random_world(&w, k));
     PetscCall(check_same(detector, &w, k));
     /* the same facets elsewhere: nothing that depends on the place may be kept */
     for (PetscInt i = 0; i < 3 * w.scene.ncorner; i++) w.corner[0][i] *= 0.95;
@@ -204,7 +289,7 @@ static PetscErrorCode check_random(void)
   w.scene.version++;
   for (int k = 0; k < 3; k++) {
     if (k) w.scene.npoint = 0;
-    if (k != 1) w.scene.nfacet = w.scene.ncorner = 0;
+    if (k != 1) w.scene.nfacet = w.scene.ncorner = w.edges.n = w.edges.nown = 0;
     PetscCall(check_same(detector, &w, 9999));
   }
   for (int i = 0; i < KINDS; i++) PetscCall(SbDetectorDestroy(&detector[i]));
@@ -212,6 +297,9 @@ static PetscErrorCode check_random(void)
   SB_CHECK(seen.contacts > 20000 && seen.inside > 5000 && seen.crossed > 1000 && seen.none < 400,
            "%d scenes, %d contacts, %d inside, %d crossed, %d scenes without", (int)seen.scenes,
            (int)seen.contacts, (int)seen.inside, (int)seen.crossed, (int)seen.none);
+  SB_CHECK(seen.edges > 500 && seen.edges_in > 300 && seen.edges_crossed > 150,
+           "%d pairs of edges, %d in each other, %d crossed", (int)seen.edges, (int)seen.edges_in,
+           (int)seen.edges_crossed);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -268,7 +356,7 @@ static PetscErrorCode check_order(void)
     const SbNear *a, *b;
     PetscInt na, nb, first = 0;
 
-    random_world(&w, k);
+    PetscCall(random_world(&w, k));
     PetscCall(SbDetectorFind(detector[0], &w.scene, &na, &a));
     turn_around(&w);
     PetscCall(SbDetectorFind(detector[1], &w.scene, &nb, &b));
@@ -334,7 +422,7 @@ static PetscErrorCode check_place(PetscReal scale, PetscBool exact)
 
     /* in degenerate scenes rounding decides which of two equal ones is found */
     if (k % 5 == 4 || k % 7 == 3 || k % 3 == 2) continue;
-    random_world(&w, k);
+    PetscCall(random_world(&w, k));
     PetscCall(SbDetectorFind(detector[0], &w.scene, &na, &a));
     if (exact)
       SbPoseSet(z, 0, none, none, &pose);
@@ -374,7 +462,7 @@ static PetscErrorCode check_stats(void)
   SB_CHECK_ERROR(SbDetectorCreate((SbDetectKind)17, &detector), "a kind that does not exist");
   PetscCall(world_create(&w));
   PetscCall(SbDetectorCreate(SB_DETECT_HASH, &detector));
-  random_world(&w, 3); /* with a huge facet */
+  PetscCall(random_world(&w, 3)); /* with a huge facet */
   PetscCall(SbDetectorFind(detector, &w.scene, &n, &near));
   PetscCall(SbDetectorGetStats(detector, &stats));
   SB_CHECK(stats.found == n && n > 0 && stats.candidates >= n, "%d found, %d candidates", (int)stats.found,

@@ -179,15 +179,16 @@ static PetscErrorCode check_rows(const char *elements, const char *more)
 }
 
 /* The pairs' gaps are those of another detector on a surface of its own. */
-static PetscErrorCode check_gaps(const char *elements)
+static PetscErrorCode check_gaps(const char *elements, PetscInt least)
 {
+  const SbEdgePair *pair;
   const SbNear *near;
   SbDetector detector;
   SbSurface surface;
   SbFacet *facet;
   Collision *c;
   Meeting x;
-  PetscInt n;
+  PetscInt n, npair;
   PetscBool close;
 
   PetscFunctionBeginUser;
@@ -201,7 +202,19 @@ static PetscErrorCode check_gaps(const char *elements)
   PetscCall(SbDetectorCreate(SB_DETECT_BRUTE, &detector));
   PetscCall(SbSurfaceUpdate(surface, x.u0, x.u, c->reach, PETSC_FALSE, &close));
   PetscCall(SbDetectorFind(detector, &surface->scene, &n, &near));
-  SB_CHECK(close && n == c->nhit, "%d pairs, and %d by a detector of our own", (int)c->nhit, (int)n);
+  PetscCall(SbDetectorFindEdges(detector, &surface->scene, &npair, &pair));
+  SB_CHECK(close && n + npair == c->nhit, "%d pairs, and %d and %d by a detector of our own", (int)c->nhit,
+           (int)n, (int)npair);
+  for (PetscInt i = 0; i < npair && n + npair == c->nhit; i++) {
+    const Hit *hit = &c->hit[n + i];
+
+    SB_CHECK(SbCollisionOfEdges(c, hit) && hit->point - surface->scene.npoint == pair[i].edge[0] &&
+               hit->part == surface->scene.edges->id[pair[i].edge[1]],
+             "pair of edges %d is another one", (int)i);
+    SB_CHECK_NEAR(hit->gap, pair[i].gap, 1e-14, "gap of a pair of edges");
+  }
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &npair, 1, MPIU_INT, MPI_SUM, x.s->comm));
+  SB_CHECK(npair >= least, "%d pairs of edges", (int)npair);
   for (PetscInt i = 0; i < PetscMin(n, c->nhit); i++) {
     const Hit *hit = &c->hit[i];
 
@@ -227,7 +240,9 @@ static PetscErrorCode count_looks(const char *elements, const char *more, PetscI
   c = (Collision *)x.e->data;
   come_down(&x, 0.03);
   PetscCall(attempt(&x));
-  for (PetscInt i = 0; i < c->nhit; i++) looks[c->surface->scene.point_part[c->hit[i].point]]++;
+  for (PetscInt i = 0; i < c->nhit; i++) {
+    if (!SbCollisionOfEdges(c, &c->hit[i])) looks[c->surface->scene.point_part[c->hit[i].point]]++;
+  }
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, looks, 2, MPIU_INT, MPI_SUM, x.s->comm));
   PetscCall(close_meeting(&x));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -420,7 +435,9 @@ int main(int argc, char **argv)
   PetscCall(check_refused());
   PetscCall(check_rows(PAIR("p1", "cr"), ""));
   PetscCall(check_rows(PAIR("dg", "p1"), "-effect_meet_sides one"));
-  PetscCall(check_gaps(PAIR("cr", "dg")));
+  PetscCall(check_rows(CROSS("p1", "dg"), ""));
+  PetscCall(check_gaps(PAIR("cr", "dg"), 0));
+  PetscCall(check_gaps(CROSS("p1", "cr"), 3));
   PetscCall(check_sides());
   PetscCall(check_far());
   PetscCall(check_attempts("projected"));

@@ -1,6 +1,6 @@
 // @ranks 1 2 3 4
 /*
-  The distributed surface: what a rank sees of it holds every facet within reach of its points, at the place where the owner has it;
+  The distributed surface: what a rank sees of it holds every facet within reach of its points and edges, at the place where the owner has it;
   areas, normals and identities are those of one rank; the list of foreign facets is kept, renewed and given up when it should; and a
   contact of small extent moves few facets.
 */
@@ -224,6 +224,89 @@ static PetscErrorCode check_points(const Case *c, const Case *alone, PetscReal a
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Box of the motion of an edge. */
+static void bound_edge(const SbDetectScene *g, PetscInt i, PetscReal box[6])
+{
+  PetscReal x[2][3], x0[2][3];
+
+  for (int q = 0; q < 6; q++) {
+    const PetscInt at = 3 * g->edges->corner[4 * i + q / 3] + q % 3;
+
+    x[q / 3][q % 3] = g->x[at];
+    x0[q / 3][q % 3] = (g->x0 ? g->x0 : g->x)[at];
+  }
+  bounds(2, x[0], x0[0], box);
+}
+
+/* The edges of this rank, own ones and others, are those of one rank; their weights give their places. */
+static void compare_edges(const Case *c, const Case *alone, const PetscInt where[], const PetscReal u[])
+{
+  const SbDetectScene *g = &c->s->scene, *one = &alone->s->scene;
+
+  for (PetscInt i = 0; i < g->edges->n; i++) {
+    const PetscInt j = where[g->edges->id[i]];
+
+    SB_CHECK(j >= 0, "edge %d is none on one rank", (int)g->edges->id[i]);
+    if (j < 0) continue;
+    SB_CHECK(g->edges->part[i] == one->edges->part[j], "part of an edge");
+    for (int k = 0; k < 12; k++) {
+      const PetscInt a = 3 * g->edges->corner[4 * i + k / 3] + k % 3,
+                     b = 3 * one->edges->corner[4 * j + k / 3] + k % 3;
+      PetscReal x = g->X[a];
+
+      SB_CHECK(g->x[a] == one->x[b] && g->X[a] == one->X[b] && (!g->x0 || g->x0[a] == one->x0[b]),
+               "corner %d of edge %d is elsewhere on one rank", k / 3, (int)g->edges->id[i]);
+      if (k >= 6) continue;
+      SB_CHECK(g->edges->vertex[2 * i + k / 3] == one->edges->vertex[2 * j + k / 3], "vertex of an edge");
+      for (int m = 0; m < 4; m++)
+        x += c->s->edge_weight[8 * i + 4 * (k / 3) + m] * u[3 * c->s->edge_node[4 * i + m] + k % 3];
+      SB_CHECK_NEAR(g->x[a], x, 1e-14, "place by weights");
+    }
+  }
+}
+
+/* Each edge of one rank has one owner among all; what is within reach of an own edge is here. */
+static PetscErrorCode check_edges(const Case *c, const Case *alone)
+{
+  const SbDetectScene *g = &c->s->scene, *one = &alone->s->scene;
+  const PetscInt nid = 12 * c->m->mesh->Ncell;
+  PetscInt *owners, *where, *here, missing = 0;
+  PetscReal *u;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscCalloc1(nid, &owners));
+  PetscCall(PetscMalloc2(nid, &where, nid, &here));
+  for (PetscInt i = 0; i < nid; i++) where[i] = here[i] = -1;
+  for (PetscInt i = 0; i < one->edges->n; i++) where[one->edges->id[i]] = i;
+  for (PetscInt i = 0; i < g->edges->n; i++) {
+    SB_CHECK(here[g->edges->id[i]] < 0, "edge %d is here twice", (int)g->edges->id[i]);
+    here[g->edges->id[i]] = i;
+    owners[g->edges->id[i]] += i < g->edges->nown;
+  }
+  PetscCall(gather_numbers(c->m->comm, 3 * c->m->space->nnode_owned, c->u, &(PetscInt){0}, &u));
+  compare_edges(c, alone, where, u);
+  PetscCall(PetscFree(u));
+  for (PetscInt i = 0; i < g->edges->nown; i++) {
+    PetscReal box[6], other[6];
+
+    bound_edge(g, i, box);
+    for (PetscInt j = 0; j < one->edges->n; j++) {
+      if (!g->self && one->edges->part[j] == g->edges->part[i]) continue;
+      bound_edge(one, j, other);
+      missing += meet(box, other, g->reach) && here[one->edges->id[j]] < 0;
+    }
+  }
+  SB_CHECK(!missing, "%d edges near own ones are missing", (int)missing);
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, owners, (PetscMPIInt)nid, MPIU_INT, MPI_SUM, c->m->comm));
+  for (PetscInt i = 0; i < nid; i++)
+    SB_CHECK(owners[i] == (where[i] >= 0), "edge %d has %d owners", (int)i, (int)owners[i]);
+  SB_CHECK(2 * one->edges->n == 3 * one->nfacet, "%d edges of %d facets", (int)one->edges->n,
+           (int)one->nfacet);
+  PetscCall(PetscFree(owners));
+  PetscCall(PetscFree2(where, here));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Updates, and checks what the rank sees. */
 static PetscErrorCode look(Case *c, PetscBool moving, PetscReal reach, PetscBool self, PetscInt *npair)
 {
@@ -303,6 +386,7 @@ static PetscErrorCode test_motion(const char *options, PetscReal area, PetscInt 
   SB_CHECK_NEAR(c.s->edge, alone.s->edge, 1e-14, "mean edge");
   SB_CHECK(c.s->size == alone.s->size && c.s->edge > 0, "size");
   PetscCall(check_points(&c, &alone, area));
+  PetscCall(check_edges(&c, &alone));
 
   /* other places, hardly moved: the same list; less reach asks for nothing new */
   nbuild = halo_of(&c)->nbuild;
@@ -326,6 +410,12 @@ static PetscErrorCode test_motion(const char *options, PetscReal area, PetscInt 
   SB_CHECK(halo_of(&c)->nbuild == nbuild + (size > 1), "the reach has grown");
   PetscCall(look(&c, PETSC_TRUE, 0.05, PETSC_TRUE, &npair));
   SB_CHECK(halo_of(&c)->nbuild == nbuild + 2 * (size > 1), "self-contact");
+
+  PetscCall(fill(&alone, 4, 0.2, 0, 0, alone.u));
+  PetscCall(fill(&c, 4, 0.2, 0, 0, c.u));
+  PetscCall(look(&c, PETSC_FALSE, 0.02, PETSC_TRUE, &npair));
+  PetscCall(look(&alone, PETSC_FALSE, 0.02, PETSC_TRUE, &npair));
+  PetscCall(check_edges(&c, &alone));
 
   /* apart */
   PetscCall(fill(&c, 2, 0.01, 0, 0.5, c.u));

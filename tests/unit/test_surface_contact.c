@@ -1,6 +1,6 @@
 // @ranks 1 2 3 4
 /*
-  A distributed surface and a detector on each rank find the contacts of one rank: between bodies of all elements, sliding, going
+  A distributed surface and a detector on each rank find the contacts and the pairs of edges of one rank: between bodies of all elements, sliding, going
   through each other, and of a body with itself.
 */
 #include "surface_fixture.h"
@@ -64,12 +64,64 @@ static PetscErrorCode compare_contacts(const Case x[2], const SbDetector detecto
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+#define PAIR_ROW 9 /* edges, places 2, gap 4, normal 5, crossed 8 */
+
+/* All pairs of edges of all ranks. */
+static PetscErrorCode find_pairs(const Case *c, SbDetector detector, PetscInt *n, PetscReal **all)
+{
+  const SbDetectScene *g = &c->s->scene;
+  const SbEdgePair *pair;
+  PetscReal *mine;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbDetectorFindEdges(detector, g, n, &pair));
+  PetscCall(PetscMalloc1(PAIR_ROW * *n, &mine));
+  for (PetscInt i = 0; i < *n; i++) {
+    PetscReal *row = mine + PAIR_ROW * i;
+
+    for (int k = 0; k < 2; k++) {
+      row[k] = (PetscReal)g->edges->id[pair[i].edge[k]];
+      row[2 + k] = pair[i].at[k];
+    }
+    row[4] = pair[i].gap;
+    for (int k = 0; k < 3; k++) row[5 + k] = pair[i].normal[k];
+    row[8] = pair[i].crossed;
+  }
+  PetscCall(gather_numbers(c->m->comm, PAIR_ROW * *n, mine, n, all));
+  *n /= PAIR_ROW;
+  PetscCall(PetscFree(mine));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The same of edges: each pair is found by one rank. */
+static PetscErrorCode compare_pairs(const Case x[2], const SbDetector detector[2], PetscInt *count)
+{
+  PetscInt n[2];
+  PetscReal *all[2];
+
+  PetscFunctionBeginUser;
+  for (int k = 0; k < 2; k++) PetscCall(find_pairs(&x[k], detector[k], &n[k], &all[k]));
+  SB_CHECK(n[0] == n[1], "%d pairs of edges, %d on one rank", (int)n[0], (int)n[1]);
+  for (PetscInt i = 0; i < n[0]; i++) {
+    const PetscReal *row = all[0] + PAIR_ROW * i;
+    PetscInt j = 0;
+
+    while (j < n[1] && (all[1][PAIR_ROW * j] != row[0] || all[1][PAIR_ROW * j + 1] != row[1])) j++;
+    SB_CHECK(j < n[1], "edges %d and %d are no pair on one rank", (int)row[0], (int)row[1]);
+    for (int k = 0; k < PAIR_ROW && j < n[1]; k++)
+      SB_CHECK_NEAR(row[k], all[1][PAIR_ROW * j + k], 1e-12, "pair of edges");
+    ++*count;
+  }
+  for (int k = 0; k < 2; k++) PetscCall(PetscFree(all[k]));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Bodies pressed into each other with wrinkled surfaces, sliding; then jumps through each other. */
 static PetscErrorCode test_contacts(const char *options, PetscReal noisy)
 {
   Case x[2]; /* on all ranks, on one */
   SbDetector detector[2];
-  PetscInt count[3][2] = {{0, 0}};
+  PetscInt count[3][2] = {{0, 0}}, pairs = 0;
 
   PetscFunctionBeginUser;
   for (int k = 0; k < 2; k++) {
@@ -88,10 +140,13 @@ static PetscErrorCode test_contacts(const char *options, PetscReal noisy)
       SB_CHECK(close, "the bodies are close");
     }
     PetscCall(compare_contacts(x, detector, count[self ? 2 : jump]));
+    PetscCall(compare_pairs(x, detector, &pairs));
   }
-  PetscCall(PetscPrintf(PETSC_COMM_WORLD,
-                        "  contacts: %d sliding, %d after jumps (%d crossed), %d with self-contact\n",
-                        (int)count[0][0], (int)count[1][0], (int)count[1][1], (int)count[2][0]));
+  PetscCall(PetscPrintf(
+    PETSC_COMM_WORLD,
+    "  contacts: %d sliding, %d after jumps (%d crossed), %d with self-contact; %d pairs of edges\n",
+    (int)count[0][0], (int)count[1][0], (int)count[1][1], (int)count[2][0], (int)pairs));
+  SB_CHECK(pairs > 20, "too few pairs of edges");
   SB_CHECK(count[0][0] > 100 && count[1][1] > 10 && count[2][0] > 100, "too few contacts");
   for (int k = 0; k < 2; k++) {
     PetscCall(SbDetectorDestroy(&detector[k]));
@@ -155,6 +210,8 @@ int main(int argc, char **argv)
   PetscCall(test_contacts(PAIR("p1", "p1"), 0.03));
   PetscCall(test_contacts(PAIR("cr", "cr"), 0.01));
   PetscCall(test_contacts(PAIR("dg", "p1"), 0.01));
+  PetscCall(test_contacts(CROSS("p1", "dg"), 0.02));
+  PetscCall(test_contacts(CROSS("cr", "p1"), 0.01));
   PetscCall(test_ring("p1"));
   PetscCall(test_ring("cr"));
   PetscCall(test_ring("dg"));
