@@ -24,16 +24,10 @@ PetscErrorCode SbMeshRegister(void)
 
 /* ------------------------------------------------------------------ errors of rank 0 */
 
-typedef struct {
-  int code;
-  char text[1024];
-} Caught;
-
-/* Keeps the message. An error that is not the user's is also printed with its trace, for us. */
-static PetscErrorCode catch_error(MPI_Comm comm, int line, const char *function, const char *file,
-                                  PetscErrorCode code, PetscErrorType kind, const char *text, void *ctx)
+PetscErrorCode SbCatchError(MPI_Comm comm, int line, const char *function, const char *file,
+                            PetscErrorCode code, PetscErrorType kind, const char *text, void *ctx)
 {
-  Caught *caught = (Caught *)ctx;
+  SbCaught *caught = (SbCaught *)ctx;
 
   if (kind == PETSC_ERROR_INITIAL) {
     caught->code = (int)code;
@@ -50,7 +44,7 @@ static PetscErrorCode create_whole(MPI_Comm comm, PetscInt nbody, SbBody body[],
                                    SbWhole *whole)
 {
   PetscMPIInt rank;
-  Caught caught = {0, ""};
+  SbCaught caught = {0, ""};
 
   PetscFunctionBeginUser;
   PetscCallMPI(MPI_Comm_rank(comm, &rank));
@@ -58,7 +52,7 @@ static PetscErrorCode create_whole(MPI_Comm comm, PetscInt nbody, SbBody body[],
   if (!rank) {
     PetscErrorCode ierr;
 
-    PetscCall(PetscPushErrorHandler(catch_error, &caught));
+    PetscCall(PetscPushErrorHandler(SbCatchError, &caught));
     ierr = SbWholeCreate(nbody, body, nset, set, whole);
     PetscCall(PetscPopErrorHandler());
     caught.code = (int)ierr;

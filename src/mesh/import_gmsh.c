@@ -5,8 +5,8 @@
   Version 4.1 gives groups per entity of the geometry; an entity may have several. Version 2.2 gives one group per
   element and writes an element again for each further group: such repeats are merged, groups joined.
 
-  Kept: points, lines, triangles that belong to a group, and all tets. Sections that do not concern us are skipped.
-  Refused: volume elements other than 4-node tets, files cut into partitions, other versions.
+  Kept: points, lines, triangles that belong to a group, and all tets; all triangles where a surface is wanted, which needs no tets.
+  Sections that do not concern us are skipped. Refused: volume elements other than 4-node tets, files cut into partitions, other versions.
 */
 #include <stdlib.h>
 #include "mesh_impl.h"
@@ -387,7 +387,8 @@ static PetscErrorCode read_element(Gmsh *g, int type, int64_t number, PetscInt t
                     (long long)node);
   }
   g->count[type]++;
-  if (type == TET || (tags && (type == POINT || type == LINE || type == TRIANGLE)))
+  if (type == TET || (type == TRIANGLE && g->im->surface) ||
+      (tags && (type == POINT || type == LINE || type == TRIANGLE)))
     PetscCall(SbImportAddItem(g->im, types[type].dim, vert, tags, number));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -579,6 +580,7 @@ static PetscErrorCode check_content(const Gmsh *g)
     PetscCheck(t == TET || types[t].dim < 3 || !g->count[t], PETSC_COMM_SELF, PETSC_ERR_FILE_UNEXPECTED,
                "%s: holds %lld %s; %s", where, (long long)g->count[t], types[t].name, advice);
   }
+  if (g->im->surface && g->count[TRIANGLE]) PetscFunctionReturn(PETSC_SUCCESS);
   for (int t = 1; t < NTYPES && !g->count[TET]; t++) {
     PetscCheck(types[t].dim < 2 || !g->count[t], PETSC_COMM_SELF, PETSC_ERR_FILE_UNEXPECTED,
                "%s: is a surface: %lld %s and no tetrahedra; mesh the volume (gmsh -3)", where,

@@ -38,6 +38,7 @@ typedef struct {
   PetscInt *tags_start; /* [ntags + 1] */
   PetscInt *tags_group; /* [tags_start[ntags]] groups, ascending in each set */
   PetscInt capacity[3]; /* of group, tags_start, tags_group */
+  PetscBool surface;    /* given: all triangles are wanted, and tets need not be there */
   /* found by SbImportCheck() */
   PetscInt nunused;     /* vertices left out */
   PetscInt nreoriented; /* cells turned */
@@ -144,6 +145,17 @@ PetscErrorCode SbPartitionerRegister(void);
 PetscErrorCode SbOrderRCM(PetscInt nvert, PetscInt ncell, const PetscInt cell[], PetscInt order[]);
 /* Own local numbering: fills the arrays and counts of the mesh from its DM. Collective. */
 PetscErrorCode SbMeshNumber(SbMesh mesh, const SbPoint point[]);
+
+/* ------------------------------------------------------------------ create.c: errors of rank 0 */
+
+/* What rank 0 has to say, to be raised by all ranks. */
+typedef struct {
+  int code;
+  char text[1024];
+} SbCaught;
+/* For PetscPushErrorHandler(), ctx an SbCaught: keeps the message. An error that is not the user's is also printed with its trace. */
+PetscErrorCode SbCatchError(MPI_Comm comm, int line, const char *function, const char *file,
+                            PetscErrorCode code, PetscErrorType kind, const char *text, void *ctx);
 
 /* ------------------------------------------------------------------ scan.c: a file in memory */
 

@@ -1,0 +1,318 @@
+/*
+  triangles_read.c - surfaces from .stl (text and binary), .obj and .off files.
+
+  STL lists triangles with three corners each; corners with equal coordinates, bit by bit, are one vertex. The normals in the file are
+  not used: the order of the corners tells the side. It is binary when its size is what its count of triangles says (80 bytes, the count,
+  50 bytes per triangle), whatever its first word is. OBJ: the lines v and f; OFF: the plain kind. Faces with more
+  than three corners become a fan, which is right for convex ones.
+*/
+#include <stdlib.h>
+#include <strings.h>
+#include "triangles.h"
+
+/* ------------------------------------------------------------------ STL */
+
+typedef struct {
+  PetscReal x[3];
+  PetscInt corner;
+} Corner;
+
+static int compare_corners(const void *a, const void *b)
+{
+  const Corner *p = (const Corner *)a, *q = (const Corner *)b;
+
+  for (int i = 0; i < 3; i++) {
+    if (p->x[i] != q->x[i]) return p->x[i] < q->x[i] ? -1 : 1;
+  }
+  return (p->corner > q->corner) - (p->corner < q->corner);
+}
+
+/* Triangles with three corners of their own get common vertices. */
+static PetscErrorCode join_corners(SbTriangles *t)
+{
+  const PetscInt n = t->nvert;
+  PetscInt nvert = 0;
+  Corner *corner;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscMalloc1(n, &corner));
+  for (PetscInt i = 0; i < n; i++) {
+    for (int k = 0; k < 3; k++) corner[i].x[k] = t->x[3 * i + k] + 0.; /* no negative zero */
+    corner[i].corner = i;
+  }
+  qsort(corner, (size_t)n, sizeof(*corner), compare_corners);
+  for (PetscInt i = 0; i < n; i++) {
+    const PetscReal *x = corner[i].x;
+
+    if (!i || x[0] != corner[i - 1].x[0] || x[1] != corner[i - 1].x[1] || x[2] != corner[i - 1].x[2]) {
+      for (int k = 0; k < 3; k++) t->x[3 * nvert + k] = x[k];
+      nvert++;
+    }
+    t->tri[corner[i].corner] = nvert - 1;
+  }
+  t->nvert = nvert;
+  PetscCall(PetscFree(corner));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static uint32_t little(const char *p)
+{
+  const unsigned char *b = (const unsigned char *)p;
+
+  return (uint32_t)b[0] | (uint32_t)b[1] << 8 | (uint32_t)b[2] << 16 | (uint32_t)b[3] << 24;
+}
+
+static PetscErrorCode stl_triangle(SbTriangleFile *f)
+{
+  const PetscInt n = f->t->nvert;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbTrianglesAdd(f, n - 3, n - 2, n - 1, f->t->ntri + 1));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode stl_binary(SbScan *s, uint32_t n, SbTriangleFile *f)
+{
+  PetscFunctionBeginUser;
+  s->bytes = PETSC_TRUE;
+  for (uint32_t i = 0; i < n; i++) {
+    for (int k = 0; k < 3; k++) {
+      PetscReal x[3];
+
+      for (int c = 0; c < 3; c++) {
+        const uint32_t bits = little(s->token = s->data + 84 + 50 * (size_t)i + 12 + 12 * k + 4 * c);
+        float value;
+
+        memcpy(&value, &bits, sizeof(value));
+        x[c] = (PetscReal)value;
+        if (!isfinite(x[c]))
+          SB_SCAN_ERROR(s, "a coordinate of triangle %lld is not a finite number; repair the file",
+                        (long long)i + 1);
+      }
+      PetscCall(SbTrianglesAddVertex(f, x));
+    }
+    PetscCall(stl_triangle(f));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode stl_word(SbScan *s, const char *wanted)
+{
+  char word[32];
+
+  PetscFunctionBeginUser;
+  PetscCall(SbScanWord(s, sizeof(word), word));
+  if (!word[0])
+    SB_SCAN_ERROR(s, "the file ends where '%s' is expected; it is truncated, write or copy it again", wanted);
+  if (strcasecmp(word, wanted)) SB_SCAN_ERROR(s, "expected '%s', found '%s'", wanted, word);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode stl_facet(SbScan *s, SbTriangleFile *f)
+{
+  PetscFunctionBeginUser;
+  PetscCall(SbScanEndOfLine(s)); /* the normal */
+  PetscCall(stl_word(s, "outer"));
+  PetscCall(stl_word(s, "loop"));
+  for (int k = 0; k < 3; k++) {
+    PetscReal x[3];
+
+    PetscCall(stl_word(s, "vertex"));
+    for (int c = 0; c < 3; c++) {
+      PetscCall(SbScanReal(s, "coordinate of a vertex", 0, &x[c]));
+      if (!isfinite(x[c])) SB_SCAN_ERROR(s, "the coordinate is not a finite number; repair the file");
+    }
+    PetscCall(SbTrianglesAddVertex(f, x));
+  }
+  PetscCall(stl_word(s, "endloop"));
+  PetscCall(stl_word(s, "endfacet"));
+  PetscCall(stl_triangle(f));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* One or more solids: together they are the surface. */
+static PetscErrorCode stl_text(SbScan *s, SbTriangleFile *f)
+{
+  char word[32];
+
+  PetscFunctionBeginUser;
+  PetscCall(SbScanWord(s, sizeof(word), word));
+  if (strcasecmp(word, "solid"))
+    SB_SCAN_ERROR(s, "expected 'solid', and the size of the file is not that of a binary one: it is no STL "
+                     "file, or truncated");
+  for (PetscBool open = PETSC_TRUE; word[0];) {
+    if (!open || strcasecmp(word, "facet")) PetscCall(SbScanEndOfLine(s)); /* the name of a solid */
+    if (open && !strcasecmp(word, "facet")) PetscCall(stl_facet(s, f));
+    PetscCall(SbScanWord(s, sizeof(word), word));
+    if (!strcasecmp(word, "endsolid"))
+      open = PETSC_FALSE;
+    else if (!strcasecmp(word, "solid"))
+      open = PETSC_TRUE;
+    else if (word[0] && (!open || strcasecmp(word, "facet")))
+      SB_SCAN_ERROR(s, "expected 'facet' or 'endsolid', found '%s'", word);
+    if (!word[0] && open)
+      SB_SCAN_ERROR(s, "the file ends where 'endsolid' is expected; it is truncated, write or copy it again");
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode stl_file(SbScan *s, SbTriangleFile *f)
+{
+  const size_t size = (size_t)(s->end - s->data);
+  const uint32_t n = size >= 84 ? little(s->data + 80) : 0;
+
+  PetscFunctionBeginUser;
+  if (size >= 84 && size == 84 + 50 * (size_t)n)
+    PetscCall(stl_binary(s, n, f));
+  else
+    PetscCall(stl_text(s, f));
+  PetscCall(join_corners(f->t));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ OBJ and OFF */
+
+/* A face as a fan around its first corner; vertices from 0. */
+static PetscErrorCode add_face(SbScan *s, int64_t corner, int64_t v, PetscInt fan[2], int64_t number,
+                               SbTriangleFile *f)
+{
+  PetscFunctionBeginUser;
+  if (v < 0 || v >= f->t->nvert)
+    SB_SCAN_ERROR(s, "face %lld uses a vertex that is not there (%lld of %lld)", (long long)number,
+                  (long long)v + 1, (long long)f->t->nvert);
+  if (corner >= 2) PetscCall(SbTrianglesAdd(f, fan[0], fan[1], (PetscInt)v, number));
+  fan[corner > 0] = (PetscInt)v;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode add_vertex(SbScan *s, SbTriangleFile *f)
+{
+  PetscReal x[3];
+
+  PetscFunctionBeginUser;
+  for (int c = 0; c < 3; c++) {
+    PetscCall(SbScanReal(s, "coordinate of a vertex", 0, &x[c]));
+    if (!isfinite(x[c])) SB_SCAN_ERROR(s, "the coordinate is not a finite number; repair the file");
+  }
+  PetscCall(SbTrianglesAddVertex(f, x));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The rest of a line f: numbers from 1, or from the last vertex back when negative; what follows a slash is not read. */
+static PetscErrorCode obj_face(SbScan *s, int64_t number, SbTriangleFile *f)
+{
+  PetscInt fan[2] = {0, 0};
+  int64_t n = 0;
+
+  PetscFunctionBeginUser;
+  for (;; n++) {
+    char *after;
+    long long v;
+
+    while (s->at < s->end && (*s->at == ' ' || *s->at == '\t' || *s->at == '\r')) s->at++;
+    if (s->at >= s->end || *s->at == '\n' || *s->at == '#') break;
+    s->token = s->at;
+    v = strtoll(s->at, &after, 10);
+    if (after == s->at || v == 0 || (*after && !strchr("/ \t\r\n", *after)))
+      SB_SCAN_ERROR(s, "expected the number of a vertex, not zero");
+    for (s->at = after; s->at < s->end && !strchr(" \t\r\n", *s->at);) s->at++;
+    PetscCall(add_face(s, n, v > 0 ? v - 1 : f->t->nvert + v, fan, number, f));
+  }
+  if (n < 3) SB_SCAN_ERROR(s, "face %lld has %lld corners; it needs three", (long long)number, (long long)n);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode obj_file(SbScan *s, SbTriangleFile *f)
+{
+  int64_t nface = 0;
+  char word[16];
+
+  PetscFunctionBeginUser;
+  for (;;) {
+    PetscCall(SbScanWord(s, sizeof(word), word));
+    if (!word[0]) break;
+    if (!strcmp(word, "v")) PetscCall(add_vertex(s, f));
+    if (!strcmp(word, "f")) PetscCall(obj_face(s, ++nface, f));
+    PetscCall(SbScanEndOfLine(s));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* To the next number, over lines that begin with #. */
+static PetscErrorCode off_next(SbScan *s)
+{
+  PetscFunctionBeginUser;
+  for (;;) {
+    while (s->at < s->end && strchr(" \t\r\n", *s->at)) s->at++;
+    if (s->at >= s->end || *s->at != '#') break;
+    PetscCall(SbScanEndOfLine(s));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode off_file(SbScan *s, SbTriangleFile *f)
+{
+  int64_t count[3];
+  char word[16];
+
+  PetscFunctionBeginUser;
+  PetscCall(off_next(s));
+  PetscCall(SbScanWord(s, sizeof(word), word));
+  if (strcmp(word, "OFF"))
+    SB_SCAN_ERROR(s, "expected 'OFF', found '%s'; only the plain text kind of OFF file is read", word);
+  for (int i = 0; i < 3; i++) {
+    PetscCall(off_next(s));
+    PetscCall(SbScanText(s, "number of vertices, faces and edges", &count[i]));
+  }
+  PetscCall(SbScanRoom(s, "vertices", count[0], 6, 6));
+  PetscCall(SbScanRoom(s, "faces", count[1], 8, 8));
+  for (int64_t i = 0; i < count[0]; i++) {
+    PetscCall(off_next(s));
+    PetscCall(add_vertex(s, f));
+    PetscCall(SbScanEndOfLine(s));
+  }
+  for (int64_t i = 0; i < count[1]; i++) {
+    PetscInt fan[2] = {0, 0};
+    int64_t n, v;
+
+    PetscCall(off_next(s));
+    PetscCall(SbScanText(s, "number of corners of a face", &n));
+    if (n < 3) SB_SCAN_ERROR(s, "face %lld has %lld corners; it needs three", (long long)i + 1, (long long)n);
+    for (int64_t k = 0; k < n; k++) {
+      PetscCall(SbScanText(s, "vertex of a face", &v));
+      PetscCall(add_face(s, k, v, fan, i + 1, f));
+    }
+    PetscCall(SbScanEndOfLine(s)); /* colours */
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ files */
+
+static PetscErrorCode with_file(const char *path, PetscErrorCode (*read)(SbScan *, SbTriangleFile *),
+                                SbTriangleFile *f)
+{
+  SbScan scan;
+  PetscErrorCode ierr;
+
+  PetscFunctionBeginUser;
+  ierr = SbScanOpen(f->where, path, &scan);
+  if (!ierr) ierr = (*read)(&scan, f);
+  PetscCall(SbScanClose(&scan));
+  PetscFunctionReturn(ierr);
+}
+
+PetscErrorCode SbTrianglesRead_STL(const char *path, SbTriangleFile *f)
+{
+  return with_file(path, stl_file, f);
+}
+
+PetscErrorCode SbTrianglesRead_OBJ(const char *path, SbTriangleFile *f)
+{
+  return with_file(path, obj_file, f);
+}
+
+PetscErrorCode SbTrianglesRead_OFF(const char *path, SbTriangleFile *f)
+{
+  return with_file(path, off_file, f);
+}

@@ -1,0 +1,246 @@
+// Surfaces from files: each kind gives the same cube on every rank; what has no inside is refused with its triangle.
+// @ranks 1 3
+#include "mesh_test.h"
+#include "surface_files.h"
+
+static const PetscReal zero[3] = {0, 0, 0}, unit[3] = {1, 1, 1};
+
+static void cube(PetscBool inwards, TestSurface *s)
+{
+  memset(s, 0, sizeof(*s));
+  test_surface_box(zero, unit, inwards, s);
+}
+
+/* Neighbours know each other, and share the edge the other way round. */
+static void check_across(const SbTriangles *t)
+{
+  PetscInt bad = 0;
+
+  for (PetscInt i = 0; i < 3 * t->ntri; i++) {
+    const PetscInt a = t->tri[i], b = t->tri[i % 3 == 2 ? i - 2 : i + 1], g = t->across[i];
+    PetscBool found = PETSC_FALSE;
+
+    for (int k = 0; k < 3; k++) {
+      if (t->tri[3 * g + k] == b && t->tri[3 * g + (k + 1) % 3] == a)
+        found = (PetscBool)(t->across[3 * g + k] == i / 3);
+    }
+    bad += !found;
+  }
+  SB_CHECK(!bad, "%d edges without their neighbour", (int)bad);
+}
+
+static PetscErrorCode check_cube(const char *extension, PetscBool binary, PetscBool inwards)
+{
+  const PetscReal at[3] = {5, 6, 7};
+  TestSurface s;
+  SbTriangles t;
+  char path[512];
+
+  PetscFunctionBeginUser;
+  cube(inwards, &s);
+  PetscCall(test_file_write(extension, binary, &s, NULL, path));
+  PetscCall(SbTrianglesRead(PETSC_COMM_WORLD, "-o", path, 2, at, &t));
+  SB_CHECK(t.nvert == 8 && t.ntri == 12, "%s: %d vertices, %d triangles", extension, (int)t.nvert,
+           (int)t.ntri);
+  SB_CHECK_NEAR(t.volume, 8, 1e-14, extension);
+  SB_CHECK_NEAR(t.edge, 2 * (2 + PETSC_SQRT2) / 3, 1e-14, "mean edge");
+  SB_CHECK(t.turned == inwards, "%s: turned %d", extension, (int)t.turned);
+  for (PetscInt i = 0; i < 3 * t.nvert; i++)
+    SB_CHECK(t.x[i] == at[i % 3] || t.x[i] == at[i % 3] + 2, "%s: coordinate %g", extension, (double)t.x[i]);
+  check_across(&t);
+  PetscCall(SbTrianglesDestroy(&t));
+  PetscCall(test_file_remove(path));
+  test_surface_free(&s);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The surface of a mesh of tets: two unit cubes side by side, the triangles between them do not count. */
+static PetscErrorCode check_tets(void)
+{
+  SbTriangles t;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbTrianglesRead(PETSC_COMM_WORLD, "-o", "tests/data/two_cubes_41_bin.msh", 1, zero, &t));
+  SB_CHECK(t.ntri == 40, "%d triangles", (int)t.ntri);
+  SB_CHECK_NEAR(t.volume, 2, 1e-14, "two cubes");
+  check_across(&t);
+  PetscCall(SbTrianglesDestroy(&t));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Faces with four corners; a cavity; two parts side by side. */
+static PetscErrorCode check_more(void)
+{
+  const PetscReal lo[3] = {0.25, 0.25, 0.25}, hi[3] = {0.75, 0.75, 0.75}, far[3] = {3, 3, 3},
+                  out[3] = {4, 4, 4};
+  TestSurface s;
+  SbTriangles t;
+  char path[512];
+
+  PetscFunctionBeginUser;
+  PetscCall(test_file_write(".off", PETSC_FALSE, NULL,
+                            "OFF 8 6 12\n0 0 0\n1 0 0\n0 1 0\n1 1 0\n0 0 1\n1 0 1\n0 1 1\n1 1 1\n"
+                            "4 0 4 6 2\n4 1 3 7 5\n4 0 1 5 4\n4 2 6 7 3\n4 0 2 3 1\n4 4 5 7 6\n",
+                            path));
+  PetscCall(SbTrianglesRead(PETSC_COMM_WORLD, "-o", path, 1, zero, &t));
+  SB_CHECK(t.ntri == 12, "%d triangles of six squares", (int)t.ntri);
+  SB_CHECK_NEAR(t.volume, 1, 1e-14, "squares");
+  PetscCall(SbTrianglesDestroy(&t));
+  PetscCall(test_file_remove(path));
+  cube(PETSC_FALSE, &s);
+  test_surface_box(lo, hi, PETSC_TRUE, &s);
+  test_surface_box(far, out, PETSC_FALSE, &s);
+  PetscCall(test_file_write(".obj", PETSC_FALSE, &s, NULL, path));
+  PetscCall(SbTrianglesRead(PETSC_COMM_WORLD, "-o", path, 1, zero, &t));
+  SB_CHECK_NEAR(t.volume, 2 - 0.125, 1e-14, "a hollow cube and another one");
+  SB_CHECK(!t.turned, "nothing to turn");
+  PetscCall(SbTrianglesDestroy(&t));
+  PetscCall(test_file_remove(path));
+  test_surface_free(&s);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ errors */
+
+static PetscErrorCode refuse_file(const char *path, PetscErrorCode code, const char *words)
+{
+  SbTriangles t;
+
+  PetscFunctionBeginUser;
+  TEST_MESSAGE(SbTrianglesRead(PETSC_COMM_WORLD, "-effect_tool_obstacle", path, 1, zero, &t), code, words);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode refuse_text(const char *extension, const char *text, const char *words)
+{
+  char path[512];
+
+  PetscFunctionBeginUser;
+  PetscCall(test_file_write(extension, PETSC_FALSE, NULL, text, path));
+  PetscCall(refuse_file(path, PETSC_ERR_FILE_UNEXPECTED, words));
+  PetscCall(test_file_remove(path));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode refuse(TestSurface *s, const char *words)
+{
+  char path[512];
+
+  PetscFunctionBeginUser;
+  PetscCall(test_file_write(".off", PETSC_FALSE, s, NULL, path));
+  PetscCall(refuse_file(path, PETSC_ERR_USER_INPUT, words));
+  PetscCall(test_file_remove(path));
+  test_surface_free(s);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode check_surfaces(void)
+{
+  const PetscReal lo[3] = {0.25, 0.25, 0.25}, hi[3] = {0.75, 0.75, 0.75}, beside[3] = {1, 0, 0},
+                  end[3] = {2, 2, 1};
+  TestSurface s;
+
+  PetscFunctionBeginUser;
+  cube(PETSC_FALSE, &s); /* a hole */
+  s.ntri = 11;
+  PetscCall(refuse(&s, "the surface is open: triangle "));
+  cube(PETSC_FALSE, &s); /* one triangle turned */
+  s.tri[4][0] = s.tri[4][1];
+  s.tri[4][1] = 0;
+  PetscCall(refuse(&s, "are turned to opposite sides; orient the surface"));
+  cube(PETSC_FALSE, &s); /* given twice */
+  test_surface_grow(&s, 0, 1);
+  for (int k = 0; k < 3; k++) s.tri[12][k] = s.tri[3][k];
+  s.ntri = 13;
+  PetscCall(refuse(&s, "triangles 4 and 13 have the same corners; remove one"));
+  cube(PETSC_FALSE, &s); /* a corner twice */
+  s.tri[6][1] = s.tri[6][0];
+  PetscCall(refuse(&s, "triangle 7 at ("));
+  cube(PETSC_FALSE, &s); /* two cubes with a common edge */
+  test_surface_box((PetscReal[3]){1, 1, 0}, end, PETSC_FALSE, &s);
+  for (int i = 36; i < 72; i++) {
+    PetscInt *v = &s.tri[i / 3][i % 3];
+
+    if (*v == 8) *v = 3;
+    if (*v == 12) *v = 7;
+  }
+  PetscCall(refuse(&s, "4 triangles meet at the edge from (1, 1, "));
+  cube(PETSC_FALSE, &s); /* two cubes, each with its own side where they touch */
+  test_surface_box(beside, end, PETSC_FALSE, &s);
+  for (int i = 36; i < 72; i++) {
+    PetscInt *v = &s.tri[i / 3][i % 3];
+
+    if ((*v - 8) % 2 == 0) *v = *v - 8 + 1;
+  }
+  PetscCall(refuse(&s, "have the same corners; remove one"));
+  cube(PETSC_FALSE, &s); /* a solid within a solid */
+  test_surface_box(lo, hi, PETSC_FALSE, &s);
+  PetscCall(refuse(&s, "the part with triangle 13 is turned outwards and lies in another part"));
+  cube(PETSC_FALSE, &s); /* a cavity of nothing */
+  test_surface_box((PetscReal[3]){3, 3, 3}, (PetscReal[3]){3.5, 3.5, 3.5}, PETSC_TRUE, &s);
+  PetscCall(refuse(&s, "the part with triangle 13 is turned inwards and lies in no other part; turn it"));
+  cube(PETSC_FALSE, &s); /* flat */
+  for (int v = 0; v < 8; v++) s.x[v][2] = 0;
+  PetscCall(refuse(&s, "has no area"));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode check_files(void)
+{
+  TestSurface s;
+  char path[512];
+
+  PetscFunctionBeginUser;
+  PetscCall(refuse_file("no/such/file.stl", PETSC_ERR_FILE_OPEN, "no/such/file.stl: cannot open the file"));
+  PetscCall(
+    refuse_file("Makefile", PETSC_ERR_USER_INPUT,
+                "Makefile: is a file of no known kind; give one that ends in .stl, .obj, .off or .msh"));
+  PetscCall(refuse_text(".stl", "hello\n", "line 1: expected 'solid'"));
+  PetscCall(refuse_text(".stl", "solid a\nfacet normal 0 0 1\nouter loop\nvertex 1 2\nvertex",
+                        "line 5: expected the coordinate of a vertex, found 'vertex'"));
+  PetscCall(refuse_text(".stl", "solid a\nfacet normal 0 0 1\nouter loop\nvertex 1 2 3\n",
+                        "the file ends where 'vertex' is expected; it is truncated"));
+  PetscCall(refuse_text(".stl", "solid a\n", "the file ends where 'endsolid' is expected"));
+  PetscCall(refuse_text(".stl", "solid a\nendsolid a\n", "holds no triangles"));
+  PetscCall(refuse_text(".stl", "solid a\nfacet normal 0 0 1\nouter loop\nvertex 1 2 inf\n",
+                        "line 4: the coordinate is not a finite number"));
+  PetscCall(refuse_text(".obj", "v 0 0 0\nv 1 0 0\nf 1 2 3\n",
+                        "line 3: face 1 uses a vertex that is not there (3 of 2)"));
+  PetscCall(refuse_text(".obj", "v 0 0 0\nv 1 0 0\nf 1 2\n", "line 3: face 1 has 2 corners; it needs three"));
+  PetscCall(refuse_text(".obj", "v 0 0 0\nf 1 x 2\n", "line 2: expected the number of a vertex"));
+  PetscCall(
+    refuse_text(".obj", "v 0 0\nf 1 2 3\n", "line 2: expected the coordinate of a vertex, found 'f'"));
+  PetscCall(refuse_text(".off", "COFF\n1 1 1\n", "line 1: expected 'OFF', found 'COFF'"));
+  PetscCall(refuse_text(".off", "OFF\n9999999 3 0\n", "9999999 vertices are announced"));
+  PetscCall(refuse_text(".off", "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1\n",
+                        "the file ends where the vertex of a face"));
+  PetscCall(refuse_text(".off", "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n2 0 1\n", "line 6: face 1 has 2 corners"));
+  PetscCall(refuse_text(".msh", "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n1\n1 0 0 0\n$EndNodes\n",
+                        "holds no tetrahedra"));
+  /* a binary file that lost its end is taken for text, and is none */
+  cube(PETSC_FALSE, &s);
+  s.ntri = 11;
+  PetscCall(test_file_write(".stl", PETSC_TRUE, &s, "lost", path));
+  PetscCall(
+    refuse_file(path, PETSC_ERR_FILE_UNEXPECTED, "expected 'solid', and the size of the file is not that"));
+  PetscCall(test_file_remove(path));
+  test_surface_free(&s);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+int main(int argc, char **argv)
+{
+  static const char *const kinds[] = {".stl", ".obj", ".off", ".msh"};
+
+  SB_TEST_BEGIN(argc, argv);
+  for (int k = 0; k < 4; k++) {
+    PetscCall(check_cube(kinds[k], PETSC_FALSE, PETSC_FALSE));
+    PetscCall(check_cube(kinds[k], PETSC_FALSE, PETSC_TRUE));
+  }
+  PetscCall(check_cube(".stl", PETSC_TRUE, PETSC_FALSE));
+  PetscCall(check_tets());
+  PetscCall(check_more());
+  PetscCall(check_surfaces());
+  PetscCall(check_files());
+  SB_TEST_END();
+}
