@@ -47,11 +47,13 @@ struct _p_SbEffect {
   char name[SB_NAME_MAX];
   char type[SB_NAME_MAX];
   SbEffectOps ops;
-  PetscBool linear; /* force does not depend on u: the tangent stays constant. Default PETSC_TRUE */
-  PetscBool steady; /* no formula uses t: a static run multiplies the effect by the load factor */
+  PetscBool linear;  /* force does not depend on u: the tangent stays constant. Default PETSC_TRUE */
+  PetscBool steady;  /* no formula uses t: a static run multiplies the effect by the load factor */
+  PetscBool dynamic; /* the run has inertia; known from set-up on */
   const struct SbEffectOn_ *held; /* the sets whose nodes it prescribes in all directions; NULL: none */
   PetscInt ncolumn;               /* history columns */
   const char *column[8];          /* "force_x", ...; written as <name>_<column> */
+  char note[256];                 /* what set-up has to say in the run's report; "": nothing */
   void *data;
 };
 

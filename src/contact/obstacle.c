@@ -3,14 +3,19 @@
 
   Each shape is a core with a radius: distance = |x - nearest point of the core| - r, the core being a point (sphere), a segment
   (capsule), a solid box or a solid cylinder (r = 0; inside them the nearest side counts). A bowl is a sphere inside out.
+  What a closed mesh encloses is in shell.c.
 */
 #include "sbcontact.h"
+#include "shell.h"
 
-typedef enum { PLANE, SPHERE, BOX, CAPSULE, CYLINDER, BOWL } Shape;
+typedef enum { PLANE, SPHERE, BOX, CAPSULE, CYLINDER, BOWL, MESH } Shape;
 
 struct _p_SbObstacle {
   Shape shape;
   PetscReal p[7];
+  char *file;     /* mesh: its path */
+  PetscReal cell; /* mesh: of the grid, m; 0: chosen */
+  SbShell shell;  /* mesh: after SbObstacleSetUp() */
 };
 
 static const struct {
@@ -23,6 +28,7 @@ static const struct {
   {"capsule", "capsule:x0,y0,z0,x1,y1,z1,r", 7},
   {"cylinder", "cylinder:x0,y0,z0,x1,y1,z1,r", 7},
   {"bowl", "bowl:x,y,z,r", 4},
+  {"mesh", "mesh:FILE[,cell]", 0},
 };
 
 /* Numbers with commas; how many there are, -1 when the text is something else or holds more than `most`. */
@@ -69,6 +75,26 @@ static const char *normalise(SbObstacle o)
   }
 }
 
+/* FILE, or FILE,cell when what follows the last comma is a number. */
+static PetscErrorCode read_mesh(const char *option, const char *text, SbObstacle o)
+{
+  const char *from = text + 5;
+  char *comma;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscStrallocpy(from, &o->file));
+  comma = strrchr(o->file, ',');
+  if (comma && read_numbers(comma + 1, 1, &o->cell) == 1) {
+    *comma = 0;
+    PetscCheck(o->cell > 0, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT, "%s %s: the cell must be positive, in m",
+               option, text);
+  } else
+    o->cell = 0;
+  PetscCheck(o->file[0], PETSC_COMM_SELF, PETSC_ERR_USER_INPUT, "%s %s: write mesh:FILE[,cell], lengths in m",
+             option, text);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode SbObstacleCreate(const char *option, const char *text, SbObstacle *obstacle)
 {
   const char *colon = strchr(text, ':'), *problem;
@@ -81,11 +107,16 @@ PetscErrorCode SbObstacleCreate(const char *option, const char *text, SbObstacle
           strncmp(shapes[k].name, text, (size_t)(colon - text))))
     k++;
   PetscCheck(k < PETSC_STATIC_ARRAY_LENGTH(shapes), PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
-             "%s %s: write one of plane:..., sphere:..., box:..., capsule:..., cylinder:..., bowl:...",
+             "%s %s: write one of plane:..., sphere:..., box:..., capsule:..., cylinder:..., bowl:..., "
+             "mesh:FILE",
              option, text);
   PetscCall(PetscNew(&o));
   *obstacle = o;
   o->shape = (Shape)k;
+  if (o->shape == MESH) {
+    PetscCall(read_mesh(option, text, o));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
   PetscCheck(read_numbers(colon + 1, 7, o->p) == shapes[k].numbers, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
              "%s %s: write %s, lengths in m", option, text, shapes[k].form);
   problem = normalise(o);
@@ -93,9 +124,42 @@ PetscErrorCode SbObstacleCreate(const char *option, const char *text, SbObstacle
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscBool SbObstacleIsMesh(SbObstacle o)
+{
+  return (PetscBool)(o->shape == MESH);
+}
+
+PetscErrorCode SbObstacleSetUp(SbObstacle o, MPI_Comm comm, const char *option, PetscReal scale,
+                               const PetscReal at[3], size_t size, char note[])
+{
+  SbTriangles t;
+  PetscInt n[3], ntri;
+  PetscInt64 bytes;
+  PetscReal cell, volume;
+  PetscBool turned;
+
+  PetscFunctionBeginUser;
+  if (o->shape != MESH) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(SbTrianglesRead(comm, option, o->file, scale, at, &t));
+  volume = t.volume;
+  turned = t.turned;
+  PetscCall(SbShellCreate(option, &t, o->cell, &o->shell));
+  SbShellSize(o->shell, n, &cell, &bytes, &ntri);
+  (void)snprintf(note, size,
+                 "%s: %" PetscInt_FMT " triangles around %.4g m^3%s, grid of %" PetscInt_FMT
+                 " x %" PetscInt_FMT " x %" PetscInt_FMT " cells of %.3g m, %.3g MB on every rank",
+                 o->file, ntri, (double)volume, turned ? " (turned: they were inside out)" : "", n[0], n[1],
+                 n[2], (double)cell, 1e-6 * (double)bytes);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode SbObstacleDestroy(SbObstacle *obstacle)
 {
   PetscFunctionBeginUser;
+  if (*obstacle) {
+    PetscCall(PetscFree((*obstacle)->file));
+    PetscCall(SbShellDestroy(&(*obstacle)->shell));
+  }
   PetscCall(PetscFree(*obstacle));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -202,6 +266,8 @@ PetscReal SbObstacleDistance(SbObstacle o, const PetscReal x[3], PetscReal n[3])
     return from_box(p, x, n);
   case CAPSULE:
     return from_capsule(p, x, n);
+  case MESH:
+    return SbShellDistance(o->shell, x, n);
   default:
     return from_cylinder(p, x, n);
   }

@@ -15,53 +15,26 @@
   Friction: a tangential spring of stiffness k to the place where the node began to stick, which lets go at mu N and slides at
   mu_k N (the elastic slip and return mapping of Wriggers 2006). During a solve N is that of the solve before, so the force has a
   potential and a symmetric tangent; solves are repeated until N has settled (the fixed point of Necas, Jarusek and Haslinger 1980).
+
+  Overlap that is there when a step begins is not thrown out at once: a node may stay behind the obstacle by that depth, which falls to
+  1/e in `recovery` steps. With springs that is the depth beyond what they give. A static run closes it at once.
 */
-#include "sbcontact.h"
-#include "sbeffect.h"
+#include "contact.h"
 
-#define TOGGLES 3      /* how often a node may come within a step before it stays */
-#define PULLING 1e-6   /* of the largest contact force: what a node must pull with to leave */
-#define SETTLED 1e-3   /* of the largest contact force: change of the N that friction assumed */
-#define UPDATES 8      /* of that N within a step */
-#define TOLERANCE 1e-7 /* of the size of the bodies: largest penetration that counts as touching */
-
-typedef enum { PROJECTED, AUGMENTED, PENALTY } Response;
-
-/* A node of the surface that this rank owns. */
-typedef struct {
-  PetscInt node, cell, a; /* local node, a cell that has it, as its node a */
-  PetscReal k;            /* stiffness of the springs, N/m */
-  PetscBool on;           /* it touches; with springs: it did at the end of the last step */
-  int toggles;            /* how often it came within the step */
-  PetscBool slips;        /* it slid at the end of the last step */
-  PetscInt along;         /* number of its direction at the node, -1: held by something else */
-  PetscReal n[3];         /* normal at the last look, outwards from the obstacle */
-  PetscReal value;        /* n . u that puts it on the obstacle, m */
-  PetscReal gap;          /* after the last solve, m */
-  PetscReal lambda;       /* multiplier of the last solve, N */
-  PetscReal pressing;     /* N that friction assumes, N */
-  PetscReal anchor[3];    /* where it began to stick, in the obstacle's rest frame */
-} Touch;
-
-typedef struct {
-  SbEffectOn on;
-  SbObstacle obstacle;
-  Response response;
-  PetscReal mu, mu_kinetic, stiffness;
-  SbFormula displacement[3], angle;
-  PetscReal axis[3], point[3];
-  PetscInt n;
-  Touch *touch;   /* [n] */
-  PetscReal size; /* of the bodies, m */
-  int updates;    /* of the N of friction within the step */
-  SbPose to;      /* at the end of the step */
-} Contact;
+#define TOGGLES 3    /* how often a node may come within a step before it stays */
+#define PULLING 1e-6 /* of the largest contact force: what a node must pull with to leave */
+#define SETTLED 1e-3 /* of the largest contact force: change of the N that friction assumed */
+#define UPDATES 8    /* of that N within a step */
 
 static const SbOption rows[] = {
   {"on", SB_OPTION_NAMES, 1, "", "boundary", "", "sets whose surface may touch"},
   {"obstacle", SB_OPTION_STRING, 1, "", NULL, "",
    "rigid obstacle (m): plane:nx,ny,nz,d (n.x <= d is solid), sphere:x,y,z,r, box:x0,y0,z0,x1,y1,z1, "
-   "capsule:x0,y0,z0,x1,y1,z1,r, cylinder:x0,y0,z0,x1,y1,z1,r, bowl:x,y,z,r (solid outside the sphere)"},
+   "capsule:x0,y0,z0,x1,y1,z1,r, cylinder:x0,y0,z0,x1,y1,z1,r, bowl:x,y,z,r (solid outside the sphere), "
+   "mesh:FILE[,cell] (what a closed surface encloses: .stl, .obj, .off, .msh; cell: of its grid)"},
+  {"obstacle_scale", SB_OPTION_REAL, 1, "", "1", "(0, inf)",
+   "mesh: factor on the coordinates of the file; 0.001 for a file in mm"},
+  {"obstacle_at", SB_OPTION_REALS, 3, "m", "0,0,0", "(-inf, inf)", "mesh: shift of the scaled mesh"},
   {"response", SB_OPTION_CHOICE, 1, "", "projected", "projected|augmented|penalty",
    "hold touching nodes on the obstacle; multipliers raised on springs; springs"},
   {"friction", SB_OPTION_REAL, 1, "", "0", "[0, inf)", "Coulomb's coefficient for sticking"},
@@ -69,6 +42,9 @@ static const SbOption rows[] = {
    "Coulomb's coefficient for slipping; negative: that for sticking"},
   {"stiffness", SB_OPTION_REAL, 1, "", "20", "(0, inf)",
    "springs of penalty and augmented: factor on (lambda + 2 mu) area / height of the cell behind"},
+  {"recovery", SB_OPTION_REAL, 1, "steps", "30", "[1, inf)",
+   "nodes that are behind the obstacle before they meet it are brought out slowly: to 1/e of the depth in so "
+   "many steps; 1, and in static runs: at once"},
   {"displacement", SB_OPTION_FORMULA, 3, "m", "0;0;0", "",
    "path of the obstacle, three formulas of the time t"},
   {"angle", SB_OPTION_FORMULA, 1, "degree", "0", "",
@@ -95,17 +71,29 @@ static PetscErrorCode read_path(SbEffect e, const SbScope *scope)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode options_contact(SbEffect e, const SbScope *scope)
+static PetscErrorCode read_obstacle(SbEffect e, const SbScope *scope)
 {
   Contact *c = (Contact *)e->data;
   char option[3 * SB_NAME_MAX], text[PETSC_MAX_PATH_LEN];
+
+  PetscFunctionBeginUser;
+  PetscCall(SbOptionName(scope, "obstacle", sizeof(option), option));
+  PetscCall(SbOptionString(scope, "obstacle", sizeof(text), text));
+  PetscCall(SbObstacleCreate(option, text, &c->obstacle));
+  if (!SbObstacleIsMesh(c->obstacle)) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(SbOptionReal(scope, "obstacle_scale", &c->scale));
+  PetscCall(SbOptionReals(scope, "obstacle_at", c->at));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode options_contact(SbEffect e, const SbScope *scope)
+{
+  Contact *c = (Contact *)e->data;
   PetscInt choice;
 
   PetscFunctionBeginUser;
   PetscCall(SbEffectReadOn(scope, &c->on));
-  PetscCall(SbOptionName(scope, "obstacle", sizeof(option), option));
-  PetscCall(SbOptionString(scope, "obstacle", sizeof(text), text));
-  PetscCall(SbObstacleCreate(option, text, &c->obstacle));
+  PetscCall(read_obstacle(e, scope));
   PetscCall(SbOptionChoice(scope, "response", &choice));
   c->response = (Response)choice;
   PetscCall(SbOptionReal(scope, "friction", &c->mu));
@@ -116,6 +104,8 @@ static PetscErrorCode options_contact(SbEffect e, const SbScope *scope)
              "go at once",
              e->name, (double)c->mu_kinetic, e->name, (double)c->mu);
   PetscCall(SbOptionReal(scope, "stiffness", &c->stiffness));
+  PetscCall(SbOptionReal(scope, "recovery", &c->recovery));
+  c->recovery = c->recovery > 1 ? PetscExpReal(-1 / c->recovery) : 0;
   PetscCall(read_path(e, scope));
   if (c->response == PROJECTED) {
     if (c->mu <= 0) e->ops.tangent = NULL;
@@ -149,10 +139,14 @@ static PetscErrorCode setup_contact(SbEffect e, SbSpace space)
 {
   Contact *c = (Contact *)e->data;
   PetscReal box[6] = {0};
+  char option[3 * SB_NAME_MAX];
   SbFacet *facet;
   PetscInt n, *slot;
 
   PetscFunctionBeginUser;
+  (void)snprintf(option, sizeof(option), "-effect_%s_obstacle", e->name);
+  PetscCall(SbObstacleSetUp(c->obstacle, space->comm, option, c->scale, c->at, sizeof(e->note), e->note));
+  if (!e->dynamic) c->recovery = 0;
   PetscCall(SbEffectFacets(space, &c->on, &n, &facet));
   PetscCall(PetscMalloc1(3 * n, &c->touch));
   PetscCall(PetscMalloc1(space->nnode, &slot));
@@ -181,51 +175,27 @@ static PetscErrorCode setup_contact(SbEffect e, SbSpace space)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* ------------------------------------------------------------------ geometry */
+/* ------------------------------------------------------------------ who touches */
 
-static void pose_at(const Contact *c, PetscReal t, SbPose *pose)
-{
-  PetscReal d[3];
-
-  for (int i = 0; i < 3; i++) d[i] = SbFormulaEval(c->displacement[i], t, NULL);
-  SbPoseSet(c->axis, SbFormulaEval(c->angle, t, NULL) * PETSC_PI / 180, c->point, d, pose);
-}
-
-static inline void place(SbSpace space, PetscInt node, const PetscReal u[], PetscReal x[3])
-{
-  for (int i = 0; i < 3; i++) x[i] = space->node_x[3 * node + i] + u[3 * node + i];
-}
-
-/* Gap of a point, m, and the normal there. */
-static PetscReal gap_of(const Contact *c, const SbPose *pose, const PetscReal x[3], PetscReal n[3])
-{
-  PetscReal X[3], N[3], gap;
-
-  SbPoseInvert(pose, x, X);
-  gap = SbObstacleDistance(c->obstacle, X, N);
-  for (int i = 0; i < 3; i++) n[i] = SbDot3(pose->R + 3 * i, N);
-  return gap;
-}
-
-/* Gap of the node at x, with its normal and the value of n . u that closes it. */
+/* Gap of the node at x beyond what it is held at, with its normal and the value of n . u that puts it there. */
 static PetscReal look(const Contact *c, SbSpace space, const PetscReal x[3], Touch *touch)
 {
-  const PetscReal gap = gap_of(c, &c->to, x, touch->n);
+  const PetscReal gap = SbContactGap(c, &c->to, x, touch->n);
 
-  touch->value = SbDot3(touch->n, x) - gap - SbDot3(touch->n, space->node_x + 3 * touch->node);
-  return gap;
+  touch->value = SbDot3(touch->n, x) - gap + touch->rest - SbDot3(touch->n, space->node_x + 3 * touch->node);
+  return gap - touch->rest;
 }
 
-/* v less its part along n; returns the length of what is left. */
-static PetscReal tangential(const PetscReal n[3], const PetscReal v[3], PetscReal t[3])
+/* Gap that a node is held at which was at x0 when the step began. */
+static PetscReal rest_of(const Contact *c, const SbPose *from, const Touch *touch, const PetscReal x0[3])
 {
-  const PetscReal along = SbDot3(n, v);
+  PetscReal n[3];
+  /* what touches springs is behind by what they give; projected it is where it was held */
+  const PetscReal depth =
+    touch->on && c->response != PROJECTED ? -touch->kept : -SbContactGap(c, from, x0, n);
 
-  for (int i = 0; i < 3; i++) t[i] = v[i] - along * n[i];
-  return PetscSqrtReal(SbDot3(t, t));
+  return depth > TOLERANCE * c->size ? -c->recovery * depth : 0;
 }
-
-/* ------------------------------------------------------------------ who touches */
 
 static PetscErrorCode touch_contact(SbEffect e, SbSpace space, PetscReal t, PetscReal dt,
                                     const PetscReal u0[], const PetscReal u[])
@@ -234,8 +204,8 @@ static PetscErrorCode touch_contact(SbEffect e, SbSpace space, PetscReal t, Pets
   SbPose from;
 
   PetscFunctionBeginUser;
-  pose_at(c, t, &from);
-  pose_at(c, t + dt, &c->to);
+  SbContactPose(c, t, &from);
+  SbContactPose(c, t + dt, &c->to);
   c->updates = 0;
   for (PetscInt i = 0; i < c->n; i++) {
     Touch *touch = &c->touch[i];
@@ -244,6 +214,7 @@ static PetscErrorCode touch_contact(SbEffect e, SbSpace space, PetscReal t, Pets
     touch->toggles = 0;
     place(space, touch->node, u, x);
     place(space, touch->node, u0, x0);
+    touch->rest = rest_of(c, &from, touch, x0);
     if (!touch->on) { /* a node that arrives in this step sticks to where it was at its start */
       SbPoseInvert(&from, x0, touch->anchor);
       touch->pressing = 0;
@@ -265,12 +236,6 @@ static PetscErrorCode hold_contact(SbEffect e, SbSpace space)
     touch->along = touch->on ? SbSpaceHold(space, touch->node, touch->n, touch->value) : -1;
   }
   PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Normal force of the springs, N. */
-static inline PetscReal spring(const Touch *touch, PetscReal gap)
-{
-  return PetscMax(0, touch->lambda - touch->k * gap);
 }
 
 /* Gap and multiplier of every node after a solve; the largest multiplier of all ranks. */
@@ -366,193 +331,6 @@ static PetscErrorCode settle_contact(SbEffect e, SbSpace space, const PetscReal 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* ------------------------------------------------------------------ forces */
-
-/* Normal force on a node at x, N; n: the normal there. */
-static PetscReal normal_force(const Contact *c, const SbPose *pose, const Touch *touch, const PetscReal x[3],
-                              PetscReal n[3])
-{
-  const PetscReal gap = gap_of(c, pose, x, n);
-
-  if (c->response == PROJECTED) return touch->on && touch->along >= 0 ? touch->lambda : 0;
-  return spring(touch, gap);
-}
-
-/* Force of friction on a node, N. Returns its share of what the spring alone would pull with: 1 while it sticks. */
-static PetscReal drag(const Contact *c, const SbPose *pose, const Touch *touch, const PetscReal x[3],
-                      const PetscReal n[3], PetscReal f[3])
-{
-  const PetscReal most = (touch->slips ? c->mu_kinetic : c->mu) * touch->pressing;
-  PetscReal target[3], trial[3], length, share = 1;
-
-  SbPoseApply(pose, touch->anchor, target);
-  for (int i = 0; i < 3; i++) trial[i] = -touch->k * (x[i] - target[i]);
-  length = tangential(n, trial, f);
-  if (length > most) share = most / length;
-  for (int i = 0; i < 3; i++) f[i] *= share;
-  return share;
-}
-
-static PetscErrorCode force_contact(SbEffect e, SbSpace space, const SbStage *stage, PetscReal f[])
-{
-  const Contact *c = (const Contact *)e->data;
-  SbPose pose;
-
-  PetscFunctionBeginUser;
-  pose_at(c, stage->t, &pose);
-  for (PetscInt i = 0; i < c->n; i++) {
-    const Touch *touch = &c->touch[i];
-    PetscReal *fi = f + 3 * touch->node, x[3], n[3], t[3];
-
-    place(space, touch->node, stage->u, x);
-    if (c->response != PROJECTED) {
-      const PetscReal normal = normal_force(c, &pose, touch, x, n);
-
-      for (int k = 0; k < 3; k++) fi[k] += normal * n[k];
-    } else
-      (void)gap_of(c, &pose, x, n);
-    if (touch->pressing <= 0) continue;
-    (void)drag(c, &pose, touch, x, n, t);
-    for (int k = 0; k < 3; k++) fi[k] += t[k];
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Minus the derivative of a node's force at x, N/m; the turning of the normal is left out. False when there is none. */
-static PetscBool stiffness_of(const Contact *c, const SbPose *pose, const Touch *touch, const PetscReal x[3],
-                              PetscReal block[9])
-{
-  PetscReal n[3], t[3], along, across = 0, length, sliding = 0;
-
-  along = normal_force(c, pose, touch, x, n) > 0 && c->response != PROJECTED ? touch->k : 0;
-  if (touch->pressing > 0) {
-    const PetscReal share = drag(c, pose, touch, x, n, t);
-
-    across = touch->k * share;
-    length = SbDot3(t, t);
-    if (share < 1 && length > 0) sliding = across / length; /* along the slip the force does not change */
-  }
-  for (int k = 0; k < 9; k++) {
-    const PetscReal nn = n[k / 3] * n[k % 3];
-
-    block[k] = along * nn + across * ((k % 4 == 0) - nn);
-    if (sliding > 0) block[k] -= sliding * t[k / 3] * t[k % 3];
-  }
-  return (PetscBool)(along > 0 || across > 0);
-}
-
-static PetscErrorCode tangent_contact(SbEffect e, SbSpace space, const SbStage *stage, Mat A)
-{
-  const Contact *c = (const Contact *)e->data;
-  SbPose pose;
-
-  PetscFunctionBeginUser;
-  pose_at(c, stage->t, &pose);
-  for (PetscInt i = 0; i < c->n; i++) {
-    const Touch *touch = &c->touch[i];
-    PetscReal x[3], block[9];
-
-    place(space, touch->node, stage->u, x);
-    if (!stiffness_of(c, &pose, touch, x, block)) continue;
-    for (int k = 0; k < 9; k++) block[k] *= stage->shift_k;
-    PetscCall(SbSpaceAddSpring(space, A, touch->cell, touch->a, block));
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* ------------------------------------------------------------------ after a step */
-
-/* Who slid takes the anchor along, at the distance that the force asks for. */
-static PetscErrorCode accept_contact(SbEffect e, SbSpace space, const SbStage *stage)
-{
-  Contact *c = (Contact *)e->data;
-  SbPose pose;
-
-  PetscFunctionBeginUser;
-  pose_at(c, stage->t, &pose);
-  for (PetscInt i = 0; i < c->n; i++) {
-    Touch *touch = &c->touch[i];
-    PetscReal x[3], n[3], t[3], normal;
-
-    place(space, touch->node, stage->u, x);
-    normal = normal_force(c, &pose, touch, x, n);
-    if (c->response != PROJECTED) touch->on = (PetscBool)(normal > 0);
-    if (touch->pressing <= 0) continue;
-    touch->slips = (PetscBool)(drag(c, &pose, touch, x, n, t) < 1);
-    if (!touch->slips) continue;
-    for (int k = 0; k < 3; k++) x[k] += t[k] / touch->k;
-    SbPoseInvert(&pose, x, touch->anchor);
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Force of the obstacle on a node at x, N. */
-static void force_on(const Contact *c, const SbPose *pose, SbSpace space, const Touch *touch,
-                     const PetscReal x[3], const PetscReal residual[], PetscReal f[3])
-{
-  PetscReal n[3], normal = normal_force(c, pose, touch, x, n);
-
-  f[0] = f[1] = f[2] = 0;
-  if (normal <= 0) return;
-  if (touch->pressing > 0) (void)drag(c, pose, touch, x, n, f);
-  if (c->response == PROJECTED)
-    normal = SbSpaceHoldForce(space, touch->node, touch->along, residual + 3 * touch->node);
-  for (int k = 0; k < 3; k++) f[k] += normal * n[k];
-}
-
-static PetscErrorCode push_contact(SbEffect e, SbSpace space, const SbStage *stage,
-                                   const PetscReal residual[], PetscReal f[])
-{
-  const Contact *c = (const Contact *)e->data;
-  SbPose pose;
-
-  PetscFunctionBeginUser;
-  pose_at(c, stage->t, &pose);
-  for (PetscInt i = 0; i < c->n; i++) {
-    PetscReal x[3], force[3];
-
-    place(space, c->touch[i].node, stage->u, x);
-    force_on(c, &pose, space, &c->touch[i], x, residual, force);
-    for (int k = 0; k < 3; k++) f[3 * c->touch[i].node + k] += force[k];
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Force and torque of the obstacle on the bodies, touching nodes, deepest penetration. */
-static PetscErrorCode history_contact(SbEffect e, SbSpace space, const SbStage *stage,
-                                      const PetscReal residual[], PetscReal values[])
-{
-  Contact *c = (Contact *)e->data;
-  PetscReal deepest[2] = {0, 0};
-  PetscMPIInt rank;
-  SbPose pose;
-
-  PetscFunctionBeginUser;
-  pose_at(c, stage->t, &pose);
-  for (int k = 0; k < 8; k++) values[k] = 0;
-  for (PetscInt i = 0; i < c->n; i++) {
-    const Touch *touch = &c->touch[i];
-    PetscReal x[3], n[3], f[3], arm[3], moment[3];
-
-    place(space, touch->node, stage->u, x);
-    deepest[0] = PetscMax(deepest[0], -gap_of(c, &pose, x, n));
-    if (normal_force(c, &pose, touch, x, n) <= 0) continue;
-    force_on(c, &pose, space, touch, x, residual, f);
-    for (int k = 0; k < 3; k++) arm[k] = x[k] - c->point[k] - pose.d[k];
-    SbCross(arm, f, moment);
-    for (int k = 0; k < 3; k++) {
-      values[k] += f[k];
-      values[3 + k] += moment[k];
-    }
-    values[6]++;
-  }
-  PetscCallMPI(MPI_Allreduce(&deepest[0], &deepest[1], 1, MPIU_REAL, MPI_MAX, space->comm));
-  PetscCallMPI(MPI_Comm_rank(space->comm, &rank));
-  /* less is the rounding of where nodes are put */
-  if (!rank && deepest[1] > TOLERANCE * c->size) values[7] = deepest[1];
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 static PetscErrorCode destroy_contact(SbEffect e)
 {
   Contact *c = (Contact *)e->data;
@@ -582,11 +360,11 @@ static PetscErrorCode create_contact(SbEffect e)
   e->ops.touch = touch_contact;
   e->ops.hold = hold_contact;
   e->ops.settle = settle_contact;
-  e->ops.force = force_contact;
-  e->ops.tangent = tangent_contact;
-  e->ops.accept = accept_contact;
-  e->ops.push = push_contact;
-  e->ops.history = history_contact;
+  e->ops.force = SbEffectForce_Contact;
+  e->ops.tangent = SbEffectTangent_Contact;
+  e->ops.accept = SbEffectAccept_Contact;
+  e->ops.push = SbEffectPush_Contact;
+  e->ops.history = SbEffectHistory_Contact;
   e->ops.destroy = destroy_contact;
   for (e->ncolumn = 0; e->ncolumn < 8; e->ncolumn++) e->column[e->ncolumn] = columns[e->ncolumn];
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -81,6 +81,7 @@ PetscErrorCode SbModelSetUp(SbModel m)
   m->load = 1.;
   m->linear = m->space->linear;
   for (PetscInt e = 0; e < m->neffect; e++) {
+    m->effect[e]->dynamic = m->dynamic;
     if (m->effect[e]->ops.setup) PetscCall(m->effect[e]->ops.setup(m->effect[e], m->space));
     m->linear = (PetscBool)(m->linear && m->effect[e]->linear);
   }

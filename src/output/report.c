@@ -96,6 +96,9 @@ static PetscErrorCode print_effects(SbModel m)
       n += (size_t)snprintf(text + n, sizeof(text) - n, " (%s)", effect->type);
   }
   PetscCall(entry("effects", "%s", text[0] ? text : "none"));
+  for (PetscInt e = 0; e < m->neffect; e++) {
+    if (m->effect[e]->note[0]) PetscCall(entry("effect", "%s: %s", m->effect[e]->name, m->effect[e]->note));
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

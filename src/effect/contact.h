@@ -1,0 +1,69 @@
+/*
+  contact.h - nodes of the surface against a rigid obstacle: what contact.c and contact_force.c share.
+*/
+#pragma once
+#include "sbcontact.h"
+#include "sbeffect.h"
+
+#define TOLERANCE 1e-7 /* of the size of the bodies: largest penetration that counts as touching */
+
+typedef enum { PROJECTED, AUGMENTED, PENALTY } Response;
+
+/* A node of the surface that this rank owns. */
+typedef struct {
+  PetscInt node, cell, a; /* local node, a cell that has it, as its node a */
+  PetscReal k;            /* stiffness of the springs, N/m */
+  PetscBool on;           /* it touches; with springs: it did at the end of the last step */
+  int toggles;            /* how often it came within the step */
+  PetscBool slips;        /* it slid at the end of the last step */
+  PetscInt along;         /* number of its direction at the node, -1: held by something else */
+  PetscReal n[3];         /* normal at the last look, outwards from the obstacle */
+  PetscReal value;        /* n . u that puts it on the obstacle, m */
+  PetscReal rest;         /* gap that it is held at: 0, or minus what is left of an overlap, m */
+  PetscReal kept;         /* springs: the same at the end of the last step, m */
+  PetscReal gap;          /* after the last solve, beyond `rest`, m */
+  PetscReal lambda;       /* multiplier of the last solve, N */
+  PetscReal pressing;     /* N that friction assumes, N */
+  PetscReal anchor[3];    /* where it began to stick, in the obstacle's rest frame */
+} Touch;
+
+typedef struct {
+  SbEffectOn on;
+  SbObstacle obstacle;
+  Response response;
+  PetscReal mu, mu_kinetic, stiffness;
+  PetscReal recovery;     /* part of an overlap that is left after a step */
+  PetscReal scale, at[3]; /* of the file of a mesh */
+  SbFormula displacement[3], angle;
+  PetscReal axis[3], point[3];
+  PetscInt n;
+  Touch *touch;   /* [n] */
+  PetscReal size; /* of the bodies, m */
+  int updates;    /* of the N of friction within the step */
+  SbPose to;      /* at the end of the step */
+} Contact;
+
+/* The obstacle's pose at time t. */
+void SbContactPose(const Contact *c, PetscReal t, SbPose *pose);
+/* Gap of a point, m, and the normal there. */
+PetscReal SbContactGap(const Contact *c, const SbPose *pose, const PetscReal x[3], PetscReal n[3]);
+
+static inline void place(SbSpace space, PetscInt node, const PetscReal u[], PetscReal x[3])
+{
+  for (int i = 0; i < 3; i++) x[i] = space->node_x[3 * node + i] + u[3 * node + i];
+}
+
+/* Normal force of the springs, N; gap: beyond what the node is held at. */
+static inline PetscReal spring(const Touch *touch, PetscReal gap)
+{
+  return PetscMax(0, touch->lambda - touch->k * gap);
+}
+
+/* Operations of the effect (sbeffect.h). */
+PetscErrorCode SbEffectForce_Contact(SbEffect e, SbSpace space, const SbStage *stage, PetscReal f[]);
+PetscErrorCode SbEffectTangent_Contact(SbEffect e, SbSpace space, const SbStage *stage, Mat A);
+PetscErrorCode SbEffectAccept_Contact(SbEffect e, SbSpace space, const SbStage *stage);
+PetscErrorCode SbEffectPush_Contact(SbEffect e, SbSpace space, const SbStage *stage,
+                                    const PetscReal residual[], PetscReal f[]);
+PetscErrorCode SbEffectHistory_Contact(SbEffect e, SbSpace space, const SbStage *stage,
+                                       const PetscReal residual[], PetscReal values[]);

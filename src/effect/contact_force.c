@@ -1,0 +1,222 @@
+/*
+  contact_force.c - where the obstacle is, and what it pushes nodes with: forces and their derivatives, the end of a step, history. The
+  method is told in contact.c.
+*/
+#include "contact.h"
+
+/* ------------------------------------------------------------------ geometry */
+
+void SbContactPose(const Contact *c, PetscReal t, SbPose *pose)
+{
+  PetscReal d[3];
+
+  for (int i = 0; i < 3; i++) d[i] = SbFormulaEval(c->displacement[i], t, NULL);
+  SbPoseSet(c->axis, SbFormulaEval(c->angle, t, NULL) * PETSC_PI / 180, c->point, d, pose);
+}
+
+PetscReal SbContactGap(const Contact *c, const SbPose *pose, const PetscReal x[3], PetscReal n[3])
+{
+  PetscReal X[3], N[3], gap;
+
+  SbPoseInvert(pose, x, X);
+  gap = SbObstacleDistance(c->obstacle, X, N);
+  for (int i = 0; i < 3; i++) n[i] = SbDot3(pose->R + 3 * i, N);
+  return gap;
+}
+
+/* v less its part along n; returns the length of what is left. */
+static PetscReal tangential(const PetscReal n[3], const PetscReal v[3], PetscReal t[3])
+{
+  const PetscReal along = SbDot3(n, v);
+
+  for (int i = 0; i < 3; i++) t[i] = v[i] - along * n[i];
+  return PetscSqrtReal(SbDot3(t, t));
+}
+
+/* ------------------------------------------------------------------ forces */
+
+/* Normal force on a node at x, N; n: the normal there. */
+static PetscReal normal_force(const Contact *c, const SbPose *pose, const Touch *touch, const PetscReal x[3],
+                              PetscReal n[3])
+{
+  const PetscReal gap = SbContactGap(c, pose, x, n);
+
+  if (c->response == PROJECTED) return touch->on && touch->along >= 0 ? touch->lambda : 0;
+  return spring(touch, gap - touch->rest);
+}
+
+/* Force of friction on a node, N. Returns its share of what the spring alone would pull with: 1 while it sticks. */
+static PetscReal drag(const Contact *c, const SbPose *pose, const Touch *touch, const PetscReal x[3],
+                      const PetscReal n[3], PetscReal f[3])
+{
+  const PetscReal most = (touch->slips ? c->mu_kinetic : c->mu) * touch->pressing;
+  PetscReal target[3], trial[3], length, share = 1;
+
+  SbPoseApply(pose, touch->anchor, target);
+  for (int i = 0; i < 3; i++) trial[i] = -touch->k * (x[i] - target[i]);
+  length = tangential(n, trial, f);
+  if (length > most) share = most / length;
+  for (int i = 0; i < 3; i++) f[i] *= share;
+  return share;
+}
+
+PetscErrorCode SbEffectForce_Contact(SbEffect e, SbSpace space, const SbStage *stage, PetscReal f[])
+{
+  const Contact *c = (const Contact *)e->data;
+  SbPose pose;
+
+  PetscFunctionBeginUser;
+  SbContactPose(c, stage->t, &pose);
+  for (PetscInt i = 0; i < c->n; i++) {
+    const Touch *touch = &c->touch[i];
+    PetscReal *fi = f + 3 * touch->node, x[3], n[3], t[3];
+
+    place(space, touch->node, stage->u, x);
+    if (c->response != PROJECTED) {
+      const PetscReal normal = normal_force(c, &pose, touch, x, n);
+
+      for (int k = 0; k < 3; k++) fi[k] += normal * n[k];
+    } else
+      (void)SbContactGap(c, &pose, x, n);
+    if (touch->pressing <= 0) continue;
+    (void)drag(c, &pose, touch, x, n, t);
+    for (int k = 0; k < 3; k++) fi[k] += t[k];
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Minus the derivative of a node's force at x, N/m; the turning of the normal is left out. False when there is none. */
+static PetscBool stiffness_of(const Contact *c, const SbPose *pose, const Touch *touch, const PetscReal x[3],
+                              PetscReal block[9])
+{
+  PetscReal n[3], t[3], along, across = 0, length, sliding = 0;
+
+  along = normal_force(c, pose, touch, x, n) > 0 && c->response != PROJECTED ? touch->k : 0;
+  if (touch->pressing > 0) {
+    const PetscReal share = drag(c, pose, touch, x, n, t);
+
+    across = touch->k * share;
+    length = SbDot3(t, t);
+    if (share < 1 && length > 0) sliding = across / length; /* along the slip the force does not change */
+  }
+  for (int k = 0; k < 9; k++) {
+    const PetscReal nn = n[k / 3] * n[k % 3];
+
+    block[k] = along * nn + across * ((k % 4 == 0) - nn);
+    if (sliding > 0) block[k] -= sliding * t[k / 3] * t[k % 3];
+  }
+  return (PetscBool)(along > 0 || across > 0);
+}
+
+PetscErrorCode SbEffectTangent_Contact(SbEffect e, SbSpace space, const SbStage *stage, Mat A)
+{
+  const Contact *c = (const Contact *)e->data;
+  SbPose pose;
+
+  PetscFunctionBeginUser;
+  SbContactPose(c, stage->t, &pose);
+  for (PetscInt i = 0; i < c->n; i++) {
+    const Touch *touch = &c->touch[i];
+    PetscReal x[3], block[9];
+
+    place(space, touch->node, stage->u, x);
+    if (!stiffness_of(c, &pose, touch, x, block)) continue;
+    for (int k = 0; k < 9; k++) block[k] *= stage->shift_k;
+    PetscCall(SbSpaceAddSpring(space, A, touch->cell, touch->a, block));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ after a step */
+
+/* Who slid takes the anchor along, at the distance that the force asks for. */
+PetscErrorCode SbEffectAccept_Contact(SbEffect e, SbSpace space, const SbStage *stage)
+{
+  Contact *c = (Contact *)e->data;
+  SbPose pose;
+
+  PetscFunctionBeginUser;
+  SbContactPose(c, stage->t, &pose);
+  for (PetscInt i = 0; i < c->n; i++) {
+    Touch *touch = &c->touch[i];
+    PetscReal x[3], n[3], t[3], normal;
+
+    place(space, touch->node, stage->u, x);
+    normal = normal_force(c, &pose, touch, x, n);
+    if (c->response != PROJECTED) touch->on = (PetscBool)(normal > 0);
+    touch->kept = touch->rest;
+    if (touch->pressing <= 0) continue;
+    touch->slips = (PetscBool)(drag(c, &pose, touch, x, n, t) < 1);
+    if (!touch->slips) continue;
+    for (int k = 0; k < 3; k++) x[k] += t[k] / touch->k;
+    SbPoseInvert(&pose, x, touch->anchor);
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Force of the obstacle on a node at x, N. */
+static void force_on(const Contact *c, const SbPose *pose, SbSpace space, const Touch *touch,
+                     const PetscReal x[3], const PetscReal residual[], PetscReal f[3])
+{
+  PetscReal n[3], normal = normal_force(c, pose, touch, x, n);
+
+  f[0] = f[1] = f[2] = 0;
+  if (normal <= 0) return;
+  if (touch->pressing > 0) (void)drag(c, pose, touch, x, n, f);
+  if (c->response == PROJECTED)
+    normal = SbSpaceHoldForce(space, touch->node, touch->along, residual + 3 * touch->node);
+  for (int k = 0; k < 3; k++) f[k] += normal * n[k];
+}
+
+PetscErrorCode SbEffectPush_Contact(SbEffect e, SbSpace space, const SbStage *stage,
+                                    const PetscReal residual[], PetscReal f[])
+{
+  const Contact *c = (const Contact *)e->data;
+  SbPose pose;
+
+  PetscFunctionBeginUser;
+  SbContactPose(c, stage->t, &pose);
+  for (PetscInt i = 0; i < c->n; i++) {
+    PetscReal x[3], force[3];
+
+    place(space, c->touch[i].node, stage->u, x);
+    force_on(c, &pose, space, &c->touch[i], x, residual, force);
+    for (int k = 0; k < 3; k++) f[3 * c->touch[i].node + k] += force[k];
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Force and torque of the obstacle on the bodies, touching nodes, deepest penetration. */
+PetscErrorCode SbEffectHistory_Contact(SbEffect e, SbSpace space, const SbStage *stage,
+                                       const PetscReal residual[], PetscReal values[])
+{
+  Contact *c = (Contact *)e->data;
+  PetscReal deepest[2] = {0, 0};
+  PetscMPIInt rank;
+  SbPose pose;
+
+  PetscFunctionBeginUser;
+  SbContactPose(c, stage->t, &pose);
+  for (int k = 0; k < 8; k++) values[k] = 0;
+  for (PetscInt i = 0; i < c->n; i++) {
+    const Touch *touch = &c->touch[i];
+    PetscReal x[3], n[3], f[3], arm[3], moment[3];
+
+    place(space, touch->node, stage->u, x);
+    deepest[0] = PetscMax(deepest[0], -SbContactGap(c, &pose, x, n));
+    if (normal_force(c, &pose, touch, x, n) <= 0) continue;
+    force_on(c, &pose, space, touch, x, residual, f);
+    for (int k = 0; k < 3; k++) arm[k] = x[k] - c->point[k] - pose.d[k];
+    SbCross(arm, f, moment);
+    for (int k = 0; k < 3; k++) {
+      values[k] += f[k];
+      values[3 + k] += moment[k];
+    }
+    values[6]++;
+  }
+  PetscCallMPI(MPI_Allreduce(&deepest[0], &deepest[1], 1, MPIU_REAL, MPI_MAX, space->comm));
+  PetscCallMPI(MPI_Comm_rank(space->comm, &rank));
+  /* less is the rounding of where nodes are put */
+  if (!rank && deepest[1] > TOLERANCE * c->size) values[7] = deepest[1];
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

@@ -1,0 +1,358 @@
+/*
+  Obstacles from meshes: distance, normal and side of a cube against the box: obstacle, of a fine sphere against the exact one, of shapes
+  with hollows against every triangle and the winding number; any cell of the grid gives the same; the note; errors.
+*/
+// @ranks 1 3
+#include "mesh_test.h"
+#include "surface_files.h"
+#include <sbcontact.h>
+#include <sbkernel.h>
+
+static const PetscReal zero[3] = {0, 0, 0};
+
+/* Numbers in -1..1 that are the same everywhere. */
+static PetscReal number(unsigned *state)
+{
+  *state = *state * 1664525u + 1013904223u;
+  return (PetscReal)(*state >> 8) / (1 << 23) - 1;
+}
+
+/* The obstacle mesh:FILE<more> of a surface. */
+static PetscErrorCode make(const TestSurface *s, const char *more, SbObstacle *o, size_t size, char note[])
+{
+  char path[512], text[600];
+
+  PetscFunctionBeginUser;
+  PetscCall(test_file_write(".off", PETSC_FALSE, s, NULL, path));
+  PetscCall(PetscSNPrintf(text, sizeof(text), "mesh:%s%s", path, more));
+  PetscCall(SbObstacleCreate("-o", text, o));
+  PetscCall(SbObstacleSetUp(*o, PETSC_COMM_WORLD, "-o", 1, zero, size, note));
+  PetscCall(test_file_remove(path));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ cube */
+
+/* The same distances as the box: near the surface exactly, elsewhere not smaller than the true one, the sign everywhere. */
+static PetscErrorCode check_cube(const char *more, PetscReal cell)
+{
+  const PetscReal lo[3] = {-0.5, -0.4, -0.3}, hi[3] = {0.6, 0.5, 0.7};
+  TestSurface s;
+  SbObstacle o, box;
+  PetscInt near = 0, far = 0, wrong = 0;
+  PetscReal off = 0, turned = 0, less = 0, more_by = 0;
+  unsigned state = 5;
+  char note[256] = "";
+
+  PetscFunctionBeginUser;
+  memset(&s, 0, sizeof(s));
+  test_surface_box(lo, hi, PETSC_FALSE, &s);
+  PetscCall(make(&s, more, &o, sizeof(note), note));
+  PetscCall(SbObstacleCreate("-o", "box:-0.5,-0.4,-0.3,0.6,0.5,0.7", &box));
+  for (int i = 0; i < 20000; i++) {
+    PetscReal x[3], n[3], m[3], d, exact;
+
+    for (int k = 0; k < 3; k++) x[k] = 1.5 * number(&state);
+    d = SbObstacleDistance(o, x, n);
+    exact = SbObstacleDistance(box, x, m);
+    wrong += d * exact < 0;
+    if (PetscAbsReal(exact) < cell) {
+      near++;
+      off = PetscMax(off, PetscAbsReal(d - exact));
+      if (PetscAbsReal(exact) > 1e-3) turned = PetscMax(turned, 1 - SbDot3(n, m));
+    } else {
+      far++;
+      less = PetscMax(less, PetscAbsReal(exact) - PetscAbsReal(d));
+      more_by = PetscMax(more_by, PetscAbsReal(d) - PetscAbsReal(exact));
+    }
+  }
+  SB_CHECK(near > 200 && !wrong, "%d near, %d far, %d on the wrong side", (int)near, (int)far, (int)wrong);
+  SB_CHECK(off < 1e-14, "cell %g: distances near the cube are off by %g", (double)cell, (double)off);
+  SB_CHECK(turned < 1e-12, "cell %g: normals near the cube are turned: 1 - cos = %g", (double)cell,
+           (double)turned);
+  SB_CHECK(less < 1e-14 && more_by < 2 * cell, "cell %g: far distances are off by %g and %g", (double)cell,
+           (double)-less, (double)more_by);
+  SB_CHECK(strstr(note, "12 triangles around 0.99 m^3, grid of "), "note: %s", note);
+  PetscCall(SbObstacleDestroy(&o));
+  PetscCall(SbObstacleDestroy(&box));
+  test_surface_free(&s);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* At a corner, on an edge and on a face: no distance, and a normal between those of the sides. */
+static PetscErrorCode check_on(void)
+{
+  static const PetscReal at[4][3] = {{1, 1, 1}, {1, 1, 0.3}, {1, 0.2, 0.3}, {1 - 1e-13, 0.2, 0.3}};
+  const PetscReal unit[3] = {1, 1, 1};
+  TestSurface s;
+  SbObstacle o;
+  char note[256];
+
+  PetscFunctionBeginUser;
+  memset(&s, 0, sizeof(s));
+  test_surface_box(zero, unit, PETSC_FALSE, &s);
+  PetscCall(make(&s, "", &o, sizeof(note), note));
+  for (int i = 0; i < 4; i++) {
+    PetscReal n[3], d = SbObstacleDistance(o, at[i], n);
+
+    SB_CHECK_NEAR(d, i < 3 ? 0 : -1e-13, 1e-15, "on the surface");
+    SB_CHECK_NEAR(SbDot3(n, n), 1, 1e-14, "length of the normal");
+    for (int k = 0; k < 3; k++) {
+      /* the triangles at a corner weigh by their angles: the three sides alike */
+      const PetscReal exact = i == 0 ? 1 / PetscSqrtReal(3.) : i == 1 ? (k < 2) / PETSC_SQRT2 : k == 0;
+
+      SB_CHECK_NEAR(n[k], exact, 1e-14, "normal on the surface");
+    }
+  }
+  PetscCall(SbObstacleDestroy(&o));
+  test_surface_free(&s);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ any surface */
+
+static PetscReal solid_angle(const TestSurface *s, PetscInt f, const PetscReal x[3])
+{
+  PetscReal a[3][3], l[3], c[3];
+
+  for (int k = 0; k < 3; k++) {
+    for (int i = 0; i < 3; i++) a[k][i] = s->x[s->tri[f][k]][i] - x[i];
+    l[k] = PetscSqrtReal(SbDot3(a[k], a[k]));
+  }
+  SbCross(a[0], a[1], c);
+  return 2 * atan2(SbDot3(c, a[2]), l[0] * l[1] * l[2] + SbDot3(a[0], a[1]) * l[2] +
+                                      SbDot3(a[1], a[2]) * l[0] + SbDot3(a[2], a[0]) * l[1]);
+}
+
+/* Distance of a point from a triangle by its inside and its three edges, all tried: slow and plain. */
+static PetscReal from_triangle(const TestSurface *s, PetscInt f, const PetscReal x[3])
+{
+  const PetscReal *p[3] = {s->x[s->tri[f][0]], s->x[s->tri[f][1]], s->x[s->tri[f][2]]};
+  PetscReal best = PETSC_MAX_REAL, n[3], a[3], b[3], area, h, w[3];
+  PetscBool over = PETSC_TRUE;
+
+  for (int i = 0; i < 3; i++) {
+    a[i] = p[1][i] - p[0][i];
+    b[i] = p[2][i] - p[0][i];
+  }
+  SbCross(a, b, n);
+  area = SbDot3(n, n);
+  for (int k = 0; k < 3; k++) {
+    PetscReal e[3], r[3], c[3], t, d2 = 0;
+
+    for (int i = 0; i < 3; i++) {
+      e[i] = p[(k + 1) % 3][i] - p[k][i];
+      r[i] = x[i] - p[k][i];
+    }
+    t = PetscMax(0, PetscMin(1, SbDot3(e, r) / SbDot3(e, e)));
+    for (int i = 0; i < 3; i++) d2 += PetscSqr(r[i] - t * e[i]);
+    best = PetscMin(best, PetscSqrtReal(d2));
+    SbCross(e, r, c);
+    w[k] = SbDot3(c, n) / area;
+    if (w[k] < 0) over = PETSC_FALSE;
+  }
+  h = 0;
+  for (int i = 0; i < 3; i++) h += (x[i] - p[0][i]) * n[i] / PetscSqrtReal(area);
+  return over ? PetscMin(best, PetscAbsReal(h)) : best;
+}
+
+/* Against all triangles: distances near the surface, signs everywhere, the nearest place on the surface. */
+static PetscErrorCode check_surface(const TestSurface *s, const char *more, PetscReal band, PetscReal box,
+                                    const char *what)
+{
+  SbObstacle o;
+  PetscInt near = 0, wrong = 0, inside = 0;
+  PetscReal off = 0, less = 0, foot = 0;
+  unsigned state = 11;
+  char note[256];
+
+  PetscFunctionBeginUser;
+  PetscCall(make(s, more, &o, sizeof(note), note));
+  for (int i = 0; i < 1500; i++) {
+    PetscReal x[3], n[3], y[3], m[3], d, exact = PETSC_MAX_REAL, around = 0;
+
+    for (int k = 0; k < 3; k++) x[k] = box * number(&state);
+    d = SbObstacleDistance(o, x, n);
+    for (PetscInt f = 0; f < s->ntri; f++) {
+      exact = PetscMin(exact, from_triangle(s, f, x));
+      around += solid_angle(s, f, x);
+    }
+    wrong += (around > 2 * PETSC_PI) != (d < 0);
+    inside += d < 0;
+    less = PetscMax(less, exact - PetscAbsReal(d));
+    if (exact > band) continue;
+    near++;
+    off = PetscMax(off, PetscAbsReal(PetscAbsReal(d) - exact));
+    for (int k = 0; k < 3; k++) y[k] = x[k] - d * n[k];
+    foot = PetscMax(foot, PetscAbsReal(SbObstacleDistance(o, y, m)));
+  }
+  SB_CHECK(near > 50 && inside > 50 && !wrong, "%s%s: %d near, %d inside, %d on the wrong side", what, more,
+           (int)near, (int)inside, (int)wrong);
+  SB_CHECK(off < 1e-13, "%s%s: distances are off by %g", what, more, (double)off);
+  SB_CHECK(less < 1e-13, "%s%s: distances are too small by %g", what, more, (double)less);
+  SB_CHECK(foot < 1e-13, "%s%s: the nearest place is off the surface by %g", what, more, (double)foot);
+  PetscCall(SbObstacleDestroy(&o));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode check_torus(void)
+{
+  const PetscInt n[2] = {24, 12};
+  TestSurface s;
+
+  PetscFunctionBeginUser;
+  memset(&s, 0, sizeof(s));
+  test_surface_torus(1, 0.4, n, &s);
+  PetscCall(check_surface(&s, "", 0.2, 1.5, "torus"));
+  PetscCall(check_surface(&s, ",0.07", 0.07, 1.5, "torus"));
+  PetscCall(check_surface(&s, ",0.5", 0.5, 1.5, "torus"));
+  test_surface_free(&s);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* A cube with a cavity and a thin plate beside it. */
+static PetscErrorCode check_parts(void)
+{
+  const PetscReal a[3] = {-0.5, -0.5, -0.5}, b[3] = {0.5, 0.5, 0.5}, c[3] = {-0.3, -0.3, -0.3},
+                  d[3] = {0.4, 0.4, 0.4};
+  const PetscReal p[3] = {-0.8, -0.8, 0.7}, q[3] = {0.8, 0.8, 0.72};
+  TestSurface s;
+
+  PetscFunctionBeginUser;
+  memset(&s, 0, sizeof(s));
+  test_surface_box(a, b, PETSC_FALSE, &s);
+  test_surface_box(c, d, PETSC_TRUE, &s);
+  test_surface_box(p, q, PETSC_FALSE, &s);
+  PetscCall(check_surface(&s, "", 0.5, 1, "parts"));
+  PetscCall(check_surface(&s, ",0.05", 0.05, 1, "parts"));
+  test_surface_free(&s);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscReal longest_edge(const TestSurface *s)
+{
+  PetscReal longest = 0;
+
+  for (PetscInt i = 0; i < 3 * s->ntri; i++) {
+    const PetscReal *a = s->x[s->tri[i / 3][i % 3]], *b = s->x[s->tri[i / 3][(i + 1) % 3]];
+    const PetscReal e[3] = {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
+
+    longest = PetscMax(longest, PetscSqrtReal(SbDot3(e, e)));
+  }
+  return longest;
+}
+
+/* A triangle in the unit sphere with edges up to h is at most h^2 / 6 away from it, and its normal turned by less than h. */
+static PetscErrorCode check_sphere(int split)
+{
+  TestSurface s;
+  SbObstacle o;
+  PetscReal off = 0, turned = 0, h;
+  PetscInt near = 0, inside = 0;
+  unsigned state = 3;
+  char note[256];
+
+  PetscFunctionBeginUser;
+  memset(&s, 0, sizeof(s));
+  test_surface_sphere(split, &s);
+  h = longest_edge(&s);
+  PetscCall(make(&s, "", &o, sizeof(note), note));
+  for (int i = 0; i < 20000; i++) {
+    PetscReal x[3], n[3], d, r;
+
+    for (int k = 0; k < 3; k++) x[k] = 1.2 * number(&state);
+    r = PetscSqrtReal(SbDot3(x, x));
+    if (PetscAbsReal(r - 1) > 0.7 * h) continue;
+    d = SbObstacleDistance(o, x, n);
+    near++;
+    inside += d < 0;
+    off = PetscMax(off, PetscAbsReal(d - (r - 1)));
+    turned = PetscMax(turned, PetscSqrtReal(PetscMax(0, 2 - 2 * SbDot3(n, x) / r)));
+  }
+  SB_CHECK(near > 500 && inside > 200, "%d near the sphere", (int)near);
+  SB_CHECK(off < h * h / 6 * (1 + h), "sphere of edges %g: distances are off by %g", (double)h, (double)off);
+  SB_CHECK(turned < h, "sphere of edges %g: normals are off by %g", (double)h, (double)turned);
+  PetscCall(SbObstacleDestroy(&o));
+  test_surface_free(&s);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ errors, cost */
+
+static PetscErrorCode check_errors(void)
+{
+  const PetscReal unit[3] = {1, 1, 1};
+  TestSurface s;
+  SbObstacle o = NULL;
+  char path[512], text[600], note[256];
+
+  PetscFunctionBeginUser;
+  memset(&s, 0, sizeof(s));
+  test_surface_box(zero, unit, PETSC_FALSE, &s);
+  PetscCall(test_file_write(".off", PETSC_FALSE, &s, NULL, path));
+  PetscCall(PetscSNPrintf(text, sizeof(text), "mesh:%s,1e-4", path));
+  PetscCall(SbObstacleCreate("-o", text, &o));
+  TEST_MESSAGE(SbObstacleSetUp(o, PETSC_COMM_WORLD, "-o", 1, zero, sizeof(note), note), PETSC_ERR_USER_INPUT,
+               "-o: cells of 0.0001 m around an obstacle of");
+  PetscCall(SbObstacleDestroy(&o));
+  TEST_MESSAGE(SbObstacleCreate("-o", "mesh:", &o), PETSC_ERR_USER_INPUT, "write mesh:FILE[,cell]");
+  PetscCall(SbObstacleDestroy(&o));
+  TEST_MESSAGE(SbObstacleCreate("-o", "mesh:a.stl,-1", &o), PETSC_ERR_USER_INPUT,
+               "-o mesh:a.stl,-1: the cell must be positive");
+  PetscCall(SbObstacleDestroy(&o));
+  PetscCall(SbObstacleCreate("-o", "mesh:no,such.stl", &o));
+  TEST_MESSAGE(SbObstacleSetUp(o, PETSC_COMM_WORLD, "-o", 1, zero, sizeof(note), note), PETSC_ERR_FILE_OPEN,
+               "-o: no,such.stl: cannot open the file");
+  PetscCall(SbObstacleDestroy(&o));
+  PetscCall(test_file_remove(path));
+  test_surface_free(&s);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Time to make the grid and of a query, for who wants to know: nothing is checked. */
+static PetscErrorCode measure(void)
+{
+  TestSurface s;
+  SbObstacle o;
+  PetscLogDouble t0, t1, t2;
+  PetscReal sum = 0;
+  unsigned state = 3;
+  char note[256];
+
+  PetscFunctionBeginUser;
+  memset(&s, 0, sizeof(s));
+  test_surface_sphere(5, &s);
+  PetscCall(PetscTime(&t0));
+  PetscCall(make(&s, "", &o, sizeof(note), note));
+  PetscCall(PetscTime(&t1));
+  for (int i = 0; i < 200000; i++) {
+    PetscReal x[3], n[3], r;
+
+    for (int k = 0; k < 3; k++) x[k] = number(&state);
+    r = PetscSqrtReal(SbDot3(x, x)) / (1 + 0.05 * number(&state));
+    for (int k = 0; k < 3; k++) x[k] /= r;
+    sum += SbObstacleDistance(o, x, n);
+  }
+  PetscCall(PetscTime(&t2));
+  PetscCall(PetscPrintf(PETSC_COMM_WORLD, "  %s: made in %.3f s, %.2f us per distance (mean %.3f)\n", note,
+                        t1 - t0, (t2 - t1) / 200000 * 1e6, (double)sum / 200000));
+  PetscCall(SbObstacleDestroy(&o));
+  test_surface_free(&s);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+int main(int argc, char **argv)
+{
+  SB_TEST_BEGIN(argc, argv);
+  PetscCall(check_cube("", 1));
+  PetscCall(check_cube(",0.1", 0.1));
+  PetscCall(check_cube(",0.03", 0.03));
+  PetscCall(check_on());
+  PetscCall(check_torus());
+  PetscCall(check_parts());
+  PetscCall(check_sphere(3));
+  PetscCall(check_sphere(4));
+  PetscCall(check_errors());
+  PetscCall(measure());
+  SB_TEST_END();
+}
