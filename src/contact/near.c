@@ -383,7 +383,7 @@ static PetscBool measure(const Look *look, const Hit *h, SbNear *near)
     if (!unit_normal(x, n)) return PETSC_FALSE;
     near->gap = SbDot3(r, n);
   } else if (h->key < AT * look->s->reach) {
-    if (!is_nearest_around(look, h) || !opposing_normal(look, h, n)) return PETSC_FALSE;
+    if (!opposing_normal(look, h, n)) return PETSC_FALSE; /* all facets around it are at the point */
     near->gap = SbDot3(r, n);
   } else {
     if (!is_nearest_around(look, h) || !pseudonormal(look, h, r, n)) return PETSC_FALSE;
@@ -534,9 +534,12 @@ static PetscBool nearest(const Look *look, PetscInt n, Hit h[], const PetscReal 
 
     for (; i < end; i++) {
       if (!measure(look, h + i, near)) continue;
-      if (!sided) inside = (PetscBool)(near->gap < 0);
-      sided = PETSC_TRUE;
-      if ((near->gap < 0) == inside && SbDot3(look->normal, near->normal) < -FACING &&
+      /* on the surface itself rounding tells the side: the next nearest place decides */
+      if (!sided && PetscAbsReal(near->gap) > TOUCH * look->s->reach) {
+        inside = (PetscBool)(near->gap < 0);
+        sided = PETSC_TRUE;
+      }
+      if ((!sided || (near->gap < 0) == inside) && SbDot3(look->normal, near->normal) < -FACING &&
           (!entry || SbDot3(near->normal, entry) > FACING))
         return PETSC_TRUE;
     }

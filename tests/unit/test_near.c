@@ -206,6 +206,42 @@ static PetscErrorCode check_touching(SbDetector d, World *w)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/*
+  A vertex of another box on the rim of this one's top, flush with its side but for rounding, and a little in or above the top: it meets
+  the top, whatever side of the side it is on.
+*/
+static PetscErrorCode check_flush(SbDetector d, World *w)
+{
+  const PetscReal half[3] = {0.5, 0.4, 0.3}, c = PetscSqrtReal(0.5);
+  const PetscReal aside[5] = {0, 1.2e-16, -1.2e-16, 5e-12, -5e-12}, up[3] = {0, 1e-8, -1e-8};
+  const PetscInt n[3] = {2, 2, 2};
+  PetscReal p[15][3], normal[15][3];
+  const SbNear *near[15];
+
+  PetscFunctionBeginUser;
+  w->nvertex = w->nfacet = w->npart = 0;
+  (void)world_box(w, half, n);
+  world_scene(w, PETSC_TRUE, 0, 0.1);
+  for (int i = 0; i < 15; i++) {
+    p[i][0] = half[0] + aside[i % 5];
+    p[i][1] = 0.13;
+    p[i][2] = half[2] + up[i / 5];
+    normal[i][0] = c; /* its own side and bottom */
+    normal[i][1] = 0;
+    normal[i][2] = -c;
+  }
+  world_probe(w, 15, p, NULL, normal);
+  PetscCall(find(d, w, near));
+  for (int i = 0; i < 15; i++) {
+    SB_CHECK(near[i], "a vertex %g m beside the side and %g m above the top meets nothing",
+             (double)aside[i % 5], (double)up[i / 5]);
+    if (!near[i]) continue;
+    SB_CHECK_NEAR(near[i]->gap, up[i / 5], 1e-15, "gap of a vertex that is flush with a side");
+    SB_CHECK_NEAR(near[i]->normal[2], 1, 1e-15, "its normal");
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 static PetscErrorCode check_sphere(SbDetector d, World *w)
 {
   PetscReal p[400][3], normal[400][3], edge2 = 0;
@@ -619,6 +655,7 @@ int main(int argc, char **argv)
     PetscCall(SbDetectorCreate(kinds[i], &d));
     PetscCall(check_box(d, &w));
     PetscCall(check_touching(d, &w));
+    PetscCall(check_flush(d, &w));
     PetscCall(check_sphere(d, &w));
     PetscCall(check_stars(d, &w));
     PetscCall(check_sliver(d, &w));
