@@ -1,5 +1,5 @@
 /*
-  verify.h - what the verification programs share: meshes of boxes with moved vertices, 3x3 algebra, Richardson's
+  verify.h - what the verification programs share: scenes, meshes of boxes with moved vertices, 3x3 algebra, Richardson's
   extrapolation.
 */
 #pragma once
@@ -169,6 +169,23 @@ static inline PetscReal verify_extrapolate(PetscReal coarse, PetscReal fine, Pet
 static inline PetscReal verify_aitken(const PetscReal v[3])
 {
   return v[2] - PetscSqr(v[2] - v[1]) / ((v[2] - v[1]) - (v[1] - v[0]));
+}
+
+/* test_scene_open() of options that are written as with printf. */
+static inline PetscErrorCode verify_open(TestScene *t, const char *format, ...)
+{
+  char text[VERIFY_TEXT];
+  size_t length;
+  va_list args;
+
+  PetscFunctionBeginUser;
+  va_start(args, format);
+  PetscCall(PetscVSNPrintf(text, sizeof(text), format, &length, args));
+  va_end(args);
+  PetscCheck(length <= sizeof(text), PETSC_COMM_SELF, PETSC_ERR_PLIB, "%d characters, room for %d",
+             (int)length, VERIFY_TEXT);
+  PetscCall(test_scene_open(text, t));
+  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* The end of the run must be its planned one. */

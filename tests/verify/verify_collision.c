@@ -15,19 +15,6 @@
 
 enum { CONTACTS, DEEPEST, MEAN, NORMAL, FRICTION, WORK, LOSS, NVALUE };
 
-static PetscErrorCode open_scene(TestScene *t, const char *format, ...)
-{
-  char text[VERIFY_TEXT];
-  va_list args;
-
-  PetscFunctionBeginUser;
-  va_start(args, format);
-  PetscCall(PetscVSNPrintf(text, sizeof(text), format, NULL, args));
-  va_end(args);
-  PetscCall(test_scene_open(text, t));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* History columns of the first effect of contact, on every rank. */
 static PetscErrorCode collision_values(SbRun run, PetscReal values[NVALUE])
 {
@@ -97,7 +84,7 @@ static PetscErrorCode check_stack(const char *element, const char *response, con
   TestScene t;
 
   PetscFunctionBeginUser;
-  PetscCall(open_scene(
+  PetscCall(verify_open(
     &t,
     "-bodies a,b -body_a_mesh box:0.1,0.1,0.05:2 -body_b_mesh box:0.1,0.1,0.05:%d -body_b_translate 0,0,0.05 "
     "-body_a_material linear -body_a_young 1e5 -body_a_poisson 0.3 -body_a_density 1000 -body_a_element %s "
@@ -189,7 +176,7 @@ static PetscErrorCode check_bars(const char *element)
   TestScene t;
 
   PetscFunctionBeginUser;
-  PetscCall(open_scene(
+  PetscCall(verify_open(
     &t,
     "-bodies a,b -body_a_mesh box:1,0.05,0.05:1 -body_b_mesh box:1,0.05,0.05:1 -body_b_translate 1.002,0,0 "
     "-body_a_material linear -body_a_young 1e5 -body_a_poisson 0 -body_a_density 1000 -body_a_element %s "
@@ -223,7 +210,7 @@ static PetscErrorCode check_momentum(const char *element, const char *response, 
   TestScene t;
 
   PetscFunctionBeginUser;
-  PetscCall(open_scene(
+  PetscCall(verify_open(
     &t,
     "-bodies a,b -body_a_mesh box:0.1,0.1,0.1:2 -body_b_mesh box:0.1,0.08,0.1:3 -body_b_translate "
     "0.11,0.03,0.02 "
@@ -263,7 +250,7 @@ static PetscErrorCode press(const char *response, PetscReal stiffness, PetscReal
   TestScene t;
 
   PetscFunctionBeginUser;
-  PetscCall(open_scene(
+  PetscCall(verify_open(
     &t,
     "-bodies a,b -body_a_mesh box:0.2,0.1,0.05:2 -body_b_mesh box:0.08,0.06,0.05:2 -body_b_translate "
     "0.06,0.02,0.05 "
@@ -320,9 +307,9 @@ static PetscErrorCode check_miss(void)
   PetscReal size, difference;
 
   PetscFunctionBeginUser;
-  PetscCall(open_scene(&alone, APART));
+  PetscCall(verify_open(&alone, APART));
   PetscCall(verify_solve(&alone, "alone"));
-  PetscCall(open_scene(&t, APART "-effects meet -effect_meet_type collision"));
+  PetscCall(verify_open(&t, APART "-effects meet -effect_meet_type collision"));
   PetscCall(verify_solve(&t, "miss"));
   PetscCall(VecNorm(t.run->U, NORM_INFINITY, &size));
   PetscCall(VecAXPY(t.run->U, -1., alone.run->U));
@@ -346,7 +333,7 @@ static PetscErrorCode slide(PetscReal mu, PetscReal end, PetscReal *velocity)
   TestScene t;
 
   PetscFunctionBeginUser;
-  PetscCall(open_scene(
+  PetscCall(verify_open(
     &t,
     "-bodies a,b -body_a_mesh box:0.3,0.1,0.05:1 -body_b_mesh box:0.06,0.06,0.03:1 -body_b_translate "
     "0.02,0.021,0.05 "

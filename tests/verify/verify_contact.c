@@ -46,19 +46,6 @@ static PetscErrorCode contact_values(SbRun run, PetscReal t, PetscReal values[NV
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode open_scene(TestScene *t, const char *format, ...)
-{
-  char text[VERIFY_TEXT];
-  va_list args;
-
-  PetscFunctionBeginUser;
-  va_start(args, format);
-  PetscCall(PetscVSNPrintf(text, sizeof(text), format, NULL, args));
-  va_end(args);
-  PetscCall(test_scene_open(text, t));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* ------------------------------------------------------------------ press */
 
 #define LOAD 500.0 /* Pa */
@@ -73,7 +60,7 @@ static PetscErrorCode check_press(const char *element, const char *response, Pet
   SbSpace s;
 
   PetscFunctionBeginUser;
-  PetscCall(open_scene(
+  PetscCall(verify_open(
     &t,
     "-bodies a -body_a_mesh box:0.1,0.1,0.05:4 -body_a_material linear -body_a_young 1e5 -body_a_poisson 0.3 "
     "-body_a_density 1000 -body_a_element %s -time static -ksp_rtol 1e-12 -snes_rtol 1e-12 "
@@ -150,7 +137,7 @@ static PetscErrorCode check_fall(const char *element, const char *response)
 
   PetscFunctionBeginUser;
   PetscCall(PetscMemzero(&f, sizeof(f)));
-  PetscCall(open_scene(
+  PetscCall(verify_open(
     &t,
     "-bodies a -body_a_mesh box:0.1,0.1,0.1:2 -body_a_material corotated -body_a_young 1e4 "
     "-body_a_poisson 0.3 -body_a_density 1000 -body_a_rotate 1,2,0,20 -body_a_translate 0,0,0.05 "
@@ -208,7 +195,7 @@ static PetscErrorCode check_incline(const char *element, const char *response, P
   PetscReal h, distance;
 
   PetscFunctionBeginUser;
-  PetscCall(open_scene(
+  PetscCall(verify_open(
     &t,
     "-bodies a -body_a_mesh box:0.1,0.1,0.05:3 -body_a_material corotated -body_a_young 1e6 "
     "-body_a_poisson 0.3 -body_a_density 1000 -body_a_element %s -effects gravity,floor "
@@ -265,15 +252,15 @@ static PetscErrorCode indent(const char *response, const char *more, Indent *f)
   PetscFunctionBeginUser;
   PetscCall(PetscMemzero(f, sizeof(*f)));
   PetscCall(
-    open_scene(&t,
-               "-bodies a -body_a_mesh box:0.1,0.06,0.04:4 -body_a_material corotated -body_a_young 2e4 "
-               "-body_a_poisson 0.4 -body_a_density 1000 -effects bed,tool -effect_bed_type support "
-               "-effect_bed_on zmin -effect_tool_type contact -effect_tool_on zmax "
-               "-effect_tool_obstacle capsule:0.05,0.031,0.055,0.05,0.031,0.155,0.015 "
-               "-effect_tool_displacement 0.02*ramp(t/0.2-1);0;-0.01*ramp(t/0.2) -effect_tool_response %s "
-               "-effect_tool_friction 0.3 "
-               "-time euler_implicit -ts_dt 0.02 -ts_max_time 0.4 %s",
-               response, more));
+    verify_open(&t,
+                "-bodies a -body_a_mesh box:0.1,0.06,0.04:4 -body_a_material corotated -body_a_young 2e4 "
+                "-body_a_poisson 0.4 -body_a_density 1000 -effects bed,tool -effect_bed_type support "
+                "-effect_bed_on zmin -effect_tool_type contact -effect_tool_on zmax "
+                "-effect_tool_obstacle capsule:0.05,0.031,0.055,0.05,0.031,0.155,0.015 "
+                "-effect_tool_displacement 0.02*ramp(t/0.2-1);0;-0.01*ramp(t/0.2) -effect_tool_response %s "
+                "-effect_tool_friction 0.3 "
+                "-time euler_implicit -ts_dt 0.02 -ts_max_time 0.4 %s",
+                response, more));
   PetscCall(SbRunAddMonitor(t.run, watch_indent, f, NULL));
   PetscCall(verify_solve(&t, response));
   PetscCall(test_scene_close(&t));
@@ -384,14 +371,14 @@ static PetscErrorCode check_bounds(void)
   Vec U;
 
   PetscFunctionBeginUser;
-  PetscCall(open_scene(&t,
-                       BEAM "-effects gravity,clamp,floor -effect_floor_type contact "
-                            "-effect_floor_obstacle plane:0,0,1,%g",
-                       (double)floor));
+  PetscCall(verify_open(&t,
+                        BEAM "-effects gravity,clamp,floor -effect_floor_type contact "
+                             "-effect_floor_obstacle plane:0,0,1,%g",
+                        (double)floor));
   PetscCall(verify_solve(&t, "bounds"));
   PetscCall(contact_values(t.run, 1, values));
   PetscCall(
-    open_scene(&free, BEAM "-effects gravity,clamp -solver sor" /* scalar storage, which SNESVI needs */));
+    verify_open(&free, BEAM "-effects gravity,clamp -solver sor" /* scalar storage, which SNESVI needs */));
   free.model->load = 1;
   PetscCall(VecDuplicate(free.run->U, &U));
   PetscCall(solve_bounded(free.model, free.run->J, floor, U));
@@ -450,7 +437,7 @@ static PetscErrorCode check_hertz(PetscInt cells, PetscReal tolerance)
   /* radial part over the distance from the axis, and the depth is -z */
   PetscCall(PetscSNPrintf(sideways, sizeof(sideways), "%.15g*(-z/%s^3-%.15g/(%s*(%s-z)))",
                           (double)(P * (1 + nu) / (2 * PETSC_PI * E)), r, (double)(1 - 2 * nu), r, r));
-  PetscCall(open_scene(
+  PetscCall(verify_open(
     &t,
     "-bodies a -body_a_mesh %s -body_a_material linear -body_a_young %g -body_a_poisson %g -body_a_density 1 "
     "-sets x0,y0,x1,y1,z1,top -set_x0_at plane:1,0,0,0 -set_y0_at plane:0,1,0,0 -set_x1_at plane:1,0,0,1 "
@@ -487,11 +474,11 @@ static PetscErrorCode check_nothing(void)
     TestScene t;
 
     PetscCall(
-      open_scene(&t,
-                 "-bodies a -body_a_mesh box:0.1,0.1,0.1:2 -body_a_material corotated -body_a_young 1e4 "
-                 "-body_a_poisson 0.3 -body_a_density 1000 -body_a_spin 1,2,3 -time euler_implicit "
-                 "-ts_dt 0.01 -ts_max_time 0.1 -snes_rtol 1e-12 %s",
-                 extra[k]));
+      verify_open(&t,
+                  "-bodies a -body_a_mesh box:0.1,0.1,0.1:2 -body_a_material corotated -body_a_young 1e4 "
+                  "-body_a_poisson 0.3 -body_a_density 1000 -body_a_spin 1,2,3 -time euler_implicit "
+                  "-ts_dt 0.01 -ts_max_time 0.1 -snes_rtol 1e-12 %s",
+                  extra[k]));
     PetscCall(verify_solve(&t, "nothing"));
     n = 3 * verify_numbers(t.model);
     PetscCall(verify_gather(t.model, t.run->U, &u[k]));
