@@ -424,6 +424,7 @@ static void read_rows(const Collision *c, SbSpace space, Hit *hit)
   hit->rests = SbSpaceCoupleRests(space, hit->row);
   if (hit->rests) {
     hit->lambda = 0;
+    hit->gap = -hit->allowed; /* so those rows say; the next look tells more if it finds the pair */
     return;
   }
   if (c->response == PROJECTED) hit->lambda = force;
