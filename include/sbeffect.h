@@ -50,6 +50,7 @@ struct _p_SbEffect {
   PetscBool linear;  /* force does not depend on u: the tangent stays constant. Default PETSC_TRUE */
   PetscBool steady;  /* no formula uses t: a static run multiplies the effect by the load factor */
   PetscBool dynamic; /* the run has inertia; known from set-up on */
+  PetscBool saddle;  /* its rows are to be solved with their multipliers as unknowns */
   const struct SbEffectOn_ *held; /* the sets whose nodes it prescribes in all directions; NULL: none */
   PetscInt ncolumn;               /* history columns */
   const char *column[8];          /* "force_x", ...; written as <name>_<column> */

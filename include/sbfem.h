@@ -165,13 +165,18 @@ PetscReal SbSpaceHoldForce(SbSpace space, PetscInt node, PetscInt k, const Petsc
 
   SbSpaceCoupleCreate() during set-up of an effect that may need them. Then, as often as they change: SbSpaceCoupleClear(), rows on
   any rank, SbSpaceCoupleDone() (collective). SbModelPrescribe(), residuals and solves follow: solves run in the null space of
-  the exact rows.
+  the exact rows, or find their multipliers as unknowns.
 */
-PetscErrorCode SbSpaceCoupleCreate(SbSpace space);
+/* How solves treat the exact rows: in their null space, or as [K G^T; G 0] by a factorisation or by iterations. */
+typedef enum { SB_SADDLE_NONE, SB_SADDLE_DIRECT, SB_SADDLE_ITERATIVE } SbSaddle;
+/* outer: rows may hold nodes on something that is no body (those of a negative id), whose forces are reactions. Alike on all ranks. */
+PetscErrorCode SbSpaceCoupleCreate(SbSpace space, PetscBool outer);
+/* Whether there may be such rows. Not collective. */
+PetscBool SbSpaceCoupleOuter(SbSpace space);
 /* Not collective. */
 void SbSpaceCoupleClear(SbSpace space);
 /* gnode[n]: global numbers of nodes; coef[n][3]; value in m; id: rows that say nearly what those of lower ids say rest, so that no
-   partition changes which. Output: row, its number on this rank. Not collective. */
+   partition changes which; negative: of a node and something that is no body, which rest only if they are fully said by others. Output: row, its number on this rank. Not collective. */
 PetscErrorCode SbSpaceCoupleRow(SbSpace space, PetscInt id, PetscInt n, const PetscInt gnode[],
                                 const PetscReal coef[], PetscReal value, PetscInt *row);
 /* A force of constant + stiffness (value - sum_k coef_k . u_k) along the row, N; stiffness >= 0, N/m. Not collective. */
@@ -182,6 +187,8 @@ PetscErrorCode SbSpaceCoupleDone(SbSpace space);
 /* What rows push with and where they are, for the displacement U and its residual R without constraints (N). R <- R less the
    forces of the exact rows: what is left is for supports and obstacles. Collective. */
 PetscErrorCode SbSpaceCoupleMeasure(SbSpace space, Vec U, Vec R);
+/* R += what rows of negative ids push free unknowns with, N, after SbSpaceCoupleMeasure(). Collective. */
+PetscErrorCode SbSpaceCoupleReaction(SbSpace space, Vec R);
 /* Whether an exact row rests: others say it, or it has no free direction. It has no force, and its sum is not looked after. */
 PetscBool SbSpaceCoupleRests(SbSpace space, PetscInt row);
 /* What SbSpaceCoupleMeasure() found: force (N, positive: it raises the sum) and sum_k coef_k . u_k (m). Not collective. */
@@ -193,8 +200,8 @@ PetscErrorCode SbCouplePrescribe(SbSpace space, Vec U);
 /* F <- F less the springs' forces, and without what the exact rows take when `constrain`. Collective. */
 PetscErrorCode SbCoupleResidual(SbSpace space, Vec U, PetscBool constrain, Vec F);
 /* The operator of solves: K, its springs, projected. singular: K may be so, because only rows hold some body: it is made regular for
-   preconditioners, but for the operator. Collective; the caller destroys it; K is borrowed until then. */
-PetscErrorCode SbCoupleCreateOperator(SbSpace space, Mat K, PetscBool singular, Mat *A);
+   preconditioners, but for the operator; SB_SADDLE_DIRECT needs none of that. Collective; the caller destroys it; K is borrowed until then. */
+PetscErrorCode SbCoupleCreateOperator(SbSpace space, Mat K, PetscBool singular, SbSaddle saddle, Mat *A);
 
 /* Per owned cell: Cauchy stress sigma[6] = xx yy zz xy yz xz (Pa), J, energy density (J/m^3, rest). Outputs may be NULL. */
 PetscErrorCode SbSpaceCellState(SbSpace space, const PetscReal u[], PetscReal sigma[], PetscReal J[],

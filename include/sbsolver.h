@@ -43,6 +43,25 @@ PetscErrorCode SbSolverLookAtResidual(KSP ksp);
 PetscErrorCode SbPCCoupleCreate(SbSpace space, PC pc, PC *inner);
 /* M of such a pc, else pc itself. Not collective. */
 PetscErrorCode SbPCCoupleGetInner(PC pc, PC *inner);
+/* Whether a factorisation of the saddle-point system stands in the place of M now. Not collective. */
+PetscErrorCode SbPCCoupleIsFactored(PC pc, PetscBool *is);
+/*
+  SbSaddleChoose - how the saddle-point system of rows is solved: `choice` 0 by size, 1 directly, 2 by iterations, with the reason in words.
+
+  Collective. Errors: PETSC_ERR_USER for 1 where this PETSc has no factorisation for it.
+*/
+PetscErrorCode SbSaddleChoose(SbSpace space, PetscBool dynamic, PetscInt choice, SbSaddle *saddle,
+                              char reason[], size_t size);
+/*
+  SbKSPSaddleSet - makes ksp, as its options have made it, a solver of the saddle-point system by iterations (couple_saddle.c).
+
+  Collective; after KSPSetFromOptions(). Its operator is that of SbCoupleCreateOperator(), its preconditioner one of SbPCCoupleCreate().
+  Tolerances are about the residual in the null space, as without it. Options read: -saddle_ksp_ (minres, or fgmres where the
+  preconditioner is not symmetric and definite).
+*/
+PetscErrorCode SbKSPSaddleSet(SbSpace space, KSP ksp);
+/* What is left to do for the solver of `snes` after SNESSetFromOptions(). Collective. */
+PetscErrorCode SbSolverFinish(SNES snes, SbSpace space);
 /* The operator that the preset works on. Collective; caller destroys. */
 PetscErrorCode SbSolverCreateOperator(SbSpace space, const SbSolverPreset *preset, Mat *A);
 

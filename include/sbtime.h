@@ -48,6 +48,9 @@ struct _p_SbRun {
   PetscInt max_cuts, static_steps;
   PetscBool tangent_known; /* J holds the tangent for shift_v, shift_a */
   PetscReal shift_v, shift_a;
+  PetscBool saddle;       /* some effect asks for multipliers as unknowns */
+  PetscInt saddle_choice; /* -multipliers: 0 by size, 1 direct, 2 iterative */
+  SbSaddle saddle_used;
   char solver_choice[SB_NAME_MAX]; /* as the scenario says: "auto" or a name */
   const struct _SbSolverPreset *solver_used;
   char solver[SB_NAME_MAX]; /* preset chosen, "cg_gamg" */

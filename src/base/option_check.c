@@ -131,6 +131,7 @@ static PetscBool looks_like_petsc(const char *name)
     "sbaij",
     "inner_",
     "coarse_",
+    "saddle_",
     "levels_",
     "prefix_",
   };

@@ -10,7 +10,8 @@
 
   Forces act along n at p and, by the same weights, on the facet: momentum is kept, and so is angular momentum where the gap is closed.
 
-  Response `projected`: rows that touch are exact (src/fem/couple.c); their multiplier is the force. After each solve the
+  Response `projected`: rows that touch are exact (src/fem/couple.c); their multiplier is the force. `multiplier`: the same, the
+  multipliers being unknowns of the solves. After each solve the
   surfaces are looked at again: a pulling row leaves, a penetrated point enters, n and b are taken anew, until nothing changes.
   A row that has come several times within a step stays, and n and b are kept after some looks: the loop ends. `penalty`: springs
   N = <-k g>. `augmented`: N = <lambda - k g> with a multiplier that is raised after each solve (Simo and Laursen 1992).
@@ -33,8 +34,9 @@
 
 static const SbOption rows[] = {
   {"on", SB_OPTION_NAMES, 1, "", "boundary", "", "sets whose surfaces may meet"},
-  {"response", SB_OPTION_CHOICE, 1, "", "projected", "projected|augmented|penalty",
-   "exact rows in the solve; multipliers raised on springs; springs"},
+  {"response", SB_OPTION_CHOICE, 1, "", "projected", "projected|multiplier|augmented|penalty",
+   "exact rows, the solve in their null space or with their multipliers as unknowns; multipliers raised on "
+   "springs; springs"},
   {"detection", SB_OPTION_CHOICE, 1, "", "hash", "hash|bvh|brute",
    "spatial hash, hierarchy of bounding volumes, or every pair: the same contacts"},
   {"sides", SB_OPTION_CHOICE, 1, "", "both", "one|both",
@@ -62,6 +64,7 @@ static PetscErrorCode options_collision(SbEffect e, const SbScope *scope)
   PetscCall(SbEffectReadOn(scope, &c->on));
   PetscCall(SbOptionChoice(scope, "response", &choice));
   c->response = (Response)choice;
+  e->saddle = (PetscBool)(c->response == MULTIPLIER);
   PetscCall(SbOptionChoice(scope, "detection", &choice));
   PetscCall(SbDetectorCreate((SbDetectKind)choice, &c->detector));
   PetscCall(SbOptionChoice(scope, "sides", &choice));
@@ -176,7 +179,7 @@ static PetscErrorCode setup_collision(SbEffect e, SbSpace space)
              e->name, e->name, e->name);
   PetscCall(PetscMalloc1(3 * space->nnode, &c->u0));
   if (c->reach == 0) c->reach = 0.5 * c->surface->edge;
-  PetscCall(SbSpaceCoupleCreate(space));
+  PetscCall(SbSpaceCoupleCreate(space, PETSC_FALSE));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -210,7 +213,7 @@ static PetscErrorCode touch_collision(SbEffect e, SbSpace space, PetscReal t, Pe
       hit->pressing = hit->lambda = 0;
       hit->slips = PETSC_FALSE;
     }
-    if (c->response != PROJECTED)
+    if (!exact(c->response))
       hit->on = (PetscBool)(hit->lambda - hit->k * (excess(hit) - TOLERANCE * c->surface->size) >= 0);
     else if (excess(hit) <= TOLERANCE * c->surface->size)
       hit->on = PETSC_TRUE;
@@ -320,7 +323,7 @@ static PetscErrorCode hold_collision(SbEffect e, SbSpace space)
     hit->row = hit->slide[0] = hit->slide[1] = -1;
     if (!hit->on) continue;
     coefficients(hit, hit->normal, coef);
-    if (c->response == PROJECTED)
+    if (exact(c->response))
       PetscCall(
         SbSpaceCoupleRow(space, row_id(c, i), hit->n, hit->node, coef, hit->value - hit->allowed, &hit->row));
     else
@@ -336,7 +339,7 @@ static PetscErrorCode hold_collision(SbEffect e, SbSpace space)
 /* Normal force after a solve, N. */
 static inline PetscReal normal_force(const Collision *c, const Hit *hit)
 {
-  if (c->response == PROJECTED) return hit->lambda;
+  if (exact(c->response)) return hit->lambda;
   return PetscMax(0, hit->lambda - hit->k * excess(hit));
 }
 
@@ -427,7 +430,7 @@ static void read_rows(const Collision *c, SbSpace space, Hit *hit)
     hit->gap = -hit->allowed; /* so those rows say; the next look tells more if it finds the pair */
     return;
   }
-  if (c->response == PROJECTED) hit->lambda = force;
+  if (exact(c->response)) hit->lambda = force;
   hit->gap = along - hit->value;
   if (hit->slide[0] < 0) return;
   for (int k = 0; k < 3; k++)
@@ -449,7 +452,7 @@ static PetscErrorCode settle_collision(SbEffect e, SbSpace space, const PetscRea
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &largest, 1, MPIU_REAL, MPI_MAX, space->comm));
   for (PetscInt i = 0; i < c->nhit; i++) {
     Hit *hit = &c->hit[i];
-    const PetscBool right = c->response == PROJECTED ? settle_row(c, largest, hit) : settle_spring(c, hit);
+    const PetscBool right = exact(c->response) ? settle_row(c, largest, hit) : settle_spring(c, hit);
 
     if (!right) mine = PETSC_TRUE;
   }

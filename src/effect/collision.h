@@ -9,7 +9,13 @@
 #define TOLERANCE 1e-7 /* of the size of the bodies: largest penetration that counts as touching */
 #define NODES 8        /* of a row, at most: of two cells; with a point one, and those of the facet's cell */
 
-typedef enum { PROJECTED, AUGMENTED, PENALTY } Response;
+typedef enum { PROJECTED, MULTIPLIER, AUGMENTED, PENALTY } Response;
+
+/* Whether rows that touch hold exactly. */
+static inline PetscBool exact(Response response)
+{
+  return (PetscBool)(response == PROJECTED || response == MULTIPLIER);
+}
 
 /*
   A point and the surface of another part, or its own, near it: `point` and `part`. Or two edges: `point` is the number of points and own

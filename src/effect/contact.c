@@ -7,7 +7,8 @@
   Response `projected`: touching nodes are held on the obstacle (src/fem/held.c): n . u is prescribed, and the force that this
   takes is the multiplier lambda. After each solve a pulling one leaves, a penetrated node enters, the normal is taken anew on a
   curved obstacle, and the solve is repeated until nothing changes (Kikuchi and Oden 1988; Hueeber and Wohlmuth 2005). A node that
-  has left and come back several times within a step stays: the loop ends.
+  has left and come back several times within a step stays: the loop ends. `multiplier`: the same with rows n . u = c (src/fem/couple.c),
+  whose forces are unknowns of the solves.
 
   Response `penalty`: springs, N = k <-g>, with k from the stiffness of the cell behind. `augmented`: the penalty with a multiplier,
   N = <lambda - k g>, which is raised after each solve until the penetration is within the tolerance (Simo and Laursen 1992).
@@ -35,8 +36,9 @@ static const SbOption rows[] = {
   {"obstacle_scale", SB_OPTION_REAL, 1, "", "1", "(0, inf)",
    "mesh: factor on the coordinates of the file; 0.001 for a file in mm"},
   {"obstacle_at", SB_OPTION_REALS, 3, "m", "0,0,0", "(-inf, inf)", "mesh: shift of the scaled mesh"},
-  {"response", SB_OPTION_CHOICE, 1, "", "projected", "projected|augmented|penalty",
-   "hold touching nodes on the obstacle; multipliers raised on springs; springs"},
+  {"response", SB_OPTION_CHOICE, 1, "", "projected", "projected|multiplier|augmented|penalty",
+   "hold touching nodes on the obstacle, or with the forces as unknowns of the solve; multipliers raised on "
+   "springs; springs"},
   {"friction", SB_OPTION_REAL, 1, "", "0", "[0, inf)", "Coulomb's coefficient for sticking"},
   {"friction_kinetic", SB_OPTION_REAL, 1, "", "-1", "[-1, inf)",
    "Coulomb's coefficient for slipping; negative: that for sticking"},
@@ -96,6 +98,7 @@ static PetscErrorCode options_contact(SbEffect e, const SbScope *scope)
   PetscCall(read_obstacle(e, scope));
   PetscCall(SbOptionChoice(scope, "response", &choice));
   c->response = (Response)choice;
+  e->saddle = (PetscBool)(c->response == MULTIPLIER);
   PetscCall(SbOptionReal(scope, "friction", &c->mu));
   PetscCall(SbOptionReal(scope, "friction_kinetic", &c->mu_kinetic));
   if (c->mu_kinetic < 0) c->mu_kinetic = c->mu;
@@ -107,7 +110,7 @@ static PetscErrorCode options_contact(SbEffect e, const SbScope *scope)
   PetscCall(SbOptionReal(scope, "recovery", &c->recovery));
   c->recovery = c->recovery > 1 ? PetscExpReal(-1 / c->recovery) : 0;
   PetscCall(read_path(e, scope));
-  if (c->response == PROJECTED) {
+  if (exact(c)) {
     if (c->mu <= 0) e->ops.tangent = NULL;
     e->linear = (PetscBool)(c->mu <= 0);
   } else {
@@ -172,6 +175,7 @@ static PetscErrorCode setup_contact(SbEffect e, SbSpace space)
   }
   c->size = PetscSqrtReal(SbDot3(box, box));
   if (c->response == PROJECTED) PetscCall(SbSpaceHoldCreate(space));
+  if (c->response == MULTIPLIER) PetscCall(SbSpaceCoupleCreate(space, PETSC_TRUE));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -191,8 +195,7 @@ static PetscReal rest_of(const Contact *c, const SbPose *from, const Touch *touc
 {
   PetscReal n[3];
   /* what touches springs is behind by what they give; projected it is where it was held */
-  const PetscReal depth =
-    touch->on && c->response != PROJECTED ? -touch->kept : -SbContactGap(c, from, x0, n);
+  const PetscReal depth = touch->on && !exact(c) ? -touch->kept : -SbContactGap(c, from, x0, n);
 
   return depth > TOLERANCE * c->size ? -c->recovery * depth : 0;
 }
@@ -220,7 +223,7 @@ static PetscErrorCode touch_contact(SbEffect e, SbSpace space, PetscReal t, Pets
       touch->pressing = 0;
       touch->slips = PETSC_FALSE;
     }
-    if (look(c, space, x, touch) < 0 && c->response == PROJECTED) touch->on = PETSC_TRUE;
+    if (look(c, space, x, touch) < 0 && exact(c)) touch->on = PETSC_TRUE;
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -233,7 +236,13 @@ static PetscErrorCode hold_contact(SbEffect e, SbSpace space)
   for (PetscInt i = 0; i < c->n; i++) {
     Touch *touch = &c->touch[i];
 
-    touch->along = touch->on ? SbSpaceHold(space, touch->node, touch->n, touch->value) : -1;
+    touch->along = -1;
+    if (!touch->on) continue;
+    if (c->response == PROJECTED)
+      touch->along = SbSpaceHold(space, touch->node, touch->n, touch->value);
+    else
+      PetscCall(SbSpaceCoupleRow(space, -1 - space->node_orig[touch->node], 1, &space->gnode[touch->node],
+                                 touch->n, touch->value, &touch->along));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -249,12 +258,12 @@ static PetscErrorCode measure(const Contact *c, SbSpace space, const PetscReal u
     const PetscInt node = touch->node;
     PetscReal x[3];
 
-    if (c->response == PROJECTED)
-      touch->lambda =
-        touch->on && touch->along >= 0 ? SbSpaceHoldForce(space, node, touch->along, r + 3 * node) : 0;
+    if (c->response == MULTIPLIER && touch->along >= 0 && SbSpaceCoupleRests(space, touch->along))
+      touch->along = -1;
+    if (exact(c)) touch->lambda = SbContactMultiplier(c, space, touch, r + 3 * node);
     place(space, node, u, x);
     touch->gap = look(c, space, x, touch);
-    *largest = PetscMax(*largest, c->response == PROJECTED ? touch->lambda : spring(touch, touch->gap));
+    *largest = PetscMax(*largest, exact(c) ? touch->lambda : spring(touch, touch->gap));
   }
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, largest, 1, MPIU_REAL, MPI_MAX, space->comm));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -301,7 +310,7 @@ static PetscErrorCode settle_friction(Contact *c, SbSpace space, PetscReal large
   c->updates++;
   for (PetscInt i = 0; i < c->n; i++) {
     Touch *touch = &c->touch[i];
-    const PetscReal normal = c->response == PROJECTED ? touch->lambda : spring(touch, touch->gap);
+    const PetscReal normal = exact(c) ? touch->lambda : spring(touch, touch->gap);
     const PetscReal change = normal - touch->pressing;
 
     if (PetscAbsReal(change) > SETTLED * largest) *changed = PETSC_TRUE;

@@ -7,7 +7,7 @@
 
 #define TOLERANCE 1e-7 /* of the size of the bodies: largest penetration that counts as touching */
 
-typedef enum { PROJECTED, AUGMENTED, PENALTY } Response;
+typedef enum { PROJECTED, MULTIPLIER, AUGMENTED, PENALTY } Response;
 
 /* A node of the surface that this rank owns. */
 typedef struct {
@@ -16,7 +16,7 @@ typedef struct {
   PetscBool on;           /* it touches; with springs: it did at the end of the last step */
   int toggles;            /* how often it came within the step */
   PetscBool slips;        /* it slid at the end of the last step */
-  PetscInt along;         /* number of its direction at the node, -1: held by something else */
+  PetscInt along;         /* number of its direction at the node, or of its row; -1: held by something else */
   PetscReal n[3];         /* normal at the last look, outwards from the obstacle */
   PetscReal value;        /* n . u that puts it on the obstacle, m */
   PetscReal rest;         /* gap that it is held at: 0, or minus what is left of an overlap, m */
@@ -43,6 +43,12 @@ typedef struct {
   SbPose to;      /* at the end of the step */
 } Contact;
 
+/* Whether touching nodes are held exactly. */
+static inline PetscBool exact(const Contact *c)
+{
+  return (PetscBool)(c->response == PROJECTED || c->response == MULTIPLIER);
+}
+
 /* The obstacle's pose at time t. */
 void SbContactPose(const Contact *c, PetscReal t, SbPose *pose);
 /* Gap of a point, m, and the normal there. */
@@ -59,6 +65,8 @@ static inline PetscReal spring(const Touch *touch, PetscReal gap)
   return PetscMax(0, touch->lambda - touch->k * gap);
 }
 
+/* What a solve has made of the force that holds a node, N; r: the residual there. */
+PetscReal SbContactMultiplier(const Contact *c, SbSpace space, const Touch *touch, const PetscReal r[3]);
 /* Operations of the effect (sbeffect.h). */
 PetscErrorCode SbEffectForce_Contact(SbEffect e, SbSpace space, const SbStage *stage, PetscReal f[]);
 PetscErrorCode SbEffectTangent_Contact(SbEffect e, SbSpace space, const SbStage *stage, Mat A);

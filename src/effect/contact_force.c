@@ -41,7 +41,7 @@ static PetscReal normal_force(const Contact *c, const SbPose *pose, const Touch 
 {
   const PetscReal gap = SbContactGap(c, pose, x, n);
 
-  if (c->response == PROJECTED) return touch->on && touch->along >= 0 ? touch->lambda : 0;
+  if (exact(c)) return touch->on && touch->along >= 0 ? touch->lambda : 0;
   return spring(touch, gap - touch->rest);
 }
 
@@ -72,7 +72,7 @@ PetscErrorCode SbEffectForce_Contact(SbEffect e, SbSpace space, const SbStage *s
     PetscReal *fi = f + 3 * touch->node, x[3], n[3], t[3];
 
     place(space, touch->node, stage->u, x);
-    if (c->response != PROJECTED) {
+    if (!exact(c)) {
       const PetscReal normal = normal_force(c, &pose, touch, x, n);
 
       for (int k = 0; k < 3; k++) fi[k] += normal * n[k];
@@ -91,7 +91,7 @@ static PetscBool stiffness_of(const Contact *c, const SbPose *pose, const Touch 
 {
   PetscReal n[3], t[3], along, across = 0, length, sliding = 0;
 
-  along = normal_force(c, pose, touch, x, n) > 0 && c->response != PROJECTED ? touch->k : 0;
+  along = normal_force(c, pose, touch, x, n) > 0 && !exact(c) ? touch->k : 0;
   if (touch->pressing > 0) {
     const PetscReal share = drag(c, pose, touch, x, n, t);
 
@@ -143,7 +143,7 @@ PetscErrorCode SbEffectAccept_Contact(SbEffect e, SbSpace space, const SbStage *
 
     place(space, touch->node, stage->u, x);
     normal = normal_force(c, &pose, touch, x, n);
-    if (c->response != PROJECTED) touch->on = (PetscBool)(normal > 0);
+    if (!exact(c)) touch->on = (PetscBool)(normal > 0);
     touch->kept = touch->rest;
     if (touch->pressing <= 0) continue;
     touch->slips = (PetscBool)(drag(c, &pose, touch, x, n, t) < 1);
@@ -152,6 +152,16 @@ PetscErrorCode SbEffectAccept_Contact(SbEffect e, SbSpace space, const SbStage *
     SbPoseInvert(&pose, x, touch->anchor);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscReal SbContactMultiplier(const Contact *c, SbSpace space, const Touch *touch, const PetscReal r[3])
+{
+  PetscReal force, at;
+
+  if (!touch->on || touch->along < 0) return 0;
+  if (c->response == PROJECTED) return SbSpaceHoldForce(space, touch->node, touch->along, r);
+  SbSpaceCoupleGet(space, touch->along, &force, &at);
+  return force;
 }
 
 /* Force of the obstacle on a node at x, N. */
@@ -163,8 +173,7 @@ static void force_on(const Contact *c, const SbPose *pose, SbSpace space, const 
   f[0] = f[1] = f[2] = 0;
   if (normal <= 0) return;
   if (touch->pressing > 0) (void)drag(c, pose, touch, x, n, f);
-  if (c->response == PROJECTED)
-    normal = SbSpaceHoldForce(space, touch->node, touch->along, residual + 3 * touch->node);
+  if (exact(c)) normal = SbContactMultiplier(c, space, touch, residual + 3 * touch->node);
   for (int k = 0; k < 3; k++) f[k] += normal * n[k];
 }
 
@@ -181,6 +190,8 @@ PetscErrorCode SbEffectPush_Contact(SbEffect e, SbSpace space, const SbStage *st
 
     place(space, c->touch[i].node, stage->u, x);
     force_on(c, &pose, space, &c->touch[i], x, residual, force);
+    if (c->response == MULTIPLIER) /* its rows push without it */
+      (void)tangential(c->touch[i].n, force, force);
     for (int k = 0; k < 3; k++) f[3 * c->touch[i].node + k] += force[k];
   }
   PetscFunctionReturn(PETSC_SUCCESS);

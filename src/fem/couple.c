@@ -13,24 +13,31 @@
 
   G D G^T has the rows of all ranks, which are few, and is factored on each of them.
 
+  Where an effect asks for it, the saddle-point system itself is solved in the place of A: couple_factor.c, couple_saddle.c.
+
   Nodes that are prescribed or held (held.c) have no say: their columns are cleared or projected.
 */
 #include "couple.h"
 
-#define REGULAR \
-  1e-8 /* relative, on the diagonal of what is factored: keeps rows that depend on others solvable */
 #define NOTHING 1e-20 /* of the largest on that diagonal: rows below it have no free node but for rounding */
 
-PetscErrorCode SbSpaceCoupleCreate(SbSpace s)
+PetscErrorCode SbSpaceCoupleCreate(SbSpace s, PetscBool outer)
 {
   SbCouple c;
 
   PetscFunctionBeginUser;
-  if (s->couple) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(PetscNew(&c));
-  PetscCall(PetscCalloc1(1, &c->start));
-  s->couple = c;
+  if (!s->couple) {
+    PetscCall(PetscNew(&c));
+    PetscCall(PetscCalloc1(1, &c->start));
+    s->couple = c;
+  }
+  if (outer) s->couple->outer = PETSC_TRUE;
   PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscBool SbSpaceCoupleOuter(SbSpace s)
+{
+  return (PetscBool)(s->couple && s->couple->outer);
 }
 
 static PetscErrorCode destroy_rows(Rows *r)
@@ -66,6 +73,7 @@ PetscErrorCode SbCoupleDestroy(SbCouple *couple)
   PetscFunctionBeginUser;
   if (!c) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(destroy_matrices(c));
+  PetscCall(SbFactoredDestroy(&c->factored));
   PetscCall(VecDestroy(&c->anchor));
   PetscCall(VecDestroy(&c->added));
   PetscCall(VecDestroy(&c->free));
@@ -302,7 +310,7 @@ static PetscErrorCode regularise(SbCouple c)
   for (PetscInt i = 0; i < c->n; i++) {
     if (!of_kind(c, i, PETSC_TRUE)) continue;
     if (x[c->place[i]] > NOTHING * largest)
-      x[c->place[i]] *= 1. + REGULAR;
+      x[c->place[i]] *= 1. + SB_COUPLE_REGULAR;
     else {
       x[c->place[i]] = largest > 0. ? largest : 1.;
       c->rests[i] = PETSC_TRUE;
@@ -432,6 +440,7 @@ PetscErrorCode SbSpaceCoupleDone(SbSpace s)
 
   PetscFunctionBeginUser;
   PetscCall(destroy_matrices(c));
+  c->version++;
   PetscCallMPI(MPI_Allreduce(&c->n, &total, 1, MPIU_INT, MPI_SUM, s->comm));
   if (!total) { /* bodies are apart: nothing more is exchanged or made */
     if (c->anchor) PetscCall(VecZeroEntries(c->anchor));
@@ -449,8 +458,8 @@ PetscErrorCode SbSpaceCoupleDone(SbSpace s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* y = (G D G^T)^-1 w, but for REGULAR; every use is repeated with what the first left. */
-static PetscErrorCode solve_rows(SbCouple c)
+/* y = (G D G^T)^-1 w, but for SB_COUPLE_REGULAR; every use is repeated with what the first left. */
+PetscErrorCode SbCoupleSolveGram(SbCouple c)
 {
   PetscFunctionBeginUser;
   PetscCall(KSPSolve(c->solver, c->exact.work, c->exact.step));
@@ -460,27 +469,27 @@ static PetscErrorCode solve_rows(SbCouple c)
 PetscErrorCode SbCoupleProject(SbCouple c, Vec x)
 {
   PetscFunctionBeginUser;
-  for (int pass = 0; c->exact.N && pass < 2; pass++) {
+  for (int pass = 0; c->exact.N && pass < c->passes; pass++) {
     PetscCall(MatMult(c->exact.free, x, c->exact.work));
     PetscCall(VecScale(c->exact.work, -1.));
-    PetscCall(solve_rows(c));
+    PetscCall(SbCoupleSolveGram(c));
     PetscCall(MatMultAdd(c->DGt, c->exact.step, x, x));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /*
-  r <- P^T r; the multipliers into c->exact.force. They may be much larger than what is left: the second pass also takes away
+  r <- P^T r; the multipliers into c->exact.force. They may be much larger than what is left: the later passes also take away
   their rounding, which would be a residual that no iteration lowers.
 */
 PetscErrorCode SbCoupleProjectForce(SbCouple c, Vec r)
 {
   PetscFunctionBeginUser;
   if (c->exact.N) PetscCall(VecZeroEntries(c->exact.force));
-  for (int pass = 0; c->exact.N && pass < 2; pass++) {
+  for (int pass = 0; c->exact.N && pass < c->passes; pass++) {
     PetscCall(MatMultTranspose(c->DGt, r, c->exact.work));
     PetscCall(VecScale(c->exact.work, -1.));
-    PetscCall(solve_rows(c));
+    PetscCall(SbCoupleSolveGram(c));
     PetscCall(MatMultTransposeAdd(c->exact.free, c->exact.step, r, r));
     PetscCall(VecAXPY(c->exact.force, -1., c->exact.step));
   }
@@ -492,10 +501,10 @@ PetscErrorCode SbCouplePrescribe(SbSpace s, Vec U)
   SbCouple c = s->couple;
 
   PetscFunctionBeginUser;
-  for (int pass = 0; c->exact.N && pass < 2; pass++) {
+  for (int pass = 0; c->exact.N && pass < c->passes; pass++) {
     PetscCall(MatMult(c->exact.whole, U, c->exact.work));
     PetscCall(VecAYPX(c->exact.work, -1., c->exact.value));
-    PetscCall(solve_rows(c));
+    PetscCall(SbCoupleSolveGram(c));
     PetscCall(MatMultAdd(c->DGt, c->exact.step, U, U));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -550,9 +559,8 @@ PetscErrorCode SbSpaceCoupleMeasure(SbSpace s, Vec U, Vec R)
     PetscCall(SbCoupleProjectForce(c, c->w[0]));
     PetscCall(hand_out(c, PETSC_TRUE, c->exact.force, c->force));
     /* the rest is what supports and obstacles push with */
-    PetscCall(VecScale(c->exact.force, -1.));
-    PetscCall(MatMultTransposeAdd(c->exact.whole, c->exact.force, R, R));
-    PetscCall(VecScale(c->exact.force, -1.));
+    PetscCall(VecAXPBY(c->exact.work, -1., 0., c->exact.force));
+    PetscCall(MatMultTransposeAdd(c->exact.whole, c->exact.work, R, R));
     PetscCall(MatMult(c->exact.whole, U, c->exact.work));
     PetscCall(hand_out(c, PETSC_TRUE, c->exact.work, c->sum));
   }
@@ -560,6 +568,24 @@ PetscErrorCode SbSpaceCoupleMeasure(SbSpace s, Vec U, Vec R)
     PetscCall(stretch(c, U));
     PetscCall(hand_out(c, PETSC_FALSE, c->spring.force, c->force));
     PetscCall(hand_out(c, PETSC_FALSE, c->spring.work, c->sum));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbSpaceCoupleReaction(SbSpace s, Vec R)
+{
+  SbCouple c = s->couple;
+  PetscScalar *x;
+
+  PetscFunctionBeginUser;
+  if (c->exact.N) {
+    PetscCall(VecCopy(c->exact.force, c->exact.work));
+    PetscCall(VecGetArray(c->exact.work, &x));
+    for (PetscInt i = 0; i < c->n; i++) {
+      if (of_kind(c, i, PETSC_TRUE) && c->id[i] >= 0) x[c->place[i]] = 0.;
+    }
+    PetscCall(VecRestoreArray(c->exact.work, &x));
+    PetscCall(MatMultTransposeAdd(c->exact.free, c->exact.work, R, R));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }

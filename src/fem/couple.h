@@ -1,5 +1,5 @@
 /*
-  couple.h - rows between nodes: what couple.c, couple_operator.c and couple_select.c share.
+  couple.h - rows between nodes: what the files couple*.c share.
 */
 #pragma once
 #include "fem_impl.h"
@@ -12,14 +12,24 @@ typedef struct {
   Vec value, force, work, step; /* by rows */
 } Rows;
 
+/* Scaled part of G D G^T on the diagonal of what is factored: rows that depend on others leave it regular. */
+#define SB_COUPLE_REGULAR 1e-8
+
+typedef struct _p_SbFactored *SbFactored; /* couple_factor.c */
+
 struct _p_SbCouple {
-  PetscInt n, size; /* rows, room */
-  PetscInt *start;  /* [n+1] */
+  SbSaddle saddle;          /* how solves find the multipliers */
+  PetscBool outer;          /* rows may tie nodes to something that is no body */
+  PetscInt version, matrix; /* raised when the rows change, and when K does */
+  SbFactored factored;      /* NULL before the first solve with SB_SADDLE_DIRECT */
+  PetscInt n, size;         /* rows, room */
+  PetscInt *start;          /* [n+1] */
   PetscInt nentry, entry_size;
   PetscInt *gnode;                         /* [nentry] */
   PetscReal *coef;                         /* [nentry][3] */
   PetscReal *value, *stiffness, *constant; /* [n]; stiffness -1: exact */
   PetscInt *id;                            /* [n] */
+  int passes;                              /* of a projection: more where rows are nearly dependent */
   PetscBool *rests;                        /* [n] an exact row that earlier ones say already */
   PetscInt *place;                         /* [n] row in its matrix on this rank */
   PetscReal *force, *sum;                  /* [n] */
@@ -40,5 +50,17 @@ struct _p_SbCouple {
 PetscErrorCode SbCoupleSelect(SbSpace space);
 /* x <- P x. Collective. */
 PetscErrorCode SbCoupleProject(SbCouple c, Vec x);
+/* y = (K + S^T k S) x, what was added to K taken away. Collective. */
+PetscErrorCode SbCoupleMultiply(SbCouple c, Vec x, Vec y);
+/* step = (G D G^T)^-1 work, vectors of c->exact. Collective. */
+PetscErrorCode SbCoupleSolveGram(SbCouple c);
 /* r <- P^T r; the multipliers into c->exact.force, N. Collective. */
 PetscErrorCode SbCoupleProjectForce(SbCouple c, Vec r);
+
+/*
+  z of [K + S^T k S, G^T; G, 0] [z; m] = [r; 0] by a factorisation, which is renewed when K or the rows have changed. Collective.
+
+  Output: ok, false when the matrix could not be factored; z is not a number then.
+*/
+PetscErrorCode SbCoupleFactoredSolve(SbSpace space, Vec r, Vec z, PetscBool *ok);
+PetscErrorCode SbFactoredDestroy(SbFactored *factored);

@@ -1,18 +1,15 @@
 /*
   What solves see of the rows of couple.c: the operator A = P^T (K + S^T k S) P, and M_A^-1 = P M^-1 P^T around any preconditioner M.
+
+  With SB_SADDLE_DIRECT the part of M is taken by the solution of the saddle-point system, which is A's inverse in the null space: one
+  iteration and what rounding asks for. Where nothing touches, M itself is used.
 */
 #include "couple.h"
 #include "sbsolver.h"
 
-/* y = P^T (K + S^T k S) x for x in the null space, where the iteration stays. */
-static PetscErrorCode multiply(Mat A, Vec x, Vec y)
+PetscErrorCode SbCoupleMultiply(SbCouple c, Vec x, Vec y)
 {
-  SbSpace s;
-  SbCouple c;
-
   PetscFunctionBeginUser;
-  PetscCall(MatShellGetContext(A, &s));
-  c = s->couple;
   PetscCall(MatMult(c->K, x, y));
   if (c->added) {
     PetscCall(VecPointwiseMult(c->w[0], c->added, x));
@@ -23,11 +20,22 @@ static PetscErrorCode multiply(Mat A, Vec x, Vec y)
     PetscCall(VecPointwiseMult(c->spring.work, c->spring.work, c->k));
     PetscCall(MatMultTransposeAdd(c->spring.free, c->spring.work, y, y));
   }
-  PetscCall(SbCoupleProjectForce(c, y));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbCoupleCreateOperator(SbSpace s, Mat K, PetscBool singular, Mat *A)
+/* y = P^T (K + S^T k S) x for x in the null space, where the iteration stays. */
+static PetscErrorCode multiply(Mat A, Vec x, Vec y)
+{
+  SbSpace s;
+
+  PetscFunctionBeginUser;
+  PetscCall(MatShellGetContext(A, &s));
+  PetscCall(SbCoupleMultiply(s->couple, x, y));
+  PetscCall(SbCoupleProjectForce(s->couple, y));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbCoupleCreateOperator(SbSpace s, Mat K, PetscBool singular, SbSaddle saddle, Mat *A)
 {
   PetscInt m, n, M, N;
 
@@ -38,7 +46,8 @@ PetscErrorCode SbCoupleCreateOperator(SbSpace s, Mat K, PetscBool singular, Mat 
   PetscCall(MatShellSetOperation(*A, MATOP_MULT, SB_OPERATION(multiply)));
   PetscCall(MatSetOption(*A, MAT_SYMMETRIC, PETSC_TRUE));
   s->couple->K = K;
-  if (singular) {
+  s->couple->saddle = saddle;
+  if (singular && saddle != SB_SADDLE_DIRECT) {
     PetscCall(SbSpaceCreateVec(s, &s->couple->anchor));
     PetscCall(SbSpaceCreateVec(s, &s->couple->added));
   }
@@ -53,6 +62,12 @@ typedef struct {
   PetscBool configured;
 } Wrapped;
 
+/* Whether solves go by a factorisation of the saddle-point system now. */
+static PetscBool is_factored(SbSpace s)
+{
+  return (PetscBool)(s->couple->saddle == SB_SADDLE_DIRECT && s->couple->exact.N);
+}
+
 static PetscErrorCode setup_wrapped(PC pc)
 {
   PCFailedReason reason;
@@ -65,6 +80,9 @@ static PetscErrorCode setup_wrapped(PC pc)
   PetscCall(PCSetOperators(w->inner, K, K));
   if (!w->configured) PetscCall(PCSetFromOptions(w->inner));
   w->configured = PETSC_TRUE;
+  PetscCall(PCSetFailedReason(pc, PC_NOERROR));
+  w->space->couple->matrix++;
+  if (is_factored(w->space)) PetscFunctionReturn(PETSC_SUCCESS); /* K alone may be singular */
   PetscCall(PCSetUp(w->inner));
   PetscCall(PCGetFailedReason(w->inner, &reason));
   PetscCall(PCSetFailedReason(pc, reason));
@@ -80,6 +98,16 @@ static PetscErrorCode apply_wrapped(PC pc, Vec r, Vec z)
   PetscFunctionBeginUser;
   PetscCall(PCShellGetContext(pc, &w));
   c = w->space->couple;
+  if (is_factored(w->space)) {
+    PetscBool ok;
+
+    PetscCall(VecCopy(r, c->w[1]));
+    PetscCall(SbCoupleProjectForce(c, c->w[1]));
+    PetscCall(SbCoupleFactoredSolve(w->space, c->w[1], z, &ok));
+    if (ok) PetscCall(SbCoupleProject(c, z));
+    PetscCall(PCSetFailedReason(pc, ok ? PC_NOERROR : PC_FACTOR_NUMERIC_ZEROPIVOT));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
   if (!c->exact.N)
     PetscCall(PCApply(w->inner, r, z));
   else {
@@ -153,5 +181,19 @@ PetscErrorCode SbPCCoupleGetInner(PC pc, PC *inner)
   if (!name || strcmp(name, NAME)) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PCShellGetContext(pc, &w));
   *inner = w->inner;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbPCCoupleIsFactored(PC pc, PetscBool *is)
+{
+  Wrapped *w;
+  PC inner;
+
+  PetscFunctionBeginUser;
+  *is = PETSC_FALSE;
+  PetscCall(SbPCCoupleGetInner(pc, &inner));
+  if (inner == pc) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PCShellGetContext(pc, &w));
+  *is = is_factored(w->space);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

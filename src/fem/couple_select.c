@@ -11,6 +11,8 @@
 
 #define DEPENDS \
   0.05 /* squared part of a row outside the span of its neighbours; below it the row rests: normals within 13 degrees */
+#define SAID \
+  1e-4 /* the same for a row that holds a node on something that is no body: two of a node may stand at a small angle */
 #define NEAR 48 /* neighbours that are looked at */
 
 /* Rows of all ranks, alike on each. */
@@ -138,6 +140,19 @@ static PetscReal outside(const All *a, PetscInt i)
   return whole > 0. ? rest / whole : 0.;
 }
 
+/* Rows of the same identity are of one point, so of one rank: there in the order in which they were written. */
+static void sort_equals(const All *a, PetscInt order[])
+{
+  for (PetscInt q = 1; q < a->n; q++) {
+    for (PetscInt k = q; k > 0 && a->id[order[k]] == a->id[order[k - 1]] && order[k] < order[k - 1]; k--) {
+      const PetscInt swap = order[k];
+
+      order[k] = order[k - 1];
+      order[k - 1] = swap;
+    }
+  }
+}
+
 PetscErrorCode SbCoupleSelect(SbSpace s)
 {
   SbCouple c = s->couple;
@@ -147,13 +162,17 @@ PetscErrorCode SbCoupleSelect(SbSpace s)
 
   PetscFunctionBeginUser;
   PetscCall(gather_rows(s, &a));
+  c->passes = 2;
   PetscCall(PetscMalloc2(a.n, &order, a.n, &rests));
   for (PetscInt i = 0; i < a.n; i++) order[i] = i;
   PetscCall(PetscSortIntWithPermutation(a.n, a.id, order));
+  sort_equals(&a, order);
   for (PetscInt q = 0; q < a.n; q++) {
     const PetscInt i = order[q];
+    const PetscReal part = outside(&a, i);
 
-    rests[i] = (PetscBool)(outside(&a, i) < DEPENDS);
+    rests[i] = (PetscBool)(part < (a.id[i] < 0 ? SAID : DEPENDS));
+    if (!rests[i] && part < DEPENDS) c->passes = 4;
     for (PetscInt e = a.start[i]; !rests[i] && e < a.start[i + 1]; e++) {
       a.next[e] = a.head[a.node[e]];
       a.head[a.node[e]] = e;

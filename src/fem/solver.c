@@ -7,6 +7,7 @@
   PCSOR, which does the largest number of sweeps without looking at the residual. A solve that does not reach its tolerance fails; the
   step is then cut or the run stops.
 */
+#include "couple.h"
 #include "sbsolver.h"
 
 #define NU_PRESSURE 0.45 /* from here on, dynamic runs of CR and DG do better with the pressures apart */
@@ -238,8 +239,23 @@ PetscErrorCode SbSolverSetUp(SNES snes, SbSpace s, const SbSolverPreset *preset)
   PetscCall(KSPGetPC(ksp, &pc));
   /* in a null space the residual of CG may grow a long way before it falls */
   if (s->couple) PetscCall(KSPSetTolerances(ksp, PETSC_DEFAULT, PETSC_DEFAULT, 1e10, PETSC_DEFAULT));
+  if (s->couple && s->couple->saddle == SB_SADDLE_DIRECT) {
+    PetscCall(SbSolverLookAtResidual(ksp));
+    PetscCall(insert_options("-saddle_mat_mumps_icntl_14 100"));
+  }
   PetscCall(SbPCCoupleCreate(s, pc, &pc));
   if (preset->precondition) PetscCall(preset->precondition(s, pc));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbSolverFinish(SNES snes, SbSpace s)
+{
+  KSP ksp;
+
+  PetscFunctionBeginUser;
+  if (!s->couple || s->couple->saddle != SB_SADDLE_ITERATIVE) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(SNESGetKSP(snes, &ksp));
+  PetscCall(SbKSPSaddleSet(s, ksp));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -248,7 +264,7 @@ PetscErrorCode SbSolverFallBack(SNES snes, PetscBool *changed)
   KSP ksp;
   PC pc;
   KSPConvergedReason reason;
-  PetscBool incomplete, symmetric;
+  PetscBool incomplete, symmetric, factored;
   Mat A;
 
   PetscFunctionBeginUser;
@@ -256,6 +272,8 @@ PetscErrorCode SbSolverFallBack(SNES snes, PetscBool *changed)
   PetscCall(SNESGetKSP(snes, &ksp));
   PetscCall(KSPGetConvergedReason(ksp, &reason));
   PetscCall(KSPGetPC(ksp, &pc));
+  PetscCall(SbPCCoupleIsFactored(pc, &factored));
+  if (factored) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(SbPCCoupleGetInner(pc, &pc));
   PetscCall(SbPCCoarseFallBack(pc, reason, changed));
   if (*changed) PetscFunctionReturn(PETSC_SUCCESS);

@@ -11,7 +11,7 @@
 #include "sbsolver.h"
 #include <petsc/private/kspimpl.h>
 
-#define AT_MOST 1e-2 /* of the right-hand side */
+#define AT_MOST 1e-2 /* of the right-hand side, where no more than that is asked for */
 
 static PetscErrorCode look(KSP ksp, Vec b, Vec x, void *ctx)
 {
@@ -29,7 +29,8 @@ static PetscErrorCode look(KSP ksp, Vec b, Vec x, void *ctx)
   PetscCall(VecNorm(b, NORM_2, &size));
   PetscCall(VecNorm(r, NORM_2, &residual));
   PetscCall(VecDestroy(&r));
-  if (PetscIsInfOrNanReal(residual) || residual > PetscMax(AT_MOST * size, ksp->abstol)) {
+  if (PetscIsInfOrNanReal(residual) ||
+      residual > PetscMax(PetscMax(AT_MOST, 2. * ksp->rtol) * size, ksp->abstol)) {
     PetscCall(
       PetscInfo(ksp, "true residual %g of a right-hand side of %g\n", (double)residual, (double)size));
     ksp->reason = KSP_DIVERGED_BREAKDOWN;

@@ -48,6 +48,20 @@ static PetscErrorCode accept_effects(SbRun run, PetscInt step, PetscReal t, Pets
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Leaves of a residual what is on prescribed unknowns. */
+static PetscErrorCode keep_reactions(SbSpace s, Vec R)
+{
+  PetscScalar *r;
+
+  PetscFunctionBeginUser;
+  PetscCall(VecGetArray(R, &r));
+  for (PetscInt i = 0; i < 3 * s->nnode_owned; i++) {
+    if (!(s->fixed[i / 3] & (1 << i % 3))) r[i] = 0.;
+  }
+  PetscCall(VecRestoreArray(R, &r));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* R with the acceleration of the integrator; where it keeps none (TSALPHA2) inertia is left out of the reactions.
    Forces between bodies are taken out. */
 static PetscErrorCode unconstrained_residual(SbRun run, PetscReal t, Vec R)
@@ -62,6 +76,10 @@ static PetscErrorCode unconstrained_residual(SbRun run, PetscReal t, Vec R)
     SbHeldReaction(run->model->space, r);
     PetscCall(VecRestoreArray(R, &r));
   }
+  if (SbSpaceCoupleOuter(run->model->space)) {
+    if (!run->model->space->held) PetscCall(keep_reactions(run->model->space, R));
+    PetscCall(SbSpaceCoupleReaction(run->model->space, R));
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -69,6 +87,7 @@ static PetscErrorCode unconstrained_residual(SbRun run, PetscReal t, Vec R)
 static PetscErrorCode works(SbRun run, Vec loads, Vec reaction, PetscReal sums[2])
 {
   SbSpace s = run->model->space;
+  const PetscBool obstacles = (PetscBool)(s->held || SbSpaceCoupleOuter(s));
   const PetscScalar *u, *u0, *f, *f0, *r, *r0;
 
   PetscFunctionBeginUser;
@@ -87,7 +106,7 @@ static PetscErrorCode works(SbRun run, Vec loads, Vec reaction, PetscReal sums[2
     }
   }
   /* elsewhere what is left of it is what contact pushes with, now or a step ago */
-  for (PetscInt i = 0; s->held && i < 3 * s->nnode_owned; i++) {
+  for (PetscInt i = 0; obstacles && i < 3 * s->nnode_owned; i++) {
     if (!(s->fixed[i / 3] & (1 << i % 3))) sums[1] += (r[i] + r0[i]) * (u[i] - u0[i]);
   }
   PetscCall(VecRestoreArrayRead(run->U, &u));

@@ -34,6 +34,10 @@ static const SbOption rows[] = {
    "where Newton starts a step: at the old displacement, or moved on by the velocity"},
   {"time_max_cuts", SB_OPTION_INT, 1, "", "10", "[0, 60]",
    "how often a step that fails is halved before the run stops"},
+  {"multipliers", SB_OPTION_CHOICE, 1, "", "auto", "auto|direct|iterative",
+   "how effects with response multiplier solve for displacements and multipliers: by a factorisation of "
+   "both, or by "
+   "MINRES with the preconditioner of the solver; auto goes by size"},
   {"static_steps", SB_OPTION_INT, 1, "", "1", "[1, 1000000]",
    "static: equal load steps from zero to full load"},
 };
@@ -92,6 +96,9 @@ PetscErrorCode SbRunCreate(SbModel model, SbRun *run)
     PetscCall(SbOptionReal(&scope, "time_newmark_gamma", &r->newmark[1]));
   }
   PetscCall(SbOptionInt(&scope, "time_max_cuts", &r->max_cuts));
+  for (PetscInt e = 0; e < model->neffect; e++)
+    r->saddle = (PetscBool)(r->saddle || model->effect[e]->saddle);
+  if (r->saddle) PetscCall(SbOptionChoice(&scope, "multipliers", &r->saddle_choice));
   PetscCall(SbSolverSetFromOptions(r->solver_choice, sizeof(r->solver_choice)));
   *run = r;
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -295,6 +302,7 @@ static PetscErrorCode set_up_ts(SbRun run)
   /* read already, and set below */
   if (SB_TS_DT_RENAMED) PetscCall(PetscOptionsClearValue(NULL, "-ts_dt"));
   PetscCall(TSSetFromOptions(run->ts));
+  PetscCall(SbSolverFinish(run->snes, m->space));
   PetscCall(find_search(run));
   PetscCall(forcing_terms(run->snes));
   PetscCall(TSSetMaxTime(run->ts, run->t_end));
@@ -321,6 +329,7 @@ static PetscErrorCode set_up_static(SbRun run)
   PetscCall(set_up_snes(run));
   PetscCall(SbSolverSetUp(run->snes, run->model->space, run->solver_used));
   PetscCall(SNESSetFromOptions(run->snes));
+  PetscCall(SbSolverFinish(run->snes, run->model->space));
   PetscCall(find_search(run));
   PetscCall(forcing_terms(run->snes));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -351,6 +360,23 @@ static PetscErrorCode check_contact(SbRun run, PetscBool explicit)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* How rows with multipliers are solved, and what is said of it. */
+static PetscErrorCode choose_saddle(SbRun run)
+{
+  const SbSpace s = run->model->space;
+  const size_t size = sizeof(run->solver_reason);
+  char reason[128];
+  size_t length;
+
+  PetscFunctionBeginUser;
+  if (!run->saddle) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(
+    SbSaddleChoose(s, run->model->dynamic, run->saddle_choice, &run->saddle_used, reason, sizeof(reason)));
+  PetscCall(PetscStrlen(run->solver_reason, &length));
+  PetscCall(PetscSNPrintf(run->solver_reason + length, size - length, "; %s", reason));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* The matrix, and what solves see of it when rows join nodes. */
 static PetscErrorCode create_operator(SbRun run)
 {
@@ -359,7 +385,8 @@ static PetscErrorCode create_operator(SbRun run)
   PetscFunctionBeginUser;
   PetscCall(SbSolverCreateOperator(m->space, run->solver_used, &run->J));
   if (m->space->couple)
-    PetscCall(SbCoupleCreateOperator(m->space, run->J, (PetscBool)!m->dynamic, &run->operator));
+    PetscCall(
+      SbCoupleCreateOperator(m->space, run->J, (PetscBool)!m->dynamic, run->saddle_used, &run->operator));
   else {
     PetscCall(PetscObjectReference((PetscObject)run->J));
     run->operator= run->J;
@@ -389,6 +416,7 @@ PetscErrorCode SbRunSetUp(SbRun run)
                            run->solver_reason, sizeof(run->solver_reason)));
   PetscCall(PetscStrncpy(run->solver, run->solver_used->name, sizeof(run->solver)));
   PetscCall(check_contact(run, explicit));
+  PetscCall(choose_saddle(run));
   if (!explicit) PetscCall(create_operator(run));
   PetscCheck(!run->solver_used->matrix_free || !m->ntangent, m->comm, PETSC_ERR_USER,
              "-solver %s works without a matrix, and the effect %s adds to it: use -solver rotated",

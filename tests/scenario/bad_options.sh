@@ -53,6 +53,7 @@ error 1 "-body_bra_young is not an option of supple; did you mean -body_bar_youn
 error 1 "-effcts is not an option of supple; did you mean -effects?" bar.opts -effcts gravity
 error 1 "-effect_pull_radius is not an option of supple here; effect pull has type, on, vector" bar.opts -effect_pull_radius 1
 error 1 "-static_steps does nothing in this scenario: " bar.opts -static_steps 3
+error 1 "-multipliers does nothing in this scenario: " bar.opts -multipliers direct
 error 1 "-bodies: two are named 'bar'" bar.opts -bodies bar,bar
 error 1 "-body_rod_mesh must be given: " bar.opts -bodies bar,rod
 error 1 "-body_bar_material must be given: one of corotated, linear, neohookean, stvk" -bodies bar -body_bar_mesh box:1,1,1:1

@@ -3,8 +3,10 @@
 /*
   Rows between nodes: two halves of a bar joined vertex by vertex are the whole bar, with every solver, by exact rows and in
   the limit by springs; rows said twice change nothing; the rows' forces carry the weight of the free half; the projected
-  operator is symmetric.
+  operator is symmetric. All of it also with the multipliers as unknowns, by a factorisation (which takes the free half without
+  anchors) and by iterations.
 */
+#include "../../src/fem/couple.h"
 #include "../scene.h"
 
 #define REST                                                                                               \
@@ -91,7 +93,7 @@ static PetscErrorCode join(SbSpace s, PetscReal stiffness, PetscBool twice)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode open_halves(const char *solver, TestScene *t)
+static PetscErrorCode open_halves(const char *solver, SbSaddle saddle, TestScene *t)
 {
   char text[2048];
 
@@ -103,8 +105,10 @@ static PetscErrorCode open_halves(const char *solver, TestScene *t)
   PetscCall(PetscOptionsInsertString(NULL, text));
   PetscCall(SbSceneCreate(PETSC_COMM_WORLD, &t->model));
   PetscCall(SbRunCreate(t->model, &t->run));
+  t->run->saddle = (PetscBool)(saddle != SB_SADDLE_NONE);
+  t->run->saddle_choice = (PetscInt)saddle;
   PetscCall(SbModelSetUp(t->model));
-  PetscCall(SbSpaceCoupleCreate(t->model->space));
+  PetscCall(SbSpaceCoupleCreate(t->model->space, PETSC_FALSE));
   PetscCall(SbRunSetUp(t->run));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -155,33 +159,34 @@ static PetscErrorCode compare(TestScene *t, const TestScene *whole, PetscReal to
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode check_joint(const char *solver, const TestScene *whole)
+static PetscErrorCode check_joint(const char *solver, SbSaddle saddle, PetscInt most, const TestScene *whole)
 {
   TestScene t;
 
   PetscFunctionBeginUser;
-  PetscCall(open_halves(solver, &t));
+  PetscCall(open_halves(solver, saddle, &t));
   PetscCall(join(t.model->space, -1, PETSC_FALSE));
   PetscCall(SbRunSolve(t.run));
   SB_CHECK(!t.run->stop_reason[0], "%s: %s", solver, t.run->stop_reason);
   PetscCall(compare(&t, whole, 1e-8, solver));
   PetscCall(check_force(&t, solver));
-  SB_CHECK(t.run->linear_total < 120, "%s: %d iterations", solver, (int)t.run->linear_total);
+  SB_CHECK(t.run->linear_total < most, "%s: %d iterations", solver, (int)t.run->linear_total);
+  SB_CHECK(!t.model->space->couple->added == (saddle == SB_SADDLE_DIRECT), "%s: anchors", solver);
   PetscCall(test_scene_close(&t));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode check_limits(const TestScene *whole)
+static PetscErrorCode check_limits(SbSaddle saddle, const TestScene *whole)
 {
   TestScene t;
 
   PetscFunctionBeginUser;
-  PetscCall(open_halves("cg_icc", &t));
+  PetscCall(open_halves("cg_icc", saddle, &t));
   PetscCall(join(t.model->space, -1, PETSC_TRUE));
   PetscCall(SbRunSolve(t.run));
   PetscCall(compare(&t, whole, 1e-8, "rows said twice"));
   PetscCall(test_scene_close(&t));
-  PetscCall(open_halves("cg_icc", &t));
+  PetscCall(open_halves("cg_icc", saddle, &t));
   PetscCall(join(t.model->space, 1e9, PETSC_FALSE));
   PetscCall(SbRunSolve(t.run));
   PetscCall(compare(&t, whole, 1e-5, "springs"));
@@ -198,7 +203,7 @@ static PetscErrorCode check_operator(void)
   TestScene t;
 
   PetscFunctionBeginUser;
-  PetscCall(open_halves("cg_icc", &t));
+  PetscCall(open_halves("cg_icc", SB_SADDLE_NONE, &t));
   PetscCall(SbModelTangent(t.model, 1, 0, 0, 1, t.run->U, NULL, t.run->J));
   PetscCall(join(t.model->space, -1, PETSC_FALSE));
   PetscCall(VecDuplicate(t.run->U, &x));
@@ -232,13 +237,24 @@ int main(int argc, char **argv)
   PetscCallMPI(MPI_Comm_size(PETSC_COMM_WORLD, &size));
   PetscCall(test_scene_open(WHOLE "-solver mumps", &whole));
   PetscCall(SbRunSolve(whole.run));
-  PetscCall(check_joint("cg_pbjacobi", &whole));
-  PetscCall(check_joint("cg_icc", &whole));
-  PetscCall(check_joint("cg_two_level", &whole));
-  PetscCall(check_joint("cg_gamg", &whole));
-  PetscCall(check_joint("mumps", &whole));
-  if (size == 1) PetscCall(check_joint("cholmod", &whole));
-  PetscCall(check_limits(&whole));
+  PetscCall(check_joint("cg_pbjacobi", SB_SADDLE_NONE, 120, &whole));
+  PetscCall(check_joint("cg_icc", SB_SADDLE_NONE, 120, &whole));
+  PetscCall(check_joint("cg_two_level", SB_SADDLE_NONE, 120, &whole));
+  PetscCall(check_joint("cg_gamg", SB_SADDLE_NONE, 120, &whole));
+  PetscCall(check_joint("mumps", SB_SADDLE_NONE, 120, &whole));
+  if (size == 1) PetscCall(check_joint("cholmod", SB_SADDLE_NONE, 120, &whole));
+  PetscCall(check_joint("cg_icc", SB_SADDLE_DIRECT, 5, &whole));
+  PetscCall(check_joint("mumps", SB_SADDLE_DIRECT, 5, &whole));
+  PetscCall(check_joint("cg_gamg", SB_SADDLE_DIRECT, 5, &whole));
+  PetscCall(check_joint("cg_pbjacobi", SB_SADDLE_ITERATIVE, 250, &whole));
+  PetscCall(check_joint("cg_two_level", SB_SADDLE_ITERATIVE, 250, &whole));
+  PetscCall(check_joint("cg_gamg", SB_SADDLE_ITERATIVE, 250, &whole));
+  PetscCall(check_joint("gauss_seidel", SB_SADDLE_ITERATIVE, 1000, &whole));
+  PetscCall(check_joint("mumps", SB_SADDLE_ITERATIVE, 200, &whole));
+  if (size == 1) PetscCall(check_joint("cholmod", SB_SADDLE_ITERATIVE, 200, &whole));
+  PetscCall(check_limits(SB_SADDLE_NONE, &whole));
+  PetscCall(check_limits(SB_SADDLE_DIRECT, &whole));
+  PetscCall(check_limits(SB_SADDLE_ITERATIVE, &whole));
   PetscCall(check_operator());
   PetscCall(test_scene_close(&whole));
   SB_TEST_END();

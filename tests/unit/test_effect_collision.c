@@ -366,7 +366,7 @@ static PetscErrorCode check_attempts(const char *response)
 enum { CONTACTS, DEEPEST, MEAN, NORMAL, FRICTION, WORK, LOSS, HOLD, PUSH, NVALUE };
 
 /* What the effects say of themselves, over all ranks of comm. */
-static PetscErrorCode press(MPI_Comm comm, PetscReal values[NVALUE])
+static PetscErrorCode press(MPI_Comm comm, const char *more, PetscReal values[NVALUE])
 {
   SbStage stage = {.t = 1, .shift_k = 1};
   PetscReal column[8];
@@ -380,6 +380,7 @@ static PetscErrorCode press(MPI_Comm comm, PetscReal values[NVALUE])
   PetscCall(SbOptionsReset());
   PetscCall(SbRegisterAll());
   PetscCall(PetscOptionsInsertString(NULL, PRESS));
+  PetscCall(PetscOptionsInsertString(NULL, more));
   PetscCall(SbSceneCreate(comm, &t.model));
   PetscCall(SbRunCreate(t.model, &t.run));
   PetscCall(SbModelSetUp(t.model));
@@ -410,15 +411,15 @@ static PetscErrorCode press(MPI_Comm comm, PetscReal values[NVALUE])
 }
 
 /* The same numbers on all ranks together and on one; what holds the stack carries what presses it. */
-static PetscErrorCode check_press(void)
+static PetscErrorCode check_press(const char *more)
 {
   static const char *const name[NVALUE] = {"contacts", "penetration",   "mean",    "normal force", "friction",
                                            "work",     "friction loss", "support", "drive"};
   PetscReal together[NVALUE], alone[NVALUE];
 
   PetscFunctionBeginUser;
-  PetscCall(press(PETSC_COMM_WORLD, together));
-  PetscCall(press(PETSC_COMM_SELF, alone));
+  PetscCall(press(PETSC_COMM_WORLD, more, together));
+  PetscCall(press(PETSC_COMM_SELF, more, alone));
   SB_CHECK(alone[CONTACTS] > 5 && alone[NORMAL] > 1, "%g contacts with %g N", (double)alone[CONTACTS],
            (double)alone[NORMAL]);
   SB_CHECK_NEAR(together[CONTACTS], alone[CONTACTS], 0, name[CONTACTS]);
@@ -442,6 +443,7 @@ int main(int argc, char **argv)
   PetscCall(check_far());
   PetscCall(check_attempts("projected"));
   PetscCall(check_attempts("penalty"));
-  PetscCall(check_press());
+  PetscCall(check_press(""));
+  PetscCall(check_press("-effect_meet_response multiplier"));
   SB_TEST_END();
 }

@@ -48,6 +48,15 @@ static PetscErrorCode check_options(void)
   PetscCall(fixture_destroy(&x));
 
   PetscCall(fixture_create(PETSC_COMM_WORLD, 1, "box:1,1,1:2", 1, hull, &x));
+  PetscCall(effect_create(&x, "floor", FLOOR "-effect_floor_response multiplier", &e));
+  SB_CHECK(e->linear && e->saddle && !e->ops.tangent && e->ops.hold && !x.space->held && x.space->couple &&
+             SbSpaceCoupleOuter(x.space),
+           "multiplier, without friction");
+  PetscCall(SbEffectDestroy(&e));
+  PetscCall(PetscOptionsClear(NULL));
+  PetscCall(fixture_destroy(&x));
+
+  PetscCall(fixture_create(PETSC_COMM_WORLD, 1, "box:1,1,1:2", 1, hull, &x));
   PetscCall(effect_create(&x, "floor", FLOOR "-effect_floor_response penalty", &e));
   SB_CHECK(!e->linear && e->ops.tangent && !e->ops.hold && !e->ops.settle && !x.space->held, "penalty");
   PetscCall(SbEffectDestroy(&e));

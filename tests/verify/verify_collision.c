@@ -7,7 +7,7 @@
                lower block carries the load, gaps are closed
     bars       two equal bars that collide end to end: time of contact and exchange of velocities of the wave solution
     momentum   two free blocks collide obliquely, with friction: momentum and angular momentum stay, energy is never gained
-    responses  the same meeting by exact rows, multipliers and stiff springs
+    responses  the same meeting by exact rows in both ways, multipliers raised on springs, and stiff springs
     miss       a body that touches nothing moves as if the other were not there
     slope      friction between two bodies: a block stays on one of tan 0.5 with 0.51, and slides with 0.49
 */
@@ -277,6 +277,10 @@ static PetscErrorCode check_responses(void)
 
   PetscFunctionBeginUser;
   PetscCall(press("projected", 20, exact, u0));
+  PetscCall(press("multiplier", 20, values, u));
+  SB_CHECK_NEAR(values[NORMAL], exact[NORMAL], 1e-6 * exact[NORMAL], "normal force with multipliers");
+  SB_CHECK_NEAR(values[FRICTION], exact[FRICTION], 1e-4 * exact[NORMAL], "friction with multipliers");
+  for (int k = 0; k < 3; k++) SB_CHECK_NEAR(u[k], u0[k], 1e-4 * 0.002, "displacement with multipliers");
   for (int q = 0; q < 2; q++) {
     PetscCall(press(q ? "penalty" : "augmented", q ? 1000 : 20, values, u));
     PetscCall(PetscPrintf(PETSC_COMM_WORLD,
@@ -380,11 +384,14 @@ int main(int argc, char **argv)
   PetscCall(check_stack("p1", "projected", "one", 2, 1e-6));
   PetscCall(check_stack("p1", "projected", "one", 3, 0.2));
   PetscCall(check_stack("p1", "projected", "both", 3, 1e-6));
+  PetscCall(check_stack("p1", "multiplier", "both", 3, 1e-6));
+  PetscCall(check_stack("cr", "multiplier", "one", 2, 1e-6));
   PetscCall(check_stack("p1", "augmented", "one", 2, 1e-4));
   PetscCall(check_stack("cr", "projected", "one", 2, 1e-6));
   PetscCall(check_bars("p1"));
   PetscCall(check_bars("cr"));
   PetscCall(check_momentum("p1", "projected", 0));
+  PetscCall(check_momentum("p1", "multiplier", 0));
   PetscCall(check_momentum("p1", "penalty", 0));
   PetscCall(check_momentum("p1", "augmented", 0));
   PetscCall(check_momentum("dg", "projected", 0));
