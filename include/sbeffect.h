@@ -51,6 +51,7 @@ struct _p_SbEffect {
   PetscBool steady;  /* no formula uses t: a static run multiplies the effect by the load factor */
   PetscBool dynamic; /* the run has inertia; known from set-up on */
   PetscBool saddle;  /* its rows are to be solved with their multipliers as unknowns */
+  PetscBool euler;   /* made for implicit Euler only. Default PETSC_FALSE */
   const struct SbEffectOn_ *held; /* the sets whose nodes it prescribes in all directions; NULL: none */
   PetscInt ncolumn;               /* history columns */
   const char *column[8];          /* "force_x", ...; written as <name>_<column> */

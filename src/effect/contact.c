@@ -19,6 +19,8 @@
 
   Overlap that is there when a step begins is not thrown out at once: a node may stay behind the obstacle by that depth, which falls to
   1/e in `recovery` steps. With springs that is the depth beyond what they give. A static run closes it at once.
+
+  What bounces is told in contact_rebound.c, forces and what is reported of them are in contact_force.c.
 */
 #include "contact.h"
 
@@ -44,6 +46,9 @@ static const SbOption rows[] = {
    "Coulomb's coefficient for slipping; negative: that for sticking"},
   {"stiffness", SB_OPTION_REAL, 1, "", "20", "(0, inf)",
    "springs of penalty and augmented: factor on (lambda + 2 mu) area / height of the cell behind"},
+  {"restitution", SB_OPTION_REAL, 1, "", "0", "[0, 1]",
+   "part of their speed with which nodes leave what they hit; needs -time euler_implicit, and a body that is "
+   "stiff within a step to bounce as a whole"},
   {"recovery", SB_OPTION_REAL, 1, "steps", "30", "[1, inf)",
    "nodes that are behind the obstacle before they meet it are brought out slowly: to 1/e of the depth in so "
    "many steps; 1, and in static runs: at once"},
@@ -107,6 +112,11 @@ static PetscErrorCode options_contact(SbEffect e, const SbScope *scope)
              "go at once",
              e->name, (double)c->mu_kinetic, e->name, (double)c->mu);
   PetscCall(SbOptionReal(scope, "stiffness", &c->stiffness));
+  PetscCall(SbOptionReal(scope, "restitution", &c->restitution));
+  PetscCheck(c->restitution <= 0 || exact(c), PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
+             "-effect_%s_restitution %g needs -effect_%s_response projected or multiplier", e->name,
+             (double)c->restitution, e->name);
+  e->euler = (PetscBool)(c->restitution > 0);
   PetscCall(SbOptionReal(scope, "recovery", &c->recovery));
   c->recovery = c->recovery > 1 ? PetscExpReal(-1 / c->recovery) : 0;
   PetscCall(read_path(e, scope));
@@ -176,6 +186,7 @@ static PetscErrorCode setup_contact(SbEffect e, SbSpace space)
   c->size = PetscSqrtReal(SbDot3(box, box));
   if (c->response == PROJECTED) PetscCall(SbSpaceHoldCreate(space));
   if (c->response == MULTIPLIER) PetscCall(SbSpaceCoupleCreate(space, PETSC_TRUE));
+  if (c->restitution > 0) PetscCall(SbReboundCreate(c, space));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -200,6 +211,13 @@ static PetscReal rest_of(const Contact *c, const SbPose *from, const Touch *touc
   return depth > TOLERANCE * c->size ? -c->recovery * depth : 0;
 }
 
+/* A node is behind the obstacle: from now on it is held. */
+static void enter(const Contact *c, Touch *touch)
+{
+  touch->on = PETSC_TRUE;
+  if (c->restitution > 0) SbReboundHit(c, touch);
+}
+
 static PetscErrorCode touch_contact(SbEffect e, SbSpace space, PetscReal t, PetscReal dt,
                                     const PetscReal u0[], const PetscReal u[])
 {
@@ -210,20 +228,25 @@ static PetscErrorCode touch_contact(SbEffect e, SbSpace space, PetscReal t, Pets
   SbContactPose(c, t, &from);
   SbContactPose(c, t + dt, &c->to);
   c->updates = 0;
+  if (c->restitution > 0) PetscCall(SbReboundBegin(c, space, dt, u0));
   for (PetscInt i = 0; i < c->n; i++) {
     Touch *touch = &c->touch[i];
     PetscReal x0[3], x[3];
+    PetscBool comes;
 
     touch->toggles = 0;
     place(space, touch->node, u, x);
     place(space, touch->node, u0, x0);
+    if (c->restitution > 0) touch->on = touch->was;
     touch->rest = rest_of(c, &from, touch, x0);
+    comes = (PetscBool)(c->restitution > 0 && SbRebound(c, &from, x0, touch));
     if (!touch->on) { /* a node that arrives in this step sticks to where it was at its start */
       SbPoseInvert(&from, x0, touch->anchor);
       touch->pressing = 0;
       touch->slips = PETSC_FALSE;
     }
-    if (look(c, space, x, touch) < 0 && exact(c)) touch->on = PETSC_TRUE;
+    touch->gap = look(c, space, x, touch);
+    if ((touch->gap < 0 || comes) && exact(c)) enter(c, touch);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -274,7 +297,7 @@ static PetscBool settle_held(const Contact *c, PetscReal largest, Touch *touch)
 {
   if (!touch->on) {
     if (touch->gap >= -TOLERANCE * c->size) return PETSC_TRUE;
-    touch->on = PETSC_TRUE;
+    enter(c, touch);
     touch->toggles++;
     return PETSC_FALSE;
   }
@@ -336,6 +359,7 @@ static PetscErrorCode settle_contact(SbEffect e, SbSpace space, const PetscReal 
     if (!right) mine = PETSC_TRUE;
   }
   if (c->mu > 0) PetscCall(settle_friction(c, space, largest, &mine));
+  if (c->restitution > 0) PetscCall(SbReboundSettle(c, space, u, &mine));
   if (mine) *changed = PETSC_TRUE;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -350,6 +374,7 @@ static PetscErrorCode destroy_contact(SbEffect e)
   for (int i = 0; i < 3; i++) PetscCall(SbFormulaDestroy(&c->displacement[i]));
   PetscCall(SbFormulaDestroy(&c->angle));
   PetscCall(PetscFree(c->touch));
+  PetscCall(PetscFree2(c->u0, c->v0));
   PetscCall(PetscFree(e->data));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

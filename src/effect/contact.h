@@ -1,5 +1,5 @@
 /*
-  contact.h - nodes of the surface against a rigid obstacle: what contact.c and contact_force.c share.
+  contact.h - nodes of the surface against a rigid obstacle: what contact.c, contact_force.c and contact_rebound.c share.
 */
 #pragma once
 #include "sbcontact.h"
@@ -19,12 +19,17 @@ typedef struct {
   PetscInt along;         /* number of its direction at the node, or of its row; -1: held by something else */
   PetscReal n[3];         /* normal at the last look, outwards from the obstacle */
   PetscReal value;        /* n . u that puts it on the obstacle, m */
-  PetscReal rest;         /* gap that it is held at: 0, or minus what is left of an overlap, m */
-  PetscReal kept;         /* springs: the same at the end of the last step, m */
-  PetscReal gap;          /* after the last solve, beyond `rest`, m */
-  PetscReal lambda;       /* multiplier of the last solve, N */
-  PetscReal pressing;     /* N that friction assumes, N */
-  PetscReal anchor[3];    /* where it began to stick, in the obstacle's rest frame */
+  PetscReal
+    rest; /* gap that it is held at: 0, minus what is left of an overlap, or where it rebounds to, m */
+  PetscReal kept; /* springs: the same at the end of the last step, m */
+  PetscReal gap;  /* after the last solve, beyond `rest`, m */
+  PetscBool was;  /* restitution: it touched at the end of the last step, and did not rebound */
+  PetscReal
+    arrives; /* restitution: speed towards the obstacle when the step began, m/s; 0: it does not rebound */
+  PetscReal gap0;      /* restitution: gap when the step began, m */
+  PetscReal lambda;    /* multiplier of the last solve, N */
+  PetscReal pressing;  /* N that friction assumes, N */
+  PetscReal anchor[3]; /* where it began to stick, in the obstacle's rest frame */
 } Touch;
 
 typedef struct {
@@ -36,6 +41,10 @@ typedef struct {
   PetscReal scale, at[3]; /* of the file of a mesh */
   SbFormula displacement[3], angle;
   PetscReal axis[3], point[3];
+  PetscReal restitution, share, dt; /* e, what is left of it in this step, length of the step (s) */
+  int reductions;                   /* of e within the step */
+  PetscBool known;                  /* v0 is */
+  PetscReal *u0, *v0;               /* [nnode_owned][3] when the step began, m and m/s; with restitution */
   PetscInt n;
   Touch *touch;   /* [n] */
   PetscReal size; /* of the bodies, m */
@@ -67,6 +76,18 @@ static inline PetscReal spring(const Touch *touch, PetscReal gap)
 
 /* What a solve has made of the force that holds a node, N; r: the residual there. */
 PetscReal SbContactMultiplier(const Contact *c, SbSpace space, const Touch *touch, const PetscReal r[3]);
+
+/*
+  Restitution (contact_rebound.c). Begin: once per attempt at a step, then SbRebound() for each node: true when it will
+  be behind the obstacle at its present speed. SbReboundHit() when it is to be held. Settle, after a solve: sees to the energy; `changed` when e was reduced, in and out. Collective. End: the step was accepted.
+*/
+PetscErrorCode SbReboundCreate(Contact *c, SbSpace space);
+PetscErrorCode SbReboundBegin(Contact *c, SbSpace space, PetscReal dt, const PetscReal u0[]);
+void SbReboundHit(const Contact *c, Touch *touch);
+PetscBool SbRebound(const Contact *c, const SbPose *from, const PetscReal x0[3], Touch *touch);
+PetscErrorCode SbReboundSettle(Contact *c, SbSpace space, const PetscReal u[], PetscBool *changed);
+PetscErrorCode SbReboundEnd(Contact *c, SbSpace space, const PetscReal v[]);
+
 /* Operations of the effect (sbeffect.h). */
 PetscErrorCode SbEffectForce_Contact(SbEffect e, SbSpace space, const SbStage *stage, PetscReal f[]);
 PetscErrorCode SbEffectTangent_Contact(SbEffect e, SbSpace space, const SbStage *stage, Mat A);

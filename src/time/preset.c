@@ -352,6 +352,10 @@ static PetscErrorCode check_contact(SbRun run, PetscBool explicit)
              "-time newmark gains energy where the effect %s stops nodes: use euler_implicit, genalpha or "
              "static",
              name);
+  for (PetscInt e = 0; e < m->ntouch; e++)
+    PetscCheck(!m->touch[e]->euler || run->preset == SB_TIME_EULER_IMPLICIT, m->comm, PETSC_ERR_USER_INPUT,
+               "-effect_%s_restitution needs -time euler_implicit, whose velocities are those of a step",
+               m->touch[e]->name);
   PetscCall(PetscStrcmp(run->solver, "pressure", &split));
   PetscCheck(!run->solver_used->matrix_free && (!split || !m->nhold), m->comm, PETSC_ERR_USER_INPUT,
              "-solver %s has no matrix of everything, in which the effect %s could hold nodes: use -solver "

@@ -37,6 +37,12 @@ static PetscErrorCode check_options(void)
   PetscCall(check_error(&x, FLOOR "-effect_floor_friction -1", "-effect_floor_friction"));
   PetscCall(check_error(&x, FLOOR "-effect_floor_friction 0.2 -effect_floor_friction_kinetic 0.3",
                         "-effect_floor_friction_kinetic 0.3 is above"));
+  PetscCall(check_error(&x, FLOOR "-effect_floor_restitution 1.5", "-effect_floor_restitution 1.5"));
+  PetscCall(check_error(&x, FLOOR "-effect_floor_restitution 0.5 -effect_floor_response penalty",
+                        "-effect_floor_restitution 0.5 needs -effect_floor_response projected"));
+  PetscCall(check_error(&x, FLOOR "-effect_floor_recovery 0.5", "-effect_floor_recovery 0.5"));
+  PetscCall(check_error(&x, "-effect_floor_type contact -effect_floor_obstacle mesh:no.stl",
+                        "-effect_floor_obstacle: no.stl: cannot open the file"));
   PetscCall(check_error(&x, FLOOR "-effect_floor_axis 0,0,0", "-effect_floor_axis: 0,0,0 is no direction"));
   PetscCall(check_error(&x, FLOOR "-effect_floor_displacement x;0;0", "-effect_floor_displacement"));
   PetscCall(effect_create(&x, "floor", FLOOR, &e));
@@ -277,6 +283,8 @@ static PetscErrorCode check_refused(void)
                 "The effect floor needs several solves in a step");
   CHECK_MESSAGE(open_only(BLOCK "-effects gravity,floor -time newmark " FLOOR),
                 "-time newmark gains energy where the effect floor stops nodes");
+  CHECK_MESSAGE(open_only(BLOCK "-effects gravity,floor -time genalpha -effect_floor_restitution 0.5 " FLOOR),
+                "-effect_floor_restitution needs -time euler_implicit");
   CHECK_MESSAGE(open_only(BLOCK "-body_a_tangent warped -effects gravity,floor -solver realtime " FLOOR),
                 "-solver realtime has no matrix of everything, in which the effect floor could hold nodes");
   CHECK_MESSAGE(open_only(BLOCK "-body_a_element cr -effects gravity,floor -solver pressure " FLOOR),
