@@ -199,6 +199,8 @@ PetscErrorCode SbSpaceCoupleForce(SbSpace space, Vec U, Vec F);
 PetscErrorCode SbCouplePrescribe(SbSpace space, Vec U);
 /* F <- F less the springs' forces, and without what the exact rows take when `constrain`. Collective. */
 PetscErrorCode SbCoupleResidual(SbSpace space, Vec U, PetscBool constrain, Vec F);
+/* Whether any node of any rank is held, or any row there, since the last Done. Not collective, alike on all ranks. */
+PetscBool SbSpaceIsHeld(SbSpace space);
 /* The operator of solves: K, its springs, projected. singular: K may be so, because only rows hold some body: it is made regular for
    preconditioners, but for the operator; SB_SADDLE_DIRECT needs none of that. Collective; the caller destroys it; K is borrowed until then. */
 PetscErrorCode SbCoupleCreateOperator(SbSpace space, Mat K, PetscBool singular, SbSaddle saddle, Mat *A);

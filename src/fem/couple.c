@@ -436,13 +436,12 @@ static PetscErrorCode create_springs(SbCouple c)
 PetscErrorCode SbSpaceCoupleDone(SbSpace s)
 {
   SbCouple c = s->couple;
-  PetscInt total;
 
   PetscFunctionBeginUser;
   PetscCall(destroy_matrices(c));
   c->version++;
-  PetscCallMPI(MPI_Allreduce(&c->n, &total, 1, MPIU_INT, MPI_SUM, s->comm));
-  if (!total) { /* bodies are apart: nothing more is exchanged or made */
+  PetscCallMPI(MPI_Allreduce(&c->n, &c->ntotal, 1, MPIU_INT, MPI_SUM, s->comm));
+  if (!c->ntotal) { /* bodies are apart: nothing more is exchanged or made */
     if (c->anchor) PetscCall(VecZeroEntries(c->anchor));
     PetscFunctionReturn(PETSC_SUCCESS);
   }

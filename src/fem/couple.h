@@ -23,6 +23,7 @@ struct _p_SbCouple {
   PetscInt version, matrix; /* raised when the rows change, and when K does */
   SbFactored factored;      /* NULL before the first solve with SB_SADDLE_DIRECT */
   PetscInt n, size;         /* rows, room */
+  PetscInt ntotal;          /* rows of all ranks */
   PetscInt *start;          /* [n+1] */
   PetscInt nentry, entry_size;
   PetscInt *gnode;                         /* [nentry] */

@@ -12,7 +12,7 @@
 
   The owner of a node decides; other ranks learn Q from it.
 */
-#include "fem_impl.h"
+#include "couple.h"
 #include "sbkernel.h"
 
 struct _p_SbHeld {
@@ -106,6 +106,11 @@ PetscErrorCode SbSpaceHoldDone(SbSpace s)
     PetscCall(SbSpaceRestoreLocalRead(s, h->row, &all));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscBool SbSpaceIsHeld(SbSpace s)
+{
+  return (PetscBool)((s->held && s->held->ntotal) || (s->couple && s->couple->ntotal));
 }
 
 void SbHeldPrescribe(SbSpace s, PetscReal u[])

@@ -65,7 +65,7 @@ PetscErrorCode SbRunSolveContact(SbRun run, SNES snes, PetscReal t, PetscReal dt
   /* the matrix holds what was held before */
   if (m->space->held || !m->dynamic) run->tangent_known = PETSC_FALSE;
   PetscCall(first_residual(snes, U, run->R, &size));
-  PetscCall(set_aim(snes, &aim, size));
+  if (SbSpaceIsHeld(m->space)) PetscCall(set_aim(snes, &aim, size)); /* if not, as without contact */
   PetscCall((*solve->solve)(solve->ctx, U, reason));
   for (PetscInt round = 1; *reason > 0; round++) {
     PetscCall((*solve->residual)(solve->ctx, U, run->R));
@@ -76,6 +76,7 @@ PetscErrorCode SbRunSolveContact(SbRun run, SNES snes, PetscReal t, PetscReal dt
       *reason = SNES_DIVERGED_MAX_IT;
       break;
     }
+    PetscCall(set_aim(snes, &aim, size));
     PetscCall((*solve->solve)(solve->ctx, U, reason));
   }
   PetscCall(set_aim(snes, &aim, 0));

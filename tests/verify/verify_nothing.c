@@ -3,8 +3,8 @@
 /*
   What a scene does not name costs nothing.
 
-    lists       without effects the model holds no effect, no list of operations has an entry, and the log event of effects
-                is never begun, while that of forces is
+    lists       without effects the model holds no effect, no list of operations has an entry, and the log events of effects
+                and of contact are never begun, while that of forces is
     memory      a scene allocates the same number of bytes whether the program knows an effect of another type or not, and
                 the type's constructor is not called
     trajectory  bit by bit the same with that type in the program; with effects that are named and do nothing too
@@ -120,6 +120,8 @@ static PetscErrorCode check_unnamed(const char *law, const char *time)
   SB_CHECK(!storms, "the constructor of a type that is not named was called");
   SB_CHECK(plain.events[SB_EVENT_EFFECTS] == 0, "effects were begun %d times",
            (int)plain.events[SB_EVENT_EFFECTS]);
+  SB_CHECK(plain.events[SB_EVENT_CONTACT] == 0, "contact was begun %d times",
+           (int)plain.events[SB_EVENT_CONTACT]);
   SB_CHECK(plain.events[SB_EVENT_RESIDUAL] > 0, "forces were never begun: the log is off");
   SB_CHECK(!plain.events[SB_EVENT_ENERGY] && !plain.events[SB_EVENT_OUTPUT] &&
              !plain.events[SB_EVENT_CHECKPOINT],
@@ -164,6 +166,21 @@ static PetscErrorCode check_idle(const char *effects, const char *options)
                         (int)with.events[SB_EVENT_EFFECTS]));
   PetscCall(destroy(&plain));
   PetscCall(destroy(&with));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Contact is looked for where it is named only: its log event counts there, so that none elsewhere means none. */
+static PetscErrorCode check_contact(void)
+{
+  Trace named;
+
+  PetscFunctionBeginUser;
+  PetscCall(run(FREE
+                "-body_a_material corotated -time euler_implicit -effects floor -effect_floor_type contact "
+                "-effect_floor_obstacle plane:0,0,1,-9",
+                PETSC_FALSE, &named));
+  SB_CHECK(named.events[SB_EVENT_CONTACT] > 0, "contact is named and was never begun");
+  PetscCall(destroy(&named));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -262,6 +279,7 @@ int main(int argc, char **argv)
   PetscCall(check_idle("damping", ""));
   PetscCall(check_idle("pull", "-effect_pull_type traction -effect_pull_on xmin -effect_pull_vector 0;0;0"));
   PetscCall(check_idle("air", "-effect_air_type pressure -effect_air_on zmax -effect_air_value 0"));
+  PetscCall(check_contact());
   PetscCall(check_static());
   PetscCall(check_plain_space());
   PetscCall(check_elements("neohookean", "cr"));

@@ -1,0 +1,126 @@
+// @ranks 1 2
+// @timeout 300
+// @needs mumps
+/*
+  A body that touches nothing moves as if the others were not there.
+
+    named    two bodies far apart, and an obstacle far away: with contact named and without, the same to the last bit, where
+             the preconditioner depends on the matrix alone
+    beside   a body that flies past two others which collide, against the same body alone in the world. One linear system holds all
+             bodies, and Newton's method and CG end when the sum over all of them is small: the motion is the same to what these tolerances
+             leave
+*/
+#include "contact.h"
+
+#define BODY(name, element, place, spin)                                                                     \
+  "-body_" name "_mesh box:0.1,0.1,0.1:2 -body_" name "_translate " place " -body_" name "_element " element \
+  " -body_" name "_material corotated -body_" name "_young 2e4 -body_" name "_poisson 0.3 -body_" name       \
+  "_spin " spin " "
+#define TIME "-time %s -ts_dt 0.005 -ts_max_time 0.1 -solver %s "
+
+/* Displacements and velocities by original number, [2][3 n]; `w` (may be NULL) watches. */
+static PetscErrorCode motion(const char *options, ContactWatch *w, PetscInt *n, PetscReal **value)
+{
+  PetscReal *u, *v;
+  TestScene t;
+
+  PetscFunctionBeginUser;
+  PetscCall(test_scene_open(options, &t));
+  if (w) PetscCall(contact_watch_add(&t, w));
+  PetscCall(verify_solve(&t, options));
+  *n = 3 * verify_numbers(t.model);
+  PetscCall(verify_gather(t.model, t.run->U, &u));
+  PetscCall(verify_gather(t.model, t.run->V, &v));
+  PetscCall(PetscMalloc1(2 * *n, value));
+  PetscCall(PetscArraycpy(*value, u, *n));
+  PetscCall(PetscArraycpy(*value + *n, v, *n));
+  PetscCall(PetscFree(u));
+  PetscCall(PetscFree(v));
+  PetscCall(test_scene_close(&t));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/*
+  The preconditioners of `rotated` and `two_level` keep something from solve to solve and are renewed when the operator is a new one, as the
+  one that bodies' contact wraps: with `exact` false the first and last scene may differ by what solves leave.
+*/
+static PetscErrorCode check_named(const char *element, const char *time, const char *solver, PetscBool exact)
+{
+  static const char *const effects[4] = {
+    "-effects gravity", "-effects gravity,meet -effect_meet_type collision -effect_meet_friction 0.3",
+    "-effects gravity,floor -effect_floor_type contact -effect_floor_obstacle plane:0,0,1,-5 "
+    "-effect_floor_friction 0.3",
+    "-effects gravity,meet,floor -effect_meet_type collision -effect_floor_type contact "
+    "-effect_floor_obstacle sphere:0,0,-9,1"};
+  PetscReal *value[4];
+  PetscInt n = 0;
+  char text[VERIFY_TEXT];
+
+  PetscFunctionBeginUser;
+  for (int k = 0; k < 4; k++) {
+    PetscCall(PetscSNPrintf(text, sizeof(text),
+                            "-bodies a,b " BODY("a", "%s", "0,0,0", "0,3,9")
+                              BODY("b", "%s", "0.3,0,0", "2,0,-5") TIME "%s",
+                            element, element, time, solver, effects[k]));
+    PetscCall(motion(text, NULL, &n, &value[k]));
+  }
+  for (int k = 1; k < 4; k++) {
+    const PetscReal off = verify_difference(2 * n, value[0], value[k]);
+
+    PetscCall(PetscPrintf(PETSC_COMM_WORLD, "  named, %s, %s, %s, scene %d: differs by %.1e\n", element, time,
+                          solver, k, (double)off));
+    SB_CHECK(exact || k == 2 ? !memcmp(value[0], value[k], (size_t)(2 * n) * sizeof(PetscReal)) : off < 1e-7,
+             "%s, %s, %s: contact that never happens changes the motion by %g: %s", element, time, solver,
+             (double)off, effects[k]);
+  }
+  for (int k = 0; k < 4; k++) PetscCall(PetscFree(value[k]));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The first body in the list has the lowest numbers in both scenes. */
+static PetscErrorCode check_beside(const char *solver, PetscReal tolerance)
+{
+  ContactWatch w = {.meet = "meet"};
+  PetscReal *alone, *beside, off[2];
+  PetscInt n, all;
+  char text[VERIFY_TEXT];
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscSNPrintf(text, sizeof(text),
+                          "-bodies a " BODY("a", "p1", "0,0,0", "0,3,9") TIME
+                          "-snes_rtol 1e-11 -ksp_rtol 1e-10",
+                          "euler_implicit", solver));
+  PetscCall(motion(text, NULL, &n, &alone));
+  PetscCall(PetscSNPrintf(
+    text, sizeof(text),
+    "-bodies a,b,c " BODY("a", "p1", "0,0,0", "0,3,9") BODY("b", "p1", "0.3,0,0", "2,0,-5")
+      BODY("c", "p1", "0.43,0.03,0", "0,0,4") TIME
+    "-body_c_velocity -1,0,0 -effects meet -effect_meet_type collision -snes_rtol 1e-11 -ksp_rtol 1e-10",
+    "euler_implicit", solver));
+  PetscCall(motion(text, &w, &all, &beside));
+  off[0] = verify_difference(n, alone, beside);
+  off[1] = verify_difference(n, alone + n, beside + all);
+  PetscCall(PetscPrintf(PETSC_COMM_WORLD,
+                        "  beside, %s: %g pairs touch, displacement differs by %.1e, velocity by %.1e\n",
+                        solver, (double)w.contacts, (double)off[0], (double)off[1]));
+  SB_CHECK(w.contacts > 3, "%s: the other bodies do not meet", solver);
+  SB_CHECK(off[0] < tolerance && off[1] < tolerance, "%s: the others change the motion by %g and %g", solver,
+           (double)off[0], (double)off[1]);
+  PetscCall(PetscFree(alone));
+  PetscCall(PetscFree(beside));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+int main(int argc, char **argv)
+{
+  SB_TEST_BEGIN(argc, argv);
+  PetscCall(check_named("p1", "euler_implicit", "rotated", PETSC_FALSE));
+  PetscCall(check_named("p1", "genalpha", "cg_icc", PETSC_TRUE));
+  PetscCall(check_named("p1", "euler_implicit", "cg_icc", PETSC_TRUE));
+  PetscCall(check_named("cr", "euler_implicit", "cg_icc", PETSC_TRUE));
+  PetscCall(check_named("cr", "euler_implicit", "cg_two_level", PETSC_FALSE));
+  PetscCall(check_named("dg", "euler_implicit", "cg_jacobi", PETSC_TRUE));
+  PetscCall(check_beside("cg_icc", 1e-9));
+  PetscCall(check_beside("mumps", 1e-9));
+  SB_TEST_END();
+}
