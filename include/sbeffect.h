@@ -27,6 +27,9 @@ typedef struct {
   /* after a solve, with the residual r without constraints, N: sets `changed` when another solve is needed. Collective. */
   PetscErrorCode (*settle)(SbEffect e, SbSpace space, const PetscReal u[], const PetscReal r[],
                            PetscBool *changed);
+  /* after the first solve of an attempt, for effects that want steps cut where points arrive: the part of the step, 0..1, after which
+     the first point that was apart before touches, as the motion without it says; 1: none does. This rank's. Not collective. */
+  PetscErrorCode (*arrive)(SbEffect e, PetscReal *part);
   /* f[nnode][3] += what contact pushes owned nodes with, N, residual r as for history(). For output only; rows that join nodes add
      theirs without it. Not collective. */
   PetscErrorCode (*push)(SbEffect e, SbSpace space, const SbStage *stage, const PetscReal r[], PetscReal f[]);

@@ -39,8 +39,8 @@ struct _p_SbModel {
   PetscInt neffect;
   SbEffect *effect;
   /* one list per operation, holding only the effects that implement it */
-  PetscInt nprescribe, nprestep, nforce, ntangent, naccept, nhistory, ntouch, nhold, nsettle;
-  SbEffect *prescribe, *prestep, *touch, *hold, *settle, *force, *tangent, *accept, *history;
+  PetscInt nprescribe, nprestep, nforce, ntangent, naccept, nhistory, ntouch, nhold, nsettle, narrive;
+  SbEffect *prescribe, *prestep, *touch, *hold, *settle, *force, *tangent, *accept, *history, *arrive;
   PetscBool linear; /* laws and effects: the tangent depends on the shifts only */
   PetscReal mass;   /* kg */
   PetscBool dynamic;
@@ -67,6 +67,9 @@ PetscErrorCode SbModelPrescribe(SbModel model, PetscReal t, Vec U);
 */
 PetscErrorCode SbModelContactBegin(SbModel model, PetscReal t, PetscReal dt, Vec U0, Vec U);
 PetscErrorCode SbModelContactSettle(SbModel model, PetscReal t, Vec U, Vec R, PetscBool *again);
+/* After the first Settle of a step: the part of it after which the first point arrives at what it did not touch before, 1: none
+   does; effects that do not ask for it are not looked at. Collective. */
+PetscErrorCode SbModelContactArrival(SbModel model, PetscReal *part);
 /* F = what contact pushes the nodes with, N, after the step that ended at t with the displacement U and the residual R without
    constraints. Collective. */
 PetscErrorCode SbModelContactForce(SbModel model, PetscReal t, Vec U, Vec R, Vec F);

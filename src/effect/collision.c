@@ -37,6 +37,9 @@ static const SbOption rows[] = {
   {"response", SB_OPTION_CHOICE, 1, "", "projected", "projected|multiplier|augmented|penalty",
    "exact rows, the solve in their null space or with their multipliers as unknowns; multipliers raised on "
    "springs; springs"},
+  {"arrival", SB_OPTION_CHOICE, 1, "", "whole", "whole|cut",
+   "a step in which points begin to touch is taken as it is, or repeated up to the moment of the first "
+   "touch"},
   {"detection", SB_OPTION_CHOICE, 1, "", "hash", "hash|bvh|brute",
    "spatial hash, hierarchy of bounding volumes, or every pair: the same contacts"},
   {"sides", SB_OPTION_CHOICE, 1, "", "both", "one|both",
@@ -65,6 +68,9 @@ static PetscErrorCode options_collision(SbEffect e, const SbScope *scope)
   PetscCall(SbOptionChoice(scope, "response", &choice));
   c->response = (Response)choice;
   e->saddle = (PetscBool)(c->response == MULTIPLIER);
+  PetscCall(SbOptionChoice(scope, "arrival", &choice));
+  c->cut = (PetscBool)(choice == 1);
+  if (!c->cut) e->ops.arrive = NULL;
   PetscCall(SbOptionChoice(scope, "detection", &choice));
   PetscCall(SbDetectorCreate((SbDetectKind)choice, &c->detector));
   PetscCall(SbOptionChoice(scope, "sides", &choice));
@@ -191,6 +197,27 @@ static inline PetscReal excess(const Hit *hit)
   return hit->gap + hit->allowed;
 }
 
+/* A point that was apart when the step began and is behind now, by a motion that did not know of it: when it came. */
+static void watch_arrival(Collision *c, const Hit *hit)
+{
+  const PetscReal gap0 = SbDot3(hit->normal, hit->start) - hit->value, small = TOLERANCE * c->surface->size;
+
+  if (!c->cut || hit->was || gap0 <= small || excess(hit) >= -small) return;
+  c->arrival = PetscMin(c->arrival, gap0 / (gap0 - hit->gap));
+}
+
+static PetscErrorCode arrive_collision(SbEffect e, PetscReal *part)
+{
+  Collision *c = (Collision *)e->data;
+
+  PetscFunctionBeginUser;
+  *part = c->arrival;
+  for (PetscInt i = 0; c->arrival < 1 && i < c->nhit; i++) { /* what arrived has pressed for a whole step */
+    if (!c->hit[i].was) c->hit[i].lambda = 0;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 static PetscErrorCode touch_collision(SbEffect e, SbSpace space, PetscReal t, PetscReal dt,
                                       const PetscReal u0[], const PetscReal u[])
 {
@@ -202,6 +229,8 @@ static PetscErrorCode touch_collision(SbEffect e, SbSpace space, PetscReal t, Pe
   PetscCall(PetscArraycpy(c->u0, u0, 3 * space->nnode));
   c->updates = 0;
   PetscCall(SbCollisionRestore(c));
+  c->first = PETSC_TRUE;
+  c->arrival = 1;
   PetscCall(SbCollisionLook(c, u, PETSC_FALSE));
   for (PetscInt i = 0; i < c->nhit; i++) {
     Hit *hit = &c->hit[i];
@@ -213,6 +242,7 @@ static PetscErrorCode touch_collision(SbEffect e, SbSpace space, PetscReal t, Pe
       hit->pressing = hit->lambda = 0;
       hit->slips = PETSC_FALSE;
     }
+    watch_arrival(c, hit);
     if (!exact(c->response))
       hit->on = (PetscBool)(hit->lambda - hit->k * (excess(hit) - TOLERANCE * c->surface->size) >= 0);
     else if (excess(hit) <= TOLERANCE * c->surface->size)
@@ -452,10 +482,13 @@ static PetscErrorCode settle_collision(SbEffect e, SbSpace space, const PetscRea
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &largest, 1, MPIU_REAL, MPI_MAX, space->comm));
   for (PetscInt i = 0; i < c->nhit; i++) {
     Hit *hit = &c->hit[i];
-    const PetscBool right = exact(c->response) ? settle_row(c, largest, hit) : settle_spring(c, hit);
+    PetscBool right;
 
+    if (c->first && !hit->on) watch_arrival(c, hit);
+    right = exact(c->response) ? settle_row(c, largest, hit) : settle_spring(c, hit);
     if (!right) mine = PETSC_TRUE;
   }
+  c->first = PETSC_FALSE;
   if (c->mu > 0) PetscCall(settle_friction(c, space, largest, &mine));
   if (mine) *changed = PETSC_TRUE;
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -584,6 +617,7 @@ static PetscErrorCode create_collision(SbEffect e)
   e->ops.touch = touch_collision;
   e->ops.hold = hold_collision;
   e->ops.settle = settle_collision;
+  e->ops.arrive = arrive_collision;
   e->ops.accept = accept_collision;
   e->ops.history = history_collision;
   e->ops.destroy = destroy_collision;

@@ -61,9 +61,12 @@ typedef struct {
   PetscReal *edge_k;  /* [own edges] the same of an edge, N/m */
   PetscReal *u0;      /* [nnode][3] displacement at the start of the step, m */
   PetscInt nhit, size, npast, past_size;
-  Hit *hit, *spare; /* by point and part */
-  Hit *past;        /* [npast] as the last step left them: each attempt at a step begins there */
-  int updates;      /* of friction within the step */
+  Hit *hit, *spare;  /* by point and part */
+  Hit *past;         /* [npast] as the last step left them: each attempt at a step begins there */
+  PetscBool cut;     /* steps end where points arrive */
+  PetscBool first;   /* the step has not been solved yet */
+  PetscReal arrival; /* the part of it after which the first point arrives, 1: none */
+  int updates;       /* of friction within the step */
   PetscReal
     unsettled; /* largest change of friction that the last solve did not see, as a part of the largest friction */
   PetscBool said;       /* that friction did not settle */

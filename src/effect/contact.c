@@ -41,6 +41,8 @@ static const SbOption rows[] = {
   {"response", SB_OPTION_CHOICE, 1, "", "projected", "projected|multiplier|augmented|penalty",
    "hold touching nodes on the obstacle, or with the forces as unknowns of the solve; multipliers raised on "
    "springs; springs"},
+  {"arrival", SB_OPTION_CHOICE, 1, "", "whole", "whole|cut",
+   "a step in which nodes begin to touch is taken as it is, or repeated up to the moment of the first touch"},
   {"friction", SB_OPTION_REAL, 1, "", "0", "[0, inf)", "Coulomb's coefficient for sticking"},
   {"friction_kinetic", SB_OPTION_REAL, 1, "", "-1", "[-1, inf)",
    "Coulomb's coefficient for slipping; negative: that for sticking"},
@@ -104,6 +106,9 @@ static PetscErrorCode options_contact(SbEffect e, const SbScope *scope)
   PetscCall(SbOptionChoice(scope, "response", &choice));
   c->response = (Response)choice;
   e->saddle = (PetscBool)(c->response == MULTIPLIER);
+  PetscCall(SbOptionChoice(scope, "arrival", &choice));
+  c->cut = (PetscBool)(choice == 1);
+  if (!c->cut) e->ops.arrive = NULL;
   PetscCall(SbOptionReal(scope, "friction", &c->mu));
   PetscCall(SbOptionReal(scope, "friction_kinetic", &c->mu_kinetic));
   if (c->mu_kinetic < 0) c->mu_kinetic = c->mu;
@@ -116,6 +121,11 @@ static PetscErrorCode options_contact(SbEffect e, const SbScope *scope)
   PetscCheck(c->restitution <= 0 || exact(c), PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
              "-effect_%s_restitution %g needs -effect_%s_response projected or multiplier", e->name,
              (double)c->restitution, e->name);
+  PetscCheck(
+    c->restitution <= 0 || !c->cut, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
+    "-effect_%s_restitution %g and -effect_%s_arrival cut do not go together: what is let go within a step "
+    "never arrives at its end; leave one of them out",
+    e->name, (double)c->restitution, e->name);
   e->euler = (PetscBool)(c->restitution > 0);
   PetscCall(SbOptionReal(scope, "recovery", &c->recovery));
   c->recovery = c->recovery > 1 ? PetscExpReal(-1 / c->recovery) : 0;
@@ -127,7 +137,7 @@ static PetscErrorCode options_contact(SbEffect e, const SbScope *scope)
     e->linear = PETSC_FALSE;
     e->ops.hold = NULL;
   }
-  if (c->response == PENALTY && c->mu <= 0) e->ops.settle = NULL;
+  if (c->response == PENALTY && c->mu <= 0 && !c->cut) e->ops.settle = NULL;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -218,6 +228,27 @@ static void enter(const Contact *c, Touch *touch)
   if (c->restitution > 0) SbReboundHit(c, touch);
 }
 
+/* A node that was apart and is behind the obstacle now, by a motion that did not know of it: when it came. */
+static void watch_arrival(Contact *c, const Touch *touch)
+{
+  const PetscReal small = TOLERANCE * c->size;
+
+  if (!c->cut || touch->was || touch->gap0 <= small || touch->gap >= -small) return;
+  c->arrival = PetscMin(c->arrival, touch->gap0 / (touch->gap0 - touch->gap));
+}
+
+static PetscErrorCode arrive_contact(SbEffect e, PetscReal *part)
+{
+  Contact *c = (Contact *)e->data;
+
+  PetscFunctionBeginUser;
+  *part = c->arrival;
+  for (PetscInt i = 0; c->arrival < 1 && i < c->n; i++) { /* what arrived has pressed for a whole step */
+    if (!c->touch[i].was) c->touch[i].lambda = 0;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 static PetscErrorCode touch_contact(SbEffect e, SbSpace space, PetscReal t, PetscReal dt,
                                     const PetscReal u0[], const PetscReal u[])
 {
@@ -228,16 +259,20 @@ static PetscErrorCode touch_contact(SbEffect e, SbSpace space, PetscReal t, Pets
   SbContactPose(c, t, &from);
   SbContactPose(c, t + dt, &c->to);
   c->updates = 0;
+  c->first = PETSC_TRUE;
+  c->arrival = 1;
   if (c->restitution > 0) PetscCall(SbReboundBegin(c, space, dt, u0));
   for (PetscInt i = 0; i < c->n; i++) {
     Touch *touch = &c->touch[i];
-    PetscReal x0[3], x[3];
+    PetscReal x0[3], x[3], n[3];
     PetscBool comes;
 
     touch->toggles = 0;
+    touch->on = touch->was; /* whatever an attempt that failed made of it */
+    touch->idle = (PetscBool)(c->cut && !touch->was && !exact(c));
     place(space, touch->node, u, x);
     place(space, touch->node, u0, x0);
-    if (c->restitution > 0) touch->on = touch->was;
+    if (c->cut) touch->gap0 = SbContactGap(c, &from, x0, n);
     touch->rest = rest_of(c, &from, touch, x0);
     comes = (PetscBool)(c->restitution > 0 && SbRebound(c, &from, x0, touch));
     if (!touch->on) { /* a node that arrives in this step sticks to where it was at its start */
@@ -246,6 +281,7 @@ static PetscErrorCode touch_contact(SbEffect e, SbSpace space, PetscReal t, Pets
       touch->slips = PETSC_FALSE;
     }
     touch->gap = look(c, space, x, touch);
+    watch_arrival(c, touch);
     if ((touch->gap < 0 || comes) && exact(c)) enter(c, touch);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -342,6 +378,21 @@ static PetscErrorCode settle_friction(Contact *c, SbSpace space, PetscReal large
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* After the first solve of a step: who arrives in it; springs of all nodes from now on. Whether one of these pushes. */
+static PetscBool wake(Contact *c)
+{
+  PetscBool pushes = PETSC_FALSE;
+
+  for (PetscInt i = 0; i < c->n; i++) {
+    Touch *touch = &c->touch[i];
+
+    if (!touch->on || !exact(c)) watch_arrival(c, touch);
+    if (touch->idle && touch->gap < 0) pushes = PETSC_TRUE;
+    touch->idle = PETSC_FALSE;
+  }
+  return pushes;
+}
+
 static PetscErrorCode settle_contact(SbEffect e, SbSpace space, const PetscReal u[], const PetscReal r[],
                                      PetscBool *changed)
 {
@@ -351,6 +402,8 @@ static PetscErrorCode settle_contact(SbEffect e, SbSpace space, const PetscReal 
 
   PetscFunctionBeginUser;
   PetscCall(measure(c, space, u, r, &largest));
+  if (c->first && c->cut && wake(c)) mine = PETSC_TRUE;
+  c->first = PETSC_FALSE;
   for (PetscInt i = 0; c->response != PENALTY && i < c->n; i++) {
     Touch *touch = &c->touch[i];
     const PetscBool right =
@@ -394,6 +447,7 @@ static PetscErrorCode create_contact(SbEffect e)
   e->ops.touch = touch_contact;
   e->ops.hold = hold_contact;
   e->ops.settle = settle_contact;
+  e->ops.arrive = arrive_contact;
   e->ops.force = SbEffectForce_Contact;
   e->ops.tangent = SbEffectTangent_Contact;
   e->ops.accept = SbEffectAccept_Contact;

@@ -14,6 +14,9 @@ typedef struct {
   PetscInt node, cell, a; /* local node, a cell that has it, as its node a */
   PetscReal k;            /* stiffness of the springs, N/m */
   PetscBool on;           /* it touches; with springs: it did at the end of the last step */
+  PetscBool was;          /* it touched at the end of the last step, and did not rebound */
+  PetscBool idle;         /* its spring waits for the first solve of the step */
+  PetscReal gap0;         /* gap when the step began, m; with `arrival cut` or restitution */
   int toggles;            /* how often it came within the step */
   PetscBool slips;        /* it slid at the end of the last step */
   PetscInt along;         /* number of its direction at the node, or of its row; -1: held by something else */
@@ -23,10 +26,8 @@ typedef struct {
     rest; /* gap that it is held at: 0, minus what is left of an overlap, or where it rebounds to, m */
   PetscReal kept; /* springs: the same at the end of the last step, m */
   PetscReal gap;  /* after the last solve, beyond `rest`, m */
-  PetscBool was;  /* restitution: it touched at the end of the last step, and did not rebound */
   PetscReal
     arrives; /* restitution: speed towards the obstacle when the step began, m/s; 0: it does not rebound */
-  PetscReal gap0;      /* restitution: gap when the step began, m */
   PetscReal lambda;    /* multiplier of the last solve, N */
   PetscReal pressing;  /* N that friction assumes, N */
   PetscReal anchor[3]; /* where it began to stick, in the obstacle's rest frame */
@@ -46,10 +47,13 @@ typedef struct {
   PetscBool known;                  /* v0 is */
   PetscReal *u0, *v0;               /* [nnode_owned][3] when the step began, m and m/s; with restitution */
   PetscInt n;
-  Touch *touch;   /* [n] */
-  PetscReal size; /* of the bodies, m */
-  int updates;    /* of the N of friction within the step */
-  SbPose to;      /* at the end of the step */
+  Touch *touch;      /* [n] */
+  PetscReal size;    /* of the bodies, m */
+  PetscBool cut;     /* steps end where nodes arrive */
+  PetscBool first;   /* the step has not been solved yet */
+  PetscReal arrival; /* the part of it after which the first node arrives, 1: none */
+  int updates;       /* of the N of friction within the step */
+  SbPose to;         /* at the end of the step */
 } Contact;
 
 /* Whether touching nodes are held exactly. */
@@ -71,7 +75,7 @@ static inline void place(SbSpace space, PetscInt node, const PetscReal u[], Pets
 /* Normal force of the springs, N; gap: beyond what the node is held at. */
 static inline PetscReal spring(const Touch *touch, PetscReal gap)
 {
-  return PetscMax(0, touch->lambda - touch->k * gap);
+  return touch->idle ? 0 : PetscMax(0, touch->lambda - touch->k * gap);
 }
 
 /* What a solve has made of the force that holds a node, N; r: the residual there. */

@@ -144,6 +144,7 @@ PetscErrorCode SbEffectAccept_Contact(SbEffect e, SbSpace space, const SbStage *
     place(space, touch->node, stage->u, x);
     normal = normal_force(c, &pose, touch, x, n);
     if (!exact(c)) touch->on = (PetscBool)(normal > 0);
+    touch->was = touch->on;
     touch->kept = PetscMin(0, touch->rest);
     if (touch->pressing <= 0) continue;
     touch->slips = (PetscBool)(drag(c, &pose, touch, x, n, t) < 1);

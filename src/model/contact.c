@@ -57,6 +57,20 @@ PetscErrorCode SbModelContactSettle(SbModel m, PetscReal t, Vec U, Vec R, PetscB
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscErrorCode SbModelContactArrival(SbModel m, PetscReal *part)
+{
+  PetscFunctionBeginUser;
+  *part = 1.;
+  for (PetscInt e = 0; e < m->narrive; e++) {
+    PetscReal mine = 1.;
+
+    PetscCall(m->arrive[e]->ops.arrive(m->arrive[e], &mine));
+    *part = PetscMin(*part, mine);
+  }
+  if (m->narrive) PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, part, 1, MPIU_REAL, MPI_MIN, m->comm));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode SbModelContactForce(SbModel m, PetscReal t, Vec U, Vec R, Vec F)
 {
   SbStage stage = {.t = t, .shift_k = 1.};

@@ -20,6 +20,7 @@ PetscErrorCode SbModelDestroy(SbModel *model)
   PetscCall(PetscFree(m->touch));
   PetscCall(PetscFree(m->hold));
   PetscCall(PetscFree(m->settle));
+  PetscCall(PetscFree(m->arrive));
   PetscCall(PetscFree(m->tangent));
   PetscCall(PetscFree(m->accept));
   PetscCall(PetscFree(m->history));
@@ -91,6 +92,7 @@ PetscErrorCode SbModelSetUp(SbModel m)
   SORT_INTO_LIST(m, touch);
   SORT_INTO_LIST(m, hold);
   SORT_INTO_LIST(m, settle);
+  SORT_INTO_LIST(m, arrive);
   SORT_INTO_LIST(m, force);
   SORT_INTO_LIST(m, tangent);
   SORT_INTO_LIST(m, accept);

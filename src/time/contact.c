@@ -50,6 +50,15 @@ static PetscErrorCode first_residual(SNES snes, Vec U, Vec R, PetscReal *size)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Where in the step the first points arrive, if it is worth cutting there. */
+static PetscErrorCode find_arrival(SbRun run)
+{
+  PetscFunctionBeginUser;
+  PetscCall(SbModelContactArrival(run->model, &run->arrival));
+  if (run->arrival < SB_ARRIVAL_LEAST || run->arrival > 1. - SB_ARRIVAL_LEAST) run->arrival = 1.;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode SbRunSolveContact(SbRun run, SNES snes, PetscReal t, PetscReal dt, Vec U0, Vec U,
                                  const SbContactSolve *solve, SNESConvergedReason *reason)
 {
@@ -60,6 +69,7 @@ PetscErrorCode SbRunSolveContact(SbRun run, SNES snes, PetscReal t, PetscReal dt
 
   PetscFunctionBeginUser;
   if (!run->R) PetscCall(VecDuplicate(U, &run->R));
+  run->arrival = 1.;
   PetscCall(get_aim(snes, &aim));
   PetscCall(SbModelContactBegin(m, t, dt, U0, U));
   /* the matrix holds what was held before */
@@ -70,7 +80,11 @@ PetscErrorCode SbRunSolveContact(SbRun run, SNES snes, PetscReal t, PetscReal dt
   for (PetscInt round = 1; *reason > 0; round++) {
     PetscCall((*solve->residual)(solve->ctx, U, run->R));
     PetscCall(SbModelContactSettle(m, t + dt, U, run->R, &again));
-    if (!again) break;
+    if (round == 1 && run->may_cut) {
+      PetscCall(find_arrival(run));
+      if (run->arrival < 1.) *reason = SNES_CONVERGED_ITERATING;
+    }
+    if (!again || !*reason) break;
     if (m->space->held || !m->dynamic) run->tangent_known = PETSC_FALSE;
     if (round == SB_CONTACT_ROUNDS) {
       *reason = SNES_DIVERGED_MAX_IT;

@@ -356,6 +356,15 @@ static PetscErrorCode check_contact(SbRun run, PetscBool explicit)
     PetscCheck(!m->touch[e]->euler || run->preset == SB_TIME_EULER_IMPLICIT, m->comm, PETSC_ERR_USER_INPUT,
                "-effect_%s_restitution needs -time euler_implicit, whose velocities are those of a step",
                m->touch[e]->name);
+  PetscCheck(
+    m->dynamic || !m->narrive, m->comm, PETSC_ERR_USER_INPUT,
+    "-effect_%s_arrival cut is about the length of time steps, and -time static has none: leave it out",
+    m->narrive ? m->arrive[0]->name : name);
+  PetscCheck(
+    run->preset != SB_TIME_GENALPHA || !m->narrive, m->comm, PETSC_ERR_USER_INPUT,
+    "-time genalpha gains energy with -effect_%s_arrival cut: it takes the acceleration of a short step, in "
+    "which nodes are stopped, into a long one; use euler_implicit",
+    m->narrive ? m->arrive[0]->name : name);
   PetscCall(PetscStrcmp(run->solver, "pressure", &split));
   PetscCheck(!run->solver_used->matrix_free && (!split || !m->nhold), m->comm, PETSC_ERR_USER_INPUT,
              "-solver %s has no matrix of everything, in which the effect %s could hold nodes: use -solver "

@@ -11,6 +11,7 @@
     explicit Euler: u1 = u0 + h v0, v1 = v0 + h a0;  symplectic Euler: v1 = v0 + h a0, u1 = u0 + h v1.
 
   The acceleration is state (run->A): nothing is recovered from differences, so a restart continues exactly.
+  A step in which points of contact arrive may be repeated up to that moment, once; what is left of it is the next step (src/time/contact.c).
   A step whose solve fails is halved and repeated; after four good steps it doubles, until the nominal length is back. The local error for TSAdapt
   is h^2 (beta - 1/6) (a1 - a0) (Zienkiewicz and Xie 1991), for implicit Euler h^2/2 a1.
 
@@ -28,6 +29,8 @@ typedef struct {
   Vec work;
   PetscReal nominal; /* step length asked for, s; 0 before the first step */
   PetscInt good;     /* steps accepted since the last cut */
+  PetscReal rest;    /* of a step that was cut where points arrive: what follows it, s; 0: no such step */
+  PetscReal whole;   /* its length before, s: the rest takes the time back to where it would have been */
   PetscBool started; /* run->A holds the acceleration of the current state */
 } SecondOrder;
 
@@ -216,7 +219,7 @@ static PetscErrorCode solve_implicit(TS ts, PetscBool *ok)
   PetscCall(end_state(ts, so->X1));
   PetscCall(VecNorm(so->V1, NORM_INFINITY, &size));
   *ok = (PetscBool)(reason > 0 && !PetscIsInfOrNanReal(size));
-  if (!*ok) {
+  if (!*ok && reason != SNES_CONVERGED_ITERATING) {
     KSP ksp;
     KSPConvergedReason kreason;
 
@@ -252,6 +255,25 @@ static PetscErrorCode solve_explicit(TS ts, PetscBool *ok)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A step that ends where points arrive, and another one for the rest of it. */
+static void cut_at_arrival(TS ts, PetscReal *next)
+{
+  SecondOrder *so = (SecondOrder *)ts->data;
+
+  *next = so->run->arrival * ts->time_step;
+  so->whole = ts->time_step;
+  so->rest = ts->time_step - *next;
+}
+
+/* The step that was cut was taken, or its rest was. */
+static void go_on_after_arrival(SecondOrder *so)
+{
+  if (so->rest > 0.)
+    so->rest = 0.;
+  else
+    so->whole = 0.;
+}
+
 /* Length that the next step should have: back towards the nominal one when four steps after a cut went well. */
 static PetscErrorCode wanted_step(TS ts, PetscReal *h)
 {
@@ -261,6 +283,7 @@ static PetscErrorCode wanted_step(TS ts, PetscReal *h)
   PetscFunctionBeginUser;
   PetscCall(PetscObjectTypeCompare((PetscObject)ts->adapt, TSADAPTNONE, &fixed));
   *h = fixed && so->good >= 3 ? PetscMin(2. * ts->time_step, so->nominal) : ts->time_step;
+  if (fixed && so->whole > 0.) *h = so->rest > 0. ? so->rest : so->whole;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -281,6 +304,8 @@ static PetscErrorCode TSStep_SecondOrder(TS ts)
     PetscBool ok = PETSC_FALSE, accept = PETSC_FALSE;
     PetscReal next, h = 0.;
 
+    so->run->may_cut = (PetscBool)(so->run->model->narrive && !cuts && so->whole == 0.);
+    so->run->arrival = 1.;
     PetscCall(SbRunStepBegin(so->run, ts->ptime, ts->time_step));
     if (is_explicit(so))
       PetscCall(solve_explicit(ts, &ok));
@@ -297,14 +322,21 @@ static PetscErrorCode TSStep_SecondOrder(TS ts)
         so->good = next > ts->time_step ? 0 : so->good + 1;
         ts->time_step = next;
         so->run->stop_reason[0] = 0;
+        go_on_after_arrival(so);
         break;
       }
+    } else if (so->run->arrival < 1.) {
+      cut_at_arrival(ts, &next);
+      cuts--;
     } else {
       PetscBool simpler = PETSC_FALSE;
 
       /* a preconditioner that broke down is replaced and the same step tried again */
       if (!is_explicit(so)) PetscCall(SbSolverFallBack(ts->snes, &simpler));
-      if (simpler) cuts--;
+      if (simpler)
+        cuts--;
+      else
+        so->whole = so->rest = 0.;
       next = simpler ? ts->time_step : 0.5 * ts->time_step;
     }
     /* rejected: the state of the start comes back, and the step is tried with another length */

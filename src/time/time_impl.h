@@ -3,6 +3,8 @@
 */
 #pragma once
 #define SB_CONTACT_ROUNDS 100 /* solves of one step before contact counts as failed */
+#define SB_ARRIVAL_LEAST \
+  0.05 /* of a step: where points arrive nearer to one of its ends, it is not cut at their arrival */
 #include "sbtime.h"
 
 #define SB_TS_SECOND_ORDER "sb_second_order"
@@ -58,6 +60,8 @@ typedef struct {
 /*
   SbRunSolveContact - a step from t to t + dt with contact: as many solves as its set of touching nodes takes, U from its guess to the
   solution. Collective. U0 is the displacement at t. reason: that of the last solve, SNES_DIVERGED_MAX_IT when the set does not settle.
+  With run->may_cut it ends after the first solve when points arrive within the step: reason is then SNES_CONVERGED_ITERATING, and the
+  step is to be repeated with run->arrival of its length.
 */
 PetscErrorCode SbRunSolveContact(SbRun run, SNES snes, PetscReal t, PetscReal dt, Vec U0, Vec U,
                                  const SbContactSolve *solve, SNESConvergedReason *reason);

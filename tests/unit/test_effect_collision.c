@@ -49,6 +49,8 @@ static PetscErrorCode check_refused(void)
     {"-effect_meet_reach -1", "-effect_meet_reach"},
     {"-effect_meet_recovery 0.5", "-effect_meet_recovery"},
     {"-sets left -set_left_at plane:1,0,0,0 -effect_meet_on left", "The effect meet has only one body"},
+    {"-effect_meet_arrival late", "whole"},
+    {"-time genalpha -effect_meet_arrival cut", "-time genalpha gains energy with -effect_meet_arrival cut"},
     {"-time euler_symplectic", "The effect meet needs several solves in a step"},
     {"-time euler_explicit", "The effect meet needs several solves in a step"},
     {"-time alpha2", "The effect meet needs several solves in a step"},

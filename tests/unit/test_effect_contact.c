@@ -43,6 +43,8 @@ static PetscErrorCode check_options(void)
   PetscCall(check_error(&x, FLOOR "-effect_floor_recovery 0.5", "-effect_floor_recovery 0.5"));
   PetscCall(check_error(&x, "-effect_floor_type contact -effect_floor_obstacle mesh:no.stl",
                         "-effect_floor_obstacle: no.stl: cannot open the file"));
+  PetscCall(check_error(&x, FLOOR "-effect_floor_arrival cut -effect_floor_restitution 0.5",
+                        "-effect_floor_restitution 0.5 and -effect_floor_arrival cut do not go together"));
   PetscCall(check_error(&x, FLOOR "-effect_floor_axis 0,0,0", "-effect_floor_axis: 0,0,0 is no direction"));
   PetscCall(check_error(&x, FLOOR "-effect_floor_displacement x;0;0", "-effect_floor_displacement"));
   PetscCall(effect_create(&x, "floor", FLOOR, &e));
