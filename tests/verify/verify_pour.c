@@ -1,0 +1,13 @@
+// @ranks 1 2
+// @timeout 300
+/*
+  Eight small bodies poured into a bowl; verify_pour_long pours fifty. What is looked at is told in pour.h.
+*/
+#include "pour.h"
+
+int main(int argc, char **argv)
+{
+  SB_TEST_BEGIN(argc, argv);
+  PetscCall(pour(8, 0.5, POUR_RADIUS, ""));
+  SB_TEST_END();
+}
