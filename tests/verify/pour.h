@@ -21,9 +21,11 @@ static inline PetscReal pour_noise(PetscInt body, PetscInt purpose)
   return PetscSinReal(x * x);
 }
 
-/* Options of n bodies in layers of four, in a string that the caller frees. */
+/* Options of n bodies in layers: rings of four, of many bodies rings of eight with one in the middle. */
 static inline PetscErrorCode pour_bodies(PetscInt n, size_t size, char text[])
 {
+  const PetscInt many = n > 8 ? 9 : 4;
+
   PetscFunctionBeginUser;
   PetscCall(PetscStrncpy(text, "-bodies", size));
   for (PetscInt k = 0; k < n; k++) {
@@ -33,9 +35,12 @@ static inline PetscErrorCode pour_bodies(PetscInt n, size_t size, char text[])
     PetscCall(PetscStrlcat(text, one, size));
   }
   for (PetscInt k = 0; k < n; k++) {
-    const PetscReal angle = 0.5 * PETSC_PI * (PetscReal)(k % 4) + 0.4 * (PetscReal)(k / 4), r = 0.075;
+    const PetscInt layer = k / many, place_in = k % many;
+    const PetscReal angle =
+      2 * PETSC_PI * (PetscReal)place_in / (PetscReal)(many == 9 ? 8 : 4) + 0.4 * (PetscReal)layer;
+    const PetscReal r = many == 4 ? 0.075 : place_in == 8 ? 0 : 0.14;
     const PetscReal place[3] = {r * PetscCosReal(angle), r * PetscSinReal(angle),
-                                -0.02 + 0.1 * (PetscReal)(k / 4) + 0.008 * pour_noise(k, 0)};
+                                -0.02 + 0.1 * (PetscReal)layer + 0.008 * pour_noise(k, 0)};
     char one[768];
 
     /* turned about the origin, which is a corner: the centre is within 0.052 m of `place` */
