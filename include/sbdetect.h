@@ -100,7 +100,8 @@ PetscErrorCode SbDetectorDestroy(SbDetector *detector);
 PetscErrorCode SbDetectorFind(SbDetector detector, const SbDetectScene *scene, PetscInt *n,
                               const SbNear **near);
 /*
-  SbDetectorFindEdges - all pairs of sharp edges of two parts that meet within the reach, or went through each other within the step.
+  SbDetectorFindEdges - all pairs of sharp edges of two parts that are within the reach of each other, or in each other by up to a quarter of it, or
+  went through each other within the step.
 
   Not collective. Every kind of detector returns the same pairs, ordered by the first edge and by the identity of the second. An edge is sharp
   where the surface is convex and its facets' normals are more than 26 degrees apart. A pair counts when its normal leads away

@@ -8,7 +8,8 @@
   from the edge into its facets. Elsewhere a vertex or a facet is nearer, and points see that.
 
   A gap that is negative by more than rounding is a penetration only if the edges are in each other's part: one of them pierces a facet at
-  the other one. Without that, the edges of the far sides of two thin bars would be a pair. Edges that went through each other
+  the other one. Without that, the edges of the far sides of two thin bars would be a pair. When bodies overlap far, the way out past edges is seldom the
+  shortest: then points part them first. Edges that went through each other
   within the step are found at any depth (cross.c).
 
   Only sharp edges: where surfaces are smooth, vertices hold them apart. Two surfaces of edges h that bend by an angle theta at each
@@ -22,6 +23,8 @@
 #define PARALLEL 0.05 /* sine between two edges, below which they have no normal */
 #define CONE \
   0.05 /* so far, 3 degrees, the normal may leave the cones: edges flush with a face are pairs also when all bends a little */
+#define DEEP \
+  0.25 /* of the reach: the largest depth at which edges that are in each other are a pair without a motion */
 #define SHALLOW 1e-3 /* of the reach: a depth that is taken for touching */
 #define START \
   0.1 /* of the reach: so deep a pair may begin the step and be in front: it lay in contact (near.c) */
@@ -169,7 +172,7 @@ PetscBool SbEdgesMeet(const SbEdgePlace *first, const SbEdgePlace *second, Petsc
   }
   pair->gap = gap;
   pair->crossed = PETSC_FALSE;
-  if (between && PetscAbsReal(gap) <= reach &&
+  if (between && gap <= reach && gap >= -DEEP * reach &&
       (gap >= -SHALLOW * reach || is_in(first, second) || is_in(second, first)))
     return PETSC_TRUE;
   pair->crossed = (PetscBool)(gap < 0 && first->x0[0] && went_through(first, second, pair->normal, reach));

@@ -29,6 +29,7 @@
 #define PULLING 1e-6 /* of the largest contact force: what a row must pull with to leave */
 #define SETTLED 1e-4 /* of the largest contact force: change of the friction that a solve assumed */
 #define LATE 1e-2    /* the same after UPDATES solves, with a warning; what does not get there is cut */
+#define SLOW 25      /* solves of a step, after which the tolerance of multipliers is raised, twice */
 #define EDGE_PAIRS 8 /* of one edge, that have identities of their own */
 #define UPDATES 30   /* of friction within a step; from half of them on N changes by half steps */
 
@@ -394,15 +395,21 @@ static PetscBool settle_row(const Collision *c, PetscReal largest, Hit *hit)
   return (PetscBool)(PetscAbsReal(excess(hit)) <= small || hit->looks >= LOOKS);
 }
 
-/* The same for springs: who pushes, and with `augmented` the multiplier. */
+/*
+  The same for springs: who pushes, and with `augmented` the multiplier. Where rows say the same twice, force goes over from one to the
+  other in ever smaller parts: after some solves a larger penetration will do.
+*/
 static PetscBool settle_spring(const Collision *c, Hit *hit)
 {
   const PetscReal force = normal_force(c, hit);
+  const PetscReal tolerance = TOLERANCE * c->surface->size *
+                              (hit->looks < SLOW       ? 1
+                               : hit->looks < 2 * SLOW ? 10
+                                                       : 100);
   const PetscBool was = hit->on;
 
   hit->on = (PetscBool)(force > 0);
-  if (c->response == AUGMENTED &&
-      (force > 0 ? PetscAbsReal(excess(hit)) > TOLERANCE * c->surface->size : hit->lambda > 0)) {
+  if (c->response == AUGMENTED && (force > 0 ? PetscAbsReal(excess(hit)) > tolerance : hit->lambda > 0)) {
     hit->lambda = force;
     return PETSC_FALSE;
   }

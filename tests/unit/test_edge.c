@@ -474,8 +474,9 @@ static void check_special(void)
   SB_CHECK(meet((PetscReal[3]){0, 0, 0.1}, cross, NULL, &pair), "crosswise");
   SB_CHECK_NEAR(pair.gap, 0.1, 1e-15, "gap");
   SB_CHECK_NEAR(pair.normal[2], 1, 1e-15, "normal");
-  SB_CHECK(meet((PetscReal[3]){0.3, 0.2, -0.1}, slant, NULL, &pair), "in each other");
-  SB_CHECK_NEAR(pair.gap, -0.1, 1e-15, "depth");
+  SB_CHECK(meet((PetscReal[3]){0.3, 0.2, -0.04}, slant, NULL, &pair), "in each other");
+  SB_CHECK_NEAR(pair.gap, -0.04, 1e-15, "depth");
+  SB_CHECK(!meet((PetscReal[3]){0.3, 0.2, -0.1}, slant, NULL, &pair), "deep in each other");
   SB_CHECK(meet((PetscReal[3]){0, 0, 0}, cross, NULL, &pair) && pair.gap == 0, "touching");
   SB_CHECK(!meet((PetscReal[3]){0, 0, 0.1}, along, NULL, &pair), "parallel");
   SB_CHECK(!meet((PetscReal[3]){0, 0, 0.1}, nearly, NULL, &pair), "nearly parallel");
