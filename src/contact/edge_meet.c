@@ -23,6 +23,8 @@
 #define PARALLEL 0.05 /* sine between two edges, below which they have no normal */
 #define CONE \
   0.05 /* so far, 3 degrees, the normal may leave the cones: edges flush with a face are pairs also when all bends a little */
+#define END \
+  1e-4 /* of an edge: nearer to its ends it is a vertex, which points see; so rounding does not decide who does */
 #define DEEP \
   0.25 /* of the reach: the largest depth at which edges that are in each other are a pair without a motion */
 #define SHALLOW 1e-3 /* of the reach: a depth that is taken for touching */
@@ -163,7 +165,8 @@ PetscBool SbEdgesMeet(const SbEdgePlace *first, const SbEdgePlace *second, Petsc
   PetscBool between;
 
   if (!normal_of(first, second, pair->normal, pair->at)) return PETSC_FALSE;
-  between = (PetscBool)(pair->at[0] > 0 && pair->at[0] < 1 && pair->at[1] > 0 && pair->at[1] < 1);
+  between =
+    (PetscBool)(PetscMin(pair->at[0], pair->at[1]) > END && PetscMax(pair->at[0], pair->at[1]) < 1 - END);
   for (int i = 0; i < 2; i++) pair->at[i] = PetscMax(0, PetscMin(1, pair->at[i]));
   for (int k = 0; k < 3; k++) {
     const PetscReal a = first->x[0][k] + pair->at[0] * (first->x[1][k] - first->x[0][k]);
