@@ -197,6 +197,8 @@ void SbSpaceCoupleGet(SbSpace space, PetscInt row, PetscReal *force, PetscReal *
 PetscErrorCode SbSpaceCoupleForce(SbSpace space, Vec U, Vec F);
 /* U <- nearest displacement on which the exact rows hold. Collective. */
 PetscErrorCode SbCouplePrescribe(SbSpace space, Vec U);
+/* z <- the part of it that moves nothing that is prescribed, held, or tied by exact rows. Collective. */
+PetscErrorCode SbSpaceAllow(SbSpace space, Vec z);
 /* F <- F less the springs' forces, and without what the exact rows take when `constrain`. Collective. */
 PetscErrorCode SbCoupleResidual(SbSpace space, Vec U, PetscBool constrain, Vec F);
 /* Whether any node of any rank is held, or any row there, since the last Done. Not collective, alike on all ranks. */

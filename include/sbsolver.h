@@ -60,6 +60,9 @@ PetscErrorCode SbSaddleChoose(SbSpace space, PetscBool dynamic, PetscInt choice,
   preconditioner is not symmetric and definite).
 */
 PetscErrorCode SbKSPSaddleSet(SbSpace space, KSP ksp);
+/* A Cholesky factorisation whose pivot is not positive is one that failed (KSP_DIVERGED_PC_FAILED), with CHOLMOD too; other types of
+   pc are left alone. After PCSetFromOptions(). Not collective. */
+PetscErrorCode SbPCGuardFactor(PC pc);
 /* What is left to do for the solver of `snes` after SNESSetFromOptions(). Collective. */
 PetscErrorCode SbSolverFinish(SNES snes, SbSpace space);
 /* The operator that the preset works on. Collective; caller destroys. */

@@ -509,6 +509,21 @@ PetscErrorCode SbCouplePrescribe(SbSpace s, Vec U)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscErrorCode SbSpaceAllow(SbSpace s, Vec z)
+{
+  PetscScalar *x;
+
+  PetscFunctionBeginUser;
+  PetscCall(VecGetArray(z, &x));
+  for (PetscInt i = 0; i < 3 * s->nnode_owned; i++) {
+    if (s->fixed[i / 3] & (1 << (i % 3))) x[i] = 0.;
+  }
+  if (s->held) SbHeldConstrain(s, x);
+  PetscCall(VecRestoreArray(z, &x));
+  if (s->couple) PetscCall(SbCoupleProject(s->couple, z));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Forces of the springs into c->spring.force, where they are into c->spring.work. */
 static PetscErrorCode stretch(SbCouple c, Vec U)
 {

@@ -251,11 +251,13 @@ PetscErrorCode SbSolverSetUp(SNES snes, SbSpace s, const SbSolverPreset *preset)
 PetscErrorCode SbSolverFinish(SNES snes, SbSpace s)
 {
   KSP ksp;
+  PC pc;
 
   PetscFunctionBeginUser;
-  if (!s->couple || s->couple->saddle != SB_SADDLE_ITERATIVE) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(SNESGetKSP(snes, &ksp));
-  PetscCall(SbKSPSaddleSet(s, ksp));
+  PetscCall(KSPGetPC(ksp, &pc));
+  PetscCall(SbPCGuardFactor(pc));
+  if (s->couple && s->couple->saddle == SB_SADDLE_ITERATIVE) PetscCall(SbKSPSaddleSet(s, ksp));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -49,11 +49,35 @@ static PetscErrorCode attempt(SbRun run, PetscReal factor, PetscReal length, Vec
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Why the solve failed. */
+static PetscErrorCode explain(SbRun run, PetscReal factor, SNESConvergedReason reason)
+{
+  KSPConvergedReason kreason;
+  PetscInt body;
+  char motion[128];
+  KSP ksp;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbRunFreeBody(run, &body, sizeof(motion), motion));
+  PetscCall(SNESGetKSP(run->snes, &ksp));
+  PetscCall(KSPGetConvergedReason(ksp, &kreason));
+  if (body >= 0)
+    PetscCall(SbRunFail(run, "load factor %g: nothing holds the body %s against %s; hold it by a support%s",
+                        (double)factor, run->model->body[body].name, motion,
+                        run->model->ntouch ? ", or let it come to rest in a dynamic run" : ""));
+  else
+    PetscCall(
+      SbRunFail(run,
+                "load factor %g: %s (linear solver: %s); use more -static_steps, or hold the bodies so "
+                "that they cannot move freely",
+                (double)factor, SNESConvergedReasons[reason], KSPConvergedReasons[kreason]));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 static PetscErrorCode solve_at(SbRun run, PetscReal factor, PetscReal length, Vec X, PetscBool *ok)
 {
   SNESConvergedReason reason;
-  KSPConvergedReason kreason;
-  KSP ksp;
+  PetscBool far;
 
   PetscFunctionBeginUser;
   PetscCall(attempt(run, factor, length, X, &reason));
@@ -62,15 +86,9 @@ static PetscErrorCode solve_at(SbRun run, PetscReal factor, PetscReal length, Ve
     PetscCall(attempt(run, factor, length, X, &reason));
     PetscCall(SbRunSearch(run, PETSC_FALSE));
   }
-  *ok = (PetscBool)(reason > 0);
-  if (!*ok) {
-    PetscCall(SNESGetKSP(run->snes, &ksp));
-    PetscCall(KSPGetConvergedReason(ksp, &kreason));
-    PetscCall(SbRunFail(run,
-                        "load factor %g: %s (linear solver: %s); use more -static_steps, or hold the body so "
-                        "that it cannot move freely",
-                        (double)factor, SNESConvergedReasons[reason], KSPConvergedReasons[kreason]));
-  }
+  PetscCall(SbRunTooFar(run, X, &far));
+  *ok = (PetscBool)(reason > 0 && !far);
+  if (!*ok) PetscCall(explain(run, factor, reason));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

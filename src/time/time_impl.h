@@ -50,6 +50,10 @@ PetscErrorCode SbFormStaticJacobian(SNES snes, Vec U, Mat J, Mat P, void *run);
 PetscErrorCode SbFormAcceleration(SbRun run, PetscReal t, Vec U, Vec V, Vec A);
 
 PetscErrorCode SbStaticSolve(SbRun run); /* static.c: the load path */
+/* free_body.c, after a static solve: a body that can move rigidly without a force, -1: none is found; how, in words. Collective. */
+PetscErrorCode SbRunFreeBody(SbRun run, PetscInt *body, size_t size, char motion[]);
+/* Whether displacements are so many times the bodies' size that the matrix must have been singular. Collective. */
+PetscErrorCode SbRunTooFar(SbRun run, Vec X, PetscBool *far);
 
 /* How a step is solved, for the loop of contact. */
 typedef struct {

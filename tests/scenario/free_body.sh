@@ -1,0 +1,70 @@
+#!/usr/bin/env bash
+# A body that only contact without friction holds in a static run: it can slide, and every solver ends with one line that names it and
+# the motion that nothing resists; no trace, and no displacement of a billion metres instead. Held by a support the same scene is solved.
+# @timeout 300
+set -uo pipefail
+# shellcheck source=tests/scenario/scenario_common.sh
+source tests/scenario/scenario_common.sh
+
+cat >bodies.opts <<'END'
+-bodies a,b
+-body_a_mesh box:0.1,0.1,0.05:2
+-body_a_material linear
+-body_a_young 1e5
+-body_a_poisson 0.3
+-body_a_density 1000
+-body_b_mesh box:0.05,0.05,0.05:2
+-body_b_translate 0.02,0.02,0.05
+-body_b_material linear
+-body_b_young 1e5
+-body_b_poisson 0.3
+-body_b_density 1000
+-sets low,under
+-set_low_at plane:0,0,1,0
+-set_under_at plane:0,0,1,0.05
+-effects gravity,hold,meet
+-effect_gravity_vector 0.5,0.2,-9.81
+-effect_hold_type support
+-effect_hold_on low
+-time static
+-output_fields none
+END
+floor="-effect_meet_type contact -effect_meet_on under -effect_meet_obstacle plane:0,0,1,0.0505"
+slides="nothing holds the body b against moving along (1.00, 0.00, 0.00); hold it by a support"
+
+# free RANKS ARGUMENT...: one line says that it slides
+free() {
+  error "$1" "load factor 0.000976562: $slides" -options_file bodies.opts "${@:2}"
+}
+
+# on an obstacle
+for solver in auto cholmod mumps cg_icc cg_two_level; do
+  # shellcheck disable=SC2086
+  free 1 $floor -solver "$solver"
+done
+# on another body
+for solver in auto mumps cg_icc; do free 1 -effect_meet_type collision -solver "$solver"; done
+# CHOLMOD met a zero pivot there, and ended the program
+for element in cr dg; do free 1 -effect_meet_type collision -body_a_element $element -body_b_element $element; done
+free 1 -effect_meet_type collision -body_a_material neohookean -body_b_material neohookean
+# multipliers as unknowns
+for way in direct iterative; do
+  # shellcheck disable=SC2086
+  free 1 $floor -effect_meet_response multiplier -multipliers $way
+done
+# shellcheck disable=SC2086
+free 2 $floor
+free 2 -effect_meet_type collision
+# held at the nodes of one axis, it turns about that
+# shellcheck disable=SC2086
+error 1 "load factor 0.000976562: nothing holds the body b against turning about (0.00, 0.00, 1.00); hold it by a support" \
+  -options_file bodies.opts $floor -effects gravity,hold,pin,turn,meet -sets low,under,pin \
+  -set_pin_at box:0.0449,0.0449,0.05,0.0451,0.0451,0.1 -effect_pin_type support -effect_pin_on pin \
+  -effect_pin_components xy -effect_turn_type body_force -effect_turn_density "(0.045-y)*1e5;(x-0.045)*1e5;0"
+# what holds: a support of the sides
+# shellcheck disable=SC2086
+timeout 60 "$supple" -options_file bodies.opts $floor -effects gravity,hold,side,meet -sets low,under,side \
+  -set_side_at plane:1,0,0,0.02 -effect_side_type support -effect_side_on side -effect_side_components xy >out.txt 2>err.txt
+code=$?
+check "held at a side: exit code $code" test "$code" = 0
+finish
