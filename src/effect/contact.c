@@ -24,6 +24,9 @@
 */
 #include "contact.h"
 
+#define AVERAGED 4   /* flips of a held node between facets in a step, after which normals are averaged */
+#define KEPT 24      /* flips after which it is held on the same plane till the step ends */
+#define JUMP 1e-6    /* 1 - cosine: a flip */
 #define TOGGLES 3    /* how often a node may come within a step before it stays */
 #define PULLING 1e-6 /* of the largest contact force: what a node must pull with to leave */
 #define SETTLED 1e-3 /* of the largest contact force: change of the N that friction assumed */
@@ -89,7 +92,8 @@ static PetscErrorCode read_obstacle(SbEffect e, const SbScope *scope)
   PetscCall(SbOptionName(scope, "obstacle", sizeof(option), option));
   PetscCall(SbOptionString(scope, "obstacle", sizeof(text), text));
   PetscCall(SbObstacleCreate(option, text, &c->obstacle));
-  if (!SbObstacleIsMesh(c->obstacle)) PetscFunctionReturn(PETSC_SUCCESS);
+  c->facets = SbObstacleIsMesh(c->obstacle);
+  if (!c->facets) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(SbOptionReal(scope, "obstacle_scale", &c->scale));
   PetscCall(SbOptionReals(scope, "obstacle_at", c->at));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -202,12 +206,39 @@ static PetscErrorCode setup_contact(SbEffect e, SbSpace space)
 
 /* ------------------------------------------------------------------ who touches */
 
+/*
+  Where facets of a mesh meet, a held node may slide from one to the other and back with every look: over a ridge, or in a valley where both
+  push. The normal that it needs is one between theirs. So after some of these flips the normals are averaged, which ends where forces
+  balance at the edge; after many the plane is kept. n comes in as the normal of the surface at its place.
+*/
+static void average_normal(Touch *touch, PetscReal n[3])
+{
+  PetscReal length;
+
+  if (SbDot3(n, touch->surface) < 1 - JUMP) touch->flips++;
+  for (int i = 0; i < 3; i++) touch->surface[i] = n[i];
+  if (touch->flips <= AVERAGED) return;
+  for (int i = 0; i < 3; i++) n[i] = touch->n[i] + (n[i] - touch->n[i]) / (touch->flips - AVERAGED + 1);
+  length = PetscSqrtReal(SbDot3(n, n));
+  for (int i = 0; i < 3; i++) n[i] /= length;
+}
+
 /* Gap of the node at x beyond what it is held at, with its normal and the value of n . u that puts it there. */
 static PetscReal look(const Contact *c, SbSpace space, const PetscReal x[3], Touch *touch)
 {
-  const PetscReal gap = SbContactGap(c, &c->to, x, touch->n);
+  const PetscReal *X = space->node_x + 3 * touch->node;
+  PetscReal n[3], at[3], gap;
 
-  touch->value = SbDot3(touch->n, x) - gap + touch->rest - SbDot3(touch->n, space->node_x + 3 * touch->node);
+  if (touch->flips > KEPT && touch->on) return SbDot3(touch->n, x) - SbDot3(touch->n, X) - touch->value;
+  gap = SbContactGap(c, &c->to, x, n);
+  for (int i = 0; i < 3; i++) at[i] = x[i] - gap * n[i] - X[i]; /* from the rest position to the surface */
+  if (c->facets && touch->on)
+    average_normal(touch, n);
+  else {
+    for (int i = 0; i < 3; i++) touch->surface[i] = n[i];
+  }
+  for (int i = 0; i < 3; i++) touch->n[i] = n[i];
+  touch->value = SbDot3(n, at) + touch->rest;
   return gap - touch->rest;
 }
 
@@ -267,7 +298,7 @@ static PetscErrorCode touch_contact(SbEffect e, SbSpace space, PetscReal t, Pets
     PetscReal x0[3], x[3], n[3];
     PetscBool comes;
 
-    touch->toggles = 0;
+    touch->toggles = touch->flips = 0;
     touch->on = touch->was; /* whatever an attempt that failed made of it */
     touch->idle = (PetscBool)(c->cut && !touch->was && !exact(c));
     place(space, touch->node, u, x);

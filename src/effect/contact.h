@@ -17,10 +17,11 @@ typedef struct {
   PetscBool was;          /* it touched at the end of the last step, and did not rebound */
   PetscBool idle;         /* its spring waits for the first solve of the step */
   PetscReal gap0;         /* gap when the step began, m; with `arrival cut` or restitution */
-  int toggles;            /* how often it came within the step */
+  int toggles, flips;     /* how often it came within the step, and while held changed facets */
   PetscBool slips;        /* it slid at the end of the last step */
   PetscInt along;         /* number of its direction at the node, or of its row; -1: held by something else */
-  PetscReal n[3];         /* normal at the last look, outwards from the obstacle */
+  PetscReal surface[3];   /* normal of the obstacle at the last look */
+  PetscReal n[3];         /* normal that it is held along, outwards from the obstacle */
   PetscReal value;        /* n . u that puts it on the obstacle, m */
   PetscReal
     rest; /* gap that it is held at: 0, minus what is left of an overlap, or where it rebounds to, m */
@@ -37,6 +38,7 @@ typedef struct {
   SbEffectOn on;
   SbObstacle obstacle;
   Response response;
+  PetscBool facets; /* the obstacle is a mesh */
   PetscReal mu, mu_kinetic, stiffness;
   PetscReal recovery;     /* part of an overlap that is left after a step */
   PetscReal scale, at[3]; /* of the file of a mesh */

@@ -35,14 +35,18 @@ static PetscReal tangential(const PetscReal n[3], const PetscReal v[3], PetscRea
 
 /* ------------------------------------------------------------------ forces */
 
-/* Normal force on a node at x, N; n: the normal there. */
+/*
+  Normal force on a node at x, N; n: the normal. Springs follow their normal; a node that is held keeps the one it is held along: were it
+  to turn during a solve, where facets meet it would jump, and Newton's method with it.
+*/
 static PetscReal normal_force(const Contact *c, const SbPose *pose, const Touch *touch, const PetscReal x[3],
                               PetscReal n[3])
 {
-  const PetscReal gap = SbContactGap(c, pose, x, n);
-
-  if (exact(c)) return touch->on && touch->along >= 0 ? touch->lambda : 0;
-  return spring(touch, gap - touch->rest);
+  if (exact(c)) {
+    for (int k = 0; k < 3; k++) n[k] = touch->n[k];
+    return touch->on && touch->along >= 0 ? touch->lambda : 0;
+  }
+  return spring(touch, SbContactGap(c, pose, x, n) - touch->rest);
 }
 
 /* Force of friction on a node, N. Returns its share of what the spring alone would pull with: 1 while it sticks. */
@@ -69,15 +73,11 @@ PetscErrorCode SbEffectForce_Contact(SbEffect e, SbSpace space, const SbStage *s
   SbContactPose(c, stage->t, &pose);
   for (PetscInt i = 0; i < c->n; i++) {
     const Touch *touch = &c->touch[i];
-    PetscReal *fi = f + 3 * touch->node, x[3], n[3], t[3];
+    PetscReal *fi = f + 3 * touch->node, x[3], n[3], t[3], normal;
 
     place(space, touch->node, stage->u, x);
-    if (!exact(c)) {
-      const PetscReal normal = normal_force(c, &pose, touch, x, n);
-
-      for (int k = 0; k < 3; k++) fi[k] += normal * n[k];
-    } else
-      (void)SbContactGap(c, &pose, x, n);
+    normal = normal_force(c, &pose, touch, x, n);
+    for (int k = 0; k < 3 && !exact(c); k++) fi[k] += normal * n[k];
     if (touch->pressing <= 0) continue;
     (void)drag(c, &pose, touch, x, n, t);
     for (int k = 0; k < 3; k++) fi[k] += t[k];

@@ -4,7 +4,7 @@
 #pragma once
 #include <stdlib.h>
 #include <unistd.h>
-#include <petscsys.h>
+#include <sbbase.h>
 
 typedef struct {
   PetscInt nvert, ntri;

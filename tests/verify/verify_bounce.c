@@ -173,6 +173,9 @@ int main(int argc, char **argv)
   PetscCall(check_ball("cr", 0.5));
   PetscCall(
     check_block("plane:0,0,1,0", "-body_a_translate 0,0,0.0104 -body_a_velocity 0,0,-1", 0.6, "block"));
+  PetscCall(check_block(
+    "plane:0,0,1,0", "-body_a_translate 0,0,0.0104 -body_a_velocity 0,0,-1 -effect_floor_response multiplier",
+    0.6, "block, multiplier"));
   PetscCall(check_block("plane:0,0,1,-0.01", "-effect_floor_displacement 0;0;0.5*t", 0.8, "bat"));
   if (size == 1) {
     PetscCall(check_soft(1e5, 0.001, 1));
