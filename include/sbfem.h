@@ -165,23 +165,29 @@ PetscReal SbSpaceHoldForce(SbSpace space, PetscInt node, PetscInt k, const Petsc
 
   SbSpaceCoupleCreate() during set-up of an effect that may need them. Then, as often as they change: SbSpaceCoupleClear(), rows on
   any rank, SbSpaceCoupleDone() (collective). SbModelPrescribe(), residuals and solves follow: solves run in the null space of
-  the exact rows, or find their multipliers as unknowns.
+  the exact rows, or find their multipliers as unknowns. oblique: rows may push along other coefficients than those of their sums; then
+  solves are not symmetric.
 */
-/* How solves treat the exact rows: in their null space, or as [K G^T; G 0] by a factorisation or by iterations. */
+/* How solves treat the exact rows: in their null space, or as [K F^T; G 0] by a factorisation or by iterations. */
 typedef enum { SB_SADDLE_NONE, SB_SADDLE_DIRECT, SB_SADDLE_ITERATIVE } SbSaddle;
 /* outer: rows may hold nodes on something that is no body (those of a negative id), whose forces are reactions. Alike on all ranks. */
-PetscErrorCode SbSpaceCoupleCreate(SbSpace space, PetscBool outer);
+PetscErrorCode SbSpaceCoupleCreate(SbSpace space, PetscBool outer, PetscBool oblique);
 /* Whether there may be such rows. Not collective. */
 PetscBool SbSpaceCoupleOuter(SbSpace space);
+/* Whether solves of this space are not symmetric. Not collective. */
+PetscBool SbSpaceCoupleOblique(SbSpace space);
 /* Not collective. */
 void SbSpaceCoupleClear(SbSpace space);
-/* gnode[n]: global numbers of nodes; coef[n][3]; value in m; id: rows that say nearly what those of lower ids say rest, so that no
-   partition changes which; negative: of a node and something that is no body, which rest only if they are fully said by others. Output: row, its number on this rank. Not collective. */
+/* gnode[n]: global numbers of nodes; coef[n][3] of the sum; push[n][3] of the force, NULL: the same; value in m; id: rows that say nearly
+   what those of lower ids say rest, so that no partition changes which; negative: of a node and something that is no body, which rest only
+   if they are fully said by others. Output: row, its number on this rank. Not collective. */
 PetscErrorCode SbSpaceCoupleRow(SbSpace space, PetscInt id, PetscInt n, const PetscInt gnode[],
-                                const PetscReal coef[], PetscReal value, PetscInt *row);
+                                const PetscReal coef[], const PetscReal push[], PetscReal value,
+                                PetscInt *row);
 /* A force of constant + stiffness (value - sum_k coef_k . u_k) along the row, N; stiffness >= 0, N/m. Not collective. */
 PetscErrorCode SbSpaceCoupleSpring(SbSpace space, PetscInt n, const PetscInt gnode[], const PetscReal coef[],
-                                   PetscReal value, PetscReal stiffness, PetscReal constant, PetscInt *row);
+                                   const PetscReal push[], PetscReal value, PetscReal stiffness,
+                                   PetscReal constant, PetscInt *row);
 /* Makes matrices of the rows; without rows on any rank it exchanges no more than their number. Collective. */
 PetscErrorCode SbSpaceCoupleDone(SbSpace space);
 /* What rows push with and where they are, for the displacement U and its residual R without constraints (N). R <- R less the

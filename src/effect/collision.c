@@ -16,9 +16,7 @@
   A row that has come several times within a step stays, and n and b are kept after some looks: the loop ends. `penalty`: springs
   N = <-k g>. `augmented`: N = <lambda - k g> with a multiplier that is raised after each solve (Simo and Laursen 1992).
 
-  Friction: a spring of stiffness k stretched by what the point has slid over the facet, which lets go at mu N (return mapping,
-  Wriggers 2006). A solve takes its tangent at the solve before, with the N of that: symmetric, and Newton's method on a convex
-  potential for given N; where that goes too far, the secant (Kacanov's method), which is slow and sure.
+  Friction is in collision_friction.c.
 
   With one surface looking for the other (`sides one`), the finer one looks: rows then are not more than the surface can take. A thin
   or much coarser partner wants both.
@@ -26,12 +24,9 @@
 #include "collision.h"
 
 #define TOGGLES 3    /* how often a row may come within a step before it stays */
-#define PULLING 1e-6 /* of the largest contact force: what a row must pull with to leave */
-#define SETTLED 1e-4 /* of the largest contact force: change of the friction that a solve assumed */
-#define LATE 1e-2    /* the same after UPDATES solves, with a warning; what does not get there is cut */
 #define SLOW 25      /* solves of a step, after which the tolerance of multipliers is raised, twice */
 #define EDGE_PAIRS 8 /* of one edge, that have identities of their own */
-#define UPDATES 30   /* of friction within a step; from half of them on N changes by half steps */
+#define PULLING 1e-6 /* of the largest contact force: what a row must pull with to leave */
 
 static const SbOption rows[] = {
   {"on", SB_OPTION_NAMES, 1, "", "boundary", "", "sets whose surfaces may meet"},
@@ -186,24 +181,18 @@ static PetscErrorCode setup_collision(SbEffect e, SbSpace space)
              e->name, e->name, e->name);
   PetscCall(PetscMalloc1(3 * space->nnode, &c->u0));
   if (c->reach == 0) c->reach = 0.5 * c->surface->edge;
-  PetscCall(SbSpaceCoupleCreate(space, PETSC_FALSE));
+  PetscCall(SbSpaceCoupleCreate(space, PETSC_FALSE, (PetscBool)(c->mu > 0)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* ------------------------------------------------------------------ who touches */
-
-/* Gap beyond what is allowed for now, m. */
-static inline PetscReal excess(const Hit *hit)
-{
-  return hit->gap + hit->allowed;
-}
 
 /* A point that was apart when the step began and is behind now, by a motion that did not know of it: when it came. */
 static void watch_arrival(Collision *c, const Hit *hit)
 {
   const PetscReal gap0 = SbDot3(hit->normal, hit->start) - hit->value, small = TOLERANCE * c->surface->size;
 
-  if (!c->cut || hit->was || gap0 <= small || excess(hit) >= -small) return;
+  if (!c->cut || hit->was || gap0 <= small || SbCollisionExcess(hit) >= -small) return;
   c->arrival = PetscMin(c->arrival, gap0 / (gap0 - hit->gap));
 }
 
@@ -237,16 +226,13 @@ static PetscErrorCode touch_collision(SbEffect e, SbSpace space, PetscReal t, Pe
     Hit *hit = &c->hit[i];
 
     hit->toggles = hit->looks = 0;
-    hit->overshoots = hit->careful = 0;
-    if (!hit->on) { /* a point that arrives in this step sticks to where it was at its start */
-      for (int k = 0; k < 3; k++) hit->stretch[k] = 0;
-      hit->pressing = hit->lambda = 0;
-      hit->slips = PETSC_FALSE;
-    }
+    if (!hit->on) hit->lambda = 0;
+    if (c->mu > 0) SbFrictionBegin(hit);
     watch_arrival(c, hit);
     if (!exact(c->response))
-      hit->on = (PetscBool)(hit->lambda - hit->k * (excess(hit) - TOLERANCE * c->surface->size) >= 0);
-    else if (excess(hit) <= TOLERANCE * c->surface->size)
+      hit->on =
+        (PetscBool)(hit->lambda - hit->k * (SbCollisionExcess(hit) - TOLERANCE * c->surface->size) >= 0);
+    else if (SbCollisionExcess(hit) <= TOLERANCE * c->surface->size)
       hit->on = PETSC_TRUE;
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -254,80 +240,8 @@ static PetscErrorCode touch_collision(SbEffect e, SbSpace space, PetscReal t, Pe
 
 /* ------------------------------------------------------------------ rows */
 
-/* Two directions across n. */
-static void frame(const PetscReal n[3], PetscReal t[2][3])
-{
-  const int k = PetscAbsReal(n[0]) < 0.6 ? 0 : 1;
-  PetscReal length;
-
-  for (int i = 0; i < 3; i++) t[0][i] = (i == k) - n[k] * n[i];
-  length = PetscSqrtReal(SbDot3(t[0], t[0]));
-  for (int i = 0; i < 3; i++) t[0][i] /= length;
-  SbCross(n, t[0], t[1]);
-}
-
-/* Stretch of the friction spring across the normal, m; returns its length. */
-static PetscReal stretch(const Hit *hit, const PetscReal w[3], PetscReal s[3])
-{
-  PetscReal along;
-
-  for (int i = 0; i < 3; i++) s[i] = hit->stretch[i] + w[i] - hit->start[i];
-  along = SbDot3(hit->normal, s);
-  for (int i = 0; i < 3; i++) s[i] -= along * hit->normal[i];
-  return PetscSqrtReal(SbDot3(s, s));
-}
-
-/* Most that friction holds, N. */
-static PetscReal limit(const Collision *c, const Hit *hit)
-{
-  return (hit->slips ? c->mu_kinetic : c->mu) * hit->pressing;
-}
-
-static void coefficients(const Hit *hit, const PetscReal direction[3], PetscReal coef[3 * NODES])
-{
-  for (PetscInt k = 0; k < 3 * hit->n; k++) coef[k] = hit->weight[k / 3] * direction[k % 3];
-}
-
-/* Force of friction for a stretch s of the given length, N. */
-static PetscReal drag(const Collision *c, const Hit *hit, PetscReal length)
-{
-  return PetscMin(hit->k * length, limit(c, hit));
-}
-
-/*
-  Two springs across the normal. Sticking: of stiffness k. Sliding: the force mu N along the slip does not change, across it has the
-  stiffness mu N / stretch: Newton's method on friction's potential for given N. Should that turn the slip around, both have the secant's.
-*/
-static PetscErrorCode add_friction(const Collision *c, SbSpace space, Hit *hit)
-{
-  PetscReal s[3], coef[3 * NODES], length, stiffness;
-  PetscBool sliding;
-
-  PetscFunctionBeginUser;
-  hit->newton = PETSC_FALSE;
-  if (hit->pressing <= 0) PetscFunctionReturn(PETSC_SUCCESS);
-  length = stretch(hit, hit->now, s);
-  sliding = (PetscBool)(hit->k * length > limit(c, hit));
-  hit->newton = (PetscBool)(sliding && !hit->careful);
-  stiffness = sliding ? limit(c, hit) / length : hit->k;
-  if (sliding) {
-    for (int k = 0; k < 3; k++) hit->tangent[0][k] = s[k] / length;
-    SbCross(hit->normal, hit->tangent[0], hit->tangent[1]);
-  } else
-    frame(hit->normal, hit->tangent);
-  for (int q = 0; q < 2; q++) {
-    const PetscReal *t = hit->tangent[q], rest = SbDot3(t, hit->start) - SbDot3(t, hit->stretch);
-    const PetscBool constant = (PetscBool)(hit->newton && q == 0);
-
-    coefficients(hit, t, coef);
-    PetscCall(SbSpaceCoupleSpring(space, hit->n, hit->node, coef, rest, constant ? 0 : stiffness,
-                                  constant ? -limit(c, hit) : 0, &hit->slide[q]));
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Identity of the row of hit i: the same for any partition. Edges come after points, which so are preferred where both say the same. */
-static PetscInt row_id(const Collision *c, PetscInt i)
+/* Edges come after points, which so are preferred where both say the same. */
+PetscInt SbCollisionId(const Collision *c, PetscInt i)
 {
   const Hit *hit = &c->hit[i];
   const SbDetectScene *s = &c->surface->scene;
@@ -335,11 +249,12 @@ static PetscInt row_id(const Collision *c, PetscInt i)
   const PetscInt64 points = (mesh->Nvert + 8 * (PetscInt64)mesh->Ncell) * mesh->nbody;
   PetscInt before = 0;
 
-  if (!SbCollisionOfEdges(c, hit)) return s->point_id[hit->point] * mesh->nbody + hit->part;
+  if (!SbCollisionOfEdges(c, hit))
+    return (PetscInt)((s->point_id[hit->point] * (PetscInt64)mesh->nbody + hit->part) % SB_COLLISION_IDS);
   while (before < i && c->hit[i - before - 1].point == hit->point) before++;
   return (PetscInt)((points + s->edges->id[hit->point - s->npoint] * (PetscInt64)EDGE_PAIRS +
                      PetscMin(before, EDGE_PAIRS - 1)) %
-                    PETSC_MAX_INT);
+                    SB_COLLISION_IDS);
 }
 
 static PetscErrorCode hold_collision(SbEffect e, SbSpace space)
@@ -349,30 +264,25 @@ static PetscErrorCode hold_collision(SbEffect e, SbSpace space)
   PetscFunctionBeginUser;
   for (PetscInt i = 0; i < c->nhit; i++) {
     Hit *hit = &c->hit[i];
-    PetscReal coef[3 * NODES];
+    PetscReal coef[3 * NODES], push[3 * NODES];
+    PetscBool oblique = PETSC_FALSE;
 
     hit->row = hit->slide[0] = hit->slide[1] = -1;
     if (!hit->on) continue;
-    coefficients(hit, hit->normal, coef);
+    SbCollisionCoef(hit, hit->normal, coef);
+    if (c->mu > 0) SbFrictionPush(c, hit, push, &oblique);
     if (exact(c->response))
-      PetscCall(
-        SbSpaceCoupleRow(space, row_id(c, i), hit->n, hit->node, coef, hit->value - hit->allowed, &hit->row));
+      PetscCall(SbSpaceCoupleRow(space, SbCollisionId(c, i), hit->n, hit->node, coef, oblique ? push : NULL,
+                                 hit->value - hit->allowed, &hit->row));
     else
-      PetscCall(SbSpaceCoupleSpring(space, hit->n, hit->node, coef, hit->value - hit->allowed, hit->k,
-                                    hit->lambda, &hit->row));
-    if (c->mu > 0) PetscCall(add_friction(c, space, hit));
+      PetscCall(SbSpaceCoupleSpring(space, hit->n, hit->node, coef, oblique ? push : NULL,
+                                    hit->value - hit->allowed, hit->k, hit->lambda, &hit->row));
+    if (c->mu > 0) PetscCall(SbFrictionHold(c, space, i));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* ------------------------------------------------------------------ settling */
-
-/* Normal force after a solve, N. */
-static inline PetscReal normal_force(const Collision *c, const Hit *hit)
-{
-  if (exact(c->response)) return hit->lambda;
-  return PetscMax(0, hit->lambda - hit->k * excess(hit));
-}
 
 /* Whether an exact row is there, or not, as it should be; changes it if not. */
 static PetscBool settle_row(const Collision *c, PetscReal largest, Hit *hit)
@@ -380,7 +290,7 @@ static PetscBool settle_row(const Collision *c, PetscReal largest, Hit *hit)
   const PetscReal small = TOLERANCE * c->surface->size;
 
   if (!hit->on) {
-    if (excess(hit) >= -small) return PETSC_TRUE;
+    if (SbCollisionExcess(hit) >= -small) return PETSC_TRUE;
     hit->on = PETSC_TRUE;
     hit->toggles++;
     return PETSC_FALSE;
@@ -392,7 +302,7 @@ static PetscBool settle_row(const Collision *c, PetscReal largest, Hit *hit)
   }
   hit->lambda = PetscMax(0, hit->lambda);
   if (hit->rests) return PETSC_TRUE;
-  return (PetscBool)(PetscAbsReal(excess(hit)) <= small || hit->looks >= LOOKS);
+  return (PetscBool)(PetscAbsReal(SbCollisionExcess(hit)) <= small || hit->looks >= LOOKS);
 }
 
 /*
@@ -401,7 +311,7 @@ static PetscBool settle_row(const Collision *c, PetscReal largest, Hit *hit)
 */
 static PetscBool settle_spring(const Collision *c, Hit *hit)
 {
-  const PetscReal force = normal_force(c, hit);
+  const PetscReal force = SbCollisionForce(c, hit);
   const PetscReal tolerance = TOLERANCE * c->surface->size *
                               (hit->looks < SLOW       ? 1
                                : hit->looks < 2 * SLOW ? 10
@@ -409,69 +319,31 @@ static PetscBool settle_spring(const Collision *c, Hit *hit)
   const PetscBool was = hit->on;
 
   hit->on = (PetscBool)(force > 0);
-  if (c->response == AUGMENTED && (force > 0 ? PetscAbsReal(excess(hit)) > tolerance : hit->lambda > 0)) {
+  if (c->response == AUGMENTED &&
+      (force > 0 ? PetscAbsReal(SbCollisionExcess(hit)) > tolerance : hit->lambda > 0)) {
     hit->lambda = force;
     return PETSC_FALSE;
   }
   return (PetscBool)(was == hit->on);
 }
 
-/* Once who touches is settled everywhere: the N that friction assumes, from the second half on with half steps. */
-static PetscErrorCode settle_friction(Collision *c, SbSpace space, PetscReal largest, PetscBool *changed)
-{
-  const PetscReal most = c->mu * largest;
-  PetscBool wait = *changed;
-
-  PetscFunctionBeginUser;
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &wait, 1, SB_MPI_BOOL, MPI_LOR, space->comm));
-  if (wait) PetscFunctionReturn(PETSC_SUCCESS);
-  c->updates++;
-  c->unsettled = 0;
-  for (PetscInt i = 0; i < c->nhit; i++) {
-    Hit *hit = &c->hit[i];
-    PetscReal s[3], change, length, wrong[3];
-
-    if (!hit->on) continue;
-    length = stretch(hit, hit->now, s);
-    if (hit->careful) hit->careful--;
-    if (hit->newton && (SbDot3(hit->drag, s) > 0 || hit->k * length < 0.9 * limit(c, hit))) {
-      hit->overshoots++;
-      hit->careful = 1 << PetscMin(5, hit->overshoots);
-    }
-    change = normal_force(c, hit) - hit->pressing;
-    hit->pressing += 2 * c->updates > UPDATES ? 0.5 * change : change;
-    for (int k = 0; k < 3; k++)
-      wrong[k] = hit->drag[k] + (length > 0 ? drag(c, hit, length) / length * s[k] : 0);
-    if (most > 0) c->unsettled = PetscMax(c->unsettled, PetscSqrtReal(SbDot3(wrong, wrong)) / most);
-  }
-  if (c->unsettled > (c->updates > UPDATES ? LATE : SETTLED)) *changed = PETSC_TRUE;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* What a solve made of the rows of a pair: its multiplier, gap and place, should its normal and weights stay. */
 static void read_rows(const Collision *c, SbSpace space, Hit *hit)
 {
-  PetscReal force, along, across[2] = {0, 0};
+  PetscReal force, along;
 
-  for (int k = 0; k < 3; k++) hit->drag[k] = 0;
   hit->rests = PETSC_FALSE;
   if (hit->row < 0) return;
-  for (int q = 0; q < 2 && hit->slide[q] >= 0; q++) {
-    SbSpaceCoupleGet(space, hit->slide[q], &force, &across[q]);
-    for (int k = 0; k < 3; k++) hit->drag[k] += force * hit->tangent[q][k];
-  }
   SbSpaceCoupleGet(space, hit->row, &force, &along);
   hit->rests = SbSpaceCoupleRests(space, hit->row);
   if (hit->rests) {
     hit->lambda = 0;
     hit->gap = -hit->allowed; /* so those rows say; the next look tells more if it finds the pair */
-    return;
+  } else {
+    if (exact(c->response)) hit->lambda = force;
+    hit->gap = along - hit->value;
   }
-  if (exact(c->response)) hit->lambda = force;
-  hit->gap = along - hit->value;
-  if (hit->slide[0] < 0) return;
-  for (int k = 0; k < 3; k++)
-    hit->now[k] = along * hit->normal[k] + across[0] * hit->tangent[0][k] + across[1] * hit->tangent[1][k];
+  if (c->mu > 0) SbFrictionRead(c, space, along, hit);
 }
 
 static PetscErrorCode settle_collision(SbEffect e, SbSpace space, const PetscReal u[], const PetscReal r[],
@@ -485,7 +357,7 @@ static PetscErrorCode settle_collision(SbEffect e, SbSpace space, const PetscRea
   (void)r;
   for (PetscInt i = 0; i < c->nhit; i++) read_rows(c, space, &c->hit[i]);
   PetscCall(SbCollisionLook(c, u, PETSC_TRUE));
-  for (PetscInt i = 0; i < c->nhit; i++) largest = PetscMax(largest, normal_force(c, &c->hit[i]));
+  for (PetscInt i = 0; i < c->nhit; i++) largest = PetscMax(largest, SbCollisionForce(c, &c->hit[i]));
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &largest, 1, MPIU_REAL, MPI_MAX, space->comm));
   for (PetscInt i = 0; i < c->nhit; i++) {
     Hit *hit = &c->hit[i];
@@ -496,59 +368,27 @@ static PetscErrorCode settle_collision(SbEffect e, SbSpace space, const PetscRea
     if (!right) mine = PETSC_TRUE;
   }
   c->first = PETSC_FALSE;
-  if (c->mu > 0) PetscCall(settle_friction(c, space, largest, &mine));
+  if (c->mu > 0) SbFrictionSettle(c, largest, &mine);
   if (mine) *changed = PETSC_TRUE;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* ------------------------------------------------------------------ after a step */
 
-/* Says once that friction was taken as it was. Collective. */
-static PetscErrorCode warn_unsettled(SbEffect e, SbSpace space, const SbStage *stage)
-{
-  Collision *c = (Collision *)e->data;
-  PetscReal most = c->unsettled;
-
-  PetscFunctionBeginUser;
-  if (c->updates <= UPDATES || c->said) PetscFunctionReturn(PETSC_SUCCESS); /* alike on all ranks */
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &most, 1, MPIU_REAL, MPI_MAX, space->comm));
-  if (most <= SETTLED) PetscFunctionReturn(PETSC_SUCCESS);
-  c->said = PETSC_TRUE;
-  PetscCall(SbWarning(space->comm,
-                      "at t = %g s the friction of the effect %s settled to %.1g of the largest only, not to "
-                      "%g; said once: smaller steps make it more exact",
-                      (double)stage->t, e->name, (double)most, SETTLED));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Who slid keeps the stretch that the force asks for; work of the forces on the way from the start of the step. */
+/* Work of the forces on the way from the start of the step. */
 static PetscErrorCode accept_collision(SbEffect e, SbSpace space, const SbStage *stage)
 {
   Collision *c = (Collision *)e->data;
 
   PetscFunctionBeginUser;
-  PetscCall(warn_unsettled(e, space, stage));
+  if (c->mu > 0) PetscCall(SbFrictionAccept(c, e->name, space, stage->t));
   for (PetscInt i = 0; i < c->nhit; i++) {
     Hit *hit = &c->hit[i];
-    const PetscReal normal = hit->on ? normal_force(c, hit) : 0;
-    PetscReal s[3], slid[3], length;
+    const PetscReal normal = hit->on ? SbCollisionForce(c, hit) : 0;
 
     hit->was = hit->on;
-    hit->held = 0;
-    if (normal <= 0) { /* nothing holds it where it was */
-      for (int k = 0; k < 3; k++) hit->stretch[k] = 0;
-      hit->slips = PETSC_FALSE;
-      continue;
-    }
-    for (int k = 0; k < 3; k++) slid[k] = hit->now[k] - hit->start[k];
-    c->work += normal * SbDot3(hit->normal, slid);
-    length = stretch(hit, hit->now, s);
-    hit->held = drag(c, hit, length);
-    hit->slips = (PetscBool)(hit->k * length > limit(c, hit));
-    if (length > 0) {
-      c->loss += hit->held / length * SbDot3(s, slid);
-      for (int k = 0; k < 3; k++) hit->stretch[k] = s[k] * hit->held / (hit->k * length);
-    }
+    for (int k = 0; k < 3 && normal > 0; k++)
+      c->work += normal * hit->normal[k] * (hit->now[k] - hit->start[k]);
   }
   PetscCall(SbCollisionKeep(c));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -573,10 +413,10 @@ static PetscErrorCode history_collision(SbEffect e, SbSpace space, const SbStage
       sum[0] -= hit->gap;
       sum[1]++;
     }
-    if (!hit->on || normal_force(c, hit) <= 0) continue;
+    if (!hit->on || SbCollisionForce(c, hit) <= 0) continue;
     values[0]++;
-    values[3] += normal_force(c, hit);
-    values[4] += hit->held;
+    values[3] += SbCollisionForce(c, hit);
+    values[4] += PetscSqrtReal(SbDot3(hit->drag, hit->drag));
   }
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &deepest, 1, MPIU_REAL, MPI_MAX, space->comm));
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, sum, 2, MPIU_REAL, MPI_SUM, space->comm));

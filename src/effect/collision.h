@@ -5,7 +5,8 @@
 #include "sbdetect.h"
 #include "sbeffect.h"
 
-#define LOOKS 8        /* how often its normal and weights may change within a step */
+#define FEW_LOOKS 3    /* how often normal and weights of a row are taken anew within a step in any case */
+#define LOOKS 8        /* and how often while its gap is not closed */
 #define TOLERANCE 1e-7 /* of the size of the bodies: largest penetration that counts as touching */
 #define NODES 8        /* of a row, at most: of two cells; with a point one, and those of the facet's cell */
 
@@ -38,14 +39,13 @@ typedef struct {
   PetscBool rests;            /* other rows say it */
   PetscInt row, slide[2];     /* rows of the space, -1: none */
   PetscReal lambda;           /* multiplier, N */
-  PetscReal pressing;         /* N that friction assumes */
-  PetscReal stretch[3];       /* of the friction spring at the start of the step, m */
-  PetscReal tangent[2][3];
-  PetscBool newton;        /* sliding by Newton's method in the last solve */
-  int overshoots, careful; /* within the step: how often that went too far; solves left with the secant */
-  PetscReal drag[3];       /* force of friction in the last solve, N */
-  PetscReal held;          /* the same, its size, at the end of the last step */
-  PetscBool slips;         /* at the end of the last step */
+  PetscBool slides;           /* in the solve; else it sticks */
+  PetscBool slid;             /* in the last step */
+  PetscReal tangent[2][3];    /* across the normal; the first one is where it slides to */
+  PetscReal turning;          /* stiffness across where it slides to, N/m */
+  PetscReal stretch[3];       /* of the springs that stick, at the start of the step, m */
+  PetscReal drag[3];          /* force of friction on the point in the last solve, N */
+  PetscReal pressing;         /* normal force of the solve before, N */
 } Hit;
 
 typedef struct {
@@ -61,15 +61,14 @@ typedef struct {
   PetscReal *edge_k;  /* [own edges] the same of an edge, N/m */
   PetscReal *u0;      /* [nnode][3] displacement at the start of the step, m */
   PetscInt nhit, size, npast, past_size;
-  Hit *hit, *spare;  /* by point and part */
-  Hit *past;         /* [npast] as the last step left them: each attempt at a step begins there */
-  PetscBool cut;     /* steps end where points arrive */
-  PetscBool first;   /* the step has not been solved yet */
-  PetscReal arrival; /* the part of it after which the first point arrives, 1: none */
-  int updates;       /* of friction within the step */
-  PetscReal
-    unsettled; /* largest change of friction that the last solve did not see, as a part of the largest friction */
-  PetscBool said;       /* that friction did not settle */
+  Hit *hit, *spare;    /* by point and part */
+  Hit *past;           /* [npast] as the last step left them: each attempt at a step begins there */
+  PetscBool cut;       /* steps end where points arrive */
+  PetscBool first;     /* the step has not been solved yet */
+  PetscReal arrival;   /* the part of it after which the first point arrives, 1: none */
+  int updates;         /* of friction within the step */
+  PetscReal unsettled; /* largest error of friction after the last solve, as a part of the largest friction */
+  PetscBool said;      /* that friction did not settle */
   PetscReal work, loss; /* of the contact forces and of friction since the start, this rank, J */
 } Collision;
 
@@ -90,3 +89,38 @@ static inline PetscBool SbCollisionOfEdges(const Collision *c, const Hit *hit)
 {
   return (PetscBool)(hit->point >= c->surface->scene.npoint);
 }
+/* Gap beyond what is allowed for now, m. */
+static inline PetscReal SbCollisionExcess(const Hit *hit)
+{
+  return hit->gap + hit->allowed;
+}
+
+/* Normal force after a solve, N. */
+static inline PetscReal SbCollisionForce(const Collision *c, const Hit *hit)
+{
+  if (exact(c->response)) return hit->lambda;
+  return PetscMax(0, hit->lambda - hit->k * SbCollisionExcess(hit));
+}
+
+/* Coefficients of the relative displacement along a direction. */
+static inline void SbCollisionCoef(const Hit *hit, const PetscReal direction[3], PetscReal coef[3 * NODES])
+{
+  for (PetscInt k = 0; k < 3 * hit->n; k++) coef[k] = hit->weight[k / 3] * direction[k % 3];
+}
+
+/* collision.c: identity of hit i, the same for any partition, below SB_COLLISION_IDS. */
+PetscInt SbCollisionId(const Collision *c, PetscInt i);
+#define SB_COLLISION_IDS (PETSC_MAX_INT / 3)
+
+/* collision_friction.c: what a pair begins a step with; not collective. */
+void SbFrictionBegin(Hit *hit);
+/* Coefficients that the normal force pushes along, if it has friction with it (oblique). */
+void SbFrictionPush(const Collision *c, const Hit *hit, PetscReal push[3 * NODES], PetscBool *oblique);
+/* Rows across the normal of hit i, which touches. Not collective. */
+PetscErrorCode SbFrictionHold(const Collision *c, SbSpace space, PetscInt i);
+/* What a solve made of them; along: the sum of the normal's row, m. */
+void SbFrictionRead(const Collision *c, SbSpace space, PetscReal along, Hit *hit);
+/* Who sticks and who slides from now on; changed: the solve was not right. largest: normal force of all pairs, N. Not collective. */
+void SbFrictionSettle(Collision *c, PetscReal largest, PetscBool *changed);
+/* Ends a step: losses, springs, a warning if friction was taken as it was. Collective. */
+PetscErrorCode SbFrictionAccept(Collision *c, const char effect[], SbSpace space, PetscReal t);

@@ -109,6 +109,11 @@ static void take_edges(const Collision *c, const SbEdgePair *pair, Hit *hit)
   relative_edges(pair, s, s->x0 ? s->x0 : s->x, hit->start);
 }
 
+static inline PetscReal gap_of(const Found *found, PetscInt i)
+{
+  return i < found->nnear ? found->near[i].gap : found->pair[i - found->nnear].gap;
+}
+
 /*
   Normal, weights and gap of a pair as the detector sees it now. A point that was behind this facet when the step began, and not held
   there, was not seen before (it came over a rim, or bodies overlap from the start): putting it in front at once would
@@ -125,7 +130,7 @@ static void take_geometry(const Collision *c, const Found *found, PetscInt i, Hi
   else
     take_point(c, &found->near[i], hit);
   for (int k = 0; k < 3; k++) hit->normal[k] = normal[k];
-  hit->gap = pair ? pair->gap : found->near[i].gap;
+  hit->gap = gap_of(found, i);
   hit->value = SbDot3(hit->normal, hit->now) - hit->gap;
   if (!hit->was || turned < 0.7)
     hit->allowed =
@@ -146,6 +151,13 @@ static PetscErrorCode make_room(Collision *c, PetscInt n)
 static inline PetscBool before(const Hit *a, PetscInt point, PetscInt part)
 {
   return (PetscBool)(a->point < point || (a->point == point && a->part < part));
+}
+
+/* A pair keeps its normal and weights once its gap is closed, or after many looks: on an edge they may change for ever. */
+static PetscBool is_settled(const Collision *c, PetscReal gap, Hit *hit)
+{
+  if (hit->looks++ < FEW_LOOKS) return PETSC_FALSE;
+  return (PetscBool)(hit->looks > LOOKS || PetscAbsReal(gap + hit->allowed) <= TOLERANCE * c->surface->size);
 }
 
 /*
@@ -170,7 +182,7 @@ static PetscErrorCode merge(Collision *c, const Found *found, PetscBool within)
       if (within && c->hit[old].on) c->spare[m++] = c->hit[old];
     }
     if (old < c->nhit && c->hit[old].point == hit.point && c->hit[old].part == hit.part) hit = c->hit[old++];
-    if (!within || !hit.on || hit.looks++ < LOOKS) take_geometry(c, found, i, &hit);
+    if (!within || !hit.on || !is_settled(c, gap_of(found, i), &hit)) take_geometry(c, found, i, &hit);
     c->spare[m++] = hit;
   }
   for (; old < c->nhit; old++) {

@@ -199,7 +199,7 @@ static PetscErrorCode setup_contact(SbEffect e, SbSpace space)
   }
   c->size = PetscSqrtReal(SbDot3(box, box));
   if (c->response == PROJECTED) PetscCall(SbSpaceHoldCreate(space));
-  if (c->response == MULTIPLIER) PetscCall(SbSpaceCoupleCreate(space, PETSC_TRUE));
+  if (c->response == MULTIPLIER) PetscCall(SbSpaceCoupleCreate(space, PETSC_TRUE, PETSC_FALSE));
   if (c->restitution > 0) PetscCall(SbReboundCreate(c, space));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -332,7 +332,7 @@ static PetscErrorCode hold_contact(SbEffect e, SbSpace space)
       touch->along = SbSpaceHold(space, touch->node, touch->n, touch->value);
     else
       PetscCall(SbSpaceCoupleRow(space, -1 - space->node_orig[touch->node], 1, &space->gnode[touch->node],
-                                 touch->n, touch->value, &touch->along));
+                                 touch->n, NULL, touch->value, &touch->along));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -13,6 +13,10 @@
 
   G D G^T has the rows of all ranks, which are few, and is factored on each of them.
 
+  A row may push along other coefficients F than those of its sum: what slides with friction mu is pushed along n - mu d, d the
+  direction of the slip. Then P = I - D F^T (G D F^T)^-1 G, forces are projected by I - F^T (G D F^T)^-1 G D, springs give F^T k G,
+  and A is not symmetric.
+
   Where an effect asks for it, the saddle-point system itself is solved in the place of A: couple_factor.c, couple_saddle.c.
 
   Nodes that are prescribed or held (held.c) have no say: their columns are cleared or projected.
@@ -21,17 +25,18 @@
 
 #define NOTHING 1e-20 /* of the largest on that diagonal: rows below it have no free node but for rounding */
 
-PetscErrorCode SbSpaceCoupleCreate(SbSpace s, PetscBool outer)
+PetscErrorCode SbSpaceCoupleCreate(SbSpace s, PetscBool outer, PetscBool oblique)
 {
-  SbCouple c;
+  SbCouple c = s->couple;
 
   PetscFunctionBeginUser;
-  if (!s->couple) {
+  if (!c) {
     PetscCall(PetscNew(&c));
     PetscCall(PetscCalloc1(1, &c->start));
     s->couple = c;
   }
-  if (outer) s->couple->outer = PETSC_TRUE;
+  c->outer = (PetscBool)(c->outer || outer);
+  c->oblique = (PetscBool)(c->oblique || oblique);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -40,11 +45,18 @@ PetscBool SbSpaceCoupleOuter(SbSpace s)
   return (PetscBool)(s->couple && s->couple->outer);
 }
 
+PetscBool SbSpaceCoupleOblique(SbSpace s)
+{
+  return (PetscBool)(s->couple && s->couple->oblique);
+}
+
 static PetscErrorCode destroy_rows(Rows *r)
 {
   PetscFunctionBeginUser;
   PetscCall(MatDestroy(&r->whole));
   PetscCall(MatDestroy(&r->free));
+  PetscCall(MatDestroy(&r->push));
+  PetscCall(MatDestroy(&r->push_free));
   PetscCall(VecDestroy(&r->value));
   PetscCall(VecDestroy(&r->force));
   PetscCall(VecDestroy(&r->work));
@@ -60,7 +72,7 @@ static PetscErrorCode destroy_matrices(SbCouple c)
   PetscCall(destroy_rows(&c->spring));
   PetscCall(VecDestroy(&c->k));
   PetscCall(VecDestroy(&c->constants));
-  PetscCall(MatDestroy(&c->DGt));
+  PetscCall(MatDestroy(&c->DFt));
   PetscCall(MatDestroy(&c->gram));
   PetscCall(KSPDestroy(&c->solver));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -80,10 +92,12 @@ PetscErrorCode SbCoupleDestroy(SbCouple *couple)
   PetscCall(VecDestroy(&c->d));
   PetscCall(VecDestroy(&c->w[0]));
   PetscCall(VecDestroy(&c->w[1]));
+  PetscCall(VecDestroy(&c->w[2]));
   PetscCall(PetscFree(c->rests));
   PetscCall(PetscFree(c->start));
   PetscCall(PetscFree(c->gnode));
   PetscCall(PetscFree(c->coef));
+  PetscCall(PetscFree(c->along));
   PetscCall(PetscFree7(c->value, c->stiffness, c->constant, c->place, c->force, c->sum, c->id));
   PetscCall(PetscFree(*couple));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -95,6 +109,7 @@ void SbSpaceCoupleClear(SbSpace s)
 {
   s->couple->n = 0;
   s->couple->nentry = 0;
+  s->couple->tilted = PETSC_FALSE;
 }
 
 static PetscErrorCode make_room(SbCouple c, PetscInt more)
@@ -132,12 +147,14 @@ static PetscErrorCode make_room(SbCouple c, PetscInt more)
     c->entry_size = PetscMax(256, 2 * (c->nentry + more));
     PetscCall(PetscRealloc((size_t)c->entry_size * sizeof(PetscInt), &c->gnode));
     PetscCall(PetscRealloc(3 * (size_t)c->entry_size * sizeof(PetscReal), &c->coef));
+    PetscCall(PetscRealloc(3 * (size_t)c->entry_size * sizeof(PetscReal), &c->along));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode SbSpaceCoupleSpring(SbSpace s, PetscInt n, const PetscInt gnode[], const PetscReal coef[],
-                                   PetscReal value, PetscReal stiffness, PetscReal constant, PetscInt *row)
+                                   const PetscReal push[], PetscReal value, PetscReal stiffness,
+                                   PetscReal constant, PetscInt *row)
 {
   SbCouple c = s->couple;
 
@@ -145,6 +162,8 @@ PetscErrorCode SbSpaceCoupleSpring(SbSpace s, PetscInt n, const PetscInt gnode[]
   PetscCall(make_room(c, n));
   PetscCall(PetscArraycpy(c->gnode + c->nentry, gnode, n));
   PetscCall(PetscArraycpy(c->coef + 3 * c->nentry, coef, 3 * n));
+  PetscCall(PetscArraycpy(c->along + 3 * c->nentry, push ? push : coef, 3 * n));
+  if (push) c->tilted = PETSC_TRUE;
   c->start[c->n] = c->nentry;
   c->value[c->n] = value;
   c->stiffness[c->n] = stiffness;
@@ -158,10 +177,11 @@ PetscErrorCode SbSpaceCoupleSpring(SbSpace s, PetscInt n, const PetscInt gnode[]
 }
 
 PetscErrorCode SbSpaceCoupleRow(SbSpace s, PetscInt id, PetscInt n, const PetscInt gnode[],
-                                const PetscReal coef[], PetscReal value, PetscInt *row)
+                                const PetscReal coef[], const PetscReal push[], PetscReal value,
+                                PetscInt *row)
 {
   PetscFunctionBeginUser;
-  PetscCall(SbSpaceCoupleSpring(s, n, gnode, coef, value, -1., 0., row));
+  PetscCall(SbSpaceCoupleSpring(s, n, gnode, coef, push, value, -1., 0., row));
   s->couple->id[*row] = id;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -171,11 +191,35 @@ static inline PetscBool of_kind(SbCouple c, PetscInt i, PetscBool exact)
   return (PetscBool)((c->stiffness[i] < 0.) == exact && !c->rests[i]);
 }
 
-/* The rows of one kind as a matrix. */
+/* The rows of one kind as a matrix, with the coefficients coef[][3]. */
+static PetscErrorCode create_matrix(SbSpace s, PetscBool exact, const Rows *r, PetscInt widest,
+                                    const PetscReal coef[], Mat *A)
+{
+  SbCouple c = s->couple;
+  PetscInt first;
+
+  PetscFunctionBeginUser;
+  PetscCall(MatCreateAIJ(s->comm, r->n, 3 * s->nnode_owned, PETSC_DETERMINE, 3 * s->Nnode, widest, NULL,
+                         widest, NULL, A));
+  PetscCall(MatGetOwnershipRange(*A, &first, NULL));
+  for (PetscInt i = 0; i < c->n; i++) {
+    if (!of_kind(c, i, exact)) continue;
+    for (PetscInt e = c->start[i]; e < c->start[i + 1]; e++) {
+      const PetscInt row = first + c->place[i], g = 3 * c->gnode[e], column[3] = {g, g + 1, g + 2};
+
+      PetscCall(MatSetValues(*A, 1, &row, 3, column, coef + 3 * e, ADD_VALUES));
+    }
+  }
+  PetscCall(MatAssemblyBegin(*A, MAT_FINAL_ASSEMBLY));
+  PetscCall(MatAssemblyEnd(*A, MAT_FINAL_ASSEMBLY));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The rows of one kind; c->tilted is alike on all ranks. */
 static PetscErrorCode create_rows(SbSpace s, PetscBool exact, Rows *r)
 {
   SbCouple c = s->couple;
-  PetscInt widest = 1, first;
+  PetscInt widest = 1;
   PetscScalar *value;
 
   PetscFunctionBeginUser;
@@ -187,26 +231,22 @@ static PetscErrorCode create_rows(SbSpace s, PetscBool exact, Rows *r)
   }
   PetscCallMPI(MPI_Allreduce(&r->n, &r->N, 1, MPIU_INT, MPI_SUM, s->comm));
   if (!r->N) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(MatCreateAIJ(s->comm, r->n, 3 * s->nnode_owned, PETSC_DETERMINE, 3 * s->Nnode, widest, NULL,
-                         widest, NULL, &r->whole));
+  PetscCall(create_matrix(s, exact, r, widest, c->coef, &r->whole));
+  if (c->tilted)
+    PetscCall(create_matrix(s, exact, r, widest, c->along, &r->push));
+  else {
+    PetscCall(PetscObjectReference((PetscObject)r->whole));
+    r->push = r->whole;
+  }
   PetscCall(MatCreateVecs(r->whole, NULL, &r->value));
   PetscCall(VecDuplicate(r->value, &r->force));
   PetscCall(VecDuplicate(r->value, &r->work));
   PetscCall(VecDuplicate(r->value, &r->step));
-  PetscCall(MatGetOwnershipRange(r->whole, &first, NULL));
   PetscCall(VecGetArrayWrite(r->value, &value));
   for (PetscInt i = 0; i < c->n; i++) {
-    if (!of_kind(c, i, exact)) continue;
-    value[c->place[i]] = c->value[i];
-    for (PetscInt e = c->start[i]; e < c->start[i + 1]; e++) {
-      const PetscInt row = first + c->place[i], g = 3 * c->gnode[e], column[3] = {g, g + 1, g + 2};
-
-      PetscCall(MatSetValues(r->whole, 1, &row, 3, column, c->coef + 3 * e, ADD_VALUES));
-    }
+    if (of_kind(c, i, exact)) value[c->place[i]] = c->value[i];
   }
   PetscCall(VecRestoreArrayWrite(r->value, &value));
-  PetscCall(MatAssemblyBegin(r->whole, MAT_FINAL_ASSEMBLY));
-  PetscCall(MatAssemblyEnd(r->whole, MAT_FINAL_ASSEMBLY));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -233,20 +273,32 @@ static PetscErrorCode create_projector(SbSpace s, Mat *H)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Clears what prescribed unknowns and held directions would say in the rows. */
-static PetscErrorCode free_rows(SbSpace s, Rows *r)
+/* Clears what prescribed unknowns and held directions (I - Q in H, NULL: none) would say in a matrix of rows. */
+static PetscErrorCode create_free(SbSpace s, Mat whole, Mat H, Mat *free)
 {
   PetscFunctionBeginUser;
-  if (!r->N) PetscFunctionReturn(PETSC_SUCCESS);
-  if (SbHeldAny(s)) {
-    Mat H;
+  if (H)
+    PetscCall(MatMatMult(whole, H, MAT_INITIAL_MATRIX, PETSC_DEFAULT, free));
+  else
+    PetscCall(MatDuplicate(whole, MAT_COPY_VALUES, free));
+  PetscCall(MatDiagonalScale(*free, NULL, s->couple->free));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
 
-    PetscCall(create_projector(s, &H));
-    PetscCall(MatMatMult(r->whole, H, MAT_INITIAL_MATRIX, PETSC_DEFAULT, &r->free));
-    PetscCall(MatDestroy(&H));
+static PetscErrorCode free_rows(SbSpace s, Rows *r)
+{
+  Mat H = NULL;
+
+  PetscFunctionBeginUser;
+  if (!r->N) PetscFunctionReturn(PETSC_SUCCESS);
+  if (SbHeldAny(s)) PetscCall(create_projector(s, &H));
+  PetscCall(create_free(s, r->whole, H, &r->free));
+  if (r->push == r->whole) {
+    PetscCall(PetscObjectReference((PetscObject)r->free));
+    r->push_free = r->free;
   } else
-    PetscCall(MatDuplicate(r->whole, MAT_COPY_VALUES, &r->free));
-  PetscCall(MatDiagonalScale(r->free, NULL, s->couple->free));
+    PetscCall(create_free(s, r->push, H, &r->push_free));
+  PetscCall(MatDestroy(&H));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -264,6 +316,7 @@ static PetscErrorCode create_vectors(SbSpace s)
   PetscCall(VecDuplicate(c->free, &c->d));
   PetscCall(VecDuplicate(c->free, &c->w[0]));
   PetscCall(VecDuplicate(c->free, &c->w[1]));
+  PetscCall(VecDuplicate(c->free, &c->w[2]));
   PetscCall(VecGetArray(c->free, &x));
   for (PetscInt i = 0; i < 3 * s->nnode_owned; i++) x[i] = s->fixed[i / 3] & (1 << (i % 3)) ? 0. : 1.;
   PetscCall(VecRestoreArray(c->free, &x));
@@ -342,7 +395,7 @@ static PetscErrorCode create_solver(SbSpace s)
     PetscCall(KSPSetType(inner, KSPPREONLY));
     PetscCall(KSPGetPC(inner, &pc));
   }
-  PetscCall(PCSetType(pc, PCCHOLESKY));
+  PetscCall(PCSetType(pc, c->tilted ? PCLU : PCCHOLESKY));
   PetscCall(KSPSetUp(c->solver));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -396,7 +449,7 @@ PetscErrorCode SbCoupleAnchor(SbSpace s, const SbValues *x)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* G D G^T of the exact rows, and its factorisation. */
+/* G D F^T of the exact rows, and its factorisation. */
 static PetscErrorCode create_gram(SbSpace s)
 {
   SbCouple c = s->couple;
@@ -404,9 +457,9 @@ static PetscErrorCode create_gram(SbSpace s)
   PetscFunctionBeginUser;
   if (!c->exact.N) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(weigh_nodes(s));
-  PetscCall(MatTranspose(c->exact.free, MAT_INITIAL_MATRIX, &c->DGt));
-  PetscCall(MatDiagonalScale(c->DGt, c->d, NULL));
-  PetscCall(MatMatMult(c->exact.free, c->DGt, MAT_INITIAL_MATRIX, PETSC_DEFAULT, &c->gram));
+  PetscCall(MatTranspose(c->exact.push_free, MAT_INITIAL_MATRIX, &c->DFt));
+  PetscCall(MatDiagonalScale(c->DFt, c->d, NULL));
+  PetscCall(MatMatMult(c->exact.free, c->DFt, MAT_INITIAL_MATRIX, PETSC_DEFAULT, &c->gram));
   PetscCall(regularise(c));
   PetscCall(create_solver(s));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -441,6 +494,7 @@ PetscErrorCode SbSpaceCoupleDone(SbSpace s)
   PetscCall(destroy_matrices(c));
   c->version++;
   PetscCallMPI(MPI_Allreduce(&c->n, &c->ntotal, 1, MPIU_INT, MPI_SUM, s->comm));
+  if (c->oblique) PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &c->tilted, 1, SB_MPI_BOOL, MPI_LOR, s->comm));
   if (!c->ntotal) { /* bodies are apart: nothing more is exchanged or made */
     if (c->anchor) PetscCall(VecZeroEntries(c->anchor));
     PetscFunctionReturn(PETSC_SUCCESS);
@@ -457,7 +511,7 @@ PetscErrorCode SbSpaceCoupleDone(SbSpace s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* y = (G D G^T)^-1 w, but for SB_COUPLE_REGULAR; every use is repeated with what the first left. */
+/* y = (G D F^T)^-1 w, but for SB_COUPLE_REGULAR; every use is repeated with what the first left. */
 PetscErrorCode SbCoupleSolveGram(SbCouple c)
 {
   PetscFunctionBeginUser;
@@ -472,13 +526,13 @@ PetscErrorCode SbCoupleProject(SbCouple c, Vec x)
     PetscCall(MatMult(c->exact.free, x, c->exact.work));
     PetscCall(VecScale(c->exact.work, -1.));
     PetscCall(SbCoupleSolveGram(c));
-    PetscCall(MatMultAdd(c->DGt, c->exact.step, x, x));
+    PetscCall(MatMultAdd(c->DFt, c->exact.step, x, x));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /*
-  r <- P^T r; the multipliers into c->exact.force. They may be much larger than what is left: the later passes also take away
+  r <- r - F^T lambda, lambda into c->exact.force. They may be much larger than what is left: the later passes also take away
   their rounding, which would be a residual that no iteration lowers.
 */
 PetscErrorCode SbCoupleProjectForce(SbCouple c, Vec r)
@@ -486,10 +540,11 @@ PetscErrorCode SbCoupleProjectForce(SbCouple c, Vec r)
   PetscFunctionBeginUser;
   if (c->exact.N) PetscCall(VecZeroEntries(c->exact.force));
   for (int pass = 0; c->exact.N && pass < c->passes; pass++) {
-    PetscCall(MatMultTranspose(c->DGt, r, c->exact.work));
+    PetscCall(VecPointwiseMult(c->w[2], c->d, r));
+    PetscCall(MatMult(c->exact.free, c->w[2], c->exact.work));
     PetscCall(VecScale(c->exact.work, -1.));
     PetscCall(SbCoupleSolveGram(c));
-    PetscCall(MatMultTransposeAdd(c->exact.free, c->exact.step, r, r));
+    PetscCall(MatMultTransposeAdd(c->exact.push_free, c->exact.step, r, r));
     PetscCall(VecAXPY(c->exact.force, -1., c->exact.step));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -504,7 +559,7 @@ PetscErrorCode SbCouplePrescribe(SbSpace s, Vec U)
     PetscCall(MatMult(c->exact.whole, U, c->exact.work));
     PetscCall(VecAYPX(c->exact.work, -1., c->exact.value));
     PetscCall(SbCoupleSolveGram(c));
-    PetscCall(MatMultAdd(c->DGt, c->exact.step, U, U));
+    PetscCall(MatMultAdd(c->DFt, c->exact.step, U, U));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -543,7 +598,7 @@ PetscErrorCode SbCoupleResidual(SbSpace s, Vec U, PetscBool constrain, Vec F)
   if (c->spring.N) {
     PetscCall(stretch(c, U));
     PetscCall(VecScale(c->spring.force, -1.));
-    PetscCall(MatMultTransposeAdd(constrain ? c->spring.free : c->spring.whole, c->spring.force, F, F));
+    PetscCall(MatMultTransposeAdd(constrain ? c->spring.push_free : c->spring.push, c->spring.force, F, F));
   }
   if (constrain) PetscCall(SbCoupleProjectForce(c, F));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -574,7 +629,7 @@ PetscErrorCode SbSpaceCoupleMeasure(SbSpace s, Vec U, Vec R)
     PetscCall(hand_out(c, PETSC_TRUE, c->exact.force, c->force));
     /* the rest is what supports and obstacles push with */
     PetscCall(VecAXPBY(c->exact.work, -1., 0., c->exact.force));
-    PetscCall(MatMultTransposeAdd(c->exact.whole, c->exact.work, R, R));
+    PetscCall(MatMultTransposeAdd(c->exact.push, c->exact.work, R, R));
     PetscCall(MatMult(c->exact.whole, U, c->exact.work));
     PetscCall(hand_out(c, PETSC_TRUE, c->exact.work, c->sum));
   }
@@ -609,10 +664,10 @@ PetscErrorCode SbSpaceCoupleForce(SbSpace s, Vec U, Vec F)
   SbCouple c = s->couple;
 
   PetscFunctionBeginUser;
-  if (c->exact.N) PetscCall(MatMultTransposeAdd(c->exact.whole, c->exact.force, F, F));
+  if (c->exact.N) PetscCall(MatMultTransposeAdd(c->exact.push, c->exact.force, F, F));
   if (c->spring.N) {
     PetscCall(stretch(c, U));
-    PetscCall(MatMultTransposeAdd(c->spring.whole, c->spring.force, F, F));
+    PetscCall(MatMultTransposeAdd(c->spring.push, c->spring.force, F, F));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }

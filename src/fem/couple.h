@@ -9,6 +9,7 @@ typedef struct {
   PetscInt n;                   /* rows of this rank */
   PetscInt N;                   /* of all ranks */
   Mat whole, free;              /* G, and G without prescribed and held directions */
+  Mat push, push_free;          /* F likewise; G itself where all rows push along themselves */
   Vec value, force, work, step; /* by rows */
 } Rows;
 
@@ -27,7 +28,7 @@ struct _p_SbCouple {
   PetscInt *start;          /* [n+1] */
   PetscInt nentry, entry_size;
   PetscInt *gnode;                         /* [nentry] */
-  PetscReal *coef;                         /* [nentry][3] */
+  PetscReal *coef, *along;                 /* [nentry][3] of the sum, and of the force */
   PetscReal *value, *stiffness, *constant; /* [n]; stiffness -1: exact */
   PetscInt *id;                            /* [n] */
   int passes;                              /* of a projection: more where rows are nearly dependent */
@@ -35,31 +36,33 @@ struct _p_SbCouple {
   PetscInt *place;                         /* [n] row in its matrix on this rank */
   PetscReal *force, *sum;                  /* [n] */
   Rows exact, spring;
-  Vec k, constants; /* of springs */
-  Mat K;            /* borrowed; NULL before SbCoupleCreateOperator() */
-  Mat DGt;          /* D G^T */
-  Mat gram;         /* G D G^T, its diagonal slightly larger */
+  Vec k, constants;  /* of springs */
+  Mat K;             /* borrowed; NULL before SbCoupleCreateOperator() */
+  PetscBool oblique; /* rows may push along other coefficients than their own */
+  PetscBool tilted;  /* some do now */
+  Mat DFt;           /* D F^T */
+  Mat gram;          /* G D F^T, its diagonal slightly larger */
   KSP solver;
   Vec anchor,
     added;  /* squares of the coefficients, and what K holds beside the tangent, N/m; NULL: nothing */
   Vec free; /* 1 at unknowns that are not prescribed, else 0 */
   Vec d;    /* D */
-  Vec w[2];
+  Vec w[3];
 };
 
 /* Finds the exact rows that rest: c->rests. Collective. */
 PetscErrorCode SbCoupleSelect(SbSpace space);
 /* x <- P x. Collective. */
 PetscErrorCode SbCoupleProject(SbCouple c, Vec x);
-/* y = (K + S^T k S) x, what was added to K taken away. Collective. */
+/* y = (K + F^T k G) x, what was added to K taken away. Collective. */
 PetscErrorCode SbCoupleMultiply(SbCouple c, Vec x, Vec y);
-/* step = (G D G^T)^-1 work, vectors of c->exact. Collective. */
+/* step = (G D F^T)^-1 work, vectors of c->exact. Collective. */
 PetscErrorCode SbCoupleSolveGram(SbCouple c);
-/* r <- P^T r; the multipliers into c->exact.force, N. Collective. */
+/* r <- r - F^T lambda, what rows cannot take; lambda into c->exact.force, N. Collective. */
 PetscErrorCode SbCoupleProjectForce(SbCouple c, Vec r);
 
 /*
-  z of [K + S^T k S, G^T; G, 0] [z; m] = [r; 0] by a factorisation, which is renewed when K or the rows have changed. Collective.
+  z of [K + F^T k G, F^T; G, 0] [z; m] = [r; 0] by a factorisation, which is renewed when K or the rows have changed. Collective.
 
   Output: ok, false when the matrix could not be factored; z is not a number then.
 */

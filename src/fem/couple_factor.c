@@ -1,13 +1,13 @@
 /*
   The saddle-point system of exact rows by a sparse factorisation, for response `multiplier`:
 
-    [ K + S^T k S   G^T        ] [ z ]   [ r ]
-    [ G            -e diag(B)  ] [ m ] = [ 0 ],    B = G D G^T
+    [ K + F^T k S   F^T        ] [ z ]   [ r ]
+    [ G            -e diag(B)  ] [ m ] = [ 0 ],    B = G D F^T
 
   It is regular where K is not: a body that only rows hold needs no anchors (couple.c). e is tiny: with it rows that depend on others
   share their force instead of making the matrix singular. What e leaves of G z is projected away by the caller.
 
-  The matrix is symmetric and indefinite: LDL^T of MUMPS on any number of ranks, or LU of UMFPACK on one. Springs stand in it, although
+  The matrix is indefinite, and symmetric but for friction: LDL^T or LU of MUMPS on any number of ranks, or LU of UMFPACK on one. Springs stand in it, although
   they join nodes that K's graph does not. Made anew when K or the rows have changed, and only then.
 */
 #include "couple.h"
@@ -110,25 +110,25 @@ static PetscErrorCode copy_matrix(SbSpace s, Mat K, Mat *A)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* K + S^T k S */
+/* K and the springs */
 static PetscErrorCode create_stiffness(SbSpace s, Mat *A)
 {
   SbCouple c = s->couple;
-  Mat kS, StkS;
+  Mat kS, FtkS;
 
   PetscFunctionBeginUser;
   PetscCall(copy_matrix(s, c->K, A));
   if (!c->spring.N) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(MatDuplicate(c->spring.free, MAT_COPY_VALUES, &kS));
   PetscCall(MatDiagonalScale(kS, c->k, NULL));
-  PetscCall(MatTransposeMatMult(c->spring.free, kS, MAT_INITIAL_MATRIX, PETSC_DEFAULT, &StkS));
-  PetscCall(MatAXPY(*A, 1., StkS, DIFFERENT_NONZERO_PATTERN));
+  PetscCall(MatTransposeMatMult(c->spring.push_free, kS, MAT_INITIAL_MATRIX, PETSC_DEFAULT, &FtkS));
+  PetscCall(MatAXPY(*A, 1., FtkS, DIFFERENT_NONZERO_PATTERN));
   PetscCall(MatDestroy(&kS));
-  PetscCall(MatDestroy(&StkS));
+  PetscCall(MatDestroy(&FtkS));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* -e diag(G D G^T) */
+/* -e diag(G D F^T) */
 static PetscErrorCode create_small(SbCouple c, Mat *C)
 {
   Vec d;
@@ -151,7 +151,7 @@ static PetscErrorCode create_saddle(SbSpace s, Mat *S)
 
   PetscFunctionBeginUser;
   PetscCall(create_stiffness(s, &block[0]));
-  PetscCall(MatTranspose(c->exact.free, MAT_INITIAL_MATRIX, &block[1]));
+  PetscCall(MatTranspose(c->exact.push_free, MAT_INITIAL_MATRIX, &block[1]));
   PetscCall(create_small(c, &block[3]));
   PetscCall(MatCreateNest(PetscObjectComm((PetscObject)c->gram), 2, NULL, 2, NULL, block, &nest));
   PetscCall(MatConvert(nest, MATAIJ, MAT_INITIAL_MATRIX, S));
@@ -159,7 +159,7 @@ static PetscErrorCode create_saddle(SbSpace s, Mat *S)
   PetscCall(MatDestroy(&block[0]));
   PetscCall(MatDestroy(&block[1]));
   PetscCall(MatDestroy(&block[3]));
-  PetscCall(MatSetOption(*S, MAT_SYMMETRIC, PETSC_TRUE));
+  PetscCall(MatSetOption(*S, MAT_SYMMETRIC, (PetscBool)!c->oblique));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -180,7 +180,7 @@ static PetscErrorCode factor(SbSpace s, SbFactored f)
   PetscCall(PCSetOptionsPrefix(f->pc, "saddle_"));
   PetscCall(PCSetOperators(f->pc, S, S));
   PetscCall(MatDestroy(&S)); /* the preconditioner keeps it */
-  PetscCall(PCSetType(f->pc, strcmp(package, MATSOLVERMUMPS) ? PCLU : PCCHOLESKY));
+  PetscCall(PCSetType(f->pc, s->couple->oblique || strcmp(package, MATSOLVERMUMPS) ? PCLU : PCCHOLESKY));
   PetscCall(PCFactorSetMatSolverType(f->pc, package));
   PetscCall(PCSetFromOptions(f->pc));
   PetscCall(PCSetUp(f->pc));

@@ -18,7 +18,7 @@ PetscErrorCode SbCoupleMultiply(SbCouple c, Vec x, Vec y)
   if (c->spring.N) {
     PetscCall(MatMult(c->spring.free, x, c->spring.work));
     PetscCall(VecPointwiseMult(c->spring.work, c->spring.work, c->k));
-    PetscCall(MatMultTransposeAdd(c->spring.free, c->spring.work, y, y));
+    PetscCall(MatMultTransposeAdd(c->spring.push_free, c->spring.work, y, y));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -44,7 +44,7 @@ PetscErrorCode SbCoupleCreateOperator(SbSpace s, Mat K, PetscBool singular, SbSa
   PetscCall(MatGetSize(K, &M, &N));
   PetscCall(MatCreateShell(s->comm, m, n, M, N, s, A));
   PetscCall(MatShellSetOperation(*A, MATOP_MULT, SB_OPERATION(multiply)));
-  PetscCall(MatSetOption(*A, MAT_SYMMETRIC, PETSC_TRUE));
+  PetscCall(MatSetOption(*A, MAT_SYMMETRIC, (PetscBool)!s->couple->oblique));
   s->couple->K = K;
   s->couple->saddle = saddle;
   if (singular && saddle != SB_SADDLE_DIRECT) {

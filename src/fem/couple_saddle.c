@@ -9,7 +9,7 @@
   the projection has factored already (couple.c); M is the preconditioner of K that the run has chosen. The factor a is small: the
   eigenvalues that belong to the rows then lie in two groups far from the others, at +- 1 / sqrt(a), and the others are those of the
   null space. A joint of two bars, cg_pbjacobi: 598 iterations with a = 1, 231 with 0.1, 91 with 1e-3, 122 with 1e-6, where rounding tells;
-  in the null space itself 46. FGMRES where M is not symmetric (solvers that are Richardson's method), and from the moment on when it
+  in the null space itself 46. FGMRES where something is not symmetric (friction; an M for Richardson's method), and from the moment on when it
   shows that M is not definite.
 
   MINRES judges by a norm of displacements and forces mixed. So the answer is projected onto the null space and its residual there, that
@@ -103,7 +103,7 @@ static PetscErrorCode multiply(Mat S, Vec x, Vec y)
   PetscCall(unpack(d, x, d->from, c->exact.step));
   PetscCall(SbCoupleMultiply(c, d->from, d->to));
   PetscCall(VecScale(c->exact.step, d->scale));
-  PetscCall(MatMultTransposeAdd(c->exact.free, c->exact.step, d->to, d->to));
+  PetscCall(MatMultTransposeAdd(c->exact.push_free, c->exact.step, d->to, d->to));
   PetscCall(MatMult(c->exact.free, d->from, c->exact.work));
   PetscCall(VecScale(c->exact.work, d->scale));
   PetscCall(pack(d, d->to, c->exact.work, y));
@@ -175,7 +175,7 @@ static PetscErrorCode update(Saddle *d)
   }
   PetscCall(MatCreateShell(s->comm, n, n, N, N, d, &d->S));
   PetscCall(MatShellSetOperation(d->S, MATOP_MULT, SB_OPERATION(multiply)));
-  PetscCall(MatSetOption(d->S, MAT_SYMMETRIC, PETSC_TRUE));
+  PetscCall(MatSetOption(d->S, MAT_SYMMETRIC, (PetscBool)!s->couple->oblique));
   PetscCall(MatCreateVecs(d->S, &d->x, &d->b));
   PetscCall(KSPCreate(s->comm, &d->inner));
   PetscCall(KSPSetOptionsPrefix(d->inner, "saddle_"));
@@ -385,6 +385,6 @@ PetscErrorCode SbKSPSaddleSet(SbSpace s, KSP ksp)
   d->plain = plain;
   d->loss = LOSS;
   PetscCall(PetscStrcmp(type, KSPRICHARDSON, &richardson));
-  d->minres = (PetscBool)!richardson;
+  d->minres = (PetscBool)(!richardson && !SbSpaceCoupleOblique(s));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -234,6 +234,8 @@ PetscErrorCode SbSolverSetUp(SNES snes, SbSpace s, const SbSolverPreset *preset)
   PetscCall(KSPSetTolerances(ksp, 1e-8, PETSC_DEFAULT, PETSC_DEFAULT, 5000));
   PetscCall(KSPSetType(ksp, KSPCG));
   PetscCall(KSPSetNormType(ksp, KSP_NORM_UNPRECONDITIONED));
+  if (s->couple && SbSpaceCoupleOblique(s))
+    PetscCall(insert_options("-ksp_type fgmres -ksp_gmres_restart 100"));
   PetscCall(insert_options(preset->options));
   if (strstr(preset->options, "-pc_type cholesky")) PetscCall(SbSolverLookAtResidual(ksp));
   PetscCall(KSPGetPC(ksp, &pc));

@@ -3,9 +3,13 @@
   right.
 
   A later solve begins next to its solution, and a tolerance relative to its own start would ask for digits that rounding does not
-  leave beside large contact forces. So all solves of a step aim at what the first one aims at.
+  leave beside large contact forces. So all solves of a step aim at what the first one aims at. While guesses are wrong, they aim at
+  ROUGH of it: a rough solution is enough to see who touches.
 */
 #include "time_impl.h"
+
+#define ROUGH 1e-3      /* of the first residual */
+#define ROUGH_ROUNDS 10 /* what has not settled then may wait for digits that rough solves do not have */
 
 /* Tolerances of the solvers as the user left them. */
 typedef struct {
@@ -27,10 +31,12 @@ static PetscErrorCode get_aim(SNES snes, Aim *aim)
 }
 
 /* Absolute tolerances for solves of a step whose first residual is `size`, N; 0: those of the user. */
-static PetscErrorCode set_aim(SNES snes, const Aim *aim, PetscReal size)
+static PetscErrorCode set_aim(SNES snes, const Aim *aim, PetscReal size, PetscBool rough)
 {
-  const PetscReal atol = PetscMax(aim->atol, aim->rtol * size);
-  const PetscReal linear = aim->single ? aim->linear_rtol * size : 0.1 * aim->rtol * size;
+  const PetscReal rtol = aim->single ? aim->linear_rtol : aim->rtol;
+  const PetscReal part = rough ? PetscMax(rtol, ROUGH) : rtol;
+  const PetscReal atol = PetscMax(aim->atol, (rough ? part : aim->rtol) * size);
+  const PetscReal linear = (aim->single ? 1 : 0.1) * part * size;
   KSP ksp;
 
   PetscFunctionBeginUser;
@@ -63,7 +69,7 @@ PetscErrorCode SbRunSolveContact(SbRun run, SNES snes, PetscReal t, PetscReal dt
                                  const SbContactSolve *solve, SNESConvergedReason *reason)
 {
   const SbModel m = run->model;
-  PetscBool again = PETSC_TRUE;
+  PetscBool again = PETSC_TRUE, rough;
   PetscReal size;
   Aim aim;
 
@@ -75,7 +81,8 @@ PetscErrorCode SbRunSolveContact(SbRun run, SNES snes, PetscReal t, PetscReal dt
   /* the matrix holds what was held before */
   if (m->space->held || !m->dynamic) run->tangent_known = PETSC_FALSE;
   PetscCall(first_residual(snes, U, run->R, &size));
-  if (SbSpaceIsHeld(m->space)) PetscCall(set_aim(snes, &aim, size)); /* if not, as without contact */
+  rough = SbSpaceIsHeld(m->space);
+  if (rough) PetscCall(set_aim(snes, &aim, size, rough)); /* if not, as without contact */
   PetscCall((*solve->solve)(solve->ctx, U, reason));
   for (PetscInt round = 1; *reason > 0; round++) {
     PetscCall((*solve->residual)(solve->ctx, U, run->R));
@@ -84,15 +91,16 @@ PetscErrorCode SbRunSolveContact(SbRun run, SNES snes, PetscReal t, PetscReal dt
       PetscCall(find_arrival(run));
       if (run->arrival < 1.) *reason = SNES_CONVERGED_ITERATING;
     }
-    if (!again || !*reason) break;
+    if ((!again && !rough) || !*reason) break;
+    if (!again || round == ROUGH_ROUNDS) rough = PETSC_FALSE;
     if (m->space->held || !m->dynamic) run->tangent_known = PETSC_FALSE;
     if (round == SB_CONTACT_ROUNDS) {
       *reason = SNES_DIVERGED_MAX_IT;
       break;
     }
-    PetscCall(set_aim(snes, &aim, size));
+    PetscCall(set_aim(snes, &aim, size, rough));
     PetscCall((*solve->solve)(solve->ctx, U, reason));
   }
-  PetscCall(set_aim(snes, &aim, 0));
+  PetscCall(set_aim(snes, &aim, 0, PETSC_FALSE));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

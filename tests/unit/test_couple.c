@@ -78,9 +78,9 @@ static PetscErrorCode join(SbSpace s, PetscReal stiffness, PetscBool twice)
         for (int again = 0; again <= (int)twice; again++) {
           if (stiffness < 0)
             PetscCall(SbSpaceCoupleRow(s, 6 * (int)(1e4 * node[b].x[1] + 1e2 * node[b].x[2]) + 2 * k + again,
-                                       2, g, coef, 0, &row));
+                                       2, g, coef, NULL, 0, &row));
           else
-            PetscCall(SbSpaceCoupleSpring(s, 2, g, coef, 0, stiffness, 0, &row));
+            PetscCall(SbSpaceCoupleSpring(s, 2, g, coef, NULL, 0, stiffness, 0, &row));
         }
       }
       joined++;
@@ -108,7 +108,7 @@ static PetscErrorCode open_halves(const char *solver, SbSaddle saddle, TestScene
   t->run->saddle = (PetscBool)(saddle != SB_SADDLE_NONE);
   t->run->saddle_choice = (PetscInt)saddle;
   PetscCall(SbModelSetUp(t->model));
-  PetscCall(SbSpaceCoupleCreate(t->model->space, PETSC_FALSE));
+  PetscCall(SbSpaceCoupleCreate(t->model->space, PETSC_FALSE, PETSC_FALSE));
   PetscCall(SbRunSetUp(t->run));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
