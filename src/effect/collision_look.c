@@ -157,7 +157,8 @@ static inline PetscBool before(const Hit *a, PetscInt point, PetscInt part)
 static PetscBool is_settled(const Collision *c, PetscReal gap, Hit *hit)
 {
   if (hit->looks++ < FEW_LOOKS) return PETSC_FALSE;
-  return (PetscBool)(hit->looks > LOOKS || PetscAbsReal(gap + hit->allowed) <= TOLERANCE * c->surface->size);
+  return (PetscBool)(hit->looks > LOOKS ||
+                     PetscAbsReal(gap + hit->allowed) <= 0.1 * TOLERANCE * c->surface->size);
 }
 
 /*
