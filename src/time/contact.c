@@ -8,6 +8,7 @@
 */
 #include "time_impl.h"
 
+#define DIGITS 1e-11    /* of the forces of contact and supports: what rounding leaves of a residual */
 #define ROUGH 1e-3      /* of the first residual */
 #define ROUGH_ROUNDS 10 /* what has not settled then may wait for digits that rough solves do not have */
 
@@ -30,13 +31,13 @@ static PetscErrorCode get_aim(SNES snes, Aim *aim)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Absolute tolerances for solves of a step whose first residual is `size`, N; 0: those of the user. */
-static PetscErrorCode set_aim(SNES snes, const Aim *aim, PetscReal size, PetscBool rough)
+/* Absolute tolerances for solves of a step whose first residual is `size`, N; 0: those of the user. least: what can be had, N. */
+static PetscErrorCode set_aim(SNES snes, const Aim *aim, PetscReal size, PetscReal least, PetscBool rough)
 {
   const PetscReal rtol = aim->single ? aim->linear_rtol : aim->rtol;
   const PetscReal part = rough ? PetscMax(rtol, ROUGH) : rtol;
-  const PetscReal atol = PetscMax(aim->atol, (rough ? part : aim->rtol) * size);
-  const PetscReal linear = (aim->single ? 1 : 0.1) * part * size;
+  const PetscReal atol = PetscMax(PetscMax(aim->atol, least), (rough ? part : aim->rtol) * size);
+  const PetscReal linear = (aim->single ? 1 : 0.1) * PetscMax(least, part * size);
   KSP ksp;
 
   PetscFunctionBeginUser;
@@ -70,7 +71,7 @@ PetscErrorCode SbRunSolveContact(SbRun run, SNES snes, PetscReal t, PetscReal dt
 {
   const SbModel m = run->model;
   PetscBool again = PETSC_TRUE, rough;
-  PetscReal size;
+  PetscReal size, least = 0;
   Aim aim;
 
   PetscFunctionBeginUser;
@@ -78,11 +79,17 @@ PetscErrorCode SbRunSolveContact(SbRun run, SNES snes, PetscReal t, PetscReal dt
   run->arrival = 1.;
   PetscCall(get_aim(snes, &aim));
   PetscCall(SbModelContactBegin(m, t, dt, U0, U));
+  rough = SbSpaceIsHeld(m->space);
   /* the matrix holds what was held before */
   if (m->space->held || !m->dynamic) run->tangent_known = PETSC_FALSE;
+  if (rough) {
+    /* a body at rest has no residual but for rounding: then contact and supports carry all there is */
+    PetscCall((*solve->residual)(solve->ctx, U, run->R));
+    PetscCall(VecNorm(run->R, NORM_2, &least));
+    least = PetscIsInfOrNanReal(least) ? 0 : DIGITS * least;
+  }
   PetscCall(first_residual(snes, U, run->R, &size));
-  rough = SbSpaceIsHeld(m->space);
-  if (rough) PetscCall(set_aim(snes, &aim, size, rough)); /* if not, as without contact */
+  if (rough) PetscCall(set_aim(snes, &aim, size, least, rough)); /* if not, as without contact */
   PetscCall((*solve->solve)(solve->ctx, U, reason));
   for (PetscInt round = 1; *reason > 0; round++) {
     PetscCall((*solve->residual)(solve->ctx, U, run->R));
@@ -98,9 +105,9 @@ PetscErrorCode SbRunSolveContact(SbRun run, SNES snes, PetscReal t, PetscReal dt
       *reason = SNES_DIVERGED_MAX_IT;
       break;
     }
-    PetscCall(set_aim(snes, &aim, size, rough));
+    PetscCall(set_aim(snes, &aim, size, least, rough));
     PetscCall((*solve->solve)(solve->ctx, U, reason));
   }
-  PetscCall(set_aim(snes, &aim, 0, PETSC_FALSE));
+  PetscCall(set_aim(snes, &aim, 0, 0, PETSC_FALSE));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
