@@ -11,7 +11,7 @@ PetscErrorCode SbCoupleMultiply(SbCouple c, Vec x, Vec y)
 {
   PetscFunctionBeginUser;
   PetscCall(MatMult(c->K, x, y));
-  if (c->added) {
+  if (c->added && c->w[0]) { /* before the first rows there is neither */
     PetscCall(VecPointwiseMult(c->w[0], c->added, x));
     PetscCall(VecAXPY(y, -1., c->w[0]));
   }
