@@ -24,7 +24,7 @@
 #define CONE \
   0.05 /* so far, 3 degrees, the normal may leave the cones: edges flush with a face are pairs also when all bends a little */
 #define END \
-  1e-4 /* of an edge: nearer to its ends it is a vertex, which points see; so rounding does not decide who does */
+  1e-9 /* of an edge: nearer to its ends it is a vertex, which points see; so rounding does not decide who does */
 #define DEEP \
   0.25 /* of the reach: the largest depth at which edges that are in each other are a pair without a motion */
 #define SHALLOW 1e-3 /* of the reach: a depth that is taken for touching */
