@@ -299,7 +299,8 @@ static PetscErrorCode touch_contact(SbEffect e, SbSpace space, PetscReal t, Pets
     PetscBool comes;
 
     touch->toggles = touch->flips = 0;
-    touch->on = touch->was; /* whatever an attempt that failed made of it */
+    /* an attempt that was cut begins as it did; one that failed goes on with what it has found to touch */
+    if (c->cut || c->restitution > 0) touch->on = touch->was;
     touch->idle = (PetscBool)(c->cut && !touch->was && !exact(c));
     place(space, touch->node, u, x);
     place(space, touch->node, u0, x0);
