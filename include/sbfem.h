@@ -88,6 +88,7 @@ struct _p_SbSpace {
   struct _p_SbPlan *plan; /* cell blocks -> matrix values; NULL before SbSpaceCreateMatrix() */
   PetscReal
     block_scale;    /* factor on blocks of SbSpaceAddCellBlock(): the load factor of a static run, else 1 */
+  PetscBool rough;  /* the solve that contact looks at was a rough one: forces are not to be trusted */
   PetscBool linear; /* every region's law is linear */
 };
 

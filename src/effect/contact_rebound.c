@@ -116,7 +116,7 @@ PetscErrorCode SbReboundSettle(Contact *c, SbSpace space, const PetscReal u[], P
 
   PetscFunctionBeginUser;
   PetscCall(measure_energy(c, space, u, &wait, &W, &D));
-  if (wait || W <= D * (1 + ROUND)) PetscFunctionReturn(PETSC_SUCCESS);
+  if (wait || space->rough || W <= D * (1 + ROUND)) PetscFunctionReturn(PETSC_SUCCESS);
   c->share *= ++c->reductions < REDUCTIONS ? SAFE * D / W : 0;
   for (PetscInt i = 0; i < c->n; i++) {
     Touch *touch = &c->touch[i];

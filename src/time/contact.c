@@ -93,6 +93,7 @@ PetscErrorCode SbRunSolveContact(SbRun run, SNES snes, PetscReal t, PetscReal dt
   PetscCall((*solve->solve)(solve->ctx, U, reason));
   for (PetscInt round = 1; *reason > 0; round++) {
     PetscCall((*solve->residual)(solve->ctx, U, run->R));
+    m->space->rough = rough;
     PetscCall(SbModelContactSettle(m, t + dt, U, run->R, &again));
     if (round == 1 && run->may_cut) {
       PetscCall(find_arrival(run));
