@@ -8,6 +8,6 @@
 int main(int argc, char **argv)
 {
   SB_TEST_BEGIN(argc, argv);
-  PetscCall(pour(8, 0.5, POUR_RADIUS, ""));
+  PetscCall(pour(8, 0.5, POUR_RADIUS, 0.03, 1e-3));
   SB_TEST_END();
 }
