@@ -33,6 +33,9 @@ typedef struct {
   /* f[nnode][3] += what contact pushes owned nodes with, N, residual r as for history(). For output only; rows that join nodes add
      theirs without it. Not collective. */
   PetscErrorCode (*push)(SbEffect e, SbSpace space, const SbStage *stage, const PetscReal r[], PetscReal f[]);
+  /* gap[nnode] of owned nodes, m, and normal[nnode][3] towards them, where something that they may touch is nearer than the gap says so
+     far. For output only. Not collective. */
+  void (*near)(SbEffect e, SbSpace space, const SbStage *stage, PetscReal gap[], PetscReal normal[]);
   /* f[nnode][3] += external force, N; must be right on owned nodes without communication */
   PetscErrorCode (*force)(SbEffect e, SbSpace space, const SbStage *stage, PetscReal f[]);
   /* A -= shift_k d force / d u + shift_v d force / d v by SbSpaceAddCellBlock(), called for (a, b) and for (b, a) */

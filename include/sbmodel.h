@@ -70,6 +70,9 @@ PetscErrorCode SbModelContactSettle(SbModel model, PetscReal t, Vec U, Vec R, Pe
 /* After the first Settle of a step: the part of it after which the first point arrives at what it did not touch before, 1: none
    does; effects that do not ask for it are not looked at. Collective. */
 PetscErrorCode SbModelContactArrival(SbModel model, PetscReal *part);
+/* G = gap of each node along the normal of the nearest thing that it may touch, m, after the step that ended at t with the displacement U;
+   0 where nothing is near. Collective. */
+PetscErrorCode SbModelContactGap(SbModel model, PetscReal t, Vec U, Vec G);
 /* F = what contact pushes the nodes with, N, after the step that ended at t with the displacement U and the residual R without
    constraints. Collective. */
 PetscErrorCode SbModelContactForce(SbModel model, PetscReal t, Vec U, Vec R, Vec F);

@@ -15,7 +15,7 @@
   point is its contact depends also on those that do not face it (near.c). A smooth closed body then costs little: nodes that touch
   are neighbours, and their normals agree. Between different bodies the cones would save less than they cost.
 */
-#include "bvh.h"
+#include "sbbvh.h"
 #include "detect.h"
 #include "tree.h"
 #include "volume.h"

@@ -22,6 +22,7 @@
   or much coarser partner wants both.
 */
 #include "collision.h"
+#include "sbbvh.h"
 
 #define TOGGLES 3    /* how often a row may come within a step before it stays */
 #define SLOW 25      /* solves of a step, after which the tolerance of multipliers is raised, twice */
@@ -38,6 +39,11 @@ static const SbOption rows[] = {
    "touch"},
   {"detection", SB_OPTION_CHOICE, 1, "", "hash", "hash|bvh|brute",
    "spatial hash, hierarchy of bounding volumes, or every pair: the same contacts"},
+  {"bvh_branching", SB_OPTION_INT, 1, "", "4", "[2, 8]", "children of a node of the tree of bvh: 2, 4 or 8"},
+  {"bvh_volume", SB_OPTION_CHOICE, 1, "", "box", "box|dop14|dop18|dop26|sphere",
+   "what bounds a node of it: a box, 14, 18 or 26 planes, or a sphere"},
+  {"bvh_build", SB_OPTION_CHOICE, 1, "", "connectivity", "connectivity|top_down",
+   "how it is built: from facets that share edges, or by halving"},
   {"sides", SB_OPTION_CHOICE, 1, "", "both", "one|both",
    "points of the finer of two surfaces look for the other one, or both do"},
   {"self", SB_OPTION_BOOL, 1, "", "no", "", "bodies may meet themselves"},
@@ -54,6 +60,37 @@ static const SbOption rows[] = {
    "once"},
 };
 
+/* Settings of the tree, which only bvh has. */
+static PetscErrorCode read_tree(SbEffect e, const SbScope *scope, SbDetector detector, PetscBool tree)
+{
+  static const char *const names[] = {"bvh_branching", "bvh_volume", "bvh_build"};
+  static const PetscInt planes[] = {6, 14, 18, 26, 0};
+  SbBvhSettings set;
+  PetscInt choice;
+
+  PetscFunctionBeginUser;
+  for (int k = 0; k < 3 && !tree; k++) {
+    PetscBool given;
+
+    PetscCall(SbOptionGiven(scope, names[k], &given));
+    PetscCheck(!given, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
+               "-effect_%s_%s is for -effect_%s_detection bvh: give that, or leave it out", e->name, names[k],
+               e->name);
+  }
+  if (!tree) PetscFunctionReturn(PETSC_SUCCESS);
+  SbBvhSettingsDefault(&set);
+  PetscCall(SbOptionInt(scope, names[0], &set.branching));
+  PetscCheck(set.branching == 2 || set.branching == 4 || set.branching == 8, PETSC_COMM_WORLD,
+             PETSC_ERR_USER_INPUT, "-effect_%s_bvh_branching %" PetscInt_FMT ": write 2, 4 or 8", e->name,
+             set.branching);
+  PetscCall(SbOptionChoice(scope, names[1], &choice));
+  set.k = planes[choice];
+  PetscCall(SbOptionChoice(scope, names[2], &choice));
+  set.build = (SbBvhBuild)choice;
+  PetscCall(SbBvhSet(detector, &set));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 static PetscErrorCode options_collision(SbEffect e, const SbScope *scope)
 {
   Collision *c = (Collision *)e->data;
@@ -69,6 +106,7 @@ static PetscErrorCode options_collision(SbEffect e, const SbScope *scope)
   if (!c->cut) e->ops.arrive = NULL;
   PetscCall(SbOptionChoice(scope, "detection", &choice));
   PetscCall(SbDetectorCreate((SbDetectKind)choice, &c->detector));
+  PetscCall(read_tree(e, scope, c->detector, (PetscBool)(choice == SB_DETECT_BVH)));
   PetscCall(SbOptionChoice(scope, "sides", &choice));
   c->both = (PetscBool)(choice == 1);
   PetscCall(SbOptionBool(scope, "self", &c->self));
@@ -430,6 +468,23 @@ static PetscErrorCode history_collision(SbEffect e, SbSpace space, const SbStage
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Gaps of points; edges have their own. */
+static void near_collision(SbEffect e, SbSpace space, const SbStage *stage, PetscReal gap[],
+                           PetscReal normal[])
+{
+  const Collision *c = (const Collision *)e->data;
+
+  (void)space;
+  (void)stage;
+  for (PetscInt i = 0; i < c->nhit && !SbCollisionOfEdges(c, &c->hit[i]); i++) {
+    const PetscInt node = c->surface->point_node[c->hit[i].point];
+
+    if (c->hit[i].gap >= gap[node]) continue;
+    gap[node] = c->hit[i].gap;
+    for (int k = 0; k < 3; k++) normal[3 * node + k] = c->hit[i].normal[k];
+  }
+}
+
 static PetscErrorCode destroy_collision(SbEffect e)
 {
   Collision *c = (Collision *)e->data;
@@ -467,6 +522,7 @@ static PetscErrorCode create_collision(SbEffect e)
   e->ops.arrive = arrive_collision;
   e->ops.accept = accept_collision;
   e->ops.history = history_collision;
+  e->ops.near = near_collision;
   e->ops.destroy = destroy_collision;
   for (e->ncolumn = 0; e->ncolumn < 7; e->ncolumn++) e->column[e->ncolumn] = columns[e->ncolumn];
   PetscFunctionReturn(PETSC_SUCCESS);

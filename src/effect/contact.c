@@ -484,6 +484,7 @@ static PetscErrorCode create_contact(SbEffect e)
   e->ops.tangent = SbEffectTangent_Contact;
   e->ops.accept = SbEffectAccept_Contact;
   e->ops.push = SbEffectPush_Contact;
+  e->ops.near = SbEffectNear_Contact;
   e->ops.history = SbEffectHistory_Contact;
   e->ops.destroy = destroy_contact;
   for (e->ncolumn = 0; e->ncolumn < 8; e->ncolumn++) e->column[e->ncolumn] = columns[e->ncolumn];

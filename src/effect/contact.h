@@ -100,5 +100,7 @@ PetscErrorCode SbEffectTangent_Contact(SbEffect e, SbSpace space, const SbStage 
 PetscErrorCode SbEffectAccept_Contact(SbEffect e, SbSpace space, const SbStage *stage);
 PetscErrorCode SbEffectPush_Contact(SbEffect e, SbSpace space, const SbStage *stage,
                                     const PetscReal residual[], PetscReal f[]);
+void SbEffectNear_Contact(SbEffect e, SbSpace space, const SbStage *stage, PetscReal gap[],
+                          PetscReal normal[]);
 PetscErrorCode SbEffectHistory_Contact(SbEffect e, SbSpace space, const SbStage *stage,
                                        const PetscReal residual[], PetscReal values[]);

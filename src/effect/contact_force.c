@@ -199,6 +199,25 @@ PetscErrorCode SbEffectPush_Contact(SbEffect e, SbSpace space, const SbStage *st
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+void SbEffectNear_Contact(SbEffect e, SbSpace space, const SbStage *stage, PetscReal gap[],
+                          PetscReal normal[])
+{
+  const Contact *c = (const Contact *)e->data;
+  SbPose pose;
+
+  SbContactPose(c, stage->t, &pose);
+  for (PetscInt i = 0; i < c->n; i++) {
+    const PetscInt node = c->touch[i].node;
+    PetscReal x[3], n[3], g;
+
+    place(space, node, stage->u, x);
+    g = SbContactGap(c, &pose, x, n);
+    if (g >= gap[node]) continue;
+    gap[node] = g;
+    for (int k = 0; k < 3; k++) normal[3 * node + k] = n[k];
+  }
+}
+
 /* Force and torque of the obstacle on the bodies, touching nodes, deepest penetration. */
 PetscErrorCode SbEffectHistory_Contact(SbEffect e, SbSpace space, const SbStage *stage,
                                        const PetscReal residual[], PetscReal values[])

@@ -71,6 +71,29 @@ PetscErrorCode SbModelContactArrival(SbModel m, PetscReal *part)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscErrorCode SbModelContactGap(SbModel m, PetscReal t, Vec U, Vec G)
+{
+  SbStage stage = {.t = t, .shift_k = 1.};
+  PetscReal *gap, *normal;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscMalloc1(m->space->nnode, &gap));
+  PetscCall(SbSpaceGetLocalRead(m->space, U, &stage.u));
+  PetscCall(SbSpaceGetLocalWrite(m->space, G, &normal));
+  PetscCall(PetscArrayzero(normal, 3 * m->space->nnode));
+  for (PetscInt i = 0; i < m->space->nnode; i++) gap[i] = PETSC_MAX_REAL;
+  for (PetscInt e = 0; e < m->ntouch; e++) {
+    if (m->touch[e]->ops.near) (*m->touch[e]->ops.near)(m->touch[e], m->space, &stage, gap, normal);
+  }
+  for (PetscInt i = 0; i < m->space->nnode; i++) {
+    for (PetscInt k = 0; k < 3 && gap[i] < PETSC_MAX_REAL; k++) normal[3 * i + k] *= gap[i];
+  }
+  PetscCall(SbSpaceRestoreLocalWrite(m->space, G, &normal));
+  PetscCall(SbSpaceRestoreLocalRead(m->space, U, &stage.u));
+  PetscCall(PetscFree(gap));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode SbModelContactForce(SbModel m, PetscReal t, Vec U, Vec R, Vec F)
 {
   SbStage stage = {.t = t, .shift_k = 1.};

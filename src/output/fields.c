@@ -3,7 +3,8 @@
 
   Vertex fields are made from the vectors by points.c. Cell fields come from one evaluation of the cells' state per frame,
   shared by all of them. von Mises: sqrt(3/2 s:s), s the deviator of the Cauchy stress. Reaction: force of the support on
-  the body, that is the residual without constraints at prescribed unknowns. Contact force: what obstacles and other bodies push with.
+  the body, that is the residual without constraints at prescribed unknowns. Contact force: what obstacles and other bodies push with;
+  contact gap: along the normal, so that a vertex less its gap is the point of contact.
 
   Two pressures, both positive in compression: `mean_pressure` is -tr(sigma)/3 of the Cauchy stress, as it is measured;
   `pressure` is the law's -lambda theta with theta its measure of the change of volume (SbMaterialOps.pressure). The two
@@ -54,6 +55,18 @@ static PetscErrorCode contact_force(SbRun run, const SbStep *step, PetscReal *va
   PetscCall(SbModelContactForce(run->model, step->t, step->U, step->R, F));
   PetscCall(SbPointsForces(run, (SbOutput)run->output, PETSC_FALSE, F, values));
   PetscCall(VecDestroy(&F));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode contact_gap(SbRun run, const SbStep *step, PetscReal *values)
+{
+  Vec G;
+
+  PetscFunctionBeginUser;
+  PetscCall(VecDuplicate(step->U, &G));
+  PetscCall(SbModelContactGap(run->model, step->t, step->U, G));
+  PetscCall(SbPointsValues(run, (SbOutput)run->output, G, values));
+  PetscCall(VecDestroy(&G));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -181,6 +194,8 @@ static const SbField table[] = {
    acceleration},
   {"reaction", "N", 3, VERTEX, VARIES, ALWAYS, "force of a support on the body", reaction},
   {"contact_force", "N", 3, VERTEX, VARIES, ALWAYS, "force of contact on the body", contact_force},
+  {"contact_gap", "m", 3, VERTEX, VARIES, ALWAYS,
+   "from the nearest place of what it may touch, along the normal there; 0: nothing near", contact_gap},
   {"stress", "Pa", 6, CELL, VARIES, ALWAYS, "Cauchy stress", stress},
   {"von_mises", "Pa", 1, CELL, VARIES, ALWAYS, "von Mises stress", von_mises},
   {"pressure", "Pa", 1, CELL, VARIES, ALWAYS, "pressure of the law, -lambda times its change of volume",

@@ -5,7 +5,7 @@
   anew; what self-contact costs; how the number of visits grows.
 */
 #include "bvh_scene.h"
-#include "../../src/contact/bvh.h"
+#include "sbbvh.h"
 #include "../../src/contact/detect.h"
 
 enum { NSETTING = 30 };

@@ -42,6 +42,9 @@ static PetscErrorCode check_refused(void)
     {"-effect_meet_response glue", "projected"},
     {"-effect_meet_sides none", "both"},
     {"-effect_meet_detection eyes", "brute"},
+    {"-effect_meet_bvh_volume sphere", "-effect_meet_bvh_volume is for -effect_meet_detection bvh"},
+    {"-effect_meet_detection bvh -effect_meet_bvh_branching 3",
+     "-effect_meet_bvh_branching 3: write 2, 4 or 8"},
     {"-effect_meet_friction -1", "-effect_meet_friction"},
     {"-effect_meet_friction 0.2 -effect_meet_friction_kinetic 0.3",
      "-effect_meet_friction_kinetic 0.3 is above -effect_meet_friction 0.2"},
@@ -181,7 +184,7 @@ static PetscErrorCode check_rows(const char *elements, const char *more)
 }
 
 /* The pairs' gaps are those of another detector on a surface of its own. */
-static PetscErrorCode check_gaps(const char *elements, PetscInt least)
+static PetscErrorCode check_gaps(const char *elements, const char *more, PetscInt least)
 {
   const SbEdgePair *pair;
   const SbNear *near;
@@ -194,7 +197,7 @@ static PetscErrorCode check_gaps(const char *elements, PetscInt least)
   PetscBool close;
 
   PetscFunctionBeginUser;
-  PetscCall(open_meeting(elements, "", &x));
+  PetscCall(open_meeting(elements, more, &x));
   c = (Collision *)x.e->data;
   come_down(&x, 0.03);
   PetscCall(attempt(&x));
@@ -425,11 +428,65 @@ static PetscErrorCode check_press(const char *more)
   SB_CHECK(alone[CONTACTS] > 5 && alone[NORMAL] > 1, "%g contacts with %g N", (double)alone[CONTACTS],
            (double)alone[NORMAL]);
   SB_CHECK_NEAR(together[CONTACTS], alone[CONTACTS], 0, name[CONTACTS]);
-  for (int k = NORMAL; k < NVALUE; k++)
-    /* gaps are closed to 1e-7 of the size, 0.25 m */
-    SB_CHECK_NEAR(together[k], alone[k], (k == WORK || k == LOSS ? 2.5e-8 : 1e-7) * PetscAbsReal(alone[NORMAL]),
-                  name[k]);
+  for (int k = NORMAL; k < NVALUE; k++) /* gaps are closed to 1e-7 of the size, 0.25 m */
+    SB_CHECK_NEAR(together[k], alone[k],
+                  (k == WORK || k == LOSS ? 2.5e-8 : 1e-7) * PetscAbsReal(alone[NORMAL]), name[k]);
   SB_CHECK_NEAR(alone[HOLD], -alone[PUSH], 1e-8 * PetscAbsReal(alone[PUSH]), "what carries the stack");
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ gaps */
+
+/* Two blocks, the upper one 4 mm lower than at rest, 6 mm above the other: gaps of its lower side and of the upper side there. */
+static PetscErrorCode check_gap_field(void)
+{
+  const PetscReal *g, z0 = 0.06, down = 0.004;
+  PetscInt seen[3] = {0, 0, 0};
+  PetscScalar *u;
+  Meeting x;
+  Vec U, G;
+
+  PetscFunctionBeginUser;
+  PetscCall(open_meeting(
+    "-bodies a,b -body_a_mesh box:0.1,0.1,0.05:2 -body_b_mesh box:0.06,0.06,0.05:2 -body_b_translate "
+    "0.02,0.02,0.06" LAW("a", "p1") LAW("b", "p1"),
+    " -effects meet,floor -effect_floor_type contact -effect_floor_on b -effect_floor_obstacle "
+    "plane:0,0,1,-1",
+    &x));
+  for (PetscInt i = 0; i < x.s->nnode; i++) x.u[3 * i + 2] = x.s->node_body[i] == 1 ? -down : 0;
+  PetscCall(attempt(&x));
+  PetscCall(SbSpaceCreateVec(x.s, &U));
+  PetscCall(VecDuplicate(U, &G));
+  PetscCall(VecGetArray(U, &u));
+  PetscCall(PetscArraycpy(u, x.u, 3 * x.s->nnode_owned));
+  PetscCall(VecRestoreArray(U, &u));
+  PetscCall(SbModelContactGap(x.t.model, 0, U, G));
+  PetscCall(VecGetArrayRead(G, &g));
+  for (PetscInt i = 0; i < x.s->nnode_owned; i++) {
+    const PetscReal *X = x.s->node_x + 3 * i;
+    const PetscBool upper = (PetscBool)(x.s->node_body[i] == 1), low = (PetscBool)(X[2] < z0 + 1e-9);
+    const PetscBool under = (PetscBool)(X[0] > 0.03 && X[0] < 0.07 && X[1] > 0.03 && X[1] < 0.07);
+
+    SB_CHECK_NEAR(PetscSqrtReal(SbDot3(g + 3 * i, g + 3 * i)), PetscAbsReal(g[3 * i + 2]), 1e-12,
+                  "a gap is along z");
+    if (upper && low) {
+      seen[0]++;
+      SB_CHECK_NEAR(g[3 * i + 2], z0 - down - 0.05, 1e-12, "gap of the lower side");
+    } else if (upper && X[2] > z0 + 0.02 && X[0] < 0.02 + 1e-9) { /* of the floor, which sees the whole body */
+      seen[1]++;
+      SB_CHECK_NEAR(g[3 * i + 2], X[2] - down + 1, 1e-12, "gap from the floor");
+    } else if (!upper && under && X[2] > 0.05 - 1e-9) {
+      seen[2]++;
+      SB_CHECK_NEAR(g[3 * i + 2], -(z0 - down - 0.05), 1e-12, "gap of the upper side");
+    }
+  }
+  PetscCall(VecRestoreArrayRead(G, &g));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, seen, 3, MPIU_INT, MPI_SUM, PETSC_COMM_WORLD));
+  SB_CHECK(seen[0] == 9 && seen[1] > 0 && seen[2] > 0, "%d, %d, %d nodes with a gap", (int)seen[0],
+           (int)seen[1], (int)seen[2]);
+  PetscCall(VecDestroy(&U));
+  PetscCall(VecDestroy(&G));
+  PetscCall(close_meeting(&x));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -440,12 +497,20 @@ int main(int argc, char **argv)
   PetscCall(check_rows(PAIR("p1", "cr"), ""));
   PetscCall(check_rows(PAIR("dg", "p1"), "-effect_meet_sides one"));
   PetscCall(check_rows(CROSS("p1", "dg"), ""));
-  PetscCall(check_gaps(PAIR("cr", "dg"), 0));
-  PetscCall(check_gaps(CROSS("p1", "cr"), 3));
+  PetscCall(check_gaps(PAIR("cr", "dg"), "", 0));
+  PetscCall(check_gaps(CROSS("p1", "cr"), "", 3));
+  PetscCall(check_gaps(CROSS("p1", "cr"), "-effect_meet_detection bvh", 3));
+  PetscCall(
+    check_gaps(PAIR("p1", "p1"),
+               "-effect_meet_detection bvh -effect_meet_bvh_volume sphere -effect_meet_bvh_branching 2", 0));
+  PetscCall(check_gaps(
+    PAIR("p1", "p1"),
+    "-effect_meet_detection bvh -effect_meet_bvh_volume dop26 -effect_meet_bvh_build top_down", 0));
   PetscCall(check_sides());
   PetscCall(check_far());
   PetscCall(check_attempts("projected"));
   PetscCall(check_attempts("penalty"));
+  PetscCall(check_gap_field());
   PetscCall(check_press(""));
   PetscCall(check_press("-effect_meet_response multiplier"));
   SB_TEST_END();

@@ -1,5 +1,5 @@
 /*
-  bvh.h - settings and counts of the detector that walks through a tree of bounding volumes.
+  sbbvh.h - settings and counts of the detector that walks through a tree of bounding volumes.
 */
 #pragma once
 #include "sbdetect.h"
