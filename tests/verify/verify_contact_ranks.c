@@ -116,7 +116,7 @@ int main(int argc, char **argv)
 
   SB_TEST_BEGIN(argc, argv);
   PetscCallMPI(MPI_Comm_size(PETSC_COMM_WORLD, &size));
-  PetscCall(check("both", 1e-9));
-  if (size == 2) PetscCall(check("one", 1e-9));
+  PetscCall(check("both", 1e-7));
+  if (size == 2) PetscCall(check("one", 1e-7));
   SB_TEST_END();
 }
