@@ -41,6 +41,7 @@ typedef struct {
   PetscReal lambda;           /* multiplier, N */
   PetscBool slides;           /* in the solve; else it sticks */
   PetscBool slid;             /* in the last step */
+  int flips;                  /* how often that or its direction has turned within the step */
   PetscReal tangent[2][3];    /* across the normal; the first one is where it slides to */
   PetscReal turning;          /* stiffness across where it slides to, N/m */
   PetscReal stretch[3];       /* of the springs that stick, at the start of the step, m */

@@ -14,6 +14,7 @@
 #define SETTLED 1e-4 /* of the largest friction: error that is left */
 #define LATE 1e-2    /* the same after UPDATES solves, with a warning; what does not get there is cut */
 #define UPDATES 30   /* solves of a step with friction */
+#define FLIPS 10     /* of a pair within a step, after which it has springs */
 #define STIFF \
   1e-3 /* smallest difference of trial force and limit that the stiffness across the slip sees, relative */
 
@@ -25,6 +26,13 @@ void SbFrictionBegin(Hit *hit)
     hit->slid = PETSC_FALSE;
   }
   hit->slides = hit->slid;
+  hit->flips = 0;
+}
+
+/* Whether a pair that cannot decide has springs of the solve before: a secant (Kacanov's method), slow and sure. */
+static inline PetscBool careful(const Hit *hit)
+{
+  return (PetscBool)(hit->flips > FLIPS);
 }
 
 static PetscReal coefficient(const Collision *c, const Hit *hit)
@@ -69,8 +77,8 @@ void SbFrictionPush(const Collision *c, const Hit *hit, PetscReal push[3 * NODES
   const PetscReal mu = coefficient(c, hit);
   PetscReal t[3], direction[3], length;
 
-  *oblique = hit->slides;
-  if (!hit->slides) return;
+  *oblique = (PetscBool)(hit->slides && !careful(hit));
+  if (!*oblique) return;
   for (int k = 0; k < 3; k++) t[k] = hit->tangent[0][k];
   length = across(hit->normal, t);
   for (int k = 0; k < 3; k++) direction[k] = hit->normal[k] - (length > 0 ? mu / length * t[k] : 0);
@@ -90,13 +98,16 @@ PetscErrorCode SbFrictionHold(const Collision *c, SbSpace space, PetscInt i)
     PetscReal stiffness = hit->k;
 
     SbCollisionCoef(hit, t, coef);
-    if (!hit->slides && exact(c->response)) { /* normals of all pairs come first */
+    if (!hit->slides && exact(c->response) && !careful(hit)) { /* normals of all pairs come first */
       const PetscInt id = SB_COLLISION_IDS + 2 * SbCollisionId(c, i) + q;
 
       PetscCall(SbSpaceCoupleRow(space, id, hit->n, hit->node, coef, NULL, rest, &hit->slide[q]));
       continue;
     }
-    if (hit->slides) stiffness = q ? hit->turning : 0;
+    if (careful(hit))
+      stiffness = hit->turning;
+    else if (hit->slides)
+      stiffness = q ? hit->turning : 0;
     PetscCall(SbSpaceCoupleSpring(space, hit->n, hit->node, coef, NULL, rest, stiffness, 0, &hit->slide[q]));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -110,18 +121,36 @@ void SbFrictionRead(const Collision *c, SbSpace space, PetscReal along, Hit *hit
   if (hit->slide[0] < 0) return;
   for (int k = 0; k < 3; k++) {
     if (!hit->rests) hit->now[k] = along * hit->normal[k];
-    if (hit->slides) hit->drag[k] = -coefficient(c, hit) * N * hit->tangent[0][k];
+    if (hit->slides && !careful(hit)) hit->drag[k] = -coefficient(c, hit) * N * hit->tangent[0][k];
   }
   for (int q = 0; q < 2; q++) {
     PetscReal force, at;
 
     SbSpaceCoupleGet(space, hit->slide[q], &force, &at);
-    if (SbSpaceCoupleRests(space, hit->slide[q])) force = 0;
+    if (SbSpaceCoupleRests(space, hit->slide[q])) { /* others hold it there */
+      force = 0;
+      at = SbDot3(hit->tangent[q], hit->start) - SbDot3(hit->tangent[q], hit->stretch);
+    }
     for (int k = 0; k < 3; k++) {
       hit->drag[k] += force * hit->tangent[q][k];
       if (!hit->rests) hit->now[k] += at * hit->tangent[q][k];
     }
   }
+}
+
+/* The same with springs for a pair that cannot decide; N is halfway between this solve's and the one before. */
+static PetscReal settle_carefully(const Collision *c, PetscReal before, Hit *hit)
+{
+  const PetscReal mu = coefficient(c, hit), most = mu * PetscMax(0, hit->pressing);
+  PetscReal s[3], wrong[3];
+  const PetscReal length = slip(hit, s), part = length > 0 ? PetscMin(hit->k, most / length) : hit->k;
+
+  for (int k = 0; k < 3; k++) wrong[k] = hit->drag[k] + part * s[k];
+  hit->slides = (PetscBool)(hit->k * length > most);
+  hit->pressing = 0.5 * (before + hit->pressing);
+  hit->turning = length > 0 ? PetscMin(hit->k, mu * PetscMax(0, hit->pressing) / length) : hit->k;
+  if (hit->slides) turn(hit, s);
+  return PetscSqrtReal(SbDot3(wrong, wrong));
 }
 
 /*
@@ -143,10 +172,12 @@ static PetscReal settle(const Collision *c, Hit *hit)
   if (hit->slides) {
     const PetscReal over = springs ? size : PetscMax(size - most, STIFF * size);
 
+    if (!slid || SbDot3(trial, hit->tangent[0]) < 0.5 * size) hit->flips++;
     for (int k = 0; k < 3; k++) wrong[k] = hit->drag[k] + most / size * trial[k];
     hit->turning = hit->k * most / over;
     turn(hit, trial);
   } else if (slid) {
+    hit->flips++;
     for (int k = 0; k < 3; k++) wrong[k] = hit->k * s[k];
   }
   return PetscSqrtReal(SbDot3(wrong, wrong));
@@ -159,12 +190,17 @@ void SbFrictionSettle(Collision *c, PetscReal largest, PetscBool *changed)
   c->updates++;
   for (PetscInt i = 0; i < c->nhit; i++) {
     Hit *hit = &c->hit[i];
+    const PetscReal before = hit->pressing;
     PetscReal error;
 
     if (!hit->on || hit->row < 0) continue;
     hit->pressing = SbCollisionForce(c, hit);
     if (hit->slide[0] < 0) continue;
-    error = settle(c, hit);
+    error = careful(hit) ? settle_carefully(c, before, hit) : settle(c, hit);
+    if (careful(hit) && hit->flips < 2 * FLIPS) { /* begins now */
+      hit->flips = 2 * FLIPS;
+      hit->turning = hit->k;
+    }
     worst = PetscMax(worst, error);
   }
   c->unsettled = largest > 0 ? worst / (c->mu * largest) : 0;

@@ -3,8 +3,8 @@
   right.
 
   A later solve begins next to its solution, and a tolerance relative to its own start would ask for digits that rounding does not
-  leave beside large contact forces. So all solves of a step aim at what the first one aims at. While guesses are wrong, they aim at
-  ROUGH of it: a rough solution is enough to see who touches.
+  leave beside large contact forces. So all solves of a step aim at what the first one aims at. While guesses are wrong, those of a time
+  step aim at ROUGH of it: a rough solution is enough to see who touches.
 */
 #include "time_impl.h"
 
@@ -70,7 +70,7 @@ PetscErrorCode SbRunSolveContact(SbRun run, SNES snes, PetscReal t, PetscReal dt
                                  const SbContactSolve *solve, SNESConvergedReason *reason)
 {
   const SbModel m = run->model;
-  PetscBool again = PETSC_TRUE, rough;
+  PetscBool again = PETSC_TRUE, rough, held;
   PetscReal size, least = 0;
   Aim aim;
 
@@ -79,17 +79,18 @@ PetscErrorCode SbRunSolveContact(SbRun run, SNES snes, PetscReal t, PetscReal dt
   run->arrival = 1.;
   PetscCall(get_aim(snes, &aim));
   PetscCall(SbModelContactBegin(m, t, dt, U0, U));
-  rough = SbSpaceIsHeld(m->space);
+  held = SbSpaceIsHeld(m->space);
+  rough = (PetscBool)(held && m->dynamic);
   /* the matrix holds what was held before */
   if (m->space->held || !m->dynamic) run->tangent_known = PETSC_FALSE;
-  if (rough) {
+  if (held) {
     /* a body at rest has no residual but for rounding: then contact and supports carry all there is */
     PetscCall((*solve->residual)(solve->ctx, U, run->R));
     PetscCall(VecNorm(run->R, NORM_2, &least));
     least = PetscIsInfOrNanReal(least) ? 0 : DIGITS * least;
   }
   PetscCall(first_residual(snes, U, run->R, &size));
-  if (rough) PetscCall(set_aim(snes, &aim, size, least, rough)); /* if not, as without contact */
+  if (held) PetscCall(set_aim(snes, &aim, size, least, rough)); /* if not, as without contact */
   PetscCall((*solve->solve)(solve->ctx, U, reason));
   for (PetscInt round = 1; *reason > 0; round++) {
     PetscCall((*solve->residual)(solve->ctx, U, run->R));
