@@ -16,7 +16,8 @@ static const SbOption rows[] = {
   {"output_dir", SB_OPTION_STRING, 1, "", "", "",
    "folder of the results; empty: out/<name of the scenario file>"},
   {"output_fields", SB_OPTION_NAMES, 1, "", "displacement,velocity,von_mises", "",
-   "fields in fields.h5: displacement, velocity, acceleration, reaction, contact_force, contact_gap, stress, von_mises, "
+   "fields in fields.h5: displacement, velocity, acceleration, reaction, contact_force, contact_gap, stress, "
+   "von_mises, "
    "pressure, "
    "mean_pressure, J, energy_density, rank; none: no such file"},
   {"output_every", SB_OPTION_REAL, 1, "s", "0", "[0, inf)",

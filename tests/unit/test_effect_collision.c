@@ -472,7 +472,8 @@ static PetscErrorCode check_gap_field(void)
     if (upper && low) {
       seen[0]++;
       SB_CHECK_NEAR(g[3 * i + 2], z0 - down - 0.05, 1e-12, "gap of the lower side");
-    } else if (upper && X[2] > z0 + 0.02 && X[0] < 0.02 + 1e-9) { /* of the floor, which sees the whole body */
+    } else if (upper && X[2] > z0 + 0.02 &&
+               X[0] < 0.02 + 1e-9) { /* of the floor, which sees the whole body */
       seen[1]++;
       SB_CHECK_NEAR(g[3 * i + 2], X[2] - down + 1, 1e-12, "gap from the floor");
     } else if (!upper && under && X[2] > 0.05 - 1e-9) {
