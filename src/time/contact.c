@@ -4,11 +4,12 @@
 
   A later solve begins next to its solution, and a tolerance relative to its own start would ask for digits that rounding does not
   leave beside large contact forces. So all solves of a step aim at what the first one aims at. While guesses are wrong, those of a time
-  step aim at ROUGH of it: a rough solution is enough to see who touches.
+  step aim at a thousand times more: a rough solution is enough to see who touches.
 */
 #include "time_impl.h"
 
 #define DIGITS 1e-11    /* of the forces of contact and supports: what rounding leaves of a residual */
+#define LOOSER 1e3      /* rough solves may have so many times the residual that is asked for */
 #define ROUGH 1e-3      /* of the first residual */
 #define ROUGH_ROUNDS 10 /* what has not settled then may wait for digits that rough solves do not have */
 
@@ -35,7 +36,7 @@ static PetscErrorCode get_aim(SNES snes, Aim *aim)
 static PetscErrorCode set_aim(SNES snes, const Aim *aim, PetscReal size, PetscReal least, PetscBool rough)
 {
   const PetscReal rtol = aim->single ? aim->linear_rtol : aim->rtol;
-  const PetscReal part = rough ? PetscMax(rtol, ROUGH) : rtol;
+  const PetscReal part = rough ? PetscMax(rtol, PetscMin(ROUGH, LOOSER * rtol)) : rtol;
   const PetscReal atol = PetscMax(PetscMax(aim->atol, least), (rough ? part : aim->rtol) * size);
   const PetscReal linear = (aim->single ? 1 : 0.1) * PetscMax(least, part * size);
   KSP ksp;

@@ -65,9 +65,7 @@ static PetscErrorCode compare(const char *name, const char *scene, PetscInt n, c
 #define LAW(name)                                                                                  \
   "-body_" name "_material linear -body_" name "_young 1e5 -body_" name "_poisson 0.3 -body_" name \
   "_density 1000 "
-/* Solves are rough until contact settles, and it settles to 1e-7 of the size of the bodies: 1e-5 of the displacements here, and more where a node is just held or just not. With
-   rows that stay as they are tests/unit/test_couple.c asks for 1e-8. */
-#define SETTLED 5e-4
+#define SETTLED 1e-8 /* of the displacements; they agree to 5e-10 */
 #define EXACT "-ksp_rtol 1e-12 -snes_rtol 1e-11 "
 
 /* ------------------------------------------------------------------ bodies */
