@@ -244,7 +244,7 @@ static PetscErrorCode check_momentum(const char *element, const char *response, 
 
 /* A block pressed onto a wider one at an angle, with friction between them: force and displacement by each response. */
 static PetscErrorCode press(const char *response, PetscReal stiffness, PetscReal values[NVALUE],
-                            PetscReal u[3])
+                            PetscReal u[3], PetscInt *solves)
 {
   static const PetscReal at[3] = {0.1, 0.02, 0.1};
   TestScene t;
@@ -267,6 +267,7 @@ static PetscErrorCode press(const char *response, PetscReal stiffness, PetscReal
   PetscCall(verify_solve(&t, "responses"));
   PetscCall(collision_values(t.run, values));
   PetscCall(test_value_at(t.model, t.run->U, at, u));
+  *solves = t.run->newton_total;
   PetscCall(test_scene_close(&t));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -274,15 +275,18 @@ static PetscErrorCode press(const char *response, PetscReal stiffness, PetscReal
 static PetscErrorCode check_responses(void)
 {
   PetscReal exact[NVALUE], values[NVALUE], u0[3], u[3];
+  PetscInt solves;
 
   PetscFunctionBeginUser;
-  PetscCall(press("projected", 20, exact, u0));
-  PetscCall(press("multiplier", 20, values, u));
+  PetscCall(press("projected", 20, exact, u0, &solves));
+  /* friction of the same solve: what had to wait for normal forces took some hundred */
+  SB_CHECK(solves > 4 && solves < 60, "%d solves for four steps with friction", (int)solves);
+  PetscCall(press("multiplier", 20, values, u, &solves));
   SB_CHECK_NEAR(values[NORMAL], exact[NORMAL], 1e-5 * exact[NORMAL], "normal force with multipliers");
   SB_CHECK_NEAR(values[FRICTION], exact[FRICTION], 1e-4 * exact[NORMAL], "friction with multipliers");
   for (int k = 0; k < 3; k++) SB_CHECK_NEAR(u[k], u0[k], 1e-4 * 0.002, "displacement with multipliers");
   for (int q = 0; q < 2; q++) {
-    PetscCall(press(q ? "penalty" : "augmented", q ? 1000 : 20, values, u));
+    PetscCall(press(q ? "penalty" : "augmented", q ? 1000 : 20, values, u, &solves));
     PetscCall(PetscPrintf(PETSC_COMM_WORLD,
                           "  responses, %s: normal force %.6g N (projected %.6g), friction %.4g (%.4g)\n",
                           q ? "penalty" : "augmented", (double)values[NORMAL], (double)exact[NORMAL],
