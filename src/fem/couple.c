@@ -489,12 +489,16 @@ static PetscErrorCode create_springs(SbCouple c)
 PetscErrorCode SbSpaceCoupleDone(SbSpace s)
 {
   SbCouple c = s->couple;
+  PetscInt count[2];
 
   PetscFunctionBeginUser;
   PetscCall(destroy_matrices(c));
   c->version++;
-  PetscCallMPI(MPI_Allreduce(&c->n, &c->ntotal, 1, MPIU_INT, MPI_SUM, s->comm));
-  if (c->oblique) PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &c->tilted, 1, SB_MPI_BOOL, MPI_LOR, s->comm));
+  count[0] = c->n;
+  count[1] = c->tilted;
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, count, 2, MPIU_INT, MPI_SUM, s->comm));
+  c->ntotal = count[0];
+  c->tilted = (PetscBool)(count[1] > 0);
   if (!c->ntotal) { /* bodies are apart: nothing more is exchanged or made */
     if (c->anchor) PetscCall(VecZeroEntries(c->anchor));
     PetscFunctionReturn(PETSC_SUCCESS);
