@@ -19,12 +19,46 @@
 typedef struct {
   PetscInt n;
   PetscInt *id, *start, *node; /* [n], [n+1], [start[n]] nodes as 0..nnode-1 */
-  PetscReal *coef;             /* [start[n]][3] */
+  PetscReal *coef;             /* [start[n]][3] of free directions */
   PetscInt first;              /* of this rank */
   PetscInt nnode;
   PetscInt *head, *next,
     *row; /* accepted rows by node: entry e of a row is e, next[e] the following one at its node */
 } All;
+
+/*
+  Takes from the rows what prescribed and held directions would say: along a symmetry plane a row of friction may be left with a
+  sliver of the direction that the normal's row has whole. sorted: global numbers of the nodes.
+*/
+static PetscErrorCode clear_held(SbSpace s, const PetscInt sorted[], All *a)
+{
+  const PetscBool held = SbHeldAny(s);
+  PetscReal *free;
+  PetscMPIInt n;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscMPIIntCast(9 * a->nnode, &n));
+  PetscCall(
+    PetscCalloc1(n, &free)); /* [nnode][3][3] by its owner: columns of I - Q that are not prescribed */
+  for (PetscInt i = 0; i < a->nnode; i++) {
+    const PetscInt node = sorted[i] - s->gnode_start;
+    const PetscReal *Q = held && node >= 0 && node < s->nnode_owned ? SbHeldProjector(s, node) : NULL;
+
+    for (PetscInt k = 0; k < 9 && node >= 0 && node < s->nnode_owned; k++) {
+      if (!(s->fixed[node] & (1 << (k % 3)))) free[9 * i + k] = (k % 4 ? 0. : 1.) - (Q ? Q[k] : 0.);
+    }
+  }
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, free, n, MPIU_REAL, MPI_SUM, s->comm));
+  for (PetscInt e = 0; e < a->start[a->n]; e++) {
+    const PetscReal *P = free + 9 * (size_t)a->node[e], *row = a->coef + 3 * (size_t)e;
+    PetscReal left[3];
+
+    for (int k = 0; k < 3; k++) left[k] = row[0] * P[k] + row[1] * P[3 + k] + row[2] * P[6 + k];
+    PetscCall(PetscArraycpy(a->coef + 3 * (size_t)e, left, 3));
+  }
+  PetscCall(PetscFree(free));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
 
 /* One array from the arrays of all ranks. */
 static PetscErrorCode gather(MPI_Comm comm, MPI_Datatype type, size_t size, PetscInt n, const void *mine,
@@ -81,6 +115,7 @@ static PetscErrorCode gather_rows(SbSpace s, All *a)
   a->nnode = total;
   PetscCall(PetscSortRemoveDupsInt(&a->nnode, sorted));
   for (PetscInt e = 0; e < total; e++) PetscCall(PetscFindInt(a->node[e], a->nnode, sorted, &a->node[e]));
+  PetscCall(clear_held(s, sorted, a));
   PetscCall(PetscFree(sorted));
   PetscCall(PetscMalloc3(a->nnode, &a->head, total, &a->next, total, &a->row));
   for (PetscInt i = 0; i < a->nnode; i++) a->head[i] = -1;
