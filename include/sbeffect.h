@@ -9,6 +9,24 @@
 
 typedef struct _p_SbEffect *SbEffect;
 
+/* A place where something pushes a body. */
+typedef struct {
+  PetscInt id[3];      /* numbers that name it among those of its effect, the same for any partition */
+  PetscInt effect;     /* number of the effect in the scenario; filled by the model */
+  PetscInt body[2];    /* the one that is pushed and the one that pushes; -1: a rigid obstacle */
+  PetscReal x[3];      /* where, on the body that is pushed, m */
+  PetscReal normal[3]; /* out of what pushes */
+  PetscReal gap;       /* m; negative inside */
+  PetscReal force[3];  /* on the body that is pushed, with friction, N */
+} SbPlace;
+/* Start with {0}; the room is kept when n is set to zero. Release with PetscFree(list->place). */
+typedef struct {
+  PetscInt n, size;
+  SbPlace *place; /* [n] */
+} SbPlaces;
+/* Appends one. Not collective. */
+PetscErrorCode SbPlacesAdd(SbPlaces *list, const SbPlace *place);
+
 typedef struct {
   /* reads -effect_<name>_...; scope = {"effect", <type>, <name>}; called once, by SbEffectCreate() */
   PetscErrorCode (*setfromoptions)(SbEffect e, const SbScope *scope);
@@ -46,6 +64,9 @@ typedef struct {
      which on prescribed unknowns is the reaction. Values are this rank's part and are summed. */
   PetscErrorCode (*history)(SbEffect e, SbSpace space, const SbStage *stage, const PetscReal residual[],
                             PetscReal values[]);
+  /* adds the places where it pushes the bodies, those of this rank, residual as for history(); for output only. Not collective. */
+  PetscErrorCode (*places)(SbEffect e, SbSpace space, const SbStage *stage, const PetscReal residual[],
+                           SbPlaces *list);
   PetscErrorCode (*destroy)(SbEffect e);
 } SbEffectOps;
 
@@ -59,9 +80,10 @@ struct _p_SbEffect {
   PetscBool saddle;  /* its rows are to be solved with their multipliers as unknowns */
   PetscBool euler;   /* made for implicit Euler only. Default PETSC_FALSE */
   const struct SbEffectOn_ *held; /* the sets whose nodes it prescribes in all directions; NULL: none */
-  PetscInt ncolumn;               /* history columns */
-  const char *column[8];          /* "force_x", ...; written as <name>_<column> */
-  char note[256];                 /* what set-up has to say in the run's report; "": nothing */
+  PetscInt ncolumn;               /* history columns, known after set-up */
+  const char *const
+    *column;      /* [ncolumn] "force_x", ...; written as <name>_<column>; owned by the type or by `data` */
+  char note[256]; /* what set-up has to say in the run's report; "": nothing */
   void *data;
 };
 

@@ -200,6 +200,9 @@ PetscErrorCode SbSpaceCoupleReaction(SbSpace space, Vec R);
 PetscBool SbSpaceCoupleRests(SbSpace space, PetscInt row);
 /* What SbSpaceCoupleMeasure() found: force (N, positive: it raises the sum) and sum_k coef_k . u_k (m). Not collective. */
 void SbSpaceCoupleGet(SbSpace space, PetscInt row, PetscReal *force, PetscReal *sum);
+/* Of the first n nodes of a row: the sum of its coefficients, and force += what it pushes them with, N, as SbSpaceCoupleMeasure() has found
+   it. Not collective. */
+void SbSpaceCouplePush(SbSpace space, PetscInt row, PetscInt n, PetscReal direction[3], PetscReal force[3]);
 /* F += what all rows push with at the displacement U, as SbSpaceCoupleMeasure() has found it. Collective. */
 PetscErrorCode SbSpaceCoupleForce(SbSpace space, Vec U, Vec F);
 /* U <- nearest displacement on which the exact rows hold. Collective. */

@@ -76,6 +76,8 @@ PetscErrorCode SbModelContactGap(SbModel model, PetscReal t, Vec U, Vec G);
 /* F = what contact pushes the nodes with, N, after the step that ended at t with the displacement U and the residual R without
    constraints. Collective. */
 PetscErrorCode SbModelContactForce(SbModel model, PetscReal t, Vec U, Vec R, Vec F);
+/* Appends the places of this rank where contact pushes bodies, after the same step. Collective. */
+PetscErrorCode SbModelContactPlaces(SbModel model, PetscReal t, Vec U, Vec R, SbPlaces *list);
 /* Initial velocities of bodies (translation and spin). */
 PetscErrorCode SbModelInitialState(SbModel model, Vec U, Vec V);
 /* Instantaneous part of the energies (kinetic, strain, momenta, ...). V may be NULL. Collective. */

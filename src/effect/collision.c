@@ -58,6 +58,8 @@ static const SbOption rows[] = {
   {"recovery", SB_OPTION_REAL, 1, "steps", "30", "[1, inf)",
    "bodies that overlap before they meet are parted slowly: to 1/e of the depth in so many steps; 1: at "
    "once"},
+  {"pairs", SB_OPTION_BOOL, 1, "", "no", "",
+   "columns in history.csv for each pair of bodies: force on the second by the first, contacts"},
 };
 
 /* Settings of the tree, which only bvh has. */
@@ -122,6 +124,7 @@ static PetscErrorCode options_collision(SbEffect e, const SbScope *scope)
   PetscCall(SbOptionReal(scope, "reach", &c->reach));
   PetscCall(SbOptionReal(scope, "recovery", &c->recovery));
   c->recovery = c->recovery > 1 ? PetscExpReal(-1 / c->recovery) : 0;
+  PetscCall(SbOptionBool(scope, "pairs", &c->pairs.wanted));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -217,6 +220,7 @@ static PetscErrorCode setup_collision(SbEffect e, SbSpace space)
              "The effect %s has only one body to look at: give -effect_%s_self yes for a body that may meet "
              "itself, or more sets with -effect_%s_on",
              e->name, e->name, e->name);
+  PetscCall(SbPairsSetUp(e, space->mesh));
   PetscCall(PetscMalloc1(3 * space->nnode, &c->u0));
   if (c->reach == 0) c->reach = 0.5 * c->surface->edge;
   PetscCall(SbSpaceCoupleCreate(space, PETSC_FALSE, (PetscBool)(c->mu > 0)));
@@ -307,6 +311,7 @@ static PetscErrorCode hold_collision(SbEffect e, SbSpace space)
 
     hit->row = hit->slide[0] = hit->slide[1] = -1;
     if (!hit->on) continue;
+    hit->held = hit->mine;
     SbCollisionCoef(hit, hit->normal, coef);
     if (c->mu > 0) SbFrictionPush(c, hit, push, &oblique);
     if (exact(c->response))
@@ -442,7 +447,7 @@ static PetscErrorCode history_collision(SbEffect e, SbSpace space, const SbStage
   PetscFunctionBeginUser;
   (void)stage;
   (void)residual;
-  for (int k = 0; k < 7; k++) values[k] = 0;
+  for (PetscInt k = 0; k < e->ncolumn; k++) values[k] = 0;
   for (PetscInt i = 0; i < c->nhit; i++) {
     const Hit *hit = &c->hit[i];
 
@@ -465,6 +470,7 @@ static PetscErrorCode history_collision(SbEffect e, SbSpace space, const SbStage
   }
   values[5] = c->work;
   values[6] = c->loss;
+  SbPairsHistory(c, space, values);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -500,6 +506,7 @@ static PetscErrorCode destroy_collision(SbEffect e)
   PetscCall(PetscFree(c->hit));
   PetscCall(PetscFree(c->spare));
   PetscCall(PetscFree(c->past));
+  PetscCall(SbPairsFree(&c->pairs));
   PetscCall(PetscFree(e->data));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -523,8 +530,10 @@ static PetscErrorCode create_collision(SbEffect e)
   e->ops.accept = accept_collision;
   e->ops.history = history_collision;
   e->ops.near = near_collision;
+  e->ops.places = SbEffectPlaces_Collision;
   e->ops.destroy = destroy_collision;
-  for (e->ncolumn = 0; e->ncolumn < 7; e->ncolumn++) e->column[e->ncolumn] = columns[e->ncolumn];
+  e->column = columns;
+  e->ncolumn = PETSC_STATIC_ARRAY_LENGTH(columns);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -24,7 +24,11 @@ static inline PetscBool exact(Response response)
 */
 typedef struct {
   PetscInt point, part;
+  PetscInt body;           /* of the surface, or of the other edge */
   PetscInt n, node[NODES]; /* global numbers; the point's first */
+  PetscInt mine,
+    held;       /* how many of them are the point's or the first edge's, and how many were in the last rows */
+  PetscReal at; /* of edges: place on the first one, 0 at its first end */
   PetscReal weight
     [NODES]; /* of the relative displacement w: 1, minus the facet's; those of the first edge, minus the other's */
   PetscReal normal[3];
@@ -49,6 +53,16 @@ typedef struct {
   PetscReal pressing;         /* normal force of the solve before, N */
 } Hit;
 
+/* Columns of the history for each pair of bodies (collision_pairs.c). */
+typedef struct {
+  PetscBool wanted;
+  PetscInt fixed, nskin;         /* columns of the effect before them; bodies that have a surface here */
+  PetscInt *slot;                /* [nbody] number among these bodies, or -1 */
+  PetscInt *place;               /* [nskin][nskin] first column of a pair, the lower body first */
+  const char **column;           /* [ncolumn] all of the effect */
+  char (*text)[3 * SB_NAME_MAX]; /* names of the columns behind the fixed ones */
+} SbPairs;
+
 typedef struct {
   SbEffectOn on;
   SbSurface surface;
@@ -71,6 +85,7 @@ typedef struct {
   PetscReal unsettled; /* largest error of friction after the last solve, as a part of the largest friction */
   PetscBool said;      /* that friction did not settle */
   PetscReal work, loss; /* of the contact forces and of friction since the start, this rank, J */
+  SbPairs pairs;
 } Collision;
 
 /*
@@ -125,3 +140,12 @@ void SbFrictionRead(const Collision *c, SbSpace space, PetscReal along, Hit *hit
 void SbFrictionSettle(Collision *c, PetscReal largest, PetscBool *changed);
 /* Ends a step: losses, springs, a warning if friction was taken as it was. Collective. */
 PetscErrorCode SbFrictionAccept(Collision *c, const char effect[], SbSpace space, PetscReal t);
+
+/* collision_pairs.c: names the columns, when they are wanted, behind those of e. Not collective. */
+PetscErrorCode SbPairsSetUp(SbEffect e, SbMesh mesh);
+/* values += this rank's part of these columns; values are those of the whole effect. Not collective. */
+void SbPairsHistory(const Collision *c, SbSpace space, PetscReal values[]);
+PetscErrorCode SbPairsFree(SbPairs *pairs);
+/* Operation of the effect (sbeffect.h). */
+PetscErrorCode SbEffectPlaces_Collision(SbEffect e, SbSpace space, const SbStage *stage,
+                                        const PetscReal residual[], SbPlaces *list);

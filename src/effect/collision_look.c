@@ -31,13 +31,14 @@ static void name_of(const Collision *c, const Found *found, PetscInt i, Hit *hit
 
   if (i < found->nnear) {
     hit->point = found->near[i].point;
-    hit->part = s->facet_part[found->near[i].facet];
+    hit->part = hit->body = s->facet_part[found->near[i].facet];
     hit->k = c->point_k[hit->point];
   } else {
     const SbEdgePair *pair = &found->pair[i - found->nnear];
 
     hit->point = s->npoint + pair->edge[0];
     hit->part = s->edges->id[pair->edge[1]];
+    hit->body = s->edges->part[pair->edge[1]];
     hit->k = c->edge_k[pair->edge[0]];
   }
 }
@@ -82,6 +83,7 @@ static void take_point(const Collision *c, const SbNear *near, Hit *hit)
 
   hit->n = 0;
   add_node(hit, f->space->gnode[f->point_node[near->point]], 1);
+  hit->mine = hit->n;
   for (int a = 0; a < 4; a++) {
     PetscReal w = 0;
 
@@ -104,7 +106,9 @@ static void take_edges(const Collision *c, const SbEdgePair *pair, Hit *hit)
     for (int a = 0; a < 4; a++)
       add_node(hit, f->edge_node[4 * pair->edge[q] + a],
                (q ? -1 : 1) * ((1 - t) * weight[a] + t * weight[4 + a]));
+    if (!q) hit->mine = hit->n;
   }
+  hit->at = pair->at[0];
   relative_edges(pair, s, s->x, hit->now);
   relative_edges(pair, s, s->x0 ? s->x0 : s->x, hit->start);
 }

@@ -485,9 +485,11 @@ static PetscErrorCode create_contact(SbEffect e)
   e->ops.accept = SbEffectAccept_Contact;
   e->ops.push = SbEffectPush_Contact;
   e->ops.near = SbEffectNear_Contact;
+  e->ops.places = SbEffectPlaces_Contact;
   e->ops.history = SbEffectHistory_Contact;
   e->ops.destroy = destroy_contact;
-  for (e->ncolumn = 0; e->ncolumn < 8; e->ncolumn++) e->column[e->ncolumn] = columns[e->ncolumn];
+  e->column = columns;
+  e->ncolumn = PETSC_STATIC_ARRAY_LENGTH(columns);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -102,5 +102,7 @@ PetscErrorCode SbEffectPush_Contact(SbEffect e, SbSpace space, const SbStage *st
                                     const PetscReal residual[], PetscReal f[]);
 void SbEffectNear_Contact(SbEffect e, SbSpace space, const SbStage *stage, PetscReal gap[],
                           PetscReal normal[]);
+PetscErrorCode SbEffectPlaces_Contact(SbEffect e, SbSpace space, const SbStage *stage,
+                                      const PetscReal residual[], SbPlaces *list);
 PetscErrorCode SbEffectHistory_Contact(SbEffect e, SbSpace space, const SbStage *stage,
                                        const PetscReal residual[], PetscReal values[]);

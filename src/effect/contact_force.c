@@ -218,6 +218,28 @@ void SbEffectNear_Contact(SbEffect e, SbSpace space, const SbStage *stage, Petsc
   }
 }
 
+PetscErrorCode SbEffectPlaces_Contact(SbEffect e, SbSpace space, const SbStage *stage,
+                                      const PetscReal residual[], SbPlaces *list)
+{
+  const Contact *c = (const Contact *)e->data;
+  SbPose pose;
+
+  PetscFunctionBeginUser;
+  SbContactPose(c, stage->t, &pose);
+  for (PetscInt i = 0; i < c->n; i++) {
+    const Touch *touch = &c->touch[i];
+    SbPlace p = {.body = {space->node_body[touch->node], -1}, .id = {0, space->node_orig[touch->node], 0}};
+
+    place(space, touch->node, stage->u, p.x);
+    if (normal_force(c, &pose, touch, p.x, p.normal) <= 0) continue;
+    force_on(c, &pose, space, touch, p.x, residual, p.force);
+    p.gap = SbContactGap(c, &pose, p.x, p.normal);
+    if (exact(c)) PetscCall(PetscArraycpy(p.normal, touch->n, 3)); /* that it is held along */
+    PetscCall(SbPlacesAdd(list, &p));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Force and torque of the obstacle on the bodies, touching nodes, deepest penetration. */
 PetscErrorCode SbEffectHistory_Contact(SbEffect e, SbSpace space, const SbStage *stage,
                                        const PetscReal residual[], PetscReal values[])

@@ -151,7 +151,8 @@ static PetscErrorCode create_drive(SbEffect e)
   e->ops.prescribe = prescribe_drive;
   e->ops.history = history_drive;
   e->ops.destroy = destroy_drive;
-  for (e->ncolumn = 0; e->ncolumn < 4; e->ncolumn++) e->column[e->ncolumn] = columns[e->ncolumn];
+  e->column = columns;
+  e->ncolumn = PETSC_STATIC_ARRAY_LENGTH(columns);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

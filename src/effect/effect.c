@@ -92,6 +92,17 @@ PetscErrorCode SbEffectDestroy(SbEffect *effect)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscErrorCode SbPlacesAdd(SbPlaces *list, const SbPlace *place)
+{
+  PetscFunctionBeginUser;
+  if (list->n == list->size) {
+    list->size = PetscMax(64, 2 * list->size);
+    PetscCall(PetscRealloc((size_t)list->size * sizeof(SbPlace), &list->place));
+  }
+  list->place[list->n++] = *place;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode SbEffectMarkHeld(SbEffect e, PetscInt nset, SbSet set[])
 {
   PetscFunctionBeginUser;

@@ -92,7 +92,8 @@ static PetscErrorCode create_support(SbEffect e)
   e->ops.prescribe = prescribe_support;
   e->ops.history = history_support;
   e->ops.destroy = destroy_support;
-  for (e->ncolumn = 0; e->ncolumn < 3; e->ncolumn++) e->column[e->ncolumn] = columns[e->ncolumn];
+  e->column = columns;
+  e->ncolumn = PETSC_STATIC_ARRAY_LENGTH(columns);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

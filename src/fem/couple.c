@@ -686,3 +686,14 @@ void SbSpaceCoupleGet(SbSpace s, PetscInt row, PetscReal *force, PetscReal *sum)
   *force = s->couple->force[row];
   *sum = s->couple->sum[row];
 }
+
+void SbSpaceCouplePush(SbSpace s, PetscInt row, PetscInt n, PetscReal direction[3], PetscReal force[3])
+{
+  const SbCouple c = s->couple;
+
+  for (PetscInt k = 0; k < 3; k++) direction[k] = 0.;
+  for (PetscInt k = 3 * c->start[row]; k < 3 * (c->start[row] + n); k++) {
+    direction[k % 3] += c->coef[k];
+    force[k % 3] += c->force[row] * c->along[k];
+  }
+}

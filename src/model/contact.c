@@ -114,3 +114,23 @@ PetscErrorCode SbModelContactForce(SbModel m, PetscReal t, Vec U, Vec R, Vec F)
   if (m->space->couple) PetscCall(SbSpaceCoupleForce(m->space, U, F));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
+
+PetscErrorCode SbModelContactPlaces(SbModel m, PetscReal t, Vec U, Vec R, SbPlaces *list)
+{
+  SbStage stage = {.t = t, .shift_k = 1.};
+  const PetscReal *r;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbSpaceGetLocalRead(m->space, U, &stage.u));
+  PetscCall(SbSpaceGetLocalRead(m->space, R, &r));
+  for (PetscInt e = 0; e < m->neffect; e++) {
+    const PetscInt before = list->n;
+
+    if (!m->effect[e]->ops.places) continue;
+    PetscCall(m->effect[e]->ops.places(m->effect[e], m->space, &stage, r, list));
+    for (PetscInt i = before; i < list->n; i++) list->place[i].effect = e;
+  }
+  PetscCall(SbSpaceRestoreLocalRead(m->space, R, &r));
+  PetscCall(SbSpaceRestoreLocalRead(m->space, U, &stage.u));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

@@ -15,6 +15,7 @@ typedef struct {
   PetscInt nfield;
   const SbField *field[SB_FIELD_MAX];
   PetscInt bytes[SB_FIELD_MAX];
+  PetscInt nplace, place_bytes; /* of contact; -1: it was not asked for */
 } SbFrame;
 
 struct _p_SbFrames {
@@ -118,10 +119,10 @@ static PetscErrorCode write_field(SbRun run, SbOutput out, const SbStep *step, c
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Bytes that a frame can take, with its metadata. */
-static PetscInt64 frame_bytes(const SbOutput out)
+/* Bytes that a frame can take, with its metadata and those of places of contact. */
+static PetscInt64 frame_bytes(const SbOutput out, PetscInt64 places)
 {
-  PetscInt64 bytes = 65536;
+  PetscInt64 bytes = 65536 + places;
 
   for (PetscInt i = 0; i < out->nfield; i++) {
     const SbField *f = out->field[i];
@@ -164,12 +165,14 @@ static PetscErrorCode write_frame(SbRun run, SbOutput out, const SbStep *step)
   SbFrames fr = out->frames;
   const SbField *field[SB_FIELD_MAX];
   PetscInt bytes[SB_FIELD_MAX], n = 0;
+  PetscInt64 places;
   char path[48], message[SB_MESSAGE_MAX] = "";
   hid_t group;
 
   PetscFunctionBeginUser;
-  PetscCall(SbH5Reserve(&fr->h5, frame_bytes(out)));
-  PetscCall(SbH5GroupCreate(&fr->h5, (unsigned)out->nfield, 14, &group));
+  PetscCall(SbContactsFind(run, out, step, &places));
+  PetscCall(SbH5Reserve(&fr->h5, frame_bytes(out, places)));
+  PetscCall(SbH5GroupCreate(&fr->h5, (unsigned)out->nfield + 1, 14, &group));
   PetscCall(SbH5PutReal(&fr->h5, group, "time", step->t));
   PetscCall(SbH5PutInt(&fr->h5, group, "step", step->step));
   out->state_valid = PETSC_FALSE;
@@ -179,13 +182,16 @@ static PetscErrorCode write_frame(SbRun run, SbOutput out, const SbStep *step)
     bytes[n] = out->precise ? 8 : 4;
     field[n++] = out->field[i];
   }
+  PetscCall(SbContactsWrite(out, &fr->h5, group));
   PetscCall(commit(out, group, step->step, sizeof(path), path));
   (void)H5Gclose(group);
   fr->last_step = step->step;
   fr->nframe++;
   if (fr->xdmf) {
     PetscCall(SbXdmfAdd(fr->xdmf, step->t, path, n, field, bytes));
+    PetscCall(SbContactsList(out, step->t, path, SbContactsCount(out), out->precise ? 8 : 4));
     SbXdmfWrite(fr->xdmf, sizeof(message), message);
+    if (!message[0]) SbContactsIndex(out, sizeof(message), message);
   }
   PetscCall(SbAgree(out->comm, PETSC_ERR_FILE_WRITE, message));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -242,6 +248,7 @@ static PetscErrorCode read_frame(hid_t hundred, const char *name, SbFrame *frame
       (void)H5Dclose(dataset);
     }
   }
+  PetscCall(SbContactsRead(group, &frame->nplace, &frame->place_bytes));
   (void)H5Gclose(group);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -337,8 +344,10 @@ static PetscErrorCode resume(SbRun run, SbOutput out, const char *path, PetscBoo
   for (PetscInt i = 0; fr->xdmf && i < fr->nframe; i++) {
     PetscCall(SbXdmfAdd(fr->xdmf, frames[i].time, frames[i].group, frames[i].nfield, frames[i].field,
                         frames[i].bytes));
+    PetscCall(SbContactsList(out, frames[i].time, frames[i].group, frames[i].nplace, frames[i].place_bytes));
   }
   if (fr->xdmf) SbXdmfWrite(fr->xdmf, sizeof(message), message);
+  if (fr->xdmf && !message[0]) SbContactsIndex(out, sizeof(message), message);
   PetscCall(PetscFree(frames));
   PetscCall(SbAgree(out->comm, PETSC_ERR_FILE_WRITE, message));
   PetscCall(scan(fr, run->step0, PETSC_TRUE, &fr->nframe, NULL));
@@ -381,6 +390,7 @@ static PetscErrorCode create(SbRun run, SbOutput out, const char *path)
   PetscFunctionBeginUser;
   // An index without its frames would mislead; the next one comes with the first frame.
   if (fr->xdmf) PetscCall(SbXdmfRemove(fr->xdmf));
+  PetscCall(SbContactsRemoveIndex(out));
   PetscCall(SbH5Create(out->comm, path, &fr->h5));
   PetscCall(SbH5PutText(&fr->h5, fr->h5.file, "program", "supple " SB_VERSION));
   PetscCall(write_mesh(run, out));
@@ -406,7 +416,8 @@ static PetscErrorCode allocate(SbRun run, SbOutput out)
   if (out->rank) PetscFunctionReturn(PETSC_SUCCESS);
   for (PetscInt i = 0; i < out->nfield; i++) rank = (PetscBool)(rank || !strcmp(out->field[i]->name, "rank"));
   PetscCall(SbOutputPath(out, "fields.xmf", sizeof(path), path));
-  PetscCall(SbXdmfCreate(path, out->point.N, out->cell.N, rank, &fr->xdmf));
+  PetscCall(SbXdmfCreate(path, &fr->xdmf));
+  PetscCall(SbXdmfSetMesh(fr->xdmf, out->point.N, out->cell.N, rank));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -424,6 +435,7 @@ PetscErrorCode SbFramesAttach(SbRun run, SbOutput out)
   out->frames->last_step = -1;
   PetscCall(SbOutputOrder(run, out));
   PetscCall(allocate(run, out));
+  PetscCall(SbContactsCreate(run, out));
   PetscCall(SbOutputPath(out, "fields.h5", sizeof(path), path));
   if (out->restarted) PetscCall(resume(run, out, path, &resumed));
   if (!resumed) PetscCall(create(run, out, path));
@@ -448,6 +460,7 @@ PetscErrorCode SbFramesDestroy(SbOutput out)
   PetscFunctionBeginUser;
   if (!out->frames) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(SbFramesClose(out));
+  PetscCall(SbContactsDestroy(out));
   PetscCall(SbXdmfDestroy(&out->frames->xdmf));
   PetscCall(PetscFree(out->frames->owned));
   PetscCall(PetscFree(out->frames->slice));

@@ -27,6 +27,8 @@ static const SbOption rows[] = {
   {"output_precision", SB_OPTION_CHOICE, 1, "", "float", "float|double", "numbers in fields.h5"},
   {"output_discontinuous", SB_OPTION_BOOL, 1, "", "false", "",
    "each tet in fields.h5 has four points of its own: cr and dg as they are, else averaged around vertices"},
+  {"output_contacts", SB_OPTION_BOOL, 1, "", "false", "",
+   "contacts.xmf: the places where contact pushes in each frame, with normals, gaps and forces"},
   {"output_history", SB_OPTION_BOOL, 1, "", "true", "", "write history.csv"},
   {"output_history_every", SB_OPTION_INT, 1, "", "1", "[1, inf)", "steps between rows of history.csv"},
   {"checkpoint_every_time", SB_OPTION_REAL, 1, "s", "0", "[0, inf)",
@@ -174,6 +176,10 @@ static PetscErrorCode read_options(SbOutput out, PetscBool dynamic)
   PetscCall(SbOptionChoice(&scope, "output_precision", &precision));
   out->precise = precision ? PETSC_TRUE : PETSC_FALSE;
   PetscCall(SbOptionBool(&scope, "output_discontinuous", &out->discontinuous));
+  PetscCall(SbOptionBool(&scope, "output_contacts", &out->places));
+  PetscCheck(
+    !out->places || out->nfield, out->comm, PETSC_ERR_USER_INPUT,
+    "-output_contacts yes needs frames, but -output_fields is none: give -output_fields body at least");
   PetscCall(SbOptionBool(&scope, "output_history", &out->history));
   PetscCall(SbOptionInt(&scope, "output_history_every", &out->history_every));
   PetscCall(SbOptionReal(&scope, "checkpoint_every_time", &out->checkpoint_every));
@@ -214,13 +220,14 @@ static PetscErrorCode make_folder(SbOutput out, size_t nmessage, char message[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static const char *const ours[] = {"fields.h5", "fields.xmf", "history.csv", "scenario.opts", "run.json"};
+static const char *const ours[] = {"fields.h5",   "fields.xmf",    "contacts.xmf",
+                                   "history.csv", "scenario.opts", "run.json"};
 
 /* Removes what an earlier run left under our names, and says so. Rank 0. */
 static PetscErrorCode clear_folder(SbOutput out, PetscInt step0)
 {
-  static const char *const leftovers[] = {"fields.xmf.tmp", "history.csv.tmp", "scenario.opts.tmp",
-                                          "run.json.tmp", "checkpoint.tmp"};
+  static const char *const leftovers[] = {"fields.xmf.tmp",    "contacts.xmf.tmp", "history.csv.tmp",
+                                          "scenario.opts.tmp", "run.json.tmp",     "checkpoint.tmp"};
   char path[PETSC_MAX_PATH_LEN];
   PetscBool found = PETSC_FALSE;
 

@@ -109,6 +109,7 @@ typedef struct _p_SbFrames *SbFrames;     /* frames.c */
 typedef struct _p_SbHistory *SbHistory;   /* history.c */
 typedef struct _p_SbProgress *SbProgress; /* progress.c */
 typedef struct _p_SbPoints *SbPoints;     /* points.c */
+typedef struct _p_SbContacts *SbContacts; /* contacts.c */
 
 typedef struct _p_SbOutput *SbOutput;
 struct _p_SbOutput {
@@ -126,6 +127,7 @@ struct _p_SbOutput {
   PetscInt every_steps;
   PetscBool precise;       /* double instead of float */
   PetscBool discontinuous; /* each cell has four points of its own */
+  PetscBool places;        /* where contact pushes, in each frame */
   PetscBool history;
   PetscInt history_every;
   PetscReal checkpoint_every; /* s of simulated time; 0: off */
@@ -153,6 +155,7 @@ struct _p_SbOutput {
   SbPoints points; /* NULL when nothing needs values at vertices */
 
   SbFrames frames;
+  SbContacts contacts; /* NULL when there are none to write and none to keep */
   SbHistory hist;
   SbProgress line;
   char started[32]; /* date and time */
@@ -184,6 +187,21 @@ PetscErrorCode SbFramesCheck(SbRun run, SbOutput out);
 PetscErrorCode SbFramesAttach(SbRun run, SbOutput out);
 PetscErrorCode SbFramesClose(SbOutput out);
 PetscErrorCode SbFramesDestroy(SbOutput out);
+/* contacts.c; without -output_contacts they only keep, after a restart, what is in the index. */
+PetscErrorCode SbContactsCreate(SbRun run, SbOutput out);
+PetscErrorCode SbContactsDestroy(SbOutput out);
+/* The places after a step, on the ranks that write them; bytes: what they take in a frame. Collective. */
+PetscErrorCode SbContactsFind(SbRun run, SbOutput out, const SbStep *step, PetscInt64 *bytes);
+/* Those as a group of the frame. Collective. */
+PetscErrorCode SbContactsWrite(SbOutput out, SbH5 *h, hid_t frame);
+/* How many places a frame has, -1: it was written without; bytes of their numbers. Not collective. */
+PetscErrorCode SbContactsRead(hid_t frame, PetscInt *n, PetscInt *bytes);
+/* How many the last SbContactsFind() found on all ranks, -1 without the option. */
+PetscInt SbContactsCount(SbOutput out);
+/* Adds a frame of n places to the index, at the path of its group; rank 0. The next brings it to disk, or removes it. */
+PetscErrorCode SbContactsList(SbOutput out, PetscReal time, const char *frame, PetscInt n, PetscInt bytes);
+void SbContactsIndex(SbOutput out, size_t nmessage, char message[]);
+PetscErrorCode SbContactsRemoveIndex(SbOutput out);
 PetscErrorCode SbHistoryAttach(SbRun run, SbOutput out);
 PetscErrorCode SbHistoryDestroy(SbOutput out);
 PetscErrorCode SbProbesFind(SbRun run, SbOutput out);
@@ -196,15 +214,26 @@ PetscErrorCode SbProgressEnd(SbOutput out); /* ends a line that is being rewritt
 PetscErrorCode SbProgressDestroy(SbOutput out);
 PetscErrorCode SbRunJson(SbRun run, SbOutput out, const char *status, const char *reason); /* collective */
 
-/* xdmf.c: the index of fields.h5, on rank 0. */
+/* xdmf.c: an index of fields.h5, on rank 0. */
 typedef struct _p_SbXdmf *SbXdmf;
-PetscErrorCode SbXdmfCreate(const char *path, PetscInt npoint, PetscInt ncell, PetscBool with_rank,
-                            SbXdmf *x);
+PetscErrorCode SbXdmfCreate(const char *path, SbXdmf *x);
+/* The mesh of SbXdmfAdd(). */
+PetscErrorCode SbXdmfSetMesh(SbXdmf x, PetscInt npoint, PetscInt ncell, PetscBool with_rank);
 PetscErrorCode SbXdmfDestroy(SbXdmf *x);
 PetscErrorCode SbXdmfRemove(SbXdmf x); /* the file, if there is one */
 /* Adds a frame: its group in fields.h5 and its fields. */
 PetscErrorCode SbXdmfAdd(SbXdmf x, PetscReal time, const char *group, PetscInt n,
                          const SbField *const field[], const PetscInt bytes[]);
+/* Values at points: a dataset [n] or [n][3] of whole numbers, or of floating ones with so many bytes. */
+typedef struct {
+  const char *name;
+  int ncomp, bytes;
+  PetscBool whole;
+} SbXdmfValues;
+/* Adds a frame of n points: values[0] are their numbers, values[1] their places, the others attributes; `nowhere`: where to put
+   a point without force when n is 0, m. */
+PetscErrorCode SbXdmfAddPoints(SbXdmf x, PetscReal time, const char *group, PetscInt n,
+                               const PetscReal nowhere[3], PetscInt nvalues, const SbXdmfValues values[]);
 /* Replaces the file; `message` becomes the error, if any. */
 void SbXdmfWrite(SbXdmf x, size_t nmessage, char message[]);
 

@@ -1,9 +1,12 @@
 /*
-  fields.xmf: what ParaView and VTK open to find the frames of fields.h5.
+  fields.xmf, and contacts.xmf: what ParaView and VTK open to find the frames of fields.h5.
 
   Only the part of XDMF that vtkXdmfReader and vtkXdmf3Reader both read rightly: one temporal collection of uniform grids,
   every array named by its full path in the HDF5 file, no references, no hyperslabs. The text of all frames so far is kept,
   so that the file is whole after every frame: it is written beside its place and renamed.
+
+  Points are a mesh of one vertex per cell, said explicitly: without that vtkXdmf3Reader finds no cells. Neither reader takes a
+  grid without points (vtkXdmf3Reader ends with a signal); a frame without any has a single one, which belongs to nobody.
 */
 #include <stdarg.h>
 #include <unistd.h>
@@ -17,15 +20,20 @@ struct _p_SbXdmf {
   size_t size, capacity;
 };
 
-PetscErrorCode SbXdmfCreate(const char *path, PetscInt npoint, PetscInt ncell, PetscBool with_rank, SbXdmf *x)
+PetscErrorCode SbXdmfCreate(const char *path, SbXdmf *x)
 {
-  SbXdmf xdmf;
+  PetscFunctionBeginUser;
+  PetscCall(PetscNew(x));
+  PetscCall(PetscStrncpy((*x)->path, path, sizeof((*x)->path)));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbXdmfSetMesh(SbXdmf xdmf, PetscInt npoint, PetscInt ncell, PetscBool with_rank)
+{
   const char *numbers[2] = {"body", "rank"};
   size_t n;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscNew(&xdmf));
-  PetscCall(PetscStrncpy(xdmf->path, path, sizeof(xdmf->path)));
   xdmf->npoint = npoint;
   xdmf->ncell = ncell;
   n = (size_t)snprintf(
@@ -45,7 +53,6 @@ PetscErrorCode SbXdmfCreate(const char *path, PetscInt npoint, PetscInt ncell, P
                           "fields.h5:/mesh/%s</DataItem></Attribute>\n",
                           numbers[i], ncell, numbers[i]);
   }
-  *x = xdmf;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -91,12 +98,19 @@ static PetscErrorCode append(SbXdmf x, const char *format, ...)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+static PetscErrorCode begin_grid(SbXdmf x, const char *name, PetscReal time)
+{
+  PetscFunctionBeginUser;
+  PetscCall(
+    append(x, "<Grid Name=\"%s\" GridType=\"Uniform\">\n<Time Value=\"%.17g\"/>\n", name, (double)time));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode SbXdmfAdd(SbXdmf x, PetscReal time, const char *group, PetscInt n,
                          const SbField *const field[], const PetscInt bytes[])
 {
   PetscFunctionBeginUser;
-  PetscCall(
-    append(x, "<Grid Name=\"bodies\" GridType=\"Uniform\">\n<Time Value=\"%.17g\"/>\n", (double)time));
+  PetscCall(begin_grid(x, "bodies", time));
   PetscCall(append(x, "%s", x->mesh));
   for (PetscInt i = 0; i < n; i++) {
     const SbField *f = field[i];
@@ -111,6 +125,50 @@ PetscErrorCode SbXdmfAdd(SbXdmf x, PetscReal time, const char *group, PetscInt n
                      "\" Format=\"HDF\">fields.h5:%s/%s</DataItem></Attribute>\n",
                      f->name, type, f->cell ? "Cell" : "Node", f->cell ? x->ncell : x->npoint, components,
                      bytes[i], group, f->name));
+  }
+  PetscCall(append(x, "</Grid>\n"));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Values at points below `group`, or without a group those of a single point, as they are. */
+static PetscErrorCode point_item(SbXdmf x, const char *group, const SbXdmfValues *v, PetscInt n,
+                                 const PetscReal single[])
+{
+  const char *type = v->whole ? "Int" : "Float", *format = group ? "HDF" : "XML";
+  char components[16] = "";
+
+  PetscFunctionBeginUser;
+  if (v->ncomp > 1) (void)snprintf(components, sizeof(components), " %d", v->ncomp);
+  PetscCall(append(
+    x, "<DataItem Dimensions=\"%" PetscInt_FMT "%s\" NumberType=\"%s\" Precision=\"%d\" Format=\"%s\">",
+    group ? n : 1, components, type, v->whole ? 4 : v->bytes, format));
+  if (group) PetscCall(append(x, "fields.h5:%s/%s", group, v->name));
+  for (int k = 0; k < v->ncomp && !group; k++)
+    PetscCall(append(x, "%s%.17g", k ? " " : "", (double)single[k]));
+  PetscCall(append(x, "</DataItem>"));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbXdmfAddPoints(SbXdmf x, PetscReal time, const char *group, PetscInt n,
+                               const PetscReal nowhere[3], PetscInt nvalues, const SbXdmfValues values[])
+{
+  static const PetscReal none[3] = {0., 0., 0.}, nobody[1] = {-1.};
+  const char *where = n ? group : NULL;
+
+  PetscFunctionBeginUser;
+  PetscCall(begin_grid(x, "contacts", time));
+  PetscCall(append(
+    x, "<Topology TopologyType=\"Polyvertex\" NumberOfElements=\"%" PetscInt_FMT "\" NodesPerElement=\"1\">",
+    PetscMax(n, 1)));
+  PetscCall(point_item(x, where, &values[0], n, none));
+  PetscCall(append(x, "</Topology>\n<Geometry GeometryType=\"XYZ\">"));
+  PetscCall(point_item(x, where, &values[1], n, nowhere));
+  PetscCall(append(x, "</Geometry>\n"));
+  for (PetscInt k = 2; k < nvalues; k++) {
+    PetscCall(append(x, "<Attribute Name=\"%s\" AttributeType=\"%s\" Center=\"Node\">", values[k].name,
+                     values[k].ncomp > 1 ? "Vector" : "Scalar"));
+    PetscCall(point_item(x, where, &values[k], n, values[k].whole ? nobody : none));
+    PetscCall(append(x, "</Attribute>\n"));
   }
   PetscCall(append(x, "</Grid>\n"));
   PetscFunctionReturn(PETSC_SUCCESS);

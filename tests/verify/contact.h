@@ -23,19 +23,21 @@ static inline PetscErrorCode contact_column_of(SbRun run, PetscReal t, Vec R, co
   SbModel m = run->model;
   SbEffect e = contact_effect(m, effect);
   SbStage stage = {.t = t, .shift_k = 1};
-  PetscReal values[PETSC_STATIC_ARRAY_LENGTH(e->column)] = {0};
+  PetscReal *values;
   PetscInt at = -1;
   const PetscReal *r;
 
   PetscFunctionBeginUser;
   for (PetscInt k = 0; k < e->ncolumn; k++) at = strcmp(e->column[k], column) ? at : k;
   PetscCheck(at >= 0 && R, PETSC_COMM_SELF, PETSC_ERR_PLIB, "No column %s_%s", effect, column);
+  PetscCall(PetscCalloc1(e->ncolumn, &values));
   PetscCall(SbSpaceGetLocalRead(m->space, R, &r));
   PetscCall(SbSpaceGetLocalRead(m->space, run->U, &stage.u));
   PetscCall((*e->ops.history)(e, m->space, &stage, r, values));
   PetscCall(SbSpaceRestoreLocalRead(m->space, run->U, &stage.u));
   PetscCall(SbSpaceRestoreLocalRead(m->space, R, &r));
   *value = values[at];
+  PetscCall(PetscFree(values));
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, value, 1, MPIU_REAL, MPI_SUM, m->comm));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

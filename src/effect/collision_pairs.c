@@ -1,0 +1,181 @@
+/*
+  collision_pairs.c - what each pair of bodies does to each other, for the history, and where, for the frames.
+
+  Forces are read from the rows of the last solve, in their directions and with their friction: summed over the pairs of a body they
+  are what contact moves it with, to rounding. A row that others say already has no force; theirs has it.
+*/
+#include "collision.h"
+
+#define PAIRS 200 /* that the history may have columns for */
+
+static const char *const apart_names[] = {"force_x", "force_y", "force_z", "contacts"};
+static const char *const self_names[] = {"normal_force", "contacts"};
+#define APART 4 /* columns of two bodies */
+#define SELF 2  /* and of one with itself, whose net force is zero */
+
+/* The body whose point or edge the pair begins with. */
+static PetscInt first_body(const Collision *c, const Hit *hit)
+{
+  const SbDetectScene *s = &c->surface->scene;
+
+  return SbCollisionOfEdges(c, hit) ? s->edges->part[hit->point - s->npoint] : s->point_part[hit->point];
+}
+
+/* Force on that body, N, and the normal that the last solve had. False when there is none. */
+static PetscBool force_of(SbSpace space, const Hit *hit, PetscReal normal[3], PetscReal force[3])
+{
+  PetscReal across[3];
+
+  force[0] = force[1] = force[2] = 0;
+  if (!hit->on || hit->row < 0) return PETSC_FALSE;
+  SbSpaceCouplePush(space, hit->row, hit->held, normal, force);
+  for (int q = 0; q < 2; q++) {
+    if (hit->slide[q] >= 0) SbSpaceCouplePush(space, hit->slide[q], hit->held, across, force);
+  }
+  return (PetscBool)(SbDot3(force, force) > 0);
+}
+
+/* ------------------------------------------------------------------ history */
+
+/* Bodies with a surface here; how many pairs they make. */
+static PetscErrorCode find_pairs(SbEffect e, SbMesh mesh, PetscInt *npair)
+{
+  Collision *c = (Collision *)e->data;
+  SbPairs *p = &c->pairs;
+  PetscInt64 n;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscMalloc1(mesh->nbody, &p->slot));
+  for (PetscInt b = 0; b < mesh->nbody; b++) p->slot[b] = c->edge[b] > 0 ? p->nskin++ : -1;
+  n = (PetscInt64)p->nskin * (p->nskin - 1) / 2 + (c->self ? p->nskin : 0);
+  PetscCheck(n <= PAIRS, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
+             "-effect_%s_pairs yes: the %" PetscInt_FMT " bodies of -effect_%s_on make %" PetscInt64_FMT
+             " pairs, more than the %d that history.csv may have columns for: name fewer sets, or use "
+             "-output_contacts yes",
+             e->name, p->nskin, e->name, n, PAIRS);
+  *npair = (PetscInt)n;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The columns of two bodies, or of one with itself, behind the n that there are. */
+static PetscErrorCode name_columns(SbEffect e, const char a[], const char b[], PetscInt *n)
+{
+  SbPairs *p = &((Collision *)e->data)->pairs;
+  const PetscBool apart = (PetscBool)(a != b);
+
+  PetscFunctionBeginUser;
+  for (int k = 0; k < (apart ? APART : SELF); k++, (*n)++) {
+    char *name = p->text[*n - p->fixed];
+
+    PetscCall(
+      PetscSNPrintf(name, sizeof(p->text[0]), "%s_%s_%s", a, b, (apart ? apart_names : self_names)[k]));
+    for (PetscInt i = 0; i < *n; i++)
+      PetscCheck(strcmp(name, p->column[i]), PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
+                 "-effect_%s_pairs yes: history.csv would have two columns %s_%s: give a body another name",
+                 e->name, e->name, name);
+    p->column[*n] = name;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbPairsSetUp(SbEffect e, SbMesh mesh)
+{
+  Collision *c = (Collision *)e->data;
+  SbPairs *p = &c->pairs;
+  PetscInt npair, n;
+
+  PetscFunctionBeginUser;
+  if (!p->wanted) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(find_pairs(e, mesh, &npair));
+  n = p->fixed = e->ncolumn;
+  PetscCall(PetscMalloc1(n + APART * npair, &p->column));
+  PetscCall(PetscMalloc1(APART * npair, &p->text));
+  PetscCall(PetscMalloc1(p->nskin * p->nskin, &p->place));
+  PetscCall(PetscArraycpy(p->column, e->column, n));
+  for (PetscInt a = 0; a < mesh->nbody; a++) {
+    for (PetscInt b = a; b < mesh->nbody; b++) {
+      if (p->slot[a] < 0 || p->slot[b] < 0 || (a == b && !c->self)) continue;
+      p->place[p->nskin * p->slot[a] + p->slot[b]] = n;
+      PetscCall(name_columns(e, mesh->body[a].name, mesh->body[b].name, &n));
+    }
+  }
+  e->column = p->column;
+  e->ncolumn = n;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+void SbPairsHistory(const Collision *c, SbSpace space, PetscReal values[])
+{
+  const SbPairs *p = &c->pairs;
+
+  if (!p->wanted) return;
+  for (PetscInt i = 0; i < c->nhit; i++) {
+    const Hit *hit = &c->hit[i];
+    const PetscInt mine = first_body(c, hit), low = PetscMin(mine, hit->body),
+                   high = PetscMax(mine, hit->body);
+    PetscReal *at = values + p->place[p->nskin * p->slot[low] + p->slot[high]], normal[3], force[3];
+    const PetscBool counts = (PetscBool)(hit->on && SbCollisionForce(c, hit) > 0);
+
+    if (low == high) {
+      at[0] += counts ? SbCollisionForce(c, hit) : 0;
+      at[1] += counts;
+      continue;
+    }
+    at[3] += counts;
+    if (!force_of(space, hit, normal, force)) continue;
+    for (int k = 0; k < 3; k++) at[k] += mine == high ? force[k] : -force[k];
+  }
+}
+
+PetscErrorCode SbPairsFree(SbPairs *p)
+{
+  PetscFunctionBeginUser;
+  PetscCall(PetscFree(p->slot));
+  PetscCall(PetscFree(p->place));
+  PetscCall(PetscFree(p->column));
+  PetscCall(PetscFree(p->text));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ places */
+
+/* Where a pair is on its first body, m; numbers that name it: kind, that of the point or edge, that of the other body or edge. */
+static void place_of(const Collision *c, const Hit *hit, SbPlace *place)
+{
+  const SbDetectScene *s = &c->surface->scene;
+  const PetscBool edges = SbCollisionOfEdges(c, hit);
+  const PetscInt own = edges ? hit->point - s->npoint : hit->point;
+
+  place->id[0] = edges;
+  place->id[1] = edges ? s->edges->id[own] : s->point_id[own];
+  place->id[2] = hit->part;
+  for (int k = 0; k < 3; k++) {
+    if (!edges)
+      place->x[k] = s->p[3 * own + k];
+    else
+      place->x[k] = (1 - hit->at) * s->x[3 * s->edges->corner[4 * own] + k] +
+                    hit->at * s->x[3 * s->edges->corner[4 * own + 1] + k];
+  }
+}
+
+PetscErrorCode SbEffectPlaces_Collision(SbEffect e, SbSpace space, const SbStage *stage,
+                                        const PetscReal residual[], SbPlaces *list)
+{
+  const Collision *c = (const Collision *)e->data;
+
+  PetscFunctionBeginUser;
+  (void)stage;
+  (void)residual;
+  for (PetscInt i = 0; i < c->nhit; i++) {
+    const Hit *hit = &c->hit[i];
+    SbPlace place;
+
+    if (!force_of(space, hit, place.normal, place.force)) continue;
+    place_of(c, hit, &place);
+    place.body[0] = first_body(c, hit);
+    place.body[1] = hit->body;
+    place.gap = hit->gap;
+    PetscCall(SbPlacesAdd(list, &place));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

@@ -1,0 +1,298 @@
+/*
+  The places where contact pushes bodies, as points with normals, gaps and forces: -output_contacts.
+
+  Each frame of fields.h5 then has a group `contacts` with one dataset per quantity and one row per place, in an order that no partition
+  changes. Their number differs from frame to frame, so they have an index of their own, contacts.xmf.
+
+  A place is sent to the rank that has its share of the numbers of points and edges, and sorted there: by the number that it begins
+  with, then by effect, kind, and the number of the other side.
+*/
+#include "output_impl.h"
+
+/* A place as it travels: what it is sorted by, then the quantities. Whole numbers are exact in a double. */
+enum {
+  FIRST,
+  EFFECT,
+  KIND,
+  SECOND,
+  BODY,
+  OTHER,
+  X,
+  NORMAL = X + 3,
+  GAP = NORMAL + 3,
+  FORCE,
+  PUSH = FORCE + 3,
+  DRAG,
+  RECORD = DRAG + 3
+};
+#define ROW (-1) /* the number of the row itself: VTK wants to be told that each point is a cell */
+
+static const struct {
+  const char *name, *unit;
+  int ncomp, from;
+  PetscBool whole;
+} table[] = {
+  // SbXdmfAddPoints() wants numbers and places first
+  {"point", "1", 1, ROW, PETSC_TRUE},          {"x", "m", 3, X, PETSC_FALSE},
+  {"effect", "1", 1, EFFECT, PETSC_TRUE},      {"body", "1", 1, BODY, PETSC_TRUE},
+  {"other", "1", 1, OTHER, PETSC_TRUE},        {"normal", "1", 3, NORMAL, PETSC_FALSE},
+  {"gap", "m", 1, GAP, PETSC_FALSE},           {"force", "N", 3, FORCE, PETSC_FALSE},
+  {"normal_force", "N", 1, PUSH, PETSC_FALSE}, {"friction_force", "N", 3, DRAG, PETSC_FALSE},
+};
+#define NTABLE ((int)PETSC_STATIC_ARRAY_LENGTH(table))
+
+struct _p_SbContacts {
+  SbPlaces list;               /* of this rank */
+  PetscInt nsend, nrecord;     /* rooms */
+  PetscReal *send, *record;    /* [nsend][RECORD] by rank; [nrecord][RECORD] of this rank's share, sorted */
+  PetscMPIInt *count, *offset; /* [2 size] places to each rank, then from each */
+  SbOrder share;               /* which rows are this rank's; it has no star forest */
+  void *column;                /* [nrecord][3] of one quantity, as in the file */
+  MPI_Datatype type;           /* of a record */
+  SbXdmf xdmf;                 /* rank 0 only */
+  PetscBool listed;            /* it has a frame */
+  PetscReal nowhere[3];        /* a vertex of the mesh, m */
+};
+
+/* ------------------------------------------------------------------ to the ranks that write them */
+
+static void fill(const SbPlace *p, PetscReal *r)
+{
+  const PetscReal push = SbDot3(p->force, p->normal);
+
+  r[FIRST] = (PetscReal)p->id[1];
+  r[EFFECT] = (PetscReal)p->effect;
+  r[KIND] = (PetscReal)p->id[0];
+  r[SECOND] = (PetscReal)p->id[2];
+  r[BODY] = (PetscReal)p->body[0];
+  r[OTHER] = (PetscReal)p->body[1];
+  r[GAP] = p->gap;
+  r[PUSH] = push;
+  for (int k = 0; k < 3; k++) {
+    r[X + k] = p->x[k];
+    r[NORMAL + k] = p->normal[k];
+    r[FORCE + k] = p->force[k];
+    r[DRAG + k] = p->force[k] - push * p->normal[k];
+  }
+}
+
+static int by_keys(const void *a, const void *b)
+{
+  const PetscReal *p = (const PetscReal *)a, *q = (const PetscReal *)b;
+
+  for (int k = FIRST; k <= SECOND; k++) {
+    if (p[k] != q[k]) return p[k] < q[k] ? -1 : 1;
+  }
+  return 0;
+}
+
+static PetscErrorCode make_room(PetscInt n, PetscInt *size, PetscReal **records)
+{
+  PetscFunctionBeginUser;
+  if (n <= *size) PetscFunctionReturn(PETSC_SUCCESS);
+  *size = PetscMax(64, 2 * n);
+  PetscCall(PetscFree(*records));
+  PetscCall(PetscMalloc1(RECORD * (size_t)*size, records));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Puts the places of this rank into c->send, those for lower ranks first; c->count and c->offset of what is sent. */
+static PetscErrorCode sort_by_rank(SbContacts c, PetscMPIInt size)
+{
+  PetscInt bound = 0;
+
+  PetscFunctionBeginUser;
+  PetscCall(make_room(c->list.n, &c->nsend, &c->send));
+  for (PetscInt i = 0; i < c->list.n; i++) bound = PetscMax(bound, c->list.place[i].id[1]);
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &bound, 1, MPIU_INT, MPI_MAX, c->share.comm));
+  PetscCall(PetscArrayzero(c->count, size));
+  for (int pass = 0; pass < 2; pass++) {
+    for (PetscInt i = 0; i < c->list.n; i++) {
+      const SbPlace *p = &c->list.place[i];
+      const PetscInt to = (PetscInt)((PetscInt64)p->id[1] * size / ((PetscInt64)bound + 1));
+
+      if (!pass)
+        c->count[to]++;
+      else
+        fill(p, c->send + RECORD * (size_t)c->offset[to]++);
+    }
+    // Filling has moved every offset to the next one.
+    for (PetscMPIInt r = 0, at = 0; r < size; at += c->count[r++]) c->offset[r] = at;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbContactsFind(SbRun run, SbOutput out, const SbStep *step, PetscInt64 *bytes)
+{
+  SbContacts c = out->contacts;
+  PetscInt n = 0;
+
+  PetscFunctionBeginUser;
+  *bytes = 0;
+  if (!out->places) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCheck(step->R, PETSC_COMM_SELF, PETSC_ERR_PLIB,
+             "The residual was asked for but not given to the monitors");
+  c->list.n = 0;
+  PetscCall(SbModelContactPlaces(run->model, step->t, step->U, step->R, &c->list));
+  PetscCall(sort_by_rank(c, out->size));
+  PetscCallMPI(MPI_Alltoall(c->count, 1, MPI_INT, c->count + out->size, 1, MPI_INT, out->comm));
+  for (PetscMPIInt r = out->size; r < 2 * out->size; n += c->count[r++]) c->offset[r] = (PetscMPIInt)n;
+  if (n > c->nrecord) {
+    PetscCall(make_room(n, &c->nrecord, &c->record));
+    PetscCall(PetscFree(c->column));
+    PetscCall(PetscMalloc(3 * sizeof(double) * (size_t)c->nrecord, &c->column));
+  }
+  PetscCallMPI(MPI_Alltoallv(c->send, c->count, c->offset, c->type, c->record, c->count + out->size,
+                             c->offset + out->size, c->type, out->comm));
+  if (n) qsort(c->record, (size_t)n, RECORD * sizeof(PetscReal), by_keys);
+  c->share.n = n;
+  PetscCallMPI(MPI_Scan(&n, &c->share.start, 1, MPIU_INT, MPI_SUM, out->comm));
+  c->share.start -= n;
+  PetscCallMPI(MPI_Allreduce(&n, &c->share.N, 1, MPIU_INT, MPI_SUM, out->comm));
+  *bytes = (PetscInt64)c->share.N * RECORD * (PetscInt64)sizeof(double) + NTABLE * 8192;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ files */
+
+/* One quantity of this rank's rows in the type of the file; returns the type in memory, and that of the file. */
+static hid_t fill_column(SbContacts c, int k, PetscBool precise, hid_t *filetype)
+{
+  for (PetscInt i = 0; i < c->share.n * table[k].ncomp; i++) {
+    const PetscInt row = i / table[k].ncomp;
+    const PetscReal *r = c->record + RECORD * (size_t)row + i % table[k].ncomp;
+
+    if (table[k].from == ROW)
+      ((int32_t *)c->column)[i] = (int32_t)(c->share.start + row);
+    else if (table[k].whole)
+      ((int32_t *)c->column)[i] = (int32_t)r[table[k].from];
+    else if (precise)
+      ((double *)c->column)[i] = r[table[k].from];
+    else
+      ((float *)c->column)[i] = (float)r[table[k].from];
+  }
+  *filetype = table[k].whole ? H5T_STD_I32LE : precise ? H5T_IEEE_F64LE : H5T_IEEE_F32LE;
+  return table[k].whole ? H5T_NATIVE_INT32 : precise ? H5T_NATIVE_DOUBLE : H5T_NATIVE_FLOAT;
+}
+
+PetscErrorCode SbContactsWrite(SbOutput out, SbH5 *h, hid_t frame)
+{
+  SbContacts c = out->contacts;
+  hid_t group;
+
+  PetscFunctionBeginUser;
+  if (!out->places) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(SbH5GroupCreate(h, (unsigned)NTABLE, 14, &group));
+  PetscCall(SbH5PutInt(h, group, "count", c->share.N));
+  for (int k = 0; k < NTABLE && c->share.N; k++) {
+    hid_t filetype;
+    const hid_t memtype = fill_column(c, k, out->precise, &filetype);
+
+    PetscCall(SbH5WriteSlice(h, group, table[k].name, table[k].unit, &c->share, table[k].ncomp, filetype,
+                             memtype, c->column));
+  }
+  PetscCall(SbH5GroupLink(h, group, frame, "contacts"));
+  (void)H5Gclose(group);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbContactsRead(hid_t frame, PetscInt *n, PetscInt *bytes)
+{
+  const hid_t group =
+    H5Lexists(frame, "contacts", H5P_DEFAULT) > 0 ? H5Gopen2(frame, "contacts", H5P_DEFAULT) : -1;
+  int64_t count = 0;
+  PetscBool ok = (PetscBool)(group >= 0);
+
+  PetscFunctionBeginUser;
+  if (ok) PetscCall(SbH5GetInt(group, "count", &count, &ok));
+  *n = ok ? (PetscInt)count : -1;
+  *bytes = 8;
+  if (ok && count) {
+    const hid_t dataset = H5Dopen2(group, "gap", H5P_DEFAULT), type = H5Dget_type(dataset);
+
+    *bytes = (PetscInt)H5Tget_size(type);
+    (void)H5Tclose(type);
+    (void)H5Dclose(dataset);
+  }
+  if (group >= 0) (void)H5Gclose(group);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscInt SbContactsCount(SbOutput out)
+{
+  return out->places ? out->contacts->share.N : -1;
+}
+
+PetscErrorCode SbContactsList(SbOutput out, PetscReal time, const char *frame, PetscInt n, PetscInt bytes)
+{
+  SbContacts c = out->contacts;
+  SbXdmfValues values[NTABLE];
+  char group[64];
+
+  PetscFunctionBeginUser;
+  if (!c || !c->xdmf || n < 0) PetscFunctionReturn(PETSC_SUCCESS);
+  for (int k = 0; k < NTABLE; k++)
+    values[k] = (SbXdmfValues){
+      .name = table[k].name, .ncomp = table[k].ncomp, .bytes = (int)bytes, .whole = table[k].whole};
+  (void)snprintf(group, sizeof(group), "%s/contacts", frame);
+  PetscCall(SbXdmfAddPoints(c->xdmf, time, group, n, c->nowhere, NTABLE, values));
+  c->listed = PETSC_TRUE;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+void SbContactsIndex(SbOutput out, size_t nmessage, char message[])
+{
+  const SbContacts c = out->contacts;
+
+  if (c && c->xdmf && c->listed) SbXdmfWrite(c->xdmf, nmessage, message);
+}
+
+PetscErrorCode SbContactsRemoveIndex(SbOutput out)
+{
+  PetscFunctionBeginUser;
+  if (out->contacts && out->contacts->xdmf) PetscCall(SbXdmfRemove(out->contacts->xdmf));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ life */
+
+PetscErrorCode SbContactsCreate(SbRun run, SbOutput out)
+{
+  const SbMesh mesh = run->model->mesh;
+  SbContacts c;
+  char path[PETSC_MAX_PATH_LEN];
+
+  PetscFunctionBeginUser;
+  // After a restart frames that are kept may have places, which stay in the index.
+  if (!out->places && !out->restarted) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscNew(&c));
+  out->contacts = c;
+  if (out->places) run->want_residual = PETSC_TRUE;
+  c->share.comm = out->comm;
+  c->share.each = 1;
+  PetscCall(PetscMalloc2(2 * (size_t)out->size, &c->count, 2 * (size_t)out->size, &c->offset));
+  PetscCallMPI(MPI_Type_contiguous(RECORD, MPIU_REAL, &c->type));
+  PetscCallMPI(MPI_Type_commit(&c->type));
+  if (out->rank) PetscFunctionReturn(PETSC_SUCCESS);
+  for (int k = 0; k < 3 && mesh->nvert; k++) c->nowhere[k] = mesh->x[k];
+  PetscCall(SbOutputPath(out, "contacts.xmf", sizeof(path), path));
+  PetscCall(SbXdmfCreate(path, &c->xdmf));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbContactsDestroy(SbOutput out)
+{
+  SbContacts c = out->contacts;
+
+  PetscFunctionBeginUser;
+  if (!c) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(SbXdmfDestroy(&c->xdmf));
+  PetscCallMPI(MPI_Type_free(&c->type));
+  PetscCall(PetscFree2(c->count, c->offset));
+  PetscCall(PetscFree(c->list.place));
+  PetscCall(PetscFree(c->send));
+  PetscCall(PetscFree(c->record));
+  PetscCall(PetscFree(c->column));
+  PetscCall(PetscFree(out->contacts));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
