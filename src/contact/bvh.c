@@ -6,9 +6,14 @@
   reach. When the volumes of inner nodes have grown by more than the factor `growth` against those of single facets, compared with the
   last build, the trees are made anew.
 
-  The search walks through both trees at once, from the pair of roots: each child of the point's node is tested against all children of
+  The search walks through both trees at once, from the pair of roots: all children of the point's node are tested against all children of
   the facet's node in one sweep (volume.c), and the pairs that meet are followed. What meets at the leaves are the candidates, in the
   order of the walk; a counting sort brings them to their points.
+
+  What a large tree costs beyond a small one is waiting for memory, and branches that cannot be foreseen. So a node is one piece of
+  memory, whole cache lines of it, which is fetched when it is put on the stack; nodes lie in the order of the walk; facets and points, which
+  do not, are fetched some nodes ahead. Which pairs meet is one number of 16 or 64 bits: those of nodes, of items and of both are told
+  apart by masks.
 
   With self-contact there are two walks. The first one follows only what may face each other (cone.c), and marks the points that face some
   facet: the others have no contact. The second one, over the marked points, leaves out nothing, since which of the facets near a
@@ -22,17 +27,25 @@
 
 typedef struct {
   PetscInt a, f;   /* node of the points, node of the facets */
-  unsigned am, fm; /* which children of each; all bits for all */
+  SbMeets wanted;  /* which of their children */
   PetscBool apart; /* they are of two parts */
 } Visit;
 
+/* All that a visit needs of a node, in whole cache lines: after the children come the bounds. */
+typedef struct {
+  SbMeets inner;    /* pairs with a child that is a node */
+  SbMeets live;     /* pairs with a child, of points: with one that is walked to */
+  PetscInt child[]; /* [width] as in SbTree; bounds [rows][lanes] of facets, [lanes][rows] of points, m */
+} Node;
+
 typedef struct {
   SbTree tree;
-  SbBound *block;   /* [nnode][rows][lanes] of facets, [nnode][lanes][rows] of points, m */
-  PetscInt *part;   /* [nnode][width] part of all that is below, NO_PART when there are several */
-  PetscInt *common; /* [nnode] the same of the node */
-  PetscReal inner;  /* sum of the sizes of inner nodes */
-  PetscReal leaves; /* and of single items */
+  size_t stride;        /* bytes from node to node */
+  char *memory, *node;  /* [nnode] of Node, allocated and aligned */
+  PetscInt *part;       /* [nnode][width] part of all that is below, NO_PART when there are several */
+  PetscInt *common;     /* [nnode] the same of the node */
+  PetscReal inner_size; /* sum of the sizes of inner nodes */
+  PetscReal item_size;  /* and of single items */
 } Fitted;
 
 typedef struct {
@@ -46,7 +59,6 @@ typedef struct {
   PetscInt nvertex;
   PetscBool cull;  /* the trees have cones, for self-contact */
   PetscBool first; /* in this walk */
-  unsigned *live;  /* [nnode of points] children that are walked to */
   PetscReal built; /* relative size of the volumes at the last build */
   PetscBool stale; /* other settings */
   Visit *stack;
@@ -56,7 +68,33 @@ typedef struct {
 } Bvh;
 
 #define NO_PART PETSC_MIN_INT
+#define AHEAD 8 /* nodes */
+#define LINE 64 /* bytes, of the cache; a guess does no harm */
 #define ROOM 80 /* the most that one visit can add: 8 x 8 pairs of children, and twice 8 with what is left */
+
+/* ------------------------------------------------------------------ nodes */
+
+static inline Node *node_of(const Fitted *t, PetscInt g)
+{
+  return (Node *)(t->node + t->stride * (size_t)g);
+}
+
+static inline SbBound *bounds_of(const SbVolume *v, Node *node)
+{
+  return (SbBound *)(node->child + v->width);
+}
+
+/* Pairs of child 0 of a node of points with all children of a node of facets; with a shift of `lanes` those of the next child. */
+static inline SbMeets row_of(const SbVolume *v)
+{
+  return v->lanes == 4 ? 0xF : 0xFF;
+}
+
+/* Pairs of all children of a node of points with child 0 of a node of facets; with a shift of 1 those with the next child. */
+static inline SbMeets column_of(const SbVolume *v)
+{
+  return v->lanes == 4 ? 0x1111 : 0x0101010101010101;
+}
 
 /* ------------------------------------------------------------------ fitting */
 
@@ -121,34 +159,42 @@ static void fit_item(const SbDetector d, const SbDetectScene *s, const Bvh *b, P
   }
 }
 
+/* The boxes of a node's items will be needed soon: in the order of the tree they lie anywhere. */
+SB_INLINE void prefetch_items(const Node *node, PetscInt width, const PetscReal box[])
+{
+  for (PetscInt l = 0; l < width; l++)
+    __builtin_prefetch(box + 6 * PetscMax(0, SB_TREE_ITEM(node->child[l])));
+}
+
 /* All nodes of one of the two trees, children before parents. */
 static void fit(const SbDetector d, const SbDetectScene *s, const Bvh *b, PetscBool points, Fitted *t)
 {
   const SbVolume *v = &b->volume;
   const PetscInt w = v->width, row = points ? 1 : v->lanes, lane = points ? v->rows : 1;
-  const size_t stride = (size_t)v->lanes * (size_t)v->rows;
   SbBound column[SB_VOLUME_ROWS];
 
-  t->inner = t->leaves = 0;
+  t->inner_size = t->item_size = 0;
   for (PetscInt g = t->tree.nnode - 1; g >= 0; g--) {
+    Node *node = node_of(t, g);
     PetscInt *part = t->part + g * w;
 
+    if (g >= AHEAD) prefetch_items(node_of(t, g - AHEAD), w, points ? d->point_box : d->facet_box);
     for (PetscInt l = 0; l < t->tree.nchild[g]; l++) {
-      const PetscInt child = t->tree.child[g * w + l];
-      SbBound *block = t->block + stride * g + l * lane;
+      const PetscInt child = node->child[l];
+      SbBound *bounds = bounds_of(v, node) + l * lane;
 
       if (child >= 0) {
-        const SbBound *below = t->block + stride * child;
+        const SbBound *below = bounds_of(v, node_of(t, child));
 
         part[l] = t->common[child];
         SbVolumeMerge(v, below, row, lane, t->tree.nchild[child], column);
         if (b->cull) SbConeMerge(below + v->cone * row, row, lane, t->tree.nchild[child], column + v->cone);
-        t->inner += SbVolumeSize(v, column);
+        t->inner_size += SbVolumeSize(v, column);
       } else {
         fit_item(d, s, b, points, SB_TREE_ITEM(child), column, part + l);
-        t->leaves += SbVolumeSize(v, column);
+        t->item_size += SbVolumeSize(v, column);
       }
-      for (int r = 0; r < v->rows; r++) block[r * row] = column[r];
+      for (int r = 0; r < v->rows; r++) bounds[r * row] = column[r];
     }
     t->common[g] = common_part(t->tree.nchild[g], part);
   }
@@ -160,36 +206,57 @@ static PetscErrorCode fitted_destroy(Fitted *t)
 {
   PetscFunctionBeginUser;
   PetscCall(SbTreeDestroy(&t->tree));
-  PetscCall(PetscFree3(t->block, t->part, t->common));
+  PetscCall(PetscFree3(t->memory, t->part, t->common));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* What is allocated stays for all calls; lanes without a child never meet anything. */
-static PetscErrorCode fitted_create(const SbBinary *binary, const SbVolume *v, Fitted *t)
+/* Children of node g and what they are; bounds that meet nothing, which the lanes without a child keep. */
+static void fill_node(const SbVolume *v, PetscBool points, PetscInt g, const SbBound none[], Fitted *t)
 {
+  const PetscInt *child = t->tree.child + g * v->width, n = v->lanes * v->rows;
+  Node *node = node_of(t, g);
+  SbBound *bounds = bounds_of(v, node);
+
+  node->inner = node->live = 0;
+  for (PetscInt l = 0; l < v->width; l++) {
+    const SbMeets with = points ? row_of(v) << v->lanes * l : column_of(v) << l;
+
+    node->child[l] = child[l];
+    if (child[l] >= 0) node->inner |= with;
+    if (child[l] != SB_TREE_NONE) node->live |= with;
+  }
+  for (PetscInt i = 0; i < n; i++) bounds[i] = none[points ? i % v->rows : i / v->lanes];
+}
+
+/* What is allocated stays for all calls. */
+static PetscErrorCode fitted_create(const SbBinary *binary, const SbVolume *v, PetscBool points, Fitted *t)
+{
+  const size_t width = (size_t)v->width, nbound = (size_t)v->lanes * (size_t)v->rows;
   SbBound none[SB_VOLUME_ROWS];
 
   PetscFunctionBeginUser;
   PetscCall(fitted_destroy(t));
   PetscCall(SbTreeCreate(binary, v->width, &t->tree));
-  const size_t nnode = (size_t)t->tree.nnode, rows = (size_t)v->rows, lanes = (size_t)v->lanes;
+  const size_t nnode = (size_t)t->tree.nnode;
 
+  t->stride = sizeof(Node) + width * sizeof(PetscInt) + nbound * sizeof(SbBound);
+  t->stride = (t->stride + LINE - 1) / LINE * LINE;
   PetscCall(
-    PetscMalloc3(nnode * lanes * rows, &t->block, nnode * (size_t)v->width, &t->part, nnode, &t->common));
+    PetscMalloc3(nnode * t->stride + LINE - 1, &t->memory, nnode * width, &t->part, nnode, &t->common));
+  t->node = t->memory + (LINE - (uintptr_t)t->memory % LINE) % LINE;
   SbVolumeNone(v, none);
-  for (size_t r = 0; r < nnode * rows; r++) {
-    for (size_t l = 0; l < lanes; l++) t->block[r * lanes + l] = none[r % rows];
-  }
+  for (PetscInt g = 0; g < t->tree.nnode; g++) fill_node(v, points, g, none, t);
+  PetscCall(PetscFree(t->tree.child)); /* the nodes have them */
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 static PetscErrorCode cones_create(const SbDetector d, const SbDetectScene *s, const PetscBool open[], Bvh *b)
 {
   PetscFunctionBeginUser;
-  PetscCall(PetscFree4(b->open, b->vertex_cone, b->normal, b->live));
+  PetscCall(PetscFree3(b->open, b->vertex_cone, b->normal));
   b->nvertex = d->rings.nvertex;
-  PetscCall(PetscMalloc4(b->nvertex, &b->open, SB_VOLUME_CONE * b->nvertex, &b->vertex_cone, 3 * s->nfacet,
-                         &b->normal, b->points.tree.nnode, &b->live));
+  PetscCall(PetscMalloc3(b->nvertex, &b->open, SB_VOLUME_CONE * b->nvertex, &b->vertex_cone, 3 * s->nfacet,
+                         &b->normal));
   PetscCall(PetscArraycpy(b->open, open, b->nvertex));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -208,8 +275,8 @@ static PetscErrorCode build(SbDetector d, const SbDetectScene *s, Bvh *b)
   PetscCall(SbFacetLinksCreate(s, &d->rings, &links));
   PetscCall(SbBinaryCreate(&facets, linked ? links.start : NULL, links.list, &over_facets));
   PetscCall(SbBinaryHang(&over_facets, links.seat, &points, &over_points));
-  PetscCall(fitted_create(&over_facets, &b->volume, &b->facets));
-  PetscCall(fitted_create(&over_points, &b->volume, &b->points));
+  PetscCall(fitted_create(&over_facets, &b->volume, PETSC_FALSE, &b->facets));
+  PetscCall(fitted_create(&over_points, &b->volume, PETSC_TRUE, &b->points));
   PetscCall(cones_create(d, s, links.open, b));
   PetscCall(SbBinaryDestroy(&over_facets));
   PetscCall(SbBinaryDestroy(&over_points));
@@ -246,9 +313,9 @@ static void fit_both(SbDetector d, const SbDetectScene *s, Bvh *b)
 /* Sizes of the inner nodes in those of the facets: unlike the sum itself it does not change with the scale, the reach or the speed. */
 static PetscReal relative_size(const Bvh *b)
 {
-  const PetscReal leaves = b->facets.leaves;
+  const PetscReal items = b->facets.item_size;
 
-  return leaves > 0 ? (b->facets.inner + b->points.inner) / leaves : 0;
+  return items > 0 ? (b->facets.inner_size + b->points.inner_size) / items : 0;
 }
 
 static PetscErrorCode prepare(SbDetector d, const SbDetectScene *s, Bvh *b)
@@ -292,28 +359,38 @@ static PetscErrorCode make_room(Bvh *b, PetscInt nstack)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Takes out of the children of a facet node those of one part, where the node holds several. */
-static unsigned without_part(const Bvh *b, PetscInt f, PetscInt part, unsigned mask)
+/* Takes out of the pairs of children those of one part, where the nodes hold several. */
+static SbMeets without_own(const Bvh *b, const Visit *v, SbMeets pairs)
 {
-  const PetscInt *parts = b->facets.part + f * b->volume.width;
+  const PetscInt *points = b->points.part + v->a * b->volume.width;
+  const PetscInt *facets = b->facets.part + v->f * b->volume.width;
 
-  for (PetscInt l = 0; l < b->facets.tree.nchild[f]; l++) {
-    if (parts[l] == part) mask &= ~(1u << l);
+  for (PetscInt c = 0; c < b->points.tree.nchild[v->a]; c++) {
+    for (PetscInt l = 0; l < b->facets.tree.nchild[v->f]; l++) {
+      if (points[c] == facets[l] && points[c] != NO_PART) pairs &= ~((SbMeets)1 << (b->volume.lanes * c + l));
+    }
   }
-  return mask;
+  return pairs;
+}
+
+/* In the row of each child of a point node the lowest bit when it is in any of the pairs, and no other. */
+static inline SbMeets children_in(const SbVolume *v, SbMeets pairs)
+{
+  pairs |= pairs >> 1;
+  pairs |= pairs >> 2;
+  if (v->lanes == 8) pairs |= pairs >> 4;
+  return pairs & column_of(v);
 }
 
 /*
-  Which children of the two nodes meet: bits of the point node's, and hit[] for them. Parts do not meet themselves unless `self`; below
-  nodes of two parts there is nothing to compare.
+  Which children of the two nodes meet. Parts do not meet themselves unless `self`; below nodes of two parts there is nothing to
+  compare.
 */
-static unsigned meet(Bvh *b, Visit *v, PetscBool self, unsigned hit[])
+static inline SbMeets meet(Bvh *b, Node *point, Node *facet, PetscBool self, Visit *v)
 {
   const SbVolume *volume = &b->volume;
-  const size_t stride = (size_t)volume->lanes * (size_t)volume->rows;
-  const PetscInt *part = b->points.part + v->a * volume->width;
-  const unsigned mask = v->am & b->live[v->a];
-  unsigned any;
+  const SbMeets wanted = v->wanted & point->live & facet->live;
+  SbMeets pairs;
 
   if (!self && !v->apart) {
     const PetscInt common = b->points.common[v->a], other = b->facets.common[v->f];
@@ -321,87 +398,139 @@ static unsigned meet(Bvh *b, Visit *v, PetscBool self, unsigned hit[])
     if (common == other && common != NO_PART) return 0;
     v->apart = (PetscBool)(common != NO_PART && other != NO_PART);
   }
-  any = volume->meet[b->first ? 1 : 0](b->points.block + stride * v->a, volume->rows, mask,
-                                       b->facets.block + stride * v->f, hit);
-  for (int c = 0; mask >> c; c++) {
-    b->counts.visits += mask >> c & 1;
-    if (!(any >> c & 1)) continue;
-    hit[c] &= v->fm;
-    if (!self && !v->apart && part[c] != NO_PART) hit[c] = without_part(b, v->f, part[c], hit[c]);
-  }
-  return any;
+  /* how many children: the sum of the lowest bits is in the highest row */
+  b->counts.visits +=
+    (PetscInt64)(children_in(volume, wanted) * column_of(volume) >> volume->lanes * (volume->lanes - 1) &
+                 row_of(volume));
+  pairs =
+    volume->meet[b->first ? 1 : 0](bounds_of(volume, point), volume->rows, wanted, bounds_of(volume, facet));
+  return !self && !v->apart ? without_own(b, v, pairs) : pairs;
 }
 
-/* A child of a point node against those of a facet node that it meets: follows them. Returns the new end of the stack. */
-static PetscInt follow(Bvh *b, const Visit *v, PetscInt c, unsigned hit, unsigned single[], PetscInt nstack)
+/* Number of the lowest bit, and of the highest. */
+static inline PetscInt lowest(SbMeets pairs)
 {
-  const PetscInt w = b->volume.width, child = b->points.tree.child[v->a * w + c];
-  const PetscInt *facet = b->facets.tree.child + v->f * w;
-  unsigned leaves = 0;
+  return (PetscInt)__builtin_ctzll(pairs);
+}
 
-  for (PetscInt l = 0; hit >> l; l++) {
-    if (!(hit >> l & 1)) continue;
-    if (child >= 0) {
-      if (facet[l] >= 0)
-        b->stack[nstack++] = (Visit){child, facet[l], ~0u, ~0u, v->apart};
-      else
-        leaves |= 1u << l;
-    } else if (facet[l] >= 0)
-      single[l] |= 1u << c;
-    else if (b->first)
-      b->live[v->a] &= ~(1u << c);
-    else {
-      b->pair[b->npair][0] = SB_TREE_ITEM(child);
-      b->pair[b->npair++][1] = SB_TREE_ITEM(facet[l]);
-    }
+static inline PetscInt highest(SbMeets pairs)
+{
+  return 63 - (PetscInt)__builtin_clzll(pairs);
+}
+
+/* Both nodes will be visited soon. */
+static inline PetscInt push(Bvh *b, PetscInt a, PetscInt f, SbMeets wanted, const Visit *from,
+                            PetscInt nstack)
+{
+  const Node *point = node_of(&b->points, a), *facet = node_of(&b->facets, f);
+
+  __builtin_prefetch(point);
+  __builtin_prefetch((const char *)point + LINE);
+  __builtin_prefetch(facet);
+  __builtin_prefetch((const char *)facet + LINE);
+  b->stack[nstack] = (Visit){a, f, wanted, from->apart};
+  return nstack + 1;
+}
+
+/*
+  Pairs of which at least one is a node: on the stack, so that the first are visited first, in the order of the nodes in memory. Items
+  wait until the other side has come down to items. Returns the new end.
+*/
+static inline PetscInt follow(Bvh *b, const Node *point, const Node *facet, const Visit *v, SbMeets pairs,
+                              PetscInt nstack)
+{
+  const PetscInt lanes = b->volume.lanes;
+  const SbMeets row = row_of(&b->volume), column = column_of(&b->volume);
+
+  for (SbMeets m = pairs & point->inner & ~facet->inner; m;) {
+    const PetscInt c = highest(m) / lanes;
+
+    nstack = push(b, point->child[c], v->f, (m >> lanes * c & row) * column, v, nstack);
+    m &= ~(row << lanes * c);
   }
-  if (leaves) b->stack[nstack++] = (Visit){child, v->f, ~0u, leaves, v->apart};
+  for (SbMeets m = pairs & ~point->inner & facet->inner; m;) {
+    const PetscInt l = highest(m) % lanes;
+    const SbMeets with = m & column << l;
+
+    nstack = push(b, v->a, facet->child[l], (with >> l) * row, v, nstack);
+    m ^= with;
+  }
+  for (SbMeets m = pairs & point->inner & facet->inner; m;) {
+    const PetscInt i = highest(m);
+
+    nstack = push(b, point->child[i / lanes], facet->child[i % lanes], ~(SbMeets)0, v, nstack);
+    m ^= (SbMeets)1 << i;
+  }
   return nstack;
 }
 
-/* All pairs that meet, into b->pair; in the first walk points that meet anything are taken out of b->live. */
+/* Pairs of items; in the first walk the points that have any are walked to no more. */
+static inline void keep(Bvh *b, Node *point, const Node *facet, SbMeets pairs)
+{
+  const PetscInt lanes = b->volume.lanes;
+
+  if (b->first) {
+    point->live &= ~(children_in(&b->volume, pairs) * row_of(&b->volume));
+    return;
+  }
+  for (; pairs; pairs &= pairs - 1) {
+    const PetscInt i = lowest(pairs);
+
+    b->pair[b->npair][0] = SB_TREE_ITEM(point->child[i / lanes]);
+    b->pair[b->npair++][1] = SB_TREE_ITEM(facet->child[i % lanes]);
+  }
+}
+
+/* All pairs that meet, into b->pair; in the first walk points that meet anything are no more alive. */
 static PetscErrorCode walk(Bvh *b, PetscBool self)
 {
-  const PetscInt w = b->volume.width;
   PetscInt nstack = 0;
 
   PetscFunctionBeginUser;
   if (!b->facets.tree.nnode || !b->points.tree.nnode) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(make_room(b, 1));
-  b->stack[nstack++] = (Visit){0, 0, ~0u, ~0u, PETSC_FALSE};
+  b->stack[nstack++] = (Visit){0, 0, ~(SbMeets)0, PETSC_FALSE};
   while (nstack) {
     Visit v = b->stack[--nstack];
-    unsigned hit[8], single[8] = {0}; /* points that go on alone to each child of the facet node */
-    unsigned any = meet(b, &v, self, hit), alone = 0;
+    Node *point = node_of(&b->points, v.a), *facet = node_of(&b->facets, v.f);
+    const SbMeets pairs = meet(b, point, facet, self, &v), nodes = point->inner | facet->inner;
 
     if (PetscMin(b->stack_size - nstack, b->pair_size - b->npair) < ROOM) PetscCall(make_room(b, nstack));
-    for (PetscInt c = 0; any >> c; c++) {
-      if (any >> c & 1) nstack = follow(b, &v, c, hit[c], single, nstack);
-    }
-    for (PetscInt l = 0; l < w; l++) alone |= single[l];
-    for (PetscInt l = 0; alone && l < w; l++) {
-      if (single[l])
-        b->stack[nstack++] = (Visit){v.a, b->facets.tree.child[v.f * w + l], single[l], ~0u, v.apart};
-    }
+    keep(b, point, facet, pairs & ~nodes);
+    nstack = follow(b, point, facet, &v, pairs & nodes, nstack);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Which children of the points' nodes are walked to: all. */
+static void set_live(Bvh *b)
+{
+  const SbVolume *v = &b->volume;
+
+  for (PetscInt g = 0; g < b->points.tree.nnode; g++) {
+    const PetscInt unused = v->lanes * (v->lanes - b->points.tree.nchild[g]);
+
+    node_of(&b->points, g)->live = ~(SbMeets)0 >> (64 - v->lanes * v->lanes + unused);
+  }
 }
 
 /* After the first walk: points that met something are walked to again, the others no more. */
 static void turn_live(Bvh *b)
 {
   const SbTree *t = &b->points.tree;
+  const SbMeets row = row_of(&b->volume);
 
   for (PetscInt g = t->nnode - 1; g >= 0; g--) {
-    for (PetscInt l = 0; l < t->nchild[g]; l++) {
-      const PetscInt child = t->child[g * t->width + l];
-      const PetscBool met = (PetscBool)(child >= 0 ? b->live[child] != 0 : !(b->live[g] >> l & 1));
+    Node *node = node_of(&b->points, g);
+    SbMeets live = 0;
 
-      if (met)
-        b->live[g] |= 1u << l;
-      else
-        b->live[g] &= ~(1u << l);
+    for (PetscInt l = 0; l < t->nchild[g]; l++) {
+      const SbMeets own = row << b->volume.lanes * l;
+
+      if (node->inner & own ? node_of(&b->points, node->child[l])->live != 0 : !(node->live & own))
+        live |= own;
     }
+    node->live = live;
   }
 }
 
@@ -411,13 +540,13 @@ static PetscErrorCode find_pairs(Bvh *b, PetscBool self)
   PetscFunctionBeginUser;
   b->npair = 0;
   b->counts.visits = 0;
-  for (PetscInt g = 0; g < b->points.tree.nnode; g++) b->live[g] = (1u << b->points.tree.nchild[g]) - 1;
   b->first = self;
   if (self) {
+    set_live(b);
     PetscCall(walk(b, self));
     turn_live(b);
+    b->first = PETSC_FALSE;
   }
-  b->first = PETSC_FALSE;
   PetscCall(walk(b, self));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -448,8 +577,7 @@ static PetscInt64 bytes(const Bvh *b)
   for (int i = 0; i < 2; i++) {
     const PetscInt64 n = t[i]->tree.nnode, w = b->volume.width;
 
-    sum += n * (PetscInt64)sizeof(SbBound) * b->volume.lanes * b->volume.rows +
-           n * (2 * w + 2) * (PetscInt64)sizeof(PetscInt);
+    sum += n * (PetscInt64)t[i]->stride + n * (w + 2) * (PetscInt64)sizeof(PetscInt);
   }
   return sum;
 }
@@ -485,7 +613,7 @@ static PetscErrorCode destroy(SbDetector d)
   PetscFunctionBeginUser;
   PetscCall(fitted_destroy(&b->facets));
   PetscCall(fitted_destroy(&b->points));
-  PetscCall(PetscFree4(b->open, b->vertex_cone, b->normal, b->live));
+  PetscCall(PetscFree3(b->open, b->vertex_cone, b->normal));
   PetscCall(PetscFree(b->stack));
   PetscCall(PetscFree(b->pair));
   PetscCall(PetscFree(d->data));

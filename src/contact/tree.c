@@ -320,20 +320,44 @@ PetscErrorCode SbBinaryHang(const SbBinary *facets, const PetscInt seat[], const
 
 /* ------------------------------------------------------------------ wide nodes */
 
-/* Children of binary node b: at first its two, then the largest inner one is replaced by its own two while there is room. */
-static PetscInt open_children(const SbBinary *b, const PetscReal size[], PetscInt node, PetscInt width,
-                              PetscInt list[])
+/* What of a binary tree decides how it is made wide. */
+typedef struct {
+  const SbBinary *tree;
+  PetscReal *size; /* [nnode] of the box */
+  PetscInt *nitem; /* [nnode] items below */
+  PetscInt width;
+} Widening;
+
+/*
+  Which of n children to open when `room` more have a place, -1: none. Those with more items than a node holds, the largest first; then, the
+  fewest items first, those whose items all have a place here. What has less stays one node, so that the lowest ones are full.
+*/
+static PetscInt to_open(const Widening *w, PetscInt n, const PetscInt list[], PetscInt room)
 {
-  PetscInt n = 1;
+  PetscInt best = -1;
+
+  for (PetscInt l = 0; l < n && room > 0; l++) {
+    if (w->nitem[list[l]] > w->width && (best < 0 || w->size[list[l]] > w->size[list[best]])) best = l;
+  }
+  if (best >= 0) return best;
+  for (PetscInt l = 0; l < n; l++) {
+    const PetscInt more = w->nitem[list[l]] - 1;
+
+    if (more > 0 && more <= room && (best < 0 || more < w->nitem[list[best]] - 1)) best = l;
+  }
+  return best;
+}
+
+/* Children of a binary node: at first itself. */
+static PetscInt open_children(const Widening *w, PetscInt node, PetscInt list[])
+{
+  const SbBinary *b = w->tree;
+  PetscInt n = 1, best;
 
   list[0] = node;
-  while (n < width) {
-    PetscInt best = -1;
-
-    for (PetscInt l = 0; l < n; l++) {
-      if (list[l] >= b->n && (best < 0 || size[list[l]] > size[list[best]])) best = l;
-    }
-    if (best < 0) break;
+  for (;;) {
+    best = n == 1 ? 0 : to_open(w, n, list, w->width - n);
+    if (best < 0 || list[best] < b->n) break;
     const PetscInt *child = b->child[list[best] - b->n];
 
     list[best] = child[0];
@@ -349,8 +373,9 @@ typedef struct {
 } Pending;
 
 /* Depth first: what is near in the tree is near in memory. */
-static void make_wide(const SbBinary *b, const PetscReal size[], Pending stack[], SbTree *t)
+static void make_wide(const Widening *w, Pending stack[], SbTree *t)
 {
+  const SbBinary *b = w->tree;
   PetscInt nstack = 1, list[8];
 
   stack[0] = (Pending){b->root, -1, 1};
@@ -361,7 +386,7 @@ static void make_wide(const SbBinary *b, const PetscReal size[], Pending stack[]
 
     if (p.parent >= 0) t->child[p.parent] = me;
     t->depth = PetscMax(t->depth, p.depth);
-    t->nchild[me] = open_children(b, size, p.node, t->width, list);
+    t->nchild[me] = open_children(w, p.node, list);
     for (PetscInt l = t->width - 1; l >= 0; l--) {
       if (l >= t->nchild[me])
         child[l] = SB_TREE_NONE;
@@ -376,7 +401,7 @@ static void make_wide(const SbBinary *b, const PetscReal size[], Pending stack[]
 PetscErrorCode SbTreeCreate(const SbBinary *b, PetscInt width, SbTree *t)
 {
   const PetscInt most = PetscMax(b->n - 1, 1);
-  PetscReal *size;
+  Widening w = {.tree = b, .width = width};
   Pending *stack;
 
   PetscFunctionBeginUser;
@@ -384,12 +409,17 @@ PetscErrorCode SbTreeCreate(const SbBinary *b, PetscInt width, SbTree *t)
   t->width = width;
   t->n = b->n;
   if (b->root < 0) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(PetscMalloc2(b->nnode, &size, most, &stack));
+  PetscCall(PetscMalloc3(b->nnode, &w.size, b->nnode, &w.nitem, most, &stack));
   PetscCall(PetscMalloc1(most * width, &t->child));
   PetscCall(PetscMalloc1(most, &t->nchild));
-  for (PetscInt i = 0; i < b->nnode; i++) size[i] = box_size(b->box[i]);
-  make_wide(b, size, stack, t);
-  PetscCall(PetscFree2(size, stack));
+  for (PetscInt i = 0; i < b->nnode; i++) {
+    const PetscInt *child = i < b->n ? NULL : b->child[i - b->n];
+
+    w.size[i] = box_size(b->box[i]);
+    w.nitem[i] = child ? w.nitem[child[0]] + w.nitem[child[1]] : 1;
+  }
+  make_wide(&w, stack, t);
+  PetscCall(PetscFree3(w.size, w.nitem, stack));
   PetscCall(PetscRealloc(sizeof(*t->child) * (size_t)(t->nnode * width), &t->child));
   PetscCall(PetscRealloc(sizeof(*t->nchild) * (size_t)t->nnode, &t->nchild));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -98,27 +98,25 @@ SB_INLINE unsigned four_lanes(const int nslab, const int lanes, const int cull, 
   return in_lanes(out);
 }
 
-SB_INLINE unsigned meet(const int nslab, const int lanes, const int cull, const float a[], PetscInt rows,
-                        unsigned mask, const float f[], unsigned hit[])
+/* No branch but over the pairs of eight lanes: which children meet cannot be foreseen. */
+SB_INLINE SbMeets meet(const int nslab, const int lanes, const int cull, const float a[], PetscInt rows,
+                       SbMeets wanted, const float f[])
 {
-  unsigned any = 0;
+  SbMeets in = 0;
 
-  for (int c = 0; mask >> c; c++) {
-    unsigned in = 0;
-
-    if (!(mask >> c & 1)) continue;
-    for (int l = 0; l < lanes; l += 4) in |= four_lanes(nslab, lanes, cull, a + c * rows, f + l) << l;
-    hit[c] = in;
-    any |= in ? 1u << c : 0;
+  for (int c = 0; c < lanes; c++) {
+    if (lanes > 4 && !(wanted >> lanes * c & 255)) continue;
+    for (int l = 0; l < lanes; l += 4)
+      in |= (SbMeets)four_lanes(nslab, lanes, cull, a + c * rows, f + l) << (lanes * c + l);
   }
-  return any;
+  return in & wanted;
 }
 
 #define MEET(nslab, lanes, cull)                                                                 \
-  static unsigned meet_##nslab##_##lanes##_##cull(const float a[], PetscInt rows, unsigned mask, \
-                                                  const float f[], unsigned hit[])               \
+  static SbMeets meet_##nslab##_##lanes##_##cull(const float a[], PetscInt rows, SbMeets wanted, \
+                                                 const float f[])                                \
   {                                                                                              \
-    return meet(nslab, lanes, cull, a, rows, mask, f, hit);                                      \
+    return meet(nslab, lanes, cull, a, rows, wanted, f);                                         \
   }
 #define MEETS(nslab) MEET(nslab, 4, 0) MEET(nslab, 8, 0) MEET(nslab, 4, 1) MEET(nslab, 8, 1)
 MEETS(0)
@@ -266,21 +264,32 @@ static void merge_spheres(const SbBound block[], PetscInt row, PetscInt lane, Pe
   column[3] = most * (1 + 8 * FLT_EPSILON);
 }
 
-void SbVolumeMerge(const SbVolume *v, const SbBound block[], PetscInt row, PetscInt lane, PetscInt n,
-                   SbBound column[])
+/* Of all lanes: those without a child are as SbVolumeNone() has them, and change nothing. */
+SB_INLINE void merge_slabs(const int nslab, const int lanes, const SbBound block[], PetscInt row,
+                           PetscInt lane, SbBound column[])
 {
-  if (!v->nslab) merge_spheres(block, row, lane, n, column);
-  for (int s = 0; s < v->nslab; s++) {
+  for (int s = 0; s < nslab; s++) {
     const SbBound *low = block + row * 2 * s, *high = low + row;
     float least = low[0], most = high[0];
 
-    for (PetscInt l = 1; l < n; l++) {
+    for (int l = 1; l < lanes; l++) {
       least = PetscMin(least, low[lane * l]);
       most = PetscMax(most, high[lane * l]);
     }
     column[2 * s] = least;
     column[2 * s + 1] = most;
   }
+}
+
+void SbVolumeMerge(const SbVolume *v, const SbBound block[], PetscInt row, PetscInt lane, PetscInt n,
+                   SbBound column[])
+{
+  if (!v->nslab)
+    merge_spheres(block, row, lane, n, column);
+  else if (v->nslab == 3 && v->lanes == 4)
+    merge_slabs(3, 4, block, row, lane, column);
+  else
+    merge_slabs(v->nslab, (int)v->lanes, block, row, lane, column);
 }
 
 PetscReal SbVolumeSize(const SbVolume *v, const SbBound column[])

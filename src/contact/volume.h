@@ -17,12 +17,14 @@ enum {
   SB_VOLUME_ROWS = 26 + SB_VOLUME_CONE /* most rows of a column */
 };
 
+/* Which children of a node of points meet which of a node of facets: bit lanes c + l for child c of the first and l of the second. */
+typedef uint64_t SbMeets;
+
 /*
-  Children of a node of points, those in `mask`, against those of a node of facets: bit l of hit[c] is set when what column c of `a` holds
-  may meet what lane l of block f holds. Columns are `rows` apart. Returns which c meet any; hit[] is set for those in `mask`.
+  Children of a node of points against those of a node of facets: which of the pairs in `wanted` may meet, by column c of `a` and lane l of
+  block f. Columns are `rows` apart.
 */
-typedef unsigned (*SbVolumeMeet)(const SbBound a[], PetscInt rows, unsigned mask, const SbBound f[],
-                                 unsigned hit[]);
+typedef SbMeets (*SbVolumeMeet)(const SbBound a[], PetscInt rows, SbMeets wanted, const SbBound f[]);
 
 typedef struct {
   PetscInt k, width;
@@ -44,7 +46,7 @@ void SbVolumeSet(PetscInt k, PetscInt width, PetscBool cones, SbVolume *volume);
 void SbVolumeOf(const SbVolume *volume, int n, const PetscReal *const corner[], const PetscReal box[6],
                 PetscReal grow, SbBound column[]);
 /*
-  SbVolumeMerge - column around the first n children of a block, without the cone; n > 0.
+  SbVolumeMerge - column around the first n children of a block, without the cone; n > 0. The other lanes are as SbVolumeNone() has them.
 
   The number in row r of child l is block[row * r + lane * l].
 */

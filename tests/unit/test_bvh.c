@@ -484,6 +484,8 @@ static void wavy(PetscReal u, PetscReal v, PetscReal x[3])
   x[2] = 0.1 * PetscSinReal(9 * u) * PetscCosReal(7 * v);
 }
 
+#define FULL 1.4 /* times as many nodes as there would be if all had all children */
+
 /* Two wavy sheets face to face: visits and candidates per point hardly grow with the number of facets. */
 static PetscErrorCode check_growth(Scene *c, int which)
 {
@@ -517,6 +519,10 @@ static PetscErrorCode check_growth(Scene *c, int which)
     PetscCall(SbBvhGetCounts(d, &counts));
     each[i] = (PetscReal)counts.visits / (PetscReal)c->s.npoint;
     per_near[i] = (PetscReal)d->start[c->s.npoint] / (PetscReal)n;
+    /* full nodes are the fewest */
+    SB_CHECK(counts.nodes * (s.branching - 1) < FULL * c->s.nfacet,
+             "setting %d: %d nodes with up to %d children over %d facets", which, (int)counts.nodes,
+             (int)s.branching, (int)c->s.nfacet);
     SB_CHECK(n > c->s.npoint * 8 / 10, "only %d of %d points meet the other sheet", (int)n, (int)c->s.npoint);
   }
   /* below a few levels all boxes look alike; growth with the square root would be 3.2 */
