@@ -37,9 +37,9 @@ typedef struct {
   /* once before each attempt at a step */
   PetscErrorCode (*prestep)(SbEffect e, SbSpace space, PetscReal t, PetscReal dt);
   /* contact, before the first solve of an attempt at a step from t to t + dt: local displacements u0 at t and u as predicted at
-     t + dt, m. Collective. */
+     t + dt, m; v0 are the velocities at t, m/s, NULL unless an effect has `rebound`. Collective. */
   PetscErrorCode (*touch)(SbEffect e, SbSpace space, PetscReal t, PetscReal dt, const PetscReal u0[],
-                          const PetscReal u[]);
+                          const PetscReal v0[], const PetscReal u[]);
   /* writes what contact holds by SbSpaceHold(), and its rows by SbSpaceCoupleRow(). Not collective. */
   PetscErrorCode (*hold)(SbEffect e, SbSpace space);
   /* after a solve, with the residual r without constraints, N: sets `changed` when another solve is needed. Collective. */
@@ -48,6 +48,11 @@ typedef struct {
   /* after the first solve of an attempt, for effects that want steps cut where points arrive: the part of the step, 0..1, after which
      the first point that was apart before touches, as the motion without it says; 1: none does. This rank's. Not collective. */
   PetscErrorCode (*arrive)(SbEffect e, PetscReal *part);
+  /* restitution (src/model/rebound.c): the work of the forces on what rebounds, as the last solve has it and in the frame of what it leaves,
+     J; this rank's. Not collective. */
+  PetscErrorCode (*rebound)(SbEffect e, PetscReal *work);
+  /* its coefficients have `share` left of them in this step, 0..1: what rebounds is held accordingly from now on. Not collective. */
+  PetscErrorCode (*curb)(SbEffect e, PetscReal share);
   /* f[nnode][3] += what contact pushes owned nodes with, N, residual r as for history(). For output only; rows that join nodes add
      theirs without it. Not collective. */
   PetscErrorCode (*push)(SbEffect e, SbSpace space, const SbStage *stage, const PetscReal r[], PetscReal f[]);

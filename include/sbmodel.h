@@ -39,8 +39,16 @@ struct _p_SbModel {
   PetscInt neffect;
   SbEffect *effect;
   /* one list per operation, holding only the effects that implement it */
-  PetscInt nprescribe, nprestep, nforce, ntangent, naccept, nhistory, ntouch, nhold, nsettle, narrive;
-  SbEffect *prescribe, *prestep, *touch, *hold, *settle, *force, *tangent, *accept, *history, *arrive;
+  PetscInt nprescribe, nprestep, nforce, ntangent, naccept, nhistory, ntouch, nhold, nsettle, narrive,
+    nrebound;
+  SbEffect *prescribe, *prestep, *touch, *hold, *settle, *force, *tangent, *accept, *history, *arrive,
+    *rebound;
+  struct {
+    Vec U0, V0;     /* state when the step began; borrowed */
+    PetscReal dt;   /* length of the step, s */
+    PetscReal left; /* of the coefficients of restitution in this step */
+    int reductions;
+  } bounce;         /* src/model/rebound.c; only with effects that rebound */
   PetscBool linear; /* laws and effects: the tangent depends on the shifts only */
   PetscReal mass;   /* kg */
   PetscBool dynamic;
@@ -61,12 +69,16 @@ PetscErrorCode SbModelTangent(SbModel model, PetscReal t, PetscReal shift_v, Pet
 /* Writes prescribed displacements at t into U. */
 PetscErrorCode SbModelPrescribe(SbModel model, PetscReal t, Vec U);
 /*
-  Contact, for effects that have it (model->ntouch > 0). Begin: before the first solve of a step from t to t + dt, U0 at t; U, the
-  guess at t + dt, is put where contact holds it. Settle: after a solve with the residual R without constraints; `again` when
+  Contact, for effects that have it (model->ntouch > 0). Begin: before the first solve of a step from t to t + dt, U0 and V0 (NULL in
+  a static run) at t, to stay as they are until the step ends; U, the guess at t + dt, is put where contact holds it. Settle: after a solve with the residual R without constraints; `again` when
   what is held has changed: U is put there, and has to be solved for once more. Collective.
 */
-PetscErrorCode SbModelContactBegin(SbModel model, PetscReal t, PetscReal dt, Vec U0, Vec U);
+PetscErrorCode SbModelContactBegin(SbModel model, PetscReal t, PetscReal dt, Vec U0, Vec V0, Vec U);
 PetscErrorCode SbModelContactSettle(SbModel model, PetscReal t, Vec U, Vec R, PetscBool *again);
+/* Restitution, of these two: Begin starts an attempt at a step; Settle, once who touches is right, sees to the energy: `again` when
+   coefficients had to be reduced. Collective. */
+PetscErrorCode SbModelReboundBegin(SbModel model, PetscReal dt, Vec U0, Vec V0);
+PetscErrorCode SbModelReboundSettle(SbModel model, Vec U, PetscBool *again);
 /* After the first Settle of a step: the part of it after which the first point arrives at what it did not touch before, 1: none
    does; effects that do not ask for it are not looked at. Collective. */
 PetscErrorCode SbModelContactArrival(SbModel model, PetscReal *part);

@@ -55,6 +55,10 @@ static const SbOption rows[] = {
   {"reach", SB_OPTION_REAL, 1, "m", "0", "[0, inf)",
    "how far points look for surfaces, and the deepest penetration that is found at rest; 0: half the mean "
    "edge"},
+  {"restitution", SB_OPTION_REAL, 1, "", "0", "[0, 1]",
+   "part of their relative speed with which surfaces leave each other; needs -time euler_implicit, and "
+   "bodies "
+   "that are stiff within a step to bounce as a whole"},
   {"recovery", SB_OPTION_REAL, 1, "steps", "30", "[1, inf)",
    "bodies that overlap before they meet are parted slowly: to 1/e of the depth in so many steps; 1: at "
    "once"},
@@ -93,6 +97,28 @@ static PetscErrorCode read_tree(SbEffect e, const SbScope *scope, SbDetector det
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+static PetscErrorCode read_restitution(SbEffect e, const SbScope *scope)
+{
+  Collision *c = (Collision *)e->data;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbOptionReal(scope, "restitution", &c->bounce.e));
+  e->euler = (PetscBool)(c->bounce.e > 0);
+  if (!e->euler) {
+    e->ops.rebound = NULL;
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  PetscCheck(exact(c->response), PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
+             "-effect_%s_restitution %g needs -effect_%s_response projected or multiplier", e->name,
+             (double)c->bounce.e, e->name);
+  PetscCheck(
+    !c->cut, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
+    "-effect_%s_restitution %g and -effect_%s_arrival cut do not go together: what is let go within a step "
+    "never arrives at its end; leave one of them out",
+    e->name, (double)c->bounce.e, e->name);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 static PetscErrorCode options_collision(SbEffect e, const SbScope *scope)
 {
   Collision *c = (Collision *)e->data;
@@ -122,6 +148,7 @@ static PetscErrorCode options_collision(SbEffect e, const SbScope *scope)
     e->name, (double)c->mu_kinetic, e->name, (double)c->mu);
   PetscCall(SbOptionReal(scope, "stiffness", &c->stiffness));
   PetscCall(SbOptionReal(scope, "reach", &c->reach));
+  PetscCall(read_restitution(e, scope));
   PetscCall(SbOptionReal(scope, "recovery", &c->recovery));
   c->recovery = c->recovery > 1 ? PetscExpReal(-1 / c->recovery) : 0;
   PetscCall(SbOptionBool(scope, "pairs", &c->pairs.wanted));
@@ -222,6 +249,7 @@ static PetscErrorCode setup_collision(SbEffect e, SbSpace space)
              e->name, e->name, e->name);
   PetscCall(SbPairsSetUp(e, space->mesh));
   PetscCall(PetscMalloc1(3 * space->nnode, &c->u0));
+  if (c->bounce.e > 0) PetscCall(PetscMalloc1(3 * space->nnode, &c->flight));
   if (c->reach == 0) c->reach = 0.5 * c->surface->edge;
   PetscCall(SbSpaceCoupleCreate(space, PETSC_FALSE, (PetscBool)(c->mu > 0)));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -251,19 +279,24 @@ static PetscErrorCode arrive_collision(SbEffect e, PetscReal *part)
 }
 
 static PetscErrorCode touch_collision(SbEffect e, SbSpace space, PetscReal t, PetscReal dt,
-                                      const PetscReal u0[], const PetscReal u[])
+                                      const PetscReal u0[], const PetscReal v0[], const PetscReal u[])
 {
   Collision *c = (Collision *)e->data;
 
   PetscFunctionBeginUser;
   (void)t;
-  (void)dt;
   PetscCall(PetscArraycpy(c->u0, u0, 3 * space->nnode));
   c->updates = 0;
   PetscCall(SbCollisionRestore(c));
   c->first = PETSC_TRUE;
   c->arrival = 1;
-  PetscCall(SbCollisionLook(c, u, PETSC_FALSE));
+  SbReboundBegin(&c->bounce, dt);
+  if (v0 && c->flight) {
+    SbCollisionFly(c, space, u0, v0, u);
+    PetscCall(SbCollisionLook(c, c->flight, PETSC_FALSE));
+    SbCollisionMeet(c);
+  } else
+    PetscCall(SbCollisionLook(c, u, PETSC_FALSE));
   for (PetscInt i = 0; i < c->nhit; i++) {
     Hit *hit = &c->hit[i];
 
@@ -275,7 +308,7 @@ static PetscErrorCode touch_collision(SbEffect e, SbSpace space, PetscReal t, Pe
       hit->on =
         (PetscBool)(hit->lambda - hit->k * (SbCollisionExcess(hit) - TOLERANCE * c->surface->size) >= 0);
     else if (SbCollisionExcess(hit) <= TOLERANCE * c->surface->size)
-      hit->on = PETSC_TRUE;
+      SbCollisionHit(c, hit);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -316,10 +349,10 @@ static PetscErrorCode hold_collision(SbEffect e, SbSpace space)
     if (c->mu > 0) SbFrictionPush(c, hit, push, &oblique);
     if (exact(c->response))
       PetscCall(SbSpaceCoupleRow(space, SbCollisionId(c, i), hit->n, hit->node, coef, oblique ? push : NULL,
-                                 hit->value - hit->allowed, &hit->row));
+                                 SbCollisionPlace(hit), &hit->row));
     else
       PetscCall(SbSpaceCoupleSpring(space, hit->n, hit->node, coef, oblique ? push : NULL,
-                                    hit->value - hit->allowed, hit->k, hit->lambda, &hit->row));
+                                    SbCollisionPlace(hit), hit->k, hit->lambda, &hit->row));
     if (c->mu > 0) PetscCall(SbFrictionHold(c, space, i));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -334,7 +367,7 @@ static PetscBool settle_row(const Collision *c, PetscReal largest, Hit *hit)
 
   if (!hit->on) {
     if (SbCollisionExcess(hit) >= -small) return PETSC_TRUE;
-    hit->on = PETSC_TRUE;
+    SbCollisionHit(c, hit);
     hit->toggles++;
     return PETSC_FALSE;
   }
@@ -381,7 +414,8 @@ static void read_rows(const Collision *c, SbSpace space, Hit *hit)
   hit->rests = SbSpaceCoupleRests(space, hit->row);
   if (hit->rests) {
     hit->lambda = 0;
-    hit->gap = -hit->allowed; /* so those rows say; the next look tells more if it finds the pair */
+    hit->gap =
+      hit->leaves - hit->allowed; /* so those rows say; the next look tells more if it finds the pair */
   } else {
     if (exact(c->response)) hit->lambda = force;
     hit->gap = along - hit->value;
@@ -429,7 +463,7 @@ static PetscErrorCode accept_collision(SbEffect e, SbSpace space, const SbStage 
     Hit *hit = &c->hit[i];
     const PetscReal normal = hit->on ? SbCollisionForce(c, hit) : 0;
 
-    hit->was = hit->on;
+    hit->was = (PetscBool)(hit->on && hit->leaves <= 0);
     for (int k = 0; k < 3 && normal > 0; k++)
       c->work += normal * hit->normal[k] * (hit->now[k] - hit->start[k]);
   }
@@ -503,6 +537,7 @@ static PetscErrorCode destroy_collision(SbEffect e)
   PetscCall(PetscFree(c->edge_k));
   PetscCall(PetscFree(c->edge));
   PetscCall(PetscFree(c->u0));
+  PetscCall(PetscFree(c->flight));
   PetscCall(PetscFree(c->hit));
   PetscCall(PetscFree(c->spare));
   PetscCall(PetscFree(c->past));
@@ -527,6 +562,8 @@ static PetscErrorCode create_collision(SbEffect e)
   e->ops.hold = hold_collision;
   e->ops.settle = settle_collision;
   e->ops.arrive = arrive_collision;
+  e->ops.rebound = SbEffectRebound_Collision;
+  e->ops.curb = SbEffectCurb_Collision;
   e->ops.accept = accept_collision;
   e->ops.history = history_collision;
   e->ops.near = near_collision;

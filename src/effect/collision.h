@@ -2,6 +2,7 @@
   collision.h - pairs of a point and a surface near it, and of two edges: what collision.c and collision_look.c share.
 */
 #pragma once
+#include "rebound.h"
 #include "sbdetect.h"
 #include "sbeffect.h"
 
@@ -36,9 +37,11 @@ typedef struct {
   PetscReal gap;              /* at the last look, m */
   PetscReal start[3], now[3]; /* w at the start of the step and at the last look, m */
   PetscReal allowed;          /* penetration that was there before and is taken back step by step, m */
+  PetscReal gap0, arrives;    /* restitution, at the start of the step: m; speed of approach, m/s */
+  PetscReal leaves;           /* gap that it is held at while it rebounds, else 0, m */
   PetscReal k;                /* stiffness of springs, N/m */
   PetscBool on;               /* it touches */
-  PetscBool was;              /* it touched at the end of the last step */
+  PetscBool was;              /* it touched at the end of the last step, and did not bounce */
   int toggles, looks;         /* within the step */
   PetscBool rests;            /* other rows say it */
   PetscInt row, slide[2];     /* rows of the space, -1: none */
@@ -75,6 +78,8 @@ typedef struct {
   PetscReal *point_k; /* [npoint] N/m */
   PetscReal *edge_k;  /* [own edges] the same of an edge, N/m */
   PetscReal *u0;      /* [nnode][3] displacement at the start of the step, m */
+  PetscReal *flight;  /* [nnode][3] that at its end if nothing had a force, m; NULL without restitution */
+  SbRebound bounce;
   PetscInt nhit, size, npast, past_size;
   Hit *hit, *spare;    /* by point and part */
   Hit *past;           /* [npast] as the last step left them: each attempt at a step begins there */
@@ -105,10 +110,16 @@ static inline PetscBool SbCollisionOfEdges(const Collision *c, const Hit *hit)
 {
   return (PetscBool)(hit->point >= c->surface->scene.npoint);
 }
-/* Gap beyond what is allowed for now, m. */
+/* Gap beyond the one that it is held at, m. */
 static inline PetscReal SbCollisionExcess(const Hit *hit)
 {
-  return hit->gap + hit->allowed;
+  return hit->gap + hit->allowed - hit->leaves;
+}
+
+/* n . w at which it is held, m. */
+static inline PetscReal SbCollisionPlace(const Hit *hit)
+{
+  return hit->value - hit->allowed + hit->leaves;
 }
 
 /* Normal force after a solve, N. */
@@ -123,6 +134,17 @@ static inline void SbCollisionCoef(const Hit *hit, const PetscReal direction[3],
 {
   for (PetscInt k = 0; k < 3 * hit->n; k++) coef[k] = hit->weight[k / 3] * direction[k % 3];
 }
+
+/*
+  Restitution (collision_rebound.c). Fly: c->flight from local displacements u0 and u (prescribed ones are taken from it) and velocities
+  v0. Meet: for each pair of the look there, what it is held at if it is to be. Hit: it is to be. Not collective.
+*/
+void SbCollisionFly(Collision *c, SbSpace space, const PetscReal u0[], const PetscReal v0[],
+                    const PetscReal u[]);
+void SbCollisionMeet(Collision *c);
+void SbCollisionHit(const Collision *c, Hit *hit);
+PetscErrorCode SbEffectRebound_Collision(SbEffect e, PetscReal *work);
+PetscErrorCode SbEffectCurb_Collision(SbEffect e, PetscReal share);
 
 /* collision.c: identity of hit i, the same for any partition, below SB_COLLISION_IDS. */
 PetscInt SbCollisionId(const Collision *c, PetscInt i);

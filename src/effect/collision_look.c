@@ -162,7 +162,7 @@ static PetscBool is_settled(const Collision *c, PetscReal gap, Hit *hit)
 {
   if (hit->looks++ < FEW_LOOKS) return PETSC_FALSE;
   return (PetscBool)(hit->looks > LOOKS ||
-                     PetscAbsReal(gap + hit->allowed) <= 0.1 * TOLERANCE * c->surface->size);
+                     PetscAbsReal(gap + hit->allowed - hit->leaves) <= 0.1 * TOLERANCE * c->surface->size);
 }
 
 /*
@@ -249,7 +249,11 @@ PetscErrorCode SbCollisionRestore(Collision *c)
     PetscCall(PetscArraycpy(c->hit, c->past, c->npast));
     c->nhit = c->npast;
   }
-  for (PetscInt i = 0; i < c->nhit; i++) c->hit[i].allowed *= c->recovery;
+  for (PetscInt i = 0; i < c->nhit; i++) {
+    c->hit[i].allowed *= c->recovery;
+    if (c->hit[i].leaves > 0) c->hit[i].on = PETSC_FALSE; /* it rebounded and is free */
+    c->hit[i].leaves = c->hit[i].arrives = 0;
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -121,16 +121,17 @@ static PetscErrorCode options_contact(SbEffect e, const SbScope *scope)
              "go at once",
              e->name, (double)c->mu_kinetic, e->name, (double)c->mu);
   PetscCall(SbOptionReal(scope, "stiffness", &c->stiffness));
-  PetscCall(SbOptionReal(scope, "restitution", &c->restitution));
-  PetscCheck(c->restitution <= 0 || exact(c), PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
+  PetscCall(SbOptionReal(scope, "restitution", &c->bounce.e));
+  PetscCheck(c->bounce.e <= 0 || exact(c), PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
              "-effect_%s_restitution %g needs -effect_%s_response projected or multiplier", e->name,
-             (double)c->restitution, e->name);
+             (double)c->bounce.e, e->name);
   PetscCheck(
-    c->restitution <= 0 || !c->cut, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
+    c->bounce.e <= 0 || !c->cut, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
     "-effect_%s_restitution %g and -effect_%s_arrival cut do not go together: what is let go within a step "
     "never arrives at its end; leave one of them out",
-    e->name, (double)c->restitution, e->name);
-  e->euler = (PetscBool)(c->restitution > 0);
+    e->name, (double)c->bounce.e, e->name);
+  e->euler = (PetscBool)(c->bounce.e > 0);
+  if (c->bounce.e <= 0) e->ops.rebound = NULL;
   PetscCall(SbOptionReal(scope, "recovery", &c->recovery));
   c->recovery = c->recovery > 1 ? PetscExpReal(-1 / c->recovery) : 0;
   PetscCall(read_path(e, scope));
@@ -200,7 +201,6 @@ static PetscErrorCode setup_contact(SbEffect e, SbSpace space)
   c->size = PetscSqrtReal(SbDot3(box, box));
   if (c->response == PROJECTED) PetscCall(SbSpaceHoldCreate(space));
   if (c->response == MULTIPLIER) PetscCall(SbSpaceCoupleCreate(space, PETSC_TRUE, PETSC_FALSE));
-  if (c->restitution > 0) PetscCall(SbReboundCreate(c, space));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -256,7 +256,7 @@ static PetscReal rest_of(const Contact *c, const SbPose *from, const Touch *touc
 static void enter(const Contact *c, Touch *touch)
 {
   touch->on = PETSC_TRUE;
-  if (c->restitution > 0) SbReboundHit(c, touch);
+  if (c->bounce.e > 0) SbContactHit(c, touch);
 }
 
 /* A node that was apart and is behind the obstacle now, by a motion that did not know of it: when it came. */
@@ -281,7 +281,7 @@ static PetscErrorCode arrive_contact(SbEffect e, PetscReal *part)
 }
 
 static PetscErrorCode touch_contact(SbEffect e, SbSpace space, PetscReal t, PetscReal dt,
-                                    const PetscReal u0[], const PetscReal u[])
+                                    const PetscReal u0[], const PetscReal v0[], const PetscReal u[])
 {
   Contact *c = (Contact *)e->data;
   SbPose from;
@@ -292,7 +292,7 @@ static PetscErrorCode touch_contact(SbEffect e, SbSpace space, PetscReal t, Pets
   c->updates = 0;
   c->first = PETSC_TRUE;
   c->arrival = 1;
-  if (c->restitution > 0) PetscCall(SbReboundBegin(c, space, dt, u0));
+  SbReboundBegin(&c->bounce, dt);
   for (PetscInt i = 0; i < c->n; i++) {
     Touch *touch = &c->touch[i];
     PetscReal x0[3], x[3], n[3];
@@ -300,13 +300,14 @@ static PetscErrorCode touch_contact(SbEffect e, SbSpace space, PetscReal t, Pets
 
     touch->toggles = touch->flips = 0;
     /* an attempt that was cut begins as it did; one that failed goes on with what it has found to touch */
-    if (c->cut || c->restitution > 0) touch->on = touch->was;
+    if (c->cut || c->bounce.e > 0) touch->on = touch->was;
     touch->idle = (PetscBool)(c->cut && !touch->was && !exact(c));
     place(space, touch->node, u, x);
     place(space, touch->node, u0, x0);
     if (c->cut) touch->gap0 = SbContactGap(c, &from, x0, n);
     touch->rest = rest_of(c, &from, touch, x0);
-    comes = (PetscBool)(c->restitution > 0 && SbRebound(c, &from, x0, touch));
+    comes =
+      (PetscBool)(c->bounce.e > 0 && SbContactComes(c, &from, x0, v0 ? v0 + 3 * touch->node : NULL, touch));
     if (!touch->on) { /* a node that arrives in this step sticks to where it was at its start */
       SbPoseInvert(&from, x0, touch->anchor);
       touch->pressing = 0;
@@ -444,7 +445,6 @@ static PetscErrorCode settle_contact(SbEffect e, SbSpace space, const PetscReal 
     if (!right) mine = PETSC_TRUE;
   }
   if (c->mu > 0) PetscCall(settle_friction(c, space, largest, &mine));
-  if (c->restitution > 0) PetscCall(SbReboundSettle(c, space, u, &mine));
   if (mine) *changed = PETSC_TRUE;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -459,7 +459,6 @@ static PetscErrorCode destroy_contact(SbEffect e)
   for (int i = 0; i < 3; i++) PetscCall(SbFormulaDestroy(&c->displacement[i]));
   PetscCall(SbFormulaDestroy(&c->angle));
   PetscCall(PetscFree(c->touch));
-  PetscCall(PetscFree2(c->u0, c->v0));
   PetscCall(PetscFree(e->data));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -480,6 +479,8 @@ static PetscErrorCode create_contact(SbEffect e)
   e->ops.hold = hold_contact;
   e->ops.settle = settle_contact;
   e->ops.arrive = arrive_contact;
+  e->ops.rebound = SbEffectRebound_Contact;
+  e->ops.curb = SbEffectCurb_Contact;
   e->ops.force = SbEffectForce_Contact;
   e->ops.tangent = SbEffectTangent_Contact;
   e->ops.accept = SbEffectAccept_Contact;

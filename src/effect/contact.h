@@ -2,6 +2,7 @@
   contact.h - nodes of the surface against a rigid obstacle: what contact.c, contact_force.c and contact_rebound.c share.
 */
 #pragma once
+#include "rebound.h"
 #include "sbcontact.h"
 #include "sbeffect.h"
 
@@ -44,10 +45,7 @@ typedef struct {
   PetscReal scale, at[3]; /* of the file of a mesh */
   SbFormula displacement[3], angle;
   PetscReal axis[3], point[3];
-  PetscReal restitution, share, dt; /* e, what is left of it in this step, length of the step (s) */
-  int reductions;                   /* of e within the step */
-  PetscBool known;                  /* v0 is */
-  PetscReal *u0, *v0;               /* [nnode_owned][3] when the step began, m and m/s; with restitution */
+  SbRebound bounce;
   PetscInt n;
   Touch *touch;      /* [n] */
   PetscReal size;    /* of the bodies, m */
@@ -84,19 +82,18 @@ static inline PetscReal spring(const Touch *touch, PetscReal gap)
 PetscReal SbContactMultiplier(const Contact *c, SbSpace space, const Touch *touch, const PetscReal r[3]);
 
 /*
-  Restitution (contact_rebound.c). Begin: once per attempt at a step, then SbRebound() for each node: true when it will
-  be behind the obstacle at its present speed. SbReboundHit() when it is to be held. Settle, after a solve: sees to the energy; `changed` when e was reduced, in and out. Collective. End: the step was accepted.
+  Restitution (contact_rebound.c), of a node at x0 with the velocity v0 (m/s; NULL: not known) when the step begins. Comes: it will be
+  behind the obstacle at that speed. Hit: it is to be held.
 */
-PetscErrorCode SbReboundCreate(Contact *c, SbSpace space);
-PetscErrorCode SbReboundBegin(Contact *c, SbSpace space, PetscReal dt, const PetscReal u0[]);
-void SbReboundHit(const Contact *c, Touch *touch);
-PetscBool SbRebound(const Contact *c, const SbPose *from, const PetscReal x0[3], Touch *touch);
-PetscErrorCode SbReboundSettle(Contact *c, SbSpace space, const PetscReal u[], PetscBool *changed);
-PetscErrorCode SbReboundEnd(Contact *c, SbSpace space, const PetscReal v[]);
+PetscBool SbContactComes(const Contact *c, const SbPose *from, const PetscReal x0[3], const PetscReal v0[3],
+                         Touch *touch);
+void SbContactHit(const Contact *c, Touch *touch);
 
 /* Operations of the effect (sbeffect.h). */
 PetscErrorCode SbEffectForce_Contact(SbEffect e, SbSpace space, const SbStage *stage, PetscReal f[]);
 PetscErrorCode SbEffectTangent_Contact(SbEffect e, SbSpace space, const SbStage *stage, Mat A);
+PetscErrorCode SbEffectRebound_Contact(SbEffect e, PetscReal *work);
+PetscErrorCode SbEffectCurb_Contact(SbEffect e, PetscReal share);
 PetscErrorCode SbEffectAccept_Contact(SbEffect e, SbSpace space, const SbStage *stage);
 PetscErrorCode SbEffectPush_Contact(SbEffect e, SbSpace space, const SbStage *stage,
                                     const PetscReal residual[], PetscReal f[]);

@@ -144,7 +144,7 @@ PetscErrorCode SbEffectAccept_Contact(SbEffect e, SbSpace space, const SbStage *
     place(space, touch->node, stage->u, x);
     normal = normal_force(c, &pose, touch, x, n);
     if (!exact(c)) touch->on = (PetscBool)(normal > 0);
-    touch->was = touch->on;
+    touch->was = (PetscBool)(touch->on && touch->rest <= 0);
     touch->kept = PetscMin(0, touch->rest);
     if (touch->pressing <= 0) continue;
     touch->slips = (PetscBool)(drag(c, &pose, touch, x, n, t) < 1);
@@ -152,7 +152,6 @@ PetscErrorCode SbEffectAccept_Contact(SbEffect e, SbSpace space, const SbStage *
     for (int k = 0; k < 3; k++) x[k] += t[k] / touch->k;
     SbPoseInvert(&pose, x, touch->anchor);
   }
-  if (c->restitution > 0) PetscCall(SbReboundEnd(c, space, stage->v));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -19,16 +19,21 @@ static PetscErrorCode hold(SbModel m, PetscReal t, Vec U)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbModelContactBegin(SbModel m, PetscReal t, PetscReal dt, Vec U0, Vec U)
+PetscErrorCode SbModelContactBegin(SbModel m, PetscReal t, PetscReal dt, Vec U0, Vec V0, Vec U)
 {
-  const PetscReal *u0, *u;
+  const PetscReal *u0, *u, *v0 = NULL;
 
   PetscFunctionBeginUser;
   PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_CONTACT], 0, 0, 0, 0));
   PetscCall(SbSpaceGetLocalRead(m->space, U0, &u0));
   PetscCall(SbSpaceGetLocalRead(m->space, U, &u));
+  if (m->nrebound) {
+    PetscCall(SbModelReboundBegin(m, dt, U0, V0));
+    PetscCall(SbSpaceGetLocalRead(m->space, V0, &v0));
+  }
   for (PetscInt e = 0; e < m->ntouch; e++)
-    PetscCall(m->touch[e]->ops.touch(m->touch[e], m->space, t, dt, u0, u));
+    PetscCall(m->touch[e]->ops.touch(m->touch[e], m->space, t, dt, u0, v0, u));
+  if (m->nrebound) PetscCall(SbSpaceRestoreLocalRead(m->space, V0, &v0));
   PetscCall(SbSpaceRestoreLocalRead(m->space, U, &u));
   PetscCall(SbSpaceRestoreLocalRead(m->space, U0, &u0));
   PetscCall(hold(m, t + dt, U));
@@ -52,6 +57,7 @@ PetscErrorCode SbModelContactSettle(SbModel m, PetscReal t, Vec U, Vec R, PetscB
   PetscCall(SbSpaceRestoreLocalRead(m->space, R, &r));
   PetscCall(SbSpaceRestoreLocalRead(m->space, U, &u));
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, again, 1, SB_MPI_BOOL, MPI_LOR, m->comm));
+  if (m->nrebound && !*again && !m->space->rough) PetscCall(SbModelReboundSettle(m, U, again));
   if (*again) PetscCall(hold(m, t, U));
   PetscCall(PetscLogEventEnd(SbEvents[SB_EVENT_CONTACT], 0, 0, 0, 0));
   PetscFunctionReturn(PETSC_SUCCESS);

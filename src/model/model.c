@@ -21,6 +21,7 @@ PetscErrorCode SbModelDestroy(SbModel *model)
   PetscCall(PetscFree(m->hold));
   PetscCall(PetscFree(m->settle));
   PetscCall(PetscFree(m->arrive));
+  PetscCall(PetscFree(m->rebound));
   PetscCall(PetscFree(m->tangent));
   PetscCall(PetscFree(m->accept));
   PetscCall(PetscFree(m->history));
@@ -93,6 +94,7 @@ PetscErrorCode SbModelSetUp(SbModel m)
   SORT_INTO_LIST(m, hold);
   SORT_INTO_LIST(m, settle);
   SORT_INTO_LIST(m, arrive);
+  SORT_INTO_LIST(m, rebound);
   SORT_INTO_LIST(m, force);
   SORT_INTO_LIST(m, tangent);
   SORT_INTO_LIST(m, accept);

@@ -79,7 +79,7 @@ PetscErrorCode SbRunSolveContact(SbRun run, SNES snes, PetscReal t, PetscReal dt
   if (!run->R) PetscCall(VecDuplicate(U, &run->R));
   run->arrival = 1.;
   PetscCall(get_aim(snes, &aim));
-  PetscCall(SbModelContactBegin(m, t, dt, U0, U));
+  PetscCall(SbModelContactBegin(m, t, dt, U0, run->V, U));
   held = SbSpaceIsHeld(m->space);
   rough = (PetscBool)(held && m->dynamic);
   /* the matrix holds what was held before */

@@ -51,6 +51,12 @@ static PetscErrorCode check_refused(void)
     {"-effect_meet_stiffness 0", "-effect_meet_stiffness"},
     {"-effect_meet_reach -1", "-effect_meet_reach"},
     {"-effect_meet_recovery 0.5", "-effect_meet_recovery"},
+    {"-effect_meet_restitution 1.5", "-effect_meet_restitution 1.5"},
+    {"-effect_meet_restitution 0.5 -effect_meet_response augmented",
+     "-effect_meet_restitution 0.5 needs -effect_meet_response projected or multiplier"},
+    {"-effect_meet_restitution 0.5 -effect_meet_arrival cut",
+     "-effect_meet_restitution 0.5 and -effect_meet_arrival cut do not go together"},
+    {"-effect_meet_restitution 0.5 -time genalpha", "-effect_meet_restitution needs -time euler_implicit"},
     {"-sets left -set_left_at plane:1,0,0,0 -effect_meet_on left", "The effect meet has only one body"},
     {"-effect_meet_arrival late", "whole"},
     {"-time genalpha -effect_meet_arrival cut", "-time genalpha gains energy with -effect_meet_arrival cut"},
@@ -124,7 +130,7 @@ static void come_down(Meeting *x, PetscReal depth)
 static PetscErrorCode attempt(Meeting *x)
 {
   PetscFunctionBeginUser;
-  PetscCall((*x->e->ops.touch)(x->e, x->s, 0, 0.01, x->u0, x->u));
+  PetscCall((*x->e->ops.touch)(x->e, x->s, 0, 0.01, x->u0, NULL, x->u));
   SbSpaceCoupleClear(x->s);
   PetscCall((*x->e->ops.hold)(x->e, x->s));
   PetscCall(SbSpaceCoupleDone(x->s));

@@ -95,7 +95,7 @@ static PetscErrorCode press(Fixture *x, SbEffect e)
 
   PetscFunctionBeginUser;
   PetscCall(PetscCalloc1(3 * x->space->nnode, &u0));
-  PetscCall((*e->ops.touch)(e, x->space, 0, 0.1, u0, u0));
+  PetscCall((*e->ops.touch)(e, x->space, 0, 0.1, u0, NULL, u0));
   push(x, 1);
   if (e->ops.settle) PetscCall((*e->ops.settle)(e, x->space, x->u, x->f, &changed));
   PetscCall(PetscFree(u0));

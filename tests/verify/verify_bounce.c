@@ -112,7 +112,8 @@ static PetscErrorCode check_ball(const char *element, PetscReal e)
     SB_CHECK_NEAR(ratio, e * e, STEP * PetscSqrtReal(2 * GRAVITY / b.peak[k - 1]) + 0.002,
                   "height after a bounce");
   }
-  SB_CHECK(b.gain < 1e-9, "a step gains %g J", (double)b.gain);
+  /* how exactly nodes are put on the obstacle, 1e-7 of the size, times the weight: where it comes to rest */
+  SB_CHECK(b.gain < 1e-7 * 4 * RADIUS * b.mass * GRAVITY, "a step gains %g J", (double)b.gain);
   PetscCall(verify_mesh_remove(path));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
