@@ -189,6 +189,8 @@ PetscErrorCode SbSpaceCoupleRow(SbSpace space, PetscInt id, PetscInt n, const Pe
 PetscErrorCode SbSpaceCoupleSpring(SbSpace space, PetscInt n, const PetscInt gnode[], const PetscReal coef[],
                                    const PetscReal push[], PetscReal value, PetscReal stiffness,
                                    PetscReal constant, PetscInt *row);
+/* The spring holds nodes on something that is no body: its force is a reaction. Not collective. */
+void SbSpaceCoupleOutside(SbSpace space, PetscInt row);
 /* Makes matrices of the rows; without rows on any rank it exchanges no more than their number. Collective. */
 PetscErrorCode SbSpaceCoupleDone(SbSpace space);
 /* What rows push with and where they are, for the displacement U and its residual R without constraints (N). R <- R less the

@@ -16,7 +16,7 @@
   A row that has come several times within a step stays, and n and b are kept after some looks: the loop ends. `penalty`: springs
   N = <-k g>. `augmented`: N = <lambda - k g> with a multiplier that is raised after each solve (Simo and Laursen 1992).
 
-  Friction is in collision_friction.c.
+  Friction is in friction.c.
 
   With one surface looking for the other (`sides one`), the finer one looks: rows then are not more than the surface can take. A thin
   or much coarser partner wants both.
@@ -129,6 +129,7 @@ static PetscErrorCode options_collision(SbEffect e, const SbScope *scope)
   PetscCall(SbOptionChoice(scope, "response", &choice));
   c->response = (Response)choice;
   e->saddle = (PetscBool)(c->response == MULTIPLIER);
+  c->friction.exact = exact(c->response);
   PetscCall(SbOptionChoice(scope, "arrival", &choice));
   c->cut = (PetscBool)(choice == 1);
   if (!c->cut) e->ops.arrive = NULL;
@@ -138,14 +139,14 @@ static PetscErrorCode options_collision(SbEffect e, const SbScope *scope)
   PetscCall(SbOptionChoice(scope, "sides", &choice));
   c->both = (PetscBool)(choice == 1);
   PetscCall(SbOptionBool(scope, "self", &c->self));
-  PetscCall(SbOptionReal(scope, "friction", &c->mu));
-  PetscCall(SbOptionReal(scope, "friction_kinetic", &c->mu_kinetic));
-  if (c->mu_kinetic < 0) c->mu_kinetic = c->mu;
+  PetscCall(SbOptionReal(scope, "friction", &c->friction.mu));
+  PetscCall(SbOptionReal(scope, "friction_kinetic", &c->friction.mu_kinetic));
+  if (c->friction.mu_kinetic < 0) c->friction.mu_kinetic = c->friction.mu;
   PetscCheck(
-    c->mu_kinetic <= c->mu, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
+    c->friction.mu_kinetic <= c->friction.mu, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
     "-effect_%s_friction_kinetic %g is above -effect_%s_friction %g: a slipping point would stop and "
     "go at once",
-    e->name, (double)c->mu_kinetic, e->name, (double)c->mu);
+    e->name, (double)c->friction.mu_kinetic, e->name, (double)c->friction.mu);
   PetscCall(SbOptionReal(scope, "stiffness", &c->stiffness));
   PetscCall(SbOptionReal(scope, "reach", &c->reach));
   PetscCall(read_restitution(e, scope));
@@ -251,7 +252,7 @@ static PetscErrorCode setup_collision(SbEffect e, SbSpace space)
   PetscCall(PetscMalloc1(3 * space->nnode, &c->u0));
   if (c->bounce.e > 0) PetscCall(PetscMalloc1(3 * space->nnode, &c->flight));
   if (c->reach == 0) c->reach = 0.5 * c->surface->edge;
-  PetscCall(SbSpaceCoupleCreate(space, PETSC_FALSE, (PetscBool)(c->mu > 0)));
+  PetscCall(SbSpaceCoupleCreate(space, PETSC_FALSE, (PetscBool)(c->friction.mu > 0)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -286,7 +287,7 @@ static PetscErrorCode touch_collision(SbEffect e, SbSpace space, PetscReal t, Pe
   PetscFunctionBeginUser;
   (void)t;
   PetscCall(PetscArraycpy(c->u0, u0, 3 * space->nnode));
-  c->updates = 0;
+  c->friction.updates = 0;
   PetscCall(SbCollisionRestore(c));
   c->first = PETSC_TRUE;
   c->arrival = 1;
@@ -299,16 +300,18 @@ static PetscErrorCode touch_collision(SbEffect e, SbSpace space, PetscReal t, Pe
     PetscCall(SbCollisionLook(c, u, PETSC_FALSE));
   for (PetscInt i = 0; i < c->nhit; i++) {
     Hit *hit = &c->hit[i];
+    const PetscBool was = hit->on;
 
     hit->toggles = hit->looks = 0;
     if (!hit->on) hit->lambda = 0;
-    if (c->mu > 0) SbFrictionBegin(hit);
+    if (c->friction.mu > 0) SbFrictionBegin(&hit->grip, hit->on);
     watch_arrival(c, hit);
     if (!exact(c->response))
       hit->on =
         (PetscBool)(hit->lambda - hit->k * (SbCollisionExcess(hit) - TOLERANCE * c->surface->size) >= 0);
     else if (SbCollisionExcess(hit) <= TOLERANCE * c->surface->size)
       SbCollisionHit(c, hit);
+    if (c->friction.mu > 0 && hit->on && !was) SbCollisionFrictionEnter(c, hit);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -342,18 +345,18 @@ static PetscErrorCode hold_collision(SbEffect e, SbSpace space)
     PetscReal coef[3 * NODES], push[3 * NODES];
     PetscBool oblique = PETSC_FALSE;
 
-    hit->row = hit->slide[0] = hit->slide[1] = -1;
+    hit->row = hit->grip.slide[0] = hit->grip.slide[1] = -1;
     if (!hit->on) continue;
     hit->held = hit->mine;
     SbCollisionCoef(hit, hit->normal, coef);
-    if (c->mu > 0) SbFrictionPush(c, hit, push, &oblique);
+    if (c->friction.mu > 0) SbCollisionFrictionPush(c, hit, push, &oblique);
     if (exact(c->response))
       PetscCall(SbSpaceCoupleRow(space, SbCollisionId(c, i), hit->n, hit->node, coef, oblique ? push : NULL,
                                  SbCollisionPlace(hit), &hit->row));
     else
       PetscCall(SbSpaceCoupleSpring(space, hit->n, hit->node, coef, oblique ? push : NULL,
                                     SbCollisionPlace(hit), hit->k, hit->lambda, &hit->row));
-    if (c->mu > 0) PetscCall(SbFrictionHold(c, space, i));
+    if (c->friction.mu > 0) PetscCall(SbCollisionFrictionHold(c, space, i));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -420,7 +423,7 @@ static void read_rows(const Collision *c, SbSpace space, Hit *hit)
     if (exact(c->response)) hit->lambda = force;
     hit->gap = along - hit->value;
   }
-  if (c->mu > 0) SbFrictionRead(c, space, along, hit);
+  if (c->friction.mu > 0) SbCollisionFrictionRead(c, space, along, hit);
 }
 
 static PetscErrorCode settle_collision(SbEffect e, SbSpace space, const PetscReal u[], const PetscReal r[],
@@ -438,14 +441,16 @@ static PetscErrorCode settle_collision(SbEffect e, SbSpace space, const PetscRea
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &largest, 1, MPIU_REAL, MPI_MAX, space->comm));
   for (PetscInt i = 0; i < c->nhit; i++) {
     Hit *hit = &c->hit[i];
+    const PetscBool was = hit->on;
     PetscBool right;
 
     if (c->first && !hit->on) watch_arrival(c, hit);
     right = exact(c->response) ? settle_row(c, largest, hit) : settle_spring(c, hit);
     if (!right) mine = PETSC_TRUE;
+    if (c->friction.mu > 0 && hit->on && !was) SbCollisionFrictionEnter(c, hit);
   }
   c->first = PETSC_FALSE;
-  if (c->mu > 0) SbFrictionSettle(c, largest, &mine);
+  if (c->friction.mu > 0) SbCollisionFrictionSettle(c, largest, &mine);
   if (mine) *changed = PETSC_TRUE;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -458,7 +463,7 @@ static PetscErrorCode accept_collision(SbEffect e, SbSpace space, const SbStage 
   Collision *c = (Collision *)e->data;
 
   PetscFunctionBeginUser;
-  if (c->mu > 0) PetscCall(SbFrictionAccept(c, e->name, space, stage->t));
+  if (c->friction.mu > 0) PetscCall(SbCollisionFrictionAccept(c, e->name, space, stage->t));
   for (PetscInt i = 0; i < c->nhit; i++) {
     Hit *hit = &c->hit[i];
     const PetscReal normal = hit->on ? SbCollisionForce(c, hit) : 0;
@@ -493,7 +498,7 @@ static PetscErrorCode history_collision(SbEffect e, SbSpace space, const SbStage
     if (!hit->on || SbCollisionForce(c, hit) <= 0) continue;
     values[0]++;
     values[3] += SbCollisionForce(c, hit);
-    values[4] += PetscSqrtReal(SbDot3(hit->drag, hit->drag));
+    values[4] += PetscSqrtReal(SbDot3(hit->grip.drag, hit->grip.drag));
   }
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &deepest, 1, MPIU_REAL, MPI_MAX, space->comm));
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, sum, 2, MPIU_REAL, MPI_SUM, space->comm));
@@ -503,7 +508,7 @@ static PetscErrorCode history_collision(SbEffect e, SbSpace space, const SbStage
     values[2] = sum[1] > 0 ? sum[0] / sum[1] : 0;
   }
   values[5] = c->work;
-  values[6] = c->loss;
+  values[6] = c->friction.loss;
   SbPairsHistory(c, space, values);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

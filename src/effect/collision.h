@@ -2,6 +2,7 @@
   collision.h - pairs of a point and a surface near it, and of two edges: what collision.c and collision_look.c share.
 */
 #pragma once
+#include "friction.h"
 #include "rebound.h"
 #include "sbdetect.h"
 #include "sbeffect.h"
@@ -9,7 +10,7 @@
 #define FEW_LOOKS 3    /* how often normal and weights of a row are taken anew within a step in any case */
 #define LOOKS 8        /* and how often while its gap is not closed */
 #define TOLERANCE 1e-7 /* of the size of the bodies: largest penetration that counts as touching */
-#define NODES 8        /* of a row, at most: of two cells; with a point one, and those of the facet's cell */
+#define NODES SB_FRICTION_NODES
 
 typedef enum { PROJECTED, MULTIPLIER, AUGMENTED, PENALTY } Response;
 
@@ -44,16 +45,9 @@ typedef struct {
   PetscBool was;              /* it touched at the end of the last step, and did not bounce */
   int toggles, looks;         /* within the step */
   PetscBool rests;            /* other rows say it */
-  PetscInt row, slide[2];     /* rows of the space, -1: none */
+  PetscInt row;               /* of the space, -1: none */
   PetscReal lambda;           /* multiplier, N */
-  PetscBool slides;           /* in the solve; else it sticks */
-  PetscBool slid;             /* in the last step */
-  int flips;                  /* how often that or its direction has turned within the step */
-  PetscReal tangent[2][3];    /* across the normal; the first one is where it slides to */
-  PetscReal turning;          /* stiffness across where it slides to, N/m */
-  PetscReal stretch[3];       /* of the springs that stick, at the start of the step, m */
-  PetscReal drag[3];          /* force of friction on the point in the last solve, N */
-  PetscReal pressing;         /* normal force of the solve before, N */
+  SbGrip grip;                /* friction */
 } Hit;
 
 /* Columns of the history for each pair of bodies (collision_pairs.c). */
@@ -72,7 +66,8 @@ typedef struct {
   SbDetector detector;
   Response response;
   PetscBool self, both;
-  PetscReal mu, mu_kinetic, stiffness, reach;
+  SbFriction friction;
+  PetscReal stiffness, reach;
   PetscReal recovery; /* part of a depth that is left after a step */
   PetscReal *edge;    /* [nbody] mean edge of the surfaces, m: the finer one looks */
   PetscReal *point_k; /* [npoint] N/m */
@@ -81,15 +76,12 @@ typedef struct {
   PetscReal *flight;  /* [nnode][3] that at its end if nothing had a force, m; NULL without restitution */
   SbRebound bounce;
   PetscInt nhit, size, npast, past_size;
-  Hit *hit, *spare;    /* by point and part */
-  Hit *past;           /* [npast] as the last step left them: each attempt at a step begins there */
-  PetscBool cut;       /* steps end where points arrive */
-  PetscBool first;     /* the step has not been solved yet */
-  PetscReal arrival;   /* the part of it after which the first point arrives, 1: none */
-  int updates;         /* of friction within the step */
-  PetscReal unsettled; /* largest error of friction after the last solve, as a part of the largest friction */
-  PetscBool said;      /* that friction did not settle */
-  PetscReal work, loss; /* of the contact forces and of friction since the start, this rank, J */
+  Hit *hit, *spare;  /* by point and part */
+  Hit *past;         /* [npast] as the last step left them: each attempt at a step begins there */
+  PetscBool cut;     /* steps end where points arrive */
+  PetscBool first;   /* the step has not been solved yet */
+  PetscReal arrival; /* the part of it after which the first point arrives, 1: none */
+  PetscReal work;    /* of the contact forces since the start, this rank, J */
   SbPairs pairs;
 } Collision;
 
@@ -150,18 +142,18 @@ PetscErrorCode SbEffectCurb_Collision(SbEffect e, PetscReal share);
 PetscInt SbCollisionId(const Collision *c, PetscInt i);
 #define SB_COLLISION_IDS (PETSC_MAX_INT / 3)
 
-/* collision_friction.c: what a pair begins a step with; not collective. */
-void SbFrictionBegin(Hit *hit);
-/* Coefficients that the normal force pushes along, if it has friction with it (oblique). */
-void SbFrictionPush(const Collision *c, const Hit *hit, PetscReal push[3 * NODES], PetscBool *oblique);
+/* collision_friction.c, by the functions of friction.h. The pair touches from now on. */
+void SbCollisionFrictionEnter(const Collision *c, Hit *hit);
+/* Coefficients that the normal force of a pair pushes along, if not its own (oblique). */
+void SbCollisionFrictionPush(const Collision *c, Hit *hit, PetscReal push[3 * NODES], PetscBool *oblique);
 /* Rows across the normal of hit i, which touches. Not collective. */
-PetscErrorCode SbFrictionHold(const Collision *c, SbSpace space, PetscInt i);
+PetscErrorCode SbCollisionFrictionHold(const Collision *c, SbSpace space, PetscInt i);
 /* What a solve made of them; along: the sum of the normal's row, m. */
-void SbFrictionRead(const Collision *c, SbSpace space, PetscReal along, Hit *hit);
+void SbCollisionFrictionRead(const Collision *c, SbSpace space, PetscReal along, Hit *hit);
 /* Who sticks and who slides from now on; changed: the solve was not right. largest: normal force of all pairs, N. Not collective. */
-void SbFrictionSettle(Collision *c, PetscReal largest, PetscBool *changed);
-/* Ends a step: losses, springs, a warning if friction was taken as it was. Collective. */
-PetscErrorCode SbFrictionAccept(Collision *c, const char effect[], SbSpace space, PetscReal t);
+void SbCollisionFrictionSettle(Collision *c, PetscReal largest, PetscBool *changed);
+/* Ends a step. Collective. */
+PetscErrorCode SbCollisionFrictionAccept(Collision *c, const char effect[], SbSpace space, PetscReal t);
 
 /* collision_pairs.c: names the columns, when they are wanted, behind those of e. Not collective. */
 PetscErrorCode SbPairsSetUp(SbEffect e, SbMesh mesh);

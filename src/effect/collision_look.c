@@ -179,7 +179,7 @@ static PetscErrorCode merge(Collision *c, const Found *found, PetscBool within)
   PetscFunctionBeginUser;
   PetscCall(make_room(c, n + c->nhit));
   for (PetscInt i = 0; i < n; i++) {
-    Hit hit = {.row = -1, .slide = {-1, -1}};
+    Hit hit = {.row = -1, .grip = {.slide = {-1, -1}}};
 
     name_of(c, found, i, &hit);
     if (hit.point < s->npoint && !looks_for(c, s->point_part[hit.point], hit.part)) continue;

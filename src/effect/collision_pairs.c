@@ -30,7 +30,7 @@ static PetscBool force_of(SbSpace space, const Hit *hit, PetscReal normal[3], Pe
   if (!hit->on || hit->row < 0) return PETSC_FALSE;
   SbSpaceCouplePush(space, hit->row, hit->held, normal, force);
   for (int q = 0; q < 2; q++) {
-    if (hit->slide[q] >= 0) SbSpaceCouplePush(space, hit->slide[q], hit->held, across, force);
+    if (hit->grip.slide[q] >= 0) SbSpaceCouplePush(space, hit->grip.slide[q], hit->held, across, force);
   }
   return (PetscBool)(SbDot3(force, force) > 0);
 }

@@ -13,9 +13,9 @@
   Response `penalty`: springs, N = k <-g>, with k from the stiffness of the cell behind. `augmented`: the penalty with a multiplier,
   N = <lambda - k g>, which is raised after each solve until the penetration is within the tolerance (Simo and Laursen 1992).
 
-  Friction: a tangential spring of stiffness k to the place where the node began to stick, which lets go at mu N and slides at
-  mu_k N (the elastic slip and return mapping of Wriggers 2006). During a solve N is that of the solve before, so the force has a
-  potential and a symmetric tangent; solves are repeated until N has settled (the fixed point of Necas, Jarusek and Haslinger 1980).
+  Friction (friction.c) is solved for with N. It needs rows: with it all responses write their nodes as such, `projected` exact ones in whose
+  null space the solves run, `penalty` and `augmented` springs, linear while normals and who touches stay, which is looked at after each
+  solve. A node sticks to the place of the obstacle where it was when the step began, and moves with it.
 
   Overlap that is there when a step begins is not thrown out at once: a node may stay behind the obstacle by that depth, which falls to
   1/e in `recovery` steps. With springs that is the depth beyond what they give. A static run closes it at once.
@@ -29,8 +29,10 @@
 #define JUMP 1e-6    /* 1 - cosine: a flip */
 #define TOGGLES 3    /* how often a node may come within a step before it stays */
 #define PULLING 1e-6 /* of the largest contact force: what a node must pull with to leave */
-#define SETTLED 1e-3 /* of the largest contact force: change of the N that friction assumed */
-#define UPDATES 8    /* of that N within a step */
+#define SETTLED 1e-4 /* of the largest contact force: what that of a spring may be off */
+
+/* Identities of the rows: normals of all obstacles before what holds nodes across them. */
+#define NORMALS (PETSC_MIN_INT / 2)
 
 static const SbOption rows[] = {
   {"on", SB_OPTION_NAMES, 1, "", "boundary", "", "sets whose surface may touch"},
@@ -50,7 +52,7 @@ static const SbOption rows[] = {
   {"friction_kinetic", SB_OPTION_REAL, 1, "", "-1", "[-1, inf)",
    "Coulomb's coefficient for slipping; negative: that for sticking"},
   {"stiffness", SB_OPTION_REAL, 1, "", "20", "(0, inf)",
-   "springs of penalty and augmented: factor on (lambda + 2 mu) area / height of the cell behind"},
+   "springs of penalty, augmented and friction: factor on (lambda + 2 mu) area / height of the cell behind"},
   {"restitution", SB_OPTION_REAL, 1, "", "0", "[0, 1]",
    "part of their speed with which nodes leave what they hit; needs -time euler_implicit, and a body that is "
    "stiff within a step to bounce as a whole"},
@@ -113,13 +115,13 @@ static PetscErrorCode options_contact(SbEffect e, const SbScope *scope)
   PetscCall(SbOptionChoice(scope, "arrival", &choice));
   c->cut = (PetscBool)(choice == 1);
   if (!c->cut) e->ops.arrive = NULL;
-  PetscCall(SbOptionReal(scope, "friction", &c->mu));
-  PetscCall(SbOptionReal(scope, "friction_kinetic", &c->mu_kinetic));
-  if (c->mu_kinetic < 0) c->mu_kinetic = c->mu;
-  PetscCheck(c->mu_kinetic <= c->mu, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
+  PetscCall(SbOptionReal(scope, "friction", &c->friction.mu));
+  PetscCall(SbOptionReal(scope, "friction_kinetic", &c->friction.mu_kinetic));
+  if (c->friction.mu_kinetic < 0) c->friction.mu_kinetic = c->friction.mu;
+  PetscCheck(c->friction.mu_kinetic <= c->friction.mu, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
              "-effect_%s_friction_kinetic %g is above -effect_%s_friction %g: a slipping node would stop and "
              "go at once",
-             e->name, (double)c->mu_kinetic, e->name, (double)c->mu);
+             e->name, (double)c->friction.mu_kinetic, e->name, (double)c->friction.mu);
   PetscCall(SbOptionReal(scope, "stiffness", &c->stiffness));
   PetscCall(SbOptionReal(scope, "restitution", &c->bounce.e));
   PetscCheck(c->bounce.e <= 0 || exact(c), PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
@@ -135,14 +137,17 @@ static PetscErrorCode options_contact(SbEffect e, const SbScope *scope)
   PetscCall(SbOptionReal(scope, "recovery", &c->recovery));
   c->recovery = c->recovery > 1 ? PetscExpReal(-1 / c->recovery) : 0;
   PetscCall(read_path(e, scope));
-  if (exact(c)) {
-    if (c->mu <= 0) e->ops.tangent = NULL;
-    e->linear = (PetscBool)(c->mu <= 0);
+  c->friction.exact = exact(c);
+  c->rows = (PetscBool)(c->response == MULTIPLIER || c->friction.mu > 0);
+  if (exact(c) || c->rows) {
+    e->ops.force = NULL;
+    e->ops.tangent = NULL;
   } else {
-    e->linear = PETSC_FALSE;
     e->ops.hold = NULL;
+    e->linear = PETSC_FALSE;
+    if (c->response == PENALTY && !c->cut) e->ops.settle = NULL;
   }
-  if (c->response == PENALTY && c->mu <= 0 && !c->cut) e->ops.settle = NULL;
+  if (c->rows) e->ops.push = NULL; /* they push without it */
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -199,8 +204,10 @@ static PetscErrorCode setup_contact(SbEffect e, SbSpace space)
       box[k] = PetscMax(box[k], space->mesh->body[b].bbox[3 + k] - space->mesh->body[b].bbox[k]);
   }
   c->size = PetscSqrtReal(SbDot3(box, box));
-  if (c->response == PROJECTED) PetscCall(SbSpaceHoldCreate(space));
-  if (c->response == MULTIPLIER) PetscCall(SbSpaceCoupleCreate(space, PETSC_TRUE, PETSC_FALSE));
+  if (c->rows)
+    PetscCall(SbSpaceCoupleCreate(space, PETSC_TRUE, (PetscBool)(c->friction.mu > 0)));
+  else if (exact(c))
+    PetscCall(SbSpaceHoldCreate(space));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -253,8 +260,13 @@ static PetscReal rest_of(const Contact *c, const SbPose *from, const Touch *touc
 }
 
 /* A node is behind the obstacle: from now on it is held. */
-static void enter(const Contact *c, Touch *touch)
+static void enter(const Contact *c, SbSpace space, Touch *touch)
 {
+  if (!touch->on && c->friction.mu > 0) {
+    const SbFrictionPair p = pair_of(space, touch);
+
+    SbFrictionEnter(&c->friction, &p, -touch->gap);
+  }
   touch->on = PETSC_TRUE;
   if (c->bounce.e > 0) SbContactHit(c, touch);
 }
@@ -280,6 +292,24 @@ static PetscErrorCode arrive_contact(SbEffect e, PetscReal *part)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The place on the obstacle where a node was when the step began, x0, moves with it: there the node sticks. One that arrives in this
+   step sticks to where it was at its start. */
+static void start_friction(const Contact *c, SbSpace space, const SbPose *from, const PetscReal x0[3],
+                           Touch *touch)
+{
+  const PetscReal *X = space->node_x + 3 * touch->node;
+  PetscReal at[3], x1[3];
+
+  SbPoseInvert(from, x0, at);
+  SbPoseApply(&c->to, at, x1);
+  for (int k = 0; k < 3; k++) {
+    touch->start[k] = x1[k] - X[k];
+    touch->grip.stretch[k] = SbDot3(c->to.R + 3 * k, touch->stretch);
+  }
+  touch->rests = PETSC_FALSE;
+  SbFrictionBegin(&touch->grip, touch->on);
+}
+
 static PetscErrorCode touch_contact(SbEffect e, SbSpace space, PetscReal t, PetscReal dt,
                                     const PetscReal u0[], const PetscReal v0[], const PetscReal u[])
 {
@@ -289,7 +319,7 @@ static PetscErrorCode touch_contact(SbEffect e, SbSpace space, PetscReal t, Pets
   PetscFunctionBeginUser;
   SbContactPose(c, t, &from);
   SbContactPose(c, t + dt, &c->to);
-  c->updates = 0;
+  c->friction.updates = 0;
   c->first = PETSC_TRUE;
   c->arrival = 1;
   SbReboundBegin(&c->bounce, dt);
@@ -308,15 +338,39 @@ static PetscErrorCode touch_contact(SbEffect e, SbSpace space, PetscReal t, Pets
     touch->rest = rest_of(c, &from, touch, x0);
     comes =
       (PetscBool)(c->bounce.e > 0 && SbContactComes(c, &from, x0, v0 ? v0 + 3 * touch->node : NULL, touch));
-    if (!touch->on) { /* a node that arrives in this step sticks to where it was at its start */
-      SbPoseInvert(&from, x0, touch->anchor);
-      touch->pressing = 0;
-      touch->slips = PETSC_FALSE;
-    }
+    if (c->friction.mu > 0) start_friction(c, space, &from, x0, touch);
     touch->gap = look(c, space, x, touch);
     watch_arrival(c, touch);
-    if ((touch->gap < 0 || comes) && exact(c)) enter(c, touch);
+    for (int k = 0; k < 3; k++) touch->now[k] = u[3 * touch->node + k];
+    if ((touch->gap < 0 || comes) && exact(c)) enter(c, space, touch);
+    if (!c->rows || exact(c)) continue;
+    if (spring(touch, touch->gap) > 0)
+      enter(c, space, touch);
+    else
+      touch->on = PETSC_FALSE;
   }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The rows of a node that touches. */
+static PetscErrorCode hold_rows(const Contact *c, SbSpace space, Touch *touch)
+{
+  const PetscInt id = space->node_orig[touch->node];
+  const SbFrictionPair p = pair_of(space, touch);
+  PetscBool oblique = PETSC_FALSE;
+  PetscReal push[3];
+
+  PetscFunctionBeginUser;
+  if (c->friction.mu > 0) SbFrictionDirection(&c->friction, &p, push, &oblique);
+  if (exact(c))
+    PetscCall(SbSpaceCoupleRow(space, NORMALS - 1 - id, 1, p.node, touch->n, oblique ? push : NULL,
+                               touch->value, &touch->along));
+  else {
+    PetscCall(SbSpaceCoupleSpring(space, 1, p.node, touch->n, oblique ? push : NULL, touch->value, touch->k,
+                                  touch->lambda, &touch->along));
+    SbSpaceCoupleOutside(space, touch->along);
+  }
+  if (c->friction.mu > 0) PetscCall(SbFrictionHold(&c->friction, space, &p, -2 - 2 * id));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -328,15 +382,36 @@ static PetscErrorCode hold_contact(SbEffect e, SbSpace space)
   for (PetscInt i = 0; i < c->n; i++) {
     Touch *touch = &c->touch[i];
 
-    touch->along = -1;
+    touch->along = touch->grip.slide[0] = touch->grip.slide[1] = -1;
     if (!touch->on) continue;
-    if (c->response == PROJECTED)
-      touch->along = SbSpaceHold(space, touch->node, touch->n, touch->value);
+    if (c->rows)
+      PetscCall(hold_rows(c, space, touch));
     else
-      PetscCall(SbSpaceCoupleRow(space, -1 - space->node_orig[touch->node], 1, &space->gnode[touch->node],
-                                 touch->n, NULL, touch->value, &touch->along));
+      touch->along = SbSpaceHold(space, touch->node, touch->n, touch->value);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* What a solve made of the rows of a node, at the displacement u; f: their normal force, N. */
+static void read_rows(const Contact *c, SbSpace space, const PetscReal u[3], Touch *touch, PetscReal f[3])
+{
+  const SbFrictionPair p = pair_of(space, touch);
+  PetscReal force, along;
+
+  touch->rests = PETSC_FALSE;
+  for (int k = 0; k < 3; k++) f[k] = 0;
+  for (int k = 0; k < 3; k++) touch->now[k] = u[k];
+  if (touch->along < 0) return;
+  SbSpaceCoupleGet(space, touch->along, &force, &along);
+  touch->rests = SbSpaceCoupleRests(space, touch->along);
+  if (touch->rests) {
+    touch->along = -1;
+    force = 0;
+  }
+  for (int k = 0; k < 3; k++) f[k] = force * touch->n[k];
+  if (c->friction.mu <= 0) return;
+  SbFrictionRead(&c->friction, space, &p, force, along);
+  for (int k = 0; k < 3; k++) touch->now[k] = u[k];
 }
 
 /* Gap and multiplier of every node after a solve; the largest multiplier of all ranks. */
@@ -348,25 +423,29 @@ static PetscErrorCode measure(const Contact *c, SbSpace space, const PetscReal u
   for (PetscInt i = 0; i < c->n; i++) {
     Touch *touch = &c->touch[i];
     const PetscInt node = touch->node;
-    PetscReal x[3];
+    PetscReal x[3], f[3] = {0}, force;
 
-    if (c->response == MULTIPLIER && touch->along >= 0 && SbSpaceCoupleRests(space, touch->along))
-      touch->along = -1;
+    if (c->rows) read_rows(c, space, u + 3 * node, touch, f);
     if (exact(c)) touch->lambda = SbContactMultiplier(c, space, touch, r + 3 * node);
     place(space, node, u, x);
     touch->gap = look(c, space, x, touch);
-    *largest = PetscMax(*largest, exact(c) ? touch->lambda : spring(touch, touch->gap));
+    *largest = PetscMax(*largest, SbContactForce(c, touch));
+    if (exact(c) || !c->rows) continue;
+    force = touch->on && touch->toggles >= TOGGLES ? touch->lambda - touch->k * touch->gap
+                                                   : SbContactForce(c, touch);
+    for (int k = 0; k < 3; k++) f[k] -= force * touch->n[k];
+    touch->wrong = PetscSqrtReal(SbDot3(f, f));
   }
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, largest, 1, MPIU_REAL, MPI_MAX, space->comm));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Whether a node is held, or not, as it should be; changes it if not. */
-static PetscBool settle_held(const Contact *c, PetscReal largest, Touch *touch)
+static PetscBool settle_held(const Contact *c, SbSpace space, PetscReal largest, Touch *touch)
 {
   if (!touch->on) {
     if (touch->gap >= -TOLERANCE * c->size) return PETSC_TRUE;
-    enter(c, touch);
+    enter(c, space, touch);
     touch->toggles++;
     return PETSC_FALSE;
   }
@@ -380,35 +459,61 @@ static PetscBool settle_held(const Contact *c, PetscReal largest, Touch *touch)
   return (PetscBool)(PetscAbsReal(touch->gap) <= TOLERANCE * c->size);
 }
 
-/* The multiplier of `augmented`, raised until what is left of the penetration does not matter. */
-static PetscBool settle_multiplier(const Contact *c, Touch *touch)
+/* Whether a spring pushes with what its place asks for, and for `augmented`, whose multiplier is raised, until what is left of the penetration
+   does not matter. */
+static PetscBool settle_spring(const Contact *c, SbSpace space, PetscReal largest, Touch *touch)
 {
   const PetscReal force = spring(touch, touch->gap);
-  const PetscBool right =
-    (PetscBool)(force > 0 ? PetscAbsReal(touch->gap) <= TOLERANCE * c->size : touch->lambda <= 0);
+  PetscBool right = PETSC_TRUE;
 
-  if (!right) touch->lambda = force;
-  return right;
+  if (c->rows) {
+    if (!touch->on && force > 0) {
+      enter(c, space, touch);
+      touch->toggles++;
+    } else if (force <= 0 && touch->toggles < TOGGLES)
+      touch->on = PETSC_FALSE;
+    right = (PetscBool)(touch->wrong <= SETTLED * largest);
+  }
+  if (c->response == PENALTY) return right;
+  if (force > 0 ? PetscAbsReal(touch->gap) <= TOLERANCE * c->size : touch->lambda <= 0) return right;
+  touch->lambda = force;
+  return PETSC_FALSE;
 }
 
-/* Once who touches is settled everywhere: the N that friction assumes, from its second half on with half steps. */
-static PetscErrorCode settle_friction(Contact *c, SbSpace space, PetscReal largest, PetscBool *changed)
+/* Springs that have stayed as rows and pull when all else is settled: they go, a few times. */
+static PetscErrorCode let_go(const Contact *c, SbSpace space, PetscReal largest, PetscBool *changed)
 {
   PetscBool wait = *changed;
 
   PetscFunctionBeginUser;
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &wait, 1, SB_MPI_BOOL, MPI_LOR, space->comm));
-  if (wait || c->updates == UPDATES) PetscFunctionReturn(PETSC_SUCCESS);
-  c->updates++;
-  for (PetscInt i = 0; i < c->n; i++) {
+  for (PetscInt i = 0; !wait && i < c->n; i++) {
     Touch *touch = &c->touch[i];
-    const PetscReal normal = exact(c) ? touch->lambda : spring(touch, touch->gap);
-    const PetscReal change = normal - touch->pressing;
 
-    if (PetscAbsReal(change) > SETTLED * largest) *changed = PETSC_TRUE;
-    touch->pressing += 2 * c->updates > UPDATES ? 0.5 * change : change;
+    if (!touch->on || touch->toggles >= 2 * TOGGLES ||
+        touch->lambda - touch->k * touch->gap >= -PULLING * largest)
+      continue;
+    touch->on = PETSC_FALSE;
+    *changed = PETSC_TRUE;
   }
   PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Which nodes stick and which slide from now on. */
+static void settle_friction(Contact *c, SbSpace space, PetscReal largest, PetscBool *changed)
+{
+  PetscReal worst = 0;
+
+  for (PetscInt i = 0; i < c->n; i++) {
+    Touch *touch = &c->touch[i];
+    const SbFrictionPair p = pair_of(space, touch);
+    PetscReal error;
+
+    if (!touch->on || touch->along < 0) continue;
+    error = SbFrictionSettle(&c->friction, &p, SbContactForce(c, touch));
+    worst = PetscMax(worst, error);
+  }
+  SbFrictionJudge(&c->friction, worst, largest, changed);
 }
 
 /* After the first solve of a step: who arrives in it; springs of all nodes from now on. Whether one of these pushes. */
@@ -437,14 +542,15 @@ static PetscErrorCode settle_contact(SbEffect e, SbSpace space, const PetscReal 
   PetscCall(measure(c, space, u, r, &largest));
   if (c->first && c->cut && wake(c)) mine = PETSC_TRUE;
   c->first = PETSC_FALSE;
-  for (PetscInt i = 0; c->response != PENALTY && i < c->n; i++) {
+  for (PetscInt i = 0; i < c->n; i++) {
     Touch *touch = &c->touch[i];
     const PetscBool right =
-      c->response == AUGMENTED ? settle_multiplier(c, touch) : settle_held(c, largest, touch);
+      exact(c) ? settle_held(c, space, largest, touch) : settle_spring(c, space, largest, touch);
 
     if (!right) mine = PETSC_TRUE;
   }
-  if (c->mu > 0) PetscCall(settle_friction(c, space, largest, &mine));
+  if (c->friction.mu > 0) settle_friction(c, space, largest, &mine);
+  if (c->rows && !exact(c)) PetscCall(let_go(c, space, largest, &mine));
   if (mine) *changed = PETSC_TRUE;
   PetscFunctionReturn(PETSC_SUCCESS);
 }

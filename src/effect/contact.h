@@ -2,6 +2,7 @@
   contact.h - nodes of the surface against a rigid obstacle: what contact.c, contact_force.c and contact_rebound.c share.
 */
 #pragma once
+#include "friction.h"
 #include "rebound.h"
 #include "sbcontact.h"
 #include "sbeffect.h"
@@ -19,8 +20,8 @@ typedef struct {
   PetscBool idle;         /* its spring waits for the first solve of the step */
   PetscReal gap0;         /* gap when the step began, m; with `arrival cut` or restitution */
   int toggles, flips;     /* how often it came within the step, and while held changed facets */
-  PetscBool slips;        /* it slid at the end of the last step */
   PetscInt along;         /* number of its direction at the node, or of its row; -1: held by something else */
+  PetscBool rests;        /* other rows say what its own does */
   PetscReal surface[3];   /* normal of the obstacle at the last look */
   PetscReal n[3];         /* normal that it is held along, outwards from the obstacle */
   PetscReal value;        /* n . u that puts it on the obstacle, m */
@@ -30,17 +31,23 @@ typedef struct {
   PetscReal gap;  /* after the last solve, beyond `rest`, m */
   PetscReal
     arrives; /* restitution: speed towards the obstacle when the step began, m/s; 0: it does not rebound */
-  PetscReal lambda;    /* multiplier of the last solve, N */
-  PetscReal pressing;  /* N that friction assumes, N */
-  PetscReal anchor[3]; /* where it began to stick, in the obstacle's rest frame */
+  PetscReal lambda;   /* multiplier of the last solve, N */
+  PetscReal wrong;    /* rows as springs: force that its place asks for, less that of the last solve, N */
+  SbGrip grip;        /* friction */
+  PetscReal start[3]; /* displacement with which it would stick, m */
+  PetscReal now[3];   /* that of the last solve, m */
+  PetscReal
+    stretch[3]; /* of springs that stick, in the obstacle's rest frame, at the end of the last step, m */
 } Touch;
 
 typedef struct {
   SbEffectOn on;
   SbObstacle obstacle;
   Response response;
+  PetscBool rows;   /* touching nodes are held by rows, not by directions of their own */
   PetscBool facets; /* the obstacle is a mesh */
-  PetscReal mu, mu_kinetic, stiffness;
+  SbFriction friction;
+  PetscReal stiffness;
   PetscReal recovery;     /* part of an overlap that is left after a step */
   PetscReal scale, at[3]; /* of the file of a mesh */
   SbFormula displacement[3], angle;
@@ -52,7 +59,6 @@ typedef struct {
   PetscBool cut;     /* steps end where nodes arrive */
   PetscBool first;   /* the step has not been solved yet */
   PetscReal arrival; /* the part of it after which the first node arrives, 1: none */
-  int updates;       /* of the N of friction within the step */
   SbPose to;         /* at the end of the step */
 } Contact;
 
@@ -76,6 +82,30 @@ static inline void place(SbSpace space, PetscInt node, const PetscReal u[], Pets
 static inline PetscReal spring(const Touch *touch, PetscReal gap)
 {
   return touch->idle ? 0 : PetscMax(0, touch->lambda - touch->k * gap);
+}
+
+/* The same of any response after a solve, N. */
+static inline PetscReal SbContactForce(const Contact *c, const Touch *touch)
+{
+  return exact(c) ? touch->lambda : spring(touch, touch->gap);
+}
+
+/* A node as friction sees it; held by rows. */
+static inline SbFrictionPair pair_of(SbSpace space, Touch *touch)
+{
+  static const PetscReal one = 1;
+
+  return (SbFrictionPair){.n = 1,
+                          .node = &space->gnode[touch->node],
+                          .weight = &one,
+                          .normal = touch->n,
+                          .start = touch->start,
+                          .now = touch->now,
+                          .k = touch->k,
+                          .rests = touch->rests,
+                          .outer = PETSC_TRUE,
+                          .fixed = space->fixed[touch->node],
+                          .grip = &touch->grip};
 }
 
 /* What a solve has made of the force that holds a node, N; r: the residual there. */

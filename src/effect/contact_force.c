@@ -24,15 +24,6 @@ PetscReal SbContactGap(const Contact *c, const SbPose *pose, const PetscReal x[3
   return gap;
 }
 
-/* v less its part along n; returns the length of what is left. */
-static PetscReal tangential(const PetscReal n[3], const PetscReal v[3], PetscReal t[3])
-{
-  const PetscReal along = SbDot3(n, v);
-
-  for (int i = 0; i < 3; i++) t[i] = v[i] - along * n[i];
-  return PetscSqrtReal(SbDot3(t, t));
-}
-
 /* ------------------------------------------------------------------ forces */
 
 /*
@@ -42,26 +33,11 @@ static PetscReal tangential(const PetscReal n[3], const PetscReal v[3], PetscRea
 static PetscReal normal_force(const Contact *c, const SbPose *pose, const Touch *touch, const PetscReal x[3],
                               PetscReal n[3])
 {
-  if (exact(c)) {
+  if (exact(c) || c->rows) {
     for (int k = 0; k < 3; k++) n[k] = touch->n[k];
-    return touch->on && touch->along >= 0 ? touch->lambda : 0;
+    return touch->on && touch->along >= 0 ? SbContactForce(c, touch) : 0;
   }
   return spring(touch, SbContactGap(c, pose, x, n) - touch->rest);
-}
-
-/* Force of friction on a node, N. Returns its share of what the spring alone would pull with: 1 while it sticks. */
-static PetscReal drag(const Contact *c, const SbPose *pose, const Touch *touch, const PetscReal x[3],
-                      const PetscReal n[3], PetscReal f[3])
-{
-  const PetscReal most = (touch->slips ? c->mu_kinetic : c->mu) * touch->pressing;
-  PetscReal target[3], trial[3], length, share = 1;
-
-  SbPoseApply(pose, touch->anchor, target);
-  for (int i = 0; i < 3; i++) trial[i] = -touch->k * (x[i] - target[i]);
-  length = tangential(n, trial, f);
-  if (length > most) share = most / length;
-  for (int i = 0; i < 3; i++) f[i] *= share;
-  return share;
 }
 
 PetscErrorCode SbEffectForce_Contact(SbEffect e, SbSpace space, const SbStage *stage, PetscReal f[])
@@ -73,41 +49,16 @@ PetscErrorCode SbEffectForce_Contact(SbEffect e, SbSpace space, const SbStage *s
   SbContactPose(c, stage->t, &pose);
   for (PetscInt i = 0; i < c->n; i++) {
     const Touch *touch = &c->touch[i];
-    PetscReal *fi = f + 3 * touch->node, x[3], n[3], t[3], normal;
+    PetscReal x[3], n[3], normal;
 
     place(space, touch->node, stage->u, x);
     normal = normal_force(c, &pose, touch, x, n);
-    for (int k = 0; k < 3 && !exact(c); k++) fi[k] += normal * n[k];
-    if (touch->pressing <= 0) continue;
-    (void)drag(c, &pose, touch, x, n, t);
-    for (int k = 0; k < 3; k++) fi[k] += t[k];
+    for (int k = 0; k < 3; k++) f[3 * touch->node + k] += normal * n[k];
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Minus the derivative of a node's force at x, N/m; the turning of the normal is left out. False when there is none. */
-static PetscBool stiffness_of(const Contact *c, const SbPose *pose, const Touch *touch, const PetscReal x[3],
-                              PetscReal block[9])
-{
-  PetscReal n[3], t[3], along, across = 0, length, sliding = 0;
-
-  along = normal_force(c, pose, touch, x, n) > 0 && !exact(c) ? touch->k : 0;
-  if (touch->pressing > 0) {
-    const PetscReal share = drag(c, pose, touch, x, n, t);
-
-    across = touch->k * share;
-    length = SbDot3(t, t);
-    if (share < 1 && length > 0) sliding = across / length; /* along the slip the force does not change */
-  }
-  for (int k = 0; k < 9; k++) {
-    const PetscReal nn = n[k / 3] * n[k % 3];
-
-    block[k] = along * nn + across * ((k % 4 == 0) - nn);
-    if (sliding > 0) block[k] -= sliding * t[k / 3] * t[k % 3];
-  }
-  return (PetscBool)(along > 0 || across > 0);
-}
-
+/* The turning of the normal is left out. */
 PetscErrorCode SbEffectTangent_Contact(SbEffect e, SbSpace space, const SbStage *stage, Mat A)
 {
   const Contact *c = (const Contact *)e->data;
@@ -117,11 +68,11 @@ PetscErrorCode SbEffectTangent_Contact(SbEffect e, SbSpace space, const SbStage 
   SbContactPose(c, stage->t, &pose);
   for (PetscInt i = 0; i < c->n; i++) {
     const Touch *touch = &c->touch[i];
-    PetscReal x[3], block[9];
+    PetscReal x[3], n[3], block[9];
 
     place(space, touch->node, stage->u, x);
-    if (!stiffness_of(c, &pose, touch, x, block)) continue;
-    for (int k = 0; k < 9; k++) block[k] *= stage->shift_k;
+    if (normal_force(c, &pose, touch, x, n) <= 0) continue;
+    for (int k = 0; k < 9; k++) block[k] = stage->shift_k * touch->k * n[k / 3] * n[k % 3];
     PetscCall(SbSpaceAddSpring(space, A, touch->cell, touch->a, block));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -129,7 +80,19 @@ PetscErrorCode SbEffectTangent_Contact(SbEffect e, SbSpace space, const SbStage 
 
 /* ------------------------------------------------------------------ after a step */
 
-/* Who slid takes the anchor along, at the distance that the force asks for. */
+/* What friction leaves for the next step. */
+static void accept_friction(Contact *c, SbSpace space, const SbPose *pose, Touch *touch)
+{
+  const SbFrictionPair p = pair_of(space, touch);
+
+  SbFrictionAccept(&c->friction, &p,
+                   (PetscBool)(touch->on && touch->along >= 0 && SbContactForce(c, touch) > 0));
+  for (int k = 0; k < 3; k++) {
+    touch->stretch[k] = 0;
+    for (int i = 0; i < 3; i++) touch->stretch[k] += pose->R[3 * i + k] * touch->grip.stretch[i];
+  }
+}
+
 PetscErrorCode SbEffectAccept_Contact(SbEffect e, SbSpace space, const SbStage *stage)
 {
   Contact *c = (Contact *)e->data;
@@ -137,20 +100,16 @@ PetscErrorCode SbEffectAccept_Contact(SbEffect e, SbSpace space, const SbStage *
 
   PetscFunctionBeginUser;
   SbContactPose(c, stage->t, &pose);
+  if (c->friction.mu > 0) PetscCall(SbFrictionWarn(&c->friction, e->name, space, stage->t));
   for (PetscInt i = 0; i < c->n; i++) {
     Touch *touch = &c->touch[i];
-    PetscReal x[3], n[3], t[3], normal;
+    PetscReal x[3], n[3];
 
     place(space, touch->node, stage->u, x);
-    normal = normal_force(c, &pose, touch, x, n);
-    if (!exact(c)) touch->on = (PetscBool)(normal > 0);
+    if (!exact(c)) touch->on = (PetscBool)(normal_force(c, &pose, touch, x, n) > 0);
+    if (c->friction.mu > 0) accept_friction(c, space, &pose, touch);
     touch->was = (PetscBool)(touch->on && touch->rest <= 0);
     touch->kept = PetscMin(0, touch->rest);
-    if (touch->pressing <= 0) continue;
-    touch->slips = (PetscBool)(drag(c, &pose, touch, x, n, t) < 1);
-    if (!touch->slips) continue;
-    for (int k = 0; k < 3; k++) x[k] += t[k] / touch->k;
-    SbPoseInvert(&pose, x, touch->anchor);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -160,7 +119,7 @@ PetscReal SbContactMultiplier(const Contact *c, SbSpace space, const Touch *touc
   PetscReal force, at;
 
   if (!touch->on || touch->along < 0) return 0;
-  if (c->response == PROJECTED) return SbSpaceHoldForce(space, touch->node, touch->along, r);
+  if (!c->rows) return SbSpaceHoldForce(space, touch->node, touch->along, r);
   SbSpaceCoupleGet(space, touch->along, &force, &at);
   return force;
 }
@@ -173,9 +132,8 @@ static void force_on(const Contact *c, const SbPose *pose, SbSpace space, const 
 
   f[0] = f[1] = f[2] = 0;
   if (normal <= 0) return;
-  if (touch->pressing > 0) (void)drag(c, pose, touch, x, n, f);
-  if (exact(c)) normal = SbContactMultiplier(c, space, touch, residual + 3 * touch->node);
-  for (int k = 0; k < 3; k++) f[k] += normal * n[k];
+  if (exact(c) || c->rows) normal = SbContactMultiplier(c, space, touch, residual + 3 * touch->node);
+  for (int k = 0; k < 3; k++) f[k] = normal * n[k] + (c->friction.mu > 0 ? touch->grip.drag[k] : 0);
 }
 
 PetscErrorCode SbEffectPush_Contact(SbEffect e, SbSpace space, const SbStage *stage,
@@ -191,8 +149,6 @@ PetscErrorCode SbEffectPush_Contact(SbEffect e, SbSpace space, const SbStage *st
 
     place(space, c->touch[i].node, stage->u, x);
     force_on(c, &pose, space, &c->touch[i], x, residual, force);
-    if (c->response == MULTIPLIER) /* its rows push without it */
-      (void)tangential(c->touch[i].n, force, force);
     for (int k = 0; k < 3; k++) f[3 * c->touch[i].node + k] += force[k];
   }
   PetscFunctionReturn(PETSC_SUCCESS);

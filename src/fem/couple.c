@@ -186,6 +186,11 @@ PetscErrorCode SbSpaceCoupleRow(SbSpace s, PetscInt id, PetscInt n, const PetscI
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+void SbSpaceCoupleOutside(SbSpace s, PetscInt row)
+{
+  s->couple->id[row] = -1;
+}
+
 static inline PetscBool of_kind(SbCouple c, PetscInt i, PetscBool exact)
 {
   return (PetscBool)((c->stiffness[i] < 0.) == exact && !c->rests[i]);
@@ -645,21 +650,28 @@ PetscErrorCode SbSpaceCoupleMeasure(SbSpace s, Vec U, Vec R)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbSpaceCoupleReaction(SbSpace s, Vec R)
+/* R += what the rows of negative ids push free unknowns with, those of one kind. */
+static PetscErrorCode add_reaction(SbCouple c, PetscBool exact, const Rows *r, Vec R)
 {
-  SbCouple c = s->couple;
   PetscScalar *x;
 
   PetscFunctionBeginUser;
-  if (c->exact.N) {
-    PetscCall(VecCopy(c->exact.force, c->exact.work));
-    PetscCall(VecGetArray(c->exact.work, &x));
-    for (PetscInt i = 0; i < c->n; i++) {
-      if (of_kind(c, i, PETSC_TRUE) && c->id[i] >= 0) x[c->place[i]] = 0.;
-    }
-    PetscCall(VecRestoreArray(c->exact.work, &x));
-    PetscCall(MatMultTransposeAdd(c->exact.free, c->exact.work, R, R));
+  if (!r->N) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(VecCopy(r->force, r->work));
+  PetscCall(VecGetArray(r->work, &x));
+  for (PetscInt i = 0; i < c->n; i++) {
+    if (of_kind(c, i, exact) && c->id[i] >= 0) x[c->place[i]] = 0.;
   }
+  PetscCall(VecRestoreArray(r->work, &x));
+  PetscCall(MatMultTransposeAdd(r->push_free, r->work, R, R));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbSpaceCoupleReaction(SbSpace s, Vec R)
+{
+  PetscFunctionBeginUser;
+  PetscCall(add_reaction(s->couple, PETSC_TRUE, &s->couple->exact, R));
+  PetscCall(add_reaction(s->couple, PETSC_FALSE, &s->couple->spring, R));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

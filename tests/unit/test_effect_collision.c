@@ -334,7 +334,7 @@ static PetscErrorCode check_attempts(const char *response)
   come_down(&x, 0.03);
   PetscCall(attempt(&x));
   for (PetscInt i = 0; i < c->nhit; i++) {
-    c->hit[i].lambda = c->hit[i].pressing = c->hit[i].on ? 10 : 0;
+    c->hit[i].lambda = c->hit[i].grip.pressing = c->hit[i].on ? 10 : 0;
     c->hit[i].now[0] += 1e-5;
   }
   PetscCall((*x.e->ops.accept)(x.e, x.s, &stage));
@@ -350,7 +350,8 @@ static PetscErrorCode check_attempts(const char *response)
   for (PetscInt i = 0; i < PetscMin(n, c->nhit); i++) {
     SB_CHECK(hit[i].point == c->hit[i].point && hit[i].on == c->hit[i].on, "pair %d", (int)i);
     SB_CHECK_NEAR(c->hit[i].allowed, hit[i].allowed, 0, "overlap that is allowed");
-    for (int k = 0; k < 3; k++) SB_CHECK_NEAR(c->hit[i].stretch[k], hit[i].stretch[k], 0, "stretch");
+    for (int k = 0; k < 3; k++)
+      SB_CHECK_NEAR(c->hit[i].grip.stretch[k], hit[i].grip.stretch[k], 0, "stretch");
   }
   PetscCall(PetscFree(hit));
   PetscCall(close_meeting(&x));

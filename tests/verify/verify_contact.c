@@ -7,6 +7,8 @@
     fall       a block falls on a plane: no step gives energy (implicit Euler), the momentum changes by weight and contact
                force alone, and no node ends a step behind the plane
     incline    friction: 0.51 holds a block on a slope of tan = 0.5, on one with 0.49 it slides at g (sin - mu cos)
+    held       a static run in which friction alone holds a block against a load along the floor
+    corner     a block slides along a floor and a wall, each with friction: g - mu (N + N')
     indent     a capsule presses and drags: the four responses give the same force
     bounds     a beam that sags on a plane: PETSc's solver of variational inequalities finds the same displacement
     hertz      a rigid sphere on a half-space: force against approach
@@ -207,8 +209,13 @@ static PetscErrorCode check_incline(const char *element, const char *response, P
   h = s.t[1] - s.t[0];
   distance = s.x[1] - s.x[0];
   PetscCall(PetscPrintf(
-    PETSC_COMM_WORLD, "  incline, %s, %s, mu = %g: in %g s it moved by %.4e m, acceleration %.5f m/s^2\n",
-    element, response, (double)mu, (double)h, (double)distance, (double)((s.v[1] - s.v[0]) / h)));
+    PETSC_COMM_WORLD,
+    "  incline, %s, %s, mu = %g: in %g s it moved by %.4e m, acceleration %.5f m/s^2, %d solves\n", element,
+    response, (double)mu, (double)h, (double)distance, (double)((s.v[1] - s.v[0]) / h),
+    (int)t.run->newton_total));
+  /* with the N of the solve before it took 540 to 910 where it slides */
+  SB_CHECK(t.run->newton_total < 7 * 60, "%s, mu = %g: %d solves for 60 steps", response, (double)mu,
+           (int)t.run->newton_total);
   if (mu > 0.5) {
     SB_CHECK_NEAR(distance, 0, 1e-8, "a block that sticks");
     SB_CHECK_NEAR(s.v[1], 0, 1e-7, "its velocity");
@@ -217,6 +224,70 @@ static PetscErrorCode check_incline(const char *element, const char *response, P
     SB_CHECK_NEAR((s.v[1] - s.v[0]) / h, a, 0.01 * a, "acceleration");
     SB_CHECK_NEAR(distance - s.v[0] * h, 0.5 * a * h * (h + 0.01), 0.01 * 0.5 * a * h * h, "distance");
   }
+  PetscCall(test_scene_close(&t));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ held */
+
+static PetscErrorCode check_held(const char *response)
+{
+  const PetscReal load = 100 * 0.1 * 0.05; /* of a weight of 4.9 N, friction could hold 1.47 N */
+  PetscReal values[NVALUE];
+  TestScene t;
+
+  PetscFunctionBeginUser;
+  PetscCall(verify_open(
+    &t,
+    "-bodies a -body_a_mesh box:0.1,0.1,0.05:2 -body_a_material linear -body_a_young 1e5 -body_a_poisson 0.3 "
+    "-body_a_density 1000 -effects gravity,side,load,floor -effect_side_type support -effect_side_on xmin "
+    "-effect_side_components y -effect_load_type traction -effect_load_on xmax -effect_load_vector 100;0;0 "
+    "-effect_floor_type contact -effect_floor_on zmin -effect_floor_obstacle plane:0,0,1,1e-5 "
+    "-effect_floor_friction 0.3 -effect_floor_response %s -time static",
+    response));
+  PetscCall(verify_solve(&t, "held"));
+  PetscCall(contact_values(t.run, 1, values));
+  PetscCall(PetscPrintf(PETSC_COMM_WORLD, "  held, %s: friction %.6f N, %d solves\n", response,
+                        (double)values[FX], (int)t.run->newton_total));
+  SB_CHECK_NEAR(values[FX], -load, 1e-5 * load, "friction against the load");
+  SB_CHECK_NEAR(values[FZ], 0.5 * 9.81, 1e-5 * 0.5 * 9.81, "weight");
+  PetscCall(test_scene_close(&t));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ corner */
+
+/* Nodes of the edge between touch both: what holds them must not take from each other's force. */
+static PetscErrorCode check_corner(const char *response)
+{
+  const PetscReal push[3] = {-5, 6, -8}, mu = 0.3, a = push[1] + mu * (push[0] + push[2]), end = 0.3;
+  PetscReal values[NVALUE];
+  SbEnergies e;
+  TestScene t;
+
+  PetscFunctionBeginUser;
+  PetscCall(verify_open(
+    &t,
+    "-bodies a -body_a_mesh box:0.1,0.1,0.1:2 -body_a_material corotated -body_a_young 1e5 "
+    "-body_a_poisson 0.3 -body_a_density 1000 -effects gravity,floor,wall -effect_gravity_vector %g,%g,%g "
+    "-effect_floor_type contact -effect_floor_obstacle plane:0,0,1,0 -effect_floor_friction %g "
+    "-effect_floor_response %s -effect_wall_type contact -effect_wall_obstacle plane:1,0,0,0 "
+    "-effect_wall_friction %g -effect_wall_response %s -time euler_implicit -ts_dt 0.01 -ts_max_time %g",
+    (double)push[0], (double)push[1], (double)push[2], (double)mu, response, (double)mu, response,
+    (double)end));
+  PetscCall(verify_solve(&t, "corner"));
+  PetscCall(SbModelEnergies(t.model, t.run->U, t.run->V, &e));
+  PetscCall(contact_values(t.run, end, values)); /* of the floor, which is the first one */
+  PetscCall(
+    PetscPrintf(PETSC_COMM_WORLD,
+                "  corner, %s: velocity %.5f of %.5f m/s, floor %.5f N upwards and %.5f N back, %d solves\n",
+                response, (double)e.momentum[1], (double)(a * end), (double)values[FZ], (double)values[FY],
+                (int)t.run->newton_total));
+  SB_CHECK_NEAR(e.momentum[1], a * end, 0.01 * a * end, "velocity along both");
+  SB_CHECK_NEAR(values[FZ], -push[2], 1e-3 * -push[2], "force of the floor");
+  SB_CHECK_NEAR(values[FY], mu * push[2], 2e-3 * mu * -push[2], "friction of the floor");
+  SB_CHECK_NEAR(values[FX], 0, 1e-2 * mu * -push[2], "the floor's friction across the motion");
+  SB_CHECK(t.run->newton_total < 15 * 30, "%s: %d solves for 30 steps", response, (int)t.run->newton_total);
   PetscCall(test_scene_close(&t));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -245,7 +316,7 @@ static PetscErrorCode watch_indent(SbRun run, const SbStep *step, void *ctx)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode indent(const char *response, const char *more, Indent *f)
+static PetscErrorCode indent(const char *response, const char *more, PetscInt most, Indent *f)
 {
   TestScene t;
 
@@ -263,6 +334,10 @@ static PetscErrorCode indent(const char *response, const char *more, Indent *f)
                 response, more));
   PetscCall(SbRunAddMonitor(t.run, watch_indent, f, NULL));
   PetscCall(verify_solve(&t, response));
+  /* with the N of the solve before it took 1700 to 2400 */
+  SB_CHECK(t.run->newton_total < most, "%s %s: %d solves", response, more, (int)t.run->newton_total);
+  PetscCall(
+    PetscPrintf(PETSC_COMM_WORLD, "  indent, %s %s: %d solves\n", response, more, (int)t.run->newton_total));
   PetscCall(test_scene_close(&t));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -281,16 +356,16 @@ static PetscErrorCode check_indent(void)
   Indent a, b;
 
   PetscFunctionBeginUser;
-  PetscCall(indent("projected", "", &a));
+  PetscCall(indent("projected", "", 900, &a));
   SB_CHECK(a.force[10][2] < -0.5 && a.force[20][0] > 0.1, "pressed by %g N, dragged by %g N",
            (double)-a.force[10][2], (double)a.force[20][0]);
-  PetscCall(indent("multiplier", "-multipliers direct", &b));
+  PetscCall(indent("multiplier", "-multipliers direct", 900, &b));
   compare_indent(&a, &b, 5e-3, "multiplier");
-  PetscCall(indent("multiplier", "-multipliers iterative", &b));
+  PetscCall(indent("multiplier", "-multipliers iterative", 900, &b));
   compare_indent(&a, &b, 5e-3, "multiplier by iterations");
-  PetscCall(indent("augmented", "", &b));
+  PetscCall(indent("augmented", "", 1000, &b));
   compare_indent(&a, &b, 0.02, "augmented");
-  PetscCall(indent("penalty", "-effect_tool_stiffness 100", &b));
+  PetscCall(indent("penalty", "-effect_tool_stiffness 100", 1200, &b));
   compare_indent(&a, &b, 0.02, "penalty");
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -513,6 +588,8 @@ int main(int argc, char **argv)
   PetscCall(check_incline("p1", "multiplier", 0.49));
   PetscCall(check_incline("p1", "projected", 0.51));
   PetscCall(check_incline("p1", "projected", 0.49));
+  PetscCall(check_held("projected"));
+  PetscCall(check_corner("projected"));
   PetscCall(check_bounds());
   PetscCall(check_nothing());
   PetscCall(check_hertz(8, 0.3));
@@ -523,6 +600,10 @@ int main(int argc, char **argv)
     PetscCall(check_incline("cr", "projected", 0.49));
     PetscCall(check_incline("p1", "augmented", 0.49));
     PetscCall(check_incline("p1", "penalty", 0.51));
+    PetscCall(check_held("multiplier"));
+    PetscCall(check_held("penalty"));
+    PetscCall(check_corner("multiplier"));
+    PetscCall(check_corner("augmented"));
     PetscCall(check_indent());
     PetscCall(check_hertz(14, 0.05));
   }

@@ -1,0 +1,279 @@
+/*
+  friction.c - Coulomb friction where a pair touches: |T| <= mu N, and what slides has T = -mu N along its slip.
+
+  A pair sticks or slides. What sticks does not move across the normal: two exact rows, or two springs where rows are springs. What
+  slides takes its friction with the normal force: that one pushes along n - mu d, d the direction of the slip, so that N is of the
+  same solve and nothing waits for it. Across d a spring turns it. After a solve what sticks with more than mu N begins to slide,
+  and what slid backwards sticks: a semismooth Newton method (Alart and Curnier 1991; Hueeber, Stadler, Wohlmuth 2008), an active
+  set in rows instead of a tangent.
+
+  The slip is that of the step, as implicit Euler has it; with springs it has the stretch that was there before.
+
+  A node in the corner of two obstacles cannot stick to both by exact rows: they would say the same twice, and take from each other's
+  normal force. Such a pair sticks by springs as long as it touches.
+*/
+#include "friction.h"
+#include "sbbase.h"
+
+#define SETTLED 1e-4 /* of the largest friction: error that is left */
+#define LATE 1e-2    /* the same after UPDATES solves, with a warning; what does not get there is cut */
+#define UPDATES 30   /* solves of a step with friction */
+#define FLIPS 10     /* of a pair within a step, after which it has springs */
+#define STIFF \
+  1e-3 /* smallest difference of trial force and limit that the stiffness across the slip sees, relative */
+
+void SbFrictionBegin(SbGrip *g, PetscBool touches)
+{
+  if (!touches) { /* a point that arrives in this step sticks to where it was at its start */
+    for (int k = 0; k < 3; k++) g->stretch[k] = 0;
+    g->pressing = 0;
+    g->slid = g->crowded = PETSC_FALSE;
+  }
+  g->slides = g->slid;
+  g->flips = 0;
+}
+
+/* Whether a pair sticks by springs. */
+static inline PetscBool springs(const SbFriction *f, const SbGrip *g)
+{
+  return (PetscBool)(!f->exact || g->crowded);
+}
+
+/* Whether a pair that cannot decide has springs of the solve before: a secant (Kacanov's method), slow and sure. */
+static inline PetscBool careful(const SbGrip *g)
+{
+  return (PetscBool)(g->flips > FLIPS);
+}
+
+static PetscReal coefficient(const SbFriction *f, const SbGrip *g)
+{
+  return g->slid ? f->mu_kinetic : f->mu;
+}
+
+/* Part of a vector across the normal; returns its length. */
+static PetscReal across(const PetscReal n[3], PetscReal v[3])
+{
+  const PetscReal along = SbDot3(n, v);
+
+  for (int k = 0; k < 3; k++) v[k] -= along * n[k];
+  return PetscSqrtReal(SbDot3(v, v));
+}
+
+/* Slip of the step and what springs were stretched by before, across the normal, m; returns its length. */
+static PetscReal slip(const SbFrictionPair *p, PetscReal s[3])
+{
+  for (int k = 0; k < 3; k++) s[k] = p->grip->stretch[k] + p->now[k] - p->start[k];
+  return across(p->normal, s);
+}
+
+/* Turns the two directions across the normal, the first one along v or what is left of it. */
+static void turn(const SbFrictionPair *p, const PetscReal v[3])
+{
+  const PetscReal *n = p->normal;
+  SbGrip *g = p->grip;
+  PetscReal t[3] = {v[0], v[1], v[2]}, length = across(n, t);
+
+  if (length <= 1e-12 * PetscSqrtReal(SbDot3(v, v))) {
+    const int k = PetscAbsReal(n[0]) < 0.6 ? 0 : 1;
+
+    for (int i = 0; i < 3; i++) t[i] = i == k;
+    length = across(n, t);
+  }
+  for (int i = 0; i < 3; i++) g->tangent[0][i] = t[i] / length;
+  SbCross(n, g->tangent[0], g->tangent[1]);
+}
+
+/* Turns them for a pair that sticks: a prescribed component has no say, and the other direction is to be one that is free. */
+static void turn_free(const SbFrictionPair *p)
+{
+  PetscReal fixed[3] = {p->fixed == 1, p->fixed == 2, p->fixed == 4}, v[3];
+
+  SbCross(p->normal, fixed, v);
+  turn(p, SbDot3(v, v) > 1e-12 ? v : p->grip->tangent[0]);
+}
+
+void SbFrictionEnter(const SbFriction *f, const SbFrictionPair *p, PetscReal depth)
+{
+  SbGrip *g = p->grip;
+  PetscReal s[3];
+  const PetscReal length = slip(p, s), most = coefficient(f, g) * PetscMax(0, depth);
+
+  g->slides = (PetscBool)(length > most);
+  if (!g->slides) return;
+  g->turning = p->k * most / length;
+  turn(p, s);
+}
+
+void SbFrictionDirection(const SbFriction *f, const SbFrictionPair *p, PetscReal direction[3],
+                         PetscBool *oblique)
+{
+  const SbGrip *g = p->grip;
+  const PetscReal mu = coefficient(f, g);
+  PetscReal t[3], length;
+
+  *oblique = (PetscBool)(g->slides && !careful(g));
+  if (!*oblique) return;
+  for (int k = 0; k < 3; k++) t[k] = g->tangent[0][k];
+  length = across(p->normal, t);
+  for (int k = 0; k < 3; k++) direction[k] = p->normal[k] - (length > 0 ? mu / length * t[k] : 0);
+}
+
+PetscErrorCode SbFrictionHold(const SbFriction *f, SbSpace space, const SbFrictionPair *p, PetscInt id)
+{
+  SbGrip *g = p->grip;
+  PetscReal coef[3 * SB_FRICTION_NODES];
+
+  PetscFunctionBeginUser;
+  if (p->rests) PetscFunctionReturn(PETSC_SUCCESS);
+  if (g->slides)
+    turn(p, g->tangent[0]);
+  else
+    turn_free(p);
+  for (int q = 0; q < 2; q++) {
+    const PetscReal *t = g->tangent[q], rest = SbDot3(t, p->start) - SbDot3(t, g->stretch);
+    PetscReal stiffness = p->k;
+
+    for (PetscInt k = 0; k < 3 * p->n; k++) coef[k] = p->weight[k / 3] * t[k % 3];
+    if (!g->slides && !springs(f, g) && !careful(g)) { /* normals of all pairs come first */
+      PetscCall(SbSpaceCoupleRow(space, id + q, p->n, p->node, coef, NULL, rest, &g->slide[q]));
+      continue;
+    }
+    if (careful(g))
+      stiffness = g->turning;
+    else if (g->slides)
+      stiffness = q ? g->turning : 0;
+    PetscCall(SbSpaceCoupleSpring(space, p->n, p->node, coef, NULL, rest, stiffness, 0, &g->slide[q]));
+    if (p->outer) SbSpaceCoupleOutside(space, g->slide[q]);
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+void SbFrictionRead(const SbFriction *f, SbSpace space, const SbFrictionPair *p, PetscReal N, PetscReal along)
+{
+  SbGrip *g = p->grip;
+
+  N = PetscMax(0, N);
+  for (int k = 0; k < 3; k++) g->drag[k] = 0;
+  if (g->slide[0] < 0) return;
+  for (int k = 0; k < 3; k++) {
+    if (!p->rests) p->now[k] = along * p->normal[k];
+    if (g->slides && !careful(g)) g->drag[k] = -coefficient(f, g) * N * g->tangent[0][k];
+  }
+  for (int q = 0; q < 2; q++) {
+    PetscReal force, at;
+
+    SbSpaceCoupleGet(space, g->slide[q], &force, &at);
+    if (SbSpaceCoupleRests(space, g->slide[q])) { /* others hold it there */
+      force = 0;
+      at = SbDot3(g->tangent[q], p->start) - SbDot3(g->tangent[q], g->stretch);
+      if (p->outer && !p->rests)
+        g->crowded = PETSC_TRUE; /* its error in settle() is that of a spring without force */
+    }
+    for (int k = 0; k < 3; k++) {
+      g->drag[k] += force * g->tangent[q][k];
+      if (!p->rests) p->now[k] += at * g->tangent[q][k];
+    }
+  }
+}
+
+/* The same with springs for a pair that cannot decide; N is halfway between this solve's and the one before. */
+static PetscReal settle_carefully(const SbFriction *f, PetscReal before, const SbFrictionPair *p)
+{
+  SbGrip *g = p->grip;
+  const PetscReal mu = coefficient(f, g), most = mu * PetscMax(0, g->pressing);
+  PetscReal s[3], wrong[3];
+  const PetscReal length = slip(p, s), part = length > 0 ? PetscMin(p->k, most / length) : p->k;
+
+  for (int k = 0; k < 3; k++) wrong[k] = g->drag[k] + part * s[k];
+  g->slides = (PetscBool)(p->k * length > most);
+  g->pressing = 0.5 * (before + g->pressing);
+  g->turning = length > 0 ? PetscMin(p->k, mu * PetscMax(0, g->pressing) / length) : p->k;
+  if (g->slides) turn(p, s);
+  return PetscSqrtReal(SbDot3(wrong, wrong));
+}
+
+/*
+  What a pair does from now on; returns the error of its friction, N. With T the force against the slip s and a stiffness k, a trial force
+  is T + k s, or with springs k s alone. It slides where that is longer than mu N, with T = mu N along it; the derivative of that
+  direction is the stiffness across it.
+*/
+static PetscReal settle(const SbFriction *f, const SbFrictionPair *p)
+{
+  SbGrip *g = p->grip;
+  const PetscReal most = coefficient(f, g) * PetscMax(0, g->pressing);
+  const PetscBool slid = g->slides;
+  PetscReal s[3], trial[3], wrong[3] = {0}, size;
+
+  slip(p, s);
+  for (int k = 0; k < 3; k++) trial[k] = p->k * s[k] - (springs(f, g) ? 0 : g->drag[k]);
+  size = PetscSqrtReal(SbDot3(trial, trial));
+  /* what slid backwards went too far */
+  g->slides = (PetscBool)(size > most && (!slid || SbDot3(trial, g->tangent[0]) >= 0));
+  if (g->slides) {
+    const PetscReal over = springs(f, g) ? size : PetscMax(size - most, STIFF * size);
+
+    if (!slid || SbDot3(trial, g->tangent[0]) < 0.5 * size) g->flips++;
+    for (int k = 0; k < 3; k++) wrong[k] = g->drag[k] + most / size * trial[k];
+    g->turning = p->k * most / over;
+    turn(p, trial);
+  } else if (slid) {
+    g->flips++;
+    for (int k = 0; k < 3; k++) wrong[k] = p->k * s[k];
+  }
+  return PetscSqrtReal(SbDot3(wrong, wrong));
+}
+
+PetscReal SbFrictionSettle(const SbFriction *f, const SbFrictionPair *p, PetscReal N)
+{
+  SbGrip *g = p->grip;
+  const PetscReal before = g->pressing;
+  PetscReal error;
+
+  g->pressing = N;
+  if (g->slide[0] < 0) return 0;
+  error = careful(g) ? settle_carefully(f, before, p) : settle(f, p);
+  if (careful(g) && g->flips < 2 * FLIPS) { /* begins now */
+    g->flips = 2 * FLIPS;
+    g->turning = p->k;
+  }
+  return error;
+}
+
+void SbFrictionJudge(SbFriction *f, PetscReal worst, PetscReal largest, PetscBool *changed)
+{
+  f->updates++;
+  f->unsettled = largest > 0 ? worst / (f->mu * largest) : 0;
+  if (f->unsettled > (f->updates > UPDATES ? LATE : SETTLED)) *changed = PETSC_TRUE;
+}
+
+void SbFrictionAccept(SbFriction *f, const SbFrictionPair *p, PetscBool presses)
+{
+  SbGrip *g = p->grip;
+
+  if (!presses) { /* nothing holds it where it was */
+    for (int k = 0; k < 3; k++) g->stretch[k] = g->drag[k] = 0;
+    g->slid = g->crowded = PETSC_FALSE;
+    return;
+  }
+  g->slid = g->slides;
+  for (int k = 0; k < 3; k++) {
+    f->loss -= g->drag[k] * (p->now[k] - p->start[k]);
+    g->stretch[k] = springs(f, g) ? -g->drag[k] / p->k : 0;
+  }
+}
+
+PetscErrorCode SbFrictionWarn(SbFriction *f, const char effect[], SbSpace space, PetscReal t)
+{
+  PetscReal most = f->unsettled;
+
+  PetscFunctionBeginUser;
+  if (f->updates <= UPDATES || f->said) PetscFunctionReturn(PETSC_SUCCESS); /* alike on all ranks */
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &most, 1, MPIU_REAL, MPI_MAX, space->comm));
+  if (most <= SETTLED) PetscFunctionReturn(PETSC_SUCCESS);
+  f->said = PETSC_TRUE;
+  PetscCall(SbWarning(space->comm,
+                      "at t = %g s the friction of the effect %s settled to %.1g of the largest only, not to "
+                      "%g; said once: smaller steps make it more exact",
+                      (double)t, effect, (double)most, SETTLED));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
