@@ -18,6 +18,7 @@ typedef struct {
   PetscInt *vertex; /* [n][2] identities of the mesh vertices at its ends */
   PetscInt *part;   /* [n] */
   PetscInt *id;     /* [n] */
+  PetscReal *thick; /* [n] the part is at least so thick there at rest, m; 0: not known */
 } SbEdges;
 
 /*
@@ -59,7 +60,9 @@ typedef struct {
   PetscInt point, facet;
   PetscReal weight[3]; /* of the facet's corners, sum 1, none negative */
   PetscReal normal[3];
-  PetscReal gap;     /* m */
+  PetscReal gap; /* m */
+  PetscReal
+    depth; /* how far it is in the part, which is less than -gap where the nearest way out is another one; 0: not, m */
   PetscBool crossed; /* found by its motion: within the step it went through the facet */
 } SbNear;
 
@@ -68,10 +71,13 @@ typedef struct {
   negative when the edges are in each other's part; it grows when the first edge moves along the normal.
 */
 typedef struct {
-  PetscInt edge[2]; /* the first one is an own one, with the lower identity */
-  PetscReal at[2];  /* the nearest places, 0 at the first end of the edge, 1 at its second */
+  PetscInt
+    edge[2]; /* the first one is an own sharp one, with the lower identity if the second is sharp, too */
+  PetscReal at[2]; /* the nearest places, 0 at the first end of the edge, 1 at its second */
   PetscReal normal[3];
-  PetscReal gap;     /* m */
+  PetscReal gap; /* m */
+  PetscReal
+    depth; /* how far their nearest places are below the facets at the other edge, the least of these; 0: not, m */
   PetscBool crossed; /* found by its motion: within the step the edges went through each other */
 } SbEdgePair;
 
@@ -100,11 +106,11 @@ PetscErrorCode SbDetectorDestroy(SbDetector *detector);
 PetscErrorCode SbDetectorFind(SbDetector detector, const SbDetectScene *scene, PetscInt *n,
                               const SbNear **near);
 /*
-  SbDetectorFindEdges - all pairs of sharp edges of two parts that are within the reach of each other, or in each other by up to a quarter of it, or
-  went through each other within the step.
+  SbDetectorFindEdges - all pairs of a sharp edge and a sharp or bent one, of two parts, that are within the reach of each other, or in each
+  other by up to a quarter of it, or went through each other within the step.
 
-  Not collective. Every kind of detector returns the same pairs, ordered by the first edge and by the identity of the second. An edge is sharp
-  where the surface is convex and its facets' normals are more than 26 degrees apart. A pair counts when its normal leads away
+  Not collective. Every kind of detector returns the same pairs, ordered by the first edge and by the identity of the second. An edge is bent
+  where the surface is convex and its facets' normals are more than 3 degrees apart, sharp where it is more than 26. A pair counts when its normal leads away
   from both parts: where it does not, points and facets are nearer. For `self` as above.
 
   Output: n; pair[n], owned by the detector, valid until the next call.
@@ -130,12 +136,13 @@ struct _p_SbSurface {
   PetscInt *facet_node;  /* [nfacet][4] global numbers of the nodes of the facet's cell */
   PetscReal *
     facet_weight; /* [nfacet][3][4] displacement of corner k = sum_a facet_weight[3 f + k][a] u[facet_node[4 f + a]] */
-  PetscInt *edge_node;    /* [nedge][4] like facet_node, of the edge's first facet */
-  PetscReal *edge_weight; /* [nedge][2][4] like facet_weight, of its ends */
-  PetscInt *edge_facet;   /* [edges->nown] the first facet, as one of those given to SbSurfaceCreate() */
-  PetscReal size;         /* of all bodies at rest, m */
-  PetscReal edge;         /* mean rest edge of all facets, m */
-  void *data;             /* private */
+  PetscReal *facet_height; /* [nfacet] rest height of the cell behind, m */
+  PetscInt *edge_node;     /* [nedge][4] like facet_node, of the edge's first facet */
+  PetscReal *edge_weight;  /* [nedge][2][4] like facet_weight, of its ends */
+  PetscInt *edge_facet;    /* [edges->nown] the first facet, as one of those given to SbSurfaceCreate() */
+  PetscReal size;          /* of all bodies at rest, m */
+  PetscReal edge;          /* mean rest edge of all facets, m */
+  void *data;              /* private */
 };
 /*
   SbSurfaceCreate - from boundary facets as SbEffectFacets() gives them (of owned and ghost cells; copied). Collective.

@@ -242,6 +242,7 @@ typedef struct {
   PetscInt corner[3];  /* 0..3, which vertices of the cell, counter-clockwise seen from outside */
   PetscInt vertex[3];  /* the same as local vertices of the mesh */
   PetscReal area;      /* rest area, m^2 */
+  PetscReal height;    /* rest height of the cell over it, m */
   PetscReal normal[3]; /* rest outward unit normal */
 } SbFacet;
 /* The element of a local cell. */

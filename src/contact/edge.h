@@ -30,15 +30,17 @@ PetscErrorCode SbEdgesDestroy(SbEdges *edges);
 typedef struct {
   const PetscReal *x[4];  /* ends, third corners of its two facets, m */
   const PetscReal *x0[2]; /* ends at the start of the step, m; NULL: motion is not looked at */
+  PetscReal thick;        /* as in SbEdges, m */
   PetscReal into[2][3];   /* unit vectors across the edge into its facets */
 } SbEdgePlace;
 
-/* Whether the surface is convex and bends by more than a bound at the edge with these corners. */
-PetscBool SbEdgeSharp(const PetscReal *const x[4]);
+typedef enum { SB_EDGE_FLAT, SB_EDGE_BENT, SB_EDGE_SHARP } SbEdgeKind;
+/* How much the surface bends at the edge with these corners; flat where it is not convex. */
+SbEdgeKind SbEdgeKindOf(const PetscReal *const x[4]);
 /* Sets place->into. The facets have an area. */
 void SbEdgeInto(SbEdgePlace *place);
 /*
-  SbEdgesMeet - whether two sharp edges are a pair: the normal, which leads away from the second one, is within both normal cones, and they
+  SbEdgesMeet - whether two edges that are not flat are a pair: the normal, which leads away from the second one, is within both normal cones, and they
   are within the reach and cross between their ends, or went through each other within the step.
 
   Not collective. Output: at, normal, gap and crossed of pair.

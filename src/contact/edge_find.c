@@ -1,8 +1,9 @@
 /*
-  edge_find.c - pairs of sharp edges: which edges are sharp now, candidates by the detector's own kind, then edge_meet.c.
+  edge_find.c - pairs of a sharp edge and one that is at least bent: which edges are that now, candidates by the detector's own kind, then
+  edge_meet.c.
 
-  Sharp edges are usually few: the kind searches a scene of its own in which own sharp edges are the points and all sharp edges are facets
-  without area, with boxes that hold their motion. On a smooth surface the whole cost is one look at each edge.
+  Sharp edges are usually few: the kind searches a scene of its own in which own sharp edges are the points and all edges that are not flat are
+  facets without area, with boxes that hold their motion. On a smooth surface the whole cost is one look at each edge.
 */
 #include "detect.h"
 #include "edge.h"
@@ -12,8 +13,10 @@
 struct SbDetectSharp {
   SbDetector search; /* of the same kind, for candidates */
   SbDetectScene scene;
-  PetscInt version;          /* of the scene that was given last */
-  PetscInt n, nown, size;    /* sharp edges, own ones first; room */
+  PetscInt version; /* of the scene that was given last */
+  SbEdgeKind *kind; /* of all edges of the scene, if one is sharp */
+  PetscInt kind_size;
+  PetscInt n, nown, size;    /* edges that are not flat, own sharp ones first; how many those are; room */
   PetscInt *edge;            /* [n] which ones */
   PetscInt *facet, *vertex;  /* [n][3] ends, the second one twice */
   PetscInt *id;              /* [n] */
@@ -40,12 +43,21 @@ PetscErrorCode SbDetectSharpDestroy(SbDetector d)
   if (!d->sharp) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(SbDetectorDestroy(&d->sharp->search));
   PetscCall(sharp_free(d->sharp));
+  PetscCall(PetscFree(d->sharp->kind));
   PetscCall(PetscFree(d->sharp->pair));
   PetscCall(PetscFree(d->sharp));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Room for n sharp edges; those there are kept. */
+static SbEdgeKind kind_of(const SbDetectScene *s, PetscInt i)
+{
+  const PetscInt *c = s->edges->corner + 4 * i;
+  const PetscReal *const x[4] = {s->x + 3 * c[0], s->x + 3 * c[1], s->x + 3 * c[2], s->x + 3 * c[3]};
+
+  return SbEdgeKindOf(x);
+}
+
+/* Room for n edges; those there are kept. */
 static PetscErrorCode reserve(Sharp *q, PetscInt n)
 {
   const PetscInt size = n + n / 2 + 64;
@@ -66,7 +78,19 @@ static PetscErrorCode reserve(Sharp *q, PetscInt n)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The sharp edges; whether they are those of the last call. */
+static PetscErrorCode add(Sharp *q, PetscInt i, PetscInt *n, PetscBool *same)
+{
+  PetscFunctionBeginUser;
+  if (*n >= q->size) {
+    q->n = PetscMax(q->n, *n);
+    PetscCall(reserve(q, *n + 1));
+  }
+  if (*n >= q->n || q->edge[*n] != i) *same = PETSC_FALSE;
+  q->edge[(*n)++] = i;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The own sharp edges, then all others that are not flat; none if no own one is sharp. Whether they are those of the last call. */
 static PetscErrorCode list_sharp(Sharp *q, const SbDetectScene *s, PetscBool *same)
 {
   const SbEdges *e = s->edges;
@@ -75,19 +99,20 @@ static PetscErrorCode list_sharp(Sharp *q, const SbDetectScene *s, PetscBool *sa
 
   PetscFunctionBeginUser;
   *same = (PetscBool)(q->version == s->version);
-  q->nown = 0;
-  for (PetscInt i = 0; i < e->n; i++) {
-    const PetscInt *c = e->corner + 4 * i;
-    const PetscReal *const x[4] = {s->x + 3 * c[0], s->x + 3 * c[1], s->x + 3 * c[2], s->x + 3 * c[3]};
-
-    if (!SbEdgeSharp(x)) continue;
-    if (n >= q->size) {
-      q->n = PetscMax(q->n, n);
-      PetscCall(reserve(q, n + 1));
-    }
-    if (n >= before || q->edge[n] != i) *same = PETSC_FALSE;
-    q->edge[n++] = i;
-    q->nown += i < e->nown;
+  if (e->n > q->kind_size) {
+    PetscCall(PetscFree(q->kind));
+    PetscCall(PetscMalloc1(e->n, &q->kind));
+    q->kind_size = e->n;
+  }
+  for (PetscInt i = 0; i < e->nown; i++) {
+    q->kind[i] = kind_of(s, i);
+    if (q->kind[i] == SB_EDGE_SHARP) PetscCall(add(q, i, &n, same));
+  }
+  q->nown = n;
+  for (PetscInt i = 0; i < e->n && q->nown; i++) {
+    if (i >= e->nown) q->kind[i] = kind_of(s, i);
+    if (q->kind[i] == SB_EDGE_BENT || (q->kind[i] == SB_EDGE_SHARP && i >= e->nown))
+      PetscCall(add(q, i, &n, same));
   }
   q->n = n;
   if (n != before || q->nown != before_own) *same = PETSC_FALSE;
@@ -113,6 +138,7 @@ static void describe(Sharp *q, const SbDetectScene *s, PetscBool same)
       q->own_part[j] = s->self ? 2 * e->part[i] : e->part[i];
       for (int k = 0; k < 3; k++) q->middle[3 * j + k] = 0.5 * (s->x[3 * c[0] + k] + s->x[3 * c[1] + k]);
     }
+    q->place[j].thick = e->thick[i];
     for (int k = 0; k < 4; k++) q->place[j].x[k] = s->x + 3 * c[k];
     for (int k = 0; k < 2; k++) q->place[j].x0[k] = s->x0 ? s->x0 + 3 * c[k] : NULL;
     SbEdgeInto(&q->place[j]);
@@ -192,7 +218,7 @@ static void insert(const SbEdges *e, PetscInt first, PetscInt n, SbEdgePair pair
   pair[j] = last;
 }
 
-/* All pairs among the candidates. Each is looked at once, from the edge with the lower identity. */
+/* All pairs among the candidates. Each is looked at once: from the sharp edge, of two from that with the lower identity. */
 static PetscErrorCode narrow(Sharp *q, const SbDetectScene *s, PetscInt *n)
 {
   const SbDetector d = q->search;
@@ -211,7 +237,8 @@ static PetscErrorCode narrow(Sharp *q, const SbDetectScene *s, PetscInt *n)
       const PetscInt other = d->candidate[c], k = q->edge[other];
       SbEdgePair *pair = q->pair + *n;
 
-      if (e->id[i] >= e->id[k] || (e->part[i] == e->part[k] && (!s->self || belong_together(s, i, k))))
+      if ((q->kind[k] == SB_EDGE_SHARP && e->id[i] >= e->id[k]) ||
+          (e->part[i] == e->part[k] && (!s->self || belong_together(s, i, k))))
         continue;
       if (!SbEdgesMeet(&q->place[j], &q->place[other], s->reach, pair)) continue;
       pair->edge[0] = i;

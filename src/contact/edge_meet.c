@@ -7,19 +7,22 @@
   between convex polyhedra", GDC 2013). The cone is the polar of the wedge: n makes no acute angle with the two directions that lead
   from the edge into its facets. Elsewhere a vertex or a facet is nearer, and points see that.
 
-  A gap that is negative by more than rounding is a penetration only if the edges are in each other's part: one of them pierces a facet at
-  the other one. Without that, the edges of the far sides of two thin bars would be a pair. When bodies overlap far, the way out past edges is seldom the
+  A gap that is negative by more than rounding is a penetration only if the edges are in each other's part: it is less than the parts are
+  thick there, or one of them pierces a facet at the other one. Without that, the edges of the far sides of two thin bars would be a
+  pair. When bodies overlap far, the way out past edges is seldom the
   shortest: then points part them first. Edges that went through each other
   within the step are found at any depth (cross.c).
 
-  Only sharp edges: where surfaces are smooth, vertices hold them apart. Two surfaces of edges h that bend by an angle theta at each
-  edge, edge on edge, are in each other by (h / 2) tan(theta / 2) before a vertex notices: an eighth of h at the bound. Edges that are
-  nearly parallel have no normal; their ends are seen by points, but for 2.5 % of h.
+  One of the two is sharp, the other at least bent: where surfaces are smooth, vertices hold them apart. Two surfaces of edges h that
+  bend by an angle theta at each edge, edge on edge, are in each other by (h / 2) tan(theta / 2) before a vertex notices: an eighth of h
+  where both are hardly sharp, 1 % where a sharp one lies on one that is hardly bent. Edges that are nearly parallel have no normal; their ends are seen by points, but for 2.5 % of h.
 */
 #include "detect.h"
 #include "edge.h"
 
-#define SHARP 0.9 /* cosine between the normals of an edge's facets, above which it is smooth: 26 degrees */
+#define SHARP \
+  0.9 /* cosine between the normals of an edge's facets, above which it is not sharp: 26 degrees */
+#define BENT 0.9986   /* the same, above which it is flat: 3 degrees */
 #define PARALLEL 0.05 /* sine between two edges, below which they have no normal */
 #define CONE \
   0.05 /* so far, 3 degrees, the normal may leave the cones: edges flush with a face are pairs also when all bends a little */
@@ -28,6 +31,7 @@
 #define DEEP \
   0.25 /* of the reach: the largest depth at which edges that are in each other are a pair without a motion */
 #define SHALLOW 1e-3 /* of the reach: a depth that is taken for touching */
+#define THICK 0.25 /* of the rest thickness of both parts: a depth within them, also when they are squeezed */
 #define START \
   0.1 /* of the reach: so deep a pair may begin the step and be in front: it lay in contact (near.c) */
 #define FLAT 1e-8  /* height over length of a facet, below which it has no normal */
@@ -38,7 +42,7 @@ static inline void subtract(const PetscReal a[3], const PetscReal b[3], PetscRea
   for (int k = 0; k < 3; k++) c[k] = a[k] - b[k];
 }
 
-PetscBool SbEdgeSharp(const PetscReal *const x[4])
+SbEdgeKind SbEdgeKindOf(const PetscReal *const x[4])
 {
   PetscReal e[3], u[3], v[3], n[3], m[3], dot, nn, mm, ee;
 
@@ -46,14 +50,15 @@ PetscBool SbEdgeSharp(const PetscReal *const x[4])
   subtract(x[2], x[0], u);
   subtract(x[3], x[0], v);
   SbCross(e, u, n);
-  if (!(SbDot3(v, n) < 0)) return PETSC_FALSE;
+  if (!(SbDot3(v, n) < 0)) return SB_EDGE_FLAT;
   SbCross(v, e, m);
   dot = SbDot3(n, m);
   nn = SbDot3(n, n);
   mm = SbDot3(m, m);
-  if (dot > 0 && dot * dot >= SHARP * SHARP * nn * mm) return PETSC_FALSE;
+  if (dot > 0 && dot * dot >= BENT * BENT * nn * mm) return SB_EDGE_FLAT;
   ee = FLAT * FLAT * SbDot3(e, e);
-  return (PetscBool)(nn > ee * SbDot3(u, u) && mm > ee * SbDot3(v, v));
+  if (!(nn > ee * SbDot3(u, u) && mm > ee * SbDot3(v, v))) return SB_EDGE_FLAT;
+  return dot > 0 && dot * dot >= SHARP * SHARP * nn * mm ? SB_EDGE_BENT : SB_EDGE_SHARP;
 }
 
 void SbEdgeInto(SbEdgePlace *p)
@@ -159,6 +164,14 @@ static PetscBool went_through(const SbEdgePlace *first, const SbEdgePlace *secon
   return SbEdgeCrossing(first->x0, first->x, f0, f1, tolerance, &time, &behind);
 }
 
+/* The least cosine between a normal of the edge and those of its facets: of a way along it the part that leads away from a facet. */
+static PetscReal steepest(const SbEdgePlace *e, const PetscReal n[3])
+{
+  const PetscReal a = SbDot3(n, e->into[0]), b = SbDot3(n, e->into[1]);
+
+  return PetscSqrtReal(PetscMax(0, 1 - PetscMax(a * a, b * b)));
+}
+
 PetscBool SbEdgesMeet(const SbEdgePlace *first, const SbEdgePlace *second, PetscReal reach, SbEdgePair *pair)
 {
   PetscReal gap = 0;
@@ -174,9 +187,11 @@ PetscBool SbEdgesMeet(const SbEdgePlace *first, const SbEdgePlace *second, Petsc
     gap += pair->normal[k] * (a - second->x[0][k] - pair->at[1] * (second->x[1][k] - second->x[0][k]));
   }
   pair->gap = gap;
+  pair->depth = gap < 0 ? -gap * PetscMin(steepest(first, pair->normal), steepest(second, pair->normal)) : 0;
   pair->crossed = PETSC_FALSE;
   if (between && gap <= reach && gap >= -DEEP * reach &&
-      (gap >= -SHALLOW * reach || is_in(first, second) || is_in(second, first)))
+      (gap >= -PetscMax(SHALLOW * reach, THICK * (first->thick + second->thick)) || is_in(first, second) ||
+       is_in(second, first)))
     return PETSC_TRUE;
   pair->crossed = (PetscBool)(gap < 0 && first->x0[0] && went_through(first, second, pair->normal, reach));
   return pair->crossed;

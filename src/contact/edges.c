@@ -57,6 +57,7 @@ PetscErrorCode SbEdgesCreate(const SbDetectScene *s, SbEdges *e)
   PetscCall(SbSidesPair(n, side, &e->n, pair));
   e->nown = e->n;
   PetscCall(PetscMalloc4(4 * e->n, &e->corner, 2 * e->n, &e->vertex, e->n, &e->part, e->n, &e->id));
+  PetscCall(PetscCalloc1(e->n, &e->thick));
   for (PetscInt i = 0; i < e->n; i++) {
     const PetscInt f = pair[i][0] / 3, k = pair[i][0] % 3, g = pair[i][1] / 3, l = pair[i][1] % 3;
 
@@ -74,6 +75,7 @@ PetscErrorCode SbEdgesDestroy(SbEdges *e)
 {
   PetscFunctionBeginUser;
   PetscCall(PetscFree4(e->corner, e->vertex, e->part, e->id));
+  PetscCall(PetscFree(e->thick));
   e->n = e->nown = 0;
   PetscFunctionReturn(PETSC_SUCCESS);
 }

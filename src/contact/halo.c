@@ -16,7 +16,7 @@
 #define MARGIN 0.5  /* of the mean edge */
 #define HALF 0.4999 /* of the margin: how far things may move; less than half by more than rounding */
 #define NUMBERS 9   /* of a facet: identity, part, vertices, nodes */
-#define REALS 21    /* weights, rest corners */
+#define REALS 22    /* weights, rest corners, height */
 
 /* ------------------------------------------------------------------ where everything is */
 
@@ -104,6 +104,7 @@ static void pack(SbSurface s, PetscInt number[], PetscReal real[])
     for (int a = 0; a < 4; a++) number[5 + a] = s->facet_node[4 * f + a];
     for (int a = 0; a < 12; a++) real[a] = s->facet_weight[12 * f + a];
     for (int k = 0; k < 9; k++) real[12 + k] = d->X[3 * d->facet[3 * f + k / 3] + k % 3];
+    real[21] = s->facet_height[f];
   }
 }
 
@@ -128,6 +129,7 @@ static PetscErrorCode unpack(SbSurface s, PetscInt n, const PetscInt number[], c
     for (int a = 0; a < 4; a++) s->facet_node[4 * f + a] = number[5 + a];
     for (int a = 0; a < 12; a++) s->facet_weight[12 * f + a] = real[a];
     for (int k = 0; k < 9; k++) d->X[3 * c + k] = real[12 + k];
+    s->facet_height[f] = real[21];
   }
   if (!same) {
     s->scene.version++;

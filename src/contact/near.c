@@ -12,7 +12,7 @@
   - faces the point: their normals oppose each other. In a thin plate that a point has entered the back may be nearer than the front,
     but the way out is the front;
   - agrees with the motion: when the point went through the part's surface in this step, the normal must not point to the far side of
-    where it came in.
+    where it came in, and the point must have been in front of the place: one that came over a rim is not pushed out sideways.
   When there is none, and the point went through a facet that faces it, that facet is the contact: this is how a thin plate stops what is
   past it at the end of the step. Points that are deeper than the reach and were inside already when the step began are not found.
 */
@@ -549,9 +549,29 @@ static PetscInt ties(PetscInt n, Hit h[], PetscReal tolerance)
   return m;
 }
 
-/* The nearest of n hits of one part that is a contact; `entry`: normal of where the point came in, NULL: it did not. */
-static PetscBool nearest(const Look *look, PetscInt n, Hit h[], const PetscReal entry[3], SbNear *near)
+/* Sets the depth; `nearest`: distance of the surface, m. Returns true. */
+static inline PetscBool in_by(PetscReal nearest, SbNear *near)
 {
+  near->depth = near->gap < 0 ? PetscMin(nearest, -near->gap) : 0;
+  return PETSC_TRUE;
+}
+
+/* Whether the point was in front of the place of contact, along its normal, when the step began, or up to `behind` m behind it. */
+static PetscBool was_in_front(const Look *look, const SbNear *near, PetscReal behind)
+{
+  const PetscReal *x0[3];
+  PetscReal r[3];
+
+  corners(look->s, look->s->x0, near->facet, x0);
+  away(look->s->p0 + 3 * look->point, x0, near->weight, r);
+  return (PetscBool)(SbDot3(r, near->normal) > -behind);
+}
+
+/* The nearest of n hits of one part that is a contact; `entry`: where the point came in, NULL: it did not; `in`: the hit of that. */
+static PetscBool nearest(const Look *look, PetscInt n, Hit h[], const SbNear *entry, const Hit *in,
+                         SbNear *near)
+{
+  const PetscReal behind = (entry && in->behind ? START : AT) * look->s->reach;
   PetscBool sided = PETSC_FALSE, inside = PETSC_FALSE;
 
   for (PetscInt i = 0; i < n;) {
@@ -565,8 +585,8 @@ static PetscBool nearest(const Look *look, PetscInt n, Hit h[], const PetscReal 
         sided = PETSC_TRUE;
       }
       if ((!sided || (near->gap < 0) == inside) && SbDot3(look->normal, near->normal) < -FACING &&
-          (!entry || SbDot3(near->normal, entry) > FACING))
-        return PETSC_TRUE;
+          (!entry || (SbDot3(near->normal, entry->normal) > FACING && was_in_front(look, near, behind))))
+        return in_by(h[0].key, near);
     }
   }
   return PETSC_FALSE;
@@ -583,6 +603,7 @@ static PetscBool passage(const Look *look, const Hit *c, SbNear *near)
   (void)SbClosestPoint(look->p, x, near->weight, &d2);
   subtract(look->p, x[0], r);
   near->gap = SbDot3(r, near->normal);
+  (void)in_by(PETSC_MAX_REAL, near);
   near->point = look->point;
   near->facet = c->facet;
   near->crossed = PETSC_TRUE;
@@ -606,9 +627,10 @@ static PetscInt contacts(Look *look, SbNear near[])
     for (jnext = j; jnext < look->ncross && look->cross[jnext].part == part;) jnext++;
     if (jnext > j) (void)ties(jnext - j, look->cross + j, TIE_TIME);
     into = (PetscBool)(jnext > j && passage(look, look->cross + j, &entry));
-    found = nearest(look, inext - i, look->hit + i, jnext > j ? entry.normal : NULL, near + n);
+    found = nearest(look, inext - i, look->hit + i, jnext > j ? &entry : NULL, look->cross + j, near + n);
     if (!found && into) {
       near[n] = entry;
+      if (inext > i) (void)in_by(look->hit[i].key, &near[n]);
       found = PETSC_TRUE;
     }
     if (found) n++;

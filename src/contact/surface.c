@@ -126,12 +126,14 @@ static PetscErrorCode make_facets(SbSurface s, const SbFacet facet[])
   PetscCall(PetscMalloc1(s->nfacet_owned, &d->facet_id));
   PetscCall(PetscMalloc1(4 * s->nfacet_owned, &s->facet_node));
   PetscCall(PetscMalloc1(12 * s->nfacet_owned, &s->facet_weight));
+  PetscCall(PetscMalloc1(s->nfacet_owned, &s->facet_height));
   for (PetscInt i = 0; i < d->nlocal; i++) {
     const PetscInt f = d->local[i].own, cell = facet[i].cell;
 
     if (f < 0) continue;
     d->facet_part[f] = mesh->cell_body[cell];
     d->facet_id[f] = 4 * mesh->cell_orig[cell] + facet[i].face;
+    s->facet_height[f] = facet[i].height;
     for (int a = 0; a < 4; a++) s->facet_node[4 * f + a] = space->gnode[space->cell_node[4 * cell + a]];
     for (int k = 0; k < 3; k++) {
       const PetscReal *weight = SbSpaceCellElement(space, cell)->ops.vertex[facet[i].corner[k]];
@@ -298,6 +300,7 @@ PetscErrorCode SbSurfaceSetForeign(SbSurface s, PetscInt n)
     PetscCall(PetscRealloc(nfacet * sizeof(*d->facet_id), &d->facet_id));
     PetscCall(PetscRealloc(4 * nfacet * sizeof(*s->facet_node), &s->facet_node));
     PetscCall(PetscRealloc(12 * nfacet * sizeof(*s->facet_weight), &s->facet_weight));
+    PetscCall(PetscRealloc(nfacet * sizeof(*s->facet_height), &s->facet_height));
   }
   s->scene.nfacet = s->nfacet_owned + n;
   s->scene.ncorner = d->ncorner_owned + 3 * n;
@@ -358,6 +361,7 @@ PetscErrorCode SbSurfaceDestroy(SbSurface *surface)
   PetscCall(PetscFree(d));
   PetscCall(PetscFree((*surface)->facet_node));
   PetscCall(PetscFree((*surface)->facet_weight));
+  PetscCall(PetscFree((*surface)->facet_height));
   PetscCall(PetscFree((*surface)->point_node));
   PetscCall(PetscFree((*surface)->point_area));
   PetscCall(PetscFree(*surface));

@@ -28,6 +28,7 @@ static PetscErrorCode reserve(SbSurface s, PetscInt n)
   PetscCall(PetscRealloc(2 * size * sizeof(PetscInt), &d->edges.vertex));
   PetscCall(PetscRealloc(size * sizeof(PetscInt), &d->edges.part));
   PetscCall(PetscRealloc(size * sizeof(PetscInt), &d->edges.id));
+  PetscCall(PetscRealloc(size * sizeof(PetscReal), &d->edges.thick));
   PetscCall(PetscRealloc(4 * size * sizeof(PetscInt), &s->edge_node));
   PetscCall(PetscRealloc(8 * size * sizeof(PetscReal), &s->edge_weight));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -70,6 +71,7 @@ static void fill_own(SbSurface s, const SbFacet facet[])
     const SbFacet *f = &facet[d->side[i][0] / 3];
 
     s->edge_facet[i] = d->side[i][0] / 3;
+    e->thick[i] = PetscMin(f->height, facet[d->side[i][1] / 3].height);
     e->part[i] = space->mesh->cell_body[f->cell];
     e->id[i] = 3 * (4 * space->mesh->cell_orig[f->cell] + f->face) + d->side[i][0] % 3;
     for (int a = 0; a < 4; a++) s->edge_node[4 * i + a] = space->gnode[space->cell_node[4 * f->cell + a]];
@@ -146,6 +148,7 @@ static void fill_other(SbSurface s, const PetscInt at[2], PetscInt i)
 
   e->part[i] = d->facet_part[f];
   e->id[i] = 3 * d->facet_id[f] + at[0] % 3;
+  e->thick[i] = PetscMin(s->facet_height[f], s->facet_height[at[1] / 3]);
   for (int j = 0; j < 3; j++) e->corner[4 * i + j] = d->facet[3 * f + (at[0] + j) % 3];
   e->corner[4 * i + 3] = d->facet[at[1] - at[1] % 3 + (at[1] + 2) % 3];
   for (int a = 0; a < 4; a++) s->edge_node[4 * i + a] = s->facet_node[4 * f + a];
@@ -197,6 +200,7 @@ PetscErrorCode SbSurfaceFreeEdges(SbSurface s)
   PetscCall(PetscFree(d->edges.vertex));
   PetscCall(PetscFree(d->edges.part));
   PetscCall(PetscFree(d->edges.id));
+  PetscCall(PetscFree(d->edges.thick));
   PetscCall(PetscFree(s->edge_node));
   PetscCall(PetscFree(s->edge_weight));
   PetscCall(PetscFree(s->edge_facet));

@@ -158,22 +158,11 @@ static PetscErrorCode options_collision(SbEffect e, const SbScope *scope)
 
 /* ------------------------------------------------------------------ set-up */
 
-static PetscReal height_over(SbSpace space, const SbFacet *facet)
-{
-  const PetscInt *v = space->mesh->cell + 4 * facet->cell;
-  PetscReal height = 0;
-
-  for (int k = 0; k < 3; k++)
-    height +=
-      facet->normal[k] * (space->mesh->x[3 * facet->vertex[0] + k] - space->mesh->x[3 * v[facet->face] + k]);
-  return height;
-}
-
 static PetscReal facet_stiffness(const Collision *c, SbSpace space, const SbFacet *facet)
 {
   const SbMaterial m = space->material[space->mesh->cell_material[facet->cell]];
 
-  return c->stiffness * (m->lambda + 2 * m->mu) * facet->area / height_over(space, facet);
+  return c->stiffness * (m->lambda + 2 * m->mu) * facet->area / facet->height;
 }
 
 /* Springs: (lambda + 2 mu) area / height, summed over the facets at a point; of an edge that of its first facet. */
@@ -381,7 +370,7 @@ static PetscBool settle_row(const Collision *c, PetscReal largest, Hit *hit)
   }
   hit->lambda = PetscMax(0, hit->lambda);
   if (hit->rests) return PETSC_TRUE;
-  return (PetscBool)(PetscAbsReal(SbCollisionExcess(hit)) <= small || hit->looks >= LOOKS);
+  return (PetscBool)(PetscAbsReal(SbCollisionExcess(hit)) <= small);
 }
 
 /*
@@ -490,9 +479,9 @@ static PetscErrorCode history_collision(SbEffect e, SbSpace space, const SbStage
   for (PetscInt i = 0; i < c->nhit; i++) {
     const Hit *hit = &c->hit[i];
 
-    if (hit->gap < -TOLERANCE * c->surface->size) {
-      deepest = PetscMax(deepest, -hit->gap);
-      sum[0] -= hit->gap;
+    if (hit->depth > TOLERANCE * c->surface->size) {
+      deepest = PetscMax(deepest, hit->depth);
+      sum[0] += hit->depth;
       sum[1]++;
     }
     if (!hit->on || SbCollisionForce(c, hit) <= 0) continue;

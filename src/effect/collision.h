@@ -35,7 +35,8 @@ typedef struct {
     [NODES]; /* of the relative displacement w: 1, minus the facet's; those of the first edge, minus the other's */
   PetscReal normal[3];
   PetscReal value;            /* n . w that closes the gap, m */
-  PetscReal gap;              /* at the last look, m */
+  PetscReal gap;              /* at the last look, by its row once that is settled, m */
+  PetscReal depth;            /* in each other at the last look, 0 also when it was not found, m */
   PetscReal start[3], now[3]; /* w at the start of the step and at the last look, m */
   PetscReal allowed;          /* penetration that was there before and is taken back step by step, m */
   PetscReal gap0, arrives;    /* restitution, at the start of the step: m; speed of approach, m/s */

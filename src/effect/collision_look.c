@@ -7,6 +7,9 @@
 */
 #include "collision.h"
 
+#define TURNED 0.7  /* cosine between normals of two looks, below which they are of another place */
+#define CORNER 1e-4 /* of the reach: places that may be one (near.c) */
+
 /* Of two surfaces, whether the points of `mine` look for `other`. Edges that rounding alone tells apart are the same. */
 static PetscBool looks_for(const Collision *c, PetscInt mine, PetscInt other)
 {
@@ -113,6 +116,11 @@ static void take_edges(const Collision *c, const SbEdgePair *pair, Hit *hit)
   relative_edges(pair, s, s->x0 ? s->x0 : s->x, hit->start);
 }
 
+static inline const PetscReal *normal_of(const Found *found, PetscInt i)
+{
+  return i < found->nnear ? found->near[i].normal : found->pair[i - found->nnear].normal;
+}
+
 static inline PetscReal gap_of(const Found *found, PetscInt i)
 {
   return i < found->nnear ? found->near[i].gap : found->pair[i - found->nnear].gap;
@@ -126,7 +134,7 @@ static inline PetscReal gap_of(const Found *found, PetscInt i)
 static void take_geometry(const Collision *c, const Found *found, PetscInt i, Hit *hit)
 {
   const SbEdgePair *pair = i < found->nnear ? NULL : &found->pair[i - found->nnear];
-  const PetscReal *normal = pair ? pair->normal : found->near[i].normal;
+  const PetscReal *normal = normal_of(found, i);
   const PetscReal turned = SbDot3(hit->normal, normal);
 
   if (pair)
@@ -136,7 +144,7 @@ static void take_geometry(const Collision *c, const Found *found, PetscInt i, Hi
   for (int k = 0; k < 3; k++) hit->normal[k] = normal[k];
   hit->gap = gap_of(found, i);
   hit->value = SbDot3(hit->normal, hit->now) - hit->gap;
-  if (!hit->was || turned < 0.7)
+  if (!hit->was || turned < TURNED)
     hit->allowed =
       c->recovery * PetscMax(0, SbDot3(hit->normal, hit->now) - SbDot3(hit->normal, hit->start) - hit->gap);
 }
@@ -158,11 +166,23 @@ static inline PetscBool before(const Hit *a, PetscInt point, PetscInt part)
 }
 
 /* A pair keeps its normal and weights once its gap is closed, or after many looks: on an edge they may change for ever. */
-static PetscBool is_settled(const Collision *c, PetscReal gap, Hit *hit)
+static PetscBool is_settled(const Collision *c, PetscReal gap, const PetscReal normal[3], Hit *hit)
 {
+  /* at a corner another facet may be as near: then the one that holds does */
+  if (PetscAbsReal(gap + hit->allowed) <= CORNER * c->reach && SbDot3(hit->normal, normal) < TURNED &&
+      PetscAbsReal(SbCollisionExcess(hit)) <= TOLERANCE * c->surface->size)
+    return PETSC_TRUE;
   if (hit->looks++ < FEW_LOOKS) return PETSC_FALSE;
   return (PetscBool)(hit->looks > LOOKS ||
                      PetscAbsReal(gap + hit->allowed - hit->leaves) <= 0.1 * TOLERANCE * c->surface->size);
+}
+
+/* A pair that was not found stays when it touches. */
+static void keep_lost(const Hit *hit, Hit to[], PetscInt *m)
+{
+  if (!hit->on) return;
+  to[*m] = *hit;
+  to[(*m)++].depth = 0;
 }
 
 /*
@@ -183,16 +203,15 @@ static PetscErrorCode merge(Collision *c, const Found *found, PetscBool within)
 
     name_of(c, found, i, &hit);
     if (hit.point < s->npoint && !looks_for(c, s->point_part[hit.point], hit.part)) continue;
-    for (; old < c->nhit && before(&c->hit[old], hit.point, hit.part); old++) {
-      if (within && c->hit[old].on) c->spare[m++] = c->hit[old];
-    }
+    for (; old < c->nhit && before(&c->hit[old], hit.point, hit.part); old++)
+      if (within) keep_lost(&c->hit[old], c->spare, &m);
     if (old < c->nhit && c->hit[old].point == hit.point && c->hit[old].part == hit.part) hit = c->hit[old++];
-    if (!within || !hit.on || !is_settled(c, gap_of(found, i), &hit)) take_geometry(c, found, i, &hit);
+    if (!within || !hit.on || !is_settled(c, gap_of(found, i), normal_of(found, i), &hit))
+      take_geometry(c, found, i, &hit);
+    hit.depth = i < found->nnear ? found->near[i].depth : found->pair[i - found->nnear].depth;
     c->spare[m++] = hit;
   }
-  for (; old < c->nhit; old++) {
-    if (within && c->hit[old].on) c->spare[m++] = c->hit[old];
-  }
+  for (; old < c->nhit && within; old++) keep_lost(&c->hit[old], c->spare, &m);
   swap = c->hit;
   c->hit = c->spare;
   c->spare = swap;

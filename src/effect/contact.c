@@ -152,8 +152,8 @@ static PetscErrorCode options_contact(SbEffect e, const SbScope *scope)
 }
 
 /* Adds a facet's share of area and stiffness to one of its nodes; slot[] holds the place of owned nodes, -1: none yet. */
-static void add_share(SbSpace space, const SbFacet *facet, PetscInt a, PetscReal share, PetscReal height,
-                      PetscInt slot[], Contact *c)
+static void add_share(SbSpace space, const SbFacet *facet, PetscInt a, PetscReal share, PetscInt slot[],
+                      Contact *c)
 {
   const PetscInt node = space->cell_node[4 * facet->cell + a];
   const SbMaterial m = space->material[space->mesh->cell_material[facet->cell]];
@@ -165,7 +165,7 @@ static void add_share(SbSpace space, const SbFacet *facet, PetscInt a, PetscReal
     c->touch[slot[node]] = (Touch){.node = node, .cell = facet->cell, .a = a};
   }
   touch = &c->touch[slot[node]];
-  touch->k += c->stiffness * (m->lambda + 2 * m->mu) * share / height;
+  touch->k += c->stiffness * (m->lambda + 2 * m->mu) * share / facet->height;
 }
 
 static PetscErrorCode setup_contact(SbEffect e, SbSpace space)
@@ -185,17 +185,11 @@ static PetscErrorCode setup_contact(SbEffect e, SbSpace space)
   PetscCall(PetscMalloc1(space->nnode, &slot));
   for (PetscInt i = 0; i < space->nnode; i++) slot[i] = -1;
   for (PetscInt i = 0; i < n; i++) {
-    const PetscInt cell = facet[i].cell, *v = space->mesh->cell + 4 * cell;
-    PetscReal height = 0;
-
-    for (int k = 0; k < 3; k++)
-      height += facet[i].normal[k] *
-                (space->mesh->x[3 * facet[i].vertex[0] + k] - space->mesh->x[3 * v[facet[i].face] + k]);
-    if (SbSpaceCellElement(space, cell)->nodes_per[0]) {
+    if (SbSpaceCellElement(space, facet[i].cell)->nodes_per[0]) {
       for (int k = 0; k < 3; k++)
-        add_share(space, &facet[i], facet[i].corner[k], facet[i].area / 3, height, slot, c);
+        add_share(space, &facet[i], facet[i].corner[k], facet[i].area / 3, slot, c);
     } else
-      add_share(space, &facet[i], facet[i].face, facet[i].area, height, slot, c);
+      add_share(space, &facet[i], facet[i].face, facet[i].area, slot, c);
   }
   PetscCall(PetscFree(slot));
   PetscCall(PetscFree(facet));

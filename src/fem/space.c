@@ -322,7 +322,12 @@ static void facet_geometry(SbMesh mesh, SbFacet *facet)
   SbCross(e1, e2, n);
   length = PetscSqrtReal(SbDot3(n, n));
   facet->area = 0.5 * length;
-  for (PetscInt i = 0; i < 3; i++) facet->normal[i] = n[i] / length;
+  facet->height = 0;
+  for (PetscInt i = 0; i < 3; i++) {
+    facet->normal[i] = n[i] / length;
+    facet->height += facet->normal[i] * (mesh->x[3 * facet->vertex[0] + i] -
+                                         mesh->x[3 * mesh->cell[4 * facet->cell + facet->face] + i]);
+  }
 }
 
 PetscErrorCode SbSpaceGetSetFacets(SbSpace s, PetscInt k, PetscInt *n, SbFacet **facets)

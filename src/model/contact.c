@@ -58,7 +58,8 @@ PetscErrorCode SbModelContactSettle(SbModel m, PetscReal t, Vec U, Vec R, PetscB
   PetscCall(SbSpaceRestoreLocalRead(m->space, U, &u));
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, again, 1, SB_MPI_BOOL, MPI_LOR, m->comm));
   if (m->nrebound && !*again && !m->space->rough) PetscCall(SbModelReboundSettle(m, U, again));
-  if (*again) PetscCall(hold(m, t, U));
+  /* a look changes normals and weights: rows that are solved again are those of the last look */
+  if (*again || m->space->rough) PetscCall(hold(m, t, U));
   PetscCall(PetscLogEventEnd(SbEvents[SB_EVENT_CONTACT], 0, 0, 0, 0));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

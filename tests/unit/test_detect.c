@@ -127,7 +127,7 @@ static PetscBool equal(const SbNear *a, const SbNear *b)
     if (a->weight[k] != b->weight[k] || a->normal[k] != b->normal[k]) return PETSC_FALSE;
   }
   return (PetscBool)(a->point == b->point && a->facet == b->facet && a->gap == b->gap &&
-                     a->crossed == b->crossed);
+                     a->depth == b->depth && a->crossed == b->crossed);
 }
 
 /* What is true of any contact. */
@@ -148,6 +148,8 @@ static void check_contact(const SbDetectScene *s, const SbNear *a, unsigned k)
   }
   along = SbDot3(r, n);
   SB_CHECK_NEAR(along, a->gap, 1e-9 * s->reach, "the gap along the normal");
+  SB_CHECK(a->depth >= 0 && a->depth <= PetscMax(0, -a->gap), "scene %u: depth %g, gap %g", k,
+           (double)a->depth, (double)a->gap);
   if (!a->crossed) {
     /* very near an edge or corner the gap is along a facet's normal there */
     SB_CHECK_NEAR(SbDot3(r, r), a->gap * a->gap, 1e-8 * s->reach * s->reach, "the gap to the nearest point");
@@ -165,7 +167,7 @@ static PetscBool equal_pairs(const SbEdgePair *a, const SbEdgePair *b)
   for (int k = 0; k < 2; k++) {
     if (a->edge[k] != b->edge[k] || a->at[k] != b->at[k]) return PETSC_FALSE;
   }
-  return (PetscBool)(a->gap == b->gap && a->crossed == b->crossed);
+  return (PetscBool)(a->gap == b->gap && a->depth == b->depth && a->crossed == b->crossed);
 }
 
 /* Corner k of an edge. */
@@ -179,8 +181,8 @@ static void check_pair(const SbDetectScene *s, const SbEdgePair *a, unsigned k)
 {
   const SbEdges *e = s->edges;
   PetscReal r[3], e0, e1, part = 0;
+  SbEdgeKind kind[2];
 
-  SB_CHECK(e->id[a->edge[0]] < e->id[a->edge[1]], "scene %u: edges in the wrong order", k);
   SB_CHECK(s->self || e->part[a->edge[0]] != e->part[a->edge[1]], "scene %u: edges of one part", k);
   for (int q = 0; q < 2; q++) {
     const PetscReal *const x[4] = {end_of(s, a->edge[q], 0), end_of(s, a->edge[q], 1),
@@ -188,11 +190,13 @@ static void check_pair(const SbDetectScene *s, const SbEdgePair *a, unsigned k)
     PetscReal d[3], along;
 
     SB_CHECK(a->at[q] >= 0 && a->at[q] <= 1, "scene %u: place %g", k, (double)a->at[q]);
-    SB_CHECK(SbEdgeSharp(x), "scene %u: a smooth edge", k);
+    kind[q] = SbEdgeKindOf(x);
     for (int i = 0; i < 3; i++) d[i] = x[1][i] - x[0][i];
     along = SbDot3(d, a->normal) / PetscSqrtReal(SbDot3(d, d));
     SB_CHECK_NEAR(along, 0, 1e-12, "normal across the edge");
   }
+  SB_CHECK(kind[0] == SB_EDGE_SHARP && kind[1] != SB_EDGE_FLAT, "scene %u: a smooth edge", k);
+  SB_CHECK(kind[1] == SB_EDGE_BENT || e->id[a->edge[0]] < e->id[a->edge[1]], "scene %u: the wrong order", k);
   for (int i = 0; i < 3; i++) {
     e0 = (1 - a->at[0]) * end_of(s, a->edge[0], 0)[i] + a->at[0] * end_of(s, a->edge[0], 1)[i];
     e1 = (1 - a->at[1]) * end_of(s, a->edge[1], 0)[i] + a->at[1] * end_of(s, a->edge[1], 1)[i];

@@ -22,7 +22,7 @@ static PetscErrorCode count_edges(World *w, PetscInt *n, PetscInt *sharp)
     const PetscInt *c = w->edges.corner + 4 * i, *v = w->edges.vertex + 2 * i, id = w->edges.id[i];
     const PetscReal *const x[4] = {s->x + 3 * c[0], s->x + 3 * c[1], s->x + 3 * c[2], s->x + 3 * c[3]};
 
-    *sharp += SbEdgeSharp(x);
+    *sharp += SbEdgeKindOf(x) == SB_EDGE_SHARP;
     SB_CHECK(w->corner_vertex[id] == v[0] && w->corner_vertex[id - id % 3 + (id + 1) % 3] == v[1] &&
                w->corner_vertex[c[2]] == w->corner_vertex[id - id % 3 + (id + 2) % 3],
              "edge %d is not that side of its first facet", (int)i);
@@ -183,6 +183,7 @@ static void set_place(const Tet *t, int k, PetscBool moving, SbEdgePlace *p)
     c = side[k][3];
     d = side[k][2];
   }
+  p->thick = 0;
   p->x[0] = t->x[side[k][0]];
   p->x[1] = t->x[side[k][1]];
   p->x[2] = t->x[c];
@@ -314,7 +315,7 @@ static void check_tets(void)
 
       set_place(&t[0], k / 6, PETSC_FALSE, &p[0]);
       set_place(&t[1], k % 6, PETSC_FALSE, &p[1]);
-      if (!SbEdgeSharp(p[0].x) || !SbEdgeSharp(p[1].x)) continue;
+      if (SbEdgeKindOf(p[0].x) < SB_EDGE_SHARP || SbEdgeKindOf(p[1].x) < SB_EDGE_SHARP) continue;
       found = SbEdgesMeet(&p[0], &p[1], 2, &pair);
       if (those && edges < 0.99 * vertices && edges < 2) {
         PetscReal e[3], f[3], n[3];
@@ -444,7 +445,7 @@ static PetscBool meet(const PetscReal shift_by[3], const PetscReal way[2], const
                       SbEdgePair *pair)
 {
   PetscReal x[8][3] = {{-1, 0, 0}, {1, 0, 0}, {0, 0.5, 0.5}, {0, -0.5, 0.5}, {0}}, x0[4][3];
-  SbEdgePlace p[2];
+  SbEdgePlace p[2] = {{.thick = 0}, {.thick = 0}};
 
   for (int k = 0; k < 3; k++) {
     for (int q = 0; q < 4; q++) x[q][k] += shift_by[k];

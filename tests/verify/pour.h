@@ -198,6 +198,7 @@ static inline PetscErrorCode pour(PetscInt n, PetscReal end, PetscReal radius, P
            (double)w->missing);
   SB_CHECK(w->behind < 1e-6 * radius, "%g m behind the bowl", (double)w->behind);
   SB_CHECK(p.inside < deep * POUR_SIZE, "%g m inside another body", (double)p.inside);
+  SB_CHECK(w->deepest < deep * POUR_SIZE, "the history says %g m inside another body", (double)w->deepest);
   SB_CHECK(furthest < radius, "a body's centre is %g m from the centre of the bowl", (double)furthest);
   SB_CHECK(w->contacts >= 2 * n && w->force > weight, "%g pairs, %g N: the bodies do not meet",
            (double)w->contacts, (double)w->force);
