@@ -53,6 +53,9 @@ typedef struct {
   PetscErrorCode (*rebound)(SbEffect e, PetscReal *work);
   /* its coefficients have `share` left of them in this step, 0..1: what rebounds is held accordingly from now on. Not collective. */
   PetscErrorCode (*curb)(SbEffect e, PetscReal share);
+  /* contact, when a step of Newmark that ends at t has been solved: at what speed that moves on which it holds something, at the end, by
+     SbSpaceHoldRate() and SbSpaceCoupleRate(); bodies' rows have none. Not collective. */
+  PetscErrorCode (*rate)(SbEffect e, SbSpace space, const SbStage *stage);
   /* f[nnode][3] += what contact pushes owned nodes with, N, residual r as for history(). For output only; rows that join nodes add
      theirs without it. Not collective. */
   PetscErrorCode (*push)(SbEffect e, SbSpace space, const SbStage *stage, const PetscReal r[], PetscReal f[]);
@@ -84,6 +87,8 @@ struct _p_SbEffect {
   PetscBool dynamic; /* the run has inertia; known from set-up on */
   PetscBool saddle;  /* its rows are to be solved with their multipliers as unknowns */
   PetscBool euler;   /* made for implicit Euler only. Default PETSC_FALSE */
+  PetscBool
+    springs; /* of contact: it pushes with springs or friction, not by what it holds alone. Default PETSC_FALSE */
   const struct SbEffectOn_ *held; /* the sets whose nodes it prescribes in all directions; NULL: none */
   PetscInt ncolumn;               /* history columns, known after set-up */
   const char *const

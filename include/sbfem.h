@@ -158,6 +158,10 @@ void SbHeldPrescribe(SbSpace space, PetscReal u[]);
 void SbHeldConstrain(SbSpace space, PetscReal f[]);
 /* Leaves of a residual what the constraints must push with: Q f, and f at prescribed unknowns. */
 void SbHeldReaction(SbSpace space, PetscReal f[]);
+/* Speed along direction k of an owned node at the end of the step, m/s; 0 unless told. Then v <- the nearest velocity with these speeds,
+   on owned nodes [nnode_owned][3]. Not collective. */
+void SbSpaceHoldRate(SbSpace space, PetscInt node, PetscInt k, PetscReal rate);
+void SbHeldVelocity(SbSpace space, PetscReal v[]);
 /* Force along direction k of an owned node that the residual r (N, unconstrained) there asks for, N. */
 PetscReal SbSpaceHoldForce(SbSpace space, PetscInt node, PetscInt k, const PetscReal r[3]);
 
@@ -209,6 +213,13 @@ void SbSpaceCouplePush(SbSpace space, PetscInt row, PetscInt n, PetscReal direct
 PetscErrorCode SbSpaceCoupleForce(SbSpace space, Vec U, Vec F);
 /* U <- nearest displacement on which the exact rows hold. Collective. */
 PetscErrorCode SbCouplePrescribe(SbSpace space, Vec U);
+/*
+  Velocities of what exact rows tie (src/fem/couple_velocity.c). Rate: of the sum of a row at the end of the step, m/s, 0 unless told; not
+  collective. Velocity: V <- the nearest one in the norm of the lumped mass that has these rates, and the impulses that this takes over
+  the length dt of the step (s) are added to the forces of the rows. Collective.
+*/
+PetscErrorCode SbSpaceCoupleRate(SbSpace space, PetscInt row, PetscReal rate);
+PetscErrorCode SbCoupleVelocity(SbSpace space, PetscReal dt, Vec V);
 /* z <- the part of it that moves nothing that is prescribed, held, or tied by exact rows. Collective. */
 PetscErrorCode SbSpaceAllow(SbSpace space, Vec z);
 /* F <- F less the springs' forces, and without what the exact rows take when `constrain`. Collective. */

@@ -82,6 +82,9 @@ PetscErrorCode SbModelReboundSettle(SbModel model, Vec U, PetscBool *again);
 /* After the first Settle of a step: the part of it after which the first point arrives at what it did not touch before, 1: none
    does; effects that do not ask for it are not looked at. Collective. */
 PetscErrorCode SbModelContactArrival(SbModel model, PetscReal *part);
+/* V <- the nearest velocity in the norm of the lumped mass with which what touches stays so, after a step of the length dt that ended at
+   t with the displacement U; the forces of rows are raised by the impulses over dt. Collective. */
+PetscErrorCode SbModelContactVelocity(SbModel model, PetscReal t, PetscReal dt, Vec U, Vec V);
 /* G = gap of each node along the normal of the nearest thing that it may touch, m, after the step that ended at t with the displacement U;
    0 where nothing is near. Collective. */
 PetscErrorCode SbModelContactGap(SbModel model, PetscReal t, Vec U, Vec G);

@@ -130,6 +130,7 @@ static PetscErrorCode options_collision(SbEffect e, const SbScope *scope)
   c->response = (Response)choice;
   e->saddle = (PetscBool)(c->response == MULTIPLIER);
   c->friction.exact = exact(c->response);
+  e->springs = (PetscBool)!exact(c->response);
   PetscCall(SbOptionChoice(scope, "arrival", &choice));
   c->cut = (PetscBool)(choice == 1);
   if (!c->cut) e->ops.arrive = NULL;
@@ -140,6 +141,7 @@ static PetscErrorCode options_collision(SbEffect e, const SbScope *scope)
   c->both = (PetscBool)(choice == 1);
   PetscCall(SbOptionBool(scope, "self", &c->self));
   PetscCall(SbOptionReal(scope, "friction", &c->friction.mu));
+  if (c->friction.mu > 0) e->springs = PETSC_TRUE;
   PetscCall(SbOptionReal(scope, "friction_kinetic", &c->friction.mu_kinetic));
   if (c->friction.mu_kinetic < 0) c->friction.mu_kinetic = c->friction.mu;
   PetscCheck(
@@ -446,6 +448,16 @@ static PetscErrorCode settle_collision(SbEffect e, SbSpace space, const PetscRea
 
 /* ------------------------------------------------------------------ after a step */
 
+/* The force of an exact row with what the end of a step of Newmark has added to it. */
+static void read_impulse(const Collision *c, SbSpace space, Hit *hit)
+{
+  PetscReal force, along;
+
+  if (!exact(c->response) || !hit->on || hit->row < 0 || SbSpaceCoupleRests(space, hit->row)) return;
+  SbSpaceCoupleGet(space, hit->row, &force, &along);
+  hit->lambda = PetscMax(0, force);
+}
+
 /* Work of the forces on the way from the start of the step. */
 static PetscErrorCode accept_collision(SbEffect e, SbSpace space, const SbStage *stage)
 {
@@ -460,6 +472,7 @@ static PetscErrorCode accept_collision(SbEffect e, SbSpace space, const SbStage 
     hit->was = (PetscBool)(hit->on && hit->leaves <= 0);
     for (int k = 0; k < 3 && normal > 0; k++)
       c->work += normal * hit->normal[k] * (hit->now[k] - hit->start[k]);
+    read_impulse(c, space, hit);
   }
   PetscCall(SbCollisionKeep(c));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -137,6 +137,7 @@ static PetscErrorCode options_contact(SbEffect e, const SbScope *scope)
   PetscCall(SbOptionReal(scope, "recovery", &c->recovery));
   c->recovery = c->recovery > 1 ? PetscExpReal(-1 / c->recovery) : 0;
   PetscCall(read_path(e, scope));
+  e->springs = (PetscBool)(!exact(c) || c->friction.mu > 0);
   c->friction.exact = exact(c);
   c->rows = (PetscBool)(c->response == MULTIPLIER || c->friction.mu > 0);
   if (exact(c) || c->rows) {
@@ -186,8 +187,7 @@ static PetscErrorCode setup_contact(SbEffect e, SbSpace space)
   for (PetscInt i = 0; i < space->nnode; i++) slot[i] = -1;
   for (PetscInt i = 0; i < n; i++) {
     if (SbSpaceCellElement(space, facet[i].cell)->nodes_per[0]) {
-      for (int k = 0; k < 3; k++)
-        add_share(space, &facet[i], facet[i].corner[k], facet[i].area / 3, slot, c);
+      for (int k = 0; k < 3; k++) add_share(space, &facet[i], facet[i].corner[k], facet[i].area / 3, slot, c);
     } else
       add_share(space, &facet[i], facet[i].face, facet[i].area, slot, c);
   }
@@ -581,6 +581,7 @@ static PetscErrorCode create_contact(SbEffect e)
   e->ops.arrive = arrive_contact;
   e->ops.rebound = SbEffectRebound_Contact;
   e->ops.curb = SbEffectCurb_Contact;
+  e->ops.rate = SbEffectRate_Contact;
   e->ops.force = SbEffectForce_Contact;
   e->ops.tangent = SbEffectTangent_Contact;
   e->ops.accept = SbEffectAccept_Contact;

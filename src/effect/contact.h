@@ -122,6 +122,7 @@ void SbContactHit(const Contact *c, Touch *touch);
 /* Operations of the effect (sbeffect.h). */
 PetscErrorCode SbEffectForce_Contact(SbEffect e, SbSpace space, const SbStage *stage, PetscReal f[]);
 PetscErrorCode SbEffectTangent_Contact(SbEffect e, SbSpace space, const SbStage *stage, Mat A);
+PetscErrorCode SbEffectRate_Contact(SbEffect e, SbSpace space, const SbStage *stage);
 PetscErrorCode SbEffectRebound_Contact(SbEffect e, PetscReal *work);
 PetscErrorCode SbEffectCurb_Contact(SbEffect e, PetscReal share);
 PetscErrorCode SbEffectAccept_Contact(SbEffect e, SbSpace space, const SbStage *stage);

@@ -1,8 +1,10 @@
 /*
-  contact_rebound.c - restitution of nodes that meet a rigid obstacle. The law and what it does to the energy are told in
-  src/model/rebound.c.
+  contact_rebound.c - velocities at a rigid obstacle: restitution of nodes that meet it, whose law and what it does to the energy are told in
+  src/model/rebound.c, and how fast it moves where it holds nodes.
 */
 #include "contact.h"
+
+#define INSTANT 1e-3 /* of a step: over so much of its end the obstacle's speed is taken */
 
 PetscBool SbContactComes(const Contact *c, const SbPose *from, const PetscReal x0[3], const PetscReal v0[3],
                          Touch *touch)
@@ -58,6 +60,33 @@ PetscErrorCode SbEffectCurb_Contact(SbEffect e, PetscReal share)
     Touch *touch = &c->touch[i];
 
     if (touch->rest > 0) move_to(SbReboundTo(&c->bounce, touch->gap0, touch->arrives), touch);
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The obstacle's point at each node that it holds moves with it. */
+PetscErrorCode SbEffectRate_Contact(SbEffect e, SbSpace space, const SbStage *stage)
+{
+  const Contact *c = (const Contact *)e->data;
+  SbPose before, now;
+
+  PetscFunctionBeginUser;
+  SbContactPose(c, stage->t, &now);
+  SbContactPose(c, stage->t - INSTANT * stage->dt, &before);
+  for (PetscInt i = 0; i < c->n; i++) {
+    const Touch *touch = &c->touch[i];
+    PetscReal x[3], X[3], from[3], to[3], v[3];
+
+    if (!touch->on || touch->along < 0) continue;
+    place(space, touch->node, stage->u, x);
+    SbPoseInvert(&now, x, X);
+    SbPoseApply(&before, X, from);
+    SbPoseApply(&now, X, to);
+    for (int k = 0; k < 3; k++) v[k] = (to[k] - from[k]) / (INSTANT * stage->dt);
+    if (!c->rows)
+      SbSpaceHoldRate(space, touch->node, touch->along, SbDot3(touch->n, v));
+    else
+      PetscCall(SbSpaceCoupleRate(space, touch->along, SbDot3(touch->n, v)));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -94,6 +94,7 @@ PetscErrorCode SbCoupleDestroy(SbCouple *couple)
   PetscCall(VecDestroy(&c->w[1]));
   PetscCall(VecDestroy(&c->w[2]));
   PetscCall(PetscFree(c->rests));
+  PetscCall(PetscFree(c->rate));
   PetscCall(PetscFree(c->start));
   PetscCall(PetscFree(c->gnode));
   PetscCall(PetscFree(c->coef));
@@ -110,6 +111,7 @@ void SbSpaceCoupleClear(SbSpace s)
   s->couple->n = 0;
   s->couple->nentry = 0;
   s->couple->tilted = PETSC_FALSE;
+  s->couple->nrate = 0;
 }
 
 static PetscErrorCode make_room(SbCouple c, PetscInt more)
@@ -380,31 +382,6 @@ static PetscErrorCode regularise(SbCouple c)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode create_solver(SbSpace s)
-{
-  SbCouple c = s->couple;
-  PetscMPIInt size;
-  KSP inner;
-  PC pc;
-
-  PetscFunctionBeginUser;
-  PetscCallMPI(MPI_Comm_size(s->comm, &size));
-  PetscCall(KSPCreate(s->comm, &c->solver));
-  PetscCall(KSPSetOptionsPrefix(c->solver, "rows_"));
-  PetscCall(KSPSetOperators(c->solver, c->gram, c->gram));
-  PetscCall(KSPSetType(c->solver, KSPPREONLY));
-  PetscCall(KSPGetPC(c->solver, &pc));
-  if (size > 1) {
-    PetscCall(PCSetType(pc, PCREDUNDANT));
-    PetscCall(PCRedundantGetKSP(pc, &inner));
-    PetscCall(KSPSetType(inner, KSPPREONLY));
-    PetscCall(KSPGetPC(inner, &pc));
-  }
-  PetscCall(PCSetType(pc, c->tilted ? PCLU : PCCHOLESKY));
-  PetscCall(KSPSetUp(c->solver));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /*
   A body that only rows hold makes K singular, which no factorisation takes. In a static run the matrix gets s_i times the squares
   of the rows' coefficients on its diagonal, s_i the size of the node's block; the operator takes it away again, so that only M
@@ -466,7 +443,7 @@ static PetscErrorCode create_gram(SbSpace s)
   PetscCall(MatDiagonalScale(c->DFt, c->d, NULL));
   PetscCall(MatMatMult(c->exact.free, c->DFt, MAT_INITIAL_MATRIX, PETSC_DEFAULT, &c->gram));
   PetscCall(regularise(c));
-  PetscCall(create_solver(s));
+  PetscCall(SbCoupleCreateSolver(s, c->gram, &c->solver));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -35,6 +35,8 @@ struct _p_SbCouple {
   PetscBool *rests;                        /* [n] an exact row that earlier ones say already */
   PetscInt *place;                         /* [n] row in its matrix on this rank */
   PetscReal *force, *sum;                  /* [n] */
+  PetscReal *rate;                         /* [nrate] m/s, of rows on what moves; rows behind them: 0 */
+  PetscInt nrate;
   Rows exact, spring;
   Vec k, constants;  /* of springs */
   Mat K;             /* borrowed; NULL before SbCoupleCreateOperator() */
@@ -56,6 +58,8 @@ PetscErrorCode SbCoupleSelect(SbSpace space);
 PetscErrorCode SbCoupleProject(SbCouple c, Vec x);
 /* y = (K + F^T k G) x, what was added to K taken away. Collective. */
 PetscErrorCode SbCoupleMultiply(SbCouple c, Vec x, Vec y);
+/* A direct solver for a matrix of rows by rows, G D F^T, on every rank; the caller destroys it. Collective. */
+PetscErrorCode SbCoupleCreateSolver(SbSpace space, Mat gram, KSP *solver);
 /* step = (G D F^T)^-1 work, vectors of c->exact. Collective. */
 PetscErrorCode SbCoupleSolveGram(SbCouple c);
 /* r <- r - F^T lambda, what rows cannot take; lambda into c->exact.force, N. Collective. */

@@ -19,6 +19,7 @@ struct _p_SbHeld {
   PetscInt *count;   /* [nnode_owned] directions */
   PetscReal *normal; /* [nnode_owned][3][3] directions as given, without prescribed components */
   PetscReal *d;      /* [nnode_owned][3] m */
+  PetscReal *rate;   /* [nnode_owned][3] speeds along the directions, m/s */
   PetscReal *Q;      /* [nnode][9] */
   PetscInt ntotal;   /* held nodes of all ranks */
   Vec row;           /* a row of Q of every node, to tell the others */
@@ -31,8 +32,8 @@ PetscErrorCode SbSpaceHoldCreate(SbSpace s)
   PetscFunctionBeginUser;
   if (s->held) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscNew(&h));
-  PetscCall(PetscCalloc4(s->nnode_owned, &h->count, 9 * s->nnode_owned, &h->normal, 3 * s->nnode_owned, &h->d,
-                         9 * s->nnode, &h->Q));
+  PetscCall(PetscCalloc5(s->nnode_owned, &h->count, 9 * s->nnode_owned, &h->normal, 3 * s->nnode_owned, &h->d,
+                         3 * s->nnode_owned, &h->rate, 9 * s->nnode, &h->Q));
   PetscCall(SbSpaceCreateVec(s, &h->row));
   s->held = h;
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -44,7 +45,7 @@ PetscErrorCode SbHeldDestroy(SbHeld *held)
 
   PetscFunctionBeginUser;
   if (!h) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(PetscFree4(h->count, h->normal, h->d, h->Q));
+  PetscCall(PetscFree5(h->count, h->normal, h->d, h->rate, h->Q));
   PetscCall(VecDestroy(&h->row));
   PetscCall(PetscFree(*held));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -56,6 +57,7 @@ void SbSpaceHoldClear(SbSpace s)
 
   memset(h->count, 0, (size_t)s->nnode_owned * sizeof(*h->count));
   memset(h->d, 0, 3 * (size_t)s->nnode_owned * sizeof(*h->d));
+  memset(h->rate, 0, 3 * (size_t)s->nnode_owned * sizeof(*h->rate));
   memset(h->Q, 0, 9 * (size_t)s->nnode * sizeof(*h->Q));
 }
 
@@ -151,21 +153,52 @@ void SbHeldReaction(SbSpace s, PetscReal f[])
   }
 }
 
-/* Least squares: the Gram matrix of at most three directions. */
-PetscReal SbSpaceHoldForce(SbSpace s, PetscInt node, PetscInt k, const PetscReal r[3])
+/* x[k] of the Gram matrix of the at most three directions of a node, x = (N N^T)^-1 b. */
+static void solve_directions(SbHeld h, PetscInt node, const PetscReal b[3], PetscReal x[3])
 {
-  const SbHeld h = s->held;
   const PetscReal *n = h->normal + 9 * node;
   const PetscInt m = h->count[node];
-  PetscReal G[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1}, b[3] = {0}, C[9], det;
+  PetscReal G[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1}, C[9], det;
 
   for (PetscInt i = 0; i < m; i++) {
-    b[i] = SbDot3(n + 3 * i, r);
     for (PetscInt j = 0; j < m; j++) G[3 * i + j] = SbDot3(n + 3 * i, n + 3 * j);
   }
   SbMatCofactor(G, C);
   det = SbDot3(G, C);
-  return (C[3 * k] * b[0] + C[3 * k + 1] * b[1] + C[3 * k + 2] * b[2]) / det;
+  for (int k = 0; k < 3; k++) x[k] = SbDot3(C + 3 * k, b) / det;
+}
+
+/* Least squares. */
+PetscReal SbSpaceHoldForce(SbSpace s, PetscInt node, PetscInt k, const PetscReal r[3])
+{
+  const SbHeld h = s->held;
+  PetscReal b[3] = {0}, x[3];
+
+  for (PetscInt i = 0; i < h->count[node]; i++) b[i] = SbDot3(h->normal + 9 * node + 3 * i, r);
+  solve_directions(h, node, b, x);
+  return x[k];
+}
+
+void SbSpaceHoldRate(SbSpace s, PetscInt node, PetscInt k, PetscReal rate)
+{
+  s->held->rate[3 * node + k] = rate;
+}
+
+void SbHeldVelocity(SbSpace s, PetscReal v[])
+{
+  const SbHeld h = s->held;
+
+  for (PetscInt i = 0; h->ntotal && i < s->nnode_owned; i++) {
+    const PetscReal *n = h->normal + 9 * i;
+    PetscReal b[3] = {0}, x[3];
+
+    if (!h->count[i]) continue;
+    for (PetscInt k = 0; k < h->count[i]; k++) b[k] = h->rate[3 * i + k] - SbDot3(n + 3 * k, v + 3 * i);
+    solve_directions(h, i, b, x);
+    for (PetscInt k = 0; k < h->count[i]; k++) {
+      for (int c = 0; c < 3; c++) v[3 * i + c] += x[k] * n[3 * k + c];
+    }
+  }
 }
 
 /* B <- (I - Qi) B (I - Qj), rows rs apart, columns cs; Q NULL: not held. */

@@ -78,6 +78,26 @@ PetscErrorCode SbModelContactArrival(SbModel m, PetscReal *part)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscErrorCode SbModelContactVelocity(SbModel m, PetscReal t, PetscReal dt, Vec U, Vec V)
+{
+  SbStage stage = {.t = t, .dt = dt, .shift_k = 1.};
+  PetscScalar *v;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbSpaceGetLocalRead(m->space, U, &stage.u));
+  for (PetscInt e = 0; e < m->ntouch; e++) {
+    if (m->touch[e]->ops.rate) PetscCall(m->touch[e]->ops.rate(m->touch[e], m->space, &stage));
+  }
+  PetscCall(SbSpaceRestoreLocalRead(m->space, U, &stage.u));
+  if (m->space->held) {
+    PetscCall(VecGetArray(V, &v));
+    SbHeldVelocity(m->space, v);
+    PetscCall(VecRestoreArray(V, &v));
+  }
+  if (m->space->couple) PetscCall(SbCoupleVelocity(m->space, dt, V));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode SbModelContactGap(SbModel m, PetscReal t, Vec U, Vec G)
 {
   SbStage stage = {.t = t, .shift_k = 1.};

@@ -113,6 +113,7 @@ static void method_settings(SbRun run, SbMethodSettings *set)
                             .beta = 0.25,
                             .gamma = 0.5,
                             .velocity_predictor = run->velocity_predictor,
+                            .impulses = (PetscBool)(run->preset == SB_TIME_NEWMARK && run->model->ntouch),
                             .max_cuts = run->max_cuts};
   if (run->preset == SB_TIME_NEWMARK) {
     set->method = SB_METHOD_GENERALIZED_ALPHA;
@@ -335,6 +336,30 @@ static PetscErrorCode set_up_static(SbRun run)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* What contact with Newmark rests on (newmark_contact.c): the trapezoidal rule, the lumped mass, and forces of what is held alone. */
+static PetscErrorCode check_newmark(SbRun run)
+{
+  const SbModel m = run->model;
+
+  PetscFunctionBeginUser;
+  PetscCheck(
+    run->newmark[0] == 0.25 && run->newmark[1] == 0.5, m->comm, PETSC_ERR_USER_INPUT,
+    "-time newmark with the effect %s needs -time_newmark_beta 0.25 and -time_newmark_gamma 0.5, not "
+    "%g and %g: else impacts may gain energy",
+    m->touch[0]->name, (double)run->newmark[0], (double)run->newmark[1]);
+  PetscCheck(!m->space->consistent_mass, m->comm, PETSC_ERR_USER_INPUT,
+             "-time newmark with the effect %s needs -mass lumped: velocities of what touches are put right "
+             "node by node",
+             m->touch[0]->name);
+  for (PetscInt e = 0; e < m->ntouch; e++)
+    PetscCheck(
+      !m->touch[e]->springs, m->comm, PETSC_ERR_USER_INPUT,
+      "-time newmark gains energy by springs and friction of the effect %s: give "
+      "-effect_%s_response projected or multiplier and no friction, or use euler_implicit or genalpha",
+      m->touch[e]->name, m->touch[e]->name);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* What contact needs: several solves in a step, and a matrix that can be projected. */
 static PetscErrorCode check_contact(SbRun run, PetscBool explicit)
 {
@@ -345,13 +370,11 @@ static PetscErrorCode check_contact(SbRun run, PetscBool explicit)
   PetscFunctionBeginUser;
   if (!m->ntouch) PetscFunctionReturn(PETSC_SUCCESS);
   name = m->touch[0]->name;
-  PetscCheck(!explicit && run->preset != SB_TIME_ALPHA2, m->comm, PETSC_ERR_USER_INPUT,
-             "The effect %s needs several solves in a step: use -time euler_implicit, genalpha or static",
-             name);
-  PetscCheck(run->preset != SB_TIME_NEWMARK, m->comm, PETSC_ERR_USER_INPUT,
-             "-time newmark gains energy where the effect %s stops nodes: use euler_implicit, genalpha or "
-             "static",
-             name);
+  PetscCheck(
+    !explicit && run->preset != SB_TIME_ALPHA2, m->comm, PETSC_ERR_USER_INPUT,
+    "The effect %s needs several solves in a step: use -time euler_implicit, newmark, genalpha or static",
+    name);
+  if (run->preset == SB_TIME_NEWMARK) PetscCall(check_newmark(run));
   for (PetscInt e = 0; e < m->ntouch; e++)
     PetscCheck(!m->touch[e]->euler || run->preset == SB_TIME_EULER_IMPLICIT, m->comm, PETSC_ERR_USER_INPUT,
                "-effect_%s_restitution needs -time euler_implicit, whose velocities are those of a step",

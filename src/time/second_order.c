@@ -7,6 +7,7 @@
       F(t0 + alpha_f h, u0 + alpha_f s, v0 + alpha_f (v1 - v0), a0 + alpha_m (a1 - a0)) = 0
     Newmark: alpha_m = alpha_f = 1
     implicit Euler: v1 = s / h, a1 = (v1 - v0) / h (it is not a Newmark method)
+  Newmark with contact: a0 is the acceleration without it, newmark_contact.c tells the rest
   and, with a0 = M^-1 (f(t0, u0, v0)),
     explicit Euler: u1 = u0 + h v0, v1 = v0 + h a0;  symplectic Euler: v1 = v0 + h a0, u1 = u0 + h v1.
 
@@ -25,7 +26,8 @@ typedef struct {
   SbRun run;
   SbMethodSettings set;
   Vec X0, V0, X1, V1, A1; /* state at the start of the step; end of the step */
-  Vec Xa, Va, Aa;         /* stage of generalized-alpha; NULL when the stage is the end */
+  Vec own0, own1; /* Newmark with contact: accelerations without it, at the start and at the end; else NULL */
+  Vec Xa, Va, Aa; /* stage of generalized-alpha; NULL when the stage is the end */
   Vec work;
   PetscReal nominal; /* step length asked for, s; 0 before the first step */
   PetscInt good;     /* steps accepted since the last cut */
@@ -45,6 +47,7 @@ static PetscErrorCode end_state(TS ts, Vec X)
 {
   SecondOrder *so = (SecondOrder *)ts->data;
   const PetscReal h = ts->time_step, beta = so->set.beta, gamma = so->set.gamma;
+  const Vec A0 = so->own0 ? so->own0 : so->run->A;
 
   PetscFunctionBeginUser;
   if (so->set.method == SB_METHOD_EULER_IMPLICIT) {
@@ -54,10 +57,9 @@ static PetscErrorCode end_state(TS ts, Vec X)
     PetscCall(VecScale(so->A1, 1. / h));
   } else {
     PetscCall(VecWAXPY(so->A1, -1., so->X0, X));
-    PetscCall(
-      VecAXPBYPCZ(so->A1, -1. / (beta * h), 1. - 0.5 / beta, 1. / (beta * h * h), so->V0, so->run->A));
+    PetscCall(VecAXPBYPCZ(so->A1, -1. / (beta * h), 1. - 0.5 / beta, 1. / (beta * h * h), so->V0, A0));
     PetscCall(VecCopy(so->V0, so->V1));
-    PetscCall(VecAXPBYPCZ(so->V1, h * (1. - gamma), h * gamma, 1., so->run->A, so->A1));
+    PetscCall(VecAXPBYPCZ(so->V1, h * (1. - gamma), h * gamma, 1., A0, so->A1));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -184,7 +186,8 @@ static PetscErrorCode contact_residual(void *ts, Vec X, Vec R)
   PetscFunctionBeginUser;
   PetscCall(stage_state((TS)ts, X, &t, &U, &V, &A));
   PetscCall(SbModelResidual(so->run->model, t, U, V, A, PETSC_FALSE, R));
-  PetscCall(VecScale(R, 1. / so->set.alpha_f));
+  /* Newmark takes the contact of the end twice: the force of its start is not there */
+  PetscCall(VecScale(R, so->set.impulses ? 0.5 : 1. / so->set.alpha_f));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -219,6 +222,9 @@ static PetscErrorCode solve_implicit(TS ts, PetscBool *ok)
   PetscCall(end_state(ts, so->X1));
   PetscCall(VecNorm(so->V1, NORM_INFINITY, &size));
   *ok = (PetscBool)(reason > 0 && !PetscIsInfOrNanReal(size));
+  if (*ok && so->set.impulses)
+    PetscCall(
+      SbNewmarkContact(so->run, ts->ptime + ts->time_step, ts->time_step, so->X1, so->V1, so->A1, so->own1));
   if (!*ok && reason != SNES_CONVERGED_ITERATING) {
     KSP ksp;
     KSPConvergedReason kreason;
@@ -297,6 +303,8 @@ static PetscErrorCode TSStep_SecondOrder(TS ts)
   /* a restarted run brings its acceleration along: that of generalized-alpha does not follow from the state */
   if (!so->started && so->run->step0 == 0 && so->set.method != SB_METHOD_EULER_IMPLICIT)
     PetscCall(SbFormAcceleration(so->run, ts->ptime, ts->vec_sol, ts->vec_dot, so->run->A));
+  if (!so->started && so->own0)
+    PetscCall(SbNewmarkOwn(so->run, ts->ptime, ts->vec_sol, ts->vec_dot, so->run->A, so->own0));
   so->started = PETSC_TRUE;
   PetscCall(VecCopy(ts->vec_sol, so->X0));
   PetscCall(VecCopy(ts->vec_dot, so->V0));
@@ -318,6 +326,7 @@ static PetscErrorCode TSStep_SecondOrder(TS ts)
       PetscCall(TSAdaptChoose(ts->adapt, ts, h, NULL, &next, &accept));
       if (accept) {
         PetscCall(VecCopy(so->A1, so->run->A));
+        if (so->own0) PetscCall(VecCopy(so->own1, so->own0));
         ts->ptime += ts->time_step;
         so->good = next > ts->time_step ? 0 : so->good + 1;
         ts->time_step = next;
@@ -408,6 +417,10 @@ static PetscErrorCode TSSetUp_SecondOrder(TS ts)
   PetscCall(TSGetAdapt(ts, &ts->adapt));
   PetscCall(TSAdaptCandidatesClear(ts->adapt));
   if (!is_explicit(so)) PetscCall(VecDuplicate(ts->vec_sol, &so->work));
+  if (so->set.impulses) {
+    PetscCall(VecDuplicate(ts->vec_sol, &so->own0));
+    PetscCall(VecDuplicate(ts->vec_sol, &so->own1));
+  }
   PetscCall(TSGetSNES(ts, &snes));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -426,6 +439,8 @@ static PetscErrorCode TSReset_SecondOrder(TS ts)
   PetscCall(VecDestroy(&so->Va));
   PetscCall(VecDestroy(&so->Aa));
   PetscCall(VecDestroy(&so->work));
+  PetscCall(VecDestroy(&so->own0));
+  PetscCall(VecDestroy(&so->own1));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -20,6 +20,7 @@ typedef struct {
   SbMethod method;
   PetscReal alpha_m, alpha_f, beta, gamma; /* generalized-alpha; fraction of the new state, as in TSALPHA2 */
   PetscBool velocity_predictor;            /* Newton starts from u + h v instead of u */
+  PetscBool impulses;                      /* Newmark with contact: newmark_contact.c */
   PetscInt max_cuts;                       /* how often a step is halved before the run stops */
 } SbMethodSettings;
 
@@ -48,6 +49,21 @@ PetscErrorCode SbFormStaticFunction(SNES snes, Vec U, Vec F, void *run);
 PetscErrorCode SbFormStaticJacobian(SNES snes, Vec U, Mat J, Mat P, void *run);
 /* A = M^-1 (f_ext - C V - f_int), zero on prescribed unknowns. */
 PetscErrorCode SbFormAcceleration(SbRun run, PetscReal t, Vec U, Vec V, Vec A);
+
+/*
+  newmark_contact.c, after the solves of a step of Newmark with contact from t - dt to t. Collective.
+
+  Input:
+    U       - displacement at t
+  In and out:
+    V       - velocity at t by Newmark's formulas, m/s; out: with what the impulses of contact make of it
+    A       - acceleration likewise, m/s^2; out: the one with which M A + f_int - f_ext is the mean force of contact
+  Output:
+    own     - acceleration at t without contact: the next step begins with it
+*/
+PetscErrorCode SbNewmarkContact(SbRun run, PetscReal t, PetscReal dt, Vec U, Vec V, Vec A, Vec own);
+/* own <- the acceleration at t without contact, of the state U, V; A at prescribed unknowns. Collective. */
+PetscErrorCode SbNewmarkOwn(SbRun run, PetscReal t, Vec U, Vec V, Vec A, Vec own);
 
 PetscErrorCode SbStaticSolve(SbRun run); /* static.c: the load path */
 /* free_body.c, after a static solve: a body that can move rigidly without a force, -1: none is found; how, in words. Collective. */

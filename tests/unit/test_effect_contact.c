@@ -327,8 +327,12 @@ static PetscErrorCode check_refused(void)
                 "The effect floor needs several solves in a step");
   CHECK_MESSAGE(open_only(BLOCK "-effects gravity,floor -time alpha2 " FLOOR),
                 "The effect floor needs several solves in a step");
-  CHECK_MESSAGE(open_only(BLOCK "-effects gravity,floor -time newmark " FLOOR),
-                "-time newmark gains energy where the effect floor stops nodes");
+  CHECK_MESSAGE(open_only(BLOCK "-effects gravity,floor -time newmark -effect_floor_response penalty " FLOOR),
+                "-time newmark gains energy by springs and friction of the effect floor");
+  CHECK_MESSAGE(open_only(BLOCK "-effects gravity,floor -time newmark -effect_floor_friction 0.3 " FLOOR),
+                "-time newmark gains energy by springs and friction of the effect floor");
+  CHECK_MESSAGE(open_only(BLOCK "-effects gravity,floor -time newmark -mass consistent " FLOOR),
+                "-time newmark with the effect floor needs -mass lumped");
   CHECK_MESSAGE(open_only(BLOCK "-effects gravity,floor -time genalpha -effect_floor_restitution 0.5 " FLOOR),
                 "-effect_floor_restitution needs -time euler_implicit");
   CHECK_MESSAGE(open_only(BLOCK "-body_a_tangent warped -effects gravity,floor -solver realtime " FLOOR),

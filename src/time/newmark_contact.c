@@ -1,0 +1,71 @@
+/*
+  Newmark's method with contact: the trapezoidal rule for everything but the forces of contact, which are implicit.
+
+  With a the acceleration without contact, M a = f_ext - f_int(u) - C v, and G^T lambda the forces of what touches at the end of the step
+  (Kane, Repetto, Ortiz and Marsden, "Finite element analysis of nonsmooth contact", CMAME 180, 1999: beta = 1/4, gamma = 1/2 there,
+  1/2 and 1 for contact)
+
+    u1 = u0 + h v0 + h^2/4 (a0 + a1) + h^2/2 M^-1 G^T lambda,    v* = v0 + h/2 (a0 + a1) + h M^-1 G^T lambda.
+
+  So u1 - u0 = h (v0 + v*) / 2, and a linear body gains lambda . (g1 - g0), g the gaps: what touches has g1 = 0, so that arriving takes energy
+  and resting does not change it. But v* is not at rest along G: where g0 = 0 a node that came with v0 has v* = -v0, leaves in the next step or
+  throws its force to and fro. Hence the velocity of the end is
+
+    v1 = v* + M^-1 G^T mu  with  G v1 = w,
+
+  w the speeds of obstacles: the persistency that Laursen and Love (IJNME 53, 2002) ask for. It is the nearest one in the norm of the
+  mass, so that it takes energy again, in all m v^2 / 2 of each node that arrives, m its own mass: an impact without restitution of
+  the nodes that touch, which vanishes with the size of the cells. In the next step their a0 + contact balances from the start, and the
+  forces are steady. (Deuflhard, Krause and Ertel, IJNME 73, 2008, project the predictor instead; velocities of what touches then
+  stay as they came until it leaves, and momentum of obstacles with them.)
+
+  As s = u1 - u0 Newmark's own formula with a0 gives A = a1 + 2 M^-1 G^T lambda, and M A + C v* + f_int(u1) - f_ext = 2 G^T lambda: every solver goes
+  on as it is. What is kept as the acceleration of the state is a1 + M^-1 G^T (lambda + mu / h), in which contact has its mean force over
+  the step, h times which is the change of momentum.
+*/
+#include "time_impl.h"
+
+/* own = -M^-1 r at free unknowns, A's at prescribed ones; r: the residual of all but inertia and contact. */
+static PetscErrorCode divide(SbSpace s, Vec A, Vec own)
+{
+  const PetscScalar *a;
+  PetscScalar *x;
+
+  PetscFunctionBeginUser;
+  PetscCall(VecGetArrayRead(A, &a));
+  PetscCall(VecGetArray(own, &x));
+  for (PetscInt i = 0; i < 3 * s->nnode_owned; i++) {
+    if (s->fixed[i / 3] & (1 << (i % 3)))
+      x[i] = a[i];
+    else
+      x[i] = s->node_mass[i / 3] > 0. ? -x[i] / s->node_mass[i / 3] : 0.;
+  }
+  PetscCall(VecRestoreArray(own, &x));
+  PetscCall(VecRestoreArrayRead(A, &a));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbNewmarkOwn(SbRun run, PetscReal t, Vec U, Vec V, Vec A, Vec own)
+{
+  PetscFunctionBeginUser;
+  PetscCall(SbModelResidual(run->model, t, U, V, NULL, PETSC_FALSE, own));
+  PetscCall(divide(run->model->space, A, own));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbNewmarkContact(SbRun run, PetscReal t, PetscReal dt, Vec U, Vec V, Vec A, Vec own)
+{
+  const SbModel m = run->model;
+  Vec change;
+
+  PetscFunctionBeginUser;
+  PetscCall(VecDuplicate(V, &change));
+  PetscCall(VecCopy(V, change));
+  if (SbSpaceIsHeld(m->space)) PetscCall(SbModelContactVelocity(m, t, dt, U, V));
+  PetscCall(VecAYPX(change, -1., V));
+  PetscCall(SbNewmarkOwn(run, t, U, V, A, own));
+  PetscCall(VecAXPBY(A, 0.5, 0.5, own));
+  PetscCall(VecAXPY(A, 1. / dt, change));
+  PetscCall(VecDestroy(&change));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
