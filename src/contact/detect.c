@@ -128,6 +128,7 @@ PetscErrorCode SbDetectorFind(SbDetector d, const SbDetectScene *s, PetscInt *n,
   PetscFunctionBeginUser;
   PetscCheck(s->reach > 0 && !PetscIsInfOrNanReal(s->reach), PETSC_COMM_SELF, PETSC_ERR_ARG_OUTOFRANGE,
              "the reach of contact detection is %g m: it must be positive and finite", (double)s->reach);
+  PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_SEARCH], 0, 0, 0, 0));
   PetscCall(SbDetectBegin(d, s));
   boxes(d, s);
   PetscCall(SbDetectCandidates(d, s));
@@ -136,6 +137,7 @@ PetscErrorCode SbDetectorFind(SbDetector d, const SbDetectScene *s, PetscInt *n,
   d->nfacet = s->nfacet;
   d->stats.found = *n;
   *near = d->near;
+  PetscCall(PetscLogEventEnd(SbEvents[SB_EVENT_SEARCH], 0, 0, 0, 0));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -431,6 +431,7 @@ PetscErrorCode SbSurfaceUpdate(SbSurface s, const PetscReal u0[], const PetscRea
   SbSurfaceData *d = (SbSurfaceData *)s->data;
 
   PetscFunctionBeginUser;
+  PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_SEARCH], 0, 0, 0, 0));
   s->scene.reach = reach;
   s->scene.self = self;
   place_all(s, u, d->x, d->p);
@@ -444,5 +445,6 @@ PetscErrorCode SbSurfaceUpdate(SbSurface s, const PetscReal u0[], const PetscRea
   PetscCall(SbHaloUpdate(s, u0, u, close));
   s->scene.x0 = u0 ? d->x0 : NULL;
   s->scene.p0 = u0 ? d->p0 : NULL;
+  PetscCall(PetscLogEventEnd(SbEvents[SB_EVENT_SEARCH], 0, 0, 0, 0));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

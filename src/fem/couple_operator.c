@@ -23,6 +23,25 @@ PetscErrorCode SbCoupleMultiply(SbCouple c, Vec x, Vec y)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The projections of a solve, timed. */
+static PetscErrorCode project_force(SbCouple c, Vec r)
+{
+  PetscFunctionBeginUser;
+  PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_PROJECT], 0, 0, 0, 0));
+  PetscCall(SbCoupleProjectForce(c, r));
+  PetscCall(PetscLogEventEnd(SbEvents[SB_EVENT_PROJECT], 0, 0, 0, 0));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode project(SbCouple c, Vec x)
+{
+  PetscFunctionBeginUser;
+  PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_PROJECT], 0, 0, 0, 0));
+  PetscCall(SbCoupleProject(c, x));
+  PetscCall(PetscLogEventEnd(SbEvents[SB_EVENT_PROJECT], 0, 0, 0, 0));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* y = P^T (K + S^T k S) x for x in the null space, where the iteration stays. */
 static PetscErrorCode multiply(Mat A, Vec x, Vec y)
 {
@@ -31,7 +50,7 @@ static PetscErrorCode multiply(Mat A, Vec x, Vec y)
   PetscFunctionBeginUser;
   PetscCall(MatShellGetContext(A, &s));
   PetscCall(SbCoupleMultiply(s->couple, x, y));
-  PetscCall(SbCoupleProjectForce(s->couple, y));
+  PetscCall(project_force(s->couple, y));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -105,9 +124,9 @@ static PetscErrorCode apply_wrapped(PC pc, Vec r, Vec z)
     PetscBool ok;
 
     PetscCall(VecCopy(r, c->w[1]));
-    PetscCall(SbCoupleProjectForce(c, c->w[1]));
+    PetscCall(project_force(c, c->w[1]));
     PetscCall(SbCoupleFactoredSolve(w->space, c->w[1], z, &ok));
-    if (ok) PetscCall(SbCoupleProject(c, z));
+    if (ok) PetscCall(project(c, z));
     PetscCall(PCSetFailedReason(pc, ok ? PC_NOERROR : PC_FACTOR_NUMERIC_ZEROPIVOT));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
@@ -115,9 +134,9 @@ static PetscErrorCode apply_wrapped(PC pc, Vec r, Vec z)
     PetscCall(PCApply(w->inner, r, z));
   else {
     PetscCall(VecCopy(r, c->w[1]));
-    PetscCall(SbCoupleProjectForce(c, c->w[1]));
+    PetscCall(project_force(c, c->w[1]));
     PetscCall(PCApply(w->inner, c->w[1], z));
-    PetscCall(SbCoupleProject(c, z));
+    PetscCall(project(c, z));
   }
   PetscCall(PCGetFailedReason(w->inner, &reason));
   if (reason) PetscCall(PCSetFailedReason(pc, reason));
