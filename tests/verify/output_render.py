@@ -39,7 +39,27 @@ def body_pixels(path, scale_width):
     return left, left.max(axis=2) - left.min(axis=2) > 40
 
 
+def check_obstacles():
+    """A ball beside the bar and a tet read from a file are drawn where they have moved to, and only when asked for."""
+    mesh = OUT / "tet.msh"
+    mesh.write_text("$MeshFormat\n4.1 0 8\n$EndMeshFormat\n$Nodes\n1 4 1 4\n3 1 0 4\n1\n2\n3\n4\n0 0 0\n100 0 0\n0 100 0\n0 0 100\n"
+                    "$EndNodes\n$Elements\n1 1 1 1\n3 1 4 1\n1 1 2 3 4\n$EndElements\n")
+    run(1, "obstacles", "-ts_max_time", "0.02", "-quiet", "-time", "euler_implicit", "-effects", "gravity,hold,ball,tet",
+        "-effect_ball_type", "contact", "-effect_ball_obstacle", "sphere:0.2,0.05,0.3,0.06", "-effect_ball_displacement", "0;0;ramp(t)^2",
+        "-effect_tet_type", "contact", "-effect_tet_obstacle", f"mesh:{mesh}", "-effect_tet_obstacle_scale", "0.001",
+        "-effect_tet_obstacle_at", "0.1,0,-0.3")
+    folder = OUT / "obstacles"
+    render(folder, "-o", folder / "without.png")
+    render(folder, "--obstacles", "-o", folder / "with.png")
+    dark = []
+    for name in ("without.png", "with.png"):
+        left, body = body_pixels(folder / name, 230)
+        dark.append((~body & (left.max(axis=2) < 190))[100:].mean())
+    check(dark[0] < 0.005 < 0.01 < dark[1], f"grey and dark beside the bar: {dark[0]:.2%} without obstacles, {dark[1]:.2%} with them")
+
+
 def main():
+    check_obstacles()
     run(1, "run", "-ts_max_time", "0.1", "-quiet", "-output_fields", "displacement,von_mises,stress")
     folder = OUT / "run"
 
