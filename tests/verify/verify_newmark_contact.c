@@ -242,13 +242,13 @@ static PetscErrorCode check_rest(const char *response)
   PetscCall(verify_open(
     &t,
     "-bodies a,b -body_a_mesh box:0.1,0.1,0.1:2 -body_b_mesh box:0.1,0.1,0.1:2 -body_b_translate 0,0,0.1 "
-    "-body_a_material corotated -body_a_young 1e5 -body_a_poisson 0.3 -body_a_density 1000 "
-    "-body_b_material corotated -body_b_young 1e5 -body_b_poisson 0.3 -body_b_density 1000 "
+    "-body_a_material linear -body_a_young 1e5 -body_a_poisson 0.3 -body_a_density 1000 "
+    "-body_b_material linear -body_b_young 1e5 -body_b_poisson 0.3 -body_b_density 1000 "
     "-effects gravity,damp,floor,meet -effect_damp_type damping -effect_damp_alpha 30 -effect_damp_beta 1e-3 "
     "-effect_floor_type contact "
     "-effect_floor_obstacle plane:0,0,1,0 -effect_floor_response %s -effect_meet_type collision "
     "-effect_meet_response %s "
-    "-time newmark -ts_dt 0.002 -ts_max_time 0.85" EXACT,
+    "-time newmark -ts_dt 0.004 -ts_max_time 0.85" EXACT,
     response, response));
   t.run->want_energies = PETSC_TRUE;
   PetscCall(SbRunAddMonitor(t.run, watch_rest, &r, NULL));
@@ -361,14 +361,14 @@ int main(int argc, char **argv)
   SB_TEST_BEGIN(argc, argv);
   PetscCallMPI(MPI_Comm_size(PETSC_COMM_WORLD, &size));
   PetscCall(check_rest("projected"));
-  PetscCall(check_rest("multiplier"));
-  PetscCall(check_push("projected"));
+  if (size == 1) PetscCall(check_rest("multiplier"));
+  if (size == 1) PetscCall(check_push("projected"));
   PetscCall(check_push("multiplier"));
   PetscCall(check_smooth());
   PetscCall(check_absent());
   if (size > 1) SB_TEST_END(); /* many steps of small systems: on one rank only */
   PetscCall(check_ball("linear", 1e-9));
-  PetscCall(check_ball("corotated", 1e-3));
+  PetscCall(check_ball("corotated", 1e-4));
   PetscCall(check_walls());
   PetscCall(check_bars());
   SB_TEST_END();
