@@ -68,6 +68,13 @@ typedef struct {
   PetscErrorCode (*tangent)(SbEffect e, SbSpace space, const SbStage *stage, Mat A);
   /* after a step was accepted */
   PetscErrorCode (*accept)(SbEffect e, SbSpace space, const SbStage *stage);
+  /* for checkpoints: what the effect takes from step to step beyond displacement and velocity, as records of `nstate` numbers each, in
+     which things have numbers that no partition changes; n of this rank, allocated here, the caller frees. Collective. */
+  PetscErrorCode (*save)(SbEffect e, SbSpace space, PetscInt *n, PetscReal **records);
+  /* takes from the n records of all ranks what is this rank's, in place of what was there; local displacements u (m) at the time t at which they
+     were saved. hold() then writes the rows of that time. Collective. */
+  PetscErrorCode (*load)(SbEffect e, SbSpace space, PetscReal t, const PetscReal u[], PetscInt n,
+                         const PetscReal records[]);
   /* numbers for the history: n values with the names given by `columns`; residual[nnode][3] is the unbalanced force, N,
      which on prescribed unknowns is the reaction. Values are this rank's part and are summed. */
   PetscErrorCode (*history)(SbEffect e, SbSpace space, const SbStage *stage, const PetscReal residual[],
@@ -90,6 +97,7 @@ struct _p_SbEffect {
   PetscBool
     springs; /* of contact: it pushes with springs or friction, not by what it holds alone. Default PETSC_FALSE */
   const struct SbEffectOn_ *held; /* the sets whose nodes it prescribes in all directions; NULL: none */
+  PetscInt nstate;                /* numbers in a record of save() */
   PetscInt ncolumn;               /* history columns, known after set-up */
   const char *const
     *column;      /* [ncolumn] "force_x", ...; written as <name>_<column>; owned by the type or by `data` */

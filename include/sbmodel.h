@@ -75,6 +75,9 @@ PetscErrorCode SbModelPrescribe(SbModel model, PetscReal t, Vec U);
 */
 PetscErrorCode SbModelContactBegin(SbModel model, PetscReal t, PetscReal dt, Vec U0, Vec V0, Vec U);
 PetscErrorCode SbModelContactSettle(SbModel model, PetscReal t, Vec U, Vec R, PetscBool *again);
+/* After effects have loaded their state from a checkpoint: holds what was held then, so that forces and reactions of that time are known.
+   Collective. */
+PetscErrorCode SbModelContactResume(SbModel model);
 /* Restitution, of these two: Begin starts an attempt at a step; Settle, once who touches is right, sees to the energy: `again` when
    coefficients had to be reduced. Collective. */
 PetscErrorCode SbModelReboundBegin(SbModel model, PetscReal dt, Vec U0, Vec V0);

@@ -573,6 +573,9 @@ static PetscErrorCode create_collision(SbEffect e)
   e->ops.curb = SbEffectCurb_Collision;
   e->ops.accept = accept_collision;
   e->ops.history = history_collision;
+  e->ops.save = SbEffectSave_Collision;
+  e->ops.load = SbEffectLoad_Collision;
+  e->nstate = SB_COLLISION_STATE;
   e->ops.near = near_collision;
   e->ops.places = SbEffectPlaces_Collision;
   e->ops.destroy = destroy_collision;

@@ -156,6 +156,12 @@ void SbCollisionFrictionSettle(Collision *c, PetscReal largest, PetscBool *chang
 /* Ends a step. Collective. */
 PetscErrorCode SbCollisionFrictionAccept(Collision *c, const char effect[], SbSpace space, PetscReal t);
 
+/* collision_state.c, for checkpoints. */
+#define SB_COLLISION_STATE (12 + SB_FRICTION_STATE) /* numbers in a record */
+PetscErrorCode SbEffectSave_Collision(SbEffect e, SbSpace space, PetscInt *n, PetscReal **records);
+PetscErrorCode SbEffectLoad_Collision(SbEffect e, SbSpace space, PetscReal t, const PetscReal u[], PetscInt n,
+                                      const PetscReal records[]);
+
 /* collision_pairs.c: names the columns, when they are wanted, behind those of e. Not collective. */
 PetscErrorCode SbPairsSetUp(SbEffect e, SbMesh mesh);
 /* values += this rank's part of these columns; values are those of the whole effect. Not collective. */

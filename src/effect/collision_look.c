@@ -205,7 +205,10 @@ static PetscErrorCode merge(Collision *c, const Found *found, PetscBool within)
     if (hit.point < s->npoint && !looks_for(c, s->point_part[hit.point], hit.part)) continue;
     for (; old < c->nhit && before(&c->hit[old], hit.point, hit.part); old++)
       if (within) keep_lost(&c->hit[old], c->spare, &m);
-    if (old < c->nhit && c->hit[old].point == hit.point && c->hit[old].part == hit.part) hit = c->hit[old++];
+    if (old < c->nhit && c->hit[old].point == hit.point && c->hit[old].part == hit.part) {
+      hit = c->hit[old++];
+      name_of(c, found, i, &hit); /* what comes from a checkpoint has not all of it */
+    }
     if (!within || !hit.on || !is_settled(c, gap_of(found, i), normal_of(found, i), &hit))
       take_geometry(c, found, i, &hit);
     hit.depth = i < found->nnear ? found->near[i].depth : found->pair[i - found->nnear].depth;

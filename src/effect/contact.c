@@ -589,6 +589,9 @@ static PetscErrorCode create_contact(SbEffect e)
   e->ops.near = SbEffectNear_Contact;
   e->ops.places = SbEffectPlaces_Contact;
   e->ops.history = SbEffectHistory_Contact;
+  e->ops.save = SbEffectSave_Contact;
+  e->ops.load = SbEffectLoad_Contact;
+  e->nstate = SB_CONTACT_STATE;
   e->ops.destroy = destroy_contact;
   e->column = columns;
   e->ncolumn = PETSC_STATIC_ARRAY_LENGTH(columns);

@@ -134,3 +134,9 @@ PetscErrorCode SbEffectPlaces_Contact(SbEffect e, SbSpace space, const SbStage *
                                       const PetscReal residual[], SbPlaces *list);
 PetscErrorCode SbEffectHistory_Contact(SbEffect e, SbSpace space, const SbStage *stage,
                                        const PetscReal residual[], PetscReal values[]);
+#define SB_CONTACT_STATE (14 + SB_FRICTION_STATE) /* numbers in a record */
+PetscErrorCode SbEffectSave_Contact(SbEffect e, SbSpace space, PetscInt *n, PetscReal **records);
+PetscErrorCode SbEffectLoad_Contact(SbEffect e, SbSpace space, PetscReal t, const PetscReal u[], PetscInt n,
+                                    const PetscReal records[]);
+/* Takes the stretch of a node's springs along with the obstacle. */
+void SbContactStretch(const SbPose *pose, Touch *touch);

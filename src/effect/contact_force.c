@@ -80,6 +80,14 @@ PetscErrorCode SbEffectTangent_Contact(SbEffect e, SbSpace space, const SbStage 
 
 /* ------------------------------------------------------------------ after a step */
 
+void SbContactStretch(const SbPose *pose, Touch *touch)
+{
+  for (int k = 0; k < 3; k++) {
+    touch->stretch[k] = 0;
+    for (int i = 0; i < 3; i++) touch->stretch[k] += pose->R[3 * i + k] * touch->grip.stretch[i];
+  }
+}
+
 /* What friction leaves for the next step. */
 static void accept_friction(Contact *c, SbSpace space, const SbPose *pose, Touch *touch)
 {
@@ -87,10 +95,7 @@ static void accept_friction(Contact *c, SbSpace space, const SbPose *pose, Touch
 
   SbFrictionAccept(&c->friction, &p,
                    (PetscBool)(touch->on && touch->along >= 0 && SbContactForce(c, touch) > 0));
-  for (int k = 0; k < 3; k++) {
-    touch->stretch[k] = 0;
-    for (int i = 0; i < 3; i++) touch->stretch[k] += pose->R[3 * i + k] * touch->grip.stretch[i];
-  }
+  SbContactStretch(pose, touch);
 }
 
 PetscErrorCode SbEffectAccept_Contact(SbEffect e, SbSpace space, const SbStage *stage)

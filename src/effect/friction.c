@@ -277,3 +277,25 @@ PetscErrorCode SbFrictionWarn(SbFriction *f, const char effect[], SbSpace space,
                       (double)t, effect, (double)most, SETTLED));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
+
+void SbFrictionSave(const SbGrip *g, PetscReal state[])
+{
+  state[0] = g->slid;
+  state[1] = g->crowded;
+  state[2] = g->turning;
+  for (int k = 0; k < 3; k++) {
+    state[3 + k] = g->tangent[0][k];
+    state[6 + k] = g->stretch[k];
+  }
+}
+
+void SbFrictionLoad(const PetscReal state[], SbGrip *g)
+{
+  *g = (SbGrip){.slide = {-1, -1}, .turning = state[2]};
+  g->slid = g->slides = (PetscBool)(state[0] != 0);
+  g->crowded = (PetscBool)(state[1] != 0);
+  for (int k = 0; k < 3; k++) {
+    g->tangent[0][k] = state[3 + k];
+    g->stretch[k] = state[6 + k];
+  }
+}

@@ -68,3 +68,7 @@ void SbFrictionJudge(SbFriction *f, PetscReal worst, PetscReal largest, PetscBoo
 void SbFrictionAccept(SbFriction *f, const SbFrictionPair *p, PetscBool presses);
 /* Ends a step: says once that friction was taken as it was. Collective. */
 PetscErrorCode SbFrictionWarn(SbFriction *f, const char effect[], SbSpace space, PetscReal t);
+/* What a pair takes from step to step, for checkpoints: state[SB_FRICTION_STATE]. */
+#define SB_FRICTION_STATE 9
+void SbFrictionSave(const SbGrip *grip, PetscReal state[]);
+void SbFrictionLoad(const PetscReal state[], SbGrip *grip);

@@ -3,19 +3,34 @@
 */
 #include "sbmodel.h"
 
-/* All effects write what they hold, and the displacement goes there. */
-static PetscErrorCode hold(SbModel m, PetscReal t, Vec U)
+/* All effects write what they hold. */
+static PetscErrorCode write_holds(SbModel m)
 {
   SbSpace s = m->space;
 
   PetscFunctionBeginUser;
-  if (!m->nhold) PetscFunctionReturn(PETSC_SUCCESS);
   if (s->held) SbSpaceHoldClear(s);
   if (s->couple) SbSpaceCoupleClear(s);
   for (PetscInt e = 0; e < m->nhold; e++) PetscCall(m->hold[e]->ops.hold(m->hold[e], s));
   if (s->held) PetscCall(SbSpaceHoldDone(s));
   if (s->couple) PetscCall(SbSpaceCoupleDone(s));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The same, and the displacement goes there. */
+static PetscErrorCode hold(SbModel m, PetscReal t, Vec U)
+{
+  PetscFunctionBeginUser;
+  if (!m->nhold) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(write_holds(m));
   PetscCall(SbModelPrescribe(m, t, U));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbModelContactResume(SbModel m)
+{
+  PetscFunctionBeginUser;
+  if (m->nhold) PetscCall(write_holds(m));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

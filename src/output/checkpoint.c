@@ -2,7 +2,7 @@
   Checkpoints: the state of a run in one HDF5 file, from which it goes on as if it had not stopped.
 
   Displacement, velocity and acceleration (the integrator's own) of all nodes in original order and double precision, the step, its time,
-  the next step's length, works and losses so far. A file is written beside its place, flushed and renamed; the newest ones
+  the next step's length, works and losses so far, and what effects remember (checkpoint_effects.c). A file is written beside its place, flushed and renamed; the newest ones
   are kept. What makes it fit a run: a hash of the mesh (every coordinate and cell by its original number), and the text of
   the options that decide the mechanics. A checksum over the three vectors detects a file that was damaged later. Both sums
   are of mixed 64-bit words (the finaliser of splitmix64; Steele, Lea and Flood 2014), which do not depend on the order.
@@ -25,7 +25,7 @@ static uint64_t mix(uint64_t x)
 }
 
 /* A number at a place. Zero has one sign here. */
-static uint64_t mix_real(uint64_t place, PetscReal value)
+uint64_t SbMixReal(uint64_t place, PetscReal value)
 {
   uint64_t bits;
 
@@ -48,7 +48,7 @@ static PetscErrorCode hash_mesh(const SbMesh mesh, uint64_t *hash)
   PetscFunctionBeginUser;
   for (PetscInt i = 0; i < mesh->nvert_owned; i++) {
     for (PetscInt c = 0; c < 3; c++)
-      sum += mix_real(3 * (uint64_t)mesh->vert_orig[i] + (uint64_t)c, mesh->x[3 * i + c]);
+      sum += SbMixReal(3 * (uint64_t)mesh->vert_orig[i] + (uint64_t)c, mesh->x[3 * i + c]);
   }
   for (PetscInt k = 0; k < mesh->ncell_owned; k++) {
     for (PetscInt a = 0; a < 4; a++)
@@ -121,7 +121,7 @@ static PetscErrorCode checksum_of(const SbOrder *order, uint64_t salt, const Pet
 
   PetscFunctionBeginUser;
   for (PetscInt i = 0; i < 3 * order->n; i++)
-    mine += mix_real(3 * (uint64_t)order->start + (uint64_t)i + (salt << 48), slice[i]);
+    mine += SbMixReal(3 * (uint64_t)order->start + (uint64_t)i + (salt << 48), slice[i]);
   PetscCall(sum_ranks(order->comm, mine, sum));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -269,6 +269,7 @@ static PetscErrorCode write_checkpoint(SbRun run, SbOutput out, const SbStep *st
   PetscCall(SbH5Create(out->comm, tmp, &h));
   PetscCall(SbH5Reserve(&h, (PetscInt64)out->node.N * 3 * 24 + (PetscInt64)strlen(out->identity) + 65536));
   PetscCall(write_vectors(run, out, &h, &checksum));
+  PetscCall(SbCheckpointWriteEffects(run, &h, &checksum));
   PetscCall(write_numbers(run, out, step, &h, checksum));
   PetscCall(SbH5Flush(&h));
   PetscCall(SbH5Close(&h));
@@ -353,13 +354,12 @@ static PetscErrorCode check_identity(SbOutput out, SbH5 *h, int64_t mesh_hash)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The three vectors of an open file; ok is false when one cannot be read or the checksum differs. */
-static PetscErrorCode read_vectors(SbRun run, SbOutput out, SbH5 *h, int64_t checksum, PetscBool *ok)
+/* The three vectors of an open file, all raised by their checksum; ok is false when one cannot be read. */
+static PetscErrorCode read_vectors(SbRun run, SbOutput out, SbH5 *h, uint64_t *all, PetscBool *ok)
 {
   Part part[3];
   PetscReal *slice;
   PetscScalar *array;
-  uint64_t all = 0;
 
   PetscFunctionBeginUser;
   parts_of(run, part);
@@ -371,13 +371,12 @@ static PetscErrorCode read_vectors(SbRun run, SbOutput out, SbH5 *h, int64_t che
     PetscCall(SbH5ReadSlice(h, part[k].name, &out->node, 3, slice, ok));
     if (!*ok) break;
     PetscCall(checksum_of(&out->node, (uint64_t)k, slice, &sum));
-    all += sum;
+    *all += sum;
     PetscCall(VecGetArray(part[k].vec, &array));
     PetscCall(SbOrderScatter(&out->node, 3, slice, array));
     PetscCall(VecRestoreArray(part[k].vec, &array));
   }
   PetscCall(PetscFree(slice));
-  if (all != (uint64_t)checksum) *ok = PETSC_FALSE;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -403,7 +402,9 @@ static PetscErrorCode load(SbRun run, SbOutput out, const char *path, PetscBool 
 {
   SbH5 h;
   Total total[NTOTAL];
-  int64_t step, mesh_hash, checksum, format;
+  int64_t step, mesh_hash, checksum = 0, format;
+  uint64_t sum = 0;
+  SbRecords *records;
   PetscReal t, values[NTOTAL];
 
   PetscFunctionBeginUser;
@@ -418,9 +419,15 @@ static PetscErrorCode load(SbRun run, SbOutput out, const char *path, PetscBool 
   for (int i = 0; i < NTOTAL; i++) PetscCall(SbH5GetReal(h.file, total[i].name, &values[i], ok));
   if (*ok && format != FORMAT) *ok = PETSC_FALSE;
   if (*ok) PetscCall(check_identity(out, &h, mesh_hash));
-  if (*ok) PetscCall(read_vectors(run, out, &h, checksum, ok));
+  PetscCall(PetscCalloc1(run->model->neffect, &records));
+  if (*ok) PetscCall(read_vectors(run, out, &h, &sum, ok));
+  if (*ok) PetscCall(SbCheckpointReadEffects(run, &h, records, &sum, ok));
+  if (sum != (uint64_t)checksum) *ok = PETSC_FALSE;
   if (*ok) PetscCall(set_step(run, h.file, ok));
   PetscCall(SbH5Close(&h));
+  if (*ok) PetscCall(SbCheckpointLoadEffects(run, t, records));
+  PetscCall(SbCheckpointFreeEffects(run, records));
+  PetscCall(PetscFree(records));
   if (!*ok) PetscFunctionReturn(PETSC_SUCCESS);
   for (int i = 0; i < NTOTAL; i++) *total[i].value = values[i];
   run->step0 = (PetscInt)step;

@@ -205,6 +205,21 @@ PetscErrorCode SbContactsRemoveIndex(SbOutput out);
 PetscErrorCode SbHistoryAttach(SbRun run, SbOutput out);
 PetscErrorCode SbHistoryDestroy(SbOutput out);
 PetscErrorCode SbProbesFind(SbRun run, SbOutput out);
+/* checkpoint_effects.c: records of an effect's state, of all ranks, as a file has them. */
+typedef struct {
+  PetscInt n;
+  PetscReal *record; /* [n][nstate] */
+} SbRecords;
+/* Writes the records of all effects; sum is raised by their checksum. Collective. */
+PetscErrorCode SbCheckpointWriteEffects(SbRun run, SbH5 *h, uint64_t *sum);
+/* Reads them into records[neffect], zeroed, on all ranks. ok turns false when they cannot be read. Free with the function below. Collective. */
+PetscErrorCode SbCheckpointReadEffects(SbRun run, SbH5 *h, SbRecords records[], uint64_t *sum, PetscBool *ok);
+/* Hands them to the effects, for the state of the run at time t. Collective. */
+PetscErrorCode SbCheckpointLoadEffects(SbRun run, PetscReal t, const SbRecords records[]);
+PetscErrorCode SbCheckpointFreeEffects(SbRun run, SbRecords records[]);
+/* A number at a place, as 64 mixed bits. */
+uint64_t SbMixReal(uint64_t place, PetscReal value);
+
 PetscErrorCode SbCheckpointAttach(SbRun run, SbOutput out);
 PetscErrorCode SbCheckpointRemoveAfter(SbOutput out, PetscInt step); /* rank 0 */
 typedef PetscErrorCode (*SbFileFn)(const char *name, PetscInt64 bytes, void *ctx);

@@ -1,0 +1,113 @@
+/*
+  What effects remember from step to step, in checkpoints: who touches and who slides. Each effect hands over records of numbers, in which things
+  have names that no partition changes (SbEffectOps.save); they are one dataset per effect, `state_<name>`, in any order. Reading,
+  every rank gets all of them, which are those of surfaces in touch, and the effect takes its own.
+
+  A checkpoint without such a dataset is an older one, or nothing touched: the effects begin as at the start of a run.
+*/
+#include "output_impl.h"
+
+#define SALT 0x5bd1e995u
+
+/* Of a record the order counts, of records it does not. */
+static uint64_t sum_of(PetscInt n, PetscInt width, const PetscReal record[])
+{
+  uint64_t sum = 0;
+
+  for (PetscInt i = 0; i < n; i++) {
+    uint64_t one = SALT;
+
+    for (PetscInt k = 0; k < width; k++) one = SbMixReal(one, record[width * i + k]);
+    sum += one;
+  }
+  return sum;
+}
+
+static PetscErrorCode name_of(SbEffect e, size_t size, char name[])
+{
+  PetscFunctionBeginUser;
+  PetscCall(PetscSNPrintf(name, size, "state_%s", e->name));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbCheckpointWriteEffects(SbRun run, SbH5 *h, uint64_t *sum)
+{
+  const SbModel m = run->model;
+
+  PetscFunctionBeginUser;
+  for (PetscInt k = 0; k < m->neffect; k++) {
+    SbEffect e = m->effect[k];
+    SbOrder order = {.comm = m->comm, .each = 1};
+    char name[2 * SB_NAME_MAX];
+    PetscReal *record;
+    uint64_t mine, all;
+
+    if (!e->ops.save) continue;
+    PetscCall((*e->ops.save)(e, m->space, &order.n, &record));
+    PetscCallMPI(MPI_Allreduce(&order.n, &order.N, 1, MPIU_INT, MPI_SUM, m->comm));
+    PetscCallMPI(MPI_Scan(&order.n, &order.start, 1, MPIU_INT, MPI_SUM, m->comm));
+    order.start -= order.n;
+    mine = sum_of(order.n, e->nstate, record);
+    PetscCallMPI(MPI_Allreduce(&mine, &all, 1, MPI_UINT64_T, MPI_SUM, m->comm));
+    PetscCall(name_of(e, sizeof(name), name));
+    if (order.N) {
+      PetscCall(SbH5PutInt(h, h->file, name, order.N));
+      PetscCall(
+        SbH5WriteSlice(h, h->file, name, "SI", &order, e->nstate, H5T_IEEE_F64LE, H5T_NATIVE_DOUBLE, record));
+      *sum += all;
+    }
+    PetscCall(PetscFree(record));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbCheckpointReadEffects(SbRun run, SbH5 *h, SbRecords records[], uint64_t *sum, PetscBool *ok)
+{
+  const SbModel m = run->model;
+
+  PetscFunctionBeginUser;
+  for (PetscInt k = 0; k < m->neffect && *ok; k++) {
+    SbEffect e = m->effect[k];
+    SbOrder order = {.comm = m->comm, .each = 1};
+    char name[2 * SB_NAME_MAX];
+    PetscBool there = PETSC_TRUE;
+    int64_t n = 0;
+
+    if (!e->ops.load) continue;
+    PetscCall(name_of(e, sizeof(name), name));
+    PetscCall(SbH5GetInt(h->file, name, &n, &there));
+    if (!there || n <= 0) continue;
+    order.n = order.N = (PetscInt)n;
+    PetscCall(PetscMalloc1(e->nstate * order.n, &records[k].record));
+    PetscCall(SbH5ReadSlice(h, name, &order, e->nstate, records[k].record, ok));
+    if (!*ok) break;
+    records[k].n = order.n;
+    *sum += sum_of(order.n, e->nstate, records[k].record);
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbCheckpointLoadEffects(SbRun run, PetscReal t, const SbRecords records[])
+{
+  const SbModel m = run->model;
+  const PetscReal *u;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbSpaceGetLocalRead(m->space, run->U, &u));
+  for (PetscInt k = 0; k < m->neffect; k++) {
+    SbEffect e = m->effect[k];
+
+    if (e->ops.load && records[k].n)
+      PetscCall((*e->ops.load)(e, m->space, t, u, records[k].n, records[k].record));
+  }
+  PetscCall(SbSpaceRestoreLocalRead(m->space, run->U, &u));
+  PetscCall(SbModelContactResume(m));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbCheckpointFreeEffects(SbRun run, SbRecords records[])
+{
+  PetscFunctionBeginUser;
+  for (PetscInt k = 0; k < run->model->neffect; k++) PetscCall(PetscFree(records[k].record));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
