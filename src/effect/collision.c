@@ -122,6 +122,7 @@ static PetscErrorCode read_restitution(SbEffect e, const SbScope *scope)
 static PetscErrorCode options_collision(SbEffect e, const SbScope *scope)
 {
   Collision *c = (Collision *)e->data;
+  PetscReal recovery;
   PetscInt choice;
 
   PetscFunctionBeginUser;
@@ -152,8 +153,8 @@ static PetscErrorCode options_collision(SbEffect e, const SbScope *scope)
   PetscCall(SbOptionReal(scope, "stiffness", &c->stiffness));
   PetscCall(SbOptionReal(scope, "reach", &c->reach));
   PetscCall(read_restitution(e, scope));
-  PetscCall(SbOptionReal(scope, "recovery", &c->recovery));
-  c->recovery = c->recovery > 1 ? PetscExpReal(-1 / c->recovery) : 0;
+  PetscCall(SbOptionReal(scope, "recovery", &recovery));
+  SbOverlapSet(&c->overlap, recovery);
   PetscCall(SbOptionBool(scope, "pairs", &c->pairs.wanted));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -279,6 +280,7 @@ static PetscErrorCode touch_collision(SbEffect e, SbSpace space, PetscReal t, Pe
   (void)t;
   PetscCall(PetscArraycpy(c->u0, u0, 3 * space->nnode));
   c->friction.updates = 0;
+  SbOverlapBegin(&c->overlap, dt);
   PetscCall(SbCollisionRestore(c));
   c->first = PETSC_TRUE;
   c->arrival = 1;

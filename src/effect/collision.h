@@ -4,6 +4,7 @@
 #pragma once
 #include "friction.h"
 #include "rebound.h"
+#include "overlap.h"
 #include "sbdetect.h"
 #include "sbeffect.h"
 
@@ -69,7 +70,7 @@ typedef struct {
   PetscBool self, both;
   SbFriction friction;
   PetscReal stiffness, reach;
-  PetscReal recovery; /* part of a depth that is left after a step */
+  SbOverlap overlap;
   PetscReal *edge;    /* [nbody] mean edge of the surfaces, m: the finer one looks */
   PetscReal *point_k; /* [npoint] N/m */
   PetscReal *edge_k;  /* [own edges] the same of an edge, N/m */

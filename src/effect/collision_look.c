@@ -7,7 +7,9 @@
 */
 #include "collision.h"
 
-#define TURNED 0.7  /* cosine between normals of two looks, below which they are of another place */
+#define TURNED 0.7 /* cosine between normals of two looks, below which they are of another place */
+#define JUMP \
+  0.05 /* of the reach: so much deeper a pair that is held began the step, seen from a facet that it is not held by */
 #define CORNER 1e-4 /* of the reach: places that may be one (near.c) */
 
 /* Of two surfaces, whether the points of `mine` look for `other`. Edges that rounding alone tells apart are the same. */
@@ -128,7 +130,7 @@ static inline PetscReal gap_of(const Found *found, PetscInt i)
 
 /*
   Normal, weights and gap of a pair as the detector sees it now. A point that was behind this facet when the step began, and not held
-  there, was not seen before (it came over a rim, or bodies overlap from the start): putting it in front at once would
+  there, was not seen before (it came over a rim, or onto another facet, or bodies overlap from the start): putting it in front at once would
   throw it out. So with edges.
 */
 static void take_geometry(const Collision *c, const Found *found, PetscInt i, Hit *hit)
@@ -136,6 +138,7 @@ static void take_geometry(const Collision *c, const Found *found, PetscInt i, Hi
   const SbEdgePair *pair = i < found->nnear ? NULL : &found->pair[i - found->nnear];
   const PetscReal *normal = normal_of(found, i);
   const PetscReal turned = SbDot3(hit->normal, normal);
+  PetscReal before;
 
   if (pair)
     take_edges(c, pair, hit);
@@ -144,9 +147,9 @@ static void take_geometry(const Collision *c, const Found *found, PetscInt i, Hi
   for (int k = 0; k < 3; k++) hit->normal[k] = normal[k];
   hit->gap = gap_of(found, i);
   hit->value = SbDot3(hit->normal, hit->now) - hit->gap;
-  if (!hit->was || turned < TURNED)
-    hit->allowed =
-      c->recovery * PetscMax(0, SbDot3(hit->normal, hit->now) - SbDot3(hit->normal, hit->start) - hit->gap);
+  before = SbDot3(hit->normal, hit->now) - SbDot3(hit->normal, hit->start) - hit->gap;
+  if (!hit->was || turned < TURNED || before > hit->allowed + JUMP * c->reach)
+    hit->allowed = c->overlap.left * PetscMax(0, before);
 }
 
 static PetscErrorCode make_room(Collision *c, PetscInt n)
@@ -272,7 +275,7 @@ PetscErrorCode SbCollisionRestore(Collision *c)
     c->nhit = c->npast;
   }
   for (PetscInt i = 0; i < c->nhit; i++) {
-    c->hit[i].allowed *= c->recovery;
+    c->hit[i].allowed *= c->overlap.left;
     if (c->hit[i].leaves > 0) c->hit[i].on = PETSC_FALSE; /* it rebounded and is free */
     c->hit[i].leaves = c->hit[i].arrives = 0;
   }

@@ -104,6 +104,7 @@ static PetscErrorCode read_obstacle(SbEffect e, const SbScope *scope)
 static PetscErrorCode options_contact(SbEffect e, const SbScope *scope)
 {
   Contact *c = (Contact *)e->data;
+  PetscReal recovery;
   PetscInt choice;
 
   PetscFunctionBeginUser;
@@ -134,8 +135,8 @@ static PetscErrorCode options_contact(SbEffect e, const SbScope *scope)
     e->name, (double)c->bounce.e, e->name);
   e->euler = (PetscBool)(c->bounce.e > 0);
   if (c->bounce.e <= 0) e->ops.rebound = NULL;
-  PetscCall(SbOptionReal(scope, "recovery", &c->recovery));
-  c->recovery = c->recovery > 1 ? PetscExpReal(-1 / c->recovery) : 0;
+  PetscCall(SbOptionReal(scope, "recovery", &recovery));
+  SbOverlapSet(&c->overlap, recovery);
   PetscCall(read_path(e, scope));
   e->springs = (PetscBool)(!exact(c) || c->friction.mu > 0);
   c->friction.exact = exact(c);
@@ -180,7 +181,7 @@ static PetscErrorCode setup_contact(SbEffect e, SbSpace space)
   PetscFunctionBeginUser;
   (void)snprintf(option, sizeof(option), "-effect_%s_obstacle", e->name);
   PetscCall(SbObstacleSetUp(c->obstacle, space->comm, option, c->scale, c->at, sizeof(e->note), e->note));
-  if (!e->dynamic) c->recovery = 0;
+  if (!e->dynamic) c->overlap.recovery = 0;
   PetscCall(SbEffectFacets(space, &c->on, &n, &facet));
   PetscCall(PetscMalloc1(3 * n, &c->touch));
   PetscCall(PetscMalloc1(space->nnode, &slot));
@@ -250,7 +251,7 @@ static PetscReal rest_of(const Contact *c, const SbPose *from, const Touch *touc
   /* what touches springs is behind by what they give; projected it is where it was held */
   const PetscReal depth = touch->on && !exact(c) ? -touch->kept : -SbContactGap(c, from, x0, n);
 
-  return depth > TOLERANCE * c->size ? -c->recovery * depth : 0;
+  return depth > TOLERANCE * c->size ? -c->overlap.left * depth : 0;
 }
 
 /* A node is behind the obstacle: from now on it is held. */
@@ -317,6 +318,7 @@ static PetscErrorCode touch_contact(SbEffect e, SbSpace space, PetscReal t, Pets
   c->first = PETSC_TRUE;
   c->arrival = 1;
   SbReboundBegin(&c->bounce, dt);
+  SbOverlapBegin(&c->overlap, dt);
   for (PetscInt i = 0; i < c->n; i++) {
     Touch *touch = &c->touch[i];
     PetscReal x0[3], x[3], n[3];

@@ -3,6 +3,7 @@
 */
 #pragma once
 #include "friction.h"
+#include "overlap.h"
 #include "rebound.h"
 #include "sbcontact.h"
 #include "sbeffect.h"
@@ -48,7 +49,7 @@ typedef struct {
   PetscBool facets; /* the obstacle is a mesh */
   SbFriction friction;
   PetscReal stiffness;
-  PetscReal recovery;     /* part of an overlap that is left after a step */
+  SbOverlap overlap;
   PetscReal scale, at[3]; /* of the file of a mesh */
   SbFormula displacement[3], angle;
   PetscReal axis[3], point[3];
