@@ -271,7 +271,7 @@ static PetscErrorCode check_overlap(const char *element, const char *response, c
     "-body_a_poisson 0.3 -body_a_density 1000 -body_a_translate -0.05,-0.05,%g -body_a_element %s -effects "
     "gravity,floor -effect_floor_type contact -effect_floor_obstacle %s -effect_floor_response %s "
     "-effect_floor_recovery %d -time euler_implicit -ts_dt %g -ts_max_time %g -snes_rtol 1e-8",
-    -DEPTH, element, obstacle, response, RECOVERY, STEP, 5.001 * RECOVERY * STEP));
+    -DEPTH, element, obstacle, response, RECOVERY, STEP, (5 * RECOVERY + 3) * STEP));
   PetscCall(SbRunAddMonitor(t.run, watch_overlap, &o, NULL));
   PetscCall(verify_solve(&t, "overlap"));
   PetscCall(
