@@ -35,6 +35,7 @@ static PetscErrorCode join_corners(SbTriangles *t)
   Corner *corner;
 
   PetscFunctionBeginUser;
+  if (!n) PetscFunctionReturn(PETSC_SUCCESS); /* what is empty is refused later; qsort() wants an array */
   PetscCall(PetscMalloc1(n, &corner));
   for (PetscInt i = 0; i < n; i++) {
     for (int k = 0; k < 3; k++) corner[i].x[k] = t->x[3 * i + k] + 0.; /* no negative zero */
