@@ -107,6 +107,11 @@ demo: deps ## install what is missing, build, run scenarios/demo.opts on 2 ranks
 	@scripts/render out/demo --animate out/demo/animation.gif
 	@echo "open out/demo/fields.xmf in ParaView; out/demo/picture.png and animation.gif show the run"
 
+pictures: deps ## run the scenarios of contact on 1 rank and draw them: docs/*.png and out/*/animation.gif (1 to 2 minutes)
+	$(AGAIN) bin/supple meshes/lobe.msh meshes/hook.msh
+	@scripts/venv
+	@scripts/pictures
+
 CHECK = tests/run --build $(BUILD) $(if $(T),--match '$(T)')
 check: deps ## install what is missing, build, run the tests (5 to 10 minutes; one of them: T=name)
 	$(AGAIN) bin/supple tests $(MESHES)
@@ -165,7 +170,7 @@ help: ## this list
 	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/  make \1|\2/p' Makefile | awk -F'|' '{ printf "%-20s%s\n", $$1, $$2 }'
 	@echo "settings: T=name (tests)  QUICK=1 (bench)  DEBUG=1  WERROR=1  V=1 (show commands)  CC=  OPT=  CFLAGS=  BUILD=  JOBS=  PREFIX=  DESTDIR=  PETSC_DIR= PETSC_ARCH="
 
-.PHONY: all tests deps demo check check-long lint sanitize memcheck bench locking solvers docs install clean help FORCE
+.PHONY: all tests deps demo pictures check check-long lint sanitize memcheck bench locking solvers docs install clean help FORCE
 .SECONDARY:
 .DELETE_ON_ERROR:
 -include $(wildcard $(BUILD)/src/*.d $(BUILD)/src/*/*.d $(BUILD)/tests/*/*.d)
