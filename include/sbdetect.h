@@ -49,6 +49,7 @@ typedef struct {
   const PetscInt *point_facet; /* [npoint] identity of that facet, -1: a vertex */
   PetscBool self;              /* parts may meet themselves */
   PetscReal reach;             /* pairs up to this distance are wanted, m; penetration likewise */
+  PetscReal deep;              /* penetration up to this depth, if it is more, m; costs like a reach of that size */
   PetscInt version;            /* changes when facets or edges are other ones, not only elsewhere */
 } SbDetectScene;
 
@@ -80,6 +81,12 @@ typedef struct {
     depth; /* how far their nearest places are below the facets at the other edge, the least of these; 0: not, m */
   PetscBool crossed; /* found by its motion: within the step the edges went through each other */
 } SbEdgePair;
+
+/* How far from a point facets are looked for, m. */
+static inline PetscReal SbDetectRange(const SbDetectScene *s)
+{
+  return PetscMax(s->reach, s->deep);
+}
 
 typedef enum { SB_DETECT_HASH, SB_DETECT_BVH, SB_DETECT_BRUTE } SbDetectKind;
 typedef struct {

@@ -109,7 +109,7 @@ static void facet_column(const SbDetector d, const SbDetectScene *s, const SbVol
     x[n++] = s->x + 3 * s->facet[3 * f + i];
     if (s->x0) x[n++] = s->x0 + 3 * s->facet[3 * f + i];
   }
-  SbVolumeOf(v, n, x, d->facet_box + 6 * f, s->reach, column);
+  SbVolumeOf(v, n, x, d->facet_box + 6 * f, SbDetectRange(s), column);
 }
 
 static void point_column(const SbDetector d, const SbDetectScene *s, const SbVolume *v, PetscInt p,

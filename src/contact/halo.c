@@ -231,7 +231,7 @@ static PetscErrorCode build(SbSurface s, const PetscReal u0[], const PetscReal u
   PetscFunctionBeginUser;
   h->built = PETSC_TRUE;
   h->self = s->scene.self;
-  h->reach = s->scene.reach;
+  h->reach = SbDetectRange(&s->scene);
   /* what moves on as in this step is still in the list at the next one; but far ahead the list is not worth its size */
   h->margin = MARGIN * s->edge + PetscMin(2 * motion, s->edge);
   h->nbuild++;
@@ -289,7 +289,7 @@ PetscErrorCode SbHaloUpdate(SbSurface s, const PetscReal u0[], const PetscReal u
     h->built = PETSC_FALSE;
     PetscFunctionReturn(PETSC_SUCCESS);
   }
-  if (!h->built || s->scene.reach > h->reach || (s->scene.self && !h->self) || !(most[1] <= HALF * h->margin))
+  if (!h->built || SbDetectRange(&s->scene) > h->reach || (s->scene.self && !h->self) || !(most[1] <= HALF * h->margin))
     PetscCall(build(s, u0, u, most[0]));
   PetscCall(exchange_positions(s, (PetscBool)(u0 != NULL)));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -14,7 +14,7 @@
   - agrees with the motion: when the point went through the part's surface in this step, the normal must not point to the far side of
     where it came in, and the point must have been in front of the place: one that came over a rim is not pushed out sideways.
   When there is none, and the point went through a facet that faces it, that facet is the contact: this is how a thin plate stops what is
-  past it at the end of the step. Points that are deeper than the reach and were inside already when the step began are not found.
+  past it at the end of the step. Points that were inside already when the step began are found up to the scene's `deep`.
 */
 #include "detect.h"
 
@@ -428,9 +428,11 @@ static void set_hit(const Look *look, PetscInt facet, PetscReal key, Hit *h)
 }
 
 /* Whether the boxes come so near each other, over the step, that the point may have been in the facet or just behind it. */
-static PetscBool may_cross(const struct _p_SbDetector *d, PetscReal reach, PetscInt point, PetscInt facet)
+static PetscBool may_cross(const struct _p_SbDetector *d, const SbDetectScene *s, PetscInt point,
+                           PetscInt facet)
 {
-  const PetscReal *p = d->point_box + 6 * point, *f = d->facet_box + 6 * facet, less = (1 - START) * reach;
+  const PetscReal *p = d->point_box + 6 * point, *f = d->facet_box + 6 * facet,
+                  less = SbDetectRange(s) - START * s->reach;
 
   return (PetscBool)(p[0] <= f[3] - less && f[0] + less <= p[3] && p[1] <= f[4] - less &&
                      f[1] + less <= p[4] && p[2] <= f[5] - less && f[2] + less <= p[5]);
@@ -478,7 +480,7 @@ static void look_closely(Look *look, PetscInt n, const PetscInt candidate[], Pet
                          PetscInt64 *looked)
 {
   const SbDetectScene *s = look->s;
-  const PetscReal reach2 = s->reach * s->reach;
+  const PetscReal range2 = SbDetectRange(s) * SbDetectRange(s);
 
   look->nhit = look->ncross = 0;
   for (PetscInt j = 0; j < n; j++) {
@@ -493,8 +495,8 @@ static void look_closely(Look *look, PetscInt n, const PetscInt candidate[], Pet
     (*looked)++;
     corners(s, s->x, f, x);
     h->place = SbClosestPoint(look->p, x, h->weight, &d2);
-    close = (PetscBool)(d2 <= reach2);
-    through = (PetscBool)(s->x0 && may_cross(look->d, s->reach, look->point, f) && crossed(look, f, c));
+    close = (PetscBool)(d2 <= range2);
+    through = (PetscBool)(s->x0 && may_cross(look->d, s, look->point, f) && crossed(look, f, c));
     if (!close && !through) continue;
     if (s->point_part[look->point] == s->facet_part[f] && belong_together(s, look->point, f)) continue;
     if (close) {
@@ -585,8 +587,9 @@ static PetscBool nearest(const Look *look, PetscInt n, Hit h[], const SbNear *en
         sided = PETSC_TRUE;
       }
       if ((!sided || (near->gap < 0) == inside) && SbDot3(look->normal, near->normal) < -FACING &&
-          (!entry || (SbDot3(near->normal, entry->normal) > FACING && was_in_front(look, near, behind))))
-        return in_by(h[0].key, near);
+          (!entry || (SbDot3(near->normal, entry->normal) > FACING &&
+                      (near->gap >= 0 || was_in_front(look, near, behind)))))
+        return (PetscBool)(near->gap <= look->s->reach && in_by(h[0].key, near));
     }
   }
   return PETSC_FALSE;

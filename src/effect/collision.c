@@ -281,6 +281,7 @@ static PetscErrorCode touch_collision(SbEffect e, SbSpace space, PetscReal t, Pe
   PetscCall(PetscArraycpy(c->u0, u0, 3 * space->nnode));
   c->friction.updates = 0;
   SbOverlapBegin(&c->overlap, dt);
+  if (!c->begun) PetscCall(SbCollisionFindOverlap(c, u0));
   PetscCall(SbCollisionRestore(c));
   c->first = PETSC_TRUE;
   c->arrival = 1;
@@ -476,6 +477,7 @@ static PetscErrorCode accept_collision(SbEffect e, SbSpace space, const SbStage 
       c->work += normal * hit->normal[k] * (hit->now[k] - hit->start[k]);
     read_impulse(c, space, hit);
   }
+  PetscCall(SbCollisionFollowOverlap(c));
   PetscCall(SbCollisionKeep(c));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

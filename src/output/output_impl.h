@@ -253,7 +253,7 @@ PetscErrorCode SbXdmfAddPoints(SbXdmf x, PetscReal time, const char *group, Pets
 void SbXdmfWrite(SbXdmf x, size_t nmessage, char message[]);
 
 /* phases.c: where the time went, from the log events. */
-#define SB_PHASE_COUNT 8
+#define SB_PHASE_COUNT 10
 typedef struct {
   const char *name;
   PetscReal seconds; /* largest of all ranks */

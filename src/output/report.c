@@ -186,6 +186,7 @@ static PetscErrorCode print_phases(SbRun run, const SbPhases *p)
   for (int i = 0; i < SB_PHASE_COUNT; i++) {
     const SbPhase *phase = &p->phase[i];
 
+    if (!strncmp(phase->name, "contact", 7) && !(phase->seconds > 0)) continue; /* none in the scene */
     PetscCall(PetscFPrintf(PETSC_COMM_SELF, PETSC_STDOUT, "%-15s %10.3f %7.1f%%", phase->name,
                            (double)phase->seconds,
                            (double)(p->total > 0. ? 100. * phase->seconds / p->total : 0.)));
