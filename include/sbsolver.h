@@ -34,6 +34,8 @@ PetscErrorCode SbSolverFallBack(SNES snes, PetscBool *changed);
 PetscErrorCode SbSolverSetUp(SNES snes, SbSpace space, const SbSolverPreset *preset);
 /* Solves of ksp whose true residual is far above the tolerance fail (KSP_DIVERGED_BREAKDOWN). Not collective. */
 PetscErrorCode SbSolverLookAtResidual(KSP ksp);
+/* CG gives way to FGMRES while rows of contact slide with friction, and comes back after them. Collective; before each solve. */
+PetscErrorCode SbSolverFollowRows(KSP ksp, SbSpace space);
 /*
   SbPCCoupleCreate - for a space with rows between nodes: makes pc a preconditioner in the null space of the exact ones, P^-1 = P M^-1 P^T.
 

@@ -42,6 +42,7 @@ struct _p_SbCouple {
   Mat K;             /* borrowed; NULL before SbCoupleCreateOperator() */
   PetscBool oblique; /* rows may push along other coefficients than their own */
   PetscBool tilted;  /* some do now */
+  PetscBool general; /* CG has given way to a method for what is not symmetric */
   Mat DFt;           /* D F^T */
   Mat gram;          /* G D F^T, its diagonal slightly larger */
   KSP solver;

@@ -10,6 +10,7 @@
 #include "couple.h"
 #include "sbsolver.h"
 
+#define RESTART 100      /* of FGMRES */
 #define NU_PRESSURE 0.45 /* from here on, dynamic runs of CR and DG do better with the pressures apart */
 
 static PetscErrorCode create_frames(SbSpace s, Mat *A)
@@ -234,8 +235,6 @@ PetscErrorCode SbSolverSetUp(SNES snes, SbSpace s, const SbSolverPreset *preset)
   PetscCall(KSPSetTolerances(ksp, 1e-8, PETSC_DEFAULT, PETSC_DEFAULT, 5000));
   PetscCall(KSPSetType(ksp, KSPCG));
   PetscCall(KSPSetNormType(ksp, KSP_NORM_UNPRECONDITIONED));
-  if (s->couple && SbSpaceCoupleOblique(s))
-    PetscCall(insert_options("-ksp_type fgmres -ksp_gmres_restart 100"));
   PetscCall(insert_options(preset->options));
   if (strstr(preset->options, "-pc_type cholesky")) PetscCall(SbSolverLookAtResidual(ksp));
   PetscCall(KSPGetPC(ksp, &pc));
@@ -247,6 +246,21 @@ PetscErrorCode SbSolverSetUp(SNES snes, SbSpace s, const SbSolverPreset *preset)
   }
   PetscCall(SbPCCoupleCreate(s, pc, &pc));
   if (preset->precondition) PetscCall(preset->precondition(s, pc));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbSolverFollowRows(KSP ksp, SbSpace s)
+{
+  PetscBool cg;
+
+  PetscFunctionBeginUser;
+  if (!s->couple || !s->couple->oblique || s->couple->general == s->couple->tilted)
+    PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscObjectTypeCompare((PetscObject)ksp, KSPCG, &cg));
+  if (!cg && !s->couple->general) PetscFunctionReturn(PETSC_SUCCESS); /* not ours, and general enough */
+  PetscCall(KSPSetType(ksp, cg ? KSPFGMRES : KSPCG));
+  if (cg) PetscCall(KSPGMRESSetRestart(ksp, RESTART));
+  s->couple->general = cg;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -6,6 +6,7 @@
   leave beside large contact forces. So all solves of a step aim at what the first one aims at. While guesses are wrong, those of a time
   step aim at a thousand times more: a rough solution is enough to see who touches.
 */
+#include "sbsolver.h"
 #include "time_impl.h"
 
 #define DIGITS 1e-11    /* of the forces of contact and supports: what rounding leaves of a residual */
@@ -17,17 +18,16 @@
 typedef struct {
   PetscReal atol, rtol, stol, linear_rtol, linear_atol, dtol;
   PetscInt max_it, max_f, linear_max;
+  KSP ksp;
   PetscBool single; /* one linear solve in the place of Newton */
 } Aim;
 
 static PetscErrorCode get_aim(SNES snes, Aim *aim)
 {
-  KSP ksp;
-
   PetscFunctionBeginUser;
-  PetscCall(SNESGetKSP(snes, &ksp));
+  PetscCall(SNESGetKSP(snes, &aim->ksp));
   PetscCall(SNESGetTolerances(snes, &aim->atol, &aim->rtol, &aim->stol, &aim->max_it, &aim->max_f));
-  PetscCall(KSPGetTolerances(ksp, &aim->linear_rtol, &aim->linear_atol, &aim->dtol, &aim->linear_max));
+  PetscCall(KSPGetTolerances(aim->ksp, &aim->linear_rtol, &aim->linear_atol, &aim->dtol, &aim->linear_max));
   PetscCall(PetscObjectTypeCompare((PetscObject)snes, SNESKSPONLY, &aim->single));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -39,13 +39,11 @@ static PetscErrorCode set_aim(SNES snes, const Aim *aim, PetscReal size, PetscRe
   const PetscReal part = rough ? PetscMax(rtol, PetscMin(ROUGH, LOOSER * rtol)) : rtol;
   const PetscReal atol = PetscMax(PetscMax(aim->atol, least), (rough ? part : aim->rtol) * size);
   const PetscReal linear = (aim->single ? 1 : 0.1) * PetscMax(least, part * size);
-  KSP ksp;
 
   PetscFunctionBeginUser;
-  PetscCall(SNESGetKSP(snes, &ksp));
   PetscCall(SNESSetTolerances(snes, atol, aim->rtol, aim->stol, aim->max_it, aim->max_f));
-  PetscCall(
-    KSPSetTolerances(ksp, PETSC_DEFAULT, PetscMax(aim->linear_atol, linear), PETSC_DEFAULT, PETSC_DEFAULT));
+  PetscCall(KSPSetTolerances(aim->ksp, PETSC_DEFAULT, PetscMax(aim->linear_atol, linear), PETSC_DEFAULT,
+                             PETSC_DEFAULT));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -92,6 +90,7 @@ PetscErrorCode SbRunSolveContact(SbRun run, SNES snes, PetscReal t, PetscReal dt
   }
   PetscCall(first_residual(snes, U, run->R, &size));
   if (held) PetscCall(set_aim(snes, &aim, size, least, rough)); /* if not, as without contact */
+  PetscCall(SbSolverFollowRows(aim.ksp, m->space));
   PetscCall((*solve->solve)(solve->ctx, U, reason));
   for (PetscInt round = 1; *reason > 0; round++) {
     PetscCall((*solve->residual)(solve->ctx, U, run->R));
@@ -109,6 +108,7 @@ PetscErrorCode SbRunSolveContact(SbRun run, SNES snes, PetscReal t, PetscReal dt
       break;
     }
     PetscCall(set_aim(snes, &aim, size, least, rough));
+    PetscCall(SbSolverFollowRows(aim.ksp, m->space));
     PetscCall((*solve->solve)(solve->ctx, U, reason));
   }
   PetscCall(set_aim(snes, &aim, 0, 0, PETSC_FALSE));
