@@ -42,15 +42,19 @@ typedef struct {
   PetscInt npoint;
   const PetscReal *p, *p0, *P; /* [npoint][3] like x, x0, X */
   const PetscReal *p_normal;   /* [npoint][3] outward unit normal of the point's own surface now */
-  const PetscInt *point_part;  /* [npoint] */
-  const PetscInt *point_id;    /* [npoint] */
+  const PetscReal *
+    p_way; /* [npoint][3] unit vectors: the way out of the part `p_way_part` (-1: of none) for points in it; NULL: the
+                                  nearest place */
+  const PetscInt *p_way_part; /* [npoint] */
+  const PetscInt *point_part; /* [npoint] */
+  const PetscInt *point_id;   /* [npoint] */
   const PetscInt
     *point_vertex; /* [npoint] identity of the mesh vertex that the point is, -1: the centroid of a facet */
   const PetscInt *point_facet; /* [npoint] identity of that facet, -1: a vertex */
   PetscBool self;              /* parts may meet themselves */
   PetscReal reach;             /* pairs up to this distance are wanted, m; penetration likewise */
-  PetscReal deep;              /* penetration up to this depth, if it is more, m; costs like a reach of that size */
-  PetscInt version;            /* changes when facets or edges are other ones, not only elsewhere */
+  PetscReal deep;   /* penetration up to this depth, if it is more, m; costs like a reach of that size */
+  PetscInt version; /* changes when facets or edges are other ones, not only elsewhere */
 } SbDetectScene;
 
 /*
@@ -124,6 +128,13 @@ PetscErrorCode SbDetectorFind(SbDetector detector, const SbDetectScene *scene, P
 */
 PetscErrorCode SbDetectorFindEdges(SbDetector detector, const SbDetectScene *scene, PetscInt *n,
                                    const SbEdgePair **pair);
+/*
+  SbRayMeets - where the half-line p + t way meets a triangle.
+
+  Not collective. Output: t >= 0, in lengths of way; weight[3] of the corners; out, whether it leads from the back to the front.
+*/
+PetscBool SbRayMeets(const PetscReal p[3], const PetscReal way[3], const PetscReal *const x[3], PetscReal *t,
+                     PetscReal weight[3], PetscBool *out);
 PetscErrorCode SbDetectorGetStats(SbDetector detector, SbDetectStats *stats);
 
 /*

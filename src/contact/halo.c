@@ -289,7 +289,8 @@ PetscErrorCode SbHaloUpdate(SbSurface s, const PetscReal u0[], const PetscReal u
     h->built = PETSC_FALSE;
     PetscFunctionReturn(PETSC_SUCCESS);
   }
-  if (!h->built || SbDetectRange(&s->scene) > h->reach || (s->scene.self && !h->self) || !(most[1] <= HALF * h->margin))
+  if (!h->built || SbDetectRange(&s->scene) > h->reach || (s->scene.self && !h->self) ||
+      !(most[1] <= HALF * h->margin))
     PetscCall(build(s, u0, u, most[0]));
   PetscCall(exchange_positions(s, (PetscBool)(u0 != NULL)));
   PetscFunctionReturn(PETSC_SUCCESS);

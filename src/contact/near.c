@@ -1,7 +1,7 @@
 /*
   near.c - the narrow phase: from candidates to contacts.
 
-  Nearest point of a triangle by the regions of Ericson, "Real-Time Collision Detection", 2005, 5.1.5. Which side the point is on is told
+  Nearest points of triangles are those of triangle.c. Which side the point is on is told
   by the pseudonormal there (Baerentzen and Aanaes, "Signed distance computation using the angle weighted pseudonormal", IEEE TVCG
   11(3), 2005): of a face its normal, of an edge the sum of its facets' normals, of a vertex their sum weighted by their angles. Facets
   belong together by the identities of their vertices, so that the open joints of CR and DG are closed.
@@ -27,7 +27,6 @@
 #define START \
   0.1 /* of the reach: so far behind a facet a point may begin the step and still be in front: it lay in contact */
 #define FLAT 1e-12   /* area over squared length, below which a triangle has no normal */
-#define SLIM 1e-4    /* the same, below which the region of the nearest point may be the wrong one */
 #define AHEAD 16     /* candidates: facets are fetched so far ahead */
 #define SELF_REACH 2 /* in reaches: what is nearer at rest is no self-contact */
 
@@ -99,97 +98,6 @@ static PetscReal angle(const PetscReal *const x[3], int k)
   subtract(x[(k + 2) % 3], x[k], b);
   SbCross(a, b, c);
   return atan2(PetscSqrtReal(SbDot3(c, c)), SbDot3(a, b));
-}
-
-static SbTrianglePlace put(SbTrianglePlace place, PetscReal w0, PetscReal w1, PetscReal w2, PetscReal w[3])
-{
-  w[0] = w0;
-  w[1] = w1;
-  w[2] = w2;
-  return place;
-}
-
-/* The nearest of the three edges, when that is nearer than d2. */
-static SbTrianglePlace closest_edge(const PetscReal p[3], const PetscReal *const x[3], SbTrianglePlace place,
-                                    PetscReal w[3], PetscReal *d2)
-{
-  for (int k = 0; k < 3; k++) {
-    const int l = (k + 1) % 3;
-    PetscReal e[3], r[3], length2, t, other;
-
-    subtract(x[l], x[k], e);
-    subtract(p, x[k], r);
-    length2 = SbDot3(e, e);
-    t = length2 > 0 ? PetscMax(0, PetscMin(1, SbDot3(r, e) / length2)) : 0;
-    for (int i = 0; i < 3; i++) r[i] -= t * e[i];
-    other = SbDot3(r, r);
-    if (other >= *d2) continue;
-    *d2 = other;
-    w[k] = 1 - t;
-    w[l] = t;
-    w[(k + 2) % 3] = 0;
-    place = (SbTrianglePlace)(t <= 0 ? k : t >= 1 ? l : SB_EDGE_0 + k);
-  }
-  return place;
-}
-
-/* Over the inside: by areas, and with slim triangles by a second look at the edges. */
-static SbTrianglePlace closest_inside(const PetscReal p[3], const PetscReal *const x[3],
-                                      const PetscReal area[3], PetscReal scale, PetscReal w[3], PetscReal *d2)
-{
-  const PetscReal total = area[0] + area[1] + area[2];
-  PetscReal r[3];
-
-  *d2 = PETSC_MAX_REAL;
-  if (total > FLAT * FLAT * scale * scale) {
-    w[1] = area[1] / total;
-    w[2] = area[2] / total;
-    w[0] = PetscMax(0, 1 - w[1] - w[2]);
-    away(p, x, w, r);
-    *d2 = SbDot3(r, r);
-    if (total > SLIM * SLIM * scale * scale) return SB_INSIDE;
-  }
-  return closest_edge(p, x, SB_INSIDE, w, d2);
-}
-
-SbTrianglePlace SbClosestPoint(const PetscReal p[3], const PetscReal *const x[3], PetscReal w[3],
-                               PetscReal *d2)
-{
-  PetscReal ab[3], ac[3], r[3], d[6], area[3];
-  SbTrianglePlace place;
-
-  subtract(x[1], x[0], ab);
-  subtract(x[2], x[0], ac);
-  for (int k = 0; k < 3; k++) {
-    subtract(p, x[k], r);
-    d[2 * k] = SbDot3(ab, r);
-    d[2 * k + 1] = SbDot3(ac, r);
-  }
-  area[2] = d[0] * d[3] - d[2] * d[1];
-  area[1] = d[4] * d[1] - d[0] * d[5];
-  area[0] = d[2] * d[5] - d[4] * d[3];
-  if (d[0] <= 0 && d[1] <= 0)
-    place = put(SB_CORNER_0, 1, 0, 0, w);
-  else if (d[2] >= 0 && d[3] <= d[2])
-    place = put(SB_CORNER_1, 0, 1, 0, w);
-  else if (d[5] >= 0 && d[4] <= d[5])
-    place = put(SB_CORNER_2, 0, 0, 1, w);
-  else if (area[2] <= 0 && d[0] >= 0 && d[2] <= 0 && d[0] > d[2]) {
-    const PetscReal t = d[0] / (d[0] - d[2]);
-    place = put(SB_EDGE_0, 1 - t, t, 0, w);
-  } else if (area[1] <= 0 && d[1] >= 0 && d[5] <= 0 && d[1] > d[5]) {
-    const PetscReal t = d[1] / (d[1] - d[5]);
-    place = put(SB_EDGE_2, 1 - t, 0, t, w);
-  } else if (area[0] <= 0 && d[3] >= d[2] && d[4] >= d[5] && d[3] - d[2] + d[4] - d[5] > 0) {
-    const PetscReal t = (d[3] - d[2]) / (d[3] - d[2] + d[4] - d[5]);
-    place = put(SB_EDGE_1, 0, 1 - t, t, w);
-  } else {
-    const PetscReal scale = PetscMax(d[0] - d[2], d[1] - d[5]); /* squared lengths of ab, ac */
-    return closest_inside(p, x, area, scale, w, d2);
-  }
-  away(p, x, w, r);
-  *d2 = SbDot3(r, r);
-  return place;
 }
 
 /* ------------------------------------------------------------------ neighbours */
@@ -613,6 +521,36 @@ static PetscBool passage(const Look *look, const Hit *c, SbNear *near)
   return (PetscBool)(SbDot3(look->normal, near->normal) < -FACING);
 }
 
+/* Where the given way leads out of the part; false when the point is not in it. */
+static PetscBool along_way(const Look *look, PetscInt n, const Hit h[], SbNear *near)
+{
+  const PetscReal *way = look->s->p_way + 3 * look->point;
+  PetscReal least = PETSC_MAX_REAL;
+  PetscInt id = -1;
+  PetscBool out = PETSC_FALSE;
+
+  for (PetscInt i = 0; i < n; i++) {
+    const PetscReal *x[3];
+    PetscReal weight[3], t;
+    PetscBool leads;
+
+    corners(look->s, look->s->x, h[i].facet, x);
+    if (!SbRayMeets(look->p, way, x, &t, weight, &leads) || t > least || (t == least && h[i].id > id))
+      continue;
+    least = t;
+    id = h[i].id;
+    out = leads;
+    near->facet = h[i].facet;
+    for (int k = 0; k < 3; k++) near->weight[k] = weight[k];
+  }
+  if (!out) return PETSC_FALSE;
+  near->point = look->point;
+  near->crossed = PETSC_FALSE;
+  near->gap = -least;
+  for (int k = 0; k < 3; k++) near->normal[k] = way[k];
+  return in_by(h[0].key, near);
+}
+
 /* Contacts of one point, at most one with each part, in order of the parts; how many. */
 static PetscInt contacts(Look *look, SbNear near[])
 {
@@ -630,7 +568,10 @@ static PetscInt contacts(Look *look, SbNear near[])
     for (jnext = j; jnext < look->ncross && look->cross[jnext].part == part;) jnext++;
     if (jnext > j) (void)ties(jnext - j, look->cross + j, TIE_TIME);
     into = (PetscBool)(jnext > j && passage(look, look->cross + j, &entry));
-    found = nearest(look, inext - i, look->hit + i, jnext > j ? &entry : NULL, look->cross + j, near + n);
+    found = (PetscBool)(look->s->p_way && look->s->p_way_part[look->point] == part &&
+                        along_way(look, inext - i, look->hit + i, near + n));
+    if (!found)
+      found = nearest(look, inext - i, look->hit + i, jnext > j ? &entry : NULL, look->cross + j, near + n);
     if (!found && into) {
       near[n] = entry;
       if (inext > i) (void)in_by(look->hit[i].key, &near[n]);

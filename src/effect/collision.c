@@ -544,6 +544,7 @@ static PetscErrorCode destroy_collision(SbEffect e)
   PetscCall(SbEffectFreeOn(&c->on));
   PetscCall(SbSurfaceDestroy(&c->surface));
   PetscCall(SbDetectorDestroy(&c->detector));
+  PetscCall(PetscFree2(c->way, c->way_part));
   PetscCall(PetscFree(c->point_k));
   PetscCall(PetscFree(c->edge_k));
   PetscCall(PetscFree(c->edge));

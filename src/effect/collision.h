@@ -78,14 +78,16 @@ typedef struct {
   PetscReal *flight;  /* [nnode][3] that at its end if nothing had a force, m; NULL without restitution */
   SbRebound bounce;
   PetscInt nhit, size, npast, past_size;
-  Hit *hit, *spare;  /* by point and part */
-  Hit *past;         /* [npast] as the last step left them: each attempt at a step begins there */
-  PetscBool cut;     /* steps end where points arrive */
-  PetscBool begun;   /* overlap that was there when the run began has been looked for */
-  PetscReal deep;    /* so deep points are looked for, m; 0: by the reach, as all come from outside */
-  PetscBool first;   /* the step has not been solved yet */
-  PetscReal arrival; /* the part of it after which the first point arrives, 1: none */
-  PetscReal work;    /* of the contact forces since the start, this rank, J */
+  Hit *hit, *spare; /* by point and part */
+  Hit *past;        /* [npast] as the last step left them: each attempt at a step begins there */
+  PetscBool cut;    /* steps end where points arrive */
+  PetscBool begun;  /* overlap that was there when the run began has been looked for */
+  PetscReal *way;   /* [npoint][3] unit vectors: ways out of overlap, zero: none; NULL while there is none */
+  PetscInt *way_part; /* [npoint] out of which part, -1: none */
+  PetscReal deep;     /* so deep points are looked for, m; 0: by the reach, as all come from outside */
+  PetscBool first;    /* the step has not been solved yet */
+  PetscReal arrival;  /* the part of it after which the first point arrives, 1: none */
+  PetscReal work;     /* of the contact forces since the start, this rank, J */
   SbPairs pairs;
 } Collision;
 
@@ -95,7 +97,7 @@ typedef struct {
   Collective. `within`: a look within a step; what touches then stays, found or not. Else only what is found stays.
 */
 PetscErrorCode SbCollisionLook(Collision *c, const PetscReal u[], PetscBool within);
-/* Sets c->deep by the overlap that is there at local displacements u, m, when a run begins. Collective; clears the pairs. */
+/* collision_overlap.c: sets c->deep and ways out by the overlap that is there at local displacements u, m, when a run begins. Collective; clears the pairs. */
 PetscErrorCode SbCollisionFindOverlap(Collision *c, const PetscReal u[]);
 /* Less, when less is left of it. Collective if c->deep is not 0. */
 PetscErrorCode SbCollisionFollowOverlap(Collision *c);

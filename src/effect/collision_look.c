@@ -10,7 +10,6 @@
 #define TURNED 0.7 /* cosine between normals of two looks, below which they are of another place */
 #define JUMP \
   0.05 /* of the reach: so much deeper a pair that is held began the step, seen from a facet that it is not held by */
-#define BLIND 8     /* reaches, four edges: overlap is looked for so deep without a sign of it */
 #define CORNER 1e-4 /* of the reach: places that may be one (near.c) */
 
 /* Of two surfaces, whether the points of `mine` look for `other`. Edges that rounding alone tells apart are the same. */
@@ -234,91 +233,14 @@ PetscErrorCode SbCollisionLook(Collision *c, const PetscReal u[], PetscBool with
 
   PetscFunctionBeginUser;
   c->surface->scene.deep = c->deep;
+  c->surface->scene.p_way = c->way;
+  c->surface->scene.p_way_part = c->way_part;
   PetscCall(SbSurfaceUpdate(c->surface, c->u0, u, c->reach, c->self, &close));
   if (close || c->self) {
     PetscCall(SbDetectorFind(c->detector, s, &found.nnear, &found.near));
     PetscCall(SbDetectorFindEdges(c->detector, s, &found.npair, &found.pair));
   }
   PetscCall(merge(c, &found, within));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode deepest_of(const Collision *c, PetscReal *deepest)
-{
-  PetscFunctionBeginUser;
-  *deepest = 0;
-  for (PetscInt i = 0; i < c->nhit; i++) *deepest = PetscMax(*deepest, -c->hit[i].gap);
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, deepest, 1, MPIU_REAL, MPI_MAX, c->surface->space->comm));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* How far boxes of two surfaces are in each other at most, m. */
-static PetscErrorCode boxes_overlap(const Collision *c, PetscReal *most)
-{
-  const SbDetectScene *s = &c->surface->scene;
-  const PetscInt nbody = c->surface->space->mesh->nbody;
-  PetscReal *box; /* [nbody][6] lower corners, negative upper ones */
-
-  PetscFunctionBeginUser;
-  PetscCall(PetscMalloc1(6 * nbody, &box));
-  for (PetscInt i = 0; i < 6 * nbody; i++) box[i] = PETSC_MAX_REAL;
-  for (PetscInt i = 0; i < s->npoint; i++) {
-    PetscReal *mine = box + 6 * s->point_part[i];
-
-    for (int k = 0; k < 3; k++) {
-      mine[k] = PetscMin(mine[k], s->p[3 * i + k]);
-      mine[3 + k] = PetscMin(mine[3 + k], -s->p[3 * i + k]);
-    }
-  }
-  PetscCallMPI(
-    MPI_Allreduce(MPI_IN_PLACE, box, (PetscMPIInt)(6 * nbody), MPIU_REAL, MPI_MIN, c->surface->space->comm));
-  *most = 0;
-  for (PetscInt a = 0; a < nbody; a++) {
-    for (PetscInt b = 0; b < a; b++) {
-      PetscReal least = PETSC_MAX_REAL;
-
-      for (int k = 0; k < 3; k++)
-        least = PetscMin(least, PetscMin(-box[6 * a + 3 + k], -box[6 * b + 3 + k]) -
-                                  PetscMax(box[6 * a + k], box[6 * b + k]));
-      *most = PetscMax(*most, least);
-    }
-  }
-  PetscCall(PetscFree(box));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/*
-  Around the places where surfaces go through each other depths begin with 0: the range is doubled until it holds twice all of them. Faces
-  that lie in one plane hide those places: so where boxes overlap, a few layers of cells are looked through in any case.
-*/
-PetscErrorCode SbCollisionFindOverlap(Collision *c, const PetscReal u[])
-{
-  PetscReal range = c->reach, deepest, blind;
-
-  PetscFunctionBeginUser;
-  c->begun = PETSC_TRUE;
-  PetscCall(SbCollisionLook(c, u, PETSC_FALSE));
-  PetscCall(deepest_of(c, &deepest));
-  PetscCall(boxes_overlap(c, &blind));
-  blind = PetscMin(blind, BLIND * c->reach);
-  while ((2 * deepest > range || range < blind) && range < c->surface->size) {
-    c->deep = range *= 2;
-    PetscCall(SbCollisionLook(c, u, PETSC_FALSE));
-    PetscCall(deepest_of(c, &deepest));
-  }
-  PetscCall(SbCollisionFollowOverlap(c));
-  c->nhit = 0;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode SbCollisionFollowOverlap(Collision *c)
-{
-  PetscReal deepest;
-
-  PetscFunctionBeginUser;
-  if (!(c->deep > 0)) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(deepest_of(c, &deepest));
-  c->deep = 2 * deepest > c->reach ? PetscMin(c->deep, 2 * deepest) : 0;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -1,0 +1,321 @@
+/*
+  collision_overlap.c - overlap that is there when a run begins: how deep it is, and which way out of it.
+
+  Later, what comes in is seen as it comes. What is in from the start may be deeper than the reach, and there the nearest place of the surface
+  is no way out: neighbours would be pushed to different sides. So ways are given as by Heidelberger, Teschner, Keiser, Mueller and
+  Gross, "Consistent penetration depth estimation for deformable collision response", VMV 2004: edges that go through the other surface
+  tell their inner end the normal there, weighted by the inverse square of the distance; from these points they spread along edges to those
+  inside. Depth and place are then where the way leads out. They stay until the bodies have parted.
+
+  Points of CR and DG, which are on facets, take the nearest place.
+*/
+#include "collision.h"
+#include "sbkernel.h"
+
+#define GRAZE 1e-6 /* of an edge: nearer to its ends it touches a facet and does not go through it */
+#define BLIND 8    /* reaches, four edges: overlap is looked for so deep without a sign of it */
+
+static PetscErrorCode deepest_of(const Collision *c, PetscReal *deepest)
+{
+  PetscFunctionBeginUser;
+  *deepest = 0;
+  for (PetscInt i = 0; i < c->nhit; i++) *deepest = PetscMax(*deepest, -c->hit[i].gap);
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, deepest, 1, MPIU_REAL, MPI_MAX, c->surface->space->comm));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* How far boxes of two surfaces are in each other at most, m. */
+static PetscErrorCode boxes_overlap(const Collision *c, PetscReal *most)
+{
+  const SbDetectScene *s = &c->surface->scene;
+  const PetscInt nbody = c->surface->space->mesh->nbody;
+  PetscReal *box; /* [nbody][6] lower corners, negative upper ones */
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscMalloc1(6 * nbody, &box));
+  for (PetscInt i = 0; i < 6 * nbody; i++) box[i] = PETSC_MAX_REAL;
+  for (PetscInt i = 0; i < s->npoint; i++) {
+    PetscReal *mine = box + 6 * s->point_part[i];
+
+    for (int k = 0; k < 3; k++) {
+      mine[k] = PetscMin(mine[k], s->p[3 * i + k]);
+      mine[3 + k] = PetscMin(mine[3 + k], -s->p[3 * i + k]);
+    }
+  }
+  PetscCallMPI(
+    MPI_Allreduce(MPI_IN_PLACE, box, (PetscMPIInt)(6 * nbody), MPIU_REAL, MPI_MIN, c->surface->space->comm));
+  *most = 0;
+  for (PetscInt a = 0; a < nbody; a++) {
+    for (PetscInt b = 0; b < a; b++) {
+      PetscReal least = PETSC_MAX_REAL;
+
+      for (int k = 0; k < 3; k++)
+        least = PetscMin(least, PetscMin(-box[6 * a + 3 + k], -box[6 * b + 3 + k]) -
+                                  PetscMax(box[6 * a + k], box[6 * b + k]));
+      *most = PetscMax(*most, least);
+    }
+  }
+  PetscCall(PetscFree(box));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ ways out */
+
+/* Ends of own edges, as nodes; global vectors with three numbers for each node. */
+typedef struct {
+  PetscInt n;
+  PetscInt *node; /* [n][2] global numbers */
+  PetscReal *w;   /* [n] inverse square of the length, m^-2 */
+  Vec known, sum; /* ways that are known; what neighbours say */
+  Vec ends;       /* [n][2][3] those of the ends of own edges */
+  VecScatter scatter;
+} Ways;
+
+/* The node whose weight is 1; -1 for an element whose vertices are no nodes. */
+static PetscInt whole(const PetscReal weight[4], const PetscInt node[4])
+{
+  for (int a = 0; a < 4; a++) {
+    if (weight[a] == 1) return node[a];
+  }
+  return -1;
+}
+
+static PetscInt end_node(const SbSurface f, PetscInt edge, int end)
+{
+  return whole(f->edge_weight + 8 * edge + 4 * end, f->edge_node + 4 * edge);
+}
+
+static PetscErrorCode create_ways(const Collision *c, Ways *w)
+{
+  const SbSurface f = c->surface;
+  const SbDetectScene *s = &f->scene;
+  IS from;
+
+  PetscFunctionBeginUser;
+  w->n = 0;
+  PetscCall(PetscMalloc2(2 * s->edges->nown, &w->node, s->edges->nown, &w->w));
+  for (PetscInt i = 0; i < s->edges->nown; i++) {
+    const PetscReal *a = s->x + 3 * s->edges->corner[4 * i], *b = s->x + 3 * s->edges->corner[4 * i + 1];
+    PetscReal r[3];
+
+    if (end_node(f, i, 0) < 0 || end_node(f, i, 1) < 0) continue;
+    for (int k = 0; k < 3; k++) r[k] = b[k] - a[k];
+    for (int q = 0; q < 2; q++) w->node[2 * w->n + q] = end_node(f, i, q);
+    w->w[w->n++] = 1 / PetscMax(SbDot3(r, r), PETSC_MACHINE_EPSILON * c->reach * c->reach);
+  }
+  PetscCall(VecCreate(f->space->comm, &w->known));
+  PetscCall(VecSetBlockSize(w->known, 3));
+  PetscCall(VecSetSizes(w->known, 3 * f->space->nnode_owned, PETSC_DETERMINE));
+  PetscCall(VecSetType(w->known, VECSTANDARD));
+  PetscCall(VecDuplicate(w->known, &w->sum));
+  PetscCall(VecCreateSeq(PETSC_COMM_SELF, 6 * w->n, &w->ends));
+  PetscCall(ISCreateBlock(PETSC_COMM_SELF, 3, 2 * w->n, w->node, PETSC_USE_POINTER, &from));
+  PetscCall(VecScatterCreate(w->known, from, w->ends, NULL, &w->scatter));
+  PetscCall(ISDestroy(&from));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode destroy_ways(Ways *w)
+{
+  PetscFunctionBeginUser;
+  PetscCall(PetscFree2(w->node, w->w));
+  PetscCall(VecDestroy(&w->known));
+  PetscCall(VecDestroy(&w->sum));
+  PetscCall(VecDestroy(&w->ends));
+  PetscCall(VecScatterDestroy(&w->scatter));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Where an edge goes through a facet, its inner end gets the facet's normal, and the corners of the facet the opposite one. */
+static PetscErrorCode add_entry(const Collision *c, PetscInt edge, PetscInt facet, Vec sum)
+{
+  const SbDetectScene *s = &c->surface->scene;
+  const PetscReal *const x[3] = {s->x + 3 * s->facet[3 * facet], s->x + 3 * s->facet[3 * facet + 1],
+                                 s->x + 3 * s->facet[3 * facet + 2]};
+  const PetscReal *a = s->x + 3 * s->edges->corner[4 * edge], *b = s->x + 3 * s->edges->corner[4 * edge + 1];
+  PetscReal u[3], v[3], n[3], way[3], weight[3], t, length, inner;
+  PetscInt node;
+  PetscBool out;
+
+  PetscFunctionBeginUser;
+  for (int k = 0; k < 3; k++) {
+    way[k] = b[k] - a[k];
+    u[k] = x[1][k] - x[0][k];
+    v[k] = x[2][k] - x[0][k];
+  }
+  if (!SbRayMeets(a, way, x, &t, weight, &out) || t < GRAZE || t > 1 - GRAZE)
+    PetscFunctionReturn(PETSC_SUCCESS);
+  SbCross(u, v, n);
+  length = PetscSqrtReal(SbDot3(n, n));
+  inner = out ? t : 1 - t; /* of the edge, from the inner end */
+  inner *= inner * SbDot3(way, way);
+  node = end_node(c->surface, edge, !out);
+  if (node < 0 || !(length > 0)) PetscFunctionReturn(PETSC_SUCCESS);
+  for (int k = 0; k < 3; k++) n[k] /= length * inner;
+  PetscCall(VecSetValuesBlocked(sum, 1, &node, n, ADD_VALUES));
+  for (int q = 0; q < 3; q++) {
+    node = whole(c->surface->facet_weight + 12 * facet + 4 * q, c->surface->facet_node + 4 * facet);
+    for (int k = 0; k < 3; k++) way[k] = -weight[q] * n[k];
+    if (node >= 0) PetscCall(VecSetValuesBlocked(sum, 1, &node, way, ADD_VALUES));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static inline PetscBool apart(const PetscReal a[3], const PetscReal b[3], const PetscReal low[3],
+                              const PetscReal high[3])
+{
+  for (int k = 0; k < 3; k++) {
+    if (PetscMax(a[k], b[k]) < low[k] || PetscMin(a[k], b[k]) > high[k]) return PETSC_TRUE;
+  }
+  return PETSC_FALSE;
+}
+
+/* All edges against all facets of other parts, once in a run: sorted by nothing, but behind boxes. */
+static PetscErrorCode find_entries(const Collision *c, Vec sum)
+{
+  const SbDetectScene *s = &c->surface->scene;
+
+  PetscFunctionBeginUser;
+  PetscCall(VecZeroEntries(sum));
+  for (PetscInt f = 0; f < s->nfacet; f++) {
+    PetscReal low[3], high[3];
+
+    for (int k = 0; k < 3; k++) {
+      const PetscReal a = s->x[3 * s->facet[3 * f] + k], b = s->x[3 * s->facet[3 * f + 1] + k],
+                      d = s->x[3 * s->facet[3 * f + 2] + k];
+
+      low[k] = PetscMin(a, PetscMin(b, d));
+      high[k] = PetscMax(a, PetscMax(b, d));
+    }
+    for (PetscInt i = 0; i < s->edges->nown; i++) {
+      if (s->edges->part[i] == s->facet_part[f] ||
+          apart(s->x + 3 * s->edges->corner[4 * i], s->x + 3 * s->edges->corner[4 * i + 1], low, high))
+        continue;
+      PetscCall(add_entry(c, i, f, sum));
+    }
+  }
+  PetscCall(VecAssemblyBegin(sum));
+  PetscCall(VecAssemblyEnd(sum));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Points inside that have none take the way that their sum says; how many on all ranks. */
+static PetscErrorCode take_ways(const Collision *c, Ways *w, PetscInt *n)
+{
+  const SbSurface f = c->surface;
+  const PetscReal *sum;
+  PetscReal *known;
+
+  PetscFunctionBeginUser;
+  *n = 0;
+  PetscCall(VecGetArrayRead(w->sum, &sum));
+  PetscCall(VecGetArray(w->known, &known));
+  for (PetscInt i = 0; i < f->scene.npoint; i++) {
+    const PetscInt node = f->point_node[i];
+    PetscReal *way = c->way + 3 * i;
+    const PetscReal length = PetscSqrtReal(SbDot3(sum + 3 * node, sum + 3 * node));
+
+    if (c->way_part[i] < 0 || SbDot3(way, way) > 0 || !(length > 0)) continue;
+    for (int k = 0; k < 3; k++) known[3 * node + k] = way[k] = sum[3 * node + k] / length;
+    (*n)++;
+  }
+  PetscCall(VecRestoreArray(w->known, &known));
+  PetscCall(VecRestoreArrayRead(w->sum, &sum));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, n, 1, MPIU_INT, MPI_SUM, f->space->comm));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Known ways go to the other ends of edges. */
+static PetscErrorCode spread(Ways *w)
+{
+  const PetscReal *end;
+
+  PetscFunctionBeginUser;
+  PetscCall(VecZeroEntries(w->sum));
+  PetscCall(VecScatterBegin(w->scatter, w->known, w->ends, INSERT_VALUES, SCATTER_FORWARD));
+  PetscCall(VecScatterEnd(w->scatter, w->known, w->ends, INSERT_VALUES, SCATTER_FORWARD));
+  PetscCall(VecGetArrayRead(w->ends, &end));
+  for (PetscInt i = 0; i < 2 * w->n; i++) {
+    PetscReal way[3];
+
+    for (int k = 0; k < 3; k++) way[k] = w->w[i / 2] * end[3 * i + k];
+    PetscCall(VecSetValuesBlocked(w->sum, 1, &w->node[i ^ 1], way, ADD_VALUES));
+  }
+  PetscCall(VecRestoreArrayRead(w->ends, &end));
+  PetscCall(VecAssemblyBegin(w->sum));
+  PetscCall(VecAssemblyEnd(w->sum));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The ways out for the points that the last look found inside: of the part in which they are deepest. */
+static PetscErrorCode find_ways(Collision *c)
+{
+  const PetscInt npoint = c->surface->scene.npoint;
+  PetscReal *deepest;
+  PetscInt n;
+  Ways w;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscCalloc2(3 * npoint, &c->way, npoint, &c->way_part));
+  PetscCall(PetscCalloc1(npoint, &deepest));
+  for (PetscInt i = 0; i < npoint; i++) c->way_part[i] = -1;
+  for (PetscInt i = 0; i < c->nhit && !SbCollisionOfEdges(c, &c->hit[i]); i++) {
+    const Hit *hit = &c->hit[i];
+
+    if (-hit->gap <= deepest[hit->point]) continue;
+    deepest[hit->point] = -hit->gap;
+    c->way_part[hit->point] = hit->part;
+  }
+  PetscCall(PetscFree(deepest));
+  PetscCall(create_ways(c, &w));
+  PetscCall(find_entries(c, w.sum));
+  PetscCall(take_ways(c, &w, &n));
+  while (n > 0) {
+    PetscCall(spread(&w));
+    PetscCall(take_ways(c, &w, &n));
+  }
+  PetscCall(destroy_ways(&w));
+  for (PetscInt i = 0; i < npoint; i++) {
+    if (!(SbDot3(c->way + 3 * i, c->way + 3 * i) > 0)) c->way_part[i] = -1;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ how deep */
+
+/*
+  Around the places where surfaces go through each other depths begin with 0: the range is doubled until it holds twice all of them. Faces
+  that lie in one plane hide those places: so where boxes overlap, a few layers of cells are looked through in any case.
+*/
+PetscErrorCode SbCollisionFindOverlap(Collision *c, const PetscReal u[])
+{
+  PetscReal range = c->reach, deepest, blind;
+
+  PetscFunctionBeginUser;
+  c->begun = PETSC_TRUE;
+  PetscCall(SbCollisionLook(c, u, PETSC_FALSE));
+  PetscCall(deepest_of(c, &deepest));
+  PetscCall(boxes_overlap(c, &blind));
+  blind = PetscMin(blind, BLIND * c->reach);
+  while ((2 * deepest > range || range < blind) && range < c->surface->size) {
+    c->deep = range *= 2;
+    PetscCall(SbCollisionLook(c, u, PETSC_FALSE));
+    PetscCall(deepest_of(c, &deepest));
+  }
+  PetscCall(SbCollisionFollowOverlap(c));
+  if (c->deep > 0) PetscCall(find_ways(c));
+  c->nhit = 0;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbCollisionFollowOverlap(Collision *c)
+{
+  PetscReal deepest;
+
+  PetscFunctionBeginUser;
+  if (!(c->deep > 0)) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(deepest_of(c, &deepest));
+  c->deep = 2 * deepest > c->reach ? PetscMin(c->deep, 2 * deepest) : 0;
+  if (c->deep == 0) PetscCall(PetscFree2(c->way, c->way_part));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
