@@ -157,10 +157,12 @@ struct _p_SbSurface {
   PetscReal *facet_height; /* [nfacet] rest height of the cell behind, m */
   PetscInt *edge_node;     /* [nedge][4] like facet_node, of the edge's first facet */
   PetscReal *edge_weight;  /* [nedge][2][4] like facet_weight, of its ends */
-  PetscInt *edge_facet;    /* [edges->nown] the first facet, as one of those given to SbSurfaceCreate() */
-  PetscReal size;          /* of all bodies at rest, m */
-  PetscReal edge;          /* mean rest edge of all facets, m */
-  void *data;              /* private */
+  PetscInt *
+    edge_carrier; /* [edges->nown][2] global numbers of the nodes of its ends with P1, of its two facets with CR and DG */
+  PetscInt *edge_facet; /* [edges->nown] the first facet, as one of those given to SbSurfaceCreate() */
+  PetscReal size;       /* of all bodies at rest, m */
+  PetscReal edge;       /* mean rest edge of all facets, m */
+  void *data;           /* private */
 };
 /*
   SbSurfaceCreate - from boundary facets as SbEffectFacets() gives them (of owned and ghost cells; copied). Collective.

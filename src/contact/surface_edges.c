@@ -60,6 +60,11 @@ static PetscInt list_sides(SbSurface s, const SbFacet facet[], SbSide side[])
   return n;
 }
 
+static PetscInt face_node(SbSpace space, const SbFacet *f)
+{
+  return space->gnode[space->cell_node[4 * f->cell + f->face]];
+}
+
 /* What own edges are, but for their corners. */
 static void fill_own(SbSurface s, const SbFacet facet[])
 {
@@ -80,6 +85,9 @@ static void fill_own(SbSurface s, const SbFacet facet[])
       const PetscReal *weight = SbSpaceCellElement(space, f->cell)->ops.vertex[f->corner[k]];
 
       e->vertex[2 * i + j] = space->mesh->vert_orig[f->vertex[k]];
+      s->edge_carrier[2 * i + j] = at_vertices(space, f->cell)
+                                     ? space->gnode[space->cell_node[4 * f->cell + f->corner[k]]]
+                                     : face_node(space, &facet[d->side[i][j] / 3]);
       for (int a = 0; a < 4; a++) s->edge_weight[8 * i + 4 * j + a] = weight[a];
     }
   }
@@ -132,6 +140,7 @@ PetscErrorCode SbSurfaceOwnEdges(SbSurface s, const SbFacet facet[])
   d->edges.n = d->edges.nown = kept;
   PetscCall(reserve(s, kept));
   PetscCall(PetscMalloc1(kept, &s->edge_facet));
+  PetscCall(PetscMalloc1(2 * kept, &s->edge_carrier));
   fill_own(s, facet);
   PetscCall(list_open(s));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -204,5 +213,6 @@ PetscErrorCode SbSurfaceFreeEdges(SbSurface s)
   PetscCall(PetscFree(s->edge_node));
   PetscCall(PetscFree(s->edge_weight));
   PetscCall(PetscFree(s->edge_facet));
+  PetscCall(PetscFree(s->edge_carrier));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

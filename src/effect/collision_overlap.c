@@ -7,7 +7,7 @@
   tell their inner end the normal there, weighted by the inverse square of the distance; from these points they spread along edges to those
   inside. Depth and place are then where the way leads out. They stay until the bodies have parted.
 
-  Points of CR and DG, which are on facets, take the nearest place.
+  Points of CR and DG are on facets: there an edge tells both its facets.
 */
 #include "collision.h"
 #include "sbkernel.h"
@@ -61,28 +61,31 @@ static PetscErrorCode boxes_overlap(const Collision *c, PetscReal *most)
 
 /* ------------------------------------------------------------------ ways out */
 
-/* Ends of own edges, as nodes; global vectors with three numbers for each node. */
+/* What own edges connect, as nodes; global vectors with three numbers for each node. */
 typedef struct {
   PetscInt n;
-  PetscInt *node; /* [n][2] global numbers */
-  PetscReal *w;   /* [n] inverse square of the length, m^-2 */
-  Vec known, sum; /* ways that are known; what neighbours say */
-  Vec ends;       /* [n][2][3] those of the ends of own edges */
+  const PetscInt *node; /* [n][2] global numbers */
+  PetscReal *w;         /* [n] inverse square of the length, m^-2 */
+  Vec known, sum;       /* ways that are known; what neighbours say */
+  Vec ends;             /* [n][2][3] those of the ends of own edges */
   VecScatter scatter;
 } Ways;
 
-/* The node whose weight is 1; -1 for an element whose vertices are no nodes. */
-static PetscInt whole(const PetscReal weight[4], const PetscInt node[4])
+/* The node that carries corner q of a facet: its own with P1, that of the facet with CR and DG. */
+static PetscInt carrier(const SbSurface f, PetscInt facet, int q)
 {
-  for (int a = 0; a < 4; a++) {
-    if (weight[a] == 1) return node[a];
-  }
-  return -1;
-}
+  const PetscReal *w = f->facet_weight + 12 * facet;
+  PetscReal most = 0;
+  int at = 0;
 
-static PetscInt end_node(const SbSurface f, PetscInt edge, int end)
-{
-  return whole(f->edge_weight + 8 * edge + 4 * end, f->edge_node + 4 * edge);
+  for (int a = 0; a < 4; a++) {
+    const PetscReal mean = w[a] + w[4 + a] + w[8 + a];
+
+    if (w[4 * q + a] == 1) return f->facet_node[4 * facet + a];
+    if (mean > most) at = a;
+    most = PetscMax(most, mean);
+  }
+  return f->facet_node[4 * facet + at];
 }
 
 static PetscErrorCode create_ways(const Collision *c, Ways *w)
@@ -92,16 +95,15 @@ static PetscErrorCode create_ways(const Collision *c, Ways *w)
   IS from;
 
   PetscFunctionBeginUser;
-  w->n = 0;
-  PetscCall(PetscMalloc2(2 * s->edges->nown, &w->node, s->edges->nown, &w->w));
+  w->n = s->edges->nown;
+  w->node = f->edge_carrier;
+  PetscCall(PetscMalloc1(w->n, &w->w));
   for (PetscInt i = 0; i < s->edges->nown; i++) {
     const PetscReal *a = s->x + 3 * s->edges->corner[4 * i], *b = s->x + 3 * s->edges->corner[4 * i + 1];
     PetscReal r[3];
 
-    if (end_node(f, i, 0) < 0 || end_node(f, i, 1) < 0) continue;
     for (int k = 0; k < 3; k++) r[k] = b[k] - a[k];
-    for (int q = 0; q < 2; q++) w->node[2 * w->n + q] = end_node(f, i, q);
-    w->w[w->n++] = 1 / PetscMax(SbDot3(r, r), PETSC_MACHINE_EPSILON * c->reach * c->reach);
+    w->w[i] = 1 / PetscMax(SbDot3(r, r), PETSC_MACHINE_EPSILON * c->reach * c->reach);
   }
   PetscCall(VecCreate(f->space->comm, &w->known));
   PetscCall(VecSetBlockSize(w->known, 3));
@@ -118,11 +120,20 @@ static PetscErrorCode create_ways(const Collision *c, Ways *w)
 static PetscErrorCode destroy_ways(Ways *w)
 {
   PetscFunctionBeginUser;
-  PetscCall(PetscFree2(w->node, w->w));
+  PetscCall(PetscFree(w->w));
   PetscCall(VecDestroy(&w->known));
   PetscCall(VecDestroy(&w->sum));
   PetscCall(VecDestroy(&w->ends));
   PetscCall(VecScatterDestroy(&w->scatter));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* w->ends from w->known. */
+static PetscErrorCode bring_ends(Ways *w)
+{
+  PetscFunctionBeginUser;
+  PetscCall(VecScatterBegin(w->scatter, w->known, w->ends, INSERT_VALUES, SCATTER_FORWARD));
+  PetscCall(VecScatterEnd(w->scatter, w->known, w->ends, INSERT_VALUES, SCATTER_FORWARD));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -149,14 +160,16 @@ static PetscErrorCode add_entry(const Collision *c, PetscInt edge, PetscInt face
   length = PetscSqrtReal(SbDot3(n, n));
   inner = out ? t : 1 - t; /* of the edge, from the inner end */
   inner *= inner * SbDot3(way, way);
-  node = end_node(c->surface, edge, !out);
-  if (node < 0 || !(length > 0)) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!(length > 0)) PetscFunctionReturn(PETSC_SUCCESS);
   for (int k = 0; k < 3; k++) n[k] /= length * inner;
-  PetscCall(VecSetValuesBlocked(sum, 1, &node, n, ADD_VALUES));
+  for (int q = 0; q < 2; q++) { /* what is outside does not take it */
+    node = c->surface->edge_carrier[2 * edge + q];
+    PetscCall(VecSetValuesBlocked(sum, 1, &node, n, ADD_VALUES));
+  }
   for (int q = 0; q < 3; q++) {
-    node = whole(c->surface->facet_weight + 12 * facet + 4 * q, c->surface->facet_node + 4 * facet);
+    node = carrier(c->surface, facet, q);
     for (int k = 0; k < 3; k++) way[k] = -weight[q] * n[k];
-    if (node >= 0) PetscCall(VecSetValuesBlocked(sum, 1, &node, way, ADD_VALUES));
+    PetscCall(VecSetValuesBlocked(sum, 1, &node, way, ADD_VALUES));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -170,14 +183,40 @@ static inline PetscBool apart(const PetscReal a[3], const PetscReal b[3], const 
   return PETSC_FALSE;
 }
 
-/* All edges against all facets of other parts, once in a run: sorted by nothing, but behind boxes. */
-static PetscErrorCode find_entries(const Collision *c, Vec sum)
+/* Which edges have one end inside: those alone can go through a surface once. Listed in cut[], room for w->n. */
+static PetscErrorCode find_cut(const Collision *c, Ways *w, PetscInt *n, PetscInt cut[])
 {
-  const SbDetectScene *s = &c->surface->scene;
+  const SbSurface f = c->surface;
+  const PetscReal *end;
+  PetscReal *inside;
 
   PetscFunctionBeginUser;
-  PetscCall(VecZeroEntries(sum));
-  for (PetscInt f = 0; f < s->nfacet; f++) {
+  PetscCall(VecZeroEntries(w->known));
+  PetscCall(VecGetArray(w->known, &inside));
+  for (PetscInt i = 0; i < f->scene.npoint; i++) inside[3 * f->point_node[i]] = c->way_part[i] >= 0;
+  PetscCall(VecRestoreArray(w->known, &inside));
+  PetscCall(bring_ends(w));
+  PetscCall(VecGetArrayRead(w->ends, &end));
+  *n = 0;
+  for (PetscInt i = 0; i < w->n; i++) {
+    if (end[6 * i] != end[6 * i + 3]) cut[(*n)++] = i;
+  }
+  PetscCall(VecRestoreArrayRead(w->ends, &end));
+  PetscCall(VecZeroEntries(w->known));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* These edges against all facets of other parts, once in a run. */
+static PetscErrorCode find_entries(const Collision *c, Ways *w)
+{
+  const SbDetectScene *s = &c->surface->scene;
+  PetscInt n = 0, *cut;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscMalloc1(w->n, &cut));
+  PetscCall(find_cut(c, w, &n, cut));
+  PetscCall(VecZeroEntries(w->sum));
+  for (PetscInt f = 0; f < s->nfacet && n; f++) {
     PetscReal low[3], high[3];
 
     for (int k = 0; k < 3; k++) {
@@ -187,15 +226,18 @@ static PetscErrorCode find_entries(const Collision *c, Vec sum)
       low[k] = PetscMin(a, PetscMin(b, d));
       high[k] = PetscMax(a, PetscMax(b, d));
     }
-    for (PetscInt i = 0; i < s->edges->nown; i++) {
-      if (s->edges->part[i] == s->facet_part[f] ||
-          apart(s->x + 3 * s->edges->corner[4 * i], s->x + 3 * s->edges->corner[4 * i + 1], low, high))
+    for (PetscInt j = 0; j < n; j++) {
+      const PetscInt *corner = s->edges->corner + 4 * cut[j];
+
+      if (s->edges->part[cut[j]] == s->facet_part[f] ||
+          apart(s->x + 3 * corner[0], s->x + 3 * corner[1], low, high))
         continue;
-      PetscCall(add_entry(c, i, f, sum));
+      PetscCall(add_entry(c, cut[j], f, w->sum));
     }
   }
-  PetscCall(VecAssemblyBegin(sum));
-  PetscCall(VecAssemblyEnd(sum));
+  PetscCall(PetscFree(cut));
+  PetscCall(VecAssemblyBegin(w->sum));
+  PetscCall(VecAssemblyEnd(w->sum));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -232,8 +274,7 @@ static PetscErrorCode spread(Ways *w)
 
   PetscFunctionBeginUser;
   PetscCall(VecZeroEntries(w->sum));
-  PetscCall(VecScatterBegin(w->scatter, w->known, w->ends, INSERT_VALUES, SCATTER_FORWARD));
-  PetscCall(VecScatterEnd(w->scatter, w->known, w->ends, INSERT_VALUES, SCATTER_FORWARD));
+  PetscCall(bring_ends(w));
   PetscCall(VecGetArrayRead(w->ends, &end));
   for (PetscInt i = 0; i < 2 * w->n; i++) {
     PetscReal way[3];
@@ -268,7 +309,7 @@ static PetscErrorCode find_ways(Collision *c)
   }
   PetscCall(PetscFree(deepest));
   PetscCall(create_ways(c, &w));
-  PetscCall(find_entries(c, w.sum));
+  PetscCall(find_entries(c, &w));
   PetscCall(take_ways(c, &w, &n));
   while (n > 0) {
     PetscCall(spread(&w));
