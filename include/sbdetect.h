@@ -53,7 +53,8 @@ typedef struct {
   const PetscInt *point_facet; /* [npoint] identity of that facet, -1: a vertex */
   PetscBool self;              /* parts may meet themselves */
   PetscReal reach;             /* pairs up to this distance are wanted, m; penetration likewise */
-  PetscReal deep;   /* penetration up to this depth, if it is more, m; costs like a reach of that size */
+  PetscReal
+    deep; /* penetration of other parts up to this depth, if it is more, m; costs like a reach of that size */
   PetscInt version; /* changes when facets or edges are other ones, not only elsewhere */
 } SbDetectScene;
 

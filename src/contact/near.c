@@ -395,6 +395,7 @@ static void look_closely(Look *look, PetscInt n, const PetscInt candidate[], Pet
     const PetscInt f = candidate[j];
     Hit *h = look->hit + look->nhit, *c = look->cross + look->ncross;
     const PetscReal *x[3];
+    const PetscBool own = (PetscBool)(s->point_part[look->point] == s->facet_part[f]);
     PetscBool close, through;
     PetscReal d2;
 
@@ -403,10 +404,10 @@ static void look_closely(Look *look, PetscInt n, const PetscInt candidate[], Pet
     (*looked)++;
     corners(s, s->x, f, x);
     h->place = SbClosestPoint(look->p, x, h->weight, &d2);
-    close = (PetscBool)(d2 <= range2);
+    close = (PetscBool)(d2 <= (own ? s->reach * s->reach : range2)); /* deeper is its own far side */
     through = (PetscBool)(s->x0 && may_cross(look->d, s, look->point, f) && crossed(look, f, c));
     if (!close && !through) continue;
-    if (s->point_part[look->point] == s->facet_part[f] && belong_together(s, look->point, f)) continue;
+    if (own && belong_together(s, look->point, f)) continue;
     if (close) {
       set_hit(look, f, PetscSqrtReal(d2), h);
       look->nhit++;

@@ -129,7 +129,7 @@ PetscBool SbRayMeets(const PetscReal p[3], const PetscReal way[3], const PetscRe
   }
   SbCross(way, e2, c);
   det = SbDot3(e1, c);
-  if (!(PetscAbsReal(det) > PARALLEL * SbDot3(e1, e1))) return PETSC_FALSE;
+  if (!(PetscAbsReal(det) > PARALLEL * SbDot3(e1, e1) * PetscSqrtReal(SbDot3(way, way)))) return PETSC_FALSE;
   weight[1] = SbDot3(r, c) / det;
   SbCross(r, e1, c);
   weight[2] = SbDot3(way, c) / det;

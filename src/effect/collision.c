@@ -243,6 +243,7 @@ static PetscErrorCode setup_collision(SbEffect e, SbSpace space)
   PetscCall(SbPairsSetUp(e, space->mesh));
   PetscCall(PetscMalloc1(3 * space->nnode, &c->u0));
   if (c->bounce.e > 0) PetscCall(PetscMalloc1(3 * space->nnode, &c->flight));
+  if (!e->dynamic) c->overlap.recovery = 0;
   if (c->reach == 0) c->reach = 0.5 * c->surface->edge;
   PetscCall(SbSpaceCoupleCreate(space, PETSC_FALSE, (PetscBool)(c->friction.mu > 0)));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -12,8 +12,9 @@
 #include "collision.h"
 #include "sbkernel.h"
 
-#define GRAZE 1e-6 /* of an edge: nearer to its ends it touches a facet and does not go through it */
-#define BLIND 8    /* reaches, four edges: overlap is looked for so deep without a sign of it */
+#define GRAZE 1e-6  /* of an edge: nearer to its ends it touches a facet and does not go through it */
+#define CANCEL 1e-6 /* of the weights: what is left of ways that oppose each other is none */
+#define BLIND 8     /* reaches, four edges: overlap is looked for so deep without a sign of it */
 
 static PetscErrorCode deepest_of(const Collision *c, PetscReal *deepest)
 {
@@ -61,13 +62,13 @@ static PetscErrorCode boxes_overlap(const Collision *c, PetscReal *most)
 
 /* ------------------------------------------------------------------ ways out */
 
-/* What own edges connect, as nodes; global vectors with three numbers for each node. */
+/* What own edges connect, as nodes; global vectors with four numbers for each node: a way times its weight, and the weight. */
 typedef struct {
   PetscInt n;
   const PetscInt *node; /* [n][2] global numbers */
   PetscReal *w;         /* [n] inverse square of the length, m^-2 */
   Vec known, sum;       /* ways that are known; what neighbours say */
-  Vec ends;             /* [n][2][3] those of the ends of own edges */
+  Vec ends;             /* [n][2][4] those of the ends of own edges */
   VecScatter scatter;
 } Ways;
 
@@ -75,15 +76,17 @@ typedef struct {
 static PetscInt carrier(const SbSurface f, PetscInt facet, int q)
 {
   const PetscReal *w = f->facet_weight + 12 * facet;
+  const PetscReal size = PetscAbsReal(w[4 * q]) + PetscAbsReal(w[4 * q + 1]) + PetscAbsReal(w[4 * q + 2]) +
+                         PetscAbsReal(w[4 * q + 3]);
   PetscReal most = 0;
   int at = 0;
 
   for (int a = 0; a < 4; a++) {
-    const PetscReal mean = w[a] + w[4 + a] + w[8 + a];
+    const PetscReal here =
+      size == 1 ? w[4 * q + a] : w[a] + w[4 + a] + w[8 + a]; /* at the corner, or in the middle */
 
-    if (w[4 * q + a] == 1) return f->facet_node[4 * facet + a];
-    if (mean > most) at = a;
-    most = PetscMax(most, mean);
+    if (here > most) at = a;
+    most = PetscMax(most, here);
   }
   return f->facet_node[4 * facet + at];
 }
@@ -106,12 +109,12 @@ static PetscErrorCode create_ways(const Collision *c, Ways *w)
     w->w[i] = 1 / PetscMax(SbDot3(r, r), PETSC_MACHINE_EPSILON * c->reach * c->reach);
   }
   PetscCall(VecCreate(f->space->comm, &w->known));
-  PetscCall(VecSetBlockSize(w->known, 3));
-  PetscCall(VecSetSizes(w->known, 3 * f->space->nnode_owned, PETSC_DETERMINE));
+  PetscCall(VecSetBlockSize(w->known, 4));
+  PetscCall(VecSetSizes(w->known, 4 * f->space->nnode_owned, PETSC_DETERMINE));
   PetscCall(VecSetType(w->known, VECSTANDARD));
   PetscCall(VecDuplicate(w->known, &w->sum));
-  PetscCall(VecCreateSeq(PETSC_COMM_SELF, 6 * w->n, &w->ends));
-  PetscCall(ISCreateBlock(PETSC_COMM_SELF, 3, 2 * w->n, w->node, PETSC_USE_POINTER, &from));
+  PetscCall(VecCreateSeq(PETSC_COMM_SELF, 8 * w->n, &w->ends));
+  PetscCall(ISCreateBlock(PETSC_COMM_SELF, 4, 2 * w->n, w->node, PETSC_USE_POINTER, &from));
   PetscCall(VecScatterCreate(w->known, from, w->ends, NULL, &w->scatter));
   PetscCall(ISDestroy(&from));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -144,7 +147,7 @@ static PetscErrorCode add_entry(const Collision *c, PetscInt edge, PetscInt face
   const PetscReal *const x[3] = {s->x + 3 * s->facet[3 * facet], s->x + 3 * s->facet[3 * facet + 1],
                                  s->x + 3 * s->facet[3 * facet + 2]};
   const PetscReal *a = s->x + 3 * s->edges->corner[4 * edge], *b = s->x + 3 * s->edges->corner[4 * edge + 1];
-  PetscReal u[3], v[3], n[3], way[3], weight[3], t, length, inner;
+  PetscReal u[3], v[3], n[4], way[4], weight[3], t, length, inner;
   PetscInt node;
   PetscBool out;
 
@@ -162,6 +165,7 @@ static PetscErrorCode add_entry(const Collision *c, PetscInt edge, PetscInt face
   inner *= inner * SbDot3(way, way);
   if (!(length > 0)) PetscFunctionReturn(PETSC_SUCCESS);
   for (int k = 0; k < 3; k++) n[k] /= length * inner;
+  n[3] = 1 / inner;
   for (int q = 0; q < 2; q++) { /* what is outside does not take it */
     node = c->surface->edge_carrier[2 * edge + q];
     PetscCall(VecSetValuesBlocked(sum, 1, &node, n, ADD_VALUES));
@@ -169,6 +173,7 @@ static PetscErrorCode add_entry(const Collision *c, PetscInt edge, PetscInt face
   for (int q = 0; q < 3; q++) {
     node = carrier(c->surface, facet, q);
     for (int k = 0; k < 3; k++) way[k] = -weight[q] * n[k];
+    way[3] = weight[q] * n[3];
     PetscCall(VecSetValuesBlocked(sum, 1, &node, way, ADD_VALUES));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -193,13 +198,13 @@ static PetscErrorCode find_cut(const Collision *c, Ways *w, PetscInt *n, PetscIn
   PetscFunctionBeginUser;
   PetscCall(VecZeroEntries(w->known));
   PetscCall(VecGetArray(w->known, &inside));
-  for (PetscInt i = 0; i < f->scene.npoint; i++) inside[3 * f->point_node[i]] = c->way_part[i] >= 0;
+  for (PetscInt i = 0; i < f->scene.npoint; i++) inside[4 * f->point_node[i]] = c->way_part[i] >= 0;
   PetscCall(VecRestoreArray(w->known, &inside));
   PetscCall(bring_ends(w));
   PetscCall(VecGetArrayRead(w->ends, &end));
   *n = 0;
   for (PetscInt i = 0; i < w->n; i++) {
-    if (end[6 * i] != end[6 * i + 3]) cut[(*n)++] = i;
+    if (end[8 * i] != end[8 * i + 4]) cut[(*n)++] = i;
   }
   PetscCall(VecRestoreArrayRead(w->ends, &end));
   PetscCall(VecZeroEntries(w->known));
@@ -255,10 +260,11 @@ static PetscErrorCode take_ways(const Collision *c, Ways *w, PetscInt *n)
   for (PetscInt i = 0; i < f->scene.npoint; i++) {
     const PetscInt node = f->point_node[i];
     PetscReal *way = c->way + 3 * i;
-    const PetscReal length = PetscSqrtReal(SbDot3(sum + 3 * node, sum + 3 * node));
+    const PetscReal *of = sum + 4 * node, length = PetscSqrtReal(SbDot3(of, of));
 
-    if (c->way_part[i] < 0 || SbDot3(way, way) > 0 || !(length > 0)) continue;
-    for (int k = 0; k < 3; k++) known[3 * node + k] = way[k] = sum[3 * node + k] / length;
+    if (c->way_part[i] < 0 || SbDot3(way, way) > 0 || !(length > CANCEL * of[3])) continue;
+    for (int k = 0; k < 3; k++) known[4 * node + k] = way[k] = of[k] / length;
+    known[4 * node + 3] = 1;
     (*n)++;
   }
   PetscCall(VecRestoreArray(w->known, &known));
@@ -277,9 +283,9 @@ static PetscErrorCode spread(Ways *w)
   PetscCall(bring_ends(w));
   PetscCall(VecGetArrayRead(w->ends, &end));
   for (PetscInt i = 0; i < 2 * w->n; i++) {
-    PetscReal way[3];
+    PetscReal way[4];
 
-    for (int k = 0; k < 3; k++) way[k] = w->w[i / 2] * end[3 * i + k];
+    for (int k = 0; k < 4; k++) way[k] = w->w[i / 2] * end[4 * i + k];
     PetscCall(VecSetValuesBlocked(w->sum, 1, &w->node[i ^ 1], way, ADD_VALUES));
   }
   PetscCall(VecRestoreArrayRead(w->ends, &end));

@@ -31,7 +31,7 @@ static Hit read_record(const PetscReal r[], PetscInt point)
 {
   Hit hit = {.point = point,
              .part = (PetscInt)r[2],
-             .on = (PetscBool)(r[3] != 0),
+             .on = (PetscBool)(r[4] != 0), /* what is on and was not has rebounded, and is free */
              .was = (PetscBool)(r[4] != 0),
              .allowed = r[5],
              .lambda = r[6],
@@ -56,6 +56,8 @@ PetscErrorCode SbEffectSave_Collision(SbEffect e, SbSpace space, PetscInt *n, Pe
   r[0] = SUMS;
   r[1] = c->work;
   r[2] = c->friction.loss;
+  r[3] = c->overlap.longest;
+  r[4] = c->deep;
   *n = 1;
   for (PetscInt i = 0; i < c->npast; i++) {
     const Hit *hit = &c->past[i];
@@ -99,6 +101,7 @@ PetscErrorCode SbEffectLoad_Collision(SbEffect e, SbSpace space, PetscReal t, co
 {
   Collision *c = (Collision *)e->data;
   const SbDetectScene *s = &c->surface->scene;
+  PetscReal sums[2] = {0, 0};
   PetscMPIInt rank;
   Names names[2];
 
@@ -120,13 +123,21 @@ PetscErrorCode SbEffectLoad_Collision(SbEffect e, SbSpace space, PetscReal t, co
       c->work += r[1];
       c->friction.loss += r[2];
     }
-    if (r[0] == SUMS) continue;
+    if (r[0] == SUMS) {
+      sums[0] = PetscMax(sums[0], r[3]);
+      sums[1] = PetscMax(sums[1], r[4]);
+      continue;
+    }
     PetscCall(PetscFindInt((PetscInt)r[1], of->n, of->id, &place));
     if (place >= 0) c->past[c->npast++] = read_record(r, of->first + of->at[place]);
   }
   qsort(c->past, (size_t)c->npast, sizeof(Hit), by_pair);
   for (int k = 0; k < 2; k++) PetscCall(PetscFree2(names[k].id, names[k].at));
   PetscCall(PetscArraycpy(c->u0, u, 3 * space->nnode));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, sums, 2, MPIU_REAL, MPI_MAX, space->comm));
+  c->overlap.longest = sums[0];
+  c->overlap.left = 1;                  /* the step that ended has taken its part */
+  c->begun = (PetscBool)(sums[1] == 0); /* ways out of what is left of an overlap are found anew */
   PetscCall(SbCollisionRestore(c));
   PetscCall(SbCollisionLook(c, u, PETSC_FALSE));
   PetscFunctionReturn(PETSC_SUCCESS);

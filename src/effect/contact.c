@@ -249,7 +249,7 @@ static PetscReal rest_of(const Contact *c, const SbPose *from, const Touch *touc
 {
   PetscReal n[3];
   /* what touches springs is behind by what they give; projected it is where it was held */
-  const PetscReal depth = touch->on && !exact(c) ? -touch->kept : -SbContactGap(c, from, x0, n);
+  const PetscReal depth = touch->was && !exact(c) ? -touch->kept : -SbContactGap(c, from, x0, n);
 
   return depth > TOLERANCE * c->size ? -c->overlap.left * depth : 0;
 }

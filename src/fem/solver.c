@@ -251,6 +251,7 @@ PetscErrorCode SbSolverSetUp(SNES snes, SbSpace s, const SbSolverPreset *preset)
 
 PetscErrorCode SbSolverFollowRows(KSP ksp, SbSpace s)
 {
+  PetscInt restart = RESTART;
   PetscBool cg;
 
   PetscFunctionBeginUser;
@@ -259,7 +260,8 @@ PetscErrorCode SbSolverFollowRows(KSP ksp, SbSpace s)
   PetscCall(PetscObjectTypeCompare((PetscObject)ksp, KSPCG, &cg));
   if (!cg && !s->couple->general) PetscFunctionReturn(PETSC_SUCCESS); /* not ours, and general enough */
   PetscCall(KSPSetType(ksp, cg ? KSPFGMRES : KSPCG));
-  if (cg) PetscCall(KSPGMRESSetRestart(ksp, RESTART));
+  PetscCall(PetscOptionsGetInt(NULL, NULL, "-ksp_gmres_restart", &restart, NULL));
+  if (cg) PetscCall(KSPGMRESSetRestart(ksp, restart));
   s->couple->general = cg;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
