@@ -52,6 +52,10 @@ static const SbOption rows[] = {
    "Coulomb's coefficient for slipping; negative: that for sticking"},
   {"stiffness", SB_OPTION_REAL, 1, "", "20", "(0, inf)",
    "springs of penalty, augmented and friction: factor on (lambda + 2 mu) area / height of the cell behind"},
+  {"damping", SB_OPTION_REAL, 1, "s", "0", "[0, inf)",
+   "response penalty: a damper beside each spring, its constant being stiffness times this time; it acts on "
+   "what is behind "
+   "and never pulls"},
   {"reach", SB_OPTION_REAL, 1, "m", "0", "[0, inf)",
    "how far points look for surfaces, and the deepest penetration that is found at rest; 0: half the mean "
    "edge"},
@@ -151,6 +155,10 @@ static PetscErrorCode options_collision(SbEffect e, const SbScope *scope)
     "go at once",
     e->name, (double)c->friction.mu_kinetic, e->name, (double)c->friction.mu);
   PetscCall(SbOptionReal(scope, "stiffness", &c->stiffness));
+  PetscCall(SbOptionReal(scope, "damping", &c->damping));
+  PetscCheck(c->damping <= 0 || c->response == PENALTY, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
+             "-effect_%s_damping %g s is for springs that give: it needs -effect_%s_response penalty",
+             e->name, (double)c->damping, e->name);
   PetscCall(SbOptionReal(scope, "reach", &c->reach));
   PetscCall(read_restitution(e, scope));
   PetscCall(SbOptionReal(scope, "recovery", &recovery));
@@ -243,6 +251,9 @@ static PetscErrorCode setup_collision(SbEffect e, SbSpace space)
   PetscCall(SbPairsSetUp(e, space->mesh));
   PetscCall(PetscMalloc1(3 * space->nnode, &c->u0));
   if (c->bounce.e > 0) PetscCall(PetscMalloc1(3 * space->nnode, &c->flight));
+  PetscCheck(c->damping <= 0 || e->dynamic, space->comm, PETSC_ERR_USER_INPUT,
+             "-effect_%s_damping %g s: a static run has no speed to damp; leave it out", e->name,
+             (double)c->damping);
   if (!e->dynamic) c->overlap.recovery = 0;
   if (c->reach == 0) c->reach = 0.5 * c->surface->edge;
   PetscCall(SbSpaceCoupleCreate(space, PETSC_FALSE, (PetscBool)(c->friction.mu > 0)));
@@ -282,6 +293,7 @@ static PetscErrorCode touch_collision(SbEffect e, SbSpace space, PetscReal t, Pe
   PetscCall(PetscArraycpy(c->u0, u0, 3 * space->nnode));
   c->friction.updates = 0;
   SbOverlapBegin(&c->overlap, dt);
+  c->damp = dt > 0 ? c->damping / dt : 0;
   if (!c->begun) PetscCall(SbCollisionFindOverlap(c, u0));
   PetscCall(SbCollisionRestore(c));
   c->first = PETSC_TRUE;
@@ -350,7 +362,8 @@ static PetscErrorCode hold_collision(SbEffect e, SbSpace space)
                                  SbCollisionPlace(hit), &hit->row));
     else
       PetscCall(SbSpaceCoupleSpring(space, hit->n, hit->node, coef, oblique ? push : NULL,
-                                    SbCollisionPlace(hit), hit->k, hit->lambda, &hit->row));
+                                    SbCollisionPlace(hit), hit->k * (1 + c->damp),
+                                    hit->lambda + SbCollisionBefore(c, hit), &hit->row));
     if (c->friction.mu > 0) PetscCall(SbCollisionFrictionHold(c, space, i));
   }
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -70,6 +70,8 @@ typedef struct {
   PetscBool self, both;
   SbFriction friction;
   PetscReal stiffness, reach;
+  PetscReal damping; /* of springs, s */
+  PetscReal damp;    /* the same in steps */
   SbOverlap overlap;
   PetscReal *edge;    /* [nbody] mean edge of the surfaces, m: the finer one looks */
   PetscReal *point_k; /* [npoint] N/m */
@@ -124,11 +126,21 @@ static inline PetscReal SbCollisionPlace(const Hit *hit)
   return hit->value - hit->allowed + hit->leaves;
 }
 
+/* The part of a damper's force that is for where the pair was when the step began, N: k damping (g - g0) / dt, g0 < 0. */
+static inline PetscReal SbCollisionBefore(const Collision *c, const Hit *hit)
+{
+  const PetscReal *n = hit->normal, *s = hit->start;
+
+  if (c->damp <= 0) return 0;
+  return hit->k * c->damp * PetscMin(0, n[0] * s[0] + n[1] * s[1] + n[2] * s[2] - SbCollisionPlace(hit));
+}
+
 /* Normal force after a solve, N. */
 static inline PetscReal SbCollisionForce(const Collision *c, const Hit *hit)
 {
   if (exact(c->response)) return hit->lambda;
-  return PetscMax(0, hit->lambda - hit->k * SbCollisionExcess(hit));
+  return PetscMax(0,
+                  hit->lambda + SbCollisionBefore(c, hit) - hit->k * (1 + c->damp) * SbCollisionExcess(hit));
 }
 
 /* Coefficients of the relative displacement along a direction. */

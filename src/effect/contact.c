@@ -53,6 +53,10 @@ static const SbOption rows[] = {
    "Coulomb's coefficient for slipping; negative: that for sticking"},
   {"stiffness", SB_OPTION_REAL, 1, "", "20", "(0, inf)",
    "springs of penalty, augmented and friction: factor on (lambda + 2 mu) area / height of the cell behind"},
+  {"damping", SB_OPTION_REAL, 1, "s", "0", "[0, inf)",
+   "response penalty: a damper beside each spring, its constant being stiffness times this time; it acts on "
+   "what is behind "
+   "and never pulls"},
   {"restitution", SB_OPTION_REAL, 1, "", "0", "[0, 1]",
    "part of their speed with which nodes leave what they hit; needs -time euler_implicit, and a body that is "
    "stiff within a step to bounce as a whole"},
@@ -124,6 +128,10 @@ static PetscErrorCode options_contact(SbEffect e, const SbScope *scope)
              "go at once",
              e->name, (double)c->friction.mu_kinetic, e->name, (double)c->friction.mu);
   PetscCall(SbOptionReal(scope, "stiffness", &c->stiffness));
+  PetscCall(SbOptionReal(scope, "damping", &c->damping));
+  PetscCheck(c->damping <= 0 || c->response == PENALTY, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
+             "-effect_%s_damping %g s is for springs that give: it needs -effect_%s_response penalty",
+             e->name, (double)c->damping, e->name);
   PetscCall(SbOptionReal(scope, "restitution", &c->bounce.e));
   PetscCheck(c->bounce.e <= 0 || exact(c), PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
              "-effect_%s_restitution %g needs -effect_%s_response projected or multiplier", e->name,
@@ -168,6 +176,7 @@ static void add_share(SbSpace space, const SbFacet *facet, PetscInt a, PetscReal
   }
   touch = &c->touch[slot[node]];
   touch->k += c->stiffness * (m->lambda + 2 * m->mu) * share / facet->height;
+  touch->stiff = touch->k;
 }
 
 static PetscErrorCode setup_contact(SbEffect e, SbSpace space)
@@ -181,6 +190,9 @@ static PetscErrorCode setup_contact(SbEffect e, SbSpace space)
   PetscFunctionBeginUser;
   (void)snprintf(option, sizeof(option), "-effect_%s_obstacle", e->name);
   PetscCall(SbObstacleSetUp(c->obstacle, space->comm, option, c->scale, c->at, sizeof(e->note), e->note));
+  PetscCheck(c->damping <= 0 || e->dynamic, space->comm, PETSC_ERR_USER_INPUT,
+             "-effect_%s_damping %g s: a static run has no speed to damp; leave it out", e->name,
+             (double)c->damping);
   if (!e->dynamic) c->overlap.recovery = 0;
   PetscCall(SbEffectFacets(space, &c->on, &n, &facet));
   PetscCall(PetscMalloc1(3 * n, &c->touch));
@@ -252,6 +264,18 @@ static PetscReal rest_of(const Contact *c, const SbPose *from, const Touch *touc
   const PetscReal depth = touch->was && !exact(c) ? -touch->kept : -SbContactGap(c, from, x0, n);
 
   return depth > TOLERANCE * c->size ? -c->overlap.left * depth : 0;
+}
+
+/* The damper of a step of implicit Euler is a stiffer spring and a constant force: k damping (g - g0) / dt, g0 < 0 the gap at its start. */
+static void set_damper(const Contact *c, const SbPose *from, PetscReal dt, const PetscReal x0[3],
+                       Touch *touch)
+{
+  PetscReal n[3];
+
+  touch->stiff = touch->k;
+  if (c->damping <= 0 || dt <= 0) return;
+  touch->stiff += touch->k * c->damping / dt;
+  touch->before = touch->k * c->damping / dt * PetscMin(0, SbContactGap(c, from, x0, n) - touch->rest);
 }
 
 /* A node is behind the obstacle: from now on it is held. */
@@ -335,6 +359,7 @@ static PetscErrorCode touch_contact(SbEffect e, SbSpace space, PetscReal t, Pets
     comes =
       (PetscBool)(c->bounce.e > 0 && SbContactComes(c, &from, x0, v0 ? v0 + 3 * touch->node : NULL, touch));
     if (c->friction.mu > 0) start_friction(c, space, &from, x0, touch);
+    set_damper(c, &from, dt, x0, touch);
     touch->gap = look(c, space, x, touch);
     watch_arrival(c, touch);
     for (int k = 0; k < 3; k++) touch->now[k] = u[3 * touch->node + k];
@@ -362,8 +387,8 @@ static PetscErrorCode hold_rows(const Contact *c, SbSpace space, Touch *touch)
     PetscCall(SbSpaceCoupleRow(space, NORMALS - 1 - id, 1, p.node, touch->n, oblique ? push : NULL,
                                touch->value, &touch->along));
   else {
-    PetscCall(SbSpaceCoupleSpring(space, 1, p.node, touch->n, oblique ? push : NULL, touch->value, touch->k,
-                                  touch->lambda, &touch->along));
+    PetscCall(SbSpaceCoupleSpring(space, 1, p.node, touch->n, oblique ? push : NULL, touch->value,
+                                  touch->stiff, touch->lambda + touch->before, &touch->along));
     SbSpaceCoupleOutside(space, touch->along);
   }
   if (c->friction.mu > 0) PetscCall(SbFrictionHold(&c->friction, space, &p, -2 - 2 * id));
@@ -427,8 +452,7 @@ static PetscErrorCode measure(const Contact *c, SbSpace space, const PetscReal u
     touch->gap = look(c, space, x, touch);
     *largest = PetscMax(*largest, SbContactForce(c, touch));
     if (exact(c) || !c->rows) continue;
-    force = touch->on && touch->toggles >= TOGGLES ? touch->lambda - touch->k * touch->gap
-                                                   : SbContactForce(c, touch);
+    force = touch->on && touch->toggles >= TOGGLES ? pull(touch, touch->gap) : SbContactForce(c, touch);
     for (int k = 0; k < 3; k++) f[k] -= force * touch->n[k];
     touch->wrong = PetscSqrtReal(SbDot3(f, f));
   }
@@ -486,8 +510,7 @@ static PetscErrorCode let_go(const Contact *c, SbSpace space, PetscReal largest,
   for (PetscInt i = 0; !wait && i < c->n; i++) {
     Touch *touch = &c->touch[i];
 
-    if (!touch->on || touch->toggles >= 2 * TOGGLES ||
-        touch->lambda - touch->k * touch->gap >= -PULLING * largest)
+    if (!touch->on || touch->toggles >= 2 * TOGGLES || pull(touch, touch->gap) >= -PULLING * largest)
       continue;
     touch->on = PETSC_FALSE;
     *changed = PETSC_TRUE;

@@ -32,6 +32,8 @@ typedef struct {
   PetscReal gap;  /* after the last solve, beyond `rest`, m */
   PetscReal
     arrives; /* restitution: speed towards the obstacle when the step began, m/s; 0: it does not rebound */
+  PetscReal stiff;    /* of the spring in this step with its damper, N/m */
+  PetscReal before;   /* damper: force for where the node was when the step began, N */
   PetscReal lambda;   /* multiplier of the last solve, N */
   PetscReal wrong;    /* rows as springs: force that its place asks for, less that of the last solve, N */
   SbGrip grip;        /* friction */
@@ -48,7 +50,7 @@ typedef struct {
   PetscBool rows;   /* touching nodes are held by rows, not by directions of their own */
   PetscBool facets; /* the obstacle is a mesh */
   SbFriction friction;
-  PetscReal stiffness;
+  PetscReal stiffness, damping; /* s */
   SbOverlap overlap;
   PetscReal scale, at[3]; /* of the file of a mesh */
   SbFormula displacement[3], angle;
@@ -79,10 +81,16 @@ static inline void place(SbSpace space, PetscInt node, const PetscReal u[], Pets
   for (int i = 0; i < 3; i++) x[i] = space->node_x[3 * node + i] + u[3 * node + i];
 }
 
+/* What springs and dampers give, N, also when they pull. */
+static inline PetscReal pull(const Touch *touch, PetscReal gap)
+{
+  return touch->lambda + touch->before - touch->stiff * gap;
+}
+
 /* Normal force of the springs, N; gap: beyond what the node is held at. */
 static inline PetscReal spring(const Touch *touch, PetscReal gap)
 {
-  return touch->idle ? 0 : PetscMax(0, touch->lambda - touch->k * gap);
+  return touch->idle ? 0 : PetscMax(0, pull(touch, gap));
 }
 
 /* The same of any response after a solve, N. */

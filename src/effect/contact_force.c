@@ -72,7 +72,7 @@ PetscErrorCode SbEffectTangent_Contact(SbEffect e, SbSpace space, const SbStage 
 
     place(space, touch->node, stage->u, x);
     if (normal_force(c, &pose, touch, x, n) <= 0) continue;
-    for (int k = 0; k < 9; k++) block[k] = stage->shift_k * touch->k * n[k / 3] * n[k % 3];
+    for (int k = 0; k < 9; k++) block[k] = stage->shift_k * touch->stiff * n[k / 3] * n[k % 3];
     PetscCall(SbSpaceAddSpring(space, A, touch->cell, touch->a, block));
   }
   PetscFunctionReturn(PETSC_SUCCESS);

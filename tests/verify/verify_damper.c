@@ -1,0 +1,101 @@
+// @ranks 1 2
+/*
+  Springs of contact with dampers: a stiff block flies onto a plane, and onto another block that is held, with response `penalty`.
+  It is a mass on a spring k and a dashpot k tau that do not pull: the speed with which it leaves is that of this oscillator.
+*/
+#include "contact.h"
+
+#define SIDE 0.05 /* m */
+#define MASS (1000 * SIDE * SIDE * SIDE)
+#define SPEED 0.1   /* m/s */
+#define YOUNG 1e7   /* Pa */
+#define FACTOR 1e-3 /* `stiffness` */
+#define STEP 1e-4   /* s */
+
+/* Speed after the impact of the oscillator, by steps a hundred times as short. */
+static PetscReal leaving(PetscReal k, PetscReal tau)
+{
+  const PetscReal h = STEP / 100;
+  PetscReal x = 0, v = -SPEED;
+
+  do {
+    const PetscReal force = PetscMax(0, -k * x - k * tau * v);
+
+    v += h / MASS * force;
+    x += h * v;
+  } while (x < 0 || v < 0);
+  return v;
+}
+
+typedef struct {
+  const char *column;
+  PetscReal speed, force; /* at the end, m/s; the largest, N */
+} Damped;
+
+static PetscErrorCode watch(SbRun run, const SbStep *step, void *ctx)
+{
+  Damped *d = (Damped *)ctx;
+  PetscReal force;
+  SbEnergies e;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbModelEnergies(run->model, step->U, step->V, &e));
+  PetscCall(contact_column(run, step->t, "meet", d->column, &force));
+  d->force = PetscMax(d->force, force);
+  d->speed = PetscSqrtReal(2 * e.kinetic / MASS);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* k: of all springs, N/m; set when there is no damper, by the largest force, SPEED sqrt(k MASS). */
+static PetscErrorCode check(const char *what, const char *scene, PetscReal tau, PetscReal *k)
+{
+  Damped d = {.column = strstr(scene, "collision") ? "normal_force" : "force_z"};
+  PetscReal expected;
+  TestScene t;
+
+  PetscFunctionBeginUser;
+  PetscCall(verify_open(
+    &t,
+    "-bodies %s -body_a_mesh box:0.05,0.05,0.05:1 -body_a_material linear -body_a_young %g -body_a_poisson "
+    "0.3 "
+    "-body_a_velocity 0,0,%g -effect_meet_response penalty -effect_meet_stiffness %g -effect_meet_damping %g "
+    "-time euler_implicit -ts_dt %g -ts_max_time 0.06 -snes_rtol 1e-10",
+    scene, YOUNG, -SPEED, FACTOR, (double)tau, STEP));
+  t.run->want_energies = PETSC_TRUE;
+  PetscCall(SbRunAddMonitor(t.run, watch, &d, NULL));
+  PetscCall(verify_solve(&t, "damper"));
+  if (tau == 0) *k = PetscSqr(d.force / SPEED) / MASS;
+  expected = leaving(*k, tau);
+  PetscCall(
+    PetscPrintf(PETSC_COMM_WORLD,
+                "  %s, damping %g s: springs of %.4g N/m, leaves with %.5f m/s, the oscillator with %.5f\n",
+                what, (double)tau, (double)*k, (double)d.speed, (double)expected));
+  SB_CHECK_NEAR(d.speed, expected, 0.02 * SPEED, "speed after the impact");
+  /* what a spring gives back is motion again: less than there was */
+  SB_CHECK(d.speed <= SPEED, "%s: it leaves with %g m/s", what, (double)d.speed);
+  PetscCall(test_scene_close(&t));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+int main(int argc, char **argv)
+{
+  static const char *const plane =
+    "a -effects meet -effect_meet_type contact -effect_meet_obstacle plane:0,0,1,-1e-4";
+  static const char *const rows = "a -effects meet -effect_meet_type contact -effect_meet_obstacle "
+                                  "plane:0,0,1,-1e-4 -effect_meet_friction 0.3";
+  static const char *const block =
+    "a,b -body_b_mesh box:0.1,0.1,0.05:1 -body_b_translate -0.025,-0.027,-0.0501 -body_b_material linear "
+    "-body_b_young 1e9 -body_b_poisson 0.3 -body_b_density 1000 -sets low -set_low_at plane:0,0,1,-0.0501 "
+    "-effects hold,meet -effect_hold_type support -effect_hold_on low -effect_meet_type collision "
+    "-effect_meet_sides one";
+
+  PetscReal k;
+
+  SB_TEST_BEGIN(argc, argv);
+  PetscCall(check("plane", plane, 0, &k));
+  PetscCall(check("plane", plane, 0.0055, &k));
+  PetscCall(check("plane, rows", rows, 0.0055, &k));
+  PetscCall(check("block", block, 0, &k));
+  PetscCall(check("block", block, 0.0055, &k));
+  SB_TEST_END();
+}
