@@ -52,6 +52,7 @@ static PetscErrorCode check_refused(void)
     {"-effect_meet_reach -1", "-effect_meet_reach"},
     {"-effect_meet_recovery 0.5", "-effect_meet_recovery"},
     {"-effect_meet_restitution 1.5", "-effect_meet_restitution 1.5"},
+    {"-effect_meet_damping 0.01", "-effect_meet_damping 0.01 s is for springs that give"},
     {"-effect_meet_restitution 0.5 -effect_meet_response augmented",
      "-effect_meet_restitution 0.5 needs -effect_meet_response projected or multiplier"},
     {"-effect_meet_restitution 0.5 -effect_meet_arrival cut",

@@ -38,6 +38,8 @@ static PetscErrorCode check_options(void)
   PetscCall(check_error(&x, FLOOR "-effect_floor_friction 0.2 -effect_floor_friction_kinetic 0.3",
                         "-effect_floor_friction_kinetic 0.3 is above"));
   PetscCall(check_error(&x, FLOOR "-effect_floor_restitution 1.5", "-effect_floor_restitution 1.5"));
+  PetscCall(check_error(&x, FLOOR "-effect_floor_damping 0.01",
+                        "-effect_floor_damping 0.01 s is for springs that give"));
   PetscCall(check_error(&x, FLOOR "-effect_floor_restitution 0.5 -effect_floor_response penalty",
                         "-effect_floor_restitution 0.5 needs -effect_floor_response projected"));
   PetscCall(check_error(&x, FLOOR "-effect_floor_recovery 0.5", "-effect_floor_recovery 0.5"));
