@@ -6,7 +6,7 @@
 
       gap = n . (x_p - sum_k b_k x_k) >= 0,     linear in u while n and b stay.
 
-  Two sharp edges of different bodies that cross each other are a pair, too: with places s and t on them gap = n . (x(s) - y(t)).
+  A sharp edge and one that is at least bent of different bodies that cross each other are a pair, too: with places s and t on them gap = n . (x(s) - y(t)).
 
   Forces act along n at p and, by the same weights, on the facet: momentum is kept, and so is angular momentum where the gap is closed.
 
@@ -57,7 +57,7 @@ static const SbOption rows[] = {
    "what is behind "
    "and never pulls"},
   {"reach", SB_OPTION_REAL, 1, "m", "0", "[0, inf)",
-   "how far points look for surfaces, and the deepest penetration that is found at rest; 0: half the mean "
+   "how far points look for surfaces; deeper overlap is looked for when a run begins only; 0: half the mean "
    "edge"},
   {"restitution", SB_OPTION_REAL, 1, "", "0", "[0, 1]",
    "part of their relative speed with which surfaces leave each other; needs -time euler_implicit, and "
