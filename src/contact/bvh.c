@@ -622,7 +622,7 @@ static PetscErrorCode destroy(SbDetector d)
 
 void SbBvhSettingsDefault(SbBvhSettings *s)
 {
-  *s = (SbBvhSettings){.branching = 4, .k = 6, .build = SB_BVH_CONNECTIVITY, .growth = 2};
+  *s = (SbBvhSettings){.branching = 8, .k = 6, .build = SB_BVH_CONNECTIVITY, .growth = 2};
 }
 
 /* The tree of a detector; an error when it is of another kind. */

@@ -39,7 +39,7 @@ static const SbOption rows[] = {
    "touch"},
   {"detection", SB_OPTION_CHOICE, 1, "", "hash", "hash|bvh|brute",
    "spatial hash, hierarchy of bounding volumes, or every pair: the same contacts"},
-  {"bvh_branching", SB_OPTION_INT, 1, "", "4", "[2, 8]", "children of a node of the tree of bvh: 2, 4 or 8"},
+  {"bvh_branching", SB_OPTION_INT, 1, "", "8", "[2, 8]", "children of a node of the tree of bvh: 2, 4 or 8"},
   {"bvh_volume", SB_OPTION_CHOICE, 1, "", "box", "box|dop14|dop18|dop26|sphere",
    "what bounds a node of it: a box, 14, 18 or 26 planes, or a sphere"},
   {"bvh_build", SB_OPTION_CHOICE, 1, "", "connectivity", "connectivity|top_down",
@@ -294,7 +294,7 @@ static PetscErrorCode touch_collision(SbEffect e, SbSpace space, PetscReal t, Pe
   c->friction.updates = 0;
   SbOverlapBegin(&c->overlap, dt);
   c->damp = dt > 0 ? c->damping / dt : 0;
-  if (!c->begun) PetscCall(SbCollisionFindOverlap(c, u0));
+  if (!c->begun) PetscCall(SbCollisionFindOverlap(e, u0));
   PetscCall(SbCollisionRestore(c));
   c->first = PETSC_TRUE;
   c->arrival = 1;

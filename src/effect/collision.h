@@ -99,8 +99,9 @@ typedef struct {
   Collective. `within`: a look within a step; what touches then stays, found or not. Else only what is found stays.
 */
 PetscErrorCode SbCollisionLook(Collision *c, const PetscReal u[], PetscBool within);
-/* collision_overlap.c: sets c->deep and ways out by the overlap that is there at local displacements u, m, when a run begins. Collective; clears the pairs. */
-PetscErrorCode SbCollisionFindOverlap(Collision *c, const PetscReal u[]);
+/* collision_overlap.c: sets c->deep and ways out by the overlap that is there at local displacements u, m, when a run begins. Collective;
+   clears the pairs. Error: a body deep inside another, without a way out. */
+PetscErrorCode SbCollisionFindOverlap(SbEffect e, const PetscReal u[]);
 /* Less, when less is left of it. Collective if c->deep is not 0. */
 PetscErrorCode SbCollisionFollowOverlap(Collision *c);
 /* The pairs as the last step left them; what an attempt at this step that failed has made of them is forgotten,

@@ -104,6 +104,30 @@ check "-scenario_view ran the scenario" test ! -e out/bar/history.csv
 "$supple" opts/scenario.opts -quiet -output_dir again 2>/dev/null
 check "scenario.opts differs" cmp -s opts/history.csv again/history.csv
 
+# a body deep in another one: no look can tell which way it came in
+cat >inside.opts <<'END'
+-bodies big,small
+-body_big_mesh box:1,1,1:9
+-body_small_mesh box:0.1,0.1,0.1:1
+-body_big_material linear
+-body_small_material linear
+-body_big_young 1e5
+-body_big_poisson 0.3
+-body_small_young 1e5
+-body_small_poisson 0.3
+-body_big_translate -0.5,-0.5,-0.5
+-body_small_translate -0.05,-0.05,-0.05
+-effects meet
+-effect_meet_type collision
+-ts_dt 1e-3
+-ts_max_time 1e-3
+END
+for n in 1 2; do
+  error $n "body small lies inside body big" inside.opts -quiet
+  check "beside it on $n: exit code $?" "${mpi[@]}" $n "$supple" inside.opts -quiet -body_small_translate 0.45,0.6,0 -output_dir in
+  check "1 cm deep on $n: exit code $?" "${mpi[@]}" $n "$supple" inside.opts -quiet -body_small_translate 0.39,-0.05,-0.05 -output_dir in
+done
+
 # answers
 check "-version" grep -q '^supple [0-9]' <<<"$("$supple" -version)"
 check "-help | head" test "$("$supple" -help 2>&1 | head -n 1 | cut -c 1-7)" = "supple "
