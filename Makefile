@@ -47,7 +47,8 @@ LINK      = $(CC) $(OPT) $(CFLAGS) $(LDFLAGS) -Wl,--as-needed
 SRC      := $(filter-out src/main.c,$(wildcard src/*/*.c))
 OBJ      := $(SRC:%.c=$(BUILD)/%.o)
 TESTSRC  := $(wildcard tests/unit/*.c tests/verify/*.c tests/perf/*.c)
-TESTBIN  := $(TESTSRC:%.c=$(BUILD)/%)
+TESTBIN  := $(TESTSRC:%.c=$(BUILD)/%) $(BUILD)/tests/hard/hard
+HARDOBJ  := $(patsubst %.c,$(BUILD)/%.o,$(wildcard tests/hard/*.c))
 MESHES   := $(patsubst %.geo,%.msh,$(wildcard meshes/*.geo))
 
 # A second make, with one job per core unless the user said otherwise: what was missing may have been installed meanwhile.
@@ -69,6 +70,10 @@ $(BUILD)/libsupple.a: $(OBJ)
 	$(Q)rm -f $@; ar rcs $@ $^
 
 tests: $(TESTBIN) ## every test and benchmark program, in build/tests
+
+$(BUILD)/tests/hard/hard: $(HARDOBJ) $(BUILD)/libsupple.a
+	$(SAY) "  link     $@"
+	$(Q)$(LINK) -o $@ $^ $(LIBS) $(RPATH)
 
 $(BUILD)/tests/%: $(BUILD)/tests/%.o $(BUILD)/libsupple.a
 	$(SAY) "  link     $@"
@@ -124,6 +129,13 @@ check-long: deps ## the tests that take longer or need ParaView
 	@scripts/venv
 	@$(CHECK) --long
 
+check-hard: deps ## every hard case on 1, 2 and 3 ranks, ten jittered runs each, and the table of their margins (about 15 minutes; one: T=name)
+	$(AGAIN) $(BUILD)/tests/hard/hard
+	@tests/run --build $(BUILD) --group hard --all $(if $(T),--match '$(T)'); status=$$?; scripts/stability --build $(BUILD); exit $$status
+
+stability: check-hard ## the same, with the table written into docs/stability.md
+	@scripts/stability --build $(BUILD) --write
+
 lint: ## format, layers of the include lines, clang-tidy, shellcheck, Python syntax
 	@scripts/install-deps lint
 	@COMPILE_FLAGS='-std=c11 $(INCLUDES)' scripts/lint
@@ -170,7 +182,7 @@ help: ## this list
 	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/  make \1|\2/p' Makefile | awk -F'|' '{ printf "%-20s%s\n", $$1, $$2 }'
 	@echo "settings: T=name (tests)  QUICK=1 (bench)  DEBUG=1  WERROR=1  V=1 (show commands)  CC=  OPT=  CFLAGS=  BUILD=  JOBS=  PREFIX=  DESTDIR=  PETSC_DIR= PETSC_ARCH="
 
-.PHONY: all tests deps demo pictures check check-long lint sanitize memcheck bench locking solvers docs install clean help FORCE
+.PHONY: all tests deps demo pictures check check-long check-hard stability lint sanitize memcheck bench locking solvers docs install clean help FORCE
 .SECONDARY:
 .DELETE_ON_ERROR:
 -include $(wildcard $(BUILD)/src/*.d $(BUILD)/src/*/*.d $(BUILD)/tests/*/*.d)
