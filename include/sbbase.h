@@ -172,3 +172,16 @@ typedef enum {
 extern PetscLogEvent SbEvents[SB_EVENT_COUNT];
 extern PetscLogStage SbStageSetup, SbStageSolve, SbStageOutput;
 PetscErrorCode SbLogInitialize(void);
+/*
+  SbLogNamed - the log event of something that a scene names: "SbEff_gravity", made when it is first asked for. What no scene of the
+  process has named has none.
+
+  Not collective, but to be called alike on all ranks: PETSc tells events by their order.
+
+  Input:
+    kind, name - "Eff" (effects), "Mat" (laws), "Elem" (elements), "Field" (fields of fields.h5), "Out" (other output), and the name
+                 in the scenario
+  Output:
+    event      - of all that have this name
+*/
+PetscErrorCode SbLogNamed(const char *kind, const char *name, PetscLogEvent *event);

@@ -61,7 +61,8 @@ typedef struct {
   PetscErrorCode (*push)(SbEffect e, SbSpace space, const SbStage *stage, const PetscReal r[], PetscReal f[]);
   /* gap[nnode] of owned nodes, m, and normal[nnode][3] towards them, where something that they may touch is nearer than the gap says so
      far. For output only. Not collective. */
-  void (*near)(SbEffect e, SbSpace space, const SbStage *stage, PetscReal gap[], PetscReal normal[]);
+  PetscErrorCode (*near)(SbEffect e, SbSpace space, const SbStage *stage, PetscReal gap[],
+                         PetscReal normal[]);
   /* f[nnode][3] += external force, N; must be right on owned nodes without communication */
   PetscErrorCode (*force)(SbEffect e, SbSpace space, const SbStage *stage, PetscReal f[]);
   /* A -= shift_k d force / d u + shift_v d force / d v by SbSpaceAddCellBlock(), called for (a, b) and for (b, a) */
@@ -89,11 +90,12 @@ struct _p_SbEffect {
   char name[SB_NAME_MAX];
   char type[SB_NAME_MAX];
   SbEffectOps ops;
-  PetscBool linear;  /* force does not depend on u: the tangent stays constant. Default PETSC_TRUE */
-  PetscBool steady;  /* no formula uses t: a static run multiplies the effect by the load factor */
-  PetscBool dynamic; /* the run has inertia; known from set-up on */
-  PetscBool saddle;  /* its rows are to be solved with their multipliers as unknowns */
-  PetscBool euler;   /* made for implicit Euler only. Default PETSC_FALSE */
+  PetscLogEvent event; /* SbEff_<type>, around every operation of the table from `setup` to `places` */
+  PetscBool linear;    /* force does not depend on u: the tangent stays constant. Default PETSC_TRUE */
+  PetscBool steady;    /* no formula uses t: a static run multiplies the effect by the load factor */
+  PetscBool dynamic;   /* the run has inertia; known from set-up on */
+  PetscBool saddle;    /* its rows are to be solved with their multipliers as unknowns */
+  PetscBool euler;     /* made for implicit Euler only. Default PETSC_FALSE */
   PetscBool
     springs; /* of contact: it pushes with springs or friction, not by what it holds alone. Default PETSC_FALSE */
   const struct SbEffectOn_ *held; /* the sets whose nodes it prescribes in all directions; NULL: none */
@@ -104,6 +106,15 @@ struct _p_SbEffect {
   char note[256]; /* what set-up has to say in the run's report; "": nothing */
   void *data;
 };
+
+/* Calls an operation that the effect has, within its log event: SbEffectCall(e, force, space, stage, f). */
+#define SbEffectCall(e, op, ...)                             \
+  do {                                                       \
+    const SbEffect sb_e_ = (e);                              \
+    PetscCall(PetscLogEventBegin(sb_e_->event, 0, 0, 0, 0)); \
+    PetscCall((*sb_e_->ops.op)(sb_e_, __VA_ARGS__));         \
+    PetscCall(PetscLogEventEnd(sb_e_->event, 0, 0, 0, 0));   \
+  } while (0)
 
 extern PetscFunctionList SbEffectList;
 /* Adds a type and its option rows; `rows` and the names in them must live as long as the program. Not collective. */

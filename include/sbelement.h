@@ -29,6 +29,7 @@ typedef struct {
 } SbElementOps;
 struct _p_SbElement {
   char name[SB_NAME_MAX];
+  PetscLogEvent event;   /* SbElem_<name>, around the set-up of its cells; in a step they are their law's */
   PetscInt nodes_per[4]; /* nodes per vertex, edge, face, cell. P1: 1,0,0,0; CR: 0,0,1,0; DG: 0,0,0,4 */
   PetscReal gamma0;      /* DG: factor on the penalty of mean jumps */
   PetscReal gamma1;      /* CR and DG: factor on the penalty of jumps */

@@ -49,6 +49,7 @@ typedef struct {
 
 struct _p_SbMaterial {
   char law[SB_NAME_MAX];
+  PetscLogEvent event; /* SbMat_<law>, around the loops over its cells for forces and assembled tangents */
   SbMaterialOps ops;
   PetscReal E, nu;       /* Young's modulus, Pa; Poisson's ratio, (-1, 0.5) */
   PetscReal lambda, mu;  /* Lame parameters, Pa */

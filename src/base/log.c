@@ -1,5 +1,6 @@
 /*
-  log.c - one PETSc log event per phase that can take one percent of a run, and the three stages of a run.
+  log.c - one PETSc log event per phase that can take one percent of a run, the three stages of a run, and one event for each
+  effect, law, element and output that a scene names.
 
   The names are what -log_view prints. Events are class-less (PETSC_OBJECT_CLASSID), because they time phases, not
   objects.
@@ -31,5 +32,16 @@ PetscErrorCode SbLogInitialize(void)
   PetscCall(stage("Setup", &SbStageSetup));
   PetscCall(stage("Solve", &SbStageSolve));
   PetscCall(stage("Output", &SbStageOutput));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbLogNamed(const char *kind, const char *name, PetscLogEvent *event)
+{
+  char text[2 * SB_NAME_MAX];
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscSNPrintf(text, sizeof(text), "Sb%s_%s", kind, name));
+  PetscCall(PetscLogEventGetId(text, event));
+  if (*event < 0) PetscCall(PetscLogEventRegister(text, PETSC_OBJECT_CLASSID, event));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

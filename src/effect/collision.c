@@ -534,11 +534,12 @@ static PetscErrorCode history_collision(SbEffect e, SbSpace space, const SbStage
 }
 
 /* Gaps of points; edges have their own. */
-static void near_collision(SbEffect e, SbSpace space, const SbStage *stage, PetscReal gap[],
-                           PetscReal normal[])
+static PetscErrorCode near_collision(SbEffect e, SbSpace space, const SbStage *stage, PetscReal gap[],
+                                     PetscReal normal[])
 {
   const Collision *c = (const Collision *)e->data;
 
+  PetscFunctionBeginUser;
   (void)space;
   (void)stage;
   for (PetscInt i = 0; i < c->nhit && !SbCollisionOfEdges(c, &c->hit[i]); i++) {
@@ -548,6 +549,7 @@ static void near_collision(SbEffect e, SbSpace space, const SbStage *stage, Pets
     gap[node] = c->hit[i].gap;
     for (int k = 0; k < 3; k++) normal[3 * node + k] = c->hit[i].normal[k];
   }
+  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 static PetscErrorCode destroy_collision(SbEffect e)

@@ -137,8 +137,8 @@ PetscErrorCode SbEffectCurb_Contact(SbEffect e, PetscReal share);
 PetscErrorCode SbEffectAccept_Contact(SbEffect e, SbSpace space, const SbStage *stage);
 PetscErrorCode SbEffectPush_Contact(SbEffect e, SbSpace space, const SbStage *stage,
                                     const PetscReal residual[], PetscReal f[]);
-void SbEffectNear_Contact(SbEffect e, SbSpace space, const SbStage *stage, PetscReal gap[],
-                          PetscReal normal[]);
+PetscErrorCode SbEffectNear_Contact(SbEffect e, SbSpace space, const SbStage *stage, PetscReal gap[],
+                                    PetscReal normal[]);
 PetscErrorCode SbEffectPlaces_Contact(SbEffect e, SbSpace space, const SbStage *stage,
                                       const PetscReal residual[], SbPlaces *list);
 PetscErrorCode SbEffectHistory_Contact(SbEffect e, SbSpace space, const SbStage *stage,

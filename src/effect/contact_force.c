@@ -159,12 +159,13 @@ PetscErrorCode SbEffectPush_Contact(SbEffect e, SbSpace space, const SbStage *st
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-void SbEffectNear_Contact(SbEffect e, SbSpace space, const SbStage *stage, PetscReal gap[],
-                          PetscReal normal[])
+PetscErrorCode SbEffectNear_Contact(SbEffect e, SbSpace space, const SbStage *stage, PetscReal gap[],
+                                    PetscReal normal[])
 {
   const Contact *c = (const Contact *)e->data;
   SbPose pose;
 
+  PetscFunctionBeginUser;
   SbContactPose(c, stage->t, &pose);
   for (PetscInt i = 0; i < c->n; i++) {
     const PetscInt node = c->touch[i].node;
@@ -176,6 +177,7 @@ void SbEffectNear_Contact(SbEffect e, SbSpace space, const SbStage *stage, Petsc
     gap[node] = g;
     for (int k = 0; k < 3; k++) normal[3 * node + k] = n[k];
   }
+  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode SbEffectPlaces_Contact(SbEffect e, SbSpace space, const SbStage *stage,

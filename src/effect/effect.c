@@ -75,6 +75,7 @@ PetscErrorCode SbEffectCreate(const char *name, SbEffect *effect)
   *effect = e;
   PetscCall(PetscStrncpy(e->name, name, sizeof(e->name)));
   PetscCall(PetscStrncpy(e->type, type, sizeof(e->type)));
+  PetscCall(SbLogNamed("Eff", type, &e->event));
   e->linear = PETSC_TRUE;
   e->steady = PETSC_TRUE;
   PetscCall((*create)(e));

@@ -82,6 +82,7 @@ PetscErrorCode SbElementCreate(const char *name, const SbScope *body, SbElement 
   }
   PetscCall(PetscNew(&e));
   PetscCall(PetscStrncpy(e->name, name, sizeof(e->name)));
+  PetscCall(SbLogNamed("Elem", name, &e->event));
   PetscCall((*create)(e));
   *element = e;
   if (body) PetscCall(read_options(body, e));

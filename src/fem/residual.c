@@ -38,7 +38,11 @@ PetscErrorCode SbSpaceAddInternalForce(SbSpace s, const SbStage *stage, PetscRea
 {
   PetscFunctionBeginUser;
   PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_RESIDUAL], 0, 0, 0, 0));
-  for (PetscInt r = 0; r < s->nregion; r++) add_region_force(s, &s->region[r], stage, f);
+  for (PetscInt r = 0; r < s->nregion; r++) {
+    PetscCall(PetscLogEventBegin(s->region[r].material->event, 0, 0, 0, 0));
+    add_region_force(s, &s->region[r], stage, f);
+    PetscCall(PetscLogEventEnd(s->region[r].material->event, 0, 0, 0, 0));
+  }
   if (s->jump) {
     SbJumpAdd(s, stage->u, SB_JUMP_STIFFNESS, f);
     if (stage->v) SbJumpAdd(s, stage->v, SB_JUMP_DAMPING, f);

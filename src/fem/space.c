@@ -76,6 +76,7 @@ static PetscErrorCode tabulate_batches(SbSpace s)
   for (PetscInt r = 0; r < s->nregion; r++) {
     const SbRegion *region = &s->region[r];
 
+    PetscCall(PetscLogEventBegin(region->element->event, 0, 0, 0, 0));
     for (PetscInt b = region->bstart; b < region->bend; b++) {
       const PetscInt first = region->cstart + (b - region->bstart) * SB_BATCH;
 
@@ -94,6 +95,7 @@ static PetscErrorCode tabulate_batches(SbSpace s)
         s->batch_V[b][l] = l < s->batch_n[b] ? V : 0.;
       }
     }
+    PetscCall(PetscLogEventEnd(region->element->event, 0, 0, 0, 0));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }

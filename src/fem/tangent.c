@@ -320,7 +320,11 @@ PetscErrorCode SbSpaceAssembleSplit(SbSpace s, const SbStage *stage, PetscInt n,
     PetscCall(glue_factors(space[k], stage, &fill[k].glue));
     fill[k].x.glue = fill[k].glue;
   }
-  for (PetscInt r = 0; r < s->nregion; r++) fill_region(s, r, stage, n, fill, out);
+  for (PetscInt r = 0; r < s->nregion; r++) {
+    PetscCall(PetscLogEventBegin(s->region[r].material->event, 0, 0, 0, 0));
+    fill_region(s, r, stage, n, fill, out);
+    PetscCall(PetscLogEventEnd(s->region[r].material->event, 0, 0, 0, 0));
+  }
   for (PetscInt k = 0; k < n; k++) {
     if (!s->consistent_mass && (stage->shift_a != 0. || stage->shift_v != 0.))
       add_lumped_mass(space[k], stage, &fill[k].x);

@@ -92,6 +92,7 @@ static PetscErrorCode create_law(const char *law, PetscErrorCode (*create)(SbMat
              "%s: density is %g kg/m^3; it must lie in (0, inf)", where, (double)density);
   PetscCall(PetscNew(&m));
   PetscCall(PetscStrncpy(m->law, law, sizeof(m->law)));
+  PetscCall(SbLogNamed("Mat", law, &m->event));
   m->E = E;
   m->nu = nu;
   m->density = density;

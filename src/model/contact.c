@@ -11,7 +11,7 @@ static PetscErrorCode write_holds(SbModel m)
   PetscFunctionBeginUser;
   if (s->held) SbSpaceHoldClear(s);
   if (s->couple) SbSpaceCoupleClear(s);
-  for (PetscInt e = 0; e < m->nhold; e++) PetscCall(m->hold[e]->ops.hold(m->hold[e], s));
+  for (PetscInt e = 0; e < m->nhold; e++) SbEffectCall(m->hold[e], hold, s);
   if (s->held) PetscCall(SbSpaceHoldDone(s));
   if (s->couple) PetscCall(SbSpaceCoupleDone(s));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -46,8 +46,7 @@ PetscErrorCode SbModelContactBegin(SbModel m, PetscReal t, PetscReal dt, Vec U0,
     PetscCall(SbModelReboundBegin(m, dt, U0, V0));
     PetscCall(SbSpaceGetLocalRead(m->space, V0, &v0));
   }
-  for (PetscInt e = 0; e < m->ntouch; e++)
-    PetscCall(m->touch[e]->ops.touch(m->touch[e], m->space, t, dt, u0, v0, u));
+  for (PetscInt e = 0; e < m->ntouch; e++) SbEffectCall(m->touch[e], touch, m->space, t, dt, u0, v0, u);
   if (m->nrebound) PetscCall(SbSpaceRestoreLocalRead(m->space, V0, &v0));
   PetscCall(SbSpaceRestoreLocalRead(m->space, U, &u));
   PetscCall(SbSpaceRestoreLocalRead(m->space, U0, &u0));
@@ -67,8 +66,7 @@ PetscErrorCode SbModelContactSettle(SbModel m, PetscReal t, Vec U, Vec R, PetscB
   if (m->space->couple) PetscCall(SbSpaceCoupleMeasure(m->space, U, R));
   PetscCall(SbSpaceGetLocalRead(m->space, U, &u));
   PetscCall(SbSpaceGetLocalRead(m->space, R, &r));
-  for (PetscInt e = 0; e < m->nsettle; e++)
-    PetscCall(m->settle[e]->ops.settle(m->settle[e], m->space, u, r, again));
+  for (PetscInt e = 0; e < m->nsettle; e++) SbEffectCall(m->settle[e], settle, m->space, u, r, again);
   PetscCall(SbSpaceRestoreLocalRead(m->space, R, &r));
   PetscCall(SbSpaceRestoreLocalRead(m->space, U, &u));
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, again, 1, SB_MPI_BOOL, MPI_LOR, m->comm));
@@ -86,7 +84,7 @@ PetscErrorCode SbModelContactArrival(SbModel m, PetscReal *part)
   for (PetscInt e = 0; e < m->narrive; e++) {
     PetscReal mine = 1.;
 
-    PetscCall(m->arrive[e]->ops.arrive(m->arrive[e], &mine));
+    SbEffectCall(m->arrive[e], arrive, &mine);
     *part = PetscMin(*part, mine);
   }
   if (m->narrive) PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, part, 1, MPIU_REAL, MPI_MIN, m->comm));
@@ -101,7 +99,7 @@ PetscErrorCode SbModelContactVelocity(SbModel m, PetscReal t, PetscReal dt, Vec 
   PetscFunctionBeginUser;
   PetscCall(SbSpaceGetLocalRead(m->space, U, &stage.u));
   for (PetscInt e = 0; e < m->ntouch; e++) {
-    if (m->touch[e]->ops.rate) PetscCall(m->touch[e]->ops.rate(m->touch[e], m->space, &stage));
+    if (m->touch[e]->ops.rate) SbEffectCall(m->touch[e], rate, m->space, &stage);
   }
   PetscCall(SbSpaceRestoreLocalRead(m->space, U, &stage.u));
   if (m->space->held) {
@@ -125,7 +123,7 @@ PetscErrorCode SbModelContactGap(SbModel m, PetscReal t, Vec U, Vec G)
   PetscCall(PetscArrayzero(normal, 3 * m->space->nnode));
   for (PetscInt i = 0; i < m->space->nnode; i++) gap[i] = PETSC_MAX_REAL;
   for (PetscInt e = 0; e < m->ntouch; e++) {
-    if (m->touch[e]->ops.near) (*m->touch[e]->ops.near)(m->touch[e], m->space, &stage, gap, normal);
+    if (m->touch[e]->ops.near) SbEffectCall(m->touch[e], near, m->space, &stage, gap, normal);
   }
   for (PetscInt i = 0; i < m->space->nnode; i++) {
     for (PetscInt k = 0; k < 3 && gap[i] < PETSC_MAX_REAL; k++) normal[3 * i + k] *= gap[i];
@@ -148,7 +146,7 @@ PetscErrorCode SbModelContactForce(SbModel m, PetscReal t, Vec U, Vec R, Vec F)
   PetscCall(SbSpaceGetLocalWrite(m->space, F, &f));
   PetscCall(PetscArrayzero(f, 3 * m->space->nnode));
   for (PetscInt e = 0; e < m->ntouch; e++) {
-    if (m->touch[e]->ops.push) PetscCall(m->touch[e]->ops.push(m->touch[e], m->space, &stage, r, f));
+    if (m->touch[e]->ops.push) SbEffectCall(m->touch[e], push, m->space, &stage, r, f);
   }
   PetscCall(SbSpaceRestoreLocalWrite(m->space, F, &f));
   PetscCall(SbSpaceRestoreLocalRead(m->space, R, &r));
@@ -169,7 +167,7 @@ PetscErrorCode SbModelContactPlaces(SbModel m, PetscReal t, Vec U, Vec R, SbPlac
     const PetscInt before = list->n;
 
     if (!m->effect[e]->ops.places) continue;
-    PetscCall(m->effect[e]->ops.places(m->effect[e], m->space, &stage, r, list));
+    SbEffectCall(m->effect[e], places, m->space, &stage, r, list);
     for (PetscInt i = before; i < list->n; i++) list->place[i].effect = e;
   }
   PetscCall(SbSpaceRestoreLocalRead(m->space, R, &r));

@@ -84,7 +84,7 @@ PetscErrorCode SbModelSetUp(SbModel m)
   m->linear = m->space->linear;
   for (PetscInt e = 0; e < m->neffect; e++) {
     m->effect[e]->dynamic = m->dynamic;
-    if (m->effect[e]->ops.setup) PetscCall(m->effect[e]->ops.setup(m->effect[e], m->space));
+    if (m->effect[e]->ops.setup) SbEffectCall(m->effect[e], setup, m->space);
     m->linear = (PetscBool)(m->linear && m->effect[e]->linear);
   }
   PetscCall(SbSpaceFixDone(m->space));
@@ -146,13 +146,13 @@ static PetscErrorCode external_forces(SbModel m, const SbStage *stage, PetscReal
   PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_EFFECTS], 0, 0, 0, 0));
   /* the steady ones first: they share their factor */
   for (PetscInt e = 0; e < m->nforce; e++) {
-    if (m->force[e]->steady) PetscCall(m->force[e]->ops.force(m->force[e], m->space, stage, f));
+    if (m->force[e]->steady) SbEffectCall(m->force[e], force, m->space, stage, f);
   }
   if (m->load != 1.) {
     for (PetscInt i = 0; i < n; i++) f[i] *= m->load;
   }
   for (PetscInt e = 0; e < m->nforce; e++) {
-    if (!m->force[e]->steady) PetscCall(m->force[e]->ops.force(m->force[e], m->space, stage, f));
+    if (!m->force[e]->steady) SbEffectCall(m->force[e], force, m->space, stage, f);
   }
   if (sign != 1.) {
     for (PetscInt i = 0; i < n; i++) f[i] *= sign;
@@ -219,7 +219,7 @@ PetscErrorCode SbModelTangent(SbModel m, PetscReal t, PetscReal shift_v, PetscRe
   PetscCall(SbSpaceAssembleTangent(m->space, &stage, A));
   for (PetscInt e = 0; e < m->ntangent; e++) {
     m->space->block_scale = load_factor(m, m->tangent[e]);
-    PetscCall(m->tangent[e]->ops.tangent(m->tangent[e], m->space, &stage, A));
+    SbEffectCall(m->tangent[e], tangent, m->space, &stage, A);
   }
   PetscCall(SbSpaceFinishTangent(m->space, A));
   PetscCall(stage_end(m, U, V, NULL, &stage));
@@ -234,11 +234,11 @@ PetscErrorCode SbModelPrescribe(SbModel m, PetscReal t, Vec U)
   PetscFunctionBeginUser;
   if (!m->nprescribe && !s->held && !s->couple) PetscFunctionReturn(PETSC_SUCCESS);
   for (PetscInt e = 0; e < m->nprescribe; e++) {
-    if (m->prescribe[e]->steady) PetscCall(m->prescribe[e]->ops.prescribe(m->prescribe[e], s, t));
+    if (m->prescribe[e]->steady) SbEffectCall(m->prescribe[e], prescribe, s, t);
   }
   for (PetscInt k = 0; k < 3 * s->nfixed; k++) s->fixed_value[k] *= m->load;
   for (PetscInt e = 0; e < m->nprescribe; e++) {
-    if (!m->prescribe[e]->steady) PetscCall(m->prescribe[e]->ops.prescribe(m->prescribe[e], s, t));
+    if (!m->prescribe[e]->steady) SbEffectCall(m->prescribe[e], prescribe, s, t);
   }
   PetscCall(VecGetArray(U, &u));
   for (PetscInt k = 0; k < s->nfixed && s->fixed_node[k] < s->nnode_owned; k++) {

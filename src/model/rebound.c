@@ -75,7 +75,7 @@ static PetscErrorCode measure(SbModel m, Vec U, PetscReal *W, PetscReal *most)
   for (PetscInt k = 0; k < m->nrebound; k++) {
     PetscReal work = 0.;
 
-    PetscCall((*m->rebound[k]->ops.rebound)(m->rebound[k], &work));
+    SbEffectCall(m->rebound[k], rebound, &work);
     *W += work;
   }
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, W, 1, MPIU_REAL, MPI_SUM, m->comm));
@@ -99,8 +99,7 @@ PetscErrorCode SbModelReboundSettle(SbModel m, Vec U, PetscBool *again)
   if (W <= most * (1. + ROUND)) PetscFunctionReturn(PETSC_SUCCESS);
   m->bounce.left *=
     ++m->bounce.reductions < REDUCTIONS ? PetscMax(SAFE * most / W, 1. - STEEP * (1. - most / W)) : 0.;
-  for (PetscInt k = 0; k < m->nrebound; k++)
-    PetscCall((*m->rebound[k]->ops.curb)(m->rebound[k], m->bounce.left));
+  for (PetscInt k = 0; k < m->nrebound; k++) SbEffectCall(m->rebound[k], curb, m->bounce.left);
   PetscCall(PetscInfo(NULL, "rebounds do %g J, %g J may be: coefficients reduced to %g of them\n", (double)W,
                       (double)most, (double)m->bounce.left));
   *again = PETSC_TRUE;

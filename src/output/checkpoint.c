@@ -296,7 +296,9 @@ static PetscErrorCode monitor(SbRun run, const SbStep *step, void *ctx)
   if (!due) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscLogStagePush(SbStageOutput));
   PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_CHECKPOINT], 0, 0, 0, 0));
+  PetscCall(PetscLogEventBegin(out->event.checkpoint, 0, 0, 0, 0));
   PetscCall(write_checkpoint(run, out, step));
+  PetscCall(PetscLogEventEnd(out->event.checkpoint, 0, 0, 0, 0));
   PetscCall(PetscLogEventEnd(SbEvents[SB_EVENT_CHECKPOINT], 0, 0, 0, 0));
   PetscCall(PetscLogStagePop());
   PetscFunctionReturn(PETSC_SUCCESS);

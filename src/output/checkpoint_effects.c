@@ -43,7 +43,7 @@ PetscErrorCode SbCheckpointWriteEffects(SbRun run, SbH5 *h, uint64_t *sum)
     uint64_t mine, all;
 
     if (!e->ops.save) continue;
-    PetscCall((*e->ops.save)(e, m->space, &order.n, &record));
+    SbEffectCall(e, save, m->space, &order.n, &record);
     PetscCallMPI(MPI_Allreduce(&order.n, &order.N, 1, MPIU_INT, MPI_SUM, m->comm));
     PetscCallMPI(MPI_Scan(&order.n, &order.start, 1, MPIU_INT, MPI_SUM, m->comm));
     order.start -= order.n;
@@ -97,8 +97,7 @@ PetscErrorCode SbCheckpointLoadEffects(SbRun run, PetscReal t, const SbRecords r
   for (PetscInt k = 0; k < m->neffect; k++) {
     SbEffect e = m->effect[k];
 
-    if (e->ops.load && records[k].n)
-      PetscCall((*e->ops.load)(e, m->space, t, u, records[k].n, records[k].record));
+    if (e->ops.load && records[k].n) SbEffectCall(e, load, m->space, t, u, records[k].n, records[k].record);
   }
   PetscCall(SbSpaceRestoreLocalRead(m->space, run->U, &u));
   PetscCall(SbModelContactResume(m));

@@ -132,6 +132,7 @@ PetscErrorCode SbContactsFind(SbRun run, SbOutput out, const SbStep *step, Petsc
   if (!out->places) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCheck(step->R, PETSC_COMM_SELF, PETSC_ERR_PLIB,
              "The residual was asked for but not given to the monitors");
+  PetscCall(PetscLogEventBegin(out->event.contacts, 0, 0, 0, 0));
   c->list.n = 0;
   PetscCall(SbModelContactPlaces(run->model, step->t, step->U, step->R, &c->list));
   PetscCall(sort_by_rank(c, out->size));
@@ -150,6 +151,7 @@ PetscErrorCode SbContactsFind(SbRun run, SbOutput out, const SbStep *step, Petsc
   c->share.start -= n;
   PetscCallMPI(MPI_Allreduce(&n, &c->share.N, 1, MPIU_INT, MPI_SUM, out->comm));
   *bytes = (PetscInt64)c->share.N * RECORD * (PetscInt64)sizeof(double) + NTABLE * 8192;
+  PetscCall(PetscLogEventEnd(out->event.contacts, 0, 0, 0, 0));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -182,6 +184,7 @@ PetscErrorCode SbContactsWrite(SbOutput out, SbH5 *h, hid_t frame)
 
   PetscFunctionBeginUser;
   if (!out->places) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscLogEventBegin(out->event.contacts, 0, 0, 0, 0));
   PetscCall(SbH5GroupCreate(h, (unsigned)NTABLE, 14, &group));
   PetscCall(SbH5PutInt(h, group, "count", c->share.N));
   for (int k = 0; k < NTABLE && c->share.N; k++) {
@@ -193,6 +196,7 @@ PetscErrorCode SbContactsWrite(SbOutput out, SbH5 *h, hid_t frame)
   }
   PetscCall(SbH5GroupLink(h, group, frame, "contacts"));
   (void)H5Gclose(group);
+  PetscCall(PetscLogEventEnd(out->event.contacts, 0, 0, 0, 0));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -86,8 +86,10 @@ static PetscErrorCode write_mesh(SbRun run, SbOutput out)
   PetscCall(write_points(run, out, group));
   for (PetscInt i = 0; i < out->nfield; i++) {
     if (!out->field[i]->constant) continue;
+    PetscCall(PetscLogEventBegin(out->field_event[i], 0, 0, 0, 0));
     PetscCall(out->field[i]->compute(run, NULL, fr->owned));
     PetscCall(write_whole(fr, group, out->field[i]->name, &out->cell, 1));
+    PetscCall(PetscLogEventEnd(out->field_event[i], 0, 0, 0, 0));
   }
   PetscCall(SbH5GroupLink(&fr->h5, group, fr->h5.file, "mesh"));
   (void)H5Gclose(group);
@@ -178,7 +180,9 @@ static PetscErrorCode write_frame(SbRun run, SbOutput out, const SbStep *step)
   out->state_valid = PETSC_FALSE;
   for (PetscInt i = 0; i < out->nfield; i++) {
     if (out->field[i]->constant) continue;
+    PetscCall(PetscLogEventBegin(out->field_event[i], 0, 0, 0, 0));
     PetscCall(write_field(run, out, step, out->field[i], group));
+    PetscCall(PetscLogEventEnd(out->field_event[i], 0, 0, 0, 0));
     bytes[n] = out->precise ? 8 : 4;
     field[n++] = out->field[i];
   }
@@ -213,7 +217,9 @@ static PetscErrorCode monitor(SbRun run, const SbStep *step, void *ctx)
   if (out->frames->last_step >= step->step) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscLogStagePush(SbStageOutput));
   PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_OUTPUT], 0, 0, 0, 0));
+  PetscCall(PetscLogEventBegin(out->event.fields, 0, 0, 0, 0));
   PetscCall(write_frame(run, out, step));
+  PetscCall(PetscLogEventEnd(out->event.fields, 0, 0, 0, 0));
   PetscCall(PetscLogEventEnd(SbEvents[SB_EVENT_OUTPUT], 0, 0, 0, 0));
   PetscCall(PetscLogStagePop());
   if (step->last) PetscCall(SbFramesClose(out));

@@ -111,7 +111,7 @@ static PetscErrorCode effect_columns(SbRun run, const SbStep *step, PetscReal *v
   for (PetscInt e = 0; e < model->nhistory; e++) {
     const SbEffect effect = model->history[e];
 
-    PetscCall(effect->ops.history(effect, model->space, &stage, residual, values));
+    SbEffectCall(effect, history, model->space, &stage, residual, values);
     values += effect->ncolumn;
   }
   PetscCall(SbSpaceRestoreLocalRead(model->space, step->R, &residual));
@@ -127,6 +127,7 @@ static PetscErrorCode probe_columns(SbRun run, SbOutput out, const SbStep *step,
   const PetscReal *u;
 
   PetscFunctionBeginUser;
+  PetscCall(PetscLogEventBegin(out->event.probes, 0, 0, 0, 0));
   if (faces)
     PetscCall(SbSpaceGetLocalRead(run->model->space, step->U, &u));
   else
@@ -138,6 +139,7 @@ static PetscErrorCode probe_columns(SbRun run, SbOutput out, const SbStep *step,
     PetscCall(SbSpaceRestoreLocalRead(run->model->space, step->U, &u));
   else
     PetscCall(VecRestoreArrayRead(step->U, &u));
+  PetscCall(PetscLogEventEnd(out->event.probes, 0, 0, 0, 0));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -216,6 +218,7 @@ static PetscErrorCode monitor(SbRun run, const SbStep *step, void *ctx)
   if (!first && !step->last && step->step % out->history_every) PetscFunctionReturn(PETSC_SUCCESS);
   if (h->last_step >= step->step) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_OUTPUT], 0, 0, 0, 0));
+  PetscCall(PetscLogEventBegin(out->event.history, 0, 0, 0, 0));
   PetscCall(extra_columns(run, out, step));
   h->last_step = step->step;
   if (h->fd >= 0) {
@@ -223,6 +226,7 @@ static PetscErrorCode monitor(SbRun run, const SbStep *step, void *ctx)
     write_row(h, sizeof(h->message), h->message);
   }
   if (step->last) PetscCall(SbAgree(out->comm, PETSC_ERR_FILE_WRITE, h->message));
+  PetscCall(PetscLogEventEnd(out->event.history, 0, 0, 0, 0));
   PetscCall(PetscLogEventEnd(SbEvents[SB_EVENT_OUTPUT], 0, 0, 0, 0));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -392,6 +392,22 @@ static PetscErrorCode count_nodes(SbSpace space, SbOutput out)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Log events of what the scenario asks for: alike on all ranks, also where some have nothing to write. */
+static PetscErrorCode name_events(SbOutput out)
+{
+  PetscFunctionBeginUser;
+  if (out->nfield) PetscCall(SbLogNamed("Out", "fields", &out->event.fields));
+  for (PetscInt i = 0; i < out->nfield; i++)
+    PetscCall(SbLogNamed("Field", out->field[i]->name, &out->field_event[i]));
+  if (out->places) PetscCall(SbLogNamed("Out", "contacts", &out->event.contacts));
+  if (out->history) PetscCall(SbLogNamed("Out", "history", &out->event.history));
+  if (out->history && out->nprobe) PetscCall(SbLogNamed("Out", "probes", &out->event.probes));
+  if (out->checkpoint_every > 0. || out->checkpoint_every_steps)
+    PetscCall(SbLogNamed("Out", "checkpoint", &out->event.checkpoint));
+  if (out->progress && !out->quiet) PetscCall(SbLogNamed("Out", "progress", &out->event.progress));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode SbOutputAttach(SbRun run)
 {
   SbOutput out = (SbOutput)run->output;
@@ -400,6 +416,7 @@ PetscErrorCode SbOutputAttach(SbRun run)
 
   PetscFunctionBeginUser;
   PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_OUTPUT], 0, 0, 0, 0));
+  PetscCall(name_events(out));
   PetscCall(count_nodes(run->model->space, out));
   PetscCall(view_scenario(run, out, &scenario, &size));
   // A checkpoint that is refused leaves the folder as it was.

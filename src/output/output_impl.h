@@ -122,6 +122,7 @@ struct _p_SbOutput {
   char scenario[PETSC_MAX_PATH_LEN]; /* file given on the command line; empty without one */
   char restart[PETSC_MAX_PATH_LEN];
   PetscInt nfield;
+  PetscLogEvent field_event[SB_FIELD_MAX]; /* SbField_<name> */
   const SbField *field[SB_FIELD_MAX];
   PetscReal every; /* s between frames; 0: every_steps counts */
   PetscInt every_steps;
@@ -137,6 +138,9 @@ struct _p_SbOutput {
   SbProbe *probe; /* [nprobe] */
 
   /* after SbOutputAttach() */
+  struct {
+    PetscLogEvent fields, contacts, history, probes, checkpoint, progress;
+  } event; /* SbOut_<name>, of those that the scenario asks for */
   SbOrder vertex, cell;
   SbOrder node;  /* the unknowns: that of the vertices when no body has its nodes at faces */
   SbOrder point; /* of vertex fields: vertices, or 4 cell + a of the corners of cells when discontinuous */

@@ -10,6 +10,7 @@
 #define WIDTH 79
 
 struct _p_SbProgress {
+  PetscLogEvent event; /* SbOut_progress */
   PetscBool terminal;
   PetscBool open; /* a line is being rewritten */
   PetscBool titled;
@@ -82,12 +83,14 @@ static PetscErrorCode monitor(SbRun run, const SbStep *step, void *ctx)
     p->steps++;
     if (!step->last && step->wall - p->last < wait) PetscFunctionReturn(PETSC_SUCCESS);
   }
+  PetscCall(PetscLogEventBegin(p->event, 0, 0, 0, 0));
   format_line(run, p, step, sizeof(line), line);
   PetscCall(PetscFPrintf(PETSC_COMM_SELF, PETSC_STDOUT, p->terminal ? "\r%-*s" : "%.*s\n", WIDTH, line));
   (void)fflush(PETSC_STDOUT);
   p->open = p->terminal;
   p->last = step->wall;
   p->newton = p->linear = p->steps = 0;
+  PetscCall(PetscLogEventEnd(p->event, 0, 0, 0, 0));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -99,6 +102,7 @@ PetscErrorCode SbProgressAttach(SbRun run, SbOutput out)
   if (out->rank) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscNew(&out->line));
   out->line->terminal = is_terminal();
+  out->line->event = out->event.progress;
   PetscCall(SbRunAddMonitor(run, monitor, out->line, NULL));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -27,8 +27,7 @@ PetscErrorCode SbRunStepBegin(SbRun run, PetscReal t, PetscReal dt)
   SbModel m = run->model;
 
   PetscFunctionBeginUser;
-  for (PetscInt e = 0; e < m->nprestep; e++)
-    PetscCall(m->prestep[e]->ops.prestep(m->prestep[e], m->space, t, dt));
+  for (PetscInt e = 0; e < m->nprestep; e++) SbEffectCall(m->prestep[e], prestep, m->space, t, dt);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -41,8 +40,7 @@ static PetscErrorCode accept_effects(SbRun run, PetscInt step, PetscReal t, Pets
   if (!m->naccept) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(SbSpaceGetLocalRead(m->space, run->U, &stage.u));
   if (run->V) PetscCall(SbSpaceGetLocalRead(m->space, run->V, &stage.v));
-  for (PetscInt e = 0; e < m->naccept; e++)
-    PetscCall(m->accept[e]->ops.accept(m->accept[e], m->space, &stage));
+  for (PetscInt e = 0; e < m->naccept; e++) SbEffectCall(m->accept[e], accept, m->space, &stage);
   if (run->V) PetscCall(SbSpaceRestoreLocalRead(m->space, run->V, &stage.v));
   PetscCall(SbSpaceRestoreLocalRead(m->space, run->U, &stage.u));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -1,0 +1,293 @@
+/*
+  parts.h - what a scene can name, each on one scene: effects, elements, laws, integrators, fields, other output, estimators.
+
+  What there is comes from the program's own registries; the table below says how each is named on the scene. The test of what is
+  not named (tests/verify/verify_unnamed.c) and the price list (tests/perf/price.c) go through both, so that what is
+  new fails the test until it has a row here.
+*/
+#pragma once
+#include "../src/base/option.h"
+#include "scene.h"
+
+#define PART_TEXT 4096 /* longest scenario */
+#define PART_STEPS "8" /* of every run */
+
+/* A soft bar along x that turns about its middle; one linear solve per step. Its sets are for the parts; they do nothing. */
+#define PART_SCENE                                                                                         \
+  "-bodies bar -body_bar_mesh %s -body_bar_material corotated -body_bar_young 5e4 -body_bar_poisson 0.4 "  \
+  "-body_bar_density 1000 -body_bar_spin 0,2,0 -sets end,tip,skin -set_end_at plane:1,0,0,0 "              \
+  "-set_tip_at plane:1,0,0,0.4 -set_skin_at body:bar -time euler_implicit -ts_dt 0.0166666666666666667 "   \
+  "-ts_max_time 0.13333333333333333 -snes_type ksponly -ksp_rtol 1e-4 -solver cg_icc -output_fields none " \
+  "-output_history "                                                                                       \
+  "false -progress false "
+/* Below its end a plane, or a block, into which it turns. */
+#define PART_FLOOR                                                                          \
+  "-effects floor -effect_floor_type contact -effect_floor_on skin -effect_floor_obstacle " \
+  "plane:0,0,1,-1e-4 "
+#define PART_BLOCK                                                                            \
+  "-bodies bar,block -body_block_mesh box:0.1,0.1,0.1:4 -body_block_translate 0.3,0,-0.1001 " \
+  "-body_block_material corotated -body_block_young 5e4 -body_block_poisson 0.4 "
+
+typedef struct {
+  const char *family, *name;
+  const char *options; /* what names it; "": the scene does */
+  const char *scene;   /* what it needs besides, also there when it is not named; NULL: nothing */
+  const char *events;  /* log events that it begins, with commas; NULL: the one of its family and name */
+  PetscBool apart;     /* it can be kept to one body of two, and explicit integrators take it */
+} Part;
+
+static const Part parts[] = {
+  {"effect", "gravity", "-effects gravity", NULL, NULL, PETSC_FALSE}, /* acts on all bodies */
+  {"effect", "body_force",
+   "-effects push -effect_push_type body_force -effect_push_on skin -effect_push_density 0;0;-9810", NULL,
+   NULL, PETSC_TRUE},
+  {"effect", "traction",
+   "-effects pull -effect_pull_type traction -effect_pull_on tip -effect_pull_vector 0;0;100", NULL, NULL,
+   PETSC_TRUE},
+  {"effect", "pressure", "-effects air -effect_air_type pressure -effect_air_on skin -effect_air_value 100",
+   NULL, NULL, PETSC_TRUE},
+  {"effect", "point_force",
+   "-effects pull -effect_pull_type point_force -effect_pull_on tip -effect_pull_vector 0;0;1", NULL, NULL,
+   PETSC_TRUE},
+  {"effect", "support", "-effects clamp -effect_clamp_type support -effect_clamp_on end", NULL, NULL,
+   PETSC_TRUE},
+  {"effect", "drive",
+   "-effects turn -effect_turn_type drive -effect_turn_on end -effect_turn_angle 100*t -effect_turn_axis "
+   "1,0,0 "
+   "-effect_turn_axis_point 0,0.05,0.05",
+   NULL, NULL, PETSC_TRUE},
+  {"effect", "damping",
+   "-effects thick -effect_thick_type damping -effect_thick_on bar -effect_thick_alpha 1 "
+   "-effect_thick_beta 0.001",
+   NULL, NULL, PETSC_TRUE},
+  {"effect", "contact", PART_FLOOR, NULL, NULL, PETSC_FALSE},                   /* implicit only */
+  {"effect", "collision", "-effects collision", PART_BLOCK, NULL, PETSC_FALSE}, /* implicit only */
+  {"element", "p1", "", NULL, NULL, PETSC_FALSE},
+  {"element", "cr", "-body_bar_element cr", NULL, NULL, PETSC_TRUE},
+  {"element", "dg", "-body_bar_element dg", NULL, NULL, PETSC_TRUE},
+  {"material", "linear", "-body_bar_material linear", NULL, NULL, PETSC_TRUE},
+  {"material", "corotated", "", NULL, NULL, PETSC_FALSE},
+  {"material", "stvk", "-body_bar_material stvk", NULL, NULL, PETSC_TRUE},
+  {"material", "neohookean", "-body_bar_material neohookean", NULL, NULL, PETSC_TRUE},
+  {"time", "euler_implicit", "", NULL, "", PETSC_FALSE},
+  {"time", "newmark", "-time newmark", NULL, "", PETSC_FALSE},
+  {"time", "genalpha", "-time genalpha", NULL, "", PETSC_FALSE},
+  {"time", "euler_symplectic", "-time euler_symplectic -ts_dt 1e-4 -ts_max_time 8e-4", NULL, "", PETSC_FALSE},
+  {"time", "euler_explicit", "-time euler_explicit -ts_dt 1e-4 -ts_max_time 8e-4", NULL, "", PETSC_FALSE},
+  {"time", "alpha2", "-time alpha2", NULL, "", PETSC_FALSE},
+  {"time", "static", "-time static -static_steps " PART_STEPS,
+   "-effects gravity,clamp -effect_clamp_type support -effect_clamp_on end ", "", PETSC_FALSE},
+  {"output", "fields", "-output_fields displacement,velocity,von_mises", NULL,
+   "SbOut_fields,SbField_displacement,SbField_velocity,SbField_von_mises,SbField_body", PETSC_FALSE},
+  {"output", "contacts", "-output_contacts true", PART_FLOOR "-output_fields displacement ", NULL,
+   PETSC_FALSE},
+  {"output", "history", "-output_history true", NULL, NULL, PETSC_FALSE},
+  {"output", "probes", "-probes tip -probe_tip_at 0.4,0.05,0.05", "-output_history true ", NULL, PETSC_FALSE},
+  {"output", "checkpoint", "-checkpoint_every_steps 1", NULL, NULL, PETSC_FALSE},
+  {"output", "progress", "-progress true", NULL, NULL, PETSC_FALSE},
+};
+
+/* Options of the output that belong to a part above: which one each names, or only changes. */
+static const struct {
+  const char *key, *part;
+} part_options[] = {
+  {"output_fields", "fields"},
+  {"output_every", "fields"},
+  {"output_every_steps", "fields"},
+  {"output_precision", "fields"},
+  {"output_discontinuous", "fields"},
+  {"output_contacts", "contacts"},
+  {"output_history", "history"},
+  {"output_history_every", "history"},
+  {"probes", "probes"},
+  {"checkpoint_every_time", "checkpoint"},
+  {"checkpoint_every_steps", "checkpoint"},
+  {"checkpoint_keep", "checkpoint"},
+  {"restart", "checkpoint"},
+  {"progress", "progress"},
+  {"quiet", "progress"},
+  {"output_dir", ""},
+};
+
+/* The families, and how their log events begin; NULL: none of their own. */
+static const struct {
+  const char *name, *kind;
+} part_families[] = {
+  {"effect", "Eff"}, {"element", "Elem"}, {"material", "Mat"},
+  {"time", NULL},    {"field", "Field"},  {"output", "Out"},
+};
+#define PART_NAMES 64 /* most names of a family */
+
+/* The output's own rows of the option table: those registered with output_dir. */
+static inline const SbOptionBlock *part_output_block(void)
+{
+  for (PetscInt b = 0; b < SbTheOptions.nblock; b++) {
+    if (!strcmp(SbTheOptions.block[b].rows[0].key, "output_dir")) return &SbTheOptions.block[b];
+  }
+  return NULL;
+}
+
+static inline PetscErrorCode part_names_list(PetscFunctionList list, PetscInt *n,
+                                             char names[PART_NAMES][SB_NAME_MAX])
+{
+  const char **all;
+  int count;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscFunctionListGet(list, &all, &count));
+  *n = 0;
+  for (int i = 0; i < count; i++) { /* PETSc 3.18 counts the closing NULL */
+    if (all[i]) PetscCall(PetscStrncpy(names[(*n)++], all[i], SB_NAME_MAX));
+  }
+  PetscCall(PetscFree(all));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/*
+  part_names - all names of a family, from the registry of the program; those of "output" from the rows above. Not collective; after
+  SbRegisterAll().
+*/
+static inline PetscErrorCode part_names(const char *family, PetscInt *n, char names[PART_NAMES][SB_NAME_MAX])
+{
+  PetscFunctionBeginUser;
+  *n = 0;
+  if (!strcmp(family, "effect")) {
+    PetscCall(part_names_list(SbEffectList, n, names));
+  } else if (!strcmp(family, "element")) {
+    PetscCall(part_names_list(SbElementList, n, names));
+  } else if (!strcmp(family, "material")) {
+    PetscCall(part_names_list(SbMaterialList, n, names));
+  } else if (!strcmp(family, "time")) {
+    char **words;
+    int count;
+
+    PetscCall(PetscStrToArray(SbTimePresets, '|', &count, &words));
+    for (int i = 0; i < count; i++) PetscCall(PetscStrncpy(names[(*n)++], words[i], SB_NAME_MAX));
+    PetscCall(PetscStrToArrayDestroy(count, words));
+  } else if (!strcmp(family, "field")) {
+    const SbField *field;
+    PetscInt count;
+
+    PetscCall(SbFieldGetAll(&count, &field));
+    for (PetscInt i = 0; i < count; i++) PetscCall(PetscStrncpy(names[(*n)++], field[i].name, SB_NAME_MAX));
+  } else {
+    for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(parts); i++) {
+      if (!strcmp(parts[i].family, family))
+        PetscCall(PetscStrncpy(names[(*n)++], parts[i].name, SB_NAME_MAX));
+    }
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The row of a name; fields need none. `part` lends what it points to until the next call. Not collective. */
+static inline PetscErrorCode part_find(const char *family, const char *name, Part *part, PetscBool *found)
+{
+  static char options[2 * SB_NAME_MAX], events[4 * SB_NAME_MAX];
+
+  PetscFunctionBeginUser;
+  *found = PETSC_FALSE;
+  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(parts) && !*found; i++) {
+    if (strcmp(parts[i].family, family) || strcmp(parts[i].name, name)) continue;
+    *part = parts[i];
+    *found = PETSC_TRUE;
+  }
+  if (!strcmp(family, "field")) {
+    PetscCall(PetscSNPrintf(options, sizeof(options), "-output_fields %s", name));
+    PetscCall(PetscSNPrintf(events, sizeof(events), "SbOut_fields,SbField_body,SbField_%s", name));
+    *part = (Part){family, name, options, NULL, events, PETSC_FALSE};
+    *found = PETSC_TRUE;
+  } else if (*found && !part->events) {
+    for (size_t k = 0; k < PETSC_STATIC_ARRAY_LENGTH(part_families); k++) {
+      if (part_families[k].kind && !strcmp(part_families[k].name, family))
+        PetscCall(PetscSNPrintf(events, sizeof(events), "Sb%s_%s", part_families[k].kind, name));
+    }
+    part->events = events;
+  }
+  if (*found && !part->scene) part->scene = "";
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* How often an event has been begun in all stages, and the seconds in it; 0 for one that does not exist. Not collective. */
+static inline PetscErrorCode part_event(const char *name, PetscInt *count, PetscLogDouble *seconds)
+{
+  const PetscLogStage stages[] = {0, SbStageSetup, SbStageSolve, SbStageOutput};
+  PetscLogEvent event;
+
+  PetscFunctionBeginUser;
+  *count = 0;
+  *seconds = 0.;
+  PetscCall(PetscLogEventGetId(name, &event));
+  for (size_t s = 0; s < PETSC_STATIC_ARRAY_LENGTH(stages) && event >= 0; s++) {
+    PetscEventPerfInfo info;
+
+    PetscCall(PetscLogEventGetPerfInfo(stages[s], event, &info));
+    *count += info.count;
+    *seconds += info.time;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ what is allocated */
+
+/* PETSc's allocations since part_watch(), those made by files of ours apart, and of the folders of what can go unnamed. */
+static struct {
+  PetscInt n, n_ours;          /* how many */
+  double bytes, bytes_ours;    /* in all, also what is free again */
+  PetscInt n_effect, n_output; /* by files of effects and contact, of output */
+} part_allocated;
+
+static PetscErrorCode (*part_malloc)(size_t, PetscBool, int, const char[], const char[], void **);
+
+static inline PetscErrorCode part_count(size_t size, PetscBool clear, int line, const char function[],
+                                        const char file[], void **memory)
+{
+  static const char *const folders[] = {"base", "contact", "effect", "element", "fem", "material",
+                                        "mesh", "model",   "output", "scene",   "time"};
+
+  part_allocated.n++;
+  part_allocated.bytes += (double)size;
+  for (size_t i = 0; file && !strncmp(file, "src/", 4) && i < PETSC_STATIC_ARRAY_LENGTH(folders); i++) {
+    const size_t length = strlen(folders[i]);
+
+    if (strncmp(file + 4, folders[i], length) || file[4 + length] != '/') continue;
+    part_allocated.n_ours++;
+    part_allocated.bytes_ours += (double)size;
+    part_allocated.n_effect += !strcmp(folders[i], "effect") || !strcmp(folders[i], "contact");
+    part_allocated.n_output += !strcmp(folders[i], "output");
+  }
+  return (*part_malloc)(size, clear, line, function, file, memory);
+}
+
+/* From here on allocations are counted; after PetscInitialize(). What PETSc reallocates is not seen. */
+static inline void part_watch(void)
+{
+  part_malloc = PetscTrMalloc;
+  PetscTrMalloc = part_count;
+}
+
+/* PETSc's own routine has to be in place when PETSc ends. */
+static inline void part_unwatch(void)
+{
+  PetscTrMalloc = part_malloc;
+}
+
+/* ------------------------------------------------------------------ running */
+
+/* Scene and run as the program makes them, output and all, ready for SbRunSolve(). Collective. */
+static inline PetscErrorCode part_open(const char *options, const char *dir, TestScene *scene)
+{
+  PetscFunctionBeginUser;
+  PetscCall(PetscOptionsClear(NULL));
+  PetscCall(SbOptionsReset());
+  PetscCall(SbRegisterAll());
+  PetscCall(PetscOptionsInsertString(NULL, options));
+  PetscCall(PetscOptionsSetValue(NULL, "-output_dir", dir));
+  PetscCall(SbSceneCreate(PETSC_COMM_WORLD, &scene->model));
+  PetscCall(SbRunCreate(scene->model, &scene->run));
+  PetscCall(SbOutputSetFromOptions(scene->run));
+  PetscCall(SbOptionsCheck());
+  PetscCall(SbModelSetUp(scene->model));
+  PetscCall(SbRunSetUp(scene->run));
+  PetscCall(SbOutputAttach(scene->run));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
