@@ -369,6 +369,7 @@ PetscErrorCode SbOutputSetFromOptions(SbRun run)
   PetscCallMPI(MPI_Comm_rank(out->comm, &out->rank));
   PetscCallMPI(MPI_Comm_size(out->comm, &out->size));
   PetscCall(PetscTime(&out->wall_start));
+  out->cpu_start = SbCpuSeconds();
   (void)strftime(out->started, sizeof(out->started), "%Y-%m-%dT%H:%M:%S%z", localtime_r(&now, &local));
   PetscCall(read_options(out, run->model->dynamic));
   // A limit on the size of files is met as a failed write, with its message, not as a signal.

@@ -115,7 +115,7 @@ typedef struct _p_SbOutput *SbOutput;
 struct _p_SbOutput {
   MPI_Comm comm;
   PetscMPIInt rank, size;
-  PetscReal wall_start; /* s */
+  PetscReal wall_start, cpu_start; /* s */
 
   /* what the scenario asks for */
   char dir[PETSC_MAX_PATH_LEN];
@@ -263,10 +263,13 @@ typedef struct {
   PetscReal seconds; /* largest of all ranks */
 } SbPhase;
 typedef struct {
-  SbPhase phase[SB_PHASE_COUNT];    /* the last one is what no event covers */
-  PetscReal total;                  /* s */
+  SbPhase phase[SB_PHASE_COUNT]; /* the last one is what no event covers */
+  PetscReal total;               /* s */
+  PetscReal cpu; /* CPU time of the slowest rank, s; less than `total` where others use the cores */
   PetscReal memory_max, memory_sum; /* peak resident memory of a rank, of all, bytes */
 } SbPhases;
+/* CPU time of this process since it began, s. */
+PetscReal SbCpuSeconds(void);
 PetscErrorCode SbPhasesGet(SbOutput out, SbPhases *phases); /* collective */
 /* Files of the run with their sizes: calls fn for each one that exists. Rank 0. */
 PetscErrorCode SbOutputFiles(SbOutput out, SbFileFn fn, void *ctx);

@@ -5,7 +5,16 @@
   what PETSc's KSP and PC events cover. The last phase is what is left of the wall time.
 */
 #include <sys/resource.h>
+#include <time.h>
 #include "output_impl.h"
+
+PetscReal SbCpuSeconds(void)
+{
+  struct timespec t;
+
+  (void)clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &t);
+  return (PetscReal)t.tv_sec + 1e-9 * (PetscReal)t.tv_nsec;
+}
 
 /* Seconds of an event in all stages, on this rank. */
 static PetscErrorCode event_seconds(PetscLogEvent event, PetscReal *seconds)
@@ -48,7 +57,7 @@ PetscErrorCode SbPhasesGet(SbOutput out, SbPhases *p)
     {SETUP, SB_EVENT_MATRIX_SETUP}, {SETUP, SB_EVENT_SOLVER_SETUP},   {RESIDUAL, SB_EVENT_RESIDUAL},
     {TANGENT, SB_EVENT_TANGENT},    {CONTACT, SB_EVENT_CONTACT},      {SEARCH, SB_EVENT_SEARCH},
     {ENERGY, SB_EVENT_ENERGY},      {OUTPUT, SB_EVENT_OUTPUT},        {OUTPUT, SB_EVENT_CHECKPOINT}};
-  PetscReal mine[SB_PHASE_COUNT] = {0.}, most[SB_PHASE_COUNT], memory;
+  PetscReal mine[SB_PHASE_COUNT] = {0.}, most[SB_PHASE_COUNT], memory, cpu;
   struct rusage usage;
 
   PetscFunctionBeginUser;
@@ -67,6 +76,8 @@ PetscErrorCode SbPhasesGet(SbOutput out, SbPhases *p)
     p->phase[i].name = names[i];
     p->phase[i].seconds = PetscMax(most[i], 0.);
   }
+  cpu = SbCpuSeconds() - out->cpu_start;
+  PetscCallMPI(MPI_Allreduce(&cpu, &p->cpu, 1, MPIU_REAL, MPI_MAX, out->comm));
   (void)getrusage(RUSAGE_SELF, &usage);
   memory = 1024. * (PetscReal)usage.ru_maxrss;
   PetscCallMPI(MPI_Allreduce(&memory, &p->memory_max, 1, MPIU_REAL, MPI_MAX, out->comm));

@@ -139,6 +139,7 @@ static PetscErrorCode put_costs(FILE *f, SbRun run, SbOutput out, const SbPhases
   for (int i = 0; i < SB_PHASE_COUNT; i++) put_real(f, p->phase[i].name, p->phase[i].seconds, ", ");
   put_real(f, "time loop", run->seconds_solve, ", ");
   put_real(f, "total", p->total, "},\n  ");
+  put_real(f, "cpu_seconds_max", p->cpu, ",\n  ");
   put_real(f, "memory_max_bytes", p->memory_max, ",\n  ");
   put_real(f, "memory_sum_bytes", p->memory_sum, ",\n");
   (void)fprintf(f, "  \"files\": [");

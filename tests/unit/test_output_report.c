@@ -35,6 +35,7 @@ static PetscErrorCode test_report(void)
 {
   TestScene scene;
   char *header, *progress, *summary, *json;
+  const char *cpu;
   PetscMPIInt rank;
 
   PetscFunctionBeginUser;
@@ -78,6 +79,8 @@ static PetscErrorCode test_report(void)
   SB_CHECK(strstr(json, "\"status\": \"completed\"") && strstr(json, "\"steps\": 10") &&
              strstr(json, "\"linear solve\": "),
            "run.json at the end: %s", json);
+  cpu = strstr(json, "\"cpu_seconds_max\": ");
+  SB_CHECK(cpu && strtod(strchr(cpu, ':') + 1, NULL) > 0, "CPU seconds in run.json: %s", cpu ? cpu : "none");
   PetscCall(PetscFree(json));
   free(header);
   free(progress);
