@@ -172,15 +172,15 @@ static void check_events(const Part *part, const Trace *without, const Trace *wi
   SB_CHECK(gone == (replaces ? 1 : 0), "with %s %s %d events are gone", part->family, part->name, (int)gone);
 }
 
-static PetscErrorCode scene_text(const char *mesh, const char *more, const char *options,
+/* The preconditioner is one that needs nothing but the matrix. */
+static PetscErrorCode scene_text(const char *mesh, const char *scene, const char *options,
                                  char text[PART_TEXT])
 {
+  char more[PART_TEXT];
+
   PetscFunctionBeginUser;
-  PetscCall(PetscSNPrintf(text, PART_TEXT, PART_SCENE, mesh));
-  PetscCall(PetscStrlcat(text, "-solver cg_jacobi ", PART_TEXT));
-  PetscCall(PetscStrlcat(text, more, PART_TEXT));
-  PetscCall(PetscStrlcat(text, " ", PART_TEXT));
-  PetscCall(PetscStrlcat(text, options, PART_TEXT));
+  PetscCall(PetscSNPrintf(more, sizeof(more), "-solver cg_jacobi %s", scene));
+  PetscCall(part_text(mesh, more, options, text));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
