@@ -13,8 +13,12 @@ typedef struct {
   Vec value, force, work, step; /* by rows */
 } Rows;
 
-/* Scaled part of G D G^T on the diagonal of what is factored: rows that depend on others leave it regular. */
-#define SB_COUPLE_REGULAR 1e-8
+/*
+  Scaled part of G D G^T on the diagonal of what is factored: rows that depend on others leave it regular. Rows of a soft and a hard surface on
+  each other are nearly dependent in the measure of D, to the ratio of stiffness: with 1e6 a part of 1e-8 is so much of the smallest
+  eigenvalues that no few passes of the projection make up for it.
+*/
+#define SB_COUPLE_REGULAR 1e-11
 
 typedef struct _p_SbFactored *SbFactored; /* couple_factor.c */
 

@@ -65,6 +65,22 @@ static PetscErrorCode find_arrival(SbRun run)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/*
+  What is left behind a solve that failed may be the tangent of a wild state, from whose diagonal rows take their weights: the next attempt
+  would fail on them. So it is that of the step's start again.
+*/
+static PetscErrorCode renew_tangent(SbRun run, SNES snes, Vec U0)
+{
+  Mat A, P;
+
+  PetscFunctionBeginUser;
+  if (!run->model->space->couple) PetscFunctionReturn(PETSC_SUCCESS);
+  run->tangent_known = PETSC_FALSE;
+  PetscCall(SNESGetJacobian(snes, &A, &P, NULL, NULL));
+  PetscCall(SNESComputeJacobian(snes, U0, A, P));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode SbRunSolveContact(SbRun run, SNES snes, PetscReal t, PetscReal dt, Vec U0, Vec U,
                                  const SbContactSolve *solve, SNESConvergedReason *reason)
 {
@@ -112,5 +128,6 @@ PetscErrorCode SbRunSolveContact(SbRun run, SNES snes, PetscReal t, PetscReal dt
     PetscCall((*solve->solve)(solve->ctx, U, reason));
   }
   PetscCall(set_aim(snes, &aim, 0, 0, PETSC_FALSE));
+  if (*reason < 0) PetscCall(renew_tangent(run, snes, U0));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
