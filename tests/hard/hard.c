@@ -8,8 +8,9 @@
 #include "hard.h"
 #include "../verify/verify.h"
 
-extern const HardCase HardCasesMaterial[], HardCasesRecovery[];
-static const HardCase *const tables[] = {HardCasesMaterial, HardCasesRecovery};
+extern const HardCase HardCasesContact[], HardCasesMaterial[], HardCasesRecovery[], HardCasesTouch[];
+static const HardCase *const tables[] = {HardCasesContact, HardCasesMaterial, HardCasesRecovery,
+                                         HardCasesTouch};
 
 /* ------------------------------------------------------------------ the table */
 

@@ -40,7 +40,7 @@ typedef enum {
   HARD_PLACE,      /* largest displacement at the end, of the size */
   HARD_MOVED,      /* largest displacement in any step, of the size */
   HARD_SPEED,      /* largest speed of a node at the end, m/s */
-  HARD_DEPTH,      /* deepest penetration in any step (SbModelContactGap()), of the size */
+  HARD_DEPTH,      /* deepest penetration in any step (column of the history), of the size */
   HARD_NEWTON,     /* most Newton iterations in a step */
   HARD_LINEAR,     /* most linear iterations in a step */
   HARD_REJECTED,   /* attempts at steps given up, all together */

@@ -2,6 +2,7 @@
   measure.c - what the limits of hard cases are about, from each step of a run and from its end.
 */
 #include "hard.h"
+#include "../verify/contact.h"
 
 static const char *const names[HARD_QUANTITIES] = {
   [HARD_EXCESS] = "energy above start and work",
@@ -81,18 +82,16 @@ static PetscErrorCode look_finite(HardRun *r, const SbStep *step)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode look_gaps(HardRun *r, const SbStep *step)
+/* As the histories of contact have it: of obstacles and of bodies. */
+static PetscErrorCode look_depth(HardRun *r, const SbStep *step)
 {
-  PetscReal least;
-  Vec G;
-
   PetscFunctionBeginUser;
-  if (!r->model->ntouch) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(VecDuplicate(step->U, &G));
-  PetscCall(SbModelContactGap(r->model, step->t, step->U, G));
-  PetscCall(VecMin(G, NULL, &least));
-  r->value[HARD_DEPTH] = PetscMax(r->value[HARD_DEPTH], -least / r->size);
-  PetscCall(VecDestroy(&G));
+  for (PetscInt i = 0; step->step && i < r->model->ntouch; i++) {
+    PetscReal depth;
+
+    PetscCall(contact_column(r->run, step->t, r->model->touch[i]->name, "penetration", &depth));
+    r->value[HARD_DEPTH] = PetscMax(r->value[HARD_DEPTH], depth / r->size);
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -137,7 +136,7 @@ PetscErrorCode HardMeasureStep(SbRun run, const SbStep *step, void *ctx)
   PetscFunctionBeginUser;
   PetscCall(look_finite(r, step));
   look_energies(r, step);
-  PetscCall(look_gaps(r, step));
+  PetscCall(look_depth(r, step));
   r->value[HARD_NEWTON] = PetscMax(r->value[HARD_NEWTON], (PetscReal)step->newton);
   r->value[HARD_LINEAR] = PetscMax(r->value[HARD_LINEAR], (PetscReal)step->linear);
   r->value[HARD_STEPS] = (PetscReal)step->step;

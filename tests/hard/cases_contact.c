@@ -1,0 +1,203 @@
+/*
+  cases_contact.c - contact at its limits: impacts at the speed of waves, deep overlap, bodies squeezed flat, ratios of mass and stiffness,
+  and sizes far from a metre.
+*/
+#include "hard.h"
+
+/* A law for a body, its modulus (Pa) and density (kg/m^3). */
+#define FLESH(body, young, density)                                                                          \
+  "-body_" body "_material neohookean -body_" body "_young " young " -body_" body "_poisson 0.3 -body_" body \
+  "_density " density " "
+#define FLOOR "-effect_floor_type contact -effect_floor_obstacle plane:0,0,1,0 "
+#define MEET "-effect_meet_type collision "
+
+/* A block of 64 g flies onto a plate of a tenth of its thickness; waves have 1000 m/s. */
+#define PLATE(element)                                                                                      \
+  "-bodies block,plate -body_block_mesh box:0.04,0.04,0.04:2 -body_block_element " element                  \
+  " -body_block_translate 0.03,0.03,0.0061 -body_block_velocity 0,0,-100 " FLESH(                           \
+    "block", "1e9", "1000") "-body_plate_mesh box:0.1,0.1,0.004:6,6,1 -body_plate_element " element         \
+                            " " FLESH("plate", "1e9", "1000") "-effects rim,meet -effect_rim_type support " \
+                                                              "-effect_rim_on plate.xmin,plate.xmax " MEET  \
+                                                              "-ts_dt 1e-5 -ts_max_time 6e-4"
+/* A block on its corner, onto a rigid floor. */
+#define CORNER(element)                                                                         \
+  "-bodies a -body_a_mesh box:0.04,0.04,0.04:2 -body_a_element " element                        \
+  " -body_a_rotate 1,-1,0,54.7356 -body_a_translate 0,0,0.05 -body_a_velocity 0,0,-100 " FLESH( \
+    "a", "1e9", "1000") "-effects floor " FLOOR "-ts_dt 1e-5 -ts_max_time 1e-3"
+#define HALF(element)                                                                                     \
+  "-bodies a,b -body_a_mesh box:0.1,0.1,0.1:2 -body_b_mesh box:0.1,0.1,0.1:3 -body_b_translate 0.05,0,0 " \
+  "-body_a_element " element " -body_b_element " element " " FLESH("a", "1e5", "1000")                    \
+    FLESH("b", "1e5", "1000") "-effects damping,meet -effect_damping_beta 0.01 " MEET                     \
+                              "-effect_meet_recovery 30 -ts_dt 0.004 -ts_max_time 0.6 -snes_rtol 1e-9"
+#define SQUEEZE(element, mesh)                                                                          \
+  "-bodies a -body_a_mesh box:0.1,0.1,0.1:" mesh " -body_a_element " element " " FLESH(                 \
+    "a", "1e4", "1000") "-effects top,floor -effect_top_type contact -effect_top_obstacle "             \
+                        "plane:0,0,-1,-0.1 -effect_top_displacement 0;0;-0.08*min(t,max(0,2-t)) " FLOOR \
+                        "-ts_dt 0.02 -ts_max_time 4"
+/* A block of 1000 kg on one of 0.1 kg, which weighs a thousandth of its stiffness. */
+#define STACK                                                                                        \
+  "-bodies a,b -body_a_mesh box:0.1,0.1,0.1:2 -body_b_mesh box:0.1,0.1,0.1:3 -body_b_translate "     \
+  "0,0,0.1 " FLESH("a", "1e8", "100")                                                                \
+    FLESH("b", "1e8", "1e6") "-effects gravity,floor,meet " FLOOR "-effect_floor_friction 0.3 " MEET \
+                             "-effect_meet_friction 0.3 -ts_dt 0.01 -ts_max_time 0.5"
+#define SOFT_STIFF(response)                                                                                \
+  "-bodies a,b -body_a_mesh box:0.1,0.1,0.1:2 -body_b_mesh box:0.1,0.1,0.1:3 -body_b_translate "            \
+  "0,0,0.1 " FLESH("a", "1e4", "1000") FLESH("b", "1e10", "1000") "-effects gravity,floor,meet " FLOOR MEET \
+                                                                  "-effect_meet_response " response         \
+                                                                  " -ts_dt 0.01 -ts_max_time 0.5"
+
+const HardCase HardCasesContact[] = {
+  {.name = "impact.plate.p1",
+   .what = "a block hits a thin plate at 100 m/s, P1",
+   .options = PLATE("p1"),
+   .jitter = 1e-5,
+   .jitter_speed = 0.1,
+   .quick = 1,
+   .limits = {{HARD_EXCESS, '<', 1e-6},
+              {HARD_MIN_J, '>', 0.5},
+              {HARD_VOLUME, '<', 0.05},
+              {HARD_DEPTH, '<', 0.01},
+              {HARD_NEWTON, '<', 100},
+              {HARD_REJECTED, '<', 5}}},
+  {.name = "impact.plate.cr",
+   .what = "a block hits a thin plate at 100 m/s, CR",
+   .options = PLATE("cr"),
+   .jitter = 1e-5,
+   .jitter_speed = 0.1,
+   .limits = {{HARD_EXCESS, '<', 1e-6},
+              {HARD_MIN_J, '>', 0.5},
+              {HARD_VOLUME, '<', 0.05},
+              {HARD_DEPTH, '<', 0.01},
+              {HARD_NEWTON, '<', 100},
+              {HARD_REJECTED, '<', 5}}},
+  {.name = "impact.corner.p1",
+   .what = "a block hits the floor with a corner at 100 m/s, P1",
+   .options = CORNER("p1"),
+   .jitter = 1e-5,
+   .jitter_speed = 0.1,
+   .quick = 1,
+   .limits = {{HARD_EXCESS, '<', 1e-6},
+              {HARD_MIN_J, '>', 0.5},
+              {HARD_VOLUME, '<', 0.05},
+              {HARD_DEPTH, '<', 0.01},
+              {HARD_NEWTON, '<', 100},
+              {HARD_REJECTED, '<', 5}}},
+  {.name = "impact.corner.dg",
+   .what = "a block hits the floor with a corner at 100 m/s, DG",
+   .options = CORNER("dg"),
+   .jitter = 1e-5,
+   .jitter_speed = 0.1,
+   .limits = {{HARD_EXCESS, '<', 1e-6},
+              {HARD_MIN_J, '>', 0.5},
+              {HARD_VOLUME, '<', 0.05},
+              {HARD_DEPTH, '<', 0.01},
+              {HARD_NEWTON, '<', 100},
+              {HARD_REJECTED, '<', 5}}},
+  {.name = "overlap.p1",
+   .what = "two blocks begin half in each other, P1",
+   .options = HALF("p1"),
+   .jitter = 1e-3,
+   .quick = 1,
+   .limits = {{HARD_MOMENTUM, '<', 1e-6},
+              {HARD_MIN_J, '>', 0.99},
+              {HARD_MIN_J_EVER, '>', 0.5},
+              {HARD_SHAPE, '<', 1e-2},
+              {HARD_SPEED, '<', 1},
+              {HARD_NEWTON, '<', 100},
+              {HARD_REJECTED, '<', 1}}},
+  {.name = "overlap.cr",
+   .what = "two blocks begin half in each other, CR",
+   .options = HALF("cr"),
+   .jitter = 1e-3,
+   .limits = {{HARD_MOMENTUM, '<', 1e-6},
+              {HARD_MIN_J, '>', 0.99},
+              {HARD_MIN_J_EVER, '>', 0.5},
+              {HARD_SHAPE, '<', 1e-2},
+              {HARD_SPEED, '<', 1},
+              {HARD_NEWTON, '<', 100},
+              {HARD_REJECTED, '<', 1}}},
+  {.name = "overlap.floor",
+   .what = "a block begins half in the floor",
+   .options = "-bodies a -body_a_mesh box:0.1,0.1,0.1:3 " FLESH(
+     "a", "1e5", "1000") "-effects damping,floor -effect_damping_beta 0.01 -effect_floor_type contact "
+                         "-effect_floor_obstacle plane:0,0,1,0.05 -ts_dt 0.004 -ts_max_time 0.6",
+   .jitter = 1e-3,
+   .quick = 1,
+   .limits = {{HARD_MIN_J, '>', 0.99},
+              {HARD_MIN_J_EVER, '>', 0.5},
+              {HARD_SHAPE, '<', 1e-2},
+              {HARD_SPEED, '<', 1},
+              {HARD_NEWTON, '<', 100},
+              {HARD_REJECTED, '<', 1}}},
+  {.name = "squeeze.p1",
+   .what = "squeezed to 20 % between plates and let go, P1",
+   .options = SQUEEZE("p1", "3"),
+   .jitter = 1e-5,
+   .limits = {{HARD_EXCESS, '<', 1e-6},
+              {HARD_MIN_J, '>', 0.9},
+              {HARD_SHAPE, '<', 1e-2},
+              {HARD_DEPTH, '<', 1e-6},
+              {HARD_NEWTON, '<', 500},
+              {HARD_REJECTED, '<', 50}}},
+  {.name = "squeeze.cr",
+   .what = "squeezed to 20 % between plates and let go, CR",
+   .options = SQUEEZE("cr", "2"),
+   .jitter = 1e-5,
+   .limits = {{HARD_EXCESS, '<', 1e-6},
+              {HARD_MIN_J, '>', 0.9},
+              {HARD_SHAPE, '<', 1e-2},
+              {HARD_DEPTH, '<', 1e-6},
+              {HARD_NEWTON, '<', 500},
+              {HARD_REJECTED, '<', 50}}},
+  {.name = "squeeze.dg",
+   .what = "squeezed to 20 % between plates and let go, DG",
+   .options = SQUEEZE("dg", "2"),
+   .jitter = 1e-5,
+   .limits = {{HARD_EXCESS, '<', 1e-6},
+              {HARD_MIN_J, '>', 0.9},
+              {HARD_SHAPE, '<', 1e-2},
+              {HARD_DEPTH, '<', 1e-6},
+              {HARD_NEWTON, '<', 500},
+              {HARD_REJECTED, '<', 50}}},
+  {.name = "mass.stack",
+   .what = "ten thousand times its mass rests on a block",
+   .options = STACK,
+   .jitter = 1e-6,
+   .quick = 1,
+   .limits = {{HARD_EXCESS, '<', 1e-6},
+              {HARD_MIN_J, '>', 0.98},
+              {HARD_SPEED, '<', 1e-3},
+              {HARD_DEPTH, '<', 1e-4},
+              {HARD_NEWTON, '<', 100},
+              {HARD_REJECTED, '<', 1}}},
+  {.name = "stiff.projected",
+   .what = "a million times stiffer body on a soft one, projected",
+   .options = SOFT_STIFF("projected"),
+   .jitter = 1e-7,
+   .quick = 1,
+   .limits = {{HARD_EXCESS, '<', 1e-6},
+              {HARD_MIN_J, '>', 0.5},
+              {HARD_DEPTH, '<', 1e-4},
+              {HARD_NEWTON, '<', 50},
+              {HARD_LINEAR, '<', 500},
+              {HARD_REJECTED, '<', 1}}},
+  {.name = "stiff.multiplier",
+   .what = "a million times stiffer body on a soft one, multiplier",
+   .options = SOFT_STIFF("multiplier"),
+   .jitter = 1e-7,
+   .limits = {{HARD_EXCESS, '<', 1e-6},
+              {HARD_MIN_J, '>', 0.5},
+              {HARD_DEPTH, '<', 1e-4},
+              {HARD_NEWTON, '<', 50},
+              {HARD_REJECTED, '<', 1}}},
+  {.name = "stiff.augmented",
+   .what = "a million times stiffer body on a soft one, augmented",
+   .options = SOFT_STIFF("augmented"),
+   .jitter = 1e-7,
+   .limits = {{HARD_EXCESS, '<', 1e-6},
+              {HARD_MIN_J, '>', 0.5},
+              {HARD_DEPTH, '<', 1e-4},
+              {HARD_NEWTON, '<', 200},
+              {HARD_REJECTED, '<', 1}}},
+  {.name = NULL},
+};
