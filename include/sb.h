@@ -1,3 +1,4 @@
 /* sb.h - everything. */
 #pragma once
+#include "sbestimate.h"
 #include "sbscene.h"

@@ -233,6 +233,10 @@ PetscErrorCode SbCoupleCreateOperator(SbSpace space, Mat K, PetscBool singular, 
 /* Per owned cell: Cauchy stress sigma[6] = xx yy zz xy yz xz (Pa), J, energy density (J/m^3, rest). Outputs may be NULL. */
 PetscErrorCode SbSpaceCellState(SbSpace space, const PetscReal u[], PetscReal sigma[], PetscReal J[],
                                 PetscReal psi[]);
+/* Per owned cell: first Piola-Kirchhoff stress P[9] (Pa), rotation R[9] in F (the identity for the linear law; may be NULL), energy
+   density psi (J/m^3, rest). Not collective. */
+PetscErrorCode SbSpaceCellPiola(SbSpace space, const PetscReal u[], PetscReal P[], PetscReal R[],
+                                PetscReal psi[]);
 /* Per owned cell: the law's pressure -lambda theta, Pa (SbMaterialOps.pressure). Not collective. */
 PetscErrorCode SbSpaceCellPressure(SbSpace space, const PetscReal u[], PetscReal pressure[]);
 /* Owned cells: strain energy (J), smallest det F, number with det F <= 0, current volume (m^3). Local: reduce them. */

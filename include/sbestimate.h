@@ -1,0 +1,40 @@
+/*
+  sbestimate.h - layer 5: how large the errors of a run are. The errors of space: src/ledger/estimate_space.c.
+*/
+#pragma once
+#include "sbmodel.h"
+
+/*
+  Estimate of the error of the space discretisation in the energy norm,
+
+    |e|^2 = 1/2 int (P - P_h) : C^-1 : (P - P_h),
+
+  P the first Piola-Kirchhoff stress that the continuum would have under the loads, inertia and prescribed displacements of the moment, P_h that
+  of the element, C Hooke's tensor of lambda and mu turned by the rotation of the cell (the strain energy norm of the linear law).
+  The same unit as strain energy: sqrt(body2 / strain) is the relative error. For CR and DG it is the error inside of the cells, the energy
+  of the jumps at faces apart.
+*/
+typedef struct _p_SbSpaceEstimate *SbSpaceEstimate;
+struct _p_SbSpaceEstimate {
+  SbModel model;     /* borrowed */
+  PetscReal *cell2;  /* [ncell_owned] square of the error of each owned cell, J */
+  PetscReal *body2;  /* [nbody] sums over the cells of each body and all ranks, J */
+  PetscReal *strain; /* [nbody] the laws' strain energy of the cells of each body and all ranks, J */
+  PetscReal *
+    factor; /* [nbody] cell2 and body2 over the square of what recovery alone gives, 1 but for bodies of P1 */
+  struct _p_SbRecovery *recovery;
+  PetscReal *P;   /* [ncell][9] stresses, Pa */
+  PetscReal *R;   /* [ncell_owned][9] rotations; NULL when every law is linear */
+  PetscReal *psi; /* [ncell_owned] energy densities, J/m^3 */
+  Vec residual;   /* NULL without a body of P1 */
+};
+/* Patches and links between ranks, once. Collective. The model is borrowed, the caller destroys the estimate. */
+PetscErrorCode SbSpaceEstimateCreate(SbModel model, SbSpaceEstimate *est);
+/*
+  SbSpaceEstimateCompute - fills cell2, body2, strain and factor.
+
+  Collective. Input: t (s); displacement U (m), velocity V (m/s), acceleration A (m/s^2) at t, the last two NULL in a static run. It costs
+  about two evaluations of the residual. Results are the same on any number of ranks up to rounding.
+*/
+PetscErrorCode SbSpaceEstimateCompute(SbSpaceEstimate est, PetscReal t, Vec U, Vec V, Vec A);
+PetscErrorCode SbSpaceEstimateDestroy(SbSpaceEstimate *est); /* sets *est to NULL; NULL is accepted */

@@ -1,0 +1,247 @@
+/*
+  estimate_space.c - the error of the space discretisation, from the stresses that the elements have.
+
+  Recovery. P_h is the first Piola-Kirchhoff stress of the cells, constant in each; for DG that of the gradient of the means. P* is linear in each
+  cell with the values that recovery.c finds at the vertices. The error of a cell is taken to be that of P_h as an approximation of P*:
+
+    off_T = 1/2 int_T (P* - P_h) : C^-1 : (P* - P_h),     C^-1: |dev s|^2 / (2 mu) + tr(s)^2 / (9 K),   s = sym(R^T (P* - P_h)),
+
+  K = lambda + 2/3 mu, R the rotation in F (Zienkiewicz and Zhu 1992; for CR and DG with averages in the place of fits: Carstensen and Funken,
+  Math. Comp. 70, 2001). In this norm the estimate stays bounded as nu -> 1/2. For CR and DG this is all. It needs neither loads
+  nor inertia, which P_h has in it.
+
+  Stiffness. The answer of P1 is too stiff, near nu = 1/2 by any factor (locking): then P_h is wrong as a whole, and what recovery takes out of it
+  is a part of a small energy only. But P* tells how much too stiff. Let a be the energy of P_h in the norm above and b what is left of
+  it without what the mesh has added, a - b the part that is not smooth. Among the multiples s u_h of the answer, under the same loads, the one that is best
+  when only the smooth part resists, s^2 b - 2 s a -> min, has s = a / b, and its potential lies below that of u_h by
+
+    |e|^2 = s a - a = (a - b) a / b:
+
+  one step of Galerkin's method in a space of one dimension. With prescribed displacements in the place of loads u_h cannot be
+  scaled and |e|^2 = a - b; in between, with the part theta of the work that is done by loads,
+
+    |e|^2 = (a - b) (1 + theta (a / b - 1)),     theta = 1 - sum R . (u - m) / (2 a), at least 0 and at most 1,
+
+  R the forces of supports and contact, m for each component the mean of u weighted by |R|: supports that all move alike do no
+  work. A mesh that does not lock has a / b -> 1, and the estimate is that of recovery. a - b is the sum of off_T, of its
+  shear part as it is; of its pressure part, which is what locks, more: where P_h oscillates from cell to cell the fit over some
+  twenty cells keeps a little of it (measured: up to a fifth of the energy), so that of the pressure's energy no more than that of P* less a quarter of off counts
+  as smooth, but a - b has off twice at most.
+
+  This is done for each body of P1, and the factor is the same in all its cells.
+
+  Limits. The norm is that of Hooke's law in the cell's own frame: for strains of order one it is not the tangent's. theta takes
+  supports that turn by large angles for ones that do work, and the force of one body on another for a support: a locked body is
+  estimated too low then. Where a mesh is too coarse to show the shape of the answer nothing here knows it.
+  In a dynamic run the error is that of the state of the moment: against the continuum under the loads and inertia of this moment (elliptic
+  reconstruction, Makridakis and Nochetto, SIAM J. Numer. Anal. 41, 2003), not what has added up since the start.
+*/
+#include "recovery.h"
+#include "sbestimate.h"
+#include "sbkernel.h"
+
+#define KEPT 0.25  /* of the energy of an oscillating pressure, at most, that recovery keeps */
+#define FLOOR 1e-8 /* smooth part of the energy, at least */
+
+/* Sums over a body. Energies in J. */
+typedef enum {
+  SHEAR,           /* of P_h */
+  PRESSURE,        /* of P_h */
+  SHEAR_OFF,       /* of P* - P_h */
+  PRESSURE_OFF,    /* of P* - P_h */
+  PRESSURE_SMOOTH, /* of P* */
+  STRAIN,          /* of the law */
+  FORCE_SIZE,      /* |R|, three components, N */
+  SHIFT = FORCE_SIZE + 3,
+  FORCE = SHIFT + 3,
+  WORK = FORCE + 3,
+  NSUM = WORK + 3
+} Sum;
+
+PetscErrorCode SbSpaceEstimateCreate(SbModel model, SbSpaceEstimate *estimate)
+{
+  const PetscInt n = model->mesh->ncell_owned;
+  PetscBool stiff = PETSC_FALSE;
+  SbSpaceEstimate est;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscNew(&est));
+  est->model = model;
+  for (PetscInt b = 0; b < model->nbody; b++)
+    stiff = (PetscBool)(stiff || model->element[b]->nodes_per[0] > 0);
+  PetscCall(SbRecoveryCreate(model->mesh, &est->recovery));
+  PetscCall(PetscCalloc1(n, &est->cell2));
+  PetscCall(PetscCalloc3(model->nbody, &est->body2, model->nbody, &est->strain, model->nbody, &est->factor));
+  PetscCall(PetscMalloc1(9 * (size_t)model->mesh->ncell, &est->P));
+  if (!model->space->linear) PetscCall(PetscMalloc1(9 * (size_t)n, &est->R));
+  PetscCall(PetscMalloc1(n, &est->psi));
+  if (stiff) PetscCall(SbSpaceCreateVec(model->space, &est->residual));
+  *estimate = est;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbSpaceEstimateDestroy(SbSpaceEstimate *estimate)
+{
+  SbSpaceEstimate est = *estimate;
+
+  PetscFunctionBeginUser;
+  if (!est) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(SbRecoveryDestroy(&est->recovery));
+  PetscCall(PetscFree(est->cell2));
+  PetscCall(PetscFree3(est->body2, est->strain, est->factor));
+  PetscCall(PetscFree(est->P));
+  PetscCall(PetscFree(est->R));
+  PetscCall(PetscFree(est->psi));
+  PetscCall(VecDestroy(&est->residual));
+  PetscCall(PetscFree(*estimate));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* 1/2 T : C^-1 : T of T turned into the frame of the cell (R NULL: it is there), J/m^3: energy[0] of the shear, energy[1] of the pressure. */
+static void complementary_energy(const struct _p_SbMaterial *m, const PetscReal R[9], const PetscReal T[9],
+                                 PetscReal energy[2])
+{
+  const PetscReal K = m->lambda + 2. / 3. * m->mu;
+  PetscReal turned[9], square = 0., trace;
+  const PetscReal *s = T;
+
+  if (R) {
+    SbMatTransposeMul(R, T, turned);
+    s = turned;
+  }
+  for (int i = 0; i < 3; i++) {
+    for (int j = 0; j < 3; j++) square += PetscSqr(0.5 * (s[3 * i + j] + s[3 * j + i]));
+  }
+  trace = s[0] + s[4] + s[8];
+  energy[0] = PetscMax(0., square - trace * trace / 3.) / (4. * m->mu);
+  energy[1] = trace * trace / (18. * K);
+}
+
+static PetscReal cell_volume(SbMesh mesh, PetscInt c)
+{
+  const PetscReal *x[4];
+  PetscReal e[9];
+
+  for (int a = 0; a < 4; a++) x[a] = mesh->x + 3 * mesh->cell[4 * c + a];
+  for (int k = 0; k < 9; k++) e[k] = x[1 + k / 3][k % 3] - x[0][k % 3];
+  return SbMatDet(e) / 6.;
+}
+
+/*
+  Adds the energies of an owned cell, and gives off_T. The integral over a tet of the square of what is linear there with the values d_a at the
+  vertices is V / 20 (sum |d_a|^2 + |sum d_a|^2).
+*/
+static PetscReal add_cell(SbSpaceEstimate est, PetscInt c, PetscReal sum[NSUM])
+{
+  SbMesh mesh = est->model->mesh;
+  const struct _p_SbMaterial *m = est->model->space->material[mesh->cell_material[c]];
+  const PetscReal *P = est->P + 9 * c, *R = est->R ? est->R + 9 * c : NULL;
+  const PetscReal V = cell_volume(mesh, c);
+  PetscReal star[5][9] = {{0.}}, off[5][9], energy[2], all = 0.;
+
+  complementary_energy(m, R, P, energy);
+  sum[SHEAR] += V * energy[0];
+  sum[PRESSURE] += V * energy[1];
+  sum[STRAIN] += V * est->psi[c];
+  for (int a = 0; a < 4; a++) {
+    const PetscReal *value = SbRecoveryCorner(est->recovery, c, a);
+
+    for (int k = 0; k < 9; k++) {
+      star[a][k] = value[k];
+      star[4][k] += value[k];
+      off[a][k] = value[k] - P[k];
+    }
+  }
+  for (int k = 0; k < 9; k++) off[4][k] = off[0][k] + off[1][k] + off[2][k] + off[3][k];
+  for (int a = 0; a < 5; a++) {
+    complementary_energy(m, R, off[a], energy);
+    sum[SHEAR_OFF] += V / 20. * energy[0];
+    sum[PRESSURE_OFF] += V / 20. * energy[1];
+    all += V / 20. * (energy[0] + energy[1]);
+    complementary_energy(m, R, star[a], energy);
+    sum[PRESSURE_SMOOTH] += V / 20. * energy[1];
+  }
+  return all;
+}
+
+/* Adds what theta is made of: the forces of supports and contact on each body of P1 and how its nodes have moved there. */
+static PetscErrorCode add_reactions(SbSpaceEstimate est, PetscReal t, Vec U, Vec V, Vec A,
+                                    PetscReal (*sum)[NSUM])
+{
+  SbModel model = est->model;
+  const PetscReal *r, *u;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbModelResidual(model, t, U, V, A, PETSC_FALSE, est->residual));
+  PetscCall(VecGetArrayRead(est->residual, &r));
+  PetscCall(VecGetArrayRead(U, &u));
+  for (PetscInt i = 0; i < 3 * model->space->nnode_owned; i++) {
+    PetscReal *mine = sum[model->space->node_body[i / 3]];
+
+    mine[FORCE_SIZE + i % 3] += PetscAbsReal(r[i]);
+    mine[SHIFT + i % 3] += PetscAbsReal(r[i]) * u[i];
+    mine[FORCE + i % 3] += r[i];
+    mine[WORK + i % 3] += r[i] * u[i];
+  }
+  PetscCall(VecRestoreArrayRead(U, &u));
+  PetscCall(VecRestoreArrayRead(est->residual, &r));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* |e|^2 of a body of P1. */
+static PetscReal stiff_error(const PetscReal sum[NSUM])
+{
+  const PetscReal a = sum[SHEAR] + sum[PRESSURE], off = sum[PRESSURE_OFF];
+  const PetscReal rough =
+    PetscMin(2. * off, PetscMax(off, sum[PRESSURE] - sum[PRESSURE_SMOOTH] + KEPT * off));
+  const PetscReal loss = PetscMin(sum[SHEAR], sum[SHEAR_OFF]) + PetscMin(sum[PRESSURE], rough);
+  const PetscReal b = PetscMax(a - loss, FLOOR * a);
+  PetscReal work = 0., theta;
+
+  if (a <= 0.) return 0.;
+  for (int k = 0; k < 3; k++) {
+    const PetscReal size = sum[FORCE_SIZE + k];
+
+    if (size > 0.) work += sum[WORK + k] - sum[SHIFT + k] / size * sum[FORCE + k];
+  }
+  theta = PetscMin(1., PetscMax(0., 1. - work / (2. * a)));
+  return loss * (1. + theta * (a / b - 1.));
+}
+
+/* Results of each body from its sums. */
+static void finish(SbSpaceEstimate est, PetscReal (*const sum)[NSUM])
+{
+  SbModel model = est->model;
+
+  for (PetscInt b = 0; b < model->nbody; b++) {
+    const PetscReal off = sum[b][SHEAR_OFF] + sum[b][PRESSURE_OFF];
+
+    est->strain[b] = sum[b][STRAIN];
+    est->body2[b] = model->element[b]->nodes_per[0] > 0 ? stiff_error(sum[b]) : off;
+    est->factor[b] = off > 0. ? est->body2[b] / off : 1.;
+  }
+  for (PetscInt c = 0; c < model->mesh->ncell_owned; c++)
+    est->cell2[c] *= est->factor[model->mesh->cell_body[c]];
+}
+
+PetscErrorCode SbSpaceEstimateCompute(SbSpaceEstimate est, PetscReal t, Vec U, Vec V, Vec A)
+{
+  SbModel model = est->model;
+  const PetscReal *u;
+  PetscReal(*sum)[NSUM];
+
+  PetscFunctionBeginUser;
+  PetscCall(SbSpaceGetLocalRead(model->space, U, &u));
+  PetscCall(SbSpaceCellPiola(model->space, u, est->P, est->R, est->psi));
+  PetscCall(SbSpaceRestoreLocalRead(model->space, U, &u));
+  PetscCall(SbRecoveryApply(est->recovery, est->P));
+  PetscCall(PetscCalloc1(model->nbody, &sum));
+  for (PetscInt c = 0; c < model->mesh->ncell_owned; c++)
+    est->cell2[c] = add_cell(est, c, sum[model->mesh->cell_body[c]]);
+  if (est->residual) PetscCall(add_reactions(est, t, U, V, A, sum));
+  PetscCallMPI(
+    MPI_Allreduce(MPI_IN_PLACE, sum, (PetscMPIInt)(NSUM * model->nbody), MPIU_REAL, MPI_SUM, model->comm));
+  finish(est, sum);
+  PetscCall(PetscFree(sum));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

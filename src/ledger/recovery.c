@@ -1,0 +1,254 @@
+/*
+  recovery.c - stresses at the vertices by least squares over the cells around each (superconvergent patch recovery, Zienkiewicz and
+  Zhu, IJNME 33, 1992, parts 1 and 2).
+
+  At a vertex v the recovered value is p(X_v) of the linear polynomial p that minimises
+
+    sum_c |p(X_c) - P_c|^2 + r |grad p|^2,   r = 0.05 sum_c |X_c - X_v|^2,
+
+  over the cells c around v, X_c their centroids. r decides where there are too few cells to tell a slope, at corners and edges
+  of a body; constants are recovered whatever it is. Only cells of one material are fitted together, because the stress jumps where the
+  material does: a vertex has one value for each material around it, at most `nlayer`. Bodies have no vertices in common.
+
+  p(X_v) is a fixed sum of the P_c; what is kept of the fit is the first row of the inverse of its 4x4 matrix. An owned vertex has
+  all its cells on the rank, so ghosts are needed only of the P_c, before, and of the values, after.
+*/
+#include "recovery.h"
+#include "sbkernel.h"
+
+#define RIDGE 0.05 /* r above, as a part of the sum of squares of distances */
+
+struct _p_SbRecovery {
+  SbMesh mesh;        /* borrowed */
+  PetscInt nlayer;    /* most materials that meet at a vertex, over all ranks */
+  PetscInt *slot;     /* [ncell][4] where the value for a corner of a cell is: nlayer vertex + layer */
+  PetscReal *row;     /* [nvert_owned nlayer][4] first row of the inverse */
+  PetscReal *value;   /* [nvert nlayer][9] */
+  PetscSF cell, vert; /* from owned ones to their ghosts; NULL on one rank */
+};
+
+/* Brings n numbers of each owned item to its ghosts. */
+static PetscErrorCode update_ghosts(PetscSF sf, PetscInt n, MPI_Datatype unit, void *array)
+{
+  MPI_Datatype type;
+
+  PetscFunctionBeginUser;
+  if (!sf) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCallMPI(MPI_Type_contiguous((PetscMPIInt)n, unit, &type));
+  PetscCallMPI(MPI_Type_commit(&type));
+  PetscCall(PetscSFBcastBegin(sf, type, array, array, MPI_REPLACE));
+  PetscCall(PetscSFBcastEnd(sf, type, array, array, MPI_REPLACE));
+  PetscCallMPI(MPI_Type_free(&type));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* global[n]: numbers, those of owned items following each other from rank to rank. */
+static PetscErrorCode create_link(MPI_Comm comm, PetscInt nowned, PetscInt n, const PetscInt global[],
+                                  PetscSF *sf)
+{
+  PetscLayout layout;
+  PetscInt *leaf;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscMalloc1(n - nowned, &leaf));
+  for (PetscInt i = nowned; i < n; i++) leaf[i - nowned] = i;
+  PetscCall(PetscLayoutCreateFromSizes(comm, nowned, PETSC_DECIDE, 1, &layout));
+  PetscCall(PetscSFCreate(comm, sf));
+  PetscCall(PetscSFSetGraphLayout(*sf, layout, n - nowned, leaf, PETSC_COPY_VALUES, global + nowned));
+  PetscCall(PetscLayoutDestroy(&layout));
+  PetscCall(PetscFree(leaf));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode create_links(SbRecovery r)
+{
+  SbMesh mesh = r->mesh;
+  PetscInt *number, first = 0;
+  PetscMPIInt size;
+
+  PetscFunctionBeginUser;
+  PetscCallMPI(MPI_Comm_size(mesh->comm, &size));
+  if (size == 1) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(create_link(mesh->comm, mesh->nvert_owned, mesh->nvert, mesh->gvert, &r->vert));
+  PetscCallMPI(MPI_Exscan(&mesh->ncell_owned, &first, 1, MPIU_INT, MPI_SUM, mesh->comm));
+  PetscCall(PetscMalloc1(mesh->ncell, &number));
+  for (PetscInt c = 0; c < mesh->ncell_owned; c++) number[c] = first + c;
+  PetscCall(SbMeshBroadcastCells(mesh, 1, number));
+  PetscCall(create_link(mesh->comm, mesh->ncell_owned, mesh->ncell, number, &r->cell));
+  PetscCall(PetscFree(number));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Cells around each vertex: corners 4 c + a, at[start[v]..start[v + 1]). */
+static PetscErrorCode list_stars(SbMesh mesh, PetscInt **start, PetscInt **at)
+{
+  PetscInt *next;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscCalloc1(mesh->nvert + 2, &next));
+  PetscCall(PetscMalloc1(4 * (size_t)mesh->ncell, at));
+  for (PetscInt i = 0; i < 4 * mesh->ncell; i++) next[mesh->cell[i] + 2]++;
+  for (PetscInt v = 0; v < mesh->nvert; v++) next[v + 2] += next[v + 1];
+  for (PetscInt i = 0; i < 4 * mesh->ncell; i++) (*at)[next[mesh->cell[i] + 1]++] = i;
+  *start = next;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Different materials of the cells around a vertex, ascending, in found[]: how many. */
+static PetscErrorCode list_materials(SbMesh mesh, PetscInt n, const PetscInt at[], PetscInt found[],
+                                     PetscInt *count)
+{
+  PetscFunctionBeginUser;
+  for (PetscInt i = 0; i < n; i++) found[i] = mesh->cell_material[at[i] / 4];
+  *count = n;
+  PetscCall(PetscSortRemoveDupsInt(count, found));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Which materials meet at each vertex, as its owner sees it, and so the slot of each corner of each cell. */
+static PetscErrorCode create_slots(SbRecovery r)
+{
+  SbMesh mesh = r->mesh;
+  PetscInt *start = NULL, *at = NULL, *found, *material, most = 1, longest = 0;
+
+  PetscFunctionBeginUser;
+  PetscCall(list_stars(mesh, &start, &at));
+  for (PetscInt v = 0; v < mesh->nvert_owned; v++) longest = PetscMax(longest, start[v + 1] - start[v]);
+  PetscCall(PetscMalloc1(longest, &found));
+  for (PetscInt v = 0; v < mesh->nvert_owned; v++) {
+    PetscInt n;
+
+    PetscCall(list_materials(mesh, start[v + 1] - start[v], at + start[v], found, &n));
+    most = PetscMax(most, n);
+  }
+  PetscCallMPI(MPI_Allreduce(&most, &r->nlayer, 1, MPIU_INT, MPI_MAX, mesh->comm));
+  PetscCall(PetscMalloc1(r->nlayer * (size_t)mesh->nvert, &material));
+  for (PetscInt i = 0; i < r->nlayer * mesh->nvert; i++) material[i] = -1;
+  for (PetscInt v = 0; v < mesh->nvert_owned; v++) {
+    PetscInt n;
+
+    PetscCall(list_materials(mesh, start[v + 1] - start[v], at + start[v], found, &n));
+    PetscCall(PetscArraycpy(material + r->nlayer * v, found, n));
+  }
+  PetscCall(update_ghosts(r->vert, r->nlayer, MPIU_INT, material));
+  PetscCall(PetscMalloc1(4 * (size_t)mesh->ncell, &r->slot));
+  for (PetscInt i = 0; i < 4 * mesh->ncell; i++) {
+    r->slot[i] = r->nlayer * mesh->cell[i];
+    for (PetscInt k = 1; k < r->nlayer && material[r->slot[i]] != mesh->cell_material[i / 4]; k++)
+      r->slot[i]++;
+  }
+  PetscCall(PetscFree(material));
+  PetscCall(PetscFree(found));
+  PetscCall(PetscFree(start));
+  PetscCall(PetscFree(at));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* 1 and the centroid of a cell seen from its corner a. */
+static inline void monomials(SbMesh mesh, PetscInt cell, int a, PetscReal p[4])
+{
+  const PetscInt *v = mesh->cell + 4 * cell;
+
+  p[0] = 1.;
+  for (int k = 0; k < 3; k++) {
+    p[k + 1] = -mesh->x[3 * v[a] + k];
+    for (int b = 0; b < 4; b++) p[k + 1] += 0.25 * mesh->x[3 * v[b] + k];
+  }
+}
+
+/*
+  First row of the inverse of [n b^T; b B], moments[10] = n, b, B (upper triangle, row by row): with y = B^-1 b it is (1, -y) / (n - b.y).
+*/
+static void solve_fit(const PetscReal moments[10], PetscReal row[4])
+{
+  const PetscReal *b = moments + 1, *M = moments + 4, ridge = RIDGE * (M[0] + M[3] + M[5]);
+  const PetscReal B[9] = {M[0] + ridge, M[1], M[2], M[1], M[3] + ridge, M[4], M[2], M[4], M[5] + ridge};
+  PetscReal cofactor[9], y[3];
+  const PetscReal det = SbMatDet(B);
+
+  SbMatCofactor(B, cofactor);
+  for (int k = 0; k < 3; k++) y[k] = SbDot3(cofactor + 3 * k, b) / det;
+  row[0] = 1. / (moments[0] - SbDot3(b, y));
+  for (int k = 0; k < 3; k++) row[k + 1] = -y[k] * row[0];
+}
+
+static PetscErrorCode create_fits(SbRecovery r)
+{
+  SbMesh mesh = r->mesh;
+  const PetscInt n = r->nlayer * mesh->nvert_owned;
+  PetscReal *moments;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscCalloc1(10 * (size_t)n, &moments));
+  PetscCall(PetscCalloc1(4 * (size_t)n, &r->row));
+  for (PetscInt i = 0; i < 4 * mesh->ncell; i++) {
+    PetscReal p[4], *sum = moments + 10 * r->slot[i];
+
+    if (mesh->cell[i] >= mesh->nvert_owned) continue;
+    monomials(mesh, i / 4, (int)(i % 4), p);
+    for (int a = 0; a < 4; a++) {
+      for (int b = a; b < 4; b++) *sum++ += p[a] * p[b];
+    }
+  }
+  for (PetscInt k = 0; k < n; k++) {
+    if (moments[10 * k] > 0.) solve_fit(moments + 10 * k, r->row + 4 * k);
+  }
+  PetscCall(PetscFree(moments));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbRecoveryCreate(SbMesh mesh, SbRecovery *recovery)
+{
+  SbRecovery r;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscNew(&r));
+  r->mesh = mesh;
+  PetscCall(create_links(r));
+  PetscCall(create_slots(r));
+  PetscCall(create_fits(r));
+  PetscCall(PetscMalloc1(9 * (size_t)r->nlayer * mesh->nvert, &r->value));
+  *recovery = r;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbRecoveryDestroy(SbRecovery *recovery)
+{
+  SbRecovery r = *recovery;
+
+  PetscFunctionBeginUser;
+  if (!r) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscSFDestroy(&r->cell));
+  PetscCall(PetscSFDestroy(&r->vert));
+  PetscCall(PetscFree(r->slot));
+  PetscCall(PetscFree(r->row));
+  PetscCall(PetscFree(r->value));
+  PetscCall(PetscFree(*recovery));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbRecoveryApply(SbRecovery r, PetscReal P[])
+{
+  SbMesh mesh = r->mesh;
+
+  PetscFunctionBeginUser;
+  PetscCall(update_ghosts(r->cell, 9, MPIU_REAL, P));
+  PetscCall(PetscArrayzero(r->value, 9 * (size_t)r->nlayer * mesh->nvert));
+  for (PetscInt i = 0; i < 4 * mesh->ncell; i++) {
+    const PetscReal *from = P + 9 * (i / 4), *row;
+    PetscReal p[4], weight, *value = r->value + 9 * r->slot[i];
+
+    if (mesh->cell[i] >= mesh->nvert_owned) continue;
+    row = r->row + 4 * r->slot[i];
+    monomials(mesh, i / 4, (int)(i % 4), p);
+    weight = row[0] + SbDot3(row + 1, p + 1);
+    for (int k = 0; k < 9; k++) value[k] += weight * from[k];
+  }
+  PetscCall(update_ghosts(r->vert, 9 * r->nlayer, MPIU_REAL, r->value));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+const PetscReal *SbRecoveryCorner(SbRecovery r, PetscInt cell, int a)
+{
+  return r->value + 9 * r->slot[4 * cell + a];
+}

@@ -1,0 +1,509 @@
+// @ranks 1
+// @needs mumps
+// @timeout 300
+/*
+  Effectivity of the estimate of the error of space: estimate over true error in the energy norm (sbestimate.h), for P1, CR and DG, on
+  problems whose stress is known, or is taken from a mesh at least twice as fine.
+
+    cube      manufactured.h, n distorted cells along an edge; at nu = 0.49999 P1 has a thousandth of the exact displacement
+    shell     Lame's hollow sphere (locking.h), edges of 0.3
+    bar       clamped at one end, under its weight, n cells across; the stress is infinite at the edge of the clamp
+    two       the bar with an upper half forty times as stiff: the stress jumps where they meet
+    turned    the bar with a nonlinear law, its end turned by more than half a radian
+    squeeze   a plate between two stiff ones that it sticks to, driven together: no loads, so a locked answer has too much energy, not too
+              little
+    sphere    a rigid sphere that is pressed into a quarter of a block
+    wave      a rod that vibrates along its axis: half of what loads it is inertia
+
+  Each ratio must lie between 0.6 and 1.3 (measured: 0.65 to 1.20). The last two columns are what other estimators say on P1: recovery
+  alone (Zienkiewicz and Zhu 1992), which does not see what has locked; and jumps of tractions (Verfuerth 1996), eta^2 = c sum_F h |F| |[P N]|^2 / mu with c
+  such that it is right for the cube, n = 16 and nu = 0.3, which grow beyond the error where the pressure oscillates.
+*/
+#include "locking.h"
+
+typedef struct {
+  const char *problem, *element;
+  PetscInt n;
+  PetscReal nu;
+} Case;
+
+/* Stress of the continuum at a rest position, Pa. */
+typedef void (*Exact)(PetscReal nu, const PetscReal x[3], PetscReal S[9]);
+
+static void exact_cube(PetscReal nu, const PetscReal x[3], PetscReal S[9])
+{
+  const PetscReal mu = 3. / (2. * (1. + nu));
+  PetscReal u[3], G[9];
+
+  manufactured_exact(x, u, G);
+  for (int k = 0; k < 9; k++) S[k] = mu * (G[k] + G[3 * (k % 3) + k / 3]);
+}
+
+static void exact_shell(PetscReal nu, const PetscReal x[3], PetscReal S[9])
+{
+  const PetscReal r = PetscSqrtReal(SbDot3(x, x)), radial = (1. - 8. / (r * r * r)) / 7.,
+                  hoop = (1. + 4. / (r * r * r)) / 7.;
+
+  (void)nu;
+  for (int k = 0; k < 9; k++) S[k] = (k % 4 == 0) * hoop + (radial - hoop) * x[k / 3] * x[k % 3] / (r * r);
+}
+
+/* Rod of length 1, E = 1, rho = 1, nu = 0, the end x = 0 held: u_x = (1 - cos(k t)) sin(k x), k = pi/2, at k t = pi. */
+static void exact_wave(PetscReal nu, const PetscReal x[3], PetscReal S[9])
+{
+  (void)nu;
+  for (int k = 0; k < 9; k++) S[k] = 0.;
+  S[0] = PETSC_PI * PetscCosReal(0.5 * PETSC_PI * x[0]);
+}
+
+/* 1/2 s : C^-1 : s, J/m^3, s the symmetric part of R^T T (R NULL: of T). */
+static PetscReal energy(SbMaterial m, const PetscReal R[9], const PetscReal T[9])
+{
+  PetscReal s[9], square = 0., trace;
+
+  if (R)
+    SbMatTransposeMul(R, T, s);
+  else
+    memcpy(s, T, sizeof(s));
+  for (int k = 0; k < 9; k++) square += PetscSqr(0.5 * (s[k] + s[3 * (k % 3) + k / 3]));
+  trace = s[0] + s[4] + s[8];
+  return (square - trace * trace / 3.) / (4. * m->mu) + trace * trace / (18. * m->lambda + 12. * m->mu);
+}
+
+/* Stresses of a solved run. */
+typedef struct {
+  PetscInt n;
+  PetscReal *x, *V; /* [n][3] centroids, m; volumes, m^3 */
+  PetscReal *P, *R; /* [n][9] */
+  PetscInt *material;
+} Stress;
+
+static PetscErrorCode stress_get(SbModel m, Vec U, Stress *s)
+{
+  const PetscInt n = m->mesh->ncell;
+  const PetscReal *u;
+  PetscReal *psi;
+
+  PetscFunctionBeginUser;
+  s->n = n;
+  PetscCall(PetscMalloc5(3 * n, &s->x, n, &s->V, 9 * n, &s->P, 9 * n, &s->R, n, &s->material));
+  PetscCall(PetscMalloc1(n, &psi));
+  PetscCall(SbSpaceGetLocalRead(m->space, U, &u));
+  PetscCall(SbSpaceCellPiola(m->space, u, s->P, s->R, psi));
+  for (PetscInt c = 0; c < n; c++) {
+    VerifyCell cell;
+
+    verify_cell(m->space, u, c, &cell);
+    s->V[c] = cell.V;
+    s->material[c] = m->mesh->cell_material[c];
+    for (int k = 0; k < 3; k++)
+      s->x[3 * c + k] = 0.25 * (cell.x[0][k] + cell.x[1][k] + cell.x[2][k] + cell.x[3][k]);
+  }
+  PetscCall(SbSpaceRestoreLocalRead(m->space, U, &u));
+  PetscCall(PetscFree(psi));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode stress_free(Stress *s)
+{
+  PetscFunctionBeginUser;
+  PetscCall(PetscFree5(s->x, s->V, s->P, s->R, s->material));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Square of the error against an exact stress. */
+static PetscErrorCode exact_error(SbModel m, Vec U, PetscReal nu, Exact exact, PetscReal *error2)
+{
+  PetscReal b[14][4], w[14];
+  Stress s;
+
+  PetscFunctionBeginUser;
+  manufactured_rule(b, w);
+  PetscCall(stress_get(m, U, &s));
+  *error2 = 0.;
+  for (PetscInt c = 0; c < s.n; c++) {
+    const PetscInt *v = m->mesh->cell + 4 * c;
+
+    for (int q = 0; q < 14; q++) {
+      PetscReal p[3] = {0., 0., 0.}, S[9];
+
+      for (int a = 0; a < 4; a++) {
+        for (int k = 0; k < 3; k++) p[k] += b[q][a] * m->mesh->x[3 * v[a] + k];
+      }
+      exact(nu, p, S);
+      for (int k = 0; k < 9; k++) S[k] -= s.P[9 * c + k];
+      *error2 += w[q] * s.V[c] * energy(m->material[s.material[c]], NULL, S);
+    }
+  }
+  PetscCall(stress_free(&s));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Square of the error against the stresses of a finer mesh, by their centroids. */
+static PetscErrorCode finer_error(SbModel m, Vec U, const Stress *fine, PetscReal *error2)
+{
+  SbMesh mesh = m->mesh;
+  PetscReal(*inverse)[9]; /* rows: gradients of the barycentric coordinates of vertices 1..3 */
+  Stress s;
+
+  PetscFunctionBeginUser;
+  PetscCall(stress_get(m, U, &s));
+  PetscCall(PetscMalloc1(s.n, &inverse));
+  for (PetscInt c = 0; c < s.n; c++) {
+    const PetscInt *v = mesh->cell + 4 * c;
+    PetscReal e[9];
+
+    for (int k = 0; k < 9; k++) e[k] = mesh->x[3 * v[1 + k / 3] + k % 3] - mesh->x[3 * v[0] + k % 3];
+    SbMatCofactor(e, inverse[c]);
+    for (int k = 0; k < 9; k++) inverse[c][k] /= 6. * s.V[c];
+  }
+  *error2 = 0.;
+  for (PetscInt f = 0; f < fine->n; f++) {
+    PetscReal best = -PETSC_MAX_REAL, S[9];
+    PetscInt at = 0;
+
+    /* the cell that it lies in, or nearly so where surfaces are not the same */
+    for (PetscInt c = 0; c < s.n && best < 0.; c++) {
+      PetscReal d[3], b[4];
+
+      for (int k = 0; k < 3; k++) d[k] = fine->x[3 * f + k] - mesh->x[3 * mesh->cell[4 * c] + k];
+      for (int a = 0; a < 3; a++) b[a] = SbDot3(inverse[c] + 3 * a, d);
+      b[3] = PetscMin(PetscMin(b[0], b[1]), PetscMin(b[2], 1. - b[0] - b[1] - b[2]));
+      if (b[3] > best && s.material[c] == fine->material[f]) {
+        best = b[3];
+        at = c;
+      }
+    }
+    for (int k = 0; k < 9; k++) S[k] = fine->P[9 * f + k] - s.P[9 * at + k];
+    *error2 += fine->V[f] * energy(m->material[s.material[at]], s.R + 9 * at, S);
+  }
+  PetscCall(PetscFree(inverse));
+  PetscCall(stress_free(&s));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* sum over inner faces of h |F| |[P N]|^2 / mu, h |F| the mean of the two volumes; without the constant. */
+static PetscErrorCode jump_estimate(SbModel m, Vec U, PetscReal *eta2)
+{
+  SbMesh mesh = m->mesh;
+  PetscInt *neighbour;
+  Stress s;
+
+  PetscFunctionBeginUser;
+  PetscCall(stress_get(m, U, &s));
+  PetscCall(SbMeshNeighbours(mesh, &neighbour));
+  *eta2 = 0.;
+  for (PetscInt i = 0; i < 4 * mesh->ncell; i++) {
+    const PetscInt c = i / 4, other = neighbour[i], *v = mesh->cell + 4 * c;
+    const PetscReal *x[3];
+    PetscReal p[3], q[3], N[3], jump = 0.;
+
+    if (other < c) continue;
+    for (int k = 0; k < 3; k++) x[k] = mesh->x + 3 * v[(i + 1 + k) % 4];
+    for (int k = 0; k < 3; k++) {
+      p[k] = x[1][k] - x[0][k];
+      q[k] = x[2][k] - x[0][k];
+    }
+    SbCross(p, q, N);
+    for (int k = 0; k < 3; k++)
+      jump += PetscSqr(SbDot3(s.P + 9 * c + 3 * k, N) - SbDot3(s.P + 9 * other + 3 * k, N));
+    *eta2 += 0.5 * (s.V[c] + s.V[other]) * jump / SbDot3(N, N) / m->material[s.material[c]]->mu;
+  }
+  PetscCall(PetscFree(neighbour));
+  PetscCall(stress_free(&s));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* One row of the table. */
+static PetscErrorCode report(const Case *c, TestScene *t, PetscReal error2)
+{
+  const PetscReal jump = 0.143; /* c */
+  const PetscBool stiff = (PetscBool)!strcmp(c->element, "p1");
+  SbRun run = t->run;
+  SbSpaceEstimate est;
+  PetscReal ratio, other = 0.;
+  char others[64] = "| |";
+
+  PetscFunctionBeginUser;
+  PetscCall(SbSpaceEstimateCreate(t->model, &est));
+  PetscCall(SbSpaceEstimateCompute(est, strcmp(c->problem, "wave") ? 1. : 2., run->U, run->V, run->A));
+  ratio = PetscSqrtReal(est->body2[0] / error2);
+  if (stiff) {
+    PetscCall(jump_estimate(t->model, run->U, &other));
+    PetscCall(PetscSNPrintf(others, sizeof(others), "| %.2f | %.2f |",
+                            (double)(ratio / PetscSqrtReal(est->factor[0])),
+                            (double)PetscSqrtReal(jump * other / error2)));
+  }
+  PetscCall(PetscPrintf(PETSC_COMM_WORLD, "| %s | %s | %d | %g | %.3g | %.3g | %.2f %s\n", c->problem,
+                        c->element, (int)c->n, (double)c->nu,
+                        (double)PetscSqrtReal(est->body2[0] / est->strain[0]),
+                        (double)PetscSqrtReal(error2 / est->strain[0]), (double)ratio, others));
+  SB_CHECK(ratio > 0.6 && ratio < 1.3, "%s, %s, n %d, nu %g: the estimate is %g of the error", c->problem,
+           c->element, (int)c->n, (double)c->nu, (double)ratio);
+  PetscCall(SbSpaceEstimateDestroy(&est));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ problems with a known stress */
+
+static PetscErrorCode check_exact(const Case *c, const char *scene, const char *mesh, Exact exact)
+{
+  char more[1024];
+  PetscReal error2 = 0.;
+  LockingCost cost;
+  TestScene t;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscSNPrintf(more, sizeof(more), "-body_a_mesh %s -body_a_element %s", mesh, c->element));
+  PetscCall(locking_run(scene, more, &t, &cost));
+  PetscCall(exact_error(t.model, t.run->U, c->nu, exact, &error2));
+  PetscCall(report(c, &t, error2));
+  PetscCall(test_scene_close(&t));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode check_cube(const char *element, PetscInt n, PetscReal nu)
+{
+  const Case c = {"cube", element, n, nu};
+  char scene[VERIFY_TEXT], mesh[512];
+
+  PetscFunctionBeginUser;
+  PetscCall(verify_distorted_box((const PetscInt[3]){n, n, n}, (const PetscReal[3]){1., 1., 1.}, mesh));
+  PetscCall(manufactured_scene(nu, scene, sizeof(scene)));
+  PetscCall(PetscStrlcat(scene, " -solver mumps", sizeof(scene)));
+  PetscCall(check_exact(&c, scene, mesh, exact_cube));
+  PetscCall(verify_mesh_remove(mesh));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode check_shell(const char *element, PetscReal nu)
+{
+  const Case c = {"shell", element, 3, nu};
+  char scene[VERIFY_TEXT];
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscSNPrintf(
+    scene, sizeof(scene),
+    "-bodies a -body_a_material linear -body_a_young 1 -body_a_poisson %.17g -body_a_density 1 "
+    "-effects x,y,z,push -effect_x_type support -effect_x_on x0 -effect_x_components x "
+    "-effect_y_type support -effect_y_on y0 -effect_y_components y -effect_z_type support -effect_z_on z0 "
+    "-effect_z_components z -effect_push_type pressure -effect_push_on inside -effect_push_value 1 "
+    "-effect_push_follower no -time static -solver mumps",
+    (double)nu));
+  PetscCall(check_exact(&c, scene, "meshes/shell.msh", exact_shell));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode check_wave(const char *element, PetscInt n)
+{
+  const Case c = {"wave", element, n, 0.};
+  char mesh[512];
+
+  PetscFunctionBeginUser;
+  PetscCall(
+    verify_distorted_box((const PetscInt[3]){4 * n, n, n}, (const PetscReal[3]){1., 0.25, 0.25}, mesh));
+  PetscCall(check_exact(
+    &c,
+    "-bodies a -body_a_material linear -body_a_young 1 -body_a_poisson 0 -body_a_density 1 -sets root "
+    "-set_root_at plane:1,0,0,0 -effects hold,load -effect_hold_type support -effect_hold_on root "
+    "-effect_load_type body_force -effect_load_density (pi/2)^2*sin(pi/2*x);0;0 -time newmark -ts_dt 0.1 "
+    "-ts_max_time 2 -ksp_rtol 1e-10",
+    mesh, exact_wave));
+  PetscCall(verify_mesh_remove(mesh));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ problems with a finer mesh */
+
+/* A box of shape[3] n cells and this size, bent by `map` if not NULL; `options` of the scene. */
+typedef struct {
+  const char *name, *options;
+  PetscInt shape[3];
+  PetscReal size[3];
+  VerifyMap map;
+} Problem;
+
+#define BAR                                                                                               \
+  "-bodies a -body_a_young 5e4 -body_a_density 1000 -sets root -set_root_at plane:1,0,0,0 -effects hold," \
+  "weight -effect_hold_type support -effect_hold_on root -effect_weight_type gravity -time static "
+#define WEIGHT "-effect_weight_vector 0,0,-9.81 "
+
+static PetscErrorCode open_problem(const Problem *p, const Case *c, TestScene *t)
+{
+  const PetscInt n[3] = {p->shape[0] * c->n, p->shape[1] * c->n, p->shape[2] * c->n};
+  char mesh[512], more[1024];
+  LockingCost cost;
+
+  PetscFunctionBeginUser;
+  if (p->map)
+    PetscCall(verify_mesh_write(n, p->map, (void *)(uintptr_t)p->size, mesh));
+  else
+    PetscCall(verify_distorted_box(n, p->size, mesh));
+  PetscCall(PetscSNPrintf(more, sizeof(more), "-body_a_mesh %s -body_a_element %s -body_a_poisson %.17g",
+                          mesh, c->element, (double)c->nu));
+  PetscCall(locking_run(p->options, more, t, &cost));
+  PetscCall(verify_mesh_remove(mesh));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* `cases` end with one without an element; `fine` is what they are compared with, its nu that of all. */
+static PetscErrorCode check_finer(const Problem *p, PetscReal nu, Case fine, const Case cases[])
+{
+  Stress stress;
+  TestScene t;
+
+  PetscFunctionBeginUser;
+  fine.nu = nu;
+  PetscCall(open_problem(p, &fine, &t));
+  PetscCall(stress_get(t.model, t.run->U, &stress));
+  PetscCall(test_scene_close(&t));
+  for (; cases->element; cases++) {
+    const Case c = {p->name, cases->element, cases->n, nu};
+    PetscReal error2 = 0.;
+
+    PetscCall(open_problem(p, &c, &t));
+    PetscCall(finer_error(t.model, t.run->U, &stress, &error2));
+    PetscCall(report(&c, &t, error2));
+    PetscCall(test_scene_close(&t));
+  }
+  PetscCall(stress_free(&stress));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* A regular box. */
+static void straight_map(const PetscInt n[3], const PetscInt at[3], PetscReal x[3], void *ctx)
+{
+  const PetscReal *size = (const PetscReal *)ctx;
+
+  (void)n;
+  (void)at;
+  for (int k = 0; k < 3; k++) x[k] *= size[k];
+}
+
+/* Cells grow with the distance from the corner (0, 0, 0), which is on top. */
+static void sphere_map(const PetscInt n[3], const PetscInt at[3], PetscReal x[3], void *ctx)
+{
+  (void)n;
+  (void)at;
+  (void)ctx;
+  for (int k = 0; k < 3; k++) {
+    const PetscReal from = k == 2 ? 1. - x[k] : x[k];
+
+    x[k] = (PetscExpReal(3. * from) - 1.) / (PetscExpReal(3.) - 1.);
+  }
+  x[2] = -x[2];
+}
+
+static PetscErrorCode check_bars(void)
+{
+  static const Problem bar = {
+    "bar", BAR WEIGHT "-body_a_material linear -solver mumps", {4, 1, 1}, {0.4, 0.1, 0.1}, NULL};
+  static const Problem two = {
+    "two",
+    BAR WEIGHT
+    "-body_a_material linear -body_a_inclusions far -set_far_at box:0,0,0.05,0.4,0.1,0.1 -sets root,far "
+    "-inclusion_far_material linear -inclusion_far_young 2e6 -inclusion_far_poisson 0.3 "
+    "-inclusion_far_density 1000 -solver mumps",
+    {4, 1, 1},
+    {0.4, 0.1, 0.1},
+    straight_map};
+  static const Case cases[] = {{.element = "p1", .n = 2},
+                               {.element = "p1", .n = 4},
+                               {.element = "cr", .n = 2},
+                               {.element = "dg", .n = 2},
+                               {.element = NULL}};
+
+  PetscFunctionBeginUser;
+  PetscCall(check_finer(&bar, 0.3, (Case){.element = "cr", .n = 6}, cases));
+  PetscCall(check_finer(&bar, 0.4999, (Case){.element = "cr", .n = 6}, cases));
+  PetscCall(check_finer(&two, 0.3, (Case){.element = "cr", .n = 6}, cases));
+  PetscCall(check_finer(&two, 0.4999, (Case){.element = "cr", .n = 6}, cases));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode check_squeeze(void)
+{
+  static const Problem squeeze = {
+    "squeeze",
+    "-bodies a -body_a_material linear -body_a_young 5e4 -body_a_density 1000 -sets low,high "
+    "-set_low_at plane:0,0,1,0 -set_high_at plane:0,0,1,0.1 -effects hold,press -effect_hold_type support "
+    "-effect_hold_on low -effect_press_type drive -effect_press_on high "
+    "-effect_press_displacement 0;0;-0.01 -time static -solver mumps",
+    {2, 2, 1},
+    {0.2, 0.2, 0.1},
+    NULL};
+  static const Case cases[] = {
+    {.element = "p1", .n = 2}, {.element = "p1", .n = 3}, {.element = "cr", .n = 2}, {.element = NULL}};
+
+  PetscFunctionBeginUser;
+  PetscCall(check_finer(&squeeze, 0.3, (Case){.element = "cr", .n = 6}, cases));
+  PetscCall(check_finer(&squeeze, 0.499, (Case){.element = "cr", .n = 6}, cases));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* law: with its options and the weight in m/s^2. */
+static PetscErrorCode check_turned(const char *name, const char *law)
+{
+  static const Case cases[] = {{.element = "p1", .n = 2}, {.element = "cr", .n = 2}, {.element = NULL}};
+  char options[VERIFY_TEXT];
+  const Problem turned = {name, options, {4, 1, 1}, {0.4, 0.1, 0.1}, NULL};
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscSNPrintf(options, sizeof(options), BAR "-body_a_material %s -solver mumps", law));
+  PetscCall(check_finer(&turned, 0.3, (Case){.element = "cr", .n = 4}, cases));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Radius of the sphere 1 m, depth 0.01 m: by Hertz the radius of contact is 0.1 m, two or four cells. */
+static PetscErrorCode check_sphere(void)
+{
+  static const Problem sphere = {
+    "sphere",
+    "-bodies a -body_a_material linear -body_a_young 1e5 -body_a_density 1 -sets x0,y0,z1,top "
+    "-set_x0_at plane:1,0,0,0 -set_y0_at plane:0,1,0,0 -set_z1_at plane:0,0,1,-1 -set_top_at plane:0,0,1,0 "
+    "-time static -ksp_rtol 1e-9 -effects x,y,z,ball -effect_x_type support -effect_x_on x0 "
+    "-effect_x_components x -effect_y_type support -effect_y_on y0 -effect_y_components y "
+    "-effect_z_type support -effect_z_on z1 -effect_ball_type contact -effect_ball_on top "
+    "-effect_ball_obstacle sphere:0,0,0.99,1",
+    {1, 1, 1},
+    {1., 1., 1.},
+    sphere_map};
+  static const Case cases[] = {
+    {.element = "p1", .n = 4}, {.element = "p1", .n = 8}, {.element = "cr", .n = 4}, {.element = NULL}};
+
+  PetscFunctionBeginUser;
+  PetscCall(check_finer(&sphere, 0.3, (Case){.element = "p1", .n = 16}, cases));
+  PetscCall(check_finer(&sphere, 0.45, (Case){.element = "p1", .n = 16}, cases));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+int main(int argc, char **argv)
+{
+  static const PetscReal nu[4] = {0.3, 0.45, 0.499, 0.49999};
+
+  SB_TEST_BEGIN(argc, argv);
+  PetscCall(PetscPrintf(PETSC_COMM_WORLD,
+                        "| problem | element | n | nu | estimate | error | ratio | recovery alone "
+                        "| jumps |\n|---|---|---|---|---|---|---|---|---|\n"));
+  for (int i = 0; i < 4; i++) {
+    for (PetscInt n = 4; n <= 16; n *= 2) PetscCall(check_cube("p1", n, nu[i]));
+    PetscCall(check_cube("cr", 4, nu[i]));
+    if (i % 3 == 0) PetscCall(check_cube("cr", 8, nu[i]));
+    PetscCall(check_cube("dg", 4, nu[i]));
+  }
+  for (int i = 0; i < 4; i++) {
+    PetscCall(check_shell("p1", nu[i]));
+    PetscCall(check_shell("cr", nu[i]));
+    if (i % 3 == 0) PetscCall(check_shell("dg", nu[i]));
+  }
+  PetscCall(check_bars());
+  PetscCall(check_squeeze());
+  PetscCall(
+    check_turned("turned, co-rotated", "corotated -body_a_tangent exact -effect_weight_vector 0,0,-4"));
+  PetscCall(check_turned("turned, neo-Hookean", "neohookean -effect_weight_vector 0,0,-2"));
+  PetscCall(check_sphere());
+  PetscCall(check_wave("p1", 2));
+  PetscCall(check_wave("p1", 4));
+  PetscCall(check_wave("cr", 2));
+  SB_TEST_END();
+}
