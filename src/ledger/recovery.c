@@ -10,8 +10,7 @@
   of a body; constants are recovered whatever it is. Only cells of one material are fitted together, because the stress jumps where the
   material does: a vertex has one value for each material around it, at most `nlayer`. Bodies have no vertices in common.
 
-  p(X_v) is a fixed sum of the P_c; what is kept of the fit is the first row of the inverse of its 4x4 matrix. An owned vertex has
-  all its cells on the rank, so ghosts are needed only of the P_c, before, and of the values, after.
+  p(X_v) is a fixed sum of the P_c, of which the weights are kept. An owned vertex has all its cells on the rank, so ghosts are needed only of the P_c, before, and of the values, after.
 */
 #include "recovery.h"
 #include "sbkernel.h"
@@ -19,11 +18,11 @@
 #define RIDGE 0.05 /* r above, as a part of the sum of squares of distances */
 
 struct _p_SbRecovery {
-  SbMesh mesh;        /* borrowed */
-  PetscInt nlayer;    /* most materials that meet at a vertex, over all ranks */
-  PetscInt *slot;     /* [ncell][4] where the value for a corner of a cell is: nlayer vertex + layer */
-  PetscReal *row;     /* [nvert_owned nlayer][4] first row of the inverse */
-  PetscReal *value;   /* [nvert nlayer][9] */
+  SbMesh mesh;       /* borrowed */
+  PetscInt nlayer;   /* most materials that meet at a vertex, over all ranks */
+  PetscInt *slot;    /* [ncell][4] where the value for a corner of a cell is: nlayer vertex + layer */
+  PetscReal *weight; /* [ncell][4] of a cell's P in the value for a corner; 0 where the vertex is not owned */
+  PetscReal *value;  /* [nvert nlayer][9] */
   PetscSF cell, vert; /* from owned ones to their ghosts; NULL on one rank */
 };
 
@@ -172,17 +171,18 @@ static void solve_fit(const PetscReal moments[10], PetscReal row[4])
   for (int k = 0; k < 3; k++) row[k + 1] = -y[k] * row[0];
 }
 
-static PetscErrorCode create_fits(SbRecovery r)
+static PetscErrorCode create_weights(SbRecovery r)
 {
   SbMesh mesh = r->mesh;
   const PetscInt n = r->nlayer * mesh->nvert_owned;
-  PetscReal *moments;
+  PetscReal *moments, *row, p[4];
 
   PetscFunctionBeginUser;
   PetscCall(PetscCalloc1(10 * (size_t)n, &moments));
-  PetscCall(PetscCalloc1(4 * (size_t)n, &r->row));
+  PetscCall(PetscMalloc1(4 * (size_t)n, &row));
+  PetscCall(PetscCalloc1(4 * (size_t)mesh->ncell, &r->weight));
   for (PetscInt i = 0; i < 4 * mesh->ncell; i++) {
-    PetscReal p[4], *sum = moments + 10 * r->slot[i];
+    PetscReal *sum = moments + 10 * r->slot[i];
 
     if (mesh->cell[i] >= mesh->nvert_owned) continue;
     monomials(mesh, i / 4, (int)(i % 4), p);
@@ -191,9 +191,15 @@ static PetscErrorCode create_fits(SbRecovery r)
     }
   }
   for (PetscInt k = 0; k < n; k++) {
-    if (moments[10 * k] > 0.) solve_fit(moments + 10 * k, r->row + 4 * k);
+    if (moments[10 * k] > 0.) solve_fit(moments + 10 * k, row + 4 * k);
+  }
+  for (PetscInt i = 0; i < 4 * mesh->ncell; i++) {
+    if (mesh->cell[i] >= mesh->nvert_owned) continue;
+    monomials(mesh, i / 4, (int)(i % 4), p);
+    for (int a = 0; a < 4; a++) r->weight[i] += row[4 * r->slot[i] + a] * p[a];
   }
   PetscCall(PetscFree(moments));
+  PetscCall(PetscFree(row));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -206,7 +212,7 @@ PetscErrorCode SbRecoveryCreate(SbMesh mesh, SbRecovery *recovery)
   r->mesh = mesh;
   PetscCall(create_links(r));
   PetscCall(create_slots(r));
-  PetscCall(create_fits(r));
+  PetscCall(create_weights(r));
   PetscCall(PetscMalloc1(9 * (size_t)r->nlayer * mesh->nvert, &r->value));
   *recovery = r;
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -221,7 +227,7 @@ PetscErrorCode SbRecoveryDestroy(SbRecovery *recovery)
   PetscCall(PetscSFDestroy(&r->cell));
   PetscCall(PetscSFDestroy(&r->vert));
   PetscCall(PetscFree(r->slot));
-  PetscCall(PetscFree(r->row));
+  PetscCall(PetscFree(r->weight));
   PetscCall(PetscFree(r->value));
   PetscCall(PetscFree(*recovery));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -235,13 +241,9 @@ PetscErrorCode SbRecoveryApply(SbRecovery r, PetscReal P[])
   PetscCall(update_ghosts(r->cell, 9, MPIU_REAL, P));
   PetscCall(PetscArrayzero(r->value, 9 * (size_t)r->nlayer * mesh->nvert));
   for (PetscInt i = 0; i < 4 * mesh->ncell; i++) {
-    const PetscReal *from = P + 9 * (i / 4), *row;
-    PetscReal p[4], weight, *value = r->value + 9 * r->slot[i];
+    const PetscReal *from = P + 9 * (i / 4), weight = r->weight[i];
+    PetscReal *value = r->value + 9 * r->slot[i];
 
-    if (mesh->cell[i] >= mesh->nvert_owned) continue;
-    row = r->row + 4 * r->slot[i];
-    monomials(mesh, i / 4, (int)(i % 4), p);
-    weight = row[0] + SbDot3(row + 1, p + 1);
     for (int k = 0; k < 9; k++) value[k] += weight * from[k];
   }
   PetscCall(update_ghosts(r->vert, 9 * r->nlayer, MPIU_REAL, r->value));
