@@ -165,6 +165,11 @@ solvers: deps ## linear solvers for CR and DG near nu = 1/2, measured into docs/
 	$(AGAIN) $(BUILD)/tests/perf/solvers
 	@scripts/solvers --build $(BUILD) $(if $(QUICK),--quick)
 
+accuracy: deps ## error against time for every choice, measured into docs/accuracy.md with plots and a CSV (about 12 minutes); QUICK=1: a test, in build
+	$(AGAIN) bin/supple
+	@scripts/venv
+	@.venv/bin/python scripts/accuracy --build $(BUILD) $(if $(QUICK),--quick)
+
 docs: bin/supple ## docs/options.md from the option table
 	bin/supple -options_markdown docs/options.md
 
@@ -180,9 +185,9 @@ clean: ## remove what was built and meshed; results in out/ stay
 
 help: ## this list
 	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/  make \1|\2/p' Makefile | awk -F'|' '{ printf "%-20s%s\n", $$1, $$2 }'
-	@echo "settings: T=name (tests)  QUICK=1 (bench)  DEBUG=1  WERROR=1  V=1 (show commands)  CC=  OPT=  CFLAGS=  BUILD=  JOBS=  PREFIX=  DESTDIR=  PETSC_DIR= PETSC_ARCH="
+	@echo "settings: T=name (tests)  QUICK=1 (bench, solvers, accuracy)  DEBUG=1  WERROR=1  V=1 (show commands)  CC=  OPT=  CFLAGS=  BUILD=  JOBS=  PREFIX=  DESTDIR=  PETSC_DIR= PETSC_ARCH="
 
-.PHONY: all tests deps demo pictures check check-long check-hard stability lint sanitize memcheck bench locking solvers docs install clean help FORCE
+.PHONY: all tests deps demo pictures check check-long check-hard stability lint sanitize memcheck bench locking solvers accuracy docs install clean help FORCE
 .SECONDARY:
 .DELETE_ON_ERROR:
 -include $(wildcard $(BUILD)/src/*.d $(BUILD)/src/*/*.d $(BUILD)/tests/*/*.d)

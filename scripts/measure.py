@@ -153,6 +153,7 @@ class Plot:
         ys = [p[1] for c in self.curves for p in c[3]]
         lx, ly = self.limits(xs), self.limits(ys)
         w, h = self.WIDTH - self.LEFT - self.RIGHT, self.HEIGHT - self.TOP - self.BOTTOM
+        width = max(self.WIDTH, self.LEFT + w + 42 + 6 * max(len(c[0]) for c in self.curves))
 
         def at(x, y):
             return (
@@ -161,8 +162,8 @@ class Plot:
             )
 
         out = [
-            f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {self.WIDTH} {self.HEIGHT}" font-family="sans-serif" font-size="11">',
-            f'<rect width="{self.WIDTH}" height="{self.HEIGHT}" fill="#fff"/>',
+            f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width} {self.HEIGHT}" font-family="sans-serif" font-size="11">',
+            f'<rect width="{width}" height="{self.HEIGHT}" fill="#fff"/>',
             f'<text x="{self.LEFT}" y="18" font-size="13">{self.title}</text>',
             f'<text x="{self.LEFT + w / 2}" y="{self.HEIGHT - 10}" text-anchor="middle">{self.x}</text>',
             f'<text x="14" y="{self.TOP + h / 2}" text-anchor="middle" transform="rotate(-90 14 {self.TOP + h / 2})">{self.y}</text>',

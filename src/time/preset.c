@@ -31,7 +31,8 @@ static const SbOption rows[] = {
   {"time_newmark_gamma", SB_OPTION_REAL, 1, "", "0.5", "[0.5, 1]",
    "newmark: gamma; more than 1/2 damps and is first order"},
   {"time_predictor", SB_OPTION_CHOICE, 1, "", "none", "none|velocity",
-   "where Newton starts a step: at the old displacement, or moved on by the velocity"},
+   "where Newton starts a step: at the old displacement, or moved on by the velocity; one solve per step is "
+   "far better with it, but may blow up unless tangent is exact_spd"},
   {"time_max_cuts", SB_OPTION_INT, 1, "", "10", "[0, 60]",
    "how often a step that fails is halved before the run stops"},
   {"multipliers", SB_OPTION_CHOICE, 1, "", "auto", "auto|direct|iterative",
