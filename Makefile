@@ -165,7 +165,7 @@ solvers: deps ## linear solvers for CR and DG near nu = 1/2, measured into docs/
 	$(AGAIN) $(BUILD)/tests/perf/solvers
 	@scripts/solvers --build $(BUILD) $(if $(QUICK),--quick)
 
-accuracy: deps ## error against time for every choice, measured into docs/accuracy.md with plots and a CSV (about 12 minutes); QUICK=1: a test, in build
+accuracy: deps ## error against time for every choice, measured into docs/accuracy.md with plots and a CSV (5 to 10 minutes); QUICK=1: a test, in build
 	$(AGAIN) bin/supple
 	@scripts/venv
 	@.venv/bin/python scripts/accuracy --build $(BUILD) $(if $(QUICK),--quick)

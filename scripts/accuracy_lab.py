@@ -23,6 +23,7 @@ PALETTE = ("#b3541e", "#1f5fa8", "#2a8a57", "#8a4fa8", "#777777", "#c2185b", "#0
 SHORT, REPEATS = 1.0, 2  # CPU seconds below which a run is repeated, and how often it runs then
 LIMIT = 900  # seconds on the clock that a run may take
 BLOWN = 10.0  # relative error at which a run counts as blown up
+WILD = 0.3  # drift of the energy above which a run is about to
 LEVELS = (0.1, 0.03, 0.01, 0.003, 0.001)
 
 # ---------------------------------------------------------------- scenes
