@@ -79,6 +79,13 @@ typedef const char *SbErrorText;
   #define SB_LINESEARCH_NONE SNESLINESEARCHNONE
 #endif
 
+/* A line search of one's own: renamed between 3.18 and 3.26. */
+#if PETSC_VERSION_LT(3, 26, 0)
+  #define SbLineSearchShellSet(search, f, ctx) SNESLineSearchShellSetUserFunc(search, f, ctx)
+#else
+  #define SbLineSearchShellSet(search, f, ctx) SNESLineSearchShellSetApply(search, f, ctx)
+#endif
+
 /* Whether PETSc calls -ts_dt deprecated, in favour of -ts_time_step; here both names work with every release. */
 #if PETSC_VERSION_LT(3, 26, 0)
   #define SB_TS_DT_RENAMED 0

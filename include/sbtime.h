@@ -48,6 +48,8 @@ struct _p_SbRun {
   PetscReal arrival;                     /* the part of the step at which it did, 1: it did not */
   PetscReal spectral_radius, newmark[2]; /* newmark: beta, gamma */
   PetscInt max_cuts, static_steps;
+  PetscBool
+    free_body; /* static, without contact: nothing holds some body, and shorter load steps do not help */
   PetscBool tangent_known; /* J holds the tangent for shift_v, shift_a */
   PetscReal shift_v, shift_a;
   PetscBool saddle;       /* some effect asks for multipliers as unknowns */

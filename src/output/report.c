@@ -235,6 +235,13 @@ PetscErrorCode SbReportSummary(SbRun run)
   PetscCall(SbFramesClose(out));
   PetscCall(SbRunJson(run, out, stopped ? "stopped" : "completed", run->stop_reason));
   PetscCall(SbPhasesGet(out, &phases));
+  if (run->want_energies && run->energies.ninverted)
+    PetscCall(SbWarning(run->model->comm,
+                        "%" PetscInt_FMT
+                        " tetrahedra are inverted or flat at the end (det F down to %g): what "
+                        "they show is no deformation of a body. Smaller steps or loads may avoid it; laws "
+                        "differ in how they come back, see docs/stability.md",
+                        run->energies.ninverted, (double)run->energies.min_J));
   if (out->quiet || out->rank) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(print_phases(run, &phases));
   PetscCall(entry("steps",

@@ -147,25 +147,11 @@ static PetscErrorCode set_up_snes(SbRun run)
   for (PetscInt b = 0; b < m->nbody; b++)
     force += (m->material[b]->E + 0.01 * m->material[b]->lambda) * PetscPowReal(m->body[b].volume, 2. / 3.);
   PetscCall(SNESSetType(run->snes, m->linear ? SNESKSPONLY : SNESNEWTONLS));
-  PetscCall(SbRunSearch(run, PETSC_FALSE));
+  PetscCall(SbRunSearch(run, SB_SEARCH_NONE));
   PetscCall(SNESSetDivergenceTolerance(run->snes, SB_UNLIMITED_REAL));
-  PetscCall(SNESSetTolerances(run->snes, 1e-13 * force, m->dynamic ? 1e-6 : 1e-8, 0., 50, SB_UNLIMITED));
+  PetscCall(SNESSetTolerances(run->snes, 1e-13 * force, m->dynamic ? 1e-6 : 1e-8, 0., SB_NEWTON_ITERATIONS,
+                              SB_UNLIMITED));
   PetscCall(SNESSetErrorIfNotConverged(run->snes, PETSC_FALSE));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/*
-  Full Newton steps first, a line search when they fail. In bending and in rotation a full step has a residual thousands of
-  times larger than before, because it stretches what it should turn, and the next one removes that: a search for a smaller
-  residual creeps along where full steps need five.
-*/
-PetscErrorCode SbRunSearch(SbRun run, PetscBool on)
-{
-  SNESLineSearch search;
-
-  PetscFunctionBeginUser;
-  PetscCall(SNESGetLineSearch(run->snes, &search));
-  PetscCall(SNESLineSearchSetType(search, on ? SNESLINESEARCHBT : SB_LINESEARCH_NONE));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -206,7 +206,8 @@ static PetscErrorCode solve_end(TS ts, SNESConvergedReason *reason)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode solve_implicit(TS ts, PetscBool *ok)
+/* shortest: no shorter step will be tried. */
+static PetscErrorCode solve_implicit(TS ts, PetscBool shortest, PetscBool *ok)
 {
   SecondOrder *so = (SecondOrder *)ts->data;
   SNESConvergedReason reason;
@@ -215,9 +216,13 @@ static PetscErrorCode solve_implicit(TS ts, PetscBool *ok)
   PetscFunctionBeginUser;
   PetscCall(solve_end(ts, &reason));
   if (SbRunWorthSearch(so->run, reason)) {
-    PetscCall(SbRunSearch(so->run, PETSC_TRUE));
+    PetscCall(SbRunSearch(so->run, SB_SEARCH_RESIDUAL));
     PetscCall(solve_end(ts, &reason));
-    PetscCall(SbRunSearch(so->run, PETSC_FALSE));
+    if (shortest && SbRunWorthSearch(so->run, reason)) {
+      PetscCall(SbRunSearch(so->run, SB_SEARCH_DOWN));
+      PetscCall(solve_end(ts, &reason));
+    }
+    PetscCall(SbRunSearch(so->run, SB_SEARCH_NONE));
   }
   PetscCall(end_state(ts, so->X1));
   PetscCall(VecNorm(so->V1, NORM_INFINITY, &size));
@@ -318,7 +323,7 @@ static PetscErrorCode TSStep_SecondOrder(TS ts)
     if (is_explicit(so))
       PetscCall(solve_explicit(ts, &ok));
     else
-      PetscCall(solve_implicit(ts, &ok));
+      PetscCall(solve_implicit(ts, (PetscBool)(cuts >= so->set.max_cuts), &ok));
     if (ok) {
       PetscCall(VecCopy(so->X1, ts->vec_sol));
       PetscCall(VecCopy(so->V1, ts->vec_dot));

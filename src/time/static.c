@@ -49,32 +49,56 @@ static PetscErrorCode attempt(SbRun run, PetscReal factor, PetscReal length, Vec
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Looks for a body that nothing holds; *found, and the run's reason to stop says so. */
+static PetscErrorCode look_for_free_body(SbRun run, PetscReal factor, PetscBool *found)
+{
+  PetscInt body;
+  char motion[128];
+
+  PetscFunctionBeginUser;
+  PetscCall(SbRunFreeBody(run, &body, sizeof(motion), motion));
+  *found = (PetscBool)(body >= 0);
+  run->free_body = (PetscBool)(*found && !run->model->ntouch);
+  if (*found)
+    PetscCall(SbRunFail(run, "load factor %g: nothing holds the body %s against %s; hold it by a support%s",
+                        (double)factor, run->model->body[body].name, motion,
+                        run->model->ntouch ? ", or let it come to rest in a dynamic run" : ""));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Why the solve failed. */
 static PetscErrorCode explain(SbRun run, PetscReal factor, SNESConvergedReason reason)
 {
   KSPConvergedReason kreason;
-  PetscInt body;
-  char motion[128];
+  PetscBool found;
   KSP ksp;
 
   PetscFunctionBeginUser;
-  PetscCall(SbRunFreeBody(run, &body, sizeof(motion), motion));
+  PetscCall(look_for_free_body(run, factor, &found));
+  if (found) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(SNESGetKSP(run->snes, &ksp));
   PetscCall(KSPGetConvergedReason(ksp, &kreason));
-  if (body >= 0)
-    PetscCall(SbRunFail(run, "load factor %g: nothing holds the body %s against %s; hold it by a support%s",
-                        (double)factor, run->model->body[body].name, motion,
-                        run->model->ntouch ? ", or let it come to rest in a dynamic run" : ""));
-  else
-    PetscCall(
-      SbRunFail(run,
-                "load factor %g: %s (linear solver: %s); use more -static_steps, or hold the bodies so "
-                "that they cannot move freely",
-                (double)factor, SNESConvergedReasons[reason], KSPConvergedReasons[kreason]));
+  PetscCall(SbRunFail(run,
+                      "load factor %g: %s (linear solver: %s); use more -static_steps, or hold the bodies so "
+                      "that they cannot move freely",
+                      (double)factor, SNESConvergedReasons[reason], KSPConvergedReasons[kreason]));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode solve_at(SbRun run, PetscReal factor, PetscReal length, Vec X, PetscBool *ok)
+/* Loads in balance leave a singular system with a solution, and a solver may find it with any rigid motion on top. */
+static PetscErrorCode refuse_free_body(SbRun run, PetscReal factor, PetscBool *ok)
+{
+  PetscBool found;
+
+  PetscFunctionBeginUser;
+  if (!*ok || run->steps_total || run->model->ntouch || !run->newton_step) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(look_for_free_body(run, factor, &found));
+  if (found) *ok = PETSC_FALSE;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode solve_at(SbRun run, PetscReal factor, PetscReal length, PetscBool shortest, Vec X,
+                               PetscBool *ok)
 {
   SNESConvergedReason reason;
   PetscBool far;
@@ -82,13 +106,18 @@ static PetscErrorCode solve_at(SbRun run, PetscReal factor, PetscReal length, Ve
   PetscFunctionBeginUser;
   PetscCall(attempt(run, factor, length, X, &reason));
   if (SbRunWorthSearch(run, reason)) {
-    PetscCall(SbRunSearch(run, PETSC_TRUE));
+    PetscCall(SbRunSearch(run, SB_SEARCH_RESIDUAL));
     PetscCall(attempt(run, factor, length, X, &reason));
-    PetscCall(SbRunSearch(run, PETSC_FALSE));
+    if (shortest && SbRunWorthSearch(run, reason)) {
+      PetscCall(SbRunSearch(run, SB_SEARCH_DOWN));
+      PetscCall(attempt(run, factor, length, X, &reason));
+    }
+    PetscCall(SbRunSearch(run, SB_SEARCH_NONE));
   }
   PetscCall(SbRunTooFar(run, X, &far));
   *ok = (PetscBool)(reason > 0 && !far);
   if (!*ok) PetscCall(explain(run, factor, reason));
+  PetscCall(refuse_free_body(run, factor, ok));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -109,7 +138,7 @@ PetscErrorCode SbStaticSolve(SbRun run)
     PetscBool ok = PETSC_FALSE;
 
     PetscCall(SbRunStepBegin(run, factor, next - factor));
-    PetscCall(solve_at(run, next, next - factor, X, &ok));
+    PetscCall(solve_at(run, next, next - factor, (PetscBool)(cuts >= run->max_cuts), X, &ok));
     if (!ok) {
       PetscBool simpler;
 
@@ -119,7 +148,7 @@ PetscErrorCode SbStaticSolve(SbRun run)
       if (simpler) continue;
       length *= 0.5;
       run->tangent_known = PETSC_FALSE;
-      if (++cuts > run->max_cuts) break;
+      if (run->free_body || ++cuts > run->max_cuts) break;
       continue;
     }
     run->stop_reason[0] = 0;

@@ -1,5 +1,5 @@
 /*
-  Runs hard cases (hard.h): hard -case NAME [-runs N] [-verbose], or -list.
+  Runs hard cases (hard.h): hard -case NAME [-runs N] [-verbose] [-more "OPTIONS"], or -list.
 
   -list writes one line per case: name, ranks with commas, quick runs, seconds, what is hard, separated by tabs. A case prints one
   line per limit, which tests/run and scripts/stability read:
@@ -8,9 +8,10 @@
 #include "hard.h"
 #include "../verify/verify.h"
 
-extern const HardCase HardCasesContact[], HardCasesMaterial[], HardCasesRecovery[], HardCasesTouch[];
-static const HardCase *const tables[] = {HardCasesContact, HardCasesMaterial, HardCasesRecovery,
-                                         HardCasesTouch};
+extern const HardCase HardCasesContact[], HardCasesMaterial[], HardCasesMesh[], HardCasesMotion[],
+  HardCasesRecovery[], HardCasesSolver[], HardCasesTime[], HardCasesTouch[];
+static const HardCase *const tables[] = {HardCasesContact,  HardCasesMaterial, HardCasesMesh, HardCasesMotion,
+                                         HardCasesRecovery, HardCasesSolver,   HardCasesTime, HardCasesTouch};
 
 /* ------------------------------------------------------------------ the table */
 
@@ -41,7 +42,9 @@ static PetscErrorCode find_case(const char *name, const HardCase **found)
   *found = NULL;
   for (size_t t = 0; t < PETSC_STATIC_ARRAY_LENGTH(tables); t++) {
     for (const HardCase *c = tables[t]; c->name; c++) {
-      if (!strcmp(c->name, name)) *found = c;
+      if (strcmp(c->name, name)) continue;
+      PetscCheck(!*found, PETSC_COMM_WORLD, PETSC_ERR_PLIB, "Two cases are called '%s'", name);
+      *found = c;
     }
   }
   PetscCheck(*found, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT, "No case '%s': -list names them", name);
@@ -122,24 +125,31 @@ static PetscErrorCode report(const HardCase *c, int runs, const PetscReal worst[
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode run_case(const HardCase *c, int runs, PetscBool verbose)
+static PetscErrorCode run_case(const HardCase *c, int runs, const char *more, PetscBool verbose)
 {
   char options[HARD_TEXT], path[512] = "";
   PetscReal worst[HARD_LIMITS];
 
   PetscFunctionBeginUser;
   if (c->mesh) PetscCall((*c->mesh)(path));
-  PetscCheck(snprintf(options, sizeof(options), c->options, path) < HARD_TEXT, PETSC_COMM_SELF,
-             PETSC_ERR_PLIB, "The options of %s have more than %d characters", c->name, HARD_TEXT);
+  (void)snprintf(options, sizeof(options), c->options, path);
+  PetscCall(PetscStrlcat(options, " ", sizeof(options)));
+  PetscCall(PetscStrlcat(options, more, sizeof(options)));
+  PetscCheck(strlen(options) < HARD_TEXT - 1, PETSC_COMM_SELF, PETSC_ERR_PLIB,
+             "The options of %s have more than %d characters", c->name, HARD_TEXT);
   for (PetscInt k = 0; k < runs; k++) {
     PetscReal value[HARD_QUANTITIES];
 
     PetscCall(run_once(c, options, k, verbose, value));
     for (const HardLimit *l = c->limits; l->relation; l++) {
       const PetscReal now = value[l->quantity], before = worst[l - c->limits];
-      const PetscBool more = (PetscBool)(l->relation == '<' ? !(now <= before) : !(now >= before));
+      const PetscBool holds = (PetscBool)(l->relation == '<' ? now < l->bound : now > l->bound);
+      const PetscBool worse = (PetscBool)(l->relation == '<' ? !(now <= before) : !(now >= before));
 
-      worst[l - c->limits] = !k || more ? now : before;
+      worst[l - c->limits] = !k || worse ? now : before;
+      if (!holds)
+        PetscCall(PetscPrintf(PETSC_COMM_WORLD, "  run %d: %s %g\n", (int)k,
+                              l->name ? l->name : HardQuantityName(l->quantity), (double)now));
     }
   }
   if (c->mesh) PetscCall(verify_mesh_remove(path));
@@ -149,7 +159,7 @@ static PetscErrorCode run_case(const HardCase *c, int runs, PetscBool verbose)
 
 int main(int argc, char **argv)
 {
-  char name[128];
+  char name[128], more[HARD_TEXT] = "";
   PetscBool named, list, verbose;
   PetscInt runs = 0;
   const HardCase *c;
@@ -158,6 +168,10 @@ int main(int argc, char **argv)
   PetscCall(PetscOptionsHasName(NULL, NULL, "-list", &list));
   PetscCall(PetscOptionsHasName(NULL, NULL, "-verbose", &verbose));
   PetscCall(PetscOptionsGetString(NULL, NULL, "-case", name, sizeof(name), &named));
+  /* PETSc would take options behind -more for its own */
+  for (int i = 1; i + 1 < argc; i++) {
+    if (!strcmp(argv[i], "-more")) PetscCall(PetscStrncpy(more, argv[i + 1], sizeof(more)));
+  }
   PetscCall(PetscOptionsGetInt(NULL, NULL, "-runs", &runs, NULL));
   if (list) {
     list_cases();
@@ -165,6 +179,6 @@ int main(int argc, char **argv)
   }
   PetscCheck(named, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT, "Give -case NAME, or -list");
   PetscCall(find_case(name, &c));
-  PetscCall(run_case(c, runs ? (int)runs : case_runs(c), verbose));
+  PetscCall(run_case(c, runs ? (int)runs : case_runs(c), more, verbose));
   SB_TEST_END();
 }

@@ -11,7 +11,7 @@
   These functions use limits for verdicts, not SB_CHECK(), which counts in hard.c only.
 
   `make build/tests/hard/hard`, then
-    scripts/mpi 2 build/tests/hard/hard -case spin.p1     all runs of a case; -runs 1: the first only; -verbose: each step
+    scripts/mpi 2 build/tests/hard/hard -case spin.p1     all runs of a case; -runs 1: the first only; -verbose: each step; -more "OPTIONS": on top
     tests/run --build build --group hard --match spin     cases with `quick` runs, on two ranks: what `make check` does
     tests/run --build build --group hard --all            everything, on the ranks of each case: what `make check-hard` does
     scripts/stability                                     table of the margins of the last runs; --write: into docs/stability.md
@@ -109,14 +109,14 @@ const char *HardQuantityName(HardQuantity q);
 PetscErrorCode HardNoise(HardRun *r, PetscReal amplitude, Vec X);
 /* Displacements, which start hooks are made of. Collective. */
 PetscErrorCode HardPlace(HardRun *r, void (*place)(const HardRun *r, const PetscReal x[3], PetscReal to[3]));
-PetscErrorCode HardStartRandom(HardRun *r); /* every vertex anywhere in the bounding box */
-PetscErrorCode
-HardStartPoint(HardRun *r); /* every vertex at one point, but for rounding (1e-9 of the size) */
-PetscErrorCode HardStartMirror(HardRun *r); /* mirrored at x = 0: every tet inverted */
-PetscErrorCode HardStartFlat(HardRun *r);   /* in the plane z = 0 */
+PetscErrorCode HardStartRandom(HardRun *r);     /* every vertex anywhere in the bounding box */
+PetscErrorCode HardStartPoint(HardRun *r);      /* every vertex at one point, but for 1e-4 of the size */
+PetscErrorCode HardStartExactPoint(HardRun *r); /* the same, exactly */
+PetscErrorCode HardStartMirror(HardRun *r);     /* mirrored at x = 0: every tet inverted */
+PetscErrorCode HardStartFlat(HardRun *r);       /* in the plane z = 0 */
 
 /* meshes.c: unit cubes but for what their names say. */
 PetscErrorCode HardMeshSliver(
   char path[512]); /* layer of slivers between two layers of cubes, dihedral angles below 1 degree */
 PetscErrorCode HardMeshNeedle(char path[512]); /* cells of 1 : 1 : 100 */
-PetscErrorCode HardMeshGraded(char path[512]); /* edges of 1e-4 to 1 of the longest, towards a corner */
+PetscErrorCode HardMeshGraded(char path[512]); /* edges from 1e-4 to 1, towards a corner */

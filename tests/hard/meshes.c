@@ -9,7 +9,7 @@
 
 #define SLIVER_CELLS 4
 #define SLIVER_LIFT 5e-4 /* m; the smallest dihedral angle is about 4 lift / edge */
-#define GRADED_CELLS 8
+#define GRADED_CELLS 6
 #define GRADED_RATIO 1e4
 
 static void needle(const PetscInt n[3], const PetscInt at[3], PetscReal x[3], void *ctx)
@@ -30,15 +30,16 @@ PetscErrorCode HardMeshNeedle(char path[512])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Edges along each axis are a geometric series. */
+/* Cubic shells around the corner at the origin, each so many times smaller than the next: x times r(s) / s, s = max x. */
 static void graded(const PetscInt n[3], const PetscInt at[3], PetscReal x[3], void *ctx)
 {
-  (void)ctx;
-  for (int k = 0; k < 3; k++) {
-    const PetscReal q = PetscPowReal(GRADED_RATIO, 1. / (PetscReal)(n[k] - 1));
+  const PetscReal s = PetscMax(x[0], PetscMax(x[1], x[2]));
+  const PetscReal inner =
+    (1. - s) * (PetscReal)n[0] / (PetscReal)(n[0] - 1); /* 0 outside, 1 at the smallest shell */
 
-    x[k] = (PetscPowReal(q, (PetscReal)at[k]) - 1.) / (PetscPowReal(q, (PetscReal)n[k]) - 1.);
-  }
+  (void)at;
+  (void)ctx;
+  for (int k = 0; k < 3 && s > 0.; k++) x[k] *= PetscPowReal(GRADED_RATIO, -inner) / s;
 }
 
 PetscErrorCode HardMeshGraded(char path[512])

@@ -7,6 +7,8 @@
 #include "hard.h"
 #include "../verify/verify.h"
 
+#define POINT 1e-4 /* of the size: exactly one point is an equilibrium of the neo-Hookean law */
+
 /* Random numbers in -1..1 for each number that nodes draw from, [verify_numbers()][3]; the caller frees them. */
 static PetscErrorCode draw(HardRun *r, PetscReal **value)
 {
@@ -91,10 +93,18 @@ PetscErrorCode HardStartRandom(HardRun *r)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HardStartPoint(HardRun *r)
+PetscErrorCode HardStartExactPoint(HardRun *r)
 {
   PetscFunctionBeginUser;
   PetscCall(HardPlace(r, at_origin));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HardStartPoint(HardRun *r)
+{
+  PetscFunctionBeginUser;
+  PetscCall(HardStartExactPoint(r));
+  PetscCall(HardNoise(r, POINT * r->size, r->run->U));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
