@@ -161,6 +161,8 @@ void SbCollisionHit(const Collision *c, Hit *hit);
 PetscErrorCode SbEffectRebound_Collision(SbEffect e, PetscReal *work);
 PetscErrorCode SbEffectCurb_Collision(SbEffect e, PetscReal share);
 
+/* The body whose point or edge the pair begins with. */
+PetscInt SbCollisionFirst(const Collision *c, const Hit *hit);
 /* collision.c: identity of hit i, the same for any partition, below SB_COLLISION_IDS. */
 PetscInt SbCollisionId(const Collision *c, PetscInt i);
 #define SB_COLLISION_IDS (PETSC_MAX_INT / 3)

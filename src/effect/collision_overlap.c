@@ -331,9 +331,9 @@ static PetscErrorCode find_ways(Collision *c)
 
 /* ------------------------------------------------------------------ how deep */
 
-/* One point of each body, and whether the last look saw another one near it; the same on all ranks. */
+/* One point of each body, and whether the effect is not on it; the same on all ranks. */
 typedef struct {
-  PetscReal x[3], found;
+  PetscReal x[3], none;
 } Sample;
 
 static PetscErrorCode sample_bodies(const Collision *c, PetscInt nbody, Sample sample[])
@@ -356,11 +356,9 @@ static PetscErrorCode sample_bodies(const Collision *c, PetscInt nbody, Sample s
   for (PetscInt b = 0; b < nbody; b++) {
     if (first[b] != rank) continue;
     for (int k = 0; k < 3; k++) sample[b].x[k] = s->p[3 * point[b] + k];
-    for (PetscInt i = 0; i < c->nhit && !SbCollisionOfEdges(c, &c->hit[i]); i++)
-      sample[b].found = sample[b].found || (c->hit[i].point == point[b] && c->hit[i].part != b);
   }
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, sample, (PetscMPIInt)(4 * nbody), MPIU_REAL, MPI_SUM, comm));
-  for (PetscInt b = 0; b < nbody; b++) sample[b].found += first[b] == INT_MAX; /* the effect is not on it */
+  for (PetscInt b = 0; b < nbody; b++) sample[b].none = first[b] == INT_MAX;
   PetscCall(PetscFree2(first, point));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -376,13 +374,19 @@ static PetscErrorCode refuse_swallowed(const Collision *c, const char name[])
   const SbMesh mesh = c->surface->space->mesh;
   const PetscInt nbody = mesh->nbody;
   Sample *sample;
-  PetscReal(*leave)
-    [3]; /* [nbody][nbody]: leavings less entries of half-lines from the first by facets of the second */
+  /* [nbody][nbody]: leavings less entries of half-lines from the first by facets of the second, and pairs that the last look saw */
+  PetscReal(*leave)[4];
 
   PetscFunctionBeginUser;
   PetscCall(PetscMalloc1(nbody, &sample));
   PetscCall(PetscCalloc1(nbody * nbody, &leave));
   PetscCall(sample_bodies(c, nbody, sample));
+  for (PetscInt i = 0; i < c->nhit; i++) {
+    const PetscInt a = SbCollisionFirst(c, &c->hit[i]), b = c->hit[i].part;
+
+    leave[a * nbody + b][3]++;
+    leave[b * nbody + a][3]++;
+  }
   for (PetscInt f = 0; f < c->surface->nfacet_owned; f++) {
     const PetscReal *const x[3] = {s->x + 3 * s->facet[3 * f], s->x + 3 * s->facet[3 * f + 1],
                                    s->x + 3 * s->facet[3 * f + 2]};
@@ -397,14 +401,14 @@ static PetscErrorCode refuse_swallowed(const Collision *c, const char name[])
       }
     }
   }
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, leave, (PetscMPIInt)(3 * nbody * nbody), MPIU_REAL, MPI_SUM,
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, leave, (PetscMPIInt)(4 * nbody * nbody), MPIU_REAL, MPI_SUM,
                              c->surface->space->comm));
   for (PetscInt i = 0; i < nbody * nbody; i++) {
     const PetscInt a = i / nbody, b = i % nbody;
 
     PetscCheck(
-      sample[a].found > 0 || (leave[i][0] > 0) + (leave[i][1] > 0) + (leave[i][2] > 0) < 2, PETSC_COMM_WORLD,
-      PETSC_ERR_USER_INPUT,
+      sample[a].none > 0 || leave[i][3] > 0 || (leave[i][0] > 0) + (leave[i][1] > 0) + (leave[i][2] > 0) < 2,
+      PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
       "body %s lies inside body %s, at (%g, %g, %g) m, deeper than %g m below its surface: -effect_%s_type "
       "collision cannot tell which way it came in; move one of them (-body_%s_translate), or name sets of "
       "one "

@@ -13,8 +13,7 @@ static const char *const self_names[] = {"normal_force", "contacts"};
 #define APART 4 /* columns of two bodies */
 #define SELF 2  /* and of one with itself, whose net force is zero */
 
-/* The body whose point or edge the pair begins with. */
-static PetscInt first_body(const Collision *c, const Hit *hit)
+PetscInt SbCollisionFirst(const Collision *c, const Hit *hit)
 {
   const SbDetectScene *s = &c->surface->scene;
 
@@ -111,7 +110,7 @@ void SbPairsHistory(const Collision *c, SbSpace space, PetscReal values[])
   if (!p->wanted) return;
   for (PetscInt i = 0; i < c->nhit; i++) {
     const Hit *hit = &c->hit[i];
-    const PetscInt mine = first_body(c, hit), low = PetscMin(mine, hit->body),
+    const PetscInt mine = SbCollisionFirst(c, hit), low = PetscMin(mine, hit->body),
                    high = PetscMax(mine, hit->body);
     PetscReal *at = values + p->place[p->nskin * p->slot[low] + p->slot[high]], normal[3], force[3];
     const PetscBool counts = (PetscBool)(hit->on && SbCollisionForce(c, hit) > 0);
@@ -172,7 +171,7 @@ PetscErrorCode SbEffectPlaces_Collision(SbEffect e, SbSpace space, const SbStage
 
     if (!force_of(space, hit, place.normal, place.force)) continue;
     place_of(c, hit, &place);
-    place.body[0] = first_body(c, hit);
+    place.body[0] = SbCollisionFirst(c, hit);
     place.body[1] = hit->body;
     place.gap = hit->gap;
     PetscCall(SbPlacesAdd(list, &place));
