@@ -20,13 +20,11 @@
   Overlap that is there when a step begins is not thrown out at once: a node may stay behind the obstacle by that depth, which falls to
   1/e in `recovery` steps. With springs that is the depth beyond what they give. A static run closes it at once.
 
-  What bounces is told in contact_rebound.c, forces and what is reported of them are in contact_force.c.
+  What bounces is told in contact_rebound.c, what happens where facets of a mesh meet in
+  contact_facets.c, forces and what is reported of them are in contact_force.c.
 */
 #include "contact.h"
 
-#define AVERAGED 4   /* flips of a held node between facets in a step, after which normals are averaged */
-#define KEPT 24      /* flips after which it is held on the same plane till the step ends */
-#define JUMP 1e-6    /* 1 - cosine: a flip */
 #define TOGGLES 3    /* how often a node may come within a step before it stays */
 #define PULLING 1e-6 /* of the largest contact force: what a node must pull with to leave */
 #define SETTLED 1e-4 /* of the largest contact force: what that of a spring may be off */
@@ -220,39 +218,25 @@ static PetscErrorCode setup_contact(SbEffect e, SbSpace space)
 
 /* ------------------------------------------------------------------ who touches */
 
-/*
-  Where facets of a mesh meet, a held node may slide from one to the other and back with every look: over a ridge, or in a valley where both
-  push. The normal that it needs is one between theirs. So after some of these flips the normals are averaged, which ends where forces
-  balance at the edge; after many the plane is kept. n comes in as the normal of the surface at its place.
-*/
-static void average_normal(Touch *touch, PetscReal n[3])
-{
-  PetscReal length;
-
-  if (SbDot3(n, touch->surface) < 1 - JUMP) touch->flips++;
-  for (int i = 0; i < 3; i++) touch->surface[i] = n[i];
-  if (touch->flips <= AVERAGED) return;
-  for (int i = 0; i < 3; i++) n[i] = touch->n[i] + (n[i] - touch->n[i]) / (touch->flips - AVERAGED + 1);
-  length = PetscSqrtReal(SbDot3(n, n));
-  for (int i = 0; i < 3; i++) n[i] /= length;
-}
-
 /* Gap of the node at x beyond what it is held at, with its normal and the value of n . u that puts it there. */
 static PetscReal look(const Contact *c, SbSpace space, const PetscReal x[3], Touch *touch)
 {
   const PetscReal *X = space->node_x + 3 * touch->node;
   PetscReal n[3], at[3], gap;
 
-  if (touch->flips > KEPT && touch->on) return SbDot3(touch->n, x) - SbDot3(touch->n, X) - touch->value;
+  touch->undecided = PETSC_FALSE;
+  if (SbContactKept(touch)) return SbDot3(touch->n, x) - SbDot3(touch->n, X) - touch->value;
   gap = SbContactGap(c, &c->to, x, n);
-  for (int i = 0; i < 3; i++) at[i] = x[i] - gap * n[i] - X[i]; /* from the rest position to the surface */
-  if (c->facets && touch->on)
-    average_normal(touch, n);
-  else {
-    for (int i = 0; i < 3; i++) touch->surface[i] = n[i];
+  if (touch->on && touch->valley) {
+    SbContactValley(c, space, x, gap, n, touch);
+    return gap - touch->rest;
   }
-  for (int i = 0; i < 3; i++) touch->n[i] = n[i];
-  touch->value = SbDot3(n, at) + touch->rest;
+  for (int i = 0; i < 3; i++) at[i] = x[i] - gap * n[i] - X[i]; /* from the rest position to the surface */
+  if (!c->facets || !touch->on || !SbContactFlip(c, X, x, gap, n, touch)) {
+    for (int i = 0; i < 3; i++) touch->n[i] = n[i];
+    touch->value = SbDot3(n, at) + touch->rest;
+  }
+  for (int i = 0; i < 3 && !touch->on; i++) touch->surface[i] = n[i];
   return gap - touch->rest;
 }
 
@@ -349,6 +333,7 @@ static PetscErrorCode touch_contact(SbEffect e, SbSpace space, PetscReal t, Pets
     PetscBool comes;
 
     touch->toggles = touch->flips = 0;
+    touch->valley = PETSC_FALSE;
     /* an attempt that was cut begins as it did; one that failed goes on with what it has found to touch */
     if (c->cut || c->bounce.e > 0) touch->on = touch->was;
     touch->idle = (PetscBool)(c->cut && !touch->was && !exact(c));
@@ -403,12 +388,13 @@ static PetscErrorCode hold_contact(SbEffect e, SbSpace space)
   for (PetscInt i = 0; i < c->n; i++) {
     Touch *touch = &c->touch[i];
 
-    touch->along = touch->grip.slide[0] = touch->grip.slide[1] = -1;
+    touch->along = touch->other_along = touch->grip.slide[0] = touch->grip.slide[1] = -1;
     if (!touch->on) continue;
     if (c->rows)
       PetscCall(hold_rows(c, space, touch));
     else
       touch->along = SbSpaceHold(space, touch->node, touch->n, touch->value);
+    if (touch->valley) touch->other_along = SbSpaceHold(space, touch->node, touch->other, touch->other_value);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -448,6 +434,9 @@ static PetscErrorCode measure(const Contact *c, SbSpace space, const PetscReal u
 
     if (c->rows) read_rows(c, space, u + 3 * node, touch, f);
     if (exact(c)) touch->lambda = SbContactMultiplier(c, space, touch, r + 3 * node);
+    if (touch->valley)
+      touch->other_lambda =
+        touch->other_along < 0 ? 0 : SbSpaceHoldForce(space, node, touch->other_along, r + 3 * node);
     place(space, node, u, x);
     touch->gap = look(c, space, x, touch);
     *largest = PetscMax(*largest, SbContactForce(c, touch));
@@ -471,11 +460,12 @@ static PetscBool settle_held(const Contact *c, SbSpace space, PetscReal largest,
   }
   if (touch->along < 0) return PETSC_TRUE;
   if (touch->lambda < -PULLING * largest && touch->toggles < TOGGLES) {
-    touch->on = PETSC_FALSE;
+    touch->on = touch->valley = PETSC_FALSE;
     touch->lambda = 0;
     return PETSC_FALSE;
   }
   touch->lambda = PetscMax(0, touch->lambda);
+  if (touch->undecided) return PETSC_FALSE;
   return (PetscBool)(PetscAbsReal(touch->gap) <= TOLERANCE * c->size);
 }
 

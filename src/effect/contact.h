@@ -1,5 +1,5 @@
 /*
-  contact.h - nodes of the surface against a rigid obstacle: what contact.c, contact_force.c and contact_rebound.c share.
+  contact.h - nodes of the surface against a rigid obstacle: what contact.c, contact_facets.c, contact_force.c and contact_rebound.c share.
 */
 #pragma once
 #include "friction.h"
@@ -24,8 +24,14 @@ typedef struct {
   PetscInt along;         /* number of its direction at the node, or of its row; -1: held by something else */
   PetscBool rests;        /* other rows say what its own does */
   PetscReal surface[3];   /* normal of the obstacle at the last look */
-  PetscReal n[3];         /* normal that it is held along, outwards from the obstacle */
-  PetscReal value;        /* n . u that puts it on the obstacle, m */
+  PetscReal level;        /* n . u on the plane of that facet, m */
+  PetscBool valley;       /* it is held on two facets for the time of a solve (contact_facets.c) */
+  PetscBool undecided;    /* the solves go on for that */
+  PetscReal other[3], other_value; /* the second one, as n and value */
+  PetscInt other_along;            /* as along */
+  PetscReal other_lambda;          /* N */
+  PetscReal n[3];                  /* normal that it is held along, outwards from the obstacle */
+  PetscReal value;                 /* n . u that puts it on the obstacle, m */
   PetscReal
     rest; /* gap that it is held at: 0, minus what is left of an overlap, or where it rebounds to, m */
   PetscReal kept; /* springs: the same at the end of the last step, m */
@@ -116,6 +122,17 @@ static inline SbFrictionPair pair_of(SbSpace space, Touch *touch)
                           .fixed = space->fixed[touch->node],
                           .grip = &touch->grip};
 }
+
+/*
+  contact_facets.c: where a held node goes that has been solved for and is at x now, X at rest, by `gap` (m) off the facet with the normal n; its planes
+  for the next solve. Flip: it was held on one facet; whether it goes on on another one. Valley: it was on two. Not collective.
+*/
+PetscBool SbContactFlip(const Contact *c, const PetscReal X[3], const PetscReal x[3], PetscReal gap,
+                        PetscReal n[3], Touch *touch);
+void SbContactValley(const Contact *c, SbSpace space, const PetscReal x[3], PetscReal gap,
+                     const PetscReal n[3], Touch *touch);
+/* Whether a node is held on the plane that it has till the step ends. */
+PetscBool SbContactKept(const Touch *touch);
 
 /* What a solve has made of the force that holds a node, N; r: the residual there. */
 PetscReal SbContactMultiplier(const Contact *c, SbSpace space, const Touch *touch, const PetscReal r[3]);

@@ -1,0 +1,97 @@
+/*
+  contact_facets.c - held nodes where facets of an obstacle's mesh meet.
+
+  There a node may slide from one facet to the other and back with every look. In a valley both push: held on one of them it goes through the
+  other one. So it is held on both for a solve, which tells what each has to push with. If neither pulls, the resultant is the
+  normal with which forces balance in the valley, and it is held along that till the step ends; else the one that pulls is left. On
+  two facets it slides along the valley, and maybe behind a third one, which then takes the place of that which pushes less.
+
+  Elsewhere (ridges, and where nodes are held by rows) normals of facets are averaged from look to look, and after many of them the plane is kept.
+*/
+#include "contact.h"
+
+#define VALLEY 2    /* flips of a held node between facets in a step, after which it may be held on two */
+#define AVERAGED 4  /* flips after which normals are averaged */
+#define GIVEN_UP 16 /* flips after which it is not held on two any more */
+#define KEPT 24     /* flips after which it is held on the same plane till the step ends */
+#define JUMP 1e-6   /* 1 - cosine: a flip */
+
+static void set_plane(const PetscReal n[3], PetscReal value, PetscReal to[3], PetscReal *to_value)
+{
+  for (int i = 0; i < 3; i++) to[i] = n[i];
+  *to_value = value;
+}
+
+/* n . u of the plane of the facet with the normal n that a node at x is by `gap` off, m. */
+static PetscReal level_of(const PetscReal X[3], const PetscReal x[3], PetscReal gap, const PetscReal n[3],
+                          const Touch *touch)
+{
+  return SbDot3(n, x) - SbDot3(n, X) - gap + touch->rest;
+}
+
+PetscBool SbContactKept(const Touch *touch)
+{
+  return (PetscBool)(touch->on && touch->flips > KEPT);
+}
+
+PetscBool SbContactFlip(const Contact *c, const PetscReal X[3], const PetscReal x[3], PetscReal gap,
+                        PetscReal n[3], Touch *touch)
+{
+  const PetscReal level = level_of(X, x, gap, n, touch), before = touch->level;
+  const PetscBool flips = (PetscBool)(SbDot3(n, touch->surface) < 1 - JUMP);
+  PetscReal last[3], length;
+
+  for (int i = 0; i < 3; i++) last[i] = touch->surface[i];
+  set_plane(n, level, touch->surface, &touch->level);
+  if (flips) touch->flips++;
+  if (flips && touch->along >= 0 && !c->rows && c->bounce.e <= 0 && touch->flips > VALLEY &&
+      touch->flips <= GIVEN_UP && gap - touch->rest < -TOLERANCE * c->size) {
+    touch->valley = touch->undecided = PETSC_TRUE;
+    set_plane(n, level, touch->n, &touch->value);
+    set_plane(last, before, touch->other, &touch->other_value);
+    return PETSC_TRUE;
+  }
+  if (touch->flips <= AVERAGED) return PETSC_FALSE;
+  if (!flips && PetscAbsReal(gap - touch->rest) > TOLERANCE * c->size) touch->flips++; /* looks are bounded */
+  for (int i = 0; i < 3; i++) n[i] = touch->n[i] + (n[i] - touch->n[i]) / (touch->flips - AVERAGED + 1);
+  length = PetscSqrtReal(SbDot3(n, n));
+  for (int i = 0; i < 3; i++) n[i] /= length;
+  return PETSC_FALSE;
+}
+
+void SbContactValley(const Contact *c, SbSpace space, const PetscReal x[3], PetscReal gap,
+                     const PetscReal n[3], Touch *touch)
+{
+  const PetscReal *X = space->node_x + 3 * touch->node;
+  const PetscReal force = touch->lambda, other = touch->other_lambda, level = level_of(X, x, gap, n, touch);
+  PetscReal sum[3], length;
+
+  touch->undecided = PETSC_TRUE;
+  set_plane(n, level, touch->surface, &touch->level);
+  if (touch->other_along < 0 || other < 0 || force < 0) { /* one of them is left */
+    touch->valley = PETSC_FALSE;
+    touch->flips++;
+    if (touch->other_along >= 0 && other > force) {
+      set_plane(touch->other, touch->other_value, touch->n, &touch->value);
+      touch->lambda = other;
+    }
+  } else if (PetscAbsReal(gap - touch->rest) > TOLERANCE * c->size) {
+    touch->flips++; /* and on a third one, or not yet where both meet */
+    if (SbDot3(n, touch->other) > 1 - JUMP || SbDot3(n, touch->n) > 1 - JUMP) return;
+    if (force > other) set_plane(touch->n, touch->value, touch->other, &touch->other_value);
+    set_plane(n, level, touch->n, &touch->value);
+    if (touch->flips > GIVEN_UP) touch->valley = PETSC_FALSE;
+  } else if (space->rough)
+    touch->undecided = PETSC_FALSE; /* a rough solve does not tell forces */
+  else {
+    for (int i = 0; i < 3; i++) sum[i] = force * touch->n[i] + other * touch->other[i];
+    length = PetscSqrtReal(SbDot3(sum, sum));
+    if (length > 0) {
+      for (int i = 0; i < 3; i++) touch->n[i] = sum[i] / length;
+      touch->value = SbDot3(touch->n, x) - SbDot3(touch->n, X);
+    }
+    touch->lambda = length;
+    touch->valley = PETSC_FALSE;
+    touch->flips = KEPT + 1;
+  }
+}
