@@ -3,6 +3,7 @@
   that jump, solves that fail; and the same contact by all responses, in the size of a cell and of a mountain.
 */
 #include "hard.h"
+#include <unistd.h>
 #include "../verify/contact.h"
 
 #define BLOCK(body, cells, at, velocity, law)                                                        \
@@ -79,6 +80,71 @@
     }                                                                                                   \
   }
 
+/* A band over a saddle of facets that comes up: in the valleys across it two facets push. Once %s is the path of the saddle. */
+#define SADDLE                                                                                          \
+  "-bodies a -body_a_mesh box:0.12,0.024,0.01:16,4,1 -body_a_material corotated -body_a_young 2e4 "     \
+  "-body_a_poisson 0.4 -body_a_density 1000 -effects gravity,ends,tool -effect_ends_type support "      \
+  "-effect_ends_on xmin,xmax "                                                                          \
+  "-effect_tool_type contact -effect_tool_obstacle mesh:%s -effect_tool_obstacle_at 0.06,0.012,-0.004 " \
+  "-effect_tool_displacement 0;0;0.02*ramp(t/0.4) -ts_dt 0.02 -ts_max_time 0.6"
+/* A block with a rigid plate in it whose middle plane has a layer of its nodes: both ways out are as long. */
+#define MIDDLE                                          \
+  "-bodies a " BLOCK(                                   \
+    "a", "2", "0,0,0", "0,0,0",                         \
+    "1e5") "-effects plate -effect_plate_type contact " \
+           "-effect_plate_obstacle box:-0.05,-0.05,0.045,0.15,0.15,0.055 -ts_dt 0.005 -ts_max_time 0.4"
+/* Steps in which the block goes six times through its height, and Newton's method may not take long. */
+#define LONG_STEPS(most)                                                                                   \
+  "-bodies a " BLOCK("a", "2", "0,0,0.02", "1,0,-10",                                                      \
+                     "1e5") "-effects floor -effect_floor_type contact "                                   \
+                            "-effect_floor_obstacle plane:0,0,1,0 -effect_floor_friction 0.3 -ts_dt 0.06 " \
+                            "-ts_max_time 0.18 -snes_max_it " most
+
+/* A thick saddle, 8 x 8 squares of two triangles: z = h (y / b)^2 - h (x / a)^2 above, flat below. */
+static PetscErrorCode write_saddle(char path[512])
+{
+  const char *folder = getenv("TMPDIR");
+  const int n = 8;
+  PetscMPIInt rank;
+
+  PetscFunctionBeginUser;
+  PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
+  PetscCall(PetscSNPrintf(path, 512, "%s/supple-XXXXXX.off", folder ? folder : "/tmp"));
+  if (!rank) {
+    const int fd = mkstemps(path, 4);
+    FILE *f = fd < 0 ? NULL : fdopen(fd, "w");
+
+    PetscCheck(f, PETSC_COMM_SELF, PETSC_ERR_FILE_OPEN, "Cannot write %s", path);
+    fprintf(f, "OFF\n%d %d 0\n", 2 * (n + 1) * (n + 1), 4 * n * n + 8 * n);
+    for (int v = 0; v < 2 * (n + 1) * (n + 1); v++) {
+      const double x = 2. * (v % (n + 1)) / n - 1, y = 2. * (v / (n + 1) % (n + 1)) / n - 1;
+
+      fprintf(f, "%.17g %.17g %.17g\n", 0.02 * x, 0.016 * y,
+              v < (n + 1) * (n + 1) ? 0.006 * (y * y - x * x) - 0.006 : -0.03);
+    }
+    for (int i = 0; i < n * n; i++) {
+      const int a = i / n * (n + 1) + i % n, b = a + n + 1, down = (n + 1) * (n + 1);
+
+      fprintf(f, "3 %d %d %d\n3 %d %d %d\n", a, a + 1, b + 1, a, b + 1, b);
+      fprintf(f, "3 %d %d %d\n3 %d %d %d\n", down + a, down + b + 1, down + a + 1, down + a, down + b,
+              down + b + 1);
+    }
+    for (int i = 0; i < 4 * n; i++) {
+      const int k = i % n, down = (n + 1) * (n + 1);
+      const int a = i < n       ? k
+                    : i < 2 * n ? k * (n + 1) + n
+                    : i < 3 * n ? n * (n + 1) + n - k
+                                : (n - k) * (n + 1);
+      const int b = a + (i < n ? 1 : i < 2 * n ? n + 1 : i < 3 * n ? -1 : -n - 1);
+
+      fprintf(f, "3 %d %d %d\n3 %d %d %d\n", a, down + b, b, a, down + a, down + b);
+    }
+    PetscCheck(!fclose(f), PETSC_COMM_SELF, PETSC_ERR_FILE_WRITE, "Cannot write %s", path);
+  }
+  PetscCallMPI(MPI_Bcast(path, 512, MPI_CHAR, 0, PETSC_COMM_WORLD));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Most pairs that touch at a time. */
 static PetscErrorCode count_pairs(HardRun *r, const SbStep *step)
 {
@@ -93,30 +159,35 @@ static PetscErrorCode count_pairs(HardRun *r, const SbStep *step)
 
 const HardCase HardCasesTouch[] = {
   {.name = "just.face",
+   .seconds = 600,
    .what = "faces coplanar, vertices on vertices",
    .options = JUST("0,0,0.1"),
    .jitter = 1e-10,
    .quick = 1,
    .limits = JUST_LIMITS},
   {.name = "just.half",
+   .seconds = 600,
    .what = "vertices exactly on edges",
    .options = JUST("0.025,0.05,0.1"),
    .jitter = 1e-10,
    .quick = 1,
    .limits = JUST_LIMITS},
   {.name = "just.edge",
+   .seconds = 600,
    .what = "edge on edge: contact without area",
    .options = JUST("0.1,0,0.1"),
    .jitter = 1e-10,
    .quick = 1,
    .limits = JUST_LIMITS},
   {.name = "just.corner",
+   .seconds = 600,
    .what = "corner on corner: contact in a point",
    .options = JUST("0.1,0.1,0.1"),
    .jitter = 1e-10,
    .quick = 1,
    .limits = JUST_LIMITS},
   {.name = "hundred.projected",
+   .seconds = 600,
    .what = "a hundred contacts on one vertex, projected",
    .options = HUNDRED("projected", "0"),
    .look = count_pairs,
@@ -124,18 +195,21 @@ const HardCase HardCasesTouch[] = {
    .quick = 1,
    .limits = HUNDRED_LIMITS},
   {.name = "hundred.multiplier",
+   .seconds = 600,
    .what = "a hundred contacts on one vertex, multiplier",
    .options = HUNDRED("multiplier", "0"),
    .look = count_pairs,
    .runs = 1,
    .limits = HUNDRED_LIMITS},
   {.name = "hundred.friction",
+   .seconds = 600,
    .what = "a hundred contacts on one vertex, friction",
    .options = HUNDRED("projected", "0.3"),
    .look = count_pairs,
    .runs = 1,
    .limits = HUNDRED_LIMITS},
   {.name = "response.projected",
+   .seconds = 600,
    .what = "falls and slides: projected",
    .options = RESPONSE(""),
    .jitter = 1e-5,
@@ -143,34 +217,76 @@ const HardCase HardCasesTouch[] = {
    .quick = 1,
    .limits = RESPONSE_LIMITS(0.01)},
   {.name = "response.multiplier",
+   .seconds = 600,
    .what = "falls and slides: multiplier",
    .options = RESPONSE("-effect_floor_response multiplier -effect_meet_response multiplier"),
    .jitter = 1e-5,
    .jitter_speed = 1e-3,
    .limits = RESPONSE_LIMITS(0.01)},
   {.name = "response.augmented",
+   .seconds = 600,
    .what = "falls and slides: augmented",
    .options = RESPONSE("-effect_floor_response augmented -effect_meet_response augmented"),
    .jitter = 1e-5,
    .jitter_speed = 1e-3,
    .limits = RESPONSE_LIMITS(0.01)},
   {.name = "response.penalty",
+   .seconds = 600,
    .what = "falls and slides: penalty",
    .options = RESPONSE("-effect_floor_response penalty -effect_meet_response penalty"),
    .jitter = 1e-5,
    .jitter_speed = 1e-3,
    .limits = RESPONSE_LIMITS(0.05)},
   {.name = "scale.micro",
+   .seconds = 600,
    .what = "contact in a micrometre",
    .options = SCALE("1e-6", "1e-7", "1.05e-6", "1e-8", "1e-6"),
    .jitter = 1e-6,
    .quick = 1,
    .limits = SCALE_LIMITS},
   {.name = "scale.kilo",
+   .seconds = 600,
    .what = "contact in a kilometre",
    .options = SCALE("1000", "100", "1050", "10", "1000"),
    .jitter = 1e-6,
    .quick = 1,
    .limits = SCALE_LIMITS},
+  {.name = "cycle.saddle",
+   .seconds = 600,
+   .what = "a band without friction in the valleys of a faceted saddle",
+   .options = SADDLE,
+   .mesh = write_saddle,
+   .jitter = 1e-5,
+   .quick = 1,
+   .limits = {{HARD_EXCESS, '<', 1e-3},
+              {HARD_MIN_J, '>', 0.5},
+              {HARD_DEPTH, '<', 1e-3},
+              {HARD_NEWTON, '<', 150},
+              {HARD_REJECTED, '<', 3}}},
+  {.name = "cycle.middle",
+   .seconds = 600,
+   .what = "nodes in the middle of a rigid plate, where both ways out are as long",
+   .options = MIDDLE,
+   .jitter = 1e-9,
+   .quick = 1,
+   .limits = {{HARD_MIN_J, '>', 0.3}, {HARD_NEWTON, '<', 300}, {HARD_REJECTED, '<', 3}}},
+  {.name = "fails.repeated",
+   .seconds = 600,
+   .what = "steps that fail are repeated, shorter",
+   .options = LONG_STEPS("6"),
+   .jitter = 1e-5,
+   .quick = 1,
+   .limits = {{HARD_EXCESS, '<', 1e-3},
+              {HARD_MIN_J, '>', 0.3},
+              {HARD_DEPTH, '<', 1e-3},
+              {HARD_REJECTED, '>', 0},
+              {HARD_REJECTED, '<', 30}}},
+  {.name = "fails.stops",
+   .seconds = 600,
+   .what = "all attempts at a step fail: said, and what there is stays",
+   .options = LONG_STEPS("1"),
+   .stops = "DIVERGED_MAX_IT",
+   .quick = 1,
+   .limits = {{HARD_MIN_J, '>', 0.3}, {HARD_DEPTH, '<', 1e-3}, {HARD_REJECTED, '>', 5}}},
   {.name = NULL},
 };

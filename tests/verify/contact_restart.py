@@ -2,7 +2,7 @@
 
 An instrument that drags along tissue, and a block that is dragged over another: nodes and pairs that stick, and some that slide, when the
 checkpoint is written. Every row of history.csv is compared, the sums since the start and the account of energies among them. Also: an
-overlap that is being taken back; a checkpoint that has lost what it says.
+overlap that is being taken back; an impact with nodes at faces; a checkpoint that has lost what it says.
 
 @timeout 300
 """
@@ -31,6 +31,11 @@ BLOCKS = ("-bodies a,b -body_a_mesh box:0.2,0.1,0.05:2 -body_b_mesh box:0.08,0.0
 DEEP = ("-bodies a -body_a_mesh box:0.1,0.1,0.05:2 " + BOX.format("a", "corotated", "1e5") + "-effects gravity,floor "
         "-effect_gravity_vector 1,0,-9 -effect_floor_type contact -effect_floor_obstacle plane:0,0,1,0.001 "
         "-effect_floor_friction 0.3 -ts_dt 0.005 -ts_max_time {end} -effect_floor_response ")
+# a block on its corner hits a floor at 100 m/s, nodes at faces; half of it is squeezed when the checkpoint is written
+CORNER = ("-bodies a -body_a_mesh box:0.04,0.04,0.04:2 -body_a_element cr -body_a_rotate 1,-1,0,54.7356 "
+          "-body_a_translate 0,0,0 -body_a_velocity 3,0,-100 " + BOX.format("a", "neohookean", "1e9")
+          + "-effects floor -effect_floor_type contact -effect_floor_obstacle plane:0,0,1,0 "
+          "-effect_floor_friction 0.2 -ts_dt 1e-5 -ts_max_time {end} -effect_floor_response ")
 COMMON = ("-time euler_implicit -snes_rtol 1e-12 -ksp_rtol 1e-12 -quiet -output_fields none -checkpoint_keep 1 "
           "-checkpoint_every_steps 10 ")
 UNLIKE = ("newton", "linear", "rejected")  # what solving took is not compared
@@ -114,6 +119,7 @@ def main():
     check("blocks-projected", BLOCKS + "projected", 0.2, (1, 3), 1e-4)  # its rows begin with weights by mass, not by stiffness
     check("blocks-augmented", BLOCKS + "augmented", 0.2, (2,), 1e-6)
     check("deep-projected", DEEP + "projected", 0.1, (2,), 1e-6)
+    check("corner-projected", CORNER + "projected", 4e-4, (2, 3), 1e-6)
     check_damage()
     print("contact is taken up as if not interrupted")
 
