@@ -1,4 +1,4 @@
 /* sb.h - everything. */
 #pragma once
-#include "sbestimate.h"
+#include "sbledger.h"
 #include "sbscene.h"

@@ -167,6 +167,7 @@ typedef enum {
   SB_EVENT_SOLVER_SETUP,
   SB_EVENT_OUTPUT,
   SB_EVENT_CHECKPOINT,
+  SB_EVENT_LEDGER, /* estimates of errors; other events within it are theirs */
   SB_EVENT_COUNT
 } SbEvent;
 extern PetscLogEvent SbEvents[SB_EVENT_COUNT];
@@ -185,3 +186,6 @@ PetscErrorCode SbLogInitialize(void);
     event      - of all that have this name
 */
 PetscErrorCode SbLogNamed(const char *kind, const char *name, PetscLogEvent *event);
+/* Adds the seconds of an event of ours, or of the one with a name (0: there is none), in all stages, on this rank. Not collective. */
+PetscErrorCode SbLogSeconds(PetscLogEvent event, PetscReal *seconds);
+PetscErrorCode SbLogSecondsNamed(const char *name, PetscReal *seconds);

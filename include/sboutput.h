@@ -73,5 +73,8 @@ PetscErrorCode SbCheckpointLoad(SbRun run, const char *file);
 PetscErrorCode SbReportHeader(SbRun run);
 PetscErrorCode SbReportSummary(SbRun run);
 
+/* Path of a file in the run's folder, and whether nothing is to be printed. Not collective. */
+PetscErrorCode SbOutputFile(SbRun run, const char *name, size_t size, char path[], PetscBool *quiet);
+
 /* Writes "status": "failed" and the reason into run.json. Any one rank, for an error handler that ends the program. */
 PetscErrorCode SbReportFailure(SbRun run, const char *reason);

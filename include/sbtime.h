@@ -31,6 +31,27 @@ typedef struct {
 } SbStep;
 
 typedef struct _p_SbRun *SbRun;
+
+/*
+  A step as it was solved, before it becomes the state: the solver can still evaluate its equations at U. All vectors are lent;
+  V, A and those of the start are NULL in a static run, where t is the load factor.
+*/
+typedef struct {
+  PetscReal t, dt;  /* start and length, s */
+  Vec U0, V0, A0;   /* start */
+  Vec U, V, A;      /* end */
+  PetscBool solved; /* by SbRun.snes; else explicitly */
+} SbSolved;
+/* `again`: the equations are to be solved once more, from U on. Collective. */
+typedef PetscErrorCode (*SbLookFn)(SbRun run, const SbSolved *step, void *ctx, PetscBool *again);
+
+/* A number that history.csv shows after those of effects; the same on all ranks. */
+typedef struct {
+  char name[SB_NAME_MAX];
+  const char *unit;
+  const PetscReal *value; /* borrowed */
+} SbColumn;
+
 typedef PetscErrorCode (*SbMonitorFn)(SbRun run, const SbStep *step, void *ctx);
 
 /* One simulation: model, solver, integrator, monitors. */
@@ -65,6 +86,17 @@ struct _p_SbRun {
     void *ctx;
     PetscErrorCode (*destroy)(void *ctx);
   } monitor[8];
+  struct {
+    SbLookFn fn; /* looks at each step that was solved; NULL: nobody does */
+    void *ctx;
+    /* error of the step that was just solved over what is allowed, which falls with the power `order` of its length, for adaptive steps;
+       NULL: displacements are compared with -ts_atol */
+    PetscErrorCode (*error)(SbRun run, const SbSolved *step, void *ctx, PetscInt *order, PetscReal *ratio);
+  } look;
+  PetscInt ncolumn;
+  const SbColumn *column; /* [ncolumn] of history.csv; borrowed */
+  /* values[ncell_owned] = energy of the error of space discretisation per rest volume, J/m^3; NULL: nobody estimates it. Collective. */
+  PetscErrorCode (*cell_error)(SbRun run, const SbStep *step, PetscReal values[]);
   PetscBool want_energies, want_residual;
   SbEnergies energies;    /* running totals of works and losses */
   PetscReal energy_start; /* kinetic + strain at the start of the run (kept over restarts), J */
@@ -84,6 +116,14 @@ struct _p_SbRun {
     SbRun run); /* frees it; called by SbRunDestroy() when not NULL, before the monitors */
 };
 
+/*
+  SbRunMethodError - what one step of the integrator of a dynamic run loses, for small steps: in the norm of the energy c h^(p+1)
+  |d^(p+1) (u, v) / dt^(p+1)|.
+
+  Not collective. Output: order p and constant c, from the eigenvalue of the method for an undamped oscillator; `ahead`, the time in lengths of a
+  step by which symplectic Euler's velocities are behind, whose error does not add up; 0 for the others.
+*/
+PetscErrorCode SbRunMethodError(SbRun run, PetscInt *order, PetscReal *c, PetscReal *ahead);
 PetscErrorCode SbTimeRegister(void); /* option rows and the TSType */
 PetscErrorCode SbRunCreate(SbModel model,
                            SbRun *run); /* reads the options -time, -solver, ...; nothing is computed yet */

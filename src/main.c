@@ -30,11 +30,12 @@ static PetscErrorCode answer(const SbCommand *command, PetscBool *answered)
 }
 
 /* Everything that options say, checked. Nothing is computed yet. */
-static PetscErrorCode read_scenario(SbModel *model, SbRun *run)
+static PetscErrorCode read_scenario(SbModel *model, SbRun *run, SbLedger *ledger)
 {
   PetscFunctionBeginUser;
   PetscCall(SbSceneCreate(PETSC_COMM_WORLD, model));
   PetscCall(SbRunCreate(*model, run));
+  PetscCall(SbLedgerSetFromOptions(*run, ledger));
   PetscCall(SbOutputSetFromOptions(*run));
   PetscCall(SbOptionsCheck());
   PetscCall(SbSceneCheck(*model));
@@ -58,19 +59,25 @@ static void report_failure(const char *message, void *run)
   (void)SbReportFailure((SbRun)run, message);
 }
 
-static PetscErrorCode simulate(SbModel model, SbRun run)
+static PetscErrorCode simulate(SbModel model, SbRun run, SbLedger ledger)
 {
+  char file[PETSC_MAX_PATH_LEN];
+  PetscBool quiet;
+
   PetscFunctionBeginUser;
   SbErrorSetFarewell(report_failure, run);
   PetscCall(PetscLogStagePush(SbStageSetup));
   PetscCall(SbModelSetUp(model));
   PetscCall(SbSceneValidate(model));
   PetscCall(SbRunSetUp(run));
+  PetscCall(SbLedgerAttach(ledger));
   PetscCall(SbOutputAttach(run));
   PetscCall(PetscLogStagePop());
   PetscCall(SbReportHeader(run));
   PetscCall(SbRunSolve(run));
   PetscCall(SbReportSummary(run));
+  PetscCall(SbOutputFile(run, "ledger.csv", sizeof(file), file, &quiet));
+  PetscCall(SbLedgerReport(ledger, file, quiet));
   SbErrorSetFarewell(NULL, NULL);
   if (run->stop_reason[0]) SbErrorPost("%s", run->stop_reason);
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -81,6 +88,7 @@ static PetscErrorCode supple(int argc, char *argv[])
   SbCommand command;
   SbModel model = NULL;
   SbRun run = NULL;
+  SbLedger ledger = NULL;
   PetscBool answered, left;
   PetscInt unused;
 
@@ -98,11 +106,12 @@ static PetscErrorCode supple(int argc, char *argv[])
 
   PetscCall(answer(&command, &answered));
   if (!answered) {
-    PetscCall(read_scenario(&model, &run));
+    PetscCall(read_scenario(&model, &run, &ledger));
     if (command.view)
       PetscCall(view_scenario(command.view_file));
     else
-      PetscCall(simulate(model, run));
+      PetscCall(simulate(model, run, ledger));
+    PetscCall(SbLedgerDestroy(&ledger));
     PetscCall(SbRunDestroy(&run));
     PetscCall(SbModelDestroy(&model));
     if (!command.view) PetscCall(SbOptionsUnused(PETSC_COMM_WORLD, &unused));

@@ -8,6 +8,7 @@
 typedef struct {
   SbModel model;
   SbRun run;
+  SbLedger ledger; /* NULL unless the options ask for one */
 } TestScene;
 
 /* Everything of the program but output: model and run are set up and ready for SbRunSolve(). */
@@ -20,9 +21,11 @@ static inline PetscErrorCode test_scene_open(const char *options, TestScene *sce
   PetscCall(PetscOptionsInsertString(NULL, options));
   PetscCall(SbSceneCreate(PETSC_COMM_WORLD, &scene->model));
   PetscCall(SbRunCreate(scene->model, &scene->run));
+  PetscCall(SbLedgerSetFromOptions(scene->run, &scene->ledger));
   PetscCall(SbOptionsCheck());
   PetscCall(SbModelSetUp(scene->model));
   PetscCall(SbRunSetUp(scene->run));
+  PetscCall(SbLedgerAttach(scene->ledger));
   PetscCall(SbMeshValidate(scene->model->mesh));
   PetscCall(SbSpaceValidate(scene->model->space));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -31,6 +34,7 @@ static inline PetscErrorCode test_scene_open(const char *options, TestScene *sce
 static inline PetscErrorCode test_scene_close(TestScene *scene)
 {
   PetscFunctionBeginUser;
+  PetscCall(SbLedgerDestroy(&scene->ledger));
   PetscCall(SbRunDestroy(&scene->run));
   PetscCall(SbModelDestroy(&scene->model));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -23,7 +23,7 @@ PetscErrorCode SbLogInitialize(void)
   static const char *const names[SB_EVENT_COUNT] = {
     "SbMeshRead", "SbMeshDistrib", "SbSpaceSetUp", "SbMatrixSetUp", "SbResidual",
     "SbTangent",  "SbEnergy",      "SbEffects",    "SbContact",     "SbSearch",
-    "SbProject",  "SbSolverSetUp", "SbOutput",     "SbCheckpoint",
+    "SbProject",  "SbSolverSetUp", "SbOutput",     "SbCheckpoint",  "SbLedger",
   };
 
   PetscFunctionBeginUser;
@@ -43,5 +43,30 @@ PetscErrorCode SbLogNamed(const char *kind, const char *name, PetscLogEvent *eve
   PetscCall(PetscSNPrintf(text, sizeof(text), "Sb%s_%s", kind, name));
   PetscCall(PetscLogEventGetId(text, event));
   if (*event < 0) PetscCall(PetscLogEventRegister(text, PETSC_OBJECT_CLASSID, event));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbLogSeconds(PetscLogEvent event, PetscReal *seconds)
+{
+  const PetscLogStage stages[] = {0, SbStageSetup, SbStageSolve, SbStageOutput};
+
+  PetscFunctionBeginUser;
+  for (size_t s = 0; s < PETSC_STATIC_ARRAY_LENGTH(stages); s++) {
+    PetscEventPerfInfo info;
+
+    if (s && stages[s] <= 0) continue;
+    PetscCall(PetscLogEventGetPerfInfo(stages[s], event, &info));
+    *seconds += (PetscReal)info.time;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbLogSecondsNamed(const char *name, PetscReal *seconds)
+{
+  PetscLogEvent event;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscLogEventGetId(name, &event));
+  if (event >= 0) PetscCall(SbLogSeconds(event, seconds));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

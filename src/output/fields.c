@@ -160,6 +160,13 @@ static PetscErrorCode energy_density(SbRun run, const SbStep *step, PetscReal *v
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+static PetscErrorCode space_error(SbRun run, const SbStep *step, PetscReal *values)
+{
+  PetscFunctionBeginUser;
+  PetscCall((*run->cell_error)(run, step, values));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 static PetscErrorCode body_number(SbRun run, const SbStep *step, PetscReal *values)
 {
   PetscFunctionBeginUser;
@@ -204,6 +211,8 @@ static const SbField table[] = {
    mean_pressure},
   {"J", "1", 1, CELL, VARIES, ALWAYS, "volume ratio det F", jacobian},
   {"energy_density", "J/m^3", 1, CELL, VARIES, ALWAYS, "strain energy per rest volume", energy_density},
+  {"space_error", "J/m^3", 1, CELL, VARIES, ALWAYS,
+   "energy of the estimated error of the mesh per rest volume; needs -ledger", space_error},
   {"body", "1", 1, CELL, CONSTANT, ALWAYS, "number of the body, always written", body_number},
   {"rank", "1", 1, CELL, CONSTANT, ALWAYS, "MPI rank that owns the cell", rank_number},
 };
@@ -246,6 +255,8 @@ PetscErrorCode SbFieldPrepare(SbRun run, SbOutput out)
   for (PetscInt i = 0; i < out->nfield; i++) {
     const SbField *f = out->field[i];
 
+    PetscCheck(f->compute != space_error || run->cell_error, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
+               "-output_fields space_error needs its estimate: give -ledger yes, too");
     if ((f->compute == stress || f->compute == von_mises || f->compute == mean_pressure) && !out->sigma)
       PetscCall(PetscMalloc1(6 * n, &out->sigma));
     if (f->compute == jacobian && !out->J) PetscCall(PetscMalloc1(n, &out->J));

@@ -78,6 +78,7 @@ static PetscErrorCode put_header(SbRun run, SbOutput out, SbHistory h)
   for (PetscInt p = 0; p < out->nprobe; p++) {
     for (int c = 0; c < 3; c++) PetscCall(put(h, ",%s_u%c", out->probe[p].name, 'x' + c));
   }
+  for (PetscInt c = 0; c < run->ncolumn; c++) PetscCall(put(h, ",%s", run->column[c].name));
   PetscCall(put(h, "\n#"));
   for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(units); i++)
     PetscCall(put(h, "%s%s", i ? "," : "", units[i]));
@@ -85,6 +86,7 @@ static PetscErrorCode put_header(SbRun run, SbOutput out, SbHistory h)
     for (PetscInt c = 0; c < run->model->history[e]->ncolumn; c++) PetscCall(put(h, ",SI"));
   }
   for (PetscInt p = 0; p < 3 * out->nprobe; p++) PetscCall(put(h, ",m"));
+  for (PetscInt c = 0; c < run->ncolumn; c++) PetscCall(put(h, ",%s", run->column[c].unit));
   PetscCall(put(h, "\n"));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -160,7 +162,7 @@ static PetscErrorCode extra_columns(SbRun run, SbOutput out, const SbStep *step)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode put_row(SbHistory h, const SbStep *step)
+static PetscErrorCode put_row(SbHistory h, const SbStep *step, SbRun run)
 {
   const SbEnergies *e = &step->energies;
   const PetscReal x[] = {e->kinetic,
@@ -191,6 +193,7 @@ static PetscErrorCode put_row(SbHistory h, const SbStep *step)
   PetscCall(put(h, ",%" PetscInt_FMT ",%" PetscInt_FMT ",%" PetscInt_FMT, step->newton, step->linear,
                 step->rejected));
   for (PetscInt i = 0; i < h->nextra; i++) PetscCall(put(h, ",%.17g", (double)h->sum[i]));
+  for (PetscInt i = 0; i < run->ncolumn; i++) PetscCall(put(h, ",%.17g", (double)*run->column[i].value));
   PetscCall(put(h, "\n"));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -222,7 +225,7 @@ static PetscErrorCode monitor(SbRun run, const SbStep *step, void *ctx)
   PetscCall(extra_columns(run, out, step));
   h->last_step = step->step;
   if (h->fd >= 0) {
-    PetscCall(put_row(h, step));
+    PetscCall(put_row(h, step, run));
     write_row(h, sizeof(h->message), h->message);
   }
   if (step->last) PetscCall(SbAgree(out->comm, PETSC_ERR_FILE_WRITE, h->message));
@@ -310,7 +313,8 @@ PetscErrorCode SbHistoryAttach(SbRun run, SbOutput out)
   for (PetscInt e = 0; e < model->nhistory; e++) h->nextra += model->history[e]->ncolumn;
   h->nextra += 3 * out->nprobe;
   PetscCall(PetscMalloc2(h->nextra + 1, &h->mine, h->nextra + 1, &h->sum));
-  h->capacity = 2 * (PETSC_STATIC_ARRAY_LENGTH(names) + (size_t)h->nextra) * (2 * SB_NAME_MAX) + 256;
+  h->capacity =
+    2 * (PETSC_STATIC_ARRAY_LENGTH(names) + (size_t)(h->nextra + run->ncolumn)) * (2 * SB_NAME_MAX) + 256;
   PetscCall(PetscMalloc1(h->capacity, &h->row));
   PetscCall(SbOutputPath(out, "history.csv", sizeof(h->path), h->path));
   if (!out->rank) PetscCall(open_file(run, out, sizeof(message), message));

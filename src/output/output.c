@@ -19,7 +19,7 @@ static const SbOption rows[] = {
    "fields in fields.h5: displacement, velocity, acceleration, reaction, contact_force, contact_gap, stress, "
    "von_mises, "
    "pressure, "
-   "mean_pressure, J, energy_density, rank; none: no such file"},
+   "mean_pressure, J, energy_density, space_error, rank; none: no such file"},
   {"output_every", SB_OPTION_REAL, 1, "s", "0", "[0, inf)",
    "simulated time between frames of fields.h5; 0: output_every_steps counts"},
   {"output_every_steps", SB_OPTION_INT, 1, "", "1", "[1, inf)",
@@ -61,6 +61,16 @@ PetscErrorCode SbOutputPath(SbOutput out, const char *name, size_t size, char pa
   PetscFunctionBeginUser;
   PetscCheck((size_t)snprintf(path, size, "%s/%s", out->dir, name) < size, PETSC_COMM_SELF, PETSC_ERR_USER,
              "-output_dir %s is too long", out->dir);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbOutputFile(SbRun run, const char *name, size_t size, char path[], PetscBool *quiet)
+{
+  const SbOutput out = (SbOutput)run->output;
+
+  PetscFunctionBeginUser;
+  *quiet = out->quiet;
+  PetscCall(SbOutputPath(out, name, size, path));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -220,8 +230,8 @@ static PetscErrorCode make_folder(SbOutput out, size_t nmessage, char message[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static const char *const ours[] = {"fields.h5",   "fields.xmf",    "contacts.xmf",
-                                   "history.csv", "scenario.opts", "run.json"};
+static const char *const ours[] = {"fields.h5",     "fields.xmf", "contacts.xmf", "history.csv",
+                                   "scenario.opts", "run.json",   "ledger.csv"};
 
 /* Removes what an earlier run left under our names, and says so. Rank 0. */
 static PetscErrorCode clear_folder(SbOutput out, PetscInt step0)

@@ -16,32 +16,6 @@ PetscReal SbCpuSeconds(void)
   return (PetscReal)t.tv_sec + 1e-9 * (PetscReal)t.tv_nsec;
 }
 
-/* Seconds of an event in all stages, on this rank. */
-static PetscErrorCode event_seconds(PetscLogEvent event, PetscReal *seconds)
-{
-  const PetscLogStage stages[] = {0, SbStageSetup, SbStageSolve, SbStageOutput};
-
-  PetscFunctionBeginUser;
-  for (size_t s = 0; s < PETSC_STATIC_ARRAY_LENGTH(stages); s++) {
-    PetscEventPerfInfo info;
-
-    if (s && stages[s] <= 0) continue;
-    PetscCall(PetscLogEventGetPerfInfo(stages[s], event, &info));
-    *seconds += (PetscReal)info.time;
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode named_seconds(const char *name, PetscReal *seconds)
-{
-  PetscLogEvent event;
-
-  PetscFunctionBeginUser;
-  PetscCall(PetscLogEventGetId(name, &event));
-  if (event >= 0) PetscCall(event_seconds(event, seconds));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode SbPhasesGet(SbOutput out, SbPhases *p)
 {
   enum { MESH, SETUP, RESIDUAL, TANGENT, SOLVE, CONTACT, SEARCH, ENERGY, OUTPUT };
@@ -62,9 +36,9 @@ PetscErrorCode SbPhasesGet(SbOutput out, SbPhases *p)
 
   PetscFunctionBeginUser;
   for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(ours); i++)
-    PetscCall(event_seconds(SbEvents[ours[i].event], &mine[ours[i].phase]));
+    PetscCall(SbLogSeconds(SbEvents[ours[i].event], &mine[ours[i].phase]));
   for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(solve); i++)
-    PetscCall(named_seconds(solve[i], &mine[SOLVE]));
+    PetscCall(SbLogSecondsNamed(solve[i], &mine[SOLVE]));
   mine[CONTACT] = PetscMax(0, mine[CONTACT] - mine[SEARCH]); /* the search is a part of it */
   PetscCall(PetscTime(&p->total));
   p->total -= out->wall_start;

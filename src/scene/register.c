@@ -18,6 +18,7 @@ PetscErrorCode SbRegisterAll(void)
   PetscCall(SbSpaceRegister());
   PetscCall(SbTimeRegister());
   PetscCall(SbOutputRegister());
+  PetscCall(SbLedgerRegister());
   PetscCall(SbErrorRegister());
   PetscCall(SbCommandRegister());
 

@@ -2,6 +2,7 @@
   scene_impl.h - what the files of layer 6 share.
 */
 #pragma once
+#include "sbledger.h"
 #include "sbscene.h"
 
 /* Option rows of the command line and of the scene. */

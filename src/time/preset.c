@@ -10,6 +10,7 @@
     alpha2            PETSc's TSALPHA2, for comparison
     static            equilibrium, no inertia: a load path
 */
+#include <complex.h>
 #include "time_impl.h"
 #include "sbsolver.h"
 
@@ -133,6 +134,55 @@ static void method_settings(SbRun run, SbMethodSettings *set)
   } else if (run->preset == SB_TIME_EULER_SYMPLECTIC) {
     set->method = SB_METHOD_EULER_SYMPLECTIC;
   }
+}
+
+/* The eigenvalue of generalized-alpha for an undamped oscillator of the frequency w, h = 1, that is next to exp(i w): with (u, v, a) growing by z a
+   step, (1 - alpha_m + alpha_m z) (z - 1)^2 + w^2 (1 - alpha_f + alpha_f z) (1 - gamma + gamma z + (1/2 - beta + beta z) (z - 1)) = 0. */
+static double complex alpha_eigenvalue(const SbMethodSettings *s, double w)
+{
+  double complex z = cexp(I * w);
+
+  for (int i = 0; i < 50; i++) {
+    const double complex d = z - 1, m = 1 - s->alpha_m + s->alpha_m * z, f = 1 - s->alpha_f + s->alpha_f * z;
+    const double complex g = 1 - s->gamma + s->gamma * z + (0.5 - s->beta + s->beta * z) * d;
+    const double complex p = m * d * d + w * w * f * g;
+    const double complex q =
+      s->alpha_m * d * d + 2 * m * d +
+      w * w * (s->alpha_f * g + f * (s->gamma + 0.5 - s->beta + s->beta * z + s->beta * d));
+
+    z -= p / q;
+  }
+  return z;
+}
+
+PetscErrorCode SbRunMethodError(SbRun run, PetscInt *order, PetscReal *c, PetscReal *ahead)
+{
+  const double w = 0.03;
+  SbMethodSettings s;
+  double complex z;
+
+  PetscFunctionBeginUser;
+  method_settings(run, &s);
+  *ahead = 0;
+  *order = 1;
+  switch (s.method) {
+  case SB_METHOD_GENERALIZED_ALPHA:
+    z = alpha_eigenvalue(&s, w);
+    if (PetscAbsReal(s.gamma - 0.5 - s.alpha_m + s.alpha_f) < 1e-9) *order = 2;
+    break;
+  case SB_METHOD_EULER_IMPLICIT:
+    z = 1 / (1 - I * w);
+    break;
+  case SB_METHOD_EULER_EXPLICIT:
+    z = 1 + I * w;
+    break;
+  default:
+    z = cexp(2 * I * asin(w / 2)); /* of the central differences that it is */
+    *order = 2;
+    *ahead = 0.5;
+  }
+  *c = (PetscReal)(cabs(z - cexp(I * w)) / pow(w, (double)*order + 1));
+  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Newton on nonlinear models, one linear solve on linear ones; tolerances that hold in any unit system. */

@@ -101,7 +101,7 @@ static PetscErrorCode solve_at(SbRun run, PetscReal factor, PetscReal length, Pe
                                PetscBool *ok)
 {
   SNESConvergedReason reason;
-  PetscBool far;
+  PetscBool far, again = (PetscBool)(run->look.fn != NULL);
 
   PetscFunctionBeginUser;
   PetscCall(attempt(run, factor, length, X, &reason));
@@ -115,6 +115,13 @@ static PetscErrorCode solve_at(SbRun run, PetscReal factor, PetscReal length, Pe
     PetscCall(SbRunSearch(run, SB_SEARCH_NONE));
   }
   PetscCall(SbRunTooFar(run, X, &far));
+  for (int i = 0; i < SB_LOOKS && again && reason > 0 && !far; i++) {
+    const SbSolved step = {.t = factor - length, .dt = length, .U = X, .solved = PETSC_TRUE};
+
+    again = PETSC_FALSE;
+    PetscCall((*run->look.fn)(run, &step, run->look.ctx, &again));
+    if (again) PetscCall(attempt(run, factor, length, X, &reason));
+  }
   *ok = (PetscBool)(reason > 0 && !far);
   if (!*ok) PetscCall(explain(run, factor, reason));
   PetscCall(refuse_free_body(run, factor, ok));

@@ -5,6 +5,7 @@
 #define SB_CONTACT_ROUNDS 100 /* solves of one step before contact counts as failed */
 #define SB_ARRIVAL_LEAST \
   0.05 /* of a step: where points arrive nearer to one of its ends, it is not cut at their arrival */
+#define SB_LOOKS 4 /* so often may a step be solved again for who looks at it */
 #include "sbtime.h"
 
 #define SB_TS_SECOND_ORDER "sb_second_order"

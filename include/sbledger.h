@@ -1,0 +1,45 @@
+/*
+  sbledger.h - layer 5: what a run's result is wrong by, source by source, beside the seconds spent on each.
+
+  Errors are in the norm of the energy: the square of an error is its energy, J, as a displacement that strains the bodies and a velocity that they
+  have; relative is the root of its share of the largest energy, kinetic and strain, that the run has had (of the strain energy in a static run).
+
+  The ledger looks at each step that was solved (SbRun.look) and is a monitor besides. Without -ledger, -accuracy or -time_budget there is none:
+  no vector, no look, no column. With -ledger alone it changes no result.
+
+  Order of calls: SbLedgerRegister(), SbRunCreate(), SbLedgerSetFromOptions(), SbModelSetUp(), SbRunSetUp(), SbLedgerAttach(),
+  SbOutputAttach(), SbRunSolve(), SbLedgerReport(), SbLedgerDestroy().
+*/
+#pragma once
+#include "sbestimate.h"
+#include "sbtime.h"
+
+typedef enum {
+  SB_ERROR_SPACE,     /* of the mesh: estimate_space.c */
+  SB_ERROR_TIME,      /* of the integrator, summed over the steps */
+  SB_ERROR_NONLINEAR, /* what Newton's method left */
+  SB_ERROR_LINEAR,    /* what the linear solver left */
+  SB_ERROR_CONTACT,   /* forces on gaps that are not closed */
+  SB_ERROR_ROUNDING,  /* of displacements in double precision */
+  SB_ERROR_COUNT
+} SbErrorSource;
+
+typedef struct _p_SbLedger *SbLedger;
+
+PetscErrorCode SbLedgerRegister(void); /* option rows */
+
+/*
+  SbLedgerSetFromOptions - reads -ledger, -ledger_every, -ledger_quantity, -ledger_at, -ledger_on, -ledger_direction, -accuracy, -time_budget. Collective.
+
+  Output: ledger, NULL when none of them asks for one. Errors (PETSC_ERR_USER_INPUT): both -accuracy and -time_budget; -time alpha2.
+*/
+PetscErrorCode SbLedgerSetFromOptions(SbRun run, SbLedger *ledger);
+/* After SbRunSetUp() and before SbOutputAttach(), whose history gets its columns. NULL: nothing. Collective. */
+PetscErrorCode SbLedgerAttach(SbLedger ledger);
+/* The error of a source in the norm of the energy, J^(1/2), and the energy that it is relative to, J. Not collective. */
+PetscErrorCode SbLedgerGet(SbLedger ledger, SbErrorSource source, PetscReal *error, PetscReal *stored);
+/* The error of the quantity that -ledger_quantity names, and its value, in its own unit. Not collective. */
+PetscErrorCode SbLedgerGetQuantity(SbLedger ledger, SbErrorSource source, PetscReal *error, PetscReal *value);
+/* Writes the table as `file`, and prints it unless quiet. NULL: nothing. Collective. */
+PetscErrorCode SbLedgerReport(SbLedger ledger, const char *file, PetscBool quiet);
+PetscErrorCode SbLedgerDestroy(SbLedger *ledger);

@@ -1,0 +1,100 @@
+/*
+  What contact left open. A force on a place that is not closed would do the work force times gap if it were: half of it (forces grow from zero)
+  bounds the energy of the error from above, but a body that springs let down as a whole is not strained by that.
+
+  Springs, then, are looked at closer. With F what they push with, one more step of Uzawa's iteration, (K + springs) delta = F, moves the body to
+  where the exact contact would hold it, up to the ratio of its stiffness to theirs; the elastic energy of delta is that of the error.
+*/
+#include "ledger_impl.h"
+#include "sbkernel.h"
+
+#define CLOSELY 1e-3 /* delta is nearly the gap, and what strains is the difference */
+#define PROBE 1e-6   /* of the bodies' size */
+
+/* Half the force times gap of all places, J. */
+static PetscErrorCode open_work(SbLedger l, const SbStep *step, PetscReal *work)
+{
+  const SbModel m = l->run->model;
+  SbPlaces list = {0};
+
+  PetscFunctionBeginUser;
+  *work = 0.;
+  PetscCall(SbModelContactPlaces(m, step->t, step->U, step->R, &list));
+  for (PetscInt i = 0; i < list.n; i++)
+    *work += 0.5 * PetscAbsReal(list.place[i].gap * SbDot3(list.place[i].force, list.place[i].normal));
+  PetscCall(PetscFree(list.place));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, work, 1, MPIU_REAL, MPI_SUM, m->comm));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* D . f_int(U + length D) */
+static PetscErrorCode elastic_work(SbLedger l, Vec U, PetscReal length, Vec D, PetscReal *work)
+{
+  const SbSpace s = l->run->model->space;
+  SbStage stage = {.shift_k = 1.};
+  PetscReal *f;
+
+  PetscFunctionBeginUser;
+  PetscCall(VecWAXPY(l->w[1], length, D, U));
+  PetscCall(VecZeroEntries(l->w[2]));
+  PetscCall(SbSpaceGetLocalRead(s, l->w[1], &stage.u));
+  PetscCall(SbSpaceGetLocalWrite(s, l->w[2], &f));
+  PetscCall(PetscArrayzero(f, 3 * s->nnode));
+  PetscCall(SbSpaceAddInternalForce(s, &stage, f));
+  PetscCall(SbSpaceRestoreLocalWrite(s, l->w[2], &f));
+  PetscCall(SbSpaceRestoreLocalRead(s, l->w[1], &stage.u));
+  PetscCall(VecDot(l->w[2], D, work));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Elastic energy of what springs keep bodies from. */
+static PetscErrorCode spring_energy(SbLedger l, const SbStep *step, PetscReal *energy)
+{
+  const SbModel m = l->run->model;
+  PetscReal rtol, atol, dtol, size, volume = 0., length, work[2];
+  PetscInt max_it;
+  Vec F, D;
+  KSP ksp;
+
+  PetscFunctionBeginUser;
+  *energy = PETSC_MAX_REAL;
+  PetscCall(VecDuplicate(step->U, &F));
+  PetscCall(VecDuplicate(step->U, &D));
+  PetscCall(SbModelContactForce(m, step->t, step->U, step->R, F));
+  PetscCall(SNESGetKSP(l->run->snes, &ksp));
+  PetscCall(KSPGetTolerances(ksp, &rtol, &atol, &dtol, &max_it));
+  PetscCall(KSPSetTolerances(ksp, CLOSELY, 0., dtol, max_it));
+  l->solving -= MPI_Wtime();
+  PetscCall(KSPSolve(ksp, F, D));
+  l->solving += MPI_Wtime();
+  PetscCall(KSPSetTolerances(ksp, rtol, atol, dtol, max_it));
+  PetscCall(VecNorm(D, NORM_INFINITY, &size));
+  for (PetscInt b = 0; b < m->nbody; b++) volume = PetscMax(volume, m->body[b].volume);
+  if (size > 0.) {
+    length = PROBE * PetscPowReal(volume, 1. / 3.) / size;
+    for (int side = 0; side < 2; side++)
+      PetscCall(elastic_work(l, step->U, side ? length : -length, D, &work[side]));
+    *energy = 0.5 * PetscAbsReal(work[1] - work[0]) / (2. * length);
+  } else
+    *energy = 0.;
+  PetscCall(VecDestroy(&F));
+  PetscCall(VecDestroy(&D));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbEstimateContact(SbLedger l, const SbStep *step, PetscReal *error)
+{
+  const SbModel m = l->run->model;
+  PetscReal energy, strained;
+  PetscBool springs = PETSC_FALSE;
+
+  PetscFunctionBeginUser;
+  PetscCall(open_work(l, step, &energy));
+  for (PetscInt e = 0; e < m->ntouch; e++) springs = (PetscBool)(springs || m->touch[e]->springs);
+  if (springs && !m->dynamic && energy > 0.) {
+    PetscCall(spring_energy(l, step, &strained));
+    energy = PetscMin(energy, strained);
+  }
+  *error = PetscSqrtReal(energy);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

@@ -1,0 +1,96 @@
+/*
+  What the solves of a step left: with F the residual of its equations at the solution and J their tangent, the correction that is missing is
+  delta = J^-1 F, and the energy of the error 1/2 delta . F (of state: J holds inertia, too). One more solve, to a tenth, tells it: a
+  fraction of the iterations of the step.
+
+  Newton's last linear solve left a residual of its own; that part of F is the linear solver's, the rest is what the linearisation left.
+*/
+#include "ledger_impl.h"
+
+#define ROUGHLY 0.1 /* of delta: how well it is solved for */
+
+/* The parts of F that linear solves and linearisation left; `before`: norm of what the last linear solve left. */
+static void share(SbLedger l, PetscReal before, PetscReal energy, PetscBool single)
+{
+  const PetscReal error = PetscSqrtReal(energy);
+  PetscReal part = 1.;
+
+  if (!single && l->first[0] > 0.) part = PetscMin(1., before / l->first[0]);
+  l->step_linear = part * error;
+  l->step_nonlinear = PetscSqrtReal(PetscMax(0., 1. - part * part)) * error;
+}
+
+/* What the next step leaves of an error like delta, in which inertia has the share shift_a delta.M delta of the energy delta.J delta: of an oscillation of
+   the frequency w implicit Euler leaves 1 / (1 + (w h)^2)^(1/2), which is the root of that share. Other methods do not damp so, but
+   their next solve sees the residual that was left, in the acceleration. */
+static PetscErrorCode damp(SbLedger l, PetscReal energy)
+{
+  PetscReal mass;
+
+  PetscFunctionBeginUser;
+  l->kept_part = 1.;
+  if (!(energy > 0.)) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(SbMassForm(l, l->delta, &mass));
+  l->kept_part = PetscMin(1., PetscSqrtReal(l->run->shift_a * mass / energy));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbEstimateSolver(SbLedger l, const SbSolved *step)
+{
+  const SNES snes = l->run->snes;
+  PetscReal rtol, atol, dtol, before, energy;
+  PetscInt max_it, its;
+  PetscBool single, warm;
+  Vec F = l->w[0];
+  KSP ksp;
+
+  PetscFunctionBeginUser;
+  PetscCall(SNESGetKSP(snes, &ksp));
+  PetscCall(KSPGetResidualNorm(ksp, &before));
+  PetscCall(PetscObjectTypeCompare((PetscObject)snes, SNESKSPONLY, &single));
+  l->residuals -= MPI_Wtime();
+  PetscCall(SNESComputeFunction(snes, step->U, F));
+  l->residuals += MPI_Wtime();
+  PetscCall(KSPGetTolerances(ksp, &rtol, &atol, &dtol, &max_it));
+  PetscCall(KSPGetInitialGuessNonzero(ksp, &warm));
+  PetscCall(KSPSetInitialGuessNonzero(ksp, PETSC_FALSE));
+  PetscCall(KSPSetTolerances(ksp, ROUGHLY, 0., dtol, max_it));
+  PetscCall(KSPSetResidualHistory(ksp, l->first, 1, PETSC_TRUE));
+  l->first[0] = 0.;
+  l->solving -= MPI_Wtime();
+  PetscCall(KSPSolve(ksp, F, l->delta));
+  l->solving += MPI_Wtime();
+  PetscCall(KSPGetIterationNumber(ksp, &its));
+  PetscCall(KSPSetTolerances(ksp, rtol, atol, dtol, max_it));
+  PetscCall(KSPSetInitialGuessNonzero(ksp, warm));
+  PetscCall(VecDot(l->delta, F, &energy));
+  share(l, before, 0.5 * PetscAbsReal(energy), single);
+  if (step->V) PetscCall(damp(l, PetscAbsReal(energy)));
+  l->own_work += 1. + 2. * (PetscReal)its;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Each displacement is off by up to half its last digit, in no direction that is preferred: signs by a hash of the node. */
+PetscErrorCode SbEstimateRounding(SbLedger l, PetscReal t, Vec U, PetscReal *error)
+{
+  const SbSpace s = l->run->model->space;
+  const PetscScalar *u;
+  PetscScalar *d;
+  PetscReal form;
+
+  PetscFunctionBeginUser;
+  PetscCall(VecGetArrayRead(U, &u));
+  PetscCall(VecGetArray(l->w[0], &d));
+  for (PetscInt i = 0; i < 3 * s->nnode_owned; i++) {
+    const uint32_t hash = (uint32_t)(3 * s->node_orig[i / 3] + i % 3) * 2654435761u;
+
+    d[i] = (hash >> 31 ? 0.5 : -0.5) * PETSC_MACHINE_EPSILON * u[i];
+  }
+  PetscCall(VecRestoreArray(l->w[0], &d));
+  PetscCall(VecRestoreArrayRead(U, &u));
+  PetscCall(SbStiffnessForm(l, t, U, l->w[0], &form));
+  /* once in a static run; in each step of a dynamic one, without a sign that stays */
+  *error =
+    PetscSqrtReal(0.5 * form * PetscMax(1., (PetscReal)(s->mesh && l->run->ts ? l->run->steps_total : 1)));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

@@ -1,0 +1,150 @@
+/*
+  What the integrator loses. With E_j the energy of the j-th derivative of the state (u, v), 1/2 d.K d + 1/2 d'.M d' for d = u^(j), a step of
+  a method of order p loses c h^(p+1) E_(p+1)^(1/2): its eigenvalue z for an oscillator of the frequency w has |z - exp(i w h)| = c (w h)^(p+1), and
+  each derivative multiplies the motion by w.
+
+  The losses of the steps add up, but an oscillation does not lose more than it has. One that the steps do not resolve has lost all of it soon, which the sum of
+  asymptotic losses does not see. With x = c h^(p+1) w^(p+1) per step, min(sum x, 1) <= (sum x)^(j/(p+1)) for every j, so that
+
+    (sum c h^(p+1))^(j/(p+1)) E_j^(1/2),   j = 0 .. p,
+
+  are bounds of the same kind; the smallest of them and of the sum is taken. (With implicit Euler and j = 1 it is the energy that the method has taken.)
+  Derivatives are differences of the accelerations, which are states of the integrators (second_order.c).
+*/
+#include "ledger_impl.h"
+#include "sbsolver.h"
+
+#define PROBE 1e-6 /* of the bodies' size: how far displacements are moved along a direction */
+
+PetscErrorCode SbMassForm(SbLedger l, Vec D, PetscReal *form)
+{
+  const SbSpace s = l->run->model->space;
+  const PetscScalar *d;
+  PetscReal sum = 0.;
+
+  PetscFunctionBeginUser;
+  PetscCall(VecGetArrayRead(D, &d));
+  for (PetscInt i = 0; i < 3 * s->nnode_owned; i++) sum += s->node_mass[i / 3] * d[i] * d[i];
+  PetscCall(VecRestoreArrayRead(D, &d));
+  PetscCallMPI(MPI_Allreduce(&sum, form, 1, MPIU_REAL, MPI_SUM, s->comm));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Where the matrix of the last solve is J = shift_a M + K, one product tells it. */
+static PetscBool matrix_tells(const SbRun run)
+{
+  return (PetscBool)(run->J && run->ts && run->shift_a > 0. && !run->damped &&
+                     !run->solver_used->matrix_free && !run->model->space->consistent_mass);
+}
+
+static PetscErrorCode form_by_matrix(SbLedger l, Vec D, PetscReal *form)
+{
+  const SbSpace s = l->run->model->space;
+  Vec free = l->w[1], product = l->w[2];
+  PetscReal mass;
+  PetscScalar *d;
+
+  PetscFunctionBeginUser;
+  PetscCall(VecCopy(D, free));
+  PetscCall(VecGetArray(free, &d));
+  for (PetscInt k = 0; k < s->nfixed; k++) {
+    for (PetscInt i = 3 * s->fixed_node[k]; i < 3 * s->fixed_node[k] + 3; i++) {
+      if (s->fixed_node[k] < s->nnode_owned && (s->fixed[i / 3] & (1 << i % 3))) d[i] = 0.;
+    }
+  }
+  PetscCall(VecRestoreArray(free, &d));
+  PetscCall(MatMult(l->run->J, free, product));
+  PetscCall(VecDot(product, free, form));
+  PetscCall(SbMassForm(l, free, &mass));
+  *form = PetscMax(0., *form - l->run->shift_a * mass);
+  l->own_work += 1.;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbStiffnessForm(SbLedger l, PetscReal t, Vec U, Vec D, PetscReal *form)
+{
+  const SbModel m = l->run->model;
+  PetscReal size, volume = 0., length, at[2];
+  Vec moved = l->w[1], R = l->w[2];
+
+  PetscFunctionBeginUser;
+  *form = 0.;
+  PetscCall(VecNorm(D, NORM_INFINITY, &size));
+  if (!(size > 0.)) PetscFunctionReturn(PETSC_SUCCESS);
+  if (matrix_tells(l->run)) {
+    PetscCall(form_by_matrix(l, D, form));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  for (PetscInt b = 0; b < m->nbody; b++) volume = PetscMax(volume, m->body[b].volume);
+  length = PROBE * PetscPowReal(volume, 1. / 3.) / size;
+  l->residuals -= MPI_Wtime();
+  for (int side = 0; side < 2; side++) {
+    PetscCall(VecWAXPY(moved, side ? length : -length, D, U));
+    PetscCall(SbModelResidual(m, t, moved, NULL, NULL, PETSC_FALSE, R));
+    PetscCall(VecDot(R, D, &at[side]));
+  }
+  l->residuals += MPI_Wtime();
+  *form = PetscAbsReal(at[1] - at[0]) / (2. * length);
+  l->own_work += 2.;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Energy of a derivative of the state: D as displacement, its rate. Collective. */
+static PetscErrorCode derivative_energy(SbLedger l, const SbSolved *step, Vec D, Vec rate, PetscReal *energy)
+{
+  PetscReal mass, stiffness;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbMassForm(l, rate, &mass));
+  PetscCall(SbStiffnessForm(l, step->t + step->dt, step->U, D, &stiffness));
+  *energy = 0.5 * (mass + stiffness);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbEstimateTime(SbLedger l, const SbSolved *step, PetscBool all)
+{
+  const PetscReal h = step->dt;
+  Vec rate = l->w[0], second = l->delta;
+  PetscReal mass;
+
+  PetscFunctionBeginUser;
+  if (all) PetscCall(derivative_energy(l, step, step->V, step->A, &l->derivative[1]));
+  PetscCall(VecWAXPY(rate, -1., step->A0, step->A));
+  PetscCall(VecScale(rate, 1. / h));
+  /* implicit Euler begins without an acceleration */
+  if (l->order == 1 && step->t == l->run->t0 && l->run->step0 == 0) PetscCall(VecZeroEntries(rate));
+  if (all || l->order == 1) PetscCall(derivative_energy(l, step, step->A, rate, &l->derivative[2]));
+  if (l->order == 2) {
+    PetscCall(VecCopy(rate, second));
+    if (l->before && l->before_dt > 0.) {
+      PetscCall(VecAXPBYPCZ(second, -1. / l->before_dt, 1. / l->before_dt, 1., l->kept, l->before));
+      PetscCall(VecScale(second, 2. / (h + l->before_dt)));
+    } else
+      PetscCall(VecZeroEntries(second));
+    PetscCall(derivative_energy(l, step, rate, second, &l->derivative[3]));
+  }
+  l->step_time =
+    l->c * PetscPowReal(h, (PetscReal)l->order + 1.) * PetscSqrtReal(l->derivative[l->order + 1]);
+  l->offset = 0.;
+  if (l->ahead > 0.) {
+    PetscCall(SbMassForm(l, step->A, &mass));
+    l->offset = l->ahead * h * PetscSqrtReal(0.5 * mass);
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+void SbEstimateTimeAdd(SbLedger l, PetscReal dt, PetscReal left)
+{
+  const PetscReal power = (PetscReal)l->order + 1.;
+  PetscReal least;
+
+  l->lost = left * l->lost + l->step_time;
+  l->tau += l->c * PetscPowReal(dt, power);
+  l->span += dt;
+  least = PetscMin(l->lost, PetscSqrtReal(l->stored));
+  for (int j = 1; j <= l->order; j++) {
+    l->mean[j] += dt * l->derivative[j];
+    least = PetscMin(least, PetscPowReal(l->tau, (PetscReal)j / power) * PetscSqrtReal(l->mean[j] / l->span));
+  }
+  l->error[SB_ERROR_TIME] = least;
+}

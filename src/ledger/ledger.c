@@ -1,0 +1,323 @@
+/*
+  The ledger of a run: when estimates are made, and how the errors of steps add up.
+
+  What a step loses is carried on by the motion, which keeps its energy or, with damping, takes from it as it takes from the motion itself: so the errors of
+  steps are summed in the norm of the energy ("Lady Windermere's fan": Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I, II.3).
+
+  Steps are looked at as long as estimates stay below a fixed share of the run's work, counted in residuals, not in seconds: two runs look
+  at the same steps. A step that was not looked at loses what the last one lost; with -accuracy the integrator's loss of each is known.
+*/
+#include "ledger_impl.h"
+
+#define SHARE 0.08    /* of the work may go into estimates */
+#define SPACE_WORK 6. /* residuals that the estimate of space costs */
+
+static const SbOption rows[] = {
+  {"ledger", SB_OPTION_BOOL, 1, "", "false", "",
+   "estimate the errors of the result by source, and print them beside the seconds spent on each"},
+  {"ledger_every", SB_OPTION_INT, 1, "", "0", "[0, inf)",
+   "steps between estimates of the error of the mesh, for the columns of history.csv; 0: at the end alone"},
+  {"ledger_quantity", SB_OPTION_CHOICE, 1, "", "none", "none|displacement|reaction|volume",
+   "number whose error is estimated, too: of the node nearest to ledger_at, of the support of a set, of all "
+   "bodies"},
+  {"ledger_at", SB_OPTION_REALS, 3, "m", "0,0,0", "(-inf, inf)",
+   "rest place of ledger_quantity displacement"},
+  {"ledger_direction", SB_OPTION_REALS, 3, "", "0,0,1", "(-inf, inf)",
+   "direction of ledger_quantity displacement and reaction; its length does not matter"},
+  {"ledger_on", SB_OPTION_STRING, 1, "", "", "", "set whose prescribed nodes make ledger_quantity reaction"},
+  {"accuracy", SB_OPTION_REAL, 1, "", "0", "[0, 1)",
+   "relative error in the norm of the energy that the run aims at: sets steps and tolerances; 0: they are "
+   "yours"},
+  {"time_budget", SB_OPTION_REAL, 1, "s", "0", "[0, inf)",
+   "wall time that a step may take: tolerances are as tight as it allows; 0: no limit"},
+};
+
+PetscErrorCode SbLedgerRegister(void)
+{
+  PetscFunctionBeginUser;
+  PetscCall(SbOptionsRegister("", "", (PetscInt)PETSC_STATIC_ARRAY_LENGTH(rows), rows));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbLedgerSetFromOptions(SbRun run, SbLedger *ledger)
+{
+  PetscReal accuracy, budget;
+  PetscBool named;
+  SbScope scope;
+  SbLedger l;
+
+  PetscFunctionBeginUser;
+  *ledger = NULL;
+  PetscCall(SbScopeSet(&scope, "", "", ""));
+  PetscCall(SbOptionBool(&scope, "ledger", &named));
+  PetscCall(SbOptionReal(&scope, "accuracy", &accuracy));
+  PetscCall(SbOptionReal(&scope, "time_budget", &budget));
+  if (!named && accuracy == 0. && budget == 0.) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCheck(
+    run->preset != SB_TIME_ALPHA2, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
+    "-ledger cannot look into the steps of -time alpha2: use -time genalpha, which is the same method");
+  PetscCall(PetscNew(&l));
+  l->run = run;
+  l->accuracy = accuracy;
+  l->budget = budget;
+  PetscCall(SbOptionInt(&scope, "ledger_every", &l->every));
+  PetscCall(SbQuantitySetFromOptions(l, &scope));
+  PetscCall(SbDialSetFromOptions(l));
+  *ledger = l;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ a step that was solved */
+
+static PetscErrorCode begin(SbLedger l)
+{
+  PetscFunctionBeginUser;
+  PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_LEDGER], 0, 0, 0, 0));
+  l->seconds -= MPI_Wtime();
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode end(SbLedger l)
+{
+  PetscFunctionBeginUser;
+  l->seconds += MPI_Wtime();
+  PetscCall(PetscLogEventEnd(SbEvents[SB_EVENT_LEDGER], 0, 0, 0, 0));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The accelerations that third differences need; an attempt that is repeated does not count twice. */
+static PetscErrorCode keep_acceleration(SbLedger l, const SbSolved *step)
+{
+  Vec spare = l->before;
+
+  PetscFunctionBeginUser;
+  if (l->kept && step->t == l->kept_t) PetscFunctionReturn(PETSC_SUCCESS);
+  if (l->kept) l->before_dt = step->t - l->kept_t;
+  l->before = l->kept;
+  l->kept = spare;
+  if (!l->kept) PetscCall(VecDuplicate(step->A0, &l->kept));
+  PetscCall(VecCopy(step->A0, l->kept));
+  l->kept_t = step->t;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* What the solver has seen of the residual that it left, N: known without an evaluation. */
+static PetscErrorCode last_residual(SbLedger l)
+{
+  PetscBool single;
+  KSP ksp;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscObjectTypeCompare((PetscObject)l->run->snes, SNESKSPONLY, &single));
+  PetscCall(SNESGetKSP(l->run->snes, &ksp));
+  if (single)
+    PetscCall(KSPGetResidualNorm(ksp, &l->residual));
+  else
+    PetscCall(SNESGetFunctionNorm(l->run->snes, &l->residual));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode look(SbRun run, const SbSolved *step, void *ctx, PetscBool *again)
+{
+  SbLedger l = (SbLedger)ctx;
+
+  PetscFunctionBeginUser;
+  if (step->A0 && l->order == 2) PetscCall(keep_acceleration(l, step));
+  l->seen = (PetscBool)(!run->model->dynamic || l->own_work <= SHARE * l->work);
+  if (step->solved) PetscCall(last_residual(l));
+  if (!l->seen && l->accuracy == 0.) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(begin(l));
+  if (step->V) PetscCall(SbEstimateTime(l, step, l->seen));
+  if (l->seen && step->solved) {
+    PetscCall(SbEstimateSolver(l, step));
+    l->seen_residual = l->residual;
+  }
+  PetscCall(end(l));
+  if (l->accuracy > 0. && l->seen) PetscCall(SbDialLook(l, step, again));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ a step that was accepted */
+
+/* What damping leaves of an error in a step: as of the motion, its power over twice its energy. */
+static PetscReal damped_part(const SbRun run, const SbStep *step)
+{
+  const PetscReal energy = step->energies.kinetic + step->energies.strain;
+
+  if (!(run->damping_power > 0.) || !(energy > 0.)) return 1.;
+  return PetscExpReal(-0.5 * PetscMin(step->dt * run->damping_power / energy, 2.));
+}
+
+/*
+  Errors of a static run are those of the last solve. In a dynamic one losses of the integrator add up. What linear solves leave is rough and
+  has another direction in each step; what linearisation leaves is smooth and has the same one. A step that was not looked at left as much
+  more as its last residual is larger.
+*/
+static void add_step(SbLedger l, const SbStep *step)
+{
+  const PetscReal left = step->V ? damped_part(l->run, step) : 0.;
+  const PetscReal part = l->seen_residual > 0. ? l->residual / l->seen_residual : 1.;
+  PetscReal *linear = &l->error[SB_ERROR_LINEAR], *nonlinear = &l->error[SB_ERROR_NONLINEAR];
+
+  if (step->V) SbEstimateTimeAdd(l, step->dt, left);
+  *linear = PetscSqrtReal(PetscSqr(left * l->kept_part * *linear) + PetscSqr(part * l->step_linear));
+  *nonlinear = left * PetscSqrtReal(l->kept_part) * *nonlinear + part * l->step_nonlinear;
+}
+
+static PetscErrorCode estimate_state(SbLedger l, const SbStep *step)
+{
+  const SbModel m = l->run->model;
+  PetscReal sum = 0., contact = 0.;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbSpaceEstimateCompute(l->space, step->t, step->U, step->V, step->A));
+  for (PetscInt b = 0; b < m->nbody; b++) {
+    l->space_error[b] = l->space->body2[b];
+    sum += l->space->body2[b];
+  }
+  l->error[SB_ERROR_SPACE] =
+    m->dynamic ? PetscMax(l->error[SB_ERROR_SPACE], PetscSqrtReal(sum)) : PetscSqrtReal(sum);
+  if (m->ntouch && step->R) PetscCall(SbEstimateContact(l, step, &contact));
+  l->error[SB_ERROR_CONTACT] = m->dynamic ? PetscMax(l->error[SB_ERROR_CONTACT], contact) : contact;
+  l->own_work += SPACE_WORK;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static void update_columns(SbLedger l)
+{
+  const PetscReal scale = l->stored > 0. ? 1. / PetscSqrtReal(l->stored) : 0.;
+
+  for (int i = 0; i < SB_ERROR_COUNT; i++) l->relative[i] = scale * l->error[i];
+  l->relative[SB_ERROR_TIME] += scale * l->offset;
+}
+
+/* In units of a residual: a tangent is three, an iteration with its preconditioner two. */
+static PetscReal work_of(const SbRun run, const SbStep *step)
+{
+  return run->snes ? 4. * (PetscReal)step->newton + 2. * (PetscReal)step->linear + 1. : 1.;
+}
+
+static PetscErrorCode monitor(SbRun run, const SbStep *step, void *ctx)
+{
+  SbLedger l = (SbLedger)ctx;
+  const PetscBool first = (PetscBool)(step->step == run->step0);
+  const PetscReal energy = step->energies.strain + step->energies.kinetic;
+
+  PetscFunctionBeginUser;
+  l->stored = run->model->dynamic ? PetscMax(l->stored, energy) : energy;
+  l->work += work_of(run, step);
+  if (!first) add_step(l, step);
+  PetscCall(begin(l));
+  if (!first && (step->last || (l->every && step->step % l->every == 0))) PetscCall(estimate_state(l, step));
+  if (l->quantity.kind) PetscCall(SbQuantityValue(l, step));
+  if (step->last && !first) {
+    PetscCall(SbEstimateRounding(l, step->t, step->U, &l->error[SB_ERROR_ROUNDING]));
+    if (l->quantity.kind) PetscCall(SbQuantityErrors(l, step));
+  }
+  update_columns(l);
+  PetscCall(end(l));
+  PetscCall(SbDialAccept(l, step));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* For the field: of the frame's own state. */
+static PetscErrorCode cell_error(SbRun run, const SbStep *step, PetscReal values[])
+{
+  const SbSpace space = run->model->space;
+  SbLedger l = NULL;
+
+  PetscFunctionBeginUser;
+  for (PetscInt k = 0; k < run->nmonitor; k++) {
+    if (run->monitor[k].fn == monitor) l = (SbLedger)run->monitor[k].ctx;
+  }
+  PetscCall(begin(l));
+  PetscCall(SbSpaceEstimateCompute(l->space, step->t, step->U, step->V, step->A));
+  for (PetscInt b = 0; b < space->nbatch; b++) {
+    for (PetscInt i = 0; i < space->batch_n[b]; i++) {
+      const PetscInt c = space->batch_cell[b] + i;
+
+      if (c < space->mesh->ncell_owned) values[c] = l->space->cell2[c] / space->batch_V[b][i];
+    }
+  }
+  l->own_work += SPACE_WORK;
+  PetscCall(end(l));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ beginning and end */
+
+static PetscErrorCode name_columns(SbLedger l)
+{
+  static const char *const names[] = {"space", "time", "nonlinear", "linear", "contact", "rounding"};
+
+  PetscFunctionBeginUser;
+  for (int i = 0; i < SB_ERROR_COUNT; i++) {
+    SbColumn *c = &l->column[i];
+
+    PetscCall(PetscSNPrintf(c->name, sizeof(c->name), "error_%s", names[i]));
+    c->unit = "1";
+    c->value = &l->relative[i];
+  }
+  l->run->column = l->column;
+  l->run->ncolumn = SB_ERROR_COUNT;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbLedgerAttach(SbLedger l)
+{
+  SbRun run;
+
+  PetscFunctionBeginUser;
+  if (!l) PetscFunctionReturn(PETSC_SUCCESS);
+  run = l->run;
+  PetscCall(begin(l));
+  PetscCall(SbSpaceEstimateCreate(run->model, &l->space));
+  PetscCall(PetscCalloc1(run->model->nbody, &l->space_error));
+  for (int i = 0; i < 3; i++) PetscCall(VecDuplicate(run->U, &l->w[i]));
+  PetscCall(VecDuplicate(run->U, &l->delta));
+  if (run->model->dynamic) PetscCall(SbRunMethodError(run, &l->order, &l->c, &l->ahead));
+  PetscCall(SbQuantityAttach(l));
+  PetscCall(name_columns(l));
+  PetscCall(end(l));
+  run->want_energies = PETSC_TRUE;
+  if (run->model->ntouch || l->quantity.kind == SB_QUANTITY_REACTION) run->want_residual = PETSC_TRUE;
+  run->look.fn = look;
+  run->look.ctx = l;
+  run->cell_error = cell_error;
+  PetscCall(SbRunAddMonitor(run, monitor, l, NULL));
+  PetscCall(SbDialAttach(l));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbLedgerGet(SbLedger l, SbErrorSource source, PetscReal *error, PetscReal *stored)
+{
+  PetscFunctionBeginUser;
+  *error = l->error[source] + (source == SB_ERROR_TIME ? l->offset : 0.);
+  *stored = l->stored;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbLedgerGetQuantity(SbLedger l, SbErrorSource source, PetscReal *error, PetscReal *value)
+{
+  PetscFunctionBeginUser;
+  *error = l->quantity.error[source];
+  *value = l->quantity.value;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbLedgerDestroy(SbLedger *ledger)
+{
+  SbLedger l = *ledger;
+
+  PetscFunctionBeginUser;
+  if (!l) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(SbQuantityDestroy(l));
+  PetscCall(SbSpaceEstimateDestroy(&l->space));
+  PetscCall(PetscFree(l->space_error));
+  for (int i = 0; i < 3; i++) PetscCall(VecDestroy(&l->w[i]));
+  PetscCall(VecDestroy(&l->delta));
+  PetscCall(VecDestroy(&l->kept));
+  PetscCall(VecDestroy(&l->before));
+  PetscCall(PetscFree(*ledger));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

@@ -1,0 +1,100 @@
+/*
+  ledger_impl.h - what the files of src/ledger share.
+*/
+#pragma once
+#include "sbledger.h"
+
+typedef enum {
+  SB_QUANTITY_NONE,
+  SB_QUANTITY_DISPLACEMENT,
+  SB_QUANTITY_REACTION,
+  SB_QUANTITY_VOLUME
+} SbQuantityKind;
+
+/* The number that the user cares for. */
+typedef struct {
+  SbQuantityKind kind;
+  PetscReal at[3], direction[3];
+  char on[SB_NAME_MAX];
+  PetscInt node;                /* displacement: the nearest owned node, -1: on another rank */
+  uint64_t set;                 /* reaction: bit of the set */
+  Vec weight;                   /* reaction: the direction on its prescribed unknowns */
+  PetscReal value, least, most; /* now, and over the run */
+  PetscReal error[SB_ERROR_COUNT];
+} SbQuantity;
+
+struct _p_SbLedger {
+  SbRun run; /* borrowed */
+  PetscInt every;
+  PetscReal accuracy, budget; /* 0: not asked for; s per step */
+  SbSpaceEstimate space;
+  PetscReal *space_error; /* [nbody] of the last estimate, J */
+  SbQuantity quantity;
+
+  PetscInt order; /* of the integrator; its constant, and how far velocities are behind (SbRunMethodError) */
+  PetscReal c, ahead;
+  PetscReal derivative[4],
+    mean[4]; /* energies of derivatives of the last state, J/s^2j; their integrals over the run */
+  PetscReal lost, tau,
+    span;           /* of time: sum of the losses of steps, J^(1/2); sum of c h^(p+1); length of the run, s */
+  PetscReal stored; /* largest energy so far, J */
+  PetscReal error[SB_ERROR_COUNT];        /* J^(1/2) */
+  PetscReal relative[SB_ERROR_COUNT + 1]; /* as columns of the history; the last one: of the quantity */
+  SbColumn column[SB_ERROR_COUNT + 1];
+  /* of the last step that was looked at, J^(1/2) */
+  PetscReal step_time, step_linear, step_nonlinear, offset;
+  PetscReal residual, seen_residual; /* that the last solve left, and that of the last step that was looked at, N */
+  PetscReal kept_part; /* of what solves left before: the integrator damps it */
+  PetscBool seen;      /* the step that is about to be accepted was */
+
+  Vec kept, before; /* accelerations at the start of this step and of the one before, m/s^2 */
+  PetscReal kept_t, kept_dt, before_dt; /* s; before_dt 0: there was none */
+  Vec w[3];                             /* work */
+  Vec delta;                            /* what the solve left, m: the quantity's share of it */
+  PetscReal first[2];                   /* norms of a residual history */
+
+  PetscReal work, own_work; /* in residuals, of the run and of the estimates: the same on every run */
+  PetscReal seconds, solving,
+    residuals; /* of the estimates on this rank: all, in linear solves, in residuals */
+
+  /* dial.c */
+  PetscBool may_tune;             /* tolerances are the program's */
+  PetscReal rtol;                 /* that the solves aim at */
+  PetscInt repeats;               /* solves that were repeated for their accuracy */
+  PetscInt nstep, nkept;          /* of -time_budget: steps, and those that took no longer */
+  PetscReal wall, longest, total; /* at the last step; s */
+};
+
+/* estimate_time.c: what the step loses, into step_time and offset; all: what bounds the sum of steps, too. Collective. */
+PetscErrorCode SbEstimateTime(SbLedger l, const SbSolved *step, PetscBool all);
+/* Adds it to the error of the run, of whose old part damping leaves `left`, 0..1. Not collective. */
+void SbEstimateTimeAdd(SbLedger l, PetscReal dt, PetscReal left);
+/* Twice the strain energy of a displacement D added to U, as the tangent at U has it, J. Collective. */
+PetscErrorCode SbStiffnessForm(SbLedger l, PetscReal t, Vec U, Vec D, PetscReal *form);
+/* Sum of the lumped mass times the square of a vector, all ranks. Collective. */
+PetscErrorCode SbMassForm(SbLedger l, Vec D, PetscReal *form);
+/* estimate_solver.c: what the solves of the step left, into step_linear, step_nonlinear and delta. Collective. */
+PetscErrorCode SbEstimateSolver(SbLedger l, const SbSolved *step);
+/* What rounding of the displacements leaves, J^(1/2). Collective. */
+PetscErrorCode SbEstimateRounding(SbLedger l, PetscReal t, Vec U, PetscReal *error);
+/* estimate_contact.c: J^(1/2). Collective. */
+PetscErrorCode SbEstimateContact(SbLedger l, const SbStep *step, PetscReal *error);
+
+/* dial.c */
+PetscErrorCode SbDialSetFromOptions(SbLedger l);
+PetscErrorCode SbDialAttach(SbLedger l);
+PetscErrorCode SbDialLook(SbLedger l, const SbSolved *step, PetscBool *again);
+PetscErrorCode SbDialAccept(SbLedger l, const SbStep *step);
+
+/* quantity.c */
+PetscErrorCode SbQuantitySetFromOptions(SbLedger l, const SbScope *scope);
+PetscErrorCode SbQuantityAttach(SbLedger l);
+PetscErrorCode SbQuantityValue(SbLedger l, const SbStep *step);
+PetscErrorCode SbQuantityErrors(SbLedger l, const SbStep *step);
+PetscErrorCode SbQuantityDestroy(SbLedger l);
+
+/* Seconds by source and those without one, largest of all ranks. */
+typedef struct {
+  PetscReal source[SB_ERROR_COUNT], search, setup, output, estimates, total;
+} SbLedgerSeconds;
+PetscErrorCode SbLedgerGetSeconds(SbLedger l, SbLedgerSeconds *s);

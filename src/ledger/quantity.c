@@ -1,0 +1,238 @@
+/*
+  The one number that the user cares for, and what it is wrong by.
+
+  In a static run by duality (Becker and Rannacher, Acta Numerica 10, 2001): with z the displacement under the load that makes the number,
+  K z = dQ/du, the mesh's share is the energy of the errors of u and z on each other, a(e_u, e_z), which the estimate of space
+  gives as (eta^2(u + s z) - eta^2(u - s z)) / 2 s; the solver's share is dQ/du . delta. For all else, and in a dynamic run, the relative
+  error in the norm of the energy stands for that of the number, times the range that it went through.
+*/
+#include "ledger_impl.h"
+#include "sbkernel.h"
+
+#define PROBE 1e-6   /* of the bodies' size */
+#define ADJOINT 1e-2 /* how well z is solved for */
+#define MIX 1e-3     /* share of z that is added to u, in the norm of the energy */
+
+PetscErrorCode SbQuantitySetFromOptions(SbLedger l, const SbScope *scope)
+{
+  SbQuantity *q = &l->quantity;
+  PetscInt kind;
+  PetscReal length;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbOptionChoice(scope, "ledger_quantity", &kind));
+  q->kind = (SbQuantityKind)kind;
+  q->node = -1;
+  q->least = PETSC_MAX_REAL;
+  q->most = PETSC_MIN_REAL;
+  if (!kind) PetscFunctionReturn(PETSC_SUCCESS);
+  if (q->kind == SB_QUANTITY_DISPLACEMENT) PetscCall(SbOptionReals(scope, "ledger_at", q->at));
+  if (q->kind == SB_QUANTITY_REACTION) PetscCall(SbOptionString(scope, "ledger_on", sizeof(q->on), q->on));
+  if (q->kind == SB_QUANTITY_VOLUME) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(SbOptionReals(scope, "ledger_direction", q->direction));
+  length = PetscSqrtReal(SbDot3(q->direction, q->direction));
+  PetscCheck(length > 0., PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT, "-ledger_direction 0,0,0 is no direction");
+  for (int k = 0; k < 3; k++) q->direction[k] /= length;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Of all ranks; of equally near ones the one with the lowest number, whatever the partition. */
+static PetscErrorCode nearest_node(SbLedger l)
+{
+  const SbSpace s = l->run->model->space;
+  SbQuantity *q = &l->quantity;
+  PetscReal least = PETSC_MAX_REAL, all;
+  PetscInt first = PETSC_MAX_INT, winner;
+
+  PetscFunctionBeginUser;
+  for (int pass = 0; pass < 2; pass++) {
+    for (PetscInt i = 0; i < s->nnode_owned; i++) {
+      PetscReal r = 0.;
+
+      for (int k = 0; k < 3; k++) r += PetscSqr(s->node_x[3 * i + k] - q->at[k]);
+      if (!pass)
+        least = PetscMin(least, r);
+      else if (r <= all * (1. + 1e-12) && s->node_orig[i] < first) {
+        first = s->node_orig[i];
+        q->node = i;
+      }
+    }
+    if (!pass) PetscCallMPI(MPI_Allreduce(&least, &all, 1, MPIU_REAL, MPI_MIN, s->comm));
+  }
+  PetscCallMPI(MPI_Allreduce(&first, &winner, 1, MPIU_INT, MPI_MIN, s->comm));
+  if (first != winner) q->node = -1;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbQuantityAttach(SbLedger l)
+{
+  const SbModel m = l->run->model;
+  const SbSpace s = m->space;
+  SbQuantity *q = &l->quantity;
+  PetscScalar *w;
+  PetscInt held = 0;
+
+  PetscFunctionBeginUser;
+  if (q->kind == SB_QUANTITY_NONE || q->kind == SB_QUANTITY_VOLUME) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(VecDuplicate(l->run->U, &q->weight));
+  PetscCall(VecZeroEntries(q->weight));
+  if (q->kind == SB_QUANTITY_DISPLACEMENT) PetscCall(nearest_node(l));
+  for (PetscInt k = 0; k < m->nset; k++) {
+    if (!strcmp(m->set[k].name, q->on)) q->set = SB_SET_BIT(k);
+  }
+  PetscCall(VecGetArray(q->weight, &w));
+  for (PetscInt i = 0; i < s->nnode_owned; i++) {
+    for (int k = 0; k < 3; k++) {
+      const PetscBool on = q->kind == SB_QUANTITY_REACTION
+                             ? (PetscBool)((s->node_set[i] & q->set) && (s->fixed[i] & (1 << k)))
+                             : (PetscBool)(i == q->node);
+
+      if (on) w[3 * i + k] = q->direction[k];
+      held += on;
+    }
+  }
+  PetscCall(VecRestoreArray(q->weight, &w));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &held, 1, MPIU_INT, MPI_SUM, m->comm));
+  PetscCheck(held > 0, m->comm, PETSC_ERR_USER_INPUT,
+             "-ledger_on '%s': no effect prescribes displacements on a set of that name, so there is no "
+             "reaction; name a set of a "
+             "support or drive",
+             q->on);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbQuantityValue(SbLedger l, const SbStep *step)
+{
+  SbQuantity *q = &l->quantity;
+
+  PetscFunctionBeginUser;
+  if (q->kind == SB_QUANTITY_VOLUME)
+    q->value = step->energies.volume;
+  else
+    PetscCall(VecDot(q->weight, q->kind == SB_QUANTITY_REACTION ? step->R : step->U, &q->value));
+  q->least = PetscMin(q->least, q->value);
+  q->most = PetscMax(q->most, q->value);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The residual's change along a displacement, N. */
+static PetscErrorCode stiffness_times(SbLedger l, PetscReal t, Vec U, Vec D, Vec R)
+{
+  const SbModel m = l->run->model;
+  PetscReal size, volume = 0., length;
+  Vec moved = l->w[1], other = l->w[2];
+
+  PetscFunctionBeginUser;
+  PetscCall(VecZeroEntries(R));
+  PetscCall(VecNorm(D, NORM_INFINITY, &size));
+  if (!(size > 0.)) PetscFunctionReturn(PETSC_SUCCESS);
+  for (PetscInt b = 0; b < m->nbody; b++) volume = PetscMax(volume, m->body[b].volume);
+  length = PROBE * PetscPowReal(volume, 1. / 3.) / size;
+  PetscCall(VecWAXPY(moved, length, D, U));
+  PetscCall(SbModelResidual(m, t, moved, NULL, NULL, PETSC_FALSE, R));
+  PetscCall(VecWAXPY(moved, -length, D, U));
+  PetscCall(SbModelResidual(m, t, moved, NULL, NULL, PETSC_FALSE, other));
+  PetscCall(VecAXPY(R, -1., other));
+  PetscCall(VecScale(R, 0.5 / length));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* dQ/du on what is not prescribed. */
+static PetscErrorCode gradient(SbLedger l, const SbStep *step, Vec B)
+{
+  const SbSpace s = l->run->model->space;
+  SbQuantity *q = &l->quantity;
+  PetscScalar *b;
+
+  PetscFunctionBeginUser;
+  if (q->kind == SB_QUANTITY_REACTION)
+    PetscCall(stiffness_times(l, step->t, step->U, q->weight, B));
+  else
+    PetscCall(VecCopy(q->weight, B));
+  PetscCall(VecGetArray(B, &b));
+  for (PetscInt i = 0; i < 3 * s->nnode_owned; i++) {
+    if (s->fixed[i / 3] & (1 << i % 3)) b[i] = 0.;
+  }
+  PetscCall(VecRestoreArray(B, &b));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode adjoint(SbLedger l, Vec B, Vec Z)
+{
+  PetscReal rtol, atol, dtol;
+  PetscInt max_it;
+  KSP ksp;
+
+  PetscFunctionBeginUser;
+  PetscCall(SNESGetKSP(l->run->snes, &ksp));
+  PetscCall(KSPGetTolerances(ksp, &rtol, &atol, &dtol, &max_it));
+  PetscCall(KSPSetTolerances(ksp, ADJOINT, 0., dtol, max_it));
+  l->solving -= MPI_Wtime();
+  PetscCall(KSPSolve(ksp, B, Z));
+  l->solving += MPI_Wtime();
+  PetscCall(KSPSetTolerances(ksp, rtol, atol, dtol, max_it));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The mesh's share: a(e_u, e_z). */
+static PetscErrorCode mesh_share(SbLedger l, const SbStep *step, PetscReal energy, Vec Z, PetscReal *error)
+{
+  const SbModel m = l->run->model;
+  PetscReal s, sums[2] = {0., 0.};
+
+  PetscFunctionBeginUser;
+  *error = 0.;
+  if (!(energy > 0.) || !(l->stored > 0.)) PetscFunctionReturn(PETSC_SUCCESS);
+  s = MIX * PetscSqrtReal(2. * l->stored / energy);
+  for (int side = 0; side < 2; side++) {
+    PetscCall(VecWAXPY(l->w[1], side ? s : -s, Z, step->U));
+    PetscCall(SbSpaceEstimateCompute(l->space, step->t, l->w[1], NULL, NULL));
+    for (PetscInt b = 0; b < m->nbody; b++) sums[side] += l->space->body2[b];
+  }
+  *error = PetscAbsReal(sums[1] - sums[0]) / (2. * s);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode by_duality(SbLedger l, const SbStep *step)
+{
+  SbQuantity *q = &l->quantity;
+  const PetscReal both = PetscSqr(l->step_linear) + PetscSqr(l->step_nonlinear);
+  PetscReal left, energy;
+  Vec B, Z;
+
+  PetscFunctionBeginUser;
+  PetscCall(VecDuplicate(step->U, &B));
+  PetscCall(VecDuplicate(step->U, &Z));
+  PetscCall(gradient(l, step, B));
+  PetscCall(VecDot(B, l->delta, &left));
+  left = PetscAbsReal(left) / PetscSqrtReal(PetscMax(both, PETSC_MIN_REAL));
+  q->error[SB_ERROR_LINEAR] = left * l->step_linear;
+  q->error[SB_ERROR_NONLINEAR] = left * l->step_nonlinear;
+  PetscCall(adjoint(l, B, Z));
+  PetscCall(VecDot(B, Z, &energy));
+  /* of a reaction: what a motion of the support does to the body, which moves as a whole where nothing else holds it */
+  if (q->kind == SB_QUANTITY_REACTION) PetscCall(VecAYPX(Z, -1., q->weight));
+  PetscCall(mesh_share(l, step, energy, Z, &q->error[SB_ERROR_SPACE]));
+  PetscCall(VecDestroy(&B));
+  PetscCall(VecDestroy(&Z));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbQuantityErrors(SbLedger l, const SbStep *step)
+{
+  SbQuantity *q = &l->quantity;
+  const PetscReal scale = l->stored > 0. ? (q->most - q->least) / PetscSqrtReal(l->stored) : 0.;
+
+  PetscFunctionBeginUser;
+  for (int i = 0; i < SB_ERROR_COUNT; i++)
+    q->error[i] = scale * (l->error[i] + (i == SB_ERROR_TIME ? l->offset : 0.));
+  if (!l->run->model->dynamic && q->kind != SB_QUANTITY_VOLUME) PetscCall(by_duality(l, step));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbQuantityDestroy(SbLedger l)
+{
+  PetscFunctionBeginUser;
+  PetscCall(VecDestroy(&l->quantity.weight));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

@@ -1,0 +1,307 @@
+/*
+  The table that a person reads at the end: errors beside seconds, and in plain words what to do about them.
+
+  What halving an error costs, as a factor on the time of the run: of the mesh, edges of half the length (errors fall with the length), eight times the tets, and
+  twice the iterations where the preconditioner's count grows with the mesh; of the integrator of order p, steps shorter by 2^(1/p); of the
+  solves, the iterations that take half a residual at the rate that was measured.
+*/
+#include <stdarg.h>
+#include "ledger_impl.h"
+
+#define WASTE 1e3 /* a source so many times below the largest one is worked on for nothing */
+#define WIDTH 79
+
+static const char *const names[SB_ERROR_COUNT] = {"space",  "time",    "nonlinear",
+                                                  "linear", "contact", "rounding"};
+
+/* ------------------------------------------------------------------ words */
+
+typedef struct {
+  char text[2048];
+  size_t n;
+} Words;
+
+static void say(Words *w, const char *format, ...) PETSC_ATTRIBUTE_FORMAT(2, 3);
+static void say(Words *w, const char *format, ...)
+{
+  va_list args;
+
+  va_start(args, format);
+  w->n += (size_t)vsnprintf(w->text + w->n, sizeof(w->text) - w->n, format, args);
+  va_end(args);
+  w->n = PetscMin(w->n, sizeof(w->text) - 1);
+}
+
+static PetscErrorCode print_wrapped(char text[])
+{
+  int column = 0;
+
+  PetscFunctionBeginUser;
+  for (char *word = strtok(text, " "); word; word = strtok(NULL, " ")) {
+    const int n = (int)strlen(word);
+
+    if (column && column + 1 + n > WIDTH) {
+      PetscCall(PetscFPrintf(PETSC_COMM_SELF, PETSC_STDOUT, "\n"));
+      column = 0;
+    }
+    PetscCall(PetscFPrintf(PETSC_COMM_SELF, PETSC_STDOUT, "%s%s", column ? " " : "", word));
+    column += n + (column > 0);
+  }
+  PetscCall(PetscFPrintf(PETSC_COMM_SELF, PETSC_STDOUT, "\n"));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscReal error_of(SbLedger l, int source)
+{
+  return l->error[source] + (source == SB_ERROR_TIME ? l->offset : 0.);
+}
+
+/* The errors are of different things and as likely to help as to hinder each other. */
+static PetscReal together(SbLedger l)
+{
+  PetscReal sum = 0.;
+
+  for (int i = 0; i < SB_ERROR_COUNT; i++) sum += PetscSqr(error_of(l, i));
+  return PetscSqrtReal(sum);
+}
+
+static int largest(SbLedger l)
+{
+  int most = 0;
+
+  for (int i = 1; i < SB_ERROR_COUNT; i++) {
+    if (error_of(l, i) > error_of(l, most)) most = i;
+  }
+  return most;
+}
+
+/* Edge of a regular tet of the mean volume, m. */
+static PetscReal mesh_size(SbModel m)
+{
+  PetscReal volume = 0., n = 0.;
+
+  for (PetscInt b = 0; b < m->nbody; b++) {
+    volume += m->body[b].volume;
+    n += (PetscReal)m->body[b].ncell;
+  }
+  return PetscPowReal(6. * PetscSqrtReal(2.) * volume / n, 1. / 3.);
+}
+
+/* By what the seconds per tet of a solve grow when edges are halved: a factorisation (n^2 in space), iterations that grow with the mesh, or not. */
+static PetscReal growth(SbRun run)
+{
+  static const struct {
+    const char *part;
+    PetscReal factor;
+  } of[] = {{"cholmod", 8.}, {"mumps", 8.},    {"umfpack", 8.},
+            {"gamg", 1.},    {"pressure", 1.}, {"two_level", 1.}};
+
+  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(of); i++) {
+    if (strstr(run->solver, of[i].part)) return of[i].factor;
+  }
+  return 2.;
+}
+
+/* What half the error of a source costs, as a factor on the time of the run. */
+static PetscReal price(SbLedger l, const SbLedgerSeconds *s, int source)
+{
+  const SbRun run = l->run;
+  const PetscReal total = PetscMax(s->total, 1e-9), solving = s->source[SB_ERROR_LINEAR] / total;
+  const PetscReal digits = PetscLog2Real(1. / PetscMax(l->rtol > 0. ? l->rtol : 1e-5, 1e-14));
+
+  switch (source) {
+  case SB_ERROR_SPACE:
+    /* explicit steps are bounded by the smallest tet */
+    return 8. * (run->J ? 1. + solving * (growth(run) - 1.) : 2.);
+  case SB_ERROR_TIME:
+    return 1. + (PetscPowReal(2., 1. / (PetscReal)PetscMax(l->order, 1)) - 1.) * (1. - s->setup / total);
+  default:
+    return 1. + (solving + s->source[SB_ERROR_NONLINEAR] / total) / digits;
+  }
+}
+
+static void say_largest(SbLedger l, const SbLedgerSeconds *s, Words *w)
+{
+  static const char *const what[SB_ERROR_COUNT] = {
+    "the mesh is the largest source of error: half of it takes edges of half the length",
+    "the time step is the largest source of error: half of it takes steps of %.3g s",
+    "Newton's method stops too early: half of its error takes a smaller -snes_rtol",
+    "the linear solver is the largest source of error: half of it takes a smaller -ksp_rtol",
+    "contact is the largest source of error: stiffer springs or -effect_..._response projected close the "
+    "gaps",
+    "rounding is the largest source of error: only other units or a smaller range of stiffnesses helps"};
+  const int most = largest(l);
+  const SbRun run = l->run;
+
+  if (!(error_of(l, most) > 0.)) {
+    say(w, "No error was found that could be told from zero. ");
+    return;
+  }
+  say(w, "Of an error of %.2g %%, ", (double)(100. * together(l) / PetscSqrtReal(l->stored)));
+  if (most == SB_ERROR_TIME)
+    say(w, "the time step is the largest source: half of it takes steps of %.3g s",
+        (double)(run->t_end / PetscMax(1, run->steps_total) / PetscPowReal(2., 1. / (PetscReal)l->order)));
+  else
+    say(w, "%s", what[most]);
+  if (most != SB_ERROR_CONTACT && most != SB_ERROR_ROUNDING)
+    say(w, ", and %.2g times the time", (double)price(l, s, most));
+  say(w, ". ");
+}
+
+/* Settings that cost and gain nothing. */
+static void say_wasted(SbLedger l, const SbLedgerSeconds *s, Words *w)
+{
+  static const struct {
+    int source;
+    const char *what;
+  } of[] = {{SB_ERROR_LINEAR, "-ksp_rtol (with Newton's method -snes_rtol)"},
+            {SB_ERROR_NONLINEAR, "-snes_rtol"},
+            {SB_ERROR_TIME, "-ts_dt"}};
+  const PetscReal most = error_of(l, largest(l));
+
+  if (l->may_tune) return; /* the dial turns them */
+  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(of); i++) {
+    const PetscReal e = error_of(l, of[i].source);
+    const PetscReal spent = s->source[of[i].source] / PetscMax(s->total, 1e-9);
+
+    if (!(e > 0.) || e * WASTE > most || (of[i].source != SB_ERROR_TIME && spent < 0.1)) continue;
+    if (of[i].source == SB_ERROR_TIME && !l->run->model->dynamic) continue;
+    if (of[i].source != SB_ERROR_TIME && l->run->linear_total <= l->run->newton_total)
+      continue; /* factorisations */
+    say(w,
+        "%s is wasted: its error is %.1g times the largest one, and could be %.1g times as large unnoticed. ",
+        of[i].what, (double)(e / most), (double)(0.1 * most / e));
+  }
+}
+
+/* Whether -accuracy was met, and what is in the way. */
+static void say_dial(SbLedger l, Words *w)
+{
+  const PetscReal all = together(l) / PetscSqrtReal(PetscMax(l->stored, PETSC_MIN_REAL));
+  const PetscReal mesh = l->error[SB_ERROR_SPACE] / PetscSqrtReal(PetscMax(l->stored, PETSC_MIN_REAL));
+  const PetscReal h = mesh_size(l->run->model);
+
+  if (l->accuracy > 0.) {
+    say(w, "-accuracy %.3g was %s. ", (double)l->accuracy, all <= l->accuracy ? "met" : "NOT met");
+    if (mesh > 0.7 * l->accuracy)
+      say(w,
+          "The mesh is too coarse for it: tets of about %.2g m (now %.2g m) would do, where errors fall with "
+          "their size. ",
+          (double)(h * 0.7 * l->accuracy / mesh), (double)h);
+  }
+  if (l->budget > 0. && l->nstep) {
+    say(w,
+        "-time_budget %.3g s: %" PetscInt_FMT " of %" PetscInt_FMT
+        " steps kept it, mean %.3g s, longest %.3g s; solves to %.1e. ",
+        (double)l->budget, l->nkept, l->nstep, (double)(l->total / (PetscReal)l->nstep), (double)l->longest,
+        (double)l->rtol);
+    if (l->total > l->budget * (PetscReal)l->nstep)
+      say(w, "It is too small for this mesh: tets of about %.2g m (now %.2g m) would fit. ",
+          (double)(h * PetscPowReal(l->total / ((PetscReal)l->nstep * l->budget), 1. / 3.)), (double)h);
+  }
+}
+
+/* ------------------------------------------------------------------ table */
+
+static PetscErrorCode write_table(SbLedger l, const SbLedgerSeconds *s, FILE *f)
+{
+  const SbModel m = l->run->model;
+  const PetscReal scale = l->stored > 0. ? 1. / PetscSqrtReal(l->stored) : 0.;
+
+  PetscFunctionBeginUser;
+  PetscCall(
+    PetscFPrintf(PETSC_COMM_SELF, f, "source,body,error,relative,quantity,seconds\n#,,J^(1/2),1,SI,s\n"));
+  for (int i = 0; i < SB_ERROR_COUNT; i++)
+    PetscCall(PetscFPrintf(PETSC_COMM_SELF, f, "%s,,%.17g,%.17g,%.17g,%.17g\n", names[i],
+                           (double)error_of(l, i), (double)(scale * error_of(l, i)),
+                           (double)l->quantity.error[i], (double)s->source[i]));
+  for (PetscInt b = 0; b < m->nbody; b++)
+    PetscCall(PetscFPrintf(PETSC_COMM_SELF, f, "space,%s,%.17g,%.17g,,\n", m->body[b].name,
+                           (double)PetscSqrtReal(l->space_error[b]),
+                           (double)(scale * PetscSqrtReal(l->space_error[b]))));
+  PetscCall(PetscFPrintf(PETSC_COMM_SELF, f, "together,,%.17g,%.17g,,%.17g\n", (double)together(l),
+                         (double)(scale * together(l)), (double)s->total));
+  PetscCall(PetscFPrintf(PETSC_COMM_SELF, f, "set-up,,,,,%.17g\noutput,,,,,%.17g\nestimates,,,,,%.17g\n",
+                         (double)s->setup, (double)s->output, (double)s->estimates));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode print_line(const char *name, PetscReal error, PetscReal relative,
+                                 const PetscReal *quantity, PetscReal seconds, PetscReal total,
+                                 const char *note)
+{
+  PetscFunctionBeginUser;
+  PetscCall(PetscFPrintf(PETSC_COMM_SELF, PETSC_STDOUT, "%-11s", name));
+  if (error >= 0.)
+    PetscCall(PetscFPrintf(PETSC_COMM_SELF, PETSC_STDOUT, " %10.2e %9.2e", (double)error, (double)relative));
+  else
+    PetscCall(PetscFPrintf(PETSC_COMM_SELF, PETSC_STDOUT, " %10s %9s", "", ""));
+  if (quantity && error >= 0.)
+    PetscCall(PetscFPrintf(PETSC_COMM_SELF, PETSC_STDOUT, " %9.2e", (double)*quantity));
+  else
+    PetscCall(PetscFPrintf(PETSC_COMM_SELF, PETSC_STDOUT, " %9s", ""));
+  if (seconds >= 0.)
+    PetscCall(PetscFPrintf(PETSC_COMM_SELF, PETSC_STDOUT, " %9.3f %5.1f %%", (double)seconds,
+                           (double)(100. * seconds / PetscMax(total, 1e-9))));
+  else
+    PetscCall(PetscFPrintf(PETSC_COMM_SELF, PETSC_STDOUT, " %9s %7s", "", ""));
+  PetscCall(PetscFPrintf(PETSC_COMM_SELF, PETSC_STDOUT, "  %s\n", note));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode print_table(SbLedger l, const SbLedgerSeconds *s)
+{
+  static const char *const notes[SB_ERROR_COUNT] = {
+    "residual, tangent", "steps", "iterations after the first", "linear solves", "contact, search", ""};
+  static const char *const quantities[] = {"", "of u, m", "of F, N", "of V, m^3"};
+  const SbModel m = l->run->model;
+  const PetscReal scale = l->stored > 0. ? 1. / PetscSqrtReal(l->stored) : 0.;
+  const PetscReal *q = l->quantity.kind ? l->quantity.error : NULL;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscFPrintf(PETSC_COMM_SELF, PETSC_STDOUT, "\n%-11s %10s %9s %9s %9s %7s  of %.3g J stored\n",
+                         "error", "J^(1/2)", "relative", quantities[l->quantity.kind], "seconds", "",
+                         (double)l->stored));
+  for (int i = 0; i < SB_ERROR_COUNT; i++) {
+    PetscCall(print_line(names[i], error_of(l, i), scale * error_of(l, i), q ? &q[i] : NULL,
+                         i == SB_ERROR_ROUNDING ? -1. : s->source[i], s->total, notes[i]));
+    for (PetscInt b = 0; i == SB_ERROR_SPACE && m->nbody > 1 && b < m->nbody; b++) {
+      char name[16];
+
+      PetscCall(PetscSNPrintf(name, sizeof(name), "  %.8s", m->body[b].name));
+      PetscCall(print_line(name, PetscSqrtReal(l->space_error[b]), scale * PetscSqrtReal(l->space_error[b]),
+                           NULL, -1., 1., ""));
+    }
+  }
+  PetscCall(print_line("set-up", -1., 0., NULL, s->setup, s->total, ""));
+  PetscCall(print_line("output", -1., 0., NULL, s->output, s->total, ""));
+  PetscCall(print_line("estimates", -1., 0., NULL, s->estimates, s->total, "of this table"));
+  PetscCall(print_line("together", together(l), scale * together(l), NULL, s->total, s->total, ""));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbLedgerReport(SbLedger l, const char *file, PetscBool quiet)
+{
+  SbLedgerSeconds s;
+  PetscMPIInt rank;
+  Words w = {.n = 0};
+  FILE *f;
+
+  PetscFunctionBeginUser;
+  if (!l) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(SbLedgerGetSeconds(l, &s));
+  PetscCallMPI(MPI_Comm_rank(l->run->model->comm, &rank));
+  if (rank) PetscFunctionReturn(PETSC_SUCCESS);
+  f = fopen(file, "w");
+  PetscCheck(f, PETSC_COMM_SELF, PETSC_ERR_FILE_OPEN, "cannot open %s for writing", file);
+  PetscCall(write_table(l, &s, f));
+  PetscCheck(!fclose(f), PETSC_COMM_SELF, PETSC_ERR_FILE_WRITE, "cannot write %s", file);
+  if (quiet) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(print_table(l, &s));
+  say_largest(l, &s, &w);
+  say_wasted(l, &s, &w);
+  say_dial(l, &w);
+  PetscCall(print_wrapped(w.text));
+  (void)fflush(PETSC_STDOUT);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

@@ -1,0 +1,246 @@
+// @ranks 1 2
+/*
+  Effectivity of the ledger's estimates, estimate over true error in the norm of the energy: of time steps on a bar that oscillates, by every
+  integrator and with damping; of solves that stop early, linear and Newton's; of springs in contact. And: a ledger changes no result, the same
+  estimates on any number of ranks, and -accuracy is met.
+  The true error of a step size is that against the same run with steps 32 times as short by Newmark's method, of a solve that against the one
+  solved to rounding.
+*/
+#include "verify.h"
+
+#define BAR                                                                                 \
+  "-bodies bar -body_bar_mesh box:0.4,0.1,0.1:2 -body_bar_young 1e5 -body_bar_poisson 0.3 " \
+  "-body_bar_density 1000 -effects gravity,hold -effect_hold_type support -effect_hold_on xmin "
+
+/* The norm of the energy of the difference of two states of the model, whose law is linear or nearly so between them. */
+static PetscErrorCode distance(SbModel m, Vec U, Vec V, Vec U1, Vec V1, PetscReal *error)
+{
+  PetscReal form, mass = 0., all;
+  const PetscScalar *v;
+  Vec D, R, R1;
+
+  PetscFunctionBeginUser;
+  PetscCall(VecDuplicate(U, &D));
+  PetscCall(VecDuplicate(U, &R));
+  PetscCall(VecDuplicate(U, &R1));
+  PetscCall(SbModelResidual(m, 1., U, NULL, NULL, PETSC_FALSE, R));
+  PetscCall(SbModelResidual(m, 1., U1, NULL, NULL, PETSC_FALSE, R1));
+  PetscCall(VecAXPY(R1, -1., R));
+  PetscCall(VecWAXPY(D, -1., U, U1));
+  PetscCall(VecDot(D, R1, &form));
+  if (V) {
+    PetscCall(VecWAXPY(D, -1., V, V1));
+    PetscCall(VecGetArrayRead(D, &v));
+    for (PetscInt i = 0; i < 3 * m->space->nnode_owned; i++) mass += m->space->node_mass[i / 3] * v[i] * v[i];
+    PetscCall(VecRestoreArrayRead(D, &v));
+  }
+  PetscCallMPI(MPI_Allreduce(&mass, &all, 1, MPIU_REAL, MPI_SUM, m->comm));
+  *error = PetscSqrtReal(0.5 * (PetscAbsReal(form) + all));
+  PetscCall(VecDestroy(&D));
+  PetscCall(VecDestroy(&R));
+  PetscCall(VecDestroy(&R1));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static void judge(const char *what, const char *source, PetscReal estimate, PetscReal error, PetscReal stored,
+                  PetscReal low, PetscReal high)
+{
+  const PetscReal ratio = estimate / error;
+
+  (void)PetscPrintf(PETSC_COMM_WORLD, "  | %s | %s | %.2e | %.2e | %.2f |\n", what, source,
+                    (double)(error / stored), (double)(estimate / stored), (double)ratio);
+  SB_CHECK(ratio >= low && ratio <= high, "%s, %s: estimate / error %g is not in [%g, %g]", what, source,
+           (double)ratio, (double)low, (double)high);
+}
+
+/* The error of `source` in a run against a reference run. */
+static PetscErrorCode compare(const char *what, const char *name, SbErrorSource source, const char *scene,
+                              const char *coarse, const char *fine, PetscReal low, PetscReal high)
+{
+  PetscReal error = 0., estimate, stored;
+  TestScene t, reference;
+
+  PetscFunctionBeginUser;
+  PetscCall(verify_open(&reference, "%s %s", scene, fine));
+  PetscCall(verify_solve(&reference, what));
+  PetscCall(verify_open(&t, "%s %s -ledger yes", scene, coarse));
+  PetscCall(verify_solve(&t, what));
+  PetscCall(distance(reference.model, reference.run->U, reference.run->V, t.run->U, t.run->V, &error));
+  PetscCall(SbLedgerGet(t.ledger, source, &estimate, &stored));
+  judge(what, name, estimate, error, PetscSqrtReal(stored), low, high);
+  PetscCall(test_scene_close(&t));
+  PetscCall(test_scene_close(&reference));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode steps(void)
+{
+  static const struct {
+    const char *what, *scene, *coarse, *fine;
+    PetscReal low, high;
+  } of[] = {
+    {"implicit Euler", "", "-time euler_implicit -ts_dt 0.002", "-time newmark -ts_dt 0.000125", 0.5, 2},
+    {"implicit Euler, long steps", "", "-time euler_implicit -ts_dt 0.01", "-time newmark -ts_dt 0.0005", 0.3,
+     3},
+    {"Newmark", "", "-time newmark -ts_dt 0.008", "-time newmark -ts_dt 0.00025", 0.5, 2},
+    {"generalized alpha", "", "-time genalpha -ts_dt 0.008", "-time newmark -ts_dt 0.00025", 0.5, 2},
+    {"symplectic Euler", "", "-time euler_symplectic -ts_dt 5e-4", "-time newmark -ts_dt 0.00025", 0.5, 2},
+    {"implicit Euler, damped", "-effects gravity,hold,damp -effect_damp_type damping -effect_damp_alpha 4",
+     "-time euler_implicit -ts_dt 0.002", "-time newmark -ts_dt 0.000125", 0.5, 2},
+    {"Newmark, corotated", "-body_bar_material corotated", "-time newmark -ts_dt 0.008",
+     "-time newmark -ts_dt 0.00025", 0.5, 2},
+  };
+
+  PetscFunctionBeginUser;
+  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(of); i++) {
+    char scene[VERIFY_TEXT];
+
+    PetscCall(PetscSNPrintf(scene, sizeof(scene),
+                            BAR "-body_bar_material linear -ts_max_time 0.4 -ksp_rtol 1e-10 %s",
+                            of[i].scene));
+    PetscCall(
+      compare(of[i].what, "time", SB_ERROR_TIME, scene, of[i].coarse, of[i].fine, of[i].low, of[i].high));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode solves(void)
+{
+  static const char cg[] = "-solver cg_icc -ksp_norm_type unpreconditioned ";
+  static const struct {
+    const char *what, *name;
+    SbErrorSource source;
+    const char *scene, *coarse, *fine;
+  } of[] = {
+    {"CG to 1e-2", "linear", SB_ERROR_LINEAR, "-body_bar_material linear -time static", "-ksp_rtol 1e-2",
+     "-ksp_rtol 1e-13"},
+    {"CG to 1e-5", "linear", SB_ERROR_LINEAR, "-body_bar_material linear -time static", "-ksp_rtol 1e-5",
+     "-ksp_rtol 1e-13"},
+    {"Newton to 1e-1", "nonlinear", SB_ERROR_NONLINEAR, "-body_bar_material neohookean -time static",
+     "-ksp_rtol 1e-8 -snes_rtol 1e-1", "-ksp_rtol 1e-10 -snes_rtol 1e-12"},
+    {"Newton to 1e-4", "nonlinear", SB_ERROR_NONLINEAR, "-body_bar_material neohookean -time static",
+     "-ksp_rtol 1e-8 -snes_rtol 1e-4", "-ksp_rtol 1e-10 -snes_rtol 1e-12"},
+    {"CG to 1e-3, Newmark", "linear", SB_ERROR_LINEAR,
+     "-body_bar_material linear -time newmark -ts_dt 0.01 -ts_max_time 0.4", "-ksp_rtol 1e-3",
+     "-ksp_rtol 1e-12"},
+    {"CG to 1e-3, generalized alpha", "linear", SB_ERROR_LINEAR,
+     "-body_bar_material linear -time genalpha -ts_dt 0.01 -ts_max_time 0.4", "-ksp_rtol 1e-3",
+     "-ksp_rtol 1e-12"},
+    {"Newton to 1e-3, implicit Euler", "nonlinear", SB_ERROR_NONLINEAR,
+     "-body_bar_material corotated -time euler_implicit -ts_dt 0.01 -ts_max_time 0.4", "-snes_rtol 1e-3",
+     "-snes_rtol 1e-10 -ksp_rtol 1e-8"},
+    {"CG to 1e-3, implicit Euler", "linear", SB_ERROR_LINEAR,
+     "-body_bar_material linear -time euler_implicit -ts_dt 0.01 -ts_max_time 0.4", "-ksp_rtol 1e-3",
+     "-ksp_rtol 1e-12"},
+  };
+
+  PetscFunctionBeginUser;
+  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(of); i++) {
+    char scene[VERIFY_TEXT];
+
+    PetscCall(PetscSNPrintf(scene, sizeof(scene), BAR "%s %s", cg, of[i].scene));
+    PetscCall(compare(of[i].what, of[i].name, of[i].source, scene, of[i].coarse, of[i].fine, 0.3, 3));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Springs in the place of a rigid contact, against the exact one: a block pressed by a ball, and one that its springs let down evenly. */
+static PetscErrorCode springs(void)
+{
+  static const char block[] =
+    "-bodies block -body_block_mesh box:0.1,0.1,0.05:4 -body_block_material linear -body_block_young 1e5 "
+    "-body_block_poisson 0.3 -effects hold,tool -effect_hold_type support -effect_tool_type contact "
+    "-effect_tool_on zmax "
+    "-time static -ksp_rtol 1e-10 ";
+  static const char ball[] = "-effect_hold_on zmin -effect_tool_obstacle sphere:0.05,0.05,0.087,0.04";
+  static const char *const stiffness[] = {"20", "5"};
+
+  PetscFunctionBeginUser;
+  for (int i = 0; i < 2; i++) {
+    char scene[VERIFY_TEXT], coarse[256];
+
+    PetscCall(PetscSNPrintf(scene, sizeof(scene), "%s %s", block, ball));
+    PetscCall(PetscSNPrintf(coarse, sizeof(coarse), "-effect_tool_response penalty -effect_tool_stiffness %s",
+                            stiffness[i]));
+    PetscCall(compare("springs under a ball", "contact", SB_ERROR_CONTACT, scene, coarse,
+                      "-effect_tool_response projected", 0.3, 3));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* A ledger is a spectator: the same state, to the last bit. */
+static PetscErrorCode spectator(const char *options)
+{
+  PetscReal difference;
+  TestScene t[2];
+
+  PetscFunctionBeginUser;
+  for (int i = 0; i < 2; i++) {
+    PetscCall(
+      verify_open(&t[i], BAR "%s %s", options,
+                  i ? "-ledger yes -ledger_every 2 -ledger_quantity displacement -ledger_at 0.4,0,0" : ""));
+    PetscCall(verify_solve(&t[i], "spectator"));
+  }
+  SB_CHECK(!t[0].ledger && !t[0].run->look.fn && !t[0].run->ncolumn, "a run without -ledger has one");
+  SB_CHECK(t[1].run->ncolumn == SB_ERROR_COUNT, "%d columns", (int)t[1].run->ncolumn);
+  PetscCall(VecAXPY(t[1].run->U, -1., t[0].run->U));
+  PetscCall(VecNorm(t[1].run->U, NORM_INFINITY, &difference));
+  SB_CHECK(difference == 0., "with a ledger displacements differ by %g m: %s", (double)difference, options);
+  SB_CHECK(t[0].run->linear_total == t[1].run->linear_total, "with a ledger iterations differ: %s", options);
+  for (int i = 0; i < 2; i++) PetscCall(test_scene_close(&t[i]));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* What is asked for is reached, and not by far more than what is asked for. */
+static PetscErrorCode dial(PetscReal accuracy, PetscInt *steps)
+{
+  PetscReal error = 0., form, stored;
+  TestScene t, reference;
+
+  PetscFunctionBeginUser;
+  PetscCall(
+    verify_open(&reference, BAR
+                "-body_bar_material linear -ts_max_time 0.4 -time newmark -ts_dt 0.00025 -ksp_rtol 1e-10"));
+  PetscCall(verify_solve(&reference, "dial"));
+  PetscCall(
+    verify_open(&t, BAR "-body_bar_material linear -ts_max_time 0.4 -time newmark -ts_dt 0.01 -accuracy %g",
+                (double)accuracy));
+  PetscCall(verify_solve(&t, "dial"));
+  PetscCall(distance(reference.model, reference.run->U, reference.run->V, t.run->U, t.run->V, &error));
+  PetscCall(SbLedgerGet(t.ledger, SB_ERROR_TIME, &form, &stored));
+  *steps = t.run->steps_total;
+  PetscCall(PetscPrintf(PETSC_COMM_WORLD, "  -accuracy %g: %d steps, %d iterations, error %.2e\n",
+                        (double)accuracy, (int)*steps, (int)t.run->linear_total,
+                        (double)(error / PetscSqrtReal(stored))));
+  SB_CHECK(error < accuracy * PetscSqrtReal(stored), "-accuracy %g: error %g", (double)accuracy,
+           (double)(error / PetscSqrtReal(stored)));
+  SB_CHECK(error > 0.05 * accuracy * PetscSqrtReal(stored), "-accuracy %g: error %g, far too good",
+           (double)accuracy, (double)(error / PetscSqrtReal(stored)));
+  PetscCall(test_scene_close(&t));
+  PetscCall(test_scene_close(&reference));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode dials(void)
+{
+  PetscInt few, many;
+
+  PetscFunctionBeginUser;
+  PetscCall(dial(0.1, &few));
+  PetscCall(dial(0.01, &many));
+  SB_CHECK(many > few, "-accuracy 0.01 takes %d steps, 0.1 %d", (int)many, (int)few);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+int main(int argc, char **argv)
+{
+  SB_TEST_BEGIN(argc, argv);
+  PetscCall(steps());
+  PetscCall(solves());
+  PetscCall(springs());
+  PetscCall(spectator("-body_bar_material linear -time static"));
+  PetscCall(spectator("-body_bar_material corotated -ts_dt 0.01 -ts_max_time 0.1"));
+  PetscCall(spectator("-body_bar_material corotated -time genalpha -ts_dt 0.01 -ts_max_time 0.1"));
+  PetscCall(dials());
+  SB_TEST_END();
+}
