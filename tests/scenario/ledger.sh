@@ -1,0 +1,80 @@
+#!/usr/bin/env bash
+# The ledger as a user meets it: the table and its words, ledger.csv, columns of history.csv, the field, the dials, and what is refused.
+# @timeout 300
+set -uo pipefail
+# shellcheck source=tests/scenario/scenario_common.sh
+source tests/scenario/scenario_common.sh
+
+cat >bar.opts <<'END'
+-bodies bar
+-body_bar_mesh box:0.4,0.1,0.1:3
+-body_bar_material linear
+-body_bar_young 1e6
+-body_bar_poisson 0.3
+-effects gravity,hold
+-effect_hold_type support
+-effect_hold_on xmin
+-time static
+-progress no
+END
+cat >swing.opts <<'END'
+-bodies bar
+-body_bar_mesh box:0.4,0.1,0.1:2
+-body_bar_material corotated
+-body_bar_young 1e5
+-body_bar_poisson 0.3
+-effects gravity,hold
+-effect_hold_type support
+-effect_hold_on xmin
+-ts_dt 0.01
+-ts_max_time 0.1
+-progress no
+END
+
+column() { # FILE ROW COLUMN: a number of ledger.csv
+  awk -F, -v row="$2" -v col="$3" '$1 == row && $2 == "" { print $col }' "$1"
+}
+near() { # A B TOLERANCE (relative)
+  awk -v a="$1" -v b="$2" -v t="$3" 'BEGIN { d = a - b; if (d < 0) d = -d; m = b < 0 ? -b : b; exit !(d <= t * m) }'
+}
+
+# the table, its last words and the file, the same on any number of ranks
+for n in 1 2 3; do
+  "${mpi[@]}" $n "$supple" bar.opts -ledger yes -ledger_quantity displacement -ledger_at 0.4,0,0 -output_dir "led$n" >"out$n.txt" 2>&1
+  check "$n ranks: exit code $?" test $? = 0
+  check "$n ranks: no row for the mesh" grep -q '^space  *[0-9.]*e' "out$n.txt"
+  check "$n ranks: no last words" grep -q 'the mesh is the largest' "out$n.txt"
+  check "$n ranks: space differs" near "$(column led$n/ledger.csv space 4)" "$(column led1/ledger.csv space 4)" 1e-6
+  check "$n ranks: of the quantity" near "$(column led$n/ledger.csv space 5)" "$(column led1/ledger.csv space 5)" 1e-3
+done
+check "the error of the mesh, $(column led1/ledger.csv space 4)" near "$(column led1/ledger.csv space 4)" 0.45 0.3
+check "columns of the history" grep -q 'error_space,error_time,error_nonlinear,error_linear,error_contact,error_rounding$' <<<"$(head -n 1 led1/history.csv)"
+"$supple" bar.opts -output_dir plain >plain.txt 2>&1
+check "without -ledger there is one" test ! -e plain/ledger.csv
+check "columns without -ledger" test -z "$(head -n 1 plain/history.csv | grep error_)"
+"$supple" bar.opts -ledger yes -ledger_quantity reaction -ledger_on xmin -ledger_direction 0,0,1 -output_dir react >react.txt 2>&1
+check "a reaction that statics tell has an error" awk -v e="$(column react/ledger.csv space 5)" 'BEGIN { exit !(e < 1e-3 * 39.24) }'
+"$supple" swing.opts -ledger yes -ledger_every 5 -output_fields space_error -quiet -output_dir field
+check "the field space_error: exit code $?" test $? = 0
+check "no field" grep -q space_error field/fields.xmf
+
+# the dials
+"$supple" swing.opts -accuracy 0.5 -output_dir coarse >coarse.txt 2>&1
+check "-accuracy 0.5 says nothing" grep -q -- '-accuracy 0.5 was' coarse.txt
+"$supple" swing.opts -accuracy 0.01 -output_dir fine >fine.txt 2>&1
+check "-accuracy 0.01 on two cells" grep -q 'NOT met' fine.txt
+check "no mesh size" grep -q 'too coarse for it: tets of about' <<<"$(tr '\n' ' ' <fine.txt)"
+"$supple" swing.opts -time_budget 100 -output_dir slow >slow.txt 2>&1
+check "100 s for a step" grep -q '10 of 10 steps kept it' <<<"$(tr '\n' ' ' <slow.txt)"
+"$supple" swing.opts -time_budget 1e-7 -output_dir fast >fast.txt 2>&1
+check "0.1 us for a step" grep -q 'It is too small for this mesh' <<<"$(tr '\n' ' ' <fast.txt)"
+
+# what is refused
+error 1 "-accuracy 0.1 and -time_budget 0.03 s: what one of them sets the other would change; give one of them" swing.opts -accuracy 0.1 -time_budget 0.03
+error 2 "-time_budget 0.03 s is about time steps, and -time static has none: give -accuracy" bar.opts -time_budget 0.03
+error 1 "-ledger cannot look into the steps of -time alpha2: use -time genalpha, which is the same method" swing.opts -time alpha2 -ledger yes
+error 1 "-output_fields space_error needs its estimate: give -ledger yes, too" bar.opts -output_fields space_error
+error 2 "-ledger_on 'floor': no effect prescribes displacements on a set of that name" bar.opts -ledger yes -ledger_quantity reaction -ledger_on floor
+error 1 "-ledger_direction 0,0,0 is no direction" bar.opts -ledger yes -ledger_quantity displacement -ledger_direction 0,0,0
+
+finish
