@@ -86,6 +86,7 @@ static const Part parts[] = {
   {"output", "probes", "-probes tip -probe_tip_at 0.4,0.05,0.05", "-output_history true ", NULL, PETSC_FALSE},
   {"output", "checkpoint", "-checkpoint_every_steps 1", NULL, NULL, PETSC_FALSE},
   {"output", "progress", "-progress true", NULL, NULL, PETSC_FALSE},
+  {"estimator", "ledger", "-ledger true", NULL, "SbLedger", PETSC_FALSE},
 };
 
 /* Options of the output that belong to a part above: which one each names, or only changes. */
@@ -115,7 +116,7 @@ static const struct {
   const char *name, *kind;
 } part_families[] = {
   {"effect", "Eff"}, {"element", "Elem"}, {"material", "Mat"},
-  {"time", NULL},    {"field", "Field"},  {"output", "Out"},
+  {"time", NULL},    {"field", "Field"},  {"output", "Out"},    {"estimator", NULL},
 };
 #define PART_NAMES 64 /* most names of a family */
 
@@ -193,7 +194,8 @@ static inline PetscErrorCode part_find(const char *family, const char *name, Par
     *found = PETSC_TRUE;
   }
   if (!strcmp(family, "field")) {
-    PetscCall(PetscSNPrintf(options, sizeof(options), "-output_fields %s", name));
+    PetscCall(PetscSNPrintf(options, sizeof(options), "-output_fields %s%s", name,
+                            strcmp(name, "space_error") ? "" : " -ledger true"));
     PetscCall(PetscSNPrintf(events, sizeof(events), "SbOut_fields,SbField_body,SbField_%s", name));
     *part = (Part){family, name, options, NULL, events, PETSC_FALSE};
     *found = PETSC_TRUE;
