@@ -167,7 +167,6 @@ typedef enum {
   SB_EVENT_SOLVER_SETUP,
   SB_EVENT_OUTPUT,
   SB_EVENT_CHECKPOINT,
-  SB_EVENT_LEDGER, /* estimates of errors; other events within it are theirs */
   SB_EVENT_COUNT
 } SbEvent;
 extern PetscLogEvent SbEvents[SB_EVENT_COUNT];
@@ -180,7 +179,7 @@ PetscErrorCode SbLogInitialize(void);
   Not collective, but to be called alike on all ranks: PETSc tells events by their order.
 
   Input:
-    kind, name - "Eff" (effects), "Mat" (laws), "Elem" (elements), "Field" (fields of fields.h5), "Out" (other output), and the name
+    kind, name - "Eff" (effects), "Mat" (laws), "Elem" (elements), "Field" (fields of fields.h5), "Out" (other output), "Est" (estimates), and the name
                  in the scenario
   Output:
     event      - of all that have this name

@@ -86,7 +86,7 @@ static const Part parts[] = {
   {"output", "probes", "-probes tip -probe_tip_at 0.4,0.05,0.05", "-output_history true ", NULL, PETSC_FALSE},
   {"output", "checkpoint", "-checkpoint_every_steps 1", NULL, NULL, PETSC_FALSE},
   {"output", "progress", "-progress true", NULL, NULL, PETSC_FALSE},
-  {"estimator", "ledger", "-ledger true", NULL, "SbLedger", PETSC_FALSE},
+  {"estimator", "ledger", "-ledger true", NULL, NULL, PETSC_FALSE},
 };
 
 /* Options of the output that belong to a part above: which one each names, or only changes. */
@@ -115,8 +115,8 @@ static const struct {
 static const struct {
   const char *name, *kind;
 } part_families[] = {
-  {"effect", "Eff"}, {"element", "Elem"}, {"material", "Mat"},
-  {"time", NULL},    {"field", "Field"},  {"output", "Out"},    {"estimator", NULL},
+  {"effect", "Eff"},  {"element", "Elem"}, {"material", "Mat"},  {"time", NULL},
+  {"field", "Field"}, {"output", "Out"},   {"estimator", "Est"},
 };
 #define PART_NAMES 64 /* most names of a family */
 
@@ -196,7 +196,8 @@ static inline PetscErrorCode part_find(const char *family, const char *name, Par
   if (!strcmp(family, "field")) {
     PetscCall(PetscSNPrintf(options, sizeof(options), "-output_fields %s%s", name,
                             strcmp(name, "space_error") ? "" : " -ledger true"));
-    PetscCall(PetscSNPrintf(events, sizeof(events), "SbOut_fields,SbField_body,SbField_%s", name));
+    PetscCall(PetscSNPrintf(events, sizeof(events), "SbOut_fields,SbField_body,SbField_%s%s", name,
+                            strcmp(name, "space_error") ? "" : ",SbEst_ledger"));
     *part = (Part){family, name, options, NULL, events, PETSC_FALSE};
     *found = PETSC_TRUE;
   } else if (*found && !part->events) {
@@ -300,10 +301,12 @@ static inline PetscErrorCode part_open(const char *options, const char *dir, Tes
   PetscCall(PetscOptionsSetValue(NULL, "-output_dir", dir));
   PetscCall(SbSceneCreate(PETSC_COMM_WORLD, &scene->model));
   PetscCall(SbRunCreate(scene->model, &scene->run));
+  PetscCall(SbLedgerSetFromOptions(scene->run, &scene->ledger));
   PetscCall(SbOutputSetFromOptions(scene->run));
   PetscCall(SbOptionsCheck());
   PetscCall(SbModelSetUp(scene->model));
   PetscCall(SbRunSetUp(scene->run));
+  PetscCall(SbLedgerAttach(scene->ledger));
   PetscCall(SbOutputAttach(scene->run));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

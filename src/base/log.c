@@ -23,7 +23,7 @@ PetscErrorCode SbLogInitialize(void)
   static const char *const names[SB_EVENT_COUNT] = {
     "SbMeshRead", "SbMeshDistrib", "SbSpaceSetUp", "SbMatrixSetUp", "SbResidual",
     "SbTangent",  "SbEnergy",      "SbEffects",    "SbContact",     "SbSearch",
-    "SbProject",  "SbSolverSetUp", "SbOutput",     "SbCheckpoint",  "SbLedger",
+    "SbProject",  "SbSolverSetUp", "SbOutput",     "SbCheckpoint",
   };
 
   PetscFunctionBeginUser;

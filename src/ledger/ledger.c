@@ -58,6 +58,7 @@ PetscErrorCode SbLedgerSetFromOptions(SbRun run, SbLedger *ledger)
     "-ledger cannot look into the steps of -time alpha2: use -time genalpha, which is the same method");
   PetscCall(PetscNew(&l));
   l->run = run;
+  PetscCall(SbLogNamed("Est", "ledger", &l->event));
   l->accuracy = accuracy;
   l->budget = budget;
   PetscCall(SbOptionInt(&scope, "ledger_every", &l->every));
@@ -72,7 +73,7 @@ PetscErrorCode SbLedgerSetFromOptions(SbRun run, SbLedger *ledger)
 static PetscErrorCode begin(SbLedger l)
 {
   PetscFunctionBeginUser;
-  PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_LEDGER], 0, 0, 0, 0));
+  PetscCall(PetscLogEventBegin(l->event, 0, 0, 0, 0));
   l->seconds -= MPI_Wtime();
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -81,7 +82,7 @@ static PetscErrorCode end(SbLedger l)
 {
   PetscFunctionBeginUser;
   l->seconds += MPI_Wtime();
-  PetscCall(PetscLogEventEnd(SbEvents[SB_EVENT_LEDGER], 0, 0, 0, 0));
+  PetscCall(PetscLogEventEnd(l->event, 0, 0, 0, 0));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -25,6 +25,7 @@ typedef struct {
 
 struct _p_SbLedger {
   SbRun run; /* borrowed */
+  PetscLogEvent event;
   PetscInt every;
   PetscReal accuracy, budget; /* 0: not asked for; s per step */
   SbSpaceEstimate space;
@@ -43,7 +44,8 @@ struct _p_SbLedger {
   SbColumn column[SB_ERROR_COUNT + 1];
   /* of the last step that was looked at, J^(1/2) */
   PetscReal step_time, step_linear, step_nonlinear, offset;
-  PetscReal residual, seen_residual; /* that the last solve left, and that of the last step that was looked at, N */
+  PetscReal residual,
+    seen_residual;     /* that the last solve left, and that of the last step that was looked at, N */
   PetscReal kept_part; /* of what solves left before: the integrator damps it */
   PetscBool seen;      /* the step that is about to be accepted was */
 

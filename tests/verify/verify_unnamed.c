@@ -187,7 +187,8 @@ static PetscErrorCode scene_text(const char *mesh, const char *scene, const char
 /* Named, beside the same scene without it; then the base scene as it was. */
 static PetscErrorCode check_part(const Part *part, const char *base, const Trace *reference)
 {
-  const PetscBool output = (PetscBool)(!strcmp(part->family, "output") || !strcmp(part->family, "field"));
+  const PetscBool output = (PetscBool)(!strcmp(part->family, "output") || !strcmp(part->family, "field") ||
+                                       !strcmp(part->family, "estimator"));
   Trace without, with, after;
   char text[PART_TEXT];
 
