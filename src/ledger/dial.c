@@ -15,6 +15,8 @@
 #define STEPS 0.7   /* of it to the integrator */
 #define LOOSEST 0.3 /* relative residual */
 #define TIGHTEST 1e-12
+#define NOISE 4.      /* times what a solve leaves */
+#define SHORTEST 1e-6 /* step, of the run */
 
 PetscErrorCode SbDialSetFromOptions(SbLedger l)
 {
@@ -60,16 +62,26 @@ static PetscErrorCode set_tolerance(SbLedger l, PetscReal rtol)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Error of the step that was just solved over what it may have: that of the whole run shared out over its time. */
+/* What the solves of the step that was just solved left, J^(1/2): of one that was not looked at, by its residual. */
+static PetscReal left_by_solves(SbLedger l)
+{
+  const PetscReal part = l->seen_residual > 0. ? l->residual / l->seen_residual : 1.;
+
+  return part * PetscSqrtReal(PetscSqr(l->step_linear) + PetscSqr(l->step_nonlinear));
+}
+
+/* Error of the step that was just solved over what it may have: that of the whole run shared out over its time. What solves leave is in the
+   differences of accelerations, too, the more so the shorter a step is: no shorter one would help against that. */
 static PetscErrorCode step_error(SbRun run, const SbSolved *step, void *ctx, PetscInt *order,
                                  PetscReal *ratio)
 {
   SbLedger l = (SbLedger)ctx;
   const PetscReal allowed = STEPS * l->accuracy * PetscSqrtReal(l->stored) * step->dt / run->t_end;
+  const PetscReal noise = NOISE * left_by_solves(l);
 
   PetscFunctionBeginUser;
   *order = l->order;
-  *ratio = allowed > 0. ? l->step_time / allowed : 0.;
+  *ratio = allowed > 0. ? PetscMax(0., l->step_time - noise) / allowed : 0.;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -84,7 +96,7 @@ PetscErrorCode SbDialAttach(SbLedger l)
     PetscCall(TSGetAdapt(run->ts, &adapt));
     /* explicit steps are no longer than the stable one */
     PetscCall(
-      TSAdaptSetStepLimits(adapt, 1e-9 * run->t_end, run->snes && run->J ? 0.1 * run->t_end : run->dt));
+      TSAdaptSetStepLimits(adapt, SHORTEST * run->t_end, run->snes && run->J ? 0.1 * run->t_end : run->dt));
   }
   if (l->may_tune && run->snes && run->J)
     PetscCall(set_tolerance(l, l->accuracy > 0. ? 0.01 * l->accuracy : 1e-3));
@@ -112,7 +124,7 @@ PetscErrorCode SbDialLook(SbLedger l, const SbSolved *step, PetscBool *again)
   if (!step->V || step->t == run->t0) PetscCall(first_energy(l, step));
   if (!l->may_tune || !step->solved) PetscFunctionReturn(PETSC_SUCCESS);
   allowed = SOLVERS * l->accuracy * PetscSqrtReal(l->stored) * part;
-  left = PetscSqrtReal(PetscSqr(l->step_linear) + PetscSqr(l->step_nonlinear));
+  left = left_by_solves(l);
   if (!(left > 0.) || !(allowed > 0.)) PetscFunctionReturn(PETSC_SUCCESS);
   if (left > allowed) {
     /* a little too much in one step of many is made up for by the next */

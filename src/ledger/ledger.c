@@ -134,7 +134,7 @@ static PetscErrorCode look(SbRun run, const SbSolved *step, void *ctx, PetscBool
     l->seen_residual = l->residual;
   }
   PetscCall(end(l));
-  if (l->accuracy > 0. && l->seen) PetscCall(SbDialLook(l, step, again));
+  if (l->accuracy > 0.) PetscCall(SbDialLook(l, step, again));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
