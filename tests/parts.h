@@ -300,8 +300,7 @@ static inline PetscErrorCode part_open(const char *options, const char *dir, Tes
   PetscCall(PetscOptionsInsertString(NULL, options));
   PetscCall(PetscOptionsSetValue(NULL, "-output_dir", dir));
   PetscCall(SbSceneCreate(PETSC_COMM_WORLD, &scene->model));
-  PetscCall(SbRunCreate(scene->model, &scene->run));
-  PetscCall(SbLedgerSetFromOptions(scene->run, &scene->ledger));
+  PetscCall(test_scene_run(scene));
   PetscCall(SbOutputSetFromOptions(scene->run));
   PetscCall(SbOptionsCheck());
   PetscCall(SbModelSetUp(scene->model));

@@ -11,6 +11,15 @@ typedef struct {
   SbLedger ledger; /* NULL unless the options ask for one */
 } TestScene;
 
+/* The run of a scene whose model is there, and its ledger if the options ask for one. */
+static inline PetscErrorCode test_scene_run(TestScene *scene)
+{
+  PetscFunctionBeginUser;
+  PetscCall(SbRunCreate(scene->model, &scene->run));
+  PetscCall(SbLedgerSetFromOptions(scene->run, &scene->ledger));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Everything of the program but output: model and run are set up and ready for SbRunSolve(). */
 static inline PetscErrorCode test_scene_open(const char *options, TestScene *scene)
 {
@@ -20,8 +29,7 @@ static inline PetscErrorCode test_scene_open(const char *options, TestScene *sce
   PetscCall(SbRegisterAll());
   PetscCall(PetscOptionsInsertString(NULL, options));
   PetscCall(SbSceneCreate(PETSC_COMM_WORLD, &scene->model));
-  PetscCall(SbRunCreate(scene->model, &scene->run));
-  PetscCall(SbLedgerSetFromOptions(scene->run, &scene->ledger));
+  PetscCall(test_scene_run(scene));
   PetscCall(SbOptionsCheck());
   PetscCall(SbModelSetUp(scene->model));
   PetscCall(SbRunSetUp(scene->run));

@@ -69,7 +69,7 @@ static inline PetscErrorCode perf_read(const char *options, TestScene *scene)
   PetscCall(SbRegisterAll());
   PetscCall(PetscOptionsInsertString(NULL, options));
   PetscCall(SbSceneCreate(PETSC_COMM_WORLD, &scene->model));
-  PetscCall(SbRunCreate(scene->model, &scene->run));
+  PetscCall(test_scene_run(scene));
   PetscCall(SbOptionsCheck());
   PetscFunctionReturn(PETSC_SUCCESS);
 }

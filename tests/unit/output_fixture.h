@@ -68,7 +68,7 @@ static inline PetscErrorCode fixture_open(const char *dir, const char *options, 
   PetscCall(PetscOptionsInsertString(NULL, options));
   PetscCall(PetscOptionsSetValue(NULL, "-output_dir", dir));
   PetscCall(SbSceneCreate(PETSC_COMM_WORLD, &scene->model));
-  PetscCall(SbRunCreate(scene->model, &scene->run));
+  PetscCall(test_scene_run(scene));
   PetscCall(SbOutputSetFromOptions(scene->run));
   PetscCall(SbModelSetUp(scene->model));
   PetscCall(SbRunSetUp(scene->run));

@@ -104,7 +104,7 @@ static PetscErrorCode open_halves(const char *solver, SbSaddle saddle, TestScene
   PetscCall(SbRegisterAll());
   PetscCall(PetscOptionsInsertString(NULL, text));
   PetscCall(SbSceneCreate(PETSC_COMM_WORLD, &t->model));
-  PetscCall(SbRunCreate(t->model, &t->run));
+  PetscCall(test_scene_run(t));
   t->run->saddle = (PetscBool)(saddle != SB_SADDLE_NONE);
   t->run->saddle_choice = (PetscInt)saddle;
   PetscCall(SbModelSetUp(t->model));

@@ -405,7 +405,7 @@ static PetscErrorCode press(MPI_Comm comm, const char *more, PetscReal values[NV
   PetscCall(PetscOptionsInsertString(NULL, PRESS));
   PetscCall(PetscOptionsInsertString(NULL, more));
   PetscCall(SbSceneCreate(comm, &t.model));
-  PetscCall(SbRunCreate(t.model, &t.run));
+  PetscCall(test_scene_run(&t));
   PetscCall(SbModelSetUp(t.model));
   PetscCall(SbRunSetUp(t.run));
   PetscCall(SbRunSolve(t.run));

@@ -58,7 +58,7 @@ static PetscErrorCode solve(MPI_Comm comm, const char *sides, Motion *motion)
   PetscCall(SbRegisterAll());
   PetscCall(PetscOptionsInsertString(NULL, text));
   PetscCall(SbSceneCreate(comm, &t.model));
-  PetscCall(SbRunCreate(t.model, &t.run));
+  PetscCall(test_scene_run(&t));
   PetscCall(SbModelSetUp(t.model));
   PetscCall(SbRunSetUp(t.run));
   t.run->want_energies = PETSC_TRUE;

@@ -32,7 +32,7 @@ static PetscErrorCode open_on(MPI_Comm comm, TestScene *t, const char *format, .
   PetscCall(SbRegisterAll());
   PetscCall(PetscOptionsInsertString(NULL, text));
   PetscCall(SbSceneCreate(comm, &t->model));
-  PetscCall(SbRunCreate(t->model, &t->run));
+  PetscCall(test_scene_run(t));
   PetscCall(SbOptionsCheck());
   PetscCall(SbModelSetUp(t->model));
   PetscCall(SbRunSetUp(t->run));

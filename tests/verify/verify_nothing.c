@@ -66,7 +66,7 @@ static PetscErrorCode run(const char *options, PetscBool storm, Trace *trace)
   PetscCall(count_events(first));
   PetscCall(PetscMallocGetCurrentUsage(&before));
   PetscCall(SbSceneCreate(PETSC_COMM_WORLD, &t.model));
-  PetscCall(SbRunCreate(t.model, &t.run));
+  PetscCall(test_scene_run(&t));
   PetscCall(SbModelSetUp(t.model));
   PetscCall(SbRunSetUp(t.run));
   PetscCall(verify_solve(&t, options));

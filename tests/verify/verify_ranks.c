@@ -25,7 +25,7 @@ static PetscErrorCode solve(MPI_Comm comm, const char *options, State *state)
   PetscCall(SbRegisterAll());
   PetscCall(PetscOptionsInsertString(NULL, options));
   PetscCall(SbSceneCreate(comm, &t.model));
-  PetscCall(SbRunCreate(t.model, &t.run));
+  PetscCall(test_scene_run(&t));
   PetscCall(SbModelSetUp(t.model));
   PetscCall(SbRunSetUp(t.run));
   PetscCall(SbMeshValidate(t.model->mesh));
