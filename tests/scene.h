@@ -24,6 +24,7 @@ static inline PetscErrorCode test_scene_run(TestScene *scene)
 static inline PetscErrorCode test_scene_open(const char *options, TestScene *scene)
 {
   PetscFunctionBeginUser;
+  *scene = (TestScene){NULL, NULL, NULL}; /* what a call that fails leaves can be closed */
   PetscCall(PetscOptionsClear(NULL));
   PetscCall(SbOptionsReset());
   PetscCall(SbRegisterAll());
