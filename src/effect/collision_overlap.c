@@ -382,7 +382,7 @@ static PetscErrorCode refuse_swallowed(const Collision *c, const char name[])
   PetscCall(PetscCalloc1(nbody * nbody, &leave));
   PetscCall(sample_bodies(c, nbody, sample));
   for (PetscInt i = 0; i < c->nhit; i++) {
-    const PetscInt a = SbCollisionFirst(c, &c->hit[i]), b = c->hit[i].part;
+    const PetscInt a = SbCollisionFirst(c, &c->hit[i]), b = c->hit[i].body;
 
     leave[a * nbody + b][3]++;
     leave[b * nbody + a][3]++;
