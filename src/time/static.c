@@ -88,10 +88,14 @@ static PetscErrorCode explain(SbRun run, PetscReal factor, SNESConvergedReason r
 /* Loads in balance leave a singular system with a solution, and a solver may find it with any rigid motion on top. */
 static PetscErrorCode refuse_free_body(SbRun run, PetscReal factor, PetscBool *ok)
 {
+  PetscInt held = run->model->space->nfixed;
   PetscBool found;
 
   PetscFunctionBeginUser;
   if (!*ok || run->steps_total || run->model->ntouch || !run->newton_step) PetscFunctionReturn(PETSC_SUCCESS);
+  /* beside supports the look is not sure enough to refuse what was solved: near nu = 1/2 they are soft against the cells */
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &held, 1, MPIU_INT, MPI_SUM, run->model->comm));
+  if (held) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(look_for_free_body(run, factor, &found));
   if (found) *ok = PETSC_FALSE;
   PetscFunctionReturn(PETSC_SUCCESS);
