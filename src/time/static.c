@@ -54,11 +54,14 @@ static PetscErrorCode look_for_free_body(SbRun run, PetscReal factor, PetscBool 
 {
   PetscInt body;
   char motion[128];
+  PetscInt held = run->model->space->nfixed;
 
   PetscFunctionBeginUser;
   PetscCall(SbRunFreeBody(run, &body, sizeof(motion), motion));
   *found = (PetscBool)(body >= 0);
-  run->free_body = (PetscBool)(*found && !run->model->ntouch);
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &held, 1, MPIU_INT, MPI_SUM, run->model->comm));
+  /* beside supports it may be the tangent of a solve that went astray, and a shorter step may do */
+  run->free_body = (PetscBool)(*found && !run->model->ntouch && !held);
   if (*found)
     PetscCall(SbRunFail(run, "load factor %g: nothing holds the body %s against %s; hold it by a support%s",
                         (double)factor, run->model->body[body].name, motion,
