@@ -39,7 +39,7 @@ PETSC_LIB  := $(shell $(PKG_CONFIG) --libs PETSc 2>/dev/null) $(call petsc_says,
 WARN     := -std=c11 -Wall -Wextra -Wshadow -Wstrict-prototypes -Wmissing-prototypes $(if $(WERROR),-Werror)
 INCLUDES := -D_GNU_SOURCE -Iinclude -Itests $(patsubst -I%,-isystem %,$(filter-out -I/usr/include,$(PETSC_INC) $(HDF5_INC) $(METIS_INC)))
 COMPILE   = $(CC) $(WARN) $(OPT) $(INCLUDES) $(CPPFLAGS) $(CFLAGS)
-LIBS     := $(PETSC_LIB) $(HDF5_LIB) $(METIS_LIB) -lm
+LIBS     := $(PETSC_LIB) $(HDF5_LIB) $(METIS_LIB) -lz -ldl -lm
 comma    := ,
 RPATH    := $(patsubst -L%,-Wl$(comma)-rpath$(comma)%,$(filter-out -L/usr/lib%,$(filter -L%,$(LIBS))))
 LINK      = $(CC) $(OPT) $(CFLAGS) $(LDFLAGS) -Wl,--as-needed
@@ -91,8 +91,8 @@ $(BUILD)/flags: FORCE
 	@mkdir -p $(@D)
 	@new='$(COMPILE) | $(LINK) $(LIBS) | PETSc $(PETSC_VERSION)'; \
 	if [ "$$new" != "$$(cat $@ 2>/dev/null)" ]; then \
-	  printf '#include <petsc.h>\n#include <hdf5.h>\n#include <metis.h>\n' | $(CC) $(INCLUDES) $(CPPFLAGS) -E -xc -o /dev/null - || \
-	    { echo "supple: the headers above are missing: run scripts/install-deps (Debian, Ubuntu), or install PETSc, parallel HDF5 and METIS" >&2; exit 1; }; \
+	  printf '#include <petsc.h>\n#include <hdf5.h>\n#include <metis.h>\n#include <zlib.h>\n' | $(CC) $(INCLUDES) $(CPPFLAGS) -E -xc -o /dev/null - || \
+	    { echo "supple: the headers above are missing: run scripts/install-deps (Debian, Ubuntu), or install PETSc, parallel HDF5, METIS and zlib" >&2; exit 1; }; \
 	  echo "  PETSc $(PETSC_VERSION), $(CC), objects in $(BUILD)/"; printf '%s\n' "$$new" >$@; fi
 
 meshes/%.msh: meshes/%.geo

@@ -53,24 +53,78 @@ PetscErrorCode SbImportAddItem(SbImport *im, int dim, const PetscInt vert[], Pet
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Slot of a group, or the free one where it belongs. */
+static PetscInt find_slot(const SbImport *im, PetscInt dim, int64_t tag)
+{
+  const uint64_t hash = ((uint64_t)tag * 4 + (uint64_t)dim) * 0x9e3779b97f4a7c15u;
+  PetscInt s = (PetscInt)(hash >> 33) & (im->nslot - 1);
+
+  for (; im->slot[s] >= 0; s = (s + 1) & (im->nslot - 1)) {
+    const SbGroup *group = &im->group[im->slot[s]];
+
+    if (group->dim == dim && group->tag == tag) break;
+  }
+  return s;
+}
+
+/* Slots for all groups and one more, at most half of them taken. */
+static PetscErrorCode hash_groups(SbImport *im)
+{
+  PetscFunctionBeginUser;
+  if (2 * (im->ngroup + 1) <= im->nslot) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscFree(im->slot));
+  for (im->nslot = 64; im->nslot < 4 * (im->ngroup + 1);) im->nslot *= 2;
+  PetscCall(PetscMalloc1(im->nslot, &im->slot));
+  for (PetscInt s = 0; s < im->nslot; s++) im->slot[s] = -1;
+  for (PetscInt g = 0; g < im->ngroup; g++) im->slot[find_slot(im, im->group[g].dim, im->group[g].tag)] = g;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode SbImportGroup(SbImport *im, PetscInt dim, int64_t tag, const char *name, PetscInt *group)
 {
   static const char *const kind[4] = {"point", "curve", "surface", "volume"};
-  PetscInt g;
+  PetscInt s, g;
 
   PetscFunctionBeginUser;
-  for (g = 0; g < im->ngroup; g++) {
-    if (im->group[g].dim == dim && im->group[g].tag == tag) break;
-  }
-  if (g == im->ngroup) {
+  PetscCall(hash_groups(im));
+  s = find_slot(im, dim, tag);
+  g = im->slot[s];
+  if (g < 0) {
+    g = im->slot[s] = im->ngroup;
     PetscCall(reserve(g + 1, &im->capacity[0], sizeof(SbGroup), &im->group));
     im->group[g].dim = dim;
     im->group[g].tag = tag;
+    im->group[g].alone = -1;
     (void)snprintf(im->group[g].name, SB_GROUP_MAX, "%s_%lld", kind[dim], (long long)tag);
     im->ngroup++;
   }
   if (name) PetscCall(PetscStrncpy(im->group[g].name, name, SB_GROUP_MAX));
   *group = g;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Appends a tag set. */
+static PetscErrorCode add_tag_set(SbImport *im, PetscInt n, const PetscInt groups[], PetscInt *tags)
+{
+  const PetscInt start = im->tags_start[im->ntags];
+
+  PetscFunctionBeginUser;
+  PetscCall(reserve(start + n, &im->capacity[2], sizeof(PetscInt), &im->tags_group));
+  PetscCall(reserve(im->ntags + 2, &im->capacity[1], sizeof(PetscInt), &im->tags_start));
+  for (PetscInt i = 0; i < n; i++) im->tags_group[start + i] = groups[i];
+  *tags = im->ntags;
+  im->tags_start[++im->ntags] = start + n;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbImportTagsAlone(SbImport *im, PetscInt dim, int64_t tag, const char *name, PetscInt *tags)
+{
+  PetscInt group;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbImportGroup(im, dim, tag, name, &group));
+  if (im->group[group].alone < 0) PetscCall(add_tag_set(im, 1, &group, &im->group[group].alone));
+  *tags = im->group[group].alone;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -86,17 +140,20 @@ PetscErrorCode SbImportTagSet(SbImport *im, PetscInt n, PetscInt groups[], Petsc
     im->tags_start[0] = im->tags_start[1] = 0;
     im->ntags = 1;
   }
+  if (n == 1 && im->group) {
+    PetscInt *alone = &im->group[groups[0]].alone;
+
+    if (*alone < 0) PetscCall(add_tag_set(im, 1, groups, alone));
+    *tags = *alone;
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
   for (*tags = 0; *tags < im->ntags; (*tags)++) {
     start = im->tags_start[*tags];
     if (im->tags_start[*tags + 1] - start != n) continue;
     if (!n || !memcmp(groups, im->tags_group + start, (size_t)n * sizeof(PetscInt)))
       PetscFunctionReturn(PETSC_SUCCESS);
   }
-  start = im->tags_start[im->ntags];
-  PetscCall(reserve(start + n, &im->capacity[2], sizeof(PetscInt), &im->tags_group));
-  PetscCall(reserve(im->ntags + 2, &im->capacity[1], sizeof(PetscInt), &im->tags_start));
-  for (PetscInt i = 0; i < n; i++) im->tags_group[start + i] = groups[i];
-  im->tags_start[++im->ntags] = start + n;
+  PetscCall(add_tag_set(im, n, groups, tags));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -113,6 +170,7 @@ PetscErrorCode SbImportDestroy(SbImport *im)
   PetscCall(PetscFree(im->group));
   PetscCall(PetscFree(im->tags_start));
   PetscCall(PetscFree(im->tags_group));
+  PetscCall(PetscFree(im->slot));
   PetscCall(PetscMemzero(im, sizeof(*im)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -169,31 +227,47 @@ static const struct {
   const char *extension;
   SbReader read;
 } readers[] = {
-  {".msh", SbImportRead_Gmsh},
+  {".msh", SbImportRead_Msh},           {".vtk", SbImportRead_VTK},     {".vtu", SbImportRead_VTU},
+  {".mesh", SbImportRead_Mesh},         {".node", SbImportRead_TetGen}, {".ele", SbImportRead_TetGen},
+  {".face", SbImportRead_TetGen},       {".edge", SbImportRead_TetGen}, {".vol", SbImportRead_Netgen},
+  {".neu", SbImportRead_NetgenNeutral}, {".bdf", SbImportRead_Nastran}, {".nas", SbImportRead_Nastran},
 };
 
+/* The reader of a file with this ending; NULL when there is none: then `known` lists all endings. */
+static SbReader reader_of(const char *mesh, size_t size, char known[])
+{
+  const char *dot = strrchr(mesh, '.');
+  size_t used = 0;
+
+  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(readers); i++) {
+    if (dot && !strcasecmp(dot, readers[i].extension)) return readers[i].read;
+    (void)snprintf(known + used, size - used, "%s%s", i ? " " : "", readers[i].extension);
+    used = strlen(known);
+  }
+  return NULL;
+}
+
+/* The name may be what the files of TetGen have in common. */
 static PetscErrorCode find_reader(const SbBody *body, SbReader *read)
 {
-  const char *dot = strrchr(body->mesh, '.');
-  char known[256] = "";
-  size_t used;
+  char known[256] = "", node[PETSC_MAX_PATH_LEN + 8];
+  PetscBool tetgen;
 
   PetscFunctionBeginUser;
   if (!strncmp(body->mesh, "box:", 4)) {
     *read = SbImportRead_Box;
     PetscFunctionReturn(PETSC_SUCCESS);
   }
-  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(readers); i++) {
-    if (dot && !strcasecmp(dot, readers[i].extension)) {
-      *read = readers[i].read;
-      PetscFunctionReturn(PETSC_SUCCESS);
-    }
-    used = strlen(known);
-    (void)snprintf(known + used, sizeof(known) - used, "%s%s", i ? " " : "", readers[i].extension);
-  }
-  SETERRQ(PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
-          "body '%s': mesh '%s' is of no known kind; give a file that ends in %s, or box:lx,ly,lz:n",
-          body->name, body->mesh, known);
+  *read = reader_of(body->mesh, sizeof(known), known);
+  if (*read) PetscFunctionReturn(PETSC_SUCCESS);
+  (void)snprintf(node, sizeof(node), "%s.node", body->mesh);
+  PetscCall(PetscTestFile(node, 'r', &tetgen));
+  PetscCheck(
+    tetgen, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
+    "body '%s': mesh '%s' is of no known kind; give a file that ends in %s (or the name of TetGen's files "
+    "without an ending), or box:lx,ly,lz:n",
+    body->name, body->mesh, known);
+  *read = SbImportRead_TetGen;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

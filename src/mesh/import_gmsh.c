@@ -8,48 +8,7 @@
   Kept: points, lines, triangles that belong to a group, and all tets; all triangles where a surface is wanted, which needs no tets.
   Sections that do not concern us are skipped. Refused: volume elements other than 4-node tets, files cut into partitions, other versions.
 */
-#include <stdlib.h>
-#include "mesh_impl.h"
-
-/* Types of elements by their number in the file. */
-static const struct {
-  const char *name;
-  int dim, nnode;
-} types[32] = {
-  {NULL, 0, 0},
-  {"2-node lines", 1, 2},
-  {"3-node triangles", 2, 3},
-  {"4-node quadrangles", 2, 4},
-  {"4-node tetrahedra", 3, 4},
-  {"hexahedra", 3, 8},
-  {"prisms", 3, 6},
-  {"pyramids", 3, 5},
-  {"3-node lines", 1, 3},
-  {"6-node triangles", 2, 6},
-  {"9-node quadrangles", 2, 9},
-  {"10-node tetrahedra", 3, 10},
-  {"27-node hexahedra", 3, 27},
-  {"18-node prisms", 3, 18},
-  {"14-node pyramids", 3, 14},
-  {"points", 0, 1},
-  {"8-node quadrangles", 2, 8},
-  {"20-node hexahedra", 3, 20},
-  {"15-node prisms", 3, 15},
-  {"13-node pyramids", 3, 13},
-  {"9-node triangles", 2, 9},
-  {"10-node triangles", 2, 10},
-  {"12-node triangles", 2, 12},
-  {"15-node triangles", 2, 15},
-  {"15-node triangles", 2, 15},
-  {"21-node triangles", 2, 21},
-  {"4-node lines", 1, 4},
-  {"5-node lines", 1, 5},
-  {"6-node lines", 1, 6},
-  {"20-node tetrahedra", 3, 20},
-  {"35-node tetrahedra", 3, 35},
-  {"56-node tetrahedra", 3, 56},
-};
-enum { LINE = 1, TRIANGLE = 2, TET = 4, POINT = 15, NTYPES = 32 };
+#include "gmsh_types.h"
 
 /* An entity of the geometry in a 4.1 file. */
 typedef struct {
@@ -58,23 +17,14 @@ typedef struct {
 } Entity;
 
 typedef struct {
-  int64_t number;
-  PetscInt vert;
-} Numbered;
-
-typedef struct {
   SbScan scan;
   SbImport *im;
   int version; /* 22 or 41 */
   PetscBool binary;
-  /* node numbers to vertices: a table from `first` on when the numbers are dense, else sorted pairs */
-  int64_t first;
-  int64_t ntable;
-  PetscInt *table;  /* [ntable] vertex or -1 */
-  Numbered *sorted; /* [nvert] */
+  SbNumbers nodes; /* node numbers to vertices */
   PetscInt nentity;
-  Entity *entity;        /* [nentity] */
-  int64_t count[NTYPES]; /* elements read, by type */
+  Entity *entity;                /* [nentity] */
+  int64_t count[SB_GMSH_NTYPES]; /* elements read, by type */
   struct {
     int dim;
     int64_t tag;
@@ -93,7 +43,7 @@ static PetscErrorCode read_format(Gmsh *g)
   PetscFunctionBeginUser;
   PetscCall(SbScanWord(s, sizeof(version), version));
   if (strcmp(version, "2.2") && strcmp(version, "4.1"))
-    SB_SCAN_ERROR(s, "format version '%s'; supple reads 2.2 and 4.1 (gmsh FILE -save -format msh41 converts)",
+    SB_SCAN_ERROR(s, "format version '%s'; supple reads 1 to 4.1 (gmsh FILE -save -format msh41 converts)",
                   version);
   g->version = version[0] == '2' ? 22 : 41;
   PetscCall(SbScanText(s, "file type 0 or 1", &kind));
@@ -285,47 +235,6 @@ static PetscErrorCode read_nodes_41(Gmsh *g)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static int compare_numbered(const void *a, const void *b)
-{
-  const int64_t p = ((const Numbered *)a)->number, q = ((const Numbered *)b)->number;
-
-  return (p > q) - (p < q);
-}
-
-/* Prepares the way from node numbers to vertices; a number given twice is an error. */
-static PetscErrorCode index_nodes(Gmsh *g)
-{
-  const PetscInt n = g->im->nvert;
-  const int64_t *number = g->im->vert_number;
-  int64_t lo = n ? number[0] : 0, hi = lo, twice = 0;
-  PetscBool repeated = PETSC_FALSE;
-
-  PetscFunctionBeginUser;
-  for (PetscInt v = 1; v < n; v++) {
-    lo = PetscMin(lo, number[v]);
-    hi = PetscMax(hi, number[v]);
-  }
-  g->first = lo;
-  if ((uint64_t)hi - (uint64_t)lo < 16 * (uint64_t)n + 1024) {
-    g->ntable = hi - lo + 1;
-    PetscCall(PetscMalloc1((size_t)g->ntable, &g->table));
-    for (int64_t i = 0; i < g->ntable; i++) g->table[i] = -1;
-    for (PetscInt v = 0; v < n; v++) {
-      if (g->table[number[v] - lo] >= 0) repeated = PETSC_TRUE, twice = number[v];
-      g->table[number[v] - lo] = v;
-    }
-  } else {
-    PetscCall(PetscMalloc1(n, &g->sorted));
-    for (PetscInt v = 0; v < n; v++) g->sorted[v] = (Numbered){number[v], v};
-    qsort(g->sorted, (size_t)n, sizeof(*g->sorted), compare_numbered);
-    for (PetscInt v = 1; v < n; v++) {
-      if (g->sorted[v].number == g->sorted[v - 1].number) repeated = PETSC_TRUE, twice = g->sorted[v].number;
-    }
-  }
-  if (repeated) SB_SCAN_ERROR(&g->scan, "node %lld is given twice; renumber the nodes", (long long)twice);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 static PetscErrorCode read_nodes(Gmsh *g)
 {
   PetscFunctionBeginUser;
@@ -334,24 +243,10 @@ static PetscErrorCode read_nodes(Gmsh *g)
     PetscCall(read_nodes_22(g));
   else
     PetscCall(read_nodes_41(g));
-  PetscCall(index_nodes(g));
+  PetscCall(SbNumbersCreate(g->im->nvert, g->im->vert_number, &g->nodes));
+  if (g->nodes.repeated)
+    SB_SCAN_ERROR(&g->scan, "node %lld is given twice; renumber the nodes", (long long)g->nodes.twice);
   PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Vertex of a node number, -1 when there is none. */
-static PetscInt find_node(const Gmsh *g, int64_t number)
-{
-  const Numbered key = {number, 0};
-  const Numbered *found;
-
-  if (g->table) {
-    const uint64_t i = (uint64_t)number - (uint64_t)g->first;
-
-    return number < g->first || i >= (uint64_t)g->ntable ? -1 : g->table[i];
-  }
-  if (!g->sorted) return -1;
-  found = (const Numbered *)bsearch(&key, g->sorted, (size_t)g->im->nvert, sizeof(key), compare_numbered);
-  return found ? found->vert : -1;
 }
 
 /* ------------------------------------------------------------------ elements */
@@ -359,7 +254,7 @@ static PetscInt find_node(const Gmsh *g, int64_t number)
 static PetscErrorCode check_type(Gmsh *g, int64_t type)
 {
   PetscFunctionBeginUser;
-  if (type < 1 || type >= NTYPES)
+  if (type < 1 || type >= SB_GMSH_NTYPES)
     SB_SCAN_ERROR(&g->scan,
                   "element type %lld; supple needs 4-node tetrahedra (type 4), with points, lines and "
                   "triangles for groups",
@@ -373,7 +268,7 @@ static PetscErrorCode read_element(Gmsh *g, int type, int64_t number, PetscInt t
   SbScan *s = &g->scan;
   int64_t node;
   PetscInt vert[64];
-  const int n = types[type].nnode;
+  const int n = SbGmshTypes[type].nnode;
 
   PetscFunctionBeginUser;
   for (int i = 0; i < n; i++) {
@@ -381,15 +276,15 @@ static PetscErrorCode read_element(Gmsh *g, int type, int64_t number, PetscInt t
       PetscCall(SbScanInt4(s, "node of an element", &node));
     else
       PetscCall(SbScanInt8(s, "node of an element", &node));
-    vert[i] = find_node(g, node);
+    vert[i] = SbNumbersFind(&g->nodes, node);
     if (vert[i] < 0)
       SB_SCAN_ERROR(s, "element %lld uses node %lld, which $Nodes does not list", (long long)number,
                     (long long)node);
   }
   g->count[type]++;
-  if (type == TET || (type == TRIANGLE && g->im->surface) ||
-      (tags && (type == POINT || type == LINE || type == TRIANGLE)))
-    PetscCall(SbImportAddItem(g->im, types[type].dim, vert, tags, number));
+  if (type == SB_GMSH_TET || (type == SB_GMSH_TRIANGLE && g->im->surface) ||
+      (tags && (type == SB_GMSH_POINT || type == SB_GMSH_LINE || type == SB_GMSH_TRIANGLE)))
+    PetscCall(SbImportAddItem(g->im, SbGmshTypes[type].dim, vert, tags, number));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -430,7 +325,7 @@ static PetscErrorCode read_elements_22_run(Gmsh *g, int64_t left, int64_t *nread
                   (long long)n, (long long)left);
   for (int64_t i = 0; i < n; i++) {
     if (s->binary) PetscCall(SbScanInt4(s, "number of an element", &number));
-    PetscCall(read_tags_22(g, types[type].dim, ntag, &tags));
+    PetscCall(read_tags_22(g, SbGmshTypes[type].dim, ntag, &tags));
     PetscCall(read_element(g, (int)type, number, tags));
   }
   *nread = n;
@@ -473,8 +368,8 @@ static PetscErrorCode read_elements_41(Gmsh *g)
       SB_SCAN_ERROR(s, "block of %lld elements; only %lld of those announced for the section are left",
                     (long long)n, (long long)(total - nread));
     tag = entity_tags(g, dim, tag);
-    if (tag && dim != types[type].dim)
-      SB_SCAN_ERROR(s, "%s in a block of dimension %lld; the file is damaged", types[type].name,
+    if (tag && dim != SbGmshTypes[type].dim)
+      SB_SCAN_ERROR(s, "%s in a block of dimension %lld; the file is damaged", SbGmshTypes[type].name,
                     (long long)dim);
     for (int64_t i = 0; i < n; i++) {
       PetscCall(SbScanInt8(s, "number of an element", &number));
@@ -562,35 +457,6 @@ static PetscErrorCode merge_repeats(SbImport *im)
 
 /* ------------------------------------------------------------------ the file */
 
-/* What was read must be a mesh of tets and of nothing else in the volume. */
-static PetscErrorCode check_content(const Gmsh *g)
-{
-  const char *where = g->im->where;
-
-  PetscFunctionBeginUser;
-  PetscCheck(g->im->x, PETSC_COMM_SELF, PETSC_ERR_FILE_UNEXPECTED,
-             "%s: has no section $Nodes; it is truncated or not a mesh", where);
-  for (int t = 1; t < NTYPES; t++) {
-    const char *advice =
-      strstr(types[t].name, "tetra")
-        ? "supple needs 4-node ones (gmsh: Mesh.ElementOrder = 1)"
-        : "supple simulates tetrahedra only: split them (gmsh: Mesh.SubdivisionAlgorithm = 0, "
-          "Recombine off)";
-
-    PetscCheck(t == TET || types[t].dim < 3 || !g->count[t], PETSC_COMM_SELF, PETSC_ERR_FILE_UNEXPECTED,
-               "%s: holds %lld %s; %s", where, (long long)g->count[t], types[t].name, advice);
-  }
-  if (g->im->surface && g->count[TRIANGLE]) PetscFunctionReturn(PETSC_SUCCESS);
-  for (int t = 1; t < NTYPES && !g->count[TET]; t++) {
-    PetscCheck(types[t].dim < 2 || !g->count[t], PETSC_COMM_SELF, PETSC_ERR_FILE_UNEXPECTED,
-               "%s: is a surface: %lld %s and no tetrahedra; mesh the volume (gmsh -3)", where,
-               (long long)g->count[t], types[t].name);
-  }
-  PetscCheck(g->count[TET], PETSC_COMM_SELF, PETSC_ERR_FILE_UNEXPECTED,
-             "%s: holds no tetrahedra; mesh the volume (gmsh -3) and save all of it", where);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* The sections that concern us; all others are skipped. */
 static PetscErrorCode read_section(Gmsh *g, const char *name, PetscBool *known)
 {
@@ -655,7 +521,9 @@ static PetscErrorCode read_file(const char *path, Gmsh *g)
   PetscFunctionBeginUser;
   PetscCall(SbScanOpen(g->im->where, path, &g->scan));
   PetscCall(read_sections(g));
-  PetscCall(check_content(g));
+  PetscCheck(g->im->x, PETSC_COMM_SELF, PETSC_ERR_FILE_UNEXPECTED,
+             "%s: has no section $Nodes; it is truncated or not a mesh", g->im->where);
+  PetscCall(SbGmshCheckTypes(g->im, g->count));
   if (g->version == 22 && g->im->ngroup > 1) PetscCall(merge_repeats(g->im));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -670,8 +538,7 @@ PetscErrorCode SbImportRead_Gmsh(const char *path, SbImport *im)
   g.im = im;
   ierr = read_file(path, &g);
   PetscCall(SbScanClose(&g.scan));
-  PetscCall(PetscFree(g.table));
-  PetscCall(PetscFree(g.sorted));
+  PetscCall(SbNumbersDestroy(&g.nodes));
   PetscCall(PetscFree(g.entity));
   PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -15,6 +15,7 @@ typedef struct {
   PetscInt dim; /* 0 points, 1 curves, 2 surfaces, 3 volumes */
   int64_t tag;  /* number in the file */
   char name[SB_GROUP_MAX];
+  PetscInt alone; /* tag set that holds only this group; -1 until somebody wants it */
 } SbGroup;
 
 /* Simplices of one dimension. */
@@ -38,6 +39,8 @@ typedef struct {
   PetscInt *tags_start; /* [ntags + 1] */
   PetscInt *tags_group; /* [tags_start[ntags]] groups, ascending in each set */
   PetscInt capacity[3]; /* of group, tags_start, tags_group */
+  PetscInt nslot;       /* a power of two */
+  PetscInt *slot;       /* [nslot] groups by a hash of (dim, tag), or -1; made when needed */
   PetscBool surface;    /* given: all triangles are wanted, and tets need not be there */
   /* found by SbImportCheck() */
   PetscInt nunused;     /* vertices left out */
@@ -48,7 +51,19 @@ typedef struct {
 
 /* A reader fills x, vert_number, items and groups from the file or description `text`. */
 typedef PetscErrorCode (*SbReader)(const char *text, SbImport *body);
+PetscErrorCode SbImportRead_Msh(const char *path,
+                                SbImport *body); /* any version: by the next one, or by the gmsh library */
 PetscErrorCode SbImportRead_Gmsh(const char *path, SbImport *body);
+PetscErrorCode SbImportRead_Nastran(const char *path, SbImport *body);
+PetscErrorCode SbImportRead_TetGen(const char *path,
+                                   SbImport *body); /* one of the files, or what they have in common */
+PetscErrorCode SbImportRead_Netgen(const char *path, SbImport *body); /* .vol */
+PetscErrorCode SbImportRead_NetgenNeutral(const char *path, SbImport *body);
+PetscErrorCode SbImportRead_Medit(const char *path, SbImport *body);
+PetscErrorCode SbImportRead_Mesh(const char *path,
+                                 SbImport *body); /* .mesh: Medit, or the neutral format of Netgen */
+PetscErrorCode SbImportRead_VTK(const char *path, SbImport *body);
+PetscErrorCode SbImportRead_VTU(const char *path, SbImport *body);
 PetscErrorCode SbImportRead_Box(const char *text, SbImport *body);
 
 /* Chooses the reader by the name of the mesh, reads, places. Not collective. */
@@ -61,8 +76,32 @@ PetscErrorCode SbImportAddItem(SbImport *import, int dim, const PetscInt vert[],
                                int64_t number);
 /* The group (dim, tag), made when new; a NULL name means "surface_12" until somebody gives one. */
 PetscErrorCode SbImportGroup(SbImport *import, PetscInt dim, int64_t tag, const char *name, PetscInt *group);
+/* The tag set that holds this group alone. */
+PetscErrorCode SbImportTagsAlone(SbImport *import, PetscInt dim, int64_t tag, const char *name,
+                                 PetscInt *tags);
 /* The tag set that holds exactly these groups (any order, repeats allowed, reordered here), made when new. */
 PetscErrorCode SbImportTagSet(SbImport *import, PetscInt n, PetscInt groups[], PetscInt *tags);
+
+/* ------------------------------------------------------------------ numbers.c: from numbers of a file to places in memory */
+
+typedef struct {
+  int64_t number;
+  PetscInt vert;
+} SbNumbered;
+typedef struct {
+  PetscInt n;
+  int64_t first, ntable;
+  PetscInt *table;    /* [ntable] place of number first + i, or -1; NULL when the numbers are far apart */
+  SbNumbered *sorted; /* [n] then this */
+  PetscBool repeated; /* a number stands twice */
+  int64_t twice;      /* this one */
+} SbNumbers;
+
+/* Prepares the way from number[n] to 0 ... n - 1; zeroed, or made before: then it is made again. */
+PetscErrorCode SbNumbersCreate(PetscInt n, const int64_t number[], SbNumbers *index);
+PetscErrorCode SbNumbersDestroy(SbNumbers *index);
+/* Place of a number, -1 when there is none. */
+PetscInt SbNumbersFind(const SbNumbers *index, int64_t number);
 
 /* ------------------------------------------------------------------ faces.c: which cells share a face */
 
@@ -186,7 +225,10 @@ PetscErrorCode SbScanRoom(SbScan *scan, const char *what, int64_t n, int64_t tex
 PetscErrorCode SbScanQuoted(SbScan *scan, const char *what, size_t size, char value[]); /* "in quotes" */
 /* The next word; empty at the end of the file. */
 PetscErrorCode SbScanWord(SbScan *scan, size_t size, char word[]);
-PetscErrorCode SbScanEndOfLine(SbScan *scan);         /* to the first byte after it */
+PetscErrorCode SbScanEndOfLine(SbScan *scan); /* to the first byte after it */
+void SbScanNext(SbScan *scan,
+                char comment); /* to the next word, over blank lines and comments to the end of a line */
+PetscBool SbScanMore(SbScan *scan, char comment);     /* whether another word stands on this line */
 PetscBool SbScanFind(SbScan *scan, const char *text); /* moves to its beginning */
 
 #define SB_SCAN_ERROR(scan, ...)                                                    \

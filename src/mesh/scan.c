@@ -155,6 +155,19 @@ PetscErrorCode SbScanInt8(SbScan *s, const char *what, int64_t *value)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A number with the exponent letter of Fortran, 1.5D+00. Returns its end, or NULL. */
+static const char *fortran_real(const SbScan *s, PetscReal *value)
+{
+  char copy[64], *p;
+  size_t n = 0;
+
+  for (; n + 1 < sizeof(copy) && !ends_token(s, s->at + n); n++)
+    copy[n] = s->at[n] == 'D' || s->at[n] == 'd' ? 'E' : s->at[n];
+  copy[n] = 0;
+  *value = strtod(copy, &p);
+  return n && p == copy + n ? s->at + n : NULL;
+}
+
 PetscErrorCode SbScanReal(SbScan *s, const char *what, int64_t number, PetscReal *value)
 {
   char *p;
@@ -166,6 +179,12 @@ PetscErrorCode SbScanReal(SbScan *s, const char *what, int64_t number, PetscReal
   }
   skip_blanks(s);
   *value = strtod(s->at, &p);
+  if (s->at < s->end && p > s->at && (*p == 'D' || *p == 'd')) {
+    const char *end = fortran_real(s, value);
+
+    if (end) s->at = end;
+    if (end) PetscFunctionReturn(PETSC_SUCCESS);
+  }
   if (s->at >= s->end || p == s->at || !ends_token(s, p)) PetscCall(unexpected(s, what, number));
   s->at = p;
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -215,6 +234,22 @@ PetscErrorCode SbScanWord(SbScan *s, size_t size, char word[])
   word[n] = 0;
   s->at += n;
   PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+void SbScanNext(SbScan *s, char comment)
+{
+  skip_blanks(s);
+  while (s->at < s->end && *s->at == comment) {
+    (void)SbScanEndOfLine(s);
+    skip_blanks(s);
+  }
+}
+
+PetscBool SbScanMore(SbScan *s, char comment)
+{
+  while (s->at < s->end && (*s->at == ' ' || *s->at == '\t' || *s->at == '\r')) s->at++;
+  s->token = s->at;
+  return (PetscBool)(s->at < s->end && *s->at != '\n' && *s->at != comment);
 }
 
 PetscErrorCode SbScanEndOfLine(SbScan *s)

@@ -72,7 +72,7 @@ PetscErrorCode SbTrianglesRead_Gmsh(const char *path, SbTriangleFile *f)
   (void)snprintf(im.where, sizeof(im.where), "%s", f->where);
   im.surface = PETSC_TRUE;
   PetscCall(SbImportTagSet(&im, 0, NULL, &none));
-  ierr = SbImportRead_Gmsh(path, &im);
+  ierr = SbImportRead_Msh(path, &im);
   if (!ierr && im.item[3].n)
     ierr = add_boundary(&im, f);
   else if (!ierr) {

@@ -43,6 +43,15 @@ static PetscBool is_generated(const char *mesh)
   return (PetscBool)!strncmp(mesh, "box:", 4);
 }
 
+/* The file, or the points of a mesh of TetGen whose files are named without their endings; sets errno. */
+static PetscBool mesh_is_there(const char *mesh)
+{
+  char node[PETSC_MAX_PATH_LEN + 8];
+
+  (void)snprintf(node, sizeof(node), "%s.node", mesh);
+  return (PetscBool)(!access(node, R_OK) || !access(mesh, R_OK));
+}
+
 /* Rank 0 looks, all ranks learn the result. */
 static PetscErrorCode check_mesh_file(MPI_Comm comm, const SbBody *body)
 {
@@ -52,7 +61,7 @@ static PetscErrorCode check_mesh_file(MPI_Comm comm, const SbBody *body)
 
   PetscFunctionBeginUser;
   PetscCallMPI(MPI_Comm_rank(comm, &rank));
-  if (!rank && access(body->mesh, R_OK)) {
+  if (!rank && !mesh_is_there(body->mesh)) {
     error = errno;
     if (error == ENOENT) PetscCall(near_files(body->mesh, sizeof(near), near));
   }

@@ -101,7 +101,7 @@ mesh 2 surface.msh ": is a surface: 2 3-node triangles and no tetrahedra; mesh t
 error 2 "-body_it_mesh nix.msh: No such file or directory" body.opts -body_it_mesh nix.msh
 mkdir folder folder.msh
 mesh 2 folder.msh ": is not a regular file; give a mesh file"
-error 2 "body 'it': mesh 'folder' is of no known kind; give a file that ends in .msh, or box:" body.opts -body_it_mesh folder
+error 2 "body 'it': mesh 'folder' is of no known kind; give a file that ends in .msh " body.opts -body_it_mesh folder
 
 # no place for the results: a file is in the way, and also root writes nothing below /proc
 touch file

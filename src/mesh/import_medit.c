@@ -1,0 +1,183 @@
+/*
+  import_medit.c - reader of Medit's text files, .mesh ("MEDIT: an interactive mesh visualization software", P. Frey, INRIA RT-0253, 2001),
+  also as mmg, CGAL and FreeFEM write them.
+
+  Keywords, each with a count and that many lines of numbers, the last of which is a reference: N gives volume_N, surface_N or
+  curve_N, and 0 none but for tets. A # begins a comment. Keywords of no concern (Corners, Ridges, Normals, Required...) are passed over, with
+  their numbers. Refused: binary files (.meshb), elements other than 4-node tets in the volume.
+*/
+#include <ctype.h>
+#include "gmsh_types.h"
+
+typedef struct {
+  SbScan scan;
+  SbImport *im;
+  int64_t count[SB_GMSH_NTYPES];
+} Medit;
+
+/* Elements by their keyword: what gmsh calls them. */
+static const struct {
+  const char *word;
+  int type;
+} elements[] = {
+  {"Tetrahedra", SB_GMSH_TET},
+  {"Triangles", SB_GMSH_TRIANGLE},
+  {"Edges", SB_GMSH_LINE},
+  {"Quadrilaterals", 3},
+  {"Hexahedra", 5},
+  {"Hexaedra", 5},
+  {"Prisms", 6},
+  {"Pyramids", 7},
+  {"TetrahedraP2", 11},
+  {"TrianglesP2", 9},
+  {"EdgesP2", 8},
+};
+
+static PetscErrorCode read_vertices(Medit *m)
+{
+  SbScan *s = &m->scan;
+  int64_t n;
+  PetscReal reference;
+
+  PetscFunctionBeginUser;
+  if (m->im->x) SB_SCAN_ERROR(s, "second section Vertices");
+  SbScanNext(s, '#');
+  PetscCall(SbScanText(s, "number of vertices", &n));
+  PetscCall(SbScanRoom(s, "vertices", n, 8, 8));
+  PetscCall(SbImportSetVertices(m->im, (PetscInt)n));
+  for (PetscInt v = 0; v < n; v++) {
+    m->im->vert_number[v] = v + 1;
+    SbScanNext(s, '#');
+    for (int i = 0; i < 3; i++) {
+      PetscCall(SbScanReal(s, "coordinate", v + 1, &m->im->x[3 * v + i]));
+      if (!isfinite(m->im->x[3 * v + i]))
+        SB_SCAN_ERROR(s, "coordinate of vertex %lld is not a finite number; repair the file",
+                      (long long)v + 1);
+    }
+    PetscCall(SbScanReal(s, "reference", v + 1, &reference));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode read_elements(Medit *m, int type)
+{
+  SbScan *s = &m->scan;
+  const int dim = SbGmshTypes[type].dim, nnode = SbGmshTypes[type].nnode;
+  int64_t n, point, reference;
+  PetscInt vert[4], tags;
+
+  PetscFunctionBeginUser;
+  if (!m->im->x) SB_SCAN_ERROR(s, "elements before the section Vertices");
+  SbScanNext(s, '#');
+  PetscCall(SbScanText(s, "number of elements", &n));
+  PetscCall(SbScanRoom(s, SbGmshTypes[type].name, n, 2 * nnode, 2 * nnode));
+  m->count[type] += n;
+  for (int64_t i = 0; i < n; i++) {
+    SbScanNext(s, '#');
+    for (int k = 0; k < nnode; k++) {
+      PetscCall(SbScanText(s, "vertex of an element", &point));
+      if (point < 1 || point > m->im->nvert)
+        SB_SCAN_ERROR(s, "element %lld uses vertex %lld of %lld", (long long)i + 1, (long long)point,
+                      (long long)m->im->nvert);
+      if (k < 4) vert[k] = (PetscInt)(point - 1);
+    }
+    PetscCall(SbScanText(s, "reference of an element", &reference));
+    if (type != SB_GMSH_TET && type != SB_GMSH_TRIANGLE && type != SB_GMSH_LINE) continue;
+    tags = 0;
+    if (reference || dim == 3) PetscCall(SbImportTagsAlone(m->im, dim, reference, NULL, &tags));
+    if (tags || (dim == 2 && m->im->surface)) PetscCall(SbImportAddItem(m->im, dim, vert, tags, i + 1));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* To the next word that is no number. */
+static PetscErrorCode skip_numbers(Medit *m)
+{
+  SbScan *s = &m->scan;
+
+  PetscFunctionBeginUser;
+  for (;;) {
+    SbScanNext(s, '#');
+    if (s->at >= s->end || isalpha((unsigned char)*s->at)) break;
+    while (s->at < s->end && !isspace((unsigned char)*s->at)) s->at++;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode read_keyword(Medit *m, const char *word)
+{
+  SbScan *s = &m->scan;
+  int64_t dimension;
+
+  PetscFunctionBeginUser;
+  if (!strcmp(word, "Vertices")) PetscCall(read_vertices(m));
+  if (!strcmp(word, "Dimension")) {
+    SbScanNext(s, '#');
+    PetscCall(SbScanText(s, "dimension", &dimension));
+    if (dimension != 3) SB_SCAN_ERROR(s, "dimension %lld; expected 3", (long long)dimension);
+  }
+  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(elements); i++) {
+    if (!strcmp(word, elements[i].word)) PetscCall(read_elements(m, elements[i].type));
+  }
+  PetscCall(skip_numbers(m));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode read_file(const char *path, Medit *m)
+{
+  SbScan *s = &m->scan;
+  char word[32];
+  PetscBool ended = PETSC_FALSE;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbScanOpen(m->im->where, path, s));
+  SbScanNext(s, '#');
+  PetscCall(SbScanWord(s, sizeof(word), word));
+  if (strcmp(word, "MeshVersionFormatted"))
+    SB_SCAN_ERROR(s, "expected 'MeshVersionFormatted', found '%s'; this is no text file of Medit", word);
+  PetscCall(skip_numbers(m));
+  while (!ended) {
+    SbScanNext(s, '#');
+    PetscCall(SbScanWord(s, sizeof(word), word));
+    if (!word[0])
+      SB_SCAN_ERROR(
+        s, "the file ends where a section, or 'End', is expected; it is truncated, write or copy it again");
+    ended = (PetscBool)!strcmp(word, "End");
+    if (!ended) PetscCall(read_keyword(m, word));
+  }
+  PetscCall(SbGmshCheckTypes(m->im, m->count));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbImportRead_Medit(const char *path, SbImport *im)
+{
+  Medit m;
+  PetscErrorCode ierr;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscMemzero(&m, sizeof(m)));
+  m.im = im;
+  ierr = read_file(path, &m);
+  PetscCall(SbScanClose(&m.scan));
+  PetscFunctionReturn(ierr);
+}
+
+/* The two share their ending: Netgen's begins with a number. */
+PetscErrorCode SbImportRead_Mesh(const char *path, SbImport *im)
+{
+  SbScan s;
+  PetscBool number;
+  PetscErrorCode ierr;
+
+  PetscFunctionBeginUser;
+  ierr = SbScanOpen(im->where, path, &s);
+  if (!ierr) SbScanNext(&s, '#');
+  number = (PetscBool)(!ierr && s.at < s.end && isdigit((unsigned char)*s.at));
+  PetscCall(SbScanClose(&s));
+  PetscCall(ierr);
+  if (number)
+    PetscCall(SbImportRead_NetgenNeutral(path, im));
+  else
+    PetscCall(SbImportRead_Medit(path, im));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

@@ -1,0 +1,248 @@
+/*
+  vtk_grid.c - cells of VTK's files as items of a body.
+
+  Types of cells as in VTK's vtkCellType.h; they are counted as what gmsh calls them, to say what else is there in the same words.
+*/
+#include <stdlib.h>
+#include <strings.h>
+#include "gmsh_types.h"
+#include "vtk_grid.h"
+
+/* VTK's types of cells: what gmsh calls them. nnode 0: any number of nodes. */
+static const struct {
+  int type, gmsh, nnode;
+} cells[] = {
+  {1, SB_GMSH_POINT, 1},
+  {2, SB_GMSH_POINT, 0},
+  {3, SB_GMSH_LINE, 2},
+  {4, SB_GMSH_LINE, 0},
+  {5, SB_GMSH_TRIANGLE, 3},
+  {8, 3, 4},
+  {9, 3, 4},
+  {10, SB_GMSH_TET, 4},
+  {11, 5, 8},
+  {12, 5, 8},
+  {13, 6, 6},
+  {14, 7, 5},
+  {21, 8, 3},
+  {22, 9, 6},
+  {23, 16, 8},
+  {24, 11, 10},
+  {25, 17, 20},
+  {26, 18, 15},
+  {27, 19, 13},
+  {28, 10, 9},
+  {29, 12, 27},
+};
+
+/* Names of arrays that number regions, in the order of preference. */
+static const char *const region_names[] = {
+  "CellEntityIds", "gmsh:physical", "medit:ref", "region", "regions", "RegionId",  "RegionIds", "material",
+  "MaterialId",    "MaterialIds",   "subdomain", "label",  "labels",  "cell_tags", "tag"};
+
+PetscErrorCode SbVtkGridDestroy(SbVtkGrid *grid)
+{
+  PetscFunctionBeginUser;
+  PetscCall(PetscFree(grid->connect));
+  PetscCall(PetscFree(grid->end));
+  PetscCall(PetscFree(grid->type));
+  for (int a = 0; a < grid->narray; a++) PetscCall(PetscFree(grid->array[a].value));
+  PetscCall(PetscMemzero(grid, sizeof(*grid)));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+void SbVtkConvert(SbVtkType type, PetscBool swap, size_t n, const void *bytes, double value[])
+{
+  const unsigned char *from = (const unsigned char *)bytes;
+
+  for (size_t i = 0; i < n; i++) {
+    uint64_t bits = 0;
+
+    for (int b = 0; b < type.size; b++)
+      bits |= (uint64_t)from[i * (size_t)type.size + (size_t)b] << 8 * (swap ? type.size - 1 - b : b);
+    if (type.kind == 'f' && type.size == 4) {
+      const uint32_t half = (uint32_t)bits;
+      float x;
+
+      memcpy(&x, &half, 4);
+      value[i] = (double)x;
+    } else if (type.kind == 'f')
+      memcpy(&value[i], &bits, 8);
+    else if (type.kind == 'u')
+      value[i] = (double)bits;
+    else {
+      const int unused = 64 - 8 * type.size;
+
+      value[i] = (double)((int64_t)(bits << unused) >> unused);
+    }
+  }
+}
+
+PetscErrorCode SbVtkSetPoints(SbScan *s, PetscInt n, const double x[], SbImport *im)
+{
+  PetscFunctionBeginUser;
+  PetscCall(SbImportSetVertices(im, n));
+  for (PetscInt v = 0; v < n; v++) {
+    im->vert_number[v] = v;
+    for (int i = 0; i < 3; i++) {
+      im->x[3 * v + i] = x[3 * v + i];
+      if (!isfinite(x[3 * v + i]))
+        SB_SCAN_ERROR(s, "coordinate of point %lld is not a finite number; repair the file", (long long)v);
+    }
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ groups */
+
+static int compare_values(const void *a, const void *b)
+{
+  const double p = *(const double *)a, q = *(const double *)b;
+
+  return (p > q) - (p < q);
+}
+
+/* Whether an array numbers regions: whole numbers, of few different values. */
+static PetscErrorCode numbers_regions(PetscInt n, const double value[], PetscBool *is)
+{
+  double *sorted;
+  PetscInt different = 1;
+
+  PetscFunctionBeginUser;
+  *is = PETSC_FALSE;
+  for (PetscInt i = 0; i < n; i++) {
+    if (!(PetscAbsReal(value[i]) < 1e12) || value[i] != PetscFloorReal(value[i]))
+      PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  PetscCall(PetscMalloc1(n, &sorted));
+  PetscCall(PetscArraycpy(sorted, value, n));
+  if (n) qsort(sorted, (size_t)n, sizeof(*sorted), compare_values);
+  for (PetscInt i = 1; i < n; i++) different += sorted[i] != sorted[i - 1];
+  PetscCall(PetscFree(sorted));
+  *is = (PetscBool)(different <= SB_VTK_REGIONS);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Which arrays become groups, and which of them is the one of regions. */
+static PetscErrorCode choose_arrays(const SbVtkGrid *grid, PetscBool use[], int *regions)
+{
+  int nuse = 0;
+
+  PetscFunctionBeginUser;
+  *regions = -1;
+  for (int a = 0; a < grid->narray; a++) {
+    PetscCall(numbers_regions(grid->ncell, grid->array[a].value, &use[a]));
+    nuse += use[a];
+  }
+  for (size_t k = 0; k < PETSC_STATIC_ARRAY_LENGTH(region_names) && *regions < 0; k++) {
+    for (int a = 0; a < grid->narray && *regions < 0; a++) {
+      if (use[a] && !strcasecmp(grid->array[a].name, region_names[k])) *regions = a;
+    }
+  }
+  for (int a = 0; a < grid->narray && nuse == 1; a++) {
+    if (use[a]) *regions = a;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Tag set of one cell: a group from each array in use. */
+static PetscErrorCode cell_tags(const SbVtkGrid *grid, const PetscBool use[], int regions, PetscInt c,
+                                int dim, SbImport *im, PetscInt *tags)
+{
+  static const char *const kind[4] = {"point", "curve", "surface", "volume"};
+  PetscInt group[SB_VTK_ARRAYS], n = 0;
+
+  PetscFunctionBeginUser;
+  for (int a = 0; a < grid->narray; a++) {
+    const PetscInt known = im->ngroup;
+    const int64_t value = use[a] ? (int64_t)grid->array[a].value[c] : 0;
+
+    if (!use[a]) continue;
+    PetscCall(SbImportGroup(im, dim, value * SB_VTK_ARRAYS + a, NULL, &group[n]));
+    if (im->ngroup > known)
+      (void)snprintf(im->group[group[n]].name, SB_GROUP_MAX, "%.40s%s%s_%lld",
+                     a == regions ? "" : grid->array[a].name, a == regions ? "" : "_", kind[dim],
+                     (long long)value);
+    n++;
+  }
+  PetscCall(SbImportTagSet(im, n, group, tags));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ cells */
+
+/* What gmsh calls a cell; a type that is not known is an error. */
+static PetscErrorCode cell_type(SbScan *s, const SbVtkGrid *grid, PetscInt c, int64_t nnode, int *type)
+{
+  const double vtk = grid->type[c];
+
+  PetscFunctionBeginUser;
+  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(cells); i++) {
+    if (vtk != cells[i].type) continue;
+    if (cells[i].nnode && nnode != cells[i].nnode)
+      SB_SCAN_ERROR(s, "cell %lld, of VTK's type %g, has %lld points; expected %d", (long long)c, vtk,
+                    (long long)nnode, cells[i].nnode);
+    *type = cells[i].gmsh;
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  SB_SCAN_ERROR(
+    s,
+    "cell %lld is of VTK's type %g; supple simulates tetrahedra (type 10), with points, lines and "
+    "triangles for groups",
+    (long long)c, vtk);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The points of a cell, checked; from `begin` on. */
+static PetscErrorCode cell_points(SbScan *s, const SbVtkGrid *grid, PetscInt c, int64_t begin, int64_t nnode,
+                                  PetscInt nvert, PetscInt vert[4])
+{
+  PetscFunctionBeginUser;
+  for (int64_t k = 0; k < nnode; k++) {
+    const double point = grid->connect[begin + k];
+
+    if (!(point >= 0 && point < (double)nvert) || point != PetscFloorReal(point))
+      SB_SCAN_ERROR(s, "cell %lld uses point %g; the points are 0 to %lld", (long long)c, point,
+                    (long long)nvert - 1);
+    if (k < 4) vert[k] = (PetscInt)point;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Where the next cell ends; it has a point at least and stays within what is there. */
+static PetscErrorCode cell_end(SbScan *s, const SbVtkGrid *grid, PetscInt c, int64_t begin, int64_t *end)
+{
+  const double value = grid->end[c];
+
+  PetscFunctionBeginUser;
+  if (!(value > (double)begin && value <= (double)grid->nconnect) || value != PetscFloorReal(value))
+    SB_SCAN_ERROR(s, "the points of cell %lld end at %g; expected a whole number above %lld, up to %lld",
+                  (long long)c, value, (long long)begin, (long long)grid->nconnect);
+  *end = (int64_t)value;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbVtkGridFill(SbScan *s, SbVtkGrid *grid, SbImport *im)
+{
+  int64_t count[SB_GMSH_NTYPES] = {0}, begin = 0, end;
+  PetscBool use[SB_VTK_ARRAYS];
+  PetscInt vert[4] = {0, 0, 0, 0}, tags;
+  int regions, type;
+
+  PetscFunctionBeginUser;
+  PetscCall(choose_arrays(grid, use, &regions));
+  for (PetscInt c = 0; c < grid->ncell; c++, begin = end) {
+    PetscCall(cell_end(s, grid, c, begin, &end));
+    PetscCall(cell_type(s, grid, c, end - begin, &type));
+    PetscCall(cell_points(s, grid, c, begin, end - begin, im->nvert, vert));
+    count[type]++;
+    if (type != SB_GMSH_TET && type != SB_GMSH_TRIANGLE && type != SB_GMSH_LINE && type != SB_GMSH_POINT)
+      continue;
+    if (end - begin != SbGmshTypes[type].nnode) continue; /* a line of many pieces */
+    PetscCall(cell_tags(grid, use, regions, c, SbGmshTypes[type].dim, im, &tags));
+    if (type == SB_GMSH_TET || tags || (type == SB_GMSH_TRIANGLE && im->surface))
+      PetscCall(SbImportAddItem(im, SbGmshTypes[type].dim, vert, tags, c));
+  }
+  PetscCall(SbGmshCheckTypes(im, count));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

@@ -1,0 +1,184 @@
+// The gmsh library in its child process: what it reads and makes, and what is said when it fails, crashes or hangs.
+// @ranks 1 3
+#include <signal.h>
+#include <stdlib.h>
+#include <unistd.h>
+#include "../../src/mesh/gmsh_library.h"
+#include "mesh_test.h"
+
+static PetscErrorCode run(const char *doing, PetscReal seconds, SbGmshWork work, void *ctx, SbImport *im)
+{
+  const SbGmshJob job = {im->where, doing, seconds, work, ctx};
+
+  PetscFunctionBeginUser;
+  PetscCall(SbGmshRun(&job, im));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Runs and frees. */
+static PetscErrorCode try_work(PetscReal seconds, SbGmshWork work, void *ctx)
+{
+  SbImport im;
+  PetscErrorCode ierr;
+
+  PetscFunctionBeginUser;
+  memset(&im, 0, sizeof(im));
+  (void)snprintf(im.where, sizeof(im.where), "body 'b': thing");
+  ierr = run("made tetrahedra", seconds, work, ctx, &im);
+  PetscCall(SbImportDestroy(&im));
+  PetscFunctionReturn(ierr);
+}
+
+/* ------------------------------------------------------------------ a volume from a surface */
+
+/* The unit cube as twelve triangles of a discrete surface; its volume, with a name, at the size that ctx points to. */
+static PetscErrorCode mesh_cube(const SbGmsh *gmsh, void *ctx, SbImport *result)
+{
+  double x[24];
+  size_t tag[8], tri[36] = {1, 3, 2, 2, 3, 4, 5, 6, 7, 6, 8, 7, 1, 2, 5, 2, 6, 5,
+                            3, 7, 4, 4, 7, 8, 1, 5, 3, 3, 5, 7, 2, 4, 6, 4, 8, 6};
+  int surface = 1, loop = 1, volume = 1;
+
+  PetscFunctionBeginUser;
+  for (int v = 0; v < 8; v++) {
+    tag[v] = (size_t)v + 1;
+    for (int i = 0; i < 3; i++) x[3 * v + i] = v >> i & 1;
+  }
+  SB_GMSH(gmsh, ModelAddDiscreteEntity, 2, surface, NULL, 0);
+  SB_GMSH(gmsh, ModelMeshAddNodes, 2, surface, tag, 8, x, 24, NULL, 0);
+  SB_GMSH(gmsh, ModelMeshAddElementsByType, surface, 2, NULL, 0, tri, 36);
+  SB_GMSH(gmsh, ModelGeoAddSurfaceLoop, &surface, 1, loop);
+  SB_GMSH(gmsh, ModelGeoAddVolume, &loop, 1, volume);
+  SB_GMSH0(gmsh, ModelGeoSynchronize);
+  SB_GMSH(gmsh, ModelAddPhysicalGroup, 3, &volume, 1, 7);
+  SB_GMSH(gmsh, ModelSetPhysicalName, 3, 7, "flesh");
+  SB_GMSH(gmsh, OptionSetNumber, "Mesh.MeshSizeMax", *(const double *)ctx);
+  SB_GMSH(gmsh, ModelMeshGenerate, 3);
+  PetscCall(SbGmshCollect(gmsh, SB_GMSH_PHYSICAL, result));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode test_cube(void)
+{
+  SbImport im;
+  SbFaces faces;
+  double size = 0.5;
+  PetscReal volume = 0;
+
+  PetscFunctionBeginUser;
+  memset(&im, 0, sizeof(im));
+  memset(&faces, 0, sizeof(faces));
+  (void)snprintf(im.where, sizeof(im.where), "body 'b': cube");
+  PetscCall(run("made tetrahedra", 60, mesh_cube, &size, &im));
+  SB_CHECK(im.item[3].n >= 6 && im.nvert >= 8, "%d tets, %d vertices", (int)im.item[3].n, (int)im.nvert);
+  SB_CHECK(im.ngroup == 1 && !strcmp(im.group[0].name, "flesh") && im.group[0].tag == 7, "group '%s'",
+           im.ngroup ? im.group[0].name : "");
+  for (PetscInt c = 1; c < im.item[3].n; c++)
+    SB_CHECK(im.item[3].number[c] > im.item[3].number[c - 1], "tets are not in the order of their numbers");
+  PetscCall(SbImportCheck(&im, &faces));
+  for (PetscInt c = 0; c < im.item[3].n; c++) volume += SbTetDet(im.x, im.item[3].vert + 4 * c) / 6;
+  SB_CHECK_NEAR(volume, 1, 1e-12, "volume");
+  /* the body can go on growing */
+  PetscCall(SbImportAddItem(&im, 3, (PetscInt[]){0, 1, 2, 3}, 0, 1));
+  PetscCall(SbImportDestroy(&im));
+  PetscCall(SbFacesDestroy(&faces));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ what goes wrong */
+
+static PetscErrorCode crash(const SbGmsh *gmsh, void *ctx, SbImport *result)
+{
+  (void)gmsh, (void)ctx, (void)result;
+  PetscFunctionBeginUser;
+  (void)raise(SIGSEGV);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode hang(const SbGmsh *gmsh, void *ctx, SbImport *result)
+{
+  (void)gmsh, (void)ctx, (void)result;
+  PetscFunctionBeginUser;
+  for (;;) (void)sleep(1);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode leave(const SbGmsh *gmsh, void *ctx, SbImport *result)
+{
+  (void)gmsh, (void)ctx, (void)result;
+  PetscFunctionBeginUser;
+  _exit(3);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode refuse(const SbGmsh *gmsh, void *ctx, SbImport *result)
+{
+  (void)gmsh, (void)result;
+  PetscFunctionBeginUser;
+  SETERRQ(PETSC_COMM_SELF, PETSC_ERR_USER_INPUT, "%s", (const char *)ctx);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode fail_in_gmsh(const SbGmsh *gmsh, void *ctx, SbImport *result)
+{
+  (void)ctx, (void)result;
+  PetscFunctionBeginUser;
+  SB_GMSH(gmsh, Merge, "/nowhere/at/all.msh");
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode no_mesh(const SbGmsh *gmsh, void *ctx, SbImport *result)
+{
+  (void)ctx;
+  PetscFunctionBeginUser;
+  PetscCall(SbGmshCollect(gmsh, SB_GMSH_ENTITIES, result));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode test_failures(void)
+{
+  PetscFunctionBeginUser;
+  TEST_MESSAGE(try_work(60, crash, NULL), PETSC_ERR_FILE_UNEXPECTED,
+               "body 'b': thing: gmsh crashed (Segmentation fault) while it made tetrahedra");
+  TEST_MESSAGE(try_work(1.5, hang, NULL), PETSC_ERR_FILE_UNEXPECTED,
+               "body 'b': thing: gmsh was stopped: after 1.5 s it had not made tetrahedra");
+  TEST_MESSAGE(try_work(60, leave, NULL), PETSC_ERR_FILE_UNEXPECTED,
+               "body 'b': thing: gmsh ended (exit code 3) while it made tetrahedra");
+  TEST_MESSAGE(try_work(60, refuse, "seven is too many"), PETSC_ERR_USER_INPUT, "seven is too many");
+  TEST_MESSAGE(try_work(60, fail_in_gmsh, NULL), PETSC_ERR_FILE_UNEXPECTED, "body 'b': thing: gmsh failed: ");
+  TEST_MESSAGE(try_work(60, fail_in_gmsh, NULL), PETSC_ERR_FILE_UNEXPECTED, "/nowhere/at/all.msh");
+  TEST_MESSAGE(try_work(60, no_mesh, NULL), PETSC_ERR_FILE_UNEXPECTED,
+               "body 'b': thing: holds no tetrahedra");
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Without a work function that calls for it, the library is not in this process. */
+static PetscErrorCode test_not_loaded(void)
+{
+  char line[512];
+  FILE *maps = fopen("/proc/self/maps", "r");
+  PetscBool found = PETSC_FALSE;
+
+  PetscFunctionBeginUser;
+  while (maps && fgets(line, sizeof(line), maps)) found = (PetscBool)(found || strstr(line, "libgmsh"));
+  if (maps) fclose(maps);
+  SB_CHECK(!found, "libgmsh is loaded in the program itself");
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+int main(int argc, char **argv)
+{
+  PetscMPIInt rank;
+
+  SB_TEST_BEGIN(argc, argv);
+  PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
+  if (!rank) {
+    PetscCall(test_cube());
+    PetscCall(test_failures());
+    PetscCall(test_not_loaded());
+  }
+  /* MPI still works after the children, and the other ranks have waited */
+  PetscCallMPI(MPI_Bcast(&rank, 1, MPI_INT, 0, PETSC_COMM_WORLD));
+  SB_CHECK(rank == 0, "rank %d from rank 0", (int)rank);
+  SB_TEST_END();
+}
