@@ -1,9 +1,9 @@
 /*
-  import_gmsh.c - reader of gmsh's .msh files: versions 2.2 and 4.1, text and binary (gmsh reference manual, "File
-  formats"). Own reader, because a body needs every physical group of every entity, also where groups overlap.
+  import_gmsh.c - reader of gmsh's .msh files: versions 1, 2 (2.0 to 2.2) and 4.1, text and binary (gmsh reference manual, "File
+  formats" and "Legacy formats"). Own reader, because a body needs every physical group of every entity, also where groups overlap.
 
-  Version 4.1 gives groups per entity of the geometry; an entity may have several. Version 2.2 gives one group per
-  element and writes an element again for each further group: such repeats are merged, groups joined.
+  Version 4.1 gives groups per entity of the geometry; an entity may have several. Versions 1 and 2 give one group per
+  element and write an element again for each further group: such repeats are merged, groups joined.
 
   Kept: points, lines, triangles that belong to a group, and all tets; all triangles where a surface is wanted, which needs no tets.
   Sections that do not concern us are skipped. Refused: volume elements other than 4-node tets, files cut into partitions, other versions.
@@ -19,7 +19,7 @@ typedef struct {
 typedef struct {
   SbScan scan;
   SbImport *im;
-  int version; /* 22 or 41 */
+  int version; /* 1, 2 or 41 */
   PetscBool binary;
   SbNumbers nodes; /* node numbers to vertices */
   PetscInt nentity;
@@ -36,16 +36,23 @@ typedef struct {
 
 static PetscErrorCode read_format(Gmsh *g)
 {
+  static const struct {
+    const char *name;
+    int version;
+  } versions[] = {{"2", 2}, {"2.0", 2}, {"2.1", 2}, {"2.2", 2}, {"4.1", 41}};
   SbScan *s = &g->scan;
   char version[16];
   int64_t kind, size, one;
 
   PetscFunctionBeginUser;
   PetscCall(SbScanWord(s, sizeof(version), version));
-  if (strcmp(version, "2.2") && strcmp(version, "4.1"))
+  g->version = 0;
+  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(versions); i++) {
+    if (!strcmp(version, versions[i].name)) g->version = versions[i].version;
+  }
+  if (!g->version)
     SB_SCAN_ERROR(s, "format version '%s'; supple reads 1 to 4.1 (gmsh FILE -save -format msh41 converts)",
                   version);
-  g->version = version[0] == '2' ? 22 : 41;
   PetscCall(SbScanText(s, "file type 0 or 1", &kind));
   PetscCall(SbScanText(s, "data size", &size));
   if (kind != 0 && kind != 1)
@@ -239,7 +246,7 @@ static PetscErrorCode read_nodes(Gmsh *g)
 {
   PetscFunctionBeginUser;
   if (g->im->x) SB_SCAN_ERROR(&g->scan, "second section $Nodes");
-  if (g->version == 22)
+  if (g->version <= 2)
     PetscCall(read_nodes_22(g));
   else
     PetscCall(read_nodes_41(g));
@@ -272,7 +279,7 @@ static PetscErrorCode read_element(Gmsh *g, int type, int64_t number, PetscInt t
 
   PetscFunctionBeginUser;
   for (int i = 0; i < n; i++) {
-    if (g->version == 22)
+    if (g->version <= 2)
       PetscCall(SbScanInt4(s, "node of an element", &node));
     else
       PetscCall(SbScanInt8(s, "node of an element", &node));
@@ -307,6 +314,19 @@ static PetscErrorCode read_tags_22(Gmsh *g, int dim, int64_t ntag, PetscInt *tag
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* In a file of version 1 every element tells how many nodes it has. */
+static PetscErrorCode read_node_count_1(Gmsh *g, int type)
+{
+  int64_t n;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbScanText(&g->scan, "number of nodes of an element", &n));
+  if (n != SbGmshTypes[type].nnode)
+    SB_SCAN_ERROR(&g->scan, "an element of type %d with %lld nodes; expected %d", type, (long long)n,
+                  SbGmshTypes[type].nnode);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Elements of one type: as text one, whose line tells type and number of tags; in binary as many as their header says. */
 static PetscErrorCode read_elements_22_run(Gmsh *g, int64_t left, int64_t *nread)
 {
@@ -319,13 +339,17 @@ static PetscErrorCode read_elements_22_run(Gmsh *g, int64_t left, int64_t *nread
   PetscCall(SbScanInt4(s, "type of an element", &type));
   PetscCall(check_type(g, type));
   if (s->binary) PetscCall(SbScanInt4(s, "number of elements in a block", &n));
-  PetscCall(SbScanInt4(s, "number of tags of an element", &ntag));
+  if (g->version == 1)
+    ntag = 2;
+  else
+    PetscCall(SbScanInt4(s, "number of tags of an element", &ntag));
   if (n < 1 || n > left)
     SB_SCAN_ERROR(s, "block of %lld elements; only %lld of those announced for the section are left",
                   (long long)n, (long long)left);
   for (int64_t i = 0; i < n; i++) {
     if (s->binary) PetscCall(SbScanInt4(s, "number of an element", &number));
     PetscCall(read_tags_22(g, SbGmshTypes[type].dim, ntag, &tags));
+    if (g->version == 1) PetscCall(read_node_count_1(g, (int)type));
     PetscCall(read_element(g, (int)type, number, tags));
   }
   *nread = n;
@@ -384,8 +408,9 @@ static PetscErrorCode read_elements_41(Gmsh *g)
 static PetscErrorCode read_elements(Gmsh *g)
 {
   PetscFunctionBeginUser;
-  if (!g->im->x) SB_SCAN_ERROR(&g->scan, "section $Elements before $Nodes");
-  if (g->version == 22)
+  if (!g->im->x)
+    SB_SCAN_ERROR(&g->scan, "section %s before the nodes", g->version == 1 ? "$ELM" : "$Elements");
+  if (g->version <= 2)
     PetscCall(read_elements_22(g));
   else
     PetscCall(read_elements_41(g));
@@ -461,20 +486,21 @@ static PetscErrorCode merge_repeats(SbImport *im)
 static PetscErrorCode read_section(Gmsh *g, const char *name, PetscBool *known)
 {
   SbScan *s = &g->scan;
+  const char *nodes = g->version == 1 ? "$NOD" : "$Nodes", *elements = g->version == 1 ? "$ELM" : "$Elements";
 
   PetscFunctionBeginUser;
   *known = PETSC_TRUE;
   if (!strcmp(name, "$PhysicalNames"))
     PetscCall(read_names(g));
-  else if (!strcmp(name, "$Entities") || !strcmp(name, "$Nodes") || !strcmp(name, "$Elements")) {
+  else if (!strcmp(name, "$Entities") || !strcmp(name, nodes) || !strcmp(name, elements)) {
     PetscCall(SbScanEndOfLine(s));
     s->binary = g->binary;
-    if (name[2] == 'n')
-      PetscCall(read_entities(g));
-    else if (name[1] == 'N')
+    if (!strcmp(name, nodes))
       PetscCall(read_nodes(g));
-    else
+    else if (!strcmp(name, elements))
       PetscCall(read_elements(g));
+    else
+      PetscCall(read_entities(g));
     s->binary = PETSC_FALSE;
   } else if (!strcmp(name, "$PartitionedEntities")) {
     SB_SCAN_ERROR(s, "the mesh is cut into partitions; save it in one piece (gmsh: Mesh, Unpartition)");
@@ -483,35 +509,47 @@ static PetscErrorCode read_section(Gmsh *g, const char *name, PetscBool *known)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Reads a section, or passes over it; then its closing word. */
+static PetscErrorCode read_whole_section(Gmsh *g, const char *name)
+{
+  SbScan *s = &g->scan;
+  char end[64], closing[72];
+  PetscBool known;
+
+  PetscFunctionBeginUser;
+  if (name[0] != '$') SB_SCAN_ERROR(s, "expected the beginning of a section, as $Nodes, found '%.20s'", name);
+  (void)snprintf(closing, sizeof(closing), g->version == 1 ? "$END%s" : "$End%s", name + 1);
+  if (!strcmp(name, "$MeshFormat")) {
+    PetscCall(read_format(g));
+    known = PETSC_TRUE;
+  } else
+    PetscCall(read_section(g, name, &known));
+  if (!known && !SbScanFind(s, closing))
+    SB_SCAN_ERROR(s, "section %s has no end; the file is truncated, write or copy it again", name);
+  PetscCall(SbScanWord(s, sizeof(end), end));
+  if (!end[0])
+    SB_SCAN_ERROR(s, "the file ends where %s is expected; it is truncated, write or copy it again", closing);
+  if (strcmp(end, closing))
+    SB_SCAN_ERROR(s, "expected %s, found '%.20s'; the section is longer than announced or damaged", closing,
+                  end);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Version 1 begins with its nodes. */
 static PetscErrorCode read_sections(Gmsh *g)
 {
   SbScan *s = &g->scan;
-  char name[64], end[64], closing[72];
-  PetscBool known;
+  char name[64];
 
   PetscFunctionBeginUser;
   PetscCall(SbScanWord(s, sizeof(name), name));
   if (!strcmp(name, "$NOD"))
-    SB_SCAN_ERROR(s, "gmsh format 1; supple reads 2.2 and 4.1 (gmsh FILE -save -format msh41 converts)");
-  if (strcmp(name, "$MeshFormat")) SB_SCAN_ERROR(s, "expected $MeshFormat; this is no gmsh mesh file");
-  PetscCall(read_format(g));
-  for (;;) {
-    (void)snprintf(closing, sizeof(closing), "$End%s", name + 1);
-    PetscCall(SbScanWord(s, sizeof(end), end));
-    if (!end[0])
-      SB_SCAN_ERROR(s, "the file ends where %s is expected; it is truncated, write or copy it again",
-                    closing);
-    if (strcmp(end, closing))
-      SB_SCAN_ERROR(s, "expected %s, found '%.20s'; the section is longer than announced or damaged", closing,
-                    end);
+    g->version = 1;
+  else if (strcmp(name, "$MeshFormat"))
+    SB_SCAN_ERROR(s, "expected $MeshFormat; this is no gmsh mesh file");
+  while (name[0]) {
+    PetscCall(read_whole_section(g, name));
     PetscCall(SbScanWord(s, sizeof(name), name));
-    if (!name[0]) break;
-    if (name[0] != '$')
-      SB_SCAN_ERROR(s, "expected the beginning of a section, as $Nodes, found '%.20s'", name);
-    PetscCall(read_section(g, name, &known));
-    (void)snprintf(closing, sizeof(closing), "$End%s", name + 1);
-    if (!known && !SbScanFind(s, closing))
-      SB_SCAN_ERROR(s, "section %s has no end; the file is truncated, write or copy it again", name);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -524,7 +562,7 @@ static PetscErrorCode read_file(const char *path, Gmsh *g)
   PetscCheck(g->im->x, PETSC_COMM_SELF, PETSC_ERR_FILE_UNEXPECTED,
              "%s: has no section $Nodes; it is truncated or not a mesh", g->im->where);
   PetscCall(SbGmshCheckTypes(g->im, g->count));
-  if (g->version == 22 && g->im->ngroup > 1) PetscCall(merge_repeats(g->im));
+  if (g->version <= 2 && g->im->ngroup > 1) PetscCall(merge_repeats(g->im));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

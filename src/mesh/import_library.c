@@ -1,5 +1,5 @@
 /*
-  import_library.c - files that the gmsh library reads for us: gmsh's own formats 1, 2.0 and 4.0, and Nastran.
+  import_library.c - files that the gmsh library reads for us: gmsh's own format 4.0, and Nastran.
 
   gmsh takes what it does not know for a script of its own, and would run it: only what is known by its content (.msh) or
   by its extension in the spelling gmsh knows gets there.
@@ -51,10 +51,9 @@ static PetscErrorCode read_by_library(const char *path, SbGmshWork work, SbImpor
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Whether the own reader does not know the version: 1, which begins with $NOD, 2.0, 2.1 and 4.0. */
+/* Whether it is of version 4.0, which the own reader does not know. */
 static PetscErrorCode foreign_msh(const char *path, const char *where, PetscBool *foreign)
 {
-  static const char *const versions[] = {"1", "2", "2.0", "2.1", "4", "4.0"};
   SbScan s;
   char word[32] = "", version[16] = "";
   PetscErrorCode ierr = SbScanOpen(where, path, &s);
@@ -64,9 +63,7 @@ static PetscErrorCode foreign_msh(const char *path, const char *where, PetscBool
   if (!ierr) ierr = SbScanWord(&s, sizeof(version), version);
   PetscCall(SbScanClose(&s));
   PetscCall(ierr);
-  *foreign = (PetscBool)!strcmp(word, "$NOD");
-  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(versions) && !strcmp(word, "$MeshFormat"); i++)
-    *foreign = (PetscBool)(*foreign || !strcmp(version, versions[i]));
+  *foreign = (PetscBool)(!strcmp(word, "$MeshFormat") && (!strcmp(version, "4") || !strcmp(version, "4.0")));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
