@@ -230,7 +230,8 @@ static const struct {
   {".msh", SbImportRead_Msh},           {".vtk", SbImportRead_VTK},     {".vtu", SbImportRead_VTU},
   {".mesh", SbImportRead_Mesh},         {".node", SbImportRead_TetGen}, {".ele", SbImportRead_TetGen},
   {".face", SbImportRead_TetGen},       {".edge", SbImportRead_TetGen}, {".vol", SbImportRead_Netgen},
-  {".neu", SbImportRead_NetgenNeutral}, {".bdf", SbImportRead_Nastran}, {".nas", SbImportRead_Nastran},
+  {".neu", SbImportRead_NetgenNeutral}, {".inp", SbImportRead_Abaqus},  {".unv", SbImportRead_UNV},
+  {".bdf", SbImportRead_Nastran},       {".nas", SbImportRead_Nastran},
 };
 
 /* The reader of a file with this ending; NULL when there is none: then `known` lists all endings. */

@@ -64,6 +64,8 @@ PetscErrorCode SbImportRead_Mesh(const char *path,
                                  SbImport *body); /* .mesh: Medit, or the neutral format of Netgen */
 PetscErrorCode SbImportRead_VTK(const char *path, SbImport *body);
 PetscErrorCode SbImportRead_VTU(const char *path, SbImport *body);
+PetscErrorCode SbImportRead_Abaqus(const char *path, SbImport *body);
+PetscErrorCode SbImportRead_UNV(const char *path, SbImport *body);
 PetscErrorCode SbImportRead_Box(const char *text, SbImport *body);
 
 /* Chooses the reader by the name of the mesh, reads, places. Not collective. */
@@ -81,6 +83,22 @@ PetscErrorCode SbImportTagsAlone(SbImport *import, PetscInt dim, int64_t tag, co
                                  PetscInt *tags);
 /* The tag set that holds exactly these groups (any order, repeats allowed, reordered here), made when new. */
 PetscErrorCode SbImportTagSet(SbImport *import, PetscInt n, PetscInt groups[], PetscInt *tags);
+
+/* ------------------------------------------------------------------ members.c: sets that are listed apart from their items */
+
+/* Item `item` of dimension dim belongs to a group. */
+typedef struct {
+  PetscInt dim, item, group;
+} SbMember;
+typedef struct {
+  PetscInt n, capacity;
+  SbMember *row; /* [n] */
+} SbMembers;
+
+PetscErrorCode SbMembersAdd(SbMembers *members, PetscInt dim, PetscInt item, PetscInt group);
+/* Gives every item the groups listed for it, beside those that it has; frees the list. */
+PetscErrorCode SbMembersApply(SbMembers *members, SbImport *im);
+PetscErrorCode SbMembersDestroy(SbMembers *members);
 
 /* ------------------------------------------------------------------ numbers.c: from numbers of a file to places in memory */
 
