@@ -24,15 +24,16 @@
 
 #define PANEL 32      /* nodes across a panel */
 #define ROWS 64       /* unknowns in a block of rows */
-#define WIDTH 16      /* floats side by side */
+#define WIDTH 16      /* words side by side */
 #define PAIR 32       /* entries in so many words */
+#define LANES 8       /* floats in a vector of AVX2; wider ones are spilled where a processor has none */
 #define HALF 65536    /* a word over its upper entry */
 #define AHEAD 512     /* words to fetch ahead */
 #define LARGEST 32767 /* largest magnitude of a stored entry */
 #define HUGE_PAGE ((size_t)1 << 21)
 
-typedef float Lanes __attribute__((vector_size(4 * WIDTH)));
-typedef int IntLanes __attribute__((vector_size(4 * WIDTH)));
+typedef float Lanes __attribute__((vector_size(4 * LANES)));
+typedef int IntLanes __attribute__((vector_size(4 * LANES)));
 
 typedef struct {
   PetscInt first, ncol; /* first place, nodes across */
@@ -359,24 +360,23 @@ PetscErrorCode SbFactorNumeric(SbFactor f, const PetscInt ia[], const PetscInt j
 
 /* ------------------------------------------------------------------ solves */
 
-/* The two entries of sixteen words, times HALF. */
+/* The two entries of eight words, times HALF. */
 #define UPPER(w) __builtin_convertvector(w, Lanes)
 #define LOWER(w) __builtin_convertvector((w) << 16, Lanes)
 
-SB_INLINE float sum_lanes(const Lanes *lanes)
+SB_INLINE float sum_lanes(const Lanes lanes[2])
 {
-  Lanes v = *lanes;
+  Lanes v = lanes[0] + lanes[1];
 
-  v += __builtin_shufflevector(v, v, 8, 9, 10, 11, 12, 13, 14, 15, 0, 1, 2, 3, 4, 5, 6, 7);
-  v += __builtin_shufflevector(v, v, 4, 5, 6, 7, 0, 1, 2, 3, 12, 13, 14, 15, 8, 9, 10, 11);
-  v += __builtin_shufflevector(v, v, 2, 3, 0, 1, 6, 7, 4, 5, 10, 11, 8, 9, 14, 15, 12, 13);
+  v += __builtin_shufflevector(v, v, 4, 5, 6, 7, 0, 1, 2, 3);
+  v += __builtin_shufflevector(v, v, 2, 3, 0, 1, 6, 7, 4, 5);
   return v[0] + v[1];
 }
 
 /* y = A x for a block of m * PAIR rows, [column][row]. m is a constant where this is inlined. */
 SB_INLINE const int32_t *multiply(int m, PetscInt ncol, const int32_t *a, const float x[], float y[])
 {
-  Lanes sum[4] = {{0}, {0}, {0}, {0}};
+  Lanes sum[8] = {{0}};
 
   for (PetscInt j = 0; j < ncol; j++, a += m * WIDTH) {
     const Lanes xj = x[j] - (Lanes){0};
@@ -384,30 +384,34 @@ SB_INLINE const int32_t *multiply(int m, PetscInt ncol, const int32_t *a, const 
     __builtin_prefetch(a + AHEAD);
     __builtin_prefetch(a + AHEAD + WIDTH);
     for (int i = 0; i < m; i++) {
-      const IntLanes w = *(const IntLanes *)(a + i * WIDTH);
+      for (int h = 0; h < 2; h++) {
+        const IntLanes w = *(const IntLanes *)(a + i * WIDTH + h * LANES);
 
-      sum[2 * i] += UPPER(w) * xj;
-      sum[2 * i + 1] += LOWER(w) * xj;
+        sum[4 * i + h] += UPPER(w) * xj;
+        sum[4 * i + 2 + h] += LOWER(w) * xj;
+      }
     }
   }
-  for (int i = 0; i < 2 * m; i++) ((Lanes *)y)[i] = sum[i];
+  for (int i = 0; i < 4 * m; i++) ((Lanes *)y)[i] = sum[i];
   return a;
 }
 
-/* sum[j] += A^T x for the same block. */
+/* sum[j][2] += A^T x for the same block. */
 SB_INLINE const int32_t *multiply_transposed(int m, PetscInt ncol, const int32_t *a, const float x[],
-                                             Lanes sum[])
+                                             Lanes (*sum)[2])
 {
-  Lanes v[4];
+  Lanes v[8];
 
-  for (int i = 0; i < 2 * m; i++) v[i] = ((const Lanes *)x)[i];
+  for (int i = 0; i < 4 * m; i++) v[i] = ((const Lanes *)x)[i];
   for (PetscInt j = 0; j < ncol; j++, a += m * WIDTH) {
     __builtin_prefetch(a + AHEAD);
     __builtin_prefetch(a + AHEAD + WIDTH);
     for (int i = 0; i < m; i++) {
-      const IntLanes w = *(const IntLanes *)(a + i * WIDTH);
+      for (int h = 0; h < 2; h++) {
+        const IntLanes w = *(const IntLanes *)(a + i * WIDTH + h * LANES);
 
-      sum[j] += UPPER(w) * v[2 * i] + LOWER(w) * v[2 * i + 1];
+        sum[j][h] += UPPER(w) * v[4 * i + h] + LOWER(w) * v[4 * i + 2 + h];
+      }
     }
   }
   return a;
@@ -429,13 +433,13 @@ SB_INLINE const int32_t *panel_multiply(size_t height, PetscInt ncol, const int3
 SB_INLINE void panel_transposed(size_t height, PetscInt ncol, const int32_t *a, const float x[],
                                 const float s[], float y[])
 {
-  Lanes sum[3 * PANEL];
+  Lanes sum[3 * PANEL][2];
   size_t i = 0;
 
-  for (PetscInt j = 0; j < ncol; j++) sum[j] = (Lanes){0};
+  for (PetscInt j = 0; j < ncol; j++) sum[j][0] = sum[j][1] = (Lanes){0};
   for (; i + ROWS <= height; i += ROWS) a = multiply_transposed(2, ncol, a, x + i, sum);
   if (i < height) multiply_transposed(1, ncol, a, x + i, sum);
-  for (PetscInt j = 0; j < ncol; j++) y[j] = s[2 * j] * sum_lanes(&sum[j]);
+  for (PetscInt j = 0; j < ncol; j++) y[j] = s[2 * j] * sum_lanes(sum[j]);
 }
 
 /* The diagonal block in the layout of the rows below it. */
