@@ -52,6 +52,12 @@ typedef struct {
   const PetscReal *value; /* borrowed */
 } SbColumn;
 
+/* A number that a checkpoint carries over a restart; the same on all ranks. Names begin with who asks for it. */
+typedef struct {
+  char name[SB_NAME_MAX];
+  PetscReal *value; /* borrowed */
+} SbCarried;
+
 typedef PetscErrorCode (*SbMonitorFn)(SbRun run, const SbStep *step, void *ctx);
 
 /* One simulation: model, solver, integrator, monitors. */
@@ -95,6 +101,8 @@ struct _p_SbRun {
   } look;
   PetscInt ncolumn;
   const SbColumn *column; /* [ncolumn] of history.csv; borrowed */
+  PetscInt ncarried;
+  const SbCarried *carried; /* [ncarried] in checkpoints; borrowed */
   /* values[ncell_owned] = energy of the error of space discretisation per rest volume, J/m^3; NULL: nobody estimates it. Collective. */
   PetscErrorCode (*cell_error)(SbRun run, const SbStep *step, PetscReal values[]);
   PetscBool want_energies, want_residual;

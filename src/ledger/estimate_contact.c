@@ -9,7 +9,6 @@
 #include "sbkernel.h"
 
 #define CLOSELY 1e-3 /* delta is nearly the gap, and what strains is the difference */
-#define PROBE 1e-6   /* of the bodies' size */
 
 /* Half the force times gap of all places, J. */
 static PetscErrorCode open_work(SbLedger l, const SbStep *step, PetscReal *work)
@@ -51,32 +50,21 @@ static PetscErrorCode elastic_work(SbLedger l, Vec U, PetscReal length, Vec D, P
 static PetscErrorCode spring_energy(SbLedger l, const SbStep *step, PetscReal *energy)
 {
   const SbModel m = l->run->model;
-  PetscReal rtol, atol, dtol, size, volume = 0., length, work[2];
-  PetscInt max_it;
+  PetscReal length, work[2];
   Vec F, D;
-  KSP ksp;
 
   PetscFunctionBeginUser;
-  *energy = PETSC_MAX_REAL;
+  *energy = 0.;
   PetscCall(VecDuplicate(step->U, &F));
   PetscCall(VecDuplicate(step->U, &D));
   PetscCall(SbModelContactForce(m, step->t, step->U, step->R, F));
-  PetscCall(SNESGetKSP(l->run->snes, &ksp));
-  PetscCall(KSPGetTolerances(ksp, &rtol, &atol, &dtol, &max_it));
-  PetscCall(KSPSetTolerances(ksp, CLOSELY, 0., dtol, max_it));
-  l->solving -= MPI_Wtime();
-  PetscCall(KSPSolve(ksp, F, D));
-  l->solving += MPI_Wtime();
-  PetscCall(KSPSetTolerances(ksp, rtol, atol, dtol, max_it));
-  PetscCall(VecNorm(D, NORM_INFINITY, &size));
-  for (PetscInt b = 0; b < m->nbody; b++) volume = PetscMax(volume, m->body[b].volume);
-  if (size > 0.) {
-    length = PROBE * PetscPowReal(volume, 1. / 3.) / size;
+  PetscCall(SbProbeSolve(l, CLOSELY, F, D, NULL));
+  PetscCall(SbProbeLength(l, D, &length));
+  if (length > 0.) {
     for (int side = 0; side < 2; side++)
       PetscCall(elastic_work(l, step->U, side ? length : -length, D, &work[side]));
     *energy = 0.5 * PetscAbsReal(work[1] - work[0]) / (2. * length);
-  } else
-    *energy = 0.;
+  }
   PetscCall(VecDestroy(&F));
   PetscCall(VecDestroy(&D));
   PetscFunctionReturn(PETSC_SUCCESS);

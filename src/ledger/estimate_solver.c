@@ -38,9 +38,9 @@ static PetscErrorCode damp(SbLedger l, PetscReal energy)
 PetscErrorCode SbEstimateSolver(SbLedger l, const SbSolved *step)
 {
   const SNES snes = l->run->snes;
-  PetscReal rtol, atol, dtol, before, energy;
-  PetscInt max_it, its;
-  PetscBool single, warm;
+  PetscReal before, energy;
+  PetscInt its;
+  PetscBool single;
   Vec F = l->w[0];
   KSP ksp;
 
@@ -51,18 +51,9 @@ PetscErrorCode SbEstimateSolver(SbLedger l, const SbSolved *step)
   l->residuals -= MPI_Wtime();
   PetscCall(SNESComputeFunction(snes, step->U, F));
   l->residuals += MPI_Wtime();
-  PetscCall(KSPGetTolerances(ksp, &rtol, &atol, &dtol, &max_it));
-  PetscCall(KSPGetInitialGuessNonzero(ksp, &warm));
-  PetscCall(KSPSetInitialGuessNonzero(ksp, PETSC_FALSE));
-  PetscCall(KSPSetTolerances(ksp, ROUGHLY, 0., dtol, max_it));
   PetscCall(KSPSetResidualHistory(ksp, l->first, 1, PETSC_TRUE));
   l->first[0] = 0.;
-  l->solving -= MPI_Wtime();
-  PetscCall(KSPSolve(ksp, F, l->delta));
-  l->solving += MPI_Wtime();
-  PetscCall(KSPGetIterationNumber(ksp, &its));
-  PetscCall(KSPSetTolerances(ksp, rtol, atol, dtol, max_it));
-  PetscCall(KSPSetInitialGuessNonzero(ksp, warm));
+  PetscCall(SbProbeSolve(l, ROUGHLY, F, l->delta, &its));
   PetscCall(VecDot(l->delta, F, &energy));
   share(l, before, 0.5 * PetscAbsReal(energy), single);
   if (step->V) PetscCall(damp(l, PetscAbsReal(energy)));

@@ -14,8 +14,6 @@
 #include "ledger_impl.h"
 #include "sbsolver.h"
 
-#define PROBE 1e-6 /* of the bodies' size: how far displacements are moved along a direction */
-
 PetscErrorCode SbMassForm(SbLedger l, Vec D, PetscReal *form)
 {
   const SbSpace s = l->run->model->space;
@@ -64,19 +62,17 @@ static PetscErrorCode form_by_matrix(SbLedger l, Vec D, PetscReal *form)
 PetscErrorCode SbStiffnessForm(SbLedger l, PetscReal t, Vec U, Vec D, PetscReal *form)
 {
   const SbModel m = l->run->model;
-  PetscReal size, volume = 0., length, at[2];
+  PetscReal length, at[2];
   Vec moved = l->w[1], R = l->w[2];
 
   PetscFunctionBeginUser;
   *form = 0.;
-  PetscCall(VecNorm(D, NORM_INFINITY, &size));
-  if (!(size > 0.)) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(SbProbeLength(l, D, &length));
+  if (!(length > 0.)) PetscFunctionReturn(PETSC_SUCCESS);
   if (matrix_tells(l->run)) {
     PetscCall(form_by_matrix(l, D, form));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
-  for (PetscInt b = 0; b < m->nbody; b++) volume = PetscMax(volume, m->body[b].volume);
-  length = PROBE * PetscPowReal(volume, 1. / 3.) / size;
   l->residuals -= MPI_Wtime();
   for (int side = 0; side < 2; side++) {
     PetscCall(VecWAXPY(moved, side ? length : -length, D, U));

@@ -225,12 +225,9 @@ static PetscErrorCode monitor(SbRun run, const SbStep *step, void *ctx)
 static PetscErrorCode cell_error(SbRun run, const SbStep *step, PetscReal values[])
 {
   const SbSpace space = run->model->space;
-  SbLedger l = NULL;
+  SbLedger l = (SbLedger)run->look.ctx;
 
   PetscFunctionBeginUser;
-  for (PetscInt k = 0; k < run->nmonitor; k++) {
-    if (run->monitor[k].fn == monitor) l = (SbLedger)run->monitor[k].ctx;
-  }
   PetscCall(begin(l));
   PetscCall(SbSpaceEstimateCompute(l->space, step->t, step->U, step->V, step->A));
   for (PetscInt b = 0; b < space->nbatch; b++) {
@@ -264,6 +261,47 @@ static PetscErrorCode name_columns(SbLedger l)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* What the errors add up from goes on over a restart. */
+static PetscErrorCode carry(SbLedger l)
+{
+  const struct {
+    const char *name;
+    PetscReal *value;
+    int n;
+  } all[] = {{"error", l->error, SB_ERROR_COUNT},
+             {"derivative", l->derivative, 4},
+             {"mean", l->mean, 4},
+             {"lost", &l->lost, 1},
+             {"tau", &l->tau, 1},
+             {"span", &l->span, 1},
+             {"stored", &l->stored, 1},
+             {"step_time", &l->step_time, 1},
+             {"step_linear", &l->step_linear, 1},
+             {"step_nonlinear", &l->step_nonlinear, 1},
+             {"offset", &l->offset, 1},
+             {"residual", &l->residual, 1},
+             {"seen_residual", &l->seen_residual, 1},
+             {"kept_part", &l->kept_part, 1},
+             {"work", &l->work, 1},
+             {"own_work", &l->own_work, 1},
+             {"least", &l->quantity.least, 1},
+             {"most", &l->quantity.most, 1}};
+  PetscInt n = 0;
+
+  PetscFunctionBeginUser;
+  for (size_t k = 0; k < PETSC_STATIC_ARRAY_LENGTH(all); k++) {
+    for (int i = 0; i < all[k].n; i++, n++) {
+      PetscCheck(n < SB_LEDGER_CARRIED, PETSC_COMM_SELF, PETSC_ERR_PLIB, "More than %d numbers",
+                 SB_LEDGER_CARRIED);
+      PetscCall(PetscSNPrintf(l->carried[n].name, SB_NAME_MAX, "ledger_%s_%d", all[k].name, i));
+      l->carried[n].value = all[k].value + i;
+    }
+  }
+  l->run->carried = l->carried;
+  l->run->ncarried = n;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode SbLedgerAttach(SbLedger l)
 {
   SbRun run;
@@ -279,6 +317,7 @@ PetscErrorCode SbLedgerAttach(SbLedger l)
   if (run->model->dynamic) PetscCall(SbRunMethodError(run, &l->order, &l->c, &l->ahead));
   PetscCall(SbQuantityAttach(l));
   PetscCall(name_columns(l));
+  PetscCall(carry(l));
   PetscCall(end(l));
   run->want_energies = PETSC_TRUE;
   if (run->model->ntouch || l->quantity.kind == SB_QUANTITY_REACTION) run->want_residual = PETSC_TRUE;

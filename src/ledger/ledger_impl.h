@@ -23,6 +23,8 @@ typedef struct {
   PetscReal error[SB_ERROR_COUNT];
 } SbQuantity;
 
+#define SB_LEDGER_CARRIED 40 /* at least as many as carry() names */
+
 struct _p_SbLedger {
   SbRun run; /* borrowed */
   PetscLogEvent event;
@@ -42,6 +44,7 @@ struct _p_SbLedger {
   PetscReal error[SB_ERROR_COUNT];        /* J^(1/2) */
   PetscReal relative[SB_ERROR_COUNT + 1]; /* as columns of the history; the last one: of the quantity */
   SbColumn column[SB_ERROR_COUNT + 1];
+  SbCarried carried[SB_LEDGER_CARRIED];
   /* of the last step that was looked at, J^(1/2) */
   PetscReal step_time, step_linear, step_nonlinear, offset;
   PetscReal residual,
@@ -66,6 +69,11 @@ struct _p_SbLedger {
   PetscInt nstep, nkept;          /* of -time_budget: steps, and those that took no longer */
   PetscReal wall, longest, total; /* at the last step; s */
 };
+
+/* probe.c: factor on D that moves the bodies by a millionth of their size at most, 0 when D is zero. Collective. */
+PetscErrorCode SbProbeLength(SbLedger l, Vec D, PetscReal *length);
+/* X = J^-1 B with the solver and tangent of the last solve, to the relative residual rtol, from zero; its may be NULL. Collective. */
+PetscErrorCode SbProbeSolve(SbLedger l, PetscReal rtol, Vec B, Vec X, PetscInt *its);
 
 /* estimate_time.c: what the step loses, into step_time and offset; all: what bounds the sum of steps, too. Collective. */
 PetscErrorCode SbEstimateTime(SbLedger l, const SbSolved *step, PetscBool all);

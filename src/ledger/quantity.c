@@ -9,7 +9,6 @@
 #include "ledger_impl.h"
 #include "sbkernel.h"
 
-#define PROBE 1e-6   /* of the bodies' size */
 #define ADJOINT 1e-2 /* how well z is solved for */
 #define MIX 1e-3     /* share of z that is added to u, in the norm of the energy */
 
@@ -119,15 +118,13 @@ PetscErrorCode SbQuantityValue(SbLedger l, const SbStep *step)
 static PetscErrorCode stiffness_times(SbLedger l, PetscReal t, Vec U, Vec D, Vec R)
 {
   const SbModel m = l->run->model;
-  PetscReal size, volume = 0., length;
+  PetscReal length;
   Vec moved = l->w[1], other = l->w[2];
 
   PetscFunctionBeginUser;
   PetscCall(VecZeroEntries(R));
-  PetscCall(VecNorm(D, NORM_INFINITY, &size));
-  if (!(size > 0.)) PetscFunctionReturn(PETSC_SUCCESS);
-  for (PetscInt b = 0; b < m->nbody; b++) volume = PetscMax(volume, m->body[b].volume);
-  length = PROBE * PetscPowReal(volume, 1. / 3.) / size;
+  PetscCall(SbProbeLength(l, D, &length));
+  if (!(length > 0.)) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(VecWAXPY(moved, length, D, U));
   PetscCall(SbModelResidual(m, t, moved, NULL, NULL, PETSC_FALSE, R));
   PetscCall(VecWAXPY(moved, -length, D, U));
@@ -154,23 +151,6 @@ static PetscErrorCode gradient(SbLedger l, const SbStep *step, Vec B)
     if (s->fixed[i / 3] & (1 << i % 3)) b[i] = 0.;
   }
   PetscCall(VecRestoreArray(B, &b));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode adjoint(SbLedger l, Vec B, Vec Z)
-{
-  PetscReal rtol, atol, dtol;
-  PetscInt max_it;
-  KSP ksp;
-
-  PetscFunctionBeginUser;
-  PetscCall(SNESGetKSP(l->run->snes, &ksp));
-  PetscCall(KSPGetTolerances(ksp, &rtol, &atol, &dtol, &max_it));
-  PetscCall(KSPSetTolerances(ksp, ADJOINT, 0., dtol, max_it));
-  l->solving -= MPI_Wtime();
-  PetscCall(KSPSolve(ksp, B, Z));
-  l->solving += MPI_Wtime();
-  PetscCall(KSPSetTolerances(ksp, rtol, atol, dtol, max_it));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -208,7 +188,7 @@ static PetscErrorCode by_duality(SbLedger l, const SbStep *step)
   left = PetscAbsReal(left) / PetscSqrtReal(PetscMax(both, PETSC_MIN_REAL));
   q->error[SB_ERROR_LINEAR] = left * l->step_linear;
   q->error[SB_ERROR_NONLINEAR] = left * l->step_nonlinear;
-  PetscCall(adjoint(l, B, Z));
+  PetscCall(SbProbeSolve(l, ADJOINT, B, Z, NULL));
   PetscCall(VecDot(B, Z, &energy));
   /* of a reaction: what a motion of the support does to the body, which moves as a whole where nothing else holds it */
   if (q->kind == SB_QUANTITY_REACTION) PetscCall(VecAYPX(Z, -1., q->weight));

@@ -115,6 +115,33 @@ static void totals_of(SbRun run, Total total[NTOTAL])
   total[5] = (Total){"load_factor", &run->model->load};
 }
 
+static PetscErrorCode write_carried(SbRun run, SbH5 *h)
+{
+  PetscFunctionBeginUser;
+  for (PetscInt i = 0; i < run->ncarried; i++)
+    PetscCall(SbH5PutReal(h, h->file, run->carried[i].name, *run->carried[i].value));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* All or none: a checkpoint of a run that did not ask for them has none. */
+static PetscErrorCode read_carried(SbRun run, SbOutput out, SbH5 *h)
+{
+  PetscBool there = PETSC_TRUE;
+  PetscReal *values;
+
+  PetscFunctionBeginUser;
+  if (!run->ncarried) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscMalloc1(run->ncarried, &values));
+  for (PetscInt i = 0; i < run->ncarried && there; i++)
+    PetscCall(SbH5GetReal(h->file, run->carried[i].name, &values[i], &there));
+  for (PetscInt i = 0; i < run->ncarried && there; i++) *run->carried[i].value = values[i];
+  PetscCall(PetscFree(values));
+  if (!there)
+    PetscCall(SbWarning(
+      out->comm, "%s has no errors, as it was written without -ledger: they count from there", h->path));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 static PetscErrorCode checksum_of(const SbOrder *order, uint64_t salt, const PetscReal slice[], uint64_t *sum)
 {
   uint64_t mine = 0;
@@ -163,6 +190,7 @@ static PetscErrorCode write_numbers(SbRun run, SbOutput out, const SbStep *step,
   if (run->ts) PetscCall(TSGetTimeStep(run->ts, &dt));
   totals_of(run, total);
   for (int i = 0; i < NTOTAL; i++) PetscCall(SbH5PutReal(h, h->file, total[i].name, *total[i].value));
+  PetscCall(write_carried(run, h));
   PetscCall(SbH5PutReal(h, h->file, "time", step->t));
   PetscCall(SbH5PutReal(h, h->file, "dt_next", dt));
   PetscCall(SbH5PutReal(h, h->file, "dt", run->dt));
@@ -426,6 +454,7 @@ static PetscErrorCode load(SbRun run, SbOutput out, const char *path, PetscBool 
   if (*ok) PetscCall(SbCheckpointReadEffects(run, &h, records, &sum, ok));
   if (sum != (uint64_t)checksum) *ok = PETSC_FALSE;
   if (*ok) PetscCall(set_step(run, h.file, ok));
+  if (*ok) PetscCall(read_carried(run, out, &h));
   PetscCall(SbH5Close(&h));
   if (*ok) PetscCall(SbCheckpointLoadEffects(run, t, records));
   PetscCall(SbCheckpointFreeEffects(run, records));

@@ -49,17 +49,28 @@ static PetscErrorCode attempt(SbRun run, PetscReal factor, PetscReal length, Vec
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Whether some displacement of some rank is prescribed. */
+static PetscErrorCode anything_held(SbRun run, PetscBool *held)
+{
+  PetscInt n = run->model->space->nfixed;
+
+  PetscFunctionBeginUser;
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &n, 1, MPIU_INT, MPI_SUM, run->model->comm));
+  *held = (PetscBool)(n > 0);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Looks for a body that nothing holds; *found, and the run's reason to stop says so. */
 static PetscErrorCode look_for_free_body(SbRun run, PetscReal factor, PetscBool *found)
 {
   PetscInt body;
   char motion[128];
-  PetscInt held = run->model->space->nfixed;
+  PetscBool held;
 
   PetscFunctionBeginUser;
   PetscCall(SbRunFreeBody(run, &body, sizeof(motion), motion));
   *found = (PetscBool)(body >= 0);
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &held, 1, MPIU_INT, MPI_SUM, run->model->comm));
+  PetscCall(anything_held(run, &held));
   /* beside supports it may be the tangent of a solve that went astray, and a shorter step may do */
   run->free_body = (PetscBool)(*found && !run->model->ntouch && !held);
   if (*found)
@@ -91,13 +102,12 @@ static PetscErrorCode explain(SbRun run, PetscReal factor, SNESConvergedReason r
 /* Loads in balance leave a singular system with a solution, and a solver may find it with any rigid motion on top. */
 static PetscErrorCode refuse_free_body(SbRun run, PetscReal factor, PetscBool *ok)
 {
-  PetscInt held = run->model->space->nfixed;
-  PetscBool found;
+  PetscBool held, found;
 
   PetscFunctionBeginUser;
   if (!*ok || run->steps_total || run->model->ntouch || !run->newton_step) PetscFunctionReturn(PETSC_SUCCESS);
   /* beside supports the look is not sure enough to refuse what was solved: near nu = 1/2 they are soft against the cells */
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &held, 1, MPIU_INT, MPI_SUM, run->model->comm));
+  PetscCall(anything_held(run, &held));
   if (held) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(look_for_free_body(run, factor, &found));
   if (found) *ok = PETSC_FALSE;

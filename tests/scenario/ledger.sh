@@ -58,6 +58,23 @@ check "a reaction that statics tell has an error" awk -v e="$(column react/ledge
 check "the field space_error: exit code $?" test $? = 0
 check "no field" grep -q space_error field/fields.xmf
 
+# errors go on over a restart, on any number of ranks
+swing="-ledger yes -time newmark -ts_max_time 0.2 -ledger_quantity volume"
+# shellcheck disable=SC2086
+"$supple" swing.opts $swing -checkpoint_every_steps 10 -output_dir whole >whole.txt 2>&1
+for n in 1 2; do
+  # shellcheck disable=SC2086
+  "${mpi[@]}" $n "$supple" swing.opts $swing -restart whole/checkpoint_000010.h5 -output_dir "half$n" >"half$n.txt" 2>&1
+  check "restart on $n ranks: exit code $?" test $? = 0
+  for source in space time; do
+    check "$source after a restart on $n ranks: $(column half$n/ledger.csv $source 4), whole $(column whole/ledger.csv $source 4)" \
+      near "$(column half$n/ledger.csv $source 4)" "$(column whole/ledger.csv $source 4)" 0.1
+  done
+done
+"$supple" swing.opts -time newmark -checkpoint_every_steps 10 -quiet -output_dir none
+"$supple" swing.opts -time newmark -ts_max_time 0.2 -ledger yes -restart none/checkpoint_000010.h5 -output_dir late >late.txt 2>&1
+check "a checkpoint without errors goes unsaid" grep -q 'was written without -ledger: they count from there' late.txt
+
 # the dials
 "$supple" swing.opts -accuracy 0.5 -output_dir coarse >coarse.txt 2>&1
 check "-accuracy 0.5 says nothing" grep -q -- '-accuracy 0.5 was' coarse.txt

@@ -1,0 +1,41 @@
+/*
+  What the estimates ask of the run: how far to move along a direction so that differences of forces are the tangent's, and
+  solves with the tangent of the last step.
+*/
+#include "ledger_impl.h"
+
+#define PROBE 1e-6 /* of the bodies' size: far enough for digits, near enough to be linear */
+
+PetscErrorCode SbProbeLength(SbLedger l, Vec D, PetscReal *length)
+{
+  const SbModel m = l->run->model;
+  PetscReal size, volume = 0.;
+
+  PetscFunctionBeginUser;
+  PetscCall(VecNorm(D, NORM_INFINITY, &size));
+  for (PetscInt b = 0; b < m->nbody; b++) volume = PetscMax(volume, m->body[b].volume);
+  *length = size > 0. ? PROBE * PetscPowReal(volume, 1. / 3.) / size : 0.;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbProbeSolve(SbLedger l, PetscReal rtol, Vec B, Vec X, PetscInt *its)
+{
+  PetscReal own_rtol, atol, dtol;
+  PetscInt max_it;
+  PetscBool warm;
+  KSP ksp;
+
+  PetscFunctionBeginUser;
+  PetscCall(SNESGetKSP(l->run->snes, &ksp));
+  PetscCall(KSPGetTolerances(ksp, &own_rtol, &atol, &dtol, &max_it));
+  PetscCall(KSPGetInitialGuessNonzero(ksp, &warm));
+  PetscCall(KSPSetInitialGuessNonzero(ksp, PETSC_FALSE));
+  PetscCall(KSPSetTolerances(ksp, rtol, 0., dtol, max_it));
+  l->solving -= MPI_Wtime();
+  PetscCall(KSPSolve(ksp, B, X));
+  l->solving += MPI_Wtime();
+  if (its) PetscCall(KSPGetIterationNumber(ksp, its));
+  PetscCall(KSPSetTolerances(ksp, own_rtol, atol, dtol, max_it));
+  PetscCall(KSPSetInitialGuessNonzero(ksp, warm));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
