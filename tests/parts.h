@@ -287,25 +287,3 @@ static inline void part_unwatch(void)
 {
   PetscTrMalloc = part_malloc;
 }
-
-/* ------------------------------------------------------------------ running */
-
-/* Scene and run as the program makes them, output and all, ready for SbRunSolve(). Collective. */
-static inline PetscErrorCode part_open(const char *options, const char *dir, TestScene *scene)
-{
-  PetscFunctionBeginUser;
-  PetscCall(PetscOptionsClear(NULL));
-  PetscCall(SbOptionsReset());
-  PetscCall(SbRegisterAll());
-  PetscCall(PetscOptionsInsertString(NULL, options));
-  PetscCall(PetscOptionsSetValue(NULL, "-output_dir", dir));
-  PetscCall(SbSceneCreate(PETSC_COMM_WORLD, &scene->model));
-  PetscCall(test_scene_run(scene));
-  PetscCall(SbOutputSetFromOptions(scene->run));
-  PetscCall(SbOptionsCheck());
-  PetscCall(SbModelSetUp(scene->model));
-  PetscCall(SbRunSetUp(scene->run));
-  PetscCall(SbLedgerAttach(scene->ledger));
-  PetscCall(SbOutputAttach(scene->run));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}

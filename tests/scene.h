@@ -20,8 +20,8 @@ static inline PetscErrorCode test_scene_run(TestScene *scene)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Everything of the program but output: model and run are set up and ready for SbRunSolve(). */
-static inline PetscErrorCode test_scene_open(const char *options, TestScene *scene)
+/* Model and run as the program makes them, ready for SbRunSolve(); with output to the folder `dir` unless it is NULL. */
+static inline PetscErrorCode test_scene_open_in(const char *dir, const char *options, TestScene *scene)
 {
   PetscFunctionBeginUser;
   *scene = (TestScene){NULL, NULL, NULL}; /* what a call that fails leaves can be closed */
@@ -29,14 +29,24 @@ static inline PetscErrorCode test_scene_open(const char *options, TestScene *sce
   PetscCall(SbOptionsReset());
   PetscCall(SbRegisterAll());
   PetscCall(PetscOptionsInsertString(NULL, options));
+  if (dir) PetscCall(PetscOptionsSetValue(NULL, "-output_dir", dir));
   PetscCall(SbSceneCreate(PETSC_COMM_WORLD, &scene->model));
   PetscCall(test_scene_run(scene));
+  if (dir) PetscCall(SbOutputSetFromOptions(scene->run));
   PetscCall(SbOptionsCheck());
   PetscCall(SbModelSetUp(scene->model));
   PetscCall(SbRunSetUp(scene->run));
   PetscCall(SbLedgerAttach(scene->ledger));
+  if (dir) PetscCall(SbOutputAttach(scene->run));
   PetscCall(SbMeshValidate(scene->model->mesh));
   PetscCall(SbSpaceValidate(scene->model->space));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static inline PetscErrorCode test_scene_open(const char *options, TestScene *scene)
+{
+  PetscFunctionBeginUser;
+  PetscCall(test_scene_open_in(NULL, options, scene));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -29,22 +29,59 @@
   "-body_a_element " element " -body_b_element " element " " FLESH("a", "1e5", "1000")                    \
     FLESH("b", "1e5", "1000") "-effects damping,meet -effect_damping_beta 0.01 " MEET                     \
                               "-effect_meet_recovery 30 -ts_dt 0.004 -ts_max_time 0.6 -snes_rtol 1e-9"
-#define SQUEEZE(element, mesh)                                                                          \
-  "-bodies a -body_a_mesh box:0.1,0.1,0.1:" mesh " -body_a_element " element " " FLESH(                 \
-    "a", "1e4", "1000") "-effects top,floor -effect_top_type contact -effect_top_obstacle "             \
-                        "plane:0,0,-1,-0.1 -effect_top_displacement 0;0;-0.08*min(t,max(0,2-t)) " FLOOR \
-                        "-ts_dt 0.02 -ts_max_time 4"
+#define SQUEEZED(element, mesh)                                                                           \
+  {                                                                                                       \
+    .name = "squeeze." element, .seconds = 600,                                                           \
+    .what = "squeezed to 20 % between plates and let go, " element,                                       \
+    .options = "-bodies a -body_a_mesh box:0.1,0.1,0.1:" mesh " -body_a_element " element " " FLESH(      \
+      "a", "1e4", "1000") "-effects top,floor -effect_top_type contact -effect_top_obstacle "             \
+                          "plane:0,0,-1,-0.1 -effect_top_displacement 0;0;-0.08*min(t,max(0,2-t)) " FLOOR \
+                          "-ts_dt 0.02 -ts_max_time 4",                                                   \
+    .jitter = 1e-5, .limits = {                                                                           \
+      {HARD_EXCESS, '<', 1e-6},                                                                           \
+      {HARD_MIN_J, '>', 0.9},                                                                             \
+      {HARD_SHAPE, '<', 1e-2},                                                                            \
+      {HARD_DEPTH, '<', 1e-6},                                                                            \
+      {HARD_NEWTON, '<', 500},                                                                            \
+      {HARD_REJECTED, '<', 50}                                                                            \
+    }                                                                                                     \
+  }
 /* A block of 1000 kg on one of 0.1 kg, which weighs a thousandth of its stiffness. */
 #define STACK                                                                                        \
   "-bodies a,b -body_a_mesh box:0.1,0.1,0.1:2 -body_b_mesh box:0.1,0.1,0.1:3 -body_b_translate "     \
   "0,0,0.1 " FLESH("a", "1e8", "100")                                                                \
     FLESH("b", "1e8", "1e6") "-effects gravity,floor,meet " FLOOR "-effect_floor_friction 0.3 " MEET \
                              "-effect_meet_friction 0.3 -ts_dt 0.01 -ts_max_time 0.5"
-#define SOFT_STIFF(response)                                                                                \
-  "-bodies a,b -body_a_mesh box:0.1,0.1,0.1:2 -body_b_mesh box:0.1,0.1,0.1:3 -body_b_translate "            \
-  "0,0,0.1 " FLESH("a", "1e4", "1000") FLESH("b", "1e10", "1000") "-effects gravity,floor,meet " FLOOR MEET \
-                                                                  "-effect_meet_response " response         \
-                                                                  " -ts_dt 0.01 -ts_max_time 0.5"
+#define IMPACT(name_, on, scene, element, quick_runs)                                                        \
+  {                                                                                                          \
+    .name = "impact." name_ "." element, .seconds = 600, .what = "a block hits " on " at 100 m/s, " element, \
+    .options = scene(element), .jitter = 1e-5, .jitter_speed = 0.1, .quick = quick_runs, .limits = {         \
+      {HARD_EXCESS, '<', 1e-6},                                                                              \
+      {HARD_MIN_J, '>', 0.5},                                                                                \
+      {HARD_VOLUME, '<', 0.05},                                                                              \
+      {HARD_DEPTH, '<', 0.01},                                                                               \
+      {HARD_NEWTON, '<', 100},                                                                               \
+      {HARD_REJECTED, '<', 5}                                                                                \
+    }                                                                                                        \
+  }
+#define STIFF(response, newton, linear, quick_runs)                                                   \
+  {                                                                                                   \
+    .name = "stiff." response, .seconds = 600,                                                        \
+    .what = "a million times stiffer body on a soft one, " response,                                  \
+    .options =                                                                                        \
+      "-bodies a,b -body_a_mesh box:0.1,0.1,0.1:2 -body_b_mesh box:0.1,0.1,0.1:3 -body_b_translate "  \
+      "0,0,0.1 " FLESH("a", "1e4", "1000")                                                            \
+        FLESH("b", "1e10", "1000") "-effects gravity,floor,meet " FLOOR MEET                          \
+                                   "-effect_meet_response " response " -ts_dt 0.01 -ts_max_time 0.5", \
+    .jitter = 1e-7, .quick = quick_runs, .limits = {                                                  \
+      {HARD_EXCESS, '<', 1e-6},                                                                       \
+      {HARD_MIN_J, '>', 0.5},                                                                         \
+      {HARD_DEPTH, '<', 1e-4},                                                                        \
+      {HARD_NEWTON, '<', newton},                                                                     \
+      {HARD_LINEAR, '<', linear},                                                                     \
+      {HARD_REJECTED, '<', 1}                                                                         \
+    }                                                                                                 \
+  }
 
 /* The largest energy of HALF as a part of that of bars pushed with the speed of the recovery, M v^2 = 2 kg (50 mm / 30 / 4 ms)^2. */
 static PetscErrorCode measure_push(HardRun *r, const SbStep *step)
@@ -57,56 +94,10 @@ static PetscErrorCode measure_push(HardRun *r, const SbStep *step)
 }
 
 const HardCase HardCasesContact[] = {
-  {.name = "impact.plate.p1",
-   .seconds = 600,
-   .what = "a block hits a thin plate at 100 m/s, P1",
-   .options = PLATE("p1"),
-   .jitter = 1e-5,
-   .jitter_speed = 0.1,
-   .quick = 1,
-   .limits = {{HARD_EXCESS, '<', 1e-6},
-              {HARD_MIN_J, '>', 0.5},
-              {HARD_VOLUME, '<', 0.05},
-              {HARD_DEPTH, '<', 0.01},
-              {HARD_NEWTON, '<', 100},
-              {HARD_REJECTED, '<', 5}}},
-  {.name = "impact.plate.cr",
-   .seconds = 600,
-   .what = "a block hits a thin plate at 100 m/s, CR",
-   .options = PLATE("cr"),
-   .jitter = 1e-5,
-   .jitter_speed = 0.1,
-   .limits = {{HARD_EXCESS, '<', 1e-6},
-              {HARD_MIN_J, '>', 0.5},
-              {HARD_VOLUME, '<', 0.05},
-              {HARD_DEPTH, '<', 0.01},
-              {HARD_NEWTON, '<', 100},
-              {HARD_REJECTED, '<', 5}}},
-  {.name = "impact.corner.p1",
-   .seconds = 600,
-   .what = "a block hits the floor with a corner at 100 m/s, P1",
-   .options = CORNER("p1"),
-   .jitter = 1e-5,
-   .jitter_speed = 0.1,
-   .quick = 1,
-   .limits = {{HARD_EXCESS, '<', 1e-6},
-              {HARD_MIN_J, '>', 0.5},
-              {HARD_VOLUME, '<', 0.05},
-              {HARD_DEPTH, '<', 0.01},
-              {HARD_NEWTON, '<', 100},
-              {HARD_REJECTED, '<', 5}}},
-  {.name = "impact.corner.dg",
-   .seconds = 600,
-   .what = "a block hits the floor with a corner at 100 m/s, DG",
-   .options = CORNER("dg"),
-   .jitter = 1e-5,
-   .jitter_speed = 0.1,
-   .limits = {{HARD_EXCESS, '<', 1e-6},
-              {HARD_MIN_J, '>', 0.5},
-              {HARD_VOLUME, '<', 0.05},
-              {HARD_DEPTH, '<', 0.01},
-              {HARD_NEWTON, '<', 100},
-              {HARD_REJECTED, '<', 5}}},
+  IMPACT("plate", "a thin plate", PLATE, "p1", 1),
+  IMPACT("plate", "a thin plate", PLATE, "cr", 0),
+  IMPACT("corner", "the floor with a corner", CORNER, "p1", 1),
+  IMPACT("corner", "the floor with a corner", CORNER, "dg", 0),
   {.name = "overlap.p1",
    .seconds = 600,
    .what = "two blocks begin half in each other, their sides in one plane, P1",
@@ -174,39 +165,9 @@ const HardCase HardCasesContact[] = {
               {HARD_SPEED, '<', 1},
               {HARD_NEWTON, '<', 100},
               {HARD_REJECTED, '<', 1}}},
-  {.name = "squeeze.p1",
-   .seconds = 600,
-   .what = "squeezed to 20 % between plates and let go, P1",
-   .options = SQUEEZE("p1", "3"),
-   .jitter = 1e-5,
-   .limits = {{HARD_EXCESS, '<', 1e-6},
-              {HARD_MIN_J, '>', 0.9},
-              {HARD_SHAPE, '<', 1e-2},
-              {HARD_DEPTH, '<', 1e-6},
-              {HARD_NEWTON, '<', 500},
-              {HARD_REJECTED, '<', 50}}},
-  {.name = "squeeze.cr",
-   .seconds = 600,
-   .what = "squeezed to 20 % between plates and let go, CR",
-   .options = SQUEEZE("cr", "2"),
-   .jitter = 1e-5,
-   .limits = {{HARD_EXCESS, '<', 1e-6},
-              {HARD_MIN_J, '>', 0.9},
-              {HARD_SHAPE, '<', 1e-2},
-              {HARD_DEPTH, '<', 1e-6},
-              {HARD_NEWTON, '<', 500},
-              {HARD_REJECTED, '<', 50}}},
-  {.name = "squeeze.dg",
-   .seconds = 600,
-   .what = "squeezed to 20 % between plates and let go, DG",
-   .options = SQUEEZE("dg", "2"),
-   .jitter = 1e-5,
-   .limits = {{HARD_EXCESS, '<', 1e-6},
-              {HARD_MIN_J, '>', 0.9},
-              {HARD_SHAPE, '<', 1e-2},
-              {HARD_DEPTH, '<', 1e-6},
-              {HARD_NEWTON, '<', 500},
-              {HARD_REJECTED, '<', 50}}},
+  SQUEEZED("p1", "3"),
+  SQUEEZED("cr", "2"),
+  SQUEEZED("dg", "2"),
   {.name = "mass.stack",
    .seconds = 600,
    .what = "ten thousand times its mass rests on a block",
@@ -219,37 +180,8 @@ const HardCase HardCasesContact[] = {
               {HARD_DEPTH, '<', 2e-3},
               {HARD_NEWTON, '<', 100},
               {HARD_REJECTED, '<', 1}}},
-  {.name = "stiff.projected",
-   .seconds = 600,
-   .what = "a million times stiffer body on a soft one, projected",
-   .options = SOFT_STIFF("projected"),
-   .jitter = 1e-7,
-   .quick = 1,
-   .limits = {{HARD_EXCESS, '<', 1e-6},
-              {HARD_MIN_J, '>', 0.5},
-              {HARD_DEPTH, '<', 1e-4},
-              {HARD_NEWTON, '<', 200},
-              {HARD_LINEAR, '<', 500},
-              {HARD_REJECTED, '<', 1}}},
-  {.name = "stiff.multiplier",
-   .seconds = 600,
-   .what = "a million times stiffer body on a soft one, multiplier",
-   .options = SOFT_STIFF("multiplier"),
-   .jitter = 1e-7,
-   .limits = {{HARD_EXCESS, '<', 1e-6},
-              {HARD_MIN_J, '>', 0.5},
-              {HARD_DEPTH, '<', 1e-4},
-              {HARD_NEWTON, '<', 50},
-              {HARD_REJECTED, '<', 1}}},
-  {.name = "stiff.augmented",
-   .seconds = 600,
-   .what = "a million times stiffer body on a soft one, augmented",
-   .options = SOFT_STIFF("augmented"),
-   .jitter = 1e-7,
-   .limits = {{HARD_EXCESS, '<', 1e-6},
-              {HARD_MIN_J, '>', 0.5},
-              {HARD_DEPTH, '<', 1e-4},
-              {HARD_NEWTON, '<', 200},
-              {HARD_REJECTED, '<', 1}}},
+  STIFF("projected", 200, 500, 1),
+  STIFF("multiplier", 50, 500, 0),
+  STIFF("augmented", 200, 500, 0),
   {.name = NULL},
 };

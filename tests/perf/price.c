@@ -86,7 +86,7 @@ static PetscErrorCode run(const char *mesh, const Part *part, PetscBool named, C
   PetscCall(PetscOptionsClear(NULL));
   PetscCall(SbOptionsReset());
   PetscCall(PetscMallocGetCurrentUsage(&before));
-  PetscCall(part_open(text, folder, &t));
+  PetscCall(test_scene_open_in(folder, text, &t));
   if (!tets) tets = t.model->mesh->Ncell;
   PetscCall(SbRunAddMonitor(t.run, watch, cost, NULL));
   PetscCall(PetscMallocGetCurrentUsage(&after));

@@ -58,24 +58,6 @@ static inline PetscErrorCode fixture_remove(const char *dir)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A scene with its output attached to `dir`. */
-static inline PetscErrorCode fixture_open(const char *dir, const char *options, TestScene *scene)
-{
-  PetscFunctionBeginUser;
-  PetscCall(PetscOptionsClear(NULL));
-  PetscCall(SbOptionsReset());
-  PetscCall(SbRegisterAll());
-  PetscCall(PetscOptionsInsertString(NULL, options));
-  PetscCall(PetscOptionsSetValue(NULL, "-output_dir", dir));
-  PetscCall(SbSceneCreate(PETSC_COMM_WORLD, &scene->model));
-  PetscCall(test_scene_run(scene));
-  PetscCall(SbOutputSetFromOptions(scene->run));
-  PetscCall(SbModelSetUp(scene->model));
-  PetscCall(SbRunSetUp(scene->run));
-  PetscCall(SbOutputAttach(scene->run));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* The motion: u = t G x with a constant gradient, so that stresses are known; v = G x; a another affine function,
    so that CR and DG hold it exactly, too. */
 #define G00 0.01

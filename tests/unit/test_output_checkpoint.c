@@ -32,7 +32,7 @@ static PetscErrorCode test_round_trip(void)
   char options[PETSC_MAX_PATH_LEN];
 
   PetscFunctionBeginUser;
-  PetscCall(fixture_open(dir, HELD EULER "-output_fields none -checkpoint_every_time 0.25", &scene));
+  PetscCall(test_scene_open_in(dir, HELD EULER "-output_fields none -checkpoint_every_time 0.25", &scene));
   SB_CHECK(scene.run->want_energies, "works and losses are part of the state");
   scene.run->energy_start = 1. / 7.;
   for (PetscInt k = 0; k <= 9; k++) PetscCall(fixture_step(&scene, k, 0.1, PETSC_FALSE));
@@ -43,7 +43,7 @@ static PetscErrorCode test_round_trip(void)
            "other checkpoints than 5 and 8 are kept");
   SB_CHECK(!fixture_exists(dir, "checkpoint.tmp"), "a temporary file is left");
   SbFormat(sizeof(options), options, HELD EULER "-output_fields none -restart %s/checkpoint_000005.h5", dir);
-  PetscCall(fixture_open(dir, options, &scene));
+  PetscCall(test_scene_open_in(dir, options, &scene));
   SB_CHECK(scene.run->step0 == 5 && scene.run->t0 == 5 * 0.1, "restart at step %d, t = %.17g",
            (int)scene.run->step0, (double)scene.run->t0);
   SB_CHECK(difference(&scene, 0.5) == 0., "the state differs by %g", (double)difference(&scene, 0.5));
@@ -74,18 +74,18 @@ static PetscErrorCode test_elements(void)
   for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(elements); i++) {
     SbFormat(sizeof(options), options, HELD EULER "%s %s -checkpoint_every_steps 1",
              i == 3 ? more : "-output_fields none", elements[i]);
-    PetscCall(fixture_open(dir, options, &scene));
+    PetscCall(test_scene_open_in(dir, options, &scene));
     for (PetscInt k = 0; k <= 1; k++) PetscCall(fixture_step(&scene, k, 0.1, PETSC_FALSE));
     PetscCall(test_scene_close(&scene));
     SbFormat(sizeof(options), options, HELD EULER "%s %s -restart latest",
              i == 3 ? more : "-output_fields none", elements[i]);
-    PetscCall(fixture_open(dir, options, &scene));
+    PetscCall(test_scene_open_in(dir, options, &scene));
     SB_CHECK(difference(&scene, 0.1) == 0., "'%s': the state differs by %g", elements[i],
              (double)difference(&scene, 0.1));
     PetscCall(test_scene_close(&scene));
     SbFormat(sizeof(options), options, HELD EULER "%s %s -body_a_element %s -restart latest",
              i == 3 ? more : "-output_fields none", elements[i], i == 0 || i == 2 ? "cr" : "dg");
-    SB_CHECK_ERROR(fixture_open(dir, options, &scene), "a checkpoint of other elements");
+    SB_CHECK_ERROR(test_scene_open_in(dir, options, &scene), "a checkpoint of other elements");
     PetscCall(test_scene_close(&scene));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -105,13 +105,13 @@ static PetscErrorCode test_next_step(void)
 
   PetscFunctionBeginUser;
   for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(cases); i++) {
-    PetscCall(fixture_open(dir, BOX EULER "-output_fields none -checkpoint_every_steps 1", &scene));
+    PetscCall(test_scene_open_in(dir, BOX EULER "-output_fields none -checkpoint_every_steps 1", &scene));
     PetscCall(fixture_step(&scene, 0, 0.1, PETSC_FALSE));
     PetscCall(TSSetTimeStep(scene.run->ts, 0.025));
     PetscCall(fixture_step(&scene, 1, 0.1, PETSC_FALSE));
     PetscCall(test_scene_close(&scene));
     SbFormat(sizeof(options), options, BOX EULER "-output_fields none -restart latest%s", cases[i].more);
-    PetscCall(fixture_open(dir, options, &scene));
+    PetscCall(test_scene_open_in(dir, options, &scene));
     PetscCall(TSGetTimeStep(scene.run->ts, &dt));
     SB_CHECK(dt == cases[i].dt, "'%s': next step %g, expected %g", cases[i].more, (double)dt,
              (double)cases[i].dt);
@@ -136,7 +136,7 @@ static PetscErrorCode test_hash(void)
   PetscFunctionBeginUser;
   for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(cases); i++) {
     SbFormat(sizeof(options), options, "-bodies a %s" MATERIAL EULER "-output_fields J", cases[i].mesh);
-    PetscCall(fixture_open(dir, options, &scene));
+    PetscCall(test_scene_open_in(dir, options, &scene));
     hash[i] = ((SbOutput)scene.run->output)->mesh_hash;
     SB_CHECK((hash[i] == hash[0]) == (cases[i].same != PETSC_FALSE), "hash of '%s'", cases[i].mesh);
     PetscCall(test_scene_close(&scene));
@@ -155,12 +155,12 @@ static PetscErrorCode test_refused(void)
   char options[PETSC_MAX_PATH_LEN];
 
   PetscFunctionBeginUser;
-  PetscCall(fixture_open(dir, BOX EULER "-output_fields none -checkpoint_every_steps 1", &scene));
+  PetscCall(test_scene_open_in(dir, BOX EULER "-output_fields none -checkpoint_every_steps 1", &scene));
   for (PetscInt k = 0; k <= 1; k++) PetscCall(fixture_step(&scene, k, 0.1, PETSC_FALSE));
   PetscCall(test_scene_close(&scene));
   for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(others); i++) {
     SbFormat(sizeof(options), options, BOX EULER "-output_fields none -restart latest%s", others[i]);
-    SB_CHECK_ERROR(fixture_open(dir, options, &scene), others[i]);
+    SB_CHECK_ERROR(test_scene_open_in(dir, options, &scene), others[i]);
     SB_CHECK(fixture_exists(dir, "checkpoint_000001.h5"), "'%s': refused, but the folder was cleared",
              others[i]);
     PetscCall(test_scene_close(&scene));

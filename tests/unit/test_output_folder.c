@@ -29,18 +29,18 @@ static PetscErrorCode test_folder(void)
 
   PetscFunctionBeginUser;
   SbFormat(sizeof(deep), deep, "%s/a//b/", dir);
-  PetscCall(fixture_open(deep, BOX EULER, &scene));
+  PetscCall(test_scene_open_in(deep, BOX EULER, &scene));
   SB_CHECK(fixture_exists(dir, "a/b/history.csv") && fixture_exists(dir, "a/b/scenario.opts"),
            "no results in a/b");
   PetscCall(test_scene_close(&scene));
   PetscCall(write_text("a/b/notes.txt", "mine"));
   PetscCall(write_text("a/b/checkpoint_000007.h5", "of an earlier run"));
-  PetscCall(fixture_open(deep, BOX EULER, &scene));
+  PetscCall(test_scene_open_in(deep, BOX EULER, &scene));
   SB_CHECK(fixture_exists(dir, "a/b/notes.txt"), "a file that is not ours is gone");
   SB_CHECK(!fixture_exists(dir, "a/b/checkpoint_000007.h5"), "a checkpoint of an earlier run is still there");
   PetscCall(test_scene_close(&scene));
   SbFormat(sizeof(deep), deep, "%s/a/b/notes.txt/c", dir);
-  SB_CHECK_ERROR(fixture_open(deep, BOX EULER, &scene), "a folder below a file");
+  SB_CHECK_ERROR(test_scene_open_in(deep, BOX EULER, &scene), "a folder below a file");
   PetscCall(test_scene_close(&scene));
   SbFormat(sizeof(deep), deep, "%s/a/b", dir);
   PetscCall(fixture_remove(deep));
@@ -56,7 +56,7 @@ static PetscErrorCode test_scenario(void)
   char *text;
 
   PetscFunctionBeginUser;
-  PetscCall(fixture_open(dir, BOX EULER "-output_every 0.5 -probes p -probe_p_at 1,2,3", &scene));
+  PetscCall(test_scene_open_in(dir, BOX EULER "-output_every 0.5 -probes p -probe_p_at 1,2,3", &scene));
   PetscCall(fixture_read(dir, "scenario.opts", &text));
   SB_CHECK(strstr(text, "-output_every 0.5 "), "a given option is missing");
   SB_CHECK(strstr(text, "-output_fields displacement,velocity,von_mises "), "a default is missing");
@@ -82,14 +82,14 @@ static PetscErrorCode test_fields(void)
              fields[i].name);
   }
   SB_CHECK_ERROR(SbFieldFind("von_mizes", &found), "a misspelt field");
-  PetscCall(fixture_open(dir, BOX EULER "-output_fields J,J,stress", &scene));
+  PetscCall(test_scene_open_in(dir, BOX EULER "-output_fields J,J,stress", &scene));
   out = (SbOutput)scene.run->output;
   SB_CHECK(out->nfield == 3 && !strcmp(out->field[2]->name, "body"), "a field named twice: %d fields",
            (int)out->nfield);
   SB_CHECK(out->sigma && out->J && !out->psi, "storage for cell quantities that nobody asked for");
   PetscCall(test_scene_close(&scene));
   // a static run has no velocity
-  PetscCall(fixture_open(dir, HELD " -time static -quiet", &scene));
+  PetscCall(test_scene_open_in(dir, HELD " -time static -quiet", &scene));
   out = (SbOutput)scene.run->output;
   SB_CHECK(out->nfield == 3 && !strcmp(out->field[1]->name, "von_mises"), "a static run has %d fields",
            (int)out->nfield);

@@ -128,7 +128,7 @@ static PetscErrorCode test_values(const char *precision, PetscReal tolerance)
 
   PetscFunctionBeginUser;
   SbFormat(sizeof(options), options, HELD EULER ALL " -output_precision %s", precision);
-  PetscCall(fixture_open(dir, options, &scene));
+  PetscCall(test_scene_open_in(dir, options, &scene));
   for (PetscInt k = 0; k <= 3; k++) PetscCall(fixture_step(&scene, k, 0.1, (PetscBool)(k == 3)));
   PetscCall(open_fields(&h));
   PetscCall(check_values((SbOutput)scene.run->output, &h, "/step/0000/000002", 0.2, tolerance));
@@ -154,7 +154,7 @@ static PetscErrorCode test_reaction(void)
   PetscBool ok, fine = PETSC_TRUE;
 
   PetscFunctionBeginUser;
-  PetscCall(fixture_open(dir, HELD EULER " -output_fields reaction", &scene));
+  PetscCall(test_scene_open_in(dir, HELD EULER " -output_fields reaction", &scene));
   out = (SbOutput)scene.run->output;
   SB_CHECK(scene.run->want_residual, "the residual is not asked for");
   PetscCall(fixture_step(&scene, 0, 0.1, PETSC_TRUE));
@@ -178,7 +178,7 @@ static PetscErrorCode test_two_bodies(void)
   SbH5 h;
 
   PetscFunctionBeginUser;
-  PetscCall(fixture_open(
+  PetscCall(test_scene_open_in(
     dir,
     "-bodies a,b -body_a_mesh box:0.4,0.1,0.2:4,1,2 -body_b_mesh box:0.4,0.1,0.2:4,1,2 -body_b_translate "
     "0,0,1"
@@ -199,7 +199,7 @@ static PetscErrorCode frames_of(const char *more, PetscInt n, PetscReal dt, char
 
   PetscFunctionBeginUser;
   SbFormat(sizeof(options), options, BOX EULER "-output_fields displacement %s", more);
-  PetscCall(fixture_open(dir, options, &scene));
+  PetscCall(test_scene_open_in(dir, options, &scene));
   for (PetscInt k = 0; k <= n; k++) PetscCall(fixture_step(&scene, k, dt, (PetscBool)(k == n)));
   PetscCall(fixture_read(dir, "fields.xmf", &xmf));
   for (PetscInt k = 0; k <= n; k++) {
@@ -271,7 +271,7 @@ static PetscErrorCode test_hundreds(void)
   unsigned long address, size;
 
   PetscFunctionBeginUser;
-  PetscCall(fixture_open(dir, BOX EULER "-output_fields J", &scene));
+  PetscCall(test_scene_open_in(dir, BOX EULER "-output_fields J", &scene));
   for (PetscInt k = 0; k <= 230; k++) PetscCall(fixture_step(&scene, k, 0.001, (PetscBool)(k == 230)));
   PetscCall(open_fields(&h));
   for (int i = 0; i < 3; i++) {
@@ -302,11 +302,11 @@ static PetscErrorCode test_restart(void)
   char *xmf, restart[PETSC_MAX_PATH_LEN + 256];
 
   PetscFunctionBeginUser;
-  PetscCall(fixture_open(dir, HELD EULER ALL " -checkpoint_every_steps 4", &scene));
+  PetscCall(test_scene_open_in(dir, HELD EULER ALL " -checkpoint_every_steps 4", &scene));
   for (PetscInt k = 0; k <= 6; k++) PetscCall(fixture_step(&scene, k, 0.1, PETSC_FALSE));
   PetscCall(test_scene_close(&scene));
   SbFormat(sizeof(restart), restart, HELD EULER ALL " -restart %s/checkpoint_000004.h5", dir);
-  PetscCall(fixture_open(dir, restart, &scene));
+  PetscCall(test_scene_open_in(dir, restart, &scene));
   SB_CHECK(scene.run->step0 == 4, "restart at step %d", (int)scene.run->step0);
   PetscCall(fixture_read(dir, "fields.xmf", &xmf));
   SB_CHECK(count(xmf, "<Time ") == 5 && !strstr(xmf, "/000005/"), "after a restart at 4: %d frames",
@@ -331,7 +331,8 @@ static PetscErrorCode test_nothing(void)
   TestScene scene;
 
   PetscFunctionBeginUser;
-  PetscCall(fixture_open(dir, BOX EULER "-output_fields none -output_history false -progress false", &scene));
+  PetscCall(
+    test_scene_open_in(dir, BOX EULER "-output_fields none -output_history false -progress false", &scene));
   SB_CHECK(scene.run->nmonitor == 0, "%d monitors", (int)scene.run->nmonitor);
   SB_CHECK(!scene.run->want_energies && !scene.run->want_residual, "energies or residual are asked for");
   PetscCall(test_scene_close(&scene));

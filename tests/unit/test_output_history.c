@@ -37,7 +37,7 @@ static PetscErrorCode test_values(void)
   PetscReal x[3], u[3], v[3], a[3];
 
   PetscFunctionBeginUser;
-  PetscCall(fixture_open(
+  PetscCall(test_scene_open_in(
     dir,
     HELD EULER "-output_fields none -probes tip,near -probe_tip_at 0.4,0.1,0.2 -probe_near_at 0.29,0.04,0.12",
     &scene));
@@ -85,7 +85,8 @@ static PetscErrorCode test_tie(void)
   SbMesh mesh;
 
   PetscFunctionBeginUser;
-  PetscCall(fixture_open(dir, BOX EULER "-output_fields none -probes p -probe_p_at 0.05,0.05,0.05", &scene));
+  PetscCall(
+    test_scene_open_in(dir, BOX EULER "-output_fields none -probes p -probe_p_at 0.05,0.05,0.05", &scene));
   probe = ((SbOutput)scene.run->output)->probe;
   mesh = scene.model->mesh;
   for (PetscInt i = 0; i < mesh->nvert_owned; i++) {
@@ -111,7 +112,7 @@ static PetscErrorCode test_every(void)
   char *text;
 
   PetscFunctionBeginUser;
-  PetscCall(fixture_open(dir, BOX EULER "-output_fields none -output_history_every 4", &scene));
+  PetscCall(test_scene_open_in(dir, BOX EULER "-output_fields none -output_history_every 4", &scene));
   for (PetscInt k = 0; k <= 10; k++) PetscCall(fixture_step(&scene, k, 0.1, (PetscBool)(k == 10)));
   PetscCall(fixture_read(dir, "history.csv", &text));
   SB_CHECK(count_rows(text) == 4 && value_of(text, "step", 2) == 8 && value_of(text, "step", 3) == 10,
@@ -130,7 +131,7 @@ static PetscErrorCode test_restart(void)
 
   PetscFunctionBeginUser;
   PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
-  PetscCall(fixture_open(dir, BOX EULER "-output_fields none -checkpoint_every_steps 4", &scene));
+  PetscCall(test_scene_open_in(dir, BOX EULER "-output_fields none -checkpoint_every_steps 4", &scene));
   for (PetscInt k = 0; k <= 6; k++) PetscCall(fixture_step(&scene, k, 0.1, PETSC_FALSE));
   PetscCall(test_scene_close(&scene));
   if (!rank) {
@@ -141,7 +142,7 @@ static PetscErrorCode test_restart(void)
     (void)fprintf(f, "7,0.7,0.1,10");
     (void)fclose(f);
   }
-  PetscCall(fixture_open(dir, BOX EULER "-output_fields none -restart latest", &scene));
+  PetscCall(test_scene_open_in(dir, BOX EULER "-output_fields none -restart latest", &scene));
   PetscCall(fixture_read(dir, "history.csv", &text));
   SB_CHECK(count_rows(text) == 5 && value_of(text, "step", 4) == 4, "after the restart: %d rows",
            (int)count_rows(text));
@@ -155,7 +156,7 @@ static PetscErrorCode test_restart(void)
   // with other columns the old file is kept under another name
   SbFormat(sizeof(options), options,
            BOX EULER "-output_fields none -restart %s/checkpoint_000004.h5 -probes p -probe_p_at 0,0,0", dir);
-  PetscCall(fixture_open(dir, options, &scene));
+  PetscCall(test_scene_open_in(dir, options, &scene));
   PetscCall(fixture_step(&scene, 4, 0.1, PETSC_TRUE));
   SB_CHECK(fixture_exists(dir, "history_before_000004.csv"), "the history with other columns is gone");
   PetscCall(fixture_read(dir, "history.csv", &text));

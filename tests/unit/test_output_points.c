@@ -41,7 +41,7 @@ static PetscErrorCode test_affine(const char *more)
 
   PetscFunctionBeginUser;
   SbFormat(sizeof(options), options, BODIES EULER FIELDS "%s", more);
-  PetscCall(fixture_open(dir, options, &scene));
+  PetscCall(test_scene_open_in(dir, options, &scene));
   for (PetscInt k = 0; k <= 2; k++) PetscCall(fixture_step(&scene, k, 0.1, (PetscBool)(k == 2)));
   out = (SbOutput)scene.run->output;
   SB_CHECK(out->point.N == (more[0] ? 4 * (48 + 72 + 48) : 30 + 36 + 27), "%d points", (int)out->point.N);
@@ -115,7 +115,7 @@ static PetscErrorCode test_mean(PetscBool discontinuous)
   PetscReal *value, worst = 0., jump = 0., V;
 
   PetscFunctionBeginUser;
-  PetscCall(fixture_open(
+  PetscCall(test_scene_open_in(
     dir, discontinuous ? BODIES EULER FIELDS " -output_discontinuous" : BODIES EULER FIELDS, &scene));
   out = (SbOutput)scene.run->output;
   mesh = scene.model->mesh;
@@ -162,7 +162,7 @@ static PetscErrorCode test_reactions(const char *more)
 
   PetscFunctionBeginUser;
   SbFormat(sizeof(options), options, BODIES EULER FIELDS "%s", more);
-  PetscCall(fixture_open(dir, options, &scene));
+  PetscCall(test_scene_open_in(dir, options, &scene));
   PetscCall(fixture_step(&scene, 0, 0.1, PETSC_FALSE));
   s = scene.model->space;
   out = (SbOutput)scene.run->output;
@@ -211,7 +211,7 @@ static PetscErrorCode test_probes(const char *fields)
            BODIES EULER
            "-probes p,q,r -probe_p_at 0.4,0.1,0.2 -probe_q_at 0.31,0.29,0.11 -probe_r_at 0.1,0.6,0.1 %s",
            fields);
-  PetscCall(fixture_open(dir, options, &scene));
+  PetscCall(test_scene_open_in(dir, options, &scene));
   out = (SbOutput)scene.run->output;
   for (PetscInt k = 0; k <= 1; k++) PetscCall(fixture_step(&scene, k, 0.1, (PetscBool)(k == 1)));
   PetscCall(fixture_read(dir, "history.csv", &text));
@@ -241,16 +241,16 @@ static PetscErrorCode test_restart(void)
                *second = other ? " -output_discontinuous" : "";
 
     SbFormat(sizeof(options), options, BODIES EULER FIELDS " -checkpoint_every_steps 1%s", first);
-    PetscCall(fixture_open(dir, options, &scene));
+    PetscCall(test_scene_open_in(dir, options, &scene));
     for (PetscInt k = 0; k <= 2; k++) PetscCall(fixture_step(&scene, k, 0.1, PETSC_FALSE));
     PetscCall(test_scene_close(&scene));
     SbFormat(sizeof(options), options, BODIES EULER FIELDS " -restart %s/checkpoint_000001.h5%s", dir,
              second);
-    SB_CHECK_ERROR(fixture_open(dir, options, &scene), "frames with other points");
+    SB_CHECK_ERROR(test_scene_open_in(dir, options, &scene), "frames with other points");
     PetscCall(test_scene_close(&scene));
     SB_CHECK(fixture_exists(dir, "checkpoint_000002.h5"), "refused, but the folder was cleared");
     SbFormat(sizeof(options), options, BODIES EULER FIELDS " -restart %s/checkpoint_000001.h5%s", dir, first);
-    PetscCall(fixture_open(dir, options, &scene));
+    PetscCall(test_scene_open_in(dir, options, &scene));
     for (PetscInt k = 1; k <= 3; k++) PetscCall(fixture_step(&scene, k, 0.1, (PetscBool)(k == 3)));
     PetscCall(test_scene_close(&scene));
     PetscCall(fixture_read(dir, "fields.xmf", &xmf));
@@ -269,7 +269,7 @@ static PetscErrorCode test_nothing(void)
   SbOutput out;
 
   PetscFunctionBeginUser;
-  PetscCall(fixture_open(dir, BOX EULER "-output_fields J", &scene));
+  PetscCall(test_scene_open_in(dir, BOX EULER "-output_fields J", &scene));
   out = (SbOutput)scene.run->output;
   SB_CHECK(!out->points, "something is kept for vertex fields that nobody asked for");
   SB_CHECK(out->node.sf == out->vertex.sf && out->point.sf == out->vertex.sf,

@@ -40,7 +40,7 @@ static PetscErrorCode test_report(void)
 
   PetscFunctionBeginUser;
   PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
-  PetscCall(fixture_open(
+  PetscCall(test_scene_open_in(
     dir, HELD " -time euler_implicit -ts_dt 0.1 -ts_max_time 1 -probes p -probe_p_at 0,0,0", &scene));
   PetscCall(fixture_read(dir, "run.json", &json));
   SB_CHECK(strstr(json, "\"status\": \"running\"") && strstr(json, "\"petsc\": \"3."),
@@ -109,7 +109,7 @@ static PetscErrorCode test_elements(void)
     SbFormat(sizeof(options), options,
              BOX " -time euler_implicit -ts_dt 0.1 -ts_max_time 1 -progress false -body_a_element %s",
              cases[i].element);
-    PetscCall(fixture_open(dir, options, &scene));
+    PetscCall(test_scene_open_in(dir, options, &scene));
     CAPTURE(header, PetscCall(SbReportHeader(scene.run)));
     SB_CHECK(rank || strstr(header, cases[i].in_header), "no '%s' in the header:\n%s", cases[i].in_header,
              header);
@@ -131,7 +131,8 @@ static PetscErrorCode test_early_end(void)
 
   PetscFunctionBeginUser;
   PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
-  PetscCall(fixture_open(dir, BOX " -time euler_implicit -ts_dt 0.1 -ts_max_time 1 -progress false", &scene));
+  PetscCall(
+    test_scene_open_in(dir, BOX " -time euler_implicit -ts_dt 0.1 -ts_max_time 1 -progress false", &scene));
   SB_CHECK(scene.run->nmonitor == 2, "%d monitors without progress", (int)scene.run->nmonitor);
   PetscCall(PetscStrncpy(scene.run->stop_reason, "the \"solver\" gave\nup", sizeof(scene.run->stop_reason)));
   CAPTURE(summary, PetscCall(SbReportSummary(scene.run)));
@@ -159,7 +160,7 @@ static PetscErrorCode test_quiet(void)
 
   PetscFunctionBeginUser;
   CAPTURE(text, {
-    PetscCall(fixture_open(dir, BOX EULER, &scene));
+    PetscCall(test_scene_open_in(dir, BOX EULER, &scene));
     PetscCall(SbReportHeader(scene.run));
     PetscCall(run_steps(&scene));
     PetscCall(SbReportSummary(scene.run));

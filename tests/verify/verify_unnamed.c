@@ -74,7 +74,7 @@ static PetscErrorCode run(const char *options, Trace *trace)
   PetscCall(PetscOptionsClear(NULL));
   PetscCall(SbOptionsReset());
   PetscCall(PetscMallocGetCurrentUsage(&before));
-  PetscCall(part_open(options, folder, &t));
+  PetscCall(test_scene_open_in(folder, options, &t));
   trace->setup_n = part_allocated.n_ours;
   trace->setup_bytes = part_allocated.bytes_ours;
   PetscCall(verify_solve(&t, options));
