@@ -10,6 +10,30 @@
 #define SB_SET_BIT(k) ((uint64_t)1 << ((k) + 1))
 #define SB_INCLUSION_MAX 16 /* inclusions of a body: tets with a material of their own */
 
+/* Who makes tets from a surface. */
+typedef enum {
+  SB_TET_AUTO, /* gmsh, and tetgen where that fails */
+  SB_TET_GMSH,
+  SB_TET_TETGEN
+} SbTetRoad;
+/* Whether the triangles of a surface stay as they are. */
+typedef enum {
+  SB_TET_SURFACE_AUTO, /* kept when their mean edge is within a factor of 1.5 of the size */
+  SB_TET_KEEP,
+  SB_TET_REMESH
+} SbTetSurface;
+/* How a surface becomes tets; lengths as those of the surface. */
+typedef struct {
+  PetscReal size; /* wanted edge; 0: the mean edge of the surface */
+  PetscReal weld; /* vertices no farther apart are one; negative: 1e-7 of the diagonal of its box */
+  PetscReal
+    untangle; /* vertices may be moved so far to part triangles that cut each other; negative: half the mean edge */
+  PetscReal angle;   /* degrees; edges with sharper turns are kept when the surface is meshed anew */
+  PetscReal seconds; /* that gmsh or tetgen may take, s */
+  SbTetRoad road;
+  SbTetSurface surface;
+} SbTetOptions;
+
 /* A body as the scenario gives it. Data, no methods. */
 typedef struct {
   char name[SB_NAME_MAX];
@@ -19,6 +43,7 @@ typedef struct {
   PetscReal scale;        /* factor on the file's coordinates, first */
   PetscReal rotate[4];    /* axis (need not be normed) and angle in degrees, second */
   PetscReal translate[3];     /* m, third */
+  SbTetOptions tet;           /* for a mesh that is a surface; m */
   char element[SB_NAME_MAX];  /* p1, cr, dg */
   PetscBool face_nodes;       /* the element has its nodes at faces: every cell of the overlap is needed */
   char material[SB_NAME_MAX]; /* linear | corotated | stvk | neohookean */
@@ -36,7 +61,7 @@ typedef struct {
   PetscReal min_dihedral;        /* smallest dihedral angle, degrees */
   PetscReal max_radius_ratio;    /* circumradius / (3 inradius), 1 for the regular tet; the worst cell */
   PetscReal bbox[6];             /* xmin ymin zmin xmax ymax zmax, placed, m */
-  char note[256]; /* what was repaired or is odd, "unused vertices left out: 3, ..."; "" when nothing */
+  char note[768]; /* what was repaired or is odd, "unused vertices left out: 3, ..."; "" when nothing */
 } SbBody;
 
 /*
@@ -126,6 +151,9 @@ PetscErrorCode SbMeshNeighbours(SbMesh mesh, PetscInt **neighbour);
 PetscErrorCode SbMeshBroadcastCells(SbMesh mesh, PetscInt n, PetscInt value[]);
 PetscErrorCode SbMeshValidate(SbMesh mesh); /* ordering, ranges, ownership, sums; for -validate and tests */
 PetscErrorCode SbMeshRegister(void);        /* rows of the option table, the METIS partitioner */
+/* Defaults of SbTetOptions; what -body_<name>_tet_... says when the mesh is a surface. Not collective. */
+PetscErrorCode SbTetDefaults(SbTetOptions *options);
+PetscErrorCode SbTetOptionsRead(const SbScope *scope, const char *mesh, SbTetOptions *options);
 /*
   A closed surface of triangles with an inside, as a rigid obstacle has it. Arrays are owned; SbTrianglesDestroy().
 */

@@ -18,6 +18,7 @@ PetscErrorCode SbMeshRegister(void)
 {
   PetscFunctionBeginUser;
   PetscCall(SbOptionsRegister("", "", (PetscInt)PETSC_STATIC_ARRAY_LENGTH(rows), rows));
+  PetscCall(SbTetRegister());
   PetscCall(SbPartitionerRegister());
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -209,7 +209,7 @@ static PetscErrorCode place(const SbBody *body, SbImport *im)
   for (PetscInt v = 0; v < im->nvert; v++) {
     PetscReal *x = im->x + 3 * v, y[3];
 
-    for (int i = 0; i < 3; i++) y[i] = body->scale * x[i];
+    for (int i = 0; i < 3; i++) y[i] = im->scale * x[i];
     for (int i = 0; i < 3; i++) {
       x[i] = R[i][0] * y[0] + R[i][1] * y[1] + R[i][2] * y[2] + body->translate[i];
       PetscCheck(isfinite(x[i]), PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
@@ -231,7 +231,8 @@ static const struct {
   {".mesh", SbImportRead_Mesh},         {".node", SbImportRead_TetGen}, {".ele", SbImportRead_TetGen},
   {".face", SbImportRead_TetGen},       {".edge", SbImportRead_TetGen}, {".vol", SbImportRead_Netgen},
   {".neu", SbImportRead_NetgenNeutral}, {".inp", SbImportRead_Abaqus},  {".unv", SbImportRead_UNV},
-  {".bdf", SbImportRead_Nastran},       {".nas", SbImportRead_Nastran},
+  {".bdf", SbImportRead_Nastran},       {".nas", SbImportRead_Nastran}, {".stl", SbImportRead_Surface},
+  {".obj", SbImportRead_Surface},       {".off", SbImportRead_Surface}, {".ply", SbImportRead_Surface},
 };
 
 /* The reader of a file with this ending; NULL when there is none: then `known` lists all endings. */
@@ -281,6 +282,8 @@ PetscErrorCode SbImportRead(const SbBody *body, SbImport *im)
   PetscCall(find_reader(body, &read));
   (void)snprintf(im->where, sizeof(im->where), "body '%s': %s", body->name, body->mesh);
   PetscCall(SbImportTagSet(im, 0, NULL, &none));
+  im->tet = body->tet;
+  im->scale = body->scale;
   PetscCall(read(body->mesh, im));
   PetscCall(place(body, im));
   PetscFunctionReturn(PETSC_SUCCESS);

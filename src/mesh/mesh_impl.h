@@ -42,6 +42,9 @@ typedef struct {
   PetscInt nslot;       /* a power of two */
   PetscInt *slot;       /* [nslot] groups by a hash of (dim, tag), or -1; made when needed */
   PetscBool surface;    /* given: all triangles are wanted, and tets need not be there */
+  SbTetOptions tet;     /* given: how a surface becomes tets */
+  PetscReal scale;      /* given: factor that placing will use; a reader that has scaled sets it to 1 */
+  char note[512];       /* what the reader mended, for SbBody.note */
   /* found by SbImportCheck() */
   PetscInt nunused;     /* vertices left out */
   PetscInt nreoriented; /* cells turned */
@@ -67,6 +70,8 @@ PetscErrorCode SbImportRead_VTU(const char *path, SbImport *body);
 PetscErrorCode SbImportRead_Abaqus(const char *path, SbImport *body);
 PetscErrorCode SbImportRead_UNV(const char *path, SbImport *body);
 PetscErrorCode SbImportRead_Box(const char *text, SbImport *body);
+PetscErrorCode SbImportRead_Surface(const char *path, SbImport *body); /* which becomes tets by body->tet */
+PetscErrorCode SbTetRegister(void);                                    /* rows of the option table */
 
 /* Chooses the reader by the name of the mesh, reads, places. Not collective. */
 PetscErrorCode SbImportRead(const SbBody *body, SbImport *import);
@@ -152,6 +157,8 @@ PetscInt SbFacesFind(const SbFaces *faces, const PetscInt vert[3], PetscInt slot
 PetscErrorCode SbImportCheck(SbImport *import, SbFaces *faces);
 /* Volume, shape, extent and number of parts: fills the "found" fields of the body. */
 PetscErrorCode SbImportQuality(const SbImport *import, const SbFaces *faces, SbBody *body);
+/* How many tets have a dihedral angle below this, and the smallest of all, degrees. */
+PetscErrorCode SbImportSlivers(const SbImport *import, PetscReal degrees, PetscInt *n, PetscReal *smallest);
 /* Six times the signed volume of a tet, m^3. */
 PetscReal SbTetDet(const PetscReal x[], const PetscInt vert[4]);
 

@@ -54,6 +54,22 @@ static inline void shape(const PetscReal x[], const PetscInt v[4], PetscReal *V,
   *ratio = PetscSqrtReal(dot(to_centre, to_centre)) / (2 * det) * sum / (3 * det);
 }
 
+PetscErrorCode SbImportSlivers(const SbImport *im, PetscReal degrees, PetscInt *n, PetscReal *smallest)
+{
+  const PetscReal bound = PetscCosReal(degrees * PETSC_PI / 180);
+  PetscReal V, cosine, ratio, most = -1;
+
+  PetscFunctionBeginUser;
+  *n = 0;
+  for (PetscInt c = 0; c < im->item[3].n; c++) {
+    shape(im->x, im->item[3].vert + 4 * c, &V, &cosine, &ratio);
+    *n += cosine > bound;
+    most = PetscMax(most, cosine);
+  }
+  *smallest = acos(PetscMin(most, 1)) * 180 / PETSC_PI;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Parts of a body that share no vertex: sets of vertices, joined by every tet. */
 static PetscErrorCode count_parts(const SbImport *im, PetscInt *npart)
 {
@@ -97,7 +113,7 @@ static PetscErrorCode write_note(const SbImport *im, SbBody *body)
   char one[128];
 
   PetscFunctionBeginUser;
-  body->note[0] = 0;
+  PetscCall(PetscStrncpy(body->note, im->note, sizeof(body->note)));
   for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(notes); i++) {
     if (!notes[i].n) continue;
     (void)snprintf(one, sizeof(one), "%s%s: %" PetscInt_FMT, body->note[0] ? ", " : "", notes[i].text,

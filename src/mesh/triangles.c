@@ -3,6 +3,7 @@
 
   The boundary of a gmsh file is that of its tets; without tets its triangles are the surface.
 */
+#include <ctype.h>
 #include <strings.h>
 #include "triangles.h"
 
@@ -30,12 +31,36 @@ PetscErrorCode SbTrianglesAdd(SbTriangleFile *f, PetscInt a, PetscInt b, PetscIn
     f->tri_size = PetscMax(256, 2 * f->tri_size);
     PetscCall(PetscRealloc(3 * (size_t)f->tri_size * sizeof(PetscInt), &t->tri));
     PetscCall(PetscRealloc((size_t)f->tri_size * sizeof(int64_t), &f->number));
+    if (f->groups) PetscCall(PetscRealloc((size_t)f->tri_size * sizeof(PetscInt), &f->tags));
   }
+  if (f->groups) f->tags[t->ntri] = f->now;
   v = t->tri + 3 * t->ntri;
   v[0] = a;
   v[1] = b;
   v[2] = c;
   f->number[t->ntri++] = number;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbTrianglesGroups(SbTriangleFile *f, PetscInt n, const char *const names[])
+{
+  PetscInt group[16];
+
+  PetscFunctionBeginUser;
+  if (!f->groups) PetscFunctionReturn(PETSC_SUCCESS);
+  n = PetscMin(n, 16);
+  for (PetscInt i = 0; i < n; i++) {
+    char name[SB_GROUP_MAX];
+    uint64_t hash = 0xcbf29ce484222325u; /* stands for the name where groups have numbers (FNV-1a) */
+
+    PetscCall(PetscStrncpy(name, names[i], sizeof(name)));
+    for (char *c = name; *c; c++) {
+      if (isspace((unsigned char)*c)) *c = '_';
+      hash = (hash ^ (unsigned char)*c) * 0x100000001b3u;
+    }
+    PetscCall(SbImportGroup(f->groups, 2, (int64_t)(hash >> 2), name, &group[i]));
+  }
+  PetscCall(SbImportTagSet(f->groups, n, group, &f->now));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -90,16 +115,26 @@ PetscErrorCode SbTrianglesRead_Gmsh(const char *path, SbTriangleFile *f)
 
 static const struct {
   const char *extension;
-  PetscErrorCode (*read)(const char *path, SbTriangleFile *file);
+  SbTriangleReader read;
+  PetscBool obstacle; /* tells inside from outside */
 } readers[] = {
-  {".stl", SbTrianglesRead_STL},
-  {".obj", SbTrianglesRead_OBJ},
-  {".off", SbTrianglesRead_OFF},
-  {".msh", SbTrianglesRead_Gmsh},
+  {".stl", SbTrianglesRead_STL, PETSC_TRUE},  {".obj", SbTrianglesRead_OBJ, PETSC_TRUE},
+  {".off", SbTrianglesRead_OFF, PETSC_TRUE},  {".ply", SbTrianglesRead_PLY, PETSC_TRUE},
+  {".msh", SbTrianglesRead_Gmsh, PETSC_TRUE},
 };
 
-/* Leaves out vertices without a triangle: they would only widen the box. */
-static PetscErrorCode drop_unused(SbTriangles *t)
+SbTriangleReader SbTrianglesReader(const char *path)
+{
+  const char *dot = strrchr(path, '.');
+
+  for (size_t i = 0; dot && i < PETSC_STATIC_ARRAY_LENGTH(readers); i++) {
+    if (!strcasecmp(dot, readers[i].extension)) return readers[i].read;
+  }
+  return NULL;
+}
+
+/* They would only widen the box. */
+PetscErrorCode SbTrianglesDropUnused(SbTriangles *t)
 {
   PetscInt *map, n = 0;
 
@@ -138,18 +173,18 @@ static PetscErrorCode read_file(const char *path, PetscReal scale, const PetscRe
 
   PetscFunctionBeginUser;
   for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(readers); i++) {
-    if (!dot || strcasecmp(dot, readers[i].extension)) continue;
+    if (!dot || !readers[i].obstacle || strcasecmp(dot, readers[i].extension)) continue;
     PetscCall((*readers[i].read)(path, f));
     PetscCheck(f->t->ntri, PETSC_COMM_SELF, PETSC_ERR_FILE_UNEXPECTED,
                "%s: holds no triangles; give a closed surface of triangles, or a mesh of tetrahedra",
                f->where);
-    PetscCall(drop_unused(f->t));
+    PetscCall(SbTrianglesDropUnused(f->t));
     PetscCall(place(scale, at, f));
     PetscCall(SbTrianglesCheck(f));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   SETERRQ(PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
-          "%s: is a file of no known kind; give one that ends in .stl, .obj, .off or .msh", f->where);
+          "%s: is a file of no known kind; give one that ends in .stl, .obj, .off, .ply or .msh", f->where);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -10,9 +10,6 @@
 #include "sbkernel.h"
 #include "triangles.h"
 
-#define FLAT 1e-10 /* twice the area over the longest edge squared, below which a triangle has no side */
-#define EMPTY 1e-9 /* volume over (area / 6)^1.5, below which a part encloses nothing */
-
 static const PetscReal *corner(const SbTriangles *t, PetscInt f, int k)
 {
   return t->x + 3 * t->tri[3 * f + k];
@@ -23,8 +20,7 @@ static void difference(const PetscReal a[3], const PetscReal b[3], PetscReal c[3
   for (int i = 0; i < 3; i++) c[i] = a[i] - b[i];
 }
 
-/* Twice the area of a triangle, m^2, and its edges squared: longest and the sum of their lengths. */
-static PetscReal measure(const SbTriangles *t, PetscInt f, PetscReal *longest2, PetscReal *around)
+PetscReal SbTriangleMeasure(const SbTriangles *t, PetscInt f, PetscReal *longest2, PetscReal *around)
 {
   PetscReal e[3][3], n[3];
 
@@ -48,9 +44,9 @@ static PetscErrorCode check_triangles(SbTriangleFile *f)
 
   PetscFunctionBeginUser;
   for (PetscInt i = 0; i < t->ntri; i++) {
-    const PetscReal area2 = measure(t, i, &longest2, &around);
+    const PetscReal area2 = SbTriangleMeasure(t, i, &longest2, &around);
 
-    PetscCheck(area2 > FLAT * longest2, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
+    PetscCheck(area2 > SB_TRIANGLE_FLAT * longest2, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
                "%s: triangle %lld at (%.6g, %.6g, %.6g) m has no area; collapse it (gmsh, meshlab: remove "
                "degenerate faces)",
                f->where, (long long)f->number[i], (double)corner(t, i, 0)[0], (double)corner(t, i, 0)[1],
@@ -63,17 +59,35 @@ static PetscErrorCode check_triangles(SbTriangleFile *f)
 
 /* ------------------------------------------------------------------ edges */
 
-typedef struct {
-  uint64_t key;  /* lower and higher vertex */
-  PetscInt slot; /* 3 triangle + edge; edge k runs from corner k to the next */
-} Edge;
-
 static int compare_edges(const void *a, const void *b)
 {
-  const Edge *p = (const Edge *)a, *q = (const Edge *)b;
+  const SbTriangleEdge *p = (const SbTriangleEdge *)a, *q = (const SbTriangleEdge *)b;
 
   if (p->key != q->key) return p->key < q->key ? -1 : 1;
   return (p->slot > q->slot) - (p->slot < q->slot);
+}
+
+PetscErrorCode SbTrianglesEdges(const SbTriangles *t, SbTriangleEdge edge[])
+{
+  const PetscInt n = 3 * t->ntri;
+
+  PetscFunctionBeginUser;
+  for (PetscInt i = 0; i < n; i++) {
+    const PetscInt a = t->tri[i], b = t->tri[i % 3 == 2 ? i - 2 : i + 1];
+
+    edge[i].key = (uint64_t)PetscMin(a, b) << 32 | (uint64_t)PetscMax(a, b);
+    edge[i].slot = i;
+  }
+  if (n) qsort(edge, (size_t)n, sizeof(*edge), compare_edges);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscInt SbTrianglesAtEdge(PetscInt n, const SbTriangleEdge edge[], PetscInt i)
+{
+  PetscInt m = 1;
+
+  for (; i + m < n && edge[i + m].key == edge[i].key;) m++;
+  return m;
 }
 
 /* The vertex of a triangle opposite to an edge of it. */
@@ -83,7 +97,7 @@ static PetscInt opposite(const SbTriangles *t, PetscInt slot)
 }
 
 /* What is wrong where n triangles meet at an edge. */
-static PetscErrorCode check_edge(const SbTriangleFile *f, PetscInt n, const Edge edge[])
+static PetscErrorCode check_edge(const SbTriangleFile *f, PetscInt n, const SbTriangleEdge edge[])
 {
   const SbTriangles *t = f->t;
   const PetscInt a = edge[0].slot / 3, b = edge[PetscMin(n - 1, 1)].slot / 3;
@@ -117,21 +131,14 @@ static PetscErrorCode check_edge(const SbTriangleFile *f, PetscInt n, const Edge
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode join_edges(const SbTriangleFile *f, PetscInt n, Edge edge[])
+static PetscErrorCode join_edges(const SbTriangleFile *f, PetscInt n, SbTriangleEdge edge[])
 {
   SbTriangles *t = f->t;
 
   PetscFunctionBeginUser;
-  for (PetscInt i = 0; i < n; i++) {
-    const PetscInt a = t->tri[i], b = t->tri[i % 3 == 2 ? i - 2 : i + 1];
-
-    edge[i].key = (uint64_t)PetscMin(a, b) << 32 | (uint64_t)PetscMax(a, b);
-    edge[i].slot = i;
-  }
-  qsort(edge, (size_t)n, sizeof(*edge), compare_edges);
+  PetscCall(SbTrianglesEdges(t, edge));
   for (PetscInt i = 0, m; i < n; i += m) {
-    for (m = 1; i + m < n && edge[i + m].key == edge[i].key; m++) {
-    }
+    m = SbTrianglesAtEdge(n, edge, i);
     PetscCall(check_edge(f, m, edge + i));
     t->across[edge[i].slot] = edge[i + 1].slot / 3;
     t->across[edge[i + 1].slot] = edge[i].slot / 3;
@@ -142,7 +149,7 @@ static PetscErrorCode join_edges(const SbTriangleFile *f, PetscInt n, Edge edge[
 static PetscErrorCode find_neighbours(const SbTriangleFile *f)
 {
   SbTriangles *t = f->t;
-  Edge *edge;
+  SbTriangleEdge *edge;
   PetscErrorCode ierr;
 
   PetscFunctionBeginUser;
@@ -189,8 +196,7 @@ static PetscErrorCode find_parts(const SbTriangles *t, PetscInt *npart, PetscInt
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Volume of the tet between a triangle and the point o, m^3. */
-static PetscReal cone(const SbTriangles *t, PetscInt f, const PetscReal o[3])
+PetscReal SbTriangleCone(const SbTriangles *t, PetscInt f, const PetscReal o[3])
 {
   PetscReal a[3][3], n[3];
 
@@ -199,8 +205,7 @@ static PetscReal cone(const SbTriangles *t, PetscInt f, const PetscReal o[3])
   return SbDot3(n, a[2]) / 6;
 }
 
-/* Solid angle of a triangle seen from o, positive from behind. */
-static PetscReal solid_angle(const SbTriangles *t, PetscInt f, const PetscReal o[3])
+PetscReal SbTriangleAngle(const SbTriangles *t, PetscInt f, const PetscReal o[3])
 {
   PetscReal a[3][3], l[3], n[3], down;
 
@@ -240,7 +245,7 @@ static PetscErrorCode check_nesting(const SbTriangleFile *f, PetscInt npart, con
     PetscReal around = 0;
 
     for (PetscInt i = 0; i < t->ntri; i++) {
-      if (part[i] != k) around += solid_angle(t, i, o);
+      if (part[i] != k) around += SbTriangleAngle(t, i, o);
     }
     around /= 4 * PETSC_PI;
     PetscCheck(PetscAbsReal(around - (p[k].volume < 0)) < 0.25, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
@@ -262,12 +267,12 @@ static PetscErrorCode check_parts(const SbTriangleFile *f, PetscInt npart, const
     PetscReal longest2, around;
 
     if (mine->first < 0) mine->first = i;
-    mine->volume += cone(t, i, corner(t, mine->first, 0));
-    mine->area += 0.5 * measure(t, i, &longest2, &around);
+    mine->volume += SbTriangleCone(t, i, corner(t, mine->first, 0));
+    mine->area += 0.5 * SbTriangleMeasure(t, i, &longest2, &around);
   }
   for (PetscInt k = 0; k < npart; k++) {
-    PetscCheck(PetscAbsReal(p[k].volume) > EMPTY * PetscPowReal(p[k].area / 6, 1.5), PETSC_COMM_SELF,
-               PETSC_ERR_USER_INPUT,
+    PetscCheck(PetscAbsReal(p[k].volume) > SB_TRIANGLE_EMPTY * PetscPowReal(p[k].area / 6, 1.5),
+               PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
                "%s: the part with triangle %lld encloses no volume; give it a thickness", f->where,
                (long long)f->number[p[k].first]);
     t->volume += p[k].volume;

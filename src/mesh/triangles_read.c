@@ -1,11 +1,14 @@
 /*
   triangles_read.c - surfaces from .stl (text and binary), .obj and .off files.
 
+  Groups, where they are wanted: the solids of an STL text (solid_1, ... without a name), the objects (o) and groups (g) of an OBJ file.
+
   STL lists triangles with three corners each; corners with equal coordinates, bit by bit, are one vertex. The normals in the file are
   not used: the order of the corners tells the side. It is binary when its size is what its count of triangles says (80 bytes, the count,
-  50 bytes per triangle), whatever its first word is. OBJ: the lines v and f; OFF: the plain kind. Faces with more
-  than three corners become a fan, which is right for convex ones.
+  50 bytes per triangle), whatever its first word is. OBJ: the lines v, f, o and g; OFF: the plain kind. Faces with more
+  than three corners are cut into triangles, see triangles_polygon.c.
 */
+#include <ctype.h>
 #include <stdlib.h>
 #include <strings.h>
 #include "triangles.h"
@@ -131,10 +134,30 @@ static PetscErrorCode stl_facet(SbScan *s, SbTriangleFile *f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The name behind `solid` is the rest of the line. */
+static PetscErrorCode stl_solid(SbScan *s, PetscInt nsolid, SbTriangleFile *f)
+{
+  char name[SB_NAME_MAX], *last;
+  const char *const names[1] = {name};
+  const char *end;
+
+  PetscFunctionBeginUser;
+  while (s->at < s->end && (*s->at == ' ' || *s->at == '\t')) s->at++;
+  end = (const char *)memchr(s->at, '\n', (size_t)(s->end - s->at));
+  if (!end) end = s->end;
+  (void)snprintf(name, sizeof(name), "%.*s", (int)PetscMin(end - s->at, (ptrdiff_t)sizeof(name) - 1), s->at);
+  for (last = name + strlen(name); last > name && isspace((unsigned char)last[-1]);) *--last = 0;
+  if (!name[0]) (void)snprintf(name, sizeof(name), "solid_%" PetscInt_FMT, nsolid);
+  PetscCall(SbTrianglesGroups(f, 1, names));
+  PetscCall(SbScanEndOfLine(s));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* One or more solids: together they are the surface. */
 static PetscErrorCode stl_text(SbScan *s, SbTriangleFile *f)
 {
   char word[32];
+  PetscInt nsolid = 0;
 
   PetscFunctionBeginUser;
   PetscCall(SbScanWord(s, sizeof(word), word));
@@ -142,7 +165,8 @@ static PetscErrorCode stl_text(SbScan *s, SbTriangleFile *f)
     SB_SCAN_ERROR(s, "expected 'solid', and the size of the file is not that of a binary one: it is no STL "
                      "file, or truncated");
   for (PetscBool open = PETSC_TRUE; word[0];) {
-    if (!open || strcasecmp(word, "facet")) PetscCall(SbScanEndOfLine(s)); /* the name of a solid */
+    if (!strcasecmp(word, "solid")) PetscCall(stl_solid(s, ++nsolid, f));
+    if (!strcasecmp(word, "endsolid")) PetscCall(SbScanEndOfLine(s)); /* its name again */
     if (open && !strcasecmp(word, "facet")) PetscCall(stl_facet(s, f));
     PetscCall(SbScanWord(s, sizeof(word), word));
     if (!strcasecmp(word, "endsolid"))
@@ -173,16 +197,24 @@ static PetscErrorCode stl_file(SbScan *s, SbTriangleFile *f)
 
 /* ------------------------------------------------------------------ OBJ and OFF */
 
-/* A face as a fan around its first corner; vertices from 0. */
-static PetscErrorCode add_face(SbScan *s, int64_t corner, int64_t v, PetscInt fan[2], int64_t number,
-                               SbTriangleFile *f)
+/* Of one face. */
+typedef struct {
+  PetscInt n, size;
+  PetscInt *vert;
+} Corners;
+
+/* Appends a corner to those of a face; v from 0. */
+static PetscErrorCode add_corner(SbScan *s, const SbTriangleFile *f, int64_t number, int64_t v, Corners *c)
 {
   PetscFunctionBeginUser;
   if (v < 0 || v >= f->t->nvert)
     SB_SCAN_ERROR(s, "face %lld uses a vertex that is not there (%lld of %lld)", (long long)number,
                   (long long)v + 1, (long long)f->t->nvert);
-  if (corner >= 2) PetscCall(SbTrianglesAdd(f, fan[0], fan[1], (PetscInt)v, number));
-  fan[corner > 0] = (PetscInt)v;
+  if (c->n == c->size) {
+    c->size = PetscMax(16, 2 * c->size);
+    PetscCall(PetscRealloc((size_t)c->size * sizeof(*c->vert), &c->vert));
+  }
+  c->vert[c->n++] = (PetscInt)v;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -200,13 +232,10 @@ static PetscErrorCode add_vertex(SbScan *s, SbTriangleFile *f)
 }
 
 /* The rest of a line f: numbers from 1, or from the last vertex back when negative; what follows a slash is not read. */
-static PetscErrorCode obj_face(SbScan *s, int64_t number, SbTriangleFile *f)
+static PetscErrorCode obj_face(SbScan *s, int64_t number, Corners *c, SbTriangleFile *f)
 {
-  PetscInt fan[2] = {0, 0};
-  int64_t n = 0;
-
   PetscFunctionBeginUser;
-  for (;; n++) {
+  for (c->n = 0;;) {
     char *after;
     long long v;
 
@@ -217,26 +246,75 @@ static PetscErrorCode obj_face(SbScan *s, int64_t number, SbTriangleFile *f)
     if (after == s->at || v == 0 || (*after && !strchr("/ \t\r\n", *after)))
       SB_SCAN_ERROR(s, "expected the number of a vertex, not zero");
     for (s->at = after; s->at < s->end && !strchr(" \t\r\n", *s->at);) s->at++;
-    PetscCall(add_face(s, n, v > 0 ? v - 1 : f->t->nvert + v, fan, number, f));
+    PetscCall(add_corner(s, f, number, v > 0 ? v - 1 : f->t->nvert + v, c));
   }
-  if (n < 3) SB_SCAN_ERROR(s, "face %lld has %lld corners; it needs three", (long long)number, (long long)n);
+  if (c->n < 3)
+    SB_SCAN_ERROR(s, "face %lld has %lld corners; it needs three", (long long)number, (long long)c->n);
+  PetscCall(SbTrianglesAddPolygon(s, c->n, c->vert, number, f));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The words behind o and g: the names of one object and of the groups that the next faces belong to. */
+typedef struct {
+  char object[SB_NAME_MAX], group[8][SB_NAME_MAX];
+  PetscInt ngroup;
+} ObjNames;
+
+static PetscErrorCode obj_names(SbScan *s, PetscBool object, ObjNames *names, SbTriangleFile *f)
+{
+  const char *all[9];
+  PetscInt n = 0;
+
+  PetscFunctionBeginUser;
+  if (object)
+    names->object[0] = 0;
+  else
+    names->ngroup = 0;
+  for (;;) {
+    char word[SB_NAME_MAX];
+
+    while (s->at < s->end && (*s->at == ' ' || *s->at == '\t' || *s->at == '\r')) s->at++;
+    if (s->at >= s->end || *s->at == '\n') break;
+    PetscCall(SbScanWord(s, sizeof(word), word));
+    if (!object && names->ngroup < 8)
+      PetscCall(PetscStrncpy(names->group[names->ngroup++], word, SB_NAME_MAX));
+    if (object && !names->object[0]) PetscCall(PetscStrncpy(names->object, word, SB_NAME_MAX));
+  }
+  if (names->object[0]) all[n++] = names->object;
+  for (PetscInt i = 0; i < names->ngroup; i++) all[n++] = names->group[i];
+  PetscCall(SbTrianglesGroups(f, n, all));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode obj_lines(SbScan *s, Corners *c, SbTriangleFile *f)
+{
+  int64_t nface = 0;
+  ObjNames names;
+  char word[16];
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscMemzero(&names, sizeof(names)));
+  for (;;) {
+    PetscCall(SbScanWord(s, sizeof(word), word));
+    if (!word[0]) break;
+    if (!strcmp(word, "v")) PetscCall(add_vertex(s, f));
+    if (!strcmp(word, "f")) PetscCall(obj_face(s, ++nface, c, f));
+    if (!strcmp(word, "g") || !strcmp(word, "o"))
+      PetscCall(obj_names(s, (PetscBool)(word[0] == 'o'), &names, f));
+    PetscCall(SbScanEndOfLine(s));
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 static PetscErrorCode obj_file(SbScan *s, SbTriangleFile *f)
 {
-  int64_t nface = 0;
-  char word[16];
+  Corners corners = {0, 0, NULL};
+  PetscErrorCode ierr;
 
   PetscFunctionBeginUser;
-  for (;;) {
-    PetscCall(SbScanWord(s, sizeof(word), word));
-    if (!word[0]) break;
-    if (!strcmp(word, "v")) PetscCall(add_vertex(s, f));
-    if (!strcmp(word, "f")) PetscCall(obj_face(s, ++nface, f));
-    PetscCall(SbScanEndOfLine(s));
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
+  ierr = obj_lines(s, &corners, f);
+  PetscCall(PetscFree(corners.vert));
+  PetscFunctionReturn(ierr);
 }
 
 /* To the next number, over lines that begin with #. */
@@ -251,7 +329,7 @@ static PetscErrorCode off_next(SbScan *s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode off_file(SbScan *s, SbTriangleFile *f)
+static PetscErrorCode off_lines(SbScan *s, Corners *c, SbTriangleFile *f)
 {
   int64_t count[3];
   char word[16];
@@ -273,25 +351,37 @@ static PetscErrorCode off_file(SbScan *s, SbTriangleFile *f)
     PetscCall(SbScanEndOfLine(s));
   }
   for (int64_t i = 0; i < count[1]; i++) {
-    PetscInt fan[2] = {0, 0};
     int64_t n, v;
 
     PetscCall(off_next(s));
     PetscCall(SbScanText(s, "number of corners of a face", &n));
     if (n < 3) SB_SCAN_ERROR(s, "face %lld has %lld corners; it needs three", (long long)i + 1, (long long)n);
+    c->n = 0;
     for (int64_t k = 0; k < n; k++) {
       PetscCall(SbScanText(s, "vertex of a face", &v));
-      PetscCall(add_face(s, k, v, fan, i + 1, f));
+      PetscCall(add_corner(s, f, i + 1, v, c));
     }
+    PetscCall(SbTrianglesAddPolygon(s, c->n, c->vert, i + 1, f));
     PetscCall(SbScanEndOfLine(s)); /* colours */
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+static PetscErrorCode off_file(SbScan *s, SbTriangleFile *f)
+{
+  Corners corners = {0, 0, NULL};
+  PetscErrorCode ierr;
+
+  PetscFunctionBeginUser;
+  ierr = off_lines(s, &corners, f);
+  PetscCall(PetscFree(corners.vert));
+  PetscFunctionReturn(ierr);
+}
+
 /* ------------------------------------------------------------------ files */
 
-static PetscErrorCode with_file(const char *path, PetscErrorCode (*read)(SbScan *, SbTriangleFile *),
-                                SbTriangleFile *f)
+PetscErrorCode SbTrianglesScan(const char *path, PetscErrorCode (*read)(SbScan *, SbTriangleFile *),
+                               SbTriangleFile *f)
 {
   SbScan scan;
   PetscErrorCode ierr;
@@ -305,15 +395,15 @@ static PetscErrorCode with_file(const char *path, PetscErrorCode (*read)(SbScan 
 
 PetscErrorCode SbTrianglesRead_STL(const char *path, SbTriangleFile *f)
 {
-  return with_file(path, stl_file, f);
+  return SbTrianglesScan(path, stl_file, f);
 }
 
 PetscErrorCode SbTrianglesRead_OBJ(const char *path, SbTriangleFile *f)
 {
-  return with_file(path, obj_file, f);
+  return SbTrianglesScan(path, obj_file, f);
 }
 
 PetscErrorCode SbTrianglesRead_OFF(const char *path, SbTriangleFile *f)
 {
-  return with_file(path, off_file, f);
+  return SbTrianglesScan(path, off_file, f);
 }

@@ -168,6 +168,7 @@ static PetscErrorCode read_body(SbModel model, PetscInt i)
   PetscCall(SbScopeSet(&scope, "body", "", body->name));
   PetscCall(SbOptionString(&scope, "mesh", sizeof(body->mesh), body->mesh));
   PetscCheck(body->mesh[0], PETSC_COMM_SELF, PETSC_ERR_USER, "-body_%s_mesh names no file", body->name);
+  PetscCall(SbTetOptionsRead(&scope, body->mesh, &body->tet));
   PetscCall(SbOptionReal(&scope, "scale", &body->scale));
   PetscCall(SbOptionReals(&scope, "rotate", body->rotate));
   axis = PetscAbsReal(body->rotate[0]) + PetscAbsReal(body->rotate[1]) + PetscAbsReal(body->rotate[2]);

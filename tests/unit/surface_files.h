@@ -134,6 +134,22 @@ static inline void test_surface_sphere(int n, TestSurface *s)
   free(old);
 }
 
+/* The surface so far once more, scaled about the origin and shifted along x. */
+static inline void test_surface_shifted_copy(TestSurface *s, PetscReal scale, PetscReal shift)
+{
+  const PetscInt nvert = s->nvert, ntri = s->ntri;
+
+  test_surface_grow(s, nvert, ntri);
+  for (PetscInt v = 0; v < nvert; v++) {
+    for (int k = 0; k < 3; k++) s->x[nvert + v][k] = scale * s->x[v][k] + (k ? 0 : shift);
+  }
+  for (PetscInt f = 0; f < ntri; f++) {
+    for (int k = 0; k < 3; k++) s->tri[ntri + f][k] = nvert + s->tri[f][k];
+  }
+  s->nvert += nvert;
+  s->ntri += ntri;
+}
+
 /* ------------------------------------------------------------------ files */
 
 static inline void write_stl(FILE *f, const TestSurface *s)

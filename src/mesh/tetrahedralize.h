@@ -1,0 +1,84 @@
+/*
+  tetrahedralize.h - from closed surfaces of triangles to tets: what the files surface*.c and tet*.c share, and what re-meshing calls.
+  Rank 0 only.
+*/
+#pragma once
+#include "triangles.h"
+
+/*
+  Surfaces that cut space into regions; every triangle knows the region on each of its sides. Arrays are owned, SbSkinDestroy().
+  A body without inner surfaces has one region: side is {-1, 0} for triangles seen counter-clockwise from outside.
+*/
+typedef struct {
+  PetscInt nvert, ntri, nregion;
+  PetscReal *x;    /* [nvert][3], every vertex is used by a triangle */
+  PetscInt *tri;   /* [ntri][3] */
+  PetscInt *tags;  /* [ntri] tag set in the import that the tets go to, 0: of no group */
+  int64_t *number; /* [ntri] in the file, for messages */
+  PetscInt *side;  /* [ntri][2] region in front (corners counter-clockwise) and behind; -1: nothing there */
+  PetscInt *region_tags; /* [nregion] tag set of the tets of each region */
+} SbSkin;
+
+PetscErrorCode SbSkinCreate(PetscInt nvert, PetscInt ntri, PetscInt nregion, SbSkin *surface);
+PetscErrorCode SbSkinDestroy(SbSkin *surface);
+/* Volume of each region, volume[nregion]; returns the mean edge of the triangles. */
+PetscReal SbSkinMeasure(const SbSkin *surface, PetscReal volume[]);
+
+/*
+  SbTetrahedralize - fills regions with tets of about one size. Not collective.
+
+  Input:
+    where   - begins every message
+    surface - closed; no two triangles cut each other; lengths in any unit
+    options - size in that unit, who does it, whether the triangles stay
+  Output:
+    body - zeroed or with groups and tag sets alone: gets x, vert_number, item[3] with the tags of its region, item[2] with every
+           triangle whose tag set is not empty, and note. With SB_TET_KEEP the first surface->nvert vertices are those of the surface,
+           bit by bit and in order, and its triangles are the facets of the tets, inner ones too.
+
+  Errors: PETSC_ERR_USER_INPUT, one line with what gmsh and what tetgen said and what to do; then body holds no mesh.
+*/
+PetscErrorCode SbTetrahedralize(const char *where, const SbSkin *surface, const SbTetOptions *options,
+                                SbImport *body);
+
+/* ------------------------------------------------------------------ from a file to a surface */
+
+/* What was found and mended, for the note of the body. */
+typedef struct {
+  PetscReal tolerance, moved;  /* vertices within this distance were joined, and the largest such distance */
+  PetscInt nwelded;            /* vertices joined with another */
+  PetscInt ncollapsed;         /* triangles that lost an edge thereby, left out */
+  PetscInt ndoubled;           /* triangles given twice, left out */
+  PetscInt nwall;              /* pairs of triangles back to back: one is kept as a wall between regions */
+  PetscInt nflat;              /* triangles without area, taken into their neighbour */
+  PetscInt nturned;            /* triangles turned to the side of their neighbours */
+  PetscInt ncavity;            /* parts taken as cavities */
+  PetscInt npairs, nuntangled; /* triangles that cut each other, and vertices moved to part them */
+  PetscReal untangled;         /* by how much */
+  PetscInt nidle;              /* triangles with nothing on both sides, left out */
+} SbMended;
+
+/* Joins vertices no farther apart than the tolerance; leaves out what collapses, doubles and unused vertices. */
+PetscErrorCode SbSkinWeld(SbTriangleFile *file, PetscReal tolerance, SbMended *mended);
+/* Takes triangles without area into their neighbours; refuses those that have none to go to, and open edges. */
+PetscErrorCode SbSkinClose(SbTriangleFile *file, SbMended *mended);
+/* Takes small folds apart by moving vertices no farther than the reach; refuses all else that cuts or touches itself. */
+PetscErrorCode SbSkinCross(SbTriangleFile *file, PetscReal reach, SbMended *mended);
+/* The regions: fills side of each triangle; regions get groups region_1, ... and those that the file names. */
+PetscErrorCode SbSkinRegions(SbTriangleFile *file, SbMended *mended, SbSkin *surface);
+
+/* ------------------------------------------------------------------ boxes.c: which boxes meet a box */
+
+/* A tree over boxes; nodes[1] is the root, the children of k are 2 k and 2 k + 1. */
+typedef struct {
+  PetscInt n, nleaf;   /* boxes; leaves, a power of two */
+  PetscInt *order;     /* [n] boxes in the order of the leaves */
+  PetscReal (*box)[6]; /* [2 nleaf] lower and upper corner of each node */
+} SbBoxTree;
+PetscErrorCode SbBoxTreeCreate(PetscInt n, const PetscReal (*box)[6], SbBoxTree *tree);
+PetscErrorCode SbBoxTreeDestroy(SbBoxTree *tree);
+/* Box of a triangle, vert[3]. */
+void SbTriangleBox(const PetscReal x[], const PetscInt vert[], PetscReal box[6]);
+/* Calls visit(ctx, i) for each box that meets the given one, until it returns an error. */
+PetscErrorCode SbBoxTreeVisit(const SbBoxTree *tree, const PetscReal box[6],
+                              PetscErrorCode (*visit)(void *ctx, PetscInt i), void *ctx);

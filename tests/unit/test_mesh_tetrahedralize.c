@@ -1,0 +1,172 @@
+// Tets from closed surfaces: volumes of nested regions are exact, kept triangles stay, sizes give counts, both roads, texts of errors.
+// @ranks 1 3
+#include "../../src/mesh/tetrahedralize.h"
+#include "mesh_test.h"
+#include "surface_files.h"
+
+/* One region around which all triangles are seen counter-clockwise, or two: behind those from `inner` on is the second. */
+static PetscErrorCode make_skin(const TestSurface *t, PetscInt inner, SbSkin *s)
+{
+  PetscFunctionBeginUser;
+  PetscCall(SbSkinCreate(t->nvert, t->ntri, inner < t->ntri ? 2 : 1, s));
+  for (PetscInt v = 0; v < t->nvert; v++) {
+    for (int k = 0; k < 3; k++) s->x[3 * v + k] = t->x[v][k];
+  }
+  for (PetscInt f = 0; f < t->ntri; f++) {
+    for (int k = 0; k < 3; k++) s->tri[3 * f + k] = t->tri[f][k];
+    s->side[2 * f] = f < inner ? -1 : 0;
+    s->side[2 * f + 1] = f < inner ? 0 : 1;
+    s->number[f] = f + 1;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Volume of the tets of each tag set. */
+static void measure(const SbImport *im, PetscInt n, PetscReal volume[])
+{
+  for (PetscInt i = 0; i < n; i++) volume[i] = 0;
+  for (PetscInt c = 0; c < im->item[3].n; c++)
+    volume[im->item[3].tags[c]] += PetscAbsReal(SbTetDet(im->x, im->item[3].vert + 4 * c)) / 6;
+}
+
+/* A sphere within a sphere, each a region of its own; the triangles stay. */
+static PetscErrorCode check_kept(SbTetRoad road)
+{
+  TestSurface t;
+  SbSkin s;
+  SbTetOptions options;
+  SbImport im;
+  SbFaces faces;
+  PetscInt slots[2], none, group[2], nin;
+  PetscReal want[2], got[3];
+
+  PetscFunctionBeginUser;
+  memset(&t, 0, sizeof(t));
+  memset(&im, 0, sizeof(im));
+  test_surface_sphere(2, &t);
+  nin = t.ntri;
+  test_surface_shifted_copy(&t, 0.4, 0.1);
+  PetscCall(make_skin(&t, nin, &s));
+  PetscCall(SbImportTagSet(&im, 0, NULL, &none));
+  for (int r = 0; r < 2; r++) {
+    PetscCall(SbImportGroup(&im, 3, r + 1, NULL, &group[r]));
+    PetscCall(SbImportTagSet(&im, 1, &group[r], &s.region_tags[r]));
+  }
+  for (PetscInt f = nin; f < t.ntri; f++) s.tags[f] = s.region_tags[0];
+  (void)SbSkinMeasure(&s, want);
+  PetscCall(SbTetDefaults(&options));
+  options.road = road;
+  options.surface = SB_TET_KEEP;
+  PetscCall(SbTetrahedralize("test", &s, &options, &im));
+  measure(&im, 3, got);
+  SB_CHECK_NEAR(got[s.region_tags[0]], want[0], 1e-11, "outer region");
+  SB_CHECK_NEAR(got[s.region_tags[1]], want[1], 1e-11, "inner region");
+  SB_CHECK(im.item[3].n > 400 && im.item[3].n < 8000, "%d tets", (int)im.item[3].n);
+  SB_CHECK(im.item[2].n == nin, "%d triangles of groups", (int)im.item[2].n);
+  for (PetscInt i = 0; i < 3 * s.nvert; i++) SB_CHECK(im.x[i] == s.x[i], "vertex %d moved", (int)i / 3);
+  PetscCall(SbImportCheck(&im, &faces));
+  SB_CHECK(faces.nboundary == nin, "%d facets", (int)faces.nboundary);
+  for (PetscInt f = 0; f < t.ntri; f++) {
+    const PetscInt n = SbFacesFind(&faces, s.tri + 3 * f, slots);
+
+    SB_CHECK(n == (f < nin ? 1 : 2), "triangle %d has %d tets", (int)f, (int)n);
+  }
+  PetscCall(SbFacesDestroy(&faces));
+  PetscCall(SbImportDestroy(&im));
+  PetscCall(SbSkinDestroy(&s));
+  test_surface_free(&t);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The unit sphere at three sizes: half the size makes about eight times the tets, none of them bad. */
+static PetscErrorCode check_sizes(void)
+{
+  const PetscReal sizes[3] = {0.5, 0.35, 0.25};
+  TestSurface t;
+  SbSkin s;
+  SbTetOptions options;
+  PetscReal per[3];
+
+  PetscFunctionBeginUser;
+  memset(&t, 0, sizeof(t));
+  test_surface_sphere(3, &t);
+  PetscCall(make_skin(&t, t.ntri, &s));
+  for (int k = 0; k < 3; k++) {
+    SbImport im;
+    SbBody body = test_body("b", "sphere");
+    SbFaces faces;
+    PetscReal volume;
+    PetscInt none;
+
+    memset(&im, 0, sizeof(im));
+    PetscCall(SbImportTagSet(&im, 0, NULL, &none));
+    PetscCall(SbTetDefaults(&options));
+    options.size = sizes[k];
+    options.surface = SB_TET_REMESH;
+    PetscCall(SbTetrahedralize("test", &s, &options, &im));
+    measure(&im, 1, &volume);
+    SB_CHECK_NEAR(volume, 4 * PETSC_PI / 3, 0.12 * 4 * PETSC_PI / 3, "sphere");
+    per[k] = (PetscReal)im.item[3].n * sizes[k] * sizes[k] * sizes[k];
+    SB_CHECK(per[k] > 3 * PETSC_SQRT2 * volume && per[k] < 12 * PETSC_SQRT2 * volume, "size %g: %d tets",
+             (double)sizes[k], (int)im.item[3].n);
+    PetscCall(SbImportCheck(&im, &faces));
+    PetscCall(SbImportQuality(&im, &faces, &body));
+    SB_CHECK(body.min_dihedral > 8, "size %g: smallest dihedral angle %g", (double)sizes[k],
+             (double)body.min_dihedral);
+    SB_CHECK(strstr(body.note, "surface meshed anew"), "'%s'", body.note);
+    PetscCall(SbFacesDestroy(&faces));
+    PetscCall(SbImportDestroy(&im));
+  }
+  for (int k = 1; k < 3; k++)
+    SB_CHECK(per[k] / per[0] > 0.6 && per[k] / per[0] < 1.7, "sizes 0 and %d: %g and %g", k, (double)per[0],
+             (double)per[k]);
+  PetscCall(SbSkinDestroy(&s));
+  test_surface_free(&t);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* What neither road can do: two boxes through each other, passed by the checks. */
+static PetscErrorCode check_failure(void)
+{
+  const PetscReal lo[3] = {0, 0, 0}, hi[3] = {1, 1, 1}, lo2[3] = {0.5, 0.4, 0.3}, hi2[3] = {1.5, 1.6, 1.7};
+  TestSurface t;
+  SbSkin s;
+  SbTetOptions options;
+  SbImport im;
+
+  PetscFunctionBeginUser;
+  memset(&t, 0, sizeof(t));
+  memset(&im, 0, sizeof(im));
+  test_surface_box(lo, hi, PETSC_FALSE, &t);
+  test_surface_box(lo2, hi2, PETSC_FALSE, &t);
+  PetscCall(make_skin(&t, t.ntri, &s));
+  PetscCall(SbTetDefaults(&options));
+  TEST_MESSAGE(SbTetrahedralize("test", &s, &options, &im), PETSC_ERR_USER_INPUT, "; tetgen: ");
+  TEST_MESSAGE(SbTetrahedralize("test", &s, &options, &im), PETSC_ERR_USER_INPUT,
+               "test: no tets could be made of the surface. gmsh: ");
+  SB_CHECK(!im.x && !im.item[3].n, "something is left");
+  options.size = 1e-6;
+  TEST_MESSAGE(SbTetrahedralize("test", &s, &options, &im), PETSC_ERR_USER_INPUT,
+               "give a size of at least 0.0");
+  for (PetscInt f = 0; f < t.ntri; f++) s.side[2 * f] = 0, s.side[2 * f + 1] = -1;
+  TEST_MESSAGE(SbTetrahedralize("test", &s, &options, &im), PETSC_ERR_USER_INPUT,
+               "region 1 has the volume -2.68; its triangles are turned");
+  PetscCall(SbSkinDestroy(&s));
+  test_surface_free(&t);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+int main(int argc, char **argv)
+{
+  PetscMPIInt rank;
+
+  SB_TEST_BEGIN(argc, argv);
+  PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
+  if (!rank) {
+    PetscCall(check_kept(SB_TET_GMSH));
+    PetscCall(check_kept(SB_TET_TETGEN));
+    PetscCall(check_sizes());
+    PetscCall(check_failure());
+  }
+  SB_TEST_END();
+}
