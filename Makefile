@@ -57,12 +57,16 @@ Q        := $(if $(V),,@)
 SAY       = $(if $(V),@:,@echo)
 
 # ---- program and tests
-all: bin/supple ## the program, bin/supple (default)
+all: bin/supple bin/supple-mesh ## the programs, bin/supple and bin/supple-mesh (default)
 
-bin/supple: $(BUILD)/supple FORCE
+bin/%: $(BUILD)/% FORCE
 	@mkdir -p bin; cmp -s $< $@ || install -m 755 $< $@
 
 $(BUILD)/supple: $(BUILD)/src/main.o $(BUILD)/libsupple.a
+	$(SAY) "  link     $@"
+	$(Q)$(LINK) -o $@ $^ $(LIBS) $(RPATH)
+
+$(BUILD)/supple-mesh: $(BUILD)/src/mesh_main.o $(BUILD)/libsupple.a
 	$(SAY) "  link     $@"
 	$(Q)$(LINK) -o $@ $^ $(LIBS) $(RPATH)
 
@@ -119,13 +123,13 @@ pictures: deps ## run the scenarios of contact on 1 rank and draw them: docs/*.p
 
 CHECK = tests/run --build $(BUILD) $(if $(T),--match '$(T)')
 check: deps ## install what is missing, build, run the tests (5 to 10 minutes; one of them: T=name)
-	$(AGAIN) bin/supple tests $(MESHES)
+	$(AGAIN) bin/supple bin/supple-mesh tests $(MESHES)
 	@scripts/venv
 	@$(CHECK)
 
 check-long: deps ## the tests that take longer or need ParaView
 	@scripts/install-deps long
-	$(AGAIN) bin/supple tests $(MESHES)
+	$(AGAIN) bin/supple bin/supple-mesh tests $(MESHES)
 	@scripts/venv
 	@$(CHECK) --long
 
@@ -154,7 +158,7 @@ $(BUILD)/unit: $(filter $(BUILD)/tests/unit/%,$(TESTBIN))
 	@touch $@
 
 bench: deps ## speed, kept as CSV below tests/perf/results; QUICK=1 measures less
-	$(AGAIN) bin/supple tests
+	$(AGAIN) bin/supple bin/supple-mesh tests
 	@scripts/bench --build $(BUILD) $(if $(QUICK),--quick)
 
 locking: deps ## how P1, CR and DG behave near nu = 1/2, measured into docs/locking.md with its plots (about 10 minutes)
@@ -173,9 +177,10 @@ accuracy: deps ## error against time for every choice, measured into docs/accura
 docs: bin/supple ## docs/options.md from the option table
 	bin/supple -options_markdown docs/options.md
 
-install: bin/supple $(MESHES) ## program, scenarios and documents to PREFIX=/usr/local (DESTDIR= in front)
-	install -d $(DESTDIR)$(PREFIX)/bin $(DESTDIR)$(PREFIX)/share/supple/scenarios $(DESTDIR)$(PREFIX)/share/supple/meshes $(DESTDIR)$(PREFIX)/share/doc/supple
-	install -m 755 bin/supple $(DESTDIR)$(PREFIX)/bin/supple
+install: bin/supple bin/supple-mesh $(MESHES) ## programs, scenarios and documents to PREFIX=/usr/local (DESTDIR= in front)
+	install -d $(DESTDIR)$(PREFIX)/bin $(DESTDIR)$(PREFIX)/share/supple/scenarios $(DESTDIR)$(PREFIX)/share/supple/meshes $(DESTDIR)$(PREFIX)/share/supple/scripts $(DESTDIR)$(PREFIX)/share/doc/supple
+	install -m 755 bin/supple bin/supple-mesh $(DESTDIR)$(PREFIX)/bin
+	install -m 755 scripts/render scripts/venv $(DESTDIR)$(PREFIX)/share/supple/scripts
 	install -m 644 scenarios/*.opts $(DESTDIR)$(PREFIX)/share/supple/scenarios
 	install -m 644 meshes/*.geo $(MESHES) $(DESTDIR)$(PREFIX)/share/supple/meshes
 	install -m 644 README.md CHANGELOG.md LICENSE $(wildcard docs/*.md) $(DESTDIR)$(PREFIX)/share/doc/supple

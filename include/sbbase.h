@@ -114,6 +114,8 @@ PetscErrorCode SbNearest(const char *word, PetscInt n, const char *const names[]
 PetscErrorCode SbErrorHandlerInstall(void);
 PetscErrorCode SbErrorRegister(void);
 PetscErrorCode SbErrorSetFromOptions(void); /* reads -error_trace */
+/* The name that begins error lines and warnings, "supple" without this call; a literal. */
+void SbErrorSetProgram(const char *name);
 /* The option file that PETSc is about to read: PETSc's messages about YAML do not name it. */
 void SbErrorSetFile(const char *file);
 /* An error line at the end of a run whose calls all succeeded: a solver gave up, the output is complete. A printf format. */

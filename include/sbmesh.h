@@ -40,8 +40,10 @@ typedef struct {
   char mesh
     [PETSC_MAX_PATH_LEN]; /* file, or box:lx,ly,lz:n or box:lx,ly,lz:nx,ny,nz, from the origin to (lx, ly, lz);
                                          n cells along the shortest side; groups xmin xmax ymin ymax zmin zmax */
-  PetscReal scale;        /* factor on the file's coordinates, first */
-  PetscReal rotate[4];    /* axis (need not be normed) and angle in degrees, second */
+  PetscInt
+    mesh_step; /* of a file that a run wrote: the step whose positions are the mesh; 0 at rest, -1 the last */
+  PetscReal scale;            /* factor on the file's coordinates, first */
+  PetscReal rotate[4];        /* axis (need not be normed) and angle in degrees, second */
   PetscReal translate[3];     /* m, third */
   SbTetOptions tet;           /* for a mesh that is a surface; m */
   char element[SB_NAME_MAX];  /* p1, cr, dg */

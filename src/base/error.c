@@ -16,15 +16,16 @@
 #define GRACE 3.0 /* s that a failed rank waits for the others */
 
 static struct {
-  MPI_Comm comm;      /* ours alone, so that nothing else can be pending on it */
-  PetscBool pending;  /* a user error is on its way up, or was posted */
-  PetscBool posted;   /* by SbErrorPost(): the run counts as failed */
-  PetscBool trace;    /* -error_trace */
-  char message[2048]; /* of the last error */
-  char file[256];     /* option files, for messages about YAML */
+  MPI_Comm comm;       /* ours alone, so that nothing else can be pending on it */
+  PetscBool pending;   /* a user error is on its way up, or was posted */
+  PetscBool posted;    /* by SbErrorPost(): the run counts as failed */
+  PetscBool trace;     /* -error_trace */
+  char message[2048];  /* of the last error */
+  char file[256];      /* option files, for messages about YAML */
+  const char *program; /* begins every line */
   void (*farewell)(const char *message, void *ctx); /* called by the rank that speaks for the run */
   void *farewell_ctx;
-} state = {.comm = MPI_COMM_NULL};
+} state = {.comm = MPI_COMM_NULL, .program = "supple"};
 
 static const SbOption rows[] = {
   {"error_trace", SB_OPTION_BOOL, 1, "", "false", "",
@@ -106,6 +107,11 @@ PetscErrorCode SbErrorSetFromOptions(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+void SbErrorSetProgram(const char *name)
+{
+  state.program = name;
+}
+
 void SbErrorSetFile(const char *file)
 {
   const size_t n = strlen(state.file);
@@ -134,7 +140,7 @@ static void speak(void)
 {
   if (state.farewell) (*state.farewell)(state.message, state.farewell_ctx);
   (void)fflush(stdout);
-  (void)fprintf(stderr, "supple: error: %s\n", state.message);
+  (void)fprintf(stderr, "%s: error: %s\n", state.program, state.message);
   (void)fflush(stderr);
 }
 
@@ -179,7 +185,7 @@ PetscErrorCode SbWarning(MPI_Comm comm, const char *format, ...)
   PetscCallMPI(MPI_Comm_rank(comm, &rank));
   if (rank) PetscFunctionReturn(PETSC_SUCCESS);
   (void)fflush(stdout);
-  (void)fprintf(stderr, "supple: warning: ");
+  (void)fprintf(stderr, "%s: warning: ", state.program);
   va_start(args, format);
   (void)vfprintf(stderr, format, args);
   va_end(args);

@@ -109,18 +109,25 @@ static inline PetscReal longest_edge2(const PetscReal x[], const PetscInt v[4])
   return L2;
 }
 
+PetscBool SbTetFlat(const PetscReal x[], const PetscInt v[4], PetscReal largest, PetscReal *det)
+{
+  const PetscReal L2 = longest_edge2(x, v), L = PetscSqrtReal(L2);
+
+  *det = SbTetDet(x, v);
+  return (PetscBool) !(PetscAbsReal(*det) > (1e-12 * L + 8 * PETSC_MACHINE_EPSILON * largest) * L2);
+}
+
 static PetscErrorCode orient(SbImport *im)
 {
-  PetscReal largest = 0;
+  PetscReal largest = 0, det;
 
   PetscFunctionBeginUser;
   for (PetscInt i = 0; i < 3 * im->nvert; i++) largest = PetscMax(largest, PetscAbsReal(im->x[i]));
   for (PetscInt c = 0; c < im->item[3].n; c++) {
     PetscInt *v = im->item[3].vert + 4 * c;
-    const PetscReal det = SbTetDet(im->x, v), L2 = longest_edge2(im->x, v), L = PetscSqrtReal(L2);
 
-    if (!(PetscAbsReal(det) > (1e-12 * L + 8 * PETSC_MACHINE_EPSILON * largest) * L2))
-      PetscCall(flat(im, c, det, L));
+    if (SbTetFlat(im->x, v, largest, &det))
+      PetscCall(flat(im, c, det, PetscSqrtReal(longest_edge2(im->x, v))));
     if (det < 0) {
       const PetscInt keep = v[3];
 

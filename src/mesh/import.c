@@ -50,6 +50,21 @@ PetscErrorCode SbImportAddItem(SbImport *im, int dim, const PetscInt vert[], Pet
   for (int i = 0; i <= dim; i++) item->vert[(dim + 1) * item->n + i] = vert[i];
   item->tags[item->n] = tags;
   item->number[item->n++] = number;
+  if (im->progress && !(item->n & 0xffff))
+    PetscCall(im->progress(dim == 3 ? "tets" : "triangles", item->n, 0, im->progress_ctx));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbImportSetItems(SbImport *im, int dim, PetscInt n)
+{
+  SbItems *item = &im->item[dim];
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscMalloc1((size_t)n * (size_t)(dim + 1), &item->vert));
+  PetscCall(PetscMalloc1(n, &item->tags));
+  PetscCall(PetscMalloc1(n, &item->number));
+  for (PetscInt i = 0; i < n; i++) item->number[i] = i + 1;
+  item->n = item->capacity = n;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -227,12 +242,16 @@ static const struct {
   const char *extension;
   SbReader read;
 } readers[] = {
-  {".msh", SbImportRead_Msh},           {".vtk", SbImportRead_VTK},     {".vtu", SbImportRead_VTU},
-  {".mesh", SbImportRead_Mesh},         {".node", SbImportRead_TetGen}, {".ele", SbImportRead_TetGen},
-  {".face", SbImportRead_TetGen},       {".edge", SbImportRead_TetGen}, {".vol", SbImportRead_Netgen},
-  {".neu", SbImportRead_NetgenNeutral}, {".inp", SbImportRead_Abaqus},  {".unv", SbImportRead_UNV},
-  {".bdf", SbImportRead_Nastran},       {".nas", SbImportRead_Nastran}, {".stl", SbImportRead_Surface},
-  {".obj", SbImportRead_Surface},       {".off", SbImportRead_Surface}, {".ply", SbImportRead_Surface},
+  {".msh", SbImportRead_Msh},     {".vtk", SbImportRead_VTK},
+  {".vtu", SbImportRead_VTU},     {".mesh", SbImportRead_Mesh},
+  {".node", SbImportRead_TetGen}, {".ele", SbImportRead_TetGen},
+  {".face", SbImportRead_TetGen}, {".edge", SbImportRead_TetGen},
+  {".vol", SbImportRead_Netgen},  {".neu", SbImportRead_NetgenNeutral},
+  {".inp", SbImportRead_Abaqus},  {".unv", SbImportRead_UNV},
+  {".bdf", SbImportRead_Nastran}, {".nas", SbImportRead_Nastran},
+  {".stl", SbImportRead_Surface}, {".obj", SbImportRead_Surface},
+  {".off", SbImportRead_Surface}, {".ply", SbImportRead_Surface},
+  {".h5", SbImportRead_H5},       {".xmf", SbImportRead_Xdmf},
 };
 
 /* The reader of a file with this ending; NULL when there is none: then `known` lists all endings. */
@@ -266,9 +285,9 @@ static PetscErrorCode find_reader(const SbBody *body, SbReader *read)
   PetscCall(PetscTestFile(node, 'r', &tetgen));
   PetscCheck(
     tetgen, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
-    "body '%s': mesh '%s' is of no known kind; give a file that ends in %s (or the name of TetGen's files "
+    "%s%s%smesh '%s' is of no known kind; give a file that ends in %s (or the name of TetGen's files "
     "without an ending), or box:lx,ly,lz:n",
-    body->name, body->mesh, known);
+    body->name[0] ? "body '" : "", body->name, body->name[0] ? "': " : "", body->mesh, known);
   *read = SbImportRead_TetGen;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -280,7 +299,11 @@ PetscErrorCode SbImportRead(const SbBody *body, SbImport *im)
 
   PetscFunctionBeginUser;
   PetscCall(find_reader(body, &read));
-  (void)snprintf(im->where, sizeof(im->where), "body '%s': %s", body->name, body->mesh);
+  if (body->name[0])
+    (void)snprintf(im->where, sizeof(im->where), "body '%s': %s", body->name, body->mesh);
+  else
+    (void)snprintf(im->where, sizeof(im->where), "%s", body->mesh);
+  im->step = body->mesh_step;
   PetscCall(SbImportTagSet(im, 0, NULL, &none));
   im->tet = body->tet;
   im->scale = body->scale;

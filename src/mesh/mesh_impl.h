@@ -4,7 +4,7 @@
   Everything here lives on rank 0 until distribute.c hands the pieces to their ranks.
 */
 #pragma once
-#include "sbmesh.h"
+#include "sbmeshfile.h"
 
 #define SB_GROUP_MAX (2 * SB_NAME_MAX) /* longest name of a physical group, with the terminating zero */
 
@@ -27,7 +27,7 @@ typedef struct {
 } SbItems;
 
 /* A body as its reader delivers it. Zeroed before the reader is called; freed by SbImportDestroy(), also after an error. */
-typedef struct {
+struct _p_SbImport {
   char where[PETSC_MAX_PATH_LEN + 2 * SB_NAME_MAX]; /* "body 'liver': liver.msh", begins every message */
   PetscInt nvert;
   PetscReal *x;         /* [nvert][3] m once placed */
@@ -45,12 +45,15 @@ typedef struct {
   SbTetOptions tet;     /* given: how a surface becomes tets */
   PetscReal scale;      /* given: factor that placing will use; a reader that has scaled sets it to 1 */
   char note[512];       /* what the reader mended, for SbBody.note */
+  PetscInt step; /* given: step of a run's output whose positions are wanted; 0 at rest, -1 the last one */
+  SbMeshProgress progress; /* given: told how far a long read is; may be NULL */
+  void *progress_ctx;
   /* found by SbImportCheck() */
   PetscInt nunused;     /* vertices left out */
   PetscInt nreoriented; /* cells turned */
   PetscInt nlost;       /* triangles of groups that are no face of a tet */
   PetscInt npinched;    /* surface edges with more than two facets */
-} SbImport;
+};
 
 /* A reader fills x, vert_number, items and groups from the file or description `text`. */
 typedef PetscErrorCode (*SbReader)(const char *text, SbImport *body);
@@ -72,6 +75,8 @@ PetscErrorCode SbImportRead_UNV(const char *path, SbImport *body);
 PetscErrorCode SbImportRead_Box(const char *text, SbImport *body);
 PetscErrorCode SbImportRead_Surface(const char *path, SbImport *body); /* which becomes tets by body->tet */
 PetscErrorCode SbTetRegister(void);                                    /* rows of the option table */
+PetscErrorCode SbImportRead_H5(const char *path, SbImport *body);
+PetscErrorCode SbImportRead_Xdmf(const char *path, SbImport *body);
 
 /* Chooses the reader by the name of the mesh, reads, places. Not collective. */
 PetscErrorCode SbImportRead(const SbBody *body, SbImport *import);
@@ -81,6 +86,8 @@ PetscErrorCode SbImportSetVertices(SbImport *import, PetscInt n);
 /* Appends a simplex; vert[dim + 1]. */
 PetscErrorCode SbImportAddItem(SbImport *import, int dim, const PetscInt vert[], PetscInt tags,
                                int64_t number);
+/* Room for exactly n simplices of a dimension that has none yet, numbered from 1 on, for the caller to fill. */
+PetscErrorCode SbImportSetItems(SbImport *import, int dim, PetscInt n);
 /* The group (dim, tag), made when new; a NULL name means "surface_12" until somebody gives one. */
 PetscErrorCode SbImportGroup(SbImport *import, PetscInt dim, int64_t tag, const char *name, PetscInt *group);
 /* The tag set that holds this group alone. */
@@ -151,6 +158,27 @@ PetscErrorCode SbFacesDestroy(SbFaces *faces);
 /* Slots of the face with these vertices: 0 (no such face), 1 (boundary) or 2. */
 PetscInt SbFacesFind(const SbFaces *faces, const PetscInt vert[3], PetscInt slots[2]);
 
+/* ------------------------------------------------------------------ import_edges.c: edges, pairs of vertices that an item joins */
+
+typedef struct {
+  PetscInt nvert, nedge;
+  PetscInt *start; /* [nvert + 1] into `high`: edges by lower vertex */
+  PetscInt *high;  /* [nedge] the other vertex, ascending for each lower one */
+} SbImportEdges;
+
+/* Edges of tets, triangles and lines. */
+PetscErrorCode SbImportEdgesCreate(const SbImport *import, SbImportEdges *edges);
+PetscErrorCode SbImportEdgesDestroy(SbImportEdges *edges);
+/* Number of the edge between two vertices, -1 when there is none. */
+PetscInt SbImportEdgesFind(const SbImportEdges *edges, PetscInt a, PetscInt b);
+
+/* ------------------------------------------------------------------ write_gmsh.c, write_h5.c: one file, written to `path` as it is */
+
+PetscErrorCode SbWrite_Gmsh(const SbImport *import, const char *path, SbMeshFormat format);
+PetscErrorCode SbWrite_H5(const SbImport *import, const char *path);
+/* The index for ParaView of a mesh that was written to `h5`. */
+PetscErrorCode SbWrite_Xdmf(const SbImport *import, const char *path, const char *h5);
+
 /* ------------------------------------------------------------------ check.c, quality.c, sets.c */
 
 /* Drops unused vertices, turns cells, refuses what would make the physics wrong; builds the faces. */
@@ -159,6 +187,13 @@ PetscErrorCode SbImportCheck(SbImport *import, SbFaces *faces);
 PetscErrorCode SbImportQuality(const SbImport *import, const SbFaces *faces, SbBody *body);
 /* How many tets have a dihedral angle below this, and the smallest of all, degrees. */
 PetscErrorCode SbImportSlivers(const SbImport *import, PetscReal degrees, PetscInt *n, PetscReal *smallest);
+/* Volume, cosines of the six dihedral angles, radius ratio of a tet. */
+void SbTetShape(const PetscReal x[], const PetscInt vert[4], PetscReal *V, PetscReal cosine[6],
+                PetscReal *ratio);
+/* Parts that share no vertex. */
+PetscErrorCode SbImportParts(const SbImport *import, PetscInt *npart);
+/* A tet that check.c refuses as flat; `largest` is the largest coordinate in size. */
+PetscBool SbTetFlat(const PetscReal x[], const PetscInt vert[4], PetscReal largest, PetscReal *det);
 /* Six times the signed volume of a tet, m^3. */
 PetscReal SbTetDet(const PetscReal x[], const PetscInt vert[4]);
 

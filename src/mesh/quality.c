@@ -20,11 +20,10 @@ static inline PetscReal dot(const PetscReal a[3], const PetscReal b[3])
   return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
-/* Volume, largest cosine of a dihedral angle, radius ratio of one tet. */
-static inline void shape(const PetscReal x[], const PetscInt v[4], PetscReal *V, PetscReal *max_cos,
-                         PetscReal *ratio)
+void SbTetShape(const PetscReal x[], const PetscInt v[4], PetscReal *V, PetscReal cosine[6], PetscReal *ratio)
 {
   PetscReal a[3], b[3], c[3], n[4][3], area[4], to_centre[3], sum = 0, det;
+  int edge = 0;
 
   for (int i = 0; i < 3; i++) {
     a[i] = x[3 * v[1] + i] - x[3 * v[0] + i];
@@ -41,13 +40,8 @@ static inline void shape(const PetscReal x[], const PetscInt v[4], PetscReal *V,
     area[i] = PetscSqrtReal(dot(n[i], n[i]));
     sum += area[i];
   }
-  *max_cos = -1;
   for (int i = 0; i < 4; i++) {
-    for (int j = 0; j < i; j++) {
-      const PetscReal cosine = -dot(n[i], n[j]) / (area[i] * area[j]);
-
-      *max_cos = PetscMax(*max_cos, cosine);
-    }
+    for (int j = 0; j < i; j++) cosine[edge++] = -dot(n[i], n[j]) / (area[i] * area[j]);
   }
   for (int i = 0; i < 3; i++) to_centre[i] = dot(a, a) * n[1][i] + dot(b, b) * n[2][i] + dot(c, c) * n[3][i];
   *V = det / 6;
@@ -57,21 +51,24 @@ static inline void shape(const PetscReal x[], const PetscInt v[4], PetscReal *V,
 PetscErrorCode SbImportSlivers(const SbImport *im, PetscReal degrees, PetscInt *n, PetscReal *smallest)
 {
   const PetscReal bound = PetscCosReal(degrees * PETSC_PI / 180);
-  PetscReal V, cosine, ratio, most = -1;
+  PetscReal V, cosine[6], ratio, most = -1;
 
   PetscFunctionBeginUser;
   *n = 0;
   for (PetscInt c = 0; c < im->item[3].n; c++) {
-    shape(im->x, im->item[3].vert + 4 * c, &V, &cosine, &ratio);
-    *n += cosine > bound;
-    most = PetscMax(most, cosine);
+    PetscReal largest = -1;
+
+    SbTetShape(im->x, im->item[3].vert + 4 * c, &V, cosine, &ratio);
+    for (int e = 0; e < 6; e++) largest = PetscMax(largest, cosine[e]);
+    *n += largest > bound;
+    most = PetscMax(most, largest);
   }
   *smallest = acos(PetscMin(most, 1)) * 180 / PETSC_PI;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Parts of a body that share no vertex: sets of vertices, joined by every tet. */
-static PetscErrorCode count_parts(const SbImport *im, PetscInt *npart)
+/* Sets of vertices, joined by every tet. */
+PetscErrorCode SbImportParts(const SbImport *im, PetscInt *npart)
 {
   PetscInt *parent;
 
@@ -125,13 +122,13 @@ static PetscErrorCode write_note(const SbImport *im, SbBody *body)
 
 PetscErrorCode SbImportQuality(const SbImport *im, const SbFaces *faces, SbBody *body)
 {
-  PetscReal V, cosine, ratio, max_cos = -1, volume = 0, max_ratio = 0;
+  PetscReal V, cosine[6], ratio, max_cos = -1, volume = 0, max_ratio = 0;
 
   PetscFunctionBeginUser;
   for (PetscInt c = 0; c < im->item[3].n; c++) {
-    shape(im->x, im->item[3].vert + 4 * c, &V, &cosine, &ratio);
+    SbTetShape(im->x, im->item[3].vert + 4 * c, &V, cosine, &ratio);
     volume += V;
-    max_cos = PetscMax(max_cos, cosine);
+    for (int e = 0; e < 6; e++) max_cos = PetscMax(max_cos, cosine[e]);
     max_ratio = PetscMax(max_ratio, ratio);
   }
   body->nvert = im->nvert;
@@ -147,7 +144,7 @@ PetscErrorCode SbImportQuality(const SbImport *im, const SbFaces *faces, SbBody 
       body->bbox[3 + i] = PetscMax(body->bbox[3 + i], im->x[3 * v + i]);
     }
   }
-  PetscCall(count_parts(im, &body->npart));
+  PetscCall(SbImportParts(im, &body->npart));
   PetscCall(write_note(im, body));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

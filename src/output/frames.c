@@ -74,6 +74,23 @@ static PetscErrorCode write_points(SbRun run, SbOutput out, hid_t group)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* "liver,stone": the bodies that the numbers of /mesh/body stand for. */
+static PetscErrorCode write_names(SbFrames fr, hid_t group, SbModel model)
+{
+  char *names;
+  const size_t size = (size_t)model->nbody * SB_NAME_MAX + 1;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscCalloc1(size, &names));
+  for (PetscInt b = 0; b < model->nbody; b++) {
+    PetscCall(PetscStrlcat(names, b ? "," : "", size));
+    PetscCall(PetscStrlcat(names, model->body[b].name, size));
+  }
+  PetscCall(SbH5PutText(&fr->h5, group, "bodies", names));
+  PetscCall(PetscFree(names));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 static PetscErrorCode write_mesh(SbRun run, SbOutput out)
 {
   SbFrames fr = out->frames;
@@ -83,6 +100,7 @@ static PetscErrorCode write_mesh(SbRun run, SbOutput out)
   PetscCall(SbH5Reserve(&fr->h5, (PetscInt64)out->point.N * 24 + (PetscInt64)out->cell.N * 40 + 65536));
   PetscCall(SbH5GroupCreate(&fr->h5, 8, 8, &group));
   PetscCall(SbH5PutInt(&fr->h5, group, "hash", (int64_t)out->mesh_hash));
+  PetscCall(write_names(fr, group, run->model));
   PetscCall(write_points(run, out, group));
   for (PetscInt i = 0; i < out->nfield; i++) {
     if (!out->field[i]->constant) continue;

@@ -21,7 +21,12 @@ static const SbOption run_rows[] = {
 };
 static const SbOption body_rows[] = {
   {"mesh", SB_OPTION_STRING, 1, "", NULL, "",
-   "tetrahedral mesh: a gmsh .msh file, or box:lx,ly,lz:n, or box:lx,ly,lz:nx,ny,nz (m, cells)"},
+   "tetrahedral mesh: a gmsh .msh file, an .h5 file of supple-mesh or of a run's output, or box:lx,ly,lz:n, "
+   "or "
+   "box:lx,ly,lz:nx,ny,nz (m, cells)"},
+  {"mesh_step", SB_OPTION_INT, 1, "", "0", "[-1, inf)",
+   "when the mesh is a run's output (fields.h5): the step whose positions are taken; 0: at rest, -1: the "
+   "last"},
   {"scale", SB_OPTION_REAL, 1, "", "1", "(0, inf)",
    "factor on the coordinates of the mesh, before rotation; 0.001 for a file in mm"},
   {"rotate", SB_OPTION_REALS, 4, "", "0,0,1,0", "(-inf, inf)",
@@ -169,6 +174,7 @@ static PetscErrorCode read_body(SbModel model, PetscInt i)
   PetscCall(SbOptionString(&scope, "mesh", sizeof(body->mesh), body->mesh));
   PetscCheck(body->mesh[0], PETSC_COMM_SELF, PETSC_ERR_USER, "-body_%s_mesh names no file", body->name);
   PetscCall(SbTetOptionsRead(&scope, body->mesh, &body->tet));
+  PetscCall(SbOptionInt(&scope, "mesh_step", &body->mesh_step));
   PetscCall(SbOptionReal(&scope, "scale", &body->scale));
   PetscCall(SbOptionReals(&scope, "rotate", body->rotate));
   axis = PetscAbsReal(body->rotate[0]) + PetscAbsReal(body->rotate[1]) + PetscAbsReal(body->rotate[2]);

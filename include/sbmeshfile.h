@@ -1,0 +1,107 @@
+/*
+  sbmeshfile.h - layer 1: a mesh as a file, on one rank: read, measured, repaired, refined, written. What supple-mesh is made of.
+
+  Not collective throughout. Errors: PETSC_ERR_USER_INPUT / PETSC_ERR_FILE_*, one line that names the file and what to do.
+*/
+#pragma once
+#include "sbmesh.h"
+
+typedef struct _p_SbImport SbImport; /* vertices, simplices of every dimension and their groups */
+
+/* Told now and then how far something long is: `what` are counted ("tets read"), total 0: not known. */
+typedef PetscErrorCode (*SbMeshProgress)(const char *what, PetscInt64 done, PetscInt64 total, void *ctx);
+
+/*
+  SbMeshFileRead - reads a mesh of any kind that -body_<name>_mesh takes; nothing in it is checked or changed.
+
+  Input:
+    body          - name (for messages; "": the file alone), mesh, mesh_step, scale, rotate, translate
+    progress, ctx - told how far it is; progress may be NULL
+  Output:
+    import        - to be freed by SbMeshFileDestroy()
+*/
+PetscErrorCode SbMeshFileRead(const SbBody *body, SbMeshProgress progress, void *ctx, SbImport **import);
+PetscErrorCode SbMeshFileDestroy(SbImport **import);
+
+/* How many simplices of each dimension it holds; n[0] counts points that belong to groups, not vertices. */
+void SbMeshFileCount(const SbImport *import, PetscInt *nvert, PetscInt n[4]);
+
+/* ------------------------------------------------------------------ groups */
+
+typedef struct {
+  char name[2 * SB_NAME_MAX];
+  PetscInt dim;   /* 0 points, 1 curves, 2 surfaces, 3 volumes */
+  int64_t tag;    /* number in the file */
+  PetscInt n;     /* simplices of this dimension in it */
+  PetscReal size; /* their length, area or volume; m, m^2, m^3; 0 for points */
+} SbMeshGroup;
+/* Group i; *group is left alone when there is none, and *found tells. */
+PetscErrorCode SbMeshFileGroup(const SbImport *import, PetscInt i, SbMeshGroup *group, PetscBool *found);
+
+/* ------------------------------------------------------------------ size and shape */
+
+#define SB_ANGLE_BINS 18 /* of ten degrees */
+#define SB_RATIO_BINS 8
+extern const PetscReal SbRatioBounds[SB_RATIO_BINS]; /* lower ends of the bins of radius ratios */
+
+typedef struct {
+  SbBody body;                     /* the fields that SbMeshCreate() finds */
+  PetscInt nedge, nface;           /* of the tets; nface counts each face once */
+  PetscReal area;                  /* of the boundary, m^2 */
+  PetscReal edge[3];               /* shortest, mean, longest, m */
+  PetscReal max_dihedral;          /* degrees */
+  PetscInt64 angle[SB_ANGLE_BINS]; /* dihedral angles, six for each tet */
+  PetscInt64 ratio[SB_RATIO_BINS]; /* radius ratios of the tets, 1 for the regular tet */
+} SbMeshFacts;
+/*
+  SbMeshFileMeasure - checks the mesh as a run would, and measures it. What a run would leave out or turn is left out and turned.
+
+  Errors: what SbMeshCreate() refuses.
+*/
+PetscErrorCode SbMeshFileMeasure(SbImport *import, SbMeshFacts *facts);
+
+/* ------------------------------------------------------------------ repair */
+
+typedef struct {
+  PetscReal weld;      /* vertices at most so far apart became one, m */
+  PetscInt nwelded;    /* vertices that went into another one */
+  PetscInt ncollapsed; /* tets that used a vertex twice, dropped */
+  PetscInt nflat;      /* flat tets, dropped */
+  PetscInt nslit;      /* those of them that had no face on the boundary: a slit without width is left */
+  PetscInt nduplicate; /* tets given again, dropped; their groups are joined */
+  PetscInt nturned;    /* inverted tets, turned */
+  PetscInt nunused;    /* vertices that no tet uses, dropped */
+  PetscInt nitem; /* triangles, lines, points of groups given again, collapsed or not of the tets, dropped */
+} SbRepair;
+/*
+  SbMeshFileRepair - makes a mesh that a run accepts, where dropping, turning and welding can do it.
+
+  Input:
+    weld - vertices at most so far apart become one, m; 0: none do; below 0: 1e-9 of the diagonal of the extent
+  Output:
+    done - what was done
+  Errors: what is left and SbMeshCreate() would refuse: overlapping tets, nothing left.
+*/
+PetscErrorCode SbMeshFileRepair(SbImport *import, PetscReal weld, SbRepair *done);
+
+/* ------------------------------------------------------------------ refine.c */
+
+/* Cuts every tet into eight, every triangle into four, every line into two; groups are carried over. */
+PetscErrorCode SbMeshFileRefine(SbImport *import);
+
+/* ------------------------------------------------------------------ writing */
+
+typedef enum {
+  SB_MESH_AUTO, /* by the name: .msh is text of version 4.1 */
+  SB_MESH_MSH41,
+  SB_MESH_MSH41_BINARY,
+  SB_MESH_MSH22,
+  SB_MESH_MSH22_BINARY,
+  SB_MESH_H5
+} SbMeshFormat;
+/*
+  SbMeshFileWrite - writes a mesh with all its groups: gmsh's .msh, or supple's .h5 with an .xmf beside it for ParaView.
+
+  The file is written beside its place and renamed when it is whole.
+*/
+PetscErrorCode SbMeshFileWrite(const SbImport *import, const char *path, SbMeshFormat format);

@@ -1,0 +1,134 @@
+/*
+  measure.c - what there is to know about a mesh before it is simulated: groups, size, shape of its tets.
+*/
+#include "mesh_impl.h"
+
+const PetscReal SbRatioBounds[SB_RATIO_BINS] = {1, 1.25, 1.5, 2, 3, 5, 10, 100};
+
+/* ------------------------------------------------------------------ groups */
+
+/* Length, area or volume of a simplex. */
+static PetscReal measure(const PetscReal x[], int dim, const PetscInt v[])
+{
+  PetscReal a[2][3], n[3];
+
+  if (dim == 3) return PetscAbsReal(SbTetDet(x, v)) / 6;
+  if (!dim) return 0;
+  for (int k = 0; k < dim; k++)
+    for (int i = 0; i < 3; i++) a[k][i] = x[3 * v[k + 1] + i] - x[3 * v[0] + i];
+  if (dim == 1) return PetscSqrtReal(a[0][0] * a[0][0] + a[0][1] * a[0][1] + a[0][2] * a[0][2]);
+  for (int i = 0; i < 3; i++)
+    n[i] = a[0][(i + 1) % 3] * a[1][(i + 2) % 3] - a[0][(i + 2) % 3] * a[1][(i + 1) % 3];
+  return PetscSqrtReal(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]) / 2;
+}
+
+PetscErrorCode SbMeshFileGroup(const SbImport *im, PetscInt i, SbMeshGroup *group, PetscBool *found)
+{
+  const SbItems *item;
+  PetscBool *in;
+  int dim;
+
+  PetscFunctionBeginUser;
+  *found = (PetscBool)(i >= 0 && i < im->ngroup);
+  if (!*found) PetscFunctionReturn(PETSC_SUCCESS);
+  dim = (int)im->group[i].dim;
+  item = &im->item[dim];
+  PetscCall(PetscStrncpy(group->name, im->group[i].name, sizeof(group->name)));
+  group->dim = dim;
+  group->tag = im->group[i].tag;
+  group->n = 0;
+  group->size = 0;
+  PetscCall(PetscCalloc1(im->ntags, &in));
+  for (PetscInt t = 0; t < im->ntags; t++)
+    for (PetscInt k = im->tags_start[t]; k < im->tags_start[t + 1]; k++)
+      if (im->tags_group[k] == i) in[t] = PETSC_TRUE;
+  for (PetscInt k = 0; k < item->n; k++) {
+    if (!in[item->tags[k]]) continue;
+    group->n++;
+    group->size += measure(im->x, dim, item->vert + (dim + 1) * (size_t)k);
+  }
+  PetscCall(PetscFree(in));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ shape */
+
+static void count_shapes(const SbImport *im, SbMeshFacts *facts)
+{
+  PetscReal V, cosine[6], ratio, min_cosine = 1;
+
+  for (PetscInt c = 0; c < im->item[3].n; c++) {
+    int bin = SB_RATIO_BINS - 1;
+
+    SbTetShape(im->x, im->item[3].vert + 4 * c, &V, cosine, &ratio);
+    for (int e = 0; e < 6; e++) {
+      const PetscReal degrees = acos(PetscMax(-1, PetscMin(1, cosine[e]))) * 180 / PETSC_PI;
+
+      facts->angle[PetscMin((int)(degrees * SB_ANGLE_BINS / 180), SB_ANGLE_BINS - 1)]++;
+      min_cosine = PetscMin(min_cosine, cosine[e]);
+    }
+    while (bin && ratio < SbRatioBounds[bin]) bin--;
+    facts->ratio[bin]++;
+  }
+  facts->max_dihedral = acos(PetscMax(-1, min_cosine)) * 180 / PETSC_PI;
+}
+
+static PetscErrorCode measure_edges(const SbImport *im, SbMeshFacts *facts)
+{
+  SbImportEdges edges;
+  SbImport tets = *im;
+  PetscReal sum = 0;
+
+  PetscFunctionBeginUser;
+  /* of the tets alone: lines and triangles of groups may lie elsewhere */
+  tets.item[1].n = tets.item[2].n = 0;
+  PetscCall(SbImportEdgesCreate(&tets, &edges));
+  facts->nedge = edges.nedge;
+  facts->edge[0] = PETSC_MAX_REAL;
+  facts->edge[2] = 0;
+  for (PetscInt a = 0; a < edges.nvert; a++) {
+    for (PetscInt e = edges.start[a]; e < edges.start[a + 1]; e++) {
+      const PetscReal length = measure(im->x, 1, (const PetscInt[2]){a, edges.high[e]});
+
+      facts->edge[0] = PetscMin(facts->edge[0], length);
+      facts->edge[2] = PetscMax(facts->edge[2], length);
+      sum += length;
+    }
+  }
+  facts->edge[1] = edges.nedge ? sum / edges.nedge : 0;
+  PetscCall(SbImportEdgesDestroy(&edges));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode measure_faces(const SbImport *im, const SbFaces *faces, SbMeshFacts *facts)
+{
+  PetscFunctionBeginUser;
+  facts->nface = (4 * faces->ncell - faces->nboundary) / 2 + faces->nboundary;
+  for (PetscInt s = 0; s < 4 * faces->ncell; s++) {
+    const PetscInt *v = im->item[3].vert + 4 * (s / 4);
+    PetscInt corner[3];
+
+    if (faces->neighbour[s] >= 0) continue;
+    for (int i = 0; i < 3; i++) corner[i] = v[SbFaceVertex[s % 4][i]];
+    facts->area += measure(im->x, 2, corner);
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbMeshFileMeasure(SbImport *im, SbMeshFacts *facts)
+{
+  SbFaces faces;
+  PetscErrorCode ierr;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscMemzero(facts, sizeof(*facts)));
+  PetscCall(PetscMemzero(&faces, sizeof(faces)));
+  ierr = SbImportCheck(im, &faces);
+  if (!ierr) ierr = SbImportQuality(im, &faces, &facts->body);
+  if (!ierr) ierr = measure_faces(im, &faces, facts);
+  PetscCall(SbFacesDestroy(&faces));
+  PetscCall(ierr);
+  PetscCall(measure_edges(im, facts));
+  count_shapes(im, facts);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

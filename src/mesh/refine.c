@@ -1,0 +1,135 @@
+/*
+  refine.c - regular refinement: every edge gets a vertex in its middle, every tet becomes eight.
+
+  Four children are cut off at the corners, each half as large as its parent. What is left is an octahedron, cut into four
+  around one of its three diagonals: the shortest one, which keeps the shapes of repeated refinement bounded (Zhang,
+  "Successive subdivisions of tetrahedra and multigrid methods on tetrahedral meshes", 1995). Diagonals lie inside a tet,
+  so that neighbours fit whatever they choose. Children have the orientation of their parent.
+
+  The surface keeps its facets: new vertices lie in their middle, not on a rounder shape.
+*/
+#include "mesh_impl.h"
+
+enum { M01, M02, M03, M12, M13, M23 }; /* middles of the edges of a tet, in the order of edges */
+static const int edge_vert[6][2] = {{0, 1}, {0, 2}, {0, 3}, {1, 2}, {1, 3}, {2, 3}};
+
+/* The three diagonals of the octahedron, and the four middles around each so that (from, to, ring[i], ring[i + 1]) is positive. */
+static const struct {
+  int from, to, ring[4];
+} diagonals[3] = {
+  {M01, M23, {M02, M03, M13, M12}},
+  {M02, M13, {M03, M01, M12, M23}},
+  {M03, M12, {M01, M02, M23, M13}},
+};
+
+static inline PetscReal distance2(const PetscReal *p, const PetscReal *q)
+{
+  return (p[0] - q[0]) * (p[0] - q[0]) + (p[1] - q[1]) * (p[1] - q[1]) + (p[2] - q[2]) * (p[2] - q[2]);
+}
+
+/* The eight children of the tet v with the middles m. */
+static void split_tet(const PetscReal x[], const PetscInt v[4], const PetscInt m[6], PetscInt child[8][4])
+{
+  const PetscInt corner[4][4] = {{v[0], m[M01], m[M02], m[M03]},
+                                 {m[M01], v[1], m[M12], m[M13]},
+                                 {m[M02], m[M12], v[2], m[M23]},
+                                 {m[M03], m[M13], m[M23], v[3]}};
+  PetscReal shortest = PETSC_MAX_REAL;
+  int best = 0;
+
+  memcpy(child, corner, sizeof(corner));
+  for (int d = 0; d < 3; d++) {
+    const PetscReal length = distance2(x + 3 * m[diagonals[d].from], x + 3 * m[diagonals[d].to]);
+
+    /* A tie must not be decided by rounding: the first one stays. */
+    if (length < shortest * (1 - 1e-12)) shortest = length, best = d;
+  }
+  for (int k = 0; k < 4; k++) {
+    child[4 + k][0] = m[diagonals[best].from];
+    child[4 + k][1] = m[diagonals[best].to];
+    child[4 + k][2] = m[diagonals[best].ring[k]];
+    child[4 + k][3] = m[diagonals[best].ring[(k + 1) % 4]];
+  }
+}
+
+/* Vertices in the middle of the edges, behind those that are there. */
+static PetscErrorCode add_middles(SbImport *im, const SbImportEdges *edges)
+{
+  const PetscInt n = im->nvert + edges->nedge;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscRealloc(3 * (size_t)n * sizeof(PetscReal), &im->x));
+  PetscCall(PetscRealloc((size_t)n * sizeof(int64_t), &im->vert_number));
+  for (PetscInt a = 0; a < edges->nvert; a++) {
+    for (PetscInt e = edges->start[a]; e < edges->start[a + 1]; e++) {
+      for (int i = 0; i < 3; i++)
+        im->x[3 * (im->nvert + e) + i] = (im->x[3 * a + i] + im->x[3 * edges->high[e] + i]) / 2;
+    }
+  }
+  for (PetscInt v = 0; v < n; v++) im->vert_number[v] = v + 1;
+  im->nvert = n;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Children of one item, [2^dim][dim + 1]. */
+static void split(const SbImport *im, int dim, const PetscInt v[], const SbImportEdges *edges,
+                  PetscInt child[])
+{
+  PetscInt m[6];
+
+  for (int e = 0; e < 6; e++) {
+    const int *p = edge_vert[e];
+
+    if (p[1] <= dim) m[e] = edges->nvert + SbImportEdgesFind(edges, v[p[0]], v[p[1]]);
+  }
+  if (dim == 3) {
+    split_tet(im->x, v, m, (PetscInt(*)[4])child);
+  } else if (dim == 2) {
+    const PetscInt four[12] = {v[0],   m[M01], m[M02], m[M01], v[1],   m[M12],
+                               m[M02], m[M12], v[2],   m[M01], m[M12], m[M02]};
+
+    memcpy(child, four, sizeof(four));
+  } else {
+    const PetscInt two[4] = {v[0], m[M01], m[M01], v[1]};
+
+    memcpy(child, two, sizeof(two));
+  }
+}
+
+static PetscErrorCode split_items(SbImport *im, int dim, const SbImportEdges *edges)
+{
+  static const char *const what[4] = {"points", "lines", "triangles", "tets"};
+  SbItems parent = im->item[dim], *item = &im->item[dim];
+  const PetscInt nchild = 1 << dim;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscMemzero(item, sizeof(*item)));
+  PetscCall(SbImportSetItems(im, dim, nchild * parent.n));
+  for (PetscInt i = 0; i < parent.n; i++) {
+    split(im, dim, parent.vert + (size_t)(dim + 1) * (size_t)i, edges,
+          item->vert + (size_t)(dim + 1) * (size_t)nchild * (size_t)i);
+    for (PetscInt k = 0; k < nchild; k++) item->tags[nchild * i + k] = parent.tags[i];
+    if (im->progress && !(i & 0xffff))
+      PetscCall(
+        im->progress(what[dim], (PetscInt64)nchild * i, (PetscInt64)nchild * parent.n, im->progress_ctx));
+  }
+  PetscCall(PetscFree(parent.vert));
+  PetscCall(PetscFree(parent.tags));
+  PetscCall(PetscFree(parent.number));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbMeshFileRefine(SbImport *im)
+{
+  SbImportEdges edges;
+
+  PetscFunctionBeginUser;
+  PetscCheck(im->item[3].n <= PETSC_MAX_INT / 64, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
+             "%s: %" PetscInt_FMT " tets, refined, are more than this build can number", im->where,
+             im->item[3].n);
+  PetscCall(SbImportEdgesCreate(im, &edges));
+  PetscCall(add_middles(im, &edges));
+  for (int d = 1; d < 4; d++) PetscCall(split_items(im, d, &edges));
+  PetscCall(SbImportEdgesDestroy(&edges));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

@@ -1,0 +1,48 @@
+/*
+  mesh_main.c - supple-mesh from its first to its last call.
+
+    supple-mesh COMMAND FILE [OUT] [-option value ...]
+
+  A second front of the same library: it reads every mesh that a run reads, with the same readers and checks.
+*/
+#include <signal.h>
+#include "tool/tool.h"
+
+static PetscErrorCode work(int argc, char *argv[], const SbToolLine *line)
+{
+  SbTool tool;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbToolRegister());
+  if (line->help) {
+    PetscCall(SbToolHelp());
+  } else if (line->version) {
+    PetscCall(PetscPrintf(PETSC_COMM_WORLD, "supple-mesh %s\n", SB_VERSION));
+  } else {
+    PetscCall(SbToolSetFromOptions(argc, argv, line, &tool));
+    PetscCall(SbToolRun(&tool));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode supple_mesh(int argc, char *argv[])
+{
+  SbToolLine line;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbErrorHandlerInstall());
+  SbErrorSetProgram("supple-mesh");
+  PetscCall(SbToolCommandLine(&argc, argv, &line));
+  PetscCall(PetscInitialize(&argc, &argv, NULL, NULL));
+  (void)signal(SIGPIPE, SIG_IGN);
+  PetscCall(work(argc, argv, &line));
+  PetscCall(SbOptionsReset());
+  PetscCall(PetscFinalize());
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+int main(int argc, char *argv[])
+{
+  if (MPI_Init(&argc, &argv)) return 1;
+  return SbErrorFinish(supple_mesh(argc, argv));
+}

@@ -1,0 +1,139 @@
+/*
+  commands.c - what supple-mesh does: one function per command, and the table of them.
+*/
+#include "tool.h"
+
+/* ------------------------------------------------------------------ reading and writing, with a word about it */
+
+static PetscErrorCode read_mesh(SbTool *tool, SbImport **mesh)
+{
+  char phase[PETSC_MAX_PATH_LEN + 16];
+  PetscErrorCode ierr;
+
+  PetscFunctionBeginUser;
+  (void)snprintf(phase, sizeof(phase), "reading %s", tool->in);
+  PetscCall(SbToolBegin(tool, phase));
+  ierr = SbMeshFileRead(&tool->body, SbToolProgress, tool, mesh);
+  PetscCall(SbToolEnd(tool));
+  PetscFunctionReturn(ierr);
+}
+
+/* "out.h5: 1,234 vertices, 5,678 tets, 910 triangles in groups, 1.2 MB" */
+static PetscErrorCode tell_result(const SbTool *tool, const SbImport *mesh)
+{
+  static const char *const what[4] = {"points", "lines", "triangles", "tets"};
+  PetscInt nvert, n[4];
+  char number[32];
+
+  PetscFunctionBeginUser;
+  if (tool->quiet) PetscFunctionReturn(PETSC_SUCCESS);
+  SbMeshFileCount(mesh, &nvert, n);
+  PetscCall(PetscPrintf(PETSC_COMM_SELF, "%s: %s vertices", tool->out, SbToolNumber(nvert, number)));
+  for (int d = 3; d >= 0; d--)
+    if (n[d] || d == 3)
+      PetscCall(PetscPrintf(PETSC_COMM_SELF, ", %s %s", SbToolNumber(n[d], number), what[d]));
+  PetscCall(PetscPrintf(PETSC_COMM_SELF, "\n"));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode write_mesh(SbTool *tool, const SbImport *mesh)
+{
+  char phase[PETSC_MAX_PATH_LEN + 16];
+  PetscErrorCode ierr;
+
+  PetscFunctionBeginUser;
+  (void)snprintf(phase, sizeof(phase), "writing %s", tool->out);
+  PetscCall(SbToolBegin(tool, phase));
+  ierr = SbMeshFileWrite(mesh, tool->out, tool->format);
+  PetscCall(SbToolEnd(tool));
+  PetscCall(ierr);
+  PetscCall(tell_result(tool, mesh));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ the commands */
+
+static PetscErrorCode convert(SbTool *tool, SbImport *mesh)
+{
+  PetscFunctionBeginUser;
+  PetscCall(write_mesh(tool, mesh));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode refine(SbTool *tool, SbImport *mesh)
+{
+  PetscFunctionBeginUser;
+  for (PetscInt k = 0; k < tool->levels; k++) {
+    PetscErrorCode ierr;
+
+    PetscCall(SbToolBegin(tool, "refining"));
+    ierr = SbMeshFileRefine(mesh);
+    PetscCall(SbToolEnd(tool));
+    PetscCall(ierr);
+  }
+  PetscCall(write_mesh(tool, mesh));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode say(const SbTool *tool, PetscInt n, const char *what)
+{
+  char number[32];
+
+  PetscFunctionBeginUser;
+  if (n && !tool->quiet) PetscCall(PetscPrintf(PETSC_COMM_SELF, "%s: %s\n", what, SbToolNumber(n, number)));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode repair(SbTool *tool, SbImport *mesh)
+{
+  SbRepair r;
+  char welded[96];
+  PetscErrorCode ierr;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbToolBegin(tool, "repairing"));
+  ierr = SbMeshFileRepair(mesh, tool->weld, &r);
+  PetscCall(SbToolEnd(tool));
+  PetscCall(ierr);
+  (void)snprintf(welded, sizeof(welded), "vertices welded to others at most %.3g m away", (double)r.weld);
+  PetscCall(say(tool, r.nwelded, welded));
+  PetscCall(say(tool, r.ncollapsed, "tets that used a vertex twice, dropped"));
+  PetscCall(say(tool, r.nduplicate, "tets given again, dropped"));
+  PetscCall(say(tool, r.nflat, "flat tets dropped"));
+  PetscCall(say(tool, r.nslit, "  of these inside the body, each left a slit without width there"));
+  PetscCall(say(tool, r.nturned, "inverted tets turned"));
+  PetscCall(say(tool, r.nunused, "unused vertices dropped"));
+  PetscCall(say(tool, r.nitem, "triangles, lines and points of groups that are not of the tets, dropped"));
+  if (!tool->quiet && !r.nwelded && !r.ncollapsed && !r.nflat && !r.nduplicate && !r.nturned && !r.nunused &&
+      !r.nitem)
+    PetscCall(PetscPrintf(PETSC_COMM_SELF, "nothing to repair\n"));
+  PetscCall(write_mesh(tool, mesh));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ the table */
+
+const SbToolCommand SbToolCommands[] = {
+  {"info", "FILE", "what is in it: size, groups, shape of the tets, memory that a run will take", 1,
+   SbToolInfo},
+  {"convert", "FILE OUT", "writes it in another format, groups and order kept", 2, convert},
+  {"repair", "FILE OUT", "drops, turns and welds what keeps a mesh from being simulated; says what it did", 2,
+   repair},
+  {"refine", "FILE OUT", "cuts every tet into eight; groups are carried over", 2, refine},
+  {NULL, NULL, NULL, 0, NULL},
+};
+
+PetscErrorCode SbToolRun(SbTool *tool)
+{
+  const SbToolCommand *command = SbToolCommands;
+  SbImport *mesh = NULL;
+  PetscErrorCode ierr;
+
+  PetscFunctionBeginUser;
+  while (strcmp(command->name, tool->command)) command++;
+  PetscCall(read_mesh(tool, &mesh));
+  ierr = command->run(tool, mesh);
+  if (!ierr && tool->view[0]) ierr = SbToolView(tool, mesh);
+  PetscCall(SbMeshFileDestroy(&mesh));
+  PetscFunctionReturn(ierr);
+}

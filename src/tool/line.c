@@ -1,0 +1,254 @@
+/*
+  line.c - the command line of supple-mesh: a command, one or two files, options in any place.
+
+  Options are rows of a table as in the program itself; each says which commands read it, and one that a command does not
+  read is an error, as is a misspelt one.
+*/
+#include <strings.h>
+#include "tool.h"
+
+static const SbOption rows[] = {
+  {"size", SB_OPTION_REAL, 1, "m", "", "(0, inf)", "edge length of the tets; required"},
+  {"weld", SB_OPTION_REAL, 1, "m", "", "[0, inf)",
+   "vertices at most so far apart become one; 0: none do; without it 1e-9 of the diagonal of the mesh"},
+  {"levels", SB_OPTION_INT, 1, "", "1", "[1, 8]",
+   "how often the mesh is refined: each time 8 times as many tets"},
+  {"format", SB_OPTION_CHOICE, 1, "", "auto", "auto|msh41|msh41_binary|msh22|msh22_binary|h5",
+   "of the file that is written; auto: .msh is msh41 (text), .h5 is h5"},
+  {"step", SB_OPTION_INT, 1, "", "0", "[-1, inf)",
+   "when FILE is a run's output (fields.h5): the step whose positions are taken; 0: at rest, -1: the last"},
+  {"scale", SB_OPTION_REAL, 1, "", "1", "(0, inf)",
+   "factor on the coordinates as they are read; 0.001 for mm"},
+  {"rotate", SB_OPTION_REALS, 4, "", "0,0,1,0", "(-inf, inf)",
+   "axis x,y,z and angle in degrees, after scaling"},
+  {"translate", SB_OPTION_REALS, 3, "m", "0,0,0", "(-inf, inf)", "shift, after rotation"},
+  {"view", SB_OPTION_STRING, 1, "", "", "", "draws the mesh to this .png"},
+  {"quiet", SB_OPTION_BOOL, 1, "", "false", "", "says nothing while it works"},
+};
+/* Which commands read each row; "" for all. */
+static const char *const readers[] = {"tet", "repair", "refine", "convert tet repair refine", "", "", "",
+                                      "",    "",       ""};
+
+PetscErrorCode SbToolRegister(void)
+{
+  PetscFunctionBeginUser;
+  PetscCall(SbOptionsRegister("", "", PETSC_STATIC_ARRAY_LENGTH(rows), rows));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbToolHelp(void)
+{
+  PetscFunctionBeginUser;
+  PetscCall(PetscPrintf(PETSC_COMM_WORLD,
+                        "supple-mesh %s - looks at, converts and repairs meshes for supple\n\n", SB_VERSION));
+  for (const SbToolCommand *c = SbToolCommands; c->name; c++)
+    PetscCall(PetscPrintf(PETSC_COMM_WORLD, "  supple-mesh %-8s%-13s %s\n", c->name, c->files, c->help));
+  PetscCall(
+    PetscPrintf(PETSC_COMM_WORLD,
+                "\nFILE: whatever -body_<name>_mesh takes, also box:lx,ly,lz:n. OUT: .msh (gmsh), or .h5 "
+                "(supple's own, with an .xmf for ParaView).\n\nOptions\n"));
+  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(rows); i++) {
+    const SbOption *r = &rows[i];
+
+    PetscCall(PetscPrintf(PETSC_COMM_WORLD, "  -%s%s%s%s%s%s%s%s%s\n      %s\n", r->key,
+                          r->range[0] ? ": in " : "", r->range, r->unit[0] ? " " : "", r->unit,
+                          r->preset[0] ? ", default " : "", r->preset, readers[i][0] ? "; for " : "",
+                          readers[i], r->help));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ words */
+
+static const SbOption *find_row(const char *key, size_t *index)
+{
+  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(rows); i++) {
+    if (strcasecmp(rows[i].key, key)) continue;
+    if (index) *index = i;
+    return &rows[i];
+  }
+  return NULL;
+}
+
+static PetscBool is_truth(const char *word)
+{
+  static const char *const words[] = {"true", "false", "yes", "no", "on", "off", "0", "1"};
+
+  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(words); i++)
+    if (!strcasecmp(word, words[i])) return PETSC_TRUE;
+  return PETSC_FALSE;
+}
+
+/* Whether the word behind an option is its value. */
+static PetscErrorCode takes_value(const char *option, const char *next, PetscBool *takes)
+{
+  const SbOption *row = find_row(option + 1, NULL);
+  PetscBool is_option;
+
+  PetscFunctionBeginUser;
+  *takes = PETSC_FALSE;
+  if (!next) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscOptionsValidKey(next, &is_option));
+  *takes = (PetscBool)(!is_option && (!row || row->kind != SB_OPTION_BOOL || is_truth(next)));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbToolCommandLine(int *argc, char *argv[], SbToolLine *line)
+{
+  int kept = 1;
+
+  PetscFunctionBeginUser;
+  memset(line, 0, sizeof(*line));
+  for (int i = 1; i < *argc; i++) {
+    PetscBool is_option, value;
+
+    PetscCall(PetscOptionsValidKey(argv[i], &is_option));
+    if (!strcasecmp(argv[i], "-help") || !strcasecmp(argv[i], "--help") || !strcmp(argv[i], "-h")) {
+      line->help = PETSC_TRUE;
+    } else if (!strcasecmp(argv[i], "-version") || !strcasecmp(argv[i], "--version")) {
+      line->version = PETSC_TRUE;
+    } else if (is_option) {
+      PetscCall(takes_value(argv[i], argv[i + 1], &value));
+      argv[kept++] = argv[i];
+      if (value) argv[kept++] = argv[++i];
+    } else {
+      if (line->nword < 4) line->word[line->nword] = argv[i];
+      line->nword++;
+    }
+  }
+  argv[kept] = NULL;
+  *argc = kept;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ checks */
+
+/* Options of PETSc that make sense here. */
+static PetscBool is_petsc(const char *name)
+{
+  static const char *const names[] = {"log_",
+                                      "malloc",
+                                      "options_",
+                                      "info",
+                                      "on_error_",
+                                      "error_",
+                                      "memory",
+                                      "fp_trap",
+                                      "no_signal_handler",
+                                      "start_in_debugger",
+                                      "skip_petscrc",
+                                      "citations"};
+
+  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(names); i++)
+    if (!strncasecmp(name, names[i], strlen(names[i]))) return PETSC_TRUE;
+  return PETSC_FALSE;
+}
+
+static PetscErrorCode check_option(const char *name, const char *command)
+{
+  const char *list[PETSC_STATIC_ARRAY_LENGTH(rows)];
+  char near[256];
+  size_t index = 0;
+
+  PetscFunctionBeginUser;
+  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(rows); i++) list[i] = rows[i].key;
+  if (!find_row(name, &index)) {
+    if (is_petsc(name)) PetscFunctionReturn(PETSC_SUCCESS);
+    PetscCall(SbNearest(name, PETSC_STATIC_ARRAY_LENGTH(rows), list, sizeof(near), near));
+    SETERRQ(PETSC_COMM_SELF, PETSC_ERR_USER, "-%s is not an option of supple-mesh%s%s%s", name,
+            near[0] ? "; did you mean -" : "; supple-mesh -help lists them", near, near[0] ? "?" : "");
+  }
+  PetscCheck(!readers[index][0] || strstr(readers[index], command), PETSC_COMM_SELF, PETSC_ERR_USER,
+             "-%s does nothing in supple-mesh %s; it is for %s", name, command, readers[index]);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode find_command(const char *word, const SbToolCommand **command)
+{
+  const char *list[16];
+  char all[256] = "", near[64];
+  PetscInt n = 0;
+
+  PetscFunctionBeginUser;
+  for (const SbToolCommand *c = SbToolCommands; c->name; c++) {
+    if (!strcmp(c->name, word)) {
+      *command = c;
+      PetscFunctionReturn(PETSC_SUCCESS);
+    }
+    list[n++] = c->name;
+    PetscCall(PetscStrlcat(all, n > 1 ? ", " : "", sizeof(all)));
+    PetscCall(PetscStrlcat(all, c->name, sizeof(all)));
+  }
+  PetscCall(SbNearest(word, n, list, sizeof(near), near));
+  SETERRQ(PETSC_COMM_SELF, PETSC_ERR_USER, "'%s' is no command; the commands are %s%s%s%s", word, all,
+          near[0] ? "; did you mean " : "", near, near[0] ? "?" : "");
+}
+
+static PetscErrorCode check_words(const SbToolLine *line, const SbToolCommand **command)
+{
+  PetscMPIInt size;
+  int nfile;
+
+  PetscFunctionBeginUser;
+  PetscCallMPI(MPI_Comm_size(PETSC_COMM_WORLD, &size));
+  PetscCheck(size == 1, PETSC_COMM_WORLD, PETSC_ERR_USER, "runs on one process, not on %d; leave out mpirun",
+             (int)size);
+  PetscCheck(line->nword, PETSC_COMM_SELF, PETSC_ERR_USER,
+             "no command is given; supple-mesh -help lists them, supple-mesh info FILE tells about a mesh");
+  PetscCall(find_command(line->word[0], command));
+  nfile = line->nword - 1;
+  PetscCheck(nfile == (*command)->nfile, PETSC_COMM_SELF, PETSC_ERR_USER,
+             "%s takes %d file%s, not %d: supple-mesh %s %s", (*command)->name, (*command)->nfile,
+             (*command)->nfile > 1 ? "s" : "", nfile, (*command)->name, (*command)->files);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ values */
+
+static PetscErrorCode read_options(SbTool *tool)
+{
+  SbScope scope;
+  PetscInt format;
+  PetscBool given;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbScopeSet(&scope, "", "", ""));
+  tool->weld = -1;
+  PetscCall(SbOptionReal(&scope, "size", &tool->size));
+  PetscCall(SbOptionReal(&scope, "weld", &tool->weld));
+  PetscCall(SbOptionInt(&scope, "levels", &tool->levels));
+  PetscCall(SbOptionChoice(&scope, "format", &format));
+  tool->format = (SbMeshFormat)format; /* in the order of the row */
+  PetscCall(SbOptionInt(&scope, "step", &tool->body.mesh_step));
+  PetscCall(SbOptionReal(&scope, "scale", &tool->body.scale));
+  PetscCall(SbOptionReals(&scope, "rotate", tool->body.rotate));
+  PetscCall(SbOptionReals(&scope, "translate", tool->body.translate));
+  PetscCall(SbOptionString(&scope, "view", sizeof(tool->view), tool->view));
+  PetscCall(SbOptionBool(&scope, "quiet", &tool->quiet));
+  PetscCall(SbOptionGiven(&scope, "size", &given));
+  PetscCheck(
+    given || strcmp(tool->command, "tet"), PETSC_COMM_SELF, PETSC_ERR_USER,
+    "tet needs -size: the edge length of the tets, above 0, in m (in the unit of the file times -scale)");
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbToolSetFromOptions(int argc, char *argv[], const SbToolLine *line, SbTool *tool)
+{
+  const SbToolCommand *command = NULL;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscMemzero(tool, sizeof(*tool)));
+  PetscCall(check_words(line, &command));
+  for (int i = 1; i < argc; i++) {
+    PetscBool is_option;
+
+    PetscCall(PetscOptionsValidKey(argv[i], &is_option));
+    if (is_option) PetscCall(check_option(argv[i] + 1, command->name));
+  }
+  tool->command = command->name;
+  tool->in = line->word[1];
+  tool->out = command->nfile > 1 ? line->word[2] : NULL;
+  PetscCall(PetscStrncpy(tool->body.mesh, tool->in, sizeof(tool->body.mesh)));
+  PetscCall(read_options(tool));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

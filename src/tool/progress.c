@@ -1,0 +1,66 @@
+/*
+  progress.c - a line on standard error that tells how far something long is: rewritten in place on a terminal, else a plain
+  line now and then. What takes less than a second says nothing.
+*/
+#include <unistd.h>
+#include "tool.h"
+
+#define PATIENCE 1.0 /* s before the first line */
+
+static PetscLogDouble now(void)
+{
+  return MPI_Wtime();
+}
+
+const char *SbToolNumber(PetscInt64 n, char text[32])
+{
+  char digits[24];
+  const int length = snprintf(digits, sizeof(digits), "%lld", (long long)n);
+  int k = 0;
+
+  for (int i = 0; i < length; i++) {
+    text[k++] = digits[i];
+    if (digits[i] != '-' && i + 1 < length && (length - i - 1) % 3 == 0) text[k++] = ',';
+  }
+  text[k] = 0;
+  return text;
+}
+
+PetscErrorCode SbToolBegin(SbTool *tool, const char *phase)
+{
+  PetscFunctionBeginUser;
+  tool->phase = phase;
+  tool->start = now();
+  tool->last = tool->start + PATIENCE;
+  tool->terminal = (PetscBool)isatty(STDERR_FILENO);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbToolProgress(const char *what, PetscInt64 done, PetscInt64 total, void *ctx)
+{
+  SbTool *tool = (SbTool *)ctx;
+  const PetscLogDouble t = now();
+  char line[PETSC_MAX_PATH_LEN], number[32];
+
+  PetscFunctionBeginUser;
+  if (tool->quiet || t < tool->last) PetscFunctionReturn(PETSC_SUCCESS);
+  tool->last = t + (tool->terminal ? 0.2 : 5.0);
+  if (total > 0)
+    (void)snprintf(line, sizeof(line), "%s: %s %s, %d %%, %.0f s", tool->phase, SbToolNumber(done, number),
+                   what, (int)(100. * (double)done / (double)total), t - tool->start);
+  else
+    (void)snprintf(line, sizeof(line), "%s: %s %s, %.0f s", tool->phase, SbToolNumber(done, number), what,
+                   t - tool->start);
+  (void)fprintf(stderr, tool->terminal ? "\r%-79.79s" : "%s\n", line);
+  (void)fflush(stderr);
+  tool->open = tool->terminal;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbToolEnd(SbTool *tool)
+{
+  PetscFunctionBeginUser;
+  if (tool->open) (void)fprintf(stderr, "\r%79s\r", "");
+  tool->open = PETSC_FALSE;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

@@ -1,0 +1,88 @@
+/*
+  view.c - a picture of a mesh, drawn by scripts/render from a file in supple's own format.
+
+  The script is looked for beside the program: ../scripts of the folder that the program is in, or, installed,
+  ../share/supple/scripts.
+*/
+#include <errno.h>
+#include <spawn.h>
+#include <stdlib.h>
+#include <sys/wait.h>
+#include <unistd.h>
+#include "tool.h"
+
+extern char **environ;
+
+static PetscErrorCode find_render(size_t size, char path[])
+{
+  static const char *const places[] = {"../scripts/render", "../share/supple/scripts/render"};
+  char program[PETSC_MAX_PATH_LEN];
+  const ssize_t n = readlink("/proc/self/exe", program, sizeof(program) - 1);
+  char *slash;
+
+  PetscFunctionBeginUser;
+  program[n > 0 ? n : 0] = 0;
+  slash = strrchr(program, '/');
+  if (slash) *slash = 0;
+  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(places); i++) {
+    (void)snprintf(path, size, "%s/%s", program, places[i]);
+    if (!access(path, X_OK)) PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  SETERRQ(PETSC_COMM_SELF, PETSC_ERR_FILE_OPEN,
+          "-view needs scripts/render of supple, which is in neither %s/%s nor %s/%s", program, places[0],
+          program, places[1]);
+}
+
+/* Runs the script; its messages go to standard error. */
+static PetscErrorCode draw(const char *render, const char *file, const char *picture, const char *caption)
+{
+  const char *const words[] = {render, file, "-o", picture, "--caption", caption, NULL};
+  pid_t child;
+  int status = 0, error;
+  posix_spawn_file_actions_t actions;
+
+  PetscFunctionBeginUser;
+  (void)posix_spawn_file_actions_init(&actions);
+  (void)posix_spawn_file_actions_adddup2(&actions, STDERR_FILENO, STDOUT_FILENO);
+  error = posix_spawn(&child, render, &actions, NULL, (char *const *)words, environ);
+  (void)posix_spawn_file_actions_destroy(&actions);
+  PetscCheck(!error, PETSC_COMM_SELF, PETSC_ERR_SYS, "cannot start %s: %s", render, strerror(error));
+  while (waitpid(child, &status, 0) < 0 && errno == EINTR) {
+  }
+  PetscCheck(WIFEXITED(status) && !WEXITSTATUS(status), PETSC_COMM_SELF, PETSC_ERR_FILE_WRITE,
+             "%s was not drawn: %s failed, its message is above", picture, render);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode check_picture(const char *name)
+{
+  const char *dot = strrchr(name, '.');
+
+  PetscFunctionBeginUser;
+  PetscCheck(dot && !strcmp(dot, ".png"), PETSC_COMM_SELF, PETSC_ERR_USER,
+             "-view %s: give a name that ends in .png", name);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbToolView(SbTool *tool, const SbImport *mesh)
+{
+  const char *tmp = getenv("TMPDIR"), *name = tool->out ? tool->out : tool->in;
+  char render[2 * PETSC_MAX_PATH_LEN], folder[PETSC_MAX_PATH_LEN], file[PETSC_MAX_PATH_LEN + 16],
+    index[PETSC_MAX_PATH_LEN + 16];
+  PetscErrorCode ierr;
+
+  PetscFunctionBeginUser;
+  PetscCall(check_picture(tool->view));
+  PetscCall(find_render(sizeof(render), render));
+  (void)snprintf(folder, sizeof(folder), "%s/supple-mesh-XXXXXX", tmp && tmp[0] ? tmp : "/tmp");
+  PetscCheck(mkdtemp(folder), PETSC_COMM_SELF, PETSC_ERR_FILE_WRITE, "cannot make a folder %s: %s", folder,
+             strerror(errno));
+  (void)snprintf(file, sizeof(file), "%s/mesh.h5", folder);
+  (void)snprintf(index, sizeof(index), "%s/mesh.xmf", folder);
+  ierr = SbMeshFileWrite(mesh, file, SB_MESH_H5);
+  if (!ierr) ierr = draw(render, file, tool->view, name);
+  (void)unlink(file);
+  (void)unlink(index);
+  (void)rmdir(folder);
+  PetscFunctionReturn(ierr);
+}

@@ -1,0 +1,142 @@
+/*
+  Seconds and memory from a mesh file to the distributed mesh, phase by phase.
+
+    mesh -mesh big.msh
+
+  read: the file to arrays on rank 0; check: what a run checks, and all bodies in one piece; distribute: DMPlex, partition,
+  migration; number: own numbering. Memory is the largest resident size within a phase (VmHWM, set back before it), of rank 0
+  and of the largest other rank, less what the process had at its start. One run per process: pages that were freed stay.
+*/
+#include "perf.h"
+#include "../../src/mesh/mesh_impl.h"
+
+/* A line of /proc/self/status in MiB. */
+static double status(const char *name)
+{
+  FILE *file = fopen("/proc/self/status", "r");
+  char line[256];
+  double kib = 0.;
+
+  while (file && fgets(line, sizeof(line), file))
+    if (!strncmp(line, name, strlen(name))) kib = strtod(line + strlen(name) + 1, NULL);
+  if (file) (void)fclose(file);
+  return kib / 1024;
+}
+
+/* From here on VmHWM counts anew. */
+static void forget_peak(void)
+{
+  FILE *file = fopen("/proc/self/clear_refs", "w");
+
+  if (!file) return;
+  (void)fputs("5", file);
+  (void)fclose(file);
+}
+
+typedef struct {
+  PerfClock start;
+  double base, most[2]; /* MiB: at the start; of the phases so far, rank 0 and others */
+} Phase;
+
+static void phase_begin(Phase *p)
+{
+  forget_peak();
+  p->start = perf_start();
+}
+
+static PetscErrorCode phase_end(Phase *p, const char *name)
+{
+  const PerfClock taken = perf_stop(p->start);
+  double mine[2] = {0., 0.}, all[2];
+  char label[64];
+  PetscMPIInt rank, size;
+
+  PetscFunctionBeginUser;
+  PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
+  PetscCallMPI(MPI_Comm_size(PETSC_COMM_WORLD, &size));
+  mine[rank > 0] = status("VmHWM:") - p->base;
+  PetscCallMPI(MPI_Allreduce(mine, all, 2, MPI_DOUBLE, MPI_MAX, PETSC_COMM_WORLD));
+  for (int k = 0; k < 2; k++) p->most[k] = PetscMax(p->most[k], all[k]);
+  PetscCall(perf_sample(name, "s", taken.wall));
+  (void)snprintf(label, sizeof(label), "%s_rank0", name);
+  PetscCall(perf_sample(label, "MiB", all[0]));
+  (void)snprintf(label, sizeof(label), "%s_others", name);
+  if (size > 1) PetscCall(perf_sample(label, "MiB", all[1]));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode read_only(const SbBody *body)
+{
+  SbImport *im = NULL;
+  PetscMPIInt rank;
+
+  PetscFunctionBeginUser;
+  PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
+  if (!rank) PetscCall(SbMeshFileRead(body, NULL, NULL, &im));
+  PetscCall(SbMeshFileDestroy(&im));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode whole_mesh(SbBody *body, SbWhole *whole)
+{
+  PetscMPIInt rank;
+
+  PetscFunctionBeginUser;
+  PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
+  PetscCall(PetscMemzero(whole, sizeof(*whole)));
+  if (!rank) PetscCall(SbWholeCreate(1, body, 0, NULL, whole));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode measure(SbBody *body)
+{
+  Phase p;
+  SbWhole whole;
+  SbMesh mesh;
+  SbPoint *point;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscMemzero(&p, sizeof(p)));
+  p.base = status("VmRSS:");
+  phase_begin(&p);
+  PetscCall(read_only(body));
+  PetscCall(phase_end(&p, "read"));
+  phase_begin(&p);
+  PetscCall(whole_mesh(body, &whole));
+  PetscCall(phase_end(&p, "read_and_check"));
+  PetscCall(PetscNew(&mesh));
+  mesh->comm = PETSC_COMM_WORLD;
+  mesh->nbody = 1;
+  mesh->body = body;
+  phase_begin(&p);
+  PetscCall(SbDistribute(PETSC_COMM_WORLD, "metis", &whole, &mesh->dm, &point));
+  PetscCall(phase_end(&p, "distribute"));
+  PetscCall(SbWholeDestroy(&whole));
+  phase_begin(&p);
+  PetscCall(SbMeshNumber(mesh, point));
+  PetscCall(phase_end(&p, "number"));
+  PetscCall(PetscFree(point));
+  PetscCall(perf_sample("peak_rank0", "MiB", p.most[0]));
+  PetscCall(perf_sample("peak_others", "MiB", p.most[1]));
+  PetscCall(perf_sample("kept", "MiB", status("VmRSS:") - p.base));
+  PetscCall(perf_fact("tets", mesh->Ncell));
+  PetscCall(SbMeshDestroy(&mesh));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+int main(int argc, char **argv)
+{
+  SbBody body;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscInitialize(&argc, &argv, NULL, NULL));
+  PetscCall(SbMeshRegister());
+  PetscCall(PetscMemzero(&body, sizeof(body)));
+  body.scale = 1;
+  PetscCall(PetscStrncpy(body.mesh, "box:0.4,0.1,0.1:8", sizeof(body.mesh)));
+  PetscCall(perf_argument("-mesh", sizeof(body.mesh), body.mesh));
+  PetscCall(measure(&body));
+  PetscCall(SbOptionsReset());
+  PetscCall(PetscFinalize());
+  return 0;
+}

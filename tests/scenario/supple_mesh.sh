@@ -1,0 +1,156 @@
+#!/usr/bin/env bash
+# supple-mesh from the command line: what info says, that formats keep a mesh, that refined and repaired meshes simulate,
+# that a run's output is a mesh again, exit codes and messages.
+# @timeout 300
+set -uo pipefail
+# shellcheck source=tests/scenario/scenario_common.sh
+source tests/scenario/scenario_common.sh
+data=$top/tests/data
+tool=$(dirname "$supple")/supple-mesh
+
+# ok ARGUMENT...: must succeed and say nothing on standard error
+ok() {
+  timeout 60 "$tool" "$@" >out.txt 2>err.txt
+  check "supple-mesh $*: exit code $?: $(cat err.txt)" test $? = 0
+  check "supple-mesh $*: on standard error: $(cat err.txt)" test ! -s err.txt
+}
+# says TEXT: what the last command printed holds the text, blanks counting as one
+says() {
+  check "no '$1' in: $(cat out.txt)" grep -qF -- "$1" <(tr -s ' ' <out.txt)
+}
+# refuses TEXT ARGUMENT...: must fail with one line that holds TEXT
+refuses() {
+  local text=$1 code
+  shift
+  timeout 60 "$tool" "$@" >out.txt 2>err.txt
+  code=$?
+  check "supple-mesh $*: exit code $code" test "$code" -ne 0 -a "$code" -ne 124
+  check "supple-mesh $*: not '$text' but '$(cat err.txt)'" grep -qF -- "supple-mesh: error: $text" err.txt
+  check "supple-mesh $*: $(wc -l <err.txt) lines" test "$(wc -l <err.txt)" = 1
+}
+# same FILE FILE: the two hold the same mesh, written as text of version 4.1
+same() {
+  "$tool" convert "$1" one.msh -quiet
+  "$tool" convert "$2" two.msh -quiet
+  check "$1 and $2 differ" cmp -s one.msh two.msh
+}
+
+# info: numbers of a known mesh
+ok info "$data/two_cubes_41.msh"
+for text in " vertices 23" " tets 48" " left 24 tets, 1 m^3 (number 1)" " both ends 8 triangles, 2 m^2 (number 4)" " volume 2 m^3" \
+  " surface 10 m^2, 40 facets" " edges 90: " " faces 116" " parts 1" " p1 69 " " cr 348 " " dg 576 " \
+  "dihedral angles, degrees: 54.7 to 109.5" " 50 to 60 128 #" " 1 to 1.25 48 #"; do
+  says "$text"
+done
+ok info "$data/two_cubes_41.msh" -scale 0.1 -translate 1,2,3
+says "from (1, 2, 3) to (1.2, 2.1, 3.1)"
+says " volume 0.002 m^3"
+ok info box:1,2,3:2 -quiet
+says " volume 6 m^3"
+ok info "$data/odd.msh"
+says " to know: unused vertices left out: 2, inverted tets turned: 1, parts that share no vertex: 2"
+refuses "$data/bad_twice.msh: tetrahedra 1 and 2 have the same four nodes; remove one" info "$data/bad_twice.msh"
+says " tets 2"
+
+# convert: every format and back
+for format in msh41 msh41_binary msh22 msh22_binary; do
+  ok convert "$data/two_cubes_41.msh" "$format.msh" -format "$format"
+  says "$format.msh: 23 vertices, 48 tets, "
+done
+ok convert msh41_binary.msh cubes.h5
+says "cubes.h5: 23 vertices, 48 tets, 12 triangles, 1 lines, 1 points"
+check "no index for ParaView" grep -q "cubes.h5:/mesh/cells" cubes.xmf
+same "$data/two_cubes_41.msh" msh41.msh
+same "$data/two_cubes_41.msh" msh41_binary.msh
+same "$data/two_cubes_41.msh" cubes.h5
+same cubes.h5 cubes.xmf
+same msh22.msh msh22_binary.msh
+ok convert cubes.h5 cubes.h5
+same "$data/two_cubes_41.msh" cubes.h5
+
+# refine: volume, groups, and it simulates; one and two ranks give the same
+ok refine cubes.h5 fine.h5 -levels 2
+says "fine.h5: 1729 vertices, 3,072 tets, 192 triangles, 4 lines, 1 points" || true
+ok info fine.h5
+for text in " tets 3,072" " left 1,536 tets, 1 m^3" " both ends 128 triangles, 2 m^2" " volume 2 m^3" " surface 10 m^2, 640 facets"; do
+  says "$text"
+done
+cat >body.opts <<'END_OPTIONS'
+-bodies it
+-body_it_material linear
+-body_it_young 1e5     # Pa
+-body_it_poisson 0.3
+-effects gravity,hold
+-effect_gravity_vector 0,0,-9.81
+-effect_hold_type support
+-effect_hold_on wall
+-time static
+-output_precision double
+END_OPTIONS
+# run FOLDER RANKS ARGUMENT...
+run() {
+  timeout 100 "${mpi[@]}" "$2" "$supple" body.opts -output_dir "$1" "${@:3}" >log.txt 2>&1
+  check "$*: exit code $?: $(tail -n 3 log.txt)" test $? = 0
+}
+strain() { # last strain energy of a run, with the name of its column found in the head
+  awk -F, 'NR == 1 { for (i = 1; i <= NF; i++) if ($i ~ /^strain/) k = i } END { print $k }' "$1/history.csv"
+}
+close() { # two numbers and a relative tolerance
+  awk -v a="$1" -v b="$2" -v t="$3" 'BEGIN { exit !(a != 0 && (a - b) ^ 2 <= (t * a) ^ 2) }'
+}
+run coarse 1 -body_it_mesh cubes.h5
+run gmsh 1 -body_it_mesh "$data/two_cubes_41.msh"
+run fine 1 -body_it_mesh fine.h5
+run fine2 2 -body_it_mesh fine.h5
+check "strain energy $(strain coarse) from .h5, $(strain gmsh) from .msh" test "$(strain coarse)" = "$(strain gmsh)"
+check "strain energy on one rank $(strain fine), on two $(strain fine2)" close "$(strain fine)" "$(strain fine2)" 1e-5
+check "strain energy falls when refined: $(strain coarse), $(strain fine)" awk -v a="$(strain coarse)" -v b="$(strain fine)" 'BEGIN { exit !(b > a) }'
+
+# a run's output is a mesh: at rest the one that went in, at its end the deformed one
+ok info coarse/fields.h5
+says " it 48 tets, 2 m^3 (number 1)"
+ok convert coarse/fields.xmf end.msh -step -1
+ok info end.msh
+check "the deformed mesh has the volume of the one at rest" test -z "$(tr -s ' ' <out.txt | grep -x ' volume 2 m^3')"
+refuses "coarse/fields.h5: has no step 99; it has " convert coarse/fields.h5 end.msh -step 99
+run again 2 -body_it_mesh coarse/fields.h5 -body_it_mesh_step -1 -effect_hold_on low -sets low -set_low_at plane:1,0,0,0,0.01
+
+# repair
+refuses "$data/bad_flat.msh: nothing is left" repair "$data/bad_flat.msh" never.msh
+check "a file was left" test ! -e never.msh -a ! -e never.msh.part
+ok repair "$data/bad_twice.msh" once.msh
+says "tets given again, dropped: 1"
+ok info once.msh
+says " tets 1"
+ok repair "$data/bad_vertex_twice.msh" mended.msh
+says "tets that used a vertex twice, dropped: 1"
+ok repair "$data/odd.msh" even.msh
+says "inverted tets turned: 1"
+says "unused vertices dropped: 2"
+ok repair even.msh even2.msh
+says "nothing to repair"
+same even.msh even2.msh
+
+# mistakes
+refuses "no command is given"
+refuses "'inof' is no command; the commands are info, convert, " inof cubes.h5
+refuses "'inof' is no command; the commands are " inof
+check "no near name: $(cat err.txt)" grep -q "did you mean info?" err.txt
+refuses "convert takes 2 files, not 1: supple-mesh convert FILE OUT" convert cubes.h5
+refuses "-levles is not an option of supple-mesh; did you mean -levels?" refine cubes.h5 x.h5 -levles 2
+refuses "-levels does nothing in supple-mesh info; it is for refine" info cubes.h5 -levels 2
+refuses "-levels is 9; it must lie in [1, 8]" refine cubes.h5 x.h5 -levels 9
+refuses "nix.msh: cannot open the file (No such file or directory)" info nix.msh
+refuses "x.doc: meshes are written as .msh (gmsh) or .h5 (supple)" convert cubes.h5 x.doc
+refuses "/proc/x.msh.part cannot be written: " convert cubes.h5 /proc/x.msh
+head -c 3000 cubes.h5 >cut.h5
+refuses "cut.h5: HDF5 cannot open it (3000 bytes); it is truncated, damaged or being written" info cut.h5
+error 2 "body 'it': cut.h5: HDF5 cannot open it (3000 bytes)" body.opts -body_it_mesh cut.h5 -output_dir new
+ok -help
+says "supple-mesh refine FILE OUT"
+ok -version
+says "supple-mesh "
+"${mpi[@]}" 2 "$tool" info cubes.h5 >out.txt 2>err.txt
+check "on two ranks: $(cat err.txt)" grep -qF "runs on one process, not on 2" err.txt
+
+finish

@@ -1,0 +1,347 @@
+// Meshes in HDF5: what supple-mesh writes and what a run writes, distributed as from any other file; damage has its message.
+#include <hdf5.h>
+#include "mesh_same.h"
+
+#define DATA "tests/data/"
+
+/* The same name on all ranks; rank 0 writes. */
+static PetscErrorCode shared_path(const char *name, size_t size, char path[])
+{
+  int id = (int)getpid();
+
+  PetscFunctionBeginUser;
+  PetscCallMPI(MPI_Bcast(&id, 1, MPI_INT, 0, PETSC_COMM_WORLD));
+  (void)snprintf(path, size, "/tmp/sbmesh_all_%d_%s", id, name);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode remove_all(const char *path)
+{
+  char index[256];
+  PetscMPIInt rank;
+
+  PetscFunctionBeginUser;
+  PetscCallMPI(MPI_Barrier(PETSC_COMM_WORLD));
+  PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
+  if (!rank) {
+    (void)unlink(path);
+    (void)snprintf(index, sizeof(index), "%.*s.xmf", (int)(strrchr(path, '.') - path), path);
+    (void)unlink(index);
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Sums over owned cells that do not depend on the partition: volume, original numbers with their vertices, sets. */
+static PetscErrorCode fingerprint(const char *mesh_path, PetscReal sum[4])
+{
+  SbBody body = test_body("b", mesh_path);
+  SbSet set[2];
+  SbMesh mesh;
+  PetscReal mine[4] = {0, 0, 0, 0};
+
+  PetscFunctionBeginUser;
+  PetscCall(test_set("w", "group:wall", &set[0]));
+  PetscCall(test_set("l", "group:left", &set[1]));
+  PetscCall(SbMeshCreate(PETSC_COMM_WORLD, 1, &body, 2, set, &mesh));
+  PetscCall(SbMeshValidate(mesh));
+  for (PetscInt c = 0; c < mesh->ncell_owned; c++) {
+    const PetscInt *v = mesh->cell + 4 * c;
+
+    mine[0] += SbTetDet(mesh->x, v) / 6;
+    for (int a = 0; a < 4; a++)
+      mine[1] += (PetscReal)(mesh->cell_orig[c] + 1) * (a + 1) * (PetscReal)(mesh->vert_orig[v[a]] + 1);
+    mine[2] += (mesh->cell_set[c] & SB_SET_BIT(1)) != 0;
+    for (int f = 0; f < 4; f++) mine[3] += (mesh->face_set[4 * c + f] & SB_SET_BIT(0)) != 0;
+  }
+  PetscCallMPI(MPI_Allreduce(mine, sum, 4, MPIU_REAL, MPI_SUM, PETSC_COMM_WORLD));
+  PetscCall(SbMeshDestroy(&mesh));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* From the .h5 and through its .xmf, every rank gets what it gets from the .msh. */
+static PetscErrorCode test_distributed(void)
+{
+  PetscReal gmsh[4], own[4], indexed[4];
+  char path[256], index[256];
+  SbImport *im;
+  PetscMPIInt rank;
+
+  PetscFunctionBeginUser;
+  PetscCall(shared_path("cubes.h5", sizeof(path), path));
+  PetscCall(shared_path("cubes.xmf", sizeof(index), index));
+  PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
+  if (!rank) {
+    PetscCall(test_read(DATA "two_cubes_41.msh", 0, &im));
+    PetscCall(SbMeshFileWrite(im, path, SB_MESH_AUTO));
+    PetscCall(SbMeshFileDestroy(&im));
+  }
+  PetscCallMPI(MPI_Barrier(PETSC_COMM_WORLD));
+  PetscCall(fingerprint(DATA "two_cubes_41.msh", gmsh));
+  PetscCall(fingerprint(path, own));
+  PetscCall(fingerprint(index, indexed));
+  SB_CHECK_NEAR(gmsh[2], 24, 0, "tets in the region");
+  SB_CHECK_NEAR(gmsh[3], 4, 0, "facets in the wall");
+  for (int k = 0; k < 4; k++) {
+    SB_CHECK_NEAR(own[k], gmsh[k], 1e-12 * gmsh[k], "of the .h5");
+    SB_CHECK_NEAR(indexed[k], gmsh[k], 1e-12 * gmsh[k], "of the .xmf");
+  }
+  PetscCall(remove_all(path));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ files made by hand */
+
+static void put_array(hid_t file, const char *name, int ndim, const hsize_t size[], hid_t type,
+                      const void *data)
+{
+  const hid_t links = H5Pcreate(H5P_LINK_CREATE), space = H5Screate_simple(ndim, size, NULL);
+  hid_t set;
+
+  (void)H5Pset_create_intermediate_group(links, 1);
+  set = H5Dcreate2(file, name, type, space, links, H5P_DEFAULT, H5P_DEFAULT);
+  if (data) (void)H5Dwrite(set, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, data);
+  (void)H5Dclose(set);
+  (void)H5Sclose(space);
+  (void)H5Pclose(links);
+}
+
+static void put_text(hid_t file, const char *where, const char *name, const char *text)
+{
+  const hid_t type = H5Tcopy(H5T_C_S1), space = H5Screate(H5S_SCALAR);
+  hid_t a;
+
+  (void)H5Tset_size(type, strlen(text) + 1);
+  a = H5Acreate_by_name(file, where, name, type, space, H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT);
+  (void)H5Awrite(a, type, text);
+  (void)H5Aclose(a);
+  (void)H5Sclose(space);
+  (void)H5Tclose(type);
+}
+
+static const double corner[12] = {0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1};
+static const int tet[4] = {0, 1, 2, 3};
+static const hsize_t four_by_three[2] = {4, 3}, one_by_four[2] = {1, 4}, one[1] = {1};
+
+/* fields.h5 of a run of one tet: displacement at steps 3 and 120, in single precision. */
+static void write_output(const char *path)
+{
+  const hid_t file = H5Fcreate(path, H5F_ACC_TRUNC, H5P_DEFAULT, H5P_DEFAULT);
+  const int body[1] = {1};
+  float u[12];
+
+  put_array(file, "/mesh/x", 2, four_by_three, H5T_NATIVE_DOUBLE, corner);
+  put_array(file, "/mesh/cells", 2, one_by_four, H5T_NATIVE_INT, tet);
+  put_array(file, "/mesh/body", 1, one, H5T_NATIVE_INT, body);
+  put_text(file, "/mesh", "bodies", "stone,liver");
+  for (int i = 0; i < 12; i++) u[i] = 0.5f;
+  put_array(file, "/step/0000/000003/displacement", 2, four_by_three, H5T_NATIVE_FLOAT, u);
+  for (int i = 0; i < 12; i++) u[i] = 2.f;
+  put_array(file, "/step/0001/000120/displacement", 2, four_by_three, H5T_NATIVE_FLOAT, u);
+  (void)H5Fclose(file);
+}
+
+static PetscErrorCode test_output(void)
+{
+  static const struct {
+    PetscInt step;
+    PetscReal shift;
+  } cases[] = {{0, 0}, {3, 0.5}, {120, 2}, {-1, 2}};
+  char path[256], text[256];
+  SbImport *im;
+
+  PetscFunctionBeginUser;
+  test_path("fields.h5", sizeof(path), path);
+  write_output(path);
+  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(cases); i++) {
+    PetscCall(test_read(path, cases[i].step, &im));
+    SB_CHECK(im->nvert == 4 && im->item[3].n == 1, "%d vertices", (int)im->nvert);
+    SB_CHECK(im->x[0] == cases[i].shift && im->x[3] == 1 + cases[i].shift, "step %d: x = %g",
+             (int)cases[i].step, (double)im->x[0]);
+    test_groups_of(im, 3, 0, sizeof(text), text);
+    SB_CHECK(!strcmp(text, "3 2 liver"), "the tet is of '%s'", text);
+    PetscCall(SbMeshFileDestroy(&im));
+  }
+  TEST_MESSAGE(test_read(path, 7, &im), PETSC_ERR_FILE_UNEXPECTED,
+               "has no step 7; it has 2 of them, from 3 to 120 (-1: the last one)");
+  (void)unlink(path);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* -output_discontinuous: two tets with points of their own; a shared vertex lies at the mean of its points. */
+static PetscErrorCode test_discontinuous(void)
+{
+  const double x[24] = {0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1, 1, 0, 0, 0, 1, 0, 0, 0, 1, 1, 1, 1};
+  const int cells[8] = {0, 1, 2, 3, 4, 5, 6, 7}, vertices[8] = {0, 1, 2, 3, 1, 2, 3, 4};
+  const hsize_t points[2] = {8, 3}, tets[2] = {2, 4};
+  double u[24] = {0};
+  char path[256];
+  SbImport *im;
+  hid_t file;
+
+  PetscFunctionBeginUser;
+  test_path("split.h5", sizeof(path), path);
+  file = H5Fcreate(path, H5F_ACC_TRUNC, H5P_DEFAULT, H5P_DEFAULT);
+  put_array(file, "/mesh/x", 2, points, H5T_NATIVE_DOUBLE, x);
+  put_array(file, "/mesh/cells", 2, tets, H5T_NATIVE_INT, cells);
+  put_array(file, "/mesh/vertices", 2, tets, H5T_NATIVE_INT, vertices);
+  u[3 * 1] = 0.5; /* of vertex 1 in the first tet only */
+  put_array(file, "/step/0000/000001/displacement", 2, points, H5T_NATIVE_DOUBLE, u);
+  (void)H5Fclose(file);
+  PetscCall(test_read(path, 1, &im));
+  SB_CHECK(im->nvert == 5 && im->item[3].n == 2, "%d vertices", (int)im->nvert);
+  SB_CHECK(im->item[3].vert[4] == 1 && im->item[3].vert[7] == 4, "vertices of the second tet");
+  SB_CHECK(im->x[3] == 1.25 && im->x[4] == 0, "x = %g", (double)im->x[3]);
+  PetscCall(SbMeshFileDestroy(&im));
+  (void)unlink(path);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ damage */
+
+/* An own mesh with one array replaced, or none. */
+static PetscErrorCode with_array(const char *path, const char *name, int ndim, const hsize_t size[],
+                                 hid_t type, const void *data, const char *words)
+{
+  SbImport *im;
+  hid_t file;
+
+  PetscFunctionBeginUser;
+  PetscCall(test_read(DATA "two_cubes_41.msh", 0, &im));
+  PetscCall(SbMeshFileWrite(im, path, SB_MESH_AUTO));
+  PetscCall(SbMeshFileDestroy(&im));
+  file = H5Fopen(path, H5F_ACC_RDWR, H5P_DEFAULT);
+  (void)H5Ldelete(file, name, H5P_DEFAULT);
+  if (ndim) put_array(file, name, ndim, size, type, data);
+  (void)H5Fclose(file);
+  TEST_MESSAGE(test_read(path, 0, &im), PETSC_ERR_FILE_UNEXPECTED, words);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode test_damage(void)
+{
+  const hsize_t lie[2] = {100000000, 4}, few[1] = {3}, pair[2] = {2, 2}, groups[1] = {8}, two[1] = {2};
+  const double bad[12] = {0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, NAN};
+  const int wild[4] = {0, 1, 2, 4711}, below[4] = {0, -1, 2, 3}, high[8] = {0, 1, 2, 3, 4, 3, 3, 3},
+            falling[2] = {1, 0};
+  char path[256], index[256];
+
+  PetscFunctionBeginUser;
+  test_path("bad.h5", sizeof(path), path);
+  PetscCall(
+    with_array(path, "/mesh/x", 0, NULL, 0, NULL, "holds no mesh: /mesh/x and /mesh/cells are missing"));
+  PetscCall(with_array(path, "/mesh/x", 2, four_by_three, H5T_NATIVE_DOUBLE, bad,
+                       "/mesh/x holds no finite number in row 4"));
+  PetscCall(with_array(path, "/mesh/x", 2, pair, H5T_NATIVE_DOUBLE, bad,
+                       "/mesh/x has 2 dimensions and 2 columns; expected 3"));
+  PetscCall(with_array(path, "/mesh/cells", 2, one_by_four, H5T_NATIVE_DOUBLE, bad,
+                       "/mesh/cells does not hold whole numbers"));
+  PetscCall(with_array(path, "/mesh/cells", 2, one_by_four, H5T_NATIVE_INT, wild,
+                       "/mesh/cells holds 4711 in row 1; it must be from 0 to 22"));
+  PetscCall(
+    with_array(path, "/mesh/cells", 2, one_by_four, H5T_NATIVE_INT, below, "/mesh/cells holds -1 in row 1"));
+  PetscCall(with_array(path, "/mesh/cells", 2, lie, H5T_NATIVE_INT, NULL,
+                       "/mesh/cells announces 100000000 x 4 numbers, more than the "));
+  PetscCall(with_array(path, "/mesh/cell_tags", 1, few, H5T_NATIVE_INT, tet,
+                       "/mesh/cell_tags has 3 rows for 48 simplices"));
+  PetscCall(with_array(path, "/mesh/cell_tags", 1, few, H5T_NATIVE_INT, wild + 1,
+                       "/mesh/cell_tags holds 4711 in row 3"));
+  PetscCall(with_array(path, "/groups/dim", 1, groups, H5T_NATIVE_INT, high,
+                       "/groups/dim holds 4 in row 5; it must be from 0 to 3"));
+  PetscCall(with_array(path, "/groups/dim", 1, two, H5T_NATIVE_INT, high, " names, 2 dimensions and "));
+  PetscCall(with_array(path, "/tag_sets/start", 1, two, H5T_NATIVE_INT, falling,
+                       "/tag_sets/start falls from 1 to 0"));
+  PetscCall(with_array(path, "/groups/name", 0, NULL, 0, NULL, "has no array /groups/name"));
+  (void)unlink(path);
+  (void)snprintf(index, sizeof(index), "%.*s.xmf", (int)(strlen(path) - 3), path);
+  (void)unlink(index);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Cut off anywhere, a file is refused: none is read beyond its end, none is half a mesh. */
+static PetscErrorCode test_truncated(void)
+{
+  char path[256], cut[256], index[256], *bytes;
+  size_t size;
+  FILE *file;
+  SbImport *im;
+
+  PetscFunctionBeginUser;
+  test_path("whole.h5", sizeof(path), path);
+  test_path("cut.h5", sizeof(cut), cut);
+  PetscCall(test_read(DATA "two_cubes_41.msh", 0, &im));
+  PetscCall(SbMeshFileWrite(im, path, SB_MESH_AUTO));
+  PetscCall(SbMeshFileDestroy(&im));
+  file = fopen(path, "rb");
+  (void)fseek(file, 0, SEEK_END);
+  size = (size_t)ftell(file);
+  rewind(file);
+  PetscCall(PetscMalloc1(size, &bytes));
+  SB_CHECK(fread(bytes, 1, size, file) == size, "%zu bytes of %s", size, path);
+  (void)fclose(file);
+  for (size_t n = 0; n < size; n += size / 7) {
+    file = fopen(cut, "wb");
+    (void)fwrite(bytes, 1, n, file);
+    (void)fclose(file);
+    TEST_MESSAGE(test_read(cut, 0, &im), PETSC_ERR_FILE_UNEXPECTED,
+                 n < 8 ? "is no HDF5 file (0 bytes)" : "it is truncated, damaged or being written");
+  }
+  PetscCall(PetscFree(bytes));
+  (void)unlink(cut);
+  (void)unlink(path);
+  (void)snprintf(index, sizeof(index), "%.*s.xmf", (int)(strlen(path) - 3), path);
+  (void)unlink(index);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode test_foreign(void)
+{
+  const int two = 2;
+  char path[256];
+  SbImport *im;
+  hid_t file, space, a;
+
+  PetscFunctionBeginUser;
+  TEST_MESSAGE(test_read("tests/data/none.h5", 0, &im), PETSC_ERR_FILE_OPEN,
+               "cannot open the file (No such file");
+  test_path("foreign.h5", sizeof(path), path);
+  file = H5Fcreate(path, H5F_ACC_TRUNC, H5P_DEFAULT, H5P_DEFAULT);
+  put_array(file, "/weather/rain", 2, one_by_four, H5T_NATIVE_INT, tet);
+  (void)H5Fclose(file);
+  TEST_MESSAGE(test_read(path, 0, &im), PETSC_ERR_FILE_UNEXPECTED,
+               "are missing; it holds weather; give an .h5 mesh");
+  file = H5Fcreate(path, H5F_ACC_TRUNC, H5P_DEFAULT, H5P_DEFAULT);
+  space = H5Screate(H5S_SCALAR);
+  a = H5Acreate2(file, "supple_mesh", H5T_NATIVE_INT, space, H5P_DEFAULT, H5P_DEFAULT);
+  (void)H5Awrite(a, H5T_NATIVE_INT, &two);
+  (void)H5Aclose(a);
+  (void)H5Sclose(space);
+  (void)H5Fclose(file);
+  TEST_MESSAGE(test_read(path, 0, &im), PETSC_ERR_FILE_UNEXPECTED,
+               "is a mesh of layout 2; this supple reads layout 1");
+  (void)unlink(path);
+  test_path("none.xmf", sizeof(path), path);
+  {
+    FILE *text = fopen(path, "w");
+
+    (void)fprintf(text, "<Xdmf/>\n");
+    (void)fclose(text);
+  }
+  TEST_MESSAGE(test_read(path, 0, &im), PETSC_ERR_FILE_UNEXPECTED, "names no mesh in an .h5 file");
+  (void)unlink(path);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+int main(int argc, char **argv)
+{
+  SB_TEST_BEGIN(argc, argv);
+  PetscCall(SbMeshRegister());
+  (void)H5Eset_auto2(H5E_DEFAULT, NULL, NULL);
+  PetscCall(test_distributed());
+  PetscCall(test_output());
+  PetscCall(test_discontinuous());
+  PetscCall(test_damage());
+  PetscCall(test_truncated());
+  PetscCall(test_foreign());
+  PetscCall(SbOptionsReset());
+  SB_TEST_END();
+}
