@@ -149,6 +149,18 @@ sanitize: deps ## unit tests under the address and undefined-behaviour sanitizer
 	$(AGAIN) BUILD=build-sanitize OPT='$(SANITIZE)' build-sanitize/unit
 	@tests/run --build build-sanitize --group unit --sanitize $(if $(T),--match '$(T)')
 
+# The readers need nothing above layers 0 and 1. MPI's compiler is told to call clang.
+FUZZ    := -O1 -g -fno-omit-frame-pointer -fsanitize=fuzzer-no-link,address,undefined -fno-sanitize-recover=undefined
+FUZZOBJ  = $(filter $(BUILD)/src/mesh/% $(BUILD)/src/base/%,$(OBJ))
+$(BUILD)/tests/fuzz/fuzz: $(BUILD)/tests/fuzz/fuzz.o $(FUZZOBJ)
+	$(SAY) "  link     $@"
+	$(Q)$(LINK) -fsanitize=fuzzer -o $@ $^ $(LIBS) $(RPATH)
+
+fuzz: deps ## the readers of meshes under clang's libFuzzer, FUZZ_SECONDS=60 each (one: T=vtu)
+	@scripts/install-deps fuzz
+	$(AGAIN) BUILD=build-fuzz CC='env OMPI_CC=clang MPICH_CC=clang $(CC)' OPT='$(FUZZ)' build-fuzz/tests/fuzz/fuzz
+	@scripts/fuzz --build build-fuzz $(T)
+
 memcheck: deps ## unit tests under valgrind
 	@scripts/install-deps lint
 	$(AGAIN) BUILD=build-memcheck OPT='-O1 -g3' build-memcheck/unit
@@ -192,7 +204,7 @@ help: ## this list
 	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/  make \1|\2/p' Makefile | awk -F'|' '{ printf "%-20s%s\n", $$1, $$2 }'
 	@echo "settings: T=name (tests)  QUICK=1 (bench, solvers, accuracy)  DEBUG=1  WERROR=1  V=1 (show commands)  CC=  OPT=  CFLAGS=  BUILD=  JOBS=  PREFIX=  DESTDIR=  PETSC_DIR= PETSC_ARCH="
 
-.PHONY: all tests deps demo pictures check check-long check-hard stability lint sanitize memcheck bench locking solvers accuracy docs install clean help FORCE
+.PHONY: all tests deps demo pictures check check-long check-hard stability lint sanitize memcheck bench locking solvers accuracy docs install fuzz clean help FORCE
 .SECONDARY:
 .DELETE_ON_ERROR:
 -include $(wildcard $(BUILD)/src/*.d $(BUILD)/src/*/*.d $(BUILD)/tests/*/*.d)

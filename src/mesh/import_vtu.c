@@ -191,15 +191,16 @@ static PetscErrorCode inflate_block(Vtu *v, Bytes *b, const char *name, size_t p
 /* Compressed: number of blocks, their size, that of the last when it is smaller, then the packed size of each. */
 static PetscErrorCode take_blocks(Vtu *v, Bytes *b, const char *name, size_t want, unsigned char out[])
 {
-  size_t nblock, size, last, *packed, at = 0;
+  size_t nblock, size, last, full, *packed, at = 0;
   PetscErrorCode ierr = PETSC_SUCCESS;
 
   PetscFunctionBeginUser;
   PetscCall(take_length(v, b, name, &nblock));
   PetscCall(take_length(v, b, name, &size));
   PetscCall(take_length(v, b, name, &last));
-  if (nblock > (size_t)(b->end - b->at) || size > want || last > size || (size && nblock > want / size + 1) ||
-      (nblock ? (nblock - 1) * size + (last ? last : size) : 0) != want)
+  full = nblock - (nblock && last);
+  if (nblock > (size_t)(b->end - b->at) || last > want || (size && full > want / size) ||
+      full * size + (nblock ? last : 0) != want)
     SB_SCAN_ERROR(&v->scan,
                   "array '%s' has %zu blocks of %zu bytes, the last of %zu; expected %zu bytes in all", name,
                   nblock, size, last, want);

@@ -64,7 +64,7 @@ const char *SbScanPlace(const SbScan *s, char place[64])
 
 static inline void skip_blanks(SbScan *s)
 {
-  while (s->at < s->end && (*s->at == ' ' || *s->at == '\n' || *s->at == '\t' || *s->at == '\r')) s->at++;
+  while (s->at < s->end && isspace((unsigned char)*s->at)) s->at++;
   s->token = s->at;
 }
 
@@ -247,7 +247,7 @@ void SbScanNext(SbScan *s, char comment)
 
 PetscBool SbScanMore(SbScan *s, char comment)
 {
-  while (s->at < s->end && (*s->at == ' ' || *s->at == '\t' || *s->at == '\r')) s->at++;
+  while (s->at < s->end && *s->at != '\n' && isspace((unsigned char)*s->at)) s->at++;
   s->token = s->at;
   return (PetscBool)(s->at < s->end && *s->at != '\n' && *s->at != comment);
 }

@@ -1,0 +1,116 @@
+/*
+  readers.h - one input through one reader, as make fuzz does it millions of times and the unit test once for each file of tests/fuzz.
+
+  The input stands in a file with the ending of its format. TetGen's mesh is four files: here they stand one after the other, apart
+  by lines of %%.
+*/
+#pragma once
+#include <sys/stat.h>
+#include <unistd.h>
+#include "../../src/mesh/mesh_impl.h"
+
+/* read NULL: a closed surface, by its ending. */
+static const struct {
+  const char *name, *ending;
+  SbReader read;
+} fuzz_readers[] = {
+  {"gmsh", ".msh", SbImportRead_Gmsh},
+  {"tetgen", ".ele", SbImportRead_TetGen},
+  {"netgen", ".vol", SbImportRead_Netgen},
+  {"neutral", ".neu", SbImportRead_NetgenNeutral},
+  {"medit", ".mesh", SbImportRead_Medit},
+  {"vtk", ".vtk", SbImportRead_VTK},
+  {"vtu", ".vtu", SbImportRead_VTU},
+  {"abaqus", ".inp", SbImportRead_Abaqus},
+  {"unv", ".unv", SbImportRead_UNV},
+  {"stl", ".stl", NULL},
+  {"obj", ".obj", NULL},
+  {"off", ".off", NULL},
+};
+enum { NFUZZ = (int)PETSC_STATIC_ARRAY_LENGTH(fuzz_readers) };
+
+/* Keeps the text of an error. */
+static inline PetscErrorCode fuzz_keep_error(MPI_Comm comm, int line, const char *function, const char *file,
+                                             PetscErrorCode code, PetscErrorType kind, const char *text,
+                                             void *ctx)
+{
+  (void)comm, (void)line, (void)function, (void)file;
+  if (kind == PETSC_ERROR_INITIAL) (void)snprintf((char *)ctx, 1024, "%s", text ? text : "");
+  return code;
+}
+
+static inline void fuzz_write(const char *path, const char *data, size_t n)
+{
+  FILE *file = fopen(path, "wb");
+
+  if (!file) return;
+  (void)fwrite(data, 1, n, file);
+  (void)fclose(file);
+}
+
+/* The parts of a mesh of TetGen. */
+static inline void fuzz_split(const char *folder, const char *data, size_t n)
+{
+  static const char *const endings[] = {".node", ".ele", ".face", ".edge"};
+  char path[256];
+
+  for (int i = 0; i < 4; i++) {
+    const char *mark = n ? (const char *)memmem(data, n, "%%\n", 3) : NULL;
+    const size_t part = mark ? (size_t)(mark - data) : n;
+
+    (void)snprintf(path, sizeof(path), "%s/in%s", folder, endings[i]);
+    (void)unlink(path);
+    if (part || i < 2) fuzz_write(path, data, part);
+    n -= mark ? part + 3 : n;
+    data += mark ? part + 3 : part;
+  }
+}
+
+/* Reads and checks as a scene does; text: of the error, "" without one. Returns the error code. */
+static inline PetscErrorCode fuzz_read(int reader, const char *folder, const char *data, size_t n,
+                                       char text[1024])
+{
+  char path[256];
+  const PetscReal origin[3] = {0, 0, 0};
+  PetscErrorCode ierr;
+
+  text[0] = 0;
+  (void)snprintf(path, sizeof(path), "%s/in%s", folder, fuzz_readers[reader].ending);
+  if (fuzz_readers[reader].read == SbImportRead_TetGen)
+    fuzz_split(folder, data, n);
+  else
+    fuzz_write(path, data, n);
+  (void)PetscPushErrorHandler(fuzz_keep_error, text);
+  if (fuzz_readers[reader].read) {
+    SbImport im;
+    SbFaces faces;
+    PetscInt none;
+
+    memset(&im, 0, sizeof(im));
+    memset(&faces, 0, sizeof(faces));
+    (void)snprintf(im.where, sizeof(im.where), "%s", path);
+    ierr = SbImportTagSet(&im, 0, NULL, &none);
+    if (!ierr) ierr = (*fuzz_readers[reader].read)(path, &im);
+    if (!ierr) ierr = SbImportCheck(&im, &faces);
+    (void)SbFacesDestroy(&faces);
+    (void)SbImportDestroy(&im);
+  } else {
+    SbTriangles t;
+
+    ierr = SbTrianglesRead(PETSC_COMM_SELF, "fuzz", path, 1, origin, &t);
+    if (!ierr) (void)SbTrianglesDestroy(&t);
+  }
+  (void)PetscPopErrorHandler();
+  return ierr;
+}
+
+/* What every error of a reader promises: it is the user's, says where, and stands on one line. NULL when it is kept. */
+static inline const char *fuzz_broken_promise(PetscErrorCode code, const char *text)
+{
+  if (!code) return NULL;
+  if (code != PETSC_ERR_USER_INPUT && code != PETSC_ERR_FILE_OPEN && code != PETSC_ERR_FILE_READ &&
+      code != PETSC_ERR_FILE_UNEXPECTED)
+    return "the error is no error of the input";
+  if (!strstr(text, "/in.")) return "the error names no file";
+  return strchr(text, '\n') ? "the error has more than one line" : NULL;
+}
