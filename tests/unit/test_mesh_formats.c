@@ -1,0 +1,395 @@
+// One mesh in every format gives the same tets, regions and surfaces. Files of tests/data come from gmsh 4.8 (two_cubes.*), VTK 9.7
+// (two_cubes_*.vtu, _51.vtk), TetGen 1.5 and Netgen 6; what is not there is written here.
+// @ranks 1
+#include <stdlib.h>
+#include <unistd.h>
+#include "mesh_test.h"
+
+#define DATA "tests/data/"
+
+static PetscErrorCode read_mesh(const char *path, SbImport *im)
+{
+  const SbBody body = test_body("b", path);
+
+  PetscFunctionBeginUser;
+  memset(im, 0, sizeof(*im));
+  PetscCall(SbImportRead(&body, im));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ items of a group, in numbers of the reference */
+
+typedef struct {
+  PetscInt v[4];
+} Row;
+
+static int compare_rows(const void *a, const void *b)
+{
+  return memcmp(a, b, sizeof(Row));
+}
+
+static PetscBool in_group(const SbImport *im, PetscInt tags, const char *name)
+{
+  for (PetscInt t = im->tags_start[tags]; t < im->tags_start[tags + 1]; t++) {
+    if (!strcmp(im->group[im->tags_group[t]].name, name)) return PETSC_TRUE;
+  }
+  return PETSC_FALSE;
+}
+
+/* The items of one dimension in a group (NULL: all), their vertices replaced by map[] and sorted, and they themselves sorted. */
+static PetscErrorCode list_items(const SbImport *im, const PetscInt map[], int dim, const char *name,
+                                 PetscInt *n, Row **rows)
+{
+  PetscFunctionBeginUser;
+  *n = 0;
+  PetscCall(PetscCalloc1(im->item[dim].n + 1, rows));
+  for (PetscInt i = 0; i < im->item[dim].n; i++) {
+    PetscInt *v = (*rows)[*n].v;
+
+    if (name && !in_group(im, im->item[dim].tags[i], name)) continue;
+    for (int k = 0; k <= dim; k++) {
+      const PetscInt vert = im->item[dim].vert[(dim + 1) * i + k];
+
+      v[k] = map ? map[vert] : vert;
+    }
+    PetscCall(PetscSortInt(dim + 1, v));
+    (*n)++;
+  }
+  qsort(*rows, (size_t)*n, sizeof(Row), compare_rows);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Vertices of the reference with the same coordinates. */
+static PetscErrorCode map_vertices(const char *path, const SbImport *im, const SbImport *reference,
+                                   PetscInt map[])
+{
+  PetscFunctionBeginUser;
+  for (PetscInt v = 0; v < im->nvert; v++) {
+    map[v] = -1;
+    for (PetscInt w = 0; w < reference->nvert; w++) {
+      PetscReal d = 0;
+
+      for (int i = 0; i < 3; i++) d = PetscMax(d, PetscAbsReal(im->x[3 * v + i] - reference->x[3 * w + i]));
+      if (d < 1e-12) map[v] = w;
+    }
+    SB_CHECK(map[v] >= 0, "%s: vertex %d is not in the mesh", path, (int)v);
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode same_group(const char *path, const SbImport *im, const SbImport *reference,
+                                 const PetscInt map[], int dim, const char *name, const char *as)
+{
+  PetscInt n, expected;
+  Row *rows, *expected_rows;
+
+  PetscFunctionBeginUser;
+  PetscCall(list_items(im, map, dim, name, &n, &rows));
+  PetscCall(list_items(reference, NULL, dim, as, &expected, &expected_rows));
+  SB_CHECK(expected > 0, "the mesh has no group '%s'", as ? as : "");
+  SB_CHECK(n == expected, "%s: %d items of dimension %d in '%s' instead of %d", path, (int)n, dim,
+           name ? name : "all", (int)expected);
+  SB_CHECK(n != expected || !memcmp(rows, expected_rows, (size_t)n * sizeof(Row)), "%s: other items in '%s'",
+           path, name ? name : "all");
+  PetscCall(PetscFree(rows));
+  PetscCall(PetscFree(expected_rows));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+typedef struct {
+  int dim;
+  const char *name, *as; /* group of the file, of the reference */
+} Same;
+
+/* A list of groups that ends with an empty name. */
+static PetscErrorCode test_file(const char *path, const SbImport *reference, const Same same[])
+{
+  SbImport im;
+  PetscInt *map;
+
+  PetscFunctionBeginUser;
+  PetscCall(read_mesh(path, &im));
+  SB_CHECK(im.nvert == reference->nvert, "%s: %d vertices", path, (int)im.nvert);
+  PetscCall(PetscMalloc1(im.nvert, &map));
+  PetscCall(map_vertices(path, &im, reference, map));
+  PetscCall(same_group(path, &im, reference, map, 3, NULL, NULL));
+  for (int i = 0; same[i].name; i++)
+    PetscCall(same_group(path, &im, reference, map, same[i].dim, same[i].name, same[i].as));
+  PetscCall(PetscFree(map));
+  PetscCall(SbImportDestroy(&im));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ files of gmsh and VTK */
+
+static PetscErrorCode test_foreign(const SbImport *reference)
+{
+  static const Same names[] = {
+    {3, "left", "left"},           {3, "all", "all"},       {2, "wall", "wall"},
+    {2, "both ends", "both ends"}, {2, "inner", "inner"},   {2, "surface_77", "surface_77"},
+    {1, "edge", "edge"},           {0, "corner", "corner"}, {0, NULL, NULL}};
+  static const Same numbers[] = {
+    {3, "volume_1", "left"},       {3, "volume_2", "all"},    {2, "surface_3", "wall"},
+    {2, "surface_4", "both ends"}, {2, "surface_5", "inner"}, {2, "surface_77", "surface_77"},
+    {1, "curve_78", "edge"},       {0, "point_79", "corner"}, {0, NULL, NULL}};
+  static const Same sets[] = {
+    {3, "left", "left"},   {3, "all", "all"},   {2, "wall", "wall"}, {2, "both_ends", "both ends"},
+    {2, "inner", "inner"}, {1, "edge", "edge"}, {0, NULL, NULL}};
+  static const Same entities[] = {{3, "volume_1", "left"},   {2, "surface_1", "wall"},
+                                  {2, "surface_2", "inner"}, {2, "surface_7", "surface_77"},
+                                  {1, "curve_1", "edge"},    {0, NULL, NULL}};
+  static const Same cell_data[] = {{3, "volume_1", "left"},
+                                   {2, "surface_3", "wall"},
+                                   {2, "surface_5", "inner"},
+                                   {2, "surface_4", "surface_77"},
+                                   {1, "curve_78", "edge"},
+                                   {0, "point_79", "corner"},
+                                   {0, NULL, NULL}};
+  static const struct {
+    const char *path;
+    const Same *same;
+  } files[] = {
+    {DATA "two_cubes_1.msh", numbers},
+    {DATA "two_cubes_40.msh", names},
+    {DATA "two_cubes.inp", sets},
+    {DATA "two_cubes.unv", sets},
+    {DATA "two_cubes.unv", entities},
+    {DATA "two_cubes.mesh", entities},
+    {DATA "two_cubes.bdf", entities},
+    {DATA "two_cubes.vtk", cell_data},
+    {DATA "two_cubes_51.vtk", cell_data},
+    {DATA "two_cubes_51_bin.vtk", cell_data},
+    {DATA "two_cubes_ascii.vtu", cell_data},
+    {DATA "two_cubes_base64.vtu", cell_data},
+    {DATA "two_cubes_zlib.vtu", cell_data},
+    {DATA "two_cubes_raw.vtu", cell_data},
+    {DATA "two_cubes_raw_zlib.vtu", cell_data},
+    {DATA "two_cubes_appended64.vtu", cell_data},
+  };
+
+  PetscFunctionBeginUser;
+  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(files); i++)
+    PetscCall(test_file(files[i].path, reference, files[i].same));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ files written here */
+
+/* Number of an item in what is written: 1 and 2 for tets left and right, 3 for the wall, 5 inside, 9 for other sides; 0 elsewhere. */
+static int mark_of(const SbImport *im, int dim, PetscInt i)
+{
+  const PetscInt tags = im->item[dim].tags[i];
+
+  if (dim == 3) return in_group(im, tags, "left") ? 1 : 2;
+  if (in_group(im, tags, "wall")) return 3;
+  return in_group(im, tags, "inner") ? 5 : dim == 2 ? 9 : 0;
+}
+
+static void write_vert(FILE *file, const SbImport *im, int dim, PetscInt i, int first)
+{
+  for (int k = 0; k <= dim; k++) fprintf(file, " %d", (int)im->item[dim].vert[(dim + 1) * i + k] + first);
+}
+
+/* TetGen's files, numbered from `first`, with comments and blank lines. */
+static PetscErrorCode write_tetgen(const char *stem, const SbImport *im, int first)
+{
+  char path[256];
+  FILE *file;
+
+  PetscFunctionBeginUser;
+  (void)snprintf(path, sizeof(path), "%s.node", stem);
+  file = fopen(path, "w");
+  fprintf(file, "# points\n%d 3 1 1\n\n", (int)im->nvert);
+  for (PetscInt v = 0; v < im->nvert; v++)
+    fprintf(file, "%d %.17g %.17g %.17g 0.5 %d # one\n", (int)v + first, im->x[3 * v], im->x[3 * v + 1],
+            im->x[3 * v + 2], v == 4 ? 79 : 0);
+  fclose(file);
+  (void)snprintf(path, sizeof(path), "%s.ele", stem);
+  file = fopen(path, "w");
+  fprintf(file, "  %d 4 1\n", (int)im->item[3].n);
+  for (PetscInt i = 0; i < im->item[3].n; i++) {
+    fprintf(file, "%d", (int)i + first);
+    write_vert(file, im, 3, i, first);
+    fprintf(file, " %d.0\n", mark_of(im, 3, i));
+  }
+  fclose(file);
+  (void)snprintf(path, sizeof(path), "%s.face", stem);
+  file = fopen(path, "w");
+  fprintf(file, "%d 1\n", (int)im->item[2].n);
+  for (PetscInt i = 0; i < im->item[2].n; i++) {
+    fprintf(file, "%d", (int)i + first);
+    write_vert(file, im, 2, i, first);
+    fprintf(file, " %d -1 7\n", mark_of(im, 2, i)); /* with neighbours, as tetgen -nn writes */
+  }
+  fclose(file);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode write_neutral(const char *path, const SbImport *im)
+{
+  FILE *file = fopen(path, "w");
+
+  PetscFunctionBeginUser;
+  fprintf(file, "%d\n", (int)im->nvert);
+  for (PetscInt v = 0; v < im->nvert; v++)
+    fprintf(file, "  %.17g  %.17g  %.17g\n", im->x[3 * v], im->x[3 * v + 1], im->x[3 * v + 2]);
+  for (int dim = 3; dim > 1; dim--) {
+    fprintf(file, "%d\n", (int)im->item[dim].n);
+    for (PetscInt i = 0; i < im->item[dim].n; i++) {
+      fprintf(file, "%d", mark_of(im, dim, i));
+      write_vert(file, im, dim, i, 1);
+      fprintf(file, "\n");
+    }
+  }
+  fclose(file);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The points stand last; names with a blank, and of what is not there. */
+static PetscErrorCode write_vol(const char *path, const SbImport *im)
+{
+  FILE *file = fopen(path, "w");
+
+  PetscFunctionBeginUser;
+  fprintf(
+    file,
+    "mesh3d\ndimension\n3\ngeomtype\n0\n\n# surfnr bcnr domin domout np p1 p2 p3\nsurfaceelementsgi\n%d\n",
+    (int)im->item[2].n);
+  for (PetscInt i = 0; i < im->item[2].n; i++) {
+    fprintf(file, " 1 %d 1 0 3", mark_of(im, 2, i));
+    write_vert(file, im, 2, i, 1);
+    fprintf(file, " 4 5 6\n");
+  }
+  fprintf(file, "# matnr np p1 p2 p3 p4\nvolumeelements\n%d\n", (int)im->item[3].n);
+  for (PetscInt i = 0; i < im->item[3].n; i++) {
+    fprintf(file, "%d 4", mark_of(im, 3, i));
+    write_vert(file, im, 3, i, 1);
+    fprintf(file, "\n");
+  }
+  fprintf(file, "points\n%d\n", (int)im->nvert);
+  for (PetscInt v = 0; v < im->nvert; v++)
+    fprintf(file, "  %.17g  %.17g  %.17g\n", im->x[3 * v], im->x[3 * v + 1], im->x[3 * v + 2]);
+  fprintf(file, "\nmaterials\n2\n1 the left one\n2 right\nbcnames\n3\n3 wall\n4 nowhere\n5 inner\nendmesh\n");
+  fclose(file);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode test_written(const SbImport *reference, const char *folder)
+{
+  static const Same marks[] = {
+    {3, "volume_1", "left"}, {2, "surface_3", "wall"}, {2, "surface_5", "inner"}, {0, NULL, NULL}};
+  static const Same names[] = {
+    {3, "the left one", "left"}, {2, "wall", "wall"}, {2, "inner", "inner"}, {0, NULL, NULL}};
+  char path[256], stem[200];
+
+  PetscFunctionBeginUser;
+  for (int first = 0; first < 2; first++) {
+    (void)snprintf(stem, sizeof(stem), "%s/from_%d.1", folder, first);
+    PetscCall(write_tetgen(stem, reference, first));
+    PetscCall(test_file(stem, reference, marks)); /* also without an ending */
+    (void)snprintf(path, sizeof(path), "%s.ele", stem);
+    PetscCall(test_file(path, reference, marks));
+    (void)snprintf(path, sizeof(path), "%s.node", stem);
+    PetscCall(test_file(path, reference, marks));
+  }
+  (void)snprintf(path, sizeof(path), "%s/neutral.mesh", folder); /* an ending it shares with Medit */
+  PetscCall(write_neutral(path, reference));
+  PetscCall(test_file(path, reference, marks));
+  (void)snprintf(path, sizeof(path), "%s/names.vol", folder);
+  PetscCall(write_vol(path, reference));
+  PetscCall(test_file(path, reference, names));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ files of TetGen and Netgen */
+
+static PetscInt count_items(const SbImport *im, int dim, const char *name)
+{
+  PetscInt n = 0;
+
+  for (PetscInt i = 0; i < im->item[dim].n; i++) n += in_group(im, im->item[dim].tags[i], name);
+  return n;
+}
+
+/* A unit cube with its sides 11 to 16 and region 7: tetgen -pqaAfenn. */
+static PetscErrorCode test_tetgen(void)
+{
+  SbImport im;
+  char name[32];
+  PetscInt sides = 0;
+
+  PetscFunctionBeginUser;
+  PetscCall(read_mesh(DATA "tetgen.ele", &im));
+  SB_CHECK(im.nvert == 26 && im.item[3].n == 36, "%d vertices, %d tets", (int)im.nvert, (int)im.item[3].n);
+  SB_CHECK(count_items(&im, 3, "volume_7") == 36, "%d tets in region 7",
+           (int)count_items(&im, 3, "volume_7"));
+  for (int side = 11; side <= 16; side++) {
+    const int axis = (const int[]){2, 2, 1, 0, 1, 0}[side - 11],
+              at = (const int[]){0, 1, 0, 1, 1, 0}[side - 11];
+
+    (void)snprintf(name, sizeof(name), "surface_%d", side);
+    SB_CHECK(count_items(&im, 2, name) > 0, "no face on side %d", side);
+    for (PetscInt i = 0; i < im.item[2].n; i++) {
+      if (!in_group(&im, im.item[2].tags[i], name)) continue;
+      sides++;
+      for (int k = 0; k < 3; k++)
+        SB_CHECK_NEAR(im.x[3 * im.item[2].vert[3 * i + k] + axis], at, 1e-12, "coordinate on its side");
+    }
+  }
+  SB_CHECK(sides == 48, "%d faces on the sides", (int)sides);
+  SB_CHECK(count_items(&im, 0, "point_5") == 1, "%d points with marker 5",
+           (int)count_items(&im, 0, "point_5"));
+  PetscCall(SbImportDestroy(&im));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Two unit cubes side by side, with names of materials and boundary conditions; the neutral format has numbers. */
+static PetscErrorCode test_netgen(void)
+{
+  SbImport vol, neu;
+  PetscInt outer = 0;
+
+  PetscFunctionBeginUser;
+  PetscCall(read_mesh(DATA "netgen.vol", &vol));
+  PetscCall(read_mesh(DATA "netgen.neu", &neu));
+  SB_CHECK(vol.nvert == 12 && vol.item[3].n == 12, "%d vertices, %d tets", (int)vol.nvert,
+           (int)vol.item[3].n);
+  SB_CHECK(count_items(&vol, 3, "left") == 6 && count_items(&vol, 3, "right") == 6, "%d and %d tets",
+           (int)count_items(&vol, 3, "left"), (int)count_items(&vol, 3, "right"));
+  SB_CHECK(count_items(&vol, 2, "left_side") > 0 && count_items(&vol, 2, "right_side") > 0, "no sides");
+  for (PetscInt i = 0; i < vol.item[3].n; i++) {
+    PetscReal middle = 0;
+
+    for (int k = 0; k < 4; k++) middle += vol.x[3 * vol.item[3].vert[4 * i + k]] / 4;
+    SB_CHECK(in_group(&vol, vol.item[3].tags[i], middle < 1 ? "left" : "right"), "tet %d at %g", (int)i,
+             (double)middle);
+  }
+  SB_CHECK(neu.nvert == 12 && neu.item[3].n == 12, "%d vertices, %d tets", (int)neu.nvert,
+           (int)neu.item[3].n);
+  SB_CHECK(count_items(&neu, 3, "volume_1") == 6, "%d tets in volume_1",
+           (int)count_items(&neu, 3, "volume_1"));
+  for (PetscInt i = 0; i < vol.item[2].n; i++) outer += vol.item[2].tags[i] != 0;
+  SB_CHECK(outer == vol.item[2].n && neu.item[2].n == vol.item[2].n, "%d and %d triangles", (int)outer,
+           (int)neu.item[2].n);
+  PetscCall(SbImportDestroy(&vol));
+  PetscCall(SbImportDestroy(&neu));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+int main(int argc, char **argv)
+{
+  char folder[] = "/tmp/sbformats_XXXXXX", command[64];
+  SbImport reference;
+
+  SB_TEST_BEGIN(argc, argv);
+  SB_CHECK(mkdtemp(folder), "no folder %s", folder);
+  PetscCall(read_mesh(DATA "two_cubes_41.msh", &reference));
+  PetscCall(test_foreign(&reference));
+  PetscCall(test_written(&reference, folder));
+  PetscCall(SbImportDestroy(&reference));
+  PetscCall(test_tetgen());
+  PetscCall(test_netgen());
+  (void)snprintf(command, sizeof(command), "rm -rf %s", folder);
+  SB_CHECK(!system(command), "%s stays", folder);
+  SB_TEST_END();
+}
