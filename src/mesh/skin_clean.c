@@ -11,7 +11,7 @@
 #include "tetrahedralize.h"
 
 #define PASSES 20         /* of the search for flat triangles: one may lie behind the other */
-#define PARTNERS_MAX 4000 /* open vertices for which partners are looked for */
+#define PARTNERS_MAX 4000 /* open edges for which partners are looked for */
 
 /* ------------------------------------------------------------------ vertices that are one */
 
@@ -305,21 +305,29 @@ static PetscErrorCode take_flat(SbTriangleFile *f, SbTriangleEdge edge[], SbMend
 
 /* ------------------------------------------------------------------ open edges */
 
-/* The tolerance that would give each open vertex a partner that it has no edge with; 0 when there is none worth a word. */
+/* Corner of an edge: its beginning (0) or end (1). */
+static PetscInt edge_end(const SbTriangles *t, PetscInt slot, int end)
+{
+  return t->tri[end ? (slot % 3 == 2 ? slot - 2 : slot + 1) : slot];
+}
+
+/* The tolerance that would lay each open edge on another one; 0 when it were no matter of rounding. */
 static PetscReal partner_distance(const SbTriangles *t, PetscInt n, const PetscInt slot[])
 {
   PetscReal need = 0, edge = 0;
 
   if (n > PARTNERS_MAX) return 0;
   for (PetscInt i = 0; i < n; i++) {
-    const PetscInt a = t->tri[slot[i]], b = t->tri[slot[i] % 3 == 2 ? slot[i] - 2 : slot[i] + 1];
+    const PetscInt a = edge_end(t, slot[i], 0), b = edge_end(t, slot[i], 1);
     PetscReal least = PETSC_MAX_REAL;
 
     edge += PetscSqrtReal(distance2(t, a, b)) / (PetscReal)n;
     for (PetscInt j = 0; j < n; j++) {
-      const PetscInt c = t->tri[slot[j]], d = t->tri[slot[j] % 3 == 2 ? slot[j] - 2 : slot[j] + 1];
+      const PetscInt c = edge_end(t, slot[j], 0), d = edge_end(t, slot[j], 1);
+      const PetscReal against = PetscMax(distance2(t, a, d), distance2(t, b, c)),
+                      along = PetscMax(distance2(t, a, c), distance2(t, b, d));
 
-      if (c != a && c != b && d != a) least = PetscMin(least, distance2(t, a, c));
+      if (i != j) least = PetscMin(least, PetscMin(against, along));
     }
     need = PetscMax(need, PetscSqrtReal(least));
   }
@@ -336,11 +344,10 @@ static PetscErrorCode refuse_open(const SbTriangleFile *f, PetscInt n, const Pet
 
   PetscFunctionBeginUser;
   if (need > 0)
-    (void)snprintf(
-      what, sizeof(what),
-      "every open corner has another one within %.3g m: -body_NAME_weld %.2g joins them, if that is "
-      "rounding and not shape",
-      (double)need, (double)(1.1 * need));
+    (void)snprintf(what, sizeof(what),
+                   "every open edge has a partner within %.3g m: -body_NAME_weld %.2g joins them, if that is "
+                   "rounding and not shape",
+                   (double)need, (double)(1.1 * need));
   SETERRQ(PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
           "%s: the surface is open: %" PetscInt_FMT
           " edges have a triangle on one side only, the first is that of "

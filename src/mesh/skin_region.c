@@ -436,30 +436,36 @@ static PetscInt number_regions(Space *s)
   return n;
 }
 
-/* The group that all triangles of the shell belong to; -1 when there is none, or several. */
-static PetscInt group_of_shell(const Space *s, PetscInt shell)
+/* The groups that all triangles of a shell belong to: group[n], n at most 16. */
+static PetscErrorCode groups_of_shell(const Space *s, PetscInt shell, PetscInt *n, PetscInt group[16])
 {
   const SbImport *im = s->f->groups;
-  PetscInt found = -1;
+  PetscInt last = -1; /* sets repeat: looked at once */
 
-  for (PetscInt i = 0; i < 2 * s->t->ntri; i++) {
-    if (s->shell[i] != shell) continue;
-    if (found < 0 && s->shells[shell].first == i / 2) {
-      const PetscInt set = s->f->tags[i / 2];
+  PetscFunctionBeginUser;
+  *n = -1;
+  for (PetscInt i = 0; i < 2 * s->t->ntri && *n; i++) {
+    const PetscInt set = s->f->tags[i / 2], start = im->tags_start[set], end = im->tags_start[set + 1];
+    PetscInt kept = 0;
 
-      if (im->tags_start[set + 1] - im->tags_start[set] != 1) return -1;
-      found = im->tags_group[im->tags_start[set]];
+    if (s->shell[i] != shell || set == last) continue;
+    last = set;
+    if (*n < 0) {
+      *n = PetscMin(end - start, 16);
+      PetscCall(PetscArraycpy(group, im->tags_group + start, *n));
     }
-    if (found < 0) return -1;
-    for (PetscInt k = im->tags_start[s->f->tags[i / 2]];; k++) {
-      if (k == im->tags_start[s->f->tags[i / 2] + 1]) return -1;
-      if (im->tags_group[k] == found) break;
+    for (PetscInt k = 0; k < *n; k++) {
+      PetscInt at = start;
+
+      while (at < end && im->tags_group[at] != group[k]) at++;
+      if (at < end) group[kept++] = group[k];
     }
+    *n = kept;
   }
-  return found;
+  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Every region is region_1, ...; also NAME_region when its outer limit is the group NAME; and what the file says. */
+/* Every region is region_1, ...; also NAME_region when its outer limit lies in the group NAME; and what the file says. */
 static PetscErrorCode name_regions(const Space *s, SbSkin *out)
 {
   SbImport *im = s->f->groups;
@@ -468,15 +474,15 @@ static PetscErrorCode name_regions(const Space *s, SbSkin *out)
   PetscFunctionBeginUser;
   for (PetscInt k = 0; k < s->nshell; k++) {
     const Shell *p = &s->shells[k];
-    PetscInt group[66], n = 0, surface;
+    PetscInt group[66], surface[16], n = 0, nsurface;
 
     if (p->volume < 0 || p->region < 0) continue;
     (void)snprintf(name, sizeof(name), "region_%" PetscInt_FMT, p->region + 1);
     PetscCall(SbImportGroup(im, 3, -1 - p->region, name, &group[n++]));
-    surface = group_of_shell(s, k);
-    if (surface >= 0) {
-      (void)snprintf(name, sizeof(name), "%.100s_region", im->group[surface].name);
-      PetscCall(SbImportGroup(im, 3, -1 - s->nshell - surface, name, &group[n++]));
+    PetscCall(groups_of_shell(s, k, &nsurface, surface));
+    for (PetscInt i = 0; i < nsurface; i++) {
+      (void)snprintf(name, sizeof(name), "%.100s_region", im->group[surface[i]].name);
+      PetscCall(SbImportGroup(im, 3, -1 - s->nshell - surface[i], name, &group[n++]));
     }
     for (PetscInt i = 0; i < s->f->nregion && n < 66; i++) {
       const SbSeed *seed = &s->f->region[i];

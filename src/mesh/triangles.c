@@ -118,9 +118,10 @@ static const struct {
   SbTriangleReader read;
   PetscBool obstacle; /* tells inside from outside */
 } readers[] = {
-  {".stl", SbTrianglesRead_STL, PETSC_TRUE},  {".obj", SbTrianglesRead_OBJ, PETSC_TRUE},
-  {".off", SbTrianglesRead_OFF, PETSC_TRUE},  {".ply", SbTrianglesRead_PLY, PETSC_TRUE},
-  {".msh", SbTrianglesRead_Gmsh, PETSC_TRUE},
+  {".stl", SbTrianglesRead_STL, PETSC_TRUE},     {".obj", SbTrianglesRead_OBJ, PETSC_TRUE},
+  {".off", SbTrianglesRead_OFF, PETSC_TRUE},     {".ply", SbTrianglesRead_PLY, PETSC_TRUE},
+  {".msh", SbTrianglesRead_Gmsh, PETSC_TRUE},    {".poly", SbTrianglesRead_Poly, PETSC_FALSE},
+  {".smesh", SbTrianglesRead_Poly, PETSC_FALSE},
 };
 
 SbTriangleReader SbTrianglesReader(const char *path)

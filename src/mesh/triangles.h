@@ -35,6 +35,7 @@ PetscErrorCode SbTrianglesRead_STL(const char *path, SbTriangleFile *file);
 PetscErrorCode SbTrianglesRead_OBJ(const char *path, SbTriangleFile *file);
 PetscErrorCode SbTrianglesRead_OFF(const char *path, SbTriangleFile *file);
 PetscErrorCode SbTrianglesRead_PLY(const char *path, SbTriangleFile *file);
+PetscErrorCode SbTrianglesRead_Poly(const char *path, SbTriangleFile *file); /* and .smesh */
 PetscErrorCode SbTrianglesRead_Gmsh(const char *path, SbTriangleFile *file);
 /* Appends a vertex, or a triangle of vertices that are there. */
 PetscErrorCode SbTrianglesAddVertex(SbTriangleFile *file, const PetscReal x[3]);
@@ -42,6 +43,13 @@ PetscErrorCode SbTrianglesAdd(SbTriangleFile *file, PetscInt a, PetscInt b, Pets
 /* Appends a polygon, convex or not, as triangles between its corners; vert[n] from 0. An error names what was scanned last. */
 PetscErrorCode SbTrianglesAddPolygon(SbScan *scan, PetscInt n, const PetscInt vert[], int64_t number,
                                      SbTriangleFile *file);
+/*
+  The same for polygons within each other: vert[start[k]] to vert[start[k + 1] - 1] is the k-th of nloop; those around one of the points
+  hole[nhole][3] are left empty, whatever else is enclosed is filled.
+*/
+PetscErrorCode SbTrianglesAddLoops(SbScan *scan, PetscInt nloop, const PetscInt start[],
+                                   const PetscInt vert[], PetscInt nhole, const PetscReal hole[],
+                                   int64_t number, SbTriangleFile *file);
 /* The triangles that come next belong to these groups; blanks in names become underscores. n = 0: to none. */
 PetscErrorCode SbTrianglesGroups(SbTriangleFile *file, PetscInt n, const char *const names[]);
 /* Reads with the file in memory; also after an error it is closed. */

@@ -3,12 +3,14 @@
 
   Signs are those of areas seen along the polygon's normal (Newell's sum over its edges, which a slightly warped one has, too). An
   ear is a corner that turns left and whose triangle holds no other corner; cut off is the one whose triangle has the largest smallest
-  angle, so that corners on a straight line do not end as triangles without area (Meisters, "Polygons have ears", 1975).
+  angle, so that corners on a straight line do not end as triangles without area (Meisters, "Polygons have ears", 1975). Polygons
+  within a polygon become one with it by bridges: pairs of edges there and back.
 */
 #include "sbkernel.h"
 #include "triangles.h"
 
 #define CORNERS_MAX 1000 /* of a polygon that is no fan: the search for ears takes their number cubed */
+#define LOOPS_MAX 100    /* polygons of one facet */
 #define THIN 1e-9        /* area over longest edge squared, below which a fan's triangle is not taken */
 
 typedef struct {
@@ -47,12 +49,13 @@ static PetscReal seen_area(const Polygon *p, PetscInt a, PetscInt b, PetscInt c,
   return SbDot3(n, p->normal);
 }
 
-static PetscBool is_fan(const Polygon *p, PetscInt n, const PetscInt vert[], PetscReal length)
+/* Whether the triangles from corner o on all have an area. */
+static PetscBool is_fan(const Polygon *p, PetscInt n, const PetscInt vert[], PetscInt o, PetscReal length)
 {
   PetscReal longest2;
 
   for (PetscInt i = 1; i + 1 < n; i++) {
-    const PetscReal area = seen_area(p, vert[0], vert[i], vert[i + 1], &longest2);
+    const PetscReal area = seen_area(p, vert[o], vert[(o + i) % n], vert[(o + i + 1) % n], &longest2);
 
     if (!(area > THIN * longest2 * length)) return PETSC_FALSE;
   }
@@ -103,17 +106,42 @@ static PetscErrorCode cut_ears(const Polygon *p, PetscInt n, PetscInt left[], in
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The corner that comes first by its coordinates: so that two copies of a polygon are cut alike, wherever they begin. */
+static PetscInt first_corner(const PetscReal x[], PetscInt n, const PetscInt vert[])
+{
+  PetscInt first = 0;
+
+  for (PetscInt i = 1; i < n; i++) {
+    const PetscReal *a = x + 3 * vert[i], *b = x + 3 * vert[first];
+    int k = 0;
+
+    while (k < 2 && a[k] == b[k]) k++;
+    if (a[k] < b[k]) first = i;
+  }
+  return first;
+}
+
+static PetscErrorCode too_many(SbScan *s, PetscInt n, int64_t number)
+{
+  PetscFunctionBeginUser;
+  SB_SCAN_ERROR(s, "face %lld has %lld corners and is not convex; supple takes up to %d, cut it into parts",
+                (long long)number, (long long)n, CORNERS_MAX);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode SbTrianglesAddPolygon(SbScan *s, PetscInt n, const PetscInt vert[], int64_t number,
                                      SbTriangleFile *f)
 {
   Polygon p = {.x = f->t->x};
   PetscInt left[CORNERS_MAX];
   PetscBool fan = PETSC_TRUE;
+  PetscInt o = 0;
 
   PetscFunctionBeginUser;
   if (n > 3) {
+    o = first_corner(p.x, n, vert);
     find_normal(n, vert, &p);
-    fan = is_fan(&p, n, vert, PetscSqrtReal(SbDot3(p.normal, p.normal)));
+    fan = is_fan(&p, n, vert, o, PetscSqrtReal(SbDot3(p.normal, p.normal)));
   }
   if (!fan) {
     if (n > CORNERS_MAX)
@@ -124,6 +152,181 @@ PetscErrorCode SbTrianglesAddPolygon(SbScan *s, PetscInt n, const PetscInt vert[
     PetscCall(cut_ears(&p, n, left, number, f));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
-  for (PetscInt i = 1; i + 1 < n; i++) PetscCall(SbTrianglesAdd(f, vert[0], vert[i], vert[i + 1], number));
+  for (PetscInt i = 1; i + 1 < n; i++)
+    PetscCall(SbTrianglesAdd(f, vert[o], vert[(o + i) % n], vert[(o + i + 1) % n], number));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ polygons within each other */
+
+typedef struct {
+  Polygon p;
+  PetscInt n;            /* loops */
+  const PetscInt *start; /* [n + 1] */
+  const PetscInt *vert;
+} Loops;
+
+static PetscInt corners_of(const Loops *l, PetscInt k)
+{
+  return l->start[k + 1] - l->start[k];
+}
+
+/* Area seen along the normal of the whole facet; the sign tells how the loop is walked. */
+static PetscReal loop_area(const Loops *l, PetscInt k)
+{
+  Polygon one = {.x = l->p.x};
+
+  find_normal(corners_of(l, k), l->vert + l->start[k], &one);
+  return SbDot3(one.normal, l->p.normal);
+}
+
+/* Whether a point of the plane lies in a loop: crossings of a ray in the two coordinates that see most of the facet. */
+static PetscBool in_loop(const Loops *l, PetscInt k, const PetscReal x[3])
+{
+  const PetscReal *m = l->p.normal;
+  const int most = PetscAbsReal(m[0]) > PetscAbsReal(m[1])
+                     ? (PetscAbsReal(m[0]) > PetscAbsReal(m[2]) ? 0 : 2)
+                     : (PetscAbsReal(m[1]) > PetscAbsReal(m[2]) ? 1 : 2);
+  const int u = (most + 1) % 3, v = (most + 2) % 3;
+  PetscBool inside = PETSC_FALSE;
+
+  for (PetscInt i = l->start[k]; i < l->start[k + 1]; i++) {
+    const PetscReal *a = l->p.x + 3 * l->vert[i],
+                    *b = l->p.x + 3 * l->vert[i + 1 < l->start[k + 1] ? i + 1 : l->start[k]];
+
+    if ((a[v] > x[v]) != (b[v] > x[v]) && x[u] < a[u] + (b[u] - a[u]) * (x[v] - a[v]) / (b[v] - a[v]))
+      inside = (PetscBool)!inside;
+  }
+  return inside;
+}
+
+/* The smallest loop around a point, not `except`; -1 when there is none. */
+static PetscInt loop_around(const Loops *l, const PetscReal x[3], PetscInt except)
+{
+  PetscInt best = -1;
+
+  for (PetscInt k = 0; k < l->n; k++) {
+    if (k == except || !in_loop(l, k, x)) continue;
+    if (best < 0 || PetscAbsReal(loop_area(l, k)) < PetscAbsReal(loop_area(l, best))) best = k;
+  }
+  return best;
+}
+
+/* Whether the segment from a to b meets an edge of the polygon that has no end in common with it. */
+static PetscBool meets_edge(const Polygon *p, PetscInt a, PetscInt b, PetscInt n, const PetscInt vert[])
+{
+  for (PetscInt i = 0; i < n; i++) {
+    const PetscInt c = vert[i], d = vert[(i + 1) % n];
+
+    if (c == a || c == b || d == a || d == b) continue;
+    if (seen_area(p, a, b, c, NULL) * seen_area(p, a, b, d, NULL) <= 0 &&
+        seen_area(p, c, d, a, NULL) * seen_area(p, c, d, b, NULL) <= 0)
+      return PETSC_TRUE;
+  }
+  return PETSC_FALSE;
+}
+
+/* The shortest free way from a corner of the polygon (place *i) to one of loop k (place *j). */
+static PetscBool find_bridge(const Loops *l, PetscInt k, PetscInt n, const PetscInt left[], PetscInt *i,
+                             PetscInt *j)
+{
+  PetscReal best = PETSC_MAX_REAL;
+
+  for (PetscInt a = 0; a < n; a++) {
+    for (PetscInt b = 0; b < corners_of(l, k); b++) {
+      const PetscInt v = left[a], w = l->vert[l->start[k] + b];
+      const PetscReal *x = l->p.x + 3 * v, *y = l->p.x + 3 * w,
+                      d[3] = {y[0] - x[0], y[1] - x[1], y[2] - x[2]};
+      PetscBool blocked = (PetscBool)(SbDot3(d, d) >= best || meets_edge(&l->p, v, w, n, left));
+
+      for (PetscInt m = 0; m < l->n && !blocked; m++)
+        blocked = meets_edge(&l->p, v, w, corners_of(l, m), l->vert + l->start[m]);
+      if (blocked) continue;
+      best = SbDot3(d, d);
+      *i = a;
+      *j = b;
+    }
+  }
+  return (PetscBool)(best < PETSC_MAX_REAL);
+}
+
+/* Loop k, walked against the polygon, becomes part of it by two bridges. */
+static PetscErrorCode add_inner(SbScan *s, const Loops *l, PetscInt k, int64_t number, PetscInt *n,
+                                PetscInt left[])
+{
+  const PetscInt m = corners_of(l, k), *loop = l->vert + l->start[k];
+  const int step = loop_area(l, k) > 0 ? -1 : 1;
+  PetscInt i = 0, j = 0;
+
+  PetscFunctionBeginUser;
+  if (*n + m + 2 > CORNERS_MAX) PetscCall(too_many(s, *n + m + 2, number));
+  if (!find_bridge(l, k, *n, left, &i, &j))
+    SB_SCAN_ERROR(s, "the polygons of facet %lld cross each other; repair it", (long long)number);
+  PetscCall(PetscArraymove(left + i + m + 2, left + i, *n - i));
+  for (PetscInt c = 0; c <= m; c++) left[i + 1 + c] = loop[((j + step * c) % m + m) % m];
+  *n += m + 2;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The polygon between loop k and the loops that lie directly in it. */
+static PetscErrorCode add_between(SbScan *s, const Loops *l, PetscInt k, const PetscInt parent[],
+                                  int64_t number, SbTriangleFile *f)
+{
+  const PetscInt m = corners_of(l, k), *loop = l->vert + l->start[k];
+  const PetscBool against = (PetscBool)(loop_area(l, k) < 0);
+  PetscInt left[CORNERS_MAX], n = m;
+  PetscBool alone = PETSC_TRUE;
+
+  PetscFunctionBeginUser;
+  for (PetscInt i = 0; i < l->n; i++) alone = (PetscBool)(alone && parent[i] != k);
+  if (alone) {
+    PetscCall(SbTrianglesAddPolygon(s, m, loop, number, f));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  if (m > CORNERS_MAX) PetscCall(too_many(s, m, number));
+  for (PetscInt i = 0; i < m; i++) left[i] = loop[against ? m - 1 - i : i];
+  for (PetscInt i = 0; i < l->n; i++) {
+    if (parent[i] == k) PetscCall(add_inner(s, l, i, number, &n, left));
+  }
+  PetscCall(cut_ears(&l->p, n, left, number, f));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbTrianglesAddLoops(SbScan *s, PetscInt nloop, const PetscInt start[], const PetscInt vert[],
+                                   PetscInt nhole, const PetscReal hole[], int64_t number, SbTriangleFile *f)
+{
+  Loops l = {{.x = f->t->x}, nloop, start, vert};
+  PetscInt parent[LOOPS_MAX], largest = 0;
+  PetscBool empty[LOOPS_MAX];
+
+  PetscFunctionBeginUser;
+  if (nloop == 1 && !nhole) PetscCall(SbTrianglesAddPolygon(s, start[1], vert, number, f));
+  if (nloop == 0 || (nloop == 1 && !nhole)) PetscFunctionReturn(PETSC_SUCCESS);
+  if (nloop > LOOPS_MAX)
+    SB_SCAN_ERROR(s, "facet %lld has %lld polygons; supple takes up to %d, cut it into parts",
+                  (long long)number, (long long)nloop, LOOPS_MAX);
+  for (PetscInt k = 0; k < nloop; k++) {
+    Polygon one = {.x = l.p.x};
+
+    find_normal(start[k + 1] - start[k], vert + start[k], &one);
+    if (k && SbDot3(one.normal, one.normal) <= SbDot3(l.p.normal, l.p.normal)) continue;
+    PetscCall(PetscArraycpy(l.p.normal, one.normal, 3));
+    largest = k;
+  }
+  for (PetscInt k = 0; k < nloop; k++) {
+    parent[k] = k == largest ? -1 : loop_around(&l, l.p.x + 3 * vert[start[k]], k);
+    empty[k] = PETSC_FALSE;
+  }
+  for (PetscInt h = 0; h < nhole; h++) {
+    const PetscInt k = loop_around(&l, hole + 3 * h, -1);
+
+    if (k < 0)
+      SB_SCAN_ERROR(s, "hole %lld of facet %lld lies in no polygon of it", (long long)h + 1,
+                    (long long)number);
+    empty[k] = PETSC_TRUE;
+  }
+  for (PetscInt k = 0; k < nloop; k++) {
+    if (!empty[k]) PetscCall(add_between(s, &l, k, parent, number, f));
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }

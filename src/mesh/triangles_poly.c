@@ -1,0 +1,265 @@
+/*
+  triangles_poly.c - surfaces from TetGen's .poly and .smesh files (TetGen 1.5 manual, section 5.2).
+
+  Four parts: points (or their number 0: then they are in NAME.node), facets, holes, regions. A facet of .smesh is one polygon; one of
+  .poly may have several, within each other, and points that mark holes between them. A # begins a comment. Numbers of points begin
+  at 0 or 1, as the first one says.
+
+  Kept: the marker of a facet other than 0 is the group surface_N; a hole is a cavity; a region names its tets volume_N by its attribute (its
+  largest volume is not used: sizes are chosen by -body_NAME_tet_size). Refused: polygons of one or two corners, which only
+  mark points and edges within a facet.
+*/
+#include <strings.h>
+#include "triangles.h"
+
+typedef struct {
+  SbScan *s;
+  SbTriangleFile *f;
+  SbNumbers index; /* of points */
+  /* polygons of one facet */
+  PetscInt nloop, loop_size, nvert, vert_size;
+  PetscInt *start; /* [nloop + 1] */
+  PetscInt *vert;
+  PetscInt nhole, hole_size;
+  PetscReal *hole; /* [nhole][3] points of holes in the facet */
+} Poly;
+
+static PetscErrorCode grow(PetscInt need, PetscInt *size, size_t unit, void *array)
+{
+  PetscFunctionBeginUser;
+  if (need <= *size) PetscFunctionReturn(PETSC_SUCCESS);
+  *size = PetscMax(16, 2 * need);
+  PetscCall(PetscRealloc((size_t)*size * unit, (void **)array));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode read_point(Poly *p, const char *what, PetscReal x[3])
+{
+  PetscFunctionBeginUser;
+  for (int k = 0; k < 3; k++) {
+    PetscCall(SbScanReal(p->s, what, 0, &x[k]));
+    if (!isfinite(x[k])) SB_SCAN_ERROR(p->s, "the %s is not a finite number; repair the file", what);
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* A count at the beginning of a part; the marks behind it, 0 where there are none. */
+static PetscErrorCode read_counts(SbScan *s, const char *what, int n, int64_t count[])
+{
+  PetscFunctionBeginUser;
+  for (int i = 1; i < n; i++) count[i] = 0;
+  SbScanNext(s, '#');
+  PetscCall(SbScanText(s, what, &count[0]));
+  for (int i = 1; i < n && SbScanMore(s, '#'); i++) PetscCall(SbScanText(s, what, &count[i]));
+  PetscCall(SbScanEndOfLine(s));
+  PetscCall(SbScanRoom(s, what, count[0], 4, 4));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ points */
+
+/* From this file, or all of NAME.node. */
+static PetscErrorCode read_points(Poly *p, int64_t n)
+{
+  int64_t *number;
+  PetscErrorCode ierr = PETSC_SUCCESS;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscMalloc1(n, &number));
+  for (int64_t i = 0; !ierr && i < n; i++) {
+    PetscReal x[3];
+
+    SbScanNext(p->s, '#');
+    ierr = SbScanText(p->s, "number of a point", &number[i]);
+    if (!ierr) ierr = read_point(p, "coordinate of a point", x);
+    if (!ierr) ierr = SbScanEndOfLine(p->s);
+    if (!ierr) ierr = SbTrianglesAddVertex(p->f, x);
+  }
+  if (!ierr) ierr = SbNumbersCreate((PetscInt)n, number, &p->index);
+  PetscCall(PetscFree(number));
+  PetscCall(ierr);
+  PetscCheck(!p->index.repeated, PETSC_COMM_SELF, PETSC_ERR_FILE_UNEXPECTED, "%s: point %lld is there twice",
+             p->f->where, (long long)p->index.twice);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode read_node_file(Poly *p, const char *path)
+{
+  char name[PETSC_MAX_PATH_LEN + 8];
+  SbScan *own = p->s, scan;
+  char *dot;
+  int64_t count[4];
+  PetscErrorCode ierr;
+
+  PetscFunctionBeginUser;
+  (void)snprintf(name, PETSC_MAX_PATH_LEN, "%s", path);
+  dot = strrchr(name, '.');
+  (void)snprintf(dot, 8, ".node");
+  ierr = SbScanOpen(p->f->where, name, &scan);
+  p->s = &scan;
+  if (!ierr) ierr = read_counts(&scan, "number of points in the .node file", 4, count);
+  if (!ierr) ierr = read_points(p, count[0]);
+  p->s = own;
+  PetscCall(SbScanClose(&scan));
+  PetscFunctionReturn(ierr);
+}
+
+/* ------------------------------------------------------------------ facets */
+
+/* n corners, which may go on over several lines. */
+static PetscErrorCode read_polygon(Poly *p, int64_t n, int64_t facet)
+{
+  int64_t number;
+
+  PetscFunctionBeginUser;
+  if (n < 3)
+    SB_SCAN_ERROR(p->s,
+                  "facet %lld has a polygon of %lld corners; it needs three: supple takes no points or edges "
+                  "within facets, cut the facet there",
+                  (long long)facet, (long long)n);
+  PetscCall(SbScanRoom(p->s, "corners", n, 2, 2));
+  PetscCall(grow(p->nloop + 2, &p->loop_size, sizeof(*p->start), &p->start));
+  PetscCall(grow(p->nvert + (PetscInt)n, &p->vert_size, sizeof(*p->vert), &p->vert));
+  p->start[p->nloop] = p->nvert;
+  for (int64_t i = 0; i < n; i++) {
+    SbScanNext(p->s, '#');
+    PetscCall(SbScanText(p->s, "corner of a polygon", &number));
+    p->vert[p->nvert] = SbNumbersFind(&p->index, number);
+    if (p->vert[p->nvert] < 0)
+      SB_SCAN_ERROR(p->s, "facet %lld uses the point %lld, which is not there", (long long)facet,
+                    (long long)number);
+    p->nvert++;
+  }
+  p->start[++p->nloop] = p->nvert;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The triangles of the facet that was read belong to this marker. */
+static PetscErrorCode end_facet(Poly *p, int64_t marker, int64_t facet)
+{
+  PetscInt group;
+
+  PetscFunctionBeginUser;
+  if (p->f->groups) {
+    if (marker) PetscCall(SbImportGroup(p->f->groups, 2, marker, NULL, &group));
+    PetscCall(SbImportTagSet(p->f->groups, marker != 0, &group, &p->f->now));
+  }
+  PetscCall(SbTrianglesAddLoops(p->s, p->nloop, p->start, p->vert, p->nhole, p->hole, facet, p->f));
+  p->nloop = p->nvert = p->nhole = 0;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* One facet of .smesh: number of corners, corners, marker when there are markers. */
+static PetscErrorCode read_smesh_facet(Poly *p, PetscBool marked, int64_t facet)
+{
+  int64_t n, marker = 0;
+
+  PetscFunctionBeginUser;
+  SbScanNext(p->s, '#');
+  PetscCall(SbScanText(p->s, "number of corners of a facet", &n));
+  PetscCall(read_polygon(p, n, facet));
+  if (marked && SbScanMore(p->s, '#')) PetscCall(SbScanText(p->s, "marker of a facet", &marker));
+  PetscCall(SbScanEndOfLine(p->s));
+  PetscCall(end_facet(p, marker, facet));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* One facet of .poly: numbers of polygons and holes, marker; then these. */
+static PetscErrorCode read_poly_facet(Poly *p, int64_t facet)
+{
+  int64_t count[3], n, number;
+
+  PetscFunctionBeginUser;
+  PetscCall(read_counts(p->s, "number of polygons of a facet", 3, count));
+  for (int64_t i = 0; i < count[0]; i++) {
+    SbScanNext(p->s, '#');
+    PetscCall(SbScanText(p->s, "number of corners of a polygon", &n));
+    PetscCall(read_polygon(p, n, facet));
+    PetscCall(SbScanEndOfLine(p->s));
+  }
+  PetscCall(SbScanRoom(p->s, "holes of a facet", count[1], 4, 4));
+  for (int64_t i = 0; i < count[1]; i++) {
+    SbScanNext(p->s, '#');
+    PetscCall(SbScanText(p->s, "number of a hole", &number));
+    PetscCall(grow(3 * (p->nhole + 1), &p->hole_size, sizeof(*p->hole), &p->hole));
+    PetscCall(read_point(p, "coordinate of a hole", p->hole + 3 * p->nhole));
+    p->nhole++;
+    PetscCall(SbScanEndOfLine(p->s));
+  }
+  PetscCall(end_facet(p, count[2], facet));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ holes and regions */
+
+/* The part may be missing at the end of the file. */
+static PetscErrorCode read_seeds(Poly *p, const char *what, PetscBool attribute, PetscInt *n, SbSeed **seed)
+{
+  int64_t count[1] = {0};
+
+  PetscFunctionBeginUser;
+  SbScanNext(p->s, '#');
+  if (p->s->at < p->s->end) PetscCall(read_counts(p->s, what, 1, count));
+  PetscCall(PetscCalloc1((size_t)count[0], seed));
+  for (*n = 0; *n < count[0]; (*n)++) {
+    SbSeed *one = &(*seed)[*n];
+    PetscReal value = 0;
+
+    SbScanNext(p->s, '#');
+    PetscCall(SbScanText(p->s, what, &one->number));
+    PetscCall(read_point(p, what, one->x));
+    if (attribute && SbScanMore(p->s, '#')) PetscCall(SbScanReal(p->s, "attribute of a region", 0, &value));
+    if (value != PetscFloorReal(value) || PetscAbsReal(value) > 1e15)
+      SB_SCAN_ERROR(p->s, "the attribute %g of a region is no whole number; it becomes the name volume_N",
+                    (double)value);
+    one->attribute = (int64_t)value;
+    PetscCall(SbScanEndOfLine(p->s));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ the file */
+
+static PetscErrorCode read_all(Poly *p, const char *path)
+{
+  const PetscBool smesh = (PetscBool)!strcasecmp(strrchr(path, '.'), ".smesh");
+  int64_t count[4];
+
+  PetscFunctionBeginUser;
+  PetscCall(SbScanOpen(p->f->where, path, p->s));
+  PetscCall(read_counts(p->s, "number of points", 4, count));
+  if (count[0] && count[1] != 3)
+    SB_SCAN_ERROR(p->s, "points of %lld dimensions; expected 3", (long long)count[1]);
+  if (count[0])
+    PetscCall(read_points(p, count[0]));
+  else
+    PetscCall(read_node_file(p, path));
+  PetscCall(read_counts(p->s, "number of facets", 2, count));
+  for (int64_t i = 1; i <= count[0]; i++) {
+    if (smesh)
+      PetscCall(read_smesh_facet(p, (PetscBool)(count[1] != 0), i));
+    else
+      PetscCall(read_poly_facet(p, i));
+  }
+  PetscCall(read_seeds(p, "hole", PETSC_FALSE, &p->f->nhole, &p->f->hole));
+  PetscCall(read_seeds(p, "region", PETSC_TRUE, &p->f->nregion, &p->f->region));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbTrianglesRead_Poly(const char *path, SbTriangleFile *f)
+{
+  SbScan scan;
+  Poly p = {.s = &scan, .f = f};
+  PetscErrorCode ierr;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscMemzero(&scan, sizeof(scan)));
+  f->sheets = PETSC_TRUE;
+  ierr = read_all(&p, path);
+  PetscCall(SbScanClose(&scan));
+  PetscCall(SbNumbersDestroy(&p.index));
+  PetscCall(PetscFree(p.start));
+  PetscCall(PetscFree(p.vert));
+  PetscCall(PetscFree(p.hole));
+  PetscFunctionReturn(ierr);
+}
