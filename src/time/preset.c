@@ -397,6 +397,25 @@ static PetscErrorCode check_newmark(SbRun run)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* One solve per step, begun where the body flies to, with a tangent that may be softer than the forces: no bound on the energy (docs/theory.md). */
+static PetscErrorCode warn_growth(SbRun run)
+{
+  const SbSpace s = run->model->space;
+  PetscBool single, warped = PETSC_FALSE;
+
+  PetscFunctionBeginUser;
+  if (!run->velocity_predictor || run->model->linear || !run->snes) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscObjectTypeCompare((PetscObject)run->snes, SNESKSPONLY, &single));
+  for (PetscInt r = 0; r < s->nregion; r++)
+    warped = (PetscBool)(warped || s->region[r].material->tangent == SB_TANGENT_WARPED);
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &warped, 1, SB_MPI_BOOL, MPI_LOR, s->comm));
+  if (single && warped)
+    PetscCall(SbWarning(s->comm, "-snes_type ksponly with -time_predictor velocity and a warped tangent may "
+                                 "gain energy without bound: give -body_<name>_tangent exact_spd, or leave "
+                                 "the predictor out"));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* What contact needs: several solves in a step, and a matrix that can be projected. */
 static PetscErrorCode check_contact(SbRun run, PetscBool explicit)
 {
@@ -498,6 +517,7 @@ PetscErrorCode SbRunSetUp(SbRun run)
     PetscCall(set_up_ts(run));
   else
     PetscCall(set_up_static(run));
+  PetscCall(warn_growth(run));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -29,6 +29,7 @@
   "-body_a_element " element " -body_b_element " element " " FLESH("a", "1e5", "1000")                    \
     FLESH("b", "1e5", "1000") "-effects damping,meet -effect_damping_beta 0.01 " MEET                     \
                               "-effect_meet_recovery 30 -ts_dt 0.004 -ts_max_time 0.6 -snes_rtol 1e-9"
+/* Jittered, some vertices begin inside the plates by up to 1e-5 of the size: the depth counts that. */
 #define SQUEEZED(element, mesh)                                                                           \
   {                                                                                                       \
     .name = "squeeze." element, .seconds = 600,                                                           \
@@ -36,12 +37,12 @@
     .options = "-bodies a -body_a_mesh box:0.1,0.1,0.1:" mesh " -body_a_element " element " " FLESH(      \
       "a", "1e4", "1000") "-effects top,floor -effect_top_type contact -effect_top_obstacle "             \
                           "plane:0,0,-1,-0.1 -effect_top_displacement 0;0;-0.08*min(t,max(0,2-t)) " FLOOR \
-                          "-ts_dt 0.02 -ts_max_time 4",                                                   \
+                          "-ts_dt 0.02 -ts_max_time 4 -snes_rtol 1e-9",                                   \
     .jitter = 1e-5, .limits = {                                                                           \
       {HARD_EXCESS, '<', 1e-6},                                                                           \
       {HARD_MIN_J, '>', 0.9},                                                                             \
       {HARD_SHAPE, '<', 1e-2},                                                                            \
-      {HARD_DEPTH, '<', 1e-6},                                                                            \
+      {HARD_DEPTH, '<', 2e-5},                                                                            \
       {HARD_NEWTON, '<', 500},                                                                            \
       {HARD_REJECTED, '<', 50}                                                                            \
     }                                                                                                     \

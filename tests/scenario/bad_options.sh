@@ -94,6 +94,14 @@ error 3 "cannot write /nonexistent/view.opts: " bar.opts -scenario_view /nonexis
 check "-ksp_rtoll: exit code $?" test $? = 0
 check "-ksp_rtoll is not reported" grep -qxF "supple: warning: nobody read the option -ksp_rtoll 1e-3" err.txt
 
+# settings that may gain energy without bound are warned of; with another tangent they do not
+for tangent in warped exact_spd; do
+  "$supple" bar.opts -quiet -output_dir grow -body_bar_material corotated -body_bar_tangent $tangent -snes_type ksponly -time_predictor velocity >out.txt 2>"$tangent.txt"
+  check "$tangent: exit code $?" test $? = 0
+done
+check "growth is not warned of" grep -q "a warped tangent may gain energy without bound: give -body_<name>_tangent exact_spd" warped.txt
+check "a warning without a reason" test ! -s exact_spd.txt
+
 # the same scene from YAML, and from the printed scenario
 "$supple" bar.yml -quiet -output_dir yml && check "YAML differs" cmp -s opts/history.csv yml/history.csv
 "$supple" bar.opts -scenario_view view.opts && "$supple" view.opts -quiet -output_dir view &&
