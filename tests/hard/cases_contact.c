@@ -65,7 +65,7 @@
       {HARD_REJECTED, '<', 5}                                                                                \
     }                                                                                                        \
   }
-#define STIFF(response, newton, linear, quick_runs)                                                   \
+#define STIFF(response, newton, linear, rejected, jitter_, quick_runs)                                \
   {                                                                                                   \
     .name = "stiff." response, .seconds = 600,                                                        \
     .what = "a million times stiffer body on a soft one, " response,                                  \
@@ -74,13 +74,13 @@
       "0,0,0.1 " FLESH("a", "1e4", "1000")                                                            \
         FLESH("b", "1e10", "1000") "-effects gravity,floor,meet " FLOOR MEET                          \
                                    "-effect_meet_response " response " -ts_dt 0.01 -ts_max_time 0.5", \
-    .jitter = 1e-7, .quick = quick_runs, .limits = {                                                  \
+    .jitter = jitter_, .quick = quick_runs, .limits = {                                               \
       {HARD_EXCESS, '<', 1e-6},                                                                       \
       {HARD_MIN_J, '>', 0.5},                                                                         \
       {HARD_DEPTH, '<', 1e-4},                                                                        \
       {HARD_NEWTON, '<', newton},                                                                     \
       {HARD_LINEAR, '<', linear},                                                                     \
-      {HARD_REJECTED, '<', 1}                                                                         \
+      {HARD_REJECTED, '<', rejected}                                                                  \
     }                                                                                                 \
   }
 
@@ -181,8 +181,8 @@ const HardCase HardCasesContact[] = {
               {HARD_DEPTH, '<', 2e-3},
               {HARD_NEWTON, '<', 100},
               {HARD_REJECTED, '<', 1}}},
-  STIFF("projected", 200, 500, 1),
-  STIFF("multiplier", 50, 500, 0),
-  STIFF("augmented", 200, 500, 0),
+  STIFF("projected", 200, 500, 1, 1e-7, 1),
+  STIFF("multiplier", 50, 500, 1, 1e-7, 0),
+  STIFF("augmented", 4000, 3e5, 30, 0, 0),
   {.name = NULL},
 };
