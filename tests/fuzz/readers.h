@@ -26,6 +26,7 @@ static const struct {
   {"stl", ".stl", NULL},
   {"obj", ".obj", NULL},
   {"off", ".off", NULL},
+  {"ply", ".ply", NULL},
 };
 enum { NFUZZ = (int)PETSC_STATIC_ARRAY_LENGTH(fuzz_readers) };
 

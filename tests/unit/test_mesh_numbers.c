@@ -1,0 +1,136 @@
+// Numbers of a file to places, and groups given to items after these: against a plain search.
+// @ranks 1
+#include <stdlib.h>
+#include "mesh_test.h"
+
+/* Every number is found at its place, its neighbours where they are numbers too. */
+static PetscErrorCode test_find(PetscInt n, const int64_t number[], PetscBool table)
+{
+  SbNumbers index;
+  PetscInt wrong = 0;
+
+  PetscFunctionBeginUser;
+  memset(&index, 0, sizeof(index));
+  PetscCall(SbNumbersCreate(n, number, &index));
+  SB_CHECK((index.table != NULL) == table, "table: %d", index.table != NULL);
+  for (PetscInt i = 0; i < n; i++) {
+    for (int64_t d = -1; d <= 1; d++) {
+      const int64_t wanted = (int64_t)((uint64_t)number[i] + (uint64_t)d);
+      PetscInt at = -1;
+
+      for (PetscInt k = 0; k < n; k++) at = number[k] == wanted ? k : at;
+      wrong += SbNumbersFind(&index, wanted) != at;
+    }
+  }
+  SB_CHECK(!wrong, "%d of %d wrong", (int)wrong, (int)(3 * n));
+  SB_CHECK(!index.repeated, "number %lld stands twice", (long long)index.twice);
+  PetscCall(SbNumbersDestroy(&index));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode test_numbers(void)
+{
+  const int64_t dense[] = {7, 3, -2, 5, 4}, far[] = {INT64_MAX, 1, INT64_MIN, 1000000000000, -5},
+                twice[] = {3, 9, 3}, far_twice[] = {1, INT64_MAX, 5, INT64_MAX};
+  SbNumbers index;
+
+  PetscFunctionBeginUser;
+  PetscCall(test_find(5, dense, PETSC_TRUE));
+  PetscCall(test_find(5, far, PETSC_FALSE));
+  memset(&index, 0, sizeof(index));
+  SB_CHECK(SbNumbersFind(&index, 0) == -1, "found in nothing");
+  PetscCall(SbNumbersCreate(0, NULL, &index));
+  SB_CHECK(SbNumbersFind(&index, 0) == -1, "found among none");
+  PetscCall(SbNumbersCreate(3, twice, &index));
+  SB_CHECK(index.repeated && index.twice == 3, "%d %lld", index.repeated, (long long)index.twice);
+  PetscCall(SbNumbersCreate(4, far_twice, &index));
+  SB_CHECK(index.repeated && index.twice == INT64_MAX, "%d %lld", index.repeated, (long long)index.twice);
+  PetscCall(SbNumbersDestroy(&index));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscBool has_group(const SbImport *im, int dim, PetscInt item, PetscInt group)
+{
+  const PetscInt tags = im->item[dim].tags[item];
+
+  for (PetscInt t = im->tags_start[tags]; t < im->tags_start[tags + 1]; t++) {
+    if (im->tags_group[t] == group) return PETSC_TRUE;
+  }
+  return PETSC_FALSE;
+}
+
+/* Random memberships, some twice, beside one group that the items have from the beginning. */
+static PetscErrorCode test_members(void)
+{
+  enum { NITEM = 40, NGROUP = 9 };
+  static PetscBool expected[4][NITEM][NGROUP + 1];
+  SbImport im;
+  SbMembers members;
+  PetscInt group[NGROUP + 1], tags, wrong = 0;
+
+  PetscFunctionBeginUser;
+  memset(&im, 0, sizeof(im));
+  memset(&members, 0, sizeof(members));
+  PetscCall(SbImportTagSet(&im, 0, NULL, &tags));
+  for (int g = 0; g <= NGROUP; g++) PetscCall(SbImportGroup(&im, g % 4, 100 + g, NULL, &group[g]));
+  PetscCall(SbImportTagSet(&im, 1, &group[NGROUP], &tags));
+  for (int d = 0; d < 4; d++) {
+    for (PetscInt i = 0; i < NITEM; i++) {
+      const PetscBool first = (PetscBool)(i % 3 == 0);
+
+      PetscCall(SbImportAddItem(&im, d, (PetscInt[]){0, 1, 2, 3}, first ? tags : 0, i));
+      expected[d][i][NGROUP] = first;
+    }
+  }
+  srand(7);
+  for (int k = 0; k < 700; k++) {
+    const int d = rand() % 4, i = rand() % NITEM, g = rand() % NGROUP;
+
+    PetscCall(SbMembersAdd(&members, d, i, group[g]));
+    expected[d][i][g] = PETSC_TRUE;
+  }
+  PetscCall(SbMembersApply(&members, &im));
+  for (int d = 0; d < 4; d++) {
+    for (PetscInt i = 0; i < NITEM; i++) {
+      for (int g = 0; g <= NGROUP; g++) wrong += has_group(&im, d, i, group[g]) != expected[d][i][g];
+    }
+  }
+  SB_CHECK(!wrong, "%d wrong memberships", (int)wrong);
+  SB_CHECK(!members.n && !members.row, "the list is not freed");
+  PetscCall(SbImportDestroy(&im));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Many groups are found again, each with its own tag set. */
+static PetscErrorCode test_many_groups(void)
+{
+  enum { N = 5000 };
+  SbImport im;
+  PetscInt group, tags, again, wrong = 0;
+
+  PetscFunctionBeginUser;
+  memset(&im, 0, sizeof(im));
+  PetscCall(SbImportTagSet(&im, 0, NULL, &tags));
+  for (int round = 0; round < 2; round++) {
+    for (int64_t k = 0; k < N; k++) {
+      PetscCall(SbImportGroup(&im, (PetscInt)(k % 4), (k - N / 2) * 1000003, NULL, &group));
+      wrong += group != k;
+      PetscCall(SbImportTagsAlone(&im, (PetscInt)(k % 4), (k - N / 2) * 1000003, NULL, &tags));
+      PetscCall(SbImportTagSet(&im, 1, &group, &again));
+      wrong += tags != again || tags == 0;
+    }
+  }
+  SB_CHECK(!wrong && im.ngroup == N && im.ntags == N + 1, "%d wrong; %d groups, %d tag sets", (int)wrong,
+           (int)im.ngroup, (int)im.ntags);
+  PetscCall(SbImportDestroy(&im));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+int main(int argc, char **argv)
+{
+  SB_TEST_BEGIN(argc, argv);
+  PetscCall(test_numbers());
+  PetscCall(test_members());
+  PetscCall(test_many_groups());
+  SB_TEST_END();
+}
