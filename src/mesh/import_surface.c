@@ -178,25 +178,35 @@ static PetscErrorCode make_surface(const char *path, const SbImport *im, SbTrian
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbImportRead_Surface(const char *path, SbImport *im)
+PetscErrorCode SbSkinRead(const char *path, SbImport *im, SbSkin *s)
 {
   SbTriangles t;
   SbTriangleFile file = {.where = im->where, .t = &t, .groups = im};
-  SbSkin s;
   PetscErrorCode ierr;
 
   PetscFunctionBeginUser;
   PetscCall(PetscMemzero(&t, sizeof(t)));
-  PetscCall(PetscMemzero(&s, sizeof(s)));
-  ierr = make_surface(path, im, &file, &s, sizeof(im->note), im->note);
+  PetscCall(PetscMemzero(s, sizeof(*s)));
+  ierr = make_surface(path, im, &file, s, sizeof(im->note), im->note);
   PetscCall(PetscFree(file.number));
   PetscCall(PetscFree(file.tags));
   PetscCall(PetscFree(file.hole));
   PetscCall(PetscFree(file.region));
   PetscCall(SbTrianglesDestroy(&t));
-  if (!ierr) ierr = SbTetrahedralize(im->where, &s, &im->tet, im);
-  PetscCall(SbSkinDestroy(&s));
+  if (ierr) PetscCall(SbSkinDestroy(s));
   PetscCall(ierr);
   im->scale = 1; /* it is in metres now */
   PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbImportRead_Surface(const char *path, SbImport *im)
+{
+  SbSkin s;
+  PetscErrorCode ierr;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbSkinRead(path, im, &s));
+  ierr = SbTetrahedralize(im->where, &s, &im->tet, im);
+  PetscCall(SbSkinDestroy(&s));
+  PetscFunctionReturn(ierr);
 }

@@ -43,6 +43,14 @@ PetscErrorCode SbTetrahedralize(const char *where, const SbSkin *surface, const 
 
 /* ------------------------------------------------------------------ from a file to a surface */
 
+/*
+  SbSkinRead - a surface from a file, mended and checked, with its regions; groups and im->note are those of the body `im`. Not collective.
+
+  Input: path; im->where, im->scale (1 afterwards: the surface is in metres), im->tet (weld and untangle).
+  Errors: PETSC_ERR_FILE_*, PETSC_ERR_USER_INPUT, one line that names the triangles and what to do; then there is no skin.
+*/
+PetscErrorCode SbSkinRead(const char *path, SbImport *im, SbSkin *skin);
+
 /* What was found and mended, for the note of the body. */
 typedef struct {
   PetscReal tolerance, moved;  /* vertices within this distance were joined, and the largest such distance */
