@@ -4,9 +4,8 @@
   The surface becomes discrete entities, one for each pair of regions that meet there. Kept, they are the mesh of the boundary as
   they are. Meshed anew, gmsh cuts them along edges that turn by more than the angle, finds a parametrisation of each
   piece (classifySurfaces, createGeometry) and meshes pieces and seams with the wanted size. Each region is a volume
-  within its entities. The tets are made by its Delaunay method and improved by its own and by Netgen's optimiser.
+  within its entities. The tets are made by its Delaunay method and improved by its own optimisers, and by Netgen's where it has it.
 */
-#include <stdlib.h>
 #include "gmsh_library.h"
 #include "tet_roads.h"
 
@@ -219,6 +218,20 @@ static PetscErrorCode take_mesh(const SbGmsh *g, const Model *m, SbImport *im)
 
 /* ------------------------------------------------------------------ the job */
 
+/* Beyond what Generate does by itself. Netgen's optimiser is not in every build of gmsh, and not in Debian's. */
+static PetscErrorCode improve(const SbGmsh *g)
+{
+  int missing = 0;
+
+  PetscFunctionBeginUser;
+  for (int pass = 0; pass < 2; pass++) {
+    SB_GMSH(g, ModelMeshOptimize, "Relocate3D", 0, 2, NULL, 0);
+    SB_GMSH(g, ModelMeshOptimize, "", 0, 1, NULL, 0);
+    if (!missing) g->ModelMeshOptimize("Netgen", 0, 1, NULL, 0, &missing);
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 static PetscErrorCode work(const SbGmsh *g, void *ctx, SbImport *im)
 {
   Model m = {.job = (const SbTetJob *)ctx};
@@ -229,6 +242,7 @@ static PetscErrorCode work(const SbGmsh *g, void *ctx, SbImport *im)
   PetscCall(add_volumes(g, &m));
   PetscCall(set_sizes(g, m.job));
   SB_GMSH(g, ModelMeshGenerate, 3);
+  PetscCall(improve(g));
   PetscCall(take_mesh(g, &m, im));
   PetscCall(PetscFree(m.piece));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -192,9 +192,9 @@ static PetscErrorCode check_files(void)
 
   PetscFunctionBeginUser;
   PetscCall(refuse_file("no/such/file.stl", PETSC_ERR_FILE_OPEN, "no/such/file.stl: cannot open the file"));
-  PetscCall(
-    refuse_file("Makefile", PETSC_ERR_USER_INPUT,
-                "Makefile: is a file of no known kind; give one that ends in .stl, .obj, .off, .ply or .msh"));
+  PetscCall(refuse_file(
+    "Makefile", PETSC_ERR_USER_INPUT,
+    "Makefile: is a file of no known kind; give one that ends in .stl, .obj, .off, .ply or .msh"));
   PetscCall(refuse_text(".stl", "hello\n", "line 1: expected 'solid'"));
   PetscCall(refuse_text(".stl", "solid a\nfacet normal 0 0 1\nouter loop\nvertex 1 2\nvertex",
                         "line 5: expected the coordinate of a vertex, found 'vertex'"));
