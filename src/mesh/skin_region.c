@@ -452,7 +452,7 @@ static PetscErrorCode groups_of_shell(const Space *s, PetscInt shell, PetscInt *
     last = set;
     if (*n < 0) {
       *n = PetscMin(end - start, 16);
-      PetscCall(PetscArraycpy(group, im->tags_group + start, *n));
+      for (PetscInt k = 0; k < *n; k++) group[k] = im->tags_group[start + k];
     }
     for (PetscInt k = 0; k < *n; k++) {
       PetscInt at = start;

@@ -64,13 +64,14 @@ static PetscErrorCode read_type(Ply *p, int *type)
 static PetscErrorCode read_property(Ply *p)
 {
   static const char *const coordinates[3] = {"x", "y", "z"};
-  Element *e = &p->element[p->nelement - 1];
+  Element *e;
   Property *q;
   char word[32];
   const char *before;
 
   PetscFunctionBeginUser;
   if (!p->nelement) SB_SCAN_ERROR(p->s, "a property stands before the first element");
+  e = &p->element[p->nelement - 1];
   if (e->nproperty == PROPERTIES_MAX)
     SB_SCAN_ERROR(p->s, "an element has more than %d properties", PROPERTIES_MAX);
   q = &e->property[e->nproperty++];
