@@ -12,6 +12,13 @@
 
 enum { OLDEST = 8, NEWEST = 30 }; /* 4.8 to 4.30 */
 
+/* A gmsh that holds METIS and others within itself must find those, not the ones of this program. The address sanitizer forbids that. */
+#if defined(RTLD_DEEPBIND) && !defined(__SANITIZE_ADDRESS__)
+  #define BIND (RTLD_NOW | RTLD_LOCAL | RTLD_DEEPBIND)
+#else
+  #define BIND (RTLD_NOW | RTLD_LOCAL)
+#endif
+
 /* ------------------------------------------------------------------ loading */
 
 static const struct {
@@ -23,17 +30,17 @@ static const struct {
 #undef ROW
 };
 
-/* The oldest known version that is there. */
+/* The newest version that is there. */
 static PetscErrorCode load(const char *where, void **library, int *minor)
 {
   char name[64], why[256] = "";
 
   PetscFunctionBeginUser;
-  for (*minor = OLDEST; *minor <= NEWEST; (*minor)++) {
+  for (*minor = NEWEST; *minor >= OLDEST; (*minor)--) {
     const char *error;
 
     (void)snprintf(name, sizeof(name), "libgmsh.so.4.%d", *minor);
-    *library = dlopen(name, RTLD_NOW | RTLD_LOCAL);
+    *library = dlopen(name, BIND);
     if (*library) PetscFunctionReturn(PETSC_SUCCESS);
     /* A library that is there but lacks another one says more than those that are not there. */
     error = dlerror();

@@ -16,7 +16,7 @@
       SB_GMSH(gmsh, ModelMeshAddElementsByType, 1, 2, NULL, 0, nodes, 3 * ntri);
       ...
       SB_GMSH(gmsh, ModelMeshGenerate, 3);
-      PetscCall(SbGmshCollect(gmsh, SB_GMSH_PHYSICAL, result));
+      PetscCall(SbGmshCollect(gmsh, SB_GMSH_ENTITIES, result));
       PetscFunctionReturn(PETSC_SUCCESS);
     }
 
@@ -30,7 +30,7 @@
 #pragma once
 #include "mesh_impl.h"
 
-/* type, name, arguments: as in gmshc.h, with the same meaning from gmsh 4.8 on. */
+/* type, name, arguments: as in gmshc.h, with the same ones from gmsh 4.8 on to 4.15 (gmshModelAddPhysicalGroup() has not). */
 #define SB_GMSH_FUNCTIONS(X)                                                                               \
   X(void, Open, (const char *, int *))                                                                     \
   X(void, Merge, (const char *, int *))                                                                    \
@@ -41,8 +41,6 @@
   X(void, ModelGetEntities, (int **, size_t *, int, int *))                                                \
   X(void, ModelGetPhysicalGroups, (int **, size_t *, int, int *))                                          \
   X(void, ModelGetPhysicalGroupsForEntity, (int, int, int **, size_t *, int *))                            \
-  X(int, ModelAddPhysicalGroup, (int, int *, size_t, int, int *))                                          \
-  X(void, ModelSetPhysicalName, (int, int, const char *, int *))                                           \
   X(void, ModelGetPhysicalName, (int, int, char **, int *))                                                \
   X(int, ModelAddDiscreteEntity, (int, int, int *, size_t, int *))                                         \
   X(void, ModelGetBoundary, (int *, size_t, int **, size_t *, int, int, int, int *))                       \
@@ -60,7 +58,6 @@
     (int **, size_t *, size_t ***, size_t **, size_t *, size_t ***, size_t **, size_t *, int, int, int *)) \
   X(void, ModelMeshGetElementsByType,                                                                      \
     (int, size_t **, size_t *, size_t **, size_t *, int, size_t, size_t, int *))                           \
-  X(void, ModelMeshRemoveDuplicateNodes, (int *))                                                          \
   X(void, ModelMeshSetSize, (int *, size_t, double, int *))                                                \
   X(int, ModelMeshFieldAdd, (const char *, int, int *))                                                    \
   X(void, ModelMeshFieldSetNumber, (int, const char *, double, int *))                                     \

@@ -97,6 +97,15 @@ edit $'1 4 0 1 2 3 4\n2 4 0 2 3 4 5' $'1 2 0 1 2 3\n2 2 0 2 3 4' >surface.msh
 mesh 1 surface.msh ": is a surface: 2 3-node triangles and no tetrahedra; mesh the volume (gmsh -3)"
 mesh 2 surface.msh ": is a surface: 2 3-node triangles and no tetrahedra; mesh the volume (gmsh -3)"
 
+# another format, and one that is read by gmsh in a process of its own
+printf '$MeshFormat\n4.0 0 8\n$EndMeshFormat\n' >version4.msh
+mesh 2 version4.msh ": gmsh finds no mesh in it; it is empty, damaged, or not what its ending says"
+printf '1 4 0\n1 1 2 3 5\n' >thing.ele
+printf '4 3\n1 0 0 0\n2 1 0 0\n3 0 1 0\n4 0 0 1\n' >thing.node
+error 2 "body 'it': thing.ele line 2: point 5 is not in the .node file, which holds 1 to 4" body.opts -body_it_mesh thing.ele -output_dir new
+error 2 "body 'it': thing.ele line 2: point 5 is not in the .node file, which holds 1 to 4" body.opts -body_it_mesh thing -output_dir new
+runs 2 "$data/two_cubes.bdf" 23 "supple "
+
 # no file
 error 2 "-body_it_mesh nix.msh: No such file or directory" body.opts -body_it_mesh nix.msh
 mkdir folder folder.msh
