@@ -131,6 +131,11 @@ int SbErrorFinish(PetscErrorCode ierr);
 /* One line `supple: warning: ...` on stderr by rank 0 of comm; a printf format without newline. Collective. */
 PetscErrorCode SbWarning(MPI_Comm comm, const char *format, ...) PETSC_ATTRIBUTE_FORMAT(2, 3);
 
+/* ------------------------------------------------------------------ memory */
+
+/* From here on arrays of 32 MiB and more are given back to the system when they are freed. After PetscInitialize(). */
+void SbMemoryReturnLarge(void);
+
 /* ------------------------------------------------------------------ formulas */
 
 /*

@@ -15,7 +15,7 @@ typedef PetscErrorCode (*SbMeshProgress)(const char *what, PetscInt64 done, Pets
   SbMeshFileRead - reads a mesh of any kind that -body_<name>_mesh takes; nothing in it is checked or changed.
 
   Input:
-    body          - name (for messages; "": the file alone), mesh, mesh_step, scale, rotate, translate
+    body          - name (for messages; "": the file alone), mesh, mesh_step, scale, rotate, translate, tet
     progress, ctx - told how far it is; progress may be NULL
   Output:
     import        - to be freed by SbMeshFileDestroy()
@@ -25,6 +25,11 @@ PetscErrorCode SbMeshFileDestroy(SbImport **import);
 
 /* How many simplices of each dimension it holds; n[0] counts points that belong to groups, not vertices. */
 void SbMeshFileCount(const SbImport *import, PetscInt *nvert, PetscInt n[4]);
+
+/* Whether a file holds a surface by its name: reading it fills it with tets, as body->tet says. */
+PetscBool SbMeshFileIsSurface(const char *path);
+/* What the reader mended; "" when nothing. Borrowed. */
+const char *SbMeshFileNote(const SbImport *import);
 
 /* ------------------------------------------------------------------ groups */
 

@@ -34,6 +34,7 @@ static PetscErrorCode supple_mesh(int argc, char *argv[])
   SbErrorSetProgram("supple-mesh");
   PetscCall(SbToolCommandLine(&argc, argv, &line));
   PetscCall(PetscInitialize(&argc, &argv, NULL, NULL));
+  SbMemoryReturnLarge();
   (void)signal(SIGPIPE, SIG_IGN);
   PetscCall(work(argc, argv, &line));
   PetscCall(SbOptionsReset());

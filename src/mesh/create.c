@@ -118,7 +118,6 @@ PetscErrorCode SbMeshCreate(MPI_Comm comm, PetscInt nbody, SbBody body[], PetscI
   m->set = set;
   PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_MESH_DISTRIBUTE], 0, 0, 0, 0));
   PetscCall(SbDistribute(comm, partitioners[partitioner], &whole, &m->dm, &point));
-  PetscCall(SbWholeDestroy(&whole));
   PetscCall(SbMeshNumber(m, point));
   PetscCall(PetscFree(point));
   PetscCall(PetscLogEventEnd(SbEvents[SB_EVENT_MESH_DISTRIBUTE], 0, 0, 0, 0));

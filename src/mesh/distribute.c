@@ -3,24 +3,25 @@
 
   The DM is not interpolated (no faces, no edges): P1 needs none, and making them costs more than everything here. What
   belongs to a cell or vertex travels in one broadcast over the composition of the two migrations. Coordinates are set
-  once, on the final DM.
+  once, on the final DM. Rank 0 frees each part of what it has read when it is handed on.
 */
 #include <petscdmplex.h>
 #include "mesh_impl.h"
 
 /* Everything on rank 0. */
-static PetscErrorCode create_serial(MPI_Comm comm, const SbWhole *w, DM *dm)
+static PetscErrorCode create_serial(MPI_Comm comm, SbWhole *w, DM *dm)
 {
   PetscFunctionBeginUser;
   PetscCall(DMCreate(comm, dm));
   PetscCall(DMSetType(*dm, DMPLEX));
   PetscCall(DMSetDimension(*dm, 3));
   PetscCall(DMPlexBuildFromCellList(*dm, w->ncell, w->nvert, 4, w->cell));
+  PetscCall(PetscFree(w->cell));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Replaces the DM by its distributed version with overlap; sf leads from the points of the old one to those of the new. */
-static PetscErrorCode migrate(const char *type, const SbWhole *w, DM *dm, PetscSF *sf)
+static PetscErrorCode migrate(const char *type, SbWhole *w, DM *dm, PetscSF *sf)
 {
   PetscPartitioner part;
   DM apart, overlapped;
@@ -34,6 +35,7 @@ static PetscErrorCode migrate(const char *type, const SbWhole *w, DM *dm, PetscS
   PetscCall(DMPlexSetPartitionBalance(*dm, PETSC_TRUE)); /* vertices between ranks go to both sides alike */
   PetscCall(DMPlexDistribute(*dm, 0, &sf_apart, &apart));
   PetscCall(DMDestroy(dm));
+  PetscCall(PetscFree(w->neighbour));
   PetscCall(DMPlexDistributeOverlap(apart, 1, &sf_overlap, &overlapped));
   PetscCall(DMDestroy(&apart));
   PetscCall(PetscSFCompose(sf_apart, sf_overlap, sf));
@@ -72,7 +74,7 @@ static PetscErrorCode set_coordinates(DM dm, const SbPoint point[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbDistribute(MPI_Comm comm, const char *partitioner, const SbWhole *w, DM *dm, SbPoint **point)
+PetscErrorCode SbDistribute(MPI_Comm comm, const char *partitioner, SbWhole *w, DM *dm, SbPoint **point)
 {
   PetscMPIInt size;
   PetscInt npoint;
@@ -89,6 +91,7 @@ PetscErrorCode SbDistribute(MPI_Comm comm, const char *partitioner, const SbWhol
   else
     PetscCall(PetscArraycpy(*point, w->point, npoint));
   PetscCall(PetscSFDestroy(&sf));
+  PetscCall(SbWholeDestroy(w));
   PetscCall(set_coordinates(*dm, *point));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -35,7 +35,7 @@ PetscErrorCode SbTetRegister(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscBool is_surface(const char *path)
+PetscBool SbMeshFileIsSurface(const char *path)
 {
   const SbTriangleReader read = strncmp(path, "box:", 4) ? SbTrianglesReader(path) : NULL;
 
@@ -48,7 +48,7 @@ PetscErrorCode SbTetOptionsRead(const SbScope *scope, const char *mesh, SbTetOpt
 
   PetscFunctionBeginUser;
   PetscCall(SbTetDefaults(o));
-  if (!is_surface(mesh)) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!SbMeshFileIsSurface(mesh)) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(SbOptionReal(scope, "tet_size", &o->size));
   PetscCall(SbOptionChoice(scope, "tet_surface", &surface));
   PetscCall(SbOptionReal(scope, "tet_angle", &o->angle));

@@ -234,9 +234,8 @@ typedef struct {
 PetscErrorCode SbWholeCreate(PetscInt nbody, SbBody body[], PetscInt nset, SbSet set[], SbWhole *whole);
 PetscErrorCode SbWholeDestroy(SbWhole *whole);
 
-/* DMPlex of cells and vertices, distributed with one layer of overlap; point[] of every local point. Collective. */
-PetscErrorCode SbDistribute(MPI_Comm comm, const char *partitioner, const SbWhole *whole, DM *dm,
-                            SbPoint **point);
+/* DMPlex of cells and vertices, distributed with one layer of overlap; point[] of every local point. Destroys the whole. Collective. */
+PetscErrorCode SbDistribute(MPI_Comm comm, const char *partitioner, SbWhole *whole, DM *dm, SbPoint **point);
 /* Hands the neighbours of all cells (on rank 0) to a partitioner of type metis, which then needs no graph from PETSc. */
 PetscErrorCode SbPartitionerSetNeighbours(PetscPartitioner part, PetscInt ncell, const PetscInt neighbour[]);
 PetscErrorCode SbPartitionerRegister(void);

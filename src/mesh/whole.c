@@ -1,6 +1,8 @@
 /*
   whole.c - all bodies in one piece, on rank 0: read, placed, checked, marked by sets, numbered one after the other.
 
+  Reading a mesh takes the most memory here, on one rank: what is no longer needed is freed before the next thing is made.
+
   Original numbers follow from here: bodies in the order of the scenario, vertices and cells in the order of their files.
 */
 #include "mesh_impl.h"
@@ -22,12 +24,33 @@ static PetscErrorCode prepare(PetscInt nbody, SbBody body[], PetscInt b, PetscIn
   PetscCall(PetscCalloc1(im->item[3].n, &part->masks.cell));
   PetscCall(PetscCalloc1(4 * (size_t)im->item[3].n, &part->masks.face));
   PetscCall(SbSetsMark(im, &part->faces, nbody, body, b, nset, set, &part->masks));
+  PetscCall(PetscFree(part->faces.face)); /* the neighbours are found */
+  PetscCall(PetscFree(part->faces.start));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Copies body b behind those already there. */
-static PetscErrorCode append(const SbImport *im, const Part *part, PetscInt b, PetscInt vert0, PetscInt cell0,
-                             SbWhole *w)
+/* Copies the tets of a body behind those already there, and frees them. */
+static PetscErrorCode append_cells(SbImport *im, Part *part, PetscInt vert0, PetscInt cell0, SbWhole *w)
+{
+  PetscFunctionBeginUser;
+  for (PetscInt i = 0; i < 4 * im->item[3].n; i++) {
+    const PetscInt n = part->faces.neighbour[i];
+
+    w->cell[4 * cell0 + i] = vert0 + im->item[3].vert[i];
+    w->neighbour[4 * cell0 + i] = n < 0 ? -1 : cell0 + n;
+  }
+  PetscCall(SbFacesDestroy(&part->faces));
+  for (int d = 0; d < 4; d++) {
+    PetscCall(PetscFree(im->item[d].vert));
+    PetscCall(PetscFree(im->item[d].tags));
+    PetscCall(PetscFree(im->item[d].number));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* What travels with the points of body b. */
+static PetscErrorCode append_points(const SbImport *im, const Part *part, PetscInt b, PetscInt vert0,
+                                    PetscInt cell0, SbWhole *w)
 {
   PetscFunctionBeginUser;
   for (PetscInt c = 0; c < im->item[3].n; c++) {
@@ -36,13 +59,7 @@ static PetscErrorCode append(const SbImport *im, const Part *part, PetscInt b, P
     p->orig = cell0 + c;
     p->body = b;
     p->set = part->masks.cell[c];
-    for (int f = 0; f < 4; f++) {
-      const PetscInt n = part->faces.neighbour[4 * c + f];
-
-      w->cell[4 * (cell0 + c) + f] = vert0 + im->item[3].vert[4 * c + f];
-      w->neighbour[4 * (cell0 + c) + f] = n < 0 ? -1 : cell0 + n;
-      p->u.face[f] = part->masks.face[4 * c + f];
-    }
+    for (int f = 0; f < 4; f++) p->u.face[f] = part->masks.face[4 * c + f];
   }
   for (PetscInt v = 0; v < im->nvert; v++) {
     SbPoint *p = &w->point[w->ncell + vert0 + v];
@@ -56,11 +73,32 @@ static PetscErrorCode append(const SbImport *im, const Part *part, PetscInt b, P
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode build(PetscInt nbody, SbBody body[], PetscInt nset, SbSet set[], SbImport im[],
-                            Part part[], SbWhole *w)
+/* All bodies one after the other. */
+static PetscErrorCode merge(PetscInt nbody, const SbBody body[], SbImport im[], Part part[], SbWhole *w)
 {
   PetscInt vert0 = 0, cell0 = 0;
 
+  PetscFunctionBeginUser;
+  PetscCall(PetscMalloc1(4 * (size_t)w->ncell, &w->cell));
+  PetscCall(PetscMalloc1(4 * (size_t)w->ncell, &w->neighbour));
+  for (PetscInt b = 0; b < nbody; b++) {
+    PetscCall(append_cells(&im[b], &part[b], vert0, cell0, w));
+    vert0 += body[b].nvert;
+    cell0 += body[b].ncell;
+  }
+  PetscCall(PetscMalloc1(w->ncell + w->nvert, &w->point));
+  vert0 = cell0 = 0;
+  for (PetscInt b = 0; b < nbody; b++) {
+    PetscCall(append_points(&im[b], &part[b], b, vert0, cell0, w));
+    vert0 += body[b].nvert;
+    cell0 += body[b].ncell;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode build(PetscInt nbody, SbBody body[], PetscInt nset, SbSet set[], SbImport im[],
+                            Part part[], SbWhole *w)
+{
   PetscFunctionBeginUser;
   for (PetscInt k = 0; k < nset; k++) set[k].nvert = set[k].nfacet = set[k].ncell = 0;
   for (PetscInt b = 0; b < nbody; b++) {
@@ -72,14 +110,7 @@ static PetscErrorCode build(PetscInt nbody, SbBody body[], PetscInt nset, SbSet 
     w->nvert += body[b].nvert;
   }
   PetscCall(SbSetsCheck(nbody, body, im, nset, set));
-  PetscCall(PetscMalloc1(4 * (size_t)w->ncell, &w->cell));
-  PetscCall(PetscMalloc1(4 * (size_t)w->ncell, &w->neighbour));
-  PetscCall(PetscMalloc1(w->ncell + w->nvert, &w->point));
-  for (PetscInt b = 0; b < nbody; b++) {
-    PetscCall(append(&im[b], &part[b], b, vert0, cell0, w));
-    vert0 += body[b].nvert;
-    cell0 += body[b].ncell;
-  }
+  PetscCall(merge(nbody, body, im, part, w));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

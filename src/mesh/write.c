@@ -30,6 +30,11 @@ PetscErrorCode SbMeshFileDestroy(SbImport **import)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+const char *SbMeshFileNote(const SbImport *im)
+{
+  return im->note;
+}
+
 void SbMeshFileCount(const SbImport *im, PetscInt *nvert, PetscInt n[4])
 {
   *nvert = im->nvert;

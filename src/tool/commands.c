@@ -11,7 +11,8 @@ static PetscErrorCode read_mesh(SbTool *tool, SbImport **mesh)
   PetscErrorCode ierr;
 
   PetscFunctionBeginUser;
-  (void)snprintf(phase, sizeof(phase), "reading %s", tool->in);
+  (void)snprintf(phase, sizeof(phase), "%s %s",
+                 SbMeshFileIsSurface(tool->in) ? "making tets from" : "reading", tool->in);
   PetscCall(SbToolBegin(tool, phase));
   ierr = SbMeshFileRead(&tool->body, SbToolProgress, tool, mesh);
   PetscCall(SbToolEnd(tool));
@@ -56,6 +57,16 @@ static PetscErrorCode write_mesh(SbTool *tool, const SbImport *mesh)
 static PetscErrorCode convert(SbTool *tool, SbImport *mesh)
 {
   PetscFunctionBeginUser;
+  PetscCall(write_mesh(tool, mesh));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Reading has filled the surface already. */
+static PetscErrorCode tet(SbTool *tool, SbImport *mesh)
+{
+  PetscFunctionBeginUser;
+  if (!tool->quiet && SbMeshFileNote(mesh)[0])
+    PetscCall(PetscPrintf(PETSC_COMM_SELF, "%s: %s\n", tool->in, SbMeshFileNote(mesh)));
   PetscCall(write_mesh(tool, mesh));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -117,6 +128,7 @@ const SbToolCommand SbToolCommands[] = {
   {"info", "FILE", "what is in it: size, groups, shape of the tets, memory that a run will take", 1,
    SbToolInfo},
   {"convert", "FILE OUT", "writes it in another format, groups and order kept", 2, convert},
+  {"tet", "SURFACE OUT", "fills a closed surface (.stl, .obj, .off, .ply, ...) with tets of a -size", 2, tet},
   {"repair", "FILE OUT", "drops, turns and welds what keeps a mesh from being simulated; says what it did", 2,
    repair},
   {"refine", "FILE OUT", "cuts every tet into eight; groups are carried over", 2, refine},
@@ -131,6 +143,11 @@ PetscErrorCode SbToolRun(SbTool *tool)
 
   PetscFunctionBeginUser;
   while (strcmp(command->name, tool->command)) command++;
+  PetscCheck(
+    command->run != tet || SbMeshFileIsSurface(tool->in), PETSC_COMM_SELF, PETSC_ERR_USER,
+    "%s: is no surface that tet can fill, by its name; give a closed surface of triangles (.stl, .obj, "
+    ".off, .ply, ...); supple-mesh info says what a mesh of tets holds",
+    tool->in);
   PetscCall(read_mesh(tool, &mesh));
   ierr = command->run(tool, mesh);
   if (!ierr && tool->view[0]) ierr = SbToolView(tool, mesh);

@@ -54,7 +54,9 @@ static PetscErrorCode groups(const SbImport *mesh)
       titled = PETSC_TRUE;
       PetscCall(print("  %-26s %12s %s", group.name, SbToolNumber(group.n, number), item[d]));
       if (d) PetscCall(print(", %.6g %s", (double)group.size, unit[d]));
-      PetscCall(print(" (number %lld)\n", (long long)group.tag));
+      /* readers of formats that have names only make up numbers */
+      if (group.tag > 0 && group.tag <= INT32_MAX) PetscCall(print(" (number %lld)", (long long)group.tag));
+      PetscCall(print("\n"));
     }
   }
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -8,9 +8,22 @@
 #include "tool.h"
 
 static const SbOption rows[] = {
-  {"size", SB_OPTION_REAL, 1, "m", "", "(0, inf)", "edge length of the tets; required"},
+  {"size", SB_OPTION_REAL, 1, "m", "", "(0, inf)",
+   "edge length of the tets made from a surface; without it the mean edge of its triangles"},
+  {"surface", SB_OPTION_CHOICE, 1, "", "auto", "auto|keep|remesh",
+   "whether the triangles of a surface stay: auto keeps them when their mean edge is within a factor of 1.5 "
+   "of the size"},
+  {"angle", SB_OPTION_REAL, 1, "degrees", "40", "(0, 180)",
+   "edges where a surface turns by more are kept when it is meshed anew"},
+  {"tetrahedralizer", SB_OPTION_CHOICE, 1, "", "auto", "auto|gmsh|tetgen",
+   "who makes tets from a surface: auto tries gmsh, then tetgen"},
+  {"seconds", SB_OPTION_REAL, 1, "s", "600", "(0, inf)", "time that gmsh, and then tetgen, may take"},
+  {"untangle", SB_OPTION_REAL, 1, "m", "", "[0, inf)",
+   "how far vertices may be moved to smooth out small folds where a surface cuts itself; without it half its "
+   "mean edge"},
   {"weld", SB_OPTION_REAL, 1, "m", "", "[0, inf)",
-   "vertices at most so far apart become one; 0: none do; without it 1e-9 of the diagonal of the mesh"},
+   "vertices at most so far apart become one; 0: none do; without it 1e-9 of the diagonal of the mesh (tet: "
+   "1e-7)"},
   {"levels", SB_OPTION_INT, 1, "", "1", "[1, 8]",
    "how often the mesh is refined: each time 8 times as many tets"},
   {"format", SB_OPTION_CHOICE, 1, "", "auto", "auto|msh41|msh41_binary|msh22|msh22_binary|h5",
@@ -26,8 +39,11 @@ static const SbOption rows[] = {
   {"quiet", SB_OPTION_BOOL, 1, "", "false", "", "says nothing while it works"},
 };
 /* Which commands read each row; "" for all. */
-static const char *const readers[] = {"tet", "repair", "refine", "convert tet repair refine", "", "", "",
-                                      "",    "",       ""};
+static const char *const readers[] = {
+  "tet", "tet", "tet", "tet", "tet", "tet", "tet repair", "refine", "convert tet repair refine",
+  "",    "",    "",    "",    "",    ""};
+_Static_assert(PETSC_STATIC_ARRAY_LENGTH(readers) == PETSC_STATIC_ARRAY_LENGTH(rows),
+               "one entry for each row");
 
 PetscErrorCode SbToolRegister(void)
 {
@@ -42,7 +58,7 @@ PetscErrorCode SbToolHelp(void)
   PetscCall(PetscPrintf(PETSC_COMM_WORLD,
                         "supple-mesh %s - looks at, converts and repairs meshes for supple\n\n", SB_VERSION));
   for (const SbToolCommand *c = SbToolCommands; c->name; c++)
-    PetscCall(PetscPrintf(PETSC_COMM_WORLD, "  supple-mesh %-8s%-13s %s\n", c->name, c->files, c->help));
+    PetscCall(PetscPrintf(PETSC_COMM_WORLD, "  supple-mesh %-8s%-12s %s\n", c->name, c->files, c->help));
   PetscCall(
     PetscPrintf(PETSC_COMM_WORLD,
                 "\nFILE: whatever -body_<name>_mesh takes, also box:lx,ly,lz:n. OUT: .msh (gmsh), or .h5 "
@@ -205,17 +221,35 @@ static PetscErrorCode check_words(const SbToolLine *line, const SbToolCommand **
 
 /* ------------------------------------------------------------------ values */
 
+/* How a surface becomes tets. */
+static PetscErrorCode read_tet(const SbScope *scope, SbTetOptions *o)
+{
+  PetscInt road, surface;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbTetDefaults(o));
+  PetscCall(SbOptionReal(scope, "size", &o->size));
+  PetscCall(SbOptionChoice(scope, "surface", &surface));
+  PetscCall(SbOptionReal(scope, "angle", &o->angle));
+  PetscCall(SbOptionChoice(scope, "tetrahedralizer", &road));
+  PetscCall(SbOptionReal(scope, "seconds", &o->seconds));
+  PetscCall(SbOptionReal(scope, "untangle", &o->untangle));
+  PetscCall(SbOptionReal(scope, "weld", &o->weld));
+  o->road = (SbTetRoad)road; /* in the order of the rows */
+  o->surface = (SbTetSurface)surface;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 static PetscErrorCode read_options(SbTool *tool)
 {
   SbScope scope;
   PetscInt format;
-  PetscBool given;
 
   PetscFunctionBeginUser;
   PetscCall(SbScopeSet(&scope, "", "", ""));
   tool->weld = -1;
-  PetscCall(SbOptionReal(&scope, "size", &tool->size));
   PetscCall(SbOptionReal(&scope, "weld", &tool->weld));
+  PetscCall(read_tet(&scope, &tool->body.tet));
   PetscCall(SbOptionInt(&scope, "levels", &tool->levels));
   PetscCall(SbOptionChoice(&scope, "format", &format));
   tool->format = (SbMeshFormat)format; /* in the order of the row */
@@ -225,10 +259,6 @@ static PetscErrorCode read_options(SbTool *tool)
   PetscCall(SbOptionReals(&scope, "translate", tool->body.translate));
   PetscCall(SbOptionString(&scope, "view", sizeof(tool->view), tool->view));
   PetscCall(SbOptionBool(&scope, "quiet", &tool->quiet));
-  PetscCall(SbOptionGiven(&scope, "size", &given));
-  PetscCheck(
-    given || strcmp(tool->command, "tet"), PETSC_COMM_SELF, PETSC_ERR_USER,
-    "tet needs -size: the edge length of the tets, above 0, in m (in the unit of the file times -scale)");
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -33,6 +33,8 @@ PetscErrorCode SbToolBegin(SbTool *tool, const char *phase)
   tool->start = now();
   tool->last = tool->start + PATIENCE;
   tool->terminal = (PetscBool)isatty(STDERR_FILENO);
+  tool->open = (PetscBool)(tool->terminal && !tool->quiet);
+  if (tool->open) (void)fprintf(stderr, "\r%-79.79s", phase);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

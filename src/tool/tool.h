@@ -14,8 +14,7 @@ typedef struct {
 
 typedef struct _SbTool {
   const char *command, *in, *out; /* out: NULL when the command writes no mesh */
-  SbBody body;                    /* of `in`: name of the file, step, scale, rotate, translate */
-  PetscReal size;                 /* -size, as in the file after scaling, m */
+  SbBody body;                    /* of `in`: name of the file, step, scale, rotate, translate, tet */
   PetscReal weld;                 /* -weld, m; below 0: the default */
   PetscInt levels;                /* -levels */
   SbMeshFormat format;            /* -format */

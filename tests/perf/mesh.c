@@ -111,7 +111,6 @@ static PetscErrorCode measure(SbBody *body)
   phase_begin(&p);
   PetscCall(SbDistribute(PETSC_COMM_WORLD, "metis", &whole, &mesh->dm, &point));
   PetscCall(phase_end(&p, "distribute"));
-  PetscCall(SbWholeDestroy(&whole));
   phase_begin(&p);
   PetscCall(SbMeshNumber(mesh, point));
   PetscCall(phase_end(&p, "number"));
@@ -130,6 +129,7 @@ int main(int argc, char **argv)
 
   PetscFunctionBeginUser;
   PetscCall(PetscInitialize(&argc, &argv, NULL, NULL));
+  SbMemoryReturnLarge();
   PetscCall(SbMeshRegister());
   PetscCall(PetscMemzero(&body, sizeof(body)));
   body.scale = 1;
