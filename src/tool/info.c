@@ -131,7 +131,7 @@ static PetscErrorCode memory(const SbMeshFacts *f)
   char number[32];
 
   PetscFunctionBeginUser;
-  PetscCall(print("a run on one rank, estimated\n  %-8s %14s %14s %14s\n", "element", "unknowns",
+  PetscCall(print("a dynamic run on one rank, estimated\n  %-8s %14s %14s %14s\n", "element", "unknowns",
                   "matrix MiB", "memory MiB"));
   for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(elements); i++) {
     PetscInt unknowns;

@@ -133,6 +133,36 @@ ok repair even.msh even2.msh
 says "nothing to repair"
 same even.msh even2.msh
 
+# a surface becomes tets, with its area and volume, and is drawn
+cat >cube.off <<'END_OFF'
+OFF
+8 6 0
+0 0 0
+1 0 0
+1 1 0
+0 1 0
+0 0 1
+1 0 1
+1 1 1
+0 1 1
+4 3 2 1 0
+4 4 5 6 7
+4 0 1 5 4
+4 1 2 6 5
+4 2 3 7 6
+4 3 0 4 7
+END_OFF
+ok tet cube.off cube.h5 -size 0.5 -quiet
+ok info cube.h5
+says " volume 1 m^3"
+says " surface 6 m^2, "
+says " region_1 "
+timeout 100 "$tool" convert cube.h5 cube.msh -view cube.png >out.txt 2>err.txt
+check "a picture: exit code $?: $(cat err.txt)" test "$(head -c 4 cube.png | tail -c 3)" = PNG
+refuses "cube.msh: is no surface that tet can fill" tet cube.msh x.h5
+refuses "-size -1 is outside (0, inf)" tet cube.off x.h5 -size -1
+refuses "-view cube.gif: give a name that ends in .png" info cube.h5 -view cube.gif
+
 # mistakes
 refuses "no command is given"
 refuses "'inof' is no command; the commands are info, convert, " inof cubes.h5
