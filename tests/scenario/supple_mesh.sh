@@ -160,7 +160,7 @@ says " region_1 "
 timeout 100 "$tool" convert cube.h5 cube.msh -view cube.png >out.txt 2>err.txt
 check "a picture: exit code $?: $(cat err.txt)" test "$(head -c 4 cube.png | tail -c 3)" = PNG
 refuses "cube.msh: is no surface that tet can fill" tet cube.msh x.h5
-refuses "-size -1 is outside (0, inf)" tet cube.off x.h5 -size -1
+refuses "-size -1 m is outside (0, inf) m" tet cube.off x.h5 -size -1
 refuses "-view cube.gif: give a name that ends in .png" info cube.h5 -view cube.gif
 
 # mistakes
