@@ -77,8 +77,8 @@ static PetscErrorCode check_volumes(const SbTetJob *job, const SbImport *im)
     got[im->item[3].tags[c]] += PetscAbsReal(SbTetDet(im->x, im->item[3].vert + 4 * c)) / 6;
   for (PetscInt r = 0; r < s->nregion && !why[0]; r++) {
     if (PetscAbsReal(got[r] - want[r]) > (job->remesh ? ROUGH : EXACT) * want[r])
-      (void)snprintf(why, sizeof(why), "its tets fill %.6g of the volume %.6g of region %" PetscInt_FMT,
-                     (double)got[r], (double)want[r], r + 1);
+      (void)snprintf(why, sizeof(why), "its tets fill %.4g percent of the volume of region %" PetscInt_FMT,
+                     (double)(100 * got[r] / want[r]), r + 1);
   }
   PetscCall(PetscFree2(want, got));
   PetscCheck(!why[0], PETSC_COMM_SELF, PETSC_ERR_USER_INPUT, "%s", why);
@@ -120,34 +120,35 @@ static PetscErrorCode give_groups(const SbSkin *s, SbImport *im)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Appends what was made, how, and how many slivers there are; `failed`: why the first road did not work. */
-static PetscErrorCode add_note(const SbTetJob *job, const char *who, PetscReal size, const char *failed,
-                               SbImport *im)
-{
-  PetscReal smallest;
-  char text[512], slivers[96] = "";
-  PetscInt n;
-
-  PetscFunctionBeginUser;
-  PetscCall(SbImportSlivers(im, SLIVER, &n, &smallest));
-  if (n)
-    (void)snprintf(slivers, sizeof(slivers),
-                   ", %" PetscInt_FMT " slivers (dihedral below %g degrees, smallest %.2g)", n,
-                   (double)SLIVER, (double)smallest);
-  (void)snprintf(text, sizeof(text), "%s%" PetscInt_FMT " tets of size %.3g m by %s, surface %s%s%s%.200s%s",
-                 im->note[0] ? ", " : "", im->item[3].n, (double)size, who,
-                 job->remesh ? "meshed anew" : "kept", slivers, failed[0] ? " (before that " : "", failed,
-                 failed[0] ? ")" : "");
-  PetscCall(PetscStrlcat(im->note, text, sizeof(im->note)));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* ------------------------------------------------------------------ roads */
 
 static const struct {
   const char *name;
   PetscErrorCode (*run)(const SbTetJob *job, SbImport *tets);
 } roads[] = {{"gmsh", SbTetRun_Gmsh}, {"tetgen", SbTetRun_TetGen}}; /* SB_TET_GMSH - 1, SB_TET_TETGEN - 1 */
+
+/* Appends what was made, how, and how many slivers there are; `failed`: why the first road did not work. */
+static PetscErrorCode add_note(const SbTetJob *job, int road, PetscReal size, const char *failed,
+                               SbImport *im)
+{
+  const char *surface = job->remesh ? "meshed anew" : "kept";
+  PetscReal smallest;
+  char text[512], slivers[96] = "";
+  PetscInt n;
+
+  PetscFunctionBeginUser;
+  if (job->remesh && road + 1 == SB_TET_TETGEN) surface = job->size < job->edge ? "split" : "kept";
+  PetscCall(SbImportSlivers(im, SLIVER, &n, &smallest));
+  if (n)
+    (void)snprintf(slivers, sizeof(slivers),
+                   ", %" PetscInt_FMT " slivers (dihedral below %g degrees, smallest %.2g)", n,
+                   (double)SLIVER, (double)smallest);
+  (void)snprintf(text, sizeof(text), "%s%" PetscInt_FMT " tets of size %.3g m by %s, surface %s%s%s%.200s%s",
+                 im->note[0] ? ", " : "", im->item[3].n, (double)size, roads[road].name, surface, slivers,
+                 failed[0] ? " (before that " : "", failed, failed[0] ? ")" : "");
+  PetscCall(PetscStrlcat(im->note, text, sizeof(im->note)));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
 
 static PetscErrorCode run_checked(int road, const SbTetJob *job, SbImport *tets)
 {
@@ -189,7 +190,7 @@ static PetscErrorCode try_road(int road, const SbTetJob *job, SbImport *tets, Pe
              PETSC_COMM_SELF, ierr, "%s: %s", job->where, caught.text);
   PetscCall(PetscStrlcat(reasons, reasons[0] ? "; " : "", size));
   PetscCall(PetscStrlcat(reasons, roads[road].name, size));
-  PetscCall(PetscStrlcat(reasons, job->remesh ? " (surface meshed anew): " : ": ", size));
+  PetscCall(PetscStrlcat(reasons, ": ", size));
   PetscCall(PetscStrlcat(reasons, without(job->where, caught.text), size));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -295,7 +296,7 @@ static PetscErrorCode run_roads(const SbTetJob *job, PetscReal factor, PetscBool
     PetscCall(move_mesh(1 / factor, &tets, body));
     PetscCall(SbImportDestroy(&tets));
     PetscCall(give_groups(job->surface, body));
-    PetscCall(add_note(job, roads[road].name, job->size / factor, reasons, body));
+    PetscCall(add_note(job, road, job->size / factor, reasons, body));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }

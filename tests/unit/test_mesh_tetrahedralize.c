@@ -125,6 +125,43 @@ static PetscErrorCode check_sizes(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A ring thinner than the size: gmsh's new surface would lose its volume, which is seen; tetgen keeps the triangles, and it is said why. */
+static PetscErrorCode check_second_road(void)
+{
+  const PetscInt n[2] = {60, 10};
+  TestSurface t;
+  SbSkin s;
+  SbTetOptions options;
+  SbImport im;
+  PetscReal want, got;
+
+  PetscFunctionBeginUser;
+  memset(&t, 0, sizeof(t));
+  memset(&im, 0, sizeof(im));
+  test_surface_torus(1, 0.1, n, &t);
+  PetscCall(make_skin(&t, t.ntri, &s));
+  (void)SbSkinMeasure(&s, &want);
+  PetscCall(SbTetDefaults(&options));
+  options.size = 0.4;
+  options.surface = SB_TET_REMESH;
+  PetscCall(SbTetrahedralize("test", &s, &options, &im));
+  measure(&im, 1, &got);
+  SB_CHECK_NEAR(got, want, 1e-9, "ring");
+  SB_CHECK(strstr(im.note, "by tetgen, surface kept"), "'%s'", im.note);
+  SB_CHECK(strstr(im.note, "(before that gmsh: its tets fill "), "'%s'", im.note);
+  PetscCall(SbImportDestroy(&im));
+  options.road = SB_TET_GMSH;
+  TEST_MESSAGE(SbTetrahedralize("test", &s, &options, &im), PETSC_ERR_USER_INPUT,
+               "percent of the volume of region 1");
+  options.road = SB_TET_AUTO;
+  options.seconds = 1e-3;
+  TEST_MESSAGE(SbTetrahedralize("test", &s, &options, &im), PETSC_ERR_USER_INPUT,
+               "tetgen: it was not done after 0.001 s (-body_NAME_tet_seconds)");
+  PetscCall(SbSkinDestroy(&s));
+  test_surface_free(&t);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* What neither road can do: two boxes through each other, passed by the checks. */
 static PetscErrorCode check_failure(void)
 {
@@ -166,6 +203,7 @@ int main(int argc, char **argv)
     PetscCall(check_kept(SB_TET_GMSH));
     PetscCall(check_kept(SB_TET_TETGEN));
     PetscCall(check_sizes());
+    PetscCall(check_second_road());
     PetscCall(check_failure());
   }
   SB_TEST_END();
