@@ -274,12 +274,78 @@ static PetscErrorCode write_vol(const char *path, const SbImport *im)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Which side of which tet a triangle is: S1 lies opposite the fourth node, S2 the third, S3 the first, S4 the second. */
+static void find_side(const SbImport *im, PetscInt triangle, int *tet, int *side)
+{
+  static const int opposite[4] = {3, 4, 2, 1}; /* node i lies opposite this side */
+
+  for (PetscInt c = 0; c < im->item[3].n; c++) {
+    int n = 0, other = -1;
+
+    for (int i = 0; i < 4; i++) {
+      PetscBool on = PETSC_FALSE;
+
+      for (int k = 0; k < 3; k++)
+        on = (PetscBool)(on || im->item[2].vert[3 * triangle + k] == im->item[3].vert[4 * c + i]);
+      n += on;
+      if (!on) other = i;
+    }
+    if (n == 3) {
+      *tet = (int)c + 1;
+      *side = opposite[other];
+    }
+  }
+}
+
+/* One part and its instance; sets that count up, that name others, also ones that come later, and a surface of sides. */
+static PetscErrorCode write_abaqus(const char *path, const SbImport *im)
+{
+  FILE *file = fopen(path, "w");
+  int nleft = 0, tet = 0, side = 0;
+
+  PetscFunctionBeginUser;
+  fprintf(file, "*Heading\n** two cubes\n*Part, name=Thing\n*NODE, NSET=Everything\n");
+  for (PetscInt v = 0; v < im->nvert; v++)
+    fprintf(file, "%d, %.17g, %.17g, %.17g\n", (int)v + 1, im->x[3 * v], im->x[3 * v + 1], im->x[3 * v + 2]);
+  fprintf(file, "*Element, type=C3D4\n");
+  for (PetscInt i = 0; i < im->item[3].n; i++) {
+    fprintf(file, "%d", (int)i + 1);
+    for (int k = 0; k < 4; k++) fprintf(file, ", %d", (int)im->item[3].vert[4 * i + k] + 1);
+    fprintf(file, "\n");
+    if (mark_of(im, 3, i) != 1) continue;
+    SB_CHECK(i == nleft, "the tets on the left are not the first ones");
+    nleft++;
+  }
+  fprintf(file, "*Elset, elset=Whole\nLeft, \"Right\"\n*Elset, elset=left, generate\n1, %d\n", nleft);
+  fprintf(
+    file,
+    "*Elset, elset=Right, generate\n%d, %d, 1\n*Solid Section, elset=Whole, material=M\n1.,\n*End Part\n",
+    nleft + 1, (int)im->item[3].n);
+  fprintf(file,
+          "*Assembly, name=A\n*Instance, name=Thing-1, part=Thing\n*End Instance\n*Nset, nset=Tip, "
+          "instance=Thing-1\n %d,\n",
+          (int)im->item[0].vert[0] + 1);
+  for (int all = 0; all < 2; all++) {
+    fprintf(file, "*Surface, type=ELEMENT, name=%s\n", all ? "Sides" : "Wall");
+    for (PetscInt i = 0; i < im->item[2].n; i++) {
+      if (!all && mark_of(im, 2, i) != 3) continue;
+      find_side(im, i, &tet, &side);
+      fprintf(file, "Thing-1.%d, S%d\n", tet, side);
+    }
+  }
+  fprintf(file, "*End Assembly\n*Step\n*End Step\n");
+  fclose(file);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 static PetscErrorCode test_written(const SbImport *reference, const char *folder)
 {
   static const Same marks[] = {
     {3, "volume_1", "left"}, {2, "surface_3", "wall"}, {2, "surface_5", "inner"}, {0, NULL, NULL}};
   static const Same names[] = {
     {3, "the left one", "left"}, {2, "wall", "wall"}, {2, "inner", "inner"}, {0, NULL, NULL}};
+  static const Same sets[] = {{3, "Left", "left"}, {3, "Whole", NULL},   {2, "Wall", "wall"},
+                              {2, "Sides", NULL},  {0, "Tip", "corner"}, {0, NULL, NULL}};
   char path[256], stem[200];
 
   PetscFunctionBeginUser;
@@ -298,6 +364,9 @@ static PetscErrorCode test_written(const SbImport *reference, const char *folder
   (void)snprintf(path, sizeof(path), "%s/names.vol", folder);
   PetscCall(write_vol(path, reference));
   PetscCall(test_file(path, reference, names));
+  (void)snprintf(path, sizeof(path), "%s/sets.inp", folder);
+  PetscCall(write_abaqus(path, reference));
+  PetscCall(test_file(path, reference, sets));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
