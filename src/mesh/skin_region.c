@@ -16,6 +16,7 @@
 #include "tetrahedralize.h"
 
 #define OUTSIDE (-1)
+#define PARTS_MAX 1000 /* each is looked for in all others */
 
 typedef struct {
   PetscInt first;   /* triangle */
@@ -256,6 +257,11 @@ static PetscErrorCode find_shells(Space *s)
   }
   s->nshell = number_heaps(2 * s->t->ntri, s->shell);
   s->nsurface = number_heaps(s->t->ntri, s->surface);
+  PetscCheck(s->nsurface <= PARTS_MAX, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
+             "%s: the surface consists of %" PetscInt_FMT
+             " parts; supple takes up to %d: remove the specks around it "
+             "(meshlab: remove isolated pieces)",
+             s->f->where, s->nsurface, PARTS_MAX);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -525,6 +525,9 @@ static PetscErrorCode check_refused(void)
   options.weld = 0;
   PetscCall(refuse(".off", &s, NULL, &options, "encloses no volume; give it a thickness"));
   clear(&s);
+  for (int i = 0; i < 1001; i++) cube_at(2 * i, 1, PETSC_FALSE, &s); /* specks */
+  PetscCall(refuse(".off", &s, NULL, NULL, "the surface consists of 1001 parts; supple takes up to 1000"));
+  clear(&s);
   PetscCall(refuse(".obj", NULL, "v 0 0 0\nv 1 0 0\n", NULL, "holds no triangles"));
   /* one side only: it also cuts itself, so that it is asked for its regions alone */
   one_sided(&s);
