@@ -113,7 +113,7 @@ static PetscErrorCode test_netgen(void)
     {POINTS "1\n1 1 2 3 4\n", NULL},
     {POINTS "1\n1 1 2 3 4 5 6 7 8 9 10\n", "line 7: element 1 uses point 5 of 4"},
     {"12" /* points */ "\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n1 1 1\n2 2 2\n3 3 3\n4 4 4\n5 5 5\n6 6 6\n7 7 7\n8 8 "
-                       "8\n1\n1 1 2 3 4 5 6 7 8 9 10\n",
+     "8\n1\n1 1 2 3 4 5 6 7 8 9 10\n",
      "holds 1 10-node tetrahedra; supple needs 4-node ones"},
     {POINTS "1\n1 1 2 3\n", "line 7: a volume element of 3 points; expected 4"},
     {POINTS "0\n1\n1 1 2 3\n", "is a surface: 1 3-node triangles and no tetrahedra"},
