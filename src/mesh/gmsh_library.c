@@ -13,10 +13,15 @@
 enum { OLDEST = 8, NEWEST = 30 }; /* 4.8 to 4.30 */
 
 /* A gmsh that holds METIS and others within itself must find those, not the ones of this program. The address sanitizer forbids that. */
-#if defined(RTLD_DEEPBIND) && !defined(__SANITIZE_ADDRESS__)
-  #define BIND (RTLD_NOW | RTLD_LOCAL | RTLD_DEEPBIND)
-#else
+#if defined(__has_feature)
+  #if __has_feature(address_sanitizer)
+    #define SANITIZED /* as clang says it */
+  #endif
+#endif
+#if defined(SANITIZED) || defined(__SANITIZE_ADDRESS__) || !defined(RTLD_DEEPBIND)
   #define BIND (RTLD_NOW | RTLD_LOCAL)
+#else
+  #define BIND (RTLD_NOW | RTLD_LOCAL | RTLD_DEEPBIND)
 #endif
 
 /* ------------------------------------------------------------------ loading */
