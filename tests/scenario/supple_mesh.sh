@@ -60,6 +60,17 @@ done
 ok convert msh41_binary.msh cubes.h5
 says "cubes.h5: 23 vertices, 48 tets, 12 triangles, 1 lines, 1 points"
 check "no index for ParaView" grep -q "cubes.h5:/mesh/cells" cubes.xmf
+cat >read.py <<'END_PYTHON'
+from vtkmodules.vtkIOXdmf2 import vtkXdmfReader
+
+reader = vtkXdmfReader()
+reader.SetFileName("cubes.xmf")
+reader.Update()
+grids = reader.GetOutputDataObject(0)
+print([(g.GetNumberOfPoints(), g.GetNumberOfCells(), g.GetCellData().GetArrayName(0)) for g in map(grids.GetBlock, range(2))])
+END_PYTHON
+check "what ParaView's reader finds: $("$top/.venv/bin/python" read.py 2>&1)" \
+  test "$("$top/.venv/bin/python" read.py 2>&1)" = "[(23, 48, 'tag_set'), (23, 12, 'tag_set')]"
 same "$data/two_cubes_41.msh" msh41.msh
 same "$data/two_cubes_41.msh" msh41_binary.msh
 same "$data/two_cubes_41.msh" cubes.h5
