@@ -186,7 +186,7 @@ PetscErrorCode SbLogInitialize(void);
   Not collective, but to be called alike on all ranks: PETSc tells events by their order.
 
   Input:
-    kind, name - "Eff" (effects), "Mat" (laws), "Elem" (elements), "Field" (fields of fields.h5), "Out" (other output), "Est" (estimates), and the name
+    kind, name - "Eff" (effects), "Mat" (laws), "Elem" (elements), "Field" (fields of fields.h5), "Out" (other output), "Est" (estimates), "Mesh" (re-meshing), and the name
                  in the scenario
   Output:
     event      - of all that have this name

@@ -76,6 +76,10 @@ typedef struct {
      were saved. hold() then writes the rows of that time. Collective. */
   PetscErrorCode (*load)(SbEffect e, SbSpace space, PetscReal t, const PetscReal u[], PetscInt n,
                          const PetscReal records[]);
+  /* for re-meshing: the n records of all ranks from save() get the names of another mesh, in which node from[i] (original number; ascending) is to[i];
+     those of what is not there are taken out. Not collective. */
+  PetscErrorCode (*rename)(SbEffect e, PetscInt nnode, const PetscInt from[], const PetscInt to[],
+                           PetscInt *n, PetscReal records[]);
   /* numbers for the history: n values with the names given by `columns`; residual[nnode][3] is the unbalanced force, N,
      which on prescribed unknowns is the reaction. Values are this rank's part and are summed. */
   PetscErrorCode (*history)(SbEffect e, SbSpace space, const SbStage *stage, const PetscReal residual[],

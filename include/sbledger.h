@@ -36,6 +36,8 @@ PetscErrorCode SbLedgerRegister(void); /* option rows */
 PetscErrorCode SbLedgerSetFromOptions(SbRun run, SbLedger *ledger);
 /* After SbRunSetUp() and before SbOutputAttach(), whose history gets its columns. NULL: nothing. Collective. */
 PetscErrorCode SbLedgerAttach(SbLedger ledger);
+/* `to`, attached, goes on with the errors and the work that `from` has summed, on another model of the same scene. Not collective. */
+PetscErrorCode SbLedgerContinue(SbLedger from, SbLedger to);
 /* The error of a source in the norm of the energy, J^(1/2), and the energy that it is relative to, J. Not collective. */
 PetscErrorCode SbLedgerGet(SbLedger ledger, SbErrorSource source, PetscReal *error, PetscReal *stored);
 /* The error of the quantity that -ledger_quantity names, and its value, in its own unit. Not collective. */

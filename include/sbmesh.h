@@ -33,6 +33,23 @@ typedef struct {
   SbTetRoad road;
   SbTetSurface surface;
 } SbTetOptions;
+/*
+  A mesh in memory, which takes the place of a body's file. The arrays are on rank 0, NULL elsewhere; the rest is alike on all ranks.
+  Groups of the file are there as the bits of the sets that they mean.
+*/
+typedef struct {
+  PetscInt step; /* after which it was made; 0: it is the mesh of the file */
+  PetscReal
+    mass; /* kg, which the body has on this mesh, too: its densities are scaled; 0: as its materials say */
+  PetscReal bound; /* the body is re-meshed when its quality falls below it; 0: as the options say */
+  PetscInt nvert, ncell, ntri;
+  PetscReal *x;       /* [nvert][3] rest position, placed, m */
+  PetscInt *cell;     /* [ncell][4] positively oriented; every vertex is used */
+  PetscInt *tri;      /* [ntri][3] triangles that sets of groups hold */
+  uint64_t *vert_set; /* [nvert] SB_SET_BIT() of sets that are groups */
+  uint64_t *tri_set;  /* [ntri] */
+  uint64_t *cell_set; /* [ncell] */
+} SbGiven;
 
 /* A body as the scenario gives it. Data, no methods. */
 typedef struct {
@@ -56,6 +73,7 @@ typedef struct {
   struct {
     PetscInt set, material; /* set that holds the tets; number of the material */
   } inclusion[SB_INCLUSION_MAX];
+  SbGiven *given; /* a mesh in memory in the place of the file, NULL: none; owned by the model */
   /* found by SbMeshCreate(), equal on all ranks */
   PetscInt nvert, ncell, nfacet; /* global counts; nfacet counts boundary facets */
   PetscInt npart;                /* connected parts */
@@ -156,6 +174,74 @@ PetscErrorCode SbMeshRegister(void);        /* rows of the option table, the MET
 /* Defaults of SbTetOptions; what -body_<name>_tet_... says when the mesh is a surface. Not collective. */
 PetscErrorCode SbTetDefaults(SbTetOptions *options);
 PetscErrorCode SbTetOptionsRead(const SbScope *scope, const char *mesh, SbTetOptions *options);
+/* Room for a mesh in memory; zeroed. Not collective. */
+PetscErrorCode SbGivenCreate(PetscInt nvert, PetscInt ncell, PetscInt ntri, SbGiven **given);
+PetscErrorCode SbGivenDestroy(SbGiven **given);
+/*
+  SbTetQuality - shape of a tet with corners x, m: 3 r / R with the radii of the spheres in it and around it, 1 for the regular one, 0 for a flat
+  one, negative when it is inside out. Not collective.
+*/
+PetscReal SbTetQuality(const PetscReal x[4][3]);
+/*
+  SbLocator - which tet holds a point. Not collective; the arrays are borrowed. Tets without volume, or inside out, hold nothing.
+
+  SbLocatorFind: the tet and the weights of its corners, none negative, sum 1. Of several that hold the point the one in which it lies
+  deepest, or the first of equal ones; of a point in none the nearest place. Returns the distance from there, m.
+*/
+typedef struct _p_SbLocator *SbLocator;
+PetscErrorCode SbLocatorCreate(PetscInt ncell, const PetscInt cell[], const PetscReal x[],
+                               SbLocator *locator);
+PetscErrorCode SbLocatorDestroy(SbLocator *locator);
+PetscReal SbLocatorFind(SbLocator locator, const PetscReal point[3], PetscInt *cell, PetscReal weight[4]);
+/* The weights of the corners of a tet at a point, in it or not. */
+void SbLocatorWeights(SbLocator locator, PetscInt cell, const PetscReal point[3], PetscReal weight[4]);
+/*
+  Re-meshing of one body (src/mesh/remesh.c), on rank 0. Not collective.
+
+  A hull is the surface of a body and what parts its regions inside. A mesher fills it with tets: their first vertices are those of the hull, unchanged and
+  in order, its triangles are faces of tets. x and cell (positively oriented) are allocated here; the caller frees. An error is
+  one line that says why it did not work.
+*/
+typedef struct {
+  PetscInt nvert, ntri, nregion;
+  PetscReal *x;  /* [nvert][3] m */
+  PetscInt *tri; /* [ntri][3] */
+  PetscInt *
+    side; /* [ntri][2] region on the side from which the corners are seen counter-clockwise, and behind; -1: nothing */
+  PetscReal edge; /* mean edge, m */
+} SbHull;
+typedef PetscErrorCode (*SbMesher)(const char *where, const SbHull *hull, PetscReal size, void *ctx,
+                                   PetscInt *nvert, PetscReal **x, PetscInt *ncell, PetscInt **cell);
+/* The program's own: SbTetrahedralize(). */
+PetscErrorCode SbMesherDefault(const char *where, const SbHull *hull, PetscReal size, void *ctx,
+                               PetscInt *nvert, PetscReal **x, PetscInt *ncell, PetscInt **cell);
+typedef struct {
+  SbMesher mesher;
+  void *ctx;
+  PetscReal size;    /* wanted edge, in mean edges of the hull */
+  PetscBool rest;    /* the body is filled as it is at rest, else as it is now */
+  PetscReal quality; /* least that tets may have at rest, and now (SbTetQuality) */
+} SbRemeshing;
+/* The mesh that there is; all borrowed. */
+typedef struct {
+  PetscInt nvert, ncell;
+  const PetscReal *X, *x; /* [nvert][3] at rest, now; m */
+  const PetscInt *cell;   /* [ncell][4] */
+  const PetscInt *region; /* [ncell] tets of different numbers stay apart */
+} SbOldMesh;
+/* Another one of the same body; arrays owned, SbNewMeshDestroy(). */
+typedef struct {
+  PetscInt nvert, ncell, nkept;
+  PetscReal *X, *x;  /* [nvert][3] at rest, and now as the old mesh has it there; m */
+  PetscInt *cell;    /* [ncell][4] */
+  PetscInt *kept;    /* [nkept] old vertex of each of the first new ones, which are where they were */
+  PetscInt *within;  /* [ncell] old tet that holds the middle of the new one */
+  PetscInt nmoved;   /* vertices that were moved, for tets that would have been inside out or too flat */
+  PetscReal quality; /* of the worst tet, now */
+} SbNewMesh;
+/* Errors (PETSC_ERR_USER_INPUT): what the mesher says; tets that stay inside out at rest or now. */
+PetscErrorCode SbRemeshBody(const char *where, const SbOldMesh *old, const SbRemeshing *how, SbNewMesh *mesh);
+PetscErrorCode SbNewMeshDestroy(SbNewMesh *mesh);
 /*
   A closed surface of triangles with an inside, as a rigid obstacle has it. Arrays are owned; SbTrianglesDestroy().
 */

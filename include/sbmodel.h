@@ -12,7 +12,8 @@ typedef struct {
     load_work; /* work done by the loads since the start (minus their potential when they have one), J */
   PetscReal drive_work;       /* work done by moving supports since the start, J */
   PetscReal damping_loss;     /* dissipated by Rayleigh damping since the start, J */
-  PetscReal integrator_loss;  /* what is missing: start + works - damping_loss - now, J */
+  PetscReal remesh_loss;      /* taken by re-meshing since the start, J */
+  PetscReal integrator_loss;  /* what is missing: start + works - damping_loss - remesh_loss - now, J */
   PetscReal momentum[3];      /* kg m/s */
   PetscReal angular[3];       /* about the origin, kg m^2/s */
   PetscReal centre[3];        /* centre of mass, m */

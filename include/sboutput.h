@@ -16,6 +16,7 @@
     /mesh/x        [npoint][3] double, rest position, m; points are the vertices, or 4 c + a for corner a of cell c
     /mesh/cells    [ncell][4] int32, point numbers, positively oriented
     /mesh/vertices [ncell][4] int32, vertex numbers; only with -output_discontinuous
+    /mesh_000123   the same for the mesh that bodies have after a re-meshing behind step 123; frames of it have the attribute `mesh` (123)
     /mesh/body     [ncell] int32, number of the body; /mesh/rank likewise when asked for
     /step/0001/000123   a frame: group with the attributes `step` and `time` (s), one dataset per field. The middle name
                    counts hundreds of frames, the last one is the step.
@@ -68,6 +69,33 @@ PetscErrorCode SbOutputAttach(SbRun run);
   or effects are not those of this run (the message names the first option that differs).
 */
 PetscErrorCode SbCheckpointLoad(SbRun run, const char *file);
+
+/*
+  SbOutputRestoreMeshes - with -restart from a checkpoint of a run that was re-meshed: the bodies' meshes (SbBody.given). Collective; between
+  SbOutputSetFromOptions() and SbModelSetUp(). Does nothing without -restart; a file that cannot be read is left to SbOutputAttach().
+*/
+PetscErrorCode SbOutputRestoreMeshes(SbRun run);
+
+/*
+  SbOutputFollow - the output of a run goes on with another one of the same scene, whose bodies have other meshes: the same files, in which
+  the mesh changes. Collective; in place of SbOutputSetFromOptions() and SbOutputAttach() for `to`.
+*/
+PetscErrorCode SbOutputFollow(SbRun from, SbRun to);
+
+/* What happened to a body that was re-meshed. */
+typedef struct {
+  char body[SB_NAME_MAX];
+  PetscInt step;
+  PetscReal t;                   /* s */
+  PetscInt tets[2], vertices[2]; /* before and after; so are the next ones */
+  PetscReal quality[2];          /* of the worst tet now */
+  PetscReal energy[2];           /* kinetic and strain energy of all bodies, J */
+  PetscInt moved;                /* vertices that were moved to mend tets */
+  PetscReal speed;               /* of the rigid motion that keeps the momenta, m/s */
+  PetscReal shift;               /* of the centre of mass of all bodies, m */
+} SbRemeshed;
+/* Prints a line and keeps it for run.json; without output it does nothing. Collective. */
+PetscErrorCode SbReportRemeshed(SbRun run, const SbRemeshed *told);
 
 /* What people see: before the run, and after it (rank 0 prints, nothing with -quiet). The latter also ends run.json. Collective. */
 PetscErrorCode SbReportHeader(SbRun run);

@@ -59,6 +59,9 @@ typedef struct {
 } SbCarried;
 
 typedef PetscErrorCode (*SbMonitorFn)(SbRun run, const SbStep *step, void *ctx);
+/* After a step that ended at t was solved and before monitors see it: whether the time loop is to come back then. Collective. */
+typedef PetscErrorCode (*SbPauseFn)(SbRun run, PetscInt step, PetscReal t, PetscReal dt, void *ctx,
+                                    PetscBool *pause);
 
 /* One simulation: model, solver, integrator, monitors. */
 struct _p_SbRun {
@@ -99,6 +102,11 @@ struct _p_SbRun {
        NULL: displacements are compared with -ts_atol */
     PetscErrorCode (*error)(SbRun run, const SbSolved *step, void *ctx, PetscInt *order, PetscReal *ratio);
   } look;
+  struct {
+    SbPauseFn fn; /* asked after each step; NULL: nobody asks */
+    void *ctx;
+  } after;
+  PetscBool paused; /* SbRunSolve() came back because of that; nothing has ended */
   PetscInt ncolumn;
   const SbColumn *column; /* [ncolumn] of history.csv; borrowed */
   PetscInt ncarried;
@@ -110,7 +118,10 @@ struct _p_SbRun {
   PetscReal energy_start; /* kinetic + strain at the start of the run (kept over restarts), J */
   PetscInt step0;         /* first step and time when restarted */
   PetscReal t0;
+  PetscInt step_now; /* of the last accepted step */
+  PetscReal t_now;
   PetscInt newton_total, linear_total, rejected_total, steps_total;
+  PetscInt newton_before, linear_before; /* of the runs that this one goes on from */
   PetscReal wall_start, seconds_solve;
   PetscReal dt, t_end; /* length of a step (the first one when adaptive) and end, s */
   PetscInt newton_step, linear_step, rejected_step; /* iterations and rejections of the current step */
@@ -138,6 +149,18 @@ PetscErrorCode SbRunCreate(SbModel model,
 PetscErrorCode
 SbRunSetUp(SbRun run); /* after SbModelSetUp(): vectors, matrix, solver, integrator. Collective */
 PetscErrorCode SbRunAddMonitor(SbRun run, SbMonitorFn fn, void *ctx, PetscErrorCode (*destroy)(void *));
+/* After SbRunSetUp(). */
+PetscErrorCode SbRunSetPause(SbRun run, SbPauseFn fn, void *ctx);
+/*
+  SbRunContinue - `to` goes on where `from` has come to, on another model of the same scene. Collective.
+
+  After SbRunSetUp(to), before monitors are added. Takes over totals, works and losses, the step and its time, and lengths of steps; with explicit
+  integrators that is the stable one of the new model, unless it was given. U, V and A are the caller's to fill.
+*/
+PetscErrorCode SbRunContinue(SbRun from, SbRun to);
+/* A <- the acceleration with which the integrator goes on at t_now from U and V: where it takes the one of the residual, that one; but A stays
+   as it is where displacements are prescribed, and with integrators that keep their own. Collective. */
+PetscErrorCode SbRunRestartAcceleration(SbRun run);
 PetscErrorCode SbRunSolve(
   SbRun run); /* the whole time loop or load path; an early end is in run->stop_reason, not an error */
 PetscErrorCode SbRunDestroy(SbRun *run);

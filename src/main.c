@@ -29,16 +29,25 @@ static PetscErrorCode answer(const SbCommand *command, PetscBool *answered)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* What there is of a simulation; re-meshing replaces the first three. */
+typedef struct {
+  SbModel model;
+  SbRun run;
+  SbLedger ledger;
+  SbRemesh remesh;
+} Scene;
+
 /* Everything that options say, checked. Nothing is computed yet. */
-static PetscErrorCode read_scenario(SbModel *model, SbRun *run, SbLedger *ledger)
+static PetscErrorCode read_scenario(Scene *s)
 {
   PetscFunctionBeginUser;
-  PetscCall(SbSceneCreate(PETSC_COMM_WORLD, model));
-  PetscCall(SbRunCreate(*model, run));
-  PetscCall(SbLedgerSetFromOptions(*run, ledger));
-  PetscCall(SbOutputSetFromOptions(*run));
+  PetscCall(SbSceneCreate(PETSC_COMM_WORLD, &s->model));
+  PetscCall(SbRunCreate(s->model, &s->run));
+  PetscCall(SbLedgerSetFromOptions(s->run, &s->ledger));
+  PetscCall(SbRemeshSetFromOptions(s->model, &s->remesh));
+  PetscCall(SbOutputSetFromOptions(s->run));
   PetscCall(SbOptionsCheck());
-  PetscCall(SbSceneCheck(*model));
+  PetscCall(SbSceneCheck(s->model));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -54,41 +63,41 @@ static PetscErrorCode view_scenario(const char *file)
 }
 
 /* The run failed: says so in its folder. */
-static void report_failure(const char *message, void *run)
+static void report_failure(const char *message, void *scene)
 {
-  (void)SbReportFailure((SbRun)run, message);
+  (void)SbReportFailure(((Scene *)scene)->run, message);
 }
 
-static PetscErrorCode simulate(SbModel model, SbRun run, SbLedger ledger)
+static PetscErrorCode simulate(Scene *s)
 {
   char file[PETSC_MAX_PATH_LEN];
   PetscBool quiet;
 
   PetscFunctionBeginUser;
-  SbErrorSetFarewell(report_failure, run);
+  SbErrorSetFarewell(report_failure, s);
   PetscCall(PetscLogStagePush(SbStageSetup));
-  PetscCall(SbModelSetUp(model));
-  PetscCall(SbSceneValidate(model));
-  PetscCall(SbRunSetUp(run));
-  PetscCall(SbLedgerAttach(ledger));
-  PetscCall(SbOutputAttach(run));
+  PetscCall(SbOutputRestoreMeshes(s->run));
+  PetscCall(SbModelSetUp(s->model));
+  PetscCall(SbSceneValidate(s->model));
+  PetscCall(SbRunSetUp(s->run));
+  PetscCall(SbLedgerAttach(s->ledger));
+  PetscCall(SbRemeshAttach(s->remesh, s->run));
+  PetscCall(SbOutputAttach(s->run));
   PetscCall(PetscLogStagePop());
-  PetscCall(SbReportHeader(run));
-  PetscCall(SbRunSolve(run));
-  PetscCall(SbReportSummary(run));
-  PetscCall(SbOutputFile(run, "ledger.csv", sizeof(file), file, &quiet));
-  PetscCall(SbLedgerReport(ledger, file, quiet));
+  PetscCall(SbReportHeader(s->run));
+  PetscCall(SbRemeshSolve(s->remesh, &s->model, &s->run, &s->ledger));
+  PetscCall(SbReportSummary(s->run));
+  PetscCall(SbOutputFile(s->run, "ledger.csv", sizeof(file), file, &quiet));
+  PetscCall(SbLedgerReport(s->ledger, file, quiet));
   SbErrorSetFarewell(NULL, NULL);
-  if (run->stop_reason[0]) SbErrorPost("%s", run->stop_reason);
+  if (s->run->stop_reason[0]) SbErrorPost("%s", s->run->stop_reason);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 static PetscErrorCode supple(int argc, char *argv[])
 {
   SbCommand command;
-  SbModel model = NULL;
-  SbRun run = NULL;
-  SbLedger ledger = NULL;
+  static Scene scene; /* an error that ends the program asks for it */
   PetscBool answered, left;
   PetscInt unused;
 
@@ -107,14 +116,15 @@ static PetscErrorCode supple(int argc, char *argv[])
 
   PetscCall(answer(&command, &answered));
   if (!answered) {
-    PetscCall(read_scenario(&model, &run, &ledger));
+    PetscCall(read_scenario(&scene));
     if (command.view)
       PetscCall(view_scenario(command.view_file));
     else
-      PetscCall(simulate(model, run, ledger));
-    PetscCall(SbLedgerDestroy(&ledger));
-    PetscCall(SbRunDestroy(&run));
-    PetscCall(SbModelDestroy(&model));
+      PetscCall(simulate(&scene));
+    PetscCall(SbRemeshDestroy(&scene.remesh));
+    PetscCall(SbLedgerDestroy(&scene.ledger));
+    PetscCall(SbRunDestroy(&scene.run));
+    PetscCall(SbModelDestroy(&scene.model));
     if (!command.view) PetscCall(SbOptionsUnused(PETSC_COMM_WORLD, &unused));
   }
   PetscCall(PetscFinalize());

@@ -9,6 +9,7 @@ typedef struct {
   SbModel model;
   SbRun run;
   SbLedger ledger; /* NULL unless the options ask for one */
+  SbRemesh remesh; /* likewise */
 } TestScene;
 
 /* The run of a scene whose model is there, and its ledger if the options ask for one. */
@@ -17,6 +18,7 @@ static inline PetscErrorCode test_scene_run(TestScene *scene)
   PetscFunctionBeginUser;
   PetscCall(SbRunCreate(scene->model, &scene->run));
   PetscCall(SbLedgerSetFromOptions(scene->run, &scene->ledger));
+  PetscCall(SbRemeshSetFromOptions(scene->model, &scene->remesh));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -24,7 +26,7 @@ static inline PetscErrorCode test_scene_run(TestScene *scene)
 static inline PetscErrorCode test_scene_open_in(const char *dir, const char *options, TestScene *scene)
 {
   PetscFunctionBeginUser;
-  *scene = (TestScene){NULL, NULL, NULL}; /* what a call that fails leaves can be closed */
+  *scene = (TestScene){NULL, NULL, NULL, NULL}; /* what a call that fails leaves can be closed */
   PetscCall(PetscOptionsClear(NULL));
   PetscCall(SbOptionsReset());
   PetscCall(SbRegisterAll());
@@ -37,6 +39,7 @@ static inline PetscErrorCode test_scene_open_in(const char *dir, const char *opt
   PetscCall(SbModelSetUp(scene->model));
   PetscCall(SbRunSetUp(scene->run));
   PetscCall(SbLedgerAttach(scene->ledger));
+  PetscCall(SbRemeshAttach(scene->remesh, scene->run));
   if (dir) PetscCall(SbOutputAttach(scene->run));
   PetscCall(SbMeshValidate(scene->model->mesh));
   PetscCall(SbSpaceValidate(scene->model->space));
@@ -50,9 +53,18 @@ static inline PetscErrorCode test_scene_open(const char *options, TestScene *sce
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The time loop, with re-meshing if the options ask for it: model, run and ledger may be other ones then. */
+static inline PetscErrorCode test_scene_solve(TestScene *scene)
+{
+  PetscFunctionBeginUser;
+  PetscCall(SbRemeshSolve(scene->remesh, &scene->model, &scene->run, &scene->ledger));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 static inline PetscErrorCode test_scene_close(TestScene *scene)
 {
   PetscFunctionBeginUser;
+  PetscCall(SbRemeshDestroy(&scene->remesh));
   PetscCall(SbLedgerDestroy(&scene->ledger));
   PetscCall(SbRunDestroy(&scene->run));
   PetscCall(SbModelDestroy(&scene->model));

@@ -596,6 +596,7 @@ static PetscErrorCode create_collision(SbEffect e)
   e->ops.history = history_collision;
   e->ops.save = SbEffectSave_Collision;
   e->ops.load = SbEffectLoad_Collision;
+  e->ops.rename = SbEffectRename_Collision;
   e->nstate = SB_COLLISION_STATE;
   e->ops.near = near_collision;
   e->ops.places = SbEffectPlaces_Collision;

@@ -185,6 +185,8 @@ PetscErrorCode SbCollisionFrictionAccept(Collision *c, const char effect[], SbSp
 PetscErrorCode SbEffectSave_Collision(SbEffect e, SbSpace space, PetscInt *n, PetscReal **records);
 PetscErrorCode SbEffectLoad_Collision(SbEffect e, SbSpace space, PetscReal t, const PetscReal u[], PetscInt n,
                                       const PetscReal records[]);
+PetscErrorCode SbEffectRename_Collision(SbEffect e, PetscInt nnode, const PetscInt from[],
+                                        const PetscInt to[], PetscInt *n, PetscReal records[]);
 
 /* collision_pairs.c: names the columns, when they are wanted, behind those of e. Not collective. */
 PetscErrorCode SbPairsSetUp(SbEffect e, SbMesh mesh);

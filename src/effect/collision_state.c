@@ -142,3 +142,24 @@ PetscErrorCode SbEffectLoad_Collision(SbEffect e, SbSpace space, PetscReal t, co
   PetscCall(SbCollisionLook(c, u, PETSC_FALSE));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
+
+/* Points keep their names but for their numbers; edges are named by their facets, which are others now, and are looked for anew. */
+PetscErrorCode SbEffectRename_Collision(SbEffect e, PetscInt nnode, const PetscInt from[],
+                                        const PetscInt to[], PetscInt *n, PetscReal records[])
+{
+  PetscInt kept = 0;
+
+  PetscFunctionBeginUser;
+  (void)e;
+  for (PetscInt i = 0; i < *n; i++) {
+    PetscReal *r = records + SB_COLLISION_STATE * i;
+    PetscInt place = -1;
+
+    if (r[0] == POINT) PetscCall(PetscFindInt((PetscInt)r[1], nnode, from, &place));
+    if (place >= 0) r[1] = (PetscReal)to[place];
+    if (place >= 0 || r[0] == SUMS)
+      PetscCall(PetscArraymove(records + SB_COLLISION_STATE * kept++, r, SB_COLLISION_STATE));
+  }
+  *n = kept;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

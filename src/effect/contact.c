@@ -606,6 +606,7 @@ static PetscErrorCode create_contact(SbEffect e)
   e->ops.history = SbEffectHistory_Contact;
   e->ops.save = SbEffectSave_Contact;
   e->ops.load = SbEffectLoad_Contact;
+  e->ops.rename = SbEffectRename_Contact;
   e->nstate = SB_CONTACT_STATE;
   e->ops.destroy = destroy_contact;
   e->column = columns;

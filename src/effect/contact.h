@@ -164,5 +164,7 @@ PetscErrorCode SbEffectHistory_Contact(SbEffect e, SbSpace space, const SbStage 
 PetscErrorCode SbEffectSave_Contact(SbEffect e, SbSpace space, PetscInt *n, PetscReal **records);
 PetscErrorCode SbEffectLoad_Contact(SbEffect e, SbSpace space, PetscReal t, const PetscReal u[], PetscInt n,
                                     const PetscReal records[]);
+PetscErrorCode SbEffectRename_Contact(SbEffect e, PetscInt nnode, const PetscInt from[], const PetscInt to[],
+                                      PetscInt *n, PetscReal records[]);
 /* Takes the stretch of a node's springs along with the obstacle. */
 void SbContactStretch(const SbPose *pose, Touch *touch);

@@ -96,3 +96,23 @@ PetscErrorCode SbEffectLoad_Contact(SbEffect e, SbSpace space, PetscReal t, cons
   PetscCall(PetscFree2(number, at));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
+
+PetscErrorCode SbEffectRename_Contact(SbEffect e, PetscInt nnode, const PetscInt from[], const PetscInt to[],
+                                      PetscInt *n, PetscReal records[])
+{
+  PetscInt kept = 0;
+
+  PetscFunctionBeginUser;
+  (void)e;
+  for (PetscInt i = 0; i < *n; i++) {
+    PetscReal *r = records + SB_CONTACT_STATE * i;
+    PetscInt place;
+
+    PetscCall(PetscFindInt((PetscInt)r[0], nnode, from, &place));
+    if (place < 0) continue;
+    r[0] = (PetscReal)to[place];
+    PetscCall(PetscArraymove(records + SB_CONTACT_STATE * kept++, r, SB_CONTACT_STATE));
+  }
+  *n = kept;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

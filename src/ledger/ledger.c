@@ -329,6 +329,20 @@ PetscErrorCode SbLedgerAttach(SbLedger l)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscErrorCode SbLedgerContinue(SbLedger from, SbLedger to)
+{
+  PetscFunctionBeginUser;
+  for (PetscInt i = 0; i < from->run->ncarried; i++)
+    *to->run->carried[i].value = *from->run->carried[i].value;
+  to->work = from->work;
+  to->own_work = from->own_work;
+  to->seconds += from->seconds;
+  to->solving += from->solving;
+  to->residuals += from->residuals;
+  to->repeats = from->repeats;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode SbLedgerGet(SbLedger l, SbErrorSource source, PetscReal *error, PetscReal *stored)
 {
   PetscFunctionBeginUser;

@@ -46,6 +46,7 @@ static PetscErrorCode create_whole(MPI_Comm comm, PetscInt nbody, SbBody body[],
 {
   PetscMPIInt rank;
   SbCaught caught = {0, ""};
+  SbGiven **given; /* each rank has its own */
 
   PetscFunctionBeginUser;
   PetscCallMPI(MPI_Comm_rank(comm, &rank));
@@ -60,7 +61,11 @@ static PetscErrorCode create_whole(MPI_Comm comm, PetscInt nbody, SbBody body[],
   }
   PetscCallMPI(MPI_Bcast(&caught, (int)sizeof(caught), MPI_BYTE, 0, comm));
   PetscCheck(!caught.code, comm, (PetscErrorCode)caught.code, "%s", caught.text);
+  PetscCall(PetscMalloc1(nbody, &given));
+  for (PetscInt b = 0; b < nbody; b++) given[b] = body[b].given;
   PetscCallMPI(MPI_Bcast(body, (int)((size_t)nbody * sizeof(*body)), MPI_BYTE, 0, comm));
+  for (PetscInt b = 0; b < nbody; b++) body[b].given = given[b];
+  PetscCall(PetscFree(given));
   PetscCallMPI(MPI_Bcast(set, (int)((size_t)nset * sizeof(*set)), MPI_BYTE, 0, comm));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -84,7 +89,7 @@ static PetscErrorCode report(MPI_Comm comm, PetscInt nbody, const SbBody body[],
                             (double)p->bbox[1], (double)p->bbox[2], (double)p->bbox[3], (double)p->bbox[4],
                             (double)p->bbox[5], (double)p->min_dihedral, (double)p->max_radius_ratio,
                             p->note[0] ? "; " : "", p->note));
-    else if (p->note[0])
+    else if (p->note[0] && !p->given)
       PetscCall(PetscPrintf(comm, "body '%s': %s: %s\n", p->name, p->mesh, p->note));
   }
   PetscFunctionReturn(PETSC_SUCCESS);

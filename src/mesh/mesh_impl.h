@@ -81,6 +81,8 @@ PetscErrorCode SbImportRead_Xdmf(const char *path, SbImport *body);
 /* Chooses the reader by the name of the mesh, reads, places. Not collective. */
 PetscErrorCode SbImportRead(const SbBody *body, SbImport *import);
 PetscErrorCode SbImportDestroy(SbImport *import);
+/* given.c: the mesh that a body has in memory. */
+PetscErrorCode SbImportGiven(const SbBody *body, SbImport *import);
 /* Room for n vertices. */
 PetscErrorCode SbImportSetVertices(SbImport *import, PetscInt n);
 /* Appends a simplex; vert[dim + 1]. */
@@ -206,6 +208,8 @@ typedef struct {
 /* Marks boundary faces and the members of all sets in body b; adds to the counts of the sets. */
 PetscErrorCode SbSetsMark(const SbImport *import, const SbFaces *faces, PetscInt nbody, const SbBody body[],
                           PetscInt b, PetscInt nset, SbSet set[], SbMasks *masks);
+/* Adds the members of sets that are groups. */
+PetscErrorCode SbGivenMark(const SbGiven *given, const SbFaces *faces, SbMasks *masks);
 /* A set that selects nothing is an error, which lists the groups that exist. */
 PetscErrorCode SbSetsCheck(PetscInt nbody, const SbBody body[], const SbImport import[], PetscInt nset,
                            const SbSet set[]);

@@ -67,6 +67,16 @@ PetscErrorCode SbImportSlivers(const SbImport *im, PetscReal degrees, PetscInt *
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscReal SbTetQuality(const PetscReal x[4][3])
+{
+  static const PetscInt corner[4] = {0, 1, 2, 3};
+  PetscReal V, cosine[6], ratio;
+
+  SbTetShape(&x[0][0], corner, &V, cosine, &ratio);
+  if (!(PetscAbsReal(V) > 0) || PetscIsInfOrNanReal(ratio)) return 0;
+  return (V > 0 ? 1 : -1) / ratio;
+}
+
 /* Sets of vertices, joined by every tet. */
 PetscErrorCode SbImportParts(const SbImport *im, PetscInt *npart)
 {

@@ -17,7 +17,10 @@ static PetscErrorCode prepare(PetscInt nbody, SbBody body[], PetscInt b, PetscIn
                               SbImport *im, Part *part)
 {
   PetscFunctionBeginUser;
-  PetscCall(SbImportRead(&body[b], im));
+  if (body[b].given)
+    PetscCall(SbImportGiven(&body[b], im));
+  else
+    PetscCall(SbImportRead(&body[b], im));
   PetscCall(SbImportCheck(im, &part->faces));
   PetscCall(SbImportQuality(im, &part->faces, &body[b]));
   PetscCall(PetscCalloc1(im->nvert, &part->masks.vert));

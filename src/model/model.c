@@ -32,6 +32,7 @@ PetscErrorCode SbModelDestroy(SbModel *model)
   PetscCall(PetscFree(m->inclusion));
   PetscCall(PetscFree(m->material));
   PetscCall(PetscFree(m->element));
+  for (PetscInt b = 0; m->body && b < m->nbody; b++) PetscCall(SbGivenDestroy(&m->body[b].given));
   PetscCall(PetscFree(m->body));
   PetscCall(PetscFree(m->set));
   PetscCall(PetscFree(*model));
@@ -61,6 +62,29 @@ static PetscErrorCode check_inclusions(SbModel m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A body that was re-meshed has the mass that it had. */
+static PetscErrorCode match_mass(SbModel m, PetscInt b)
+{
+  const SbMesh mesh = m->mesh;
+  PetscReal mass = 0., factor;
+
+  PetscFunctionBeginUser;
+  for (PetscInt c = 0; c < mesh->ncell_owned; c++) {
+    PetscReal x[4][3], g[3][3], V;
+
+    if (mesh->cell_body[c] != b) continue;
+    for (PetscInt i = 0; i < 12; i++) x[i / 3][i % 3] = mesh->x[3 * mesh->cell[4 * c + i / 3] + i % 3];
+    m->element[b]->ops.tabulate((const PetscReal(*)[3])x, g, &V);
+    mass += m->material[mesh->cell_material[c]]->density * V;
+  }
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &mass, 1, MPIU_REAL, MPI_SUM, m->comm));
+  factor = m->body[b].given->mass / mass;
+  m->material[b]->density *= factor;
+  for (PetscInt k = 0; k < m->body[b].ninclusion; k++)
+    m->material[m->body[b].inclusion[k].material]->density *= factor;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Effects that have the operation, in scenario order. */
 #define SORT_INTO_LIST(m, op)                                               \
   do {                                                                      \
@@ -78,6 +102,9 @@ PetscErrorCode SbModelSetUp(SbModel m)
   for (PetscInt b = 0; b < m->nbody; b++) m->body[b].face_nodes = (PetscBool)!m->element[b]->nodes_per[0];
   PetscCall(SbMeshCreate(m->comm, m->nbody, m->body, m->nset, m->set, &m->mesh));
   if (m->nmaterial > m->nbody) PetscCall(check_inclusions(m));
+  for (PetscInt b = 0; b < m->nbody; b++) {
+    if (m->body[b].given && m->body[b].given->mass > 0.) PetscCall(match_mass(m, b));
+  }
   for (PetscInt e = 0; e < m->neffect; e++) PetscCall(SbEffectMarkHeld(m->effect[e], m->nset, m->set));
   PetscCall(SbSpaceCreate(m->mesh, m->material, m->element, &m->space));
   m->load = 1.;

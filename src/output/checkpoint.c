@@ -191,6 +191,8 @@ static PetscErrorCode write_numbers(SbRun run, SbOutput out, const SbStep *step,
   totals_of(run, total);
   for (int i = 0; i < NTOTAL; i++) PetscCall(SbH5PutReal(h, h->file, total[i].name, *total[i].value));
   PetscCall(write_carried(run, h));
+  if (run->energies.remesh_loss != 0.)
+    PetscCall(SbH5PutReal(h, h->file, "remesh_loss", run->energies.remesh_loss));
   PetscCall(SbH5PutReal(h, h->file, "time", step->t));
   PetscCall(SbH5PutReal(h, h->file, "dt_next", dt));
   PetscCall(SbH5PutReal(h, h->file, "dt", run->dt));
@@ -288,6 +290,7 @@ static PetscErrorCode write_checkpoint(SbRun run, SbOutput out, const SbStep *st
 {
   SbH5 h;
   char name[SB_FILE_MAX], path[PETSC_MAX_PATH_LEN], tmp[PETSC_MAX_PATH_LEN], message[SB_MESSAGE_MAX] = "";
+  PetscInt64 mesh_bytes;
   uint64_t checksum;
 
   PetscFunctionBeginUser;
@@ -295,9 +298,12 @@ static PetscErrorCode write_checkpoint(SbRun run, SbOutput out, const SbStep *st
   PetscCall(SbOutputPath(out, name, sizeof(path), path));
   PetscCall(SbOutputPath(out, "checkpoint.tmp", sizeof(tmp), tmp));
   PetscCall(SbH5Create(out->comm, tmp, &h));
-  PetscCall(SbH5Reserve(&h, (PetscInt64)out->node.N * 3 * 24 + (PetscInt64)strlen(out->identity) + 65536));
+  PetscCall(SbCheckpointMeshBytes(run, &mesh_bytes));
+  PetscCall(SbH5Reserve(&h, (PetscInt64)out->node.N * 3 * 24 + (PetscInt64)strlen(out->identity) + 65536 +
+                              mesh_bytes));
   PetscCall(write_vectors(run, out, &h, &checksum));
   PetscCall(SbCheckpointWriteEffects(run, &h, &checksum));
+  PetscCall(SbCheckpointWriteMeshes(run, &h, &checksum));
   PetscCall(write_numbers(run, out, step, &h, checksum));
   PetscCall(SbH5Flush(&h));
   PetscCall(SbH5Close(&h));
@@ -364,7 +370,7 @@ static void first_difference(const char *theirs, const char *ours, size_t size, 
 }
 
 /* Refuses a checkpoint of other bodies, meshes or effects. */
-static PetscErrorCode check_identity(SbOutput out, SbH5 *h, int64_t mesh_hash)
+static PetscErrorCode check_identity(SbRun run, SbOutput out, SbH5 *h, int64_t mesh_hash)
 {
   PetscBool ok = PETSC_TRUE;
   char *options;
@@ -379,8 +385,8 @@ static PetscErrorCode check_identity(SbOutput out, SbH5 *h, int64_t mesh_hash)
     "cannot restart from %s: it was made with '%s', this run has '%s'; bodies and effects must be the same",
     h->path, a, b);
   PetscCheck((uint64_t)mesh_hash == out->mesh_hash, out->comm, PETSC_ERR_USER_INPUT,
-             "cannot restart from %s: it belongs to another mesh (other vertices, cells or placement)",
-             h->path);
+             "cannot restart from %s: it belongs to another mesh (other vertices, cells or placement%s)",
+             h->path, SbOutputMeshStep(run) ? ", or a body was re-meshed: name it by -restart FILE" : "");
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -435,7 +441,8 @@ static PetscErrorCode load(SbRun run, SbOutput out, const char *path, PetscBool 
   int64_t step, mesh_hash, checksum = 0, format;
   uint64_t sum = 0;
   SbRecords *records;
-  PetscReal t, values[NTOTAL];
+  PetscReal t, values[NTOTAL], remesh_loss = 0.;
+  PetscBool remeshed = PETSC_TRUE;
 
   PetscFunctionBeginUser;
   PetscCall(SbH5Open(out->comm, path, PETSC_FALSE, &h, ok));
@@ -447,11 +454,13 @@ static PetscErrorCode load(SbRun run, SbOutput out, const char *path, PetscBool 
   PetscCall(SbH5GetReal(h.file, "time", &t, ok));
   totals_of(run, total);
   for (int i = 0; i < NTOTAL; i++) PetscCall(SbH5GetReal(h.file, total[i].name, &values[i], ok));
+  PetscCall(SbH5GetReal(h.file, "remesh_loss", &remesh_loss, &remeshed));
   if (*ok && format != FORMAT) *ok = PETSC_FALSE;
-  if (*ok) PetscCall(check_identity(out, &h, mesh_hash));
+  if (*ok) PetscCall(check_identity(run, out, &h, mesh_hash));
   PetscCall(PetscCalloc1(run->model->neffect, &records));
   if (*ok) PetscCall(read_vectors(run, out, &h, &sum, ok));
   if (*ok) PetscCall(SbCheckpointReadEffects(run, &h, records, &sum, ok));
+  if (*ok) PetscCall(SbCheckpointSumMeshes(run, &h, &sum, ok));
   if (sum != (uint64_t)checksum) *ok = PETSC_FALSE;
   if (*ok) PetscCall(set_step(run, h.file, ok));
   if (*ok) PetscCall(read_carried(run, out, &h));
@@ -461,6 +470,7 @@ static PetscErrorCode load(SbRun run, SbOutput out, const char *path, PetscBool 
   PetscCall(PetscFree(records));
   if (!*ok) PetscFunctionReturn(PETSC_SUCCESS);
   for (int i = 0; i < NTOTAL; i++) *total[i].value = values[i];
+  run->energies.remesh_loss = remesh_loss;
   run->step0 = (PetscInt)step;
   run->t0 = t;
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -485,6 +495,16 @@ static PetscErrorCode nth_newest(SbOutput out, int k, size_t size, char path[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscErrorCode SbCheckpointFind(SbOutput out, const char *file, int k, size_t size, char path[])
+{
+  PetscFunctionBeginUser;
+  if (strcmp(file, "latest"))
+    PetscCall(PetscStrncpy(path, file, size));
+  else
+    PetscCall(nth_newest(out, k, size, path));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode SbCheckpointLoad(SbRun run, const char *file)
 {
   SbOutput out = (SbOutput)run->output;
@@ -493,9 +513,8 @@ PetscErrorCode SbCheckpointLoad(SbRun run, const char *file)
 
   PetscFunctionBeginUser;
   PetscCall(SbOutputOrder(run, out));
-  if (!latest) PetscCall(PetscStrncpy(path, file, sizeof(path)));
   for (int k = 0; !ok; k++) {
-    if (latest) PetscCall(nth_newest(out, k, sizeof(path), path));
+    PetscCall(SbCheckpointFind(out, file, k, sizeof(path), path));
     PetscCheck(path[0], out->comm, PETSC_ERR_FILE_OPEN, "-restart latest: there is no %scheckpoint in %s",
                k ? "readable " : "", out->dir);
     PetscCall(load(run, out, path, &ok));

@@ -16,6 +16,7 @@ typedef struct {
   const SbField *field[SB_FIELD_MAX];
   PetscInt bytes[SB_FIELD_MAX];
   PetscInt nplace, place_bytes; /* of contact; -1: it was not asked for */
+  PetscInt mesh;                /* step behind which its mesh was made, 0: the first one */
 } SbFrame;
 
 struct _p_SbFrames {
@@ -25,12 +26,21 @@ struct _p_SbFrames {
   PetscInt nnode, nlink; /* hundreds so far; links in the current one */
   PetscInt last_step;    /* of the last frame in the file, or -1 */
   PetscInt nframe;
+  PetscInt mesh;            /* of frames that are written, as in SbFrame */
   SbXdmf xdmf;              /* rank 0 only */
   PetscReal *owned, *slice; /* work: six numbers per cell or three per point */
   void *packed;             /* slice in the type of the file; NULL when that is double */
 };
 
 /* ------------------------------------------------------------------ the mesh */
+
+static void mesh_name(PetscInt step, size_t size, char name[])
+{
+  if (step)
+    SbFormat(size, name, "mesh_%06" PetscInt_FMT, step);
+  else
+    SbFormat(size, name, "mesh");
+}
 
 /* A constant whole number per entity, or the four vertices of each cell. */
 static PetscErrorCode write_whole(SbFrames fr, hid_t where, const char *name, const SbOrder *order,
@@ -94,9 +104,11 @@ static PetscErrorCode write_names(SbFrames fr, hid_t group, SbModel model)
 static PetscErrorCode write_mesh(SbRun run, SbOutput out)
 {
   SbFrames fr = out->frames;
+  char name[32];
   hid_t group;
 
   PetscFunctionBeginUser;
+  mesh_name(fr->mesh, sizeof(name), name);
   PetscCall(SbH5Reserve(&fr->h5, (PetscInt64)out->point.N * 24 + (PetscInt64)out->cell.N * 40 + 65536));
   PetscCall(SbH5GroupCreate(&fr->h5, 8, 8, &group));
   PetscCall(SbH5PutInt(&fr->h5, group, "hash", (int64_t)out->mesh_hash));
@@ -109,7 +121,7 @@ static PetscErrorCode write_mesh(SbRun run, SbOutput out)
     PetscCall(write_whole(fr, group, out->field[i]->name, &out->cell, 1));
     PetscCall(PetscLogEventEnd(out->field_event[i], 0, 0, 0, 0));
   }
-  PetscCall(SbH5GroupLink(&fr->h5, group, fr->h5.file, "mesh"));
+  PetscCall(SbH5GroupLink(&fr->h5, group, fr->h5.file, name));
   (void)H5Gclose(group);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -195,6 +207,7 @@ static PetscErrorCode write_frame(SbRun run, SbOutput out, const SbStep *step)
   PetscCall(SbH5GroupCreate(&fr->h5, (unsigned)out->nfield + 1, 14, &group));
   PetscCall(SbH5PutReal(&fr->h5, group, "time", step->t));
   PetscCall(SbH5PutInt(&fr->h5, group, "step", step->step));
+  if (fr->mesh) PetscCall(SbH5PutInt(&fr->h5, group, "mesh", fr->mesh));
   out->state_valid = PETSC_FALSE;
   for (PetscInt i = 0; i < out->nfield; i++) {
     if (out->field[i]->constant) continue;
@@ -250,7 +263,8 @@ static PetscErrorCode monitor(SbRun run, const SbStep *step, void *ctx)
 static PetscErrorCode read_frame(hid_t hundred, const char *name, SbFrame *frame, PetscBool *ok)
 {
   const hid_t group = H5Gopen2(hundred, name, H5P_DEFAULT);
-  int64_t step = 0;
+  int64_t step = 0, mesh = 0;
+  PetscBool other = PETSC_TRUE;
   PetscInt n;
   const SbField *fields;
 
@@ -259,7 +273,9 @@ static PetscErrorCode read_frame(hid_t hundred, const char *name, SbFrame *frame
   if (!*ok) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(SbH5GetInt(group, "step", &step, ok));
   PetscCall(SbH5GetReal(group, "time", &frame->time, ok));
+  PetscCall(SbH5GetInt(group, "mesh", &mesh, &other));
   frame->step = (PetscInt)step;
+  frame->mesh = other ? (PetscInt)mesh : 0;
   frame->nfield = 0;
   PetscCall(SbFieldGetAll(&n, &fields));
   for (PetscInt i = 0; i < n; i++) {
@@ -328,14 +344,48 @@ static int by_step(const void *a, const void *b)
   return (p > q) - (p < q);
 }
 
-/* Hash of the mesh in an open file of frames; ok is false when there is none. */
-static PetscErrorCode mesh_hash(hid_t file, int64_t *hash, PetscBool *ok)
+/* Hash of a mesh in an open file of frames; ok is false when there is none. */
+static PetscErrorCode mesh_hash(hid_t file, PetscInt step, int64_t *hash, PetscBool *ok)
 {
-  const hid_t mesh = H5Gopen2(file, "mesh", H5P_DEFAULT);
+  char name[32];
+  hid_t mesh;
 
   PetscFunctionBeginUser;
+  mesh_name(step, sizeof(name), name);
+  mesh = H5Lexists(file, name, H5P_DEFAULT) > 0 ? H5Gopen2(file, name, H5P_DEFAULT) : -1;
   *ok = (PetscBool)(mesh >= 0);
   if (*ok) PetscCall(SbH5GetInt(mesh, "hash", hash, ok));
+  if (mesh >= 0) (void)H5Gclose(mesh);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The mesh of this run in an open file: that of its last re-meshing, or the first one. ok is false when it is another one. */
+static PetscErrorCode find_mesh(SbRun run, SbOutput out, hid_t file, PetscInt *step, PetscBool *ok)
+{
+  int64_t hash = 0;
+
+  PetscFunctionBeginUser;
+  *step = SbOutputMeshStep(run);
+  PetscCall(mesh_hash(file, *step, &hash, ok));
+  if (*step && (!*ok || (uint64_t)hash != out->mesh_hash)) {
+    *step = 0;
+    PetscCall(mesh_hash(file, 0, &hash, ok));
+  }
+  *ok = (PetscBool)(*ok && (uint64_t)hash == out->mesh_hash);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The index of frames that come next is of this mesh of the file. Rank 0. */
+static PetscErrorCode index_mesh(SbFrames fr, PetscInt step)
+{
+  char name[32];
+  hid_t mesh;
+
+  PetscFunctionBeginUser;
+  mesh_name(step, sizeof(name), name);
+  mesh = H5Gopen2(fr->h5.file, name, H5P_DEFAULT);
+  PetscCall(SbXdmfSetMesh(fr->xdmf, name, (PetscInt)SbH5Rows(mesh, "x"), (PetscInt)SbH5Rows(mesh, "cells"),
+                          (PetscBool)(SbH5Rows(mesh, "rank") > 0)));
   if (mesh >= 0) (void)H5Gclose(mesh);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -345,15 +395,14 @@ static PetscErrorCode resume(SbRun run, SbOutput out, const char *path, PetscBoo
 {
   SbFrames fr = out->frames;
   SbFrame *frames;
-  int64_t hash = 0;
   char message[SB_MESSAGE_MAX] = "";
 
   PetscFunctionBeginUser;
   PetscCall(SbH5Open(out->comm, path, PETSC_TRUE, &fr->h5, ok));
   if (!*ok) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(mesh_hash(fr->h5.file, &hash, ok));
+  PetscCall(find_mesh(run, out, fr->h5.file, &fr->mesh, ok));
   fr->top = H5Gopen2(fr->h5.file, "step", H5P_DEFAULT);
-  if (!*ok || fr->top < 0 || (uint64_t)hash != out->mesh_hash) {
+  if (!*ok || fr->top < 0) {
     *ok = PETSC_FALSE;
     if (fr->top >= 0) (void)H5Gclose(fr->top);
     PetscCall(SbH5Close(&fr->h5));
@@ -366,10 +415,12 @@ static PetscErrorCode resume(SbRun run, SbOutput out, const char *path, PetscBoo
   if (fr->nframe) fr->last_step = frames[fr->nframe - 1].step;
   // The index first, so that it never names a frame that is gone.
   for (PetscInt i = 0; fr->xdmf && i < fr->nframe; i++) {
+    if (frames[i].mesh != (i ? frames[i - 1].mesh : fr->mesh)) PetscCall(index_mesh(fr, frames[i].mesh));
     PetscCall(SbXdmfAdd(fr->xdmf, frames[i].time, frames[i].group, frames[i].nfield, frames[i].field,
                         frames[i].bytes));
     PetscCall(SbContactsList(out, frames[i].time, frames[i].group, frames[i].nplace, frames[i].place_bytes));
   }
+  if (fr->xdmf && fr->nframe && frames[fr->nframe - 1].mesh != fr->mesh) PetscCall(index_mesh(fr, fr->mesh));
   if (fr->xdmf) SbXdmfWrite(fr->xdmf, sizeof(message), message);
   if (fr->xdmf && !message[0]) SbContactsIndex(out, sizeof(message), message);
   PetscCall(PetscFree(frames));
@@ -383,7 +434,7 @@ PetscErrorCode SbFramesCheck(SbRun run, SbOutput out)
 {
   SbH5 h;
   char path[PETSC_MAX_PATH_LEN];
-  int64_t hash = 0;
+  PetscInt step;
   PetscBool ok, corners;
 
   PetscFunctionBeginUser;
@@ -394,11 +445,11 @@ PetscErrorCode SbFramesCheck(SbRun run, SbOutput out)
   if (!ok) PetscFunctionReturn(PETSC_SUCCESS);
   corners = (PetscBool)(H5Lexists(h.file, "mesh", H5P_DEFAULT) > 0 &&
                         H5Lexists(h.file, "mesh/vertices", H5P_DEFAULT) > 0);
-  PetscCall(mesh_hash(h.file, &hash, &ok));
+  PetscCall(find_mesh(run, out, h.file, &step, &ok));
   PetscCall(SbH5Close(&h));
   // Frames of another mesh are replaced.
   PetscCheck(
-    !ok || (uint64_t)hash != out->mesh_hash || corners == out->discontinuous, out->comm, PETSC_ERR_USER_INPUT,
+    !ok || corners == out->discontinuous, out->comm, PETSC_ERR_USER_INPUT,
     "-output_discontinuous is %s, but the frames in %s were written with %s: go on with the same, or give "
     "another -output_dir",
     out->discontinuous ? "true" : "false", path, corners ? "true" : "false");
@@ -424,24 +475,54 @@ static PetscErrorCode create(SbRun run, SbOutput out, const char *path)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* What depends on the mesh. */
 static PetscErrorCode allocate(SbRun run, SbOutput out)
 {
   SbFrames fr = out->frames;
   const PetscInt nowned = PetscMax(3 * out->point.nowned, 6 * out->cell.nowned);
   const PetscInt nslice = PetscMax(3 * out->point.n, 6 * out->cell.n);
-  PetscBool rank = PETSC_FALSE;
-  char path[PETSC_MAX_PATH_LEN];
 
   PetscFunctionBeginUser;
   PetscCall(PetscMalloc1(nowned, &fr->owned));
   PetscCall(PetscMalloc1(nslice, &fr->slice));
   if (!out->precise) PetscCall(PetscMalloc((size_t)nslice * sizeof(float), &fr->packed));
   PetscCall(SbFieldPrepare(run, out));
-  if (out->rank) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode free_work(SbFrames fr)
+{
+  PetscFunctionBeginUser;
+  PetscCall(PetscFree(fr->owned));
+  PetscCall(PetscFree(fr->slice));
+  PetscCall(PetscFree(fr->packed));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The index of frames that come next is of the mesh that the run has. */
+static PetscErrorCode index_own_mesh(SbOutput out)
+{
+  SbFrames fr = out->frames;
+  PetscBool rank = PETSC_FALSE;
+  char name[32];
+
+  PetscFunctionBeginUser;
+  if (!fr->xdmf) PetscFunctionReturn(PETSC_SUCCESS);
   for (PetscInt i = 0; i < out->nfield; i++) rank = (PetscBool)(rank || !strcmp(out->field[i]->name, "rank"));
+  mesh_name(fr->mesh, sizeof(name), name);
+  PetscCall(SbXdmfSetMesh(fr->xdmf, name, out->point.N, out->cell.N, rank));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode create_index(SbOutput out)
+{
+  char path[PETSC_MAX_PATH_LEN];
+
+  PetscFunctionBeginUser;
+  if (out->rank) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(SbOutputPath(out, "fields.xmf", sizeof(path), path));
-  PetscCall(SbXdmfCreate(path, &fr->xdmf));
-  PetscCall(SbXdmfSetMesh(fr->xdmf, out->point.N, out->cell.N, rank));
+  PetscCall(SbXdmfCreate(path, &out->frames->xdmf));
+  PetscCall(index_own_mesh(out));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -459,10 +540,26 @@ PetscErrorCode SbFramesAttach(SbRun run, SbOutput out)
   out->frames->last_step = -1;
   PetscCall(SbOutputOrder(run, out));
   PetscCall(allocate(run, out));
+  PetscCall(create_index(out));
   PetscCall(SbContactsCreate(run, out));
   PetscCall(SbOutputPath(out, "fields.h5", sizeof(path), path));
   if (out->restarted) PetscCall(resume(run, out, path, &resumed));
   if (!resumed) PetscCall(create(run, out, path));
+  PetscCall(SbRunAddMonitor(run, monitor, out, NULL));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbFramesFollow(SbRun run, SbOutput out)
+{
+  PetscFunctionBeginUser;
+  if (!out->frames) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(free_work(out->frames));
+  PetscCall(allocate(run, out));
+  if (out->places) run->want_residual = PETSC_TRUE;
+  out->frames->mesh = run->step0;
+  PetscCall(write_mesh(run, out));
+  PetscCall(SbH5Flush(&out->frames->h5));
+  PetscCall(index_own_mesh(out));
   PetscCall(SbRunAddMonitor(run, monitor, out, NULL));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -486,9 +583,7 @@ PetscErrorCode SbFramesDestroy(SbOutput out)
   PetscCall(SbFramesClose(out));
   PetscCall(SbContactsDestroy(out));
   PetscCall(SbXdmfDestroy(&out->frames->xdmf));
-  PetscCall(PetscFree(out->frames->owned));
-  PetscCall(PetscFree(out->frames->slice));
-  PetscCall(PetscFree(out->frames->packed));
+  PetscCall(free_work(out->frames));
   PetscCall(PetscFree(out->frames));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

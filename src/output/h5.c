@@ -289,6 +289,21 @@ static PetscErrorCode put(SbH5 *h, hid_t where, const char *name, hid_t filetype
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscInt64 SbH5Rows(hid_t where, const char *name)
+{
+  const hid_t set =
+    where >= 0 && H5Lexists(where, name, H5P_DEFAULT) > 0 ? H5Dopen2(where, name, H5P_DEFAULT) : -1;
+  hsize_t n[2] = {0, 0};
+  hid_t space;
+
+  if (set < 0) return 0;
+  space = H5Dget_space(set);
+  if (H5Sget_simple_extent_ndims(space) <= 2) (void)H5Sget_simple_extent_dims(space, n, NULL);
+  (void)H5Sclose(space);
+  (void)H5Dclose(set);
+  return (PetscInt64)n[0];
+}
+
 PetscErrorCode SbH5PutReal(SbH5 *h, hid_t where, const char *name, PetscReal value)
 {
   PetscFunctionBeginUser;

@@ -326,6 +326,17 @@ PetscErrorCode SbHistoryAttach(SbRun run, SbOutput out)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscErrorCode SbHistoryFollow(SbRun run, SbOutput out)
+{
+  PetscFunctionBeginUser;
+  if (!out->hist) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(SbProbesFind(run, out));
+  run->want_energies = PETSC_TRUE;
+  if (run->model->nhistory) run->want_residual = PETSC_TRUE;
+  PetscCall(SbRunAddMonitor(run, monitor, out, NULL));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode SbHistoryDestroy(SbOutput out)
 {
   SbHistory h = out->hist;

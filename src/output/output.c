@@ -291,7 +291,8 @@ static PetscErrorCode keep_identity(SbRun run, SbOutput out, const char *text)
     for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(prefix); i++) {
       if (strncmp(line, prefix[i], strlen(prefix[i]))) continue;
       // The mesh itself is compared, not the name of its file.
-      if (!memmem(line, strcspn(line, " \n"), "_mesh", 5))
+      if (!memmem(line, strcspn(line, " \n"), "_mesh", 5) &&
+          !memmem(line, strcspn(line, " \n"), "_remesh_", 8))
         n += (size_t)sprintf(out->identity + n, "%.*s\n", length, line);
       break;
     }
@@ -346,20 +347,10 @@ static PetscErrorCode destroy(SbRun run)
   PetscCall(SbFramesDestroy(out));
   PetscCall(SbHistoryDestroy(out));
   PetscCall(SbProgressDestroy(out));
-  if (out->ordered) {
-    PetscCall(SbOrderDestroy(&out->vertex));
-    PetscCall(SbOrderDestroy(&out->cell));
-    PetscCall(SbOrderDestroy(&out->node));
-    PetscCall(SbOrderDestroy(&out->point));
-  }
+  PetscCall(SbOutputForgetMesh(out));
   PetscCall(PetscFree(out->probe));
   PetscCall(PetscFree(out->identity));
-  PetscCall(PetscFree(out->sigma));
-  PetscCall(PetscFree(out->J));
-  PetscCall(PetscFree(out->psi));
-  PetscCall(PetscFree(out->pressure));
-  PetscCall(PetscFree(out->body_nodes));
-  PetscCall(SbPointsDestroy(out));
+  PetscCall(PetscFree(out->remeshed));
   PetscCall(PetscFree(run->output));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -391,7 +382,7 @@ PetscErrorCode SbOutputSetFromOptions(SbRun run)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode count_nodes(SbSpace space, SbOutput out)
+PetscErrorCode SbOutputCountNodes(SbSpace space, SbOutput out)
 {
   PetscMPIInt n;
 
@@ -428,7 +419,7 @@ PetscErrorCode SbOutputAttach(SbRun run)
   PetscFunctionBeginUser;
   PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_OUTPUT], 0, 0, 0, 0));
   PetscCall(name_events(out));
-  PetscCall(count_nodes(run->model->space, out));
+  PetscCall(SbOutputCountNodes(run->model->space, out));
   PetscCall(view_scenario(run, out, &scenario, &size));
   // A checkpoint that is refused leaves the folder as it was.
   if (out->restart[0]) PetscCall(SbCheckpointLoad(run, out->restart));

@@ -63,6 +63,8 @@ PetscErrorCode SbH5WriteSlice(SbH5 *h, hid_t where, const char *name, const char
 /* The slice of such a dataset as doubles; ok is false when it is missing, has another shape or cannot be read. Collective. */
 PetscErrorCode SbH5ReadSlice(SbH5 *h, const char *name, const SbOrder *order, PetscInt ncomp,
                              PetscReal slice[], PetscBool *ok);
+/* Rows of a dataset [n] or [n][m]; 0 when it is not there or another one. Not collective. */
+PetscInt64 SbH5Rows(hid_t where, const char *name);
 PetscErrorCode SbH5PutReal(SbH5 *h, hid_t where, const char *name, PetscReal value);
 PetscErrorCode SbH5PutInt(SbH5 *h, hid_t where, const char *name, int64_t value);
 PetscErrorCode SbH5PutText(SbH5 *h, hid_t where, const char *name, const char *text);
@@ -163,14 +165,21 @@ struct _p_SbOutput {
   SbHistory hist;
   SbProgress line;
   char started[32]; /* date and time */
+  PetscInt nremeshed, remeshed_size;
+  SbRemeshed *remeshed; /* [nremeshed] for run.json */
 };
 
 /* Path of a file of the run's folder. */
 PetscErrorCode SbOutputPath(SbOutput out, const char *name, size_t size, char path[]);
 /* Whether a multiple of `every` lies in (t - dt, t]. */
 PetscBool SbOutputDue(PetscReal every, PetscReal t, PetscReal dt);
+/* The step after which a body was re-meshed last, 0: none was. Not collective. */
+PetscInt SbOutputMeshStep(SbRun run);
 /* Original orders and the mesh's hash; made once. Collective. */
 PetscErrorCode SbOutputOrder(SbRun run, SbOutput out);
+/* follow.c: frees what belongs to the mesh: orders, points, cell quantities, counts. */
+PetscErrorCode SbOutputForgetMesh(SbOutput out);
+PetscErrorCode SbOutputCountNodes(SbSpace space, SbOutput out); /* collective */
 
 PetscErrorCode SbFieldFind(const char *name, const SbField **field);
 PetscErrorCode SbFieldPrepare(SbRun run, SbOutput out); /* storage for the cell quantities */
@@ -189,6 +198,8 @@ void SbPointsVertex(SbRun run, SbOutput out, PetscInt vertex, const PetscReal x[
 /* Before the folder is touched: refuses to go on with frames that have other points. Collective. */
 PetscErrorCode SbFramesCheck(SbRun run, SbOutput out);
 PetscErrorCode SbFramesAttach(SbRun run, SbOutput out);
+/* The same output goes on with the run of another mesh, as does that of the functions below. Collective. */
+PetscErrorCode SbFramesFollow(SbRun run, SbOutput out);
 PetscErrorCode SbFramesClose(SbOutput out);
 PetscErrorCode SbFramesDestroy(SbOutput out);
 /* contacts.c; without -output_contacts they only keep, after a restart, what is in the index. */
@@ -207,6 +218,7 @@ PetscErrorCode SbContactsList(SbOutput out, PetscReal time, const char *frame, P
 void SbContactsIndex(SbOutput out, size_t nmessage, char message[]);
 PetscErrorCode SbContactsRemoveIndex(SbOutput out);
 PetscErrorCode SbHistoryAttach(SbRun run, SbOutput out);
+PetscErrorCode SbHistoryFollow(SbRun run, SbOutput out);
 PetscErrorCode SbHistoryDestroy(SbOutput out);
 PetscErrorCode SbProbesFind(SbRun run, SbOutput out);
 /* checkpoint_effects.c: records of an effect's state, of all ranks, as a file has them. */
@@ -224,11 +236,20 @@ PetscErrorCode SbCheckpointFreeEffects(SbRun run, SbRecords records[]);
 /* A number at a place, as 64 mixed bits. */
 uint64_t SbMixReal(uint64_t place, PetscReal value);
 
+/* checkpoint_mesh.c: the meshes of bodies that were re-meshed, as they are in memory. Writes them; sum is raised by their checksum. Collective. */
+PetscErrorCode SbCheckpointWriteMeshes(SbRun run, SbH5 *h, uint64_t *sum);
+/* Their checksum in an open file, 0 without any; ok turns false when they cannot be read. Collective. */
+PetscErrorCode SbCheckpointSumMeshes(SbRun run, SbH5 *h, uint64_t *sum, PetscBool *ok);
+/* Bytes that they take, for messages. Collective. */
+PetscErrorCode SbCheckpointMeshBytes(SbRun run, PetscInt64 *bytes);
+/* Path of the checkpoint that -restart names; of `latest` the k-th newest one, "" when there is none. Collective. */
+PetscErrorCode SbCheckpointFind(SbOutput out, const char *file, int k, size_t size, char path[]);
 PetscErrorCode SbCheckpointAttach(SbRun run, SbOutput out);
 PetscErrorCode SbCheckpointRemoveAfter(SbOutput out, PetscInt step); /* rank 0 */
 typedef PetscErrorCode (*SbFileFn)(const char *name, PetscInt64 bytes, void *ctx);
 PetscErrorCode SbCheckpointFiles(SbOutput out, SbFileFn fn, void *ctx);
 PetscErrorCode SbProgressAttach(SbRun run, SbOutput out);
+PetscErrorCode SbProgressFollow(SbRun run, SbOutput out);
 PetscErrorCode SbProgressEnd(SbOutput out); /* ends a line that is being rewritten */
 PetscErrorCode SbProgressDestroy(SbOutput out);
 PetscErrorCode SbRunJson(SbRun run, SbOutput out, const char *status, const char *reason); /* collective */
@@ -236,8 +257,9 @@ PetscErrorCode SbRunJson(SbRun run, SbOutput out, const char *status, const char
 /* xdmf.c: an index of fields.h5, on rank 0. */
 typedef struct _p_SbXdmf *SbXdmf;
 PetscErrorCode SbXdmfCreate(const char *path, SbXdmf *x);
-/* The mesh of SbXdmfAdd(). */
-PetscErrorCode SbXdmfSetMesh(SbXdmf x, PetscInt npoint, PetscInt ncell, PetscBool with_rank);
+/* The mesh of SbXdmfAdd() from now on: its group in fields.h5, without the first slash. */
+PetscErrorCode SbXdmfSetMesh(SbXdmf x, const char *group, PetscInt npoint, PetscInt ncell,
+                             PetscBool with_rank);
 PetscErrorCode SbXdmfDestroy(SbXdmf *x);
 PetscErrorCode SbXdmfRemove(SbXdmf x); /* the file, if there is one */
 /* Adds a frame: its group in fields.h5 and its fields. */

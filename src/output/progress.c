@@ -71,6 +71,8 @@ static PetscErrorCode monitor(SbRun run, const SbStep *step, void *ctx)
   char line[160];
 
   PetscFunctionBeginUser;
+  if (p->titled && step->step == run->step0)
+    PetscFunctionReturn(PETSC_SUCCESS); /* it was told before a re-meshing */
   if (!p->titled) {
     p->titled = PETSC_TRUE;
     p->t_start = step->t;
@@ -104,6 +106,15 @@ PetscErrorCode SbProgressAttach(SbRun run, SbOutput out)
   out->line->terminal = is_terminal();
   out->line->event = out->event.progress;
   PetscCall(SbRunAddMonitor(run, monitor, out->line, NULL));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbProgressFollow(SbRun run, SbOutput out)
+{
+  PetscFunctionBeginUser;
+  if (!out->progress || out->quiet) PetscFunctionReturn(PETSC_SUCCESS);
+  run->want_energies = PETSC_TRUE;
+  if (out->line) PetscCall(SbRunAddMonitor(run, monitor, out->line, NULL));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

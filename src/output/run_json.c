@@ -148,6 +148,31 @@ static PetscErrorCode put_costs(FILE *f, SbRun run, SbOutput out, const SbPhases
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+static void put_remeshed(FILE *f, const SbOutput out)
+{
+  if (!out->nremeshed) return;
+  (void)fprintf(f, "  \"remeshed\": [");
+  for (PetscInt i = 0; i < out->nremeshed; i++) {
+    const SbRemeshed *r = &out->remeshed[i];
+
+    (void)fprintf(f, "%s\n    {\"body\": ", i ? "," : "");
+    put_string(f, r->body);
+    (void)fprintf(f, ", \"step\": %" PetscInt_FMT ", ", r->step);
+    put_real(f, "time", r->t, ", ");
+    (void)fprintf(f,
+                  "\"tets\": [%" PetscInt_FMT ", %" PetscInt_FMT "], \"vertices\": [%" PetscInt_FMT
+                  ", %" PetscInt_FMT "], \"vertices_moved\": %" PetscInt_FMT ",\n     ",
+                  r->tets[0], r->tets[1], r->vertices[0], r->vertices[1], r->moved);
+    put_real(f, "quality_before", r->quality[0], ", ");
+    put_real(f, "quality_after", r->quality[1], ", ");
+    put_real(f, "energy_before", r->energy[0], ", ");
+    put_real(f, "energy_after", r->energy[1], ",\n     ");
+    put_real(f, "rigid_speed", r->speed, ", ");
+    put_real(f, "centre_shift", r->shift, "}");
+  }
+  (void)fprintf(f, "\n  ],\n");
+}
+
 /* The whole text, on one rank; phases is NULL when nothing was timed. */
 static PetscErrorCode write_json(SbRun run, SbOutput out, const char *status, const char *reason,
                                  const SbPhases *phases, size_t nmessage, char message[])
@@ -168,6 +193,7 @@ static PetscErrorCode write_json(SbRun run, SbOutput out, const char *status, co
   put_text(f, "scenario", out->scenario);
   put_bodies(f, run->model, out);
   PetscCall(put_settings(f, run));
+  put_remeshed(f, out);
   if (phases) PetscCall(put_costs(f, run, out, phases));
   put_text(f, "reason", reason);
   (void)fprintf(f, "  \"status\": \"%s\"\n}\n", status);

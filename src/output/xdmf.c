@@ -15,7 +15,7 @@
 struct _p_SbXdmf {
   char path[PETSC_MAX_PATH_LEN];
   PetscInt npoint, ncell;
-  char mesh[1024]; /* topology, geometry and constant arrays: the same in every frame */
+  char mesh[1024]; /* topology, geometry and constant arrays of the frames that come next */
   char *text;      /* [size] frames so far; capacity grows by doubling */
   size_t size, capacity;
 };
@@ -28,7 +28,8 @@ PetscErrorCode SbXdmfCreate(const char *path, SbXdmf *x)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbXdmfSetMesh(SbXdmf xdmf, PetscInt npoint, PetscInt ncell, PetscBool with_rank)
+PetscErrorCode SbXdmfSetMesh(SbXdmf xdmf, const char *group, PetscInt npoint, PetscInt ncell,
+                             PetscBool with_rank)
 {
   const char *numbers[2] = {"body", "rank"};
   size_t n;
@@ -40,18 +41,18 @@ PetscErrorCode SbXdmfSetMesh(SbXdmf xdmf, PetscInt npoint, PetscInt ncell, Petsc
     xdmf->mesh, sizeof(xdmf->mesh),
     "<Topology TopologyType=\"Tetrahedron\" NumberOfElements=\"%" PetscInt_FMT "\">"
     "<DataItem Dimensions=\"%" PetscInt_FMT " 4\" NumberType=\"Int\" Precision=\"4\" Format=\"HDF\">"
-    "fields.h5:/mesh/cells</DataItem></Topology>\n"
+    "fields.h5:/%s/cells</DataItem></Topology>\n"
     "<Geometry GeometryType=\"XYZ\">"
     "<DataItem Dimensions=\"%" PetscInt_FMT " 3\" NumberType=\"Float\" Precision=\"8\" Format=\"HDF\">"
-    "fields.h5:/mesh/x</DataItem></Geometry>\n",
-    ncell, ncell, npoint);
+    "fields.h5:/%s/x</DataItem></Geometry>\n",
+    ncell, ncell, group, npoint, group);
   for (int i = 0; i < (with_rank ? 2 : 1); i++) {
     n += (size_t)snprintf(xdmf->mesh + n, sizeof(xdmf->mesh) - n,
                           "<Attribute Name=\"%s\" AttributeType=\"Scalar\" Center=\"Cell\">"
                           "<DataItem Dimensions=\"%" PetscInt_FMT
                           "\" NumberType=\"Int\" Precision=\"4\" Format=\"HDF\">"
-                          "fields.h5:/mesh/%s</DataItem></Attribute>\n",
-                          numbers[i], ncell, numbers[i]);
+                          "fields.h5:/%s/%s</DataItem></Attribute>\n",
+                          numbers[i], ncell, group, numbers[i]);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -19,6 +19,7 @@ PetscErrorCode SbRegisterAll(void)
   PetscCall(SbTimeRegister());
   PetscCall(SbOutputRegister());
   PetscCall(SbLedgerRegister());
+  PetscCall(SbRemeshRegister());
   PetscCall(SbErrorRegister());
   PetscCall(SbCommandRegister());
 

@@ -139,8 +139,8 @@ static PetscErrorCode account(SbRun run, PetscReal t, PetscReal dt, PetscBool fi
     e->damping_loss += 0.5 * dt * (power + run->damping_power);
   } else if (run->step0 == 0)
     run->energy_start = e->kinetic + e->strain;
-  e->integrator_loss =
-    run->energy_start + e->load_work + e->drive_work - e->damping_loss - e->kinetic - e->strain;
+  e->integrator_loss = run->energy_start + e->load_work + e->drive_work - e->damping_loss - e->remesh_loss -
+                       e->kinetic - e->strain;
   run->damping_power = power;
   PetscCall(VecDestroy(&run->loads));
   PetscCall(VecDestroy(&run->reaction));
@@ -158,6 +158,8 @@ PetscErrorCode SbRunStepAccepted(SbRun run, PetscInt step, PetscReal t, PetscRea
     .step = step, .t = t, .dt = dt, .t_end = run->t_end, .U = run->U, .V = run->V, .A = run->A, .last = last};
 
   PetscFunctionBeginUser;
+  run->step_now = step;
+  run->t_now = t;
   if (!first) PetscCall(accept_effects(run, step, t, dt));
   if (run->want_energies)
     PetscCall(account(run, t, dt, first));

@@ -249,12 +249,12 @@ static PetscErrorCode step_accepted(TS ts, PetscInt step, PetscReal t, Vec U, vo
   PetscCall(TSGetStepRejections(ts, &rejected));
   PetscCall(TSGetPrevTime(ts, &previous));
   PetscCall(TSGetConvergedReason(ts, &reason));
-  run->newton_step = newton - run->newton_total;
-  run->linear_step = linear - run->linear_total;
+  run->newton_step = newton + run->newton_before - run->newton_total;
+  run->linear_step = linear + run->linear_before - run->linear_total;
   run->rejected_step = rejected - run->rejected_seen;
   run->rejected_seen = rejected;
   PetscCall(SbRunStepAccepted(run, step, t, step == run->step0 ? 0. : t - previous,
-                              (PetscBool)(reason > 0 || t >= run->t_end * (1. - 1e-12))));
+                              (PetscBool)((reason > 0 && !run->paused) || t >= run->t_end * (1. - 1e-12))));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -536,7 +536,8 @@ PetscErrorCode SbRunAddMonitor(SbRun run, SbMonitorFn fn, void *ctx, PetscErrorC
 PetscErrorCode SbRunSolve(SbRun run)
 {
   PetscFunctionBeginUser;
-  run->wall_start = MPI_Wtime();
+  if (run->wall_start == 0.) run->wall_start = MPI_Wtime();
+  run->paused = PETSC_FALSE;
   if (run->ts) {
     PetscCall(TSSetStepNumber(run->ts, run->step0));
     PetscCall(TSSetTime(run->ts, run->t0));

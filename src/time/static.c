@@ -177,8 +177,11 @@ PetscErrorCode SbStaticSolve(SbRun run)
     }
     run->stop_reason[0] = 0;
     PetscCall(VecCopy(X, run->U));
+    if (run->after.fn && next < 1.)
+      PetscCall((*run->after.fn)(run, step + 1, next, next - factor, run->after.ctx, &run->paused));
     PetscCall(SbRunStepAccepted(run, ++step, next, next - factor, (PetscBool)(next >= 1.)));
     run->newton_step = run->linear_step = run->rejected_step = 0;
+    if (run->paused) break;
     factor = next;
     cuts = 0;
     length = PetscMin(2. * length, nominal);

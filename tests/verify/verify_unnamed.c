@@ -188,7 +188,7 @@ static PetscErrorCode scene_text(const char *mesh, const char *scene, const char
 static PetscErrorCode check_part(const Part *part, const char *base, const Trace *reference)
 {
   const PetscBool output = (PetscBool)(!strcmp(part->family, "output") || !strcmp(part->family, "field") ||
-                                       !strcmp(part->family, "estimator"));
+                                       !strcmp(part->family, "estimator") || !strcmp(part->family, "remesh"));
   Trace without, with, after;
   char text[PART_TEXT];
 

@@ -1,0 +1,269 @@
+/*
+  Meshes in checkpoints. A body that was re-meshed has no file any more: its mesh is in the checkpoint, as the group `mesh_<body>` with the arrays of
+  SbGiven, written by rank 0. A restart takes it from there before the scene is set up; the mesh of the other bodies comes from their files.
+*/
+#include <unistd.h>
+#include "output_impl.h"
+
+#define SALT 0x6d657368u
+
+/* The arrays of a mesh in memory; on ranks other than 0 they are empty. */
+typedef struct {
+  const char *name;
+  PetscInt n, ncomp; /* n of all ranks */
+  hid_t filetype, memtype;
+  void *data;
+} Array;
+
+#define NARRAY 6
+static void arrays_of(SbGiven *g, const PetscInt count[3], Array a[NARRAY])
+{
+  const hid_t whole = sizeof(PetscInt) == 8 ? H5T_NATIVE_INT64 : H5T_NATIVE_INT32;
+
+  a[0] = (Array){"x", count[0], 3, H5T_IEEE_F64LE, H5T_NATIVE_DOUBLE, g->x};
+  a[1] = (Array){"cells", count[1], 4, H5T_STD_I64LE, whole, g->cell};
+  a[2] = (Array){"triangles", count[2], 3, H5T_STD_I64LE, whole, g->tri};
+  a[3] = (Array){"vertex_sets", count[0], 1, H5T_STD_U64LE, H5T_NATIVE_UINT64, g->vert_set};
+  a[4] = (Array){"cell_sets", count[1], 1, H5T_STD_U64LE, H5T_NATIVE_UINT64, g->cell_set};
+  a[5] = (Array){"triangle_sets", count[2], 1, H5T_STD_U64LE, H5T_NATIVE_UINT64, g->tri_set};
+}
+
+/* Sum of places and values, so that damage is seen. */
+static uint64_t sum_of(const SbGiven *g)
+{
+  uint64_t sum = SALT;
+
+  for (PetscInt i = 0; i < 3 * g->nvert; i++) sum += SbMixReal((uint64_t)i, g->x[i]);
+  for (PetscInt i = 0; i < 4 * g->ncell; i++) sum += SbMixReal((uint64_t)i + SALT, (PetscReal)g->cell[i]);
+  for (PetscInt i = 0; i < 3 * g->ntri; i++)
+    sum += SbMixReal((uint64_t)i + 2 * (uint64_t)SALT, (PetscReal)g->tri[i]);
+  for (PetscInt i = 0; i < g->nvert; i++) sum += g->vert_set[i] * (uint64_t)(2 * i + 1);
+  for (PetscInt i = 0; i < g->ncell; i++) sum += g->cell_set[i] * (uint64_t)(2 * i + 1);
+  for (PetscInt i = 0; i < g->ntri; i++) sum += g->tri_set[i] * (uint64_t)(2 * i + 1);
+  return sum;
+}
+
+PetscErrorCode SbCheckpointMeshBytes(SbRun run, PetscInt64 *bytes)
+{
+  PetscFunctionBeginUser;
+  *bytes = 0;
+  for (PetscInt b = 0; b < run->model->nbody; b++) {
+    const SbBody *body = &run->model->body[b];
+
+    if (body->given && body->given->step)
+      *bytes +=
+        (PetscInt64)body->nvert * 32 + (PetscInt64)body->ncell * 40 + (PetscInt64)body->nfacet * 32 + 65536;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode write_mesh(SbH5 *h, SbOutput out, const char *body, SbGiven *g, uint64_t *sum)
+{
+  PetscInt count[3] = {g->nvert, g->ncell, g->ntri};
+  char name[2 * SB_NAME_MAX];
+  Array a[NARRAY];
+  hid_t group;
+
+  PetscFunctionBeginUser;
+  PetscCallMPI(MPI_Bcast(count, 3, MPIU_INT, 0, out->comm));
+  arrays_of(g, count, a);
+  PetscCall(PetscSNPrintf(name, sizeof(name), "mesh_%s", body));
+  PetscCall(SbH5GroupCreate(h, NARRAY, 16, &group));
+  PetscCall(SbH5PutInt(h, group, "step", g->step));
+  PetscCall(SbH5PutReal(h, group, "mass", g->mass));
+  PetscCall(SbH5PutReal(h, group, "bound", g->bound));
+  for (int k = 0; k < 3; k++)
+    PetscCall(SbH5PutInt(h, group, k == 0 ? "vertices" : k == 1 ? "tets" : "faces", count[k]));
+  for (int k = 0; k < NARRAY; k++) {
+    const SbOrder order = {.comm = out->comm,
+                           .each = 1,
+                           .N = a[k].n,
+                           .n = out->rank ? 0 : a[k].n,
+                           .start = out->rank ? a[k].n : 0};
+
+    if (!a[k].n) continue;
+    PetscCall(
+      SbH5WriteSlice(h, group, a[k].name, "SI", &order, a[k].ncomp, a[k].filetype, a[k].memtype, a[k].data));
+  }
+  PetscCall(SbH5GroupLink(h, group, h->file, name));
+  (void)H5Gclose(group);
+  if (!out->rank) *sum += sum_of(g);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbCheckpointWriteMeshes(SbRun run, SbH5 *h, uint64_t *sum)
+{
+  SbOutput out = (SbOutput)run->output;
+  uint64_t all = 0;
+
+  PetscFunctionBeginUser;
+  for (PetscInt b = 0; b < run->model->nbody; b++) {
+    SbBody *body = &run->model->body[b];
+
+    if (body->given && body->given->step) PetscCall(write_mesh(h, out, body->name, body->given, &all));
+  }
+  PetscCallMPI(MPI_Bcast(&all, 1, MPI_UINT64_T, 0, out->comm));
+  *sum += all;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ reading; one rank */
+
+static PetscErrorCode read_array(hid_t group, const Array *a, PetscBool *ok)
+{
+  hsize_t size[2] = {0, 0};
+  hid_t set, space;
+
+  PetscFunctionBeginUser;
+  if (!*ok || !a->n) PetscFunctionReturn(PETSC_SUCCESS);
+  set = H5Lexists(group, a->name, H5P_DEFAULT) > 0 ? H5Dopen2(group, a->name, H5P_DEFAULT) : -1;
+  *ok = (PetscBool)(set >= 0);
+  if (!*ok) PetscFunctionReturn(PETSC_SUCCESS);
+  space = H5Dget_space(set);
+  *ok =
+    (PetscBool)(H5Sget_simple_extent_ndims(space) <= 2 && H5Sget_simple_extent_dims(space, size, NULL) > 0 &&
+                size[0] == (hsize_t)a->n && (a->ncomp == 1 || size[1] == (hsize_t)a->ncomp));
+  if (*ok) *ok = (PetscBool)(H5Dread(set, a->memtype, H5S_ALL, H5S_ALL, H5P_DEFAULT, a->data) >= 0);
+  (void)H5Sclose(space);
+  (void)H5Dclose(set);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Numbers of vertices lie in their range: nothing else may be read beyond its end. */
+static PetscBool in_range(const SbGiven *g)
+{
+  for (PetscInt i = 0; i < 4 * g->ncell; i++) {
+    if (g->cell[i] < 0 || g->cell[i] >= g->nvert) return PETSC_FALSE;
+  }
+  for (PetscInt i = 0; i < 3 * g->ntri; i++) {
+    if (g->tri[i] < 0 || g->tri[i] >= g->nvert) return PETSC_FALSE;
+  }
+  return PETSC_TRUE;
+}
+
+/* The mesh of a body in an open file; NULL when it has none. */
+static PetscErrorCode read_mesh(hid_t file, const char *body, SbGiven **given, PetscBool *ok)
+{
+  static const char *const counts[3] = {"vertices", "tets", "faces"};
+  char name[2 * SB_NAME_MAX];
+  int64_t n[3] = {0, 0, 0}, step = 0;
+  PetscInt count[3];
+  PetscReal mass = 0., bound = 0.;
+  Array a[NARRAY];
+  hid_t group;
+
+  PetscFunctionBeginUser;
+  *given = NULL;
+  PetscCall(PetscSNPrintf(name, sizeof(name), "mesh_%s", body));
+  if (!*ok || H5Lexists(file, name, H5P_DEFAULT) <= 0) PetscFunctionReturn(PETSC_SUCCESS);
+  group = H5Gopen2(file, name, H5P_DEFAULT);
+  *ok = (PetscBool)(group >= 0);
+  if (!*ok) PetscFunctionReturn(PETSC_SUCCESS);
+  for (int k = 0; k < 3; k++) {
+    PetscCall(SbH5GetInt(group, counts[k], &n[k], ok));
+    *ok = (PetscBool)(*ok && n[k] >= 0 && n[k] < PETSC_MAX_INT / 8);
+  }
+  PetscCall(SbH5GetInt(group, "step", &step, ok));
+  PetscCall(SbH5GetReal(group, "mass", &mass, ok));
+  PetscCall(SbH5GetReal(group, "bound", &bound, ok));
+  for (int k = 0; k < 3; k++) count[k] = *ok ? (PetscInt)n[k] : 0;
+  /* a count that lies shows when its dataset has another one: nothing is allocated for it */
+  *ok = (PetscBool)(*ok && SbH5Rows(group, "x") == n[0] && SbH5Rows(group, "cells") == n[1] &&
+                    (!n[2] || SbH5Rows(group, "triangles") == n[2]));
+  if (*ok) {
+    PetscCall(SbGivenCreate(count[0], count[1], count[2], given));
+    (*given)->step = (PetscInt)step;
+    (*given)->mass = mass;
+    (*given)->bound = bound;
+    arrays_of(*given, count, a);
+    for (int k = 0; k < NARRAY; k++) PetscCall(read_array(group, &a[k], ok));
+    *ok = (PetscBool)(*ok && in_range(*given));
+    if (!*ok) PetscCall(SbGivenDestroy(given));
+  }
+  (void)H5Gclose(group);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbCheckpointSumMeshes(SbRun run, SbH5 *h, uint64_t *sum, PetscBool *ok)
+{
+  SbOutput out = (SbOutput)run->output;
+  struct {
+    uint64_t sum, ok;
+  } found = {0, 1};
+
+  PetscFunctionBeginUser;
+  for (PetscInt b = 0; b < run->model->nbody && !out->rank; b++) {
+    PetscBool good = PETSC_TRUE;
+    SbGiven *given;
+
+    PetscCall(read_mesh(h->file, run->model->body[b].name, &given, &good));
+    if (given) found.sum += sum_of(given);
+    if (!good) found.ok = 0;
+    PetscCall(SbGivenDestroy(&given));
+  }
+  PetscCallMPI(MPI_Bcast(&found, 2, MPI_UINT64_T, 0, out->comm));
+  *sum += found.sum;
+  *ok = (PetscBool)(*ok && found.ok);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* On rank 0: the meshes of one file; ok is false when it cannot be read. */
+static PetscErrorCode read_file(SbModel m, const char *path, SbGiven *given[], PetscBool *ok)
+{
+  hid_t file = -1;
+
+  PetscFunctionBeginUser;
+  *ok = PETSC_FALSE;
+  if (access(path, R_OK)) PetscFunctionReturn(PETSC_SUCCESS);
+  H5E_BEGIN_TRY file = H5Fopen(path, H5F_ACC_RDONLY, H5P_DEFAULT);
+  H5E_END_TRY
+  if (file < 0) PetscFunctionReturn(PETSC_SUCCESS);
+  *ok = PETSC_TRUE;
+  for (PetscInt b = 0; b < m->nbody; b++) PetscCall(read_mesh(file, m->body[b].name, &given[b], ok));
+  (void)H5Fclose(file);
+  for (PetscInt b = 0; b < m->nbody && !*ok; b++) PetscCall(SbGivenDestroy(&given[b]));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* All ranks know which bodies have a mesh of their own, and its numbers. */
+static PetscErrorCode share(SbModel m, SbOutput out, SbGiven *given[])
+{
+  PetscFunctionBeginUser;
+  for (PetscInt b = 0; b < m->nbody; b++) {
+    PetscReal numbers[2] = {given[b] ? given[b]->mass : 0., given[b] ? given[b]->bound : 0.};
+    PetscInt whole[2] = {given[b] ? 1 : 0, given[b] ? given[b]->step : 0};
+
+    PetscCallMPI(MPI_Bcast(numbers, 2, MPIU_REAL, 0, out->comm));
+    PetscCallMPI(MPI_Bcast(whole, 2, MPIU_INT, 0, out->comm));
+    if (!whole[0]) continue;
+    if (out->rank) PetscCall(SbGivenCreate(0, 0, 0, &given[b]));
+    given[b]->mass = numbers[0];
+    given[b]->bound = numbers[1];
+    given[b]->step = whole[1];
+    m->body[b].given = given[b];
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbOutputRestoreMeshes(SbRun run)
+{
+  SbOutput out = (SbOutput)run->output;
+  const SbModel m = run->model;
+  const PetscBool latest = (PetscBool)!strcmp(out->restart, "latest");
+  char path[PETSC_MAX_PATH_LEN];
+  SbGiven **given;
+  PetscBool ok = PETSC_FALSE;
+
+  PetscFunctionBeginUser;
+  if (!out->restart[0]) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscCalloc1(m->nbody, &given));
+  for (int k = 0; !ok && (latest || !k); k++) {
+    PetscCall(SbCheckpointFind(out, out->restart, k, sizeof(path), path));
+    if (!path[0]) break;
+    if (!out->rank) PetscCall(read_file(m, path, given, &ok));
+    PetscCallMPI(MPI_Bcast(&ok, 1, SB_MPI_BOOL, 0, out->comm));
+  }
+  PetscCall(share(m, out, given));
+  PetscCall(PetscFree(given));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

@@ -1,0 +1,104 @@
+/*
+  The output of a run whose bodies were re-meshed: the folder, its files and their counts stay, and what belongs to the mesh is made anew.
+
+  The row and the frame of the step are there already, on the old mesh; the next ones are on the new one.
+*/
+#include "output_impl.h"
+
+PetscErrorCode SbOutputForgetMesh(SbOutput out)
+{
+  PetscFunctionBeginUser;
+  if (out->ordered) {
+    PetscCall(SbOrderDestroy(&out->vertex));
+    PetscCall(SbOrderDestroy(&out->cell));
+    PetscCall(SbOrderDestroy(&out->node));
+    PetscCall(SbOrderDestroy(&out->point));
+  }
+  out->ordered = PETSC_FALSE;
+  PetscCall(PetscFree(out->sigma));
+  PetscCall(PetscFree(out->J));
+  PetscCall(PetscFree(out->psi));
+  PetscCall(PetscFree(out->pressure));
+  PetscCall(PetscFree(out->body_nodes));
+  PetscCall(SbPointsDestroy(out));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscInt SbOutputMeshStep(SbRun run)
+{
+  PetscInt step = 0;
+
+  for (PetscInt b = 0; b < run->model->nbody; b++) {
+    const SbGiven *given = run->model->body[b].given;
+
+    if (given) step = PetscMax(step, given->step);
+  }
+  return step;
+}
+
+/* A probe inside a body has lost its vertex: it goes to the nearest one, and says so. */
+static PetscErrorCode follow_probes(SbOutput out, const SbProbe before[])
+{
+  PetscFunctionBeginUser;
+  for (PetscInt p = 0; p < out->nprobe; p++) {
+    const PetscReal *a = before[p].x, *b = out->probe[p].x;
+    const PetscReal d = PetscSqrtReal(PetscSqr(a[0] - b[0]) + PetscSqr(a[1] - b[1]) + PetscSqr(a[2] - b[2]));
+
+    if (d > 0.)
+      PetscCall(SbWarning(out->comm,
+                          "probe '%s' has moved by %.3g m at rest: its vertex inside a body that was "
+                          "re-meshed is gone, and it follows the nearest one",
+                          out->probe[p].name, (double)d));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbOutputFollow(SbRun from, SbRun to)
+{
+  SbOutput out = (SbOutput)from->output;
+  SbProbe *before;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_OUTPUT], 0, 0, 0, 0));
+  to->output = out;
+  to->output_destroy = from->output_destroy;
+  from->output = NULL;
+  from->output_destroy = NULL;
+  PetscCall(SbOutputForgetMesh(out));
+  PetscCall(SbOutputCountNodes(to->model->space, out));
+  PetscCall(SbOutputOrder(to, out));
+  PetscCall(PetscMalloc1(out->nprobe, &before));
+  PetscCall(PetscArraycpy(before, out->probe, out->nprobe));
+  PetscCall(SbFramesFollow(to, out));
+  PetscCall(SbHistoryFollow(to, out));
+  if (out->hist) PetscCall(follow_probes(out, before));
+  PetscCall(PetscFree(before));
+  PetscCall(SbCheckpointAttach(to, out));
+  PetscCall(SbProgressFollow(to, out));
+  PetscCall(PetscLogEventEnd(SbEvents[SB_EVENT_OUTPUT], 0, 0, 0, 0));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbReportRemeshed(SbRun run, const SbRemeshed *told)
+{
+  SbOutput out = (SbOutput)run->output;
+  const PetscReal change = told->energy[1] - told->energy[0];
+
+  PetscFunctionBeginUser;
+  if (!out) PetscFunctionReturn(PETSC_SUCCESS);
+  if (out->nremeshed == out->remeshed_size) {
+    out->remeshed_size = PetscMax(8, 2 * out->remeshed_size);
+    PetscCall(PetscRealloc((size_t)out->remeshed_size * sizeof(*told), &out->remeshed));
+  }
+  out->remeshed[out->nremeshed++] = *told;
+  if (out->quiet) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(SbProgressEnd(out));
+  PetscCall(
+    PetscPrintf(out->comm,
+                "body '%s' is re-meshed after step %" PetscInt_FMT ", t = %g%s: worst quality %.3g -> %.3g, "
+                "%" PetscInt_FMT " -> %" PetscInt_FMT " tets, energy %+.3g J (%+.2g %%)\n",
+                told->body, told->step, (double)told->t, run->model->dynamic ? " s" : "",
+                (double)told->quality[0], (double)told->quality[1], told->tets[0], told->tets[1],
+                (double)change, (double)(told->energy[0] > 0. ? 100. * change / told->energy[0] : 0.)));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

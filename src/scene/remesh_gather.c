@@ -1,0 +1,255 @@
+/*
+  A scene with its state from all ranks to rank 0, and back.
+
+  A star forest joins the cells of each rank (leaves) with their places on rank 0 (roots), by their original numbers. With a cell travel its vertices, its
+  sets, and the values of the vectors at its nodes: so every element is carried alike, and a node that several cells share
+  comes with each of them.
+*/
+#include "remesh_impl.h"
+
+static PetscErrorCode forest(MPI_Comm comm, PetscInt N, PetscInt n, const PetscInt original[], PetscSF *sf)
+{
+  PetscSFNode *root;
+  PetscMPIInt rank;
+
+  PetscFunctionBeginUser;
+  PetscCallMPI(MPI_Comm_rank(comm, &rank));
+  PetscCall(PetscMalloc1(n, &root));
+  for (PetscInt i = 0; i < n; i++) root[i] = (PetscSFNode){.rank = 0, .index = original[i]};
+  PetscCall(PetscSFCreate(comm, sf));
+  PetscCall(PetscSFSetGraph(*sf, rank ? 0 : N, n, NULL, PETSC_USE_POINTER, root, PETSC_OWN_POINTER));
+  PetscCall(PetscSFSetUp(*sf));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Brings n numbers of each leaf to its root. */
+static PetscErrorCode collect(PetscSF sf, PetscInt n, MPI_Datatype one, const void *leaf, void *root)
+{
+  MPI_Datatype type;
+
+  PetscFunctionBeginUser;
+  PetscCallMPI(MPI_Type_contiguous((PetscMPIInt)n, one, &type));
+  PetscCallMPI(MPI_Type_commit(&type));
+  PetscCall(PetscSFReduceBegin(sf, type, leaf, root, MPI_REPLACE));
+  PetscCall(PetscSFReduceEnd(sf, type, leaf, root, MPI_REPLACE));
+  PetscCallMPI(MPI_Type_free(&type));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode gather_vertices(SbMesh mesh, PetscBool root, SbGathered *g)
+{
+  PetscSF sf;
+
+  PetscFunctionBeginUser;
+  if (root) {
+    PetscCall(PetscMalloc1(3 * (size_t)g->nvert, &g->X));
+    PetscCall(PetscMalloc1(3 * (size_t)g->nvert, &g->x));
+    PetscCall(PetscMalloc1(g->nvert, &g->vert_set));
+  }
+  PetscCall(forest(mesh->comm, mesh->Nvert, mesh->nvert_owned, mesh->vert_orig, &sf));
+  PetscCall(collect(sf, 3, MPIU_REAL, mesh->x, g->X));
+  PetscCall(collect(sf, 1, MPI_UINT64_T, mesh->vert_set, g->vert_set));
+  PetscCall(PetscSFDestroy(&sf));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode gather_cells(SbMesh mesh, PetscBool root, PetscSF sf, SbGathered *g)
+{
+  const PetscInt n = mesh->ncell_owned;
+  PetscInt *cell;
+  uint64_t *set;
+
+  PetscFunctionBeginUser;
+  if (root) {
+    PetscCall(PetscMalloc1(4 * (size_t)g->ncell, &g->cell));
+    PetscCall(PetscMalloc1(g->ncell, &g->cell_material));
+    PetscCall(PetscMalloc1(5 * (size_t)g->ncell, &g->cell_set));
+  }
+  PetscCall(PetscMalloc1(4 * (size_t)n, &cell));
+  PetscCall(PetscMalloc1(5 * (size_t)n, &set));
+  for (PetscInt c = 0; c < n; c++) {
+    for (int a = 0; a < 4; a++) {
+      cell[4 * c + a] = mesh->vert_orig[mesh->cell[4 * c + a]];
+      set[5 * c + 1 + a] = mesh->face_set[4 * c + a];
+    }
+    set[5 * c] = mesh->cell_set[c];
+  }
+  PetscCall(collect(sf, 4, MPIU_INT, cell, g->cell));
+  PetscCall(collect(sf, 1, MPIU_INT, mesh->cell_material, g->cell_material));
+  PetscCall(collect(sf, 5, MPI_UINT64_T, set, g->cell_set));
+  PetscCall(PetscFree(cell));
+  PetscCall(PetscFree(set));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The vectors of a run. */
+static PetscInt vectors_of(SbRun run, Vec vec[3])
+{
+  PetscInt n = 0;
+
+  vec[n++] = run->U;
+  if (run->V) vec[n++] = run->V;
+  if (run->A) vec[n++] = run->A;
+  return n;
+}
+
+static PetscInt node_at(SbSpace s, PetscInt cell, PetscInt k)
+{
+  return k < 4 ? s->cell_node[4 * cell + k] : s->support ? s->support[4 * cell + k - 4] : -1;
+}
+
+static PetscErrorCode gather_values(SbRun run, PetscBool root, PetscSF sf, SbGathered *g)
+{
+  const SbSpace s = run->model->space;
+  const PetscInt n = s->mesh->ncell_owned, each = g->width * g->nfield * 3;
+  const PetscReal *array;
+  PetscReal *value;
+  Vec vec[3];
+
+  PetscFunctionBeginUser;
+  (void)vectors_of(run, vec);
+  if (root) PetscCall(PetscMalloc1((size_t)each * (size_t)g->ncell, &g->value));
+  PetscCall(PetscMalloc1((size_t)each * (size_t)n, &value));
+  for (PetscInt f = 0; f < g->nfield; f++) {
+    PetscCall(SbSpaceGetLocalRead(s, vec[f], &array));
+    for (PetscInt i = 0; i < n * g->width; i++) {
+      const PetscInt node = node_at(s, i / g->width, i % g->width);
+
+      for (int k = 0; k < 3; k++)
+        value[(g->nfield * i + f) * 3 + k] = node < 0 ? PETSC_MAX_REAL : array[3 * node + k];
+    }
+    PetscCall(SbSpaceRestoreLocalRead(s, vec[f], &array));
+  }
+  PetscCall(collect(sf, each, MPIU_REAL, value, g->value));
+  PetscCall(PetscFree(value));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Where vertices are now: P1 has them; of CR and DG the mean of the cells around, weighted with their volumes. */
+static PetscErrorCode find_places(SbModel m, SbGathered *g)
+{
+  const PetscInt step = g->nfield * 3;
+  PetscReal *weight;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscCalloc1(g->nvert, &weight));
+  PetscCall(PetscArrayzero(g->x, 3 * (size_t)g->nvert));
+  for (PetscInt b = 0; b < g->nbody; b++) {
+    const SbElement e = m->element[b];
+
+    for (PetscInt c = g->cell0[b]; c < g->cell0[b + 1]; c++) {
+      const PetscReal *u = g->value + (size_t)c * (size_t)(g->width * step);
+      PetscReal x[4][3], gradient[3][3], V;
+
+      for (int i = 0; i < 12; i++) x[i / 3][i % 3] = g->X[3 * g->cell[4 * c + i / 3] + i % 3];
+      e->ops.tabulate((const PetscReal(*)[3])x, gradient, &V);
+      for (int v = 0; v < 4; v++) {
+        const PetscInt vertex = g->cell[4 * c + v];
+
+        if (e->nodes_per[0]) {
+          for (int k = 0; k < 3; k++) g->x[3 * vertex + k] = u[v * step + k];
+          weight[vertex] = 1;
+          continue;
+        }
+        for (int a = 0; a < 4; a++) {
+          for (int k = 0; k < 3; k++) g->x[3 * vertex + k] += V * e->ops.vertex[v][a] * u[a * step + k];
+        }
+        weight[vertex] += V;
+      }
+    }
+  }
+  for (PetscInt i = 0; i < 3 * g->nvert; i++) g->x[i] = g->X[i] + g->x[i] / weight[i / 3];
+  PetscCall(PetscFree(weight));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode body_masses(SbModel m, PetscReal mass[])
+{
+  PetscFunctionBeginUser;
+  for (PetscInt i = 0; i < m->space->nnode_owned; i++) mass[m->space->node_body[i]] += m->space->node_mass[i];
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, mass, (PetscMPIInt)m->nbody, MPIU_REAL, MPI_SUM, m->comm));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbGather(SbRun run, SbGathered *g)
+{
+  const SbModel m = run->model;
+  const SbMesh mesh = m->mesh;
+  PetscMPIInt rank, supports = m->space->support ? 1 : 0;
+  Vec vec[3];
+  PetscSF sf;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscMemzero(g, sizeof(*g)));
+  PetscCallMPI(MPI_Comm_rank(m->comm, &rank));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &supports, 1, MPI_INT, MPI_MAX, m->comm));
+  g->nbody = m->nbody;
+  g->nvert = mesh->Nvert;
+  g->ncell = mesh->Ncell;
+  g->nfield = vectors_of(run, vec);
+  g->width = supports ? 8 : 4;
+  PetscCall(PetscCalloc2(m->nbody + 1, &g->vert0, m->nbody + 1, &g->cell0));
+  PetscCall(PetscCalloc1(m->nbody, &g->mass));
+  for (PetscInt b = 0; b < m->nbody; b++) {
+    g->vert0[b + 1] = g->vert0[b] + m->body[b].nvert;
+    g->cell0[b + 1] = g->cell0[b] + m->body[b].ncell;
+  }
+  PetscCall(body_masses(m, g->mass));
+  PetscCall(gather_vertices(mesh, (PetscBool)!rank, g));
+  PetscCall(forest(m->comm, mesh->Ncell, mesh->ncell_owned, mesh->cell_orig, &sf));
+  PetscCall(gather_cells(mesh, (PetscBool)!rank, sf, g));
+  PetscCall(gather_values(run, (PetscBool)!rank, sf, g));
+  PetscCall(PetscSFDestroy(&sf));
+  if (!rank) PetscCall(find_places(m, g));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbGatheredDestroy(SbGathered *g)
+{
+  PetscFunctionBeginUser;
+  PetscCall(PetscFree2(g->vert0, g->cell0));
+  PetscCall(PetscFree(g->mass));
+  PetscCall(PetscFree(g->X));
+  PetscCall(PetscFree(g->x));
+  PetscCall(PetscFree(g->vert_set));
+  PetscCall(PetscFree(g->cell));
+  PetscCall(PetscFree(g->cell_material));
+  PetscCall(PetscFree(g->cell_set));
+  PetscCall(PetscFree(g->value));
+  PetscCall(PetscMemzero(g, sizeof(*g)));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbScatter(const SbGathered *g, SbRun run)
+{
+  const SbSpace s = run->model->space;
+  const SbMesh mesh = s->mesh;
+  const PetscInt each = g->width * g->nfield * 3;
+  PetscReal *value, *array;
+  MPI_Datatype type;
+  Vec vec[3];
+  PetscSF sf;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscMalloc1((size_t)each * (size_t)mesh->ncell, &value));
+  PetscCall(forest(mesh->comm, mesh->Ncell, mesh->ncell, mesh->cell_orig, &sf));
+  PetscCallMPI(MPI_Type_contiguous((PetscMPIInt)each, MPIU_REAL, &type));
+  PetscCallMPI(MPI_Type_commit(&type));
+  PetscCall(PetscSFBcastBegin(sf, type, g->value, value, MPI_REPLACE));
+  PetscCall(PetscSFBcastEnd(sf, type, g->value, value, MPI_REPLACE));
+  PetscCallMPI(MPI_Type_free(&type));
+  PetscCall(PetscSFDestroy(&sf));
+  (void)vectors_of(run, vec);
+  for (PetscInt f = 0; f < g->nfield; f++) {
+    PetscCall(SbSpaceGetLocalWrite(s, vec[f], &array));
+    for (PetscInt i = 0; i < mesh->ncell * g->width; i++) {
+      const PetscInt node = node_at(s, i / g->width, i % g->width);
+      const PetscReal *from = value + (g->nfield * i + f) * 3;
+
+      for (int k = 0; k < 3 && node >= 0 && from[0] < PETSC_MAX_REAL; k++) array[3 * node + k] = from[k];
+    }
+    PetscCall(SbSpaceRestoreLocalWrite(s, vec[f], &array));
+  }
+  PetscCall(PetscFree(value));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

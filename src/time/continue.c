@@ -1,0 +1,97 @@
+/*
+  A run that goes on with another model of the same scene: what the first one has come to, and how the second one begins.
+
+  Integrators that take their acceleration from the residual (the explicit ones, Newmark) get that of the new model. Implicit Euler and generalized-alpha have one
+  of their own, which does not follow from the state.
+*/
+#include "time_impl.h"
+
+static PetscErrorCode after_step(TS ts)
+{
+  TSConvergedReason reason;
+  PetscReal t, before;
+  PetscInt step;
+  SbRun run;
+
+  PetscFunctionBeginUser;
+  PetscCall(TSGetApplicationContext(ts, &run));
+  PetscCall(TSGetConvergedReason(ts, &reason));
+  PetscCall(TSGetTime(ts, &t));
+  if (reason || t >= run->t_end * (1. - 1e-12)) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(TSGetStepNumber(ts, &step));
+  PetscCall(TSGetPrevTime(ts, &before));
+  PetscCall((*run->after.fn)(run, step, t, t - before, run->after.ctx, &run->paused));
+  if (run->paused) PetscCall(TSSetConvergedReason(ts, TS_CONVERGED_USER));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbRunSetPause(SbRun run, SbPauseFn fn, void *ctx)
+{
+  PetscFunctionBeginUser;
+  run->after.fn = fn;
+  run->after.ctx = ctx;
+  if (!run->ts) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(TSSetApplicationContext(run->ts, run));
+  PetscCall(TSSetPostStep(run->ts, after_step));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscBool is_explicit(const SbRun run)
+{
+  return (PetscBool)(run->preset == SB_TIME_EULER_EXPLICIT || run->preset == SB_TIME_EULER_SYMPLECTIC);
+}
+
+/* Fixed steps have their nominal length again, also where the last one was cut. */
+static PetscErrorCode take_step(SbRun from, SbRun to)
+{
+  PetscReal dt;
+
+  PetscFunctionBeginUser;
+  if (!is_explicit(to) || from->dt_given) to->dt = from->dt;
+  to->dt_given = from->dt_given;
+  if (!to->ts) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(TSGetTimeStep(from->ts, &dt));
+  if (to->fixed_step) dt = to->dt;
+  PetscCall(TSSetTimeStep(to->ts, PetscMin(dt, to->t_end - from->t_now)));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbRunContinue(SbRun from, SbRun to)
+{
+  PetscFunctionBeginUser;
+  to->step0 = to->step_now = from->step_now;
+  to->t0 = to->t_now = from->t_now;
+  to->model->load = from->model->load;
+  to->energies = from->energies;
+  to->energy_start = from->energy_start;
+  to->newton_total = to->newton_before = from->newton_total;
+  to->linear_total = to->linear_before = from->linear_total;
+  to->rejected_total = from->rejected_total;
+  to->steps_total = from->steps_total;
+  to->wall_start = from->wall_start;
+  PetscCall(take_step(from, to));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbRunRestartAcceleration(SbRun run)
+{
+  const SbSpace s = run->model->space;
+  const PetscScalar *residual;
+  PetscScalar *a;
+  Vec own;
+
+  PetscFunctionBeginUser;
+  if (!run->A || !(is_explicit(run) || (run->preset == SB_TIME_NEWMARK && !run->model->ntouch)))
+    PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(VecDuplicate(run->A, &own));
+  PetscCall(SbFormAcceleration(run, run->t_now, run->U, run->V, own));
+  PetscCall(VecGetArrayRead(own, &residual));
+  PetscCall(VecGetArray(run->A, &a));
+  for (PetscInt i = 0; i < 3 * s->nnode_owned; i++) {
+    if (!(s->fixed[i / 3] & (1 << i % 3))) a[i] = residual[i];
+  }
+  PetscCall(VecRestoreArray(run->A, &a));
+  PetscCall(VecRestoreArrayRead(own, &residual));
+  PetscCall(VecDestroy(&own));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

@@ -1,0 +1,356 @@
+// @ranks 1 2 3
+// @timeout 300
+/*
+  A state on another mesh of the same body.
+
+    linear     a linear displacement and velocity are the same functions there, for every element, on a body that is deformed by them
+    same       what lies on the surface has its values to the last bit; so has a body that is not re-meshed
+    momenta    mass, momentum and angular momentum of each body are those of before to 1e-12, free and held, with both masses
+    run        a run that is re-meshed on its way: steps, time, totals; the account closes with remesh_loss; Newmark and symplectic Euler go on
+    refused    a mesher that cannot: the run goes on as one that is not re-meshed, to the last bit
+    sets       groups of a file and shapes hold the same triangles, vertices of the surface and volume
+*/
+#include "../../src/scene/remesh_impl.h"
+#include "../remesh.h"
+
+#define TWO                                                                                         \
+  "-bodies a,b -body_a_mesh box:0.4,0.1,0.2:4,2,2 -body_a_material neohookean -body_a_young 1e4 "   \
+  "-body_a_poisson 0.3 -body_a_density 900 -body_b_mesh box:0.1,0.1,0.1:2 -body_b_translate 0,1,0 " \
+  "-body_b_material corotated -body_b_young 2e4 -body_b_poisson 0.3 -body_b_density 700 "
+#define EULER "-time euler_implicit -ts_dt 0.01 -ts_max_time 0.05 "
+
+/* Two scenes: the second one is the first on other meshes. */
+typedef struct {
+  TestScene a, b;
+  SbMade made[2];
+} Pair;
+
+static void linear(const PetscReal x[3], PetscReal u[3])
+{
+  u[0] = 0.1 + 0.4 * x[0] - 0.3 * x[1] + 0.2 * x[2];
+  u[1] = -0.2 + 0.2 * x[0] - 0.1 * x[1] - 0.3 * x[2];
+  u[2] = 0.5 * x[0] + 0.1 * x[1] - 0.4 * x[2];
+}
+
+static void curved(const PetscReal x[3], PetscReal u[3])
+{
+  u[0] = 0.3 * x[0] * x[0] + 0.1 * x[1];
+  u[1] = x[0] * x[2] - 0.2 * x[1];
+  u[2] = PetscSinReal(5 * x[0]) * 0.05 + 0.3 * x[1] * x[1];
+}
+
+/* The second scene of a pair, with body a meshed anew. */
+static PetscErrorCode make_second(Pair *p, const char *options)
+{
+  const SbRemeshing how = {.mesher = fixture_cone, .size = 1., .quality = 1e-3};
+  const PetscBool due[2] = {PETSC_TRUE, PETSC_FALSE};
+  SbGiven *given[2] = {NULL, NULL};
+  SbGathered g, next = {0};
+  SbRenamed renamed = {0};
+  PetscMPIInt rank;
+
+  PetscFunctionBeginUser;
+  PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
+  PetscCall(SbGather(p->a.run, &g));
+  if (!rank) PetscCall(SbRemeshBodies(p->a.model, &g, due, 1, &how, given, p->made, &next, &renamed));
+  next.nfield = g.nfield;
+  next.width = g.width;
+  PetscCallMPI(MPI_Bcast(p->made, (int)sizeof(p->made), MPI_BYTE, 0, PETSC_COMM_WORLD));
+  PetscCall(SbSceneCreate(PETSC_COMM_WORLD, &p->b.model));
+  PetscCall(SbRunCreate(p->b.model, &p->b.run));
+  (void)options;
+  for (int b = 0; b < 2; b++) {
+    if (rank) PetscCall(SbGivenCreate(0, 0, 0, &given[b]));
+    if (rank && b == 0) given[b]->mass = g.mass[0];
+    p->b.model->body[b].given = given[b];
+  }
+  PetscCall(SbModelSetUp(p->b.model));
+  PetscCall(SbMeshValidate(p->b.model->mesh));
+  PetscCall(SbSpaceValidate(p->b.model->space));
+  PetscCall(SbRunSetUp(p->b.run));
+  PetscCall(SbScatter(&next, p->b.run));
+  PetscCall(SbGatheredDestroy(&g));
+  PetscCall(SbGatheredDestroy(&next));
+  PetscCall(PetscFree2(renamed.from, renamed.to));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode close_pair(Pair *p)
+{
+  PetscFunctionBeginUser;
+  PetscCall(test_scene_close(&p->a));
+  PetscCall(test_scene_close(&p->b));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Largest difference of a vector from a function of the rest position. */
+static PetscErrorCode difference(SbModel m, void (*f)(const PetscReal x[3], PetscReal value[3]), Vec U,
+                                 PetscReal *worst)
+{
+  const PetscScalar *u;
+
+  PetscFunctionBeginUser;
+  *worst = 0;
+  PetscCall(VecGetArrayRead(U, &u));
+  for (PetscInt i = 0; i < m->space->nnode_owned; i++) {
+    PetscReal expected[3];
+
+    f(m->space->node_x + 3 * i, expected);
+    for (int k = 0; k < 3; k++) *worst = PetscMax(*worst, PetscAbsReal(u[3 * i + k] - expected[k]));
+  }
+  PetscCall(VecRestoreArrayRead(U, &u));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, worst, 1, MPIU_REAL, MPI_MAX, PETSC_COMM_WORLD));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode check_linear(const char *element)
+{
+  SbEnergies e[2];
+  PetscReal worst;
+  char text[2048];
+  Pair p = {0};
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscSNPrintf(text, sizeof(text), TWO EULER "-body_a_element %s -body_b_element p1", element));
+  PetscCall(test_scene_open(text, &p.a));
+  PetscCall(test_fill(p.a.model, linear, p.a.run->U));
+  PetscCall(test_fill(p.a.model, curved, p.a.run->V));
+  PetscCall(test_fill(p.a.model, linear, p.a.run->A));
+  PetscCall(make_second(&p, text));
+  SB_CHECK(!p.made[0].message[0], "%s: %s", element, p.made[0].message);
+  SB_CHECK(p.b.model->body[0].ncell == 80 && p.a.model->body[0].ncell == 96, "%s: %d tets, then %d", element,
+           (int)p.a.model->body[0].ncell, (int)p.b.model->body[0].ncell);
+  PetscCall(difference(p.b.model, linear, p.b.run->U, &worst));
+  SB_CHECK(worst < 1e-13, "%s: a linear displacement is wrong by %g m", element, (double)worst);
+  PetscCall(difference(p.b.model, linear, p.b.run->A, &worst));
+  SB_CHECK(worst < 1e-13, "%s: a linear acceleration is wrong by %g m/s^2", element, (double)worst);
+  PetscCall(SbModelEnergies(p.a.model, p.a.run->U, p.a.run->V, &e[0]));
+  PetscCall(SbModelEnergies(p.b.model, p.b.run->U, p.b.run->V, &e[1]));
+  SB_CHECK_NEAR(e[1].strain, e[0].strain, 1e-12 * e[0].strain, "strain energy of a linear displacement");
+  SB_CHECK_NEAR(e[1].volume, e[0].volume, 1e-13 * e[0].volume, "volume now");
+  SB_CHECK_NEAR(p.b.model->body[0].volume, p.a.model->body[0].volume, 1e-15, "volume at rest");
+  PetscCall(close_pair(&p));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Sum over the nodes of a body of the bits of their values, whatever their order: of the vertices of the surface, or of all. */
+static PetscErrorCode bits_of(SbModel m, Vec U, PetscInt body, PetscBool surface, uint64_t *sum)
+{
+  const SbMesh mesh = m->mesh;
+  PetscBool *on;
+  const PetscScalar *u;
+
+  PetscFunctionBeginUser;
+  *sum = 0;
+  PetscCall(PetscCalloc1(mesh->nvert, &on));
+  for (PetscInt i = 0; i < 4 * mesh->ncell; i++) {
+    for (int k = 1; k < 4 && (mesh->face_set[i] & SB_ON_BOUNDARY); k++)
+      on[mesh->cell[4 * (i / 4) + (i + k) % 4]] = PETSC_TRUE;
+  }
+  PetscCall(VecGetArrayRead(U, &u));
+  for (PetscInt i = 0; i < m->space->nnode_owned; i++) {
+    if (m->space->node_body[i] != body || (surface && !on[i])) continue;
+    for (int k = 0; k < 3; k++) {
+      uint64_t bits;
+
+      memcpy(&bits, &u[3 * i + k], sizeof(bits));
+      *sum += bits * (uint64_t)(2 * k + 1);
+    }
+  }
+  PetscCall(VecRestoreArrayRead(U, &u));
+  PetscCall(PetscFree(on));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, sum, 1, MPI_UINT64_T, MPI_SUM, PETSC_COMM_WORLD));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode check_same(void)
+{
+  Pair p = {0};
+  uint64_t a, b;
+
+  PetscFunctionBeginUser;
+  PetscCall(test_scene_open(TWO EULER, &p.a));
+  PetscCall(test_fill(p.a.model, curved, p.a.run->U));
+  PetscCall(test_fill(p.a.model, linear, p.a.run->V));
+  PetscCall(make_second(&p, TWO EULER));
+  for (int body = 0; body < 2; body++) {
+    PetscCall(bits_of(p.a.model, p.a.run->U, body, (PetscBool)!body, &a));
+    PetscCall(bits_of(p.b.model, p.b.run->U, body, (PetscBool)!body, &b));
+    SB_CHECK(a == b, "displacements of %s have changed", body ? "a body that is as it was" : "the surface");
+  }
+  PetscCall(close_pair(&p));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode check_momenta(const char *more)
+{
+  PetscReal before[2][6], after[2][6], corrected[2][6], mass[2] = {0, 0}, speed;
+  const PetscBool named[2] = {PETSC_TRUE, PETSC_FALSE};
+  char text[2048];
+  Pair p = {0};
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscSNPrintf(text, sizeof(text), TWO EULER "%s", more));
+  PetscCall(test_scene_open(text, &p.a));
+  PetscCall(test_fill(p.a.model, curved, p.a.run->U));
+  PetscCall(test_fill(p.a.model, curved, p.a.run->V));
+  PetscCall(make_second(&p, text));
+  PetscCall(SbBodyMomenta(p.a.model, p.a.run->U, p.a.run->V, before));
+  PetscCall(SbBodyMomenta(p.b.model, p.b.run->U, p.b.run->V, after));
+  PetscCall(
+    SbBodySetMomenta(p.b.model, p.b.run->U, p.b.run->V, named, (const PetscReal(*)[6])before, &speed));
+  PetscCall(SbBodyMomenta(p.b.model, p.b.run->U, p.b.run->V, corrected));
+  for (int b = 0; b < 2; b++) {
+    PetscReal moved = 0;
+
+    for (int k = 0; k < 6; k++) {
+      const PetscReal scale =
+        PetscAbsReal(before[b][0]) + PetscAbsReal(before[b][1]) + PetscAbsReal(before[b][2]);
+
+      SB_CHECK(PetscAbsReal(corrected[b][k] - before[b][k]) <= 1e-12 * scale,
+               "'%s', body %d: momentum %d is %.15g, was %.15g, without correction %.15g", more, b, k,
+               (double)corrected[b][k], (double)before[b][k], (double)after[b][k]);
+      moved = PetscMax(moved, PetscAbsReal(after[b][k] - before[b][k]) / scale);
+    }
+    SB_CHECK((moved > 1e-6) == (b == 0), "%s: the momenta of body %d differ by %g before they are put right",
+             more, b, (double)moved);
+  }
+  SB_CHECK(speed > 0 && speed < 0.1, "a rigid speed of %g m/s", (double)speed);
+  for (PetscInt i = 0; i < p.b.model->space->nnode_owned; i++)
+    mass[p.b.model->space->node_body[i]] += p.b.model->space->node_mass[i];
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, mass, 2, MPIU_REAL, MPI_SUM, PETSC_COMM_WORLD));
+  SB_CHECK_NEAR(mass[0], 900 * 0.008, 1e-13 * 7.2, "mass");
+  SB_CHECK_NEAR(mass[1], 0.7, 1e-13, "mass of the other body");
+  PetscCall(close_pair(&p));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ runs */
+
+static PetscErrorCode check_run(const char *more, const char *element, PetscBool explicit)
+{
+  SbEnergies e;
+  PetscReal sum, scale;
+  TestScene s;
+  int calls = 0;
+  char text[2048];
+
+  PetscFunctionBeginUser;
+  PetscCall(
+    PetscSNPrintf(text, sizeof(text),
+                  TWO "-body_a_element %s -body_a_spin 0,3,1 -body_a_velocity 1,0,0 -remesh_times 0.02,0.03 "
+                      "-remesh_bodies a %s",
+                  element, more));
+  PetscCall(test_scene_open(text, &s));
+  s.run->want_energies = PETSC_TRUE;
+  PetscCall(SbRemeshSetMesher(s.remesh, fixture_cone, &calls));
+  PetscCall(test_scene_solve(&s));
+  PetscCallMPI(MPI_Bcast(&calls, 1, MPI_INT, 0, PETSC_COMM_WORLD));
+  SB_CHECK(calls == 2 && !s.run->stop_reason[0], "%s %s: meshed %d times; %s", more, element, calls,
+           s.run->stop_reason);
+  SB_CHECK_NEAR(s.run->t_now, 0.05, 1e-10, "end");
+  SB_CHECK(explicit || (s.run->steps_total == 5 && s.run->step_now == 5), "%d steps, the last one is %d",
+           (int)s.run->steps_total, (int)s.run->step_now);
+  e = s.run->energies;
+  sum = e.kinetic + e.strain + e.integrator_loss + e.remesh_loss - s.run->energy_start;
+  scale = s.run->energy_start;
+  SB_CHECK_NEAR(sum, 0, 1e-12 * scale, "account");
+  SB_CHECK(e.remesh_loss != 0 && PetscAbsReal(e.remesh_loss) < 0.2 * scale, "remesh_loss %g of %g J",
+           (double)e.remesh_loss, (double)scale);
+  SB_CHECK_NEAR(e.momentum[0], 7.2, 1e-5, "momentum along x");
+  SB_CHECK_NEAR(e.momentum[1], 0, 1e-5, "momentum along y");
+  SB_CHECK(e.ninverted == 0, "%d tets are inside out", (int)e.ninverted);
+  PetscCall(test_scene_close(&s));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The sum of squares of the displacement at the end. */
+static PetscErrorCode refused_run(SbMesher mesher, const char *more, PetscReal *norm)
+{
+  TestScene s;
+  char text[2048];
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscSNPrintf(text, sizeof(text), TWO EULER "-body_a_spin 0,3,1 %s", more));
+  PetscCall(test_scene_open(text, &s));
+  if (s.remesh) PetscCall(SbRemeshSetMesher(s.remesh, mesher, NULL));
+  PetscCall(test_scene_solve(&s));
+  PetscCall(VecNorm(s.run->U, NORM_2, norm));
+  SB_CHECK(s.run->steps_total == 5, "%d steps", (int)s.run->steps_total);
+  PetscCall(test_scene_close(&s));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode check_refused(void)
+{
+  PetscReal with, without;
+
+  PetscFunctionBeginUser;
+  PetscCall(refused_run(fixture_refuse, "", &without));
+  PetscCall(refused_run(fixture_refuse, "-remesh_times 0.02", &with));
+  SB_CHECK(with == without, "a run that could not be re-meshed moves otherwise: %.17g, without %.17g",
+           (double)with, (double)without);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ sets */
+
+static PetscErrorCode check_sets(void)
+{
+  static const char text[] =
+    TWO EULER "-sets left,top,part -set_left_at group:a.xmin -set_top_at plane:0,0,1,0.2 "
+              "-set_part_at box:0,0,0,0.2,0.1,0.2 -effects hold,pull -effect_hold_type support "
+              "-effect_hold_on left -effect_pull_type traction -effect_pull_on top -effect_pull_vector 0;0;1";
+  PetscReal area[2][2] = {{0, 0}, {0, 0}};
+  Pair p = {0};
+
+  PetscFunctionBeginUser;
+  PetscCall(test_scene_open(text, &p.a));
+  PetscCall(test_fill(p.a.model, curved, p.a.run->U));
+  PetscCall(make_second(&p, text));
+  for (int i = 0; i < 2; i++) {
+    const SbModel m = i ? p.b.model : p.a.model;
+
+    for (int k = 0; k < 2; k++) {
+      SbFacet *facet;
+      PetscInt n;
+
+      PetscCall(SbSpaceGetSetFacets(m->space, k, &n, &facet));
+      for (PetscInt f = 0; f < n; f++) area[i][k] += facet[f].cell < m->mesh->ncell_owned ? facet[f].area : 0;
+      PetscCall(PetscFree(facet));
+    }
+    SB_CHECK(m->set[0].nvert == 9 && m->set[0].nfacet == 8, "the group holds %d vertices, %d facets",
+             (int)m->set[0].nvert, (int)m->set[0].nfacet);
+  }
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, area, 4, MPIU_REAL, MPI_SUM, PETSC_COMM_WORLD));
+  for (int k = 0; k < 2; k++)
+    SB_CHECK_NEAR(area[1][k], area[0][k], 1e-15, k ? "area of the shape" : "area of the group");
+  SB_CHECK(p.a.model->set[2].nfacet == p.b.model->set[2].nfacet, "facets of the box: %d, then %d",
+           (int)p.a.model->set[2].nfacet, (int)p.b.model->set[2].nfacet);
+  PetscCall(close_pair(&p));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+int main(int argc, char **argv)
+{
+  SB_TEST_BEGIN(argc, argv);
+  PetscCall(check_linear("p1"));
+  PetscCall(check_linear("cr"));
+  PetscCall(check_linear("dg"));
+  PetscCall(check_same());
+  PetscCall(check_momenta(""));
+  PetscCall(check_momenta("-mass consistent"));
+  PetscCall(check_momenta("-body_a_element cr"));
+  PetscCall(check_momenta("-body_a_element dg -mass consistent"));
+  PetscCall(check_momenta("-sets end -set_end_at plane:1,0,0,0 -effects hold -effect_hold_type support "
+                          "-effect_hold_on end"));
+  PetscCall(check_run(EULER, "p1", PETSC_FALSE));
+  PetscCall(check_run(EULER, "cr", PETSC_FALSE));
+  PetscCall(check_run(EULER, "dg", PETSC_FALSE));
+  PetscCall(check_run("-time newmark -ts_dt 0.01 -ts_max_time 0.05", "p1", PETSC_FALSE));
+  PetscCall(check_run("-time genalpha -ts_dt 0.01 -ts_max_time 0.05", "p1", PETSC_FALSE));
+  PetscCall(check_run("-time euler_symplectic -ts_max_time 0.05", "p1", PETSC_TRUE));
+  PetscCall(check_refused());
+  PetscCall(check_sets());
+  SB_TEST_END();
+}
