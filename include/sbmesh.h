@@ -219,6 +219,7 @@ typedef struct {
   SbMesher mesher;
   void *ctx;
   PetscReal size;    /* wanted edge, in mean edges of the hull */
+  PetscBool better;  /* a mesh whose worst tet is no better now than that of the old one is refused */
   PetscBool rest;    /* the body is filled as it is at rest, else as it is now */
   PetscReal quality; /* least that tets may have at rest, and now (SbTetQuality) */
 } SbRemeshing;

@@ -8,11 +8,15 @@
 
   Between these the motion is not linear, so a new tet may be inside out at rest although it is none now. Such tets, and those
   that are too flat, are mended by moving their inner vertices through the material, towards the middle of their neighbours: to the place of a few on the
-  way where the worst tet around is best, until all are good or nothing helps.
+  way where the worst tet around is best, until all are good or nothing helps. A tet between four vertices of a side that was flat at rest and bulges
+  now has no volume at rest, and no inner vertex: an inner edge of it gets one in its middle, with all tets around, which then moves
+  inwards.
 */
+#include <stdlib.h>
 #include "mesh_impl.h"
 
 #define SWEEPS 30
+#define ROUNDS 6 /* of moving vertices and splitting edges */
 #define PLACES 6 /* on the way to the middle of the neighbours, each half as far as the one before */
 
 /* ------------------------------------------------------------------ the hull */
@@ -263,7 +267,8 @@ static PetscBool move_vertex(const SbOldMesh *old, SbLocator rest, const Stars *
 }
 
 /* Moves inner vertices until all tets are good enough, or nothing helps. */
-static PetscErrorCode mend(const SbOldMesh *old, const SbRemeshing *how, SbLocator rest, SbNewMesh *m)
+static PetscErrorCode move_vertices(const SbOldMesh *old, const SbRemeshing *how, SbLocator rest,
+                                    SbNewMesh *m)
 {
   PetscBool *moved, better = PETSC_TRUE;
   Stars stars;
@@ -290,10 +295,119 @@ static PetscErrorCode mend(const SbOldMesh *old, const SbRemeshing *how, SbLocat
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+static uint64_t edge_key(PetscInt p, PetscInt q)
+{
+  return (uint64_t)PetscMin(p, q) << 32 | (uint64_t)PetscMax(p, q);
+}
+
+static int by_key(const void *a, const void *b)
+{
+  const uint64_t p = *(const uint64_t *)a, q = *(const uint64_t *)b;
+
+  return (p > q) - (p < q);
+}
+
+/* Edges of the hull, [3 hull->ntri] in order, which stay whole. */
+static PetscErrorCode list_edges(const SbHull *hull, uint64_t **edge)
+{
+  PetscFunctionBeginUser;
+  PetscCall(PetscMalloc1(3 * (size_t)hull->ntri, edge));
+  for (PetscInt i = 0; i < 3 * hull->ntri; i++)
+    (*edge)[i] = edge_key(hull->tri[i], hull->tri[i % 3 == 2 ? i - 2 : i + 1]);
+  qsort(*edge, 3 * (size_t)hull->ntri, sizeof(**edge), by_key);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The longest edge of a tet, now, that is not of the hull; false when there is none. */
+static PetscBool inner_edge(const SbHull *hull, const uint64_t edge[], const SbNewMesh *m, PetscInt c,
+                            PetscInt ends[2])
+{
+  PetscReal longest = -1;
+
+  for (int i = 0; i < 4; i++) {
+    for (int j = 0; j < i; j++) {
+      const PetscInt p = m->cell[4 * c + i], q = m->cell[4 * c + j];
+      const uint64_t key = edge_key(p, q);
+      PetscReal length = 0;
+
+      if (bsearch(&key, edge, 3 * (size_t)hull->ntri, sizeof(key), by_key)) continue;
+      for (int k = 0; k < 3; k++) length += PetscSqr(m->x[3 * p + k] - m->x[3 * q + k]);
+      if (length <= longest) continue;
+      longest = length;
+      ends[0] = p;
+      ends[1] = q;
+    }
+  }
+  return (PetscBool)(longest >= 0);
+}
+
+/* A vertex in the middle of an edge at rest; each tet around it becomes two. */
+static PetscErrorCode split_edge(const SbOldMesh *old, SbLocator rest, const PetscInt ends[2], SbNewMesh *m)
+{
+  const PetscInt middle = m->nvert, ncell = m->ncell;
+  PetscReal w[4];
+  PetscInt n = 0, cell;
+
+  PetscFunctionBeginUser;
+  for (PetscInt c = 0; c < ncell; c++) {
+    int found = 0;
+
+    for (int a = 0; a < 4; a++) found += m->cell[4 * c + a] == ends[0] || m->cell[4 * c + a] == ends[1];
+    n += found == 2;
+  }
+  PetscCall(PetscRealloc(3 * (size_t)(m->nvert + 1) * sizeof(*m->X), &m->X));
+  PetscCall(PetscRealloc(3 * (size_t)(m->nvert + 1) * sizeof(*m->x), &m->x));
+  PetscCall(PetscRealloc(4 * (size_t)(ncell + n) * sizeof(*m->cell), &m->cell));
+  for (int k = 0; k < 3; k++) m->X[3 * middle + k] = 0.5 * (m->X[3 * ends[0] + k] + m->X[3 * ends[1] + k]);
+  (void)SbLocatorFind(rest, m->X + 3 * middle, &cell, w);
+  mix(old, old->x, cell, w, m->x + 3 * middle);
+  m->nvert++;
+  for (PetscInt c = 0; c < ncell; c++) {
+    PetscInt *v = m->cell + 4 * c, at[2] = {-1, -1};
+
+    for (int a = 0; a < 4; a++) {
+      if (v[a] == ends[0]) at[0] = a;
+      if (v[a] == ends[1]) at[1] = a;
+    }
+    if (at[0] < 0 || at[1] < 0) continue;
+    PetscCall(PetscArraycpy(m->cell + 4 * m->ncell, v, 4));
+    v[at[1]] = middle;
+    m->cell[4 * m->ncell++ + at[0]] = middle;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Vertices are moved, and edges of tets that have none to move are split, until all tets are good enough or nothing helps. */
+static PetscErrorCode mend(const SbOldMesh *old, const SbRemeshing *how, const SbHull *hull, SbLocator rest,
+                           SbNewMesh *m)
+{
+  PetscBool split = PETSC_TRUE;
+  uint64_t *edge;
+
+  PetscFunctionBeginUser;
+  PetscCall(list_edges(hull, &edge));
+  for (int round = 0; round < ROUNDS && split; round++) {
+    const PetscInt ncell = m->ncell;
+
+    PetscCall(move_vertices(old, how, rest, m));
+    split = PETSC_FALSE;
+    for (PetscInt c = 0; c < ncell && round + 1 < ROUNDS; c++) {
+      PetscInt ends[2] = {-1, -1};
+
+      if (worse(m, c) >= how->quality || !inner_edge(hull, edge, m, c, ends)) continue;
+      PetscCall(split_edge(old, rest, ends, m));
+      split = PETSC_TRUE;
+    }
+  }
+  PetscCall(PetscFree(edge));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Refuses what could not be mended: tets inside out now are allowed where the old mesh had some, too. */
-static PetscErrorCode judge(const SbOldMesh *old, SbNewMesh *m)
+static PetscErrorCode judge(const SbOldMesh *old, const SbRemeshing *how, SbNewMesh *m)
 {
   PetscInt at_rest = 0, now = 0, before = 0;
+  PetscReal worst = 1;
 
   PetscFunctionBeginUser;
   m->quality = 1;
@@ -304,7 +418,14 @@ static PetscErrorCode judge(const SbOldMesh *old, SbNewMesh *m)
     now += !(quality > 0);
     m->quality = PetscMin(m->quality, quality);
   }
-  for (PetscInt c = 0; c < old->ncell; c++) before += !(SbTetDet(old->x, old->cell + 4 * c) > 0);
+  for (PetscInt c = 0; c < old->ncell; c++) {
+    PetscReal x[4][3], quality;
+
+    for (int i = 0; i < 12; i++) x[i / 3][i % 3] = old->x[3 * old->cell[4 * c + i / 3] + i % 3];
+    quality = SbTetQuality((const PetscReal(*)[3])x);
+    before += !(quality > 0);
+    worst = PetscMin(worst, quality);
+  }
   PetscCheck(!at_rest, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
              "%" PetscInt_FMT " of %" PetscInt_FMT
              " new tetrahedra would be inside out or flat at rest: the deformation differs too much from one "
@@ -314,6 +435,9 @@ static PetscErrorCode judge(const SbOldMesh *old, SbNewMesh *m)
              "%" PetscInt_FMT " of %" PetscInt_FMT " new tetrahedra would be inside out, %" PetscInt_FMT
              " old ones are",
              now, m->ncell, before);
+  PetscCheck(!how->better || m->quality > worst, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
+             "a new mesh would be no better: its worst tetrahedron has the quality %.3g, now it is %.3g",
+             (double)m->quality, (double)worst);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -363,8 +487,8 @@ static PetscErrorCode remesh(const char *where, const SbOldMesh *old, const SbRe
   PetscCall(check_mesher(hull, m));
   PetscCall(SbLocatorCreate(old->ncell, old->cell, old->X, rest));
   PetscCall(find_material(old, how, *rest, m));
-  PetscCall(mend(old, how, *rest, m));
-  PetscCall(judge(old, m));
+  PetscCall(mend(old, how, hull, *rest, m));
+  PetscCall(judge(old, how, m));
   PetscCall(find_within(*rest, m));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

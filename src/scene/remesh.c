@@ -220,6 +220,7 @@ static PetscErrorCode look(SbRun run, PetscInt step, PetscReal t, PetscReal dt, 
   *pause = PETSC_FALSE;
   for (PetscInt i = 0; i < r->ntime; i++)
     time = (PetscBool)(time || (r->time[i] > t - dt + ahead && r->time[i] <= t + ahead));
+  r->how.better = (PetscBool)!time;
   PetscCall(SbBodyQualities(run->model, run->U, r->named, r->worst));
   for (PetscInt b = 0; b < r->nbody; b++) {
     const PetscBool bad = (PetscBool)(r->asked[b] > 0. && r->worst[b] < r->bound[b] && step >= r->from[b]);
@@ -247,6 +248,7 @@ static PetscErrorCode look_after_failure(SbRemesh r, SbRun run, PetscBool *again
   }
   if (worst < 0) PetscFunctionReturn(PETSC_SUCCESS);
   r->due[worst] = *again = PETSC_TRUE;
+  r->how.better = PETSC_FALSE;
   PetscCall(SbWarning(run->model->comm, "%s; body '%s' is re-meshed", run->stop_reason,
                       run->model->body[worst].name));
   PetscFunctionReturn(PETSC_SUCCESS);
