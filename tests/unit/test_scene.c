@@ -199,7 +199,7 @@ static PetscErrorCode test_names(void)
 static PetscErrorCode test_values(void)
 {
   PetscFunctionBeginUser;
-  PetscCall(refused("-bodies liver", "-body_liver_mesh must be given: tetrahedral mesh"));
+  PetscCall(refused("-bodies liver", "-body_liver_mesh must be given: mesh of tetrahedra"));
   PetscCall(refused("-bodies liver -body_liver_mesh box:1,1,1:2",
                     "-body_liver_material must be given: one of corotated, linear, neohookean, stvk"));
   PetscCall(refused(LIVER " -body_liver_material corotate",
