@@ -1,0 +1,69 @@
+"""A run that was re-meshed and is taken up behind that, on other numbers of ranks, is the run that was not interrupted; its frames name their mesh.
+
+@timeout 300
+"""
+import os
+import shlex
+import shutil
+import subprocess
+import sys
+import xml.etree.ElementTree as ElementTree
+from pathlib import Path
+
+import h5py
+import numpy
+
+SUPPLE = os.environ.get("SB_SUPPLE", "bin/supple")
+MPI = shlex.split(os.environ.get("SB_MPI", "scripts/mpi"))
+OUT = Path(os.environ.get("SB_OUT", "build/test-out/remesh")).resolve()
+
+
+def run(ranks, folder, *more):
+    line = [*MPI, str(ranks), SUPPLE, "scenarios/knead.opts", "-quiet", "-output_dir", str(OUT / folder), *more]
+    result = subprocess.run(line, capture_output=True, text=True, timeout=120)
+    if result.returncode:
+        sys.exit(f"{folder}: exit code {result.returncode}\n{result.stdout}{result.stderr}")
+
+
+def history(folder):
+    lines = (OUT / folder / "history.csv").read_text().splitlines()
+    return lines[0].split(","), numpy.array([[float(x) for x in line.split(",")] for line in lines[2:]])
+
+
+def check_frames(folder):
+    """Each frame's arrays have the lengths of its own mesh, and the index names that mesh."""
+    meshes = set()
+    with h5py.File(OUT / folder / "fields.h5", "r") as f:
+        for grid in ElementTree.parse(OUT / folder / "fields.xmf").getroot().iter("Grid"):
+            if grid.get("GridType") != "Uniform":
+                continue
+            paths = [item.text.strip().split(":")[1] for item in grid.iter("DataItem")]
+            mesh = next(path for path in paths if path.endswith("/cells")).rsplit("/", 1)[0]
+            frame = next(path for path in paths if path.startswith("/step/")).rsplit("/", 1)[0]
+            if len(f[frame]["displacement"]) != len(f[mesh]["x"]) or len(f[frame]["von_mises"]) != len(f[mesh]["cells"]):
+                sys.exit(f"{folder}: {frame} does not fit {mesh}")
+            meshes.add((mesh, f[frame].attrs["step"] > 6))
+    if meshes != {("/mesh", False), ("/mesh_000006", True)}:
+        sys.exit(f"{folder}: meshes {meshes}")
+
+
+def main():
+    shutil.rmtree(OUT, ignore_errors=True)
+    run(2, "whole", "-checkpoint_every_steps", "10", "-checkpoint_keep", "5")
+    names, whole = history("whole")
+    check_frames("whole")
+    for ranks in (1, 3):
+        folder = f"parts{ranks}"
+        shutil.copytree(OUT / "whole", OUT / folder)
+        run(ranks, folder, "-restart", str(OUT / folder / "checkpoint_000010.h5"))
+        _, parts = history(folder)
+        check_frames(folder)
+        for name in ("strain", "drive_work", "volume", "min_J", "max_displacement", "remesh_loss"):
+            k = names.index(name)
+            worst = numpy.abs(whole[:, k] - parts[:, k]).max() / numpy.abs(whole[:, k]).max()
+            if whole.shape != parts.shape or not worst <= 1e-6:
+                sys.exit(f"{folder}: column {name} differs by {worst:.3g}")
+    print("a re-meshed run is taken up on 1 and 3 ranks as if not interrupted")
+
+
+main()
