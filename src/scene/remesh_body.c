@@ -424,7 +424,7 @@ static PetscErrorCode finish_body(const Work *w, PetscBool done, PetscInt step, 
                                   SbGiven **given, SbRenamed *renamed)
 {
   const SbBody *body = &w->model->body[w->body];
-  const size_t each = (size_t)(next->width * w->each);
+  const size_t each = (size_t)next->width * (size_t)w->each;
   PetscReal *value = next->value + each * (size_t)next->cell0[w->body];
 
   PetscFunctionBeginUser;
