@@ -98,7 +98,7 @@ mesh 1 surface.msh ": is a surface: 2 3-node triangles and no tetrahedra; mesh t
 mesh 2 surface.msh ": is a surface: 2 3-node triangles and no tetrahedra; mesh the volume (gmsh -3)"
 
 # another format, and one that is read by gmsh in a process of its own
-printf '$MeshFormat\n4.0 0 8\n$EndMeshFormat\n' >version4.msh
+printf '%s\n' "\$MeshFormat" '4.0 0 8' "\$EndMeshFormat" >version4.msh
 mesh 2 version4.msh ": gmsh finds no mesh in it; it is empty, damaged, or not what its ending says"
 printf '1 4 0\n1 1 2 3 5\n' >thing.ele
 printf '4 3\n1 0 0 0\n2 1 0 0\n3 0 1 0\n4 0 0 1\n' >thing.node
