@@ -157,8 +157,9 @@ PetscErrorCode SbEffectRename_Collision(SbEffect e, PetscInt nnode, const PetscI
 
     if (r[0] == POINT) PetscCall(PetscFindInt((PetscInt)r[1], nnode, from, &place));
     if (place >= 0) r[1] = (PetscReal)to[place];
-    if (place >= 0 || r[0] == SUMS)
-      PetscCall(PetscArraymove(records + SB_COLLISION_STATE * kept++, r, SB_COLLISION_STATE));
+    if (place < 0 && r[0] != SUMS) continue;
+    PetscCall(PetscArraymove(records + SB_COLLISION_STATE * kept, r, SB_COLLISION_STATE));
+    kept++;
   }
   *n = kept;
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -111,7 +111,8 @@ PetscErrorCode SbEffectRename_Contact(SbEffect e, PetscInt nnode, const PetscInt
     PetscCall(PetscFindInt((PetscInt)r[0], nnode, from, &place));
     if (place < 0) continue;
     r[0] = (PetscReal)to[place];
-    PetscCall(PetscArraymove(records + SB_CONTACT_STATE * kept++, r, SB_CONTACT_STATE));
+    PetscCall(PetscArraymove(records + SB_CONTACT_STATE * kept, r, SB_CONTACT_STATE));
+    kept++;
   }
   *n = kept;
   PetscFunctionReturn(PETSC_SUCCESS);
