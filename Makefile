@@ -133,7 +133,7 @@ check-long: deps ## the tests that take longer or need ParaView
 	@scripts/venv
 	@$(CHECK) --long
 
-check-hard: deps ## every hard case on 1, 2 and 3 ranks, ten jittered runs each, and the table of their margins (about 15 minutes; one: T=name)
+check-hard: deps ## every hard case on 1, 2 and 3 ranks, ten jittered runs each, and the table of their margins (an hour and more; one: T=name)
 	$(AGAIN) $(BUILD)/tests/hard/hard
 	@tests/run --build $(BUILD) --group hard --all $(if $(T),--match '$(T)'); status=$$?; scripts/stability --build $(BUILD); exit $$status
 
