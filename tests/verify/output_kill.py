@@ -1,7 +1,7 @@
 """A run that is killed at any moment, in the middle of a frame or of a checkpoint, leaves what it had completed.
 
 @timeout 300
-Thirty runs are killed (SIGKILL, all ranks at once or one of them) after random times. Each time fields.xmf must be
+A dozen runs are killed (SIGKILL, all ranks at once or one of them) after random times. Each time fields.xmf must be
 well-formed and every frame in it readable, history.csv must hold whole rows, and the newest checkpoint must restart.
 """
 import os
@@ -14,7 +14,7 @@ from pathlib import Path
 
 from output_common import OUT, check_frames, command, history, run
 
-KILLS = 30
+KILLS = 12
 
 
 def ranks_of(launcher):

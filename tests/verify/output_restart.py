@@ -93,7 +93,7 @@ def check_damage():
         sys.exit(f"latest did not fall back to step 10\n{text}")
     if sorted(path.name for path in folder.glob("checkpoint_*"))[-1] != "checkpoint_000015.h5":
         sys.exit(f"after the restart there is {sorted(folder.glob('checkpoint_*'))}")
-    for part in (0, 0.1, 0.5, 0.9, 0.999):
+    for part in (0, 0.5, 0.999):
         shutil.copy(OUT / "checkpoint_000020.h5", folder / "cut.h5")
         truncate(folder / "cut.h5", part)
         expect("cut.h5: it is truncated, damaged or not a checkpoint", "-restart", folder / "cut.h5")
@@ -114,11 +114,12 @@ def check_fit():
 
 
 def main():
-    for time in ("newmark", "genalpha", "euler_implicit"):
-        check_reproduction(time, (1, 2, 3), "-time", time)
+    check_reproduction("newmark", (1, 2, 3), "-time", "newmark")
+    for time in ("genalpha", "euler_implicit"):
+        check_reproduction(time, (3,), "-time", time)
     for element in ("cr", "dg", "mixed"):
         # dg with points of its own, so that frames of this kind go on, too
-        check_reproduction(element, (1, 3), *ELEMENTS[element], *(["-output_discontinuous"] if element == "dg" else []))
+        check_reproduction(element, (3,), *ELEMENTS[element], *(["-output_discontinuous"] if element == "dg" else []))
     check_damage()
     check_fit()
 

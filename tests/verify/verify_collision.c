@@ -1,4 +1,4 @@
-// @ranks 1 2
+// @ranks 2
 // @timeout 300
 /*
   Contact between bodies.

@@ -1,4 +1,4 @@
-// @ranks 1 2
+// @ranks 2
 // @timeout 300
 /*
   A plate as thin as cloth, one cell thick, falls on a ball and drapes over it. The ball is a rigid obstacle, with friction, or a body held

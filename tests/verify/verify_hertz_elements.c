@@ -1,4 +1,5 @@
 // @ranks 1
+// @long
 // @timeout 300
 /*
   Hertz's contact (hertz.h) with CR and DG, and of one body on a rigid plane.

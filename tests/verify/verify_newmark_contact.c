@@ -1,4 +1,4 @@
-// @ranks 1 2 3
+// @ranks 1 2
 // @timeout 300
 /*
   Newmark with contact (src/time/newmark_contact.c).

@@ -1,4 +1,4 @@
-// @ranks 1 2 3
+// @ranks 1 2
 // @timeout 200
 /*
   What pairs of bodies do to each other: columns of the history for each pair, and places of contact.
