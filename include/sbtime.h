@@ -104,6 +104,8 @@ struct _p_SbRun {
   } look;
   struct {
     SbPauseFn fn; /* asked after each step; NULL: nobody asks */
+    PetscReal
+      dt; /* length of the step that was asked about last; of a restart, when the run had paused there; else 0 */
     void *ctx;
   } after;
   PetscBool paused; /* SbRunSolve() came back because of that; nothing has ended */

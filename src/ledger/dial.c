@@ -41,7 +41,7 @@ PetscErrorCode SbDialSetFromOptions(SbLedger l)
 }
 
 /* The relative tolerance of solves: Newton's, or the linear solver's where there is one solve per step. */
-static PetscErrorCode set_tolerance(SbLedger l, PetscReal rtol)
+PetscErrorCode SbDialSet(SbLedger l, PetscReal rtol)
 {
   const SNES snes = l->run->snes;
   PetscReal atol, old, stol, linear, latol, dtol;
@@ -99,7 +99,7 @@ PetscErrorCode SbDialAttach(SbLedger l)
       TSAdaptSetStepLimits(adapt, SHORTEST * run->t_end, run->snes && run->J ? 0.1 * run->t_end : run->dt));
   }
   if (l->may_tune && run->snes && run->J)
-    PetscCall(set_tolerance(l, l->accuracy > 0. ? 0.01 * l->accuracy : 1e-3));
+    PetscCall(SbDialSet(l, l->accuracy > 0. ? 0.01 * l->accuracy : 1e-3));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -130,9 +130,9 @@ PetscErrorCode SbDialLook(SbLedger l, const SbSolved *step, PetscBool *again)
     /* a little too much in one step of many is made up for by the next */
     *again = (PetscBool)(l->rtol > TIGHTEST && left > (step->V ? 3. : 1.) * allowed);
     l->repeats += *again;
-    PetscCall(set_tolerance(l, l->rtol * PetscMax(1e-3, 0.3 * allowed / left)));
+    PetscCall(SbDialSet(l, l->rtol * PetscMax(1e-3, 0.3 * allowed / left)));
   } else if (left < 0.1 * allowed)
-    PetscCall(set_tolerance(l, l->rtol * PetscMin(3., 0.3 * allowed / left)));
+    PetscCall(SbDialSet(l, l->rtol * PetscMin(3., 0.3 * allowed / left)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -151,8 +151,8 @@ PetscErrorCode SbDialAccept(SbLedger l, const SbStep *step)
   l->total += took;
   if (!l->may_tune || !l->run->J) PetscFunctionReturn(PETSC_SUCCESS);
   if (took > 0.9 * l->budget)
-    PetscCall(set_tolerance(l, 4. * l->rtol));
+    PetscCall(SbDialSet(l, 4. * l->rtol));
   else if (took < 0.5 * l->budget)
-    PetscCall(set_tolerance(l, 0.5 * l->rtol));
+    PetscCall(SbDialSet(l, 0.5 * l->rtol));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -107,8 +107,9 @@ PetscErrorCode SbEstimateTime(SbLedger l, const SbSolved *step, PetscBool all)
   if (all) PetscCall(derivative_energy(l, step, step->V, step->A, &l->derivative[1]));
   PetscCall(VecWAXPY(rate, -1., step->A0, step->A));
   PetscCall(VecScale(rate, 1. / h));
-  /* implicit Euler begins without an acceleration */
-  if (l->order == 1 && step->t == l->run->t0 && l->run->step0 == 0) PetscCall(VecZeroEntries(rate));
+  /* implicit Euler begins without an acceleration; on another mesh no integrator has one */
+  if (step->t == l->run->t0 && (l->anew || (l->order == 1 && l->run->step0 == 0)))
+    PetscCall(VecZeroEntries(rate));
   if (all || l->order == 1) PetscCall(derivative_energy(l, step, step->A, rate, &l->derivative[2]));
   if (l->order == 2) {
     PetscCall(VecCopy(rate, second));

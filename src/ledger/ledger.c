@@ -340,6 +340,12 @@ PetscErrorCode SbLedgerContinue(SbLedger from, SbLedger to)
   to->solving += from->solving;
   to->residuals += from->residuals;
   to->repeats = from->repeats;
+  to->nstep = from->nstep;
+  to->nkept = from->nkept;
+  to->longest = from->longest;
+  to->total = from->total;
+  to->anew = PETSC_TRUE;
+  if (to->may_tune && to->run->snes && to->run->J) PetscCall(SbDialSet(to, from->rtol));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

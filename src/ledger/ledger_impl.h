@@ -51,6 +51,8 @@ struct _p_SbLedger {
     seen_residual;     /* that the last solve left, and that of the last step that was looked at, N */
   PetscReal kept_part; /* of what solves left before: the integrator damps it */
   PetscBool seen;      /* the step that is about to be accepted was */
+  PetscBool
+    anew; /* the run goes on with another mesh, on which the accelerations of before are in no balance */
 
   Vec kept, before; /* accelerations at the start of this step and of the one before, m/s^2 */
   PetscReal kept_t, kept_dt, before_dt; /* s; before_dt 0: there was none */
@@ -93,6 +95,7 @@ PetscErrorCode SbEstimateContact(SbLedger l, const SbStep *step, PetscReal *erro
 /* dial.c */
 PetscErrorCode SbDialSetFromOptions(SbLedger l);
 PetscErrorCode SbDialAttach(SbLedger l);
+PetscErrorCode SbDialSet(SbLedger l, PetscReal rtol); /* the tolerance of solves, where it is the program's */
 PetscErrorCode SbDialLook(SbLedger l, const SbSolved *step, PetscBool *again);
 PetscErrorCode SbDialAccept(SbLedger l, const SbStep *step);
 

@@ -1,7 +1,8 @@
 /*
   given.c - a body whose mesh is in memory, on rank 0: what re-meshing has made, or what a checkpoint holds.
 
-  There are no groups any more, but the sets that they mean are known by their bits. Shapes are looked up anew.
+  There are no groups any more, but the sets that they mean are known by their bits. Shapes are looked up anew, but for the tets of inclusions: these stay
+  what they were, also where a new tet lies across the shape.
 */
 #include "mesh_impl.h"
 
@@ -60,13 +61,16 @@ PetscErrorCode SbImportGiven(const SbBody *body, SbImport *im)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbGivenMark(const SbGiven *g, const SbFaces *faces, SbMasks *m)
+PetscErrorCode SbGivenMark(const SbBody *body, const SbFaces *faces, SbMasks *m)
 {
+  const SbGiven *g = body->given;
+  uint64_t inclusions = 0;
   PetscInt slots[2];
 
   PetscFunctionBeginUser;
+  for (PetscInt k = 0; k < body->ninclusion; k++) inclusions |= SB_SET_BIT(body->inclusion[k].set);
   for (PetscInt v = 0; v < g->nvert; v++) m->vert[v] |= g->vert_set[v];
-  for (PetscInt c = 0; c < g->ncell; c++) m->cell[c] |= g->cell_set[c];
+  for (PetscInt c = 0; c < g->ncell; c++) m->cell[c] = (m->cell[c] & ~inclusions) | g->cell_set[c];
   for (PetscInt t = 0; t < g->ntri; t++) {
     const PetscInt n = SbFacesFind(faces, g->tri + 3 * (size_t)t, slots);
 

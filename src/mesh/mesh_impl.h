@@ -209,7 +209,7 @@ typedef struct {
 PetscErrorCode SbSetsMark(const SbImport *import, const SbFaces *faces, PetscInt nbody, const SbBody body[],
                           PetscInt b, PetscInt nset, SbSet set[], SbMasks *masks);
 /* Adds the members of sets that are groups. */
-PetscErrorCode SbGivenMark(const SbGiven *given, const SbFaces *faces, SbMasks *masks);
+PetscErrorCode SbGivenMark(const SbBody *body, const SbFaces *faces, SbMasks *masks);
 /* A set that selects nothing is an error, which lists the groups that exist. */
 PetscErrorCode SbSetsCheck(PetscInt nbody, const SbBody body[], const SbImport import[], PetscInt nset,
                            const SbSet set[]);

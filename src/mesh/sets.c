@@ -255,7 +255,7 @@ PetscErrorCode SbSetsMark(const SbImport *im, const SbFaces *faces, PetscInt nbo
   PetscCall(mark_tags(im, nbody, body, b, nset, set, bits));
   PetscCall(mark_groups(im, faces, bits, m));
   PetscCall(PetscFree(bits));
-  if (body[b].given) PetscCall(SbGivenMark(body[b].given, faces, m));
+  if (body[b].given) PetscCall(SbGivenMark(&body[b], faces, m));
   if (!nset) PetscFunctionReturn(PETSC_SUCCESS);
   for (PetscInt v = 0; v < im->nvert; v++) count_bits(m->vert[v], nset, &set->nvert, sizeof(*set));
   for (PetscInt c = 0; c < im->item[3].n; c++) count_bits(m->cell[c], nset, &set->ncell, sizeof(*set));

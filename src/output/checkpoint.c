@@ -193,6 +193,7 @@ static PetscErrorCode write_numbers(SbRun run, SbOutput out, const SbStep *step,
   PetscCall(write_carried(run, h));
   if (run->energies.remesh_loss != 0.)
     PetscCall(SbH5PutReal(h, h->file, "remesh_loss", run->energies.remesh_loss));
+  if (run->paused) PetscCall(SbH5PutReal(h, h->file, "paused_after", run->after.dt));
   PetscCall(SbH5PutReal(h, h->file, "time", step->t));
   PetscCall(SbH5PutReal(h, h->file, "dt_next", dt));
   PetscCall(SbH5PutReal(h, h->file, "dt", run->dt));
@@ -441,8 +442,8 @@ static PetscErrorCode load(SbRun run, SbOutput out, const char *path, PetscBool 
   int64_t step, mesh_hash, checksum = 0, format;
   uint64_t sum = 0;
   SbRecords *records;
-  PetscReal t, values[NTOTAL], remesh_loss = 0.;
-  PetscBool remeshed = PETSC_TRUE;
+  PetscReal t, values[NTOTAL], remesh_loss = 0., paused = 0.;
+  PetscBool remeshed = PETSC_TRUE, pauses = PETSC_TRUE;
 
   PetscFunctionBeginUser;
   PetscCall(SbH5Open(out->comm, path, PETSC_FALSE, &h, ok));
@@ -455,6 +456,7 @@ static PetscErrorCode load(SbRun run, SbOutput out, const char *path, PetscBool 
   totals_of(run, total);
   for (int i = 0; i < NTOTAL; i++) PetscCall(SbH5GetReal(h.file, total[i].name, &values[i], ok));
   PetscCall(SbH5GetReal(h.file, "remesh_loss", &remesh_loss, &remeshed));
+  PetscCall(SbH5GetReal(h.file, "paused_after", &paused, &pauses));
   if (*ok && format != FORMAT) *ok = PETSC_FALSE;
   if (*ok) PetscCall(check_identity(run, out, &h, mesh_hash));
   PetscCall(PetscCalloc1(run->model->neffect, &records));
@@ -471,6 +473,7 @@ static PetscErrorCode load(SbRun run, SbOutput out, const char *path, PetscBool 
   if (!*ok) PetscFunctionReturn(PETSC_SUCCESS);
   for (int i = 0; i < NTOTAL; i++) *total[i].value = values[i];
   run->energies.remesh_loss = remesh_loss;
+  run->after.dt = paused;
   run->step0 = (PetscInt)step;
   run->t0 = t;
   PetscFunctionReturn(PETSC_SUCCESS);

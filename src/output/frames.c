@@ -109,6 +109,8 @@ static PetscErrorCode write_mesh(SbRun run, SbOutput out)
 
   PetscFunctionBeginUser;
   mesh_name(fr->mesh, sizeof(name), name);
+  // A run that was taken up before a re-meshing comes to it again.
+  if (H5Lexists(fr->h5.file, name, H5P_DEFAULT) > 0) (void)H5Ldelete(fr->h5.file, name, H5P_DEFAULT);
   PetscCall(SbH5Reserve(&fr->h5, (PetscInt64)out->point.N * 24 + (PetscInt64)out->cell.N * 40 + 65536));
   PetscCall(SbH5GroupCreate(&fr->h5, 8, 8, &group));
   PetscCall(SbH5PutInt(&fr->h5, group, "hash", (int64_t)out->mesh_hash));

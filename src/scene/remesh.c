@@ -241,6 +241,12 @@ static PetscErrorCode look_after_failure(SbRemesh r, SbRun run, PetscBool *again
   *again = PETSC_FALSE;
   if (!r->failed || !run->stop_reason[0] || run->step_now <= r->tried) PetscFunctionReturn(PETSC_SUCCESS);
   r->tried = run->step_now;
+  if (!run->step_now) {
+    PetscCall(SbWarning(run->model->comm,
+                        "-remesh_failed: the first step failed, with the bodies as they were "
+                        "given: none is re-meshed, their meshes, loads or steps must change"));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
   PetscCall(SbBodyQualities(run->model, run->U, r->named, r->worst));
   for (PetscInt b = 0; b < r->nbody; b++) {
     r->due[b] = PETSC_FALSE;
@@ -332,23 +338,36 @@ static PetscErrorCode make_scene(const Scene *old, SbGiven *given[], Scene *s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Momenta of the bodies, and rates of theirs where the integrator brings its acceleration along: else it would push them for a step. */
+static PetscErrorCode conserve_momenta(const Scene *old, const PetscBool done[], SbRun run, PetscReal *speed)
+{
+  const SbRun before = old->run;
+  PetscReal(*momenta)[6], rate;
+
+  PetscFunctionBeginUser;
+  if (!run->V) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscCalloc1(old->model->nbody, &momenta));
+  PetscCall(SbBodyMomenta(old->model, before->U, before->V, momenta));
+  PetscCall(SbBodySetMomenta(run->model, run->U, run->V, done, (const PetscReal(*)[6])momenta, speed));
+  if (run->A) {
+    PetscCall(SbBodyMomenta(old->model, before->U, before->A, momenta));
+    PetscCall(SbBodySetMomenta(run->model, run->U, run->A, done, (const PetscReal(*)[6])momenta, &rate));
+  }
+  PetscCall(PetscFree(momenta));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* The state goes from the old scene to the new one. */
 static PetscErrorCode hand_over(const Scene *old, const SbGathered *next, const SbRenamed *renamed,
                                 const PetscBool done[], Scene *s, PetscReal *speed)
 {
   SbRun run = s->run;
-  PetscReal(*momenta)[6];
 
   PetscFunctionBeginUser;
   PetscCall(SbRunContinue(old->run, run));
   PetscCall(SbScatter(next, run));
   PetscCall(SbModelPrescribe(s->model, run->t_now, run->U));
-  if (run->V) {
-    PetscCall(PetscCalloc1(old->model->nbody, &momenta));
-    PetscCall(SbBodyMomenta(old->model, old->run->U, old->run->V, momenta));
-    PetscCall(SbBodySetMomenta(s->model, run->U, run->V, done, (const PetscReal(*)[6])momenta, speed));
-    PetscCall(PetscFree(momenta));
-  }
+  PetscCall(conserve_momenta(old, done, run, speed));
   PetscCall(SbEffectsHandOver(old->run, run, renamed));
   PetscCall(SbRunRestartAcceleration(run));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -500,12 +519,28 @@ static PetscErrorCode apply(SbRemesh r, Scene *scene, PetscBool *any)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A checkpoint of a step that bodies were to be re-meshed after holds the meshes of before: a restart does it first. */
+static PetscErrorCode make_up(SbRemesh r, Scene *scene)
+{
+  const SbRun run = scene->run;
+  PetscBool again = PETSC_FALSE, any;
+
+  PetscFunctionBeginUser;
+  if (!r || !run->step0 || !(run->after.dt > 0.)) PetscFunctionReturn(PETSC_SUCCESS);
+  run->step_now = run->step0;
+  run->t_now = run->t0;
+  PetscCall(look(run, run->step0, run->t0, run->after.dt, r, &again));
+  if (again) PetscCall(apply(r, scene, &any));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode SbRemeshSolve(SbRemesh r, SbModel *model, SbRun *run, SbLedger *ledger)
 {
   Scene scene = {*model, *run, ledger ? *ledger : NULL};
   PetscBool again, failed = PETSC_FALSE, any = PETSC_FALSE;
 
   PetscFunctionBeginUser;
+  PetscCall(make_up(r, &scene));
   do {
     PetscCall(SbRunSolve(scene.run));
     again = scene.run->paused;

@@ -50,7 +50,8 @@ typedef struct {
   Side *side; /* [nside] of the old surface, in order */
   SbLocator rest;
   SbNewMesh mesh;
-  uint64_t groups; /* bits of sets that are groups */
+  uint64_t groups;     /* bits of sets that are groups */
+  uint64_t inclusions; /* and of those that are inclusions of the body */
 } Work;
 
 static uint64_t groups_of(SbModel m)
@@ -58,6 +59,14 @@ static uint64_t groups_of(SbModel m)
   uint64_t bits = 0;
 
   for (PetscInt k = 0; k < m->nset; k++) bits |= m->set[k].shape == SB_SET_GROUP ? SB_SET_BIT(k) : 0;
+  return bits;
+}
+
+static uint64_t inclusions_of(const SbBody *body)
+{
+  uint64_t bits = 0;
+
+  for (PetscInt k = 0; k < body->ninclusion; k++) bits |= SB_SET_BIT(body->inclusion[k].set);
   return bits;
 }
 
@@ -76,6 +85,7 @@ static PetscErrorCode open_work(SbModel m, const SbGathered *g, PetscInt b, Work
   w->element = m->element[b];
   w->each = 3 * g->nfield;
   w->groups = groups_of(m);
+  w->inclusions = inclusions_of(&m->body[b]);
   PetscCall(PetscMalloc1(4 * (size_t)w->ncell, &w->cell));
   PetscCall(PetscMalloc1(nvert, &w->at));
   for (PetscInt i = 0; i < 4 * w->ncell; i++) {
@@ -133,7 +143,7 @@ static PetscErrorCode number_regions(const Work *w, PetscInt region[])
   PetscCall(PetscMalloc1(w->ncell, &kind));
   for (PetscInt c = 0; c < w->ncell; c++) {
     const uint64_t material = (uint64_t)g->cell_material[w->cell0 + c],
-                   sets = g->cell_set[5 * (w->cell0 + c)] & w->groups;
+                   sets = g->cell_set[5 * (w->cell0 + c)] & (w->groups | w->inclusions);
     PetscInt k = 0;
 
     while (k < nkind && (kind[k][0] != material || kind[k][1] != sets)) k++;
@@ -236,8 +246,8 @@ static PetscErrorCode give_new(const Work *w, SbGiven **given)
   (void)list_triangles(w, p);
   for (PetscInt v = 0; v < m->nkept; v++) p->vert_set[v] = w->g->vert_set[w->vert0 + m->kept[v]] & w->groups;
   for (PetscInt c = 0; c < m->ncell; c++) {
-    p->cell_set[c] = w->g->cell_set[5 * (w->cell0 + m->within[c])] & w->groups;
-    for (int a = 0; a < 4; a++) p->vert_set[m->cell[4 * c + a]] |= p->cell_set[c];
+    p->cell_set[c] = w->g->cell_set[5 * (w->cell0 + m->within[c])] & (w->groups | w->inclusions);
+    for (int a = 0; a < 4; a++) p->vert_set[m->cell[4 * c + a]] |= p->cell_set[c] & w->groups;
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -258,7 +268,8 @@ static PetscErrorCode give_old(const Work *w, SbGiven **given)
   PetscCall(PetscArraycpy(p->x, g->X + 3 * w->vert0, 3 * (size_t)nvert));
   PetscCall(PetscArraycpy(p->cell, w->cell, 4 * (size_t)w->ncell));
   for (PetscInt v = 0; v < nvert; v++) p->vert_set[v] = g->vert_set[w->vert0 + v] & w->groups;
-  for (PetscInt c = 0; c < w->ncell; c++) p->cell_set[c] = g->cell_set[5 * (w->cell0 + c)] & w->groups;
+  for (PetscInt c = 0; c < w->ncell; c++)
+    p->cell_set[c] = g->cell_set[5 * (w->cell0 + c)] & (w->groups | w->inclusions);
   ntri = 0;
   for (PetscInt i = 0; i < 4 * w->ncell; i++) {
     const uint64_t bits = g->cell_set[5 * (w->cell0 + i / 4) + 1 + i % 4] & w->groups;

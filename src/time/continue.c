@@ -20,6 +20,7 @@ static PetscErrorCode after_step(TS ts)
   if (reason || t >= run->t_end * (1. - 1e-12)) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(TSGetStepNumber(ts, &step));
   PetscCall(TSGetPrevTime(ts, &before));
+  run->after.dt = t - before;
   PetscCall((*run->after.fn)(run, step, t, t - before, run->after.ctx, &run->paused));
   if (run->paused) PetscCall(TSSetConvergedReason(ts, TS_CONVERGED_USER));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -61,7 +62,7 @@ PetscErrorCode SbRunContinue(SbRun from, SbRun to)
   PetscFunctionBeginUser;
   to->step0 = to->step_now = from->step_now;
   to->t0 = to->t_now = from->t_now;
-  to->model->load = from->model->load;
+  to->model->load = to->model->dynamic ? 1. : from->t_now; /* an attempt that failed has left its own */
   to->energies = from->energies;
   to->energy_start = from->energy_start;
   to->newton_total = to->newton_before = from->newton_total;

@@ -177,6 +177,7 @@ PetscErrorCode SbStaticSolve(SbRun run)
     }
     run->stop_reason[0] = 0;
     PetscCall(VecCopy(X, run->U));
+    run->after.dt = next - factor;
     if (run->after.fn && next < 1.)
       PetscCall((*run->after.fn)(run, step + 1, next, next - factor, run->after.ctx, &run->paused));
     PetscCall(SbRunStepAccepted(run, ++step, next, next - factor, (PetscBool)(next >= 1.)));

@@ -1,0 +1,417 @@
+// @ranks 1 2
+// @timeout 300
+/*
+  Re-meshing where bodies touch, hold, are made of several materials, or fail.
+
+    touch      the same nodes touch before and after it, with the same forces, frictions and normals: a plane and another body
+    runs       bodies that are re-meshed while they touch: momentum, penetration, energy, end
+    inclusion  every tet's material has the mass that it had, also where the inclusion is a shape that new tets would lie across
+    held       cr and dg on a support, with adaptive steps
+    ledger     errors go on, and -accuracy finds its steps
+    failed     -remesh_failed: tried once for each state, then the run stops with its reason; not where the first step fails
+*/
+#include "../../src/scene/remesh_impl.h"
+#include "../remesh.h"
+
+#define STUFF(b)                                                                                \
+  " -body_" #b "_material neohookean -body_" #b "_young 2e4 -body_" #b "_poisson 0.3 -body_" #b \
+  "_density 1000 "
+#define FLOOR                                                                                              \
+  "-bodies a -body_a_mesh box:0.2,0.15,0.1:4,3,2 -body_a_translate 0,0,0.002" STUFF(                       \
+    a) "-body_a_velocity 0.5,0,-0.3 -effects weight,floor -effect_weight_type gravity -effect_floor_type " \
+       "contact "                                                                                          \
+       "-effect_floor_obstacle plane:0,0,1,0 -ts_dt 0.005 "
+#define PAIR                                                                                               \
+  "-bodies a,b -body_a_mesh box:0.2,0.2,0.2:3,3,3 -body_b_mesh box:0.2,0.2,0.2:4,4,4 "                     \
+  "-body_b_translate 0.202,0.03,0.02" STUFF(a)                                                             \
+    STUFF(b) "-body_a_velocity 0.5,0,0 -body_b_velocity -0.5,0,0 -effects hit -effect_hit_type collision " \
+             "-ts_dt 0.005 "
+#define BEAM                                                                                                 \
+  "-bodies a -body_a_mesh box:0.4,0.1,0.1:6,2,2" STUFF(                                                      \
+    a) "-sets end -set_end_at plane:1,0,0,0 -effects hold,weight -effect_hold_type support -effect_hold_on " \
+       "end "                                                                                                \
+       "-effect_weight_type gravity "
+
+/* ------------------------------------------------------------------ who touches */
+
+/* What an effect would write to a checkpoint, of all ranks, in order; but for its sums. */
+typedef struct {
+  PetscInt n;
+  PetscReal *r; /* [n][nstate] */
+} Records;
+
+static PetscInt width; /* of a record, for the comparison */
+
+static int by_name(const void *a, const void *b)
+{
+  const PetscReal *p = (const PetscReal *)a, *q = (const PetscReal *)b;
+
+  for (PetscInt k = 0; k < PetscMin(width, 3); k++) {
+    if (p[k] != q[k]) return p[k] < q[k] ? -1 : 1;
+  }
+  return 0;
+}
+
+static PetscErrorCode gather(SbEffect e, SbSpace space, Records *all)
+{
+  PetscMPIInt size, mine, count[16], offset[16], total = 0;
+  PetscReal *own;
+  PetscInt n;
+
+  PetscFunctionBeginUser;
+  PetscCallMPI(MPI_Comm_size(space->comm, &size));
+  PetscCheck(size <= 16, space->comm, PETSC_ERR_SUP, "at most 16 ranks");
+  SbEffectCall(e, save, space, &n, &own);
+  mine = (PetscMPIInt)(n * e->nstate);
+  PetscCallMPI(MPI_Allgather(&mine, 1, MPI_INT, count, 1, MPI_INT, space->comm));
+  for (PetscMPIInt k = 0; k < size; total += count[k++]) offset[k] = total;
+  PetscCall(PetscMalloc1(total, &all->r));
+  PetscCallMPI(MPI_Allgatherv(own, mine, MPIU_REAL, all->r, count, offset, MPIU_REAL, space->comm));
+  PetscCall(PetscFree(own));
+  all->n = total / e->nstate;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Leaves what is about nodes, in order. collision: a record begins with what it is. */
+static PetscErrorCode put_in_order(SbEffect e, PetscBool collision, Records *all)
+{
+  PetscInt kept = 0;
+
+  PetscFunctionBeginUser;
+  for (PetscInt i = 0; i < all->n; i++) {
+    if (collision && all->r[i * e->nstate] != 0.) continue;
+    PetscCall(PetscArraymove(all->r + kept++ * e->nstate, all->r + i * e->nstate, e->nstate));
+  }
+  all->n = kept;
+  width = collision ? 3 : 1;
+  qsort(all->r, (size_t)all->n, (size_t)e->nstate * sizeof(PetscReal), by_name);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The second scene is the first one with body a meshed anew by the program's own mesher. */
+static PetscErrorCode hand_over(TestScene *a, TestScene *b, SbRenamed *renamed)
+{
+  const SbRemeshing how = {.mesher = SbMesherDefault, .size = 1., .quality = 1e-3};
+  const PetscBool due[2] = {PETSC_TRUE, PETSC_FALSE};
+  SbMade made[2];
+  SbGiven *given[2] = {NULL, NULL};
+  SbGathered g, next = {0};
+  PetscMPIInt rank;
+
+  PetscFunctionBeginUser;
+  PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
+  PetscCall(SbGather(a->run, &g));
+  if (!rank) PetscCall(SbRemeshBodies(a->model, &g, due, 1, &how, given, made, &next, renamed));
+  if (!rank) SB_CHECK(!made[0].message[0], "%s", made[0].message);
+  PetscCallMPI(MPI_Bcast(&renamed->n, 1, MPIU_INT, 0, PETSC_COMM_WORLD));
+  if (rank) PetscCall(PetscMalloc2(renamed->n, &renamed->from, renamed->n, &renamed->to));
+  PetscCallMPI(MPI_Bcast(renamed->from, (PetscMPIInt)renamed->n, MPIU_INT, 0, PETSC_COMM_WORLD));
+  PetscCallMPI(MPI_Bcast(renamed->to, (PetscMPIInt)renamed->n, MPIU_INT, 0, PETSC_COMM_WORLD));
+  next.nfield = g.nfield;
+  next.width = g.width;
+  PetscCall(SbSceneCreate(PETSC_COMM_WORLD, &b->model));
+  PetscCall(SbRunCreate(b->model, &b->run));
+  for (PetscInt k = 0; k < a->model->nbody; k++) {
+    if (rank) PetscCall(SbGivenCreate(0, 0, 0, &given[k]));
+    if (rank && !k) given[0]->mass = g.mass[0];
+    b->model->body[k].given = given[k];
+  }
+  PetscCall(SbModelSetUp(b->model));
+  PetscCall(SbRunSetUp(b->run));
+  PetscCall(SbRunContinue(a->run, b->run));
+  PetscCall(SbScatter(&next, b->run));
+  PetscCall(SbEffectsHandOver(a->run, b->run, renamed));
+  PetscCall(SbGatheredDestroy(&g));
+  PetscCall(SbGatheredDestroy(&next));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Runs until bodies touch; the last effect is the one that is looked at. */
+static PetscErrorCode check_touch(const char *scene, PetscBool collision)
+{
+  TestScene a, b = {NULL, NULL, NULL, NULL};
+  SbRenamed renamed = {0};
+  Records before, after;
+  PetscReal worst = 0., scale = 0.;
+  PetscInt last, named;
+  SbEffect e;
+
+  PetscFunctionBeginUser;
+  PetscCall(test_scene_open(scene, &a));
+  PetscCall(test_scene_solve(&a));
+  last = a.model->neffect - 1;
+  e = a.model->effect[last];
+  PetscCall(hand_over(&a, &b, &renamed));
+  PetscCall(gather(e, a.model->space, &before));
+  PetscCall(put_in_order(e, collision, &before));
+  named = before.n;
+  PetscCall((*e->ops.rename)(e, renamed.n, renamed.from, renamed.to, &before.n, before.r));
+  PetscCall(put_in_order(e, collision, &before));
+  PetscCall(gather(b.model->effect[last], b.model->space, &after));
+  PetscCall(put_in_order(e, collision, &after));
+  SB_CHECK(before.n > 5 && before.n == named && after.n == named, "'%s': %d nodes touch, %d renamed, then %d",
+           scene, (int)named, (int)before.n, (int)after.n);
+  for (PetscInt i = 0; i < e->nstate * PetscMin(before.n, after.n); i++) {
+    /* a checkpoint of pairs leaves out who was let go within the step */
+    if (collision && i % e->nstate == 3) continue;
+    worst = PetscMax(worst, PetscAbsReal(after.r[i] - before.r[i]));
+    scale = PetscMax(scale, PetscAbsReal(before.r[i]));
+  }
+  SB_CHECK(worst <= 1e-12 * scale, "'%s': what touching nodes remember has changed by %g of %g", scene,
+           (double)worst, (double)scale);
+  PetscCall(PetscFree(before.r));
+  PetscCall(PetscFree(after.r));
+  PetscCall(PetscFree2(renamed.from, renamed.to));
+  PetscCall(test_scene_close(&a));
+  PetscCall(test_scene_close(&b));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ runs */
+
+/* The largest penetration that the last effect reports, m. */
+static PetscErrorCode penetration(SbModel m, const char *name, PetscReal *depth)
+{
+  const SbEffect e = m->effect[m->neffect - 1];
+  PetscReal *values;
+
+  PetscFunctionBeginUser;
+  *depth = -1.;
+  PetscCall(PetscCalloc1(e->ncolumn, &values));
+  PetscCall((*e->ops.history)(e, m->space, NULL, NULL, values));
+  for (PetscInt k = 0; k < e->ncolumn; k++) {
+    if (!strcmp(e->column[k], name)) *depth = values[k];
+  }
+  PetscCall(PetscFree(values));
+  PetscCallMPI(MPI_Bcast(depth, 1, MPIU_REAL, 0, m->comm));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* How far nodes are below z = 0. */
+static PetscErrorCode below(SbModel m, Vec U, PetscReal *depth)
+{
+  const PetscScalar *u;
+
+  PetscFunctionBeginUser;
+  *depth = 0.;
+  PetscCall(VecGetArrayRead(U, &u));
+  for (PetscInt i = 0; i < m->space->nnode_owned; i++)
+    *depth = PetscMax(*depth, -m->space->node_x[3 * i + 2] - u[3 * i + 2]);
+  PetscCall(VecRestoreArrayRead(U, &u));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, depth, 1, MPIU_REAL, MPI_MAX, m->comm));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* pair: two bodies and nothing else, whose momenta cancel. */
+static PetscErrorCode check_run(const char *scene, PetscBool pair, PetscReal end)
+{
+  PetscReal depth, scale, lost, drift;
+  SbEnergies e;
+  TestScene s;
+
+  PetscFunctionBeginUser;
+  PetscCall(test_scene_open(scene, &s));
+  s.run->want_energies = PETSC_TRUE;
+  PetscCall(test_scene_solve(&s));
+  e = s.run->energies;
+  scale = s.run->energy_start;
+  SB_CHECK(!s.run->stop_reason[0] && PetscAbsReal(s.run->t_now - end) < 1e-9, "'%s' ends at %g s: %s", scene,
+           (double)s.run->t_now, s.run->stop_reason);
+  SB_CHECK(s.model->body[0].given && e.remesh_loss != 0., "'%s' was not re-meshed", scene);
+  SB_CHECK(PetscAbsReal(e.remesh_loss) < 0.1 * scale, "'%s': %g of %g J by re-meshing", scene,
+           (double)e.remesh_loss, (double)scale);
+  lost = scale + e.load_work + e.drive_work - e.kinetic - e.strain - e.remesh_loss;
+  SB_CHECK(lost > -0.01 * scale && lost < scale + PetscAbsReal(e.load_work), "'%s' has lost %g of %g J",
+           scene, (double)lost, (double)scale);
+  SB_CHECK(e.ninverted == 0, "'%s': %d tets inside out", scene, (int)e.ninverted);
+  if (pair)
+    PetscCall(penetration(s.model, "penetration", &depth));
+  else
+    PetscCall(below(s.model, s.run->U, &depth));
+  SB_CHECK(depth >= 0. && depth < (strstr(scene, " dg") ? 4e-3 : 1e-3), "'%s': %g m deep", scene,
+           (double)depth);
+  drift =
+    PetscMax(PetscAbsReal(e.momentum[0]), PetscMax(PetscAbsReal(e.momentum[1]), PetscAbsReal(e.momentum[2])));
+  SB_CHECK(!pair || drift < 1e-5, "'%s': momentum %g kg m/s", scene, (double)drift);
+  PetscCall(test_scene_close(&s));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ inclusions */
+
+static PetscErrorCode masses(SbModel m, PetscReal mass[3])
+{
+  const SbSpace s = m->space;
+
+  PetscFunctionBeginUser;
+  for (int k = 0; k < 3; k++) mass[k] = 0.;
+  for (PetscInt b = 0; b < s->nbatch; b++) {
+    for (PetscInt i = 0; i < s->batch_n[b]; i++) {
+      const PetscInt c = s->batch_cell[b] + i;
+
+      if (c < m->mesh->ncell_owned) mass[m->mesh->cell_material[c]] += s->batch_V[b][i];
+    }
+  }
+  for (PetscInt i = 0; i < s->nnode_owned; i++) mass[2] += s->node_mass[i];
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, mass, 3, MPIU_REAL, MPI_SUM, m->comm));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode check_inclusion(const char *more)
+{
+  PetscReal before[3], after[3];
+  TestScene s;
+  char text[2048];
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscSNPrintf(
+    text, sizeof(text),
+    "-bodies a -body_a_mesh box:0.2,0.2,0.2:5,5,5" STUFF(
+      a) "-body_a_spin 0,3,1 -sets core -set_core_at sphere:0.1,0.1,0.1,0.075 -body_a_inclusions core "
+         "-inclusion_core_material neohookean -inclusion_core_young 1e5 -inclusion_core_poisson 0.3 "
+         "-inclusion_core_density 3000 -ts_dt 0.01 -ts_max_time 0.03 -remesh_times 0.01,0.02 %s",
+    more));
+  PetscCall(test_scene_open(text, &s));
+  PetscCall(masses(s.model, before));
+  PetscCall(test_scene_solve(&s));
+  PetscCall(masses(s.model, after));
+  SB_CHECK(s.model->body[0].given && s.model->body[0].given->step == 2, "re-meshed twice");
+  SB_CHECK(before[1] > 0.05 * before[0], "an inclusion of %g m^3", (double)before[1]);
+  for (int k = 0; k < 3; k++)
+    SB_CHECK_NEAR(after[k], before[k], 1e-12 * before[k],
+                  k == 2 ? "mass of the body"
+                  : k    ? "volume of the inclusion"
+                         : "volume around it");
+  PetscCall(test_scene_close(&s));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ supports, adaptive steps, ledger */
+
+static PetscErrorCode check_held(const char *more)
+{
+  PetscReal worst = 0.;
+  const PetscScalar *u;
+  TestScene s;
+  char text[2048];
+
+  PetscFunctionBeginUser;
+  PetscCall(
+    PetscSNPrintf(text, sizeof(text), BEAM "-ts_dt 0.005 -ts_max_time 0.06 -remesh_times 0.03 %s", more));
+  PetscCall(test_scene_open(text, &s));
+  s.run->want_energies = PETSC_TRUE;
+  PetscCall(test_scene_solve(&s));
+  SB_CHECK_NEAR(s.run->t_now, 0.06, 1e-9, "end");
+  SB_CHECK(!s.run->stop_reason[0] && s.model->body[0].given, "%s: %s", more, s.run->stop_reason);
+  PetscCall(VecGetArrayRead(s.run->U, &u));
+  for (PetscInt i = 0; i < s.model->space->nnode_owned; i++) {
+    for (int k = 0; k < 3; k++)
+      worst = PetscMax(worst, s.model->space->fixed[i] & (1 << k) ? PetscAbsReal(u[3 * i + k]) : 0.);
+  }
+  PetscCall(VecRestoreArrayRead(s.run->U, &u));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &worst, 1, MPIU_REAL, MPI_MAX, PETSC_COMM_WORLD));
+  SB_CHECK(worst == 0. && s.run->energies.max_displacement > 0.01, "%s: the support gives by %g m", more,
+           (double)worst);
+  PetscCall(test_scene_close(&s));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Relative errors of the time steps and of the mesh at the end, and the steps. */
+static PetscErrorCode ledger_run(const char *more, PetscReal error[2], PetscInt *steps)
+{
+  PetscReal stored;
+  TestScene s;
+  char text[2048];
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscSNPrintf(text, sizeof(text), BEAM "-ts_dt 0.005 -ts_max_time 0.08 -ledger %s", more));
+  PetscCall(test_scene_open(text, &s));
+  PetscCall(test_scene_solve(&s));
+  SB_CHECK(!s.run->stop_reason[0], "%s: %s", more, s.run->stop_reason);
+  PetscCall(SbLedgerGet(s.ledger, SB_ERROR_TIME, &error[0], &stored));
+  PetscCall(SbLedgerGet(s.ledger, SB_ERROR_SPACE, &error[1], &stored));
+  for (int k = 0; k < 2; k++) error[k] /= PetscSqrtReal(stored);
+  *steps = s.run->steps_total;
+  PetscCall(test_scene_close(&s));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode check_ledger(const char *more, PetscReal accuracy)
+{
+  PetscReal with[2], without[2];
+  PetscInt steps[2];
+  char text[512];
+
+  PetscFunctionBeginUser;
+  PetscCall(ledger_run(more, without, &steps[0]));
+  PetscCall(PetscSNPrintf(text, sizeof(text), "%s -remesh_times 0.06", more));
+  PetscCall(ledger_run(text, with, &steps[1]));
+  /* most of the run was before it, so errors that did not go on would be smaller; a re-meshed body vibrates, so they are larger */
+  SB_CHECK(with[0] > 0.9 * without[0] || (accuracy > 0. && with[0] < accuracy),
+           "%s: time %g, not re-meshed %g", more, (double)with[0], (double)without[0]);
+  SB_CHECK(with[0] < (accuracy > 0. ? accuracy : 0.5), "%s: time %g", more, (double)with[0]);
+  SB_CHECK(with[1] > 0.5 * without[1] && with[1] < 2. * without[1], "%s: space %g, not re-meshed %g", more,
+           (double)with[1], (double)without[1]);
+  SB_CHECK(steps[1] < 20 * steps[0], "%s: %d steps, not re-meshed %d", more, (int)steps[1], (int)steps[0]);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ steps that fail */
+
+/* A solve that may take few iterations. */
+static PetscErrorCode check_failed(const char *iterations, PetscBool first)
+{
+  TestScene s;
+  char text[2048];
+  int calls = 0;
+
+  PetscFunctionBeginUser;
+  PetscCall(
+    PetscSNPrintf(text, sizeof(text),
+                  "-bodies a -body_a_mesh box:0.1,0.1,0.1:3,3,3" STUFF(
+                    a) "-effects knead "
+                       "-effect_knead_type drive -effect_knead_on boundary -effect_knead_displacement "
+                       "0.1*sin(40*t*y)*z;-0.5*t*(y-0.05);-0.4*t*z -time static -static_steps 10 "
+                       "-time_max_cuts 0 -remesh_failed -snes_max_it %s",
+                  iterations));
+  PetscCall(test_scene_open(text, &s));
+  PetscCall(SbRemeshSetMesher(s.remesh, fixture_cone, &calls));
+  PetscCall(test_scene_solve(&s));
+  PetscCallMPI(MPI_Bcast(&calls, 1, MPI_INT, 0, PETSC_COMM_WORLD));
+  SB_CHECK(s.run->stop_reason[0] && s.run->t_now < 1., "a run with %s iterations comes to its end",
+           iterations);
+  SB_CHECK(first == !calls && first == !s.run->step_now, "%s iterations: %d re-meshings, %d steps",
+           iterations, calls, (int)s.run->step_now);
+  SB_CHECK(first || (s.model->body[0].given && s.model->body[0].given->step > 0), "no new mesh");
+  SB_CHECK(first || s.model->load > s.run->t_now, "the attempt has its own load factor");
+  PetscCall(test_scene_close(&s));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+int main(int argc, char **argv)
+{
+  SB_TEST_BEGIN(argc, argv);
+  PetscCall(check_touch(FLOOR "-ts_max_time 0.04", PETSC_FALSE));
+  PetscCall(check_touch(FLOOR "-ts_max_time 0.04 -effect_floor_friction 0.4", PETSC_FALSE));
+  PetscCall(
+    check_touch(FLOOR "-ts_max_time 0.04 -effect_floor_friction 0.4 -body_a_element cr", PETSC_FALSE));
+  PetscCall(check_touch(PAIR "-ts_max_time 0.03 -effect_hit_friction 0.3", PETSC_TRUE));
+  PetscCall(check_run(FLOOR "-ts_max_time 0.07 -remesh_times 0.04", PETSC_FALSE, 0.07));
+  PetscCall(
+    check_run(FLOOR "-ts_max_time 0.07 -remesh_times 0.04 -effect_floor_friction 0.4", PETSC_FALSE, 0.07));
+  PetscCall(check_run(PAIR "-ts_max_time 0.05 -remesh_bodies a -remesh_times 0.03", PETSC_TRUE, 0.05));
+  PetscCall(check_run(PAIR "-ts_max_time 0.05 -remesh_bodies a -remesh_times 0.03 -effect_hit_friction 0.3",
+                      PETSC_TRUE, 0.05));
+  PetscCall(
+    check_run(PAIR "-ts_max_time 0.05 -remesh_bodies a -remesh_times 0.03 -time genalpha -body_a_element dg",
+              PETSC_TRUE, 0.05));
+  PetscCall(check_inclusion(""));
+  PetscCall(check_held("-body_a_element cr"));
+  PetscCall(check_held("-body_a_element dg -ts_adapt_type basic"));
+  PetscCall(check_held("-ts_adapt_type basic -time genalpha"));
+  PetscCall(check_ledger("", 0.));
+  PetscCall(check_ledger("-accuracy 0.1", 0.1));
+  PetscCall(check_failed("4", PETSC_TRUE));
+  PetscCall(check_failed("9", PETSC_FALSE));
+  SB_TEST_END();
+}
