@@ -80,7 +80,8 @@ static PetscErrorCode put_in_order(SbEffect e, PetscBool collision, Records *all
   PetscFunctionBeginUser;
   for (PetscInt i = 0; i < all->n; i++) {
     if (collision && all->r[i * e->nstate] != 0.) continue;
-    PetscCall(PetscArraymove(all->r + kept++ * e->nstate, all->r + i * e->nstate, e->nstate));
+    PetscCall(PetscArraymove(all->r + kept * e->nstate, all->r + i * e->nstate, e->nstate));
+    kept++;
   }
   all->n = kept;
   width = collision ? 3 : 1;
