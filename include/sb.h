@@ -1,4 +1,5 @@
 /* sb.h - everything. */
 #pragma once
 #include "sbledger.h"
+#include "sbremesh.h"
 #include "sbscene.h"

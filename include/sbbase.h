@@ -128,6 +128,14 @@ void SbErrorSetFarewell(void (*farewell)(const char *message, void *ctx), void *
   one failed. `ierr` is the code that came up, 0 after PetscFinalize().
 */
 int SbErrorFinish(PetscErrorCode ierr);
+/* What one rank has to say, to be raised by all: rank 0 of a mesh, a child process. */
+typedef struct {
+  int code;
+  char text[1024];
+} SbCaught;
+/* For PetscPushErrorHandler(), ctx an SbCaught: keeps the message. An error that is not the user's is also printed with its trace. */
+PetscErrorCode SbCatchError(MPI_Comm comm, int line, const char *function, const char *file,
+                            PetscErrorCode code, PetscErrorType kind, const char *text, void *ctx);
 /* One line `supple: warning: ...` on stderr by rank 0 of comm; a printf format without newline. Collective. */
 PetscErrorCode SbWarning(MPI_Comm comm, const char *format, ...) PETSC_ATTRIBUTE_FORMAT(2, 3);
 

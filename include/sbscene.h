@@ -55,26 +55,3 @@ PetscErrorCode SbSceneCheck(SbModel model);
 
 /* With -validate: the invariants of mesh and space (ordering, ranges, ownership, sums). Collective; after SbModelSetUp(). */
 PetscErrorCode SbSceneValidate(SbModel model);
-
-/* ------------------------------------------------------------------ re-meshing */
-
-/*
-  SbRemesh - bodies get other meshes while the run goes on (src/scene/remesh.c).
-
-  Order of calls: SbRemeshSetFromOptions() after SbSceneCreate(); SbRemeshAttach() after SbRunSetUp() and SbLedgerAttach(), before
-  SbOutputAttach(), whose history gets the column remesh_loss; SbRemeshSolve() in the place of SbRunSolve(); SbRemeshDestroy().
-*/
-typedef struct _p_SbRemesh *SbRemesh;
-PetscErrorCode SbRemeshRegister(void); /* option rows */
-/* Options read: -remesh_..., -body_<name>_remesh_quality. remesh: NULL when none of them asks for it. Collective. */
-PetscErrorCode SbRemeshSetFromOptions(SbModel model, SbRemesh *remesh);
-/* Who makes the tets, in place of SbMesherDefault(). Not collective. */
-PetscErrorCode SbRemeshSetMesher(SbRemesh remesh, SbMesher mesher, void *ctx);
-/* NULL: nothing. Not collective. */
-PetscErrorCode SbRemeshAttach(SbRemesh remesh, SbRun run);
-/*
-  The whole time loop or load path, as SbRunSolve(). model, run and ledger (NULL: there is none) are other ones afterwards when a body was
-  re-meshed; the old ones are gone. remesh NULL: SbRunSolve() alone. Collective.
-*/
-PetscErrorCode SbRemeshSolve(SbRemesh remesh, SbModel *model, SbRun *run, SbLedger *ledger);
-PetscErrorCode SbRemeshDestroy(SbRemesh *remesh);

@@ -176,6 +176,21 @@ int SbErrorFinish(PetscErrorCode ierr)
   return all[FAILED];
 }
 
+PetscErrorCode SbCatchError(MPI_Comm comm, int line, const char *function, const char *file,
+                            PetscErrorCode code, PetscErrorType kind, const char *text, void *ctx)
+{
+  SbCaught *caught = (SbCaught *)ctx;
+
+  if (kind == PETSC_ERROR_INITIAL) {
+    caught->code = (int)code;
+    (void)snprintf(caught->text, sizeof(caught->text), "%s", text ? text : "");
+  }
+  if (caught->code != PETSC_ERR_USER_INPUT && caught->code != PETSC_ERR_FILE_OPEN &&
+      caught->code != PETSC_ERR_FILE_READ && caught->code != PETSC_ERR_FILE_UNEXPECTED)
+    (void)PetscTraceBackErrorHandler(comm, line, function, file, code, kind, text, NULL);
+  return code;
+}
+
 PetscErrorCode SbWarning(MPI_Comm comm, const char *format, ...)
 {
   PetscMPIInt rank;

@@ -2,7 +2,7 @@
   shell.h - signed distance from a closed surface of triangles.
 */
 #pragma once
-#include "sbmesh.h"
+#include "sbtriangles.h"
 
 typedef struct _p_SbShell *SbShell;
 

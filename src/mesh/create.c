@@ -5,6 +5,7 @@
   so that nobody waits for a rank that is gone.
 */
 #include "mesh_impl.h"
+#include "sbskin.h"
 
 static const SbOption rows[] = {
   {"mesh_partitioner", SB_OPTION_CHOICE, 1, "", "metis", "metis|ptscotch|simple",
@@ -24,21 +25,6 @@ PetscErrorCode SbMeshRegister(void)
 }
 
 /* ------------------------------------------------------------------ errors of rank 0 */
-
-PetscErrorCode SbCatchError(MPI_Comm comm, int line, const char *function, const char *file,
-                            PetscErrorCode code, PetscErrorType kind, const char *text, void *ctx)
-{
-  SbCaught *caught = (SbCaught *)ctx;
-
-  if (kind == PETSC_ERROR_INITIAL) {
-    caught->code = (int)code;
-    (void)snprintf(caught->text, sizeof(caught->text), "%s", text ? text : "");
-  }
-  if (caught->code != PETSC_ERR_USER_INPUT && caught->code != PETSC_ERR_FILE_OPEN &&
-      caught->code != PETSC_ERR_FILE_READ && caught->code != PETSC_ERR_FILE_UNEXPECTED)
-    (void)PetscTraceBackErrorHandler(comm, line, function, file, code, kind, text, NULL);
-  return code;
-}
 
 /* Collective: builds the whole mesh on rank 0; all ranks fail together, or all know what was found. */
 static PetscErrorCode create_whole(MPI_Comm comm, PetscInt nbody, SbBody body[], PetscInt nset, SbSet set[],

@@ -2,6 +2,7 @@
   register.c - everything that a scenario can name: one line per type. A new type is one file in its folder and one line
   here.
 */
+#include "sbremesh.h"
 #include "scene_impl.h"
 
 PetscErrorCode SbRegisterAll(void)

@@ -7,7 +7,9 @@
 #pragma once
 #include <sys/stat.h>
 #include <unistd.h>
-#include "../../src/mesh/tetrahedralize.h"
+#include "../../src/format/format_impl.h"
+#include "../../src/skin/skin_impl.h"
+#include "sbtet.h"
 
 /* A surface for a body: read, mended, checked and cut into regions; it is not filled with tets. */
 static inline PetscErrorCode fuzz_skin(const char *path, SbImport *im)

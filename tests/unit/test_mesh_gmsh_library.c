@@ -3,8 +3,8 @@
 #include <signal.h>
 #include <stdlib.h>
 #include <unistd.h>
-#include "../../src/mesh/gmsh_library.h"
 #include "mesh_test.h"
+#include "sbgmsh.h"
 
 static PetscErrorCode run(const char *doing, PetscReal seconds, SbGmshWork work, void *ctx, SbImport *im)
 {

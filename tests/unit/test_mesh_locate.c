@@ -2,8 +2,9 @@
 /*
   Which tet holds a point: against all tets one by one, at corners, outside, beside tets that are inside out. Shapes of tets.
 */
-#include "../../src/mesh/mesh_impl.h"
+#include "../../src/format/format_impl.h"
 #include "../test.h"
+#include "sbtet.h"
 
 #define N 6
 

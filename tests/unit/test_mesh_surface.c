@@ -1,6 +1,6 @@
 // Bodies from closed surfaces: regions, cavities and groups of each kind of file; what is mended is said; what is wrong is named.
 // @ranks 1 3
-#include "../../src/mesh/tetrahedralize.h"
+#include "../../src/skin/skin_impl.h"
 #include "mesh_test.h"
 #include "surface_files.h"
 

@@ -1,6 +1,6 @@
 // Tets from closed surfaces: volumes of nested regions are exact, kept triangles stay, sizes give counts, both roads, texts of errors.
 // @ranks 1 3
-#include "../../src/mesh/tetrahedralize.h"
+#include "../../src/skin/skin_impl.h"
 #include "mesh_test.h"
 #include "surface_files.h"
 

@@ -1,6 +1,7 @@
 // Surfaces from files: each kind gives the same cube on every rank; what has no inside is refused with its triangle.
 // @ranks 1 3
 #include "mesh_test.h"
+#include "sbtriangles.h"
 #include "surface_files.h"
 
 static const PetscReal zero[3] = {0, 0, 0}, unit[3] = {1, 1, 1};

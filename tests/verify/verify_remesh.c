@@ -10,7 +10,7 @@
     refused    a mesher that cannot: the run goes on as one that is not re-meshed, to the last bit
     sets       groups of a file and shapes hold the same triangles, vertices of the surface and volume
 */
-#include "../../src/scene/remesh_impl.h"
+#include "../../src/remesh/remesh_impl.h"
 #include "../remesh.h"
 
 #define TWO                                                                                         \

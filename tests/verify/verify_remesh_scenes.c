@@ -10,7 +10,7 @@
     ledger     errors go on, and -accuracy finds its steps
     failed     -remesh_failed: tried once for each state, then the run stops with its reason; not where the first step fails
 */
-#include "../../src/scene/remesh_impl.h"
+#include "../../src/remesh/remesh_impl.h"
 #include "../remesh.h"
 
 #define STUFF(b)                                                                                \

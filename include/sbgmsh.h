@@ -1,0 +1,134 @@
+/*
+  sbgmsh.h - layer 1: the gmsh library at work in a process of its own: reads foreign files, makes tetrahedra. Rank 0 only.
+
+  How to use it: write a function of type SbGmshWork and hand it to SbGmshRun(). That forks; the child loads libgmsh, calls
+  the function with a fresh, empty model, and what the function puts into its SbImport (most often by SbGmshCollect())
+  comes back to the caller by a pipe. The function sees all memory of the caller as it was (its ctx may point anywhere), but what
+  it changes there stays in the child. A PETSc error in the function is raised in the caller with the same code and
+  text. A crash of gmsh, or one that does not end in time, is an error of the caller too; the memory of gmsh goes with the child. A
+  scene that does not call SbGmshRun() never loads the library.
+
+    static PetscErrorCode work(const SbGmsh *gmsh, void *ctx, SbImport *result)
+    {
+      PetscFunctionBeginUser;
+      SB_GMSH(gmsh, ModelAddDiscreteEntity, 2, 1, NULL, 0);
+      SB_GMSH(gmsh, ModelMeshAddNodes, 2, 1, tags, n, x, 3 * n, NULL, 0);
+      SB_GMSH(gmsh, ModelMeshAddElementsByType, 1, 2, NULL, 0, nodes, 3 * ntri);
+      ...
+      SB_GMSH(gmsh, ModelMeshGenerate, 3);
+      PetscCall(SbGmshCollect(gmsh, SB_GMSH_ENTITIES, result));
+      PetscFunctionReturn(PETSC_SUCCESS);
+    }
+
+    const SbGmshJob job = {im->where, "made tetrahedra", 600, work, &mine};
+    PetscCall(SbGmshRun(&job, im));
+
+  The functions are those of gmshc.h without the prefix `gmsh` (reference manual of gmsh, "Gmsh API"; one that is missing below is a line more),
+  with the same arguments but the last, the error code, which SB_GMSH() adds and checks. Arrays that gmsh hands out go back by
+  gmsh->Free(). Nothing of gmsh is printed; it uses one thread, so that the same input gives the same mesh.
+*/
+#pragma once
+#include "sbformat.h"
+
+/* type, name, arguments: as in gmshc.h, with the same ones from gmsh 4.8 on to 4.15 (gmshModelAddPhysicalGroup() has not). */
+#define SB_GMSH_FUNCTIONS(X)                                                                               \
+  X(void, Open, (const char *, int *))                                                                     \
+  X(void, Merge, (const char *, int *))                                                                    \
+  X(void, Write, (const char *, int *))                                                                    \
+  X(void, OptionSetNumber, (const char *, double, int *))                                                  \
+  X(void, OptionSetString, (const char *, const char *, int *))                                            \
+  X(void, ModelAdd, (const char *, int *))                                                                 \
+  X(void, ModelGetEntities, (int **, size_t *, int, int *))                                                \
+  X(void, ModelGetPhysicalGroups, (int **, size_t *, int, int *))                                          \
+  X(void, ModelGetPhysicalGroupsForEntity, (int, int, int **, size_t *, int *))                            \
+  X(void, ModelGetPhysicalName, (int, int, char **, int *))                                                \
+  X(int, ModelAddDiscreteEntity, (int, int, int *, size_t, int *))                                         \
+  X(void, ModelGetBoundary, (int *, size_t, int **, size_t *, int, int, int, int *))                       \
+  X(void, ModelMeshGenerate, (int, int *))                                                                 \
+  X(void, ModelMeshOptimize, (const char *, int, int, int *, size_t, int *))                               \
+  X(void, ModelMeshRefine, (int *))                                                                        \
+  X(void, ModelMeshClassifySurfaces, (double, int, int, double, int, int *))                               \
+  X(void, ModelMeshCreateGeometry, (int *, size_t, int *))                                                 \
+  X(void, ModelMeshCreateTopology, (int, int, int *))                                                      \
+  X(void, ModelMeshAddNodes, (int, int, size_t *, size_t, double *, size_t, double *, size_t, int *))      \
+  X(void, ModelMeshAddElementsByType, (int, int, size_t *, size_t, size_t *, size_t, int *))               \
+  X(void, ModelMeshGetNodes,                                                                               \
+    (size_t **, size_t *, double **, size_t *, double **, size_t *, int, int, int, int, int *))            \
+  X(void, ModelMeshGetElements,                                                                            \
+    (int **, size_t *, size_t ***, size_t **, size_t *, size_t ***, size_t **, size_t *, int, int, int *)) \
+  X(void, ModelMeshGetElementsByType,                                                                      \
+    (int, size_t **, size_t *, size_t **, size_t *, int, size_t, size_t, int *))                           \
+  X(void, ModelMeshSetSize, (int *, size_t, double, int *))                                                \
+  X(int, ModelMeshFieldAdd, (const char *, int, int *))                                                    \
+  X(void, ModelMeshFieldSetNumber, (int, const char *, double, int *))                                     \
+  X(void, ModelMeshFieldSetNumbers, (int, const char *, double *, size_t, int *))                          \
+  X(void, ModelMeshFieldSetString, (int, const char *, const char *, int *))                               \
+  X(void, ModelMeshFieldSetAsBackgroundMesh, (int, int *))                                                 \
+  X(int, ModelGeoAddSurfaceLoop, (int *, size_t, int, int *))                                              \
+  X(int, ModelGeoAddVolume, (int *, size_t, int, int *))                                                   \
+  X(void, ModelGeoSynchronize, (int *))                                                                    \
+  X(int, ViewAdd, (const char *, int, int *))                                                              \
+  X(void, ViewAddListData, (int, const char *, int, double *, size_t, int *))                              \
+  X(void, LoggerStart, (int *))                                                                            \
+  X(void, LoggerGet, (char ***, size_t *, int *))                                                          \
+  X(void, LoggerGetLastError, (char **, int *))
+
+typedef struct {
+  const char *where; /* begins every message */
+  void (*Free)(void *);
+#define SB_GMSH_MEMBER(type, name, arguments) type(*name) arguments;
+  SB_GMSH_FUNCTIONS(SB_GMSH_MEMBER)
+#undef SB_GMSH_MEMBER
+} SbGmsh;
+
+/* Calls a function of gmsh; its error becomes one of PETSc with the last message of gmsh. SB_GMSH0(): without arguments. */
+#define SB_GMSH(gmsh, function, ...)                              \
+  do {                                                            \
+    int sb_error = 0;                                             \
+    (void)(gmsh)->function(__VA_ARGS__, &sb_error);               \
+    if (sb_error) PetscCall(SbGmshError(gmsh, "gmsh" #function)); \
+  } while (0)
+#define SB_GMSH0(gmsh, function)                                  \
+  do {                                                            \
+    int sb_error = 0;                                             \
+    (void)(gmsh)->function(&sb_error);                            \
+    if (sb_error) PetscCall(SbGmshError(gmsh, "gmsh" #function)); \
+  } while (0)
+
+typedef PetscErrorCode (*SbGmshWork)(const SbGmsh *gmsh, void *ctx, SbImport *result);
+
+typedef struct {
+  const char *where; /* begins every message, as SbImport.where */
+  const char *doing; /* "read the file": for "gmsh crashed while it read the file" */
+  PetscReal seconds; /* it is stopped after that time, s */
+  SbGmshWork work;
+  void *ctx;
+} SbGmshJob;
+
+/*
+  SbGmshRun - runs job->work in a child process with the gmsh library, and brings back what it filled in.
+
+  Not collective; for rank 0. Replaces vertices, items, groups and tag sets of `result`, keeps its `where` and `surface`
+  (the work function finds `surface` set as here).
+
+  Errors: what the work function raises; PETSC_ERR_USER_INPUT when the library cannot be loaded; PETSC_ERR_FILE_UNEXPECTED when
+  gmsh crashes or takes longer than job->seconds; PETSC_ERR_SYS when there can be no child process.
+*/
+PetscErrorCode SbGmshRun(const SbGmshJob *job, SbImport *result);
+
+/* Which groups SbGmshCollect() gives to an element. */
+typedef enum {
+  SB_GMSH_PHYSICAL, /* physical groups with their names */
+  SB_GMSH_ENTITIES  /* these or, when the model has none, its entities: "volume_3" */
+} SbGmshGroups;
+
+/*
+  SbGmshCollect - the mesh of the current model: all nodes, all tets, and triangles, lines and points of groups (all triangles
+  when result->surface). In the order of their numbers. Not collective; in a work function.
+
+  Errors: PETSC_ERR_FILE_UNEXPECTED when there are no tets (and, for a surface, no triangles) or other volume elements.
+*/
+PetscErrorCode SbGmshCollect(const SbGmsh *gmsh, SbGmshGroups groups, SbImport *result);
+
+/* The error of a function of gmsh that failed. */
+PetscErrorCode SbGmshError(const SbGmsh *gmsh, const char *function);

@@ -1,0 +1,47 @@
+/*
+  sbremesh.h - layer 6: bodies get other meshes while a run goes on; who makes their tets.
+*/
+#pragma once
+#include "sbledger.h"
+
+/*
+  Re-meshing of one body (src/remesh/body.c), on rank 0. Not collective.
+
+  A hull is the surface of a body and what parts its regions inside. A mesher fills it with tets: their first vertices are those of the hull, unchanged and
+  in order, its triangles are faces of tets. x and cell (positively oriented) are allocated here; the caller frees. An error is
+  one line that says why it did not work.
+*/
+typedef struct {
+  PetscInt nvert, ntri, nregion;
+  PetscReal *x;  /* [nvert][3] m */
+  PetscInt *tri; /* [ntri][3] */
+  PetscInt *
+    side; /* [ntri][2] region on the side from which the corners are seen counter-clockwise, and behind; -1: nothing */
+  PetscReal edge; /* mean edge, m */
+} SbHull;
+typedef PetscErrorCode (*SbMesher)(const char *where, const SbHull *hull, PetscReal size, void *ctx,
+                                   PetscInt *nvert, PetscReal **x, PetscInt *ncell, PetscInt **cell);
+/* The program's own: SbTetrahedralize(). */
+PetscErrorCode SbMesherDefault(const char *where, const SbHull *hull, PetscReal size, void *ctx,
+                               PetscInt *nvert, PetscReal **x, PetscInt *ncell, PetscInt **cell);
+
+/*
+  SbRemesh - bodies get other meshes while the run goes on (src/remesh/remesh.c).
+
+  Order of calls: SbRemeshSetFromOptions() after SbSceneCreate(); SbRemeshAttach() after SbRunSetUp() and SbLedgerAttach(), before
+  SbOutputAttach(), whose history gets the column remesh_loss; SbRemeshSolve() in the place of SbRunSolve(); SbRemeshDestroy().
+*/
+typedef struct _p_SbRemesh *SbRemesh;
+PetscErrorCode SbRemeshRegister(void); /* option rows */
+/* Options read: -remesh_..., -body_<name>_remesh_quality. remesh: NULL when none of them asks for it. Collective. */
+PetscErrorCode SbRemeshSetFromOptions(SbModel model, SbRemesh *remesh);
+/* Who makes the tets, in place of SbMesherDefault(). Not collective. */
+PetscErrorCode SbRemeshSetMesher(SbRemesh remesh, SbMesher mesher, void *ctx);
+/* NULL: nothing. Not collective. */
+PetscErrorCode SbRemeshAttach(SbRemesh remesh, SbRun run);
+/*
+  The whole time loop or load path, as SbRunSolve(). model, run and ledger (NULL: there is none) are other ones afterwards when a body was
+  re-meshed; the old ones are gone. remesh NULL: SbRunSolve() alone. Collective.
+*/
+PetscErrorCode SbRemeshSolve(SbRemesh remesh, SbModel *model, SbRun *run, SbLedger *ledger);
+PetscErrorCode SbRemeshDestroy(SbRemesh *remesh);

@@ -1,0 +1,60 @@
+/*
+  sbtet.h - layer 1: tets as plain arrays on one rank: their faces, their shape, which one holds a point. Not collective throughout.
+*/
+#pragma once
+#include "sbformat.h"
+
+/* ------------------------------------------------------------------ faces.c: which cells share a face */
+
+typedef struct {
+  uint64_t key;  /* middle and highest vertex */
+  PetscInt slot; /* 4 * cell + face */
+} SbFaceKey;
+
+typedef struct {
+  PetscInt nvert, ncell;
+  PetscInt *start;     /* [nvert + 1] into `face`: faces by lowest vertex */
+  SbFaceKey *face;     /* [4 * ncell] ascending keys below each lowest vertex */
+  PetscInt *neighbour; /* [ncell][4] cell across face f (opposite vertex f), -1 on the boundary */
+  PetscInt nboundary;
+  PetscInt nshared;   /* faces of more than two cells */
+  PetscInt shared[3]; /* three cells at the first one of these */
+} SbFaces;
+
+extern const int
+  SbFaceVertex[4][3]; /* of face f, counter-clockwise seen from outside a positively oriented tet */
+
+PetscErrorCode SbFacesCreate(PetscInt nvert, PetscInt ncell, const PetscInt cell[], SbFaces *faces);
+PetscErrorCode SbFacesDestroy(SbFaces *faces);
+/* Slots of the face with these vertices: 0 (no such face), 1 (boundary) or 2. */
+PetscInt SbFacesFind(const SbFaces *faces, const PetscInt vert[3], PetscInt slots[2]);
+
+/* ------------------------------------------------------------------ check.c, quality.c */
+
+/* Drops unused vertices, turns cells, refuses what would make the physics wrong; builds the faces. */
+PetscErrorCode SbImportCheck(SbImport *import, SbFaces *faces);
+/* How many tets have a dihedral angle below this, and the smallest of all, degrees. */
+PetscErrorCode SbImportSlivers(const SbImport *import, PetscReal degrees, PetscInt *n, PetscReal *smallest);
+/* Six times the signed volume of a tet, m^3. */
+PetscReal SbTetDet(const PetscReal x[], const PetscInt vert[4]);
+/*
+  SbTetQuality - shape of a tet with corners x, m: 3 r / R with the radii of the spheres in it and around it, 1 for the regular one, 0 for a flat
+  one, negative when it is inside out. Not collective.
+*/
+PetscReal SbTetQuality(const PetscReal x[4][3]);
+
+/* ------------------------------------------------------------------ locate.c */
+
+/*
+  SbLocator - which tet holds a point. Not collective; the arrays are borrowed. Tets without volume, or inside out, hold nothing.
+
+  SbLocatorFind: the tet and the weights of its corners, none negative, sum 1. Of several that hold the point the one in which it lies
+  deepest, or the first of equal ones; of a point in none the nearest place. Returns the distance from there, m.
+*/
+typedef struct _p_SbLocator *SbLocator;
+PetscErrorCode SbLocatorCreate(PetscInt ncell, const PetscInt cell[], const PetscReal x[],
+                               SbLocator *locator);
+PetscErrorCode SbLocatorDestroy(SbLocator *locator);
+PetscReal SbLocatorFind(SbLocator locator, const PetscReal point[3], PetscInt *cell, PetscReal weight[4]);
+/* The weights of the corners of a tet at a point, in it or not. */
+void SbLocatorWeights(SbLocator locator, PetscInt cell, const PetscReal point[3], PetscReal weight[4]);

@@ -1,0 +1,32 @@
+/*
+  sbtriangles.h - layer 1: a closed surface of triangles from a file, as a rigid obstacle.
+*/
+#pragma once
+#include "sbmesh.h"
+
+/*
+  A closed surface of triangles with an inside, as a rigid obstacle has it. Arrays are owned; SbTrianglesDestroy().
+*/
+typedef struct {
+  PetscInt nvert, ntri;
+  PetscReal *x;     /* [nvert][3] m */
+  PetscInt *tri;    /* [ntri][3] vertices, counter-clockwise seen from outside */
+  PetscInt *across; /* [ntri][3] triangle beyond edge k, which runs from corner k to the next */
+  PetscReal volume; /* enclosed, m^3 */
+  PetscReal edge;   /* mean edge, m */
+  PetscBool turned; /* it was inside out in the file */
+} SbTriangles;
+/*
+  SbTrianglesRead - a closed surface from a file, x <- scale x + at: .stl (text or binary), .obj, .off, or .msh (gmsh: the boundary of
+  its tets or, without tets, its triangles).
+
+  Collective; rank 0 reads and checks, every rank gets all of it.
+
+  Input: option - for messages; path; scale > 0; at, m.
+  Errors: PETSC_ERR_FILE_*, PETSC_ERR_USER_INPUT, alike on all ranks, one line with option, file, line or triangle (numbered as in the
+  file) and what to do: unreadable; open; more than two triangles at an edge; turned to opposite sides; flat, doubled; no volume; a
+  part within another that is no cavity. A surface that is inside out as a whole is turned, with a warning.
+*/
+PetscErrorCode SbTrianglesRead(MPI_Comm comm, const char *option, const char *path, PetscReal scale,
+                               const PetscReal at[3], SbTriangles *triangles);
+PetscErrorCode SbTrianglesDestroy(SbTriangles *triangles);

@@ -1,0 +1,110 @@
+/*
+  edges.c - edges: pairs of vertices that a tet, triangle or line joins, each once.
+
+  The edges of every item go into the bucket of their lower vertex (a counting sort); each bucket is sorted, equal neighbours
+  in it are one edge. The number of an edge is its place in the list.
+*/
+#include <stdlib.h>
+#include "mesh_impl.h"
+
+static const int tet_edge[6][2] = {{0, 1}, {0, 2}, {0, 3}, {1, 2}, {1, 3}, {2, 3}};
+static const int edge_count[4] = {0, 1, 3,
+                                  6}; /* of an item, by dimension; triangles use the pairs 0, 1 and 3 */
+static const int edge_row[4][6] = {{0}, {0}, {0, 1, 3}, {0, 1, 2, 3, 4, 5}};
+
+static inline void edge_of(const SbItems *item, int dim, PetscInt i, int e, PetscInt *low, PetscInt *high)
+{
+  const PetscInt *v = item->vert + (size_t)(dim + 1) * (size_t)i;
+  const PetscInt a = v[tet_edge[edge_row[dim][e]][0]], b = v[tet_edge[edge_row[dim][e]][1]];
+
+  *low = PetscMin(a, b);
+  *high = PetscMax(a, b);
+}
+
+static int compare(const void *a, const void *b)
+{
+  const PetscInt p = *(const PetscInt *)a, q = *(const PetscInt *)b;
+
+  return (p > q) - (p < q);
+}
+
+/* Sorts each bucket and closes the gaps that repeats leave. */
+static void drop_repeats(SbImportEdges *edges)
+{
+  PetscInt begin = 0, kept = 0;
+
+  for (PetscInt v = 0; v < edges->nvert; v++) {
+    const PetscInt end = edges->start[v + 1];
+
+    qsort(edges->high + begin, (size_t)(end - begin), sizeof(*edges->high), compare);
+    for (PetscInt i = begin; i < end; i++) {
+      if (i > begin && edges->high[i] == edges->high[i - 1]) continue;
+      edges->high[kept++] = edges->high[i];
+    }
+    edges->start[v + 1] = kept;
+    begin = end;
+  }
+  edges->nedge = kept;
+}
+
+PetscErrorCode SbImportEdgesCreate(const SbImport *im, SbImportEdges *edges)
+{
+  PetscInt *next, low, high;
+  PetscInt64 total = 0;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscMemzero(edges, sizeof(*edges)));
+  edges->nvert = im->nvert;
+  for (int d = 1; d < 4; d++) total += (PetscInt64)edge_count[d] * im->item[d].n;
+  PetscCheck(total <= PETSC_MAX_INT, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
+             "%s: has more edges than this build can number", im->where);
+  PetscCall(PetscCalloc1((size_t)im->nvert + 1, &edges->start));
+  PetscCall(PetscMalloc1((size_t)total, &edges->high));
+  for (int d = 1; d < 4; d++) {
+    for (PetscInt i = 0; i < im->item[d].n; i++) {
+      for (int e = 0; e < edge_count[d]; e++) {
+        edge_of(&im->item[d], d, i, e, &low, &high);
+        edges->start[low + 1]++;
+      }
+    }
+  }
+  for (PetscInt v = 0; v < im->nvert; v++) edges->start[v + 1] += edges->start[v];
+  PetscCall(PetscMalloc1(im->nvert, &next));
+  PetscCall(PetscArraycpy(next, edges->start, im->nvert));
+  for (int d = 1; d < 4; d++) {
+    for (PetscInt i = 0; i < im->item[d].n; i++) {
+      for (int e = 0; e < edge_count[d]; e++) {
+        edge_of(&im->item[d], d, i, e, &low, &high);
+        edges->high[next[low]++] = high;
+      }
+    }
+  }
+  PetscCall(PetscFree(next));
+  drop_repeats(edges);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbImportEdgesDestroy(SbImportEdges *edges)
+{
+  PetscFunctionBeginUser;
+  PetscCall(PetscFree(edges->start));
+  PetscCall(PetscFree(edges->high));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscInt SbImportEdgesFind(const SbImportEdges *edges, PetscInt a, PetscInt b)
+{
+  const PetscInt low = PetscMin(a, b), high = PetscMax(a, b);
+  PetscInt begin = edges->start[low], end = edges->start[low + 1];
+
+  while (begin < end) {
+    const PetscInt middle = begin + (end - begin) / 2;
+
+    if (edges->high[middle] == high) return middle;
+    if (edges->high[middle] < high)
+      begin = middle + 1;
+    else
+      end = middle;
+  }
+  return -1;
+}

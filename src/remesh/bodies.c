@@ -1,0 +1,492 @@
+/*
+  On rank 0: from a scene and its state to the same scene with other meshes for some of its bodies.
+
+  The vectors are functions of the place at rest, linear in each tet: what a new node gets is the value there (body.c says where that is). A node
+  on the surface has its triangle, or its vertex, in the old mesh too, and gets what is there to the last bit. A DG cell takes the value from its own
+  side of a face.
+
+  Sets that are groups of a file go with the tets that they hold, by the old tet in the middle of the new one; on the surface with its triangles
+  and vertices.
+*/
+#include "remesh_impl.h"
+
+#define INWARDS \
+  1e-6 /* part of the way from a face to the middle of its DG cell, to tell on which side that is */
+
+/* A triangle by its vertices in ascending order, and where it is: 4 cell + face. */
+typedef struct {
+  PetscInt vert[3], slot;
+} Side;
+
+static int by_vertices(const void *a, const void *b)
+{
+  const Side *p = (const Side *)a, *q = (const Side *)b;
+
+  for (int k = 0; k < 3; k++) {
+    if (p->vert[k] != q->vert[k]) return p->vert[k] < q->vert[k] ? -1 : 1;
+  }
+  return 0;
+}
+
+static Side side_of(const PetscInt cell[], PetscInt slot)
+{
+  const PetscInt *v = cell + 4 * (slot / 4), f = slot % 4;
+  Side side = {{v[(f + 1) % 4], v[(f + 2) % 4], v[(f + 3) % 4]}, slot};
+
+  (void)PetscSortInt(3, side.vert);
+  return side;
+}
+
+/* One body on its way from the old mesh to the new one. Vertices and tets count from the body's first. */
+typedef struct {
+  SbModel model;
+  const SbGathered *g;
+  PetscInt body, vert0, cell0, ncell;
+  SbElement element;
+  PetscInt each;  /* numbers of a node: 3 nfield */
+  PetscInt *cell; /* [ncell][4] old tets */
+  PetscInt *at;   /* [nvert] a corner 4 cell + a of each old vertex */
+  PetscInt nside;
+  Side *side; /* [nside] of the old surface, in order */
+  SbLocator rest;
+  SbNewMesh mesh;
+  uint64_t groups;     /* bits of sets that are groups */
+  uint64_t inclusions; /* and of those that are inclusions of the body */
+} Work;
+
+static uint64_t groups_of(SbModel m)
+{
+  uint64_t bits = 0;
+
+  for (PetscInt k = 0; k < m->nset; k++) bits |= m->set[k].shape == SB_SET_GROUP ? SB_SET_BIT(k) : 0;
+  return bits;
+}
+
+static uint64_t inclusions_of(const SbBody *body)
+{
+  uint64_t bits = 0;
+
+  for (PetscInt k = 0; k < body->ninclusion; k++) bits |= SB_SET_BIT(body->inclusion[k].set);
+  return bits;
+}
+
+static PetscErrorCode open_work(SbModel m, const SbGathered *g, PetscInt b, Work *w)
+{
+  const PetscInt nvert = g->vert0[b + 1] - g->vert0[b];
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscMemzero(w, sizeof(*w)));
+  w->model = m;
+  w->g = g;
+  w->body = b;
+  w->vert0 = g->vert0[b];
+  w->cell0 = g->cell0[b];
+  w->ncell = g->cell0[b + 1] - g->cell0[b];
+  w->element = m->element[b];
+  w->each = 3 * g->nfield;
+  w->groups = groups_of(m);
+  w->inclusions = inclusions_of(&m->body[b]);
+  PetscCall(PetscMalloc1(4 * (size_t)w->ncell, &w->cell));
+  PetscCall(PetscMalloc1(nvert, &w->at));
+  for (PetscInt i = 0; i < 4 * w->ncell; i++) {
+    w->cell[i] = g->cell[4 * w->cell0 + i] - w->vert0;
+    w->at[w->cell[i]] = i;
+    w->nside += g->cell_set[5 * (w->cell0 + i / 4) + 1 + i % 4] & SB_ON_BOUNDARY ? 1 : 0;
+  }
+  PetscCall(PetscMalloc1(w->nside, &w->side));
+  w->nside = 0;
+  for (PetscInt i = 0; i < 4 * w->ncell; i++) {
+    if (g->cell_set[5 * (w->cell0 + i / 4) + 1 + i % 4] & SB_ON_BOUNDARY)
+      w->side[w->nside++] = side_of(w->cell, i);
+  }
+  qsort(w->side, (size_t)w->nside, sizeof(Side), by_vertices);
+  PetscCall(SbLocatorCreate(w->ncell, w->cell, g->X + 3 * w->vert0, &w->rest));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode close_work(Work *w)
+{
+  PetscFunctionBeginUser;
+  PetscCall(SbNewMeshDestroy(&w->mesh));
+  PetscCall(SbLocatorDestroy(&w->rest));
+  PetscCall(PetscFree(w->cell));
+  PetscCall(PetscFree(w->at));
+  PetscCall(PetscFree(w->side));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The place 4 cell + face of a triangle of the new mesh on the old surface, -1: it is inside. */
+static PetscInt old_slot(const Work *w, PetscInt slot)
+{
+  Side side = side_of(w->mesh.cell, slot);
+  const Side *found;
+
+  for (int k = 0; k < 3; k++) {
+    if (side.vert[k] >= w->mesh.nkept) return -1;
+    side.vert[k] = w->mesh.kept[side.vert[k]];
+  }
+  (void)PetscSortInt(3, side.vert);
+  found = (const Side *)bsearch(&side, w->side, (size_t)w->nside, sizeof(Side), by_vertices);
+  return found ? found->slot : -1;
+}
+
+/* ------------------------------------------------------------------ the mesh */
+
+/* Tets of another material, or of other groups, stay apart. */
+static PetscErrorCode number_regions(const Work *w, PetscInt region[])
+{
+  const SbGathered *g = w->g;
+  uint64_t(*kind)[2];
+  PetscInt nkind = 0;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscMalloc1(w->ncell, &kind));
+  for (PetscInt c = 0; c < w->ncell; c++) {
+    const uint64_t material = (uint64_t)g->cell_material[w->cell0 + c],
+                   sets = g->cell_set[5 * (w->cell0 + c)] & (w->groups | w->inclusions);
+    PetscInt k = 0;
+
+    while (k < nkind && (kind[k][0] != material || kind[k][1] != sets)) k++;
+    if (k == nkind) {
+      kind[nkind][0] = material;
+      kind[nkind++][1] = sets;
+    }
+    region[c] = k;
+  }
+  PetscCall(PetscFree(kind));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* A set that holds what lies inside as points, curves or triangles of a file would lose it. */
+static PetscErrorCode check_sets(const Work *w)
+{
+  const SbGathered *g = w->g;
+  const PetscInt nvert = g->vert0[w->body + 1] - w->vert0;
+  uint64_t lost = 0, *volume;
+  PetscBool *surface;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscCalloc1(nvert, &volume));
+  PetscCall(PetscCalloc1(nvert, &surface));
+  for (PetscInt i = 0; i < 4 * w->ncell; i++) {
+    const uint64_t *set = g->cell_set + 5 * (w->cell0 + i / 4);
+
+    volume[w->cell[i]] |= set[0];
+    if (!(set[1 + i % 4] & SB_ON_BOUNDARY)) {
+      lost |= set[1 + i % 4] & w->groups;
+    } else {
+      for (int k = 1; k < 4; k++) surface[w->cell[4 * (i / 4) + (i % 4 + k) % 4]] = PETSC_TRUE;
+    }
+  }
+  for (PetscInt v = 0; v < nvert; v++)
+    lost |= surface[v] ? 0 : g->vert_set[w->vert0 + v] & w->groups & ~volume[v];
+  PetscCall(PetscFree(volume));
+  PetscCall(PetscFree(surface));
+  for (PetscInt k = 0; k < w->model->nset; k++)
+    PetscCheck(!(lost & SB_SET_BIT(k)), PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
+               "the group '%s' holds triangles, curves or points inside the body, which would be lost: use a "
+               "shape (-sets) or a group of the surface or of volumes",
+               w->model->set[k].group);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode make_mesh(Work *w, const SbRemeshing *how)
+{
+  const SbGathered *g = w->g;
+  char where[3 * SB_NAME_MAX];
+  PetscErrorCode ierr;
+  PetscInt *region;
+  SbOldMesh old = {.nvert = g->vert0[w->body + 1] - w->vert0,
+                   .ncell = w->ncell,
+                   .X = g->X + 3 * w->vert0,
+                   .x = g->x + 3 * w->vert0,
+                   .cell = w->cell};
+
+  PetscFunctionBeginUser;
+  PetscCall(check_sets(w));
+  PetscCall(PetscSNPrintf(where, sizeof(where), "body '%s', re-meshed", w->model->body[w->body].name));
+  PetscCall(PetscMalloc1(w->ncell, &region));
+  PetscCall(number_regions(w, region));
+  old.region = region;
+  ierr = SbRemeshBody(where, &old, how, &w->mesh);
+  PetscCall(PetscFree(region));
+  PetscCall(ierr);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Triangles of the new surface in groups: counted, or written. */
+static PetscInt list_triangles(const Work *w, SbGiven *given)
+{
+  PetscInt n = 0;
+
+  for (PetscInt i = 0; i < 4 * w->mesh.ncell; i++) {
+    const PetscInt slot = old_slot(w, i);
+    const uint64_t bits = slot < 0 ? 0 : w->g->cell_set[5 * (w->cell0 + slot / 4) + 1 + slot % 4] & w->groups;
+
+    if (!bits) continue;
+    if (given) {
+      for (int k = 0; k < 3; k++) given->tri[3 * n + k] = w->mesh.cell[4 * (i / 4) + (i % 4 + 1 + k) % 4];
+      given->tri_set[n] = bits;
+    }
+    n++;
+  }
+  return n;
+}
+
+static PetscErrorCode give_new(const Work *w, SbGiven **given)
+{
+  const SbNewMesh *m = &w->mesh;
+  SbGiven *p;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbGivenCreate(m->nvert, m->ncell, list_triangles(w, NULL), given));
+  p = *given;
+  PetscCall(PetscArraycpy(p->x, m->X, 3 * (size_t)m->nvert));
+  PetscCall(PetscArraycpy(p->cell, m->cell, 4 * (size_t)m->ncell));
+  (void)list_triangles(w, p);
+  for (PetscInt v = 0; v < m->nkept; v++) p->vert_set[v] = w->g->vert_set[w->vert0 + m->kept[v]] & w->groups;
+  for (PetscInt c = 0; c < m->ncell; c++) {
+    p->cell_set[c] = w->g->cell_set[5 * (w->cell0 + m->within[c])] & (w->groups | w->inclusions);
+    for (int a = 0; a < 4; a++) p->vert_set[m->cell[4 * c + a]] |= p->cell_set[c] & w->groups;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The old mesh as it is. */
+static PetscErrorCode give_old(const Work *w, SbGiven **given)
+{
+  const SbGathered *g = w->g;
+  const PetscInt nvert = g->vert0[w->body + 1] - w->vert0;
+  PetscInt ntri = 0;
+  SbGiven *p;
+
+  PetscFunctionBeginUser;
+  for (PetscInt i = 0; i < 4 * w->ncell; i++)
+    ntri += g->cell_set[5 * (w->cell0 + i / 4) + 1 + i % 4] & w->groups ? 1 : 0;
+  PetscCall(SbGivenCreate(nvert, w->ncell, ntri, given));
+  p = *given;
+  PetscCall(PetscArraycpy(p->x, g->X + 3 * w->vert0, 3 * (size_t)nvert));
+  PetscCall(PetscArraycpy(p->cell, w->cell, 4 * (size_t)w->ncell));
+  for (PetscInt v = 0; v < nvert; v++) p->vert_set[v] = g->vert_set[w->vert0 + v] & w->groups;
+  for (PetscInt c = 0; c < w->ncell; c++)
+    p->cell_set[c] = g->cell_set[5 * (w->cell0 + c)] & (w->groups | w->inclusions);
+  ntri = 0;
+  for (PetscInt i = 0; i < 4 * w->ncell; i++) {
+    const uint64_t bits = g->cell_set[5 * (w->cell0 + i / 4) + 1 + i % 4] & w->groups;
+
+    if (!bits) continue;
+    for (int k = 0; k < 3; k++) p->tri[3 * ntri + k] = w->cell[4 * (i / 4) + (i % 4 + 1 + k) % 4];
+    p->tri_set[ntri++] = bits;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ the values */
+
+static const PetscReal *old_value(const Work *w, PetscInt cell, PetscInt k)
+{
+  return w->g->value + ((size_t)(w->cell0 + cell) * (size_t)w->g->width + (size_t)k) * (size_t)w->each;
+}
+
+/* The old fields at a place at rest, as the tet has them that holds `near`. */
+static void look_up(const Work *w, const PetscReal X[3], const PetscReal near[3], PetscReal value[])
+{
+  PetscReal weight[4];
+  PetscInt cell;
+
+  (void)SbLocatorFind(w->rest, near, &cell, weight);
+  if (near != X) SbLocatorWeights(w->rest, cell, X, weight);
+  for (PetscInt k = 0; k < w->each; k++) value[k] = 0.;
+  for (int a = 0; a < 4; a++) {
+    const PetscReal *from = old_value(w, cell, a);
+    PetscReal psi = 0.;
+
+    for (int v = 0; v < 4; v++) psi += weight[v] * w->element->ops.vertex[v][a];
+    for (PetscInt k = 0; k < w->each; k++) value[k] += psi * from[k];
+  }
+}
+
+/* Middle of face f of a new cell at rest, the same for both cells of it, to the last bit; and a place a little towards the cell's own middle. */
+static void face_place(const Work *w, PetscInt c, PetscInt f, PetscReal X[3], PetscReal inside[3])
+{
+  const Side side = side_of(w->mesh.cell, 4 * c + f);
+  const PetscReal *at = w->mesh.X, *apex = at + 3 * w->mesh.cell[4 * c + f];
+
+  for (int k = 0; k < 3; k++) {
+    X[k] = (at[3 * side.vert[0] + k] + at[3 * side.vert[1] + k] + at[3 * side.vert[2] + k]) / 3.;
+    inside[k] = X[k] + INWARDS * 0.25 * (apex[k] - X[k]);
+  }
+}
+
+static void new_values(const Work *w, PetscInt c, PetscReal value[])
+{
+  for (PetscInt a = 0; a < 4; a++) {
+    const PetscInt v = w->mesh.cell[4 * c + a], slot = old_slot(w, 4 * c + a);
+    PetscReal *to = value + a * w->each, *support = value + (4 + a) * w->each, X[3], inside[3];
+    const PetscReal *from = NULL;
+
+    if (w->element->nodes_per[0]) {
+      const PetscInt corner = v < w->mesh.nkept ? w->at[w->mesh.kept[v]] : -1;
+
+      if (corner >= 0) from = old_value(w, corner / 4, corner % 4);
+    } else if (slot >= 0)
+      from = old_value(w, slot / 4, slot % 4);
+    if (!from && w->element->nodes_per[0])
+      for (int k = 0; k < 3; k++) X[k] = w->mesh.X[3 * v + k];
+    else if (!from)
+      face_place(w, c, a, X, inside);
+    if (!from) look_up(w, X, w->element->nodes_per[3] ? inside : X, to);
+    for (PetscInt k = 0; k < w->each && from; k++) to[k] = from[k];
+    for (PetscInt k = 0; k < w->each && w->g->width == 8; k++)
+      support[k] = slot < 0 ? PETSC_MAX_REAL : old_value(w, slot / 4, 4 + slot % 4)[k];
+  }
+}
+
+/* ------------------------------------------------------------------ names of nodes */
+
+/* Room for two names per corner of the surface of all bodies; n of them so far. */
+static void rename_node(SbRenamed *r, PetscInt from, PetscInt to)
+{
+  r->from[r->n] = from;
+  r->to[r->n++] = to;
+}
+
+/* Nodes of the body's surface: vertices, or faces and their supports. vert1, cell1: first ones of the body in the next scene. */
+static void rename_surface(const Work *w, PetscBool made, PetscInt vert1, PetscInt cell1,
+                           const SbGathered *next, SbRenamed *r)
+{
+  const PetscInt N = w->g->nvert, C = w->g->ncell, N1 = next->nvert, C1 = next->ncell;
+  const PetscInt ncell = made ? w->mesh.ncell : w->ncell;
+
+  if (w->element->nodes_per[0]) {
+    const PetscInt n = made ? w->mesh.nkept : w->g->vert0[w->body + 1] - w->vert0;
+
+    for (PetscInt v = 0; v < n; v++) rename_node(r, w->vert0 + (made ? w->mesh.kept[v] : v), vert1 + v);
+    return;
+  }
+  for (PetscInt i = 0; i < 4 * ncell; i++) {
+    PetscInt slot = i;
+
+    if (made)
+      slot = old_slot(w, i);
+    else if (!(w->g->cell_set[5 * (w->cell0 + i / 4) + 1 + i % 4] & SB_ON_BOUNDARY))
+      slot = -1;
+    if (slot < 0) continue;
+    rename_node(r, N + 4 * (w->cell0 + slot / 4) + slot % 4, N1 + 4 * (cell1 + i / 4) + i % 4);
+    rename_node(r, N + 4 * (C + w->cell0 + slot / 4) + slot % 4, N1 + 4 * (C1 + cell1 + i / 4) + i % 4);
+  }
+}
+
+/* ------------------------------------------------------------------ all bodies */
+
+/* Keeps what an error says; one that is not the user's is printed with its trace, too. */
+static PetscErrorCode keep_message(MPI_Comm comm, int line, const char *function, const char *file,
+                                   PetscErrorCode code, PetscErrorType kind, const char *text, void *ctx)
+{
+  SbMade *made = (SbMade *)ctx;
+
+  if (kind == PETSC_ERROR_INITIAL)
+    (void)snprintf(made->message, sizeof(made->message), "%s", text ? text : "no reason was given");
+  if (code != PETSC_ERR_USER && code != PETSC_ERR_USER_INPUT && code != PETSC_ERR_FILE_UNEXPECTED)
+    (void)PetscTraceBackErrorHandler(comm, line, function, file, code, kind, text, NULL);
+  return code;
+}
+
+/* Meshes one body anew; what it cannot do goes to the message. */
+static PetscErrorCode try_body(Work *w, const SbRemeshing *how, SbMade *made, PetscBool *done)
+{
+  PetscErrorCode ierr;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscPushErrorHandler(keep_message, made));
+  ierr = make_mesh(w, how);
+  PetscCall(PetscPopErrorHandler());
+  *done = (PetscBool)!ierr;
+  if (ierr) PetscCall(SbNewMeshDestroy(&w->mesh));
+  made->nvert[0] = w->g->vert0[w->body + 1] - w->vert0;
+  made->ncell[0] = w->ncell;
+  made->nvert[1] = *done ? w->mesh.nvert : made->nvert[0];
+  made->ncell[1] = *done ? w->mesh.ncell : w->ncell;
+  made->nmoved = w->mesh.nmoved;
+  made->quality = w->mesh.quality;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Counts, and room for the values. */
+static PetscErrorCode begin_next(const SbGathered *g, const SbMade made[], SbGathered *next)
+{
+  PetscFunctionBeginUser;
+  next->nbody = g->nbody;
+  next->nfield = g->nfield;
+  next->width = g->width;
+  PetscCall(PetscCalloc2(g->nbody + 1, &next->vert0, g->nbody + 1, &next->cell0));
+  for (PetscInt b = 0; b < g->nbody; b++) {
+    next->vert0[b + 1] = next->vert0[b] + made[b].nvert[1];
+    next->cell0[b + 1] = next->cell0[b] + made[b].ncell[1];
+  }
+  next->nvert = next->vert0[g->nbody];
+  next->ncell = next->cell0[g->nbody];
+  PetscCall(PetscMalloc1((size_t)(next->width * next->nfield * 3) * (size_t)next->ncell, &next->value));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Mesh, values and names of one body. */
+static PetscErrorCode finish_body(const Work *w, PetscBool done, PetscInt step, SbGathered *next,
+                                  SbGiven **given, SbRenamed *renamed)
+{
+  const SbBody *body = &w->model->body[w->body];
+  const size_t each = (size_t)next->width * (size_t)w->each;
+  PetscReal *value = next->value + each * (size_t)next->cell0[w->body];
+
+  PetscFunctionBeginUser;
+  if (done) {
+    PetscCall(give_new(w, given));
+    for (PetscInt c = 0; c < w->mesh.ncell; c++) new_values(w, c, value + each * (size_t)c);
+    (*given)->step = step;
+    (*given)->mass = w->g->mass[w->body];
+    (*given)->bound = w->mesh.quality; /* the caller makes a bound of it */
+  } else {
+    PetscCall(give_old(w, given));
+    PetscCall(PetscArraycpy(value, w->g->value + each * (size_t)w->cell0, each * (size_t)w->ncell));
+    if (body->given) {
+      (*given)->step = body->given->step;
+      (*given)->mass = body->given->mass;
+      (*given)->bound = body->given->bound;
+    }
+  }
+  rename_surface(w, done, next->vert0[w->body], next->cell0[w->body], next, renamed);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbRemeshBodies(SbModel m, const SbGathered *g, const PetscBool due[], PetscInt step,
+                              const SbRemeshing *how, SbGiven *given[], SbMade made[], SbGathered *next,
+                              SbRenamed *renamed)
+{
+  PetscBool *done;
+  PetscInt room = 0;
+  Work *work;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscMemzero(next, sizeof(*next)));
+  PetscCall(PetscCalloc2(m->nbody, &work, m->nbody, &done));
+  for (PetscInt b = 0; b < m->nbody; b++) {
+    PetscCall(open_work(m, g, b, &work[b]));
+    made[b] = (SbMade){{g->vert0[b + 1] - g->vert0[b], g->vert0[b + 1] - g->vert0[b]},
+                       {work[b].ncell, work[b].ncell},
+                       0,
+                       0.,
+                       ""};
+    if (due[b]) PetscCall(try_body(&work[b], how, &made[b], &done[b]));
+    room += made[b].nvert[0] + 2 * work[b].nside;
+  }
+  PetscCall(begin_next(g, made, next));
+  PetscCall(PetscMalloc2(room, &renamed->from, room, &renamed->to));
+  renamed->n = 0;
+  for (PetscInt b = 0; b < m->nbody; b++) {
+    PetscCall(finish_body(&work[b], done[b], step, next, &given[b], renamed));
+    PetscCall(close_work(&work[b]));
+  }
+  PetscCall(PetscSortIntWithArray(renamed->n, renamed->from, renamed->to));
+  PetscCall(PetscFree2(work, done));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

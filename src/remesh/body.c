@@ -1,0 +1,522 @@
+/*
+  body.c - another mesh of the same body in the same state, on rank 0.
+
+  The hull stays: every triangle of the surface, and every one between regions that must stay apart, with its vertices. What it encloses is filled
+  anew, in the shape that the body has now or at rest. A new vertex y in the shape of now lies in a tet of the old mesh with the weights w,
+  y = sum w_a x_a; its rest position is X = sum w_a X_a: the material that is there. So the volume at rest is the same,
+  and the motion from X to x that the old mesh has is only looked at in other places.
+
+  Between these the motion is not linear, so a new tet may be inside out at rest although it is none now. Such tets, and those
+  that are too flat, are mended by moving their inner vertices through the material, towards the middle of their neighbours: to the place of a few on the
+  way where the worst tet around is best, until all are good or nothing helps. A tet between four vertices of a side that was flat at rest and bulges
+  now has no volume at rest, and no inner vertex: an inner edge of it gets one in its middle, with all tets around, which then moves
+  inwards.
+*/
+#include <stdlib.h>
+#include "remesh_impl.h"
+
+#define SWEEPS 30
+#define ROUNDS 6 /* of moving vertices and splitting edges */
+#define PLACES 6 /* on the way to the middle of the neighbours, each half as far as the one before */
+
+/* ------------------------------------------------------------------ the hull */
+
+/* Parts of the body that hang together by faces between tets of one number: component[ncell]. */
+static PetscErrorCode find_regions(const SbOldMesh *old, const SbFaces *faces, PetscInt *n,
+                                   PetscInt component[])
+{
+  PetscInt *stack, top;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscMalloc1(old->ncell, &stack));
+  for (PetscInt c = 0; c < old->ncell; c++) component[c] = -1;
+  *n = 0;
+  for (PetscInt first = 0; first < old->ncell; first++) {
+    if (component[first] >= 0) continue;
+    component[first] = *n;
+    stack[0] = first;
+    for (top = 1; top;) {
+      const PetscInt c = stack[--top];
+
+      for (int f = 0; f < 4; f++) {
+        const PetscInt other = faces->neighbour[4 * c + f];
+
+        if (other < 0 || component[other] >= 0 || old->region[other] != old->region[c]) continue;
+        component[other] = *n;
+        stack[top++] = other;
+      }
+    }
+    (*n)++;
+  }
+  PetscCall(PetscFree(stack));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Whether the hull has face f of tet c: each triangle once. */
+static PetscBool in_hull(const SbFaces *faces, const PetscInt component[], PetscInt c, int f)
+{
+  const PetscInt other = faces->neighbour[4 * c + f];
+
+  return (PetscBool)(other < 0 || (c < other && component[other] != component[c]));
+}
+
+static PetscReal mean_edge(const SbHull *hull)
+{
+  PetscReal sum = 0;
+
+  for (PetscInt i = 0; i < 3 * hull->ntri; i++) {
+    const PetscReal *p = hull->x + 3 * hull->tri[i], *q = hull->x + 3 * hull->tri[i % 3 == 2 ? i - 2 : i + 1];
+
+    sum += PetscSqrtReal(PetscSqr(p[0] - q[0]) + PetscSqr(p[1] - q[1]) + PetscSqr(p[2] - q[2]));
+  }
+  return sum / (3 * (PetscReal)hull->ntri);
+}
+
+/* Triangles and vertices of the hull, these in the order of the old mesh: kept[hull->nvert]. */
+static PetscErrorCode fill_hull(const SbOldMesh *old, const SbFaces *faces, const PetscInt component[],
+                                const PetscReal x[], SbHull *hull, PetscInt **kept)
+{
+  PetscInt *number, n = 0;
+
+  PetscFunctionBeginUser;
+  for (PetscInt s = 0; s < 4 * old->ncell; s++) hull->ntri += in_hull(faces, component, s / 4, s % 4);
+  PetscCall(PetscMalloc1(3 * (size_t)hull->ntri, &hull->tri));
+  PetscCall(PetscMalloc1(2 * (size_t)hull->ntri, &hull->side));
+  PetscCall(PetscCalloc1(old->nvert, &number));
+  for (PetscInt s = 0; s < 4 * old->ncell; s++) {
+    const PetscInt other = faces->neighbour[s];
+
+    if (!in_hull(faces, component, s / 4, s % 4)) continue;
+    for (int k = 0; k < 3; k++) {
+      hull->tri[3 * n + k] = old->cell[4 * (s / 4) + SbFaceVertex[s % 4][k]];
+      number[hull->tri[3 * n + k]] = 1;
+    }
+    hull->side[2 * n] = other < 0 ? -1 : component[other];
+    hull->side[2 * n++ + 1] = component[s / 4];
+  }
+  for (PetscInt v = 0; v < old->nvert; v++) hull->nvert += number[v];
+  PetscCall(PetscMalloc1(3 * (size_t)hull->nvert, &hull->x));
+  PetscCall(PetscMalloc1(hull->nvert, kept));
+  n = 0;
+  for (PetscInt v = 0; v < old->nvert; v++) {
+    if (!number[v]) continue;
+    PetscCall(PetscArraycpy(hull->x + 3 * n, x + 3 * v, 3));
+    (*kept)[n] = v;
+    number[v] = n++;
+  }
+  for (PetscInt i = 0; i < 3 * hull->ntri; i++) hull->tri[i] = number[hull->tri[i]];
+  hull->edge = mean_edge(hull);
+  PetscCall(PetscFree(number));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode make_hull(const SbOldMesh *old, const PetscReal x[], SbHull *hull, PetscInt **kept)
+{
+  SbFaces faces;
+  PetscInt *component;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscMemzero(hull, sizeof(*hull)));
+  PetscCall(SbFacesCreate(old->nvert, old->ncell, old->cell, &faces));
+  PetscCall(PetscMalloc1(old->ncell, &component));
+  PetscCall(find_regions(old, &faces, &hull->nregion, component));
+  PetscCall(fill_hull(old, &faces, component, x, hull, kept));
+  PetscCall(PetscFree(component));
+  PetscCall(SbFacesDestroy(&faces));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode free_hull(SbHull *hull)
+{
+  PetscFunctionBeginUser;
+  PetscCall(PetscFree(hull->x));
+  PetscCall(PetscFree(hull->tri));
+  PetscCall(PetscFree(hull->side));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ the material at new vertices */
+
+static void mix(const SbOldMesh *old, const PetscReal at[], PetscInt cell, const PetscReal w[4],
+                PetscReal value[3])
+{
+  for (int k = 0; k < 3; k++) {
+    value[k] = 0;
+    for (int a = 0; a < 4; a++) value[k] += w[a] * at[3 * old->cell[4 * cell + a] + k];
+  }
+}
+
+/* Rest positions of vertices that were placed now, and where the old mesh has them now. */
+static PetscErrorCode find_material(const SbOldMesh *old, const SbRemeshing *how, SbLocator rest,
+                                    SbNewMesh *m)
+{
+  SbLocator now = NULL;
+  PetscReal *y = m->x;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscMalloc1(3 * (size_t)m->nvert, &m->X));
+  for (PetscInt v = 0; v < m->nkept; v++) {
+    PetscCall(PetscArraycpy(m->X + 3 * v, old->X + 3 * m->kept[v], 3));
+    PetscCall(PetscArraycpy(m->x + 3 * v, old->x + 3 * m->kept[v], 3));
+  }
+  if (!how->rest) PetscCall(SbLocatorCreate(old->ncell, old->cell, old->x, &now));
+  for (PetscInt v = m->nkept; v < m->nvert; v++) {
+    PetscInt cell;
+    PetscReal w[4];
+
+    if (how->rest) {
+      PetscCall(PetscArraycpy(m->X + 3 * v, y + 3 * v, 3));
+      (void)SbLocatorFind(rest, m->X + 3 * v, &cell, w);
+    } else {
+      (void)SbLocatorFind(now, y + 3 * v, &cell, w);
+      PetscCheck(cell >= 0, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT, "no tetrahedron has a volume now");
+      mix(old, old->X, cell, w, m->X + 3 * v);
+    }
+    PetscCheck(cell >= 0, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT, "no tetrahedron has a volume at rest");
+    mix(old, old->x, cell, w, m->x + 3 * v);
+  }
+  PetscCall(SbLocatorDestroy(&now));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ tets that are inside out or flat */
+
+static PetscReal shape_at(const SbNewMesh *m, const PetscReal at[], PetscInt cell)
+{
+  PetscReal x[4][3];
+
+  for (int a = 0; a < 4; a++) {
+    for (int k = 0; k < 3; k++) x[a][k] = at[3 * m->cell[4 * cell + a] + k];
+  }
+  return SbTetQuality((const PetscReal(*)[3])x);
+}
+
+/* The worse of its shapes at rest and now. */
+static PetscReal worse(const SbNewMesh *m, PetscInt cell)
+{
+  const PetscReal rest = shape_at(m, m->X, cell), now = shape_at(m, m->x, cell);
+
+  return PetscMin(rest, now);
+}
+
+/* Tets around each vertex: cells[start[v]] to cells[start[v + 1]]. */
+typedef struct {
+  PetscInt *start, *cells;
+} Stars;
+
+static PetscErrorCode make_stars(const SbNewMesh *m, Stars *s)
+{
+  PetscFunctionBeginUser;
+  PetscCall(PetscCalloc1(m->nvert + 1, &s->start));
+  PetscCall(PetscMalloc1(4 * (size_t)m->ncell, &s->cells));
+  for (PetscInt i = 0; i < 4 * m->ncell; i++) s->start[m->cell[i] + 1]++;
+  for (PetscInt v = 0; v < m->nvert; v++) s->start[v + 1] += s->start[v];
+  for (PetscInt i = 0; i < 4 * m->ncell; i++) s->cells[s->start[m->cell[i]]++] = i / 4;
+  for (PetscInt v = m->nvert; v > 0; v--) s->start[v] = s->start[v - 1];
+  s->start[0] = 0;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscReal worst_around(const SbNewMesh *m, const Stars *s, PetscInt v)
+{
+  PetscReal worst = 1;
+
+  for (PetscInt i = s->start[v]; i < s->start[v + 1]; i++) {
+    const PetscReal quality = worse(m, s->cells[i]);
+
+    worst = PetscMin(worst, quality);
+  }
+  return worst;
+}
+
+/* Tries places on the way to the middle of the neighbours at rest; says whether one was better. */
+static PetscBool move_vertex(const SbOldMesh *old, SbLocator rest, const Stars *s, PetscInt v, SbNewMesh *m)
+{
+  PetscReal middle[3] = {0, 0, 0}, X[3], best_X[3], best_x[3], best = worst_around(m, s, v), part = 1;
+  const PetscReal n = 4 * (PetscReal)(s->start[v + 1] - s->start[v]);
+  PetscBool better = PETSC_FALSE;
+
+  for (int k = 0; k < 3; k++) {
+    X[k] = best_X[k] = m->X[3 * v + k];
+    best_x[k] = m->x[3 * v + k];
+    for (PetscInt i = s->start[v]; i < s->start[v + 1]; i++) {
+      for (int a = 0; a < 4; a++) middle[k] += m->X[3 * m->cell[4 * s->cells[i] + a] + k] / n;
+    }
+  }
+  for (int i = 0; i < PLACES; i++, part /= 2) {
+    PetscReal w[4], now;
+    PetscInt cell;
+
+    for (int k = 0; k < 3; k++) m->X[3 * v + k] = X[k] + part * (middle[k] - X[k]) * 4 / 3;
+    (void)SbLocatorFind(rest, m->X + 3 * v, &cell, w);
+    mix(old, old->x, cell, w, m->x + 3 * v);
+    now = worst_around(m, s, v);
+    if (!(now > best)) continue;
+    best = now;
+    better = PETSC_TRUE;
+    for (int k = 0; k < 3; k++) {
+      best_X[k] = m->X[3 * v + k];
+      best_x[k] = m->x[3 * v + k];
+    }
+  }
+  for (int k = 0; k < 3; k++) {
+    m->X[3 * v + k] = best_X[k];
+    m->x[3 * v + k] = best_x[k];
+  }
+  return better;
+}
+
+/* Moves inner vertices until all tets are good enough, or nothing helps. */
+static PetscErrorCode move_vertices(const SbOldMesh *old, const SbRemeshing *how, SbLocator rest,
+                                    SbNewMesh *m)
+{
+  PetscBool *moved, better = PETSC_TRUE;
+  Stars stars;
+
+  PetscFunctionBeginUser;
+  PetscCall(make_stars(m, &stars));
+  PetscCall(PetscCalloc1(m->nvert, &moved));
+  for (int sweep = 0; sweep < SWEEPS && better; sweep++) {
+    better = PETSC_FALSE;
+    for (PetscInt c = 0; c < m->ncell; c++) {
+      if (worse(m, c) >= how->quality) continue;
+      for (int a = 0; a < 4; a++) {
+        const PetscInt v = m->cell[4 * c + a];
+
+        if (v < m->nkept || !move_vertex(old, rest, &stars, v, m)) continue;
+        moved[v] = better = PETSC_TRUE;
+      }
+    }
+  }
+  for (PetscInt v = 0; v < m->nvert; v++) m->nmoved += moved[v];
+  PetscCall(PetscFree(moved));
+  PetscCall(PetscFree(stars.start));
+  PetscCall(PetscFree(stars.cells));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static uint64_t edge_key(PetscInt p, PetscInt q)
+{
+  return (uint64_t)PetscMin(p, q) << 32 | (uint64_t)PetscMax(p, q);
+}
+
+static int by_key(const void *a, const void *b)
+{
+  const uint64_t p = *(const uint64_t *)a, q = *(const uint64_t *)b;
+
+  return (p > q) - (p < q);
+}
+
+/* Edges of the hull, [3 hull->ntri] in order, which stay whole. */
+static PetscErrorCode list_edges(const SbHull *hull, uint64_t **edge)
+{
+  PetscFunctionBeginUser;
+  PetscCall(PetscMalloc1(3 * (size_t)hull->ntri, edge));
+  for (PetscInt i = 0; i < 3 * hull->ntri; i++)
+    (*edge)[i] = edge_key(hull->tri[i], hull->tri[i % 3 == 2 ? i - 2 : i + 1]);
+  qsort(*edge, 3 * (size_t)hull->ntri, sizeof(**edge), by_key);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The longest edge of a tet, now, that is not of the hull; false when there is none. */
+static PetscBool inner_edge(const SbHull *hull, const uint64_t edge[], const SbNewMesh *m, PetscInt c,
+                            PetscInt ends[2])
+{
+  PetscReal longest = -1;
+
+  for (int i = 0; i < 4; i++) {
+    for (int j = 0; j < i; j++) {
+      const PetscInt p = m->cell[4 * c + i], q = m->cell[4 * c + j];
+      const uint64_t key = edge_key(p, q);
+      PetscReal length = 0;
+
+      if (bsearch(&key, edge, 3 * (size_t)hull->ntri, sizeof(key), by_key)) continue;
+      for (int k = 0; k < 3; k++) length += PetscSqr(m->x[3 * p + k] - m->x[3 * q + k]);
+      if (length <= longest) continue;
+      longest = length;
+      ends[0] = p;
+      ends[1] = q;
+    }
+  }
+  return (PetscBool)(longest >= 0);
+}
+
+/* A vertex in the middle of an edge at rest; each tet around it becomes two. */
+static PetscErrorCode split_edge(const SbOldMesh *old, SbLocator rest, const PetscInt ends[2], SbNewMesh *m)
+{
+  const PetscInt middle = m->nvert, ncell = m->ncell;
+  PetscReal w[4];
+  PetscInt n = 0, cell;
+
+  PetscFunctionBeginUser;
+  for (PetscInt c = 0; c < ncell; c++) {
+    int found = 0;
+
+    for (int a = 0; a < 4; a++) found += m->cell[4 * c + a] == ends[0] || m->cell[4 * c + a] == ends[1];
+    n += found == 2;
+  }
+  PetscCall(PetscRealloc(3 * (size_t)(m->nvert + 1) * sizeof(*m->X), &m->X));
+  PetscCall(PetscRealloc(3 * (size_t)(m->nvert + 1) * sizeof(*m->x), &m->x));
+  PetscCall(PetscRealloc(4 * (size_t)(ncell + n) * sizeof(*m->cell), &m->cell));
+  for (int k = 0; k < 3; k++) m->X[3 * middle + k] = 0.5 * (m->X[3 * ends[0] + k] + m->X[3 * ends[1] + k]);
+  (void)SbLocatorFind(rest, m->X + 3 * middle, &cell, w);
+  mix(old, old->x, cell, w, m->x + 3 * middle);
+  m->nvert++;
+  for (PetscInt c = 0; c < ncell; c++) {
+    PetscInt *v = m->cell + 4 * c, at[2] = {-1, -1};
+
+    for (int a = 0; a < 4; a++) {
+      if (v[a] == ends[0]) at[0] = a;
+      if (v[a] == ends[1]) at[1] = a;
+    }
+    if (at[0] < 0 || at[1] < 0) continue;
+    PetscCall(PetscArraycpy(m->cell + 4 * m->ncell, v, 4));
+    v[at[1]] = middle;
+    m->cell[4 * m->ncell++ + at[0]] = middle;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Vertices are moved, and edges of tets that have none to move are split, until all tets are good enough or nothing helps. */
+static PetscErrorCode mend(const SbOldMesh *old, const SbRemeshing *how, const SbHull *hull, SbLocator rest,
+                           SbNewMesh *m)
+{
+  PetscBool split = PETSC_TRUE;
+  uint64_t *edge;
+
+  PetscFunctionBeginUser;
+  PetscCall(list_edges(hull, &edge));
+  for (int round = 0; round < ROUNDS && split; round++) {
+    const PetscInt ncell = m->ncell;
+
+    PetscCall(move_vertices(old, how, rest, m));
+    split = PETSC_FALSE;
+    for (PetscInt c = 0; c < ncell && round + 1 < ROUNDS; c++) {
+      PetscInt ends[2] = {-1, -1};
+
+      if (worse(m, c) >= how->quality || !inner_edge(hull, edge, m, c, ends)) continue;
+      PetscCall(split_edge(old, rest, ends, m));
+      split = PETSC_TRUE;
+    }
+  }
+  PetscCall(PetscFree(edge));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Refuses what could not be mended: tets inside out now are allowed where the old mesh had some, too. */
+static PetscErrorCode judge(const SbOldMesh *old, const SbRemeshing *how, SbNewMesh *m)
+{
+  PetscInt at_rest = 0, now = 0, before = 0;
+  PetscReal worst = 1;
+
+  PetscFunctionBeginUser;
+  m->quality = 1;
+  for (PetscInt c = 0; c < m->ncell; c++) {
+    const PetscReal quality = shape_at(m, m->x, c);
+
+    at_rest += !(shape_at(m, m->X, c) > 1e-6);
+    now += !(quality > 0);
+    m->quality = PetscMin(m->quality, quality);
+  }
+  for (PetscInt c = 0; c < old->ncell; c++) {
+    PetscReal x[4][3], quality;
+
+    for (int i = 0; i < 12; i++) x[i / 3][i % 3] = old->x[3 * old->cell[4 * c + i / 3] + i % 3];
+    quality = SbTetQuality((const PetscReal(*)[3])x);
+    before += !(quality > 0);
+    worst = PetscMin(worst, quality);
+  }
+  PetscCheck(!at_rest, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
+             "%" PetscInt_FMT " of %" PetscInt_FMT
+             " new tetrahedra would be inside out or flat at rest: the deformation differs too much from one "
+             "old tetrahedron to the next",
+             at_rest, m->ncell);
+  PetscCheck(now <= before, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
+             "%" PetscInt_FMT " of %" PetscInt_FMT " new tetrahedra would be inside out, %" PetscInt_FMT
+             " old ones are",
+             now, m->ncell, before);
+  PetscCheck(!how->better || m->quality > worst, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
+             "a new mesh would be no better: its worst tetrahedron has the quality %.3g, now it is %.3g",
+             (double)m->quality, (double)worst);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ from beginning to end */
+
+static PetscErrorCode find_within(SbLocator rest, SbNewMesh *m)
+{
+  PetscFunctionBeginUser;
+  PetscCall(PetscMalloc1(m->ncell, &m->within));
+  for (PetscInt c = 0; c < m->ncell; c++) {
+    PetscReal middle[3], w[4];
+
+    for (int k = 0; k < 3; k++) {
+      middle[k] = 0;
+      for (int a = 0; a < 4; a++) middle[k] += m->X[3 * m->cell[4 * c + a] + k] / 4;
+    }
+    (void)SbLocatorFind(rest, middle, &m->within[c], w);
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* A mesher of the user's tests, or a new one, may not keep what it promises. */
+static PetscErrorCode check_mesher(const SbHull *hull, const SbNewMesh *m)
+{
+  PetscBool *used, all = PETSC_TRUE;
+
+  PetscFunctionBeginUser;
+  PetscCheck(m->ncell && m->nvert >= hull->nvert, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
+             "the mesher made no tetrahedra");
+  PetscCall(PetscCalloc1(m->nvert, &used));
+  for (PetscInt i = 0; i < 4 * m->ncell; i++) used[m->cell[i]] = PETSC_TRUE;
+  for (PetscInt v = 0; v < m->nvert; v++) all = (PetscBool)(all && used[v]);
+  PetscCall(PetscFree(used));
+  PetscCheck(all, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
+             "the mesher left out vertices of the surface, or made some of no tetrahedron");
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode remesh(const char *where, const SbOldMesh *old, const SbRemeshing *how, SbHull *hull,
+                             SbLocator *rest, SbNewMesh *m)
+{
+  PetscFunctionBeginUser;
+  PetscCall(make_hull(old, how->rest ? old->X : old->x, hull, &m->kept));
+  m->nkept = hull->nvert;
+  PetscCall(
+    (*how->mesher)(where, hull, how->size * hull->edge, how->ctx, &m->nvert, &m->x, &m->ncell, &m->cell));
+  PetscCall(check_mesher(hull, m));
+  PetscCall(SbLocatorCreate(old->ncell, old->cell, old->X, rest));
+  PetscCall(find_material(old, how, *rest, m));
+  PetscCall(mend(old, how, hull, *rest, m));
+  PetscCall(judge(old, how, m));
+  PetscCall(find_within(*rest, m));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbRemeshBody(const char *where, const SbOldMesh *old, const SbRemeshing *how, SbNewMesh *m)
+{
+  SbHull hull = {0};
+  SbLocator rest = NULL;
+  PetscErrorCode ierr;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscMemzero(m, sizeof(*m)));
+  ierr = remesh(where, old, how, &hull, &rest, m);
+  PetscCall(free_hull(&hull));
+  PetscCall(SbLocatorDestroy(&rest));
+  if (ierr) PetscCall(SbNewMeshDestroy(m));
+  PetscCall(ierr);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbNewMeshDestroy(SbNewMesh *m)
+{
+  PetscFunctionBeginUser;
+  PetscCall(PetscFree(m->X));
+  PetscCall(PetscFree(m->x));
+  PetscCall(PetscFree(m->cell));
+  PetscCall(PetscFree(m->kept));
+  PetscCall(PetscFree(m->within));
+  PetscCall(PetscMemzero(m, sizeof(*m)));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

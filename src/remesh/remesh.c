@@ -1,0 +1,557 @@
+/*
+  Re-meshing while a run goes on: when the tets of a body have become too bad, or at given times, it is meshed anew and the run goes on.
+
+  After each step the time loop asks whether to come back (SbRun.after). Then the state is brought to rank 0 (gather.c), bodies get their new
+  meshes and the state is looked up there (bodies.c), the scene is made once more from its options with these meshes in memory, and the
+  state goes there: vectors, what effects remember (effects.c), totals, output, ledger. Mass is that of before because densities are scaled (SbGiven.mass),
+  momenta because a rigid motion is added to the velocities (check.c). What kinetic and strain energy have changed by is the remesh_loss of the
+  account.
+
+  A body that could not be re-meshed keeps its mesh, and the run goes on with a warning; it is tried again when its quality has halved, but after 1, 2, 4, ...
+  steps at the soonest. The same bound holds after a mesh that came out little better: no body is re-meshed step by step.
+*/
+#include "remesh_impl.h"
+#include "sbscene.h"
+
+#define AGAIN 0.5          /* of the quality that was reached: below it a body may be re-meshed again */
+#define QUALITY_LEAST 1e-3 /* of new tets at rest and now, below which vertices are moved */
+
+struct _p_SbRemesh {
+  PetscLogEvent event;
+  PetscInt nbody;
+  PetscBool *named; /* [nbody] may be re-meshed */
+  PetscBool *due;   /* [nbody] is to be, now */
+  PetscReal *asked; /* [nbody] quality that the options name; 0: none */
+  PetscReal *bound; /* [nbody] the one that counts */
+  PetscReal *worst; /* [nbody] after the last step */
+  PetscInt *from;   /* [nbody] step from which its quality counts again */
+  PetscInt *rest;   /* [nbody] steps that it was left alone after the last attempt without success */
+  PetscInt ntime;
+  PetscReal *time;  /* [ntime] s */
+  PetscBool failed; /* also when a step fails */
+  PetscInt tried;   /* the step after which that was tried last, -1: never */
+  SbRemeshing how;
+  SbColumn *column; /* those of the ledger and remesh_loss */
+};
+
+static const SbOption rows[] = {
+  {"remesh_quality", SB_OPTION_REAL, 1, "", "0", "[0, 1)",
+   "a body is re-meshed when the shape 3 r/R of a tet falls below this (1: regular, 0: flat, negative: "
+   "inside "
+   "out); "
+   "0: never for that"},
+  {"remesh_times", SB_OPTION_NAMES, 1, "s", "", "",
+   "times at which bodies are re-meshed, with commas between them"},
+  {"remesh_failed", SB_OPTION_BOOL, 1, "", "false", "",
+   "when a step fails for good: the body with the worst tet is re-meshed and the step tried again"},
+  {"remesh_bodies", SB_OPTION_NAMES, 1, "", "", "", "bodies that may be re-meshed; empty: all"},
+  {"remesh_from", SB_OPTION_CHOICE, 1, "", "deformed", "deformed|rest",
+   "the shape that is filled with new tets: the one that the body has then, or the one at rest"},
+  {"remesh_size", SB_OPTION_REAL, 1, "", "1", "[0.1, 10]",
+   "edges of new tets inside, in mean edges of the body's surface, which stays"},
+};
+static const SbOption body_rows[] = {
+  {"remesh_quality", SB_OPTION_REAL, 1, "", "", "[0, 1)", "of this body, in place of -remesh_quality"},
+};
+
+PetscErrorCode SbRemeshRegister(void)
+{
+  PetscFunctionBeginUser;
+  PetscCall(SbOptionsRegister("", "", PETSC_STATIC_ARRAY_LENGTH(rows), rows));
+  PetscCall(SbOptionsRegister("body", "", PETSC_STATIC_ARRAY_LENGTH(body_rows), body_rows));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ options */
+
+static PetscErrorCode read_times(SbRemesh r, const SbScope *scope)
+{
+  char(*words)[SB_NAME_MAX];
+
+  PetscFunctionBeginUser;
+  PetscCall(SbOptionNames(scope, "remesh_times", &r->ntime, &words));
+  PetscCall(PetscMalloc1(r->ntime, &r->time));
+  for (PetscInt i = 0; i < r->ntime; i++) {
+    char *end;
+    PetscBool good;
+
+    r->time[i] = strtod(words[i], &end);
+    good = (PetscBool)(!*end && r->time[i] > 0. && !PetscIsInfOrNanReal(r->time[i]));
+    if (!good) {
+      char word[SB_NAME_MAX];
+
+      PetscCall(PetscStrncpy(word, words[i], sizeof(word)));
+      PetscCall(PetscFree(words));
+      SETERRQ(PETSC_COMM_SELF, PETSC_ERR_USER,
+              "-remesh_times: '%s' is no time above 0 s; give numbers with commas between them", word);
+    }
+  }
+  PetscCall(PetscFree(words));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode read_names(SbRemesh r, SbModel m, const SbScope *scope)
+{
+  char(*names)[SB_NAME_MAX], wrong[SB_NAME_MAX] = "";
+  PetscInt n;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbOptionNames(scope, "remesh_bodies", &n, &names));
+  for (PetscInt b = 0; b < m->nbody; b++) r->named[b] = (PetscBool)!n;
+  for (PetscInt i = 0; i < n; i++) {
+    PetscInt b = 0;
+
+    while (b < m->nbody && strcmp(names[i], m->body[b].name)) b++;
+    if (b < m->nbody)
+      r->named[b] = PETSC_TRUE;
+    else
+      PetscCall(PetscStrncpy(wrong, names[i], sizeof(wrong)));
+  }
+  PetscCall(PetscFree(names));
+  PetscCheck(!wrong[0], PETSC_COMM_SELF, PETSC_ERR_USER,
+             "-remesh_bodies: the scenario has no body '%s'; give names of -bodies", wrong);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Bounds of the bodies that are named; whether there is one. */
+static PetscErrorCode read_bounds(SbRemesh r, SbModel m, const SbScope *scope, PetscBool *any)
+{
+  PetscReal all;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbOptionReal(scope, "remesh_quality", &all));
+  for (PetscInt b = 0; b < m->nbody; b++) {
+    SbScope own;
+
+    if (!r->named[b]) continue;
+    r->asked[b] = all;
+    PetscCall(SbScopeSet(&own, "body", "", m->body[b].name));
+    PetscCall(SbOptionReal(&own, "remesh_quality", &r->asked[b]));
+    r->bound[b] = r->asked[b];
+    *any = (PetscBool)(*any || r->asked[b] > 0.);
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Whether the scenario asks for it, by any option but those that say how. */
+static PetscErrorCode is_named(SbModel m, const SbScope *scope, PetscBool *named)
+{
+  static const char *const keys[] = {"remesh_quality", "remesh_times", "remesh_failed"};
+  PetscBool given;
+
+  PetscFunctionBeginUser;
+  *named = PETSC_FALSE;
+  for (size_t k = 0; k < PETSC_STATIC_ARRAY_LENGTH(keys); k++) {
+    PetscCall(SbOptionGiven(scope, keys[k], &given));
+    *named = (PetscBool)(*named || given);
+  }
+  for (PetscInt b = 0; b < m->nbody; b++) {
+    SbScope own;
+
+    PetscCall(SbScopeSet(&own, "body", "", m->body[b].name));
+    PetscCall(SbOptionGiven(&own, "remesh_quality", &given));
+    *named = (PetscBool)(*named || given);
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbRemeshSetFromOptions(SbModel m, SbRemesh *remesh)
+{
+  PetscBool named, any = PETSC_FALSE;
+  PetscInt from;
+  SbScope scope;
+  SbRemesh r;
+
+  PetscFunctionBeginUser;
+  *remesh = NULL;
+  PetscCall(SbScopeSet(&scope, "", "", ""));
+  PetscCall(is_named(m, &scope, &named));
+  if (!named) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscNew(&r));
+  *remesh = r;
+  PetscCall(SbLogNamed("Mesh", "remesh", &r->event));
+  r->nbody = m->nbody;
+  r->tried = -1;
+  PetscCall(PetscCalloc7(m->nbody, &r->named, m->nbody, &r->due, m->nbody, &r->asked, m->nbody, &r->bound,
+                         m->nbody, &r->worst, m->nbody, &r->from, m->nbody, &r->rest));
+  PetscCall(read_names(r, m, &scope));
+  PetscCall(read_bounds(r, m, &scope, &any));
+  PetscCall(read_times(r, &scope));
+  PetscCall(SbOptionBool(&scope, "remesh_failed", &r->failed));
+  PetscCall(SbOptionChoice(&scope, "remesh_from", &from));
+  PetscCall(SbOptionReal(&scope, "remesh_size", &r->how.size));
+  r->how.rest = (PetscBool)(from == 1);
+  r->how.quality = QUALITY_LEAST;
+  r->how.mesher = SbMesherDefault;
+  if (!any && !r->ntime && !r->failed) PetscCall(SbRemeshDestroy(remesh));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbRemeshSetMesher(SbRemesh r, SbMesher mesher, void *ctx)
+{
+  PetscFunctionBeginUser;
+  r->how.mesher = mesher;
+  r->how.ctx = ctx;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbRemeshDestroy(SbRemesh *remesh)
+{
+  SbRemesh r = *remesh;
+
+  PetscFunctionBeginUser;
+  if (!r) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscFree7(r->named, r->due, r->asked, r->bound, r->worst, r->from, r->rest));
+  PetscCall(PetscFree(r->time));
+  PetscCall(PetscFree(r->column));
+  PetscCall(PetscFree(*remesh));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ whether, and which bodies */
+
+static PetscErrorCode look(SbRun run, PetscInt step, PetscReal t, PetscReal dt, void *ctx, PetscBool *pause)
+{
+  const PetscReal ahead = 1e-6 * dt; /* a step that ends there but for rounding has reached it */
+  SbRemesh r = (SbRemesh)ctx;
+  PetscBool time = PETSC_FALSE;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscLogEventBegin(r->event, 0, 0, 0, 0));
+  *pause = PETSC_FALSE;
+  for (PetscInt i = 0; i < r->ntime; i++)
+    time = (PetscBool)(time || (r->time[i] > t - dt + ahead && r->time[i] <= t + ahead));
+  r->how.better = (PetscBool)!time;
+  PetscCall(SbBodyQualities(run->model, run->U, r->named, r->worst));
+  for (PetscInt b = 0; b < r->nbody; b++) {
+    const PetscBool bad = (PetscBool)(r->asked[b] > 0. && r->worst[b] < r->bound[b] && step >= r->from[b]);
+
+    r->due[b] = (PetscBool)(r->named[b] && (time || bad));
+    *pause = (PetscBool)(*pause || r->due[b]);
+  }
+  PetscCall(PetscLogEventEnd(r->event, 0, 0, 0, 0));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The step that follows failed: the body with the worst tet is due, once for each state. */
+static PetscErrorCode look_after_failure(SbRemesh r, SbRun run, PetscBool *again)
+{
+  PetscInt worst = -1;
+
+  PetscFunctionBeginUser;
+  *again = PETSC_FALSE;
+  if (!r->failed || !run->stop_reason[0] || run->step_now <= r->tried) PetscFunctionReturn(PETSC_SUCCESS);
+  r->tried = run->step_now;
+  if (!run->step_now) {
+    PetscCall(SbWarning(run->model->comm,
+                        "-remesh_failed: the first step failed, with the bodies as they were "
+                        "given: none is re-meshed, their meshes, loads or steps must change"));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  PetscCall(SbBodyQualities(run->model, run->U, r->named, r->worst));
+  for (PetscInt b = 0; b < r->nbody; b++) {
+    r->due[b] = PETSC_FALSE;
+    if (r->named[b] && (worst < 0 || r->worst[b] < r->worst[worst])) worst = b;
+  }
+  if (worst < 0) PetscFunctionReturn(PETSC_SUCCESS);
+  r->due[worst] = *again = PETSC_TRUE;
+  r->how.better = PETSC_FALSE;
+  PetscCall(SbWarning(run->model->comm, "%s; body '%s' is re-meshed", run->stop_reason,
+                      run->model->body[worst].name));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbRemeshAttach(SbRemesh r, SbRun run)
+{
+  PetscFunctionBeginUser;
+  if (!r) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscFree(r->column));
+  PetscCall(PetscMalloc1(run->ncolumn + 1, &r->column));
+  PetscCall(PetscArraycpy(r->column, run->column, run->ncolumn));
+  r->column[run->ncolumn] = (SbColumn){"remesh_loss", "J", &run->energies.remesh_loss};
+  run->column = r->column;
+  run->ncolumn++;
+  run->want_energies = PETSC_TRUE;
+  for (PetscInt b = 0; b < r->nbody; b++) {
+    const SbGiven *given = run->model->body[b].given;
+
+    if (given && given->bound > 0.) r->bound[b] = PetscMin(r->bound[b], given->bound);
+  }
+  PetscCall(SbRunSetPause(run, look, r));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ the scene once more */
+
+/* What is being replaced, and what takes its place. */
+typedef struct {
+  SbModel model;
+  SbRun run;
+  SbLedger ledger;
+} Scene;
+
+static PetscErrorCode destroy_scene(Scene *s)
+{
+  PetscFunctionBeginUser;
+  PetscCall(SbLedgerDestroy(&s->ledger));
+  PetscCall(SbRunDestroy(&s->run));
+  PetscCall(SbModelDestroy(&s->model));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The bodies' meshes, which are on rank 0; the model owns them from now on. */
+static PetscErrorCode hand_meshes(SbModel m, SbGiven *given[])
+{
+  PetscMPIInt rank;
+
+  PetscFunctionBeginUser;
+  PetscCallMPI(MPI_Comm_rank(m->comm, &rank));
+  for (PetscInt b = 0; b < m->nbody; b++) {
+    SbGiven *p = given[b];
+    PetscReal numbers[2] = {p ? p->mass : 0., p ? p->bound : 0.};
+    PetscInt step = p ? p->step : 0;
+
+    if (rank) PetscCall(SbGivenCreate(0, 0, 0, &p));
+    PetscCallMPI(MPI_Bcast(numbers, 2, MPIU_REAL, 0, m->comm));
+    PetscCallMPI(MPI_Bcast(&step, 1, MPIU_INT, 0, m->comm));
+    p->mass = numbers[0];
+    p->bound = numbers[1];
+    p->step = step;
+    m->body[b].given = p;
+    given[b] = NULL;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Everything from the options again, on the new meshes. The solver is the one of before, whose options are in PETSc's database. */
+static PetscErrorCode make_scene(const Scene *old, SbGiven *given[], Scene *s)
+{
+  PetscFunctionBeginUser;
+  PetscCall(SbSceneCreate(old->model->comm, &s->model));
+  PetscCall(SbRunCreate(s->model, &s->run));
+  PetscCall(PetscStrncpy(s->run->solver_choice, old->run->solver, sizeof(s->run->solver_choice)));
+  PetscCall(SbLedgerSetFromOptions(s->run, &s->ledger));
+  PetscCall(hand_meshes(s->model, given));
+  PetscCall(SbModelSetUp(s->model));
+  PetscCall(SbSceneValidate(s->model));
+  PetscCall(SbRunSetUp(s->run));
+  PetscCall(PetscStrncpy(s->run->solver_reason, old->run->solver_reason, sizeof(s->run->solver_reason)));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Momenta of the bodies, and rates of theirs where the integrator brings its acceleration along: else it would push them for a step. */
+static PetscErrorCode conserve_momenta(const Scene *old, const PetscBool done[], SbRun run, PetscReal *speed)
+{
+  const SbRun before = old->run;
+  PetscReal(*momenta)[6], rate;
+
+  PetscFunctionBeginUser;
+  if (!run->V) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscCalloc1(old->model->nbody, &momenta));
+  PetscCall(SbBodyMomenta(old->model, before->U, before->V, momenta));
+  PetscCall(SbBodySetMomenta(run->model, run->U, run->V, done, (const PetscReal(*)[6])momenta, speed));
+  if (run->A) {
+    PetscCall(SbBodyMomenta(old->model, before->U, before->A, momenta));
+    PetscCall(SbBodySetMomenta(run->model, run->U, run->A, done, (const PetscReal(*)[6])momenta, &rate));
+  }
+  PetscCall(PetscFree(momenta));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The state goes from the old scene to the new one. */
+static PetscErrorCode hand_over(const Scene *old, const SbGathered *next, const SbRenamed *renamed,
+                                const PetscBool done[], Scene *s, PetscReal *speed)
+{
+  SbRun run = s->run;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbRunContinue(old->run, run));
+  PetscCall(SbScatter(next, run));
+  PetscCall(SbModelPrescribe(s->model, run->t_now, run->U));
+  PetscCall(conserve_momenta(old, done, run, speed));
+  PetscCall(SbEffectsHandOver(old->run, run, renamed));
+  PetscCall(SbRunRestartAcceleration(run));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Energies of both states: what is between them was lost. */
+static PetscErrorCode close_account(const Scene *old, Scene *s, SbEnergies e[2])
+{
+  PetscFunctionBeginUser;
+  PetscCall(PetscMemzero(e, 2 * sizeof(*e)));
+  PetscCall(SbModelEnergies(old->model, old->run->U, old->run->V, &e[0]));
+  PetscCall(SbModelEnergies(s->model, s->run->U, s->run->V, &e[1]));
+  s->run->energies.remesh_loss += e[0].kinetic + e[0].strain - e[1].kinetic - e[1].strain;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ a re-meshing from beginning to end */
+
+/* What rank 0 has made; all ranks know the messages and numbers. done: bodies with a new mesh. */
+static PetscErrorCode make_meshes(SbRemesh r, SbRun run, SbGathered *next, SbRenamed *renamed,
+                                  SbGiven *given[], SbMade made[], PetscBool done[], PetscBool *any)
+{
+  const SbModel m = run->model;
+  SbGathered g;
+  PetscMPIInt rank;
+
+  PetscFunctionBeginUser;
+  PetscCallMPI(MPI_Comm_rank(m->comm, &rank));
+  PetscCall(SbGather(run, &g));
+  PetscCall(PetscMemzero(next, sizeof(*next)));
+  PetscCall(PetscMemzero(renamed, sizeof(*renamed)));
+  if (!rank) PetscCall(SbRemeshBodies(m, &g, r->due, run->step_now, &r->how, given, made, next, renamed));
+  next->nbody = g.nbody;
+  next->nfield = g.nfield;
+  next->width = g.width;
+  PetscCall(SbGatheredDestroy(&g));
+  PetscCallMPI(MPI_Bcast(made, (int)((size_t)m->nbody * sizeof(*made)), MPI_BYTE, 0, m->comm));
+  PetscCallMPI(MPI_Bcast(&renamed->n, 1, MPIU_INT, 0, m->comm));
+  if (rank) PetscCall(PetscMalloc2(renamed->n, &renamed->from, renamed->n, &renamed->to));
+  PetscCallMPI(MPI_Bcast(renamed->from, (PetscMPIInt)renamed->n, MPIU_INT, 0, m->comm));
+  PetscCallMPI(MPI_Bcast(renamed->to, (PetscMPIInt)renamed->n, MPIU_INT, 0, m->comm));
+  *any = PETSC_FALSE;
+  for (PetscInt b = 0; b < m->nbody; b++) {
+    done[b] = (PetscBool)(r->due[b] && !made[b].message[0]);
+    *any = (PetscBool)(*any || done[b]);
+    if (r->due[b] && !done[b])
+      PetscCall(SbWarning(m->comm, "body '%s' keeps its mesh after step %" PetscInt_FMT ": %s",
+                          m->body[b].name, run->step_now, made[b].message));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Below which quality, and from which step on, the bodies that were due are re-meshed again. */
+static void set_bounds(SbRemesh r, PetscInt step, const SbMade made[], const PetscBool done[],
+                       SbGiven *given[])
+{
+  for (PetscInt b = 0; b < r->nbody; b++) {
+    const PetscReal reached = done[b] ? made[b].quality : r->worst[b];
+
+    if (!r->due[b]) continue;
+    if (reached > 0.) r->bound[b] = PetscMin(r->asked[b], AGAIN * reached);
+    r->rest[b] = done[b] && reached > 0. ? 0 : PetscMax(1, 2 * r->rest[b]);
+    r->from[b] = step + r->rest[b];
+    if (given[b] && done[b]) given[b]->bound = r->bound[b];
+  }
+}
+
+static PetscErrorCode report(SbRemesh r, const Scene *s, const SbMade made[], const PetscBool done[],
+                             const SbEnergies e[2], PetscReal speed)
+{
+  PetscFunctionBeginUser;
+  for (PetscInt b = 0; b < r->nbody; b++) {
+    SbRemeshed told = {.step = s->run->step_now, .t = s->run->t_now};
+
+    if (!done[b]) continue;
+    PetscCall(PetscStrncpy(told.body, s->model->body[b].name, sizeof(told.body)));
+    for (int i = 0; i < 2; i++) {
+      told.tets[i] = made[b].ncell[i];
+      told.vertices[i] = made[b].nvert[i];
+      told.energy[i] = e[i].kinetic + e[i].strain;
+    }
+    told.quality[0] = r->worst[b];
+    told.quality[1] = made[b].quality;
+    told.moved = made[b].nmoved;
+    told.speed = speed;
+    for (int k = 0; k < 3; k++) told.shift += PetscSqr(e[1].centre[k] - e[0].centre[k]);
+    told.shift = PetscSqrtReal(told.shift);
+    PetscCall(SbReportRemeshed(s->run, &told));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The new scene, or the message why it cannot be made: then the old one goes on. */
+static PetscErrorCode replace(SbRemesh r, Scene *old, const SbGathered *next, const SbRenamed *renamed,
+                              const PetscBool done[], SbGiven *given[], const SbMade made[])
+{
+  Scene s = {NULL, NULL, NULL};
+  SbEnergies e[2];
+  PetscReal speed = 0.;
+
+  PetscFunctionBeginUser;
+  PetscCall(make_scene(old, given, &s));
+  PetscCall(hand_over(old, next, renamed, done, &s, &speed));
+  PetscCall(close_account(old, &s, e));
+  PetscCall(SbLedgerAttach(s.ledger));
+  if (s.ledger) PetscCall(SbLedgerContinue(old->ledger, s.ledger));
+  PetscCall(SbRemeshAttach(r, s.run));
+  if (old->run->output) PetscCall(SbOutputFollow(old->run, s.run));
+  PetscCall(report(r, &s, made, done, e, speed));
+  PetscCall(destroy_scene(old));
+  *old = s;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The old mesh stays, and the time loop begins again where it was. */
+static void go_on(SbRun run)
+{
+  run->step0 = run->step_now;
+  run->t0 = run->t_now;
+  run->newton_before = run->newton_total;
+  run->linear_before = run->linear_total;
+  run->rejected_seen = 0;
+}
+
+/* any: some body has a new mesh. */
+static PetscErrorCode apply(SbRemesh r, Scene *scene, PetscBool *any)
+{
+  const PetscInt n = scene->model->nbody;
+  SbGathered next;
+  SbRenamed renamed;
+  SbGiven **given;
+  SbMade *made;
+  PetscBool *done;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscLogStagePush(SbStageSetup));
+  PetscCall(PetscLogEventBegin(r->event, 0, 0, 0, 0));
+  PetscCall(PetscCalloc3(n, &given, n, &made, n, &done));
+  PetscCall(make_meshes(r, scene->run, &next, &renamed, given, made, done, any));
+  set_bounds(r, scene->run->step_now, made, done, given);
+  if (*any) PetscCall(replace(r, scene, &next, &renamed, done, given, made));
+  for (PetscInt b = 0; b < n; b++) PetscCall(SbGivenDestroy(&given[b]));
+  PetscCall(PetscFree3(given, made, done));
+  PetscCall(SbGatheredDestroy(&next));
+  PetscCall(PetscFree2(renamed.from, renamed.to));
+  PetscCall(PetscLogEventEnd(r->event, 0, 0, 0, 0));
+  PetscCall(PetscLogStagePop());
+  if (!*any) go_on(scene->run);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* A checkpoint of a step that bodies were to be re-meshed after holds the meshes of before: a restart does it first. */
+static PetscErrorCode make_up(SbRemesh r, Scene *scene)
+{
+  const SbRun run = scene->run;
+  PetscBool again = PETSC_FALSE, any;
+
+  PetscFunctionBeginUser;
+  if (!r || !run->step0 || !(run->after.dt > 0.)) PetscFunctionReturn(PETSC_SUCCESS);
+  run->step_now = run->step0;
+  run->t_now = run->t0;
+  PetscCall(look(run, run->step0, run->t0, run->after.dt, r, &again));
+  if (again) PetscCall(apply(r, scene, &any));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbRemeshSolve(SbRemesh r, SbModel *model, SbRun *run, SbLedger *ledger)
+{
+  Scene scene = {*model, *run, ledger ? *ledger : NULL};
+  PetscBool again, failed = PETSC_FALSE, any = PETSC_FALSE;
+
+  PetscFunctionBeginUser;
+  PetscCall(make_up(r, &scene));
+  do {
+    PetscCall(SbRunSolve(scene.run));
+    again = scene.run->paused;
+    if (r && !again) PetscCall(look_after_failure(r, scene.run, &failed));
+    if (again || failed) PetscCall(apply(r, &scene, &any));
+    if (failed) again = any;
+    failed = PETSC_FALSE;
+    *model = scene.model;
+    *run = scene.run;
+    if (ledger) *ledger = scene.ledger;
+  } while (again);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

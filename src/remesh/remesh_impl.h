@@ -1,0 +1,92 @@
+/*
+  remesh_impl.h - what the files of re-meshing share: a scene with its state on rank 0, and the one that takes its place.
+*/
+#pragma once
+#include "sbremesh.h"
+#include "sbtet.h"
+
+/* All bodies in original order, and up to three vectors of the run. Arrays are on rank 0 alone, NULL elsewhere. */
+typedef struct {
+  PetscInt nbody, nvert, ncell;
+  PetscInt nfield;         /* vectors: U, V, A, as far as the run has them */
+  PetscInt width;          /* 4: the nodes of a cell; 8: and the supports of its faces */
+  PetscInt *vert0, *cell0; /* [nbody + 1] first vertex and cell of each body; on all ranks */
+  PetscReal *mass;         /* [nbody] kg; on all ranks */
+  PetscReal *X, *x;        /* [nvert][3] at rest; now, of CR and DG the means around vertices; m */
+  uint64_t *vert_set;      /* [nvert] */
+  PetscInt *cell;          /* [ncell][4] vertices */
+  PetscInt *cell_material; /* [ncell] */
+  uint64_t *cell_set;      /* [ncell][5] of the cell, of its faces */
+  PetscReal *value;        /* [ncell][width][nfield][3]; SI; supports: PETSC_MAX_REAL where there is none */
+} SbGathered;
+PetscErrorCode SbGather(SbRun run, SbGathered *g); /* collective; SbGatheredDestroy() */
+PetscErrorCode SbGatheredDestroy(SbGathered *g);
+/* Fills the vectors of a run from value, width and nfield of g, whose cells are those of the run's mesh. Collective. */
+PetscErrorCode SbScatter(const SbGathered *g, SbRun run);
+
+/* Nodes of the surface by their original numbers, ascending in `from`, on all ranks; PetscFree2(from, to). */
+typedef struct {
+  PetscInt n, *from, *to;
+} SbRenamed;
+
+/* ------------------------------------------------------------------ body.c: another mesh of one body, on rank 0; not collective */
+
+typedef struct {
+  SbMesher mesher;
+  void *ctx;
+  PetscReal size;    /* wanted edge, in mean edges of the hull */
+  PetscBool better;  /* a mesh whose worst tet is no better now than that of the old one is refused */
+  PetscBool rest;    /* the body is filled as it is at rest, else as it is now */
+  PetscReal quality; /* least that tets may have at rest, and now (SbTetQuality) */
+} SbRemeshing;
+/* The mesh that there is; all borrowed. */
+typedef struct {
+  PetscInt nvert, ncell;
+  const PetscReal *X, *x; /* [nvert][3] at rest, now; m */
+  const PetscInt *cell;   /* [ncell][4] */
+  const PetscInt *region; /* [ncell] tets of different numbers stay apart */
+} SbOldMesh;
+/* Another one of the same body; arrays owned, SbNewMeshDestroy(). */
+typedef struct {
+  PetscInt nvert, ncell, nkept;
+  PetscReal *X, *x;  /* [nvert][3] at rest, and now as the old mesh has it there; m */
+  PetscInt *cell;    /* [ncell][4] */
+  PetscInt *kept;    /* [nkept] old vertex of each of the first new ones, which are where they were */
+  PetscInt *within;  /* [ncell] old tet that holds the middle of the new one */
+  PetscInt nmoved;   /* vertices that were moved, for tets that would have been inside out or too flat */
+  PetscReal quality; /* of the worst tet, now */
+} SbNewMesh;
+/* Errors (PETSC_ERR_USER_INPUT): what the mesher says; tets that stay inside out at rest or now. */
+PetscErrorCode SbRemeshBody(const char *where, const SbOldMesh *old, const SbRemeshing *how, SbNewMesh *mesh);
+PetscErrorCode SbNewMeshDestroy(SbNewMesh *mesh);
+
+/*
+  bodies.c - rank 0: the bodies with due[b] are meshed anew; `made` gets their meshes and those of all others, as they are, and `next` the same
+  scene with the state looked up there (X, vert_set and so on are left out).
+
+  Not collective. message[b]: why a body could not be re-meshed, "" when it was or was not due; it keeps its mesh then.
+*/
+typedef struct {
+  PetscInt nvert[2], ncell[2]; /* before and after */
+  PetscInt nmoved;
+  PetscReal quality; /* of the worst tet after it */
+  char message[512];
+} SbMade;
+PetscErrorCode SbRemeshBodies(SbModel model, const SbGathered *g, const PetscBool due[], PetscInt step,
+                              const SbRemeshing *how, SbGiven *given[], SbMade made[], SbGathered *next,
+                              SbRenamed *renamed);
+
+/*
+  check.c - qualities and momenta.
+*/
+/* worst[nbody]: quality of the worst tet of each body that is named, else 1. Collective. */
+PetscErrorCode SbBodyQualities(SbModel model, Vec U, const PetscBool named[], PetscReal worst[]);
+/* Momentum and angular momentum about the origin of each body, [nbody][6], SI. Collective. */
+PetscErrorCode SbBodyMomenta(SbModel model, Vec U, Vec V, PetscReal momenta[][6]);
+/* Adds a rigid motion to the velocities of each body that is named, but not where they are prescribed, with which it has these momenta.
+   Collective. `largest`: speed that was added, m/s. */
+PetscErrorCode SbBodySetMomenta(SbModel model, Vec U, Vec V, const PetscBool named[],
+                                const PetscReal momenta[][6], PetscReal *largest);
+
+/* effects.c: what effects remember goes from one model to the other. Collective. */
+PetscErrorCode SbEffectsHandOver(SbRun from, SbRun to, const SbRenamed *renamed);
