@@ -223,15 +223,14 @@ static PetscErrorCode read_names(Netgen *g, const char *section, PetscInt dim)
   if (!find_section(s, section)) PetscFunctionReturn(PETSC_SUCCESS);
   SbScanNext(s, '#');
   PetscCall(SbScanText(s, "number of names", &n));
-  PetscCall(SbScanRoom(s, "names", n, 4, 4));
+  PetscCall(SbScanRoom(s, "names", n, 2, 2));
   for (int64_t i = 0; i < n; i++) {
     char name[SB_GROUP_MAX];
     size_t length = 0;
 
     SbScanNext(s, '#');
     PetscCall(SbScanText(s, "number of a name", &number));
-    if (!SbScanMore(s, '\n'))
-      SB_SCAN_ERROR(s, "the line ends where the name of number %lld is expected", (long long)number);
+    if (!SbScanMore(s, '\n')) continue; /* it has no name */
     for (; s->at < s->end && *s->at != '\n'; s->at++) {
       if (length + 1 >= sizeof(name))
         SB_SCAN_ERROR(s, "the name is longer than %zu characters", sizeof(name) - 1);

@@ -158,7 +158,9 @@ static PetscErrorCode cell_tags(const SbVtkGrid *grid, const PetscBool use[], in
     const int64_t value = use[a] ? (int64_t)grid->array[a].value[c] : 0;
 
     if (!use[a]) continue;
-    PetscCall(SbImportGroup(im, dim, value * SB_VTK_ARRAYS + a, NULL, &group[n]));
+    /* numbers of regions stay; those of other arrays lie apart from them */
+    PetscCall(
+      SbImportGroup(im, dim, a == regions ? value : value + ((int64_t)(a + 1) << 42), NULL, &group[n]));
     if (im->ngroup > known)
       (void)snprintf(im->group[group[n]].name, SB_GROUP_MAX, "%.40s%s%s_%lld",
                      a == regions ? "" : grid->array[a].name, a == regions ? "" : "_", kind[dim],

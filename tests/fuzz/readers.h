@@ -38,6 +38,7 @@ static const struct {
   {"vtu", ".vtu", SbImportRead_VTU},
   {"abaqus", ".inp", SbImportRead_Abaqus},
   {"unv", ".unv", SbImportRead_UNV},
+  {"nastran", ".bdf", SbImportRead_Nastran},
   {"stl", ".stl", NULL},
   {"obj", ".obj", NULL},
   {"off", ".off", NULL},

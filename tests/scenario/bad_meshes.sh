@@ -97,7 +97,7 @@ edit $'1 4 0 1 2 3 4\n2 4 0 2 3 4 5' $'1 2 0 1 2 3\n2 2 0 2 3 4' >surface.msh
 mesh 1 surface.msh ": is a surface: 2 3-node triangles and no tetrahedra; mesh the volume (gmsh -3)"
 mesh 2 surface.msh ": is a surface: 2 3-node triangles and no tetrahedra; mesh the volume (gmsh -3)"
 
-# another format, and one that is read by gmsh in a process of its own
+# another format, one that is read by gmsh in a process of its own, and one of a finite-element program
 printf '%s\n' "\$MeshFormat" '4.0 0 8' "\$EndMeshFormat" >version4.msh
 mesh 2 version4.msh ": gmsh finds no mesh in it; it is empty, damaged, or not what its ending says"
 printf '1 4 0\n1 1 2 3 5\n' >thing.ele

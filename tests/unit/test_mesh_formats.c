@@ -122,6 +122,23 @@ static PetscErrorCode test_file(const char *path, const SbImport *reference, con
 
 /* ------------------------------------------------------------------ files of gmsh and VTK */
 
+/* Numbers of VTK's regions stay those of the file, beside another array: a conversion keeps them. */
+static PetscErrorCode test_numbers(void)
+{
+  SbImport im;
+
+  PetscFunctionBeginUser;
+  PetscCall(read_mesh(DATA "two_cubes.vtk", &im));
+  for (PetscInt g = 0; g < im.ngroup; g++) {
+    const char *number = strrchr(im.group[g].name, '_');
+
+    SB_CHECK(number && strtoll(number + 1, NULL, 10) == (long long)im.group[g].tag,
+             "'%s' has the number %lld", im.group[g].name, (long long)im.group[g].tag);
+  }
+  PetscCall(SbImportDestroy(&im));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 static PetscErrorCode test_foreign(const SbImport *reference)
 {
   static const Same names[] = {
@@ -269,7 +286,7 @@ static PetscErrorCode write_vol(const char *path, const SbImport *im)
   fprintf(file, "points\n%d\n", (int)im->nvert);
   for (PetscInt v = 0; v < im->nvert; v++)
     fprintf(file, "  %.17g  %.17g  %.17g\n", im->x[3 * v], im->x[3 * v + 1], im->x[3 * v + 2]);
-  fprintf(file, "\nmaterials\n2\n1 the left one\n2 right\nbcnames\n3\n3 wall\n4 nowhere\n5 inner\nendmesh\n");
+  fprintf(file, "\nmaterials\n3\n1 the left one\n2 \n3\nbcnames\n3\n3 wall\n4 nowhere\n5 inner\nendmesh\n");
   fclose(file);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -338,12 +355,79 @@ static PetscErrorCode write_abaqus(const char *path, const SbImport *im)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A node in one of the ways that Nastran knows: between commas, of 8 columns by tabs, of 16, of 8 without the letter of the exponent. */
+static void write_grid(FILE *file, int way, int label, const PetscReal x[3])
+{
+  if (way == 0)
+    fprintf(file, "grid,%d,,%.4f,%.4f,%.4f $ free\n", label, x[0], x[1], x[2]);
+  else if (way == 1)
+    fprintf(file, "GRID\t%d\t0\t%.4f\t%.4f\t%.4f\r\n", label, x[0], x[1], x[2]);
+  else if (way == 2)
+    fprintf(file, "GRID*   %16d%16s%16.9f%16.9f*G%d\n*G%-6d%16.9E\n", label, "", x[0], x[1], label, label,
+            x[2]);
+  else
+    fprintf(file, "%-8s%8d%8s%6.2f-2%6.2f+0%8.4f\n", "GRID", label, "", 100 * x[0], x[1], x[2]);
+}
+
+/* A deck with its head and its end; elements before their points, names as four programs write them, sets of nodes. */
+static PetscErrorCode write_nastran(const char *path, const SbImport *im)
+{
+  FILE *file = fopen(path, "w");
+
+  PetscFunctionBeginUser;
+  fprintf(file, "SOL 101\nCEND\nSET 4 = 1,2\nGRID 1 2 3\nBEGIN BULK\n");
+  fprintf(file, "$ANSA_NAME_COMMENT;1;PSOLID;the left one;NO;NO;\n$ANSA_NAME_COMMENT;1;MAT1;steel;NO;\n");
+  fprintf(file, "$HMNAME PROP                   2\"right\" 4\n$ Femap with NX Nastran Property 3 : wall\n");
+  fprintf(file, "$ Elements and Element Properties for region : inner\nPSHELL,5,1,1.\nPSOLID,1,7\n+,0\n");
+  for (PetscInt i = 0; i < im->item[3].n; i++) {
+    fprintf(file, "CTETRA  %8d%8d", (int)i + 1, mark_of(im, 3, i));
+    for (int k = 0; k < 4; k++) fprintf(file, "%8d", (int)im->item[3].vert[4 * i + k] + 1);
+    fprintf(file, "\n$ a comment\n\n");
+  }
+  for (int dim = 2; dim > 0; dim--) {
+    for (PetscInt i = 0; i < im->item[dim].n; i++) {
+      fprintf(file, "%s,%d,%d", dim == 2 ? "CTRIA3" : "CBAR", 1000 * dim + (int)i,
+              dim == 2 ? mark_of(im, 2, i) : 78);
+      for (int k = 0; k <= dim; k++) fprintf(file, ",%d", (int)im->item[dim].vert[(dim + 1) * i + k] + 1);
+      fprintf(file, ",0.,0.,1.\n");
+    }
+  }
+  for (PetscInt v = 0; v < im->nvert; v++) write_grid(file, (int)v % 4, (int)v + 1, im->x + 3 * v);
+  fprintf(file, "SPC1,3,123,%d,%d,,%d,THRU,\n+,%d,900,THRU,999\n", (int)im->item[0].vert[0] + 1,
+          (int)im->item[0].vert[0] + 1, (int)im->item[0].vert[0] + 1, (int)im->item[0].vert[0] + 1);
+  fprintf(file, "SPC,4,%d,123,0.\nSET1,5,%d\nENDDATA\nGRID,1\n", (int)im->item[0].vert[0] + 1,
+          (int)im->item[0].vert[0] + 1);
+  fclose(file);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode test_nastran(const SbImport *reference, const char *folder)
+{
+  static const Same deck[] = {{3, "the_left_one", "left"}, {2, "wall", "wall"},    {2, "inner", "inner"},
+                              {1, "curve_78", "edge"},     {0, "spc_3", "corner"}, {0, "spc_4", "corner"},
+                              {0, "set_5", "corner"},      {0, NULL, NULL}};
+  char path[256];
+  SbImport im;
+
+  PetscFunctionBeginUser;
+  (void)snprintf(path, sizeof(path), "%s/deck.Bdf", folder);
+  PetscCall(write_nastran(path, reference));
+  PetscCall(test_file(path, reference, deck));
+  PetscCall(read_mesh(path, &im));
+  SB_CHECK(im.item[0].n == 3, "%d points for three sets of one node", (int)im.item[0].n);
+  PetscCall(SbImportDestroy(&im));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 static PetscErrorCode test_written(const SbImport *reference, const char *folder)
 {
   static const Same marks[] = {
     {3, "volume_1", "left"}, {2, "surface_3", "wall"}, {2, "surface_5", "inner"}, {0, NULL, NULL}};
-  static const Same names[] = {
-    {3, "the left one", "left"}, {2, "wall", "wall"}, {2, "inner", "inner"}, {0, NULL, NULL}};
+  static const Same names[] = {{3, "the left one", "left"},
+                               {2, "wall", "wall"},
+                               {2, "inner", "inner"},
+                               {2, "surface_9", "surface_77"},
+                               {0, NULL, NULL}};
   static const Same sets[] = {{3, "Left", "left"}, {3, "Whole", NULL},   {2, "Wall", "wall"},
                               {2, "Sides", NULL},  {0, "Tip", "corner"}, {0, NULL, NULL}};
   char path[256], stem[200];
@@ -455,6 +539,8 @@ int main(int argc, char **argv)
   PetscCall(read_mesh(DATA "two_cubes_41.msh", &reference));
   PetscCall(test_foreign(&reference));
   PetscCall(test_written(&reference, folder));
+  PetscCall(test_nastran(&reference, folder));
+  PetscCall(test_numbers());
   PetscCall(SbImportDestroy(&reference));
   PetscCall(test_tetgen());
   PetscCall(test_netgen());

@@ -1,0 +1,644 @@
+/*
+  import_nastran.c - reader of Nastran bulk data, .bdf and .nas (MSC Nastran Quick Reference Guide, "Bulk Data Entries"; also what NX,
+  HyperMesh, ANSA, Femap, Patran, gmsh, meshio and pyNastran write).
+
+  An entry has ten fields a line, the first one its name: of 8 columns, of 16 where the name ends with a star, or between commas; a line
+  whose first field is empty or begins with + or * goes on with the entry before it. Tabs lead to the next column after a
+  multiple of 8. Reals may leave out the letter of the exponent (1.5-3).
+
+  Read: GRID, solid, shell and line elements with their property, SPC, SPC1 and SET1 as sets of nodes. Property N is the group volume_N,
+  surface_N or curve_N, or has the name that a comment gives it (ANSA, HyperMesh, Femap, Patran). Lines in front of BEGIN BULK and
+  behind ENDDATA, and other entries, are passed over. Refused: points in a coordinate system of their own, INCLUDE.
+
+  Elements may stand before their points: all is collected first and put together at the end.
+*/
+#include <ctype.h>
+#include <stdlib.h>
+#include <strings.h>
+#include "gmsh_types.h"
+
+enum { LINE = 256, WORD = 64 };
+
+typedef struct {
+  int64_t label, property, node[4];
+  int type;
+  const char *at; /* for messages */
+} Element;
+
+/* Nodes first to last are in a set: SPC, SPC1 or SET1 of a number. */
+typedef struct {
+  int kind;
+  int64_t number, first, last;
+} Range;
+
+typedef struct {
+  int64_t number;
+  char name[SB_GROUP_MAX];
+} Name;
+
+typedef struct {
+  PetscInt n, capacity;
+} Count;
+
+typedef struct {
+  SbScan scan;
+  SbImport *im;
+  char line[LINE];       /* the current one, tabs replaced, without its comment */
+  PetscBool commas, cut; /* cut: it was longer than this */
+  int field, per_line;   /* last field taken; fields of values on the line */
+  Count nnode, nelement, nrange, nname;
+  int64_t *node; /* [nnode] labels */
+  PetscReal *x;  /* [nnode][3] */
+  Element *element;
+  Range *range;
+  Name *name;
+  char pending[SB_GROUP_MAX]; /* name that Patran gives to the next property */
+  SbNumbers nodes;
+  int64_t count[SB_GMSH_NTYPES];
+} Nastran;
+
+static const char *const set_names[] = {"spc", "set"};
+
+static PetscErrorCode grow(Count *count, size_t unit, void *array)
+{
+  PetscFunctionBeginUser;
+  if (count->n == count->capacity) {
+    count->capacity = PetscMax(64, 2 * count->capacity);
+    PetscCall(PetscRealloc((size_t)count->capacity * unit, (void **)array));
+  }
+  count->n++;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ names in comments */
+
+/* The text from `p` to a delimiter or the end of the line, without blanks around it; blanks within become underscores. */
+static void copy_name(const char *p, const char *end, char delimiter, char name[SB_GROUP_MAX])
+{
+  size_t n = 0;
+
+  while (p < end && isspace((unsigned char)*p)) p++;
+  for (; p < end && *p != delimiter && n + 1 < SB_GROUP_MAX; p++)
+    name[n++] = isgraph((unsigned char)*p) ? *p : '_';
+  while (n && name[n - 1] == '_') n--;
+  name[n] = 0;
+}
+
+static PetscErrorCode add_name(Nastran *b, int64_t number, const char *name)
+{
+  PetscFunctionBeginUser;
+  if (!name[0] || number <= 0) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(grow(&b->nname, sizeof(*b->name), &b->name));
+  b->name[b->nname.n - 1].number = number;
+  PetscCall(PetscStrncpy(b->name[b->nname.n - 1].name, name, SB_GROUP_MAX));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* $ANSA_NAME_COMMENT;12;PSOLID;liver;   $HMNAME PROP 12"liver"   $ Femap Property 12 : liver   $ ... Properties for region : liver */
+static PetscErrorCode read_comment(Nastran *b, const char *text, const char *end)
+{
+  char line[LINE], name[SB_GROUP_MAX] = "", *p = line;
+  const size_t n = PetscMin((size_t)(end - text), sizeof(line) - 1);
+  int64_t number = 0;
+
+  PetscFunctionBeginUser;
+  memcpy(line, text, n);
+  line[n] = 0;
+  if (!strncmp(line, "$ANSA_NAME_COMMENT;", 19)) {
+    number = strtoll(line + 19, &p, 10);
+    p = *p == ';' && p[1] == 'P' ? strchr(p + 1, ';') : NULL; /* not of a material or a set */
+    if (p) copy_name(p + 1, line + n, ';', name);
+  } else if (!strncmp(line, "$HMNAME PROP", 12)) {
+    number = strtoll(line + 12, &p, 10);
+    if (*p == '"') copy_name(p + 1, line + n, '"', name);
+  } else if (!strncmp(line, "$ Femap", 7) && (p = strstr(line, " Property ")) != NULL) {
+    number = strtoll(p + 10, &p, 10);
+    p += strspn(p, " ");
+    if (*p == ':') copy_name(p + 1, line + n, 0, name);
+  } else if ((p = strstr(line, "Properties for region :")) != NULL) {
+    copy_name(p + 23, line + n, 0, b->pending);
+  }
+  PetscCall(add_name(b, number, name));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ lines and fields */
+
+static void trim(const char *from, const char *to, char word[WORD])
+{
+  size_t n = 0;
+
+  while (from < to && isspace((unsigned char)*from)) from++;
+  while (to > from && isspace((unsigned char)to[-1])) to--;
+  for (; from < to && n + 1 < WORD; from++) word[n++] = *from;
+  word[n] = 0;
+}
+
+/* Tabs become blanks up to the next multiple of 8 columns. */
+static void copy_line(Nastran *b, const char *from, const char *to)
+{
+  size_t n = 0;
+
+  for (; from < to && *from != '$' && n + 1 < LINE; from++) {
+    if (*from == '\t') {
+      do {
+        b->line[n++] = ' ';
+      } while (n % 8 && n + 1 < LINE);
+    } else
+      b->line[n++] = isprint((unsigned char)*from) ? *from : ' ';
+  }
+  b->cut = (PetscBool)(from < to && *from != '$');
+  b->line[n] = 0;
+}
+
+/* Field k of this line, 0 its name. */
+static void get_field(const Nastran *b, int k, char word[WORD])
+{
+  const size_t length = strlen(b->line), width = b->per_line == 4 ? 16 : 8;
+  size_t from = k ? 8 + (size_t)(k - 1) * width : 0, to = k ? from + width : 8;
+  const char *p = b->line;
+
+  if (b->commas) {
+    for (int i = 0; i < k && p; i++) p = (p = strchr(p, ',')) != NULL ? p + 1 : NULL;
+    word[0] = 0;
+    if (p) trim(p, p + strcspn(p, ","), word);
+    return;
+  }
+  from = PetscMin(from, length);
+  to = PetscMin(to, length);
+  trim(p + from, p + to, word);
+}
+
+/* Takes the next line that is neither a comment nor empty; false at the end. */
+static PetscErrorCode next_line(Nastran *b, PetscBool *there)
+{
+  SbScan *s = &b->scan;
+  char name[WORD];
+
+  PetscFunctionBeginUser;
+  for (*there = PETSC_FALSE; s->at < s->end && !*there;) {
+    const char *end = (const char *)memchr(s->at, '\n', (size_t)(s->end - s->at));
+
+    s->token = s->at;
+    if (!end) end = s->end;
+    if (*s->at == '$') PetscCall(read_comment(b, s->at, end));
+    copy_line(b, s->at, end);
+    *there = (PetscBool)(b->line[strspn(b->line, " ")] != 0);
+    s->at = end < s->end ? end + 1 : s->end;
+  }
+  if (!*there) PetscFunctionReturn(PETSC_SUCCESS);
+  b->commas = (PetscBool)(strchr(b->line, ',') != NULL);
+  if (b->commas && b->cut)
+    SB_SCAN_ERROR(s, "the line is longer than %d characters; go on with the entry on a next line", LINE - 1);
+  b->field = 0;
+  get_field(b, 0, name);
+  b->per_line = strchr(name, '*') ? 4 : 8;
+  if (b->commas) get_field(b, b->per_line + 2, name);
+  if (b->commas && name[0])
+    SB_SCAN_ERROR(s, "the line has more than %d fields; go on with the entry on a next line",
+                  b->per_line + 2);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscBool continues(const Nastran *b)
+{
+  char name[WORD];
+
+  get_field(b, 0, name);
+  return (PetscBool)(!name[0] || name[0] == '+' || name[0] == '*');
+}
+
+/* The next field of the entry, on this line or one that continues it; false at the end of the entry. */
+static PetscErrorCode next_field(Nastran *b, char word[WORD], PetscBool *there)
+{
+  SbScan *s = &b->scan;
+  const char *at = s->at, *token = s->token;
+
+  PetscFunctionBeginUser;
+  word[0] = 0;
+  if (b->field == b->per_line) {
+    char line[LINE];
+    const PetscBool commas = b->commas;
+
+    PetscCall(PetscStrncpy(line, b->line, sizeof(line)));
+    PetscCall(next_line(b, there));
+    if (!*there || !continues(b)) {
+      /* that line is for later; this one stays at its end */
+      PetscCall(PetscStrncpy(b->line, line, sizeof(line)));
+      b->commas = commas;
+      b->field = b->per_line = 8;
+      s->at = at;
+      s->token = token;
+      *there = PETSC_FALSE;
+      PetscFunctionReturn(PETSC_SUCCESS);
+    }
+  }
+  get_field(b, ++b->field, word);
+  *there = PETSC_TRUE;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* A whole number; `empty` where the field is. */
+static PetscErrorCode to_number(Nastran *b, const char *word, const char *what, int64_t empty, int64_t *value)
+{
+  char *end;
+
+  PetscFunctionBeginUser;
+  *value = empty;
+  if (!word[0]) PetscFunctionReturn(PETSC_SUCCESS);
+  *value = strtoll(word, &end, 10);
+  if (*end || *value < 0 || *value > (int64_t)1 << 40)
+    SB_SCAN_ERROR(&b->scan, "expected the %s, found '%.24s'", what, word);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode next_number(Nastran *b, const char *what, int64_t empty, int64_t *value)
+{
+  char word[WORD];
+  PetscBool there;
+
+  PetscFunctionBeginUser;
+  PetscCall(next_field(b, word, &there));
+  PetscCall(to_number(b, word, what, empty, value));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* A number that must be there. */
+static PetscErrorCode next_label(Nastran *b, const char *what, int64_t *value)
+{
+  PetscFunctionBeginUser;
+  PetscCall(next_number(b, what, 0, value));
+  if (!*value) SB_SCAN_ERROR(&b->scan, "the %s is missing", what);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* 1.5, 1.5E-3, 1.5D-3, 1.5-3; nothing is 0. */
+static PetscErrorCode next_real(Nastran *b, int64_t node, PetscReal *value)
+{
+  char word[WORD], full[WORD + 1], *end;
+  size_t n = 0;
+  PetscBool there;
+
+  PetscFunctionBeginUser;
+  PetscCall(next_field(b, word, &there));
+  for (const char *p = word; *p && n < WORD; p++) {
+    if ((*p == '-' || *p == '+') && p > word && (isdigit((unsigned char)p[-1]) || p[-1] == '.'))
+      full[n++] = 'E';
+    full[n++] = *p == 'D' || *p == 'd' ? 'E' : *p;
+  }
+  full[PetscMin(n, WORD)] = 0;
+  *value = strtod(full, &end);
+  if (*end || full[strspn(full, "0123456789.+-Ee")] || !isfinite(*value))
+    SB_SCAN_ERROR(&b->scan, "expected the coordinate of node %lld, found '%.24s'", (long long)node, word);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ entries */
+
+static PetscErrorCode read_grid(Nastran *b)
+{
+  int64_t label, system;
+  PetscInt v;
+
+  PetscFunctionBeginUser;
+  PetscCall(next_label(b, "number of a node", &label));
+  PetscCall(next_number(b, "coordinate system of a node", 0, &system));
+  if (system)
+    SB_SCAN_ERROR(
+      &b->scan,
+      "node %lld is given in coordinate system %lld; write all nodes in the basic one (field 3 of "
+      "GRID empty or 0)",
+      (long long)label, (long long)system);
+  PetscCheck(b->nnode.n < PETSC_MAX_INT / 8, PETSC_COMM_SELF, PETSC_ERR_FILE_UNEXPECTED,
+             "%s: has more nodes than this build can number", b->im->where);
+  v = b->nnode.n;
+  if (v == b->nnode.capacity) PetscCall(PetscRealloc(sizeof(*b->x) * 3 * (size_t)PetscMax(64, 2 * v), &b->x));
+  PetscCall(grow(&b->nnode, sizeof(*b->node), &b->node));
+  b->node[v] = label;
+  for (int i = 0; i < 3; i++) PetscCall(next_real(b, label, &b->x[3 * v + i]));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Points of the file are in the system of GRDSET where GRID leaves it empty. */
+static PetscErrorCode read_default(Nastran *b)
+{
+  char word[WORD];
+  PetscBool there;
+  int64_t system;
+
+  PetscFunctionBeginUser;
+  PetscCall(next_field(b, word, &there));
+  PetscCall(next_number(b, "coordinate system of the nodes", 0, &system));
+  if (system)
+    SB_SCAN_ERROR(&b->scan, "GRDSET gives the nodes in coordinate system %lld; write them in the basic one",
+                  (long long)system);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Elements by name: what gmsh calls them with all nodes of their corners, and with one more. */
+static const struct {
+  const char *name;
+  int ncorner, linear, higher;
+  PetscBool property; /* the second field is one */
+} kinds[] = {
+  {"CTETRA", 4, 4, 11, PETSC_TRUE}, {"CHEXA", 8, 5, 17, PETSC_TRUE},  {"CPENTA", 6, 6, 18, PETSC_TRUE},
+  {"CPYRAM", 5, 7, 19, PETSC_TRUE}, {"CPYRA", 5, 7, 19, PETSC_TRUE},  {"CTRIA3", 3, 2, 2, PETSC_TRUE},
+  {"CTRIAR", 3, 2, 2, PETSC_TRUE},  {"CTRIA6", 3, 2, 9, PETSC_TRUE},  {"CQUAD4", 4, 3, 3, PETSC_TRUE},
+  {"CQUADR", 4, 3, 3, PETSC_TRUE},  {"CQUAD8", 4, 3, 16, PETSC_TRUE}, {"CBAR", 2, 1, 1, PETSC_TRUE},
+  {"CBEAM", 2, 1, 1, PETSC_TRUE},   {"CROD", 2, 1, 1, PETSC_TRUE},    {"CTUBE", 2, 1, 1, PETSC_TRUE},
+  {"CONROD", 2, 1, 1, PETSC_FALSE},
+};
+
+static PetscErrorCode read_element(Nastran *b, int kind)
+{
+  Element e = {.at = b->scan.token};
+  char word[WORD];
+  PetscBool there, more = PETSC_FALSE;
+  int64_t node;
+
+  PetscFunctionBeginUser;
+  PetscCall(next_label(b, "number of an element", &e.label));
+  if (kinds[kind].property) PetscCall(next_number(b, "property of an element", 0, &e.property));
+  for (int k = 0; k < kinds[kind].ncorner; k++) {
+    PetscCall(next_label(b, "node of an element", &node));
+    if (k < 4) e.node[k] = node;
+  }
+  /* nodes at the middle of edges; the last fields of shells and lines are something else */
+  while (kinds[kind].linear != kinds[kind].higher && !more) {
+    PetscCall(next_field(b, word, &there));
+    if (!there) break;
+    more = (PetscBool)(word[0] != 0 && word[0] != '+' && !strchr(word, '.'));
+  }
+  e.type = more ? kinds[kind].higher : kinds[kind].linear;
+  b->count[e.type]++;
+  if (e.type != SB_GMSH_TET && e.type != SB_GMSH_TRIANGLE && e.type != SB_GMSH_LINE)
+    PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(grow(&b->nelement, sizeof(e), &b->element));
+  b->element[b->nelement.n - 1] = e;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode add_range(Nastran *b, int kind, int64_t number, int64_t first, int64_t last)
+{
+  PetscFunctionBeginUser;
+  PetscCall(grow(&b->nrange, sizeof(*b->range), &b->range));
+  b->range[b->nrange.n - 1] = (Range){kind, number, first, PetscMax(first, last)};
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Nodes one by one or from THRU to, behind the number of the set and `nskip` fields. */
+static PetscErrorCode read_list(Nastran *b, int kind, int nskip)
+{
+  char word[WORD];
+  PetscBool there, thru = PETSC_FALSE;
+  int64_t number = 0, node, last = 0;
+
+  PetscFunctionBeginUser;
+  PetscCall(next_label(b, "number of a set", &number));
+  for (int i = 0; i < nskip; i++) PetscCall(next_field(b, word, &there));
+  for (;;) {
+    PetscCall(next_field(b, word, &there));
+    if (!there) break;
+    if (!strcasecmp(word, "THRU")) {
+      thru = PETSC_TRUE;
+    } else if (word[0] && strcasecmp(word, "SKIN") != 0) {
+      PetscCall(to_number(b, word, "node of a set", 0, &node));
+      PetscCall(add_range(b, kind, number, thru ? last : node, node));
+      last = node;
+      thru = PETSC_FALSE;
+    }
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* SPC: twice a node, its components and their displacement. */
+static PetscErrorCode read_spc(Nastran *b)
+{
+  char word[WORD];
+  PetscBool there;
+  int64_t number = 0, node;
+
+  PetscFunctionBeginUser;
+  PetscCall(next_label(b, "number of a set", &number));
+  for (int i = 0; i < 2; i++) {
+    PetscCall(next_number(b, "node of a set", 0, &node));
+    if (node) PetscCall(add_range(b, 0, number, node, node));
+    for (int k = 0; k < 2; k++) PetscCall(next_field(b, word, &there));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode read_entry(Nastran *b)
+{
+  char name[WORD];
+  int64_t number = 0;
+
+  PetscFunctionBeginUser;
+  if (continues(b)) PetscFunctionReturn(PETSC_SUCCESS); /* of an entry that is passed over */
+  get_field(b, 0, name);
+  name[strcspn(name, "*")] = 0;
+  if (!strcasecmp(name, "GRID")) PetscCall(read_grid(b));
+  if (!strcasecmp(name, "GRDSET")) PetscCall(read_default(b));
+  if (!strcasecmp(name, "SPC")) PetscCall(read_spc(b));
+  if (!strcasecmp(name, "SPC1")) PetscCall(read_list(b, 0, 1));
+  if (!strcasecmp(name, "SET1")) PetscCall(read_list(b, 1, 0));
+  if (!strncasecmp(name, "INCLUDE", 7))
+    SB_SCAN_ERROR(&b->scan, "INCLUDE is not followed; put all into one file");
+  for (int k = 0; k < (int)PETSC_STATIC_ARRAY_LENGTH(kinds); k++)
+    if (!strcasecmp(name, kinds[k].name)) PetscCall(read_element(b, k));
+  if (b->pending[0] && (name[0] == 'P' || name[0] == 'p')) {
+    PetscCall(next_number(b, "number of a property", 0, &number));
+    PetscCall(add_name(b, number, b->pending));
+    b->pending[0] = 0;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ putting it together */
+
+static PetscErrorCode make_nodes(Nastran *b)
+{
+  SbImport *im = b->im;
+
+  PetscFunctionBeginUser;
+  if (!b->nnode.n) {
+    b->scan.token = b->scan.end;
+    SB_SCAN_ERROR(&b->scan,
+                  "there is no GRID up to here; this is no bulk data of Nastran, or it is truncated");
+  }
+  PetscCall(SbImportSetVertices(im, b->nnode.n));
+  PetscCall(PetscArraycpy(im->x, b->x, 3 * im->nvert));
+  PetscCall(PetscArraycpy(im->vert_number, b->node, im->nvert));
+  PetscCall(SbNumbersCreate(im->nvert, im->vert_number, &b->nodes));
+  PetscCheck(!b->nodes.repeated, PETSC_COMM_SELF, PETSC_ERR_FILE_UNEXPECTED,
+             "%s: node %lld is given twice; renumber the nodes", im->where, (long long)b->nodes.twice);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode make_items(Nastran *b)
+{
+  PetscFunctionBeginUser;
+  for (PetscInt i = 0; i < b->nelement.n; i++) {
+    const Element *e = &b->element[i];
+    const int dim = SbGmshTypes[e->type].dim;
+    PetscInt vert[4] = {0, 0, 0, 0}, tags = 0;
+
+    b->scan.token = e->at;
+    for (int k = 0; k <= dim; k++) {
+      vert[k] = SbNumbersFind(&b->nodes, e->node[k]);
+      if (vert[k] < 0)
+        SB_SCAN_ERROR(&b->scan, "element %lld uses node %lld, which is not there", (long long)e->label,
+                      (long long)e->node[k]);
+    }
+    if (e->property) PetscCall(SbImportTagsAlone(b->im, dim, e->property, NULL, &tags));
+    if (tags || dim == 3) PetscCall(SbImportAddItem(b->im, dim, vert, tags, e->label));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static int compare_names(const void *a, const void *b)
+{
+  const Name *p = (const Name *)a, *q = (const Name *)b;
+
+  return (p->number > q->number) - (p->number < q->number);
+}
+
+/* Properties that elements use get their names. */
+static PetscErrorCode name_groups(Nastran *b)
+{
+  PetscFunctionBeginUser;
+  if (!b->nname.n) PetscFunctionReturn(PETSC_SUCCESS);
+  qsort(b->name, (size_t)b->nname.n, sizeof(*b->name), compare_names);
+  for (PetscInt g = 0; g < b->im->ngroup; g++) {
+    const Name wanted = {.number = b->im->group[g].tag};
+    const Name *found =
+      (const Name *)bsearch(&wanted, b->name, (size_t)b->nname.n, sizeof(wanted), compare_names);
+
+    if (found) PetscCall(PetscStrncpy(b->im->group[g].name, found->name, SB_GROUP_MAX));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+typedef struct {
+  int64_t label;
+  PetscInt vert;
+} Node;
+
+static int compare_nodes(const void *a, const void *b)
+{
+  const Node *p = (const Node *)a, *q = (const Node *)b;
+
+  return (p->label > q->label) - (p->label < q->label);
+}
+
+static int compare_ranges(const void *a, const void *b)
+{
+  const Range *p = (const Range *)a, *q = (const Range *)b;
+
+  if (p->kind != q->kind) return p->kind - q->kind;
+  if (p->number != q->number) return p->number < q->number ? -1 : 1;
+  return (p->first > q->first) - (p->first < q->first);
+}
+
+/* First of the sorted nodes whose label is not below this. */
+static PetscInt lower_bound(PetscInt n, const Node node[], int64_t label)
+{
+  PetscInt low = 0;
+
+  while (n > low) {
+    const PetscInt middle = low + (n - low) / 2;
+
+    if (node[middle].label < label)
+      low = middle + 1;
+    else
+      n = middle;
+  }
+  return low;
+}
+
+/* Each node once in each set; numbers without a node are those of other kinds of points. */
+static PetscErrorCode make_sets(Nastran *b)
+{
+  const PetscInt n = b->im->nvert;
+  Node *node;
+  PetscInt next = 0, tags = 0;
+
+  PetscFunctionBeginUser;
+  if (!b->nrange.n) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscMalloc1(n, &node));
+  for (PetscInt v = 0; v < n; v++) node[v] = (Node){b->im->vert_number[v], v};
+  qsort(node, (size_t)n, sizeof(*node), compare_nodes);
+  qsort(b->range, (size_t)b->nrange.n, sizeof(*b->range), compare_ranges);
+  for (PetscInt i = 0; i < b->nrange.n; i++) {
+    const Range *r = &b->range[i];
+    const PetscBool same = (PetscBool)(i && r[-1].kind == r->kind && r[-1].number == r->number);
+    char name[SB_GROUP_MAX];
+
+    (void)snprintf(name, sizeof(name), "%s_%lld", set_names[r->kind], (long long)r->number);
+    if (!same)
+      PetscCall(SbImportTagsAlone(b->im, 0, r->number + ((int64_t)(r->kind + 1) << 40), name, &tags));
+    next = PetscMax(same ? next : 0, lower_bound(n, node, r->first));
+    for (; next < n && node[next].label <= r->last; next++)
+      PetscCall(SbImportAddItem(b->im, 0, &node[next].vert, tags, node[next].label));
+  }
+  PetscCall(PetscFree(node));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ the file */
+
+/* Behind the line BEGIN BULK, or at the start of a file that has none. */
+static void find_bulk(Nastran *b)
+{
+  SbScan *s = &b->scan;
+
+  for (const char *p = s->data; p < s->end;) {
+    const char *end = (const char *)memchr(p, '\n', (size_t)(s->end - p));
+    const char *word = p + strspn(p, " \t");
+
+    if (!strncasecmp(word, "BEGIN", 5) && !strncasecmp(word + 5 + strspn(word + 5, " \t"), "BULK", 4)) {
+      s->at = end ? end + 1 : s->end;
+      return;
+    }
+    p = end ? end + 1 : s->end;
+  }
+}
+
+static PetscErrorCode read_file(const char *path, Nastran *b)
+{
+  PetscBool there;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbScanOpen(b->im->where, path, &b->scan));
+  find_bulk(b);
+  for (;;) {
+    PetscCall(next_line(b, &there));
+    if (!there || !strncasecmp(b->line, "ENDDATA", 7)) break;
+    PetscCall(read_entry(b));
+  }
+  PetscCall(make_nodes(b));
+  PetscCall(make_items(b));
+  PetscCall(name_groups(b));
+  PetscCall(make_sets(b));
+  PetscCall(SbGmshCheckTypes(b->im, b->count));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbImportRead_Nastran(const char *path, SbImport *im)
+{
+  Nastran b;
+  PetscErrorCode ierr;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscMemzero(&b, sizeof(b)));
+  b.im = im;
+  ierr = read_file(path, &b);
+  PetscCall(SbNumbersDestroy(&b.nodes));
+  PetscCall(PetscFree(b.node));
+  PetscCall(PetscFree(b.x));
+  PetscCall(PetscFree(b.element));
+  PetscCall(PetscFree(b.range));
+  PetscCall(PetscFree(b.name));
+  PetscCall(SbScanClose(&b.scan));
+  PetscFunctionReturn(ierr);
+}
