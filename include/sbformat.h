@@ -27,6 +27,7 @@ typedef struct {
 /* A body as its reader delivers it. Zeroed before the reader is called; freed by SbImportDestroy(), also after an error. */
 struct _p_SbImport {
   char where[PETSC_MAX_PATH_LEN + 2 * SB_NAME_MAX]; /* "body 'liver': liver.msh", begins every message */
+  char body[SB_NAME_MAX];                           /* "liver"; "" in supple-mesh */
   PetscInt nvert;
   PetscReal *x;         /* [nvert][3] m once placed */
   int64_t *vert_number; /* [nvert] number in the file */
@@ -56,6 +57,9 @@ struct _p_SbImport {
 /* Chooses the reader by the name of the mesh, reads, places. Not collective. */
 PetscErrorCode SbImportRead(const SbBody *body, SbImport *import);
 PetscErrorCode SbImportDestroy(SbImport *import);
+/* How the user writes an option of this body, for messages: "-body_liver_tet_size"; in supple-mesh "-size". */
+#define SB_OPTION_NAME_MAX (SB_NAME_MAX + 32)
+const char *SbImportOption(const SbImport *import, const char *key, char name[SB_OPTION_NAME_MAX]);
 /* A .msh of any version, by the program's own reader or by the gmsh library. */
 PetscErrorCode SbImportRead_Msh(const char *path, SbImport *body);
 /* Room for n vertices. */

@@ -173,6 +173,15 @@ PetscErrorCode SbImportTagSet(SbImport *im, PetscInt n, PetscInt groups[], Petsc
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+const char *SbImportOption(const SbImport *im, const char *key, char name[SB_OPTION_NAME_MAX])
+{
+  if (im->body[0])
+    (void)snprintf(name, SB_OPTION_NAME_MAX, "-body_%s_%s", im->body, key);
+  else
+    (void)snprintf(name, SB_OPTION_NAME_MAX, "-%s", strncmp(key, "tet_", 4) ? key : key + 4);
+  return name;
+}
+
 PetscErrorCode SbImportDestroy(SbImport *im)
 {
   PetscFunctionBeginUser;
@@ -219,6 +228,7 @@ static PetscErrorCode rotation(const SbBody *body, PetscReal R[3][3])
 static PetscErrorCode place(const SbBody *body, SbImport *im)
 {
   PetscReal R[3][3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
+  char scale[SB_OPTION_NAME_MAX], translate[SB_OPTION_NAME_MAX];
 
   PetscFunctionBeginUser;
   if (body->rotate[3] != 0) PetscCall(rotation(body, R));
@@ -229,8 +239,9 @@ static PetscErrorCode place(const SbBody *body, SbImport *im)
     for (int i = 0; i < 3; i++) {
       x[i] = R[i][0] * y[0] + R[i][1] * y[1] + R[i][2] * y[2] + body->translate[i];
       PetscCheck(isfinite(x[i]), PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
-                 "%s: node %lld leaves the range of numbers when scaled by %g; check scale and translate",
-                 im->where, (long long)im->vert_number[v], (double)body->scale);
+                 "%s: node %lld leaves the range of numbers when scaled by %g; check %s and %s", im->where,
+                 (long long)im->vert_number[v], (double)body->scale, SbImportOption(im, "scale", scale),
+                 SbImportOption(im, "translate", translate));
     }
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -305,6 +316,7 @@ PetscErrorCode SbImportRead(const SbBody *body, SbImport *im)
     (void)snprintf(im->where, sizeof(im->where), "body '%s': %s", body->name, body->mesh);
   else
     (void)snprintf(im->where, sizeof(im->where), "%s", body->mesh);
+  PetscCall(PetscStrncpy(im->body, body->name, sizeof(im->body)));
   im->step = body->mesh_step;
   PetscCall(SbImportTagSet(im, 0, NULL, &none));
   im->tet = body->tet;

@@ -570,6 +570,7 @@ static PetscErrorCode read_keyword(Abaqus *a)
 static PetscErrorCode read_file(const char *path, Abaqus *a)
 {
   SbScan *s = &a->scan;
+  char rotate[SB_OPTION_NAME_MAX], translate[SB_OPTION_NAME_MAX];
 
   PetscFunctionBeginUser;
   PetscCall(SbScanOpen(a->im->where, path, s));
@@ -579,9 +580,8 @@ static PetscErrorCode read_file(const char *path, Abaqus *a)
       continue;
     }
     if (a->in_instance)
-      SB_SCAN_ERROR(
-        s, "the instance is moved or turned; move the body in the scenario (-body_NAME_translate) and "
-           "take these lines out");
+      SB_SCAN_ERROR(s, "the instance is moved or turned; take these lines out and move the body by %s and %s",
+                    SbImportOption(a->im, "rotate", rotate), SbImportOption(a->im, "translate", translate));
     leave_line(a);
   }
   s->token = s->end;

@@ -340,14 +340,14 @@ static PetscErrorCode refuse_open(const SbTriangleFile *f, PetscInt n, const Pet
   const PetscReal *a = t->x + 3 * t->tri[slot[0]],
                   *b = t->x + 3 * t->tri[slot[0] % 3 == 2 ? slot[0] - 2 : slot[0] + 1];
   const PetscReal need = partner_distance(t, n, slot);
-  char what[192] = "close the holes (meshlab: close holes; blender: fill)";
+  char option[SB_OPTION_NAME_MAX], what[256] = "close the holes (meshlab: close holes; blender: fill)";
 
   PetscFunctionBeginUser;
   if (need > 0)
     (void)snprintf(what, sizeof(what),
-                   "every open edge has a partner within %.3g m: -body_NAME_weld %.2g joins them, if that is "
+                   "every open edge has a partner within %.3g m: %s %.2g joins them, if that is "
                    "rounding and not shape",
-                   (double)need, (double)(1.1 * need));
+                   (double)need, SbImportOption(f->groups, "weld", option), (double)(1.1 * need));
   SETERRQ(PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
           "%s: the surface is open: %" PetscInt_FMT
           " edges have a triangle on one side only, the first is that of "

@@ -340,7 +340,7 @@ PetscErrorCode SbSkinCross(SbTriangleFile *f, PetscReal reach, SbMended *m)
   SbTriangles *t = f->t;
   Search search, left;
   PetscInt ncrossing = 0;
-  char why[192] = "";
+  char why[192] = "", option[SB_OPTION_NAME_MAX];
   PetscErrorCode ierr = PETSC_SUCCESS;
 
   PetscFunctionBeginUser;
@@ -356,10 +356,11 @@ PetscErrorCode SbSkinCross(SbTriangleFile *f, PetscReal reach, SbMended *m)
   else if (search.n && reach > 0) {
     PetscCall(untangle(t, reach, &left, m));
     if (left.n || m->untangled > reach)
-      (void)snprintf(why, sizeof(why), "smoothing did not part them within %.3g m (-body_NAME_untangle)",
-                     (double)reach);
+      (void)snprintf(why, sizeof(why), "smoothing did not part them within %.3g m (%s)", (double)reach,
+                     SbImportOption(f->groups, "untangle", option));
   } else if (search.n)
-    (void)snprintf(why, sizeof(why), "-body_NAME_untangle 0 forbids to smooth it");
+    (void)snprintf(why, sizeof(why), "%s 0 forbids to smooth it",
+                   SbImportOption(f->groups, "untangle", option));
   PetscCall(PetscFree(search.crossing));
   if (why[0]) ierr = name_pairs(f, &search, why);
   PetscFunctionReturn(ierr);

@@ -107,13 +107,14 @@ static PetscErrorCode write_mended(const SbTriangles *t, const SbMended *m, size
 /* To metres, and nothing that is not a number. */
 static PetscErrorCode scale_file(PetscReal scale, SbTriangleFile *f)
 {
+  char option[SB_OPTION_NAME_MAX];
+
   PetscFunctionBeginUser;
   for (PetscInt i = 0; i < 3 * f->t->nvert; i++) {
     f->t->x[i] *= scale;
     PetscCheck(isfinite(f->t->x[i]), PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
-               "%s: vertex %" PetscInt_FMT
-               " leaves the range of numbers when scaled by %g; check -body_NAME_scale",
-               f->where, i / 3 + 1, (double)scale);
+               "%s: vertex %" PetscInt_FMT " leaves the range of numbers when scaled by %g; check %s",
+               f->where, i / 3 + 1, (double)scale, SbImportOption(f->groups, "scale", option));
   }
   for (PetscInt i = 0; i < f->nhole; i++) {
     for (int k = 0; k < 3; k++) f->hole[i].x[k] *= scale;
@@ -130,6 +131,7 @@ static PetscErrorCode weld_tolerance(const SbTriangleFile *f, PetscReal given, P
 {
   const SbTriangles *t = f->t;
   PetscReal lo[3], hi[3], around, longest2, sum = 0, d2 = 0;
+  char option[SB_OPTION_NAME_MAX];
 
   PetscFunctionBeginUser;
   for (int k = 0; k < 3; k++) lo[k] = hi[k] = t->x[k];
@@ -144,11 +146,10 @@ static PetscErrorCode weld_tolerance(const SbTriangleFile *f, PetscReal given, P
   }
   *edge = sum;
   *tolerance = given >= 0 ? given : WELD * PetscSqrtReal(d2);
-  PetscCheck(given < 0.5 * sum, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
-             "%s: -body_NAME_weld %g m would join corners of one triangle: the mean edge is %.3g m; give "
-             "less than half of "
-             "it",
-             f->where, (double)given, (double)sum);
+  PetscCheck(
+    given < 0.5 * sum, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
+    "%s: %s %g m would join corners of one triangle: the mean edge is %.3g m; give less than half of it",
+    f->where, SbImportOption(f->groups, "weld", option), (double)given, (double)sum);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -157,6 +158,7 @@ static PetscErrorCode make_surface(const char *path, const SbImport *im, SbTrian
 {
   SbMended mended;
   PetscReal tolerance, edge;
+  char option[SB_OPTION_NAME_MAX];
 
   PetscFunctionBeginUser;
   PetscCall(PetscMemzero(&mended, sizeof(mended)));
@@ -168,9 +170,9 @@ static PetscErrorCode make_surface(const char *path, const SbImport *im, SbTrian
   PetscCall(weld_tolerance(f, im->tet.weld, &tolerance, &edge));
   PetscCall(SbSkinWeld(f, tolerance, &mended));
   PetscCheck(f->t->ntri, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
-             "%s: no triangle is left when vertices within %g m are one; give a smaller -body_NAME_weld, or "
+             "%s: no triangle is left when vertices within %g m are one; give a smaller %s, or "
              "check the scale",
-             f->where, (double)tolerance);
+             f->where, (double)tolerance, SbImportOption(im, "weld", option));
   PetscCall(SbSkinClose(f, &mended));
   PetscCall(SbSkinCross(f, im->tet.untangle >= 0 ? im->tet.untangle : 0.5 * edge, &mended));
   PetscCall(SbSkinRegions(f, &mended, s));

@@ -7,7 +7,8 @@
 #define SB_TET_MOST 5e7 /* tets that one surface may become */
 
 typedef struct {
-  const char *where; /* begins every message */
+  const char *where;    /* begins every message */
+  const SbImport *body; /* whose options messages name */
   const SbSkin *surface;
   SbTetOptions options;
   PetscReal size, edge; /* wanted edge, mean edge of the surface */

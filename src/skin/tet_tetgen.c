@@ -143,11 +143,12 @@ static PetscErrorCode check_end(const char *folder, int status)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode run_tetgen(const char *folder, const char *flags, PetscReal seconds)
+static PetscErrorCode run_tetgen(const char *folder, const char *flags, const SbTetJob *job)
 {
-  const double end = now() + seconds;
+  const double end = now() + job->options.seconds;
   const pid_t pid = fork();
   int status = 0, pause = 1;
+  char option[SB_OPTION_NAME_MAX];
 
   PetscFunctionBeginUser;
   if (!pid) become_tetgen(folder, flags);
@@ -159,8 +160,8 @@ static PetscErrorCode run_tetgen(const char *folder, const char *flags, PetscRea
     if (now() > end || (done < 0 && errno != EINTR)) {
       (void)kill(pid, SIGKILL);
       (void)waitpid(pid, &status, 0);
-      SETERRQ(PETSC_COMM_SELF, PETSC_ERR_USER_INPUT, "it was not done after %g s (-body_NAME_tet_seconds)",
-              (double)seconds);
+      SETERRQ(PETSC_COMM_SELF, PETSC_ERR_USER_INPUT, "it was not done after %g s (%s)",
+              (double)job->options.seconds, SbImportOption(job->body, "tet_seconds", option));
     }
     (void)poll(NULL, 0, pause);
     pause = PetscMin(2 * pause, 50);
@@ -383,7 +384,7 @@ static PetscErrorCode work_in(const char *folder, const SbTetJob *job, SbImport 
   /* Tets of the wanted size have this volume on average, so some must be allowed to be larger. */
   (void)snprintf(flags, sizeof(flags), "-p%sMQq1.4/10a%.6f", job->remesh && job->size < job->edge ? "" : "Y",
                  (double)(1.8 * volume));
-  PetscCall(run_tetgen(folder, flags, job->options.seconds));
+  PetscCall(run_tetgen(folder, flags, job));
   PetscCall(read_items(folder, "s.1.node", 3, take_vertex, im));
   PetscCall(read_items(folder, "s.1.ele", 4, take_tet, im));
   PetscCall(read_items(folder, "s.1.face", 2, take_facet, im));

@@ -244,9 +244,11 @@ PetscErrorCode SbTetDefaults(SbTetOptions *o)
 }
 
 /* The size, whether the triangles stay, and what follows from the shape of the surface. */
-static PetscErrorCode prepare(const char *where, const SbSkin *s, const SbTetOptions *o, SbTetJob *job)
+static PetscErrorCode prepare(const char *where, const SbSkin *s, const SbTetOptions *o, const SbImport *body,
+                              SbTetJob *job)
 {
   PetscReal *volume, edge, all = 0;
+  char option[SB_OPTION_NAME_MAX];
 
   PetscFunctionBeginUser;
   PetscCheck(s->ntri > 3 && s->nregion > 0, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
@@ -266,8 +268,12 @@ static PetscErrorCode prepare(const char *where, const SbSkin *s, const SbTetOpt
     all += v;
   }
   PetscCall(PetscFree(volume));
-  *job = (SbTetJob){
-    .where = where, .surface = s, .size = o->size > 0 ? o->size : edge, .options = *o, .edge = edge};
+  *job = (SbTetJob){.where = where,
+                    .body = body,
+                    .surface = s,
+                    .size = o->size > 0 ? o->size : edge,
+                    .options = *o,
+                    .edge = edge};
   if (!(job->options.seconds > 0)) job->options.seconds = 600;
   if (!(job->options.angle > 0)) job->options.angle = 40;
   job->remesh =
@@ -277,9 +283,10 @@ static PetscErrorCode prepare(const char *where, const SbSkin *s, const SbTetOpt
   job->expected = 6 * PETSC_SQRT2 * all / (job->size * job->size * job->size);
   PetscCheck(job->expected < SB_TET_MOST, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
              "%s: a size of %g m makes about %.2g tets out of %.4g m^3; give a size of at least %.3g m "
-             "(-body_NAME_tet_size)",
+             "(%s)",
              where, (double)job->size, (double)job->expected, (double)all,
-             (double)(job->size * PetscPowReal(job->expected / SB_TET_MOST, 1. / 3)));
+             (double)(job->size * PetscPowReal(job->expected / SB_TET_MOST, 1. / 3)),
+             SbImportOption(body, "tet_size", option));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -308,12 +315,12 @@ PetscErrorCode SbTetrahedralize(const char *where, const SbSkin *s, const SbTetO
   SbSkin scaled;
   PetscReal factor;
   PetscBool done = PETSC_FALSE;
-  char reasons[640] = "";
+  char reasons[640] = "", size_option[SB_OPTION_NAME_MAX], surface_option[SB_OPTION_NAME_MAX];
   int exponent;
   PetscErrorCode ierr;
 
   PetscFunctionBeginUser;
-  PetscCall(prepare(where, s, o, &job));
+  PetscCall(prepare(where, s, o, body, &job));
   (void)frexp(job.size, &exponent);
   factor = ldexp(1, 1 - exponent);
   PetscCall(scale_surface(s, factor, &scaled));
@@ -323,10 +330,10 @@ PetscErrorCode SbTetrahedralize(const char *where, const SbSkin *s, const SbTetO
   ierr = run_roads(&job, factor, &done, sizeof(reasons), reasons, body);
   PetscCall(PetscFree(scaled.x));
   PetscCall(ierr);
-  PetscCheck(
-    done, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
-    "%s: no tets could be made of the surface. %s. Try another -body_NAME_tet_size, -body_NAME_tet_surface "
-    "keep or remesh, or repair the surface where it is thinner than its triangles",
-    where, reasons);
+  PetscCheck(done, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
+             "%s: no tets could be made of the surface. %s. Try another %s, %s "
+             "keep or remesh, or repair the surface where it is thinner than its triangles",
+             where, reasons, SbImportOption(body, "tet_size", size_option),
+             SbImportOption(body, "tet_surface", surface_option));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -6,7 +6,7 @@
   at 0 or 1, as the first one says.
 
   Kept: the marker of a facet other than 0 is the group surface_N; a hole is a cavity; a region names its tets volume_N by its attribute (its
-  largest volume is not used: sizes are chosen by -body_NAME_tet_size). Refused: polygons of one or two corners, which only
+  largest volume is not used: sizes are chosen by -body_<name>_tet_size). Refused: polygons of one or two corners, which only
   mark points and edges within a facet.
 */
 #include <strings.h>

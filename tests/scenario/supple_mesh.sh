@@ -171,6 +171,10 @@ says " region_1 "
 timeout 100 "$tool" convert cube.h5 cube.msh -view cube.png >out.txt 2>err.txt
 check "a picture: exit code $?: $(cat err.txt)" test "$(head -c 4 cube.png | tail -c 3)" = PNG
 refuses "cube.msh: is no surface that tet can fill" tet cube.msh x.h5
+refuses "cube.off: a size of 0.0001 m makes about 8.5e+12 tets out of 1 m^3; give a size of at least 0.00554 m (-size)" tet cube.off x.h5 -size 1e-4
+refuses "cube.off: -weld 0.9 m would join corners of one triangle" tet cube.off x.h5 -weld 0.9
+error 2 "body 'it': cube.off: a size of 0.0001 m makes about 8.5e+12 tets out of 1 m^3; give a size of at least 0.00554 m (-body_it_tet_size)" \
+  body.opts -body_it_mesh cube.off -body_it_tet_size 1e-4 -output_dir new
 refuses "-size -1 m is outside (0, inf) m" tet cube.off x.h5 -size -1
 refuses "-view cube.gif: give a name that ends in .png" info cube.h5 -view cube.gif
 

@@ -433,12 +433,12 @@ static PetscErrorCode check_mended(void)
   s.tri[2][2] = s.tri[2][2] == 7 ? 8 : s.tri[2][2];
   PetscCall(refuse(".off", &s, NULL, NULL,
                    "edges have a triangle on one side only, the first is that of triangle 3 from (1, 1, "));
-  PetscCall(refuse(".off", &s, NULL, NULL, "-body_NAME_weld 1.9e-06 joins them"));
+  PetscCall(refuse(".off", &s, NULL, NULL, "-body_b_weld 1.9e-06 joins them"));
   options.weld = 1e-5;
   PetscCall(mend(&s, &options, 1, "vertices joined within 1e-05 m: 1 (by up to 1.7e-06 m)"));
   cube_at(0, 1, PETSC_FALSE, &s); /* a tolerance that joins everything */
   options.weld = 0.9;
-  PetscCall(refuse(".off", &s, NULL, &options, "-body_NAME_weld 0.9 m would join corners of one triangle"));
+  PetscCall(refuse(".off", &s, NULL, &options, "-body_b_weld 0.9 m would join corners of one triangle"));
   test_surface_grow(&s, 1, 2); /* given twice, and a corner twice */
   for (int k = 0; k < 3; k++) {
     s.tri[12][k] = s.tri[3][(k + 1) % 3];
@@ -560,7 +560,7 @@ static PetscErrorCode check_fold(void)
   v = s.tri[777][0];
   for (int k = 0; k < 3; k++) s.x[v][k] = 2.2 * s.x[s.tri[777][1]][k] - 1.2 * s.x[s.tri[777][0]][k];
   options.untangle = 0;
-  PetscCall(refuse(".off", &s, NULL, &options, "-body_NAME_untangle 0 forbids to smooth it"));
+  PetscCall(refuse(".off", &s, NULL, &options, "-body_b_untangle 0 forbids to smooth it"));
   options.untangle = 0.01;
   PetscCall(refuse(".off", &s, NULL, &options, "smoothing did not part them within 0.01 m"));
   options.untangle = 0.3;

@@ -156,7 +156,7 @@ static PetscErrorCode check_second_road(void)
   options.road = SB_TET_AUTO;
   options.seconds = 1e-3;
   TEST_MESSAGE(SbTetrahedralize("test", &s, &options, &im), PETSC_ERR_USER_INPUT,
-               "tetgen: it was not done after 0.001 s (-body_NAME_tet_seconds)");
+               "tetgen: it was not done after 0.001 s (-seconds)");
   PetscCall(SbSkinDestroy(&s));
   test_surface_free(&t);
   PetscFunctionReturn(PETSC_SUCCESS);
