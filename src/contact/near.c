@@ -389,6 +389,7 @@ static void look_closely(Look *look, PetscInt n, const PetscInt candidate[], Pet
 {
   const SbDetectScene *s = look->s;
   const PetscReal range2 = SbDetectRange(s) * SbDetectRange(s);
+  const PetscBool led = (PetscBool)(s->p_way && s->p_way_part[look->point] == s->point_part[look->point]);
 
   look->nhit = look->ncross = 0;
   for (PetscInt j = 0; j < n; j++) {
@@ -404,7 +405,7 @@ static void look_closely(Look *look, PetscInt n, const PetscInt candidate[], Pet
     (*looked)++;
     corners(s, s->x, f, x);
     h->place = SbClosestPoint(look->p, x, h->weight, &d2);
-    close = (PetscBool)(d2 <= (own ? s->reach * s->reach : range2)); /* deeper is its own far side */
+    close = (PetscBool)(d2 <= (own && !led ? s->reach * s->reach : range2)); /* deeper is its own far side */
     through = (PetscBool)(s->x0 && may_cross(look->d, s, look->point, f) && crossed(look, f, c));
     if (!close && !through) continue;
     if (own && belong_together(s, look->point, f)) continue;
@@ -552,6 +553,13 @@ static PetscBool along_way(const Look *look, PetscInt n, const Hit h[], SbNear *
   return in_by(h[0].key, near);
 }
 
+/* Of n hits of one part, how many the nearest place is looked for among: of its own part a point also has deeper ones when it is led out of it. */
+static PetscInt nearby(const Look *look, PetscInt part, PetscInt n, const Hit h[])
+{
+  while (n > 0 && part == look->s->point_part[look->point] && h[n - 1].key > look->s->reach) n--;
+  return n;
+}
+
 /* Contacts of one point, at most one with each part, in order of the parts; how many. */
 static PetscInt contacts(Look *look, SbNear near[])
 {
@@ -572,7 +580,8 @@ static PetscInt contacts(Look *look, SbNear near[])
     found = (PetscBool)(look->s->p_way && look->s->p_way_part[look->point] == part &&
                         along_way(look, inext - i, look->hit + i, near + n));
     if (!found)
-      found = nearest(look, inext - i, look->hit + i, jnext > j ? &entry : NULL, look->cross + j, near + n);
+      found = nearest(look, nearby(look, part, inext - i, look->hit + i), look->hit + i,
+                      jnext > j ? &entry : NULL, look->cross + j, near + n);
     if (!found && into) {
       near[n] = entry;
       if (inext > i) (void)in_by(look->hit[i].key, &near[n]);

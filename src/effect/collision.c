@@ -57,8 +57,8 @@ static const SbOption rows[] = {
    "what is behind "
    "and never pulls"},
   {"reach", SB_OPTION_REAL, 1, "m", "0", "[0, inf)",
-   "how far points look for surfaces; deeper overlap is looked for when a run begins only; 0: half the mean "
-   "edge"},
+   "how far points look for surfaces; what is deeper is found when a run begins or as points in tets; 0: "
+   "half the mean edge"},
   {"restitution", SB_OPTION_REAL, 1, "", "0", "[0, 1]",
    "part of their relative speed with which surfaces leave each other; needs -time euler_implicit, and "
    "bodies "
@@ -243,6 +243,8 @@ static PetscErrorCode setup_collision(SbEffect e, SbSpace space)
   PetscCall(SbSurfaceCreate(space, n, facet, &c->surface));
   PetscCall(find_stiffness(c, space, n, facet));
   PetscCall(find_edges(c, space, n, facet, &nskin));
+  PetscCall(SbInsideCreate(c->surface, SB_DETECT_HASH, &c->inside));
+  PetscCall(PetscCalloc1(c->surface->scene.npoint, &c->alone));
   PetscCall(PetscFree(facet));
   PetscCheck(nskin > 1 || c->self, space->comm, PETSC_ERR_USER_INPUT,
              "The effect %s has only one body to look at: give -effect_%s_self yes for a body that may meet "
@@ -294,7 +296,10 @@ static PetscErrorCode touch_collision(SbEffect e, SbSpace space, PetscReal t, Pe
   c->friction.updates = 0;
   SbOverlapBegin(&c->overlap, dt);
   c->damp = dt > 0 ? c->damping / dt : 0;
-  if (!c->begun) PetscCall(SbCollisionFindOverlap(e, u0));
+  if (c->begun)
+    PetscCall(SbCollisionWatchInside(e, u0));
+  else
+    PetscCall(SbCollisionFindOverlap(e, u0));
   PetscCall(SbCollisionRestore(c));
   c->first = PETSC_TRUE;
   c->arrival = 1;
@@ -558,6 +563,8 @@ static PetscErrorCode destroy_collision(SbEffect e)
 
   PetscFunctionBeginUser;
   PetscCall(SbEffectFreeOn(&c->on));
+  PetscCall(SbInsideDestroy(&c->inside));
+  PetscCall(PetscFree(c->alone));
   PetscCall(SbSurfaceDestroy(&c->surface));
   PetscCall(SbDetectorDestroy(&c->detector));
   PetscCall(PetscFree2(c->way, c->way_part));

@@ -84,7 +84,10 @@ typedef struct {
   Hit *past;        /* [npast] as the last step left them: each attempt at a step begins there */
   PetscBool cut;    /* steps end where points arrive */
   PetscBool begun;  /* overlap that was there when the run began has been looked for */
-  PetscReal *way;   /* [npoint][3] unit vectors: ways out of overlap, zero: none; NULL while there is none */
+  PetscBool close;  /* boxes of two bodies met at the last look */
+  SbInside inside;
+  signed char *alone; /* [npoint] for how many steps a point has been inside without a pair */
+  PetscReal *way; /* [npoint][3] unit vectors: ways out of overlap, zero: none; NULL while there is none */
   PetscInt *way_part; /* [npoint] out of which part, -1: none */
   PetscReal deep;     /* so deep points are looked for, m; 0: by the reach, as all come from outside */
   PetscBool first;    /* the step has not been solved yet */
@@ -99,9 +102,13 @@ typedef struct {
   Collective. `within`: a look within a step; what touches then stays, found or not. Else only what is found stays.
 */
 PetscErrorCode SbCollisionLook(Collision *c, const PetscReal u[], PetscBool within);
-/* collision_overlap.c: sets c->deep and ways out by the overlap that is there at local displacements u, m, when a run begins. Collective;
-   clears the pairs. Error: a body deep inside another, without a way out. */
+/* Of two surfaces, whether the points of `mine` look for `other`. Not collective. */
+PetscBool SbCollisionLooksFor(const Collision *c, PetscInt mine, PetscInt other);
+/* collision_overlap.c: sets c->deep and ways out by the overlap that is there at local displacements u, m. Collective;
+   clears the pairs. Error when a run begins: a body deep inside another, without a way out. */
 PetscErrorCode SbCollisionFindOverlap(SbEffect e, const PetscReal u[]);
+/* Does so when points have been inside for some steps that no pair holds, c->past being the pairs at local displacements u, m. Collective. */
+PetscErrorCode SbCollisionWatchInside(SbEffect e, const PetscReal u[]);
 /* Less, when less is left of it. Collective if c->deep is not 0. */
 PetscErrorCode SbCollisionFollowOverlap(Collision *c);
 /* The pairs as the last step left them; what an attempt at this step that failed has made of them is forgotten,

@@ -12,8 +12,8 @@
   0.05 /* of the reach: so much deeper a pair that is held began the step, seen from a facet that it is not held by */
 #define CORNER 1e-4 /* of the reach: places that may be one (near.c) */
 
-/* Of two surfaces, whether the points of `mine` look for `other`. Edges that rounding alone tells apart are the same. */
-static PetscBool looks_for(const Collision *c, PetscInt mine, PetscInt other)
+/* Edges that rounding alone tells apart are the same. */
+PetscBool SbCollisionLooksFor(const Collision *c, PetscInt mine, PetscInt other)
 {
   const PetscReal difference = c->edge[mine] - c->edge[other];
 
@@ -205,7 +205,7 @@ static PetscErrorCode merge(Collision *c, const Found *found, PetscBool within)
     Hit hit = {.row = -1, .grip = {.slide = {-1, -1}}};
 
     name_of(c, found, i, &hit);
-    if (hit.point < s->npoint && !looks_for(c, s->point_part[hit.point], hit.part)) continue;
+    if (hit.point < s->npoint && !SbCollisionLooksFor(c, s->point_part[hit.point], hit.part)) continue;
     for (; old < c->nhit && before(&c->hit[old], hit.point, hit.part); old++)
       if (within) keep_lost(&c->hit[old], c->spare, &m);
     if (old < c->nhit && c->hit[old].point == hit.point && c->hit[old].part == hit.part) {
@@ -229,14 +229,13 @@ PetscErrorCode SbCollisionLook(Collision *c, const PetscReal u[], PetscBool with
 {
   const SbDetectScene *s = &c->surface->scene;
   Found found = {0};
-  PetscBool close;
 
   PetscFunctionBeginUser;
   c->surface->scene.deep = c->deep;
   c->surface->scene.p_way = c->way;
   c->surface->scene.p_way_part = c->way_part;
-  PetscCall(SbSurfaceUpdate(c->surface, c->u0, u, c->reach, c->self, &close));
-  if (close || c->self) {
+  PetscCall(SbSurfaceUpdate(c->surface, c->u0, u, c->reach, c->self, &c->close));
+  if (c->close || c->self) {
     PetscCall(SbDetectorFind(c->detector, s, &found.nnear, &found.near));
     PetscCall(SbDetectorFindEdges(c->detector, s, &found.npair, &found.pair));
   }

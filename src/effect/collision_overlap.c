@@ -1,7 +1,8 @@
 /*
-  collision_overlap.c - overlap that is there when a run begins: how deep it is, and which way out of it.
+  collision_overlap.c - points inside bodies that no pair holds: which way out, and how deep.
 
-  Later, what comes in is seen as it comes. What is in from the start may be deeper than the reach, and there the nearest place of the surface
+  What comes in while a run goes on is seen as it comes. What is in from the start, or got in past what is looked at, is found as a point in a tet
+  (src/contact/inside.c). It may be deeper than the reach, and there the nearest place of the surface
   is no way out: neighbours would be pushed to different sides. So ways are given as by Heidelberger, Teschner, Keiser, Mueller and
   Gross, "Consistent penetration depth estimation for deformable collision response", VMV 2004: edges that go through the other surface
   tell their inner end the normal there, weighted by the inverse square of the distance; from these points they spread along edges to those
@@ -13,9 +14,11 @@
 #include "sbkernel.h"
 #include <limits.h>
 
-#define GRAZE 1e-6  /* of an edge: nearer to its ends it touches a facet and does not go through it */
+#define GRAZE 1e-6  /* of an edge: nearer to its inner end it touches a facet and does not go through it */
 #define CANCEL 1e-6 /* of the weights: what is left of ways that oppose each other is none */
-#define BLIND 8     /* reaches, four edges: overlap is looked for so deep without a sign of it */
+#define BLIND 8     /* reaches, four edges: without a way out the nearest places are looked for so deep */
+#define PATIENCE 3  /* steps that a point may be inside without a pair: edges and rims take so long */
+#define AGAIN 30    /* steps after which one that has got no pair is looked at again */
 
 static PetscErrorCode deepest_of(const Collision *c, PetscReal *deepest)
 {
@@ -23,41 +26,6 @@ static PetscErrorCode deepest_of(const Collision *c, PetscReal *deepest)
   *deepest = 0;
   for (PetscInt i = 0; i < c->nhit; i++) *deepest = PetscMax(*deepest, -c->hit[i].gap);
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, deepest, 1, MPIU_REAL, MPI_MAX, c->surface->space->comm));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* How far boxes of two surfaces are in each other at most, m. */
-static PetscErrorCode boxes_overlap(const Collision *c, PetscReal *most)
-{
-  const SbDetectScene *s = &c->surface->scene;
-  const PetscInt nbody = c->surface->space->mesh->nbody;
-  PetscReal *box; /* [nbody][6] lower corners, negative upper ones */
-
-  PetscFunctionBeginUser;
-  PetscCall(PetscMalloc1(6 * nbody, &box));
-  for (PetscInt i = 0; i < 6 * nbody; i++) box[i] = PETSC_MAX_REAL;
-  for (PetscInt i = 0; i < s->npoint; i++) {
-    PetscReal *mine = box + 6 * s->point_part[i];
-
-    for (int k = 0; k < 3; k++) {
-      mine[k] = PetscMin(mine[k], s->p[3 * i + k]);
-      mine[3 + k] = PetscMin(mine[3 + k], -s->p[3 * i + k]);
-    }
-  }
-  PetscCallMPI(
-    MPI_Allreduce(MPI_IN_PLACE, box, (PetscMPIInt)(6 * nbody), MPIU_REAL, MPI_MIN, c->surface->space->comm));
-  *most = 0;
-  for (PetscInt a = 0; a < nbody; a++) {
-    for (PetscInt b = 0; b < a; b++) {
-      PetscReal least = PETSC_MAX_REAL;
-
-      for (int k = 0; k < 3; k++)
-        least = PetscMin(least, PetscMin(-box[6 * a + 3 + k], -box[6 * b + 3 + k]) -
-                                  PetscMax(box[6 * a + k], box[6 * b + k]));
-      *most = PetscMax(*most, least);
-    }
-  }
-  PetscCall(PetscFree(box));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -90,6 +58,12 @@ static PetscInt carrier(const SbSurface f, PetscInt facet, int q)
     most = PetscMax(most, here);
   }
   return f->facet_node[4 * facet + at];
+}
+
+/* Whether an own edge is one of P1, whose ends are nodes. */
+static inline PetscBool of_vertices(const Collision *c, PetscInt edge)
+{
+  return (PetscBool)(c->surface->space->element[c->surface->scene.edges->part[edge]]->nodes_per[0] > 0);
 }
 
 static PetscErrorCode create_ways(const Collision *c, Ways *w)
@@ -141,13 +115,23 @@ static PetscErrorCode bring_ends(Ways *w)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Where an edge goes through a facet, its inner end gets the facet's normal, and the corners of the facet the opposite one. */
-static PetscErrorCode add_entry(const Collision *c, PetscInt edge, PetscInt facet, Vec sum)
+/* An own edge from one of its ends on, which may leave a part. */
+typedef struct {
+  PetscInt edge, part;
+  int from; /* the inner end, 0 or 1 */
+} Leaving;
+
+/*
+  Where an edge leaves a part through a facet, its inner end gets the facet's normal, and the corners of the facet the opposite one. `end`: so
+  much of the edge counts; a whole edge also when it ends on the facet.
+*/
+static PetscErrorCode add_entry(const Collision *c, const Leaving *l, PetscInt facet, PetscReal end, Vec sum)
 {
   const SbDetectScene *s = &c->surface->scene;
   const PetscReal *const x[3] = {s->x + 3 * s->facet[3 * facet], s->x + 3 * s->facet[3 * facet + 1],
                                  s->x + 3 * s->facet[3 * facet + 2]};
-  const PetscReal *a = s->x + 3 * s->edges->corner[4 * edge], *b = s->x + 3 * s->edges->corner[4 * edge + 1];
+  const PetscReal *a = s->x + 3 * s->edges->corner[4 * l->edge + l->from],
+                  *b = s->x + 3 * s->edges->corner[4 * l->edge + 1 - l->from];
   PetscReal u[3], v[3], n[4], way[4], weight[3], t, length, inner;
   PetscInt node;
   PetscBool out;
@@ -158,17 +142,17 @@ static PetscErrorCode add_entry(const Collision *c, PetscInt edge, PetscInt face
     u[k] = x[1][k] - x[0][k];
     v[k] = x[2][k] - x[0][k];
   }
-  if (!SbRayMeets(a, way, x, &t, weight, &out) || t < GRAZE || t > 1 - GRAZE)
+  if (!SbRayMeets(a, way, x, &t, weight, &out) || !out || t < GRAZE || t > end)
     PetscFunctionReturn(PETSC_SUCCESS);
   SbCross(u, v, n);
   length = PetscSqrtReal(SbDot3(n, n));
-  inner = out ? t : 1 - t; /* of the edge, from the inner end */
-  inner *= inner * SbDot3(way, way);
+  inner = t * t * SbDot3(way, way);
   if (!(length > 0)) PetscFunctionReturn(PETSC_SUCCESS);
   for (int k = 0; k < 3; k++) n[k] /= length * inner;
   n[3] = 1 / inner;
-  for (int q = 0; q < 2; q++) { /* what is outside does not take it */
-    node = c->surface->edge_carrier[2 * edge + q];
+  for (int q = 0; q < 2; q++) { /* of CR and DG both facets; what is outside does not take it */
+    if (of_vertices(c, l->edge) && q != l->from) continue;
+    node = c->surface->edge_carrier[2 * l->edge + q];
     PetscCall(VecSetValuesBlocked(sum, 1, &node, n, ADD_VALUES));
   }
   for (int q = 0; q < 3; q++) {
@@ -189,8 +173,11 @@ static inline PetscBool apart(const PetscReal a[3], const PetscReal b[3], const 
   return PETSC_FALSE;
 }
 
-/* Which edges have one end inside: those alone can go through a surface once. Listed in cut[], room for w->n. */
-static PetscErrorCode find_cut(const Collision *c, Ways *w, PetscInt *n, PetscInt cut[])
+/*
+  Edges that may leave a part: from an end inside to one that is not, with P1; of CR and DG, which do not know their ends, those of facets
+  inside, both ways. Listed in leaving[], room for 4 w->n.
+*/
+static PetscErrorCode find_leaving(const Collision *c, Ways *w, PetscInt *n, Leaving leaving[])
 {
   const SbSurface f = c->surface;
   const PetscReal *end;
@@ -199,51 +186,76 @@ static PetscErrorCode find_cut(const Collision *c, Ways *w, PetscInt *n, PetscIn
   PetscFunctionBeginUser;
   PetscCall(VecZeroEntries(w->known));
   PetscCall(VecGetArray(w->known, &inside));
-  for (PetscInt i = 0; i < f->scene.npoint; i++) inside[4 * f->point_node[i]] = c->way_part[i] >= 0;
+  for (PetscInt i = 0; i < f->scene.npoint; i++)
+    inside[4 * f->point_node[i]] = (PetscReal)(c->way_part[i] + 1);
   PetscCall(VecRestoreArray(w->known, &inside));
   PetscCall(bring_ends(w));
   PetscCall(VecGetArrayRead(w->ends, &end));
   *n = 0;
   for (PetscInt i = 0; i < w->n; i++) {
-    if (end[8 * i] != end[8 * i + 4]) cut[(*n)++] = i;
+    const PetscInt part[2] = {(PetscInt)end[8 * i] - 1, (PetscInt)end[8 * i + 4] - 1};
+
+    for (int q = 0; q < 2; q++) {
+      if (part[q] < 0 || (part[0] == part[1] && (q || of_vertices(c, i)))) continue;
+      leaving[(*n)++] = (Leaving){i, part[q], q};
+      if (!of_vertices(c, i)) leaving[(*n)++] = (Leaving){i, part[q], 1 - q};
+    }
   }
   PetscCall(VecRestoreArrayRead(w->ends, &end));
   PetscCall(VecZeroEntries(w->known));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* These edges against all facets of other parts, once in a run. */
-static PetscErrorCode find_entries(const Collision *c, Ways *w)
+/* These edges against all facets of the parts: few of the one, and seldom. In its own part an edge meets its neighbours at its ends, which does not count. */
+static PetscErrorCode find_entries(const Collision *c, PetscReal end, Ways *w)
 {
   const SbDetectScene *s = &c->surface->scene;
-  PetscInt n = 0, *cut;
+  Leaving *leaving;
+  PetscInt n = 0;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscMalloc1(w->n, &cut));
-  PetscCall(find_cut(c, w, &n, cut));
+  PetscCall(PetscMalloc1(4 * w->n, &leaving));
+  PetscCall(find_leaving(c, w, &n, leaving));
   PetscCall(VecZeroEntries(w->sum));
   for (PetscInt f = 0; f < s->nfacet && n; f++) {
     PetscReal low[3], high[3];
 
     for (int k = 0; k < 3; k++) {
       const PetscReal a = s->x[3 * s->facet[3 * f] + k], b = s->x[3 * s->facet[3 * f + 1] + k],
-                      d = s->x[3 * s->facet[3 * f + 2] + k];
+                      d = s->x[3 * s->facet[3 * f + 2] + k], slack = GRAZE * c->reach;
 
-      low[k] = PetscMin(a, PetscMin(b, d));
-      high[k] = PetscMax(a, PetscMax(b, d));
+      low[k] = PetscMin(a, PetscMin(b, d)) - slack;
+      high[k] = PetscMax(a, PetscMax(b, d)) + slack;
     }
     for (PetscInt j = 0; j < n; j++) {
-      const PetscInt *corner = s->edges->corner + 4 * cut[j];
+      const PetscInt *corner = s->edges->corner + 4 * leaving[j].edge;
 
-      if (s->edges->part[cut[j]] == s->facet_part[f] ||
-          apart(s->x + 3 * corner[0], s->x + 3 * corner[1], low, high))
-        continue;
-      PetscCall(add_entry(c, cut[j], f, w->sum));
+      if (leaving[j].part == s->facet_part[f] &&
+          !apart(s->x + 3 * corner[0], s->x + 3 * corner[1], low, high))
+        PetscCall(add_entry(c, &leaving[j], f, end, w->sum));
     }
   }
-  PetscCall(PetscFree(cut));
+  PetscCall(PetscFree(leaving));
   PetscCall(VecAssemblyBegin(w->sum));
   PetscCall(VecAssemblyEnd(w->sum));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Those that are there already. */
+static PetscErrorCode know_ways(const Collision *c, Ways *w)
+{
+  PetscReal *known;
+
+  PetscFunctionBeginUser;
+  PetscCall(VecGetArray(w->known, &known));
+  for (PetscInt i = 0; i < c->surface->scene.npoint; i++) {
+    const PetscReal *way = c->way + 3 * i;
+    PetscReal *to = known + 4 * c->surface->point_node[i];
+
+    for (int k = 0; k < 3; k++) to[k] = way[k];
+    to[3] = SbDot3(way, way) > 0;
+  }
+  PetscCall(VecRestoreArray(w->known, &known));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -295,32 +307,27 @@ static PetscErrorCode spread(Ways *w)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The ways out for the points that the last look found inside: of the part in which they are deepest. */
+/*
+  The ways out for the points inside c->way_part; those that get none are in no part afterwards. First by edges that go through a facet. Where
+  surfaces have planes in common edges end on facets, which tells less: only what has got no way by then goes by these.
+*/
 static PetscErrorCode find_ways(Collision *c)
 {
+  static const PetscReal ends[] = {1 - GRAZE, 1 + GRAZE};
   const PetscInt npoint = c->surface->scene.npoint;
-  PetscReal *deepest;
   PetscInt n;
   Ways w;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscCalloc2(3 * npoint, &c->way, npoint, &c->way_part));
-  PetscCall(PetscCalloc1(npoint, &deepest));
-  for (PetscInt i = 0; i < npoint; i++) c->way_part[i] = -1;
-  for (PetscInt i = 0; i < c->nhit && !SbCollisionOfEdges(c, &c->hit[i]); i++) {
-    const Hit *hit = &c->hit[i];
-
-    if (-hit->gap <= deepest[hit->point]) continue;
-    deepest[hit->point] = -hit->gap;
-    c->way_part[hit->point] = hit->part;
-  }
-  PetscCall(PetscFree(deepest));
   PetscCall(create_ways(c, &w));
-  PetscCall(find_entries(c, &w));
-  PetscCall(take_ways(c, &w, &n));
-  while (n > 0) {
-    PetscCall(spread(&w));
+  for (int pass = 0; pass < 2; pass++) {
+    PetscCall(find_entries(c, ends[pass], &w));
+    PetscCall(know_ways(c, &w));
     PetscCall(take_ways(c, &w, &n));
+    do {
+      PetscCall(spread(&w));
+      PetscCall(take_ways(c, &w, &n));
+    } while (n > 0);
   }
   PetscCall(destroy_ways(&w));
   for (PetscInt i = 0; i < npoint; i++) {
@@ -331,119 +338,156 @@ static PetscErrorCode find_ways(Collision *c)
 
 /* ------------------------------------------------------------------ how deep */
 
-/* One point of each body, and whether the effect is not on it; the same on all ranks. */
-typedef struct {
-  PetscReal x[3], none;
-} Sample;
-
-static PetscErrorCode sample_bodies(const Collision *c, PetscInt nbody, Sample sample[])
+/* How many points on all ranks have a pair along their way out. */
+static PetscErrorCode count_led(const Collision *c, PetscInt *n)
 {
-  const SbDetectScene *s = &c->surface->scene;
-  const MPI_Comm comm = c->surface->space->comm;
-  PetscMPIInt rank, *first; /* the rank that takes the point */
-  PetscInt *point;
-
   PetscFunctionBeginUser;
-  PetscCallMPI(MPI_Comm_rank(comm, &rank));
-  PetscCall(PetscMalloc2(nbody, &first, nbody, &point));
-  PetscCall(PetscArrayzero(sample, nbody));
-  for (PetscInt b = 0; b < nbody; b++) first[b] = INT_MAX;
-  for (PetscInt i = s->npoint - 1; i >= 0; i--) {
-    first[s->point_part[i]] = rank;
-    point[s->point_part[i]] = i;
-  }
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, first, (PetscMPIInt)nbody, MPI_INT, MPI_MIN, comm));
-  for (PetscInt b = 0; b < nbody; b++) {
-    if (first[b] != rank) continue;
-    for (int k = 0; k < 3; k++) sample[b].x[k] = s->p[3 * point[b] + k];
-  }
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, sample, (PetscMPIInt)(4 * nbody), MPIU_REAL, MPI_SUM, comm));
-  for (PetscInt b = 0; b < nbody; b++) sample[b].none = first[b] == INT_MAX;
-  PetscCall(PetscFree2(first, point));
+  *n = 0;
+  for (PetscInt i = 0; i < c->nhit && !SbCollisionOfEdges(c, &c->hit[i]); i++)
+    *n += c->way && c->way_part[c->hit[i].point] == c->hit[i].part;
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, n, 1, MPIU_INT, MPI_SUM, c->surface->space->comm));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/*
-  A body that lies in the flesh of another, so deep that none of the looks found it, has no way out that could be told: half-lines from a point of
-  it leave the other once more than they enter. Two of three have to, as one may run along an edge. A body in a hollow is not meant.
-*/
-static PetscErrorCode refuse_swallowed(const Collision *c, const char name[])
+/* Two bodies, one with points inside the other, of which the last look found no pair: a nbody + b, the same on all ranks; -1: none. */
+static PetscErrorCode find_unmet(const Collision *c, const PetscInt inside[], PetscInt *unmet)
 {
-  static const PetscReal way[3][3] = {{0.81, 0.47, 0.35}, {-0.29, 0.87, -0.41}, {0.13, -0.38, 0.92}};
   const SbDetectScene *s = &c->surface->scene;
-  const SbMesh mesh = c->surface->space->mesh;
-  const PetscInt nbody = mesh->nbody;
-  Sample *sample;
-  /* [nbody][nbody]: leavings less entries of half-lines from the first by facets of the second, and pairs that the last look saw */
-  PetscReal(*leave)[4];
+  const PetscInt nbody = c->surface->space->mesh->nbody;
+  PetscInt(*count)[2]; /* [nbody][nbody] points of the first in the second, and pairs of the two */
 
   PetscFunctionBeginUser;
-  PetscCall(PetscMalloc1(nbody, &sample));
-  PetscCall(PetscCalloc1(nbody * nbody, &leave));
-  PetscCall(sample_bodies(c, nbody, sample));
+  PetscCall(PetscCalloc1(nbody * nbody, &count));
+  for (PetscInt i = 0; i < s->npoint; i++) {
+    if (inside[i] >= 0 && inside[i] != s->point_part[i]) count[s->point_part[i] * nbody + inside[i]][0]++;
+  }
   for (PetscInt i = 0; i < c->nhit; i++) {
     const PetscInt a = SbCollisionFirst(c, &c->hit[i]), b = c->hit[i].body;
 
-    leave[a * nbody + b][3]++;
-    leave[b * nbody + a][3]++;
+    count[a * nbody + b][1]++;
+    count[b * nbody + a][1]++;
   }
-  for (PetscInt f = 0; f < c->surface->nfacet_owned; f++) {
-    const PetscReal *const x[3] = {s->x + 3 * s->facet[3 * f], s->x + 3 * s->facet[3 * f + 1],
-                                   s->x + 3 * s->facet[3 * f + 2]};
-
-    for (PetscInt b = 0; b < nbody; b++) {
-      for (int k = 0; k < 3 && b != s->facet_part[f]; k++) {
-        PetscReal t, weight[3];
-        PetscBool out;
-
-        if (SbRayMeets(sample[b].x, way[k], x, &t, weight, &out))
-          leave[b * nbody + s->facet_part[f]][k] += out ? 1 : -1;
-      }
-    }
-  }
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, leave, (PetscMPIInt)(4 * nbody * nbody), MPIU_REAL, MPI_SUM,
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, count, (PetscMPIInt)(2 * nbody * nbody), MPIU_INT, MPI_SUM,
                              c->surface->space->comm));
-  for (PetscInt i = 0; i < nbody * nbody; i++) {
-    const PetscInt a = i / nbody, b = i % nbody;
-
-    PetscCheck(
-      sample[a].none > 0 || leave[i][3] > 0 || (leave[i][0] > 0) + (leave[i][1] > 0) + (leave[i][2] > 0) < 2,
-      PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
-      "body %s lies inside body %s, at (%g, %g, %g) m, deeper than %g m below its surface: -effect_%s_type "
-      "collision cannot tell which way it came in; move one of them (-body_%s_translate), or name sets of "
-      "one "
-      "of them only (-effect_%s_on)",
-      mesh->body[a].name, mesh->body[b].name, (double)sample[a].x[0], (double)sample[a].x[1],
-      (double)sample[a].x[2], (double)PetscMax(c->deep, c->reach), name, mesh->body[a].name, name);
+  *unmet = -1;
+  for (PetscInt i = 0; i < nbody * nbody && *unmet < 0; i++) {
+    if (count[i][0] && !count[i][1]) *unmet = i;
   }
-  PetscCall(PetscFree(leave));
-  PetscCall(PetscFree(sample));
+  PetscCall(PetscFree(count));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* What is in a body without a way out: an error when a run begins. Within a run it was looked for as far as it goes, and may come out by itself. */
+static PetscErrorCode tell_unmet(SbEffect e, const PetscInt inside[], PetscInt unmet, PetscBool begins)
+{
+  const Collision *c = (const Collision *)e->data;
+  const SbDetectScene *s = &c->surface->scene;
+  const SbMesh mesh = c->surface->space->mesh;
+  const char *in = mesh->body[unmet / mesh->nbody].name, *out = mesh->body[unmet % mesh->nbody].name;
+  PetscReal x[3] = {-PETSC_MAX_REAL, -PETSC_MAX_REAL, -PETSC_MAX_REAL};
+  PetscMPIInt rank, first = INT_MAX;
+
+  PetscFunctionBeginUser;
+  PetscCallMPI(MPI_Comm_rank(c->surface->space->comm, &rank));
+  for (PetscInt i = 0; i < s->npoint && first == INT_MAX; i++) {
+    if (s->point_part[i] * mesh->nbody + inside[i] != unmet || inside[i] < 0) continue;
+    first = rank;
+    PetscCall(PetscArraycpy(x, s->p + 3 * i, 3));
+  }
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &first, 1, MPI_INT, MPI_MIN, c->surface->space->comm));
+  PetscCallMPI(MPI_Bcast(x, 3, MPIU_REAL, first, c->surface->space->comm));
+  PetscCheck(
+    !begins, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
+    "body %s lies inside body %s, at (%g, %g, %g) m, deeper than %g m below its surface: -effect_%s_type "
+    "collision cannot tell which way it came in; move one of them (-body_%s_translate), or name sets of "
+    "one of them only (-effect_%s_on)",
+    in, out, (double)x[0], (double)x[1], (double)x[2], (double)(BLIND * c->reach), e->name, in, e->name);
+  PetscCall(
+    SbWarning(c->surface->space->comm,
+              "the effect %s: body %s has points inside body %s, at (%g, %g, %g) m, and sees no way out "
+              "of it; shorter steps (-ts_dt) keep bodies from getting there",
+              e->name, in, out, (double)x[0], (double)x[1], (double)x[2]));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Points in tets, and how many on all ranks. */
+static PetscErrorCode find_inside(const Collision *c, const PetscReal u[], PetscInt inside[], PetscInt *n)
+{
+  PetscFunctionBeginUser;
+  PetscCall(SbInsideFind(c->inside, u, c->self, inside));
+  *n = 0;
+  for (PetscInt i = 0; i < c->surface->scene.npoint; i++) *n += inside[i] >= 0;
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, n, 1, MPIU_INT, MPI_SUM, c->surface->space->comm));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Looks twice as far as long as half of it is not yet as deep as what was found, ends of ways are still found, or `blind` m are not reached. */
+static PetscErrorCode look_deeper(Collision *c, const PetscReal u[], PetscReal blind)
+{
+  PetscReal range = PetscMax(c->reach, c->deep), deepest;
+  PetscInt led, before = 0;
+
+  PetscFunctionBeginUser;
+  PetscCall(deepest_of(c, &deepest));
+  PetscCall(count_led(c, &led));
+  while (range < c->surface->size && (2 * deepest > range || range < blind || led > before)) {
+    before = led;
+    c->deep = range *= 2;
+    PetscCall(SbCollisionLook(c, u, PETSC_FALSE));
+    PetscCall(deepest_of(c, &deepest));
+    PetscCall(count_led(c, &led));
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /*
-  Around the places where surfaces go through each other depths begin with 0: the range is doubled until it holds twice all of them. Faces
-  that lie in one plane hide those places: so where boxes overlap, a few layers of cells are looked through in any case.
+  The ways out of what points in tets are in; and those at the rim of it, which lie on its surface and have pairs behind. Ways that are
+  there from before stay, as what they lead out is on its way.
+*/
+static PetscErrorCode lead_out(Collision *c, const PetscReal u[], const PetscInt inside[])
+{
+  const PetscInt npoint = c->surface->scene.npoint;
+
+  PetscFunctionBeginUser;
+  if (!c->way) {
+    PetscCall(PetscCalloc2(3 * npoint, &c->way, npoint, &c->way_part));
+    for (PetscInt i = 0; i < npoint; i++) c->way_part[i] = -1;
+  }
+  for (PetscInt i = 0; i < npoint; i++) {
+    if (c->way_part[i] < 0) c->way_part[i] = inside[i];
+  }
+  for (PetscInt i = 0; i < c->nhit && !SbCollisionOfEdges(c, &c->hit[i]); i++) {
+    if (c->hit[i].gap < 0 && c->way_part[c->hit[i].point] < 0) c->way_part[c->hit[i].point] = c->hit[i].part;
+  }
+  PetscCall(find_ways(c));
+  PetscCall(SbCollisionLook(c, u, PETSC_FALSE));
+  PetscCall(look_deeper(c, u, 0));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/*
+  Ways lead out at any depth. Where surfaces do not go through each other (faces that lie in one plane, a body in another) nearest places have to do, up
+  to a few layers of cells.
 */
 PetscErrorCode SbCollisionFindOverlap(SbEffect e, const PetscReal u[])
 {
   Collision *c = (Collision *)e->data;
-  PetscReal range = c->reach, deepest, blind;
+  const PetscBool begins = (PetscBool)!c->begun;
+  PetscInt *inside, n, unmet;
 
   PetscFunctionBeginUser;
   c->begun = PETSC_TRUE;
   PetscCall(SbCollisionLook(c, u, PETSC_FALSE));
-  PetscCall(deepest_of(c, &deepest));
-  PetscCall(boxes_overlap(c, &blind));
-  blind = PetscMin(blind, BLIND * c->reach);
-  while ((2 * deepest > range || range < blind) && range < c->surface->size) {
-    c->deep = range *= 2;
-    PetscCall(SbCollisionLook(c, u, PETSC_FALSE));
-    PetscCall(deepest_of(c, &deepest));
+  PetscCall(PetscMalloc1(c->surface->scene.npoint, &inside));
+  PetscCall(find_inside(c, u, inside, &n));
+  if (n) {
+    PetscCall(look_deeper(c, u, BLIND * c->reach));
+    PetscCall(lead_out(c, u, inside));
+    PetscCall(find_unmet(c, inside, &unmet));
+    if (unmet >= 0) PetscCall(tell_unmet(e, inside, unmet, begins));
   }
-  if (blind > 0) PetscCall(refuse_swallowed(c, e->name));
+  PetscCall(PetscFree(inside));
   PetscCall(SbCollisionFollowOverlap(c));
-  if (c->deep > 0) PetscCall(find_ways(c));
   c->nhit = 0;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -457,5 +501,38 @@ PetscErrorCode SbCollisionFollowOverlap(Collision *c)
   PetscCall(deepest_of(c, &deepest));
   c->deep = 2 * deepest > c->reach ? PetscMin(c->deep, 2 * deepest) : 0;
   if (c->deep == 0) PetscCall(PetscFree2(c->way, c->way_part));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ while a run goes on */
+
+PetscErrorCode SbCollisionWatchInside(SbEffect e, const PetscReal u[])
+{
+  Collision *c = (Collision *)e->data;
+  const PetscInt npoint = c->surface->scene.npoint;
+  PetscInt *inside, late = 0;
+
+  PetscFunctionBeginUser;
+  if (!c->close && !c->self) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscMalloc1(npoint, &inside));
+  PetscCall(SbInsideFind(c->inside, u, c->self, inside));
+  for (PetscInt i = 0, j = 0; i < npoint; i++) {
+    PetscBool held = PETSC_FALSE;
+
+    for (; j < c->npast && c->past[j].point <= i; j++) {
+      if (c->past[j].point == i && c->past[j].part == inside[i]) held = PETSC_TRUE;
+    }
+    if (inside[i] < 0 || held || !SbCollisionLooksFor(c, c->surface->scene.point_part[i], inside[i]))
+      c->alone[i] = 0;
+    else if (++c->alone[i] == PATIENCE)
+      late = 1;
+  }
+  PetscCall(PetscFree(inside));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &late, 1, MPIU_INT, MPI_MAX, c->surface->space->comm));
+  if (!late) PetscFunctionReturn(PETSC_SUCCESS);
+  for (PetscInt i = 0; i < npoint; i++) {
+    if (c->alone[i] == PATIENCE) c->alone[i] = -AGAIN;
+  }
+  PetscCall(SbCollisionFindOverlap(e, u));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

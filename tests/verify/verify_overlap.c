@@ -3,7 +3,9 @@
   Two cubes that begin half in each other, which no reach of contact sees at once: the depth is found, all points get the same way out (a smaller cube
   in a face: ways to one side), the depth is taken back by the option's steps, and
   the bodies part with no more than twice the energy M v^2 of a bar that is pushed with the speed v at which it is taken back. Momentum stays. A
-  body that begins within reach of the other but not in it is not touched.
+  body that begins within reach of the other but not in it is not touched. No point is inside for long without a pair.
+
+  A finger ten layers of cells deep in a block has one way out, along itself, and so have the ends of a bar that is bent into itself.
 */
 #include "../../src/effect/collision.h"
 #include "contact.h"
@@ -16,7 +18,36 @@
 typedef struct {
   PetscReal first, depth, energy, momentum, torque; /* depth after a step and after STEPS of them, m */
   PetscReal contacts, agreement, pairs;
+  PetscInt alone;   /* most steps that a point has been inside without a pair */
+  PetscInt *inside; /* [npoint] the part that it is in */
+  PetscInt *steps;  /* [npoint] how long so */
+  SbInside look;
 } Overlap;
+
+/* How long points have been inside that no pair holds. */
+static PetscErrorCode watch_alone(SbRun run, const SbStep *step, Overlap *o)
+{
+  const Collision *c = (const Collision *)contact_effect(run->model, "meet")->data;
+  const PetscInt n = c->surface->scene.npoint;
+  const PetscReal *u;
+
+  PetscFunctionBeginUser;
+  if (!o->look) {
+    PetscCall(SbInsideCreate(c->surface, SB_DETECT_BRUTE, &o->look));
+    PetscCall(PetscCalloc2(n, &o->inside, n, &o->steps));
+  }
+  PetscCall(SbSpaceGetLocalRead(run->model->space, step->U, &u));
+  PetscCall(SbInsideFind(o->look, u, PETSC_FALSE, o->inside));
+  PetscCall(SbSpaceRestoreLocalRead(run->model->space, step->U, &u));
+  for (PetscInt i = 0; i < c->nhit && !SbCollisionOfEdges(c, &c->hit[i]); i++) {
+    if (c->hit[i].part == o->inside[c->hit[i].point]) o->inside[c->hit[i].point] = -1;
+  }
+  for (PetscInt i = 0; i < n; i++) {
+    o->steps[i] = o->inside[i] < 0 ? 0 : o->steps[i] + 1;
+    o->alone = PetscMax(o->alone, o->steps[i]);
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
 
 /* The least cosine between the normal of a pair that is behind and the mean one of the same body, after the first step. */
 static PetscErrorCode agreement(SbRun run, PetscReal *least, PetscReal *pairs)
@@ -62,6 +93,7 @@ static PetscErrorCode watch(SbRun run, const SbStep *step, void *ctx)
   }
   if (step->step == STEPS) o->depth = depth;
   o->contacts = contacts;
+  PetscCall(watch_alone(run, step, o));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -84,12 +116,16 @@ static PetscErrorCode check(const char *element, const char *detection, PetscRea
   t.run->want_energies = PETSC_TRUE;
   PetscCall(SbRunAddMonitor(t.run, watch, &o, NULL));
   PetscCall(verify_solve(&t, "overlap"));
-  PetscCall(PetscPrintf(
-    PETSC_COMM_WORLD,
-    "  %s, %s, %g m apart: %.3f of the depth after a step, %.3f after %d, energy %.3g J of %.3g "
-    "allowed, momentum %.1e, cosine %.2f, %g pairs at the end\n",
-    element, detection, (double)shift, (double)(o.first / DEPTH), (double)(o.depth / DEPTH), STEPS,
-    (double)o.energy, (double)(mass * v * v), (double)o.momentum, (double)o.agreement, (double)o.contacts));
+  PetscCall(
+    PetscPrintf(PETSC_COMM_WORLD,
+                "  %s, %s, %g m apart: %.3f of the depth after a step, %.3f after %d, energy %.3g J of %.3g "
+                "allowed, momentum %.1e, cosine %.2f, %g pairs at the end, alone for %d steps\n",
+                element, detection, (double)shift, (double)(o.first / DEPTH), (double)(o.depth / DEPTH),
+                STEPS, (double)o.energy, (double)(mass * v * v), (double)o.momentum, (double)o.agreement,
+                (double)o.contacts, (int)o.alone));
+  SB_CHECK(o.alone <= 3, "a point is inside without a pair for %d steps", (int)o.alone);
+  PetscCall(SbInsideDestroy(&o.look));
+  PetscCall(PetscFree2(o.inside, o.steps));
   SB_CHECK(o.contacts == 0, "%g pairs still touch", (double)o.contacts);
   SB_CHECK(o.momentum < 1e-9, "momentum %g kg m/s", (double)o.momentum);
   if (apart)
@@ -108,6 +144,116 @@ static PetscErrorCode check(const char *element, const char *detection, PetscRea
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* What is deep inside, and how it is led out. */
+typedef struct {
+  PetscInt inside, led,
+    behind; /* points in tets; with a way out of there; with a pair that is behind along it */
+  PetscReal deepest,
+    least; /* of these, m; the least cosine between a way of the first body and the given one */
+} Ways;
+
+/* Looks for overlap at displacements u. `out`: the way out for points of the first body. */
+static PetscErrorCode look_for_ways(SbModel m, const PetscReal u[], const PetscReal out[3], Ways *w)
+{
+  SbEffect e = contact_effect(m, "meet");
+  Collision *c = (Collision *)e->data;
+  const SbDetectScene *s = &c->surface->scene;
+  PetscInt *part, count[3] = {0};
+  PetscReal most[2] = {0, -1};
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscArraycpy(c->u0, u, 3 * m->space->nnode));
+  PetscCall(SbCollisionFindOverlap(e, u));
+  PetscCall(SbCollisionLook(c, u, PETSC_FALSE));
+  PetscCall(PetscMalloc1(s->npoint, &part));
+  PetscCall(SbInsideFind(c->inside, u, c->self, part));
+  for (PetscInt i = 0; i < s->npoint; i++) {
+    if (part[i] < 0) continue;
+    count[0]++;
+    if (!c->way || c->way_part[i] != part[i]) continue;
+    count[1]++;
+    if (!s->point_part[i]) most[1] = PetscMax(most[1], -SbDot3(c->way + 3 * i, out));
+  }
+  for (PetscInt i = 0; i < c->nhit && !SbCollisionOfEdges(c, &c->hit[i]); i++) {
+    if (part[c->hit[i].point] != c->hit[i].part || c->hit[i].gap >= 0) continue;
+    count[2]++;
+    most[0] = PetscMax(most[0], -c->hit[i].gap);
+  }
+  PetscCall(PetscFree(part));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, count, 3, MPIU_INT, MPI_SUM, m->comm));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, most, 2, MPIU_REAL, MPI_MAX, m->comm));
+  *w = (Ways){count[0], count[1], count[2], most[0], -most[1]};
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* A finger of 2 x 2 x 20 cells, half of it in a block, through its top. */
+static PetscErrorCode check_finger(const char *element)
+{
+  const PetscReal up[3] = {0, 0, 1};
+  PetscReal *u;
+  TestScene t;
+  Ways w;
+
+  PetscFunctionBeginUser;
+  PetscCall(
+    verify_open(&t,
+                "-bodies a,b -body_a_mesh box:0.02,0.02,0.2:2,2,20 -body_a_translate 0.041,0.0392,0.1 "
+                "-body_b_mesh box:0.1,0.1,0.2:4,4,8 -body_a_material corotated -body_a_young 1e5 "
+                "-body_a_poisson 0.3 -body_b_material corotated -body_b_young 1e5 -body_b_poisson 0.3 "
+                "-body_a_element %s -body_b_element %s "
+                "-effects meet -effect_meet_type collision -effect_meet_reach 0.005 -ts_dt 1e-3",
+                element, element));
+  PetscCall(PetscCalloc1(3 * t.run->model->space->nnode, &u));
+  PetscCall(look_for_ways(t.run->model, u, up, &w));
+  PetscCall(PetscPrintf(PETSC_COMM_WORLD,
+                        "  finger, %s: %d points inside, %d with a way out, %d seen along it, deepest %g m, "
+                        "cosine %.3f\n",
+                        element, (int)w.inside, (int)w.led, (int)w.behind, (double)w.deepest,
+                        (double)w.least));
+  SB_CHECK(w.inside > 80 && w.led == w.inside && w.behind == w.inside, "%d inside, %d led, %d seen",
+           (int)w.inside, (int)w.led, (int)w.behind);
+  SB_CHECK(w.least > 0.9 && w.deepest > 0.095 && w.deepest < 0.11, "deepest %g m, cosine %g",
+           (double)w.deepest, (double)w.least);
+  PetscCall(PetscFree(u));
+  PetscCall(test_scene_close(&t));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* A bar bent to more than a ring, wider on one side, so that its ends are in each other. */
+static PetscErrorCode check_ring(const char *element)
+{
+  PetscReal *u;
+  SbSpace space;
+  TestScene t;
+  Ways w;
+
+  PetscFunctionBeginUser;
+  PetscCall(
+    verify_open(&t,
+                "-bodies a -body_a_mesh box:2,0.2,0.1:40,4,2 -body_a_material corotated "
+                "-body_a_young 1e5 -body_a_poisson 0.3 -body_a_element %s -effects meet "
+                "-effect_meet_type collision -effect_meet_self yes -effect_meet_reach 0.02 -ts_dt 1e-3",
+                element));
+  space = t.run->model->space;
+  PetscCall(PetscCalloc1(3 * space->nnode, &u));
+  for (PetscInt i = 0; i < space->nnode; i++) {
+    const PetscReal *X = space->node_x + 3 * i, turn = (2 * PETSC_PI + 0.7) / 2;
+    const PetscReal r = 1 / turn + X[2] + 0.03 * X[0];
+
+    u[3 * i] = r * PetscSinReal(turn * X[0]) - X[0];
+    u[3 * i + 2] = r * PetscCosReal(turn * X[0]) - X[2];
+  }
+  PetscCall(look_for_ways(t.run->model, u, (const PetscReal[3]){0, 0, 0}, &w));
+  PetscCall(PetscPrintf(PETSC_COMM_WORLD,
+                        "  ring, %s: %d points inside, %d with a way out, %d seen along it\n", element,
+                        (int)w.inside, (int)w.led, (int)w.behind));
+  SB_CHECK(w.inside > 20 && w.led > 0.9 * (PetscReal)w.inside && w.behind > 0.9 * (PetscReal)w.inside,
+           "%d inside, %d led, %d seen", (int)w.inside, (int)w.led, (int)w.behind);
+  PetscCall(PetscFree(u));
+  PetscCall(test_scene_close(&t));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 int main(int argc, char **argv)
 {
   SB_TEST_BEGIN(argc, argv);
@@ -118,5 +264,9 @@ int main(int argc, char **argv)
   PetscCall(check("p1", "bvh", DEPTH, "-effect_meet_self yes"));
   PetscCall(check("cr", "hash", DEPTH, ""));
   PetscCall(check("p1", "hash", SIZE + 0.001, ""));
+  PetscCall(check_finger("p1"));
+  PetscCall(check_finger("dg"));
+  PetscCall(check_ring("p1"));
+  PetscCall(check_ring("cr"));
   SB_TEST_END();
 }
