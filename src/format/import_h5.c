@@ -329,7 +329,7 @@ static PetscErrorCode add_sets(const File *f, PetscInt n, const PetscInt start[]
     if (start[t] > start[t + 1])
       H5_ERROR(f, "/tag_sets/start falls from %lld to %lld; the file is damaged", (long long)start[t],
                (long long)start[t + 1]);
-    PetscCall(SbImportTagSet(f->im, start[t + 1] - start[t], member + start[t], &map[t]));
+    PetscCall(SbImportTagSet(f->im, start[t + 1] - start[t], nmember ? member + start[t] : NULL, &map[t]));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -2,11 +2,12 @@
   readers.h - one input through one reader, as make fuzz does it millions of times and the unit test once for each file of tests/fuzz.
 
   The input stands in a file with the ending of its format. TetGen's mesh is four files: here they stand one after the other, apart
-  by lines of %%.
+  by lines of %%. For a mesh in HDF5 it says what the file holds (h5.h).
 */
 #pragma once
 #include <sys/stat.h>
 #include <unistd.h>
+#include "h5.h"
 #include "../../src/format/format_impl.h"
 #include "../../src/skin/skin_impl.h"
 #include "sbtet.h"
@@ -39,6 +40,8 @@ static const struct {
   {"abaqus", ".inp", SbImportRead_Abaqus},
   {"unv", ".unv", SbImportRead_UNV},
   {"nastran", ".bdf", SbImportRead_Nastran},
+  {"h5", ".h5", SbImportRead_H5},
+  {"xmf", ".xmf", SbImportRead_Xdmf},
   {"stl", ".stl", NULL},
   {"obj", ".obj", NULL},
   {"off", ".off", NULL},
@@ -93,11 +96,14 @@ static inline PetscErrorCode fuzz_read(int reader, const char *folder, const cha
   char path[256];
   const PetscReal origin[3] = {0, 0, 0};
   PetscErrorCode ierr;
+  int step = 0;
 
   text[0] = 0;
   (void)snprintf(path, sizeof(path), "%s/in%s", folder, fuzz_readers[reader].ending);
   if (fuzz_readers[reader].read == SbImportRead_TetGen)
     fuzz_split(folder, data, n);
+  else if (fuzz_readers[reader].read == SbImportRead_H5)
+    step = fuzz_h5_write(path, data, n);
   else
     fuzz_write(path, data, n);
   (void)PetscPushErrorHandler(fuzz_keep_error, text);
@@ -109,6 +115,7 @@ static inline PetscErrorCode fuzz_read(int reader, const char *folder, const cha
     memset(&im, 0, sizeof(im));
     memset(&faces, 0, sizeof(faces));
     (void)snprintf(im.where, sizeof(im.where), "%s", path);
+    im.step = step;
     ierr = SbImportTagSet(&im, 0, NULL, &none);
     if (!ierr) ierr = (*fuzz_readers[reader].read)(path, &im);
     if (!ierr && fuzz_readers[reader].read != fuzz_skin) ierr = SbImportCheck(&im, &faces);
