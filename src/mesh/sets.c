@@ -154,6 +154,15 @@ static const char *group_in_body(const SbSet *set, PetscInt nbody, const SbBody 
   return set->group;
 }
 
+/* Names of options cannot hold blanks: an underscore stands for one, too. */
+static PetscBool is_named(const SbGroup *group, const char *name)
+{
+  const char *p = group->name;
+
+  for (; *p && (*p == *name || (*p == ' ' && *name == '_')); p++) name++;
+  return (PetscBool)(!*p && !*name);
+}
+
 /* Bits of each tag set. */
 static PetscErrorCode mark_tags(const SbImport *im, PetscInt nbody, const SbBody body[], PetscInt b,
                                 PetscInt nset, const SbSet set[], uint64_t bits[])
@@ -165,7 +174,7 @@ static PetscErrorCode mark_tags(const SbImport *im, PetscInt nbody, const SbBody
 
     for (PetscInt t = 0; name && t < im->ntags; t++) {
       for (PetscInt i = im->tags_start[t]; i < im->tags_start[t + 1]; i++) {
-        if (!strcmp(im->group[im->tags_group[i]].name, name)) bits[t] |= SB_SET_BIT(k);
+        if (is_named(&im->group[im->tags_group[i]], name)) bits[t] |= SB_SET_BIT(k);
       }
     }
   }
@@ -309,7 +318,7 @@ static PetscErrorCode empty_group(PetscInt nbody, const SbBody body[], const SbI
 
     for (PetscInt g = 0; g < import[b].ngroup; g++) {
       names[n++] = import[b].group[g].name;
-      exists += name && !strcmp(name, import[b].group[g].name);
+      exists += name && is_named(&import[b].group[g], name);
     }
   }
   PetscCall(SbNearest(wanted, n, names, sizeof(near), near));

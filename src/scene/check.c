@@ -52,10 +52,22 @@ static PetscBool mesh_is_there(const char *mesh)
   return (PetscBool)(!access(node, R_OK) || !access(mesh, R_OK));
 }
 
+/* "; make meshes/lobe.msh makes it" where its description for gmsh lies beside it, as for those of the scenarios. */
+static void how_made(const char *mesh, size_t size, char text[])
+{
+  const char *dot = strrchr(mesh, '.');
+  char geo[PETSC_MAX_PATH_LEN + 4];
+
+  text[0] = 0;
+  if (!dot || strcmp(dot, ".msh") != 0 || strncmp(mesh, "meshes/", 7) != 0) return;
+  (void)snprintf(geo, sizeof(geo), "%.*s.geo", (int)(dot - mesh), mesh);
+  if (!access(geo, R_OK)) (void)snprintf(text, size, "; make %s makes it", mesh);
+}
+
 /* Rank 0 looks, all ranks learn the result. */
 static PetscErrorCode check_mesh_file(MPI_Comm comm, const SbBody *body)
 {
-  char near[PETSC_MAX_PATH_LEN] = "", folder[PETSC_MAX_PATH_LEN];
+  char near[PETSC_MAX_PATH_LEN] = "", folder[PETSC_MAX_PATH_LEN], make[PETSC_MAX_PATH_LEN + 32] = "";
   int error = 0;
   PetscMPIInt rank;
 
@@ -63,11 +75,15 @@ static PetscErrorCode check_mesh_file(MPI_Comm comm, const SbBody *body)
   PetscCallMPI(MPI_Comm_rank(comm, &rank));
   if (!rank && !mesh_is_there(body->mesh)) {
     error = errno;
-    if (error == ENOENT) PetscCall(near_files(body->mesh, sizeof(near), near));
+    if (error == ENOENT) how_made(body->mesh, sizeof(make), make);
+    if (error == ENOENT && !make[0]) PetscCall(near_files(body->mesh, sizeof(near), near));
   }
   PetscCallMPI(MPI_Bcast(&error, 1, MPI_INT, 0, comm));
   if (!error) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCallMPI(MPI_Bcast(near, sizeof(near), MPI_CHAR, 0, comm));
+  PetscCallMPI(MPI_Bcast(make, sizeof(make), MPI_CHAR, 0, comm));
+  PetscCheck(!make[0], PETSC_COMM_SELF, PETSC_ERR_USER, "-body_%s_mesh %s: %s%s", body->name, body->mesh,
+             strerror(error), make);
   PetscCall(PetscGetWorkingDirectory(folder, sizeof(folder)));
   SETERRQ(PETSC_COMM_SELF, PETSC_ERR_USER, "-body_%s_mesh %s: %s%s%s%s", body->name, body->mesh,
           strerror(error),

@@ -108,7 +108,9 @@ runs 2 "$data/two_cubes.bdf" 23 "supple "
 
 # no file
 error 2 "-body_it_mesh nix.msh: No such file or directory" body.opts -body_it_mesh nix.msh
-mkdir folder folder.msh
+mkdir folder folder.msh meshes
+touch meshes/lobe.geo
+error 2 "-body_it_mesh meshes/lobe.msh: No such file or directory; make meshes/lobe.msh makes it" body.opts -body_it_mesh meshes/lobe.msh
 mesh 2 folder.msh ": is not a regular file; give a mesh file"
 error 2 "body 'it': mesh 'folder' is of no known kind; give a file that ends in .msh " body.opts -body_it_mesh folder
 

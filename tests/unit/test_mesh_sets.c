@@ -163,6 +163,7 @@ int main(int argc, char **argv)
   /* sides of the gmsh cubes: 5 vertices and 4 triangles each; of the box: 9 vertices and 8 triangles */
   PetscCall(test_counts("group:wall", 5, 4, 0));
   PetscCall(test_counts("group:a.both ends", 10, 8, 0));
+  PetscCall(test_counts("group:both_ends", 10, 8, 0));
   PetscCall(test_counts("group:surface_77", 5, 4, 0));
   PetscCall(test_counts("group:inner", 5, 0, 0));
   PetscCall(test_counts("group:edge", 2, 0, 0));
