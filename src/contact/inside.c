@@ -5,16 +5,17 @@
   collision detection of deformable objects", VMV 2003): points go into hashed cells, each tet looks up the cells of its box, and barycentric
   coordinates decide. The table is that of hash.c, with the boxes of tets in the place of those of facets.
 
-  Points go to the tets: each rank tells the boxes of its tets, body by body, and gets the points of others that are within them; what goes back is
-  a number for each point. While no boxes of two bodies meet nothing is done.
+  Points go to the tets: each rank tells the boxes of its tets, body by body, and gets the points of others that are within them; what goes back are
+  two numbers for each point. While no boxes of two bodies meet nothing is done.
 
-  A point on the surface is not inside: what of a tet it lies on (corner, edge or face) has all its corners on the surface. In meshes that coincide such points are
-  common. With CR and DG tets come apart a little, and a point in such a joint is in none.
+  A point on the boundary of a body is not inside, be its facets among those of the surface or not. In meshes that coincide such points are common, and so are those
+  on edges and faces within a body: the tet with the boundary facet, on whichever rank, tells which it is. With CR and DG tets come apart a little, and a point in
+  such a joint is in none.
 */
 #include "detect.h"
 #include "surface_impl.h"
 
-#define ON 1e-6   /* of a barycentric coordinate: so near a face a point lies on it */
+#define ON 1e-6   /* of a barycentric coordinate, and of a tet's box: so near a face a point lies on it */
 #define FLAT 1e-9 /* six times the volume over the cubed longest edge, below which nothing is in a tet */
 #define BOX 7     /* a part, and the box of its tets on a rank */
 
@@ -25,10 +26,14 @@ struct _p_SbInside {
   SbSurface surface;
   SbDetector detector;
   PetscInt ncell;
-  PetscInt *cell;      /* [ncell] own cells of the parts that have a surface anywhere */
-  PetscInt *part;      /* [ncell] */
-  unsigned char *skin; /* [ncell] bit k: corner k is on the surface */
+  PetscInt *cell; /* [ncell] own cells of the parts that have a surface anywhere */
+  PetscInt *part; /* [ncell] */
 };
+
+/* The part that a point is in, and one that it is on the boundary of; -1: none. Goes as MPIU_2INT. */
+typedef struct {
+  PetscInt in, on;
+} Answer;
 
 /* Numbers that go from rank to rank: how many, and where those of each rank begin. */
 typedef struct {
@@ -43,25 +48,19 @@ static PetscErrorCode list_cells(SbInside in)
 {
   const SbSurfaceData *d = (const SbSurfaceData *)in->surface->data;
   const SbMesh mesh = in->surface->space->mesh;
-  PetscInt *skin; /* [npart], then [nvert] */
+  PetscInt *wanted; /* [npart] */
 
   PetscFunctionBeginUser;
-  PetscCall(PetscCalloc1(d->npart + mesh->nvert, &skin));
-  for (PetscInt f = 0; f < in->surface->nfacet_owned; f++) skin[d->facet_part[f]] = 1;
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, skin, (PetscMPIInt)d->npart, MPIU_INT, MPI_MAX, d->halo.comm));
-  for (PetscInt i = 0; i < 3 * d->nlocal; i++) skin[d->npart + mesh->cell[d->local[i / 3].at[i % 3]]] = 1;
-  PetscCall(
-    PetscMalloc3(mesh->ncell_owned, &in->cell, mesh->ncell_owned, &in->part, mesh->ncell_owned, &in->skin));
+  PetscCall(PetscCalloc1(d->npart, &wanted));
+  for (PetscInt f = 0; f < in->surface->nfacet_owned; f++) wanted[d->facet_part[f]] = 1;
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, wanted, (PetscMPIInt)d->npart, MPIU_INT, MPI_MAX, d->halo.comm));
+  PetscCall(PetscMalloc2(mesh->ncell_owned, &in->cell, mesh->ncell_owned, &in->part));
   for (PetscInt c = 0; c < mesh->ncell_owned; c++) {
-    if (!skin[mesh->cell_body[c]]) continue;
+    if (!wanted[mesh->cell_body[c]]) continue;
     in->cell[in->ncell] = c;
-    in->part[in->ncell] = mesh->cell_body[c];
-    in->skin[in->ncell] = 0;
-    for (int k = 0; k < 4; k++)
-      in->skin[in->ncell] |= (unsigned char)(skin[d->npart + mesh->cell[4 * c + k]] << k);
-    in->ncell++;
+    in->part[in->ncell++] = mesh->cell_body[c];
   }
-  PetscCall(PetscFree(skin));
+  PetscCall(PetscFree(wanted));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -85,7 +84,7 @@ PetscErrorCode SbInsideDestroy(SbInside *inside)
   PetscFunctionBeginUser;
   if (!in) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(SbDetectorDestroy(&in->detector));
-  PetscCall(PetscFree3(in->cell, in->part, in->skin));
+  PetscCall(PetscFree2(in->cell, in->part));
   PetscCall(PetscFree(*inside));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -258,11 +257,13 @@ static PetscBool surrounds(SbInside in, PetscInt j, const PetscReal X[3])
   return PETSC_TRUE;
 }
 
-/* Whether a point is in tet j, and not on the surface. */
-static PetscBool lies_in(SbInside in, PetscInt j, const PetscReal u[], const PetscReal p[3])
+typedef enum { OUTSIDE, WITHIN, ON_BOUNDARY } Place;
+
+/* Where a point is in tet j. */
+static Place place_in(SbInside in, PetscInt j, const PetscReal u[], const PetscReal p[3])
 {
+  const uint64_t *face = in->surface->space->mesh->face_set + 4 * in->cell[j];
   PetscReal x[4][3], e[4][3], weight[4] = {1}, all, longest = 0;
-  unsigned char carrier = 0;
 
   for (int k = 0; k < 4; k++) SbSurfacePlace(in->surface->space, 4 * in->cell[j] + k, u, x[k]);
   for (int k = 1; k < 4; k++) {
@@ -271,28 +272,58 @@ static PetscBool lies_in(SbInside in, PetscInt j, const PetscReal u[], const Pet
   }
   for (int i = 0; i < 3; i++) e[0][i] = p[i] - x[0][i];
   all = volume(e[1], e[2], e[3]);
-  if (!(PetscAbsReal(all) > FLAT * longest * PetscSqrtReal(longest))) return PETSC_FALSE;
+  if (!(PetscAbsReal(all) > FLAT * longest * PetscSqrtReal(longest))) return OUTSIDE;
   weight[1] = volume(e[0], e[2], e[3]) / all;
   weight[2] = volume(e[1], e[0], e[3]) / all;
   weight[3] = volume(e[1], e[2], e[0]) / all;
   weight[0] -= weight[1] + weight[2] + weight[3];
   for (int k = 0; k < 4; k++) {
-    if (weight[k] < -ON) return PETSC_FALSE;
-    if (weight[k] > ON) carrier |= (unsigned char)(1 << k);
+    if (weight[k] < -ON) return OUTSIDE;
   }
-  return (PetscBool)(carrier == 15 || (carrier & in->skin[j]) != carrier);
+  for (int k = 0; k < 4; k++) {
+    if (weight[k] <= ON && (face[k] & SB_ON_BOUNDARY)) return ON_BOUNDARY;
+  }
+  return WITHIN;
 }
 
-/* The part with the lowest number that each of n points is in, -1: none. The boxes of the tets are there. */
+/* Of the parts of a point's candidates, the lowest that it is in, and the lowest that it is on the boundary of. */
+static Answer answer_one(SbInside in, const PetscReal u[], PetscInt i, const PetscReal asked[ASK],
+                         PetscInt (*seen)[2])
+{
+  const SbDetector d = in->detector;
+  Answer a = {-1, -1};
+
+  for (PetscInt k = d->start[i]; k < d->start[i + 1]; k++) {
+    const PetscInt j = d->candidate[k], b = in->part[j];
+    Place place;
+
+    if (b == (PetscInt)asked[6] && surrounds(in, j, asked + 3)) continue;
+    place = place_in(in, j, u, asked);
+    if (place != OUTSIDE) seen[b][place == ON_BOUNDARY] = i + 1;
+  }
+  for (PetscInt k = d->start[i]; k < d->start[i + 1]; k++) {
+    const PetscInt b = in->part[d->candidate[k]];
+
+    if (seen[b][1] == i + 1)
+      a.on = a.on < 0 ? b : PetscMin(a.on, b);
+    else if (seen[b][0] == i + 1)
+      a.in = a.in < 0 ? b : PetscMin(a.in, b);
+  }
+  return a;
+}
+
+/* For each of n points. The boxes of the tets are there. */
 static PetscErrorCode answer(SbInside in, const PetscReal u[], PetscBool self, PetscInt n,
-                             const PetscReal asked[], PetscInt part[])
+                             const PetscReal asked[], Answer said[])
 {
   SbDetector d = in->detector;
   SbDetectScene s = {.nfacet = in->ncell, .facet_part = in->part, .npoint = n, .self = self};
-  PetscInt *mine;
+  PetscInt *mine,
+    (*seen)[2]; /* [npart][2] the last point, counted from 1, that was in a part and on its boundary */
 
   PetscFunctionBeginUser;
   PetscCall(PetscMalloc1(n, &mine));
+  PetscCall(PetscCalloc1(((const SbSurfaceData *)in->surface->data)->npart, &seen));
   for (PetscInt i = 0; i < n; i++) mine[i] = (PetscInt)asked[ASK * i + 6];
   s.point_part = mine;
   PetscCall(SbDetectBegin(d, &s));
@@ -300,16 +331,8 @@ static PetscErrorCode answer(SbInside in, const PetscReal u[], PetscBool self, P
     for (int k = 0; k < 6; k++) d->point_box[6 * i + k] = asked[ASK * i + k % 3];
   }
   PetscCall(d->ops.search(d, &s));
-  for (PetscInt i = 0; i < n; i++) {
-    part[i] = -1;
-    for (PetscInt k = d->start[i]; k < d->start[i + 1]; k++) {
-      const PetscInt j = d->candidate[k];
-
-      if (part[i] >= 0 && in->part[j] >= part[i]) continue;
-      if (in->part[j] == mine[i] && surrounds(in, j, asked + ASK * i + 3)) continue;
-      if (lies_in(in, j, u, asked + ASK * i)) part[i] = in->part[j];
-    }
-  }
+  for (PetscInt i = 0; i < n; i++) said[i] = answer_one(in, u, i, asked + ASK * i, seen);
+  PetscCall(PetscFree(seen));
   PetscCall(PetscFree(mine));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -330,6 +353,7 @@ static PetscErrorCode box_tets(SbInside in, const PetscReal u[])
       SbSurfacePlace(in->surface->space, 4 * in->cell[j] + k, u, x);
       SbBoxAdd(box, x);
     }
+    SbDetectBoxGrow(ON * PetscMax(box[3] - box[0], PetscMax(box[4] - box[1], box[5] - box[2])), box);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -337,7 +361,8 @@ static PetscErrorCode box_tets(SbInside in, const PetscReal u[])
 PetscErrorCode SbInsideFind(SbInside in, const PetscReal u[], PetscBool self, PetscInt part[])
 {
   const SbHalo *h = &((const SbSurfaceData *)in->surface->data)->halo;
-  PetscInt *sent, *said, *back;
+  PetscInt *sent;
+  Answer *said, *back;
   PetscReal *asked;
   Mail mail;
 
@@ -348,13 +373,16 @@ PetscErrorCode SbInsideFind(SbInside in, const PetscReal u[], PetscBool self, Pe
   PetscCall(ask(in, u, self, in->detector->facet_box, &mail, &sent, &asked));
   PetscCall(PetscMalloc2(mail.nfrom, &said, mail.nto, &back));
   PetscCall(answer(in, u, self, mail.nfrom, asked, said));
-  PetscCallMPI(MPI_Alltoallv(said, mail.from, mail.from_start, MPIU_INT, back, mail.to, mail.to_start,
-                             MPIU_INT, h->comm));
+  PetscCallMPI(MPI_Alltoallv(said, mail.from, mail.from_start, MPIU_2INT, back, mail.to, mail.to_start,
+                             MPIU_2INT, h->comm));
   for (PetscInt i = 0; i < in->surface->scene.npoint; i++) part[i] = -1;
   for (PetscInt j = 0; j < mail.nto; j++) {
     PetscInt *of = &part[sent[j]];
 
-    if (back[j] >= 0 && (*of < 0 || back[j] < *of)) *of = back[j];
+    if (back[j].in >= 0 && (*of < 0 || back[j].in < *of)) *of = back[j].in;
+  }
+  for (PetscInt j = 0; j < mail.nto; j++) {
+    if (back[j].on >= 0 && part[sent[j]] == back[j].on) part[sent[j]] = -1;
   }
   PetscCall(PetscFree2(said, back));
   PetscCall(PetscFree(asked));

@@ -212,7 +212,7 @@ static PetscErrorCode find_edges(Collision *c, SbSpace space, PetscInt n, const 
   PetscReal *count;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscCalloc1(nbody, &c->edge));
+  PetscCall(PetscCalloc2(nbody, &c->edge, nbody, &c->whole));
   PetscCall(PetscCalloc1(nbody, &count));
   for (PetscInt i = 0; i < n; i++) {
     const PetscInt b = space->mesh->cell_body[facet[i].cell];
@@ -226,6 +226,7 @@ static PetscErrorCode find_edges(Collision *c, SbSpace space, PetscInt n, const 
   *nskin = 0;
   for (PetscInt b = 0; b < nbody; b++) {
     *nskin += count[b] > 0;
+    c->whole[b] = (PetscBool)(count[b] == (PetscReal)space->mesh->body[b].nfacet);
     c->edge[b] = count[b] > 0 ? PetscSqrtReal(c->edge[b] / count[b]) : 0;
   }
   PetscCall(PetscFree(count));
@@ -570,7 +571,7 @@ static PetscErrorCode destroy_collision(SbEffect e)
   PetscCall(PetscFree2(c->way, c->way_part));
   PetscCall(PetscFree(c->point_k));
   PetscCall(PetscFree(c->edge_k));
-  PetscCall(PetscFree(c->edge));
+  PetscCall(PetscFree2(c->edge, c->whole));
   PetscCall(PetscFree(c->u0));
   PetscCall(PetscFree(c->flight));
   PetscCall(PetscFree(c->hit));

@@ -74,6 +74,7 @@ typedef struct {
   PetscReal damp;    /* the same in steps */
   SbOverlap overlap;
   PetscReal *edge;    /* [nbody] mean edge of the surfaces, m: the finer one looks */
+  PetscBool *whole;   /* [nbody] the effect has all of the body's surface */
   PetscReal *point_k; /* [npoint] N/m */
   PetscReal *edge_k;  /* [own edges] the same of an edge, N/m */
   PetscReal *u0;      /* [nnode][3] displacement at the start of the step, m */

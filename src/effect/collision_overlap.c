@@ -349,7 +349,10 @@ static PetscErrorCode count_led(const Collision *c, PetscInt *n)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Two bodies, one with points inside the other, of which the last look found no pair: a nbody + b, the same on all ranks; -1: none. */
+/*
+  Two bodies, one with points inside the other that have no way out, of which the last look found no pair: a nbody + b, the same on all ranks;
+  -1: none. What came in where the effect does not have the surface of the other is none of its business.
+*/
 static PetscErrorCode find_unmet(const Collision *c, const PetscInt inside[], PetscInt *unmet)
 {
   const SbDetectScene *s = &c->surface->scene;
@@ -359,7 +362,8 @@ static PetscErrorCode find_unmet(const Collision *c, const PetscInt inside[], Pe
   PetscFunctionBeginUser;
   PetscCall(PetscCalloc1(nbody * nbody, &count));
   for (PetscInt i = 0; i < s->npoint; i++) {
-    if (inside[i] >= 0 && inside[i] != s->point_part[i]) count[s->point_part[i] * nbody + inside[i]][0]++;
+    if (inside[i] >= 0 && inside[i] != s->point_part[i] && c->whole[inside[i]] && c->way_part[i] != inside[i])
+      count[s->point_part[i] * nbody + inside[i]][0]++;
   }
   for (PetscInt i = 0; i < c->nhit; i++) {
     const PetscInt a = SbCollisionFirst(c, &c->hit[i]), b = c->hit[i].body;

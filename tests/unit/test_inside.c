@@ -150,8 +150,9 @@ static PetscErrorCode test_ring(const char *element)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Points of two cubes of the same 4 x 4 x 4 cells, the second moved by whole cells. */
-static PetscErrorCode test_coincident(const char *options, PetscReal shift, PetscInt expected)
+/* Points of a set of two bodies whose meshes meet in vertices, edges or faces, the second moved along x and z. */
+static PetscErrorCode test_coincident(const char *options, PetscInt set, PetscReal shift, PetscReal lift,
+                                      PetscInt expected)
 {
   Case c;
   SbInside inside;
@@ -159,15 +160,16 @@ static PetscErrorCode test_coincident(const char *options, PetscReal shift, Pets
   PetscBool close;
 
   PetscFunctionBeginUser;
-  PetscCall(open_on(PETSC_COMM_WORLD, options, 0, &c));
+  PetscCall(open_on(PETSC_COMM_WORLD, options, set, &c));
   PetscCall(SbInsideCreate(c.s, SB_DETECT_HASH, &inside));
-  PetscCall(fill(&c, 0, 0, shift, 0, c.u));
+  PetscCall(fill(&c, 0, 0, shift, lift, c.u));
   PetscCall(SbSurfaceUpdate(c.s, NULL, c.u, 0.1, PETSC_FALSE, &close));
   PetscCall(PetscMalloc1(c.s->scene.npoint, &part));
   PetscCall(SbInsideFind(inside, c.u, PETSC_FALSE, part));
   for (PetscInt i = 0; i < c.s->scene.npoint; i++) n += part[i] >= 0;
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &n, 1, MPIU_INT, MPI_SUM, PETSC_COMM_WORLD));
-  SB_CHECK(n == expected, "%d points inside, not %d, %g m apart", (int)n, (int)expected, (double)shift);
+  SB_CHECK(n == expected, "%d points of set %d inside, not %d, moved by %g and %g m", (int)n, (int)set,
+           (int)expected, (double)shift, (double)lift);
   PetscCall(PetscFree(part));
   PetscCall(SbInsideDestroy(&inside));
   PetscCall(close_case(&c));
@@ -176,6 +178,11 @@ static PetscErrorCode test_coincident(const char *options, PetscReal shift, Pets
 
 #define CUBES \
   SETS "-bodies a,b" BODY("a", "p1", "box:1,1,1:4", "0,0,0") BODY("b", "p1", "box:1,1,1:4", "0,0,0")
+
+/* Of one layer: all vertices are on the surface, and edges and faces within the body have no others. */
+#define PLATES                                                      \
+  SETS "-bodies a,b" BODY("a", "p1", "box:1,1,0.25:4,4,1", "0,0,0") \
+    BODY("b", "p1", "box:1,1,0.25:4,4,1", "0,0.125,0")
 
 int main(int argc, char **argv)
 {
@@ -186,10 +193,11 @@ int main(int argc, char **argv)
   PetscCall(test_pair(CROSS("p1", "cr"), SB_DETECT_HASH));
   PetscCall(test_ring("p1"));
   PetscCall(test_ring("dg"));
-  PetscCall(test_coincident(CUBES, 1, 0)); /* face on face */
-  PetscCall(test_coincident(CUBES, 0, 0)); /* in one place: all on the surface */
-  PetscCall(
-    test_coincident(CUBES, 0.5, 2 * 9)); /* the middle of one face of each: the sides are on the surface */
-  PetscCall(test_coincident(CUBES, 0.625, 2 * 9)); /* the same between vertices */
+  PetscCall(test_coincident(CUBES, 0, 1, 0, 0));         /* face on face */
+  PetscCall(test_coincident(CUBES, 0, 0, 0, 0));         /* in one place: all on the surface */
+  PetscCall(test_coincident(CUBES, 0, 0.5, 0, 2 * 9));   /* the middle of one face of each, not its sides */
+  PetscCall(test_coincident(CUBES, 0, 0.625, 0, 2 * 9)); /* the same between vertices */
+  PetscCall(test_coincident(PLATES, 0, 0.125, 0.125, 2 * 16)); /* vertices in the middle of cells */
+  PetscCall(test_coincident(CUBES, 1, 1, 0.3, 0));             /* on a face that the set does not have */
   SB_TEST_END();
 }

@@ -254,6 +254,28 @@ static PetscErrorCode check_ring(const char *element)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* What a run may begin with: `inside`, whether points are in the other body; else it would be an error that they are and have no way out. */
+static PetscErrorCode check_begins(const char *name, const char *options, PetscBool inside)
+{
+  PetscReal *u;
+  TestScene t;
+  Ways w;
+
+  PetscFunctionBeginUser;
+  PetscCall(verify_open(&t,
+                        "-bodies a,b -body_a_material corotated -body_a_young 1e5 -body_a_poisson 0.3 "
+                        "-body_b_material corotated -body_b_young 1e5 -body_b_poisson 0.3 -effects meet "
+                        "-effect_meet_type collision -ts_dt 1e-3 %s",
+                        options));
+  PetscCall(PetscCalloc1(3 * t.run->model->space->nnode, &u));
+  PetscCall(look_for_ways(t.run->model, u, (const PetscReal[3]){0, 0, 0}, &w));
+  PetscCall(PetscPrintf(PETSC_COMM_WORLD, "  %s: %d points inside\n", name, (int)w.inside));
+  SB_CHECK((w.inside > 0) == inside, "%s: %d points inside", name, (int)w.inside);
+  PetscCall(PetscFree(u));
+  PetscCall(test_scene_close(&t));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 int main(int argc, char **argv)
 {
   SB_TEST_BEGIN(argc, argv);
@@ -268,5 +290,19 @@ int main(int argc, char **argv)
   PetscCall(check_finger("dg"));
   PetscCall(check_ring("p1"));
   PetscCall(check_ring("cr"));
+  PetscCall(check_begins("beside each other, tops only",
+                         "-body_a_mesh box:1,1,1:4 -body_b_mesh box:1,1,0.6:4,4,3 -body_b_translate 1,0.1,0 "
+                         "-sets high,low -set_high_at plane:0,0,1,1 -set_low_at plane:0,0,1,0.6 "
+                         "-effect_meet_on high,low",
+                         PETSC_FALSE));
+  PetscCall(check_begins("a little in each other, tops only",
+                         "-body_a_mesh box:1,1,1:4 -body_b_mesh box:1,1,0.6:4,4,3 "
+                         "-body_b_translate 0.9999,0.1,0 -sets high,low -set_high_at plane:0,0,1,1 "
+                         "-set_low_at plane:0,0,1,0.6 -effect_meet_on high,low",
+                         PETSC_TRUE));
+  PetscCall(check_begins("a coarse tip, which does not look",
+                         "-body_a_mesh box:1,1,1:12 -body_b_mesh box:1,1,1:1 -body_b_rotate 1,-1,0,54.7356 "
+                         "-body_b_translate 0.53,0.52,0.99 -effect_meet_sides one -effect_meet_reach 0.01",
+                         PETSC_TRUE));
   SB_TEST_END();
 }
