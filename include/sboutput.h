@@ -18,6 +18,7 @@
     /mesh/vertices [ncell][4] int32, vertex numbers; only with -output_discontinuous
     /mesh_000123   the same for the mesh that bodies have after a re-meshing behind step 123; frames of it have the attribute `mesh` (123)
     /mesh/body     [ncell] int32, number of the body; /mesh/rank likewise when asked for
+    /mesh/set_NAME [npoint] int32, 1 at points of this set of the scenario, and /mesh/tets_NAME [ncell] when it holds tets; only with the field `sets`
     /step/0001/000123   a frame: group with the attributes `step` and `time` (s), one dataset per field. The middle name
                    counts hundreds of frames, the last one is the step.
   history.csv: names in the first line, units in the second one behind a '#', then one row per step.
@@ -35,7 +36,8 @@ typedef struct {
   PetscBool constant; /* whole numbers, written once with the mesh */
   PetscBool dynamic;  /* does not exist in a static run */
   const char *help;
-  PetscErrorCode (*compute)(SbRun run, const SbStep *step, PetscReal *values);
+  PetscErrorCode (*compute)(SbRun run, const SbStep *step,
+                            PetscReal *values); /* NULL: `sets`, several arrays */
 } SbField;
 
 PetscErrorCode SbOutputRegister(void); /* option rows */

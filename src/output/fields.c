@@ -215,6 +215,8 @@ static const SbField table[] = {
    "energy of the estimated error of the mesh per rest volume; needs -ledger", space_error},
   {"body", "1", 1, CELL, CONSTANT, ALWAYS, "number of the body, always written", body_number},
   {"rank", "1", 1, CELL, CONSTANT, ALWAYS, "MPI rank that owns the cell", rank_number},
+  {"sets", "1", 1, CELL, CONSTANT, ALWAYS,
+   "sets and groups that the scenario names: arrays set_NAME of points, tets_NAME of cells, 1 inside", NULL},
 };
 
 PetscErrorCode SbFieldGetAll(PetscInt *n, const SbField **fields)

@@ -6,6 +6,7 @@
   A frame is invisible until it is complete (h5.c says how), and then enters fields.xmf. After a restart in the same folder
   the frames up to the restart stay and later ones are taken out; their space in the file is used again.
 */
+#include <ctype.h>
 #include "output_impl.h"
 
 typedef struct {
@@ -101,6 +102,45 @@ static PetscErrorCode write_names(SbFrames fr, hid_t group, SbModel model)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* "set_fat_tissue": letters that a path or XML takes for its own become underscores. */
+static void array_of_set(const char *prefix, const char *set, size_t size, char name[])
+{
+  SbFormat(size, name, "%s_%s", prefix, set);
+  for (char *p = name; *p; p++)
+    if (!isalnum((unsigned char)*p) && !strchr("_-.", *p)) *p = '_';
+}
+
+/* One set: which points are in it, and which tets when there are any: 1, or 0. */
+static PetscErrorCode write_set(SbRun run, SbOutput out, PetscInt k, hid_t group)
+{
+  SbFrames fr = out->frames;
+  const SbMesh mesh = run->model->mesh;
+  const PetscInt npoint = out->discontinuous ? 4 * mesh->ncell_owned : mesh->nvert_owned;
+  char name[SB_NAME_MAX + 8];
+
+  PetscFunctionBeginUser;
+  array_of_set("set", mesh->set[k].name, sizeof(name), name);
+  if (H5Lexists(group, name, H5P_DEFAULT) > 0)
+    PetscFunctionReturn(PETSC_SUCCESS); /* fat tissue, fat_tissue */
+  for (PetscInt i = 0; i < npoint; i++)
+    fr->owned[i] = (mesh->vert_set[out->discontinuous ? mesh->cell[i] : i] & SB_SET_BIT(k)) != 0;
+  PetscCall(write_whole(fr, group, name, &out->point, 1));
+  if (!mesh->set[k].ncell) PetscFunctionReturn(PETSC_SUCCESS);
+  array_of_set("tets", mesh->set[k].name, sizeof(name), name);
+  for (PetscInt c = 0; c < mesh->ncell_owned; c++) fr->owned[c] = (mesh->cell_set[c] & SB_SET_BIT(k)) != 0;
+  PetscCall(write_whole(fr, group, name, &out->cell, 1));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode write_sets(SbRun run, SbOutput out, hid_t group)
+{
+  PetscFunctionBeginUser;
+  PetscCall(SbH5Reserve(&out->frames->h5, (PetscInt64)run->model->mesh->nset *
+                                            (4 * ((PetscInt64)out->point.N + out->cell.N) + 8192)));
+  for (PetscInt k = 0; k < run->model->mesh->nset; k++) PetscCall(write_set(run, out, k, group));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 static PetscErrorCode write_mesh(SbRun run, SbOutput out)
 {
   SbFrames fr = out->frames;
@@ -119,8 +159,11 @@ static PetscErrorCode write_mesh(SbRun run, SbOutput out)
   for (PetscInt i = 0; i < out->nfield; i++) {
     if (!out->field[i]->constant) continue;
     PetscCall(PetscLogEventBegin(out->field_event[i], 0, 0, 0, 0));
-    PetscCall(out->field[i]->compute(run, NULL, fr->owned));
-    PetscCall(write_whole(fr, group, out->field[i]->name, &out->cell, 1));
+    if (out->field[i]->compute) {
+      PetscCall(out->field[i]->compute(run, NULL, fr->owned));
+      PetscCall(write_whole(fr, group, out->field[i]->name, &out->cell, 1));
+    } else
+      PetscCall(write_sets(run, out, group));
     PetscCall(PetscLogEventEnd(out->field_event[i], 0, 0, 0, 0));
   }
   PetscCall(SbH5GroupLink(&fr->h5, group, fr->h5.file, name));
@@ -386,8 +429,7 @@ static PetscErrorCode index_mesh(SbFrames fr, PetscInt step)
   PetscFunctionBeginUser;
   mesh_name(step, sizeof(name), name);
   mesh = H5Gopen2(fr->h5.file, name, H5P_DEFAULT);
-  PetscCall(SbXdmfSetMesh(fr->xdmf, name, (PetscInt)SbH5Rows(mesh, "x"), (PetscInt)SbH5Rows(mesh, "cells"),
-                          (PetscBool)(SbH5Rows(mesh, "rank") > 0)));
+  PetscCall(SbXdmfSetMesh(fr->xdmf, mesh, name));
   if (mesh >= 0) (void)H5Gclose(mesh);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -417,12 +459,13 @@ static PetscErrorCode resume(SbRun run, SbOutput out, const char *path, PetscBoo
   if (fr->nframe) fr->last_step = frames[fr->nframe - 1].step;
   // The index first, so that it never names a frame that is gone.
   for (PetscInt i = 0; fr->xdmf && i < fr->nframe; i++) {
-    if (frames[i].mesh != (i ? frames[i - 1].mesh : fr->mesh)) PetscCall(index_mesh(fr, frames[i].mesh));
+    if (!i || frames[i].mesh != frames[i - 1].mesh) PetscCall(index_mesh(fr, frames[i].mesh));
     PetscCall(SbXdmfAdd(fr->xdmf, frames[i].time, frames[i].group, frames[i].nfield, frames[i].field,
                         frames[i].bytes));
     PetscCall(SbContactsList(out, frames[i].time, frames[i].group, frames[i].nplace, frames[i].place_bytes));
   }
-  if (fr->xdmf && fr->nframe && frames[fr->nframe - 1].mesh != fr->mesh) PetscCall(index_mesh(fr, fr->mesh));
+  if (fr->xdmf && (!fr->nframe || frames[fr->nframe - 1].mesh != fr->mesh))
+    PetscCall(index_mesh(fr, fr->mesh));
   if (fr->xdmf) SbXdmfWrite(fr->xdmf, sizeof(message), message);
   if (fr->xdmf && !message[0]) SbContactsIndex(out, sizeof(message), message);
   PetscCall(PetscFree(frames));
@@ -474,6 +517,7 @@ static PetscErrorCode create(SbRun run, SbOutput out, const char *path)
   PetscCall(SbH5GroupCreate(&fr->h5, SB_H5_NODE_LINKS, 4, &fr->top));
   PetscCall(SbH5GroupLink(&fr->h5, fr->top, fr->h5.file, "step"));
   PetscCall(SbH5Flush(&fr->h5));
+  if (fr->xdmf) PetscCall(index_mesh(fr, fr->mesh));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -501,21 +545,6 @@ static PetscErrorCode free_work(SbFrames fr)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The index of frames that come next is of the mesh that the run has. */
-static PetscErrorCode index_own_mesh(SbOutput out)
-{
-  SbFrames fr = out->frames;
-  PetscBool rank = PETSC_FALSE;
-  char name[32];
-
-  PetscFunctionBeginUser;
-  if (!fr->xdmf) PetscFunctionReturn(PETSC_SUCCESS);
-  for (PetscInt i = 0; i < out->nfield; i++) rank = (PetscBool)(rank || !strcmp(out->field[i]->name, "rank"));
-  mesh_name(fr->mesh, sizeof(name), name);
-  PetscCall(SbXdmfSetMesh(fr->xdmf, name, out->point.N, out->cell.N, rank));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 static PetscErrorCode create_index(SbOutput out)
 {
   char path[PETSC_MAX_PATH_LEN];
@@ -524,7 +553,6 @@ static PetscErrorCode create_index(SbOutput out)
   if (out->rank) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(SbOutputPath(out, "fields.xmf", sizeof(path), path));
   PetscCall(SbXdmfCreate(path, &out->frames->xdmf));
-  PetscCall(index_own_mesh(out));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -561,7 +589,7 @@ PetscErrorCode SbFramesFollow(SbRun run, SbOutput out)
   out->frames->mesh = run->step0;
   PetscCall(write_mesh(run, out));
   PetscCall(SbH5Flush(&out->frames->h5));
-  PetscCall(index_own_mesh(out));
+  if (out->frames->xdmf) PetscCall(index_mesh(out->frames, out->frames->mesh));
   PetscCall(SbRunAddMonitor(run, monitor, out, NULL));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

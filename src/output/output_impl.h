@@ -257,9 +257,8 @@ PetscErrorCode SbRunJson(SbRun run, SbOutput out, const char *status, const char
 /* xdmf.c: an index of fields.h5, on rank 0. */
 typedef struct _p_SbXdmf *SbXdmf;
 PetscErrorCode SbXdmfCreate(const char *path, SbXdmf *x);
-/* The mesh of SbXdmfAdd() from now on: its group in fields.h5, without the first slash. */
-PetscErrorCode SbXdmfSetMesh(SbXdmf x, const char *group, PetscInt npoint, PetscInt ncell,
-                             PetscBool with_rank);
+/* The mesh of SbXdmfAdd() from now on: its group in fields.h5, open, and by name without the first slash. */
+PetscErrorCode SbXdmfSetMesh(SbXdmf x, hid_t mesh, const char *group);
 PetscErrorCode SbXdmfDestroy(SbXdmf *x);
 PetscErrorCode SbXdmfRemove(SbXdmf x); /* the file, if there is one */
 /* Adds a frame: its group in fields.h5 and its fields. */

@@ -15,8 +15,8 @@
 struct _p_SbXdmf {
   char path[PETSC_MAX_PATH_LEN];
   PetscInt npoint, ncell;
-  char mesh[1024]; /* topology, geometry and constant arrays of the frames that come next */
-  char *text;      /* [size] frames so far; capacity grows by doubling */
+  char *mesh; /* topology, geometry and constant arrays of the frames that come next */
+  char *text; /* [size] frames so far; capacity grows by doubling */
   size_t size, capacity;
 };
 
@@ -28,17 +28,48 @@ PetscErrorCode SbXdmfCreate(const char *path, SbXdmf *x)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbXdmfSetMesh(SbXdmf xdmf, const char *group, PetscInt npoint, PetscInt ncell,
-                             PetscBool with_rank)
+enum { ROOM = 768 }; /* letters for one array of the mesh */
+
+typedef struct {
+  SbXdmf xdmf;
+  const char *group;
+  size_t n, size; /* letters of xdmf->mesh, and room for them */
+} List;
+
+/* Whole numbers of points (set_NAME) and cells (tets_NAME, body, rank); the others are the mesh itself. */
+static herr_t list_array(hid_t where, const char *name, const H5L_info_t *info, void *ctx)
 {
-  const char *numbers[2] = {"body", "rank"};
-  size_t n;
+  List *l = (List *)ctx;
+  const PetscBool points = (PetscBool)!strncmp(name, "set_", 4);
+
+  (void)where, (void)info;
+  if (!points && strncmp(name, "tets_", 5) != 0 && strcmp(name, "body") != 0 && strcmp(name, "rank") != 0)
+    return 0;
+  if (l->size - l->n < ROOM) return -1;
+  l->n += (size_t)snprintf(
+    l->xdmf->mesh + l->n, l->size - l->n,
+    "<Attribute Name=\"%s\" AttributeType=\"Scalar\" Center=\"%s\">"
+    "<DataItem Dimensions=\"%" PetscInt_FMT "\" NumberType=\"Int\" Precision=\"4\" Format=\"HDF\">"
+    "fields.h5:/%s/%s</DataItem></Attribute>\n",
+    name, points ? "Node" : "Cell", points ? l->xdmf->npoint : l->xdmf->ncell, l->group, name);
+  return 0;
+}
+
+PetscErrorCode SbXdmfSetMesh(SbXdmf xdmf, hid_t mesh, const char *group)
+{
+  const PetscInt npoint = (PetscInt)SbH5Rows(mesh, "x"), ncell = (PetscInt)SbH5Rows(mesh, "cells");
+  H5G_info_t info = {.nlinks = 0};
+  List list = {.xdmf = xdmf, .group = group};
 
   PetscFunctionBeginUser;
   xdmf->npoint = npoint;
   xdmf->ncell = ncell;
-  n = (size_t)snprintf(
-    xdmf->mesh, sizeof(xdmf->mesh),
+  if (mesh >= 0) (void)H5Gget_info(mesh, &info);
+  list.size = (size_t)(info.nlinks + 2) * ROOM;
+  PetscCall(PetscFree(xdmf->mesh));
+  PetscCall(PetscMalloc1(list.size, &xdmf->mesh));
+  list.n = (size_t)snprintf(
+    xdmf->mesh, list.size,
     "<Topology TopologyType=\"Tetrahedron\" NumberOfElements=\"%" PetscInt_FMT "\">"
     "<DataItem Dimensions=\"%" PetscInt_FMT " 4\" NumberType=\"Int\" Precision=\"4\" Format=\"HDF\">"
     "fields.h5:/%s/cells</DataItem></Topology>\n"
@@ -46,14 +77,7 @@ PetscErrorCode SbXdmfSetMesh(SbXdmf xdmf, const char *group, PetscInt npoint, Pe
     "<DataItem Dimensions=\"%" PetscInt_FMT " 3\" NumberType=\"Float\" Precision=\"8\" Format=\"HDF\">"
     "fields.h5:/%s/x</DataItem></Geometry>\n",
     ncell, ncell, group, npoint, group);
-  for (int i = 0; i < (with_rank ? 2 : 1); i++) {
-    n += (size_t)snprintf(xdmf->mesh + n, sizeof(xdmf->mesh) - n,
-                          "<Attribute Name=\"%s\" AttributeType=\"Scalar\" Center=\"Cell\">"
-                          "<DataItem Dimensions=\"%" PetscInt_FMT
-                          "\" NumberType=\"Int\" Precision=\"4\" Format=\"HDF\">"
-                          "fields.h5:/%s/%s</DataItem></Attribute>\n",
-                          numbers[i], ncell, group, numbers[i]);
-  }
+  if (mesh >= 0) (void)H5Literate(mesh, H5_INDEX_NAME, H5_ITER_INC, NULL, list_array, &list);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -61,6 +85,7 @@ PetscErrorCode SbXdmfDestroy(SbXdmf *x)
 {
   PetscFunctionBeginUser;
   if (!*x) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscFree((*x)->mesh));
   PetscCall(PetscFree((*x)->text));
   PetscCall(PetscFree(*x));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -70,6 +95,24 @@ PetscErrorCode SbXdmfRemove(SbXdmf x)
 {
   PetscFunctionBeginUser;
   (void)unlink(x->path);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode append_text(SbXdmf x, size_t n, const char *text)
+{
+  PetscFunctionBeginUser;
+  if (x->size + n + 1 > x->capacity) {
+    const size_t capacity = 2 * (x->size + n + 1);
+    char *grown;
+
+    PetscCall(PetscMalloc1(capacity, &grown));
+    if (x->size) PetscCall(PetscArraycpy(grown, x->text, x->size));
+    PetscCall(PetscFree(x->text));
+    x->text = grown;
+    x->capacity = capacity;
+  }
+  PetscCall(PetscArraycpy(x->text + x->size, text, n + 1));
+  x->size += n;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -84,18 +127,7 @@ static PetscErrorCode append(SbXdmf x, const char *format, ...)
   n = (size_t)vsnprintf(piece, sizeof(piece), format, args);
   va_end(args);
   PetscCheck(n < sizeof(piece), PETSC_COMM_SELF, PETSC_ERR_PLIB, "A piece of %s has %zu letters", x->path, n);
-  if (x->size + n + 1 > x->capacity) {
-    const size_t capacity = 2 * (x->size + n + 1);
-    char *grown;
-
-    PetscCall(PetscMalloc1(capacity, &grown));
-    if (x->size) PetscCall(PetscArraycpy(grown, x->text, x->size));
-    PetscCall(PetscFree(x->text));
-    x->text = grown;
-    x->capacity = capacity;
-  }
-  PetscCall(PetscArraycpy(x->text + x->size, piece, n + 1));
-  x->size += n;
+  PetscCall(append_text(x, n, piece));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -112,7 +144,7 @@ PetscErrorCode SbXdmfAdd(SbXdmf x, PetscReal time, const char *group, PetscInt n
 {
   PetscFunctionBeginUser;
   PetscCall(begin_grid(x, "bodies", time));
-  PetscCall(append(x, "%s", x->mesh));
+  PetscCall(append_text(x, strlen(x->mesh), x->mesh));
   for (PetscInt i = 0; i < n; i++) {
     const SbField *f = field[i];
     const char *type = f->ncomp == 1 ? "Scalar" : f->ncomp == 3 ? "Vector" : "Tensor6";

@@ -118,7 +118,7 @@ static PetscInt count(const char *text, const char *word)
 }
 
 #define ALL \
-  " -output_fields displacement,velocity,acceleration,stress,von_mises,J,energy_density,reaction,rank"
+  " -output_fields displacement,velocity,acceleration,stress,von_mises,J,energy_density,reaction,rank,sets"
 
 static PetscErrorCode test_values(const char *precision, PetscReal tolerance)
 {
@@ -169,6 +169,56 @@ static PetscErrorCode test_reaction(void)
   PetscCall(PetscFree2(x, r));
   PetscCall(SbH5Close(&h));
   PetscCall(test_scene_close(&scene));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Sets are 1 at their points, and in their tets when they hold some; with points of the cells, too. */
+static PetscErrorCode check_sets(const char *more)
+{
+  TestScene scene;
+  SbOutput out;
+  SbH5 h;
+  PetscReal *x, *left, *half, *tets, volume = 0.;
+  PetscBool ok[4], fine = PETSC_TRUE;
+  char options[2048], *xmf;
+
+  PetscFunctionBeginUser;
+  SbFormat(sizeof(options), options,
+           HELD EULER " -sets left,half -set_half_at halfspace:1,0,0,0.2 -output_fields sets %s", more);
+  PetscCall(test_scene_open_in(dir, options, &scene));
+  out = (SbOutput)scene.run->output;
+  PetscCall(fixture_step(&scene, 0, 0.1, PETSC_TRUE));
+  PetscCall(open_fields(&h));
+  PetscCall(PetscMalloc4(3 * out->point.n, &x, out->point.n, &left, out->point.n, &half, out->cell.n, &tets));
+  PetscCall(SbH5ReadSlice(&h, "/mesh/x", &out->point, 3, x, &ok[0]));
+  PetscCall(SbH5ReadSlice(&h, "/mesh/set_left", &out->point, 1, left, &ok[1]));
+  PetscCall(SbH5ReadSlice(&h, "/mesh/set_half", &out->point, 1, half, &ok[2]));
+  PetscCall(SbH5ReadSlice(&h, "/mesh/tets_half", &out->cell, 1, tets, &ok[3]));
+  SB_CHECK(ok[0] && ok[1] && ok[2] && ok[3], "an array of a set is missing");
+  SB_CHECK(H5Lexists(h.file, "/mesh/tets_left", H5P_DEFAULT) <= 0, "tets in a plane");
+  for (PetscInt i = 0; i < out->point.n; i++)
+    fine = (PetscBool)(fine && left[i] == (x[3 * i] < 1e-9) && half[i] == (x[3 * i] < 0.2 + 1e-9));
+  SB_CHECK(fine, "points of the sets%s", more);
+  for (PetscInt c = 0; c < out->cell.n; c++) volume += tets[c];
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &volume, 1, MPIU_REAL, MPI_SUM, PETSC_COMM_WORLD));
+  SB_CHECK(2 * volume == out->cell.N, "%g of %d tets in one half", (double)volume, (int)out->cell.N);
+  PetscCall(PetscFree4(x, left, half, tets));
+  PetscCall(SbH5Close(&h));
+  PetscCall(test_scene_close(&scene));
+  PetscCall(fixture_read(dir, "fields.xmf", &xmf));
+  SB_CHECK(count(xmf, "\"set_left\" AttributeType=\"Scalar\" Center=\"Node\"") == 1 &&
+             count(xmf, "\"tets_half\" AttributeType=\"Scalar\" Center=\"Cell\"") == 1 &&
+             !strstr(xmf, "/sets"),
+           "sets in fields.xmf");
+  PetscCall(PetscFree(xmf));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode test_sets(void)
+{
+  PetscFunctionBeginUser;
+  PetscCall(check_sets(""));
+  PetscCall(check_sets(" -output_discontinuous"));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -315,6 +365,7 @@ static PetscErrorCode test_restart(void)
   for (PetscInt k = 4; k <= 6; k++) PetscCall(fixture_step(&scene, k, 0.1, (PetscBool)(k == 6)));
   PetscCall(fixture_read(dir, "fields.xmf", &xmf));
   SB_CHECK(count(xmf, "<Time ") == 7, "at the end: %d frames", (int)count(xmf, "<Time "));
+  SB_CHECK(count(xmf, "\"set_left\"") == 7 && count(xmf, "\"rank\"") == 7, "arrays of the mesh in the index");
   SB_CHECK(strstr(xmf, "/step/0001/000006/"), "the frames after the restart begin a new hundred");
   PetscCall(PetscFree(xmf));
   PetscCall(open_fields(&h));
@@ -348,6 +399,7 @@ int main(int argc, char *argv[])
   PetscCall(test_values("double", 1e-13)); // rounding of a few operations
   PetscCall(test_values("float", 1.2e-7)); // half a unit in the last place of a float, twice
   PetscCall(test_reaction());
+  PetscCall(test_sets());
   PetscCall(test_two_bodies());
   PetscCall(test_which_frames());
   PetscCall(test_hundreds());
