@@ -87,6 +87,8 @@ typedef struct {
   /* adds the places where it pushes the bodies, those of this rank, residual as for history(); for output only. Not collective. */
   PetscErrorCode (*places)(SbEffect e, SbSpace space, const SbStage *stage, const PetscReal residual[],
                            SbPlaces *list);
+  /* for the summary when a run ends: a line on its work, "": nothing. Collective. */
+  PetscErrorCode (*tell)(SbEffect e, SbSpace space, size_t size, char text[]);
   PetscErrorCode (*destroy)(SbEffect e);
 } SbEffectOps;
 

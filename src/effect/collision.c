@@ -558,6 +558,36 @@ static PetscErrorCode near_collision(SbEffect e, SbSpace space, const SbStage *s
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* How surfaces were looked at; of the last look what the rank that had most to do says. */
+static PetscErrorCode tell_collision(SbEffect e, SbSpace space, size_t size, char text[])
+{
+  const Collision *c = (const Collision *)e->data;
+  PetscInt64 sum[2] = {c->candidates, 0};
+  SbDetectStats stats;
+  struct {
+    double candidates;
+    int rank;
+  } most = {0, 0};
+
+  PetscFunctionBeginUser;
+  PetscCall(SbDetectorGetStats(c->detector, &stats));
+  sum[1] = stats.memory;
+  most.candidates = (double)stats.candidates;
+  PetscCallMPI(MPI_Comm_rank(space->comm, &most.rank));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &most, 1, MPI_DOUBLE_INT, MPI_MAXLOC, space->comm));
+  PetscCallMPI(MPI_Bcast(stats.text, (PetscMPIInt)sizeof(stats.text), MPI_CHAR, most.rank, space->comm));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, sum, 2, MPIU_INT64, MPI_SUM, space->comm));
+  if (c->looks)
+    PetscCall(PetscSNPrintf(text, size,
+                            "%" PetscInt64_FMT
+                            " looks at surfaces, %.3g pairs of point and facet in each; %s; "
+                            "%.3g kB",
+                            c->looks, (double)sum[0] / (double)c->looks, stats.text, (double)sum[1] / 1e3));
+  else
+    PetscCall(PetscStrncpy(text, "no bodies came near each other", size));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 static PetscErrorCode destroy_collision(SbEffect e)
 {
   Collision *c = (Collision *)e->data;
@@ -608,6 +638,7 @@ static PetscErrorCode create_collision(SbEffect e)
   e->nstate = SB_COLLISION_STATE;
   e->ops.near = near_collision;
   e->ops.places = SbEffectPlaces_Collision;
+  e->ops.tell = tell_collision;
   e->ops.destroy = destroy_collision;
   e->column = columns;
   e->ncolumn = PETSC_STATIC_ARRAY_LENGTH(columns);

@@ -94,6 +94,7 @@ typedef struct {
   PetscBool first;    /* the step has not been solved yet */
   PetscReal arrival;  /* the part of it after which the first point arrives, 1: none */
   PetscReal work;     /* of the contact forces since the start, this rank, J */
+  PetscInt64 looks, candidates; /* of this rank: at surfaces, and at pairs of a point and a facet */
   SbPairs pairs;
 } Collision;
 

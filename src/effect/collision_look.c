@@ -229,6 +229,7 @@ PetscErrorCode SbCollisionLook(Collision *c, const PetscReal u[], PetscBool with
 {
   const SbDetectScene *s = &c->surface->scene;
   Found found = {0};
+  SbDetectStats stats;
 
   PetscFunctionBeginUser;
   c->surface->scene.deep = c->deep;
@@ -237,6 +238,9 @@ PetscErrorCode SbCollisionLook(Collision *c, const PetscReal u[], PetscBool with
   PetscCall(SbSurfaceUpdate(c->surface, c->u0, u, c->reach, c->self, &c->close));
   if (c->close || c->self) {
     PetscCall(SbDetectorFind(c->detector, s, &found.nnear, &found.near));
+    PetscCall(SbDetectorGetStats(c->detector, &stats));
+    c->looks++;
+    c->candidates += stats.candidates;
     PetscCall(SbDetectorFindEdges(c->detector, s, &found.npair, &found.pair));
   }
   PetscCall(merge(c, &found, within));

@@ -223,6 +223,22 @@ static PetscErrorCode add_file(const char *name, PetscInt64 bytes, void *ctx)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* What effects have to say of their work. Collective. */
+static PetscErrorCode print_work(SbModel m, PetscBool silent)
+{
+  char text[512] = "";
+
+  PetscFunctionBeginUser;
+  for (PetscInt e = 0; e < m->neffect; e++) {
+    const SbEffect effect = m->effect[e];
+
+    if (!effect->ops.tell) continue;
+    PetscCall(effect->ops.tell(effect, m->space, sizeof(text), text));
+    if (!silent && text[0]) PetscCall(entry("effect", "%s: %s", effect->name, text));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode SbReportSummary(SbRun run)
 {
   SbOutput out = (SbOutput)run->output;
@@ -242,8 +258,10 @@ PetscErrorCode SbReportSummary(SbRun run)
                         "they show is no deformation of a body. Smaller steps or loads may avoid it; laws "
                         "differ in how they come back, see docs/stability.md",
                         run->energies.ninverted, (double)run->energies.min_J));
-  if (out->quiet || out->rank) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(print_phases(run, &phases));
+  if (out->quiet) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!out->rank) PetscCall(print_phases(run, &phases));
+  PetscCall(print_work(run->model, (PetscBool)(out->rank > 0)));
+  if (out->rank) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(entry("steps",
                   "%" PetscInt_FMT " (%" PetscInt_FMT " attempts rejected), %" PetscInt_FMT
                   " Newton and %" PetscInt_FMT " linear iterations",

@@ -136,6 +136,16 @@ for n in 1 2; do
   check "1 cm deep on $n: exit code $?" "${mpi[@]}" $n "$supple" inside.opts -quiet -body_small_translate 0.39,-0.05,-0.05 -output_dir in
 done
 
+# what a run says of its search for contacts, the same with any number of ranks but for the memory
+for n in 1 2; do
+  "${mpi[@]}" $n "$supple" inside.opts -progress no -body_small_translate 0.39,-0.05,-0.05 -output_dir in >told.txt
+  check "the summary on $n has no search" grep -qE '^effect +meet: [1-9][0-9]* looks at surfaces, [1-9].* pairs of point and' told.txt
+  grep -A3 '^effect  ' told.txt | tr -s ' \n' ' ' >"told$n.txt"
+  check "the summary on $n has no table" grep -qE 'hash, cells of [0-9.]+ m, [1-9][0-9]* entries in [1-9][0-9]* slots' "told$n.txt"
+done
+"$supple" inside.opts -progress no -body_small_translate 5,0,0 -output_dir in >told.txt
+check "bodies that are apart were looked at" grep -q 'meet: no bodies came near each other' told.txt
+
 # answers
 check "-version" grep -q '^supple [0-9]' <<<"$("$supple" -version)"
 check "-help | head" test "$("$supple" -help 2>&1 | head -n 1 | cut -c 1-7)" = "supple "
