@@ -13,6 +13,8 @@ typedef struct {
   PetscReal drive_work;       /* work done by moving supports since the start, J */
   PetscReal damping_loss;     /* dissipated by Rayleigh damping since the start, J */
   PetscReal remesh_loss;      /* taken by re-meshing since the start, J */
+  PetscReal remesh_mass;      /* change by re-meshings since the start, each as its absolute value, kg */
+  PetscReal remesh_momentum;  /* likewise of the momentum, kg m/s */
   PetscReal integrator_loss;  /* what is missing: start + works - damping_loss - remesh_loss - now, J */
   PetscReal momentum[3];      /* kg m/s */
   PetscReal angular[3];       /* about the origin, kg m^2/s */

@@ -73,9 +73,10 @@ struct _p_SbRun {
   Vec U, V, A;     /* A: acceleration of the last step, state of the integrator */
   Vec R;           /* residual for contact; NULL without */
   PetscBool dt_given, velocity_predictor, fixed_step, damped;
-  PetscBool may_search;                  /* Newton may try a failed step again with a line search */
-  PetscBool may_cut;                     /* this attempt may end where points arrive */
-  PetscReal arrival;                     /* the part of the step at which it did, 1: it did not */
+  PetscBool may_search;               /* Newton may try a failed step again with a line search */
+  PetscBool refuse_inverted, refused; /* steps that turn tets inside out; the last attempt was such a one */
+  PetscBool may_cut;                  /* this attempt may end where points arrive */
+  PetscReal arrival;                  /* the part of the step at which it did, 1: it did not */
   PetscReal spectral_radius, newmark[2]; /* newmark: beta, gamma */
   PetscInt max_cuts, static_steps;
   PetscBool

@@ -181,6 +181,16 @@ static PetscErrorCode write_vectors(SbRun run, SbOutput out, SbH5 *h, uint64_t *
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Totals of re-meshing, which are there only behind one. */
+#define NREMESH 3
+static const char *const remesh_names[NREMESH] = {"remesh_loss", "remesh_mass", "remesh_momentum"};
+static PetscReal *remesh_total(SbRun run, int k)
+{
+  SbEnergies *e = &run->energies;
+
+  return k == 0 ? &e->remesh_loss : k == 1 ? &e->remesh_mass : &e->remesh_momentum;
+}
+
 static PetscErrorCode write_numbers(SbRun run, SbOutput out, const SbStep *step, SbH5 *h, uint64_t checksum)
 {
   Total total[NTOTAL];
@@ -191,8 +201,9 @@ static PetscErrorCode write_numbers(SbRun run, SbOutput out, const SbStep *step,
   totals_of(run, total);
   for (int i = 0; i < NTOTAL; i++) PetscCall(SbH5PutReal(h, h->file, total[i].name, *total[i].value));
   PetscCall(write_carried(run, h));
-  if (run->energies.remesh_loss != 0.)
-    PetscCall(SbH5PutReal(h, h->file, "remesh_loss", run->energies.remesh_loss));
+  for (int k = 0; k < NREMESH; k++)
+    if (*remesh_total(run, k) != 0.)
+      PetscCall(SbH5PutReal(h, h->file, remesh_names[k], *remesh_total(run, k)));
   if (run->paused) PetscCall(SbH5PutReal(h, h->file, "paused_after", run->after.dt));
   PetscCall(SbH5PutReal(h, h->file, "time", step->t));
   PetscCall(SbH5PutReal(h, h->file, "dt_next", dt));
@@ -442,8 +453,8 @@ static PetscErrorCode load(SbRun run, SbOutput out, const char *path, PetscBool 
   int64_t step, mesh_hash, checksum = 0, format;
   uint64_t sum = 0;
   SbRecords *records;
-  PetscReal t, values[NTOTAL], remesh_loss = 0., paused = 0.;
-  PetscBool remeshed = PETSC_TRUE, pauses = PETSC_TRUE;
+  PetscReal t, values[NTOTAL], remeshed[NREMESH] = {0.}, paused = 0.;
+  PetscBool there[NREMESH] = {PETSC_TRUE, PETSC_TRUE, PETSC_TRUE}, pauses = PETSC_TRUE;
 
   PetscFunctionBeginUser;
   PetscCall(SbH5Open(out->comm, path, PETSC_FALSE, &h, ok));
@@ -455,7 +466,7 @@ static PetscErrorCode load(SbRun run, SbOutput out, const char *path, PetscBool 
   PetscCall(SbH5GetReal(h.file, "time", &t, ok));
   totals_of(run, total);
   for (int i = 0; i < NTOTAL; i++) PetscCall(SbH5GetReal(h.file, total[i].name, &values[i], ok));
-  PetscCall(SbH5GetReal(h.file, "remesh_loss", &remesh_loss, &remeshed));
+  for (int k = 0; k < NREMESH; k++) PetscCall(SbH5GetReal(h.file, remesh_names[k], &remeshed[k], &there[k]));
   PetscCall(SbH5GetReal(h.file, "paused_after", &paused, &pauses));
   if (*ok && format != FORMAT) *ok = PETSC_FALSE;
   if (*ok) PetscCall(check_identity(run, out, &h, mesh_hash));
@@ -472,7 +483,7 @@ static PetscErrorCode load(SbRun run, SbOutput out, const char *path, PetscBool 
   PetscCall(PetscFree(records));
   if (!*ok) PetscFunctionReturn(PETSC_SUCCESS);
   for (int i = 0; i < NTOTAL; i++) *total[i].value = values[i];
-  run->energies.remesh_loss = remesh_loss;
+  for (int k = 0; k < NREMESH; k++) *remesh_total(run, k) = remeshed[k];
   run->after.dt = paused;
   run->step0 = (PetscInt)step;
   run->t0 = t;

@@ -1,9 +1,16 @@
 /*
   mesher.c - the mesher of re-meshing: the hull is filled by SbTetrahedralize(), which keeps its triangles.
+
+  Its tets hang on the last bits of the coordinates, and these on the number of ranks: solvers add in other orders. So it gets coordinates that are
+  rounded to a thousandth of an edge, in which such bits are gone, and the same body gets the same tets on any number of ranks. Where the rounded
+  surface cannot be filled, as where it nearly touches itself, it gets the exact ones. The vertices of the hull are where they were in either case.
 */
 #include "sbremesh.h"
 #include "sbskin.h"
 #include "sbtet.h"
+
+#define BITS 10   /* an edge has 2^10 to 2^11 steps */
+#define AHEAD 0.3 /* of a step: with one half, round numbers would lie where rounding is not sure */
 
 static PetscErrorCode make_skin(const SbHull *hull, SbSkin *skin)
 {
@@ -39,28 +46,46 @@ static PetscErrorCode take(SbImport *im, PetscInt *nvert, PetscReal **x, PetscIn
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbMesherDefault(const char *where, const SbHull *hull, PetscReal size, void *ctx,
-                               PetscInt *nvert, PetscReal **x, PetscInt *ncell, PetscInt **cell)
+/* One attempt. step: coordinates are rounded to multiples of it, m; 0: they stay as they are. */
+static PetscErrorCode fill(const char *where, const SbHull *hull, PetscReal size, PetscReal step,
+                           SbImport *im)
 {
   SbTetOptions options;
-  SbImport im;
   SbSkin skin;
   PetscErrorCode ierr;
   PetscInt none;
 
   PetscFunctionBeginUser;
-  (void)ctx;
-  PetscCall(PetscMemzero(&im, sizeof(im)));
-  (void)snprintf(im.where, sizeof(im.where), "%s", where);
-  PetscCall(SbImportTagSet(&im, 0, NULL, &none));
+  PetscCall(PetscMemzero(im, sizeof(*im)));
+  (void)snprintf(im->where, sizeof(im->where), "%s", where);
+  PetscCall(SbImportTagSet(im, 0, NULL, &none));
   PetscCall(SbTetDefaults(&options));
-  options.size = size;
+  options.size = step > 0 ? step * PetscMax(1, PetscFloorReal(size / step)) : size;
   options.surface = SB_TET_KEEP;
   PetscCall(make_skin(hull, &skin));
-  ierr = SbTetrahedralize(where, &skin, &options, &im);
+  for (PetscInt i = 0; i < 3 * hull->nvert && step > 0; i++)
+    skin.x[i] = step * PetscFloorReal(skin.x[i] / step + AHEAD);
+  ierr = SbTetrahedralize(where, &skin, &options, im);
   PetscCall(SbSkinDestroy(&skin));
-  if (!ierr) PetscCall(take(&im, nvert, x, ncell, cell));
-  PetscCall(SbImportDestroy(&im));
+  if (ierr) PetscCall(SbImportDestroy(im));
   PetscCall(ierr);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbMesherDefault(const char *where, const SbHull *hull, PetscReal size, void *ctx,
+                               PetscInt *nvert, PetscReal **x, PetscInt *ncell, PetscInt **cell)
+{
+  const PetscReal step = PetscPowReal(2, PetscFloorReal(PetscLog2Real(hull->edge)) - BITS);
+  SbImport im;
+  PetscErrorCode ierr;
+
+  PetscFunctionBeginUser;
+  (void)ctx;
+  PetscCall(PetscPushErrorHandler(PetscReturnErrorHandler, NULL));
+  ierr = fill(where, hull, size, step, &im);
+  PetscCall(PetscPopErrorHandler());
+  if (ierr) PetscCall(fill(where, hull, size, 0, &im));
+  PetscCall(take(&im, nvert, x, ncell, cell));
+  PetscCall(SbImportDestroy(&im));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

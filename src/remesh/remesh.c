@@ -266,11 +266,12 @@ PetscErrorCode SbRemeshAttach(SbRemesh r, SbRun run)
   PetscFunctionBeginUser;
   if (!r) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscFree(r->column));
-  PetscCall(PetscMalloc1(run->ncolumn + 1, &r->column));
+  PetscCall(PetscMalloc1(run->ncolumn + 3, &r->column));
   PetscCall(PetscArraycpy(r->column, run->column, run->ncolumn));
-  r->column[run->ncolumn] = (SbColumn){"remesh_loss", "J", &run->energies.remesh_loss};
+  r->column[run->ncolumn++] = (SbColumn){"remesh_loss", "J", &run->energies.remesh_loss};
+  r->column[run->ncolumn++] = (SbColumn){"remesh_mass", "kg", &run->energies.remesh_mass};
+  r->column[run->ncolumn++] = (SbColumn){"remesh_momentum", "kg m/s", &run->energies.remesh_momentum};
   run->column = r->column;
-  run->ncolumn++;
   run->want_energies = PETSC_TRUE;
   for (PetscInt b = 0; b < r->nbody; b++) {
     const SbGiven *given = run->model->body[b].given;
@@ -374,7 +375,12 @@ static PetscErrorCode hand_over(const Scene *old, const SbGathered *next, const 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Energies of both states: what is between them was lost. */
+static PetscReal distance(const PetscReal a[3], const PetscReal b[3])
+{
+  return PetscSqrtReal(PetscSqr(a[0] - b[0]) + PetscSqr(a[1] - b[1]) + PetscSqr(a[2] - b[2]));
+}
+
+/* Energies, mass and momentum of both states: what is between them was lost. */
 static PetscErrorCode close_account(const Scene *old, Scene *s, SbEnergies e[2])
 {
   PetscFunctionBeginUser;
@@ -382,6 +388,8 @@ static PetscErrorCode close_account(const Scene *old, Scene *s, SbEnergies e[2])
   PetscCall(SbModelEnergies(old->model, old->run->U, old->run->V, &e[0]));
   PetscCall(SbModelEnergies(s->model, s->run->U, s->run->V, &e[1]));
   s->run->energies.remesh_loss += e[0].kinetic + e[0].strain - e[1].kinetic - e[1].strain;
+  s->run->energies.remesh_mass += PetscAbsReal(s->model->mass - old->model->mass);
+  s->run->energies.remesh_momentum += distance(e[0].momentum, e[1].momentum);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -454,8 +462,7 @@ static PetscErrorCode report(SbRemesh r, const Scene *s, const SbMade made[], co
     told.quality[1] = made[b].quality;
     told.moved = made[b].nmoved;
     told.speed = speed;
-    for (int k = 0; k < 3; k++) told.shift += PetscSqr(e[1].centre[k] - e[0].centre[k]);
-    told.shift = PetscSqrtReal(told.shift);
+    told.shift = distance(e[0].centre, e[1].centre);
     PetscCall(SbReportRemeshed(s->run, &told));
   }
   PetscFunctionReturn(PETSC_SUCCESS);

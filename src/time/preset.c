@@ -36,6 +36,10 @@ static const SbOption rows[] = {
    "far better with it, but may blow up unless tangent is exact_spd"},
   {"time_max_cuts", SB_OPTION_INT, 1, "", "10", "[0, 60]",
    "how often a step that fails is halved before the run stops"},
+  {"time_inverted", SB_OPTION_CHOICE, 1, "", "count", "count|refuse",
+   "a step that turns tets inside out (det F <= 0): taken, and they are counted; or halved and tried again, "
+   "and the run stops when that does "
+   "not help"},
   {"multipliers", SB_OPTION_CHOICE, 1, "", "auto", "auto|direct|iterative",
    "how effects with response multiplier solve for displacements and multipliers: by a factorisation of "
    "both, or by "
@@ -70,7 +74,7 @@ PetscErrorCode SbRunCreate(SbModel model, SbRun *run)
 {
   SbRun r;
   SbScope scope;
-  PetscInt preset, predictor;
+  PetscInt preset, predictor, inverted;
 
   PetscFunctionBeginUser;
   PetscCall(PetscNew(&r));
@@ -98,6 +102,11 @@ PetscErrorCode SbRunCreate(SbModel model, SbRun *run)
     PetscCall(SbOptionReal(&scope, "time_newmark_gamma", &r->newmark[1]));
   }
   PetscCall(SbOptionInt(&scope, "time_max_cuts", &r->max_cuts));
+  PetscCall(SbOptionChoice(&scope, "time_inverted", &inverted));
+  r->refuse_inverted = (PetscBool)(inverted == 1);
+  PetscCheck(
+    !r->refuse_inverted || r->preset != SB_TIME_ALPHA2, PETSC_COMM_SELF, PETSC_ERR_USER,
+    "-time_inverted refuse: -time alpha2 cannot refuse steps; take genalpha, which is the same method");
   for (PetscInt e = 0; e < model->neffect; e++)
     r->saddle = (PetscBool)(r->saddle || model->effect[e]->saddle);
   if (r->saddle) PetscCall(SbOptionChoice(&scope, "multipliers", &r->saddle_choice));

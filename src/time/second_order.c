@@ -351,6 +351,7 @@ static PetscErrorCode TSStep_SecondOrder(TS ts)
     else
       PetscCall(solve_implicit(ts, (PetscBool)(cuts >= so->set.max_cuts), &ok));
     if (ok && so->run->look.fn) PetscCall(look_at(ts, &ok));
+    PetscCall(SbRunRefuse(so->run, ts->ptime, ts->time_step, (Vec[2]){so->X0, so->X1}, &ok));
     if (ok) {
       PetscCall(VecCopy(so->X1, ts->vec_sol));
       PetscCall(VecCopy(so->V1, ts->vec_dot));
@@ -366,6 +367,9 @@ static PetscErrorCode TSStep_SecondOrder(TS ts)
         go_on_after_arrival(so);
         break;
       }
+    } else if (so->run->refused) {
+      so->whole = so->rest = 0.;
+      next = 0.5 * ts->time_step;
     } else if (so->run->arrival < 1.) {
       cut_at_arrival(ts, &next);
       cuts--;
@@ -386,7 +390,7 @@ static PetscErrorCode TSStep_SecondOrder(TS ts)
     ts->reject++;
     so->run->rejected_total++;
     so->good = 0;
-    if (is_explicit(so) || ++cuts > so->set.max_cuts) {
+    if (is_explicit(so) || ++cuts > so->set.max_cuts || SbRunTooShort(so->run, next)) {
       ts->reason = TS_DIVERGED_STEP_REJECTED;
       break;
     }

@@ -142,6 +142,7 @@ static PetscErrorCode solve_at(SbRun run, PetscReal factor, PetscReal length, Pe
   *ok = (PetscBool)(reason > 0 && !far);
   if (!*ok) PetscCall(explain(run, factor, reason));
   PetscCall(refuse_free_body(run, factor, ok));
+  PetscCall(SbRunRefuse(run, factor - length, length, (Vec[2]){run->U, X}, ok));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -164,15 +165,15 @@ PetscErrorCode SbStaticSolve(SbRun run)
     PetscCall(SbRunStepBegin(run, factor, next - factor));
     PetscCall(solve_at(run, next, next - factor, (PetscBool)(cuts >= run->max_cuts), X, &ok));
     if (!ok) {
-      PetscBool simpler;
+      PetscBool simpler = PETSC_FALSE;
 
       run->rejected_step++;
       run->rejected_total++;
-      PetscCall(SbSolverFallBack(run->snes, &simpler));
+      if (!run->refused) PetscCall(SbSolverFallBack(run->snes, &simpler));
       if (simpler) continue;
       length *= 0.5;
       run->tangent_known = PETSC_FALSE;
-      if (run->free_body || ++cuts > run->max_cuts) break;
+      if (run->free_body || ++cuts > run->max_cuts || SbRunTooShort(run, length)) break;
       continue;
     }
     run->stop_reason[0] = 0;

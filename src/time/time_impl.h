@@ -48,6 +48,15 @@ static inline PetscBool SbRunWorthSearch(SbRun run, SNESConvergedReason reason)
 }
 PetscErrorCode SbRunFail(SbRun run, const char *format, ...) __attribute__((format(printf, 2, 3)));
 
+/*
+  inverted.c, after a step from t to t + dt was solved. Collective; nothing happens without -time_inverted refuse.
+
+  U: displacements at its start and at its end. ok: false when the step turned tets inside out; run->refused and run->stop_reason say so, too.
+*/
+PetscErrorCode SbRunRefuse(SbRun run, PetscReal t, PetscReal dt, const Vec U[2], PetscBool *ok);
+/* Whether the last step was refused, and one of this length is not worth trying. */
+PetscBool SbRunTooShort(SbRun run, PetscReal dt);
+
 /* form.c: the model as PETSc sees it. */
 PetscErrorCode SbFormI2Function(TS ts, PetscReal t, Vec U, Vec V, Vec A, Vec F, void *run);
 PetscErrorCode SbFormI2Jacobian(TS ts, PetscReal t, Vec U, Vec V, Vec A, PetscReal shift_v, PetscReal shift_a,

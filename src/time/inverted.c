@@ -1,0 +1,51 @@
+/*
+  Whether a step turned tets inside out, for runs that refuse that (-time_inverted refuse).
+
+  det F <= 0 in a tet is no deformation of a body. Energies that are finite there carry a run on, and what it shows behind that may be
+  anything. A step after which more tets have it than before is refused, so a start from tets that are inside out may recover. It is repeated with half its
+  length; from 2^-time_max_cuts of the nominal length on the run stops: halving again would only creep up to where the tet is flat.
+*/
+#include "time_impl.h"
+
+/* Tets with det F <= 0 of all ranks, and the smallest det F. */
+static PetscErrorCode count_inverted(SbRun run, Vec U, PetscInt *n, PetscReal *least)
+{
+  const SbSpace s = run->model->space;
+  PetscReal energy, volume;
+  const PetscReal *u;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbSpaceGetLocalRead(s, U, &u));
+  PetscCall(SbSpaceStrainEnergy(s, u, &energy, least, n, &volume));
+  PetscCall(SbSpaceRestoreLocalRead(s, U, &u));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, n, 1, MPIU_INT, MPI_SUM, run->model->comm));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, least, 1, MPIU_REAL, MPI_MIN, run->model->comm));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbRunRefuse(SbRun run, PetscReal t, PetscReal dt, const Vec U[2], PetscBool *ok)
+{
+  PetscInt n[2];
+  PetscReal least[2];
+
+  PetscFunctionBeginUser;
+  run->refused = PETSC_FALSE;
+  if (!run->refuse_inverted || !*ok) PetscFunctionReturn(PETSC_SUCCESS);
+  for (int k = 0; k < 2; k++) PetscCall(count_inverted(run, U[k], &n[k], &least[k]));
+  if (n[1] <= n[0]) PetscFunctionReturn(PETSC_SUCCESS);
+  *ok = PETSC_FALSE;
+  run->refused = PETSC_TRUE;
+  PetscCall(SbRunFail(
+    run,
+    "%s %g to %g would turn %" PetscInt_FMT
+    " more tet%s inside out (smallest det F %.3g, before it %.3g), which "
+    "-time_inverted refuses; re-mesh the body before that (-remesh_quality), or give it a finer mesh",
+    run->ts ? "the step from t, s =" : "the step from the load factor", (double)t, (double)(t + dt),
+    n[1] - n[0], n[1] - n[0] == 1 ? "" : "s", (double)least[1], (double)least[0]));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscBool SbRunTooShort(SbRun run, PetscReal dt)
+{
+  return (PetscBool)(run->refused && dt < 0.999 * PetscPowReal(0.5, (PetscReal)run->max_cuts) * run->dt);
+}

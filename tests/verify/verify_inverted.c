@@ -1,0 +1,100 @@
+// @ranks 1 2
+/*
+  Runs that refuse steps which turn tets inside out (-time_inverted refuse).
+
+    stops     a box that is pressed flat, which it would be at 2/3 of the way: every integrator stops before that with the reason, no farther from it than
+              the shortest step, and with every tet the right side out; one that counts gets to the end with all of them inside out
+    mirrored  a body that is inside out where it begins goes on: no more tets are so than before
+    alpha2    cannot refuse, and says so
+*/
+#include "scene.h"
+
+#define BOX                                                                                                 \
+  "-bodies a -body_a_mesh box:0.1,0.1,0.1:2 -body_a_material neohookean -body_a_young 1e4 -body_a_poisson " \
+  "0.3 -body_a_density 1000 "
+#define PRESS BOX "-effects press -effect_press_type drive -effect_press_on boundary "
+
+static PetscErrorCode check_stops(const char *time, PetscReal shortest)
+{
+  SbEnergies e;
+  TestScene s;
+  char text[1024];
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscSNPrintf(text, sizeof(text),
+                          PRESS "-effect_press_displacement 0;0;-1.5*t*z -time_max_cuts 4 %s -time_inverted ",
+                          time));
+  for (int refuse = 0; refuse < 2; refuse++) {
+    char whole[1100];
+
+    PetscCall(PetscSNPrintf(whole, sizeof(whole), "%s%s", text, refuse ? "refuse" : "count"));
+    PetscCall(test_scene_open(whole, &s));
+    s.run->want_energies = PETSC_TRUE;
+    PetscCall(test_scene_solve(&s));
+    e = s.run->energies;
+    if (refuse) {
+      SB_CHECK(strstr(s.run->stop_reason, "inside out") && !e.ninverted && e.min_J > 0.,
+               "%s: %d inverted, '%s'", time, (int)e.ninverted, s.run->stop_reason);
+      SB_CHECK(s.run->t_now < 2. / 3 && s.run->t_now > 2. / 3 - 1.01 * shortest, "%s: stops at %.6g", time,
+               (double)s.run->t_now);
+    } else {
+      SB_CHECK(!s.run->stop_reason[0] && e.ninverted && PetscAbsReal(s.run->t_now - 1.) < 1e-6,
+               "%s: t %.6g, '%s'", time, (double)s.run->t_now, s.run->stop_reason);
+    }
+    PetscCall(test_scene_close(&s));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static void mirror(const PetscReal x[3], PetscReal u[3])
+{
+  u[0] = -2. * x[0];
+  u[1] = 0.;
+  u[2] = 0.;
+}
+
+/* Held as its mirror image, where it begins. */
+static PetscErrorCode check_mirrored(void)
+{
+  SbEnergies e;
+  TestScene s;
+
+  PetscFunctionBeginUser;
+  PetscCall(test_scene_open(
+    PRESS "-effect_press_displacement 0*t-2*x;0;0 -time static -static_steps 2 -time_inverted refuse", &s));
+  s.run->want_energies = PETSC_TRUE;
+  PetscCall(test_fill(s.model, mirror, s.run->U));
+  PetscCall(SbModelEnergies(s.model, s.run->U, s.run->V, &e));
+  SB_CHECK(e.ninverted == s.model->mesh->Ncell, "%d tets are inside out at first", (int)e.ninverted);
+  PetscCall(test_scene_solve(&s));
+  SB_CHECK(!s.run->stop_reason[0] && s.run->t_now == 1., "stops at %g s: %s", (double)s.run->t_now,
+           s.run->stop_reason);
+  PetscCall(test_scene_close(&s));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode check_alpha2(void)
+{
+  PetscErrorCode ierr;
+  TestScene s;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscPushErrorHandler(PetscReturnErrorHandler, NULL));
+  ierr = test_scene_open(BOX "-time alpha2 -time_inverted refuse", &s);
+  PetscCall(PetscPopErrorHandler());
+  SB_CHECK(ierr == PETSC_ERR_USER, "alpha2 cannot refuse steps: error %d", (int)ierr);
+  PetscCall(test_scene_close(&s));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+int main(int argc, char **argv)
+{
+  SB_TEST_BEGIN(argc, argv);
+  PetscCall(check_stops("-time static -static_steps 10", 0.1 / 16));
+  PetscCall(check_stops("-time euler_implicit -ts_dt 0.1 -ts_max_time 1", 0.1 / 16));
+  PetscCall(check_stops("-time genalpha -ts_dt 0.1 -ts_max_time 1", 0.1 / 16));
+  PetscCall(check_stops("-time euler_symplectic -ts_dt 0.001 -ts_max_time 1", 0.02));
+  PetscCall(check_mirrored());
+  PetscCall(check_alpha2());
+  SB_TEST_END();
+}
