@@ -23,12 +23,31 @@ static PetscErrorCode open_msh(const SbGmsh *g, void *ctx, SbImport *im)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* gmsh knows the format by the very first letters; with a blank line or the mark of UTF-8 in front it would run the file. */
+static PetscErrorCode check_begin(const char *path, const char *where)
+{
+  static const char begin[] = "$MeshFormat";
+  char text[sizeof(begin)] = "";
+  FILE *file = fopen(path, "rb");
+
+  PetscFunctionBeginUser;
+  if (file) {
+    (void)fread(text, 1, sizeof(begin) - 1, file);
+    (void)fclose(file);
+  }
+  PetscCheck(!strcmp(text, begin), PETSC_COMM_SELF, PETSC_ERR_FILE_UNEXPECTED,
+             "%s line 1: a file of version 4.0 must begin with %s; remove what stands before it", where,
+             begin);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 static PetscErrorCode read_by_library(const char *path, SbImport *im)
 {
   char copy[PETSC_MAX_PATH_LEN];
   const SbGmshJob job = {im->where, "read the file", read_seconds, open_msh, copy};
 
   PetscFunctionBeginUser;
+  PetscCall(check_begin(path, im->where));
   PetscCall(PetscStrncpy(copy, path, sizeof(copy)));
   PetscCall(SbGmshRun(&job, im));
   PetscFunctionReturn(PETSC_SUCCESS);

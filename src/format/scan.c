@@ -11,6 +11,14 @@
 #include <sys/stat.h>
 #include "format_impl.h"
 
+/* Takes out the three bytes that some editors put in front of text to say that it is UTF-8; returns how many they were. */
+static size_t drop_mark(char data[], size_t n)
+{
+  if (n < 3 || memcmp(data, "\xef\xbb\xbf", 3) != 0) return 0;
+  memmove(data, data + 3, n - 3 + 1); /* with the zero at the end */
+  return 3;
+}
+
 PetscErrorCode SbScanOpen(const char *where, const char *path, SbScan *s)
 {
   FILE *file;
@@ -34,7 +42,7 @@ PetscErrorCode SbScanOpen(const char *where, const char *path, SbScan *s)
   (void)fclose(file);
   s->data[got] = 0;
   s->at = s->token = s->data;
-  s->end = s->data + got;
+  s->end = s->data + got - drop_mark(s->data, got);
   PetscCheck(got == size, PETSC_COMM_SELF, PETSC_ERR_FILE_READ, "%s: only %zu of %zu bytes could be read",
              where, got, size);
   PetscCheck(size, PETSC_COMM_SELF, PETSC_ERR_FILE_UNEXPECTED, "%s: is empty (0 bytes); write the mesh again",

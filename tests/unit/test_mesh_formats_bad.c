@@ -285,6 +285,7 @@ static PetscErrorCode test_unv(void)
 #define UTET "    -1\n  2412\n 1 111 2 1 7 4\n 1 2 3 4\n    -1\n"
   static const Case cases[] = {
     {UNODE UTET, NULL},
+    {"\xef\xbb\xbf" UNODE UTET, NULL},
     {UNODE UTET "    -1\n  2467\n 1 0 0 0 0 0 0 2\nname\n 8 1 0 0 7 3 0 0\n    -1\n", NULL},
     {"solid\n", "u.unv line 1: expected a line of -1; this is no universal file, or it is damaged"},
     {UTET, "elements before the nodes"},
@@ -307,12 +308,29 @@ static PetscErrorCode test_unv(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Nothing gets to the gmsh library that it would take for a script. */
+static PetscErrorCode test_library(void)
+{
+  static const Case cases[] = {
+    {"\n$MeshFormat\n4.0 0 8\n$EndMeshFormat\n",
+     "g.msh line 1: a file of version 4.0 must begin with $MeshFormat; remove what stands before it"},
+    {"\xef\xbb\xbf$MeshFormat\n4.0 0 8\n$EndMeshFormat\n",
+     "g.msh line 1: a file of version 4.0 must begin with $MeshFormat"},
+    {"$MeshFormat\n4.0 0 8\n$EndMeshFormat\n", "g.msh: gmsh finds no mesh in it"},
+    {NULL, NULL}};
+
+  PetscFunctionBeginUser;
+  PetscCall(test_cases("g.msh", cases));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 static PetscErrorCode test_nastran(void)
 {
 #define GRIDS "GRID,1,,0.,0.,0.\nGRID,2,,1.,0.,0.\nGRID,3,,0.,1.,0.\nGRID,4,,0.,0.,1.\n"
   static const Case cases[] = {
     {GRIDS "CTETRA,1,5,1,2,3,4\nENDDATA\n", NULL},
-    {GRIDS "CTETRA,1,,1,2,3,4\nSPC1,1,123,7\n", NULL}, /* no property; a point of another kind */
+    {"\xef\xbb\xbf" GRIDS "CTETRA,1,5,1,2,3,4\nENDDATA\n", NULL}, /* the mark of UTF-8 */
+    {GRIDS "CTETRA,1,,1,2,3,4\nSPC1,1,123,7\n", NULL},            /* no property; a point of another kind */
     {"solid\n", "n.bdf line 2: there is no GRID up to here; this is no bulk data of Nastran"},
     {GRIDS "CTETRA,1,5,1,2,3,9\n", "n.bdf line 5: element 1 uses node 9, which is not there"},
     {GRIDS "CTETRA,1,5,1,2,3\n", "line 5: the node of an element is missing"},
@@ -353,6 +371,7 @@ int main(int argc, char **argv)
   PetscCall(test_vtu());
   PetscCall(test_abaqus());
   PetscCall(test_unv());
+  PetscCall(test_library());
   PetscCall(test_nastran());
   (void)snprintf(command, sizeof(command), "rm -rf %s", folder);
   SB_CHECK(!system(command), "%s stays", folder);
