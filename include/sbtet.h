@@ -57,4 +57,6 @@ PetscErrorCode SbLocatorCreate(PetscInt ncell, const PetscInt cell[], const Pets
 PetscErrorCode SbLocatorDestroy(SbLocator *locator);
 PetscReal SbLocatorFind(SbLocator locator, const PetscReal point[3], PetscInt *cell, PetscReal weight[4]);
 /* The weights of the corners of a tet at a point, in it or not. */
+/* Of a tet with the corners v of x[][3] alone: sum w_a x_a = point; negative where it lies outside. */
+void SbTetWeights(const PetscReal x[], const PetscInt v[4], const PetscReal point[3], PetscReal weight[4]);
 void SbLocatorWeights(SbLocator locator, PetscInt cell, const PetscReal point[3], PetscReal weight[4]);

@@ -345,6 +345,7 @@ PetscErrorCode SbLedgerContinue(SbLedger from, SbLedger to)
   to->longest = from->longest;
   to->total = from->total;
   to->anew = PETSC_TRUE;
+  PetscCall(SbQuantityContinue(from, to));
   if (to->may_tune && to->run->snes && to->run->J) PetscCall(SbDialSet(to, from->rtol));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -17,6 +17,7 @@ typedef struct {
   PetscReal at[3], direction[3];
   char on[SB_NAME_MAX];
   PetscInt node;                /* displacement: the nearest owned node, -1: on another rank */
+  PetscReal x[3];               /* its rest place, on all ranks, m */
   uint64_t set;                 /* reaction: bit of the set */
   Vec weight;                   /* reaction: the direction on its prescribed unknowns */
   PetscReal value, least, most; /* now, and over the run */
@@ -102,6 +103,8 @@ PetscErrorCode SbDialAccept(SbLedger l, const SbStep *step);
 /* quantity.c */
 PetscErrorCode SbQuantitySetFromOptions(SbLedger l, const SbScope *scope);
 PetscErrorCode SbQuantityAttach(SbLedger l);
+/* The run goes on with other meshes: says so when the node of the number is another one. Collective. */
+PetscErrorCode SbQuantityContinue(SbLedger from, SbLedger to);
 PetscErrorCode SbQuantityValue(SbLedger l, const SbStep *step);
 PetscErrorCode SbQuantityErrors(SbLedger l, const SbStep *step);
 PetscErrorCode SbQuantityDestroy(SbLedger l);

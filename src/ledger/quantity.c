@@ -60,6 +60,8 @@ static PetscErrorCode nearest_node(SbLedger l)
   }
   PetscCallMPI(MPI_Allreduce(&first, &winner, 1, MPIU_INT, MPI_MIN, s->comm));
   if (first != winner) q->node = -1;
+  for (int k = 0; k < 3; k++) q->x[k] = q->node < 0 ? 0. : s->node_x[3 * q->node + k];
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, q->x, 3, MPIU_REAL, MPI_SUM, s->comm));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -97,6 +99,21 @@ PetscErrorCode SbQuantityAttach(SbLedger l)
              "reaction; name a set of a "
              "support or drive",
              q->on);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbQuantityContinue(SbLedger from, SbLedger to)
+{
+  const PetscReal *a = from->quantity.x, *b = to->quantity.x;
+  const PetscReal d = PetscSqrtReal(PetscSqr(a[0] - b[0]) + PetscSqr(a[1] - b[1]) + PetscSqr(a[2] - b[2]));
+
+  PetscFunctionBeginUser;
+  if (to->quantity.kind == SB_QUANTITY_DISPLACEMENT && d > 0.)
+    PetscCall(SbWarning(to->run->model->comm,
+                        "-ledger_at: the node at (%g, %g, %g) m is gone with a mesh; from now on the nearest "
+                        "one, %.3g m from it, stands for it. Vertices of "
+                        "the surface stay: choose one of them",
+                        (double)a[0], (double)a[1], (double)a[2], (double)d));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -129,16 +129,15 @@ PetscErrorCode SbLocatorDestroy(SbLocator *locator)
 }
 
 /* Volumes of the tets that the point makes with the faces, over that of the tet. */
-void SbLocatorWeights(SbLocator l, PetscInt c, const PetscReal p[3], PetscReal w[4])
+void SbTetWeights(const PetscReal x[], const PetscInt v[4], const PetscReal p[3], PetscReal w[4])
 {
-  const PetscInt *v = l->cell + 4 * c;
   PetscReal a[3], b[3], d[3], r[3], det;
 
   for (int k = 0; k < 3; k++) {
-    a[k] = l->x[3 * v[1] + k] - l->x[3 * v[0] + k];
-    b[k] = l->x[3 * v[2] + k] - l->x[3 * v[0] + k];
-    d[k] = l->x[3 * v[3] + k] - l->x[3 * v[0] + k];
-    r[k] = p[k] - l->x[3 * v[0] + k];
+    a[k] = x[3 * v[1] + k] - x[3 * v[0] + k];
+    b[k] = x[3 * v[2] + k] - x[3 * v[0] + k];
+    d[k] = x[3 * v[3] + k] - x[3 * v[0] + k];
+    r[k] = p[k] - x[3 * v[0] + k];
   }
   det = a[0] * (b[1] * d[2] - b[2] * d[1]) + a[1] * (b[2] * d[0] - b[0] * d[2]) +
         a[2] * (b[0] * d[1] - b[1] * d[0]);
@@ -152,6 +151,11 @@ void SbLocatorWeights(SbLocator l, PetscInt c, const PetscReal p[3], PetscReal w
           a[2] * (b[0] * r[1] - b[1] * r[0])) /
          det;
   w[0] = 1 - w[1] - w[2] - w[3];
+}
+
+void SbLocatorWeights(SbLocator l, PetscInt c, const PetscReal p[3], PetscReal w[4])
+{
+  SbTetWeights(l->x, l->cell + 4 * c, p, w);
 }
 
 /* Moves weights into the tet; returns the distance, and how deep the point lies when it is 0. */

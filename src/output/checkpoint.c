@@ -201,6 +201,7 @@ static PetscErrorCode write_numbers(SbRun run, SbOutput out, const SbStep *step,
   totals_of(run, total);
   for (int i = 0; i < NTOTAL; i++) PetscCall(SbH5PutReal(h, h->file, total[i].name, *total[i].value));
   PetscCall(write_carried(run, h));
+  PetscCall(SbProbesWrite(run, out, h));
   for (int k = 0; k < NREMESH; k++)
     if (*remesh_total(run, k) != 0.)
       PetscCall(SbH5PutReal(h, h->file, remesh_names[k], *remesh_total(run, k)));
@@ -477,6 +478,7 @@ static PetscErrorCode load(SbRun run, SbOutput out, const char *path, PetscBool 
   if (sum != (uint64_t)checksum) *ok = PETSC_FALSE;
   if (*ok) PetscCall(set_step(run, h.file, ok));
   if (*ok) PetscCall(read_carried(run, out, &h));
+  if (*ok) PetscCall(SbProbesRead(run, out, &h));
   PetscCall(SbH5Close(&h));
   if (*ok) PetscCall(SbCheckpointLoadEffects(run, t, records));
   PetscCall(SbCheckpointFreeEffects(run, records));

@@ -36,27 +36,9 @@ PetscInt SbOutputMeshStep(SbRun run)
   return step;
 }
 
-/* A probe inside a body has lost its vertex: it goes to the nearest one, and says so. */
-static PetscErrorCode follow_probes(SbOutput out, const SbProbe before[])
-{
-  PetscFunctionBeginUser;
-  for (PetscInt p = 0; p < out->nprobe; p++) {
-    const PetscReal *a = before[p].x, *b = out->probe[p].x;
-    const PetscReal d = PetscSqrtReal(PetscSqr(a[0] - b[0]) + PetscSqr(a[1] - b[1]) + PetscSqr(a[2] - b[2]));
-
-    if (d > 0.)
-      PetscCall(SbWarning(out->comm,
-                          "probe '%s' has moved by %.3g m at rest: its vertex inside a body that was "
-                          "re-meshed is gone, and it follows the nearest one",
-                          out->probe[p].name, (double)d));
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode SbOutputFollow(SbRun from, SbRun to)
 {
   SbOutput out = (SbOutput)from->output;
-  SbProbe *before;
 
   PetscFunctionBeginUser;
   PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_OUTPUT], 0, 0, 0, 0));
@@ -67,12 +49,8 @@ PetscErrorCode SbOutputFollow(SbRun from, SbRun to)
   PetscCall(SbOutputForgetMesh(out));
   PetscCall(SbOutputCountNodes(to->model->space, out));
   PetscCall(SbOutputOrder(to, out));
-  PetscCall(PetscMalloc1(out->nprobe, &before));
-  PetscCall(PetscArraycpy(before, out->probe, out->nprobe));
   PetscCall(SbFramesFollow(to, out));
   PetscCall(SbHistoryFollow(to, out));
-  if (out->hist) PetscCall(follow_probes(out, before));
-  PetscCall(PetscFree(before));
   PetscCall(SbCheckpointAttach(to, out));
   PetscCall(SbProgressFollow(to, out));
   PetscCall(PetscLogEventEnd(SbEvents[SB_EVENT_OUTPUT], 0, 0, 0, 0));

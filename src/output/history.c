@@ -125,22 +125,13 @@ static PetscErrorCode effect_columns(SbRun run, const SbStep *step, PetscReal *v
 
 static PetscErrorCode probe_columns(SbRun run, SbOutput out, const SbStep *step, PetscReal *values)
 {
-  const PetscBool faces = run->model->space->faces; // then ghosts are needed
   const PetscReal *u;
 
   PetscFunctionBeginUser;
   PetscCall(PetscLogEventBegin(out->event.probes, 0, 0, 0, 0));
-  if (faces)
-    PetscCall(SbSpaceGetLocalRead(run->model->space, step->U, &u));
-  else
-    PetscCall(VecGetArrayRead(step->U, &u));
-  for (PetscInt p = 0; p < out->nprobe; p++) {
-    if (out->probe[p].local >= 0) SbPointsVertex(run, out, out->probe[p].local, u, values + 3 * p);
-  }
-  if (faces)
-    PetscCall(SbSpaceRestoreLocalRead(run->model->space, step->U, &u));
-  else
-    PetscCall(VecRestoreArrayRead(step->U, &u));
+  PetscCall(SbSpaceGetLocalRead(run->model->space, step->U, &u));
+  for (PetscInt p = 0; p < out->nprobe; p++) SbProbeValue(run, out, &out->probe[p], u, values + 3 * p);
+  PetscCall(SbSpaceRestoreLocalRead(run->model->space, step->U, &u));
   PetscCall(PetscLogEventEnd(out->event.probes, 0, 0, 0, 0));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

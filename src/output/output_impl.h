@@ -101,10 +101,14 @@ PetscErrorCode SbFileRead(const char *path, char **text, size_t *size);
 
 typedef struct {
   char name[SB_NAME_MAX];
-  PetscReal at[3];   /* asked for, m */
-  PetscReal x[3];    /* nearest vertex, m */
-  PetscInt original; /* its number */
-  PetscInt local;    /* owned local vertex, or -1 on the other ranks */
+  PetscReal at[3]; /* asked for, m */
+  PetscReal x[3];  /* the material point that it follows: the nearest vertex of the first mesh, at rest, m */
+  PetscBool found; /* x and body are known */
+  PetscInt body;   /* that x belongs to */
+  PetscInt original;   /* number of that vertex, -1: it is gone */
+  PetscInt local;      /* owned local vertex at x, or -1: on the other ranks, and where there is none */
+  PetscInt cell;       /* without a vertex at x: the owned cell that holds it, or -1 on the other ranks */
+  PetscReal weight[4]; /* of its corners */
 } SbProbe;
 
 typedef struct _p_SbFrames *SbFrames;     /* frames.c */
@@ -193,6 +197,8 @@ PetscErrorCode SbPointsValues(SbRun run, SbOutput out, Vec x, PetscReal values[]
 /* The same for forces at nodes, or at their prescribed unknowns only: resultant and moment of the nodal forces are kept. Collective. */
 PetscErrorCode SbPointsForces(SbRun run, SbOutput out, PetscBool prescribed, Vec R, PetscReal values[]);
 /* The value at an owned vertex of a local array x[nnode][3] with ghosts, as vertex fields have it. */
+/* At a corner 4 cell + a of a cell, as the cell has it. */
+void SbPointsCorner(SbRun run, PetscInt corner, const PetscReal x[], PetscReal value[3]);
 void SbPointsVertex(SbRun run, SbOutput out, PetscInt vertex, const PetscReal x[], PetscReal value[3]);
 
 /* Before the folder is touched: refuses to go on with frames that have other points. Collective. */
@@ -221,6 +227,11 @@ PetscErrorCode SbHistoryAttach(SbRun run, SbOutput out);
 PetscErrorCode SbHistoryFollow(SbRun run, SbOutput out);
 PetscErrorCode SbHistoryDestroy(SbOutput out);
 PetscErrorCode SbProbesFind(SbRun run, SbOutput out);
+/* In a checkpoint of a run that was re-meshed: the places that they follow. Collective. */
+PetscErrorCode SbProbesWrite(SbRun run, SbOutput out, SbH5 *h);
+PetscErrorCode SbProbesRead(SbRun run, SbOutput out, SbH5 *h);
+/* Value of a vector, local with ghosts, at a probe of this rank; zero on others. */
+void SbProbeValue(SbRun run, SbOutput out, const SbProbe *probe, const PetscReal u[], PetscReal value[3]);
 /* checkpoint_effects.c: records of an effect's state, of all ranks, as a file has them. */
 typedef struct {
   PetscInt n;

@@ -141,12 +141,14 @@ static PetscErrorCode print_output(SbOutput out)
   PetscCall(entry("output", "%s%s%s", out->dir, text[0] ? ": " : "", text));
   for (PetscInt p = 0; p < out->nprobe && out->history; p++) {
     const SbProbe *probe = &out->probe[p];
+    char where[64] = "a tet";
 
-    PetscCall(entry(
-      "probe", "%s at vertex %" PetscInt_FMT " (%g, %g, %g) m, %.3g m from the place asked for", probe->name,
-      probe->original, (double)probe->x[0], (double)probe->x[1], (double)probe->x[2],
-      (double)PetscSqrtReal(PetscSqr(probe->x[0] - probe->at[0]) + PetscSqr(probe->x[1] - probe->at[1]) +
-                            PetscSqr(probe->x[2] - probe->at[2]))));
+    if (probe->original >= 0) (void)snprintf(where, sizeof(where), "vertex %lld", (long long)probe->original);
+    PetscCall(entry("probe", "%s at %s (%g, %g, %g) m, %.3g m from the place asked for", probe->name, where,
+                    (double)probe->x[0], (double)probe->x[1], (double)probe->x[2],
+                    (double)PetscSqrtReal(PetscSqr(probe->x[0] - probe->at[0]) +
+                                          PetscSqr(probe->x[1] - probe->at[1]) +
+                                          PetscSqr(probe->x[2] - probe->at[2]))));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
