@@ -246,6 +246,7 @@ static PetscErrorCode setup_collision(SbEffect e, SbSpace space)
   PetscCall(find_edges(c, space, n, facet, &nskin));
   PetscCall(SbInsideCreate(c->surface, SB_DETECT_HASH, &c->inside));
   PetscCall(PetscCalloc1(c->surface->scene.npoint, &c->alone));
+  c->watched = -PETSC_MAX_REAL;
   PetscCall(PetscFree(facet));
   PetscCheck(nskin > 1 || c->self, space->comm, PETSC_ERR_USER_INPUT,
              "The effect %s has only one body to look at: give -effect_%s_self yes for a body that may meet "
@@ -292,13 +293,12 @@ static PetscErrorCode touch_collision(SbEffect e, SbSpace space, PetscReal t, Pe
   Collision *c = (Collision *)e->data;
 
   PetscFunctionBeginUser;
-  (void)t;
   PetscCall(PetscArraycpy(c->u0, u0, 3 * space->nnode));
   c->friction.updates = 0;
   SbOverlapBegin(&c->overlap, dt);
   c->damp = dt > 0 ? c->damping / dt : 0;
   if (c->begun)
-    PetscCall(SbCollisionWatchInside(e, u0));
+    PetscCall(SbCollisionWatchInside(e, t, u0));
   else
     PetscCall(SbCollisionFindOverlap(e, u0));
   PetscCall(SbCollisionRestore(c));

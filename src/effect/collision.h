@@ -88,6 +88,7 @@ typedef struct {
   PetscBool close;  /* boxes of two bodies met at the last look */
   SbInside inside;
   signed char *alone; /* [npoint] for how many steps a point has been inside without a pair */
+  PetscReal watched;  /* beginning of the last step for which that was looked at: it may be tried again, s */
   PetscReal *way; /* [npoint][3] unit vectors: ways out of overlap, zero: none; NULL while there is none */
   PetscInt *way_part; /* [npoint] out of which part, -1: none */
   PetscReal deep;     /* so deep points are looked for, m; 0: by the reach, as all come from outside */
@@ -109,8 +110,11 @@ PetscBool SbCollisionLooksFor(const Collision *c, PetscInt mine, PetscInt other)
 /* collision_overlap.c: sets c->deep and ways out by the overlap that is there at local displacements u, m. Collective;
    clears the pairs. Error when a run begins: a body deep inside another, without a way out. */
 PetscErrorCode SbCollisionFindOverlap(SbEffect e, const PetscReal u[]);
-/* Does so when points have been inside for some steps that no pair holds, c->past being the pairs at local displacements u, m. Collective. */
-PetscErrorCode SbCollisionWatchInside(SbEffect e, const PetscReal u[]);
+/*
+  Does so when points have been inside for some steps that no pair holds, c->past being the pairs at local displacements u, m. Collective. `t`: when the
+  step begins, s; further attempts at it are not counted.
+*/
+PetscErrorCode SbCollisionWatchInside(SbEffect e, PetscReal t, const PetscReal u[]);
 /* Less, when less is left of it. Collective if c->deep is not 0. */
 PetscErrorCode SbCollisionFollowOverlap(Collision *c);
 /* The pairs as the last step left them; what an attempt at this step that failed has made of them is forgotten,

@@ -444,9 +444,26 @@ static PetscErrorCode look_deeper(Collision *c, const PetscReal u[], PetscReal b
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Points inside that are not held along the way that they have, which was out of another part, or leads nowhere any more, have none. */
+static void forget_ways(const Collision *c, const PetscInt inside[])
+{
+  const PetscInt npoint = c->surface->scene.npoint;
+
+  for (PetscInt i = 0, j = 0; i < npoint; i++) {
+    PetscBool held = PETSC_FALSE;
+
+    for (; j < c->nhit && c->hit[j].point <= i; j++) {
+      if (c->hit[j].point == i && c->hit[j].part == c->way_part[i] && c->hit[j].gap < 0) held = PETSC_TRUE;
+    }
+    if (inside[i] < 0 || held) continue;
+    c->way_part[i] = -1;
+    c->way[3 * i] = c->way[3 * i + 1] = c->way[3 * i + 2] = 0;
+  }
+}
+
 /*
   The ways out of what points in tets are in; and those at the rim of it, which lie on its surface and have pairs behind. Ways that are
-  there from before stay, as what they lead out is on its way.
+  there from before stay while they lead something out.
 */
 static PetscErrorCode lead_out(Collision *c, const PetscReal u[], const PetscInt inside[])
 {
@@ -457,6 +474,7 @@ static PetscErrorCode lead_out(Collision *c, const PetscReal u[], const PetscInt
     PetscCall(PetscCalloc2(3 * npoint, &c->way, npoint, &c->way_part));
     for (PetscInt i = 0; i < npoint; i++) c->way_part[i] = -1;
   }
+  forget_ways(c, inside);
   for (PetscInt i = 0; i < npoint; i++) {
     if (c->way_part[i] < 0) c->way_part[i] = inside[i];
   }
@@ -510,14 +528,15 @@ PetscErrorCode SbCollisionFollowOverlap(Collision *c)
 
 /* ------------------------------------------------------------------ while a run goes on */
 
-PetscErrorCode SbCollisionWatchInside(SbEffect e, const PetscReal u[])
+PetscErrorCode SbCollisionWatchInside(SbEffect e, PetscReal t, const PetscReal u[])
 {
   Collision *c = (Collision *)e->data;
   const PetscInt npoint = c->surface->scene.npoint;
   PetscInt *inside, late = 0;
 
   PetscFunctionBeginUser;
-  if (!c->close && !c->self) PetscFunctionReturn(PETSC_SUCCESS);
+  if ((!c->close && !c->self) || t == c->watched) PetscFunctionReturn(PETSC_SUCCESS);
+  c->watched = t;
   PetscCall(PetscMalloc1(npoint, &inside));
   PetscCall(SbInsideFind(c->inside, u, c->self, inside));
   for (PetscInt i = 0, j = 0; i < npoint; i++) {

@@ -3,11 +3,11 @@
 
   A record is a pair by the identities of its point and the other body, or of its two edges: whether it touches and did so, the overlap that
   it may keep, multiplier, normal, and its friction. Nodes and weights are found again where the bodies are. One more record per rank has
-  the sums that are reported.
+  the sums that are reported, and one per point that is inside without a pair for how long it has been.
 */
 #include "collision.h"
 
-enum { POINT, EDGES, SUMS }; /* what a record is */
+enum { POINT, EDGES, SUMS, ALONE }; /* what a record is */
 
 static void write_record(const Collision *c, const Hit *hit, PetscReal r[])
 {
@@ -47,11 +47,14 @@ static Hit read_record(const PetscReal r[], PetscInt point)
 PetscErrorCode SbEffectSave_Collision(SbEffect e, SbSpace space, PetscInt *n, PetscReal **records)
 {
   const Collision *c = (const Collision *)e->data;
+  const SbDetectScene *s = &c->surface->scene;
+  PetscInt nalone = 0;
   PetscReal *r;
 
   PetscFunctionBeginUser;
   (void)space;
-  PetscCall(PetscCalloc1(SB_COLLISION_STATE * (c->npast + 1), records));
+  for (PetscInt i = 0; i < s->npoint; i++) nalone += c->alone[i] != 0;
+  PetscCall(PetscCalloc1(SB_COLLISION_STATE * (c->npast + 1 + nalone), records));
   r = *records;
   r[0] = SUMS;
   r[1] = c->work;
@@ -64,6 +67,15 @@ PetscErrorCode SbEffectSave_Collision(SbEffect e, SbSpace space, PetscInt *n, Pe
 
     if (hit->on || hit->was || hit->allowed > 0 || hit->lambda != 0)
       write_record(c, hit, r + SB_COLLISION_STATE * (*n)++);
+  }
+  for (PetscInt i = 0; i < s->npoint; i++) {
+    PetscReal *to = r + SB_COLLISION_STATE * *n;
+
+    if (!c->alone[i]) continue;
+    to[0] = ALONE;
+    to[1] = (PetscReal)s->point_id[i];
+    to[2] = c->alone[i];
+    (*n)++;
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -129,15 +141,20 @@ PetscErrorCode SbEffectLoad_Collision(SbEffect e, SbSpace space, PetscReal t, co
       continue;
     }
     PetscCall(PetscFindInt((PetscInt)r[1], of->n, of->id, &place));
-    if (place >= 0) c->past[c->npast++] = read_record(r, of->first + of->at[place]);
+    if (place < 0) continue;
+    if (r[0] == ALONE)
+      c->alone[of->at[place]] = (signed char)r[2];
+    else
+      c->past[c->npast++] = read_record(r, of->first + of->at[place]);
   }
   qsort(c->past, (size_t)c->npast, sizeof(Hit), by_pair);
   for (int k = 0; k < 2; k++) PetscCall(PetscFree2(names[k].id, names[k].at));
   PetscCall(PetscArraycpy(c->u0, u, 3 * space->nnode));
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, sums, 2, MPIU_REAL, MPI_MAX, space->comm));
   c->overlap.longest = sums[0];
-  c->overlap.left = 1;                  /* the step that ended has taken its part */
-  c->begun = (PetscBool)(sums[1] == 0); /* ways out of what is left of an overlap are found anew */
+  c->overlap.left = 1; /* the step that ended has taken its part */
+  c->begun = PETSC_TRUE;
+  if (sums[1] > 0) PetscCall(SbCollisionFindOverlap(e, u)); /* ways out of what is left are found anew */
   PetscCall(SbCollisionRestore(c));
   PetscCall(SbCollisionLook(c, u, PETSC_FALSE));
   PetscFunctionReturn(PETSC_SUCCESS);

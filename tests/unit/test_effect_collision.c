@@ -148,6 +148,88 @@ static PetscErrorCode attempt(Meeting *x)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Begins a step where the bodies are; `deep`: how deep overlap is looked for then, m. */
+static PetscErrorCode begin_step(Meeting *x, PetscReal t, PetscReal *deep)
+{
+  PetscFunctionBeginUser;
+  PetscCall((*x->e->ops.touch)(x->e, x->s, t, 0.01, x->u0, NULL, x->u0));
+  *deep = ((Collision *)x->e->data)->deep;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/*
+  Points that got into a body unseen are led out after three steps, not after three attempts at one, and as soon when the run is taken up from a
+  checkpoint in between. What is taken up where one lies deep in another goes on: it was no error before.
+*/
+static PetscErrorCode check_patience(void)
+{
+  Collision *c;
+  Meeting x;
+  PetscInt n;
+  PetscReal *records, deep = 0;
+
+  PetscFunctionBeginUser;
+  PetscCall(open_meeting(PAIR("p1", "p1"), "-effect_meet_reach 0.01", &x));
+  c = (Collision *)x.e->data;
+  PetscCall(begin_step(&x, 0, &deep));
+  come_down(&x, 0.15);
+  PetscCall(PetscArraycpy(x.u0, x.u, 3 * x.s->nnode));
+  for (int k = 0; k < 8; k++) PetscCall(begin_step(&x, 1 + k / 4, &deep)); /* in the first their boxes meet */
+  SB_CHECK(deep == 0, "after two steps overlap is looked for, %g m deep", (double)deep);
+  PetscCall((*x.e->ops.save)(x.e, x.s, &n, &records));
+  PetscCall(PetscArrayzero(c->alone, c->surface->scene.npoint));
+  PetscCall((*x.e->ops.load)(x.e, x.s, 3, x.u0, n, records));
+  PetscCall(PetscFree(records));
+  PetscCall(begin_step(&x, 3, &deep));
+  SB_CHECK(deep > 0.1, "after three steps overlap is looked for %g m deep", (double)deep);
+  PetscCall((*x.e->ops.save)(x.e, x.s, &n, &records));
+  for (PetscInt i = 0; i < 3 * x.s->nnode;
+       i++) { /* small, and in the middle of the other, where no facet is within reach */
+    const PetscReal middle[3] = {0.5, 0.4, 0.15}, *X = x.s->node_x + i - i % 3;
+
+    x.u0[i] = x.s->node_body[i / 3] ? middle[i % 3] + 0.05 * (X[i % 3] - 0.5) - X[i % 3] : 0;
+  }
+  c->deep = 0;
+  PetscCall(PetscFree2(c->way, c->way_part));
+  PetscCall((*x.e->ops.load)(x.e, x.s, 4, x.u0, n, records));
+  PetscCall(begin_step(&x, 4, &deep));
+  PetscCall(PetscFree(records));
+  PetscCall(close_meeting(&x));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Points that were led out of one body and get into another before the first has gone are led out of that. */
+static PetscErrorCode check_other_way(void)
+{
+  Collision *c;
+  Meeting x;
+  PetscReal deep = 0;
+  PetscInt led[2] = {0, 0};
+
+  PetscFunctionBeginUser;
+  PetscCall(open_meeting(SETS "-bodies a,b,c" BODY("a", "p1", "box:1,0.8,0.3:3", "0,0,0")
+                           BODY("b", "p1", "box:0.6,0.5,0.4:2", "0.2,0.1,0.32")
+                             BODY("c", "p1", "box:1,0.8,0.3:3", "0,0,5"),
+                         "-effect_meet_reach 0.01", &x));
+  c = (Collision *)x.e->data;
+  for (int k = 0; k < 2; k++) {
+    come_down(&x, k ? -4.9 : 0.15);
+    for (PetscInt i = 0; i < x.s->nnode; i++) { /* into the third, straight */
+      if (k && x.s->node_body[i] == 1) x.u[3 * i + 2] -= 4.9 * x.s->node_x[3 * i];
+    }
+    PetscCall(PetscArraycpy(x.u0, x.u, 3 * x.s->nnode));
+    for (int step = 0; step < 4; step++) PetscCall(begin_step(&x, 4 * k + step, &deep));
+    SB_CHECK(deep > 0.1, "overlap is looked for %g m deep", (double)deep);
+    for (PetscInt i = 0; i < c->surface->scene.npoint; i++)
+      led[k] += c->surface->scene.point_part[i] == 1 && c->way_part[i] == 2 * k;
+  }
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, led, 2, MPIU_INT, MPI_SUM, x.s->comm));
+  SB_CHECK(led[0] > 3 && led[1] > 3, "%d points are led out of the first body, %d of the third", (int)led[0],
+           (int)led[1]);
+  PetscCall(close_meeting(&x));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Displacements of all nodes by their global numbers. */
 static PetscErrorCode gather_all(const Meeting *x, PetscReal **all)
 {
@@ -527,6 +609,8 @@ int main(int argc, char **argv)
     "-effect_meet_detection bvh -effect_meet_bvh_volume dop26 -effect_meet_bvh_build top_down", 0));
   PetscCall(check_sides());
   PetscCall(check_far());
+  PetscCall(check_patience());
+  PetscCall(check_other_way());
   PetscCall(check_attempts("projected"));
   PetscCall(check_attempts("penalty"));
   PetscCall(check_gap_field());
