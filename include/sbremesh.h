@@ -19,11 +19,16 @@ typedef struct {
     side; /* [ntri][2] region on the side from which the corners are seen counter-clockwise, and behind; -1: nothing */
   PetscReal edge; /* mean edge, m */
 } SbHull;
+typedef struct {
+  PetscInt nvert, ncell;
+  PetscReal *x;   /* [nvert][3] m */
+  PetscInt *cell; /* [ncell][4] */
+} SbTets;
 typedef PetscErrorCode (*SbMesher)(const char *where, const SbHull *hull, PetscReal size, void *ctx,
-                                   PetscInt *nvert, PetscReal **x, PetscInt *ncell, PetscInt **cell);
+                                   SbTets *tets);
 /* The program's own: SbTetrahedralize(). */
 PetscErrorCode SbMesherDefault(const char *where, const SbHull *hull, PetscReal size, void *ctx,
-                               PetscInt *nvert, PetscReal **x, PetscInt *ncell, PetscInt **cell);
+                               SbTets *tets);
 
 /*
   SbRemesh - bodies get other meshes while the run goes on (src/remesh/remesh.c).

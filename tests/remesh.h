@@ -6,38 +6,35 @@
 
 /* Fills what can be seen whole from its middle. ctx: NULL, or an int that counts the calls. */
 static inline PetscErrorCode fixture_cone(const char *where, const SbHull *hull, PetscReal size, void *ctx,
-                                          PetscInt *nvert, PetscReal **x, PetscInt *ncell, PetscInt **cell)
+                                          SbTets *tets)
 {
   PetscFunctionBeginUser;
   (void)where;
   (void)size;
   if (ctx) (*(int *)ctx)++;
-  *nvert = hull->nvert + 1;
-  *ncell = hull->ntri;
-  PetscCall(PetscCalloc1(3 * *nvert, x));
-  PetscCall(PetscMalloc1(4 * *ncell, cell));
-  PetscCall(PetscArraycpy(*x, hull->x, 3 * hull->nvert));
+  tets->nvert = hull->nvert + 1;
+  tets->ncell = hull->ntri;
+  PetscCall(PetscCalloc1(3 * tets->nvert, &tets->x));
+  PetscCall(PetscMalloc1(4 * tets->ncell, &tets->cell));
+  PetscCall(PetscArraycpy(tets->x, hull->x, 3 * hull->nvert));
   for (PetscInt i = 0; i < 3 * hull->nvert; i++)
-    (*x)[3 * hull->nvert + i % 3] += hull->x[i] / (PetscReal)hull->nvert;
+    tets->x[3 * hull->nvert + i % 3] += hull->x[i] / (PetscReal)hull->nvert;
   for (PetscInt t = 0; t < hull->ntri; t++) {
     const PetscInt v[4] = {hull->nvert, hull->tri[3 * t], hull->tri[3 * t + 1], hull->tri[3 * t + 2]};
 
-    PetscCall(PetscArraycpy(*cell + 4 * t, v, 4));
+    PetscCall(PetscArraycpy(tets->cell + 4 * t, v, 4));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* One that cannot. */
 static inline PetscErrorCode fixture_refuse(const char *where, const SbHull *hull, PetscReal size, void *ctx,
-                                            PetscInt *nvert, PetscReal **x, PetscInt *ncell, PetscInt **cell)
+                                            SbTets *tets)
 {
   PetscFunctionBeginUser;
   (void)hull;
   (void)size;
   (void)ctx;
-  (void)nvert;
-  (void)x;
-  (void)ncell;
-  (void)cell;
+  (void)tets;
   SETERRQ(PETSC_COMM_SELF, PETSC_ERR_USER_INPUT, "%s: the mesher of the test refuses", where);
 }

@@ -431,9 +431,10 @@ static PetscErrorCode begin_next(const SbGathered *g, const SbMade made[], SbGat
 }
 
 /* Mesh, values and names of one body. */
-static PetscErrorCode finish_body(const Work *w, PetscBool done, PetscInt step, SbGathered *next,
-                                  SbGiven **given, SbRenamed *renamed)
+static PetscErrorCode finish_body(const Work *w, PetscBool done, PetscInt step, SbRemade *remade)
 {
+  SbGathered *next = &remade->next;
+  SbGiven **given = &remade->given[w->body];
   const SbBody *body = &w->model->body[w->body];
   const size_t each = (size_t)next->width * (size_t)w->each;
   PetscReal *value = next->value + each * (size_t)next->cell0[w->body];
@@ -454,39 +455,52 @@ static PetscErrorCode finish_body(const Work *w, PetscBool done, PetscInt step, 
       (*given)->bound = body->given->bound;
     }
   }
-  rename_surface(w, done, next->vert0[w->body], next->cell0[w->body], next, renamed);
+  rename_surface(w, done, next->vert0[w->body], next->cell0[w->body], next, &remade->renamed);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbRemadeCreate(PetscInt nbody, SbRemade *r)
+{
+  PetscFunctionBeginUser;
+  PetscCall(PetscMemzero(r, sizeof(*r)));
+  r->nbody = nbody;
+  PetscCall(PetscCalloc3(nbody, &r->given, nbody, &r->made, nbody, &r->done));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbRemadeDestroy(SbRemade *r)
+{
+  PetscFunctionBeginUser;
+  for (PetscInt b = 0; b < r->nbody; b++) PetscCall(SbGivenDestroy(&r->given[b]));
+  PetscCall(PetscFree3(r->given, r->made, r->done));
+  PetscCall(SbGatheredDestroy(&r->next));
+  PetscCall(PetscFree2(r->renamed.from, r->renamed.to));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode SbRemeshBodies(SbModel m, const SbGathered *g, const PetscBool due[], PetscInt step,
-                              const SbRemeshing *how, SbGiven *given[], SbMade made[], SbGathered *next,
-                              SbRenamed *renamed)
+                              const SbRemeshing *how, SbRemade *r)
 {
-  PetscBool *done;
   PetscInt room = 0;
   Work *work;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscMemzero(next, sizeof(*next)));
-  PetscCall(PetscCalloc2(m->nbody, &work, m->nbody, &done));
+  PetscCall(PetscCalloc1(m->nbody, &work));
   for (PetscInt b = 0; b < m->nbody; b++) {
+    const PetscInt nvert = g->vert0[b + 1] - g->vert0[b];
+
     PetscCall(open_work(m, g, b, &work[b]));
-    made[b] = (SbMade){{g->vert0[b + 1] - g->vert0[b], g->vert0[b + 1] - g->vert0[b]},
-                       {work[b].ncell, work[b].ncell},
-                       0,
-                       0.,
-                       ""};
-    if (due[b]) PetscCall(try_body(&work[b], how, &made[b], &done[b]));
-    room += made[b].nvert[0] + 2 * work[b].nside;
+    r->made[b] = (SbMade){{nvert, nvert}, {work[b].ncell, work[b].ncell}, 0, 0., ""};
+    if (due[b]) PetscCall(try_body(&work[b], how, &r->made[b], &r->done[b]));
+    room += nvert + 2 * work[b].nside;
   }
-  PetscCall(begin_next(g, made, next));
-  PetscCall(PetscMalloc2(room, &renamed->from, room, &renamed->to));
-  renamed->n = 0;
+  PetscCall(begin_next(g, r->made, &r->next));
+  PetscCall(PetscMalloc2(room, &r->renamed.from, room, &r->renamed.to));
   for (PetscInt b = 0; b < m->nbody; b++) {
-    PetscCall(finish_body(&work[b], done[b], step, next, &given[b], renamed));
+    PetscCall(finish_body(&work[b], r->done[b], step, r));
     PetscCall(close_work(&work[b]));
   }
-  PetscCall(PetscSortIntWithArray(renamed->n, renamed->from, renamed->to));
-  PetscCall(PetscFree2(work, done));
+  PetscCall(PetscSortIntWithArray(r->renamed.n, r->renamed.from, r->renamed.to));
+  PetscCall(PetscFree(work));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -479,11 +479,16 @@ static PetscErrorCode check_mesher(const SbHull *hull, const SbNewMesh *m)
 static PetscErrorCode remesh(const char *where, const SbOldMesh *old, const SbRemeshing *how, SbHull *hull,
                              SbLocator *rest, SbNewMesh *m)
 {
+  SbTets tets = {0};
+
   PetscFunctionBeginUser;
   PetscCall(make_hull(old, how->rest ? old->X : old->x, hull, &m->kept));
   m->nkept = hull->nvert;
-  PetscCall(
-    (*how->mesher)(where, hull, how->size * hull->edge, how->ctx, &m->nvert, &m->x, &m->ncell, &m->cell));
+  PetscCall((*how->mesher)(where, hull, how->size * hull->edge, how->ctx, &tets));
+  m->nvert = tets.nvert;
+  m->ncell = tets.ncell;
+  m->x = tets.x;
+  m->cell = tets.cell;
   PetscCall(check_mesher(hull, m));
   PetscCall(SbLocatorCreate(old->ncell, old->cell, old->X, rest));
   PetscCall(find_material(old, how, *rest, m));

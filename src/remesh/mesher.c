@@ -26,20 +26,17 @@ static PetscErrorCode make_skin(const SbHull *hull, SbSkin *skin)
 }
 
 /* Takes vertices and tets out of an import, which loses them; tets are turned where they need it. */
-static PetscErrorCode take(SbImport *im, PetscInt *nvert, PetscReal **x, PetscInt *ncell, PetscInt **cell)
+static PetscErrorCode take(SbImport *im, SbTets *tets)
 {
   PetscFunctionBeginUser;
-  *nvert = im->nvert;
-  *ncell = im->item[3].n;
-  *x = im->x;
-  *cell = im->item[3].vert;
+  *tets = (SbTets){.nvert = im->nvert, .ncell = im->item[3].n, .x = im->x, .cell = im->item[3].vert};
   im->x = NULL;
   im->item[3].vert = NULL;
-  for (PetscInt c = 0; c < *ncell; c++) {
-    PetscInt *v = *cell + 4 * (size_t)c;
+  for (PetscInt c = 0; c < tets->ncell; c++) {
+    PetscInt *v = tets->cell + 4 * (size_t)c;
     const PetscInt keep = v[3];
 
-    if (SbTetDet(*x, v) > 0) continue;
+    if (SbTetDet(tets->x, v) > 0) continue;
     v[3] = v[2];
     v[2] = keep;
   }
@@ -72,8 +69,7 @@ static PetscErrorCode fill(const char *where, const SbHull *hull, PetscReal size
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbMesherDefault(const char *where, const SbHull *hull, PetscReal size, void *ctx,
-                               PetscInt *nvert, PetscReal **x, PetscInt *ncell, PetscInt **cell)
+PetscErrorCode SbMesherDefault(const char *where, const SbHull *hull, PetscReal size, void *ctx, SbTets *tets)
 {
   const PetscReal step = PetscPowReal(2, PetscFloorReal(PetscLog2Real(hull->edge)) - BITS);
   SbImport im;
@@ -85,7 +81,7 @@ PetscErrorCode SbMesherDefault(const char *where, const SbHull *hull, PetscReal 
   ierr = fill(where, hull, size, step, &im);
   PetscCall(PetscPopErrorHandler());
   if (ierr) PetscCall(fill(where, hull, size, 0, &im));
-  PetscCall(take(&im, nvert, x, ncell, cell));
+  PetscCall(take(&im, tets));
   PetscCall(SbImportDestroy(&im));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -360,17 +360,16 @@ static PetscErrorCode conserve_momenta(const Scene *old, const PetscBool done[],
 }
 
 /* The state goes from the old scene to the new one. */
-static PetscErrorCode hand_over(const Scene *old, const SbGathered *next, const SbRenamed *renamed,
-                                const PetscBool done[], Scene *s, PetscReal *speed)
+static PetscErrorCode hand_over(const Scene *old, const SbRemade *remade, Scene *s, PetscReal *speed)
 {
   SbRun run = s->run;
 
   PetscFunctionBeginUser;
   PetscCall(SbRunContinue(old->run, run));
-  PetscCall(SbScatter(next, run));
+  PetscCall(SbScatter(&remade->next, run));
   PetscCall(SbModelPrescribe(s->model, run->t_now, run->U));
-  PetscCall(conserve_momenta(old, done, run, speed));
-  PetscCall(SbEffectsHandOver(old->run, run, renamed));
+  PetscCall(conserve_momenta(old, remade->done, run, speed));
+  PetscCall(SbEffectsHandOver(old->run, run, &remade->renamed));
   PetscCall(SbRunRestartAcceleration(run));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -395,44 +394,45 @@ static PetscErrorCode close_account(const Scene *old, Scene *s, SbEnergies e[2])
 
 /* ------------------------------------------------------------------ a re-meshing from beginning to end */
 
-/* What rank 0 has made; all ranks know the messages and numbers. done: bodies with a new mesh. */
-static PetscErrorCode make_meshes(SbRemesh r, SbRun run, SbGathered *next, SbRenamed *renamed,
-                                  SbGiven *given[], SbMade made[], PetscBool done[], PetscBool *any)
+/* What rank 0 has made; all ranks know the messages, numbers and names. any: some body has a new mesh. */
+static PetscErrorCode make_meshes(SbRemesh r, SbRun run, SbRemade *remade, PetscBool *any)
 {
   const SbModel m = run->model;
+  SbRenamed *renamed = &remade->renamed;
   SbGathered g;
   PetscMPIInt rank;
 
   PetscFunctionBeginUser;
   PetscCallMPI(MPI_Comm_rank(m->comm, &rank));
   PetscCall(SbGather(run, &g));
-  PetscCall(PetscMemzero(next, sizeof(*next)));
-  PetscCall(PetscMemzero(renamed, sizeof(*renamed)));
-  if (!rank) PetscCall(SbRemeshBodies(m, &g, r->due, run->step_now, &r->how, given, made, next, renamed));
-  next->nbody = g.nbody;
-  next->nfield = g.nfield;
-  next->width = g.width;
+  if (!rank) PetscCall(SbRemeshBodies(m, &g, r->due, run->step_now, &r->how, remade));
+  remade->next.nbody = g.nbody;
+  remade->next.nfield = g.nfield;
+  remade->next.width = g.width;
   PetscCall(SbGatheredDestroy(&g));
-  PetscCallMPI(MPI_Bcast(made, (int)((size_t)m->nbody * sizeof(*made)), MPI_BYTE, 0, m->comm));
+  PetscCallMPI(
+    MPI_Bcast(remade->made, (int)((size_t)m->nbody * sizeof(*remade->made)), MPI_BYTE, 0, m->comm));
+  PetscCallMPI(MPI_Bcast(remade->done, (PetscMPIInt)m->nbody, SB_MPI_BOOL, 0, m->comm));
   PetscCallMPI(MPI_Bcast(&renamed->n, 1, MPIU_INT, 0, m->comm));
   if (rank) PetscCall(PetscMalloc2(renamed->n, &renamed->from, renamed->n, &renamed->to));
   PetscCallMPI(MPI_Bcast(renamed->from, (PetscMPIInt)renamed->n, MPIU_INT, 0, m->comm));
   PetscCallMPI(MPI_Bcast(renamed->to, (PetscMPIInt)renamed->n, MPIU_INT, 0, m->comm));
   *any = PETSC_FALSE;
   for (PetscInt b = 0; b < m->nbody; b++) {
-    done[b] = (PetscBool)(r->due[b] && !made[b].message[0]);
-    *any = (PetscBool)(*any || done[b]);
-    if (r->due[b] && !done[b])
+    *any = (PetscBool)(*any || remade->done[b]);
+    if (r->due[b] && !remade->done[b])
       PetscCall(SbWarning(m->comm, "body '%s' keeps its mesh after step %" PetscInt_FMT ": %s",
-                          m->body[b].name, run->step_now, made[b].message));
+                          m->body[b].name, run->step_now, remade->made[b].message));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Below which quality, and from which step on, the bodies that were due are re-meshed again. */
-static void set_bounds(SbRemesh r, PetscInt step, const SbMade made[], const PetscBool done[],
-                       SbGiven *given[])
+static void set_bounds(SbRemesh r, PetscInt step, const SbRemade *remade)
 {
+  const SbMade *made = remade->made;
+  const PetscBool *done = remade->done;
+
   for (PetscInt b = 0; b < r->nbody; b++) {
     const PetscReal reached = done[b] ? made[b].quality : r->worst[b];
 
@@ -440,18 +440,20 @@ static void set_bounds(SbRemesh r, PetscInt step, const SbMade made[], const Pet
     if (reached > 0.) r->bound[b] = PetscMin(r->asked[b], AGAIN * reached);
     r->rest[b] = done[b] && reached > 0. ? 0 : PetscMax(1, 2 * r->rest[b]);
     r->from[b] = step + r->rest[b];
-    if (given[b] && done[b]) given[b]->bound = r->bound[b];
+    if (remade->given[b] && done[b]) remade->given[b]->bound = r->bound[b];
   }
 }
 
-static PetscErrorCode report(SbRemesh r, const Scene *s, const SbMade made[], const PetscBool done[],
-                             const SbEnergies e[2], PetscReal speed)
+static PetscErrorCode report(SbRemesh r, const Scene *s, const SbRemade *remade, const SbEnergies e[2],
+                             PetscReal speed)
 {
+  const SbMade *made = remade->made;
+
   PetscFunctionBeginUser;
   for (PetscInt b = 0; b < r->nbody; b++) {
     SbRemeshed told = {.step = s->run->step_now, .t = s->run->t_now};
 
-    if (!done[b]) continue;
+    if (!remade->done[b]) continue;
     PetscCall(PetscStrncpy(told.body, s->model->body[b].name, sizeof(told.body)));
     for (int i = 0; i < 2; i++) {
       told.tets[i] = made[b].ncell[i];
@@ -469,22 +471,21 @@ static PetscErrorCode report(SbRemesh r, const Scene *s, const SbMade made[], co
 }
 
 /* The new scene, or the message why it cannot be made: then the old one goes on. */
-static PetscErrorCode replace(SbRemesh r, Scene *old, const SbGathered *next, const SbRenamed *renamed,
-                              const PetscBool done[], SbGiven *given[], const SbMade made[])
+static PetscErrorCode replace(SbRemesh r, Scene *old, SbRemade *remade)
 {
   Scene s = {NULL, NULL, NULL};
   SbEnergies e[2];
   PetscReal speed = 0.;
 
   PetscFunctionBeginUser;
-  PetscCall(make_scene(old, given, &s));
-  PetscCall(hand_over(old, next, renamed, done, &s, &speed));
+  PetscCall(make_scene(old, remade->given, &s));
+  PetscCall(hand_over(old, remade, &s, &speed));
   PetscCall(close_account(old, &s, e));
   PetscCall(SbLedgerAttach(s.ledger));
   if (s.ledger) PetscCall(SbLedgerContinue(old->ledger, s.ledger));
   PetscCall(SbRemeshAttach(r, s.run));
   if (old->run->output) PetscCall(SbOutputFollow(old->run, s.run));
-  PetscCall(report(r, &s, made, done, e, speed));
+  PetscCall(report(r, &s, remade, e, speed));
   PetscCall(destroy_scene(old));
   *old = s;
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -503,24 +504,16 @@ static void go_on(SbRun run)
 /* any: some body has a new mesh. */
 static PetscErrorCode apply(SbRemesh r, Scene *scene, PetscBool *any)
 {
-  const PetscInt n = scene->model->nbody;
-  SbGathered next;
-  SbRenamed renamed;
-  SbGiven **given;
-  SbMade *made;
-  PetscBool *done;
+  SbRemade remade;
 
   PetscFunctionBeginUser;
   PetscCall(PetscLogStagePush(SbStageSetup));
   PetscCall(PetscLogEventBegin(r->event, 0, 0, 0, 0));
-  PetscCall(PetscCalloc3(n, &given, n, &made, n, &done));
-  PetscCall(make_meshes(r, scene->run, &next, &renamed, given, made, done, any));
-  set_bounds(r, scene->run->step_now, made, done, given);
-  if (*any) PetscCall(replace(r, scene, &next, &renamed, done, given, made));
-  for (PetscInt b = 0; b < n; b++) PetscCall(SbGivenDestroy(&given[b]));
-  PetscCall(PetscFree3(given, made, done));
-  PetscCall(SbGatheredDestroy(&next));
-  PetscCall(PetscFree2(renamed.from, renamed.to));
+  PetscCall(SbRemadeCreate(scene->model->nbody, &remade));
+  PetscCall(make_meshes(r, scene->run, &remade, any));
+  set_bounds(r, scene->run->step_now, &remade);
+  if (*any) PetscCall(replace(r, scene, &remade));
+  PetscCall(SbRemadeDestroy(&remade));
   PetscCall(PetscLogEventEnd(r->event, 0, 0, 0, 0));
   PetscCall(PetscLogStagePop());
   if (!*any) go_on(scene->run);

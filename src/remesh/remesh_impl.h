@@ -61,10 +61,9 @@ PetscErrorCode SbRemeshBody(const char *where, const SbOldMesh *old, const SbRem
 PetscErrorCode SbNewMeshDestroy(SbNewMesh *mesh);
 
 /*
-  bodies.c - rank 0: the bodies with due[b] are meshed anew; `made` gets their meshes and those of all others, as they are, and `next` the same
-  scene with the state looked up there (X, vert_set and so on are left out).
+  bodies.c - rank 0: the bodies with due[b] are meshed anew, what comes of it is a SbRemade.
 
-  Not collective. message[b]: why a body could not be re-meshed, "" when it was or was not due; it keeps its mesh then.
+  Not collective. message: why a body could not be re-meshed, "" when it was or was not due; it keeps its mesh then.
 */
 typedef struct {
   PetscInt nvert[2], ncell[2]; /* before and after */
@@ -72,9 +71,19 @@ typedef struct {
   PetscReal quality; /* of the worst tet after it */
   char message[512];
 } SbMade;
+typedef struct {
+  PetscInt nbody;
+  SbGiven **
+    given; /* [nbody] meshes of all bodies, also of those that stay as they are; rank 0, NULL elsewhere and when somebody has taken it */
+  SbMade *made;      /* [nbody] */
+  PetscBool *done;   /* [nbody] has a new mesh */
+  SbGathered next;   /* the same scene with the state looked up there; X, vert_set and so on are left out */
+  SbRenamed renamed; /* nodes of the surfaces of all bodies */
+} SbRemade;
+PetscErrorCode SbRemadeCreate(PetscInt nbody, SbRemade *remade); /* empty. SbRemadeDestroy() */
+PetscErrorCode SbRemadeDestroy(SbRemade *remade);
 PetscErrorCode SbRemeshBodies(SbModel model, const SbGathered *g, const PetscBool due[], PetscInt step,
-                              const SbRemeshing *how, SbGiven *given[], SbMade made[], SbGathered *next,
-                              SbRenamed *renamed);
+                              const SbRemeshing *how, SbRemade *remade);
 
 /*
   check.c - qualities and momenta.

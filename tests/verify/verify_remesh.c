@@ -6,6 +6,7 @@
     linear     a linear displacement and velocity are the same functions there, for every element, on a body that is deformed by them
     same       what lies on the surface has its values to the last bit; so has a body that is not re-meshed
     momenta    mass, momentum and angular momentum of each body are those of before to 1e-12, free and held, with both masses
+    energy     a new mesh changes the energy of a smooth motion less the finer it is, like the square of its edges
     run        a run that is re-meshed on its way: steps, time, totals; the account closes with remesh_loss; Newmark and symplectic Euler go on
     refused    a mesher that cannot: the run goes on as one that is not re-meshed, to the last bit
     sets       groups of a file and shapes hold the same triangles, vertices of the surface and volume
@@ -40,38 +41,38 @@ static void curved(const PetscReal x[3], PetscReal u[3])
 }
 
 /* The second scene of a pair, with body a meshed anew. */
-static PetscErrorCode make_second(Pair *p, const char *options)
+static PetscErrorCode make_second(Pair *p, SbMesher mesher)
 {
-  const SbRemeshing how = {.mesher = fixture_cone, .size = 1., .quality = 1e-3};
+  const SbRemeshing how = {.mesher = mesher, .size = 1., .quality = 1e-3};
   const PetscBool due[2] = {PETSC_TRUE, PETSC_FALSE};
-  SbGiven *given[2] = {NULL, NULL};
-  SbGathered g, next = {0};
-  SbRenamed renamed = {0};
+  SbRemade remade;
+  SbGathered g;
   PetscMPIInt rank;
 
   PetscFunctionBeginUser;
   PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
   PetscCall(SbGather(p->a.run, &g));
-  if (!rank) PetscCall(SbRemeshBodies(p->a.model, &g, due, 1, &how, given, p->made, &next, &renamed));
-  next.nfield = g.nfield;
-  next.width = g.width;
+  PetscCall(SbRemadeCreate(2, &remade));
+  if (!rank) PetscCall(SbRemeshBodies(p->a.model, &g, due, 1, &how, &remade));
+  PetscCall(PetscArraycpy(p->made, remade.made, 2));
+  remade.next.nfield = g.nfield;
+  remade.next.width = g.width;
   PetscCallMPI(MPI_Bcast(p->made, (int)sizeof(p->made), MPI_BYTE, 0, PETSC_COMM_WORLD));
   PetscCall(SbSceneCreate(PETSC_COMM_WORLD, &p->b.model));
   PetscCall(SbRunCreate(p->b.model, &p->b.run));
-  (void)options;
   for (int b = 0; b < 2; b++) {
-    if (rank) PetscCall(SbGivenCreate(0, 0, 0, &given[b]));
-    if (rank && b == 0) given[b]->mass = g.mass[0];
-    p->b.model->body[b].given = given[b];
+    if (rank) PetscCall(SbGivenCreate(0, 0, 0, &remade.given[b]));
+    if (rank && b == 0) remade.given[b]->mass = g.mass[0];
+    p->b.model->body[b].given = remade.given[b];
+    remade.given[b] = NULL;
   }
   PetscCall(SbModelSetUp(p->b.model));
   PetscCall(SbMeshValidate(p->b.model->mesh));
   PetscCall(SbSpaceValidate(p->b.model->space));
   PetscCall(SbRunSetUp(p->b.run));
-  PetscCall(SbScatter(&next, p->b.run));
+  PetscCall(SbScatter(&remade.next, p->b.run));
   PetscCall(SbGatheredDestroy(&g));
-  PetscCall(SbGatheredDestroy(&next));
-  PetscCall(PetscFree2(renamed.from, renamed.to));
+  PetscCall(SbRemadeDestroy(&remade));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -116,7 +117,7 @@ static PetscErrorCode check_linear(const char *element)
   PetscCall(test_fill(p.a.model, linear, p.a.run->U));
   PetscCall(test_fill(p.a.model, curved, p.a.run->V));
   PetscCall(test_fill(p.a.model, linear, p.a.run->A));
-  PetscCall(make_second(&p, text));
+  PetscCall(make_second(&p, fixture_cone));
   SB_CHECK(!p.made[0].message[0], "%s: %s", element, p.made[0].message);
   SB_CHECK(p.b.model->body[0].ncell == 80 && p.a.model->body[0].ncell == 96, "%s: %d tets, then %d", element,
            (int)p.a.model->body[0].ncell, (int)p.b.model->body[0].ncell);
@@ -172,7 +173,7 @@ static PetscErrorCode check_same(void)
   PetscCall(test_scene_open(TWO EULER, &p.a));
   PetscCall(test_fill(p.a.model, curved, p.a.run->U));
   PetscCall(test_fill(p.a.model, linear, p.a.run->V));
-  PetscCall(make_second(&p, TWO EULER));
+  PetscCall(make_second(&p, fixture_cone));
   for (int body = 0; body < 2; body++) {
     PetscCall(bits_of(p.a.model, p.a.run->U, body, (PetscBool)!body, &a));
     PetscCall(bits_of(p.b.model, p.b.run->U, body, (PetscBool)!body, &b));
@@ -194,7 +195,7 @@ static PetscErrorCode check_momenta(const char *more)
   PetscCall(test_scene_open(text, &p.a));
   PetscCall(test_fill(p.a.model, curved, p.a.run->U));
   PetscCall(test_fill(p.a.model, curved, p.a.run->V));
-  PetscCall(make_second(&p, text));
+  PetscCall(make_second(&p, fixture_cone));
   PetscCall(SbBodyMomenta(p.a.model, p.a.run->U, p.a.run->V, before));
   PetscCall(SbBodyMomenta(p.b.model, p.b.run->U, p.b.run->V, after));
   PetscCall(
@@ -222,6 +223,41 @@ static PetscErrorCode check_momenta(const char *more)
   SB_CHECK_NEAR(mass[0], 900 * 0.008, 1e-13 * 7.2, "mass");
   SB_CHECK_NEAR(mass[1], 0.7, 1e-13, "mass of the other body");
   PetscCall(close_pair(&p));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Part of the strain energy of a smooth motion that a new mesh changes it by, with n cells along the shortest side. */
+static PetscErrorCode energy_change(int n, PetscReal *part)
+{
+  SbEnergies e[2];
+  char text[2048];
+  Pair p = {0};
+
+  PetscFunctionBeginUser;
+  PetscCall(
+    PetscSNPrintf(text, sizeof(text), TWO EULER "-body_a_mesh box:0.4,0.1,0.2:%d,%d,%d", 4 * n, n, 2 * n));
+  PetscCall(test_scene_open(text, &p.a));
+  PetscCall(test_fill(p.a.model, curved, p.a.run->U));
+  PetscCall(make_second(&p, SbMesherDefault));
+  SB_CHECK(!p.made[0].message[0], "%d cells: %s", n, p.made[0].message);
+  PetscCall(SbModelEnergies(p.a.model, p.a.run->U, p.a.run->V, &e[0]));
+  PetscCall(SbModelEnergies(p.b.model, p.b.run->U, p.b.run->V, &e[1]));
+  *part = PetscAbsReal(e[1].strain - e[0].strain) / e[0].strain;
+  PetscCall(close_pair(&p));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* It falls like the square of the edges: by four when they are halved. */
+static PetscErrorCode check_energy(void)
+{
+  PetscReal coarse, fine;
+
+  PetscFunctionBeginUser;
+  PetscCall(energy_change(3, &coarse));
+  PetscCall(energy_change(6, &fine));
+  SB_CHECK(coarse < 0.1 && fine < 0.4 * coarse,
+           "a new mesh changes the energy by %g, with edges half as long by %g", (double)coarse,
+           (double)fine);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -307,7 +343,7 @@ static PetscErrorCode check_sets(void)
   PetscFunctionBeginUser;
   PetscCall(test_scene_open(text, &p.a));
   PetscCall(test_fill(p.a.model, curved, p.a.run->U));
-  PetscCall(make_second(&p, text));
+  PetscCall(make_second(&p, fixture_cone));
   for (int i = 0; i < 2; i++) {
     const SbModel m = i ? p.b.model : p.a.model;
 
@@ -337,6 +373,7 @@ int main(int argc, char **argv)
   PetscCall(check_linear("p1"));
   PetscCall(check_linear("cr"));
   PetscCall(check_linear("dg"));
+  PetscCall(check_energy());
   PetscCall(check_same());
   PetscCall(check_momenta(""));
   PetscCall(check_momenta("-mass consistent"));

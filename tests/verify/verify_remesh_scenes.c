@@ -90,40 +90,40 @@ static PetscErrorCode put_in_order(SbEffect e, PetscBool collision, Records *all
 }
 
 /* The second scene is the first one with body a meshed anew by the program's own mesher. */
-static PetscErrorCode hand_over(TestScene *a, TestScene *b, SbRenamed *renamed)
+static PetscErrorCode hand_over(TestScene *a, TestScene *b, SbRemade *remade)
 {
   const SbRemeshing how = {.mesher = SbMesherDefault, .size = 1., .quality = 1e-3};
   const PetscBool due[2] = {PETSC_TRUE, PETSC_FALSE};
-  SbMade made[2];
-  SbGiven *given[2] = {NULL, NULL};
-  SbGathered g, next = {0};
+  SbRenamed *renamed = &remade->renamed;
+  SbGathered g;
   PetscMPIInt rank;
 
   PetscFunctionBeginUser;
   PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
   PetscCall(SbGather(a->run, &g));
-  if (!rank) PetscCall(SbRemeshBodies(a->model, &g, due, 1, &how, given, made, &next, renamed));
-  if (!rank) SB_CHECK(!made[0].message[0], "%s", made[0].message);
+  PetscCall(SbRemadeCreate(a->model->nbody, remade));
+  if (!rank) PetscCall(SbRemeshBodies(a->model, &g, due, 1, &how, remade));
+  if (!rank) SB_CHECK(remade->done[0], "%s", remade->made[0].message);
   PetscCallMPI(MPI_Bcast(&renamed->n, 1, MPIU_INT, 0, PETSC_COMM_WORLD));
   if (rank) PetscCall(PetscMalloc2(renamed->n, &renamed->from, renamed->n, &renamed->to));
   PetscCallMPI(MPI_Bcast(renamed->from, (PetscMPIInt)renamed->n, MPIU_INT, 0, PETSC_COMM_WORLD));
   PetscCallMPI(MPI_Bcast(renamed->to, (PetscMPIInt)renamed->n, MPIU_INT, 0, PETSC_COMM_WORLD));
-  next.nfield = g.nfield;
-  next.width = g.width;
+  remade->next.nfield = g.nfield;
+  remade->next.width = g.width;
   PetscCall(SbSceneCreate(PETSC_COMM_WORLD, &b->model));
   PetscCall(SbRunCreate(b->model, &b->run));
   for (PetscInt k = 0; k < a->model->nbody; k++) {
-    if (rank) PetscCall(SbGivenCreate(0, 0, 0, &given[k]));
-    if (rank && !k) given[0]->mass = g.mass[0];
-    b->model->body[k].given = given[k];
+    if (rank) PetscCall(SbGivenCreate(0, 0, 0, &remade->given[k]));
+    if (rank && !k) remade->given[0]->mass = g.mass[0];
+    b->model->body[k].given = remade->given[k];
+    remade->given[k] = NULL;
   }
   PetscCall(SbModelSetUp(b->model));
   PetscCall(SbRunSetUp(b->run));
   PetscCall(SbRunContinue(a->run, b->run));
-  PetscCall(SbScatter(&next, b->run));
+  PetscCall(SbScatter(&remade->next, b->run));
   PetscCall(SbEffectsHandOver(a->run, b->run, renamed));
   PetscCall(SbGatheredDestroy(&g));
-  PetscCall(SbGatheredDestroy(&next));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -131,7 +131,7 @@ static PetscErrorCode hand_over(TestScene *a, TestScene *b, SbRenamed *renamed)
 static PetscErrorCode check_touch(const char *scene, PetscBool collision)
 {
   TestScene a, b = {NULL, NULL, NULL, NULL};
-  SbRenamed renamed = {0};
+  SbRemade remade;
   Records before, after;
   PetscReal worst = 0., scale = 0.;
   PetscInt last, named;
@@ -142,11 +142,12 @@ static PetscErrorCode check_touch(const char *scene, PetscBool collision)
   PetscCall(test_scene_solve(&a));
   last = a.model->neffect - 1;
   e = a.model->effect[last];
-  PetscCall(hand_over(&a, &b, &renamed));
+  PetscCall(hand_over(&a, &b, &remade));
   PetscCall(gather(e, a.model->space, &before));
   PetscCall(put_in_order(e, collision, &before));
   named = before.n;
-  PetscCall((*e->ops.rename)(e, renamed.n, renamed.from, renamed.to, &before.n, before.r));
+  PetscCall(
+    (*e->ops.rename)(e, remade.renamed.n, remade.renamed.from, remade.renamed.to, &before.n, before.r));
   PetscCall(put_in_order(e, collision, &before));
   PetscCall(gather(b.model->effect[last], b.model->space, &after));
   PetscCall(put_in_order(e, collision, &after));
@@ -162,7 +163,7 @@ static PetscErrorCode check_touch(const char *scene, PetscBool collision)
            (double)worst, (double)scale);
   PetscCall(PetscFree(before.r));
   PetscCall(PetscFree(after.r));
-  PetscCall(PetscFree2(renamed.from, renamed.to));
+  PetscCall(SbRemadeDestroy(&remade));
   PetscCall(test_scene_close(&a));
   PetscCall(test_scene_close(&b));
   PetscFunctionReturn(PETSC_SUCCESS);
