@@ -43,6 +43,7 @@ typedef struct {
 typedef struct {
   SbScan scan;
   SbImport *im;
+  size_t length;         /* of the line */
   char line[LINE];       /* the current one, tabs replaced, without its comment */
   PetscBool commas, cut; /* cut: it was longer than this */
   int field, per_line;   /* last field taken; fields of values on the line */
@@ -149,12 +150,13 @@ static void copy_line(Nastran *b, const char *from, const char *to)
   }
   b->cut = (PetscBool)(from < to && *from != '$');
   b->line[n] = 0;
+  b->length = n;
 }
 
 /* Field k of this line, 0 its name. */
 static void get_field(const Nastran *b, int k, char word[WORD])
 {
-  const size_t length = strlen(b->line), width = b->per_line == 4 ? 16 : 8;
+  const size_t length = b->length, width = b->per_line == 4 ? 16 : 8;
   size_t from = k ? 8 + (size_t)(k - 1) * width : 0, to = k ? from + width : 8;
   const char *p = b->line;
 
@@ -216,8 +218,12 @@ static PetscErrorCode next_field(Nastran *b, char word[WORD], PetscBool *there)
 
   PetscFunctionBeginUser;
   word[0] = 0;
+  *there = PETSC_FALSE;
+  if (b->field == b->per_line && s->at < s->end && isalpha((unsigned char)*s->at))
+    PetscFunctionReturn(PETSC_SUCCESS); /* most often another entry begins there */
   if (b->field == b->per_line) {
     char line[LINE];
+    const size_t length = b->length;
     const PetscBool commas = b->commas;
 
     PetscCall(PetscStrncpy(line, b->line, sizeof(line)));
@@ -225,6 +231,7 @@ static PetscErrorCode next_field(Nastran *b, char word[WORD], PetscBool *there)
     if (!*there || !continues(b)) {
       /* that line is for later; this one stays at its end */
       PetscCall(PetscStrncpy(b->line, line, sizeof(line)));
+      b->length = length;
       b->commas = commas;
       b->field = b->per_line = 8;
       s->at = at;
