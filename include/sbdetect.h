@@ -187,7 +187,7 @@ PetscErrorCode SbSurfaceUpdate(SbSurface surface, const PetscReal u0[], const Pe
 
   Create: collective; `kind` is SB_DETECT_HASH or SB_DETECT_BRUTE, how points and tets are brought together; the surface is borrowed.
   Find: collective, after an SbSurfaceUpdate(), for local displacements u (m). Output: part[npoint], the part that a point is in, with the lowest number of several, -1: none.
-  Points on a surface are not in it. In its own part a point is in those tets that were farther from it than twice the reach at rest.
+  Points on the boundary of a body are not in it. In its own part a point is in those tets that were farther from it than twice the reach at rest.
 */
 typedef struct _p_SbInside *SbInside;
 PetscErrorCode SbInsideCreate(SbSurface surface, SbDetectKind kind, SbInside *inside);

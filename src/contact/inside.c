@@ -6,7 +6,7 @@
   coordinates decide. The table is that of hash.c, with the boxes of tets in the place of those of facets.
 
   Points go to the tets: each rank tells the boxes of its tets, body by body, and gets the points of others that are within them; what goes back are
-  two numbers for each point. While no boxes of two bodies meet nothing is done.
+  two numbers for each point. Who asks does so only while boxes of two bodies meet.
 
   A point on the boundary of a body is not inside, be its facets among those of the surface or not. In meshes that coincide such points are common, and so are those
   on edges and faces within a body: the tet with the boundary facet, on whichever rank, tells which it is. With CR and DG tets come apart a little, and a point in

@@ -6,7 +6,7 @@
   is no way out: neighbours would be pushed to different sides. So ways are given as by Heidelberger, Teschner, Keiser, Mueller and
   Gross, "Consistent penetration depth estimation for deformable collision response", VMV 2004: edges that go through the other surface
   tell their inner end the normal there, weighted by the inverse square of the distance; from these points they spread along edges to those
-  inside. Depth and place are then where the way leads out. They stay until the bodies have parted.
+  inside. Depth and place are then where the way leads out. They stay until no pair is deeper than half the reach, where the nearest place will do.
 
   Points of CR and DG are on facets: there an edge tells both its facets.
 */
