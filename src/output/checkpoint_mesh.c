@@ -60,18 +60,21 @@ PetscErrorCode SbCheckpointMeshBytes(SbRun run, PetscInt64 *bytes)
 static PetscErrorCode write_mesh(SbH5 *h, SbOutput out, const char *body, SbGiven *g, uint64_t *sum)
 {
   PetscInt count[3] = {g->nvert, g->ncell, g->ntri};
+  uint64_t own = out->rank ? 0 : sum_of(g);
   char name[2 * SB_NAME_MAX];
   Array a[NARRAY];
   hid_t group;
 
   PetscFunctionBeginUser;
   PetscCallMPI(MPI_Bcast(count, 3, MPIU_INT, 0, out->comm));
+  PetscCallMPI(MPI_Bcast(&own, 1, MPI_UINT64_T, 0, out->comm));
   arrays_of(g, count, a);
   PetscCall(PetscSNPrintf(name, sizeof(name), "mesh_%s", body));
   PetscCall(SbH5GroupCreate(h, NARRAY, 16, &group));
   PetscCall(SbH5PutInt(h, group, "step", g->step));
   PetscCall(SbH5PutReal(h, group, "mass", g->mass));
   PetscCall(SbH5PutReal(h, group, "bound", g->bound));
+  PetscCall(SbH5PutInt(h, group, "sum", (int64_t)own));
   for (int k = 0; k < 3; k++)
     PetscCall(SbH5PutInt(h, group, k == 0 ? "vertices" : k == 1 ? "tets" : "faces", count[k]));
   for (int k = 0; k < NARRAY; k++) {
@@ -87,7 +90,7 @@ static PetscErrorCode write_mesh(SbH5 *h, SbOutput out, const char *body, SbGive
   }
   PetscCall(SbH5GroupLink(h, group, h->file, name));
   (void)H5Gclose(group);
-  if (!out->rank) *sum += sum_of(g);
+  if (!out->rank) *sum += own;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -146,7 +149,7 @@ static PetscErrorCode read_mesh(hid_t file, const char *body, SbGiven **given, P
 {
   static const char *const counts[3] = {"vertices", "tets", "faces"};
   char name[2 * SB_NAME_MAX];
-  int64_t n[3] = {0, 0, 0}, step = 0;
+  int64_t n[3] = {0, 0, 0}, step = 0, sum = 0;
   PetscInt count[3];
   PetscReal mass = 0., bound = 0.;
   Array a[NARRAY];
@@ -166,6 +169,7 @@ static PetscErrorCode read_mesh(hid_t file, const char *body, SbGiven **given, P
   PetscCall(SbH5GetInt(group, "step", &step, ok));
   PetscCall(SbH5GetReal(group, "mass", &mass, ok));
   PetscCall(SbH5GetReal(group, "bound", &bound, ok));
+  PetscCall(SbH5GetInt(group, "sum", &sum, ok));
   for (int k = 0; k < 3; k++) count[k] = *ok ? (PetscInt)n[k] : 0;
   /* a count that lies shows when its dataset has another one: nothing is allocated for it */
   *ok = (PetscBool)(*ok && SbH5Rows(group, "x") == n[0] && SbH5Rows(group, "cells") == n[1] &&
@@ -177,7 +181,8 @@ static PetscErrorCode read_mesh(hid_t file, const char *body, SbGiven **given, P
     (*given)->bound = bound;
     arrays_of(*given, count, a);
     for (int k = 0; k < NARRAY; k++) PetscCall(read_array(group, &a[k], ok));
-    *ok = (PetscBool)(*ok && in_range(*given));
+    /* checked before the mesh is used: else a damaged file would be taken for one of another mesh */
+    *ok = (PetscBool)(*ok && in_range(*given) && (int64_t)sum_of(*given) == sum);
     if (!*ok) PetscCall(SbGivenDestroy(given));
   }
   (void)H5Gclose(group);
