@@ -20,6 +20,12 @@
 enum { LINE = 256, WORD = 64 };
 
 typedef struct {
+  int64_t label;
+  PetscReal x[3];
+  const char *at; /* for messages */
+} Grid;
+
+typedef struct {
   int64_t label, property, node[4];
   int type;
   const char *at; /* for messages */
@@ -48,8 +54,7 @@ typedef struct {
   PetscBool commas, cut; /* cut: it was longer than this */
   int field, per_line;   /* last field taken; fields of values on the line */
   Count nnode, nelement, nrange, nname;
-  int64_t *node; /* [nnode] labels */
-  PetscReal *x;  /* [nnode][3] */
+  Grid *node;
   Element *element;
   Range *range;
   Name *name;
@@ -305,7 +310,7 @@ static PetscErrorCode next_real(Nastran *b, int64_t node, PetscReal *value)
 static PetscErrorCode read_grid(Nastran *b)
 {
   int64_t label, system;
-  PetscInt v;
+  Grid *node;
 
   PetscFunctionBeginUser;
   PetscCall(next_label(b, "number of a node", &label));
@@ -318,11 +323,11 @@ static PetscErrorCode read_grid(Nastran *b)
       (long long)label, (long long)system);
   PetscCheck(b->nnode.n < PETSC_MAX_INT / 8, PETSC_COMM_SELF, PETSC_ERR_FILE_UNEXPECTED,
              "%s: has more nodes than this build can number", b->im->where);
-  v = b->nnode.n;
-  if (v == b->nnode.capacity) PetscCall(PetscRealloc(sizeof(*b->x) * 3 * (size_t)PetscMax(64, 2 * v), &b->x));
   PetscCall(grow(&b->nnode, sizeof(*b->node), &b->node));
-  b->node[v] = label;
-  for (int i = 0; i < 3; i++) PetscCall(next_real(b, label, &b->x[3 * v + i]));
+  node = &b->node[b->nnode.n - 1];
+  node->label = label;
+  node->at = b->scan.token;
+  for (int i = 0; i < 3; i++) PetscCall(next_real(b, label, &node->x[i]));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -474,12 +479,15 @@ static PetscErrorCode make_nodes(Nastran *b)
                   "there is no GRID up to here; this is no bulk data of Nastran, or it is truncated");
   }
   PetscCall(SbImportSetVertices(im, b->nnode.n));
-  PetscCall(PetscArraycpy(im->x, b->x, 3 * im->nvert));
-  PetscCall(PetscArraycpy(im->vert_number, b->node, im->nvert));
+  for (PetscInt v = 0; v < im->nvert; v++) {
+    PetscCall(PetscArraycpy(im->x + 3 * v, b->node[v].x, 3));
+    im->vert_number[v] = b->node[v].label;
+  }
   PetscCall(SbNumbersCreate(im->nvert, im->vert_number, &b->nodes));
-  PetscCheck(!b->nodes.repeated, PETSC_COMM_SELF, PETSC_ERR_FILE_UNEXPECTED,
-             "%s: node %lld is given twice; renumber the nodes", im->where, (long long)b->nodes.twice);
-  PetscFunctionReturn(PETSC_SUCCESS);
+  if (!b->nodes.repeated) PetscFunctionReturn(PETSC_SUCCESS);
+  for (PetscInt v = 0; v < im->nvert; v++)
+    if (b->node[v].label == b->nodes.twice) b->scan.token = b->node[v].at;
+  SB_SCAN_ERROR(&b->scan, "node %lld is given twice; renumber the nodes", (long long)b->nodes.twice);
 }
 
 static PetscErrorCode make_items(Nastran *b)
@@ -642,7 +650,6 @@ PetscErrorCode SbImportRead_Nastran(const char *path, SbImport *im)
   ierr = read_file(path, &b);
   PetscCall(SbNumbersDestroy(&b.nodes));
   PetscCall(PetscFree(b.node));
-  PetscCall(PetscFree(b.x));
   PetscCall(PetscFree(b.element));
   PetscCall(PetscFree(b.range));
   PetscCall(PetscFree(b.name));

@@ -345,7 +345,7 @@ static PetscErrorCode test_nastran(void)
      "line 1: node 1 is given in coordinate system 2; write all nodes in the basic one"},
     {"GRDSET,,3\n" GRIDS, "line 1: GRDSET gives the nodes in coordinate system 3"},
     {"GRID,,,0.,0.,0.\n", "line 1: the number of a node is missing"},
-    {GRIDS "GRID,3,,5.,0.,0.\nCTETRA,1,5,1,2,3,4\n", "n.bdf: node 3 is given twice; renumber the nodes"},
+    {GRIDS "GRID,3,,5.,0.,0.\nCTETRA,1,5,1,2,3,4\n", "n.bdf line 5: node 3 is given twice; renumber the nodes"},
     {GRIDS "INCLUDE 'more.bdf'\n", "line 5: INCLUDE is not followed; put all into one file"},
     {GRIDS "SPC1,1,123,1,2,3,4,1,2,3,4\n", "line 5: the line has more than 10 fields"},
     {GRIDS "SPC1,1,123,all\n", "line 5: expected the node of a set, found 'all'"},
