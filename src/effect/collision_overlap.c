@@ -15,6 +15,7 @@
 #include <limits.h>
 
 #define GRAZE 1e-6  /* of an edge: nearer to its inner end it touches a facet and does not go through it */
+#define ALONG 0.2   /* cosine between edge and normal, below which the edge runs along the facet */
 #define CANCEL 1e-6 /* of the weights: what is left of ways that oppose each other is none */
 #define BLIND 8     /* reaches, four edges: without a way out the nearest places are looked for so deep */
 #define PATIENCE 3  /* steps that a point may be inside without a pair: edges and rims take so long */
@@ -122,17 +123,18 @@ typedef struct {
 } Leaving;
 
 /*
-  Where an edge leaves a part through a facet, its inner end gets the facet's normal, and the corners of the facet the opposite one. `end`: so
-  much of the edge counts; a whole edge also when it ends on the facet.
+  Where an edge leaves a part through a facet, its inner end gets the facet's normal, and the corners of the facet the opposite one. `clear`: only when it
+  goes through it, and not along it.
 */
-static PetscErrorCode add_entry(const Collision *c, const Leaving *l, PetscInt facet, PetscReal end, Vec sum)
+static PetscErrorCode add_entry(const Collision *c, const Leaving *l, PetscInt facet, PetscBool clear,
+                                Vec sum)
 {
   const SbDetectScene *s = &c->surface->scene;
   const PetscReal *const x[3] = {s->x + 3 * s->facet[3 * facet], s->x + 3 * s->facet[3 * facet + 1],
                                  s->x + 3 * s->facet[3 * facet + 2]};
   const PetscReal *a = s->x + 3 * s->edges->corner[4 * l->edge + l->from],
                   *b = s->x + 3 * s->edges->corner[4 * l->edge + 1 - l->from];
-  PetscReal u[3], v[3], n[4], way[4], weight[3], t, length, inner;
+  PetscReal u[3], v[3], n[4], way[4], weight[3], t, length, edge2, inner;
   PetscInt node;
   PetscBool out;
 
@@ -142,12 +144,14 @@ static PetscErrorCode add_entry(const Collision *c, const Leaving *l, PetscInt f
     u[k] = x[1][k] - x[0][k];
     v[k] = x[2][k] - x[0][k];
   }
-  if (!SbRayMeets(a, way, x, &t, weight, &out) || !out || t < GRAZE || t > end)
+  if (!SbRayMeets(a, way, x, &t, weight, &out) || !out || t < GRAZE || t > (clear ? 1 - GRAZE : 1 + GRAZE))
     PetscFunctionReturn(PETSC_SUCCESS);
   SbCross(u, v, n);
   length = PetscSqrtReal(SbDot3(n, n));
-  inner = t * t * SbDot3(way, way);
-  if (!(length > 0)) PetscFunctionReturn(PETSC_SUCCESS);
+  edge2 = SbDot3(way, way);
+  inner = t * t * edge2;
+  if (!(length > 0) || (clear && SbDot3(n, way) < ALONG * length * PetscSqrtReal(edge2)))
+    PetscFunctionReturn(PETSC_SUCCESS);
   for (int k = 0; k < 3; k++) n[k] /= length * inner;
   n[3] = 1 / inner;
   for (int q = 0; q < 2; q++) { /* of CR and DG both facets; what is outside does not take it */
@@ -207,7 +211,7 @@ static PetscErrorCode find_leaving(const Collision *c, Ways *w, PetscInt *n, Lea
 }
 
 /* These edges against all facets of the parts: few of the one, and seldom. In its own part an edge meets its neighbours at its ends, which does not count. */
-static PetscErrorCode find_entries(const Collision *c, PetscReal end, Ways *w)
+static PetscErrorCode find_entries(const Collision *c, PetscBool clear, Ways *w)
 {
   const SbDetectScene *s = &c->surface->scene;
   Leaving *leaving;
@@ -232,7 +236,7 @@ static PetscErrorCode find_entries(const Collision *c, PetscReal end, Ways *w)
 
       if (leaving[j].part == s->facet_part[f] &&
           !apart(s->x + 3 * corner[0], s->x + 3 * corner[1], low, high))
-        PetscCall(add_entry(c, &leaving[j], f, end, w->sum));
+        PetscCall(add_entry(c, &leaving[j], f, clear, w->sum));
     }
   }
   PetscCall(PetscFree(leaving));
@@ -309,11 +313,10 @@ static PetscErrorCode spread(Ways *w)
 
 /*
   The ways out for the points inside c->way_part; those that get none are in no part afterwards. First by edges that go through a facet. Where
-  surfaces have planes in common edges end on facets, which tells less: only what has got no way by then goes by these.
+  surfaces have planes in common, or nearly, edges run along facets or end on them, which tells less: only what has got no way by then goes by these.
 */
 static PetscErrorCode find_ways(Collision *c)
 {
-  static const PetscReal ends[] = {1 - GRAZE, 1 + GRAZE};
   const PetscInt npoint = c->surface->scene.npoint;
   PetscInt n;
   Ways w;
@@ -321,7 +324,7 @@ static PetscErrorCode find_ways(Collision *c)
   PetscFunctionBeginUser;
   PetscCall(create_ways(c, &w));
   for (int pass = 0; pass < 2; pass++) {
-    PetscCall(find_entries(c, ends[pass], &w));
+    PetscCall(find_entries(c, (PetscBool)!pass, &w));
     PetscCall(know_ways(c, &w));
     PetscCall(take_ways(c, &w, &n));
     do {
