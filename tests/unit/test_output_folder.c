@@ -78,8 +78,9 @@ static PetscErrorCode test_fields(void)
   for (PetscInt i = 0; i < n; i++) {
     PetscCall(SbFieldFind(fields[i].name, &found));
     SB_CHECK(found == &fields[i], "field %s is not found by its name", fields[i].name);
-    SB_CHECK(fields[i].compute && fields[i].unit[0] && fields[i].help[0], "field %s is not complete",
-             fields[i].name);
+    /* `sets` are several arrays, which another function writes */
+    SB_CHECK((fields[i].compute || !strcmp(fields[i].name, "sets")) && fields[i].unit[0] && fields[i].help[0],
+             "field %s is not complete", fields[i].name);
   }
   SB_CHECK_ERROR(SbFieldFind("von_mizes", &found), "a misspelt field");
   PetscCall(test_scene_open_in(dir, BOX EULER "-output_fields J,J,stress", &scene));
