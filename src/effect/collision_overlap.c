@@ -18,6 +18,7 @@
 #define ALONG 0.2   /* cosine between edge and normal, below which the edge runs along the facet */
 #define CANCEL 1e-6 /* of the weights: what is left of ways that oppose each other is none */
 #define BLIND 8     /* reaches, four edges: without a way out the nearest places are looked for so deep */
+#define SHALLOW 0.5 /* of the reach: what is less deep needs no way out but the nearest place */
 #define PATIENCE 3  /* steps that a point may be inside without a pair: edges and rims take so long */
 #define AGAIN 30    /* steps after which one that has got no pair is looked at again */
 
@@ -417,13 +418,23 @@ static PetscErrorCode tell_unmet(SbEffect e, const PetscInt inside[], PetscInt u
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Points in tets, and how many on all ranks. */
+/* Points in tets, and how many on all ranks, without those that lie in contact: the nearest place is their way out. */
 static PetscErrorCode find_inside(const Collision *c, const PetscReal u[], PetscInt inside[], PetscInt *n)
 {
   PetscFunctionBeginUser;
   PetscCall(SbInsideFind(c->inside, u, c->self, inside));
   *n = 0;
-  for (PetscInt i = 0; i < c->surface->scene.npoint; i++) *n += inside[i] >= 0;
+  for (PetscInt i = 0, j = 0; i < c->surface->scene.npoint; i++) {
+    const PetscBool led = (PetscBool)(c->way && c->way_part[i] >= 0 && c->way_part[i] == inside[i]);
+    PetscBool lies = PETSC_FALSE;
+
+    for (; j < c->nhit && c->hit[j].point <= i; j++) {
+      if (c->hit[j].point == i && c->hit[j].part == inside[i] && c->hit[j].gap >= -SHALLOW * c->reach)
+        lies = PETSC_TRUE;
+    }
+    if (lies && !led) inside[i] = -1;
+    *n += inside[i] >= 0;
+  }
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, n, 1, MPIU_INT, MPI_SUM, c->surface->space->comm));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -482,7 +493,8 @@ static PetscErrorCode lead_out(Collision *c, const PetscReal u[], const PetscInt
     if (c->way_part[i] < 0) c->way_part[i] = inside[i];
   }
   for (PetscInt i = 0; i < c->nhit && !SbCollisionOfEdges(c, &c->hit[i]); i++) {
-    if (c->hit[i].gap < 0 && c->way_part[c->hit[i].point] < 0) c->way_part[c->hit[i].point] = c->hit[i].part;
+    if (c->hit[i].gap < -SHALLOW * c->reach && c->way_part[c->hit[i].point] < 0)
+      c->way_part[c->hit[i].point] = c->hit[i].part;
   }
   PetscCall(find_ways(c));
   PetscCall(SbCollisionLook(c, u, PETSC_FALSE));
@@ -524,7 +536,7 @@ PetscErrorCode SbCollisionFollowOverlap(Collision *c)
   PetscFunctionBeginUser;
   if (!(c->deep > 0)) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(deepest_of(c, &deepest));
-  c->deep = 2 * deepest > c->reach ? PetscMin(c->deep, 2 * deepest) : 0;
+  c->deep = deepest > SHALLOW * c->reach ? PetscMin(c->deep, 2 * deepest) : 0;
   if (c->deep == 0) PetscCall(PetscFree2(c->way, c->way_part));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
