@@ -368,6 +368,7 @@ PetscErrorCode SbInsideFind(SbInside in, const PetscReal u[], PetscBool self, Pe
 
   PetscFunctionBeginUser;
   PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_SEARCH], 0, 0, 0, 0));
+  PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_INSIDE], 0, 0, 0, 0));
   PetscCall(create_mail(h->size, &mail));
   PetscCall(box_tets(in, u));
   PetscCall(ask(in, u, self, in->detector->facet_box, &mail, &sent, &asked));
@@ -388,6 +389,7 @@ PetscErrorCode SbInsideFind(SbInside in, const PetscReal u[], PetscBool self, Pe
   PetscCall(PetscFree(asked));
   PetscCall(PetscFree(sent));
   PetscCall(destroy_mail(&mail));
+  PetscCall(PetscLogEventEnd(SbEvents[SB_EVENT_INSIDE], 0, 0, 0, 0));
   PetscCall(PetscLogEventEnd(SbEvents[SB_EVENT_SEARCH], 0, 0, 0, 0));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -228,13 +228,14 @@ static PetscErrorCode add_file(const char *name, PetscInt64 bytes, void *ctx)
 /* What effects have to say of their work. Collective. */
 static PetscErrorCode print_work(SbModel m, PetscBool silent)
 {
-  char text[512] = "";
+  char text[512];
 
   PetscFunctionBeginUser;
   for (PetscInt e = 0; e < m->neffect; e++) {
     const SbEffect effect = m->effect[e];
 
     if (!effect->ops.tell) continue;
+    text[0] = 0;
     PetscCall(effect->ops.tell(effect, m->space, sizeof(text), text));
     if (!silent && text[0]) PetscCall(entry("effect", "%s: %s", effect->name, text));
   }

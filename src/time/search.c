@@ -14,7 +14,7 @@
 */
 #include "time_impl.h"
 
-#define DOWN_ITERATIONS 1000 /* limited tangents are slow near such places: 330 were seen */
+#define DOWN_ITERATIONS 1000 /* limited tangents are slow near such places: a mirrored cube takes hundreds */
 #define TRIES 12
 #define ENOUGH 0.5 /* of the slope at the start */
 
