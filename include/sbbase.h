@@ -144,6 +144,16 @@ PetscErrorCode SbWarning(MPI_Comm comm, const char *format, ...) PETSC_ATTRIBUTE
 /* From here on arrays of 32 MiB and more are given back to the system when they are freed. After PetscInitialize(). */
 void SbMemoryReturnLarge(void);
 
+/* ------------------------------------------------------------------ threads */
+
+/*
+  SbThreadsSetOne - from here on the libraries of this process (OpenMP's, BLAS) compute on the calling thread alone.
+
+  Not collective. Returns the number of threads that some library would still use, 1 when all obey. Libraries that are loaded
+  later are not told: call it again.
+*/
+int SbThreadsSetOne(void);
+
 /* ------------------------------------------------------------------ formulas */
 
 /*

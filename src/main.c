@@ -106,6 +106,7 @@ static PetscErrorCode supple(int argc, char *argv[])
   PetscCall(SbCommandLine(&argc, argv, &command));
   PetscCall(PetscInitialize(&argc, &argv, command.scenario[0] ? command.scenario : NULL, NULL));
   SbMemoryReturnLarge();
+  (void)SbThreadsSetOne();
   (void)signal(SIGPIPE, SIG_IGN); /* a terminal that is gone must not end a run that writes files */
   PetscCheck(!command.problem[0], PETSC_COMM_SELF, PETSC_ERR_USER, "%s", command.problem);
   PetscCall(SbOptionsRemember());

@@ -35,6 +35,7 @@ static PetscErrorCode supple_mesh(int argc, char *argv[])
   PetscCall(SbToolCommandLine(&argc, argv, &line));
   PetscCall(PetscInitialize(&argc, &argv, NULL, NULL));
   SbMemoryReturnLarge();
+  (void)SbThreadsSetOne();
   (void)signal(SIGPIPE, SIG_IGN);
   PetscCall(work(argc, argv, &line));
   PetscCall(SbOptionsReset());

@@ -51,6 +51,7 @@ static inline void sb_test_record(PetscBool ok, const char *file, int line, cons
   do {                                                        \
     PetscFunctionBeginUser;                                   \
     PetscCall(PetscInitialize(&(argc), &(argv), NULL, NULL)); \
+    (void)SbThreadsSetOne();                                  \
   } while (0)
 
 static inline int sb_test_end(void)

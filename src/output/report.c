@@ -156,15 +156,18 @@ static PetscErrorCode print_output(SbOutput out)
 PetscErrorCode SbReportHeader(SbRun run)
 {
   SbOutput out = (SbOutput)run->output;
-  char petsc[256];
+  char petsc[256], threads[64] = "one thread";
+  int most;
 
   PetscFunctionBeginUser;
   if (out->quiet || out->rank) PetscFunctionReturn(PETSC_SUCCESS);
+  /* a library that does not obey is named by what it may use */
+  most = SbThreadsSetOne();
+  if (most > 1) (void)snprintf(threads, sizeof(threads), "up to %d threads", most);
   (void)snprintf(petsc, sizeof(petsc), "%d.%d.%d", PETSC_VERSION_MAJOR, PETSC_VERSION_MINOR,
                  PETSC_VERSION_SUBMINOR);
-  PetscCall(PetscFPrintf(PETSC_COMM_SELF, PETSC_STDOUT,
-                         "supple %s with PETSc %s on %d rank%s, one thread each\n", SB_VERSION, petsc,
-                         (int)out->size, out->size == 1 ? "" : "s"));
+  PetscCall(PetscFPrintf(PETSC_COMM_SELF, PETSC_STDOUT, "supple %s with PETSc %s on %d rank%s, %s each\n",
+                         SB_VERSION, petsc, (int)out->size, out->size == 1 ? "" : "s", threads));
   PetscCall(print_bodies(run->model, out));
   if (out->scenario[0]) PetscCall(entry("scenario", "%s", out->scenario));
   PetscCall(print_effects(run->model));

@@ -188,7 +188,8 @@ static PetscErrorCode write_json(SbRun run, SbOutput out, const char *status, co
   put_versions(f);
   (void)gethostname(host, sizeof(host) - 1);
   put_text(f, "host", host);
-  (void)fprintf(f, "  \"cores\": %ld,\n  \"ranks\": %d,\n", sysconf(_SC_NPROCESSORS_ONLN), (int)out->size);
+  (void)fprintf(f, "  \"cores\": %ld,\n  \"ranks\": %d,\n  \"threads_per_rank\": %d,\n",
+                sysconf(_SC_NPROCESSORS_ONLN), (int)out->size, SbThreadsSetOne());
   put_text(f, "started", out->started);
   put_text(f, "scenario", out->scenario);
   put_bodies(f, run->model, out);
