@@ -79,6 +79,8 @@ struct _p_SbRun {
   PetscReal arrival;                  /* the part of the step at which it did, 1: it did not */
   PetscReal spectral_radius, newmark[2]; /* newmark: beta, gamma */
   PetscInt max_cuts, static_steps;
+  PetscReal min_increment; /* static: smallest load increment as a part of 1 / static_steps */
+  PetscReal softening;     /* static: |du|/dlambda of the last step over that of the first one; 0: there was none */
   PetscBool
     free_body; /* static, without contact: nothing holds some body, and shorter load steps do not help */
   PetscBool tangent_known; /* J holds the tangent for shift_v, shift_a */

@@ -46,6 +46,9 @@ static const SbOption rows[] = {
    "MINRES with the preconditioner of the solver; auto goes by size"},
   {"static_steps", SB_OPTION_INT, 1, "", "1", "[1, 1000000]",
    "static: equal load steps from zero to full load"},
+  {"static_min_increment", SB_OPTION_REAL, 1, "", "1e-4", "(0, 1]",
+   "static: smallest load increment, as a part of a load step; where equilibrium asks for a shorter one the "
+   "run stops, and says whether a limit load is likely"},
 };
 
 PetscErrorCode SbTimeRegister(void)
@@ -92,6 +95,7 @@ PetscErrorCode SbRunCreate(SbModel model, SbRun *run)
     r->velocity_predictor = (PetscBool)(predictor == 1);
   } else {
     PetscCall(SbOptionInt(&scope, "static_steps", &r->static_steps));
+    PetscCall(SbOptionReal(&scope, "static_min_increment", &r->min_increment));
     r->t_end = 1.;
     r->dt = 1. / (PetscReal)r->static_steps;
   }

@@ -1,10 +1,16 @@
 /*
   The load path of a static run: f_int(u) = lambda f_ext, u = lambda u_prescribed on supports, lambda from 0 to 1 in
   -static_steps equal steps. There is no mass, no damping and no TS. A step whose solve fails is halved and tried again from the
-  last equilibrium; two steps that succeed double it again.
+  last equilibrium; each step that succeeds doubles it again.
+
+  Towards a limit load lambda* displacements go like sqrt(lambda* - lambda), and steps become shorter without end. Below
+  -static_min_increment the run stops; how much faster displacements grow with the load than in the first step tells a limit load from
+  other failures. A shortened step without an iteration (a change of load below rounding) is no sign that steps may be longer.
 */
 #include "sbsolver.h"
 #include "time_impl.h"
+
+#define LIMIT 10. /* softening from which on a limit load is likely */
 
 /* Newton from the displacement that X holds. */
 static PetscErrorCode solve_once(void *ctx, Vec X, SNESConvergedReason *reason)
@@ -146,10 +152,43 @@ static PetscErrorCode solve_at(SbRun run, PetscReal factor, PetscReal length, Pe
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* U <- X, and how many times as fast as in the first step displacements have grown with the load. */
+static PetscErrorCode take(SbRun run, PetscReal length, Vec X, PetscReal *first)
+{
+  PetscReal rate;
+
+  PetscFunctionBeginUser;
+  PetscCall(VecAXPY(run->U, -1., X));
+  PetscCall(VecNorm(run->U, NORM_2, &rate));
+  rate /= length;
+  if (*first == 0.) *first = rate;
+  if (*first > 0. && run->newton_step) run->softening = rate / *first;
+  PetscCall(VecCopy(X, run->U));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Steps have become too short: how far the load has got, and what is likely in the way. */
+static PetscErrorCode explain_end(SbRun run, PetscReal factor, PetscReal length)
+{
+  char why[sizeof(run->stop_reason)];
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscStrncpy(why, run->stop_reason, sizeof(why)));
+  if (!run->refused && run->softening > LIMIT)
+    PetscCall(
+      SbRunFail(run,
+                "the load factor reached %.7g of 1, and no equilibrium was found %.1e further on: a limit "
+                "load is likely, as displacements grow %.0f times as fast with the load as at first",
+                (double)factor, (double)(2. * length), (double)run->softening));
+  else if (factor > 0.)
+    PetscCall(SbRunFail(run, "the load factor reached %.7g of 1; %s", (double)factor, why));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode SbStaticSolve(SbRun run)
 {
-  const PetscReal nominal = 1. / (PetscReal)run->static_steps;
-  PetscReal factor = run->t0, length = nominal;
+  const PetscReal nominal = 1. / (PetscReal)run->static_steps, least = run->min_increment * nominal;
+  PetscReal factor = run->t0, length = nominal, rate = 0.;
   PetscInt step = run->step0, cuts = 0;
   Vec X;
 
@@ -173,19 +212,21 @@ PetscErrorCode SbStaticSolve(SbRun run)
       if (simpler) continue;
       length *= 0.5;
       run->tangent_known = PETSC_FALSE;
-      if (run->free_body || ++cuts > run->max_cuts || SbRunTooShort(run, length)) break;
-      continue;
+      if (run->free_body) break;
+      if (++cuts <= run->max_cuts && length >= least && !SbRunTooShort(run, length)) continue;
+      PetscCall(explain_end(run, factor, length));
+      break;
     }
     run->stop_reason[0] = 0;
-    PetscCall(VecCopy(X, run->U));
+    PetscCall(take(run, next - factor, X, &rate));
     run->after.dt = next - factor;
     if (run->after.fn && next < 1.)
       PetscCall((*run->after.fn)(run, step + 1, next, next - factor, run->after.ctx, &run->paused));
     PetscCall(SbRunStepAccepted(run, ++step, next, next - factor, (PetscBool)(next >= 1.)));
+    if (run->newton_step) cuts = 0;
     run->newton_step = run->linear_step = run->rejected_step = 0;
     if (run->paused) break;
     factor = next;
-    cuts = 0;
     length = PetscMin(2. * length, nominal);
   }
   PetscCall(VecDestroy(&X));
