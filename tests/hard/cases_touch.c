@@ -103,18 +103,12 @@
 /* A thick saddle, 8 x 8 squares of two triangles: z = h (y / b)^2 - h (x / a)^2 above, flat below. */
 static PetscErrorCode write_saddle(char path[512])
 {
-  const char *folder = getenv("TMPDIR");
   const int n = 8;
-  PetscMPIInt rank;
+  FILE *f;
 
   PetscFunctionBeginUser;
-  PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
-  PetscCall(PetscSNPrintf(path, 512, "%s/supple-XXXXXX.off", folder ? folder : "/tmp"));
-  if (!rank) {
-    const int fd = mkstemps(path, 4);
-    FILE *f = fd < 0 ? NULL : fdopen(fd, "w");
-
-    PetscCheck(f, PETSC_COMM_SELF, PETSC_ERR_FILE_OPEN, "Cannot write %s", path);
+  PetscCall(test_file_open(".off", path, &f));
+  if (f) {
     fprintf(f, "OFF\n%d %d 0\n", 2 * (n + 1) * (n + 1), 4 * n * n + 8 * n);
     for (int v = 0; v < 2 * (n + 1) * (n + 1); v++) {
       const double x = 2. * (v % (n + 1)) / n - 1, y = 2. * (v / (n + 1) % (n + 1)) / n - 1;
@@ -139,9 +133,8 @@ static PetscErrorCode write_saddle(char path[512])
 
       fprintf(f, "3 %d %d %d\n3 %d %d %d\n", a, down + b, b, a, down + a, down + b);
     }
-    PetscCheck(!fclose(f), PETSC_COMM_SELF, PETSC_ERR_FILE_WRITE, "Cannot write %s", path);
   }
-  PetscCallMPI(MPI_Bcast(path, 512, MPI_CHAR, 0, PETSC_COMM_WORLD));
+  PetscCall(test_file_close(f));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

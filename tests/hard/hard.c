@@ -1,7 +1,7 @@
 /*
   Runs hard cases (hard.h): hard -case NAME [-runs N] [-verbose] [-more "OPTIONS"], or -list.
 
-  -list writes one line per case: name, ranks with commas, quick runs, seconds, what is hard, separated by tabs. A case prints one
+  -list writes one line per case: name, ranks with commas, quick runs, processor time in s on each rank, what is hard, separated by tabs. A case prints one
   line per limit, which tests/run and scripts/stability read:
     limit|case|ranks|runs|quantity|measured|relation|bound|unit
 */
@@ -31,7 +31,7 @@ static void list_cases(void)
       else
         printf("%s\t%d", c->name, n[0]);
       for (int k = 1; k < 3 && n[k]; k++) printf(",%d", n[k]);
-      printf("\t%d\t%d\t%s\n", PetscMin(c->quick, case_runs(c)), c->seconds ? c->seconds : 120, c->what);
+      printf("\t%d\t%d\t%s\n", PetscMin(c->quick, case_runs(c)), c->seconds ? c->seconds : 300, c->what);
     }
   }
 }
@@ -152,7 +152,7 @@ static PetscErrorCode run_case(const HardCase *c, int runs, const char *more, Pe
                               l->name ? l->name : HardQuantityName(l->quantity), (double)now));
     }
   }
-  if (c->mesh) PetscCall(verify_mesh_remove(path));
+  if (c->mesh) PetscCall(test_file_remove(path));
   PetscCall(report(c, runs, worst));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

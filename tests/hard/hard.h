@@ -93,7 +93,7 @@ struct _HardCase {
   int ranks[3];           /* {0}: 1, 2 and 3 */
   int runs;               /* 0: 1 without jitter, 10 with */
   int quick;              /* runs in `make check`, on 2 ranks; 0: only in `make check-hard` */
-  int seconds;            /* that all runs may take; 0: 120 */
+  int seconds;            /* of processor time that all runs may take on each rank; 0: 300 */
   PetscReal jitter;       /* of the displacement at the start, of the size */
   PetscReal jitter_speed; /* of the velocity at the start, m/s */
   HardLimit limits[HARD_LIMITS + 1];

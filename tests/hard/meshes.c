@@ -114,20 +114,11 @@ static void write_slivers(FILE *f)
 
 PetscErrorCode HardMeshSliver(char path[512])
 {
-  const char *folder = getenv("TMPDIR");
-  PetscMPIInt rank;
+  FILE *f;
 
   PetscFunctionBeginUser;
-  PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
-  PetscCall(PetscSNPrintf(path, 512, "%s/supple-XXXXXX.msh", folder ? folder : "/tmp"));
-  if (!rank) {
-    const int fd = mkstemps(path, 4);
-    FILE *f = fd < 0 ? NULL : fdopen(fd, "w");
-
-    PetscCheck(f, PETSC_COMM_SELF, PETSC_ERR_FILE_OPEN, "Cannot write %s", path);
-    write_slivers(f);
-    PetscCheck(!fclose(f), PETSC_COMM_SELF, PETSC_ERR_FILE_WRITE, "Cannot write %s", path);
-  }
-  PetscCallMPI(MPI_Bcast(path, 512, MPI_CHAR, 0, PETSC_COMM_WORLD));
+  PetscCall(test_file_open(".msh", path, &f));
+  if (f) write_slivers(f);
+  PetscCall(test_file_close(f));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

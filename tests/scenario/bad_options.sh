@@ -1,7 +1,6 @@
 #!/usr/bin/env bash
 # Every mistake in the options ends with one clear line, once for all ranks, a non-zero exit code and no trace.
 # Also: what the command line answers (-help, -version, -scenario_view) and that a printed scenario runs again.
-# @timeout 300
 set -uo pipefail
 # shellcheck source=tests/scenario/scenario_common.sh
 source tests/scenario/scenario_common.sh

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Five million tets from a .msh of gmsh on two ranks: both ranks together stay below 3 GiB at any time (2.0 GiB measured).
 # @long
-# @timeout 900
+# @cpu 900
 set -uo pipefail
 # shellcheck source=tests/scenario/scenario_common.sh
 source tests/scenario/scenario_common.sh

@@ -1,6 +1,5 @@
 #!/usr/bin/env bash
 # The ledger as a user meets it: the table and its words, ledger.csv, columns of history.csv, the field, the dials, and what is refused.
-# @timeout 300
 set -uo pipefail
 # shellcheck source=tests/scenario/scenario_common.sh
 source tests/scenario/scenario_common.sh

@@ -48,13 +48,15 @@ static inline PetscErrorCode fixture_remove(const char *dir)
   PetscFunctionBeginUser;
   PetscCallMPI(MPI_Barrier(PETSC_COMM_WORLD));
   PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
-  if (rank || !(d = opendir(dir))) PetscFunctionReturn(PETSC_SUCCESS);
-  while ((entry = readdir(d))) {
-    SbFormat(sizeof(path), path, "%s/%s", dir, entry->d_name);
-    (void)unlink(path);
+  if (!rank && (d = opendir(dir))) {
+    while ((entry = readdir(d))) {
+      SbFormat(sizeof(path), path, "%s/%s", dir, entry->d_name);
+      (void)unlink(path);
+    }
+    (void)closedir(d);
+    (void)rmdir(dir);
   }
-  (void)closedir(d);
-  (void)rmdir(dir);
+  PetscCallMPI(MPI_Barrier(PETSC_COMM_WORLD)); /* what is gone is gone for all ranks */
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

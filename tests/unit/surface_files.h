@@ -2,9 +2,7 @@
   surface_files.h - closed surfaces for tests, written as files of each kind that is read.
 */
 #pragma once
-#include <stdlib.h>
-#include <unistd.h>
-#include <sbbase.h>
+#include "../file.h"
 
 typedef struct {
   PetscInt nvert, ntri;
@@ -241,34 +239,17 @@ static inline PetscErrorCode test_file_write(const char *extension, PetscBool bi
     const char *extension;
     void (*write)(FILE *, const TestSurface *);
   } kinds[] = {{".stl", write_stl}, {".obj", write_obj}, {".off", write_off}, {".msh", write_msh}};
-  const char *folder = getenv("TMPDIR");
-  PetscMPIInt rank;
+  FILE *f;
 
   PetscFunctionBeginUser;
-  PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
-  PetscCall(PetscSNPrintf(path, 512, "%s/supple-XXXXXX%s", folder ? folder : "/tmp", extension));
-  if (!rank) {
-    const int fd = mkstemps(path, (int)strlen(extension));
-    FILE *f = fd < 0 ? NULL : fdopen(fd, "wb");
-
-    PetscCheck(f, PETSC_COMM_SELF, PETSC_ERR_FILE_OPEN, "Cannot write %s", path);
+  PetscCall(test_file_open(extension, path, &f));
+  if (f) {
     if (text) fprintf(f, "%s", text);
     if (s && binary) write_stl_binary(f, s);
     for (size_t k = 0; s && !binary && k < PETSC_STATIC_ARRAY_LENGTH(kinds); k++) {
       if (!strcmp(extension, kinds[k].extension)) (*kinds[k].write)(f, s);
     }
-    PetscCheck(!fclose(f), PETSC_COMM_SELF, PETSC_ERR_FILE_WRITE, "Cannot write %s", path);
   }
-  PetscCallMPI(MPI_Bcast(path, 512, MPI_CHAR, 0, PETSC_COMM_WORLD));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static inline PetscErrorCode test_file_remove(const char path[])
-{
-  PetscMPIInt rank;
-
-  PetscFunctionBeginUser;
-  PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
-  if (!rank) (void)unlink(path);
+  PetscCall(test_file_close(f));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -3,8 +3,8 @@
   reaction and torque; with every element, and on the supports of DG faces.
 */
 // @ranks 1 3
-#include <unistd.h>
 #include "effect_fixture.h"
+#include "../file.h"
 
 static const char *const sets[][2] = {{"top", "plane:0,0,1,1"}, {"bottom", "plane:0,0,1,0"}};
 
@@ -91,34 +91,18 @@ static PetscErrorCode check_torque(Fixture *x, SbEffect e)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A table of this run's own: tests may run side by side. */
-static PetscErrorCode write_table(size_t size, char name[])
-{
-  PetscMPIInt rank;
-
-  PetscFunctionBeginUser;
-  PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
-  if (!rank) {
-    FILE *file;
-
-    PetscCall(PetscSNPrintf(name, size, "/tmp/supple_test_drive_%d.txt", (int)getpid()));
-    PetscCall(PetscFOpen(PETSC_COMM_SELF, name, "w", &file));
-    PetscCall(PetscFPrintf(PETSC_COMM_SELF, file, "# t x\n0 0\n2, 3\n"));
-    PetscCall(PetscFClose(PETSC_COMM_SELF, file));
-  }
-  PetscCallMPI(MPI_Bcast(name, (PetscMPIInt)size, MPI_CHAR, 0, PETSC_COMM_WORLD));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 static PetscErrorCode check_element(const char *element, PetscBool held)
 {
   Fixture x;
   SbEffect twist, pull;
-  char table[64], options[256];
+  char table[512], options[1024];
+  FILE *file;
 
   PetscFunctionBeginUser;
   fixture_use(element, element, held);
-  PetscCall(write_table(sizeof(table), table));
+  PetscCall(test_file_open(".txt", table, &file));
+  if (file) fprintf(file, "# t x\n0 0\n2, 3\n");
+  PetscCall(test_file_close(file));
   PetscCall(fixture_create(PETSC_COMM_WORLD, 1, "box:1,1,1:2", PETSC_STATIC_ARRAY_LENGTH(sets), sets, &x));
   PetscCall(effect_create(
     &x, "twist",
@@ -142,8 +126,7 @@ static PetscErrorCode check_element(const char *element, PetscBool held)
   PetscCall(SbEffectDestroy(&twist));
   PetscCall(SbEffectDestroy(&pull));
   PetscCall(fixture_destroy(&x));
-  PetscCallMPI(MPI_Barrier(PETSC_COMM_WORLD));
-  (void)remove(table);
+  PetscCall(test_file_remove(table));
   PetscCall(PetscOptionsClear(NULL));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

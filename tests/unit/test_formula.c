@@ -2,6 +2,7 @@
   test_formula.c - formulas and tables: values against C's own arithmetic, messages of what cannot be read.
 */
 // @ranks 1 3
+#include "file.h"
 #include "test.h"
 #include <unistd.h>
 
@@ -168,18 +169,14 @@ static PetscErrorCode table(const char *file, const char *content, const char *p
 
 static PetscErrorCode test_tables(void)
 {
-  char file[PETSC_MAX_PATH_LEN] = "/tmp/sb_test_formula_XXXXXX";
-  PetscMPIInt rank;
+  char file[512];
+  FILE *empty;
   SbFormula f;
   PetscBool time, place;
-  int fd = -1;
 
   PetscFunctionBeginUser;
-  PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
-  if (!rank) fd = mkstemp(file);
-  if (!rank) PetscCheck(fd >= 0, PETSC_COMM_SELF, PETSC_ERR_FILE_OPEN, "cannot make a file");
-  if (!rank) (void)close(fd);
-  PetscCallMPI(MPI_Bcast(file, sizeof(file), MPI_CHAR, 0, PETSC_COMM_WORLD));
+  PetscCall(test_file_open(".txt", file, &empty));
+  PetscCall(test_file_close(empty));
 
   PetscCall(table(file, "# t value\n0 1\n\n 1, 3 # here\r\n2\t5\n4;-5", NULL, &f));
   PetscCall(SbFormulaUses(f, &time, &place));
@@ -199,7 +196,7 @@ static PetscErrorCode test_tables(void)
   PetscCall(
     table(file, "0 1\n2 1\n2 3\n", ", line 3: time 2 s does not come after 2 s; times must ascend", &f));
   PetscCall(table(file, "# nothing\n", " holds no numbers", &f));
-  if (!rank) (void)unlink(file);
+  PetscCall(test_file_remove(file));
   PetscCall(
     refused("table:/nonexistent.txt", "-test: cannot open /nonexistent.txt: No such file or directory"));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -1,7 +1,7 @@
 """The chart of what accuracy costs, quick (scripts/accuracy): every run ends well, errors fall at their orders, each problem has its front.
 
 @long
-@timeout 900
+@cpu 900
 """
 import os
 import subprocess

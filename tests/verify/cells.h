@@ -83,7 +83,7 @@ static inline void verify_move_vertex(const PetscInt n[3], const PetscInt at[3],
   }
 }
 
-/* Such a box as a file; the same for the same n on any number of ranks. verify_mesh_remove() it. Collective. */
+/* Such a box as a file; the same for the same n on any number of ranks. test_file_remove() it. Collective. */
 static inline PetscErrorCode verify_distorted_box(const PetscInt n[3], const PetscReal size[3],
                                                   char path[512])
 {

@@ -175,6 +175,6 @@ static inline PetscErrorCode hertz(const Pair *p, const Case *c, PetscReal *forc
                 "force in the history against the one that acts");
   SB_CHECK(values[DEEPEST] < 0.01 * d, "penetration %g m of %g m", (double)values[DEEPEST], (double)d);
   PetscCall(test_scene_close(&t));
-  for (int k = 0; k < 2; k++) PetscCall(verify_mesh_remove(path[k]));
+  for (int k = 0; k < 2; k++) PetscCall(test_file_remove(path[k]));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

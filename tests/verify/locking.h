@@ -60,7 +60,7 @@ static inline PetscErrorCode locking_cube(PetscInt n, const char *file, PetscRea
   PetscCall(locking_run(scene, text, &t, cost));
   PetscCall(manufactured_errors(t.model, t.run->U, error));
   PetscCall(test_scene_close(&t));
-  if (!file[0]) PetscCall(verify_mesh_remove(mesh));
+  if (!file[0]) PetscCall(test_file_remove(mesh));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -92,7 +92,7 @@ static inline PetscErrorCode locking_bar(PetscInt n, PetscReal nu, const char *m
   value[0] = u[2];
   value[1] = e.strain;
   PetscCall(test_scene_close(&t));
-  PetscCall(verify_mesh_remove(mesh));
+  PetscCall(test_file_remove(mesh));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -262,7 +262,7 @@ static inline PetscErrorCode locking_beam(PetscInt n, PetscReal mu, const char *
   PetscCall(locking_run(scene, more, &t, cost));
   PetscCall(verify_value_at(t.model, t.run->U, tip, u));
   PetscCall(test_scene_close(&t));
-  PetscCall(verify_mesh_remove(mesh));
+  PetscCall(test_file_remove(mesh));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -345,7 +345,7 @@ static inline PetscErrorCode locking_hang(PetscInt n, PetscReal nu, const char *
   value[1] = (e.volume - t.model->body[0].volume) / t.model->body[0].volume;
   value[2] = e.min_J;
   PetscCall(test_scene_close(&t));
-  PetscCall(verify_mesh_remove(mesh));
+  PetscCall(test_file_remove(mesh));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -375,7 +375,7 @@ static inline PetscErrorCode locking_modes(PetscInt n, PetscReal nu, const char 
   value[1] = w2[zero] / unit;
   value[2] = w2[zero + 1] / unit;
   PetscCall(test_scene_close(&t));
-  PetscCall(verify_mesh_remove(mesh));
+  PetscCall(test_file_remove(mesh));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -60,7 +60,7 @@ def command(ranks, folder, *more):
 
 def run(ranks, folder, *more, fails=False, **keywords):
     """Runs the scenario; returns what it printed."""
-    result = subprocess.run(command(ranks, folder, *more), capture_output=True, text=True, timeout=100, **keywords)
+    result = subprocess.run(command(ranks, folder, *more), capture_output=True, text=True, **keywords)
     text = result.stdout + result.stderr
     if (result.returncode != 0) != fails:
         sys.exit(f"{folder}: exit code {result.returncode}\n{text}")

@@ -20,19 +20,13 @@ def fill_up(ranks, folder, frames, *more):
     """Starts a long run, lets it write a few frames, then lets no file grow. Returns exit code and output."""
     shutil.rmtree(OUT / folder, ignore_errors=True)
     args = command(ranks, folder, "-ts_max_time", "100", "-progress", "false", *more)
-    process = subprocess.Popen(args, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, start_new_session=True)
+    process = subprocess.Popen(args, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
     index = OUT / folder / "fields.xmf"
-    end = time.time() + 60
-    while not (index.exists() and index.read_text().count("<Time") >= frames) and time.time() < end:
+    while not (index.exists() and index.read_text().count("<Time") >= frames) and process.poll() is None:
         time.sleep(0.01)
     for pid in ranks_of(process.pid):
         resource.prlimit(pid, resource.RLIMIT_FSIZE, (60000, 60000))
-    try:
-        text, _ = process.communicate(timeout=60)
-    except subprocess.TimeoutExpired:
-        for pid in ranks_of(process.pid):
-            os.kill(pid, 9)
-        sys.exit(f"{folder}: still running a minute after the disk was full")
+    text, _ = process.communicate()  # an end that does not come is found by tests/run
     return process.returncode, text
 
 
@@ -70,7 +64,7 @@ def check_default_folder():
     shutil.rmtree(OUT / "out", ignore_errors=True)
     args = [*MPI, "1", SUPPLE, str(path), "-ts_max_time", "0.01"]
     for again in (False, True):
-        text = subprocess.run(args, cwd=OUT, capture_output=True, text=True, timeout=100, check=True).stdout
+        text = subprocess.run(args, cwd=OUT, capture_output=True, text=True, check=True).stdout
         if ("results of an earlier run are replaced" in text) != again:
             sys.exit(f"replaced results: {text}")
         (OUT / "out" / "bar" / "notes.txt").write_text("mine")

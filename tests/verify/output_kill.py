@@ -1,6 +1,5 @@
 """A run that is killed at any moment, in the middle of a frame or of a checkpoint, leaves what it had completed.
 
-@timeout 300
 A dozen runs are killed (SIGKILL, all ranks at once or one of them) after random times. Each time fields.xmf must be
 well-formed and every frame in it readable, history.csv must hold whole rows, and the newest checkpoint must restart.
 """
@@ -37,9 +36,8 @@ def ranks_of(launcher):
 def kill_at_random(ranks, folder, chance):
     """Starts a long run, waits until it writes frames, kills after a random time."""
     args = command(ranks, folder, "-ts_max_time", "100", "-checkpoint_every_steps", "3", "-quiet")
-    process = subprocess.Popen(args, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True)
-    end = time.time() + 60
-    while not (OUT / folder / "fields.xmf").exists() and time.time() < end and process.poll() is None:
+    process = subprocess.Popen(args, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    while not (OUT / folder / "fields.xmf").exists() and process.poll() is None:
         time.sleep(0.01)
     time.sleep(chance.uniform(0.0, 0.4))
     victims = ranks_of(process.pid)
@@ -50,11 +48,7 @@ def kill_at_random(ranks, folder, chance):
         victims = [chance.choice(victims)]  # the launcher ends the others
     for pid in victims:
         os.kill(pid, signal.SIGKILL)
-    try:
-        process.wait(60)
-    except subprocess.TimeoutExpired:
-        process.kill()
-        sys.exit(f"{folder}: still running a minute after a rank was killed")
+    process.wait()  # an end that does not come is found by tests/run
 
 
 def main():

@@ -4,7 +4,6 @@ Displacement, velocity and acceleration of the last frame and every row of histo
 for all of them in one scene. Also: damaged checkpoints, the newest one that is whole, checkpoints that do not fit the run.
 
 @needs mumps
-@timeout 300
 """
 import re
 import shutil

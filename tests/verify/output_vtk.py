@@ -2,7 +2,6 @@
 with points of its own for each cell.
 
 @needs mumps
-@timeout 300
 
 vtkXdmfReader is what PyPI's VTK has; vtkXdmf3Reader is tried where there is one. Values are compared with those of fields.h5
 and, for the first and last frame, with history.csv.

@@ -1,6 +1,4 @@
 """A run that was re-meshed and is taken up behind that, on other numbers of ranks, is the run that was not interrupted; its frames name their mesh.
-
-@timeout 300
 """
 import os
 import shlex
@@ -20,7 +18,7 @@ OUT = Path(os.environ.get("SB_OUT", "build/test-out/remesh")).resolve()
 
 def run(ranks, folder, *more):
     line = [*MPI, str(ranks), SUPPLE, "scenarios/knead.opts", "-quiet", "-output_dir", str(OUT / folder), *more]
-    result = subprocess.run(line, capture_output=True, text=True, timeout=120)
+    result = subprocess.run(line, capture_output=True, text=True)
     if result.returncode:
         sys.exit(f"{folder}: exit code {result.returncode}\n{result.stdout}{result.stderr}")
 

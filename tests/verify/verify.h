@@ -3,7 +3,7 @@
   extrapolation.
 */
 #pragma once
-#include <unistd.h>
+#include "../file.h"
 #include "../scene.h"
 
 #define VERIFY_TEXT 4096 /* longest scenario of a test */
@@ -47,22 +47,16 @@ static inline void verify_write_cells(FILE *f, const PetscInt n[3])
 
 /*
   A box of n[0] x n[1] x n[2] cells with its vertices where `map` puts them, as a gmsh file in the folder for temporary
-  files. Collective; the path is the same on all ranks, rank 0 writes. Remove it with verify_mesh_remove().
+  files. Collective; the path is the same on all ranks, rank 0 writes. Remove it with test_file_remove().
 */
 static inline PetscErrorCode verify_mesh_write(const PetscInt n[3], VerifyMap map, void *ctx, char path[512])
 {
-  const char *folder = getenv("TMPDIR");
-  PetscMPIInt rank;
   PetscInt at[3];
+  FILE *f;
 
   PetscFunctionBeginUser;
-  PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
-  PetscCall(PetscSNPrintf(path, 512, "%s/supple-XXXXXX.msh", folder ? folder : "/tmp"));
-  if (!rank) {
-    const int fd = mkstemps(path, 4);
-    FILE *f = fd < 0 ? NULL : fdopen(fd, "w");
-
-    PetscCheck(f, PETSC_COMM_SELF, PETSC_ERR_FILE_OPEN, "Cannot write %s", path);
+  PetscCall(test_file_open(".msh", path, &f));
+  if (f) {
     fprintf(f, "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n%d\n",
             (int)((n[0] + 1) * (n[1] + 1) * (n[2] + 1)));
     for (at[2] = 0; at[2] <= n[2]; at[2]++) {
@@ -80,19 +74,8 @@ static inline PetscErrorCode verify_mesh_write(const PetscInt n[3], VerifyMap ma
     fprintf(f, "$EndNodes\n$Elements\n%d\n", (int)(6 * n[0] * n[1] * n[2]));
     verify_write_cells(f, n);
     fprintf(f, "$EndElements\n");
-    PetscCheck(!fclose(f), PETSC_COMM_SELF, PETSC_ERR_FILE_WRITE, "Cannot write %s", path);
   }
-  PetscCallMPI(MPI_Bcast(path, 512, MPI_CHAR, 0, PETSC_COMM_WORLD));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static inline PetscErrorCode verify_mesh_remove(const char path[])
-{
-  PetscMPIInt rank;
-
-  PetscFunctionBeginUser;
-  PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
-  if (!rank) (void)unlink(path);
+  PetscCall(test_file_close(f));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

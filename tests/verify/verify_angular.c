@@ -1,5 +1,4 @@
 // @ranks 1 2
-// @timeout 300
 /*
   Two free blocks that collide obliquely, without friction: what their contact does to the angular momentum.
 

@@ -1,5 +1,4 @@
 // @ranks 1 2
-// @timeout 300
 // @needs mumps
 /*
   A body that touches nothing moves as if the others were not there.

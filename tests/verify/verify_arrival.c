@@ -1,5 +1,4 @@
 // @ranks 1 2
-// @timeout 300
 /*
   What a step does in which points arrive (-effect_<name>_arrival). An elastic bar flies onto a wall: the wave solution has it there from the
   moment of arrival for the time 2 L / c, and then away with the speed that it came with. Steps begin at several distances before

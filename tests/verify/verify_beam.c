@@ -1,5 +1,4 @@
 // @ranks 1
-// @timeout 300
 /*
   Bars in bending and under their own weight, static, against theory and against computed solutions of the continuum.
 

@@ -1,5 +1,4 @@
 // @ranks 1 2
-// @timeout 200
 /*
   Restitution: what bounces off a rigid obstacle.
 
@@ -114,7 +113,7 @@ static PetscErrorCode check_ball(const char *element, PetscReal e)
   }
   /* how exactly nodes are put on the obstacle, 1e-7 of the size, times the weight: where it comes to rest */
   SB_CHECK(b.gain < 1e-7 * 4 * RADIUS * b.mass * GRAVITY, "a step gains %g J", (double)b.gain);
-  PetscCall(verify_mesh_remove(path));
+  PetscCall(test_file_remove(path));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -159,7 +158,7 @@ static PetscErrorCode check_soft(PetscReal young, PetscReal dt, PetscReal e)
     (double)young, (double)dt, (double)e, (double)(b.peak[1] / b.peak[0]), (double)b.gain));
   /* of 0.5 J; the energy of co-rotated tets that turn is not quite convex */
   SB_CHECK(b.gain < 1e-6, "a step gains %g J", (double)b.gain);
-  PetscCall(verify_mesh_remove(path));
+  PetscCall(test_file_remove(path));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -233,7 +233,7 @@ static PetscErrorCode check_mesh(Shape shape)
     PetscCall(check_case(shape, path, &(Case){"cr", laws[law], "", 0.4999, 2.}, PETSC_TRUE));
     PetscCall(check_case(shape, path, &(Case){"dg", laws[law], "", 0.4999, 2.}, PETSC_TRUE));
   }
-  PetscCall(verify_mesh_remove(path));
+  PetscCall(test_file_remove(path));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

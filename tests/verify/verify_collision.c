@@ -1,5 +1,4 @@
 // @ranks 2
-// @timeout 300
 /*
   Contact between bodies.
 

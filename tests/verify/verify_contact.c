@@ -1,5 +1,4 @@
 // @ranks 1 2
-// @timeout 300
 /*
   Contact with rigid obstacles.
 
@@ -534,7 +533,7 @@ static PetscErrorCode check_hertz(PetscInt cells, PetscReal tolerance)
     (int)cells, (double)values[CONTACTS], (double)(-4 * values[FZ] / P), (int)t.run->newton_total));
   SB_CHECK_NEAR(-4 * values[FZ] / P, 1, tolerance, "force against that of Hertz");
   PetscCall(test_scene_close(&t));
-  PetscCall(verify_mesh_remove(path));
+  PetscCall(test_file_remove(path));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

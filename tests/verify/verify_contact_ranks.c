@@ -1,5 +1,4 @@
 // @ranks 2 3 4
-// @timeout 300
 /*
   The same contacts and the same motion on any number of ranks: two blocks fall on a floor and onto each other, beside a rigid ball that the
   upper one meets as well, without friction. Every rank runs the scene alone, then all run it together.

@@ -28,7 +28,7 @@ static PetscErrorCode solve(PetscInt n, PetscReal nu, PetscBool distorted, Petsc
                         distorted ? "distorted" : "regular", (double)nu, (int)n, (double)error[0],
                         (double)error[1]));
   PetscCall(test_scene_close(&t));
-  if (distorted) PetscCall(verify_mesh_remove(mesh));
+  if (distorted) PetscCall(test_file_remove(mesh));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -1,5 +1,4 @@
 // @ranks 2
-// @timeout 300
 /*
   A plate as thin as cloth, one cell thick, falls on a ball and drapes over it. The ball is a rigid obstacle, with friction, or a body held
   at its lower end, without.
@@ -91,7 +90,7 @@ static PetscErrorCode check_drape(PetscBool rigid, PetscInt cells, PetscInt thic
   SB_CHECK(w->gain < 1e-6 * weight * SIDE, "a step gained %g J", (double)w->gain);
   if (rigid) SB_CHECK(w->missing < 1e-5, "momentum changed by %g kg m/s without a force", (double)w->missing);
   PetscCall(test_scene_close(&t));
-  PetscCall(verify_mesh_remove(path));
+  PetscCall(test_file_remove(path));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

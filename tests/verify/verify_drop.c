@@ -1,5 +1,4 @@
 // @ranks 1 2
-// @timeout 300
 /*
   A ball is dropped on a plane and bounces, with implicit Euler and with generalized-alpha.
 
@@ -157,7 +156,7 @@ static PetscErrorCode check_bounce(const char *time, PetscReal bound, PetscInt l
   PetscCall(VecDestroy(&b.V));
   PetscCall(VecDestroy(&b.A));
   PetscCall(test_scene_close(&t));
-  PetscCall(verify_mesh_remove(path));
+  PetscCall(test_file_remove(path));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -1,5 +1,4 @@
 // @ranks 1 2
-// @timeout 300
 /*
   Contact between edges.
 
@@ -370,18 +369,13 @@ static PetscErrorCode write_ring(char path[512])
   static const int ways[6][4] = {{0, 1, 3, 7}, {0, 2, 6, 7}, {0, 4, 5, 7},
                                  {0, 1, 5, 7}, {0, 2, 3, 7}, {0, 4, 6, 7}};
   const PetscReal corner[4][2] = {{-TUBE, 0}, {0, -TUBE}, {0, TUBE}, {TUBE, 0}}; /* outwards, along z */
-  const char *folder = getenv("TMPDIR");
-  PetscMPIInt rank;
+  FILE *f;
 
   PetscFunctionBeginUser;
-  PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
-  PetscCall(PetscSNPrintf(path, 512, "%s/supple-XXXXXX.msh", folder ? folder : "/tmp"));
-  if (!rank) {
-    const int fd = mkstemps(path, 4);
-    FILE *f = fd < 0 ? NULL : fdopen(fd, "w");
+  PetscCall(test_file_open(".msh", path, &f));
+  if (f) {
     int count = 0;
 
-    PetscCheck(f, PETSC_COMM_SELF, PETSC_ERR_FILE_OPEN, "Cannot write %s", path);
     fprintf(f, "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n%d\n", 4 * SEGMENTS);
     for (int i = 0; i < 4 * SEGMENTS; i++) {
       const PetscReal angle = 2 * PETSC_PI * (i / 4 - 0.5) / SEGMENTS, r = RADIUS + corner[i % 4][0];
@@ -404,9 +398,8 @@ static PetscErrorCode write_ring(char path[512])
       fprintf(f, "\n");
     }
     fprintf(f, "$EndElements\n");
-    PetscCheck(!fclose(f), PETSC_COMM_SELF, PETSC_ERR_FILE_WRITE, "Cannot write %s", path);
   }
-  PetscCallMPI(MPI_Bcast(path, 512, MPI_CHAR, 0, PETSC_COMM_WORLD));
+  PetscCall(test_file_close(f));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -501,7 +494,7 @@ static PetscErrorCode check_rings(PetscReal most)
   SB_CHECK(seen.depth < most && seen.deepest < most, "the rings are %g m in each other, they say %g",
            (double)seen.depth, (double)seen.deepest);
   PetscCall(test_scene_close(&t));
-  PetscCall(verify_mesh_remove(path));
+  PetscCall(test_file_remove(path));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

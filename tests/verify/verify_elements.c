@@ -1,5 +1,4 @@
 // @ranks 1 3
-// @timeout 300
 // @needs mumps
 /*
   Effects on bodies of every element, through whole runs.

@@ -1,5 +1,4 @@
 // @ranks 1 2
-// @timeout 300
 /*
   Energy and momentum over many steps.
 

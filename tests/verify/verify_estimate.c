@@ -1,6 +1,5 @@
 // @ranks 1
 // @needs mumps
-// @timeout 300
 /*
   Effectivity of the estimate of the error of space: estimate over true error in the energy norm (sbestimate.h), for P1, CR and DG, on
   problems whose stress is known, or is taken from a mesh at least twice as fine.
@@ -272,7 +271,7 @@ static PetscErrorCode check_cube(const char *element, PetscInt n, PetscReal nu)
   PetscCall(manufactured_scene(nu, scene, sizeof(scene)));
   PetscCall(PetscStrlcat(scene, " -solver mumps", sizeof(scene)));
   PetscCall(check_exact(&c, scene, mesh, exact_cube));
-  PetscCall(verify_mesh_remove(mesh));
+  PetscCall(test_file_remove(mesh));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -309,7 +308,7 @@ static PetscErrorCode check_wave(const char *element, PetscInt n)
     "-effect_load_type body_force -effect_load_density (pi/2)^2*sin(pi/2*x);0;0 -time newmark -ts_dt 0.1 "
     "-ts_max_time 2 -ksp_rtol 1e-10",
     mesh, exact_wave));
-  PetscCall(verify_mesh_remove(mesh));
+  PetscCall(test_file_remove(mesh));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -342,7 +341,7 @@ static PetscErrorCode open_problem(const Problem *p, const Case *c, TestScene *t
   PetscCall(PetscSNPrintf(more, sizeof(more), "-body_a_mesh %s -body_a_element %s -body_a_poisson %.17g",
                           mesh, c->element, (double)c->nu));
   PetscCall(locking_run(p->options, more, t, &cost));
-  PetscCall(verify_mesh_remove(mesh));
+  PetscCall(test_file_remove(mesh));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -1,5 +1,4 @@
 // @ranks 1
-// @timeout 300
 /*
   Contact of two elastic bodies of P1 after Hertz: what hertz.h tells, on meshes that are refined, with each response and either side looking.
 */

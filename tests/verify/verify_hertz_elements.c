@@ -1,6 +1,5 @@
 // @ranks 1
 // @long
-// @timeout 300
 /*
   Hertz's contact (hertz.h) with CR and DG, and of one body on a rigid plane.
 */
@@ -60,7 +59,7 @@ static PetscErrorCode check_plane(const char *element, PetscInt cells, PetscReal
   SB_CHECK_NEAR(4 * force / P, 1, tolerance, "force of the plane against that of Hertz");
   SB_CHECK_NEAR(-reaction, force, 1e-3 * force, "force of the drive against that of the plane");
   PetscCall(test_scene_close(&t));
-  PetscCall(verify_mesh_remove(path));
+  PetscCall(test_file_remove(path));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -1,6 +1,5 @@
 // @ranks 1 2 3
 // @needs mumps
-// @timeout 300
 /*
   Response `multiplier` against `projected`: the same nonlinear problem by another linear solve, so the same answer to what contact
   settles to.

@@ -1,5 +1,4 @@
 // @ranks 1 2
-// @timeout 300
 /*
   Newmark with contact (src/time/newmark_contact.c).
 
@@ -198,7 +197,7 @@ static PetscErrorCode check_ball(const char *material, PetscReal tolerance)
   SB_CHECK(w.gain < tolerance * w.start, "ball, %s: a step gains %g J", material, (double)w.gain);
   SB_CHECK(w.missing < 1e-9, "momentum changes by %g without a force", (double)w.missing);
   PetscCall(test_scene_close(&t));
-  PetscCall(verify_mesh_remove(path));
+  PetscCall(test_file_remove(path));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -1,5 +1,4 @@
 // @ranks 1 2
-// @timeout 200
 /*
   Rigid obstacles given by a mesh, and bodies that overlap an obstacle at first.
 
@@ -98,7 +97,7 @@ static PetscErrorCode check_mesh(void)
   /* distances agree to rounding; friction is settled to a part of its force, which rounding may decide */
   SB_CHECK(off < 1e-6, "on the mesh of the box displacements differ by %g", (double)off);
   for (int k = 0; k < 2; k++) PetscCall(PetscFree(u[k]));
-  PetscCall(verify_mesh_remove(path));
+  PetscCall(test_file_remove(path));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -302,7 +301,7 @@ static PetscErrorCode check_overlap_mesh(void)
   PetscCall(verify_mesh_write(n, table, NULL, path));
   PetscCall(PetscSNPrintf(text, sizeof(text), "mesh:%s", path));
   PetscCall(check_overlap("p1", "projected", text));
-  PetscCall(verify_mesh_remove(path));
+  PetscCall(test_file_remove(path));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

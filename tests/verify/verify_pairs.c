@@ -1,5 +1,4 @@
 // @ranks 1 2
-// @timeout 200
 /*
   What pairs of bodies do to each other: columns of the history for each pair, and places of contact.
 
@@ -200,7 +199,7 @@ static PetscErrorCode check_fold(void)
   SB_CHECK(most[0] > 1 && most[1] > 0.01, "the legs did not meet: %g contacts, %g N", (double)most[0],
            (double)most[1]);
   PetscCall(test_scene_close(&t));
-  PetscCall(verify_mesh_remove(path));
+  PetscCall(test_file_remove(path));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -296,7 +296,7 @@ int main(int argc, char **argv)
       p.element = elements[e];
       PetscCall(check_mesh(&p));
     }
-    PetscCall(verify_mesh_remove(p.path));
+    PetscCall(test_file_remove(p.path));
   }
   SB_TEST_END();
 }

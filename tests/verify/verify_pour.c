@@ -1,5 +1,4 @@
 // @ranks 1 2
-// @timeout 300
 /*
   Eight small bodies poured into a bowl; verify_pour_long pours fifty. What is looked at is told in pour.h.
 */

@@ -1,5 +1,4 @@
 // @ranks 1 2 3
-// @timeout 300
 /*
   Restitution between bodies.
 
@@ -130,7 +129,7 @@ static PetscErrorCode check_balls(PetscReal e)
                           "-body_b_density 2000 -body_b_translate 0.1207,0,0 -body_b_velocity -1,0,0",
                           path[0], path[1]));
   PetscCall(check_pair("balls", bodies, "", e));
-  for (int k = 0; k < 2; k++) PetscCall(verify_mesh_remove(path[k]));
+  for (int k = 0; k < 2; k++) PetscCall(test_file_remove(path[k]));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -208,7 +207,7 @@ static PetscErrorCode check_soft(PetscReal young, PetscReal dt, PetscReal e)
   /* the energy of co-rotated tets that turn is not quite convex: also where nothing touches */
   SB_CHECK(b.momentum < 1e-8 * b.scale, "soft: momentum changes by %g", (double)b.momentum);
   SB_CHECK(b.gain < 1e-5 * b.start, "a step gains %g J", (double)b.gain);
-  PetscCall(verify_mesh_remove(path));
+  PetscCall(test_file_remove(path));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -244,7 +243,7 @@ static PetscErrorCode check_self(PetscReal e)
                         (double)b.gain, (double)b.energy, (double)b.momentum));
   SB_CHECK(b.gain < 1e-9 * b.energy, "a step gains %g J", (double)b.gain);
   SB_CHECK(b.momentum < 1e-12, "momentum changes by %g", (double)b.momentum);
-  PetscCall(verify_mesh_remove(path));
+  PetscCall(test_file_remove(path));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -1,5 +1,4 @@
 // @ranks 1 2 3
-// @timeout 300
 /*
   A state on another mesh of the same body.
 

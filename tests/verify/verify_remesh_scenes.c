@@ -1,5 +1,4 @@
 // @ranks 1 2
-// @timeout 300
 /*
   Re-meshing where bodies touch, hold, are made of several materials, or fail.
 

@@ -1,5 +1,4 @@
 // @ranks 1
-// @timeout 300
 /*
   A cushion between two plates that both move, until it is half as high; quarter of it, planes of symmetry x = 0 and y = 0, no friction.
 
@@ -144,7 +143,7 @@ static PetscErrorCode check_squeeze(const char *element, PetscInt cells, PetscRe
   if (!strcmp(element, "p1"))
     SB_CHECK_NEAR(virial, 1, 1e-6, "height times force against the trace of the stress");
   PetscCall(test_scene_close(&t));
-  PetscCall(verify_mesh_remove(path));
+  PetscCall(test_file_remove(path));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

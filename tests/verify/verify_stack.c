@@ -1,5 +1,4 @@
 // @ranks 1 2
-// @timeout 300
 /*
   Five blocks on a floor, neighbours of very different mass and mesh, fall onto each other and come to rest.
 

@@ -1,5 +1,4 @@
 // @ranks 1
-// @timeout 300
 /*
   The structural benchmarks CSM1 and CSM2 of Turek and Hron ("Proposal for numerical benchmarking of fluid-structure
   interaction between an elastic object and laminar incompressible flow", 2006): a St. Venant-Kirchhoff beam, plane strain,
@@ -50,7 +49,7 @@ static PetscErrorCode solve(const char *what, const PetscInt n[3], VerifyMap map
                   "-effect_plane_components z %s",
                   mesh, options));
   PetscCall(test_scene_open(text, &t));
-  PetscCall(verify_mesh_remove(mesh));
+  PetscCall(test_file_remove(mesh));
   PetscCall(verify_solve(&t, what));
   PetscCall(test_value_at(t.model, t.run->U, at, u));
   PetscCall(PetscPrintf(PETSC_COMM_WORLD, "    %s, %d x %d cells: %.6g %.6g, %d Newton iterations\n", what,

@@ -1,6 +1,6 @@
 // @long
 // @ranks 1
-// @timeout 600
+// @cpu 600
 // @needs mumps
 /*
   A neo-Hookean bar at nu = 0.499, its end turned by 90 degrees, in eight static steps.

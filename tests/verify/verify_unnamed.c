@@ -1,5 +1,4 @@
 // @ranks 1 2
-// @timeout 300
 /*
   Every effect, element, law, field and other output there is (tests/parts.h takes them from the registries): named alone it shows its log
   events; unnamed it shows none, allocates nothing and leaves the motion as it is, to the last bit.
