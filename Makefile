@@ -122,7 +122,7 @@ pictures: deps ## run the scenarios of contact on 1 rank and draw them: docs/*.p
 	@scripts/pictures
 
 CHECK = tests/run --build $(BUILD) $(if $(T),--match '$(T)')
-check: deps ## install what is missing, build, run the tests (5 to 10 minutes; one of them: T=name)
+check: deps ## install what is missing, build, run the tests (25 minutes of processor time, on all cores; one of them: T=name)
 	$(AGAIN) bin/supple bin/supple-mesh tests $(MESHES)
 	@scripts/venv
 	@$(CHECK)

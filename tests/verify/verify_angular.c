@@ -145,11 +145,15 @@ static PetscErrorCode check(const char *element, const char *response, const cha
 
 int main(int argc, char **argv)
 {
+  PetscMPIInt size;
+
   SB_TEST_BEGIN(argc, argv);
+  PetscCallMPI(MPI_Comm_size(PETSC_COMM_WORLD, &size));
   PetscCall(check("p1", "projected", "one", 0.001, 5e-5));
-  PetscCall(check("p1", "projected", "one", 0.0005, 2e-5));
   PetscCall(check("p1", "projected", "both", 0.001, 5e-5));
   PetscCall(check("cr", "projected", "one", 0.001, 5e-5));
+  if (size > 1) SB_TEST_END(); /* many solves of a small system: on one rank only */
+  PetscCall(check("p1", "projected", "one", 0.0005, 2e-5));
   PetscCall(check("p1", "augmented", "one", 0.001, 1e-4)); /* springs leave gaps */
   SB_TEST_END();
 }

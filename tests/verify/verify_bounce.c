@@ -169,7 +169,6 @@ int main(int argc, char **argv)
   SB_TEST_BEGIN(argc, argv);
   PetscCallMPI(MPI_Comm_size(PETSC_COMM_WORLD, &size));
   PetscCall(check_ball("p1", 0.5));
-  PetscCall(check_ball("p1", 0.8));
   PetscCall(check_ball("cr", 0.5));
   PetscCall(
     check_block("plane:0,0,1,0", "-body_a_translate 0,0,0.0104 -body_a_velocity 0,0,-1", 0.6, "block"));
@@ -178,6 +177,7 @@ int main(int argc, char **argv)
     0.6, "block, multiplier"));
   PetscCall(check_block("plane:0,0,1,-0.01", "-effect_floor_displacement 0;0;0.5*t", 0.8, "bat"));
   if (size == 1) {
+    PetscCall(check_ball("p1", 0.8));
     PetscCall(check_soft(1e5, 0.001, 1));
     PetscCall(check_soft(1e5, 0.005, 1));
     PetscCall(check_soft(1e6, 0.001, 0.5));

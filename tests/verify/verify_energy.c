@@ -251,17 +251,19 @@ int main(int argc, char **argv)
   PetscCall(check_account("newmark", "dg", "corotated", 2, 1e-3));
   PetscCall(check_flight("euler_implicit", "p1", "corotated", 2e-3, 1));
   PetscCall(check_flight("newmark", "p1", "corotated", 2e-3, 2));
-  PetscCall(check_flight("newmark", "p1", "neohookean", 2e-3, 2));
   PetscCall(check_flight("genalpha", "p1", "stvk", 2e-3, 2));
+  PetscCall(check_flight("euler_symplectic", "p1", "corotated", 2e-4, 0));
+  PetscCall(check_flight("newmark", "cr", "corotated", 2e-3, 2));
+  PetscCall(check_flight("newmark", "dg", "corotated", 2e-3, 2));
+  if (size > 1) SB_TEST_END(); /* laws and short steps do not know of ranks */
+  PetscCall(check_flight("newmark", "p1", "neohookean", 2e-3, 2));
   PetscCall(check_flight("genalpha", "p1", "linear", 2e-3, -1));
   PetscCall(check_flight("alpha2", "p1", "corotated", 2e-3, -1));
-  PetscCall(check_flight("euler_symplectic", "p1", "corotated", 2e-4, 0));
   PetscCall(check_flight("euler_symplectic", "p1", "neohookean", 2e-4, 0));
   PetscCall(check_flight("euler_explicit", "p1", "corotated", 5e-5, 1));
   for (int e = 0; e < 2; e++) {
     const char *element = e ? "dg" : "cr";
 
-    PetscCall(check_flight("newmark", element, "corotated", 2e-3, 2));
     PetscCall(check_flight("genalpha", element, "stvk", 2e-3, 2));
     PetscCall(check_flight("newmark", element, "linear", 2e-3, -1));
     PetscCall(check_flight("euler_symplectic", element, "corotated", 1e-4, 0));

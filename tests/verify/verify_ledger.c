@@ -91,10 +91,15 @@ static PetscErrorCode steps(void)
      "-time newmark -ts_dt 0.00025", 0.5, 2},
   };
 
+  PetscMPIInt size;
+
   PetscFunctionBeginUser;
+  PetscCallMPI(MPI_Comm_size(PETSC_COMM_WORLD, &size));
   for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(of); i++) {
     char scene[VERIFY_TEXT];
 
+    /* thousands of steps of a small system: on several ranks an implicit and an explicit integrator */
+    if (size > 1 && i != 2 && i != 4) continue;
     PetscCall(PetscSNPrintf(scene, sizeof(scene),
                             BAR "-body_bar_material linear -ts_max_time 0.4 -ksp_rtol 1e-10 %s",
                             of[i].scene));
@@ -243,7 +248,8 @@ int main(int argc, char **argv)
   PetscCall(steps());
   PetscCall(solves());
   PetscCall(springs());
-  PetscCall(spectator("-body_bar_material linear -time static"));
+  /* a factorization on several ranks adds in the order in which messages come */
+  PetscCall(spectator("-body_bar_material linear -time static -solver cg_icc"));
   PetscCall(spectator("-body_bar_material corotated -ts_dt 0.01 -ts_max_time 0.1"));
   PetscCall(spectator("-body_bar_material corotated -time genalpha -ts_dt 0.01 -ts_max_time 0.1"));
   PetscCall(dials());

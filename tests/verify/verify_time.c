@@ -1,4 +1,4 @@
-// @ranks 1 2 3
+// @ranks 1 3
 // @needs mumps
 /*
   The integrators against exact answers of their own recurrences. One linear tet held at its base is an oscillator: its apex moves
