@@ -29,12 +29,14 @@
 
 /*
   Context of a destroy callback of a MATSHELL, PCSHELL, KSP, SNES: 3.18 hands over ctx, newer releases &ctx, under the
-  same C type. SB_DESTROY_CTX(type, arg) is the pointer to the struct in both.
+  same C type. SB_DESTROY_CTX(type, arg) is the pointer to the struct in both; SB_CTX_TO_DESTROY(ctx) is what a callback of PETSc's is called with.
 */
 #if PETSC_VERSION_LT(3, 24, 0)
   #define SB_DESTROY_CTX(type, arg) ((type *)(arg))
+  #define SB_CTX_TO_DESTROY(ctx) (ctx)
 #else
   #define SB_DESTROY_CTX(type, arg) (*(type **)(arg))
+  #define SB_CTX_TO_DESTROY(ctx) (&(ctx))
 #endif
 
 /* Destroy callback of a PetscContainer, which gets its pointer as SB_DESTROY_CTX() takes it. */
@@ -79,6 +81,13 @@ typedef const char *SbErrorText;
   #define SB_LINESEARCH_NONE SNESLINESEARCHNONE
 #endif
 
+/* Newton's method met what is not a number. */
+#if PETSC_VERSION_LT(3, 25, 0)
+  #define SB_SNES_DIVERGED_NAN SNES_DIVERGED_FNORM_NAN
+#else
+  #define SB_SNES_DIVERGED_NAN SNES_DIVERGED_FUNCTION_NANORINF
+#endif
+
 /* A line search of one's own: renamed between 3.18 and 3.26. */
 #if PETSC_VERSION_LT(3, 26, 0)
   #define SbLineSearchShellSet(search, f, ctx) SNESLineSearchShellSetUserFunc(search, f, ctx)
@@ -101,11 +110,12 @@ typedef const char *SbErrorText;
   #define SbKSPRefineOrthogonalization(ksp) KSPGMRESSetCGSRefinementType(ksp, KSP_GMRES_CGS_REFINE_IFNEEDED)
 #endif
 
-/* PetscHasExternalPackage() for CHOLMOD too: older releases know SuiteSparse as a whole, newer ones each part of it. */
+/* PetscHasExternalPackage() for CHOLMOD and UMFPACK too: some releases know SuiteSparse as a whole, some each part of it. */
 static inline PetscErrorCode SbHasPackage(const char name[], PetscBool *has)
 {
   PetscFunctionBeginUser;
   PetscCall(PetscHasExternalPackage(name, has));
-  if (!*has && !strcmp(name, "cholmod")) PetscCall(PetscHasExternalPackage("suitesparse", has));
+  if (!*has && (!strcmp(name, "cholmod") || !strcmp(name, "umfpack")))
+    PetscCall(PetscHasExternalPackage("suitesparse", has));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -62,8 +62,23 @@ PetscErrorCode SbSaddleChoose(SbSpace space, PetscBool dynamic, PetscInt choice,
   preconditioner is not symmetric and definite).
 */
 PetscErrorCode SbKSPSaddleSet(SbSpace space, KSP ksp);
-/* A Cholesky factorisation whose pivot is not positive is one that failed (KSP_DIVERGED_PC_FAILED), with CHOLMOD too; other types of
-   pc are left alone. After PCSetFromOptions(). Not collective. */
+#define SB_DIRECT_SMALL \
+  30000 /* unknowns up to which one rank may factor for all of them; auto takes no factorisation beyond */
+/*
+  SbDirectPackage - the package of this PETSc that factors a symmetric matrix of so many unknowns soonest on the ranks of comm: one of PETSc's
+  MATSOLVER names, NULL without any. Indefinite ones need other packages than those that are positive definite. Not collective.
+*/
+PetscErrorCode SbDirectPackage(MPI_Comm comm, PetscInt unknowns, PetscBool definite, const char **package);
+/*
+  SbPCDirectSet - makes pc a factorisation by `package` (MUMPS, CHOLMOD or UMFPACK) of an AIJ matrix, gathered on one rank where there are several and the
+  package works on one (PCTELESCOPE).
+
+  Not collective. PCSetFromOptions() and SbPCGuardFactor() have to follow. Input: symmetric, L L^T or L D L^T where the package has it, else LU. Options read: those of
+  PETSc's PCCHOLESKY or PCLU, with the prefix telescope_ where the matrix is gathered.
+*/
+PetscErrorCode SbPCDirectSet(PC pc, const char *package, PetscBool symmetric);
+/* A Cholesky factorisation whose pivot is not positive is one that failed (KSP_DIVERGED_PC_FAILED), with CHOLMOD too and where it is gathered on
+   one rank; other types of pc are left alone. After PCSetFromOptions(). Not collective. */
 PetscErrorCode SbPCGuardFactor(PC pc);
 /* What is left to do for the solver of `snes` after SNESSetFromOptions(). Collective. */
 PetscErrorCode SbSolverFinish(SNES snes, SbSpace space);

@@ -132,6 +132,7 @@ static PetscBool looks_like_petsc(const char *name)
     "inner_",
     "coarse_",
     "saddle_",
+    "telescope_",
     "levels_",
     "prefix_",
   };

@@ -8,6 +8,7 @@
   Modes that vanish make E singular, but decoupled: they get the mean diagonal of their block, and multiply zeros.
 */
 #include "coarse.h"
+#include "product.h"
 
 /* The value arrays of A: diagonal part with its first block of each row, and the part with ghost columns. */
 typedef struct {
@@ -45,10 +46,10 @@ static PetscErrorCode return_blocks(Mat A, Blocks *x)
 {
   PetscFunctionBeginUser;
   if (x->symmetric)
-    PetscCall(MatSeqSBAIJRestoreArray(A, &x->value[0]));
+    PetscCall(SbMatReturnRead(A, MatSeqSBAIJRestoreArray, &x->value[0]));
   else
-    PetscCall(MatSeqBAIJRestoreArray(x->part[0], &x->value[0]));
-  if (x->part[1]) PetscCall(MatSeqBAIJRestoreArray(x->part[1], &x->value[1]));
+    PetscCall(SbMatReturnRead(x->part[0], MatSeqBAIJRestoreArray, &x->value[0]));
+  if (x->part[1]) PetscCall(SbMatReturnRead(x->part[1], MatSeqBAIJRestoreArray, &x->value[1]));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -7,7 +7,7 @@
   It is regular where K is not: a body that only rows hold needs no anchors (couple.c). e is tiny: with it rows that depend on others
   share their force instead of making the matrix singular. What e leaves of G z is projected away by the caller.
 
-  The matrix is indefinite, and symmetric but for friction: LDL^T or LU of MUMPS on any number of ranks, or LU of UMFPACK on one. Springs stand in it, although
+  The matrix is indefinite, and symmetric but for friction: LDL^T or LU of MUMPS, or LU of UMFPACK on one of the ranks (pc_direct.c). Springs stand in it, although
   they join nodes that K's graph does not. Made anew when K or the rows have changed, and only then.
 */
 #include "couple.h"
@@ -25,23 +25,6 @@ struct _p_SbFactored {
   PetscBool ok;
 };
 
-/* Name of the package that factors it; NULL: none. */
-static PetscErrorCode find_package(MPI_Comm comm, const char **name)
-{
-  PetscMPIInt size;
-  PetscBool has;
-
-  PetscFunctionBeginUser;
-  *name = NULL;
-  PetscCallMPI(MPI_Comm_size(comm, &size));
-  PetscCall(SbHasPackage("mumps", &has));
-  if (has) *name = MATSOLVERMUMPS;
-  if (has || size > 1) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(SbHasPackage("umfpack", &has));
-  if (has) *name = MATSOLVERUMFPACK;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode SbSaddleChoose(SbSpace s, PetscBool dynamic, PetscInt choice, SbSaddle *saddle, char reason[],
                               size_t size)
 {
@@ -49,11 +32,10 @@ PetscErrorCode SbSaddleChoose(SbSpace s, PetscBool dynamic, PetscInt choice, SbS
   const char *package;
 
   PetscFunctionBeginUser;
-  PetscCall(find_package(s->comm, &package));
-  PetscCheck(
-    choice != 1 || package, s->comm, PETSC_ERR_USER,
-    "-multipliers direct needs MUMPS (or, on one rank, UMFPACK), which this PETSc was built without: use "
-    "-multipliers iterative");
+  PetscCall(SbDirectPackage(s->comm, unknowns, PETSC_FALSE, &package));
+  PetscCheck(choice != 1 || package, s->comm, PETSC_ERR_USER,
+             "-multipliers direct needs MUMPS or SuiteSparse, and this PETSc was built without both: use "
+             "-multipliers iterative");
   if (!choice) choice = package && unknowns <= (dynamic ? DIRECT_DYNAMIC : DIRECT_STATIC) ? 1 : 2;
   *saddle = choice == 1 ? SB_SADDLE_DIRECT : SB_SADDLE_ITERATIVE;
   if (choice == 1)
@@ -173,16 +155,16 @@ static PetscErrorCode factor(SbSpace s, SbFactored f)
   PetscCall(PCDestroy(&f->pc));
   PetscCall(VecDestroy(&f->b));
   PetscCall(VecDestroy(&f->x));
-  PetscCall(find_package(s->comm, &package));
+  PetscCall(SbDirectPackage(s->comm, 3 * s->Nnode, PETSC_FALSE, &package));
   PetscCall(create_saddle(s, &S));
   PetscCall(MatCreateVecs(S, &f->x, &f->b));
   PetscCall(PCCreate(s->comm, &f->pc));
   PetscCall(PCSetOptionsPrefix(f->pc, "saddle_"));
   PetscCall(PCSetOperators(f->pc, S, S));
   PetscCall(MatDestroy(&S)); /* the preconditioner keeps it */
-  PetscCall(PCSetType(f->pc, s->couple->oblique || strcmp(package, MATSOLVERMUMPS) ? PCLU : PCCHOLESKY));
-  PetscCall(PCFactorSetMatSolverType(f->pc, package));
+  PetscCall(SbPCDirectSet(f->pc, package, (PetscBool)!s->couple->oblique));
   PetscCall(PCSetFromOptions(f->pc));
+  PetscCall(SbPCGuardFactor(f->pc));
   PetscCall(PCSetUp(f->pc));
   PetscCall(PCGetFailedReason(f->pc, &failed));
   f->ok = (PetscBool)!failed;

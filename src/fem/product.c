@@ -121,6 +121,17 @@ static PetscErrorCode product_of(Mat A, Product **p)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscErrorCode SbMatReturnRead(Mat A, PetscErrorCode (*restore)(Mat, PetscScalar *[]), PetscScalar *value[])
+{
+  PetscObjectState state;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscObjectStateGet((PetscObject)A, &state));
+  PetscCall((*restore)(A, value));
+  PetscCall(PetscObjectStateSet((PetscObject)A, state));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode SbProductGetSymmetric(Mat A, Mat *local)
 {
   Product *p;

@@ -4,6 +4,7 @@
   The block storages are read in place, by the plan that they were assembled with (both keep a block by columns; the
   symmetric one keeps only the upper triangle). AIJ goes through MatGetRow(), three times slower.
 */
+#include "product.h"
 #include "rotated.h"
 
 /* Place in the row (as ia counts) of the block with global node column g; -1: not in the graph. */
@@ -74,8 +75,8 @@ static PetscErrorCode read_baij(SbSpace s, Mat A, PetscInt n, const PetscInt nod
     for (PetscInt e = p->oi[node[k]]; e < p->oi[node[k] + 1]; e++, to += 9)
       copy_block(other + 9 * (size_t)e, PETSC_FALSE, to);
   }
-  PetscCall(MatSeqBAIJRestoreArray(part[0], &diagonal));
-  if (part[1]) PetscCall(MatSeqBAIJRestoreArray(part[1], &other));
+  PetscCall(SbMatReturnRead(part[0], MatSeqBAIJRestoreArray, &diagonal));
+  if (part[1]) PetscCall(SbMatReturnRead(part[1], MatSeqBAIJRestoreArray, &other));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -100,7 +101,7 @@ static PetscErrorCode read_sbaij(SbSpace s, Mat A, PetscInt n, const PetscInt no
       copy_block(value + 9 * (size_t)(p->ui[row] + at - p->diagonal[row]), lower, to);
     }
   }
-  PetscCall(MatSeqSBAIJRestoreArray(A, &value));
+  PetscCall(SbMatReturnRead(A, MatSeqSBAIJRestoreArray, &value));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

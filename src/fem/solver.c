@@ -27,6 +27,24 @@ static PetscErrorCode create_frames(SbSpace s, Mat *A)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+static PetscErrorCode factor_cholmod(SbSpace s, PC pc)
+{
+  (void)s;
+  return SbPCDirectSet(pc, MATSOLVERCHOLMOD, PETSC_TRUE);
+}
+
+static PetscErrorCode factor_umfpack(SbSpace s, PC pc)
+{
+  (void)s;
+  return SbPCDirectSet(pc, MATSOLVERUMFPACK, PETSC_TRUE);
+}
+
+static PetscErrorCode factor_mumps(SbSpace s, PC pc)
+{
+  (void)s;
+  return SbPCDirectSet(pc, MATSOLVERMUMPS, PETSC_TRUE);
+}
+
 static const SbSolverPreset presets[] = {
   {"cg", SB_MATRIX_BAIJ, PETSC_FALSE, "-ksp_type cg -pc_type none", NULL, NULL,
    "conjugate gradients without preconditioner", NULL},
@@ -52,11 +70,12 @@ static const SbSolverPreset presets[] = {
   {"sor", SB_MATRIX_AIJ, PETSC_FALSE,
    "-ksp_type richardson -pc_type composite -pc_composite_pcs sor -sub_0_pc_sor_omega 1.6 -ksp_max_it 100000",
    NULL, NULL, "successive over-relaxation, omega 1.6 (between ranks: block Jacobi)", NULL},
-  {"cholmod", SB_MATRIX_AIJ, PETSC_FALSE, "-ksp_type cg -pc_type cholesky -pc_factor_mat_solver_type cholmod",
-   "cholmod", NULL, "sparse Cholesky of SuiteSparse; one rank", NULL},
-  {"mumps", SB_MATRIX_AIJ, PETSC_FALSE,
-   "-ksp_type fgmres -pc_type cholesky -pc_factor_mat_solver_type mumps -mat_mumps_icntl_14 100", "mumps",
-   NULL, "sparse factorisation of MUMPS on any number of ranks", NULL},
+  {"cholmod", SB_MATRIX_AIJ, PETSC_FALSE, "-ksp_type cg", "cholmod", factor_cholmod,
+   "sparse Cholesky of SuiteSparse, on one of the ranks", NULL},
+  {"umfpack", SB_MATRIX_AIJ, PETSC_FALSE, "-ksp_type fgmres", "umfpack", factor_umfpack,
+   "sparse LU of SuiteSparse, on one of the ranks: takes indefinite tangents", NULL},
+  {"mumps", SB_MATRIX_AIJ, PETSC_FALSE, "-ksp_type fgmres", "mumps", factor_mumps,
+   "sparse factorisation of MUMPS on all ranks: takes indefinite tangents", NULL},
   {"rotated", SB_MATRIX_BAIJ, PETSC_FALSE, "-ksp_type cg", NULL, SbPCRotatedCreate,
    "CG, one factorisation that turns with the nodes and is seldom renewed: dynamic runs of up to about 100k "
    "tets",
@@ -73,10 +92,12 @@ static const SbSolverPreset presets[] = {
 
 static const SbOption rows[] = {
   {"solver", SB_OPTION_CHOICE, 1, "", "auto",
-   "auto|cg|cg_jacobi|cg_pbjacobi|cg_icc|cg_ssor|cg_two_level|cg_gamg|cg_hypre|gauss_seidel|sor|cholmod|"
-   "mumps|rotated|realtime|pressure",
-   "linear solver; auto chooses by size, ranks and material and says why. PETSc's -ksp_ and -pc_ options "
-   "refine it"},
+   "auto|direct|cg|cg_jacobi|cg_pbjacobi|cg_icc|cg_ssor|cg_two_level|cg_gamg|cg_hypre|gauss_seidel|sor|"
+   "cholmod|"
+   "umfpack|mumps|rotated|realtime|pressure",
+   "linear solver; auto chooses by size, ranks and material and says why, direct takes the fastest "
+   "factorisation "
+   "that this PETSc has for the problem. PETSc's -ksp_ and -pc_ options refine it"},
 };
 
 PetscErrorCode SbSolverRegister(void)
@@ -94,8 +115,8 @@ PetscErrorCode SbSolverSetFromOptions(char choice[], size_t size)
   PetscFunctionBeginUser;
   PetscCall(SbScopeSet(&scope, "", "", ""));
   PetscCall(SbOptionChoice(&scope, "solver", &index));
-  /* the choices are auto and then the rows of the table */
-  PetscCall(PetscStrncpy(choice, index == 0 ? "auto" : presets[index - 1].name, size));
+  /* the choices are auto, direct and then the rows of the table */
+  PetscCall(PetscStrncpy(choice, index > 1 ? presets[index - 2].name : index ? "direct" : "auto", size));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -107,7 +128,7 @@ static const SbSolverPreset *find_preset(const char *name)
   return NULL;
 }
 
-/* Whether some law hands out its exact tangent, which is indefinite in compression: CHOLMOD ends the program there. */
+/* Whether some law hands out its exact tangent, which is indefinite in compression: CHOLMOD fails there. */
 static PetscErrorCode may_be_indefinite(SbSpace s, PetscBool *maybe)
 {
   PetscFunctionBeginUser;
@@ -137,8 +158,8 @@ PetscErrorCode SbSolverChoose(SbSpace s, PetscBool dynamic, PetscBool linear, Pe
                               const char *choice, const SbSolverPreset **preset, char reason[], size_t size)
 {
   const PetscInt unknowns = 3 * s->Nnode;
-  const char *name = choice;
-  PetscBool direct, indefinite, has = PETSC_TRUE;
+  const char *name = choice, *package;
+  PetscBool indefinite, has = PETSC_TRUE;
   PetscReal nu;
   PetscMPIInt nrank;
 
@@ -146,10 +167,18 @@ PetscErrorCode SbSolverChoose(SbSpace s, PetscBool dynamic, PetscBool linear, Pe
   PetscCallMPI(MPI_Comm_size(s->comm, &nrank));
   PetscCall(may_be_indefinite(s, &indefinite));
   PetscCall(largest_poisson(s, &nu));
-  PetscCall(SbHasPackage(nrank == 1 && !indefinite ? "cholmod" : "mumps", &direct));
+  PetscCall(SbDirectPackage(s->comm, unknowns, (PetscBool)!indefinite, &package));
   if (explicit_run) {
     name = "cg";
     PetscCall(PetscSNPrintf(reason, size, "explicit integrator: no linear system"));
+  } else if (!strcmp(choice, "direct")) {
+    PetscCheck(package, s->comm, PETSC_ERR_USER,
+               "-solver direct needs SuiteSparse or MUMPS, and this PETSc was built without both: choose "
+               "another solver, or auto");
+    name = package;
+    PetscCall(PetscSNPrintf(reason, size, "the factorisation for %" PetscInt_FMT " unknowns on %d rank%s%s",
+                            unknowns, (int)nrank, nrank > 1 ? "s" : "",
+                            indefinite ? "; the exact tangent may be indefinite" : ""));
   } else if (strcmp(choice, "auto")) {
     PetscCall(PetscSNPrintf(reason, size, "chosen by -solver"));
   } else if (dynamic && !linear && unknowns <= (s->faces && nrank > 1 ? 20000 : 60000) && nu <= NU_ROTATED) {
@@ -160,8 +189,8 @@ PetscErrorCode SbSolverChoose(SbSpace s, PetscBool dynamic, PetscBool linear, Pe
                             "dynamic, %" PetscInt_FMT
                             " unknowns: one factorisation turns with the nodes and serves many steps",
                             unknowns));
-  } else if (unknowns <= 30000 && direct) {
-    name = nrank == 1 && !indefinite ? "cholmod" : "mumps";
+  } else if (unknowns <= SB_DIRECT_SMALL && package) {
+    name = package;
     PetscCall(PetscSNPrintf(
       reason, size, "%" PetscInt_FMT " unknowns: a factorisation is fast and holds at any Poisson's ratio%s",
       unknowns, indefinite ? "; the exact tangent may be indefinite" : ""));
@@ -188,8 +217,6 @@ PetscErrorCode SbSolverChoose(SbSpace s, PetscBool dynamic, PetscBool linear, Pe
   PetscCheck(has, s->comm, PETSC_ERR_USER,
              "-solver %s needs %s, which this PETSc was built without: choose another solver, or auto",
              (*preset)->name, (*preset)->package);
-  PetscCheck(nrank == 1 || strcmp((*preset)->name, "cholmod"), s->comm, PETSC_ERR_USER,
-             "-solver cholmod runs on one rank and there are %d: use mumps", (int)nrank);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -229,6 +256,7 @@ PetscErrorCode SbSolverCreateOperator(SbSpace s, const SbSolverPreset *preset, M
 
 PetscErrorCode SbSolverSetUp(SNES snes, SbSpace s, const SbSolverPreset *preset)
 {
+  PetscBool direct;
   KSP ksp;
   PC pc;
 
@@ -238,16 +266,13 @@ PetscErrorCode SbSolverSetUp(SNES snes, SbSpace s, const SbSolverPreset *preset)
   PetscCall(KSPSetType(ksp, KSPCG));
   PetscCall(KSPSetNormType(ksp, KSP_NORM_UNPRECONDITIONED));
   PetscCall(insert_options(preset->options));
-  if (strstr(preset->options, "-pc_type cholesky")) PetscCall(SbSolverLookAtResidual(ksp));
   PetscCall(KSPGetPC(ksp, &pc));
   /* in a null space the residual of CG may grow a long way before it falls */
   if (s->couple) PetscCall(KSPSetTolerances(ksp, PETSC_DEFAULT, PETSC_DEFAULT, 1e10, PETSC_DEFAULT));
-  if (s->couple && s->couple->saddle == SB_SADDLE_DIRECT) {
-    PetscCall(SbSolverLookAtResidual(ksp));
-    PetscCall(insert_options("-saddle_mat_mumps_icntl_14 100"));
-  }
   PetscCall(SbPCCoupleCreate(s, pc, &pc));
   if (preset->precondition) PetscCall(preset->precondition(s, pc));
+  PetscCall(PetscObjectTypeCompareAny((PetscObject)pc, &direct, PCCHOLESKY, PCLU, PCTELESCOPE, ""));
+  if (direct || (s->couple && s->couple->saddle == SB_SADDLE_DIRECT)) PetscCall(SbSolverLookAtResidual(ksp));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

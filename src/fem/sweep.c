@@ -120,7 +120,7 @@ PetscErrorCode SbSweepSetUp(SbSpace s, Mat A, PetscReal inverse[], PetscBool *po
     for (int k = 0; k < 9; k++) inverse[9 * (size_t)i + (size_t)k] = det > 0. ? C[k] / det : 0.;
     a += 9 * (size_t)(p->di[i + 1] - p->diagonal[i]);
   }
-  PetscCall(MatSeqSBAIJRestoreArray(local, &a));
+  PetscCall(SbMatReturnRead(local, MatSeqSBAIJRestoreArray, &a));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -141,7 +141,7 @@ PetscErrorCode SbSweep(SbSpace s, Mat A, const PetscReal inverse[], SbSweepDirec
   else
     backward(n, p->diagonal, p->di + 1, p->dj, a + 9 * (size_t)(p->di[n] + n) / 2, inverse, out);
   PetscCall(VecRestoreArray(z, &out));
-  PetscCall(MatSeqSBAIJRestoreArray(local, &a));
+  PetscCall(SbMatReturnRead(local, MatSeqSBAIJRestoreArray, &a));
   PetscCall(PetscLogFlops(9. * (double)(p->di[n] + n)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -89,13 +89,16 @@ PetscErrorCode SbMeshCreate(MPI_Comm comm, PetscInt nbody, SbBody body[], PetscI
   SbWhole whole;
   SbPoint *point;
   PetscInt partitioner;
-  PetscBool full;
+  PetscBool full, has = PETSC_TRUE;
 
   PetscFunctionBeginUser;
   PetscCheck(nset <= SB_SET_MAX, comm, PETSC_ERR_USER_INPUT,
              "%" PetscInt_FMT " sets; a scenario may have up to %d", nset, SB_SET_MAX);
   PetscCall(SbScopeSet(&scope, "", "", ""));
   PetscCall(SbOptionChoice(&scope, "mesh_partitioner", &partitioner));
+  if (!strcmp(partitioners[partitioner], "ptscotch")) PetscCall(SbHasPackage("ptscotch", &has));
+  PetscCheck(has, comm, PETSC_ERR_USER_INPUT,
+             "-mesh_partitioner ptscotch: this PETSc was built without it; choose metis");
   PetscCall(SbOptionBool(&scope, "mesh_report", &full));
   PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_MESH_READ], 0, 0, 0, 0));
   PetscCall(create_whole(comm, nbody, body, nset, set, &whole));

@@ -39,11 +39,11 @@ static PetscErrorCode linear_fails(KSP ksp, PetscInt it, PetscReal norm, KSPConv
 
 static PetscErrorCode forget_linear(void *ctx)
 {
-  void **both = (void **)ctx;
+  void **both = SB_DESTROY_CTX(void *, ctx);
 
   PetscFunctionBeginUser;
   PetscCall(PetscFree(both[0]));
-  PetscCall(KSPConvergedDefaultDestroy(both[1]));
+  PetscCall(KSPConvergedDefaultDestroy(SB_CTX_TO_DESTROY(both[1])));
   PetscCall(PetscFree(both));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -84,7 +84,7 @@ static PetscErrorCode newton_fails(SNES snes, PetscInt it, PetscReal x, PetscRea
 {
   PetscFunctionBeginUser;
   if (now((Saboteur *)ctx))
-    *reason = SNES_DIVERGED_FNORM_NAN;
+    *reason = SB_SNES_DIVERGED_NAN;
   else
     PetscCall(SNESConvergedDefault(snes, it, x, y, f, reason, NULL));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -92,8 +92,10 @@ static PetscErrorCode newton_fails(SNES snes, PetscInt it, PetscReal x, PetscRea
 
 static PetscErrorCode forget_newton(void *ctx)
 {
+  Saboteur *s = SB_DESTROY_CTX(Saboteur, ctx);
+
   PetscFunctionBeginUser;
-  PetscCall(PetscFree(ctx));
+  PetscCall(PetscFree(s));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

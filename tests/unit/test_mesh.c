@@ -1,6 +1,5 @@
 // The mesh of a scene on any number of ranks: every piece agrees with the whole, errors reach all ranks.
 // @ranks 1 2 3 4
-// @needs ptscotch
 #include "mesh_test.h"
 
 #define DATA "tests/data/"
@@ -199,12 +198,21 @@ static PetscErrorCode test_validation(void)
 
 int main(int argc, char **argv)
 {
+  PetscBool ptscotch;
+
   SB_TEST_BEGIN(argc, argv);
   PetscCall(SbLogInitialize());
   PetscCall(SbMeshRegister());
   PetscCall(test_scene("metis"));
   PetscCall(test_scene("simple"));
-  PetscCall(test_scene("ptscotch"));
+  PetscCall(PetscHasExternalPackage("ptscotch", &ptscotch));
+  if (ptscotch)
+    PetscCall(test_scene("ptscotch"));
+  else {
+    PetscCall(PetscOptionsSetValue(NULL, "-mesh_partitioner", "ptscotch"));
+    TEST_MESSAGE(create("box:1,1,1:2", NULL), PETSC_ERR_USER_INPUT, "-mesh_partitioner ptscotch");
+    PetscCall(PetscOptionsSetValue(NULL, "-mesh_partitioner", "metis"));
+  }
   PetscCall(test_few(DATA "two_tets.msh", 2));
   PetscCall(test_few("box:1,1,1:1", 6));
   PetscCall(test_order());

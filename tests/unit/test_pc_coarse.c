@@ -1,5 +1,4 @@
 // @ranks 1 2 3
-// @needs mumps
 /*
   The two-level preconditioner: symmetric and positive definite; iterations that hardly grow with the mesh, also on a slender
   bar where incomplete Cholesky alone fails; the solution of a factorisation, with several and held bodies; failures said.
@@ -206,7 +205,7 @@ static PetscErrorCode test_renewal(void)
 /* The displacement of a run with the preset against a factorisation; simple: whether the diagonal must have taken over. */
 static PetscErrorCode test_solution(const char *scene, PetscBool simple, const char *what)
 {
-  static const char *const solvers[] = {"-solver mumps ", "-solver cg_two_level "};
+  static const char *const solvers[] = {"-solver direct ", "-solver cg_two_level "};
   PetscReal norm[2], difference = 0.;
   Vec exact = NULL;
   char text[2048];

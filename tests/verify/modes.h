@@ -4,6 +4,7 @@
 */
 #pragma once
 #include <petscblaslapack.h>
+#include "sbsolver.h"
 #include "verify.h"
 
 #define MODES_BLOCK 16
@@ -47,6 +48,7 @@ static inline PetscErrorCode modes_lowest(SbModel m, PetscReal shift, PetscReal 
 {
   PetscReal last = 0.;
   PetscRandom random;
+  const char *package;
   Vec *X, *MX, *Z, U;
   Mat A;
   KSP ksp;
@@ -63,8 +65,11 @@ static inline PetscErrorCode modes_lowest(SbModel m, PetscReal shift, PetscReal 
   PetscCall(KSPSetOperators(ksp, A, A));
   PetscCall(KSPSetType(ksp, KSPPREONLY));
   PetscCall(KSPGetPC(ksp, &pc));
-  PetscCall(PCSetType(pc, PCCHOLESKY));
-  PetscCall(PCFactorSetMatSolverType(pc, MATSOLVERMUMPS));
+  PetscCall(SbDirectPackage(PETSC_COMM_WORLD, 3 * m->space->Nnode, PETSC_TRUE, &package));
+  PetscCheck(package, PETSC_COMM_WORLD, PETSC_ERR_SUP, "This PETSc has neither SuiteSparse nor MUMPS");
+  PetscCall(SbPCDirectSet(pc, package, PETSC_TRUE));
+  PetscCall(PCSetFromOptions(pc));
+  PetscCall(SbPCGuardFactor(pc));
   PetscCall(PetscRandomCreate(PETSC_COMM_WORLD, &random));
   for (int i = 0; i < MODES_BLOCK; i++) PetscCall(VecSetRandom(X[i], random));
   PetscCall(PetscRandomDestroy(&random));

@@ -2,7 +2,6 @@
 of the other elements with points of their own for each cell.
 
 @long
-@needs mumps
 Needs pvpython, from PATH or named by PVPYTHON; on Debian: apt-get install --no-install-recommends python3-paraview
 """
 import json

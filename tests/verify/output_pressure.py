@@ -4,7 +4,6 @@ Measured by the root mean square of the jumps between neighbouring cells, over t
 numbers in the cells have sqrt(2) = 1.41, alternating ones up to 2; for a smooth pressure it goes down with the size of the
 cells. All laws must find the same pressure, because strains are small; on two ranks it must be the same as on one.
 
-@needs mumps
 """
 import itertools
 import subprocess
@@ -27,7 +26,7 @@ SCENARIO = """
 -effect_hold_type support
 -effect_hold_on left
 -time static
--solver mumps
+-solver direct
 -snes_rtol 1e-6
 -output_fields pressure,mean_pressure,J
 -output_precision double

@@ -1,6 +1,5 @@
 """scripts/render draws a run without a display: a picture with the body in the colours of the scale, an animation.
 
-@needs mumps
 """
 import os
 import subprocess

@@ -3,7 +3,6 @@
 Displacement, velocity and acceleration of the last frame and every row of history.csv are compared, for every element and
 for all of them in one scene. Also: damaged checkpoints, the newest one that is whole, checkpoints that do not fit the run.
 
-@needs mumps
 """
 import re
 import shutil

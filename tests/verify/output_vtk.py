@@ -1,7 +1,6 @@
 """fields.xmf as VTK reads it: frames, times, names, values; and the same datasets on 1, 2, 3 and 4 ranks; by element, and
 with points of its own for each cell.
 
-@needs mumps
 
 vtkXdmfReader is what PyPI's VTK has; vtkXdmf3Reader is tried where there is one. Values are compared with those of fields.h5
 and, for the first and last frame, with history.csv.

@@ -1,5 +1,4 @@
 // @ranks 1 2
-// @needs mumps
 /*
   A body that touches nothing moves as if the others were not there.
 
@@ -121,6 +120,6 @@ int main(int argc, char **argv)
   PetscCall(check_named("cr", "euler_implicit", "cg_two_level", PETSC_FALSE));
   PetscCall(check_named("dg", "euler_implicit", "cg_jacobi", PETSC_TRUE));
   PetscCall(check_beside("cg_icc", 1e-9));
-  PetscCall(check_beside("mumps", 1e-9));
+  PetscCall(check_beside("direct", 1e-9));
   SB_TEST_END();
 }

@@ -1,5 +1,4 @@
 // @ranks 1 3
-// @needs mumps
 /*
   Effects on bodies of every element, through whole runs.
 
@@ -72,7 +71,7 @@ static PetscErrorCode bar(int kind, PetscInt n, PetscReal *strain)
     text, sizeof(text),
     "-bodies a -body_a_mesh box:0.2,0.1,0.1:%d" BODY "%s -body_a_material linear -effects gravity,clamp,pull "
     "-effect_clamp_type support -effect_clamp_on xmin -effect_pull_type traction -effect_pull_on xmax "
-    "-effect_pull_total 0,3,6 -time static -solver mumps" EXACT,
+    "-effect_pull_total 0,3,6 -time static -solver direct" EXACT,
     (int)n, kinds[kind][1]));
   PetscCall(test_scene_open(text, &t));
   PetscCall(verify_solve(&t, kinds[kind][0]));
@@ -122,7 +121,7 @@ static PetscErrorCode check_drive(int kind)
     "-bodies a -body_a_mesh box:0.2,0.1,0.1:2" BODY
     "%s -body_a_material corotated -effects hand -effect_hand_type drive -effect_hand_on "
     "xmin,xmax -effect_hand_angle 40*t -effect_hand_axis 1,2,3 -effect_hand_axis_point "
-    "0.1,0,0 -effect_hand_displacement t;0;0.5*t -time static -static_steps 4 -solver mumps" EXACT,
+    "0.1,0,0 -effect_hand_displacement t;0;0.5*t -time static -static_steps 4 -solver direct" EXACT,
     kinds[kind][1]));
   PetscCall(test_scene_open(text, &t));
   PetscCall(verify_solve(&t, kinds[kind][0]));
@@ -175,7 +174,7 @@ static PetscErrorCode check_mixed(void)
     "support "
     "-effect_stand_on low -effect_poke_type point_force -effect_poke_on tip -effect_poke_vector "
     "0.01;0.02;0.03 "
-    "-time static -solver mumps" EXACT));
+    "-time static -solver direct" EXACT));
   PetscCall(PetscStrlcat(text, " -set_tip_at box:-1,-1,0.09,3,1,1", sizeof(text)));
   PetscCall(test_scene_open(text, &t));
   PetscCall(verify_solve(&t, "three bodies"));
@@ -277,7 +276,7 @@ static PetscErrorCode check_motion(int kind)
   PetscReal implicit[2], explicit[2];
 
   PetscFunctionBeginUser;
-  PetscCall(swing(kind, "-time newmark -ts_dt 2e-4 -solver mumps" EXACT, implicit));
+  PetscCall(swing(kind, "-time newmark -ts_dt 2e-4 -solver direct" EXACT, implicit));
   SB_CHECK_NEAR(implicit[0], 1, 1e-10, kinds[kind][0]);
   PetscCall(swing(kind, "-time euler_symplectic", explicit));
   PetscCall(PetscPrintf(PETSC_COMM_WORLD,
@@ -301,7 +300,7 @@ static PetscErrorCode check_pressure(int kind)
                           "-bodies a -body_a_mesh box:0.2,0.1,0.1:2" BODY
                           "%s -body_a_material neohookean -body_a_spin 0,0,20 -effects sea "
                           "-effect_sea_type pressure -effect_sea_on boundary -effect_sea_value 2e4 -time "
-                          "euler_implicit -ts_dt 5e-3 -ts_max_time 0.05 -solver mumps" EXACT,
+                          "euler_implicit -ts_dt 5e-3 -ts_max_time 0.05 -solver direct" EXACT,
                           kinds[kind][1]));
   PetscCall(test_scene_open(text, &t));
   PetscCall(verify_solve(&t, kinds[kind][0]));

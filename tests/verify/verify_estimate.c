@@ -1,5 +1,4 @@
 // @ranks 1
-// @needs mumps
 /*
   Effectivity of the estimate of the error of space: estimate over true error in the energy norm (sbestimate.h), for P1, CR and DG, on
   problems whose stress is known, or is taken from a mesh at least twice as fine.
@@ -269,7 +268,7 @@ static PetscErrorCode check_cube(const char *element, PetscInt n, PetscReal nu)
   PetscFunctionBeginUser;
   PetscCall(verify_distorted_box((const PetscInt[3]){n, n, n}, (const PetscReal[3]){1., 1., 1.}, mesh));
   PetscCall(manufactured_scene(nu, scene, sizeof(scene)));
-  PetscCall(PetscStrlcat(scene, " -solver mumps", sizeof(scene)));
+  PetscCall(PetscStrlcat(scene, " -solver direct", sizeof(scene)));
   PetscCall(check_exact(&c, scene, mesh, exact_cube));
   PetscCall(test_file_remove(mesh));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -287,7 +286,7 @@ static PetscErrorCode check_shell(const char *element, PetscReal nu)
     "-effects x,y,z,push -effect_x_type support -effect_x_on x0 -effect_x_components x "
     "-effect_y_type support -effect_y_on y0 -effect_y_components y -effect_z_type support -effect_z_on z0 "
     "-effect_z_components z -effect_push_type pressure -effect_push_on inside -effect_push_value 1 "
-    "-effect_push_follower no -time static -solver mumps",
+    "-effect_push_follower no -time static -solver direct",
     (double)nu));
   PetscCall(check_exact(&c, scene, "meshes/shell.msh", exact_shell));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -396,13 +395,13 @@ static void sphere_map(const PetscInt n[3], const PetscInt at[3], PetscReal x[3]
 static PetscErrorCode check_bars(void)
 {
   static const Problem bar = {
-    "bar", BAR WEIGHT "-body_a_material linear -solver mumps", {4, 1, 1}, {0.4, 0.1, 0.1}, NULL};
+    "bar", BAR WEIGHT "-body_a_material linear -solver direct", {4, 1, 1}, {0.4, 0.1, 0.1}, NULL};
   static const Problem two = {
     "two",
     BAR WEIGHT
     "-body_a_material linear -body_a_inclusions far -set_far_at box:0,0,0.05,0.4,0.1,0.1 -sets root,far "
     "-inclusion_far_material linear -inclusion_far_young 2e6 -inclusion_far_poisson 0.3 "
-    "-inclusion_far_density 1000 -solver mumps",
+    "-inclusion_far_density 1000 -solver direct",
     {4, 1, 1},
     {0.4, 0.1, 0.1},
     straight_map};
@@ -427,7 +426,7 @@ static PetscErrorCode check_squeeze(void)
     "-bodies a -body_a_material linear -body_a_young 5e4 -body_a_density 1000 -sets low,high "
     "-set_low_at plane:0,0,1,0 -set_high_at plane:0,0,1,0.1 -effects hold,press -effect_hold_type support "
     "-effect_hold_on low -effect_press_type drive -effect_press_on high "
-    "-effect_press_displacement 0;0;-0.01 -time static -solver mumps",
+    "-effect_press_displacement 0;0;-0.01 -time static -solver direct",
     {2, 2, 1},
     {0.2, 0.2, 0.1},
     NULL};
@@ -448,7 +447,7 @@ static PetscErrorCode check_turned(const char *name, const char *law)
   const Problem turned = {name, options, {4, 1, 1}, {0.4, 0.1, 0.1}, NULL};
 
   PetscFunctionBeginUser;
-  PetscCall(PetscSNPrintf(options, sizeof(options), BAR "-body_a_material %s -solver mumps", law));
+  PetscCall(PetscSNPrintf(options, sizeof(options), BAR "-body_a_material %s -solver direct", law));
   PetscCall(check_finer(&turned, 0.3, (Case){.element = "cr", .n = 4}, cases));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -1,5 +1,4 @@
 // @ranks 1
-// @needs mumps
 /*
   The bar 0.4 x 0.1 x 0.1 m, clamped, E = 5e4, nu = 0.3, rho = 1000, small strains.
 
@@ -10,6 +9,7 @@
 
   Gravity put on at once, undamped: the first minimum of the end face is -1.5696 m at 0.7203 s.
 */
+#include "sbsolver.h"
 #include "verify.h"
 
 #define BAR                                                                                                  \
@@ -43,6 +43,7 @@ static PetscErrorCode lowest_mode(TestScene *t, Vec X, PetscReal *w)
 {
   SbModel m = t->model;
   PetscReal last = 0., size;
+  const char *package;
   Vec Y, Z;
   Mat K;
   KSP ksp;
@@ -55,8 +56,11 @@ static PetscErrorCode lowest_mode(TestScene *t, Vec X, PetscReal *w)
   PetscCall(KSPSetOperators(ksp, K, K));
   PetscCall(KSPSetType(ksp, KSPPREONLY));
   PetscCall(KSPGetPC(ksp, &pc));
-  PetscCall(PCSetType(pc, PCCHOLESKY));
-  PetscCall(PCFactorSetMatSolverType(pc, MATSOLVERMUMPS));
+  PetscCall(SbDirectPackage(PETSC_COMM_WORLD, 3 * m->space->Nnode, PETSC_TRUE, &package));
+  PetscCheck(package, PETSC_COMM_WORLD, PETSC_ERR_SUP, "This PETSc has neither SuiteSparse nor MUMPS");
+  PetscCall(SbPCDirectSet(pc, package, PETSC_TRUE));
+  PetscCall(PCSetFromOptions(pc));
+  PetscCall(SbPCGuardFactor(pc));
   PetscCall(VecDuplicate(X, &Y));
   PetscCall(VecDuplicate(X, &Z));
   PetscCall(test_fill(m, bend, X));

@@ -13,7 +13,8 @@
   "-body_a_density 1 -effects x,y,z,press -effect_x_type support -effect_x_on xmin -effect_x_components x " \
   "-effect_y_type support -effect_y_on ymin -effect_y_components y -effect_z_type support -effect_z_on "    \
   "zmin "                                                                                                   \
-  "-effect_z_components z -effect_press_type traction -effect_press_on zmax -time static "
+  "-effect_z_components z -effect_press_type traction -effect_press_on zmax -time static -time_inverted "   \
+  "refuse "
 
 static const PetscReal limit = 0.19245008972987526; /* of E */
 

@@ -1,5 +1,4 @@
 // @ranks 1 2 3
-// @needs mumps
 /*
   Response `multiplier` against `projected`: the same nonlinear problem by another linear solve, so the same answer to what contact
   settles to.
@@ -82,10 +81,10 @@ static PetscErrorCode check_stack(PetscInt n)
   static const char *const more[] = {
     "-effect_meet_response projected",
     "-effect_meet_response multiplier -multipliers direct -solver cg_pbjacobi",
-    "-effect_meet_response multiplier -multipliers direct -solver mumps",
+    "-effect_meet_response multiplier -multipliers direct -solver direct",
     "-effect_meet_response multiplier -multipliers iterative -solver cg_icc",
     "-effect_meet_response multiplier -multipliers iterative -solver cg_gamg",
-    "-effect_meet_response multiplier -multipliers iterative -solver mumps",
+    "-effect_meet_response multiplier -multipliers iterative -solver direct",
     "-effect_meet_response multiplier -multipliers direct -solver cg_pbjacobi"};
 
   PetscFunctionBeginUser;

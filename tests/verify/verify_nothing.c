@@ -1,5 +1,4 @@
 // @ranks 1 2
-// @needs mumps
 /*
   What a scene does not name costs nothing.
 

@@ -1,5 +1,4 @@
 // @ranks 2 3 4
-// @needs mumps
 /*
   The same scene on one rank and on all of them: every rank runs it alone and then all run it together. Displacements,
   velocities (by original number of the node) and scalars of the last state must agree.
@@ -115,7 +114,7 @@ static PetscErrorCode check_element(const char *bar, const char *block)
     "-body_bar_tangent exact -effects "
     "gravity,clamp,pull,air -effect_pull_type traction -effect_pull_on xmax "
     "-effect_pull_vector 0;300;100 -effect_air_type pressure -effect_air_on zmax "
-    "-effect_air_value 500 -time static -snes_rtol 1e-9 -solver mumps",
+    "-effect_air_value 500 -time static -snes_rtol 1e-9 -solver direct",
     bar));
   PetscCall(check(what, 1e-8, text));
   PetscCall(PetscSNPrintf(elements, sizeof(elements),
@@ -126,14 +125,14 @@ static PetscErrorCode check_element(const char *bar, const char *block)
     PetscSNPrintf(text, sizeof(text),
                   "%s -body_bar_material linear -body_block_material linear -effects gravity,clamp,damping "
                   "-effect_damping_alpha 0.3 -effect_damping_beta 0.001 -time newmark -ts_dt 0.01 "
-                  "-ts_max_time 0.1 -solver mumps -ksp_rtol 1e-13",
+                  "-ts_max_time 0.1 -solver direct -ksp_rtol 1e-13",
                   elements));
   PetscCall(check(what, 1e-10, text));
   PetscCall(PetscSNPrintf(what, sizeof(what), "genalpha, %s and %s", bar, block));
   PetscCall(PetscSNPrintf(text, sizeof(text),
                           "%s -body_bar_material stvk -body_bar_tangent exact -body_block_material corotated "
                           "-effects gravity,clamp "
-                          "-time genalpha -ts_dt 0.01 -ts_max_time 0.05 -snes_rtol 1e-9 -solver mumps",
+                          "-time genalpha -ts_dt 0.01 -ts_max_time 0.05 -snes_rtol 1e-9 -solver direct",
                           elements));
   PetscCall(check(what, 1e-8, text));
   PetscCall(PetscSNPrintf(what, sizeof(what), "explicit, %s and %s", bar, block));

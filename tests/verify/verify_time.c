@@ -1,5 +1,4 @@
 // @ranks 1 3
-// @needs mumps
 /*
   The integrators against exact answers of their own recurrences. One linear tet held at its base is an oscillator: its apex moves
   along z with w^2 = V (lambda + 2 mu) / (H^2 m), m = rho V / 4. With q = v + i w u an undamped step multiplies q by
@@ -149,7 +148,7 @@ static PetscErrorCode bend(const char *element, const char *options, PetscInt n,
                   "-bodies a -body_a_mesh box:0.2,0.1,0.1:1 -body_a_element %s -body_a_material linear "
                   "-body_a_young 1e4 -body_a_poisson 0.3 -body_a_density 1000 -effects gravity,hold,damping "
                   "-effect_damping_alpha 2 -effect_damping_beta 0.002 -effect_hold_type support "
-                  "-effect_hold_on xmin -ts_dt %.17g -ts_max_time %.17g -ksp_rtol 1e-14 -solver mumps %s",
+                  "-effect_hold_on xmin -ts_dt %.17g -ts_max_time %.17g -ksp_rtol 1e-14 -solver direct %s",
                   element, (double)(T / (PetscReal)n), (double)T, options));
   PetscCall(test_scene_open(text, &t));
   PetscCall(SbRunSolve(t.run));

@@ -1,7 +1,6 @@
 // @long
 // @ranks 1
 // @cpu 600
-// @needs mumps
 /*
   A neo-Hookean bar at nu = 0.499, its end turned by 90 degrees, in eight static steps.
 
@@ -17,7 +16,7 @@
 #include "locking.h"
 
 #define NU 0.499
-#define OPTIONS "-solver mumps -static_steps 8"
+#define OPTIONS "-solver direct -static_steps 8"
 
 static PetscErrorCode twist(const char *element, PetscInt n, PetscReal value[4])
 {
