@@ -303,9 +303,19 @@ PetscErrorCode SbSpaceNodeRotations(SbSpace space, const PetscReal u[], PetscRea
   as long as the iterations stay low; it is renewed at the next change of the operator when they do not, when the solver
   fails, or when SbPCRotatedRenew() is called.
   Options read: -pc_rotated_spread (rad), from which angle on between a cell and its node the node is solved exactly.
-  Errors: PETSC_ERR_USER when ranks meet at more than 1500 nodes. An operator that is not positive definite fails the solve.
+  Memory: besides the factor 72 n^2 bytes on each rank during a factorisation, with n of SbSpaceInterfaceSize(); 9 n^2 of all ranks
+  together stay. An operator that is not positive definite fails the solve.
 */
 PetscErrorCode SbPCRotatedCreate(SbSpace space, PC pc);
 PetscErrorCode SbPCRotatedRenew(PC pc);
+/*
+  SbSpaceInterfaceSize - nodes at which the parts of the ranks meet, n, and how many of them a factor that turns takes, most.
+
+  Collective; prescribed unknowns are known. Makes the plan of the space. Options read: -pc_rotated_interface (1500).
+*/
+PetscErrorCode SbSpaceInterfaceSize(SbSpace space, PetscInt *n, PetscInt *most);
 /* Factorisations so far, nodes solved exactly at present (this rank), entries of the factor (this rank). Outputs may be NULL. */
 PetscErrorCode SbPCRotatedGetStats(PC pc, PetscInt *nfactor, PetscInt *nexact, PetscInt64 *entries);
+/* What one application reads on this rank, bytes: the factor of its interior, twice, and its rows of the interface's; 0 before the
+   factorisation. nface: nodes of the interface. Outputs may be NULL. Not collective. */
+PetscErrorCode SbPCRotatedGetWork(PC pc, PetscInt64 *interior, PetscInt64 *interface, PetscInt *nface);

@@ -22,8 +22,9 @@ static inline PetscErrorCode test_scene_run(TestScene *scene)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Model and run as the program makes them, ready for SbRunSolve(); with output to the folder `dir` unless it is NULL. */
-static inline PetscErrorCode test_scene_open_in(const char *dir, const char *options, TestScene *scene)
+/* Model and run on the ranks of `comm` as the program makes them, ready for SbRunSolve(); with output to the folder `dir` unless it is NULL. */
+static inline PetscErrorCode test_scene_open_on(MPI_Comm comm, const char *dir, const char *options,
+                                                TestScene *scene)
 {
   PetscFunctionBeginUser;
   *scene = (TestScene){NULL, NULL, NULL, NULL}; /* what a call that fails leaves can be closed */
@@ -32,7 +33,7 @@ static inline PetscErrorCode test_scene_open_in(const char *dir, const char *opt
   PetscCall(SbRegisterAll());
   PetscCall(PetscOptionsInsertString(NULL, options));
   if (dir) PetscCall(PetscOptionsSetValue(NULL, "-output_dir", dir));
-  PetscCall(SbSceneCreate(PETSC_COMM_WORLD, &scene->model));
+  PetscCall(SbSceneCreate(comm, &scene->model));
   PetscCall(test_scene_run(scene));
   if (dir) PetscCall(SbOutputSetFromOptions(scene->run));
   PetscCall(SbOptionsCheck());
@@ -43,6 +44,13 @@ static inline PetscErrorCode test_scene_open_in(const char *dir, const char *opt
   if (dir) PetscCall(SbOutputAttach(scene->run));
   PetscCall(SbMeshValidate(scene->model->mesh));
   PetscCall(SbSpaceValidate(scene->model->space));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static inline PetscErrorCode test_scene_open_in(const char *dir, const char *options, TestScene *scene)
+{
+  PetscFunctionBeginUser;
+  PetscCall(test_scene_open_on(PETSC_COMM_WORLD, dir, options, scene));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -6,8 +6,8 @@
   iteration hardly notices; where they vary much the nodes are solved exactly (exact_nodes.c). So one factorisation serves a
   whole run, and a step of a swinging bar takes six to ten iterations to 1e-4.
 
-  A0^-1 is applied by a factor in 16-bit integers (factor.c). On several ranks each eliminates its interior, and the interface
-  is solved by its dense inverse (interface.c): the same preconditioner as on one rank, but for rounding.
+  A0^-1 is applied by a factor in 16-bit integers (factor.c). On several ranks each eliminates its interior, and what is left on
+  the nodes between them is solved by all together (interface.c): the same preconditioner as on one rank, but for rounding.
 
   Prescribed unknowns: nodes with all three take no part and are divided by their diagonal; nodes with one or two are not
   turned. Renewal: see SbPCRotatedCreate(); by counts of iterations only, so that runs are repeatable.
@@ -186,6 +186,7 @@ static PetscErrorCode factor_operator(Rotated *p, Mat A, PetscBool *ok)
   SbSpace s = p->space;
   const PetscInt ninterior = p->n - p->nkeep;
   PetscInt *ia, *ja, nz = 0;
+  PetscInt64 entries, bytes;
   PetscReal *block, *own, *schur;
 
   PetscFunctionBeginUser;
@@ -205,7 +206,8 @@ static PetscErrorCode factor_operator(Rotated *p, Mat A, PetscBool *ok)
   PetscCall(add_other_rows(p, A, schur));
   add_own_schur(p, own, schur);
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, ok, 1, SB_MPI_BOOL, MPI_LAND, s->comm));
-  if (*ok) PetscCall(SbInterfaceInvert(p->face, schur, ok));
+  SbFactorSize(p->factor, &entries, &bytes);
+  if (*ok) PetscCall(SbInterfaceFactorise(p->face, 2 * bytes, schur, ok));
   PetscCall(PetscFree2(own, schur));
   PetscCall(PetscFree2(ja, block));
   PetscCall(PetscFree(ia));
@@ -451,5 +453,19 @@ PetscErrorCode SbPCRotatedGetStats(PC pc, PetscInt *nfactor, PetscInt *nexact, P
   if (nfactor) *nfactor = p->nfactor;
   if (nexact) *nexact = p->exact.n;
   if (entries) *entries = found;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbPCRotatedGetWork(PC pc, PetscInt64 *interior, PetscInt64 *interface, PetscInt *nface)
+{
+  PetscInt64 entries, bytes = 0;
+  Rotated *p;
+
+  PetscFunctionBeginUser;
+  PetscCall(PCShellGetContext(pc, &p));
+  if (p->factor) SbFactorSize(p->factor, &entries, &bytes);
+  if (interior) *interior = 2 * bytes;
+  if (interface) *interface = p->face ? SbInterfaceBytes(p->face) : 0;
+  if (nface) *nface = p->face ? p->face->n : 0;
   PetscFunctionReturn(PETSC_SUCCESS);
 }

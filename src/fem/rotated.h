@@ -33,29 +33,40 @@ PetscErrorCode SbFrameOperatorAddRows(Mat A, PetscInt n, const PetscInt node[], 
 /* ------------------------------------------------------------------ nodes between the parts of several ranks */
 
 /*
-  The interface: nodes of a rank that touch a node of a lower rank. Without them the parts of the ranks are not coupled. Their
-  Schur complement is inverted densely; each rank keeps some rows of the inverse.
+  SbInterfaceChooseNodes - few nodes, without which the parts of the ranks are not coupled.
+
+  Collective; the space has a plan. Fully prescribed nodes are left out. Output: index[nnode] number among them of a local node, -1 for
+  others; those of a rank are consecutive. nmine: owned by this rank; n: of all ranks.
 */
+PetscErrorCode SbInterfaceChooseNodes(SbSpace space, PetscInt index[], PetscInt *nmine, PetscInt *n);
+
+/* These nodes, and the factored inverse of their Schur complement, of which each rank has some rows (interface.c). */
 typedef struct _p_SbInterface *SbInterface;
+typedef struct _p_SbInterfaceFactor *SbInterfaceFactor;
 struct _p_SbInterface {
   MPI_Comm comm;
-  PetscInt n;                    /* nodes of all ranks */
-  PetscInt *index;               /* [nnode] number among them of a local node, -1 for others */
-  PetscInt nmine;                /* owned by this rank */
-  PetscInt *mine;                /* [nmine] local nodes */
-  PetscInt row0, nrow;           /* rows of the inverse here, unknowns */
-  float *inverse;                /* [nrow][3 n] */
-  float *sum;                    /* [3 n] work */
-  PetscMPIInt *counts, *offsets; /* [size] rows of each rank */
+  PetscInt n;               /* nodes of all ranks */
+  PetscInt *index;          /* [nnode] number among them of a local node, -1 for others */
+  PetscInt nmine;           /* owned by this rank */
+  PetscInt *mine;           /* [nmine] local nodes */
+  SbInterfaceFactor factor; /* owned */
 };
 
-/* Finds the interface. Collective. Fully prescribed nodes are left out. Errors: PETSC_ERR_USER when it is too large. */
+/* Finds the interface. Collective. */
 PetscErrorCode SbInterfaceCreate(SbSpace space, SbInterface *face);
 PetscErrorCode SbInterfaceDestroy(SbInterface *face);
-/* Inverts. schur[(3 n)^2], column-major, lower triangle: this rank's contributions; destroyed. Collective. */
-PetscErrorCode SbInterfaceInvert(SbInterface face, PetscReal schur[], PetscBool *ok);
+/*
+  SbInterfaceFactorise - factors the sum over ranks of their contributions.
+
+  Collective. Input: work, bytes that this rank reads for its interior in each application, which is evened out. In and out:
+  schur[(3 n)^2], column-major, lower triangle: this rank's contribution; destroyed. Output: ok, PETSC_FALSE on all ranks when the
+  sum is not positive definite.
+*/
+PetscErrorCode SbInterfaceFactorise(SbInterface face, PetscInt64 work, PetscReal schur[], PetscBool *ok);
 /* x[3 n] <- inverse times the sum of x over ranks. Collective. */
 PetscErrorCode SbInterfaceSolve(SbInterface face, float x[]);
+/* Bytes of the factored inverse that this rank reads in a solve. Not collective. */
+PetscInt64 SbInterfaceBytes(SbInterface face);
 
 /* ------------------------------------------------------------------ nodes solved exactly */
 

@@ -159,7 +159,8 @@ PetscErrorCode SbSolverChoose(SbSpace s, PetscBool dynamic, PetscBool linear, Pe
 {
   const PetscInt unknowns = 3 * s->Nnode;
   const char *name = choice, *package;
-  PetscBool indefinite, has = PETSC_TRUE;
+  PetscInt nface = 0, most = 0;
+  PetscBool indefinite, has = PETSC_TRUE, turns;
   PetscReal nu;
   PetscMPIInt nrank;
 
@@ -168,6 +169,25 @@ PetscErrorCode SbSolverChoose(SbSpace s, PetscBool dynamic, PetscBool linear, Pe
   PetscCall(may_be_indefinite(s, &indefinite));
   PetscCall(largest_poisson(s, &nu));
   PetscCall(SbDirectPackage(s->comm, unknowns, (PetscBool)!indefinite, &package));
+  /* a factorisation that turns with the nodes, unless ranks meet at too many of them */
+  turns = (PetscBool)(!strcmp(choice, "rotated") || !strcmp(choice, "realtime"));
+  if (!strcmp(choice, "auto")) {
+    const PetscInt limit =
+      s->faces && nrank > 1 ? 20000 : 60000; /* face terms join more nodes between ranks */
+
+    turns = (PetscBool)(dynamic && !linear && unknowns <= limit && nu <= NU_ROTATED);
+  }
+  if (turns && nrank > 1 && !explicit_run) PetscCall(SbSpaceInterfaceSize(s, &nface, &most));
+  if (nface > most) {
+    if (strcmp(choice, "auto"))
+      PetscCall(SbWarning(s->comm,
+                          "-solver %s is for parts of ranks that meet at %" PetscInt_FMT
+                          " nodes at most (-pc_rotated_interface), and these meet at %" PetscInt_FMT
+                          ": another solver is taken; fewer ranks may be faster",
+                          choice, most, nface));
+    turns = PETSC_FALSE;
+    choice = "auto";
+  }
   if (explicit_run) {
     name = "cg";
     PetscCall(PetscSNPrintf(reason, size, "explicit integrator: no linear system"));
@@ -181,9 +201,9 @@ PetscErrorCode SbSolverChoose(SbSpace s, PetscBool dynamic, PetscBool linear, Pe
                             indefinite ? "; the exact tangent may be indefinite" : ""));
   } else if (strcmp(choice, "auto")) {
     PetscCall(PetscSNPrintf(reason, size, "chosen by -solver"));
-  } else if (dynamic && !linear && unknowns <= (s->faces && nrank > 1 ? 20000 : 60000) && nu <= NU_ROTATED) {
-    /* face terms join more nodes between ranks, and the dense interface is bounded. Ten steps of 1.3k to 2.3k unknowns, linear iterations
-       of this and pressure, DG: 1150 and 1478 at nu 0.4999, 14521 and 1652 at 0.49999, 634312 and 4348 at 0.499999 */
+  } else if (turns) {
+    /* ten steps of 1.3k to 2.3k unknowns, linear iterations of this and pressure, DG: 1150 and 1478 at nu 0.4999, 14521 and 1652 at
+       0.49999, 634312 and 4348 at 0.499999 */
     name = "rotated";
     PetscCall(PetscSNPrintf(reason, size,
                             "dynamic, %" PetscInt_FMT
@@ -210,6 +230,15 @@ PetscErrorCode SbSolverChoose(SbSpace s, PetscBool dynamic, PetscBool linear, Pe
                     "%s, %" PetscInt_FMT
                     " unknowns: motions of large parts are solved directly, the rest takes few iterations",
                     dynamic ? "dynamic" : "static", unknowns));
+  }
+  if (nface > most) {
+    size_t length;
+
+    PetscCall(PetscStrlen(reason, &length));
+    PetscCall(PetscSNPrintf(reason + length, size - length,
+                            "; %d ranks meet at %" PetscInt_FMT
+                            " nodes, and rotated and realtime take %" PetscInt_FMT,
+                            (int)nrank, nface, most));
   }
   *preset = find_preset(name);
   PetscCheck(*preset, s->comm, PETSC_ERR_PLIB, "No solver preset %s", name);

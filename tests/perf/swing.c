@@ -1,5 +1,5 @@
 /*
-  Milliseconds per step of the swinging bar (perf.h) with one linear solver, without output.
+  Milliseconds per step of the swinging bar (perf.h) with one linear solver, without output; -mesh and -hold take another body.
 
     swing -mesh box:0.4,0.1,0.1:8 -solver realtime -element p1 -steps 120 -seconds 10
 
@@ -7,6 +7,35 @@
   step is told apart: it holds what a solver sets up once. Iterations are those of CG.
 */
 #include "perf.h"
+
+/* Bytes that one application of a factor that turns reads: on the busiest rank, and of that the interface; of all ranks. */
+static PetscErrorCode tell_work(SNES snes)
+{
+  PetscInt64 work[3] = {0}, all[3];
+  PetscInt nface;
+  const char *name;
+  PetscBool shell;
+  KSP ksp;
+  PC pc;
+
+  PetscFunctionBeginUser;
+  PetscCall(SNESGetKSP(snes, &ksp));
+  PetscCall(KSPGetPC(ksp, &pc));
+  PetscCall(PetscObjectTypeCompare((PetscObject)pc, PCSHELL, &shell));
+  if (!shell) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PCShellGetName(pc, &name));
+  if (!name || strcmp(name, "rotated factor")) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(SbPCRotatedGetWork(pc, &work[0], &work[1], &nface));
+  work[2] = work[0] + work[1];
+  PetscCallMPI(MPI_Allreduce(work, all, 3, MPIU_INT64, MPI_MAX, PETSC_COMM_WORLD));
+  PetscCall(perf_fact("interface_nodes", (double)nface));
+  PetscCall(perf_fact("busiest_interior_bytes", (double)all[0]));
+  PetscCall(perf_fact("busiest_interface_bytes", (double)all[1]));
+  PetscCall(perf_fact("busiest_bytes", (double)all[2]));
+  PetscCallMPI(MPI_Allreduce(&work[2], &all[2], 1, MPIU_INT64, MPI_SUM, PETSC_COMM_WORLD));
+  PetscCall(perf_fact("bytes", (double)all[2]));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
 
 typedef struct {
   double limit, before; /* s of wall time: after these the run ends; at the end of the last step */
@@ -31,23 +60,27 @@ static PetscErrorCode watch(SbRun run, const SbStep *step, void *ctx)
 
 int main(int argc, char **argv)
 {
-  char mesh[512] = "box:0.4,0.1,0.1:8", solver[64] = "cg_icc", element[64] = "p1", more[256], text[PERF_TEXT];
+  char mesh[512] = "box:0.4,0.1,0.1:8", solver[64] = "cg_icc", element[64] = "p1",
+       hold[256] = "plane:1,0,0,0", more[512], text[PERF_TEXT];
   PetscInt steps = 120;
   PetscReal seconds = 10.;
   Watch w = {0., 0.};
   PerfClock start;
   TestScene t;
+  SNES snes;
 
   PetscFunctionBeginUser;
   PetscCall(PetscInitialize(&argc, &argv, NULL, NULL));
   PetscCall(perf_argument("-mesh", sizeof(mesh), mesh));
   PetscCall(perf_argument("-solver", sizeof(solver), solver));
   PetscCall(perf_argument("-element", sizeof(element), element));
+  PetscCall(perf_argument("-hold", sizeof(hold), hold));
   PetscCall(PetscOptionsGetInt(NULL, NULL, "-steps", &steps, NULL));
   PetscCall(PetscOptionsGetReal(NULL, NULL, "-seconds", &seconds, NULL));
   PetscCall(PetscSNPrintf(more, sizeof(more),
-                          "-solver %s -body_bar_element %s -ts_max_time %.10g -time_max_cuts 0", solver,
-                          element, (double)steps / 60.));
+                          "-solver %s -body_bar_element %s -ts_max_time %.10g -time_max_cuts 0 "
+                          "-set_end_at %s",
+                          solver, element, (double)steps / 60., hold));
   PetscCall(perf_bar(mesh, more, text));
   PetscCall(perf_open(text, &t));
   w.limit = (double)seconds;
@@ -57,6 +90,8 @@ int main(int argc, char **argv)
   PetscCall(SbRunSolve(t.run));
   PetscCall(
     perf_fact("cpu_per_step_ms", 1e3 * perf_stop(start).cpu / (double)PetscMax(t.run->steps_total, 1)));
+  PetscCall(TSGetSNES(t.run->ts, &snes));
+  PetscCall(tell_work(snes));
   if (t.run->stop_reason[0])
     PetscCall(PetscPrintf(PETSC_COMM_WORLD, "fact failed 1\nnote %s\n", t.run->stop_reason));
   PetscCall(test_scene_close(&t));

@@ -202,6 +202,53 @@ static PetscErrorCode check_indefinite(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* What an application reads is shared: all ranks together read little more than one does alone, and none much more than its part. */
+static PetscErrorCode check_work(PetscMPIInt size)
+{
+  const char *options =
+    "-bodies bar -body_bar_mesh box:0.4,0.1,0.1:24,7,7 -body_bar_material linear -body_bar_young 5e4 "
+    "-body_bar_poisson 0.4 -body_bar_density 1000";
+  PetscInt64 interior, face, alone = 0, work, all, most;
+  PetscInt nface;
+
+  PetscFunctionBeginUser;
+  for (int k = 0; k < 2; k++) {
+    MPI_Comm comm = k ? PETSC_COMM_WORLD : PETSC_COMM_SELF;
+    SbStage stage = {.shift_a = 3600., .shift_v = 60., .shift_k = 1.};
+    TestScene t;
+    PetscBool is;
+    Mat A;
+    PC pc;
+
+    PetscCall(test_scene_open_on(comm, NULL, options, &t));
+    PetscCall(SbSpaceCreateFrameOperator(t.model->space, &A));
+    PetscCall(SbFrameOperatorSetState(A, &stage, &is));
+    PetscCall(PCCreate(comm, &pc));
+    PetscCall(PCSetOperators(pc, A, A));
+    PetscCall(SbPCRotatedCreate(t.model->space, pc));
+    PetscCall(SbPCRotatedGetWork(pc, &interior, &face, &nface));
+    SB_CHECK(!interior && !face && !nface, "work before there is a factor");
+    PetscCall(PCSetUp(pc));
+    PetscCall(SbPCRotatedGetWork(pc, &interior, &face, &nface));
+    SB_CHECK(interior > 0 && face >= 0 && (nface > 0) == (k && size > 1),
+             "%" PetscInt_FMT " nodes between ranks", nface);
+    if (!k) alone = interior;
+    PetscCall(PCDestroy(&pc));
+    PetscCall(MatDestroy(&A));
+    PetscCall(test_scene_close(&t));
+  }
+  work = interior + face;
+  PetscCallMPI(MPI_Allreduce(&work, &all, 1, MPIU_INT64, MPI_SUM, PETSC_COMM_WORLD));
+  PetscCallMPI(MPI_Allreduce(&work, &most, 1, MPIU_INT64, MPI_MAX, PETSC_COMM_WORLD));
+  PetscCall(PetscPrintf(PETSC_COMM_WORLD, "work on %d ranks: %.3f of that on one, busiest rank %.3f\n",
+                        (int)size, (double)all / (double)alone, (double)most / (double)alone));
+  SB_CHECK((double)all <= 1.15 * (double)alone, "%d ranks read %g times what one reads", (int)size,
+           (double)all / (double)alone);
+  SB_CHECK((double)most <= 1.3 * (double)alone / size, "the busiest of %d ranks has %g of the work",
+           (int)size, (double)most / (double)alone);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 int main(int argc, char **argv)
 {
   PetscInt its[2];
@@ -222,5 +269,6 @@ int main(int argc, char **argv)
     check_bent("corotated", held, PETSC_FALSE, 2., 25, &its[0])); /* the exact tangent, made definite */
   PetscCall(check_bent("neohookean", held, PETSC_FALSE, 0.5, 15, &its[0]));
   PetscCall(check_indefinite());
+  PetscCall(check_work(size));
   SB_TEST_END();
 }

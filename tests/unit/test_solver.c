@@ -117,6 +117,27 @@ static PetscErrorCode check_choice(const char *element, const char *nu, PetscBoo
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Where ranks meet at more nodes than a factorisation that turns takes, another solver does it. */
+static PetscErrorCode check_meeting(const char *solver, const char *most, PetscBool turns)
+{
+  char text[512];
+  TestScene t;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscSNPrintf(text, sizeof(text),
+                          "-bodies a -body_a_mesh box:0.3,0.1,0.1:2 -body_a_young 1e6 -body_a_poisson 0.3 "
+                          "-body_a_material corotated -body_a_tangent warped -effects gravity -ts_dt 0.02 "
+                          "-ts_max_time 0.02 -solver %s -pc_rotated_interface %s",
+                          solver, most));
+  PetscCall(test_scene_open(text, &t));
+  SB_CHECK((PetscBool)!strcmp(t.run->solver, strcmp(solver, "auto") ? solver : "rotated") == turns,
+           "%s, at most %s nodes: %s was taken, %s", solver, most, t.run->solver, t.run->solver_reason);
+  PetscCall(SbRunSolve(t.run));
+  SB_CHECK(!t.run->stop_reason[0] && t.run->steps_total == 1, "%s: %s", t.run->solver, t.run->stop_reason);
+  PetscCall(test_scene_close(&t));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 int main(int argc, char **argv)
 {
   static const char *const solvers[] = {"auto",    "cg",           "cg_jacobi", "cg_pbjacobi", "cg_icc",
@@ -154,6 +175,12 @@ int main(int argc, char **argv)
   PetscCall(check_indefinite(MATSOLVERUMFPACK, KSPFGMRES));
   PetscCall(check_indefinite(MATSOLVERMUMPS, KSPFGMRES));
   PetscCall(check_choice("p1", "0.499999", PETSC_TRUE));
+  for (size_t k = 0; k < 3; k++) {
+    static const char *const turning[] = {"auto", "rotated", "realtime"};
+
+    PetscCall(check_meeting(turning[k], "1500", PETSC_TRUE));
+    PetscCall(check_meeting(turning[k], "3", (PetscBool)(size == 1)));
+  }
   PetscCall(check_choice("cr", "0.4999", PETSC_TRUE));
   PetscCall(check_choice("cr", "0.499999", PETSC_FALSE));
   PetscCall(check_choice("dg", "0.499999", PETSC_FALSE));
