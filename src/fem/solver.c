@@ -171,12 +171,8 @@ PetscErrorCode SbSolverChoose(SbSpace s, PetscBool dynamic, PetscBool linear, Pe
   PetscCall(SbDirectPackage(s->comm, unknowns, (PetscBool)!indefinite, &package));
   /* a factorisation that turns with the nodes, unless ranks meet at too many of them */
   turns = (PetscBool)(!strcmp(choice, "rotated") || !strcmp(choice, "realtime"));
-  if (!strcmp(choice, "auto")) {
-    const PetscInt limit =
-      s->faces && nrank > 1 ? 20000 : 60000; /* face terms join more nodes between ranks */
-
-    turns = (PetscBool)(dynamic && !linear && unknowns <= limit && nu <= NU_ROTATED);
-  }
+  if (!strcmp(choice, "auto"))
+    turns = (PetscBool)(dynamic && !linear && unknowns <= 60000 && nu <= NU_ROTATED);
   if (turns && nrank > 1 && !explicit_run) PetscCall(SbSpaceInterfaceSize(s, &nface, &most));
   if (nface > most) {
     if (strcmp(choice, "auto"))
@@ -202,8 +198,9 @@ PetscErrorCode SbSolverChoose(SbSpace s, PetscBool dynamic, PetscBool linear, Pe
   } else if (strcmp(choice, "auto")) {
     PetscCall(PetscSNPrintf(reason, size, "chosen by -solver"));
   } else if (turns) {
-    /* ten steps of 1.3k to 2.3k unknowns, linear iterations of this and pressure, DG: 1150 and 1478 at nu 0.4999, 14521 and 1652 at
-       0.49999, 634312 and 4348 at 0.499999 */
+    /* 51k unknowns of CR, 36k of DG, nu 0.4: ms per step of this and cg_two_level 22 and 89, 22 and 94 on two ranks, 12 and 50, 16
+       and 76 on four (docs/reports/realtime_ranks.md). Ten steps of 1.3k to 2.3k unknowns, linear iterations of this and pressure,
+       DG: 1150 and 1478 at nu 0.4999, 14521 and 1652 at 0.49999, 634312 and 4348 at 0.499999 */
     name = "rotated";
     PetscCall(PetscSNPrintf(reason, size,
                             "dynamic, %" PetscInt_FMT
