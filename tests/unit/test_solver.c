@@ -147,8 +147,10 @@ int main(int argc, char **argv)
   PetscReal z, exact;
   PetscInt iterations;
   char stop[512], text[128];
+  PetscMPIInt size;
 
   SB_TEST_BEGIN(argc, argv);
+  PetscCallMPI(MPI_Comm_size(PETSC_COMM_WORLD, &size));
   PetscCall(tip("-solver cg_pbjacobi", &exact, stop, &iterations));
   SB_CHECK(exact < -1e-3 && !stop[0], "cg_pbjacobi: tip at %g, %s", (double)exact, stop);
   for (size_t k = 0; k < PETSC_STATIC_ARRAY_LENGTH(solvers); k++) {
