@@ -23,6 +23,11 @@ PetscErrorCode SbSolverSetFromOptions(char choice[], size_t size);
 /* The preset for `choice`; with "auto" by number of unknowns, ranks and law, the reason in words. Collective. */
 PetscErrorCode SbSolverChoose(SbSpace space, PetscBool dynamic, PetscBool linear, PetscBool explicit_run,
                               const char *choice, const SbSolverPreset **preset, char reason[], size_t size);
+/* Names a factorisation for matrices that may be indefinite when `choice` is auto. Not collective. Errors: PETSC_ERR_USER where this PETSc has none
+   for this number of ranks. */
+PetscErrorCode SbSolverPivot(MPI_Comm comm, size_t size, char choice[]);
+/* negative: eigenvalues below zero of the matrix that `snes` has factored last, -1: its solver does not tell. Collective. */
+PetscErrorCode SbSolverNegative(SNES snes, PetscInt *negative);
 /*
   SbSolverFallBack - after a solve that failed: a simpler preconditioner when the present one broke down (an incomplete
   factorisation that is not positive definite), said once as a warning. Collective.

@@ -80,7 +80,18 @@ struct _p_SbRun {
   PetscReal spectral_radius, newmark[2]; /* newmark: beta, gamma */
   PetscInt max_cuts, static_steps;
   PetscReal min_increment; /* static: smallest load increment as a part of 1 / static_steps */
-  PetscReal softening;     /* static: |du|/dlambda of the last step over that of the first one; 0: there was none */
+  PetscReal
+    softening; /* static: |du|/dlambda of the last step over that of the first one; 0: there was none */
+  struct {
+    PetscBool on;   /* static: steps along the path of equilibria, with the load factor as an unknown */
+    PetscInt steps; /* at most so many */
+    PetscReal longest,
+      first; /* longest step as a multiple of the first one, and that one, m; 0: not known yet */
+    PetscReal displacement; /* at which the path ends, m; 0: at none */
+  } arc;
+  Vec
+    path; /* with arc.on the last step's displacement, as long as the next step is to be; zero at the start */
+  PetscInt bifurcations; /* that a factorisation has shown */
   PetscBool
     free_body; /* static, without contact: nothing holds some body, and shorter load steps do not help */
   PetscBool tangent_known; /* J holds the tangent for shift_v, shift_a */

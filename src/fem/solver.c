@@ -332,6 +332,50 @@ PetscErrorCode SbSolverFinish(SNES snes, SbSpace s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscErrorCode SbSolverPivot(MPI_Comm comm, size_t size, char choice[])
+{
+  PetscBool own, direct, mumps, umfpack;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscStrcmp(choice, "auto", &own));
+  PetscCall(PetscStrcmp(choice, "direct", &direct));
+  if (!own && !direct) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(SbHasPackage("mumps", &mumps));
+  PetscCall(SbHasPackage("umfpack", &umfpack));
+  PetscCheck(mumps || umfpack, comm, PETSC_ERR_USER,
+             "-static_control arc_length factors indefinite matrices, which takes MUMPS or UMFPACK, and this "
+             "PETSc has "
+             "neither: choose another -solver");
+  PetscCall(PetscStrncpy(choice, mumps ? "mumps" : "umfpack", size));
+  /* MUMPS counts negative pivots when the last front is factored by one rank */
+  if (mumps) PetscCall(insert_options("-mat_mumps_icntl_13 1"));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbSolverNegative(SNES snes, PetscInt *negative)
+{
+  PetscBool cholesky;
+  MatSolverType type = NULL;
+  PetscInt serial_root;
+  PetscMPIInt nrank;
+  KSP ksp;
+  PC pc;
+  Mat F;
+
+  PetscFunctionBeginUser;
+  *negative = -1;
+  PetscCall(SNESGetKSP(snes, &ksp));
+  PetscCall(KSPGetPC(ksp, &pc));
+  PetscCall(PetscObjectTypeCompare((PetscObject)pc, PCCHOLESKY, &cholesky));
+  if (cholesky) PetscCall(PCFactorGetMatSolverType(pc, &type));
+  if (!type || strcmp(type, "mumps")) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PCFactorGetMatrix(pc, &F));
+  PetscCall(MatMumpsGetIcntl(F, 13, &serial_root));
+  PetscCallMPI(MPI_Comm_size(PetscObjectComm((PetscObject)F), &nrank));
+  if (nrank == 1 || serial_root == 1) PetscCall(MatGetInertia(F, negative, NULL, NULL));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode SbSolverFallBack(SNES snes, PetscBool *changed)
 {
   KSP ksp;

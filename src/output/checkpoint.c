@@ -89,11 +89,15 @@ typedef struct {
   Vec vec;
 } Part;
 
-static void parts_of(SbRun run, Part part[3])
+#define NPART 4
+#define PATH \
+  3 /* there with arc length only, with a checksum of its own: runs without go on from such a file, and the other way round */
+static void parts_of(SbRun run, Part part[NPART])
 {
   part[0] = (Part){"u", run->U};
   part[1] = (Part){"v", run->V};
   part[2] = (Part){"a", run->A};
+  part[PATH] = (Part){"path", run->path};
 }
 
 /* Running totals, by name. */
@@ -157,7 +161,7 @@ static PetscErrorCode checksum_of(const SbOrder *order, uint64_t salt, const Pet
 
 static PetscErrorCode write_vectors(SbRun run, SbOutput out, SbH5 *h, uint64_t *checksum)
 {
-  Part part[3];
+  Part part[NPART];
   PetscReal *slice;
   const PetscScalar *array;
 
@@ -165,7 +169,7 @@ static PetscErrorCode write_vectors(SbRun run, SbOutput out, SbH5 *h, uint64_t *
   *checksum = 0;
   parts_of(run, part);
   PetscCall(PetscMalloc1(3 * out->node.n, &slice));
-  for (int k = 0; k < 3; k++) {
+  for (int k = 0; k < NPART; k++) {
     uint64_t sum;
 
     if (!part[k].vec) continue;
@@ -175,7 +179,11 @@ static PetscErrorCode write_vectors(SbRun run, SbOutput out, SbH5 *h, uint64_t *
     PetscCall(SbH5WriteSlice(h, h->file, part[k].name, "SI", &out->node, 3, H5T_IEEE_F64LE, H5T_NATIVE_DOUBLE,
                              slice));
     PetscCall(checksum_of(&out->node, (uint64_t)k, slice, &sum));
-    *checksum += sum;
+    if (k == PATH) {
+      PetscCall(SbH5PutInt(h, h->file, "path_checksum", (int64_t)sum));
+      PetscCall(SbH5PutReal(h, h->file, "path_first", run->arc.first));
+    } else
+      *checksum += sum;
   }
   PetscCall(PetscFree(slice));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -312,7 +320,7 @@ static PetscErrorCode write_checkpoint(SbRun run, SbOutput out, const SbStep *st
   PetscCall(SbOutputPath(out, "checkpoint.tmp", sizeof(tmp), tmp));
   PetscCall(SbH5Create(out->comm, tmp, &h));
   PetscCall(SbCheckpointMeshBytes(run, &mesh_bytes));
-  PetscCall(SbH5Reserve(&h, (PetscInt64)out->node.N * 3 * 24 + (PetscInt64)strlen(out->identity) + 65536 +
+  PetscCall(SbH5Reserve(&h, (PetscInt64)out->node.N * 3 * 32 + (PetscInt64)strlen(out->identity) + 65536 +
                               mesh_bytes));
   PetscCall(write_vectors(run, out, &h, &checksum));
   PetscCall(SbCheckpointWriteEffects(run, &h, &checksum));
@@ -403,24 +411,30 @@ static PetscErrorCode check_identity(SbRun run, SbOutput out, SbH5 *h, int64_t m
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The three vectors of an open file, all raised by their checksum; ok is false when one cannot be read. */
+/* The vectors of an open file, all raised by the checksum of the first three; ok is false when one cannot be read. */
 static PetscErrorCode read_vectors(SbRun run, SbOutput out, SbH5 *h, uint64_t *all, PetscBool *ok)
 {
-  Part part[3];
+  Part part[NPART];
   PetscReal *slice;
   PetscScalar *array;
 
   PetscFunctionBeginUser;
   parts_of(run, part);
   PetscCall(PetscMalloc1(3 * out->node.n, &slice));
-  for (int k = 0; k < 3 && *ok; k++) {
+  for (int k = 0; k < NPART && *ok; k++) {
     uint64_t sum;
+    int64_t own = 0;
 
-    if (!part[k].vec) continue;
+    if (!part[k].vec || (k == PATH && H5Lexists(h->file, part[k].name, H5P_DEFAULT) <= 0)) continue;
     PetscCall(SbH5ReadSlice(h, part[k].name, &out->node, 3, slice, ok));
     if (!*ok) break;
     PetscCall(checksum_of(&out->node, (uint64_t)k, slice, &sum));
-    *all += sum;
+    if (k == PATH) {
+      PetscCall(SbH5GetInt(h->file, "path_checksum", &own, ok));
+      PetscCall(SbH5GetReal(h->file, "path_first", &run->arc.first, ok));
+      if (own != (int64_t)sum) *ok = PETSC_FALSE;
+    } else
+      *all += sum;
     PetscCall(VecGetArray(part[k].vec, &array));
     PetscCall(SbOrderScatter(&out->node, 3, slice, array));
     PetscCall(VecRestoreArray(part[k].vec, &array));

@@ -77,10 +77,10 @@ PetscErrorCode SbOutputFile(SbRun run, const char *name, size_t size, char path[
 
 PetscBool SbOutputDue(PetscReal every, PetscReal t, PetscReal dt)
 {
-  // A step that ends at the multiple but for rounding counts as having reached it.
-  const PetscReal ahead = 1e-6 * dt;
+  // A step that ends at the multiple but for rounding counts as having reached it. A load factor may come back.
+  const PetscReal ahead = 1e-6 * PetscAbsReal(dt);
 
-  return (PetscBool)(PetscFloorReal((t + ahead) / every) > PetscFloorReal((t - dt + ahead) / every));
+  return (PetscBool)(PetscFloorReal((t + ahead) / every) != PetscFloorReal((t - dt + ahead) / every));
 }
 
 /* ------------------------------------------------------------------ options */

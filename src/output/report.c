@@ -108,7 +108,10 @@ static PetscErrorCode print_time(SbRun run)
 
   PetscFunctionBeginUser;
   PetscCall(SbPresetName(run, sizeof(name), name));
-  if (!run->model->dynamic)
+  if (run->arc.on)
+    PetscCall(entry("time", "%s, along the path of equilibria; load increment of the first step %g", name,
+                    1. / (double)run->static_steps));
+  else if (!run->model->dynamic)
     PetscCall(entry("time", "%s, %" PetscInt_FMT " load step%s", name, run->static_steps,
                     run->static_steps == 1 ? "" : "s"));
   else if (run->fixed_step)

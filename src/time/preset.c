@@ -48,7 +48,19 @@ static const SbOption rows[] = {
    "static: equal load steps from zero to full load"},
   {"static_min_increment", SB_OPTION_REAL, 1, "", "1e-4", "(0, 1]",
    "static: smallest load increment, as a part of a load step; where equilibrium asks for a shorter one the "
-   "run stops, and says whether a limit load is likely"},
+   "run "
+   "stops, and says whether a limit load is likely"},
+  {"static_control", SB_OPTION_CHOICE, 1, "", "load", "load|arc_length",
+   "static: what a step prescribes, the load factor or the length of the path of equilibria, which goes past "
+   "limit loads; "
+   "ends where the load factor reaches 1"},
+  {"static_max_steps", SB_OPTION_INT, 1, "", "1000", "[1, inf)",
+   "arc_length: steps after which the run ends"},
+  {"static_max_displacement", SB_OPTION_REAL, 1, "m", "0", "[0, inf)",
+   "arc_length: displacement of some node at which the run ends; 0: none"},
+  {"static_longest_step", SB_OPTION_REAL, 1, "", "10", "(0, inf)",
+   "arc_length: longest step along the path, as a multiple of the first one, whose load increment is "
+   "1/-static_steps"},
 };
 
 PetscErrorCode SbTimeRegister(void)
@@ -73,11 +85,35 @@ static PetscErrorCode step_option_names(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Arc length needs the tangents that are exact: those of laws that were not chosen become so. */
+static PetscErrorCode read_arc_length(SbRun run, const SbScope *scope)
+{
+  const SbModel m = run->model;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbOptionInt(scope, "static_max_steps", &run->arc.steps));
+  PetscCall(SbOptionReal(scope, "static_max_displacement", &run->arc.displacement));
+  PetscCall(SbOptionReal(scope, "static_longest_step", &run->arc.longest));
+  for (PetscInt k = 0; k < m->nmaterial; k++) {
+    char option[3 * SB_NAME_MAX];
+    PetscBool given;
+
+    if (m->material[k]->linear || m->material[k]->tangent == SB_TANGENT_EXACT) continue;
+    PetscCall(PetscSNPrintf(option, sizeof(option), "-%s_%s_tangent", k < m->nbody ? "body" : "inclusion",
+                            k < m->nbody ? m->body[k].name : m->inclusion[k - m->nbody]));
+    PetscCall(PetscOptionsHasName(NULL, NULL, option, &given));
+    PetscCheck(!given, m->comm, PETSC_ERR_USER_INPUT,
+               "-static_control arc_length needs exact tangents: leave %s out, or make it exact", option);
+    PetscCall(SbMaterialSetTangent(m->material[k], SB_TANGENT_EXACT));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode SbRunCreate(SbModel model, SbRun *run)
 {
   SbRun r;
   SbScope scope;
-  PetscInt preset, predictor, inverted;
+  PetscInt preset, predictor, inverted, control;
 
   PetscFunctionBeginUser;
   PetscCall(PetscNew(&r));
@@ -96,6 +132,8 @@ PetscErrorCode SbRunCreate(SbModel model, SbRun *run)
   } else {
     PetscCall(SbOptionInt(&scope, "static_steps", &r->static_steps));
     PetscCall(SbOptionReal(&scope, "static_min_increment", &r->min_increment));
+    PetscCall(SbOptionChoice(&scope, "static_control", &control));
+    r->arc.on = (PetscBool)(control == 1);
     r->t_end = 1.;
     r->dt = 1. / (PetscReal)r->static_steps;
   }
@@ -115,6 +153,7 @@ PetscErrorCode SbRunCreate(SbModel model, SbRun *run)
     r->saddle = (PetscBool)(r->saddle || model->effect[e]->saddle);
   if (r->saddle) PetscCall(SbOptionChoice(&scope, "multipliers", &r->saddle_choice));
   PetscCall(SbSolverSetFromOptions(r->solver_choice, sizeof(r->solver_choice)));
+  if (r->arc.on) PetscCall(read_arc_length(r, &scope));
   *run = r;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -371,7 +410,7 @@ static PetscErrorCode set_up_static(SbRun run)
   Vec F;
 
   PetscFunctionBeginUser;
-  run->fixed_step = PETSC_TRUE;
+  run->fixed_step = (PetscBool)!run->arc.on;
   PetscCall(SbSpaceCreateVec(run->model->space, &F));
   PetscCall(SNESCreate(run->model->comm, &run->snes));
   PetscCall(SNESSetFunction(run->snes, F, SbFormStaticFunction, run));
@@ -383,6 +422,7 @@ static PetscErrorCode set_up_static(SbRun run)
   PetscCall(SbSolverFinish(run->snes, run->model->space));
   PetscCall(find_search(run));
   PetscCall(forcing_terms(run->snes));
+  if (run->arc.on) PetscCall(SbArcLengthCheck(run));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -517,6 +557,10 @@ PetscErrorCode SbRunSetUp(SbRun run)
   }
   if (!m->dynamic) m->load = run->t0; /* a static run begins without loads and prescribed displacements */
   PetscCall(SbModelInitialState(m, run->U, run->V));
+  if (run->arc.on) {
+    PetscCall(SbSpaceCreateVec(m->space, &run->path));
+    PetscCall(SbSolverPivot(m->comm, sizeof(run->solver_choice), run->solver_choice));
+  }
   PetscCall(SbSolverChoose(m->space, m->dynamic, m->linear, explicit, run->solver_choice, &run->solver_used,
                            run->solver_reason, sizeof(run->solver_reason)));
   PetscCall(PetscStrncpy(run->solver, run->solver_used->name, sizeof(run->solver)));
@@ -555,7 +599,9 @@ PetscErrorCode SbRunSolve(SbRun run)
     PetscCall(TSSetStepNumber(run->ts, run->step0));
     PetscCall(TSSetTime(run->ts, run->t0));
     PetscCall(TSSolve(run->ts, run->U));
-  } else
+  } else if (run->arc.on)
+    PetscCall(SbArcLengthSolve(run));
+  else
     PetscCall(SbStaticSolve(run));
   run->seconds_solve = MPI_Wtime() - run->wall_start;
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -582,6 +628,7 @@ PetscErrorCode SbRunDestroy(SbRun *run)
   PetscCall(VecDestroy(&r->loads));
   PetscCall(VecDestroy(&r->reaction));
   PetscCall(VecDestroy(&r->previous));
+  PetscCall(VecDestroy(&r->path));
   PetscCall(PetscFree(*run));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -82,6 +82,10 @@ PetscErrorCode SbNewmarkContact(SbRun run, PetscReal t, PetscReal dt, Vec U, Vec
 PetscErrorCode SbNewmarkOwn(SbRun run, PetscReal t, Vec U, Vec V, Vec A, Vec own);
 
 PetscErrorCode SbStaticSolve(SbRun run); /* static.c: the load path */
+/* arc_length.c: the path of equilibria with the load factor as an unknown. Collective. Check: after the solver is set up; PETSC_ERR_USER_INPUT for
+   contact, and for solvers that take definite matrices only. */
+PetscErrorCode SbArcLengthCheck(SbRun run);
+PetscErrorCode SbArcLengthSolve(SbRun run);
 /* free_body.c, after a static solve: a body that can move rigidly without a force, -1: none is found; how, in words. Collective. */
 PetscErrorCode SbRunFreeBody(SbRun run, PetscInt *body, size_t size, char motion[]);
 /* Whether displacements are so many times the bodies' size that the matrix must have been singular. Collective. */

@@ -4,7 +4,9 @@
   stress P = E/2 (s^3 - s), which is largest at s = 1/sqrt 3: 0.19245 E.
 
   A load path that asks for 0.2 E ends there in few steps, says how far it got, and that displacements grow without bound with the load. One that stays
-  below gets to its end.
+  below gets to its end. By arc length each equilibrium of the path is one of the formula, past the maximum, through s = 0, where the cube has no height, to the
+  branch on which it is inside out and carries 0.2 E; with dead and follower loads, and with all elements. A restart goes on along the same path, also from the
+  end of a load path.
 */
 #include "verify.h"
 
@@ -13,8 +15,11 @@
   "-body_a_density 1 -effects x,y,z,press -effect_x_type support -effect_x_on xmin -effect_x_components x " \
   "-effect_y_type support -effect_y_on ymin -effect_y_components y -effect_z_type support -effect_z_on "    \
   "zmin "                                                                                                   \
-  "-effect_z_components z -effect_press_type traction -effect_press_on zmax -time static -time_inverted "   \
-  "refuse "
+  "-effect_z_components z -effect_press_on zmax -time static "
+#define DEAD "-effect_press_type traction -effect_press_vector 0;0;%.17g "
+
+#define ARC "-static_control arc_length "
+#define OUTPUT "-output_fields none -quiet -checkpoint_every_steps 1 -checkpoint_keep 100"
 
 static const PetscReal limit = 0.19245008972987526; /* of E */
 
@@ -25,7 +30,7 @@ static PetscErrorCode check_end(PetscReal load, int steps, const char *more)
 
   PetscFunctionBeginUser;
   PetscCall(
-    verify_open(&t, CUBE "-effect_press_vector 0;0;%.17g -static_steps %d %s", (double)-load, steps, more));
+    verify_open(&t, CUBE DEAD "-time_inverted refuse -static_steps %d %s", (double)-load, steps, more));
   PetscCall(SbRunSolve(t.run));
   PetscCall(PetscPrintf(PETSC_COMM_WORLD, "  %g E in %d steps %s: %.9g in %d steps, softening %g\n    %s\n",
                         (double)load, steps, more, (double)t.run->t_now, (int)t.run->steps_total,
@@ -40,13 +45,130 @@ static PetscErrorCode check_end(PetscReal load, int steps, const char *more)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+typedef struct {
+  PetscReal load;  /* of E */
+  PetscReal error; /* largest difference from the formula, of E */
+  PetscReal top;   /* largest load factor */
+  PetscReal s;     /* of the last step */
+} Branch;
+
+static PetscErrorCode watch(SbRun run, const SbStep *step, void *ctx)
+{
+  Branch *b = (Branch *)ctx;
+
+  PetscFunctionBeginUser;
+  (void)run;
+  b->s = 2. * step->energies.centre[2]; /* the base stays at z = 0 */
+  b->error = PetscMax(b->error, PetscAbsReal(step->t * b->load - 0.5 * (b->s - b->s * b->s * b->s)));
+  b->top = PetscMax(b->top, step->t);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Opens the cube with the load 0.2 E. */
+static PetscErrorCode open_branch(const char *dir, PetscBool follower, const char *more, Branch *b,
+                                  TestScene *t)
+{
+  char text[VERIFY_TEXT], load[128];
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscSNPrintf(load, sizeof(load),
+                          follower ? "-effect_press_type pressure -effect_press_value %.17g" : DEAD,
+                          follower ? 0.2 : -0.2));
+  PetscCall(PetscSNPrintf(text, sizeof(text), CUBE "-static_steps 10 %s %s", load, more));
+  PetscCall(test_scene_open_in(dir, text, t));
+  t->run->want_energies = PETSC_TRUE;
+  *b = (Branch){.load = 0.2};
+  PetscCall(SbRunAddMonitor(t->run, watch, b, NULL));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The branch: with a dead load until the inverted cube carries it, with a follower load to beyond the limit. */
+static PetscErrorCode check_branch(PetscBool follower, const char *more)
+{
+  TestScene t;
+  Branch b;
+
+  PetscFunctionBeginUser;
+  PetscCall(open_branch(NULL, follower, more, &b, &t));
+  PetscCall(verify_solve(&t, "branch"));
+  PetscCall(PetscPrintf(
+    PETSC_COMM_WORLD, "  arc length%s: %d steps, %d rejected, top %.6f, s %.9f at the end, error %.1e E\n",
+    more, (int)t.run->steps_total, (int)t.run->rejected_total, (double)b.top, (double)b.s, (double)b.error));
+  /* tolerance of the residual: 1e-8 of the load */
+  SB_CHECK(b.error < 1e-7 * b.load, "%s: %g E off the branch", more, (double)b.error);
+  SB_CHECK((t.run->t_now == 1.) == !follower, "%s: the path ended at %.17g", more, (double)t.run->t_now);
+  SB_CHECK(follower ? b.s < 0.55 && b.s > 0.4 : b.s < -1., "%s: stretch %g at the end", more, (double)b.s);
+  SB_CHECK(b.top <= (follower ? limit / b.load + 1e-7 : 1.), "%s: load factor %g", more, (double)b.top);
+  PetscCall(test_scene_close(&t));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Moving supports scale with the load factor: s = 1 - lambda / 2, and Newton's method converges as with loads. */
+static PetscErrorCode check_drive(void)
+{
+  TestScene t;
+  Branch b = {.load = 0.};
+
+  PetscFunctionBeginUser;
+  PetscCall(verify_open(&t, CUBE ARC
+                        "-static_steps 10 -effect_press_type drive -effect_press_displacement 0;0;-0.5"));
+  t.run->want_energies = PETSC_TRUE;
+  PetscCall(SbRunAddMonitor(t.run, watch, &b, NULL));
+  PetscCall(verify_solve(&t, "drive"));
+  PetscCall(PetscPrintf(PETSC_COMM_WORLD, "  drive: %d steps, %d Newton iterations, s %.12f\n",
+                        (int)t.run->steps_total, (int)t.run->newton_total, (double)b.s));
+  SB_CHECK(t.run->t_now == 1. && PetscAbsReal(b.s - 0.5) < 1e-9, "s %.12f at the load factor %g", (double)b.s,
+           (double)t.run->t_now);
+  SB_CHECK(t.run->rejected_total == 0 && t.run->newton_total <= 5 * t.run->steps_total,
+           "%d Newton iterations in %d steps", (int)t.run->newton_total, (int)t.run->steps_total);
+  PetscCall(test_scene_close(&t));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* A run that goes on from a checkpoint in its middle, or from where a load path ended, is on the same branch. */
+static PetscErrorCode check_restart(const char *first, const char *checkpoint, PetscReal tolerance)
+{
+  const char *folder = getenv("TMPDIR");
+  char dir[256], more[VERIFY_TEXT];
+  TestScene t;
+  Branch b, whole;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscSNPrintf(dir, sizeof(dir), "%s/limit", folder ? folder : "/tmp"));
+  PetscCall(PetscSNPrintf(more, sizeof(more), "%s " OUTPUT, first));
+  PetscCall(open_branch(dir, PETSC_FALSE, more, &whole, &t));
+  PetscCall(SbRunSolve(t.run));
+  PetscCall(test_scene_close(&t));
+  PetscCall(PetscSNPrintf(more, sizeof(more), ARC "-static_max_displacement 0.99 -restart %s/%s " OUTPUT, dir,
+                          checkpoint));
+  PetscCall(open_branch(dir, PETSC_FALSE, more, &b, &t));
+  PetscCall(SbRunSolve(t.run));
+  PetscCall(PetscPrintf(PETSC_COMM_WORLD, "  restart of '%s' at %s: s %.12f and %.12f, error %.1e E\n", first,
+                        checkpoint, (double)whole.s, (double)b.s, (double)b.error));
+  SB_CHECK(t.run->steps_total > 1 && b.error < 1e-8 * b.load, "%g E off the branch", (double)b.error);
+  SB_CHECK(b.s < 0.02 && b.s > -0.3, "stretch %g at the end", (double)b.s);
+  SB_CHECK(PetscAbsReal(b.s - whole.s) < tolerance, "restart: %g and %g", (double)b.s, (double)whole.s);
+  PetscCall(test_scene_close(&t));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 int main(int argc, char **argv)
 {
   SB_TEST_BEGIN(argc, argv);
   PetscCall(check_end(0.19, 5, "-body_a_tangent exact"));
-  PetscCall(check_end(0.2, 10, "-body_a_tangent exact"));
+  /* Newton's method with the exact tangent may find the inverted cube */
+  PetscCall(check_end(0.2, 10, "-body_a_tangent exact -time_inverted refuse"));
   PetscCall(check_end(0.2, 10, "-body_a_tangent exact_spd"));
   /* increments of rounding: the number of attempts ends it */
   PetscCall(check_end(0.2, 10, "-body_a_tangent exact_spd -static_min_increment 1e-15"));
+  PetscCall(check_branch(PETSC_FALSE, ARC));
+  PetscCall(check_branch(PETSC_FALSE, ARC "-body_a_mesh box:1,1,1:1"));
+  PetscCall(check_branch(PETSC_FALSE, ARC "-body_a_element cr"));
+  PetscCall(check_branch(PETSC_FALSE, ARC "-body_a_element dg"));
+  PetscCall(check_branch(PETSC_FALSE, ARC "-effect_press_vector 0;0;-0.2*t"));
+  PetscCall(check_drive());
+  PetscCall(check_branch(PETSC_TRUE, ARC "-static_max_displacement 0.45"));
+  PetscCall(check_restart(ARC "-static_max_displacement 0.99", "checkpoint_000005.h5", 1e-9));
+  PetscCall(check_restart("", "checkpoint_000018.h5", PETSC_MAX_REAL));
   SB_TEST_END();
 }

@@ -1,0 +1,448 @@
+/*
+  The path of a static run by arc length: the load factor lambda is an unknown, and the length l of a step the equation for it,
+
+    R(u, lambda) = f_int(u) - f_ext(u, lambda) = 0,   |d| = l,   d = u - u_n,
+
+  so that the path goes on where the load has a maximum, and where displacements turn back, too. |d| is the root mean square over the mass of the
+  bodies, m, prescribed displacements included: a cylinder (Crisfield, Comput. Struct. 13, 1981). Both equations are linearised together
+  (Schweizerhof and Wriggers, Comput. Methods Appl. Mech. Eng. 59, 1986). With the exact tangent K and q = -dR/dlambda an
+  iteration is two solves with one factorisation,
+
+    K r = -R,   K v = q,   dlambda = ((l^2 - |d|^2)/2 - (d, r)) / (d, v),   du = r + dlambda v.
+
+  A step begins along v, in the direction in which (v, d) > 0 with the step d before (de Souza Neto and Feng, Comput. Methods Appl. Mech.
+  Eng. 179, 1999): unlike the sign of the determinant or of the work of the loads it is right at limit loads, where displacements turn back
+  and behind bifurcations. The first step has the load increment 1 / static_steps, later ones are longer while iterations are few. A step that does
+  not converge, or ends far from the direction in which it began (on another branch), is halved.
+
+  K is that of the matrix, but for pressure that follows a free rim: there it is applied by differences of R, and the matrix preconditions. q is a
+  difference of residuals, too. It is exact for loads that are proportional to lambda; with moving supports and formulas of t, which is
+  lambda, the step of the difference is small. The last step is solved at lambda = 1.
+
+  K has negative eigenvalues behind limit loads. Where its factorisation tells their number, one that changes while the load does not turn is a
+  bifurcation: another branch begins there, which is not looked for. Not handled: contact, re-meshing.
+*/
+#include "sbsolver.h"
+#include "time_impl.h"
+
+#define DESIRED 4.  /* iterations below which steps become longer */
+#define MOST 25     /* iterations after which a step is halved */
+#define STRAIGHT .7 /* smallest cosine of the angle between the directions in which a step begins and ends */
+#define ROUGH 1e-5  /* relative residual of linear solves with K by differences, which is as exact as that */
+#define FINE 1e-6   /* step of lambda for q where R is not linear in it */
+
+typedef struct {
+  SbRun run;
+  Vec weight;               /* of each displacement: its share of the mass */
+  Vec X, d, r, v, q, begin; /* end of the step and its parts as above; v where the step begins */
+  Vec w, du;                /* work; correction of X */
+  Mat exact;                /* K by differences of R where the assembled one is not exact; else NULL */
+  PetscReal factor, delta;  /* lambda at X; its step for q */
+  PetscReal load;           /* |q| where the run begins, N */
+  PetscInt negative;        /* eigenvalues of K where the last step began; -1: not known */
+  PetscReal turned;         /* sign of dlambda then */
+} Path;
+
+/* (a, b), m^2. */
+static PetscErrorCode product(Path *p, Vec a, Vec b, PetscReal *value)
+{
+  PetscFunctionBeginUser;
+  PetscCall(VecPointwiseMult(p->w, p->weight, a));
+  PetscCall(VecDot(p->w, b, value));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The load factor at X, with what is prescribed then. */
+static PetscErrorCode put_at(Path *p, PetscReal factor)
+{
+  PetscFunctionBeginUser;
+  p->factor = p->run->model->load = factor;
+  PetscCall(SbModelPrescribe(p->run->model, factor, p->X));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode evaluate(void *snes, Vec X, Vec R)
+{
+  PetscFunctionBeginUser;
+  PetscCall(SNESComputeFunction((SNES)snes, X, R));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Pressure that follows a free rim has a tangent that is not symmetric, and the matrix has its symmetric part: a preconditioner here. */
+static PetscErrorCode create_exact(Path *p)
+{
+  PetscInt n, N;
+  KSP ksp;
+
+  PetscFunctionBeginUser;
+  PetscCall(VecGetLocalSize(p->X, &n));
+  PetscCall(VecGetSize(p->X, &N));
+  PetscCall(MatCreateMFFD(p->run->model->comm, n, n, N, N, &p->exact));
+  PetscCall(MatMFFDSetFunction(p->exact, evaluate, p->run->snes));
+  PetscCall(MatSetUp(p->exact));
+  PetscCall(SNESGetKSP(p->run->snes, &ksp));
+  PetscCall(KSPSetTolerances(ksp, ROUGH, PETSC_DEFAULT, PETSC_DEFAULT, PETSC_DEFAULT));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode create(SbRun run, Path *p)
+{
+  const SbModel m = run->model;
+  PetscScalar *w;
+  PetscReal moved;
+
+  PetscFunctionBeginUser;
+  *p = (Path){.run = run, .negative = -1};
+  PetscCall(VecDuplicate(run->U, &p->weight));
+  PetscCall(VecDuplicate(run->U, &p->X));
+  PetscCall(VecDuplicate(run->U, &p->d));
+  PetscCall(VecDuplicate(run->U, &p->r));
+  PetscCall(VecDuplicate(run->U, &p->v));
+  PetscCall(VecDuplicate(run->U, &p->q));
+  PetscCall(VecDuplicate(run->U, &p->w));
+  PetscCall(VecDuplicate(run->U, &p->du));
+  PetscCall(VecDuplicate(run->U, &p->begin));
+  PetscCall(VecGetArray(p->weight, &w));
+  for (PetscInt i = 0; i < 3 * m->space->nnode_owned; i++) w[i] = m->space->node_mass[i / 3] / m->mass;
+  PetscCall(VecRestoreArray(p->weight, &w));
+  /* whether R is linear in lambda */
+  PetscCall(VecZeroEntries(p->X));
+  PetscCall(put_at(p, 1.));
+  PetscCall(VecNorm(p->X, NORM_INFINITY, &moved));
+  p->delta = moved > 0. ? FINE : 1.;
+  for (PetscInt e = 0; e < m->nforce; e++) p->delta = m->force[e]->steady ? p->delta : FINE;
+  for (PetscInt e = 0; e < m->nprescribe; e++) p->delta = m->prescribe[e]->steady ? p->delta : FINE;
+  PetscCall(VecCopy(run->U, p->X));
+  PetscCall(put_at(p, run->t0));
+  if (m->ntangent) PetscCall(create_exact(p));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode destroy(Path *p)
+{
+  PetscFunctionBeginUser;
+  PetscCall(VecDestroy(&p->weight));
+  PetscCall(VecDestroy(&p->X));
+  PetscCall(VecDestroy(&p->d));
+  PetscCall(VecDestroy(&p->r));
+  PetscCall(VecDestroy(&p->v));
+  PetscCall(VecDestroy(&p->q));
+  PetscCall(VecDestroy(&p->w));
+  PetscCall(VecDestroy(&p->du));
+  PetscCall(MatDestroy(&p->exact));
+  PetscCall(VecDestroy(&p->begin));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* r = R(X, lambda) */
+static PetscErrorCode residual(Path *p, PetscReal *norm)
+{
+  PetscFunctionBeginUser;
+  PetscCall(SNESComputeFunction(p->run->snes, p->X, p->r));
+  PetscCall(VecNorm(p->r, NORM_2, norm));
+  PetscCall(SNESSetFunctionNorm(p->run->snes, *norm));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode solve(Path *p, Vec b, Vec x, PetscBool *ok)
+{
+  KSPConvergedReason reason;
+  PetscInt its;
+  KSP ksp;
+
+  PetscFunctionBeginUser;
+  PetscCall(SNESGetKSP(p->run->snes, &ksp));
+  PetscCall(KSPSetOperators(ksp, p->exact ? p->exact : p->run->operator, p->run->J));
+  PetscCall(VecZeroEntries(x));
+  PetscCall(KSPSolve(ksp, b, x));
+  PetscCall(KSPGetConvergedReason(ksp, &reason));
+  PetscCall(KSPGetIterationNumber(ksp, &its));
+  p->run->linear_step += its;
+  *ok = (PetscBool)(reason > 0);
+  if (!*ok)
+    PetscCall(SbRunFail(p->run, "load factor %g: the linear solver ended with %s", (double)p->factor,
+                        KSPConvergedReasons[reason]));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* K at X, and v from the residual there, which is in r. */
+static PetscErrorCode tangent(Path *p, PetscBool *ok)
+{
+  const SbRun run = p->run;
+  const PetscReal factor = p->factor;
+
+  PetscFunctionBeginUser;
+  PetscCall(SNESComputeJacobian(run->snes, p->X, run->operator, run->J));
+  run->newton_step++;
+  /* q, with w the way of what is prescribed */
+  PetscCall(VecCopy(p->X, p->w));
+  PetscCall(put_at(p, factor + p->delta));
+  PetscCall(SNESComputeFunction(run->snes, p->X, p->q));
+  PetscCall(VecAXPBY(p->q, 1. / p->delta, -1. / p->delta, p->r));
+  PetscCall(VecAYPX(p->w, -1., p->X));
+  PetscCall(put_at(p, factor));
+  if (p->exact) {
+    PetscCall(MatMFFDSetBase(p->exact, p->X, p->r));
+    PetscCall(MatAssemblyBegin(p->exact, MAT_FINAL_ASSEMBLY));
+    PetscCall(MatAssemblyEnd(p->exact, MAT_FINAL_ASSEMBLY));
+  }
+  PetscCall(solve(p, p->q, p->v, ok));
+  PetscCall(VecAXPY(p->v, 1. / p->delta, p->w));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Newton's method from X for R and the length l of the step; with l = 0 for R at the present load factor. */
+static PetscErrorCode correct(Path *p, PetscReal l, PetscInt *its, PetscBool *ok)
+{
+  PetscReal atol, rtol, norm, dd, dr, dv, more = 0.;
+
+  PetscFunctionBeginUser;
+  PetscCall(SNESGetTolerances(p->run->snes, &atol, &rtol, NULL, NULL, NULL));
+  for (*its = 0;; (*its)++) {
+    PetscCall(residual(p, &norm));
+    *ok = (PetscBool)(norm <= PetscMax(atol, rtol * p->load));
+    if (*ok) break;
+    if (*its == MOST || PetscIsInfOrNanReal(norm)) {
+      PetscCall(SbRunFail(p->run,
+                          "load factor %g: the residual is still %g N after %" PetscInt_FMT " iterations",
+                          (double)p->factor, (double)norm, *its));
+      break;
+    }
+    PetscCall(tangent(p, ok));
+    if (!*ok) break;
+    PetscCall(VecAXPBY(p->q, -1., 0., p->r));
+    PetscCall(solve(p, p->q, p->du, ok));
+    if (!*ok) break;
+    if (l > 0.) {
+      PetscCall(VecWAXPY(p->d, -1., p->run->U, p->X));
+      PetscCall(product(p, p->d, p->d, &dd));
+      PetscCall(product(p, p->d, p->du, &dr));
+      PetscCall(product(p, p->d, p->v, &dv));
+      more = (0.5 * (l * l - dd) - dr) / dv;
+    }
+    PetscCall(VecAXPY(p->du, more, p->v));
+    PetscCall(VecAXPY(p->X, 1., p->du));
+    PetscCall(put_at(p, p->factor + more));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* A step of the length l from U, where the load factor is `from`; sign: whether the load rises along it at first. */
+static PetscErrorCode attempt(Path *p, PetscReal from, PetscReal l, PetscReal sign, PetscInt *its,
+                              PetscBool *ok)
+{
+  const SbRun run = p->run;
+  PetscReal vv, dd, dv;
+  PetscBool far, again = (PetscBool)(run->look.fn != NULL);
+  PetscInt more;
+
+  PetscFunctionBeginUser;
+  PetscCall(product(p, p->begin, p->begin, &vv));
+  PetscCall(VecWAXPY(p->X, sign * l / PetscSqrtReal(vv), p->begin, run->U));
+  PetscCall(put_at(p, from + sign * l / PetscSqrtReal(vv)));
+  PetscCall(correct(p, l, its, ok));
+  /* another branch */
+  PetscCall(VecWAXPY(p->d, -1., run->U, p->X));
+  PetscCall(product(p, p->d, p->d, &dd));
+  PetscCall(product(p, p->d, p->begin, &dv));
+  if (*ok && !(sign * dv >= STRAIGHT * PetscSqrtReal(dd * vv))) {
+    *ok = PETSC_FALSE;
+    PetscCall(SbRunFail(run, "load factor %g: the path turns too sharply", (double)p->factor));
+  }
+  PetscCall(SbRunTooFar(run, p->X, &far));
+  if (far) *ok = PETSC_FALSE;
+  /* the end of the path */
+  if (*ok && from < 1. && p->factor > 1.) {
+    PetscCall(VecWAXPY(p->X, (1. - from) / (p->factor - from), p->d, run->U));
+    PetscCall(put_at(p, 1.));
+    PetscCall(correct(p, l = 0., &more, ok));
+    *its += more;
+  }
+  for (int i = 0; i < SB_LOOKS && again && *ok; i++) {
+    const SbSolved step = {.t = from, .dt = p->factor - from, .U = p->X, .solved = PETSC_TRUE};
+
+    again = PETSC_FALSE;
+    PetscCall((*run->look.fn)(run, &step, run->look.ctx, &again));
+    if (again) PetscCall(correct(p, l, &more, ok));
+  }
+  PetscCall(SbRunRefuse(run, from, p->factor - from, (Vec[2]){run->U, p->X}, ok));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Length of a first step: its load increment is 1 / static_steps; near a limit load, where a load path ended, by what the load has moved so far. */
+static PetscErrorCode first_length(Path *p, PetscReal factor, PetscReal *l)
+{
+  const SbRun run = p->run;
+  PetscReal rate, uu;
+
+  PetscFunctionBeginUser;
+  PetscCall(product(p, p->begin, p->begin, &rate));
+  PetscCheck(rate > 0., run->model->comm, PETSC_ERR_USER_INPUT,
+             "-static_control arc_length: no effect loads or moves the bodies more with the load factor");
+  rate = PetscSqrtReal(rate);
+  if (factor > 0.) {
+    PetscCall(product(p, run->U, run->U, &uu));
+    rate = PetscMin(rate, PetscSqrtReal(uu) / factor);
+  }
+  *l = run->arc.first = rate / (PetscReal)run->static_steps;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* v at U, where the residual is zero but for the tolerance, in `begin`; a bifurcation on the way there is told. */
+static PetscErrorCode begin_step(Path *p, PetscReal *sign, PetscBool *ok)
+{
+  const SbRun run = p->run;
+  PetscInt negative;
+  PetscReal norm, along;
+
+  PetscFunctionBeginUser;
+  PetscCall(residual(p, &norm));
+  PetscCall(tangent(p, ok));
+  if (!*ok) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(VecCopy(p->v, p->begin));
+  if (p->load == 0.) PetscCall(VecNorm(p->q, NORM_2, &p->load));
+  PetscCall(product(p, run->path, p->begin, &along));
+  *sign = along < 0. ? -1. : 1.;
+  PetscCall(SbSolverNegative(run->snes, &negative));
+  if (negative >= 0 && p->negative >= 0 && PetscAbsInt(negative - p->negative) != (*sign != p->turned) &&
+      !run->bifurcations++)
+    PetscCall(SbWarning(run->model->comm,
+                        "load factor %g: the tangent has %" PetscInt_FMT
+                        " negative eigenvalues, a step before %" PetscInt_FMT
+                        ", and the load does not turn: a bifurcation was passed, and other equilibria may be "
+                        "reached by a small imperfection",
+                        (double)p->factor, negative, p->negative));
+  p->negative = negative;
+  p->turned = *sign;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Whether some displacement is as large as asked for. */
+static PetscErrorCode far_enough(SbRun run, PetscBool *enough)
+{
+  const PetscScalar *u;
+  PetscReal most = 0.;
+
+  PetscFunctionBeginUser;
+  *enough = PETSC_FALSE;
+  if (run->arc.displacement == 0.) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(VecGetArrayRead(run->U, &u));
+  for (PetscInt i = 0; i < run->model->space->nnode_owned; i++)
+    most = PetscMax(most, PetscSqr(u[3 * i]) + PetscSqr(u[3 * i + 1]) + PetscSqr(u[3 * i + 2]));
+  PetscCall(VecRestoreArrayRead(run->U, &u));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &most, 1, MPIU_REAL, MPI_MAX, run->model->comm));
+  *enough = (PetscBool)(PetscSqrtReal(most) >= run->arc.displacement);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Why no step succeeded. */
+static PetscErrorCode explain(SbRun run, PetscReal factor, PetscReal l)
+{
+  char why[sizeof(run->stop_reason)], motion[128];
+  PetscInt body;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscStrncpy(why, run->stop_reason, sizeof(why)));
+  PetscCall(SbRunFreeBody(run, &body, sizeof(motion), motion));
+  if (run->refused) PetscFunctionReturn(PETSC_SUCCESS);
+  if (body >= 0 && !run->steps_total)
+    PetscCall(SbRunFail(run, "load factor %g: nothing holds the body %s against %s; hold it by a support",
+                        (double)factor, run->model->body[body].name, motion));
+  else
+    PetscCall(SbRunFail(
+      run,
+      "the path reached the load factor %.7g, and no step of %.1e of the first one's length was found to "
+      "go on: %s",
+      (double)factor, (double)(2. * l / run->arc.first), why));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbArcLengthCheck(SbRun run)
+{
+  const SbModel m = run->model;
+  const char *name = m->ntouch ? m->touch[0]->name : "";
+  PetscBool cg, cholmod;
+  KSP ksp;
+
+  PetscFunctionBeginUser;
+  PetscCheck(!m->ntouch, m->comm, PETSC_ERR_USER_INPUT,
+             "-static_control arc_length does not know contact (effect %s): use -static_control load, or a "
+             "dynamic run "
+             "with damping",
+             name);
+  PetscCall(SNESGetKSP(run->snes, &ksp));
+  PetscCall(PetscObjectTypeCompare((PetscObject)ksp, KSPCG, &cg));
+  PetscCall(PetscStrcmp(run->solver, "cholmod", &cholmod));
+  PetscCheck(
+    !cg && !cholmod, m->comm, PETSC_ERR_USER_INPUT,
+    "-static_control arc_length meets indefinite matrices, which -solver %s does not take: leave -solver to "
+    "auto, or give mumps or umfpack",
+    run->solver);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbArcLengthSolve(SbRun run)
+{
+  PetscReal factor = run->t0, sign = 1., l, length;
+  PetscInt step = run->step0, cuts = 0, its;
+  PetscBool last = (PetscBool)(factor == 1.), known = PETSC_FALSE, ok;
+  Path p;
+
+  PetscFunctionBeginUser;
+  PetscCheck(!run->after.fn, run->model->comm, PETSC_ERR_USER_INPUT,
+             "-static_control arc_length does not know re-meshing: leave the options -remesh_ out");
+  PetscCall(create(run, &p));
+  PetscCall(SbRunStepAccepted(run, step, factor, 0., last));
+  run->newton_step = run->linear_step = run->rejected_step = 0;
+  PetscCall(product(&p, run->path, run->path, &l));
+  l = PetscSqrtReal(l);
+  while (!last) {
+    /* where the path goes on, and how far */
+    if (!known) {
+      PetscCall(VecCopy(run->U, p.X));
+      PetscCall(put_at(&p, factor));
+      PetscCall(begin_step(&p, &sign, &ok));
+      if (!ok) {
+        PetscCall(SbSolverFallBack(run->snes, &ok));
+        if (ok) continue;
+        break;
+      }
+      known = PETSC_TRUE;
+    }
+    if (l == 0.) PetscCall(first_length(&p, factor, &l));
+    PetscCall(SbRunStepBegin(run, factor, 0.));
+    PetscCall(attempt(&p, factor, l, sign, &its, &ok));
+    if (!ok) {
+      run->rejected_step++;
+      run->rejected_total++;
+      run->tangent_known = PETSC_FALSE;
+      l *= 0.5;
+      if (++cuts <= run->max_cuts && l >= run->min_increment * run->arc.first) continue;
+      break;
+    }
+    /* the new equilibrium, and the length of the step behind it */
+    run->stop_reason[0] = 0;
+    known = PETSC_FALSE;
+    cuts = 0;
+    PetscCall(VecWAXPY(run->path, -1., run->U, p.X));
+    PetscCall(product(&p, run->path, run->path, &length));
+    l *= PetscMax(1., PetscMin(2., PetscSqrtReal(DESIRED / (PetscReal)PetscMax(its, 1))));
+    l = PetscMin(l, run->arc.longest * run->arc.first);
+    PetscCall(VecScale(run->path, l / PetscSqrtReal(length)));
+    PetscCall(VecCopy(p.X, run->U));
+    PetscCall(far_enough(run, &last));
+    last = (PetscBool)(last || p.factor == 1.);
+    if (!last && step + 1 - run->step0 == run->arc.steps) {
+      last = PETSC_TRUE;
+      PetscCall(SbWarning(run->model->comm,
+                          "the path ended after -static_max_steps %" PetscInt_FMT ", at the load factor %g",
+                          run->arc.steps, (double)p.factor));
+    }
+    PetscCall(SbRunStepAccepted(run, ++step, p.factor, p.factor - factor, last));
+    run->newton_step = run->linear_step = run->rejected_step = 0;
+    factor = p.factor;
+  }
+  if (run->stop_reason[0]) PetscCall(explain(run, factor, l));
+  PetscCall(destroy(&p));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

@@ -1,0 +1,143 @@
+// @ranks 1,2
+// @timeout 300
+/*
+  Snap-through of Williams' toggle ("An approach to the non-linear behaviour of the members of a rigid jointed plane framework with finite
+  deflections", Q. J. Mech. Appl. Math. 17, 1964): two straight members of the span l = 12.94 in each, clamped at the far ends and joined rigidly in the middle, which is
+  H = 0.386 in higher; section 0.753 in x 0.243 in, E = 1.03e7 lb/in^2. The load in the middle has a maximum of some 34 lb, falls, and rises
+  again. Here one half as a solid, with Poisson's ratio 0 as beams have it.
+
+  With the compression N = k^2 E I, slope a = H/l and the middle lowered by delta, a shallow beam has
+
+    P = 2 N (a + B),   B = -delta / (l - 2/k tan(k l/2)),   N l / E A = a delta - 1/2 int w'^2 dx,   w' = B (1 - cos k x - tan(k l/2) sin k x),
+
+  from which N follows for each delta. Left out of it are terms of a^2, the shear of the members and finite strains: some 0.1 % each.
+*/
+#include "verify.h"
+
+#define SPAN 12.94
+#define RISE 0.386
+#define DEPTH 0.243
+#define WIDTH 0.753
+#define YOUNG 1.03e7
+
+/* How much shorter a member would have to be than it is under the compression N, and the load, lb. */
+static PetscReal excess(PetscReal N, PetscReal delta, PetscReal *P)
+{
+  const PetscReal EI = YOUNG * WIDTH * DEPTH * DEPTH * DEPTH / 12., EA = YOUNG * WIDTH * DEPTH;
+  const PetscReal l = SPAN, a = RISE / l, k = PetscSqrtReal(N / EI), q = k * l;
+  const PetscReal t = PetscTanReal(q / 2.), s = PetscSinReal(q), c = PetscCosReal(q);
+  const PetscReal B = -delta / (l - 2. * t / k);
+  const PetscReal square = l + t * t * (l / 2. - s * c / (2. * k)) + (l / 2. + s * c / (2. * k)) -
+                           2. * t * (1. - c) / k - 2. * s / k + t * s * s / k;
+
+  *P = 2. * N * (a + B);
+  return a * delta - 0.5 * B * B * square - N * l / EA;
+}
+
+static PetscReal toggle_load(PetscReal delta)
+{
+  PetscReal low = 1e-3, high = 2000., P = 0.; /* k l < pi */
+
+  for (int i = 0; i < 100; i++) {
+    const PetscReal N = 0.5 * (low + high);
+
+    if (excess(N, delta, &P) > 0.)
+      low = N;
+    else
+      high = N;
+  }
+  return P;
+}
+
+static void member(const PetscInt n[3], const PetscInt at[3], PetscReal x[3], void *ctx)
+{
+  const PetscReal depth = DEPTH * PetscSqrtReal(1. + PetscSqr(RISE / SPAN)); /* of a vertical cut */
+
+  (void)at;
+  (void)ctx;
+  x[1] = RISE * x[0] + depth * (x[1] - 0.5);
+  x[0] *= SPAN;
+  x[2] *= SPAN / (PetscReal)n[0];
+}
+
+typedef struct {
+  PetscReal full;    /* load at the factor 1, lb */
+  PetscReal error;   /* largest difference of loads, lb */
+  PetscReal top;     /* largest load before it falls, lb */
+  PetscReal bottom;  /* smallest one behind that, lb */
+  PetscReal last[2]; /* delta, in, and load, lb */
+  PetscReal end[3];  /* point of the middle */
+} Toggle;
+
+static PetscErrorCode watch(SbRun run, const SbStep *step, void *ctx)
+{
+  Toggle *g = (Toggle *)ctx;
+  PetscReal u[3], P, expected;
+
+  PetscFunctionBeginUser;
+  PetscCall(test_value_at(run->model, step->U, g->end, u));
+  P = step->t * g->full;
+  expected = step->step ? toggle_load(-u[1]) : 0.;
+  g->error = PetscMax(g->error, PetscAbsReal(P - expected));
+  if (g->bottom == PETSC_MAX_REAL) g->top = PetscMax(g->top, P);
+  if (P < g->top) g->bottom = PetscMin(g->bottom, P);
+  g->last[0] = -u[1];
+  g->last[1] = P;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode check_toggle(PetscInt nx, PetscInt ny, PetscReal *error, PetscReal *top)
+{
+  const PetscInt n[3] = {nx, ny, 1};
+  char mesh[512];
+  TestScene t;
+  Toggle g = {.full = 50., .bottom = PETSC_MAX_REAL, .end = {SPAN, RISE, 0.}};
+
+  PetscFunctionBeginUser;
+  PetscCall(verify_mesh_write(n, member, NULL, mesh));
+  PetscCall(verify_open(
+    &t,
+    "-bodies a -body_a_mesh %s -body_a_element cr -body_a_material stvk -body_a_young %.17g "
+    "-body_a_poisson 0 -body_a_density 1 -sets far,middle -set_far_at plane:1,0,0,0 "
+    "-set_middle_at plane:1,0,0,%.17g -effects clamp,symmetry,plane,load -effect_clamp_type support "
+    "-effect_clamp_on far -effect_symmetry_type support -effect_symmetry_on middle "
+    "-effect_symmetry_components x -effect_plane_type support -effect_plane_on all "
+    "-effect_plane_components z -effect_load_type traction -effect_load_on middle "
+    "-effect_load_total 0,%.17g,0 -time static -static_control arc_length -static_steps 5 "
+    "-static_longest_step 1",
+    mesh, YOUNG, SPAN, (double)(-0.5 * g.full * SPAN / (double)nx / WIDTH)));
+  PetscCall(verify_mesh_remove(mesh));
+  PetscCall(SbRunAddMonitor(t.run, watch, &g, NULL));
+  PetscCall(verify_solve(&t, "toggle"));
+  PetscCall(PetscPrintf(
+    PETSC_COMM_WORLD,
+    "  %d x %d cells: %d steps, %d rejected, %d Newton iterations; load %.4f lb, then %.4f lb, "
+    "%.1f lb at %.4f in; error %.3f lb\n",
+    (int)nx, (int)ny, (int)t.run->steps_total, (int)t.run->rejected_total, (int)t.run->newton_total,
+    (double)g.top, (double)g.bottom, (double)g.last[1], (double)g.last[0], (double)g.error));
+  SB_CHECK(g.last[1] == g.full, "the load ended at %g lb", (double)g.last[1]);
+  SB_CHECK(g.bottom < g.top - 1., "the load fell from %g to %g lb", (double)g.top, (double)g.bottom);
+  SB_CHECK(t.run->bifurcations == 0, "bifurcation");
+  *error = g.error / g.full;
+  *top = g.top;
+  PetscCall(test_scene_close(&t));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+int main(int argc, char **argv)
+{
+  PetscReal error[2], top[2], limit, expected = 0.;
+
+  SB_TEST_BEGIN(argc, argv);
+  for (int i = 1; i < 500; i++) expected = PetscMax(expected, toggle_load(0.002 * i * RISE));
+  PetscCall(check_toggle(108, 2, &error[0], &top[0]));
+  PetscCall(check_toggle(216, 4, &error[1], &top[1]));
+  limit = verify_extrapolate(top[0], top[1], 2.);
+  PetscCall(PetscPrintf(PETSC_COMM_WORLD, "  limit load: extrapolated %.3f lb, beam theory %.3f lb\n",
+                        (double)limit, (double)expected));
+  SB_CHECK(error[1] < 0.03, "%g of the load off the curve", (double)error[1]);
+  SB_CHECK(error[1] < 0.4 * error[0], "%g and %g of the load off the curve", (double)error[0],
+           (double)error[1]);
+  SB_CHECK_NEAR(limit, expected, 0.01 * expected, "limit load");
+  SB_TEST_END();
+}
