@@ -86,6 +86,18 @@ error 1 "-effects has no value: " bar.opts -effects
 error 1 "the word '2,' in the command line belongs to no option" bar.opts -body_bar_translate 1, 2, 3
 error 1 "-time static: nothing holds the bodies" -bodies bar -body_bar_mesh box:1,1,1:1 -body_bar_material linear \
   -body_bar_young 1 -body_bar_poisson 0 -time static
+# the path by arc length takes exact tangents, solvers for indefinite matrices, and no contact
+arc="-bodies a -body_a_mesh box:1,1,1:1 -body_a_material stvk -body_a_young 1 -body_a_poisson 0 -body_a_density 1 -effects hold,push \
+  -effect_hold_type support -effect_hold_on zmin -effect_push_type gravity -time static -static_control arc_length -output_fields none"
+# shellcheck disable=SC2086
+{
+  error 1 "-static_control arc_length needs exact tangents: leave -body_a_tangent out" $arc -body_a_tangent exact_spd
+  error 1 "-static_control arc_length meets indefinite matrices, which -solver cholmod " $arc -solver cholmod
+  error 2 "-static_control arc_length meets indefinite matrices, which -solver cg_gamg " $arc -solver cg_gamg
+  error 1 "-static_control arc_length does not know contact (effect floor)" $arc -effects hold,push,floor -effect_floor_type contact \
+    -effect_floor_on zmax -effect_floor_obstacle plane:0,0,1,-1
+  error 1 "-static_control arc_length does not know re-meshing" $arc -remesh_times 0.5
+}
 error 3 "cannot write /nonexistent/view.opts: " bar.opts -scenario_view /nonexistent/view.opts
 
 # a PETSc option that nobody reads is reported loudly, but the run goes on
