@@ -106,6 +106,7 @@ static PetscErrorCode check_toggle(PetscInt nx, PetscInt ny, PetscReal *error, P
     "-effect_load_total 0,%.17g,0 -time static -static_control arc_length -static_steps 5 "
     "-static_longest_step 1",
     mesh, YOUNG, SPAN, (double)(-0.5 * g.full * SPAN / (double)nx / WIDTH)));
+  PetscCall(test_file_remove(mesh));
   PetscCall(SbRunAddMonitor(t.run, watch, &g, NULL));
   PetscCall(verify_solve(&t, "toggle"));
   PetscCall(PetscPrintf(
