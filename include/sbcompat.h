@@ -88,11 +88,13 @@ typedef const char *SbErrorText;
   #define SB_SNES_DIVERGED_NAN SNES_DIVERGED_FUNCTION_NANORINF
 #endif
 
-/* A line search of one's own: renamed between 3.18 and 3.26. */
-#if PETSC_VERSION_LT(3, 26, 0)
-  #define SbLineSearchShellSet(search, f, ctx) SNESLineSearchShellSetUserFunc(search, f, ctx)
+/* The convergence test of a SNES, which sets its reason; for a SNESType of one's own. */
+#if PETSC_VERSION_LT(3, 20, 0)
+  #define SbSNESConverged(snes, iteration, xnorm, ynorm, fnorm) \
+    (*(snes)->ops->converged)(snes, iteration, xnorm, ynorm, fnorm, &(snes)->reason, (snes)->cnvP)
 #else
-  #define SbLineSearchShellSet(search, f, ctx) SNESLineSearchShellSetApply(search, f, ctx)
+  #define SbSNESConverged(snes, iteration, xnorm, ynorm, fnorm) \
+    SNESConverged(snes, iteration, xnorm, ynorm, fnorm)
 #endif
 
 /* Whether PETSc calls -ts_dt deprecated, in favour of -ts_time_step; here both names work with every release. */

@@ -79,10 +79,12 @@ struct _p_SbSpace {
   void *batch_memory;        /* what batch_g and batch_V live in */
   PetscReal *node_mass;      /* [nnode] lumped mass, kg, complete on owned nodes */
   PetscBool consistent_mass; /* -mass consistent */
-  uint8_t *fixed;            /* [nnode] bit c set: component c of the node is prescribed */
-  PetscInt nfixed;           /* local nodes with any bit */
-  PetscInt *fixed_node;      /* [nfixed] */
-  PetscReal *fixed_value;    /* [nfixed][3] prescribed displacement at the time last asked for, m */
+  PetscBool
+    tentative; /* the tangent in use may be indefinite, and a solve that fails is repeated with a definite one: no reason to change the solver */
+  uint8_t *fixed;         /* [nnode] bit c set: component c of the node is prescribed */
+  PetscInt nfixed;        /* local nodes with any bit */
+  PetscInt *fixed_node;   /* [nfixed] */
+  PetscReal *fixed_value; /* [nfixed][3] prescribed displacement at the time last asked for, m */
   PetscBool ghosted; /* more than one rank: vectors carry ghosts, also where a rank happens to have none */
   Vec template_vec;  /* ghosted (more than one rank) or sequential; block size 3 */
   struct _p_SbPlan *plan; /* cell blocks -> matrix values; NULL before SbSpaceCreateMatrix() */

@@ -51,11 +51,12 @@ struct _p_SbMaterial {
   char law[SB_NAME_MAX];
   PetscLogEvent event; /* SbMat_<law>, around the loops over its cells for forces and assembled tangents */
   SbMaterialOps ops;
-  PetscReal E, nu;       /* Young's modulus, Pa; Poisson's ratio, (-1, 0.5) */
-  PetscReal lambda, mu;  /* Lame parameters, Pa */
-  PetscReal density;     /* kg/m^3 */
-  PetscBool linear;      /* stress is linear in F: K is constant */
-  PetscBool symmetric;   /* always true for hyperelastic laws */
+  PetscReal E, nu;      /* Young's modulus, Pa; Poisson's ratio, (-1, 0.5) */
+  PetscReal lambda, mu; /* Lame parameters, Pa */
+  PetscReal density;    /* kg/m^3 */
+  PetscBool linear;     /* stress is linear in F: K is constant */
+  PetscBool symmetric;  /* always true for hyperelastic laws */
+  PetscBool adaptive;   /* -body_NAME_tangent auto: the solver of a step chooses between the two exact ones */
   SbTangentKind tangent; /* what ops.frame or ops.tangent hands out */
   void *data;
 };

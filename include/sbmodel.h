@@ -51,9 +51,10 @@ struct _p_SbModel {
     PetscReal dt;   /* length of the step, s */
     PetscReal left; /* of the coefficients of restitution in this step */
     int reductions;
-  } bounce;         /* src/model/rebound.c; only with effects that rebound */
-  PetscBool linear; /* laws and effects: the tangent depends on the shifts only */
-  PetscReal mass;   /* kg */
+  } bounce;             /* src/model/rebound.c; only with effects that rebound */
+  PetscBool linear;     /* laws and effects: the tangent depends on the shifts only */
+  PetscBool may_filter; /* some law has the tangent auto */
+  PetscReal mass;       /* kg */
   PetscBool dynamic;
   PetscReal
     load; /* load factor: 1, in a static run 0..1; multiplies loads and prescribed displacements without t in their formulas */
@@ -103,5 +104,14 @@ PetscErrorCode SbModelContactPlaces(SbModel model, PetscReal t, Vec U, Vec R, Sb
 PetscErrorCode SbModelInitialState(SbModel model, Vec U, Vec V);
 /* Instantaneous part of the energies (kinetic, strain, momenta, ...). V may be NULL. Collective. */
 PetscErrorCode SbModelEnergies(SbModel model, Vec U, Vec V, SbEnergies *e);
+/*
+  SbModelStrainAlong - strain energy at U, J, its slope against D, d psi(U - s D)/ds at s = 0, J, and how many tets are inside out there.
+
+  Collective. D: [nnode][3] m, of any length.
+*/
+PetscErrorCode SbModelStrainAlong(SbModel model, Vec U, Vec D, PetscReal *psi, PetscReal *slope,
+                                  PetscInt *ninverted);
+/* For laws with -body_NAME_tangent auto: tangents from now on without negative eigenvalues of cells, or the exact ones. Not collective. */
+PetscErrorCode SbModelFilterTangent(SbModel model, PetscBool filter);
 /* Power taken by Rayleigh damping, v . C v, W. Collective. */
 PetscErrorCode SbModelDampingPower(SbModel model, Vec U, Vec V, PetscReal *power);

@@ -72,8 +72,10 @@ struct _p_SbRun {
   Mat J, operator; /* tangent; what solves see of it: J itself, or its projection (sbfem.h, SbCouple) */
   Vec U, V, A;     /* A: acceleration of the last step, state of the integrator */
   Vec R;           /* residual for contact; NULL without */
+  Vec stage,
+    stage_start; /* where the integrator evaluates forces, stage_start + stage_part (X - stage_start), in a solve for X; NULL: at X */
+  PetscReal stage_part;
   PetscBool dt_given, velocity_predictor, fixed_step, damped;
-  PetscBool may_search;               /* Newton may try a failed step again with a line search */
   PetscBool refuse_inverted, refused; /* steps that turn tets inside out; the last attempt was such a one */
   PetscBool may_cut;                  /* this attempt may end where points arrive */
   PetscReal arrival;                  /* the part of the step at which it did, 1: it did not */

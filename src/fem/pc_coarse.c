@@ -135,7 +135,7 @@ static PetscErrorCode PCSetUp_Coarse(PC pc)
     PetscCall(VecCreateLocalVector(p->s, &p->own_out));
   }
   PetscCall(set_up_fine(p, pc, A, &ok));
-  if (!ok && !p->simple) {
+  if (!ok && !p->simple && !p->space->tentative) {
     PetscCall(simplify(p));
     PetscCall(set_up_fine(p, pc, A, &ok));
   }

@@ -3,22 +3,12 @@
   delta = J^-1 F, and the energy of the error 1/2 delta . F (of state: J holds inertia, too). One more solve, to a tenth, tells it: a
   fraction of the iterations of the step.
 
-  Newton's last linear solve left a residual of its own; that part of F is the linear solver's, the rest is what the linearisation left.
+  With one linear solve per step that is the linear solver's; with Newton's method, whose iteration ends by its own tolerance and whose linear solves are as
+  accurate as that needs, all of it is Newton's. What its steps leave has one direction and adds up.
 */
 #include "ledger_impl.h"
 
 #define ROUGHLY 0.1 /* of delta: how well it is solved for */
-
-/* The parts of F that linear solves and linearisation left; `before`: norm of what the last linear solve left. */
-static void share(SbLedger l, PetscReal before, PetscReal energy, PetscBool single)
-{
-  const PetscReal error = PetscSqrtReal(energy);
-  PetscReal part = 1.;
-
-  if (!single && l->first[0] > 0.) part = PetscMin(1., before / l->first[0]);
-  l->step_linear = part * error;
-  l->step_nonlinear = PetscSqrtReal(PetscMax(0., 1. - part * part)) * error;
-}
 
 /* What the next step leaves of an error like delta, in which inertia has the share shift_a delta.M delta of the energy delta.J delta: of an oscillation of
    the frequency w implicit Euler leaves 1 / (1 + (w h)^2)^(1/2), which is the root of that share. Other methods do not damp so, but
@@ -38,24 +28,20 @@ static PetscErrorCode damp(SbLedger l, PetscReal energy)
 PetscErrorCode SbEstimateSolver(SbLedger l, const SbSolved *step)
 {
   const SNES snes = l->run->snes;
-  PetscReal before, energy;
+  PetscReal energy;
   PetscInt its;
   PetscBool single;
   Vec F = l->w[0];
-  KSP ksp;
 
   PetscFunctionBeginUser;
-  PetscCall(SNESGetKSP(snes, &ksp));
-  PetscCall(KSPGetResidualNorm(ksp, &before));
   PetscCall(PetscObjectTypeCompare((PetscObject)snes, SNESKSPONLY, &single));
   l->residuals -= MPI_Wtime();
   PetscCall(SNESComputeFunction(snes, step->U, F));
   l->residuals += MPI_Wtime();
-  PetscCall(KSPSetResidualHistory(ksp, l->first, 1, PETSC_TRUE));
-  l->first[0] = 0.;
   PetscCall(SbProbeSolve(l, ROUGHLY, F, l->delta, &its));
   PetscCall(VecDot(l->delta, F, &energy));
-  share(l, before, 0.5 * PetscAbsReal(energy), single);
+  l->step_linear = single ? PetscSqrtReal(0.5 * PetscAbsReal(energy)) : 0.;
+  l->step_nonlinear = single ? 0. : PetscSqrtReal(0.5 * PetscAbsReal(energy));
   if (step->V) PetscCall(damp(l, PetscAbsReal(energy)));
   l->own_work += 1. + 2. * (PetscReal)its;
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -59,7 +59,6 @@ struct _p_SbLedger {
   PetscReal kept_t, kept_dt, before_dt; /* s; before_dt 0: there was none */
   Vec w[3];                             /* work */
   Vec delta;                            /* what the solve left, m: the quantity's share of it */
-  PetscReal first[2];                   /* norms of a residual history */
 
   PetscReal work, own_work; /* in residuals, of the run and of the estimates: the same on every run */
   PetscReal seconds, solving,

@@ -212,7 +212,8 @@ static PetscErrorCode setfromoptions_corotated(SbMaterial m, const SbScope *scop
 
   PetscFunctionBeginUser;
   PetscCall(SbOptionChoice(scope, "tangent", &kind));
-  PetscCall(SbMaterialSetTangent(m, (SbTangentKind)kind));
+  m->adaptive = (PetscBool)(kind == 0);
+  PetscCall(SbMaterialSetTangent(m, m->adaptive ? SB_TANGENT_EXACT_SPD : (SbTangentKind)(kind - 1)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

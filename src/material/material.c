@@ -14,12 +14,12 @@ static const SbOption body_rows[] = {
   {"density", SB_OPTION_REAL, 1, "kg/m^3", "1000", "(0, inf)", "Mass per rest volume."},
 };
 static const SbOption corotated_rows[] = {
-  {"tangent", SB_OPTION_CHOICE, 1, "", "exact_spd", "warped|exact|exact_spd",
+  {"tangent", SB_OPTION_CHOICE, 1, "", "auto", "auto|warped|exact|exact_spd",
    "Stiffness: Hooke's turned with the cell (positive definite), the exact derivative, or that without "
    "negative eigenvalues."},
 };
 static const SbOption exact_rows[] = {
-  {"tangent", SB_OPTION_CHOICE, 1, "", "exact_spd", "exact|exact_spd",
+  {"tangent", SB_OPTION_CHOICE, 1, "", "auto", "auto|exact|exact_spd",
    "Stiffness: the exact derivative of the force, or that without negative eigenvalues (for CG)."},
 };
 
@@ -169,7 +169,8 @@ PetscErrorCode SbMaterialSetFromOptions_Exact(SbMaterial m, const SbScope *scope
 
   PetscFunctionBeginUser;
   PetscCall(SbOptionChoice(scope, "tangent", &choice));
-  PetscCall(SbMaterialSetTangent(m, choice ? SB_TANGENT_EXACT_SPD : SB_TANGENT_EXACT));
+  m->adaptive = (PetscBool)(choice == 0);
+  PetscCall(SbMaterialSetTangent(m, choice == 1 ? SB_TANGENT_EXACT : SB_TANGENT_EXACT_SPD));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -110,3 +110,33 @@ PetscErrorCode SbModelDampingPower(SbModel m, Vec U, Vec V, PetscReal *power)
   PetscCallMPI(MPI_Allreduce(&mine, power, 1, MPIU_REAL, MPI_SUM, m->comm));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
+
+PetscErrorCode SbModelStrainAlong(SbModel m, Vec U, Vec D, PetscReal *psi, PetscReal *slope,
+                                  PetscInt *ninverted)
+{
+  SbSpace s = m->space;
+  SbStage stage = {.shift_k = 1.};
+  PetscReal sum[3], minJ, volume, *f;
+  const PetscScalar *d;
+  PetscInt n;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_ENERGY], 0, 0, 0, 0));
+  PetscCall(PetscCalloc1(3 * s->nnode, &f));
+  PetscCall(SbSpaceGetLocalRead(s, U, &stage.u));
+  PetscCall(SbSpaceStrainEnergy(s, stage.u, &sum[0], &minJ, &n, &volume));
+  PetscCall(SbSpaceAddInternalForce(s, &stage, f));
+  PetscCall(SbSpaceRestoreLocalRead(s, U, &stage.u));
+  PetscCall(VecGetArrayRead(D, &d));
+  sum[1] = 0.;
+  sum[2] = (PetscReal)n;
+  for (PetscInt i = 0; i < 3 * s->nnode_owned; i++) sum[1] -= f[i] * d[i];
+  PetscCall(VecRestoreArrayRead(D, &d));
+  PetscCall(PetscFree(f));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, sum, 3, MPIU_REAL, MPI_SUM, m->comm));
+  *psi = sum[0];
+  *slope = sum[1];
+  *ninverted = (PetscInt)sum[2];
+  PetscCall(PetscLogEventEnd(SbEvents[SB_EVENT_ENERGY], 0, 0, 0, 0));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

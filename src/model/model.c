@@ -105,6 +105,8 @@ PetscErrorCode SbModelSetUp(SbModel m)
   for (PetscInt b = 0; b < m->nbody; b++) {
     if (m->body[b].given && m->body[b].given->mass > 0.) PetscCall(match_mass(m, b));
   }
+  for (PetscInt k = 0; k < m->nmaterial; k++)
+    m->may_filter = (PetscBool)(m->may_filter || m->material[k]->adaptive);
   for (PetscInt e = 0; e < m->neffect; e++) PetscCall(SbEffectMarkHeld(m->effect[e], m->nset, m->set));
   PetscCall(SbSpaceCreate(m->mesh, m->material, m->element, &m->space));
   m->load = 1.;
@@ -250,6 +252,17 @@ PetscErrorCode SbModelTangent(SbModel m, PetscReal t, PetscReal shift_v, PetscRe
   }
   PetscCall(SbSpaceFinishTangent(m->space, A));
   PetscCall(stage_end(m, U, V, NULL, &stage));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbModelFilterTangent(SbModel m, PetscBool filter)
+{
+  PetscFunctionBeginUser;
+  for (PetscInt k = 0; k < m->nmaterial; k++) {
+    if (m->material[k]->adaptive)
+      PetscCall(SbMaterialSetTangent(m->material[k], filter ? SB_TANGENT_EXACT_SPD : SB_TANGENT_EXACT));
+  }
+  m->space->tentative = (PetscBool)(m->may_filter && !filter);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

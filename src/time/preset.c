@@ -69,6 +69,7 @@ PetscErrorCode SbTimeRegister(void)
   PetscCall(SbOptionsRegister("", "", (PetscInt)PETSC_STATIC_ARRAY_LENGTH(rows), rows));
   PetscCall(SbSolverRegister());
   PetscCall(SbSecondOrderRegister());
+  PetscCall(SbNewtonRegister());
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -242,30 +243,22 @@ static PetscErrorCode set_up_snes(SbRun run)
 {
   SbModel m = run->model;
   PetscReal force = 0.;
+  PetscBool asked;
 
   PetscFunctionBeginUser;
   /* rounding of the internal forces: below 1e-13 of (stress modulus) x (area of the body) no residual is meaningful; near
      nu = 1/2 it is the pressure that rounds, lambda times the last digit of the change of volume */
   for (PetscInt b = 0; b < m->nbody; b++)
     force += (m->material[b]->E + 0.01 * m->material[b]->lambda) * PetscPowReal(m->body[b].volume, 2. / 3.);
-  PetscCall(SNESSetType(run->snes, m->linear ? SNESKSPONLY : SNESNEWTONLS));
-  PetscCall(SbRunSearch(run, SB_SEARCH_NONE));
+  /* a line search of PETSc's comes with PETSc's loop, and TSALPHA2 has stages of its own */
+  PetscCall(PetscOptionsHasName(NULL, NULL, "-snes_linesearch_type", &asked));
+  PetscCall(SNESSetType(run->snes, m->linear                                ? SNESKSPONLY
+                                   : asked || run->preset == SB_TIME_ALPHA2 ? SNESNEWTONLS
+                                                                            : SB_SNES_NEWTON));
   PetscCall(SNESSetDivergenceTolerance(run->snes, SB_UNLIMITED_REAL));
   PetscCall(SNESSetTolerances(run->snes, 1e-13 * force, m->dynamic ? 1e-6 : 1e-8, 0., SB_NEWTON_ITERATIONS,
                               SB_UNLIMITED));
   PetscCall(SNESSetErrorIfNotConverged(run->snes, PETSC_FALSE));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Newton's method without a line search of the user's choice has one to fall back on. */
-static PetscErrorCode find_search(SbRun run)
-{
-  PetscBool newton, asked;
-
-  PetscFunctionBeginUser;
-  PetscCall(PetscObjectTypeCompare((PetscObject)run->snes, SNESNEWTONLS, &newton));
-  PetscCall(PetscOptionsHasName(NULL, NULL, "-snes_linesearch_type", &asked));
-  run->may_search = (PetscBool)(newton && !asked);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -275,7 +268,7 @@ static PetscErrorCode forcing_terms(SNES snes)
   PetscBool newton, asked, rtol;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscObjectTypeCompare((PetscObject)snes, SNESNEWTONLS, &newton));
+  PetscCall(PetscObjectTypeCompareAny((PetscObject)snes, &newton, SB_SNES_NEWTON, SNESNEWTONLS, ""));
   PetscCall(PetscOptionsHasName(NULL, NULL, "-snes_ksp_ew", &asked));
   PetscCall(PetscOptionsHasName(NULL, NULL, "-ksp_rtol", &rtol));
   if (!newton || asked || rtol) PetscFunctionReturn(PETSC_SUCCESS);
@@ -393,7 +386,7 @@ static PetscErrorCode set_up_ts(SbRun run)
   if (SB_TS_DT_RENAMED) PetscCall(PetscOptionsClearValue(NULL, "-ts_dt"));
   PetscCall(TSSetFromOptions(run->ts));
   PetscCall(SbSolverFinish(run->snes, m->space));
-  PetscCall(find_search(run));
+  PetscCall(SbNewtonSetRun(run->snes, run));
   PetscCall(forcing_terms(run->snes));
   PetscCall(TSSetMaxTime(run->ts, run->t_end));
   PetscCall(TSSetTimeStep(run->ts, run->dt));
@@ -420,7 +413,7 @@ static PetscErrorCode set_up_static(SbRun run)
   PetscCall(SbSolverSetUp(run->snes, run->model->space, run->solver_used));
   PetscCall(SNESSetFromOptions(run->snes));
   PetscCall(SbSolverFinish(run->snes, run->model->space));
-  PetscCall(find_search(run));
+  PetscCall(SbNewtonSetRun(run->snes, run));
   PetscCall(forcing_terms(run->snes));
   if (run->arc.on) PetscCall(SbArcLengthCheck(run));
   PetscFunctionReturn(PETSC_SUCCESS);

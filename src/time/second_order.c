@@ -206,8 +206,7 @@ static PetscErrorCode solve_end(TS ts, SNESConvergedReason *reason)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* shortest: no shorter step will be tried. */
-static PetscErrorCode solve_implicit(TS ts, PetscBool shortest, PetscBool *ok)
+static PetscErrorCode solve_implicit(TS ts, PetscBool *ok)
 {
   SecondOrder *so = (SecondOrder *)ts->data;
   SNESConvergedReason reason;
@@ -215,15 +214,6 @@ static PetscErrorCode solve_implicit(TS ts, PetscBool shortest, PetscBool *ok)
 
   PetscFunctionBeginUser;
   PetscCall(solve_end(ts, &reason));
-  if (SbRunWorthSearch(so->run, reason)) {
-    PetscCall(SbRunSearch(so->run, SB_SEARCH_RESIDUAL));
-    PetscCall(solve_end(ts, &reason));
-    if (shortest && SbRunWorthSearch(so->run, reason)) {
-      PetscCall(SbRunSearch(so->run, SB_SEARCH_DOWN));
-      PetscCall(solve_end(ts, &reason));
-    }
-    PetscCall(SbRunSearch(so->run, SB_SEARCH_NONE));
-  }
   PetscCall(end_state(ts, so->X1));
   PetscCall(VecNorm(so->V1, NORM_INFINITY, &size));
   *ok = (PetscBool)(reason > 0 && !PetscIsInfOrNanReal(size));
@@ -306,7 +296,7 @@ static PetscErrorCode look_at(TS ts, PetscBool *ok)
 
     again = PETSC_FALSE;
     PetscCall((*run->look.fn)(run, &step, run->look.ctx, &again));
-    if (again) PetscCall(solve_implicit(ts, PETSC_FALSE, ok));
+    if (again) PetscCall(solve_implicit(ts, ok));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -339,6 +329,9 @@ static PetscErrorCode TSStep_SecondOrder(TS ts)
   so->started = PETSC_TRUE;
   PetscCall(VecCopy(ts->vec_sol, so->X0));
   PetscCall(VecCopy(ts->vec_dot, so->V0));
+  so->run->stage = so->Xa;
+  so->run->stage_start = so->X0;
+  so->run->stage_part = so->set.alpha_f;
   for (;;) {
     PetscBool ok = PETSC_FALSE, accept = PETSC_FALSE;
     PetscReal next, h = 0.;
@@ -349,7 +342,7 @@ static PetscErrorCode TSStep_SecondOrder(TS ts)
     if (is_explicit(so))
       PetscCall(solve_explicit(ts, &ok));
     else
-      PetscCall(solve_implicit(ts, (PetscBool)(cuts >= so->set.max_cuts), &ok));
+      PetscCall(solve_implicit(ts, &ok));
     if (ok && so->run->look.fn) PetscCall(look_at(ts, &ok));
     PetscCall(SbRunRefuse(so->run, ts->ptime, ts->time_step, (Vec[2]){so->X0, so->X1}, &ok));
     if (ok) {

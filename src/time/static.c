@@ -120,23 +120,13 @@ static PetscErrorCode refuse_free_body(SbRun run, PetscReal factor, PetscBool *o
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode solve_at(SbRun run, PetscReal factor, PetscReal length, PetscBool shortest, Vec X,
-                               PetscBool *ok)
+static PetscErrorCode solve_at(SbRun run, PetscReal factor, PetscReal length, Vec X, PetscBool *ok)
 {
   SNESConvergedReason reason;
   PetscBool far, again = (PetscBool)(run->look.fn != NULL);
 
   PetscFunctionBeginUser;
   PetscCall(attempt(run, factor, length, X, &reason));
-  if (SbRunWorthSearch(run, reason)) {
-    PetscCall(SbRunSearch(run, SB_SEARCH_RESIDUAL));
-    PetscCall(attempt(run, factor, length, X, &reason));
-    if (shortest && SbRunWorthSearch(run, reason)) {
-      PetscCall(SbRunSearch(run, SB_SEARCH_DOWN));
-      PetscCall(attempt(run, factor, length, X, &reason));
-    }
-    PetscCall(SbRunSearch(run, SB_SEARCH_NONE));
-  }
   PetscCall(SbRunTooFar(run, X, &far));
   for (int i = 0; i < SB_LOOKS && again && reason > 0 && !far; i++) {
     const SbSolved step = {.t = factor - length, .dt = length, .U = X, .solved = PETSC_TRUE};
@@ -203,7 +193,7 @@ PetscErrorCode SbStaticSolve(SbRun run)
     PetscBool ok = PETSC_FALSE;
 
     PetscCall(SbRunStepBegin(run, factor, next - factor));
-    PetscCall(solve_at(run, next, next - factor, (PetscBool)(cuts >= run->max_cuts), X, &ok));
+    PetscCall(solve_at(run, next, next - factor, X, &ok));
     if (!ok) {
       PetscBool simpler = PETSC_FALSE;
 

@@ -33,19 +33,11 @@ PetscErrorCode SbSecondOrderSet(TS ts, SbRun run, const SbMethodSettings *settin
 PetscErrorCode SbRunStepBegin(SbRun run, PetscReal t, PetscReal dt); /* before an attempt */
 PetscErrorCode SbRunStepAccepted(SbRun run, PetscInt step, PetscReal t, PetscReal dt,
                                  PetscBool last); /* after it was accepted; also once at the start */
-#define SB_NEWTON_ITERATIONS 50
-/* search.c: how far Newton's method goes along its steps. */
-typedef enum {
-  SB_SEARCH_NONE,     /* all the way */
-  SB_SEARCH_RESIDUAL, /* until the residual is smaller */
-  SB_SEARCH_DOWN      /* as long as the potential falls */
-} SbSearch;
-PetscErrorCode SbRunSearch(SbRun run, SbSearch search);
-/* Whether Newton's method, which failed for this reason, should be tried with a line search. */
-static inline PetscBool SbRunWorthSearch(SbRun run, SNESConvergedReason reason)
-{
-  return (PetscBool)(run->may_search && reason < 0 && reason != SNES_DIVERGED_LINEAR_SOLVE);
-}
+#define SB_NEWTON_ITERATIONS 100
+/* newton.c: Newton's method as a minimisation, a SNESType. Run: the one whose steps snes solves, borrowed; after the type is set. */
+#define SB_SNES_NEWTON "newton"
+PetscErrorCode SbNewtonRegister(void);
+PetscErrorCode SbNewtonSetRun(SNES snes, SbRun run);
 PetscErrorCode SbRunFail(SbRun run, const char *format, ...) __attribute__((format(printf, 2, 3)));
 
 /*

@@ -68,7 +68,7 @@ static PetscErrorCode make_linear_fail(HardRun *r, PetscInt until, PetscInt fail
 static PetscErrorCode linear_fails_once(HardRun *r)
 {
   PetscFunctionBeginUser;
-  PetscCall(make_linear_fail(r, 20, 1));
+  PetscCall(make_linear_fail(r, 20, 2)); /* with the exact tangent and with the filtered one */
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -99,14 +99,14 @@ static PetscErrorCode forget_newton(void *ctx)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Full steps and the line search both, three times over: the step is halved until it is an eighth. */
+/* Three times over: the step is halved until it is an eighth. */
 static PetscErrorCode newton_fails_often(HardRun *r)
 {
   Saboteur *s;
 
   PetscFunctionBeginUser;
   PetscCall(PetscNew(&s));
-  *s = (Saboteur){30, 6};
+  *s = (Saboteur){30, 3};
   PetscCall(SNESSetConvergenceTest(r->run->snes, newton_fails, s, forget_newton));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -62,6 +62,7 @@ static PetscErrorCode open_case(const char *law, const char *extra, PetscBool fr
   PetscCall(SbSpaceCreateVec(c->t.model->space, &c->U));
   PetscCall(SbSpaceCreateVec(c->t.model->space, &c->b));
   PetscCall(SbSpaceCreateVec(c->t.model->space, &c->x));
+  PetscCall(SbModelFilterTangent(c->t.model, PETSC_TRUE)); /* definite at any state */
   c->frames = frames;
   if (frames)
     PetscCall(SbSpaceCreateFrameOperator(c->t.model->space, &c->A));

@@ -1,0 +1,288 @@
+/*
+  Newton's method as a minimisation.
+
+  The solution u of a step of an implicit integrator, or of a load step, is a stationary point of the incremental potential
+
+    E(u) = a_M/2 |u - u^|_M^2 + psi(u) - f . u + D(u)
+
+  (inertia about the predictor u^, strain, loads, Rayleigh damping); the residual F(u) is its gradient. Each iteration solves K p = -F and goes along
+  p by a length s that makes E fall enough: E(u + s p) - E(u) <= c s F . p (Armijo; Nocedal and Wright, Numerical Optimization, 2006, section 3.1).
+
+  The change of E. Strain is evaluated as such; the rest of F is linear in u but for follower loads and what contact adds, so the trapezoidal
+  rule with the slopes at both ends of the step gives its work: psi(u + s p) - psi(u) + s/2 (r(0) + r(s)), r = (F - dpsi/du) . p. Where that
+  is rounding, near the solution, the residual decides.
+
+  Provisional steps. In bending and rotation the first full step stretches what it should turn, and E rises a long way that the next step comes back
+  from; a search that never lets E rise creeps where full steps need five. So a full step that turns no tet inside out may raise E,
+  and the next one has to bring it below where it was, or the search starts again from there (watchdog technique: Chamberlain et al. 1982; Nocedal
+  and Wright, section 15.6).
+
+  Tangent. With -body_NAME_tangent auto it is the exact one. When the linear solver meets a direction of negative curvature, or p goes up, the eigenvalues of
+  the cells are raised to zero and the system is solved once more (Longva et al. 2023, "Pitfalls of projection"); after a full step the exact one is tried again.
+*/
+#include <petsc/private/snesimpl.h> /* PETSc has no public way to write a SNESType */
+#include "time_impl.h"
+
+#define DECREASE 1e-4  /* c above */
+#define SHORTEST 1e-7  /* of a step, before the search gives up */
+#define ROUNDING 1e-11 /* of the terms that E's change is the difference of */
+#define PROVISIONAL 1  /* steps that may follow each other while E is above where they began */
+
+/* What a solve keeps from iteration to iteration. */
+typedef struct {
+  SbRun run;
+  Vec W, G;        /* trial place and its residual */
+  Vec start, step; /* where provisional steps began; the first of them led to start - step */
+  PetscReal least; /* rounding of the strain energy of a body that has turned: E V to the last digit, J */
+  PetscInt provisional;  /* how many there were since */
+  PetscReal slope;       /* of E at `start` along that step, J */
+  PetscReal first, rise; /* change of E over it, and over all since, J */
+} Newton;
+
+/* The potential at a place, as far as lengths of steps ask. */
+typedef struct {
+  PetscReal norm; /* of the residual, N */
+  PetscReal psi;  /* strain energy, J */
+  PetscReal rest; /* slope of all but strain along the step, J */
+  PetscInt ninverted;
+} Place;
+
+/* Everything about the place X, whose residual is F, for a step along -Y. */
+static PetscErrorCode look_at_place(Newton *n, Vec X, Vec F, Vec Y, Place *at)
+{
+  const SbRun run = n->run;
+  const PetscReal part = run->stage ? run->stage_part : 1.;
+  PetscReal slope, elastic;
+
+  PetscFunctionBeginUser;
+  *at = (Place){0};
+  PetscCall(VecNorm(F, NORM_2, &at->norm));
+  if (PetscIsInfOrNanReal(at->norm)) PetscFunctionReturn(PETSC_SUCCESS);
+  /* forces are those of a stage between the start of the step and X, divided by its part of the step */
+  if (run->stage) PetscCall(VecAXPBYPCZ(run->stage, 1. - part, part, 0., run->stage_start, X));
+  PetscCall(
+    SbModelStrainAlong(run->model, run->stage ? run->stage : X, Y, &at->psi, &elastic, &at->ninverted));
+  PetscCall(VecDot(F, Y, &slope));
+  at->psi /= PetscSqr(part);
+  at->rest = -slope - elastic / part;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Solves for Y, X - Y being the next place, and for the slope of E along -Y. */
+static PetscErrorCode find_direction(SNES snes, PetscBool *filtered, PetscReal *slope)
+{
+  Newton *n = (Newton *)snes->data;
+  const Vec X = snes->vec_sol, F = snes->vec_func, Y = snes->vec_sol_update;
+  const SbModel m = n->run->model;
+  KSPConvergedReason reason;
+  PetscInt iterations;
+
+  PetscFunctionBeginUser;
+  for (;;) {
+    PetscCall(SbModelFilterTangent(m, *filtered));
+    PetscCall(SNESComputeJacobian(snes, X, snes->jacobian, snes->jacobian_pre));
+    PetscCall(KSPSetOperators(snes->ksp, snes->jacobian, snes->jacobian_pre));
+    PetscCall(KSPSolve(snes->ksp, F, Y));
+    PetscCall(KSPGetIterationNumber(snes->ksp, &iterations));
+    PetscCall(KSPGetConvergedReason(snes->ksp, &reason));
+    snes->linear_its += iterations;
+    PetscCall(VecDot(F, Y, slope));
+    *slope = -*slope;
+    if ((reason > 0 && *slope < 0.) || *filtered || !m->may_filter) break;
+    PetscCall(PetscInfo(snes,
+                        "iteration %" PetscInt_FMT ": the exact tangent is not definite (%s, slope %g J)\n",
+                        snes->iter, KSPConvergedReasons[reason], (double)*slope));
+    *filtered = PETSC_TRUE;
+  }
+  if (reason < 0) snes->reason = SNES_DIVERGED_LINEAR_SOLVE;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Goes from X along -Y, E having the slope `slope` there, to the next X and F; s: how far, as part of Y. */
+static PetscErrorCode search(SNES snes, PetscReal slope, PetscReal *s)
+{
+  Newton *n = (Newton *)snes->data;
+  const Vec X = snes->vec_sol, F = snes->vec_func, Y = snes->vec_sol_update;
+  PetscBool enough, provisional, plain = PETSC_FALSE;
+  PetscReal change, noise, total, goal;
+  Place from, to;
+
+  PetscFunctionBeginUser;
+  *s = 1.;
+  PetscCall(look_at_place(n, X, F, Y, &from));
+  for (;;) {
+    /* how E changes */
+    change = PETSC_INFINITY;
+    noise = 0.;
+    PetscCall(VecWAXPY(n->W, -*s, Y, X));
+    PetscCall(SNESComputeFunction(snes, n->W, n->G));
+    PetscCall(look_at_place(n, n->W, n->G, Y, &to));
+    if (!PetscIsInfOrNanReal(to.norm)) {
+      change = to.psi - from.psi + 0.5 * *s * (from.rest + to.rest);
+      noise = n->least + ROUNDING * (PetscAbsReal(to.psi) + PetscAbsReal(from.psi) +
+                                     *s * (PetscAbsReal(from.rest) + PetscAbsReal(to.rest)));
+      if (PetscIsInfOrNanReal(change)) change = PETSC_INFINITY;
+    }
+    PetscCall(PetscInfo(
+      snes,
+      "iteration %" PetscInt_FMT ": %g of the step changes E by %g J (slope %g J), residual %g -> %g N\n",
+      snes->iter, (double)*s, (double)change, (double)slope, (double)from.norm, (double)to.norm));
+
+    /* enough; where it is too little to tell, or the step goes up at once, as forces without a potential may make it, the residual has to */
+    total = n->provisional ? n->rise + change : change;
+    goal = DECREASE * (n->provisional ? n->slope : *s * slope);
+    enough = (PetscBool)(slope < 0. && total <= goal);
+    if (slope >= 0. || total <= noise)
+      enough = (PetscBool)(enough || to.norm <= (1. - DECREASE * *s) * from.norm);
+    provisional = (PetscBool)(!enough && !plain && slope < 0. && n->provisional < PROVISIONAL &&
+                              change < PETSC_INFINITY && to.ninverted <= from.ninverted);
+    if (enough || provisional) break;
+
+    /* back to where provisional steps began, and a shorter step: to where the parabola through slope and both ends is lowest */
+    if (n->provisional) {
+      PetscCall(VecCopy(n->start, X));
+      PetscCall(VecCopy(n->step, Y));
+      PetscCall(SNESComputeFunction(snes, X, F));
+      PetscCall(look_at_place(n, X, F, Y, &from));
+      slope = n->slope;
+      change = n->first;
+      n->provisional = 0;
+    }
+    plain = PETSC_TRUE;
+    *s *= PetscMax(0.1, PetscMin(0.5, -slope * *s / (2. * (change - slope * *s))));
+    if (*s < SHORTEST) {
+      snes->reason = SNES_DIVERGED_LINE_SEARCH;
+      PetscFunctionReturn(PETSC_SUCCESS);
+    }
+  }
+
+  /* the new place; where provisional steps began is kept until E has fallen below */
+  if (enough)
+    n->provisional = 0;
+  else if (!n->provisional++) {
+    PetscCall(VecCopy(X, n->start));
+    PetscCall(VecCopy(Y, n->step));
+    n->slope = slope;
+    n->first = change;
+    n->rise = 0.;
+  }
+  n->rise += change;
+  PetscCall(VecCopy(n->W, X));
+  PetscCall(VecCopy(n->G, F));
+  snes->norm = to.norm;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode SNESSolve_Newton(SNES snes)
+{
+  Newton *n = (Newton *)snes->data;
+  const Vec X = snes->vec_sol, F = snes->vec_func, Y = snes->vec_sol_update;
+  PetscBool filtered = PETSC_FALSE;
+  PetscReal slope = 0., s = 1.;
+
+  PetscFunctionBeginUser;
+  /* where it begins */
+  snes->reason = SNES_CONVERGED_ITERATING;
+  snes->iter = 0;
+  n->provisional = 0;
+  PetscCall(SNESComputeFunction(snes, X, F));
+  PetscCall(VecNorm(F, NORM_2, &snes->norm));
+  PetscCall(SNESLogConvergenceHistory(snes, snes->norm, 0));
+  PetscCall(SbSNESConverged(snes, 0, 0., 0., snes->norm));
+  PetscCall(SNESMonitor(snes, 0, snes->norm));
+
+  while (!snes->reason) {
+    const PetscInt linear = snes->linear_its;
+
+    /* where to, and how far */
+    PetscCall(find_direction(snes, &filtered, &slope));
+    if (!snes->reason) PetscCall(search(snes, slope, &s));
+    if (snes->reason) break;
+    if (s == 1.) filtered = PETSC_FALSE;
+
+    /* whether that is near enough */
+    snes->iter++;
+    PetscCall(VecNorm(X, NORM_2, &snes->xnorm));
+    PetscCall(VecNorm(Y, NORM_2, &snes->ynorm));
+    snes->ynorm *= s;
+    PetscCall(SNESLogConvergenceHistory(snes, snes->norm, snes->linear_its - linear));
+    PetscCall(SbSNESConverged(snes, snes->iter, snes->xnorm, snes->ynorm, snes->norm));
+    PetscCall(SNESMonitor(snes, snes->iter, snes->norm));
+    if (!snes->reason && snes->iter >= snes->max_its) snes->reason = SNES_DIVERGED_MAX_IT;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode SNESSetUp_Newton(SNES snes)
+{
+  Newton *n = (Newton *)snes->data;
+
+  PetscFunctionBeginUser;
+  PetscCall(SNESSetUpMatrices(snes));
+  PetscCall(VecDuplicate(snes->vec_sol, &n->W));
+  PetscCall(VecDuplicate(snes->vec_sol, &n->G));
+  PetscCall(VecDuplicate(snes->vec_sol, &n->start));
+  PetscCall(VecDuplicate(snes->vec_sol, &n->step));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode SNESReset_Newton(SNES snes)
+{
+  Newton *n = (Newton *)snes->data;
+
+  PetscFunctionBeginUser;
+  PetscCall(VecDestroy(&n->W));
+  PetscCall(VecDestroy(&n->G));
+  PetscCall(VecDestroy(&n->start));
+  PetscCall(VecDestroy(&n->step));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode SNESDestroy_Newton(SNES snes)
+{
+  PetscFunctionBeginUser;
+  PetscCall(SNESReset_Newton(snes));
+  PetscCall(PetscFree(snes->data));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode SNESCreate_Newton(SNES snes)
+{
+  Newton *n;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscNew(&n));
+  snes->data = n;
+  snes->ops->setup = SNESSetUp_Newton;
+  snes->ops->solve = SNESSolve_Newton;
+  snes->ops->reset = SNESReset_Newton;
+  snes->ops->destroy = SNESDestroy_Newton;
+  snes->usesksp = PETSC_TRUE;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbNewtonRegister(void)
+{
+  PetscFunctionBeginUser;
+  PetscCall(SNESRegister(SB_SNES_NEWTON, SNESCreate_Newton));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbNewtonSetRun(SNES snes, SbRun run)
+{
+  const SbModel m = run->model;
+  PetscBool ours;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscObjectTypeCompare((PetscObject)snes, SB_SNES_NEWTON, &ours));
+  if (ours) {
+    Newton *n = (Newton *)snes->data;
+
+    n->run = run;
+    n->least = 0.;
+    for (PetscInt b = 0; b < m->nbody; b++)
+      n->least += 4. * PETSC_MACHINE_EPSILON * m->material[b]->E * m->body[b].volume;
+  }
+  PetscCall(SbModelFilterTangent(m, (PetscBool)!ours));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

@@ -1,0 +1,103 @@
+// @ranks 1 2
+/*
+  Newton's method on steps that full steps do not survive: a bar of CR that bends under its weight in one load step, near nu = 1/2.
+
+  It ends in one load step, without a rejected one, and takes at most twice the iterations of the best of 2, 4 and 8 equal load steps; all of them end in the same
+  state. Where the exact tangent is indefinite, it is filtered: with the exact one alone the same load takes more, and with the filtered one
+  alone the last iterations are not quadratic.
+*/
+#include "verify.h"
+
+#define MOST 16 /* residuals that are kept */
+
+/* One run: iterations, rejected load steps, displacement of the end, ratios of the residuals at the end. */
+typedef struct {
+  PetscInt iterations, rejected, n;
+  PetscReal residual[MOST]; /* the last ones, N */
+  PetscReal strain;         /* J */
+} Outcome;
+
+static PetscErrorCode keep(SNES snes, PetscInt it, PetscReal norm, void *ctx)
+{
+  Outcome *o = (Outcome *)ctx;
+
+  PetscFunctionBeginUser;
+  (void)snes;
+  if (it == 0) o->n = 0;
+  o->residual[o->n++ % MOST] = norm;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode bend(PetscReal poisson, PetscInt steps, const char *extra, Outcome *o)
+{
+  TestScene t;
+
+  PetscFunctionBeginUser;
+  PetscCall(
+    verify_open(&t,
+                "-bodies bar -body_bar_mesh box:0.4,0.1,0.1:2 -body_bar_element cr -body_bar_material "
+                "neohookean -body_bar_young 5e5 -body_bar_poisson %g -body_bar_density 1000 -effects "
+                "gravity,clamp -effect_gravity_vector 0,0,-9.81 -effect_clamp_type support "
+                "-effect_clamp_on xmin -time static -static_steps %d %s",
+                (double)poisson, (int)steps, extra));
+  *o = (Outcome){0};
+  t.run->want_energies = PETSC_TRUE;
+  PetscCall(SNESMonitorSet(t.run->snes, keep, o, NULL));
+  PetscCall(verify_solve(&t, "bend"));
+  o->iterations = t.run->newton_total;
+  o->rejected = t.run->rejected_total;
+  o->strain = t.run->energies.strain;
+  PetscCall(test_scene_close(&t));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode check_one_step(PetscReal poisson)
+{
+  Outcome one, best = {.iterations = PETSC_MAX_INT}, o;
+
+  PetscFunctionBeginUser;
+  PetscCall(bend(poisson, 1, "", &one));
+  for (PetscInt steps = 2; steps <= 8; steps *= 2) {
+    PetscCall(bend(poisson, steps, "", &o));
+    SB_CHECK_NEAR(o.strain, one.strain, 1e-6 * one.strain, "strain energy with more load steps");
+    if (o.iterations < best.iterations) best = o;
+  }
+  PetscCall(PetscPrintf(PETSC_COMM_WORLD,
+                        "  nu %g: %d iterations in one load step, %d in the best number of them\n",
+                        (double)poisson, (int)one.iterations, (int)best.iterations));
+  SB_CHECK(one.rejected == 0, "nu %g: %d rejected load steps", (double)poisson, (int)one.rejected);
+  SB_CHECK(one.iterations <= 2 * best.iterations, "nu %g: %d iterations, %d with load steps chosen by hand",
+           (double)poisson, (int)one.iterations, (int)best.iterations);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* With exact tangents each of the last iterations squares the residual, as far as rounding lets it. */
+static PetscErrorCode check_quadratic(void)
+{
+  Outcome o, filtered;
+
+  PetscFunctionBeginUser;
+  PetscCall(bend(0.3, 1, "-ksp_rtol 1e-10", &o));
+  PetscCall(bend(0.3, 1, "-ksp_rtol 1e-10 -body_bar_tangent exact_spd", &filtered));
+  SB_CHECK(o.n >= 4 && o.n < MOST, "%d residuals", (int)o.n);
+  if (o.n >= 4 && o.n < MOST) {
+    const PetscReal *r = o.residual + o.n - 3;
+
+    /* of order two the logarithms' ratio is 2; the last residual is one of rounding, so 1.5 */
+    SB_CHECK(PetscLogReal(r[2] / r[1]) < 1.5 * PetscLogReal(r[1] / r[0]),
+             "residuals %g, %g, %g are not quadratic", (double)r[0], (double)r[1], (double)r[2]);
+  }
+  SB_CHECK(o.iterations <= filtered.iterations, "%d iterations, %d with the filtered tangent",
+           (int)o.iterations, (int)filtered.iterations);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+int main(int argc, char *argv[])
+{
+  const PetscReal poisson[] = {0.3, 0.49, 0.499, 0.4999};
+
+  SB_TEST_BEGIN(argc, argv);
+  for (size_t k = 0; k < PETSC_STATIC_ARRAY_LENGTH(poisson); k++) PetscCall(check_one_step(poisson[k]));
+  PetscCall(check_quadratic());
+  SB_TEST_END();
+}
