@@ -81,10 +81,12 @@ static PetscErrorCode renew_tangent(SbRun run, SNES snes, Vec U0)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbRunSolveContact(SbRun run, SNES snes, PetscReal t, PetscReal dt, Vec U0, Vec U,
-                                 const SbContactSolve *solve, SNESConvergedReason *reason)
+PetscErrorCode SbRunSolveContact(SbRun run, const SbAttempt *step, SNESConvergedReason *reason)
 {
   const SbModel m = run->model;
+  const SNES snes = run->snes;
+  const PetscReal t = step->t, dt = step->dt;
+  const Vec U0 = step->U0, U = step->U;
   PetscBool again = PETSC_TRUE, rough, held;
   PetscReal size, least = 0;
   Aim aim;
@@ -100,16 +102,16 @@ PetscErrorCode SbRunSolveContact(SbRun run, SNES snes, PetscReal t, PetscReal dt
   if (m->space->held || !m->dynamic) run->tangent_known = PETSC_FALSE;
   if (held) {
     /* a body at rest has no residual but for rounding: then contact and supports carry all there is */
-    PetscCall((*solve->residual)(solve->ctx, U, run->R));
+    PetscCall((*step->residual)(step->ctx, U, run->R));
     PetscCall(VecNorm(run->R, NORM_2, &least));
     least = PetscIsInfOrNanReal(least) ? 0 : DIGITS * least;
   }
   PetscCall(first_residual(snes, U, run->R, &size));
   if (held) PetscCall(set_aim(snes, &aim, size, least, rough)); /* if not, as without contact */
   PetscCall(SbSolverFollowRows(aim.ksp, m->space));
-  PetscCall((*solve->solve)(solve->ctx, U, reason));
+  PetscCall((*step->solve)(step->ctx, U, reason));
   for (PetscInt round = 1; *reason > 0; round++) {
-    PetscCall((*solve->residual)(solve->ctx, U, run->R));
+    PetscCall((*step->residual)(step->ctx, U, run->R));
     m->space->rough = rough;
     PetscCall(SbModelContactSettle(m, t + dt, U, run->R, &again));
     if (round == 1 && run->may_cut) {
@@ -125,7 +127,7 @@ PetscErrorCode SbRunSolveContact(SbRun run, SNES snes, PetscReal t, PetscReal dt
     }
     PetscCall(set_aim(snes, &aim, size, least, rough));
     PetscCall(SbSolverFollowRows(aim.ksp, m->space));
-    PetscCall((*solve->solve)(solve->ctx, U, reason));
+    PetscCall((*step->solve)(step->ctx, U, reason));
   }
   PetscCall(set_aim(snes, &aim, 0, 0, PETSC_FALSE));
   if (*reason < 0) PetscCall(renew_tangent(run, snes, U0));

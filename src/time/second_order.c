@@ -123,8 +123,9 @@ static PetscErrorCode SNESTSFormJacobian_SecondOrder(SNES snes, Vec X, Mat J, Ma
 }
 
 /* Sets X1 to the initial guess, with prescribed values of the end time in place. */
-static PetscErrorCode predict(TS ts)
+static PetscErrorCode predict(void *ctx)
 {
+  const TS ts = (TS)ctx;
   SecondOrder *so = (SecondOrder *)ts->data;
   PetscBool single, warm;
   KSP ksp;
@@ -151,15 +152,16 @@ static PetscErrorCode predict(TS ts)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Solves for the end displacement, from the one that X1 holds. */
-static PetscErrorCode solve_once(TS ts, SNESConvergedReason *reason)
+/* Solves for the end displacement X, from the one that it holds. */
+static PetscErrorCode solve(void *ctx, Vec X, SNESConvergedReason *reason)
 {
+  const TS ts = (TS)ctx;
   SecondOrder *so = (SecondOrder *)ts->data;
   PetscInt newton, linear;
 
   PetscFunctionBeginUser;
   PetscCall(TSPreStage(ts, ts->ptime + so->set.alpha_f * ts->time_step));
-  PetscCall(SNESSolve(ts->snes, NULL, so->X1));
+  PetscCall(SNESSolve(ts->snes, NULL, X));
   PetscCall(SNESGetConvergedReason(ts->snes, reason));
   PetscCall(SNESGetIterationNumber(ts->snes, &newton));
   PetscCall(SNESGetLinearSolveIterations(ts->snes, &linear));
@@ -168,15 +170,7 @@ static PetscErrorCode solve_once(TS ts, SNESConvergedReason *reason)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The two things that the loop of contact (contact.c) asks for. */
-static PetscErrorCode contact_solve(void *ts, Vec U, SNESConvergedReason *reason)
-{
-  PetscFunctionBeginUser;
-  (void)U; /* X1 itself */
-  PetscCall(solve_once((TS)ts, reason));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
+/* What contact is the answer to. */
 static PetscErrorCode contact_residual(void *ts, Vec X, Vec R)
 {
   SecondOrder *so = (SecondOrder *)((TS)ts)->data;
@@ -191,36 +185,36 @@ static PetscErrorCode contact_residual(void *ts, Vec X, Vec R)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* One attempt at the end displacement, from the predicted one. */
-static PetscErrorCode solve_end(TS ts, SNESConvergedReason *reason)
+static SbSolved solved_step(TS ts)
 {
   SecondOrder *so = (SecondOrder *)ts->data;
-  const SbContactSolve solve = {contact_solve, contact_residual, ts};
 
-  PetscFunctionBeginUser;
-  PetscCall(predict(ts));
-  if (so->run->model->ntouch)
-    PetscCall(SbRunSolveContact(so->run, ts->snes, ts->ptime, ts->time_step, so->X0, so->X1, &solve, reason));
-  else
-    PetscCall(solve_once(ts, reason));
-  PetscFunctionReturn(PETSC_SUCCESS);
+  return (SbSolved){ts->ptime, ts->time_step, so->X0,
+                    so->V0,    so->run->A,    so->X1,
+                    so->V1,    so->A1,        (PetscBool)!is_explicit(so)};
 }
 
-static PetscErrorCode solve_implicit(TS ts, PetscBool *ok)
+/* Velocity and acceleration of the end. */
+static PetscErrorCode complete(void *ctx, SNESConvergedReason reason, SbSolved *step, PetscBool *ok)
 {
+  const TS ts = (TS)ctx;
   SecondOrder *so = (SecondOrder *)ts->data;
-  SNESConvergedReason reason;
   PetscReal size;
 
   PetscFunctionBeginUser;
-  PetscCall(solve_end(ts, &reason));
-  PetscCall(end_state(ts, so->X1));
-  PetscCall(VecNorm(so->V1, NORM_INFINITY, &size));
+  if (!is_explicit(so)) PetscCall(end_state(ts, so->X1));
+  PetscCall(VecNorm(is_explicit(so) ? so->A1 : so->V1, NORM_INFINITY, &size));
   *ok = (PetscBool)(reason > 0 && !PetscIsInfOrNanReal(size));
   if (*ok && so->set.impulses)
     PetscCall(
       SbNewmarkContact(so->run, ts->ptime + ts->time_step, ts->time_step, so->X1, so->V1, so->A1, so->own1));
-  if (!*ok && reason != SNES_CONVERGED_ITERATING) {
+  *step = solved_step(ts);
+  if (!*ok && is_explicit(so))
+    PetscCall(SbRunFail(so->run,
+                        "step %" PetscInt_FMT " at t = %g s: the explicit solution is not finite; its step "
+                        "of %g s is beyond the stable one (see the header)",
+                        ts->steps + 1, (double)ts->ptime, (double)ts->time_step));
+  else if (!*ok && reason != SNES_CONVERGED_ITERATING) {
     KSP ksp;
     KSPConvergedReason kreason;
 
@@ -235,24 +229,26 @@ static PetscErrorCode solve_implicit(TS ts, PetscBool *ok)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode solve_explicit(TS ts, PetscBool *ok)
+/* The explicit rules need no guess and no solver. */
+static PetscErrorCode no_guess(void *ctx)
 {
+  PetscFunctionBeginUser;
+  (void)ctx;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode step_explicitly(void *ctx, Vec X, SNESConvergedReason *reason)
+{
+  const TS ts = (TS)ctx;
   SecondOrder *so = (SecondOrder *)ts->data;
   const PetscReal h = ts->time_step;
-  PetscReal size;
 
   PetscFunctionBeginUser;
   PetscCall(VecWAXPY(so->V1, h, so->run->A, so->V0));
-  PetscCall(VecWAXPY(so->X1, h, so->set.method == SB_METHOD_EULER_EXPLICIT ? so->V0 : so->V1, so->X0));
-  PetscCall(SbModelPrescribe(so->run->model, ts->ptime + h, so->X1));
-  PetscCall(SbFormAcceleration(so->run, ts->ptime + h, so->X1, so->V1, so->A1));
-  PetscCall(VecNorm(so->A1, NORM_INFINITY, &size));
-  *ok = (PetscBool)!PetscIsInfOrNanReal(size);
-  if (!*ok)
-    PetscCall(SbRunFail(so->run,
-                        "step %" PetscInt_FMT " at t = %g s: the explicit solution is not finite; its step "
-                        "of %g s is beyond the stable one (see the header)",
-                        ts->steps + 1, (double)ts->ptime, (double)h));
+  PetscCall(VecWAXPY(X, h, so->set.method == SB_METHOD_EULER_EXPLICIT ? so->V0 : so->V1, so->X0));
+  PetscCall(SbModelPrescribe(so->run->model, ts->ptime + h, X));
+  PetscCall(SbFormAcceleration(so->run, ts->ptime + h, X, so->V1, so->A1));
+  *reason = SNES_CONVERGED_ITS;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -275,32 +271,6 @@ static void go_on_after_arrival(SecondOrder *so)
     so->whole = 0.;
 }
 
-static SbSolved solved_step(TS ts)
-{
-  SecondOrder *so = (SecondOrder *)ts->data;
-
-  return (SbSolved){ts->ptime, ts->time_step, so->X0,
-                    so->V0,    so->run->A,    so->X1,
-                    so->V1,    so->A1,        (PetscBool)!is_explicit(so)};
-}
-
-/* Who looks at solutions may ask for a better one: solved for once more, the solver being told what is wanted. */
-static PetscErrorCode look_at(TS ts, PetscBool *ok)
-{
-  const SbRun run = ((SecondOrder *)ts->data)->run;
-  PetscBool again = PETSC_TRUE;
-
-  PetscFunctionBeginUser;
-  for (int i = 0; i < SB_LOOKS && again && *ok; i++) {
-    const SbSolved step = solved_step(ts);
-
-    again = PETSC_FALSE;
-    PetscCall((*run->look.fn)(run, &step, run->look.ctx, &again));
-    if (again) PetscCall(solve_implicit(ts, ok));
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* Length that the next step should have: back towards the nominal one when four steps after a cut went well. */
 static PetscErrorCode wanted_step(TS ts, PetscReal *h)
 {
@@ -317,6 +287,14 @@ static PetscErrorCode wanted_step(TS ts, PetscReal *h)
 static PetscErrorCode TSStep_SecondOrder(TS ts)
 {
   SecondOrder *so = (SecondOrder *)ts->data;
+  const PetscBool explicit = is_explicit(so);
+  SbAttempt attempt = {.U0 = so->X0,
+                       .U = so->X1,
+                       .predict = explicit ? no_guess : predict,
+                       .solve = explicit ? step_explicitly : solve,
+                       .residual = contact_residual,
+                       .complete = complete,
+                       .ctx = ts};
   PetscInt cuts = 0;
 
   PetscFunctionBeginUser;
@@ -338,13 +316,9 @@ static PetscErrorCode TSStep_SecondOrder(TS ts)
 
     so->run->may_cut = (PetscBool)(so->run->model->narrive && !cuts && so->whole == 0.);
     so->run->arrival = 1.;
-    PetscCall(SbRunStepBegin(so->run, ts->ptime, ts->time_step));
-    if (is_explicit(so))
-      PetscCall(solve_explicit(ts, &ok));
-    else
-      PetscCall(solve_implicit(ts, &ok));
-    if (ok && so->run->look.fn) PetscCall(look_at(ts, &ok));
-    PetscCall(SbRunRefuse(so->run, ts->ptime, ts->time_step, (Vec[2]){so->X0, so->X1}, &ok));
+    attempt.t = ts->ptime;
+    attempt.dt = ts->time_step;
+    PetscCall(SbRunAttempt(so->run, &attempt, &ok));
     if (ok) {
       PetscCall(VecCopy(so->X1, ts->vec_sol));
       PetscCall(VecCopy(so->V1, ts->vec_dot));

@@ -12,10 +12,17 @@
 
 #define LIMIT 10. /* softening from which on a limit load is likely */
 
+/* What one load step works with. */
+typedef struct {
+  SbRun run;
+  PetscReal factor, length; /* load factor at its end, and what it adds */
+  Vec X;                    /* displacement at its end, m */
+} LoadStep;
+
 /* Newton from the displacement that X holds. */
-static PetscErrorCode solve_once(void *ctx, Vec X, SNESConvergedReason *reason)
+static PetscErrorCode solve(void *ctx, Vec X, SNESConvergedReason *reason)
 {
-  SbRun run = (SbRun)ctx;
+  const SbRun run = ((LoadStep *)ctx)->run;
   PetscInt newton, linear;
 
   PetscFunctionBeginUser;
@@ -30,7 +37,7 @@ static PetscErrorCode solve_once(void *ctx, Vec X, SNESConvergedReason *reason)
 
 static PetscErrorCode contact_residual(void *ctx, Vec X, Vec R)
 {
-  SbRun run = (SbRun)ctx;
+  const SbRun run = ((LoadStep *)ctx)->run;
 
   PetscFunctionBeginUser;
   PetscCall(SbModelResidual(run->model, run->model->load, X, NULL, NULL, PETSC_FALSE, R));
@@ -38,20 +45,14 @@ static PetscErrorCode contact_residual(void *ctx, Vec X, Vec R)
 }
 
 /* From the last equilibrium with the prescribed values of the new load factor. */
-static PetscErrorCode attempt(SbRun run, PetscReal factor, PetscReal length, Vec X,
-                              SNESConvergedReason *reason)
+static PetscErrorCode predict(void *ctx)
 {
-  SbModel m = run->model;
-  const SbContactSolve solve = {solve_once, contact_residual, run};
+  const LoadStep *l = (LoadStep *)ctx;
 
   PetscFunctionBeginUser;
-  m->load = factor;
-  PetscCall(VecCopy(run->U, X));
-  PetscCall(SbModelPrescribe(m, factor, X));
-  if (m->ntouch)
-    PetscCall(SbRunSolveContact(run, run->snes, factor - length, length, run->U, X, &solve, reason));
-  else
-    PetscCall(solve_once(run, X, reason));
+  l->run->model->load = l->factor;
+  PetscCall(VecCopy(l->run->U, l->X));
+  PetscCall(SbModelPrescribe(l->run->model, l->factor, l->X));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -120,25 +121,17 @@ static PetscErrorCode refuse_free_body(SbRun run, PetscReal factor, PetscBool *o
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode solve_at(SbRun run, PetscReal factor, PetscReal length, Vec X, PetscBool *ok)
+static PetscErrorCode complete(void *ctx, SNESConvergedReason reason, SbSolved *step, PetscBool *ok)
 {
-  SNESConvergedReason reason;
-  PetscBool far, again = (PetscBool)(run->look.fn != NULL);
+  const LoadStep *l = (LoadStep *)ctx;
+  PetscBool far;
 
   PetscFunctionBeginUser;
-  PetscCall(attempt(run, factor, length, X, &reason));
-  PetscCall(SbRunTooFar(run, X, &far));
-  for (int i = 0; i < SB_LOOKS && again && reason > 0 && !far; i++) {
-    const SbSolved step = {.t = factor - length, .dt = length, .U = X, .solved = PETSC_TRUE};
-
-    again = PETSC_FALSE;
-    PetscCall((*run->look.fn)(run, &step, run->look.ctx, &again));
-    if (again) PetscCall(attempt(run, factor, length, X, &reason));
-  }
+  *step = (SbSolved){.t = l->factor - l->length, .dt = l->length, .U = l->X, .solved = PETSC_TRUE};
+  PetscCall(SbRunTooFar(l->run, l->X, &far));
   *ok = (PetscBool)(reason > 0 && !far);
-  if (!*ok) PetscCall(explain(run, factor, reason));
-  PetscCall(refuse_free_body(run, factor, ok));
-  PetscCall(SbRunRefuse(run, factor - length, length, (Vec[2]){run->U, X}, ok));
+  if (!*ok) PetscCall(explain(l->run, l->factor, reason));
+  PetscCall(refuse_free_body(l->run, l->factor, ok));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -181,10 +174,18 @@ PetscErrorCode SbStaticSolve(SbRun run)
   const PetscReal nominal = 1. / (PetscReal)run->static_steps, least = run->min_increment * nominal;
   PetscReal factor = run->t0, length = nominal, rate = 0.;
   PetscInt step = run->step0, cuts = 0;
+  LoadStep load;
+  SbAttempt attempt = {.U0 = run->U,
+                       .predict = predict,
+                       .solve = solve,
+                       .residual = contact_residual,
+                       .complete = complete,
+                       .ctx = &load};
   Vec X;
 
   PetscFunctionBeginUser;
   PetscCall(VecDuplicate(run->U, &X));
+  attempt.U = X;
   run->model->load = factor;
   PetscCall(SbRunStepAccepted(run, step, factor, 0., PETSC_FALSE));
   run->newton_step = run->linear_step = run->rejected_step = 0;
@@ -192,8 +193,10 @@ PetscErrorCode SbStaticSolve(SbRun run)
     const PetscReal next = factor + length > 1. - 1e-9 ? 1. : factor + length;
     PetscBool ok = PETSC_FALSE;
 
-    PetscCall(SbRunStepBegin(run, factor, next - factor));
-    PetscCall(solve_at(run, next, next - factor, X, &ok));
+    load = (LoadStep){run, next, next - factor, X};
+    attempt.t = factor;
+    attempt.dt = next - factor;
+    PetscCall(SbRunAttempt(run, &attempt, &ok));
     if (!ok) {
       PetscBool simpler = PETSC_FALSE;
 

@@ -29,8 +29,21 @@ PetscErrorCode SbSecondOrderRegister(void);
 /* The run gives prescribed displacements, initial acceleration and the lumped mass; it is borrowed. */
 PetscErrorCode SbSecondOrderSet(TS ts, SbRun run, const SbMethodSettings *settings);
 
-/* hooks.c: what happens around a step. */
+/* step.c: what happens in a step. */
 PetscErrorCode SbRunStepBegin(SbRun run, PetscReal t, PetscReal dt); /* before an attempt */
+/* How a step from t to t + dt is attempted; vectors and ctx are borrowed. Static runs: t is the load factor. */
+typedef struct {
+  PetscReal t, dt;                      /* s */
+  Vec U0, U;                            /* displacements at its start, and at its end once it is solved, m */
+  PetscErrorCode (*predict)(void *ctx); /* U: a first guess with the prescribed values */
+  PetscErrorCode (*solve)(void *ctx, Vec U, SNESConvergedReason *reason); /* from the displacement in U */
+  PetscErrorCode (*residual)(void *ctx, Vec U, Vec R); /* without constraints, N; for contact */
+  /* the end state from U in `step`, if ok; else run->stop_reason says why */
+  PetscErrorCode (*complete)(void *ctx, SNESConvergedReason reason, SbSolved *step, PetscBool *ok);
+  void *ctx;
+} SbAttempt;
+/* ok: the step can be accepted. Collective. */
+PetscErrorCode SbRunAttempt(SbRun run, const SbAttempt *attempt, PetscBool *ok);
 PetscErrorCode SbRunStepAccepted(SbRun run, PetscInt step, PetscReal t, PetscReal dt,
                                  PetscBool last); /* after it was accepted; also once at the start */
 #define SB_NEWTON_ITERATIONS 100
@@ -83,17 +96,16 @@ PetscErrorCode SbRunFreeBody(SbRun run, PetscInt *body, size_t size, char motion
 /* Whether displacements are so many times the bodies' size that the matrix must have been singular. Collective. */
 PetscErrorCode SbRunTooFar(SbRun run, Vec X, PetscBool *far);
 
-/* How a step is solved, for the loop of contact. */
-typedef struct {
-  PetscErrorCode (*solve)(void *ctx, Vec U, SNESConvergedReason *reason); /* from the displacement in U */
-  PetscErrorCode (*residual)(void *ctx, Vec U, Vec R);                    /* without constraints, N */
-  void *ctx;
-} SbContactSolve;
+/* account.c: energies of the state at t and the account of the step of the length dt that ended there; `first` opens the account. Collective. */
+PetscErrorCode SbRunAccount(SbRun run, PetscReal t, PetscReal dt, PetscBool first);
+/* R <- the residual at t with the acceleration of the integrator, without constraints: reactions on prescribed unknowns; where it keeps none
+   (TSALPHA2), inertia is left out. Forces between bodies are taken out. Collective. */
+PetscErrorCode SbRunReactions(SbRun run, PetscReal t, Vec R);
+
 /*
-  SbRunSolveContact - a step from t to t + dt with contact: as many solves as its set of touching nodes takes, U from its guess to the
-  solution. Collective. U0 is the displacement at t. reason: that of the last solve, SNES_DIVERGED_MAX_IT when the set does not settle.
+  SbRunSolveContact - an attempt at a step with contact: as many solves as its set of touching nodes takes, U from its guess to the
+  solution. Collective. reason: that of the last solve, SNES_DIVERGED_MAX_IT when the set does not settle.
   With run->may_cut it ends after the first solve when points arrive within the step: reason is then SNES_CONVERGED_ITERATING, and the
   step is to be repeated with run->arrival of its length.
 */
-PetscErrorCode SbRunSolveContact(SbRun run, SNES snes, PetscReal t, PetscReal dt, Vec U0, Vec U,
-                                 const SbContactSolve *solve, SNESConvergedReason *reason);
+PetscErrorCode SbRunSolveContact(SbRun run, const SbAttempt *attempt, SNESConvergedReason *reason);

@@ -1,0 +1,105 @@
+/*
+  One step, dynamic or static, from its start to its acceptance. second_order.c and static.c say what a step's unknowns are and how long it is.
+
+    attempt: effects move, a first guess, Newton's method with the loop of contact around it, who looks at solutions, what is refused
+    accepted: effects keep their history, the account of energies is closed (account.c), monitors look
+*/
+#include <stdarg.h>
+#include "time_impl.h"
+
+PetscErrorCode SbRunFail(SbRun run, const char *format, ...)
+{
+  va_list args;
+
+  PetscFunctionBeginUser;
+  va_start(args, format);
+  PetscCall(PetscVSNPrintf(run->stop_reason, sizeof(run->stop_reason), format, NULL, args));
+  va_end(args);
+  PetscCall(PetscInfo(NULL, "%s\n", run->stop_reason));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbRunStepBegin(SbRun run, PetscReal t, PetscReal dt)
+{
+  SbModel m = run->model;
+
+  PetscFunctionBeginUser;
+  for (PetscInt e = 0; e < m->nprestep; e++) SbEffectCall(m->prestep[e], prestep, m->space, t, dt);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbRunAttempt(SbRun run, const SbAttempt *a, PetscBool *ok)
+{
+  SNESConvergedReason reason;
+  PetscBool again = PETSC_TRUE;
+
+  PetscFunctionBeginUser;
+  /* effects move to the end of the step */
+  PetscCall(SbRunStepBegin(run, a->t, a->dt));
+  for (int solves = 0; again; solves++) {
+    SbSolved step;
+
+    /* a first guess, and the solution from there; with contact, as often as finding out what touches takes */
+    PetscCall((*a->predict)(a->ctx));
+    if (run->model->ntouch)
+      PetscCall(SbRunSolveContact(run, a, &reason));
+    else
+      PetscCall((*a->solve)(a->ctx, a->U, &reason));
+
+    /* the state at the end, or why there is none */
+    PetscCall((*a->complete)(a->ctx, reason, &step, ok));
+
+    /* who looks at solutions may ask for a better one, the solver having been told what is wanted */
+    again = PETSC_FALSE;
+    if (*ok && run->look.fn && solves < SB_LOOKS)
+      PetscCall((*run->look.fn)(run, &step, run->look.ctx, &again));
+  }
+  /* tets that it would turn inside out */
+  PetscCall(SbRunRefuse(run, a->t, a->dt, (Vec[2]){a->U0, a->U}, ok));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode accept_effects(SbRun run, PetscInt step, PetscReal t, PetscReal dt)
+{
+  SbModel m = run->model;
+  SbStage stage = {.t = t, .dt = dt, .step = step, .shift_k = 1.};
+
+  PetscFunctionBeginUser;
+  if (!m->naccept) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(SbSpaceGetLocalRead(m->space, run->U, &stage.u));
+  if (run->V) PetscCall(SbSpaceGetLocalRead(m->space, run->V, &stage.v));
+  for (PetscInt e = 0; e < m->naccept; e++) SbEffectCall(m->accept[e], accept, m->space, &stage);
+  if (run->V) PetscCall(SbSpaceRestoreLocalRead(m->space, run->V, &stage.v));
+  PetscCall(SbSpaceRestoreLocalRead(m->space, run->U, &stage.u));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbRunStepAccepted(SbRun run, PetscInt step, PetscReal t, PetscReal dt, PetscBool last)
+{
+  const PetscBool first = (PetscBool)(step == run->step0);
+  SbStep now = {
+    .step = step, .t = t, .dt = dt, .t_end = run->t_end, .U = run->U, .V = run->V, .A = run->A, .last = last};
+
+  PetscFunctionBeginUser;
+  run->step_now = step;
+  run->t_now = t;
+  if (!first) PetscCall(accept_effects(run, step, t, dt));
+  if (run->want_energies)
+    PetscCall(SbRunAccount(run, t, dt, first));
+  else if (run->want_residual) {
+    if (!run->reaction) PetscCall(VecDuplicate(run->U, &run->reaction));
+    PetscCall(SbRunReactions(run, t, run->reaction));
+  }
+  now.R = run->reaction;
+  now.energies = run->energies;
+  now.step_end = run->fixed_step ? step + (PetscInt)PetscCeilReal((run->t_end - t) / run->dt - 1e-6) : -1;
+  now.newton = run->newton_step;
+  now.linear = run->linear_step;
+  now.rejected = run->rejected_step;
+  now.wall = MPI_Wtime() - run->wall_start;
+  run->newton_total += now.newton;
+  run->linear_total += now.linear;
+  run->steps_total += !first;
+  for (PetscInt k = 0; k < run->nmonitor; k++) PetscCall(run->monitor[k].fn(run, &now, run->monitor[k].ctx));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
