@@ -1,6 +1,6 @@
 /*
-  sbmesh.h - layer 1: bodies read from files or made as boxes, placed, checked, merged into one DMPlex, partitioned by
-  METIS with one layer of overlap, and held as plain arrays.
+  sbmesh.h - layer 1: bodies read from files or made as boxes, placed, checked, merged, partitioned with the help of METIS,
+  and held as plain arrays with one layer of overlap.
 */
 #pragma once
 #include "sbbase.h"
@@ -119,7 +119,7 @@ typedef struct {
 typedef struct _p_SbMesh *SbMesh;
 struct _p_SbMesh {
   MPI_Comm comm;
-  DM dm; /* DMPlex of cells and vertices, distributed with overlap 1; owned here */
+  PetscSF cell_sf; /* from owned cells to their ghost copies, as these arrays number them; NULL on one rank */
   PetscInt nbody;
   SbBody *body; /* [nbody] borrowed: the model owns the bodies */
   PetscInt nset;
@@ -142,8 +142,7 @@ struct _p_SbMesh {
     *cell_body; /* [ncell]; owned and ghost cells are each sorted by body, inclusion, lowest local vertex */
   PetscInt *
     cell_material; /* [ncell] number of the body, or the material of its first inclusion that holds the cell */
-  PetscInt *cell_point; /* [ncell] point of the DM */
-  uint64_t *cell_set;   /* [ncell] */
+  uint64_t *cell_set; /* [ncell] */
   uint64_t
     *face_set; /* [ncell][4] face f lies opposite vertex f: SB_ON_BOUNDARY, and SB_SET_BIT(k) when in set k */
 };

@@ -8,19 +8,18 @@
 #include "sbskin.h"
 
 static const SbOption rows[] = {
-  {"mesh_partitioner", SB_OPTION_CHOICE, 1, "", "metis", "metis|ptscotch|simple",
-   "who cuts the mesh into one part per rank"},
+  {"mesh_partitioner", SB_OPTION_CHOICE, 1, "", "auto", "auto|metis|bisection",
+   "how the mesh is cut into one part per rank: METIS (short borders, on rank 0), bisection (in parallel), "
+   "auto: METIS up to 50,000 tets"},
   {"mesh_report", SB_OPTION_BOOL, 1, "", "false", "",
    "print one line per body with the size, shape and groups of its mesh"},
 };
-static const char *const partitioners[] = {"metis", "ptscotch", "simple"}; /* in the order of the row */
 
 PetscErrorCode SbMeshRegister(void)
 {
   PetscFunctionBeginUser;
   PetscCall(SbOptionsRegister("", "", (PetscInt)PETSC_STATIC_ARRAY_LENGTH(rows), rows));
   PetscCall(SbTetRegister());
-  PetscCall(SbPartitionerRegister());
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -53,6 +52,11 @@ static PetscErrorCode create_whole(MPI_Comm comm, PetscInt nbody, SbBody body[],
   for (PetscInt b = 0; b < nbody; b++) body[b].given = given[b];
   PetscCall(PetscFree(given));
   PetscCallMPI(MPI_Bcast(set, (int)((size_t)nset * sizeof(*set)), MPI_BYTE, 0, comm));
+  whole->Nvert = whole->Ncell = 0;
+  for (PetscInt b = 0; b < nbody; b++) {
+    whole->Nvert += body[b].nvert;
+    whole->Ncell += body[b].ncell;
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -87,18 +91,15 @@ PetscErrorCode SbMeshCreate(MPI_Comm comm, PetscInt nbody, SbBody body[], PetscI
   SbMesh m;
   SbScope scope;
   SbWhole whole;
-  SbPoint *point;
+  SbPiece piece;
   PetscInt partitioner;
-  PetscBool full, has = PETSC_TRUE;
+  PetscBool full, all = PETSC_FALSE;
 
   PetscFunctionBeginUser;
   PetscCheck(nset <= SB_SET_MAX, comm, PETSC_ERR_USER_INPUT,
              "%" PetscInt_FMT " sets; a scenario may have up to %d", nset, SB_SET_MAX);
   PetscCall(SbScopeSet(&scope, "", "", ""));
   PetscCall(SbOptionChoice(&scope, "mesh_partitioner", &partitioner));
-  if (!strcmp(partitioners[partitioner], "ptscotch")) PetscCall(SbHasPackage("ptscotch", &has));
-  PetscCheck(has, comm, PETSC_ERR_USER_INPUT,
-             "-mesh_partitioner ptscotch: this PETSc was built without it; choose metis");
   PetscCall(SbOptionBool(&scope, "mesh_report", &full));
   PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_MESH_READ], 0, 0, 0, 0));
   PetscCall(create_whole(comm, nbody, body, nset, set, &whole));
@@ -111,9 +112,9 @@ PetscErrorCode SbMeshCreate(MPI_Comm comm, PetscInt nbody, SbBody body[], PetscI
   m->nset = nset;
   m->set = set;
   PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_MESH_DISTRIBUTE], 0, 0, 0, 0));
-  PetscCall(SbDistribute(comm, partitioners[partitioner], &whole, &m->dm, &point));
-  PetscCall(SbMeshNumber(m, point));
-  PetscCall(PetscFree(point));
+  for (PetscInt b = 0; b < nbody; b++) all = (PetscBool)(all || body[b].face_nodes);
+  PetscCall(SbDistribute(comm, (SbPartitioner)partitioner, all, &whole, &piece));
+  PetscCall(SbMeshNumber(m, &piece));
   PetscCall(PetscLogEventEnd(SbEvents[SB_EVENT_MESH_DISTRIBUTE], 0, 0, 0, 0));
   *mesh = m;
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -125,7 +126,7 @@ PetscErrorCode SbMeshDestroy(SbMesh *mesh)
 
   PetscFunctionBeginUser;
   if (!m) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(DMDestroy(&m->dm));
+  PetscCall(PetscSFDestroy(&m->cell_sf));
   PetscCall(PetscFree(m->gvert));
   PetscCall(PetscFree(m->vert_orig));
   PetscCall(PetscFree(m->vert_body));
@@ -134,7 +135,6 @@ PetscErrorCode SbMeshDestroy(SbMesh *mesh)
   PetscCall(PetscFree(m->cell));
   PetscCall(PetscFree(m->cell_orig));
   PetscCall(PetscFree2(m->cell_body, m->cell_material));
-  PetscCall(PetscFree(m->cell_point));
   PetscCall(PetscFree(m->cell_set));
   PetscCall(PetscFree(m->face_set));
   PetscCall(PetscFree(*mesh));

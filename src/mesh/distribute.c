@@ -1,97 +1,452 @@
 /*
-  distribute.c - from rank 0 to all: DMPlex of cells and vertices, partition, one layer of overlap, data of the points.
+  distribute.c - the whole, cut into parts: each rank gets its cells, their vertices, and copies of cells of other ranks (ghosts).
 
-  The DM is not interpolated (no faces, no edges): P1 needs none, and making them costs more than everything here. What
-  belongs to a cell or vertex travels in one broadcast over the composition of the two migrations. Coordinates are set
-  once, on the final DM. Rank 0 frees each part of what it has read when it is handed on.
+  Cells go straight to their owners, with their vertices; a vertex is written down once for each rank that it goes to. Which ranks have a vertex is
+  found by a directory: rank r keeps the list of the vertices with the original numbers of the r-th block. Vertices on the border of the same
+  ranks are sorted along the longest side of their box and shared out in equal runs: all ranks that have them decide alike, everybody owns about as many, and
+  the runs are compact, so that few cells have to be copied. Then each rank sends copies of its cells to the owners of their vertices.
 */
-#include <petscdmplex.h>
+#include <stdlib.h>
 #include "mesh_impl.h"
 
-/* Everything on rank 0. */
-static PetscErrorCode create_serial(MPI_Comm comm, SbWhole *w, DM *dm)
+/* ------------------------------------------------------------------ cells on their way */
+
+/* Cells with their vertices, and the owners of these where they are known. */
+typedef struct {
+  PetscBool owned; /* they are known; alike on all ranks, also on those without cells */
+  PetscInt ncell, nvert;
+  PetscInt *cell;       /* [ncell][4] places in vertex[] */
+  SbCellData *data;     /* [ncell] */
+  SbVertexData *vertex; /* [nvert] */
+  PetscMPIInt *owner;   /* [nvert] */
+} Cells;
+
+static PetscErrorCode cells_destroy(Cells *c)
 {
   PetscFunctionBeginUser;
-  PetscCall(DMCreate(comm, dm));
-  PetscCall(DMSetType(*dm, DMPLEX));
-  PetscCall(DMSetDimension(*dm, 3));
-  PetscCall(DMPlexBuildFromCellList(*dm, w->ncell, w->nvert, 4, w->cell));
-  PetscCall(PetscFree(w->cell));
+  PetscCall(PetscFree(c->cell));
+  PetscCall(PetscFree(c->data));
+  PetscCall(PetscFree(c->vertex));
+  PetscCall(PetscFree(c->owner));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Replaces the DM by its distributed version with overlap; sf leads from the points of the old one to those of the new. */
-static PetscErrorCode migrate(const char *type, SbWhole *w, DM *dm, PetscSF *sf)
+/* For each rank the vertices of the cells that go there, in the order of their first cell: at[n][4] is the place of a cell's vertices in the list of its rank. */
+static PetscErrorCode list_vertices(const Cells *from, const SbRoute *route, const PetscInt which[],
+                                    const PetscMPIInt dest[], PetscInt at[], PetscInt *nlist, PetscInt **list,
+                                    PetscMPIInt **to)
 {
-  PetscPartitioner part;
-  DM apart, overlapped;
-  PetscSF sf_apart, sf_overlap;
+  PetscInt *order, *place, *count, n = 0;
+  PetscMPIInt *mark;
 
   PetscFunctionBeginUser;
-  PetscCall(DMPlexGetPartitioner(*dm, &part));
-  PetscCall(PetscPartitionerSetType(part, type));
-  PetscCall(PetscPartitionerSetFromOptions(part));
-  PetscCall(SbPartitionerSetNeighbours(part, w->ncell, w->neighbour));
-  PetscCall(DMPlexSetPartitionBalance(*dm, PETSC_TRUE)); /* vertices between ranks go to both sides alike */
-  PetscCall(DMPlexDistribute(*dm, 0, &sf_apart, &apart));
-  PetscCall(DMDestroy(dm));
-  PetscCall(PetscFree(w->neighbour));
-  PetscCall(DMPlexDistributeOverlap(apart, 1, &sf_overlap, &overlapped));
-  PetscCall(DMDestroy(&apart));
-  PetscCall(PetscSFCompose(sf_apart, sf_overlap, sf));
-  PetscCall(PetscSFDestroy(&sf_apart));
-  PetscCall(PetscSFDestroy(&sf_overlap));
-  *dm = overlapped;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
+  PetscCall(PetscMalloc4(route->nsend, &order, from->nvert, &place, route->size, &count, from->nvert, &mark));
+  for (PetscInt i = 0; i < route->nsend; i++) order[route->place[i]] = i;
+  for (int pass = 0; pass < 2; pass++) {
+    for (PetscInt v = 0; v < from->nvert; v++) mark[v] = -1;
+    for (PetscMPIInt r = 0; r < route->size; r++) count[r] = 0;
+    n = 0;
+    for (PetscInt k = 0; k < route->nsend; k++) {
+      const PetscInt i = order[k], *v = from->cell + 4 * (size_t)(which ? which[i] : i);
 
-static PetscErrorCode send_points(PetscSF sf, const SbWhole *w, SbPoint point[])
-{
-  MPI_Datatype type;
-
-  PetscFunctionBeginUser;
-  PetscCallMPI(MPI_Type_contiguous((int)sizeof(SbPoint), MPI_BYTE, &type));
-  PetscCallMPI(MPI_Type_commit(&type));
-  PetscCall(PetscSFBcastBegin(sf, type, w->point, point, MPI_REPLACE));
-  PetscCall(PetscSFBcastEnd(sf, type, w->point, point, MPI_REPLACE));
-  PetscCallMPI(MPI_Type_free(&type));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode set_coordinates(DM dm, const SbPoint point[])
-{
-  PetscInt vStart, vEnd;
-  PetscReal *x;
-
-  PetscFunctionBeginUser;
-  PetscCall(DMPlexGetDepthStratum(dm, 0, &vStart, &vEnd));
-  PetscCall(PetscMalloc1(3 * (size_t)(vEnd - vStart), &x));
-  for (PetscInt v = vStart; v < vEnd; v++) {
-    for (int i = 0; i < 3; i++) x[3 * (v - vStart) + i] = point[v].u.x[i];
+      for (int a = 0; a < 4; a++) {
+        if (mark[v[a]] != dest[i]) {
+          mark[v[a]] = dest[i];
+          place[v[a]] = count[dest[i]]++;
+          if (pass) {
+            (*list)[n] = v[a];
+            (*to)[n] = dest[i];
+          }
+          n++;
+        }
+        at[4 * (size_t)i + a] = place[v[a]];
+      }
+    }
+    if (!pass) PetscCall(PetscMalloc2(n, list, n, to));
   }
-  PetscCall(DMPlexBuildCoordinatesFromCellList(dm, 3, x));
-  PetscCall(PetscFree(x));
+  *nlist = n;
+  PetscCall(PetscFree4(order, place, count, mark));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbDistribute(MPI_Comm comm, const char *partitioner, SbWhole *w, DM *dm, SbPoint **point)
+/* Sends the cells which[] (NULL: all) to ranks dest[], as the route says. */
+static PetscErrorCode send_cells(const Cells *from, const SbRoute *route, const PetscInt which[],
+                                 const PetscMPIInt dest[], Cells *to)
 {
-  PetscMPIInt size;
-  PetscInt npoint;
-  PetscSF sf = NULL;
+  PetscInt *at, *list, nlist;
+  PetscMPIInt *list_dest, *owner = NULL;
+  SbRoute vertices;
+  SbVertexData *vertex;
+  SbCellData *data = NULL;
 
   PetscFunctionBeginUser;
+  PetscCall(PetscMemzero(to, sizeof(*to)));
+  /* cells as places in the list of vertices of their rank */
+  PetscCall(PetscMalloc1(4 * (size_t)route->nsend, &at));
+  PetscCall(list_vertices(from, route, which, dest, at, &nlist, &list, &list_dest));
+  PetscCall(SbRouteCreate(route->comm, nlist, list_dest, &vertices));
+  PetscCall(SbRouteSend(route, 4 * sizeof(PetscInt), at, &to->cell));
+  PetscCall(PetscFree(at));
+  to->ncell = route->nrecv;
+  to->nvert = vertices.nrecv;
+  for (PetscMPIInt r = 0; r < route->size; r++) {
+    for (PetscInt i = 4 * route->rfirst[r]; i < 4 * (route->rfirst[r] + route->rcount[r]); i++)
+      to->cell[i] += vertices.rfirst[r];
+  }
+  /* what belongs to cells */
+  if (which) {
+    PetscCall(PetscMalloc1(route->nsend, &data));
+    for (PetscInt i = 0; i < route->nsend; i++) data[i] = from->data[which[i]];
+  }
+  PetscCall(SbRouteSend(route, sizeof(SbCellData), which ? data : from->data, &to->data));
+  PetscCall(PetscFree(data));
+  /* what belongs to vertices */
+  PetscCall(PetscMalloc1(nlist, &vertex));
+  for (PetscInt i = 0; i < nlist; i++) vertex[i] = from->vertex[list[i]];
+  PetscCall(SbRouteSend(&vertices, sizeof(SbVertexData), vertex, &to->vertex));
+  PetscCall(PetscFree(vertex));
+  if (from->owned) {
+    PetscCall(PetscMalloc1(nlist, &owner));
+    for (PetscInt i = 0; i < nlist; i++) owner[i] = from->owner[list[i]];
+    PetscCall(SbRouteSend(&vertices, sizeof(PetscMPIInt), owner, &to->owner));
+    PetscCall(PetscFree(owner));
+  }
+  PetscCall(SbRouteDestroy(&vertices));
+  PetscCall(PetscFree2(list, list_dest));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Places of numbers in ascending order: order[n]. */
+static PetscErrorCode ascending(PetscInt n, const PetscInt number[], PetscInt order[])
+{
+  PetscInt *key;
+  PetscBool sorted = PETSC_TRUE;
+
+  PetscFunctionBeginUser;
+  for (PetscInt i = 0; i < n; i++) order[i] = i;
+  for (PetscInt i = 1; i < n && sorted; i++) sorted = (PetscBool)(number[i] >= number[i - 1]);
+  if (sorted) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscMalloc1(n, &key));
+  PetscCall(PetscArraycpy(key, number, n));
+  PetscCall(PetscSortIntWithArray(n, key, order));
+  PetscCall(PetscFree(key));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Owned cells and their vertices by original number; a vertex that came from several ranks becomes one. */
+static PetscErrorCode keep_owned(Cells *c, SbPiece *piece)
+{
+  PetscInt *number, *order, *place, n = 0;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscMalloc3(PetscMax(c->nvert, c->ncell), &number, PetscMax(c->nvert, c->ncell), &order,
+                         c->nvert, &place));
+  for (PetscInt v = 0; v < c->nvert; v++) number[v] = c->vertex[v].orig;
+  PetscCall(ascending(c->nvert, number, order));
+  PetscCall(PetscMalloc1(c->nvert, &piece->vertex));
+  for (PetscInt i = 0; i < c->nvert; i++) {
+    const SbVertexData *v = &c->vertex[order[i]];
+
+    if (!n || piece->vertex[n - 1].orig != v->orig) piece->vertex[n++] = *v;
+    place[order[i]] = n - 1;
+  }
+  piece->nvert = piece->held = n;
+  PetscCall(PetscFree(c->vertex));
+  for (PetscInt k = 0; k < c->ncell; k++) number[k] = c->data[k].orig;
+  PetscCall(ascending(c->ncell, number, order));
+  PetscCall(PetscMalloc1(4 * (size_t)c->ncell, &piece->cell));
+  PetscCall(PetscMalloc1(c->ncell, &piece->data));
+  for (PetscInt k = 0; k < c->ncell; k++) {
+    piece->data[k] = c->data[order[k]];
+    for (int a = 0; a < 4; a++) piece->cell[4 * (size_t)k + a] = place[c->cell[4 * (size_t)order[k] + a]];
+  }
+  piece->ncell = piece->ncell_owned = c->ncell;
+  PetscCall(PetscFree3(number, order, place));
+  PetscCall(cells_destroy(c));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ vertices on several ranks */
+
+typedef struct {
+  PetscInt vert, orig, n;
+  const PetscInt *rank; /* [n] that have it, ascending; every second number of the list */
+  PetscReal along;
+} Shared;
+typedef struct {
+  PetscInt n;
+  Shared *vert;   /* [n] */
+  PetscInt *pair; /* {original number, rank} of all of them, ascending */
+} Border;
+
+/* Vertices that other ranks have, too, with these ranks: told by the directory. */
+static PetscErrorCode border_create(MPI_Comm comm, PetscInt Nvert, const SbPiece *piece, Border *border)
+{
+  const PetscInt n = piece->held;
+  PetscInt *orig, *got, *start, *holder, *pair, block, first, npair = 0;
+  PetscMPIInt *dest, *pair_dest, rank, size;
+  SbRoute there, back;
+
+  PetscFunctionBeginUser;
+  PetscCallMPI(MPI_Comm_rank(comm, &rank));
   PetscCallMPI(MPI_Comm_size(comm, &size));
-  PetscCall(create_serial(comm, w, dm));
-  if (size > 1) PetscCall(migrate(partitioner, w, dm, &sf));
-  PetscCall(DMPlexGetChart(*dm, NULL, &npoint));
-  PetscCall(PetscMalloc1(npoint, point));
-  if (sf)
-    PetscCall(send_points(sf, w, *point));
-  else
-    PetscCall(PetscArraycpy(*point, w->point, npoint));
-  PetscCall(PetscSFDestroy(&sf));
+  block = Nvert / size + 1;
+  first = rank * block;
+  PetscCall(PetscMalloc2(n, &orig, n, &dest));
+  for (PetscInt v = 0; v < n; v++) {
+    orig[v] = piece->vertex[v].orig;
+    dest[v] = (PetscMPIInt)(orig[v] / block);
+  }
+  PetscCall(SbRouteCreate(comm, n, dest, &there));
+  PetscCall(SbRouteSend(&there, sizeof(PetscInt), orig, &got));
+  PetscCall(PetscFree2(orig, dest));
+  /* ranks of each vertex of the block, ascending */
+  PetscCall(PetscCalloc1(block + 2, &start));
+  PetscCall(PetscMalloc1(there.nrecv, &holder));
+  for (PetscInt i = 0; i < there.nrecv; i++) start[got[i] - first + 2]++;
+  for (PetscInt v = 0; v < block; v++) start[v + 2] += start[v + 1];
+  for (PetscMPIInt r = 0; r < size; r++) {
+    for (PetscInt i = there.rfirst[r]; i < there.rfirst[r] + there.rcount[r]; i++)
+      holder[start[got[i] - first + 1]++] = r;
+  }
+  PetscCall(SbRouteDestroy(&there));
+  PetscCall(PetscFree(got));
+  /* each of them is told all of them */
+  for (PetscInt v = 0; v < block; v++) {
+    const PetscInt m = start[v + 1] - start[v];
+
+    npair += m > 1 ? m * m : 0;
+  }
+  PetscCall(PetscMalloc2(2 * (size_t)npair, &pair, npair, &pair_dest));
+  npair = 0;
+  for (PetscInt v = 0; v < block; v++) {
+    if (start[v + 1] - start[v] < 2) continue;
+    for (PetscInt i = start[v]; i < start[v + 1]; i++) {
+      for (PetscInt j = start[v]; j < start[v + 1]; j++) {
+        pair[2 * npair] = first + v;
+        pair[2 * npair + 1] = holder[j];
+        pair_dest[npair++] = (PetscMPIInt)holder[i];
+      }
+    }
+  }
+  PetscCall(PetscFree(start));
+  PetscCall(PetscFree(holder));
+  PetscCall(SbRouteCreate(comm, npair, pair_dest, &back));
+  PetscCall(SbRouteSend(&back, 2 * sizeof(PetscInt), pair, &border->pair));
+  PetscCall(PetscFree2(pair, pair_dest));
+  /* blocks follow each other: the numbers ascend */
+  border->n = 0;
+  for (PetscInt i = 0; i < back.nrecv; i++) border->n += !i || border->pair[2 * i] != border->pair[2 * i - 2];
+  PetscCall(PetscMalloc1(border->n, &border->vert));
+  for (PetscInt i = 0, k = -1, v = 0; i < back.nrecv; i++) {
+    if (i && border->pair[2 * i] == border->pair[2 * i - 2]) {
+      border->vert[k].n++;
+      continue;
+    }
+    while (piece->vertex[v].orig != border->pair[2 * i]) v++;
+    border->vert[++k] = (Shared){v, border->pair[2 * i], 1, border->pair + 2 * i + 1, 0};
+  }
+  PetscCall(SbRouteDestroy(&back));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode border_destroy(Border *border)
+{
+  PetscFunctionBeginUser;
+  PetscCall(PetscFree(border->vert));
+  PetscCall(PetscFree(border->pair));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static int compare_ranks(const void *a, const void *b)
+{
+  const Shared *p = (const Shared *)a, *q = (const Shared *)b;
+
+  if (p->n != q->n) return p->n < q->n ? -1 : 1;
+  for (PetscInt i = 0; i < p->n; i++)
+    if (p->rank[2 * i] != q->rank[2 * i]) return p->rank[2 * i] < q->rank[2 * i] ? -1 : 1;
+  return 0;
+}
+
+static int compare_shared(const void *a, const void *b)
+{
+  const Shared *p = (const Shared *)a, *q = (const Shared *)b;
+  const int ranks = compare_ranks(a, b);
+
+  if (ranks) return ranks;
+  if (p->along != q->along) return p->along < q->along ? -1 : 1;
+  return (p->orig > q->orig) - (p->orig < q->orig);
+}
+
+/* Vertices of the same ranks go to them in equal runs along the longest side of their box. */
+static PetscErrorCode choose_owners(const SbPiece *piece, Border *border, PetscMPIInt me, PetscMPIInt owner[])
+{
+  PetscInt n;
+
+  PetscFunctionBeginUser;
+  for (PetscInt v = 0; v < piece->held; v++) owner[v] = me;
+  qsort(border->vert, (size_t)border->n, sizeof(Shared), compare_shared);
+  for (PetscInt i = 0; i < border->n; i += n) {
+    Shared *s = border->vert + i;
+    PetscReal low[3], high[3];
+    int axis = 0;
+
+    for (n = 1; i + n < border->n && !compare_ranks(s, s + n);) n++;
+    for (int d = 0; d < 3; d++) {
+      low[d] = high[d] = piece->vertex[s[0].vert].x[d];
+      for (PetscInt k = 1; k < n; k++) {
+        low[d] = PetscMin(low[d], piece->vertex[s[k].vert].x[d]);
+        high[d] = PetscMax(high[d], piece->vertex[s[k].vert].x[d]);
+      }
+      if (high[d] - low[d] > high[axis] - low[axis]) axis = d;
+    }
+    for (PetscInt k = 0; k < n; k++) s[k].along = piece->vertex[s[k].vert].x[axis];
+    qsort(s, (size_t)n, sizeof(Shared), compare_shared);
+    for (PetscInt k = 0; k < n; k++)
+      owner[s[k].vert] = (PetscMPIInt)s[k].rank[2 * ((PetscInt64)k * s[k].n / n)];
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ ghosts */
+
+/* Which owned cells are copied to which ranks. */
+static PetscErrorCode list_copies(const SbPiece *piece, const Border *border, PetscBool all, PetscMPIInt me,
+                                  PetscMPIInt size, PetscInt *ncopy, PetscInt **copied, PetscMPIInt **dest)
+{
+  PetscInt *shared, *mark, n = 0;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscMalloc2(piece->held, &shared, size, &mark));
+  for (PetscInt v = 0; v < piece->held; v++) shared[v] = -1;
+  for (PetscInt i = 0; i < border->n; i++) shared[border->vert[i].vert] = i;
+  for (int pass = 0; pass < 2; pass++) {
+    for (PetscMPIInt r = 0; r < size; r++) mark[r] = -1;
+    n = 0;
+    for (PetscInt c = 0; c < piece->ncell_owned; c++) {
+      mark[me] = c;
+      for (int a = 0; a < 4; a++) {
+        const PetscInt v = piece->cell[4 * (size_t)c + a];
+        const Shared *s = shared[v] < 0 ? NULL : border->vert + shared[v];
+
+        for (PetscInt k = 0; s && k < (all ? s->n : 1); k++) {
+          const PetscMPIInt r = all ? (PetscMPIInt)s->rank[2 * k] : piece->owner[v];
+
+          if (mark[r] == c) continue;
+          mark[r] = c;
+          if (pass) {
+            (*copied)[n] = c;
+            (*dest)[n] = r;
+          }
+          n++;
+        }
+      }
+    }
+    if (!pass) {
+      PetscCall(PetscMalloc1(n, copied));
+      PetscCall(PetscMalloc1(n, dest));
+    }
+  }
+  *ncopy = n;
+  PetscCall(PetscFree2(shared, mark));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Appends the ghosts and those of their vertices that are new here. */
+static PetscErrorCode append_ghosts(const Cells *g, SbPiece *piece)
+{
+  PetscInt *orig, *number, *order, *place, n = piece->nvert;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscMalloc4(piece->held, &orig, g->nvert, &number, g->nvert, &order, g->nvert, &place));
+  for (PetscInt v = 0; v < piece->held; v++) orig[v] = piece->vertex[v].orig;
+  for (PetscInt v = 0; v < g->nvert; v++) number[v] = g->vertex[v].orig;
+  PetscCall(ascending(g->nvert, number, order));
+  PetscCall(PetscRealloc((size_t)(n + g->nvert) * sizeof(SbVertexData), &piece->vertex));
+  PetscCall(PetscRealloc((size_t)(n + g->nvert) * sizeof(PetscMPIInt), &piece->owner));
+  for (PetscInt i = 0; i < g->nvert; i++) {
+    const PetscInt v = order[i];
+
+    PetscCall(PetscFindInt(number[v], piece->held, orig, &place[v]));
+    if (place[v] >= 0) continue;
+    if (n == piece->held || piece->vertex[n - 1].orig != number[v]) {
+      piece->vertex[n] = g->vertex[v];
+      piece->owner[n++] = g->owner[v];
+    }
+    place[v] = n - 1;
+  }
+  piece->nvert = n;
+  n = piece->ncell;
+  piece->ncell += g->ncell;
+  PetscCall(PetscRealloc(4 * (size_t)piece->ncell * sizeof(PetscInt), &piece->cell));
+  PetscCall(PetscRealloc((size_t)piece->ncell * sizeof(SbCellData), &piece->data));
+  PetscCall(PetscArraycpy(piece->data + n, g->data, g->ncell));
+  for (PetscInt i = 0; i < 4 * g->ncell; i++) piece->cell[4 * (size_t)n + i] = place[g->cell[i]];
+  PetscCall(PetscFree4(orig, number, order, place));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode add_ghosts(MPI_Comm comm, PetscInt Nvert, PetscBool all, SbPiece *piece)
+{
+  PetscMPIInt rank, size, *dest;
+  PetscInt n = 0;
+  Border border;
+  Cells own, ghost;
+
+  PetscFunctionBeginUser;
+  PetscCallMPI(MPI_Comm_rank(comm, &rank));
+  PetscCallMPI(MPI_Comm_size(comm, &size));
+  PetscCall(border_create(comm, Nvert, piece, &border));
+  PetscCall(choose_owners(piece, &border, rank, piece->owner));
+  PetscCall(list_copies(piece, &border, all, rank, size, &n, &piece->copied, &dest));
+  PetscCall(border_destroy(&border));
+  PetscCall(SbRouteCreate(comm, n, dest, &piece->ghost));
+  own =
+    (Cells){PETSC_TRUE, piece->ncell, piece->nvert, piece->cell, piece->data, piece->vertex, piece->owner};
+  PetscCall(send_cells(&own, &piece->ghost, piece->copied, dest, &ghost));
+  PetscCall(PetscFree(dest));
+  PetscCall(append_ghosts(&ghost, piece));
+  PetscCall(cells_destroy(&ghost));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ all of it */
+
+PetscErrorCode SbDistribute(MPI_Comm comm, SbPartitioner type, PetscBool all, SbWhole *w, SbPiece *piece)
+{
+  const PetscInt Nvert = w->Nvert;
+  PetscMPIInt size, *part;
+  SbRoute route;
+  Cells from, owned;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscMemzero(piece, sizeof(*piece)));
+  PetscCallMPI(MPI_Comm_size(comm, &size));
+  from = (Cells){PETSC_FALSE, w->ncell, w->nvert, w->cell, w->data, w->vertex, NULL};
+  if (size == 1) {
+    w->cell = NULL;
+    w->data = NULL;
+    w->vertex = NULL;
+    *piece = (SbPiece){.ncell_owned = from.ncell,
+                       .ncell = from.ncell,
+                       .nvert = from.nvert,
+                       .held = from.nvert,
+                       .cell = from.cell,
+                       .data = from.data,
+                       .vertex = from.vertex};
+  } else {
+    PetscCall(PetscMalloc1(w->ncell, &part));
+    PetscCall(SbPartition(comm, type, w, part));
+    PetscCall(PetscFree(w->neighbour));
+    PetscCall(PetscFree(w->remote));
+    PetscCall(SbRouteCreate(comm, w->ncell, part, &route));
+    PetscCall(send_cells(&from, &route, NULL, part, &owned));
+    PetscCall(SbRouteDestroy(&route));
+    PetscCall(PetscFree(part));
+  }
   PetscCall(SbWholeDestroy(w));
-  PetscCall(set_coordinates(*dm, *point));
+  if (size > 1) PetscCall(keep_owned(&owned, piece));
+  PetscCall(PetscCalloc1(piece->nvert, &piece->owner));
+  if (size > 1) PetscCall(add_ghosts(comm, Nvert, all, piece));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -1,9 +1,10 @@
 /*
   mesh_impl.h - what the files of src/mesh/ share: edges and shapes of a body, its sets, all bodies in one piece.
 
-  Everything here lives on rank 0 until distribute.c hands the pieces to their ranks.
+  A body lives on rank 0 until distribute.c hands the pieces to their ranks.
 */
 #pragma once
+#include <petscsf.h>
 #include "sbtet.h"
 
 /* given.c: the mesh that a body has in memory. */
@@ -50,36 +51,82 @@ PetscErrorCode SbGivenMark(const SbBody *body, const SbFaces *faces, SbMasks *ma
 PetscErrorCode SbSetsCheck(PetscInt nbody, const SbBody body[], const SbImport import[], PetscInt nset,
                            const SbSet set[]);
 
-/* ------------------------------------------------------------------ whole.c, distribute.c, order.c, number.c: from rank 0 to all */
+/* ------------------------------------------------------------------ route.c: records to other ranks, and answers back */
 
-/* What travels with a point of the DMPlex. */
+typedef struct {
+  MPI_Comm comm;
+  PetscInt nsend, nrecv;
+  PetscInt *place; /* [nsend] of a record among those that leave, by rank */
+  PetscMPIInt size, *scount, *sfirst, *rcount,
+    *rfirst; /* [size] records to and from each rank, and the first of them */
+} SbRoute;
+
+/* Prepares n records to go to ranks dest[n]; their order among those for one rank stays. Collective. */
+PetscErrorCode SbRouteCreate(MPI_Comm comm, PetscInt n, const PetscMPIInt dest[], SbRoute *route);
+PetscErrorCode SbRouteDestroy(SbRoute *route);
+/* Sends records of `unit` bytes, record[nsend]; received[nrecv] by rank, PetscFree(). Collective. */
+PetscErrorCode SbRouteSend(const SbRoute *route, size_t unit, const void *record, void *received);
+/* Brings answer[nrecv] back to who sent the records: result[nsend], room of the caller. Collective. */
+PetscErrorCode SbRouteReply(const SbRoute *route, size_t unit, const void *answer, void *result);
+/* The rank that sent record i of those received. */
+PetscMPIInt SbRouteSource(const SbRoute *route, PetscInt i);
+
+/* ------------------------------------------------------------------ whole.c, partition.c, distribute.c, order.c, number.c */
+
+/* What travels with a vertex and with a cell. */
 typedef struct {
   PetscInt orig, body;
   uint64_t set;
-  union {
-    PetscReal x[3];   /* of a vertex */
-    uint64_t face[4]; /* of a cell */
-  } u;
-} SbPoint;
-
-/* All bodies in one piece; on ranks other than 0 it is empty. */
+  PetscReal x[3];
+} SbVertexData;
 typedef struct {
+  PetscInt orig, body;
+  uint64_t set, face[4];
+} SbCellData;
+
+/*
+  All bodies in one piece, before it is cut into parts: some cells on each rank, with all their vertices. A vertex of cells on several ranks is on each of
+  them with the same data.
+*/
+typedef struct {
+  PetscInt Nvert, Ncell; /* on all ranks together */
   PetscInt nvert, ncell;
-  PetscInt *cell;      /* [ncell][4] */
-  PetscInt *neighbour; /* [ncell][4] cell across the face, -1 on the boundary */
-  SbPoint *point;      /* [ncell + nvert] cells, then vertices */
+  SbVertexData *vertex; /* [nvert] ascending original numbers */
+  PetscInt *cell;       /* [ncell][4] places in vertex[] */
+  SbCellData *data;     /* [ncell] */
+  PetscInt *
+    neighbour; /* [ncell][4] cell across the face, -1 on the boundary, ncell + k: the cell remote[k] of another rank */
+  PetscInt nremote;
+  PetscSFNode *remote; /* [nremote] */
 } SbWhole;
 
 /* Rank 0: reads, checks and merges all bodies, fills their "found" fields and those of the sets. */
 PetscErrorCode SbWholeCreate(PetscInt nbody, SbBody body[], PetscInt nset, SbSet set[], SbWhole *whole);
 PetscErrorCode SbWholeDestroy(SbWhole *whole);
 
-/* DMPlex of cells and vertices, distributed with one layer of overlap; point[] of every local point. Destroys the whole. Collective. */
-PetscErrorCode SbDistribute(MPI_Comm comm, const char *partitioner, SbWhole *whole, DM *dm, SbPoint **point);
-/* Hands the neighbours of all cells (on rank 0) to a partitioner of type metis, which then needs no graph from PETSc. */
-PetscErrorCode SbPartitionerSetNeighbours(PetscPartitioner part, PetscInt ncell, const PetscInt neighbour[]);
-PetscErrorCode SbPartitionerRegister(void);
+typedef enum {
+  SB_PARTITION_AUTO, /* METIS for small meshes, bisection for others */
+  SB_PARTITION_METIS,
+  SB_PARTITION_BISECTION
+} SbPartitioner;
+/* The rank that will own each cell: part[ncell]. Collective. */
+PetscErrorCode SbPartition(MPI_Comm comm, SbPartitioner type, const SbWhole *whole, PetscMPIInt part[]);
+
+/* What a rank has of the mesh before it is numbered: owned cells by original number, then ghost ones; vertices of owned cells by original number, then the others. */
+typedef struct {
+  PetscInt ncell_owned, ncell, nvert;
+  PetscInt *cell;       /* [ncell][4] places in vertex[] */
+  SbCellData *data;     /* [ncell] */
+  SbVertexData *vertex; /* [nvert] */
+  PetscMPIInt *owner;   /* [nvert] */
+  SbRoute ghost;        /* copies of owned cells to other ranks, on several ranks */
+  PetscInt *copied;     /* [ghost.nsend] the cell that is copied */
+  PetscInt held;        /* vertices of owned cells */
+} SbPiece;
+
+/* Hands the whole out to the ranks and destroys it. `all`: ghosts are all cells that share a vertex with an owned cell, else those with an owned vertex. Collective. */
+PetscErrorCode SbDistribute(MPI_Comm comm, SbPartitioner type, PetscBool all, SbWhole *whole, SbPiece *piece);
+/* Own local numbering: fills the arrays and counts of the mesh and destroys the piece. Collective. */
+PetscErrorCode SbMeshNumber(SbMesh mesh, SbPiece *piece);
 /* Reverse Cuthill-McKee order: order[i] is the vertex that gets number i. A cell's vertex may be -1: it takes no part. */
 PetscErrorCode SbOrderRCM(PetscInt nvert, PetscInt ncell, const PetscInt cell[], PetscInt order[]);
-/* Own local numbering: fills the arrays and counts of the mesh from its DM. Collective. */
-PetscErrorCode SbMeshNumber(SbMesh mesh, const SbPoint point[]);

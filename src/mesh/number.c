@@ -1,138 +1,91 @@
 /*
-  number.c - own local numbering of what DMPlex brought to this rank.
+  number.c - own local numbering of what has come to this rank.
 
   Vertices: owned ones first, in reverse Cuthill-McKee order, then ghosts by global number. The owned ones of all ranks,
   one rank after the other, are the global numbers. Cells: owned ones first, then ghosts; both sorted by body and inclusion, then by
   lowest local vertex, so that a loop over cells walks through the vertices.
-
-  Overlap 1 brings every cell that touches a cell of this rank. Where all nodes are vertices, a ghost cell that touches no
-  owned vertex adds to no row of this rank and is left out here, with its vertices; the DM keeps it.
 */
-#include <petscdmplex.h>
 #include "mesh_impl.h"
 
-/* The local part of the DM and the way to the own numbers. */
+/* The piece and the way to the own numbers. */
 typedef struct {
-  const SbPoint *point; /* [npoint] data of each point */
-  PetscInt cStart, cEnd, vStart, vEnd, npoint;
-  PetscInt ncell, nvert; /* in the DM */
-  PetscSF sf;            /* points that others own; NULL on one rank */
-  PetscBool *ghost;      /* [npoint] */
-  PetscInt *cone;        /* [ncell][4] DM vertices from 0 on */
-  PetscInt *global;      /* [npoint] global number of a vertex */
-  PetscInt *local;       /* [nvert] own number of a DM vertex, -1: not needed */
-  PetscBool *kept;       /* [ncell] */
+  const SbPiece *p;
+  PetscMPIInt rank, size;
+  PetscInt *local;  /* [nvert] own number of a vertex of the piece */
+  PetscInt *global; /* [nvert] */
 } Work;
-
-static PetscErrorCode work_create(DM dm, const SbPoint point[], Work *w)
-{
-  PetscMPIInt size;
-  const PetscInt *leaf;
-  PetscInt nleaf;
-
-  PetscFunctionBeginUser;
-  PetscCall(PetscMemzero(w, sizeof(*w)));
-  w->point = point;
-  PetscCall(DMPlexGetHeightStratum(dm, 0, &w->cStart, &w->cEnd));
-  PetscCall(DMPlexGetDepthStratum(dm, 0, &w->vStart, &w->vEnd));
-  PetscCall(DMPlexGetChart(dm, NULL, &w->npoint));
-  w->ncell = w->cEnd - w->cStart;
-  w->nvert = w->vEnd - w->vStart;
-  PetscCall(PetscCalloc5(w->npoint, &w->ghost, 4 * w->ncell, &w->cone, w->npoint, &w->global, w->nvert,
-                         &w->local, w->ncell, &w->kept));
-  for (PetscInt c = 0; c < w->ncell; c++) {
-    const PetscInt *cone;
-
-    PetscCall(DMPlexGetCone(dm, w->cStart + c, &cone));
-    for (int a = 0; a < 4; a++) w->cone[4 * c + a] = cone[a] - w->vStart;
-  }
-  PetscCallMPI(MPI_Comm_size(PetscObjectComm((PetscObject)dm), &size));
-  if (size == 1) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(DMGetPointSF(dm, &w->sf));
-  PetscCall(PetscSFGetGraph(w->sf, NULL, &nleaf, &leaf, NULL));
-  for (PetscInt i = 0; i < nleaf; i++) w->ghost[leaf ? leaf[i] : i] = PETSC_TRUE;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode work_destroy(Work *w)
-{
-  PetscFunctionBeginUser;
-  PetscCall(PetscFree5(w->ghost, w->cone, w->global, w->local, w->kept));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
 
 /* ------------------------------------------------------------------ vertices */
 
-/* Own numbers of owned vertices. */
+/* Own numbers of owned vertices; global numbers of them. */
 static PetscErrorCode number_owned(Work *w, SbMesh mesh)
 {
-  PetscInt *compact, *back, *cell, *order, n = 0;
+  const SbPiece *p = w->p;
+  PetscInt *compact, *back, *cell, *order, n = 0, mine[2], sum[2] = {0, 0};
 
   PetscFunctionBeginUser;
-  PetscCall(PetscMalloc4(w->nvert, &compact, w->nvert, &back, 4 * w->ncell, &cell, w->nvert, &order));
-  for (PetscInt v = 0; v < w->nvert; v++) {
+  PetscCall(PetscMalloc4(p->nvert, &compact, p->nvert, &back, 4 * (size_t)p->ncell, &cell, p->nvert, &order));
+  for (PetscInt v = 0; v < p->nvert; v++) {
     compact[v] = -1;
-    if (w->ghost[w->vStart + v]) continue;
+    if (p->owner[v] != w->rank) continue;
     back[n] = v;
     compact[v] = n++;
   }
-  for (PetscInt i = 0; i < 4 * w->ncell; i++) cell[i] = compact[w->cone[i]];
-  PetscCall(SbOrderRCM(n, w->ncell, cell, order));
-  for (PetscInt v = 0; v < w->nvert; v++) w->local[v] = -1;
+  for (PetscInt i = 0; i < 4 * p->ncell; i++) cell[i] = compact[p->cell[i]];
+  PetscCall(SbOrderRCM(n, p->ncell, cell, order));
   for (PetscInt i = 0; i < n; i++) w->local[back[order[i]]] = i;
   PetscCall(PetscFree4(compact, back, cell, order));
   mesh->nvert_owned = n;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Global numbers of all local vertices. */
-static PetscErrorCode number_globally(Work *w, SbMesh mesh)
-{
-  PetscInt mine[2] = {mesh->nvert_owned, 0}, sum[2] = {0, 0};
-
-  PetscFunctionBeginUser;
-  for (PetscInt c = 0; c < w->ncell; c++) mine[1] += !w->ghost[w->cStart + c];
-  mesh->ncell_owned = mine[1];
+  mesh->nvert = p->nvert;
+  mesh->ncell_owned = p->ncell_owned;
+  mesh->ncell = p->ncell;
+  mine[0] = n;
+  mine[1] = p->ncell_owned;
   PetscCallMPI(MPI_Scan(mine, sum, 1, MPIU_INT, MPI_SUM, mesh->comm));
-  mesh->gvert_start = sum[0] - mine[0];
+  mesh->gvert_start = sum[0] - n;
   PetscCallMPI(MPI_Allreduce(mine, sum, 2, MPIU_INT, MPI_SUM, mesh->comm));
   mesh->Nvert = sum[0];
   mesh->Ncell = sum[1];
-  for (PetscInt v = 0; v < w->nvert; v++) w->global[w->vStart + v] = mesh->gvert_start + w->local[v];
-  if (w->sf) {
-    PetscCall(PetscSFBcastBegin(w->sf, MPIU_INT, w->global, w->global, MPI_REPLACE));
-    PetscCall(PetscSFBcastEnd(w->sf, MPIU_INT, w->global, w->global, MPI_REPLACE));
-  }
+  for (PetscInt v = 0; v < p->nvert; v++)
+    if (p->owner[v] == w->rank) w->global[v] = mesh->gvert_start + w->local[v];
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Keeps cells that are owned or touch an owned vertex, all with face nodes; ghost vertices of these get own numbers. */
+/* Ghosts: their owners know them by their original numbers. */
 static PetscErrorCode number_ghosts(Work *w, SbMesh mesh)
 {
-  PetscInt *ghost, *key, n = 0;
-  PetscBool all = PETSC_FALSE;
+  const SbPiece *p = w->p;
+  PetscInt *ghost, *key, *orig, *got, n = 0;
+  PetscMPIInt *dest;
+  SbRoute route;
 
   PetscFunctionBeginUser;
-  for (PetscInt b = 0; b < mesh->nbody; b++) all = (PetscBool)(all || mesh->body[b].face_nodes);
-  mesh->ncell = 0;
-  PetscCall(PetscMalloc2(w->nvert, &ghost, w->nvert, &key));
-  for (PetscInt c = 0; c < w->ncell; c++) {
-    const PetscInt *v = w->cone + 4 * c;
-
-    w->kept[c] = (PetscBool)(all || !w->ghost[w->cStart + c]);
-    for (int a = 0; a < 4; a++) w->kept[c] = (PetscBool)(w->kept[c] || !w->ghost[w->vStart + v[a]]);
-    mesh->ncell += w->kept[c];
-    for (int a = 0; w->kept[c] && a < 4; a++) {
-      if (w->local[v[a]] != -1) continue;
-      w->local[v[a]] = -2; /* needed, number to come */
-      key[n] = w->global[w->vStart + v[a]];
-      ghost[n++] = v[a];
-    }
+  if (w->size == 1) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscMalloc4(p->nvert, &ghost, p->nvert, &key, p->held, &orig, p->nvert, &dest));
+  for (PetscInt v = 0; v < p->nvert; v++) {
+    if (p->owner[v] == w->rank) continue;
+    ghost[n] = v;
+    key[n] = p->vertex[v].orig;
+    dest[n++] = p->owner[v];
   }
+  for (PetscInt v = 0; v < p->held; v++) orig[v] = p->vertex[v].orig;
+  PetscCall(SbRouteCreate(mesh->comm, n, dest, &route));
+  PetscCall(SbRouteSend(&route, sizeof(PetscInt), key, &got));
+  for (PetscInt i = 0; i < route.nrecv; i++) {
+    PetscInt v;
+
+    PetscCall(PetscFindInt(got[i], p->held, orig, &v));
+    PetscCheck(v >= 0 && p->owner[v] == w->rank, PETSC_COMM_SELF, PETSC_ERR_PLIB,
+               "Vertex %" PetscInt_FMT " is not owned here", got[i]);
+    got[i] = w->global[v];
+  }
+  PetscCall(SbRouteReply(&route, sizeof(PetscInt), got, key));
+  PetscCall(PetscFree(got));
+  PetscCall(SbRouteDestroy(&route));
+  for (PetscInt i = 0; i < n; i++) w->global[ghost[i]] = key[i];
   PetscCall(PetscSortIntWithArray(n, key, ghost));
   for (PetscInt i = 0; i < n; i++) w->local[ghost[i]] = mesh->nvert_owned + i;
-  PetscCall(PetscFree2(ghost, key));
-  mesh->nvert = mesh->nvert_owned + n;
+  PetscCall(PetscFree4(ghost, key, orig, dest));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -144,16 +97,15 @@ static PetscErrorCode fill_vertices(const Work *w, SbMesh mesh)
   PetscCall(PetscMalloc1(mesh->nvert, &mesh->vert_body));
   PetscCall(PetscMalloc1(mesh->nvert, &mesh->vert_set));
   PetscCall(PetscMalloc1(3 * (size_t)mesh->nvert, &mesh->x));
-  for (PetscInt v = 0; v < w->nvert; v++) {
-    const SbPoint *p = &w->point[w->vStart + v];
+  for (PetscInt v = 0; v < mesh->nvert; v++) {
+    const SbVertexData *p = &w->p->vertex[v];
     const PetscInt l = w->local[v];
 
-    if (l < 0) continue;
-    mesh->gvert[l] = w->global[w->vStart + v];
+    mesh->gvert[l] = w->global[v];
     mesh->vert_orig[l] = p->orig;
     mesh->vert_body[l] = p->body;
     mesh->vert_set[l] = p->set;
-    for (int i = 0; i < 3; i++) mesh->x[3 * l + i] = p->u.x[i];
+    for (int i = 0; i < 3; i++) mesh->x[3 * l + i] = p->x[i];
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -176,7 +128,7 @@ static PetscErrorCode sort_by_key(PetscInt n, const PetscInt from[], PetscInt nk
 }
 
 /* The inclusion of its body that a cell belongs to: 0 for the bulk, else one more than its place in the list. */
-static PetscInt inclusion_of(SbMesh mesh, const SbPoint *cell)
+static PetscInt inclusion_of(SbMesh mesh, const SbCellData *cell)
 {
   const SbBody *body = &mesh->body[cell->body];
 
@@ -186,29 +138,57 @@ static PetscInt inclusion_of(SbMesh mesh, const SbPoint *cell)
   return 0;
 }
 
-/* The kept DM cells in the order of their own numbers. */
+/* The cells of the piece in the order of their own numbers. */
 static PetscErrorCode order_cells(const Work *w, SbMesh mesh, PetscInt order[])
 {
-  PetscInt *key, *some, n = 0;
+  const SbPiece *p = w->p;
+  PetscInt *key, *all, *some;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscMalloc2(w->ncell, &key, mesh->ncell, &some));
-  for (PetscInt c = 0; c < w->ncell; c++) {
-    const PetscInt *v = w->cone + 4 * c;
+  PetscCall(PetscMalloc3(p->ncell, &key, p->ncell, &all, p->ncell, &some));
+  for (PetscInt c = 0; c < p->ncell; c++) {
+    const PetscInt *v = p->cell + 4 * (size_t)c;
 
-    if (!w->kept[c]) continue;
     key[c] = PetscMin(PetscMin(w->local[v[0]], w->local[v[1]]), PetscMin(w->local[v[2]], w->local[v[3]]));
-    order[n++] = c;
+    all[c] = c;
   }
-  PetscCall(sort_by_key(n, order, mesh->nvert, key, some));
-  for (PetscInt c = 0; c < w->ncell; c++) {
-    const SbPoint *p = &w->point[w->cStart + c];
+  PetscCall(sort_by_key(p->ncell, all, mesh->nvert, key, some));
+  for (PetscInt c = 0; c < p->ncell; c++)
+    key[c] = (SB_INCLUSION_MAX + 1) * (p->data[c].body + (c < p->ncell_owned ? 0 : mesh->nbody)) +
+             inclusion_of(mesh, &p->data[c]);
+  PetscCall(sort_by_key(p->ncell, some, 2 * (SB_INCLUSION_MAX + 1) * mesh->nbody, key, order));
+  PetscCall(PetscFree3(key, all, some));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
 
-    key[c] = (SB_INCLUSION_MAX + 1) * (p->body + (w->ghost[w->cStart + c] ? mesh->nbody : 0)) +
-             inclusion_of(mesh, p);
+/* From owned cells to their copies on other ranks. */
+static PetscErrorCode link_cells(const Work *w, SbMesh mesh, const PetscInt order[])
+{
+  const SbPiece *p = w->p;
+  const PetscInt nghost = p->ncell - p->ncell_owned;
+  PetscInt *number, *sent, *got, *leaf;
+  PetscSFNode *remote;
+
+  PetscFunctionBeginUser;
+  if (w->size == 1) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscMalloc2(p->ncell, &number, p->ghost.nsend, &sent));
+  for (PetscInt c = 0; c < p->ncell; c++) number[order[c]] = c;
+  for (PetscInt i = 0; i < p->ghost.nsend; i++) sent[i] = number[p->copied[i]];
+  PetscCall(SbRouteSend(&p->ghost, sizeof(PetscInt), sent, &got));
+  PetscCall(PetscMalloc1(nghost, &leaf));
+  PetscCall(PetscMalloc1(nghost, &remote));
+  for (PetscInt g = 0; g < nghost; g++) {
+    const PetscInt came = order[p->ncell_owned + g] - p->ncell_owned; /* as which of the ghosts */
+
+    leaf[g] = p->ncell_owned + g;
+    remote[g].rank = SbRouteSource(&p->ghost, came);
+    remote[g].index = got[came];
   }
-  PetscCall(sort_by_key(n, some, 2 * (SB_INCLUSION_MAX + 1) * mesh->nbody, key, order));
-  PetscCall(PetscFree2(key, some));
+  PetscCall(PetscSFCreate(mesh->comm, &mesh->cell_sf));
+  PetscCall(PetscSFSetGraph(mesh->cell_sf, p->ncell_owned, nghost, leaf, PETSC_OWN_POINTER, remote,
+                            PETSC_OWN_POINTER));
+  PetscCall(PetscFree(got));
+  PetscCall(PetscFree2(number, sent));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -219,41 +199,47 @@ static PetscErrorCode fill_cells(const Work *w, SbMesh mesh)
   PetscFunctionBeginUser;
   PetscCall(PetscMalloc1(mesh->ncell, &order));
   PetscCall(order_cells(w, mesh, order));
+  PetscCall(link_cells(w, mesh, order));
   PetscCall(PetscMalloc1(4 * (size_t)mesh->ncell, &mesh->cell));
   PetscCall(PetscMalloc1(mesh->ncell, &mesh->cell_orig));
   PetscCall(PetscMalloc2(mesh->ncell, &mesh->cell_body, mesh->ncell, &mesh->cell_material));
-  PetscCall(PetscMalloc1(mesh->ncell, &mesh->cell_point));
   PetscCall(PetscMalloc1(mesh->ncell, &mesh->cell_set));
   PetscCall(PetscMalloc1(4 * (size_t)mesh->ncell, &mesh->face_set));
   for (PetscInt c = 0; c < mesh->ncell; c++) {
-    const SbPoint *p = &w->point[w->cStart + order[c]];
+    const SbCellData *p = &w->p->data[order[c]];
     const PetscInt inclusion = inclusion_of(mesh, p);
 
-    mesh->cell_point[c] = w->cStart + order[c];
     mesh->cell_orig[c] = p->orig;
     mesh->cell_body[c] = p->body;
     mesh->cell_material[c] = inclusion ? mesh->body[p->body].inclusion[inclusion - 1].material : p->body;
     mesh->cell_set[c] = p->set;
     for (int a = 0; a < 4; a++) {
-      mesh->cell[4 * c + a] = w->local[w->cone[4 * order[c] + a]];
-      mesh->face_set[4 * c + a] = p->u.face[a];
+      mesh->cell[4 * (size_t)c + a] = w->local[w->p->cell[4 * (size_t)order[c] + a]];
+      mesh->face_set[4 * (size_t)c + a] = p->face[a];
     }
   }
   PetscCall(PetscFree(order));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbMeshNumber(SbMesh mesh, const SbPoint point[])
+PetscErrorCode SbMeshNumber(SbMesh mesh, SbPiece *piece)
 {
-  Work w;
+  Work w = {.p = piece};
 
   PetscFunctionBeginUser;
-  PetscCall(work_create(mesh->dm, point, &w));
+  PetscCallMPI(MPI_Comm_rank(mesh->comm, &w.rank));
+  PetscCallMPI(MPI_Comm_size(mesh->comm, &w.size));
+  PetscCall(PetscMalloc2(piece->nvert, &w.local, piece->nvert, &w.global));
   PetscCall(number_owned(&w, mesh));
-  PetscCall(number_globally(&w, mesh));
   PetscCall(number_ghosts(&w, mesh));
   PetscCall(fill_vertices(&w, mesh));
+  PetscCall(PetscFree(piece->vertex));
   PetscCall(fill_cells(&w, mesh));
-  PetscCall(work_destroy(&w));
+  PetscCall(PetscFree2(w.local, w.global));
+  PetscCall(PetscFree(piece->cell));
+  PetscCall(PetscFree(piece->data));
+  PetscCall(PetscFree(piece->owner));
+  PetscCall(PetscFree(piece->copied));
+  if (w.size > 1) PetscCall(SbRouteDestroy(&piece->ghost));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -1,151 +1,294 @@
 /*
-  partition.c - METIS as a PetscPartitioner: k-way partition of the graph of cells that share a face.
+  partition.c - which rank owns which tet.
 
-  Debian's PETSc knows no METIS, so the type `metis` is registered here. The whole graph is on one rank. A mesh that
-  knows its neighbours hands them over and saves PETSc the search for them: 2.8 s for 200,000 tets, ten times what all the
-  rest of the distribution takes.
-  Reference: Karypis and Kumar, "A fast and high quality multilevel scheme for partitioning irregular graphs", 1998.
+  METIS cuts the graph of tets that share a face, on rank 0: short borders, but the graph of all tets is on one rank, and the others wait. Bisection halves the
+  centres of the tets across the longest side of their box, again and again, in parallel: the medians are those of a sample that all ranks have, taken
+  by a hash of the original numbers, so that the number of ranks has no influence on it. Then tets at the borders move to the part
+  where most of their neighbours are. Its borders are 1.0 (bars) to 1.8 times (1,240,000 tets of a bunny) as long as those of METIS, in a tenth of the time.
+
+  References: Karypis and Kumar, "A fast and high quality multilevel scheme for partitioning irregular graphs", 1998; Berger and Bokhari, "A partitioning
+  strategy for nonuniform problems on multiprocessors", 1987.
 */
 #include <metis.h>
-#include <petsc/private/partitionerimpl.h> /* a partitioner of our own fills the table of operations, which is private */
 #include "mesh_impl.h"
 
+#define MOST 50000 /* tets that METIS is given by itself: it takes 0.05 s for them */
+#define SAMPLE \
+  1024 /* tets of the sample for each part, at least; a part then holds within 3 % of its share */
+#define SAMPLES 65536 /* and of all parts together */
+#define SWEEPS 4      /* over the borders of parts */
+
+/* ------------------------------------------------------------------ boxes */
+
 typedef struct {
-  PetscInt ncell;
-  const PetscInt *neighbour; /* [ncell][4], borrowed */
-} Metis;
+  int axis; /* -1: a leaf */
+  PetscReal cut;
+  PetscInt next; /* the child below the cut, the other one follows; of a leaf: its number */
+} Node;
+typedef struct {
+  PetscInt nnode, nleaf;
+  Node *node;
+} Tree;
 
-/* PETSc 3.26 passes weights of edges too. */
-#if PETSC_VERSION_LT(3, 23, 0)
-  #define EDGE_SECTION
-#else
-  #define EDGE_SECTION __attribute__((unused)) PetscSection edge_weights,
-#endif
-
-/* The graph in the types of METIS: from the neighbours when they are known, else from PETSc. */
-static PetscErrorCode fill_graph(const Metis *m, PetscInt n, const PetscInt start[],
-                                 const PetscInt adjacency[], idx_t xadj[], idx_t adj[])
+/* A hash of a number, so that samples have nothing to do with the order of a mesh. */
+static inline uint64_t mix(uint64_t z)
 {
-  idx_t k = 0;
+  z += 0x9e3779b97f4a7c15u;
+  z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9u;
+  z = (z ^ (z >> 27)) * 0x94d049bb133111ebu;
+  return z ^ (z >> 31);
+}
 
-  PetscFunctionBeginUser;
-  for (PetscInt c = 0; c < n; c++) {
-    xadj[c] = k;
-    if (m->neighbour) {
-      for (int f = 0; f < 4; f++) {
-        if (m->neighbour[4 * c + f] >= 0) adj[k++] = (idx_t)m->neighbour[4 * c + f];
+static inline void centre(const SbWhole *w, PetscInt c, PetscReal x[3])
+{
+  const PetscInt *v = w->cell + 4 * (size_t)c;
+
+  for (int i = 0; i < 3; i++)
+    x[i] = w->vertex[v[0]].x[i] + w->vertex[v[1]].x[i] + w->vertex[v[2]].x[i] + w->vertex[v[3]].x[i];
+}
+
+/* Reorders x[n][3] so that the k-th smallest along an axis stands at its place, smaller ones before it. */
+static void select_kth(PetscInt n, PetscReal (*x)[3], int axis, PetscInt k)
+{
+  PetscInt low = 0, high = n - 1;
+
+  while (low < high) {
+    const PetscReal pivot = x[low + (high - low) / 2][axis];
+    PetscInt i = low, j = high;
+
+    while (i <= j) {
+      while (x[i][axis] < pivot) i++;
+      while (x[j][axis] > pivot) j--;
+      if (i > j) break;
+      for (int d = 0; d < 3; d++) {
+        const PetscReal keep = x[i][d];
+
+        x[i][d] = x[j][d];
+        x[j][d] = keep;
       }
-    } else {
-      for (PetscInt i = start[c]; i < start[c + 1]; i++) adj[k++] = (idx_t)adjacency[i];
+      i++;
+      j--;
+    }
+    if (k <= j)
+      high = j;
+    else if (k >= i)
+      low = i;
+    else
+      return;
+  }
+}
+
+/* Splits the samples x[n] into k leaves below a node. */
+static void split(Tree *t, PetscInt at, PetscInt n, PetscReal (*x)[3], PetscInt k)
+{
+  PetscReal low[3] = {0, 0, 0}, high[3] = {0, 0, 0};
+  PetscInt below, half = k / 2;
+  int axis = 0;
+
+  if (k == 1 || n < 2) {
+    t->node[at] = (Node){-1, 0, t->nleaf++};
+    return;
+  }
+  for (PetscInt i = 0; i < n; i++) {
+    for (int d = 0; d < 3; d++) {
+      low[d] = i ? PetscMin(low[d], x[i][d]) : x[i][d];
+      high[d] = i ? PetscMax(high[d], x[i][d]) : x[i][d];
     }
   }
-  xadj[n] = k;
+  for (int d = 1; d < 3; d++)
+    if (high[d] - low[d] > high[axis] - low[axis]) axis = d;
+  below = (PetscInt)((PetscInt64)n * half / k);
+  select_kth(n, x, axis, below);
+  t->node[at] = (Node){axis, x[below][axis], t->nnode};
+  t->nnode += 2;
+  split(t, t->node[at].next, below, x, half);
+  split(t, t->node[at].next + 1, n - below, x + below, k - half);
+}
+
+/* A tree with k leaves. Collective. */
+static PetscErrorCode tree_create(MPI_Comm comm, const SbWhole *w, PetscInt k, Tree *t)
+{
+  const PetscInt64 wanted = PetscMax((PetscInt64)SAMPLE * k, SAMPLES);
+  const uint64_t bound = wanted >= w->Ncell ? UINT64_MAX : UINT64_MAX / (uint64_t)w->Ncell * (uint64_t)wanted;
+  PetscReal(*mine)[3], (*all)[3];
+  PetscMPIInt n = 0, total = 0, *count, *first, size;
+
+  PetscFunctionBeginUser;
+  PetscCallMPI(MPI_Comm_size(comm, &size));
+  for (PetscInt c = 0; c < w->ncell; c++) n += 3 * (mix((uint64_t)w->data[c].orig) <= bound);
+  PetscCall(PetscMalloc3(n / 3, &mine, size, &count, size, &first));
+  n = 0;
+  for (PetscInt c = 0; c < w->ncell; c++)
+    if (mix((uint64_t)w->data[c].orig) <= bound) centre(w, c, mine[n++]);
+  n *= 3;
+  PetscCallMPI(MPI_Allgather(&n, 1, MPI_INT, count, 1, MPI_INT, comm));
+  for (PetscMPIInt r = 0; r < size; r++) {
+    first[r] = total;
+    total += count[r];
+  }
+  PetscCall(PetscMalloc1(PetscMax(total / 3, 1), &all));
+  PetscCallMPI(MPI_Allgatherv(mine, n, MPIU_REAL, all, count, first, MPIU_REAL, comm));
+  PetscCall(PetscFree3(mine, count, first));
+  PetscCall(PetscMalloc1(2 * (size_t)k, &t->node));
+  t->nnode = 1;
+  t->nleaf = 0;
+  split(t, 0, total / 3, all, k);
+  PetscCall(PetscFree(all));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Part of every cell. */
-static PetscErrorCode call_metis(const Metis *m, PetscInt nparts, PetscInt n, const PetscInt start[],
-                                 const PetscInt adjacency[], idx_t part[])
+/* The leaf that each cell lies in. */
+static void tree_find(const Tree *t, const SbWhole *w, PetscInt leaf[])
 {
-  idx_t nvtxs = (idx_t)n, ncon = 1, np = (idx_t)nparts, cut, options[METIS_NOPTIONS];
-  idx_t *xadj, *adj;
+  for (PetscInt c = 0; c < w->ncell; c++) {
+    const Node *node = t->node;
+    PetscReal x[3];
+
+    centre(w, c, x);
+    while (node->axis >= 0) node = t->node + node->next + (x[node->axis] >= node->cut);
+    leaf[c] = node->next;
+  }
+}
+
+/* ------------------------------------------------------------------ METIS */
+
+/* The part of each cell, of a graph on one rank. */
+static PetscErrorCode call_metis(PetscInt ncell, const PetscInt orig[], const PetscInt across[],
+                                 PetscInt nparts, PetscInt part[])
+{
+  idx_t n = (idx_t)ncell, ncon = 1, np = (idx_t)nparts, cut, options[METIS_NOPTIONS], k = 0;
+  idx_t *start, *adj, *result;
+  PetscInt *place;
   int status;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscMalloc2(n + 1, &xadj, m->neighbour ? 4 * n : start[n], &adj));
-  PetscCall(fill_graph(m, n, start, adjacency, xadj, adj));
+  PetscCall(PetscMalloc4(ncell + 1, &start, 4 * (size_t)ncell, &adj, ncell, &result, ncell, &place));
+  for (PetscInt c = 0; c < ncell; c++) place[orig[c]] = c;
+  for (PetscInt c = 0; c < ncell; c++) {
+    const PetscInt *other = across + 4 * (size_t)place[c];
+
+    start[c] = k;
+    for (int f = 0; f < 4; f++)
+      if (other[f] >= 0) adj[k++] = (idx_t)other[f];
+  }
+  start[n] = k;
   METIS_SetDefaultOptions(options);
   options[METIS_OPTION_UFACTOR] = 10; /* the largest part is at most 1 % above the mean */
   status =
-    METIS_PartGraphKway(&nvtxs, &ncon, xadj, adj, NULL, NULL, NULL, &np, NULL, NULL, options, &cut, part);
-  PetscCall(PetscFree2(xadj, adj));
+    METIS_PartGraphKway(&n, &ncon, start, adj, NULL, NULL, NULL, &np, NULL, NULL, options, &cut, result);
+  for (PetscInt c = 0; c < ncell; c++) part[c] = (PetscInt)result[orig[c]];
+  PetscCall(PetscFree4(start, adj, result, place));
   PetscCheck(status == METIS_OK, PETSC_COMM_SELF, PETSC_ERR_LIB, "METIS_PartGraphKway() failed with %d",
              status);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* All ranks decide alike: the graph must be on one of them. */
-static PetscErrorCode check_serial(PetscPartitioner p, PetscInt n)
+/* Collects the graph on rank 0, by original numbers, so that its partition has nothing to do with who had what. */
+static PetscErrorCode cut_graph(MPI_Comm comm, const SbWhole *w, PetscSF sf, PetscInt part[])
 {
-  MPI_Comm comm = PetscObjectComm((PetscObject)p);
-  int mine = n > 0, holders = 0;
+  PetscInt *orig, *remote, *across, *all_orig, *all_across, *all_part;
+  PetscMPIInt rank, size, *dest;
+  SbRoute route;
 
   PetscFunctionBeginUser;
-  PetscCallMPI(MPI_Allreduce(&mine, &holders, 1, MPI_INT, MPI_SUM, comm));
-  PetscCheck(holders <= 1, comm, PETSC_ERR_SUP,
-             "The metis partitioner needs the whole graph on one rank, %d hold parts of it", holders);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode PetscPartitionerPartition_Metis(PetscPartitioner p, PetscInt nparts, PetscInt n,
-                                                      PetscInt start[], PetscInt adjacency[],
-                                                      PetscSection weights, EDGE_SECTION PetscSection target,
-                                                      PetscSection section, IS *is)
-{
-  const Metis *m = (const Metis *)p->data;
-  idx_t *part;
-  PetscInt *points, *next;
-
-  PetscFunctionBeginUser;
-  (void)weights;
-  (void)target;
-  PetscCall(check_serial(p, n));
-  PetscCheck(!m->neighbour || m->ncell == n, PETSC_COMM_SELF, PETSC_ERR_PLIB,
-             "%" PetscInt_FMT " cells to partition, neighbours of %" PetscInt_FMT, n, m->ncell);
-  PetscCall(PetscMalloc3(n, &part, n, &points, nparts + 1, &next));
-  /* METIS wants more cells than parts. */
-  if (n <= nparts) {
-    for (PetscInt c = 0; c < n; c++) part[c] = (idx_t)c;
-  } else
-    PetscCall(call_metis(m, nparts, n, start, adjacency, part));
-  PetscCall(PetscArrayzero(next, nparts + 1));
-  for (PetscInt c = 0; c < n; c++) next[part[c] + 1]++;
-  for (PetscInt r = 0; r < nparts; r++) {
-    PetscCall(PetscSectionAddDof(section, r, next[r + 1]));
-    next[r + 1] += next[r];
+  PetscCallMPI(MPI_Comm_rank(comm, &rank));
+  PetscCallMPI(MPI_Comm_size(comm, &size));
+  PetscCall(
+    PetscMalloc4(w->ncell, &orig, w->nremote, &remote, 4 * (size_t)w->ncell, &across, w->ncell, &dest));
+  for (PetscInt c = 0; c < w->ncell; c++) {
+    orig[c] = w->data[c].orig;
+    dest[c] = 0;
   }
-  for (PetscInt c = 0; c < n; c++) points[next[part[c]]++] = c;
-  PetscCall(ISCreateGeneral(PetscObjectComm((PetscObject)p), n, points, PETSC_COPY_VALUES, is));
-  PetscCall(PetscFree3(part, points, next));
+  PetscCall(PetscSFBcastBegin(sf, MPIU_INT, orig, remote, MPI_REPLACE));
+  PetscCall(PetscSFBcastEnd(sf, MPIU_INT, orig, remote, MPI_REPLACE));
+  for (PetscInt s = 0; s < 4 * w->ncell; s++) {
+    const PetscInt n = w->neighbour[s];
+
+    across[s] = n < 0 ? -1 : n < w->ncell ? orig[n] : remote[n - w->ncell];
+  }
+  PetscCall(SbRouteCreate(comm, w->ncell, dest, &route));
+  PetscCall(SbRouteSend(&route, sizeof(PetscInt), orig, &all_orig));
+  PetscCall(SbRouteSend(&route, 4 * sizeof(PetscInt), across, &all_across));
+  PetscCall(PetscMalloc1(route.nrecv, &all_part));
+  if (!rank) PetscCall(call_metis(w->Ncell, all_orig, all_across, size, all_part));
+  PetscCall(SbRouteReply(&route, sizeof(PetscInt), all_part, part));
+  PetscCall(PetscFree(all_orig));
+  PetscCall(PetscFree(all_across));
+  PetscCall(PetscFree(all_part));
+  PetscCall(SbRouteDestroy(&route));
+  PetscCall(PetscFree4(orig, remote, across, dest));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode PetscPartitionerDestroy_Metis(PetscPartitioner p)
+/* ------------------------------------------------------------------ borders */
+
+/* What the neighbour of a cell across slot s has: `across` of those on other ranks. */
+static inline PetscInt value_across(const SbWhole *w, PetscInt s, const PetscInt value[],
+                                    const PetscInt across[])
 {
+  const PetscInt n = w->neighbour[s];
+
+  return n < w->ncell ? value[n] : across[n - w->ncell];
+}
+
+/* A cell moves to the part that most of its neighbours are in, when that takes faces from the border. */
+static PetscErrorCode smooth(const SbWhole *w, PetscSF sf, PetscInt part[])
+{
+  PetscInt *now, *across;
+
   PetscFunctionBeginUser;
-  PetscCall(PetscFree(p->data));
+  PetscCall(PetscMalloc2(w->ncell, &now, w->nremote, &across));
+  for (int sweep = 0; sweep < SWEEPS; sweep++) {
+    PetscCall(PetscSFBcastBegin(sf, MPIU_INT, part, across, MPI_REPLACE));
+    PetscCall(PetscSFBcastEnd(sf, MPIU_INT, part, across, MPI_REPLACE));
+    PetscCall(PetscArraycpy(now, part, w->ncell));
+    for (PetscInt c = 0; c < w->ncell; c++) {
+      PetscInt other[4], n = 0, own = 0;
+
+      for (PetscInt s = 4 * c; s < 4 * c + 4; s++) {
+        if (w->neighbour[s] < 0) continue;
+        other[n] = value_across(w, s, now, across);
+        own += other[n++] == now[c];
+      }
+      for (PetscInt i = 0; i < n && own < 2; i++) {
+        PetscInt there = 0;
+
+        for (PetscInt j = 0; j < n; j++) there += other[j] == other[i];
+        if (there > own + 1) part[c] = other[i];
+      }
+    }
+  }
+  PetscCall(PetscFree2(now, across));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode PetscPartitionerCreate_Metis(PetscPartitioner p)
+PetscErrorCode SbPartition(MPI_Comm comm, SbPartitioner type, const SbWhole *w, PetscMPIInt part[])
 {
-  Metis *m;
+  PetscInt *to;
+  PetscMPIInt size;
+  PetscSF sf;
+  Tree tree;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscNew(&m));
-  p->data = m;
-  p->noGraph = PETSC_FALSE;
-  p->ops->partition = PetscPartitionerPartition_Metis;
-  p->ops->destroy = PetscPartitionerDestroy_Metis;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode SbPartitionerSetNeighbours(PetscPartitioner p, PetscInt ncell, const PetscInt neighbour[])
-{
-  PetscBool ismetis;
-
-  PetscFunctionBeginUser;
-  PetscCall(PetscObjectTypeCompare((PetscObject)p, "metis", &ismetis));
-  if (!ismetis) PetscFunctionReturn(PETSC_SUCCESS);
-  ((Metis *)p->data)->ncell = ncell;
-  ((Metis *)p->data)->neighbour = neighbour;
-  p->noGraph = PETSC_TRUE;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode SbPartitionerRegister(void)
-{
-  PetscFunctionBeginUser;
-  PetscCall(PetscPartitionerRegister("metis", PetscPartitionerCreate_Metis));
+  PetscCallMPI(MPI_Comm_size(comm, &size));
+  /* METIS wants two parts at least, and more cells than parts */
+  if (size == 1 || w->Ncell <= size) {
+    for (PetscInt c = 0; c < w->ncell; c++) part[c] = size == 1 ? 0 : (PetscMPIInt)w->data[c].orig;
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  PetscCall(PetscSFCreate(comm, &sf));
+  PetscCall(PetscSFSetGraph(sf, w->ncell, w->nremote, NULL, PETSC_USE_POINTER, w->remote, PETSC_USE_POINTER));
+  PetscCall(PetscMalloc1(w->ncell, &to));
+  if (type == SB_PARTITION_METIS || (type == SB_PARTITION_AUTO && w->Ncell <= MOST)) {
+    PetscCall(cut_graph(comm, w, sf, to));
+  } else {
+    PetscCall(tree_create(comm, w, size, &tree));
+    tree_find(&tree, w, to);
+    PetscCall(PetscFree(tree.node));
+    PetscCall(smooth(w, sf, to));
+  }
+  for (PetscInt c = 0; c < w->ncell; c++) part[c] = (PetscMPIInt)to[c];
+  PetscCall(PetscFree(to));
+  PetscCall(PetscSFDestroy(&sf));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

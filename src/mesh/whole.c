@@ -57,21 +57,20 @@ static PetscErrorCode append_points(const SbImport *im, const Part *part, PetscI
 {
   PetscFunctionBeginUser;
   for (PetscInt c = 0; c < im->item[3].n; c++) {
-    SbPoint *p = &w->point[cell0 + c];
+    SbCellData *p = &w->data[cell0 + c];
 
     p->orig = cell0 + c;
     p->body = b;
     p->set = part->masks.cell[c];
-    for (int f = 0; f < 4; f++) p->u.face[f] = part->masks.face[4 * c + f];
+    for (int f = 0; f < 4; f++) p->face[f] = part->masks.face[4 * c + f];
   }
   for (PetscInt v = 0; v < im->nvert; v++) {
-    SbPoint *p = &w->point[w->ncell + vert0 + v];
+    SbVertexData *p = &w->vertex[vert0 + v];
 
     p->orig = vert0 + v;
     p->body = b;
     p->set = part->masks.vert[v];
-    for (int i = 0; i < 3; i++) p->u.x[i] = im->x[3 * v + i];
-    p->u.face[3] = 0;
+    for (int i = 0; i < 3; i++) p->x[i] = im->x[3 * v + i];
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -89,7 +88,8 @@ static PetscErrorCode merge(PetscInt nbody, const SbBody body[], SbImport im[], 
     vert0 += body[b].nvert;
     cell0 += body[b].ncell;
   }
-  PetscCall(PetscMalloc1(w->ncell + w->nvert, &w->point));
+  PetscCall(PetscMalloc1(w->ncell, &w->data));
+  PetscCall(PetscMalloc1(w->nvert, &w->vertex));
   vert0 = cell0 = 0;
   for (PetscInt b = 0; b < nbody; b++) {
     PetscCall(append_points(&im[b], &part[b], b, vert0, cell0, w));
@@ -113,6 +113,8 @@ static PetscErrorCode build(PetscInt nbody, SbBody body[], PetscInt nset, SbSet 
     w->nvert += body[b].nvert;
   }
   PetscCall(SbSetsCheck(nbody, body, im, nset, set));
+  w->Nvert = w->nvert;
+  w->Ncell = w->ncell;
   PetscCall(merge(nbody, body, im, part, w));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -145,6 +147,8 @@ PetscErrorCode SbWholeDestroy(SbWhole *w)
   PetscFunctionBeginUser;
   PetscCall(PetscFree(w->cell));
   PetscCall(PetscFree(w->neighbour));
-  PetscCall(PetscFree(w->point));
+  PetscCall(PetscFree(w->remote));
+  PetscCall(PetscFree(w->data));
+  PetscCall(PetscFree(w->vertex));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -11,7 +11,6 @@
 
   The displacement bends and twists the bar, with rotations of every size.
 */
-#include <petscdmplex.h>
 #include "perf.h"
 
 enum { TRIAD = 8 << 20 }; /* numbers in each of the three arrays: 192 MB, beyond any cache */
@@ -142,7 +141,7 @@ static PetscErrorCode create_closure(Bench *w)
   PetscInt pStart, pEnd, vStart, vEnd;
 
   PetscFunctionBeginUser;
-  PetscCall(DMClone(w->scene.model->mesh->dm, &w->dm));
+  PetscCall(perf_plex(w->scene.model->mesh, &w->dm));
   PetscCall(DMPlexGetChart(w->dm, &pStart, &pEnd));
   PetscCall(DMPlexGetDepthStratum(w->dm, 0, &vStart, &vEnd));
   PetscCall(PetscSectionCreate(PETSC_COMM_WORLD, &section));

@@ -1,13 +1,12 @@
 /*
   Set-up seconds per million tets, by phase: reading (or making) and checking the mesh, distributing and numbering it, the
-  space, the assembly plan, the matrices; beside DMCreateMatrix() on the same DM.
+  space, the assembly plan, the matrices; beside DMCreateMatrix() on a DMPlex of the same tets.
 
     setup -mesh box:0.4,0.1,0.1:8 -rounds 3
 
   The phases of the mesh are what PETSc's log says of their events; the matrices are timed here. The plan is made with the
   first matrix of a space: a second one of the same kind (SBAIJ, on several ranks BAIJ) shows what it took.
 */
-#include <petscdmplex.h>
 #include "perf.h"
 
 /* Seconds of an event so far on this rank. */
@@ -20,7 +19,7 @@ static double event_seconds(SbEvent e)
 }
 
 /* What DMPlex does for three unknowns per vertex. */
-static PetscErrorCode dm_matrix(DM mesh_dm, PerfClock *seconds)
+static PetscErrorCode dm_matrix(SbMesh mesh, PerfClock *seconds)
 {
   PetscSection section;
   PetscInt pStart, pEnd, vStart, vEnd;
@@ -29,7 +28,7 @@ static PetscErrorCode dm_matrix(DM mesh_dm, PerfClock *seconds)
   Mat A;
 
   PetscFunctionBeginUser;
-  PetscCall(DMClone(mesh_dm, &dm));
+  PetscCall(perf_plex(mesh, &dm));
   PetscCall(DMPlexGetChart(dm, &pStart, &pEnd));
   PetscCall(DMPlexGetDepthStratum(dm, 0, &vStart, &vEnd));
   PetscCall(PetscSectionCreate(PETSC_COMM_WORLD, &section));
@@ -89,7 +88,7 @@ static PetscErrorCode matrices(SbModel m, double per_million)
   PetscCall(own_matrix(m->space, kind, &first));
   PetscCall(own_matrix(m->space, kind, &second));
   PetscCall(own_matrix(m->space, SB_MATRIX_AIJ, &aij));
-  PetscCall(dm_matrix(m->mesh->dm, &dm));
+  PetscCall(dm_matrix(m->mesh, &dm));
   PetscCall(perf_sample("plan_and_blocks", "s/Mtet", per_million * first.cpu));
   PetscCall(perf_sample("matrix_blocks", "s/Mtet", per_million * second.cpu));
   PetscCall(perf_sample("matrix_aij", "s/Mtet", per_million * aij.cpu));

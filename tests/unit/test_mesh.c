@@ -31,19 +31,19 @@ static PetscErrorCode compare_with_whole(SbMesh mesh, const SbWhole *whole)
   SB_CHECK(mesh->Nvert == whole->nvert && mesh->Ncell == whole->ncell, "%d vertices, %d cells",
            (int)mesh->Nvert, (int)mesh->Ncell);
   for (PetscInt v = 0; v < mesh->nvert; v++) {
-    const SbPoint *p = &whole->point[whole->ncell + mesh->vert_orig[v]];
+    const SbVertexData *p = &whole->vertex[mesh->vert_orig[v]];
 
     wrong_vert += p->body != mesh->vert_body[v] || p->set != mesh->vert_set[v];
-    for (int i = 0; i < 3; i++) wrong_vert += p->u.x[i] != mesh->x[3 * v + i];
+    for (int i = 0; i < 3; i++) wrong_vert += p->x[i] != mesh->x[3 * v + i];
   }
   for (PetscInt c = 0; c < mesh->ncell; c++) {
     const PetscInt orig = mesh->cell_orig[c];
-    const SbPoint *p = &whole->point[orig];
+    const SbCellData *p = &whole->data[orig];
 
     wrong_cell += p->body != mesh->cell_body[c] || p->set != mesh->cell_set[c];
     for (int a = 0; a < 4; a++) {
       wrong_cell += whole->cell[4 * orig + a] != mesh->vert_orig[mesh->cell[4 * c + a]];
-      wrong_cell += p->u.face[a] != mesh->face_set[4 * c + a];
+      wrong_cell += p->face[a] != mesh->face_set[4 * c + a];
     }
   }
   SB_CHECK(!wrong_vert && !wrong_cell, "%d wrong entries of vertices, %d of cells", (int)wrong_vert,
@@ -51,27 +51,46 @@ static PetscErrorCode compare_with_whole(SbMesh mesh, const SbWhole *whole)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The DM has the same points, and each vertex the same place. */
-static PetscErrorCode check_dm(SbMesh mesh)
+/* A number that each owned cell has comes to all its ghosts. */
+static PetscErrorCode check_broadcast(SbMesh mesh)
 {
-  Vec x;
-  PetscInt n;
-  PetscReal sum = 0, sums = 0;
-  PetscScalar total;
+  PetscInt *value, wrong = 0;
 
   PetscFunctionBeginUser;
-  PetscCall(DMGetCoordinates(mesh->dm, &x));
-  PetscCall(VecGetSize(x, &n));
-  PetscCall(VecSum(x, &total));
-  for (PetscInt i = 0; i < 3 * mesh->nvert_owned; i++) sum += mesh->x[i];
-  PetscCallMPI(MPI_Allreduce(&sum, &sums, 1, MPIU_REAL, MPI_SUM, mesh->comm));
-  SB_CHECK(n == 3 * mesh->Nvert, "%d coordinates in the DM", (int)n);
-  SB_CHECK_NEAR(total, sums, 1e-12 * n,
-                "sum of the coordinates of the DM"); /* rounding of n terms of order one */
+  PetscCall(PetscMalloc1(2 * mesh->ncell, &value));
+  for (PetscInt c = 0; c < mesh->ncell; c++) {
+    value[2 * c] = c < mesh->ncell_owned ? mesh->cell_orig[c] : -1;
+    value[2 * c + 1] = c < mesh->ncell_owned ? -mesh->cell_orig[c] : 1;
+  }
+  PetscCall(SbMeshBroadcastCells(mesh, 2, value));
+  for (PetscInt c = 0; c < mesh->ncell; c++)
+    wrong += value[2 * c] != mesh->cell_orig[c] || value[2 * c + 1] != -mesh->cell_orig[c];
+  SB_CHECK(!wrong, "%d cells with the number of another one", (int)wrong);
+  PetscCall(PetscFree(value));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode test_scene(const char *partitioner)
+/* With nodes at faces: every cell at a vertex of an owned cell is here, each once. Counted over all ranks by the corners of owned cells. */
+static PetscErrorCode check_layer(SbMesh mesh)
+{
+  PetscInt *around, *total, missing = 0;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscCalloc2(mesh->Nvert, &around, mesh->Nvert, &total));
+  for (PetscInt i = 0; i < 4 * mesh->ncell_owned; i++) total[mesh->vert_orig[mesh->cell[i]]]++;
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, total, (int)mesh->Nvert, MPIU_INT, MPI_SUM, mesh->comm));
+  for (PetscInt i = 0; i < 4 * mesh->ncell; i++) around[mesh->vert_orig[mesh->cell[i]]]++;
+  for (PetscInt i = 0; i < 4 * mesh->ncell_owned; i++) {
+    const PetscInt v = mesh->vert_orig[mesh->cell[i]];
+
+    missing += around[v] != total[v];
+  }
+  SB_CHECK(!missing, "%d corners of owned cells without all their cells", (int)missing);
+  PetscCall(PetscFree2(around, total));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode test_scene(const char *partitioner, PetscBool face_nodes)
 {
   SbBody body[3], body_again[3];
   SbSet set[NSET], set_again[NSET];
@@ -82,11 +101,13 @@ static PetscErrorCode test_scene(const char *partitioner)
   PetscCall(PetscOptionsSetValue(NULL, "-mesh_partitioner", partitioner));
   PetscCall(make_scene(body, set));
   PetscCall(make_scene(body_again, set_again));
+  body[0].face_nodes = face_nodes;
   PetscCall(SbMeshCreate(PETSC_COMM_WORLD, 3, body, NSET, set, &mesh));
   PetscCall(SbMeshValidate(mesh));
   PetscCall(SbWholeCreate(3, body_again, NSET, set_again, &whole));
   PetscCall(compare_with_whole(mesh, &whole));
-  PetscCall(check_dm(mesh));
+  PetscCall(check_broadcast(mesh));
+  if (face_nodes) PetscCall(check_layer(mesh));
   /* What rank 0 found is known to all. */
   SB_CHECK(!memcmp(set, set_again, sizeof(set)), "counts of the sets");
   for (int b = 0; b < 3; b++) {
@@ -198,21 +219,12 @@ static PetscErrorCode test_validation(void)
 
 int main(int argc, char **argv)
 {
-  PetscBool ptscotch;
-
   SB_TEST_BEGIN(argc, argv);
   PetscCall(SbLogInitialize());
   PetscCall(SbMeshRegister());
-  PetscCall(test_scene("metis"));
-  PetscCall(test_scene("simple"));
-  PetscCall(PetscHasExternalPackage("ptscotch", &ptscotch));
-  if (ptscotch)
-    PetscCall(test_scene("ptscotch"));
-  else {
-    PetscCall(PetscOptionsSetValue(NULL, "-mesh_partitioner", "ptscotch"));
-    TEST_MESSAGE(create("box:1,1,1:2", NULL), PETSC_ERR_USER_INPUT, "-mesh_partitioner ptscotch");
-    PetscCall(PetscOptionsSetValue(NULL, "-mesh_partitioner", "metis"));
-  }
+  PetscCall(test_scene("metis", PETSC_FALSE));
+  PetscCall(test_scene("metis", PETSC_TRUE));
+  PetscCall(test_scene("bisection", PETSC_FALSE));
   PetscCall(test_few(DATA "two_tets.msh", 2));
   PetscCall(test_few("box:1,1,1:1", 6));
   PetscCall(test_order());

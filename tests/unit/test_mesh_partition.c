@@ -1,75 +1,115 @@
-// The METIS partitioner: balance and cut of a box, with neighbours given and with the graph from PETSc, few cells.
+// The cut of a mesh into parts: balance and length of the border, few cells, and the exchange of records.
 // @ranks 1 2 3 4
-#include <petscdmplex.h>
 #include "mesh_test.h"
 
-/* Cells per rank after distribution by the partitioner. */
-static PetscErrorCode distribute(const char *mesh, PetscBool give_neighbours, PetscInt *ncell,
-                                 PetscInt *total)
+/* A box on rank 0, cut; the most cells of a part, their sum over all parts, and faces between parts. */
+static PetscErrorCode cut(const char *mesh, SbPartitioner type, PetscInt *most, PetscInt *cells,
+                          PetscInt *faces)
 {
   SbWhole whole;
   SbBody body = test_body("b", mesh);
-  DM dm, apart;
-  PetscPartitioner part;
-  PetscMPIInt rank;
-  PetscInt cStart, cEnd;
+  PetscMPIInt rank, size, *part;
+  PetscInt count[64] = {0}, n[3] = {0, 0, 0};
 
   PetscFunctionBeginUser;
   PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
+  PetscCallMPI(MPI_Comm_size(PETSC_COMM_WORLD, &size));
   PetscCall(SbWholeCreate(1, &body, 0, NULL, &whole));
-  *total = whole.ncell;
-  PetscCall(DMCreate(PETSC_COMM_WORLD, &dm));
-  PetscCall(DMSetType(dm, DMPLEX));
-  PetscCall(DMSetDimension(dm, 3));
-  PetscCall(DMPlexBuildFromCellList(dm, rank ? 0 : whole.ncell, rank ? 0 : whole.nvert, 4, whole.cell));
-  PetscCall(DMPlexGetPartitioner(dm, &part));
-  PetscCall(PetscPartitionerSetType(part, "metis"));
-  if (give_neighbours) PetscCall(SbPartitionerSetNeighbours(part, rank ? 0 : whole.ncell, whole.neighbour));
-  PetscCall(DMPlexDistribute(dm, 0, NULL, &apart));
-  PetscCall(DMPlexGetHeightStratum(apart ? apart : dm, 0, &cStart, &cEnd));
-  *ncell = cEnd - cStart;
-  PetscCall(DMDestroy(&apart));
-  PetscCall(DMDestroy(&dm));
+  if (rank) whole.nvert = whole.ncell = 0;
+  PetscCall(PetscMalloc1(whole.ncell, &part));
+  PetscCall(SbPartition(PETSC_COMM_WORLD, type, &whole, part));
+  for (PetscInt c = 0; c < whole.ncell; c++) {
+    SB_CHECK(part[c] >= 0 && part[c] < size, "cell %d goes to rank %d", (int)c, (int)part[c]);
+    count[part[c]]++;
+    n[1]++;
+    for (int f = 0; f < 4; f++) {
+      const PetscInt other = whole.neighbour[4 * c + f];
+
+      n[2] += other > c && part[other] != part[c];
+    }
+  }
+  for (int r = 0; r < size; r++) n[0] = PetscMax(n[0], count[r]);
+  PetscCallMPI(MPI_Bcast(n, 3, MPIU_INT, 0, PETSC_COMM_WORLD));
+  *most = n[0];
+  *cells = n[1];
+  *faces = n[2];
+  PetscCall(PetscFree(part));
   PetscCall(SbWholeDestroy(&whole));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Parts are at most 1 % (and a cell) above the mean, the promise of the partitioner. */
-static PetscErrorCode test_balance(PetscBool give_neighbours)
+/*
+  A bar of 24 x 6 x 6 cells of 6 tets: cut across into as many pieces as there are ranks, each border has 72 faces. METIS promises parts of at most 1 %
+  above the mean, bisection is rougher. No border may be longer than twice the shortest possible one.
+*/
+static PetscErrorCode test_bar(SbPartitioner type, PetscReal slack)
 {
-  PetscInt ncell, total, most, sum;
+  PetscInt most, cells, faces;
   PetscMPIInt size;
 
   PetscFunctionBeginUser;
   PetscCallMPI(MPI_Comm_size(PETSC_COMM_WORLD, &size));
-  PetscCall(distribute("box:2,1,1:6", give_neighbours, &ncell, &total));
-  PetscCallMPI(MPI_Allreduce(&ncell, &most, 1, MPIU_INT, MPI_MAX, PETSC_COMM_WORLD));
-  PetscCallMPI(MPI_Allreduce(&ncell, &sum, 1, MPIU_INT, MPI_SUM, PETSC_COMM_WORLD));
-  SB_CHECK(sum == total, "%d of %d cells", (int)sum, (int)total);
-  SB_CHECK(most <= 1.01 * total / size + 1, "%d cells on one rank of %d", (int)most, (int)size);
+  PetscCall(cut("box:4,1,1:6", type, &most, &cells, &faces));
+  SB_CHECK(cells == 5184, "%d cells", (int)cells);
+  SB_CHECK(most <= (1 + slack) * cells / size + 1, "%d of %d cells on one rank of %d", (int)most, (int)cells,
+           (int)size);
+  SB_CHECK(faces <= 2 * 72 * (size - 1), "%d faces between the parts of %d ranks", (int)faces, (int)size);
+  SB_CHECK(faces >= 72 * (size - 1), "%d faces between the parts of %d ranks", (int)faces, (int)size);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* With two cells two ranks get one each. */
 static PetscErrorCode test_few(void)
 {
-  PetscInt ncell, total, most;
+  PetscInt most, cells, faces;
   PetscMPIInt size;
 
   PetscFunctionBeginUser;
   PetscCallMPI(MPI_Comm_size(PETSC_COMM_WORLD, &size));
-  PetscCall(distribute("tests/data/two_tets.msh", PETSC_TRUE, &ncell, &total));
-  PetscCallMPI(MPI_Allreduce(&ncell, &most, 1, MPIU_INT, MPI_MAX, PETSC_COMM_WORLD));
+  PetscCall(cut("tests/data/two_tets.msh", SB_PARTITION_METIS, &most, &cells, &faces));
   SB_CHECK(most == (size == 1 ? 2 : 1), "%d cells on one rank", (int)most);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Rank r sends i to rank (r + i) % size for i below r + 3: it arrives there, in order, and the answer i + 100 r comes back. */
+static PetscErrorCode test_route(void)
+{
+  PetscMPIInt rank, size, dest[16];
+  PetscInt number[16], *got, answer[16], last = -1;
+  SbRoute route;
+
+  PetscFunctionBeginUser;
+  PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
+  PetscCallMPI(MPI_Comm_size(PETSC_COMM_WORLD, &size));
+  for (PetscMPIInt i = 0; i < rank + 3; i++) {
+    number[i] = i;
+    dest[i] = (rank + i) % size;
+  }
+  PetscCall(SbRouteCreate(PETSC_COMM_WORLD, rank + 3, dest, &route));
+  PetscCall(SbRouteSend(&route, sizeof(PetscInt), number, &got));
+  for (PetscInt k = 0; k < route.nrecv; k++) {
+    const PetscMPIInt from = SbRouteSource(&route, k);
+
+    SB_CHECK((from + got[k]) % size == rank, "%d of rank %d", (int)got[k], (int)from);
+    SB_CHECK(k == route.rfirst[from] || got[k] > last, "%d follows %d", (int)got[k], (int)last);
+    last = got[k];
+    got[k] += 100 * from;
+  }
+  PetscCall(SbRouteReply(&route, sizeof(PetscInt), got, answer));
+  for (PetscMPIInt i = 0; i < rank + 3; i++)
+    SB_CHECK(answer[i] == i + 100 * rank, "answer %d to %d", (int)answer[i], (int)i);
+  PetscCall(PetscFree(got));
+  PetscCall(SbRouteDestroy(&route));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 int main(int argc, char **argv)
 {
   SB_TEST_BEGIN(argc, argv);
-  PetscCall(SbPartitionerRegister());
-  PetscCall(test_balance(PETSC_TRUE));
-  PetscCall(test_balance(PETSC_FALSE));
+  PetscCall(test_route());
+  PetscCall(test_bar(SB_PARTITION_METIS, 0.01));
+  PetscCall(test_bar(SB_PARTITION_AUTO, 0.01));
+  PetscCall(test_bar(SB_PARTITION_BISECTION, 0.03));
   PetscCall(test_few());
   SB_TEST_END();
 }

@@ -71,7 +71,7 @@ static PetscBool sees_back(const SbWhole *whole, PetscInt c, PetscInt neighbour)
   const PetscInt *n = whole->neighbour + 4 * neighbour;
 
   if (neighbour < 0) return PETSC_TRUE;
-  return (PetscBool)(whole->point[neighbour].body == whole->point[c].body &&
+  return (PetscBool)(whole->data[neighbour].body == whole->data[c].body &&
                      (n[0] == c || n[1] == c || n[2] == c || n[3] == c));
 }
 
@@ -86,11 +86,11 @@ static PetscErrorCode test_counts(const char *text, PetscInt nvert, PetscInt nfa
   SB_CHECK(set.nvert == nvert && set.nfacet == nfacet && set.ncell == ncell,
            "%s: %d vertices, %d facets, %d cells", text, (int)set.nvert, (int)set.nfacet, (int)set.ncell);
   /* The masks say the same. */
-  for (PetscInt v = 0; v < whole.nvert; v++) n[0] += !!(whole.point[whole.ncell + v].set & SB_SET_BIT(0));
+  for (PetscInt v = 0; v < whole.nvert; v++) n[0] += !!(whole.vertex[v].set & SB_SET_BIT(0));
   for (PetscInt c = 0; c < whole.ncell; c++) {
-    n[2] += !!(whole.point[c].set & SB_SET_BIT(0));
+    n[2] += !!(whole.data[c].set & SB_SET_BIT(0));
     for (int f = 0; f < 4; f++) {
-      const uint64_t mask = whole.point[c].u.face[f];
+      const uint64_t mask = whole.data[c].face[f];
 
       n[1] += (mask & SB_SET_BIT(0)) && (mask & SB_ON_BOUNDARY);
       SB_CHECK(sees_back(&whole, c, whole.neighbour[4 * c + f]), "cell %d and its neighbour %d", (int)c,
@@ -118,11 +118,11 @@ static PetscErrorCode test_inner(void)
     const PetscInt other = whole.neighbour[s];
     PetscBool theirs = PETSC_FALSE;
 
-    if (!(whole.point[s / 4].u.face[s % 4] & SB_SET_BIT(0))) continue;
+    if (!(whole.data[s / 4].face[s % 4] & SB_SET_BIT(0))) continue;
     nface++;
     for (int f = 0; other >= 0 && f < 4; f++)
       theirs = (PetscBool)(theirs || (whole.neighbour[4 * other + f] == s / 4 &&
-                                      whole.point[other].u.face[f] & SB_SET_BIT(0)));
+                                      whole.data[other].face[f] & SB_SET_BIT(0)));
     alone += !theirs;
   }
   SB_CHECK(nface == 8 && !alone, "%d sides of inner facets, %d without the other side", (int)nface,

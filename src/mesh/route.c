@@ -1,0 +1,111 @@
+/*
+  route.c - records to other ranks, and answers back: one exchange of counts, then one of the records of all ranks with all ranks.
+
+  What stays on a rank takes the same way, so that callers have one case.
+*/
+#include "mesh_impl.h"
+
+/* Where the records of each rank begin. */
+static PetscErrorCode first_of_each(PetscMPIInt size, const PetscMPIInt count[], PetscMPIInt first[],
+                                    PetscInt *total)
+{
+  PetscInt64 n = 0;
+
+  PetscFunctionBeginUser;
+  for (PetscMPIInt r = 0; r < size; r++) {
+    PetscCall(PetscMPIIntCast((PetscInt)PetscMin(n, PETSC_MAX_INT), &first[r]));
+    n += count[r];
+  }
+  PetscCheck(n <= PETSC_MPI_INT_MAX, PETSC_COMM_SELF, PETSC_ERR_SUP,
+             "One rank would send or get %lld records of the mesh, MPI counts to %d; take more ranks",
+             (long long)n, PETSC_MPI_INT_MAX);
+  *total = (PetscInt)n;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbRouteCreate(MPI_Comm comm, PetscInt n, const PetscMPIInt dest[], SbRoute *route)
+{
+  PetscMPIInt *next;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscMemzero(route, sizeof(*route)));
+  route->comm = comm;
+  route->nsend = n;
+  PetscCallMPI(MPI_Comm_size(comm, &route->size));
+  PetscCall(PetscCalloc5(route->size, &route->scount, route->size, &route->sfirst, route->size,
+                         &route->rcount, route->size, &route->rfirst, n, &route->place));
+  for (PetscInt i = 0; i < n; i++) route->scount[dest[i]]++;
+  PetscCallMPI(MPI_Alltoall(route->scount, 1, MPI_INT, route->rcount, 1, MPI_INT, comm));
+  PetscCall(first_of_each(route->size, route->scount, route->sfirst, &n));
+  PetscCall(first_of_each(route->size, route->rcount, route->rfirst, &route->nrecv));
+  PetscCall(PetscMalloc1(route->size, &next));
+  PetscCall(PetscArraycpy(next, route->sfirst, route->size));
+  for (PetscInt i = 0; i < n; i++) route->place[i] = next[dest[i]]++;
+  PetscCall(PetscFree(next));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbRouteDestroy(SbRoute *route)
+{
+  PetscFunctionBeginUser;
+  PetscCall(PetscFree5(route->scount, route->sfirst, route->rcount, route->rfirst, route->place));
+  PetscCall(PetscMemzero(route, sizeof(*route)));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode exchange(const SbRoute *route, size_t unit, PetscBool back, const void *out, void *in)
+{
+  MPI_Datatype type;
+
+  PetscFunctionBeginUser;
+  PetscCallMPI(MPI_Type_contiguous((int)unit, MPI_BYTE, &type));
+  PetscCallMPI(MPI_Type_commit(&type));
+  PetscCallMPI(MPI_Alltoallv(out, back ? route->rcount : route->scount, back ? route->rfirst : route->sfirst,
+                             type, in, back ? route->scount : route->rcount,
+                             back ? route->sfirst : route->rfirst, type, route->comm));
+  PetscCallMPI(MPI_Type_free(&type));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbRouteSend(const SbRoute *route, size_t unit, const void *record, void *received)
+{
+  char *out, *in;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscMalloc(unit * (size_t)route->nsend, &out));
+  for (PetscInt i = 0; i < route->nsend; i++)
+    memcpy(out + unit * (size_t)route->place[i], (const char *)record + unit * (size_t)i, unit);
+  PetscCall(PetscMalloc(unit * (size_t)route->nrecv, &in));
+  PetscCall(exchange(route, unit, PETSC_FALSE, out, in));
+  PetscCall(PetscFree(out));
+  *(void **)received = in;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbRouteReply(const SbRoute *route, size_t unit, const void *answer, void *result)
+{
+  char *in;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscMalloc(unit * (size_t)route->nsend, &in));
+  PetscCall(exchange(route, unit, PETSC_TRUE, answer, in));
+  for (PetscInt i = 0; i < route->nsend; i++)
+    memcpy((char *)result + unit * (size_t)i, in + unit * (size_t)route->place[i], unit);
+  PetscCall(PetscFree(in));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscMPIInt SbRouteSource(const SbRoute *route, PetscInt i)
+{
+  PetscMPIInt low = 0, high = route->size;
+
+  while (high - low > 1) {
+    const PetscMPIInt middle = low + (high - low) / 2;
+
+    if (route->rfirst[middle] <= i)
+      low = middle;
+    else
+      high = middle;
+  }
+  return low;
+}
