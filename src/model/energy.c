@@ -121,7 +121,6 @@ PetscErrorCode SbModelStrainAlong(SbModel m, Vec U, Vec D, PetscReal *psi, Petsc
   PetscInt n;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_ENERGY], 0, 0, 0, 0));
   PetscCall(PetscCalloc1(3 * s->nnode, &f));
   PetscCall(SbSpaceGetLocalRead(s, U, &stage.u));
   PetscCall(SbSpaceStrainEnergy(s, stage.u, &sum[0], &minJ, &n, &volume));
@@ -137,6 +136,5 @@ PetscErrorCode SbModelStrainAlong(SbModel m, Vec U, Vec D, PetscReal *psi, Petsc
   *psi = sum[0];
   *slope = sum[1];
   *ninverted = (PetscInt)sum[2];
-  PetscCall(PetscLogEventEnd(SbEvents[SB_EVENT_ENERGY], 0, 0, 0, 0));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -2,7 +2,8 @@
   time_impl.h - what the files of src/time share.
 */
 #pragma once
-#define SB_CONTACT_ROUNDS 100 /* solves of one step before contact counts as failed */
+#define SB_CONTACT_ROUNDS \
+  250 /* solves of one step before contact counts as failed; response augmented may take more than 100 */
 #define SB_ARRIVAL_LEAST \
   0.05 /* of a step: where points arrive nearer to one of its ends, it is not cut at their arrival */
 #define SB_LOOKS 4 /* so often may a step be solved again for who looks at it */

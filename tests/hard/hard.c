@@ -4,7 +4,9 @@
   -list writes one line per case: name, ranks with commas, quick runs, processor time in s on each rank, what is hard, separated by tabs. A case prints one
   line per limit, which tests/run and scripts/stability read:
     limit|case|ranks|runs|quantity|measured|relation|bound|unit
+    work|case|run|steps|rejected|Newton|linear iterations|CPU s of rank 0
 */
+#include <time.h>
 #include "hard.h"
 #include "../verify/verify.h"
 
@@ -85,6 +87,7 @@ static PetscErrorCode run_once(const HardCase *c, const char *options, PetscInt 
                                PetscReal value[])
 {
   HardRun r = {.c = c, .k = k, .verbose = verbose};
+  const clock_t began = clock();
   TestScene t;
 
   PetscFunctionBeginUser;
@@ -96,6 +99,9 @@ static PetscErrorCode run_once(const HardCase *c, const char *options, PetscInt 
     PetscCall((*c->solve)(&r));
   else
     PetscCall(SbRunSolve(r.run));
+  PetscCall(PetscPrintf(PETSC_COMM_WORLD, "work|%s|%d|%d|%d|%d|%d|%.2f\n", c->name, (int)k,
+                        (int)t.run->steps_total, (int)t.run->rejected_total, (int)t.run->newton_total,
+                        (int)t.run->linear_total, (double)(clock() - began) / CLOCKS_PER_SEC));
   PetscCall(HardMeasureEnd(&r));
   check_end(&r);
   PetscCall(PetscArraycpy(value, r.value, HARD_QUANTITIES));
