@@ -190,6 +190,52 @@ static PetscErrorCode MatMult_Pressure(Mat K, Vec X, Vec Y)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Squares of the entries of B C^-1/2 at each node, added to y[nnode][3]; right on owned nodes. */
+static void add_squares(SbPressureOperator op, PetscReal y[])
+{
+  SbSpace s = op->space;
+
+  for (PetscInt r = 0; r < s->nregion; r++) {
+    const SbRegion *region = &s->region[r];
+
+    for (PetscInt b = region->bstart; b < region->bend; b++) {
+      const SbLane *v = (const SbLane *)op->volume.b + 12 * b;
+
+      for (PetscInt k = 0; k < 12; k++) {
+        for (PetscInt l = 0; l < s->batch_n[b]; l++) {
+          const PetscReal weight = region->broken ? s->batch_weight[4 * b + k / 3][l] : 1.,
+                          square = op->volume.modulus[b][l] / s->batch_V[b][l] * PetscSqr(v[k][l]);
+          const PetscInt node = s->batch_node[(4 * b + k / 3) * SB_BATCH + l];
+
+          y[3 * node + k % 3] += square * PetscSqr(weight);
+          if (region->broken)
+            y[3 * s->batch_clique[(8 * b + 4 + k / 3) * SB_BATCH + l] + k % 3] +=
+              square * PetscSqr(1. - weight);
+        }
+      }
+    }
+  }
+}
+
+static PetscErrorCode MatGetDiagonal_Pressure(Mat K, Vec D)
+{
+  SbPressureOperator op;
+  PetscScalar *d;
+  PetscReal *y;
+
+  PetscFunctionBeginUser;
+  PetscCall(MatShellGetContext(K, &op));
+  PetscCall(MatGetDiagonal(op->levels->A[0], D));
+  PetscCall(PetscCalloc1(3 * op->space->nnode, &y));
+  add_squares(op, y);
+  clear_fixed(op->space, op->space->nnode_owned, y);
+  PetscCall(VecGetArray(D, &d));
+  for (PetscInt i = 0; i < 3 * op->space->nnode_owned; i++) d[i] += y[i];
+  PetscCall(VecRestoreArray(D, &d));
+  PetscCall(PetscFree(y));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode SbPressureOperatorGet(Mat K, SbPressureOperator *op)
 {
   void (*mark)(void) = NULL;
@@ -350,6 +396,7 @@ PetscErrorCode SbPressureOperatorCreate(SbSpace s, Mat *K)
     MatCreateShell(s->comm, 3 * s->nnode_owned, 3 * s->nnode_owned, PETSC_DETERMINE, PETSC_DETERMINE, op, K));
   PetscCall(MatSetBlockSize(*K, 3));
   PetscCall(MatShellSetOperation(*K, MATOP_MULT, SB_OPERATION(MatMult_Pressure)));
+  PetscCall(MatShellSetOperation(*K, MATOP_GET_DIAGONAL, SB_OPERATION(MatGetDiagonal_Pressure)));
   PetscCall(MatShellSetOperation(*K, MATOP_DESTROY, SB_OPERATION(MatDestroy_Pressure)));
   PetscCall(MatSetOption(*K, MAT_SYMMETRIC, PETSC_TRUE));
   PetscCall(MatSetOption(*K, MAT_SYMMETRY_ETERNAL, PETSC_TRUE));

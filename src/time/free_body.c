@@ -1,37 +1,176 @@
 /*
-  Why a static solve failed: whether some body can move as a rigid one without any force. Contact without friction holds a body along
-  its normals only; a matrix that leaves it free is singular, and more load steps do not help.
+  Why a static solve failed: whether some part of a body can move as a rigid one without any force. More load steps do not help then.
 
-  With Z the six rigid motions of a body, less what is prescribed, held or tied by contact, A the operator of the last solve and D the
-  diagonal of its matrix, the smallest eigenvalue of Z^T A Z against Z^T D Z is the stiffness of the softest such motion as a part of that
-  of a cell. Zero but for rounding: nothing resists it. Two bodies that are free together only, tied to each other, are not found.
+  Part: nodes that cells join. Of its six rigid motions Z, what supports and contact take away is B = Z - P Z, P the projection onto what is allowed
+  (SbSpaceAllow()). With x such that B^T B x = l Z^T Z x the motion Z x is allowed when l is zero but for rounding: nothing of it is prescribed. That is geometry,
+  whatever the stiffness. For those that are allowed, A the operator of the last solve and D the diagonal of its matrix, the smallest eigenvalue of
+  (P Z x)^T A (P Z x) against that with D is the stiffness of the softest as a part of a cell's. Zero but for rounding: nothing resists it, no
+  spring, no friction and no stress.
+
+  Not found: parts that are free only together, tied to each other by contact; one that is held by springs whose stiffness is rounding beside that of its cells.
 */
 #include "time_impl.h"
 #include <petscblaslapack.h>
 
-#define FREE 1e-10   /* of a cell's stiffness: less is rounding */
-#define FAR 1e6      /* times its size: a body that went so far in a static run was not held */
-#define NOTHING 1e-6 /* of its length: what is left of a motion that others or constraints take away */
+#define ALLOWED 1e-13 /* part of its square that a motion may lose by rounding */
+#define FREE 1e-13    /* of the cells' stiffness: rounding of sums over the nodes leaves 1e-15 */
+#define FAR 1e6       /* times its size: a body that went so far in a static run was not held */
 
-/* Motion k = 0..2: along an axis, 3..5: about one through the centre, of the body's nodes; m and rad. */
-static PetscErrorCode create_motion(SbRun run, PetscInt body, const PetscReal centre[3], PetscReal size,
-                                    PetscInt k, Vec *z)
+/* ------------------------------------------------------------------ parts */
+
+static PetscInt root_of(PetscInt parent[], PetscInt i)
+{
+  for (; parent[i] != i; i = parent[i]) parent[i] = parent[parent[i]];
+  return i;
+}
+
+static void join(PetscInt parent[], PetscInt i, PetscInt j)
+{
+  const PetscInt a = root_of(parent, i), b = root_of(parent, j);
+
+  parent[PetscMax(a, b)] = PetscMin(a, b);
+}
+
+/* label[nnode_owned]: the lowest global number of a node's part. Collective; the caller frees it. */
+static PetscErrorCode label_parts(SbSpace s, PetscInt **label)
+{
+  PetscInt *parent, *lowest;
+  PetscBool changed = PETSC_TRUE;
+  PetscScalar *own;
+  const PetscReal *all;
+  Vec v;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscMalloc2(s->nnode, &parent, s->nnode, &lowest));
+  for (PetscInt i = 0; i < s->nnode; i++) parent[i] = i;
+  for (PetscInt k = 0; k < 4 * s->mesh->ncell; k++) {
+    join(parent, s->cell_node[k - k % 4], s->cell_node[k]);
+    if (s->support && s->support[k] >= 0) join(parent, s->cell_node[k], s->support[k]);
+  }
+  /* cells of dg have nodes of their own: the faces join them */
+  for (PetscInt b = 0; s->width > 4 && b < s->nbatch; b++) {
+    for (PetscInt k = 0; k < 4 * SB_BATCH; k++) {
+      if (k % SB_BATCH < s->batch_n[b])
+        join(parent, s->batch_node[4 * SB_BATCH * b + k],
+             s->batch_clique[8 * SB_BATCH * b + 4 * SB_BATCH + k]);
+    }
+  }
+  for (PetscInt i = 0; i < s->nnode; i++) lowest[i] = s->gnode[i];
+  /* parts that several ranks share: what the owners know spreads until nothing changes */
+  PetscCall(SbSpaceCreateVec(s, &v));
+  while (changed) {
+    changed = PETSC_FALSE;
+    for (PetscInt i = 0; i < s->nnode; i++) {
+      const PetscInt root = root_of(parent, i);
+
+      lowest[root] = PetscMin(lowest[root], lowest[i]);
+    }
+    PetscCall(VecGetArray(v, &own));
+    for (PetscInt i = 0; i < s->nnode_owned; i++) own[3 * i] = (PetscReal)lowest[root_of(parent, i)];
+    PetscCall(VecRestoreArray(v, &own));
+    PetscCall(SbSpaceGetLocalRead(s, v, &all));
+    for (PetscInt i = 0; i < s->nnode; i++) {
+      const PetscInt other = (PetscInt)all[3 * i], root = root_of(parent, i);
+
+      changed = (PetscBool)(changed || other < lowest[root]);
+      lowest[i] = PetscMin(lowest[root], other);
+    }
+    PetscCall(SbSpaceRestoreLocalRead(s, v, &all));
+    PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &changed, 1, SB_MPI_BOOL, MPI_LOR, s->comm));
+  }
+  PetscCall(PetscMalloc1(s->nnode_owned, label));
+  for (PetscInt i = 0; i < s->nnode_owned; i++) (*label)[i] = lowest[root_of(parent, i)];
+  PetscCall(VecDestroy(&v));
+  PetscCall(PetscFree2(parent, lowest));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The labels of all parts, ascending, alike on all ranks. The caller frees them. */
+static PetscErrorCode list_parts(SbSpace s, const PetscInt label[], PetscInt *npart, PetscInt **part)
+{
+  PetscMPIInt size, mine = 0, sum = 0, *count, *start;
+  PetscInt *own;
+
+  PetscFunctionBeginUser;
+  PetscCallMPI(MPI_Comm_size(s->comm, &size));
+  PetscCall(PetscMalloc3(s->nnode_owned, &own, size, &count, size, &start));
+  for (PetscInt i = 0; i < s->nnode_owned; i++) {
+    if (label[i] == s->gnode[i]) own[mine++] = label[i];
+  }
+  PetscCallMPI(MPI_Allgather(&mine, 1, MPI_INT, count, 1, MPI_INT, s->comm));
+  for (PetscMPIInt r = 0; r < size; r++) {
+    start[r] = sum;
+    sum += count[r];
+  }
+  PetscCall(PetscMalloc1(sum, part));
+  PetscCallMPI(MPI_Allgatherv(own, mine, MPIU_INT, *part, count, start, MPIU_INT, s->comm));
+  PetscCall(PetscSortInt(sum, *part));
+  *npart = sum;
+  PetscCall(PetscFree3(own, count, start));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ motions */
+
+/* A part and what of its motions is free. */
+typedef struct {
+  PetscInt label, body;
+  PetscReal centre[3], size; /* of its nodes, m */
+  PetscInt nfree;            /* motions that nothing resists */
+  PetscReal motion[6]; /* one of them: along the axes, m, and about axes through the centre, rad times size */
+} Part;
+
+/* Where a node is, for the tangent: linear laws know the rest state only. */
+static inline PetscReal place(SbSpace s, const PetscScalar u[], PetscInt k)
+{
+  return s->node_x[k] + (s->linear ? 0. : u[k]);
+}
+
+/* Body, centre and size of a part. */
+static PetscErrorCode measure(SbRun run, const PetscInt label[], Part *part)
+{
+  SbSpace s = run->model->space;
+  PetscReal sum[6] = {0.}; /* nodes, places, squares, body */
+  const PetscScalar *u;
+
+  PetscFunctionBeginUser;
+  PetscCall(VecGetArrayRead(run->U, &u));
+  for (PetscInt i = 0; i < s->nnode_owned; i++) {
+    if (label[i] != part->label) continue;
+    sum[0] += 1.;
+    for (PetscInt c = 0; c < 3; c++) sum[1 + c] += place(s, u, 3 * i + c);
+    sum[5] += s->node_body[i];
+  }
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, sum, 6, MPIU_REAL, MPI_SUM, s->comm));
+  for (int c = 0; c < 3; c++) part->centre[c] = sum[1 + c] / sum[0];
+  for (PetscInt i = 0; i < s->nnode_owned; i++) {
+    if (label[i] != part->label) continue;
+    for (PetscInt c = 0; c < 3; c++) sum[4] += PetscSqr(place(s, u, 3 * i + c) - part->centre[c]);
+  }
+  PetscCall(VecRestoreArrayRead(run->U, &u));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &sum[4], 1, MPIU_REAL, MPI_SUM, s->comm));
+  part->size = PetscSqrtReal(sum[4] / sum[0]);
+  part->body = (PetscInt)(sum[5] / sum[0] + 0.5);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Motion k = 0..2: along an axis, 3..5: about one through the centre; z: what of it is allowed. */
+static PetscErrorCode create_motion(SbRun run, const PetscInt label[], const Part *part, PetscInt k,
+                                    Vec *whole, Vec *z)
 {
   SbSpace s = run->model->space;
   const PetscScalar *u;
   PetscScalar *to;
 
   PetscFunctionBeginUser;
-  PetscCall(SbSpaceCreateVec(s, z));
+  PetscCall(SbSpaceCreateVec(s, whole));
   PetscCall(VecGetArrayRead(run->U, &u));
-  PetscCall(VecGetArray(*z, &to));
+  PetscCall(VecGetArray(*whole, &to));
   for (PetscInt i = 0; i < s->nnode_owned; i++) {
     PetscReal r[3];
 
-    if (s->node_body[i] != body) continue;
-    /* linear laws know the rest state only */
-    for (PetscInt c = 0; c < 3; c++)
-      r[c] = (s->node_x[3 * i + c] + (s->linear ? 0. : u[3 * i + c]) - centre[c]) / size;
+    if (label[i] != part->label) continue;
+    for (PetscInt c = 0; c < 3; c++) r[c] = (place(s, u, 3 * i + c) - part->centre[c]) / part->size;
     if (k < 3)
       to[3 * i + k] = 1.;
     else {
@@ -39,155 +178,237 @@ static PetscErrorCode create_motion(SbRun run, PetscInt body, const PetscReal ce
       to[3 * i + (k + 2) % 3] = r[(k + 1) % 3];
     }
   }
-  PetscCall(VecRestoreArray(*z, &to));
+  PetscCall(VecRestoreArray(*whole, &to));
   PetscCall(VecRestoreArrayRead(run->U, &u));
+  PetscCall(VecDuplicate(*whole, z));
+  PetscCall(VecCopy(*whole, *z));
   PetscCall(SbSpaceAllow(s, *z));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* z[n] orthonormal in the norm of d, each with its share q[6] of the six motions; those that are nothing are dropped. */
-static PetscErrorCode orthonormalise(Vec d, PetscInt *n, Vec z[6], PetscReal q[6][6])
+/* Eigenvalues of E x = value M x, n <= 6, ascending; their vectors, M-orthonormal, into the columns of E. ok: M is definite. */
+static PetscErrorCode eigen(PetscInt n, PetscReal E[36], PetscReal M[36], PetscReal value[6], PetscBool *ok)
 {
-  PetscInt m = 0;
-  Vec w;
+  PetscBLASInt one = 1, six = 6, m, lwork = 64, info = 0;
+  PetscScalar work[64];
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscBLASIntCast(n, &m));
+  LAPACKsygv_(&one, "V", "U", &m, E, &six, M, &six, value, work, &lwork, &info);
+  *ok = (PetscBool)!info;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Motions of a part that supports and contact allow: *n of them, shares of the six in the columns of x. */
+static PetscErrorCode allowed(Vec whole[6], Vec z[6], PetscInt *n, PetscReal x[36])
+{
+  PetscReal M[36], value[6];
+  PetscBool ok;
+
+  PetscFunctionBeginUser;
+  for (int j = 0; j < 6; j++) {
+    for (int i = 0; i <= j; i++) PetscCall(VecDot(whole[i], whole[j], &M[6 * j + i]));
+  }
+  for (int k = 0; k < 6; k++) PetscCall(VecAXPY(whole[k], -1., z[k]));
+  for (int j = 0; j < 6; j++) {
+    for (int i = 0; i <= j; i++) PetscCall(VecDot(whole[i], whole[j], &x[6 * j + i]));
+  }
+  PetscCall(eigen(6, x, M, value, &ok));
+  for (*n = 0; ok && *n < 6 && value[*n] <= ALLOWED; ++*n) {
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Those of the n allowed motions x that have no stiffness: part->nfree, and one of them. */
+static PetscErrorCode resisted(SbRun run, Vec d, Vec z[6], PetscInt n, const PetscReal x[36], Part *part)
+{
+  PetscReal E[36], M[36], value[6];
+  PetscBool ok;
+  Vec y[6], w;
 
   PetscFunctionBeginUser;
   PetscCall(VecDuplicate(d, &w));
-  for (PetscInt k = 0; k < 6; k++) {
-    PetscReal before, length;
-    PetscScalar dot;
-
-    for (PetscInt c = 0; c < 6; c++) q[m][c] = c == k;
-    PetscCall(VecPointwiseMult(w, d, z[k]));
-    PetscCall(VecDot(w, z[k], &dot));
-    before = PetscSqrtReal(PetscAbsScalar(dot));
-    for (PetscInt j = 0; j < m; j++) {
-      PetscCall(VecPointwiseMult(w, d, z[j]));
-      PetscCall(VecDot(w, z[k], &dot));
-      PetscCall(VecAXPY(z[k], -dot, z[j]));
-      for (PetscInt c = 0; c < 6; c++) q[m][c] -= dot * q[j][c];
-    }
-    PetscCall(VecPointwiseMult(w, d, z[k]));
-    PetscCall(VecDot(w, z[k], &dot));
-    length = PetscSqrtReal(PetscAbsScalar(dot));
-    if (length <= NOTHING * before || length == 0.) continue;
-    PetscCall(VecScale(z[k], 1. / length));
-    for (PetscInt c = 0; c < 6; c++) q[m][c] /= length;
-    PetscCall(VecSwap(z[m], z[k]));
-    m++;
+  for (PetscInt j = 0; j < n; j++) {
+    PetscCall(VecDuplicate(d, &y[j]));
+    PetscCall(VecZeroEntries(y[j]));
+    PetscCall(VecMAXPY(y[j], 6, x + 6 * j, z));
   }
-  *n = m;
+  for (PetscInt j = 0; j < n; j++) {
+    PetscCall(VecPointwiseMult(w, d, y[j]));
+    for (PetscInt i = 0; i <= j; i++) PetscCall(VecDot(y[i], w, &M[6 * j + i]));
+    PetscCall(MatMult(run->operator, y[j], w));
+    for (PetscInt i = 0; i <= j; i++) PetscCall(VecDot(y[i], w, &E[6 * j + i]));
+  }
+  PetscCall(eigen(n, E, M, value, &ok));
+  for (part->nfree = 0; ok && part->nfree < n && PetscAbsReal(value[part->nfree]) <= FREE; part->nfree++) {
+  }
+  PetscCall(PetscInfo(NULL,
+                      "part of body %s: softest of %" PetscInt_FMT " motions %g of the cells' stiffness\n",
+                      run->model->body[part->body].name, n, ok ? (double)value[0] : -1.));
+  for (int c = 0; c < 6 && part->nfree; c++) {
+    part->motion[c] = 0.;
+    for (PetscInt i = 0; i < n; i++) part->motion[c] += E[i] * x[6 * i + c];
+  }
+  for (PetscInt j = 0; j < n; j++) PetscCall(VecDestroy(&y[j]));
   PetscCall(VecDestroy(&w));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The first of the six that is free by itself, which says more than the softest of all: *k, 6 for none. */
-static PetscErrorCode first_free(SbRun run, Vec d, Vec z[6], PetscInt *k)
+/* Of several motions that are free, one along or about an axis says most: the first such one, if there is any. */
+static PetscErrorCode plain_motion(SbRun run, Vec d, Vec lost[6], Vec z[6], Part *part)
 {
-  PetscScalar stiffness, size;
+  PetscReal off, on, stiffness, size;
   Vec w;
 
   PetscFunctionBeginUser;
   PetscCall(VecDuplicate(d, &w));
-  for (*k = 0; *k < 6; ++*k) {
-    PetscCall(VecPointwiseMult(w, d, z[*k]));
-    PetscCall(VecDot(w, z[*k], &size));
-    PetscCall(MatMult(run->operator, z[*k], w));
-    PetscCall(VecDot(w, z[*k], &stiffness));
-    if (size > 0. && PetscAbsScalar(stiffness) <= FREE * size) break;
+  for (int k = 0; k < 6; k++) {
+    PetscCall(VecNorm(lost[k], NORM_2, &off));
+    PetscCall(VecNorm(z[k], NORM_2, &on));
+    if (off * off > ALLOWED * on * on) continue;
+    PetscCall(VecPointwiseMult(w, d, z[k]));
+    PetscCall(VecDot(w, z[k], &size));
+    PetscCall(MatMult(run->operator, z[k], w));
+    PetscCall(VecDot(w, z[k], &stiffness));
+    if (PetscAbsReal(stiffness) > FREE * size) continue;
+    for (int c = 0; c < 6; c++) part->motion[c] = c == k;
+    break;
   }
   PetscCall(VecDestroy(&w));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The softest motion of a body: its stiffness, and its share of the six. */
-static PetscErrorCode softest(SbRun run, Vec d, Vec z[6], PetscReal *stiffness, PetscReal motion[6])
+/* What is free of a part. */
+static PetscErrorCode examine(SbRun run, const PetscInt label[], Vec d, Part *part)
 {
-  PetscReal q[6][6], value[6], E[36] = {0};
-  PetscScalar work[36];
-  PetscBLASInt n, six = 6, lwork = 36, info = 0;
-  PetscInt found = 0;
-  Vec Az;
+  PetscReal x[36];
+  PetscInt n = 0;
+  Vec whole[6], z[6];
 
   PetscFunctionBeginUser;
-  *stiffness = 1.;
-  PetscCall(orthonormalise(d, &found, z, q));
-  if (!found) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(VecDuplicate(d, &Az));
-  for (PetscInt j = 0; j < found; j++) {
-    PetscCall(MatMult(run->operator, z[j], Az));
-    for (PetscInt i = 0; i < found; i++) PetscCall(VecDot(z[i], Az, &E[6 * j + i]));
-  }
-  PetscCall(VecDestroy(&Az));
-  PetscCall(PetscBLASIntCast(found, &n));
-  LAPACKsyev_("V", "U", &n, E, &six, value, work, &lwork, &info);
-  if (info) PetscFunctionReturn(PETSC_SUCCESS);
-  *stiffness = PetscAbsReal(value[0]);
-  for (int c = 0; c < 6; c++) {
-    motion[c] = 0.;
-    for (PetscInt i = 0; i < found; i++) motion[c] += E[i] * q[i][c];
+  part->nfree = 0;
+  PetscCall(measure(run, label, part));
+  for (PetscInt k = 0; k < 6; k++) PetscCall(create_motion(run, label, part, k, &whole[k], &z[k]));
+  PetscCall(allowed(whole, z, &n, x)); /* whole is then what is lost */
+  if (n) PetscCall(resisted(run, d, z, n, x, part));
+  if (part->nfree > 1) PetscCall(plain_motion(run, d, whole, z, part));
+  for (int k = 0; k < 6; k++) {
+    PetscCall(VecDestroy(&whole[k]));
+    PetscCall(VecDestroy(&z[k]));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* "moving along (1, 0, 0)" or "turning about (0, 0, 1)", whichever is more of it. */
-static PetscErrorCode say_motion(const PetscReal motion[6], size_t size, char text[])
+/* ------------------------------------------------------------------ words */
+
+/* e: the direction of v with its largest component positive, small ones zero. */
+static void direction(const PetscReal v[3], PetscReal e[3])
 {
-  const PetscReal along = PetscSqrtReal(PetscSqr(motion[0]) + PetscSqr(motion[1]) + PetscSqr(motion[2]));
-  const PetscReal about = PetscSqrtReal(PetscSqr(motion[3]) + PetscSqr(motion[4]) + PetscSqr(motion[5]));
-  const PetscBool turns = (PetscBool)(about > 2. * along);
-  const PetscReal *v = turns ? motion + 3 : motion, length = turns ? about : along;
-  PetscReal e[3];
+  const PetscReal length = PetscSqrtReal(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
   int largest = 0;
 
-  PetscFunctionBeginUser;
-  for (int c = 1; c < 3; c++) largest = PetscAbsReal(v[c]) > PetscAbsReal(v[largest]) ? c : largest;
+  for (int c = 1; c < 3; c++)
+    largest = PetscAbsReal(v[c]) > PetscAbsReal(v[largest]) + 1e-9 * length ? c : largest;
   for (int c = 0; c < 3; c++) {
     e[c] = (v[largest] < 0. ? -v[c] : v[c]) / length;
     if (PetscAbsReal(e[c]) < 5e-3) e[c] = 0.;
   }
-  PetscCall(PetscSNPrintf(text, size, "%s(%.2f, %.2f, %.2f)", turns ? "turning about " : "moving along ",
-                          (double)e[0], (double)e[1], (double)e[2]));
+}
+
+/* "moving along (1, 0, 0)", or "turning about the axis along (0, 0, 1) through (x, y, z)". */
+static PetscErrorCode say_motion(const Part *part, size_t size, char text[])
+{
+  const PetscReal *t = part->motion, *w = part->motion + 3, w2 = w[0] * w[0] + w[1] * w[1] + w[2] * w[2],
+                  t2 = t[0] * t[0] + t[1] * t[1] + t[2] * t[2];
+  PetscReal e[3], p[3];
+
+  PetscFunctionBeginUser;
+  if (w2 <= 1e-10 * t2) {
+    direction(t, e);
+    PetscCall(
+      PetscSNPrintf(text, size, "moving along (%.2f, %.2f, %.2f)", (double)e[0], (double)e[1], (double)e[2]));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  direction(w, e);
+  /* t + w / size x (p - centre) has no part across w there */
+  for (int c = 0; c < 3; c++) {
+    p[c] =
+      part->centre[c] + part->size * (w[(c + 1) % 3] * t[(c + 2) % 3] - w[(c + 2) % 3] * t[(c + 1) % 3]) / w2;
+    if (PetscAbsReal(p[c]) < 1e-9 * part->size) p[c] = 0.;
+  }
+  PetscCall(
+    PetscSNPrintf(text, size, "turning about the axis along (%.2f, %.2f, %.2f) through (%.4g, %.4g, %.4g) m",
+                  (double)e[0], (double)e[1], (double)e[2], (double)p[0], (double)p[1], (double)p[2]));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* What more there is to say: a part among several, further motions, an element whose nodes are the centres of facets. */
+static PetscErrorCode say_more(SbRun run, const PetscInt label[], const Part *part, PetscInt nbrother,
+                               size_t size, char text[])
+{
+  SbSpace s = run->model->space;
+  PetscInt held[2] = {0, 0};
+  char more[128];
+
+  PetscFunctionBeginUser;
+  if (part->nfree > 1) {
+    PetscCall(PetscSNPrintf(more, sizeof(more), " and %" PetscInt_FMT " more motion%s", part->nfree - 1,
+                            part->nfree > 2 ? "s" : ""));
+    PetscCall(PetscStrlcat(text, more, size));
+  }
+  if (nbrother > 1) {
+    PetscCall(PetscSNPrintf(more, sizeof(more),
+                            " (one of its %" PetscInt_FMT " parts, around (%.4g, %.4g, %.4g) m)", nbrother,
+                            (double)part->centre[0], (double)part->centre[1], (double)part->centre[2]));
+    PetscCall(PetscStrlcat(text, more, size));
+  }
+  for (PetscInt k = 0; k < s->nfixed; k++) {
+    if (s->fixed_node[k] < s->nnode_owned && label[s->fixed_node[k]] == part->label) held[0]++;
+  }
+  PetscCallMPI(MPI_Allreduce(&held[0], &held[1], 1, MPIU_INT, MPI_SUM, s->comm));
+  if (held[1] && held[1] <= 2 && !s->element[part->body]->nodes_per[0]) {
+    PetscCall(PetscSNPrintf(more, sizeof(more),
+                            "; %s is held at the centres of facets, here of %" PetscInt_FMT
+                            ": three that are not in line hold it",
+                            s->element[part->body]->name, held[1]));
+    PetscCall(PetscStrlcat(text, more, size));
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode SbRunFreeBody(SbRun run, PetscInt *body, size_t size, char motion[])
 {
-  const SbModel m = run->model;
-  PetscBool assembled;
-  Vec d, z[6];
+  PetscInt *label, *list, npart = 0, nbrother = 0;
+  PetscBool diagonal;
+  Part part;
+  Vec d;
 
   PetscFunctionBeginUser;
   *body = -1;
-  PetscCall(PetscObjectTypeCompareAny((PetscObject)run->J, &assembled, MATSEQAIJ, MATMPIAIJ, MATSEQBAIJ,
-                                      MATMPIBAIJ, MATSEQSBAIJ, ""));
-  if (!assembled) PetscFunctionReturn(PETSC_SUCCESS); /* -solver pressure keeps a part of it elsewhere */
-  PetscCall(SbSpaceCreateVec(m->space, &d));
+  PetscCall(MatHasOperation(run->J, MATOP_GET_DIAGONAL, &diagonal));
+  if (!diagonal) PetscFunctionReturn(PETSC_SUCCESS); /* -solver realtime, which is for dynamic runs */
+  PetscCall(SbSpaceCreateVec(run->model->space, &d));
   PetscCall(MatGetDiagonal(run->J, d));
   PetscCall(VecAbs(d));
-  for (PetscInt b = 0; b < m->nbody && *body < 0; b++) {
-    const PetscReal *box = m->body[b].bbox;
-    PetscReal centre[3], length = 0., stiffness, softest_of[6];
-    PetscInt first = 6;
-
-    for (int c = 0; c < 3; c++) {
-      centre[c] = 0.5 * (box[c] + box[3 + c]);
-      length = PetscMax(length, 0.5 * (box[3 + c] - box[c]));
-    }
-    for (PetscInt k = 0; k < 6; k++) PetscCall(create_motion(run, b, centre, length, k, &z[k]));
-    PetscCall(first_free(run, d, z, &first));
-    if (first < 6) {
-      for (PetscInt k = 0; k < 6; k++) softest_of[k] = k == first;
-      stiffness = 0.;
-    } else
-      PetscCall(softest(run, d, z, &stiffness, softest_of));
-    for (PetscInt k = 0; k < 6; k++) PetscCall(VecDestroy(&z[k]));
-    PetscCall(PetscInfo(NULL, "body %s: softest rigid motion %g of a cell's stiffness\n", m->body[b].name,
-                        (double)stiffness));
-    if (stiffness > FREE) continue;
-    *body = b;
-    PetscCall(say_motion(softest_of, size, motion));
+  PetscCall(label_parts(run->model->space, &label));
+  PetscCall(list_parts(run->model->space, label, &npart, &list));
+  for (PetscInt k = 0; k < npart && *body < 0; k++) {
+    part.label = list[k];
+    PetscCall(examine(run, label, d, &part));
+    if (part.nfree) *body = part.body;
   }
+  if (*body >= 0) {
+    for (PetscInt k = 0; k < npart; k++) {
+      Part other = {.label = list[k]};
+
+      PetscCall(measure(run, label, &other));
+      nbrother += other.body == *body;
+    }
+    PetscCall(say_motion(&part, size, motion));
+    PetscCall(say_more(run, label, &part, nbrother, size, motion));
+  }
+  PetscCall(PetscFree(label));
+  PetscCall(PetscFree(list));
   PetscCall(VecDestroy(&d));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
