@@ -231,6 +231,8 @@ PetscBool SbSpaceIsHeld(SbSpace space);
 /* The operator of solves: K, its springs, projected. singular: K may be so, because only rows hold some body: it is made regular for
    preconditioners, but for the operator; SB_SADDLE_DIRECT needs none of that. Collective; the caller destroys it; K is borrowed until then. */
 PetscErrorCode SbCoupleCreateOperator(SbSpace space, Mat K, PetscBool singular, SbSaddle saddle, Mat *A);
+/* Another matrix in the place of K; borrowed. Not collective. */
+PetscErrorCode SbCoupleSetMatrix(SbSpace space, Mat K);
 
 /* Per owned cell: Cauchy stress sigma[6] = xx yy zz xy yz xz (Pa), J, energy density (J/m^3, rest). Outputs may be NULL. */
 PetscErrorCode SbSpaceCellState(SbSpace space, const PetscReal u[], PetscReal sigma[], PetscReal J[],

@@ -8,6 +8,7 @@
 #define SB_SET_MAX 63                /* named sets that one scenario may use: one bit each, bit 0 is taken */
 #define SB_ON_BOUNDARY ((uint64_t)1) /* bit 0 of SbMesh.face_set: the face has no cell on the other side */
 #define SB_SET_BIT(k) ((uint64_t)1 << ((k) + 1))
+#define SB_SLIVER 0.5       /* degrees: tets with a smaller dihedral angle are slivers, which solvers feel */
 #define SB_INCLUSION_MAX 16 /* inclusions of a body: tets with a material of their own */
 
 /* Who makes tets from a surface. */
@@ -79,6 +80,7 @@ typedef struct {
   PetscInt npart;                /* connected parts */
   PetscReal volume;              /* rest volume, m^3 */
   PetscReal min_dihedral;        /* smallest dihedral angle, degrees */
+  PetscInt nsliver;              /* tets with one below SB_SLIVER */
   PetscReal max_radius_ratio;    /* circumradius / (3 inradius), 1 for the regular tet; the worst cell */
   PetscReal bbox[6];             /* xmin ymin zmin xmax ymax zmax, placed, m */
   char note[768]; /* what was repaired or is odd, "unused vertices left out: 3, ..."; "" when nothing */

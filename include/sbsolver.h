@@ -29,12 +29,15 @@ PetscErrorCode SbSolverPivot(MPI_Comm comm, size_t size, char choice[]);
 /* negative: eigenvalues below zero of the matrix that `snes` has factored last, -1: its solver does not tell. Collective. */
 PetscErrorCode SbSolverNegative(SNES snes, PetscInt *negative);
 /*
-  SbSolverFallBack - after a solve that failed: a simpler preconditioner when the present one broke down (an incomplete
-  factorisation that is not positive definite), said once as a warning. Collective.
+  SbSolverNext - what to try after a solver that failed: first a factorisation, for large systems iterations first.
 
-  Output: changed, false when there is nothing simpler or the failure was another one; then the step has to be cut.
+  Collective. Input: reason - why it failed; memory - for want of memory. In and out: tried, bits of the rows that failed in this run; preset,
+  the one that failed, then the next one that this PETSc has and that can solve for the space, NULL when there is none.
 */
-PetscErrorCode SbSolverFallBack(SNES snes, PetscBool *changed);
+PetscErrorCode SbSolverNext(SbSpace space, KSPConvergedReason reason, PetscBool memory, uint32_t *tried,
+                            const SbSolverPreset **preset);
+/* Takes the row's options out of the database again, but for those with another value: they are the user's. Not collective. */
+PetscErrorCode SbSolverClear(const SbSolverPreset *preset);
 /* Gives the linear solver of `snes` the preset's options and tolerances; before SNESSetFromOptions(). Collective. */
 PetscErrorCode SbSolverSetUp(SNES snes, SbSpace space, const SbSolverPreset *preset);
 /* Solves of ksp whose true residual is far above the tolerance fail (KSP_DIVERGED_BREAKDOWN). Not collective. */

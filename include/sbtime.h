@@ -105,6 +105,8 @@ struct _p_SbRun {
   const struct _SbSolverPreset *solver_used;
   char solver[SB_NAME_MAX]; /* preset chosen, "cg_gamg" */
   char solver_reason[256];
+  struct _p_SbSolverList
+    *solver_list; /* what happens when it fails (solver_list.c); NULL without linear systems */
   PetscInt nmonitor;
   struct {
     SbMonitorFn fn;
@@ -147,7 +149,7 @@ struct _p_SbRun {
   Vec loads, reaction,
     previous; /* f_ext and residual at the last step, its displacement: for works; only with want_energies */
   PetscReal damping_power; /* at the last step, W */
-  char stop_reason[512];   /* why the run ended early; empty when it reached its end */
+  char stop_reason[1024];  /* why the run ended early; empty when it reached its end */
   void *output;            /* what src/output keeps for this run; NULL when no output was asked for */
   PetscErrorCode (*output_destroy)(
     SbRun run); /* frees it; called by SbRunDestroy() when not NULL, before the monitors */

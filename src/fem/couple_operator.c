@@ -73,6 +73,13 @@ PetscErrorCode SbCoupleCreateOperator(SbSpace s, Mat K, PetscBool singular, SbSa
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscErrorCode SbCoupleSetMatrix(SbSpace s, Mat K)
+{
+  PetscFunctionBeginUser;
+  s->couple->K = K;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 #define NAME "null space of rows"
 
 typedef struct {

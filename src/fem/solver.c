@@ -5,14 +5,16 @@
   Convergence is judged by the true residual: the preconditioned norm can be off by orders of magnitude for nearly
   incompressible bodies. Gauss-Seidel and SOR are wrapped in a PCCOMPOSITE of one: Richardson hands its whole loop to a bare
   PCSOR, which does the largest number of sweeps without looking at the residual. A solve that does not reach its tolerance fails; the
-  step is then cut or the run stops.
+  next row of a list is then tried on the same system (time/solver_list.c), and only after the last one is the step cut or the run stopped.
 */
 #include "couple.h"
 #include "sbsolver.h"
 
 #define RESTART 100       /* of FGMRES */
 #define NU_ROTATED 0.4999 /* up to here nodes of CR and DG at faces may turn a factorisation with them */
-#define NU_PRESSURE 0.45  /* from here on, dynamic runs of CR and DG do better with the pressures apart */
+#define DIRECT_NEXT \
+  200000 /* unknowns up to which a factorisation is the first to be tried after another solver */
+#define NU_PRESSURE 0.45 /* from here on, dynamic runs of CR and DG do better with the pressures apart */
 
 static PetscErrorCode create_frames(SbSpace s, Mat *A)
 {
@@ -142,6 +144,26 @@ static PetscErrorCode may_be_indefinite(SbSpace s, PetscBool *maybe)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The value of a row's option, "cholesky" of -pc_type; "" where there is none. */
+static PetscErrorCode preset_value(const SbSolverPreset *preset, const char *name, size_t size, char value[])
+{
+  const char *at = strstr(preset->options, name);
+
+  PetscFunctionBeginUser;
+  value[0] = 0;
+  if (at) {
+    at += strlen(name) + 1;
+    PetscCall(PetscStrncpy(value, at, PetscMin(size, strcspn(at, " ") + 1)));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscBool is_direct(const SbSolverPreset *preset)
+{
+  return (PetscBool)(preset->precondition == factor_cholmod || preset->precondition == factor_umfpack ||
+                     preset->precondition == factor_mumps);
+}
+
 /* Largest Poisson's ratio among the bodies with nodes at faces, -1 without any. */
 static PetscErrorCode largest_poisson(SbSpace s, PetscReal *nu)
 {
@@ -246,6 +268,59 @@ PetscErrorCode SbSolverChoose(SbSpace s, PetscBool dynamic, PetscBool linear, Pe
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Solvers after one that failed, in this order, and up to how many unknowns: a factorisation fails seldom, and costs most. */
+static const struct {
+  const char *name;
+  PetscInt most;
+} others[] = {{"direct", DIRECT_NEXT},
+              {"pressure", PETSC_MAX_INT},
+              {"cg_gamg", PETSC_MAX_INT},
+              {"direct", PETSC_MAX_INT}};
+
+/* The row of a name in that list that has not failed yet and can solve for this space; NULL: there is none. */
+static PetscErrorCode find_other(SbSpace s, const char *name, PetscBool indefinite, uint32_t tried,
+                                 const SbSolverPreset **preset)
+{
+  const PetscBool direct = (PetscBool)!strcmp(name, "direct");
+
+  PetscFunctionBeginUser;
+  *preset = direct ? NULL : find_preset(name);
+  /* what is not definite by rounding or by stress is next */
+  for (int k = indefinite; direct && k < 2 && !*preset; k++) {
+    const char *package;
+
+    PetscCall(SbDirectPackage(s->comm, 3 * s->Nnode, (PetscBool)!k, &package));
+    if (package) *preset = find_preset(package);
+    if (*preset && tried & 1U << (*preset - presets)) *preset = NULL;
+  }
+  if (*preset && tried & 1U << (*preset - presets)) *preset = NULL;
+  if (*preset && (*preset)->create && (!s->faces || s->held || s->couple)) *preset = NULL;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbSolverNext(SbSpace s, KSPConvergedReason reason, PetscBool memory, uint32_t *tried,
+                            const SbSolverPreset **preset)
+{
+  const SbSolverPreset *failed = *preset;
+  PetscBool indefinite;
+
+  PetscFunctionBeginUser;
+  *preset = NULL;
+  *tried |= 1U << (failed - presets);
+  PetscCall(may_be_indefinite(s, &indefinite));
+  /* where the tangent itself is not definite, and may be so, the iteration is not to blame: that is Newton's affair */
+  if (indefinite && reason == KSP_DIVERGED_INDEFINITE_MAT) PetscFunctionReturn(PETSC_SUCCESS);
+  for (size_t k = 0; k < PETSC_STATIC_ARRAY_LENGTH(others) && !*preset; k++) {
+    const PetscBool direct = (PetscBool)!strcmp(others[k].name, "direct");
+
+    if (3 * s->Nnode > others[k].most || (memory && direct)) continue;
+    /* what a factorisation finds singular no iteration solves */
+    if (is_direct(failed) && !memory && !direct) continue;
+    PetscCall(find_other(s, others[k].name, indefinite, *tried, preset));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Options of the row that the user did not give. */
 static PetscErrorCode insert_options(const char *text)
 {
@@ -259,8 +334,31 @@ static PetscErrorCode insert_options(const char *text)
     PetscBool given;
 
     if (k + 1 < n && word[k + 1][0] != '-') value = word[++k];
+    /* the types are set by calls, so that what stands in the database is the user's */
+    if (!strcmp(name, "-ksp_type") || !strcmp(name, "-pc_type")) continue;
     PetscCall(PetscOptionsHasName(NULL, NULL, name, &given));
     if (!given) PetscCall(PetscOptionsSetValue(NULL, name, value));
+  }
+  PetscCall(PetscStrToArrayDestroy(n, word));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbSolverClear(const SbSolverPreset *preset)
+{
+  char **word;
+  int n;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscStrToArray(preset->options, ' ', &n, &word));
+  for (int k = 0; k < n; k++) {
+    const char *name = word[k], *value = "";
+    char there[128] = "";
+    PetscBool given;
+
+    if (k + 1 < n && word[k + 1][0] != '-') value = word[++k];
+    PetscCall(PetscOptionsGetString(NULL, NULL, name, there, sizeof(there), &given));
+    if (strcmp(name, "-ksp_type") && strcmp(name, "-pc_type") && given && !strcmp(there, value))
+      PetscCall(PetscOptionsClearValue(NULL, name));
   }
   PetscCall(PetscStrToArrayDestroy(n, word));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -282,23 +380,27 @@ PetscErrorCode SbSolverCreateOperator(SbSpace s, const SbSolverPreset *preset, M
 
 PetscErrorCode SbSolverSetUp(SNES snes, SbSpace s, const SbSolverPreset *preset)
 {
-  PetscBool direct;
+  char type[SB_NAME_MAX];
   KSP ksp;
   PC pc;
 
   PetscFunctionBeginUser;
   PetscCall(SNESGetKSP(snes, &ksp));
   PetscCall(KSPSetTolerances(ksp, 1e-8, PETSC_DEFAULT, PETSC_DEFAULT, 5000));
-  PetscCall(KSPSetType(ksp, KSPCG));
+  PetscCall(preset_value(preset, "-ksp_type", sizeof(type), type));
+  PetscCall(KSPSetType(ksp, type));
+  if (s->couple) s->couple->general = PETSC_FALSE;
   PetscCall(KSPSetNormType(ksp, KSP_NORM_UNPRECONDITIONED));
   PetscCall(insert_options(preset->options));
   PetscCall(KSPGetPC(ksp, &pc));
   /* in a null space the residual of CG may grow a long way before it falls */
   if (s->couple) PetscCall(KSPSetTolerances(ksp, PETSC_DEFAULT, PETSC_DEFAULT, 1e10, PETSC_DEFAULT));
   PetscCall(SbPCCoupleCreate(s, pc, &pc));
+  PetscCall(preset_value(preset, "-pc_type", sizeof(type), type));
+  if (type[0]) PetscCall(PCSetType(pc, type));
   if (preset->precondition) PetscCall(preset->precondition(s, pc));
-  PetscCall(PetscObjectTypeCompareAny((PetscObject)pc, &direct, PCCHOLESKY, PCLU, PCTELESCOPE, ""));
-  if (direct || (s->couple && s->couple->saddle == SB_SADDLE_DIRECT)) PetscCall(SbSolverLookAtResidual(ksp));
+  if (is_direct(preset) || (s->couple && s->couple->saddle == SB_SADDLE_DIRECT))
+    PetscCall(SbSolverLookAtResidual(ksp));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -373,38 +475,5 @@ PetscErrorCode SbSolverNegative(SNES snes, PetscInt *negative)
   PetscCall(MatMumpsGetIcntl(F, 13, &serial_root));
   PetscCallMPI(MPI_Comm_size(PetscObjectComm((PetscObject)F), &nrank));
   if (nrank == 1 || serial_root == 1) PetscCall(MatGetInertia(F, negative, NULL, NULL));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode SbSolverFallBack(SNES snes, PetscBool *changed)
-{
-  KSP ksp;
-  PC pc;
-  KSPConvergedReason reason;
-  PetscBool incomplete, symmetric, factored;
-  Mat A;
-
-  PetscFunctionBeginUser;
-  *changed = PETSC_FALSE;
-  PetscCall(SNESGetKSP(snes, &ksp));
-  PetscCall(KSPGetConvergedReason(ksp, &reason));
-  PetscCall(KSPGetPC(ksp, &pc));
-  PetscCall(SbPCCoupleIsFactored(pc, &factored));
-  if (factored) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(SbPCCoupleGetInner(pc, &pc));
-  PetscCall(SbPCCoarseFallBack(pc, reason, changed));
-  if (*changed) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(PetscObjectTypeCompareAny((PetscObject)pc, &incomplete, PCICC, PCBJACOBI, ""));
-  if (!incomplete || (reason != KSP_DIVERGED_INDEFINITE_PC && reason != KSP_DIVERGED_PC_FAILED &&
-                      reason != KSP_DIVERGED_NANORINF))
-    PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(SNESGetJacobian(snes, NULL, &A, NULL, NULL));
-  PetscCall(PetscObjectTypeCompareAny((PetscObject)A, &symmetric, MATSEQSBAIJ, MATMPISBAIJ, ""));
-  PetscCall(PCSetType(pc, symmetric ? PCJACOBI : PCPBJACOBI));
-  PetscCall(SbWarning(PetscObjectComm((PetscObject)snes),
-                      "the incomplete factorisation is not positive definite (very flat tets, or nu near "
-                      "1/2): going on with %s, which is slower; -solver cg_gamg may be faster",
-                      symmetric ? "jacobi" : "pbjacobi"));
-  *changed = PETSC_TRUE;
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -133,12 +133,18 @@ static PetscErrorCode write_note(const SbImport *im, SbBody *body)
 PetscErrorCode SbImportQuality(const SbImport *im, const SbFaces *faces, SbBody *body)
 {
   PetscReal V, cosine[6], ratio, max_cos = -1, volume = 0, max_ratio = 0;
+  const PetscReal sliver = PetscCosReal(SB_SLIVER * PETSC_PI / 180);
 
   PetscFunctionBeginUser;
+  body->nsliver = 0;
   for (PetscInt c = 0; c < im->item[3].n; c++) {
+    PetscReal largest = -1;
+
     SbTetShape(im->x, im->item[3].vert + 4 * c, &V, cosine, &ratio);
     volume += V;
-    for (int e = 0; e < 6; e++) max_cos = PetscMax(max_cos, cosine[e]);
+    for (int e = 0; e < 6; e++) largest = PetscMax(largest, cosine[e]);
+    max_cos = PetscMax(max_cos, largest);
+    body->nsliver += largest > sliver;
     max_ratio = PetscMax(max_ratio, ratio);
   }
   body->nvert = im->nvert;

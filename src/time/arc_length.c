@@ -402,11 +402,7 @@ PetscErrorCode SbArcLengthSolve(SbRun run)
       PetscCall(VecCopy(run->U, p.X));
       PetscCall(put_at(&p, factor));
       PetscCall(begin_step(&p, &sign, &ok));
-      if (!ok) {
-        PetscCall(SbSolverFallBack(run->snes, &ok));
-        if (ok) continue;
-        break;
-      }
+      if (!ok) break;
       known = PETSC_TRUE;
     }
     if (l == 0.) PetscCall(first_length(&p, factor, &l));

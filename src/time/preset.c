@@ -567,6 +567,7 @@ PetscErrorCode SbRunSetUp(SbRun run)
     PetscCall(set_up_ts(run));
   else
     PetscCall(set_up_static(run));
+  PetscCall(SbSolverListCreate(run));
   PetscCall(warn_growth(run));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -610,6 +611,7 @@ PetscErrorCode SbRunDestroy(SbRun *run)
   for (PetscInt k = 0; k < r->nmonitor; k++) {
     if (r->monitor[k].destroy) PetscCall(r->monitor[k].destroy(r->monitor[k].ctx));
   }
+  PetscCall(SbSolverListDestroy(r));
   if (!r->ts) PetscCall(SNESDestroy(&r->snes));
   PetscCall(TSDestroy(&r->ts));
   PetscCall(VecDestroy(&r->R));

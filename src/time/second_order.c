@@ -19,7 +19,6 @@
   petsc/private/tsimpl.h: PETSc has no public way to write a TSType.
 */
 #include <petsc/private/tsimpl.h>
-#include "sbsolver.h"
 #include "time_impl.h"
 
 typedef struct {
@@ -215,16 +214,13 @@ static PetscErrorCode complete(void *ctx, SNESConvergedReason reason, SbSolved *
                         "of %g s is beyond the stable one (see the header)",
                         ts->steps + 1, (double)ts->ptime, (double)ts->time_step));
   else if (!*ok && reason != SNES_CONVERGED_ITERATING) {
-    KSP ksp;
-    KSPConvergedReason kreason;
+    char why[512] = "";
 
-    PetscCall(SNESGetKSP(ts->snes, &ksp));
-    PetscCall(KSPGetConvergedReason(ksp, &kreason));
-    PetscCall(SbRunFail(so->run,
-                        "step %" PetscInt_FMT " at t = %g s with a length of %g s: %s (linear solver: %s)",
+    if (reason == SNES_DIVERGED_LINEAR_SOLVE) PetscCall(SbSolverListExplain(so->run, sizeof(why), why));
+    PetscCall(SbRunFail(so->run, "step %" PetscInt_FMT " at t = %g s with a length of %g s: %s%s%s",
                         ts->steps + 1, (double)ts->ptime, (double)ts->time_step,
                         reason > 0 ? "the solution is not finite" : SNESConvergedReasons[reason],
-                        KSPConvergedReasons[kreason]));
+                        why[0] ? "; " : "", why));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -334,22 +330,12 @@ static PetscErrorCode TSStep_SecondOrder(TS ts)
         go_on_after_arrival(so);
         break;
       }
-    } else if (so->run->refused) {
-      so->whole = so->rest = 0.;
-      next = 0.5 * ts->time_step;
-    } else if (so->run->arrival < 1.) {
+    } else if (!so->run->refused && so->run->arrival < 1.) {
       cut_at_arrival(ts, &next);
       cuts--;
     } else {
-      PetscBool simpler = PETSC_FALSE;
-
-      /* a preconditioner that broke down is replaced and the same step tried again */
-      if (!is_explicit(so)) PetscCall(SbSolverFallBack(ts->snes, &simpler));
-      if (simpler)
-        cuts--;
-      else
-        so->whole = so->rest = 0.;
-      next = simpler ? ts->time_step : 0.5 * ts->time_step;
+      so->whole = so->rest = 0.;
+      next = 0.5 * ts->time_step;
     }
     /* rejected: the state of the start comes back, and the step is tried with another length */
     PetscCall(VecCopy(so->X0, ts->vec_sol));

@@ -7,7 +7,6 @@
   -static_min_increment the run stops; how much faster displacements grow with the load than in the first step tells a limit load from
   other failures. A shortened step without an iteration (a change of load below rounding) is no sign that steps may be longer.
 */
-#include "sbsolver.h"
 #include "time_impl.h"
 
 #define LIMIT 10. /* softening from which on a limit load is likely */
@@ -56,30 +55,16 @@ static PetscErrorCode predict(void *ctx)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Whether some displacement of some rank is prescribed. */
-static PetscErrorCode anything_held(SbRun run, PetscBool *held)
-{
-  PetscInt n = run->model->space->nfixed;
-
-  PetscFunctionBeginUser;
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &n, 1, MPIU_INT, MPI_SUM, run->model->comm));
-  *held = (PetscBool)(n > 0);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* Looks for a body that nothing holds; *found, and the run's reason to stop says so. */
 static PetscErrorCode look_for_free_body(SbRun run, PetscReal factor, PetscBool *found)
 {
   PetscInt body;
-  char motion[128];
-  PetscBool held;
+  char motion[256];
 
   PetscFunctionBeginUser;
   PetscCall(SbRunFreeBody(run, &body, sizeof(motion), motion));
   *found = (PetscBool)(body >= 0);
-  PetscCall(anything_held(run, &held));
-  /* beside supports it may be the tangent of a solve that went astray, and a shorter step may do */
-  run->free_body = (PetscBool)(*found && !run->model->ntouch && !held);
+  run->free_body = (PetscBool)(*found && !run->model->ntouch);
   if (*found)
     PetscCall(SbRunFail(run, "load factor %g: nothing holds the body %s against %s; hold it by a support%s",
                         (double)factor, run->model->body[body].name, motion,
@@ -90,32 +75,24 @@ static PetscErrorCode look_for_free_body(SbRun run, PetscReal factor, PetscBool 
 /* Why the solve failed. */
 static PetscErrorCode explain(SbRun run, PetscReal factor, SNESConvergedReason reason)
 {
-  KSPConvergedReason kreason;
   PetscBool found;
-  KSP ksp;
+  char why[512] = "use more -static_steps";
 
   PetscFunctionBeginUser;
   PetscCall(look_for_free_body(run, factor, &found));
   if (found) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(SNESGetKSP(run->snes, &ksp));
-  PetscCall(KSPGetConvergedReason(ksp, &kreason));
-  PetscCall(SbRunFail(run,
-                      "load factor %g: %s (linear solver: %s); use more -static_steps, or hold the bodies so "
-                      "that they cannot move freely",
-                      (double)factor, SNESConvergedReasons[reason], KSPConvergedReasons[kreason]));
+  if (reason == SNES_DIVERGED_LINEAR_SOLVE) PetscCall(SbSolverListExplain(run, sizeof(why), why));
+  PetscCall(SbRunFail(run, "load factor %g: %s; %s", (double)factor, SNESConvergedReasons[reason], why));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Loads in balance leave a singular system with a solution, and a solver may find it with any rigid motion on top. */
 static PetscErrorCode refuse_free_body(SbRun run, PetscReal factor, PetscBool *ok)
 {
-  PetscBool held, found;
+  PetscBool found;
 
   PetscFunctionBeginUser;
   if (!*ok || run->steps_total || run->model->ntouch || !run->newton_step) PetscFunctionReturn(PETSC_SUCCESS);
-  /* beside supports the look is not sure enough to refuse what was solved: near nu = 1/2 they are soft against the cells */
-  PetscCall(anything_held(run, &held));
-  if (held) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(look_for_free_body(run, factor, &found));
   if (found) *ok = PETSC_FALSE;
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -198,12 +175,8 @@ PetscErrorCode SbStaticSolve(SbRun run)
     attempt.dt = next - factor;
     PetscCall(SbRunAttempt(run, &attempt, &ok));
     if (!ok) {
-      PetscBool simpler = PETSC_FALSE;
-
       run->rejected_step++;
       run->rejected_total++;
-      if (!run->refused) PetscCall(SbSolverFallBack(run->snes, &simpler));
-      if (simpler) continue;
       length *= 0.5;
       run->tangent_known = PETSC_FALSE;
       if (run->free_body) break;

@@ -87,6 +87,18 @@ PetscErrorCode SbNewmarkContact(SbRun run, PetscReal t, PetscReal dt, Vec U, Vec
 /* own <- the acceleration at t without contact, of the state U, V; A at prescribed unknowns. Collective. */
 PetscErrorCode SbNewmarkOwn(SbRun run, PetscReal t, Vec U, Vec V, Vec A, Vec own);
 
+/*
+  solver_list.c: when a linear solve of run->snes fails, the next solver of SbSolverNext() is tried on the same system, with one warning
+  line, and stays. Nothing is replaced where -ksp_type or -pc_type are the user's.
+
+  Collective, after SbSolverFinish().
+*/
+PetscErrorCode SbSolverListCreate(SbRun run);
+PetscErrorCode SbSolverListDestroy(SbRun run);
+/* After a Newton step whose linear solve failed: "linear solver: ", each solver that was tried with its reason, iterations and residual, what is known of the
+   causes, and advice. Collective. */
+PetscErrorCode SbSolverListExplain(SbRun run, size_t size, char text[]);
+
 PetscErrorCode SbStaticSolve(SbRun run); /* static.c: the load path */
 /* arc_length.c: the path of equilibria with the load factor as an unknown. Collective. Check: after the solver is set up; PETSC_ERR_USER_INPUT for
    contact, and for solvers that take definite matrices only. */

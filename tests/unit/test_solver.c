@@ -168,7 +168,7 @@ int main(int argc, char **argv)
     SB_CHECK_NEAR(z, exact, 1e-6 * PetscAbsReal(exact), solvers[k]);
     PetscCall(PetscPrintf(PETSC_COMM_WORLD, "%-14s %" PetscInt_FMT " iterations\n", solvers[k], iterations));
   }
-  PetscCall(tip("-solver cg_jacobi -ksp_max_it 3 -time_max_cuts 2", &z, stop, &iterations));
+  PetscCall(tip("-solver cg_jacobi -ksp_type cg -ksp_max_it 3 -time_max_cuts 2", &z, stop, &iterations));
   SB_CHECK(stop[0], "three iterations passed as a solution");
   SB_CHECK(strstr(stop, "DIVERGED_ITS"), "the reason does not name the limit: %s", stop);
   PetscCall(check_indefinite(MATSOLVERCHOLMOD, KSPPREONLY));

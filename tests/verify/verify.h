@@ -16,29 +16,33 @@ static inline PetscInt verify_vertex(const PetscInt n[3], const PetscInt at[3])
   return (at[2] * (n[1] + 1) + at[1]) * (n[0] + 1) + at[0];
 }
 
-/* Six tets of each cell around a diagonal, mirrored from cell to cell as those of a box: mesh. */
-static inline void verify_write_cells(FILE *f, const PetscInt n[3])
+/* Vertices of tet w = 0..5 of the cell c[3]: six around a diagonal, mirrored from cell to cell as those of a box: mesh. */
+static inline void verify_tet(const PetscInt n[3], const PetscInt c[3], int w, PetscInt vertex[4])
 {
   static const int ways[6][4] = {{0, 1, 3, 7}, {0, 2, 6, 7}, {0, 4, 5, 7},
                                  {0, 1, 5, 7}, {0, 2, 3, 7}, {0, 4, 6, 7}};
-  PetscInt c[3], count = 0;
+  const int mirror = (int)((c[0] & 1) | (c[1] & 1) << 1 | (c[2] & 1) << 2);
+  const PetscBool swap = (PetscBool)(((c[0] + c[1] + c[2]) & 1) ^ (w >= 3)); /* positive volumes */
+
+  for (int a = 0; a < 4; a++) {
+    const int corner = ways[w][swap && a >= 2 ? 5 - a : a] ^ mirror;
+    const PetscInt at[3] = {c[0] + (corner & 1), c[1] + (corner >> 1 & 1), c[2] + (corner >> 2)};
+
+    vertex[a] = verify_vertex(n, at);
+  }
+}
+
+static inline void verify_write_cells(FILE *f, const PetscInt n[3])
+{
+  PetscInt c[3], v[4], count = 0;
 
   for (c[2] = 0; c[2] < n[2]; c[2]++) {
     for (c[1] = 0; c[1] < n[1]; c[1]++) {
       for (c[0] = 0; c[0] < n[0]; c[0]++) {
-        const int mirror = (int)((c[0] & 1) | (c[1] & 1) << 1 | (c[2] & 1) << 2);
-
         for (int w = 0; w < 6; w++) {
-          const PetscBool swap = (PetscBool)(((c[0] + c[1] + c[2]) & 1) ^ (w >= 3)); /* positive volumes */
-
-          fprintf(f, "%d 4 2 0 1", (int)++count);
-          for (int a = 0; a < 4; a++) {
-            const int corner = ways[w][swap && a >= 2 ? 5 - a : a] ^ mirror;
-            const PetscInt at[3] = {c[0] + (corner & 1), c[1] + (corner >> 1 & 1), c[2] + (corner >> 2)};
-
-            fprintf(f, " %d", (int)verify_vertex(n, at) + 1);
-          }
-          fprintf(f, "\n");
+          verify_tet(n, c, w, v);
+          fprintf(f, "%d 4 2 0 1 %d %d %d %d\n", (int)++count, (int)v[0] + 1, (int)v[1] + 1, (int)v[2] + 1,
+                  (int)v[3] + 1);
         }
       }
     }

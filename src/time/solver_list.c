@@ -1,0 +1,308 @@
+/*
+  What happens when a linear solve fails: the next solver of a list (SbSolverNext()) is tried on the same system, that is the same
+  Newton iteration and right-hand side, and stays for the rest of the run. A step is cut after the last one only.
+
+  It hangs behind KSPSolve() as its post-solve callback. The KSP stays the same object, so that whoever holds it keeps it; it gets another type, preconditioner
+  and, where the next solver works on another kind of matrix, another operator, assembled at Newton's iterate.
+
+  Not replaced: what the user chose by -ksp_type or -pc_type; solves by a factorisation of the saddle-point system of contact, and those along an arc length; a
+  static system in which a body has been shown to be free (free_body.c), which no solver solves; one with an exact tangent that Newton's method will filter (newton.c).
+
+  petsc/private/kspimpl.h: the reason of a solve, its iterations and the callback that is there already have no public access.
+*/
+#include "sbsolver.h"
+#include "time_impl.h"
+#include <petsc/private/kspimpl.h>
+
+#define RATIO 1e4    /* of Young's moduli: more is told */
+#define NU_HARD 0.45 /* Poisson's ratio from which on it is told */
+
+typedef struct _p_SbSolverList *SbSolverList;
+struct _p_SbSolverList {
+  SbRun run;
+  PetscBool own;                                   /* the solver is one of ours, which may be replaced */
+  uint32_t tried;                                  /* rows of the table that failed */
+  PetscErrorCode (*before)(KSP, Vec, Vec, void *); /* the callback that was there; NULL: none */
+  void *before_ctx;
+  PetscBool again; /* within a solve that another solver does once more */
+  char failures[384];
+};
+
+static PetscErrorCode after_solve(KSP ksp, Vec b, Vec x, void *ctx);
+
+static PetscErrorCode attach(SbSolverList l, KSP ksp)
+{
+  PetscFunctionBeginUser;
+  if (ksp->postsolve == after_solve) PetscFunctionReturn(PETSC_SUCCESS);
+  l->before = ksp->postsolve;
+  l->before_ctx = ksp->postctx;
+  PetscCall(KSPSetPostSolve(ksp, after_solve, l));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Why the solver failed, into text and behind l->failures: "DIVERGED_ITS of cg after 5000 iterations, ...". memory: a factorisation lacked it. */
+static PetscErrorCode tell_failure(SbSolverList l, KSP ksp, Vec b, Vec x, char text[], size_t size,
+                                   PetscBool *memory)
+{
+  const char *reason = KSPConvergedReasons[ksp->reason];
+  PetscReal load, residual;
+  PCFailedReason failed;
+  size_t length;
+  Mat A;
+  Vec r;
+
+  PetscFunctionBeginUser;
+  PetscCall(PCGetFailedReason(ksp->pc, &failed));
+  *memory = (PetscBool)(failed == PC_FACTOR_OUTMEMORY);
+  PetscCallMPI(
+    MPI_Allreduce(MPI_IN_PLACE, memory, 1, SB_MPI_BOOL, MPI_LOR, PetscObjectComm((PetscObject)ksp)));
+  if (ksp->reason == KSP_DIVERGED_PC_FAILED)
+    PetscCall(PetscSNPrintf(text, size, "%s of %s: %s", reason, l->run->solver,
+                            *memory ? "not enough memory" : "its set-up met a pivot that is not positive"));
+  else {
+    PetscCall(KSPGetOperators(ksp, &A, NULL));
+    PetscCall(VecDuplicate(b, &r));
+    PetscCall(MatMult(A, x, r));
+    PetscCall(VecAYPX(r, -1., b));
+    PetscCall(VecNorm(b, NORM_2, &load));
+    PetscCall(VecNorm(r, NORM_2, &residual));
+    PetscCall(VecDestroy(&r));
+    PetscCall(PetscSNPrintf(text, size,
+                            "%s of %s after %" PetscInt_FMT " iterations, %.2g of the residual left", reason,
+                            l->run->solver, ksp->its, (double)(residual / load)));
+  }
+  if (!l->again) l->failures[0] = 0;
+  PetscCall(PetscStrlen(l->failures, &length));
+  PetscCall(
+    PetscSNPrintf(l->failures + length, sizeof(l->failures) - length, "%s%s", length ? ", then " : "", text));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Whether another solver may do better: *is. */
+static PetscErrorCode may_replace(SbSolverList l, KSP ksp, Vec b, PetscBool *is)
+{
+  SbRun run = l->run;
+  PetscBool newton, factored;
+  PetscReal size;
+  PetscInt body = -1;
+  char motion[128];
+  Vec X;
+
+  PetscFunctionBeginUser;
+  *is = PETSC_FALSE;
+  PetscCall(PetscObjectTypeCompareAny((PetscObject)run->snes, &newton, SB_SNES_NEWTON, SNESNEWTONLS,
+                                      SNESKSPONLY, ""));
+  PetscCall(SNESGetSolution(run->snes, &X));
+  PetscCall(SbPCCoupleIsFactored(ksp->pc, &factored));
+  if (!l->own || !newton || !X || factored) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(VecNorm(b, NORM_2, &size));
+  if (PetscIsInfOrNanReal(size)) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!run->model->dynamic) PetscCall(SbRunFreeBody(run, &body, sizeof(motion), motion));
+  *is = (PetscBool)(body < 0);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The operator that `next` works on, in the place of the run's. */
+static PetscErrorCode replace_operator(SbRun run, const SbSolverPreset *next)
+{
+  SbSpace s = run->model->space;
+
+  PetscFunctionBeginUser;
+  PetscCall(MatDestroy(&run->J));
+  PetscCall(SbSolverCreateOperator(s, next, &run->J));
+  if (s->couple)
+    PetscCall(SbCoupleSetMatrix(s, run->J));
+  else {
+    PetscCall(MatDestroy(&run->operator));
+    PetscCall(PetscObjectReference((PetscObject)run->J));
+    run->operator= run->J;
+  }
+  PetscCall(SNESSetJacobian(run->snes, run->operator, run->J, NULL, NULL));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Makes of the run's KSP the solver `next`, with the tangent of Newton's iterate. */
+static PetscErrorCode replace(SbSolverList l, KSP ksp, const SbSolverPreset *next)
+{
+  PetscErrorCode (*jacobian)(SNES, Vec, Mat, Mat, void *);
+  SbRun run = l->run;
+  const SbSolverPreset *old = run->solver_used;
+  const char *prefix;
+  PetscReal rtol, atol;
+  void *ctx, *test;
+  Vec X;
+  PC pc;
+
+  PetscFunctionBeginUser;
+  PetscCall(KSPGetTolerances(ksp, &rtol, &atol, NULL, NULL));
+  PetscCall(SbSolverClear(old));
+  PetscCall(KSPReset(ksp));
+  PetscCall(KSPGetOptionsPrefix(ksp, &prefix));
+  PetscCall(PCCreate(PetscObjectComm((PetscObject)ksp), &pc));
+  PetscCall(PCSetOptionsPrefix(pc, prefix));
+  PetscCall(KSPSetPC(ksp, pc));
+  PetscCall(PCDestroy(&pc));
+  PetscCall(KSPConvergedDefaultCreate(&test));
+  PetscCall(KSPSetConvergenceTest(ksp, KSPConvergedDefault, test, KSPConvergedDefaultDestroy));
+  PetscCall(KSPSetInitialGuessNonzero(ksp, PETSC_FALSE));
+  if (old->create || next->create || old->matrix != next->matrix) PetscCall(replace_operator(run, next));
+  run->solver_used = next;
+  PetscCall(PetscStrncpy(run->solver, next->name, sizeof(run->solver)));
+  PetscCall(SbSolverSetUp(run->snes, run->model->space, next));
+  PetscCall(KSPSetFromOptions(ksp));
+  PetscCall(SbSolverFinish(run->snes, run->model->space));
+  PetscCall(KSPSetTolerances(ksp, rtol, atol, PETSC_DEFAULT, PETSC_DEFAULT));
+  PetscCall(attach(l, ksp));
+  /* the tangent may be kept from one step to the next: not this one */
+  run->tangent_known = PETSC_FALSE;
+  PetscCall(SNESGetSolution(run->snes, &X));
+  PetscCall(SNESGetJacobian(run->snes, NULL, NULL, &jacobian, &ctx));
+  PetscCall((*jacobian)(run->snes, X, run->operator, run->J, ctx));
+  PetscCall(KSPSetOperators(ksp, run->operator, run->J));
+  PetscCall(SbSolverFollowRows(ksp, run->model->space));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The same system once more; iterations of both count. */
+static PetscErrorCode solve_again(SbSolverList l, KSP ksp, Vec b, Vec x)
+{
+  const PetscInt its = ksp->its;
+  const PetscBool outer = l->again;
+  PetscBool forcing;
+
+  PetscFunctionBeginUser;
+  PetscCall(VecZeroEntries(x));
+  /* the tolerance of this Newton step is set already */
+  PetscCall(SNESKSPGetUseEW(l->run->snes, &forcing));
+  PetscCall(SNESKSPSetUseEW(l->run->snes, PETSC_FALSE));
+  l->again = PETSC_TRUE;
+  PetscCall(KSPSolve(ksp, b, x));
+  l->again = outer;
+  PetscCall(SNESKSPSetUseEW(l->run->snes, forcing));
+  ksp->its += its;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode after_solve(KSP ksp, Vec b, Vec x, void *ctx)
+{
+  SbSolverList l = (SbSolverList)ctx;
+  SbRun run = l->run;
+  const SbSolverPreset *next = run->solver_used;
+  PetscBool may = PETSC_FALSE, memory, simpler = PETSC_FALSE;
+  char text[192];
+  PC pc;
+
+  PetscFunctionBeginUser;
+  if (l->before) PetscCall((*l->before)(ksp, b, x, l->before_ctx));
+  if (ksp->reason > 0) {
+    if (!l->again) l->failures[0] = 0;
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  /* Newton's method filters the tangent and comes back */
+  if (run->model->space->tentative) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(tell_failure(l, ksp, b, x, text, sizeof(text), &memory));
+  /* an incomplete factorisation within it may have broken down */
+  PetscCall(SbPCCoupleGetInner(ksp->pc, &pc));
+  PetscCall(SbPCCoarseFallBack(pc, ksp->reason, &simpler));
+  if (simpler) {
+    PetscCall(solve_again(l, ksp, b, x));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  PetscCall(may_replace(l, ksp, b, &may));
+  if (!may) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(SbSolverNext(run->model->space, ksp->reason, memory, &l->tried, &next));
+  if (!next) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(SbWarning(run->model->comm, "linear solver: %s; from here on -solver %s", text, next->name));
+  PetscCall(PetscSNPrintf(run->solver_reason, sizeof(run->solver_reason), "after %s", text));
+  PetscCall(replace(l, ksp, next));
+  PetscCall(solve_again(l, ksp, b, x));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbSolverListCreate(SbRun run)
+{
+  PetscBool given;
+  SbSolverList l;
+  KSP ksp;
+
+  PetscFunctionBeginUser;
+  if (!run->J) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscNew(&l));
+  l->run = run;
+  PetscCall(PetscOptionsHasName(NULL, NULL, "-ksp_type", &given));
+  l->own = (PetscBool)!given;
+  PetscCall(PetscOptionsHasName(NULL, NULL, "-pc_type", &given));
+  l->own = (PetscBool)(l->own && !given && !run->arc.on); /* the arc length needs its inertia */
+  PetscCall(SNESGetKSP(run->snes, &ksp));
+  PetscCall(attach(l, ksp));
+  run->solver_list = l;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbSolverListDestroy(SbRun run)
+{
+  PetscFunctionBeginUser;
+  PetscCall(PetscFree(run->solver_list));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* What of the bodies makes systems hard, as far as it is known: "; nu is up to 0.4999". */
+static PetscErrorCode tell_causes(SbRun run, char text[], size_t size)
+{
+  const SbModel m = run->model;
+  PetscReal nu = 0., soft = PETSC_MAX_REAL, stiff = 0.;
+  PetscInt nsliver = 0, ntet = 0;
+  char one[128];
+
+  PetscFunctionBeginUser;
+  text[0] = 0;
+  for (PetscInt k = 0; k < m->nmaterial; k++) {
+    nu = PetscMax(nu, m->material[k]->nu);
+    soft = PetscMin(soft, m->material[k]->E);
+    stiff = PetscMax(stiff, m->material[k]->E);
+  }
+  for (PetscInt b = 0; b < m->nbody; b++) {
+    nsliver += m->body[b].nsliver;
+    ntet += m->body[b].ncell;
+  }
+  if (nsliver) {
+    PetscCall(PetscSNPrintf(one, sizeof(one),
+                            "; %" PetscInt_FMT " of %" PetscInt_FMT
+                            " tets have an angle below %g degrees: repair the mesh",
+                            nsliver, ntet, SB_SLIVER));
+    PetscCall(PetscStrlcat(text, one, size));
+  }
+  if (stiff > RATIO * soft) {
+    PetscCall(PetscSNPrintf(one, sizeof(one),
+                            "; the stiffest material has %.2g times Young's modulus of the softest",
+                            (double)(stiff / soft)));
+    PetscCall(PetscStrlcat(text, one, size));
+  }
+  if (nu > NU_HARD) {
+    PetscCall(PetscSNPrintf(one, sizeof(one), "; nu is up to %g", (double)nu));
+    PetscCall(PetscStrlcat(text, one, size));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbSolverListExplain(SbRun run, size_t size, char text[])
+{
+  const SbSolverList l = run->solver_list;
+  const SbSolverPreset *next = run->solver_used;
+  uint32_t tried = 0;
+  char causes[256];
+
+  PetscFunctionBeginUser;
+  PetscCall(tell_causes(run, causes, sizeof(causes)));
+  if (l->own)
+    PetscCall(PetscSNPrintf(text, size, "linear solver: %s%s", l->failures, causes));
+  else {
+    PetscCall(SbSolverNext(run->model->space, KSP_DIVERGED_ITS, PETSC_FALSE, &tried, &next));
+    PetscCall(
+      PetscSNPrintf(text, size,
+                    "linear solver: %s%s; it is the one of -ksp_type and -pc_type, which are not replaced: "
+                    "leave them out%s%s",
+                    l->failures, causes, next ? ", or take -solver " : "", next ? next->name : ""));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

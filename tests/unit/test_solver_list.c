@@ -1,0 +1,121 @@
+// @ranks 1 2
+/*
+  A solver that fails gives way to the next one on the same system: no step is cut, the solution is that of a factorisation, and the run goes on with
+  it. A method of the user's is not replaced, nor is any where a body is free.
+*/
+#include <sbsolver.h>
+#include "../slivers.h"
+
+#define BAR                                                                                              \
+  "-bodies a -body_a_mesh box:0.3,0.1,0.1:3 -body_a_young 1e5 -body_a_poisson 0.3 -body_a_density 1000 " \
+  "-effects gravity,clamp -effect_clamp_type support -effect_clamp_on xmin "
+#define STATIC BAR "-time static -body_a_material corotated -ksp_rtol 1e-10 "
+
+typedef struct {
+  PetscReal tip[3];
+  PetscInt newton, linear, rejected;
+  char solver[SB_NAME_MAX], stop[1024];
+} Outcome;
+
+static PetscErrorCode run(const char *options, const char *more, Outcome *o)
+{
+  const PetscReal at[3] = {0.3, 0.1, 0.1};
+  char text[2048];
+  TestScene t;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscSNPrintf(text, sizeof(text), "%s %s", options, more));
+  PetscCall(test_scene_open(text, &t));
+  PetscCall(SbRunSolve(t.run));
+  PetscCall(test_value_at(t.model, t.run->U, at, o->tip));
+  o->newton = t.run->newton_total;
+  o->linear = t.run->linear_total;
+  o->rejected = t.run->rejected_total;
+  PetscCall(PetscStrncpy(o->solver, t.run->solver, sizeof(o->solver)));
+  PetscCall(PetscStrncpy(o->stop, t.run->stop_reason, sizeof(o->stop)));
+  PetscCall(test_scene_close(&t));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* A run whose solver fails, against one with a factorisation: the same steps of Newton's method and the same displacement. */
+static PetscErrorCode check_replaced(const char *options, const char *solver, const char *more,
+                                     PetscReal tolerance)
+{
+  char text[256];
+  Outcome o, exact;
+
+  PetscFunctionBeginUser;
+  PetscCall(run(options, "-solver direct", &exact));
+  PetscCall(PetscSNPrintf(text, sizeof(text), "-solver %s %s", solver, more));
+  PetscCall(run(options, text, &o));
+  SB_CHECK(!o.stop[0] && !exact.stop[0], "%s: %s%s", text, o.stop, exact.stop);
+  SB_CHECK(strcmp(o.solver, solver), "%s: not replaced", text);
+  SB_CHECK(o.rejected == 0, "%s: %" PetscInt_FMT " steps cut", text, o.rejected);
+  SB_CHECK(o.newton == exact.newton, "%s: %" PetscInt_FMT " Newton iterations, directly %" PetscInt_FMT, text,
+           o.newton, exact.newton);
+  for (int c = 0; c < 3; c++)
+    SB_CHECK_NEAR(o.tip[c], exact.tip[c], tolerance * PetscAbsReal(exact.tip[2]), text);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Slivers near nu = 1/2: iterations for the pressures that are too few, on every kind of matrix. */
+static PetscErrorCode check_slivers(void)
+{
+  const Slivers s = {.n = {12, 4, 4}, .size = {0.3, 0.1, 0.1}, .part = 0.01, .degrees = 0.1};
+  char path[512], text[1024];
+  PetscInt made = 0;
+  TestScene t;
+
+  PetscFunctionBeginUser;
+  PetscCall(slivers_write(&s, path, &made));
+  for (int dg = 0; dg < 2; dg++) {
+    PetscCall(PetscSNPrintf(
+      text, sizeof(text),
+      BAR "-body_a_mesh %s -effect_clamp_on held -sets held -set_held_at "
+          "plane:1,0,0,0 -time static -body_a_material linear -body_a_poisson 0.4999 -body_a_element %s",
+      path, dg ? "dg" : "cr"));
+    PetscCall(check_replaced(text, "pressure", "-ksp_max_it 20", 1e-4));
+  }
+  PetscCall(test_scene_open(text, &t));
+  SB_CHECK(t.model->body[0].nsliver >= made && made > 0, "%" PetscInt_FMT " slivers found of %" PetscInt_FMT,
+           t.model->body[0].nsliver, made);
+  PetscCall(test_scene_close(&t));
+  PetscCall(test_file_remove(path));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+int main(int argc, char **argv)
+{
+  Outcome o;
+
+  SB_TEST_BEGIN(argc, argv);
+  /* matrices of all kinds give way to AIJ, static and in time */
+  PetscCall(check_replaced(STATIC, "cg", "-ksp_max_it 3", 1e-6));
+  PetscCall(check_replaced(STATIC, "cg_icc", "-ksp_max_it 3", 1e-6));
+  PetscCall(check_replaced(STATIC, "gauss_seidel", "-ksp_max_it 3", 1e-6));
+  PetscCall(check_replaced(BAR "-body_a_material corotated -ts_dt 0.02 -ts_max_time 0.1 -ksp_rtol 1e-10",
+                           "cg_two_level", "-ksp_max_it 3", 1e-5));
+  PetscCall(
+    check_replaced(BAR "-body_a_material linear -time newmark -ts_dt 0.02 -ts_max_time 0.1 -ksp_rtol 1e-10",
+                   "rotated", "-ksp_max_it 1", 1e-5));
+  /* nodes held by an obstacle, and rows of contact between bodies */
+  PetscCall(
+    check_replaced(BAR "-body_a_material corotated -ts_dt 0.02 -ts_max_time 0.2 -effects gravity,clamp,floor "
+                       "-effect_floor_type contact -effect_floor_on boundary -effect_floor_obstacle "
+                       "plane:0,0,1,-0.01 -ksp_rtol 1e-10",
+                   "cg", "-ksp_max_it 5", 1e-4));
+  PetscCall(check_replaced(
+    BAR "-body_a_material corotated -bodies a,b -body_b_mesh box:0.1,0.1,0.1:2 "
+        "-body_b_translate 0.2,0,0.102 -body_b_young 1e5 -body_b_poisson 0.3 -body_b_density "
+        "1000 -body_b_material corotated -effect_clamp_on a.xmin -ts_dt 0.02 -ts_max_time 0.1 -effects "
+        "gravity,clamp,meet -effect_meet_type collision -ksp_rtol 1e-10",
+    "cg", "-ksp_max_it 20", 1e-4));
+  PetscCall(check_slivers());
+  /* the user's own method stays, and the run says that it failed */
+  PetscCall(run(STATIC, "-solver cg -ksp_type cg -ksp_max_it 3 -time_max_cuts 0", &o));
+  SB_CHECK(o.stop[0] && !strcmp(o.solver, "cg"), "the user's method was replaced by %s", o.solver);
+  /* a body that nothing holds: no solver would do */
+  PetscCall(run(STATIC, "-effect_clamp_components xy -solver cg_jacobi -ksp_max_it 300", &o));
+  SB_CHECK(o.stop[0] && !strcmp(o.solver, "cg_jacobi"), "%s was tried on a free body", o.solver);
+  SB_TEST_END();
+}
