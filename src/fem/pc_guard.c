@@ -11,6 +11,36 @@
 #define ORIGINAL "SbPCSetUpOriginal_C"
 #define ORIGINAL_APPLY "SbPCApplyOriginal_C"
 
+/*
+  PETSc's error path forgets the arrays that wrap the matrix for CHOLMOD (MatWrapCholmod_seqaij: as much as the matrix itself, for each factorisation that
+  fails). They are noted while the factorisation runs, through PETSc's table of allocators, and freed when it has failed.
+*/
+static struct {
+  PetscErrorCode (*allocate)(size_t, PetscBool, int, const char[], const char[], void **);
+  PetscErrorCode (*release)(void *, int, const char[], const char[]);
+  void *wrapped[8];
+  int n;
+} noted;
+
+static PetscErrorCode note_allocate(size_t size, PetscBool clear, int line, const char function[],
+                                    const char file[], void **p)
+{
+  const PetscErrorCode error = (*noted.allocate)(size, clear, line, function, file, p);
+
+  if (!error && *p && noted.n < (int)PETSC_STATIC_ARRAY_LENGTH(noted.wrapped) &&
+      strstr(function, "MatWrapCholmod"))
+    noted.wrapped[noted.n++] = *p;
+  return error;
+}
+
+static PetscErrorCode note_release(void *p, int line, const char function[], const char file[])
+{
+  for (int k = 0; k < noted.n; k++) {
+    if (noted.wrapped[k] == p) noted.wrapped[k] = NULL;
+  }
+  return (*noted.release)(p, line, function, file);
+}
+
 static PetscErrorCode guarded_setup(PC pc)
 {
   PetscErrorCode (*original)(PC) = NULL;
@@ -18,10 +48,18 @@ static PetscErrorCode guarded_setup(PC pc)
 
   PetscFunctionBeginUser;
   PetscCall(PetscObjectQueryFunction((PetscObject)pc, ORIGINAL, &original));
+  noted.allocate = PetscTrMalloc;
+  noted.release = PetscTrFree;
+  noted.n = 0;
+  PetscTrMalloc = note_allocate;
+  PetscTrFree = note_release;
   PetscCall(PetscPushErrorHandler(PetscReturnErrorHandler, NULL));
   error = (*original)(pc);
   PetscCall(PetscPopErrorHandler());
+  PetscTrMalloc = noted.allocate;
+  PetscTrFree = noted.release;
   if (error == PETSC_ERR_MAT_CH_ZRPVT) {
+    for (int k = 0; k < noted.n; k++) PetscCall(PetscFree(noted.wrapped[k]));
     PetscCall(PCSetFailedReason(pc, PC_FACTOR_NUMERIC_ZEROPIVOT));
     PetscCall(PetscInfo(pc, "CHOLMOD: a pivot is not positive\n"));
     PetscFunctionReturn(PETSC_SUCCESS);
