@@ -67,6 +67,10 @@ typedef struct {
   PetscErrorCode (*force)(SbEffect e, SbSpace space, const SbStage *stage, PetscReal f[]);
   /* A -= shift_k d force / d u + shift_v d force / d v by SbSpaceAddCellBlock(), called for (a, b) and for (b, a) */
   PetscErrorCode (*tangent)(SbEffect e, SbSpace space, const SbStage *stage, Mat A);
+  /* y[nnode][3] -= shift_k (d force / d u) x, N, of forces whose derivative is far from symmetric and which tangent() leaves out, for the
+     direction x[nnode][3], m; must be right on owned nodes without communication; not with rows that join nodes */
+  PetscErrorCode (*unsymmetric)(SbEffect e, SbSpace space, const SbStage *stage, const PetscReal x[],
+                                PetscReal y[]);
   /* after a step was accepted */
   PetscErrorCode (*accept)(SbEffect e, SbSpace space, const SbStage *stage);
   /* for checkpoints: what the effect takes from step to step beyond displacement and velocity, as records of `nstate` numbers each, in

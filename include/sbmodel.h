@@ -42,10 +42,10 @@ struct _p_SbModel {
   PetscInt neffect;
   SbEffect *effect;
   /* one list per operation, holding only the effects that implement it */
-  PetscInt nprescribe, nprestep, nforce, ntangent, naccept, nhistory, ntouch, nhold, nsettle, narrive,
-    nrebound;
-  SbEffect *prescribe, *prestep, *touch, *hold, *settle, *force, *tangent, *accept, *history, *arrive,
-    *rebound;
+  PetscInt nprescribe, nprestep, nforce, ntangent, nunsymmetric, naccept, nhistory, ntouch, nhold, nsettle,
+    narrive, nrebound;
+  SbEffect *prescribe, *prestep, *touch, *hold, *settle, *force, *tangent, *unsymmetric, *accept, *history,
+    *arrive, *rebound;
   struct {
     Vec U0, V0;     /* state when the step began; borrowed */
     PetscReal dt;   /* length of the step, s */
@@ -70,6 +70,12 @@ PetscErrorCode SbModelLoads(SbModel model, PetscReal t, Vec U, Vec V, Vec F);
 /* A = shift_a M + shift_v C + shift_k K(u) and the effects' part, prescribed unknowns replaced. Collective. */
 PetscErrorCode SbModelTangent(SbModel model, PetscReal t, PetscReal shift_v, PetscReal shift_a,
                               PetscReal shift_k, Vec U, Vec V, Mat A);
+/*
+  SbModelUnsymmetric - Y = the part of the tangent at U that the matrix of SbModelTangent() lacks, as it is far from symmetric, times X.
+
+  Collective. U, X: [nnode][3] m; Y: N, zero on prescribed unknowns; all from SbSpaceCreateVec().
+*/
+PetscErrorCode SbModelUnsymmetric(SbModel model, PetscReal t, Vec U, Vec X, Vec Y);
 /* Writes prescribed displacements at t into U. */
 PetscErrorCode SbModelPrescribe(SbModel model, PetscReal t, Vec U);
 /*

@@ -69,9 +69,15 @@ struct _p_SbRun {
   SbTimePreset preset;
   TS ts;           /* NULL in a static run */
   SNES snes;       /* of the TS, or own in a static run; borrowed from ts when there is one */
-  Mat J, operator; /* tangent; what solves see of it: J itself, or its projection (sbfem.h, SbCouple) */
-  Vec U, V, A;     /* A: acceleration of the last step, state of the integrator */
-  Vec R;           /* residual for contact; NULL without */
+  Mat J, operator; /* tangent; what solves see of it: J itself, its projection (sbfem.h, SbCouple), or
+                     with what it lacks (SbModelUnsymmetric()) */
+  struct {
+    Vec U, x,
+      y; /* displacement that J belongs to; what is multiplied, and the result; NULL where J lacks nothing */
+    PetscReal t; /* J's time or load factor */
+  } unsymmetric;
+  Vec U, V, A; /* A: acceleration of the last step, state of the integrator */
+  Vec R;       /* residual for contact; NULL without */
   Vec stage,
     stage_start; /* where the integrator evaluates forces, stage_start + stage_part (X - stage_start), in a solve for X; NULL: at X */
   PetscReal stage_part;

@@ -19,7 +19,11 @@
   The facets of CR and DG bodies do not meet at their edges, so that forces facet by facet do not quite add up to
   zero. Where the pressure acts on the whole surface of such a body, it is taken as -p dV/du of the volume inside
   (src/fem/volume.c): at rest that is the same, and force and moment vanish for every displacement. On part of the
-  surface the gaps stay; they close with the mesh.
+  surface the gaps stay; they close with the mesh. There nothing cancels between facets: with CR the force stands at the facet's own
+  node, and N depends on the other three of the cell, so that the derivative has nothing opposite, and its symmetric part is wrong by as much as it is large.
+  Newton's method with it stalls near p = mu. The matrix gets none of it; the operator of the linear solver applies it
+  exactly, facet by facet, dN = sum_b w_b x c_b, and the matrix preconditions. With contact the symmetric part stays in the matrix, for want
+  of a method for both.
 
   With follower = no the pressure acts on the rest area and normal, as small-strain theory has it; then there
   is no tangent.
@@ -55,8 +59,10 @@ static PetscErrorCode options_pressure(SbEffect e, const SbScope *scope)
   PetscCall(SbEffectFormulas(scope, "time", 1, PETSC_FALSE, &p->time, &e->steady));
   if (p->follower)
     e->linear = PETSC_FALSE;
-  else
+  else {
     e->ops.tangent = NULL;
+    e->ops.unsymmetric = NULL;
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -84,11 +90,17 @@ static PetscErrorCode find_whole(Pressure *p, SbSpace space)
 static PetscErrorCode setup_pressure(SbEffect e, SbSpace space)
 {
   Pressure *p = (Pressure *)e->data;
+  PetscBool some = PETSC_FALSE;
 
   PetscFunctionBeginUser;
   PetscCall(SbEffectFacets(space, &p->on, &p->nfacet, &p->facet));
   PetscCall(PetscCalloc1(space->mesh->nbody, &p->whole));
   if (space->faces && p->follower) PetscCall(find_whole(p, space));
+  /* what is left of bodies with nodes at faces */
+  for (PetscInt k = 0; k < p->nfacet && !some; k++)
+    some = (PetscBool)!SbSpaceCellElement(space, p->facet[k].cell)->nodes_per[0];
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &some, 1, SB_MPI_BOOL, MPI_LOR, space->comm));
+  if (!some) e->ops.unsymmetric = NULL;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -106,6 +118,27 @@ static inline void corners(SbSpace space, const SbFacet *facet, const PetscReal 
   }
 }
 
+/* f += factor N at each corner. */
+static inline void add_to_corners(SbSpace space, const SbFacet *facet, PetscReal factor, const PetscReal N[3],
+                                  PetscReal f[])
+{
+  const SbElementOps *e = &SbSpaceCellElement(space, facet->cell)->ops;
+
+  for (int a = 0; a < 4; a++) {
+    const PetscInt node = space->cell_node[4 * facet->cell + a];
+    PetscReal share = 0;
+
+    for (int c = 0; c < 3; c++) share += e->vertex[facet->corner[c]][a];
+    for (int i = 0; i < 3; i++) f[3 * node + i] += share * factor * N[i];
+  }
+}
+
+/* Whether it meets no other facet at its edges, and its tangent is applied beside the matrix. */
+static inline PetscBool apart(SbSpace space, const SbFacet *facet)
+{
+  return (PetscBool)(!SbSpaceCellElement(space, facet->cell)->nodes_per[0] && !space->couple);
+}
+
 static PetscErrorCode force_pressure(SbEffect e, SbSpace space, const SbStage *stage, PetscReal f[])
 {
   const Pressure *load = (const Pressure *)e->data;
@@ -118,7 +151,6 @@ static PetscErrorCode force_pressure(SbEffect e, SbSpace space, const SbStage *s
   }
   for (PetscInt k = 0; k < load->nfacet; k++) {
     const SbFacet *facet = &load->facet[k];
-    const SbElementOps *element = &SbSpaceCellElement(space, facet->cell)->ops;
     PetscReal x[3][3], d[3], b[3], N[3];
 
     corners(space, facet, u, x);
@@ -127,14 +159,7 @@ static PetscErrorCode force_pressure(SbEffect e, SbSpace space, const SbStage *s
       b[i] = x[2][i] - x[0][i];
     }
     SbCross(d, b, N);
-    /* each corner has -p/6 N */
-    for (int a = 0; a < 4; a++) {
-      const PetscInt node = space->cell_node[4 * facet->cell + a];
-      PetscReal share = 0;
-
-      for (int c = 0; c < 3; c++) share += element->vertex[facet->corner[c]][a];
-      for (int i = 0; i < 3; i++) f[3 * node + i] -= share * p / 6 * N[i];
-    }
+    add_to_corners(space, facet, -p / 6, N, f);
   }
   PetscCall(PetscLogFlops(45.0 * (PetscLogDouble)load->nfacet));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -181,6 +206,7 @@ static PetscErrorCode tangent_pressure(SbEffect e, SbSpace space, const SbStage 
     const SbElementOps *element = &SbSpaceCellElement(space, facet->cell)->ops;
     PetscReal x[3][3], c[3][3], block[9];
 
+    if (apart(space, facet)) continue;
     corners(space, facet, stage->u, x);
     for (int b = 0; b < 3; b++) {
       for (int i = 0; i < 3; i++) c[b][i] = x[(b + 1) % 3][i] - x[(b + 2) % 3][i];
@@ -192,6 +218,38 @@ static PetscErrorCode tangent_pressure(SbEffect e, SbSpace space, const SbStage 
         PetscCall(SbSpaceAddCellBlock(space, A, facet->cell, a, b, block));
       }
     }
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode unsymmetric_pressure(SbEffect e, SbSpace space, const SbStage *stage,
+                                           const PetscReal x[], PetscReal y[])
+{
+  const Pressure *load = (const Pressure *)e->data;
+  const PetscReal p =
+    stage->shift_k * SbFormulaEval(load->value, stage->t, NULL) * SbFormulaEval(load->time, stage->t, NULL);
+
+  PetscFunctionBeginUser;
+  for (PetscInt k = 0; k < load->nfacet; k++) {
+    const SbFacet *facet = &load->facet[k];
+    const PetscInt *node = space->cell_node + 4 * facet->cell;
+    PetscReal z[3][3], w[3], c[3], turn[3], dN[3] = {0, 0, 0};
+
+    if (!apart(space, facet)) continue;
+    /* dN = sum_b w_b x c_b, w_b the direction at corner b */
+    corners(space, facet, stage->u, z);
+    for (int b = 0; b < 3; b++) {
+      for (int i = 0; i < 3; i++) {
+        c[i] = z[(b + 1) % 3][i] - z[(b + 2) % 3][i];
+        w[i] = 0;
+        for (int a = 0; a < 4; a++)
+          w[i] +=
+            SbSpaceCellElement(space, facet->cell)->ops.vertex[facet->corner[b]][a] * x[3 * node[a] + i];
+      }
+      SbCross(w, c, turn);
+      for (int i = 0; i < 3; i++) dN[i] += turn[i];
+    }
+    add_to_corners(space, facet, p / 6, dN, y);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -221,6 +279,7 @@ static PetscErrorCode create_pressure(SbEffect e)
   e->ops.setup = setup_pressure;
   e->ops.force = force_pressure;
   e->ops.tangent = tangent_pressure;
+  e->ops.unsymmetric = unsymmetric_pressure;
   e->ops.destroy = destroy_pressure;
   PetscFunctionReturn(PETSC_SUCCESS);
 }

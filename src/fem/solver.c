@@ -423,7 +423,10 @@ PetscErrorCode SbSolverFollowRows(KSP ksp, SbSpace s)
 
 PetscErrorCode SbSolverFinish(SNES snes, SbSpace s)
 {
+  PetscInt restart = RESTART;
+  PetscBool symmetric;
   KSP ksp;
+  Mat A, P;
   PC pc;
 
   PetscFunctionBeginUser;
@@ -431,6 +434,14 @@ PetscErrorCode SbSolverFinish(SNES snes, SbSpace s)
   PetscCall(KSPGetPC(ksp, &pc));
   PetscCall(SbPCGuardFactor(pc));
   if (s->couple && s->couple->saddle == SB_SADDLE_ITERATIVE) PetscCall(SbKSPSaddleSet(s, ksp));
+
+  /* a matrix without what is not symmetric preconditions the whole tangent */
+  PetscCall(SNESGetJacobian(snes, &A, &P, NULL, NULL));
+  PetscCall(PetscObjectTypeCompareAny((PetscObject)ksp, &symmetric, KSPCG, KSPRICHARDSON, ""));
+  if (A == P || s->couple || !symmetric) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(KSPSetType(ksp, KSPFGMRES));
+  PetscCall(PetscOptionsGetInt(NULL, NULL, "-ksp_gmres_restart", &restart, NULL));
+  PetscCall(KSPGMRESSetRestart(ksp, restart));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

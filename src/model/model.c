@@ -23,6 +23,7 @@ PetscErrorCode SbModelDestroy(SbModel *model)
   PetscCall(PetscFree(m->arrive));
   PetscCall(PetscFree(m->rebound));
   PetscCall(PetscFree(m->tangent));
+  PetscCall(PetscFree(m->unsymmetric));
   PetscCall(PetscFree(m->accept));
   PetscCall(PetscFree(m->history));
   PetscCall(SbSpaceDestroy(&m->space));
@@ -126,6 +127,7 @@ PetscErrorCode SbModelSetUp(SbModel m)
   SORT_INTO_LIST(m, rebound);
   SORT_INTO_LIST(m, force);
   SORT_INTO_LIST(m, tangent);
+  SORT_INTO_LIST(m, unsymmetric);
   SORT_INTO_LIST(m, accept);
   SORT_INTO_LIST(m, history);
   for (PetscInt i = 0; i < m->space->nnode_owned; i++) mass += m->space->node_mass[i];
@@ -252,6 +254,29 @@ PetscErrorCode SbModelTangent(SbModel m, PetscReal t, PetscReal shift_v, PetscRe
   }
   PetscCall(SbSpaceFinishTangent(m->space, A));
   PetscCall(stage_end(m, U, V, NULL, &stage));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbModelUnsymmetric(SbModel m, PetscReal t, Vec U, Vec X, Vec Y)
+{
+  const PetscReal *x;
+  SbStage stage;
+  PetscReal *y;
+
+  PetscFunctionBeginUser;
+  PetscCall(stage_begin(m, t, U, NULL, NULL, &stage));
+  PetscCall(SbSpaceGetLocalRead(m->space, X, &x));
+  PetscCall(SbSpaceGetLocalWrite(m->space, Y, &y));
+  PetscCall(PetscArrayzero(y, 3 * m->space->nnode));
+  for (PetscInt e = 0; e < m->nunsymmetric; e++) {
+    stage.shift_k = load_factor(m, m->unsymmetric[e]);
+    SbEffectCall(m->unsymmetric[e], unsymmetric, m->space, &stage, x, y);
+  }
+  constrain_residual(m->space, y);
+  if (m->space->held) SbHeldConstrain(m->space, y);
+  PetscCall(SbSpaceRestoreLocalWrite(m->space, Y, &y));
+  PetscCall(SbSpaceRestoreLocalRead(m->space, X, &x));
+  PetscCall(stage_end(m, U, NULL, NULL, &stage));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -24,9 +24,43 @@ static PetscErrorCode form_tangent(SbRun run, PetscReal t, PetscReal shift_v, Pe
   /* a preconditioner that turns with the nodes asks for the displacement that the matrix belongs to */
   if (run->solver_used->precondition)
     PetscCall(PetscObjectCompose((PetscObject)P, "sb_state", (PetscObject)U));
+  if (run->unsymmetric.U) {
+    PetscCall(VecCopy(U, run->unsymmetric.U));
+    run->unsymmetric.t = t;
+  }
   run->tangent_known = PETSC_TRUE;
   run->shift_v = shift_v;
   run->shift_a = shift_a;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* y = (J + what it lacks) x */
+static PetscErrorCode multiply(Mat A, Vec x, Vec y)
+{
+  SbRun run;
+
+  PetscFunctionBeginUser;
+  PetscCall(MatShellGetContext(A, &run));
+  PetscCall(VecCopy(x, run->unsymmetric.x));
+  PetscCall(SbModelUnsymmetric(run->model, run->unsymmetric.t, run->unsymmetric.U, run->unsymmetric.x,
+                               run->unsymmetric.y));
+  PetscCall(MatMult(run->J, x, y));
+  PetscCall(VecAXPY(y, 1., run->unsymmetric.y));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbFormCreateOperator(SbRun run)
+{
+  PetscInt m, n, M, N;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbSpaceCreateVec(run->model->space, &run->unsymmetric.U));
+  PetscCall(SbSpaceCreateVec(run->model->space, &run->unsymmetric.x));
+  PetscCall(SbSpaceCreateVec(run->model->space, &run->unsymmetric.y));
+  PetscCall(MatGetLocalSize(run->J, &m, &n));
+  PetscCall(MatGetSize(run->J, &M, &N));
+  PetscCall(MatCreateShell(run->model->comm, m, n, M, N, run, &run->operator));
+  PetscCall(MatShellSetOperation(run->operator, MATOP_MULT, SB_OPERATION(multiply)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -525,6 +525,8 @@ static PetscErrorCode create_operator(SbRun run)
   if (m->space->couple)
     PetscCall(
       SbCoupleCreateOperator(m->space, run->J, (PetscBool)!m->dynamic, run->saddle_used, &run->operator));
+  else if (m->nunsymmetric)
+    PetscCall(SbFormCreateOperator(run));
   else {
     PetscCall(PetscObjectReference((PetscObject)run->J));
     run->operator= run->J;
@@ -617,6 +619,9 @@ PetscErrorCode SbRunDestroy(SbRun *run)
   PetscCall(VecDestroy(&r->R));
   PetscCall(MatDestroy(&r->operator));
   PetscCall(MatDestroy(&r->J));
+  PetscCall(VecDestroy(&r->unsymmetric.U));
+  PetscCall(VecDestroy(&r->unsymmetric.x));
+  PetscCall(VecDestroy(&r->unsymmetric.y));
   PetscCall(VecDestroy(&r->U));
   PetscCall(VecDestroy(&r->V));
   PetscCall(VecDestroy(&r->A));

@@ -112,7 +112,7 @@ static PetscErrorCode replace_operator(SbRun run, const SbSolverPreset *next)
   PetscCall(SbSolverCreateOperator(s, next, &run->J));
   if (s->couple)
     PetscCall(SbCoupleSetMatrix(s, run->J));
-  else {
+  else if (!run->unsymmetric.U) { /* that one multiplies by run->J, whichever it is */
     PetscCall(MatDestroy(&run->operator));
     PetscCall(PetscObjectReference((PetscObject)run->J));
     run->operator= run->J;

@@ -67,6 +67,8 @@ PetscBool SbRunTooShort(SbRun run, PetscReal dt);
 PetscErrorCode SbFormI2Function(TS ts, PetscReal t, Vec U, Vec V, Vec A, Vec F, void *run);
 PetscErrorCode SbFormI2Jacobian(TS ts, PetscReal t, Vec U, Vec V, Vec A, PetscReal shift_v, PetscReal shift_a,
                                 Mat J, Mat P, void *run);
+/* run->operator: what solves see where the matrix lacks a part of the tangent. Collective. */
+PetscErrorCode SbFormCreateOperator(SbRun run);
 PetscErrorCode SbFormStaticFunction(SNES snes, Vec U, Vec F, void *run);
 PetscErrorCode SbFormStaticJacobian(SNES snes, Vec U, Mat J, Mat P, void *run);
 /* A = M^-1 (f_ext - C V - f_int), zero on prescribed unknowns. */

@@ -1,0 +1,263 @@
+// @ranks 1 2
+/*
+  A thick sphere and a thick cylinder (plane strain), radii A = 1 and B = 2, blown up by a pressure that follows their inner wall, to 1.5 times its
+  radius: CR, stable neo-Hookean law, mu = 1, nu = 0.499, between planes of symmetry. The pressure acts on part of the surface, whose facets do not
+  meet at their edges.
+
+  Without change of volume the hoop stretch falls from la = a/A inside to lb, lb^k = 1 + (la^k - 1) (A/B)^k, and equilibrium along the radius gives
+
+    p = int_lb^la dW/dl / (l^k - 1) dl,   k = 3 for the sphere, 2 for the cylinder, W(l) the energy at that stretch.
+
+  W = mu/2 (I1 - 3) makes it mu/2 [(4/lb + lb^-4) - (4/la + la^-4)] for the sphere, mu [ln(la/lb) + (lb^-2 - la^-2)/2] for the cylinder. The law of this program is
+
+    W = 2/3 mu [(I1 - 3) - log((I1 + 1)/4)],   dW/dI1 = 2/3 mu I1/(I1 + 1):
+
+  mu/2 at rest, and up to a third stiffer when stretched. Both are computed: the quadrature is checked with the classical energy.
+
+    pressure   of the closed form at the stretch that the run has reached, against the one applied; on two meshes and in the limit
+    order      a disturbance of the answer falls with its square in one iteration of Newton's method
+*/
+#include "verify.h"
+
+#define NU 0.499
+#define STRETCH 1.5
+#define WALLS "-set_x0_at plane:1,0,0,0 -set_y0_at plane:0,1,0,0 -set_z0_at plane:0,0,1,0 "
+
+/* (dW/dl) / (l^k - 1) by dW/dI1 with mu = 1; I1 - 3 >= 0 has a double zero at l = 1. */
+static PetscReal integrand(PetscInt k, PetscBool classical, PetscReal l)
+{
+  const PetscReal I1 = k == 3 ? 2. * l * l + PetscPowReal(l, -4.) : 1. + l * l + 1. / (l * l);
+  const PetscReal slope = k == 3 ? 4. * (1. + PetscPowReal(l, -3.)) * PetscPowReal(l, -2.)
+                                 : 2. * (l * l + 1.) / (l * l * l); /* (dI1/dl) / (l^k - 1) */
+
+  return slope * (classical ? 0.5 : 2. / 3. * I1 / (I1 + 1.));
+}
+
+/* Pressure at the inner stretch la, by Simpson's rule. */
+static PetscReal closed_form(PetscInt k, PetscBool classical, PetscReal la)
+{
+  const PetscReal power = (PetscReal)k,
+                  lb =
+                    PetscPowReal(1. + (PetscPowReal(la, power) - 1.) / PetscPowReal(2., power), 1. / power);
+  const PetscInt n = 200;
+  PetscReal sum = 0.;
+
+  for (PetscInt i = 0; i <= n; i++)
+    sum += (i % n == 0 ? 1.
+            : i % 2    ? 4.
+                       : 2.) *
+           integrand(k, classical, lb + (la - lb) * (PetscReal)i / (PetscReal)n);
+  return sum * (la - lb) / (3. * (PetscReal)n);
+}
+
+static void check_quadrature(void)
+{
+  const PetscReal a = STRETCH, b3 = PetscCbrtReal(1. + (a * a * a - 1.) / 8.),
+                  b2 = PetscSqrtReal(1. + (a * a - 1.) / 4.);
+
+  SB_CHECK_NEAR(closed_form(3, PETSC_TRUE, a),
+                0.5 * (4. / b3 + PetscPowReal(b3, -4.) - 4. / a - PetscPowReal(a, -4.)), 1e-9,
+                "sphere, classical energy");
+  SB_CHECK_NEAR(closed_form(2, PETSC_TRUE, a), PetscLogReal(a / b2) + 0.5 * (1. / (b2 * b2) - 1. / (a * a)),
+                1e-9, "cylinder, classical energy");
+}
+
+/*
+  An eighth of the sphere: n layers of n^2 triangles of an octahedron's face each, whose prisms are cut into three tets along the diagonals to the
+  vertex of the higher number. Collective.
+*/
+static PetscErrorCode write_sphere(PetscInt n, char path[512])
+{
+  const PetscInt nlayer = (n + 1) * (n + 2) / 2;
+  FILE *f;
+
+  PetscFunctionBeginUser;
+  PetscCall(test_file_open(".msh", path, &f));
+  if (f) {
+    PetscInt count = 0;
+
+    /* vertex (i, j) of a layer has the number of those before it: rows j of n + 1 - j vertices */
+    fprintf(f, "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n%d\n", (int)((n + 1) * nlayer));
+    for (PetscInt layer = 0; layer <= n; layer++) {
+      const PetscReal r = PetscPowReal(2., (PetscReal)layer / (PetscReal)n);
+
+      for (PetscInt j = 0; j <= n; j++) {
+        for (PetscInt i = 0; i + j <= n; i++) {
+          const PetscReal q = 0.5 * PETSC_PI / (PetscReal)n, x = PetscSinReal(q * (PetscReal)(n - i - j)),
+                          y = PetscSinReal(q * (PetscReal)i), z = PetscSinReal(q * (PetscReal)j),
+                          scale = r / PetscSqrtReal(x * x + y * y + z * z);
+
+          fprintf(f, "%d %.17g %.17g %.17g\n", (int)++count, (double)(scale * x), (double)(scale * y),
+                  (double)(scale * z));
+        }
+      }
+    }
+    fprintf(f, "$EndNodes\n$Elements\n%d\n", (int)(3 * n * n * n));
+    count = 0;
+    for (PetscInt layer = 0; layer < n; layer++) {
+      PetscInt row = layer * nlayer;
+
+      for (PetscInt j = 0; j < n; row += n + 1 - j, j++) {
+        for (PetscInt c = 0; c < 2 * (n - j) - 1; c++) {
+          const PetscInt a = row + c / 2 + 1, b = a + n + 1 - j; /* below and above, which has one less */
+          const PetscInt low[3] = {c % 2 ? a + 1 : a, c % 2 ? b : a + 1, c % 2 ? b + 1 : b};
+          const PetscInt way = c % 2 ? 1 : 0; /* the two kinds of triangles turn opposite ways */
+
+          for (PetscInt k = 0; k < 3; k++) {
+            PetscInt v[4];
+
+            for (PetscInt m = 0; m < 4; m++) v[m] = m <= 2 - k ? low[m] : low[m - 1] + nlayer;
+            if (way != k % 2) {
+              const PetscInt first = v[0];
+
+              v[0] = v[1];
+              v[1] = first;
+            }
+            fprintf(f, "%d 4 2 0 1 %d %d %d %d\n", (int)++count, (int)v[0], (int)v[1], (int)v[2], (int)v[3]);
+          }
+        }
+      }
+    }
+    fprintf(f, "$EndElements\n");
+  }
+  PetscCall(test_file_close(f));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* A quarter of a ring, one layer in z; narrower cells towards the inside. */
+static void ring(const PetscInt n[3], const PetscInt at[3], PetscReal x[3], void *ctx)
+{
+  const PetscReal r = PetscPowReal(2., x[0]), angle = 0.5 * PETSC_PI * x[1];
+
+  (void)ctx;
+  x[0] = at[1] == n[1] ? 0. : r * PetscCosReal(angle);
+  x[1] = r * PetscSinReal(angle);
+  x[2] *= 0.1;
+}
+
+/* Mean stretch of the inner wall: of the radii of its facets' centroids. */
+static PetscErrorCode inner_stretch(TestScene *t, PetscInt k, PetscReal *stretch)
+{
+  const SbSpace s = t->model->space;
+  PetscReal sum[2] = {0., 0.};
+  const PetscReal *u;
+  PetscInt inside;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbSpaceFindSet(s, "inside", "verify_inflate", &inside));
+  PetscCall(SbSpaceGetLocalRead(s, t->run->U, &u));
+  for (PetscInt i = 0; i < 4 * s->mesh->ncell_owned; i++) {
+    const PetscInt node = s->cell_node[i];
+    PetscReal rest = 0., now = 0.;
+
+    if (!(s->mesh->face_set[i] & SB_SET_BIT(inside))) continue;
+    for (PetscInt c = 0; c < k; c++) {
+      rest += PetscSqr(s->node_x[3 * node + c]);
+      now += PetscSqr(s->node_x[3 * node + c] + u[3 * node + c]);
+    }
+    SB_CHECK(rest < 1. + 1e-9, "node at radius %g is not on the inner wall", (double)PetscSqrtReal(rest));
+    sum[0] += PetscSqrtReal(now / rest);
+    sum[1] += 1.;
+  }
+  PetscCall(SbSpaceRestoreLocalRead(s, t->run->U, &u));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, sum, 2, MPIU_REAL, MPI_SUM, s->comm));
+  *stretch = sum[0] / sum[1];
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static void ripple(const PetscReal x[3], PetscReal v[3])
+{
+  v[0] = x[0] * PetscSinReal(3. * x[1]);
+  v[1] = x[1] * PetscCosReal(2. * x[2] + x[0]);
+  v[2] = x[2] * PetscSinReal(2. * x[0] + 1.);
+}
+
+/* Error that one iteration leaves of a disturbance of the solution. */
+static PetscErrorCode one_step(TestScene *t, PetscReal size, PetscReal *error)
+{
+  Vec X;
+
+  PetscFunctionBeginUser;
+  PetscCall(VecDuplicate(t->run->U, &X));
+  PetscCall(test_fill(t->model, ripple, X));
+  PetscCall(VecAYPX(X, size, t->run->U));
+  PetscCall(SbModelPrescribe(t->model, 1., X));
+  PetscCall(SNESSetTolerances(t->run->snes, 0., 0., 0., 1, SB_UNLIMITED));
+  PetscCall(SNESSolve(t->run->snes, NULL, X));
+  PetscCall(VecAXPY(X, -1., t->run->U));
+  PetscCall(VecNorm(X, NORM_INFINITY, error));
+  PetscCall(VecDestroy(&X));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode check(PetscInt k, const char *mesh, const char *more, PetscReal *wrong)
+{
+  const char *name = k == 3 ? "sphere" : "cylinder";
+  const PetscReal p = closed_form(k, PETSC_FALSE, STRETCH);
+  PetscReal stretch = 0., error[2], order;
+  TestScene t;
+
+  PetscFunctionBeginUser;
+  PetscCall(verify_open(
+    &t,
+    "-bodies a -body_a_mesh %s -body_a_element cr -body_a_material neohookean -body_a_young %.17g "
+    "-body_a_poisson %.17g -body_a_density 1 %s -effects x,y,z,push -effect_x_type support -effect_x_on x0 "
+    "-effect_x_components x -effect_y_type support -effect_y_on y0 -effect_y_components y -effect_z_type "
+    "support -effect_z_components z -effect_push_type pressure -effect_push_on inside "
+    "-effect_push_value %.17g -time static -static_steps 4 -solver direct -ksp_rtol 1e-11 -snes_rtol 1e-9",
+    mesh, 2. * (1. + NU), NU, more, (double)p));
+  PetscCall(verify_solve(&t, name));
+  PetscCall(inner_stretch(&t, k, &stretch));
+  for (int i = 0; i < 2; i++) PetscCall(one_step(&t, i ? 1e-5 : 1e-4, &error[i]));
+  order = PetscLog10Real(error[0] / error[1]);
+  PetscCall(PetscPrintf(PETSC_COMM_WORLD,
+                        "  %s: %d load steps, %d Newton and %d linear iterations; stretch %.4f, there p %.5f "
+                        "(classical %.5f), applied %.5f: %+.2f %%; order %.2f\n",
+                        name, (int)t.run->steps_total, (int)t.run->newton_total, (int)t.run->linear_total,
+                        (double)stretch, (double)closed_form(k, PETSC_FALSE, stretch),
+                        (double)closed_form(k, PETSC_TRUE, stretch), (double)p,
+                        (double)(100. * (closed_form(k, PETSC_FALSE, stretch) / p - 1.)), (double)order));
+  SB_CHECK(stretch > 1.35, "%s: stretch %g only", name, (double)stretch);
+  *wrong = closed_form(k, PETSC_FALSE, stretch) / p - 1.;
+  SB_CHECK_NEAR(order, 2., 0.15, "order of Newton's method");
+  SB_CHECK(t.run->steps_total == 4 && t.run->newton_total <= 40, "%s: %d steps, %d iterations", name,
+           (int)t.run->steps_total, (int)t.run->newton_total);
+  PetscCall(test_scene_close(&t));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* On two meshes: the error, first order as that of the face terms of CR, vanishes in the limit. */
+static PetscErrorCode check_body(PetscInt k, const char *more)
+{
+  PetscReal error[2];
+
+  PetscFunctionBeginUser;
+  for (PetscInt i = 0; i < 2; i++) {
+    const PetscInt n = i ? 8 : 4;
+    char mesh[512];
+
+    if (k == 3)
+      PetscCall(write_sphere(n, mesh));
+    else
+      PetscCall(verify_mesh_write((const PetscInt[3]){n, n + n / 2, 1}, ring, NULL, mesh));
+    PetscCall(check(k, mesh, more, &error[i]));
+    PetscCall(test_file_remove(mesh));
+  }
+  PetscCall(PetscPrintf(PETSC_COMM_WORLD, "  limit: %+.2f %%\n",
+                        (double)(100. * verify_extrapolate(error[0], error[1], 1.))));
+  SB_CHECK_NEAR(error[1], 0., 0.05, "pressure of the closed form, on the fine mesh");
+  SB_CHECK_NEAR(verify_extrapolate(error[0], error[1], 1.), 0., 0.01,
+                "pressure of the closed form, in the limit");
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+int main(int argc, char **argv)
+{
+  SB_TEST_BEGIN(argc, argv);
+  check_quadrature();
+  PetscCall(
+    check_body(3, "-sets x0,y0,z0,inside " WALLS "-set_inside_at sphere:0,0,0,1.001 -effect_z_on z0"));
+  PetscCall(check_body(2, "-sets x0,y0,z0,z1,inside " WALLS "-set_z1_at plane:0,0,1,0.1 "
+                          "-set_inside_at sphere:0,0,0.05,1.01 -effect_z_on z0,z1"));
+  SB_TEST_END();
+}
