@@ -347,10 +347,12 @@ int main(int argc, char **argv)
   PetscCall(check_adaptive("newmark"));
   PetscCall(check_adaptive("euler_implicit"));
   PetscCall(check_cuts());
-  PetscCall(check_silent("-body_a_material linear -time static -solver cg_jacobi -ksp_type cg -ksp_max_it 1"));
-  PetscCall(check_silent("-body_a_material corotated -time static -solver cg_jacobi -ksp_type cg -ksp_max_it 1"));
-  PetscCall(check_silent(
-    "-body_a_material linear -time newmark -ts_dt 0.1 -ts_max_time 1 -solver cg_jacobi -ksp_type cg -ksp_max_it 1"));
+  PetscCall(
+    check_silent("-body_a_material linear -time static -solver cg_jacobi -ksp_type cg -ksp_max_it 1"));
+  PetscCall(
+    check_silent("-body_a_material corotated -time static -solver cg_jacobi -ksp_type cg -ksp_max_it 1"));
+  PetscCall(check_silent("-body_a_material linear -time newmark -ts_dt 0.1 -ts_max_time 1 -solver cg_jacobi "
+                         "-ksp_type cg -ksp_max_it 1"));
   PetscCall(check_silent(
     "-body_a_material corotated -time euler_implicit -ts_dt 0.1 -ts_max_time 1 -snes_type ksponly -solver "
     "cg_jacobi -ksp_type cg -ksp_max_it 1"));
