@@ -183,12 +183,12 @@ static PetscErrorCode lie(const char *obstacles, PetscReal *strain, PetscReal *w
   PetscCall(open_scene(&t,
                        "-bodies a -body_a_mesh box:0.1,0.1,0.1:3 -body_a_rotate 0,1,0,-45 -body_a_translate "
                        "0.001,-0.05,0.005 -body_a_material corotated -body_a_young 2e4 -body_a_poisson 0.3 "
-                       "-body_a_density 1000 -time euler_implicit -ts_dt 0.01 -ts_max_time 0.8 %s",
+                       "-body_a_density 1000 -time euler_implicit -ts_dt 0.01 -ts_max_time 1.2 %s",
                        obstacles));
   PetscCall(verify_solve(&t, obstacles));
   PetscCall(SbModelEnergies(t.model, t.run->U, t.run->V, &e));
-  PetscCall(contact_column(t.run, 0.8, "l", "force_z", &force[0]));
-  if (contact_effect(t.model, "r")) PetscCall(contact_column(t.run, 0.8, "r", "force_z", &force[1]));
+  PetscCall(contact_column(t.run, 1.2, "l", "force_z", &force[0]));
+  if (contact_effect(t.model, "r")) PetscCall(contact_column(t.run, 1.2, "r", "force_z", &force[1]));
   *strain = e.strain;
   *weight = force[0] + force[1];
   PetscCall(test_scene_close(&t));
