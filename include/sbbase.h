@@ -81,11 +81,16 @@ PetscErrorCode SbOptionExists(const SbScope *scope, const char *key, PetscBool *
 PetscErrorCode SbOptionName(const SbScope *scope, const char *key, size_t size, char name[]);
 
 /*
-  SbOptionsCheck - ends the run when the database holds an option of ours that nobody read, with the nearest names.
+  SbOptionsCheck - looks at the options of ours that nobody read. One that exists and is of no use in this run is warned of, with the reason; one that does
+  not exist ends the run, with the nearest names.
   Ours: every name that begins with the prefix of a class (body_, set_, effect_) or equals, or is within two edits of,
-  a program-wide option of ours and does not belong to PETSc. Collective.
+  a program-wide option of ours and does not belong to PETSc. Of an instance that was not read an option exists when the class has its key and SbOptionsFile() found the
+  instance in a list. Collective.
 */
 PetscErrorCode SbOptionsCheck(void);
+/* Notes the names in the lists of a scenario file (-bodies, -effects, ...), which the command line may override. After all rows are
+   registered. Collective. */
+PetscErrorCode SbOptionsFile(MPI_Comm comm, const char *file);
 /* Call once, when the user's options are all in the database and before the program adds its own (presets of solvers):
    what is added later does not count as the user's. Without this call everything counts. Not collective. */
 PetscErrorCode SbOptionsRemember(void);

@@ -13,6 +13,8 @@ typedef struct {
   char markdown[PETSC_MAX_PATH_LEN];  /* -options_markdown FILE; "" when not asked for */
   char scenario
     [PETSC_MAX_PATH_LEN]; /* first word of the command line when it is no option; for PetscInitialize() */
+  PetscInt nfile;
+  const char *file[16]; /* [nfile] scenario and other option files that can be read; of argv, borrowed */
   char problem[PETSC_MAX_PATH_LEN + 256]; /* what is wrong with the command line; "" when nothing is */
 } SbCommand;
 

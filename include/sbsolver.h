@@ -20,7 +20,8 @@ typedef struct _SbSolverPreset {
 PetscErrorCode SbSolverRegister(void);
 /* Reads -solver: "auto" or a name of the table. */
 PetscErrorCode SbSolverSetFromOptions(char choice[], size_t size);
-/* The preset for `choice`; with "auto" by number of unknowns, ranks and law, the reason in words. Collective. */
+/* The preset for `choice`; with "auto" by number of unknowns, ranks and law; for a -pc_type of the user's, a row that it works with. The reason in
+   words. Collective. */
 PetscErrorCode SbSolverChoose(SbSpace space, PetscBool dynamic, PetscBool linear, PetscBool explicit_run,
                               const char *choice, const SbSolverPreset **preset, char reason[], size_t size);
 /* Names a factorisation for matrices that may be indefinite when `choice` is auto. Not collective. Errors: PETSC_ERR_USER where this PETSc has none
@@ -40,9 +41,26 @@ PetscErrorCode SbSolverNext(SbSpace space, KSPConvergedReason reason, PetscBool 
 PetscErrorCode SbSolverClear(const SbSolverPreset *preset);
 /* Gives the linear solver of `snes` the preset's options and tolerances; before SNESSetFromOptions(). Collective. */
 PetscErrorCode SbSolverSetUp(SNES snes, SbSpace space, const SbSolverPreset *preset);
-/* Solves of ksp whose true residual is far above the tolerance fail (KSP_DIVERGED_BREAKDOWN). Not collective. */
-PetscErrorCode SbSolverLookAtResidual(KSP ksp);
-/* CG gives way to FGMRES while rows of contact slide with friction, and comes back after them. Collective; before each solve. */
+/*
+  SbKSPLookAtResidual - solves of ksp whose true residual is far above the tolerance fail (KSP_DIVERGED_BREAKDOWN).
+
+  Not collective; after KSPSetFromOptions(). Input: direct, the preconditioner is a factorisation; alone, no Newton step looks at what a solve has left.
+  Nothing is done for an iteration that is judged by the true residual, or by none, nor for one with a norm of its own inside Newton's method.
+*/
+PetscErrorCode SbKSPLookAtResidual(KSP ksp, PetscBool direct, PetscBool alone);
+/*
+  SbKSPMeasureForces - makes the absolute tolerance of ksp one of the true residual, N, whatever norm it is judged by.
+
+  Not collective; after KSPSetFromOptions(). A norm that is not the true one is compared with its own start, by the factor that the true residual has to fall by.
+  Nothing is done for a method that is judged by the true residual, or with -ksp_convergence_test of the user's.
+*/
+PetscErrorCode SbKSPMeasureForces(KSP ksp);
+/* The true residual decides, unless the user chose a norm or a side, or the type of ksp cannot tell it. After KSPSetType(). Not collective. */
+PetscErrorCode SbKSPPreferTrueResidual(KSP ksp);
+/* Errors: PETSC_ERR_USER for a norm or side that the type of ksp does not have. After KSPSetFromOptions(). Not collective. */
+PetscErrorCode SbKSPCheckNorm(KSP ksp);
+/* A method for symmetric systems gives way to FGMRES while rows of contact slide with friction, and comes back after them. Collective; before
+   each solve. */
 PetscErrorCode SbSolverFollowRows(KSP ksp, SbSpace space);
 /*
   SbPCCoupleCreate - for a space with rows between nodes: makes pc a preconditioner in the null space of the exact ones, P^-1 = P M^-1 P^T.
@@ -70,6 +88,8 @@ PetscErrorCode SbSaddleChoose(SbSpace space, PetscBool dynamic, PetscInt choice,
   preconditioner is not symmetric and definite).
 */
 PetscErrorCode SbKSPSaddleSet(SbSpace space, KSP ksp);
+/* The method that such a ksp takes where nothing touches; ksp itself when it is another one. Borrowed. Not collective. */
+PetscErrorCode SbKSPSaddleGetPlain(KSP ksp, KSP *plain);
 #define SB_DIRECT_SMALL \
   30000 /* unknowns up to which one rank may factor for all of them; auto takes no factorisation beyond */
 /*
@@ -85,11 +105,20 @@ PetscErrorCode SbDirectPackage(MPI_Comm comm, PetscInt unknowns, PetscBool defin
   PETSc's PCCHOLESKY or PCLU, with the prefix telescope_ where the matrix is gathered.
 */
 PetscErrorCode SbPCDirectSet(PC pc, const char *package, PetscBool symmetric);
+/* The package of such a factorisation that is gathered on one rank, NULL for any other pc. Not collective. */
+PetscErrorCode SbPCDirectGathered(PC pc, const char **package);
 /* A Cholesky factorisation whose pivot is not positive is one that failed (KSP_DIVERGED_PC_FAILED), with CHOLMOD too and where it is gathered on
    one rank; other types of pc are left alone. After PCSetFromOptions(). Not collective. */
 PetscErrorCode SbPCGuardFactor(PC pc);
-/* What is left to do for the solver of `snes` after SNESSetFromOptions(). Collective. */
-PetscErrorCode SbSolverFinish(SNES snes, SbSpace space);
+/*
+  SbSolverFinish - what is left to do for the solver of `snes` after SNESSetFromOptions().
+
+  Collective. P: the matrix of the preconditioner; NULL without linear systems. Errors: PETSC_ERR_USER, in one line that says what to choose, for a -ksp_type,
+  -pc_type, norm, side or package that cannot work here.
+*/
+PetscErrorCode SbSolverFinish(SNES snes, SbSpace space, const SbSolverPreset *preset, Mat P);
+/* "cg, cholesky of mumps": what the solver of `snes` is now. Not collective. */
+PetscErrorCode SbSolverDescribe(SNES snes, SbSpace space, size_t size, char text[]);
 /* The operator that the preset works on. Collective; caller destroys. */
 PetscErrorCode SbSolverCreateOperator(SbSpace space, const SbSolverPreset *preset, Mat *A);
 

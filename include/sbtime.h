@@ -109,7 +109,10 @@ struct _p_SbRun {
   SbSaddle saddle_used;
   char solver_choice[SB_NAME_MAX]; /* as the scenario says: "auto" or a name */
   const struct _SbSolverPreset *solver_used;
-  char solver[SB_NAME_MAX]; /* preset chosen, "cg_gamg" */
+  char
+    solver[SB_NAME_MAX]; /* preset chosen, "cg_gamg"; with a -pc_type of the user's what solves, "cg, gamg" */
+  char
+    solver_parts[SB_NAME_MAX]; /* what solves at first, "cg, cholesky of mumps"; "" without linear systems */
   char solver_reason[256];
   struct _p_SbSolverList
     *solver_list; /* what happens when it fails (solver_list.c); NULL without linear systems */

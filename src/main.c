@@ -114,6 +114,7 @@ static PetscErrorCode supple(int argc, char *argv[])
   if (!left) PetscCall(PetscOptionsSetValue(NULL, "-options_left", "no")); /* SbOptionsUnused() says it */
   PetscCall(SbRegisterAll());
   PetscCall(SbErrorSetFromOptions());
+  for (PetscInt i = 0; i < command.nfile; i++) PetscCall(SbOptionsFile(PETSC_COMM_WORLD, command.file[i]));
 
   PetscCall(answer(&command, &answered));
   if (!answered) {

@@ -241,12 +241,60 @@ PetscErrorCode SbOptionsRemember(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Whether an option without its dash is a list of names: -effects, -body_liver_inclusions. */
+static PetscBool is_list(const char *name)
+{
+  for (PetscInt i = 0; i < SbTheOptions.nblock; i++) {
+    const SbOptionBlock *block = &SbTheOptions.block[i];
+    const size_t length = strlen(name), prefix = strlen(block->klass);
+
+    for (PetscInt j = 0; j < block->n; j++) {
+      const size_t n = strlen(block->rows[j].key);
+
+      if (block->rows[j].kind != SB_OPTION_NAMES || length < n ||
+          strcasecmp(name + length - n, block->rows[j].key))
+        continue;
+      if (prefix ? length > n + prefix && !strncasecmp(name, block->klass, prefix) : length == n)
+        return PETSC_TRUE;
+    }
+  }
+  return PETSC_FALSE;
+}
+
+PetscErrorCode SbOptionsFile(MPI_Comm comm, const char *file)
+{
+  PetscOptions database;
+  PetscInt n;
+  char **names, **values;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscOptionsCreate(&database));
+  PetscCall(PetscOptionsInsertFile(comm, database, file, PETSC_TRUE));
+  PetscCall(PetscOptionsLeftGet(database, &n, &names, &values));
+  for (PetscInt i = 0; i < n; i++) {
+    char *text, *rest;
+
+    if (!values[i] || !is_list(names[i])) continue;
+    PetscCall(PetscStrallocpy(values[i], &text));
+    for (char *name = strtok_r(text, ", ", &rest); name; name = strtok_r(NULL, ", ", &rest)) {
+      PetscCall(grow(SbTheOptions.nlisted, sizeof(*SbTheOptions.listed), &SbTheOptions.listed));
+      PetscCall(PetscStrallocpy(name, &SbTheOptions.listed[SbTheOptions.nlisted++]));
+    }
+    PetscCall(PetscFree(text));
+  }
+  PetscCall(PetscOptionsLeftRestore(database, &n, &names, &values));
+  PetscCall(PetscOptionsDestroy(&database));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode SbOptionsReset(void)
 {
   PetscFunctionBeginUser;
   for (PetscInt i = 0; i < SbTheOptions.nrecord; i++) PetscCall(PetscFree(SbTheOptions.record[i].text));
   PetscCall(PetscFree(SbTheOptions.record));
   PetscCall(PetscFree(SbTheOptions.block));
+  for (PetscInt i = 0; i < SbTheOptions.nlisted; i++) PetscCall(PetscFree(SbTheOptions.listed[i]));
+  PetscCall(PetscFree(SbTheOptions.listed));
   PetscCall(SbOptionUsersFree(&SbTheOptions.nuser, &SbTheOptions.user));
   PetscCall(PetscMemzero(&SbTheOptions, sizeof(SbTheOptions)));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -35,6 +35,8 @@ typedef struct {
   SbOptionRecord *record; /* [nrecord] in the order of the first reading */
   PetscBool remembered;   /* SbOptionsRemember() filled `user` */
   SbOptionUser *user;     /* [nuser] */
+  PetscInt nlisted;
+  char **listed; /* [nlisted] names in the lists of the scenario files, with repeats; owned */
 } SbOptionTable;
 extern SbOptionTable SbTheOptions; /* the registry of options */
 

@@ -1,9 +1,13 @@
 /*
-  option_check.c - options that nobody read: which are ours and misspelt, which are PETSc's and did nothing.
+  option_check.c - options that nobody read: which are ours and misspelt, which are right but of no use in this run, which are PETSc's and did nothing.
 
   PETSc cannot tell a misspelt option from one that an object created later would read, so it stays silent. Ours are all
   read before anything is computed. A name is ours when it begins with the prefix of one of our classes, when it is a
   program-wide key, or when it is within two edits of one and does not begin like an option of PETSc.
+
+  A misspelt one ends the run; one that is right and unused is warned of, with the reason: its integrator, type or effect is not the one of this run. What belongs to
+  an instance that nobody has read is right when some list of the scenario file names that instance and the class has the key:
+  then the command line has left it out. An instance that no list names is a slip.
 
   Distance between words: optimal string alignment (Levenshtein's distance, an exchange of neighbours counts as one edit;
   Damerau, Communications of the ACM 7, 1964). Case does not count, as in PETSc.
@@ -45,7 +49,11 @@ PetscErrorCode SbNearest(const char *word, PetscInt n, const char *const names[]
     if (names[i]) best = PetscMin(best, edit_distance(word, names[i]));
   if (best > farthest) PetscFunctionReturn(PETSC_SUCCESS);
   for (PetscInt i = 0; i < n && nbest < 3; i++) {
+    PetscBool again = PETSC_FALSE;
+
     if (!names[i] || edit_distance(word, names[i]) != best) continue;
+    for (PetscInt j = 0; j < i && !again; j++) again = (PetscBool)(names[j] && !strcmp(names[i], names[j]));
+    if (again) continue;
     if (nbest++) PetscCall(PetscStrlcat(text, " or ", size));
     PetscCall(PetscStrlcat(text, names[i], size));
   }
@@ -161,7 +169,7 @@ static PetscBool is_recorded(const char *name)
   return PETSC_FALSE;
 }
 
-/* Near full names: everything read so far, and every program-wide option. `text` is empty when none is near. */
+/* Near full names: everything read so far, every program-wide option, and the options of what a scenario file names. `text` is empty when none is near. */
 static PetscErrorCode near_options(const char *dashed, size_t size, char text[])
 {
   PetscInt n = 0, room = SbTheOptions.nrecord;
@@ -169,15 +177,23 @@ static PetscErrorCode near_options(const char *dashed, size_t size, char text[])
   char(*names)[SB_OPTION_NAME_MAX];
 
   PetscFunctionBeginUser;
-  for (PetscInt i = 0; i < SbTheOptions.nblock; i++) room += SbTheOptions.block[i].n;
+  for (PetscInt i = 0; i < SbTheOptions.nblock; i++)
+    room += SbTheOptions.block[i].n * (SbTheOptions.block[i].klass[0] ? SbTheOptions.nlisted : 1);
   PetscCall(PetscMalloc2(room, &list, room, &names));
   for (PetscInt i = 0; i < SbTheOptions.nrecord; i++) list[n++] = SbTheOptions.record[i].name;
   for (PetscInt i = 0; i < SbTheOptions.nblock; i++) {
     const SbOptionBlock *block = &SbTheOptions.block[i];
+    const PetscInt instances = block->klass[0] ? SbTheOptions.nlisted : 1;
 
-    for (PetscInt j = 0; !block->klass[0] && j < block->n; j++) {
-      if (is_recorded(block->rows[j].key)) continue;
-      PetscCall(PetscSNPrintf(names[n], SB_OPTION_NAME_MAX, "-%s", block->rows[j].key));
+    for (PetscInt j = 0; j < block->n * instances; j++) {
+      const char *key = block->rows[j % block->n].key;
+
+      if (block->klass[0])
+        PetscCall(PetscSNPrintf(names[n], SB_OPTION_NAME_MAX, "-%s_%s_%s", block->klass,
+                                SbTheOptions.listed[j / block->n], key));
+      else
+        PetscCall(PetscSNPrintf(names[n], SB_OPTION_NAME_MAX, "-%s", key));
+      if (is_recorded(names[n] + 1)) continue;
       list[n] = names[n];
       n++;
     }
@@ -242,8 +258,82 @@ static PetscErrorCode explain(const char *klass, const char *name, size_t size, 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* What to say about an option of ours that nobody read; empty when it is not ours. */
-static PetscErrorCode verdict(const char *name, size_t size, char text[])
+/* The length of the name's instance, "liver" in "body_liver_young": the longest one that is known; 0: none. read: it has been read, else it is only listed in a file. */
+static size_t instance_of(const char *klass, const char *name, PetscBool *read)
+{
+  const char *at = name + strlen(klass) + 1;
+  size_t best = 0;
+
+  *read = PETSC_FALSE;
+  for (PetscInt i = 0; i < SbTheOptions.nrecord + SbTheOptions.nlisted; i++) {
+    const PetscBool is_read = (PetscBool)(i < SbTheOptions.nrecord);
+    const SbOptionRecord *r = &SbTheOptions.record[i];
+    const char *instance = is_read ? r->scope.instance : SbTheOptions.listed[i - SbTheOptions.nrecord];
+    const size_t n = strlen(instance);
+
+    if (is_read && strcmp(r->scope.klass, klass)) continue;
+    if (n <= best || strncasecmp(at, instance, n) || at[n] != '_') continue;
+    best = n;
+    *read = is_read;
+  }
+  return best;
+}
+
+/* Whether some record of the instance (n letters behind the class) is of this type. */
+static PetscBool has_type(const char *klass, const char *instance, size_t n, const char *type)
+{
+  for (PetscInt i = 0; i < SbTheOptions.nrecord; i++) {
+    const SbScope *scope = &SbTheOptions.record[i].scope;
+
+    if (!strcmp(scope->klass, klass) && !strcmp(scope->type, type) && strlen(scope->instance) == n &&
+        !strncasecmp(scope->instance, instance, n))
+      return PETSC_TRUE;
+  }
+  return PETSC_FALSE;
+}
+
+/* What is to be said of an option that nobody read. */
+typedef enum {
+  NOT_OURS,
+  UNUSED,   /* right, for another type or setting: `text` is the reason */
+  LEFT_OUT, /* right, of an instance that only a scenario file names: `text` is "effect floor" */
+  WRONG     /* `text` is the message */
+} Verdict;
+
+/* An option with the prefix of a class, if some type of the class has its key. */
+static PetscErrorCode verdict_of_class(const char *klass, const char *name, size_t size, char text[],
+                                       Verdict *verdict)
+{
+  const size_t prefix = strlen(klass) + 1;
+  const char *instance = name + prefix, *key;
+  PetscBool read;
+  const size_t n = instance_of(klass, name, &read);
+
+  PetscFunctionBeginUser;
+  *verdict = WRONG;
+  if (!n) PetscFunctionReturn(PETSC_SUCCESS);
+  key = instance + n + 1;
+  for (PetscInt i = 0; i < SbTheOptions.nblock; i++) {
+    const SbOptionBlock *block = &SbTheOptions.block[i];
+    const PetscBool own = (PetscBool)(!block->type[0] || has_type(klass, instance, n, block->type));
+
+    for (PetscInt j = 0; !strcmp(block->klass, klass) && j < block->n; j++) {
+      if (strcasecmp(block->rows[j].key, key)) continue;
+      *verdict = read ? UNUSED : LEFT_OUT;
+      if (!read)
+        PetscCall(PetscSNPrintf(text, size, "%s %.*s", klass, (int)n, instance));
+      else if (own)
+        PetscCall(PetscSNPrintf(text, size, "%s", block->rows[j].help));
+      else
+        PetscCall(PetscSNPrintf(text, size, "it is for type %s, and the %s %.*s has another one", block->type,
+                                klass, (int)n, instance));
+      if (own || !read) PetscFunctionReturn(PETSC_SUCCESS);
+    }
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode find_verdict(const char *name, size_t size, char text[], Verdict *verdict)
 {
   char near[3 * SB_OPTION_NAME_MAX], dashed[SB_OPTION_NAME_MAX], why[1024] = "";
   const char *klass = class_of(name);
@@ -251,14 +341,21 @@ static PetscErrorCode verdict(const char *name, size_t size, char text[])
 
   PetscFunctionBeginUser;
   text[0] = 0;
+  *verdict = NOT_OURS;
   PetscCall(PetscSNPrintf(dashed, sizeof(dashed), "-%s", name));
   if (row) {
-    PetscCall(PetscSNPrintf(text, size, "%s does nothing in this scenario: %s", dashed, row->help));
+    *verdict = UNUSED;
+    PetscCall(PetscStrncpy(text, row->help, size));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   if (!klass && looks_like_petsc(name)) PetscFunctionReturn(PETSC_SUCCESS);
+  if (klass) {
+    PetscCall(verdict_of_class(klass, name, size, text, verdict));
+    if (*verdict != WRONG) PetscFunctionReturn(PETSC_SUCCESS);
+  }
   PetscCall(near_options(dashed, sizeof(near), near));
   if (!klass && !near[0]) PetscFunctionReturn(PETSC_SUCCESS);
+  *verdict = WRONG;
   if (near[0])
     PetscCall(PetscSNPrintf(why, sizeof(why), "; did you mean %s?", near));
   else
@@ -301,16 +398,34 @@ PetscErrorCode SbOptionMissing(const SbOptionRecord *r)
 PetscErrorCode SbOptionsCheck(void)
 {
   PetscInt nleft, nbad = 0;
-  char **names, first[1024] = "", more[64] = "";
+  char **names, first[1024] = "", more[64] = "", (*text)[1024];
+  Verdict *verdict;
 
   PetscFunctionBeginUser;
   PetscCall(PetscOptionsLeftGet(NULL, &nleft, &names, NULL));
+  PetscCall(PetscMalloc2(nleft, &verdict, nleft, &text));
   for (PetscInt i = 0; i < nleft; i++) {
-    char text[1024];
-
-    PetscCall(verdict(names[i], sizeof(text), text));
-    if (text[0] && !nbad++) PetscCall(PetscStrncpy(first, text, sizeof(first)));
+    PetscCall(find_verdict(names[i], sizeof(*text), text[i], &verdict[i]));
+    if (verdict[i] == WRONG && !nbad++) PetscCall(PetscStrncpy(first, text[i], sizeof(first)));
   }
+  /* what is right is warned of where nothing is wrong; options of one instance that is left out in one line */
+  for (PetscInt i = 0; i < nleft && !nbad; i++) {
+    PetscInt others = 0;
+
+    if (verdict[i] == UNUSED)
+      PetscCall(SbWarning(PETSC_COMM_WORLD, "-%s is unused in this run: %s", names[i], text[i]));
+    if (verdict[i] != LEFT_OUT) continue;
+    for (PetscInt j = i + 1; j < nleft; j++) {
+      if (verdict[j] != LEFT_OUT || strcmp(text[i], text[j])) continue;
+      verdict[j] = NOT_OURS;
+      others++;
+    }
+    if (others) PetscCall(PetscSNPrintf(more, sizeof(more), " and %" PetscInt_FMT " more of it are", others));
+    PetscCall(SbWarning(PETSC_COMM_WORLD,
+                        "-%s%s unused in this run: the scenario file names the %s, this run does not",
+                        names[i], others ? more : " is", text[i]));
+  }
+  PetscCall(PetscFree2(verdict, text));
   PetscCall(PetscOptionsLeftRestore(NULL, &nleft, &names, NULL));
   if (nbad > 1)
     PetscCall(PetscSNPrintf(more, sizeof(more), " (and %" PetscInt_FMT " more like it)", nbad - 1));
@@ -338,14 +453,14 @@ PetscErrorCode SbOptionsUnused(MPI_Comm comm, PetscInt *n)
   char **names, **values;
 
   PetscFunctionBeginUser;
-  *n = 0;
+  *n = 0; /* ours were warned of by SbOptionsCheck() */
   PetscCall(PetscOptionsLeftGet(NULL, &nleft, &names, &values));
   for (PetscInt i = 0; i < nleft; i++) {
     PetscBool users = (PetscBool)!SbTheOptions.remembered;
 
     for (PetscInt j = 0; j < SbTheOptions.nuser && !users; j++)
       users = (PetscBool)!strcasecmp(SbTheOptions.user[j].name, names[i]);
-    if (!users || is_read_at_end(names[i])) continue;
+    if (!users || is_read_at_end(names[i]) || class_of(names[i]) || program_row(names[i])) continue;
     PetscCall(SbWarning(comm, "nobody read the option -%s%s%s", names[i], values[i] ? " " : "",
                         values[i] ? values[i] : ""));
     (*n)++;

@@ -46,9 +46,12 @@ struct _p_SbCouple {
   Mat K;             /* borrowed; NULL before SbCoupleCreateOperator() */
   PetscBool oblique; /* rows may push along other coefficients than their own */
   PetscBool tilted;  /* some do now */
-  PetscBool general; /* CG has given way to a method for what is not symmetric */
-  Mat DFt;           /* D F^T */
-  Mat gram;          /* G D F^T, its diagonal slightly larger */
+  PetscBool general; /* a method for symmetric systems has given way to one for others */
+  char method[SB_NAME_MAX];
+  KSPNormType norm;
+  PCSide side; /* of that method */
+  Mat DFt;     /* D F^T */
+  Mat gram;    /* G D F^T, its diagonal slightly larger */
   KSP solver;
   Vec anchor,
     added;  /* squares of the coefficients, and what K holds beside the tangent, N/m; NULL: nothing */

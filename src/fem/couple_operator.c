@@ -85,7 +85,6 @@ PetscErrorCode SbCoupleSetMatrix(SbSpace s, Mat K)
 typedef struct {
   SbSpace space;
   PC inner;
-  PetscBool configured;
 } Wrapped;
 
 /* Whether solves go by a factorisation of the saddle-point system now. */
@@ -104,11 +103,6 @@ static PetscErrorCode setup_wrapped(PC pc)
   PetscCall(PCShellGetContext(pc, &w));
   PetscCall(PCGetOperators(pc, NULL, &K));
   PetscCall(PCSetOperators(w->inner, K, K));
-  if (!w->configured) {
-    PetscCall(PCSetFromOptions(w->inner));
-    PetscCall(SbPCGuardFactor(w->inner));
-    w->configured = PETSC_TRUE;
-  }
   PetscCall(PCSetFailedReason(pc, PC_NOERROR));
   w->space->couple->matrix++;
   if (is_factored(w->space)) PetscFunctionReturn(PETSC_SUCCESS); /* K alone may be singular */

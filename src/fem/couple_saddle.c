@@ -375,7 +375,7 @@ PetscErrorCode SbKSPSaddleSet(SbSpace s, KSP ksp)
   PetscCall(KSPCreate(s->comm, &plain));
   PetscCall(KSPSetOptionsPrefix(plain, prefix));
   PetscCall(KSPSetType(plain, type));
-  PetscCall(KSPSetNormType(plain, KSP_NORM_UNPRECONDITIONED));
+  PetscCall(SbKSPPreferTrueResidual(plain));
   PetscCall(KSPSetFromOptions(plain));
   PetscCall(KSPSetPC(plain, pc));
   PetscCall(KSPRegister(SB_KSP_SADDLE, create_saddle));
@@ -386,5 +386,15 @@ PetscErrorCode SbKSPSaddleSet(SbSpace s, KSP ksp)
   d->loss = LOSS;
   PetscCall(PetscStrcmp(type, KSPRICHARDSON, &richardson));
   d->minres = (PetscBool)(!richardson && !SbSpaceCoupleOblique(s));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbKSPSaddleGetPlain(KSP ksp, KSP *plain)
+{
+  PetscBool is;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscObjectTypeCompare((PetscObject)ksp, SB_KSP_SADDLE, &is));
+  *plain = is ? ((Saddle *)ksp->data)->plain : ksp;
   PetscFunctionReturn(PETSC_SUCCESS);
 }

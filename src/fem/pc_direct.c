@@ -73,3 +73,14 @@ PetscErrorCode SbPCDirectSet(PC pc, const char *package, PetscBool symmetric)
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
+
+PetscErrorCode SbPCDirectGathered(PC pc, const char **package)
+{
+  PetscBool is;
+
+  PetscFunctionBeginUser;
+  *package = NULL;
+  PetscCall(PetscObjectTypeCompare((PetscObject)pc, PCTELESCOPE, &is));
+  if (is) PetscCall(PCGetApplicationContext(pc, (void *)package));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

@@ -2,7 +2,10 @@
   Linear solvers by name. Each is a row of options for PETSc, put into its database where the user is silent, so that
   everything stays adjustable by PETSc's own options; the matrix type is what the row's preconditioner takes.
 
-  Convergence is judged by the true residual: the preconditioned norm can be off by orders of magnitude for nearly
+  A -pc_type of the user's that is not the row's own takes the row's place: `by_type` says which matrix it works on. The method is CG
+  then, or what -ksp_type says. SbSolverFinish() refuses what cannot work, before anything is computed.
+
+  Convergence is judged by the true residual wherever the method can tell it: the preconditioned norm can be off by orders of magnitude for nearly
   incompressible bodies. Gauss-Seidel and SOR are wrapped in a PCCOMPOSITE of one: Richardson hands its whole loop to a bare
   PCSOR, which does the largest number of sweeps without looking at the residual. A solve that does not reach its tolerance fails; the
   next row of a list is then tried on the same system (time/solver_list.c), and only after the last one is the step cut or the run stopped.
@@ -92,6 +95,18 @@ static const SbSolverPreset presets[] = {
    SbPressureOperatorCreate},
 };
 
+/* Preconditioners that the user names by -pc_type: what they work on, and what goes with them. The last row: all others. */
+static const SbSolverPreset by_type[] = {
+  {PCNONE, SB_MATRIX_BAIJ, PETSC_FALSE, "-ksp_type cg -pc_type none", NULL, NULL, NULL, NULL},
+  {PCJACOBI, SB_MATRIX_BAIJ, PETSC_FALSE, "-ksp_type cg -pc_type jacobi", NULL, NULL, NULL, NULL},
+  {PCPBJACOBI, SB_MATRIX_BAIJ, PETSC_FALSE, "-ksp_type cg -pc_type pbjacobi", NULL, NULL, NULL, NULL},
+  {PCICC, SB_MATRIX_SBAIJ, PETSC_FALSE, "-ksp_type cg -pc_type icc", NULL, NULL, NULL, NULL},
+  {PCSOR, SB_MATRIX_AIJ, PETSC_FALSE, "-ksp_type cg -pc_type sor -pc_sor_local_symmetric", NULL, NULL, NULL,
+   NULL},
+  {PCHYPRE, SB_MATRIX_AIJ, PETSC_FALSE, "-ksp_type cg -pc_type hypre", "hypre", NULL, NULL, NULL},
+  {"", SB_MATRIX_AIJ, PETSC_FALSE, "-ksp_type cg", NULL, NULL, NULL, NULL},
+};
+
 static const SbOption rows[] = {
   {"solver", SB_OPTION_CHOICE, 1, "", "auto",
    "auto|direct|cg|cg_jacobi|cg_pbjacobi|cg_icc|cg_ssor|cg_two_level|cg_gamg|cg_hypre|gauss_seidel|sor|"
@@ -176,11 +191,33 @@ static PetscErrorCode largest_poisson(SbSpace s, PetscReal *nu)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The row for a -pc_type of the user's: that of -solver when it has the same one; NULL: the user gave none. */
+static PetscErrorCode find_type(const char *choice, const SbSolverPreset **preset)
+{
+  const SbSolverPreset *base = find_preset(choice);
+  char type[SB_NAME_MAX], own[SB_NAME_MAX];
+  PetscBool given;
+
+  PetscFunctionBeginUser;
+  *preset = NULL;
+  PetscCall(PetscOptionsGetString(NULL, NULL, "-pc_type", type, sizeof(type), &given));
+  if (!given) PetscFunctionReturn(PETSC_SUCCESS);
+  if (base) {
+    PetscCall(preset_value(base, "-pc_type", sizeof(own), own));
+    *preset = strcmp(own, type) ? NULL : base;
+  }
+  for (size_t k = 0; !*preset; k++) {
+    if (!strcmp(by_type[k].name, type) || !by_type[k].name[0]) *preset = &by_type[k];
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode SbSolverChoose(SbSpace s, PetscBool dynamic, PetscBool linear, PetscBool explicit_run,
                               const char *choice, const SbSolverPreset **preset, char reason[], size_t size)
 {
   const PetscInt unknowns = 3 * s->Nnode;
   const char *name = choice, *package;
+  char method[SB_NAME_MAX] = "";
   PetscInt nface = 0, most = 0;
   PetscBool indefinite, has = PETSC_TRUE, turns;
   PetscReal nu;
@@ -191,10 +228,15 @@ PetscErrorCode SbSolverChoose(SbSpace s, PetscBool dynamic, PetscBool linear, Pe
   PetscCall(may_be_indefinite(s, &indefinite));
   PetscCall(largest_poisson(s, &nu));
   PetscCall(SbDirectPackage(s->comm, unknowns, (PetscBool)!indefinite, &package));
+  PetscCall(PetscOptionsGetString(NULL, NULL, "-ksp_type", method, sizeof(method), NULL));
+  *preset = NULL;
+  if (!explicit_run) PetscCall(find_type(choice, preset));
   /* a factorisation that turns with the nodes, unless ranks meet at too many of them */
   turns = (PetscBool)(!strcmp(choice, "rotated") || !strcmp(choice, "realtime"));
   if (!strcmp(choice, "auto"))
-    turns = (PetscBool)(dynamic && !linear && unknowns <= 60000 && nu <= NU_ROTATED);
+    turns =
+      (PetscBool)(dynamic && !linear && unknowns <= 60000 && nu <= NU_ROTATED && strcmp(method, KSPMINRES));
+  if (*preset) turns = PETSC_FALSE;
   if (turns && nrank > 1 && !explicit_run) PetscCall(SbSpaceInterfaceSize(s, &nface, &most));
   if (nface > most) {
     if (strcmp(choice, "auto"))
@@ -209,6 +251,8 @@ PetscErrorCode SbSolverChoose(SbSpace s, PetscBool dynamic, PetscBool linear, Pe
   if (explicit_run) {
     name = "cg";
     PetscCall(PetscSNPrintf(reason, size, "explicit integrator: no linear system"));
+  } else if (*preset) {
+    PetscCall(PetscSNPrintf(reason, size, "chosen by -pc_type"));
   } else if (!strcmp(choice, "direct")) {
     PetscCheck(package, s->comm, PETSC_ERR_USER,
                "-solver direct needs SuiteSparse or MUMPS, and this PETSc was built without both: choose "
@@ -259,12 +303,12 @@ PetscErrorCode SbSolverChoose(SbSpace s, PetscBool dynamic, PetscBool linear, Pe
                             " nodes, and rotated and realtime take %" PetscInt_FMT,
                             (int)nrank, nface, most));
   }
-  *preset = find_preset(name);
+  if (!*preset) *preset = find_preset(name);
   PetscCheck(*preset, s->comm, PETSC_ERR_PLIB, "No solver preset %s", name);
   if ((*preset)->package) PetscCall(SbHasPackage((*preset)->package, &has));
   PetscCheck(has, s->comm, PETSC_ERR_USER,
-             "-solver %s needs %s, which this PETSc was built without: choose another solver, or auto",
-             (*preset)->name, (*preset)->package);
+             "%s %s needs %s, which this PETSc was built without: choose another one, or -solver auto",
+             find_preset((*preset)->name) ? "-solver" : "-pc_type", (*preset)->name, (*preset)->package);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -306,7 +350,7 @@ PetscErrorCode SbSolverNext(SbSpace s, KSPConvergedReason reason, PetscBool memo
 
   PetscFunctionBeginUser;
   *preset = NULL;
-  *tried |= 1U << (failed - presets);
+  if (find_preset(failed->name) == failed) *tried |= 1U << (failed - presets);
   PetscCall(may_be_indefinite(s, &indefinite));
   /* where the tangent itself is not definite, and may be so, the iteration is not to blame: that is Newton's affair */
   if (indefinite && reason == KSP_DIVERGED_INDEFINITE_MAT) PetscFunctionReturn(PETSC_SUCCESS);
@@ -321,7 +365,7 @@ PetscErrorCode SbSolverNext(SbSpace s, KSPConvergedReason reason, PetscBool memo
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Options of the row that the user did not give. */
+/* Options that the user did not give. */
 static PetscErrorCode insert_options(const char *text)
 {
   char **word;
@@ -378,70 +422,235 @@ PetscErrorCode SbSolverCreateOperator(SbSpace s, const SbSolverPreset *preset, M
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The package that factors where the user names neither one nor -solver: PETSc's own choice knows neither sizes nor ranks. */
+static PetscErrorCode choose_package(SbSpace s, PC pc, const char *type)
+{
+  const PetscBool lu = (PetscBool)!strcmp(type, PCLU);
+  const char *package;
+  PetscBool indefinite, has;
+  PetscMPIInt size;
+
+  PetscFunctionBeginUser;
+  PetscCallMPI(MPI_Comm_size(s->comm, &size));
+  PetscCall(may_be_indefinite(s, &indefinite));
+  PetscCall(SbDirectPackage(s->comm, 3 * s->Nnode, (PetscBool)(!lu && !indefinite), &package));
+  if (size > 1) {
+    /* a type of the user's is one for distributed matrices */
+    package = MATSOLVERMUMPS;
+    PetscCall(SbHasPackage(package, &has));
+    if (!has && lu) package = MATSOLVERSUPERLU_DIST;
+    if (!has) PetscCall(SbHasPackage(package, &has));
+    if (!has) package = NULL;
+  } else if (package && !lu && !strcmp(package, MATSOLVERUMFPACK))
+    package = NULL;
+  if (package) PetscCall(PCFactorSetMatSolverType(pc, package));
+  if (package && !strcmp(package, MATSOLVERMUMPS)) PetscCall(insert_options("-mat_mumps_icntl_14 100"));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Methods for symmetric systems only. */
+static PetscErrorCode is_symmetric(KSP ksp, PetscBool *is)
+{
+  PetscFunctionBeginUser;
+  PetscCall(PetscObjectTypeCompareAny((PetscObject)ksp, is, KSPCG, KSPFCG, KSPMINRES, KSPPIPECG, KSPPIPEFCG,
+                                      KSPGROPPCG, KSPCR, KSPSYMMLQ, ""));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode SbSolverSetUp(SNES snes, SbSpace s, const SbSolverPreset *preset)
 {
-  char type[SB_NAME_MAX];
+  char method[SB_NAME_MAX], type[SB_NAME_MAX], users[SB_NAME_MAX];
+  PetscBool given, symmetric;
   KSP ksp;
   PC pc;
 
   PetscFunctionBeginUser;
   PetscCall(SNESGetKSP(snes, &ksp));
-  PetscCall(KSPSetTolerances(ksp, 1e-8, PETSC_DEFAULT, PETSC_DEFAULT, 5000));
-  PetscCall(preset_value(preset, "-ksp_type", sizeof(type), type));
-  PetscCall(KSPSetType(ksp, type));
   if (s->couple) s->couple->general = PETSC_FALSE;
-  PetscCall(KSPSetNormType(ksp, KSP_NORM_UNPRECONDITIONED));
-  PetscCall(insert_options(preset->options));
   PetscCall(KSPGetPC(ksp, &pc));
+  PetscCall(KSPSetTolerances(ksp, 1e-8, PETSC_DEFAULT, PETSC_DEFAULT, 5000));
   /* in a null space the residual of CG may grow a long way before it falls */
   if (s->couple) PetscCall(KSPSetTolerances(ksp, PETSC_DEFAULT, PETSC_DEFAULT, 1e10, PETSC_DEFAULT));
   PetscCall(SbPCCoupleCreate(s, pc, &pc));
+  /* the row, and over it the types of the user's */
+  PetscCall(preset_value(preset, "-ksp_type", sizeof(method), method));
   PetscCall(preset_value(preset, "-pc_type", sizeof(type), type));
+  PetscCall(PetscOptionsGetString(NULL, NULL, "-pc_type", type, sizeof(type), NULL));
+  PetscCall(PetscOptionsGetString(NULL, NULL, "-ksp_type", users, sizeof(users), &given));
+  PetscCall(KSPSetType(ksp, given ? users : method));
+  PetscCall(is_symmetric(ksp, &symmetric));
+  if (symmetric) PetscCall(insert_options("-pc_asm_type basic -sub_0_pc_sor_local_symmetric"));
   if (type[0]) PetscCall(PCSetType(pc, type));
+  PetscCall(insert_options(preset->options));
+  if (!strcmp(type, PCLU) || !strcmp(type, PCCHOLESKY)) PetscCall(choose_package(s, pc, type));
   if (preset->precondition) PetscCall(preset->precondition(s, pc));
-  if (is_direct(preset) || (s->couple && s->couple->saddle == SB_SADDLE_DIRECT))
-    PetscCall(SbSolverLookAtResidual(ksp));
+  PetscCall(SbKSPPreferTrueResidual(ksp));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode SbSolverFollowRows(KSP ksp, SbSpace s)
 {
   PetscInt restart = RESTART;
-  PetscBool cg;
+  PetscBool symmetric;
+  SbCouple c = s->couple;
+  KSPType type;
 
   PetscFunctionBeginUser;
-  if (!s->couple || !s->couple->oblique || s->couple->general == s->couple->tilted)
-    PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(PetscObjectTypeCompare((PetscObject)ksp, KSPCG, &cg));
-  if (!cg && !s->couple->general) PetscFunctionReturn(PETSC_SUCCESS); /* not ours, and general enough */
-  PetscCall(KSPSetType(ksp, cg ? KSPFGMRES : KSPCG));
+  if (!c || !c->oblique || c->general == c->tilted) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(is_symmetric(ksp, &symmetric));
+  if (!symmetric && !c->general) PetscFunctionReturn(PETSC_SUCCESS); /* general enough */
+  if (symmetric) {
+    PetscCall(KSPGetType(ksp, &type));
+    PetscCall(PetscStrncpy(c->method, type, sizeof(c->method)));
+    PetscCall(KSPGetNormType(ksp, &c->norm));
+    PetscCall(KSPGetPCSide(ksp, &c->side));
+  }
+  PetscCall(KSPSetType(ksp, symmetric ? KSPFGMRES : c->method));
+  PetscCall(KSPSetNormType(ksp, symmetric && c->norm != KSP_NORM_NONE ? KSP_NORM_UNPRECONDITIONED : c->norm));
+  PetscCall(KSPSetPCSide(ksp, symmetric ? PC_RIGHT : c->side));
   PetscCall(PetscOptionsGetInt(NULL, NULL, "-ksp_gmres_restart", &restart, NULL));
-  if (cg) PetscCall(KSPGMRESSetRestart(ksp, restart));
-  s->couple->general = cg;
+  if (symmetric) PetscCall(KSPGMRESSetRestart(ksp, restart));
+  c->general = symmetric;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbSolverFinish(SNES snes, SbSpace s)
+/* A factorisation that the matrix's type or the number of ranks rules out. */
+static PetscErrorCode check_factor(PC pc, Mat A)
+{
+  static const struct {
+    PCType type;
+    MatFactorType kind;
+    const char *advice;
+  } of[] = {
+    {PCLU, MAT_FACTOR_LU, "-solver direct, or an iteration: -pc_type gamg"},
+    {PCCHOLESKY, MAT_FACTOR_CHOLESKY, "-solver direct, or an iteration: -pc_type gamg"},
+    {PCICC, MAT_FACTOR_ICC, "-pc_type bjacobi -sub_pc_type icc, which does it on each rank"},
+    {PCILU, MAT_FACTOR_ILU, "-pc_type bjacobi -sub_pc_type ilu, which does it on each rank"},
+  };
+  MatSolverType package;
+  PetscMPIInt size;
+  PetscBool is, has;
+
+  PetscFunctionBeginUser;
+  PetscCallMPI(MPI_Comm_size(PetscObjectComm((PetscObject)pc), &size));
+  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(of); i++) {
+    PetscCall(PetscObjectTypeCompare((PetscObject)pc, of[i].type, &is));
+    if (!is) continue;
+    PetscCall(PCFactorGetMatSolverType(pc, &package));
+    PetscCall(MatGetFactorAvailable(A, package, of[i].kind, &has));
+    PetscCheck(has, PetscObjectComm((PetscObject)pc), PETSC_ERR_USER,
+               "-pc_type %s%s%s has no factorisation on %d rank%s in this PETSc: choose %s", of[i].type,
+               package ? " -pc_factor_mat_solver_type " : "", package ? package : "", (int)size,
+               size == 1 ? "" : "s", of[i].advice);
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* One application of a preconditioner that does not solve; MINRES with one that is symmetric to single precision only. */
+static PetscErrorCode check_method(SbSpace s, KSP ksp, PC pc, const SbSolverPreset *preset, PetscBool *direct)
+{
+  PetscBool single, parts, minres;
+  char sub[SB_NAME_MAX] = "";
+  const char *package;
+  PCType type;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscObjectTypeCompare((PetscObject)ksp, KSPMINRES, &minres));
+  PetscCheck(!minres || preset->precondition != SbPCRotatedCreate, s->comm, PETSC_ERR_USER,
+             "-ksp_type minres does not converge with the single precision of -solver %s: choose -ksp_type "
+             "cg, or another "
+             "-solver",
+             preset->name);
+  PetscCall(PetscObjectTypeCompare((PetscObject)ksp, KSPPREONLY, &single));
+  PetscCall(
+    PetscObjectTypeCompareAny((PetscObject)pc, direct, PCLU, PCCHOLESKY, PCQR, PCSVD, PCREDUNDANT, ""));
+  PetscCall(SbPCDirectGathered(pc, &package));
+  if (package) *direct = PETSC_TRUE;
+  if (!single) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscObjectTypeCompareAny((PetscObject)pc, &parts, PCBJACOBI, PCASM, ""));
+  PetscCall(PetscOptionsGetString(NULL, NULL, "-sub_pc_type", sub, sizeof(sub), NULL));
+  parts = (PetscBool)(parts && (!strcmp(sub, PCLU) || !strcmp(sub, PCCHOLESKY)));
+  PetscCall(PCGetType(pc, &type));
+  PetscCheck(*direct || parts, s->comm, PETSC_ERR_USER,
+             "-ksp_type preonly takes the preconditioner for the inverse, which %s %s is not: choose "
+             "-pc_type cholesky "
+             "or lu, or a -ksp_type that iterates (cg, minres, gmres)",
+             strcmp(type, PCSHELL) ? "-pc_type" : "-solver", strcmp(type, PCSHELL) ? type : preset->name);
+  PetscCheck(
+    !s->couple || s->couple->saddle == SB_SADDLE_DIRECT, s->comm, PETSC_ERR_USER,
+    "-ksp_type preonly does not hold the rows of contact, which join nodes beside the matrix: choose "
+    "-ksp_type cg or fgmres");
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbSolverFinish(SNES snes, SbSpace s, const SbSolverPreset *preset, Mat P)
 {
   PetscInt restart = RESTART;
-  PetscBool symmetric;
+  PetscBool direct, single, symmetric;
   KSP ksp;
-  Mat A, P;
+  Mat A;
+  PC pc;
+
+  PetscFunctionBeginUser;
+  if (!P) PetscFunctionReturn(PETSC_SUCCESS); /* explicit: no linear system */
+  PetscCall(SNESGetKSP(snes, &ksp));
+  PetscCall(KSPGetPC(ksp, &pc));
+  PetscCall(SbPCCoupleGetInner(pc, &pc));
+  if (s->couple) {
+    PetscCall(PCSetOperators(pc, P, P));
+    PetscCall(PCSetFromOptions(pc));
+  }
+  PetscCall(SbPCGuardFactor(pc));
+  /* what cannot work is said before anything is computed */
+  PetscCall(check_factor(pc, P));
+  PetscCall(check_method(s, ksp, pc, preset, &direct));
+  /* a matrix without what is not symmetric preconditions the whole tangent */
+  PetscCall(SNESGetJacobian(snes, &A, NULL, NULL, NULL));
+  PetscCall(is_symmetric(ksp, &symmetric));
+  PetscCall(PetscObjectTypeCompareAny((PetscObject)ksp, &single, KSPRICHARDSON, KSPPREONLY, ""));
+  if (A && A != P && !s->couple && (symmetric || single)) {
+    PetscCall(KSPSetType(ksp, KSPFGMRES));
+    PetscCall(PetscOptionsGetInt(NULL, NULL, "-ksp_gmres_restart", &restart, NULL));
+    PetscCall(KSPGMRESSetRestart(ksp, restart));
+  }
+  PetscCall(SbKSPCheckNorm(ksp));
+  /* a solve that no Newton step looks at, or whose own norm is not to be trusted */
+  PetscCall(PetscObjectTypeCompare((PetscObject)snes, SNESKSPONLY, &single));
+  if (s->couple && s->couple->saddle == SB_SADDLE_DIRECT) direct = PETSC_TRUE;
+  PetscCall(SbKSPLookAtResidual(ksp, direct, single));
+  if (s->couple || s->held) PetscCall(SbKSPMeasureForces(ksp));
+  if (s->couple && s->couple->saddle == SB_SADDLE_ITERATIVE) PetscCall(SbKSPSaddleSet(s, ksp));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbSolverDescribe(SNES snes, SbSpace s, size_t size, char text[])
+{
+  MatSolverType package = NULL;
+  PetscBool shell, factor;
+  KSPType method;
+  const char *name, *gathered;
+  KSP ksp;
   PC pc;
 
   PetscFunctionBeginUser;
   PetscCall(SNESGetKSP(snes, &ksp));
+  PetscCall(SbKSPSaddleGetPlain(ksp, &ksp));
+  PetscCall(KSPGetType(ksp, &method));
+  if (s->couple && s->couple->general) method = s->couple->method;
   PetscCall(KSPGetPC(ksp, &pc));
-  PetscCall(SbPCGuardFactor(pc));
-  if (s->couple && s->couple->saddle == SB_SADDLE_ITERATIVE) PetscCall(SbKSPSaddleSet(s, ksp));
-
-  /* a matrix without what is not symmetric preconditions the whole tangent */
-  PetscCall(SNESGetJacobian(snes, &A, &P, NULL, NULL));
-  PetscCall(PetscObjectTypeCompareAny((PetscObject)ksp, &symmetric, KSPCG, KSPRICHARDSON, ""));
-  if (A == P || s->couple || !symmetric) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(KSPSetType(ksp, KSPFGMRES));
-  PetscCall(PetscOptionsGetInt(NULL, NULL, "-ksp_gmres_restart", &restart, NULL));
-  PetscCall(KSPGMRESSetRestart(ksp, restart));
+  PetscCall(SbPCCoupleGetInner(pc, &pc));
+  PetscCall(PCGetType(pc, &name));
+  PetscCall(PetscObjectTypeCompare((PetscObject)pc, PCSHELL, &shell));
+  if (shell) PetscCall(PCShellGetName(pc, &name));
+  PetscCall(PetscObjectTypeCompareAny((PetscObject)pc, &factor, PCLU, PCCHOLESKY, ""));
+  if (factor) PetscCall(PCFactorGetMatSolverType(pc, &package));
+  PetscCall(SbPCDirectGathered(pc, &gathered));
+  if (gathered) {
+    name = strcmp(gathered, MATSOLVERCHOLMOD) ? PCLU : PCCHOLESKY;
+    package = gathered;
+  }
+  PetscCall(PetscSNPrintf(text, size, "%s, %s%s%s%s", method ? method : "", name ? name : "",
+                          package ? " of " : "", package ? package : "", gathered ? " on one rank" : ""));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

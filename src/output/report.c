@@ -3,6 +3,7 @@
 */
 #include <stdarg.h>
 #include "output_impl.h"
+#include "sbsolver.h"
 
 #define WIDTH 79
 #define INDENT 11
@@ -175,7 +176,10 @@ PetscErrorCode SbReportHeader(SbRun run)
   if (out->scenario[0]) PetscCall(entry("scenario", "%s", out->scenario));
   PetscCall(print_effects(run->model));
   PetscCall(print_time(run));
-  PetscCall(entry("solver", "%s: %s", run->solver, run->solver_reason));
+  if (run->solver_parts[0] && strcmp(run->solver, run->solver_parts))
+    PetscCall(entry("solver", "%s (%s): %s", run->solver, run->solver_parts, run->solver_reason));
+  else
+    PetscCall(entry("solver", "%s: %s", run->solver, run->solver_reason));
   PetscCall(print_output(out));
   (void)fflush(PETSC_STDOUT);
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -253,7 +257,7 @@ PetscErrorCode SbReportSummary(SbRun run)
   SbOutput out = (SbOutput)run->output;
   const PetscBool stopped = (PetscBool)(run->stop_reason[0] != 0);
   SbPhases phases;
-  char files[1024] = "", memory[32], sum[32];
+  char files[1024] = "", memory[32], sum[32], solver[SB_NAME_MAX];
 
   PetscFunctionBeginUser;
   PetscCall(SbProgressEnd(out));
@@ -275,6 +279,11 @@ PetscErrorCode SbReportSummary(SbRun run)
                   "%" PetscInt_FMT " (%" PetscInt_FMT " attempts rejected), %" PetscInt_FMT
                   " Newton and %" PetscInt_FMT " linear iterations",
                   run->steps_total, run->rejected_total, run->newton_total, run->linear_total));
+  if (run->solver_parts[0]) {
+    PetscCall(SbSolverDescribe(run->snes, run->model->space, sizeof(solver), solver));
+    if (strcmp(solver, run->solver_parts))
+      PetscCall(entry("solver", "%s at the end, %s at first", solver, run->solver_parts));
+  }
   size_text(phases.memory_max, sizeof(memory), memory);
   size_text(phases.memory_sum, sizeof(sum), sum);
   if (out->size > 1)

@@ -5,6 +5,7 @@
 #include <time.h>
 #include <unistd.h>
 #include "output_impl.h"
+#include "sbsolver.h"
 
 /* A JSON string with its quotes. */
 static void put_string(FILE *f, const char *text)
@@ -87,7 +88,7 @@ static void put_bodies(FILE *f, SbModel m, SbOutput out)
 
 static PetscErrorCode put_settings(FILE *f, SbRun run)
 {
-  char name[SB_NAME_MAX];
+  char name[SB_NAME_MAX], parts[SB_NAME_MAX] = "";
   char *options;
 
   PetscFunctionBeginUser;
@@ -95,6 +96,9 @@ static PetscErrorCode put_settings(FILE *f, SbRun run)
   put_text(f, "time", name);
   put_text(f, "solver", run->solver);
   put_text(f, "solver_reason", run->solver_reason);
+  /* as it is now: a fallback may have changed it */
+  if (run->solver_parts[0]) PetscCall(SbSolverDescribe(run->snes, run->model->space, sizeof(parts), parts));
+  put_text(f, "solver_parts", parts);
   (void)fprintf(f, "  \"unknowns\": %" PetscInt_FMT ",\n  ", 3 * run->model->space->Nnode);
   put_real(f, "dt", run->dt, ",\n  ");
   put_real(f, "t_start", run->t0, ",\n  ");

@@ -46,12 +46,16 @@ static int file_error(const char *file)
   return error;
 }
 
-/* Whether an option file can be read; else says so in command->problem. */
+/* Whether an option file can be read: it is noted; else that is said in command->problem. */
 static PetscBool readable(const char *file, SbCommand *command)
 {
   const int error = file_error(file);
 
-  if (!error) return PETSC_TRUE;
+  if (!error) {
+    if (command->nfile < (PetscInt)PETSC_STATIC_ARRAY_LENGTH(command->file))
+      command->file[command->nfile++] = file;
+    return PETSC_TRUE;
+  }
   if (command->problem[0]) return PETSC_FALSE;
   (void)snprintf(command->problem, sizeof(command->problem), "cannot read the option file %s: %s", file,
                  strerror(error));

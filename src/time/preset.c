@@ -385,7 +385,7 @@ static PetscErrorCode set_up_ts(SbRun run)
   /* read already, and set below */
   if (SB_TS_DT_RENAMED) PetscCall(PetscOptionsClearValue(NULL, "-ts_dt"));
   PetscCall(TSSetFromOptions(run->ts));
-  PetscCall(SbSolverFinish(run->snes, m->space));
+  PetscCall(SbSolverFinish(run->snes, m->space, run->solver_used, run->J));
   PetscCall(SbNewtonSetRun(run->snes, run));
   PetscCall(forcing_terms(run->snes));
   PetscCall(TSSetMaxTime(run->ts, run->t_end));
@@ -412,7 +412,7 @@ static PetscErrorCode set_up_static(SbRun run)
   PetscCall(set_up_snes(run));
   PetscCall(SbSolverSetUp(run->snes, run->model->space, run->solver_used));
   PetscCall(SNESSetFromOptions(run->snes));
-  PetscCall(SbSolverFinish(run->snes, run->model->space));
+  PetscCall(SbSolverFinish(run->snes, run->model->space, run->solver_used, run->J));
   PetscCall(SbNewtonSetRun(run->snes, run));
   PetscCall(forcing_terms(run->snes));
   if (run->arc.on) PetscCall(SbArcLengthCheck(run));
@@ -570,6 +570,11 @@ PetscErrorCode SbRunSetUp(SbRun run)
   else
     PetscCall(set_up_static(run));
   PetscCall(SbSolverListCreate(run));
+  /* options may have made something else of the preset */
+  if (!explicit) {
+    PetscCall(SbSolverDescribe(run->snes, m->space, sizeof(run->solver_parts), run->solver_parts));
+    if (!run->solver_used->help) PetscCall(PetscStrncpy(run->solver, run->solver_parts, sizeof(run->solver)));
+  }
   PetscCall(warn_growth(run));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

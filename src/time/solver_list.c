@@ -150,7 +150,7 @@ static PetscErrorCode replace(SbSolverList l, KSP ksp, const SbSolverPreset *nex
   PetscCall(PetscStrncpy(run->solver, next->name, sizeof(run->solver)));
   PetscCall(SbSolverSetUp(run->snes, run->model->space, next));
   PetscCall(KSPSetFromOptions(ksp));
-  PetscCall(SbSolverFinish(run->snes, run->model->space));
+  PetscCall(SbSolverFinish(run->snes, run->model->space, next, run->J));
   PetscCall(KSPSetTolerances(ksp, rtol, atol, PETSC_DEFAULT, PETSC_DEFAULT));
   PetscCall(attach(l, ksp));
   /* the tangent may be kept from one step to the next: not this one */
@@ -188,7 +188,8 @@ static PetscErrorCode after_solve(KSP ksp, Vec b, Vec x, void *ctx)
   SbSolverList l = (SbSolverList)ctx;
   SbRun run = l->run;
   const SbSolverPreset *next = run->solver_used;
-  PetscBool may = PETSC_FALSE, memory, simpler = PETSC_FALSE;
+  PetscBool may = PETSC_FALSE, memory, simpler = PETSC_FALSE, minres;
+  KSPConvergedReason reason;
   char text[192];
   PC pc;
 
@@ -203,7 +204,12 @@ static PetscErrorCode after_solve(KSP ksp, Vec b, Vec x, void *ctx)
   PetscCall(tell_failure(l, ksp, b, x, text, sizeof(text), &memory));
   /* an incomplete factorisation within it may have broken down */
   PetscCall(SbPCCoupleGetInner(ksp->pc, &pc));
-  PetscCall(SbPCCoarseFallBack(pc, ksp->reason, &simpler));
+  /* MINRES blames the matrix for a preconditioner that is not definite, or does not notice */
+  reason = ksp->reason;
+  PetscCall(PetscObjectTypeCompare((PetscObject)ksp, KSPMINRES, &minres));
+  if (minres && (reason == KSP_DIVERGED_INDEFINITE_MAT || reason == KSP_DIVERGED_ITS))
+    reason = KSP_DIVERGED_INDEFINITE_PC;
+  PetscCall(SbPCCoarseFallBack(pc, reason, &simpler));
   if (simpler) {
     PetscCall(solve_again(l, ksp, b, x));
     PetscFunctionReturn(PETSC_SUCCESS);

@@ -1,0 +1,250 @@
+// @ranks 1 2
+// @timeout 300
+/*
+  PETSc's -ksp_type, -pc_type and -ksp_norm_type over every preset of -solver, for all elements, static and dynamic, with and without what contact
+  adds: each run reaches the answer of the plain solver, or is refused before anything is computed by one line that names the option.
+  What has to be refused is a table here, so a run that is refused for no reason fails, too.
+
+  Every method with every preconditioner is run in each case. Presets below them are run whole where `whole` says so, or with the argument "all"; elsewhere with the methods that
+  differ most.
+*/
+#include "../scene.h"
+
+#define LAW(name)                                                                                     \
+  "-body_" name "_material corotated -body_" name "_young 1e5 -body_" name "_poisson 0.3 -body_" name \
+  "_density 1000 "
+#define BAR "-bodies a -body_a_mesh box:0.2,0.1,0.1:2 " LAW("a")
+#define HELD "-effect_clamp_type support -effect_clamp_on xmin "
+#define STATIC BAR "-effects gravity,clamp " HELD "-time static "
+#define STEPS "-ts_dt 0.01 -ts_max_time 0.02 "
+#define DYNAMIC BAR "-effects gravity,clamp " HELD STEPS
+#define PAIR                                                                                         \
+  "-bodies a,b -body_a_mesh box:0.2,0.1,0.05:1 -body_b_mesh box:0.08,0.06,0.05:1 -body_b_translate " \
+  "0.06,0.021,0.05 " LAW("a") LAW("b") "-sets bottom,top -set_bottom_at plane:0,0,1,0 -set_top_at "  \
+                                       "plane:0,0,1,0.1 -effects hold,push,meet -effect_hold_type "  \
+                                       "support -effect_hold_on bottom -effect_push_type drive "     \
+                                       "-effect_push_on top -effect_meet_type collision "
+#define PRESS "-time static -effect_push_displacement 0.0005*t;0.0001*t;-0.002*t "
+#define DRAG STEPS "-effect_push_displacement 0.1*t;0;-0.1*t "
+
+/* What contact adds to the system: nothing, rows, rows and multipliers that are factored with it. */
+typedef enum { NO_ROWS, ROWS, FACTORED } Contact;
+
+typedef struct {
+  const char *name, *options;
+  Contact contact;
+  PetscBool whole;
+} Case;
+
+static const Case cases[] = {
+  {"static, p1", STATIC, NO_ROWS, PETSC_TRUE},
+  {"static, cr", STATIC "-body_a_element cr ", NO_ROWS, PETSC_FALSE},
+  {"static, dg", STATIC "-body_a_element dg ", NO_ROWS, PETSC_FALSE},
+  {"dynamic, p1", DYNAMIC, NO_ROWS, PETSC_FALSE},
+  {"dynamic, cr", DYNAMIC "-body_a_element cr ", NO_ROWS, PETSC_FALSE},
+  {"dynamic, dg", DYNAMIC "-body_a_element dg ", NO_ROWS, PETSC_FALSE},
+  {"obstacle",
+   BAR "-effects gravity,floor -effect_floor_type contact -effect_floor_on zmin -effect_floor_obstacle "
+       "plane:0,0,1,0 " STEPS,
+   NO_ROWS, PETSC_FALSE},
+  {"static rows", PAIR PRESS, ROWS, PETSC_FALSE},
+  {"dynamic rows", PAIR DRAG, ROWS, PETSC_TRUE},
+  {"rows that slide", PAIR DRAG "-effect_meet_friction 0.1 ", ROWS, PETSC_FALSE},
+  {"multipliers, iterative", PAIR PRESS "-effect_meet_response multiplier -multipliers iterative ", ROWS,
+   PETSC_FALSE},
+  {"multipliers, direct", PAIR PRESS "-effect_meet_response multiplier -multipliers direct ", FACTORED,
+   PETSC_FALSE},
+};
+static const char *const methods[] = {"cg", "fcg", "minres", "gmres", "fgmres", "bcgs", "preonly"};
+static const char *const types[] = {"jacobi",   "bjacobi", "icc", "gamg", "hypre",
+                                    "cholesky", "lu",      "asm", "none"};
+static const char *const presets[] = {"auto",         "direct",   "cg",           "cg_jacobi", "cg_pbjacobi",
+                                      "cg_icc",       "cg_ssor",  "cg_two_level", "cg_gamg",   "cg_hypre",
+                                      "gauss_seidel", "sor",      "cholmod",      "umfpack",   "mumps",
+                                      "rotated",      "realtime", "pressure"};
+/* Norms that a method can be judged by, of PETSc's manual. */
+static const char *const norms[][2] = {
+  {"cg", "none preconditioned unpreconditioned natural"},
+  {"fcg", "none preconditioned unpreconditioned natural"},
+  {"minres", "none preconditioned"},
+  {"gmres", "none preconditioned unpreconditioned"},
+  {"fgmres", "none unpreconditioned"},
+  {"bcgs", "none preconditioned unpreconditioned"},
+};
+
+static char message[2048];
+
+static PetscErrorCode keep(MPI_Comm comm, int line, const char *function, const char *file, PetscErrorCode n,
+                           PetscErrorType p, const char *text, void *ctx)
+{
+  (void)comm, (void)line, (void)function, (void)file, (void)ctx;
+  if (p == PETSC_ERROR_INITIAL) (void)snprintf(message, sizeof(message), "%s", text ? text : "");
+  return n;
+}
+
+/* Runs a case with more options; x: the largest displacement of all nodes, m. */
+static PetscErrorCode run(const Case *c, const char *more, PetscErrorCode *code, PetscReal *x, char stop[512])
+{
+  char text[2048];
+  TestScene t;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscSNPrintf(text, sizeof(text), "%s -ksp_rtol 1e-6 -snes_rtol 1e-5 -ksp_gmres_restart 100 %s",
+                          c->options, more));
+  *x = 0.;
+  message[0] = stop[0] = 0;
+  PetscCall(PetscPushErrorHandler(keep, NULL));
+  *code = test_scene_open(text, &t);
+  if (!*code) *code = SbRunSolve(t.run);
+  PetscCall(PetscPopErrorHandler());
+  if (!*code) {
+    PetscCall(VecNorm(t.run->U, NORM_2, x));
+    PetscCall(PetscStrncpy(stop, t.run->stop_reason, 512));
+  }
+  PetscCall(test_scene_close(&t));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Does what it must: the answer `exact` (0: any), or a refusal that names `option`. */
+static PetscErrorCode check(const Case *c, const char *more, PetscReal exact, const char *option)
+{
+  PetscErrorCode code;
+  PetscReal x;
+  char stop[512];
+
+  PetscFunctionBeginUser;
+  PetscCall(run(c, more, &code, &x, stop));
+  if (option) {
+    SB_CHECK(code == PETSC_ERR_USER || code == PETSC_ERR_USER_INPUT, "%s, %s: not refused, code %d, %s",
+             c->name, more, (int)code, message);
+    SB_CHECK(strstr(message, option) && !strchr(message, '\n'), "%s, %s: %s", c->name, more, message);
+  } else {
+    SB_CHECK(!code && !stop[0], "%s, %s: code %d, %s%s", c->name, more, (int)code, message, stop);
+    if (!code && !stop[0] && exact > 0.)
+      SB_CHECK(PetscAbsReal(x - exact) <= 1e-4 * exact, "%s, %s: %.10g, not %.10g", c->name, more, (double)x,
+               (double)exact);
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Whether this PETSc has what a type or a preset needs here. */
+static PetscErrorCode available(const char *name, PetscMPIInt size, PetscBool *has)
+{
+  const char *package = !strcmp(name, "cg_hypre") ? "hypre" : name;
+
+  PetscFunctionBeginUser;
+  *has = PETSC_TRUE;
+  if (!strcmp(package, "hypre") || !strcmp(package, "cholmod") || !strcmp(package, "umfpack") ||
+      !strcmp(package, "mumps"))
+    PetscCall(SbHasPackage(package, has));
+  if (size > 1 && (!strcmp(name, "lu") || !strcmp(name, "cholesky"))) PetscCall(SbHasPackage("mumps", has));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* What -ksp_type with -pc_type is refused by; NULL: by nothing. */
+static const char *refused(Contact contact, PetscMPIInt size, const char *method, const char *type)
+{
+  if (size > 1 && !strcmp(type, "icc")) return "-pc_type icc";
+  if (strcmp(method, "preonly")) return NULL;
+  if (strcmp(type, "cholesky") && strcmp(type, "lu")) return "-ksp_type preonly";
+  return contact == ROWS ? "-ksp_type preonly" : NULL;
+}
+
+/* What a preset is refused by when the user leaves its preconditioner. */
+static const char *refused_preset(const Case *c, const char *method, const char *preset)
+{
+  const PetscBool direct = (PetscBool)(!strcmp(preset, "cholmod") || !strcmp(preset, "mumps") ||
+                                       !strcmp(preset, "umfpack") || !strcmp(preset, "direct"));
+
+  if (!strcmp(preset, "realtime")) return "-solver realtime";
+  if (!strcmp(preset, "pressure") && (c->contact != NO_ROWS || !strstr(c->options, "element")))
+    return "-solver pressure";
+  if (!strcmp(method, "minres") && !strcmp(preset, "rotated")) return "-ksp_type minres";
+  if (strcmp(method, "preonly")) return NULL;
+  if (!strcmp(preset, "auto") && c->contact != ROWS && strstr(c->options, "static"))
+    return NULL; /* a factorisation */
+  return !direct || c->contact == ROWS ? "-ksp_type preonly" : NULL;
+}
+
+static PetscErrorCode check_case(const Case *c, PetscMPIInt size, PetscBool all)
+{
+  PetscErrorCode code;
+  PetscReal exact;
+  PetscBool has;
+  char stop[512], more[256];
+
+  PetscFunctionBeginUser;
+  PetscCall(run(c, "", &code, &exact, stop));
+  SB_CHECK(!code && !stop[0] && exact > 0., "%s: code %d, %s%s", c->name, (int)code, message, stop);
+  for (size_t k = 0; k < PETSC_STATIC_ARRAY_LENGTH(methods); k++) {
+    for (size_t p = 0; p < PETSC_STATIC_ARRAY_LENGTH(types); p++) {
+      PetscCall(available(types[p], size, &has));
+      if (!has) continue;
+      PetscCall(PetscSNPrintf(more, sizeof(more), "-ksp_type %s -pc_type %s", methods[k], types[p]));
+      PetscCall(check(c, more, exact, refused(c->contact, size, methods[k], types[p])));
+    }
+  }
+  for (size_t s = 0; s < PETSC_STATIC_ARRAY_LENGTH(presets); s++) {
+    PetscCall(available(presets[s], size, &has));
+    if (!has) continue;
+    for (size_t p = 0; all && p < PETSC_STATIC_ARRAY_LENGTH(types); p++) {
+      PetscCall(available(types[p], size, &has));
+      if (!has) continue;
+      PetscCall(PetscSNPrintf(more, sizeof(more), "-solver %s -pc_type %s", presets[s], types[p]));
+      PetscCall(check(c, more, exact, refused(c->contact, size, "cg", types[p])));
+    }
+    for (size_t k = 0; k < PETSC_STATIC_ARRAY_LENGTH(methods); k++) {
+      if (!all && strcmp(methods[k], "minres") && strcmp(methods[k], "bcgs") && strcmp(methods[k], "preonly"))
+        continue;
+      PetscCall(PetscSNPrintf(more, sizeof(more), "-solver %s -ksp_type %s", presets[s], methods[k]));
+      PetscCall(check(c, more, exact, refused_preset(c, methods[k], presets[s])));
+    }
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Every norm of every method. */
+static PetscErrorCode check_norms(const Case *c)
+{
+  static const char *const all[] = {"none", "preconditioned", "unpreconditioned", "natural"};
+  PetscErrorCode code;
+  PetscReal exact;
+  char stop[512], more[256];
+
+  PetscFunctionBeginUser;
+  PetscCall(run(c, "", &code, &exact, stop));
+  for (size_t k = 0; k < PETSC_STATIC_ARRAY_LENGTH(norms); k++) {
+    for (size_t n = 0; n < PETSC_STATIC_ARRAY_LENGTH(all); n++) {
+      char word[32];
+      PetscBool has = PETSC_FALSE;
+      const char *at = norms[k][1];
+
+      while (!has && sscanf(at, "%31s", word) == 1) {
+        has = (PetscBool)!strcmp(word, all[n]);
+        at += strcspn(at, " ");
+        at += strspn(at, " ");
+        if (!*at && !has) break;
+      }
+      PetscCall(PetscSNPrintf(more, sizeof(more), "-ksp_type %s -pc_type bjacobi -ksp_norm_type %s%s",
+                              norms[k][0], all[n], n ? "" : " -ksp_convergence_test skip -ksp_max_it 25"));
+      /* a number of iterations instead of a norm leaves what it leaves */
+      PetscCall(check(c, more, n ? exact : 0., has ? NULL : "-ksp_norm_type"));
+    }
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+int main(int argc, char **argv)
+{
+  PetscMPIInt size;
+
+  SB_TEST_BEGIN(argc, argv);
+  PetscCallMPI(MPI_Comm_size(PETSC_COMM_WORLD, &size));
+  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(cases); i++) {
+    PetscCall(
+      check_case(&cases[i], size, (PetscBool)(cases[i].whole || (argc > 1 && !strcmp(argv[1], "all")))));
+  }
+  PetscCall(check_norms(&cases[0]));
+  PetscCall(check_norms(&cases[8]));
+  SB_TEST_END();
+}
