@@ -90,11 +90,13 @@ PetscErrorCode SbSaddleChoose(SbSpace space, PetscBool dynamic, PetscInt choice,
 PetscErrorCode SbKSPSaddleSet(SbSpace space, KSP ksp);
 /* The method that such a ksp takes where nothing touches; ksp itself when it is another one. Borrowed. Not collective. */
 PetscErrorCode SbKSPSaddleGetPlain(KSP ksp, KSP *plain);
+/* -reproducible: runs on the same number of ranks have the same bits. Not collective. */
+PetscErrorCode SbSolverReproducible(PetscBool *reproducible);
 #define SB_DIRECT_SMALL \
   30000 /* unknowns up to which one rank may factor for all of them; auto takes no factorisation beyond */
 /*
   SbDirectPackage - the package of this PETSc that factors a symmetric matrix of so many unknowns soonest on the ranks of comm: one of PETSc's
-  MATSOLVER names, NULL without any. Indefinite ones need other packages than those that are positive definite. Not collective.
+  MATSOLVER names, NULL without any; with -reproducible one that works on one rank. Indefinite ones need other packages than those that are positive definite. Not collective.
 */
 PetscErrorCode SbDirectPackage(MPI_Comm comm, PetscInt unknowns, PetscBool definite, const char **package);
 /*

@@ -7,16 +7,28 @@
 */
 #include "sbsolver.h"
 
+PetscErrorCode SbSolverReproducible(PetscBool *reproducible)
+{
+  SbScope scope;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbScopeSet(&scope, "", "", ""));
+  PetscCall(SbOptionBool(&scope, "reproducible", reproducible));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode SbDirectPackage(MPI_Comm comm, PetscInt unknowns, PetscBool definite, const char **package)
 {
   const char *order[4];
+  PetscBool reproducible;
   PetscMPIInt size;
   int n = 0;
 
   PetscFunctionBeginUser;
   PetscCallMPI(MPI_Comm_size(comm, &size));
+  PetscCall(SbSolverReproducible(&reproducible));
   if (definite && (size == 1 || unknowns <= SB_DIRECT_SMALL)) order[n++] = MATSOLVERCHOLMOD;
-  order[n++] = MATSOLVERMUMPS;
+  if (size == 1 || !reproducible) order[n++] = MATSOLVERMUMPS;
   if (definite) order[n++] = MATSOLVERCHOLMOD;
   order[n++] = MATSOLVERUMFPACK;
   *package = NULL;

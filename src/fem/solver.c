@@ -115,6 +115,10 @@ static const SbOption rows[] = {
    "linear solver; auto chooses by size, ranks and material and says why, direct takes the fastest "
    "factorisation "
    "that this PETSc has for the problem. PETSc's -ksp_ and -pc_ options refine it"},
+  {"reproducible", SB_OPTION_BOOL, 1, "", "false", "",
+   "every run on the same number of ranks has the same bits: several ranks factor on one of them, and never "
+   "by MUMPS or SuperLU_DIST, "
+   "which add in the order in which messages come"},
 };
 
 PetscErrorCode SbSolverRegister(void)
@@ -132,6 +136,7 @@ PetscErrorCode SbSolverSetFromOptions(char choice[], size_t size)
   PetscFunctionBeginUser;
   PetscCall(SbScopeSet(&scope, "", "", ""));
   PetscCall(SbOptionChoice(&scope, "solver", &index));
+  PetscCall(SbOptionAhead(&scope, "reproducible"));
   /* the choices are auto, direct and then the rows of the table */
   PetscCall(PetscStrncpy(choice, index > 1 ? presets[index - 2].name : index ? "direct" : "auto", size));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -514,7 +519,7 @@ PetscErrorCode SbSolverFollowRows(KSP ksp, SbSpace s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A factorisation that the matrix's type or the number of ranks rules out. */
+/* A factorisation that the matrix's type, the number of ranks or -reproducible rules out. */
 static PetscErrorCode check_factor(PC pc, Mat A)
 {
   static const struct {
@@ -529,10 +534,17 @@ static PetscErrorCode check_factor(PC pc, Mat A)
   };
   MatSolverType package;
   PetscMPIInt size;
-  PetscBool is, has;
+  PetscBool is, has, distributed, reproducible;
 
   PetscFunctionBeginUser;
   PetscCallMPI(MPI_Comm_size(PetscObjectComm((PetscObject)pc), &size));
+  PetscCall(SbSolverReproducible(&reproducible));
+  PetscCall(PetscObjectTypeCompareAny((PetscObject)pc, &distributed, PCLU, PCCHOLESKY, ""));
+  PetscCheck(!reproducible || size == 1 || !distributed, PetscObjectComm((PetscObject)pc), PETSC_ERR_USER,
+             "-reproducible: a factorisation on %d ranks has other last digits in each run; choose -solver "
+             "direct, which "
+             "factors on one of them",
+             (int)size);
   for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(of); i++) {
     PetscCall(PetscObjectTypeCompare((PetscObject)pc, of[i].type, &is));
     if (!is) continue;
@@ -656,7 +668,8 @@ PetscErrorCode SbSolverDescribe(SNES snes, SbSpace s, size_t size, char text[])
 
 PetscErrorCode SbSolverPivot(MPI_Comm comm, size_t size, char choice[])
 {
-  PetscBool own, direct, mumps, umfpack;
+  PetscBool own, direct, mumps, umfpack, reproducible;
+  PetscMPIInt nrank;
 
   PetscFunctionBeginUser;
   PetscCall(PetscStrcmp(choice, "auto", &own));
@@ -668,6 +681,9 @@ PetscErrorCode SbSolverPivot(MPI_Comm comm, size_t size, char choice[])
              "-static_control arc_length factors indefinite matrices, which takes MUMPS or UMFPACK, and this "
              "PETSc has "
              "neither: choose another -solver");
+  PetscCallMPI(MPI_Comm_size(comm, &nrank));
+  PetscCall(SbSolverReproducible(&reproducible));
+  if (reproducible && nrank > 1 && umfpack) mumps = PETSC_FALSE;
   PetscCall(PetscStrncpy(choice, mumps ? "mumps" : "umfpack", size));
   /* MUMPS counts negative pivots when the last front is factored by one rank */
   if (mumps) PetscCall(insert_options("-mat_mumps_icntl_13 1"));

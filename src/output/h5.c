@@ -172,6 +172,7 @@ PetscErrorCode SbH5GroupCreate(SbH5 *h, unsigned links, unsigned letters, hid_t 
   (void)H5Pset_link_creation_order(list, H5P_CRT_ORDER_TRACKED);
   (void)H5Pset_link_phase_change(list, 60000, 59999);
   (void)H5Pset_est_link_info(list, links, letters);
+  (void)H5Pset_obj_track_times(list, 0);
   *group = H5Gcreate_anon(h->file, list, H5P_DEFAULT);
   (void)H5Pclose(list);
   H5_CALL(h, *group);
@@ -222,6 +223,7 @@ PetscErrorCode SbH5WriteSlice(SbH5 *h, hid_t where, const char *name, const char
   PetscFunctionBeginUser;
   (void)H5Pset_fill_time(create, H5D_FILL_TIME_NEVER);
   (void)H5Pset_alloc_time(create, H5D_ALLOC_TIME_EARLY);
+  (void)H5Pset_obj_track_times(create, 0); // the same run writes the same bytes
   select_slice(order, ncomp, &filespace, &memspace);
   dataset = H5Dcreate2(where, name, filetype, filespace, H5P_DEFAULT, create, H5P_DEFAULT);
   H5_CALL(h, dataset);
@@ -364,11 +366,14 @@ PetscErrorCode SbH5GetInt(hid_t where, const char *name, int64_t *value, PetscBo
 PetscErrorCode SbH5WriteText(SbH5 *h, hid_t where, const char *name, const char *text)
 {
   const hid_t type = H5Tcopy(H5T_C_S1), space = H5Screate(H5S_SCALAR), transfer = collective_list();
+  const hid_t create = H5Pcreate(H5P_DATASET_CREATE);
   hid_t dataset;
 
   PetscFunctionBeginUser;
   (void)H5Tset_size(type, strlen(text) + 1);
-  dataset = H5Dcreate2(where, name, type, space, H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT);
+  (void)H5Pset_obj_track_times(create, 0);
+  dataset = H5Dcreate2(where, name, type, space, H5P_DEFAULT, create, H5P_DEFAULT);
+  (void)H5Pclose(create);
   H5_CALL(h, dataset);
   note(h, (PetscBool)(H5Dwrite(dataset, type, H5S_ALL, H5S_ALL, transfer, text) < 0));
   (void)H5Dclose(dataset);
