@@ -1,6 +1,7 @@
 /*
   The coarse space of the two-level preconditioner: modes of the aggregates, which rank knows what of them, and the two maps
-  between nodes and modes. An application gathers 6 N numbers on every rank, and each solves for itself.
+  between nodes and modes. While E is small, an application gathers 6 N numbers on every rank, and each solves for itself; else its
+  rows stay with the ranks (coarse_levels.c).
 
   Modes that vanish, as the rotations of an aggregate of one node, are found once from the Gram matrix sum Z_i^T Z_i: its
   eigenvectors with eigenvalues near zero. They are all that can make E = Z^T A Z singular (coarse_operator.c).
@@ -52,8 +53,8 @@ static PetscErrorCode list_members(SbCoarse c)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Places relative to the centre in units of the radius; 1 / nodes. */
-static void find_places(SbCoarse c, PetscReal weight[])
+/* Places relative to the centre in units of the radius. */
+static void find_places(SbCoarse c)
 {
   SbSpace s = c->space;
 
@@ -69,7 +70,8 @@ static void find_places(SbCoarse c, PetscReal weight[])
       r2 += d * d / (PetscReal)n;
     }
     for (PetscInt k = 0; k < 3 * n && n > 1; k++) c->d[3 * node[k / 3] + k % 3] /= PetscSqrtReal(r2);
-    weight[a] = 1. / (PetscReal)n;
+    for (PetscInt q = 0; q < 3; q++) c->centre[4 * a + q] = x0[q];
+    c->centre[4 * a + 3] = n > 1 ? PetscSqrtReal(r2) : 0.;
   }
 }
 
@@ -102,21 +104,26 @@ static PetscErrorCode find_vanishing(SbCoarse c, PetscInt a, PetscReal projector
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Which aggregates meet: those at the neighbours of an aggregate's nodes, from the aggregate itself on. */
+/* Which aggregates meet: those at the neighbours of an aggregate's nodes, the aggregate itself first. */
 static PetscErrorCode find_pattern(SbCoarse c)
 {
   SbPlan p = c->space->plan;
-  PetscInt *mark, nz = 0;
+  PetscInt lowest = c->N, highest = c->first + c->n, *mark, nz = 0;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscMalloc1(c->N, &mark));
+  /* marks from the lowest to the highest aggregate that this rank knows of */
+  for (PetscInt i = 0; i < c->space->nnode; i++) {
+    if (c->agg[i] >= 0) lowest = PetscMin(lowest, c->agg[i]);
+    highest = PetscMax(highest, c->agg[i] + 1);
+  }
+  PetscCall(PetscMalloc1(PetscMax(0, highest - lowest), &mark));
   PetscCall(PetscMalloc1(c->n + 1, &c->start));
   for (PetscInt pass = 0; pass < 2; pass++) {
-    for (PetscInt b = 0; b < c->N; b++) mark[b] = -1;
+    for (PetscInt b = lowest; b < highest; b++) mark[b - lowest] = -1;
     nz = 0;
     for (PetscInt a = 0; a < c->n; a++) {
       c->start[a] = nz;
-      mark[c->first + a] = a;
+      mark[c->first + a - lowest] = a;
       if (pass) c->column[nz] = c->first + a;
       nz++;
       for (PetscInt k = c->member_start[a]; k < c->member_start[a + 1]; k++) {
@@ -125,13 +132,13 @@ static PetscErrorCode find_pattern(SbCoarse c)
         for (PetscInt e = 0; e < nd + no; e++) {
           const PetscInt b = c->agg[e < nd ? p->dj[p->di[i] + e] : p->oj[p->oi[i] + e - nd]];
 
-          if (b < c->first + a || mark[b] == a) continue;
-          mark[b] = a;
+          if (b < (c->spread ? 0 : c->first + a) || mark[b - lowest] == a) continue;
+          mark[b - lowest] = a;
           if (pass) c->column[nz] = b;
           nz++;
         }
       }
-      if (pass) PetscCall(PetscSortInt(nz - c->start[a], c->column + c->start[a]));
+      if (pass) PetscCall(PetscSortInt(nz - c->start[a] - 1, c->column + c->start[a] + 1));
     }
     if (!pass) PetscCall(PetscMalloc1(nz, &c->column));
   }
@@ -243,15 +250,13 @@ static PetscErrorCode create_matrix(SbCoarse c)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The numbers and places of the nodes on every rank that knows them, the weights on all. */
-static PetscErrorCode share_aggregates(SbCoarse c, const PetscReal weight[])
+/* The numbers and places of the nodes on every rank that knows them. */
+static PetscErrorCode share_aggregates(SbCoarse c)
 {
   SbSpace s = c->space;
   PetscReal *number;
-  PetscMPIInt size, *count, *offset;
 
   PetscFunctionBeginUser;
-  PetscCallMPI(MPI_Comm_size(s->comm, &size));
   PetscCall(PetscCalloc1(3 * s->nnode, &number));
   for (PetscInt i = 0; i < s->nnode_owned; i++)
     number[3 * i] = c->agg[i] < 0 ? -1. : (PetscReal)(c->first + c->agg[i]);
@@ -259,27 +264,40 @@ static PetscErrorCode share_aggregates(SbCoarse c, const PetscReal weight[])
   PetscCall(update_ghosts(s, c->d));
   for (PetscInt i = 0; i < s->nnode; i++) c->agg[i] = (PetscInt)number[3 * i];
   PetscCall(PetscFree(number));
-  PetscCall(PetscMalloc2(size, &count, size, &offset));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* 1 / nodes in an aggregate, for all of them. */
+static PetscErrorCode gather_weights(SbCoarse c)
+{
+  PetscReal *weight;
+  PetscMPIInt size, *count, *offset;
+
+  PetscFunctionBeginUser;
+  PetscCallMPI(MPI_Comm_size(c->space->comm, &size));
+  PetscCall(PetscMalloc3(c->n, &weight, size, &count, size, &offset));
+  for (PetscInt a = 0; a < c->n; a++)
+    weight[a] = 1. / (PetscReal)(c->member_start[a + 1] - c->member_start[a]);
   for (PetscMPIInt r = 0; r < size; r++) {
     count[r] = c->npart[r] / 6;
     offset[r] = (PetscMPIInt)c->part_start[r];
   }
   PetscCall(PetscMalloc1(c->N, &c->weight));
-  PetscCallMPI(
-    MPI_Allgatherv(weight, (PetscMPIInt)c->n, MPIU_REAL, c->weight, count, offset, MPIU_REAL, s->comm));
-  PetscCall(PetscFree2(count, offset));
+  PetscCallMPI(MPI_Allgatherv(weight, (PetscMPIInt)c->n, MPIU_REAL, c->weight, count, offset, MPIU_REAL,
+                              c->space->comm));
+  PetscCall(PetscFree3(weight, count, offset));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbCoarseCreate(SbSpace s, PetscInt wanted, SbCoarse *coarse)
+PetscErrorCode SbCoarseCreate(SbSpace s, PetscInt wanted, PetscBool spread, SbCoarse *coarse)
 {
   PetscInt nfree = 0, total;
-  PetscReal *weight;
   SbCoarse c;
 
   PetscFunctionBeginUser;
   PetscCall(PetscNew(&c));
   c->space = s;
+  c->spread = spread;
   PetscCall(PetscMalloc1(s->nnode, &c->agg));
   PetscCall(PetscCalloc1(3 * s->nnode, &c->d));
   for (PetscInt i = 0; i < s->nnode_owned; i++) nfree += s->fixed[i] != 7;
@@ -290,16 +308,20 @@ PetscErrorCode SbCoarseCreate(SbSpace s, PetscInt wanted, SbCoarse *coarse)
   PetscCallMPI(MPI_Scan(&c->n, &c->first, 1, MPIU_INT, MPI_SUM, s->comm));
   c->first -= c->n;
   PetscCall(list_members(c));
-  PetscCall(PetscMalloc1(c->n, &weight));
-  find_places(c, weight);
+  PetscCall(PetscMalloc1(4 * c->n, &c->centre));
+  find_places(c);
   PetscCall(PetscMalloc1(36 * c->n, &c->null));
   for (PetscInt a = 0; a < c->n; a++) PetscCall(find_vanishing(c, a, c->null + 36 * a));
-  PetscCall(plan_parts(c));
-  PetscCall(share_aggregates(c, weight));
+  PetscCall(share_aggregates(c));
   PetscCall(find_pattern(c));
-  PetscCall(plan_blocks(c));
-  if (c->N) PetscCall(create_matrix(c));
-  PetscCall(PetscFree(weight));
+  if (spread && c->N)
+    PetscCall(SbCoarseCreateLevels(c));
+  else if (c->N) {
+    PetscCall(plan_parts(c));
+    PetscCall(gather_weights(c));
+    PetscCall(plan_blocks(c));
+    PetscCall(create_matrix(c));
+  }
   *coarse = c;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -310,6 +332,7 @@ PetscErrorCode SbCoarseDestroy(SbCoarse *coarse)
 
   PetscFunctionBeginUser;
   if (!c) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PCDestroy(&c->levels));
   PetscCall(MatDestroy(&c->factor));
   PetscCall(MatDestroy(&c->E));
   PetscCall(VecDestroy(&c->c));
@@ -324,6 +347,7 @@ PetscErrorCode SbCoarseDestroy(SbCoarse *coarse)
   PetscCall(PetscFree2(c->member_start, c->member));
   PetscCall(PetscFree(c->null));
   PetscCall(PetscFree(c->weight));
+  PetscCall(PetscFree(c->centre));
   PetscCall(PetscFree(c->d));
   PetscCall(PetscFree(c->agg));
   PetscCall(PetscFree(*coarse));
@@ -332,19 +356,15 @@ PetscErrorCode SbCoarseDestroy(SbCoarse *coarse)
 
 /* ------------------------------------------------------------------ application */
 
-PetscErrorCode SbCoarseRestrict(SbCoarse c, Vec R, PetscReal *share)
+/* m[n][6] = Z^T r of this rank's aggregates; norm2: square of r on them. */
+static PetscErrorCode restrict_own(SbCoarse c, Vec R, PetscReal m[], PetscReal *norm2)
 {
   SbSpace s = c->space;
-  PetscReal norm2 = 0., c2 = 0.;
   const PetscScalar *r;
-  PetscScalar *all;
-  PetscMPIInt size;
 
   PetscFunctionBeginUser;
-  *share = 0.;
-  if (!c->N) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCallMPI(MPI_Comm_size(s->comm, &size));
-  PetscCall(PetscArrayzero(c->send, 6 * c->n));
+  *norm2 = 0.;
+  PetscCall(PetscArrayzero(m, 6 * c->n));
   PetscCall(VecGetArrayRead(R, &r));
   for (PetscInt i = 0; i < s->nnode_owned; i++) {
     PetscReal f[3];
@@ -352,11 +372,33 @@ PetscErrorCode SbCoarseRestrict(SbCoarse c, Vec R, PetscReal *share)
     if (c->agg[i] < 0) continue;
     for (int q = 0; q < 3; q++) {
       f[q] = s->fixed[i] & (1 << q) ? 0. : r[3 * i + q];
-      norm2 += f[q] * f[q];
+      *norm2 += f[q] * f[q];
     }
-    SbCoarseAddMoments(c->d + 3 * i, f, c->send + 6 * (c->agg[i] - c->first));
+    SbCoarseAddMoments(c->d + 3 * i, f, m + 6 * (c->agg[i] - c->first));
   }
   PetscCall(VecRestoreArrayRead(R, &r));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbCoarseRestrict(SbCoarse c, Vec R, PetscReal *share)
+{
+  SbSpace s = c->space;
+  PetscReal norm2, c2 = 0.;
+  PetscScalar *all;
+  PetscMPIInt size;
+
+  PetscFunctionBeginUser;
+  *share = 0.;
+  if (!c->N) PetscFunctionReturn(PETSC_SUCCESS);
+  if (c->spread) {
+    *share = 1.;
+    PetscCall(VecGetArrayWrite(c->c, &all));
+    PetscCall(restrict_own(c, R, all, &norm2));
+    PetscCall(VecRestoreArrayWrite(c->c, &all));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  PetscCallMPI(MPI_Comm_size(s->comm, &size));
+  PetscCall(restrict_own(c, R, c->send, &norm2));
   c->send[6 * c->n] = norm2;
   PetscCallMPI(MPI_Allgatherv(c->send, 6 * (PetscMPIInt)c->n + 1, MPIU_REAL, c->receive, c->npart, c->part,
                               MPIU_REAL, s->comm));
@@ -382,14 +424,17 @@ PetscErrorCode SbCoarseAdd(SbCoarse c, Vec Z)
 
   PetscFunctionBeginUser;
   if (!c->N) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(MatSolve(c->factor, c->c, c->y));
+  if (c->spread)
+    PetscCall(PCApply(c->levels, c->c, c->y));
+  else
+    PetscCall(MatSolve(c->factor, c->c, c->y));
   PetscCall(VecGetArrayRead(c->y, &y));
   PetscCall(VecGetArray(Z, &z));
   for (PetscInt i = 0; i < s->nnode_owned; i++) {
     PetscReal u[3];
 
     if (c->agg[i] < 0) continue;
-    SbCoarseMotion(c->d + 3 * i, y + 6 * c->agg[i], u);
+    SbCoarseMotion(c->d + 3 * i, y + 6 * (c->agg[i] - (c->spread ? c->first : 0)), u);
     for (int q = 0; q < 3; q++) z[3 * i + q] += s->fixed[i] & (1 << q) ? 0. : u[q];
   }
   PetscCall(VecRestoreArray(Z, &z));

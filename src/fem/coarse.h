@@ -14,7 +14,8 @@ PetscErrorCode SbAggregate(SbSpace space, PetscInt wanted, PetscInt *n, PetscInt
 
 /*
   The coarse space: columns Z of six modes per aggregate, u(x) = t + w x d with d the place relative to the aggregate's centre
-  in units of its radius; zero on prescribed unknowns. E = Z^T A Z is the same on every rank.
+  in units of its radius; zero on prescribed unknowns. E = Z^T A Z is gathered and factored by every rank, or its rows stay with
+  their ranks and a cycle of multigrid stands for E^-1.
 */
 typedef struct _p_SbCoarse *SbCoarse;
 struct _p_SbCoarse {
@@ -22,12 +23,14 @@ struct _p_SbCoarse {
   PetscInt n, first, N;   /* aggregates of this rank, number of its first one, all of them */
   PetscInt *agg;          /* [nnode] aggregate by global number, -1 for fully prescribed nodes */
   PetscReal *d;           /* [nnode][3] */
+  PetscReal *centre;      /* [n][4] place, m, and radius, m; 0 for a single node */
+  PetscBool spread;       /* E stays with its ranks; what is [N], [nblock] and [size] below is NULL then */
   PetscReal *weight;      /* [N] 1 / nodes in the aggregate */
   PetscReal *null;        /* [n][36] projector onto the modes that vanish (single nodes, nodes on a line) */
   PetscInt *member_start; /* [n+1] */
   PetscInt *member;       /* own nodes by aggregate */
   PetscInt *start,
-    *column; /* [n+1] blocks of own rows, upper triangle: the aggregate itself, then higher ones ascending */
+    *column; /* [n+1] blocks of own rows: the aggregate itself, then higher ones ascending; all others when spread */
   PetscReal *value;          /* [start[n]][36], row-major, N/m */
   PetscInt nblock;           /* blocks of all ranks */
   PetscReal *all;            /* [nblock][36]; `value` on one rank */
@@ -39,19 +42,25 @@ struct _p_SbCoarse {
   PetscInt *ai, *aj; /* E by rows of its upper triangle */
   PetscScalar *av;
   Mat E, factor;
-  Vec c, y; /* [6 N] */
+  PC levels; /* multigrid on a spread E */
+  Vec c, y;  /* [6 N] on each rank, or spread */
   PetscBool ok;
 };
 
-/* Collective. wanted: aggregates of all ranks, about. */
-PetscErrorCode SbCoarseCreate(SbSpace space, PetscInt wanted, SbCoarse *coarse);
+/* Collective. wanted: aggregates of all ranks, about; spread: E is not to be gathered. Options read: -pc_coarse_ (multigrid). */
+PetscErrorCode SbCoarseCreate(SbSpace space, PetscInt wanted, PetscBool spread, SbCoarse *coarse);
 PetscErrorCode SbCoarseDestroy(SbCoarse *coarse);
-/* E = Z^T A Z for a BAIJ or SBAIJ matrix of the space, and its factor. coarse->ok: E is positive definite. Collective. */
+/* E = Z^T A Z for a BAIJ or SBAIJ matrix of the space, and its factor or cycle. coarse->ok: nothing shows that E is not positive
+   definite, which a factor finds out for certain. Collective. */
 PetscErrorCode SbCoarseSetUp(SbCoarse coarse, Mat A);
-/* c = Z^T r on every rank; share: |c|, weighted so that it is about |r| when r is in the span of Z, over |r|. Collective. */
+/* c = Z^T r; share: |c|, weighted so that it is about |r| when r is in the span of Z, over |r|; 1 when spread. Collective. */
 PetscErrorCode SbCoarseRestrict(SbCoarse coarse, Vec r, PetscReal *share);
-/* z += Z E^-1 c with the c of the last SbCoarseRestrict(). Not collective. */
+/* z += Z E^-1 c with the c of the last SbCoarseRestrict(). Collective. */
 PetscErrorCode SbCoarseAdd(SbCoarse coarse, Vec z);
+/* A spread E with its multigrid, once (coarse_levels.c). Collective. */
+PetscErrorCode SbCoarseCreateLevels(SbCoarse coarse);
+/* Brings the blocks in coarse->value into them. Collective. */
+PetscErrorCode SbCoarseSetUpLevels(SbCoarse coarse);
 
 /* Z^T f of one node, added: force and torque. */
 SB_INLINE void SbCoarseAddMoments(const PetscReal d[3], const PetscReal f[3], PetscReal m[6])

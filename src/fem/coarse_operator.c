@@ -4,6 +4,7 @@
   For a node i and an aggregate b among its neighbours, W_ib = sum_j A_ij Z_j over the neighbours in b, 3x6; then
   E_ab += Z_i^T W_ib with a the aggregate of i. Each rank makes the upper blocks of its own aggregates' rows; all ranks
   gather the blocks (0.7 MB for 300 aggregates) and factor E each for itself. CHOLMOD factors; MUMPS where PETSc has no CHOLMOD.
+  When E is spread, a rank makes its rows whole and nothing is gathered.
 
   Modes that vanish make E singular, but decoupled: they get the mean diagonal of their block, and multiply zeros.
 */
@@ -91,14 +92,15 @@ static inline PetscReal *sum_of(RowSums *row, PetscInt b)
 static void sum_row(SbCoarse c, const Blocks *x, PetscInt i, RowSums *row)
 {
   const SbPlan p = c->space->plan;
-  const PetscInt own = c->agg[i], first = x->symmetric ? p->diagonal[i] : p->di[i];
+  const PetscInt own = c->agg[i], lowest = c->spread ? 0 : own,
+                 first = x->symmetric ? p->diagonal[i] : p->di[i];
   const PetscScalar *K = x->value[0] + 9 * (size_t)(x->symmetric ? p->ui[i] : p->di[i]);
 
   row->n = 0;
   for (PetscInt k = first; k < p->di[i + 1]; k++, K += 9) {
     const PetscInt j = p->dj[k], b = c->agg[j];
 
-    if (b < 0 || (!x->symmetric && b < own)) continue;
+    if (b < 0 || (!x->symmetric && b < lowest)) continue;
     if (j == i) {
       PetscScalar D[9];
 
@@ -110,11 +112,11 @@ static void sum_row(SbCoarse c, const Blocks *x, PetscInt i, RowSums *row)
   for (PetscInt k = p->oi[i]; k < p->oi[i + 1]; k++) {
     const PetscInt j = p->oj[k], b = c->agg[j];
 
-    if (b >= own) add_column(x->value[1] + 9 * (size_t)k, 1., c->d + 3 * j, sum_of(row, b));
+    if (b >= lowest) add_column(x->value[1] + 9 * (size_t)k, 1., c->d + 3 * j, sum_of(row, b));
   }
 }
 
-/* Block (a, b) of the upper triangle, a own. */
+/* Block (a, b), a own. */
 static inline PetscReal *block_of(SbCoarse c, PetscInt a, PetscInt b)
 {
   PetscInt k = c->start[a - c->first];
@@ -130,7 +132,7 @@ static void add_row(SbCoarse c, PetscInt i, const RowSums *row)
 
   for (PetscInt k = 0; k < row->n; k++) {
     const PetscInt b = row->b[k];
-    const PetscBool below = (PetscBool)(b < a);
+    const PetscBool below = (PetscBool)(b < a && !c->spread);
     PetscReal *E = below ? block_of(c, b, a) : block_of(c, a, b);
 
     for (int q = 0; q < 6; q++) {
@@ -220,6 +222,10 @@ PetscErrorCode SbCoarseSetUp(SbCoarse c, Mat A)
   c->ok = PETSC_TRUE;
   if (!c->N) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(assemble(c, A));
+  if (c->spread) {
+    PetscCall(SbCoarseSetUpLevels(c));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
   if (c->all != c->value) {
     PetscCallMPI(MPI_Allgatherv(c->value, 36 * (PetscMPIInt)c->start[c->n], MPIU_REAL, c->all, c->nvalue,
                                 c->at, MPIU_REAL, c->space->comm));

@@ -147,6 +147,22 @@ static inline void sb_gather(const PetscInt node[4 * SB_BATCH], const PetscReal 
   }
 }
 
+/* Longest side of a box: what a rotation of unit size is relative to. */
+SB_INLINE PetscReal SbRigidSize(const PetscReal box[6])
+{
+  return PetscMax(box[3] - box[0], PetscMax(box[4] - box[1], box[5] - box[2]));
+}
+/* Value of rigid-body mode 0 to 5 (three translations, three rotations about the middle of the box) at x, over the box's size. */
+void SbRigidMode(PetscInt mode, const PetscReal x[3], const PetscReal box[6], PetscReal value[3]);
+/*
+  SbAttachModes - the near null space of A: the six rigid-body modes, which algebraic multigrid must reproduce, made orthonormal. Six serve
+  any number of bodies: an aggregate never spans two of them, and each body turns about its own centre.
+
+  Collective. fill(mode, v, ctx) writes this rank's part of a mode; one that vanishes is left out.
+*/
+PetscErrorCode SbAttachModes(Mat A, PetscErrorCode (*fill)(PetscInt mode, PetscScalar v[], const void *ctx),
+                             const void *ctx);
+
 /*
   What strains are computed from: the nodes of the cells; for DG the means m = p + w (u - p) of the own node u and the one
   across the face p.

@@ -3,13 +3,22 @@
 
       P^-1 = Q + (1 - Q A) M (1 - A Q),   Q = Z E^-1 Z^T,   E = Z^T A Z
 
-  with M the fine level, Z six rigid-body modes for each of some hundred aggregates of nodes. It is symmetric and positive
+  with M the fine level, Z six rigid-body modes for each of some hundred or thousand aggregates of nodes. It is symmetric and positive
   definite when M and A are. Mandel (1993), Balancing domain decomposition; Tang, Nabben, Vuik, Erlangga (2009),
   Comparison of two-level preconditioners derived from deflation, domain decomposition and multigrid methods, J. Sci. Comput. 39.
 
   When the start of the iteration makes Z^T r = 0, which the hook before a solve does, it stays so and the right factor is 1: what
   is left is their A-DEF2, with one product by A and one coarse solve for each application. That is looked at each time; a
   residual with a part in the span of Z gets the whole.
+
+  While E is small beside a rank's own part, every rank factors it: few aggregates are best. On many ranks that would soon be most
+  of the work, and the incomplete factorisation, which ends at the border of a rank, is weaker. E stays with its ranks then, a
+  cycle of multigrid C stands for E^-1 (coarse_levels.c), and there are more aggregates, of NODES_PER_SPREAD nodes each. Q = Z C Z^T corrects
+  only in part, so that the whole is always taken, with what the correction leaves corrected once more:
+
+      P^-1 = 2 Q - Q A Q + (1 - Q A) M (1 - A Q),   symmetric, and positive definite as C has no eigenvalue of C E above 2.
+
+  docs/reports/many_ranks.md lists the iterations, messages and memory.
 
   Fine level: ICC(0) of the rows and columns of each rank, made from the SBAIJ matrix that the product has at hand (product.h):
   given BAIJ, PETSc would first make one. Where that is not positive definite (at Poisson's ratio 0.45, not yet at 0.4;
@@ -29,10 +38,17 @@
 #define IN_SPAN \
   1e-5 /* share of the residual in the span of Z that rounding may leave; below it the right factor is 1 */
 
+/* Aggregates that every rank factors: one for so many nodes of a rank, within these bounds. */
+#define NODES_PER_FACTORED 10
+#define LEAST_FACTORED 50
+#define MOST_FACTORED 1000
+#define NODES_PER_SPREAD 16 /* bar of 80,000 tets on 16 ranks: 12, 16 and 24 take 37, 37 and 38 iterations */
+
 typedef struct {
   SbSpace space;
   SbCoarse coarse;
   PetscInt wanted;  /* aggregates, 0: by size */
+  PetscInt limit;   /* of the aggregates that every rank factors, -1: by size */
   PC fine;          /* of this rank alone, unless it is the diagonal */
   PetscBool simple; /* the diagonal as fine level */
   Vec s, w, t;
@@ -41,13 +57,26 @@ typedef struct {
   PetscBool guess_given;
 } TwoLevel;
 
-/* 300 at 36,000 nodes (192,000 tets) was best; the coarse solve grows faster than the number of aggregates. */
-static PetscInt default_aggregates(SbSpace s)
-{
-  return PetscMax(1, (PetscInt)(300. * PetscPowReal((PetscReal)s->Nnode / 36000., 0.7) + 0.5));
-}
-
 /* ------------------------------------------------------------------ set-up */
+
+static PetscErrorCode create_coarse(TwoLevel *p)
+{
+  SbSpace s = p->space;
+  PetscInt wanted = p->wanted, limit = p->limit;
+  PetscBool spread;
+  PetscMPIInt size;
+
+  PetscFunctionBeginUser;
+  PetscCallMPI(MPI_Comm_size(s->comm, &size));
+  /* 300 at 36,000 nodes (192,000 tets) was best; the work of a factor grows faster than the number of aggregates */
+  if (!wanted) wanted = PetscMax(1, (PetscInt)(300. * PetscPowReal((PetscReal)s->Nnode / 36000., 0.7) + 0.5));
+  if (limit < 0)
+    limit = PetscMax(LEAST_FACTORED, PetscMin(MOST_FACTORED, s->Nnode / (size * NODES_PER_FACTORED)));
+  spread = (PetscBool)(size > 1 && wanted > limit);
+  if (spread && !p->wanted) wanted = s->Nnode / NODES_PER_SPREAD;
+  PetscCall(SbCoarseCreate(s, wanted, spread, &p->coarse));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
 
 static PetscErrorCode choose_fine(TwoLevel *p)
 {
@@ -127,7 +156,7 @@ static PetscErrorCode PCSetUp_Coarse(PC pc)
   PetscCall(PCGetOperators(pc, NULL, &A));
   PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_SOLVER_SETUP], pc, 0, 0, 0));
   if (!p->coarse) {
-    PetscCall(SbCoarseCreate(p->space, p->wanted ? p->wanted : default_aggregates(p->space), &p->coarse));
+    PetscCall(create_coarse(p));
     PetscCall(choose_fine(p));
     PetscCall(MatCreateVecs(A, &p->s, &p->w));
     PetscCall(VecDuplicate(p->s, &p->t));
@@ -141,7 +170,8 @@ static PetscErrorCode PCSetUp_Coarse(PC pc)
   }
   PetscCall(SbCoarseSetUp(p->coarse, A));
   p->nsetup++;
-  PetscCall(PetscInfo(pc, "%" PetscInt_FMT " aggregates%s\n", p->coarse->N,
+  PetscCall(PetscInfo(pc, "%" PetscInt_FMT " aggregates, %s%s\n", p->coarse->N,
+                      p->coarse->spread ? "spread over the ranks" : "factored by each rank",
                       p->coarse->ok ? "" : ": the coarse operator is not positive definite"));
   PetscCall(PCSetFailedReason(pc, ok && p->coarse->ok ? PC_NOERROR : PC_FACTOR_NUMERIC_ZEROPIVOT));
   PetscCall(PetscLogEventEnd(SbEvents[SB_EVENT_SOLVER_SETUP], pc, 0, 0, 0));
@@ -246,7 +276,8 @@ static PetscErrorCode PCView_Coarse(PC pc, PetscViewer viewer)
   PetscCall(PCShellGetContext(pc, &p));
   if (p->coarse)
     PetscCall(PetscViewerASCIIPrintf(
-      viewer, "  %" PetscInt_FMT " aggregates with six rigid-body modes each; fine level:\n", p->coarse->N));
+      viewer, "  %" PetscInt_FMT " aggregates with six rigid-body modes each, %s; fine level:\n",
+      p->coarse->N, p->coarse->spread ? "spread over the ranks" : "factored by each rank"));
   if (p->fine && p->simple) PetscCall(PCView(p->fine, viewer));
   if (p->fine && !p->simple) {
     PetscCall(PetscViewerGetSubViewer(viewer, PETSC_COMM_SELF, &own));
@@ -282,11 +313,18 @@ PetscErrorCode SbPCCoarseCreate(SbSpace s, PC pc)
   PetscCall(PetscNew(&p));
   p->space = s;
   PetscCall(PCGetOptionsPrefix(pc, &prefix));
+  p->limit = -1;
   PetscCall(PetscOptionsGetInt(NULL, prefix, "-pc_coarse_aggregates", &p->wanted, NULL));
+  PetscCall(PetscOptionsGetInt(NULL, prefix, "-pc_coarse_redundant", &p->limit, NULL));
   PetscCheck(p->wanted >= 0, s->comm, PETSC_ERR_USER,
              "-pc_coarse_aggregates %" PetscInt_FMT
              " is negative: give a number of aggregates, or 0 to choose by size",
              p->wanted);
+  PetscCheck(p->limit >= -1, s->comm, PETSC_ERR_USER,
+             "-pc_coarse_redundant %" PetscInt_FMT
+             " is below -1: give the largest number of aggregates that every rank factors, 0 for "
+             "none, or -1 to choose by size",
+             p->limit);
   PetscCall(PCSetType(pc, PCSHELL));
   PetscCall(PCShellSetContext(pc, p));
   PetscCall(PCShellSetName(pc, NAME));
@@ -333,7 +371,8 @@ PetscErrorCode SbPCCoarseFallBack(PC pc, KSPConvergedReason reason, PetscBool *c
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbPCCoarseGetStats(PC pc, PetscInt *naggregate, PetscInt *nsetup, PetscBool *simple)
+PetscErrorCode SbPCCoarseGetStats(PC pc, PetscInt *naggregate, PetscInt *nsolved, PetscInt *nsetup,
+                                  PetscBool *simple)
 {
   TwoLevel *p;
 
@@ -341,6 +380,7 @@ PetscErrorCode SbPCCoarseGetStats(PC pc, PetscInt *naggregate, PetscInt *nsetup,
   PetscCall(context_of(pc, &p));
   PetscCheck(p, PetscObjectComm((PetscObject)pc), PETSC_ERR_ARG_WRONG, "Not a two-level preconditioner");
   if (naggregate) *naggregate = p->coarse ? p->coarse->N : 0;
+  if (nsolved) *nsolved = !p->coarse ? 0 : p->coarse->spread ? p->coarse->n : p->coarse->N;
   if (nsetup) *nsetup = p->nsetup;
   if (simple) *simple = p->simple;
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -396,10 +396,9 @@ static PetscErrorCode plan_fixed(SbSpace s, SbPlan p)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Value of rigid-body mode `kind` (three translations, three rotations) at x, relative to the body's size. */
-static void rigid_mode(PetscInt kind, const PetscReal x[3], const PetscReal box[6], PetscReal value[3])
+void SbRigidMode(PetscInt kind, const PetscReal x[3], const PetscReal box[6], PetscReal value[3])
 {
-  const PetscReal extent = PetscMax(box[3] - box[0], PetscMax(box[4] - box[1], box[5] - box[2]));
+  const PetscReal extent = SbRigidSize(box);
 
   value[0] = value[1] = value[2] = 0.;
   if (kind < 3) {
@@ -412,11 +411,8 @@ static void rigid_mode(PetscInt kind, const PetscReal x[3], const PetscReal box[
   }
 }
 
-/*
-  The six rigid-body modes, zero on prescribed unknowns: what algebraic multigrid must reproduce. Six serve any number of
-  bodies: an aggregate never spans two of them, and each body turns about its own centre.
-*/
-static PetscErrorCode attach_rigid_modes(SbSpace s, Mat A)
+PetscErrorCode SbAttachModes(Mat A, PetscErrorCode (*fill)(PetscInt mode, PetscScalar v[], const void *ctx),
+                             const void *ctx)
 {
   Vec mode[6];
   PetscInt kept = 0;
@@ -429,12 +425,7 @@ static PetscErrorCode attach_rigid_modes(SbSpace s, Mat A)
 
     PetscCall(MatCreateVecs(A, &mode[kept], NULL));
     PetscCall(VecGetArray(mode[kept], &v));
-    for (PetscInt i = 0; i < s->nnode_owned; i++) {
-      PetscReal value[3];
-
-      rigid_mode(m, s->node_x + 3 * i, s->mesh->body[s->node_body[i]].bbox, value);
-      for (PetscInt c = 0; c < 3; c++) v[3 * i + c] = s->fixed[i] & (1 << c) ? 0. : value[c];
-    }
+    PetscCall(fill(m, v, ctx));
     PetscCall(VecRestoreArray(mode[kept], &v));
     /* orthonormal, as MatNullSpaceCreate() demands; what vanishes on fully held bodies drops out */
     PetscCall(VecNormalize(mode[kept], &norm));
@@ -448,10 +439,25 @@ static PetscErrorCode attach_rigid_modes(SbSpace s, Mat A)
     else
       PetscCall(VecDestroy(&mode[kept]));
   }
-  PetscCall(MatNullSpaceCreate(s->comm, PETSC_FALSE, kept, mode, &near));
+  PetscCall(MatNullSpaceCreate(PetscObjectComm((PetscObject)A), PETSC_FALSE, kept, mode, &near));
   PetscCall(MatSetNearNullSpace(A, near));
   PetscCall(MatNullSpaceDestroy(&near));
   for (PetscInt k = 0; k < kept; k++) PetscCall(VecDestroy(&mode[k]));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* A mode at the nodes, zero on prescribed unknowns. */
+static PetscErrorCode fill_rigid_mode(PetscInt m, PetscScalar v[], const void *ctx)
+{
+  const struct _p_SbSpace *s = ctx;
+
+  PetscFunctionBeginUser;
+  for (PetscInt i = 0; i < s->nnode_owned; i++) {
+    PetscReal value[3];
+
+    SbRigidMode(m, s->node_x + 3 * i, s->mesh->body[s->node_body[i]].bbox, value);
+    for (PetscInt c = 0; c < 3; c++) v[3 * i + c] = s->fixed[i] & (1 << c) ? 0. : value[c];
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -488,7 +494,7 @@ PetscErrorCode SbSpaceCreateMatrix(SbSpace s, SbMatrixKind kind, Mat *A)
   PetscCall(MatSetOption(*A, MAT_SYMMETRIC, PETSC_TRUE));
   PetscCall(MatSetOption(*A, MAT_SYMMETRY_ETERNAL, PETSC_TRUE));
   if (kind == SB_MATRIX_AIJ)
-    PetscCall(attach_rigid_modes(s, *A));
+    PetscCall(SbAttachModes(*A, fill_rigid_mode, s));
   else
     PetscCall(SbProductAttach(s, kind, *A));
   PetscCall(PetscLogEventEnd(SbEvents[SB_EVENT_MATRIX_SETUP], 0, 0, 0, 0));

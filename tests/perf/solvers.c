@@ -361,7 +361,7 @@ static PetscErrorCode report(Case *c, KSP ksp)
   PetscCall(perf_fact("memory", most));
   if (!strcmp(c->scene.run->solver, "cg_two_level")) {
     PetscCall(KSPGetPC(ksp, &pc));
-    PetscCall(SbPCCoarseGetStats(pc, NULL, NULL, &simple));
+    PetscCall(SbPCCoarseGetStats(pc, NULL, NULL, NULL, &simple));
   }
   PetscCall(perf_fact("simpler", (double)simple));
   PetscFunctionReturn(PETSC_SUCCESS);
