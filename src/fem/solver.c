@@ -101,6 +101,8 @@ static const SbSolverPreset by_type[] = {
   {PCJACOBI, SB_MATRIX_BAIJ, PETSC_FALSE, "-ksp_type cg -pc_type jacobi", NULL, NULL, NULL, NULL},
   {PCPBJACOBI, SB_MATRIX_BAIJ, PETSC_FALSE, "-ksp_type cg -pc_type pbjacobi", NULL, NULL, NULL, NULL},
   {PCICC, SB_MATRIX_SBAIJ, PETSC_FALSE, "-ksp_type cg -pc_type icc", NULL, NULL, NULL, NULL},
+  {PCBJACOBI, SB_MATRIX_AIJ, PETSC_FALSE,
+   "-ksp_type cg -pc_type bjacobi -sub_pc_factor_shift_type positive_definite", NULL, NULL, NULL, NULL},
   {PCSOR, SB_MATRIX_AIJ, PETSC_FALSE, "-ksp_type cg -pc_type sor -pc_sor_local_symmetric", NULL, NULL, NULL,
    NULL},
   {PCHYPRE, SB_MATRIX_AIJ, PETSC_FALSE, "-ksp_type cg -pc_type hypre", "hypre", NULL, NULL, NULL},
@@ -415,15 +417,19 @@ PetscErrorCode SbSolverClear(const SbSolverPreset *preset)
 
 PetscErrorCode SbSolverCreateOperator(SbSpace s, const SbSolverPreset *preset, Mat *A)
 {
+  SbMatrixKind kind = preset->matrix;
   PetscMPIInt nrank;
 
   PetscFunctionBeginUser;
   PetscCallMPI(MPI_Comm_size(s->comm, &nrank));
+  /* PETSc's incomplete factors of blocks have no shift, and those of CR and DG are indefinite at any tangent; P1's need none, and are faster by
+     two fifths than those of numbers */
+  if (kind == SB_MATRIX_SBAIJ && !preset->precondition && s->faces) kind = SB_MATRIX_AIJ;
+  if (kind == SB_MATRIX_SBAIJ && nrank > 1) kind = SB_MATRIX_BAIJ;
   if (preset->create)
     PetscCall(preset->create(s, A));
   else
-    PetscCall(SbSpaceCreateMatrix(
-      s, nrank > 1 && preset->matrix == SB_MATRIX_SBAIJ ? SB_MATRIX_BAIJ : preset->matrix, A));
+    PetscCall(SbSpaceCreateMatrix(s, kind, A));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
