@@ -75,7 +75,7 @@ static PetscErrorCode look_for_free_body(SbRun run, PetscReal factor, PetscBool 
 /* Why the solve failed. */
 static PetscErrorCode explain(SbRun run, PetscReal factor, SNESConvergedReason reason)
 {
-  PetscBool found;
+  PetscBool found = PETSC_FALSE;
   char why[512] = "use more -static_steps";
 
   PetscFunctionBeginUser;
@@ -89,7 +89,7 @@ static PetscErrorCode explain(SbRun run, PetscReal factor, SNESConvergedReason r
 /* Loads in balance leave a singular system with a solution, and a solver may find it with any rigid motion on top. */
 static PetscErrorCode refuse_free_body(SbRun run, PetscReal factor, PetscBool *ok)
 {
-  PetscBool found;
+  PetscBool found = PETSC_FALSE;
 
   PetscFunctionBeginUser;
   if (!*ok || run->steps_total || run->model->ntouch || !run->newton_step) PetscFunctionReturn(PETSC_SUCCESS);
