@@ -3,7 +3,7 @@
 
   The trees are made when the facets are other ones (tree.c); in every call their volumes are fitted to where things are now, from the
   last node to the first, since children come after their node. A volume holds the swept motion; those of facets are grown by the
-  reach. When the volumes of inner nodes have grown by more than the factor `growth` against those of single facets, compared with the
+  reach. When the volumes of inner nodes have grown by more than GROWTH against those of single facets, compared with the
   last build, the trees are made anew.
 
   The search walks through both trees at once, from the pair of roots: all children of the point's node are tested against all children of
@@ -12,7 +12,7 @@
 
   What a large tree costs beyond a small one is waiting for memory, and branches that cannot be foreseen. So a node is one piece of
   memory, whole cache lines of it, which is fetched when it is put on the stack; nodes lie in the order of the walk; facets and points, which
-  do not, are fetched some nodes ahead. Which pairs meet is one number of 16 or 64 bits: those of nodes, of items and of both are told
+  do not, are fetched some nodes ahead. Which pairs meet is one number of 64 bits: those of nodes, of items and of both are told
   apart by masks.
 
   With self-contact there are two walks. The first one follows only what may face each other (cone.c), and marks the points that face some
@@ -33,23 +33,24 @@ typedef struct {
 
 /* All that a visit needs of a node, in whole cache lines: after the children come the bounds. */
 typedef struct {
-  SbMeets inner;    /* pairs with a child that is a node */
-  SbMeets live;     /* pairs with a child, of points: with one that is walked to */
-  PetscInt child[]; /* [width] as in SbTree; bounds [rows][lanes] of facets, [lanes][rows] of points, m */
+  SbMeets inner;                 /* pairs with a child that is a node */
+  SbMeets live;                  /* pairs with a child, of points: with one that is walked to */
+  PetscInt child[SB_TREE_WIDTH]; /* as in SbTree */
+  SbBound bounds[];              /* [rows][SB_TREE_WIDTH] of facets, [SB_TREE_WIDTH][rows] of points, m */
 } Node;
 
 typedef struct {
   SbTree tree;
   size_t stride;        /* bytes from node to node */
   char *memory, *node;  /* [nnode] of Node, allocated and aligned */
-  PetscInt *part;       /* [nnode][width] part of all that is below, NO_PART when there are several */
+  PetscInt *part;       /* [nnode][SB_TREE_WIDTH] part of all that is below, NO_PART when there are several */
   PetscInt *common;     /* [nnode] the same of the node */
   PetscReal inner_size; /* sum of the sizes of inner nodes */
   PetscReal item_size;  /* and of single items */
 } Fitted;
 
 typedef struct {
-  SbBvhSettings settings;
+  PetscInt k; /* planes of a volume */
   SbBvhCounts counts;
   SbVolume volume;
   Fitted facets, points;
@@ -60,7 +61,7 @@ typedef struct {
   PetscBool cull;  /* the trees have cones, for self-contact */
   PetscBool first; /* in this walk */
   PetscReal built; /* relative size of the volumes at the last build */
-  PetscBool stale; /* other settings */
+  PetscBool stale; /* other volumes */
   Visit *stack;
   PetscInt stack_size;
   PetscInt (*pair)[2]; /* point, facet */
@@ -68,8 +69,13 @@ typedef struct {
 } Bvh;
 
 #define NO_PART PETSC_MIN_INT
-#define AHEAD 8 /* nodes */
-#define LINE 64 /* bytes, of the cache; a guess does no harm */
+#define GROWTH 2 /* of the volumes until the trees are made anew */
+#define ROW \
+  ((SbMeets)0xFF) /* pairs of child 0 of a node of points with all of a node of facets; child c: << 8 c */
+#define COLUMN \
+  ((SbMeets)0x0101010101010101) /* pairs of all of a node of points with child 0 of facets; child l: << l */
+#define AHEAD 8                 /* nodes */
+#define LINE 64                 /* bytes, of the cache; a guess does no harm */
 #define ROOM 80 /* the most that one visit can add: 8 x 8 pairs of children, and twice 8 with what is left */
 
 /* ------------------------------------------------------------------ nodes */
@@ -77,23 +83,6 @@ typedef struct {
 static inline Node *node_of(const Fitted *t, PetscInt g)
 {
   return (Node *)(t->node + t->stride * (size_t)g);
-}
-
-static inline SbBound *bounds_of(const SbVolume *v, Node *node)
-{
-  return (SbBound *)(node->child + v->width);
-}
-
-/* Pairs of child 0 of a node of points with all children of a node of facets; with a shift of `lanes` those of the next child. */
-static inline SbMeets row_of(const SbVolume *v)
-{
-  return v->lanes == 4 ? 0xF : 0xFF;
-}
-
-/* Pairs of all children of a node of points with child 0 of a node of facets; with a shift of 1 those with the next child. */
-static inline SbMeets column_of(const SbVolume *v)
-{
-  return v->lanes == 4 ? 0x1111 : 0x0101010101010101;
 }
 
 /* ------------------------------------------------------------------ fitting */
@@ -105,7 +94,7 @@ static void facet_column(const SbDetector d, const SbDetectScene *s, const SbVol
   int n = 0;
 
   /* of a box all is known */
-  for (int i = 0; i < 3 && v->k != 6; i++) {
+  for (int i = 0; i < 3 && v->nslab > 3; i++) {
     x[n++] = s->x + 3 * s->facet[3 * f + i];
     if (s->x0) x[n++] = s->x0 + 3 * s->facet[3 * f + i];
   }
@@ -160,9 +149,9 @@ static void fit_item(const SbDetector d, const SbDetectScene *s, const Bvh *b, P
 }
 
 /* The boxes of a node's items will be needed soon: in the order of the tree they lie anywhere. */
-SB_INLINE void prefetch_items(const Node *node, PetscInt width, const PetscReal box[])
+SB_INLINE void prefetch_items(const Node *node, const PetscReal box[])
 {
-  for (PetscInt l = 0; l < width; l++)
+  for (PetscInt l = 0; l < SB_TREE_WIDTH; l++)
     __builtin_prefetch(box + 6 * PetscMax(0, SB_TREE_ITEM(node->child[l])));
 }
 
@@ -170,7 +159,7 @@ SB_INLINE void prefetch_items(const Node *node, PetscInt width, const PetscReal 
 static void fit(const SbDetector d, const SbDetectScene *s, const Bvh *b, PetscBool points, Fitted *t)
 {
   const SbVolume *v = &b->volume;
-  const PetscInt w = v->width, row = points ? 1 : v->lanes, lane = points ? v->rows : 1;
+  const PetscInt w = SB_TREE_WIDTH, row = points ? 1 : w, lane = points ? v->rows : 1;
   SbBound column[SB_VOLUME_ROWS];
 
   t->inner_size = t->item_size = 0;
@@ -178,21 +167,21 @@ static void fit(const SbDetector d, const SbDetectScene *s, const Bvh *b, PetscB
     Node *node = node_of(t, g);
     PetscInt *part = t->part + g * w;
 
-    if (g >= AHEAD) prefetch_items(node_of(t, g - AHEAD), w, points ? d->point_box : d->facet_box);
+    if (g >= AHEAD) prefetch_items(node_of(t, g - AHEAD), points ? d->point_box : d->facet_box);
     for (PetscInt l = 0; l < t->tree.nchild[g]; l++) {
       const PetscInt child = node->child[l];
-      SbBound *bounds = bounds_of(v, node) + l * lane;
+      SbBound *bounds = node->bounds + l * lane;
 
       if (child >= 0) {
-        const SbBound *below = bounds_of(v, node_of(t, child));
+        const SbBound *below = node_of(t, child)->bounds;
 
         part[l] = t->common[child];
-        SbVolumeMerge(v, below, row, lane, t->tree.nchild[child], column);
+        SbVolumeMerge(v, below, row, lane, column);
         if (b->cull) SbConeMerge(below + v->cone * row, row, lane, t->tree.nchild[child], column + v->cone);
-        t->inner_size += SbVolumeSize(v, column);
+        t->inner_size += SbVolumeSize(column);
       } else {
         fit_item(d, s, b, points, SB_TREE_ITEM(child), column, part + l);
-        t->item_size += SbVolumeSize(v, column);
+        t->item_size += SbVolumeSize(column);
       }
       for (int r = 0; r < v->rows; r++) bounds[r * row] = column[r];
     }
@@ -213,33 +202,32 @@ static PetscErrorCode fitted_destroy(Fitted *t)
 /* Children of node g and what they are; bounds that meet nothing, which the lanes without a child keep. */
 static void fill_node(const SbVolume *v, PetscBool points, PetscInt g, const SbBound none[], Fitted *t)
 {
-  const PetscInt *child = t->tree.child + g * v->width, n = v->lanes * v->rows;
+  const PetscInt *child = t->tree.child + g * SB_TREE_WIDTH, n = SB_TREE_WIDTH * v->rows;
   Node *node = node_of(t, g);
-  SbBound *bounds = bounds_of(v, node);
 
   node->inner = node->live = 0;
-  for (PetscInt l = 0; l < v->width; l++) {
-    const SbMeets with = points ? row_of(v) << v->lanes * l : column_of(v) << l;
+  for (PetscInt l = 0; l < SB_TREE_WIDTH; l++) {
+    const SbMeets with = points ? ROW << SB_TREE_WIDTH * l : COLUMN << l;
 
     node->child[l] = child[l];
     if (child[l] >= 0) node->inner |= with;
     if (child[l] != SB_TREE_NONE) node->live |= with;
   }
-  for (PetscInt i = 0; i < n; i++) bounds[i] = none[points ? i % v->rows : i / v->lanes];
+  for (PetscInt i = 0; i < n; i++) node->bounds[i] = none[points ? i % v->rows : i / SB_TREE_WIDTH];
 }
 
 /* What is allocated stays for all calls. */
 static PetscErrorCode fitted_create(const SbBinary *binary, const SbVolume *v, PetscBool points, Fitted *t)
 {
-  const size_t width = (size_t)v->width, nbound = (size_t)v->lanes * (size_t)v->rows;
+  const size_t width = SB_TREE_WIDTH;
   SbBound none[SB_VOLUME_ROWS];
 
   PetscFunctionBeginUser;
   PetscCall(fitted_destroy(t));
-  PetscCall(SbTreeCreate(binary, v->width, &t->tree));
+  PetscCall(SbTreeCreate(binary, &t->tree));
   const size_t nnode = (size_t)t->tree.nnode;
 
-  t->stride = sizeof(Node) + width * sizeof(PetscInt) + nbound * sizeof(SbBound);
+  t->stride = sizeof(Node) + width * (size_t)v->rows * sizeof(SbBound);
   t->stride = (t->stride + LINE - 1) / LINE * LINE;
   PetscCall(
     PetscMalloc3(nnode * t->stride + LINE - 1, &t->memory, nnode * width, &t->part, nnode, &t->common));
@@ -265,15 +253,14 @@ static PetscErrorCode build(SbDetector d, const SbDetectScene *s, Bvh *b)
 {
   const SbTreeItems facets = {s->nfacet, d->facet_box, s->facet_part};
   const SbTreeItems points = {s->npoint, d->point_box, s->point_part};
-  const PetscBool linked = (PetscBool)(b->settings.build == SB_BVH_CONNECTIVITY);
   SbBinary over_facets, over_points;
   SbFacetLinks links;
 
   PetscFunctionBeginUser;
-  SbVolumeSet(b->settings.k, b->settings.branching, s->self, &b->volume);
+  SbVolumeSet(b->k, s->self, &b->volume);
   b->cull = s->self;
   PetscCall(SbFacetLinksCreate(s, &d->rings, &links));
-  PetscCall(SbBinaryCreate(&facets, linked ? links.start : NULL, links.list, &over_facets));
+  PetscCall(SbBinaryCreate(&facets, links.start, links.list, &over_facets));
   PetscCall(SbBinaryHang(&over_facets, links.seat, &points, &over_points));
   PetscCall(fitted_create(&over_facets, &b->volume, PETSC_FALSE, &b->facets));
   PetscCall(fitted_create(&over_points, &b->volume, PETSC_TRUE, &b->points));
@@ -326,7 +313,7 @@ static PetscErrorCode prepare(SbDetector d, const SbDetectScene *s, Bvh *b)
   PetscFunctionBeginUser;
   if (!anew) {
     fit_both(d, s, b);
-    anew = (PetscBool)(relative_size(b) > b->settings.growth * b->built);
+    anew = (PetscBool)(relative_size(b) > GROWTH * b->built);
   }
   if (anew) {
     PetscCall(build(d, s, b));
@@ -362,24 +349,24 @@ static PetscErrorCode make_room(Bvh *b, PetscInt nstack)
 /* Takes out of the pairs of children those of one part, where the nodes hold several. */
 static SbMeets without_own(const Bvh *b, const Visit *v, SbMeets pairs)
 {
-  const PetscInt *points = b->points.part + v->a * b->volume.width;
-  const PetscInt *facets = b->facets.part + v->f * b->volume.width;
+  const PetscInt *points = b->points.part + v->a * SB_TREE_WIDTH;
+  const PetscInt *facets = b->facets.part + v->f * SB_TREE_WIDTH;
 
   for (PetscInt c = 0; c < b->points.tree.nchild[v->a]; c++) {
     for (PetscInt l = 0; l < b->facets.tree.nchild[v->f]; l++) {
-      if (points[c] == facets[l] && points[c] != NO_PART) pairs &= ~((SbMeets)1 << (b->volume.lanes * c + l));
+      if (points[c] == facets[l] && points[c] != NO_PART) pairs &= ~((SbMeets)1 << (SB_TREE_WIDTH * c + l));
     }
   }
   return pairs;
 }
 
 /* In the row of each child of a point node the lowest bit when it is in any of the pairs, and no other. */
-static inline SbMeets children_in(const SbVolume *v, SbMeets pairs)
+static inline SbMeets children_in(SbMeets pairs)
 {
   pairs |= pairs >> 1;
   pairs |= pairs >> 2;
-  if (v->lanes == 8) pairs |= pairs >> 4;
-  return pairs & column_of(v);
+  pairs |= pairs >> 4;
+  return pairs & COLUMN;
 }
 
 /*
@@ -388,7 +375,6 @@ static inline SbMeets children_in(const SbVolume *v, SbMeets pairs)
 */
 static inline SbMeets meet(Bvh *b, Node *point, Node *facet, PetscBool self, Visit *v)
 {
-  const SbVolume *volume = &b->volume;
   const SbMeets wanted = v->wanted & point->live & facet->live;
   SbMeets pairs;
 
@@ -398,12 +384,8 @@ static inline SbMeets meet(Bvh *b, Node *point, Node *facet, PetscBool self, Vis
     if (common == other && common != NO_PART) return 0;
     v->apart = (PetscBool)(common != NO_PART && other != NO_PART);
   }
-  /* how many children: the sum of the lowest bits is in the highest row */
-  b->counts.visits +=
-    (PetscInt64)(children_in(volume, wanted) * column_of(volume) >> volume->lanes * (volume->lanes - 1) &
-                 row_of(volume));
-  pairs =
-    volume->meet[b->first ? 1 : 0](bounds_of(volume, point), volume->rows, wanted, bounds_of(volume, facet));
+  b->counts.visits += (PetscInt64)(children_in(wanted) * COLUMN >> 56); /* the sum of the lowest bits */
+  pairs = b->volume.meet[b->first ? 1 : 0](point->bounds, b->volume.rows, wanted, facet->bounds);
   return !self && !v->apart ? without_own(b, v, pairs) : pairs;
 }
 
@@ -439,20 +421,19 @@ static inline PetscInt push(Bvh *b, PetscInt a, PetscInt f, SbMeets wanted, cons
 static inline PetscInt follow(Bvh *b, const Node *point, const Node *facet, const Visit *v, SbMeets pairs,
                               PetscInt nstack)
 {
-  const PetscInt lanes = b->volume.lanes;
-  const SbMeets row = row_of(&b->volume), column = column_of(&b->volume);
+  enum { lanes = SB_TREE_WIDTH };
 
   for (SbMeets m = pairs & point->inner & ~facet->inner; m;) {
     const PetscInt c = highest(m) / lanes;
 
-    nstack = push(b, point->child[c], v->f, (m >> lanes * c & row) * column, v, nstack);
-    m &= ~(row << lanes * c);
+    nstack = push(b, point->child[c], v->f, (m >> lanes * c & ROW) * COLUMN, v, nstack);
+    m &= ~(ROW << lanes * c);
   }
   for (SbMeets m = pairs & ~point->inner & facet->inner; m;) {
     const PetscInt l = highest(m) % lanes;
-    const SbMeets with = m & column << l;
+    const SbMeets with = m & COLUMN << l;
 
-    nstack = push(b, v->a, facet->child[l], (with >> l) * row, v, nstack);
+    nstack = push(b, v->a, facet->child[l], (with >> l) * ROW, v, nstack);
     m ^= with;
   }
   for (SbMeets m = pairs & point->inner & facet->inner; m;) {
@@ -467,17 +448,15 @@ static inline PetscInt follow(Bvh *b, const Node *point, const Node *facet, cons
 /* Pairs of items; in the first walk the points that have any are walked to no more. */
 static inline void keep(Bvh *b, Node *point, const Node *facet, SbMeets pairs)
 {
-  const PetscInt lanes = b->volume.lanes;
-
   if (b->first) {
-    point->live &= ~(children_in(&b->volume, pairs) * row_of(&b->volume));
+    point->live &= ~(children_in(pairs) * ROW);
     return;
   }
   for (; pairs; pairs &= pairs - 1) {
     const PetscInt i = lowest(pairs);
 
-    b->pair[b->npair][0] = SB_TREE_ITEM(point->child[i / lanes]);
-    b->pair[b->npair++][1] = SB_TREE_ITEM(facet->child[i % lanes]);
+    b->pair[b->npair][0] = SB_TREE_ITEM(point->child[i / SB_TREE_WIDTH]);
+    b->pair[b->npair++][1] = SB_TREE_ITEM(facet->child[i % SB_TREE_WIDTH]);
   }
 }
 
@@ -505,27 +484,21 @@ static PetscErrorCode walk(Bvh *b, PetscBool self)
 /* Which children of the points' nodes are walked to: all. */
 static void set_live(Bvh *b)
 {
-  const SbVolume *v = &b->volume;
-
-  for (PetscInt g = 0; g < b->points.tree.nnode; g++) {
-    const PetscInt unused = v->lanes * (v->lanes - b->points.tree.nchild[g]);
-
-    node_of(&b->points, g)->live = ~(SbMeets)0 >> (64 - v->lanes * v->lanes + unused);
-  }
+  for (PetscInt g = 0; g < b->points.tree.nnode; g++)
+    node_of(&b->points, g)->live = ~(SbMeets)0 >> SB_TREE_WIDTH * (SB_TREE_WIDTH - b->points.tree.nchild[g]);
 }
 
 /* After the first walk: points that met something are walked to again, the others no more. */
 static void turn_live(Bvh *b)
 {
   const SbTree *t = &b->points.tree;
-  const SbMeets row = row_of(&b->volume);
 
   for (PetscInt g = t->nnode - 1; g >= 0; g--) {
     Node *node = node_of(&b->points, g);
     SbMeets live = 0;
 
     for (PetscInt l = 0; l < t->nchild[g]; l++) {
-      const SbMeets own = row << b->volume.lanes * l;
+      const SbMeets own = ROW << SB_TREE_WIDTH * l;
 
       if (node->inner & own ? node_of(&b->points, node->child[l])->live != 0 : !(node->live & own))
         live |= own;
@@ -575,7 +548,7 @@ static PetscInt64 bytes(const Bvh *b)
          3 * b->facets.tree.n * (PetscInt64)sizeof(PetscReal);
 
   for (int i = 0; i < 2; i++) {
-    const PetscInt64 n = t[i]->tree.nnode, w = b->volume.width;
+    const PetscInt64 n = t[i]->tree.nnode, w = SB_TREE_WIDTH;
 
     sum += n * (PetscInt64)t[i]->stride + n * (w + 2) * (PetscInt64)sizeof(PetscInt);
   }
@@ -587,22 +560,15 @@ static PetscInt64 bytes(const Bvh *b)
 static PetscErrorCode search(SbDetector d, const SbDetectScene *s)
 {
   Bvh *b = (Bvh *)d->data;
-  char volume[32] = "spheres";
 
   PetscFunctionBeginUser;
   PetscCall(prepare(d, s, b));
   PetscCall(find_pairs(b, s->self));
   PetscCall(sort_pairs(d, s, b));
   d->stats.memory = bytes(b);
-  if (b->settings.k == 6)
-    PetscCall(PetscStrncpy(volume, "boxes", sizeof(volume)));
-  else if (b->settings.k)
-    PetscCall(PetscSNPrintf(volume, sizeof(volume), "%d-DOPs", (int)b->settings.k));
   PetscCall(PetscSNPrintf(d->stats.text, sizeof(d->stats.text),
-                          "tree of %s, %d children, %s, %" PetscInt_FMT " nodes, depth %" PetscInt_FMT,
-                          volume, (int)b->settings.branching,
-                          b->settings.build == SB_BVH_TOP_DOWN ? "top-down" : "by connectivity",
-                          b->counts.nodes, b->counts.depth));
+                          "tree of %s, %" PetscInt_FMT " nodes, depth %" PetscInt_FMT,
+                          b->k == 6 ? "boxes" : "14-DOPs", b->counts.nodes, b->counts.depth));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -620,42 +586,25 @@ static PetscErrorCode destroy(SbDetector d)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-void SbBvhSettingsDefault(SbBvhSettings *s)
-{
-  *s = (SbBvhSettings){.branching = 8, .k = 6, .build = SB_BVH_CONNECTIVITY, .growth = 2};
-}
-
 /* The tree of a detector; an error when it is of another kind. */
 static PetscErrorCode tree_of(SbDetector d, Bvh **b)
 {
   PetscFunctionBeginUser;
   PetscCheck(d->ops.search == search, PETSC_COMM_SELF, PETSC_ERR_ARG_WRONG,
-             "the contact detector is of kind %s: settings of the tree are for kind bvh", d->ops.name);
+             "the contact detector is of kind %s: a tree is in those of kind bvh", d->ops.name);
   *b = (Bvh *)d->data;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbBvhSet(SbDetector d, const SbBvhSettings *s)
+PetscErrorCode SbBvhSet(SbDetector d, PetscInt k)
 {
   Bvh *b = NULL;
 
   PetscFunctionBeginUser;
   PetscCall(tree_of(d, &b));
-  PetscCheck(s->branching == 2 || s->branching == 4 || s->branching == 8, PETSC_COMM_SELF,
-             PETSC_ERR_ARG_OUTOFRANGE, "branching of the contact tree is %" PetscInt_FMT ": write 2, 4 or 8",
-             s->branching);
-  PetscCheck(s->k == 0 || s->k == 6 || s->k == 14 || s->k == 18 || s->k == 26, PETSC_COMM_SELF,
-             PETSC_ERR_ARG_OUTOFRANGE,
-             "planes of a volume of the contact tree are %" PetscInt_FMT
-             ": write 6, 14, 18, 26, or 0 for spheres",
-             s->k);
-  PetscCheck(
-    s->build == SB_BVH_CONNECTIVITY || s->build == SB_BVH_TOP_DOWN, PETSC_COMM_SELF, PETSC_ERR_ARG_OUTOFRANGE,
-    "the contact tree cannot be built in way %d: write connectivity (0) or top-down (1)", (int)s->build);
-  PetscCheck(s->growth > 1, PETSC_COMM_SELF, PETSC_ERR_ARG_OUTOFRANGE,
-             "growth of the contact tree until it is built anew is %g: it must be above 1",
-             (double)s->growth);
-  b->settings = *s;
+  PetscCheck(k == 6 || k == 14, PETSC_COMM_SELF, PETSC_ERR_ARG_OUTOFRANGE,
+             "planes of a volume of the contact tree are %" PetscInt_FMT ": write 6 (a box) or 14", k);
+  b->k = k;
   b->stale = PETSC_TRUE;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -676,7 +625,7 @@ PetscErrorCode sb_detector_bvh(SbDetector d)
 
   PetscFunctionBeginUser;
   PetscCall(PetscNew(&b));
-  SbBvhSettingsDefault(&b->settings);
+  b->k = 6;
   b->stale = PETSC_TRUE;
   d->data = b;
   d->ops = (SbDetectorOps){"bvh", search, destroy};

@@ -8,8 +8,8 @@
   regions left, and their number falls geometrically, so that the whole is linear. A round that joins less than a tenth of the
   regions is the last one (regions around one large one, or without neighbours).
 
-  Top-down: the longest axis of the box of all centres is cut at the median. Parts are kept apart first and joined at the end in the
-  same way.
+  What is then left over is joined top-down: the longest axis of the box of all centres is cut at the median. Parts are kept apart
+  first and joined at the end in the same way.
 */
 #include "tree.h"
 
@@ -247,16 +247,6 @@ PetscErrorCode SbBinaryCreate(const SbTreeItems *items, const PetscInt start[], 
   PetscFunctionBeginUser;
   PetscCall(binary_start(items, tree));
   if (!items->n) PetscFunctionReturn(PETSC_SUCCESS);
-  if (!start) {
-    PetscInt *node, *part;
-
-    PetscCall(PetscMalloc2(items->n, &node, items->n, &part));
-    for (PetscInt i = 0; i < items->n; i++) node[i] = i;
-    PetscCall(PetscArraycpy(part, items->part, items->n));
-    PetscCall(join_rest(tree, items->n, node, part));
-    PetscCall(PetscFree2(node, part));
-    PetscFunctionReturn(PETSC_SUCCESS);
-  }
   PetscCall(regions_create(items, start, list, &a));
   PetscCall(regions_create(items, start, list, &b));
   while (a.n > 1) {
@@ -325,7 +315,6 @@ typedef struct {
   const SbBinary *tree;
   PetscReal *size; /* [nnode] of the box */
   PetscInt *nitem; /* [nnode] items below */
-  PetscInt width;
 } Widening;
 
 /*
@@ -337,7 +326,7 @@ static PetscInt to_open(const Widening *w, PetscInt n, const PetscInt list[], Pe
   PetscInt best = -1;
 
   for (PetscInt l = 0; l < n && room > 0; l++) {
-    if (w->nitem[list[l]] > w->width && (best < 0 || w->size[list[l]] > w->size[list[best]])) best = l;
+    if (w->nitem[list[l]] > SB_TREE_WIDTH && (best < 0 || w->size[list[l]] > w->size[list[best]])) best = l;
   }
   if (best >= 0) return best;
   for (PetscInt l = 0; l < n; l++) {
@@ -356,7 +345,7 @@ static PetscInt open_children(const Widening *w, PetscInt node, PetscInt list[])
 
   list[0] = node;
   for (;;) {
-    best = n == 1 ? 0 : to_open(w, n, list, w->width - n);
+    best = n == 1 ? 0 : to_open(w, n, list, SB_TREE_WIDTH - n);
     if (best < 0 || list[best] < b->n) break;
     const PetscInt *child = b->child[list[best] - b->n];
 
@@ -376,41 +365,40 @@ typedef struct {
 static void make_wide(const Widening *w, Pending stack[], SbTree *t)
 {
   const SbBinary *b = w->tree;
-  PetscInt nstack = 1, list[8];
+  PetscInt nstack = 1, list[SB_TREE_WIDTH];
 
   stack[0] = (Pending){b->root, -1, 1};
   while (nstack) {
     const Pending p = stack[--nstack];
     const PetscInt me = t->nnode++;
-    PetscInt *child = t->child + me * t->width;
+    PetscInt *child = t->child + me * SB_TREE_WIDTH;
 
     if (p.parent >= 0) t->child[p.parent] = me;
     t->depth = PetscMax(t->depth, p.depth);
     t->nchild[me] = open_children(w, p.node, list);
-    for (PetscInt l = t->width - 1; l >= 0; l--) {
+    for (PetscInt l = SB_TREE_WIDTH - 1; l >= 0; l--) {
       if (l >= t->nchild[me])
         child[l] = SB_TREE_NONE;
       else if (list[l] < b->n)
         child[l] = SB_TREE_ITEM(list[l]);
       else
-        stack[nstack++] = (Pending){list[l], me * t->width + l, p.depth + 1};
+        stack[nstack++] = (Pending){list[l], me * SB_TREE_WIDTH + l, p.depth + 1};
     }
   }
 }
 
-PetscErrorCode SbTreeCreate(const SbBinary *b, PetscInt width, SbTree *t)
+PetscErrorCode SbTreeCreate(const SbBinary *b, SbTree *t)
 {
   const PetscInt most = PetscMax(b->n - 1, 1);
-  Widening w = {.tree = b, .width = width};
+  Widening w = {.tree = b};
   Pending *stack;
 
   PetscFunctionBeginUser;
   PetscCall(PetscMemzero(t, sizeof(*t)));
-  t->width = width;
   t->n = b->n;
   if (b->root < 0) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscMalloc3(b->nnode, &w.size, b->nnode, &w.nitem, most, &stack));
-  PetscCall(PetscMalloc1(most * width, &t->child));
+  PetscCall(PetscMalloc1(most * SB_TREE_WIDTH, &t->child));
   PetscCall(PetscMalloc1(most, &t->nchild));
   for (PetscInt i = 0; i < b->nnode; i++) {
     const PetscInt *child = i < b->n ? NULL : b->child[i - b->n];
@@ -420,7 +408,7 @@ PetscErrorCode SbTreeCreate(const SbBinary *b, PetscInt width, SbTree *t)
   }
   make_wide(&w, stack, t);
   PetscCall(PetscFree3(w.size, w.nitem, stack));
-  PetscCall(PetscRealloc(sizeof(*t->child) * (size_t)(t->nnode * width), &t->child));
+  PetscCall(PetscRealloc(sizeof(*t->child) * (size_t)(t->nnode * SB_TREE_WIDTH), &t->child));
   PetscCall(PetscRealloc(sizeof(*t->nchild) * (size_t)t->nnode, &t->nchild));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -1,8 +1,8 @@
 /*
-  tree.h - trees over boxes: a binary one by joining neighbours or by halving, then one with wide nodes.
+  tree.h - trees over boxes: a binary one by joining neighbours, then one with eight children to a node.
 */
 #pragma once
-#include "detect.h"
+#include "volume.h"
 
 /* What a tree is made of: facets or points. Arrays are borrowed. */
 typedef struct {
@@ -30,9 +30,9 @@ PetscErrorCode SbFacetLinksCreate(const SbDetectScene *scene, const SbDetectRing
 PetscErrorCode SbFacetLinksDestroy(SbFacetLinks *links);
 
 /*
-  SbBinaryCreate - tree over the items: with links neighbours are joined bottom-up, what is left over, or all, is halved top-down.
+  SbBinaryCreate - tree over the items: neighbours are joined bottom-up, what is left over is halved top-down.
 
-  Not collective. Input: start, list - neighbours of each item, or NULL.
+  Not collective. Input: start, list - neighbours of each item.
 */
 PetscErrorCode SbBinaryCreate(const SbTreeItems *items, const PetscInt start[], const PetscInt list[],
                               SbBinary *tree);
@@ -45,13 +45,13 @@ PetscErrorCode SbBinaryDestroy(SbBinary *tree);
 /* Item i as a child, and back. */
 #define SB_TREE_ITEM(i) (-2 - (i))
 
-/* Nodes with up to `width` children; the children of a node come after it. The first `nchild` lanes are used. */
+/* Nodes with up to SB_TREE_WIDTH children; the children of a node come after it. The first `nchild` lanes are used. */
 typedef struct {
-  PetscInt width, n, nnode, depth;
-  PetscInt *child;  /* [nnode][width] node, SB_TREE_ITEM(item), or SB_TREE_NONE */
+  PetscInt n, nnode, depth;
+  PetscInt *child;  /* [nnode][SB_TREE_WIDTH] node, SB_TREE_ITEM(item), or SB_TREE_NONE */
   PetscInt *nchild; /* [nnode] */
 } SbTree;
 
 /* Takes grandchildren for children, the largest first, until each node is full. Not collective. */
-PetscErrorCode SbTreeCreate(const SbBinary *binary, PetscInt width, SbTree *tree);
+PetscErrorCode SbTreeCreate(const SbBinary *binary, SbTree *tree);
 PetscErrorCode SbTreeDestroy(SbTree *tree);

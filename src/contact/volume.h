@@ -1,7 +1,7 @@
 /*
-  volume.h - bounding volumes of a tree: intersections of slabs (k-DOP), or spheres; and cones of normals.
+  volume.h - bounding volumes of a tree: intersections of slabs, boxes or k-DOPs; and cones of normals.
 
-  A volume is a column of numbers: lower and upper bound along each of k/2 directions, or centre and radius; then, for self-contact, its cone: axis,
+  A volume is a column of numbers: lower and upper bound along each of k/2 directions; then, for self-contact, its cone: axis,
   cosine and sine of the half-angle. A node of the tree holds the columns of its children as a block, either row by row (a number of
   all children side by side: what is tested against) or column by column (what is tested).
 
@@ -13,11 +13,12 @@
 typedef float SbBound;
 
 enum {
-  SB_VOLUME_CONE = 5,                  /* rows of the cone, the last ones */
-  SB_VOLUME_ROWS = 26 + SB_VOLUME_CONE /* most rows of a column */
+  SB_VOLUME_CONE = 5,                   /* rows of the cone, the last ones */
+  SB_VOLUME_ROWS = 14 + SB_VOLUME_CONE, /* most rows of a column */
+  SB_TREE_WIDTH = 8                     /* children of a node, and lanes of a block */
 };
 
-/* Which children of a node of points meet which of a node of facets: bit lanes c + l for child c of the first and l of the second. */
+/* Which children of a node of points meet which of a node of facets: bit 8 c + l for child c of the first and l of the second. */
 typedef uint64_t SbMeets;
 
 /*
@@ -27,35 +28,33 @@ typedef uint64_t SbMeets;
 typedef SbMeets (*SbVolumeMeet)(const SbBound a[], PetscInt rows, SbMeets wanted, const SbBound f[]);
 
 typedef struct {
-  PetscInt k, width;
-  PetscInt lanes; /* children that a block has room for: width, at least 4 */
-  int nslab;      /* k/2; 0: spheres */
-  int cone;       /* the first row of the cone */
-  int rows;       /* of a column, with its cone where there are cones */
+  int nslab; /* k/2 */
+  int cone;  /* the first row of the cone */
+  int rows;  /* of a column, with its cone where there are cones */
   PetscReal origin[3];
   SbVolumeMeet meet[2]; /* without and with a look at the cones */
 } SbVolume;
 
-/* k = 0, 6, 14, 18 or 26; width = 2, 4 or 8; cones: there is room for them. The origin is 0. */
-void SbVolumeSet(PetscInt k, PetscInt width, PetscBool cones, SbVolume *volume);
+/* k = 6 or 14; cones: there is room for them. The origin is 0. */
+void SbVolumeSet(PetscInt k, PetscBool cones, SbVolume *volume);
 /*
   SbVolumeOf - column of n corners, m, all within `box` grown by `grow` to all sides, m; rounding is allowed for.
 
-  `grow` widens what box does not tell: the slanted slabs and the sphere. The cone is not set.
+  `grow` widens what box does not tell: the slanted slabs. The cone is not set.
 */
 void SbVolumeOf(const SbVolume *volume, int n, const PetscReal *const corner[], const PetscReal box[6],
                 PetscReal grow, SbBound column[]);
 /*
-  SbVolumeMerge - column around the first n children of a block, without the cone; n > 0. The other lanes are as SbVolumeNone() has them.
+  SbVolumeMerge - column around the children of a block, without the cone. Lanes without a child are as SbVolumeNone() has them.
 
   The number in row r of child l is block[row * r + lane * l].
 */
-void SbVolumeMerge(const SbVolume *volume, const SbBound block[], PetscInt row, PetscInt lane, PetscInt n,
+void SbVolumeMerge(const SbVolume *volume, const SbBound block[], PetscInt row, PetscInt lane,
                    SbBound column[]);
 /* A column that meets nothing. */
 void SbVolumeNone(const SbVolume *volume, SbBound column[]);
 /* What stands for the surface of a volume, m^2. */
-PetscReal SbVolumeSize(const SbVolume *volume, const SbBound column[]);
+PetscReal SbVolumeSize(const SbBound column[]);
 
 /* ------------------------------------------------------------------ cones of normals, cone.c */
 

@@ -39,11 +39,8 @@ static const SbOption rows[] = {
    "touch"},
   {"detection", SB_OPTION_CHOICE, 1, "", "hash", "hash|bvh|brute",
    "spatial hash, hierarchy of bounding volumes, or every pair: the same contacts"},
-  {"bvh_branching", SB_OPTION_INT, 1, "", "8", "[2, 8]", "children of a node of the tree of bvh: 2, 4 or 8"},
-  {"bvh_volume", SB_OPTION_CHOICE, 1, "", "box", "box|dop14|dop18|dop26|sphere",
-   "what bounds a node of it: a box, 14, 18 or 26 planes, or a sphere"},
-  {"bvh_build", SB_OPTION_CHOICE, 1, "", "connectivity", "connectivity|top_down",
-   "how it is built: from facets that share edges, or by halving"},
+  {"bvh_volume", SB_OPTION_CHOICE, 1, "", "box", "box|dop14",
+   "what bounds a node of the tree of bvh: a box or 14 planes"},
   {"sides", SB_OPTION_CHOICE, 1, "", "both", "one|both",
    "points of the finer of two surfaces look for the other one, or both do"},
   {"self", SB_OPTION_BOOL, 1, "", "no", "", "bodies may meet themselves"},
@@ -69,37 +66,6 @@ static const SbOption rows[] = {
   {"pairs", SB_OPTION_BOOL, 1, "", "no", "",
    "columns in history.csv for each pair of bodies: force on the second by the first, contacts"},
 };
-
-/* Settings of the tree, which only bvh has. */
-static PetscErrorCode read_tree(SbEffect e, const SbScope *scope, SbDetector detector, PetscBool tree)
-{
-  static const char *const names[] = {"bvh_branching", "bvh_volume", "bvh_build"};
-  static const PetscInt planes[] = {6, 14, 18, 26, 0};
-  SbBvhSettings set;
-  PetscInt choice;
-
-  PetscFunctionBeginUser;
-  for (int k = 0; k < 3 && !tree; k++) {
-    PetscBool given;
-
-    PetscCall(SbOptionGiven(scope, names[k], &given));
-    PetscCheck(!given, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
-               "-effect_%s_%s is for -effect_%s_detection bvh: give that, or leave it out", e->name, names[k],
-               e->name);
-  }
-  if (!tree) PetscFunctionReturn(PETSC_SUCCESS);
-  SbBvhSettingsDefault(&set);
-  PetscCall(SbOptionInt(scope, names[0], &set.branching));
-  PetscCheck(set.branching == 2 || set.branching == 4 || set.branching == 8, PETSC_COMM_WORLD,
-             PETSC_ERR_USER_INPUT, "-effect_%s_bvh_branching %" PetscInt_FMT ": write 2, 4 or 8", e->name,
-             set.branching);
-  PetscCall(SbOptionChoice(scope, names[1], &choice));
-  set.k = planes[choice];
-  PetscCall(SbOptionChoice(scope, names[2], &choice));
-  set.build = (SbBvhBuild)choice;
-  PetscCall(SbBvhSet(detector, &set));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
 
 static PetscErrorCode read_restitution(SbEffect e, const SbScope *scope)
 {
@@ -141,7 +107,17 @@ static PetscErrorCode options_collision(SbEffect e, const SbScope *scope)
   if (!c->cut) e->ops.arrive = NULL;
   PetscCall(SbOptionChoice(scope, "detection", &choice));
   PetscCall(SbDetectorCreate((SbDetectKind)choice, &c->detector));
-  PetscCall(read_tree(e, scope, c->detector, (PetscBool)(choice == SB_DETECT_BVH)));
+  if (choice == SB_DETECT_BVH) {
+    PetscCall(SbOptionChoice(scope, "bvh_volume", &choice));
+    PetscCall(SbBvhSet(c->detector, choice ? 14 : 6));
+  } else {
+    PetscBool given;
+
+    PetscCall(SbOptionGiven(scope, "bvh_volume", &given));
+    PetscCheck(!given, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
+               "-effect_%s_bvh_volume is for -effect_%s_detection bvh: give that, or leave it out", e->name,
+               e->name);
+  }
   PetscCall(SbOptionChoice(scope, "sides", &choice));
   c->both = (PetscBool)(choice == 1);
   PetscCall(SbOptionBool(scope, "self", &c->self));

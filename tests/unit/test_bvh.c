@@ -1,14 +1,15 @@
 // @ranks 1
 /*
   Detection by trees of bounding volumes: all pairs that are near each other are candidates, and the contacts are those of the
-  detector by brute force, with every branching, volume and build, on random, degenerate and moving scenes; refitting and building
+  detector by brute force, with boxes and k-DOPs, on random, degenerate and moving scenes; refitting and building
   anew; what self-contact costs; how the number of visits grows.
 */
 #include "bvh_scene.h"
 #include "sbbvh.h"
 #include "../../src/contact/detect.h"
 
-enum { NSETTING = 30 };
+enum { NVOLUME = 2 };
+static const PetscInt planes[NVOLUME] = {6, 14};
 
 /* The edges of a finished scene. */
 static PetscErrorCode add_edges(Scene *c)
@@ -192,30 +193,16 @@ static PetscBool same_edges(PetscInt n, const SbEdgePair a[], PetscInt m, const 
   return (PetscBool)(n == m);
 }
 
-static SbBvhSettings setting(int i)
-{
-  static const PetscInt k[5] = {0, 6, 14, 18, 26};
-  SbBvhSettings s;
-
-  SbBvhSettingsDefault(&s);
-  s.branching = 2 << (i % 3);
-  s.k = k[i / 3 % 5];
-  s.build = (SbBvhBuild)(i / 15);
-  return s;
-}
-
 static PetscErrorCode check_random(Scene *c)
 {
-  SbDetector brute, bvh[NSETTING];
+  SbDetector brute, bvh[NVOLUME];
   Totals sum = {0};
 
   PetscFunctionBeginUser;
   PetscCall(SbDetectorCreate(SB_DETECT_BRUTE, &brute));
-  for (int i = 0; i < NSETTING; i++) {
-    const SbBvhSettings s = setting(i);
-
+  for (int i = 0; i < NVOLUME; i++) {
     PetscCall(SbDetectorCreate(SB_DETECT_BVH, &bvh[i]));
-    PetscCall(SbBvhSet(bvh[i], &s));
+    PetscCall(SbBvhSet(bvh[i], planes[i]));
   }
   for (unsigned seed = 1; seed <= 240; seed++) {
     const SbEdgePair *expected_edges, *edges;
@@ -229,41 +216,36 @@ static PetscErrorCode check_random(Scene *c)
     sum.contacts += n;
     sum.edges += nedges;
     for (PetscInt i = 0; i < n; i++) sum.crossed += expected[i].crossed ? 1 : 0;
-    /* each third setting by turns, which do not go with those of the scenes (self-contact, motion, scale, reach) */
-    for (int i = 0; i < NSETTING; i++) {
-      if (((unsigned)(i + i / 3) + seed / 42) % 3) continue;
+    for (int i = 0; i < NVOLUME; i++) {
       PetscCall(SbDetectorFind(bvh[i], &c->s, &m, &near));
-      PetscCall(PetscSNPrintf(what, sizeof(what), "scene %u, setting %d", seed, i));
+      PetscCall(PetscSNPrintf(what, sizeof(what), "scene %u, %d planes", seed, (int)planes[i]));
       SB_CHECK(!differences(n, expected, m, near), "%s: %d contacts, brute force finds %d, or they differ",
                what, (int)m, (int)n);
       PetscCall(SbDetectorFindEdges(bvh[i], &c->s, &medges, &edges));
       SB_CHECK(same_edges(nedges, expected_edges, medges, edges),
                "%s: %d pairs of edges, brute force finds %d, or they differ", what, (int)medges, (int)nedges);
-      if (((unsigned)i + seed / 35) % 5 == 0) check_candidates(c, bvh[i], what, &sum);
+      check_candidates(c, bvh[i], what, &sum);
     }
   }
   SB_CHECK(sum.contacts > 1000 && sum.crossed > 50 && sum.culled > 1000,
            "few contacts (%d), crossings (%d), culled pairs (%d)", (int)sum.contacts, (int)sum.crossed,
            (int)sum.culled);
   PetscCall(SbDetectorDestroy(&brute));
-  for (int i = 0; i < NSETTING; i++) PetscCall(SbDetectorDestroy(&bvh[i]));
+  for (int i = 0; i < NVOLUME; i++) PetscCall(SbDetectorDestroy(&bvh[i]));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* ------------------------------------------------------------------ motion */
 
 /* Two spheres that roll on each other: refitted trees find what new ones find; scattered vertices make the trees anew. */
-static PetscErrorCode check_refit(Scene *c, SbBvhBuild build)
+static PetscErrorCode check_refit(Scene *c, PetscInt k)
 {
   SbDetector kept, fresh;
-  SbBvhSettings s;
   SbDetectStats stats;
   unsigned state = 5;
   PetscInt found = 0;
 
   PetscFunctionBeginUser;
-  SbBvhSettingsDefault(&s);
-  s.build = build;
   scene_clear(c);
   for (PetscInt part = 0; part < 2; part++) {
     const PetscInt v0 = c->s.ncorner, f0 = c->s.nfacet;
@@ -274,7 +256,7 @@ static PetscErrorCode check_refit(Scene *c, SbBvhBuild build)
   }
   c->s.reach = 0.1;
   PetscCall(SbDetectorCreate(SB_DETECT_BVH, &kept));
-  PetscCall(SbBvhSet(kept, &s));
+  PetscCall(SbBvhSet(kept, k));
   for (int step = 0; step < 20; step++) {
     const SbNear *a, *b;
     PetscInt n, m;
@@ -292,7 +274,7 @@ static PetscErrorCode check_refit(Scene *c, SbBvhBuild build)
     PetscCall(scene_finish(c));
     PetscCall(SbDetectorFind(kept, &c->s, &n, &a));
     PetscCall(SbDetectorCreate(SB_DETECT_BVH, &fresh));
-    PetscCall(SbBvhSet(fresh, &s));
+    PetscCall(SbBvhSet(fresh, k));
     PetscCall(SbDetectorFind(fresh, &c->s, &m, &b));
     SB_CHECK(!differences(n, a, m, b),
              "step %d: refitted trees find %d contacts, new ones %d, or they differ", step, (int)n, (int)m);
@@ -387,13 +369,13 @@ static void flat_strip(PetscReal u, PetscReal v, PetscReal x[3])
   x[2] = 0;
 }
 
-/* What a tree with these settings does in a scene; its contacts are checked against brute force. */
+/* What a tree of volumes of k planes does in a scene; its contacts are checked against brute force. */
 typedef struct {
   PetscInt found, inside; /* contacts, those with a negative gap */
   PetscInt64 candidates, visits;
 } Outcome;
 
-static PetscErrorCode find_both(const Scene *c, const SbBvhSettings *settings, Outcome *out)
+static PetscErrorCode find_both(const Scene *c, PetscInt k, Outcome *out)
 {
   SbDetector brute, d;
   SbBvhCounts counts;
@@ -403,7 +385,7 @@ static PetscErrorCode find_both(const Scene *c, const SbBvhSettings *settings, O
   PetscFunctionBeginUser;
   PetscCall(SbDetectorCreate(SB_DETECT_BRUTE, &brute));
   PetscCall(SbDetectorCreate(SB_DETECT_BVH, &d));
-  PetscCall(SbBvhSet(d, settings));
+  PetscCall(SbBvhSet(d, k));
   PetscCall(SbDetectorFind(brute, &c->s, &n, &a));
   PetscCall(SbDetectorFind(d, &c->s, &out->found, &b));
   SB_CHECK(!differences(n, a, out->found, b), "%d contacts by brute force, %d by the tree, or they differ",
@@ -421,11 +403,9 @@ static PetscErrorCode find_both(const Scene *c, const SbBvhSettings *settings, O
 /* A strip with the normals towards the other leg: two sides that touch; or away from it: each leg is behind the other one. */
 static PetscErrorCode check_folded(Scene *c, PetscBool towards)
 {
-  SbBvhSettings s;
   Outcome out;
 
   PetscFunctionBeginUser;
-  SbBvhSettingsDefault(&s);
   scene_clear(c);
   add_sheet(c, 0, 30, (PetscBool)!towards, flat_strip);
   for (PetscInt v = 0; v < c->s.ncorner; v++)
@@ -434,7 +414,7 @@ static PetscErrorCode check_folded(Scene *c, PetscBool towards)
   c->s.self = PETSC_TRUE;
   c->s.reach = 0.03;
   PetscCall(scene_finish(c));
-  PetscCall(find_both(c, &s, &out));
+  PetscCall(find_both(c, 6, &out));
   /* of the 31 rows of points the one on the fold is too close to its neighbours at rest */
   SB_CHECK(out.found >= 29 * 31 && out.found <= 31 * 31 && out.inside == (towards ? 0 : out.found),
            "folded strip: %d contacts, %d of them inside", (int)out.found, (int)out.inside);
@@ -443,16 +423,12 @@ static PetscErrorCode check_folded(Scene *c, PetscBool towards)
 }
 
 /* A sphere at rest that may meet itself: finer, and the visits per point fall, since whole regions cannot face each other. */
-static PetscErrorCode check_sphere(Scene *c, PetscInt k, PetscInt branching)
+static PetscErrorCode check_sphere(Scene *c, PetscInt k)
 {
   static const PetscInt sizes[] = {4, 8, 16, 32};
   PetscReal each[4];
-  SbBvhSettings s;
 
   PetscFunctionBeginUser;
-  SbBvhSettingsDefault(&s);
-  s.k = k;
-  s.branching = branching;
   for (int i = 0; i < 4; i++) {
     Outcome out;
 
@@ -462,7 +438,7 @@ static PetscErrorCode check_sphere(Scene *c, PetscInt k, PetscInt branching)
     c->s.self = PETSC_TRUE;
     c->s.reach = 0.5 / (PetscReal)sizes[i];
     PetscCall(scene_finish(c));
-    PetscCall(find_both(c, &s, &out));
+    PetscCall(find_both(c, k, &out));
     each[i] = (PetscReal)out.visits / (PetscReal)c->s.npoint;
     SB_CHECK(!out.found, "sphere of %d facets at rest: %d contacts with itself", (int)c->s.nfacet,
              (int)out.found);
@@ -487,16 +463,15 @@ static void wavy(PetscReal u, PetscReal v, PetscReal x[3])
 #define FULL 1.4 /* times as many nodes as there would be if all had all children */
 
 /* Two wavy sheets face to face: visits and candidates per point hardly grow with the number of facets. */
-static PetscErrorCode check_growth(Scene *c, int which)
+static PetscErrorCode check_growth(Scene *c, PetscInt k)
 {
   static const PetscInt sizes[] = {10, 40, 130};
-  const SbBvhSettings s = setting(which);
   PetscReal each[3], per_near[3];
   SbDetector d;
 
   PetscFunctionBeginUser;
   PetscCall(SbDetectorCreate(SB_DETECT_BVH, &d));
-  PetscCall(SbBvhSet(d, &s));
+  PetscCall(SbBvhSet(d, k));
   for (int i = 0; i < 3; i++) {
     const SbNear *near;
     SbBvhCounts counts;
@@ -520,43 +495,28 @@ static PetscErrorCode check_growth(Scene *c, int which)
     each[i] = (PetscReal)counts.visits / (PetscReal)c->s.npoint;
     per_near[i] = (PetscReal)d->start[c->s.npoint] / (PetscReal)n;
     /* full nodes are the fewest */
-    SB_CHECK(counts.nodes * (s.branching - 1) < FULL * c->s.nfacet,
-             "setting %d: %d nodes with up to %d children over %d facets", which, (int)counts.nodes,
-             (int)s.branching, (int)c->s.nfacet);
+    SB_CHECK(counts.nodes * 7 < FULL * c->s.nfacet, "%d nodes with up to 8 children over %d facets",
+             (int)counts.nodes, (int)c->s.nfacet);
     SB_CHECK(n > c->s.npoint * 8 / 10, "only %d of %d points meet the other sheet", (int)n, (int)c->s.npoint);
   }
   /* below a few levels all boxes look alike; growth with the square root would be 3.2 */
-  SB_CHECK(each[2] < 1.4 * each[1], "setting %d: visits per point %g, %g, %g", which, (double)each[0],
+  SB_CHECK(each[2] < 1.4 * each[1], "%d planes: visits per point %g, %g, %g", (int)k, (double)each[0],
            (double)each[1], (double)each[2]);
-  SB_CHECK(per_near[2] < 12, "setting %d: %g candidates per contact", which, (double)per_near[2]);
+  SB_CHECK(per_near[2] < 12, "%d planes: %g candidates per contact", (int)k, (double)per_near[2]);
   PetscCall(SbDetectorDestroy(&d));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 static PetscErrorCode check_errors(void)
 {
-  SbBvhSettings s;
   SbDetector d;
 
   PetscFunctionBeginUser;
   PetscCall(SbDetectorCreate(SB_DETECT_BVH, &d));
-  SbBvhSettingsDefault(&s);
-  PetscCall(SbBvhSet(d, &s));
-  s.branching = 3;
-  SB_CHECK_ERROR(SbBvhSet(d, &s), "branching 3");
-  SbBvhSettingsDefault(&s);
-  s.k = 12;
-  SB_CHECK_ERROR(SbBvhSet(d, &s), "12-DOPs");
-  SbBvhSettingsDefault(&s);
-  s.growth = 1;
-  SB_CHECK_ERROR(SbBvhSet(d, &s), "growth 1");
-  SbBvhSettingsDefault(&s);
-  s.build = (SbBvhBuild)2;
-  SB_CHECK_ERROR(SbBvhSet(d, &s), "a third way to build");
+  SB_CHECK_ERROR(SbBvhSet(d, 12), "12-DOPs");
   PetscCall(SbDetectorDestroy(&d));
   PetscCall(SbDetectorCreate(SB_DETECT_BRUTE, &d));
-  SbBvhSettingsDefault(&s);
-  SB_CHECK_ERROR(SbBvhSet(d, &s), "settings of the tree for another kind");
+  SB_CHECK_ERROR(SbBvhSet(d, 6), "volumes of the tree for another kind");
   PetscCall(SbDetectorDestroy(&d));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -564,14 +524,12 @@ static PetscErrorCode check_errors(void)
 /* Nothing to look for, and a single facet and point. */
 static PetscErrorCode check_small(Scene *c)
 {
-  SbBvhSettings s;
   Outcome out;
 
   PetscFunctionBeginUser;
-  SbBvhSettingsDefault(&s);
   scene_clear(c);
   c->s.reach = 0.1;
-  PetscCall(find_both(c, &s, &out));
+  PetscCall(find_both(c, 6, &out));
   SB_CHECK(!out.found && !out.visits, "an empty scene: %d contacts, %ld visits", (int)out.found,
            (long)out.visits);
   (void)add_vertex(c, 0, 0, 0);
@@ -580,12 +538,12 @@ static PetscErrorCode check_small(Scene *c)
   (void)add_vertex(c, 0.2, 0.2, 0.05);
   add_point(c, 1, 3, -1);
   PetscCall(scene_finish(c));
-  PetscCall(find_both(c, &s, &out));
+  PetscCall(find_both(c, 6, &out));
   SB_CHECK(!out.found, "a point without facets: %d contacts", (int)out.found);
   add_facet(c, 0, 0, 1, 2);
   PetscCall(scene_finish(c));
   c->normal[2] = -1;
-  PetscCall(find_both(c, &s, &out));
+  PetscCall(find_both(c, 6, &out));
   SB_CHECK(out.found == 1 && out.candidates == 1 && out.visits == 1, "one facet, one point: %d contacts",
            (int)out.found);
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -598,15 +556,14 @@ int main(int argc, char **argv)
   SB_TEST_BEGIN(argc, argv);
   PetscCall(scene_create(&c));
   PetscCall(check_random(&c));
-  PetscCall(check_refit(&c, SB_BVH_CONNECTIVITY));
-  PetscCall(check_refit(&c, SB_BVH_TOP_DOWN));
   PetscCall(check_rebuild(&c));
   PetscCall(check_folded(&c, PETSC_TRUE));
   PetscCall(check_folded(&c, PETSC_FALSE));
-  PetscCall(check_sphere(&c, 6, 4));
-  PetscCall(check_sphere(&c, 0, 2));
-  PetscCall(check_sphere(&c, 18, 8));
-  for (int i = 0; i < NSETTING; i += 4) PetscCall(check_growth(&c, i));
+  for (int i = 0; i < NVOLUME; i++) {
+    PetscCall(check_refit(&c, planes[i]));
+    PetscCall(check_sphere(&c, planes[i]));
+    PetscCall(check_growth(&c, planes[i]));
+  }
   PetscCall(check_small(&c));
   PetscCall(check_errors());
   PetscCall(scene_destroy(&c));

@@ -42,9 +42,7 @@ static PetscErrorCode check_refused(void)
     {"-effect_meet_response glue", "projected"},
     {"-effect_meet_sides none", "both"},
     {"-effect_meet_detection eyes", "brute"},
-    {"-effect_meet_bvh_volume sphere", "-effect_meet_bvh_volume is for -effect_meet_detection bvh"},
-    {"-effect_meet_detection bvh -effect_meet_bvh_branching 3",
-     "-effect_meet_bvh_branching 3: write 2, 4 or 8"},
+    {"-effect_meet_bvh_volume dop14", "-effect_meet_bvh_volume is for -effect_meet_detection bvh"},
     {"-effect_meet_friction -1", "-effect_meet_friction"},
     {"-effect_meet_friction 0.2 -effect_meet_friction_kinetic 0.3",
      "-effect_meet_friction_kinetic 0.3 is above -effect_meet_friction 0.2"},
@@ -601,12 +599,8 @@ int main(int argc, char **argv)
   PetscCall(check_gaps(PAIR("cr", "dg"), "", 0));
   PetscCall(check_gaps(CROSS("p1", "cr"), "", 3));
   PetscCall(check_gaps(CROSS("p1", "cr"), "-effect_meet_detection bvh", 3));
-  PetscCall(
-    check_gaps(PAIR("p1", "p1"),
-               "-effect_meet_detection bvh -effect_meet_bvh_volume sphere -effect_meet_bvh_branching 2", 0));
-  PetscCall(check_gaps(
-    PAIR("p1", "p1"),
-    "-effect_meet_detection bvh -effect_meet_bvh_volume dop26 -effect_meet_bvh_build top_down", 0));
+  PetscCall(check_gaps(PAIR("p1", "p1"), "-effect_meet_detection bvh -effect_meet_bvh_volume box", 0));
+  PetscCall(check_gaps(PAIR("p1", "p1"), "-effect_meet_detection bvh -effect_meet_bvh_volume dop14", 0));
   PetscCall(check_sides());
   PetscCall(check_far());
   PetscCall(check_patience());
