@@ -193,6 +193,9 @@ PetscErrorCode SbScanReal(SbScan *s, const char *what, int64_t number, PetscReal
     if (end) s->at = end;
     if (end) PetscFunctionReturn(PETSC_SUCCESS);
   }
+  if (p > s->at && p + 1 < s->end && *p == ',' && isdigit((unsigned char)p[1]))
+    SB_SCAN_ERROR(s, "the %s, %.*s, has a decimal comma; write the file with decimal points", what,
+                  (int)PetscMin(24, p + strspn(p, ",0123456789") - s->at), s->at);
   if (s->at >= s->end || p == s->at || !ends_token(s, p)) PetscCall(unexpected(s, what, number));
   s->at = p;
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -5,7 +5,8 @@
 
   STL lists triangles with three corners each; corners with equal coordinates, bit by bit, are one vertex. The normals in the file are
   not used: the order of the corners tells the side. It is binary when its size is what its count of triangles says (80 bytes, the count,
-  50 bytes per triangle), whatever its first word is. OBJ: the lines v, f, o and g; OFF: the plain kind. Faces with more
+  50 bytes per triangle), whatever its first word is, or when it is larger and there is a byte 0 near its beginning, which text has not:
+  what follows the triangles is left out with a warning. Words of the text may be in capitals, and `end solid` be two of them. OBJ: the lines v, f, o and g; OFF: the plain kind. Faces with more
   than three corners are cut into triangles, see triangles_polygon.c.
 */
 #include <ctype.h>
@@ -100,12 +101,21 @@ static PetscErrorCode stl_binary(SbScan *s, uint32_t n, SbTriangleFile *f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The next word; `end solid` is `endsolid`. */
+static PetscErrorCode stl_next(SbScan *s, char word[32])
+{
+  PetscFunctionBeginUser;
+  PetscCall(SbScanWord(s, 32, word));
+  if (!strcasecmp(word, "end")) PetscCall(SbScanWord(s, 32 - 3, word + 3));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 static PetscErrorCode stl_word(SbScan *s, const char *wanted)
 {
   char word[32];
 
   PetscFunctionBeginUser;
-  PetscCall(SbScanWord(s, sizeof(word), word));
+  PetscCall(stl_next(s, word));
   if (!word[0])
     SB_SCAN_ERROR(s, "the file ends where '%s' is expected; it is truncated, write or copy it again", wanted);
   if (strcasecmp(word, wanted)) SB_SCAN_ERROR(s, "expected '%s', found '%s'", wanted, word);
@@ -160,7 +170,9 @@ static PetscErrorCode stl_text(SbScan *s, SbTriangleFile *f)
   PetscInt nsolid = 0;
 
   PetscFunctionBeginUser;
-  PetscCall(SbScanWord(s, sizeof(word), word));
+  /* what DOS and careless programs leave at the end */
+  while (s->end > s->at && (s->end[-1] == 0 || s->end[-1] == 0x1a)) s->end--;
+  PetscCall(stl_next(s, word));
   if (strcasecmp(word, "solid"))
     SB_SCAN_ERROR(s, "expected 'solid', and the size of the file is not that of a binary one: it is no STL "
                      "file, or truncated");
@@ -168,7 +180,7 @@ static PetscErrorCode stl_text(SbScan *s, SbTriangleFile *f)
     if (!strcasecmp(word, "solid")) PetscCall(stl_solid(s, ++nsolid, f));
     if (!strcasecmp(word, "endsolid")) PetscCall(SbScanEndOfLine(s)); /* its name again */
     if (open && !strcasecmp(word, "facet")) PetscCall(stl_facet(s, f));
-    PetscCall(SbScanWord(s, sizeof(word), word));
+    PetscCall(stl_next(s, word));
     if (!strcasecmp(word, "endsolid"))
       open = PETSC_FALSE;
     else if (!strcasecmp(word, "solid"))
@@ -185,11 +197,15 @@ static PetscErrorCode stl_file(SbScan *s, SbTriangleFile *f)
 {
   const size_t size = (size_t)(s->end - s->data);
   const uint32_t n = size >= 84 ? little(s->data + 80) : 0;
+  const size_t known = 84 + 50 * (size_t)n;
 
   PetscFunctionBeginUser;
-  if (size >= 84 && size == 84 + 50 * (size_t)n)
+  if (size == known || (size > known && n && memchr(s->data, 0, PetscMin(known, 134)))) {
+    if (size > known)
+      PetscCall(SbWarning(PETSC_COMM_SELF, "%s: %zu bytes behind the %lld triangles are left out", f->where,
+                          size - known, (long long)n));
     PetscCall(stl_binary(s, n, f));
-  else
+  } else
     PetscCall(stl_text(s, f));
   PetscCall(join_corners(f->t));
   PetscFunctionReturn(PETSC_SUCCESS);

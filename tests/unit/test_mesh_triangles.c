@@ -101,6 +101,76 @@ static PetscErrorCode check_more(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A tetrahedron of 1/6 m^3 as a text of STL: its first and last line, and how its lines begin and end. */
+static PetscErrorCode check_stl(const char *first, const char *last, PetscBool capitals, const char *line_end)
+{
+  static const char *const corner[4][3] = {{"0 0 0", "0 1 0", "1 0 0"},
+                                           {"0 0 0", "1 0 0", "0 0 1"},
+                                           {"0 0 0", "0 0 1", "0 1 0"},
+                                           {"1 0 0", "0 1 0", "0 0 1"}};
+  char text[4096], path[512];
+  size_t n;
+  SbTriangles t;
+
+  PetscFunctionBeginUser;
+  n = (size_t)snprintf(text, sizeof(text), "%s%s", first, line_end);
+  for (int f = 0; f < 4; f++) {
+    n +=
+      (size_t)snprintf(text + n, sizeof(text) - n, "\tfacet normal 0 0 1%souter loop%s", line_end, line_end);
+    for (int k = 0; k < 3; k++)
+      n += (size_t)snprintf(text + n, sizeof(text) - n, "vertex   %s%s", corner[f][k], line_end);
+    n += (size_t)snprintf(text + n, sizeof(text) - n, f % 2 ? "endloop%sendfacet%s" : "end loop%send facet%s",
+                          line_end, line_end);
+  }
+  (void)snprintf(text + n, sizeof(text) - n, "%s", last);
+  for (char *c = text; *c && capitals; c++)
+    if (*c >= 'a' && *c <= 'z') *c = (char)(*c - 'a' + 'A');
+  PetscCall(test_file_write(".stl", PETSC_FALSE, NULL, text, path));
+  PetscCall(SbTrianglesRead(PETSC_COMM_WORLD, "-o", path, 1, zero, &t));
+  SB_CHECK(t.ntri == 4 && t.nvert == 4, "'%s' ... '%s': %d triangles, %d vertices", first, last, (int)t.ntri,
+           (int)t.nvert);
+  SB_CHECK_NEAR(t.volume, 1. / 6, 1e-14, last);
+  PetscCall(SbTrianglesDestroy(&t));
+  PetscCall(test_file_remove(path));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* What exporters write that the format does not know. */
+static PetscErrorCode check_stl_variants(void)
+{
+  TestSurface s;
+  SbTriangles t;
+  char path[512];
+  FILE *file;
+
+  PetscFunctionBeginUser;
+  PetscCall(check_stl("solid name", "endsolid name\n", PETSC_FALSE, "\n"));
+  PetscCall(check_stl("solid name", "end solid\n", PETSC_FALSE, "\n"));
+  PetscCall(check_stl("solid name", "end solid name", PETSC_FALSE, "\n"));
+  PetscCall(check_stl("solid", "endsolid", PETSC_FALSE, "\n"));
+  PetscCall(check_stl("solid name", "EndSolid other name\r\n\r\n\x1a", PETSC_FALSE, "\r\n"));
+  PetscCall(check_stl("solid name", "endsolid name\n", PETSC_TRUE, "\n\n \n"));
+  PetscCall(check_stl("\xef\xbb\xbfsolid name", "end solid\n\n", PETSC_FALSE, "\n"));
+  /* several solids; the last one has nothing in it */
+  PetscCall(check_stl("solid none\nend solid\nsolid name", "endsolid name\nsolid more\nend solid more\n",
+                      PETSC_FALSE, "\n"));
+  /* a binary file with something behind its triangles; its header begins with `solid` */
+  cube(PETSC_FALSE, &s);
+  PetscCall(test_file_open(".stl", path, &file));
+  if (file) {
+    write_stl_binary(file, &s);
+    fprintf(file, "written by somebody");
+  }
+  PetscCall(test_file_close(file));
+  PetscCall(SbTrianglesRead(PETSC_COMM_WORLD, "-o", path, 1, zero, &t));
+  SB_CHECK(t.ntri == 12, "%d triangles", (int)t.ntri);
+  SB_CHECK_NEAR(t.volume, 1, 1e-14, "bytes behind the triangles");
+  PetscCall(SbTrianglesDestroy(&t));
+  PetscCall(test_file_remove(path));
+  test_surface_free(&s);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* ------------------------------------------------------------------ errors */
 
 static PetscErrorCode refuse_file(const char *path, PetscErrorCode code, const char *words)
@@ -201,6 +271,9 @@ static PetscErrorCode check_files(void)
                         "line 5: expected the coordinate of a vertex, found 'vertex'"));
   PetscCall(refuse_text(".stl", "solid a\nfacet normal 0 0 1\nouter loop\nvertex 1 2 3\n",
                         "the file ends where 'vertex' is expected; it is truncated"));
+  PetscCall(refuse_text(".stl", "solid a\nfacet normal 0 0 1\nouter loop\nvertex 1,5 2,5 3,5\n",
+                        "line 4: the coordinate of a vertex, 1,5, has a decimal comma"));
+  PetscCall(refuse_text(".stl", "solid a\nend facet\n", "expected 'facet' or 'endsolid', found 'endfacet'"));
   PetscCall(refuse_text(".stl", "solid a\n", "the file ends where 'endsolid' is expected"));
   PetscCall(refuse_text(".stl", "solid a\nendsolid a\n", "holds no triangles"));
   PetscCall(refuse_text(".stl", "solid a\nfacet normal 0 0 1\nouter loop\nvertex 1 2 inf\n",
@@ -241,6 +314,7 @@ int main(int argc, char **argv)
   PetscCall(check_cube(".stl", PETSC_TRUE, PETSC_FALSE));
   PetscCall(check_tets());
   PetscCall(check_more());
+  PetscCall(check_stl_variants());
   PetscCall(check_surfaces());
   PetscCall(check_files());
   SB_TEST_END();
