@@ -23,6 +23,23 @@ static PetscErrorCode grow(PetscInt n, size_t size, void *array)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+static PetscErrorCode at_end(void)
+{
+  PetscFunctionBeginUser;
+  PetscCall(SbOptionsReset());
+  SbTheOptions.at_end = PETSC_FALSE;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Frees the table at the end, once: PETSc has room for 256 such functions, and a test may read options more often. */
+static PetscErrorCode free_at_end(void)
+{
+  PetscFunctionBeginUser;
+  if (!SbTheOptions.at_end) PetscCall(PetscRegisterFinalize(at_end));
+  SbTheOptions.at_end = PETSC_TRUE;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode SbOptionsRegister(const char *klass, const char *type, PetscInt n, const SbOption rows[])
 {
   SbOptionBlock *block;
@@ -36,7 +53,7 @@ PetscErrorCode SbOptionsRegister(const char *klass, const char *type, PetscInt n
   for (PetscInt i = 0; i < n; i++)
     PetscCheck(rows[i].count <= SB_OPTION_COUNT_MAX, PETSC_COMM_SELF, PETSC_ERR_PLIB,
                "Option %s has more than %d values", rows[i].key, SB_OPTION_COUNT_MAX);
-  if (!SbTheOptions.nblock) PetscCall(PetscRegisterFinalize(SbOptionsReset));
+  PetscCall(free_at_end());
   PetscCall(grow(SbTheOptions.nblock, sizeof(*block), &SbTheOptions.block));
   block = &SbTheOptions.block[SbTheOptions.nblock++];
   PetscCall(PetscStrncpy(block->klass, klass, sizeof(block->klass)));
@@ -234,7 +251,7 @@ PetscErrorCode SbOptionUsersFree(PetscInt *n, SbOptionUser **users)
 PetscErrorCode SbOptionsRemember(void)
 {
   PetscFunctionBeginUser;
-  if (!SbTheOptions.nblock) PetscCall(PetscRegisterFinalize(SbOptionsReset));
+  PetscCall(free_at_end());
   PetscCall(SbOptionUsersFree(&SbTheOptions.nuser, &SbTheOptions.user));
   PetscCall(SbOptionUsersGet(&SbTheOptions.nuser, &SbTheOptions.user));
   SbTheOptions.remembered = PETSC_TRUE;
@@ -289,6 +306,8 @@ PetscErrorCode SbOptionsFile(MPI_Comm comm, const char *file)
 
 PetscErrorCode SbOptionsReset(void)
 {
+  const PetscBool registered = SbTheOptions.at_end;
+
   PetscFunctionBeginUser;
   for (PetscInt i = 0; i < SbTheOptions.nrecord; i++) PetscCall(PetscFree(SbTheOptions.record[i].text));
   PetscCall(PetscFree(SbTheOptions.record));
@@ -297,5 +316,6 @@ PetscErrorCode SbOptionsReset(void)
   PetscCall(PetscFree(SbTheOptions.listed));
   PetscCall(SbOptionUsersFree(&SbTheOptions.nuser, &SbTheOptions.user));
   PetscCall(PetscMemzero(&SbTheOptions, sizeof(SbTheOptions)));
+  SbTheOptions.at_end = registered;
   PetscFunctionReturn(PETSC_SUCCESS);
 }

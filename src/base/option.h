@@ -30,6 +30,7 @@ typedef struct {
 } SbOptionUser;
 
 typedef struct {
+  PetscBool at_end; /* PETSc frees it at the end */
   PetscInt nblock, nrecord, nuser;
   SbOptionBlock *block;   /* [nblock] in the order of registration */
   SbOptionRecord *record; /* [nrecord] in the order of the first reading */

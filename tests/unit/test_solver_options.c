@@ -66,7 +66,11 @@ static const char *const presets[] = {"auto",         "direct",   "cg",         
 static const char *const norms[][2] = {
   {"cg", "none preconditioned unpreconditioned natural"},
   {"fcg", "none preconditioned unpreconditioned natural"},
+#if PETSC_VERSION_LT(3, 20, 0)
   {"minres", "none preconditioned"},
+#else /* written anew: KSPMINRESSetUseQLP() */
+  {"minres", "none preconditioned unpreconditioned"},
+#endif
   {"gmres", "none preconditioned unpreconditioned"},
   {"fgmres", "none unpreconditioned"},
   {"bcgs", "none preconditioned unpreconditioned"},
