@@ -27,8 +27,12 @@ PetscErrorCode SbSolverChoose(SbSpace space, PetscBool dynamic, PetscBool linear
 /* Names a factorisation for matrices that may be indefinite when `choice` is auto. Not collective. Errors: PETSC_ERR_USER where this PETSc has none
    for this number of ranks. */
 PetscErrorCode SbSolverPivot(MPI_Comm comm, size_t size, char choice[]);
-/* negative: eigenvalues below zero of the matrix that `snes` has factored last, -1: its solver does not tell. Collective. */
-PetscErrorCode SbSolverNegative(SNES snes, PetscInt *negative);
+/*
+  SbSolverNegative - eigenvalues below zero of the matrix that `snes` has factored last, in the null space of its rows of contact.
+
+  Collective. Output: negative, -1: the solver does not tell.
+*/
+PetscErrorCode SbSolverNegative(SNES snes, SbSpace space, PetscInt *negative);
 /*
   SbSolverNext - what to try after a solver that failed: first a factorisation, for large systems iterations first.
 
@@ -107,6 +111,8 @@ PetscErrorCode SbDirectPackage(MPI_Comm comm, PetscInt unknowns, PetscBool defin
   PETSc's PCCHOLESKY or PCLU, with the prefix telescope_ where the matrix is gathered.
 */
 PetscErrorCode SbPCDirectSet(PC pc, const char *package, PetscBool symmetric);
+/* negative: pivots below zero of a factorisation that is done, -1 where it does not tell: L D L^T of MUMPS does. Collective. */
+PetscErrorCode SbPCDirectNegative(PC pc, PetscInt *negative);
 /* The package of such a factorisation that is gathered on one rank, NULL for any other pc. Not collective. */
 PetscErrorCode SbPCDirectGathered(PC pc, const char **package);
 /* A Cholesky factorisation whose pivot is not positive is one that failed (KSP_DIVERGED_PC_FAILED), with CHOLMOD too and where it is gathered on

@@ -79,4 +79,6 @@ PetscErrorCode SbCoupleProjectForce(SbCouple c, Vec r);
   Output: ok, false when the matrix could not be factored; z is not a number then.
 */
 PetscErrorCode SbCoupleFactoredSolve(SbSpace space, Vec r, Vec z, PetscBool *ok);
+/* Negative eigenvalues of K + F^T k G in the null space of the rows, from that factorisation; -1: it does not tell. Collective. */
+PetscErrorCode SbCoupleFactoredNegative(SbSpace space, PetscInt *negative);
 PetscErrorCode SbFactoredDestroy(SbFactored *factored);

@@ -216,3 +216,15 @@ PetscErrorCode SbCoupleFactoredSolve(SbSpace s, Vec r, Vec z, PetscBool *ok)
   PetscCall(VecRestoreArrayRead(f->x, &from));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
+
+PetscErrorCode SbCoupleFactoredNegative(SbSpace s, PetscInt *negative)
+{
+  const SbFactored f = s->couple->factored;
+
+  PetscFunctionBeginUser;
+  *negative = -1;
+  if (!f || !f->ok) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(SbPCDirectNegative(f->pc, negative));
+  if (*negative >= 0) *negative = PetscMax(0, *negative - s->couple->exact.N);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

@@ -76,6 +76,8 @@ PetscErrorCode SbPCDirectSet(PC pc, const char *package, PetscBool symmetric)
     PetscCall(
       PCSetApplicationContext(pc, (void *)(uintptr_t)package)); /* what is made of it at its first set-up */
   }
+  /* all negative pivots are counted when the last front is not spread over the ranks */
+  if (mumps) PetscCall(set_if_silent(prefix, "mat_mumps_icntl_13", "1"));
   if (mumps) PetscCall(set_if_silent(prefix, "mat_mumps_icntl_14", "100"));
   if (umfpack) PetscCall(set_if_silent(prefix, "mat_umfpack_ordering", "METIS"));
   /* for small matrices CHOLMOD's own choice is L D L^T, which takes indefinite ones without a word; a failure is told by the solver's reason */
@@ -94,5 +96,25 @@ PetscErrorCode SbPCDirectGathered(PC pc, const char **package)
   *package = NULL;
   PetscCall(PetscObjectTypeCompare((PetscObject)pc, PCTELESCOPE, &is));
   if (is) PetscCall(PCGetApplicationContext(pc, (void *)package));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbPCDirectNegative(PC pc, PetscInt *negative)
+{
+  PetscBool cholesky;
+  MatSolverType type = NULL;
+  PetscInt serial_root;
+  PetscMPIInt nrank;
+  Mat F;
+
+  PetscFunctionBeginUser;
+  *negative = -1;
+  PetscCall(PetscObjectTypeCompare((PetscObject)pc, PCCHOLESKY, &cholesky));
+  if (cholesky) PetscCall(PCFactorGetMatSolverType(pc, &type));
+  if (!type || strcmp(type, MATSOLVERMUMPS)) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PCFactorGetMatrix(pc, &F));
+  PetscCall(MatMumpsGetIcntl(F, 13, &serial_root));
+  PetscCallMPI(MPI_Comm_size(PetscObjectComm((PetscObject)F), &nrank));
+  if (nrank == 1 || serial_root == 1) PetscCall(MatGetInertia(F, negative, NULL, NULL));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -455,7 +455,8 @@ static PetscErrorCode choose_package(SbSpace s, PC pc, const char *type)
   } else if (package && !lu && !strcmp(package, MATSOLVERUMFPACK))
     package = NULL;
   if (package) PetscCall(PCFactorSetMatSolverType(pc, package));
-  if (package && !strcmp(package, MATSOLVERMUMPS)) PetscCall(insert_options("-mat_mumps_icntl_14 100"));
+  if (package && !strcmp(package, MATSOLVERMUMPS))
+    PetscCall(insert_options("-mat_mumps_icntl_13 1 -mat_mumps_icntl_14 100"));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -691,31 +692,24 @@ PetscErrorCode SbSolverPivot(MPI_Comm comm, size_t size, char choice[])
   PetscCall(SbSolverReproducible(&reproducible));
   if (reproducible && nrank > 1 && umfpack) mumps = PETSC_FALSE;
   PetscCall(PetscStrncpy(choice, mumps ? "mumps" : "umfpack", size));
-  /* MUMPS counts negative pivots when the last front is factored by one rank */
-  if (mumps) PetscCall(insert_options("-mat_mumps_icntl_13 1"));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbSolverNegative(SNES snes, PetscInt *negative)
+PetscErrorCode SbSolverNegative(SNES snes, SbSpace s, PetscInt *negative)
 {
-  PetscBool cholesky;
-  MatSolverType type = NULL;
-  PetscInt serial_root;
-  PetscMPIInt nrank;
+  PetscBool saddle;
   KSP ksp;
   PC pc;
-  Mat F;
 
   PetscFunctionBeginUser;
-  *negative = -1;
   PetscCall(SNESGetKSP(snes, &ksp));
   PetscCall(KSPGetPC(ksp, &pc));
-  PetscCall(PetscObjectTypeCompare((PetscObject)pc, PCCHOLESKY, &cholesky));
-  if (cholesky) PetscCall(PCFactorGetMatSolverType(pc, &type));
-  if (!type || strcmp(type, "mumps")) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(PCFactorGetMatrix(pc, &F));
-  PetscCall(MatMumpsGetIcntl(F, 13, &serial_root));
-  PetscCallMPI(MPI_Comm_size(PetscObjectComm((PetscObject)F), &nrank));
-  if (nrank == 1 || serial_root == 1) PetscCall(MatGetInertia(F, negative, NULL, NULL));
+  PetscCall(SbPCCoupleIsFactored(pc, &saddle));
+  if (saddle)
+    PetscCall(SbCoupleFactoredNegative(s, negative));
+  else {
+    PetscCall(SbPCCoupleGetInner(pc, &pc));
+    PetscCall(SbPCDirectNegative(pc, negative));
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -303,7 +303,7 @@ static PetscErrorCode begin_step(Path *p, PetscReal *sign, PetscBool *ok)
   if (p->load == 0.) PetscCall(VecNorm(p->q, NORM_2, &p->load));
   PetscCall(product(p, run->path, p->begin, &along));
   *sign = along < 0. ? -1. : 1.;
-  PetscCall(SbSolverNegative(run->snes, &negative));
+  PetscCall(SbSolverNegative(run->snes, run->model->space, &negative));
   if (run->unsymmetric.U) negative = -1; /* the matrix lacks a part of K */
   if (negative >= 0 && p->negative >= 0 && PetscAbsInt(negative - p->negative) != (*sign != p->turned) &&
       !run->bifurcations++)

@@ -17,10 +17,11 @@
   and the next one has to bring it below where it was, or the search starts again from there (watchdog technique: Chamberlain et al. 1982; Nocedal
   and Wright, section 15.6).
 
-  Tangent. With -body_NAME_tangent auto it is the exact one. When the linear solver meets a direction of negative curvature, or p goes up, the eigenvalues of
+  Tangent. With -body_NAME_tangent auto it is the exact one. When the linear solver meets a direction of negative curvature or counts negative pivots, or p goes up, the eigenvalues of
   the cells are raised to zero and the system is solved once more (Longva et al. 2023, "Pitfalls of projection"); after a full step the exact one is tried again.
 */
 #include <petsc/private/snesimpl.h> /* PETSc has no public way to write a SNESType */
+#include "sbsolver.h"
 #include "time_impl.h"
 
 #define DECREASE 1e-4  /* c above */
@@ -75,7 +76,7 @@ static PetscErrorCode find_direction(SNES snes, PetscBool *filtered, PetscReal *
   const Vec X = snes->vec_sol, F = snes->vec_func, Y = snes->vec_sol_update;
   const SbModel m = n->run->model;
   KSPConvergedReason reason;
-  PetscInt iterations;
+  PetscInt iterations, negative;
 
   PetscFunctionBeginUser;
   for (;;) {
@@ -88,10 +89,16 @@ static PetscErrorCode find_direction(SNES snes, PetscBool *filtered, PetscReal *
     snes->linear_its += iterations;
     PetscCall(VecDot(F, Y, slope));
     *slope = -*slope;
-    if ((reason > 0 && *slope < 0.) || *filtered || !m->may_filter) break;
+    if (*filtered || !m->may_filter) break;
+    /* L D L^T factors what is not definite without a word, and p may go down on the way to a saddle point */
+    negative = -1;
+    if (reason > 0 && *slope < 0.) PetscCall(SbSolverNegative(snes, m->space, &negative));
+    if (reason > 0 && *slope < 0. && negative <= 0) break;
     PetscCall(PetscInfo(snes,
-                        "iteration %" PetscInt_FMT ": the exact tangent is not definite (%s, slope %g J)\n",
-                        snes->iter, KSPConvergedReasons[reason], (double)*slope));
+                        "iteration %" PetscInt_FMT
+                        ": the exact tangent is not definite (%s, slope %g J, %" PetscInt_FMT
+                        " negative eigenvalues)\n",
+                        snes->iter, KSPConvergedReasons[reason], (double)*slope, negative));
     *filtered = PETSC_TRUE;
   }
   if (reason < 0) snes->reason = SNES_DIVERGED_LINEAR_SOLVE;
