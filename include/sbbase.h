@@ -99,7 +99,13 @@ PetscErrorCode SbOptionsUnused(MPI_Comm comm, PetscInt *n);
 /* The complete scenario as an option file that runs again: every option of ours read so far with its value, help as
    comment, then the PETSc options that the user gave. Collective; rank 0 writes. */
 PetscErrorCode SbOptionsView(PetscViewer viewer);
-PetscErrorCode SbOptionsHelp(MPI_Comm comm);                       /* the manual for -help, from the table */
+/*
+  SbOptionsHelp - the manual for -help, from the table.
+
+  Collective; rank 0 prints. topic: "": how to run it, a first scene, the topics; "all": everything; else a class, a type, the first word of
+  options, or a word in their names and texts. Errors: PETSC_ERR_USER for a word that no option holds.
+*/
+PetscErrorCode SbOptionsHelp(MPI_Comm comm, const char *topic);
 PetscErrorCode SbOptionsMarkdown(MPI_Comm comm, const char *file); /* docs/options.md, from the table */
 /* ASCII viewer on a file, or on standard output when file is "" or "-"; that it cannot be written is an error on every rank. Collective. */
 PetscErrorCode SbViewerOpen(MPI_Comm comm, const char *file, PetscViewer *viewer);

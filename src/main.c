@@ -18,7 +18,7 @@ static PetscErrorCode answer(const SbCommand *command, PetscBool *answered)
   PetscFunctionBeginUser;
   *answered = PETSC_TRUE;
   if (command->help) {
-    PetscCall(SbOptionsHelp(PETSC_COMM_WORLD));
+    PetscCall(SbOptionsHelp(PETSC_COMM_WORLD, command->topic));
   } else if (command->version) {
     PetscCall(PetscGetVersion(petsc, sizeof(petsc)));
     PetscCall(PetscPrintf(PETSC_COMM_WORLD, "supple %s\n%s\n", SB_VERSION, petsc));
@@ -98,6 +98,7 @@ static PetscErrorCode supple(int argc, char *argv[])
 {
   SbCommand command;
   static Scene scene; /* an error that ends the program asks for it */
+  const PetscBool bare = (PetscBool)(argc < 2);
   PetscBool answered, left;
   PetscInt unused;
 
@@ -116,6 +117,8 @@ static PetscErrorCode supple(int argc, char *argv[])
   PetscCall(SbErrorSetFromOptions());
   for (PetscInt i = 0; i < command.nfile; i++) PetscCall(SbOptionsFile(PETSC_COMM_WORLD, command.file[i]));
 
+  if (bare)
+    PetscCall(SbOptionsHelp(PETSC_COMM_WORLD, "")); /* and then the error that there is nothing to run */
   PetscCall(answer(&command, &answered));
   if (!answered) {
     PetscCall(read_scenario(&scene));

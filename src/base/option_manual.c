@@ -1,9 +1,22 @@
 /*
-  option_manual.c - the reference manual from the table of options: for the terminal (-help) and as docs/options.md.
+  option_manual.c - the reference manual from the table of options: for the terminal (-help TOPIC) and as docs/options.md.
 
-  Blocks are told by class in the order of registration: first what every instance of the class has, then each type.
+  Blocks come by class, the run and the bodies first: what every instance of the class has, then each type. A topic is a class (body), a
+  type (pressure), the first word of options (solver), or any word in their names and texts.
 */
 #include "option.h"
+
+#define USAGE                                    \
+  "  supple SCENARIO.opts [-option value ...]\n" \
+  "  mpirun -n 4 supple SCENARIO.yml [-option value ...]\n"
+
+/* What a first scenario is made of: [class, type, key]. */
+static const char *const first_options[][3] = {
+  {"", "", "bodies"},      {"body", "", "mesh"},    {"body", "", "material"}, {"body", "", "young"},
+  {"body", "", "poisson"}, {"body", "", "density"}, {"body", "", "element"},  {"", "", "effects"},
+  {"effect", "", "type"},  {"effect", "", "on"},    {"", "", "time"},         {"", "", "ts_dt"},
+  {"", "", "ts_max_time"}, {"", "", "solver"},      {"", "", "output_dir"},
+};
 
 /* What the value looks like: "3 numbers", "euler_implicit|newmark". */
 static PetscErrorCode describe_value(const SbOption *row, size_t size, char text[])
@@ -118,20 +131,51 @@ static PetscErrorCode headline(PetscViewer viewer, const SbOptionBlock *block, P
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* All blocks of a class and type under one headline. */
-static PetscErrorCode print_type(PetscViewer viewer, const SbOptionBlock *first, PetscBool markdown)
+/* Whether a text holds the word, in capitals or not. */
+static PetscBool holds(const char *text, const char *word)
 {
+  return (PetscBool)(strcasestr(text, word) != NULL);
+}
+
+/* How well an option answers a topic: 3: its class or type, 2: its first word, 1: a word in its name or text, 0: not. */
+static PetscErrorCode answers(const SbOptionBlock *block, const SbOption *row, const char *topic, int *how)
+{
+  const size_t n = strlen(topic);
+  char name[SB_OPTION_NAME_MAX];
+
   PetscFunctionBeginUser;
-  PetscCall(headline(viewer, first, markdown));
+  PetscCall(SbOptionManualName(block, row, sizeof(name), name));
+  *how = 0;
+  if (!strcasecmp(block->klass[0] ? block->klass : "run", topic) || !strcasecmp(block->type, topic))
+    *how = 3;
+  else if (!block->klass[0] && !strncasecmp(row->key, topic, n) && (!row->key[n] || row->key[n] == '_'))
+    *how = 2;
+  else if (holds(name, topic) || holds(row->help, topic) || holds(row->range, topic))
+    *how = 1;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The options of a class and type that answer the topic at least so well, under one headline; *n += how many. */
+static PetscErrorCode print_type(PetscViewer viewer, const SbOptionBlock *first, const char *topic, int least,
+                                 PetscBool markdown, PetscInt *n)
+{
+  PetscInt printed = 0;
+  int how = 0;
+
+  PetscFunctionBeginUser;
   for (const SbOptionBlock *b = first; b < SbTheOptions.block + SbTheOptions.nblock; b++) {
     if (strcmp(b->klass, first->klass) || strcmp(b->type, first->type)) continue;
     for (PetscInt i = 0; i < b->n; i++) {
+      PetscCall(answers(b, &b->rows[i], topic, &how));
+      if (how < least) continue;
+      if (!printed++) PetscCall(headline(viewer, first, markdown));
       if (markdown)
         PetscCall(markdown_row(viewer, b, &b->rows[i]));
       else
         PetscCall(help_row(viewer, b, &b->rows[i]));
     }
   }
+  *n += printed;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -144,57 +188,130 @@ static PetscBool is_first(PetscInt i, PetscBool by_type)
   return PETSC_TRUE;
 }
 
-static PetscErrorCode print_manual(PetscViewer viewer, PetscBool markdown)
+/* All options that answer the topic at least so well; n: how many. */
+static PetscErrorCode print_manual(PetscViewer viewer, const char *topic, int least, PetscBool markdown,
+                                   PetscInt *n)
 {
-  PetscFunctionBeginUser;
-  for (PetscInt i = 0; i < SbTheOptions.nblock; i++) {
-    const char *klass = SbTheOptions.block[i].klass;
+  static const char *const order[] = {"", "body", "effect"}; /* then as they were registered */
+  const PetscInt nordered = PETSC_STATIC_ARRAY_LENGTH(order);
 
-    if (!is_first(i, PETSC_FALSE)) continue;
+  PetscFunctionBeginUser;
+  *n = 0;
+  for (PetscInt i = -nordered; i < SbTheOptions.nblock; i++) {
+    const char *klass = i < 0 ? order[i + nordered] : SbTheOptions.block[i].klass;
+    PetscBool seen = PETSC_FALSE;
+
+    for (PetscInt k = 0; i >= 0 && k < nordered; k++) seen = (PetscBool)(seen || !strcmp(order[k], klass));
+    if (seen || (i >= 0 && !is_first(i, PETSC_FALSE))) continue;
     /* what all instances have comes before what one type has */
     for (int typed = 0; typed < 2; typed++) {
-      for (PetscInt j = i; j < SbTheOptions.nblock; j++) {
+      for (PetscInt j = 0; j < SbTheOptions.nblock; j++) {
         const SbOptionBlock *b = &SbTheOptions.block[j];
 
         if (!strcmp(b->klass, klass) && (b->type[0] != 0) == typed && b->n && is_first(j, PETSC_TRUE))
-          PetscCall(print_type(viewer, b, markdown));
+          PetscCall(print_type(viewer, b, topic, least, markdown, n));
       }
     }
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbOptionsHelp(MPI_Comm comm)
+/* Topics that have options of their own: classes and their types, first words that several options of the run share. */
+static PetscErrorCode print_topics(PetscViewer viewer)
 {
+  char word[SB_NAME_MAX], words[1024] = " ";
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscViewerASCIIPrintf(viewer, "\nTopics of -help\n"));
+  for (PetscInt i = 0; i < SbTheOptions.nblock; i++) {
+    const SbOptionBlock *b = &SbTheOptions.block[i];
+
+    for (PetscInt k = 0; !b->klass[0] && k < b->n; k++) {
+      const size_t n = strcspn(b->rows[k].key, "_");
+
+      PetscCall(PetscSNPrintf(word, sizeof(word), " %.*s ", (int)n, b->rows[k].key));
+      if (!strstr(words, word)) PetscCall(PetscStrlcat(words, word + 1, sizeof(words)));
+    }
+  }
+  PetscCall(PetscViewerASCIIPrintf(viewer, "  run:%s", words));
+  for (PetscInt i = 0; i < SbTheOptions.nblock; i++) {
+    const SbOptionBlock *b = &SbTheOptions.block[i];
+
+    if (!b->klass[0] || !is_first(i, PETSC_FALSE)) continue;
+    PetscCall(PetscViewerASCIIPrintf(viewer, "\n  %s:", b->klass));
+    for (PetscInt j = i; j < SbTheOptions.nblock; j++) {
+      const SbOptionBlock *t = &SbTheOptions.block[j];
+
+      if (!strcmp(t->klass, b->klass) && t->type[0] && is_first(j, PETSC_TRUE))
+        PetscCall(PetscViewerASCIIPrintf(viewer, " %s", t->type));
+    }
+  }
+  PetscCall(PetscViewerASCIIPrintf(viewer,
+                                   "\n  any other word: the options whose name or text holds it\n"
+                                   "  all: everything; petsc: a run that lists PETSc's own options\n"));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* How to run it, what a first scenario needs, and where the rest is. */
+static PetscErrorCode print_usage(PetscViewer viewer)
+{
+  PetscFunctionBeginUser;
+  PetscCall(PetscViewerASCIIPrintf(viewer, "supple %s - soft bodies by finite elements on PETSc\n\n%s",
+                                   SB_VERSION, USAGE));
+  PetscCall(PetscViewerASCIIPrintf(
+    viewer,
+    "  supple -help [TOPIC]\n\nSI units. The last value given wins. Scenarios to start from: scenarios/\n\n"
+    "A first scene\n"));
+  for (size_t k = 0; k < PETSC_STATIC_ARRAY_LENGTH(first_options); k++) {
+    const char *const *o = first_options[k];
+
+    for (PetscInt i = 0; i < SbTheOptions.nblock; i++) {
+      const SbOptionBlock *b = &SbTheOptions.block[i];
+      const SbOption *row = NULL;
+
+      if (strcmp(b->klass, o[0]) || strcmp(b->type, o[1])) continue;
+      for (PetscInt r = 0; r < b->n && !row; r++) row = strcmp(b->rows[r].key, o[2]) ? NULL : &b->rows[r];
+      if (row) PetscCall(help_row(viewer, b, row));
+    }
+  }
+  PetscCall(print_topics(viewer));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbOptionsHelp(MPI_Comm comm, const char *topic)
+{
+  const PetscBool all = (PetscBool)!strcasecmp(topic, "all");
   PetscViewer viewer;
+  PetscInt n = 0;
 
   PetscFunctionBeginUser;
   PetscCall(SbViewerOpen(comm, "", &viewer));
-  PetscCall(
-    PetscViewerASCIIPrintf(viewer, "supple %s - soft bodies by finite elements on PETSc\n\n", SB_VERSION));
-  PetscCall(PetscViewerASCIIPrintf(viewer, "  supple SCENARIO.opts [-option value ...]\n"));
-  PetscCall(PetscViewerASCIIPrintf(viewer, "  mpirun -n 4 supple SCENARIO.yml\n\n"));
-  PetscCall(PetscViewerASCIIPrintf(
-    viewer, "The last value given wins. SI units. -help petsc lists PETSc's own options.\n"));
-  PetscCall(print_manual(viewer, PETSC_FALSE));
+  if (!topic[0] || all) PetscCall(print_usage(viewer));
+  if (all) PetscCall(print_manual(viewer, "", 0, PETSC_FALSE, &n));
+  /* the best kind of answer that there is */
+  for (int least = 3; topic[0] && !n && least > 0; least--)
+    PetscCall(print_manual(viewer, topic, least, PETSC_FALSE, &n));
   PetscCall(PetscViewerDestroy(&viewer));
+  PetscCheck(n || !topic[0], comm, PETSC_ERR_USER,
+             "-help %s: no option has this word in its name or text; supple -help lists the topics", topic);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode SbOptionsMarkdown(MPI_Comm comm, const char *file)
 {
   PetscViewer viewer;
+  PetscInt n;
 
   PetscFunctionBeginUser;
   PetscCall(SbViewerOpen(comm, file, &viewer));
   PetscCall(
     PetscViewerASCIIPrintf(viewer,
                            "# Options of supple %s\n\nMade by `supple -options_markdown docs/options.md` "
-                           "from the table in the source; `supple -help` prints the same.\n",
+                           "from the table in the source; `supple -help all` prints the same.\n",
                            SB_VERSION));
   PetscCall(PetscViewerASCIIPrintf(
     viewer, "SI units. The last value given wins. Options of PETSc can be given as well.\n"));
-  PetscCall(print_manual(viewer, PETSC_TRUE));
+  PetscCall(print_manual(viewer, "", 0, PETSC_TRUE, &n));
   PetscCall(PetscViewerDestroy(&viewer));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

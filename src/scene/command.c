@@ -11,7 +11,8 @@
 
 static const SbOption rows[] = {
   {"help", SB_OPTION_BOOL, 1, "", "false", "",
-   "this list, and nothing else; `-help petsc` runs and lists PETSc's own options"},
+   "how to run it and the topics, or the options of a topic, and nothing else; -help all: every option; "
+   "-help petsc runs and lists PETSc's own"},
   {"version", SB_OPTION_BOOL, 1, "", "false", "", "the versions of supple and of PETSc, and nothing else"},
   {"options_file", SB_OPTION_STRING, 1, "", "", "",
    "the scenario, .opts or .yml; its name can also be the first word of the command line"},
@@ -68,6 +69,7 @@ static PetscBool take_option(const char *name, const char *value, SbCommand *com
   if (is_one_of(name, "-help", "--help") || !strcmp(name, "-h")) {
     if (value && !strcasecmp(value, "petsc")) return PETSC_TRUE;
     command->help = PETSC_TRUE;
+    (void)snprintf(command->topic, sizeof(command->topic), "%s", value ? value : "");
     return PETSC_FALSE;
   }
   if (is_one_of(name, "-version", "--version")) {

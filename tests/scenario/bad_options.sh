@@ -174,6 +174,13 @@ check "bodies that are apart were looked at" grep -q 'meet: no bodies came near 
 check "-version" grep -q '^supple [0-9]' <<<"$("$supple" -version)"
 check "-help | head" test "$("$supple" -help 2>&1 | head -n 1 | cut -c 1-7)" = "supple "
 check "-help lacks -body_<name>_young" grep -qF -- '-body_<name>_young' <<<"$("${mpi[@]}" 2 "$supple" -help)"
+check "-help body has options of effects" test "$("$supple" -help body | grep -c -- '-effect_<name>_')" = 0
+check "-help solver" test "$("$supple" -help solver | grep -c '^  -')" = 1
+check "-help friction lacks -effect_<name>_friction" grep -qF -- '-effect_<name>_friction:' <<<"$("$supple" -help friction)"
+check "-help all is shorter than the table" test "$("$supple" -help all | grep -c '^  -')" -gt 140
+error 1 "-help nonsense" -help nonsense
+check "nothing at all prints no usage" grep -q 'supple SCENARIO.opts' <<<"$("$supple" 2>nothing.txt)"
+check "nothing at all is no error" grep -q '^supple: error: -bodies' nothing.txt
 "$supple" -options_markdown options.md && check "-options_markdown" grep -qF -- "-ts_dt" options.md
 
 finish
