@@ -151,7 +151,7 @@ sanitize: deps ## unit tests under the address and undefined-behaviour sanitizer
 
 # The readers need nothing above layers 0 and 1. MPI's compiler is told to call clang.
 FUZZ    := -O1 -g -fno-omit-frame-pointer -fsanitize=fuzzer-no-link,address,undefined -fno-sanitize-recover=undefined
-FUZZOBJ  = $(filter $(foreach folder,format skin mesh base,$(BUILD)/src/$(folder)/%),$(OBJ))
+FUZZOBJ  = $(filter $(foreach folder,meshio surface mesh geometry base,$(BUILD)/src/$(folder)/%),$(OBJ))
 $(BUILD)/tests/fuzz/fuzz: $(BUILD)/tests/fuzz/fuzz.o $(FUZZOBJ)
 	$(SAY) "  link     $@"
 	$(Q)$(LINK) -fsanitize=fuzzer -o $@ $^ $(LIBS) $(RPATH)

@@ -72,7 +72,7 @@ PetscErrorCode SbOptionChoice(const SbScope *scope, const char *key,
 PetscErrorCode SbOptionGiven(const SbScope *scope, const char *key, PetscBool *given); /* by the user */
 
 /* Reads and checks a value that is asked for only later, when much has been computed already. */
-PetscErrorCode SbOptionAhead(const SbScope *scope, const char *key);
+PetscErrorCode SbOptionCheckEarly(const SbScope *scope, const char *key);
 /* Whether the scope has a row with this key. */
 PetscErrorCode SbOptionExists(const SbScope *scope, const char *key, PetscBool *exists);
 /* SbOptionGiven() alone does not count as reading for SbOptionsView(): read the value too. */
@@ -81,7 +81,7 @@ PetscErrorCode SbOptionExists(const SbScope *scope, const char *key, PetscBool *
 PetscErrorCode SbOptionName(const SbScope *scope, const char *key, size_t size, char name[]);
 
 /*
-  SbOptionsCheck - looks at the options of ours that nobody read. One that exists and is of no use in this run is warned of, with the reason; one that does
+  SbOptionsCheck - examines the options of ours that nobody read. One that exists and is of no use in this run is warned of, with the reason; one that does
   not exist ends the run, with the nearest names.
   Ours: every name that begins with the prefix of a class (body_, set_, effect_) or equals, or is within two edits of,
   a program-wide option of ours and does not belong to PETSc. Of an instance that was not read an option exists when the class has its key and SbOptionsFile() found the
@@ -111,9 +111,10 @@ PetscErrorCode SbOptionsMarkdown(MPI_Comm comm, const char *file); /* docs/optio
 PetscErrorCode SbViewerOpen(MPI_Comm comm, const char *file, PetscViewer *viewer);
 PetscErrorCode SbOptionsReset(void); /* forgets what was read and registered; at exit and in tests */
 
-/* SbNearest - the names of `n` candidates closest to `word` by edit distance, joined by " or "; "" when none is near. NULL
+/* SbNearestNames - the names of `n` candidates closest to `word` by edit distance, joined by " or "; "" when none is near. NULL
    among the names is passed over: PetscFunctionListGet() counts its closing one. */
-PetscErrorCode SbNearest(const char *word, PetscInt n, const char *const names[], size_t size, char text[]);
+PetscErrorCode SbNearestNames(const char *word, PetscInt n, const char *const names[], size_t size,
+                              char text[]);
 
 /* ------------------------------------------------------------------ errors and warnings */
 
@@ -132,7 +133,7 @@ void SbErrorSetFile(const char *file);
 /* An error line at the end of a run whose calls all succeeded: a solver gave up, the output is complete. A printf format. */
 void SbErrorPost(const char *format, ...) PETSC_ATTRIBUTE_FORMAT(1, 2);
 /* What one rank does when the run fails, before the error line: with PETSc as it was left, no communication. NULL: nothing. */
-void SbErrorSetFarewell(void (*farewell)(const char *message, void *ctx), void *ctx);
+void SbErrorSetFailureHandler(void (*failure_handler)(const char *message, void *ctx), void *ctx);
 /*
   SbErrorFinish - last call of main() on every rank: `supple: error: ...` on stderr, once for the run; then MPI_Finalize(),
   or MPI_Abort() when other ranks do not arrive within a few seconds. Returns the exit code, non-zero on all ranks when
@@ -143,8 +144,8 @@ int SbErrorFinish(PetscErrorCode ierr);
 typedef struct {
   int code;
   char text[1024];
-} SbCaught;
-/* For PetscPushErrorHandler(), ctx an SbCaught: keeps the message. An error that is not the user's is also printed with its trace. */
+} SbCaughtError;
+/* For PetscPushErrorHandler(), ctx an SbCaughtError: keeps the message. An error that is not the user's is also printed with its trace. */
 PetscErrorCode SbCatchError(MPI_Comm comm, int line, const char *function, const char *file,
                             PetscErrorCode code, PetscErrorType kind, const char *text, void *ctx);
 /* One line `supple: warning: ...` on stderr by rank 0 of comm; a printf format without newline. Collective. */
@@ -200,7 +201,7 @@ typedef enum {
   SB_EVENT_CONTACT,
   SB_EVENT_SEARCH,  /* within it: points against facets, on all ranks */
   SB_EVENT_INSIDE,  /* within it: points against tets */
-  SB_EVENT_PROJECT, /* within solves: into the null space of the rows of contact */
+  SB_EVENT_PROJECT, /* within solves: into the null space of the contact constraints */
   SB_EVENT_SOLVER_SETUP,
   SB_EVENT_OUTPUT,
   SB_EVENT_CHECKPOINT,

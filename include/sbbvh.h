@@ -11,7 +11,7 @@ typedef struct {
 } SbBvhCounts;
 
 /*
-  SbBvhSet - other volumes, bounded by k planes: 6 (a box, the default) or 14; the next call builds the tree anew.
+  SbBvhSet - other volumes, bounded by k planes: 6 (a box, the default) or 14; the next call builds the tree again.
 
   Not collective.
   Errors: PETSC_ERR_ARG_OUTOFRANGE for another k, PETSC_ERR_ARG_WRONG for another kind of detector.

@@ -35,7 +35,7 @@ PetscErrorCode SbObstacleSetUp(SbObstacle obstacle, MPI_Comm comm, const char *o
 /*
   SbObstacleDistance - signed distance of a point from the obstacle at rest, m, negative inside, and the unit outward normal
   at the nearest point of its surface. Where the nearest point is not unique (centre of a sphere), one of them. A mesh: is
-  exact near its surface, elsewhere of the right sign (src/contact/shell.c). Not collective.
+  exact near its surface, elsewhere of the right sign (src/contact/signed_distance.c). Not collective.
 */
 PetscReal SbObstacleDistance(SbObstacle obstacle, const PetscReal x[3], PetscReal normal[3]);
 

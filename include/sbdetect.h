@@ -1,12 +1,13 @@
 /*
   sbdetect.h - layer 3: where the surfaces of bodies come near each other.
 
-  A surface is a set of triangles. What looks for it are points: the nodes that carry a surface, vertices of P1 and
-  centroids of boundary faces of CR and DG. SbSurface brings to each rank what its points may meet; a detector then is
+  A surface is a set of triangles. What searches for it are points: the nodes that carry a surface, vertices of P1 and
+  centroids of boundary faces of CR and DG. SbContactSurface brings to each rank what its points may meet; a detector then is
   geometry alone: arrays in, arrays out, no communication.
 */
 #pragma once
 #include "sbfem.h"
+#include "sbgeometry.h"
 
 /*
   Edges between two facets of one part. The first two corners are its ends, counter-clockwise in that of its facets with the lower identity; the
@@ -29,7 +30,7 @@ typedef struct {
   PetscInt ncorner;
   const PetscReal *x; /* [ncorner][3] where the corners are, m */
   const PetscReal
-    *x0; /* [ncorner][3] where they were at the start of the step, m; NULL: motion is not looked at */
+    *x0; /* [ncorner][3] where they were at the start of the step, m; NULL: motion is not examined */
   const PetscReal *X; /* [ncorner][3] rest position, m */
   PetscInt nfacet;
   const PetscInt *facet; /* [nfacet][3] corners, counter-clockwise seen from outside */
@@ -43,7 +44,7 @@ typedef struct {
   const PetscReal *p, *p0, *P; /* [npoint][3] like x, x0, X */
   const PetscReal *p_normal;   /* [npoint][3] outward unit normal of the point's own surface now */
   const PetscReal *
-    p_way; /* [npoint][3] unit vectors: the way out of the part `p_way_part` (-1: of none) for points in it; NULL: the
+    p_way; /* [npoint][3] unit vectors: the separation direction of the part `p_way_part` (-1: of none) for points in it; NULL: the
                                   nearest place */
   const PetscInt *p_way_part; /* [npoint] */
   const PetscInt *point_part; /* [npoint] */
@@ -68,7 +69,7 @@ typedef struct {
   PetscReal normal[3];
   PetscReal gap; /* m */
   PetscReal
-    depth; /* how far it is in the part, which is less than -gap where the nearest way out is another one; 0: not, m */
+    depth; /* how far it is in the part, which is less than -gap where the nearest separation direction is another one; 0: not, m */
   PetscBool crossed; /* found by its motion: within the step it went through the facet */
 } SbNear;
 
@@ -87,7 +88,7 @@ typedef struct {
   PetscBool crossed; /* found by its motion: within the step the edges went through each other */
 } SbEdgePair;
 
-/* How far from a point facets are looked for, m. */
+/* How far from a point facets are searched for, m. */
 static inline PetscReal SbDetectRange(const SbDetectScene *s)
 {
   return PetscMax(s->reach, s->deep);
@@ -95,15 +96,15 @@ static inline PetscReal SbDetectRange(const SbDetectScene *s)
 
 typedef enum { SB_DETECT_HASH, SB_DETECT_BVH, SB_DETECT_BRUTE } SbDetectKind;
 typedef struct {
-  PetscInt64 candidates; /* pairs of point and facet that were looked at closely */
+  PetscInt64 candidates; /* pairs of point and facet that were examined */
   PetscInt found;
-  PetscInt64 memory; /* bytes held by the search structure */
-  PetscInt rebuilt;  /* how often it was built anew, of all calls so far */
+  PetscInt64 memory; /* bytes constrained by the search structure */
+  PetscInt rebuilt;  /* how often it was rebuilt, of all calls so far */
   char text[256];    /* what the detector says of itself: cell size, table, tree */
 } SbDetectStats;
 
 typedef struct _p_SbDetector *SbDetector;
-/* Not collective. What each kind does is told in its file in src/contact. */
+/* Not collective. What each kind does is described in its file in src/contact. */
 PetscErrorCode SbDetectorCreate(SbDetectKind kind, SbDetector *detector);
 PetscErrorCode SbDetectorDestroy(SbDetector *detector);
 /*
@@ -129,23 +130,17 @@ PetscErrorCode SbDetectorFind(SbDetector detector, const SbDetectScene *scene, P
 */
 PetscErrorCode SbDetectorFindEdges(SbDetector detector, const SbDetectScene *scene, PetscInt *n,
                                    const SbEdgePair **pair);
-/*
-  SbRayMeets - where the half-line p + t way meets a triangle.
 
-  Not collective. Output: t >= 0, in lengths of way; weight[3] of the corners; out, whether it leads from the back to the front.
-*/
-PetscBool SbRayMeets(const PetscReal p[3], const PetscReal way[3], const PetscReal *const x[3], PetscReal *t,
-                     PetscReal weight[3], PetscBool *out);
 PetscErrorCode SbDetectorGetStats(SbDetector detector, SbDetectStats *stats);
 
 /*
-  SbSurface - the surfaces that may meet, distributed: the scene of this rank, and which nodes its points and facets belong to.
+  SbContactSurface - the surfaces that may meet, distributed: the scene of this rank, and which nodes its points and facets belong to.
   Own corners, facets and points come first, then the facets of other ranks that are near points or edges of this one.
 
   Each edge is owned by one rank: with P1 by the owner of that of its vertices with the lower identity, else by the owner of its first
   facet. The pairs that a rank finds are those of its own edges.
 */
-typedef struct _p_SbSurface *SbSurface;
+typedef struct _p_SbSurface *SbContactSurface;
 struct _p_SbSurface {
   SbSpace space; /* borrowed */
   SbDetectScene scene;
@@ -160,36 +155,37 @@ struct _p_SbSurface {
   PetscReal *edge_weight;  /* [nedge][2][4] like facet_weight, of its ends */
   PetscInt *
     edge_carrier; /* [edges->nown][2] global numbers of the nodes of its ends with P1, of its two facets with CR and DG */
-  PetscInt *edge_facet; /* [edges->nown] the first facet, as one of those given to SbSurfaceCreate() */
+  PetscInt *edge_facet; /* [edges->nown] the first facet, as one of those given to SbContactSurfaceCreate() */
   PetscReal size;       /* of all bodies at rest, m */
   PetscReal edge;       /* mean rest edge of all facets, m */
   void *data;           /* private */
 };
 /*
-  SbSurfaceCreate - from boundary facets as SbEffectFacets() gives them (of owned and ghost cells; copied). Collective.
+  SbContactSurfaceCreate - from boundary facets as SbEffectFacets() gives them (of owned and ghost cells; copied). Collective.
   A part is a body; own facets are those of owned cells.
 */
-PetscErrorCode SbSurfaceCreate(SbSpace space, PetscInt n, const SbFacet facet[], SbSurface *surface);
-PetscErrorCode SbSurfaceDestroy(SbSurface *surface);
+PetscErrorCode SbContactSurfaceCreate(SbSpace space, PetscInt n, const SbFacet facet[],
+                                      SbContactSurface *surface);
+PetscErrorCode SbContactSurfaceDestroy(SbContactSurface *surface);
 /*
-  SbSurfaceUpdate - moves corners and points to the local displacements u (m) and, when u0 is not NULL, those at the start of the step,
+  SbContactSurfaceUpdate - moves corners and points to the local displacements u (m) and, when u0 is not NULL, those at the start of the step,
   and brings the facets of other ranks that may come within `reach` of own points or own edges. Collective.
 
   Output: close, whether two parts' boxes (swept, and grown by the reach) meet anywhere, the same on all ranks; when not, and no self-contact
   is wanted, nothing but the boxes has been exchanged and the scene holds no facets of others.
   The list of facets from other ranks is kept while nothing has moved by more than half the margin it was made with.
 */
-PetscErrorCode SbSurfaceUpdate(SbSurface surface, const PetscReal u0[], const PetscReal u[], PetscReal reach,
-                               PetscBool self, PetscBool *close);
+PetscErrorCode SbContactSurfaceUpdate(SbContactSurface surface, const PetscReal u0[], const PetscReal u[],
+                                      PetscReal reach, PetscBool self, PetscBool *close);
 
 /*
   SbInside - which points of a surface lie in tets of another part or, with `self`, of their own (src/contact/inside.c).
 
   Create: collective; `kind` is SB_DETECT_HASH or SB_DETECT_BRUTE, how points and tets are brought together; the surface is borrowed.
-  Find: collective, after an SbSurfaceUpdate(), for local displacements u (m). Output: part[npoint], the part that a point is in, with the lowest number of several, -1: none.
+  Find: collective, after an SbContactSurfaceUpdate(), for local displacements u (m). Output: part[npoint], the part that a point is in, with the lowest number of several, -1: none.
   Points on the boundary of a body are not in it. In its own part a point is in those tets that were farther from it than twice the reach at rest.
 */
 typedef struct _p_SbInside *SbInside;
-PetscErrorCode SbInsideCreate(SbSurface surface, SbDetectKind kind, SbInside *inside);
+PetscErrorCode SbInsideCreate(SbContactSurface surface, SbDetectKind kind, SbInside *inside);
 PetscErrorCode SbInsideDestroy(SbInside *inside);
 PetscErrorCode SbInsideFind(SbInside inside, const PetscReal u[], PetscBool self, PetscInt part[]);

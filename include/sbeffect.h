@@ -18,14 +18,14 @@ typedef struct {
   PetscReal normal[3]; /* out of what pushes */
   PetscReal gap;       /* m; negative inside */
   PetscReal force[3];  /* on the body that is pushed, with friction, N */
-} SbPlace;
+} SbContactPoint;
 /* Start with {0}; the room is kept when n is set to zero. Release with PetscFree(list->place). */
 typedef struct {
   PetscInt n, size;
-  SbPlace *place; /* [n] */
-} SbPlaces;
+  SbContactPoint *place; /* [n] */
+} SbContactPoints;
 /* Appends one. Not collective. */
-PetscErrorCode SbPlacesAdd(SbPlaces *list, const SbPlace *place);
+PetscErrorCode SbContactPointsAdd(SbContactPoints *list, const SbContactPoint *place);
 
 typedef struct {
   /* reads -effect_<name>_...; scope = {"effect", <type>, <name>}; called once, by SbEffectCreate() */
@@ -37,40 +37,40 @@ typedef struct {
   /* once before each attempt at a step */
   PetscErrorCode (*prestep)(SbEffect e, SbSpace space, PetscReal t, PetscReal dt);
   /* contact, before the first solve of an attempt at a step from t to t + dt: local displacements u0 at t and u as predicted at
-     t + dt, m; v0 are the velocities at t, m/s, NULL unless an effect has `rebound`. Collective. */
-  PetscErrorCode (*touch)(SbEffect e, SbSpace space, PetscReal t, PetscReal dt, const PetscReal u0[],
-                          const PetscReal v0[], const PetscReal u[]);
-  /* writes what contact holds by SbSpaceHold(), and its rows by SbSpaceCoupleRow(). Not collective. */
-  PetscErrorCode (*hold)(SbEffect e, SbSpace space);
+     t + dt, m; v0 are the velocities at t, m/s, NULL unless an effect has `restitution`. Collective. */
+  PetscErrorCode (*begin_step)(SbEffect e, SbSpace space, PetscReal t, PetscReal dt, const PetscReal u0[],
+                               const PetscReal v0[], const PetscReal u[]);
+  /* writes what contact holds by SbSpaceAddNodalConstraint(), and its rows by SbSpaceAddConstraint(). Not collective. */
+  PetscErrorCode (*assemble_constraints)(SbEffect e, SbSpace space);
   /* after a solve, with the residual r without constraints, N: sets `changed` when another solve is needed. Collective. */
-  PetscErrorCode (*settle)(SbEffect e, SbSpace space, const PetscReal u[], const PetscReal r[],
-                           PetscBool *changed);
-  /* after the first solve of an attempt, for effects that want steps cut where points arrive: the part of the step, 0..1, after which
+  PetscErrorCode (*update_active_set)(SbEffect e, SbSpace space, const PetscReal u[], const PetscReal r[],
+                                      PetscBool *changed);
+  /* after the first solve of an attempt, for effects that want steps cut where points come into contact: the part of the step, 0..1, after which
      the first point that was apart before touches, as the motion without it says; 1: none does. This rank's. Not collective. */
-  PetscErrorCode (*arrive)(SbEffect e, PetscReal *part);
-  /* restitution (src/model/rebound.c): the work of the forces on what rebounds, as the last solve has it and in the frame of what it leaves,
+  PetscErrorCode (*time_of_impact)(SbEffect e, PetscReal *part);
+  /* restitution (src/model/restitution.c): the work of the forces on what bounces, as the last solve has it and in the frame of what it leaves,
      J; this rank's. Not collective. */
-  PetscErrorCode (*rebound)(SbEffect e, PetscReal *work);
-  /* its coefficients have `share` left of them in this step, 0..1: what rebounds is held accordingly from now on. Not collective. */
-  PetscErrorCode (*curb)(SbEffect e, PetscReal share);
+  PetscErrorCode (*restitution)(SbEffect e, PetscReal *work);
+  /* its coefficients have `share` left of them in this step, 0..1: what bounces is constrained accordingly from now on. Not collective. */
+  PetscErrorCode (*scale_restitution)(SbEffect e, PetscReal share);
   /* contact, when a step of Newmark that ends at t has been solved: at what speed that moves on which it holds something, at the end, by
-     SbSpaceHoldRate() and SbSpaceCoupleRate(); bodies' rows have none. Not collective. */
-  PetscErrorCode (*rate)(SbEffect e, SbSpace space, const SbStage *stage);
-  /* f[nnode][3] += what contact pushes owned nodes with, N, residual r as for history(). For output only; rows that join nodes add
+     SbSpaceSetNodalConstraintVelocity() and SbSpaceSetConstraintVelocity(); bodies' rows have none. Not collective. */
+  PetscErrorCode (*target_velocity)(SbEffect e, SbSpace space, const SbStage *stage);
+  /* f[nnode][3] += what contact pushes owned nodes with, N, residual r as for history(). For output only; constraints between nodes add
      theirs without it. Not collective. */
-  PetscErrorCode (*push)(SbEffect e, SbSpace space, const SbStage *stage, const PetscReal r[], PetscReal f[]);
+  PetscErrorCode (*contact_force)(SbEffect e, SbSpace space, const SbStage *stage, const PetscReal r[],
+                                  PetscReal f[]);
   /* gap[nnode] of owned nodes, m, and normal[nnode][3] towards them, where something that they may touch is nearer than the gap says so
      far. For output only. Not collective. */
-  PetscErrorCode (*near)(SbEffect e, SbSpace space, const SbStage *stage, PetscReal gap[],
-                         PetscReal normal[]);
+  PetscErrorCode (*gap)(SbEffect e, SbSpace space, const SbStage *stage, PetscReal gap[], PetscReal normal[]);
   /* f[nnode][3] += external force, N; must be right on owned nodes without communication */
   PetscErrorCode (*force)(SbEffect e, SbSpace space, const SbStage *stage, PetscReal f[]);
   /* A -= shift_k d force / d u + shift_v d force / d v by SbSpaceAddCellBlock(), called for (a, b) and for (b, a) */
   PetscErrorCode (*tangent)(SbEffect e, SbSpace space, const SbStage *stage, Mat A);
   /* y[nnode][3] -= shift_k (d force / d u) x, N, of forces whose derivative is far from symmetric and which tangent() leaves out, for the
-     direction x[nnode][3], m; must be right on owned nodes without communication; not with rows that join nodes */
-  PetscErrorCode (*unsymmetric)(SbEffect e, SbSpace space, const SbStage *stage, const PetscReal x[],
-                                PetscReal y[]);
+     direction x[nnode][3], m; must be right on owned nodes without communication; not with constraints between nodes */
+  PetscErrorCode (*nonsymmetric)(SbEffect e, SbSpace space, const SbStage *stage, const PetscReal x[],
+                                 PetscReal y[]);
   /* after a step was accepted */
   PetscErrorCode (*accept)(SbEffect e, SbSpace space, const SbStage *stage);
   /* for checkpoints: what the effect takes from step to step beyond displacement and velocity, as records of `nstate` numbers each, in
@@ -89,10 +89,10 @@ typedef struct {
   PetscErrorCode (*history)(SbEffect e, SbSpace space, const SbStage *stage, const PetscReal residual[],
                             PetscReal values[]);
   /* adds the places where it pushes the bodies, those of this rank, residual as for history(); for output only. Not collective. */
-  PetscErrorCode (*places)(SbEffect e, SbSpace space, const SbStage *stage, const PetscReal residual[],
-                           SbPlaces *list);
+  PetscErrorCode (*contact_points)(SbEffect e, SbSpace space, const SbStage *stage,
+                                   const PetscReal residual[], SbContactPoints *list);
   /* for the summary when a run ends: a line on its work, "": nothing. Collective. */
-  PetscErrorCode (*tell)(SbEffect e, SbSpace space, size_t size, char text[]);
+  PetscErrorCode (*summary)(SbEffect e, SbSpace space, size_t size, char text[]);
   PetscErrorCode (*destroy)(SbEffect e);
 } SbEffectOps;
 
@@ -100,17 +100,18 @@ struct _p_SbEffect {
   char name[SB_NAME_MAX];
   char type[SB_NAME_MAX];
   SbEffectOps ops;
-  PetscLogEvent event; /* SbEff_<type>, around every operation of the table from `setup` to `places` */
-  PetscBool linear;    /* force does not depend on u: the tangent stays constant. Default PETSC_TRUE */
-  PetscBool steady;    /* no formula uses t: a static run multiplies the effect by the load factor */
-  PetscBool dynamic;   /* the run has inertia; known from set-up on */
-  PetscBool saddle;    /* its rows are to be solved with their multipliers as unknowns */
-  PetscBool euler;     /* made for implicit Euler only. Default PETSC_FALSE */
+  PetscLogEvent
+    event;           /* SbEff_<type>, around every operation of the table from `setup` to `contact_points` */
+  PetscBool linear;  /* force does not depend on u: the tangent stays constant. Default PETSC_TRUE */
+  PetscBool steady;  /* no formula uses t: a static run multiplies the effect by the load factor */
+  PetscBool dynamic; /* the run has inertia; known from set-up on */
+  PetscBool saddle;  /* its rows are to be solved with their multipliers as unknowns */
+  PetscBool euler;   /* made for implicit Euler only. Default PETSC_FALSE */
   PetscBool
     springs; /* of contact: it pushes with springs or friction, not by what it holds alone. Default PETSC_FALSE */
-  const struct SbEffectOn_ *held; /* the sets whose nodes it prescribes in all directions; NULL: none */
-  PetscInt nstate;                /* numbers in a record of save() */
-  PetscInt ncolumn;               /* history columns, known after set-up */
+  const struct SbEffectOn_ *prescribed; /* the sets whose nodes it prescribes in all directions; NULL: none */
+  PetscInt nstate;                      /* numbers in a record of save() */
+  PetscInt ncolumn;                     /* history columns, known after set-up */
   const char *const
     *column;      /* [ncolumn] "force_x", ...; written as <name>_<column>; owned by the type or by `data` */
   char note[256]; /* what set-up has to say in the run's report; "": nothing */
@@ -142,11 +143,11 @@ PetscErrorCode SbEffectRegister(const char *type, PetscErrorCode (*create)(SbEff
 PetscErrorCode SbEffectCreate(const char *name, SbEffect *e);
 PetscErrorCode SbEffectDestroy(SbEffect *e); /* sets *e to NULL; NULL is accepted */
 /*
-  SbEffectMarkHeld - marks the sets that the effect holds in all directions (SbSet.held), for the space to be made.
+  SbEffectMarkPrescribed - marks the sets that the effect holds in all directions (SbSet.held), for the space to be made.
 
   Not collective. Call it for every effect between SbMeshCreate() and SbSpaceCreate(). Names without a set are left to set-up.
 */
-PetscErrorCode SbEffectMarkHeld(SbEffect e, PetscInt nset, SbSet set[]);
+PetscErrorCode SbEffectMarkPrescribed(SbEffect e, PetscInt nset, SbSet set[]);
 
 /* Constructors, one per file in src/effect/. */
 PetscErrorCode SbEffectRegister_Gravity(void);
@@ -154,8 +155,8 @@ PetscErrorCode SbEffectRegister_BodyForce(void);
 PetscErrorCode SbEffectRegister_Traction(void);
 PetscErrorCode SbEffectRegister_Pressure(void);
 PetscErrorCode SbEffectRegister_PointForce(void);
-PetscErrorCode SbEffectRegister_Support(void);
-PetscErrorCode SbEffectRegister_Drive(void);
+PetscErrorCode SbEffectRegister_Fixed(void);
+PetscErrorCode SbEffectRegister_PrescribedDisplacement(void);
 PetscErrorCode SbEffectRegister_Damping(void);
 PetscErrorCode SbEffectRegister_Contact(void);
 PetscErrorCode SbEffectRegister_Collision(void);
@@ -195,7 +196,7 @@ PetscErrorCode SbEffectFreeOn(SbEffectOn *on);
   nothing of the kind, with what it does select.
 
   SbEffectFacets - boundary facets of owned and ghost cells.
-  SbEffectNodes  - nodes that can be held, ascending, owned ones first. An error for a body with nodes at faces of which the
+  SbEffectNodes  - nodes that can be constrained, ascending, owned ones first. An error for a body with nodes at faces of which the
                    sets hold vertices but no face.
   SbEffectVertices - vertices of the mesh, ascending, owned ones first.
   SbEffectCells  - cells, ascending, owned ones first; every local cell when no set is named.
@@ -208,7 +209,7 @@ PetscErrorCode SbEffectCells(SbSpace space, const SbEffectOn *on, PetscInt *n, P
 /*
   SbDeadLoad - a force per volume or per area, given by three formulas of time and rest position, integrated against the
   basis functions of the cells or facets that carry it (src/effect/deadload.c). What is kept is one force per node; it is
-  integrated anew only when the formulas use t and t has changed.
+  integrated again only when the formulas use t and t has changed.
 */
 typedef struct _p_SbDeadLoad *SbDeadLoad;
 /*
@@ -232,28 +233,28 @@ PetscErrorCode SbDeadLoadAdd(SbDeadLoad load, PetscReal t, PetscReal factor, Pet
 PetscErrorCode SbDeadLoadDestroy(SbDeadLoad *load);
 
 /*
-  SbHold - unknowns that an effect prescribes. An unknown belongs to the first effect that asks for it, in the order of
+  SbPrescribed - unknowns that an effect prescribes. An unknown belongs to the first effect that asks for it, in the order of
   the scenario; so no two effects write one value, and no reaction is counted twice.
 */
 typedef struct {
   PetscInt n;
   PetscInt *node;      /* [n] local nodes, ascending, owned ones first; owned by this struct */
-  uint8_t *components; /* [n] bit c: component c is held by this effect; owned by this struct */
-  PetscInt *row;       /* [n] index into space->fixed_node; filled by the first SbHoldPrescribe() */
+  uint8_t *components; /* [n] bit c: component c is constrained by this effect; owned by this struct */
+  PetscInt *row;       /* [n] index into space->fixed_node; filled by the first SbPrescribedSetValues() */
   PetscBool have_rows;
   PetscInt nowned;
-} SbHold;
+} SbPrescribed;
 /*
-  SbHoldSetUp - claims `components` (bits 0..2) of the nodes of the named sets. Collective; release with SbHoldFree().
+  SbPrescribedSetUp - claims `components` (bits 0..2) of the nodes of the named sets. Collective; release with SbPrescribedFree().
 
   Errors: PETSC_ERR_USER_INPUT when earlier effects already hold all of them.
 */
-PetscErrorCode SbHoldSetUp(SbHold *hold, SbSpace space, const SbEffectOn *on, int components);
+PetscErrorCode SbPrescribedSetUp(SbPrescribed *hold, SbSpace space, const SbEffectOn *on, int components);
 /* Writes value[n][3] (NULL: zero), m, into space->fixed_value. Not collective; after SbSpaceFixDone(). */
-PetscErrorCode SbHoldPrescribe(SbHold *hold, SbSpace space, const PetscReal value[]);
+PetscErrorCode SbPrescribedSetValues(SbPrescribed *hold, SbSpace space, const PetscReal value[]);
 /* force[3] = sum over the owned held unknowns of the residual: what holds the body, acting on it, N. Not collective. */
-void SbHoldReaction(const SbHold *hold, const PetscReal residual[], PetscReal force[3]);
-PetscErrorCode SbHoldFree(SbHold *hold);
+void SbPrescribedReaction(const SbPrescribed *hold, const PetscReal residual[], PetscReal force[3]);
+PetscErrorCode SbPrescribedFree(SbPrescribed *hold);
 /* Bits of the choice "x|y|z|xy|yz|xz|xyz", by its position. */
-int SbHoldComponents(PetscInt choice);
-#define SB_HOLD_CHOICES "x|y|z|xy|yz|xz|xyz"
+int SbPrescribedComponents(PetscInt choice);
+#define SB_COMPONENT_CHOICES "x|y|z|xy|yz|xz|xyz"

@@ -19,7 +19,7 @@ static const int SbPairB[10] = {0, 1, 2, 3, 1, 2, 3, 2, 3, 3};
 typedef struct _p_SbElement *SbElement;
 typedef struct {
   /* Basis gradients of nodes 1..3 (node 0 has minus their sum) and volumes from vertex positions of one cell.
-     x[4][3] m; g[3][3] row a = grad phi_{a+1}, 1/m; V m^3, negative when the cell is inside out. A cell without volume
+     x[4][3] m; g[3][3] row a = grad phi_{a+1}, 1/m; V m^3, negative when the cell is inverted. A cell without volume
      gives gradients that are not finite: the mesh refuses it before. */
   void (*tabulate)(const PetscReal x[4][3], PetscReal g[3][3], PetscReal *V);
   /* mass of a cell / (density V): lumped share of each node, and consistent M_aa, M_ab */
@@ -45,7 +45,7 @@ PetscErrorCode SbElementRegister(const char *name, PetscErrorCode (*create)(SbEl
                                  const SbOption rows[]);
 PetscErrorCode SbElementRegisterAll(void);
 /*
-  Creates an element by name and reads the options of body (NULL: their defaults; its `type` is not looked at); owned by the
+  Creates an element by name and reads the options of body (NULL: their defaults; its `type` is not examined); owned by the
   caller. Error: PETSC_ERR_USER for an unknown name, and what the option readers refuse.
 */
 PetscErrorCode SbElementCreate(const char *name, const SbScope *body, SbElement *e);

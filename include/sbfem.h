@@ -36,8 +36,8 @@ typedef struct {
   that this rank owns.
 */
 typedef struct _p_SbJump *SbJump;
-typedef struct _p_SbHeld *SbHeld;     /* src/fem/held.c */
-typedef struct _p_SbCouple *SbCouple; /* src/fem/couple.c */
+typedef struct _p_SbHeld *SbNodalConstraints; /* src/fem/nodal_constraint.c */
+typedef struct _p_SbCouple *SbConstraints;    /* src/fem/constraint.c */
 
 typedef struct _p_SbSpace *SbSpace;
 struct _p_SbSpace {
@@ -52,11 +52,12 @@ struct _p_SbSpace {
     node_orig; /* [nnode] number that no partition changes, right on owned nodes: vert_orig of a vertex, Nvert +
                           4 cell_orig + a of node a of a cell, the lower of the two that share it; 4 Ncell more for its support */
   PetscInt *node_body; /* [nnode] */
-  uint64_t *node_set;  /* [nnode] SB_SET_BIT(k) when held with set k: a face with a support is held there */
+  uint64_t *
+    node_set; /* [nnode] SB_SET_BIT(k) when constrained with set k: a face with a support is constrained there */
   PetscBool faces;     /* some body has its nodes at faces; if not, nodes are the mesh's vertices */
   PetscInt *neighbour; /* [ncell][4] local cell across each face, -1: none; NULL without face nodes */
   PetscInt *
-    support; /* [ncell][4] node without mass that a held boundary face of a DG cell is tied to, -1: none; NULL without any */
+    dirichlet_node; /* [ncell][4] node without mass that a held boundary face of a DG cell is tied to, -1: none; NULL without any */
   const SbElement *element;   /* [nbody] borrowed */
   const SbMaterial *material; /* by SbMesh.cell_material; borrowed */
   PetscInt nregion;
@@ -72,10 +73,10 @@ struct _p_SbSpace {
   SbLane
     *batch_weight; /* [nbatch][4] weight of a cell's own node in the mean of the two; NULL when width is 4 */
   SbJump jump;     /* NULL without face nodes */
-  SbHeld held;     /* NULL unless an effect may hold nodes along directions of their own */
-  SbCouple couple; /* NULL unless an effect may join nodes by rows */
-  SbLane *batch_g; /* [nbatch][9] basis gradients of nodes 1..3, 1/m; 64-byte aligned */
-  SbLane *batch_V; /* [nbatch] volumes, m^3; 0 in padding; 64-byte aligned */
+  SbNodalConstraints nodal;  /* NULL unless an effect may hold nodes along directions of their own */
+  SbConstraints constraints; /* NULL unless an effect may join nodes by rows */
+  SbLane *batch_g;           /* [nbatch][9] basis gradients of nodes 1..3, 1/m; 64-byte aligned */
+  SbLane *batch_V;           /* [nbatch] volumes, m^3; 0 in padding; 64-byte aligned */
   void *batch_memory;        /* what batch_g and batch_V live in */
   PetscReal *node_mass;      /* [nnode] lumped mass, kg, complete on owned nodes */
   PetscBool consistent_mass; /* -mass consistent */
@@ -90,7 +91,7 @@ struct _p_SbSpace {
   struct _p_SbPlan *plan; /* cell blocks -> matrix values; NULL before SbSpaceCreateMatrix() */
   PetscReal
     block_scale;    /* factor on blocks of SbSpaceAddCellBlock(): the load factor of a static run, else 1 */
-  PetscBool rough;  /* the solve that contact looks at was a rough one: forces are not to be trusted */
+  PetscBool rough;  /* the solve that contact examines was a rough one: forces are not to be trusted */
   PetscBool linear; /* every region's law is linear */
 };
 
@@ -145,94 +146,90 @@ PetscErrorCode SbSpaceFixDone(SbSpace space);
 PetscInt SbSpaceFixedIndex(SbSpace space, PetscInt node);
 
 /*
-  Nodes held along directions of their own for the moment (contact). SbSpaceHoldCreate() during set-up of an effect that may
-  need it. Then, as often as the directions change: SbSpaceHoldClear(), SbSpaceHold() for owned nodes on each rank,
-  SbSpaceHoldDone() (collective). SbModelPrescribe(), residuals and tangents follow.
+  Nodes constrained along directions of their own for the moment (contact). SbSpaceCreateNodalConstraints() during set-up of an effect that may
+  need it. Then, as often as the directions change: SbSpaceClearNodalConstraints(), SbSpaceAddNodalConstraint() for owned nodes on each rank,
+  SbSpaceAssembleNodalConstraints() (collective). SbModelPrescribe(), residuals and tangents follow.
 */
-PetscErrorCode SbSpaceHoldCreate(SbSpace space);
-void SbSpaceHoldClear(SbSpace space);
+PetscErrorCode SbSpaceCreateNodalConstraints(SbSpace space);
+void SbSpaceClearNodalConstraints(SbSpace space);
 /* n . u = value (m) at an owned node, n of length one. Returns the number of the direction at the node, 0..2, or -1 when the
    node's earlier directions or prescribed unknowns hold it already: nothing is done then. */
-PetscInt SbSpaceHold(SbSpace space, PetscInt node, const PetscReal n[3], PetscReal value);
-PetscErrorCode SbSpaceHoldDone(SbSpace space);
+PetscInt SbSpaceAddNodalConstraint(SbSpace space, PetscInt node, const PetscReal n[3], PetscReal value);
+PetscErrorCode SbSpaceAssembleNodalConstraints(SbSpace space);
 /* u <- (I - Q) u + d, and f <- (I - Q) f, on owned nodes [nnode_owned][3]. Not collective. */
-void SbHeldPrescribe(SbSpace space, PetscReal u[]);
-void SbHeldConstrain(SbSpace space, PetscReal f[]);
-/* Leaves of a residual what the constraints must push with: Q f, and f at prescribed unknowns. */
-void SbHeldReaction(SbSpace space, PetscReal f[]);
+void SbNodalConstraintsPrescribe(SbSpace space, PetscReal u[]);
+void SbNodalConstraintsProject(SbSpace space, PetscReal f[]);
+/* Leaves of a residual what the constraints must exert: Q f, and f at prescribed unknowns. */
+void SbNodalConstraintsReaction(SbSpace space, PetscReal f[]);
 /* Speed along direction k of an owned node at the end of the step, m/s; 0 unless told. Then v <- the nearest velocity with these speeds,
    on owned nodes [nnode_owned][3]. Not collective. */
-void SbSpaceHoldRate(SbSpace space, PetscInt node, PetscInt k, PetscReal rate);
-void SbHeldVelocity(SbSpace space, PetscReal v[]);
+void SbSpaceSetNodalConstraintVelocity(SbSpace space, PetscInt node, PetscInt k, PetscReal rate);
+void SbNodalConstraintsVelocity(SbSpace space, PetscReal v[]);
 /* Force along direction k of an owned node that the residual r (N, unconstrained) there asks for, N. */
-PetscReal SbSpaceHoldForce(SbSpace space, PetscInt node, PetscInt k, const PetscReal r[3]);
+PetscReal SbSpaceGetNodalConstraintForce(SbSpace space, PetscInt node, PetscInt k, const PetscReal r[3]);
 
 /*
-  Rows that join nodes of any rank (contact between bodies, src/fem/couple.c): sum_k coef_k . u_k = value, exactly or by a spring.
+  Rows that join nodes of any rank (contact between bodies, src/fem/constraint.c): sum_k coef_k . u_k = value, exactly or by a spring.
 
-  SbSpaceCoupleCreate() during set-up of an effect that may need them. Then, as often as they change: SbSpaceCoupleClear(), rows on
-  any rank, SbSpaceCoupleDone() (collective). SbModelPrescribe(), residuals and solves follow: solves run in the null space of
-  the exact rows, or find their multipliers as unknowns. oblique: rows may push along other coefficients than those of their sums; then
+  SbSpaceCreateConstraints() during set-up of an effect that may need them. Then, as often as they change: SbSpaceClearConstraints(), rows on
+  any rank, SbSpaceAssembleConstraints() (collective). SbModelPrescribe(), residuals and solves follow: solves run in the null space of
+  the exact constraints, or find their multipliers as unknowns. nonsymmetric: constraints may push along other coefficients than those of their sums; then
   solves are not symmetric.
 */
-/* How solves treat the exact rows: in their null space, or as [K F^T; G 0] by a factorisation or by iterations. */
+/* How solves treat the exact constraints: in their null space, or as [K F^T; G 0] by a factorisation or by iterations. */
 typedef enum { SB_SADDLE_NONE, SB_SADDLE_DIRECT, SB_SADDLE_ITERATIVE } SbSaddle;
-/* outer: rows may hold nodes on something that is no body (those of a negative id), whose forces are reactions. Alike on all ranks. */
-PetscErrorCode SbSpaceCoupleCreate(SbSpace space, PetscBool outer, PetscBool oblique);
+/* external: constraints may hold nodes on something that is no body (those of a negative id), whose forces are reactions. Alike on all ranks. */
+PetscErrorCode SbSpaceCreateConstraints(SbSpace space, PetscBool external, PetscBool nonsymmetric);
 /* Whether there may be such rows. Not collective. */
-PetscBool SbSpaceCoupleOuter(SbSpace space);
+PetscBool SbSpaceHasExternalConstraints(SbSpace space);
 /* Whether solves of this space are not symmetric. Not collective. */
-PetscBool SbSpaceCoupleOblique(SbSpace space);
+PetscBool SbSpaceHasNonsymmetricConstraints(SbSpace space);
 /* Not collective. */
-void SbSpaceCoupleClear(SbSpace space);
+void SbSpaceClearConstraints(SbSpace space);
 /* gnode[n]: global numbers of nodes; coef[n][3] of the sum; push[n][3] of the force, NULL: the same; value in m; id: rows that say nearly
    what those of lower ids say rest, so that no partition changes which; negative: of a node and something that is no body, which rest only
    if they are fully said by others. Output: row, its number on this rank. Not collective. */
-PetscErrorCode SbSpaceCoupleRow(SbSpace space, PetscInt id, PetscInt n, const PetscInt gnode[],
-                                const PetscReal coef[], const PetscReal push[], PetscReal value,
-                                PetscInt *row);
+PetscErrorCode SbSpaceAddConstraint(SbSpace space, PetscInt id, PetscInt n, const PetscInt gnode[],
+                                    const PetscReal coef[], const PetscReal push[], PetscReal value,
+                                    PetscInt *row);
 /* A force of constant + stiffness (value - sum_k coef_k . u_k) along the row, N; stiffness >= 0, N/m. Not collective. */
-PetscErrorCode SbSpaceCoupleSpring(SbSpace space, PetscInt n, const PetscInt gnode[], const PetscReal coef[],
-                                   const PetscReal push[], PetscReal value, PetscReal stiffness,
-                                   PetscReal constant, PetscInt *row);
+PetscErrorCode SbSpaceAddPenaltyConstraint(SbSpace space, PetscInt n, const PetscInt gnode[],
+                                           const PetscReal coef[], const PetscReal push[], PetscReal value,
+                                           PetscReal stiffness, PetscReal constant, PetscInt *row);
 /* The spring holds nodes on something that is no body: its force is a reaction. Not collective. */
-void SbSpaceCoupleOutside(SbSpace space, PetscInt row);
+void SbSpaceSetConstraintExternal(SbSpace space, PetscInt row);
 /* Makes matrices of the rows; without rows on any rank it exchanges no more than their number. Collective. */
-PetscErrorCode SbSpaceCoupleDone(SbSpace space);
-/* What rows push with and where they are, for the displacement U and its residual R without constraints (N). R <- R less the
-   forces of the exact rows: what is left is for supports and obstacles. Collective. */
-PetscErrorCode SbSpaceCoupleMeasure(SbSpace space, Vec U, Vec R);
-/* R += what rows of negative ids push free unknowns with, N, after SbSpaceCoupleMeasure(). Collective. */
-PetscErrorCode SbSpaceCoupleReaction(SbSpace space, Vec R);
-/* Whether an exact row rests: others say it, or it has no free direction. It has no force, and its sum is not looked after. */
-PetscBool SbSpaceCoupleRests(SbSpace space, PetscInt row);
-/* What SbSpaceCoupleMeasure() found: force (N, positive: it raises the sum) and sum_k coef_k . u_k (m). Not collective. */
-void SbSpaceCoupleGet(SbSpace space, PetscInt row, PetscReal *force, PetscReal *sum);
-/* Of the first n nodes of a row: the sum of its coefficients, and force += what it pushes them with, N, as SbSpaceCoupleMeasure() has found
+PetscErrorCode SbSpaceAssembleConstraints(SbSpace space);
+/* What rows exert and where they are, for the displacement U and its residual R without constraints (N). R <- R less the
+   forces of the exact constraints: what is left is for supports and obstacles. Collective. */
+PetscErrorCode SbSpaceComputeConstraintForces(SbSpace space, Vec U, Vec R);
+/* R += what rows of negative ids push free unknowns with, N, after SbSpaceComputeConstraintForces(). Collective. */
+PetscErrorCode SbSpaceAddConstraintReactions(SbSpace space, Vec R);
+/* Whether an exact constraint rests: others say it, or it has no free direction. It has no force, and its sum is not looked after. */
+PetscBool SbSpaceIsConstraintRedundant(SbSpace space, PetscInt row);
+/* What SbSpaceComputeConstraintForces() found: force (N, positive: it raises the sum) and sum_k coef_k . u_k (m). Not collective. */
+void SbSpaceGetConstraint(SbSpace space, PetscInt row, PetscReal *force, PetscReal *sum);
+/* Of the first n nodes of a row: the sum of its coefficients, and force += what it pushes them with, N, as SbSpaceComputeConstraintForces() has found
    it. Not collective. */
-void SbSpaceCouplePush(SbSpace space, PetscInt row, PetscInt n, PetscReal direction[3], PetscReal force[3]);
-/* F += what all rows push with at the displacement U, as SbSpaceCoupleMeasure() has found it. Collective. */
-PetscErrorCode SbSpaceCoupleForce(SbSpace space, Vec U, Vec F);
-/* U <- nearest displacement on which the exact rows hold. Collective. */
-PetscErrorCode SbCouplePrescribe(SbSpace space, Vec U);
+void SbSpaceGetConstraintForce(SbSpace space, PetscInt row, PetscInt n, PetscReal direction[3],
+                               PetscReal force[3]);
+/* F += what all rows exert at the displacement U, as SbSpaceComputeConstraintForces() has found it. Collective. */
+PetscErrorCode SbSpaceAddConstraintForces(SbSpace space, Vec U, Vec F);
+/* U <- nearest displacement on which the exact constraints hold. Collective. */
+PetscErrorCode SbConstraintsPrescribe(SbSpace space, Vec U);
 /*
-  Velocities of what exact rows tie (src/fem/couple_velocity.c). Rate: of the sum of a row at the end of the step, m/s, 0 unless told; not
+  Velocities of what exact constraints tie (src/fem/constraint_velocity.c). Rate: of the sum of a row at the end of the step, m/s, 0 unless told; not
   collective. Velocity: V <- the nearest one in the norm of the lumped mass that has these rates, and the impulses that this takes over
   the length dt of the step (s) are added to the forces of the rows. Collective.
 */
-PetscErrorCode SbSpaceCoupleRate(SbSpace space, PetscInt row, PetscReal rate);
-PetscErrorCode SbCoupleVelocity(SbSpace space, PetscReal dt, Vec V);
-/* z <- the part of it that moves nothing that is prescribed, held, or tied by exact rows. Collective. */
-PetscErrorCode SbSpaceAllow(SbSpace space, Vec z);
-/* F <- F less the springs' forces, and without what the exact rows take when `constrain`. Collective. */
-PetscErrorCode SbCoupleResidual(SbSpace space, Vec U, PetscBool constrain, Vec F);
-/* Whether any node of any rank is held, or any row there, since the last Done. Not collective, alike on all ranks. */
-PetscBool SbSpaceIsHeld(SbSpace space);
-/* The operator of solves: K, its springs, projected. singular: K may be so, because only rows hold some body: it is made regular for
-   preconditioners, but for the operator; SB_SADDLE_DIRECT needs none of that. Collective; the caller destroys it; K is borrowed until then. */
-PetscErrorCode SbCoupleCreateOperator(SbSpace space, Mat K, PetscBool singular, SbSaddle saddle, Mat *A);
-/* Another matrix in the place of K; borrowed. Not collective. */
-PetscErrorCode SbCoupleSetMatrix(SbSpace space, Mat K);
+PetscErrorCode SbSpaceSetConstraintVelocity(SbSpace space, PetscInt row, PetscReal rate);
+PetscErrorCode SbConstraintsProjectVelocity(SbSpace space, PetscReal dt, Vec V);
+/* z <- the part of it that moves nothing that is prescribed, constrained, or tied by exact constraints. Collective. */
+PetscErrorCode SbSpaceProjectAdmissible(SbSpace space, Vec z);
+/* F <- F less the springs' forces, and without what the exact constraints take when `constrain`. Collective. */
+PetscErrorCode SbConstraintsResidual(SbSpace space, Vec U, PetscBool constrain, Vec F);
+/* Whether any node of any rank is constrained, or any row there, since the last Done. Not collective, alike on all ranks. */
+PetscBool SbSpaceIsConstrained(SbSpace space);
 
 /* Per owned cell: Cauchy stress sigma[6] = xx yy zz xy yz xz (Pa), J, energy density (J/m^3, rest). Outputs may be NULL. */
 PetscErrorCode SbSpaceCellState(SbSpace space, const PetscReal u[], PetscReal sigma[], PetscReal J[],
@@ -277,18 +274,18 @@ PetscErrorCode SbSpaceFindSet(SbSpace space, const char *name, const char *where
 /* ------------------------------------------------------------------ real time: many similar systems, solved fast */
 
 /*
-  SbSpaceCreateFrameOperator - the tangent without a matrix: A = shift_a M + shift_v C + shift_k sum_T R_T K_T R_T^T, applied cell
+  SbSpaceCreateMatrixFree - the tangent without a matrix: A = shift_a M + shift_v C + shift_k sum_T R_T K_T R_T^T, applied cell
   by cell from the cells' rotated gradients.
 
   Collective. For laws whose tangent is Hooke's tensor turned by a rotation (linear; co-rotated with the warped tangent) and
   lumped mass. A is a MATSHELL owned by the caller; the space is borrowed. Its state is set by SbSpaceAssembleTangent(), as for
   any matrix. Prescribed unknowns have a scaled identity. Errors: PETSC_ERR_SUP for other laws and the consistent mass.
 */
-PetscErrorCode SbSpaceCreateFrameOperator(SbSpace space, Mat *A);
-/* PETSC_TRUE when the space's laws and mass allow a frame operator. Not collective, same on all ranks. */
-PetscErrorCode SbSpaceHasFrames(SbSpace space, PetscBool *has);
-/* Sets the state of a frame operator: u and the shifts of the stage. PETSC_FALSE in `is` (and nothing done) for another matrix. */
-PetscErrorCode SbFrameOperatorSetState(Mat A, const SbStage *stage, PetscBool *is);
+PetscErrorCode SbSpaceCreateMatrixFree(SbSpace space, Mat *A);
+/* PETSC_TRUE when the space's laws and mass allow a matrix-free operator. Not collective, same on all ranks. */
+PetscErrorCode SbSpaceAllowsMatrixFree(SbSpace space, PetscBool *has);
+/* Sets the state of a matrix-free operator: u and the shifts of the stage. PETSC_FALSE in `is` (and nothing done) for another matrix. */
+PetscErrorCode SbMatrixFreeSetState(Mat A, const SbStage *stage, PetscBool *is);
 
 /*
   SbSpaceNodeRotations - how the material around each owned node is turned: the proper rotation next to the volume-weighted
@@ -298,28 +295,3 @@ PetscErrorCode SbFrameOperatorSetState(Mat A, const SbStage *stage, PetscBool *i
   largest |R_cell - R|_F^2 among the cells around, 8 sin^2(angle / 2).
 */
 PetscErrorCode SbSpaceNodeRotations(SbSpace space, const PetscReal u[], PetscReal R[], PetscReal spread[]);
-
-/*
-  SbPCRotatedCreate - makes pc a preconditioner that factors seldom: P = Q A0 Q^T, A0 a past operator, Q its nodes' rotations since.
-
-  Collective. The operator is a frame operator, or an assembled matrix of the space on which the displacement
-  belonging to it is composed as "sb_state" (PetscObjectCompose() with a vector of SbSpaceCreateVec()). One factorisation lasts
-  as long as the iterations stay low; it is renewed at the next change of the operator when they do not, when the solver
-  fails, or when SbPCRotatedRenew() is called.
-  Options read: -pc_rotated_spread (rad), from which angle on between a cell and its node the node is solved exactly.
-  Memory: besides the factor 72 n^2 bytes on each rank during a factorisation, with n of SbSpaceInterfaceSize(); 9 n^2 of all ranks
-  together stay. An operator that is not positive definite fails the solve.
-*/
-PetscErrorCode SbPCRotatedCreate(SbSpace space, PC pc);
-PetscErrorCode SbPCRotatedRenew(PC pc);
-/*
-  SbSpaceInterfaceSize - nodes at which the parts of the ranks meet, n, and how many of them a factor that turns takes, most.
-
-  Collective; prescribed unknowns are known. Makes the plan of the space. Options read: -pc_rotated_interface (1500).
-*/
-PetscErrorCode SbSpaceInterfaceSize(SbSpace space, PetscInt *n, PetscInt *most);
-/* Factorisations so far, nodes solved exactly at present (this rank), entries of the factor (this rank). Outputs may be NULL. */
-PetscErrorCode SbPCRotatedGetStats(PC pc, PetscInt *nfactor, PetscInt *nexact, PetscInt64 *entries);
-/* What one application reads on this rank, bytes: the factor of its interior, twice, and its rows of the interface's; 0 before the
-   factorisation. nface: nodes of the interface. Outputs may be NULL. Not collective. */
-PetscErrorCode SbPCRotatedGetWork(PC pc, PetscInt64 *interior, PetscInt64 *interface, PetscInt *nface);

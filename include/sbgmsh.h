@@ -28,7 +28,7 @@
   gmsh->Free(). Nothing of gmsh is printed; it uses one thread, so that the same input gives the same mesh.
 */
 #pragma once
-#include "sbformat.h"
+#include "sbmeshio.h"
 
 /* type, name, arguments: as in gmshc.h, with the same ones from gmsh 4.8 on to 4.15 (gmshModelAddPhysicalGroup() has not). */
 #define SB_GMSH_FUNCTIONS(X)                                                                               \

@@ -4,8 +4,8 @@
   Errors are in the norm of the energy: the square of an error is its energy, J, as a displacement that strains the bodies and a velocity that they
   have; relative is the root of its share of the largest energy, kinetic and strain, that the run has had (of the strain energy in a static run).
 
-  The ledger looks at each step that was solved (SbRun.look) and is a monitor besides. Without -ledger, -accuracy or -time_budget there is none:
-  no vector, no look, no column. With -ledger alone it changes no result.
+  The ledger examines each step that was solved (SbRun.post_solve) and is a monitor besides. Without -ledger, -accuracy or -time_budget there is none:
+  no vector, no callback, no column. With -ledger alone it changes no result.
 
   Order of calls: SbLedgerRegister(), SbRunCreate(), SbLedgerSetFromOptions(), SbModelSetUp(), SbRunSetUp(), SbLedgerAttach(),
   SbOutputAttach(), SbRunSolve(), SbLedgerReport(), SbLedgerDestroy().

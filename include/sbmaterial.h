@@ -74,7 +74,7 @@ PetscErrorCode SbMaterialRegisterAll(void);
 /*
   SbMaterialCreate - creates the law by name and reads young, poisson, density and the law's own options.
 
-  Not collective, same on all ranks. Input: law; body, the scope of the body or inclusion (its `type` is not looked at). Output: material,
+  Not collective, same on all ranks. Input: law; body, the scope of the body or inclusion (its `type` is not examined). Output: material,
   owned by the caller. Errors: PETSC_ERR_USER for an unknown law and for what the option readers and the next two refuse.
 */
 PetscErrorCode SbMaterialCreate(const char *law, const SbScope *body, SbMaterial *m);

@@ -16,7 +16,7 @@ typedef enum {
   SB_TET_AUTO, /* gmsh, and tetgen where that fails */
   SB_TET_GMSH,
   SB_TET_TETGEN
-} SbTetRoad;
+} SbTetBackend;
 /* Whether the triangles of a surface stay as they are. */
 typedef enum {
   SB_TET_SURFACE_AUTO, /* kept when their mean edge is within a factor of 1.5 of the size */
@@ -26,12 +26,13 @@ typedef enum {
 /* How a surface becomes tets; lengths as those of the surface. */
 typedef struct {
   PetscReal size; /* wanted edge; 0: the mean edge of the surface */
-  PetscReal weld; /* vertices no farther apart are one; negative: 1e-7 of the diagonal of its box */
+  PetscReal
+    merge_tolerance; /* vertices no farther apart are one; negative: 1e-7 of the diagonal of its box */
   PetscReal
     untangle; /* vertices may be moved so far to part triangles that cut each other; negative: half the mean edge */
-  PetscReal angle;   /* degrees; edges with sharper turns are kept when the surface is meshed anew */
+  PetscReal angle;   /* degrees; edges with sharper turns are kept when the surface is remeshed */
   PetscReal seconds; /* that gmsh or tetgen may take, s */
-  SbTetRoad road;
+  SbTetBackend backend;
   SbTetSurface surface;
 } SbTetOptions;
 /*
@@ -50,7 +51,7 @@ typedef struct {
   uint64_t *vert_set; /* [nvert] SB_SET_BIT() of sets that are groups */
   uint64_t *tri_set;  /* [ntri] */
   uint64_t *cell_set; /* [ncell] */
-} SbGiven;
+} SbMemoryMesh;
 
 /* A body as the scenario gives it. Data, no methods. */
 typedef struct {
@@ -60,21 +61,21 @@ typedef struct {
                                          n cells along the shortest side; groups xmin xmax ymin ymax zmin zmax */
   PetscInt
     mesh_step; /* of a file that a run wrote: the step whose positions are the mesh; 0 at rest, -1 the last */
-  PetscReal scale;            /* factor on the file's coordinates, first */
-  PetscReal rotate[4];        /* axis (need not be normed) and angle in degrees, second */
-  PetscReal translate[3];     /* m, third */
-  SbTetOptions tet;           /* for a mesh that is a surface; m */
-  char element[SB_NAME_MAX];  /* p1, cr, dg */
-  PetscBool face_nodes;       /* the element has its nodes at faces: every cell of the overlap is needed */
-  char material[SB_NAME_MAX]; /* linear | corotated | stvk | neohookean */
-  PetscReal density;          /* kg/m^3 */
-  PetscReal velocity[3];      /* initial velocity of the centre of mass, m/s */
-  PetscReal spin[3];          /* initial angular velocity about the centre of mass, rad/s */
-  PetscInt ninclusion;        /* inclusions: tets with a material of their own */
+  PetscReal scale;               /* factor on the file's coordinates, first */
+  PetscReal rotate[4];           /* axis (need not be normed) and angle in degrees, second */
+  PetscReal translate[3];        /* m, third */
+  SbTetOptions tet;              /* for a mesh that is a surface; m */
+  char element[SB_NAME_MAX];     /* p1, cr, dg */
+  PetscBool face_nodes;          /* the element has its nodes at faces: every cell of the overlap is needed */
+  char material[SB_NAME_MAX];    /* linear | corotated | stvk | neohookean */
+  PetscReal density;             /* kg/m^3 */
+  PetscReal velocity[3];         /* initial velocity of the centre of mass, m/s */
+  PetscReal angular_velocity[3]; /* initial angular velocity about the centre of mass, rad/s */
+  PetscInt ninclusion;           /* inclusions: tets with a material of their own */
   struct {
     PetscInt set, material; /* set that holds the tets; number of the material */
   } inclusion[SB_INCLUSION_MAX];
-  SbGiven *given; /* a mesh in memory in the place of the file, NULL: none; owned by the model */
+  SbMemoryMesh *in_memory; /* a mesh in memory in the place of the file, NULL: none; owned by the model */
   /* found by SbMeshCreate(), equal on all ranks */
   PetscInt nvert, ncell, nfacet; /* global counts; nfacet counts boundary facets */
   PetscInt npart;                /* connected parts */
@@ -110,7 +111,7 @@ typedef struct {
                                         sphere: cx cy cz r; halfspace: nx ny nz d (n.x <= d); n has length 1 here, d is scaled likewise */
   PetscInt nvert, nfacet,
     ncell; /* global counts, found by SbMeshCreate(); nfacet counts boundary facets; all zero is an error there */
-  PetscBool held; /* an effect prescribes every displacement there */
+  PetscBool prescribed; /* an effect prescribes every displacement there */
 } SbSet;
 
 /*
@@ -176,8 +177,8 @@ PetscErrorCode SbMeshRegister(void);        /* rows of the option table, the MET
 PetscErrorCode SbTetDefaults(SbTetOptions *options);
 PetscErrorCode SbTetOptionsRead(const SbScope *scope, const char *mesh, SbTetOptions *options);
 /* Room for a mesh in memory; zeroed. Not collective. */
-PetscErrorCode SbGivenCreate(PetscInt nvert, PetscInt ncell, PetscInt ntri, SbGiven **given);
-PetscErrorCode SbGivenDestroy(SbGiven **given);
+PetscErrorCode SbMemoryMeshCreate(PetscInt nvert, PetscInt ncell, PetscInt ntri, SbMemoryMesh **in_memory);
+PetscErrorCode SbMemoryMeshDestroy(SbMemoryMesh **in_memory);
 /*
   SbSetParse - reads the description of a set. Not collective.
 

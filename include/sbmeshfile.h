@@ -28,7 +28,7 @@ void SbMeshFileCount(const SbImport *import, PetscInt *nvert, PetscInt n[4]);
 
 /* Whether a file holds a surface by its name: reading it fills it with tets, as body->tet says. */
 PetscBool SbMeshFileIsSurface(const char *path);
-/* What the reader mended; "" when nothing. Borrowed. */
+/* What the reader repaired; "" when nothing. Borrowed. */
 const char *SbMeshFileNote(const SbImport *import);
 
 /* ------------------------------------------------------------------ groups */
@@ -68,10 +68,10 @@ PetscErrorCode SbMeshFileMeasure(SbImport *import, SbMeshFacts *facts);
 /* ------------------------------------------------------------------ repair */
 
 typedef struct {
-  PetscReal weld;      /* vertices at most so far apart became one, m */
-  PetscInt nwelded;    /* vertices that went into another one */
-  PetscInt ncollapsed; /* tets that used a vertex twice, dropped */
-  PetscInt nflat;      /* flat tets, dropped */
+  PetscReal merge_tolerance; /* vertices at most so far apart became one, m */
+  PetscInt nwelded;          /* vertices that went into another one */
+  PetscInt ncollapsed;       /* tets that used a vertex twice, dropped */
+  PetscInt nflat;            /* flat tets, dropped */
   PetscInt nslit;      /* those of them that had no face on the boundary: a slit without width is left */
   PetscInt nduplicate; /* tets given again, dropped; their groups are joined */
   PetscInt nturned;    /* inverted tets, turned */
@@ -87,7 +87,7 @@ typedef struct {
     done - what was done
   Errors: what is left and SbMeshCreate() would refuse: overlapping tets, nothing left.
 */
-PetscErrorCode SbMeshFileRepair(SbImport *import, PetscReal weld, SbRepair *done);
+PetscErrorCode SbMeshFileRepair(SbImport *import, PetscReal merge_tolerance, SbRepair *done);
 
 /* ------------------------------------------------------------------ refine.c */
 

@@ -10,7 +10,7 @@ typedef struct {
   PetscReal strain;  /* J */
   PetscReal
     load_work; /* work done by the loads since the start (minus their potential when they have one), J */
-  PetscReal drive_work;       /* work done by moving supports since the start, J */
+  PetscReal prescribed_work;  /* work done by moving supports since the start, J */
   PetscReal damping_loss;     /* dissipated by Rayleigh damping since the start, J */
   PetscReal remesh_loss;      /* taken by re-meshing since the start, J */
   PetscReal remesh_mass;      /* change by re-meshings since the start, each as its absolute value, kg */
@@ -42,16 +42,16 @@ struct _p_SbModel {
   PetscInt neffect;
   SbEffect *effect;
   /* one list per operation, holding only the effects that implement it */
-  PetscInt nprescribe, nprestep, nforce, ntangent, nunsymmetric, naccept, nhistory, ntouch, nhold, nsettle,
-    narrive, nrebound;
-  SbEffect *prescribe, *prestep, *touch, *hold, *settle, *force, *tangent, *unsymmetric, *accept, *history,
-    *arrive, *rebound;
+  PetscInt nprescribe, nprestep, nforce, ntangent, nnonsymmetric, naccept, nhistory, nbegin_step,
+    nassemble_constraints, nupdate_active_set, ntime_of_impact, nrestitution;
+  SbEffect *prescribe, *prestep, *begin_step, *assemble_constraints, *update_active_set, *force, *tangent,
+    *nonsymmetric, *accept, *history, *time_of_impact, *restitution;
   struct {
     Vec U0, V0;     /* state when the step began; borrowed */
     PetscReal dt;   /* length of the step, s */
     PetscReal left; /* of the coefficients of restitution in this step */
     int reductions;
-  } bounce;             /* src/model/rebound.c; only with effects that rebound */
+  } bounce;             /* src/model/restitution.c; only with effects that bounce */
   PetscBool linear;     /* laws and effects: the tangent depends on the shifts only */
   PetscBool may_filter; /* some law has the tangent auto */
   PetscReal mass;       /* kg */
@@ -71,30 +71,30 @@ PetscErrorCode SbModelLoads(SbModel model, PetscReal t, Vec U, Vec V, Vec F);
 PetscErrorCode SbModelTangent(SbModel model, PetscReal t, PetscReal shift_v, PetscReal shift_a,
                               PetscReal shift_k, Vec U, Vec V, Mat A);
 /*
-  SbModelUnsymmetric - Y = the part of the tangent at U that the matrix of SbModelTangent() lacks, as it is far from symmetric, times X.
+  SbModelNonsymmetric - Y = the part of the tangent at U that the matrix of SbModelTangent() lacks, as it is far from symmetric, times X.
 
   Collective. U, X: [nnode][3] m; Y: N, zero on prescribed unknowns; all from SbSpaceCreateVec().
 */
-PetscErrorCode SbModelUnsymmetric(SbModel model, PetscReal t, Vec U, Vec X, Vec Y);
+PetscErrorCode SbModelNonsymmetric(SbModel model, PetscReal t, Vec U, Vec X, Vec Y);
 /* Writes prescribed displacements at t into U. */
 PetscErrorCode SbModelPrescribe(SbModel model, PetscReal t, Vec U);
 /*
-  Contact, for effects that have it (model->ntouch > 0). Begin: before the first solve of a step from t to t + dt, U0 and V0 (NULL in
+  Contact, for effects that have it (model->nbegin_step > 0). Begin: before the first solve of a step from t to t + dt, U0 and V0 (NULL in
   a static run) at t, to stay as they are until the step ends; U, the guess at t + dt, is put where contact holds it. Settle: after a solve with the residual R without constraints; `again` when
-  what is held has changed: U is put there, and has to be solved for once more. Collective.
+  what is constrained has changed: U is put there, and has to be solved for once more. Collective.
 */
-PetscErrorCode SbModelContactBegin(SbModel model, PetscReal t, PetscReal dt, Vec U0, Vec V0, Vec U);
-PetscErrorCode SbModelContactSettle(SbModel model, PetscReal t, Vec U, Vec R, PetscBool *again);
-/* After effects have loaded their state from a checkpoint: holds what was held then, so that forces and reactions of that time are known.
+PetscErrorCode SbModelContactBeginStep(SbModel model, PetscReal t, PetscReal dt, Vec U0, Vec V0, Vec U);
+PetscErrorCode SbModelContactUpdateActiveSet(SbModel model, PetscReal t, Vec U, Vec R, PetscBool *again);
+/* After effects have loaded their state from a checkpoint: holds what was constrained then, so that forces and reactions of that time are known.
    Collective. */
 PetscErrorCode SbModelContactResume(SbModel model);
 /* Restitution, of these two: Begin starts an attempt at a step; Settle, once who touches is right, sees to the energy: `again` when
    coefficients had to be reduced. Collective. */
-PetscErrorCode SbModelReboundBegin(SbModel model, PetscReal dt, Vec U0, Vec V0);
-PetscErrorCode SbModelReboundSettle(SbModel model, Vec U, PetscBool *again);
+PetscErrorCode SbModelRestitutionBegin(SbModel model, PetscReal dt, Vec U0, Vec V0);
+PetscErrorCode SbModelRestitutionUpdate(SbModel model, Vec U, PetscBool *again);
 /* After the first Settle of a step: the part of it after which the first point arrives at what it did not touch before, 1: none
-   does; effects that do not ask for it are not looked at. Collective. */
-PetscErrorCode SbModelContactArrival(SbModel model, PetscReal *part);
+   does; effects that do not ask for it are not examined. Collective. */
+PetscErrorCode SbModelContactTimeOfImpact(SbModel model, PetscReal *part);
 /* V <- the nearest velocity in the norm of the lumped mass with which what touches stays so, after a step of the length dt that ended at
    t with the displacement U; the forces of rows are raised by the impulses over dt. Collective. */
 PetscErrorCode SbModelContactVelocity(SbModel model, PetscReal t, PetscReal dt, Vec U, Vec V);
@@ -105,18 +105,18 @@ PetscErrorCode SbModelContactGap(SbModel model, PetscReal t, Vec U, Vec G);
    constraints. Collective. */
 PetscErrorCode SbModelContactForce(SbModel model, PetscReal t, Vec U, Vec R, Vec F);
 /* Appends the places of this rank where contact pushes bodies, after the same step. Collective. */
-PetscErrorCode SbModelContactPlaces(SbModel model, PetscReal t, Vec U, Vec R, SbPlaces *list);
+PetscErrorCode SbModelContactPoints(SbModel model, PetscReal t, Vec U, Vec R, SbContactPoints *list);
 /* Initial velocities of bodies (translation and spin). */
 PetscErrorCode SbModelInitialState(SbModel model, Vec U, Vec V);
 /* Instantaneous part of the energies (kinetic, strain, momenta, ...). V may be NULL. Collective. */
 PetscErrorCode SbModelEnergies(SbModel model, Vec U, Vec V, SbEnergies *e);
 /*
-  SbModelStrainAlong - strain energy at U, J, its slope against D, d psi(U - s D)/ds at s = 0, J, and how many tets are inside out there.
+  SbModelStrainEnergyAlong - strain energy at U, J, its slope against D, d psi(U - s D)/ds at s = 0, J, and how many tets are inverted there.
 
   Collective. D: [nnode][3] m, of any length.
 */
-PetscErrorCode SbModelStrainAlong(SbModel model, Vec U, Vec D, PetscReal *psi, PetscReal *slope,
-                                  PetscInt *ninverted);
+PetscErrorCode SbModelStrainEnergyAlong(SbModel model, Vec U, Vec D, PetscReal *psi, PetscReal *slope,
+                                        PetscInt *ninverted);
 /* For laws with -body_NAME_tangent auto: tangents from now on without negative eigenvalues of cells, or the exact ones. Not collective. */
 PetscErrorCode SbModelFilterTangent(SbModel model, PetscBool filter);
 /* Power taken by Rayleigh damping, v . C v, W. Collective. */

@@ -79,10 +79,10 @@ PetscErrorCode SbCheckpointLoad(SbRun run, const char *file);
 PetscErrorCode SbOutputRestoreMeshes(SbRun run);
 
 /*
-  SbOutputFollow - the output of a run goes on with another one of the same scene, whose bodies have other meshes: the same files, in which
+  SbOutputReattach - the output of a run goes on with another one of the same scene, whose bodies have other meshes: the same files, in which
   the mesh changes. Collective; in place of SbOutputSetFromOptions() and SbOutputAttach() for `to`.
 */
-PetscErrorCode SbOutputFollow(SbRun from, SbRun to);
+PetscErrorCode SbOutputReattach(SbRun from, SbRun to);
 
 /* What happened to a body that was re-meshed. */
 typedef struct {
@@ -92,7 +92,7 @@ typedef struct {
   PetscInt tets[2], vertices[2]; /* before and after; so are the next ones */
   PetscReal quality[2];          /* of the worst tet now */
   PetscReal energy[2];           /* kinetic and strain energy of all bodies, J */
-  PetscInt moved;                /* vertices that were moved to mend tets */
+  PetscInt moved;                /* vertices that were moved to repair tets */
   PetscReal speed;               /* of the rigid motion that keeps the momenta, m/s */
   PetscReal shift;               /* of the centre of mass of all bodies, m */
 } SbRemeshed;

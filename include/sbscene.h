@@ -49,7 +49,7 @@ PetscErrorCode SbRegisterAll(void);
 PetscErrorCode SbSceneCreate(MPI_Comm comm, SbModel *model);
 
 /*
-  SbSceneCheck - what no single option can know: mesh files exist, a static run is held by something. Collective; after
+  SbSceneCheck - what no single option can know: mesh files exist, a static run is constrained by something. Collective; after
   SbRunCreate(), which says whether the run is static.
 
   Errors: PETSC_ERR_USER with names that are near in the folder of a missing file.

@@ -8,7 +8,7 @@
 typedef struct _SbSolverPreset {
   const char *name;
   SbMatrixKind matrix;   /* on several ranks SBAIJ becomes BAIJ */
-  PetscBool matrix_free; /* a frame operator in place of the matrix */
+  PetscBool matrix_free; /* a matrix-free operator in place of the matrix */
   const char *options;   /* "-ksp_type cg -pc_type gamg ..." */
   const char *package;   /* of PETSc's that the row needs; NULL: none */
   PetscErrorCode (*precondition)(SbSpace space,
@@ -26,57 +26,57 @@ PetscErrorCode SbSolverChoose(SbSpace space, PetscBool dynamic, PetscBool linear
                               const char *choice, const SbSolverPreset **preset, char reason[], size_t size);
 /* Names a factorisation for matrices that may be indefinite when `choice` is auto. Not collective. Errors: PETSC_ERR_USER where this PETSc has none
    for this number of ranks. */
-PetscErrorCode SbSolverPivot(MPI_Comm comm, size_t size, char choice[]);
+PetscErrorCode SbSolverChooseIndefinite(MPI_Comm comm, size_t size, char choice[]);
 /*
-  SbSolverNegative - eigenvalues below zero of the matrix that `snes` has factored last, in the null space of its rows of contact.
+  SbSolverCountNegativeEigenvalues - eigenvalues below zero of the matrix that `snes` has factored last, in the null space of its contact constraints.
 
   Collective. Output: negative, -1: the solver does not tell.
 */
-PetscErrorCode SbSolverNegative(SNES snes, SbSpace space, PetscInt *negative);
+PetscErrorCode SbSolverCountNegativeEigenvalues(SNES snes, SbSpace space, PetscInt *negative);
 /*
-  SbSolverNext - what to try after a solver that failed: first a factorisation, for large systems iterations first.
+  SbSolverNextFallback - what to try after a solver that failed: first a factorisation, for large systems iterations first.
 
   Collective. Input: reason - why it failed; memory - for want of memory. In and out: tried, bits of the rows that failed in this run; preset,
   the one that failed, then the next one that this PETSc has and that can solve for the space, NULL when there is none.
 */
-PetscErrorCode SbSolverNext(SbSpace space, KSPConvergedReason reason, PetscBool memory, uint32_t *tried,
-                            const SbSolverPreset **preset);
+PetscErrorCode SbSolverNextFallback(SbSpace space, KSPConvergedReason reason, PetscBool memory,
+                                    uint32_t *tried, const SbSolverPreset **preset);
 /* Takes the row's options out of the database again, but for those with another value: they are the user's. Not collective. */
 PetscErrorCode SbSolverClear(const SbSolverPreset *preset);
 /* Gives the linear solver of `snes` the preset's options and tolerances; before SNESSetFromOptions(). Collective. */
 PetscErrorCode SbSolverSetUp(SNES snes, SbSpace space, const SbSolverPreset *preset);
 /*
-  SbKSPLookAtResidual - solves of ksp whose true residual is far above the tolerance fail (KSP_DIVERGED_BREAKDOWN).
+  SbKSPCheckTrueResidual - solves of ksp whose true residual is far above the tolerance fail (KSP_DIVERGED_BREAKDOWN).
 
-  Not collective; after KSPSetFromOptions(). Input: direct, the preconditioner is a factorisation; alone, no Newton step looks at what a solve has left.
+  Not collective; after KSPSetFromOptions(). Input: direct, the preconditioner is a factorisation; alone, no Newton step examines what a solve has left.
   Nothing is done for an iteration that is judged by the true residual, or by none, nor for one with a norm of its own inside Newton's method.
 */
-PetscErrorCode SbKSPLookAtResidual(KSP ksp, PetscBool direct, PetscBool alone);
+PetscErrorCode SbKSPCheckTrueResidual(KSP ksp, PetscBool direct, PetscBool alone);
 /*
-  SbKSPMeasureForces - makes the absolute tolerance of ksp one of the true residual, N, whatever norm it is judged by.
+  SbKSPSetForceTolerance - makes the absolute tolerance of ksp one of the true residual, N, whatever norm it is judged by.
 
   Not collective; after KSPSetFromOptions(). A norm that is not the true one is compared with its own start, by the factor that the true residual has to fall by.
   Nothing is done for a method that is judged by the true residual, or with -ksp_convergence_test of the user's.
 */
-PetscErrorCode SbKSPMeasureForces(KSP ksp);
+PetscErrorCode SbKSPSetForceTolerance(KSP ksp);
 /* The true residual decides, unless the user chose a norm or a side, or the type of ksp cannot tell it. After KSPSetType(). Not collective. */
 PetscErrorCode SbKSPPreferTrueResidual(KSP ksp);
 /* Errors: PETSC_ERR_USER for a norm or side that the type of ksp does not have. After KSPSetFromOptions(). Not collective. */
 PetscErrorCode SbKSPCheckNorm(KSP ksp);
-/* A method for symmetric systems gives way to FGMRES while rows of contact slide with friction, and comes back after them. Collective; before
+/* A method for symmetric systems gives way to FGMRES while contact constraints slide with friction, and comes back after them. Collective; before
    each solve. */
-PetscErrorCode SbSolverFollowRows(KSP ksp, SbSpace space);
+PetscErrorCode SbSolverUpdateSymmetry(KSP ksp, SbSpace space);
 /*
-  SbPCCoupleCreate - for a space with rows between nodes: makes pc a preconditioner in the null space of the exact ones, P^-1 = P M^-1 P^T.
+  SbPCConstrainedCreate - for a space with constraints between nodes: makes pc a preconditioner in the null space of the exact ones, P^-1 = P M^-1 P^T.
 
   Collective. Output: inner, M; borrowed. It takes the options of pc, which gives up its prefix. inner is pc itself for a space
   without such rows.
 */
-PetscErrorCode SbPCCoupleCreate(SbSpace space, PC pc, PC *inner);
+PetscErrorCode SbPCConstrainedCreate(SbSpace space, PC pc, PC *inner);
 /* M of such a pc, else pc itself. Not collective. */
-PetscErrorCode SbPCCoupleGetInner(PC pc, PC *inner);
+PetscErrorCode SbPCConstrainedGetInner(PC pc, PC *inner);
 /* Whether a factorisation of the saddle-point system stands in the place of M now. Not collective. */
-PetscErrorCode SbPCCoupleIsFactored(PC pc, PetscBool *is);
+PetscErrorCode SbPCConstrainedIsFactored(PC pc, PetscBool *is);
 /*
   SbSaddleChoose - how the saddle-point system of rows is solved: `choice` 0 by size, 1 directly, 2 by iterations, with the reason in words.
 
@@ -85,9 +85,9 @@ PetscErrorCode SbPCCoupleIsFactored(PC pc, PetscBool *is);
 PetscErrorCode SbSaddleChoose(SbSpace space, PetscBool dynamic, PetscInt choice, SbSaddle *saddle,
                               char reason[], size_t size);
 /*
-  SbKSPSaddleSet - makes ksp, as its options have made it, a solver of the saddle-point system by iterations (couple_saddle.c).
+  SbKSPSaddleSet - makes ksp, as its options have made it, a solver of the saddle-point system by iterations (saddle.c).
 
-  Collective; after KSPSetFromOptions(). Its operator is that of SbCoupleCreateOperator(), its preconditioner one of SbPCCoupleCreate().
+  Collective; after KSPSetFromOptions(). Its operator is that of SbConstraintsCreateOperator(), its preconditioner one of SbPCConstrainedCreate().
   Tolerances are about the residual in the null space, as without it. Options read: -saddle_ksp_ (minres, or fgmres where the
   preconditioner is not symmetric and definite).
 */
@@ -107,19 +107,19 @@ PetscErrorCode SbDirectPackage(MPI_Comm comm, PetscInt unknowns, PetscBool defin
   SbPCDirectSet - makes pc a factorisation by `package` (MUMPS, CHOLMOD or UMFPACK) of an AIJ matrix, gathered on one rank where there are several and the
   package works on one (PCTELESCOPE).
 
-  Not collective. PCSetFromOptions() and SbPCGuardFactor() have to follow. Input: symmetric, L L^T or L D L^T where the package has it, else LU. Options read: those of
+  Not collective. PCSetFromOptions() and SbPCCheckPivots() have to follow. Input: symmetric, L L^T or L D L^T where the package has it, else LU. Options read: those of
   PETSc's PCCHOLESKY or PCLU, with the prefix telescope_ where the matrix is gathered.
 */
 PetscErrorCode SbPCDirectSet(PC pc, const char *package, PetscBool symmetric);
 /* negative: pivots below zero of a factorisation that is done, -1 where it does not tell: L D L^T of MUMPS does. Collective. */
-PetscErrorCode SbPCDirectNegative(PC pc, PetscInt *negative);
+PetscErrorCode SbPCDirectCountNegative(PC pc, PetscInt *negative);
 /* The package of such a factorisation that is gathered on one rank, NULL for any other pc. Not collective. */
 PetscErrorCode SbPCDirectGathered(PC pc, const char **package);
 /* A Cholesky factorisation whose pivot is not positive is one that failed (KSP_DIVERGED_PC_FAILED), with CHOLMOD too and where it is gathered on
    one rank; other types of pc are left alone. After PCSetFromOptions(). Not collective. */
-PetscErrorCode SbPCGuardFactor(PC pc);
+PetscErrorCode SbPCCheckPivots(PC pc);
 /*
-  SbSolverFinish - what is left to do for the solver of `snes` after SNESSetFromOptions().
+  SbSolverFinish - the last set-up of the solver of `snes` after SNESSetFromOptions().
 
   Collective. P: the matrix of the preconditioner; NULL without linear systems. Errors: PETSC_ERR_USER, in one line that says what to choose, for a -ksp_type,
   -pc_type, norm, side or package that cannot work here.
@@ -170,3 +170,34 @@ PetscErrorCode SbPressureOperatorCreate(SbSpace space, Mat *K);
 PetscErrorCode SbPCPressureCreate(SbSpace space, PC pc);
 /* Solves so far, iterations of all of them, most in one. Outputs may be NULL. Not collective. */
 PetscErrorCode SbPCPressureGetStats(PC pc, PetscInt *nsolve, PetscInt *total, PetscInt *most);
+
+/*
+  SbPCRotatedCreate - makes pc a preconditioner that factors seldom: P = Q A0 Q^T, A0 a past operator, Q its nodes' rotations since.
+
+  Collective. The operator is a matrix-free operator, or an assembled matrix of the space on which the displacement
+  belonging to it is composed as "sb_state" (PetscObjectCompose() with a vector of SbSpaceCreateVec()). One factorisation lasts
+  as long as the iterations stay low; it is renewed at the next change of the operator when they do not, when the solver
+  fails, or when SbPCRotatedRenew() is called.
+  Options read: -pc_rotated_spread (rad), from which angle on between a cell and its node the node is solved exactly.
+  Memory: besides the factor 72 n^2 bytes on each rank during a factorisation, with n of SbSpaceInterfaceSize(); 9 n^2 of all ranks
+  together stay. An operator that is not positive definite fails the solve.
+*/
+PetscErrorCode SbPCRotatedCreate(SbSpace space, PC pc);
+PetscErrorCode SbPCRotatedRenew(PC pc);
+/*
+  SbSpaceInterfaceSize - nodes at which the parts of the ranks meet, n, and how many of them a factor that turns takes, most.
+
+  Collective; prescribed unknowns are known. Makes the plan of the space. Options read: -pc_rotated_interface (1500).
+*/
+PetscErrorCode SbSpaceInterfaceSize(SbSpace space, PetscInt *n, PetscInt *most);
+/* Factorisations so far, nodes solved exactly at present (this rank), entries of the factor (this rank). Outputs may be NULL. */
+PetscErrorCode SbPCRotatedGetStats(PC pc, PetscInt *nfactor, PetscInt *nexact, PetscInt64 *entries);
+/* What one application reads on this rank, bytes: the factor of its interior, twice, and its rows of the interface's; 0 before the
+   factorisation. nface: nodes of the interface. Outputs may be NULL. Not collective. */
+PetscErrorCode SbPCRotatedGetWork(PC pc, PetscInt64 *interior, PetscInt64 *interface, PetscInt *nface);
+
+/* The operator of solves: K, its springs, projected. singular: K may be so, because only rows hold some body: it is made regular for
+   preconditioners, but for the operator; SB_SADDLE_DIRECT needs none of that. Collective; the caller destroys it; K is borrowed until then. */
+PetscErrorCode SbConstraintsCreateOperator(SbSpace space, Mat K, PetscBool singular, SbSaddle saddle, Mat *A);
+/* Another matrix in the place of K; borrowed. Not collective. */
+PetscErrorCode SbConstraintsSetMatrix(SbSpace space, Mat K);

@@ -2,7 +2,8 @@
   sbtet.h - layer 1: tets as plain arrays on one rank: their faces, their shape, which one holds a point. Not collective throughout.
 */
 #pragma once
-#include "sbformat.h"
+#include "sbmeshio.h"
+#include "sbgeometry.h"
 
 /* ------------------------------------------------------------------ faces.c: which cells share a face */
 
@@ -35,28 +36,9 @@ PetscInt SbFacesFind(const SbFaces *faces, const PetscInt vert[3], PetscInt slot
 PetscErrorCode SbImportCheck(SbImport *import, SbFaces *faces);
 /* How many tets have a dihedral angle below this, and the smallest of all, degrees. */
 PetscErrorCode SbImportSlivers(const SbImport *import, PetscReal degrees, PetscInt *n, PetscReal *smallest);
-/* Six times the signed volume of a tet, m^3. */
-PetscReal SbTetDet(const PetscReal x[], const PetscInt vert[4]);
+
 /*
   SbTetQuality - shape of a tet with corners x, m: 3 r / R with the radii of the spheres in it and around it, 1 for the regular one, 0 for a flat
-  one, negative when it is inside out. Not collective.
+  one, negative when it is inverted. Not collective.
 */
 PetscReal SbTetQuality(const PetscReal x[4][3]);
-
-/* ------------------------------------------------------------------ locate.c */
-
-/*
-  SbLocator - which tet holds a point. Not collective; the arrays are borrowed. Tets without volume, or inside out, hold nothing.
-
-  SbLocatorFind: the tet and the weights of its corners, none negative, sum 1. Of several that hold the point the one in which it lies
-  deepest, or the first of equal ones; of a point in none the nearest place. Returns the distance from there, m.
-*/
-typedef struct _p_SbLocator *SbLocator;
-PetscErrorCode SbLocatorCreate(PetscInt ncell, const PetscInt cell[], const PetscReal x[],
-                               SbLocator *locator);
-PetscErrorCode SbLocatorDestroy(SbLocator *locator);
-PetscReal SbLocatorFind(SbLocator locator, const PetscReal point[3], PetscInt *cell, PetscReal weight[4]);
-/* The weights of the corners of a tet at a point, in it or not. */
-/* Of a tet with the corners v of x[][3] alone: sum w_a x_a = point; negative where it lies outside. */
-void SbTetWeights(const PetscReal x[], const PetscInt v[4], const PetscReal point[3], PetscReal weight[4]);
-void SbLocatorWeights(SbLocator locator, PetscInt cell, const PetscReal point[3], PetscReal weight[4]);

@@ -25,7 +25,7 @@ typedef struct {
   Vec R; /* residual without constraints: reactions on prescribed unknowns; NULL unless somebody asked */
   SbEnergies energies;     /* filled when some monitor needs them (SbRun.want_energies) */
   PetscInt newton, linear; /* iterations of this step */
-  PetscInt rejected;       /* attempts given up, this step */
+  PetscInt rejected;       /* rejected attempts, this step */
   PetscReal wall;          /* seconds since the time loop began */
   PetscBool last;
 } SbStep;
@@ -41,9 +41,9 @@ typedef struct {
   Vec U0, V0, A0;   /* start */
   Vec U, V, A;      /* end */
   PetscBool solved; /* by SbRun.snes; else explicitly */
-} SbSolved;
+} SbSolvedStep;
 /* `again`: the equations are to be solved once more, from U on. Collective. */
-typedef PetscErrorCode (*SbLookFn)(SbRun run, const SbSolved *step, void *ctx, PetscBool *again);
+typedef PetscErrorCode (*SbStepSolvedFn)(SbRun run, const SbSolvedStep *step, void *ctx, PetscBool *again);
 
 /* A number that history.csv shows after those of effects; the same on all ranks. */
 typedef struct {
@@ -56,7 +56,7 @@ typedef struct {
 typedef struct {
   char name[SB_NAME_MAX];
   PetscReal *value; /* borrowed */
-} SbCarried;
+} SbCheckpointValue;
 
 typedef PetscErrorCode (*SbMonitorFn)(SbRun run, const SbStep *step, void *ctx);
 /* After a step that ended at t was solved and before monitors see it: whether the time loop is to come back then. Collective. */
@@ -69,24 +69,24 @@ struct _p_SbRun {
   SbTimePreset preset;
   TS ts;           /* NULL in a static run */
   SNES snes;       /* of the TS, or own in a static run; borrowed from ts when there is one */
-  Mat J, operator; /* tangent; what solves see of it: J itself, its projection (sbfem.h, SbCouple), or
-                     with what it lacks (SbModelUnsymmetric()) */
+  Mat J, operator; /* tangent; what solves see of it: J itself, its projection (sbfem.h, SbConstraints), or
+                     with what it lacks (SbModelNonsymmetric()) */
   struct {
     Vec U, x,
       y; /* displacement that J belongs to; what is multiplied, and the result; NULL where J lacks nothing */
     PetscReal t; /* J's time or load factor */
-  } unsymmetric;
+  } nonsymmetric;
   Vec U, V, A; /* A: acceleration of the last step, state of the integrator */
   Vec R;       /* residual for contact; NULL without */
   Vec stage,
     stage_start; /* where the integrator evaluates forces, stage_start + stage_part (X - stage_start), in a solve for X; NULL: at X */
   PetscReal stage_part;
   PetscBool dt_given, velocity_predictor, fixed_step, damped;
-  PetscBool refuse_inverted, refused; /* steps that turn tets inside out; the last attempt was such a one */
-  PetscBool may_cut;                  /* this attempt may end where points arrive */
-  PetscReal arrival;                  /* the part of the step at which it did, 1: it did not */
-  PetscReal spectral_radius, newmark[2]; /* newmark: beta, gamma */
-  PetscInt max_cuts, static_steps;
+  PetscBool reject_inverted, rejected_inverted; /* steps that invert tets; the last attempt was such a one */
+  PetscBool may_end_at_impact;                  /* this attempt may end where points come into contact */
+  PetscReal time_of_impact;                     /* the part of the step at which it did, 1: it did not */
+  PetscReal spectral_radius, newmark[2];        /* newmark: beta, gamma */
+  PetscInt max_halvings, static_steps;
   PetscReal min_increment; /* static: smallest load increment as a part of 1 / static_steps */
   PetscReal
     softening; /* static: |du|/dlambda of the last step over that of the first one; 0: there was none */
@@ -105,7 +105,7 @@ struct _p_SbRun {
   PetscBool tangent_known; /* J holds the tangent for shift_v, shift_a */
   PetscReal shift_v, shift_a;
   PetscBool saddle;       /* some effect asks for multipliers as unknowns */
-  PetscInt saddle_choice; /* -multipliers: 0 by size, 1 direct, 2 iterative */
+  PetscInt saddle_choice; /* -saddle_solver: 0 by size, 1 direct, 2 iterative */
   SbSaddle saddle_used;
   char solver_choice[SB_NAME_MAX]; /* as the scenario says: "auto" or a name */
   const struct _SbSolverPreset *solver_used;
@@ -123,12 +123,13 @@ struct _p_SbRun {
     PetscErrorCode (*destroy)(void *ctx);
   } monitor[8];
   struct {
-    SbLookFn fn; /* looks at each step that was solved; NULL: nobody does */
+    SbStepSolvedFn fn; /* examines each step that was solved; NULL: nobody does */
     void *ctx;
     /* error of the step that was just solved over what is allowed, which falls with the power `order` of its length, for adaptive steps;
        NULL: displacements are compared with -ts_atol */
-    PetscErrorCode (*error)(SbRun run, const SbSolved *step, void *ctx, PetscInt *order, PetscReal *ratio);
-  } look;
+    PetscErrorCode (*error)(SbRun run, const SbSolvedStep *step, void *ctx, PetscInt *order,
+                            PetscReal *ratio);
+  } post_solve;
   struct {
     SbPauseFn fn; /* asked after each step; NULL: nobody asks */
     PetscReal
@@ -139,7 +140,7 @@ struct _p_SbRun {
   PetscInt ncolumn;
   const SbColumn *column; /* [ncolumn] of history.csv; borrowed */
   PetscInt ncarried;
-  const SbCarried *carried; /* [ncarried] in checkpoints; borrowed */
+  const SbCheckpointValue *carried; /* [ncarried] in checkpoints; borrowed */
   /* values[ncell_owned] = energy of the error of space discretisation per rest volume, J/m^3; NULL: nobody estimates it. Collective. */
   PetscErrorCode (*cell_error)(SbRun run, const SbStep *step, PetscReal values[]);
   PetscBool want_energies, want_residual;

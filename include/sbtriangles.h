@@ -14,7 +14,7 @@ typedef struct {
   PetscInt *across; /* [ntri][3] triangle beyond edge k, which runs from corner k to the next */
   PetscReal volume; /* enclosed, m^3 */
   PetscReal edge;   /* mean edge, m */
-  PetscBool turned; /* it was inside out in the file */
+  PetscBool turned; /* it was inverted in the file */
 } SbTriangles;
 /*
   SbTrianglesRead - a closed surface from a file, x <- scale x + at: .stl (text or binary), .obj, .off, or .msh (gmsh: the boundary of
@@ -25,7 +25,7 @@ typedef struct {
   Input: option - for messages; path; scale > 0; at, m.
   Errors: PETSC_ERR_FILE_*, PETSC_ERR_USER_INPUT, alike on all ranks, one line with option, file, line or triangle (numbered as in the
   file) and what to do: unreadable; open; more than two triangles at an edge; turned to opposite sides; flat, doubled; no volume; a
-  part within another that is no cavity. A surface that is inside out as a whole is turned, with a warning.
+  part within another that is no cavity. A surface that is inverted as a whole is turned, with a warning.
 */
 PetscErrorCode SbTrianglesRead(MPI_Comm comm, const char *option, const char *path, PetscReal scale,
                                const PetscReal at[3], SbTriangles *triangles);

@@ -60,13 +60,13 @@ def hertz_scene():
 -set_ay_at box:0,1,-1,1,1,0
 -set_az_at plane:0,0,1,-1
 -effects x,y,far,ball
--effect_x_type support
+-effect_x_type fixed
 -effect_x_on x0
 -effect_x_components x
--effect_y_type support
+-effect_y_type fixed
 -effect_y_on y0
 -effect_y_components y
--effect_far_type drive
+-effect_far_type prescribed_displacement
 -effect_far_on ax,ay,az
 -effect_far_displacement x*{side};y*{side};-{c:.15g}*({2 * (1 - nu):.15g}/{r}+z^2/{r}^3)
 -effect_ball_type contact
@@ -83,7 +83,7 @@ SCENES = {
 -body_bar_density 1000
 -effects gravity,clamp
 -effect_gravity_vector 0,0,-9.81
--effect_clamp_type support
+-effect_clamp_type fixed
 -effect_clamp_on xmin
 -time static
 -probes end
@@ -94,9 +94,9 @@ SCENES = {
 -body_plate_young 1
 -body_plate_density 1
 -effects hold,plane,pull
--effect_hold_type support
+-effect_hold_type fixed
 -effect_hold_on left
--effect_plane_type support
+-effect_plane_type fixed
 -effect_plane_on all
 -effect_plane_components z
 -effect_pull_type traction
@@ -113,7 +113,7 @@ SCENES = {
 -body_bar_density 1000
 -effects gravity,clamp
 -effect_gravity_vector 0,0,-9.81
--effect_clamp_type support
+-effect_clamp_type fixed
 -effect_clamp_on xmin
 -probes end
 -probe_end_at 0.4,0.05,0.05

@@ -74,7 +74,7 @@ static PetscErrorCode simulate(Scene *s)
   PetscBool quiet;
 
   PetscFunctionBeginUser;
-  SbErrorSetFarewell(report_failure, s);
+  SbErrorSetFailureHandler(report_failure, s);
   PetscCall(PetscLogStagePush(SbStageSetup));
   PetscCall(SbOutputRestoreMeshes(s->run));
   PetscCall(SbModelSetUp(s->model));
@@ -89,7 +89,7 @@ static PetscErrorCode simulate(Scene *s)
   PetscCall(SbReportSummary(s->run));
   PetscCall(SbOutputFile(s->run, "ledger.csv", sizeof(file), file, &quiet));
   PetscCall(SbLedgerReport(s->ledger, file, quiet));
-  SbErrorSetFarewell(NULL, NULL);
+  SbErrorSetFailureHandler(NULL, NULL);
   if (s->run->stop_reason[0]) SbErrorPost("%s", s->run->stop_reason);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

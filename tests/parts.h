@@ -2,7 +2,7 @@
   parts.h - what a scene can name, each on one scene: effects, elements, laws, integrators, fields, other output, estimators.
 
   What there is comes from the program's own registries; the table below says how each is named on the scene. The test of what is
-  not named (tests/verify/verify_unnamed.c) and the price list (tests/perf/price.c) go through both, so that what is
+  not named (tests/verify/verify_unnamed.c) and the list of costs (tests/perf/effect_cost.c) go through both, so that what is
   new fails the test until it has a row here.
 */
 #pragma once
@@ -15,7 +15,7 @@
 /* A soft bar along x that turns about its middle; one linear solve per step. Its sets are for the parts; they do nothing. */
 #define PART_SCENE                                                                                        \
   "-bodies bar -body_bar_mesh %s -body_bar_material corotated -body_bar_young 5e4 -body_bar_poisson 0.4 " \
-  "-body_bar_density 1000 -body_bar_spin 0,2,0 -sets end,tip,skin -set_end_at plane:1,0,0,0 "             \
+  "-body_bar_density 1000 -body_bar_angular_velocity 0,2,0 -sets end,tip,skin -set_end_at plane:1,0,0,0 " \
   "-set_tip_at plane:1,0,0,0.4 -set_skin_at body:bar -snes_type ksponly -ksp_rtol 1e-4 -solver cg_icc "   \
   "-output_fields none -output_history false -progress false "
 #define PART_TIME "-time euler_implicit -ts_dt 0.0166666666666666667 -ts_max_time 0.13333333333333333 "
@@ -50,10 +50,10 @@ static const Part parts[] = {
   {"effect", "point_force",
    "-effects pull -effect_pull_type point_force -effect_pull_on tip -effect_pull_vector 0;0;1", NULL, NULL,
    PETSC_TRUE},
-  {"effect", "support", "-effects clamp -effect_clamp_type support -effect_clamp_on end", NULL, NULL,
-   PETSC_TRUE},
-  {"effect", "drive",
-   "-effects turn -effect_turn_type drive -effect_turn_on end -effect_turn_angle 100*t -effect_turn_axis "
+  {"effect", "fixed", "-effects clamp -effect_clamp_type fixed -effect_clamp_on end", NULL, NULL, PETSC_TRUE},
+  {"effect", "prescribed_displacement",
+   "-effects turn -effect_turn_type prescribed_displacement -effect_turn_on end -effect_turn_angle 100*t "
+   "-effect_turn_axis "
    "1,0,0 "
    "-effect_turn_axis_point 0,0.05,0.05",
    NULL, NULL, PETSC_TRUE},
@@ -77,7 +77,7 @@ static const Part parts[] = {
   {"time", "euler_explicit", "-time euler_explicit -ts_dt 1e-4 -ts_max_time 8e-4", NULL, "", PETSC_FALSE},
   {"time", "alpha2", "-time alpha2", NULL, "", PETSC_FALSE},
   {"time", "static", "-time static -static_steps " PART_STEPS,
-   "-effects gravity,clamp -effect_clamp_type support -effect_clamp_on end ", "", PETSC_FALSE},
+   "-effects gravity,clamp -effect_clamp_type fixed -effect_clamp_on end ", "", PETSC_FALSE},
   {"output", "fields", "-output_fields displacement,velocity,von_mises", NULL,
    "SbOut_fields,SbField_displacement,SbField_velocity,SbField_von_mises,SbField_body", PETSC_FALSE},
   {"output", "contacts", "-output_contacts true", PART_FLOOR "-output_fields displacement ", NULL,

@@ -2,7 +2,7 @@
   slivers.h - a box of tets, some of them so flat that their smallest dihedral angle is a given one.
 
   Inner vertices whose stars share no tet are moved, each along a random direction, until the first tet of its star has the angle; so
-  many of them, in random order, that the part of the tets that is wanted has it. No tet is turned inside out.
+  many of them, in random order, that the part of the tets that is wanted has it. No tet is inverted.
 */
 #pragma once
 #include "verify/verify.h"

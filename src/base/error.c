@@ -23,7 +23,7 @@ static struct {
   char message[2048];  /* of the last error */
   char file[256];      /* option files, for messages about YAML */
   const char *program; /* begins every line */
-  void (*farewell)(const char *message, void *ctx); /* called by the rank that speaks for the run */
+  void (*failure_handler)(const char *message, void *ctx); /* called by the rank that speaks for the run */
   void *farewell_ctx;
 } state = {.comm = MPI_COMM_NULL, .program = "supple"};
 
@@ -129,16 +129,16 @@ void SbErrorPost(const char *format, ...)
   state.pending = state.posted = PETSC_TRUE;
 }
 
-void SbErrorSetFarewell(void (*farewell)(const char *message, void *ctx), void *ctx)
+void SbErrorSetFailureHandler(void (*failure_handler)(const char *message, void *ctx), void *ctx)
 {
-  state.farewell = farewell;
+  state.failure_handler = failure_handler;
   state.farewell_ctx = ctx;
 }
 
 /* What the run has to say, by one rank. */
 static void speak(void)
 {
-  if (state.farewell) (*state.farewell)(state.message, state.farewell_ctx);
+  if (state.failure_handler) (*state.failure_handler)(state.message, state.farewell_ctx);
   (void)fflush(stdout);
   (void)fprintf(stderr, "%s: error: %s\n", state.program, state.message);
   (void)fflush(stderr);
@@ -179,7 +179,7 @@ int SbErrorFinish(PetscErrorCode ierr)
 PetscErrorCode SbCatchError(MPI_Comm comm, int line, const char *function, const char *file,
                             PetscErrorCode code, PetscErrorType kind, const char *text, void *ctx)
 {
-  SbCaught *caught = (SbCaught *)ctx;
+  SbCaughtError *caught = (SbCaughtError *)ctx;
 
   if (kind == PETSC_ERROR_INITIAL) {
     caught->code = (int)code;

@@ -107,7 +107,7 @@ static PetscErrorCode unknown_name(const Parser *p, const char *at, const char *
   for (int i = 0; i < 4; i++) known[n++] = variables[i];
   known[n++] = "pi";
   if (strlen(name) > 1)
-    PetscCall(SbNearest(name, n, known, sizeof(near), near));
+    PetscCall(SbNearestNames(name, n, known, sizeof(near), near));
   else
     near[0] = 0;
   PetscCall(PetscSNPrintf(

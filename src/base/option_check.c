@@ -38,7 +38,8 @@ static PetscInt edit_distance(const char *a, const char *b)
   return row[na % 3][nb];
 }
 
-PetscErrorCode SbNearest(const char *word, PetscInt n, const char *const names[], size_t size, char text[])
+PetscErrorCode SbNearestNames(const char *word, PetscInt n, const char *const names[], size_t size,
+                              char text[])
 {
   const PetscInt farthest = strlen(word) < 6 ? 1 : 2; /* edits that still look like a slip */
   PetscInt best = farthest + 1, nbest = 0;
@@ -198,7 +199,7 @@ static PetscErrorCode near_options(const char *dashed, size_t size, char text[])
       n++;
     }
   }
-  PetscCall(SbNearest(dashed, n, list, size, text));
+  PetscCall(SbNearestNames(dashed, n, list, size, text));
   PetscCall(PetscFree2(list, names));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -386,7 +387,7 @@ PetscErrorCode SbOptionMissing(const SbOptionRecord *r)
   PetscCall(PetscMalloc1(nleft, &list));
   for (PetscInt i = 0; i < nleft; i++)
     if (may_be_misspelt(names[i], r)) list[n++] = names[i];
-  PetscCall(SbNearest(r->name + 1, n, list, sizeof(near), near));
+  PetscCall(SbNearestNames(r->name + 1, n, list, sizeof(near), near));
   PetscCall(PetscFree(list));
   PetscCall(PetscOptionsLeftRestore(NULL, &nleft, &names, NULL));
   PetscCheck(!near[0], PETSC_COMM_SELF, PETSC_ERR_USER, "-%s is not an option of supple; did you mean %s?",

@@ -237,7 +237,7 @@ static PetscErrorCode nearest_choice(const char *range, const char *word, size_t
     (void)next_piece(&range, '|', SB_NAME_MAX, words[i]);
     list[i] = words[i];
   }
-  PetscCall(SbNearest(word, n, list, size, text));
+  PetscCall(SbNearestNames(word, n, list, size, text));
   PetscCall(PetscFree2(words, list));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -291,7 +291,7 @@ PetscErrorCode SbOptionFormulas(const SbScope *scope, const char *key, SbFormula
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbOptionAhead(const SbScope *scope, const char *key)
+PetscErrorCode SbOptionCheckEarly(const SbScope *scope, const char *key)
 {
   const SbOption *row = SbOptionFind(scope, key);
   PetscReal x[SB_OPTION_COUNT_MAX];

@@ -1,5 +1,5 @@
 /*
-  brute.c - contact detection that looks at every pair of boxes: the reference for the other kinds, quick for a handful of facets.
+  brute.c - contact detection that examines every pair of boxes: the reference for the other kinds, quick for a handful of facets.
 */
 #include "detect.h"
 
@@ -12,7 +12,7 @@ static PetscErrorCode search_brute(SbDetector d, const SbDetectScene *s)
     d->start[i] = (PetscInt)n;
     PetscCall(SbCandidatesReserve(d, n + s->nfacet));
     for (PetscInt f = 0; f < s->nfacet; f++) {
-      if (SbBoxesMeet(d->point_box + 6 * i, d->facet_box + 6 * f) && SbDetectPairWanted(s, i, f))
+      if (SbBoxesOverlap(d->point_box + 6 * i, d->facet_box + 6 * f) && SbDetectPairWanted(s, i, f))
         d->candidate[n++] = f;
     }
   }
@@ -23,7 +23,7 @@ static PetscErrorCode search_brute(SbDetector d, const SbDetectScene *s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode sb_detector_brute(SbDetector d)
+PetscErrorCode SbDetectorCreate_Brute(SbDetector d)
 {
   PetscFunctionBeginUser;
   d->ops = (SbDetectorOps){.name = "brute", .search = search_brute};

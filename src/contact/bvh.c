@@ -4,7 +4,7 @@
   The trees are made when the facets are other ones (tree.c); in every call their volumes are fitted to where things are now, from the
   last node to the first, since children come after their node. A volume holds the swept motion; those of facets are grown by the
   reach. When the volumes of inner nodes have grown by more than GROWTH against those of single facets, compared with the
-  last build, the trees are made anew.
+  last build, the trees are rebuilt.
 
   The search walks through both trees at once, from the pair of roots: all children of the point's node are tested against all children of
   the facet's node in one sweep (volume.c), and the pairs that meet are followed. What meets at the leaves are the candidates, in the
@@ -69,7 +69,7 @@ typedef struct {
 } Bvh;
 
 #define NO_PART PETSC_MIN_INT
-#define GROWTH 2 /* of the volumes until the trees are made anew */
+#define GROWTH 2 /* of the volumes until the trees are rebuilt */
 #define ROW \
   ((SbMeets)0xFF) /* pairs of child 0 of a node of points with all of a node of facets; child c: << 8 c */
 #define COLUMN \
@@ -619,7 +619,7 @@ PetscErrorCode SbBvhGetCounts(SbDetector d, SbBvhCounts *counts)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode sb_detector_bvh(SbDetector d)
+PetscErrorCode SbDetectorCreate_BVH(SbDetector d)
 {
   Bvh *b;
 

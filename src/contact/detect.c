@@ -1,15 +1,15 @@
 /*
   detect.c - contact detection on one rank: boxes of facets and points, candidates by a kind of detector, then near.c.
 
-  A box holds its facet at the end and, when the motion is looked at, at the start of the step, and so everything in between: corners
+  A box holds its facet at the end and, when the motion is examined, at the start of the step, and so everything in between: corners
   move on straight lines. Two that come within the reach, or cross, have boxes that meet.
 */
 #include "detect.h"
 
 static PetscErrorCode (*const constructors[])(SbDetector) = {
-  [SB_DETECT_HASH] = sb_detector_hash,
-  [SB_DETECT_BVH] = sb_detector_bvh,
-  [SB_DETECT_BRUTE] = sb_detector_brute,
+  [SB_DETECT_HASH] = SbDetectorCreate_Hash,
+  [SB_DETECT_BVH] = SbDetectorCreate_BVH,
+  [SB_DETECT_BRUTE] = SbDetectorCreate_Brute,
 };
 
 PetscErrorCode SbDetectorCreate(SbDetectKind kind, SbDetector *detector)
@@ -110,7 +110,7 @@ PetscErrorCode SbDetectBegin(SbDetector d, const SbDetectScene *s)
 {
   PetscFunctionBeginUser;
   d->same_facets = (PetscBool)(d->nfacet == s->nfacet && d->version == s->version);
-  d->nfacet = -1; /* should the search fail, the next call begins anew */
+  d->nfacet = -1; /* should the search fail, the next call begins again */
   PetscCall(reserve(d, s));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -29,7 +29,7 @@ PetscErrorCode SbEdgesDestroy(SbEdges *edges);
 /* An edge where it is. */
 typedef struct {
   const PetscReal *x[4];  /* ends, third corners of its two facets, m */
-  const PetscReal *x0[2]; /* ends at the start of the step, m; NULL: motion is not looked at */
+  const PetscReal *x0[2]; /* ends at the start of the step, m; NULL: motion is not examined */
   PetscReal thick;        /* as in SbEdges, m */
   PetscReal into[2][3];   /* unit vectors across the edge into its facets */
 } SbEdgePlace;

@@ -3,7 +3,7 @@
   edge_meet.c.
 
   Sharp edges are usually few: the kind searches a scene of its own in which own sharp edges are the points and all edges that are not flat are
-  facets without area, with boxes that hold their motion. On a smooth surface the whole cost is one look at each edge.
+  facets without area, with boxes that hold their motion. On a smooth surface the whole cost is one examine each edge.
 */
 #include "detect.h"
 #include "edge.h"
@@ -218,7 +218,7 @@ static void insert(const SbEdges *e, PetscInt first, PetscInt n, SbEdgePair pair
   pair[j] = last;
 }
 
-/* All pairs among the candidates. Each is looked at once: from the sharp edge, of two from that with the lower identity. */
+/* All pairs among the candidates. Each is examined once: from the sharp edge, of two from that with the lower identity. */
 static PetscErrorCode narrow(Sharp *q, const SbDetectScene *s, PetscInt *n)
 {
   const SbDetector d = q->search;

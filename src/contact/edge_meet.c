@@ -9,7 +9,7 @@
 
   A gap that is negative by more than rounding is a penetration only if the edges are in each other's part: it is less than the parts are
   thick there, or one of them pierces a facet at the other one. Without that, the edges of the far sides of two thin bars would be a
-  pair. When bodies overlap far, the way out past edges is seldom the
+  pair. When bodies overlap far, the separation direction past edges is seldom the
   shortest: then points part them first. Edges that went through each other
   within the step are found at any depth (cross.c).
 
@@ -161,7 +161,7 @@ static PetscBool went_through(const SbEdgePlace *first, const SbEdgePlace *secon
     f1[0] = f1[1];
     f1[1] = t;
   }
-  return SbEdgeCrossing(first->x0, first->x, f0, f1, tolerance, &time, &behind);
+  return SbCCDEdgeEdge(first->x0, first->x, f0, f1, tolerance, &time, &behind);
 }
 
 /* The least cosine between a normal of the edge and those of its facets: of a way along it the part that leads away from a facet. */

@@ -48,9 +48,9 @@ static void look_at(SbHalo *h, PetscInt npart, PetscInt n, const PetscInt part[]
 }
 
 /* The same over all ranks. */
-static PetscErrorCode reduce_motion(SbSurface s)
+static PetscErrorCode reduce_motion(SbContactSurface s)
 {
-  SbSurfaceData *d = (SbSurfaceData *)s->data;
+  SbContactSurfaceData *d = (SbContactSurfaceData *)s->data;
   SbHalo *h = &d->halo;
   const PetscInt n = 6 * d->npart;
   PetscMPIInt count;
@@ -82,7 +82,7 @@ static PetscErrorCode are_close(SbHalo *h, PetscInt npart, PetscReal reach, Pets
     const PetscReal *a = h->reduced + 6 * h->order[i];
 
     for (PetscInt j = i + 1; j < npart && h->low[j] - reach <= a[3] && !*close; j++)
-      *close = SbBoxNear(a, h->reduced + 6 * h->order[j], reach);
+      *close = SbBoxesWithin(a, h->reduced + 6 * h->order[j], reach);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -90,9 +90,9 @@ static PetscErrorCode are_close(SbHalo *h, PetscInt npart, PetscReal reach, Pets
 /* ------------------------------------------------------------------ facets from rank to rank */
 
 /* What does not move of the facets in the list. */
-static void pack(SbSurface s, PetscInt number[], PetscReal real[])
+static void pack(SbContactSurface s, PetscInt number[], PetscReal real[])
 {
-  const SbSurfaceData *d = (const SbSurfaceData *)s->data;
+  const SbContactSurfaceData *d = (const SbContactSurfaceData *)s->data;
   const SbHalo *h = &d->halo;
 
   for (PetscInt i = 0; i < h->to_start[h->nto]; i++, number += NUMBERS, real += REALS) {
@@ -109,13 +109,13 @@ static void pack(SbSurface s, PetscInt number[], PetscReal real[])
 }
 
 /* The scene gets the facets of others; its version grows when they are other ones. */
-static PetscErrorCode unpack(SbSurface s, PetscInt n, const PetscInt number[], const PetscReal real[])
+static PetscErrorCode unpack(SbContactSurface s, PetscInt n, const PetscInt number[], const PetscReal real[])
 {
-  SbSurfaceData *d = (SbSurfaceData *)s->data;
+  SbContactSurfaceData *d = (SbContactSurfaceData *)s->data;
   PetscBool same = (PetscBool)(s->scene.nfacet == s->nfacet_owned + n);
 
   PetscFunctionBeginUser;
-  PetscCall(SbSurfaceSetForeign(s, n));
+  PetscCall(SbContactSurfaceSetForeign(s, n));
   for (PetscInt i = 0; i < n; i++, number += NUMBERS, real += REALS) {
     const PetscInt f = s->nfacet_owned + i, c = d->ncorner_owned + 3 * i;
 
@@ -133,7 +133,7 @@ static PetscErrorCode unpack(SbSurface s, PetscInt n, const PetscInt number[], c
   }
   if (!same) {
     s->scene.version++;
-    PetscCall(SbSurfaceOtherEdges(s));
+    PetscCall(SbContactSurfaceOtherEdges(s));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -195,9 +195,9 @@ static PetscInt drop_silent(PetscInt n, PetscMPIInt rank[], PetscInt start[])
 }
 
 /* Sends what does not move of the listed facets. */
-static PetscErrorCode exchange_facets(SbSurface s)
+static PetscErrorCode exchange_facets(SbContactSurface s)
 {
-  SbSurfaceData *d = (SbSurfaceData *)s->data;
+  SbContactSurfaceData *d = (SbContactSurfaceData *)s->data;
   SbHalo *h = &d->halo;
   PetscInt *number, nsend, nrecv;
   PetscReal *real;
@@ -223,9 +223,9 @@ static PetscErrorCode exchange_facets(SbSurface s)
 }
 
 /* Makes the list. `motion`: largest in the step, m. */
-static PetscErrorCode build(SbSurface s, const PetscReal u0[], const PetscReal u[], PetscReal motion)
+static PetscErrorCode build(SbContactSurface s, const PetscReal u0[], const PetscReal u[], PetscReal motion)
 {
-  SbSurfaceData *d = (SbSurfaceData *)s->data;
+  SbContactSurfaceData *d = (SbContactSurfaceData *)s->data;
   SbHalo *h = &d->halo;
 
   PetscFunctionBeginUser;
@@ -248,9 +248,9 @@ static PetscErrorCode build(SbSurface s, const PetscReal u0[], const PetscReal u
 }
 
 /* Positions of the listed facets. */
-static PetscErrorCode exchange_positions(SbSurface s, PetscBool moving)
+static PetscErrorCode exchange_positions(SbContactSurface s, PetscBool moving)
 {
-  SbSurfaceData *d = (SbSurfaceData *)s->data;
+  SbContactSurfaceData *d = (SbContactSurfaceData *)s->data;
   SbHalo *h = &d->halo;
   const size_t n = 9 * (size_t)h->to_start[h->nto];
   PetscInt nrequest = 0;
@@ -274,9 +274,9 @@ static PetscErrorCode exchange_positions(SbSurface s, PetscBool moving)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbHaloUpdate(SbSurface s, const PetscReal u0[], const PetscReal u[], PetscBool *close)
+PetscErrorCode SbHaloUpdate(SbContactSurface s, const PetscReal u0[], const PetscReal u[], PetscBool *close)
 {
-  SbSurfaceData *d = (SbSurfaceData *)s->data;
+  SbContactSurfaceData *d = (SbContactSurfaceData *)s->data;
   SbHalo *h = &d->halo;
   const PetscReal *most = h->reduced + 6 * d->npart;
 
@@ -296,9 +296,9 @@ PetscErrorCode SbHaloUpdate(SbSurface s, const PetscReal u0[], const PetscReal u
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbHaloCreate(SbSurface s)
+PetscErrorCode SbHaloCreate(SbContactSurface s)
 {
-  SbSurfaceData *d = (SbSurfaceData *)s->data;
+  SbContactSurfaceData *d = (SbContactSurfaceData *)s->data;
   SbHalo *h = &d->halo;
 
   PetscFunctionBeginUser;

@@ -33,9 +33,9 @@ typedef struct {
 } Plan;
 
 /* Boxes of own corners, points, edges and facets; a facet's holds all copies of its vertices. */
-static PetscErrorCode sweep(SbSurface s, const PetscReal u0[], const PetscReal u[], Plan *plan)
+static PetscErrorCode sweep(SbContactSurface s, const PetscReal u0[], const PetscReal u[], Plan *plan)
 {
-  SbSurfaceData *d = (SbSurfaceData *)s->data;
+  SbContactSurfaceData *d = (SbContactSurfaceData *)s->data;
   PetscReal *swept = d->halo.swept, *vertex, x[3];
 
   PetscFunctionBeginUser;
@@ -53,42 +53,42 @@ static PetscErrorCode sweep(SbSurface s, const PetscReal u0[], const PetscReal u
     PetscReal *box = plan->look + 6 * (s->scene.npoint + i);
 
     SbBoxClear(box);
-    for (int k = 0; k < 2; k++) SbBoxUnite(box, swept + 6 * d->edges.corner[4 * i + k]);
+    for (int k = 0; k < 2; k++) SbBoxMerge(box, swept + 6 * d->edges.corner[4 * i + k]);
   }
   PetscCall(PetscMalloc1(6 * s->nfacet_owned, &plan->facet));
   PetscCall(PetscMalloc1(6 * d->nvertex, &vertex));
   for (PetscInt v = 0; v < d->nvertex; v++) SbBoxClear(vertex + 6 * v);
   for (PetscInt i = 0; i < 3 * d->nlocal; i++) {
-    const SbSurfaceFacet *f = &d->local[i / 3];
+    const SbContactSurfaceFacet *f = &d->local[i / 3];
 
-    SbSurfacePlace(s->space, f->at[i % 3], u, x);
+    SbContactSurfacePosition(s->space, f->at[i % 3], u, x);
     SbBoxAdd(vertex + 6 * f->vertex[i % 3], x);
-    if (u0) SbSurfacePlace(s->space, f->at[i % 3], u0, x);
+    if (u0) SbContactSurfacePosition(s->space, f->at[i % 3], u0, x);
     SbBoxAdd(vertex + 6 * f->vertex[i % 3], x);
   }
   for (PetscInt i = 0; i < d->nlocal; i++) {
-    const SbSurfaceFacet *f = &d->local[i];
+    const SbContactSurfaceFacet *f = &d->local[i];
 
     if (f->own < 0) continue;
     SbBoxClear(plan->facet + 6 * f->own);
-    for (int k = 0; k < 3; k++) SbBoxUnite(plan->facet + 6 * f->own, vertex + 6 * f->vertex[k]);
+    for (int k = 0; k < 3; k++) SbBoxMerge(plan->facet + 6 * f->own, vertex + 6 * f->vertex[k]);
   }
   PetscCall(PetscFree(vertex));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* The part of what looks. */
-static inline PetscInt look_part(SbSurface s, PetscInt i)
+static inline PetscInt look_part(SbContactSurface s, PetscInt i)
 {
-  const SbSurfaceData *d = (const SbSurfaceData *)s->data;
+  const SbContactSurfaceData *d = (const SbContactSurfaceData *)s->data;
 
   return i < s->scene.npoint ? d->point_part[i] : d->edges.part[i - s->scene.npoint];
 }
 
 /* The parts on each rank, with the boxes of what looks and of their facets there. */
-static PetscErrorCode gather_parts(SbSurface s, Plan *plan)
+static PetscErrorCode gather_parts(SbContactSurface s, Plan *plan)
 {
-  const SbSurfaceData *d = (const SbSurfaceData *)s->data;
+  const SbContactSurfaceData *d = (const SbContactSurfaceData *)s->data;
   const SbHalo *h = &d->halo;
   PetscMPIInt *count, mine;
 
@@ -103,11 +103,11 @@ static PetscErrorCode gather_parts(SbSurface s, Plan *plan)
     const PetscInt part = look_part(s, i);
 
     plan->mine[ENTRY * part] = (PetscReal)part;
-    SbBoxUnite(plan->mine + ENTRY * part + 1, plan->look + 6 * i);
+    SbBoxMerge(plan->mine + ENTRY * part + 1, plan->look + 6 * i);
   }
   for (PetscInt f = 0; f < s->nfacet_owned; f++) {
     plan->mine[ENTRY * d->facet_part[f]] = (PetscReal)d->facet_part[f];
-    SbBoxUnite(plan->mine + ENTRY * d->facet_part[f] + 7, plan->facet + 6 * f);
+    SbBoxMerge(plan->mine + ENTRY * d->facet_part[f] + 7, plan->facet + 6 * f);
   }
   for (PetscInt b = 0; b < d->npart; b++) {
     if (plan->mine[ENTRY * b] < 0) continue;
@@ -150,8 +150,8 @@ static PetscErrorCode find_neighbours(SbHalo *h, const Plan *plan)
         const PetscReal *own = plan->mine + ENTRY * i;
 
         if (!wanted(h, own[0], theirs[0])) continue;
-        if (SbBoxNear(theirs + 1, own + 7, plan->grown)) gives = PETSC_TRUE;
-        if (SbBoxNear(own + 1, theirs + 7, plan->grown)) takes = PETSC_TRUE;
+        if (SbBoxesWithin(theirs + 1, own + 7, plan->grown)) gives = PETSC_TRUE;
+        if (SbBoxesWithin(own + 1, theirs + 7, plan->grown)) takes = PETSC_TRUE;
       }
     }
     if (gives) h->to[h->nto++] = r;
@@ -167,7 +167,7 @@ static PetscBool near_rank(const SbHalo *h, const Plan *plan, PetscMPIInt r, Pet
   for (PetscMPIInt j = plan->start[r]; j < plan->start[r + 1]; j++) {
     const PetscReal *theirs = plan->entry + ENTRY * j;
 
-    if (wanted(h, part, theirs[0]) && SbBoxNear(box, theirs + 7, plan->grown)) return PETSC_TRUE;
+    if (wanted(h, part, theirs[0]) && SbBoxesWithin(box, theirs + 7, plan->grown)) return PETSC_TRUE;
   }
   return PETSC_FALSE;
 }
@@ -208,7 +208,7 @@ static void split(const PetscReal swept[], PetscReal part, int depth, PetscInt n
   int axis = 0;
 
   SbBoxClear(box);
-  for (PetscInt i = 0; i < n; i++) SbBoxUnite(box, swept + 6 * index[i]);
+  for (PetscInt i = 0; i < n; i++) SbBoxMerge(box, swept + 6 * index[i]);
   if (!depth || n <= LEAST) {
     plan->near[plan->nnear][0] = part;
     for (int k = 0; k < 6; k++) plan->near[plan->nnear][1 + k] = box[k];
@@ -224,9 +224,9 @@ static void split(const PetscReal swept[], PetscReal part, int depth, PetscInt n
 }
 
 /* Boxes of what looks within the facet boxes of neighbours. */
-static PetscErrorCode find_near(SbSurface s, Plan *plan)
+static PetscErrorCode find_near(SbContactSurface s, Plan *plan)
 {
-  const SbSurfaceData *d = (const SbSurfaceData *)s->data;
+  const SbContactSurfaceData *d = (const SbContactSurfaceData *)s->data;
   const SbHalo *h = &d->halo;
   PetscInt n = 0, *index, *part;
 
@@ -252,19 +252,19 @@ static PetscErrorCode find_near(SbSurface s, Plan *plan)
 }
 
 /* Appends the own facets that are near n boxes of points; room for all is there. */
-static void choose(SbSurface s, const Plan *plan, PetscInt n, PetscReal (*box)[7], PetscInt *nsend,
+static void choose(SbContactSurface s, const Plan *plan, PetscInt n, PetscReal (*box)[7], PetscInt *nsend,
                    PetscInt send[])
 {
-  const SbSurfaceData *d = (const SbSurfaceData *)s->data;
+  const SbContactSurfaceData *d = (const SbContactSurfaceData *)s->data;
   PetscReal all[6];
 
   SbBoxClear(all);
-  for (PetscInt j = 0; j < n; j++) SbBoxUnite(all, box[j] + 1);
+  for (PetscInt j = 0; j < n; j++) SbBoxMerge(all, box[j] + 1);
   for (PetscInt f = 0; f < s->nfacet_owned; f++) {
-    if (!SbBoxNear(plan->facet + 6 * f, all, plan->grown)) continue;
+    if (!SbBoxesWithin(plan->facet + 6 * f, all, plan->grown)) continue;
     for (PetscInt j = 0; j < n; j++) {
       if (!wanted(&d->halo, box[j][0], (PetscReal)d->facet_part[f])) continue;
-      if (!SbBoxNear(plan->facet + 6 * f, box[j] + 1, plan->grown)) continue;
+      if (!SbBoxesWithin(plan->facet + 6 * f, box[j] + 1, plan->grown)) continue;
       send[(*nsend)++] = f;
       break;
     }
@@ -272,9 +272,9 @@ static void choose(SbSurface s, const Plan *plan, PetscInt n, PetscReal (*box)[7
 }
 
 /* Receives the points' boxes of each rank in `to` and lists the facets for it. */
-static PetscErrorCode choose_all(SbSurface s, const Plan *plan)
+static PetscErrorCode choose_all(SbContactSurface s, const Plan *plan)
 {
-  SbSurfaceData *d = (SbSurfaceData *)s->data;
+  SbContactSurfaceData *d = (SbContactSurfaceData *)s->data;
   SbHalo *h = &d->halo;
   PetscInt n = 0, room = 0;
 
@@ -303,9 +303,9 @@ static PetscErrorCode choose_all(SbSurface s, const Plan *plan)
 }
 
 /* Own boxes of points to those who have the facets, theirs to the list of what to send. */
-static PetscErrorCode agree(SbSurface s, Plan *plan)
+static PetscErrorCode agree(SbContactSurface s, Plan *plan)
 {
-  SbSurfaceData *d = (SbSurfaceData *)s->data;
+  SbContactSurfaceData *d = (SbContactSurfaceData *)s->data;
   SbHalo *h = &d->halo;
   PetscReal(*out)[7];
   PetscInt n = 0;
@@ -331,9 +331,9 @@ static PetscErrorCode agree(SbSurface s, Plan *plan)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbHaloPlan(SbSurface s, const PetscReal u0[], const PetscReal u[], PetscReal grown)
+PetscErrorCode SbHaloPlan(SbContactSurface s, const PetscReal u0[], const PetscReal u[], PetscReal grown)
 {
-  SbSurfaceData *d = (SbSurfaceData *)s->data;
+  SbContactSurfaceData *d = (SbContactSurfaceData *)s->data;
   Plan plan = {.grown = grown};
 
   PetscFunctionBeginUser;

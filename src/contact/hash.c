@@ -10,7 +10,7 @@
   The cells are as wide as the boxes of the facets on average, which hold the reach and the motion; the table has two to four slots per
   entry. What would cover very many cells is not put into them: a facet is then tested against all points, a point against all facets.
   Before that, points outside the boxes around the other parts' facets are left out, and facets outside the boxes around the others'
-  points. Time and memory grow linearly with points and facets. All is made anew at each call.
+  points. Time and memory grow linearly with points and facets. All is rebuilt at each call.
 */
 #include "detect.h"
 
@@ -41,7 +41,7 @@ typedef struct {
   Entry *entry;
   PetscInt nkept, nlone, nfacet;
   PetscInt *kept;  /* [nkept] points in cells; from the end, [nlone] points in too many */
-  PetscInt *facet; /* [nfacet] that are looked at */
+  PetscInt *facet; /* [nfacet] that are examined */
   PetscInt *pair;  /* [npair][2] point, facet */
   PetscInt64 npair, wide;
   PetscInt npart;
@@ -118,7 +118,7 @@ static PetscBool wanted(const Hash *h, const SbDetectScene *s, PetscInt part, Pe
   const PetscInt own = s->self || h->npart == 1 ? -1 : part;
 
   for (PetscInt k = 0; k < h->npart; k++) {
-    if (k != own && SbBoxesMeet(box, facets ? h->part[k].facets : h->part[k].points)) return PETSC_TRUE;
+    if (k != own && SbBoxesOverlap(box, facets ? h->part[k].facets : h->part[k].points)) return PETSC_TRUE;
   }
   return PETSC_FALSE;
 }
@@ -278,7 +278,7 @@ static PetscErrorCode test_all(Hash *h, SbDetector d, const SbDetectScene *s, Pe
   PetscFunctionBeginUser;
   PetscCall(reserve_pairs(h, n));
   for (PetscInt i = 0; i < n; i++) {
-    if (SbBoxesMeet(d->point_box + 6 * point[i], d->facet_box + 6 * facet) &&
+    if (SbBoxesOverlap(d->point_box + 6 * point[i], d->facet_box + 6 * facet) &&
         SbDetectPairWanted(s, point[i], facet))
       pair(h, d, point[i], facet);
   }
@@ -306,7 +306,7 @@ static PetscErrorCode look_up(Hash *h, SbDetector d, const SbDetectScene *s, Pet
 
     if (a->part != own && i >= first && i <= last && a->cell[1] == j && a->cell[2] == k &&
         !(a->above & (above | (i > lo[0]))) &&
-        SbBoxesMeet(d->point_box + 6 * a->point, d->facet_box + 6 * facet))
+        SbBoxesOverlap(d->point_box + 6 * a->point, d->facet_box + 6 * facet))
       pair(h, d, a->point, facet);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -397,7 +397,7 @@ static PetscErrorCode destroy_hash(SbDetector d)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode sb_detector_hash(SbDetector d)
+PetscErrorCode SbDetectorCreate_Hash(SbDetector d)
 {
   Hash *h;
 

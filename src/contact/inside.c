@@ -23,7 +23,7 @@
 #define REST 2 /* in reaches: tets that are nearer at rest are its own surroundings (near.c) */
 
 struct _p_SbInside {
-  SbSurface surface;
+  SbContactSurface surface;
   SbDetector detector;
   PetscInt ncell;
   PetscInt *cell; /* [ncell] own cells of the parts that have a surface anywhere */
@@ -46,7 +46,7 @@ typedef struct {
 /* Own cells of the parts that have a surface anywhere. */
 static PetscErrorCode list_cells(SbInside in)
 {
-  const SbSurfaceData *d = (const SbSurfaceData *)in->surface->data;
+  const SbContactSurfaceData *d = (const SbContactSurfaceData *)in->surface->data;
   const SbMesh mesh = in->surface->space->mesh;
   PetscInt *wanted; /* [npart] */
 
@@ -64,7 +64,7 @@ static PetscErrorCode list_cells(SbInside in)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbInsideCreate(SbSurface surface, SbDetectKind kind, SbInside *inside)
+PetscErrorCode SbInsideCreate(SbContactSurface surface, SbDetectKind kind, SbInside *inside)
 {
   SbInside in;
 
@@ -123,7 +123,7 @@ static PetscErrorCode address(const SbHalo *h, Mail *mail)
 /* The boxes of the tets of all parts on all ranks, [start[size]][BOX]; room for them is allocated. */
 static PetscErrorCode gather_boxes(SbInside in, const PetscReal tet[], PetscMPIInt start[], PetscReal **all)
 {
-  const SbSurfaceData *d = (const SbSurfaceData *)in->surface->data;
+  const SbContactSurfaceData *d = (const SbContactSurfaceData *)in->surface->data;
   const SbHalo *h = &d->halo;
   PetscReal *mine;
   PetscMPIInt n = 0, *count, *at;
@@ -137,7 +137,7 @@ static PetscErrorCode gather_boxes(SbInside in, const PetscReal tet[], PetscMPII
   }
   for (PetscInt j = 0; j < in->ncell; j++) {
     mine[BOX * in->part[j]] = (PetscReal)in->part[j];
-    SbBoxUnite(mine + BOX * in->part[j] + 1, tet + 6 * j);
+    SbBoxMerge(mine + BOX * in->part[j] + 1, tet + 6 * j);
   }
   for (PetscInt b = 0; b < d->npart; b++) {
     if (mine[BOX * b] < 0) continue;
@@ -158,7 +158,7 @@ static PetscErrorCode gather_boxes(SbInside in, const PetscReal tet[], PetscMPII
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Whether a point is within one of n boxes of tets that it is looked for in. */
+/* Whether a point is within one of n boxes of tets that it is searched for in. */
 static PetscBool within(PetscInt n, const PetscReal box[], PetscBool self, PetscInt part,
                         const PetscReal x[3])
 {
@@ -178,7 +178,7 @@ static PetscBool within(PetscInt n, const PetscReal box[], PetscBool self, Petsc
 static PetscErrorCode ask(SbInside in, const PetscReal u[], PetscBool self, const PetscReal tet[], Mail *mail,
                           PetscInt **sent, PetscReal **asked)
 {
-  const SbSurfaceData *d = (const SbSurfaceData *)in->surface->data;
+  const SbContactSurfaceData *d = (const SbContactSurfaceData *)in->surface->data;
   const SbHalo *h = &d->halo;
   const SbSpace space = in->surface->space;
   PetscReal *box, *x, *out;
@@ -265,7 +265,7 @@ static Place place_in(SbInside in, PetscInt j, const PetscReal u[], const PetscR
   const uint64_t *face = in->surface->space->mesh->face_set + 4 * in->cell[j];
   PetscReal x[4][3], e[4][3], weight[4] = {1}, all, longest = 0;
 
-  for (int k = 0; k < 4; k++) SbSurfacePlace(in->surface->space, 4 * in->cell[j] + k, u, x[k]);
+  for (int k = 0; k < 4; k++) SbContactSurfacePosition(in->surface->space, 4 * in->cell[j] + k, u, x[k]);
   for (int k = 1; k < 4; k++) {
     for (int i = 0; i < 3; i++) e[k][i] = x[k][i] - x[0][i];
     longest = PetscMax(longest, SbDot3(e[k], e[k]));
@@ -323,7 +323,7 @@ static PetscErrorCode answer(SbInside in, const PetscReal u[], PetscBool self, P
 
   PetscFunctionBeginUser;
   PetscCall(PetscMalloc1(n, &mine));
-  PetscCall(PetscCalloc1(((const SbSurfaceData *)in->surface->data)->npart, &seen));
+  PetscCall(PetscCalloc1(((const SbContactSurfaceData *)in->surface->data)->npart, &seen));
   for (PetscInt i = 0; i < n; i++) mine[i] = (PetscInt)asked[ASK * i + 6];
   s.point_part = mine;
   PetscCall(SbDetectBegin(d, &s));
@@ -350,7 +350,7 @@ static PetscErrorCode box_tets(SbInside in, const PetscReal u[])
 
     SbBoxClear(box);
     for (int k = 0; k < 4; k++) {
-      SbSurfacePlace(in->surface->space, 4 * in->cell[j] + k, u, x);
+      SbContactSurfacePosition(in->surface->space, 4 * in->cell[j] + k, u, x);
       SbBoxAdd(box, x);
     }
     SbDetectBoxGrow(ON * PetscMax(box[3] - box[0], PetscMax(box[4] - box[1], box[5] - box[2])), box);
@@ -360,7 +360,7 @@ static PetscErrorCode box_tets(SbInside in, const PetscReal u[])
 
 PetscErrorCode SbInsideFind(SbInside in, const PetscReal u[], PetscBool self, PetscInt part[])
 {
-  const SbHalo *h = &((const SbSurfaceData *)in->surface->data)->halo;
+  const SbHalo *h = &((const SbContactSurfaceData *)in->surface->data)->halo;
   PetscInt *sent;
   Answer *said, *back;
   PetscReal *asked;

@@ -1,7 +1,7 @@
 /*
   near.c - the narrow phase: from candidates to contacts.
 
-  Nearest points of triangles are those of triangle.c. Which side the point is on is told
+  Nearest points of triangles are those of closest_point.c. Which side the point is on is told
   by the pseudonormal there (Baerentzen and Aanaes, "Signed distance computation using the angle weighted pseudonormal", IEEE TVCG
   11(3), 2005): of a face its normal, of an edge the sum of its facets' normals, of a vertex their sum weighted by their angles. Facets
   belong together by the identities of their vertices, so that the open joints of CR and DG are closed.
@@ -10,7 +10,7 @@
   - is a nearest place of the surface around it, not only of its own facet: elsewhere the pseudonormal means nothing;
   - sees the point on the side where the nearest facet of all sees it: behind a thin plate one is not inside;
   - faces the point: their normals oppose each other. In a thin plate that a point has entered the back may be nearer than the front,
-    but the way out is the front;
+    but the separation direction is the front;
   - agrees with the motion: when the point went through the part's surface in this step, the normal must not point to the far side of
     where it came in, and the point must have been in front of the place: one that came over a rim is not pushed out sideways.
   When there is none, and the point went through a facet that faces it, that facet is the contact: this is how a thin plate stops what is
@@ -33,7 +33,7 @@
 /* A facet near a point, or one that it went through. */
 struct SbDetectHit {
   PetscInt part, facet, id;
-  SbTrianglePlace place;
+  SbTriangleFeature place;
   PetscBool behind; /* crossing: the point lay just behind the facet when the step began */
   PetscReal key;    /* distance, m; crossing: time */
   PetscReal weight[3];
@@ -164,7 +164,7 @@ PetscErrorCode SbDetectRingsUpdate(SbDetector d, const SbDetectScene *s)
 }
 
 /* Next facet after ring place *j that has the edge or vertex `place` of `facet`, with the corner of it; false: no more. */
-static PetscBool next_around(const SbDetectRings *r, PetscInt facet, SbTrianglePlace place, PetscInt *j,
+static PetscBool next_around(const SbDetectRings *r, PetscInt facet, SbTriangleFeature place, PetscInt *j,
                              PetscInt *g, int *corner)
 {
   const int k = place % 3;
@@ -176,7 +176,7 @@ static PetscBool next_around(const SbDetectRings *r, PetscInt facet, SbTriangleP
     *g = r->ring[*j] / 3;
     *corner = (int)(r->ring[*j] % 3);
     v = r->vertex + 3 * *g;
-    if (place <= SB_CORNER_2 || v[0] == b || v[1] == b || v[2] == b) return PETSC_TRUE;
+    if (place <= SB_FEATURE_CORNER_2 || v[0] == b || v[1] == b || v[2] == b) return PETSC_TRUE;
   }
   return PETSC_FALSE;
 }
@@ -215,7 +215,7 @@ static void pseudonormal_by_place(const Look *look, const Hit *h, const PetscRea
     subtract(other, r, other);
     if (SbDot3(other, other) > TOUCH * TOUCH * look->s->reach * look->s->reach || !unit_normal(x, n))
       continue;
-    add(o->place <= SB_CORNER_2 ? angle(x, o->place) : PETSC_PI, n, sum);
+    add(o->place <= SB_FEATURE_CORNER_2 ? angle(x, o->place) : PETSC_PI, n, sum);
   }
 }
 
@@ -235,7 +235,7 @@ static PetscBool pseudonormal(const Look *look, const Hit *h, const PetscReal r[
     if (!unit_normal(x, n))
       flat = PETSC_TRUE;
     else
-      add(h->place <= SB_CORNER_2 ? angle(x, corner) : 1, n, sum);
+      add(h->place <= SB_FEATURE_CORNER_2 ? angle(x, corner) : 1, n, sum);
   }
   if (flat) pseudonormal_by_place(look, h, r, sum);
   return normalise(sum);
@@ -274,7 +274,7 @@ static PetscBool is_nearest_around(const Look *look, const Hit *h)
 
     if (g == h->facet) continue;
     corners(look->s, look->s->x, g, x);
-    (void)SbClosestPoint(look->p, x, w, &d2);
+    (void)SbTriangleClosestPoint(look->p, x, w, &d2);
     if (d2 < limit * limit) return PETSC_FALSE;
   }
   return PETSC_TRUE;
@@ -288,7 +288,7 @@ static PetscBool measure(const Look *look, const Hit *h, SbNear *near)
 
   corners(look->s, look->s->x, h->facet, x);
   away(look->p, x, h->weight, r);
-  if (h->place == SB_INSIDE) {
+  if (h->place == SB_FEATURE_FACE) {
     if (!unit_normal(x, n)) return PETSC_FALSE;
     near->gap = SbDot3(r, n);
   } else if (h->key < AT * look->s->reach) {
@@ -323,7 +323,7 @@ static PetscBool belong_together(const SbDetectScene *s, PetscInt point, PetscIn
   if (vertex >= 0 && (v[0] == vertex || v[1] == vertex || v[2] == vertex)) return PETSC_TRUE;
   if (s->point_facet[point] >= 0 && s->point_facet[point] == s->facet_id[facet]) return PETSC_TRUE;
   corners(s, s->X, facet, x);
-  (void)SbClosestPoint(s->P + 3 * point, x, w, &d2);
+  (void)SbTriangleClosestPoint(s->P + 3 * point, x, w, &d2);
   return (PetscBool)(d2 < limit * limit);
 }
 
@@ -356,13 +356,13 @@ static PetscBool crossed(const Look *look, PetscInt facet, Hit *h)
 
   corners(s, s->x, facet, x);
   corners(s, s->x0, facet, x0);
-  if (!SbCrossing(s->p0 + 3 * look->point, look->p, x0, x, tolerance, &h->key, &h->behind))
+  if (!SbCCDPointTriangle(s->p0 + 3 * look->point, look->p, x0, x, tolerance, &h->key, &h->behind))
     return PETSC_FALSE;
   return (PetscBool)(unit_normal(x, n) && (!h->behind || SbDot3(n, look->normal) < -FACING));
 }
 
 /*
-  Facets that are looked at soon lie anywhere in memory: first their corners' numbers, later the corners. `left`: candidates of all points
+  Facets that are examined soon lie anywhere in memory: first their corners' numbers, later the corners. `left`: candidates of all points
   from here on. Always inlined: a call of what only fetches is left out by the compiler, as without effect.
 */
 SB_INLINE void prefetch_facets(const SbDetectScene *s, const PetscInt candidate[], PetscInt left)
@@ -404,7 +404,7 @@ static void look_closely(Look *look, PetscInt n, const PetscInt candidate[], Pet
     if (!SbDetectPairWanted(s, look->point, f)) continue;
     (*looked)++;
     corners(s, s->x, f, x);
-    h->place = SbClosestPoint(look->p, x, h->weight, &d2);
+    h->place = SbTriangleClosestPoint(look->p, x, h->weight, &d2);
     close = (PetscBool)(d2 <= (own && !led ? s->reach * s->reach : range2)); /* deeper is its own far side */
     through = (PetscBool)(s->x0 && may_cross(look->d, s, look->point, f) && crossed(look, f, c));
     if (!close && !through) continue;
@@ -513,7 +513,7 @@ static PetscBool passage(const Look *look, const Hit *c, SbNear *near)
 
   corners(look->s, look->s->x, c->facet, x);
   (void)unit_normal(x, near->normal);
-  (void)SbClosestPoint(look->p, x, near->weight, &d2);
+  (void)SbTriangleClosestPoint(look->p, x, near->weight, &d2);
   subtract(look->p, x[0], r);
   near->gap = SbDot3(r, near->normal);
   (void)in_by(PETSC_MAX_REAL, near);
@@ -537,7 +537,7 @@ static PetscBool along_way(const Look *look, PetscInt n, const Hit h[], SbNear *
     PetscBool leads;
 
     corners(look->s, look->s->x, h[i].facet, x);
-    if (!SbRayMeets(look->p, way, x, &t, weight, &leads) || t > least || (t == least && h[i].id > id))
+    if (!SbRayTriangle(look->p, way, x, &t, weight, &leads) || t > least || (t == least && h[i].id > id))
       continue;
     least = t;
     id = h[i].id;
@@ -553,7 +553,7 @@ static PetscBool along_way(const Look *look, PetscInt n, const Hit h[], SbNear *
   return in_by(h[0].key, near);
 }
 
-/* Of n hits of one part, how many the nearest place is looked for among: of its own part a point also has deeper ones when it is led out of it. */
+/* Of n hits of one part, how many the nearest place is searched for among: of its own part a point also has deeper ones when it is separated from it. */
 static PetscInt nearby(const Look *look, PetscInt part, PetscInt n, const Hit h[])
 {
   while (n > 0 && part == look->s->point_part[look->point] && h[n - 1].key > look->s->reach) n--;

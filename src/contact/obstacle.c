@@ -2,20 +2,20 @@
   obstacle.c - rigid obstacles by their signed distance.
 
   Each shape is a core with a radius: distance = |x - nearest point of the core| - r, the core being a point (sphere), a segment
-  (capsule), a solid box or a solid cylinder (r = 0; inside them the nearest side counts). A bowl is a sphere inside out.
-  What a closed mesh encloses is in shell.c.
+  (capsule), a solid box or a solid cylinder (r = 0; inside them the nearest side counts). A bowl is a sphere inverted.
+  What a closed mesh encloses is in signed_distance.c.
 */
 #include "sbcontact.h"
-#include "shell.h"
+#include "signed_distance.h"
 
 typedef enum { PLANE, SPHERE, BOX, CAPSULE, CYLINDER, BOWL, MESH } Shape;
 
 struct _p_SbObstacle {
   Shape shape;
   PetscReal p[7];
-  char *file;     /* mesh: its path */
-  PetscReal cell; /* mesh: of the grid, m; 0: chosen */
-  SbShell shell;  /* mesh: after SbObstacleSetUp() */
+  char *file;             /* mesh: its path */
+  PetscReal cell;         /* mesh: of the grid, m; 0: chosen */
+  SbSignedDistance shell; /* mesh: after SbObstacleSetUp() */
 };
 
 static const struct {
@@ -143,12 +143,12 @@ PetscErrorCode SbObstacleSetUp(SbObstacle o, MPI_Comm comm, const char *option, 
   PetscCall(SbTrianglesRead(comm, option, o->file, scale, at, &t));
   volume = t.volume;
   turned = t.turned;
-  PetscCall(SbShellCreate(option, &t, o->cell, &o->shell));
-  SbShellSize(o->shell, n, &cell, &bytes, &ntri);
+  PetscCall(SbSignedDistanceCreate(option, &t, o->cell, &o->shell));
+  SbSignedDistanceGetSize(o->shell, n, &cell, &bytes, &ntri);
   (void)snprintf(note, size,
                  "%s: %" PetscInt_FMT " triangles around %.4g m^3%s, grid of %" PetscInt_FMT
                  " x %" PetscInt_FMT " x %" PetscInt_FMT " cells of %.3g m, %.3g MB on every rank",
-                 o->file, ntri, (double)volume, turned ? " (turned: they were inside out)" : "", n[0], n[1],
+                 o->file, ntri, (double)volume, turned ? " (turned: they were inverted)" : "", n[0], n[1],
                  n[2], (double)cell, 1e-6 * (double)bytes);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -158,7 +158,7 @@ PetscErrorCode SbObstacleDestroy(SbObstacle *obstacle)
   PetscFunctionBeginUser;
   if (*obstacle) {
     PetscCall(PetscFree((*obstacle)->file));
-    PetscCall(SbShellDestroy(&(*obstacle)->shell));
+    PetscCall(SbSignedDistanceDestroy(&(*obstacle)->shell));
   }
   PetscCall(PetscFree(*obstacle));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -267,7 +267,7 @@ PetscReal SbObstacleDistance(SbObstacle o, const PetscReal x[3], PetscReal n[3])
   case CAPSULE:
     return from_capsule(p, x, n);
   case MESH:
-    return SbShellDistance(o->shell, x, n);
+    return SbSignedDistanceEvaluate(o->shell, x, n);
   default:
     return from_cylinder(p, x, n);
   }

@@ -14,7 +14,7 @@
 */
 #include "surface_impl.h"
 
-void SbSurfacePlace(SbSpace space, PetscInt at, const PetscReal u[], PetscReal x[3])
+void SbContactSurfacePosition(SbSpace space, PetscInt at, const PetscReal u[], PetscReal x[3])
 {
   const PetscInt cell = at / 4, *node = space->cell_node + 4 * cell;
   const PetscReal *weight = SbSpaceCellElement(space, cell)->ops.vertex[at % 4],
@@ -35,9 +35,9 @@ static inline PetscBool at_vertices(SbSpace space, PetscInt cell)
 /* ------------------------------------------------------------------ set-up */
 
 /* Facets of owned and ghost cells; numbers of the vertices on them. */
-static PetscErrorCode list_local(SbSurface s, PetscInt n, const SbFacet facet[])
+static PetscErrorCode list_local(SbContactSurface s, PetscInt n, const SbFacet facet[])
 {
-  SbSurfaceData *d = (SbSurfaceData *)s->data;
+  SbContactSurfaceData *d = (SbContactSurfaceData *)s->data;
   const SbMesh mesh = s->space->mesh;
   PetscInt *slot;
 
@@ -61,10 +61,10 @@ static PetscErrorCode list_local(SbSurface s, PetscInt n, const SbFacet facet[])
 }
 
 /* The number of vertex k of a local facet among own corners, a new one when it is none yet. */
-static PetscInt corner_of(SbSurface s, PetscInt corner[], PetscInt facet, int k)
+static PetscInt corner_of(SbContactSurface s, PetscInt corner[], PetscInt facet, int k)
 {
-  SbSurfaceData *d = (SbSurfaceData *)s->data;
-  const SbSurfaceFacet *f = &d->local[facet];
+  SbContactSurfaceData *d = (SbContactSurfaceData *)s->data;
+  const SbContactSurfaceFacet *f = &d->local[facet];
   const PetscInt cell = f->at[0] / 4;
   PetscInt c = at_vertices(s->space, cell) ? corner[f->vertex[k]] : -1;
 
@@ -80,9 +80,9 @@ static PetscInt corner_of(SbSurface s, PetscInt corner[], PetscInt facet, int k)
   Corners of own facets: a vertex of P1 once, others for each facet. Fills facet[]. Behind them what else own edges need: corners of
   facets of ghost cells.
 */
-static PetscErrorCode make_corners(SbSurface s)
+static PetscErrorCode make_corners(SbContactSurface s)
 {
-  SbSurfaceData *d = (SbSurfaceData *)s->data;
+  SbContactSurfaceData *d = (SbContactSurfaceData *)s->data;
   const SbMesh mesh = s->space->mesh;
   PetscInt *corner;
 
@@ -113,9 +113,9 @@ static PetscErrorCode make_corners(SbSurface s)
 }
 
 /* Identities, nodes and weights of own facets. */
-static PetscErrorCode make_facets(SbSurface s, const SbFacet facet[])
+static PetscErrorCode make_facets(SbContactSurface s, const SbFacet facet[])
 {
-  SbSurfaceData *d = (SbSurfaceData *)s->data;
+  SbContactSurfaceData *d = (SbContactSurfaceData *)s->data;
   const SbSpace space = s->space;
   const SbMesh mesh = space->mesh;
 
@@ -152,9 +152,9 @@ static inline PetscInt carrier(SbSpace space, const SbFacet *f, int k)
 }
 
 /* Owned nodes that carry the surface, ascending; point[nnode_owned] gets their numbers, -1 elsewhere. */
-static PetscErrorCode make_points(SbSurface s, const SbFacet facet[], PetscInt point[])
+static PetscErrorCode make_points(SbContactSurface s, const SbFacet facet[], PetscInt point[])
 {
-  SbSurfaceData *d = (SbSurfaceData *)s->data;
+  SbContactSurfaceData *d = (SbContactSurfaceData *)s->data;
   const SbSpace space = s->space;
   PetscInt n = 0;
 
@@ -186,10 +186,10 @@ static PetscErrorCode make_points(SbSurface s, const SbFacet facet[], PetscInt p
 }
 
 /* A P1 facet around an owned point. */
-static void add_fan(SbSurface s, const SbFacet *f, const PetscInt point[])
+static void add_fan(SbContactSurface s, const SbFacet *f, const PetscInt point[])
 {
-  SbSurfaceData *d = (SbSurfaceData *)s->data;
-  SbSurfaceFan fan;
+  SbContactSurfaceData *d = (SbContactSurfaceData *)s->data;
+  SbContactSurfaceFan fan;
   PetscBool mine = PETSC_FALSE;
 
   for (int k = 0; k < 3; k++) {
@@ -203,9 +203,9 @@ static void add_fan(SbSurface s, const SbFacet *f, const PetscInt point[])
 }
 
 /* What areas and normals of points are made of, in the order of the facets' identities. */
-static PetscErrorCode make_fans(SbSurface s, const SbFacet facet[], const PetscInt point[])
+static PetscErrorCode make_fans(SbContactSurface s, const SbFacet facet[], const PetscInt point[])
 {
-  SbSurfaceData *d = (SbSurfaceData *)s->data;
+  SbContactSurfaceData *d = (SbContactSurfaceData *)s->data;
   const SbSpace space = s->space;
   PetscInt *id, *order;
 
@@ -237,9 +237,9 @@ static PetscErrorCode make_fans(SbSurface s, const SbFacet facet[], const PetscI
 }
 
 /* Size of the bodies and mean edge of all facets at rest. */
-static PetscErrorCode measure(SbSurface s)
+static PetscErrorCode measure(SbContactSurface s)
 {
-  const SbSurfaceData *d = (const SbSurfaceData *)s->data;
+  const SbContactSurfaceData *d = (const SbContactSurfaceData *)s->data;
   const SbMesh mesh = s->space->mesh;
   PetscReal box[3] = {0}, sum[2] = {0, 3 * (PetscReal)s->nfacet_owned}, e[3];
 
@@ -260,9 +260,9 @@ static PetscErrorCode measure(SbSurface s)
 }
 
 /* Lends the arrays to the scene. */
-static void publish(SbSurface s)
+static void publish(SbContactSurface s)
 {
-  const SbSurfaceData *d = (const SbSurfaceData *)s->data;
+  const SbContactSurfaceData *d = (const SbContactSurfaceData *)s->data;
   SbDetectScene *scene = &s->scene;
 
   scene->x = d->x;
@@ -281,9 +281,9 @@ static void publish(SbSurface s)
   scene->edges = &d->edges;
 }
 
-PetscErrorCode SbSurfaceSetForeign(SbSurface s, PetscInt n)
+PetscErrorCode SbContactSurfaceSetForeign(SbContactSurface s, PetscInt n)
 {
-  SbSurfaceData *d = (SbSurfaceData *)s->data;
+  SbContactSurfaceData *d = (SbContactSurfaceData *)s->data;
 
   PetscFunctionBeginUser;
   if (n > d->foreign_size) {
@@ -308,10 +308,11 @@ PetscErrorCode SbSurfaceSetForeign(SbSurface s, PetscInt n)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbSurfaceCreate(SbSpace space, PetscInt n, const SbFacet facet[], SbSurface *surface)
+PetscErrorCode SbContactSurfaceCreate(SbSpace space, PetscInt n, const SbFacet facet[],
+                                      SbContactSurface *surface)
 {
-  SbSurface s;
-  SbSurfaceData *d;
+  SbContactSurface s;
+  SbContactSurfaceData *d;
   PetscInt *point;
 
   PetscFunctionBeginUser;
@@ -323,29 +324,29 @@ PetscErrorCode SbSurfaceCreate(SbSpace space, PetscInt n, const SbFacet facet[],
   d->npart = space->mesh->nbody;
   PetscCall(list_local(s, n, facet));
   PetscCall(make_facets(s, facet));
-  PetscCall(SbSurfaceOwnEdges(s, facet));
+  PetscCall(SbContactSurfaceOwnEdges(s, facet));
   PetscCall(make_corners(s));
   PetscCall(PetscMalloc1(space->nnode_owned, &point));
   PetscCall(make_points(s, facet, point));
   PetscCall(make_fans(s, facet, point));
   PetscCall(PetscFree(point));
   PetscCall(measure(s));
-  PetscCall(SbSurfaceSetForeign(s, 0));
-  PetscCall(SbSurfaceOtherEdges(s));
+  PetscCall(SbContactSurfaceSetForeign(s, 0));
+  PetscCall(SbContactSurfaceOtherEdges(s));
   PetscCall(SbHaloCreate(s));
   *surface = s;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbSurfaceDestroy(SbSurface *surface)
+PetscErrorCode SbContactSurfaceDestroy(SbContactSurface *surface)
 {
-  SbSurfaceData *d;
+  SbContactSurfaceData *d;
 
   PetscFunctionBeginUser;
   if (!*surface) PetscFunctionReturn(PETSC_SUCCESS);
-  d = (SbSurfaceData *)(*surface)->data;
+  d = (SbContactSurfaceData *)(*surface)->data;
   PetscCall(SbHaloDestroy(&d->halo));
-  PetscCall(SbSurfaceFreeEdges(*surface));
+  PetscCall(SbContactSurfaceFreeEdges(*surface));
   PetscCall(PetscFree2(d->corner_at, d->corner_part));
   PetscCall(PetscFree(d->local));
   PetscCall(PetscFree(d->fan));
@@ -371,11 +372,12 @@ PetscErrorCode SbSurfaceDestroy(SbSurface *surface)
 /* ------------------------------------------------------------------ motion */
 
 /* Own corners and points at local displacements u. */
-static void place_all(SbSurface s, const PetscReal u[], PetscReal x[], PetscReal p[])
+static void place_all(SbContactSurface s, const PetscReal u[], PetscReal x[], PetscReal p[])
 {
-  const SbSurfaceData *d = (const SbSurfaceData *)s->data;
+  const SbContactSurfaceData *d = (const SbContactSurfaceData *)s->data;
 
-  for (PetscInt c = 0; c < d->ncorner_owned; c++) SbSurfacePlace(s->space, d->corner_at[c], u, x + 3 * c);
+  for (PetscInt c = 0; c < d->ncorner_owned; c++)
+    SbContactSurfacePosition(s->space, d->corner_at[c], u, x + 3 * c);
   for (PetscInt i = 0; i < s->scene.npoint; i++) {
     for (int k = 0; k < 3; k++) p[3 * i + k] = d->P[3 * i + k] + u[3 * s->point_node[i] + k];
   }
@@ -395,9 +397,9 @@ static inline void area_vector(const PetscReal a[3], const PetscReal b[3], const
 }
 
 /* Normals of points: of a vertex from the facets around it, of a centroid that of its facet. */
-static void turn_normals(SbSurface s, const PetscReal u[])
+static void turn_normals(SbContactSurface s, const PetscReal u[])
 {
-  const SbSurfaceData *d = (const SbSurfaceData *)s->data;
+  const SbContactSurfaceData *d = (const SbContactSurfaceData *)s->data;
   PetscReal n[3], x[3][3];
 
   for (PetscInt i = 0; i < s->scene.npoint; i++) {
@@ -407,7 +409,7 @@ static void turn_normals(SbSurface s, const PetscReal u[])
     if (c) area_vector(d->x + 3 * c[0], d->x + 3 * c[1], d->x + 3 * c[2], d->p_normal + 3 * i);
   }
   for (PetscInt i = 0; i < d->nfan; i++) {
-    const SbSurfaceFan *f = &d->fan[i];
+    const SbContactSurfaceFan *f = &d->fan[i];
 
     for (int k = 0; k < 3; k++) {
       for (int j = 0; j < 3; j++) x[k][j] = s->space->node_x[3 * f->node[k] + j] + u[3 * f->node[k] + j];
@@ -425,10 +427,10 @@ static void turn_normals(SbSurface s, const PetscReal u[])
   }
 }
 
-PetscErrorCode SbSurfaceUpdate(SbSurface s, const PetscReal u0[], const PetscReal u[], PetscReal reach,
-                               PetscBool self, PetscBool *close)
+PetscErrorCode SbContactSurfaceUpdate(SbContactSurface s, const PetscReal u0[], const PetscReal u[],
+                                      PetscReal reach, PetscBool self, PetscBool *close)
 {
-  SbSurfaceData *d = (SbSurfaceData *)s->data;
+  SbContactSurfaceData *d = (SbContactSurfaceData *)s->data;
 
   PetscFunctionBeginUser;
   PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_SEARCH], 0, 0, 0, 0));

@@ -16,9 +16,9 @@ static inline PetscBool at_vertices(SbSpace space, PetscInt cell)
 }
 
 /* Room for n edges. */
-static PetscErrorCode reserve(SbSurface s, PetscInt n)
+static PetscErrorCode reserve(SbContactSurface s, PetscInt n)
 {
-  SbSurfaceData *d = (SbSurfaceData *)s->data;
+  SbContactSurfaceData *d = (SbContactSurfaceData *)s->data;
   const size_t size = (size_t)n + (size_t)n / 8 + 1;
 
   PetscFunctionBeginUser;
@@ -37,9 +37,9 @@ static PetscErrorCode reserve(SbSurface s, PetscInt n)
 /* ------------------------------------------------------------------ own edges */
 
 /* Sides of facets of owned and ghost cells; with P1 only those whose edge is an own one. */
-static PetscInt list_sides(SbSurface s, const SbFacet facet[], SbSide side[])
+static PetscInt list_sides(SbContactSurface s, const SbFacet facet[], SbSide side[])
 {
-  const SbSurfaceData *d = (const SbSurfaceData *)s->data;
+  const SbContactSurfaceData *d = (const SbContactSurfaceData *)s->data;
   const SbSpace space = s->space;
   PetscInt n = 0;
 
@@ -66,9 +66,9 @@ static PetscInt face_node(SbSpace space, const SbFacet *f)
 }
 
 /* What own edges are, but for their corners. */
-static void fill_own(SbSurface s, const SbFacet facet[])
+static void fill_own(SbContactSurface s, const SbFacet facet[])
 {
-  const SbSurfaceData *d = (const SbSurfaceData *)s->data;
+  const SbContactSurfaceData *d = (const SbContactSurfaceData *)s->data;
   const SbSpace space = s->space;
   const SbEdges *e = &d->edges;
 
@@ -94,9 +94,9 @@ static void fill_own(SbSurface s, const SbFacet facet[])
 }
 
 /* Sides of own facets whose edge others own, if it is one; identities of own edges, ascending. */
-static PetscErrorCode list_open(SbSurface s)
+static PetscErrorCode list_open(SbContactSurface s)
 {
-  SbSurfaceData *d = (SbSurfaceData *)s->data;
+  SbContactSurfaceData *d = (SbContactSurfaceData *)s->data;
   const PetscInt n = 3 * s->nfacet_owned;
   PetscBool *known;
 
@@ -118,9 +118,9 @@ static PetscErrorCode list_open(SbSurface s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbSurfaceOwnEdges(SbSurface s, const SbFacet facet[])
+PetscErrorCode SbContactSurfaceOwnEdges(SbContactSurface s, const SbFacet facet[])
 {
-  SbSurfaceData *d = (SbSurfaceData *)s->data;
+  SbContactSurfaceData *d = (SbContactSurfaceData *)s->data;
   PetscInt n, kept = 0;
   SbSide *side;
 
@@ -149,9 +149,9 @@ PetscErrorCode SbSurfaceOwnEdges(SbSurface s, const SbFacet facet[])
 /* ------------------------------------------------------------------ the others */
 
 /* What the edge between two sides of facets of the scene is. */
-static void fill_other(SbSurface s, const PetscInt at[2], PetscInt i)
+static void fill_other(SbContactSurface s, const PetscInt at[2], PetscInt i)
 {
-  const SbSurfaceData *d = (const SbSurfaceData *)s->data;
+  const SbContactSurfaceData *d = (const SbContactSurfaceData *)s->data;
   const SbEdges *e = &d->edges;
   const PetscInt f = at[0] / 3;
 
@@ -169,9 +169,9 @@ static void fill_other(SbSurface s, const PetscInt at[2], PetscInt i)
   }
 }
 
-PetscErrorCode SbSurfaceOtherEdges(SbSurface s)
+PetscErrorCode SbContactSurfaceOtherEdges(SbContactSurface s)
 {
-  SbSurfaceData *d = (SbSurfaceData *)s->data;
+  SbContactSurfaceData *d = (SbContactSurfaceData *)s->data;
   const PetscInt most = d->nopen + 3 * (s->scene.nfacet - s->nfacet_owned);
   PetscInt n, (*pair)[2];
   SbSide *side;
@@ -197,9 +197,9 @@ PetscErrorCode SbSurfaceOtherEdges(SbSurface s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbSurfaceFreeEdges(SbSurface s)
+PetscErrorCode SbContactSurfaceFreeEdges(SbContactSurface s)
 {
-  SbSurfaceData *d = (SbSurfaceData *)s->data;
+  SbContactSurfaceData *d = (SbContactSurfaceData *)s->data;
 
   PetscFunctionBeginUser;
   PetscCall(PetscFree(d->side));

@@ -1,5 +1,5 @@
 /*
-  surface_impl.h - what surface.c and halo.c share: the private data of an SbSurface.
+  surface_impl.h - what surface.c and halo.c share: the private data of an SbContactSurface.
 */
 #pragma once
 #include "sbdetect.h"
@@ -10,13 +10,13 @@ typedef struct {
   PetscInt at[3];     /* 4 cell + corner: which vertices of its cell */
   PetscInt vertex[3]; /* their numbers among the vertices of the surface on this rank */
   PetscInt own;       /* number among own facets, -1: of a ghost cell */
-} SbSurfaceFacet;
+} SbContactSurfaceFacet;
 
 /* A facet of a P1 cell around an owned point. */
 typedef struct {
   PetscInt node[3];  /* local nodes at its corners */
   PetscInt point[3]; /* points there, -1: owned by another rank */
-} SbSurfaceFan;
+} SbContactSurfaceFan;
 
 /* What is sent and received (halo.c). */
 typedef struct {
@@ -42,14 +42,14 @@ typedef struct {
 typedef struct {
   PetscInt npart;
   PetscInt ncorner_owned;
-  PetscInt *corner_at;   /* [ncorner_owned] 4 cell + corner */
-  PetscInt *corner_part; /* [ncorner_owned] */
-  PetscInt nlocal;       /* facets of owned and ghost cells */
-  SbSurfaceFacet *local; /* [nlocal] */
-  PetscInt nvertex;      /* vertices of these */
+  PetscInt *corner_at;          /* [ncorner_owned] 4 cell + corner */
+  PetscInt *corner_part;        /* [ncorner_owned] */
+  PetscInt nlocal;              /* facets of owned and ghost cells */
+  SbContactSurfaceFacet *local; /* [nlocal] */
+  PetscInt nvertex;             /* vertices of these */
   PetscInt nfan;
-  SbSurfaceFan *fan;   /* [nfan] in the order of facet_id: sums do not depend on the partition */
-  PetscInt *point_own; /* [npoint] own facet whose centroid the point is, -1: a vertex */
+  SbContactSurfaceFan *fan; /* [nfan] in the order of facet_id: sums do not depend on the partition */
+  PetscInt *point_own;      /* [npoint] own facet whose centroid the point is, -1: a vertex */
   SbEdges edges;
   PetscInt edge_size;    /* edges that there is room for */
   PetscInt (*side)[2];   /* [edges.nown] sides of the first and the second facet, 3 local + k */
@@ -60,59 +60,24 @@ typedef struct {
   PetscReal *x, *x0, *X, *p, *p0, *P, *p_normal;
   PetscInt *facet, *facet_vertex, *facet_part, *facet_id, *point_part, *point_id, *point_vertex, *point_facet;
   SbHalo halo;
-} SbSurfaceData;
-
-/* Boxes: lower and upper corner, m. An empty one has its lower corner above the upper. */
-static inline void SbBoxClear(PetscReal box[6])
-{
-  for (int k = 0; k < 3; k++) {
-    box[k] = PETSC_MAX_REAL;
-    box[3 + k] = -PETSC_MAX_REAL;
-  }
-}
-
-/* Places that are no numbers are passed over: then a diverged solve makes no difference between ranks. */
-static inline void SbBoxJoin(PetscReal box[6], const PetscReal low[3], const PetscReal high[3])
-{
-  for (int k = 0; k < 3; k++) {
-    if (low[k] < box[k]) box[k] = low[k];
-    if (high[k] > box[3 + k]) box[3 + k] = high[k];
-  }
-}
-
-static inline void SbBoxAdd(PetscReal box[6], const PetscReal x[3])
-{
-  SbBoxJoin(box, x, x);
-}
-
-static inline void SbBoxUnite(PetscReal box[6], const PetscReal other[6])
-{
-  SbBoxJoin(box, other, other + 3);
-}
-
-/* Whether two boxes are nearer than `grown` in every coordinate. Empty ones never are. */
-static inline PetscBool SbBoxNear(const PetscReal a[6], const PetscReal b[6], PetscReal grown)
-{
-  for (int k = 0; k < 3; k++) {
-    if (a[k] - grown > b[3 + k] || b[k] - grown > a[3 + k]) return PETSC_FALSE;
-  }
-  return PETSC_TRUE;
-}
+} SbContactSurfaceData;
 
 /* Where vertex `at` = 4 cell + corner of a local cell is at local displacements u, m. */
-void SbSurfacePlace(SbSpace space, PetscInt at, const PetscReal u[], PetscReal x[3]);
+void SbContactSurfacePosition(SbSpace space, PetscInt at, const PetscReal u[], PetscReal x[3]);
 /* Makes the scene hold n facets of others behind its own ones; what they are is written afterwards. Not collective. */
-PetscErrorCode SbSurfaceSetForeign(SbSurface surface, PetscInt n);
+PetscErrorCode SbContactSurfaceSetForeign(SbContactSurface surface, PetscInt n);
 
 /* The own edges but for their corners; allocates. Not collective. */
-PetscErrorCode SbSurfaceOwnEdges(SbSurface surface, const SbFacet facet[]);
+PetscErrorCode SbContactSurfaceOwnEdges(SbContactSurface surface, const SbFacet facet[]);
 /* The edges behind the own ones, after the facets of others have changed. Not collective. */
-PetscErrorCode SbSurfaceOtherEdges(SbSurface surface);
-PetscErrorCode SbSurfaceFreeEdges(SbSurface surface);
+PetscErrorCode SbContactSurfaceOtherEdges(SbContactSurface surface);
+PetscErrorCode SbContactSurfaceFreeEdges(SbContactSurface surface);
 
-PetscErrorCode SbHaloCreate(SbSurface surface);
+PetscErrorCode SbHaloCreate(SbContactSurface surface);
 PetscErrorCode SbHaloDestroy(SbHalo *halo);
 /* Finds, with boxes grown by `grown`, which facets go to which rank: fills nto, to, to_start, send, nfrom, from, swept. Collective. */
-PetscErrorCode SbHaloPlan(SbSurface surface, const PetscReal u0[], const PetscReal u[], PetscReal grown);
+PetscErrorCode SbHaloPlan(SbContactSurface surface, const PetscReal u0[], const PetscReal u[],
+                          PetscReal grown);
 /* Brings facets of others, own corners and points having been moved. `moving`: u0 is not NULL. Collective. */
-PetscErrorCode SbHaloUpdate(SbSurface surface, const PetscReal u0[], const PetscReal u[], PetscBool *close);
+PetscErrorCode SbHaloUpdate(SbContactSurface surface, const PetscReal u0[], const PetscReal u[],
+                            PetscBool *close);

@@ -30,7 +30,7 @@ PetscErrorCode SbFacetLinksCreate(const SbDetectScene *scene, const SbDetectRing
 PetscErrorCode SbFacetLinksDestroy(SbFacetLinks *links);
 
 /*
-  SbBinaryCreate - tree over the items: neighbours are joined bottom-up, what is left over is halved top-down.
+  SbBinaryCreate - tree over the items: neighbours are joined bottom-up, the rest is halved top-down.
 
   Not collective. Input: start, list - neighbours of each item.
 */

@@ -32,7 +32,7 @@ typedef struct {
   int cone;  /* the first row of the cone */
   int rows;  /* of a column, with its cone where there are cones */
   PetscReal origin[3];
-  SbVolumeMeet meet[2]; /* without and with a look at the cones */
+  SbVolumeMeet meet[2]; /* without and with a examine the cones */
 } SbVolume;
 
 /* k = 6 or 14; cones: there is room for them. The origin is 0. */

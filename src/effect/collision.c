@@ -10,15 +10,15 @@
 
   Forces act along n at p and, by the same weights, on the facet: momentum is kept, and so is angular momentum where the gap is closed.
 
-  Response `projected`: rows that touch are exact (src/fem/couple.c); their multiplier is the force. `multiplier`: the same, the
+  Response `projected`: rows that touch are exact (src/fem/constraint.c); their multiplier is the force. `multiplier`: the same, the
   multipliers being unknowns of the solves. After each solve the
-  surfaces are looked at again: a pulling row leaves, a penetrated point enters, n and b are taken anew, until nothing changes.
-  A row that has come several times within a step stays, and n and b are kept after some looks: the loop ends. `penalty`: springs
+  surfaces are examined again: a pulling row leaves, a penetrated point enters, n and b are taken again, until nothing changes.
+  A row that has come several times within a step stays, and n and b are kept after some searches: the loop ends. `penalty`: springs
   N = <-k g>. `augmented`: N = <lambda - k g> with a multiplier that is raised after each solve (Simo and Laursen 1992).
 
   Friction is in friction.c.
 
-  With one surface looking for the other (`sides one`), the finer one looks: rows then are not more than the surface can take. A thin
+  With one surface searching for the other (`passes one`), the finer one looks: rows then are not more than the surface can take. A thin
   or much coarser partner wants both.
 */
 #include "collision.h"
@@ -32,17 +32,18 @@
 static const SbOption rows[] = {
   {"on", SB_OPTION_NAMES, 1, "", "boundary", "", "sets whose surfaces may meet"},
   {"response", SB_OPTION_CHOICE, 1, "", "projected", "projected|multiplier|augmented|penalty",
-   "exact rows, the solve in their null space or with their multipliers as unknowns; multipliers raised on "
+   "exact constraints, the solve in their null space or with their multipliers as unknowns; multipliers "
+   "raised on "
    "springs; springs"},
-  {"arrival", SB_OPTION_CHOICE, 1, "", "whole", "whole|cut",
+  {"time_of_impact", SB_OPTION_CHOICE, 1, "", "no", "no|yes",
    "a step in which points begin to touch is taken as it is, or repeated up to the moment of the first "
    "touch"},
   {"detection", SB_OPTION_CHOICE, 1, "", "hash", "hash|bvh|brute",
    "spatial hash, hierarchy of bounding volumes, or every pair: the same contacts"},
   {"bvh_volume", SB_OPTION_CHOICE, 1, "", "box", "box|dop14",
    "what bounds a node of the tree of bvh: a box or 14 planes"},
-  {"sides", SB_OPTION_CHOICE, 1, "", "both", "one|both",
-   "points of the finer of two surfaces look for the other one, or both do"},
+  {"passes", SB_OPTION_CHOICE, 1, "", "two", "one|two",
+   "points of the finer of two surfaces search for the other one, or both do"},
   {"self", SB_OPTION_BOOL, 1, "", "no", "", "bodies may meet themselves"},
   {"friction", SB_OPTION_REAL, 1, "", "0", "[0, inf)", "Coulomb's coefficient for sticking"},
   {"friction_kinetic", SB_OPTION_REAL, 1, "", "-1", "[-1, inf)",
@@ -53,14 +54,14 @@ static const SbOption rows[] = {
    "response penalty: a damper beside each spring, its constant being stiffness times this time; it acts on "
    "what is behind "
    "and never pulls"},
-  {"reach", SB_OPTION_REAL, 1, "m", "0", "[0, inf)",
-   "how far points look for surfaces; what is deeper is found when a run begins or as points in tets; 0: "
+  {"search_radius", SB_OPTION_REAL, 1, "m", "0", "[0, inf)",
+   "how far points search for surfaces; what is deeper is found when a run begins or as points in tets; 0: "
    "half the mean edge"},
   {"restitution", SB_OPTION_REAL, 1, "", "0", "[0, 1]",
    "part of their relative speed with which surfaces leave each other; needs -time euler_implicit, and "
    "bodies "
    "that are stiff within a step to bounce as a whole"},
-  {"recovery", SB_OPTION_REAL, 1, "steps", "30", "[1, inf)",
+  {"separation_steps", SB_OPTION_REAL, 1, "steps", "30", "[1, inf)",
    "bodies that overlap before they meet are parted slowly: to 1/e of the depth in so many steps; 1: at "
    "once"},
   {"pairs", SB_OPTION_BOOL, 1, "", "no", "",
@@ -75,17 +76,17 @@ static PetscErrorCode read_restitution(SbEffect e, const SbScope *scope)
   PetscCall(SbOptionReal(scope, "restitution", &c->bounce.e));
   e->euler = (PetscBool)(c->bounce.e > 0);
   if (!e->euler) {
-    e->ops.rebound = NULL;
+    e->ops.restitution = NULL;
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   PetscCheck(exact(c->response), PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
              "-effect_%s_restitution %g needs -effect_%s_response projected or multiplier", e->name,
              (double)c->bounce.e, e->name);
-  PetscCheck(
-    !c->cut, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
-    "-effect_%s_restitution %g and -effect_%s_arrival cut do not go together: what is let go within a step "
-    "never arrives at its end; leave one of them out",
-    e->name, (double)c->bounce.e, e->name);
+  PetscCheck(!c->cut, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
+             "-effect_%s_restitution %g and -effect_%s_time_of_impact yes do not go together: what is let go "
+             "within a step "
+             "never arrives at its end; leave one of them out",
+             e->name, (double)c->bounce.e, e->name);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -102,9 +103,9 @@ static PetscErrorCode options_collision(SbEffect e, const SbScope *scope)
   e->saddle = (PetscBool)(c->response == MULTIPLIER);
   c->friction.exact = exact(c->response);
   e->springs = (PetscBool)!exact(c->response);
-  PetscCall(SbOptionChoice(scope, "arrival", &choice));
+  PetscCall(SbOptionChoice(scope, "time_of_impact", &choice));
   c->cut = (PetscBool)(choice == 1);
-  if (!c->cut) e->ops.arrive = NULL;
+  if (!c->cut) e->ops.time_of_impact = NULL;
   PetscCall(SbOptionChoice(scope, "detection", &choice));
   PetscCall(SbDetectorCreate((SbDetectKind)choice, &c->detector));
   if (choice == SB_DETECT_BVH) {
@@ -118,7 +119,7 @@ static PetscErrorCode options_collision(SbEffect e, const SbScope *scope)
                "-effect_%s_bvh_volume is for -effect_%s_detection bvh: give that, or leave it out", e->name,
                e->name);
   }
-  PetscCall(SbOptionChoice(scope, "sides", &choice));
+  PetscCall(SbOptionChoice(scope, "passes", &choice));
   c->both = (PetscBool)(choice == 1);
   PetscCall(SbOptionBool(scope, "self", &c->self));
   PetscCall(SbOptionReal(scope, "friction", &c->friction.mu));
@@ -135,9 +136,9 @@ static PetscErrorCode options_collision(SbEffect e, const SbScope *scope)
   PetscCheck(c->damping <= 0 || c->response == PENALTY, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
              "-effect_%s_damping %g s is for springs that give: it needs -effect_%s_response penalty",
              e->name, (double)c->damping, e->name);
-  PetscCall(SbOptionReal(scope, "reach", &c->reach));
+  PetscCall(SbOptionReal(scope, "search_radius", &c->reach));
   PetscCall(read_restitution(e, scope));
-  PetscCall(SbOptionReal(scope, "recovery", &recovery));
+  PetscCall(SbOptionReal(scope, "separation_steps", &recovery));
   SbOverlapSet(&c->overlap, recovery);
   PetscCall(SbOptionBool(scope, "pairs", &c->pairs.wanted));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -217,7 +218,7 @@ static PetscErrorCode setup_collision(SbEffect e, SbSpace space)
 
   PetscFunctionBeginUser;
   PetscCall(SbEffectFacets(space, &c->on, &n, &facet));
-  PetscCall(SbSurfaceCreate(space, n, facet, &c->surface));
+  PetscCall(SbContactSurfaceCreate(space, n, facet, &c->surface));
   PetscCall(find_stiffness(c, space, n, facet));
   PetscCall(find_edges(c, space, n, facet, &nskin));
   PetscCall(SbInsideCreate(c->surface, SB_DETECT_HASH, &c->inside));
@@ -225,7 +226,7 @@ static PetscErrorCode setup_collision(SbEffect e, SbSpace space)
   c->watched = -PETSC_MAX_REAL;
   PetscCall(PetscFree(facet));
   PetscCheck(nskin > 1 || c->self, space->comm, PETSC_ERR_USER_INPUT,
-             "The effect %s has only one body to look at: give -effect_%s_self yes for a body that may meet "
+             "The effect %s has only one body to examine: give -effect_%s_self yes for a body that may meet "
              "itself, or more sets with -effect_%s_on",
              e->name, e->name, e->name);
   PetscCall(SbPairsSetUp(e, space->mesh));
@@ -236,7 +237,7 @@ static PetscErrorCode setup_collision(SbEffect e, SbSpace space)
              (double)c->damping);
   if (!e->dynamic) c->overlap.recovery = 0;
   if (c->reach == 0) c->reach = 0.5 * c->surface->edge;
-  PetscCall(SbSpaceCoupleCreate(space, PETSC_FALSE, (PetscBool)(c->friction.mu > 0)));
+  PetscCall(SbSpaceCreateConstraints(space, PETSC_FALSE, (PetscBool)(c->friction.mu > 0)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -280,7 +281,7 @@ static PetscErrorCode touch_collision(SbEffect e, SbSpace space, PetscReal t, Pe
   PetscCall(SbCollisionRestore(c));
   c->first = PETSC_TRUE;
   c->arrival = 1;
-  SbReboundBegin(&c->bounce, dt);
+  SbRestitutionBegin(&c->bounce, dt);
   if (v0 && c->flight) {
     SbCollisionFly(c, space, u0, v0, u);
     PetscCall(SbCollisionLook(c, c->flight, PETSC_FALSE));
@@ -340,12 +341,12 @@ static PetscErrorCode hold_collision(SbEffect e, SbSpace space)
     SbCollisionCoef(hit, hit->normal, coef);
     if (c->friction.mu > 0) SbCollisionFrictionPush(c, hit, push, &oblique);
     if (exact(c->response))
-      PetscCall(SbSpaceCoupleRow(space, SbCollisionId(c, i), hit->n, hit->node, coef, oblique ? push : NULL,
-                                 SbCollisionPlace(hit), &hit->row));
+      PetscCall(SbSpaceAddConstraint(space, SbCollisionId(c, i), hit->n, hit->node, coef,
+                                     oblique ? push : NULL, SbCollisionPlace(hit), &hit->row));
     else
-      PetscCall(SbSpaceCoupleSpring(space, hit->n, hit->node, coef, oblique ? push : NULL,
-                                    SbCollisionPlace(hit), hit->k * (1 + c->damp),
-                                    hit->lambda + SbCollisionBefore(c, hit), &hit->row));
+      PetscCall(SbSpaceAddPenaltyConstraint(space, hit->n, hit->node, coef, oblique ? push : NULL,
+                                            SbCollisionPlace(hit), hit->k * (1 + c->damp),
+                                            hit->lambda + SbCollisionBefore(c, hit), &hit->row));
     if (c->friction.mu > 0) PetscCall(SbCollisionFrictionHold(c, space, i));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -353,7 +354,7 @@ static PetscErrorCode hold_collision(SbEffect e, SbSpace space)
 
 /* ------------------------------------------------------------------ settling */
 
-/* Whether an exact row is there, or not, as it should be; changes it if not. */
+/* Whether an exact constraint is there, or not, as it should be; changes it if not. */
 static PetscBool settle_row(const Collision *c, PetscReal largest, Hit *hit)
 {
   const PetscReal small = TOLERANCE * c->surface->size;
@@ -403,12 +404,12 @@ static void read_rows(const Collision *c, SbSpace space, Hit *hit)
 
   hit->rests = PETSC_FALSE;
   if (hit->row < 0) return;
-  SbSpaceCoupleGet(space, hit->row, &force, &along);
-  hit->rests = SbSpaceCoupleRests(space, hit->row);
+  SbSpaceGetConstraint(space, hit->row, &force, &along);
+  hit->rests = SbSpaceIsConstraintRedundant(space, hit->row);
   if (hit->rests) {
     hit->lambda = 0;
     hit->gap =
-      hit->leaves - hit->allowed; /* so those rows say; the next look tells more if it finds the pair */
+      hit->leaves - hit->allowed; /* so those rows say; the next search tells more if it finds the pair */
   } else {
     if (exact(c->response)) hit->lambda = force;
     hit->gap = along - hit->value;
@@ -447,13 +448,14 @@ static PetscErrorCode settle_collision(SbEffect e, SbSpace space, const PetscRea
 
 /* ------------------------------------------------------------------ after a step */
 
-/* The force of an exact row with what the end of a step of Newmark has added to it. */
+/* The force of an exact constraint with what the end of a step of Newmark has added to it. */
 static void read_impulse(const Collision *c, SbSpace space, Hit *hit)
 {
   PetscReal force, along;
 
-  if (!exact(c->response) || !hit->on || hit->row < 0 || SbSpaceCoupleRests(space, hit->row)) return;
-  SbSpaceCoupleGet(space, hit->row, &force, &along);
+  if (!exact(c->response) || !hit->on || hit->row < 0 || SbSpaceIsConstraintRedundant(space, hit->row))
+    return;
+  SbSpaceGetConstraint(space, hit->row, &force, &along);
   hit->lambda = PetscMax(0, force);
 }
 
@@ -534,7 +536,7 @@ static PetscErrorCode near_collision(SbEffect e, SbSpace space, const SbStage *s
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* How surfaces were looked at; of the last look what the rank that had most to do says. */
+/* How surfaces were examined; of the last search what the rank that had most to do says. */
 static PetscErrorCode tell_collision(SbEffect e, SbSpace space, size_t size, char text[])
 {
   const Collision *c = (const Collision *)e->data;
@@ -556,7 +558,7 @@ static PetscErrorCode tell_collision(SbEffect e, SbSpace space, size_t size, cha
   if (c->looks)
     PetscCall(PetscSNPrintf(text, size,
                             "%" PetscInt64_FMT
-                            " looks at surfaces, %.3g pairs of point and facet in each; %s; "
+                            " searches of surfaces, %.3g pairs of point and facet in each; %s; "
                             "%.3g kB",
                             c->looks, (double)sum[0] / (double)c->looks, stats.text, (double)sum[1] / 1e3));
   else
@@ -572,7 +574,7 @@ static PetscErrorCode destroy_collision(SbEffect e)
   PetscCall(SbEffectFreeOn(&c->on));
   PetscCall(SbInsideDestroy(&c->inside));
   PetscCall(PetscFree(c->alone));
-  PetscCall(SbSurfaceDestroy(&c->surface));
+  PetscCall(SbContactSurfaceDestroy(&c->surface));
   PetscCall(SbDetectorDestroy(&c->detector));
   PetscCall(PetscFree2(c->way, c->way_part));
   PetscCall(PetscFree(c->point_k));
@@ -600,21 +602,21 @@ static PetscErrorCode create_collision(SbEffect e)
   e->steady = PETSC_FALSE; /* a load factor does not make bodies pass through each other */
   e->ops.setfromoptions = options_collision;
   e->ops.setup = setup_collision;
-  e->ops.touch = touch_collision;
-  e->ops.hold = hold_collision;
-  e->ops.settle = settle_collision;
-  e->ops.arrive = arrive_collision;
-  e->ops.rebound = SbEffectRebound_Collision;
-  e->ops.curb = SbEffectCurb_Collision;
+  e->ops.begin_step = touch_collision;
+  e->ops.assemble_constraints = hold_collision;
+  e->ops.update_active_set = settle_collision;
+  e->ops.time_of_impact = arrive_collision;
+  e->ops.restitution = SbEffectRestitution_Collision;
+  e->ops.scale_restitution = SbEffectScaleRestitution_Collision;
   e->ops.accept = accept_collision;
   e->ops.history = history_collision;
   e->ops.save = SbEffectSave_Collision;
   e->ops.load = SbEffectLoad_Collision;
   e->ops.rename = SbEffectRename_Collision;
   e->nstate = SB_COLLISION_STATE;
-  e->ops.near = near_collision;
-  e->ops.places = SbEffectPlaces_Collision;
-  e->ops.tell = tell_collision;
+  e->ops.gap = near_collision;
+  e->ops.contact_points = SbEffectContactPoints_Collision;
+  e->ops.summary = tell_collision;
   e->ops.destroy = destroy_collision;
   e->column = columns;
   e->ncolumn = PETSC_STATIC_ARRAY_LENGTH(columns);

@@ -8,7 +8,7 @@
 #include "sbdetect.h"
 #include "sbeffect.h"
 
-#define FEW_LOOKS 3    /* how often normal and weights of a row are taken anew within a step in any case */
+#define FEW_LOOKS 3    /* how often normal and weights of a row are taken again within a step in any case */
 #define LOOKS 8        /* and how often while its gap is not closed */
 #define TOLERANCE 1e-7 /* of the size of the bodies: largest penetration that counts as touching */
 #define NODES SB_FRICTION_NODES
@@ -36,12 +36,12 @@ typedef struct {
     [NODES]; /* of the relative displacement w: 1, minus the facet's; those of the first edge, minus the other's */
   PetscReal normal[3];
   PetscReal value;            /* n . w that closes the gap, m */
-  PetscReal gap;              /* at the last look, by its row once that is settled, m */
-  PetscReal depth;            /* in each other at the last look, 0 also when it was not found, m */
-  PetscReal start[3], now[3]; /* w at the start of the step and at the last look, m */
+  PetscReal gap;              /* at the last search, by its row once that is settled, m */
+  PetscReal depth;            /* in each other at the last search, 0 also when it was not found, m */
+  PetscReal start[3], now[3]; /* w at the start of the step and at the last search, m */
   PetscReal allowed;          /* penetration that was there before and is taken back step by step, m */
   PetscReal gap0, arrives;    /* restitution, at the start of the step: m; speed of approach, m/s */
-  PetscReal leaves;           /* gap that it is held at while it rebounds, else 0, m */
+  PetscReal leaves;           /* gap that it is constrained at while it bounces, else 0, m */
   PetscReal k;                /* stiffness of springs, N/m */
   PetscBool on;               /* it touches */
   PetscBool was;              /* it touched at the end of the last step, and did not bounce */
@@ -49,7 +49,7 @@ typedef struct {
   PetscBool rests;            /* other rows say it */
   PetscInt row;               /* of the space, -1: none */
   PetscReal lambda;           /* multiplier, N */
-  SbGrip grip;                /* friction */
+  SbFrictionState grip;       /* friction */
 } Hit;
 
 /* Columns of the history for each pair of bodies (collision_pairs.c). */
@@ -64,7 +64,7 @@ typedef struct {
 
 typedef struct {
   SbEffectOn on;
-  SbSurface surface;
+  SbContactSurface surface;
   SbDetector detector;
   Response response;
   PetscBool self, both;
@@ -79,19 +79,20 @@ typedef struct {
   PetscReal *edge_k;  /* [own edges] the same of an edge, N/m */
   PetscReal *u0;      /* [nnode][3] displacement at the start of the step, m */
   PetscReal *flight;  /* [nnode][3] that at its end if nothing had a force, m; NULL without restitution */
-  SbRebound bounce;
+  SbRestitution bounce;
   PetscInt nhit, size, npast, past_size;
   Hit *hit, *spare; /* by point and part */
   Hit *past;        /* [npast] as the last step left them: each attempt at a step begins there */
-  PetscBool cut;    /* steps end where points arrive */
-  PetscBool begun;  /* overlap that was there when the run began has been looked for */
-  PetscBool close;  /* boxes of two bodies met at the last look */
+  PetscBool cut;    /* steps end where points come into contact */
+  PetscBool begun;  /* overlap that was there when the run began has been searched for */
+  PetscBool close;  /* boxes of two bodies met at the last search */
   SbInside inside;
   signed char *alone; /* [npoint] for how many steps a point has been inside without a pair */
-  PetscReal watched;  /* beginning of the last step for which that was looked at: it may be tried again, s */
-  PetscReal *way; /* [npoint][3] unit vectors: ways out of overlap, zero: none; NULL while there is none */
+  PetscReal watched;  /* beginning of the last step for which that was examined: it may be tried again, s */
+  PetscReal *
+    way; /* [npoint][3] unit vectors: separation directions of overlap, zero: none; NULL while there is none */
   PetscInt *way_part; /* [npoint] out of which part, -1: none */
-  PetscReal deep;     /* so deep points are looked for, m; 0: by the reach, as all come from outside */
+  PetscReal deep;     /* so deep points are searched for, m; 0: by the reach, as all come from outside */
   PetscBool first;    /* the step has not been solved yet */
   PetscReal arrival;  /* the part of it after which the first point arrives, 1: none */
   PetscReal work;     /* of the contact forces since the start, this rank, J */
@@ -100,15 +101,15 @@ typedef struct {
 } Collision;
 
 /*
-  SbCollisionLook - finds the pairs anew for local displacements u, m, each with what is known of it from before.
+  SbCollisionLook - finds the pairs again for local displacements u, m, each with what is known of it from before.
 
   Collective. `within`: a look within a step; what touches then stays, found or not. Else only what is found stays.
 */
 PetscErrorCode SbCollisionLook(Collision *c, const PetscReal u[], PetscBool within);
-/* Of two surfaces, whether the points of `mine` look for `other`. Not collective. */
+/* Of two surfaces, whether the points of `mine` search for `other`. Not collective. */
 PetscBool SbCollisionLooksFor(const Collision *c, PetscInt mine, PetscInt other);
-/* collision_overlap.c: sets c->deep and ways out by the overlap that is there at local displacements u, m. Collective;
-   clears the pairs. Error when a run begins: a body deep inside another, without a way out. */
+/* collision_overlap.c: sets c->deep and separation directions by the overlap that is there at local displacements u, m. Collective;
+   clears the pairs. Error when a run begins: a body deep inside another, without a separation direction. */
 PetscErrorCode SbCollisionFindOverlap(SbEffect e, const PetscReal u[]);
 /*
   Does so when points have been inside for some steps that no pair holds, c->past being the pairs at local displacements u, m. Collective. `t`: when the
@@ -128,13 +129,13 @@ static inline PetscBool SbCollisionOfEdges(const Collision *c, const Hit *hit)
 {
   return (PetscBool)(hit->point >= c->surface->scene.npoint);
 }
-/* Gap beyond the one that it is held at, m. */
+/* Gap beyond the one that it is constrained at, m. */
 static inline PetscReal SbCollisionExcess(const Hit *hit)
 {
   return hit->gap + hit->allowed - hit->leaves;
 }
 
-/* n . w at which it is held, m. */
+/* n . w at which it is constrained, m. */
 static inline PetscReal SbCollisionPlace(const Hit *hit)
 {
   return hit->value - hit->allowed + hit->leaves;
@@ -165,14 +166,14 @@ static inline void SbCollisionCoef(const Hit *hit, const PetscReal direction[3],
 
 /*
   Restitution (collision_rebound.c). Fly: c->flight from local displacements u0 and u (prescribed ones are taken from it) and velocities
-  v0. Meet: for each pair of the look there, what it is held at if it is to be. Hit: it is to be. Not collective.
+  v0. Meet: for each pair of the look there, what it is constrained at if it is to be. Hit: it is to be. Not collective.
 */
 void SbCollisionFly(Collision *c, SbSpace space, const PetscReal u0[], const PetscReal v0[],
                     const PetscReal u[]);
 void SbCollisionMeet(Collision *c);
 void SbCollisionHit(const Collision *c, Hit *hit);
-PetscErrorCode SbEffectRebound_Collision(SbEffect e, PetscReal *work);
-PetscErrorCode SbEffectCurb_Collision(SbEffect e, PetscReal share);
+PetscErrorCode SbEffectRestitution_Collision(SbEffect e, PetscReal *work);
+PetscErrorCode SbEffectScaleRestitution_Collision(SbEffect e, PetscReal share);
 
 /* The body whose point or edge the pair begins with. */
 PetscInt SbCollisionFirst(const Collision *c, const Hit *hit);
@@ -207,5 +208,5 @@ PetscErrorCode SbPairsSetUp(SbEffect e, SbMesh mesh);
 void SbPairsHistory(const Collision *c, SbSpace space, PetscReal values[]);
 PetscErrorCode SbPairsFree(SbPairs *pairs);
 /* Operation of the effect (sbeffect.h). */
-PetscErrorCode SbEffectPlaces_Collision(SbEffect e, SbSpace space, const SbStage *stage,
-                                        const PetscReal residual[], SbPlaces *list);
+PetscErrorCode SbEffectContactPoints_Collision(SbEffect e, SbSpace space, const SbStage *stage,
+                                               const PetscReal residual[], SbContactPoints *list);

@@ -1,5 +1,5 @@
 /*
-  collision_look.c - pairs of a point and a surface near it, and of two edges, from look to look: what the detector finds now, with what was known
+  collision_look.c - pairs of a point and a surface near it, and of two edges, from search to search: what the detector finds now, with what was known
   of the pair before.
 
   A step may be tried several times. Each attempt begins with the pairs as the last step left them, so that a failed one leaves no
@@ -7,9 +7,9 @@
 */
 #include "collision.h"
 
-#define TURNED 0.7 /* cosine between normals of two looks, below which they are of another place */
+#define TURNED 0.7 /* cosine between normals of two searches, below which they are of another place */
 #define JUMP \
-  0.05 /* of the reach: so much deeper a pair that is held began the step, seen from a facet that it is not held by */
+  0.05 /* of the reach: so much deeper a pair that is constrained began the step, seen from a facet that it is not held by */
 #define CORNER 1e-4 /* of the reach: places that may be one (near.c) */
 
 /* Edges that rounding alone tells apart are the same. */
@@ -29,7 +29,7 @@ typedef struct {
   const SbEdgePair *pair;
 } Found;
 
-/* The pair of something found, by which it is known from look to look. */
+/* The pair of something found, by which it is known from search to search. */
 static void name_of(const Collision *c, const Found *found, PetscInt i, Hit *hit)
 {
   const SbDetectScene *s = &c->surface->scene;
@@ -83,7 +83,7 @@ static inline void add_node(Hit *hit, PetscInt node, PetscReal weight)
 /* Nodes and weights of a pair, where it is, and where it was when the step began. */
 static void take_point(const Collision *c, const SbNear *near, Hit *hit)
 {
-  const SbSurface f = c->surface;
+  const SbContactSurface f = c->surface;
   const SbDetectScene *s = &f->scene;
 
   hit->n = 0;
@@ -101,7 +101,7 @@ static void take_point(const Collision *c, const SbNear *near, Hit *hit)
 
 static void take_edges(const Collision *c, const SbEdgePair *pair, Hit *hit)
 {
-  const SbSurface f = c->surface;
+  const SbContactSurface f = c->surface;
   const SbDetectScene *s = &f->scene;
 
   hit->n = 0;
@@ -129,7 +129,7 @@ static inline PetscReal gap_of(const Found *found, PetscInt i)
 }
 
 /*
-  Normal, weights and gap of a pair as the detector sees it now. A point that was behind this facet when the step began, and not held
+  Normal, weights and gap of a pair as the detector sees it now. A point that was behind this facet when the step began, and not constrained
   there, was not seen before (it came over a rim, or onto another facet, or bodies overlap from the start): putting it in front at once would
   throw it out. So with edges.
 */
@@ -168,7 +168,7 @@ static inline PetscBool before(const Hit *a, PetscInt point, PetscInt part)
   return (PetscBool)(a->point < point || (a->point == point && a->part < part));
 }
 
-/* A pair keeps its normal and weights once its gap is closed, or after many looks: on an edge they may change for ever. */
+/* A pair keeps its normal and weights once its gap is closed, or after many searches: on an edge they may change for ever. */
 static PetscBool is_settled(const Collision *c, PetscReal gap, const PetscReal normal[3], Hit *hit)
 {
   /* at a corner another facet may be as near: then the one that holds does */
@@ -235,7 +235,7 @@ PetscErrorCode SbCollisionLook(Collision *c, const PetscReal u[], PetscBool with
   c->surface->scene.deep = c->deep;
   c->surface->scene.p_way = c->way;
   c->surface->scene.p_way_part = c->way_part;
-  PetscCall(SbSurfaceUpdate(c->surface, c->u0, u, c->reach, c->self, &c->close));
+  PetscCall(SbContactSurfaceUpdate(c->surface, c->u0, u, c->reach, c->self, &c->close));
   if (c->close || c->self) {
     PetscCall(SbDetectorFind(c->detector, s, &found.nnear, &found.near));
     PetscCall(SbDetectorGetStats(c->detector, &stats));

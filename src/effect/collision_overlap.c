@@ -1,9 +1,9 @@
 /*
-  collision_overlap.c - points inside bodies that no pair holds: which way out, and how deep.
+  collision_overlap.c - points inside bodies that no pair holds: which separation direction, and how deep.
 
-  What comes in while a run goes on is seen as it comes. What is in from the start, or got in past what is looked at, is found as a point in a tet
+  What comes in while a run goes on is seen as it comes. What is in from the start, or got in past what is examined, is found as a point in a tet
   (src/contact/inside.c). It may be deeper than the reach, and there the nearest place of the surface
-  is no way out: neighbours would be pushed to different sides. So ways are given as by Heidelberger, Teschner, Keiser, Mueller and
+  is no separation direction: neighbours would be pushed to different sides. So ways are given as by Heidelberger, Teschner, Keiser, Mueller and
   Gross, "Consistent penetration depth estimation for deformable collision response", VMV 2004: edges that go through the other surface
   tell their inner end the normal there, weighted by the inverse square of the distance; from these points they spread along edges to those
   inside. Depth and place are then where the way leads out. They stay until no pair is deeper than half the reach, where the nearest place will do.
@@ -16,11 +16,12 @@
 
 #define GRAZE 1e-6  /* of an edge: nearer to its inner end it touches a facet and does not go through it */
 #define ALONG 0.2   /* cosine between edge and normal, below which the edge runs along the facet */
-#define CANCEL 1e-6 /* of the weights: what is left of ways that oppose each other is none */
-#define BLIND 8     /* reaches, four edges: without a way out the nearest places are looked for so deep */
-#define SHALLOW 0.5 /* of the reach: what is less deep needs no way out but the nearest place */
+#define CANCEL 1e-6 /* of the weights: the remainder of ways that oppose each other is none */
+#define BLIND \
+  8 /* reaches, four edges: without a separation direction the nearest places are searched for so deep */
+#define SHALLOW 0.5 /* of the reach: what is less deep needs no separation direction but the nearest place */
 #define PATIENCE 3  /* steps that a point may be inside without a pair: edges and rims take so long */
-#define AGAIN 30    /* steps after which one that has got no pair is looked at again */
+#define AGAIN 30    /* steps after which one that has got no pair is examined again */
 
 static PetscErrorCode deepest_of(const Collision *c, PetscReal *deepest)
 {
@@ -31,7 +32,7 @@ static PetscErrorCode deepest_of(const Collision *c, PetscReal *deepest)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* ------------------------------------------------------------------ ways out */
+/* ------------------------------------------------------------------ separation directions */
 
 /* What own edges connect, as nodes; global vectors with four numbers for each node: a way times its weight, and the weight. */
 typedef struct {
@@ -44,7 +45,7 @@ typedef struct {
 } Ways;
 
 /* The node that carries corner q of a facet: its own with P1, that of the facet with CR and DG. */
-static PetscInt carrier(const SbSurface f, PetscInt facet, int q)
+static PetscInt carrier(const SbContactSurface f, PetscInt facet, int q)
 {
   const PetscReal *w = f->facet_weight + 12 * facet;
   const PetscReal size = PetscAbsReal(w[4 * q]) + PetscAbsReal(w[4 * q + 1]) + PetscAbsReal(w[4 * q + 2]) +
@@ -70,7 +71,7 @@ static inline PetscBool of_vertices(const Collision *c, PetscInt edge)
 
 static PetscErrorCode create_ways(const Collision *c, Ways *w)
 {
-  const SbSurface f = c->surface;
+  const SbContactSurface f = c->surface;
   const SbDetectScene *s = &f->scene;
   IS from;
 
@@ -145,7 +146,7 @@ static PetscErrorCode add_entry(const Collision *c, const Leaving *l, PetscInt f
     u[k] = x[1][k] - x[0][k];
     v[k] = x[2][k] - x[0][k];
   }
-  if (!SbRayMeets(a, way, x, &t, weight, &out) || !out || t < GRAZE || t > (clear ? 1 - GRAZE : 1 + GRAZE))
+  if (!SbRayTriangle(a, way, x, &t, weight, &out) || !out || t < GRAZE || t > (clear ? 1 - GRAZE : 1 + GRAZE))
     PetscFunctionReturn(PETSC_SUCCESS);
   SbCross(u, v, n);
   length = PetscSqrtReal(SbDot3(n, n));
@@ -184,7 +185,7 @@ static inline PetscBool apart(const PetscReal a[3], const PetscReal b[3], const 
 */
 static PetscErrorCode find_leaving(const Collision *c, Ways *w, PetscInt *n, Leaving leaving[])
 {
-  const SbSurface f = c->surface;
+  const SbContactSurface f = c->surface;
   const PetscReal *end;
   PetscReal *inside;
 
@@ -267,7 +268,7 @@ static PetscErrorCode know_ways(const Collision *c, Ways *w)
 /* Points inside that have none take the way that their sum says; how many on all ranks. */
 static PetscErrorCode take_ways(const Collision *c, Ways *w, PetscInt *n)
 {
-  const SbSurface f = c->surface;
+  const SbContactSurface f = c->surface;
   const PetscReal *sum;
   PetscReal *known;
 
@@ -313,7 +314,7 @@ static PetscErrorCode spread(Ways *w)
 }
 
 /*
-  The ways out for the points inside c->way_part; those that get none are in no part afterwards. First by edges that go through a facet. Where
+  The separation directions for the points inside c->way_part; those that get none are in no part afterwards. First by edges that go through a facet. Where
   surfaces have planes in common, or nearly, edges run along facets or end on them, which tells less: only what has got no way by then goes by these.
 */
 static PetscErrorCode find_ways(Collision *c)
@@ -342,7 +343,7 @@ static PetscErrorCode find_ways(Collision *c)
 
 /* ------------------------------------------------------------------ how deep */
 
-/* How many points on all ranks have a pair along their way out. */
+/* How many points on all ranks have a pair along their separation direction. */
 static PetscErrorCode count_led(const Collision *c, PetscInt *n)
 {
   PetscFunctionBeginUser;
@@ -354,7 +355,7 @@ static PetscErrorCode count_led(const Collision *c, PetscInt *n)
 }
 
 /*
-  Two bodies, one with points inside the other that have no way out, of which the last look found no pair: a nbody + b, the same on all ranks;
+  Two bodies, one with points inside the other that have no separation direction, of which the last search found no pair: a nbody + b, the same on all ranks;
   -1: none. What came in where the effect does not have the surface of the other is none of its business.
 */
 static PetscErrorCode find_unmet(const Collision *c, const PetscInt inside[], PetscInt *unmet)
@@ -385,7 +386,7 @@ static PetscErrorCode find_unmet(const Collision *c, const PetscInt inside[], Pe
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* What is in a body without a way out: an error when a run begins. Within a run it was looked for as far as it goes, and may come out by itself. */
+/* What is in a body without a separation direction: an error when a run begins. Within a run it was searched for as far as it goes, and may come out by itself. */
 static PetscErrorCode tell_unmet(SbEffect e, const PetscInt inside[], PetscInt unmet, PetscBool begins)
 {
   const Collision *c = (const Collision *)e->data;
@@ -410,15 +411,15 @@ static PetscErrorCode tell_unmet(SbEffect e, const PetscInt inside[], PetscInt u
     "collision cannot tell which way it came in; move one of them (-body_%s_translate), or name sets of "
     "one of them only (-effect_%s_on)",
     in, out, (double)x[0], (double)x[1], (double)x[2], (double)(BLIND * c->reach), e->name, in, e->name);
-  PetscCall(
-    SbWarning(c->surface->space->comm,
-              "the effect %s: body %s has points inside body %s, at (%g, %g, %g) m, and sees no way out "
-              "of it; shorter steps (-ts_dt) keep bodies from getting there",
-              e->name, in, out, (double)x[0], (double)x[1], (double)x[2]));
+  PetscCall(SbWarning(
+    c->surface->space->comm,
+    "the effect %s: body %s has points inside body %s, at (%g, %g, %g) m, and sees no separation direction "
+    "of it; shorter steps (-ts_dt) keep bodies from getting there",
+    e->name, in, out, (double)x[0], (double)x[1], (double)x[2]));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Points in tets, and how many on all ranks, without those that lie in contact: the nearest place is their way out. */
+/* Points in tets, and how many on all ranks, without those that lie in contact: the nearest place is their separation direction. */
 static PetscErrorCode find_inside(const Collision *c, const PetscReal u[], PetscInt inside[], PetscInt *n)
 {
   PetscFunctionBeginUser;
@@ -458,7 +459,7 @@ static PetscErrorCode look_deeper(Collision *c, const PetscReal u[], PetscReal b
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Points inside that are not held along the way that they have, which was out of another part, or leads nowhere any more, have none. */
+/* Points inside that are not constrained along the way that they have, which was out of another part, or leads nowhere any more, have none. */
 static void forget_ways(const Collision *c, const PetscInt inside[])
 {
   const PetscInt npoint = c->surface->scene.npoint;
@@ -476,7 +477,7 @@ static void forget_ways(const Collision *c, const PetscInt inside[])
 }
 
 /*
-  The ways out of what points in tets are in; and those at the rim of it, which lie on its surface and have pairs behind. Ways that are
+  The separation directions of what points in tets are in; and those at the rim of it, which lie on its surface and have pairs behind. Ways that are
   there from before stay while they lead something out.
 */
 static PetscErrorCode lead_out(Collision *c, const PetscReal u[], const PetscInt inside[])

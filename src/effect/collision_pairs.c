@@ -27,9 +27,10 @@ static PetscBool force_of(SbSpace space, const Hit *hit, PetscReal normal[3], Pe
 
   force[0] = force[1] = force[2] = 0;
   if (!hit->on || hit->row < 0) return PETSC_FALSE;
-  SbSpaceCouplePush(space, hit->row, hit->held, normal, force);
+  SbSpaceGetConstraintForce(space, hit->row, hit->held, normal, force);
   for (int q = 0; q < 2; q++) {
-    if (hit->grip.slide[q] >= 0) SbSpaceCouplePush(space, hit->grip.slide[q], hit->held, across, force);
+    if (hit->grip.slide[q] >= 0)
+      SbSpaceGetConstraintForce(space, hit->grip.slide[q], hit->held, across, force);
   }
   return (PetscBool)(SbDot3(force, force) > 0);
 }
@@ -139,7 +140,7 @@ PetscErrorCode SbPairsFree(SbPairs *p)
 /* ------------------------------------------------------------------ places */
 
 /* Where a pair is on its first body, m; numbers that name it: kind, that of the point or edge, that of the other body or edge. */
-static void place_of(const Collision *c, const Hit *hit, SbPlace *place)
+static void place_of(const Collision *c, const Hit *hit, SbContactPoint *place)
 {
   const SbDetectScene *s = &c->surface->scene;
   const PetscBool edges = SbCollisionOfEdges(c, hit);
@@ -157,8 +158,8 @@ static void place_of(const Collision *c, const Hit *hit, SbPlace *place)
   }
 }
 
-PetscErrorCode SbEffectPlaces_Collision(SbEffect e, SbSpace space, const SbStage *stage,
-                                        const PetscReal residual[], SbPlaces *list)
+PetscErrorCode SbEffectContactPoints_Collision(SbEffect e, SbSpace space, const SbStage *stage,
+                                               const PetscReal residual[], SbContactPoints *list)
 {
   const Collision *c = (const Collision *)e->data;
 
@@ -167,14 +168,14 @@ PetscErrorCode SbEffectPlaces_Collision(SbEffect e, SbSpace space, const SbStage
   (void)residual;
   for (PetscInt i = 0; i < c->nhit; i++) {
     const Hit *hit = &c->hit[i];
-    SbPlace place;
+    SbContactPoint place;
 
     if (!force_of(space, hit, place.normal, place.force)) continue;
     place_of(c, hit, &place);
     place.body[0] = SbCollisionFirst(c, hit);
     place.body[1] = hit->body;
     place.gap = hit->gap;
-    PetscCall(SbPlacesAdd(list, &place));
+    PetscCall(SbContactPointsAdd(list, &place));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -1,9 +1,9 @@
 /*
-  collision_rebound.c - restitution between bodies. The law and what it does to the energy are told in src/model/rebound.c.
+  collision_rebound.c - restitution between bodies. The law and what it does to the energy are described in src/model/restitution.c.
 
-  The pairs of a step are first looked for where everything would be without forces, at u0 + h v0. There the detector finds what is about to
+  The pairs of a step are first searched for where everything would be without forces, at u0 + h v0. There the detector finds what is about to
   meet, however fast, and the relative displacement of a pair is h times its relative velocity when the step began: nothing else has to
-  be brought from the ranks of the other body. A pair that is found only later in the step, farther than the reach from there, is held
+  be brought from the ranks of the other body. A pair that is found only later in the step, farther than the reach from there, is constrained
   at the gap zero as without restitution.
 */
 #include "collision.h"
@@ -31,11 +31,11 @@ void SbCollisionMeet(Collision *c)
 void SbCollisionHit(const Collision *c, Hit *hit)
 {
   hit->on = PETSC_TRUE;
-  hit->leaves = SbReboundTo(&c->bounce, hit->gap0, hit->arrives);
+  hit->leaves = SbRestitutionGap(&c->bounce, hit->gap0, hit->arrives);
 }
 
 /* Of what leaves, and of what ends an overlap. */
-PetscErrorCode SbEffectRebound_Collision(SbEffect e, PetscReal *work)
+PetscErrorCode SbEffectRestitution_Collision(SbEffect e, PetscReal *work)
 {
   const Collision *c = (const Collision *)e->data;
 
@@ -49,7 +49,7 @@ PetscErrorCode SbEffectRebound_Collision(SbEffect e, PetscReal *work)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbEffectCurb_Collision(SbEffect e, PetscReal share)
+PetscErrorCode SbEffectScaleRestitution_Collision(SbEffect e, PetscReal share)
 {
   Collision *c = (Collision *)e->data;
 
@@ -58,7 +58,7 @@ PetscErrorCode SbEffectCurb_Collision(SbEffect e, PetscReal share)
   for (PetscInt i = 0; i < c->nhit; i++) {
     Hit *hit = &c->hit[i];
 
-    if (hit->leaves > 0) hit->leaves = SbReboundTo(&c->bounce, hit->gap0, hit->arrives);
+    if (hit->leaves > 0) hit->leaves = SbRestitutionGap(&c->bounce, hit->gap0, hit->arrives);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -154,13 +154,14 @@ PetscErrorCode SbEffectLoad_Collision(SbEffect e, SbSpace space, PetscReal t, co
   c->overlap.longest = sums[0];
   c->overlap.left = 1; /* the step that ended has taken its part */
   c->begun = PETSC_TRUE;
-  if (sums[1] > 0) PetscCall(SbCollisionFindOverlap(e, u)); /* ways out of what is left are found anew */
+  if (sums[1] > 0)
+    PetscCall(SbCollisionFindOverlap(e, u)); /* separation directions of what is left are found again */
   PetscCall(SbCollisionRestore(c));
   PetscCall(SbCollisionLook(c, u, PETSC_FALSE));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Points keep their names but for their numbers; edges are named by their facets, which are others now, and are looked for anew. */
+/* Points keep their names but for their numbers; edges are named by their facets, which are others now, and are searched for again. */
 PetscErrorCode SbEffectRename_Collision(SbEffect e, PetscInt nnode, const PetscInt from[],
                                         const PetscInt to[], PetscInt *n, PetscReal records[])
 {

@@ -4,23 +4,23 @@
   A node at x has the gap g = signed distance from the obstacle where it is at that time, and the normal n there. Nodes are
   those that carry the surface: vertices of P1, centroids of boundary faces of CR and DG (there g is the mean gap of the face).
 
-  Response `projected`: touching nodes are held on the obstacle (src/fem/held.c): n . u is prescribed, and the force that this
-  takes is the multiplier lambda. After each solve a pulling one leaves, a penetrated node enters, the normal is taken anew on a
+  Response `projected`: touching nodes are constrained on the obstacle (src/fem/nodal_constraint.c): n . u is prescribed, and the force that this
+  takes is the multiplier lambda. After each solve a pulling one leaves, a penetrated node enters, the normal is taken again on a
   curved obstacle, and the solve is repeated until nothing changes (Kikuchi and Oden 1988; Hueeber and Wohlmuth 2005). A node that
-  has left and come back several times within a step stays: the loop ends. `multiplier`: the same with rows n . u = c (src/fem/couple.c),
+  has left and come back several times within a step stays: the loop ends. `multiplier`: the same with rows n . u = c (src/fem/constraint.c),
   whose forces are unknowns of the solves.
 
   Response `penalty`: springs, N = k <-g>, with k from the stiffness of the cell behind. `augmented`: the penalty with a multiplier,
   N = <lambda - k g>, which is raised after each solve until the penetration is within the tolerance (Simo and Laursen 1992).
 
   Friction (friction.c) is solved for with N. It needs rows: with it all responses write their nodes as such, `projected` exact ones in whose
-  null space the solves run, `penalty` and `augmented` springs, linear while normals and who touches stay, which is looked at after each
+  null space the solves run, `penalty` and `augmented` springs, linear while normals and who touches stay, which is examined after each
   solve. A node sticks to the place of the obstacle where it was when the step began, and moves with it.
 
   Overlap that is there when a step begins is not thrown out at once: a node may stay behind the obstacle by that depth, which falls to
   1/e in `recovery` steps. With springs that is the depth beyond what they give. A static run closes it at once.
 
-  What bounces is told in contact_rebound.c, what happens where facets of a mesh meet in
+  What bounces is described in contact_rebound.c, what happens where facets of a mesh meet in
   contact_facets.c, forces and what is reported of them are in contact_force.c.
 */
 #include "contact.h"
@@ -44,8 +44,8 @@ static const SbOption rows[] = {
   {"response", SB_OPTION_CHOICE, 1, "", "projected", "projected|multiplier|augmented|penalty",
    "hold touching nodes on the obstacle, or with the forces as unknowns of the solve; multipliers raised on "
    "springs; springs"},
-  {"arrival", SB_OPTION_CHOICE, 1, "", "whole", "whole|cut",
-   "a step in which nodes begin to touch is taken as it is, or repeated up to the moment of the first touch"},
+  {"time_of_impact", SB_OPTION_CHOICE, 1, "", "no", "no|yes",
+   "a step in which nodes begin to touch is taken as it is, or repeated up to the first time of impact"},
   {"friction", SB_OPTION_REAL, 1, "", "0", "[0, inf)", "Coulomb's coefficient for sticking"},
   {"friction_kinetic", SB_OPTION_REAL, 1, "", "-1", "[-1, inf)",
    "Coulomb's coefficient for slipping; negative: that for sticking"},
@@ -58,7 +58,7 @@ static const SbOption rows[] = {
   {"restitution", SB_OPTION_REAL, 1, "", "0", "[0, 1]",
    "part of their speed with which nodes leave what they hit; needs -time euler_implicit, and a body that is "
    "stiff within a step to bounce as a whole"},
-  {"recovery", SB_OPTION_REAL, 1, "steps", "30", "[1, inf)",
+  {"separation_steps", SB_OPTION_REAL, 1, "steps", "30", "[1, inf)",
    "nodes that are behind the obstacle before they meet it are brought out slowly: to 1/e of the depth in so "
    "many steps; 1, and in static runs: at once"},
   {"displacement", SB_OPTION_FORMULA, 3, "m", "0;0;0", "",
@@ -115,9 +115,9 @@ static PetscErrorCode options_contact(SbEffect e, const SbScope *scope)
   PetscCall(SbOptionChoice(scope, "response", &choice));
   c->response = (Response)choice;
   e->saddle = (PetscBool)(c->response == MULTIPLIER);
-  PetscCall(SbOptionChoice(scope, "arrival", &choice));
+  PetscCall(SbOptionChoice(scope, "time_of_impact", &choice));
   c->cut = (PetscBool)(choice == 1);
-  if (!c->cut) e->ops.arrive = NULL;
+  if (!c->cut) e->ops.time_of_impact = NULL;
   PetscCall(SbOptionReal(scope, "friction", &c->friction.mu));
   PetscCall(SbOptionReal(scope, "friction_kinetic", &c->friction.mu_kinetic));
   if (c->friction.mu_kinetic < 0) c->friction.mu_kinetic = c->friction.mu;
@@ -134,14 +134,14 @@ static PetscErrorCode options_contact(SbEffect e, const SbScope *scope)
   PetscCheck(c->bounce.e <= 0 || exact(c), PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
              "-effect_%s_restitution %g needs -effect_%s_response projected or multiplier", e->name,
              (double)c->bounce.e, e->name);
-  PetscCheck(
-    c->bounce.e <= 0 || !c->cut, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
-    "-effect_%s_restitution %g and -effect_%s_arrival cut do not go together: what is let go within a step "
-    "never arrives at its end; leave one of them out",
-    e->name, (double)c->bounce.e, e->name);
+  PetscCheck(c->bounce.e <= 0 || !c->cut, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
+             "-effect_%s_restitution %g and -effect_%s_time_of_impact yes do not go together: what is let go "
+             "within a step "
+             "never arrives at its end; leave one of them out",
+             e->name, (double)c->bounce.e, e->name);
   e->euler = (PetscBool)(c->bounce.e > 0);
-  if (c->bounce.e <= 0) e->ops.rebound = NULL;
-  PetscCall(SbOptionReal(scope, "recovery", &recovery));
+  if (c->bounce.e <= 0) e->ops.restitution = NULL;
+  PetscCall(SbOptionReal(scope, "separation_steps", &recovery));
   SbOverlapSet(&c->overlap, recovery);
   PetscCall(read_path(e, scope));
   e->springs = (PetscBool)(!exact(c) || c->friction.mu > 0);
@@ -151,11 +151,11 @@ static PetscErrorCode options_contact(SbEffect e, const SbScope *scope)
     e->ops.force = NULL;
     e->ops.tangent = NULL;
   } else {
-    e->ops.hold = NULL;
+    e->ops.assemble_constraints = NULL;
     e->linear = PETSC_FALSE;
-    if (c->response == PENALTY && !c->cut) e->ops.settle = NULL;
+    if (c->response == PENALTY && !c->cut) e->ops.update_active_set = NULL;
   }
-  if (c->rows) e->ops.push = NULL; /* they push without it */
+  if (c->rows) e->ops.contact_force = NULL; /* they push without it */
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -210,15 +210,15 @@ static PetscErrorCode setup_contact(SbEffect e, SbSpace space)
   }
   c->size = PetscSqrtReal(SbDot3(box, box));
   if (c->rows)
-    PetscCall(SbSpaceCoupleCreate(space, PETSC_TRUE, (PetscBool)(c->friction.mu > 0)));
+    PetscCall(SbSpaceCreateConstraints(space, PETSC_TRUE, (PetscBool)(c->friction.mu > 0)));
   else if (exact(c))
-    PetscCall(SbSpaceHoldCreate(space));
+    PetscCall(SbSpaceCreateNodalConstraints(space));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* ------------------------------------------------------------------ who touches */
 
-/* Gap of the node at x beyond what it is held at, with its normal and the value of n . u that puts it there. */
+/* Gap of the node at x beyond what it is constrained at, with its normal and the value of n . u that puts it there. */
 static PetscReal look(const Contact *c, SbSpace space, const PetscReal x[3], Touch *touch)
 {
   const PetscReal *X = space->node_x + 3 * touch->node;
@@ -240,11 +240,11 @@ static PetscReal look(const Contact *c, SbSpace space, const PetscReal x[3], Tou
   return gap - touch->rest;
 }
 
-/* Gap that a node is held at which was at x0 when the step began. */
+/* Gap that a node is constrained at which was at x0 when the step began. */
 static PetscReal rest_of(const Contact *c, const SbPose *from, const Touch *touch, const PetscReal x0[3])
 {
   PetscReal n[3];
-  /* what touches springs is behind by what they give; projected it is where it was held */
+  /* what touches springs is behind by what they give; projected it is where it was constrained */
   const PetscReal depth = touch->was && !exact(c) ? -touch->kept : -SbContactGap(c, from, x0, n);
 
   return depth > TOLERANCE * c->size ? -c->overlap.left * depth : 0;
@@ -262,7 +262,7 @@ static void set_damper(const Contact *c, const SbPose *from, PetscReal dt, const
   touch->before = touch->k * c->damping / dt * PetscMin(0, SbContactGap(c, from, x0, n) - touch->rest);
 }
 
-/* A node is behind the obstacle: from now on it is held. */
+/* A node is behind the obstacle: from now on it is constrained. */
 static void enter(const Contact *c, SbSpace space, Touch *touch)
 {
   if (!touch->on && c->friction.mu > 0) {
@@ -325,7 +325,7 @@ static PetscErrorCode touch_contact(SbEffect e, SbSpace space, PetscReal t, Pets
   c->friction.updates = 0;
   c->first = PETSC_TRUE;
   c->arrival = 1;
-  SbReboundBegin(&c->bounce, dt);
+  SbRestitutionBegin(&c->bounce, dt);
   SbOverlapBegin(&c->overlap, dt);
   for (PetscInt i = 0; i < c->n; i++) {
     Touch *touch = &c->touch[i];
@@ -369,12 +369,12 @@ static PetscErrorCode hold_rows(const Contact *c, SbSpace space, Touch *touch)
   PetscFunctionBeginUser;
   if (c->friction.mu > 0) SbFrictionDirection(&c->friction, &p, push, &oblique);
   if (exact(c))
-    PetscCall(SbSpaceCoupleRow(space, NORMALS - 1 - id, 1, p.node, touch->n, oblique ? push : NULL,
-                               touch->value, &touch->along));
+    PetscCall(SbSpaceAddConstraint(space, NORMALS - 1 - id, 1, p.node, touch->n, oblique ? push : NULL,
+                                   touch->value, &touch->along));
   else {
-    PetscCall(SbSpaceCoupleSpring(space, 1, p.node, touch->n, oblique ? push : NULL, touch->value,
-                                  touch->stiff, touch->lambda + touch->before, &touch->along));
-    SbSpaceCoupleOutside(space, touch->along);
+    PetscCall(SbSpaceAddPenaltyConstraint(space, 1, p.node, touch->n, oblique ? push : NULL, touch->value,
+                                          touch->stiff, touch->lambda + touch->before, &touch->along));
+    SbSpaceSetConstraintExternal(space, touch->along);
   }
   if (c->friction.mu > 0) PetscCall(SbFrictionHold(&c->friction, space, &p, -2 - 2 * id));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -393,8 +393,9 @@ static PetscErrorCode hold_contact(SbEffect e, SbSpace space)
     if (c->rows)
       PetscCall(hold_rows(c, space, touch));
     else
-      touch->along = SbSpaceHold(space, touch->node, touch->n, touch->value);
-    if (touch->valley) touch->other_along = SbSpaceHold(space, touch->node, touch->other, touch->other_value);
+      touch->along = SbSpaceAddNodalConstraint(space, touch->node, touch->n, touch->value);
+    if (touch->valley)
+      touch->other_along = SbSpaceAddNodalConstraint(space, touch->node, touch->other, touch->other_value);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -409,8 +410,8 @@ static void read_rows(const Contact *c, SbSpace space, const PetscReal u[3], Tou
   for (int k = 0; k < 3; k++) f[k] = 0;
   for (int k = 0; k < 3; k++) touch->now[k] = u[k];
   if (touch->along < 0) return;
-  SbSpaceCoupleGet(space, touch->along, &force, &along);
-  touch->rests = SbSpaceCoupleRests(space, touch->along);
+  SbSpaceGetConstraint(space, touch->along, &force, &along);
+  touch->rests = SbSpaceIsConstraintRedundant(space, touch->along);
   if (touch->rests) {
     touch->along = -1;
     force = 0;
@@ -435,8 +436,9 @@ static PetscErrorCode measure(const Contact *c, SbSpace space, const PetscReal u
     if (c->rows) read_rows(c, space, u + 3 * node, touch, f);
     if (exact(c)) touch->lambda = SbContactMultiplier(c, space, touch, r + 3 * node);
     if (touch->valley)
-      touch->other_lambda =
-        touch->other_along < 0 ? 0 : SbSpaceHoldForce(space, node, touch->other_along, r + 3 * node);
+      touch->other_lambda = touch->other_along < 0
+                              ? 0
+                              : SbSpaceGetNodalConstraintForce(space, node, touch->other_along, r + 3 * node);
     place(space, node, u, x);
     touch->gap = look(c, space, x, touch);
     *largest = PetscMax(*largest, SbContactForce(c, touch));
@@ -449,7 +451,7 @@ static PetscErrorCode measure(const Contact *c, SbSpace space, const PetscReal u
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Whether a node is held, or not, as it should be; changes it if not. */
+/* Whether a node is constrained, or not, as it should be; changes it if not. */
 static PetscBool settle_held(const Contact *c, SbSpace space, PetscReal largest, Touch *touch)
 {
   if (!touch->on) {
@@ -469,7 +471,7 @@ static PetscBool settle_held(const Contact *c, SbSpace space, PetscReal largest,
   return (PetscBool)(PetscAbsReal(touch->gap) <= TOLERANCE * c->size);
 }
 
-/* Whether a spring pushes with what its place asks for, and for `augmented`, whose multiplier is raised, until what is left of the penetration
+/* Whether a spring pushes with what its place asks for, and for `augmented`, whose multiplier is raised, until the remainder of the penetration
    does not matter. */
 static PetscBool settle_spring(const Contact *c, SbSpace space, PetscReal largest, Touch *touch)
 {
@@ -590,19 +592,19 @@ static PetscErrorCode create_contact(SbEffect e)
   e->steady = PETSC_FALSE; /* a load factor does not make an obstacle softer */
   e->ops.setfromoptions = options_contact;
   e->ops.setup = setup_contact;
-  e->ops.touch = touch_contact;
-  e->ops.hold = hold_contact;
-  e->ops.settle = settle_contact;
-  e->ops.arrive = arrive_contact;
-  e->ops.rebound = SbEffectRebound_Contact;
-  e->ops.curb = SbEffectCurb_Contact;
-  e->ops.rate = SbEffectRate_Contact;
+  e->ops.begin_step = touch_contact;
+  e->ops.assemble_constraints = hold_contact;
+  e->ops.update_active_set = settle_contact;
+  e->ops.time_of_impact = arrive_contact;
+  e->ops.restitution = SbEffectRestitution_Contact;
+  e->ops.scale_restitution = SbEffectScaleRestitution_Contact;
+  e->ops.target_velocity = SbEffectTargetVelocity_Contact;
   e->ops.force = SbEffectForce_Contact;
   e->ops.tangent = SbEffectTangent_Contact;
   e->ops.accept = SbEffectAccept_Contact;
-  e->ops.push = SbEffectPush_Contact;
-  e->ops.near = SbEffectNear_Contact;
-  e->ops.places = SbEffectPlaces_Contact;
+  e->ops.contact_force = SbEffectContactForce_Contact;
+  e->ops.gap = SbEffectGap_Contact;
+  e->ops.contact_points = SbEffectContactPoints_Contact;
   e->ops.history = SbEffectHistory_Contact;
   e->ops.save = SbEffectSave_Contact;
   e->ops.load = SbEffectLoad_Contact;

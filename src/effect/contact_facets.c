@@ -1,19 +1,19 @@
 /*
-  contact_facets.c - held nodes where facets of an obstacle's mesh meet.
+  contact_facets.c - constrained nodes where facets of an obstacle's mesh meet.
 
-  There a node may slide from one facet to the other and back with every look. In a valley both push: held on one of them it goes through the
-  other one. So it is held on both for a solve, which tells what each has to push with. If neither pulls, the resultant is the
-  normal with which forces balance in the valley, and it is held along that till the step ends; else the one that pulls is left. On
+  There a node may slide from one facet to the other and back with every look. In a valley both push: constrained on one of them it goes through the
+  other one. So it is constrained on both for a solve, which tells what each has to exert. If neither pulls, the resultant is the
+  normal with which forces balance in the valley, and it is constrained along that till the step ends; else the one that pulls is left. On
   two facets it slides along the valley, and maybe behind a third one, which then takes the place of that which pushes less.
 
-  Elsewhere (ridges, and where nodes are held by rows) normals of facets are averaged from look to look, and after many of them the plane is kept.
+  Elsewhere (ridges, and where nodes are constrained by rows) normals of facets are averaged from search to search, and after many of them the plane is kept.
 */
 #include "contact.h"
 
-#define VALLEY 2    /* flips of a held node between facets in a step, after which it may be held on two */
+#define VALLEY 2 /* flips of a held node between facets in a step, after which it may be constrained on two */
 #define AVERAGED 4  /* flips after which normals are averaged */
-#define GIVEN_UP 16 /* flips after which it is not held on two any more */
-#define KEPT 24     /* flips after which it is held on the same plane till the step ends */
+#define GIVEN_UP 16 /* flips after which it is not constrained on two any more */
+#define KEPT 24     /* flips after which it is constrained on the same plane till the step ends */
 #define JUMP 1e-6   /* 1 - cosine: a flip */
 
 static void set_plane(const PetscReal n[3], PetscReal value, PetscReal to[3], PetscReal *to_value)

@@ -1,6 +1,6 @@
 /*
   contact_force.c - where the obstacle is, and what it pushes nodes with: forces and their derivatives, the end of a step, history. The
-  method is told in contact.c.
+  method is described in contact.c.
 */
 #include "contact.h"
 
@@ -27,7 +27,7 @@ PetscReal SbContactGap(const Contact *c, const SbPose *pose, const PetscReal x[3
 /* ------------------------------------------------------------------ forces */
 
 /*
-  Normal force on a node at x, N; n: the normal. Springs follow their normal; a node that is held keeps the one it is held along: were it
+  Normal force on a node at x, N; n: the normal. Springs follow their normal; a node that is constrained keeps the one it is constrained along: were it
   to turn during a solve, where facets meet it would jump, and Newton's method with it.
 */
 static PetscReal normal_force(const Contact *c, const SbPose *pose, const Touch *touch, const PetscReal x[3],
@@ -124,8 +124,8 @@ PetscReal SbContactMultiplier(const Contact *c, SbSpace space, const Touch *touc
   PetscReal force, at;
 
   if (!touch->on || touch->along < 0) return 0;
-  if (!c->rows) return SbSpaceHoldForce(space, touch->node, touch->along, r);
-  SbSpaceCoupleGet(space, touch->along, &force, &at);
+  if (!c->rows) return SbSpaceGetNodalConstraintForce(space, touch->node, touch->along, r);
+  SbSpaceGetConstraint(space, touch->along, &force, &at);
   return force;
 }
 
@@ -141,8 +141,8 @@ static void force_on(const Contact *c, const SbPose *pose, SbSpace space, const 
   for (int k = 0; k < 3; k++) f[k] = normal * n[k] + (c->friction.mu > 0 ? touch->grip.drag[k] : 0);
 }
 
-PetscErrorCode SbEffectPush_Contact(SbEffect e, SbSpace space, const SbStage *stage,
-                                    const PetscReal residual[], PetscReal f[])
+PetscErrorCode SbEffectContactForce_Contact(SbEffect e, SbSpace space, const SbStage *stage,
+                                            const PetscReal residual[], PetscReal f[])
 {
   const Contact *c = (const Contact *)e->data;
   SbPose pose;
@@ -159,8 +159,8 @@ PetscErrorCode SbEffectPush_Contact(SbEffect e, SbSpace space, const SbStage *st
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbEffectNear_Contact(SbEffect e, SbSpace space, const SbStage *stage, PetscReal gap[],
-                                    PetscReal normal[])
+PetscErrorCode SbEffectGap_Contact(SbEffect e, SbSpace space, const SbStage *stage, PetscReal gap[],
+                                   PetscReal normal[])
 {
   const Contact *c = (const Contact *)e->data;
   SbPose pose;
@@ -180,8 +180,8 @@ PetscErrorCode SbEffectNear_Contact(SbEffect e, SbSpace space, const SbStage *st
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbEffectPlaces_Contact(SbEffect e, SbSpace space, const SbStage *stage,
-                                      const PetscReal residual[], SbPlaces *list)
+PetscErrorCode SbEffectContactPoints_Contact(SbEffect e, SbSpace space, const SbStage *stage,
+                                             const PetscReal residual[], SbContactPoints *list)
 {
   const Contact *c = (const Contact *)e->data;
   SbPose pose;
@@ -190,14 +190,15 @@ PetscErrorCode SbEffectPlaces_Contact(SbEffect e, SbSpace space, const SbStage *
   SbContactPose(c, stage->t, &pose);
   for (PetscInt i = 0; i < c->n; i++) {
     const Touch *touch = &c->touch[i];
-    SbPlace p = {.body = {space->node_body[touch->node], -1}, .id = {0, space->node_orig[touch->node], 0}};
+    SbContactPoint p = {.body = {space->node_body[touch->node], -1},
+                        .id = {0, space->node_orig[touch->node], 0}};
 
     place(space, touch->node, stage->u, p.x);
     if (normal_force(c, &pose, touch, p.x, p.normal) <= 0) continue;
     force_on(c, &pose, space, touch, p.x, residual, p.force);
     p.gap = SbContactGap(c, &pose, p.x, p.normal);
-    if (exact(c)) PetscCall(PetscArraycpy(p.normal, touch->n, 3)); /* that it is held along */
-    PetscCall(SbPlacesAdd(list, &p));
+    if (exact(c)) PetscCall(PetscArraycpy(p.normal, touch->n, 3)); /* that it is constrained along */
+    PetscCall(SbContactPointsAdd(list, &p));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }

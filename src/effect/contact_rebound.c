@@ -1,6 +1,6 @@
 /*
-  contact_rebound.c - velocities at a rigid obstacle: restitution of nodes that meet it, whose law and what it does to the energy are told in
-  src/model/rebound.c, and how fast it moves where it holds nodes.
+  contact_rebound.c - velocities at a rigid obstacle: restitution of nodes that meet it, whose law and what it does to the energy are described in
+  src/model/restitution.c, and how fast it moves where it holds nodes.
 */
 #include "contact.h"
 
@@ -19,10 +19,10 @@ PetscBool SbContactComes(const Contact *c, const SbPose *from, const PetscReal x
   SbPoseApply(&c->to, X, x1);
   for (int i = 0; i < 3; i++) v -= n[i] * (v0[i] - (x1[i] - x0[i]) / c->bounce.dt);
   touch->arrives = PetscMax(0, v);
-  return SbReboundComes(&c->bounce, touch->gap0, v);
+  return SbRestitutionApproaches(&c->bounce, touch->gap0, v);
 }
 
-/* The node is held elsewhere. */
+/* The node is constrained elsewhere. */
 static void move_to(PetscReal rest, Touch *touch)
 {
   touch->value += rest - touch->rest;
@@ -33,10 +33,10 @@ static void move_to(PetscReal rest, Touch *touch)
 void SbContactHit(const Contact *c, Touch *touch)
 {
   if (touch->arrives > 0 && touch->rest == 0)
-    move_to(SbReboundTo(&c->bounce, touch->gap0, touch->arrives), touch);
+    move_to(SbRestitutionGap(&c->bounce, touch->gap0, touch->arrives), touch);
 }
 
-PetscErrorCode SbEffectRebound_Contact(SbEffect e, PetscReal *work)
+PetscErrorCode SbEffectRestitution_Contact(SbEffect e, PetscReal *work)
 {
   const Contact *c = (const Contact *)e->data;
 
@@ -50,7 +50,7 @@ PetscErrorCode SbEffectRebound_Contact(SbEffect e, PetscReal *work)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbEffectCurb_Contact(SbEffect e, PetscReal share)
+PetscErrorCode SbEffectScaleRestitution_Contact(SbEffect e, PetscReal share)
 {
   Contact *c = (Contact *)e->data;
 
@@ -59,13 +59,13 @@ PetscErrorCode SbEffectCurb_Contact(SbEffect e, PetscReal share)
   for (PetscInt i = 0; i < c->n; i++) {
     Touch *touch = &c->touch[i];
 
-    if (touch->rest > 0) move_to(SbReboundTo(&c->bounce, touch->gap0, touch->arrives), touch);
+    if (touch->rest > 0) move_to(SbRestitutionGap(&c->bounce, touch->gap0, touch->arrives), touch);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* The obstacle's point at each node that it holds moves with it. */
-PetscErrorCode SbEffectRate_Contact(SbEffect e, SbSpace space, const SbStage *stage)
+PetscErrorCode SbEffectTargetVelocity_Contact(SbEffect e, SbSpace space, const SbStage *stage)
 {
   const Contact *c = (const Contact *)e->data;
   SbPose before, now;
@@ -84,9 +84,9 @@ PetscErrorCode SbEffectRate_Contact(SbEffect e, SbSpace space, const SbStage *st
     SbPoseApply(&now, X, to);
     for (int k = 0; k < 3; k++) v[k] = (to[k] - from[k]) / (INSTANT * stage->dt);
     if (!c->rows)
-      SbSpaceHoldRate(space, touch->node, touch->along, SbDot3(touch->n, v));
+      SbSpaceSetNodalConstraintVelocity(space, touch->node, touch->along, SbDot3(touch->n, v));
     else
-      PetscCall(SbSpaceCoupleRate(space, touch->along, SbDot3(touch->n, v)));
+      PetscCall(SbSpaceSetConstraintVelocity(space, touch->along, SbDot3(touch->n, v)));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -1,7 +1,7 @@
 /*
   contact_state.c - what a node that touches an obstacle takes from step to step, for checkpoints.
 
-  A record is a node by its original number: whether it touches and did so, what it is held at and along, multiplier, gap, and its
+  A record is a node by its original number: whether it touches and did so, what it is constrained at and along, multiplier, gap, and its
   friction. With that the rows of the last solve can be written again, and the next step begins as if the run had not stopped.
 */
 #include "contact.h"
@@ -61,7 +61,7 @@ static void forget(Contact *c, const PetscReal u[])
     touch->on = touch->was = touch->idle = touch->rests = PETSC_FALSE;
     touch->along = -1;
     touch->rest = touch->kept = touch->lambda = touch->gap = touch->arrives = 0;
-    touch->grip = (SbGrip){.slide = {-1, -1}};
+    touch->grip = (SbFrictionState){.slide = {-1, -1}};
     for (int k = 0; k < 3; k++) {
       touch->start[k] = touch->now[k] = u[3 * touch->node + k];
       touch->stretch[k] = 0;

@@ -45,7 +45,7 @@ static PetscErrorCode check_body(SbMesh mesh, const SbEffectOn *on, const char *
   }
   PetscCall(PetscMalloc1(mesh->nbody, &names));
   for (PetscInt b = 0; b < mesh->nbody; b++) names[b] = mesh->body[b].name;
-  PetscCall(SbNearest(name, mesh->nbody, names, sizeof(near), near));
+  PetscCall(SbNearestNames(name, mesh->nbody, names, sizeof(near), near));
   PetscCall(PetscFree(names));
   SETERRQ(mesh->comm, PETSC_ERR_USER_INPUT,
           "%s: there is no body %s%s%s; damping acts on bodies, see -bodies", on->option, name,

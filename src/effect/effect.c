@@ -42,7 +42,7 @@ static PetscErrorCode unknown_type(const char *name, const char *type)
   // PETSc counts a closing NULL.
   PetscCall(PetscFunctionListGet(SbEffectList, &types, &n));
   while (n && !types[n - 1]) n--;
-  PetscCall(SbNearest(type, n, types, sizeof(near), near));
+  PetscCall(SbNearestNames(type, n, types, sizeof(near), near));
   // Nothing near: list them all.
   if (!near[0]) {
     for (int i = 0; i < n; i++) {
@@ -93,26 +93,26 @@ PetscErrorCode SbEffectDestroy(SbEffect *effect)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbPlacesAdd(SbPlaces *list, const SbPlace *place)
+PetscErrorCode SbContactPointsAdd(SbContactPoints *list, const SbContactPoint *place)
 {
   PetscFunctionBeginUser;
   if (list->n == list->size) {
     list->size = PetscMax(64, 2 * list->size);
-    PetscCall(PetscRealloc((size_t)list->size * sizeof(SbPlace), &list->place));
+    PetscCall(PetscRealloc((size_t)list->size * sizeof(SbContactPoint), &list->place));
   }
   list->place[list->n++] = *place;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbEffectMarkHeld(SbEffect e, PetscInt nset, SbSet set[])
+PetscErrorCode SbEffectMarkPrescribed(SbEffect e, PetscInt nset, SbSet set[])
 {
   PetscFunctionBeginUser;
-  for (PetscInt i = 0; e->held && i < e->held->n; i++) {
+  for (PetscInt i = 0; e->prescribed && i < e->prescribed->n; i++) {
     for (PetscInt k = 0; k < nset; k++) {
       PetscBool same;
 
-      PetscCall(PetscStrcmp(set[k].name, e->held->name[i], &same));
-      if (same) set[k].held = PETSC_TRUE;
+      PetscCall(PetscStrcmp(set[k].name, e->prescribed->name[i], &same));
+      if (same) set[k].prescribed = PETSC_TRUE;
     }
   }
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -1,7 +1,7 @@
 /*
   friction.c - Coulomb friction where a pair touches: |T| <= mu N, and what slides has T = -mu N along its slip.
 
-  A pair sticks or slides. What sticks does not move across the normal: two exact rows, or two springs where rows are springs. What
+  A pair sticks or slides. What sticks does not move across the normal: two exact constraints, or two springs where rows are springs. What
   slides takes its friction with the normal force: that one pushes along n - mu d, d the direction of the slip, so that N is of the
   same solve and nothing waits for it. Across d a spring turns it. After a solve what sticks with more than mu N begins to slide,
   and what slid backwards sticks: a semismooth Newton method (Alart and Curnier 1991; Hueeber, Stadler, Wohlmuth 2008), an active
@@ -9,7 +9,7 @@
 
   The slip is that of the step, as implicit Euler has it; with springs it has the stretch that was there before.
 
-  A node in the corner of two obstacles cannot stick to both by exact rows: they would say the same twice, and take from each other's
+  A node in the corner of two obstacles cannot stick to both by exact constraints: they would say the same twice, and take from each other's
   normal force. Such a pair sticks by springs as long as it touches.
 */
 #include "friction.h"
@@ -22,7 +22,7 @@
 #define STIFF \
   1e-3 /* smallest difference of trial force and limit that the stiffness across the slip sees, relative */
 
-void SbFrictionBegin(SbGrip *g, PetscBool touches)
+void SbFrictionBegin(SbFrictionState *g, PetscBool touches)
 {
   if (!touches) { /* a point that arrives in this step sticks to where it was at its start */
     for (int k = 0; k < 3; k++) g->stretch[k] = 0;
@@ -34,18 +34,18 @@ void SbFrictionBegin(SbGrip *g, PetscBool touches)
 }
 
 /* Whether a pair sticks by springs. */
-static inline PetscBool springs(const SbFriction *f, const SbGrip *g)
+static inline PetscBool springs(const SbFriction *f, const SbFrictionState *g)
 {
   return (PetscBool)(!f->exact || g->crowded);
 }
 
 /* Whether a pair that cannot decide has springs of the solve before: a secant (Kacanov's method), slow and sure. */
-static inline PetscBool careful(const SbGrip *g)
+static inline PetscBool careful(const SbFrictionState *g)
 {
   return (PetscBool)(g->flips > FLIPS);
 }
 
-static PetscReal coefficient(const SbFriction *f, const SbGrip *g)
+static PetscReal coefficient(const SbFriction *f, const SbFrictionState *g)
 {
   return g->slid ? f->mu_kinetic : f->mu;
 }
@@ -66,11 +66,11 @@ static PetscReal slip(const SbFrictionPair *p, PetscReal s[3])
   return across(p->normal, s);
 }
 
-/* Turns the two directions across the normal, the first one along v or what is left of it. */
+/* Turns the two directions across the normal, the first one along v or the remainder of it. */
 static void turn(const SbFrictionPair *p, const PetscReal v[3])
 {
   const PetscReal *n = p->normal;
-  SbGrip *g = p->grip;
+  SbFrictionState *g = p->grip;
   PetscReal t[3] = {v[0], v[1], v[2]}, length = across(n, t);
 
   if (length <= 1e-12 * PetscSqrtReal(SbDot3(v, v))) {
@@ -94,7 +94,7 @@ static void turn_free(const SbFrictionPair *p)
 
 void SbFrictionEnter(const SbFriction *f, const SbFrictionPair *p, PetscReal depth)
 {
-  SbGrip *g = p->grip;
+  SbFrictionState *g = p->grip;
   PetscReal s[3];
   const PetscReal length = slip(p, s), most = coefficient(f, g) * PetscMax(0, depth);
 
@@ -107,7 +107,7 @@ void SbFrictionEnter(const SbFriction *f, const SbFrictionPair *p, PetscReal dep
 void SbFrictionDirection(const SbFriction *f, const SbFrictionPair *p, PetscReal direction[3],
                          PetscBool *oblique)
 {
-  const SbGrip *g = p->grip;
+  const SbFrictionState *g = p->grip;
   const PetscReal mu = coefficient(f, g);
   PetscReal t[3], length;
 
@@ -120,7 +120,7 @@ void SbFrictionDirection(const SbFriction *f, const SbFrictionPair *p, PetscReal
 
 PetscErrorCode SbFrictionHold(const SbFriction *f, SbSpace space, const SbFrictionPair *p, PetscInt id)
 {
-  SbGrip *g = p->grip;
+  SbFrictionState *g = p->grip;
   PetscReal coef[3 * SB_FRICTION_NODES];
 
   PetscFunctionBeginUser;
@@ -135,22 +135,23 @@ PetscErrorCode SbFrictionHold(const SbFriction *f, SbSpace space, const SbFricti
 
     for (PetscInt k = 0; k < 3 * p->n; k++) coef[k] = p->weight[k / 3] * t[k % 3];
     if (!g->slides && !springs(f, g) && !careful(g)) { /* normals of all pairs come first */
-      PetscCall(SbSpaceCoupleRow(space, id + q, p->n, p->node, coef, NULL, rest, &g->slide[q]));
+      PetscCall(SbSpaceAddConstraint(space, id + q, p->n, p->node, coef, NULL, rest, &g->slide[q]));
       continue;
     }
     if (careful(g))
       stiffness = g->turning;
     else if (g->slides)
       stiffness = q ? g->turning : 0;
-    PetscCall(SbSpaceCoupleSpring(space, p->n, p->node, coef, NULL, rest, stiffness, 0, &g->slide[q]));
-    if (p->outer) SbSpaceCoupleOutside(space, g->slide[q]);
+    PetscCall(
+      SbSpaceAddPenaltyConstraint(space, p->n, p->node, coef, NULL, rest, stiffness, 0, &g->slide[q]));
+    if (p->outer) SbSpaceSetConstraintExternal(space, g->slide[q]);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 void SbFrictionRead(const SbFriction *f, SbSpace space, const SbFrictionPair *p, PetscReal N, PetscReal along)
 {
-  SbGrip *g = p->grip;
+  SbFrictionState *g = p->grip;
 
   N = PetscMax(0, N);
   for (int k = 0; k < 3; k++) g->drag[k] = 0;
@@ -162,8 +163,8 @@ void SbFrictionRead(const SbFriction *f, SbSpace space, const SbFrictionPair *p,
   for (int q = 0; q < 2; q++) {
     PetscReal force, at;
 
-    SbSpaceCoupleGet(space, g->slide[q], &force, &at);
-    if (SbSpaceCoupleRests(space, g->slide[q])) { /* others hold it there */
+    SbSpaceGetConstraint(space, g->slide[q], &force, &at);
+    if (SbSpaceIsConstraintRedundant(space, g->slide[q])) { /* others hold it there */
       force = 0;
       at = SbDot3(g->tangent[q], p->start) - SbDot3(g->tangent[q], g->stretch);
       if (p->outer && !p->rests)
@@ -179,7 +180,7 @@ void SbFrictionRead(const SbFriction *f, SbSpace space, const SbFrictionPair *p,
 /* The same with springs for a pair that cannot decide; N is halfway between this solve's and the one before. */
 static PetscReal settle_carefully(const SbFriction *f, PetscReal before, const SbFrictionPair *p)
 {
-  SbGrip *g = p->grip;
+  SbFrictionState *g = p->grip;
   const PetscReal mu = coefficient(f, g), most = mu * PetscMax(0, g->pressing);
   PetscReal s[3], wrong[3];
   const PetscReal length = slip(p, s), part = length > 0 ? PetscMin(p->k, most / length) : p->k;
@@ -199,7 +200,7 @@ static PetscReal settle_carefully(const SbFriction *f, PetscReal before, const S
 */
 static PetscReal settle(const SbFriction *f, const SbFrictionPair *p)
 {
-  SbGrip *g = p->grip;
+  SbFrictionState *g = p->grip;
   const PetscReal most = coefficient(f, g) * PetscMax(0, g->pressing);
   const PetscBool slid = g->slides;
   PetscReal s[3], trial[3], wrong[3] = {0}, size;
@@ -225,7 +226,7 @@ static PetscReal settle(const SbFriction *f, const SbFrictionPair *p)
 
 PetscReal SbFrictionSettle(const SbFriction *f, const SbFrictionPair *p, PetscReal N)
 {
-  SbGrip *g = p->grip;
+  SbFrictionState *g = p->grip;
   const PetscReal before = g->pressing;
   PetscReal error;
 
@@ -248,7 +249,7 @@ void SbFrictionJudge(SbFriction *f, PetscReal worst, PetscReal largest, PetscBoo
 
 void SbFrictionAccept(SbFriction *f, const SbFrictionPair *p, PetscBool presses)
 {
-  SbGrip *g = p->grip;
+  SbFrictionState *g = p->grip;
 
   if (!presses) { /* nothing holds it where it was */
     for (int k = 0; k < 3; k++) g->stretch[k] = g->drag[k] = 0;
@@ -278,7 +279,7 @@ PetscErrorCode SbFrictionWarn(SbFriction *f, const char effect[], SbSpace space,
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-void SbFrictionSave(const SbGrip *g, PetscReal state[])
+void SbFrictionSave(const SbFrictionState *g, PetscReal state[])
 {
   state[0] = g->slid;
   state[1] = g->crowded;
@@ -289,9 +290,9 @@ void SbFrictionSave(const SbGrip *g, PetscReal state[])
   }
 }
 
-void SbFrictionLoad(const PetscReal state[], SbGrip *g)
+void SbFrictionLoad(const PetscReal state[], SbFrictionState *g)
 {
-  *g = (SbGrip){.slide = {-1, -1}, .turning = state[2]};
+  *g = (SbFrictionState){.slide = {-1, -1}, .turning = state[2]};
   g->slid = g->slides = (PetscBool)(state[0] != 0);
   g->crowded = (PetscBool)(state[1] != 0);
   for (int k = 0; k < 3; k++) {

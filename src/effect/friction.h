@@ -10,7 +10,7 @@
 /* Coefficients of an effect, and how its friction settles in a step. */
 typedef struct {
   PetscReal mu, mu_kinetic;
-  PetscBool exact;     /* what sticks has exact rows; else springs */
+  PetscBool exact;     /* what sticks has exact constraints; else springs */
   int updates;         /* within the step */
   PetscReal unsettled; /* largest error of friction after the last solve, as a part of the largest friction */
   PetscBool said;      /* that friction did not settle */
@@ -29,7 +29,7 @@ typedef struct {
   PetscReal stretch[3];    /* of the springs that stick, at the start of the step, m */
   PetscReal drag[3];       /* force of friction on the point in the last solve, N */
   PetscReal pressing;      /* normal force of the solve before, N */
-} SbGrip;
+} SbFrictionState;
 
 /* A pair as friction sees it for the length of a call; all borrowed. */
 typedef struct {
@@ -43,11 +43,11 @@ typedef struct {
   PetscBool rests;         /* other rows say what its normal's row does */
   PetscBool outer;         /* on something that is no body: its forces are reactions */
   uint8_t fixed;           /* bit c: component c of its only node is prescribed */
-  SbGrip *grip;
+  SbFrictionState *grip;
 } SbFrictionPair;
 
 /* What a pair begins a step with; touches: it did when the last one ended. Not collective. */
-void SbFrictionBegin(SbGrip *grip, PetscBool touches);
+void SbFrictionBegin(SbFrictionState *grip, PetscBool touches);
 /* A pair that touches from now on: it sticks or slides as its motion without touching says, by which it is `depth` (m) behind; p->now is that
    motion. */
 void SbFrictionEnter(const SbFriction *f, const SbFrictionPair *p, PetscReal depth);
@@ -70,5 +70,5 @@ void SbFrictionAccept(SbFriction *f, const SbFrictionPair *p, PetscBool presses)
 PetscErrorCode SbFrictionWarn(SbFriction *f, const char effect[], SbSpace space, PetscReal t);
 /* What a pair takes from step to step, for checkpoints: state[SB_FRICTION_STATE]. */
 #define SB_FRICTION_STATE 9
-void SbFrictionSave(const SbGrip *grip, PetscReal state[]);
-void SbFrictionLoad(const PetscReal state[], SbGrip *grip);
+void SbFrictionSave(const SbFrictionState *grip, PetscReal state[]);
+void SbFrictionLoad(const PetscReal state[], SbFrictionState *grip);

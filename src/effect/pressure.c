@@ -12,13 +12,13 @@
   Tangent: with the opposite edges c_b = x_{b+1} - x_{b+2} (indices modulo 3), dN/dx_b w = w x c_b, so
   df_a/dx_b = p/6 [c_b]x, where [c]x w = c x w. It is not symmetric facet by facet; what the facets add to the
   matrix here is the symmetric part, the blocks p/12 [c_b - c_a]x. On a closed surface, or one whose rim is
-  held, the other part cancels and the tangent is the exact derivative (Bufler, "Pressure loaded structures
+  constrained, the other part cancels and the tangent is the exact derivative (Bufler, "Pressure loaded structures
   under large deformations", 1984); at a free rim it is not, and Newton converges a little more slowly to the
   same answer.
 
   The facets of CR and DG bodies do not meet at their edges, so that forces facet by facet do not quite add up to
   zero. Where the pressure acts on the whole surface of such a body, it is taken as -p dV/du of the volume inside
-  (src/fem/volume.c): at rest that is the same, and force and moment vanish for every displacement. On part of the
+  (src/fem/body_volume.c): at rest that is the same, and force and moment vanish for every displacement. On part of the
   surface the gaps stay; they close with the mesh. There nothing cancels between facets: with CR the force stands at the facet's own
   node, and N depends on the other three of the cell, so that the derivative has nothing opposite, and its symmetric part is wrong by as much as it is large.
   Newton's method with it stalls near p = mu. The matrix gets none of it; the operator of the linear solver applies it
@@ -61,7 +61,7 @@ static PetscErrorCode options_pressure(SbEffect e, const SbScope *scope)
     e->linear = PETSC_FALSE;
   else {
     e->ops.tangent = NULL;
-    e->ops.unsymmetric = NULL;
+    e->ops.nonsymmetric = NULL;
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -96,11 +96,11 @@ static PetscErrorCode setup_pressure(SbEffect e, SbSpace space)
   PetscCall(SbEffectFacets(space, &p->on, &p->nfacet, &p->facet));
   PetscCall(PetscCalloc1(space->mesh->nbody, &p->whole));
   if (space->faces && p->follower) PetscCall(find_whole(p, space));
-  /* what is left of bodies with nodes at faces */
+  /* the remainder of bodies with nodes at faces */
   for (PetscInt k = 0; k < p->nfacet && !some; k++)
     some = (PetscBool)!SbSpaceCellElement(space, p->facet[k].cell)->nodes_per[0];
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &some, 1, SB_MPI_BOOL, MPI_LOR, space->comm));
-  if (!some) e->ops.unsymmetric = NULL;
+  if (!some) e->ops.nonsymmetric = NULL;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -136,7 +136,7 @@ static inline void add_to_corners(SbSpace space, const SbFacet *facet, PetscReal
 /* Whether it meets no other facet at its edges, and its tangent is applied beside the matrix. */
 static inline PetscBool apart(SbSpace space, const SbFacet *facet)
 {
-  return (PetscBool)(!SbSpaceCellElement(space, facet->cell)->nodes_per[0] && !space->couple);
+  return (PetscBool)(!SbSpaceCellElement(space, facet->cell)->nodes_per[0] && !space->constraints);
 }
 
 static PetscErrorCode force_pressure(SbEffect e, SbSpace space, const SbStage *stage, PetscReal f[])
@@ -279,7 +279,7 @@ static PetscErrorCode create_pressure(SbEffect e)
   e->ops.setup = setup_pressure;
   e->ops.force = force_pressure;
   e->ops.tangent = tangent_pressure;
-  e->ops.unsymmetric = unsymmetric_pressure;
+  e->ops.nonsymmetric = unsymmetric_pressure;
   e->ops.destroy = destroy_pressure;
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -1,34 +1,34 @@
 /*
-  rebound.h - Newton's law of restitution for one point that meets something within a step; told in src/model/rebound.c.
+  bounce.h - Newton's law of restitution for one point that meets something within a step; told in src/model/restitution.c.
 */
 #pragma once
 #include "sbbase.h"
 
-#define SB_REBOUND_EARLY \
+#define SB_RESTITUTION_EARLY \
   1e-6 /* of the way of a step: who would only just not arrive arrives, so that a flat base does so at once */
 
 /* What the points of an effect have left of their speed. */
 typedef struct {
-  PetscReal e;    /* coefficient of restitution; 0: nothing rebounds */
+  PetscReal e;    /* coefficient of restitution; 0: nothing bounces */
   PetscReal left; /* part of it that is left in this step */
   PetscReal dt;   /* length of the step, s */
-} SbRebound;
+} SbRestitution;
 
 /* Begins an attempt at a step. */
-static inline void SbReboundBegin(SbRebound *r, PetscReal dt)
+static inline void SbRestitutionBegin(SbRestitution *r, PetscReal dt)
 {
   r->left = 1;
   r->dt = dt;
 }
 
 /* Whether a point at gap0 (m) will be behind the other at the end of the step, with its speed towards it (m/s). */
-static inline PetscBool SbReboundComes(const SbRebound *r, PetscReal gap0, PetscReal speed)
+static inline PetscBool SbRestitutionApproaches(const SbRestitution *r, PetscReal gap0, PetscReal speed)
 {
-  return (PetscBool)(speed > 0 && r->dt * speed * (1 + SB_REBOUND_EARLY) >= gap0);
+  return (PetscBool)(speed > 0 && r->dt * speed * (1 + SB_RESTITUTION_EARLY) >= gap0);
 }
 
-/* Gap that it is held at when it is to be there: where it leaves to, m; 0: it does not rebound. */
-static inline PetscReal SbReboundTo(const SbRebound *r, PetscReal gap0, PetscReal speed)
+/* Gap that it is constrained at when it is to be there: where it leaves to, m; 0: it does not bounce. */
+static inline PetscReal SbRestitutionGap(const SbRestitution *r, PetscReal gap0, PetscReal speed)
 {
   return speed > 0 ? gap0 + r->dt * r->left * r->e * speed : 0;
 }

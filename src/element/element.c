@@ -13,8 +13,8 @@ static const SbOption dg_rows[] = {
   {"gamma0", SB_OPTION_REAL, 1, "", "4", "(0, inf)", "factor on the penalty of the mean jump across a face"},
   {"gamma1", SB_OPTION_REAL, 1, "", "0.6", "(0, inf)",
    "factor on the penalty of jumps across faces; less is softer, much more locks"},
-  {"supports", SB_OPTION_CHOICE, 1, "", "weak", "weak|strong",
-   "boundary faces held in all directions: by a penalty, or the mean displacement itself"},
+  {"dirichlet", SB_OPTION_CHOICE, 1, "", "weak", "weak|strong",
+   "boundary faces fixed in all directions: by a penalty, or the mean displacement itself"},
 };
 
 static PetscErrorCode destroy_list(void)
@@ -54,7 +54,7 @@ static PetscErrorCode read_options(const SbScope *body, SbElement e)
   if (e->weak) {
     PetscInt strong;
 
-    PetscCall(SbOptionChoice(&scope, "supports", &strong));
+    PetscCall(SbOptionChoice(&scope, "dirichlet", &strong));
     e->weak = (PetscBool)!strong;
   }
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -11,24 +11,25 @@
 
   AIJ keeps the rows of a block apart: its blocks go one by one, number by number.
 */
-#include "four.h"
+#include "fem_impl.h"
+#include "sbfour.h"
 
 /* Part q of row i begins with the face terms, glue times the identity in each block; one pass where blocks lie together. */
 static void begin_with_glue(SbSpace s, const SbValues *x, PetscInt i, int q)
 {
   const SbPlan p = s->plan;
   const PetscInt *ptr = q ? p->oi : p->di, first = x->kind == SB_MATRIX_SBAIJ ? p->diagonal[i] : ptr[i];
-  const PetscReal factor = x->glue[s->node_body[i]];
+  const PetscReal factor = x->face_term[s->node_body[i]];
   size_t rs, cs;
 
   for (PetscInt k = first; k < ptr[i + 1]; k++) {
-    const PetscReal glue = factor * p->glue[q][k];
+    const PetscReal face_term = factor * p->face_term[q][k];
     PetscScalar *v = sb_block(x, p, i, q ? ~k : k, &rs, &cs);
 
     if (x->kind == SB_MATRIX_AIJ) {
-      for (size_t c = 0; c < 3; c++) v[c * (rs + cs)] = glue;
+      for (size_t c = 0; c < 3; c++) v[c * (rs + cs)] = face_term;
     } else {
-      for (int e = 0; e < 9; e++) v[e] = e % 4 == 0 ? glue : 0.;
+      for (int e = 0; e < 9; e++) v[e] = e % 4 == 0 ? face_term : 0.;
     }
   }
 }
@@ -47,8 +48,8 @@ void SbInsertClear(SbSpace s, const SbValues *x, PetscInt b)
 
   for (PetscInt k = p->fresh_start[b]; k < p->fresh_start[b + 1]; k++) {
     for (int q = 0; q < (x->value[1] ? 2 : 1); q++) {
-      if (!x->glue || x->kind == SB_MATRIX_AIJ) clear_row(s, x, p->fresh[k], q);
-      if (x->glue) begin_with_glue(s, x, p->fresh[k], q);
+      if (!x->face_term || x->kind == SB_MATRIX_AIJ) clear_row(s, x, p->fresh[k], q);
+      if (x->face_term) begin_with_glue(s, x, p->fresh[k], q);
     }
   }
 }

@@ -45,7 +45,7 @@ static void face_nodes(SbSpace s, const Face *face, PetscInt node[8])
 
   for (PetscInt i = 0; i < 4; i++) node[i] = s->cell_node[plus + (face->face[0] + i) % 4];
   if (face->cell[1] == SUPPORT) {
-    for (int i = 4; i < 8; i++) node[i] = s->support[plus + face->face[0]];
+    for (int i = 4; i < 8; i++) node[i] = s->dirichlet_node[plus + face->face[0]];
     return;
   }
   node[4] = s->cell_node[minus + face->face[1]];
@@ -112,7 +112,7 @@ static PetscErrorCode find_faces(SbSpace s, const PetscInt region_of[], PetscInt
     if (s->element[b]->nodes_per[0]) continue;
     for (PetscInt i = 0; i < 4 * s->mesh->ncell; i++) {
       Face *face = &(*faces)[n];
-      const PetscBool held = (PetscBool)(s->support && s->support[i] >= 0);
+      const PetscBool held = (PetscBool)(s->dirichlet_node && s->dirichlet_node[i] >= 0);
       PetscInt node[8], f = 0;
       PetscBool owned = PETSC_FALSE;
 

@@ -51,7 +51,7 @@ static uint64_t held_sets(SbSpace s)
   PetscBool weak = PETSC_FALSE;
 
   for (PetscInt b = 0; b < s->mesh->nbody; b++) weak = (PetscBool)(weak || s->element[b]->weak);
-  for (PetscInt k = 0; weak && k < s->mesh->nset; k++) held |= s->mesh->set[k].held ? SB_SET_BIT(k) : 0;
+  for (PetscInt k = 0; weak && k < s->mesh->nset; k++) held |= s->mesh->set[k].prescribed ? SB_SET_BIT(k) : 0;
   return held;
 }
 
@@ -76,7 +76,7 @@ static PetscErrorCode number_owned(SbSpace s, uint64_t held, PetscInt node[])
 
         node[4 * c + a] = n++;
         if (SbSpaceCellElement(s, c)->weak && (sets & SB_ON_BOUNDARY) && (sets & held))
-          s->support[4 * c + a] = n++;
+          s->dirichlet_node[4 * c + a] = n++;
       } else if (per[2]) {
         node[4 * c + a] = number_face(s, node, c, a, &n);
       } else if (v < mesh->nvert_owned) {
@@ -155,7 +155,7 @@ static PetscErrorCode localise(SbSpace s)
   PetscFunctionBeginUser;
   PetscCall(PetscMalloc1(8 * (size_t)s->mesh->ncell, &ghost));
   add_ghosts(s, s->cell_node, &nghost, ghost);
-  if (s->support) add_ghosts(s, s->support, &nghost, ghost);
+  if (s->dirichlet_node) add_ghosts(s, s->dirichlet_node, &nghost, ghost);
   PetscCall(PetscSortRemoveDupsInt(&nghost, ghost));
   s->nnode = s->nnode_owned + nghost;
   PetscCall(PetscMalloc1(s->nnode, &s->gnode));
@@ -163,7 +163,7 @@ static PetscErrorCode localise(SbSpace s)
   PetscCall(PetscArraycpy(s->gnode + s->nnode_owned, ghost, nghost));
   PetscCall(PetscFree(ghost));
   PetscCall(make_local(s, s->cell_node));
-  if (s->support) PetscCall(make_local(s, s->support));
+  if (s->dirichlet_node) PetscCall(make_local(s, s->dirichlet_node));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -187,7 +187,7 @@ static uint64_t face_sets(SbMesh mesh, PetscInt cell, PetscInt face)
 static void describe_supports(SbSpace s)
 {
   for (PetscInt i = 0; i < 4 * s->mesh->ncell; i++) {
-    const PetscInt own = s->cell_node[i], node = s->support[i];
+    const PetscInt own = s->cell_node[i], node = s->dirichlet_node[i];
 
     if (node == UNKNOWN) continue;
     s->node_body[node] = s->node_body[own];
@@ -224,7 +224,7 @@ static PetscErrorCode describe_nodes(SbSpace s)
       for (int k = 0; k < 3; k++) x[k] = (mesh->x[3 * a + k] + mesh->x[3 * b + k] + mesh->x[3 * c + k]) / 3.;
     }
   }
-  if (s->support) describe_supports(s);
+  if (s->dirichlet_node) describe_supports(s);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -259,8 +259,8 @@ static PetscErrorCode layout_faces(SbSpace s)
   PetscCall(SbMeshNeighbours(mesh, &s->neighbour));
   PetscCall(PetscMalloc1(4 * (size_t)mesh->ncell, &s->cell_node));
   if (held) {
-    PetscCall(PetscMalloc1(4 * (size_t)mesh->ncell, &s->support));
-    for (PetscInt i = 0; i < 4 * mesh->ncell; i++) s->support[i] = UNKNOWN;
+    PetscCall(PetscMalloc1(4 * (size_t)mesh->ncell, &s->dirichlet_node));
+    for (PetscInt i = 0; i < 4 * mesh->ncell; i++) s->dirichlet_node[i] = UNKNOWN;
   }
   PetscCall(number_owned(s, held, s->cell_node));
   PetscCallMPI(MPI_Scan(&s->nnode_owned, &s->gnode_start, 1, MPIU_INT, MPI_SUM, s->comm));
@@ -268,12 +268,12 @@ static PetscErrorCode layout_faces(SbSpace s)
   s->gnode_start -= s->nnode_owned;
   for (PetscInt i = 0; i < 4 * mesh->ncell_owned; i++) {
     if (s->cell_node[i] != UNKNOWN) s->cell_node[i] += s->gnode_start;
-    if (s->support && s->support[i] != UNKNOWN) s->support[i] += s->gnode_start;
+    if (s->dirichlet_node && s->dirichlet_node[i] != UNKNOWN) s->dirichlet_node[i] += s->gnode_start;
   }
   PetscCall(SbMeshBroadcastCells(mesh, 4, s->cell_node));
   PetscCall(complete_owned(s, s->cell_node));
   PetscCall(SbMeshBroadcastCells(mesh, 4, s->cell_node));
-  if (s->support) PetscCall(SbMeshBroadcastCells(mesh, 4, s->support));
+  if (s->dirichlet_node) PetscCall(SbMeshBroadcastCells(mesh, 4, s->dirichlet_node));
   PetscCall(localise(s));
   PetscCall(describe_nodes(s));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -301,7 +301,7 @@ PetscErrorCode SbLayoutDestroy(SbSpace s)
   PetscCall(PetscFree(s->node_x));
   if (s->faces) PetscCall(PetscFree3(s->node_body, s->node_set, s->node_orig));
   PetscCall(PetscFree(s->neighbour));
-  PetscCall(PetscFree(s->support));
+  PetscCall(PetscFree(s->dirichlet_node));
   PetscCall(PetscFree(s->fixed));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -314,8 +314,8 @@ static void across(SbSpace s, const PetscReal stiffness[], PetscInt cell, PetscI
 
   *node = s->cell_node[4 * cell + a];
   *weight = 1.;
-  if (s->support && s->support[4 * cell + a] != UNKNOWN) {
-    *node = s->support[4 * cell + a];
+  if (s->dirichlet_node && s->dirichlet_node[4 * cell + a] != UNKNOWN) {
+    *node = s->dirichlet_node[4 * cell + a];
     *weight = 0.;
   }
   if (other < 0) return;

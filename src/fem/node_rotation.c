@@ -5,7 +5,7 @@
   quaternions", gives the same maximiser of sum_T V_T R : R_T). All cells that touch an owned node are local, so owned nodes
   need no communication. Where rotations cancel out (cells turned against each other by pi) the result is some rotation.
 */
-#include "rotated.h"
+#include "fem_impl.h"
 
 void SbSpaceCellRotations(SbSpace s, const PetscReal x[], SbLane R[])
 {

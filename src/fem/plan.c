@@ -154,7 +154,7 @@ static void place_row(const Groups *g, PetscInt i, const PetscInt place[])
 static PetscErrorCode plan_glue(SbSpace s, const Groups *faces, SbPlan p)
 {
   PetscFunctionBeginUser;
-  PetscCall(PetscCalloc2(p->di[s->nnode_owned], &p->glue[0], p->oi[s->nnode_owned], &p->glue[1]));
+  PetscCall(PetscCalloc2(p->di[s->nnode_owned], &p->face_term[0], p->oi[s->nnode_owned], &p->face_term[1]));
   for (PetscInt b = 0; b < faces->nbatch; b++) {
     for (PetscInt l = 0; l < SB_BATCH; l++) {
       const PetscInt *place = faces->offset + (size_t)b * 64 * SB_BATCH + l;
@@ -164,7 +164,7 @@ static PetscErrorCode plan_glue(SbSpace s, const Groups *faces, SbPlan p)
       for (int k = 0; k < 64; k++) {
         const PetscInt at = place[SB_BATCH * k];
 
-        if (at != SB_NOT_OWNED) p->glue[at < 0][at < 0 ? ~at : at] += K[k / 8][k % 8];
+        if (at != SB_NOT_OWNED) p->face_term[at < 0][at < 0 ? ~at : at] += K[k / 8][k % 8];
       }
     }
   }
@@ -258,7 +258,7 @@ PetscErrorCode SbPlanDestroy(SbPlan *plan)
   PetscCall(PetscFree(p->offset));
   PetscCall(PetscFree(p->ui));
   PetscCall(PetscFree(p->upper));
-  PetscCall(PetscFree2(p->glue[0], p->glue[1]));
+  PetscCall(PetscFree2(p->face_term[0], p->face_term[1]));
   PetscCall(PetscFree2(p->fresh_start, p->fresh));
   PetscCall(PetscFree3(p->fix_block, p->fix_row, p->fix_mask));
   PetscCall(PetscFree(*plan));

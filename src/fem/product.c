@@ -12,8 +12,8 @@
 
   Measured at 200,000 tets on one rank: 0.9 ms in the place of 1.4 (SBAIJ) and 1.7 (BAIJ); in cache half the time.
 */
-#include "four.h"
-#include "product.h"
+#include "fem_impl.h"
+#include "sbfour.h"
 #include <petsc/private/petscimpl.h>
 
 typedef struct {
@@ -121,7 +121,7 @@ static PetscErrorCode product_of(Mat A, Product **p)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbMatReturnRead(Mat A, PetscErrorCode (*restore)(Mat, PetscScalar *[]), PetscScalar *value[])
+PetscErrorCode SbMatRestoreRead(Mat A, PetscErrorCode (*restore)(Mat, PetscScalar *[]), PetscScalar *value[])
 {
   PetscObjectState state;
 

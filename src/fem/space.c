@@ -173,8 +173,8 @@ PetscErrorCode SbSpaceDestroy(SbSpace *space)
   if (!s) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(SbPlanDestroy(&s->plan));
   PetscCall(VecDestroy(&s->template_vec));
-  PetscCall(SbHeldDestroy(&s->held));
-  PetscCall(SbCoupleDestroy(&s->couple));
+  PetscCall(SbNodalConstraintsDestroy(&s->nodal));
+  PetscCall(SbConstraintsDestroy(&s->constraints));
   PetscCall(SbJumpDestroy(&s->jump));
   PetscCall(SbLayoutDestroy(s));
   if (s->width > 4) PetscCall(PetscFree2(s->batch_clique, s->batch_weight));
@@ -198,8 +198,8 @@ PetscErrorCode SbSpaceValidate(SbSpace s)
   for (PetscInt i = 0; i < s->nnode_owned; i++) {
     PetscCheck(s->gnode[i] == s->gnode_start + i, PETSC_COMM_SELF, PETSC_ERR_PLIB,
                "Owned node %" PetscInt_FMT " is out of order", i);
-    PetscCheck(s->node_mass[i] > 0. || (s->support && s->fixed[i] == 7), PETSC_COMM_SELF, PETSC_ERR_PLIB,
-               "Node %" PetscInt_FMT " has no mass", i);
+    PetscCheck(s->node_mass[i] > 0. || (s->dirichlet_node && s->fixed[i] == 7), PETSC_COMM_SELF,
+               PETSC_ERR_PLIB, "Node %" PetscInt_FMT " has no mass", i);
     sums[0] += s->node_mass[i];
   }
   for (PetscInt i = s->nnode_owned + 1; i < s->nnode; i++)
@@ -301,7 +301,7 @@ PetscErrorCode SbSpaceFindSet(SbSpace s, const char *name, const char *where, Pe
     if (same) PetscFunctionReturn(PETSC_SUCCESS);
     names[*k] = s->mesh->set[*k].name;
   }
-  PetscCall(SbNearest(name, s->mesh->nset, names, sizeof(near), near));
+  PetscCall(SbNearestNames(name, s->mesh->nset, names, sizeof(near), near));
   SETERRQ(PETSC_COMM_SELF, PETSC_ERR_USER, "%s names the set '%s', which does not exist%s%s", where, name,
           near[0] ? "; nearest: " : "", near);
 }

@@ -32,7 +32,7 @@ PetscErrorCode SbValuesBegin(Mat A, SbValues *x)
   if (is[3]) PetscCall(MatMPIBAIJGetSeqBAIJ(A, &x->part[0], &x->part[1], NULL));
   x->kind = is[4] ? SB_MATRIX_SBAIJ : is[2] || is[3] ? SB_MATRIX_BAIJ : SB_MATRIX_AIJ;
   x->value[1] = NULL;
-  x->glue = NULL;
+  x->face_term = NULL;
   PetscCheck(is[0] || is[1] || is[2] || is[3] || is[4], PetscObjectComm((PetscObject)A), PETSC_ERR_SUP,
              "No direct access to a matrix of type %s", ((PetscObject)A)->type_name);
   for (int q = 0; q < 2 && x->part[q]; q++) {
@@ -209,7 +209,7 @@ static void keep_volumetric(SbSpace s, const SbMaterial m, PetscInt batch, const
 typedef struct {
   SbSpace space;
   SbValues x;
-  PetscReal *glue;
+  PetscReal *face_term;
 } Fill;
 
 /* Adds the blocks of a batch and its consistent mass; K is overwritten. */
@@ -268,14 +268,14 @@ static void fill_region(SbSpace s, PetscInt r, const SbStage *stage, PetscInt nf
 }
 
 /* What the rows of each body begin with: its face terms, as stiffness and damping. */
-static PetscErrorCode glue_factors(SbSpace s, const SbStage *stage, PetscReal **glue)
+static PetscErrorCode glue_factors(SbSpace s, const SbStage *stage, PetscReal **face_term)
 {
   PetscFunctionBeginUser;
-  *glue = NULL;
+  *face_term = NULL;
   if (!s->jump) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(PetscCalloc1(s->mesh->nbody, glue));
+  PetscCall(PetscCalloc1(s->mesh->nbody, face_term));
   for (PetscInt r = 0; r < s->nregion; r++)
-    (*glue)[s->region[r].body] = stage->shift_k + stage->shift_v * s->region[r].beta;
+    (*face_term)[s->region[r].body] = stage->shift_k + stage->shift_v * s->region[r].beta;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -317,8 +317,8 @@ PetscErrorCode SbSpaceAssembleSplit(SbSpace s, const SbStage *stage, PetscInt n,
   for (PetscInt k = 0; k < n; k++) {
     fill[k].space = space[k];
     PetscCall(SbValuesBegin(A[k], &fill[k].x));
-    PetscCall(glue_factors(space[k], stage, &fill[k].glue));
-    fill[k].x.glue = fill[k].glue;
+    PetscCall(glue_factors(space[k], stage, &fill[k].face_term));
+    fill[k].x.face_term = fill[k].face_term;
   }
   for (PetscInt r = 0; r < s->nregion; r++) {
     PetscCall(PetscLogEventBegin(s->region[r].material->event, 0, 0, 0, 0));
@@ -329,7 +329,7 @@ PetscErrorCode SbSpaceAssembleSplit(SbSpace s, const SbStage *stage, PetscInt n,
     if (!s->consistent_mass && (stage->shift_a != 0. || stage->shift_v != 0.))
       add_lumped_mass(space[k], stage, &fill[k].x);
     PetscCall(SbValuesEnd(&fill[k].x));
-    PetscCall(PetscFree(fill[k].glue));
+    PetscCall(PetscFree(fill[k].face_term));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -340,7 +340,7 @@ PetscErrorCode SbSpaceAssembleTangent(SbSpace s, const SbStage *stage, Mat A)
 
   PetscFunctionBeginUser;
   PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_TANGENT], A, 0, 0, 0));
-  PetscCall(SbFrameOperatorSetState(A, stage, &done));
+  PetscCall(SbMatrixFreeSetState(A, stage, &done));
   if (!done) PetscCall(SbPressureOperatorAssemble(A, stage, &done));
   if (!done) PetscCall(SbSpaceAssembleSplit(s, stage, 1, &s, &A, NULL));
   PetscCall(PetscLogEventEnd(SbEvents[SB_EVENT_TANGENT], A, 0, 0, 0));
@@ -414,8 +414,8 @@ PetscErrorCode SbSpaceFinishTangent(SbSpace s, Mat A)
   if (matrix_free) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(SbValuesBegin(A, &x));
   clear_fixed(s, &x);
-  if (s->held) SbHeldProject(s, &x);
-  if (s->couple) PetscCall(SbCoupleAnchor(s, &x));
+  if (s->nodal) SbNodalConstraintsProjectMatrix(s, &x);
+  if (s->constraints) PetscCall(SbConstraintsRegularize(s, &x));
   PetscCall(SbValuesEnd(&x));
   /* the parts' cached diagonals are stale: their own (local) assembly drops them; the outer matrix only needs its state raised */
   for (int q = 0; q < 2 && x.part[q]; q++) {

@@ -2,7 +2,7 @@
   What contact left open. A force on a place that is not closed would do the work force times gap if it were: half of it (forces grow from zero)
   bounds the energy of the error from above, but a body that springs let down as a whole is not strained by that.
 
-  Springs, then, are looked at closer. With F what they push with, one more step of Uzawa's iteration, (K + springs) delta = F, moves the body to
+  Springs, then, are examined closer. With F what they exert, one more step of Uzawa's iteration, (K + springs) delta = F, moves the body to
   where the exact contact would hold it, up to the ratio of its stiffness to theirs; the elastic energy of delta is that of the error.
 */
 #include "ledger_impl.h"
@@ -14,11 +14,11 @@
 static PetscErrorCode open_work(SbLedger l, const SbStep *step, PetscReal *work)
 {
   const SbModel m = l->run->model;
-  SbPlaces list = {0};
+  SbContactPoints list = {0};
 
   PetscFunctionBeginUser;
   *work = 0.;
-  PetscCall(SbModelContactPlaces(m, step->t, step->U, step->R, &list));
+  PetscCall(SbModelContactPoints(m, step->t, step->U, step->R, &list));
   for (PetscInt i = 0; i < list.n; i++)
     *work += 0.5 * PetscAbsReal(list.place[i].gap * SbDot3(list.place[i].force, list.place[i].normal));
   PetscCall(PetscFree(list.place));
@@ -78,7 +78,7 @@ PetscErrorCode SbEstimateContact(SbLedger l, const SbStep *step, PetscReal *erro
 
   PetscFunctionBeginUser;
   PetscCall(open_work(l, step, &energy));
-  for (PetscInt e = 0; e < m->ntouch; e++) springs = (PetscBool)(springs || m->touch[e]->springs);
+  for (PetscInt e = 0; e < m->nbegin_step; e++) springs = (PetscBool)(springs || m->begin_step[e]->springs);
   if (springs && !m->dynamic && energy > 0.) {
     PetscCall(spring_energy(l, step, &strained));
     energy = PetscMin(energy, strained);

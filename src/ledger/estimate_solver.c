@@ -25,7 +25,7 @@ static PetscErrorCode damp(SbLedger l, PetscReal energy)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbEstimateSolver(SbLedger l, const SbSolved *step)
+PetscErrorCode SbEstimateSolver(SbLedger l, const SbSolvedStep *step)
 {
   const SNES snes = l->run->snes;
   PetscReal energy;

@@ -11,7 +11,7 @@
   nor inertia, which P_h has in it.
 
   Stiffness. The answer of P1 is too stiff, near nu = 1/2 by any factor (locking): then P_h is wrong as a whole, and what recovery takes out of it
-  is a part of a small energy only. But P* tells how much too stiff. Let a be the energy of P_h in the norm above and b what is left of
+  is a part of a small energy only. But P* tells how much too stiff. Let a be the energy of P_h in the norm above and b the remainder of
   it without what the mesh has added, a - b the part that is not smooth. Among the multiples s u_h of the answer, under the same loads, the one that is best
   when only the smooth part resists, s^2 b - 2 s a -> min, has s = a / b, and its potential lies below that of u_h by
 

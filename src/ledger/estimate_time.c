@@ -86,7 +86,8 @@ PetscErrorCode SbStiffnessForm(SbLedger l, PetscReal t, Vec U, Vec D, PetscReal 
 }
 
 /* Energy of a derivative of the state: D as displacement, its rate. Collective. */
-static PetscErrorCode derivative_energy(SbLedger l, const SbSolved *step, Vec D, Vec rate, PetscReal *energy)
+static PetscErrorCode derivative_energy(SbLedger l, const SbSolvedStep *step, Vec D, Vec rate,
+                                        PetscReal *energy)
 {
   PetscReal mass, stiffness;
 
@@ -97,7 +98,7 @@ static PetscErrorCode derivative_energy(SbLedger l, const SbSolved *step, Vec D,
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbEstimateTime(SbLedger l, const SbSolved *step, PetscBool all)
+PetscErrorCode SbEstimateTime(SbLedger l, const SbSolvedStep *step, PetscBool all)
 {
   const PetscReal h = step->dt;
   Vec rate = l->w[0], second = l->delta;

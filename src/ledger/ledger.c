@@ -4,8 +4,8 @@
   What a step loses is carried on by the motion, which keeps its energy or, with damping, takes from it as it takes from the motion itself: so the errors of
   steps are summed in the norm of the energy ("Lady Windermere's fan": Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I, II.3).
 
-  Steps are looked at as long as estimates stay below a fixed share of the run's work, counted in residuals, not in seconds: two runs look
-  at the same steps. A step that was not looked at loses what the last one lost; with -accuracy the integrator's loss of each is known.
+  Steps are examined as long as estimates stay below a fixed share of the run's work, counted in residuals, not in seconds: two runs examine
+ the same steps. A step that was not examined loses what the last one lost; with -accuracy the integrator's loss of each is known.
 */
 #include "ledger_impl.h"
 
@@ -63,7 +63,7 @@ PetscErrorCode SbLedgerSetFromOptions(SbRun run, SbLedger *ledger)
   l->budget = budget;
   PetscCall(SbOptionInt(&scope, "ledger_every", &l->every));
   PetscCall(SbQuantitySetFromOptions(l, &scope));
-  PetscCall(SbDialSetFromOptions(l));
+  PetscCall(SbAdaptiveToleranceSetFromOptions(l));
   *ledger = l;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -87,7 +87,7 @@ static PetscErrorCode end(SbLedger l)
 }
 
 /* The accelerations that third differences need; an attempt that is repeated does not count twice. */
-static PetscErrorCode keep_acceleration(SbLedger l, const SbSolved *step)
+static PetscErrorCode keep_acceleration(SbLedger l, const SbSolvedStep *step)
 {
   Vec spare = l->before;
 
@@ -118,7 +118,7 @@ static PetscErrorCode last_residual(SbLedger l)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode look(SbRun run, const SbSolved *step, void *ctx, PetscBool *again)
+static PetscErrorCode look(SbRun run, const SbSolvedStep *step, void *ctx, PetscBool *again)
 {
   SbLedger l = (SbLedger)ctx;
 
@@ -134,7 +134,7 @@ static PetscErrorCode look(SbRun run, const SbSolved *step, void *ctx, PetscBool
     l->seen_residual = l->residual;
   }
   PetscCall(end(l));
-  if (l->accuracy > 0.) PetscCall(SbDialLook(l, step, again));
+  if (l->accuracy > 0.) PetscCall(SbAdaptiveToleranceUpdate(l, step, again));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -151,7 +151,7 @@ static PetscReal damped_part(const SbRun run, const SbStep *step)
 
 /*
   Errors of a static run are those of the last solve. In a dynamic one losses of the integrator add up. What linear solves leave is rough and
-  has another direction in each step; what linearisation leaves is smooth and has the same one. A step that was not looked at left as much
+  has another direction in each step; what linearisation leaves is smooth and has the same one. A step that was not examined left as much
   more as its last residual is larger.
 */
 static void add_step(SbLedger l, const SbStep *step)
@@ -178,7 +178,7 @@ static PetscErrorCode estimate_state(SbLedger l, const SbStep *step)
   }
   l->error[SB_ERROR_SPACE] =
     m->dynamic ? PetscMax(l->error[SB_ERROR_SPACE], PetscSqrtReal(sum)) : PetscSqrtReal(sum);
-  if (m->ntouch && step->R) PetscCall(SbEstimateContact(l, step, &contact));
+  if (m->nbegin_step && step->R) PetscCall(SbEstimateContact(l, step, &contact));
   l->error[SB_ERROR_CONTACT] = m->dynamic ? PetscMax(l->error[SB_ERROR_CONTACT], contact) : contact;
   l->own_work += SPACE_WORK;
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -217,7 +217,7 @@ static PetscErrorCode monitor(SbRun run, const SbStep *step, void *ctx)
   }
   update_columns(l);
   PetscCall(end(l));
-  PetscCall(SbDialAccept(l, step));
+  PetscCall(SbAdaptiveToleranceAccept(l, step));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -225,7 +225,7 @@ static PetscErrorCode monitor(SbRun run, const SbStep *step, void *ctx)
 static PetscErrorCode cell_error(SbRun run, const SbStep *step, PetscReal values[])
 {
   const SbSpace space = run->model->space;
-  SbLedger l = (SbLedger)run->look.ctx;
+  SbLedger l = (SbLedger)run->post_solve.ctx;
 
   PetscFunctionBeginUser;
   PetscCall(begin(l));
@@ -320,12 +320,12 @@ PetscErrorCode SbLedgerAttach(SbLedger l)
   PetscCall(carry(l));
   PetscCall(end(l));
   run->want_energies = PETSC_TRUE;
-  if (run->model->ntouch || l->quantity.kind == SB_QUANTITY_REACTION) run->want_residual = PETSC_TRUE;
-  run->look.fn = look;
-  run->look.ctx = l;
+  if (run->model->nbegin_step || l->quantity.kind == SB_QUANTITY_REACTION) run->want_residual = PETSC_TRUE;
+  run->post_solve.fn = look;
+  run->post_solve.ctx = l;
   run->cell_error = cell_error;
   PetscCall(SbRunAddMonitor(run, monitor, l, NULL));
-  PetscCall(SbDialAttach(l));
+  PetscCall(SbAdaptiveToleranceAttach(l));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -346,7 +346,7 @@ PetscErrorCode SbLedgerContinue(SbLedger from, SbLedger to)
   to->total = from->total;
   to->anew = PETSC_TRUE;
   PetscCall(SbQuantityContinue(from, to));
-  if (to->may_tune && to->run->snes && to->run->J) PetscCall(SbDialSet(to, from->rtol));
+  if (to->may_tune && to->run->snes && to->run->J) PetscCall(SbAdaptiveToleranceSet(to, from->rtol));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -45,11 +45,11 @@ struct _p_SbLedger {
   PetscReal error[SB_ERROR_COUNT];        /* J^(1/2) */
   PetscReal relative[SB_ERROR_COUNT + 1]; /* as columns of the history; the last one: of the quantity */
   SbColumn column[SB_ERROR_COUNT + 1];
-  SbCarried carried[SB_LEDGER_CARRIED];
-  /* of the last step that was looked at, J^(1/2) */
+  SbCheckpointValue carried[SB_LEDGER_CARRIED];
+  /* of the last step that was examined, J^(1/2) */
   PetscReal step_time, step_linear, step_nonlinear, offset;
   PetscReal residual,
-    seen_residual;     /* that the last solve left, and that of the last step that was looked at, N */
+    seen_residual;     /* that the last solve left, and that of the last step that was examined, N */
   PetscReal kept_part; /* of what solves left before: the integrator damps it */
   PetscBool seen;      /* the step that is about to be accepted was */
   PetscBool
@@ -64,7 +64,7 @@ struct _p_SbLedger {
   PetscReal seconds, solving,
     residuals; /* of the estimates on this rank: all, in linear solves, in residuals */
 
-  /* dial.c */
+  /* adaptive_tolerance.c */
   PetscBool may_tune;             /* tolerances are the program's */
   PetscReal rtol;                 /* that the solves aim at */
   PetscInt repeats;               /* solves that were repeated for their accuracy */
@@ -78,7 +78,7 @@ PetscErrorCode SbProbeLength(SbLedger l, Vec D, PetscReal *length);
 PetscErrorCode SbProbeSolve(SbLedger l, PetscReal rtol, Vec B, Vec X, PetscInt *its);
 
 /* estimate_time.c: what the step loses, into step_time and offset; all: what bounds the sum of steps, too. Collective. */
-PetscErrorCode SbEstimateTime(SbLedger l, const SbSolved *step, PetscBool all);
+PetscErrorCode SbEstimateTime(SbLedger l, const SbSolvedStep *step, PetscBool all);
 /* Adds it to the error of the run, of whose old part damping leaves `left`, 0..1. Not collective. */
 void SbEstimateTimeAdd(SbLedger l, PetscReal dt, PetscReal left);
 /* Twice the strain energy of a displacement D added to U, as the tangent at U has it, J. Collective. */
@@ -86,18 +86,19 @@ PetscErrorCode SbStiffnessForm(SbLedger l, PetscReal t, Vec U, Vec D, PetscReal 
 /* Sum of the lumped mass times the square of a vector, all ranks. Collective. */
 PetscErrorCode SbMassForm(SbLedger l, Vec D, PetscReal *form);
 /* estimate_solver.c: what the solves of the step left, into step_linear, step_nonlinear and delta. Collective. */
-PetscErrorCode SbEstimateSolver(SbLedger l, const SbSolved *step);
+PetscErrorCode SbEstimateSolver(SbLedger l, const SbSolvedStep *step);
 /* What rounding of the displacements leaves, J^(1/2). Collective. */
 PetscErrorCode SbEstimateRounding(SbLedger l, PetscReal t, Vec U, PetscReal *error);
 /* estimate_contact.c: J^(1/2). Collective. */
 PetscErrorCode SbEstimateContact(SbLedger l, const SbStep *step, PetscReal *error);
 
-/* dial.c */
-PetscErrorCode SbDialSetFromOptions(SbLedger l);
-PetscErrorCode SbDialAttach(SbLedger l);
-PetscErrorCode SbDialSet(SbLedger l, PetscReal rtol); /* the tolerance of solves, where it is the program's */
-PetscErrorCode SbDialLook(SbLedger l, const SbSolved *step, PetscBool *again);
-PetscErrorCode SbDialAccept(SbLedger l, const SbStep *step);
+/* adaptive_tolerance.c */
+PetscErrorCode SbAdaptiveToleranceSetFromOptions(SbLedger l);
+PetscErrorCode SbAdaptiveToleranceAttach(SbLedger l);
+PetscErrorCode
+SbAdaptiveToleranceSet(SbLedger l, PetscReal rtol); /* the tolerance of solves, where it is the program's */
+PetscErrorCode SbAdaptiveToleranceUpdate(SbLedger l, const SbSolvedStep *step, PetscBool *again);
+PetscErrorCode SbAdaptiveToleranceAccept(SbLedger l, const SbStep *step);
 
 /* quantity.c */
 PetscErrorCode SbQuantitySetFromOptions(SbLedger l, const SbScope *scope);

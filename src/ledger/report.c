@@ -158,7 +158,7 @@ static void say_wasted(SbLedger l, const SbLedgerSeconds *s, Words *w)
             {SB_ERROR_TIME, "-ts_dt"}};
   const PetscReal most = error_of(l, largest(l));
 
-  if (l->may_tune) return; /* the dial turns them */
+  if (l->may_tune) return; /* the adaptive tolerance changes them */
   for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(of); i++) {
     const PetscReal e = error_of(l, of[i].source);
     const PetscReal spent = s->source[of[i].source] / PetscMax(s->total, 1e-9);

@@ -2,7 +2,7 @@
   Seconds by source of error, those of the slowest rank.
 
   space: residuals and tangents; linear: the solves, both without what Newton's iterations beyond the first of a step took, which are the
-  nonlinear source's; contact: its search and what it decides; time: what is left of the loop. Estimates are counted apart, also where they
+  nonlinear source's; contact: its search and what it decides; time: the remainder of the loop. Estimates are counted apart, also where they
   call what the run calls.
 */
 #include "ledger_impl.h"

@@ -67,7 +67,7 @@ static PetscErrorCode find_law(const char *law, const char *where, PetscErrorCod
   PetscCall(PetscFunctionListFind(SbMaterialList, law, create));
   if (*create) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscFunctionListGet(SbMaterialList, &names, &n));
-  PetscCall(SbNearest(law, n, names, sizeof(near), near));
+  PetscCall(SbNearestNames(law, n, names, sizeof(near), near));
   for (int k = 0; k < n && names[k]; k++) {
     PetscCall(PetscStrlcat(all, k ? ", " : "", sizeof(all)));
     PetscCall(PetscStrlcat(all, names[k], sizeof(all)));

@@ -12,17 +12,6 @@
 #include <stdlib.h>
 #include "mesh_impl.h"
 
-PetscReal SbTetDet(const PetscReal x[], const PetscInt v[4])
-{
-  const PetscReal *p = x + 3 * v[0], *q = x + 3 * v[1], *r = x + 3 * v[2], *s = x + 3 * v[3];
-  const PetscReal a[3] = {q[0] - p[0], q[1] - p[1], q[2] - p[2]};
-  const PetscReal b[3] = {r[0] - p[0], r[1] - p[1], r[2] - p[2]};
-  const PetscReal c[3] = {s[0] - p[0], s[1] - p[1], s[2] - p[2]};
-
-  return a[0] * (b[1] * c[2] - b[2] * c[1]) + a[1] * (b[2] * c[0] - b[0] * c[2]) +
-         a[2] * (b[0] * c[1] - b[1] * c[0]);
-}
-
 /* ------------------------------------------------------------------ unused vertices */
 
 /* Renumbers the vertices of items; drops items that use a vertex which is gone. */
@@ -113,7 +102,7 @@ PetscBool SbTetFlat(const PetscReal x[], const PetscInt v[4], PetscReal largest,
 {
   const PetscReal L2 = longest_edge2(x, v), L = PetscSqrtReal(L2);
 
-  *det = SbTetDet(x, v);
+  *det = SbTetDeterminant(x, v);
   return (PetscBool) !(PetscAbsReal(*det) > (1e-12 * L + 8 * PETSC_MACHINE_EPSILON * largest) * L2);
 }
 

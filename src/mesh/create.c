@@ -5,7 +5,7 @@
   so that nobody waits for a rank that is gone.
 */
 #include "mesh_impl.h"
-#include "sbskin.h"
+#include "sbsurface.h"
 
 static const SbOption rows[] = {
   {"mesh_partitioner", SB_OPTION_CHOICE, 1, "", "auto", "auto|metis|bisection",
@@ -27,35 +27,35 @@ PetscErrorCode SbMeshRegister(void)
 
 /* Collective: builds the whole mesh on rank 0; all ranks fail together, or all know what was found. */
 static PetscErrorCode create_whole(MPI_Comm comm, PetscInt nbody, SbBody body[], PetscInt nset, SbSet set[],
-                                   SbWhole *whole)
+                                   SbMergedMesh *merged)
 {
   PetscMPIInt rank;
-  SbCaught caught = {0, ""};
-  SbGiven **given; /* each rank has its own */
+  SbCaughtError caught = {0, ""};
+  SbMemoryMesh **in_memory; /* each rank has its own */
 
   PetscFunctionBeginUser;
   PetscCallMPI(MPI_Comm_rank(comm, &rank));
-  PetscCall(PetscMemzero(whole, sizeof(*whole)));
+  PetscCall(PetscMemzero(merged, sizeof(*merged)));
   if (!rank) {
     PetscErrorCode ierr;
 
     PetscCall(PetscPushErrorHandler(SbCatchError, &caught));
-    ierr = SbWholeCreate(nbody, body, nset, set, whole);
+    ierr = SbMergedMeshCreate(nbody, body, nset, set, merged);
     PetscCall(PetscPopErrorHandler());
     caught.code = (int)ierr;
   }
   PetscCallMPI(MPI_Bcast(&caught, (int)sizeof(caught), MPI_BYTE, 0, comm));
   PetscCheck(!caught.code, comm, (PetscErrorCode)caught.code, "%s", caught.text);
-  PetscCall(PetscMalloc1(nbody, &given));
-  for (PetscInt b = 0; b < nbody; b++) given[b] = body[b].given;
+  PetscCall(PetscMalloc1(nbody, &in_memory));
+  for (PetscInt b = 0; b < nbody; b++) in_memory[b] = body[b].in_memory;
   PetscCallMPI(MPI_Bcast(body, (int)((size_t)nbody * sizeof(*body)), MPI_BYTE, 0, comm));
-  for (PetscInt b = 0; b < nbody; b++) body[b].given = given[b];
-  PetscCall(PetscFree(given));
+  for (PetscInt b = 0; b < nbody; b++) body[b].in_memory = in_memory[b];
+  PetscCall(PetscFree(in_memory));
   PetscCallMPI(MPI_Bcast(set, (int)((size_t)nset * sizeof(*set)), MPI_BYTE, 0, comm));
-  whole->Nvert = whole->Ncell = 0;
+  merged->Nvert = merged->Ncell = 0;
   for (PetscInt b = 0; b < nbody; b++) {
-    whole->Nvert += body[b].nvert;
-    whole->Ncell += body[b].ncell;
+    merged->Nvert += body[b].nvert;
+    merged->Ncell += body[b].ncell;
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -79,7 +79,7 @@ static PetscErrorCode report(MPI_Comm comm, PetscInt nbody, const SbBody body[],
                             (double)p->bbox[1], (double)p->bbox[2], (double)p->bbox[3], (double)p->bbox[4],
                             (double)p->bbox[5], (double)p->min_dihedral, (double)p->max_radius_ratio,
                             p->note[0] ? "; " : "", p->note));
-    else if (p->note[0] && !p->given)
+    else if (p->note[0] && !p->in_memory)
       PetscCall(PetscPrintf(comm, "body '%s': %s: %s\n", p->name, p->mesh, p->note));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -90,7 +90,7 @@ PetscErrorCode SbMeshCreate(MPI_Comm comm, PetscInt nbody, SbBody body[], PetscI
 {
   SbMesh m;
   SbScope scope;
-  SbWhole whole;
+  SbMergedMesh merged;
   SbPiece piece;
   PetscInt partitioner;
   PetscBool full, all = PETSC_FALSE;
@@ -102,7 +102,7 @@ PetscErrorCode SbMeshCreate(MPI_Comm comm, PetscInt nbody, SbBody body[], PetscI
   PetscCall(SbOptionChoice(&scope, "mesh_partitioner", &partitioner));
   PetscCall(SbOptionBool(&scope, "mesh_report", &full));
   PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_MESH_READ], 0, 0, 0, 0));
-  PetscCall(create_whole(comm, nbody, body, nset, set, &whole));
+  PetscCall(create_whole(comm, nbody, body, nset, set, &merged));
   PetscCall(PetscLogEventEnd(SbEvents[SB_EVENT_MESH_READ], 0, 0, 0, 0));
   PetscCall(report(comm, nbody, body, full));
   PetscCall(PetscNew(&m));
@@ -113,7 +113,7 @@ PetscErrorCode SbMeshCreate(MPI_Comm comm, PetscInt nbody, SbBody body[], PetscI
   m->set = set;
   PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_MESH_DISTRIBUTE], 0, 0, 0, 0));
   for (PetscInt b = 0; b < nbody; b++) all = (PetscBool)(all || body[b].face_nodes);
-  PetscCall(SbDistribute(comm, (SbPartitioner)partitioner, all, &whole, &piece));
+  PetscCall(SbDistribute(comm, (SbPartitioner)partitioner, all, &merged, &piece));
   PetscCall(SbMeshNumber(m, &piece));
   PetscCall(PetscLogEventEnd(SbEvents[SB_EVENT_MESH_DISTRIBUTE], 0, 0, 0, 0));
   *mesh = m;

@@ -150,7 +150,7 @@ static PetscErrorCode keep_owned(Cells *c, SbPiece *piece)
     if (!n || piece->vertex[n - 1].orig != v->orig) piece->vertex[n++] = *v;
     place[order[i]] = n - 1;
   }
-  piece->nvert = piece->held = n;
+  piece->nvert = piece->nvert_cells = n;
   PetscCall(PetscFree(c->vertex));
   for (PetscInt k = 0; k < c->ncell; k++) number[k] = c->data[k].orig;
   PetscCall(ascending(c->ncell, number, order));
@@ -182,7 +182,7 @@ typedef struct {
 /* Vertices that other ranks have, too, with these ranks: told by the directory. */
 static PetscErrorCode border_create(MPI_Comm comm, PetscInt Nvert, const SbPiece *piece, Border *border)
 {
-  const PetscInt n = piece->held;
+  const PetscInt n = piece->nvert_cells;
   PetscInt *orig, *got, *start, *holder, *pair, block, first, npair = 0;
   PetscMPIInt *dest, *pair_dest, rank, size;
   SbRoute there, back;
@@ -284,7 +284,7 @@ static PetscErrorCode choose_owners(const SbPiece *piece, Border *border, PetscM
   PetscInt n;
 
   PetscFunctionBeginUser;
-  for (PetscInt v = 0; v < piece->held; v++) owner[v] = me;
+  for (PetscInt v = 0; v < piece->nvert_cells; v++) owner[v] = me;
   qsort(border->vert, (size_t)border->n, sizeof(Shared), compare_shared);
   for (PetscInt i = 0; i < border->n; i += n) {
     Shared *s = border->vert + i;
@@ -317,8 +317,8 @@ static PetscErrorCode list_copies(const SbPiece *piece, const Border *border, Pe
   PetscInt *shared, *mark, n = 0;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscMalloc2(piece->held, &shared, size, &mark));
-  for (PetscInt v = 0; v < piece->held; v++) shared[v] = -1;
+  PetscCall(PetscMalloc2(piece->nvert_cells, &shared, size, &mark));
+  for (PetscInt v = 0; v < piece->nvert_cells; v++) shared[v] = -1;
   for (PetscInt i = 0; i < border->n; i++) shared[border->vert[i].vert] = i;
   for (int pass = 0; pass < 2; pass++) {
     for (PetscMPIInt r = 0; r < size; r++) mark[r] = -1;
@@ -358,8 +358,8 @@ static PetscErrorCode append_ghosts(const Cells *g, SbPiece *piece)
   PetscInt *orig, *number, *order, *place, n = piece->nvert;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscMalloc4(piece->held, &orig, g->nvert, &number, g->nvert, &order, g->nvert, &place));
-  for (PetscInt v = 0; v < piece->held; v++) orig[v] = piece->vertex[v].orig;
+  PetscCall(PetscMalloc4(piece->nvert_cells, &orig, g->nvert, &number, g->nvert, &order, g->nvert, &place));
+  for (PetscInt v = 0; v < piece->nvert_cells; v++) orig[v] = piece->vertex[v].orig;
   for (PetscInt v = 0; v < g->nvert; v++) number[v] = g->vertex[v].orig;
   PetscCall(ascending(g->nvert, number, order));
   PetscCall(PetscRealloc((size_t)(n + g->nvert) * sizeof(SbVertexData), &piece->vertex));
@@ -367,9 +367,9 @@ static PetscErrorCode append_ghosts(const Cells *g, SbPiece *piece)
   for (PetscInt i = 0; i < g->nvert; i++) {
     const PetscInt v = order[i];
 
-    PetscCall(PetscFindInt(number[v], piece->held, orig, &place[v]));
+    PetscCall(PetscFindInt(number[v], piece->nvert_cells, orig, &place[v]));
     if (place[v] >= 0) continue;
-    if (n == piece->held || piece->vertex[n - 1].orig != number[v]) {
+    if (n == piece->nvert_cells || piece->vertex[n - 1].orig != number[v]) {
       piece->vertex[n] = g->vertex[v];
       piece->owner[n++] = g->owner[v];
     }
@@ -412,7 +412,7 @@ static PetscErrorCode add_ghosts(MPI_Comm comm, PetscInt Nvert, PetscBool all, S
 
 /* ------------------------------------------------------------------ all of it */
 
-PetscErrorCode SbDistribute(MPI_Comm comm, SbPartitioner type, PetscBool all, SbWhole *w, SbPiece *piece)
+PetscErrorCode SbDistribute(MPI_Comm comm, SbPartitioner type, PetscBool all, SbMergedMesh *w, SbPiece *piece)
 {
   const PetscInt Nvert = w->Nvert;
   PetscMPIInt size, *part;
@@ -430,7 +430,7 @@ PetscErrorCode SbDistribute(MPI_Comm comm, SbPartitioner type, PetscBool all, Sb
     *piece = (SbPiece){.ncell_owned = from.ncell,
                        .ncell = from.ncell,
                        .nvert = from.nvert,
-                       .held = from.nvert,
+                       .nvert_cells = from.nvert,
                        .cell = from.cell,
                        .data = from.data,
                        .vertex = from.vertex};
@@ -444,7 +444,7 @@ PetscErrorCode SbDistribute(MPI_Comm comm, SbPartitioner type, PetscBool all, Sb
     PetscCall(SbRouteDestroy(&route));
     PetscCall(PetscFree(part));
   }
-  PetscCall(SbWholeDestroy(w));
+  PetscCall(SbMergedMeshDestroy(w));
   if (size > 1) PetscCall(keep_owned(&owned, piece));
   PetscCall(PetscCalloc1(piece->nvert, &piece->owner));
   if (size > 1) PetscCall(add_ghosts(comm, Nvert, all, piece));

@@ -12,7 +12,7 @@ static PetscReal measure(const PetscReal x[], int dim, const PetscInt v[])
 {
   PetscReal a[2][3], n[3];
 
-  if (dim == 3) return PetscAbsReal(SbTetDet(x, v)) / 6;
+  if (dim == 3) return PetscAbsReal(SbTetDeterminant(x, v)) / 6;
   if (!dim) return 0;
   for (int k = 0; k < dim; k++)
     for (int i = 0; i < 3; i++) a[k][i] = x[3 * v[k + 1] + i] - x[3 * v[0] + i];

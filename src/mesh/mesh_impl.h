@@ -7,8 +7,8 @@
 #include <petscsf.h>
 #include "sbtet.h"
 
-/* given.c: the mesh that a body has in memory. */
-PetscErrorCode SbImportGiven(const SbBody *body, SbImport *import);
+/* memory_mesh.c: the mesh that a body has in memory. */
+PetscErrorCode SbImportMemoryMesh(const SbBody *body, SbImport *import);
 
 /* ------------------------------------------------------------------ edges.c: pairs of vertices that an item joins */
 
@@ -46,7 +46,7 @@ typedef struct {
 PetscErrorCode SbSetsMark(const SbImport *import, const SbFaces *faces, PetscInt nbody, const SbBody body[],
                           PetscInt b, PetscInt nset, SbSet set[], SbMasks *masks);
 /* Adds the members of sets that are groups. */
-PetscErrorCode SbGivenMark(const SbBody *body, const SbFaces *faces, SbMasks *masks);
+PetscErrorCode SbMemoryMeshMark(const SbBody *body, const SbFaces *faces, SbMasks *masks);
 /* A set that selects nothing is an error, which lists the groups that exist. */
 PetscErrorCode SbSetsCheck(PetscInt nbody, const SbBody body[], const SbImport import[], PetscInt nset,
                            const SbSet set[]);
@@ -71,7 +71,7 @@ PetscErrorCode SbRouteReply(const SbRoute *route, size_t unit, const void *answe
 /* The rank that sent record i of those received. */
 PetscMPIInt SbRouteSource(const SbRoute *route, PetscInt i);
 
-/* ------------------------------------------------------------------ whole.c, partition.c, distribute.c, order.c, number.c */
+/* ------------------------------------------------------------------ merge.c, partition.c, distribute.c, order.c, number.c */
 
 /* What travels with a vertex and with a cell. */
 typedef struct {
@@ -98,11 +98,12 @@ typedef struct {
     neighbour; /* [ncell][4] cell across the face, -1 on the boundary, ncell + k: the cell remote[k] of another rank */
   PetscInt nremote;
   PetscSFNode *remote; /* [nremote] */
-} SbWhole;
+} SbMergedMesh;
 
 /* Rank 0: reads, checks and merges all bodies, fills their "found" fields and those of the sets. */
-PetscErrorCode SbWholeCreate(PetscInt nbody, SbBody body[], PetscInt nset, SbSet set[], SbWhole *whole);
-PetscErrorCode SbWholeDestroy(SbWhole *whole);
+PetscErrorCode SbMergedMeshCreate(PetscInt nbody, SbBody body[], PetscInt nset, SbSet set[],
+                                  SbMergedMesh *merged);
+PetscErrorCode SbMergedMeshDestroy(SbMergedMesh *merged);
 
 typedef enum {
   SB_PARTITION_AUTO, /* METIS for small meshes, bisection for others */
@@ -110,7 +111,7 @@ typedef enum {
   SB_PARTITION_BISECTION
 } SbPartitioner;
 /* The rank that will own each cell: part[ncell]. Collective. */
-PetscErrorCode SbPartition(MPI_Comm comm, SbPartitioner type, const SbWhole *whole, PetscMPIInt part[]);
+PetscErrorCode SbPartition(MPI_Comm comm, SbPartitioner type, const SbMergedMesh *merged, PetscMPIInt part[]);
 
 /* What a rank has of the mesh before it is numbered: owned cells by original number, then ghost ones; vertices of owned cells by original number, then the others. */
 typedef struct {
@@ -121,11 +122,12 @@ typedef struct {
   PetscMPIInt *owner;   /* [nvert] */
   SbRoute ghost;        /* copies of owned cells to other ranks, on several ranks */
   PetscInt *copied;     /* [ghost.nsend] the cell that is copied */
-  PetscInt held;        /* vertices of owned cells */
+  PetscInt nvert_cells; /* vertices of owned cells */
 } SbPiece;
 
 /* Hands the whole out to the ranks and destroys it. `all`: ghosts are all cells that share a vertex with an owned cell, else those with an owned vertex. Collective. */
-PetscErrorCode SbDistribute(MPI_Comm comm, SbPartitioner type, PetscBool all, SbWhole *whole, SbPiece *piece);
+PetscErrorCode SbDistribute(MPI_Comm comm, SbPartitioner type, PetscBool all, SbMergedMesh *merged,
+                            SbPiece *piece);
 /* Own local numbering: fills the arrays and counts of the mesh and destroys the piece. Collective. */
 PetscErrorCode SbMeshNumber(SbMesh mesh, SbPiece *piece);
 /* Reverse Cuthill-McKee order: order[i] is the vertex that gets number i. A cell's vertex may be -1: it takes no part. */

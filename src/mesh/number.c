@@ -61,20 +61,20 @@ static PetscErrorCode number_ghosts(Work *w, SbMesh mesh)
 
   PetscFunctionBeginUser;
   if (w->size == 1) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(PetscMalloc4(p->nvert, &ghost, p->nvert, &key, p->held, &orig, p->nvert, &dest));
+  PetscCall(PetscMalloc4(p->nvert, &ghost, p->nvert, &key, p->nvert_cells, &orig, p->nvert, &dest));
   for (PetscInt v = 0; v < p->nvert; v++) {
     if (p->owner[v] == w->rank) continue;
     ghost[n] = v;
     key[n] = p->vertex[v].orig;
     dest[n++] = p->owner[v];
   }
-  for (PetscInt v = 0; v < p->held; v++) orig[v] = p->vertex[v].orig;
+  for (PetscInt v = 0; v < p->nvert_cells; v++) orig[v] = p->vertex[v].orig;
   PetscCall(SbRouteCreate(mesh->comm, n, dest, &route));
   PetscCall(SbRouteSend(&route, sizeof(PetscInt), key, &got));
   for (PetscInt i = 0; i < route.nrecv; i++) {
     PetscInt v;
 
-    PetscCall(PetscFindInt(got[i], p->held, orig, &v));
+    PetscCall(PetscFindInt(got[i], p->nvert_cells, orig, &v));
     PetscCheck(v >= 0 && p->owner[v] == w->rank, PETSC_COMM_SELF, PETSC_ERR_PLIB,
                "Vertex %" PetscInt_FMT " is not owned here", got[i]);
     got[i] = w->global[v];

@@ -39,7 +39,7 @@ static inline uint64_t mix(uint64_t z)
   return z ^ (z >> 31);
 }
 
-static inline void centre(const SbWhole *w, PetscInt c, PetscReal x[3])
+static inline void centre(const SbMergedMesh *w, PetscInt c, PetscReal x[3])
 {
   const PetscInt *v = w->cell + 4 * (size_t)c;
 
@@ -106,7 +106,7 @@ static void split(Tree *t, PetscInt at, PetscInt n, PetscReal (*x)[3], PetscInt 
 }
 
 /* A tree with k leaves. Collective. */
-static PetscErrorCode tree_create(MPI_Comm comm, const SbWhole *w, PetscInt k, Tree *t)
+static PetscErrorCode tree_create(MPI_Comm comm, const SbMergedMesh *w, PetscInt k, Tree *t)
 {
   const PetscInt64 wanted = PetscMax((PetscInt64)SAMPLE * k, SAMPLES);
   const uint64_t bound = wanted >= w->Ncell ? UINT64_MAX : UINT64_MAX / (uint64_t)w->Ncell * (uint64_t)wanted;
@@ -138,7 +138,7 @@ static PetscErrorCode tree_create(MPI_Comm comm, const SbWhole *w, PetscInt k, T
 }
 
 /* The leaf that each cell lies in. */
-static void tree_find(const Tree *t, const SbWhole *w, PetscInt leaf[])
+static void tree_find(const Tree *t, const SbMergedMesh *w, PetscInt leaf[])
 {
   for (PetscInt c = 0; c < w->ncell; c++) {
     const Node *node = t->node;
@@ -184,7 +184,7 @@ static PetscErrorCode call_metis(PetscInt ncell, const PetscInt orig[], const Pe
 }
 
 /* Collects the graph on rank 0, by original numbers, so that its partition has nothing to do with who had what. */
-static PetscErrorCode cut_graph(MPI_Comm comm, const SbWhole *w, PetscSF sf, PetscInt part[])
+static PetscErrorCode cut_graph(MPI_Comm comm, const SbMergedMesh *w, PetscSF sf, PetscInt part[])
 {
   PetscInt *orig, *remote, *across, *all_orig, *all_across, *all_part;
   PetscMPIInt rank, size, *dest;
@@ -223,7 +223,7 @@ static PetscErrorCode cut_graph(MPI_Comm comm, const SbWhole *w, PetscSF sf, Pet
 /* ------------------------------------------------------------------ borders */
 
 /* What the neighbour of a cell across slot s has: `across` of those on other ranks. */
-static inline PetscInt value_across(const SbWhole *w, PetscInt s, const PetscInt value[],
+static inline PetscInt value_across(const SbMergedMesh *w, PetscInt s, const PetscInt value[],
                                     const PetscInt across[])
 {
   const PetscInt n = w->neighbour[s];
@@ -232,7 +232,7 @@ static inline PetscInt value_across(const SbWhole *w, PetscInt s, const PetscInt
 }
 
 /* A cell moves to the part that most of its neighbours are in, when that takes faces from the border. */
-static PetscErrorCode smooth(const SbWhole *w, PetscSF sf, PetscInt part[])
+static PetscErrorCode smooth(const SbMergedMesh *w, PetscSF sf, PetscInt part[])
 {
   PetscInt *now, *across;
 
@@ -262,7 +262,7 @@ static PetscErrorCode smooth(const SbWhole *w, PetscSF sf, PetscInt part[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbPartition(MPI_Comm comm, SbPartitioner type, const SbWhole *w, PetscMPIInt part[])
+PetscErrorCode SbPartition(MPI_Comm comm, SbPartitioner type, const SbMergedMesh *w, PetscMPIInt part[])
 {
   PetscInt *to;
   PetscMPIInt size;

@@ -77,9 +77,9 @@ static PetscErrorCode weld(SbImport *im, PetscReal tolerance, SbRepair *done)
 
   PetscFunctionBeginUser;
   extent(im, cubes.origin, &diagonal);
-  done->weld = tolerance < 0 ? 1e-9 * diagonal : tolerance;
-  if (done->weld == 0 || !(diagonal > 0)) PetscFunctionReturn(PETSC_SUCCESS);
-  cubes.h = PetscMax(4 * done->weld, diagonal / (1 + cbrt((double)im->nvert)));
+  done->merge_tolerance = tolerance < 0 ? 1e-9 * diagonal : tolerance;
+  if (done->merge_tolerance == 0 || !(diagonal > 0)) PetscFunctionReturn(PETSC_SUCCESS);
+  cubes.h = PetscMax(4 * done->merge_tolerance, diagonal / (1 + cbrt((double)im->nvert)));
   for (cubes.mask = 1; cubes.mask < (uint64_t)im->nvert; cubes.mask *= 2) {
   }
   PetscCall(PetscMalloc3((size_t)cubes.mask, &cubes.head, im->nvert, &cubes.next, im->nvert, &map));
@@ -87,7 +87,7 @@ static PetscErrorCode weld(SbImport *im, PetscReal tolerance, SbRepair *done)
   cubes.mask--;
   for (PetscInt v = 0; v < im->nvert; v++) {
     const PetscReal *p = im->x + 3 * v;
-    const PetscInt near = find_near(&cubes, im->x, p, done->weld);
+    const PetscInt near = find_near(&cubes, im->x, p, done->merge_tolerance);
 
     map[v] = near < 0 ? v : near;
     if (near < 0) {
@@ -268,10 +268,11 @@ PetscErrorCode SbMeshFileRepair(SbImport *im, PetscReal tolerance, SbRepair *don
     PetscCall(drop_repeats(im, d, &ndropped));
   }
   PetscCall(drop_flat(im, done));
-  PetscCheck(im->item[3].n, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
-             "%s: nothing is left: every tetrahedron is flat or uses a vertex twice; check -weld and the "
-             "scale of the file",
-             im->where);
+  PetscCheck(
+    im->item[3].n, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
+    "%s: nothing is left: every tetrahedron is flat or uses a vertex twice; check -merge_tolerance and the "
+    "scale of the file",
+    im->where);
   turned = im->nreoriented;
   ierr = SbImportCheck(im, &faces);
   done->nturned = im->nreoriented - turned;

@@ -40,7 +40,7 @@ static PetscErrorCode unknown_shape(const char *option, const char *text)
   }
   PetscCall(PetscStrncpy(word, text, sizeof(word)));
   if (strchr(word, ':')) *strchr(word, ':') = 0;
-  PetscCall(SbNearest(word, NSHAPE, names, sizeof(near), near));
+  PetscCall(SbNearestNames(word, NSHAPE, names, sizeof(near), near));
   SETERRQ(PETSC_COMM_SELF, PETSC_ERR_USER_INPUT, "%s '%s': a set begins with one of %s%s%s%s", option, text,
           all, near[0] ? "; did you mean " : "", near, near[0] ? "?" : "");
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -264,7 +264,7 @@ PetscErrorCode SbSetsMark(const SbImport *im, const SbFaces *faces, PetscInt nbo
   PetscCall(mark_tags(im, nbody, body, b, nset, set, bits));
   PetscCall(mark_groups(im, faces, bits, m));
   PetscCall(PetscFree(bits));
-  if (body[b].given) PetscCall(SbGivenMark(&body[b], faces, m));
+  if (body[b].in_memory) PetscCall(SbMemoryMeshMark(&body[b], faces, m));
   if (!nset) PetscFunctionReturn(PETSC_SUCCESS);
   for (PetscInt v = 0; v < im->nvert; v++) count_bits(m->vert[v], nset, &set->nvert, sizeof(*set));
   for (PetscInt c = 0; c < im->item[3].n; c++) count_bits(m->cell[c], nset, &set->ncell, sizeof(*set));
@@ -321,7 +321,7 @@ static PetscErrorCode empty_group(PetscInt nbody, const SbBody body[], const SbI
       exists += name && is_named(&import[b].group[g], name);
     }
   }
-  PetscCall(SbNearest(wanted, n, names, sizeof(near), near));
+  PetscCall(SbNearestNames(wanted, n, names, sizeof(near), near));
   PetscCall(PetscFree(names));
   PetscCall(list_groups(nbody, body, import, sizeof(groups), groups));
   PetscCheck(!exists, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
@@ -367,7 +367,7 @@ static PetscErrorCode empty_body(PetscInt nbody, const SbBody body[], const SbSe
   PetscFunctionBeginUser;
   PetscCall(PetscMalloc1(nbody, &names));
   for (PetscInt b = 0; b < nbody; b++) names[b] = body[b].name;
-  PetscCall(SbNearest(set->group, nbody, names, sizeof(near), near));
+  PetscCall(SbNearestNames(set->group, nbody, names, sizeof(near), near));
   PetscCall(PetscFree(names));
   SETERRQ(PETSC_COMM_SELF, PETSC_ERR_USER_INPUT, "set '%s': there is no body '%s'%s%s%s", set->name,
           set->group, near[0] ? "; did you mean " : "", near, near[0] ? "?" : "");

@@ -59,7 +59,7 @@ static PetscErrorCode check_cells(SbMesh m)
       CHECK(m->vert_body[v[a]] == m->cell_body[c],
             "Cell %" PetscInt_FMT " and its vertex %" PetscInt_FMT " are in different bodies", c, v[a]);
     }
-    CHECK(SbTetDet(m->x, v) > 0, "Cell %" PetscInt_FMT " is not positively oriented", c);
+    CHECK(SbTetDeterminant(m->x, v) > 0, "Cell %" PetscInt_FMT " is not positively oriented", c);
     CHECK(0 <= m->cell_orig[c] && m->cell_orig[c] < m->Ncell,
           "Original cell number %" PetscInt_FMT " out of range", m->cell_orig[c]);
     if (c >= m->ncell_owned && !all)
@@ -99,7 +99,7 @@ static PetscErrorCode check_sums(SbMesh m)
     if (c >= m->ncell_owned) continue;
     mine[CELL_MIX] += mix(m->cell_orig[c]);
     for (int f = 0; f < 4; f++) mine[FACET] += m->face_set[4 * c + f] & SB_ON_BOUNDARY;
-    volume += SbTetDet(m->x, m->cell + 4 * c) / 6;
+    volume += SbTetDeterminant(m->x, m->cell + 4 * c) / 6;
   }
   PetscCallMPI(MPI_Allreduce(mine, all, NSUM, MPI_UINT64_T, MPI_SUM, m->comm));
   PetscCallMPI(MPI_Allreduce(&volume, &volumes, 1, MPIU_REAL, MPI_SUM, m->comm));

@@ -111,8 +111,8 @@ PetscErrorCode SbModelDampingPower(SbModel m, Vec U, Vec V, PetscReal *power)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbModelStrainAlong(SbModel m, Vec U, Vec D, PetscReal *psi, PetscReal *slope,
-                                  PetscInt *ninverted)
+PetscErrorCode SbModelStrainEnergyAlong(SbModel m, Vec U, Vec D, PetscReal *psi, PetscReal *slope,
+                                        PetscInt *ninverted)
 {
   SbSpace s = m->space;
   SbStage stage = {.shift_k = 1.};

@@ -17,13 +17,13 @@ PetscErrorCode SbModelDestroy(SbModel *model)
   PetscCall(PetscFree(m->prescribe));
   PetscCall(PetscFree(m->prestep));
   PetscCall(PetscFree(m->force));
-  PetscCall(PetscFree(m->touch));
-  PetscCall(PetscFree(m->hold));
-  PetscCall(PetscFree(m->settle));
-  PetscCall(PetscFree(m->arrive));
-  PetscCall(PetscFree(m->rebound));
+  PetscCall(PetscFree(m->begin_step));
+  PetscCall(PetscFree(m->assemble_constraints));
+  PetscCall(PetscFree(m->update_active_set));
+  PetscCall(PetscFree(m->time_of_impact));
+  PetscCall(PetscFree(m->restitution));
   PetscCall(PetscFree(m->tangent));
-  PetscCall(PetscFree(m->unsymmetric));
+  PetscCall(PetscFree(m->nonsymmetric));
   PetscCall(PetscFree(m->accept));
   PetscCall(PetscFree(m->history));
   PetscCall(SbSpaceDestroy(&m->space));
@@ -33,7 +33,7 @@ PetscErrorCode SbModelDestroy(SbModel *model)
   PetscCall(PetscFree(m->inclusion));
   PetscCall(PetscFree(m->material));
   PetscCall(PetscFree(m->element));
-  for (PetscInt b = 0; m->body && b < m->nbody; b++) PetscCall(SbGivenDestroy(&m->body[b].given));
+  for (PetscInt b = 0; m->body && b < m->nbody; b++) PetscCall(SbMemoryMeshDestroy(&m->body[b].in_memory));
   PetscCall(PetscFree(m->body));
   PetscCall(PetscFree(m->set));
   PetscCall(PetscFree(*model));
@@ -79,7 +79,7 @@ static PetscErrorCode match_mass(SbModel m, PetscInt b)
     mass += m->material[mesh->cell_material[c]]->density * V;
   }
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &mass, 1, MPIU_REAL, MPI_SUM, m->comm));
-  factor = m->body[b].given->mass / mass;
+  factor = m->body[b].in_memory->mass / mass;
   m->material[b]->density *= factor;
   for (PetscInt k = 0; k < m->body[b].ninclusion; k++)
     m->material[m->body[b].inclusion[k].material]->density *= factor;
@@ -104,11 +104,11 @@ PetscErrorCode SbModelSetUp(SbModel m)
   PetscCall(SbMeshCreate(m->comm, m->nbody, m->body, m->nset, m->set, &m->mesh));
   if (m->nmaterial > m->nbody) PetscCall(check_inclusions(m));
   for (PetscInt b = 0; b < m->nbody; b++) {
-    if (m->body[b].given && m->body[b].given->mass > 0.) PetscCall(match_mass(m, b));
+    if (m->body[b].in_memory && m->body[b].in_memory->mass > 0.) PetscCall(match_mass(m, b));
   }
   for (PetscInt k = 0; k < m->nmaterial; k++)
     m->may_filter = (PetscBool)(m->may_filter || m->material[k]->adaptive);
-  for (PetscInt e = 0; e < m->neffect; e++) PetscCall(SbEffectMarkHeld(m->effect[e], m->nset, m->set));
+  for (PetscInt e = 0; e < m->neffect; e++) PetscCall(SbEffectMarkPrescribed(m->effect[e], m->nset, m->set));
   PetscCall(SbSpaceCreate(m->mesh, m->material, m->element, &m->space));
   m->load = 1.;
   m->linear = m->space->linear;
@@ -120,14 +120,14 @@ PetscErrorCode SbModelSetUp(SbModel m)
   PetscCall(SbSpaceFixDone(m->space));
   SORT_INTO_LIST(m, prescribe);
   SORT_INTO_LIST(m, prestep);
-  SORT_INTO_LIST(m, touch);
-  SORT_INTO_LIST(m, hold);
-  SORT_INTO_LIST(m, settle);
-  SORT_INTO_LIST(m, arrive);
-  SORT_INTO_LIST(m, rebound);
+  SORT_INTO_LIST(m, begin_step);
+  SORT_INTO_LIST(m, assemble_constraints);
+  SORT_INTO_LIST(m, update_active_set);
+  SORT_INTO_LIST(m, time_of_impact);
+  SORT_INTO_LIST(m, restitution);
   SORT_INTO_LIST(m, force);
   SORT_INTO_LIST(m, tangent);
-  SORT_INTO_LIST(m, unsymmetric);
+  SORT_INTO_LIST(m, nonsymmetric);
   SORT_INTO_LIST(m, accept);
   SORT_INTO_LIST(m, history);
   for (PetscInt i = 0; i < m->space->nnode_owned; i++) mass += m->space->node_mass[i];
@@ -216,10 +216,10 @@ PetscErrorCode SbModelResidual(SbModel m, PetscReal t, Vec U, Vec V, Vec A, Pets
   PetscCall(SbSpaceAddInternalForce(m->space, &stage, f));
   if (A || V) PetscCall(SbSpaceAddInertia(m->space, &stage, f));
   if (constrain) constrain_residual(m->space, f);
-  if (constrain && m->space->held) SbHeldConstrain(m->space, f);
+  if (constrain && m->space->nodal) SbNodalConstraintsProject(m->space, f);
   PetscCall(SbSpaceRestoreLocalWrite(m->space, F, &f));
   PetscCall(stage_end(m, U, V, A, &stage));
-  if (m->space->couple) PetscCall(SbCoupleResidual(m->space, U, constrain, F));
+  if (m->space->constraints) PetscCall(SbConstraintsResidual(m->space, U, constrain, F));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -257,7 +257,7 @@ PetscErrorCode SbModelTangent(SbModel m, PetscReal t, PetscReal shift_v, PetscRe
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbModelUnsymmetric(SbModel m, PetscReal t, Vec U, Vec X, Vec Y)
+PetscErrorCode SbModelNonsymmetric(SbModel m, PetscReal t, Vec U, Vec X, Vec Y)
 {
   const PetscReal *x;
   SbStage stage;
@@ -268,12 +268,12 @@ PetscErrorCode SbModelUnsymmetric(SbModel m, PetscReal t, Vec U, Vec X, Vec Y)
   PetscCall(SbSpaceGetLocalRead(m->space, X, &x));
   PetscCall(SbSpaceGetLocalWrite(m->space, Y, &y));
   PetscCall(PetscArrayzero(y, 3 * m->space->nnode));
-  for (PetscInt e = 0; e < m->nunsymmetric; e++) {
-    stage.shift_k = load_factor(m, m->unsymmetric[e]);
-    SbEffectCall(m->unsymmetric[e], unsymmetric, m->space, &stage, x, y);
+  for (PetscInt e = 0; e < m->nnonsymmetric; e++) {
+    stage.shift_k = load_factor(m, m->nonsymmetric[e]);
+    SbEffectCall(m->nonsymmetric[e], nonsymmetric, m->space, &stage, x, y);
   }
   constrain_residual(m->space, y);
-  if (m->space->held) SbHeldConstrain(m->space, y);
+  if (m->space->nodal) SbNodalConstraintsProject(m->space, y);
   PetscCall(SbSpaceRestoreLocalWrite(m->space, Y, &y));
   PetscCall(SbSpaceRestoreLocalRead(m->space, X, &x));
   PetscCall(stage_end(m, U, NULL, NULL, &stage));
@@ -297,7 +297,7 @@ PetscErrorCode SbModelPrescribe(SbModel m, PetscReal t, Vec U)
   PetscScalar *u;
 
   PetscFunctionBeginUser;
-  if (!m->nprescribe && !s->held && !s->couple) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!m->nprescribe && !s->nodal && !s->constraints) PetscFunctionReturn(PETSC_SUCCESS);
   for (PetscInt e = 0; e < m->nprescribe; e++) {
     if (m->prescribe[e]->steady) SbEffectCall(m->prescribe[e], prescribe, s, t);
   }
@@ -313,9 +313,9 @@ PetscErrorCode SbModelPrescribe(SbModel m, PetscReal t, Vec U)
       if (s->fixed[node] & (1 << c)) u[3 * node + c] = s->fixed_value[3 * k + c];
     }
   }
-  if (s->held) SbHeldPrescribe(s, u);
+  if (s->nodal) SbNodalConstraintsPrescribe(s, u);
   PetscCall(VecRestoreArray(U, &u));
-  if (s->couple) PetscCall(SbCouplePrescribe(s, U));
+  if (s->constraints) PetscCall(SbConstraintsPrescribe(s, U));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -353,7 +353,7 @@ PetscErrorCode SbModelInitialState(SbModel m, Vec U, Vec V)
   PetscCall(VecGetArray(V, &v));
   for (PetscInt i = 0; i < s->nnode_owned; i++) {
     const SbBody *body = &m->body[m->space->node_body[i]];
-    const PetscReal *w = body->spin;
+    const PetscReal *w = body->angular_velocity;
     PetscReal r[3];
 
     for (PetscInt k = 0; k < 3; k++) r[k] = s->node_x[3 * i + k] - centre[m->space->node_body[i]][k];

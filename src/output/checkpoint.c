@@ -112,7 +112,7 @@ static void totals_of(SbRun run, Total total[NTOTAL])
   SbEnergies *e = &run->energies;
 
   total[0] = (Total){"load_work", &e->load_work};
-  total[1] = (Total){"drive_work", &e->drive_work};
+  total[1] = (Total){"prescribed_work", &e->prescribed_work};
   total[2] = (Total){"damping_loss", &e->damping_loss};
   total[3] = (Total){"integrator_loss", &e->integrator_loss};
   total[4] = (Total){"energy_start", &run->energy_start};

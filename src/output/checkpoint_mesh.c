@@ -1,6 +1,6 @@
 /*
   Meshes in checkpoints. A body that was re-meshed has no file any more: its mesh is in the checkpoint, as the group `mesh_<body>` with the arrays of
-  SbGiven, written by rank 0. A restart takes it from there before the scene is set up; the mesh of the other bodies comes from their files.
+  SbMemoryMesh, written by rank 0. A restart takes it from there before the scene is set up; the mesh of the other bodies comes from their files.
 */
 #include <unistd.h>
 #include "output_impl.h"
@@ -16,7 +16,7 @@ typedef struct {
 } Array;
 
 #define NARRAY 6
-static void arrays_of(SbGiven *g, const PetscInt count[3], Array a[NARRAY])
+static void arrays_of(SbMemoryMesh *g, const PetscInt count[3], Array a[NARRAY])
 {
   const hid_t whole = sizeof(PetscInt) == 8 ? H5T_NATIVE_INT64 : H5T_NATIVE_INT32;
 
@@ -29,7 +29,7 @@ static void arrays_of(SbGiven *g, const PetscInt count[3], Array a[NARRAY])
 }
 
 /* Sum of places and values, so that damage is seen. */
-static uint64_t sum_of(const SbGiven *g)
+static uint64_t sum_of(const SbMemoryMesh *g)
 {
   uint64_t sum = SALT;
 
@@ -50,14 +50,14 @@ PetscErrorCode SbCheckpointMeshBytes(SbRun run, PetscInt64 *bytes)
   for (PetscInt b = 0; b < run->model->nbody; b++) {
     const SbBody *body = &run->model->body[b];
 
-    if (body->given && body->given->step)
+    if (body->in_memory && body->in_memory->step)
       *bytes +=
         (PetscInt64)body->nvert * 32 + (PetscInt64)body->ncell * 40 + (PetscInt64)body->nfacet * 32 + 65536;
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode write_mesh(SbH5 *h, SbOutput out, const char *body, SbGiven *g, uint64_t *sum)
+static PetscErrorCode write_mesh(SbH5 *h, SbOutput out, const char *body, SbMemoryMesh *g, uint64_t *sum)
 {
   PetscInt count[3] = {g->nvert, g->ncell, g->ntri};
   uint64_t own = out->rank ? 0 : sum_of(g);
@@ -103,7 +103,8 @@ PetscErrorCode SbCheckpointWriteMeshes(SbRun run, SbH5 *h, uint64_t *sum)
   for (PetscInt b = 0; b < run->model->nbody; b++) {
     SbBody *body = &run->model->body[b];
 
-    if (body->given && body->given->step) PetscCall(write_mesh(h, out, body->name, body->given, &all));
+    if (body->in_memory && body->in_memory->step)
+      PetscCall(write_mesh(h, out, body->name, body->in_memory, &all));
   }
   PetscCallMPI(MPI_Bcast(&all, 1, MPI_UINT64_T, 0, out->comm));
   *sum += all;
@@ -133,7 +134,7 @@ static PetscErrorCode read_array(hid_t group, const Array *a, PetscBool *ok)
 }
 
 /* Numbers of vertices lie in their range: nothing else may be read beyond its end. */
-static PetscBool in_range(const SbGiven *g)
+static PetscBool in_range(const SbMemoryMesh *g)
 {
   for (PetscInt i = 0; i < 4 * g->ncell; i++) {
     if (g->cell[i] < 0 || g->cell[i] >= g->nvert) return PETSC_FALSE;
@@ -145,7 +146,7 @@ static PetscBool in_range(const SbGiven *g)
 }
 
 /* The mesh of a body in an open file; NULL when it has none. */
-static PetscErrorCode read_mesh(hid_t file, const char *body, SbGiven **given, PetscBool *ok)
+static PetscErrorCode read_mesh(hid_t file, const char *body, SbMemoryMesh **in_memory, PetscBool *ok)
 {
   static const char *const counts[3] = {"vertices", "tets", "faces"};
   char name[2 * SB_NAME_MAX];
@@ -156,7 +157,7 @@ static PetscErrorCode read_mesh(hid_t file, const char *body, SbGiven **given, P
   hid_t group;
 
   PetscFunctionBeginUser;
-  *given = NULL;
+  *in_memory = NULL;
   PetscCall(PetscSNPrintf(name, sizeof(name), "mesh_%s", body));
   if (!*ok || H5Lexists(file, name, H5P_DEFAULT) <= 0) PetscFunctionReturn(PETSC_SUCCESS);
   group = H5Gopen2(file, name, H5P_DEFAULT);
@@ -175,15 +176,15 @@ static PetscErrorCode read_mesh(hid_t file, const char *body, SbGiven **given, P
   *ok = (PetscBool)(*ok && SbH5Rows(group, "x") == n[0] && SbH5Rows(group, "cells") == n[1] &&
                     (!n[2] || SbH5Rows(group, "triangles") == n[2]));
   if (*ok) {
-    PetscCall(SbGivenCreate(count[0], count[1], count[2], given));
-    (*given)->step = (PetscInt)step;
-    (*given)->mass = mass;
-    (*given)->bound = bound;
-    arrays_of(*given, count, a);
+    PetscCall(SbMemoryMeshCreate(count[0], count[1], count[2], in_memory));
+    (*in_memory)->step = (PetscInt)step;
+    (*in_memory)->mass = mass;
+    (*in_memory)->bound = bound;
+    arrays_of(*in_memory, count, a);
     for (int k = 0; k < NARRAY; k++) PetscCall(read_array(group, &a[k], ok));
     /* checked before the mesh is used: else a damaged file would be taken for one of another mesh */
-    *ok = (PetscBool)(*ok && in_range(*given) && (int64_t)sum_of(*given) == sum);
-    if (!*ok) PetscCall(SbGivenDestroy(given));
+    *ok = (PetscBool)(*ok && in_range(*in_memory) && (int64_t)sum_of(*in_memory) == sum);
+    if (!*ok) PetscCall(SbMemoryMeshDestroy(in_memory));
   }
   (void)H5Gclose(group);
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -199,12 +200,12 @@ PetscErrorCode SbCheckpointSumMeshes(SbRun run, SbH5 *h, uint64_t *sum, PetscBoo
   PetscFunctionBeginUser;
   for (PetscInt b = 0; b < run->model->nbody && !out->rank; b++) {
     PetscBool good = PETSC_TRUE;
-    SbGiven *given;
+    SbMemoryMesh *in_memory;
 
-    PetscCall(read_mesh(h->file, run->model->body[b].name, &given, &good));
-    if (given) found.sum += sum_of(given);
+    PetscCall(read_mesh(h->file, run->model->body[b].name, &in_memory, &good));
+    if (in_memory) found.sum += sum_of(in_memory);
     if (!good) found.ok = 0;
-    PetscCall(SbGivenDestroy(&given));
+    PetscCall(SbMemoryMeshDestroy(&in_memory));
   }
   PetscCallMPI(MPI_Bcast(&found, 2, MPI_UINT64_T, 0, out->comm));
   *sum += found.sum;
@@ -213,7 +214,7 @@ PetscErrorCode SbCheckpointSumMeshes(SbRun run, SbH5 *h, uint64_t *sum, PetscBoo
 }
 
 /* On rank 0: the meshes of one file; ok is false when it cannot be read. */
-static PetscErrorCode read_file(SbModel m, const char *path, SbGiven *given[], PetscBool *ok)
+static PetscErrorCode read_file(SbModel m, const char *path, SbMemoryMesh *in_memory[], PetscBool *ok)
 {
   hid_t file = -1;
 
@@ -224,28 +225,28 @@ static PetscErrorCode read_file(SbModel m, const char *path, SbGiven *given[], P
   H5E_END_TRY
   if (file < 0) PetscFunctionReturn(PETSC_SUCCESS);
   *ok = PETSC_TRUE;
-  for (PetscInt b = 0; b < m->nbody; b++) PetscCall(read_mesh(file, m->body[b].name, &given[b], ok));
+  for (PetscInt b = 0; b < m->nbody; b++) PetscCall(read_mesh(file, m->body[b].name, &in_memory[b], ok));
   (void)H5Fclose(file);
-  for (PetscInt b = 0; b < m->nbody && !*ok; b++) PetscCall(SbGivenDestroy(&given[b]));
+  for (PetscInt b = 0; b < m->nbody && !*ok; b++) PetscCall(SbMemoryMeshDestroy(&in_memory[b]));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* All ranks know which bodies have a mesh of their own, and its numbers. */
-static PetscErrorCode share(SbModel m, SbOutput out, SbGiven *given[])
+static PetscErrorCode share(SbModel m, SbOutput out, SbMemoryMesh *in_memory[])
 {
   PetscFunctionBeginUser;
   for (PetscInt b = 0; b < m->nbody; b++) {
-    PetscReal numbers[2] = {given[b] ? given[b]->mass : 0., given[b] ? given[b]->bound : 0.};
-    PetscInt whole[2] = {given[b] ? 1 : 0, given[b] ? given[b]->step : 0};
+    PetscReal numbers[2] = {in_memory[b] ? in_memory[b]->mass : 0., in_memory[b] ? in_memory[b]->bound : 0.};
+    PetscInt whole[2] = {in_memory[b] ? 1 : 0, in_memory[b] ? in_memory[b]->step : 0};
 
     PetscCallMPI(MPI_Bcast(numbers, 2, MPIU_REAL, 0, out->comm));
     PetscCallMPI(MPI_Bcast(whole, 2, MPIU_INT, 0, out->comm));
     if (!whole[0]) continue;
-    if (out->rank) PetscCall(SbGivenCreate(0, 0, 0, &given[b]));
-    given[b]->mass = numbers[0];
-    given[b]->bound = numbers[1];
-    given[b]->step = whole[1];
-    m->body[b].given = given[b];
+    if (out->rank) PetscCall(SbMemoryMeshCreate(0, 0, 0, &in_memory[b]));
+    in_memory[b]->mass = numbers[0];
+    in_memory[b]->bound = numbers[1];
+    in_memory[b]->step = whole[1];
+    m->body[b].in_memory = in_memory[b];
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -256,19 +257,19 @@ PetscErrorCode SbOutputRestoreMeshes(SbRun run)
   const SbModel m = run->model;
   const PetscBool latest = (PetscBool)!strcmp(out->restart, "latest");
   char path[PETSC_MAX_PATH_LEN];
-  SbGiven **given;
+  SbMemoryMesh **in_memory;
   PetscBool ok = PETSC_FALSE;
 
   PetscFunctionBeginUser;
   if (!out->restart[0]) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(PetscCalloc1(m->nbody, &given));
+  PetscCall(PetscCalloc1(m->nbody, &in_memory));
   for (int k = 0; !ok && (latest || !k); k++) {
     PetscCall(SbCheckpointFind(out, out->restart, k, sizeof(path), path));
     if (!path[0]) break;
-    if (!out->rank) PetscCall(read_file(m, path, given, &ok));
+    if (!out->rank) PetscCall(read_file(m, path, in_memory, &ok));
     PetscCallMPI(MPI_Bcast(&ok, 1, SB_MPI_BOOL, 0, out->comm));
   }
-  PetscCall(share(m, out, given));
-  PetscCall(PetscFree(given));
+  PetscCall(share(m, out, in_memory));
+  PetscCall(PetscFree(in_memory));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -42,7 +42,7 @@ static const struct {
 #define NTABLE ((int)PETSC_STATIC_ARRAY_LENGTH(table))
 
 struct _p_SbContacts {
-  SbPlaces list;               /* of this rank */
+  SbContactPoints list;        /* of this rank */
   PetscInt nsend, nrecord;     /* rooms */
   PetscReal *send, *record;    /* [nsend][RECORD] by rank; [nrecord][RECORD] of this rank's share, sorted */
   PetscMPIInt *count, *offset; /* [2 size] places to each rank, then from each */
@@ -56,7 +56,7 @@ struct _p_SbContacts {
 
 /* ------------------------------------------------------------------ to the ranks that write them */
 
-static void fill(const SbPlace *p, PetscReal *r)
+static void fill(const SbContactPoint *p, PetscReal *r)
 {
   const PetscReal push = SbDot3(p->force, p->normal);
 
@@ -108,7 +108,7 @@ static PetscErrorCode sort_by_rank(SbContacts c, PetscMPIInt size)
   PetscCall(PetscArrayzero(c->count, size));
   for (int pass = 0; pass < 2; pass++) {
     for (PetscInt i = 0; i < c->list.n; i++) {
-      const SbPlace *p = &c->list.place[i];
+      const SbContactPoint *p = &c->list.place[i];
       const PetscInt to = (PetscInt)((PetscInt64)p->id[1] * size / ((PetscInt64)bound + 1));
 
       if (!pass)
@@ -134,7 +134,7 @@ PetscErrorCode SbContactsFind(SbRun run, SbOutput out, const SbStep *step, Petsc
              "The residual was asked for but not given to the monitors");
   PetscCall(PetscLogEventBegin(out->event.contacts, 0, 0, 0, 0));
   c->list.n = 0;
-  PetscCall(SbModelContactPlaces(run->model, step->t, step->U, step->R, &c->list));
+  PetscCall(SbModelContactPoints(run->model, step->t, step->U, step->R, &c->list));
   PetscCall(sort_by_rank(c, out->size));
   PetscCallMPI(MPI_Alltoall(c->count, 1, MPI_INT, c->count + out->size, 1, MPI_INT, out->comm));
   for (PetscMPIInt r = out->size; r < 2 * out->size; n += c->count[r++]) c->offset[r] = (PetscMPIInt)n;

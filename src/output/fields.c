@@ -243,7 +243,7 @@ PetscErrorCode SbFieldFind(const char *name, const SbField **field)
     PetscCall(PetscStrlcat(all, i ? ", " : "", sizeof(all)));
     PetscCall(PetscStrlcat(all, names[i], sizeof(all)));
   }
-  PetscCall(SbNearest(name, n, names, sizeof(near), near));
+  PetscCall(SbNearestNames(name, n, names, sizeof(near), near));
   SETERRQ(PETSC_COMM_SELF, PETSC_ERR_USER,
           "-output_fields: there is no field '%s'%s%s%s; fields are %s, or none", name,
           near[0] ? ", did you mean " : "", near, near[0] ? "?" : "", all);

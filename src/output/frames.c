@@ -582,7 +582,7 @@ PetscErrorCode SbFramesAttach(SbRun run, SbOutput out)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbFramesFollow(SbRun run, SbOutput out)
+PetscErrorCode SbFramesReattach(SbRun run, SbOutput out)
 {
   PetscFunctionBeginUser;
   if (!out->frames) PetscFunctionReturn(PETSC_SUCCESS);

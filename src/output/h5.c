@@ -19,7 +19,7 @@
 
 /*
   After a failed write HDF5 1.10 cannot be closed: it frees the file, keeps its identifier, and crashes when MPI_Finalize()
-  makes it end. The error has been told by then; what is left of the program's end is skipped.
+  makes it end. The error has been told by then; the remainder of the program's end is skipped.
 */
 static int leave_at_once(MPI_Comm comm, int key, void *attribute, void *state)
 {

@@ -2,7 +2,7 @@
   history.csv: one row of scalars per step, each written to the file at once and in one piece.
 
   First line: names. Second line: units behind a '#', so that pandas and numpy skip it with comment='#'. Numbers have 17
-  digits: what is read back is what was computed. `total` is kinetic + strain - load_work - drive_work, which stays what it
+  digits: what is read back is what was computed. `total` is kinetic + strain - load_work - prescribed_work, which stays what it
   was at the start as long as nothing is dissipated.
 
   The sums that effects and probes need travel in one reduction per row; with them the news that the row before could not be
@@ -27,13 +27,33 @@ struct _p_SbHistory {
   char message[SB_MESSAGE_MAX]; /* why it failed; empty when it did not */
 };
 
-static const char *const names[] = {
-  "step",       "time",       "dt",           "kinetic",          "strain",
-  "load_work",  "drive_work", "damping_loss", "integrator_loss",  "total",
-  "momentum_x", "momentum_y", "momentum_z",   "angular_x",        "angular_y",
-  "angular_z",  "centre_x",   "centre_y",     "centre_z",         "volume",
-  "min_J",      "inverted",   "max_speed",    "max_displacement", "newton",
-  "linear",     "rejected"};
+static const char *const names[] = {"step",
+                                    "time",
+                                    "dt",
+                                    "kinetic",
+                                    "strain",
+                                    "load_work",
+                                    "prescribed_work",
+                                    "damping_loss",
+                                    "integrator_loss",
+                                    "total",
+                                    "momentum_x",
+                                    "momentum_y",
+                                    "momentum_z",
+                                    "angular_x",
+                                    "angular_y",
+                                    "angular_z",
+                                    "centre_x",
+                                    "centre_y",
+                                    "centre_z",
+                                    "volume",
+                                    "min_J",
+                                    "inverted",
+                                    "max_speed",
+                                    "max_displacement",
+                                    "newton",
+                                    "linear",
+                                    "rejected"};
 static const char *const units[] = {"1",        "s",        "s", "J",      "J",      "J",      "J",
                                     "J",        "J",        "J", "kg m/s", "kg m/s", "kg m/s", "kg m^2/s",
                                     "kg m^2/s", "kg m^2/s", "m", "m",      "m",      "m^3",    "1",
@@ -159,10 +179,10 @@ static PetscErrorCode put_row(SbHistory h, const SbStep *step, SbRun run)
   const PetscReal x[] = {e->kinetic,
                          e->strain,
                          e->load_work,
-                         e->drive_work,
+                         e->prescribed_work,
                          e->damping_loss,
                          e->integrator_loss,
-                         e->kinetic + e->strain - e->load_work - e->drive_work,
+                         e->kinetic + e->strain - e->load_work - e->prescribed_work,
                          e->momentum[0],
                          e->momentum[1],
                          e->momentum[2],
@@ -317,7 +337,7 @@ PetscErrorCode SbHistoryAttach(SbRun run, SbOutput out)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbHistoryFollow(SbRun run, SbOutput out)
+PetscErrorCode SbHistoryReattach(SbRun run, SbOutput out)
 {
   PetscFunctionBeginUser;
   if (!out->hist) PetscFunctionReturn(PETSC_SUCCESS);

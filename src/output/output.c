@@ -38,7 +38,7 @@ static const SbOption rows[] = {
    "steps between checkpoints; 0: none by steps"},
   {"checkpoint_keep", SB_OPTION_INT, 1, "", "2", "[1, inf)", "checkpoints kept, the newest ones"},
   {"restart", SB_OPTION_STRING, 1, "", "", "",
-   "checkpoint to go on from, or latest: the newest one in output_dir; empty: start anew"},
+   "checkpoint to go on from, or latest: the newest one in output_dir; empty: start from the beginning"},
   {"probes", SB_OPTION_NAMES, 1, "", "", "", "names of points whose displacement history.csv follows"},
   {"progress", SB_OPTION_BOOL, 1, "", "true", "", "print a line on the progress of the run"},
   {"quiet", SB_OPTION_BOOL, 1, "", "false", "", "print errors and warnings only"},

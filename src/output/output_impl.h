@@ -181,7 +181,7 @@ PetscBool SbOutputDue(PetscReal every, PetscReal t, PetscReal dt);
 PetscInt SbOutputMeshStep(SbRun run);
 /* Original orders and the mesh's hash; made once. Collective. */
 PetscErrorCode SbOutputOrder(SbRun run, SbOutput out);
-/* follow.c: frees what belongs to the mesh: orders, points, cell quantities, counts. */
+/* reattach.c: frees what belongs to the mesh: orders, points, cell quantities, counts. */
 PetscErrorCode SbOutputForgetMesh(SbOutput out);
 PetscErrorCode SbOutputCountNodes(SbSpace space, SbOutput out); /* collective */
 
@@ -205,7 +205,7 @@ void SbPointsVertex(SbRun run, SbOutput out, PetscInt vertex, const PetscReal x[
 PetscErrorCode SbFramesCheck(SbRun run, SbOutput out);
 PetscErrorCode SbFramesAttach(SbRun run, SbOutput out);
 /* The same output goes on with the run of another mesh, as does that of the functions below. Collective. */
-PetscErrorCode SbFramesFollow(SbRun run, SbOutput out);
+PetscErrorCode SbFramesReattach(SbRun run, SbOutput out);
 PetscErrorCode SbFramesClose(SbOutput out);
 PetscErrorCode SbFramesDestroy(SbOutput out);
 /* contacts.c; without -output_contacts they only keep, after a restart, what is in the index. */
@@ -224,7 +224,7 @@ PetscErrorCode SbContactsList(SbOutput out, PetscReal time, const char *frame, P
 void SbContactsIndex(SbOutput out, size_t nmessage, char message[]);
 PetscErrorCode SbContactsRemoveIndex(SbOutput out);
 PetscErrorCode SbHistoryAttach(SbRun run, SbOutput out);
-PetscErrorCode SbHistoryFollow(SbRun run, SbOutput out);
+PetscErrorCode SbHistoryReattach(SbRun run, SbOutput out);
 PetscErrorCode SbHistoryDestroy(SbOutput out);
 PetscErrorCode SbProbesFind(SbRun run, SbOutput out);
 /* In a checkpoint of a run that was re-meshed: the places that they follow. Collective. */
@@ -260,7 +260,7 @@ PetscErrorCode SbCheckpointRemoveAfter(SbOutput out, PetscInt step); /* rank 0 *
 typedef PetscErrorCode (*SbFileFn)(const char *name, PetscInt64 bytes, void *ctx);
 PetscErrorCode SbCheckpointFiles(SbOutput out, SbFileFn fn, void *ctx);
 PetscErrorCode SbProgressAttach(SbRun run, SbOutput out);
-PetscErrorCode SbProgressFollow(SbRun run, SbOutput out);
+PetscErrorCode SbProgressReattach(SbRun run, SbOutput out);
 PetscErrorCode SbProgressEnd(SbOutput out); /* ends a line that is being rewritten */
 PetscErrorCode SbProgressDestroy(SbOutput out);
 PetscErrorCode SbRunJson(SbRun run, SbOutput out, const char *status, const char *reason); /* collective */

@@ -2,7 +2,7 @@
   Where the time went: the program's log events, gathered into the phases that the closing table shows.
 
   The seconds of a phase are those of the slowest rank. Events of a phase do not contain each other; the linear solve is
-  what PETSc's KSP and PC events cover. The last phase is what is left of the wall time.
+  what PETSc's KSP and PC events cover. The last phase is the remainder of the wall time.
 */
 #include <sys/resource.h>
 #include <time.h>

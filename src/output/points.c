@@ -206,7 +206,7 @@ static void add_corner_force(const Forces *f, const PetscReal valence[], PetscIn
   } else {
     // node a lies opposite vertex a: this corner belongs to the faces of the others
     for (int a = 0; a < 4; a++) {
-      const PetscInt support = s->support ? s->support[corner - corner % 4 + a] : -1;
+      const PetscInt support = s->dirichlet_node ? s->dirichlet_node[corner - corner % 4 + a] : -1;
 
       if (a == corner % 4) continue;
       add_force(f, node[a], 1. / (3. * valence[node[a]]), value);

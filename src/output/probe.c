@@ -54,7 +54,7 @@ static PetscReal deepest_owned(const SbMesh mesh, const SbProbe *probe, PetscInt
     PetscReal w[4], outside;
 
     if (mesh->cell_body[c] != probe->body) continue;
-    SbTetWeights(mesh->x, mesh->cell + 4 * c, probe->x, w);
+    SbTetBarycentric(mesh->x, mesh->cell + 4 * c, probe->x, w);
     outside = -PetscMin(PetscMin(w[0], w[1]), PetscMin(w[2], w[3]));
     if (outside > best || (outside == best && mesh->cell_orig[c] > mesh->cell_orig[*cell])) continue;
     best = outside;

@@ -109,7 +109,7 @@ PetscErrorCode SbProgressAttach(SbRun run, SbOutput out)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbProgressFollow(SbRun run, SbOutput out)
+PetscErrorCode SbProgressReattach(SbRun run, SbOutput out)
 {
   PetscFunctionBeginUser;
   if (!out->progress || out->quiet) PetscFunctionReturn(PETSC_SUCCESS);

@@ -244,9 +244,9 @@ static PetscErrorCode print_work(SbModel m, PetscBool silent)
   for (PetscInt e = 0; e < m->neffect; e++) {
     const SbEffect effect = m->effect[e];
 
-    if (!effect->ops.tell) continue;
+    if (!effect->ops.summary) continue;
     text[0] = 0;
-    PetscCall(effect->ops.tell(effect, m->space, sizeof(text), text));
+    PetscCall(effect->ops.summary(effect, m->space, sizeof(text), text));
     if (!silent && text[0]) PetscCall(entry("effect", "%s: %s", effect->name, text));
   }
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -215,7 +215,7 @@ static PetscErrorCode make_mesh(Work *w, const SbRemeshing *how)
 }
 
 /* Triangles of the new surface in groups: counted, or written. */
-static PetscInt list_triangles(const Work *w, SbGiven *given)
+static PetscInt list_triangles(const Work *w, SbMemoryMesh *in_memory)
 {
   PetscInt n = 0;
 
@@ -224,23 +224,23 @@ static PetscInt list_triangles(const Work *w, SbGiven *given)
     const uint64_t bits = slot < 0 ? 0 : w->g->cell_set[5 * (w->cell0 + slot / 4) + 1 + slot % 4] & w->groups;
 
     if (!bits) continue;
-    if (given) {
-      for (int k = 0; k < 3; k++) given->tri[3 * n + k] = w->mesh.cell[4 * (i / 4) + (i % 4 + 1 + k) % 4];
-      given->tri_set[n] = bits;
+    if (in_memory) {
+      for (int k = 0; k < 3; k++) in_memory->tri[3 * n + k] = w->mesh.cell[4 * (i / 4) + (i % 4 + 1 + k) % 4];
+      in_memory->tri_set[n] = bits;
     }
     n++;
   }
   return n;
 }
 
-static PetscErrorCode give_new(const Work *w, SbGiven **given)
+static PetscErrorCode give_new(const Work *w, SbMemoryMesh **in_memory)
 {
   const SbNewMesh *m = &w->mesh;
-  SbGiven *p;
+  SbMemoryMesh *p;
 
   PetscFunctionBeginUser;
-  PetscCall(SbGivenCreate(m->nvert, m->ncell, list_triangles(w, NULL), given));
-  p = *given;
+  PetscCall(SbMemoryMeshCreate(m->nvert, m->ncell, list_triangles(w, NULL), in_memory));
+  p = *in_memory;
   PetscCall(PetscArraycpy(p->x, m->X, 3 * (size_t)m->nvert));
   PetscCall(PetscArraycpy(p->cell, m->cell, 4 * (size_t)m->ncell));
   (void)list_triangles(w, p);
@@ -253,18 +253,18 @@ static PetscErrorCode give_new(const Work *w, SbGiven **given)
 }
 
 /* The old mesh as it is. */
-static PetscErrorCode give_old(const Work *w, SbGiven **given)
+static PetscErrorCode give_old(const Work *w, SbMemoryMesh **in_memory)
 {
   const SbGathered *g = w->g;
   const PetscInt nvert = g->vert0[w->body + 1] - w->vert0;
   PetscInt ntri = 0;
-  SbGiven *p;
+  SbMemoryMesh *p;
 
   PetscFunctionBeginUser;
   for (PetscInt i = 0; i < 4 * w->ncell; i++)
     ntri += g->cell_set[5 * (w->cell0 + i / 4) + 1 + i % 4] & w->groups ? 1 : 0;
-  PetscCall(SbGivenCreate(nvert, w->ncell, ntri, given));
-  p = *given;
+  PetscCall(SbMemoryMeshCreate(nvert, w->ncell, ntri, in_memory));
+  p = *in_memory;
   PetscCall(PetscArraycpy(p->x, g->X + 3 * w->vert0, 3 * (size_t)nvert));
   PetscCall(PetscArraycpy(p->cell, w->cell, 4 * (size_t)w->ncell));
   for (PetscInt v = 0; v < nvert; v++) p->vert_set[v] = g->vert_set[w->vert0 + v] & w->groups;
@@ -295,7 +295,7 @@ static void look_up(const Work *w, const PetscReal X[3], const PetscReal near[3]
   PetscInt cell;
 
   (void)SbLocatorFind(w->rest, near, &cell, weight);
-  if (near != X) SbLocatorWeights(w->rest, cell, X, weight);
+  if (near != X) SbLocatorBarycentric(w->rest, cell, X, weight);
   for (PetscInt k = 0; k < w->each; k++) value[k] = 0.;
   for (int a = 0; a < 4; a++) {
     const PetscReal *from = old_value(w, cell, a);
@@ -392,7 +392,7 @@ static PetscErrorCode keep_message(MPI_Comm comm, int line, const char *function
   return code;
 }
 
-/* Meshes one body anew; what it cannot do goes to the message. */
+/* Meshes one body again; what it cannot do goes to the message. */
 static PetscErrorCode try_body(Work *w, const SbRemeshing *how, SbMade *made, PetscBool *done)
 {
   PetscErrorCode ierr;
@@ -434,25 +434,25 @@ static PetscErrorCode begin_next(const SbGathered *g, const SbMade made[], SbGat
 static PetscErrorCode finish_body(const Work *w, PetscBool done, PetscInt step, SbRemade *remade)
 {
   SbGathered *next = &remade->next;
-  SbGiven **given = &remade->given[w->body];
+  SbMemoryMesh **in_memory = &remade->in_memory[w->body];
   const SbBody *body = &w->model->body[w->body];
   const size_t each = (size_t)next->width * (size_t)w->each;
   PetscReal *value = next->value + each * (size_t)next->cell0[w->body];
 
   PetscFunctionBeginUser;
   if (done) {
-    PetscCall(give_new(w, given));
+    PetscCall(give_new(w, in_memory));
     for (PetscInt c = 0; c < w->mesh.ncell; c++) new_values(w, c, value + each * (size_t)c);
-    (*given)->step = step;
-    (*given)->mass = w->g->mass[w->body];
-    (*given)->bound = w->mesh.quality; /* the caller makes a bound of it */
+    (*in_memory)->step = step;
+    (*in_memory)->mass = w->g->mass[w->body];
+    (*in_memory)->bound = w->mesh.quality; /* the caller makes a bound of it */
   } else {
-    PetscCall(give_old(w, given));
+    PetscCall(give_old(w, in_memory));
     PetscCall(PetscArraycpy(value, w->g->value + each * (size_t)w->cell0, each * (size_t)w->ncell));
-    if (body->given) {
-      (*given)->step = body->given->step;
-      (*given)->mass = body->given->mass;
-      (*given)->bound = body->given->bound;
+    if (body->in_memory) {
+      (*in_memory)->step = body->in_memory->step;
+      (*in_memory)->mass = body->in_memory->mass;
+      (*in_memory)->bound = body->in_memory->bound;
     }
   }
   rename_surface(w, done, next->vert0[w->body], next->cell0[w->body], next, &remade->renamed);
@@ -464,15 +464,15 @@ PetscErrorCode SbRemadeCreate(PetscInt nbody, SbRemade *r)
   PetscFunctionBeginUser;
   PetscCall(PetscMemzero(r, sizeof(*r)));
   r->nbody = nbody;
-  PetscCall(PetscCalloc3(nbody, &r->given, nbody, &r->made, nbody, &r->done));
+  PetscCall(PetscCalloc3(nbody, &r->in_memory, nbody, &r->made, nbody, &r->done));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode SbRemadeDestroy(SbRemade *r)
 {
   PetscFunctionBeginUser;
-  for (PetscInt b = 0; b < r->nbody; b++) PetscCall(SbGivenDestroy(&r->given[b]));
-  PetscCall(PetscFree3(r->given, r->made, r->done));
+  for (PetscInt b = 0; b < r->nbody; b++) PetscCall(SbMemoryMeshDestroy(&r->in_memory[b]));
+  PetscCall(PetscFree3(r->in_memory, r->made, r->done));
   PetscCall(SbGatheredDestroy(&r->next));
   PetscCall(PetscFree2(r->renamed.from, r->renamed.to));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -2,12 +2,12 @@
   body.c - another mesh of the same body in the same state, on rank 0.
 
   The hull stays: every triangle of the surface, and every one between regions that must stay apart, with its vertices. What it encloses is filled
-  anew, in the shape that the body has now or at rest. A new vertex y in the shape of now lies in a tet of the old mesh with the weights w,
+  again, in the shape that the body has now or at rest. A new vertex y in the shape of now lies in a tet of the old mesh with the weights w,
   y = sum w_a x_a; its rest position is X = sum w_a X_a: the material that is there. So the volume at rest is the same,
-  and the motion from X to x that the old mesh has is only looked at in other places.
+  and the motion from X to x that the old mesh has is only examined in other places.
 
-  Between these the motion is not linear, so a new tet may be inside out at rest although it is none now. Such tets, and those
-  that are too flat, are mended by moving their inner vertices through the material, towards the middle of their neighbours: to the place of a few on the
+  Between these the motion is not linear, so a new tet may be inverted at rest although it is none now. Such tets, and those
+  that are too flat, are repaired by moving their inner vertices through the material, towards the middle of their neighbours: to the place of a few on the
   way where the worst tet around is best, until all are good or nothing helps. A tet between four vertices of a side that was flat at rest and bulges
   now has no volume at rest, and no inner vertex: an inner edge of it gets one in its middle, with all tets around, which then moves
   inwards.
@@ -179,7 +179,7 @@ static PetscErrorCode find_material(const SbOldMesh *old, const SbRemeshing *how
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* ------------------------------------------------------------------ tets that are inside out or flat */
+/* ------------------------------------------------------------------ tets that are inverted or flat */
 
 static PetscReal shape_at(const SbNewMesh *m, const PetscReal at[], PetscInt cell)
 {
@@ -403,7 +403,7 @@ static PetscErrorCode mend(const SbOldMesh *old, const SbRemeshing *how, const S
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Refuses what could not be mended: tets inside out now are allowed where the old mesh had some, too. */
+/* Refuses what could not be repaired: tets inverted now are allowed where the old mesh had some, too. */
 static PetscErrorCode judge(const SbOldMesh *old, const SbRemeshing *how, SbNewMesh *m)
 {
   PetscInt at_rest = 0, now = 0, before = 0;
@@ -428,11 +428,11 @@ static PetscErrorCode judge(const SbOldMesh *old, const SbRemeshing *how, SbNewM
   }
   PetscCheck(!at_rest, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
              "%" PetscInt_FMT " of %" PetscInt_FMT
-             " new tetrahedra would be inside out or flat at rest: the deformation differs too much from one "
+             " new tetrahedra would be inverted or flat at rest: the deformation differs too much from one "
              "old tetrahedron to the next",
              at_rest, m->ncell);
   PetscCheck(now <= before, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
-             "%" PetscInt_FMT " of %" PetscInt_FMT " new tetrahedra would be inside out, %" PetscInt_FMT
+             "%" PetscInt_FMT " of %" PetscInt_FMT " new tetrahedra would be inverted, %" PetscInt_FMT
              " old ones are",
              now, m->ncell, before);
   PetscCheck(!how->better || m->quality > worst, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,

@@ -1,7 +1,7 @@
 /*
   How bad the tets of a body are now, and its momenta.
 
-  A tet is looked at where its corners are now; of CR and DG these are the means of the cells around, as vertex fields have them.
+  A tet is examined where its corners are now; of CR and DG these are the means of the cells around, as vertex fields have them.
 
   Velocities on another mesh have other momenta, by as much as the mesh is wrong. With p = M v, the six rigid velocities w_k (three translations,
   three rotations about the origin at the places of now) and D, which leaves out what is prescribed, the momenta are w_k . p, and v + sum_l c_l D w_l
@@ -194,7 +194,7 @@ static PetscReal add_rigid(SbModel m, const PetscReal u[], const PetscReal middl
   return largest;
 }
 
-/* G[6][6] x = y by elimination with full pivots; unknowns of pivots below rounding are zero: motions that are held. */
+/* G[6][6] x = y by elimination with full pivots; unknowns of pivots below rounding are zero: motions that are constrained. */
 static void solve6(PetscReal G[6][6], PetscReal y[6], PetscReal x[6])
 {
   int column[6] = {0, 1, 2, 3, 4, 5}, rank = 0;
@@ -292,7 +292,7 @@ static PetscErrorCode correct(SbModel m, Vec U, const PetscBool named[], const P
 PetscErrorCode SbBodySetMomenta(SbModel m, Vec U, Vec V, const PetscBool named[],
                                 const PetscReal momenta[][6], PetscReal *largest)
 {
-  const PetscReal *given;
+  const PetscReal *in_memory;
   PetscReal(*middle)[3], *size, *v, *array;
 
   PetscFunctionBeginUser;
@@ -300,9 +300,9 @@ PetscErrorCode SbBodySetMomenta(SbModel m, Vec U, Vec V, const PetscBool named[]
   PetscCall(PetscCalloc2(m->nbody, &middle, m->nbody, &size));
   PetscCall(PetscMalloc1(3 * m->space->nnode, &v));
   PetscCall(find_middles(m, U, middle, size));
-  PetscCall(SbSpaceGetLocalRead(m->space, V, &given));
-  PetscCall(PetscArraycpy(v, given, 3 * m->space->nnode));
-  PetscCall(SbSpaceRestoreLocalRead(m->space, V, &given));
+  PetscCall(SbSpaceGetLocalRead(m->space, V, &in_memory));
+  PetscCall(PetscArraycpy(v, in_memory, 3 * m->space->nnode));
+  PetscCall(SbSpaceRestoreLocalRead(m->space, V, &in_memory));
   for (int i = 0; i < 2; i++)
     PetscCall(correct(m, U, named, (const PetscReal(*)[3])middle, size, momenta, v, largest));
   PetscCall(SbSpaceGetLocalWrite(m->space, V, &array));

@@ -1,7 +1,7 @@
 /*
   What effects remember of one model (who touches, who sticks), for another one: as a checkpoint would carry it, with the names of nodes changed.
 
-  What does not say how its names change (SbEffectOps.rename) begins anew, as at the start of a run.
+  What does not say how its names change (SbEffectOps.rename) begins again, as at the start of a run.
 */
 #include "remesh_impl.h"
 

@@ -95,7 +95,7 @@ static PetscInt vectors_of(SbRun run, Vec vec[3])
 
 static PetscInt node_at(SbSpace s, PetscInt cell, PetscInt k)
 {
-  return k < 4 ? s->cell_node[4 * cell + k] : s->support ? s->support[4 * cell + k - 4] : -1;
+  return k < 4 ? s->cell_node[4 * cell + k] : s->dirichlet_node ? s->dirichlet_node[4 * cell + k - 4] : -1;
 }
 
 static PetscErrorCode gather_values(SbRun run, PetscBool root, PetscSF sf, SbGathered *g)
@@ -175,7 +175,7 @@ PetscErrorCode SbGather(SbRun run, SbGathered *g)
 {
   const SbModel m = run->model;
   const SbMesh mesh = m->mesh;
-  PetscMPIInt rank, supports = m->space->support ? 1 : 0;
+  PetscMPIInt rank, supports = m->space->dirichlet_node ? 1 : 0;
   Vec vec[3];
   PetscSF sf;
 

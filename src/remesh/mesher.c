@@ -6,22 +6,22 @@
   surface cannot be filled, as where it nearly touches itself, it gets the exact ones. The vertices of the hull are where they were in either case.
 */
 #include "sbremesh.h"
-#include "sbskin.h"
+#include "sbsurface.h"
 #include "sbtet.h"
 
 #define BITS 10   /* an edge has 2^10 to 2^11 steps */
 #define AHEAD 0.3 /* of a step: with one half, round numbers would lie where rounding is not sure */
 
-static PetscErrorCode make_skin(const SbHull *hull, SbSkin *skin)
+static PetscErrorCode make_skin(const SbHull *hull, SbSurface *body_surface)
 {
   PetscFunctionBeginUser;
-  PetscCall(SbSkinCreate(hull->nvert, hull->ntri, hull->nregion, skin));
-  PetscCall(PetscArraycpy(skin->x, hull->x, 3 * (size_t)hull->nvert));
-  PetscCall(PetscArraycpy(skin->tri, hull->tri, 3 * (size_t)hull->ntri));
-  PetscCall(PetscArraycpy(skin->side, hull->side, 2 * (size_t)hull->ntri));
-  PetscCall(PetscArrayzero(skin->tags, hull->ntri));
-  PetscCall(PetscArrayzero(skin->region_tags, hull->nregion));
-  for (PetscInt t = 0; t < hull->ntri; t++) skin->number[t] = t + 1;
+  PetscCall(SbSurfaceCreate(hull->nvert, hull->ntri, hull->nregion, body_surface));
+  PetscCall(PetscArraycpy(body_surface->x, hull->x, 3 * (size_t)hull->nvert));
+  PetscCall(PetscArraycpy(body_surface->tri, hull->tri, 3 * (size_t)hull->ntri));
+  PetscCall(PetscArraycpy(body_surface->side, hull->side, 2 * (size_t)hull->ntri));
+  PetscCall(PetscArrayzero(body_surface->tags, hull->ntri));
+  PetscCall(PetscArrayzero(body_surface->region_tags, hull->nregion));
+  for (PetscInt t = 0; t < hull->ntri; t++) body_surface->number[t] = t + 1;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -36,7 +36,7 @@ static PetscErrorCode take(SbImport *im, SbTets *tets)
     PetscInt *v = tets->cell + 4 * (size_t)c;
     const PetscInt keep = v[3];
 
-    if (SbTetDet(tets->x, v) > 0) continue;
+    if (SbTetDeterminant(tets->x, v) > 0) continue;
     v[3] = v[2];
     v[2] = keep;
   }
@@ -48,7 +48,7 @@ static PetscErrorCode fill(const char *where, const SbHull *hull, PetscReal size
                            SbImport *im)
 {
   SbTetOptions options;
-  SbSkin skin;
+  SbSurface body_surface;
   PetscErrorCode ierr;
   PetscInt none;
 
@@ -59,11 +59,11 @@ static PetscErrorCode fill(const char *where, const SbHull *hull, PetscReal size
   PetscCall(SbTetDefaults(&options));
   options.size = step > 0 ? step * PetscMax(1, PetscFloorReal(size / step)) : size;
   options.surface = SB_TET_KEEP;
-  PetscCall(make_skin(hull, &skin));
+  PetscCall(make_skin(hull, &body_surface));
   for (PetscInt i = 0; i < 3 * hull->nvert && step > 0; i++)
-    skin.x[i] = step * PetscFloorReal(skin.x[i] / step + AHEAD);
-  ierr = SbTetrahedralize(where, &skin, &options, im);
-  PetscCall(SbSkinDestroy(&skin));
+    body_surface.x[i] = step * PetscFloorReal(body_surface.x[i] / step + AHEAD);
+  ierr = SbTetrahedralize(where, &body_surface, &options, im);
+  PetscCall(SbSurfaceDestroy(&body_surface));
   if (ierr) PetscCall(SbImportDestroy(im));
   PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -1,9 +1,9 @@
 /*
-  Re-meshing while a run goes on: when the tets of a body have become too bad, or at given times, it is meshed anew and the run goes on.
+  Re-meshing while a run goes on: when the tets of a body have become too bad, or at given times, it is remeshed and the run goes on.
 
   After each step the time loop asks whether to come back (SbRun.after). Then the state is brought to rank 0 (gather.c), bodies get their new
   meshes and the state is looked up there (bodies.c), the scene is made once more from its options with these meshes in memory, and the
-  state goes there: vectors, what effects remember (effects.c), totals, output, ledger. Mass is that of before because densities are scaled (SbGiven.mass),
+  state goes there: vectors, what effects remember (effects.c), totals, output, ledger. Mass is that of before because densities are scaled (SbMemoryMesh.mass),
   momenta because a rigid motion is added to the velocities (check.c). What kinetic and strain energy have changed by is the remesh_loss of the
   account.
 
@@ -137,20 +137,20 @@ static PetscErrorCode read_bounds(SbRemesh r, SbModel m, const SbScope *scope, P
 static PetscErrorCode is_named(SbModel m, const SbScope *scope, PetscBool *named)
 {
   static const char *const keys[] = {"remesh_quality", "remesh_times", "remesh_failed"};
-  PetscBool given;
+  PetscBool in_memory;
 
   PetscFunctionBeginUser;
   *named = PETSC_FALSE;
   for (size_t k = 0; k < PETSC_STATIC_ARRAY_LENGTH(keys); k++) {
-    PetscCall(SbOptionGiven(scope, keys[k], &given));
-    *named = (PetscBool)(*named || given);
+    PetscCall(SbOptionGiven(scope, keys[k], &in_memory));
+    *named = (PetscBool)(*named || in_memory);
   }
   for (PetscInt b = 0; b < m->nbody; b++) {
     SbScope own;
 
     PetscCall(SbScopeSet(&own, "body", "", m->body[b].name));
-    PetscCall(SbOptionGiven(&own, "remesh_quality", &given));
-    *named = (PetscBool)(*named || given);
+    PetscCall(SbOptionGiven(&own, "remesh_quality", &in_memory));
+    *named = (PetscBool)(*named || in_memory);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -274,9 +274,9 @@ PetscErrorCode SbRemeshAttach(SbRemesh r, SbRun run)
   run->column = r->column;
   run->want_energies = PETSC_TRUE;
   for (PetscInt b = 0; b < r->nbody; b++) {
-    const SbGiven *given = run->model->body[b].given;
+    const SbMemoryMesh *in_memory = run->model->body[b].in_memory;
 
-    if (given && given->bound > 0.) r->bound[b] = PetscMin(r->bound[b], given->bound);
+    if (in_memory && in_memory->bound > 0.) r->bound[b] = PetscMin(r->bound[b], in_memory->bound);
   }
   PetscCall(SbRunSetPause(run, look, r));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -301,38 +301,38 @@ static PetscErrorCode destroy_scene(Scene *s)
 }
 
 /* The bodies' meshes, which are on rank 0; the model owns them from now on. */
-static PetscErrorCode hand_meshes(SbModel m, SbGiven *given[])
+static PetscErrorCode hand_meshes(SbModel m, SbMemoryMesh *in_memory[])
 {
   PetscMPIInt rank;
 
   PetscFunctionBeginUser;
   PetscCallMPI(MPI_Comm_rank(m->comm, &rank));
   for (PetscInt b = 0; b < m->nbody; b++) {
-    SbGiven *p = given[b];
+    SbMemoryMesh *p = in_memory[b];
     PetscReal numbers[2] = {p ? p->mass : 0., p ? p->bound : 0.};
     PetscInt step = p ? p->step : 0;
 
-    if (rank) PetscCall(SbGivenCreate(0, 0, 0, &p));
+    if (rank) PetscCall(SbMemoryMeshCreate(0, 0, 0, &p));
     PetscCallMPI(MPI_Bcast(numbers, 2, MPIU_REAL, 0, m->comm));
     PetscCallMPI(MPI_Bcast(&step, 1, MPIU_INT, 0, m->comm));
     p->mass = numbers[0];
     p->bound = numbers[1];
     p->step = step;
-    m->body[b].given = p;
-    given[b] = NULL;
+    m->body[b].in_memory = p;
+    in_memory[b] = NULL;
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Everything from the options again, on the new meshes. The solver is the one of before, whose options are in PETSc's database. */
-static PetscErrorCode make_scene(const Scene *old, SbGiven *given[], Scene *s)
+static PetscErrorCode make_scene(const Scene *old, SbMemoryMesh *in_memory[], Scene *s)
 {
   PetscFunctionBeginUser;
   PetscCall(SbSceneCreate(old->model->comm, &s->model));
   PetscCall(SbRunCreate(s->model, &s->run));
   PetscCall(PetscStrncpy(s->run->solver_choice, old->run->solver, sizeof(s->run->solver_choice)));
   PetscCall(SbLedgerSetFromOptions(s->run, &s->ledger));
-  PetscCall(hand_meshes(s->model, given));
+  PetscCall(hand_meshes(s->model, in_memory));
   PetscCall(SbModelSetUp(s->model));
   PetscCall(SbSceneValidate(s->model));
   PetscCall(SbRunSetUp(s->run));
@@ -440,7 +440,7 @@ static void set_bounds(SbRemesh r, PetscInt step, const SbRemade *remade)
     if (reached > 0.) r->bound[b] = PetscMin(r->asked[b], AGAIN * reached);
     r->rest[b] = done[b] && reached > 0. ? 0 : PetscMax(1, 2 * r->rest[b]);
     r->from[b] = step + r->rest[b];
-    if (remade->given[b] && done[b]) remade->given[b]->bound = r->bound[b];
+    if (remade->in_memory[b] && done[b]) remade->in_memory[b]->bound = r->bound[b];
   }
 }
 
@@ -478,13 +478,13 @@ static PetscErrorCode replace(SbRemesh r, Scene *old, SbRemade *remade)
   PetscReal speed = 0.;
 
   PetscFunctionBeginUser;
-  PetscCall(make_scene(old, remade->given, &s));
+  PetscCall(make_scene(old, remade->in_memory, &s));
   PetscCall(hand_over(old, remade, &s, &speed));
   PetscCall(close_account(old, &s, e));
   PetscCall(SbLedgerAttach(s.ledger));
   if (s.ledger) PetscCall(SbLedgerContinue(old->ledger, s.ledger));
   PetscCall(SbRemeshAttach(r, s.run));
-  if (old->run->output) PetscCall(SbOutputFollow(old->run, s.run));
+  if (old->run->output) PetscCall(SbOutputReattach(old->run, s.run));
   PetscCall(report(r, &s, remade, e, speed));
   PetscCall(destroy_scene(old));
   *old = s;

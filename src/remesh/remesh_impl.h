@@ -53,15 +53,15 @@ typedef struct {
   PetscInt *cell;    /* [ncell][4] */
   PetscInt *kept;    /* [nkept] old vertex of each of the first new ones, which are where they were */
   PetscInt *within;  /* [ncell] old tet that holds the middle of the new one */
-  PetscInt nmoved;   /* vertices that were moved, for tets that would have been inside out or too flat */
+  PetscInt nmoved;   /* vertices that were moved, for tets that would have been inverted or too flat */
   PetscReal quality; /* of the worst tet, now */
 } SbNewMesh;
-/* Errors (PETSC_ERR_USER_INPUT): what the mesher says; tets that stay inside out at rest or now. */
+/* Errors (PETSC_ERR_USER_INPUT): what the mesher says; tets that stay inverted at rest or now. */
 PetscErrorCode SbRemeshBody(const char *where, const SbOldMesh *old, const SbRemeshing *how, SbNewMesh *mesh);
 PetscErrorCode SbNewMeshDestroy(SbNewMesh *mesh);
 
 /*
-  bodies.c - rank 0: the bodies with due[b] are meshed anew, what comes of it is a SbRemade.
+  bodies.c - rank 0: the bodies with due[b] are remeshed, what comes of it is a SbRemade.
 
   Not collective. message: why a body could not be re-meshed, "" when it was or was not due; it keeps its mesh then.
 */
@@ -73,8 +73,8 @@ typedef struct {
 } SbMade;
 typedef struct {
   PetscInt nbody;
-  SbGiven **
-    given; /* [nbody] meshes of all bodies, also of those that stay as they are; rank 0, NULL elsewhere and when somebody has taken it */
+  SbMemoryMesh **
+    in_memory; /* [nbody] meshes of all bodies, also of those that stay as they are; rank 0, NULL elsewhere and when somebody has taken it */
   SbMade *made;      /* [nbody] */
   PetscBool *done;   /* [nbody] has a new mesh */
   SbGathered next;   /* the same scene with the state looked up there; X, vert_set and so on are left out */

@@ -30,7 +30,7 @@ static PetscErrorCode near_files(const char *path, size_t size, char text[])
   while (n < NAMES_MAX && (entry = readdir(dir)))
     PetscCall(PetscStrallocpy(entry->d_name, (char **)&list[n++]));
   (void)closedir(dir);
-  PetscCall(SbNearest(name, n, list, sizeof(found), found));
+  PetscCall(SbNearestNames(name, n, list, sizeof(found), found));
   if (found[0]) PetscCall(PetscSNPrintf(text, size, "%s%s", slash ? folder : "", found));
   for (PetscInt i = 0; i < n; i++) PetscCall(PetscFree(list[i]));
   PetscCall(PetscFree(list));
@@ -107,6 +107,6 @@ PetscErrorCode SbSceneCheck(SbModel model)
     held = (PetscBool)(model->effect[e]->ops.prescribe != NULL);
   PetscCheck(held, PETSC_COMM_SELF, PETSC_ERR_USER,
              "-time static: nothing holds the bodies, so there is no unique equilibrium; name an effect of "
-             "type support or drive");
+             "type fixed or prescribed_displacement");
   PetscFunctionReturn(PETSC_SUCCESS);
 }

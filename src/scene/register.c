@@ -33,8 +33,8 @@ PetscErrorCode SbRegisterAll(void)
   PetscCall(SbEffectRegister_Traction());
   PetscCall(SbEffectRegister_Pressure());
   PetscCall(SbEffectRegister_PointForce());
-  PetscCall(SbEffectRegister_Support());
-  PetscCall(SbEffectRegister_Drive());
+  PetscCall(SbEffectRegister_Fixed());
+  PetscCall(SbEffectRegister_PrescribedDisplacement());
   PetscCall(SbEffectRegister_Damping());
   PetscCall(SbEffectRegister_Contact());
   PetscCall(SbEffectRegister_Collision());

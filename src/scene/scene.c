@@ -41,7 +41,7 @@ static const SbOption body_rows[] = {
    "sets or volume groups whose tetrahedra have a material of their own, -inclusion_<name>_..."},
   {"velocity", SB_OPTION_REALS, 3, "m/s", "0,0,0", "(-inf, inf)",
    "velocity of the centre of mass at the start"},
-  {"spin", SB_OPTION_REALS, 3, "rad/s", "0,0,0", "(-inf, inf)",
+  {"angular_velocity", SB_OPTION_REALS, 3, "rad/s", "0,0,0", "(-inf, inf)",
    "angular velocity about the centre of mass at the start"},
 };
 static const SbOption inclusion_rows[] = {
@@ -141,7 +141,7 @@ static PetscErrorCode describe_list(PetscFunctionList list, const char *word, si
     PetscCall(PetscStrlcat(all, i ? ", " : "", size));
     PetscCall(PetscStrlcat(all, names[i], size));
   }
-  PetscCall(SbNearest(word, n, names, size, near));
+  PetscCall(SbNearestNames(word, n, names, size, near));
   PetscCall(PetscFree(names));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -190,7 +190,7 @@ static PetscErrorCode read_body(SbModel model, PetscInt i)
   PetscCall(SbMaterialCreate(body->material, &scope, &model->material[i]));
   body->density = model->material[i]->density;
   PetscCall(SbOptionReals(&scope, "velocity", body->velocity));
-  PetscCall(SbOptionReals(&scope, "spin", body->spin));
+  PetscCall(SbOptionReals(&scope, "angular_velocity", body->angular_velocity));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -268,7 +268,7 @@ static PetscErrorCode read_ahead(void)
 
   PetscFunctionBeginUser;
   PetscCall(SbScopeSet(&scope, "", "", ""));
-  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(keys); i++) PetscCall(SbOptionAhead(&scope, keys[i]));
+  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(keys); i++) PetscCall(SbOptionCheckEarly(&scope, keys[i]));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -24,17 +24,17 @@ PetscErrorCode SbRunReactions(SbRun run, PetscReal t, Vec R)
 {
   PetscFunctionBeginUser;
   PetscCall(SbModelResidual(run->model, t, run->U, run->V, run->A, PETSC_FALSE, R));
-  if (run->model->space->couple) PetscCall(SbSpaceCoupleMeasure(run->model->space, run->U, R));
-  if (run->model->space->held) {
+  if (run->model->space->constraints) PetscCall(SbSpaceComputeConstraintForces(run->model->space, run->U, R));
+  if (run->model->space->nodal) {
     PetscScalar *r;
 
     PetscCall(VecGetArray(R, &r));
-    SbHeldReaction(run->model->space, r);
+    SbNodalConstraintsReaction(run->model->space, r);
     PetscCall(VecRestoreArray(R, &r));
   }
-  if (SbSpaceCoupleOuter(run->model->space)) {
-    if (!run->model->space->held) PetscCall(keep_reactions(run->model->space, R));
-    PetscCall(SbSpaceCoupleReaction(run->model->space, R));
+  if (SbSpaceHasExternalConstraints(run->model->space)) {
+    if (!run->model->space->nodal) PetscCall(keep_reactions(run->model->space, R));
+    PetscCall(SbSpaceAddConstraintReactions(run->model->space, R));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -43,7 +43,7 @@ PetscErrorCode SbRunReactions(SbRun run, PetscReal t, Vec R)
 static PetscErrorCode works(SbRun run, Vec loads, Vec reaction, PetscReal sums[2])
 {
   SbSpace s = run->model->space;
-  const PetscBool obstacles = (PetscBool)(s->held || SbSpaceCoupleOuter(s));
+  const PetscBool obstacles = (PetscBool)(s->nodal || SbSpaceHasExternalConstraints(s));
   const PetscScalar *u, *u0, *f, *f0, *r, *r0;
 
   PetscFunctionBeginUser;
@@ -61,7 +61,7 @@ static PetscErrorCode works(SbRun run, Vec loads, Vec reaction, PetscReal sums[2
       if (s->fixed[node] & (1 << (i - 3 * node))) sums[1] += (r[i] + r0[i]) * (u[i] - u0[i]);
     }
   }
-  /* elsewhere what is left of it is what contact pushes with, now or a step ago */
+  /* elsewhere the remainder of it is what contact exerts, now or a step ago */
   for (PetscInt i = 0; obstacles && i < 3 * s->nnode_owned; i++) {
     if (!(s->fixed[i / 3] & (1 << i % 3))) sums[1] += (r[i] + r0[i]) * (u[i] - u0[i]);
   }
@@ -92,12 +92,12 @@ PetscErrorCode SbRunAccount(SbRun run, PetscReal t, PetscReal dt, PetscBool firs
     PetscCall(works(run, loads, reaction, sums));
     PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, sums, 2, MPIU_REAL, MPI_SUM, m->comm));
     e->load_work += 0.5 * sums[0];
-    e->drive_work += 0.5 * sums[1];
+    e->prescribed_work += 0.5 * sums[1];
     e->damping_loss += 0.5 * dt * (power + run->damping_power);
   } else if (run->step0 == 0)
     run->energy_start = e->kinetic + e->strain;
-  e->integrator_loss = run->energy_start + e->load_work + e->drive_work - e->damping_loss - e->remesh_loss -
-                       e->kinetic - e->strain;
+  e->integrator_loss = run->energy_start + e->load_work + e->prescribed_work - e->damping_loss -
+                       e->remesh_loss - e->kinetic - e->strain;
   run->damping_power = power;
   PetscCall(VecDestroy(&run->loads));
   PetscCall(VecDestroy(&run->reaction));

@@ -20,7 +20,7 @@
   lambda, the step of the difference is small. The last step is solved at lambda = 1.
 
   K has negative eigenvalues behind limit loads. Where its factorisation tells their number, one that changes while the load does not turn is a
-  bifurcation: another branch begins there, which is not looked for. Not handled: contact, re-meshing.
+  bifurcation: another branch begins there, which is not searched for. Not handled: contact, re-meshing.
 */
 #include "sbsolver.h"
 #include "time_impl.h"
@@ -233,7 +233,7 @@ static PetscErrorCode attempt(Path *p, PetscReal from, PetscReal l, PetscReal si
 {
   const SbRun run = p->run;
   PetscReal vv, dd, dv;
-  PetscBool far, again = (PetscBool)(run->look.fn != NULL);
+  PetscBool far, again = (PetscBool)(run->post_solve.fn != NULL);
   PetscInt more;
 
   PetscFunctionBeginUser;
@@ -259,13 +259,13 @@ static PetscErrorCode attempt(Path *p, PetscReal from, PetscReal l, PetscReal si
     *its += more;
   }
   for (int i = 0; i < SB_LOOKS && again && *ok; i++) {
-    const SbSolved step = {.t = from, .dt = p->factor - from, .U = p->X, .solved = PETSC_TRUE};
+    const SbSolvedStep step = {.t = from, .dt = p->factor - from, .U = p->X, .solved = PETSC_TRUE};
 
     again = PETSC_FALSE;
-    PetscCall((*run->look.fn)(run, &step, run->look.ctx, &again));
+    PetscCall((*run->post_solve.fn)(run, &step, run->post_solve.ctx, &again));
     if (again) PetscCall(correct(p, l, &more, ok));
   }
-  PetscCall(SbRunRefuse(run, from, p->factor - from, (Vec[2]){run->U, p->X}, ok));
+  PetscCall(SbRunRejectInverted(run, from, p->factor - from, (Vec[2]){run->U, p->X}, ok));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -303,8 +303,8 @@ static PetscErrorCode begin_step(Path *p, PetscReal *sign, PetscBool *ok)
   if (p->load == 0.) PetscCall(VecNorm(p->q, NORM_2, &p->load));
   PetscCall(product(p, run->path, p->begin, &along));
   *sign = along < 0. ? -1. : 1.;
-  PetscCall(SbSolverNegative(run->snes, run->model->space, &negative));
-  if (run->unsymmetric.U) negative = -1; /* the matrix lacks a part of K */
+  PetscCall(SbSolverCountNegativeEigenvalues(run->snes, run->model->space, &negative));
+  if (run->nonsymmetric.U) negative = -1; /* the matrix lacks a part of K */
   if (negative >= 0 && p->negative >= 0 && PetscAbsInt(negative - p->negative) != (*sign != p->turned) &&
       !run->bifurcations++)
     PetscCall(SbWarning(run->model->comm,
@@ -345,7 +345,7 @@ static PetscErrorCode explain(SbRun run, PetscReal factor, PetscReal l)
   PetscFunctionBeginUser;
   PetscCall(PetscStrncpy(why, run->stop_reason, sizeof(why)));
   PetscCall(SbRunFreeBody(run, &body, sizeof(motion), motion));
-  if (run->refused) PetscFunctionReturn(PETSC_SUCCESS);
+  if (run->rejected_inverted) PetscFunctionReturn(PETSC_SUCCESS);
   if (body >= 0 && !run->steps_total)
     PetscCall(SbRunFail(run, "load factor %g: nothing holds the body %s against %s; hold it by a support",
                         (double)factor, run->model->body[body].name, motion));
@@ -361,12 +361,12 @@ static PetscErrorCode explain(SbRun run, PetscReal factor, PetscReal l)
 PetscErrorCode SbArcLengthCheck(SbRun run)
 {
   const SbModel m = run->model;
-  const char *name = m->ntouch ? m->touch[0]->name : "";
+  const char *name = m->nbegin_step ? m->begin_step[0]->name : "";
   PetscBool cg, cholmod;
   KSP ksp;
 
   PetscFunctionBeginUser;
-  PetscCheck(!m->ntouch, m->comm, PETSC_ERR_USER_INPUT,
+  PetscCheck(!m->nbegin_step, m->comm, PETSC_ERR_USER_INPUT,
              "-static_control arc_length does not know contact (effect %s): use -static_control load, or a "
              "dynamic run "
              "with damping",
@@ -414,7 +414,7 @@ PetscErrorCode SbArcLengthSolve(SbRun run)
       run->rejected_total++;
       run->tangent_known = PETSC_FALSE;
       l *= 0.5;
-      if (++cuts <= run->max_cuts && l >= run->min_increment * run->arc.first) continue;
+      if (++cuts <= run->max_halvings && l >= run->min_increment * run->arc.first) continue;
       break;
     }
     /* the new equilibrium, and the length of the step behind it */

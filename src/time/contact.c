@@ -1,5 +1,5 @@
 /*
-  The solves of a step with contact: who touches is guessed, the equations are solved, the guess is looked at, and so on until it was
+  The solves of a step with contact: who touches is guessed, the equations are solved, the guess is examined, and so on until it was
   right.
 
   A later solve begins next to its solution, and a tolerance relative to its own start would ask for digits that rounding does not
@@ -56,12 +56,13 @@ static PetscErrorCode first_residual(SNES snes, Vec U, Vec R, PetscReal *size)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Where in the step the first points arrive, if it is worth cutting there. */
+/* Where in the step the first points come into contact, if it is worth cutting there. */
 static PetscErrorCode find_arrival(SbRun run)
 {
   PetscFunctionBeginUser;
-  PetscCall(SbModelContactArrival(run->model, &run->arrival));
-  if (run->arrival < SB_ARRIVAL_LEAST || run->arrival > 1. - SB_ARRIVAL_LEAST) run->arrival = 1.;
+  PetscCall(SbModelContactTimeOfImpact(run->model, &run->time_of_impact));
+  if (run->time_of_impact < SB_TIME_OF_IMPACT_LEAST || run->time_of_impact > 1. - SB_TIME_OF_IMPACT_LEAST)
+    run->time_of_impact = 1.;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -74,7 +75,7 @@ static PetscErrorCode renew_tangent(SbRun run, SNES snes, Vec U0)
   Mat A, P;
 
   PetscFunctionBeginUser;
-  if (!run->model->space->couple) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!run->model->space->constraints) PetscFunctionReturn(PETSC_SUCCESS);
   run->tangent_known = PETSC_FALSE;
   PetscCall(SNESGetJacobian(snes, &A, &P, NULL, NULL));
   PetscCall(SNESComputeJacobian(snes, U0, A, P));
@@ -93,13 +94,13 @@ PetscErrorCode SbRunSolveContact(SbRun run, const SbAttempt *step, SNESConverged
 
   PetscFunctionBeginUser;
   if (!run->R) PetscCall(VecDuplicate(U, &run->R));
-  run->arrival = 1.;
+  run->time_of_impact = 1.;
   PetscCall(get_aim(snes, &aim));
-  PetscCall(SbModelContactBegin(m, t, dt, U0, run->V, U));
-  held = SbSpaceIsHeld(m->space);
+  PetscCall(SbModelContactBeginStep(m, t, dt, U0, run->V, U));
+  held = SbSpaceIsConstrained(m->space);
   rough = (PetscBool)(held && m->dynamic);
-  /* the matrix holds what was held before */
-  if (m->space->held || !m->dynamic) run->tangent_known = PETSC_FALSE;
+  /* the matrix holds what was constrained before */
+  if (m->space->nodal || !m->dynamic) run->tangent_known = PETSC_FALSE;
   if (held) {
     /* a body at rest has no residual but for rounding: then contact and supports carry all there is */
     PetscCall((*step->residual)(step->ctx, U, run->R));
@@ -108,25 +109,25 @@ PetscErrorCode SbRunSolveContact(SbRun run, const SbAttempt *step, SNESConverged
   }
   PetscCall(first_residual(snes, U, run->R, &size));
   if (held) PetscCall(set_aim(snes, &aim, size, least, rough)); /* if not, as without contact */
-  PetscCall(SbSolverFollowRows(aim.ksp, m->space));
+  PetscCall(SbSolverUpdateSymmetry(aim.ksp, m->space));
   PetscCall((*step->solve)(step->ctx, U, reason));
   for (PetscInt round = 1; *reason > 0; round++) {
     PetscCall((*step->residual)(step->ctx, U, run->R));
     m->space->rough = rough;
-    PetscCall(SbModelContactSettle(m, t + dt, U, run->R, &again));
-    if (round == 1 && run->may_cut) {
+    PetscCall(SbModelContactUpdateActiveSet(m, t + dt, U, run->R, &again));
+    if (round == 1 && run->may_end_at_impact) {
       PetscCall(find_arrival(run));
-      if (run->arrival < 1.) *reason = SNES_CONVERGED_ITERATING;
+      if (run->time_of_impact < 1.) *reason = SNES_CONVERGED_ITERATING;
     }
     if ((!again && !rough) || !*reason) break;
     if (!again || round == ROUGH_ROUNDS) rough = PETSC_FALSE;
-    if (m->space->held || !m->dynamic) run->tangent_known = PETSC_FALSE;
+    if (m->space->nodal || !m->dynamic) run->tangent_known = PETSC_FALSE;
     if (round == SB_CONTACT_ROUNDS) {
       *reason = SNES_DIVERGED_MAX_IT;
       break;
     }
     PetscCall(set_aim(snes, &aim, size, least, rough));
-    PetscCall(SbSolverFollowRows(aim.ksp, m->space));
+    PetscCall(SbSolverUpdateSymmetry(aim.ksp, m->space));
     PetscCall((*step->solve)(step->ctx, U, reason));
   }
   PetscCall(set_aim(snes, &aim, 0, 0, PETSC_FALSE));

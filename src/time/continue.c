@@ -82,7 +82,7 @@ PetscErrorCode SbRunRestartAcceleration(SbRun run)
   Vec own;
 
   PetscFunctionBeginUser;
-  if (!run->A || !(is_explicit(run) || (run->preset == SB_TIME_NEWMARK && !run->model->ntouch)))
+  if (!run->A || !(is_explicit(run) || (run->preset == SB_TIME_NEWMARK && !run->model->nbegin_step)))
     PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(VecDuplicate(run->A, &own));
   PetscCall(SbFormAcceleration(run, run->t_now, run->U, run->V, own));

@@ -24,9 +24,9 @@ static PetscErrorCode form_tangent(SbRun run, PetscReal t, PetscReal shift_v, Pe
   /* a preconditioner that turns with the nodes asks for the displacement that the matrix belongs to */
   if (run->solver_used->precondition)
     PetscCall(PetscObjectCompose((PetscObject)P, "sb_state", (PetscObject)U));
-  if (run->unsymmetric.U) {
-    PetscCall(VecCopy(U, run->unsymmetric.U));
-    run->unsymmetric.t = t;
+  if (run->nonsymmetric.U) {
+    PetscCall(VecCopy(U, run->nonsymmetric.U));
+    run->nonsymmetric.t = t;
   }
   run->tangent_known = PETSC_TRUE;
   run->shift_v = shift_v;
@@ -41,11 +41,11 @@ static PetscErrorCode multiply(Mat A, Vec x, Vec y)
 
   PetscFunctionBeginUser;
   PetscCall(MatShellGetContext(A, &run));
-  PetscCall(VecCopy(x, run->unsymmetric.x));
-  PetscCall(SbModelUnsymmetric(run->model, run->unsymmetric.t, run->unsymmetric.U, run->unsymmetric.x,
-                               run->unsymmetric.y));
+  PetscCall(VecCopy(x, run->nonsymmetric.x));
+  PetscCall(SbModelNonsymmetric(run->model, run->nonsymmetric.t, run->nonsymmetric.U, run->nonsymmetric.x,
+                                run->nonsymmetric.y));
   PetscCall(MatMult(run->J, x, y));
-  PetscCall(VecAXPY(y, 1., run->unsymmetric.y));
+  PetscCall(VecAXPY(y, 1., run->nonsymmetric.y));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -54,9 +54,9 @@ PetscErrorCode SbFormCreateOperator(SbRun run)
   PetscInt m, n, M, N;
 
   PetscFunctionBeginUser;
-  PetscCall(SbSpaceCreateVec(run->model->space, &run->unsymmetric.U));
-  PetscCall(SbSpaceCreateVec(run->model->space, &run->unsymmetric.x));
-  PetscCall(SbSpaceCreateVec(run->model->space, &run->unsymmetric.y));
+  PetscCall(SbSpaceCreateVec(run->model->space, &run->nonsymmetric.U));
+  PetscCall(SbSpaceCreateVec(run->model->space, &run->nonsymmetric.x));
+  PetscCall(SbSpaceCreateVec(run->model->space, &run->nonsymmetric.y));
   PetscCall(MatGetLocalSize(run->J, &m, &n));
   PetscCall(MatGetSize(run->J, &M, &N));
   PetscCall(MatCreateShell(run->model->comm, m, n, M, N, run, &run->operator));

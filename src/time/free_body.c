@@ -2,12 +2,12 @@
   Why a static solve failed: whether some part of a body can move as a rigid one without any force. More load steps do not help then.
 
   Part: nodes that cells join. Of its six rigid motions Z, what supports and contact take away is B = Z - P Z, P the projection onto what is allowed
-  (SbSpaceAllow()). With x such that B^T B x = l Z^T Z x the motion Z x is allowed when l is zero but for rounding: nothing of it is prescribed. That is geometry,
+  (SbSpaceProjectAdmissible()). With x such that B^T B x = l Z^T Z x the motion Z x is allowed when l is zero but for rounding: nothing of it is prescribed. That is geometry,
   whatever the stiffness. For those that are allowed, A the operator of the last solve and D the diagonal of its matrix, the smallest eigenvalue of
   (P Z x)^T A (P Z x) against that with D is the stiffness of the softest as a part of a cell's. Zero but for rounding: nothing resists it, no
   spring, no friction and no stress.
 
-  Not found: parts that are free only together, tied to each other by contact; one that is held by springs whose stiffness is rounding beside that of its cells.
+  Not found: parts that are free only together, tied to each other by contact; one that is constrained by springs whose stiffness is rounding beside that of its cells.
 */
 #include "time_impl.h"
 #include <petscblaslapack.h>
@@ -45,7 +45,7 @@ static PetscErrorCode label_parts(SbSpace s, PetscInt **label)
   for (PetscInt i = 0; i < s->nnode; i++) parent[i] = i;
   for (PetscInt k = 0; k < 4 * s->mesh->ncell; k++) {
     join(parent, s->cell_node[k - k % 4], s->cell_node[k]);
-    if (s->support && s->support[k] >= 0) join(parent, s->cell_node[k], s->support[k]);
+    if (s->dirichlet_node && s->dirichlet_node[k] >= 0) join(parent, s->cell_node[k], s->dirichlet_node[k]);
   }
   /* cells of dg have nodes of their own: the faces join them */
   for (PetscInt b = 0; s->width > 4 && b < s->nbatch; b++) {
@@ -182,7 +182,7 @@ static PetscErrorCode create_motion(SbRun run, const PetscInt label[], const Par
   PetscCall(VecRestoreArrayRead(run->U, &u));
   PetscCall(VecDuplicate(*whole, z));
   PetscCall(VecCopy(*whole, *z));
-  PetscCall(SbSpaceAllow(s, *z));
+  PetscCall(SbSpaceProjectAdmissible(s, *z));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -368,7 +368,7 @@ static PetscErrorCode say_more(SbRun run, const PetscInt label[], const Part *pa
   PetscCallMPI(MPI_Allreduce(&held[0], &held[1], 1, MPIU_INT, MPI_SUM, s->comm));
   if (held[1] && held[1] <= 2 && !s->element[part->body]->nodes_per[0]) {
     PetscCall(PetscSNPrintf(more, sizeof(more),
-                            "; %s is held at the centres of facets, here of %" PetscInt_FMT
+                            "; %s is constrained at the centres of facets, here of %" PetscInt_FMT
                             ": three that are not in line hold it",
                             s->element[part->body]->name, held[1]));
     PetscCall(PetscStrlcat(text, more, size));

@@ -1,9 +1,9 @@
 /*
-  Whether a step turned tets inside out, for runs that refuse that (-time_inverted refuse).
+  Whether a step turned tets, for runs that refuse that (-time_inverted reject).
 
   det F <= 0 in a tet is no deformation of a body. Energies that are finite there carry a run on, and what it shows behind that may be
-  anything. A step after which more tets have it than before is refused, so a start from tets that are inside out may recover. It is repeated with half its
-  length; from 2^-time_max_cuts of the nominal length on the run stops: halving again would only creep up to where the tet is flat.
+  anything. A step after which more tets have it than before is refused, so a start from tets that are inverted may recover. It is repeated with half its
+  length; from 2^-time_max_halvings of the nominal length on the run stops: halving again would only creep up to where the tet is flat.
 */
 #include "time_impl.h"
 
@@ -23,23 +23,22 @@ static PetscErrorCode count_inverted(SbRun run, Vec U, PetscInt *n, PetscReal *l
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbRunRefuse(SbRun run, PetscReal t, PetscReal dt, const Vec U[2], PetscBool *ok)
+PetscErrorCode SbRunRejectInverted(SbRun run, PetscReal t, PetscReal dt, const Vec U[2], PetscBool *ok)
 {
   PetscInt n[2];
   PetscReal least[2];
 
   PetscFunctionBeginUser;
-  run->refused = PETSC_FALSE;
-  if (!run->refuse_inverted || !*ok) PetscFunctionReturn(PETSC_SUCCESS);
+  run->rejected_inverted = PETSC_FALSE;
+  if (!run->reject_inverted || !*ok) PetscFunctionReturn(PETSC_SUCCESS);
   for (int k = 0; k < 2; k++) PetscCall(count_inverted(run, U[k], &n[k], &least[k]));
   if (n[1] <= n[0]) PetscFunctionReturn(PETSC_SUCCESS);
   *ok = PETSC_FALSE;
-  run->refused = PETSC_TRUE;
+  run->rejected_inverted = PETSC_TRUE;
   PetscCall(SbRunFail(
     run,
-    "%s %g to %g would turn %" PetscInt_FMT
-    " more tet%s inside out (smallest det F %.3g, before it %.3g), which "
-    "-time_inverted refuses; re-mesh the body before that (-remesh_quality), or give it a finer mesh",
+    "%s %g to %g would invert %" PetscInt_FMT " more tet%s (smallest det F %.3g, before it %.3g), which "
+    "-time_inverted reject; re-mesh the body before that (-remesh_quality), or give it a finer mesh",
     run->ts ? "the step from t, s =" : "the step from the load factor", (double)t, (double)(t + dt),
     n[1] - n[0], n[1] - n[0] == 1 ? "" : "s", (double)least[1], (double)least[0]));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -47,5 +46,6 @@ PetscErrorCode SbRunRefuse(SbRun run, PetscReal t, PetscReal dt, const Vec U[2],
 
 PetscBool SbRunTooShort(SbRun run, PetscReal dt)
 {
-  return (PetscBool)(run->refused && dt < 0.999 * PetscPowReal(0.5, (PetscReal)run->max_cuts) * run->dt);
+  return (PetscBool)(run->rejected_inverted &&
+                     dt < 0.999 * PetscPowReal(0.5, (PetscReal)run->max_halvings) * run->dt);
 }

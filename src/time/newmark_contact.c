@@ -61,7 +61,7 @@ PetscErrorCode SbNewmarkContact(SbRun run, PetscReal t, PetscReal dt, Vec U, Vec
   PetscFunctionBeginUser;
   PetscCall(VecDuplicate(V, &change));
   PetscCall(VecCopy(V, change));
-  if (SbSpaceIsHeld(m->space)) PetscCall(SbModelContactVelocity(m, t, dt, U, V));
+  if (SbSpaceIsConstrained(m->space)) PetscCall(SbModelContactVelocity(m, t, dt, U, V));
   PetscCall(VecAYPX(change, -1., V));
   PetscCall(SbNewmarkOwn(run, t, U, V, A, own));
   PetscCall(VecAXPBY(A, 0.5, 0.5, own));

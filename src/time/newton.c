@@ -13,7 +13,7 @@
   is rounding, near the solution, the residual decides.
 
   Provisional steps. In bending and rotation the first full step stretches what it should turn, and E rises a long way that the next step comes back
-  from; a search that never lets E rise creeps where full steps need five. So a full step that turns no tet inside out may raise E,
+  from; a search that never lets E rise creeps where full steps need five. So a full step that turns no tet inverted may raise E,
   and the next one has to bring it below where it was, or the search starts again from there (watchdog technique: Chamberlain et al. 1982; Nocedal
   and Wright, section 15.6).
 
@@ -62,7 +62,7 @@ static PetscErrorCode look_at_place(Newton *n, Vec X, Vec F, Vec Y, Place *at)
   /* forces are those of a stage between the start of the step and X, divided by its part of the step */
   if (run->stage) PetscCall(VecAXPBYPCZ(run->stage, 1. - part, part, 0., run->stage_start, X));
   PetscCall(
-    SbModelStrainAlong(run->model, run->stage ? run->stage : X, Y, &at->psi, &elastic, &at->ninverted));
+    SbModelStrainEnergyAlong(run->model, run->stage ? run->stage : X, Y, &at->psi, &elastic, &at->ninverted));
   PetscCall(VecDot(F, Y, &slope));
   at->psi /= PetscSqr(part);
   at->rest = -slope - elastic / part;
@@ -92,7 +92,7 @@ static PetscErrorCode find_direction(SNES snes, PetscBool *filtered, PetscReal *
     if (*filtered || !m->may_filter) break;
     /* L D L^T factors what is not definite without a word, and p may go down on the way to a saddle point */
     negative = -1;
-    if (reason > 0 && *slope < 0.) PetscCall(SbSolverNegative(snes, m->space, &negative));
+    if (reason > 0 && *slope < 0.) PetscCall(SbSolverCountNegativeEigenvalues(snes, m->space, &negative));
     if (reason > 0 && *slope < 0. && negative <= 0) break;
     PetscCall(PetscInfo(snes,
                         "iteration %" PetscInt_FMT

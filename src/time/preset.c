@@ -34,13 +34,13 @@ static const SbOption rows[] = {
   {"time_predictor", SB_OPTION_CHOICE, 1, "", "none", "none|velocity",
    "where Newton starts a step: at the old displacement, or moved on by the velocity; one solve per step is "
    "far better with it, but may blow up unless tangent is exact_spd"},
-  {"time_max_cuts", SB_OPTION_INT, 1, "", "10", "[0, 60]",
+  {"time_max_halvings", SB_OPTION_INT, 1, "", "10", "[0, 60]",
    "how often a step that fails is halved before the run stops"},
-  {"time_inverted", SB_OPTION_CHOICE, 1, "", "count", "count|refuse",
-   "a step that turns tets inside out (det F <= 0): taken, and they are counted; or halved and tried again, "
+  {"time_inverted", SB_OPTION_CHOICE, 1, "", "accept", "accept|reject",
+   "a step that inverts tets (det F <= 0): taken, and they are counted; or halved and tried again, "
    "and the run stops when that does "
    "not help"},
-  {"multipliers", SB_OPTION_CHOICE, 1, "", "auto", "auto|direct|iterative",
+  {"saddle_solver", SB_OPTION_CHOICE, 1, "", "auto", "auto|direct|iterative",
    "how effects with response multiplier solve for displacements and multipliers: by a factorisation of "
    "both, or by "
    "MINRES with the preconditioner of the solver; auto goes by size"},
@@ -144,15 +144,15 @@ PetscErrorCode SbRunCreate(SbModel model, SbRun *run)
     PetscCall(SbOptionReal(&scope, "time_newmark_beta", &r->newmark[0]));
     PetscCall(SbOptionReal(&scope, "time_newmark_gamma", &r->newmark[1]));
   }
-  PetscCall(SbOptionInt(&scope, "time_max_cuts", &r->max_cuts));
+  PetscCall(SbOptionInt(&scope, "time_max_halvings", &r->max_halvings));
   PetscCall(SbOptionChoice(&scope, "time_inverted", &inverted));
-  r->refuse_inverted = (PetscBool)(inverted == 1);
+  r->reject_inverted = (PetscBool)(inverted == 1);
   PetscCheck(
-    !r->refuse_inverted || r->preset != SB_TIME_ALPHA2, PETSC_COMM_SELF, PETSC_ERR_USER,
-    "-time_inverted refuse: -time alpha2 cannot refuse steps; take genalpha, which is the same method");
+    !r->reject_inverted || r->preset != SB_TIME_ALPHA2, PETSC_COMM_SELF, PETSC_ERR_USER,
+    "-time_inverted reject: -time alpha2 cannot reject steps; take genalpha, which is the same method");
   for (PetscInt e = 0; e < model->neffect; e++)
     r->saddle = (PetscBool)(r->saddle || model->effect[e]->saddle);
-  if (r->saddle) PetscCall(SbOptionChoice(&scope, "multipliers", &r->saddle_choice));
+  if (r->saddle) PetscCall(SbOptionChoice(&scope, "saddle_solver", &r->saddle_choice));
   PetscCall(SbSolverSetFromOptions(r->solver_choice, sizeof(r->solver_choice)));
   if (r->arc.on) PetscCall(read_arc_length(r, &scope));
   *run = r;
@@ -162,14 +162,15 @@ PetscErrorCode SbRunCreate(SbModel model, SbRun *run)
 /* The method behind a preset. */
 static void method_settings(SbRun run, SbMethodSettings *set)
 {
-  *set = (SbMethodSettings){.method = SB_METHOD_EULER_IMPLICIT,
-                            .alpha_m = 1.,
-                            .alpha_f = 1.,
-                            .beta = 0.25,
-                            .gamma = 0.5,
-                            .velocity_predictor = run->velocity_predictor,
-                            .impulses = (PetscBool)(run->preset == SB_TIME_NEWMARK && run->model->ntouch),
-                            .max_cuts = run->max_cuts};
+  *set =
+    (SbMethodSettings){.method = SB_METHOD_EULER_IMPLICIT,
+                       .alpha_m = 1.,
+                       .alpha_f = 1.,
+                       .beta = 0.25,
+                       .gamma = 0.5,
+                       .velocity_predictor = run->velocity_predictor,
+                       .impulses = (PetscBool)(run->preset == SB_TIME_NEWMARK && run->model->nbegin_step),
+                       .max_halvings = run->max_halvings};
   if (run->preset == SB_TIME_NEWMARK) {
     set->method = SB_METHOD_GENERALIZED_ALPHA;
     set->beta = run->newmark[0];
@@ -419,7 +420,7 @@ static PetscErrorCode set_up_static(SbRun run)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* What contact with Newmark rests on (newmark_contact.c): the trapezoidal rule, the lumped mass, and forces of what is held alone. */
+/* What contact with Newmark rests on (newmark_contact.c): the trapezoidal rule, the lumped mass, and forces of what is constrained alone. */
 static PetscErrorCode check_newmark(SbRun run)
 {
   const SbModel m = run->model;
@@ -429,17 +430,17 @@ static PetscErrorCode check_newmark(SbRun run)
     run->newmark[0] == 0.25 && run->newmark[1] == 0.5, m->comm, PETSC_ERR_USER_INPUT,
     "-time newmark with the effect %s needs -time_newmark_beta 0.25 and -time_newmark_gamma 0.5, not "
     "%g and %g: else impacts may gain energy",
-    m->touch[0]->name, (double)run->newmark[0], (double)run->newmark[1]);
+    m->begin_step[0]->name, (double)run->newmark[0], (double)run->newmark[1]);
   PetscCheck(!m->space->consistent_mass, m->comm, PETSC_ERR_USER_INPUT,
              "-time newmark with the effect %s needs -mass lumped: velocities of what touches are put right "
              "node by node",
-             m->touch[0]->name);
-  for (PetscInt e = 0; e < m->ntouch; e++)
+             m->begin_step[0]->name);
+  for (PetscInt e = 0; e < m->nbegin_step; e++)
     PetscCheck(
-      !m->touch[e]->springs, m->comm, PETSC_ERR_USER_INPUT,
+      !m->begin_step[e]->springs, m->comm, PETSC_ERR_USER_INPUT,
       "-time newmark gains energy by springs and friction of the effect %s: give "
       "-effect_%s_response projected or multiplier and no friction, or use euler_implicit or genalpha",
-      m->touch[e]->name, m->touch[e]->name);
+      m->begin_step[e]->name, m->begin_step[e]->name);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -470,28 +471,30 @@ static PetscErrorCode check_contact(SbRun run, PetscBool explicit)
   PetscBool split;
 
   PetscFunctionBeginUser;
-  if (!m->ntouch) PetscFunctionReturn(PETSC_SUCCESS);
-  name = m->touch[0]->name;
+  if (!m->nbegin_step) PetscFunctionReturn(PETSC_SUCCESS);
+  name = m->begin_step[0]->name;
   PetscCheck(
     !explicit && run->preset != SB_TIME_ALPHA2, m->comm, PETSC_ERR_USER_INPUT,
     "The effect %s needs several solves in a step: use -time euler_implicit, newmark, genalpha or static",
     name);
   if (run->preset == SB_TIME_NEWMARK) PetscCall(check_newmark(run));
-  for (PetscInt e = 0; e < m->ntouch; e++)
-    PetscCheck(!m->touch[e]->euler || run->preset == SB_TIME_EULER_IMPLICIT, m->comm, PETSC_ERR_USER_INPUT,
+  for (PetscInt e = 0; e < m->nbegin_step; e++)
+    PetscCheck(!m->begin_step[e]->euler || run->preset == SB_TIME_EULER_IMPLICIT, m->comm,
+               PETSC_ERR_USER_INPUT,
                "-effect_%s_restitution needs -time euler_implicit, whose velocities are those of a step",
-               m->touch[e]->name);
-  PetscCheck(
-    m->dynamic || !m->narrive, m->comm, PETSC_ERR_USER_INPUT,
-    "-effect_%s_arrival cut is about the length of time steps, and -time static has none: leave it out",
-    m->narrive ? m->arrive[0]->name : name);
-  PetscCheck(
-    run->preset != SB_TIME_GENALPHA || !m->narrive, m->comm, PETSC_ERR_USER_INPUT,
-    "-time genalpha gains energy with -effect_%s_arrival cut: it takes the acceleration of a short step, in "
-    "which nodes are stopped, into a long one; use euler_implicit",
-    m->narrive ? m->arrive[0]->name : name);
+               m->begin_step[e]->name);
+  PetscCheck(m->dynamic || !m->ntime_of_impact, m->comm, PETSC_ERR_USER_INPUT,
+             "-effect_%s_time_of_impact yes is about the length of time steps, and -time static has none: "
+             "leave it out",
+             m->ntime_of_impact ? m->time_of_impact[0]->name : name);
+  PetscCheck(run->preset != SB_TIME_GENALPHA || !m->ntime_of_impact, m->comm, PETSC_ERR_USER_INPUT,
+             "-time genalpha gains energy with -effect_%s_time_of_impact yes: it takes the acceleration of a "
+             "short step, in "
+             "which nodes are stopped, into a long one; use euler_implicit",
+             m->ntime_of_impact ? m->time_of_impact[0]->name : name);
   PetscCall(PetscStrcmp(run->solver, "pressure", &split));
-  PetscCheck(!run->solver_used->matrix_free && (!split || !m->nhold), m->comm, PETSC_ERR_USER_INPUT,
+  PetscCheck(!run->solver_used->matrix_free && (!split || !m->nassemble_constraints), m->comm,
+             PETSC_ERR_USER_INPUT,
              "-solver %s has no matrix of everything, in which the effect %s could hold nodes: use -solver "
              "rotated or cg_two_level",
              run->solver, name);
@@ -522,10 +525,10 @@ static PetscErrorCode create_operator(SbRun run)
 
   PetscFunctionBeginUser;
   PetscCall(SbSolverCreateOperator(m->space, run->solver_used, &run->J));
-  if (m->space->couple)
-    PetscCall(
-      SbCoupleCreateOperator(m->space, run->J, (PetscBool)!m->dynamic, run->saddle_used, &run->operator));
-  else if (m->nunsymmetric)
+  if (m->space->constraints)
+    PetscCall(SbConstraintsCreateOperator(m->space, run->J, (PetscBool)!m->dynamic, run->saddle_used,
+                                          &run->operator));
+  else if (m->nnonsymmetric)
     PetscCall(SbFormCreateOperator(run));
   else {
     PetscCall(PetscObjectReference((PetscObject)run->J));
@@ -554,7 +557,7 @@ PetscErrorCode SbRunSetUp(SbRun run)
   PetscCall(SbModelInitialState(m, run->U, run->V));
   if (run->arc.on) {
     PetscCall(SbSpaceCreateVec(m->space, &run->path));
-    PetscCall(SbSolverPivot(m->comm, sizeof(run->solver_choice), run->solver_choice));
+    PetscCall(SbSolverChooseIndefinite(m->comm, sizeof(run->solver_choice), run->solver_choice));
   }
   PetscCall(SbSolverChoose(m->space, m->dynamic, m->linear, explicit, run->solver_choice, &run->solver_used,
                            run->solver_reason, sizeof(run->solver_reason)));
@@ -624,9 +627,9 @@ PetscErrorCode SbRunDestroy(SbRun *run)
   PetscCall(VecDestroy(&r->R));
   PetscCall(MatDestroy(&r->operator));
   PetscCall(MatDestroy(&r->J));
-  PetscCall(VecDestroy(&r->unsymmetric.U));
-  PetscCall(VecDestroy(&r->unsymmetric.x));
-  PetscCall(VecDestroy(&r->unsymmetric.y));
+  PetscCall(VecDestroy(&r->nonsymmetric.U));
+  PetscCall(VecDestroy(&r->nonsymmetric.x));
+  PetscCall(VecDestroy(&r->nonsymmetric.y));
   PetscCall(VecDestroy(&r->U));
   PetscCall(VecDestroy(&r->V));
   PetscCall(VecDestroy(&r->A));

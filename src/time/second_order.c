@@ -12,7 +12,7 @@
     explicit Euler: u1 = u0 + h v0, v1 = v0 + h a0;  symplectic Euler: v1 = v0 + h a0, u1 = u0 + h v1.
 
   The acceleration is state (run->A): nothing is recovered from differences, so a restart continues exactly.
-  A step in which points of contact arrive may be repeated up to that moment, once; what is left of it is the next step (src/time/contact.c).
+  A step in which points of contact arrive may be repeated up to that moment, once; the remainder of it is the next step (src/time/contact.c).
   A step whose solve fails is halved and repeated; after four good steps it doubles, until the nominal length is back. The local error for TSAdapt
   is h^2 (beta - 1/6) (a1 - a0) (Zienkiewicz and Xie 1991), for implicit Euler h^2/2 a1.
 
@@ -30,7 +30,8 @@ typedef struct {
   Vec work;
   PetscReal nominal; /* step length asked for, s; 0 before the first step */
   PetscInt good;     /* steps accepted since the last cut */
-  PetscReal rest;    /* of a step that was cut where points arrive: what follows it, s; 0: no such step */
+  PetscReal
+    rest; /* of a step that was cut where points come into contact: what follows it, s; 0: no such step */
   PetscReal whole;   /* its length before, s: the rest takes the time back to where it would have been */
   PetscBool started; /* run->A holds the acceleration of the current state */
 } SecondOrder;
@@ -184,17 +185,17 @@ static PetscErrorCode contact_residual(void *ts, Vec X, Vec R)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static SbSolved solved_step(TS ts)
+static SbSolvedStep solved_step(TS ts)
 {
   SecondOrder *so = (SecondOrder *)ts->data;
 
-  return (SbSolved){ts->ptime, ts->time_step, so->X0,
-                    so->V0,    so->run->A,    so->X1,
-                    so->V1,    so->A1,        (PetscBool)!is_explicit(so)};
+  return (SbSolvedStep){ts->ptime, ts->time_step, so->X0,
+                        so->V0,    so->run->A,    so->X1,
+                        so->V1,    so->A1,        (PetscBool)!is_explicit(so)};
 }
 
 /* Velocity and acceleration of the end. */
-static PetscErrorCode complete(void *ctx, SNESConvergedReason reason, SbSolved *step, PetscBool *ok)
+static PetscErrorCode complete(void *ctx, SNESConvergedReason reason, SbSolvedStep *step, PetscBool *ok)
 {
   const TS ts = (TS)ctx;
   SecondOrder *so = (SecondOrder *)ts->data;
@@ -248,12 +249,12 @@ static PetscErrorCode step_explicitly(void *ctx, Vec X, SNESConvergedReason *rea
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A step that ends where points arrive, and another one for the rest of it. */
+/* A step that ends where points come into contact, and another one for the rest of it. */
 static void cut_at_arrival(TS ts, PetscReal *next)
 {
   SecondOrder *so = (SecondOrder *)ts->data;
 
-  *next = so->run->arrival * ts->time_step;
+  *next = so->run->time_of_impact * ts->time_step;
   so->whole = ts->time_step;
   so->rest = ts->time_step - *next;
 }
@@ -310,8 +311,8 @@ static PetscErrorCode TSStep_SecondOrder(TS ts)
     PetscBool ok = PETSC_FALSE, accept = PETSC_FALSE;
     PetscReal next, h = 0.;
 
-    so->run->may_cut = (PetscBool)(so->run->model->narrive && !cuts && so->whole == 0.);
-    so->run->arrival = 1.;
+    so->run->may_end_at_impact = (PetscBool)(so->run->model->ntime_of_impact && !cuts && so->whole == 0.);
+    so->run->time_of_impact = 1.;
     attempt.t = ts->ptime;
     attempt.dt = ts->time_step;
     PetscCall(SbRunAttempt(so->run, &attempt, &ok));
@@ -330,7 +331,7 @@ static PetscErrorCode TSStep_SecondOrder(TS ts)
         go_on_after_arrival(so);
         break;
       }
-    } else if (!so->run->refused && so->run->arrival < 1.) {
+    } else if (!so->run->rejected_inverted && so->run->time_of_impact < 1.) {
       cut_at_arrival(ts, &next);
       cuts--;
     } else {
@@ -343,7 +344,7 @@ static PetscErrorCode TSStep_SecondOrder(TS ts)
     ts->reject++;
     so->run->rejected_total++;
     so->good = 0;
-    if (is_explicit(so) || ++cuts > so->set.max_cuts || SbRunTooShort(so->run, next)) {
+    if (is_explicit(so) || ++cuts > so->set.max_halvings || SbRunTooShort(so->run, next)) {
       ts->reason = TS_DIVERGED_STEP_REJECTED;
       break;
     }
@@ -360,10 +361,10 @@ static PetscErrorCode TSEvaluateWLTE_SecondOrder(TS ts, NormType type, PetscInt 
   PetscReal absolute, relative;
 
   PetscFunctionBeginUser;
-  if (so->run->look.error) {
-    const SbSolved step = solved_step(ts);
+  if (so->run->post_solve.error) {
+    const SbSolvedStep step = solved_step(ts);
 
-    PetscCall((*so->run->look.error)(so->run, &step, so->run->look.ctx, order, wlte));
+    PetscCall((*so->run->post_solve.error)(so->run, &step, so->run->post_solve.ctx, order, wlte));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   if (so->set.method == SB_METHOD_GENERALIZED_ALPHA) {

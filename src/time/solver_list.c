@@ -1,5 +1,5 @@
 /*
-  What happens when a linear solve fails: the next solver of a list (SbSolverNext()) is tried on the same system, that is the same
+  What happens when a linear solve fails: the next solver of a list (SbSolverNextFallback()) is tried on the same system, that is the same
   Newton iteration and right-hand side, and stays for the rest of the run. A step is cut after the last one only.
 
   It hangs behind KSPSolve() as its post-solve callback. The KSP stays the same object, so that whoever holds it keeps it; it gets another type, preconditioner
@@ -93,7 +93,7 @@ static PetscErrorCode may_replace(SbSolverList l, KSP ksp, Vec b, PetscBool *is)
   PetscCall(PetscObjectTypeCompareAny((PetscObject)run->snes, &newton, SB_SNES_NEWTON, SNESNEWTONLS,
                                       SNESKSPONLY, ""));
   PetscCall(SNESGetSolution(run->snes, &X));
-  PetscCall(SbPCCoupleIsFactored(ksp->pc, &factored));
+  PetscCall(SbPCConstrainedIsFactored(ksp->pc, &factored));
   if (!l->own || !newton || !X || factored) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(VecNorm(b, NORM_2, &size));
   if (PetscIsInfOrNanReal(size)) PetscFunctionReturn(PETSC_SUCCESS);
@@ -110,9 +110,9 @@ static PetscErrorCode replace_operator(SbRun run, const SbSolverPreset *next)
   PetscFunctionBeginUser;
   PetscCall(MatDestroy(&run->J));
   PetscCall(SbSolverCreateOperator(s, next, &run->J));
-  if (s->couple)
-    PetscCall(SbCoupleSetMatrix(s, run->J));
-  else if (!run->unsymmetric.U) { /* that one multiplies by run->J, whichever it is */
+  if (s->constraints)
+    PetscCall(SbConstraintsSetMatrix(s, run->J));
+  else if (!run->nonsymmetric.U) { /* that one multiplies by run->J, whichever it is */
     PetscCall(MatDestroy(&run->operator));
     PetscCall(PetscObjectReference((PetscObject)run->J));
     run->operator= run->J;
@@ -159,7 +159,7 @@ static PetscErrorCode replace(SbSolverList l, KSP ksp, const SbSolverPreset *nex
   PetscCall(SNESGetJacobian(run->snes, NULL, NULL, &jacobian, &ctx));
   PetscCall((*jacobian)(run->snes, X, run->operator, run->J, ctx));
   PetscCall(KSPSetOperators(ksp, run->operator, run->J));
-  PetscCall(SbSolverFollowRows(ksp, run->model->space));
+  PetscCall(SbSolverUpdateSymmetry(ksp, run->model->space));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -203,7 +203,7 @@ static PetscErrorCode after_solve(KSP ksp, Vec b, Vec x, void *ctx)
   if (run->model->space->tentative) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(tell_failure(l, ksp, b, x, text, sizeof(text), &memory));
   /* an incomplete factorisation within it may have broken down */
-  PetscCall(SbPCCoupleGetInner(ksp->pc, &pc));
+  PetscCall(SbPCConstrainedGetInner(ksp->pc, &pc));
   /* MINRES blames the matrix for a preconditioner that is not definite, or does not notice */
   reason = ksp->reason;
   PetscCall(PetscObjectTypeCompare((PetscObject)ksp, KSPMINRES, &minres));
@@ -216,7 +216,7 @@ static PetscErrorCode after_solve(KSP ksp, Vec b, Vec x, void *ctx)
   }
   PetscCall(may_replace(l, ksp, b, &may));
   if (!may) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(SbSolverNext(run->model->space, ksp->reason, memory, &l->tried, &next));
+  PetscCall(SbSolverNextFallback(run->model->space, ksp->reason, memory, &l->tried, &next));
   if (!next) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(SbWarning(run->model->comm, "linear solver: %s; from here on -solver %s", text, next->name));
   PetscCall(PetscSNPrintf(run->solver_reason, sizeof(run->solver_reason), "after %s", text));
@@ -303,7 +303,7 @@ PetscErrorCode SbSolverListExplain(SbRun run, size_t size, char text[])
   if (l->own)
     PetscCall(PetscSNPrintf(text, size, "linear solver: %s%s", l->failures, causes));
   else {
-    PetscCall(SbSolverNext(run->model->space, KSP_DIVERGED_ITS, PETSC_FALSE, &tried, &next));
+    PetscCall(SbSolverNextFallback(run->model->space, KSP_DIVERGED_ITS, PETSC_FALSE, &tried, &next));
     PetscCall(
       PetscSNPrintf(text, size,
                     "linear solver: %s%s; it is the one of -ksp_type and -pc_type, which are not replaced: "

@@ -64,11 +64,11 @@ static PetscErrorCode look_for_free_body(SbRun run, PetscReal factor, PetscBool 
   PetscFunctionBeginUser;
   PetscCall(SbRunFreeBody(run, &body, sizeof(motion), motion));
   *found = (PetscBool)(body >= 0);
-  run->free_body = (PetscBool)(*found && !run->model->ntouch);
+  run->free_body = (PetscBool)(*found && !run->model->nbegin_step);
   if (*found)
     PetscCall(SbRunFail(run, "load factor %g: nothing holds the body %s against %s; hold it by a support%s",
                         (double)factor, run->model->body[body].name, motion,
-                        run->model->ntouch ? ", or let it come to rest in a dynamic run" : ""));
+                        run->model->nbegin_step ? ", or let it come to rest in a dynamic run" : ""));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -92,19 +92,20 @@ static PetscErrorCode refuse_free_body(SbRun run, PetscReal factor, PetscBool *o
   PetscBool found = PETSC_FALSE;
 
   PetscFunctionBeginUser;
-  if (!*ok || run->steps_total || run->model->ntouch || !run->newton_step) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!*ok || run->steps_total || run->model->nbegin_step || !run->newton_step)
+    PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(look_for_free_body(run, factor, &found));
   if (found) *ok = PETSC_FALSE;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode complete(void *ctx, SNESConvergedReason reason, SbSolved *step, PetscBool *ok)
+static PetscErrorCode complete(void *ctx, SNESConvergedReason reason, SbSolvedStep *step, PetscBool *ok)
 {
   const LoadStep *l = (LoadStep *)ctx;
   PetscBool far;
 
   PetscFunctionBeginUser;
-  *step = (SbSolved){.t = l->factor - l->length, .dt = l->length, .U = l->X, .solved = PETSC_TRUE};
+  *step = (SbSolvedStep){.t = l->factor - l->length, .dt = l->length, .U = l->X, .solved = PETSC_TRUE};
   PetscCall(SbRunTooFar(l->run, l->X, &far));
   *ok = (PetscBool)(reason > 0 && !far);
   if (!*ok) PetscCall(explain(l->run, l->factor, reason));
@@ -180,7 +181,7 @@ PetscErrorCode SbStaticSolve(SbRun run)
       length *= 0.5;
       run->tangent_known = PETSC_FALSE;
       if (run->free_body) break;
-      if (++cuts <= run->max_cuts && length >= least && !SbRunTooShort(run, length)) continue;
+      if (++cuts <= run->max_halvings && length >= least && !SbRunTooShort(run, length)) continue;
       PetscCall(explain_end(run, factor, length));
       break;
     }

@@ -1,7 +1,7 @@
 /*
   One step, dynamic or static, from its start to its acceptance. second_order.c and static.c say what a step's unknowns are and how long it is.
 
-    attempt: effects move, a first guess, Newton's method with the loop of contact around it, who looks at solutions, what is refused
+    attempt: effects move, a first guess, Newton's method with the loop of contact around it, who examines solutions, what is refused
     accepted: effects keep their history, the account of energies is closed (account.c), monitors look
 */
 #include <stdarg.h>
@@ -37,11 +37,11 @@ PetscErrorCode SbRunAttempt(SbRun run, const SbAttempt *a, PetscBool *ok)
   /* effects move to the end of the step */
   PetscCall(SbRunStepBegin(run, a->t, a->dt));
   for (int solves = 0; again; solves++) {
-    SbSolved step;
+    SbSolvedStep step;
 
     /* a first guess, and the solution from there; with contact, as often as finding out what touches takes */
     PetscCall((*a->predict)(a->ctx));
-    if (run->model->ntouch)
+    if (run->model->nbegin_step)
       PetscCall(SbRunSolveContact(run, a, &reason));
     else
       PetscCall((*a->solve)(a->ctx, a->U, &reason));
@@ -49,13 +49,13 @@ PetscErrorCode SbRunAttempt(SbRun run, const SbAttempt *a, PetscBool *ok)
     /* the state at the end, or why there is none */
     PetscCall((*a->complete)(a->ctx, reason, &step, ok));
 
-    /* who looks at solutions may ask for a better one, the solver having been told what is wanted */
+    /* who examines solutions may ask for a better one, the solver having been told what is wanted */
     again = PETSC_FALSE;
-    if (*ok && run->look.fn && solves < SB_LOOKS)
-      PetscCall((*run->look.fn)(run, &step, run->look.ctx, &again));
+    if (*ok && run->post_solve.fn && solves < SB_LOOKS)
+      PetscCall((*run->post_solve.fn)(run, &step, run->post_solve.ctx, &again));
   }
-  /* tets that it would turn inside out */
-  PetscCall(SbRunRefuse(run, a->t, a->dt, (Vec[2]){a->U0, a->U}, ok));
+  /* tets that it would turn inverted */
+  PetscCall(SbRunRejectInverted(run, a->t, a->dt, (Vec[2]){a->U0, a->U}, ok));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -4,9 +4,9 @@
 #pragma once
 #define SB_CONTACT_ROUNDS \
   250 /* solves of one step before contact counts as failed; response augmented may take more than 100 */
-#define SB_ARRIVAL_LEAST \
-  0.05 /* of a step: where points arrive nearer to one of its ends, it is not cut at their arrival */
-#define SB_LOOKS 4 /* so often may a step be solved again for who looks at it */
+#define SB_TIME_OF_IMPACT_LEAST \
+  0.05 /* of a step: where points come into contact nearer to one of its ends, it is not cut at their arrival */
+#define SB_LOOKS 4 /* so often may a step be solved again for who examines it */
 #include "sbtime.h"
 
 #define SB_TS_SECOND_ORDER "sb_second_order"
@@ -23,7 +23,7 @@ typedef struct {
   PetscReal alpha_m, alpha_f, beta, gamma; /* generalized-alpha; fraction of the new state, as in TSALPHA2 */
   PetscBool velocity_predictor;            /* Newton starts from u + h v instead of u */
   PetscBool impulses;                      /* Newmark with contact: newmark_contact.c */
-  PetscInt max_cuts;                       /* how often a step is halved before the run stops */
+  PetscInt max_halvings;                   /* how often a step is halved before the run stops */
 } SbMethodSettings;
 
 PetscErrorCode SbSecondOrderRegister(void);
@@ -40,7 +40,7 @@ typedef struct {
   PetscErrorCode (*solve)(void *ctx, Vec U, SNESConvergedReason *reason); /* from the displacement in U */
   PetscErrorCode (*residual)(void *ctx, Vec U, Vec R); /* without constraints, N; for contact */
   /* the end state from U in `step`, if ok; else run->stop_reason says why */
-  PetscErrorCode (*complete)(void *ctx, SNESConvergedReason reason, SbSolved *step, PetscBool *ok);
+  PetscErrorCode (*complete)(void *ctx, SNESConvergedReason reason, SbSolvedStep *step, PetscBool *ok);
   void *ctx;
 } SbAttempt;
 /* ok: the step can be accepted. Collective. */
@@ -55,11 +55,11 @@ PetscErrorCode SbNewtonSetRun(SNES snes, SbRun run);
 PetscErrorCode SbRunFail(SbRun run, const char *format, ...) __attribute__((format(printf, 2, 3)));
 
 /*
-  inverted.c, after a step from t to t + dt was solved. Collective; nothing happens without -time_inverted refuse.
+  inverted.c, after a step from t to t + dt was solved. Collective; nothing happens without -time_inverted reject.
 
-  U: displacements at its start and at its end. ok: false when the step turned tets inside out; run->refused and run->stop_reason say so, too.
+  U: displacements at its start and at its end. ok: false when the step inverted tets; run->refused and run->stop_reason say so, too.
 */
-PetscErrorCode SbRunRefuse(SbRun run, PetscReal t, PetscReal dt, const Vec U[2], PetscBool *ok);
+PetscErrorCode SbRunRejectInverted(SbRun run, PetscReal t, PetscReal dt, const Vec U[2], PetscBool *ok);
 /* Whether the last step was refused, and one of this length is not worth trying. */
 PetscBool SbRunTooShort(SbRun run, PetscReal dt);
 
@@ -90,7 +90,7 @@ PetscErrorCode SbNewmarkContact(SbRun run, PetscReal t, PetscReal dt, Vec U, Vec
 PetscErrorCode SbNewmarkOwn(SbRun run, PetscReal t, Vec U, Vec V, Vec A, Vec own);
 
 /*
-  solver_list.c: when a linear solve of run->snes fails, the next solver of SbSolverNext() is tried on the same system, with one warning
+  solver_list.c: when a linear solve of run->snes fails, the next solver of SbSolverNextFallback() is tried on the same system, with one warning
   line, and stays. Nothing is replaced where -ksp_type or -pc_type are the user's.
 
   Collective, after SbSolverFinish().
@@ -120,7 +120,7 @@ PetscErrorCode SbRunReactions(SbRun run, PetscReal t, Vec R);
 /*
   SbRunSolveContact - an attempt at a step with contact: as many solves as its set of touching nodes takes, U from its guess to the
   solution. Collective. reason: that of the last solve, SNES_DIVERGED_MAX_IT when the set does not settle.
-  With run->may_cut it ends after the first solve when points arrive within the step: reason is then SNES_CONVERGED_ITERATING, and the
+  With run->may_cut it ends after the first solve when points come into contact within the step: reason is then SNES_CONVERGED_ITERATING, and the
   step is to be repeated with run->arrival of its length.
 */
 PetscErrorCode SbRunSolveContact(SbRun run, const SbAttempt *attempt, SNESConvergedReason *reason);

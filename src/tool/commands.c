@@ -103,10 +103,11 @@ static PetscErrorCode repair(SbTool *tool, SbImport *mesh)
 
   PetscFunctionBeginUser;
   PetscCall(SbToolBegin(tool, "repairing"));
-  ierr = SbMeshFileRepair(mesh, tool->weld, &r);
+  ierr = SbMeshFileRepair(mesh, tool->merge_tolerance, &r);
   PetscCall(SbToolEnd(tool));
   PetscCall(ierr);
-  (void)snprintf(welded, sizeof(welded), "vertices welded to others at most %.3g m away", (double)r.weld);
+  (void)snprintf(welded, sizeof(welded), "vertices welded to others at most %.3g m away",
+                 (double)r.merge_tolerance);
   PetscCall(say(tool, r.nwelded, welded));
   PetscCall(say(tool, r.ncollapsed, "tets that used a vertex twice, dropped"));
   PetscCall(say(tool, r.nduplicate, "tets given again, dropped"));

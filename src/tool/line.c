@@ -14,14 +14,14 @@ static const SbOption rows[] = {
    "whether the triangles of a surface stay: auto keeps them when their mean edge is within a factor of 1.5 "
    "of the size"},
   {"angle", SB_OPTION_REAL, 1, "degrees", "40", "(0, 180)",
-   "edges where a surface turns by more are kept when it is meshed anew"},
+   "edges where a surface turns by more are kept when it is remeshed"},
   {"tetrahedralizer", SB_OPTION_CHOICE, 1, "", "auto", "auto|gmsh|tetgen",
    "who makes tets from a surface: auto tries gmsh, then tetgen"},
   {"seconds", SB_OPTION_REAL, 1, "s", "600", "(0, inf)", "time that gmsh, and then tetgen, may take"},
   {"untangle", SB_OPTION_REAL, 1, "m", "", "[0, inf)",
    "how far vertices may be moved to smooth out small folds where a surface cuts itself; without it half its "
    "mean edge"},
-  {"weld", SB_OPTION_REAL, 1, "m", "", "[0, inf)",
+  {"merge_tolerance", SB_OPTION_REAL, 1, "m", "", "[0, inf)",
    "vertices at most so far apart become one; 0: none do; without it 1e-9 of the diagonal of the mesh (tet: "
    "1e-7)"},
   {"levels", SB_OPTION_INT, 1, "", "1", "[1, 8]",
@@ -56,7 +56,7 @@ PetscErrorCode SbToolHelp(void)
 {
   PetscFunctionBeginUser;
   PetscCall(PetscPrintf(PETSC_COMM_WORLD,
-                        "supple-mesh %s - looks at, converts and repairs meshes for supple\n\n", SB_VERSION));
+                        "supple-mesh %s - examines, converts and repairs meshes for supple\n\n", SB_VERSION));
   for (const SbToolCommand *c = SbToolCommands; c->name; c++)
     PetscCall(PetscPrintf(PETSC_COMM_WORLD, "  supple-mesh %-8s%-12s %s\n", c->name, c->files, c->help));
   PetscCall(
@@ -170,7 +170,7 @@ static PetscErrorCode check_option(const char *name, const char *command)
   for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(rows); i++) list[i] = rows[i].key;
   if (!find_row(name, &index)) {
     if (is_petsc(name)) PetscFunctionReturn(PETSC_SUCCESS);
-    PetscCall(SbNearest(name, PETSC_STATIC_ARRAY_LENGTH(rows), list, sizeof(near), near));
+    PetscCall(SbNearestNames(name, PETSC_STATIC_ARRAY_LENGTH(rows), list, sizeof(near), near));
     SETERRQ(PETSC_COMM_SELF, PETSC_ERR_USER, "-%s is not an option of supple-mesh%s%s%s", name,
             near[0] ? "; did you mean -" : "; supple-mesh -help lists them", near, near[0] ? "?" : "");
   }
@@ -195,7 +195,7 @@ static PetscErrorCode find_command(const char *word, const SbToolCommand **comma
     PetscCall(PetscStrlcat(all, n > 1 ? ", " : "", sizeof(all)));
     PetscCall(PetscStrlcat(all, c->name, sizeof(all)));
   }
-  PetscCall(SbNearest(word, n, list, sizeof(near), near));
+  PetscCall(SbNearestNames(word, n, list, sizeof(near), near));
   SETERRQ(PETSC_COMM_SELF, PETSC_ERR_USER, "'%s' is no command; the commands are %s%s%s%s", word, all,
           near[0] ? "; did you mean " : "", near, near[0] ? "?" : "");
 }
@@ -224,18 +224,18 @@ static PetscErrorCode check_words(const SbToolLine *line, const SbToolCommand **
 /* How a surface becomes tets. */
 static PetscErrorCode read_tet(const SbScope *scope, SbTetOptions *o)
 {
-  PetscInt road, surface;
+  PetscInt backend, surface;
 
   PetscFunctionBeginUser;
   PetscCall(SbTetDefaults(o));
   PetscCall(SbOptionReal(scope, "size", &o->size));
   PetscCall(SbOptionChoice(scope, "surface", &surface));
   PetscCall(SbOptionReal(scope, "angle", &o->angle));
-  PetscCall(SbOptionChoice(scope, "tetrahedralizer", &road));
+  PetscCall(SbOptionChoice(scope, "tetrahedralizer", &backend));
   PetscCall(SbOptionReal(scope, "seconds", &o->seconds));
   PetscCall(SbOptionReal(scope, "untangle", &o->untangle));
-  PetscCall(SbOptionReal(scope, "weld", &o->weld));
-  o->road = (SbTetRoad)road; /* in the order of the rows */
+  PetscCall(SbOptionReal(scope, "merge_tolerance", &o->merge_tolerance));
+  o->backend = (SbTetBackend)backend; /* in the order of the rows */
   o->surface = (SbTetSurface)surface;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -247,8 +247,8 @@ static PetscErrorCode read_options(SbTool *tool)
 
   PetscFunctionBeginUser;
   PetscCall(SbScopeSet(&scope, "", "", ""));
-  tool->weld = -1;
-  PetscCall(SbOptionReal(&scope, "weld", &tool->weld));
+  tool->merge_tolerance = -1;
+  PetscCall(SbOptionReal(&scope, "merge_tolerance", &tool->merge_tolerance));
   PetscCall(read_tet(&scope, &tool->body.tet));
   PetscCall(SbOptionInt(&scope, "levels", &tool->levels));
   PetscCall(SbOptionChoice(&scope, "format", &format));

@@ -15,7 +15,7 @@ typedef struct {
 typedef struct _SbTool {
   const char *command, *in, *out; /* out: NULL when the command writes no mesh */
   SbBody body;                    /* of `in`: name of the file, step, scale, rotate, translate, tet */
-  PetscReal weld;                 /* -weld, m; below 0: the default */
+  PetscReal merge_tolerance;      /* -merge_tolerance, m; below 0: the default */
   PetscInt levels;                /* -levels */
   SbMeshFormat format;            /* -format */
   char view[PETSC_MAX_PATH_LEN];  /* -view; "" for no picture */

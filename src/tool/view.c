@@ -1,7 +1,7 @@
 /*
   view.c - a picture of a mesh, drawn by scripts/render from a file in supple's own format.
 
-  The script is looked for beside the program: ../scripts of the folder that the program is in, or, installed,
+  The script is searched for beside the program: ../scripts of the folder that the program is in, or, installed,
   ../share/supple/scripts.
 */
 #include <errno.h>

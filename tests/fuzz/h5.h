@@ -2,7 +2,7 @@
   h5.h - an HDF5 file made from the bytes of a fuzzer, for the reader of meshes in HDF5.
 
   The bytes do not become the file itself: HDF5 1.10 reads beyond its memory with damaged containers (H5Aexists() and others, found within
-  seconds), which this program cannot mend. They choose which arrays a sound file holds, their types, shapes and values:
+  seconds), which this program cannot repair. They choose which arrays a sound file holds, their types, shapes and values:
 
     layout, step          bit 0: an own mesh, bits 1 to 2: its version less one; step that is read, signed
     then arrays           name, type, number of dimensions, dimensions, values; the last one of a name counts

@@ -8,20 +8,20 @@
 #include <sys/stat.h>
 #include <unistd.h>
 #include "h5.h"
-#include "../../src/format/format_impl.h"
-#include "../../src/skin/skin_impl.h"
+#include "../../src/meshio/meshio_impl.h"
+#include "../../src/surface/surface_impl.h"
 #include "sbtet.h"
 
-/* A surface for a body: read, mended, checked and cut into regions; it is not filled with tets. */
-static inline PetscErrorCode fuzz_skin(const char *path, SbImport *im)
+/* A surface for a body: read, repaired, checked and cut into regions; it is not filled with tets. */
+static inline PetscErrorCode fuzz_surface(const char *path, SbImport *im)
 {
-  SbSkin skin;
+  SbSurface body_surface;
 
   PetscFunctionBeginUser;
   im->scale = 1;
   PetscCall(SbTetDefaults(&im->tet));
-  PetscCall(SbSkinRead(path, im, &skin));
-  PetscCall(SbSkinDestroy(&skin));
+  PetscCall(SbSurfaceRead(path, im, &body_surface));
+  PetscCall(SbSurfaceDestroy(&body_surface));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -46,9 +46,9 @@ static const struct {
   {"obj", ".obj", NULL},
   {"off", ".off", NULL},
   {"ply", ".ply", NULL},
-  {"poly", ".poly", fuzz_skin},
-  {"smesh", ".smesh", fuzz_skin},
-  {"skin", ".off", fuzz_skin},
+  {"poly", ".poly", fuzz_surface},
+  {"smesh", ".smesh", fuzz_surface},
+  {"surface", ".off", fuzz_surface},
 };
 enum { NFUZZ = (int)PETSC_STATIC_ARRAY_LENGTH(fuzz_readers) };
 
@@ -118,7 +118,7 @@ static inline PetscErrorCode fuzz_read(int reader, const char *folder, const cha
     im.step = step;
     ierr = SbImportTagSet(&im, 0, NULL, &none);
     if (!ierr) ierr = (*fuzz_readers[reader].read)(path, &im);
-    if (!ierr && fuzz_readers[reader].read != fuzz_skin) ierr = SbImportCheck(&im, &faces);
+    if (!ierr && fuzz_readers[reader].read != fuzz_surface) ierr = SbImportCheck(&im, &faces);
     (void)SbFacesDestroy(&faces);
     (void)SbImportDestroy(&im);
   } else {

@@ -3,11 +3,12 @@
 */
 #include "hard.h"
 
-#define BAR                                                                                              \
-  "-bodies a -body_a_mesh box:0.3,0.1,0.1:2 -body_a_young 1e5 -body_a_poisson 0.3 -body_a_density 1000 " \
-  "-effects "                                                                                            \
-  "left,right,damping -effect_damping_alpha 5 -effect_left_type drive -effect_left_on xmin "             \
-  "-effect_right_type drive "                                                                            \
+#define BAR                                                                                               \
+  "-bodies a -body_a_mesh box:0.3,0.1,0.1:2 -body_a_young 1e5 -body_a_poisson 0.3 -body_a_density 1000 "  \
+  "-effects "                                                                                             \
+  "left,right,damping -effect_damping_alpha 5 -effect_left_type prescribed_displacement -effect_left_on " \
+  "xmin "                                                                                                 \
+  "-effect_right_type prescribed_displacement "                                                           \
   "-effect_right_on xmax "
 #define STILL "-effect_left_displacement 0;0;0 "
 #define RETURNS                                       \
@@ -31,20 +32,20 @@
     }                                                                                                    \
   }
 
-#define SPIN(ELEMENT, LAW, QUICK)                                                                          \
-  {                                                                                                        \
-    .name = "spin." ELEMENT "." LAW, .what = "free spin at 1000 rad/s, newmark, " ELEMENT ", " LAW,        \
-    .options =                                                                                             \
-      "-bodies a -body_a_mesh box:0.02,0.02,0.02:2 -body_a_young 1e7 -body_a_poisson 0.3 -body_a_density " \
-      "1000 -body_a_spin 600,0,800 -time newmark -ts_dt 5e-5 -ts_max_time 0.02 -ksp_rtol 1e-10 "           \
-      "-snes_rtol 1e-10 -body_a_element " ELEMENT " -body_a_material " LAW,                                \
-    .jitter_speed = 0.1, .runs = 3, .quick = QUICK, .limits = {                                            \
-      {HARD_MOMENTUM, '<', 1e-9},                                                                          \
-      {HARD_ANGULAR, '<', 3e-3},                                                                           \
-      {HARD_DRIFT, '<', 0.01},                                                                             \
-      {HARD_MIN_J, '>', 0.8},                                                                              \
-      {HARD_NEWTON, '<', 20}                                                                               \
-    }                                                                                                      \
+#define SPIN(ELEMENT, LAW, QUICK)                                                                            \
+  {                                                                                                          \
+    .name = "spin." ELEMENT "." LAW, .what = "free spin at 1000 rad/s, newmark, " ELEMENT ", " LAW,          \
+    .options =                                                                                               \
+      "-bodies a -body_a_mesh box:0.02,0.02,0.02:2 -body_a_young 1e7 -body_a_poisson 0.3 -body_a_density "   \
+      "1000 -body_a_angular_velocity 600,0,800 -time newmark -ts_dt 5e-5 -ts_max_time 0.02 -ksp_rtol 1e-10 " \
+      "-snes_rtol 1e-10 -body_a_element " ELEMENT " -body_a_material " LAW,                                  \
+    .jitter_speed = 0.1, .runs = 3, .quick = QUICK, .limits = {                                              \
+      {HARD_MOMENTUM, '<', 1e-9},                                                                            \
+      {HARD_ANGULAR, '<', 3e-3},                                                                             \
+      {HARD_DRIFT, '<', 0.01},                                                                               \
+      {HARD_MIN_J, '>', 0.8},                                                                                \
+      {HARD_NEWTON, '<', 20}                                                                                 \
+    }                                                                                                        \
   }
 
 /*
@@ -104,7 +105,7 @@
     .name = "length." NAME, .what = WHAT,                                                                \
     .options =                                                                                           \
       "-bodies a -body_a_mesh box:" BOX ":2 -body_a_young 1e5 -body_a_poisson 0.3 -body_a_density 1000 " \
-      "-body_a_material corotated -effects clamp,pull -effect_clamp_type support -effect_clamp_on xmin " \
+      "-body_a_material corotated -effects clamp,pull -effect_clamp_type fixed -effect_clamp_on xmin "   \
       "-effect_pull_type traction -effect_pull_on xmax -effect_pull_vector 0;0;-1000 -ts_dt " STEP       \
       " -ts_max_time " END,                                                                              \
     .quick = 1, .limits = {                                                                              \

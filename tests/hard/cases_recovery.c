@@ -1,7 +1,7 @@
 /*
   cases_recovery.c - bodies that start far from anything physical, and have to come back to their rest shape.
 
-  A cube of 0.1 m that is free and not damped but by implicit Euler: it may come back anywhere and turned, and HARD_SHAPE does not look at
+  A cube of 0.1 m that is free and not damped but by implicit Euler: it may come back anywhere and turned, and HARD_SHAPE does not examine
   that. Steps of a tenth of the slowest period (0.06 s) leave motion enough to get past folds: with longer ones the body creeps downhill, and may
   end in an equilibrium in which tets wind twice around an edge, all of them with J > 0.
 */

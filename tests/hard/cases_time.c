@@ -8,7 +8,7 @@
 #define CUBE                                                                                             \
   "-bodies a -body_a_mesh box:0.1,0.1,0.1:2 -body_a_young 5e4 -body_a_poisson 0.3 -body_a_density 1000 " \
   "-effects "                                                                                            \
-  "clamp,gravity -effect_clamp_type support -effect_clamp_on zmin -body_a_velocity 1,0,0.5 "
+  "clamp,gravity -effect_clamp_type fixed -effect_clamp_on zmin -body_a_velocity 1,0,0.5 "
 #define TIGHT "-ksp_rtol 1e-14 -snes_rtol 1e-14 "
 
 #define COARSE(ELEMENT, TIME, LAW, QUICK)                                                               \
@@ -31,7 +31,8 @@
     .name = "beyond." TIME, .what = "five times the stable step of " TIME,                              \
     .options =                                                                                          \
       "-bodies a -body_a_mesh box:0.1,0.1,0.1:2 -body_a_young 5e4 -body_a_poisson 0.3 -body_a_density " \
-      "1000 -body_a_material corotated -body_a_spin 1,0,0 -ts_dt 0.02 -ts_max_time 20 -time " TIME,     \
+      "1000 -body_a_material corotated -body_a_angular_velocity 1,0,0 -ts_dt 0.02 -ts_max_time 20 "     \
+      "-time " TIME,                                                                                    \
     .quick = 1, .stops = "beyond the stable one", .limits = {                                           \
       {HARD_STEPS, '<', 900}                                                                            \
     }                                                                                                   \
@@ -55,7 +56,7 @@ const HardCase HardCasesTime[] = {
    .what = "1e6 steps of six tets, newmark, linear",
    .options =
      "-bodies a -body_a_mesh box:0.1,0.1,0.1:1 -body_a_young 1e5 -body_a_poisson 0.3 -body_a_density 1000 "
-     "-body_a_material linear -body_a_velocity 0.1,0,0.3 -effects clamp -effect_clamp_type support "
+     "-body_a_material linear -body_a_velocity 0.1,0,0.3 -effects clamp -effect_clamp_type fixed "
      "-effect_clamp_on xmin -time newmark -ts_dt 0.003 -ts_max_time 3000 " TIGHT,
    .ranks = {1},
    .seconds = 900,

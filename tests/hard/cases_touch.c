@@ -83,11 +83,11 @@
 /* A band over a saddle of facets that comes up: in the valleys across it two facets push. Once %s is the path of the saddle. */
 #define SADDLE                                                                                          \
   "-bodies a -body_a_mesh box:0.12,0.024,0.01:16,4,1 -body_a_material corotated -body_a_young 2e4 "     \
-  "-body_a_poisson 0.4 -body_a_density 1000 -effects gravity,ends,tool -effect_ends_type support "      \
+  "-body_a_poisson 0.4 -body_a_density 1000 -effects gravity,ends,tool -effect_ends_type fixed "        \
   "-effect_ends_on xmin,xmax "                                                                          \
   "-effect_tool_type contact -effect_tool_obstacle mesh:%s -effect_tool_obstacle_at 0.06,0.012,-0.004 " \
   "-effect_tool_displacement 0;0;0.02*ramp(t/0.4) -ts_dt 0.02 -ts_max_time 0.6"
-/* A block with a rigid plate in it whose middle plane has a layer of its nodes: both ways out are as long. */
+/* A block with a rigid plate in it whose middle plane has a layer of its nodes: both separation directions are as long. */
 #define MIDDLE                                          \
   "-bodies a " BLOCK(                                   \
     "a", "2", "0,0,0", "0,0,0",                         \
@@ -258,7 +258,7 @@ const HardCase HardCasesTouch[] = {
               {HARD_REJECTED, '<', 3}}},
   {.name = "cycle.middle",
    .seconds = 600,
-   .what = "nodes in the middle of a rigid plate, where both ways out are as long",
+   .what = "nodes in the middle of a rigid plate, where both separation directions are as long",
    .options = MIDDLE,
    .jitter = 1e-9,
    .quick = 1,

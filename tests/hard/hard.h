@@ -43,7 +43,7 @@ typedef enum {
   HARD_DEPTH,      /* deepest penetration in any step (column of the history), of the size */
   HARD_NEWTON,     /* most Newton iterations in a step */
   HARD_LINEAR,     /* most linear iterations in a step */
-  HARD_REJECTED,   /* attempts at steps given up, all together */
+  HARD_REJECTED,   /* rejected attempts at steps, all together */
   HARD_STEPS,      /* steps taken */
   HARD_OWN,        /* what `look` measures: value[HARD_OWN] */
   HARD_OWN2,

@@ -24,7 +24,7 @@ static const char *const names[HARD_QUANTITIES] = {
   [HARD_DEPTH] = "penetration / size",
   [HARD_NEWTON] = "Newton iterations of a step",
   [HARD_LINEAR] = "linear iterations of a step",
-  [HARD_REJECTED] = "attempts given up",
+  [HARD_REJECTED] = "rejected steps",
   [HARD_STEPS] = "steps",
   [HARD_OWN] = "own",
   [HARD_OWN2] = "own 2",
@@ -86,10 +86,10 @@ static PetscErrorCode look_finite(HardRun *r, const SbStep *step)
 static PetscErrorCode look_depth(HardRun *r, const SbStep *step)
 {
   PetscFunctionBeginUser;
-  for (PetscInt i = 0; step->step && i < r->model->ntouch; i++) {
+  for (PetscInt i = 0; step->step && i < r->model->nbegin_step; i++) {
     PetscReal depth;
 
-    PetscCall(contact_column(r->run, step->t, r->model->touch[i]->name, "penetration", &depth));
+    PetscCall(contact_column(r->run, step->t, r->model->begin_step[i]->name, "penetration", &depth));
     r->value[HARD_DEPTH] = PetscMax(r->value[HARD_DEPTH], depth / r->size);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -106,8 +106,8 @@ static void look_energies(HardRun *r, const SbStep *step)
     r->last = now;
   }
   /* what is behind of the account now may only have been lent */
-  r->most = PetscMax(
-    r->most, PetscMax(now, r->run->energy_start + PetscAbsReal(e->load_work) + PetscAbsReal(e->drive_work)));
+  r->most = PetscMax(r->most, PetscMax(now, r->run->energy_start + PetscAbsReal(e->load_work) +
+                                              PetscAbsReal(e->prescribed_work)));
   r->gain = PetscMax(r->gain, -e->integrator_loss);
   value[HARD_ACCOUNT] = PetscMax(value[HARD_ACCOUNT], PetscAbsReal(e->integrator_loss));
   value[HARD_RISE] = PetscMax(value[HARD_RISE], now - r->last);

@@ -3,7 +3,7 @@
 
   Two wavy sheets of squares cut in two lie in each other, a hundred facets to a wave whatever their number, so that each point has the same
   surroundings. The sheets shift a little from call to call. Printed are microseconds per point of a call, `sample NAME us VALUE`, the
-  detectors taking turns, and the same of the look for sharp edges, of which there are a few; and what was found. -motion: the way since the last call is looked at too. -shuffled: facets and
+  detectors taking turns, and the same of the search for sharp edges, of which there are a few; and what was found. -motion: the way since the last call is examined too. -shuffled: facets and
   vertices in random order, the worst that a mesh can do to the cache.
 */
 #include "../../src/contact/edge.h"

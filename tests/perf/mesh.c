@@ -25,7 +25,7 @@ static double status(const char *name)
   return kib / 1024;
 }
 
-/* From here on VmHWM counts anew. */
+/* From here on VmHWM counts again. */
 static void forget_peak(void)
 {
   FILE *file = fopen("/proc/self/clear_refs", "w");
@@ -81,14 +81,14 @@ static PetscErrorCode read_only(const SbBody *body)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode whole_mesh(SbBody *body, SbWhole *whole)
+static PetscErrorCode whole_mesh(SbBody *body, SbMergedMesh *whole)
 {
   PetscMPIInt rank;
 
   PetscFunctionBeginUser;
   PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
   PetscCall(PetscMemzero(whole, sizeof(*whole)));
-  if (!rank) PetscCall(SbWholeCreate(1, body, 0, NULL, whole));
+  if (!rank) PetscCall(SbMergedMeshCreate(1, body, 0, NULL, whole));
   PetscCallMPI(MPI_Bcast(&whole->Nvert, 1, MPIU_INT, 0, PETSC_COMM_WORLD));
   PetscCallMPI(MPI_Bcast(&whole->Ncell, 1, MPIU_INT, 0, PETSC_COMM_WORLD));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -97,7 +97,7 @@ static PetscErrorCode whole_mesh(SbBody *body, SbWhole *whole)
 static PetscErrorCode measure(SbBody *body)
 {
   Phase p;
-  SbWhole whole;
+  SbMergedMesh whole;
   SbMesh mesh;
   SbPiece piece;
 

@@ -5,7 +5,7 @@
   touch all the time. heap: eight boxes, each turned a little, in two layers, fall by 2 mm on a floor and onto each other, with friction.
 
   For each step in which something touches, but the first: milliseconds of the step and its parts, of the slowest rank. search: where
-  surfaces and points are now, between ranks too, and points against facets; the look for pairs of edges is not in it. contact: all else
+  surfaces and points are now, between ranks too, and points against facets; the search for pairs of edges is not in it. contact: all else
   around solves, rows and the decisions about them. project: the rows within the linear solves. Work of the monitor is not counted.
 */
 #include "../verify/contact.h"
@@ -93,8 +93,8 @@ static PetscErrorCode press_scene(PetscInt cells, PetscInt steps, size_t size, c
   PetscCall(PetscSNPrintf(mesh, sizeof(mesh), "box:0.08,0.08,0.06:%d", (int)cells));
   PetscCall(add_body("high", mesh, "translate 0.021,0.018,0.0601", size, text));
   PetscCall(PetscSNPrintf(more, sizeof(more),
-                          " -effects hold,push,meet -effect_hold_type support -effect_hold_on low.zmin "
-                          "-effect_push_type drive -effect_push_on high.zmax "
+                          " -effects hold,push,meet -effect_hold_type fixed -effect_hold_on low.zmin "
+                          "-effect_push_type prescribed_displacement -effect_push_on high.zmax "
                           "-effect_push_displacement 0;0;-0.0037*t/%.10g -ts_dt 0.01",
                           0.01 * (double)steps));
   PetscCall(PetscStrlcat(text, more, size));

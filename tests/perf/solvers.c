@@ -11,7 +11,7 @@
   such blocks hold the functions of a vertex without divergence, which is what a smoother needs for nu near 1/2.
 
   Prints `fact NAME VALUE`: tets, unknowns, iterations, reason (PETSc's number of why the iteration ended, negative: it failed),
-  residual (|b - K x| / |b|, computed anew), simpler (1: the fine level of cg_two_level is the diagonal), setup and
+  residual (|b - K x| / |b|, computed again), simpler (1: the fine level of cg_two_level is the diagonal), setup and
   solve (CPU seconds of the slower rank), memory (MB of the larger rank). Set-up: plan, matrices, tangent, preconditioner. A rank that
   waits for another one sleeps: on a busy machine its CPU time would be one of waiting else. After -limit CPU seconds
   of a rank it prints `fact late` and gives up, with a code that is not zero.
@@ -80,7 +80,7 @@ static PetscErrorCode list_stars(SbSpace s, PetscInt **start, PetscInt **node)
 
     if (v >= mesh->nvert_owned) continue;
     for (PetscInt f = 0; f < 4; f++) {
-      const PetscInt slot = k - a + f, support = s->support ? s->support[slot] : -1;
+      const PetscInt slot = k - a + f, support = s->dirichlet_node ? s->dirichlet_node[slot] : -1;
 
       if (f == a) continue;
       list[at[v]++] = s->gnode[s->cell_node[slot]];
@@ -411,7 +411,7 @@ int main(int argc, char **argv)
                           "-bodies a -body_a_mesh %s -body_a_element %s -body_a_material linear "
                           "-body_a_young 1e6 -body_a_poisson %.17g -body_a_density 1000 -sets held "
                           "-set_held_at %s -effects gravity,clamp -effect_gravity_vector 0,0,-9.81 "
-                          "-effect_clamp_type support -effect_clamp_on held -time static -ksp_rtol 1e-8 %s",
+                          "-effect_clamp_type fixed -effect_clamp_on held -time static -ksp_rtol 1e-8 %s",
                           mesh, element, (double)nu, hold, with));
   PetscCall(perf_read(text, &c.scene));
   PetscCall(SbModelSetUp(c.scene.model));

@@ -6,6 +6,7 @@
   The bar is let go at rest, falls and swings for 2 s in 120 steps of 1/60 s. Ends early after so many seconds. The first
   step is told apart: it holds what a solver sets up once. Iterations are those of CG.
 */
+#include "sbsolver.h"
 #include "perf.h"
 
 /* Bytes that one application of a factor that turns reads: on the busiest rank, and of that the interface; of all ranks. */
@@ -78,7 +79,7 @@ int main(int argc, char **argv)
   PetscCall(PetscOptionsGetInt(NULL, NULL, "-steps", &steps, NULL));
   PetscCall(PetscOptionsGetReal(NULL, NULL, "-seconds", &seconds, NULL));
   PetscCall(PetscSNPrintf(more, sizeof(more),
-                          "-solver %s -body_bar_element %s -ts_max_time %.10g -time_max_cuts 0 "
+                          "-solver %s -body_bar_element %s -ts_max_time %.10g -time_max_halvings 0 "
                           "-set_end_at %s",
                           solver, element, (double)steps / 60., hold));
   PetscCall(perf_bar(mesh, more, text));

@@ -106,7 +106,7 @@ int main(int argc, char **argv)
     "-bodies bar -body_bar_mesh box:%g,0.1,0.1:%d,%d,%d -body_bar_material linear -body_bar_young 5e5 "
     "-body_bar_poisson %g "
     "-body_bar_element %s -sets end -set_end_at plane:1,0,0,0 -effects gravity,clamp -effect_gravity_vector "
-    "0,0,-9.81 -effect_clamp_type support -effect_clamp_on end -time static -ksp_rtol 1e-8 -solver %s %s",
+    "0,0,-9.81 -effect_clamp_type fixed -effect_clamp_on end -time static -ksp_rtol 1e-8 -solver %s %s",
     0.1 * (double)length, (int)(0.5 + length * (PetscReal)k), (int)k, (int)k, (double)nu, element, solver,
     more));
   PetscCall(perf_open(text, &t));

@@ -12,7 +12,7 @@ cat >body.opts <<'END_OPTIONS'
 -body_it_young 1e5     # Pa
 -body_it_poisson 0.3
 -effects gravity,hold
--effect_hold_type support
+-effect_hold_type fixed
 -effect_hold_on low
 -sets low
 -set_low_at plane:0,0,1,0

@@ -15,7 +15,7 @@ cat >bar.opts <<'END'
 -sets left
 -set_left_at plane:1,0,0,0
 -effects gravity,hold,pull
--effect_hold_type support
+-effect_hold_type fixed
 -effect_hold_on left
 -effect_pull_type traction
 -effect_pull_on xmax
@@ -36,7 +36,7 @@ sets: [left]
 set: {left: {at: "plane:1,0,0,0"}}
 effects: [gravity, hold, pull]
 effect:
-  hold: {type: support, on: left}
+  hold: {type: fixed, on: left}
   pull:
     type: traction
     on: [xmax]
@@ -86,7 +86,7 @@ error 1 "-time static: nothing holds the bodies" -bodies bar -body_bar_mesh box:
   -body_bar_young 1 -body_bar_poisson 0 -time static
 # the path by arc length takes exact tangents, solvers for indefinite matrices, and no contact
 arc="-bodies a -body_a_mesh box:1,1,1:1 -body_a_material stvk -body_a_young 1 -body_a_poisson 0 -body_a_density 1 -effects hold,push \
-  -effect_hold_type support -effect_hold_on zmin -effect_push_type gravity -time static -static_control arc_length -output_fields none"
+  -effect_hold_type fixed -effect_hold_on zmin -effect_push_type gravity -time static -static_control arc_length -output_fields none"
 # shellcheck disable=SC2086
 {
   error 1 "-static_control arc_length needs exact tangents: leave -body_a_tangent out" $arc -body_a_tangent exact_spd
@@ -110,7 +110,7 @@ unused() { # RANKS OPTION ARGUMENT...
   check "$2 is not the one warning: $(cat err.txt)" test "$(grep -c "^supple: warning: $2 " err.txt) $(wc -l <err.txt)" = "1 1"
 }
 unused 1 -static_steps -static_steps 3
-unused 2 -multipliers -multipliers direct
+unused 2 -saddle_solver -saddle_solver direct
 unused 1 -time_spectral_radius -time newmark -time_spectral_radius 0.3
 unused 1 -effect_pull_displacement -effect_pull_displacement 1          # of another type
 unused 1 -body_bar_tangent -body_bar_material linear -body_bar_tangent warped
@@ -163,7 +163,7 @@ done
 # what a run says of its search for contacts, the same with any number of ranks but for the memory
 for n in 1 2; do
   "${mpi[@]}" $n "$supple" inside.opts -progress no -body_small_translate 0.39,-0.05,-0.05 -output_dir in >told.txt
-  check "the summary on $n has no search" grep -qE '^effect +meet: [1-9][0-9]* looks at surfaces, [1-9].* pairs of point and' told.txt
+  check "the summary on $n has no search" grep -qE '^effect +meet: [1-9][0-9]* searches of surfaces, [1-9].* pairs of point and' told.txt
   grep -A3 '^effect  ' told.txt | tr -s ' \n' ' ' >"told$n.txt"
   check "the summary on $n has no table" grep -qE 'hash, cells of [0-9.]+ m, [1-9][0-9]* entries in [1-9][0-9]* slots' "told$n.txt"
 done

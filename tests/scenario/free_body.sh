@@ -23,7 +23,7 @@ cat >bodies.opts <<'END'
 -set_under_at plane:0,0,1,0.05
 -effects gravity,hold,meet
 -effect_gravity_vector 0.5,0.2,-9.81
--effect_hold_type support
+-effect_hold_type fixed
 -effect_hold_on low
 -time static
 -output_fields none
@@ -54,18 +54,18 @@ free 1 -effect_meet_type collision -body_a_material neohookean -body_b_material 
 # multipliers as unknowns
 for way in direct iterative; do
   # shellcheck disable=SC2086
-  free 1 $floor -effect_meet_response multiplier -multipliers $way
+  free 1 $floor -effect_meet_response multiplier -saddle_solver $way
 done
 # shellcheck disable=SC2086
 for solver in $solvers; do free 2 $floor -solver "$solver"; done
 free 2 -effect_meet_type collision
-# held at the nodes of one axis, it turns about that
+# constrained at the nodes of one axis, it turns about that
 # shellcheck disable=SC2086
 error 1 "load factor 0.000976562: nothing holds the body b against turning about the axis along (0.00, 0.00, 1.00) through (0.045, 0.045, 0.075) m; hold it by a support" \
   -options_file bodies.opts $floor -effects gravity,hold,pin,turn,meet -sets low,under,pin \
-  -set_pin_at box:0.0449,0.0449,0.05,0.0451,0.0451,0.1 -effect_pin_type support -effect_pin_on pin \
+  -set_pin_at box:0.0449,0.0449,0.05,0.0451,0.0451,0.1 -effect_pin_type fixed -effect_pin_on pin \
   -effect_pin_components xy -effect_turn_type body_force -effect_turn_density "(0.045-y)*1e5;(x-0.045)*1e5;0"
-# cr and dg are held at the centres of facets: two of them are a hinge, one holds less; with p1 the same supports hold
+# cr and dg are constrained at the centres of facets: two of them are a hinge, one holds less; with p1 the same supports hold
 cat >bar.opts <<'END'
 -bodies a
 -body_a_mesh box:0.3,0.1,0.1:2
@@ -75,7 +75,7 @@ cat >bar.opts <<'END'
 -body_a_density 1000
 -sets part
 -effects gravity,clamp
--effect_clamp_type support
+-effect_clamp_type fixed
 -effect_clamp_on part
 -time static
 -output_fields none
@@ -112,7 +112,7 @@ check "another solver takes over: exit code $code" test "$code" = 0
 # what holds: a support of the sides
 # shellcheck disable=SC2086
 "$supple" -options_file bodies.opts $floor -effects gravity,hold,side,meet -sets low,under,side \
-  -set_side_at plane:1,0,0,0.02 -effect_side_type support -effect_side_on side -effect_side_components xy >out.txt 2>err.txt
+  -set_side_at plane:1,0,0,0.02 -effect_side_type fixed -effect_side_on side -effect_side_components xy >out.txt 2>err.txt
 code=$?
 check "held at a side: exit code $code" test "$code" = 0
 finish

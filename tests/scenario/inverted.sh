@@ -7,7 +7,7 @@ source tests/scenario/scenario_common.sh
 
 run() { # displacement of the end in m
   "$supple" -bodies a -body_a_mesh box:0.1,0.1,0.1:1 -body_a_material linear -body_a_young 1e5 -body_a_poisson 0.3 \
-    -body_a_density 1000 -effects left,right -effect_left_type support -effect_left_on xmin -effect_right_type drive \
+    -body_a_density 1000 -effects left,right -effect_left_type fixed -effect_left_on xmin -effect_right_type prescribed_displacement \
     -effect_right_on xmax -effect_right_displacement "$1;0;0" -time static -output_fields none -quiet >out.txt 2>err.txt
 }
 

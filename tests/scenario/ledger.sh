@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# The ledger as a user meets it: the table and its words, ledger.csv, columns of history.csv, the field, the dials, and what is refused.
+# The ledger as a user meets it: the table and its words, ledger.csv, columns of history.csv, the field, the adaptive tolerances, and what is refused.
 set -uo pipefail
 # shellcheck source=tests/scenario/scenario_common.sh
 source tests/scenario/scenario_common.sh
@@ -11,7 +11,7 @@ cat >bar.opts <<'END'
 -body_bar_young 1e6
 -body_bar_poisson 0.3
 -effects gravity,hold
--effect_hold_type support
+-effect_hold_type fixed
 -effect_hold_on xmin
 -time static
 -progress no
@@ -23,7 +23,7 @@ cat >swing.opts <<'END'
 -body_bar_young 1e5
 -body_bar_poisson 0.3
 -effects gravity,hold
--effect_hold_type support
+-effect_hold_type fixed
 -effect_hold_on xmin
 -ts_dt 0.01
 -ts_max_time 0.1
@@ -74,7 +74,7 @@ done
 "$supple" swing.opts -time newmark -ts_max_time 0.2 -ledger yes -restart none/checkpoint_000010.h5 -output_dir late >late.txt 2>&1
 check "a checkpoint without errors goes unsaid" grep -q 'was written without -ledger: they count from there' late.txt
 
-# the dials
+# the adaptive tolerances
 "$supple" swing.opts -accuracy 0.5 -output_dir coarse >coarse.txt 2>&1
 check "-accuracy 0.5 says nothing" grep -q -- '-accuracy 0.5 was' coarse.txt
 "$supple" swing.opts -accuracy 0.01 -output_dir fine >fine.txt 2>&1

@@ -20,9 +20,9 @@ cat >bodies.opts <<'END'
 -set_bottom_at plane:0,0,1,0
 -set_top_at plane:0,0,1,0.1
 -effects hold,push,meet
--effect_hold_type support
+-effect_hold_type fixed
 -effect_hold_on bottom
--effect_push_type drive
+-effect_push_type prescribed_displacement
 -effect_push_on top
 -effect_push_displacement 0.1*t;0;-0.1*t
 -effect_meet_type collision

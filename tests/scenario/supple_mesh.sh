@@ -92,7 +92,7 @@ cat >body.opts <<'END_OPTIONS'
 -body_it_poisson 0.3
 -effects gravity,hold
 -effect_gravity_vector 0,0,-9.81
--effect_hold_type support
+-effect_hold_type fixed
 -effect_hold_on wall
 -time static
 -output_precision double
@@ -171,7 +171,7 @@ says " region_1 "
 check "a picture: exit code $?: $(cat err.txt)" test "$(head -c 4 cube.png | tail -c 3)" = PNG
 refuses "cube.msh: is no surface that tet can fill" tet cube.msh x.h5
 refuses "cube.off: a size of 0.0001 m makes about 8.5e+12 tets out of 1 m^3; give a size of at least 0.00554 m (-size)" tet cube.off x.h5 -size 1e-4
-refuses "cube.off: -weld 0.9 m would join corners of one triangle" tet cube.off x.h5 -weld 0.9
+refuses "cube.off: -merge_tolerance 0.9 m would join corners of one triangle" tet cube.off x.h5 -merge_tolerance 0.9
 error 2 "body 'it': cube.off: a size of 0.0001 m makes about 8.5e+12 tets out of 1 m^3; give a size of at least 0.00554 m (-body_it_tet_size)" \
   body.opts -body_it_mesh cube.off -body_it_tet_size 1e-4 -output_dir new
 refuses "-size -1 m is outside (0, inf) m" tet cube.off x.h5 -size -1

@@ -70,9 +70,9 @@ static inline PetscErrorCode world_destroy(World *w)
 }
 
 /* A vertex of the last part; one that is there already is found again when `weld`. */
-static inline PetscInt world_vertex(World *w, const PetscReal X[3], PetscInt first, PetscBool weld)
+static inline PetscInt world_vertex(World *w, const PetscReal X[3], PetscInt first, PetscBool merge_tolerance)
 {
-  for (PetscInt i = first; weld && i < w->nvertex; i++) {
+  for (PetscInt i = first; merge_tolerance && i < w->nvertex; i++) {
     if (PetscMax(PetscAbsReal(w->X[i][0] - X[0]),
                  PetscMax(PetscAbsReal(w->X[i][1] - X[1]), PetscAbsReal(w->X[i][2] - X[2]))) < 1e-9)
       return i;

@@ -5,7 +5,7 @@
   -body_<name>_young and so on, which fixture_create() sets. The same scene can be made on PETSC_COMM_SELF beside the
   parallel one: fields of the two are compared by original node number.
 
-  fixture_use() says which elements the next scenes are made of, and whether their first set is held: then DG faces in it
+  fixture_use() says which elements the next scenes are made of, and whether their first set is constrained: then DG faces in it
   have supports.
 */
 #pragma once
@@ -49,8 +49,8 @@ static inline PetscErrorCode fixture_register(void)
   PetscCall(SbEffectRegister_Traction());
   PetscCall(SbEffectRegister_Pressure());
   PetscCall(SbEffectRegister_PointForce());
-  PetscCall(SbEffectRegister_Support());
-  PetscCall(SbEffectRegister_Drive());
+  PetscCall(SbEffectRegister_Fixed());
+  PetscCall(SbEffectRegister_PrescribedDisplacement());
   PetscCall(SbEffectRegister_Damping());
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -92,7 +92,7 @@ static inline PetscErrorCode fixture_create(MPI_Comm comm, PetscInt nbody, const
   for (PetscInt k = 0; k < nset; k++) {
     PetscCall(SbSetParse(sets[k][0], sets[k][1], &x->set[k]));
     PetscCall(PetscStrncpy(x->set[k].name, sets[k][0], sizeof(x->set[k].name)));
-    x->set[k].held = (PetscBool)(fixture_held && k == 0);
+    x->set[k].prescribed = (PetscBool)(fixture_held && k == 0);
   }
   PetscCall(SbMeshCreate(comm, nbody, x->body, nset, x->set, &x->mesh));
   PetscCall(SbSpaceCreate(x->mesh, x->material, x->element, &x->space));

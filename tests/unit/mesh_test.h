@@ -2,7 +2,7 @@
   mesh_test.h - what the tests of the mesh layer share: bodies and sets in one line, and the text of an error.
 */
 #pragma once
-#include "../../src/format/format_impl.h"
+#include "../../src/meshio/meshio_impl.h"
 #include "../../src/mesh/mesh_impl.h"
 #include "../test.h"
 

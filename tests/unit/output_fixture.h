@@ -17,7 +17,7 @@
 #define MATERIAL " -body_a_material linear -body_a_young 1000 -body_a_poisson 0.25 -body_a_density 10"
 #define BOX "-bodies a -body_a_mesh box:0.4,0.1,0.2:4,1,2" MATERIAL
 #define HELD \
-  BOX " -sets left -set_left_at plane:1,0,0,0 -effects hold -effect_hold_type support -effect_hold_on left"
+  BOX " -sets left -set_left_at plane:1,0,0,0 -effects hold -effect_hold_type fixed -effect_hold_on left"
 #define EULER " -time euler_implicit -ts_dt 0.1 -ts_max_time 1 -quiet "
 
 /* A folder that does not exist yet, below the system's one for temporary files; the same on all ranks. */
@@ -107,7 +107,7 @@ static inline PetscErrorCode fixture_step(TestScene *scene, PetscInt k, PetscRea
   step.energies = (SbEnergies){.kinetic = 100. + k,
                                .strain = 200. + k,
                                .load_work = 300. + k,
-                               .drive_work = 400.,
+                               .prescribed_work = 400.,
                                .volume = 0.008,
                                .min_J = 1. / 3.,
                                .ninverted = 7};

@@ -21,7 +21,7 @@
 /* A surface with displacements at the start of the step and now. */
 typedef struct {
   SbModel m;
-  SbSurface s;
+  SbContactSurface s;
   PetscReal *u0, *u; /* [nnode][3] */
 } Case;
 
@@ -38,7 +38,7 @@ static inline PetscErrorCode open_on(MPI_Comm comm, const char *options, PetscIn
   PetscCall(SbSceneCreate(comm, &c->m));
   PetscCall(SbModelSetUp(c->m));
   PetscCall(SbSpaceGetSetFacets(c->m->space, set, &n, &facet));
-  PetscCall(SbSurfaceCreate(c->m->space, n, facet, &c->s));
+  PetscCall(SbContactSurfaceCreate(c->m->space, n, facet, &c->s));
   PetscCall(PetscFree(facet));
   PetscCall(PetscCalloc2(3 * c->m->space->nnode, &c->u0, 3 * c->m->space->nnode, &c->u));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -48,7 +48,7 @@ static inline PetscErrorCode close_case(Case *c)
 {
   PetscFunctionBeginUser;
   PetscCall(PetscFree2(c->u0, c->u));
-  PetscCall(SbSurfaceDestroy(&c->s));
+  PetscCall(SbContactSurfaceDestroy(&c->s));
   PetscCall(SbModelDestroy(&c->m));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

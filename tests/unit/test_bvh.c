@@ -2,7 +2,7 @@
 /*
   Detection by trees of bounding volumes: all pairs that are near each other are candidates, and the contacts are those of the
   detector by brute force, with boxes and k-DOPs, on random, degenerate and moving scenes; refitting and building
-  anew; what self-contact costs; how the number of visits grows.
+  again; what self-contact costs; how the number of visits grows.
 */
 #include "bvh_scene.h"
 #include "sbbvh.h"
@@ -237,7 +237,7 @@ static PetscErrorCode check_random(Scene *c)
 
 /* ------------------------------------------------------------------ motion */
 
-/* Two spheres that roll on each other: refitted trees find what new ones find; scattered vertices make the trees anew. */
+/* Two spheres that roll on each other: refitted trees find what new ones find; scattered vertices make the trees again. */
 static PetscErrorCode check_refit(Scene *c, PetscInt k)
 {
   SbDetector kept, fresh;
@@ -290,7 +290,7 @@ static PetscErrorCode check_refit(Scene *c, PetscInt k)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Many small bodies of one part that change places: the tree over them no longer fits, and is built anew once. */
+/* Many small bodies of one part that change places: the tree over them no longer fits, and is rebuilt once. */
 static PetscErrorCode check_rebuild(Scene *c)
 {
   enum { NBODY = 200 };
@@ -337,7 +337,7 @@ static PetscErrorCode check_rebuild(Scene *c)
     SB_CHECK(stats.rebuilt == (round ? 2 : 1), "round %d: the trees are built %d times", round,
              (int)stats.rebuilt);
   }
-  SB_CHECK(visits[1] < 2 * visits[0] && visits[2] == visits[1], "visits: %ld, built anew %ld, then %ld",
+  SB_CHECK(visits[1] < 2 * visits[0] && visits[2] == visits[1], "visits: %ld, rebuilt %ld, then %ld",
            (long)visits[0], (long)visits[1], (long)visits[2]);
   SB_CHECK(strstr(stats.text, "boxes") && stats.memory > 0, "text %s, %ld bytes", stats.text,
            (long)stats.memory);
@@ -521,7 +521,7 @@ static PetscErrorCode check_errors(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Nothing to look for, and a single facet and point. */
+/* Nothing to search for, and a single facet and point. */
 static PetscErrorCode check_small(Scene *c)
 {
   Outcome out;

@@ -86,7 +86,7 @@ static PetscReal point_segment2(const PetscReal p[3], const PetscReal *const b[2
   const PetscReal *const x[3] = {b[0], b[1], b[1]};
   PetscReal w[3], d2;
 
-  (void)SbClosestPoint(p, x, w, &d2);
+  (void)SbTriangleClosestPoint(p, x, w, &d2);
   return d2;
 }
 
@@ -192,7 +192,7 @@ static void set_place(const Tet *t, int k, PetscBool moving, SbEdgePlace *p)
   SbEdgeInto(p);
 }
 
-/* Nearest features by looking at all: the distance from vertices to faces, and of edges, with the two of the least. */
+/* Nearest features by examining all: the distance from vertices to faces, and of edges, with the two of the least. */
 static void nearest(const Tet t[2], PetscReal *vertices, PetscReal *edges, int which[2])
 {
   *vertices = *edges = PETSC_MAX_REAL;
@@ -202,7 +202,7 @@ static void nearest(const Tet t[2], PetscReal *vertices, PetscReal *edges, int w
       const PetscReal *const x[3] = {t[1 - q].x[f[0]], t[1 - q].x[f[1]], t[1 - q].x[f[2]]};
       PetscReal w[3], d2;
 
-      (void)SbClosestPoint(t[q].x[i / 4], x, w, &d2);
+      (void)SbTriangleClosestPoint(t[q].x[i / 4], x, w, &d2);
       *vertices = PetscMin(*vertices, PetscSqrtReal(d2));
     }
   }
@@ -430,7 +430,7 @@ static void check_motions(void)
     expected = stepwise(x[0], x[1], &expected_time);
     if (expected < 0) continue;
     seen[expected]++;
-    through = SbEdgeCrossing(e0, e1, f0, f1, tolerance, &time, &behind);
+    through = SbCCDEdgeEdge(e0, e1, f0, f1, tolerance, &time, &behind);
     SB_CHECK(through == (expected > 0), "motion %d: %s", i,
              expected ? "a passage is missed" : "there is no passage");
     if (through && expected) SB_CHECK_NEAR(time, expected_time, 1. / STEPS, "time of the passage");

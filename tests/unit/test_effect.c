@@ -69,10 +69,10 @@ static PetscErrorCode test_errors(void)
     PetscOptionsInsertString(NULL, "-effect_air_type pressure -effect_air_on top -effect_air_value 5*x"));
   CHECK_MESSAGE(SbEffectCreate("air", &e), "-effect_air_value");
   PetscCall(SbEffectDestroy(&e));
-  PetscCall(PetscOptionsInsertString(NULL, "-effect_hold_type support"));
+  PetscCall(PetscOptionsInsertString(NULL, "-effect_hold_type fixed"));
   CHECK_MESSAGE(SbEffectCreate("hold", &e), "-effect_hold_on");
   PetscCall(SbEffectDestroy(&e));
-  PetscCall(PetscOptionsInsertString(NULL, "-effect_push_type drive -effect_push_on top"));
+  PetscCall(PetscOptionsInsertString(NULL, "-effect_push_type prescribed_displacement -effect_push_on top"));
   CHECK_MESSAGE(SbEffectCreate("push", &e), "-effect_push_displacement");
   PetscCall(SbEffectDestroy(&e));
   PetscCall(PetscOptionsInsertString(NULL, "-effect_push_angle 10 -effect_push_axis 0,0,0"));
@@ -112,8 +112,8 @@ int main(int argc, char **argv)
   PetscCall(SbEffectRegister_Traction());
   PetscCall(SbEffectRegister_Pressure());
   PetscCall(SbEffectRegister_PointForce());
-  PetscCall(SbEffectRegister_Support());
-  PetscCall(SbEffectRegister_Drive());
+  PetscCall(SbEffectRegister_Fixed());
+  PetscCall(SbEffectRegister_PrescribedDisplacement());
   PetscCall(SbEffectRegister_Damping());
   PetscCall(test_types());
   PetscCall(test_errors());

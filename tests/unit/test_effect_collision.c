@@ -1,11 +1,11 @@
 // @ranks 1 2 3
 /*
   Contact between bodies as an effect: settings that are refused; rows that make no net force and have the detector's gap; who
-  looks with `sides one`; what a step costs when bodies are far apart; attempts at a step that do not know of each other; a
+  looks with `passes one`; what a step costs when bodies are far apart; attempts at a step that do not know of each other; a
   static scene of all elements whose numbers no partition changes, and reactions that balance.
 */
 #include "../../src/effect/collision.h"
-#include "../../src/fem/couple.h"
+#include "sbconstraint.h"
 #include "surface_fixture.h"
 
 #define MEET " -effects meet -effect_meet_type collision -ts_dt 0.01 -ts_max_time 0.02 "
@@ -40,25 +40,26 @@ static PetscErrorCode check_refused(void)
 {
   static const char *const cases[][2] = {
     {"-effect_meet_response glue", "projected"},
-    {"-effect_meet_sides none", "both"},
+    {"-effect_meet_passes none", "two"},
     {"-effect_meet_detection eyes", "brute"},
     {"-effect_meet_bvh_volume dop14", "-effect_meet_bvh_volume is for -effect_meet_detection bvh"},
     {"-effect_meet_friction -1", "-effect_meet_friction"},
     {"-effect_meet_friction 0.2 -effect_meet_friction_kinetic 0.3",
      "-effect_meet_friction_kinetic 0.3 is above -effect_meet_friction 0.2"},
     {"-effect_meet_stiffness 0", "-effect_meet_stiffness"},
-    {"-effect_meet_reach -1", "-effect_meet_reach"},
-    {"-effect_meet_recovery 0.5", "-effect_meet_recovery"},
+    {"-effect_meet_search_radius -1", "-effect_meet_search_radius"},
+    {"-effect_meet_separation_steps 0.5", "-effect_meet_separation_steps"},
     {"-effect_meet_restitution 1.5", "-effect_meet_restitution 1.5"},
     {"-effect_meet_damping 0.01", "-effect_meet_damping 0.01 s is for springs that give"},
     {"-effect_meet_restitution 0.5 -effect_meet_response augmented",
      "-effect_meet_restitution 0.5 needs -effect_meet_response projected or multiplier"},
-    {"-effect_meet_restitution 0.5 -effect_meet_arrival cut",
-     "-effect_meet_restitution 0.5 and -effect_meet_arrival cut do not go together"},
+    {"-effect_meet_restitution 0.5 -effect_meet_time_of_impact yes",
+     "-effect_meet_restitution 0.5 and -effect_meet_time_of_impact yes do not go together"},
     {"-effect_meet_restitution 0.5 -time genalpha", "-effect_meet_restitution needs -time euler_implicit"},
     {"-sets left -set_left_at plane:1,0,0,0 -effect_meet_on left", "The effect meet has only one body"},
-    {"-effect_meet_arrival late", "whole"},
-    {"-time genalpha -effect_meet_arrival cut", "-time genalpha gains energy with -effect_meet_arrival cut"},
+    {"-effect_meet_time_of_impact late", "no"},
+    {"-time genalpha -effect_meet_time_of_impact yes",
+     "-time genalpha gains energy with -effect_meet_time_of_impact yes"},
     {"-time euler_symplectic", "The effect meet needs several solves in a step"},
     {"-time euler_explicit", "The effect meet needs several solves in a step"},
     {"-time alpha2", "The effect meet needs several solves in a step"},
@@ -112,7 +113,7 @@ static PetscErrorCode open_meeting(const char *elements, const char *more, Meeti
   PetscCall(PetscSNPrintf(options, sizeof(options), "%s" MEET "%s", elements, more));
   PetscCall(test_scene_open(options, &x->t));
   x->s = x->t.model->space;
-  x->e = x->t.model->touch[0];
+  x->e = x->t.model->begin_step[0];
   PetscCall(PetscCalloc2(3 * x->s->nnode, &x->u0, 3 * x->s->nnode, &x->u));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -139,24 +140,24 @@ static void come_down(Meeting *x, PetscReal depth)
 static PetscErrorCode attempt(Meeting *x)
 {
   PetscFunctionBeginUser;
-  PetscCall((*x->e->ops.touch)(x->e, x->s, 0, 0.01, x->u0, NULL, x->u));
-  SbSpaceCoupleClear(x->s);
-  PetscCall((*x->e->ops.hold)(x->e, x->s));
-  PetscCall(SbSpaceCoupleDone(x->s));
+  PetscCall((*x->e->ops.begin_step)(x->e, x->s, 0, 0.01, x->u0, NULL, x->u));
+  SbSpaceClearConstraints(x->s);
+  PetscCall((*x->e->ops.assemble_constraints)(x->e, x->s));
+  PetscCall(SbSpaceAssembleConstraints(x->s));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Begins a step where the bodies are; `deep`: how deep overlap is looked for then, m. */
+/* Begins a step where the bodies are; `deep`: how deep overlap is searched for then, m. */
 static PetscErrorCode begin_step(Meeting *x, PetscReal t, PetscReal *deep)
 {
   PetscFunctionBeginUser;
-  PetscCall((*x->e->ops.touch)(x->e, x->s, t, 0.01, x->u0, NULL, x->u0));
+  PetscCall((*x->e->ops.begin_step)(x->e, x->s, t, 0.01, x->u0, NULL, x->u0));
   *deep = ((Collision *)x->e->data)->deep;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /*
-  Points that got into a body unseen are led out after three steps, not after three attempts at one, and as soon when the run is taken up from a
+  Points that got into a body unseen are separated after three steps, not after three attempts at one, and as soon when the run is taken up from a
   checkpoint in between. What is taken up where one lies deep in another goes on: it was no error before.
 */
 static PetscErrorCode check_patience(void)
@@ -167,19 +168,19 @@ static PetscErrorCode check_patience(void)
   PetscReal *records, deep = 0;
 
   PetscFunctionBeginUser;
-  PetscCall(open_meeting(PAIR("p1", "p1"), "-effect_meet_reach 0.01", &x));
+  PetscCall(open_meeting(PAIR("p1", "p1"), "-effect_meet_search_radius 0.01", &x));
   c = (Collision *)x.e->data;
   PetscCall(begin_step(&x, 0, &deep));
   come_down(&x, 0.15);
   PetscCall(PetscArraycpy(x.u0, x.u, 3 * x.s->nnode));
   for (int k = 0; k < 8; k++) PetscCall(begin_step(&x, 1 + k / 4, &deep)); /* in the first their boxes meet */
-  SB_CHECK(deep == 0, "after two steps overlap is looked for, %g m deep", (double)deep);
+  SB_CHECK(deep == 0, "after two steps overlap is searched for, %g m deep", (double)deep);
   PetscCall((*x.e->ops.save)(x.e, x.s, &n, &records));
   PetscCall(PetscArrayzero(c->alone, c->surface->scene.npoint));
   PetscCall((*x.e->ops.load)(x.e, x.s, 3, x.u0, n, records));
   PetscCall(PetscFree(records));
   PetscCall(begin_step(&x, 3, &deep));
-  SB_CHECK(deep > 0.1, "after three steps overlap is looked for %g m deep", (double)deep);
+  SB_CHECK(deep > 0.1, "after three steps overlap is searched for %g m deep", (double)deep);
   PetscCall((*x.e->ops.save)(x.e, x.s, &n, &records));
   for (PetscInt i = 0; i < 3 * x.s->nnode;
        i++) { /* small, and in the middle of the other, where no facet is within reach */
@@ -196,7 +197,7 @@ static PetscErrorCode check_patience(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Points that were led out of one body and get into another before the first has gone are led out of that. */
+/* Points that were separated from one body and get into another before the first has gone are separated from that. */
 static PetscErrorCode check_other_way(void)
 {
   Collision *c;
@@ -208,7 +209,7 @@ static PetscErrorCode check_other_way(void)
   PetscCall(open_meeting(SETS "-bodies a,b,c" BODY("a", "p1", "box:1,0.8,0.3:3", "0,0,0")
                            BODY("b", "p1", "box:0.6,0.5,0.4:2", "0.2,0.1,0.32")
                              BODY("c", "p1", "box:1,0.8,0.3:3", "0,0,5"),
-                         "-effect_meet_reach 0.01", &x));
+                         "-effect_meet_search_radius 0.01", &x));
   c = (Collision *)x.e->data;
   for (int k = 0; k < 2; k++) {
     come_down(&x, k ? -4.9 : 0.15);
@@ -217,13 +218,13 @@ static PetscErrorCode check_other_way(void)
     }
     PetscCall(PetscArraycpy(x.u0, x.u, 3 * x.s->nnode));
     for (int step = 0; step < 4; step++) PetscCall(begin_step(&x, 4 * k + step, &deep));
-    SB_CHECK(deep > 0.1, "overlap is looked for %g m deep", (double)deep);
+    SB_CHECK(deep > 0.1, "overlap is searched for %g m deep", (double)deep);
     for (PetscInt i = 0; i < c->surface->scene.npoint; i++)
       led[k] += c->surface->scene.point_part[i] == 1 && c->way_part[i] == 2 * k;
   }
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, led, 2, MPIU_INT, MPI_SUM, x.s->comm));
-  SB_CHECK(led[0] > 3 && led[1] > 3, "%d points are led out of the first body, %d of the third", (int)led[0],
-           (int)led[1]);
+  SB_CHECK(led[0] > 3 && led[1] > 3, "%d points are separated from the first body, %d of the third",
+           (int)led[0], (int)led[1]);
   PetscCall(close_meeting(&x));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -254,13 +255,13 @@ static PetscErrorCode check_rows(const char *elements, const char *more)
   come_down(&x, 0.03);
   PetscCall(attempt(&x));
   PetscCall(gather_all(&x, &all));
-  total = x.s->couple->n;
+  total = x.s->constraints->n;
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &total, 1, MPIU_INT, MPI_SUM, x.s->comm));
   SB_CHECK(total > 5, "%d rows", (int)total);
   reach = 1e-12 * c->surface->size;
   for (PetscInt i = 0; i < c->nhit; i++) {
     const Hit *hit = &c->hit[i];
-    const SbCouple rows = x.s->couple;
+    const SbConstraints rows = x.s->constraints;
     PetscReal sum[3] = {0}, at = 0;
 
     if (hit->row < 0) continue;
@@ -286,7 +287,7 @@ static PetscErrorCode check_gaps(const char *elements, const char *more, PetscIn
   const SbEdgePair *pair;
   const SbNear *near;
   SbDetector detector;
-  SbSurface surface;
+  SbContactSurface surface;
   SbFacet *facet;
   Collision *c;
   Meeting x;
@@ -299,10 +300,10 @@ static PetscErrorCode check_gaps(const char *elements, const char *more, PetscIn
   come_down(&x, 0.03);
   PetscCall(attempt(&x));
   PetscCall(SbEffectFacets(x.s, &c->on, &n, &facet));
-  PetscCall(SbSurfaceCreate(x.s, n, facet, &surface));
+  PetscCall(SbContactSurfaceCreate(x.s, n, facet, &surface));
   PetscCall(PetscFree(facet));
   PetscCall(SbDetectorCreate(SB_DETECT_BRUTE, &detector));
-  PetscCall(SbSurfaceUpdate(surface, x.u0, x.u, c->reach, PETSC_FALSE, &close));
+  PetscCall(SbContactSurfaceUpdate(surface, x.u0, x.u, c->reach, PETSC_FALSE, &close));
   PetscCall(SbDetectorFind(detector, &surface->scene, &n, &near));
   PetscCall(SbDetectorFindEdges(detector, &surface->scene, &npair, &pair));
   SB_CHECK(close && n + npair == c->nhit, "%d pairs, and %d and %d by a detector of our own", (int)c->nhit,
@@ -324,7 +325,7 @@ static PetscErrorCode check_gaps(const char *elements, const char *more, PetscIn
              "pair %d is another one", (int)i);
     SB_CHECK_NEAR(hit->gap, near[i].gap, 1e-14, "gap of a pair");
   }
-  PetscCall(SbSurfaceDestroy(&surface));
+  PetscCall(SbContactSurfaceDestroy(&surface));
   PetscCall(SbDetectorDestroy(&detector));
   PetscCall(close_meeting(&x));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -356,7 +357,7 @@ static PetscErrorCode check_sides(void)
 
   PetscFunctionBeginUser;
   PetscCall(count_looks(PAIR("p1", "cr"), "", both));
-  PetscCall(count_looks(PAIR("p1", "cr"), "-effect_meet_sides one", one));
+  PetscCall(count_looks(PAIR("p1", "cr"), "-effect_meet_passes one", one));
   /* facets of b are smaller: 0.6 x 0.5 x 0.4 by 2 against 1 x 0.8 x 0.3 by 3 */
   SB_CHECK(both[0] > 0 && both[1] > 0, "both sides: %d and %d pairs", (int)both[0], (int)both[1]);
   SB_CHECK(one[0] * one[1] == 0 && one[0] + one[1] > 0, "one side: %d and %d pairs", (int)one[0],
@@ -395,14 +396,14 @@ static PetscErrorCode check_far(void)
       petsc_isend_ct + petsc_send_ct + petsc_irecv_ct + petsc_recv_ct + petsc_gather_ct;
 
     PetscCall(attempt(&x));
-    PetscCall((*x.e->ops.settle)(x.e, x.s, x.u, x.u, &changed));
+    PetscCall((*x.e->ops.update_active_set)(x.e, x.s, x.u, x.u, &changed));
     SB_CHECK(petsc_allreduce_ct - sums <= 5, "%g sums over ranks", petsc_allreduce_ct - sums);
     SB_CHECK(petsc_isend_ct + petsc_send_ct + petsc_irecv_ct + petsc_recv_ct + petsc_gather_ct == others,
              "bodies that are apart exchange something");
   }
   PetscTrMalloc = real_malloc;
   SB_CHECK(nmalloc == 0, "%d allocations in a step of bodies that are apart", nmalloc);
-  SB_CHECK(!changed && !x.s->couple->n, "nothing touches");
+  SB_CHECK(!changed && !x.s->constraints->n, "nothing touches");
   PetscCall(close_meeting(&x));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -462,8 +463,9 @@ static PetscErrorCode check_attempts(const char *response)
       "dg") " -sets low,top,side -set_side_at plane:1,0,0,0.03 -set_low_at plane:0,0,1,0 -set_top_at "    \
             "plane:0,0,1,0.15 "                                                                           \
             "-time static -static_steps 1 -ksp_rtol 1e-12 -snes_rtol 1e-11 -effects hold,push,side,meet " \
-            "-effect_side_type support -effect_side_on side -effect_side_components xy "                  \
-            "-effect_hold_type support -effect_hold_on low -effect_push_type drive -effect_push_on top "  \
+            "-effect_side_type fixed -effect_side_on side -effect_side_components xy "                    \
+            "-effect_hold_type fixed -effect_hold_on low -effect_push_type prescribed_displacement "      \
+            "-effect_push_on top "                                                                        \
             "-effect_push_displacement 0;0;-0.001 -effect_meet_type collision"
 
 enum { CONTACTS, DEEPEST, MEAN, NORMAL, FRICTION, WORK, LOSS, HOLD, PUSH, NVALUE };
@@ -492,7 +494,7 @@ static PetscErrorCode press(MPI_Comm comm, const char *more, PetscReal values[NV
   SB_CHECK(!t.run->stop_reason[0], "%s", t.run->stop_reason);
   PetscCall(VecDuplicate(t.run->U, &R));
   PetscCall(SbModelResidual(t.model, 1, t.run->U, NULL, NULL, PETSC_FALSE, R));
-  PetscCall(SbSpaceCoupleMeasure(t.model->space, t.run->U, R));
+  PetscCall(SbSpaceComputeConstraintForces(t.model->space, t.run->U, R));
   PetscCall(SbSpaceGetLocalRead(t.model->space, R, &r));
   PetscCall(SbSpaceGetLocalRead(t.model->space, t.run->U, &stage.u));
   for (PetscInt e = 0; e < t.model->neffect; e++) {
@@ -500,7 +502,7 @@ static PetscErrorCode press(MPI_Comm comm, const char *more, PetscReal values[NV
 
     for (int k = 0; k < 8; k++) column[k] = 0;
     PetscCall((*effect->ops.history)(effect, t.model->space, &stage, r, column));
-    if (effect->ops.touch)
+    if (effect->ops.begin_step)
       for (int k = 0; k <= LOSS; k++) values[k] = column[k];
     else if (strcmp(effect->name, "side"))
       values[!strcmp(effect->name, "hold") ? HOLD : PUSH] = column[2];
@@ -516,8 +518,9 @@ static PetscErrorCode press(MPI_Comm comm, const char *more, PetscReal values[NV
 /* The same numbers on all ranks together and on one; what holds the stack carries what presses it. */
 static PetscErrorCode check_press(const char *more)
 {
-  static const char *const name[NVALUE] = {"contacts", "penetration",   "mean",    "normal force", "friction",
-                                           "work",     "friction loss", "support", "drive"};
+  static const char *const name[NVALUE] = {"contacts",      "penetration", "mean",
+                                           "normal force",  "friction",    "work",
+                                           "friction loss", "fixed",       "prescribed_displacement"};
   PetscReal together[NVALUE], alone[NVALUE];
 
   PetscFunctionBeginUser;
@@ -594,7 +597,7 @@ int main(int argc, char **argv)
   SB_TEST_BEGIN(argc, argv);
   PetscCall(check_refused());
   PetscCall(check_rows(PAIR("p1", "cr"), ""));
-  PetscCall(check_rows(PAIR("dg", "p1"), "-effect_meet_sides one"));
+  PetscCall(check_rows(PAIR("dg", "p1"), "-effect_meet_passes one"));
   PetscCall(check_rows(CROSS("p1", "dg"), ""));
   PetscCall(check_gaps(PAIR("cr", "dg"), "", 0));
   PetscCall(check_gaps(CROSS("p1", "cr"), "", 3));

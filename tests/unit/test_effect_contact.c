@@ -42,15 +42,18 @@ static PetscErrorCode check_options(void)
                         "-effect_floor_damping 0.01 s is for springs that give"));
   PetscCall(check_error(&x, FLOOR "-effect_floor_restitution 0.5 -effect_floor_response penalty",
                         "-effect_floor_restitution 0.5 needs -effect_floor_response projected"));
-  PetscCall(check_error(&x, FLOOR "-effect_floor_recovery 0.5", "-effect_floor_recovery 0.5"));
+  PetscCall(
+    check_error(&x, FLOOR "-effect_floor_separation_steps 0.5", "-effect_floor_separation_steps 0.5"));
   PetscCall(check_error(&x, "-effect_floor_type contact -effect_floor_obstacle mesh:no.stl",
                         "-effect_floor_obstacle: no.stl: cannot open the file"));
-  PetscCall(check_error(&x, FLOOR "-effect_floor_arrival cut -effect_floor_restitution 0.5",
-                        "-effect_floor_restitution 0.5 and -effect_floor_arrival cut do not go together"));
+  PetscCall(
+    check_error(&x, FLOOR "-effect_floor_time_of_impact yes -effect_floor_restitution 0.5",
+                "-effect_floor_restitution 0.5 and -effect_floor_time_of_impact yes do not go together"));
   PetscCall(check_error(&x, FLOOR "-effect_floor_axis 0,0,0", "-effect_floor_axis: 0,0,0 is no direction"));
   PetscCall(check_error(&x, FLOOR "-effect_floor_displacement x;0;0", "-effect_floor_displacement"));
   PetscCall(effect_create(&x, "floor", FLOOR, &e));
-  SB_CHECK(e->linear && !e->steady && !e->ops.tangent && e->ops.hold && e->ops.settle && x.space->held,
+  SB_CHECK(e->linear && !e->steady && !e->ops.tangent && e->ops.assemble_constraints &&
+             e->ops.update_active_set && x.space->nodal,
            "projected, without friction");
   SB_CHECK(e->ncolumn == 8, "columns");
   PetscCall(SbEffectDestroy(&e));
@@ -59,8 +62,8 @@ static PetscErrorCode check_options(void)
 
   PetscCall(fixture_create(PETSC_COMM_WORLD, 1, "box:1,1,1:2", 1, hull, &x));
   PetscCall(effect_create(&x, "floor", FLOOR "-effect_floor_response multiplier", &e));
-  SB_CHECK(e->linear && e->saddle && !e->ops.tangent && e->ops.hold && !x.space->held && x.space->couple &&
-             SbSpaceCoupleOuter(x.space),
+  SB_CHECK(e->linear && e->saddle && !e->ops.tangent && e->ops.assemble_constraints && !x.space->nodal &&
+             x.space->constraints && SbSpaceHasExternalConstraints(x.space),
            "multiplier, without friction");
   PetscCall(SbEffectDestroy(&e));
   PetscCall(PetscOptionsClear(NULL));
@@ -68,12 +71,15 @@ static PetscErrorCode check_options(void)
 
   PetscCall(fixture_create(PETSC_COMM_WORLD, 1, "box:1,1,1:2", 1, hull, &x));
   PetscCall(effect_create(&x, "floor", FLOOR "-effect_floor_response penalty", &e));
-  SB_CHECK(!e->linear && e->ops.tangent && !e->ops.hold && !e->ops.settle && !x.space->held, "penalty");
+  SB_CHECK(!e->linear && e->ops.tangent && !e->ops.assemble_constraints && !e->ops.update_active_set &&
+             !x.space->nodal,
+           "penalty");
   PetscCall(SbEffectDestroy(&e));
   PetscCall(PetscOptionsClear(NULL));
   PetscCall(effect_create(&x, "floor", FLOOR "-effect_floor_friction 0.2", &e));
-  SB_CHECK(e->linear && !e->ops.tangent && e->ops.hold && !x.space->held && x.space->couple &&
-             SbSpaceCoupleOuter(x.space) && SbSpaceCoupleOblique(x.space),
+  SB_CHECK(e->linear && !e->ops.tangent && e->ops.assemble_constraints && !x.space->nodal &&
+             x.space->constraints && SbSpaceHasExternalConstraints(x.space) &&
+             SbSpaceHasNonsymmetricConstraints(x.space),
            "friction has rows");
   PetscCall(SbEffectDestroy(&e));
   PetscCall(PetscOptionsClear(NULL));
@@ -103,9 +109,9 @@ static PetscErrorCode press(Fixture *x, SbEffect e)
 
   PetscFunctionBeginUser;
   PetscCall(PetscCalloc1(3 * x->space->nnode, &u0));
-  PetscCall((*e->ops.touch)(e, x->space, 0, 0.1, u0, NULL, u0));
+  PetscCall((*e->ops.begin_step)(e, x->space, 0, 0.1, u0, NULL, u0));
   push(x, 1);
-  if (e->ops.settle) PetscCall((*e->ops.settle)(e, x->space, x->u, x->f, &changed));
+  if (e->ops.update_active_set) PetscCall((*e->ops.update_active_set)(e, x->space, x->u, x->f, &changed));
   PetscCall(PetscFree(u0));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -222,17 +228,17 @@ static PetscErrorCode rub(Fixture *x, const char *options)
   PetscCall(PetscCalloc1(3 * x->space->nnode, &u0));
   push(x, 0.15);
   PetscCall(to_vec(x, x->u, U));
-  PetscCall((*e->ops.touch)(e, x->space, 0, 0.1, u0, NULL, x->u));
+  PetscCall((*e->ops.begin_step)(e, x->space, 0, 0.1, u0, NULL, x->u));
   for (int solve = 0; solve < 3; solve++) {
-    SbSpaceCoupleClear(x->space);
-    PetscCall((*e->ops.hold)(e, x->space));
-    PetscCall(SbSpaceCoupleDone(x->space));
+    SbSpaceClearConstraints(x->space);
+    PetscCall((*e->ops.assemble_constraints)(e, x->space));
+    PetscCall(SbSpaceAssembleConstraints(x->space));
     PetscCall(VecZeroEntries(R));
-    PetscCall(SbSpaceCoupleMeasure(x->space, U, R));
-    PetscCall((*e->ops.settle)(e, x->space, x->u, x->f, &changed));
+    PetscCall(SbSpaceComputeConstraintForces(x->space, U, R));
+    PetscCall((*e->ops.update_active_set)(e, x->space, x->u, x->f, &changed));
   }
   PetscCall(VecZeroEntries(R));
-  PetscCall(SbSpaceCoupleForce(x->space, U, R));
+  PetscCall(SbSpaceAddConstraintForces(x->space, U, R));
   PetscCall(from_vec(R, x));
   PetscCall(PetscFree(u0));
   PetscCall(VecDestroy(&U));
@@ -306,14 +312,16 @@ static PetscErrorCode check_scene(void)
   PetscFunctionBeginUser;
   PetscCall(PetscLogDefaultBegin());
   PetscCall(test_scene_open(BLOCK "-effects gravity,floor " FLOOR, &t));
-  SB_CHECK(t.model->ntouch == 1 && t.model->nhold == 1 && t.model->nsettle == 1 && t.model->space->held,
+  SB_CHECK(t.model->nbegin_step == 1 && t.model->nassemble_constraints == 1 &&
+             t.model->nupdate_active_set == 1 && t.model->space->nodal,
            "a scene with contact");
   PetscCall(SbRunSolve(t.run));
   PetscCall(PetscLogEventGetPerfInfo(PETSC_DETERMINE, SbEvents[SB_EVENT_CONTACT], &before));
   SB_CHECK(before.count > 0, "contact is logged");
   PetscCall(test_scene_close(&t));
   PetscCall(test_scene_open(BLOCK "-effects gravity", &t));
-  SB_CHECK(!t.model->ntouch && !t.model->nhold && !t.model->nsettle && !t.model->space->held,
+  SB_CHECK(!t.model->nbegin_step && !t.model->nassemble_constraints && !t.model->nupdate_active_set &&
+             !t.model->space->nodal,
            "a scene without contact has nothing of it");
   PetscCall(SbRunSolve(t.run));
   PetscCall(PetscLogEventGetPerfInfo(PETSC_DETERMINE, SbEvents[SB_EVENT_CONTACT], &info));

@@ -188,12 +188,12 @@ static PetscErrorCode check_taylor(Fixture *x, SbEffect e, Mat A, PetscBool rim)
   PetscCall(tangent(x, e, 1, A));
   PetscCall(apply(x, A, w, Aw));
   // The part that is applied beside the matrix.
-  if (e->ops.unsymmetric) {
+  if (e->ops.nonsymmetric) {
     const SbStage stage = {.t = 2, .u = x->u, .shift_k = 1};
     PetscReal *y;
 
     PetscCall(PetscCalloc1(3 * n, &y));
-    PetscCall((*e->ops.unsymmetric)(e, x->space, &stage, w, y));
+    PetscCall((*e->ops.nonsymmetric)(e, x->space, &stage, w, y));
     for (PetscInt i = 0; i < 3 * x->space->nnode_owned; i++) Aw[i] += y[i];
     PetscCall(PetscFree(y));
   }
@@ -233,7 +233,7 @@ static PetscErrorCode check_tangent(Fixture *x)
   PetscCall(SbSpaceCreateMatrix(x->space, SB_MATRIX_BAIJ, &A));
   PetscCall(check_taylor(x, closed, A, PETSC_FALSE));
   // The facets of CR and DG do not meet at their edges: all of the tangent of an open surface is applied facet by facet, and exact at a free rim.
-  SB_CHECK(!closed->ops.unsymmetric && !open->ops.unsymmetric == !x->space->faces,
+  SB_CHECK(!closed->ops.nonsymmetric && !open->ops.nonsymmetric == !x->space->faces,
            "what is beside the matrix");
   PetscCall(check_taylor(x, open, A, (PetscBool)!x->space->faces));
 

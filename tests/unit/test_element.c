@@ -57,7 +57,7 @@ static void test_tabulate(SbElement e, PetscRandom random)
     for (int k = 0; k < 9; k++) edge[k] = x[1 + k / 3][k % 3] - x[0][k % 3];
     SbCross(edge + 3, edge + 6, n);
     SB_CHECK_NEAR(V, SbDot3(edge, n) / 6, 1e-13 * size * size * size, "volume");
-    SB_CHECK(V > 0, "the tet is inside out");
+    SB_CHECK(V > 0, "the tet is inverted");
   }
 }
 
@@ -74,10 +74,10 @@ static void test_orientation(SbElement e)
     for (int i = 0; i < 3; i++) SB_CHECK_NEAR(g[a][i], factor * (a == i), 0, "gradient in the unit tet");
   }
   e->ops.tabulate(y, h, &V);
-  SB_CHECK_NEAR(V, -1. / 6, 1e-16, "volume inside out");
+  SB_CHECK_NEAR(V, -1. / 6, 1e-16, "volume inverted");
   for (int i = 0; i < 3; i++) {
-    SB_CHECK_NEAR(h[0][i], g[1][i], 0, "gradient inside out");
-    SB_CHECK_NEAR(h[1][i], g[0][i], 0, "gradient inside out");
+    SB_CHECK_NEAR(h[0][i], g[1][i], 0, "gradient inverted");
+    SB_CHECK_NEAR(h[1][i], g[0][i], 0, "gradient inverted");
   }
 }
 

@@ -332,7 +332,7 @@ static void test_patch(SbElement e, SbMaterial m)
     for (int l = 0; l < 4; l++) {
       const int *corner = face[start + l], node[4] = {8, corner[0], corner[1], corner[2]};
 
-      SB_CHECK(c.V[l] > 0, "tet %d of the patch is inside out", start + l);
+      SB_CHECK(c.V[l] > 0, "tet %d of the patch is inverted", start + l);
       volume += c.V[l];
       for (int k = 0; k < 12; k++) f[node[k / 3]][k % 3] += fe[k][l];
     }

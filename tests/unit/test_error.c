@@ -66,7 +66,7 @@ int main(int argc, char **argv)
   fd = open(file, O_WRONLY | O_APPEND);
   if (fd < 0 || dup2(fd, STDERR_FILENO) < 0) return 2;
 
-  SbErrorSetFarewell(farewell, NULL);
+  SbErrorSetFailureHandler(farewell, NULL);
   code = SbErrorFinish(program(argc, argv, rank, size));
   SB_CHECK(code == 1, "exit code %d on rank %d", code, rank);
   SB_CHECK(spoken == (rank == size - 1), "rank %d said farewell %d times", rank, spoken);

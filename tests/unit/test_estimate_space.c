@@ -122,7 +122,7 @@ static PetscErrorCode check_patch(const char *element, const char *law)
     for (int k = 0; k < 2; k++) {
       PetscCall(estimate(m, k ? turned_field : wavy_field, &est));
       error2[k] =
-        est->body2[0] / est->factor[0]; /* the factor looks at forces of supports, of which there are none */
+        est->body2[0] / est->factor[0]; /* the factor examines forces of supports, of which there are none */
       PetscCall(SbSpaceEstimateDestroy(&est));
     }
     SB_CHECK_NEAR(error2[1] / error2[0], 1., 1e-9, "estimate of a turned body over that before");
@@ -183,7 +183,7 @@ static PetscErrorCode many_bodies(MPI_Comm comm, PetscReal value[3 * NVALUE])
     "-body_c_density 1 -body_a_inclusions far -sets far -set_far_at box:0.5,0,0,1,1,1 "
     "-inclusion_far_material linear -inclusion_far_young 5e3 -inclusion_far_poisson 0.3 "
     "-inclusion_far_density 1 "
-    "-effects hold,weight -effect_hold_type support -effect_hold_on zmin -effect_weight_type gravity "
+    "-effects hold,weight -effect_hold_type fixed -effect_hold_on zmin -effect_weight_type gravity "
     "-effect_weight_vector 0,0,-9.81 -time static",
     &m));
   PetscCall(estimate(m, wavy_field, &est));

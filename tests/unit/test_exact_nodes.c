@@ -1,15 +1,15 @@
 // @ranks 1 3
 /*
   Nodes solved exactly: whatever the rest of the preconditioner does, the residual on them is gone afterwards (to the 1e-4 of
-  the 16-bit factor); the correction is symmetric; nodes that are held or whose row is not local are never chosen.
+  the 16-bit factor); the correction is symmetric; nodes that are constrained or whose row is not local are never chosen.
 */
-#include "../../src/fem/rotated.h"
+#include "../../src/solver/rotated.h"
 #include "../scene.h"
 
 static const char *const scene = "-bodies a -body_a_mesh box:1,0.5,0.4:6,4,4 -body_a_material corotated "
                                  "-body_a_young 1e3 -body_a_poisson 0.3 -body_a_density 10 "
                                  "-sets left -set_left_at plane:1,0,0,0 -effects clamp -effect_clamp_type "
-                                 "support -effect_clamp_on left -effect_clamp_components x";
+                                 "fixed -effect_clamp_on left -effect_clamp_components x";
 
 static void wave(const PetscReal x[3], PetscReal v[3])
 {

@@ -4,7 +4,7 @@
   a matrix that is not positive definite. Rounding the columns to 1.5e-5 of their largest entry gives errors of
   that size times the condition number of the factor, here about 3: 2e-4 is allowed.
 */
-#include "../../src/fem/factor.h"
+#include "../../src/solver/factor.h"
 #include <test.h>
 #include <petscblaslapack.h>
 

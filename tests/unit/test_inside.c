@@ -47,7 +47,7 @@ static PetscInt loop(const Case *c, PetscInt point, PetscBool self, PetscReal re
       }
       if (far <= 2 * reach) continue;
     }
-    for (int q = 0; q < 4; q++) SbSurfacePlace(space, 4 * cell + q, c->u, x[q]);
+    for (int q = 0; q < 4; q++) SbContactSurfacePosition(space, 4 * cell + q, c->u, x[q]);
     for (int k = 0; k < 3; k++) {
       for (int q = 0; q < 3; q++) A[q][k] = x[q + 1][k] - x[0][k];
       b[k] = g->p[3 * point + k] - x[0][k];
@@ -104,7 +104,7 @@ static PetscErrorCode test_pair(const char *options, SbDetectKind kind)
 
     for (int k = 0; k < 2; k++) {
       PetscCall(fill(&x[k], step, 0.02, 0.02 * step, step ? -0.06 * step : 0.2, x[k].u));
-      PetscCall(SbSurfaceUpdate(x[k].s, NULL, x[k].u, 0.03, PETSC_FALSE, &close));
+      PetscCall(SbContactSurfaceUpdate(x[k].s, NULL, x[k].u, 0.03, PETSC_FALSE, &close));
     }
     PetscCall(compare(x, inside, PETSC_FALSE, 0.03, step ? &count : &apart));
   }
@@ -139,7 +139,7 @@ static PetscErrorCode test_ring(const char *element)
         x[k].u[3 * i + 1] = 0.02 * X[0];
         x[k].u[3 * i + 2] = r * PetscCosReal(turn * X[0]) - X[2];
       }
-      PetscCall(SbSurfaceUpdate(x[k].s, NULL, x[k].u, 0.02, PETSC_TRUE, &close));
+      PetscCall(SbContactSurfaceUpdate(x[k].s, NULL, x[k].u, 0.02, PETSC_TRUE, &close));
     }
     PetscCall(compare(x, inside, PETSC_TRUE, 0.02, &count[step > 0]));
   }
@@ -163,7 +163,7 @@ static PetscErrorCode test_coincident(const char *options, PetscInt set, PetscRe
   PetscCall(open_on(PETSC_COMM_WORLD, options, set, &c));
   PetscCall(SbInsideCreate(c.s, SB_DETECT_HASH, &inside));
   PetscCall(fill(&c, 0, 0, shift, lift, c.u));
-  PetscCall(SbSurfaceUpdate(c.s, NULL, c.u, 0.1, PETSC_FALSE, &close));
+  PetscCall(SbContactSurfaceUpdate(c.s, NULL, c.u, 0.1, PETSC_FALSE, &close));
   PetscCall(PetscMalloc1(c.s->scene.npoint, &part));
   PetscCall(SbInsideFind(inside, c.u, PETSC_FALSE, part));
   for (PetscInt i = 0; i < c.s->scene.npoint; i++) n += part[i] >= 0;

@@ -2,7 +2,7 @@
 /*
   Face terms of CR and DG against their formula: for each face the jump at three points of a rule that is exact for squares,
   from the two cells' own functions at places in space, with no use of the nodes that the face has in jump.c. DG faces that are
-  held add the mean against that of their support.
+  constrained add the mean against that of their support.
 */
 #include "../../src/fem/fem_impl.h"
 #include "../scene.h"
@@ -15,7 +15,7 @@ static const char *const scene =
   "-body_b_scale 0.1 "
   "-body_b_translate 0,0,2 -body_b_material neohookean -body_b_young 3e5 -body_b_poisson 0.45 "
   "-body_b_density 500 "
-  "-body_b_element %s -effects damping,clamp -effect_damping_beta 0.02 -effect_clamp_type support "
+  "-body_b_element %s -effects damping,clamp -effect_damping_beta 0.02 -effect_clamp_type fixed "
   "-effect_clamp_on a.xmin";
 
 static void wave(const PetscReal x[3], PetscReal v[3])
@@ -117,7 +117,7 @@ static PetscReal face_energy(SbModel m, PetscInt i, const PetscReal u[])
          (e->gamma1 * 2. * law->mu * square + e->gamma0 * (2. * law->mu + law->lambda) * SbDot3(mean, mean));
 }
 
-/* A DG face that is held: its mean against that of the support, which is infinitely stiff. */
+/* A DG face that is constrained: its mean against that of the support, which is infinitely stiff. */
 static PetscReal support_energy(SbModel m, PetscInt i, const PetscReal u[])
 {
   const SbSpace s = m->space;
@@ -126,7 +126,8 @@ static PetscReal support_energy(SbModel m, PetscInt i, const PetscReal u[])
                               k = (2. * law->mu + law->lambda) * area / cell_volume(s->mesh, i / 4);
   PetscReal square = 0.;
 
-  for (int c = 0; c < 3; c++) square += PetscSqr(u[3 * s->cell_node[i] + c] - u[3 * s->support[i] + c]);
+  for (int c = 0; c < 3; c++)
+    square += PetscSqr(u[3 * s->cell_node[i] + c] - u[3 * s->dirichlet_node[i] + c]);
   return SbSpaceCellElement(s, i / 4)->gamma0 * k * area * square;
 }
 
@@ -140,7 +141,7 @@ static PetscErrorCode formula(SbModel m, const PetscReal u[], PetscReal *energy)
   for (PetscInt i = 0; i < 4 * s->mesh->ncell_owned; i++) {
     if (!SbSpaceCellElement(s, i / 4)->nodes_per[0] && s->neighbour[i] >= 0)
       *energy += 0.5 * face_energy(m, i, u);
-    if (s->support && s->support[i] >= 0) *energy += support_energy(m, i, u);
+    if (s->dirichlet_node && s->dirichlet_node[i] >= 0) *energy += support_energy(m, i, u);
   }
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, energy, 1, MPIU_REAL, MPI_SUM, m->comm));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -11,8 +11,8 @@
   " -body_" name "_element " element
 #define SETS                                                                         \
   " -sets low,ball -set_low_at plane:0,0,1,0 -set_ball_at sphere:0.25,0.2,0.15,0.16" \
-  " -effects clamp,push -effect_clamp_type support -effect_clamp_on low"             \
-  " -effect_push_type support -effect_push_on ball -effect_push_components y"
+  " -effects clamp,push -effect_clamp_type fixed -effect_clamp_on low"               \
+  " -effect_push_type fixed -effect_push_on ball -effect_push_components y"
 
 static const char *const scenes[] = {
   "-bodies a" BODY("a", "p1", "0") SETS,
@@ -45,7 +45,7 @@ static PetscInt expected_nodes(SbModel m)
 
     /* each inner face is one of two cells */
     n += per[0] ? body->nvert : per[3] ? 4 * body->ncell : (4 * body->ncell + body->nfacet) / 2;
-    /* the first body stands on the plane that is held: 3 x 3 squares of two triangles */
+    /* the first body stands on the plane that is constrained: 3 x 3 squares of two triangles */
     if (b == 0 && per[3]) n += 18;
   }
   return n;
@@ -122,7 +122,7 @@ static PetscErrorCode compare(SbModel m, SbModel alone)
   SB_CHECK(count == expected_nodes(m) && m->space->Nnode == count && alone->space->Nnode == count,
            "%d nodes, and the space has %d, the meshes %d", (int)count, (int)m->space->Nnode,
            (int)expected_nodes(m));
-  SB_CHECK(fixed > 0 && fixed < count && in_set == fixed, "%d nodes are held, %d in sets", (int)fixed,
+  SB_CHECK(fixed > 0 && fixed < count && in_set == fixed, "%d nodes are constrained, %d in sets", (int)fixed,
            (int)in_set);
   SB_CHECK_NEAR(mass, 1000. * 0.5 * 0.4 * 0.3 * (PetscReal)m->mesh->nbody, 1e-12 * mass, "mass of all nodes");
   PetscCall(PetscFree(one));
@@ -164,9 +164,9 @@ static void check_cliques(SbSpace s)
 
     if (l >= s->batch_n[b]) continue;
     SB_CHECK(node[0] == s->cell_node[4 * cell + a], "own node of a clique");
-    if (s->support && s->support[4 * cell + a] >= 0) {
-      SB_CHECK(node[4 * SB_BATCH] == s->support[4 * cell + a] && weight == 0. &&
-                 s->fixed[s->support[4 * cell + a]] == 7,
+    if (s->dirichlet_node && s->dirichlet_node[4 * cell + a] >= 0) {
+      SB_CHECK(node[4 * SB_BATCH] == s->dirichlet_node[4 * cell + a] && weight == 0. &&
+                 s->fixed[s->dirichlet_node[4 * cell + a]] == 7,
                "a held face has weight %g", (double)weight);
     } else if (!SbSpaceCellElement(s, cell)->nodes_per[3] || s->neighbour[4 * cell + a] < 0) {
       SB_CHECK(node[4 * SB_BATCH] == node[0] && weight == 1., "a side without another has weight %g",

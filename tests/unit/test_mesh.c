@@ -23,7 +23,7 @@ static PetscErrorCode make_scene(SbBody body[3], SbSet set[NSET])
 }
 
 /* Every rank builds the whole mesh once more and looks up what it was given. */
-static PetscErrorCode compare_with_whole(SbMesh mesh, const SbWhole *whole)
+static PetscErrorCode compare_with_whole(SbMesh mesh, const SbMergedMesh *whole)
 {
   PetscInt wrong_vert = 0, wrong_cell = 0;
 
@@ -95,7 +95,7 @@ static PetscErrorCode test_scene(const char *partitioner, PetscBool face_nodes)
   SbBody body[3], body_again[3];
   SbSet set[NSET], set_again[NSET];
   SbMesh mesh;
-  SbWhole whole;
+  SbMergedMesh whole;
 
   PetscFunctionBeginUser;
   PetscCall(PetscOptionsSetValue(NULL, "-mesh_partitioner", partitioner));
@@ -104,7 +104,7 @@ static PetscErrorCode test_scene(const char *partitioner, PetscBool face_nodes)
   body[0].face_nodes = face_nodes;
   PetscCall(SbMeshCreate(PETSC_COMM_WORLD, 3, body, NSET, set, &mesh));
   PetscCall(SbMeshValidate(mesh));
-  PetscCall(SbWholeCreate(3, body_again, NSET, set_again, &whole));
+  PetscCall(SbMergedMeshCreate(3, body_again, NSET, set_again, &whole));
   PetscCall(compare_with_whole(mesh, &whole));
   PetscCall(check_broadcast(mesh));
   if (face_nodes) PetscCall(check_layer(mesh));
@@ -117,7 +117,7 @@ static PetscErrorCode test_scene(const char *partitioner, PetscBool face_nodes)
   }
   SB_CHECK(set[0].nvert == 5 && set[0].nfacet == 4 && set[3].ncell == body[1].ncell,
            "%d vertices, %d facets in the wall", (int)set[0].nvert, (int)set[0].nfacet);
-  PetscCall(SbWholeDestroy(&whole));
+  PetscCall(SbMergedMeshDestroy(&whole));
   PetscCall(SbMeshDestroy(&mesh));
   SB_CHECK(!mesh, "the mesh is gone");
   PetscCall(SbMeshDestroy(&mesh));

@@ -45,7 +45,7 @@ static PetscErrorCode test_repairs(void)
   SB_CHECK(m.im.item[0].n == 0 && m.im.item[2].n == 2, "%d points and %d triangles left", (int)m.im.item[0].n,
            (int)m.im.item[2].n);
   for (PetscInt c = 0; c < 2; c++)
-    SB_CHECK_NEAR(SbTetDet(m.im.x, m.im.item[3].vert + 4 * c), 1, 0, "determinant");
+    SB_CHECK_NEAR(SbTetDeterminant(m.im.x, m.im.item[3].vert + 4 * c), 1, 0, "determinant");
   SB_CHECK(m.body.npart == 2, "%d parts", (int)m.body.npart);
   SB_CHECK(!strcmp(m.body.note, "unused vertices left out: 2, inverted tets turned: 1, parts that share no "
                                 "vertex: 2, triangles of groups that are no face of a "

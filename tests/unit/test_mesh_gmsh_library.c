@@ -89,7 +89,7 @@ static PetscErrorCode test_cube(void)
   for (PetscInt c = 1; c < im.item[3].n; c++)
     SB_CHECK(im.item[3].number[c] > im.item[3].number[c - 1], "tets are not in the order of their numbers");
   PetscCall(SbImportCheck(&im, &faces));
-  for (PetscInt c = 0; c < im.item[3].n; c++) volume += SbTetDet(im.x, im.item[3].vert + 4 * c) / 6;
+  for (PetscInt c = 0; c < im.item[3].n; c++) volume += SbTetDeterminant(im.x, im.item[3].vert + 4 * c) / 6;
   SB_CHECK_NEAR(volume, 1, 1e-12, "volume");
   /* the body can go on growing */
   PetscCall(SbImportAddItem(&im, 3, (PetscInt[]){0, 1, 2, 3}, 0, 1));

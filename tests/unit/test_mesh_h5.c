@@ -47,7 +47,7 @@ static PetscErrorCode fingerprint(const char *mesh_path, PetscReal sum[4])
   for (PetscInt c = 0; c < mesh->ncell_owned; c++) {
     const PetscInt *v = mesh->cell + 4 * c;
 
-    mine[0] += SbTetDet(mesh->x, v) / 6;
+    mine[0] += SbTetDeterminant(mesh->x, v) / 6;
     for (int a = 0; a < 4; a++)
       mine[1] += (PetscReal)(mesh->cell_orig[c] + 1) * (a + 1) * (PetscReal)(mesh->vert_orig[v[a]] + 1);
     mine[2] += (mesh->cell_set[c] & SB_SET_BIT(1)) != 0;

@@ -65,7 +65,7 @@ static PetscErrorCode test_members(void)
   enum { NITEM = 40, NGROUP = 9 };
   static PetscBool expected[4][NITEM][NGROUP + 1];
   SbImport im;
-  SbMembers members;
+  SbGroupMembership members;
   PetscInt group[NGROUP + 1], tags, wrong = 0;
 
   PetscFunctionBeginUser;
@@ -86,10 +86,10 @@ static PetscErrorCode test_members(void)
   for (int k = 0; k < 700; k++) {
     const int d = rand() % 4, i = rand() % NITEM, g = rand() % NGROUP;
 
-    PetscCall(SbMembersAdd(&members, d, i, group[g]));
+    PetscCall(SbGroupMembershipAdd(&members, d, i, group[g]));
     expected[d][i][g] = PETSC_TRUE;
   }
-  PetscCall(SbMembersApply(&members, &im));
+  PetscCall(SbGroupMembershipApply(&members, &im));
   for (int d = 0; d < 4; d++) {
     for (PetscInt i = 0; i < NITEM; i++) {
       for (int g = 0; g <= NGROUP; g++) wrong += has_group(&im, d, i, group[g]) != expected[d][i][g];

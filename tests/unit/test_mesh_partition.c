@@ -6,7 +6,7 @@
 static PetscErrorCode cut(const char *mesh, SbPartitioner type, PetscInt *most, PetscInt *cells,
                           PetscInt *faces)
 {
-  SbWhole whole;
+  SbMergedMesh whole;
   SbBody body = test_body("b", mesh);
   PetscMPIInt rank, size, *part;
   PetscInt count[64] = {0}, n[3] = {0, 0, 0};
@@ -14,7 +14,7 @@ static PetscErrorCode cut(const char *mesh, SbPartitioner type, PetscInt *most, 
   PetscFunctionBeginUser;
   PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
   PetscCallMPI(MPI_Comm_size(PETSC_COMM_WORLD, &size));
-  PetscCall(SbWholeCreate(1, &body, 0, NULL, &whole));
+  PetscCall(SbMergedMeshCreate(1, &body, 0, NULL, &whole));
   if (rank) whole.nvert = whole.ncell = 0;
   PetscCall(PetscMalloc1(whole.ncell, &part));
   PetscCall(SbPartition(PETSC_COMM_WORLD, type, &whole, part));
@@ -34,7 +34,7 @@ static PetscErrorCode cut(const char *mesh, SbPartitioner type, PetscInt *most, 
   *cells = n[1];
   *faces = n[2];
   PetscCall(PetscFree(part));
-  PetscCall(SbWholeDestroy(&whole));
+  PetscCall(SbMergedMeshDestroy(&whole));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -36,7 +36,7 @@ static PetscReal family(const SbImport *im, PetscInt c, PetscReal *smallest)
 
   *smallest = PETSC_MAX_REAL;
   for (PetscInt k = 8 * c; k < 8 * c + 8; k++) {
-    const PetscReal det = SbTetDet(im->x, im->item[3].vert + 4 * k);
+    const PetscReal det = SbTetDeterminant(im->x, im->item[3].vert + 4 * k);
 
     sum += det;
     *smallest = PetscMin(*smallest, det);
@@ -65,7 +65,7 @@ static PetscErrorCode test_children(const char *path)
     }
   }
   for (PetscInt c = 0; c < im->item[3].n; c++) {
-    const PetscReal det = SbTetDet(im->x, im->item[3].vert + 4 * c);
+    const PetscReal det = SbTetDeterminant(im->x, im->item[3].vert + 4 * c);
     PetscReal smallest;
     const PetscReal sum = family(fine, c, &smallest);
 

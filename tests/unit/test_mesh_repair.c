@@ -1,11 +1,11 @@
-// Repair: each kind of damage is found, counted and gone afterwards; what it cannot mend is an error.
+// Repair: each kind of damage is found, counted and gone afterwards; what it cannot repair is an error.
 // @ranks 1
 #include "mesh_same.h"
 
-static PetscErrorCode repaired(SbImport *im, PetscReal weld, SbRepair *r, SbMeshFacts *facts)
+static PetscErrorCode repaired(SbImport *im, PetscReal merge_tolerance, SbRepair *r, SbMeshFacts *facts)
 {
   PetscFunctionBeginUser;
-  PetscCall(SbMeshFileRepair(im, weld, r));
+  PetscCall(SbMeshFileRepair(im, merge_tolerance, r));
   PetscCall(SbMeshFileMeasure(im, facts));
   SB_CHECK(!strstr(facts->body.note, "unused") && !strstr(facts->body.note, "inverted") &&
              !strstr(facts->body.note, "no face"),
@@ -60,7 +60,7 @@ static PetscErrorCode test_weld(void)
            "%d vertices, %d tets, %d parts", (int)facts.body.nvert, (int)facts.body.ncell,
            (int)facts.body.npart);
   SB_CHECK_NEAR(facts.body.volume, 1, 1e-10, "volume");
-  SB_CHECK_NEAR(r.weld, 1e-9 * sqrt(3.), 1e-11, "tolerance");
+  SB_CHECK_NEAR(r.merge_tolerance, 1e-9 * sqrt(3.), 1e-11, "tolerance");
   PetscCall(SbMeshFileDestroy(&im));
 
   PetscCall(test_read("box:1,1,1:4", 0, &im));

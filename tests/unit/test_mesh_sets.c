@@ -54,19 +54,19 @@ static PetscErrorCode test_parse(void)
 }
 
 /* One set on two bodies: "a" the two cubes (x from 0 to 2), "b" a unit box of 2 x 2 x 2 cells at x = 5. */
-static PetscErrorCode build(const char *text, SbSet *set, SbWhole *whole)
+static PetscErrorCode build(const char *text, SbSet *set, SbMergedMesh *whole)
 {
   SbBody body[2] = {test_body("a", DATA "two_cubes_41.msh"), test_body("b", "box:1,1,1:2")};
 
   PetscFunctionBeginUser;
   body[1].translate[0] = 5;
   PetscCall(test_set("clamp", text, set));
-  PetscCall(SbWholeCreate(2, body, 1, set, whole));
+  PetscCall(SbMergedMeshCreate(2, body, 1, set, whole));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Whether a neighbour is in the same body and has this cell for a neighbour. */
-static PetscBool sees_back(const SbWhole *whole, PetscInt c, PetscInt neighbour)
+static PetscBool sees_back(const SbMergedMesh *whole, PetscInt c, PetscInt neighbour)
 {
   const PetscInt *n = whole->neighbour + 4 * neighbour;
 
@@ -77,7 +77,7 @@ static PetscBool sees_back(const SbWhole *whole, PetscInt c, PetscInt neighbour)
 
 static PetscErrorCode test_counts(const char *text, PetscInt nvert, PetscInt nfacet, PetscInt ncell)
 {
-  SbWhole whole;
+  SbMergedMesh whole;
   SbSet set;
   PetscInt n[3] = {0, 0, 0};
 
@@ -101,14 +101,14 @@ static PetscErrorCode test_counts(const char *text, PetscInt nvert, PetscInt nfa
   }
   SB_CHECK(n[0] == nvert && n[1] == nfacet && n[2] == ncell, "%s: masks of %d vertices, %d facets, %d cells",
            text, (int)n[0], (int)n[1], (int)n[2]);
-  PetscCall(SbWholeDestroy(&whole));
+  PetscCall(SbMergedMeshDestroy(&whole));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* An inner surface is seen from the cells on both sides, and both sides agree. */
 static PetscErrorCode test_inner(void)
 {
-  SbWhole whole;
+  SbMergedMesh whole;
   SbSet set;
   PetscInt nface = 0, alone = 0;
 
@@ -127,18 +127,18 @@ static PetscErrorCode test_inner(void)
   }
   SB_CHECK(nface == 8 && !alone, "%d sides of inner facets, %d without the other side", (int)nface,
            (int)alone);
-  PetscCall(SbWholeDestroy(&whole));
+  PetscCall(SbMergedMeshDestroy(&whole));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 static PetscErrorCode fail(const char *text)
 {
-  SbWhole whole;
+  SbMergedMesh whole;
   SbSet set;
 
   PetscFunctionBeginUser;
   PetscCall(build(text, &set, &whole));
-  PetscCall(SbWholeDestroy(&whole));
+  PetscCall(SbMergedMeshDestroy(&whole));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

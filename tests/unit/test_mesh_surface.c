@@ -1,6 +1,6 @@
-// Bodies from closed surfaces: regions, cavities and groups of each kind of file; what is mended is said; what is wrong is named.
+// Bodies from closed surfaces: regions, cavities and groups of each kind of file; what is repaired is said; what is wrong is named.
 // @ranks 1 3
-#include "../../src/skin/skin_impl.h"
+#include "../../src/surface/surface_impl.h"
 #include "mesh_test.h"
 #include "surface_files.h"
 
@@ -71,7 +71,8 @@ static PetscReal of_group(const SbImport *im, int dim, const char *name)
       const PetscInt set = im->item[dim].tags[i];
 
       for (PetscInt k = im->tags_start[set]; k < im->tags_start[set + 1]; k++) {
-        if (im->tags_group[k] == g) sum += dim == 3 ? SbTetDet(im->x, im->item[3].vert + 4 * i) / 6 : 1;
+        if (im->tags_group[k] == g)
+          sum += dim == 3 ? SbTetDeterminant(im->x, im->item[3].vert + 4 * i) / 6 : 1;
       }
     }
   }
@@ -201,7 +202,7 @@ static PetscErrorCode check_wall(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A cavity in a box, with a box in it; the same turned inside out as a whole. */
+/* A cavity in a box, with a box in it; the same inverted as a whole. */
 static PetscErrorCode check_cavity(PetscBool turned)
 {
   TestSurface s;
@@ -221,7 +222,7 @@ static PetscErrorCode check_cavity(PetscBool turned)
     SB_CHECK(body.npart == 2, "%d parts", (int)body.npart);
     SB_CHECK(strstr(body.note, "triangles turned to the side of their neighbours: 1, cavities: 1"), "'%s'",
              body.note);
-    SB_CHECK(!strstr(body.note, "inside out") == !turned, "'%s'", body.note);
+    SB_CHECK(!strstr(body.note, "inverted") == !turned, "'%s'", body.note);
     PetscCall(SbImportDestroy(&im));
   }
   test_surface_free(&s);
@@ -397,7 +398,7 @@ static PetscErrorCode check_ply(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* ------------------------------------------------------------------ mended */
+/* ------------------------------------------------------------------ repaired */
 
 /* Cubes whose defects are repaired give their volume and say so. */
 static PetscErrorCode mend(TestSurface *s, const SbTetOptions *options, PetscReal volume, const char *words)
@@ -433,12 +434,13 @@ static PetscErrorCode check_mended(void)
   s.tri[2][2] = s.tri[2][2] == 7 ? 8 : s.tri[2][2];
   PetscCall(refuse(".off", &s, NULL, NULL,
                    "edges have a triangle on one side only, the first is that of triangle 3 from (1, 1, "));
-  PetscCall(refuse(".off", &s, NULL, NULL, "-body_b_weld 1.9e-06 joins them"));
-  options.weld = 1e-5;
+  PetscCall(refuse(".off", &s, NULL, NULL, "-body_b_merge_tolerance 1.9e-06 joins them"));
+  options.merge_tolerance = 1e-5;
   PetscCall(mend(&s, &options, 1, "vertices joined within 1e-05 m: 1 (by up to 1.7e-06 m)"));
   cube_at(0, 1, PETSC_FALSE, &s); /* a tolerance that joins everything */
-  options.weld = 0.9;
-  PetscCall(refuse(".off", &s, NULL, &options, "-body_b_weld 0.9 m would join corners of one triangle"));
+  options.merge_tolerance = 0.9;
+  PetscCall(
+    refuse(".off", &s, NULL, &options, "-body_b_merge_tolerance 0.9 m would join corners of one triangle"));
   test_surface_grow(&s, 1, 2); /* given twice, and a corner twice */
   for (int k = 0; k < 3; k++) {
     s.tri[12][k] = s.tri[3][(k + 1) % 3];
@@ -500,8 +502,8 @@ static PetscErrorCode check_refused(void)
   SbTriangles t;
   int64_t number[1000];
   SbTriangleFile file = {.where = "test", .t = &t, .number = number};
-  SbMended mended;
-  SbSkin skin;
+  SbSurfaceRepairs mended;
+  SbSurface body_surface;
 
   PetscFunctionBeginUser;
   memset(&s, 0, sizeof(s));
@@ -522,7 +524,7 @@ static PetscErrorCode check_refused(void)
   cube_at(0, 1, PETSC_FALSE, &s); /* two sheets on each other */
   for (int v = 0; v < 8; v++) s.x[v][2] *= 1.5e-10;
   PetscCall(SbTetDefaults(&options));
-  options.weld = 0;
+  options.merge_tolerance = 0;
   PetscCall(refuse(".off", &s, NULL, &options, "encloses no volume; give it a thickness"));
   clear(&s);
   for (int i = 0; i < 1001; i++) cube_at(2 * i, 1, PETSC_FALSE, &s); /* specks */
@@ -538,8 +540,9 @@ static PetscErrorCode check_refused(void)
   t.x = &s.x[0][0];
   t.tri = &s.tri[0][0];
   for (int i = 0; i < 1000; i++) number[i] = i + 1;
-  memset(&skin, 0, sizeof(skin));
-  TEST_MESSAGE(SbSkinRegions(&file, &mended, &skin), PETSC_ERR_USER_INPUT, "the surface has one side only");
+  memset(&body_surface, 0, sizeof(body_surface));
+  TEST_MESSAGE(SbSurfaceFindRegions(&file, &mended, &body_surface), PETSC_ERR_USER_INPUT,
+               "the surface has one side only");
   clear(&s);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

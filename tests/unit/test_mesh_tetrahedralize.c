@@ -1,14 +1,14 @@
-// Tets from closed surfaces: volumes of nested regions are exact, kept triangles stay, sizes give counts, both roads, texts of errors.
+// Tets from closed surfaces: volumes of nested regions are exact, kept triangles stay, sizes give counts, both backends, texts of errors.
 // @ranks 1 3
-#include "../../src/skin/skin_impl.h"
+#include "../../src/surface/surface_impl.h"
 #include "mesh_test.h"
 #include "surface_files.h"
 
 /* One region around which all triangles are seen counter-clockwise, or two: behind those from `inner` on is the second. */
-static PetscErrorCode make_skin(const TestSurface *t, PetscInt inner, SbSkin *s)
+static PetscErrorCode make_skin(const TestSurface *t, PetscInt inner, SbSurface *s)
 {
   PetscFunctionBeginUser;
-  PetscCall(SbSkinCreate(t->nvert, t->ntri, inner < t->ntri ? 2 : 1, s));
+  PetscCall(SbSurfaceCreate(t->nvert, t->ntri, inner < t->ntri ? 2 : 1, s));
   for (PetscInt v = 0; v < t->nvert; v++) {
     for (int k = 0; k < 3; k++) s->x[3 * v + k] = t->x[v][k];
   }
@@ -26,14 +26,14 @@ static void measure(const SbImport *im, PetscInt n, PetscReal volume[])
 {
   for (PetscInt i = 0; i < n; i++) volume[i] = 0;
   for (PetscInt c = 0; c < im->item[3].n; c++)
-    volume[im->item[3].tags[c]] += PetscAbsReal(SbTetDet(im->x, im->item[3].vert + 4 * c)) / 6;
+    volume[im->item[3].tags[c]] += PetscAbsReal(SbTetDeterminant(im->x, im->item[3].vert + 4 * c)) / 6;
 }
 
 /* A sphere within a sphere, each a region of its own; the triangles stay. */
-static PetscErrorCode check_kept(SbTetRoad road)
+static PetscErrorCode check_kept(SbTetBackend backend)
 {
   TestSurface t;
-  SbSkin s;
+  SbSurface s;
   SbTetOptions options;
   SbImport im;
   SbFaces faces;
@@ -53,9 +53,9 @@ static PetscErrorCode check_kept(SbTetRoad road)
     PetscCall(SbImportTagSet(&im, 1, &group[r], &s.region_tags[r]));
   }
   for (PetscInt f = nin; f < t.ntri; f++) s.tags[f] = s.region_tags[0];
-  (void)SbSkinMeasure(&s, want);
+  (void)SbSurfaceMeasure(&s, want);
   PetscCall(SbTetDefaults(&options));
-  options.road = road;
+  options.backend = backend;
   options.surface = SB_TET_KEEP;
   PetscCall(SbTetrahedralize("test", &s, &options, &im));
   measure(&im, 3, got);
@@ -73,7 +73,7 @@ static PetscErrorCode check_kept(SbTetRoad road)
   }
   PetscCall(SbFacesDestroy(&faces));
   PetscCall(SbImportDestroy(&im));
-  PetscCall(SbSkinDestroy(&s));
+  PetscCall(SbSurfaceDestroy(&s));
   test_surface_free(&t);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -83,7 +83,7 @@ static PetscErrorCode check_sizes(void)
 {
   const PetscReal sizes[3] = {0.5, 0.35, 0.25};
   TestSurface t;
-  SbSkin s;
+  SbSurface s;
   SbTetOptions options;
   PetscReal per[3];
 
@@ -113,14 +113,14 @@ static PetscErrorCode check_sizes(void)
     PetscCall(SbImportQuality(&im, &faces, &body));
     SB_CHECK(body.min_dihedral > 8, "size %g: smallest dihedral angle %g", (double)sizes[k],
              (double)body.min_dihedral);
-    SB_CHECK(strstr(body.note, "surface meshed anew"), "'%s'", body.note);
+    SB_CHECK(strstr(body.note, "surface remeshed"), "'%s'", body.note);
     PetscCall(SbFacesDestroy(&faces));
     PetscCall(SbImportDestroy(&im));
   }
   for (int k = 1; k < 3; k++)
     SB_CHECK(per[k] / per[0] > 0.6 && per[k] / per[0] < 1.7, "sizes 0 and %d: %g and %g", k, (double)per[0],
              (double)per[k]);
-  PetscCall(SbSkinDestroy(&s));
+  PetscCall(SbSurfaceDestroy(&s));
   test_surface_free(&t);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -130,7 +130,7 @@ static PetscErrorCode check_second_road(void)
 {
   const PetscInt n[2] = {60, 10};
   TestSurface t;
-  SbSkin s;
+  SbSurface s;
   SbTetOptions options;
   SbImport im;
   PetscReal want, got;
@@ -140,7 +140,7 @@ static PetscErrorCode check_second_road(void)
   memset(&im, 0, sizeof(im));
   test_surface_torus(1, 0.1, n, &t);
   PetscCall(make_skin(&t, t.ntri, &s));
-  (void)SbSkinMeasure(&s, &want);
+  (void)SbSurfaceMeasure(&s, &want);
   PetscCall(SbTetDefaults(&options));
   options.size = 0.4;
   options.surface = SB_TET_REMESH;
@@ -150,24 +150,24 @@ static PetscErrorCode check_second_road(void)
   SB_CHECK(strstr(im.note, "by tetgen, surface kept"), "'%s'", im.note);
   SB_CHECK(strstr(im.note, "(before that gmsh: its tets fill "), "'%s'", im.note);
   PetscCall(SbImportDestroy(&im));
-  options.road = SB_TET_GMSH;
+  options.backend = SB_TET_GMSH;
   TEST_MESSAGE(SbTetrahedralize("test", &s, &options, &im), PETSC_ERR_USER_INPUT,
                "percent of the volume of region 1");
-  options.road = SB_TET_AUTO;
+  options.backend = SB_TET_AUTO;
   options.seconds = 1e-3;
   TEST_MESSAGE(SbTetrahedralize("test", &s, &options, &im), PETSC_ERR_USER_INPUT,
                "tetgen: it was not done after 0.001 s (-seconds)");
-  PetscCall(SbSkinDestroy(&s));
+  PetscCall(SbSurfaceDestroy(&s));
   test_surface_free(&t);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* What neither road can do: two boxes through each other, passed by the checks. */
+/* What neither backend can do: two boxes through each other, passed by the checks. */
 static PetscErrorCode check_failure(void)
 {
   const PetscReal lo[3] = {0, 0, 0}, hi[3] = {1, 1, 1}, lo2[3] = {0.5, 0.4, 0.3}, hi2[3] = {1.5, 1.6, 1.7};
   TestSurface t;
-  SbSkin s;
+  SbSurface s;
   SbTetOptions options;
   SbImport im;
 
@@ -188,7 +188,7 @@ static PetscErrorCode check_failure(void)
   for (PetscInt f = 0; f < t.ntri; f++) s.side[2 * f] = 0, s.side[2 * f + 1] = -1;
   TEST_MESSAGE(SbTetrahedralize("test", &s, &options, &im), PETSC_ERR_USER_INPUT,
                "region 1 has the volume -2.68; its triangles are turned");
-  PetscCall(SbSkinDestroy(&s));
+  PetscCall(SbSurfaceDestroy(&s));
   test_surface_free(&t);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

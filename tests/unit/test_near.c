@@ -40,7 +40,7 @@ static PetscReal segment2(const PetscReal p[3], const PetscReal a[3], const Pets
   return distance2(p, q);
 }
 
-/* The same to a triangle: of the segments along x1 x2, the shorter the nearer to x0, the nearest is looked for like above. */
+/* The same to a triangle: of the segments along x1 x2, the shorter the nearer to x0, the nearest is searched for like above. */
 static PetscReal triangle2(const PetscReal p[3], const PetscReal *const x[3])
 {
   PetscReal lo = 0, hi = 1, best = segment2(p, x[1], x[2]);
@@ -76,7 +76,7 @@ static void check_triangles(void)
     const PetscReal slim = i % 3 == 1 ? pow(10, -1 - i % 15) : 1;
     PetscReal c[3][3], p[3], q[3] = {0, 0, 0}, w[3], d2, true2;
     const PetscReal *const x[3] = {c[0], c[1], c[2]};
-    SbTrianglePlace at;
+    SbTriangleFeature at;
 
     for (int k = 0; k < 3; k++) {
       p[k] = 1.5 * number(&state);
@@ -90,7 +90,7 @@ static void check_triangles(void)
       if (i % 24 == 5) c[1][k] = c[2][k] = c[0][k];
       if (i % 24 == 17) c[i / 24 % 3][k] = 0.5 * (c[(i / 24 + 1) % 3][k] + c[(i / 24 + 2) % 3][k]);
     }
-    at = SbClosestPoint(p, x, w, &d2);
+    at = SbTriangleClosestPoint(p, x, w, &d2);
     place[at]++;
     for (int m = 0; m < 3; m++) {
       SB_CHECK(w[m] >= 0 && w[m] <= 1, "triangle %d: weight %g", i, (double)w[m]);
@@ -104,9 +104,10 @@ static void check_triangles(void)
              "triangle %d, slim %g: squared distance %.12g, not %.12g", i, (double)slim, (double)d2,
              (double)true2);
     for (int m = 0; m < 3; m++) {
-      const PetscBool zero = (PetscBool)(at == SB_INSIDE   ? 0
-                                         : at >= SB_EDGE_0 ? m == ((int)at - SB_EDGE_0 + 2) % 3
-                                                           : m != (int)at);
+      const PetscBool zero =
+        (PetscBool)(at == SB_FEATURE_FACE     ? 0
+                    : at >= SB_FEATURE_EDGE_0 ? m == ((int)at - SB_FEATURE_EDGE_0 + 2) % 3
+                                              : m != (int)at);
 
       if (zero) SB_CHECK(w[m] == 0, "triangle %d: weight %d is %g at place %d", i, m, (double)w[m], (int)at);
     }
@@ -281,7 +282,7 @@ static PetscErrorCode check_sphere(SbDetector d, World *w)
 }
 
 /*
-  Bodies with sharp edges and deep dents. Each place is looked at by six points that face six ways: the nearest contact of all is the
+  Bodies with sharp edges and deep dents. Each place is examined by six points that face six ways: the nearest contact of all is the
   nearest point of the surface, and its sign tells inside from outside.
 */
 static PetscErrorCode check_stars(SbDetector d, World *w)
@@ -321,7 +322,7 @@ static PetscErrorCode check_stars(SbDetector d, World *w)
       }
       for (PetscInt f = 0; f < w->nfacet; f++) {
         for (int k = 0; k < 3; k++) x[k] = w->x[w->facet[f][k]];
-        (void)SbClosestPoint(p[i], x, weight, &d2);
+        (void)SbTriangleClosestPoint(p[i], x, weight, &d2);
         best = PetscMin(best, PetscSqrtReal(d2));
       }
       SB_CHECK(a, "star %u: nothing at point %d", star, i / 6);
@@ -540,7 +541,7 @@ static PetscErrorCode check_through(SbDetector d, World *w, const SbPose *pose, 
     if (depth < 2 * PLATE) continue;
     PetscCall(hit_plate(d, w, up, n, p, p0, normal, PETSC_FALSE, pose, near));
     for (PetscInt i = 0; i < n; i++)
-      SB_CHECK(!near[i], "found behind the plate without looking at the motion");
+      SB_CHECK(!near[i], "found behind the plate without examining the motion");
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -557,7 +558,7 @@ static PetscErrorCode check_passages(SbDetector d, World *w, const SbPose *pose)
     {0.1, 0.005, 0.1, 0.03, -1, 0.02, 0},      /* inside, and out again at the front */
     {0.1, PLATE, 0.1, -0.4, -1, -0.41, 1},     /* lay on it */
     {0.1, 0.0075, 0.1, -0.4, -1, -0.41, 1},    /* lay on it, pressed in a little */
-    {0.1, 0.4, 0.1, -0.03, 0.1, 9, 0},         /* sideways and back a little: never held at the back */
+    {0.1, 0.4, 0.1, -0.03, 0.1, 9, 0},         /* sideways and back a little: never constrained at the back */
     {0.1, 0.4, 0.1, 0.0095, -0.1, -0.0005, 0}, /* sideways, just inside */
     {0.3, 0.4, -0.3, -0.4, -0.6, -0.41, 1},    /* obliquely */
     {0.52, 0.03, 0.47, 0.005, -1, -0.005, 0},  /* in through the corner */
@@ -603,7 +604,7 @@ static PetscErrorCode check_grazing(SbDetector d, World *w)
   world_probe(w, 1, p, p0, normal);
   PetscCall(find(d, w, near));
   SB_CHECK(near[0] && !near[0]->crossed && near[0]->gap > 0.02,
-           "what only grazed a ball is held where it came in");
+           "what only grazed a ball is constrained where it came in");
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

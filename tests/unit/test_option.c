@@ -465,8 +465,8 @@ static PetscErrorCode test_ahead(void)
   PetscFunctionBeginUser;
   PetscCall(begin("-body_liver_translate 1,2,3 -body_liver_mesh a.msh -verbose -repeat 2 -integrator static",
                   &database));
-  for (int i = 0; i < 5; i++) PetscCall(SbOptionAhead(&body_scope, keys[i]));
-  for (int i = 1; i < 4; i++) PetscCall(SbOptionAhead(&run_scope, run_rows[i].key));
+  for (int i = 0; i < 5; i++) PetscCall(SbOptionCheckEarly(&body_scope, keys[i]));
+  for (int i = 1; i < 4; i++) PetscCall(SbOptionCheckEarly(&run_scope, run_rows[i].key));
   PetscCall(SbOptionsCheck());
   PetscCall(SbOptionExists(&body_scope, "young", &exists));
   SB_CHECK(exists, "young exists");
@@ -477,7 +477,7 @@ static PetscErrorCode test_ahead(void)
   SB_CHECK(!exists, "young belongs to another type");
   PetscCall(end(&database));
   PetscCall(begin("-body_liver_scale -1", &database));
-  EXPECT_MESSAGE(SbOptionAhead(&body_scope, "scale"),
+  EXPECT_MESSAGE(SbOptionCheckEarly(&body_scope, "scale"),
                  "-body_liver_scale -1 is outside (0, inf): factor on the file's coordinates");
   PetscCall(end(&database));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -512,15 +512,15 @@ static PetscErrorCode test_nearest(void)
   char text[64];
 
   PetscFunctionBeginUser;
-  PetscCall(SbNearest("gravty", 5, names, sizeof(text), text));
+  PetscCall(SbNearestNames("gravty", 5, names, sizeof(text), text));
   SB_CHECK(!strcmp(text, "gravity"), "'%s'", text);
-  PetscCall(SbNearest("GRAVITY", 5, names, sizeof(text), text));
+  PetscCall(SbNearestNames("GRAVITY", 5, names, sizeof(text), text));
   SB_CHECK(!strcmp(text, "gravity"), "'%s'", text);
-  PetscCall(SbNearest("c1", 5, names, sizeof(text), text));
+  PetscCall(SbNearestNames("c1", 5, names, sizeof(text), text));
   SB_CHECK(!strcmp(text, "p1 or cr"), "'%s'", text);
-  PetscCall(SbNearest("rc", 5, names, sizeof(text), text));
+  PetscCall(SbNearestNames("rc", 5, names, sizeof(text), text));
   SB_CHECK(!strcmp(text, "cr"), "'%s'", text);
-  PetscCall(SbNearest("contact", 5, names, sizeof(text), text));
+  PetscCall(SbNearestNames("contact", 5, names, sizeof(text), text));
   SB_CHECK(!text[0], "'%s'", text);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

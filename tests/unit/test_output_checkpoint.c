@@ -48,9 +48,9 @@ static PetscErrorCode test_round_trip(void)
            (int)scene.run->step0, (double)scene.run->t0);
   SB_CHECK(difference(&scene, 0.5) == 0., "the state differs by %g", (double)difference(&scene, 0.5));
   SB_CHECK(scene.run->energy_start == 1. / 7. && scene.run->energies.load_work == 305. &&
-             scene.run->energies.drive_work == 400.,
+             scene.run->energies.prescribed_work == 400.,
            "running totals: %.17g %g %g", (double)scene.run->energy_start,
-           (double)scene.run->energies.load_work, (double)scene.run->energies.drive_work);
+           (double)scene.run->energies.load_work, (double)scene.run->energies.prescribed_work);
   SB_CHECK(!fixture_exists(dir, "checkpoint_000008.h5"),
            "a checkpoint of what is computed again is still there");
   PetscCall(test_scene_close(&scene));

@@ -1,18 +1,18 @@
 // Meshes in checkpoints: every bit comes back, and one that is damaged is not taken.
 // @ranks 1 2
-#include "given_fixture.h"
+#include "memory_mesh_fixture.h"
 
 static char dir[PETSC_MAX_PATH_LEN];
 
 static PetscErrorCode write_two(void)
 {
-  SbGiven *given;
+  SbMemoryMesh *in_memory;
   TestScene scene;
 
   PetscFunctionBeginUser;
-  PetscCall(fixture_given(&given));
-  PetscCall(fixture_open_given(dir, GIVEN_SCENE EULER "-output_fields none -checkpoint_every_steps 1", given,
-                               &scene));
+  PetscCall(fixture_given(&in_memory));
+  PetscCall(fixture_open_given(dir, GIVEN_SCENE EULER "-output_fields none -checkpoint_every_steps 1",
+                               in_memory, &scene));
   for (PetscInt k = 0; k <= 5; k++) PetscCall(fixture_step(&scene, k, 0.1, PETSC_FALSE));
   PetscCall(test_scene_close(&scene));
   SB_CHECK(fixture_exists(dir, "checkpoint_000004.h5") && fixture_exists(dir, "checkpoint_000005.h5"),
@@ -22,7 +22,7 @@ static PetscErrorCode write_two(void)
 
 static PetscErrorCode check_back(PetscInt step)
 {
-  SbGiven *expected, *g;
+  SbMemoryMesh *expected, *g;
   PetscMPIInt rank;
   TestScene scene;
 
@@ -30,7 +30,7 @@ static PetscErrorCode check_back(PetscInt step)
   PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
   PetscCall(fixture_given(&expected));
   PetscCall(fixture_open_given(dir, GIVEN_SCENE EULER "-output_fields none -restart latest", NULL, &scene));
-  g = scene.model->body[0].given;
+  g = scene.model->body[0].in_memory;
   SB_CHECK(scene.run->step0 == step, "goes on from step %d, not %d", (int)scene.run->step0, (int)step);
   SB_CHECK(g && g->step == GIVEN_STEP && g->mass == GIVEN_MASS && g->bound == GIVEN_BOUND,
            "numbers of the mesh");
@@ -44,7 +44,7 @@ static PetscErrorCode check_back(PetscInt step)
     SB_CHECK(!memcmp(g->cell_set, expected->cell_set, 2 * sizeof(*g->cell_set)), "sets of tets");
     SB_CHECK(g->tri_set[0] == expected->tri_set[0], "set of the triangle");
   }
-  PetscCall(SbGivenDestroy(&expected));
+  PetscCall(SbMemoryMeshDestroy(&expected));
   PetscCall(test_scene_close(&scene));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

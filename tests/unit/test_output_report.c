@@ -55,7 +55,7 @@ static PetscErrorCode test_report(void)
                                             "linear",
                                             "1000",
                                             "0.25",
-                                            "effects    hold (support)",
+                                            "effects    hold (fixed)",
                                             "euler_implicit",
                                             "solver     ",
                                             "probe      p at vertex"};

@@ -11,7 +11,7 @@
   "_poisson 0.3 -body_" name "_density 1000 " more
 #define BAR(mesh)                  \
   "-bodies bar " BODY("bar", mesh, \
-                      "") "-effects gravity,clamp -effect_clamp_type support -effect_clamp_on xmin "
+                      "") "-effects gravity,clamp -effect_clamp_type fixed -effect_clamp_on xmin "
 #define STATIC "-time static -solver cg_two_level "
 #define SPREAD "-pc_coarse_redundant 0 "
 
@@ -20,11 +20,11 @@
   "box:-1,0.9,-1,0.001,1.2,1 -set_floor_at box:-1,0.9,-1,1,1.2,0.001 " BODY("bar", "box:0.4,0.1,0.1:3", "") \
     BODY("tet", "box:0.1,0.1,0.1:1", "-body_tet_translate 0,1,0 ") BODY(                                    \
       "held", "box:0.1,0.1,0.1:2",                                                                          \
-      "-body_held_translate 0,2,0 ") "-effects gravity,clamp,whole,roll,rest -effect_clamp_type support "   \
+      "-body_held_translate 0,2,0 ") "-effects gravity,clamp,whole,roll,rest -effect_clamp_type fixed "     \
                                      "-effect_clamp_on root "                                               \
-                                     "-effect_whole_type support -effect_whole_on held -effect_roll_type "  \
-                                     "support -effect_roll_on foot -effect_roll_components x "              \
-                                     "-effect_rest_type support -effect_rest_on floor "                     \
+                                     "-effect_whole_type fixed -effect_whole_on held -effect_roll_type "    \
+                                     "fixed -effect_roll_on foot -effect_roll_components x "                \
+                                     "-effect_rest_type fixed -effect_rest_on floor "                       \
                                      "-effect_rest_components yz "
 
 /* A matrix K + shift M of the scene's space at rest, with a system of its own. */
@@ -54,7 +54,7 @@ static PetscErrorCode assemble(System *y, PetscReal stiffness, PetscReal shift)
   PetscCall(SbSpaceRestoreLocalRead(s, zero, &u));
   PetscCall(VecDestroy(&zero));
   if (y->ksp)
-    PetscCall(KSPSetOperators(y->ksp, y->A, y->A)); /* as SNES does: KSP looks at the matrix only then */
+    PetscCall(KSPSetOperators(y->ksp, y->A, y->A)); /* as SNES does: KSP examines the matrix only then */
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

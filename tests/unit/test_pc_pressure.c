@@ -4,14 +4,14 @@
   matrix does not grow with lambda; the preconditioner is symmetric and positive; solutions are those of a factorisation;
   iterations stay bounded as nu goes to 1/2 and the mesh is refined; failures are said.
 */
-#include "../../src/fem/pressure.h"
+#include "../../src/solver/pressure.h"
 #include "../scene.h"
 #include <sbsolver.h>
 
 #define BODY(name, mesh, law, element, more)                                                     \
   "-body_" name "_mesh " mesh " -body_" name "_material " law " -body_" name "_element " element \
   " -body_" name "_young 5e4 -body_" name "_density 1000 " more
-#define CLAMPED "-effects gravity,clamp -effect_clamp_type support -effect_clamp_on xmin "
+#define CLAMPED "-effects gravity,clamp -effect_clamp_type fixed -effect_clamp_on xmin "
 #define STATIC "-time static "
 
 /* ------------------------------------------------------------------ laws */
@@ -179,7 +179,7 @@ static PetscErrorCode test_operators(void)
   PetscFunctionBeginUser;
   PetscCall(test_operator(ONE("linear", "cr"), 0., &still));
   PetscCall(test_operator(ONE("linear", "dg"), 0., &still));
-  PetscCall(test_operator(ONE("linear", "dg") "-body_one_supports strong", 0., &still));
+  PetscCall(test_operator(ONE("linear", "dg") "-body_one_dirichlet strong", 0., &still));
   PetscCall(test_operator(ONE("corotated", "cr"), 1e-3, &moving));
   PetscCall(test_operator(ONE("corotated", "dg") "-body_one_tangent exact_spd", 1e-3, &moving));
   PetscCall(test_operator(ONE("stvk", "dg"), 1e-4, &moving));
@@ -262,7 +262,7 @@ static PetscErrorCode test_bounds(void)
       PetscSNPrintf(options, sizeof(options),
                     "-bodies bar -body_bar_mesh box:0.4,0.1,0.1:%s -body_bar_material linear "
                     "-body_bar_young 1e6 -body_bar_density 1000 -body_bar_element %s -body_bar_poisson %s "
-                    "-effects gravity,clamp -effect_clamp_type support -effect_clamp_on xmin " STATIC,
+                    "-effects gravity,clamp -effect_clamp_type fixed -effect_clamp_on xmin " STATIC,
                     cells[k / 6], element[k / 3 % 2], nu[k % 3]));
     /* relative residuals of 1e-8 times the condition of the bar, above all in bending; at 0.499999 factorisations of the same
        matrix differ by 1e-5 among themselves */
@@ -287,9 +287,9 @@ static PetscErrorCode test_contrast(void)
       "-body_a_poisson 0.3 -body_a_density 1000 -body_a_inclusions far -sets far "
       "-set_far_at box:0.5,0,0,1,1,1 -inclusion_far_material linear -inclusion_far_young 1e4 "
       "-inclusion_far_poisson 0.4999999 -inclusion_far_density 3000 -effects pull,x,y,z "
-      "-effect_pull_type traction -effect_pull_on xmax -effect_pull_vector 10;0;0 -effect_x_type support "
-      "-effect_x_on xmin -effect_x_components x -effect_y_type support -effect_y_on ymin,ymax "
-      "-effect_y_components y -effect_z_type support -effect_z_on zmin,zmax -effect_z_components z " STATIC,
+      "-effect_pull_type traction -effect_pull_on xmax -effect_pull_vector 10;0;0 -effect_x_type fixed "
+      "-effect_x_on xmin -effect_x_components x -effect_y_type fixed -effect_y_on ymin,ymax "
+      "-effect_y_components y -effect_z_type fixed -effect_z_on zmin,zmax -effect_z_components z " STATIC,
       element[k]));
     PetscCall(test_solution(options, 120, 1e-5));
   }
@@ -302,7 +302,7 @@ static PetscErrorCode test_scenes(void)
   /* large displacements, a load with a tangent of its own */
   PetscCall(test_solution(
     "-bodies one " BODY("one", "box:0.3,0.1,0.1:2", "neohookean", "dg",
-                        "-body_one_poisson 0.499 ") "-effects gravity,clamp,push -effect_clamp_type support "
+                        "-body_one_poisson 0.499 ") "-effects gravity,clamp,push -effect_clamp_type fixed "
                                                     "-effect_clamp_on xmin -effect_push_type pressure "
                                                     "-effect_push_on zmax -effect_push_value 200 "
                                                     "-body_one_young 5e5 -static_steps 3 " STATIC,
@@ -340,8 +340,8 @@ static PetscErrorCode test_springs(void)
       "-bodies a,b -body_a_mesh box:0.1,0.1,0.05:3 -body_b_mesh box:0.1,0.1,0.05:2 -body_a_element %s "
       "-body_b_element p1 -body_a_poisson 0.499 -body_b_poisson 0.3 -body_a_material linear "
       "-body_b_material linear -body_a_young 1e5 -body_b_young 1e5 -body_a_density 1000 "
-      "-body_b_density 1000 -effects gravity,x,y,floor -effect_x_type support -effect_x_on xmin "
-      "-effect_x_components x -effect_y_type support -effect_y_on ymin -effect_y_components y "
+      "-body_b_density 1000 -effects gravity,x,y,floor -effect_x_type fixed -effect_x_on xmin "
+      "-effect_x_components x -effect_y_type fixed -effect_y_on ymin -effect_y_components y "
       "-effect_floor_type contact -effect_floor_on zmin -effect_floor_obstacle %s "
       "-effect_floor_response penalty " STATIC,
       element[k % 2], floor[k / 2]));
@@ -358,20 +358,20 @@ static PetscErrorCode test_failures(void)
   PetscFunctionBeginUser;
   PetscCall(
     run_scene("-bodies one " BODY("one", "box:0.3,0.1,0.1:2", "linear", "cr", "-body_one_poisson 0.49 ")
-                CLAMPED STATIC "-ksp_max_it 7 -time_max_cuts 0",
+                CLAMPED STATIC "-ksp_max_it 7 -time_max_halvings 0",
               "pressure", &r));
   SB_CHECK(!r.ok && r.its == 7, "7 iterations are enough, or %d were done", (int)r.its);
   PetscCall(VecDestroy(&r.U));
-  /* held at the middles of two faces, it may turn about the line through them: the residual is less than rounding explains */
+  /* constrained at the middles of two faces, it may turn about the line through them: the residual is less than rounding explains */
   PetscCall(run_scene("-bodies one " BODY("one", "box:1,1,1:1", "linear", "cr", "-body_one_poisson 0.4999 ")
-                        CLAMPED STATIC "-pressure_coarse_pc_type redundant -time_max_cuts 0",
+                        CLAMPED STATIC "-pressure_coarse_pc_type redundant -time_max_halvings 0",
                       "pressure", &r));
   SB_CHECK(!r.ok, "a singular matrix passes");
   PetscCall(VecDestroy(&r.U));
   /* a diagonal block that is not positive fails the solve, not the program */
   PetscCall(
     run_scene("-bodies one " BODY("one", "box:1,1,1:1", "neohookean", "cr", "-body_one_poisson 0.4999 ")
-                CLAMPED STATIC "-body_one_young 1e6 -time_max_cuts 10",
+                CLAMPED STATIC "-body_one_young 1e6 -time_max_halvings 10",
               "pressure", &r));
   SB_CHECK(!r.ok, "a singular matrix passes");
   PetscCall(VecDestroy(&r.U));

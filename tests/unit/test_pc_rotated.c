@@ -3,14 +3,15 @@
   The rotated factor: exact (to the rounding of its 16-bit entries) for the operator that it was made from and for that one
   turned as a whole, few iterations in a bent body, the same on any number of ranks and for every kind of operator.
 */
+#include "sbsolver.h"
 #include "../scene.h"
 
 static const char *const bar =
   "-bodies bar -body_bar_mesh box:0.4,0.1,0.1:16,4,4 -body_bar_material %s -body_bar_young 5e4 "
   "-body_bar_poisson 0.4 -body_bar_density 1000 -sets left -set_left_at plane:1,0,0,0 %s";
-static const char *const held = "-effects clamp -effect_clamp_type support -effect_clamp_on left";
+static const char *const held = "-effects clamp -effect_clamp_type fixed -effect_clamp_on left";
 static const char *const guided =
-  "-effects clamp -effect_clamp_type support -effect_clamp_on left -effect_clamp_components x";
+  "-effects clamp -effect_clamp_type fixed -effect_clamp_on left -effect_clamp_components x";
 
 #define WARPED "corotated -body_bar_tangent warped"
 
@@ -65,7 +66,7 @@ static PetscErrorCode open_case(const char *law, const char *extra, PetscBool fr
   PetscCall(SbModelFilterTangent(c->t.model, PETSC_TRUE)); /* definite at any state */
   c->frames = frames;
   if (frames)
-    PetscCall(SbSpaceCreateFrameOperator(c->t.model->space, &c->A));
+    PetscCall(SbSpaceCreateMatrixFree(c->t.model->space, &c->A));
   else {
     PetscCall(SbSpaceCreateMatrix(c->t.model->space, SB_MATRIX_BAIJ, &c->A));
     PetscCall(PetscObjectCompose((PetscObject)c->A, "sb_state", (PetscObject)c->U));
@@ -109,7 +110,7 @@ static PetscErrorCode solve(Case *c, void (*state)(const PetscReal x[3], PetscRe
     PetscCall(VecZeroEntries(c->U));
   if (c->frames) {
     PetscCall(SbSpaceGetLocalRead(m->space, c->U, &stage.u));
-    PetscCall(SbFrameOperatorSetState(c->A, &stage, &is));
+    PetscCall(SbMatrixFreeSetState(c->A, &stage, &is));
     PetscCall(SbSpaceRestoreLocalRead(m->space, c->U, &stage.u));
   } else
     PetscCall(SbModelTangent(m, 0., stage.shift_v, stage.shift_a, 1., c->U, c->U, c->A));
@@ -222,8 +223,8 @@ static PetscErrorCode check_work(PetscMPIInt size)
     PC pc;
 
     PetscCall(test_scene_open_on(comm, NULL, options, &t));
-    PetscCall(SbSpaceCreateFrameOperator(t.model->space, &A));
-    PetscCall(SbFrameOperatorSetState(A, &stage, &is));
+    PetscCall(SbSpaceCreateMatrixFree(t.model->space, &A));
+    PetscCall(SbMatrixFreeSetState(A, &stage, &is));
     PetscCall(PCCreate(comm, &pc));
     PetscCall(PCSetOperators(pc, A, A));
     PetscCall(SbPCRotatedCreate(t.model->space, pc));

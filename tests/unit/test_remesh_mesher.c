@@ -73,9 +73,9 @@ static PetscErrorCode fill(const PetscReal size[3], PetscReal bits, PetscReal *v
   PetscCall(SbMesherDefault("the test's hull", &hull, 0.6 / N, NULL, tets));
   *volume = 0.;
   for (PetscInt c = 0; c < tets->ncell; c++) {
-    const PetscReal six = SbTetDet(tets->x, tets->cell + 4 * c);
+    const PetscReal six = SbTetDeterminant(tets->x, tets->cell + 4 * c);
 
-    SB_CHECK(six > 0., "tet %d is inside out", (int)c);
+    SB_CHECK(six > 0., "tet %d is inverted", (int)c);
     *volume += six / 6.;
   }
   for (int i = 0; i < 3 * NVERT; i++)

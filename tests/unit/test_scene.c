@@ -11,12 +11,13 @@
 
 static const char two_bodies[] =
   "-bodies liver,big_stone -body_liver_mesh box:1,1,1:2" LAW
-  " -body_liver_rotate 1,0,0,90 -body_liver_translate 0,0,2 -body_liver_scale 0.1 -body_liver_spin 0,0,3"
+  " -body_liver_rotate 1,0,0,90 -body_liver_translate 0,0,2 -body_liver_scale 0.1 "
+  "-body_liver_angular_velocity 0,0,3"
   " -body_big_stone_mesh box:1,1,1:3 -body_big_stone_material linear -body_big_stone_young 1e6"
   " -body_big_stone_poisson 0.2 -body_big_stone_density 2500 -body_big_stone_velocity 1,2,3"
   " -sets left,tip -set_left_at plane:2,0,0,1 -set_tip_at sphere:1,1,1,0.5"
   " -effects gravity,hold,press,damp -effect_gravity_vector 0,0,-1"
-  " -effect_hold_type support -effect_hold_on left,big_stone,liver.xmin"
+  " -effect_hold_type fixed -effect_hold_on left,big_stone,liver.xmin"
   " -effect_press_type pressure -effect_press_on boundary,left,zmax -effect_press_value 100*t"
   " -effect_damp_type damping -effect_damp_on all -effect_damp_alpha 0.1";
 
@@ -63,7 +64,8 @@ static void check_two_bodies(SbModel m, const char *where)
   SB_CHECK(!strcmp(liver->mesh, "box:1,1,1:2") && liver->scale == 0.1, "%s: mesh and scale", where);
   SB_CHECK(liver->rotate[0] == 1 && liver->rotate[3] == 90 && liver->translate[2] == 2, "%s: placement",
            where);
-  SB_CHECK(liver->spin[2] == 3 && stone->velocity[1] == 2 && stone->spin[0] == 0, "%s: motion", where);
+  SB_CHECK(liver->angular_velocity[2] == 3 && stone->velocity[1] == 2 && stone->angular_velocity[0] == 0,
+           "%s: motion", where);
   SB_CHECK(liver->density == 1000 && stone->density == 2500, "%s: density", where);
   SB_CHECK(!strcmp(m->material[0]->law, "corotated") && m->material[0]->E == 5e3, "%s: material", where);
   SB_CHECK(!strcmp(stone->material, "linear") && m->material[1]->nu == 0.2, "%s: second material", where);
@@ -87,7 +89,7 @@ static PetscErrorCode test_model(const char *folder)
                              "body:\n"
                              "  liver: {mesh: \"box:1,1,1:2\", material: corotated, young: 5e3, poisson: "
                              "0.45, rotate: [1, 0, 0, 90],\n"
-                             "          translate: [0, 0, 2], scale: 0.1, spin: [0, 0, 3]}\n"
+                             "          translate: [0, 0, 2], scale: 0.1, angular_velocity: [0, 0, 3]}\n"
                              "  big_stone:\n"
                              "    mesh: box:1,1,1:3\n"
                              "    material: linear\n"
@@ -100,7 +102,7 @@ static PetscErrorCode test_model(const char *folder)
                              "effects: [gravity, hold, press, damp]\n"
                              "effect:\n"
                              "  gravity: {vector: [0, 0, -1]}\n"
-                             "  hold: {type: support, on: [left, big_stone, liver.xmin]}\n"
+                             "  hold: {type: fixed, on: [left, big_stone, liver.xmin]}\n"
                              "  press: {type: pressure, on: [boundary, left, zmax], value: 100*t}\n"
                              "  damp: {type: damping, on: all, alpha: 0.1}\n";
   char view[PETSC_MAX_PATH_LEN], file[PETSC_MAX_PATH_LEN];
@@ -247,7 +249,7 @@ static PetscErrorCode test_check(const char *folder)
                     "-body_liver_mesh nowhere.msh: No such file or directory; relative names begin in /"));
   /* not dynamic, and nothing holds the body */
   PetscCall(refused(LIVER " -effects gravity", "-time static: nothing holds the bodies"));
-  PetscCall(begin(LIVER " -effects hold -effect_hold_type support -effect_hold_on xmin", &database));
+  PetscCall(begin(LIVER " -effects hold -effect_hold_type fixed -effect_hold_on xmin", &database));
   PetscCall(SbSceneCreate(PETSC_COMM_WORLD, &model));
   PetscCall(SbSceneCheck(model));
   SB_CHECK(model->nset == 1 && model->set[0].shape == SB_SET_GROUP, "the set of the support");
@@ -258,7 +260,7 @@ static PetscErrorCode test_check(const char *folder)
 /* 70 sets are more than one bit each; they must not be written beyond the array. */
 static PetscErrorCode test_many_sets(void)
 {
-  char options[4096] = LIVER " -effects hold -effect_hold_type support -effect_hold_on s0", name[8];
+  char options[4096] = LIVER " -effects hold -effect_hold_type fixed -effect_hold_on s0", name[8];
 
   PetscFunctionBeginUser;
   for (int i = 1; i < 70; i++) {

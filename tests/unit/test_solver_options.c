@@ -14,16 +14,17 @@
   "-body_" name "_material corotated -body_" name "_young 1e5 -body_" name "_poisson 0.3 -body_" name \
   "_density 1000 "
 #define BAR "-bodies a -body_a_mesh box:0.2,0.1,0.1:2 " LAW("a")
-#define HELD "-effect_clamp_type support -effect_clamp_on xmin "
+#define HELD "-effect_clamp_type fixed -effect_clamp_on xmin "
 #define STATIC BAR "-effects gravity,clamp " HELD "-time static "
 #define STEPS "-ts_dt 0.01 -ts_max_time 0.02 "
 #define DYNAMIC BAR "-effects gravity,clamp " HELD STEPS
 #define PAIR                                                                                         \
   "-bodies a,b -body_a_mesh box:0.2,0.1,0.05:1 -body_b_mesh box:0.08,0.06,0.05:1 -body_b_translate " \
-  "0.06,0.021,0.05 " LAW("a") LAW("b") "-sets bottom,top -set_bottom_at plane:0,0,1,0 -set_top_at "  \
-                                       "plane:0,0,1,0.1 -effects hold,push,meet -effect_hold_type "  \
-                                       "support -effect_hold_on bottom -effect_push_type drive "     \
-                                       "-effect_push_on top -effect_meet_type collision "
+  "0.06,0.021,0.05 " LAW("a")                                                                        \
+    LAW("b") "-sets bottom,top -set_bottom_at plane:0,0,1,0 -set_top_at "                            \
+             "plane:0,0,1,0.1 -effects hold,push,meet -effect_hold_type "                            \
+             "fixed -effect_hold_on bottom -effect_push_type prescribed_displacement "               \
+             "-effect_push_on top -effect_meet_type collision "
 #define PRESS "-time static -effect_push_displacement 0.0005*t;0.0001*t;-0.002*t "
 #define DRAG STEPS "-effect_push_displacement 0.1*t;0;-0.1*t "
 
@@ -50,9 +51,9 @@ static const Case cases[] = {
   {"static rows", PAIR PRESS, ROWS, PETSC_FALSE},
   {"dynamic rows", PAIR DRAG, ROWS, PETSC_TRUE},
   {"rows that slide", PAIR DRAG "-effect_meet_friction 0.1 ", ROWS, PETSC_FALSE},
-  {"multipliers, iterative", PAIR PRESS "-effect_meet_response multiplier -multipliers iterative ", ROWS,
+  {"multipliers, iterative", PAIR PRESS "-effect_meet_response multiplier -saddle_solver iterative ", ROWS,
    PETSC_FALSE},
-  {"multipliers, direct", PAIR PRESS "-effect_meet_response multiplier -multipliers direct ", FACTORED,
+  {"multipliers, direct", PAIR PRESS "-effect_meet_response multiplier -saddle_solver direct ", FACTORED,
    PETSC_FALSE},
 };
 static const char *const methods[] = {"cg", "fcg", "minres", "gmres", "fgmres", "bcgs", "preonly"};
@@ -68,7 +69,7 @@ static const char *const norms[][2] = {
   {"fcg", "none preconditioned unpreconditioned natural"},
 #if PETSC_VERSION_LT(3, 20, 0)
   {"minres", "none preconditioned"},
-#else /* written anew: KSPMINRESSetUseQLP() */
+#else /* written again: KSPMINRESSetUseQLP() */
   {"minres", "none preconditioned unpreconditioned"},
 #endif
   {"gmres", "none preconditioned unpreconditioned"},

@@ -1,7 +1,7 @@
 // @ranks 1 2 3 4
 /*
   The distributed surface: what a rank sees of it holds every facet within reach of its points and edges, at the place where the owner has it;
-  areas, normals and identities are those of one rank; the list of foreign facets is kept, renewed and given up when it should; and a
+  areas, normals and identities are those of one rank; the list of foreign facets is kept, renewed and dropped when it should; and a
   contact of small extent moves few facets.
 */
 #include "../../src/contact/surface_impl.h"
@@ -314,7 +314,7 @@ static PetscErrorCode look(Case *c, PetscBool moving, PetscReal reach, PetscBool
   Whole w;
 
   PetscFunctionBeginUser;
-  PetscCall(SbSurfaceUpdate(c->s, moving ? c->u0 : NULL, c->u, reach, self, &close));
+  PetscCall(SbContactSurfaceUpdate(c->s, moving ? c->u0 : NULL, c->u, reach, self, &close));
   SB_CHECK(close, "the bodies are close");
   SB_CHECK((c->s->scene.x0 != NULL) == moving && (c->s->scene.p0 != NULL) == moving, "start of the step");
   SB_CHECK(c->s->scene.reach == reach && c->s->scene.self == self, "what the scene says");
@@ -327,7 +327,7 @@ static PetscErrorCode look(Case *c, PetscBool moving, PetscReal reach, PetscBool
 
 static const SbHalo *halo_of(const Case *c)
 {
-  return &((const SbSurfaceData *)c->s->data)->halo;
+  return &((const SbContactSurfaceData *)c->s->data)->halo;
 }
 
 /* Many small steps: some lists, never one that is too old; the version tells whether the facets are other ones. */
@@ -419,11 +419,11 @@ static PetscErrorCode test_motion(const char *options, PetscReal area, PetscInt 
 
   /* apart */
   PetscCall(fill(&c, 2, 0.01, 0, 0.5, c.u));
-  PetscCall(SbSurfaceUpdate(c.s, c.u, c.u, 0.05, PETSC_FALSE, &close));
+  PetscCall(SbContactSurfaceUpdate(c.s, c.u, c.u, 0.05, PETSC_FALSE, &close));
   SB_CHECK(!close && c.s->scene.nfacet == c.s->nfacet_owned, "apart, with %d facets of others",
            (int)(c.s->scene.nfacet - c.s->nfacet_owned));
   nbuild = halo_of(&c)->nbuild;
-  PetscCall(SbSurfaceUpdate(c.s, c.u, c.u, 0.05, PETSC_FALSE, &close));
+  PetscCall(SbContactSurfaceUpdate(c.s, c.u, c.u, 0.05, PETSC_FALSE, &close));
   SB_CHECK(!close && halo_of(&c)->nbuild == nbuild, "apart");
   /* within the step one passed the other */
   PetscCall(fill(&c, 2, 0.01, 0, -0.5, c.u0));
@@ -448,7 +448,7 @@ static PetscErrorCode test_normals(const char *element)
   PetscCall(PetscSNPrintf(options, sizeof(options),
                           SETS "-bodies a" BODY("a", "%s", "box:1,0.8,0.3:3", "0,0,0"), element));
   PetscCall(open_on(PETSC_COMM_WORLD, options, 0, &c));
-  PetscCall(SbSurfaceUpdate(c.s, NULL, c.u, 0.1, PETSC_FALSE, &close));
+  PetscCall(SbContactSurfaceUpdate(c.s, NULL, c.u, 0.1, PETSC_FALSE, &close));
   SB_CHECK(!close, "one body is not close to another");
   for (PetscInt i = 0; i < c.s->scene.npoint; i++) {
     const PetscReal *x = c.s->scene.p + 3 * i, *n = c.s->scene.p_normal + 3 * i;
@@ -484,13 +484,13 @@ static PetscErrorCode test_part(const char *options, PetscReal area)
     Case *x = k ? &alone : &c;
 
     PetscCall(fill(x, 1, 0.01, 0, 0, x->u));
-    PetscCall(SbSurfaceUpdate(x->s, NULL, x->u, 0.05, PETSC_FALSE, &close));
+    PetscCall(SbContactSurfaceUpdate(x->s, NULL, x->u, 0.05, PETSC_FALSE, &close));
     SB_CHECK(!close, "one part");
   }
   PetscCall(check_points(&c, &alone, area));
   PetscCall(fill(&c, 1, 0.01, 0, 0, c.u0));
   PetscCall(close_case(&alone));
-  PetscCall(SbSurfaceUpdate(c.s, NULL, c.u, 0.05, PETSC_TRUE, &close));
+  PetscCall(SbContactSurfaceUpdate(c.s, NULL, c.u, 0.05, PETSC_TRUE, &close));
   {
     Whole w;
 

@@ -135,8 +135,8 @@ static PetscErrorCode test_contacts(const char *options, PetscReal noisy)
     for (int k = 0; k < 2; k++) {
       PetscCall(PetscArraycpy(x[k].u0, x[k].u, 3 * x[k].m->space->nnode));
       PetscCall(fill(&x[k], step, noisy, 0.03 * step, jump ? -0.3 : -0.03, x[k].u));
-      PetscCall(
-        SbSurfaceUpdate(x[k].s, step % 4 == 2 ? NULL : x[k].u0, x[k].u, self ? 0.03 : 0.06, self, &close));
+      PetscCall(SbContactSurfaceUpdate(x[k].s, step % 4 == 2 ? NULL : x[k].u0, x[k].u, self ? 0.03 : 0.06,
+                                       self, &close));
       SB_CHECK(close, "the bodies are close");
     }
     PetscCall(compare_contacts(x, detector, count[self ? 2 : jump]));
@@ -190,7 +190,7 @@ static PetscErrorCode test_ring(const char *element)
     for (int k = 0; k < 2; k++) {
       PetscCall(PetscArraycpy(x[k].u0, x[k].u, 3 * x[k].m->space->nnode));
       bend(&x[k], 0.16 - 0.04 * step, x[k].u);
-      PetscCall(SbSurfaceUpdate(x[k].s, x[k].u0, x[k].u, 0.02, PETSC_TRUE, &close));
+      PetscCall(SbContactSurfaceUpdate(x[k].s, x[k].u0, x[k].u, 0.02, PETSC_TRUE, &close));
       SB_CHECK(!close, "one part");
     }
     PetscCall(compare_contacts(x, detector, count));

@@ -107,10 +107,11 @@ static inline PetscErrorCode open_pair(const Pair *p, const Case *c, PetscReal d
     "-set_meet_at plane:0,0,1,0,%g -set_ax_at box:1,0,-1,1,1,0 -set_ay_at box:0,1,-1,1,1,0 "
     "-set_az_at plane:0,0,1,-1 -set_bx_at box:1,0,0.01,1,1,1 -set_by_at box:0,1,0.01,1,1,1 "
     "-set_bz_at plane:0,0,1,1 -time static -ksp_rtol 1e-8 -solver cg_two_level -effects x,y,low,high,meet "
-    "-effect_x_type support -effect_x_on x0 -effect_x_components x -effect_y_type support -effect_y_on y0 "
-    "-effect_y_components y -effect_low_type drive -effect_low_on ax,ay,az -effect_low_displacement %s "
-    "-effect_high_type drive -effect_high_on bx,by,bz -effect_high_displacement %s "
-    "-effect_meet_type collision -effect_meet_on meet -effect_meet_response %s -effect_meet_sides %s",
+    "-effect_x_type fixed -effect_x_on x0 -effect_x_components x -effect_y_type fixed -effect_y_on y0 "
+    "-effect_y_components y -effect_low_type prescribed_displacement -effect_low_on ax,ay,az "
+    "-effect_low_displacement %s "
+    "-effect_high_type prescribed_displacement -effect_high_on bx,by,bz -effect_high_displacement %s "
+    "-effect_meet_type collision -effect_meet_on meet -effect_meet_response %s -effect_meet_passes %s",
     path[0], path[1], c->element, c->element, (double)p->young[0], (double)p->young[1], POISSON, POISSON,
     (double)(3 * d), far[0], far[1], c->response, c->sides));
   PetscCall(test_scene_open(text, t));
@@ -134,7 +135,7 @@ static inline PetscErrorCode read_forces(SbRun run, PetscReal values[NVALUE], Pe
   for (PetscInt i = 0; i < m->neffect; i++) {
     SbEffect e = m->effect[i];
 
-    if (e->ops.touch) PetscCall((*e->ops.history)(e, m->space, &stage, r, values));
+    if (e->ops.begin_step) PetscCall((*e->ops.history)(e, m->space, &stage, r, values));
     if (!strcmp(e->name, "high")) PetscCall((*e->ops.history)(e, m->space, &stage, r, pull));
   }
   PetscCall(SbSpaceRestoreLocalRead(m->space, run->U, &stage.u));
@@ -146,7 +147,7 @@ static inline PetscErrorCode read_forces(SbRun run, PetscReal values[NVALUE], Pe
 
 /*
   Force of a case, taken from the far face of the upper body, as a part of the formula's. The force in the history must be the same;
-  exact rows of both sides are more than the surfaces can take, and some of those that stay to end the loop pull, which
+  exact constraints of both sides are more than the surfaces can take, and some of those that stay to end the loop pull, which
   normal_force leaves out.
 */
 static inline PetscErrorCode hertz(const Pair *p, const Case *c, PetscReal *force)
@@ -166,7 +167,7 @@ static inline PetscErrorCode hertz(const Pair *p, const Case *c, PetscReal *forc
   *force = -4 * reaction / P;
   PetscCall(PetscPrintf(
     PETSC_COMM_WORLD,
-    "  %s, %s, %s, sides %s, %d^3 cells, d = %.3e m: %g points touch, force %.4f (history %.4f) of the "
+    "  %s, %s, %s, passes %s, %d^3 cells, d = %.3e m: %g points touch, force %.4f (history %.4f) of the "
     "formula's, penetration %.1e d, %d solves\n",
     p->name, c->element, c->response, c->sides, (int)c->cells, (double)d, (double)values[CONTACTS],
     (double)*force, (double)(4 * values[NORMAL] / P), (double)(values[DEEPEST] / d),

@@ -83,7 +83,7 @@ static inline PetscErrorCode locking_bar(PetscInt n, PetscReal nu, const char *m
   PetscCall(PetscSNPrintf(scene, sizeof(scene),
                           "-bodies a -body_a_mesh %s -body_a_material linear -body_a_young 5e4 "
                           "-body_a_poisson %.17g -body_a_density 1000 -sets root -set_root_at plane:1,0,0,0 "
-                          "-effects clamp,gravity -effect_clamp_type support -effect_clamp_on root "
+                          "-effects clamp,gravity -effect_clamp_type fixed -effect_clamp_on root "
                           "-effect_gravity_vector 0,0,-9.81 -time static",
                           mesh, (double)nu));
   PetscCall(locking_run(scene, more, &t, cost));
@@ -109,8 +109,8 @@ static inline PetscErrorCode locking_cook(const char *mesh, PetscReal nu, const 
   PetscCall(PetscSNPrintf(
     scene, sizeof(scene),
     "-bodies a -body_a_mesh %s -body_a_material linear -body_a_young 1 -body_a_poisson %.17g "
-    "-body_a_density 1 -effects hold,plane,pull -effect_hold_type support -effect_hold_on left "
-    "-effect_plane_type support -effect_plane_on all -effect_plane_components z "
+    "-body_a_density 1 -effects hold,plane,pull -effect_hold_type fixed -effect_hold_on left "
+    "-effect_plane_type fixed -effect_plane_on all -effect_plane_components z "
     "-effect_pull_type traction -effect_pull_on right -effect_pull_vector 0;1/16;0 -time static",
     mesh, (double)nu));
   PetscCall(locking_run(scene, more, &t, cost));
@@ -217,9 +217,9 @@ static inline PetscErrorCode locking_shell(const char *mesh, PetscReal nu, const
   PetscCall(
     PetscSNPrintf(scene, sizeof(scene),
                   "-bodies a -body_a_mesh %s -body_a_material linear -body_a_young 1 -body_a_poisson %.17g "
-                  "-body_a_density 1 -effects x,y,z,push -effect_x_type support -effect_x_on x0 "
-                  "-effect_x_components x -effect_y_type support -effect_y_on y0 -effect_y_components y "
-                  "-effect_z_type support -effect_z_on z0 -effect_z_components z -effect_push_type pressure "
+                  "-body_a_density 1 -effects x,y,z,push -effect_x_type fixed -effect_x_on x0 "
+                  "-effect_x_components x -effect_y_type fixed -effect_y_on y0 -effect_y_components y "
+                  "-effect_z_type fixed -effect_z_on z0 -effect_z_components z -effect_push_type pressure "
                   "-effect_push_on inside -effect_push_value 1 -effect_push_follower no -time static",
                   mesh, (double)nu));
   PetscCall(locking_run(scene, more, &t, cost));
@@ -256,7 +256,7 @@ static inline PetscErrorCode locking_beam(PetscInt n, PetscReal mu, const char *
     scene, sizeof(scene),
     "-bodies a -body_a_mesh %s -body_a_tangent exact -body_a_young %.17g -body_a_poisson 0.4 "
     "-body_a_density 1000 -sets arc -set_arc_at sphere:0.2,0.2,%.17g,%.17g -effects root,plane,gravity "
-    "-effect_root_type support -effect_root_on arc -effect_plane_type support -effect_plane_on all "
+    "-effect_root_type fixed -effect_root_on arc -effect_plane_type fixed -effect_plane_on all "
     "-effect_plane_components z -effect_gravity_vector 0,-2,0 -time static",
     mesh, (double)(2.8 * mu), half, (double)PetscSqrtReal(0.0025 + half * half)));
   PetscCall(locking_run(scene, more, &t, cost));
@@ -276,14 +276,13 @@ static inline PetscErrorCode locking_swing(PetscInt n, PetscReal nu, const char 
   char scene[VERIFY_TEXT];
 
   PetscFunctionBeginUser;
-  PetscCall(
-    PetscSNPrintf(scene, sizeof(scene),
-                  "-bodies a -body_a_mesh box:0.4,0.1,0.1:%d -body_a_material corotated "
-                  "-body_a_young 1e5 -body_a_poisson %.17g -body_a_density 1000 "
-                  "-effects gravity,clamp -effect_gravity_vector 0,0,-9.81 -effect_clamp_type support "
-                  "-effect_clamp_on xmin -time genalpha -time_spectral_radius 0.8 -ts_dt 0.01 "
-                  "-ts_max_time 0.3",
-                  (int)n, (double)nu));
+  PetscCall(PetscSNPrintf(scene, sizeof(scene),
+                          "-bodies a -body_a_mesh box:0.4,0.1,0.1:%d -body_a_material corotated "
+                          "-body_a_young 1e5 -body_a_poisson %.17g -body_a_density 1000 "
+                          "-effects gravity,clamp -effect_gravity_vector 0,0,-9.81 -effect_clamp_type fixed "
+                          "-effect_clamp_on xmin -time genalpha -time_spectral_radius 0.8 -ts_dt 0.01 "
+                          "-ts_max_time 0.3",
+                          (int)n, (double)nu));
   PetscCall(locking_run(scene, more, &t, cost));
   PetscCall(verify_value_at(t.model, t.run->U, end, value));
   PetscCall(SbModelEnergies(t.model, t.run->U, t.run->V, &e));
@@ -303,14 +302,15 @@ static inline PetscErrorCode locking_twist(PetscInt n, PetscReal nu, const char 
   char scene[VERIFY_TEXT];
 
   PetscFunctionBeginUser;
-  PetscCall(PetscSNPrintf(
-    scene, sizeof(scene),
-    "-bodies a -body_a_mesh box:0.4,0.1,0.1:%d -body_a_material neohookean -body_a_young 1e5 "
-    "-body_a_poisson %.17g -body_a_density 1000 -effects held,turned "
-    "-effect_held_type support -effect_held_on xmin -effect_turned_type drive -effect_turned_on xmax "
-    "-effect_turned_axis 1,0,0 -effect_turned_axis_point 0,0.05,0.05 -effect_turned_angle 90*t "
-    "-time static -static_steps 16 -ksp_max_it 20",
-    (int)n, (double)nu));
+  PetscCall(
+    PetscSNPrintf(scene, sizeof(scene),
+                  "-bodies a -body_a_mesh box:0.4,0.1,0.1:%d -body_a_material neohookean -body_a_young 1e5 "
+                  "-body_a_poisson %.17g -body_a_density 1000 -effects held,turned "
+                  "-effect_held_type fixed -effect_held_on xmin -effect_turned_type prescribed_displacement "
+                  "-effect_turned_on xmax "
+                  "-effect_turned_axis 1,0,0 -effect_turned_axis_point 0,0.05,0.05 -effect_turned_angle 90*t "
+                  "-time static -static_steps 16 -ksp_max_it 20",
+                  (int)n, (double)nu));
   PetscCall(locking_run(scene, more, &t, cost));
   PetscCall(verify_value_at(t.model, t.run->U, edge, value));
   PetscCall(SbModelEnergies(t.model, t.run->U, NULL, &e));
@@ -336,7 +336,7 @@ static inline PetscErrorCode locking_hang(PetscInt n, PetscReal nu, const char *
   PetscCall(
     PetscSNPrintf(scene, sizeof(scene),
                   "-bodies a -body_a_mesh %s -body_a_poisson %.17g -body_a_density 1000 -sets top "
-                  "-set_top_at plane:0,0,1,0.2 -effects clamp,gravity -effect_clamp_type support "
+                  "-set_top_at plane:0,0,1,0.2 -effects clamp,gravity -effect_clamp_type fixed "
                   "-effect_clamp_on top -effect_gravity_vector 0,0,-9.81 -time static -static_steps 4",
                   mesh, (double)nu));
   PetscCall(locking_run(scene, more, &t, cost));

@@ -147,7 +147,7 @@ static inline PetscErrorCode manufactured_scene(PetscReal nu, char text[], size_
   PetscCall(PetscSNPrintf(
     text, size,
     "-bodies a -body_a_material linear -body_a_young 3 -body_a_poisson %.17g -body_a_density 1 "
-    "-effects hold,load -effect_hold_type support -effect_hold_on boundary -effect_load_type body_force "
+    "-effects hold,load -effect_hold_type fixed -effect_hold_on boundary -effect_load_type body_force "
     "-effect_load_density %s;%s;%s -time static ",
     (double)nu, f[0], f[1], f[2]));
   PetscFunctionReturn(PETSC_SUCCESS);

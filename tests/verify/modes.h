@@ -69,7 +69,7 @@ static inline PetscErrorCode modes_lowest(SbModel m, PetscReal shift, PetscReal 
   PetscCheck(package, PETSC_COMM_WORLD, PETSC_ERR_SUP, "This PETSc has neither SuiteSparse nor MUMPS");
   PetscCall(SbPCDirectSet(pc, package, PETSC_TRUE));
   PetscCall(PCSetFromOptions(pc));
-  PetscCall(SbPCGuardFactor(pc));
+  PetscCall(SbPCCheckPivots(pc));
   PetscCall(PetscRandomCreate(PETSC_COMM_WORLD, &random));
   for (int i = 0; i < MODES_BLOCK; i++) PetscCall(VecSetRandom(X[i], random));
   PetscCall(PetscRandomDestroy(&random));

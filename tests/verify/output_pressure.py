@@ -23,7 +23,7 @@ SCENARIO = """
 -set_left_at plane:1,0,0,0
 -effects gravity,hold
 -effect_gravity_vector 0,0,-9.81
--effect_hold_type support
+-effect_hold_type fixed
 -effect_hold_on left
 -time static
 -solver direct

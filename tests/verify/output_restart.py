@@ -38,7 +38,7 @@ def compare(a, b, tolerance, rows_tolerance):
     for k, name in enumerate(names):
         if name in ("newton", "linear", "min_J"):
             continue
-        kind = "strain" if name in ("kinetic", "load_work", "drive_work", "damping_loss", "integrator_loss", "total") else name[:-1]
+        kind = "strain" if name in ("kinetic", "load_work", "prescribed_work", "damping_loss", "integrator_loss", "total") else name[:-1]
         scale = max(numpy.abs(p[:, i]).max() for i, n in enumerate(names) if n == name or n == kind or n[:-1] == kind)
         worst = numpy.abs(p[:, k] - q[:, k]).max()
         if not worst <= rows_tolerance * scale:

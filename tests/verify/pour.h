@@ -204,7 +204,7 @@ static inline PetscErrorCode pour(PetscInt n, PetscReal end, PetscReal radius, P
            (double)w->contacts, (double)w->force);
   SB_CHECK(w->start - w->energy > 0.1 * weight * radius, "the bodies do not fall: %g J",
            (double)(w->start - w->energy));
-  SB_CHECK(w->min_J > 0, "a cell is turned inside out");
+  SB_CHECK(w->min_J > 0, "a cell is inverted");
   PetscCall(test_scene_close(&t));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

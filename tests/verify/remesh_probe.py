@@ -21,7 +21,7 @@ SCENE = """-bodies cube
 -body_cube_poisson 0.3
 -body_cube_density 1000
 -effects shear
--effect_shear_type drive
+-effect_shear_type prescribed_displacement
 -effect_shear_on boundary
 -effect_shear_displacement 0.3*t*x+0.2*t*z;-0.2*t*y;0.4*t*z
 -time static

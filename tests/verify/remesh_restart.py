@@ -54,7 +54,7 @@ def check_restart(whole, names, step, ranks):
     check_frames(folder)
     if whole.shape != parts.shape:
         sys.exit(f"{folder}: {parts.shape} rows and columns, not {whole.shape}")
-    for name in ("strain", "drive_work", "volume", "min_J", "max_displacement", "remesh_loss"):
+    for name in ("strain", "prescribed_work", "volume", "min_J", "max_displacement", "remesh_loss"):
         k = names.index(name)
         worst = numpy.abs(whole[:, k] - parts[:, k]).max() / numpy.abs(whole[:, k]).max()
         if not worst <= 1e-6:

@@ -20,7 +20,7 @@ SCENARIO = """
 -body_bar_density 1000
 -effects gravity,hold
 -effect_gravity_vector 0,0,-9.81
--effect_hold_type support
+-effect_hold_type fixed
 -effect_hold_on xmin
 -time static
 -solver cg_two_level

@@ -119,14 +119,14 @@ static PetscErrorCode check(const char *element, const char *response, const cha
                         "-body_b_material corotated -body_b_young 2e4 -body_b_poisson 0.3 -body_b_element %s "
                         "-body_a_velocity 0.8,0,0 "
                         "-body_b_velocity -1,0,0 -effects meet -effect_meet_type collision "
-                        "-effect_meet_response %s -effect_meet_sides %s "
+                        "-effect_meet_response %s -effect_meet_passes %s "
                         "-time euler_implicit -ts_dt %g -ts_max_time 0.1 -ksp_rtol 1e-11 -snes_rtol 1e-12",
                         element, element, response, sides, (double)dt));
   t.run->want_energies = PETSC_TRUE;
   PetscCall(SbRunAddMonitor(t.run, watch, &w, NULL));
   PetscCall(verify_solve(&t, "angular"));
   PetscCall(PetscPrintf(PETSC_COMM_WORLD,
-                        "  %s, %s, sides %s, steps of %g ms: bodies turned each other by %.3e kg m^2/s, off "
+                        "  %s, %s, passes %s, steps of %g ms: bodies turned each other by %.3e kg m^2/s, off "
                         "in a step by %.1e, torque of all "
                         "contacts %.1e, without it %.1e, %g pairs, momentum %.1e\n",
                         element, response, sides, (double)(1000 * dt), (double)w.most, (double)w.missing,
@@ -150,7 +150,7 @@ int main(int argc, char **argv)
   SB_TEST_BEGIN(argc, argv);
   PetscCallMPI(MPI_Comm_size(PETSC_COMM_WORLD, &size));
   PetscCall(check("p1", "projected", "one", 0.001, 5e-5));
-  PetscCall(check("p1", "projected", "both", 0.001, 5e-5));
+  PetscCall(check("p1", "projected", "two", 0.001, 5e-5));
   PetscCall(check("cr", "projected", "one", 0.001, 5e-5));
   if (size > 1) SB_TEST_END(); /* many solves of a small system: on one rank only */
   PetscCall(check("p1", "projected", "one", 0.0005, 2e-5));

@@ -14,7 +14,7 @@
 #define BODY(name, element, place, spin)                                                                     \
   "-body_" name "_mesh box:0.1,0.1,0.1:2 -body_" name "_translate " place " -body_" name "_element " element \
   " -body_" name "_material corotated -body_" name "_young 2e4 -body_" name "_poisson 0.3 -body_" name       \
-  "_spin " spin " "
+  "_angular_velocity " spin " "
 #define TIME "-time %s -ts_dt 0.005 -ts_max_time 0.1 -solver %s "
 
 /* Displacements and velocities by original number, [2][3 n]; `w` (may be NULL) watches. */
@@ -41,7 +41,7 @@ static PetscErrorCode motion(const char *options, ContactWatch *w, PetscInt *n, 
 
 /*
   The preconditioners of `rotated` and `two_level` keep something from solve to solve and are renewed when the operator is a new one, as the
-  one that rows of contact wrap: with `exact` false scenes with them may differ by what solves leave.
+  one that contact constraints wrap: with `exact` false scenes with them may differ by what solves leave.
 */
 static PetscErrorCode check_named(const char *element, const char *time, const char *solver, PetscBool exact)
 {

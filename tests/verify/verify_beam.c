@@ -64,7 +64,7 @@ static PetscErrorCode hanging_error(PetscInt n, PetscReal *error)
     PetscSNPrintf(text, sizeof(text),
                   "-bodies a -time static -body_a_mesh box:0.3,0.3,1:%d -body_a_translate -0.1,-0.2,0 "
                   "-body_a_material linear -body_a_young %g -body_a_poisson %g -body_a_density 1000 "
-                  "-effects gravity,top -effect_top_type drive -effect_top_on zmax "
+                  "-effects gravity,top -effect_top_type prescribed_displacement -effect_top_on zmax "
                   "-effect_top_displacement %.17g*x;%.17g*y;%.17g*(x^2+y^2)",
                   (int)n, HANG_E, HANG_NU, -HANG_NU * HANG_W / HANG_E, -HANG_NU * HANG_W / HANG_E,
                   0.5 * HANG_NU * HANG_W / HANG_E));
@@ -100,8 +100,8 @@ static PetscErrorCode check_hanging(void)
 
 /* ------------------------------------------------------------------ cantilevers */
 
-#define PLANE                                                                                              \
-  " -effects clamp,plane,end -effect_clamp_type support -effect_clamp_on xmin -effect_plane_type support " \
+#define PLANE                                                                                          \
+  " -effects clamp,plane,end -effect_clamp_type fixed -effect_clamp_on xmin -effect_plane_type fixed " \
   "-effect_plane_on all -effect_plane_components y -effect_end_type traction -effect_end_on xmax"
 
 /* End load with the parabolic shear of beam theory. */
@@ -151,7 +151,7 @@ static PetscErrorCode check_weight(void)
     PetscCall(PetscSNPrintf(
       text, sizeof(text),
       "-body_a_mesh box:0.4,0.1,0.1:%d -body_a_material linear -body_a_young 5e4 "
-      "-body_a_poisson 0.3 -body_a_density 1000 -effects gravity,clamp -effect_clamp_type support "
+      "-body_a_poisson 0.3 -body_a_density 1000 -effects gravity,clamp -effect_clamp_type fixed "
       "-effect_clamp_on xmin",
       4 << k));
     PetscCall(solve(text, &bar));

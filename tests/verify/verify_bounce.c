@@ -146,13 +146,13 @@ static PetscErrorCode check_soft(PetscReal young, PetscReal dt, PetscReal e)
 
   PetscFunctionBeginUser;
   PetscCall(verify_mesh_write(n, ball, NULL, path));
-  PetscCall(
-    bounce("soft", &b,
-           "-bodies a -body_a_mesh %s -body_a_material corotated -body_a_young %g -body_a_poisson 0.3 "
-           "-body_a_density 1000 -body_a_translate 0,0,%g -body_a_spin 3,5,7 -effects gravity,floor "
-           "-effect_floor_type contact -effect_floor_obstacle plane:0,0.1,1,0 -effect_floor_restitution %g "
-           "-time euler_implicit -ts_dt %g -ts_max_time 0.4 -snes_rtol 1e-8",
-           path, (double)young, 0.05 + RADIUS, (double)e, (double)dt));
+  PetscCall(bounce(
+    "soft", &b,
+    "-bodies a -body_a_mesh %s -body_a_material corotated -body_a_young %g -body_a_poisson 0.3 "
+    "-body_a_density 1000 -body_a_translate 0,0,%g -body_a_angular_velocity 3,5,7 -effects gravity,floor "
+    "-effect_floor_type contact -effect_floor_obstacle plane:0,0.1,1,0 -effect_floor_restitution %g "
+    "-time euler_implicit -ts_dt %g -ts_max_time 0.4 -snes_rtol 1e-8",
+    path, (double)young, 0.05 + RADIUS, (double)e, (double)dt));
   PetscCall(PetscPrintf(
     PETSC_COMM_WORLD, "  soft, E = %g, dt = %g, e = %g: first rise %.3f, largest gain of a step %.1e J\n",
     (double)young, (double)dt, (double)e, (double)(b.peak[1] / b.peak[0]), (double)b.gain));

@@ -44,7 +44,7 @@ static void place_vertex(const PetscInt n[3], const PetscInt at[3], PetscReal x[
     x[1] *= size * (1. + 0.1 * r[1]);
     x[2] *= size * (1. + 0.1 * r[2]);
   } else if (at[0] == 1 && at[1] == 0) {
-    /* a line of vertices moved onto the plane of faces that it looks at, but for a thousandth */
+    /* a line of vertices moved onto the plane of faces that it examines, but for a thousandth */
     const PetscReal part = 0.499 * (1. - 0.002 * r[0]);
 
     x[0] -= part / (PetscReal)n[0];
@@ -176,7 +176,7 @@ static PetscErrorCode pressed(const char *element, const char *law, PetscReal ra
     text, sizeof(text),
     "-bodies a -body_a_mesh box:1,1,1:2 -body_a_element %s -body_a_material %s -body_a_tangent exact "
     "-body_a_young 1e5 -body_a_poisson 0.499 -body_a_density 1 -solver cg_jacobi -effects hold "
-    "-effect_hold_type support -effect_hold_on boundary",
+    "-effect_hold_type fixed -effect_hold_on boundary",
     element, law));
   PetscCall(test_scene_open(text, &t));
   eps =

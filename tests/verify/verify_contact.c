@@ -20,7 +20,7 @@ enum { FX, FY, FZ, TX, TY, TZ, CONTACTS, PENETRATION, NVALUE };
 static SbEffect find_contact(SbModel m)
 {
   for (PetscInt e = 0; e < m->neffect; e++) {
-    if (m->effect[e]->ops.touch) return m->effect[e];
+    if (m->effect[e]->ops.begin_step) return m->effect[e];
   }
   return NULL;
 }
@@ -65,8 +65,8 @@ static PetscErrorCode check_press(const char *element, const char *response, Pet
     &t,
     "-bodies a -body_a_mesh box:0.1,0.1,0.05:4 -body_a_material linear -body_a_young 1e5 -body_a_poisson 0.3 "
     "-body_a_density 1000 -body_a_element %s -time static -ksp_rtol 1e-12 -snes_rtol 1e-12 "
-    "-effects x,y,load,floor -effect_x_type support -effect_x_on xmin -effect_x_components x "
-    "-effect_y_type support -effect_y_on ymin -effect_y_components y -effect_load_type traction "
+    "-effects x,y,load,floor -effect_x_type fixed -effect_x_on xmin -effect_x_components x "
+    "-effect_y_type fixed -effect_y_on ymin -effect_y_components y -effect_load_type traction "
     "-effect_load_on zmax -effect_load_vector 0;0;%g -effect_floor_type contact -effect_floor_on zmin "
     "-effect_floor_obstacle plane:0,0,1,0.001 -effect_floor_response %s -effect_floor_stiffness %g",
     element, -LOAD, response, (double)stiffness));
@@ -239,7 +239,7 @@ static PetscErrorCode check_held(const char *response)
   PetscCall(verify_open(
     &t,
     "-bodies a -body_a_mesh box:0.1,0.1,0.05:2 -body_a_material linear -body_a_young 1e5 -body_a_poisson 0.3 "
-    "-body_a_density 1000 -effects gravity,side,load,floor -effect_side_type support -effect_side_on xmin "
+    "-body_a_density 1000 -effects gravity,side,load,floor -effect_side_type fixed -effect_side_on xmin "
     "-effect_side_components y -effect_load_type traction -effect_load_on xmax -effect_load_vector 100;0;0 "
     "-effect_floor_type contact -effect_floor_on zmin -effect_floor_obstacle plane:0,0,1,1e-5 "
     "-effect_floor_friction 0.3 -effect_floor_response %s -time static",
@@ -324,7 +324,7 @@ static PetscErrorCode indent(const char *response, const char *more, PetscInt mo
   PetscCall(
     verify_open(&t,
                 "-bodies a -body_a_mesh box:0.1,0.06,0.04:4 -body_a_material corotated -body_a_young 2e4 "
-                "-body_a_poisson 0.4 -body_a_density 1000 -effects bed,tool -effect_bed_type support "
+                "-body_a_poisson 0.4 -body_a_density 1000 -effects bed,tool -effect_bed_type fixed "
                 "-effect_bed_on zmin -effect_tool_type contact -effect_tool_on zmax "
                 "-effect_tool_obstacle capsule:0.05,0.031,0.055,0.05,0.031,0.155,0.015 "
                 "-effect_tool_displacement 0.02*ramp(t/0.2-1);0;-0.01*ramp(t/0.2) -effect_tool_response %s "
@@ -358,9 +358,9 @@ static PetscErrorCode check_indent(void)
   PetscCall(indent("projected", "", 900, &a));
   SB_CHECK(a.force[10][2] < -0.5 && a.force[20][0] > 0.1, "pressed by %g N, dragged by %g N",
            (double)-a.force[10][2], (double)a.force[20][0]);
-  PetscCall(indent("multiplier", "-multipliers direct", 900, &b));
+  PetscCall(indent("multiplier", "-saddle_solver direct", 900, &b));
   compare_indent(&a, &b, 5e-3, "multiplier");
-  PetscCall(indent("multiplier", "-multipliers iterative", 900, &b));
+  PetscCall(indent("multiplier", "-saddle_solver iterative", 900, &b));
   compare_indent(&a, &b, 5e-3, "multiplier by iterations");
   PetscCall(indent("augmented", "", 1000, &b));
   compare_indent(&a, &b, 0.02, "augmented");
@@ -374,7 +374,7 @@ static PetscErrorCode check_indent(void)
 #define BEAM                                                                                              \
   "-bodies a -body_a_mesh box:1,0.2,0.1:2 -body_a_material linear -body_a_young 2e6 -body_a_poisson 0.3 " \
   "-body_a_density 100 -body_a_element p1 -time static -ksp_rtol 1e-13 -snes_rtol 1e-12 "                 \
-  "-effect_clamp_type support -effect_clamp_on xmin "
+  "-effect_clamp_type fixed -effect_clamp_on xmin "
 
 static PetscErrorCode vi_function(SNES snes, Vec U, Vec F, void *ctx)
 {
@@ -520,8 +520,8 @@ static PetscErrorCode check_hertz(PetscInt cells, PetscReal tolerance)
     "-bodies a -body_a_mesh %s -body_a_material linear -body_a_young %g -body_a_poisson %g -body_a_density 1 "
     "-sets x0,y0,x1,y1,z1,top -set_x0_at plane:1,0,0,0 -set_y0_at plane:0,1,0,0 -set_x1_at plane:1,0,0,1 "
     "-set_y1_at plane:0,1,0,1 -set_z1_at plane:0,0,1,-1 -set_top_at plane:0,0,1,0 -time static "
-    "-ksp_rtol 1e-10 -effects x,y,far,ball -effect_x_type support -effect_x_on x0 -effect_x_components x "
-    "-effect_y_type support -effect_y_on y0 -effect_y_components y -effect_far_type drive "
+    "-ksp_rtol 1e-10 -effects x,y,far,ball -effect_x_type fixed -effect_x_on x0 -effect_x_components x "
+    "-effect_y_type fixed -effect_y_on y0 -effect_y_components y -effect_far_type prescribed_displacement "
     "-effect_far_on x1,y1,z1 -effect_far_displacement x*%s;y*%s;%.15g*(%.15g/%s+z^2/%s^3) "
     "-effect_ball_type contact -effect_ball_on top -effect_ball_obstacle sphere:0,0,%.15g,1",
     path, (double)E, (double)nu, sideways, sideways, (double)(-P * (1 + nu) / (2 * PETSC_PI * E)),
@@ -551,12 +551,12 @@ static PetscErrorCode check_nothing(void)
   for (int k = 0; k < 2; k++) {
     TestScene t;
 
-    PetscCall(
-      verify_open(&t,
-                  "-bodies a -body_a_mesh box:0.1,0.1,0.1:2 -body_a_material corotated -body_a_young 1e4 "
-                  "-body_a_poisson 0.3 -body_a_density 1000 -body_a_spin 1,2,3 -time euler_implicit "
-                  "-ts_dt 0.01 -ts_max_time 0.1 -snes_rtol 1e-12 %s",
-                  extra[k]));
+    PetscCall(verify_open(
+      &t,
+      "-bodies a -body_a_mesh box:0.1,0.1,0.1:2 -body_a_material corotated -body_a_young 1e4 "
+      "-body_a_poisson 0.3 -body_a_density 1000 -body_a_angular_velocity 1,2,3 -time euler_implicit "
+      "-ts_dt 0.01 -ts_max_time 0.1 -snes_rtol 1e-12 %s",
+      extra[k]));
     PetscCall(verify_solve(&t, "nothing"));
     n = 3 * verify_numbers(t.model);
     PetscCall(verify_gather(t.model, t.run->U, &u[k]));

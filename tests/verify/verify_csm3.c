@@ -64,8 +64,8 @@ static PetscErrorCode swing(PetscInt across, PetscReal h, PetscReal seconds, Pet
     text, sizeof(text),
     "-bodies a -body_a_mesh %s -body_a_material stvk -body_a_young 1.4e6 -body_a_poisson 0.4 "
     "-body_a_density 1000 -sets front,back -set_front_at sphere:0.2,0.2,0,0.05 "
-    "-set_back_at sphere:0.2,0.2,%.17g,0.05 -effects root,plane,gravity -effect_root_type support "
-    "-effect_root_on front,back -effect_plane_type support -effect_plane_on all "
+    "-set_back_at sphere:0.2,0.2,%.17g,0.05 -effects root,plane,gravity -effect_root_type fixed "
+    "-effect_root_on front,back -effect_plane_type fixed -effect_plane_on all "
     "-effect_plane_components z -effect_gravity_vector 0,-2,0 -time newmark -ts_dt %g -ts_max_time %g",
     mesh, 0.35 / (double)n[0], (double)h, (double)seconds));
   PetscCall(test_scene_open(text, &t));

@@ -1,6 +1,6 @@
 // @ranks 1 2
 /*
-  Springs of contact with dampers: a stiff block flies onto a plane, and onto another block that is held, with response `penalty`.
+  Springs of contact with dampers: a stiff block flies onto a plane, and onto another block that is constrained, with response `penalty`.
   It is a mass on a spring k and a dashpot k tau that do not pull: the speed with which it leaves is that of this oscillator.
 */
 #include "contact.h"
@@ -86,8 +86,8 @@ int main(int argc, char **argv)
   static const char *const block =
     "a,b -body_b_mesh box:0.1,0.1,0.05:1 -body_b_translate -0.025,-0.027,-0.0501 -body_b_material linear "
     "-body_b_young 1e9 -body_b_poisson 0.3 -body_b_density 1000 -sets low -set_low_at plane:0,0,1,-0.0501 "
-    "-effects hold,meet -effect_hold_type support -effect_hold_on low -effect_meet_type collision "
-    "-effect_meet_sides one";
+    "-effects hold,meet -effect_hold_type fixed -effect_hold_on low -effect_meet_type collision "
+    "-effect_meet_passes one";
 
   PetscReal k;
 

@@ -1,10 +1,10 @@
 // @ranks 1 2
 /*
-  A plate as thin as cloth, one cell thick, falls on a ball and drapes over it. The ball is a rigid obstacle, with friction, or a body held
+  A plate as thin as cloth, one cell thick, falls on a ball and drapes over it. The ball is a rigid obstacle, with friction, or a body constrained
   at its lower end, without.
 
   No vertex of the plate ends a step inside the rigid ball, in the other one none is deeper than 0.4 of its thickness (rows that others imply
-  are not looked after); no cell is turned inside out, no step gives energy, momentum changes by weight and
+  are not looked after); no cell is inverted, no step gives energy, momentum changes by weight and
   the force of the ball, and at the end the plate hangs down on all sides.
 */
 #include "pour.h"
@@ -56,7 +56,7 @@ static PetscErrorCode check_drape(PetscBool rigid, PetscInt cells, PetscInt thic
       how, sizeof(how),
       "-bodies cloth,ball -body_ball_mesh %s -body_ball_translate 0,0,%g -body_ball_material corotated "
       "-body_ball_young 2e5 -body_ball_poisson 0.3 -sets foot -set_foot_at halfspace:0,0,1,%g "
-      "-effects gravity,foot,meet -effect_foot_type support -effect_foot_on foot "
+      "-effects gravity,foot,meet -effect_foot_type fixed -effect_foot_on foot "
       "-effect_meet_type collision",
       path, -RADIUS, -1.6 * RADIUS));
   PetscCall(verify_open(
@@ -86,7 +86,7 @@ static PetscErrorCode check_drape(PetscBool rigid, PetscInt cells, PetscInt thic
   SB_CHECK(depth[2] > depth[1] + 0.01 && depth[1] > depth[0] + 0.01 && depth[0] > 0.5 * DROP,
            "the plate does not drape: %g, %g and %g m", (double)depth[2], (double)depth[1], (double)depth[0]);
   SB_CHECK(behind < (rigid ? 1e-6 : 0.4) * THICK, "%g m inside the ball", (double)behind);
-  SB_CHECK(w->min_J > 0, "a cell is turned inside out");
+  SB_CHECK(w->min_J > 0, "a cell is inverted");
   SB_CHECK(w->gain < 1e-6 * weight * SIDE, "a step gained %g J", (double)w->gain);
   if (rigid) SB_CHECK(w->missing < 1e-5, "momentum changed by %g kg m/s without a force", (double)w->missing);
   PetscCall(test_scene_close(&t));

@@ -46,7 +46,7 @@ static PetscErrorCode collision_values(SbRun run, PetscReal values[NVALUE])
   SbEffect e = NULL;
 
   PetscFunctionBeginUser;
-  for (PetscInt i = 0; i < m->neffect && !e; i++) e = m->effect[i]->ops.touch ? m->effect[i] : NULL;
+  for (PetscInt i = 0; i < m->neffect && !e; i++) e = m->effect[i]->ops.begin_step ? m->effect[i] : NULL;
   PetscCall((*e->ops.history)(e, m->space, &stage, NULL, values));
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, values, NVALUE, MPIU_REAL, MPI_SUM, m->comm));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -117,7 +117,7 @@ static PetscReal depth_at(const PetscReal p[3], PetscReal part, PetscInt n, cons
 
     if (row[0] != part) continue;
     angle += solid_angle(p, row + 1);
-    (void)SbClosestPoint(p, x, w, &d2);
+    (void)SbTriangleClosestPoint(p, x, w, &d2);
     nearest = PetscMin(nearest, d2);
   }
   return PetscAbsReal(angle) > 2 * PETSC_PI ? PetscSqrtReal(nearest) : 0;
@@ -225,13 +225,13 @@ static PetscErrorCode watch(SbRun run, const SbStep *step, void *ctx)
 #define LAWS(young)                                                                              \
   " -body_a_material corotated -body_a_young " young " -body_a_poisson 0.3 -body_a_density 1000" \
   " -body_b_material corotated -body_b_young " young " -body_b_poisson 0.3 -body_b_density 1000 "
-/* The ends of the lower bar are held, those of the upper one guided. */
-#define ENDS                                                                                                 \
-  "-sets skin,a0,a1,b0,b1 -set_skin_at boundary -set_a0_at plane:1,0,0,0 -set_a1_at plane:1,0,0,0.21 "       \
-  "-set_b0_at plane:0,1,0,-0.105 -set_b1_at plane:0,1,0,0.105 -effect_a0_type support -effect_a0_on a0 "     \
-  "-effect_a1_type support -effect_a1_on a1 -effect_b0_type support -effect_b0_on b0 -effect_b0_components " \
-  "xy "                                                                                                      \
-  "-effect_b1_type support -effect_b1_on b1 -effect_b1_components xy -effect_meet_type collision "
+/* The ends of the lower bar are constrained, those of the upper one guided. */
+#define ENDS                                                                                             \
+  "-sets skin,a0,a1,b0,b1 -set_skin_at boundary -set_a0_at plane:1,0,0,0 -set_a1_at plane:1,0,0,0.21 "   \
+  "-set_b0_at plane:0,1,0,-0.105 -set_b1_at plane:0,1,0,0.105 -effect_a0_type fixed -effect_a0_on a0 "   \
+  "-effect_a1_type fixed -effect_a1_on a1 -effect_b0_type fixed -effect_b0_on b0 -effect_b0_components " \
+  "xy "                                                                                                  \
+  "-effect_b1_type fixed -effect_b1_on b1 -effect_b1_components xy -effect_meet_type collision "
 #define BARS                                                                                       \
   "-bodies a,b -body_a_mesh box:0.21,0.03,0.03:7,1,1 -body_a_rotate 1,0,0,45 -body_b_mesh "        \
   "box:0.03,0.21,0.03:1,7,1 -body_b_rotate 0,1,0,-45 -body_b_translate 0.105,-0.105,0.0434264 "    \
@@ -334,10 +334,10 @@ static PetscErrorCode check_box(const char *what, const char *turn, PetscReal mo
     "0,0,-5 "
     "-sets skin,x0,x1,y0,y1 -set_skin_at boundary -set_x0_at plane:1,0,0,0 -set_x1_at plane:1,0,0,0.2 "
     "-set_y0_at "
-    "plane:0,1,0,0 -set_y1_at plane:0,1,0,0.2 -effects x0,x1,y0,y1,meet -effect_x0_type support "
+    "plane:0,1,0,0 -set_y1_at plane:0,1,0,0.2 -effects x0,x1,y0,y1,meet -effect_x0_type fixed "
     "-effect_x0_on x0 "
-    "-effect_x1_type support -effect_x1_on x1 -effect_y0_type support -effect_y0_on y0 -effect_y1_type "
-    "support "
+    "-effect_x1_type fixed -effect_x1_on x1 -effect_y0_type fixed -effect_y0_on y0 -effect_y1_type "
+    "fixed "
     "-effect_y1_on y1 -effect_meet_type collision -time euler_implicit -ts_dt 0.001 -ts_max_time 0.03",
     turn));
   PetscCall(SbRunAddMonitor(t.run, watch, &seen, NULL));
@@ -460,7 +460,7 @@ static PetscErrorCode watch_rings(SbRun run, const SbStep *step, void *ctx)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The second ring stands upright in the first and is pulled away along x, the first one being held at its far side. */
+/* The second ring stands upright in the first and is pulled away along x, the first one being constrained at its far side. */
 static PetscErrorCode check_rings(PetscReal most)
 {
   const PetscReal inner = (RADIUS - TUBE) * PetscCosReal(PETSC_PI / SEGMENTS), away = 2 * inner - 0.002;
@@ -476,7 +476,8 @@ static PetscErrorCode check_rings(PetscReal most)
     "skin,far,end "
     "-set_skin_at boundary -set_far_at halfspace:1,0,0,-0.09 -set_end_at halfspace:-1,0,0,%.15g -effects "
     "hold,pull,meet "
-    "-effect_hold_type support -effect_hold_on far -effect_pull_type drive -effect_pull_on end "
+    "-effect_hold_type fixed -effect_hold_on far -effect_pull_type prescribed_displacement -effect_pull_on "
+    "end "
     "-effect_pull_displacement "
     "0.08*ramp(t/0.4);0;0 -effect_meet_type collision -time euler_implicit -ts_dt 0.01 -ts_max_time 0.5" LAWS(
       "1e5"),

@@ -21,7 +21,7 @@ static const char *const kinds[][2] = {
   {"p1", " -body_a_element p1"},
   {"cr", " -body_a_element cr"},
   {"dg weak", " -body_a_element dg"},
-  {"dg strong", " -body_a_element dg -body_a_supports strong"},
+  {"dg strong", " -body_a_element dg -body_a_dirichlet strong"},
 };
 #define NKIND ((int)PETSC_STATIC_ARRAY_LENGTH(kinds))
 
@@ -70,7 +70,7 @@ static PetscErrorCode bar(int kind, PetscInt n, PetscReal *strain)
   PetscCall(PetscSNPrintf(
     text, sizeof(text),
     "-bodies a -body_a_mesh box:0.2,0.1,0.1:%d" BODY "%s -body_a_material linear -effects gravity,clamp,pull "
-    "-effect_clamp_type support -effect_clamp_on xmin -effect_pull_type traction -effect_pull_on xmax "
+    "-effect_clamp_type fixed -effect_clamp_on xmin -effect_pull_type traction -effect_pull_on xmax "
     "-effect_pull_total 0,3,6 -time static -solver direct" EXACT,
     (int)n, kinds[kind][1]));
   PetscCall(test_scene_open(text, &t));
@@ -119,7 +119,7 @@ static PetscErrorCode check_drive(int kind)
   PetscCall(PetscSNPrintf(
     text, sizeof(text),
     "-bodies a -body_a_mesh box:0.2,0.1,0.1:2" BODY
-    "%s -body_a_material corotated -effects hand -effect_hand_type drive -effect_hand_on "
+    "%s -body_a_material corotated -effects hand -effect_hand_type prescribed_displacement -effect_hand_on "
     "xmin,xmax -effect_hand_angle 40*t -effect_hand_axis 1,2,3 -effect_hand_axis_point "
     "0.1,0,0 -effect_hand_displacement t;0;0.5*t -time static -static_steps 4 -solver direct" EXACT,
     kinds[kind][1]));
@@ -171,7 +171,7 @@ static PetscErrorCode check_mixed(void)
     "-body_b_young 2e5 -body_c_young 1e5 -body_b_poisson 0.3 -body_c_poisson 0.45 -body_b_density 500 "
     "-body_c_density 250 -sets low,tip -set_low_at plane:0,0,1,0 -effects gravity,stand,poke "
     "-effect_stand_type "
-    "support "
+    "fixed "
     "-effect_stand_on low -effect_poke_type point_force -effect_poke_on tip -effect_poke_vector "
     "0.01;0.02;0.03 "
     "-time static -solver direct" EXACT));
@@ -224,12 +224,12 @@ static PetscErrorCode check_flight(int kind, const char *mass)
   TestScene t;
 
   PetscFunctionBeginUser;
-  PetscCall(
-    PetscSNPrintf(text, sizeof(text),
-                  "-bodies a -body_a_mesh box:0.2,0.1,0.1:4" BODY
-                  "%s -body_a_material corotated -body_a_velocity 1,2,3 -body_a_spin 3,0,0 -mass %s -time "
-                  "euler_symplectic -ts_max_time 0.01",
-                  kinds[kind][1], mass));
+  PetscCall(PetscSNPrintf(
+    text, sizeof(text),
+    "-bodies a -body_a_mesh box:0.2,0.1,0.1:4" BODY
+    "%s -body_a_material corotated -body_a_velocity 1,2,3 -body_a_angular_velocity 3,0,0 -mass %s -time "
+    "euler_symplectic -ts_max_time 0.01",
+    kinds[kind][1], mass));
   PetscCall(test_scene_open(text, &t));
   PetscCall(SbRunAddMonitor(t.run, watch_flight, &f, NULL));
   PetscCall(verify_solve(&t, kinds[kind][0]));
@@ -258,7 +258,7 @@ static PetscErrorCode swing(int kind, const char *time, PetscReal energy[2])
     PetscSNPrintf(text, sizeof(text),
                   "-bodies a -body_a_mesh box:0.2,0.1,0.1:2" BODY
                   "%s -body_a_material linear -body_a_velocity 0,0,0.1 -effects clamp -effect_clamp_type "
-                  "support -effect_clamp_on xmin -ts_max_time 0.02 %s",
+                  "fixed -effect_clamp_on xmin -ts_max_time 0.02 %s",
                   kinds[kind][1], time));
   PetscCall(test_scene_open(text, &t));
   PetscCall(SbModelEnergies(t.model, t.run->U, t.run->V, &e));
@@ -298,7 +298,7 @@ static PetscErrorCode check_pressure(int kind)
   PetscFunctionBeginUser;
   PetscCall(PetscSNPrintf(text, sizeof(text),
                           "-bodies a -body_a_mesh box:0.2,0.1,0.1:2" BODY
-                          "%s -body_a_material neohookean -body_a_spin 0,0,20 -effects sea "
+                          "%s -body_a_material neohookean -body_a_angular_velocity 0,0,20 -effects sea "
                           "-effect_sea_type pressure -effect_sea_on boundary -effect_sea_value 2e4 -time "
                           "euler_implicit -ts_dt 5e-3 -ts_max_time 0.05 -solver direct" EXACT,
                           kinds[kind][1]));

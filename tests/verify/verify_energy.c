@@ -46,7 +46,7 @@ static PetscErrorCode check_drift(const char *element, PetscInt steps)
     PetscSNPrintf(text, sizeof(text),
                   "-bodies a -body_a_mesh box:0.2,0.1,0.1:1" BODY
                   "-body_a_element %s -body_a_material linear -body_a_velocity "
-                  "0.1,0,0.3 -effects clamp -effect_clamp_type support -effect_clamp_on xmin -time newmark "
+                  "0.1,0,0.3 -effects clamp -effect_clamp_type fixed -effect_clamp_on xmin -time newmark "
                   "-ts_dt 0.003 -ts_max_time %.17g" TIGHT,
                   element, 0.003 * (double)steps));
   PetscCall(test_scene_open(text, &t));
@@ -106,7 +106,7 @@ static PetscErrorCode check_decay(const char *element, PetscReal h)
   PetscCall(PetscSNPrintf(text, sizeof(text),
                           "-bodies a -body_a_mesh box:0.2,0.1,0.1:2" BODY
                           "-body_a_element %s -body_a_material linear -body_a_velocity "
-                          "0.1,0,0.3 -effects clamp -effect_clamp_type support -effect_clamp_on xmin -time "
+                          "0.1,0,0.3 -effects clamp -effect_clamp_type fixed -effect_clamp_on xmin -time "
                           "euler_implicit -ts_dt %.17g -ts_max_time %.17g" TIGHT,
                           element, (double)h, (double)(100. * h)));
   PetscCall(test_scene_open(text, &t));
@@ -142,7 +142,7 @@ static PetscErrorCode missing(const char *preset, const char *element, const cha
     text, sizeof(text),
     "-bodies a -body_a_mesh box:0.2,0.1,0.1:2" BODY
     "-body_a_element %s -body_a_material %s -effects gravity,damping,hand,wind -effect_damping_alpha 1 "
-    "-effect_damping_beta 0.002 -effect_hand_type drive -effect_hand_on xmin "
+    "-effect_damping_beta 0.002 -effect_hand_type prescribed_displacement -effect_hand_on xmin "
     "-effect_hand_displacement 0.05*sin(6*t)^2;0;0.03*t^2 -effect_wind_type traction "
     "-effect_wind_on xmax -effect_wind_vector 0;500*t;0 -time %s -ts_dt %.17g -ts_max_time 0.5" TIGHT,
     element, law, preset, (double)h));
@@ -150,13 +150,14 @@ static PetscErrorCode missing(const char *preset, const char *element, const cha
   t.run->want_energies = PETSC_TRUE;
   PetscCall(verify_solve(&t, "account"));
   e = &t.run->energies;
-  *loss = e->integrator_loss / (PetscAbsReal(e->load_work) + PetscAbsReal(e->drive_work) + e->damping_loss);
+  *loss =
+    e->integrator_loss / (PetscAbsReal(e->load_work) + PetscAbsReal(e->prescribed_work) + e->damping_loss);
   PetscCall(PetscPrintf(
     PETSC_COMM_WORLD,
     "  account of %s, %s %s, h %g s: loads %.4f J, drive %.4f J, damping %.4f J, kinetic %.4f J, strain %.4f "
     "J; missing %.1e of that\n",
-    preset, element, law, (double)h, (double)e->load_work, (double)e->drive_work, (double)e->damping_loss,
-    (double)e->kinetic, (double)e->strain, (double)*loss));
+    preset, element, law, (double)h, (double)e->load_work, (double)e->prescribed_work,
+    (double)e->damping_loss, (double)e->kinetic, (double)e->strain, (double)*loss));
   PetscCall(test_scene_close(&t));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -186,12 +187,13 @@ static PetscErrorCode fly(const char *preset, const char *element, const char *l
   char text[VERIFY_TEXT];
 
   PetscFunctionBeginUser;
-  PetscCall(PetscSNPrintf(text, sizeof(text),
-                          "-bodies a -body_a_mesh box:0.3,0.2,0.1:1" BODY
-                          "-body_a_element %s -body_a_material %s -body_a_velocity 0.3,-0.2,0.1 -body_a_spin "
-                          "1,2,6 -time %s -ts_dt %.17g "
-                          "-ts_max_time 0.1" TIGHT,
-                          element, law, preset, (double)h));
+  PetscCall(PetscSNPrintf(
+    text, sizeof(text),
+    "-bodies a -body_a_mesh box:0.3,0.2,0.1:1" BODY
+    "-body_a_element %s -body_a_material %s -body_a_velocity 0.3,-0.2,0.1 -body_a_angular_velocity "
+    "1,2,6 -time %s -ts_dt %.17g "
+    "-ts_max_time 0.1" TIGHT,
+    element, law, preset, (double)h));
   PetscCall(test_scene_open(text, &t));
   PetscCall(SbModelEnergies(t.model, t.run->U, t.run->V, &before));
   PetscCall(verify_solve(&t, preset));
@@ -208,7 +210,7 @@ static PetscErrorCode fly(const char *preset, const char *element, const char *l
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* order of the angular momentum; 0: exact; -1: not looked at */
+/* order of the angular momentum; 0: exact; -1: not examined */
 static PetscErrorCode check_flight(const char *preset, const char *element, const char *law, PetscReal h,
                                    int order)
 {

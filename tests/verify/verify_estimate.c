@@ -283,8 +283,8 @@ static PetscErrorCode check_shell(const char *element, PetscReal nu)
   PetscCall(PetscSNPrintf(
     scene, sizeof(scene),
     "-bodies a -body_a_material linear -body_a_young 1 -body_a_poisson %.17g -body_a_density 1 "
-    "-effects x,y,z,push -effect_x_type support -effect_x_on x0 -effect_x_components x "
-    "-effect_y_type support -effect_y_on y0 -effect_y_components y -effect_z_type support -effect_z_on z0 "
+    "-effects x,y,z,push -effect_x_type fixed -effect_x_on x0 -effect_x_components x "
+    "-effect_y_type fixed -effect_y_on y0 -effect_y_components y -effect_z_type fixed -effect_z_on z0 "
     "-effect_z_components z -effect_push_type pressure -effect_push_on inside -effect_push_value 1 "
     "-effect_push_follower no -time static -solver direct",
     (double)nu));
@@ -303,7 +303,7 @@ static PetscErrorCode check_wave(const char *element, PetscInt n)
   PetscCall(check_exact(
     &c,
     "-bodies a -body_a_material linear -body_a_young 1 -body_a_poisson 0 -body_a_density 1 -sets root "
-    "-set_root_at plane:1,0,0,0 -effects hold,load -effect_hold_type support -effect_hold_on root "
+    "-set_root_at plane:1,0,0,0 -effects hold,load -effect_hold_type fixed -effect_hold_on root "
     "-effect_load_type body_force -effect_load_density (pi/2)^2*sin(pi/2*x);0;0 -time newmark -ts_dt 0.1 "
     "-ts_max_time 2 -ksp_rtol 1e-10",
     mesh, exact_wave));
@@ -323,7 +323,7 @@ typedef struct {
 
 #define BAR                                                                                               \
   "-bodies a -body_a_young 5e4 -body_a_density 1000 -sets root -set_root_at plane:1,0,0,0 -effects hold," \
-  "weight -effect_hold_type support -effect_hold_on root -effect_weight_type gravity -time static "
+  "weight -effect_hold_type fixed -effect_hold_on root -effect_weight_type gravity -time static "
 #define WEIGHT "-effect_weight_vector 0,0,-9.81 "
 
 static PetscErrorCode open_problem(const Problem *p, const Case *c, TestScene *t)
@@ -424,8 +424,8 @@ static PetscErrorCode check_squeeze(void)
   static const Problem squeeze = {
     "squeeze",
     "-bodies a -body_a_material linear -body_a_young 5e4 -body_a_density 1000 -sets low,high "
-    "-set_low_at plane:0,0,1,0 -set_high_at plane:0,0,1,0.1 -effects hold,press -effect_hold_type support "
-    "-effect_hold_on low -effect_press_type drive -effect_press_on high "
+    "-set_low_at plane:0,0,1,0 -set_high_at plane:0,0,1,0.1 -effects hold,press -effect_hold_type fixed "
+    "-effect_hold_on low -effect_press_type prescribed_displacement -effect_press_on high "
     "-effect_press_displacement 0;0;-0.01 -time static -solver direct",
     {2, 2, 1},
     {0.2, 0.2, 0.1},
@@ -459,9 +459,9 @@ static PetscErrorCode check_sphere(void)
     "sphere",
     "-bodies a -body_a_material linear -body_a_young 1e5 -body_a_density 1 -sets x0,y0,z1,top "
     "-set_x0_at plane:1,0,0,0 -set_y0_at plane:0,1,0,0 -set_z1_at plane:0,0,1,-1 -set_top_at plane:0,0,1,0 "
-    "-time static -ksp_rtol 1e-9 -effects x,y,z,ball -effect_x_type support -effect_x_on x0 "
-    "-effect_x_components x -effect_y_type support -effect_y_on y0 -effect_y_components y "
-    "-effect_z_type support -effect_z_on z1 -effect_ball_type contact -effect_ball_on top "
+    "-time static -ksp_rtol 1e-9 -effects x,y,z,ball -effect_x_type fixed -effect_x_on x0 "
+    "-effect_x_components x -effect_y_type fixed -effect_y_on y0 -effect_y_components y "
+    "-effect_z_type fixed -effect_z_on z1 -effect_ball_type contact -effect_ball_on top "
     "-effect_ball_obstacle sphere:0,0,0.99,1",
     {1, 1, 1},
     {1., 1., 1.},

@@ -44,11 +44,11 @@ int main(int argc, char **argv)
   PetscCall(check_meshes(&sphere));
   PetscCall(check_case(&sphere, "projected", "one", 0.08, 1e-3));
   PetscCall(check_case(&sphere, "projected", "one", 0.1, 1e-3));
-  PetscCall(check_case(&sphere, "projected", "both", 0.1, 0.05));
+  PetscCall(check_case(&sphere, "projected", "two", 0.1, 0.05));
   PetscCall(check_case(&sphere, "augmented", "one", 0.1, 1e-3));
-  PetscCall(check_case(&sphere, "augmented", "both", 0.12, 1e-3));
+  PetscCall(check_case(&sphere, "augmented", "two", 0.12, 1e-3));
   PetscCall(check_meshes(&spheres));
-  PetscCall(check_case(&spheres, "projected", "both", 0.1, 0.05));
-  PetscCall(check_case(&spheres, "augmented", "both", 0.1, 1e-3));
+  PetscCall(check_case(&spheres, "projected", "two", 0.1, 0.05));
+  PetscCall(check_case(&spheres, "augmented", "two", 0.1, 1e-3));
   SB_TEST_END();
 }

@@ -38,10 +38,10 @@ static PetscErrorCode check_plane(const char *element, PetscInt cells, PetscReal
                         "-set_meet_at plane:0,0,1,0,%g "
                         "-set_bx_at box:1,0,0.01,1,1,1 -set_by_at box:0,1,0.01,1,1,1 -set_bz_at "
                         "plane:0,0,1,1 -time static -ksp_rtol 1e-8 "
-                        "-solver cg_two_level -effects x,y,high,floor -effect_x_type support -effect_x_on x0 "
+                        "-solver cg_two_level -effects x,y,high,floor -effect_x_type fixed -effect_x_on x0 "
                         "-effect_x_components x "
-                        "-effect_y_type support -effect_y_on y0 -effect_y_components y -effect_high_type "
-                        "drive -effect_high_on bx,by,bz "
+                        "-effect_y_type fixed -effect_y_on y0 -effect_y_components y -effect_high_type "
+                        "prescribed_displacement -effect_high_on bx,by,bz "
                         "-effect_high_displacement %s -effect_floor_type contact -effect_floor_on meet "
                         "-effect_floor_obstacle plane:0,0,1,0",
                         path, element, (double)young, POISSON, (double)(3 * d), far));

@@ -33,9 +33,9 @@ static PetscErrorCode scenario(const char *element, const Inclusion *in, size_t 
     "-body_cube_young %g -body_cube_poisson %g -body_cube_density 1000 -body_cube_inclusions far "
     "-sets far -set_far_at box:0.5,0,0,1,1,1 -inclusion_far_material linear -inclusion_far_young %g "
     "-inclusion_far_poisson %.12g -inclusion_far_density 3000 -effects pull,x,y,z -effect_pull_type traction "
-    "-effect_pull_on xmax -effect_pull_vector %g;0;0 -effect_x_type support -effect_x_on xmin "
-    "-effect_x_components x -effect_y_type support -effect_y_on ymin,ymax -effect_y_components y "
-    "-effect_z_type support -effect_z_on zmin,zmax -effect_z_components z -time static",
+    "-effect_pull_on xmax -effect_pull_vector %g;0;0 -effect_x_type fixed -effect_x_on xmin "
+    "-effect_x_components x -effect_y_type fixed -effect_y_on ymin,ymax -effect_y_components y "
+    "-effect_z_type fixed -effect_z_on zmin,zmax -effect_z_components z -time static",
     element, BULK_E, BULK_NU, (double)in->E, (double)in->nu, SIGMA));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -203,9 +203,9 @@ static PetscErrorCode check(PetscInt k, const char *mesh, const char *more, cons
   PetscCall(verify_open(
     &t,
     "-bodies a -body_a_mesh %s -body_a_element cr -body_a_material neohookean -body_a_young %.17g "
-    "-body_a_poisson %.17g -body_a_density 1 %s -effects x,y,z,push -effect_x_type support -effect_x_on x0 "
-    "-effect_x_components x -effect_y_type support -effect_y_on y0 -effect_y_components y -effect_z_type "
-    "support -effect_z_components z -effect_push_type pressure -effect_push_on inside "
+    "-body_a_poisson %.17g -body_a_density 1 %s -effects x,y,z,push -effect_x_type fixed -effect_x_on x0 "
+    "-effect_x_components x -effect_y_type fixed -effect_y_on y0 -effect_y_components y -effect_z_type "
+    "fixed -effect_z_components z -effect_push_type pressure -effect_push_on inside "
     "-effect_push_value %.17g -time static -static_steps 4 -solver %s -ksp_rtol 1e-11 -snes_rtol 1e-9",
     mesh, 2. * (1. + NU), NU, more, (double)p, solver));
   PetscCall(verify_solve(&t, name));

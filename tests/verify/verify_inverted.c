@@ -1,10 +1,10 @@
 // @ranks 1 2
 /*
-  Runs that refuse steps which turn tets inside out (-time_inverted refuse).
+  Runs that refuse steps which invert tets (-time_inverted reject).
 
     stops     a box that is pressed flat, which it would be at 2/3 of the way: every integrator stops before that with the reason, no farther from it than
-              the shortest step, and with every tet the right side out; one that counts gets to the end with all of them inside out
-    mirrored  a body that is inside out where it begins goes on: no more tets are so than before
+              the shortest step, and with every tet the right side out; one that counts gets to the end with all of them inverted
+    mirrored  a body that is inverted where it begins goes on: no more tets are so than before
     alpha2    cannot refuse, and says so
 */
 #include "scene.h"
@@ -12,7 +12,7 @@
 #define BOX                                                                                                 \
   "-bodies a -body_a_mesh box:0.1,0.1,0.1:2 -body_a_material neohookean -body_a_young 1e4 -body_a_poisson " \
   "0.3 -body_a_density 1000 "
-#define PRESS BOX "-effects press -effect_press_type drive -effect_press_on boundary "
+#define PRESS BOX "-effects press -effect_press_type prescribed_displacement -effect_press_on boundary "
 
 static PetscErrorCode check_stops(const char *time, PetscReal shortest)
 {
@@ -21,19 +21,19 @@ static PetscErrorCode check_stops(const char *time, PetscReal shortest)
   char text[1024];
 
   PetscFunctionBeginUser;
-  PetscCall(PetscSNPrintf(text, sizeof(text),
-                          PRESS "-effect_press_displacement 0;0;-1.5*t*z -time_max_cuts 4 %s -time_inverted ",
-                          time));
+  PetscCall(PetscSNPrintf(
+    text, sizeof(text),
+    PRESS "-effect_press_displacement 0;0;-1.5*t*z -time_max_halvings 4 %s -time_inverted ", time));
   for (int refuse = 0; refuse < 2; refuse++) {
     char whole[1100];
 
-    PetscCall(PetscSNPrintf(whole, sizeof(whole), "%s%s", text, refuse ? "refuse" : "count"));
+    PetscCall(PetscSNPrintf(whole, sizeof(whole), "%s%s", text, refuse ? "reject" : "accept"));
     PetscCall(test_scene_open(whole, &s));
     s.run->want_energies = PETSC_TRUE;
     PetscCall(test_scene_solve(&s));
     e = s.run->energies;
     if (refuse) {
-      SB_CHECK(strstr(s.run->stop_reason, "inside out") && !e.ninverted && e.min_J > 0.,
+      SB_CHECK(strstr(s.run->stop_reason, "inverted") && !e.ninverted && e.min_J > 0.,
                "%s: %d inverted, '%s'", time, (int)e.ninverted, s.run->stop_reason);
       SB_CHECK(s.run->t_now < 2. / 3 && s.run->t_now > 2. / 3 - 1.01 * shortest, "%s: stops at %.6g", time,
                (double)s.run->t_now);
@@ -61,11 +61,11 @@ static PetscErrorCode check_mirrored(void)
 
   PetscFunctionBeginUser;
   PetscCall(test_scene_open(
-    PRESS "-effect_press_displacement 0*t-2*x;0;0 -time static -static_steps 2 -time_inverted refuse", &s));
+    PRESS "-effect_press_displacement 0*t-2*x;0;0 -time static -static_steps 2 -time_inverted reject", &s));
   s.run->want_energies = PETSC_TRUE;
   PetscCall(test_fill(s.model, mirror, s.run->U));
   PetscCall(SbModelEnergies(s.model, s.run->U, s.run->V, &e));
-  SB_CHECK(e.ninverted == s.model->mesh->Ncell, "%d tets are inside out at first", (int)e.ninverted);
+  SB_CHECK(e.ninverted == s.model->mesh->Ncell, "%d tets are inverted at first", (int)e.ninverted);
   PetscCall(test_scene_solve(&s));
   SB_CHECK(!s.run->stop_reason[0] && s.run->t_now == 1., "stops at %g s: %s", (double)s.run->t_now,
            s.run->stop_reason);
@@ -80,7 +80,7 @@ static PetscErrorCode check_alpha2(void)
 
   PetscFunctionBeginUser;
   PetscCall(PetscPushErrorHandler(PetscReturnErrorHandler, NULL));
-  ierr = test_scene_open(BOX "-time alpha2 -time_inverted refuse", &s);
+  ierr = test_scene_open(BOX "-time alpha2 -time_inverted reject", &s);
   PetscCall(PetscPopErrorHandler());
   SB_CHECK(ierr == PETSC_ERR_USER, "alpha2 cannot refuse steps: error %d", (int)ierr);
   PetscCall(test_scene_close(&s));

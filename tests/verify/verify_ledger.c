@@ -10,7 +10,7 @@
 
 #define BAR                                                                                 \
   "-bodies bar -body_bar_mesh box:0.4,0.1,0.1:2 -body_bar_young 1e5 -body_bar_poisson 0.3 " \
-  "-body_bar_density 1000 -effects gravity,hold -effect_hold_type support -effect_hold_on xmin "
+  "-body_bar_density 1000 -effects gravity,hold -effect_hold_type fixed -effect_hold_on xmin "
 
 /* The norm of the energy of the difference of two states of the model, whose law is linear or nearly so between them. */
 static PetscErrorCode distance(SbModel m, Vec U, Vec V, Vec U1, Vec V1, PetscReal *error)
@@ -162,7 +162,7 @@ static PetscErrorCode springs(void)
 {
   static const char block[] =
     "-bodies block -body_block_mesh box:0.1,0.1,0.05:4 -body_block_material linear -body_block_young 1e5 "
-    "-body_block_poisson 0.3 -effects hold,tool -effect_hold_type support -effect_tool_type contact "
+    "-body_block_poisson 0.3 -effects hold,tool -effect_hold_type fixed -effect_tool_type contact "
     "-effect_tool_on zmax "
     "-time static -ksp_rtol 1e-10 ";
   static const char ball[] = "-effect_hold_on zmin -effect_tool_obstacle sphere:0.05,0.05,0.087,0.04";
@@ -194,7 +194,7 @@ static PetscErrorCode spectator(const char *options)
                   i ? "-ledger yes -ledger_every 2 -ledger_quantity displacement -ledger_at 0.4,0,0" : ""));
     PetscCall(verify_solve(&t[i], "spectator"));
   }
-  SB_CHECK(!t[0].ledger && !t[0].run->look.fn && !t[0].run->ncolumn, "a run without -ledger has one");
+  SB_CHECK(!t[0].ledger && !t[0].run->post_solve.fn && !t[0].run->ncolumn, "a run without -ledger has one");
   SB_CHECK(t[1].run->ncolumn == SB_ERROR_COUNT, "%d columns", (int)t[1].run->ncolumn);
   PetscCall(VecAXPY(t[1].run->U, -1., t[0].run->U));
   PetscCall(VecNorm(t[1].run->U, NORM_INFINITY, &difference));

@@ -7,7 +7,7 @@
   corner. The load has a maximum of 1.855 and a minimum of -0.940, and between them the point under the load turns back at 61.01 and at 50.74: snap-through and snap-back.
 
   References are those of a geometrically exact beam with shear (Reissner 1972), extrapolated from 20 and 40 elements in each member. The mesh is one layer of CR
-  tets in plane stress, with an odd number of cells through the depth: a hinge is one triangle in the middle of an end, whose mean is held while it turns. It is
+  tets in plane stress, with an odd number of cells through the depth: a hinge is one triangle in the middle of an end, whose mean is constrained while it turns. It is
   a depth / 18 n off the middle, and the load is shared by two vertices beside it. Bending is extrapolated from two meshes (order 2).
 */
 #include "verify.h"
@@ -87,8 +87,8 @@ static PetscErrorCode solve(PetscInt ny, Frame *f)
     "-bodies a -body_a_mesh %s -body_a_element cr -body_a_material stvk -body_a_young 720 -body_a_poisson 0 "
     "-body_a_density 1 "
     "-sets foot,end,point -set_foot_at sphere:%.17g,0,%.17g,%.17g -set_end_at sphere:120,%.17g,%.17g,%.17g "
-    "-set_point_at box:23.5,119.5,-1,24.5,120.5,0.001 -effects foot,end,plane,load -effect_foot_type support "
-    "-effect_foot_on foot -effect_end_type support -effect_end_on end -effect_plane_type support "
+    "-set_point_at box:23.5,119.5,-1,24.5,120.5,0.001 -effects foot,end,plane,load -effect_foot_type fixed "
+    "-effect_foot_on foot -effect_end_type fixed -effect_end_on end -effect_plane_type fixed "
     "-effect_plane_on all "
     "-effect_plane_components z -effect_load_type point_force -effect_load_on point -effect_load_vector "
     "0;%.17g;0 "

@@ -5,16 +5,16 @@
 
   A load path that asks for 0.2 E ends there in few steps, says how far it got, and that displacements grow without bound with the load. One that stays
   below gets to its end. By arc length each equilibrium of the path is one of the formula, past the maximum, through s = 0, where the cube has no height, to the
-  branch on which it is inside out and carries 0.2 E; with dead and follower loads, and with all elements. A restart goes on along the same path, also from the
+  branch on which it is inverted and carries 0.2 E; with dead and follower loads, and with all elements. A restart goes on along the same path, also from the
   end of a load path.
 */
 #include "verify.h"
 
-#define CUBE                                                                                                \
-  "-bodies a -body_a_mesh box:1,1,1:2 -body_a_material stvk -body_a_young 1 -body_a_poisson 0 "             \
-  "-body_a_density 1 -effects x,y,z,press -effect_x_type support -effect_x_on xmin -effect_x_components x " \
-  "-effect_y_type support -effect_y_on ymin -effect_y_components y -effect_z_type support -effect_z_on "    \
-  "zmin "                                                                                                   \
+#define CUBE                                                                                              \
+  "-bodies a -body_a_mesh box:1,1,1:2 -body_a_material stvk -body_a_young 1 -body_a_poisson 0 "           \
+  "-body_a_density 1 -effects x,y,z,press -effect_x_type fixed -effect_x_on xmin -effect_x_components x " \
+  "-effect_y_type fixed -effect_y_on ymin -effect_y_components y -effect_z_type fixed -effect_z_on "      \
+  "zmin "                                                                                                 \
   "-effect_z_components z -effect_press_on zmax -time static "
 #define DEAD "-effect_press_type traction -effect_press_vector 0;0;%.17g "
 
@@ -30,7 +30,7 @@ static PetscErrorCode check_end(PetscReal load, int steps, const char *more)
 
   PetscFunctionBeginUser;
   PetscCall(
-    verify_open(&t, CUBE DEAD "-time_inverted refuse -static_steps %d %s", (double)-load, steps, more));
+    verify_open(&t, CUBE DEAD "-time_inverted reject -static_steps %d %s", (double)-load, steps, more));
   PetscCall(SbRunSolve(t.run));
   PetscCall(PetscPrintf(PETSC_COMM_WORLD, "  %g E in %d steps %s: %.9g in %d steps, softening %g\n    %s\n",
                         (double)load, steps, more, (double)t.run->t_now, (int)t.run->steps_total,
@@ -110,11 +110,12 @@ static PetscErrorCode check_drive(void)
   Branch b = {.load = 0.};
 
   PetscFunctionBeginUser;
-  PetscCall(verify_open(&t, CUBE ARC
-                        "-static_steps 10 -effect_press_type drive -effect_press_displacement 0;0;-0.5"));
+  PetscCall(verify_open(
+    &t, CUBE ARC
+    "-static_steps 10 -effect_press_type prescribed_displacement -effect_press_displacement 0;0;-0.5"));
   t.run->want_energies = PETSC_TRUE;
   PetscCall(SbRunAddMonitor(t.run, watch, &b, NULL));
-  PetscCall(verify_solve(&t, "drive"));
+  PetscCall(verify_solve(&t, "prescribed_displacement"));
   PetscCall(PetscPrintf(PETSC_COMM_WORLD, "  drive: %d steps, %d Newton iterations, s %.12f\n",
                         (int)t.run->steps_total, (int)t.run->newton_total, (double)b.s));
   SB_CHECK(t.run->t_now == 1. && PetscAbsReal(b.s - 0.5) < 1e-9, "s %.12f at the load factor %g", (double)b.s,
@@ -157,7 +158,7 @@ int main(int argc, char **argv)
   SB_TEST_BEGIN(argc, argv);
   PetscCall(check_end(0.19, 5, "-body_a_tangent exact"));
   /* Newton's method with the exact tangent may find the inverted cube */
-  PetscCall(check_end(0.2, 10, "-body_a_tangent exact -time_inverted refuse"));
+  PetscCall(check_end(0.2, 10, "-body_a_tangent exact -time_inverted reject"));
   PetscCall(check_end(0.2, 10, "-body_a_tangent exact_spd"));
   /* increments of rounding: the number of attempts ends it */
   PetscCall(check_end(0.2, 10, "-body_a_tangent exact_spd -static_min_increment 1e-15"));

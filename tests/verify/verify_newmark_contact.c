@@ -110,7 +110,7 @@ static PetscErrorCode check_walls(void)
            (double)left[1], (double)euler[1]);
   SB_CHECK(left[0] > euler[0] + 0.02, "%g of the speed is left, with implicit Euler %g", (double)left[0],
            (double)euler[0]);
-  PetscCall(check_wall("newmark", " -effect_wall_arrival cut", 0.0005, other));
+  PetscCall(check_wall("newmark", " -effect_wall_time_of_impact yes", 0.0005, other));
   SB_CHECK_NEAR(other[1], left[1], 0.01, "energy with steps cut at the arrival");
   PetscCall(check_wall("newmark", "", 0.002, left));
   PetscCall(check_wall("newmark", " -effect_wall_response multiplier", 0.002, other));
@@ -205,7 +205,7 @@ static PetscErrorCode check_ball(const char *material, PetscReal tolerance)
 
 typedef struct {
   const char *name[2], *column[2];
-  PetscReal from;                   /* looked at from then on, s */
+  PetscReal from;                   /* examined from then on, s */
   PetscReal last[2][2];             /* forces of the last two steps, N */
   PetscReal rough, low[2], high[2]; /* largest second difference; bounds, N */
   PetscInt n;
@@ -326,7 +326,7 @@ static PetscErrorCode check_push(const char *response)
   "0.3 -body_a_density 1000 "                                                                                \
   "-body_b_mesh box:0.1,0.1,0.1:1 -body_b_translate 0,0,3 -body_b_material corotated -body_b_young 1e5 "     \
   "-body_b_poisson 0.3 -body_b_density 1000 "                                                                \
-  "-time newmark -ts_dt 0.005 -ts_max_time 0.2 -solver cg_icc -effect_clamp_type support -effect_clamp_on "  \
+  "-time newmark -ts_dt 0.005 -ts_max_time 0.2 -solver cg_icc -effect_clamp_type fixed -effect_clamp_on "    \
   "xmin " EXACT
 
 static PetscErrorCode check_absent(void)

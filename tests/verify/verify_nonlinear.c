@@ -16,7 +16,7 @@
 
 #define BAR \
   "-bodies a -body_a_mesh box:0.4,0.1,0.1:2 -body_a_young 1e5 -body_a_poisson 0.3 -body_a_density 1000 "
-#define CLAMP "-effect_clamp_type support -effect_clamp_on xmin "
+#define CLAMP "-effect_clamp_type fixed -effect_clamp_on xmin "
 #define TIGHT "-snes_rtol 1e-11 -ksp_rtol 1e-12 "
 
 static const PetscReal end[3] = {0.4, 0.05, 0.05};
@@ -131,7 +131,7 @@ static PetscErrorCode follow(const char *element, const char *law, int steps, Pe
     BAR CLAMP
     "-body_a_element %s -body_a_material %s -effects gravity,clamp,air,push -effect_gravity_vector 0,0,%g "
     "-effect_air_type pressure -effect_air_on zmax -effect_air_value %g -effect_push_type "
-    "drive -effect_push_on xmax -effect_push_components y -effect_push_displacement 0;%g;0 "
+    "prescribed_displacement -effect_push_on xmax -effect_push_components y -effect_push_displacement 0;%g;0 "
     "-time static -static_steps %d %s " TIGHT,
     element, law, -9.81 * (double)load, 100. * (double)load, 0.1 * (double)load, steps,
     strcmp(element, "p1") ? "-body_a_young 1e6" : ""));
@@ -287,7 +287,7 @@ static PetscErrorCode check_cuts(void)
   SB_CHECK_NEAR(cut.t, 0.2, 1e-12, "end of a run with cut steps");
   SB_CHECK_NEAR(cut.u[2], whole.u[2], 0.03 * PetscAbsReal(whole.u[2]), "end of the bar");
   PetscCall(swing("-body_a_material neohookean -body_a_tangent exact -time newmark -ts_dt 0.05 -ts_max_time "
-                  "0.2 -snes_max_it 1 -time_max_cuts 2 " TIGHT,
+                  "0.2 -snes_max_it 1 -time_max_halvings 2 " TIGHT,
                   &stopped));
   PetscCall(PetscPrintf(PETSC_COMM_WORLD, "  1 iteration, 2 cuts allowed: stops at %g s: %s\n",
                         (double)stopped.t, stopped.reason));

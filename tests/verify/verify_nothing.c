@@ -104,7 +104,7 @@ static PetscErrorCode destroy(Trace *trace)
 #define FREE                                                                                             \
   "-bodies a -body_a_mesh box:0.3,0.2,0.1:2 -body_a_young 1e5 -body_a_poisson 0.3 -body_a_density 1000 " \
   "-body_a_velocity "                                                                                    \
-  "0.3,-0.2,0.1 -body_a_spin 1,2,6 -ts_dt 0.01 -ts_max_time 0.2 "
+  "0.3,-0.2,0.1 -body_a_angular_velocity 1,2,6 -ts_dt 0.01 -ts_max_time 0.2 "
 
 /* A free body with and without a type that is not named. */
 static PetscErrorCode check_unnamed(const char *law, const char *time)
@@ -168,7 +168,7 @@ static PetscErrorCode check_idle(const char *effects, const char *options)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Contact is looked for where it is named only: its log event counts there, so that none elsewhere means none. */
+/* Contact is searched for where it is named only: its log event counts there, so that none elsewhere means none. */
 static PetscErrorCode check_contact(void)
 {
   Trace named;
@@ -190,7 +190,7 @@ static PetscErrorCode check_static(void)
   PetscFunctionBeginUser;
   PetscCall(run(
     "-bodies a -body_a_mesh box:0.3,0.2,0.1:2 -body_a_material linear -body_a_young 1e5 -body_a_poisson 0.3 "
-    "-body_a_density 1000 -effects clamp -effect_clamp_type support -effect_clamp_on xmin -time static",
+    "-body_a_density 1000 -effects clamp -effect_clamp_type fixed -effect_clamp_on xmin -time static",
     PETSC_FALSE, &trace));
   SB_CHECK(trace.events[SB_EVENT_EFFECTS] == 0, "a support is no force: effects were begun %d times",
            (int)trace.events[SB_EVENT_EFFECTS]);
@@ -209,12 +209,12 @@ static PetscErrorCode check_plain_space(void)
   PetscCall(test_scene_open(FREE "-body_a_material corotated -time newmark", &t));
   s = t.model->space;
   PetscCall(SbSpaceCreateMatrix(s, SB_MATRIX_BAIJ, &A));
-  SB_CHECK(!s->faces && !s->neighbour && !s->support && !s->jump && !s->batch_weight && s->width == 4,
+  SB_CHECK(!s->faces && !s->neighbour && !s->dirichlet_node && !s->jump && !s->batch_weight && s->width == 4,
            "a space of vertices holds something of faces");
   SB_CHECK(s->batch_clique == s->batch_node && s->node_body == s->mesh->vert_body &&
              s->node_set == s->mesh->vert_set && s->node_orig == s->mesh->vert_orig,
            "a space of vertices has copies of what the mesh holds");
-  SB_CHECK(s->plan && !s->plan->glue[0] && !s->plan->glue[1], "the plan has face terms");
+  SB_CHECK(s->plan && !s->plan->face_term[0] && !s->plan->face_term[1], "the plan has face terms");
   PetscCall(MatDestroy(&A));
   PetscCall(test_scene_close(&t));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -273,7 +273,7 @@ int main(int argc, char **argv)
   PetscCall(destroy(&first));
   PetscCall(run(FREE "-body_a_material stvk -time euler_symplectic -ts_dt 0.002", PETSC_FALSE, &first));
   PetscCall(destroy(&first));
-  /* MUMPS shares its work out anew in each run: the last bits differ */
+  /* MUMPS shares its work out again in each run: the last bits differ */
   PetscCall(check_unnamed("linear", "newmark -solver cg_jacobi"));
   PetscCall(check_unnamed("corotated", "euler_implicit"));
   PetscCall(check_unnamed("neohookean", "genalpha"));

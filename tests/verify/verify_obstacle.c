@@ -125,7 +125,7 @@ static PetscErrorCode drag(const char *obstacle, PetscReal force[])
   PetscCall(open_scene(
     &t,
     "-bodies a -body_a_mesh box:0.1,0.06,0.04:4 -body_a_material corotated -body_a_young 2e4 "
-    "-body_a_poisson 0.4 -body_a_density 1000 -effects bed,tool -effect_bed_type support -effect_bed_on zmin "
+    "-body_a_poisson 0.4 -body_a_density 1000 -effects bed,tool -effect_bed_type fixed -effect_bed_on zmin "
     "-effect_tool_type contact -effect_tool_on zmax -effect_tool_obstacle %s -effect_tool_friction 0.3 "
     "-effect_tool_displacement 0.02*ramp(t/0.2-1);0;-0.01*ramp(t/0.2) -time euler_implicit -ts_dt %g "
     "-ts_max_time "
@@ -269,7 +269,7 @@ static PetscErrorCode check_overlap(const char *element, const char *response, c
     "-bodies a -body_a_mesh box:0.1,0.1,0.1:3 -body_a_material corotated -body_a_young 5e4 "
     "-body_a_poisson 0.3 -body_a_density 1000 -body_a_translate -0.05,-0.05,%g -body_a_element %s -effects "
     "gravity,floor -effect_floor_type contact -effect_floor_obstacle %s -effect_floor_response %s "
-    "-effect_floor_recovery %d -time euler_implicit -ts_dt %g -ts_max_time %g -snes_rtol 1e-8",
+    "-effect_floor_separation_steps %d -time euler_implicit -ts_dt %g -ts_max_time %g -snes_rtol 1e-8",
     -DEPTH, element, obstacle, response, RECOVERY, STEP, (5 * RECOVERY + 3) * STEP));
   PetscCall(SbRunAddMonitor(t.run, watch_overlap, &o, NULL));
   PetscCall(verify_solve(&t, "overlap"));
@@ -291,7 +291,7 @@ static PetscErrorCode check_overlap(const char *element, const char *response, c
 
 /* ------------------------------------------------------------------ at once */
 
-/* Deep in a mesh its field is coarser: the way out is found all the same. */
+/* Deep in a mesh its field is coarser: the separation direction is found all the same. */
 static PetscErrorCode check_overlap_mesh(void)
 {
   const PetscInt n[3] = {30, 20, 10};
@@ -313,7 +313,7 @@ static PetscErrorCode check_at_once(void)
   PetscFunctionBeginUser;
   PetscCall(
     open_scene(&t, "-bodies a -body_a_mesh box:0.1,0.1,0.1:3 -body_a_material corotated -body_a_young 5e4 "
-                   "-body_a_poisson 0.3 -body_a_density 1000 -effects top,floor -effect_top_type support "
+                   "-body_a_poisson 0.3 -body_a_density 1000 -effects top,floor -effect_top_type fixed "
                    "-effect_top_on zmax "
                    "-effect_floor_type contact -effect_floor_obstacle plane:0,0,1,0.02 -time static"));
   PetscCall(verify_solve(&t, "at once"));

@@ -1,11 +1,11 @@
 // @ranks 1 2
 /*
-  Two cubes that begin half in each other, which no reach of contact sees at once: the depth is found, all points get the same way out (a smaller cube
+  Two cubes that begin half in each other, which no reach of contact sees at once: the depth is found, all points get the same separation direction (a smaller cube
   in a face: ways to one side), the depth is taken back by the option's steps, and
   the bodies part with no more than twice the energy M v^2 of a bar that is pushed with the speed v at which it is taken back. Momentum stays. A
   body that begins within reach of the other but not in it is not touched. No point is inside for long without a pair.
 
-  A finger ten layers of cells deep in a block has one way out, along itself, and so have the ends of a bar that is bent into itself.
+  A finger ten layers of cells deep in a block has one separation direction, along itself, and so have the ends of a bar that is bent into itself.
 */
 #include "../../src/effect/collision.h"
 #include "contact.h"
@@ -110,7 +110,7 @@ static PetscErrorCode check(const char *element, const char *detection, PetscRea
     "-bodies a,b -body_a_mesh box:0.1,0.1,0.1:3 -body_b_mesh box:0.1,0.1,0.1:2 -body_b_translate %g,0,0 %s "
     "-body_a_material corotated -body_a_young 1e5 -body_a_poisson 0.3 -body_a_element %s "
     "-body_b_material corotated -body_b_young 1e5 -body_b_poisson 0.3 -body_b_element %s "
-    "-effects meet -effect_meet_type collision -effect_meet_detection %s -effect_meet_recovery %d "
+    "-effects meet -effect_meet_type collision -effect_meet_detection %s -effect_meet_separation_steps %d "
     "-time euler_implicit -ts_dt %g -ts_max_time 0.48 -snes_rtol 1e-9",
     (double)shift, turn, element, element, detection, STEPS, STEP));
   t.run->want_energies = PETSC_TRUE;
@@ -132,7 +132,7 @@ static PetscErrorCode check(const char *element, const char *detection, PetscRea
     SB_CHECK(o.energy < 1e-20, "bodies that do not touch get %g J", (double)o.energy);
   else {
     /* corners move out by the sides, too: less than the whole depth is left */
-    /* ways out lead to one side; the nearest places do to all */
+    /* separation directions lead to one side; the nearest places do to all */
     SB_CHECK(o.agreement > 0.2 && o.pairs > 4, "normals differ: cosine %g", (double)o.agreement);
     if (vertices && !turn[0])
       SB_CHECK_NEAR(o.first / DEPTH, PetscExpReal(-1. / STEPS), 0.02, "depth after a step");
@@ -144,15 +144,15 @@ static PetscErrorCode check(const char *element, const char *detection, PetscRea
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* What is deep inside, and how it is led out. */
+/* What is deep inside, and how it is separated. */
 typedef struct {
   PetscInt inside, led,
-    behind; /* points in tets; with a way out of there; with a pair that is behind along it */
+    behind; /* points in tets; with a separation direction of there; with a pair that is behind along it */
   PetscReal deepest,
     least; /* of these, m; the least cosine between a way of the first body and the given one */
 } Ways;
 
-/* Looks for overlap at displacements u. `out`: the way out for points of the first body. */
+/* Looks for overlap at displacements u. `out`: the separation direction for points of the first body. */
 static PetscErrorCode look_for_ways(SbModel m, const PetscReal u[], const PetscReal out[3], Ways *w)
 {
   SbEffect e = contact_effect(m, "meet");
@@ -201,15 +201,15 @@ static PetscErrorCode check_finger(const char *element)
                 "-body_b_mesh box:0.1,0.1,0.2:4,4,8 -body_a_material corotated -body_a_young 1e5 "
                 "-body_a_poisson 0.3 -body_b_material corotated -body_b_young 1e5 -body_b_poisson 0.3 "
                 "-body_a_element %s -body_b_element %s "
-                "-effects meet -effect_meet_type collision -effect_meet_reach 0.005 -ts_dt 1e-3",
+                "-effects meet -effect_meet_type collision -effect_meet_search_radius 0.005 -ts_dt 1e-3",
                 element, element));
   PetscCall(PetscCalloc1(3 * t.run->model->space->nnode, &u));
   PetscCall(look_for_ways(t.run->model, u, up, &w));
-  PetscCall(PetscPrintf(PETSC_COMM_WORLD,
-                        "  finger, %s: %d points inside, %d with a way out, %d seen along it, deepest %g m, "
-                        "cosine %.3f\n",
-                        element, (int)w.inside, (int)w.led, (int)w.behind, (double)w.deepest,
-                        (double)w.least));
+  PetscCall(PetscPrintf(
+    PETSC_COMM_WORLD,
+    "  finger, %s: %d points inside, %d with a separation direction, %d seen along it, deepest %g m, "
+    "cosine %.3f\n",
+    element, (int)w.inside, (int)w.led, (int)w.behind, (double)w.deepest, (double)w.least));
   SB_CHECK(w.inside > 80 && w.led == w.inside && w.behind == w.inside, "%d inside, %d led, %d seen",
            (int)w.inside, (int)w.led, (int)w.behind);
   SB_CHECK(w.least > 0.9 && w.deepest > 0.095 && w.deepest < 0.11, "deepest %g m, cosine %g",
@@ -228,12 +228,12 @@ static PetscErrorCode check_ring(const char *element)
   Ways w;
 
   PetscFunctionBeginUser;
-  PetscCall(
-    verify_open(&t,
-                "-bodies a -body_a_mesh box:2,0.2,0.1:40,4,2 -body_a_material corotated "
-                "-body_a_young 1e5 -body_a_poisson 0.3 -body_a_element %s -effects meet "
-                "-effect_meet_type collision -effect_meet_self yes -effect_meet_reach 0.02 -ts_dt 1e-3",
-                element));
+  PetscCall(verify_open(
+    &t,
+    "-bodies a -body_a_mesh box:2,0.2,0.1:40,4,2 -body_a_material corotated "
+    "-body_a_young 1e5 -body_a_poisson 0.3 -body_a_element %s -effects meet "
+    "-effect_meet_type collision -effect_meet_self yes -effect_meet_search_radius 0.02 -ts_dt 1e-3",
+    element));
   space = t.run->model->space;
   PetscCall(PetscCalloc1(3 * space->nnode, &u));
   for (PetscInt i = 0; i < space->nnode; i++) {
@@ -245,8 +245,8 @@ static PetscErrorCode check_ring(const char *element)
   }
   PetscCall(look_for_ways(t.run->model, u, (const PetscReal[3]){0, 0, 0}, &w));
   PetscCall(PetscPrintf(PETSC_COMM_WORLD,
-                        "  ring, %s: %d points inside, %d with a way out, %d seen along it\n", element,
-                        (int)w.inside, (int)w.led, (int)w.behind));
+                        "  ring, %s: %d points inside, %d with a separation direction, %d seen along it\n",
+                        element, (int)w.inside, (int)w.led, (int)w.behind));
   /* what lies less deep than half the reach has the nearest place */
   SB_CHECK(w.inside > 20 && 2 * w.led > w.inside && w.behind > 0.9 * (PetscReal)w.inside,
            "%d inside, %d led, %d seen", (int)w.inside, (int)w.led, (int)w.behind);
@@ -255,7 +255,7 @@ static PetscErrorCode check_ring(const char *element)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* What a run may begin with: `inside`, whether points are in the other body; else it would be an error that they are and have no way out. */
+/* What a run may begin with: `inside`, whether points are in the other body; else it would be an error that they are and have no separation direction. */
 static PetscErrorCode check_begins(const char *name, const char *options, PetscBool inside)
 {
   PetscReal *u;
@@ -301,9 +301,10 @@ int main(int argc, char **argv)
                          "-body_b_translate 0.9999,0.1,0 -sets high,low -set_high_at plane:0,0,1,1 "
                          "-set_low_at plane:0,0,1,0.6 -effect_meet_on high,low",
                          PETSC_TRUE));
-  PetscCall(check_begins("a coarse tip, which does not look",
-                         "-body_a_mesh box:1,1,1:12 -body_b_mesh box:1,1,1:1 -body_b_rotate 1,-1,0,54.7356 "
-                         "-body_b_translate 0.53,0.52,0.99 -effect_meet_sides one -effect_meet_reach 0.01",
-                         PETSC_TRUE));
+  PetscCall(
+    check_begins("a coarse tip, which does not look",
+                 "-body_a_mesh box:1,1,1:12 -body_b_mesh box:1,1,1:1 -body_b_rotate 1,-1,0,54.7356 "
+                 "-body_b_translate 0.53,0.52,0.99 -effect_meet_passes one -effect_meet_search_radius 0.01",
+                 PETSC_TRUE));
   SB_TEST_END();
 }

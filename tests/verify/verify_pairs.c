@@ -36,14 +36,14 @@ typedef struct {
 static PetscErrorCode sum_places(SbRun run, PetscReal t, Watch *w, PetscReal force[2][BODIES][BODIES + 1][3],
                                  PetscReal n[2])
 {
-  SbPlaces list = {0};
+  SbContactPoints list = {0};
 
   PetscFunctionBeginUser;
   PetscCall(PetscMemzero(force, sizeof(PetscReal) * 2 * BODIES * (BODIES + 1) * 3));
   n[0] = n[1] = 0;
-  PetscCall(SbModelContactPlaces(run->model, t, run->U, run->reaction, &list));
+  PetscCall(SbModelContactPoints(run->model, t, run->U, run->reaction, &list));
   for (PetscInt i = 0; i < list.n; i++) {
-    const SbPlace *p = &list.place[i];
+    const SbContactPoint *p = &list.place[i];
     const PetscReal push = SbDot3(p->force, p->normal);
 
     SB_CHECK_NEAR(SbDot3(p->normal, p->normal), 1, 1e-9, "length of a normal");
@@ -185,8 +185,9 @@ static PetscErrorCode check_fold(void)
                 "-bodies a -body_a_mesh %s" LAW(
                   "a") "-sets low,high -set_low_at box:-1,-1,-1,0.03,1,0.01 "
                        "-set_high_at box:-1,-1,0.03,0.002,1,1 -effects hold,press,meet -effect_hold_type "
-                       "support -effect_hold_on low "
-                       "-effect_press_type drive -effect_press_on high -effect_press_displacement 0;0;-0.4*t "
+                       "fixed -effect_hold_on low "
+                       "-effect_press_type prescribed_displacement -effect_press_on high "
+                       "-effect_press_displacement 0;0;-0.4*t "
                        "-effect_meet_type collision -effect_meet_self yes -effect_meet_pairs yes -time "
                        "euler_implicit -ts_dt "
                        "0.005 -ts_max_time 0.09",
@@ -274,7 +275,7 @@ int main(int argc, char **argv)
 {
   SB_TEST_BEGIN(argc, argv);
   PetscCall(check_heap(" -effect_meet_friction 0.3"));
-  PetscCall(check_heap(" -effect_meet_response multiplier -multipliers iterative"));
+  PetscCall(check_heap(" -effect_meet_response multiplier -saddle_solver iterative"));
   PetscCall(check_heap(" -effect_meet_response augmented -effect_meet_friction 0.3"));
   PetscCall(
     check_heap(" -effect_meet_response penalty -effect_floor_response penalty -body_left_element cr"));

@@ -1,7 +1,7 @@
 // @ranks 1 2
 /*
   The patch test (MacNeal and Harder, "A proposed standard set of problems to test finite element accuracy", 1985): a body
-  that is held on its boundary, or pulled there, as a homogeneous deformation x = F X asks for must take it inside too, on
+  that is constrained on its boundary, or pulled there, as a homogeneous deformation x = F X asks for must take it inside too, on
   any mesh. Small strains with the displacement of that paper, and a large strain with every law: the stress is compared
   with the law's formula, which is written down here once more. The linear system is solved directly. The same for CR and DG:
   their nodes on the boundary are moved or pulled, and those inside, among them all jumps, must follow.
@@ -23,7 +23,7 @@ typedef struct {
 
 /*
   Inner vertices of the unit cube: moved at random by up to 0.3 cells; or every second one moved onto the plane of a face
-  that it looks at, but for a thousandth, which leaves flat tets.
+  that it examines, but for a thousandth, which leaves flat tets.
 */
 static void move_vertex(const PetscInt n[3], const PetscInt at[3], PetscReal x[3], void *ctx)
 {
@@ -181,7 +181,7 @@ static PetscErrorCode load_options(PetscBool pulled, const PetscReal F[9], const
   PetscFunctionBeginUser;
   PetscCall(
     PetscSNPrintf(text, size,
-                  " -effect_move_type drive -effect_move_on %s -effect_move_displacement "
+                  " -effect_move_type prescribed_displacement -effect_move_on %s -effect_move_displacement "
                   "(%.17g)*x+(%.17g)*y+(%.17g)*z;(%.17g)*x+(%.17g)*y+(%.17g)*z;(%.17g)*x+(%.17g)*y+(%.17g)*z",
                   pulled ? "side0" : "boundary", (double)F[0] - 1., (double)F[1], (double)F[2], (double)F[3],
                   (double)F[4] - 1., (double)F[5], (double)F[6], (double)F[7], (double)F[8] - 1.));
@@ -212,7 +212,7 @@ typedef struct {
   char path[512];
 } Patch;
 
-/* known: normal and shear stress of the paper; NULL: not looked at. */
+/* known: normal and shear stress of the paper; NULL: not examined. */
 static PetscErrorCode check_patch(const Patch *p, const char *law, PetscReal nu, PetscBool pulled,
                                   const PetscReal F[9], const PetscReal known[2])
 {

@@ -1,6 +1,6 @@
 // @ranks 1 2
 /*
-  Eight small bodies poured into a bowl; verify_pour_long pours fifty. What is looked at is told in pour.h.
+  Eight small bodies poured into a bowl; verify_pour_long pours fifty. What is examined is described in pour.h.
 */
 #include "pour.h"
 

@@ -39,7 +39,7 @@ static void curved(const PetscReal x[3], PetscReal u[3])
   u[2] = PetscSinReal(5 * x[0]) * 0.05 + 0.3 * x[1] * x[1];
 }
 
-/* The second scene of a pair, with body a meshed anew. */
+/* The second scene of a pair, with body a remeshed. */
 static PetscErrorCode make_second(Pair *p, SbMesher mesher)
 {
   const SbRemeshing how = {.mesher = mesher, .size = 1., .quality = 1e-3};
@@ -60,10 +60,10 @@ static PetscErrorCode make_second(Pair *p, SbMesher mesher)
   PetscCall(SbSceneCreate(PETSC_COMM_WORLD, &p->b.model));
   PetscCall(SbRunCreate(p->b.model, &p->b.run));
   for (int b = 0; b < 2; b++) {
-    if (rank) PetscCall(SbGivenCreate(0, 0, 0, &remade.given[b]));
-    if (rank && b == 0) remade.given[b]->mass = g.mass[0];
-    p->b.model->body[b].given = remade.given[b];
-    remade.given[b] = NULL;
+    if (rank) PetscCall(SbMemoryMeshCreate(0, 0, 0, &remade.in_memory[b]));
+    if (rank && b == 0) remade.in_memory[b]->mass = g.mass[0];
+    p->b.model->body[b].in_memory = remade.in_memory[b];
+    remade.in_memory[b] = NULL;
   }
   PetscCall(SbModelSetUp(p->b.model));
   PetscCall(SbMeshValidate(p->b.model->mesh));
@@ -271,11 +271,11 @@ static PetscErrorCode check_run(const char *more, const char *element, PetscBool
   char text[2048];
 
   PetscFunctionBeginUser;
-  PetscCall(
-    PetscSNPrintf(text, sizeof(text),
-                  TWO "-body_a_element %s -body_a_spin 0,3,1 -body_a_velocity 1,0,0 -remesh_times 0.02,0.03 "
-                      "-remesh_bodies a %s",
-                  element, more));
+  PetscCall(PetscSNPrintf(
+    text, sizeof(text),
+    TWO "-body_a_element %s -body_a_angular_velocity 0,3,1 -body_a_velocity 1,0,0 -remesh_times 0.02,0.03 "
+        "-remesh_bodies a %s",
+    element, more));
   PetscCall(test_scene_open(text, &s));
   s.run->want_energies = PETSC_TRUE;
   PetscCall(SbRemeshSetMesher(s.remesh, fixture_cone, &calls));
@@ -294,7 +294,7 @@ static PetscErrorCode check_run(const char *more, const char *element, PetscBool
            (double)e.remesh_loss, (double)scale);
   SB_CHECK_NEAR(e.momentum[0], 7.2, 1e-5, "momentum along x");
   SB_CHECK_NEAR(e.momentum[1], 0, 1e-5, "momentum along y");
-  SB_CHECK(e.ninverted == 0, "%d tets are inside out", (int)e.ninverted);
+  SB_CHECK(e.ninverted == 0, "%d tets are inverted", (int)e.ninverted);
   PetscCall(test_scene_close(&s));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -306,7 +306,7 @@ static PetscErrorCode refused_run(SbMesher mesher, const char *more, PetscReal *
   char text[2048];
 
   PetscFunctionBeginUser;
-  PetscCall(PetscSNPrintf(text, sizeof(text), TWO EULER "-body_a_spin 0,3,1 %s", more));
+  PetscCall(PetscSNPrintf(text, sizeof(text), TWO EULER "-body_a_angular_velocity 0,3,1 %s", more));
   PetscCall(test_scene_open(text, &s));
   if (s.remesh) PetscCall(SbRemeshSetMesher(s.remesh, mesher, NULL));
   PetscCall(test_scene_solve(&s));
@@ -334,7 +334,7 @@ static PetscErrorCode check_sets(void)
 {
   static const char text[] =
     TWO EULER "-sets left,top,part -set_left_at group:a.xmin -set_top_at plane:0,0,1,0.2 "
-              "-set_part_at box:0,0,0,0.2,0.1,0.2 -effects hold,pull -effect_hold_type support "
+              "-set_part_at box:0,0,0,0.2,0.1,0.2 -effects hold,pull -effect_hold_type fixed "
               "-effect_hold_on left -effect_pull_type traction -effect_pull_on top -effect_pull_vector 0;0;1";
   PetscReal area[2][2] = {{0, 0}, {0, 0}};
   Pair p = {0};
@@ -378,7 +378,7 @@ int main(int argc, char **argv)
   PetscCall(check_momenta("-mass consistent"));
   PetscCall(check_momenta("-body_a_element cr"));
   PetscCall(check_momenta("-body_a_element dg -mass consistent"));
-  PetscCall(check_momenta("-sets end -set_end_at plane:1,0,0,0 -effects hold -effect_hold_type support "
+  PetscCall(check_momenta("-sets end -set_end_at plane:1,0,0,0 -effects hold -effect_hold_type fixed "
                           "-effect_hold_on end"));
   PetscCall(check_run(EULER, "p1", PETSC_FALSE));
   PetscCall(check_run(EULER, "cr", PETSC_FALSE));

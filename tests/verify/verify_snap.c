@@ -99,9 +99,9 @@ static PetscErrorCode check_toggle(PetscInt nx, PetscInt ny, PetscReal *error, P
     &t,
     "-bodies a -body_a_mesh %s -body_a_element cr -body_a_material stvk -body_a_young %.17g "
     "-body_a_poisson 0 -body_a_density 1 -sets far,middle -set_far_at plane:1,0,0,0 "
-    "-set_middle_at plane:1,0,0,%.17g -effects clamp,symmetry,plane,load -effect_clamp_type support "
-    "-effect_clamp_on far -effect_symmetry_type support -effect_symmetry_on middle "
-    "-effect_symmetry_components x -effect_plane_type support -effect_plane_on all "
+    "-set_middle_at plane:1,0,0,%.17g -effects clamp,symmetry,plane,load -effect_clamp_type fixed "
+    "-effect_clamp_on far -effect_symmetry_type fixed -effect_symmetry_on middle "
+    "-effect_symmetry_components x -effect_plane_type fixed -effect_plane_on all "
     "-effect_plane_components z -effect_load_type traction -effect_load_on middle "
     "-effect_load_total 0,%.17g,0 -time static -static_control arc_length -static_steps 5 "
     "-static_longest_step 1",

@@ -159,7 +159,7 @@ static PetscErrorCode check_spin(const char *element, const char *law, PetscReal
     text, sizeof(text),
     "-bodies a -body_a_mesh box:0.3,0.1,0.1:2 -body_a_translate -0.15,-0.05,-0.05 "
     "-body_a_element %s -body_a_material %s -body_a_young %g -body_a_poisson 0.3 -body_a_density 1000 "
-    "-body_a_spin 0,0,%.17g -time euler_implicit -ts_dt %.17g -ts_max_time %.17g "
+    "-body_a_angular_velocity 0,0,%.17g -time euler_implicit -ts_dt %.17g -ts_max_time %.17g "
     "-snes_rtol 1e-10",
     element, law, (double)E, (double)w0, (double)h, (double)(h * (PetscReal)steps)));
   PetscCall(test_scene_open(text, &t));
@@ -195,7 +195,7 @@ static PetscErrorCode check_rod(const char *element, const char *law)
     PetscSNPrintf(text, sizeof(text),
                   "-bodies a -body_a_mesh box:1,0.05,0.05:20,2,2 -body_a_translate -0.5,-0.025,-0.025 "
                   "-body_a_element %s -body_a_material %s -body_a_young %g -body_a_poisson 0 -body_a_density "
-                  "%g -body_a_spin 0,0,%g "
+                  "%g -body_a_angular_velocity 0,0,%g "
                   "-effects damping -effect_damping_beta 0.01 -time newmark -ts_dt 0.002 -ts_max_time 0.4 "
                   "-snes_rtol 1e-9",
                   element, law, (double)E, (double)rho, (double)w));

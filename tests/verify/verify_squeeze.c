@@ -2,7 +2,7 @@
 /*
   A cushion between two plates that both move, until it is half as high; quarter of it, planes of symmetry x = 0 and y = 0, no friction.
 
-  Both plates push alike, the force rises in every step, no cell is turned inside out, and nothing moves up or down in the middle. The work of
+  Both plates push alike, the force rises in every step, no cell is inverted, and nothing moves up or down in the middle. The work of
   the plates is the energy that the cushion has taken. With Poisson's ratio 0.49 the volume hardly changes.
   With P1, x itself is an
   admissible test function: the integral of the trace of the stress is the sum of x . f, which is minus the height times the force.
@@ -105,8 +105,8 @@ static PetscErrorCode check_squeeze(const char *element, PetscInt cells, PetscRe
     "-bodies a -body_a_mesh %s -body_a_element %s -body_a_material neohookean "
     "-body_a_young %g -body_a_poisson %g "
     "-sets x0,y0 -set_x0_at plane:1,0,0,0 -set_y0_at plane:0,1,0,0 -effects x,y,top,bottom -effect_x_type "
-    "support "
-    "-effect_x_on x0 -effect_x_components x -effect_y_type support -effect_y_on y0 -effect_y_components y "
+    "fixed "
+    "-effect_x_on x0 -effect_x_components x -effect_y_type fixed -effect_y_on y0 -effect_y_components y "
     "-effect_top_type contact -effect_top_obstacle plane:0,0,-1,%g -effect_top_displacement 0;0;%g*t "
     "-effect_bottom_type contact -effect_bottom_obstacle plane:0,0,1,%g -effect_bottom_displacement 0;0;%g*t "
     "-time static -static_steps %d -snes_rtol 1e-8 -ksp_rtol 1e-8",
@@ -117,7 +117,7 @@ static PetscErrorCode check_squeeze(const char *element, PetscInt cells, PetscRe
   PetscCall(stress_trace(&t, &trace));
   virial = s.force[0] * RADIUS / trace; /* it is RADIUS high now */
   lost = 1 - t.run->energies.volume / s.volume;
-  account = t.run->energies.drive_work / t.run->energies.strain;
+  account = t.run->energies.prescribed_work / t.run->energies.strain;
   PetscCall(PetscPrintf(
     PETSC_COMM_WORLD,
     "  squeeze, %s, nu %g: %g and %g contacts, force %.4f N, both plates to %.1e of it, it fell by %.1e of "

@@ -45,7 +45,7 @@ static PetscErrorCode solve(const char *what, const PetscInt n[3], VerifyMap map
   PetscCall(verify_mesh_write(n, map, NULL, mesh));
   PetscCall(
     PetscSNPrintf(text, sizeof(text),
-                  "-bodies a -body_a_mesh %s -time static -effect_plane_type support -effect_plane_on all "
+                  "-bodies a -body_a_mesh %s -time static -effect_plane_type fixed -effect_plane_on all "
                   "-effect_plane_components z %s",
                   mesh, options));
   PetscCall(test_scene_open(text, &t));
@@ -74,7 +74,7 @@ static PetscErrorCode check_csm(const char *what, PetscReal mu, PetscReal ux, Pe
                     "-body_a_material stvk -body_a_tangent exact -body_a_young %.17g -body_a_poisson 0.4 "
                     "-body_a_density 1000 -sets front,back -set_front_at sphere:0.2,0.2,0,0.05 "
                     "-set_back_at sphere:0.2,0.2,%.17g,0.05 -effects root,plane,gravity "
-                    "-effect_root_type support -effect_root_on front,back -effect_gravity_vector 0,-2,0 "
+                    "-effect_root_type fixed -effect_root_on front,back -effect_gravity_vector 0,-2,0 "
                     " ",
                     (double)(2.8 * mu), thickness));
     PetscCall(solve(what, n, beam, text, tip, u[k]));
@@ -104,7 +104,7 @@ static PetscErrorCode check_cook(PetscReal nu, PetscReal uy)
     PetscCall(PetscSNPrintf(text, sizeof(text),
                             "-body_a_material linear -body_a_young 1 -body_a_poisson %.17g -body_a_density 1 "
                             "-sets left,right -set_left_at plane:1,0,0,0 -set_right_at plane:1,0,0,48 "
-                            "-effects hold,plane,pull -effect_hold_type support -effect_hold_on left "
+                            "-effects hold,plane,pull -effect_hold_type fixed -effect_hold_on left "
                             "-effect_pull_type traction -effect_pull_on right -effect_pull_vector 0;1/16;0",
                             (double)nu));
     PetscCall(solve("Cook", n, membrane, text, corner, u[k]));

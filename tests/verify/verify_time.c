@@ -1,6 +1,6 @@
 // @ranks 1 3
 /*
-  The integrators against exact answers of their own recurrences. One linear tet held at its base is an oscillator: its apex moves
+  The integrators against exact answers of their own recurrences. One linear tet constrained at its base is an oscillator: its apex moves
   along z with w^2 = V (lambda + 2 mu) / (H^2 m), m = rho V / 4. With q = v + i w u an undamped step multiplies q by
     implicit Euler 1 / (1 - i w h), explicit Euler 1 + i w h, Newmark (1/4, 1/2) (1 + i w h / 2) / (1 - i w h / 2),
   which is where amplitude factor and period elongation of the field's formulas come from. With CR and DG, whose tet has more
@@ -35,7 +35,7 @@ static PetscErrorCode oscillate(const char *options, PetscInt n, PetscReal h, Pe
                           "-bodies a -body_a_mesh tests/data/one_tet.msh -body_a_material linear "
                           "-body_a_young %g -body_a_poisson %g -body_a_density %g "
                           "-body_a_velocity 0,0,%g -sets base -set_base_at plane:0,0,1,0 -effects "
-                          "hold,damping -effect_hold_type support -effect_hold_on base "
+                          "hold,damping -effect_hold_type fixed -effect_hold_on base "
                           "-ts_dt %.17g -ts_max_time %.17g -ksp_rtol 1e-14 -solver cg_jacobi %s",
                           (double)young, (double)nu, (double)rho, (double)v0, (double)h, (double)(h * n),
                           options));
@@ -94,7 +94,7 @@ static PetscErrorCode check_order(const char *options, PetscReal share, PetscRea
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Highest frequencies: one step of generalized-alpha at w h = 1e4 leaves the spectral radius (in a norm of u, v, a: look at the decay over steps). */
+/* Highest frequencies: one step of generalized-alpha at w h = 1e4 leaves the spectral radius (in a norm of u, v, a: examine the decay over steps). */
 static PetscErrorCode check_dissipation(void)
 {
   PetscReal u[2], v[2];
@@ -147,7 +147,7 @@ static PetscErrorCode bend(const char *element, const char *options, PetscInt n,
     PetscSNPrintf(text, sizeof(text),
                   "-bodies a -body_a_mesh box:0.2,0.1,0.1:1 -body_a_element %s -body_a_material linear "
                   "-body_a_young 1e4 -body_a_poisson 0.3 -body_a_density 1000 -effects gravity,hold,damping "
-                  "-effect_damping_alpha 2 -effect_damping_beta 0.002 -effect_hold_type support "
+                  "-effect_damping_alpha 2 -effect_damping_beta 0.002 -effect_hold_type fixed "
                   "-effect_hold_on xmin -ts_dt %.17g -ts_max_time %.17g -ksp_rtol 1e-14 -solver direct %s",
                   element, (double)(T / (PetscReal)n), (double)T, options));
   PetscCall(test_scene_open(text, &t));

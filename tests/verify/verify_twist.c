@@ -11,7 +11,7 @@
   The limit of the energy is near that of St. Venant's torsion. For a neo-Hookean solid of nu = 1/2 that cannot change its
   length, torsion without warping stores mu theta^2 J / (2 L) at any angle (Rivlin, "Large elastic deformations of
   isotropic materials IV", 1948); warping lowers J of a square of side a from a^4 / 6 to 0.14058 a^4 (Timoshenko and Goodier,
-  "Theory of elasticity", section 109). Ends that are held plane raise it again by some per cent.
+  "Theory of elasticity", section 109). Ends that are constrained plane raise it again by some per cent.
 */
 #include "locking.h"
 

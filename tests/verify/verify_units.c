@@ -63,7 +63,7 @@ static PetscErrorCode scenario(const char *element, const char *law, const char 
                   0.2 * m, 0.1 * m, 0.1 * m, element, law, 2e5 * pa, 5e2 * rho, q->angle * 180. / PETSC_PI));
     PetscCall(add(text,
                   " -body_block_translate %.17g,%.17g,%.17g -body_block_velocity %.17g,%.17g,%.17g "
-                  "-body_block_spin %.17g,%.17g,%.17g",
+                  "-body_block_angular_velocity %.17g,%.17g,%.17g",
                   at[0] * m, at[1] * m, at[2] * m, v[0] * m / s, v[1] * m / s, v[2] * m / s, spin[0] / s,
                   spin[1] / s, spin[2] / s));
     PetscCall(add(text, " -effect_damping_alpha %.17g -effect_damping_beta %.17g -ts_max_time %.17g", 0.5 / s,
@@ -72,7 +72,7 @@ static PetscErrorCode scenario(const char *element, const char *law, const char 
   }
   PetscCall(
     add(text,
-        " -effects clamp,gravity,pull,air%s -effect_clamp_type support -effect_clamp_on bar.xmin "
+        " -effects clamp,gravity,pull,air%s -effect_clamp_type fixed -effect_clamp_on bar.xmin "
         "-effect_gravity_vector %.17g,%.17g,%.17g -effect_pull_type traction -effect_pull_on bar.xmax "
         "-effect_pull_vector %.17g;%.17g;%.17g -effect_air_type pressure -effect_air_on bar.zmax "
         "-effect_air_value %.17g %s",

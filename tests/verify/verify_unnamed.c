@@ -86,7 +86,7 @@ static PetscErrorCode run(const char *options, Trace *trace)
   PetscCall(PetscMallocGetCurrentUsage(&trace->live));
   trace->live -= before;
   trace->neffect = t.model->neffect;
-  trace->bare = (PetscBool)(!t.model->space->held && !t.model->space->couple && !t.model->space->jump &&
+  trace->bare = (PetscBool)(!t.model->space->nodal && !t.model->space->constraints && !t.model->space->jump &&
                             !t.model->space->nfixed && !t.run->nmonitor);
   trace->n = 3 * verify_numbers(t.model);
   PetscCall(verify_gather(t.model, t.run->U, &trace->u));
@@ -236,7 +236,7 @@ static PetscErrorCode check_apart(const Part *part, PetscBool exact)
   static const char far[] =
     "-bodies still,bar -body_still_mesh box:0.1,0.1,0.1:2 -body_still_translate -9,0,0 "
     "-body_still_material corotated -body_still_young 5e4 -body_still_poisson 0.4 "
-    "-body_still_spin 1,2,3 -time euler_symplectic -ts_dt 1e-4 -ts_max_time 8e-4";
+    "-body_still_angular_velocity 1,2,3 -time euler_symplectic -ts_dt 1e-4 -ts_max_time 8e-4";
   const PetscInt n = 3 * 27; /* numbers of the first body's vertices */
   Trace without, with;
   char text[PART_TEXT];

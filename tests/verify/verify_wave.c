@@ -55,7 +55,7 @@ static PetscErrorCode run_wave(int cells, Wave *w)
   PetscCall(PetscSNPrintf(
     text, sizeof(text),
     "-bodies a -body_a_mesh box:1,0.02,0.02:%d,2,2 -body_a_material linear -body_a_young %g "
-    "-body_a_poisson 0 -body_a_density %g -effects wall,pull -effect_wall_type support -effect_wall_on "
+    "-body_a_poisson 0 -body_a_density %g -effects wall,pull -effect_wall_type fixed -effect_wall_on "
     "xmin -effect_pull_type traction -effect_pull_on xmax -effect_pull_vector %g;0;0 -time newmark "
     "-ts_dt %.17g -ts_max_time %.17g",
     cells, (double)E, (double)rho, (double)N, (double)(0.5 * L / (cells * w->c)), (double)(4. * L / w->c)));

@@ -1,0 +1,186 @@
+/*
+  sbassembly.h - layer 3: what linear solvers see of a space beside sbfem.h: the assembly plan, gathers of batches, rows of operators.
+*/
+#pragma once
+#include "sbfem.h"
+
+/*
+  The plan: sparsity graph of the owned node rows, split as PETSc splits it (diagonal part: owned columns; off-diagonal
+  part: ghost columns), and for each local cell the place of its width^2 node blocks in it. A block index k of row i is the same
+  for BAIJ (values 9 k ..) and for AIJ with full 3x3 blocks (see block_position in tangent.c).
+*/
+typedef struct _p_SbPlan {
+  PetscInt *di, *dj;  /* diagonal part: rows [nnode_owned+1], local columns ascending */
+  PetscInt *oi, *oj;  /* off-diagonal part: columns are local ghost nodes, ascending */
+  PetscInt *diagonal; /* [nnode_owned] block index of (i, i) */
+  PetscInt *
+    offset; /* [nbatch][width^2][SB_BATCH] block (a, b) at width a + b: k in the diagonal part, ~k in the off-diagonal
+                             part, SB_NOT_OWNED when row a is another rank's; padding lanes have those of the first */
+  PetscInt *ui; /* [nnode_owned+1] first upper block of each row, for SBAIJ; NULL otherwise */
+  PetscInt *
+    upper; /* [nbatch][10][SB_BATCH] block index in the upper triangle of pair p, ~k when it is to be transposed */
+  PetscInt *fresh_start; /* [nbatch+1] into fresh */
+  PetscInt *fresh;       /* [nnode_owned] rows in the order in which the batches reach them first */
+  PetscReal *face_term
+    [2]; /* face terms: factor of the identity in each block of the two parts, N/m; NULL without them */
+  PetscInt nfix;       /* blocks that a prescribed unknown touches */
+  PetscInt *fix_block; /* [nfix] block index as in offset */
+  PetscInt *fix_row;   /* [nfix] local row node */
+  uint8_t
+    *fix_mask; /* [nfix] bits 0..2: rows, bits 3..5: columns of the block to clear; bit 6: diagonal block */
+} * SbPlan;
+#define SB_NOT_OWNED PETSC_MIN_INT
+
+/* Where a cell's places begin in `offset`: block (a, b) follows at SB_BATCH (width a + b). */
+size_t SbPlanCellOffset(SbSpace space, PetscInt cell);
+PetscErrorCode SbPlanCreate(SbSpace space, SbPlan *plan);
+PetscErrorCode SbPlanDestroy(SbPlan *plan);
+
+/*
+  The volumetric part of a tangent, kept out of the matrix: sum over cells of modulus / V b b^T, b_a = V D grad psi_a with D from
+  SbMaterialOps.volumetric. Cells of P1 bodies and of laws with lambda <= 0 are kept whole: b and both moduli are zero.
+*/
+typedef struct {
+  SbLane *b;       /* [nbatch][12] m^2; 0 in padding */
+  SbLane *modulus; /* [nbatch] lambda times the factor of stiffness and damping, Pa */
+  SbLane *shear;   /* [nbatch] mu likewise, Pa */
+} SbVolumetric;
+/*
+  SbSpaceAssembleSplit - the tangent without its volumetric part, in up to three spaces of the mesh at once: space[0] is s.
+
+  Not collective. The strains are those of s. Where space[k] has its nodes at vertices and s at faces, A[k] is the same form
+  there. out NULL: nothing is left out.
+*/
+PetscErrorCode SbSpaceAssembleSplit(SbSpace s, const SbStage *stage, PetscInt n, const SbSpace space[],
+                                    const Mat A[], const SbVolumetric *out);
+/* pc_pressure_operator.c, for an operator of SbPressureOperatorCreate(); other matrices are left alone. */
+PetscErrorCode SbPressureOperatorAssemble(Mat A, const SbStage *stage, PetscBool *is);
+PetscErrorCode SbPressureOperatorFinish(Mat A);
+/* Between the two, factor times a block (N/m) that is in its matrix already, for the coarse spaces. Not collective. */
+PetscErrorCode SbPressureOperatorAddSpring(Mat A, PetscInt node, PetscReal factor, const PetscReal block[9]);
+/* Its matrix; A itself when A is not one. */
+PetscErrorCode SbPressureOperatorMatrix(Mat A, Mat *inner);
+
+/* u[3 a + i][lane] of a batch from a local array [nnode][3]. */
+static inline void sb_gather(const PetscInt node[4 * SB_BATCH], const PetscReal x[], SbLane u[12])
+{
+  for (int a = 0; a < 4; a++) {
+    for (int l = 0; l < SB_BATCH; l++) {
+      const PetscReal *p = x + 3 * node[a * SB_BATCH + l];
+
+      u[3 * a][l] = p[0];
+      u[3 * a + 1][l] = p[1];
+      u[3 * a + 2][l] = p[2];
+    }
+  }
+}
+
+/* Longest side of a box: what a rotation of unit size is relative to. */
+SB_INLINE PetscReal SbRigidSize(const PetscReal box[6])
+{
+  return PetscMax(box[3] - box[0], PetscMax(box[4] - box[1], box[5] - box[2]));
+}
+/* Value of rigid-body mode 0 to 5 (three translations, three rotations about the middle of the box) at x, over the box's size. */
+void SbRigidMode(PetscInt mode, const PetscReal x[3], const PetscReal box[6], PetscReal value[3]);
+/*
+  SbAttachModes - the near null space of A: the six rigid-body modes, which algebraic multigrid must reproduce, made orthonormal. Six serve
+  any number of bodies: an aggregate never spans two of them, and each body turns about its own centre.
+
+  Collective. fill(mode, v, ctx) writes this rank's part of a mode; one that vanishes is left out.
+*/
+PetscErrorCode SbAttachModes(Mat A, PetscErrorCode (*fill)(PetscInt mode, PetscScalar v[], const void *ctx),
+                             const void *ctx);
+
+/*
+  What strains are computed from: the nodes of the cells; for DG the means m = p + w (u - p) of the own node u and the one
+  across the face p.
+*/
+static inline void sb_gather_strain(SbSpace s, const SbRegion *region, PetscInt b, const PetscReal x[],
+                                    SbLane u[12])
+{
+  sb_gather(s->batch_node + 4 * SB_BATCH * b, x, u);
+  if (region->broken) {
+    SbLane p[12];
+
+    sb_gather(s->batch_clique + (8 * b + 4) * SB_BATCH, x, p);
+    for (int k = 0; k < 12; k++) {
+      for (int l = 0; l < SB_BATCH; l++)
+        u[k][l] = p[k][l] + s->batch_weight[4 * b + k / 3][l] * (u[k][l] - p[k][l]);
+    }
+  }
+}
+
+/* f[nnode][3] += the first n lanes of a batch's nodal vectors. */
+static inline void sb_scatter_add(const PetscInt node[4 * SB_BATCH], PetscInt n, const SbLane fe[12],
+                                  PetscReal f[])
+{
+  for (int a = 0; a < 4; a++) {
+    for (PetscInt l = 0; l < n; l++) {
+      PetscReal *p = f + 3 * node[a * SB_BATCH + l];
+
+      p[0] += fe[3 * a][l];
+      p[1] += fe[3 * a + 1][l];
+      p[2] += fe[3 * a + 2][l];
+    }
+  }
+}
+
+/* The transpose of sb_gather_strain(): forces on the means go to the two nodes by their weights. */
+static inline void sb_scatter_strain(SbSpace s, const SbRegion *region, PetscInt b, SbLane fe[12],
+                                     PetscReal f[])
+{
+  if (region->broken) {
+    SbLane p[12];
+
+    for (int k = 0; k < 12; k++) {
+      for (int l = 0; l < SB_BATCH; l++) {
+        const PetscReal own = s->batch_weight[4 * b + k / 3][l] * fe[k][l];
+
+        p[k][l] = fe[k][l] - own;
+        fe[k][l] = own;
+      }
+    }
+    sb_scatter_add(s->batch_clique + (8 * b + 4) * SB_BATCH, s->batch_n[b], (const SbLane *)p, f);
+  }
+  sb_scatter_add(s->batch_node + 4 * SB_BATCH * b, s->batch_n[b], (const SbLane *)fe, f);
+}
+
+/*
+  SbSpaceCellRotations - R[nbatch][9]: the frames of the laws, or the polar rotations of F where a law has none.
+
+  Not collective. Input: u[nnode][3] with ghosts, m; NULL: at rest.
+*/
+void SbSpaceCellRotations(SbSpace space, const PetscReal u[], SbLane R[]);
+/* As SbSpaceNodeRotations(), from rotations of cells. */
+PetscErrorCode SbSpaceAverageRotations(SbSpace space, const SbLane R[], PetscReal node_R[],
+                                       PetscReal spread[]);
+
+/* Lends the rotations of cells that a matrix-free operator holds; NULL for another matrix. */
+PetscErrorCode SbMatrixFreeGetRotations(Mat A, const SbLane **R);
+
+/*
+  SbSpaceGetRows - rows of an operator of the space for some owned nodes.
+
+  Not collective. Input: A, matrix-free operator, AIJ, BAIJ or SBAIJ of the space; n, node[n] owned local nodes. Output: ia[n+1], ja: local nodes, owned
+  ones first, both ascending; block[ia[n]][9], row-major, N/m. ja and block may be NULL to learn ia. Caller owns the arrays.
+*/
+PetscErrorCode SbSpaceGetRows(SbSpace space, Mat A, PetscInt n, const PetscInt node[], PetscInt ia[],
+                              PetscInt ja[], PetscReal block[]);
+/* The part of it that a matrix-free operator does. */
+PetscErrorCode SbMatrixFreeAddRows(Mat A, PetscInt n, const PetscInt node[], const PetscInt ia[],
+                                   PetscReal block[]);
+
+/*
+  SbProductGetSymmetric - the rows and columns of this rank of a matrix with the fast product, as SBAIJ.
+
+  Not collective. Input: A, BAIJ or SBAIJ of SbSpaceCreateMatrix(). Output: local, borrowed from A, up to date until values of A
+  change; A itself when that is SBAIJ on one rank. Ask again after each assembly: the same matrix, with a new state.
+*/
+PetscErrorCode SbProductGetSymmetric(Mat A, Mat *local);
+/*
+  SbMatRestoreRead - gives back the values of a matrix that were only read, by its own function, say MatSeqSBAIJRestoreArray.
+
+  Not collective. Since 3.25 PETSc takes these functions for a change of the matrix, after which fast products and preconditioners are set up again,
+  in each iteration if one reads the values in its set-up.
+*/
+PetscErrorCode SbMatRestoreRead(Mat A, PetscErrorCode (*restore)(Mat, PetscScalar *[]), PetscScalar *value[]);

@@ -1,0 +1,84 @@
+/*
+  sbconstraint.h - constraints between nodes: what the files couple*.c share.
+*/
+#pragma once
+#include "sbfem.h"
+
+/* Rows of one kind as a matrix with three columns per node. */
+typedef struct {
+  PetscInt n;                   /* rows of this rank */
+  PetscInt N;                   /* of all ranks */
+  Mat full, free;               /* G, and G without prescribed and constrained directions */
+  Mat push, push_free;          /* F likewise; G itself where all rows push along themselves */
+  Vec value, force, work, step; /* by rows */
+} Rows;
+
+/*
+  Scaled part of G D G^T on the diagonal of what is factored: rows that depend on others leave it regular. Rows of a soft and a hard surface on
+  each other are nearly dependent in the measure of D, to the ratio of stiffness: with 1e6 a part of 1e-8 is so much of the smallest
+  eigenvalues that no few passes of the projection make up for it.
+*/
+#define SB_CONSTRAINT_REGULARIZATION 1e-11
+
+typedef struct _p_SbFactored *SbSaddleFactor; /* saddle_factor.c */
+
+struct _p_SbCouple {
+  SbSaddle saddle;          /* how solves find the multipliers */
+  PetscBool external;       /* rows may tie nodes to something that is no body */
+  PetscInt version, matrix; /* raised when the rows change, and when K does */
+  SbSaddleFactor factored;  /* NULL before the first solve with SB_SADDLE_DIRECT */
+  PetscInt n, size;         /* rows, room */
+  PetscInt ntotal;          /* rows of all ranks */
+  PetscInt *start;          /* [n+1] */
+  PetscInt nentry, entry_size;
+  PetscInt *gnode;                         /* [nentry] */
+  PetscReal *coef, *along;                 /* [nentry][3] of the sum, and of the force */
+  PetscReal *value, *stiffness, *constant; /* [n]; stiffness -1: exact */
+  PetscInt *id;                            /* [n] */
+  int passes;                              /* of a projection: more where rows are nearly dependent */
+  PetscBool *redundant;                    /* [n] an exact constraint that earlier ones say already */
+  PetscInt *place;                         /* [n] row in its matrix on this rank */
+  PetscReal *force, *sum;                  /* [n] */
+  PetscReal *rate;                         /* [nrate] m/s, of rows on what moves; rows behind them: 0 */
+  PetscInt nrate;
+  Rows exact, spring;
+  Vec k, constants;       /* of springs */
+  Mat K;                  /* borrowed; NULL before SbConstraintsCreateOperator() */
+  PetscBool nonsymmetric; /* rows may push along other coefficients than their own */
+  PetscBool tilted;       /* some do now */
+  PetscBool general;      /* a method for symmetric systems has given way to one for others */
+  char method[SB_NAME_MAX];
+  KSPNormType norm;
+  PCSide side; /* of that method */
+  Mat DFt;     /* D F^T */
+  Mat gram;    /* G D F^T, its diagonal slightly larger */
+  KSP solver;
+  Vec anchor,
+    added;  /* squares of the coefficients, and what K holds beside the tangent, N/m; NULL: nothing */
+  Vec free; /* 1 at unknowns that are not prescribed, else 0 */
+  Vec d;    /* D */
+  Vec w[3];
+};
+
+/* Finds the exact constraints that rest: c->rests. Collective. */
+PetscErrorCode SbConstraintsFindRedundant(SbSpace space);
+/* x <- P x. Collective. */
+PetscErrorCode SbConstraintsProject(SbConstraints c, Vec x);
+/* y = (K + F^T k G) x, what was added to K taken away. Collective. */
+PetscErrorCode SbConstraintsMultiply(SbConstraints c, Vec x, Vec y);
+/* A direct solver for a matrix of rows by rows, G D F^T, on every rank; the caller destroys it. Collective. */
+PetscErrorCode SbConstraintsCreateGramSolver(SbSpace space, Mat gram, KSP *solver);
+/* step = (G D F^T)^-1 work, vectors of c->exact. Collective. */
+PetscErrorCode SbConstraintsSolveGram(SbConstraints c);
+/* r <- r - F^T lambda, what rows cannot take; lambda into c->exact.force, N. Collective. */
+PetscErrorCode SbConstraintsProjectForce(SbConstraints c, Vec r);
+
+/*
+  z of [K + F^T k G, F^T; G, 0] [z; m] = [r; 0] by a factorisation, which is renewed when K or the rows have changed. Collective.
+
+  Output: ok, false when the matrix could not be factored; z is not a number then.
+*/
+PetscErrorCode SbSaddleFactorSolve(SbSpace space, Vec r, Vec z, PetscBool *ok);
+/* Negative eigenvalues of K + F^T k G in the null space of the rows, from that factorisation; -1: it does not tell. Collective. */
+PetscErrorCode SbSaddleFactorCountNegative(SbSpace space, PetscInt *negative);
+PetscErrorCode SbSaddleFactorDestroy(SbSaddleFactor *factored);

@@ -1,0 +1,141 @@
+/*
+  sbgeometry.h - layer 1: distances, intersection, continuous collision detection, trees of boxes, location: arrays in, arrays out.
+
+  Not collective throughout; nothing here knows a mesh, a surface or contact. Lengths in any unit, the same throughout a call.
+*/
+#pragma once
+#include "sbbase.h"
+#include "sbkernel.h"
+
+#define SB_BOX_ROUNDING 16 /* in units of eps |x|: what the corners of a box may be off */
+
+/* Whether two boxes share a point. */
+static inline PetscBool SbBoxesOverlap(const PetscReal a[6], const PetscReal b[6])
+{
+  return (PetscBool)(a[0] <= b[3] && b[0] <= a[3] && a[1] <= b[4] && b[1] <= a[4] && a[2] <= b[5] &&
+                     b[2] <= a[5]);
+}
+
+/* Boxes: lower and upper corner, m. An empty one has its lower corner above the upper. */
+static inline void SbBoxClear(PetscReal box[6])
+{
+  for (int k = 0; k < 3; k++) {
+    box[k] = PETSC_MAX_REAL;
+    box[3 + k] = -PETSC_MAX_REAL;
+  }
+}
+
+/* Places that are no numbers are passed over: then a diverged solve makes no difference between ranks. */
+static inline void SbBoxJoin(PetscReal box[6], const PetscReal low[3], const PetscReal high[3])
+{
+  for (int k = 0; k < 3; k++) {
+    if (low[k] < box[k]) box[k] = low[k];
+    if (high[k] > box[3 + k]) box[3 + k] = high[k];
+  }
+}
+
+static inline void SbBoxAdd(PetscReal box[6], const PetscReal x[3])
+{
+  SbBoxJoin(box, x, x);
+}
+
+static inline void SbBoxMerge(PetscReal box[6], const PetscReal other[6])
+{
+  SbBoxJoin(box, other, other + 3);
+}
+
+/* Whether two boxes are nearer than `grown` in every coordinate. Empty ones never are. */
+static inline PetscBool SbBoxesWithin(const PetscReal a[6], const PetscReal b[6], PetscReal grown)
+{
+  for (int k = 0; k < 3; k++) {
+    if (a[k] - grown > b[3 + k] || b[k] - grown > a[3 + k]) return PETSC_FALSE;
+  }
+  return PETSC_TRUE;
+}
+
+/* Where on a triangle: its corner 0, 1 or 2, its edge from corner 0 to 1, 1 to 2, 2 to 0, or its inside. */
+typedef enum {
+  SB_FEATURE_CORNER_0,
+  SB_FEATURE_CORNER_1,
+  SB_FEATURE_CORNER_2,
+  SB_FEATURE_EDGE_0,
+  SB_FEATURE_EDGE_1,
+  SB_FEATURE_EDGE_2,
+  SB_FEATURE_FACE
+} SbTriangleFeature;
+
+/*
+  SbTriangleClosestPoint - the point of a triangle nearest to p.
+
+  Not collective. Input: p[3]; x[k][3], corners, m. Output: weight[3], none negative, sum 1; d2, squared distance, m^2. Triangles without
+  area are segments or points; the place then is never SB_FEATURE_FACE. NaN in, NaN out.
+*/
+SbTriangleFeature SbTriangleClosestPoint(const PetscReal p[3], const PetscReal *const x[3],
+                                         PetscReal weight[3], PetscReal *d2);
+
+/*
+  SbCCDPointTriangle - whether a point goes through a triangle from its front to its back and stays behind it.
+
+  Not collective. Point and corners move on straight lines. Input: p0[3], p1[3], point at the start and end of the step; x0[k][3], x1[k][3],
+  corners, m; slack, a start behind the triangle by no more than this is in front of it; rest, an end behind it by no more than this does not count, m.
+  Output: time, of the step, in [0, 1]; behind, the start was behind it.
+*/
+PetscBool SbCCDPointTriangle(const PetscReal p0[3], const PetscReal p1[3], const PetscReal *const x0[3],
+                             const PetscReal *const x1[3], const PetscReal tolerance[2], PetscReal *time,
+                             PetscBool *behind);
+
+/*
+  SbCCDEdgeEdge - whether an edge goes through another one from its front to its back and stays behind it.
+
+  Not collective. In front is where (e[0] - f[0]) . (e x f) is positive, e and f from the first to the second end; with the ends of
+  one edge exchanged it is the other side. Input: ends at the start and end of the step, m. The rest as for SbCCDPointTriangle().
+*/
+PetscBool SbCCDEdgeEdge(const PetscReal *const e0[2], const PetscReal *const e1[2],
+                        const PetscReal *const f0[2], const PetscReal *const f1[2],
+                        const PetscReal tolerance[2], PetscReal *time, PetscBool *behind);
+
+/*
+  SbRayTriangle - where the half-line p + t way meets a triangle.
+
+  Not collective. Output: t >= 0, in lengths of way; weight[3] of the corners; out, whether it leads from the back to the front.
+*/
+PetscBool SbRayTriangle(const PetscReal p[3], const PetscReal way[3], const PetscReal *const x[3],
+                        PetscReal *t, PetscReal weight[3], PetscBool *out);
+
+/* ------------------------------------------------------------------ box_tree.c: which boxes meet a box */
+
+/* A tree over boxes; nodes[1] is the root, the children of k are 2 k and 2 k + 1. */
+typedef struct {
+  PetscInt n, nleaf;   /* boxes; leaves, a power of two */
+  PetscInt *order;     /* [n] boxes in the order of the leaves */
+  PetscReal (*box)[6]; /* [2 nleaf] lower and upper corner of each node */
+} SbBoxTree;
+PetscErrorCode SbBoxTreeCreate(PetscInt n, const PetscReal (*box)[6], SbBoxTree *tree);
+PetscErrorCode SbBoxTreeDestroy(SbBoxTree *tree);
+/* Box of a triangle, vert[3]. */
+void SbTriangleBox(const PetscReal x[], const PetscInt vert[], PetscReal box[6]);
+/* Calls visit(ctx, i) for each box that meets the given one, until it returns an error. */
+PetscErrorCode SbBoxTreeVisit(const SbBoxTree *tree, const PetscReal box[6],
+                              PetscErrorCode (*visit)(void *ctx, PetscInt i), void *ctx);
+
+/* Six times the signed volume of a tet, m^3. */
+PetscReal SbTetDeterminant(const PetscReal x[], const PetscInt vert[4]);
+
+/* ------------------------------------------------------------------ locate.c */
+
+/*
+  SbLocator - which tet holds a point. Not collective; the arrays are borrowed. Tets without volume, or inverted, hold nothing.
+
+  SbLocatorFind: the tet and the weights of its corners, none negative, sum 1. Of several that hold the point the one in which it lies
+  deepest, or the first of equal ones; of a point in none the nearest place. Returns the distance from there, m.
+*/
+typedef struct _p_SbLocator *SbLocator;
+PetscErrorCode SbLocatorCreate(PetscInt ncell, const PetscInt cell[], const PetscReal x[],
+                               SbLocator *locator);
+PetscErrorCode SbLocatorDestroy(SbLocator *locator);
+PetscReal SbLocatorFind(SbLocator locator, const PetscReal point[3], PetscInt *cell, PetscReal weight[4]);
+/* The weights of the corners of a tet at a point, in it or not. */
+/* Of a tet with the corners v of x[][3] alone: sum w_a x_a = point; negative where it lies outside. */
+void SbTetBarycentric(const PetscReal x[], const PetscInt v[4], const PetscReal point[3],
+                      PetscReal weight[4]);
+void SbLocatorBarycentric(SbLocator locator, PetscInt cell, const PetscReal point[3], PetscReal weight[4]);

@@ -1,0 +1,142 @@
+/*
+  sbmeshio.h - layer 1: a body on rank 0 as its reader delivers it, and what reading a file takes. Not collective throughout.
+*/
+#pragma once
+#include "sbmeshfile.h"
+
+#define SB_GROUP_MAX (2 * SB_NAME_MAX) /* longest name of a physical group, with the terminating zero */
+
+/* ------------------------------------------------------------------ import.c: one body in memory */
+
+/* A physical group of a file, or a side of a box: a name for entities of one dimension. */
+typedef struct {
+  PetscInt dim; /* 0 points, 1 curves, 2 surfaces, 3 volumes */
+  int64_t tag;  /* number in the file */
+  char name[SB_GROUP_MAX];
+  PetscInt alone; /* tag set that holds only this group; -1 until somebody wants it */
+} SbGroup;
+
+/* Simplices of one dimension. */
+typedef struct {
+  PetscInt n, capacity;
+  PetscInt *vert;  /* [n][dim + 1] */
+  PetscInt *tags;  /* [n] tag set */
+  int64_t *number; /* [n] number in the file, for messages */
+} SbItems;
+
+/* A body as its reader delivers it. Zeroed before the reader is called; freed by SbImportDestroy(), also after an error. */
+struct _p_SbImport {
+  char where[PETSC_MAX_PATH_LEN + 2 * SB_NAME_MAX]; /* "body 'liver': liver.msh", begins every message */
+  char body[SB_NAME_MAX];                           /* "liver"; "" in supple-mesh */
+  PetscInt nvert;
+  PetscReal *x;         /* [nvert][3] m once placed */
+  int64_t *vert_number; /* [nvert] number in the file */
+  SbItems item[4];      /* by dimension; item[3] are the tets */
+  PetscInt ngroup;
+  SbGroup *group;       /* [ngroup] */
+  PetscInt ntags;       /* tag sets: which groups an item belongs to. Set 0 is empty */
+  PetscInt *tags_start; /* [ntags + 1] */
+  PetscInt *tags_group; /* [tags_start[ntags]] groups, ascending in each set */
+  PetscInt capacity[3]; /* of group, tags_start, tags_group */
+  PetscInt nslot;       /* a power of two */
+  PetscInt *slot;       /* [nslot] groups by a hash of (dim, tag), or -1; made when needed */
+  PetscBool surface;    /* given: all triangles are wanted, and tets need not be there */
+  SbTetOptions tet;     /* given: how a surface becomes tets */
+  PetscReal scale;      /* given: factor that placing will use; a reader that has scaled sets it to 1 */
+  char note[512];       /* what the reader repaired, for SbBody.note */
+  PetscInt step; /* given: step of a run's output whose positions are wanted; 0 at rest, -1 the last one */
+  SbMeshProgress progress; /* given: told how far a long read is; may be NULL */
+  void *progress_ctx;
+  /* found by SbImportCheck() */
+  PetscInt nunused;     /* vertices left out */
+  PetscInt nreoriented; /* cells turned */
+  PetscInt nlost;       /* triangles of groups that are no face of a tet */
+  PetscInt npinched;    /* surface edges with more than two facets */
+};
+
+/* Chooses the reader by the name of the mesh, reads, places. Not collective. */
+PetscErrorCode SbImportRead(const SbBody *body, SbImport *import);
+PetscErrorCode SbImportDestroy(SbImport *import);
+/* How the user writes an option of this body, for messages: "-body_liver_tet_size"; in supple-mesh "-size". */
+#define SB_OPTION_NAME_MAX (SB_NAME_MAX + 32)
+const char *SbImportOption(const SbImport *import, const char *key, char name[SB_OPTION_NAME_MAX]);
+/* A .msh of any version, by the program's own reader or by the gmsh library. */
+PetscErrorCode SbImportRead_Msh(const char *path, SbImport *body);
+/* Room for n vertices. */
+PetscErrorCode SbImportSetVertices(SbImport *import, PetscInt n);
+/* Appends a simplex; vert[dim + 1]. */
+PetscErrorCode SbImportAddItem(SbImport *import, int dim, const PetscInt vert[], PetscInt tags,
+                               int64_t number);
+/* Room for exactly n simplices of a dimension that has none yet, numbered from 1 on, for the caller to fill. */
+PetscErrorCode SbImportSetItems(SbImport *import, int dim, PetscInt n);
+/* The group (dim, tag), made when new; a NULL name means "surface_12" until somebody gives one. */
+PetscErrorCode SbImportGroup(SbImport *import, PetscInt dim, int64_t tag, const char *name, PetscInt *group);
+/* The tag set that holds this group alone. */
+PetscErrorCode SbImportTagsAlone(SbImport *import, PetscInt dim, int64_t tag, const char *name,
+                                 PetscInt *tags);
+/* The tag set that holds exactly these groups (any order, repeats allowed, reordered here), made when new. */
+PetscErrorCode SbImportTagSet(SbImport *import, PetscInt n, PetscInt groups[], PetscInt *tags);
+
+/* ------------------------------------------------------------------ numbers.c: from numbers of a file to places in memory */
+
+typedef struct {
+  int64_t number;
+  PetscInt vert;
+} SbNumbered;
+typedef struct {
+  PetscInt n;
+  int64_t first, ntable;
+  PetscInt *table;    /* [ntable] place of number first + i, or -1; NULL when the numbers are far apart */
+  SbNumbered *sorted; /* [n] then this */
+  PetscBool repeated; /* a number stands twice */
+  int64_t twice;      /* this one */
+} SbNumbers;
+
+/* Prepares the way from number[n] to 0 ... n - 1; zeroed, or made before: then it is made again. */
+PetscErrorCode SbNumbersCreate(PetscInt n, const int64_t number[], SbNumbers *index);
+PetscErrorCode SbNumbersDestroy(SbNumbers *index);
+/* Place of a number, -1 when there is none. */
+PetscInt SbNumbersFind(const SbNumbers *index, int64_t number);
+
+/* ------------------------------------------------------------------ scan.c: a file in memory */
+
+typedef struct {
+  const char *where; /* begins every message */
+  char *data;        /* whole file and a terminating zero */
+  const char *end;
+  const char *at;    /* next byte */
+  const char *token; /* what was read last, for messages */
+  PetscBool binary;  /* the numbers that follow are binary */
+  PetscBool bytes;   /* messages count bytes instead of lines */
+  PetscBool swap;    /* from a machine with the other byte order */
+} SbScan;
+
+PetscErrorCode SbScanOpen(const char *where, const char *path, SbScan *scan);
+PetscErrorCode SbScanClose(SbScan *scan);
+/* "line 12" or "byte 4711" of the last token. */
+const char *SbScanPlace(const SbScan *scan, char place[64]);
+/* Numbers, as text or in binary of 4 or 8 bytes; `what` tells what is expected there. */
+PetscErrorCode SbScanText(SbScan *scan, const char *what, int64_t *value); /* always text */
+PetscErrorCode SbScanInt4(SbScan *scan, const char *what, int64_t *value);
+PetscErrorCode SbScanInt8(SbScan *scan, const char *what, int64_t *value);
+PetscErrorCode SbScanReal(SbScan *scan, const char *what, int64_t number,
+                          PetscReal *value); /* `what` of `number` */
+/* A count of things that take at least so many bytes each as text and in binary: more than the file holds is an error. */
+PetscErrorCode SbScanRoom(SbScan *scan, const char *what, int64_t n, int64_t text_bytes,
+                          int64_t binary_bytes);
+PetscErrorCode SbScanQuoted(SbScan *scan, const char *what, size_t size, char value[]); /* "in quotes" */
+/* The next word; empty at the end of the file. */
+PetscErrorCode SbScanWord(SbScan *scan, size_t size, char word[]);
+PetscErrorCode SbScanEndOfLine(SbScan *scan); /* to the first byte after it */
+void SbScanNext(SbScan *scan,
+                char comment); /* to the next word, over blank lines and comments to the end of a line */
+PetscBool SbScanMore(SbScan *scan, char comment);     /* whether another word stands on this line */
+PetscBool SbScanFind(SbScan *scan, const char *text); /* moves to its beginning */
+
+#define SB_SCAN_ERROR(scan, ...)                                                    \
+  do {                                                                              \
+    char sb_place[64], sb_text[512];                                                \
+    (void)snprintf(sb_text, sizeof(sb_text), __VA_ARGS__);                          \
+    SETERRQ(PETSC_COMM_SELF, PETSC_ERR_FILE_UNEXPECTED, "%s %s: %s", (scan)->where, \
+            SbScanPlace(scan, sb_place), sb_text);                                  \
+  } while (0)

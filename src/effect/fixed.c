@@ -1,0 +1,105 @@
+/*
+  fixed.c - nodes constrained where they are at rest, in all directions or in some.
+
+  Prescribes u_c = 0 for the chosen components c. The history gets the force of the support on the body
+  (prescribed.c has the sign). Between effects that want the same unknown, the one named first in the scenario has
+  it.
+
+  CR and DG are constrained at the triangles of their surface, in the mean: one triangle alone, or two, leave rotations
+  free. A DG face that is fixed in all directions has a node of its own that is prescribed, to which its cell is tied
+  by a penalty (src/fem/layout.c; -body_X_dirichlet strong: the mean itself is prescribed). Single directions are
+  constrained in the mean itself.
+*/
+#include "sbeffect.h"
+
+typedef struct {
+  SbEffectOn on;
+  int components; /* bits 0..2 */
+  SbPrescribed prescribed;
+} Support;
+
+static const SbOption rows[] = {
+  {"on", SB_OPTION_NAMES, 1, "", NULL, "",
+   "sets whose nodes are constrained: vertices, with cr and dg the means over triangles"},
+  {"components", SB_OPTION_CHOICE, 1, "", "xyz", SB_COMPONENT_CHOICES, "directions that are constrained"},
+};
+
+static PetscErrorCode options_support(SbEffect e, const SbScope *scope)
+{
+  Support *s = (Support *)e->data;
+  PetscInt choice;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbEffectReadOn(scope, &s->on));
+  PetscCall(SbOptionChoice(scope, "components", &choice));
+  s->components = SbPrescribedComponents(choice);
+  if (s->components == 7) e->prescribed = &s->on;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode setup_support(SbEffect e, SbSpace space)
+{
+  Support *s = (Support *)e->data;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbPrescribedSetUp(&s->prescribed, space, &s->on, s->components));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode prescribe_support(SbEffect e, SbSpace space, PetscReal t)
+{
+  Support *s = (Support *)e->data;
+
+  PetscFunctionBeginUser;
+  (void)t;
+  PetscCall(SbPrescribedSetValues(&s->prescribed, space, NULL));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode history_support(SbEffect e, SbSpace space, const SbStage *stage,
+                                      const PetscReal residual[], PetscReal values[])
+{
+  const Support *s = (const Support *)e->data;
+
+  PetscFunctionBeginUser;
+  (void)space;
+  (void)stage;
+  SbPrescribedReaction(&s->prescribed, residual, values);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode destroy_support(SbEffect e)
+{
+  Support *s = (Support *)e->data;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbEffectFreeOn(&s->on));
+  PetscCall(SbPrescribedFree(&s->prescribed));
+  PetscCall(PetscFree(e->data));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode create_support(SbEffect e)
+{
+  static const char *const columns[] = {"reaction_x", "reaction_y", "reaction_z"};
+  Support *s;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscNew(&s));
+  e->data = s;
+  e->ops.setfromoptions = options_support;
+  e->ops.setup = setup_support;
+  e->ops.prescribe = prescribe_support;
+  e->ops.history = history_support;
+  e->ops.destroy = destroy_support;
+  e->column = columns;
+  e->ncolumn = PETSC_STATIC_ARRAY_LENGTH(columns);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbEffectRegister_Fixed(void)
+{
+  PetscFunctionBeginUser;
+  PetscCall(SbEffectRegister("fixed", create_support, PETSC_STATIC_ARRAY_LENGTH(rows), rows));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

@@ -1,0 +1,164 @@
+/*
+  prescribed_displacement.c - nodes moved along a given path: a translation, a rotation about an axis, or both.
+
+  With r = X - c the rest position relative to a point c of the axis, k the unit direction and theta(t) the
+  angle, the prescribed displacement is (Rodrigues 1840)
+
+    u(X, t) = d(t, X) + sin(theta) k x r + 2 sin^2(theta/2) k x (k x r).
+
+  X being a vertex, or with CR and DG the centroid of a triangle. Written this way nothing cancels at small angles. Reaction: force of the drive on the body (prescribed.c has the
+  sign); torque: moment of that force about the axis at rest, taken with the current positions.
+*/
+#include "sbeffect.h"
+
+typedef struct {
+  SbEffectOn on;
+  int components; /* bits 0..2 */
+  SbFormula displacement[3], angle;
+  PetscReal point[3], axis[3]; /* m; unit vector */
+  SbPrescribed prescribed;
+  PetscReal *value; /* [hold.n][3] m */
+} Drive;
+
+static const SbOption rows[] = {
+  {"on", SB_OPTION_NAMES, 1, "", NULL, "",
+   "sets whose nodes are moved: vertices, with cr and dg the means over triangles"},
+  {"components", SB_OPTION_CHOICE, 1, "", "xyz", SB_COMPONENT_CHOICES, "directions that are prescribed"},
+  {"displacement", SB_OPTION_FORMULA, 3, "m", "0;0;0", "",
+   "translation, three formulas of t, x, y, z (rest position)"},
+  {"angle", SB_OPTION_FORMULA, 1, "degree", "0", "",
+   "angle of rotation about the axis, a formula of the time t"},
+  {"axis", SB_OPTION_REALS, 3, "", "0,0,1", "", "direction of the axis of rotation; right-handed"},
+  {"axis_point", SB_OPTION_REALS, 3, "m", "0,0,0", "", "a point on the axis of rotation"},
+};
+
+static PetscErrorCode options_drive(SbEffect e, const SbScope *scope)
+{
+  Drive *d = (Drive *)e->data;
+  PetscInt choice;
+  PetscBool move, turn;
+  PetscReal length = 0;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbEffectReadOn(scope, &d->on));
+  PetscCall(SbOptionChoice(scope, "components", &choice));
+  d->components = SbPrescribedComponents(choice);
+  if (d->components == 7) e->prescribed = &d->on;
+  PetscCall(SbOptionGiven(scope, "displacement", &move));
+  PetscCall(SbOptionGiven(scope, "angle", &turn));
+  PetscCheck(move || turn, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
+             "effect %s: give -effect_%s_displacement (m, three formulas) or -effect_%s_angle (degrees, one "
+             "formula)",
+             e->name, e->name, e->name);
+  PetscCall(SbEffectFormulas(scope, "displacement", 3, PETSC_TRUE, d->displacement, &e->steady));
+  PetscCall(SbEffectFormulas(scope, "angle", 1, PETSC_FALSE, &d->angle, &e->steady));
+  PetscCall(SbOptionReals(scope, "axis", d->axis));
+  PetscCall(SbOptionReals(scope, "axis_point", d->point));
+  for (int i = 0; i < 3; i++) length += d->axis[i] * d->axis[i];
+  length = PetscSqrtReal(length);
+  PetscCheck(length > 0, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT, "-effect_%s_axis: 0,0,0 is no direction",
+             e->name);
+  for (int i = 0; i < 3; i++) d->axis[i] /= length;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode setup_drive(SbEffect e, SbSpace space)
+{
+  Drive *d = (Drive *)e->data;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbPrescribedSetUp(&d->prescribed, space, &d->on, d->components));
+  PetscCall(PetscMalloc1(3 * d->prescribed.n, &d->value));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static inline void cross(const PetscReal a[3], const PetscReal b[3], PetscReal c[3])
+{
+  c[0] = a[1] * b[2] - a[2] * b[1];
+  c[1] = a[2] * b[0] - a[0] * b[2];
+  c[2] = a[0] * b[1] - a[1] * b[0];
+}
+
+static PetscErrorCode prescribe_drive(SbEffect e, SbSpace space, PetscReal t)
+{
+  Drive *d = (Drive *)e->data;
+  const PetscReal theta = SbFormulaEval(d->angle, t, NULL) * PETSC_PI / 180;
+  const PetscReal half = PetscSinReal(theta / 2);
+
+  PetscFunctionBeginUser;
+  for (PetscInt i = 0; i < d->prescribed.n; i++) {
+    const PetscReal *X = &space->node_x[3 * d->prescribed.node[i]];
+    const PetscReal r[3] = {X[0] - d->point[0], X[1] - d->point[1], X[2] - d->point[2]};
+    PetscReal kr[3], kkr[3];
+
+    cross(d->axis, r, kr);
+    cross(d->axis, kr, kkr);
+    for (int c = 0; c < 3; c++) {
+      d->value[3 * i + c] =
+        SbFormulaEval(d->displacement[c], t, X) + PetscSinReal(theta) * kr[c] + 2 * half * half * kkr[c];
+    }
+  }
+  PetscCall(SbPrescribedSetValues(&d->prescribed, space, d->value));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode history_drive(SbEffect e, SbSpace space, const SbStage *stage,
+                                    const PetscReal residual[], PetscReal values[])
+{
+  const Drive *d = (const Drive *)e->data;
+
+  PetscFunctionBeginUser;
+  SbPrescribedReaction(&d->prescribed, residual, values);
+  values[3] = 0;
+  for (PetscInt i = 0; i < d->prescribed.nowned; i++) {
+    const PetscInt node = d->prescribed.node[i];
+    PetscReal arm[3], force[3], moment[3];
+
+    for (int c = 0; c < 3; c++) {
+      arm[c] = space->node_x[3 * node + c] + stage->u[3 * node + c] - d->point[c];
+      force[c] = d->prescribed.components[i] & (1 << c) ? residual[3 * node + c] : 0;
+    }
+    cross(arm, force, moment);
+    for (int c = 0; c < 3; c++) values[3] += d->axis[c] * moment[c];
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode destroy_drive(SbEffect e)
+{
+  Drive *d = (Drive *)e->data;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbEffectFreeOn(&d->on));
+  for (int c = 0; c < 3; c++) PetscCall(SbFormulaDestroy(&d->displacement[c]));
+  PetscCall(SbFormulaDestroy(&d->angle));
+  PetscCall(SbPrescribedFree(&d->prescribed));
+  PetscCall(PetscFree(d->value));
+  PetscCall(PetscFree(e->data));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode create_drive(SbEffect e)
+{
+  static const char *const columns[] = {"reaction_x", "reaction_y", "reaction_z", "torque"};
+  Drive *d;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscNew(&d));
+  e->data = d;
+  e->ops.setfromoptions = options_drive;
+  e->ops.setup = setup_drive;
+  e->ops.prescribe = prescribe_drive;
+  e->ops.history = history_drive;
+  e->ops.destroy = destroy_drive;
+  e->column = columns;
+  e->ncolumn = PETSC_STATIC_ARRAY_LENGTH(columns);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbEffectRegister_PrescribedDisplacement(void)
+{
+  PetscFunctionBeginUser;
+  PetscCall(SbEffectRegister("prescribed_displacement", create_drive, PETSC_STATIC_ARRAY_LENGTH(rows), rows));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

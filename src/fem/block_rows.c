@@ -1,0 +1,138 @@
+/*
+  Rows of an operator as 3x3 blocks with local columns, whatever the operator is: a matrix-free operator, AIJ, BAIJ or SBAIJ.
+
+  The block storages are read in place, by the plan that they were assembled with (both keep a block by columns; the
+  symmetric one keeps only the upper triangle). AIJ goes through MatGetRow(), three times slower.
+*/
+#include "fem_impl.h"
+
+/* Place in the row (as ia counts) of the block with global node column g; -1: not in the graph. */
+static PetscInt find_column(SbSpace s, PetscInt row, PetscInt g)
+{
+  const SbPlan p = s->plan;
+  const PetscInt nd = p->di[row + 1] - p->di[row];
+  const PetscBool owned = (PetscBool)(g >= s->gnode_start && g < s->gnode_start + s->nnode_owned);
+  PetscInt lo = owned ? p->di[row] : p->oi[row], hi = owned ? p->di[row + 1] : p->oi[row + 1];
+
+  while (lo < hi) {
+    const PetscInt mid = lo + (hi - lo) / 2, node = owned ? p->dj[mid] : p->oj[mid];
+
+    if (s->gnode[node] == g) return owned ? mid - p->di[row] : nd + mid - p->oi[row];
+    if (s->gnode[node] < g)
+      lo = mid + 1;
+    else
+      hi = mid;
+  }
+  return -1;
+}
+
+static PetscErrorCode read_any(SbSpace s, Mat A, PetscInt n, const PetscInt node[], const PetscInt ia[],
+                               PetscReal block[])
+{
+  PetscFunctionBeginUser;
+  for (PetscInt k = 0; k < n; k++) {
+    for (PetscInt c = 0; c < 3; c++) {
+      const PetscInt row = 3 * (s->gnode_start + node[k]) + c, *column;
+      const PetscScalar *value;
+      PetscInt ncol, at = -1;
+
+      PetscCall(MatGetRow(A, row, &ncol, &column, &value));
+      for (PetscInt e = 0; e < ncol; e++) {
+        if (!e || column[e] / 3 != column[e - 1] / 3) at = find_column(s, node[k], column[e] / 3);
+        if (at >= 0) block[9 * (ia[k] + at) + 3 * c + column[e] % 3] = value[e];
+      }
+      PetscCall(MatRestoreRow(A, row, &ncol, &column, &value));
+    }
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* A block by columns to one by rows; `turned`: of the transposed block. */
+static inline void copy_block(const PetscScalar *from, PetscBool turned, PetscReal to[9])
+{
+  for (int e = 0; e < 9; e++) to[e] = from[turned ? e : 3 * (e % 3) + e / 3];
+}
+
+static PetscErrorCode read_baij(SbSpace s, Mat A, PetscInt n, const PetscInt node[], const PetscInt ia[],
+                                PetscReal block[])
+{
+  const SbPlan p = s->plan;
+  PetscScalar *diagonal, *other = NULL;
+  Mat part[2] = {A, NULL};
+  PetscBool parallel;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscObjectTypeCompare((PetscObject)A, MATMPIBAIJ, &parallel));
+  if (parallel) PetscCall(MatMPIBAIJGetSeqBAIJ(A, &part[0], &part[1], NULL));
+  PetscCall(MatSeqBAIJGetArray(part[0], &diagonal));
+  if (part[1]) PetscCall(MatSeqBAIJGetArray(part[1], &other));
+  for (PetscInt k = 0; k < n; k++) {
+    PetscReal *to = block + 9 * ia[k];
+
+    for (PetscInt e = p->di[node[k]]; e < p->di[node[k] + 1]; e++, to += 9)
+      copy_block(diagonal + 9 * (size_t)e, PETSC_FALSE, to);
+    for (PetscInt e = p->oi[node[k]]; e < p->oi[node[k] + 1]; e++, to += 9)
+      copy_block(other + 9 * (size_t)e, PETSC_FALSE, to);
+  }
+  PetscCall(SbMatRestoreRead(part[0], MatSeqBAIJRestoreArray, &diagonal));
+  if (part[1]) PetscCall(SbMatRestoreRead(part[1], MatSeqBAIJRestoreArray, &other));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Blocks left of the diagonal are found, transposed, in the rows of their columns. */
+static PetscErrorCode read_sbaij(SbSpace s, Mat A, PetscInt n, const PetscInt node[], const PetscInt ia[],
+                                 PetscReal block[])
+{
+  const SbPlan p = s->plan;
+  PetscScalar *value;
+
+  PetscFunctionBeginUser;
+  PetscCall(MatSeqSBAIJGetArray(A, &value));
+  for (PetscInt k = 0; k < n; k++) {
+    const PetscInt i = node[k];
+    PetscReal *to = block + 9 * ia[k];
+
+    for (PetscInt e = p->di[i]; e < p->di[i + 1]; e++, to += 9) {
+      const PetscBool lower = (PetscBool)(p->dj[e] < i);
+      const PetscInt row = lower ? p->dj[e] : i;
+      const PetscInt at = lower ? p->di[row] + find_column(s, row, s->gnode[i]) : e;
+
+      copy_block(value + 9 * (size_t)(p->ui[row] + at - p->diagonal[row]), lower, to);
+    }
+  }
+  PetscCall(SbMatRestoreRead(A, MatSeqSBAIJRestoreArray, &value));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbSpaceGetRows(SbSpace s, Mat A, PetscInt n, const PetscInt node[], PetscInt ia[],
+                              PetscInt ja[], PetscReal block[])
+{
+  const SbPlan p = s->plan;
+  const SbLane *R;
+  PetscBool baij, sbaij;
+
+  PetscFunctionBeginUser;
+  ia[0] = 0;
+  for (PetscInt k = 0; k < n; k++) {
+    const PetscInt i = node[k], nd = p->di[i + 1] - p->di[i], no = p->oi[i + 1] - p->oi[i];
+
+    ia[k + 1] = ia[k] + nd + no;
+    if (!ja) continue;
+    PetscCall(PetscArraycpy(ja + ia[k], p->dj + p->di[i], nd));
+    PetscCall(PetscArraycpy(ja + ia[k] + nd, p->oj + p->oi[i], no));
+  }
+  if (!block) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscObjectTypeCompareAny((PetscObject)A, &baij, MATSEQBAIJ, MATMPIBAIJ, ""));
+  PetscCall(PetscObjectTypeCompare((PetscObject)A, MATSEQSBAIJ, &sbaij));
+  PetscCall(SbMatrixFreeGetRotations(A, &R));
+  PetscCall(PetscArrayzero(block, 9 * ia[n]));
+  if (R)
+    PetscCall(SbMatrixFreeAddRows(A, n, node, ia, block));
+  else if (baij)
+    PetscCall(read_baij(s, A, n, node, ia, block));
+  else if (sbaij)
+    PetscCall(read_sbaij(s, A, n, node, ia, block));
+  else
+    PetscCall(read_any(s, A, n, node, ia, block));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

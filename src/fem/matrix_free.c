@@ -1,0 +1,369 @@
+/*
+  The tangent without a matrix, for laws whose tangent is Hooke's tensor turned by a rotation.
+
+  With rotated gradients h_a = R grad phi_a a cell's part of A p is
+    H = sum_a p_a h_a^T,  T = 2 mu sym(H) + lambda tr(H) I,  q_a = V T h_a,
+  linear elasticity in the turned frame; R is not applied to anything else. A state costs a rotation and nine products per cell,
+  an application about as much as one with a stored matrix, and no blocks are formed at all: for a handful of iterations per
+  step this is several times cheaper than assembling.
+
+  Vectors are copied to four doubles per node, so that a node is one load and one store of the processor. Eight cells side by
+  side: a 4x4 transpose turns eight loads of a node into lanes.
+
+  Prescribed unknowns: p is zero there, and their rows are a multiple of the identity.
+  Not handled: the consistent mass, tangents of effects.
+*/
+#include "fem_impl.h"
+
+#define FRAME_OPERATOR "SbFrameOperator"
+
+typedef struct {
+  SbSpace space;
+  void *memory;                  /* what R and h live in */
+  SbLane *R, *h;                 /* [nbatch][9] rotations; rotated gradients of nodes 1..3, 1/m */
+  PetscReal *lambda, *mu;        /* [nregion] times the factor of the stiffness, Pa */
+  PetscReal *inertia;            /* [nnode_owned] diagonal from mass and its damping, kg/s^2 */
+  PetscReal prescribed_diagonal; /* diagonal of prescribed unknowns, kg/s^2 or N/m */
+  Vec ghosted;                   /* NULL on one rank */
+  PetscReal *p, *q;              /* [nnode][4] */
+} Operator;
+
+typedef double Four __attribute__((vector_size(32)));
+typedef double Eight __attribute__((vector_size(64)));
+
+/* lanes[c] = component c of eight nodes. */
+SB_INLINE void gather(const PetscReal *p, const PetscInt node[SB_BATCH], Eight lanes[3])
+{
+  Eight t[4];
+
+  for (int k = 0; k < 4; k++) {
+    const Four low = *(const Four *)(p + 4 * node[k]), high = *(const Four *)(p + 4 * node[k + 4]);
+
+    t[k] = __builtin_shufflevector(low, high, 0, 1, 2, 3, 4, 5, 6, 7);
+  }
+  const Eight even01 = __builtin_shufflevector(t[0], t[1], 0, 8, 2, 10, 4, 12, 6, 14);
+  const Eight even23 = __builtin_shufflevector(t[2], t[3], 0, 8, 2, 10, 4, 12, 6, 14);
+  const Eight odd01 = __builtin_shufflevector(t[0], t[1], 1, 9, 3, 11, 5, 13, 7, 15);
+  const Eight odd23 = __builtin_shufflevector(t[2], t[3], 1, 9, 3, 11, 5, 13, 7, 15);
+  lanes[0] = __builtin_shufflevector(even01, even23, 0, 1, 8, 9, 4, 5, 12, 13);
+  lanes[1] = __builtin_shufflevector(odd01, odd23, 0, 1, 8, 9, 4, 5, 12, 13);
+  lanes[2] = __builtin_shufflevector(even01, even23, 2, 3, 10, 11, 6, 7, 14, 15);
+}
+
+/* The reverse, added to q. */
+SB_INLINE void scatter_add(const Eight lanes[3], const PetscInt node[SB_BATCH], PetscReal *q)
+{
+  const Eight zero = {0}, x = lanes[0], y = lanes[1], z = lanes[2];
+  const Eight xy0 = __builtin_shufflevector(x, y, 0, 8, 2, 10, 4, 12, 6, 14);
+  const Eight xy1 = __builtin_shufflevector(x, y, 1, 9, 3, 11, 5, 13, 7, 15);
+  const Eight z0 = __builtin_shufflevector(z, zero, 0, 8, 2, 10, 4, 12, 6, 14);
+  const Eight z1 = __builtin_shufflevector(z, zero, 1, 9, 3, 11, 5, 13, 7, 15);
+  const Eight t[4] = {__builtin_shufflevector(xy0, z0, 0, 1, 8, 9, 4, 5, 12, 13),
+                      __builtin_shufflevector(xy1, z1, 0, 1, 8, 9, 4, 5, 12, 13),
+                      __builtin_shufflevector(xy0, z0, 2, 3, 10, 11, 6, 7, 14, 15),
+                      __builtin_shufflevector(xy1, z1, 2, 3, 10, 11, 6, 7, 14, 15)};
+
+  for (int k = 0; k < 4; k++) {
+    *(Four *)(q + 4 * node[k]) += __builtin_shufflevector(t[k], t[k], 0, 1, 2, 3);
+    *(Four *)(q + 4 * node[k + 4]) += __builtin_shufflevector(t[k], t[k], 4, 5, 6, 7);
+  }
+}
+
+/* q += A p of the batches of one region. Padding lanes have volume zero. */
+SB_KERNEL static void apply_region(PetscInt nbatch, const PetscInt *node, const SbLane *gradient,
+                                   const SbLane *volume, PetscReal lambda, PetscReal mu, const PetscReal *p,
+                                   PetscReal *q)
+{
+  for (PetscInt b = 0; b < nbatch; b++, node += 4 * SB_BATCH) {
+    const Eight *h = (const Eight *)(gradient + 9 * b), V = *(const Eight *)(volume + b);
+    Eight u[4][3], H[9], f[4][3];
+
+    for (int a = 0; a < 4; a++) gather(p, node + a * SB_BATCH, u[a]);
+    for (int i = 0; i < 3; i++) {
+      const Eight d1 = u[1][i] - u[0][i], d2 = u[2][i] - u[0][i], d3 = u[3][i] - u[0][i];
+
+      for (int j = 0; j < 3; j++) H[3 * i + j] = d1 * h[j] + d2 * h[3 + j] + d3 * h[6 + j];
+    }
+    const Eight mv = mu * V, m2 = mv + mv, pressure = lambda * V * (H[0] + H[4] + H[8]);
+    const Eight xx = m2 * H[0] + pressure, yy = m2 * H[4] + pressure, zz = m2 * H[8] + pressure;
+    const Eight xy = mv * (H[1] + H[3]), xz = mv * (H[2] + H[6]), yz = mv * (H[5] + H[7]);
+    for (int a = 0; a < 3; a++) {
+      const Eight *g = h + 3 * a;
+
+      f[a + 1][0] = xx * g[0] + xy * g[1] + xz * g[2];
+      f[a + 1][1] = xy * g[0] + yy * g[1] + yz * g[2];
+      f[a + 1][2] = xz * g[0] + yz * g[1] + zz * g[2];
+    }
+    for (int i = 0; i < 3; i++) f[0][i] = -(f[1][i] + f[2][i] + f[3][i]);
+    for (int a = 0; a < 4; a++) scatter_add(f[a], node + a * SB_BATCH, q);
+  }
+}
+
+static PetscErrorCode load_vector(Operator *o, Vec X)
+{
+  SbSpace s = o->space;
+  const PetscScalar *x;
+  Vec local = X;
+
+  PetscFunctionBeginUser;
+  if (o->ghosted) {
+    PetscCall(VecCopy(X, o->ghosted));
+    PetscCall(VecGhostUpdateBegin(o->ghosted, INSERT_VALUES, SCATTER_FORWARD));
+    PetscCall(VecGhostUpdateEnd(o->ghosted, INSERT_VALUES, SCATTER_FORWARD));
+    PetscCall(VecGhostGetLocalForm(o->ghosted, &local));
+  }
+  PetscCall(VecGetArrayRead(local, &x));
+  for (PetscInt i = 0; i < s->nnode; i++) {
+    for (PetscInt c = 0; c < 3; c++) o->p[4 * i + c] = x[3 * i + c];
+  }
+  PetscCall(VecRestoreArrayRead(local, &x));
+  if (o->ghosted) PetscCall(VecGhostRestoreLocalForm(o->ghosted, &local));
+  for (PetscInt k = 0; k < s->nfixed; k++) {
+    for (PetscInt c = 0; c < 3; c++) {
+      if (s->fixed[s->fixed_node[k]] & (1 << c)) o->p[4 * s->fixed_node[k] + c] = 0.;
+    }
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode MatMult_Frames(Mat A, Vec X, Vec Y)
+{
+  Operator *o;
+  SbSpace s;
+  const PetscScalar *x;
+  PetscScalar *y;
+
+  PetscFunctionBeginUser;
+  PetscCall(MatShellGetContext(A, &o));
+  s = o->space;
+  PetscCall(load_vector(o, X));
+  for (PetscInt i = 0; i < s->nnode_owned; i++) {
+    for (PetscInt c = 0; c < 4; c++) o->q[4 * i + c] = o->inertia[i] * o->p[4 * i + c];
+  }
+  PetscCall(PetscArrayzero(o->q + 4 * s->nnode_owned, 4 * (s->nnode - s->nnode_owned)));
+  for (PetscInt r = 0; r < s->nregion; r++) {
+    const PetscInt b = s->region[r].bstart;
+
+    apply_region(s->region[r].bend - b, s->batch_node + 4 * SB_BATCH * b, (const SbLane *)o->h + 9 * b,
+                 (const SbLane *)s->batch_V + b, o->lambda[r], o->mu[r], o->p, o->q);
+  }
+  PetscCall(VecGetArrayRead(X, &x));
+  PetscCall(VecGetArray(Y, &y));
+  for (PetscInt i = 0; i < s->nnode_owned; i++) {
+    for (PetscInt c = 0; c < 3; c++) y[3 * i + c] = o->q[4 * i + c];
+  }
+  for (PetscInt k = 0; k < s->nfixed && s->fixed_node[k] < s->nnode_owned; k++) {
+    const PetscInt i = s->fixed_node[k];
+
+    for (PetscInt c = 0; c < 3; c++) {
+      if (s->fixed[i] & (1 << c)) y[3 * i + c] = o->prescribed_diagonal * x[3 * i + c];
+    }
+  }
+  PetscCall(VecRestoreArray(Y, &y));
+  PetscCall(VecRestoreArrayRead(X, &x));
+  PetscCall(PetscLogFlops(170. * (PetscLogDouble)s->mesh->ncell));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode MatDestroy_Frames(Mat A)
+{
+  Operator *o;
+
+  PetscFunctionBeginUser;
+  PetscCall(MatShellGetContext(A, &o));
+  PetscCall(VecDestroy(&o->ghosted));
+  PetscCall(PetscFree(o->memory));
+  PetscCall(PetscFree3(o->lambda, o->mu, o->inertia));
+  PetscCall(PetscFree(o));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbSpaceAllowsMatrixFree(SbSpace s, PetscBool *has)
+{
+  PetscFunctionBeginUser;
+  *has = (PetscBool)!s->consistent_mass;
+  for (PetscInt r = 0; r < s->nregion; r++)
+    *has = (PetscBool)(*has && (s->region[r].material->linear || s->region[r].material->ops.frame));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, has, 1, SB_MPI_BOOL, MPI_LAND, s->comm));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbSpaceCreateMatrixFree(SbSpace s, Mat *A)
+{
+  const size_t batches = 18 * (size_t)s->nbatch * sizeof(SbLane),
+               nodes = 8 * (size_t)s->nnode * sizeof(PetscReal);
+  PetscMPIInt size;
+  PetscBool has;
+  Operator *o;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbSpaceAllowsMatrixFree(s, &has));
+  PetscCheck(has, s->comm, PETSC_ERR_SUP,
+             "The tangent of this law, or the consistent mass, needs an assembled matrix");
+  if (!s->plan) PetscCall(SbPlanCreate(s, &s->plan));
+  PetscCall(PetscNew(&o));
+  o->space = s;
+  PetscCall(PetscMalloc(batches + nodes + 64, &o->memory));
+  o->R = (SbLane *)(((uintptr_t)o->memory + 63) & ~(uintptr_t)63);
+  o->h = o->R + 9 * s->nbatch;
+  o->p = (PetscReal *)(o->h + 9 * s->nbatch);
+  o->q = o->p + 4 * s->nnode;
+  PetscCall(PetscArrayzero(o->p, 8 * s->nnode));
+  PetscCall(PetscMalloc3(s->nregion, &o->lambda, s->nregion, &o->mu, s->nnode_owned, &o->inertia));
+  PetscCallMPI(MPI_Comm_size(s->comm, &size));
+  if (size > 1) PetscCall(SbSpaceCreateVec(s, &o->ghosted));
+  PetscCall(
+    MatCreateShell(s->comm, 3 * s->nnode_owned, 3 * s->nnode_owned, PETSC_DETERMINE, PETSC_DETERMINE, o, A));
+  PetscCall(MatSetBlockSize(*A, 3));
+  PetscCall(MatShellSetOperation(*A, MATOP_MULT, SB_OPERATION(MatMult_Frames)));
+  PetscCall(MatShellSetOperation(*A, MATOP_DESTROY, SB_OPERATION(MatDestroy_Frames)));
+  PetscCall(MatSetOption(*A, MAT_SYMMETRIC, PETSC_TRUE));
+  PetscCall(MatSetOption(*A, MAT_SYMMETRY_ETERNAL, PETSC_TRUE));
+  PetscCall(MatSetUp(*A));
+  PetscCall(PetscObjectComposeFunction((PetscObject)*A, FRAME_OPERATOR, MatMult_Frames));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode get_operator(Mat A, Operator **o)
+{
+  void (*mark)(void) = NULL;
+
+  PetscFunctionBeginUser;
+  *o = NULL;
+  PetscCall(PetscObjectQueryFunction((PetscObject)A, FRAME_OPERATOR, &mark));
+  if (mark) PetscCall(MatShellGetContext(A, o));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbMatrixFreeGetRotations(Mat A, const SbLane **R)
+{
+  Operator *o;
+
+  PetscFunctionBeginUser;
+  PetscCall(get_operator(A, &o));
+  *R = o ? (const SbLane *)o->R : NULL;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* h = R grad phi of one batch. */
+SB_KERNEL static void rotate_gradients(const SbLane R[restrict 9], const SbLane g[restrict 9],
+                                       SbLane h[restrict 9])
+{
+  for (int l = 0; l < SB_BATCH; l++) {
+    PetscReal r[9], e[9], t[9];
+
+    SbLaneGet(9, R, l, r);
+    SbLaneGet(9, g, l, e);
+    SbMatMulTranspose(e, r, t);
+    SbLanePut(9, t, l, h);
+  }
+}
+
+PetscErrorCode SbMatrixFreeSetState(Mat A, const SbStage *stage, PetscBool *is)
+{
+  Operator *o;
+  SbSpace s;
+  PetscReal stiffest = 0.;
+
+  PetscFunctionBeginUser;
+  PetscCall(get_operator(A, &o));
+  *is = (PetscBool)(o != NULL);
+  if (!o) PetscFunctionReturn(PETSC_SUCCESS);
+  s = o->space;
+  PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_TANGENT], A, 0, 0, 0));
+  SbSpaceCellRotations(s, stage->u, o->R);
+  for (PetscInt b = 0; b < s->nbatch; b++)
+    rotate_gradients((const SbLane *)o->R + 9 * b, (const SbLane *)s->batch_g + 9 * b, o->h + 9 * b);
+  for (PetscInt i = 0; i < s->nnode_owned; i++) o->inertia[i] = stage->shift_a * s->node_mass[i];
+  for (PetscInt r = 0; r < s->nregion; r++) {
+    const SbRegion *region = &s->region[r];
+    const PetscReal factor = stage->shift_k + stage->shift_v * region->beta;
+    const PetscReal damping =
+      stage->shift_v * region->alpha * region->material->density * region->element->ops.mass_lumped;
+
+    o->lambda[r] = factor * region->material->lambda;
+    o->mu[r] = factor * region->material->mu;
+    stiffest = PetscMax(stiffest, factor * region->material->E);
+    for (PetscInt b = region->bstart; damping != 0. && b < region->bend; b++) {
+      for (PetscInt l = 0; l < 4 * SB_BATCH; l++) {
+        const PetscInt node = s->batch_node[4 * SB_BATCH * b + l];
+
+        if (node < s->nnode_owned) o->inertia[node] += damping * s->batch_V[b][l % SB_BATCH];
+      }
+    }
+  }
+  /* of the size of the other diagonal entries: E times the edge of a typical cell; equal on all ranks is not needed */
+  o->prescribed_diagonal =
+    s->nbatch ? stiffest * PetscCbrtReal(s->batch_V[0][0]) + (s->nnode_owned ? o->inertia[0] : 0.) : 1.;
+  PetscCall(MatAssemblyBegin(A, MAT_FINAL_ASSEMBLY));
+  PetscCall(MatAssemblyEnd(A, MAT_FINAL_ASSEMBLY));
+  PetscCall(PetscLogEventEnd(SbEvents[SB_EVENT_TANGENT], A, 0, 0, 0));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Clears what belongs to prescribed unknowns in row i of the operator. */
+static void constrain_row(const Operator *o, PetscInt i, PetscReal block[])
+{
+  SbSpace s = o->space;
+  SbPlan p = s->plan;
+  const PetscInt nd = p->di[i + 1] - p->di[i], no = p->oi[i + 1] - p->oi[i];
+
+  for (PetscInt k = 0; k < nd + no; k++) {
+    const PetscInt j = k < nd ? p->dj[p->di[i] + k] : p->oj[p->oi[i] + k - nd];
+
+    for (PetscInt e = 0; e < 9; e++) {
+      if (s->fixed[i] & (1 << e / 3) || s->fixed[j] & (1 << e % 3))
+        block[9 * k + e] = i == j && e % 4 == 0 ? o->prescribed_diagonal : 0.;
+    }
+  }
+}
+
+PetscErrorCode SbMatrixFreeAddRows(Mat A, PetscInt n, const PetscInt node[], const PetscInt ia[],
+                                   PetscReal block[])
+{
+  Operator *o;
+  SbSpace s;
+  SbPlan p;
+  PetscInt *wanted;
+
+  PetscFunctionBeginUser;
+  PetscCall(get_operator(A, &o));
+  s = o->space;
+  p = s->plan;
+  PetscCall(PetscMalloc1(s->nnode, &wanted));
+  for (PetscInt i = 0; i < s->nnode; i++) wanted[i] = -1;
+  for (PetscInt k = 0; k < n; k++) {
+    wanted[node[k]] = k;
+    for (PetscInt c = 0; c < 3; c++)
+      block[9 * (ia[k] + p->diagonal[node[k]] - p->di[node[k]]) + 4 * c] += o->inertia[node[k]];
+  }
+  for (PetscInt r = 0; r < s->nregion; r++) {
+    for (PetscInt b = s->region[r].bstart; b < s->region[r].bend; b++) {
+      const PetscInt *corner = s->batch_node + 4 * SB_BATCH * b;
+      PetscBool any = PETSC_FALSE;
+      SbLane K[10][9];
+
+      for (PetscInt l = 0; l < 4 * SB_BATCH; l++) any = (PetscBool)(any || wanted[corner[l]] >= 0);
+      if (!any) continue;
+      SbCellBlocksIsotropic(s->batch_g + 9 * b, s->batch_V[b], o->lambda[r], o->mu[r],
+                            (const SbLane *)o->R + 9 * b, K);
+      for (PetscInt l = 0; l < s->batch_n[b]; l++) {
+        for (int q = 0; q < 16; q++) {
+          const int a = q / 4, c = q % 4, lo = PetscMin(a, c), hi = PetscMax(a, c);
+          const int pair = lo * (7 - lo) / 2 + hi;
+          const PetscInt i = corner[a * SB_BATCH + l], k = wanted[i];
+
+          if (k < 0) continue;
+          const PetscInt place = p->offset[(16 * (size_t)b + (size_t)q) * SB_BATCH + (size_t)l];
+          const PetscInt at =
+            ia[k] + (place >= 0 ? place - p->di[i] : p->di[i + 1] - p->di[i] + ~place - p->oi[i]);
+
+          for (int e = 0; e < 9; e++) block[9 * at + e] += K[pair][a <= c ? e : 3 * (e % 3) + e / 3][l];
+        }
+      }
+    }
+  }
+  for (PetscInt k = 0; k < n; k++) constrain_row(o, node[k], block + 9 * ia[k]);
+  PetscCall(PetscFree(wanted));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

@@ -1,0 +1,158 @@
+/*
+  The two adaptive tolerances: -accuracy sets what decides the error from the error that is asked for, -time_budget from the seconds that a step may take.
+
+  -accuracy e: steps are as long as the integrator's loss allows, which is shared out over the run (TSAdapt, error per unit of time), and the
+  solves leave a tenth of e, which the estimate of each step holds them to. The mesh is as it is.
+
+  -time_budget s: the time step is yours. Solves are looser when a step took longer than s, and tighter when it took less than half of it. What they do
+  depends on the machine, and no two runs are the same.
+
+  A tolerance that the user gave (-snes_rtol, -ksp_rtol, -ts_adapt_type) stays.
+*/
+#include "ledger_impl.h"
+
+#define SOLVERS 0.1 /* of the accuracy is left to solves */
+#define STEPS 0.7   /* of it to the integrator */
+#define LOOSEST 0.3 /* relative residual */
+#define TIGHTEST 1e-12
+#define NOISE 4.      /* times what a solve leaves */
+#define SHORTEST 1e-6 /* step, of the run */
+
+PetscErrorCode SbAdaptiveToleranceSetFromOptions(SbLedger l)
+{
+  PetscBool given, rtol[2];
+
+  PetscFunctionBeginUser;
+  PetscCheck(
+    l->accuracy == 0. || l->budget == 0., PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
+    "-accuracy %g and -time_budget %g s: what one of them sets the other would change; give one of them",
+    (double)l->accuracy, (double)l->budget);
+  PetscCheck(l->budget == 0. || l->run->model->dynamic, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
+             "-time_budget %g s is about time steps, and -time static has none: give -accuracy",
+             (double)l->budget);
+  if (l->accuracy > 0. && l->run->model->dynamic) {
+    PetscCall(PetscOptionsHasName(NULL, NULL, "-ts_adapt_type", &given));
+    if (!given) PetscCall(PetscOptionsSetValue(NULL, "-ts_adapt_type", "basic"));
+  }
+  PetscCall(PetscOptionsHasName(NULL, NULL, "-snes_rtol", &rtol[0]));
+  PetscCall(PetscOptionsHasName(NULL, NULL, "-ksp_rtol", &rtol[1]));
+  l->may_tune = (PetscBool)(!rtol[0] && !rtol[1] && (l->accuracy > 0. || l->budget > 0.));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The relative tolerance of solves: Newton's, or the linear solver's where there is one solve per step. */
+PetscErrorCode SbAdaptiveToleranceSet(SbLedger l, PetscReal rtol)
+{
+  const SNES snes = l->run->snes;
+  PetscReal atol, old, stol, linear, latol, dtol;
+  PetscInt max_it, max_f, linear_max;
+  PetscBool single;
+  KSP ksp;
+
+  PetscFunctionBeginUser;
+  l->rtol = PetscMax(TIGHTEST, PetscMin(LOOSEST, rtol));
+  PetscCall(PetscObjectTypeCompare((PetscObject)snes, SNESKSPONLY, &single));
+  PetscCall(SNESGetKSP(snes, &ksp));
+  PetscCall(SNESGetTolerances(snes, &atol, &old, &stol, &max_it, &max_f));
+  PetscCall(KSPGetTolerances(ksp, &linear, &latol, &dtol, &linear_max));
+  if (single)
+    PetscCall(KSPSetTolerances(ksp, l->rtol, latol, dtol, linear_max));
+  else
+    PetscCall(SNESSetTolerances(snes, atol, l->rtol, stol, max_it, max_f));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* What the solves of the step that was just solved left, J^(1/2): of one that was not examined, by its residual. */
+static PetscReal left_by_solves(SbLedger l)
+{
+  const PetscReal part = l->seen_residual > 0. ? l->residual / l->seen_residual : 1.;
+
+  return part * PetscSqrtReal(PetscSqr(l->step_linear) + PetscSqr(l->step_nonlinear));
+}
+
+/* Error of the step that was just solved over what it may have: that of the whole run shared out over its time. What solves leave is in the
+   differences of accelerations, too, the more so the shorter a step is: no shorter one would help against that. */
+static PetscErrorCode step_error(SbRun run, const SbSolvedStep *step, void *ctx, PetscInt *order,
+                                 PetscReal *ratio)
+{
+  SbLedger l = (SbLedger)ctx;
+  const PetscReal allowed = STEPS * l->accuracy * PetscSqrtReal(l->stored) * step->dt / run->t_end;
+  const PetscReal noise = NOISE * left_by_solves(l);
+
+  PetscFunctionBeginUser;
+  *order = l->order;
+  *ratio = allowed > 0. ? PetscMax(0., l->step_time - noise) / allowed : 0.;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbAdaptiveToleranceAttach(SbLedger l)
+{
+  const SbRun run = l->run;
+  TSAdapt adapt;
+
+  PetscFunctionBeginUser;
+  if (l->accuracy > 0. && run->ts) {
+    run->post_solve.error = step_error;
+    PetscCall(TSGetAdapt(run->ts, &adapt));
+    /* explicit steps are no longer than the stable one */
+    PetscCall(
+      TSAdaptSetStepLimits(adapt, SHORTEST * run->t_end, run->snes && run->J ? 0.1 * run->t_end : run->dt));
+  }
+  if (l->may_tune && run->snes && run->J)
+    PetscCall(SbAdaptiveToleranceSet(l, l->accuracy > 0. ? 0.01 * l->accuracy : 1e-3));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Until something has moved, the energy that counts is that of the first attempt. */
+static PetscErrorCode first_energy(SbLedger l, const SbSolvedStep *step)
+{
+  SbEnergies e;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbModelEnergies(l->run->model, step->U, step->V, &e));
+  l->stored = PetscMax(l->stored, e.strain + (step->V ? e.kinetic : 0.));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbAdaptiveToleranceUpdate(SbLedger l, const SbSolvedStep *step, PetscBool *again)
+{
+  const SbRun run = l->run;
+  const PetscReal part = step->V ? step->dt / run->t_end : 1.;
+  PetscReal allowed, left;
+
+  PetscFunctionBeginUser;
+  if (!step->V || step->t == run->t0) PetscCall(first_energy(l, step));
+  if (!l->may_tune || !step->solved) PetscFunctionReturn(PETSC_SUCCESS);
+  allowed = SOLVERS * l->accuracy * PetscSqrtReal(l->stored) * part;
+  left = left_by_solves(l);
+  if (!(left > 0.) || !(allowed > 0.)) PetscFunctionReturn(PETSC_SUCCESS);
+  if (left > allowed) {
+    /* a little too much in one step of many is made up for by the next */
+    *again = (PetscBool)(l->rtol > TIGHTEST && left > (step->V ? 3. : 1.) * allowed);
+    l->repeats += *again;
+    PetscCall(SbAdaptiveToleranceSet(l, l->rtol * PetscMax(1e-3, 0.3 * allowed / left)));
+  } else if (left < 0.1 * allowed)
+    PetscCall(SbAdaptiveToleranceSet(l, l->rtol * PetscMin(3., 0.3 * allowed / left)));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbAdaptiveToleranceAccept(SbLedger l, const SbStep *step)
+{
+  PetscReal took = step->wall - l->wall;
+
+  PetscFunctionBeginUser;
+  if (l->budget == 0.) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &took, 1, MPIU_REAL, MPI_MAX, l->run->model->comm));
+  l->wall = step->wall;
+  if (step->step == l->run->step0) PetscFunctionReturn(PETSC_SUCCESS);
+  l->nstep++;
+  l->nkept += took <= l->budget;
+  l->longest = PetscMax(l->longest, took);
+  l->total += took;
+  if (!l->may_tune || !l->run->J) PetscFunctionReturn(PETSC_SUCCESS);
+  if (took > 0.9 * l->budget)
+    PetscCall(SbAdaptiveToleranceSet(l, 4. * l->rtol));
+  else if (took < 0.5 * l->budget)
+    PetscCall(SbAdaptiveToleranceSet(l, 0.5 * l->rtol));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

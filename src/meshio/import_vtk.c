@@ -1,0 +1,417 @@
+/*
+  import_vtk.c - reader of VTK's legacy files of unstructured grids, text or binary (VTK User's Guide, "File formats"; version 5.1
+  is described in VTK's "VTK 5.1 legacy format"): cells with their counts, or as OFFSETS and CONNECTIVITY.
+
+  Kept: tets, triangles, lines and points; arrays of cells that hold whole numbers become groups, see vtk_grid.h. Data of points is
+  passed over. Binary data is big-endian. Refused: other data sets, volume cells other than 4-node tets.
+*/
+#include <strings.h>
+#include "vtk_grid.h"
+
+typedef struct {
+  SbScan scan;
+  SbImport *im;
+  SbVtkGrid grid;
+  PetscBool binary, points, cells, on_cells; /* on_cells: what follows is data of cells */
+  int64_t ntuple;                            /* of what follows */
+  const char *cells_at;                      /* for messages */
+} Vtk;
+
+static const struct {
+  const char *name;
+  SbVtkType type;
+} types[] = {
+  {"char", {'i', 1}},           {"unsigned_char", {'u', 1}}, {"short", {'i', 2}},
+  {"unsigned_short", {'u', 2}}, {"int", {'i', 4}},           {"unsigned_int", {'u', 4}},
+  {"long", {'i', 8}},           {"unsigned_long", {'u', 8}}, {"float", {'f', 4}},
+  {"double", {'f', 8}},         {"vtkidtype", {'i', 4}},     {"vtktypeint64", {'i', 8}},
+  {"vtktypeuint64", {'u', 8}},
+};
+
+/* ------------------------------------------------------------------ numbers */
+
+static PetscErrorCode read_type(Vtk *v, SbVtkType *type)
+{
+  char word[32];
+
+  PetscFunctionBeginUser;
+  PetscCall(SbScanWord(&v->scan, sizeof(word), word));
+  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(types); i++) {
+    if (strcasecmp(word, types[i].name)) continue;
+    *type = types[i].type;
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  SB_SCAN_ERROR(&v->scan, "expected a type of numbers, as float or int, found '%s'", word);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Leaves out a line end, which stands before binary data. */
+static PetscErrorCode begin_data(Vtk *v, const char *what, int64_t n, SbVtkType type)
+{
+  PetscFunctionBeginUser;
+  if (v->binary) PetscCall(SbScanEndOfLine(&v->scan));
+  v->scan.binary = v->binary;
+  PetscCall(SbScanRoom(&v->scan, what, n, 2, type.size));
+  v->scan.binary = PETSC_FALSE;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* n numbers of this type; value may be NULL to pass over them. */
+static PetscErrorCode read_numbers(Vtk *v, const char *what, int64_t n, SbVtkType type, double *value)
+{
+  SbScan *s = &v->scan;
+
+  PetscFunctionBeginUser;
+  PetscCall(begin_data(v, what, n, type));
+  if (v->binary) {
+    const size_t bytes = (size_t)n * (size_t)type.size;
+
+    s->token = s->at;
+    if ((size_t)(s->end - s->at) < bytes)
+      SB_SCAN_ERROR(s, "the file ends within the %s; it is truncated, write or copy it again", what);
+    if (value) SbVtkConvert(type, PETSC_TRUE, (size_t)n, s->at, value);
+    s->at += bytes;
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  for (int64_t i = 0; i < n; i++) {
+    PetscReal x;
+
+    PetscCall(SbScanReal(s, what, 0, &x));
+    if (value) value[i] = x;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Allocates and reads. */
+static PetscErrorCode read_array(Vtk *v, const char *what, int64_t n, SbVtkType type, double **value)
+{
+  PetscFunctionBeginUser;
+  v->scan.binary = v->binary;
+  PetscCall(SbScanRoom(&v->scan, what, n, 2, type.size));
+  v->scan.binary = PETSC_FALSE;
+  PetscCall(PetscFree(*value));
+  PetscCall(PetscMalloc1((size_t)n, value));
+  PetscCall(read_numbers(v, what, n, type, *value));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ points and cells */
+
+static PetscErrorCode read_points(Vtk *v)
+{
+  SbVtkType type;
+  int64_t n;
+  double *x = NULL;
+  PetscErrorCode ierr;
+
+  PetscFunctionBeginUser;
+  if (v->points) SB_SCAN_ERROR(&v->scan, "second section POINTS");
+  v->points = PETSC_TRUE;
+  PetscCall(SbScanText(&v->scan, "number of points", &n));
+  PetscCall(read_type(v, &type));
+  PetscCall(SbScanRoom(&v->scan, "points", n, 3, 3));
+  ierr = read_array(v, "coordinates", 3 * n, type, &x);
+  if (!ierr) ierr = SbVtkSetPoints(&v->scan, (PetscInt)n, x, v->im);
+  PetscCall(PetscFree(x));
+  PetscFunctionReturn(ierr);
+}
+
+/* Cells with their counts before version 5: [n, p1 ... pn] one after the other in `all`. */
+static PetscErrorCode split_cells(Vtk *v, int64_t size, const double all[])
+{
+  SbVtkGrid *grid = &v->grid;
+  int64_t at = 0;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscMalloc1((size_t)size, &grid->connect));
+  PetscCall(PetscMalloc1(grid->ncell, &grid->end));
+  for (PetscInt c = 0; c < grid->ncell; c++) {
+    const double n = at < size ? all[at] : 0;
+
+    if (!(n >= 1 && n <= (double)(size - at - 1)) || n != PetscFloorReal(n))
+      SB_SCAN_ERROR(&v->scan,
+                    "cell %lld of %lld has %g points, more than the section announces or less than one",
+                    (long long)c, (long long)grid->ncell, n);
+    for (int64_t k = 0; k < (int64_t)n; k++) grid->connect[grid->nconnect++] = all[at + 1 + k];
+    at += 1 + (int64_t)n;
+    grid->end[c] = (double)grid->nconnect;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* From version 5 on: `n` offsets from 0 to the number of points, then the points. */
+static PetscErrorCode read_offsets(Vtk *v, int64_t n, int64_t nconnect)
+{
+  SbVtkGrid *grid = &v->grid;
+  SbVtkType type;
+  char word[32];
+
+  PetscFunctionBeginUser;
+  PetscCall(read_type(v, &type));
+  PetscCall(read_array(v, "offsets", n, type, &grid->end));
+  for (int64_t c = 0; c + 1 < n; c++) grid->end[c] = grid->end[c + 1]; /* the first is 0 */
+  PetscCall(SbScanWord(&v->scan, sizeof(word), word));
+  if (strcasecmp(word, "CONNECTIVITY")) SB_SCAN_ERROR(&v->scan, "expected CONNECTIVITY, found '%s'", word);
+  PetscCall(read_type(v, &type));
+  PetscCall(read_array(v, "points of cells", nconnect, type, &grid->connect));
+  grid->ncell = (PetscInt)PetscMax(n - 1, 0);
+  grid->nconnect = nconnect;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode read_cells(Vtk *v)
+{
+  SbScan *s = &v->scan;
+  int64_t n, size;
+  double *all = NULL;
+  PetscErrorCode ierr;
+  char word[32];
+  const char *at;
+
+  PetscFunctionBeginUser;
+  if (v->cells) SB_SCAN_ERROR(s, "second section CELLS");
+  v->cells = PETSC_TRUE;
+  v->cells_at = s->token;
+  PetscCall(SbScanText(s, "number of cells", &n));
+  PetscCall(SbScanText(s, "size of the list of cells", &size));
+  PetscCall(SbScanRoom(s, "cells", n, 1, 1));
+  PetscCall(SbScanRoom(s, "numbers in the list of cells", size, 1, 1));
+  at = s->at;
+  PetscCall(SbScanWord(s, sizeof(word), word));
+  if (!strcasecmp(word, "OFFSETS")) {
+    PetscCall(read_offsets(v, n, size));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  s->at = at;
+  v->grid.ncell = (PetscInt)n;
+  ierr = read_array(v, "list of cells", size, (SbVtkType){'i', 4}, &all);
+  if (!ierr) ierr = split_cells(v, size, all);
+  PetscCall(PetscFree(all));
+  PetscFunctionReturn(ierr);
+}
+
+static PetscErrorCode read_cell_types(Vtk *v)
+{
+  int64_t n;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbScanText(&v->scan, "number of types of cells", &n));
+  if (!v->cells || n != v->grid.ncell)
+    SB_SCAN_ERROR(&v->scan, "%lld types of cells for %lld cells", (long long)n, (long long)v->grid.ncell);
+  PetscCall(read_array(v, "types of cells", n, (SbVtkType){'i', 4}, &v->grid.type));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ data */
+
+/* An array of `ncomponent` numbers for each tuple: kept when it is one number for each cell. */
+static PetscErrorCode read_data(Vtk *v, const char *name, int64_t ncomponent, int64_t ntuple, SbVtkType type)
+{
+  SbVtkGrid *grid = &v->grid;
+
+  PetscFunctionBeginUser;
+  if (ncomponent < 0 || ncomponent > 1024)
+    SB_SCAN_ERROR(&v->scan, "array '%s' of %lld components; expected up to 1024", name,
+                  (long long)ncomponent);
+  PetscCall(SbScanRoom(&v->scan, "tuples", ntuple, 1, 1));
+  if (v->on_cells && ncomponent == 1 && ntuple == grid->ncell && grid->narray < SB_VTK_ARRAYS) {
+    const int a = grid->narray++;
+
+    grid->array[a].value = NULL;
+    PetscCall(PetscStrncpy(grid->array[a].name, name, sizeof(grid->array[a].name)));
+    PetscCall(read_array(v, "data of cells", ntuple, type, &grid->array[a].value));
+  } else
+    PetscCall(read_numbers(v, "data", ncomponent * ntuple, type, NULL));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* SCALARS name type [components] / LOOKUP_TABLE name / numbers */
+static PetscErrorCode read_scalars(Vtk *v)
+{
+  SbScan *s = &v->scan;
+  SbVtkType type;
+  int64_t ncomponent = 1;
+  char name[SB_NAME_MAX], word[32];
+  const char *at;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbScanWord(s, sizeof(name), name));
+  PetscCall(read_type(v, &type));
+  if (SbScanMore(s, '\n')) PetscCall(SbScanText(s, "number of components", &ncomponent));
+  at = s->at;
+  PetscCall(SbScanWord(s, sizeof(word), word));
+  if (strcasecmp(word, "LOOKUP_TABLE"))
+    s->at = at;
+  else
+    PetscCall(SbScanWord(s, sizeof(word), word));
+  PetscCall(read_data(v, name, ncomponent, v->ntuple, type));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* FIELD name n, then n times: name components tuples type / numbers */
+static PetscErrorCode read_field(Vtk *v)
+{
+  SbScan *s = &v->scan;
+  SbVtkType type;
+  char name[SB_NAME_MAX], word[32];
+  int64_t n, ncomponent, ntuple;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbScanWord(s, sizeof(word), word));
+  PetscCall(SbScanText(s, "number of arrays in a field", &n));
+  PetscCall(SbScanRoom(s, "arrays", n, 8, 8));
+  for (int64_t i = 0; i < n; i++) {
+    PetscCall(SbScanWord(s, sizeof(name), name));
+    if (!strcmp(name, "METADATA")) {
+      while (SbScanMore(s, '\n')) {
+        PetscCall(SbScanEndOfLine(s));
+        if (s->at < s->end && (*s->at == '\n' || *s->at == '\r')) break;
+      }
+      PetscCall(SbScanWord(s, sizeof(name), name));
+    }
+    PetscCall(SbScanText(s, "number of components", &ncomponent));
+    PetscCall(SbScanText(s, "number of tuples", &ntuple));
+    PetscCall(read_type(v, &type));
+    PetscCall(read_data(v, name, ncomponent, ntuple, type));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode read_tuples(Vtk *v, int64_t ncomponent)
+{
+  SbVtkType type;
+  char name[SB_NAME_MAX];
+
+  PetscFunctionBeginUser;
+  PetscCall(SbScanWord(&v->scan, sizeof(name), name));
+  PetscCall(read_type(v, &type));
+  PetscCall(read_data(v, name, ncomponent, v->ntuple, type));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* CELL_DATA n, POINT_DATA n: what the arrays that follow belong to. */
+static PetscErrorCode read_owner(Vtk *v, PetscBool on_cells)
+{
+  const int64_t expected = on_cells ? v->grid.ncell : v->im->nvert;
+
+  PetscFunctionBeginUser;
+  if (!v->points || !v->cells) SB_SCAN_ERROR(&v->scan, "data before the sections POINTS and CELLS");
+  PetscCall(SbScanText(&v->scan, "number of data", &v->ntuple));
+  if (v->ntuple != expected)
+    SB_SCAN_ERROR(&v->scan, "data for %lld %s; there are %lld", (long long)v->ntuple,
+                  on_cells ? "cells" : "points", (long long)expected);
+  v->on_cells = on_cells;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* LOOKUP_TABLE name n: four bytes, or four numbers, for each entry */
+static PetscErrorCode read_table(Vtk *v)
+{
+  char name[SB_NAME_MAX];
+  int64_t n;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbScanWord(&v->scan, sizeof(name), name));
+  PetscCall(SbScanText(&v->scan, "number of colours", &n));
+  PetscCall(SbScanRoom(&v->scan, "colours", n, 1, 1));
+  PetscCall(read_numbers(v, "colours", 4 * n, (SbVtkType){'u', 1}, NULL));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* A block of lines up to an empty one. */
+static PetscErrorCode skip_metadata(Vtk *v)
+{
+  SbScan *s = &v->scan;
+
+  PetscFunctionBeginUser;
+  do {
+    PetscCall(SbScanEndOfLine(s));
+  } while (SbScanMore(s, '\n'));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ the file */
+
+static PetscErrorCode read_header(Vtk *v)
+{
+  SbScan *s = &v->scan;
+  char word[32], kind[32];
+
+  PetscFunctionBeginUser;
+  if ((size_t)(s->end - s->at) < 5 || strncasecmp(s->at, "# vtk", 5))
+    SB_SCAN_ERROR(s, "expected '# vtk DataFile Version'; this is no legacy file of VTK");
+  PetscCall(SbScanEndOfLine(s));
+  PetscCall(SbScanEndOfLine(s)); /* the title */
+  PetscCall(SbScanWord(s, sizeof(kind), kind));
+  if (strcasecmp(kind, "ASCII") && strcasecmp(kind, "BINARY"))
+    SB_SCAN_ERROR(s, "expected ASCII or BINARY, found '%s'", kind);
+  v->binary = (PetscBool)!strcasecmp(kind, "BINARY");
+  s->bytes = v->binary;
+  PetscCall(SbScanWord(s, sizeof(word), word));
+  if (strcasecmp(word, "DATASET")) SB_SCAN_ERROR(s, "expected DATASET, found '%s'", word);
+  PetscCall(SbScanWord(s, sizeof(word), word));
+  if (strcasecmp(word, "UNSTRUCTURED_GRID"))
+    SB_SCAN_ERROR(s, "data set %s; expected UNSTRUCTURED_GRID with tetrahedra", word);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode read_section(Vtk *v, const char *name)
+{
+  static const struct {
+    const char *name;
+    int ncomponent;
+  } tuples[] = {{"VECTORS", 3}, {"NORMALS", 3}, {"TENSORS", 9}, {"TENSORS6", 6}};
+
+  PetscFunctionBeginUser;
+  if (!strcasecmp(name, "POINTS")) return read_points(v);
+  if (!strcasecmp(name, "CELLS")) return read_cells(v);
+  if (!strcasecmp(name, "CELL_TYPES")) return read_cell_types(v);
+  if (!strcasecmp(name, "CELL_DATA")) return read_owner(v, PETSC_TRUE);
+  if (!strcasecmp(name, "POINT_DATA")) return read_owner(v, PETSC_FALSE);
+  if (!strcasecmp(name, "SCALARS")) return read_scalars(v);
+  if (!strcasecmp(name, "FIELD")) return read_field(v);
+  if (!strcasecmp(name, "LOOKUP_TABLE")) return read_table(v);
+  if (!strcasecmp(name, "METADATA")) return skip_metadata(v);
+  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(tuples); i++) {
+    if (!strcasecmp(name, tuples[i].name)) return read_tuples(v, tuples[i].ncomponent);
+  }
+  SB_SCAN_ERROR(&v->scan, "expected a section, as POINTS or CELLS, found '%s'", name);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode read_file(const char *path, Vtk *v)
+{
+  SbScan *s = &v->scan;
+  char name[32];
+
+  PetscFunctionBeginUser;
+  PetscCall(SbScanOpen(v->im->where, path, s));
+  PetscCall(read_header(v));
+  for (;;) {
+    PetscCall(SbScanWord(s, sizeof(name), name));
+    if (!name[0]) break;
+    PetscCall(read_section(v, name));
+  }
+  if (!v->points || !v->cells || !v->grid.type)
+    SB_SCAN_ERROR(s, "the file ends before the section %s; it is truncated, write or copy it again",
+                  !v->points  ? "POINTS"
+                  : !v->cells ? "CELLS"
+                              : "CELL_TYPES");
+  s->token = v->cells_at;
+  PetscCall(SbVtkGridFill(s, &v->grid, v->im));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbImportRead_VTK(const char *path, SbImport *im)
+{
+  Vtk v;
+  PetscErrorCode ierr;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscMemzero(&v, sizeof(v)));
+  v.im = im;
+  ierr = read_file(path, &v);
+  PetscCall(SbVtkGridDestroy(&v.grid));
+  PetscCall(SbScanClose(&v.scan));
+  PetscFunctionReturn(ierr);
+}

@@ -1,0 +1,533 @@
+/*
+  import_vtu.c - reader of VTK's XML files of unstructured grids, .vtu (VTK User's Guide, "XML file formats").
+
+  Arrays stand in the elements DataArray as text, as base64, or behind the mark _ of AppendedData as bytes or base64. Binary ones
+  begin with their length or, compressed by zlib, with the number and sizes of their blocks. Base64 that ends in = may go on after
+  it: writers encode the lengths and the data apart, or together.
+
+  Kept: tets, triangles, lines and points; arrays of cells that hold whole numbers become groups, see vtk_grid.h. Refused:
+  several pieces, other compressors, volume cells other than 4-node tets.
+*/
+#include <ctype.h>
+#include <stdlib.h>
+#include <zlib.h>
+#include "vtk_grid.h"
+
+enum { ZLIB_RATIO = 1032 }; /* no compressed byte tells of more */
+
+typedef struct {
+  SbScan scan;
+  SbImport *im;
+  SbVtkGrid grid;
+  PetscBool swap, zlib;
+  int header;              /* bytes of a length: 4 or 8 */
+  const char *xml_end;     /* what is XML ends here */
+  const char *appended;    /* first byte behind the mark _, or NULL */
+  PetscBool appended_text; /* and it is base64 */
+  const char *cells_at;    /* for messages */
+} Vtu;
+
+/* ------------------------------------------------------------------ XML */
+
+/* The next element of this name before `end`: from < to the byte behind its >; false when there is none. */
+static PetscBool find_element(const char *from, const char *end, const char *name, const char **open,
+                              const char **close)
+{
+  const size_t n = strlen(name);
+
+  for (const char *p = from; p && p < end; p++) {
+    p = (const char *)memchr(p, '<', (size_t)(end - p));
+    if (!p || (size_t)(end - p) < n + 2) return PETSC_FALSE;
+    if (strncmp(p + 1, name, n) || !strchr(" \t\r\n/>", p[n + 1]) || !p[n + 1]) continue;
+    *open = p;
+    *close = (const char *)memchr(p, '>', (size_t)(end - p));
+    if (!*close) return PETSC_FALSE;
+    (*close)++;
+    return PETSC_TRUE;
+  }
+  return PETSC_FALSE;
+}
+
+/* The value of an attribute, "" when it is not there. */
+static void attribute(const char *open, const char *close, const char *name, size_t size, char value[])
+{
+  const size_t n = strlen(name);
+
+  value[0] = 0;
+  for (const char *p = open; p + n + 2 < close; p++) {
+    const char *q = p + 1 + n, *quote;
+    size_t length = 0;
+
+    if (!isspace((unsigned char)*p) || strncmp(p + 1, name, n)) continue;
+    while (q < close && isspace((unsigned char)*q)) q++;
+    if (q >= close || *q++ != '=') continue;
+    while (q < close && isspace((unsigned char)*q)) q++;
+    if (q >= close || (*q != '"' && *q != '\'')) continue;
+    for (quote = q++; q < close && *q != *quote && length + 1 < size; q++)
+      value[length++] = isprint((unsigned char)*q) ? *q : '?';
+    value[length] = 0;
+    return;
+  }
+}
+
+/* A whole number given by an attribute. */
+static PetscErrorCode attribute_number(Vtu *v, const char *open, const char *close, const char *name,
+                                       int64_t *n)
+{
+  char value[32], *end;
+
+  PetscFunctionBeginUser;
+  attribute(open, close, name, sizeof(value), value);
+  *n = strtoll(value, &end, 10);
+  v->scan.token = open;
+  if (!value[0] || *end || *n < 0)
+    SB_SCAN_ERROR(&v->scan, "expected a number %s=\"...\", found '%s'", name, value);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ bytes */
+
+/* Bytes on their separation direction of raw data or base64. */
+typedef struct {
+  const char *at, *end;
+  PetscBool text;
+  unsigned char held[3];
+  int nheld, from;
+} Bytes;
+
+static int base64_digit(char c)
+{
+  if (c >= 'A' && c <= 'Z') return c - 'A';
+  if (c >= 'a' && c <= 'z') return c - 'a' + 26;
+  if (c >= '0' && c <= '9') return c - '0' + 52;
+  return c == '+' ? 62 : c == '/' ? 63 : -1;
+}
+
+/* Four characters become up to three bytes; false at the end, or at what is no base64. */
+static PetscBool next_quad(Bytes *b)
+{
+  uint32_t bits = 0;
+  int n = 0, padding = 0;
+
+  while (n < 4) {
+    int digit;
+
+    while (b->at < b->end && isspace((unsigned char)*b->at)) b->at++;
+    if (b->at >= b->end) return PETSC_FALSE;
+    digit = base64_digit(*b->at);
+    if (digit < 0 && !(*b->at == '=' && n >= 2)) return PETSC_FALSE;
+    padding += digit < 0;
+    if (digit >= 0 && padding) return PETSC_FALSE;
+    bits = bits << 6 | (uint32_t)PetscMax(digit, 0);
+    b->at++;
+    n++;
+  }
+  for (int i = 0; i < 3; i++) b->held[i] = (unsigned char)(bits >> (16 - 8 * i));
+  b->nheld = 3 - padding;
+  b->from = 0;
+  return PETSC_TRUE;
+}
+
+/* Takes n bytes; false when there are fewer. */
+static PetscBool take_bytes(Bytes *b, size_t n, unsigned char out[])
+{
+  if (!b->text) {
+    if ((size_t)(b->end - b->at) < n) return PETSC_FALSE;
+    memcpy(out, b->at, n);
+    b->at += n;
+    return PETSC_TRUE;
+  }
+  for (size_t i = 0; i < n; i++) {
+    while (b->from >= b->nheld) {
+      if (!next_quad(b)) return PETSC_FALSE;
+    }
+    out[i] = b->held[b->from++];
+  }
+  return PETSC_TRUE;
+}
+
+/* A length of 4 or 8 bytes. */
+static PetscErrorCode take_length(Vtu *v, Bytes *b, const char *name, size_t *length)
+{
+  unsigned char raw[8];
+  uint64_t value = 0;
+
+  PetscFunctionBeginUser;
+  if (!take_bytes(b, (size_t)v->header, raw))
+    SB_SCAN_ERROR(&v->scan, "the data of array '%s' is truncated, or no base64", name);
+  for (int i = 0; i < v->header; i++) value |= (uint64_t)raw[i] << 8 * (v->swap ? v->header - 1 - i : i);
+  if (value > (uint64_t)1 << 40)
+    SB_SCAN_ERROR(&v->scan, "array '%s' announces %llu bytes or blocks; it is damaged", name,
+                  (unsigned long long)value);
+  *length = (size_t)value;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ arrays */
+
+/* One compressed block into out[size]. */
+static PetscErrorCode inflate_block(Vtu *v, Bytes *b, const char *name, size_t packed, size_t size,
+                                    unsigned char out[])
+{
+  unsigned char *in;
+  uLongf got = (uLongf)size;
+  PetscBool complete;
+  int result = Z_OK;
+
+  PetscFunctionBeginUser;
+  if (packed > (size_t)(b->end - b->at) + 3)
+    SB_SCAN_ERROR(&v->scan, "a block of array '%s' announces %zu bytes, which the file does not hold", name,
+                  packed);
+  PetscCall(PetscMalloc1(packed + 1, &in));
+  complete = take_bytes(b, packed, in);
+  if (complete) result = uncompress(out, &got, in, (uLong)packed);
+  PetscCall(PetscFree(in));
+  if (!complete) SB_SCAN_ERROR(&v->scan, "the data of array '%s' is truncated, or no base64", name);
+  if (result != Z_OK || got != size)
+    SB_SCAN_ERROR(&v->scan, "a compressed block of array '%s' is damaged", name);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Compressed: number of blocks, their size, that of the last when it is smaller, then the packed size of each. */
+static PetscErrorCode take_blocks(Vtu *v, Bytes *b, const char *name, size_t want, unsigned char out[])
+{
+  size_t nblock, size, last, full, *packed, at = 0;
+  PetscErrorCode ierr = PETSC_SUCCESS;
+
+  PetscFunctionBeginUser;
+  PetscCall(take_length(v, b, name, &nblock));
+  PetscCall(take_length(v, b, name, &size));
+  PetscCall(take_length(v, b, name, &last));
+  full = nblock - (nblock && last);
+  if (nblock > (size_t)(b->end - b->at) || last > want || (size && full > want / size) ||
+      full * size + (nblock ? last : 0) != want)
+    SB_SCAN_ERROR(&v->scan,
+                  "array '%s' has %zu blocks of %zu bytes, the last of %zu; expected %zu bytes in all", name,
+                  nblock, size, last, want);
+  PetscCall(PetscMalloc1(nblock, &packed));
+  for (size_t i = 0; i < nblock && !ierr; i++) ierr = take_length(v, b, name, &packed[i]);
+  for (size_t i = 0; i < nblock && !ierr; i++) {
+    const size_t n = i + 1 == nblock && last ? last : size;
+
+    ierr = inflate_block(v, b, name, packed[i], n, out + at);
+    at += n;
+  }
+  PetscCall(PetscFree(packed));
+  PetscFunctionReturn(ierr);
+}
+
+/* n binary numbers of this type. */
+static PetscErrorCode read_binary(Vtu *v, Bytes *b, const char *name, SbVtkType type, size_t n,
+                                  double value[])
+{
+  const size_t want = n * (size_t)type.size;
+  unsigned char *raw;
+  size_t length = want;
+  PetscErrorCode ierr = PETSC_SUCCESS;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscMalloc1(want, &raw));
+  if (v->zlib)
+    ierr = take_blocks(v, b, name, want, raw);
+  else {
+    PetscBool complete;
+
+    ierr = take_length(v, b, name, &length);
+    complete = (PetscBool)(!ierr && length == want && take_bytes(b, want, raw));
+    if (!ierr && !complete) {
+      (void)PetscFree(raw);
+      SB_SCAN_ERROR(&v->scan, "array '%s' has %zu bytes; expected %zu, or it is truncated, or no base64",
+                    name, length, want);
+    }
+  }
+  if (!ierr) SbVtkConvert(type, v->swap, n, raw, value);
+  PetscCall(PetscFree(raw));
+  PetscFunctionReturn(ierr);
+}
+
+static PetscErrorCode read_text(Vtu *v, const char *from, const char *end, size_t n, double value[])
+{
+  SbScan s = v->scan;
+
+  PetscFunctionBeginUser;
+  s.at = from;
+  s.end = end;
+  s.bytes = PETSC_FALSE;
+  for (size_t i = 0; i < n; i++) {
+    PetscReal x;
+
+    PetscCall(SbScanReal(&s, "value of an array", 0, &x));
+    value[i] = x;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode read_type(Vtu *v, const char *open, const char *close, SbVtkType *type)
+{
+  char name[32];
+
+  PetscFunctionBeginUser;
+  attribute(open, close, "type", sizeof(name), name);
+  type->kind = !strncmp(name, "Int", 3)     ? 'i'
+               : !strncmp(name, "UInt", 4)  ? 'u'
+               : !strncmp(name, "Float", 5) ? 'f'
+                                            : 0;
+  type->size = atoi(name + strcspn(name, "0123456789")) / 8;
+  if (!type->kind || (type->size != 1 && type->size != 2 && type->size != 4 && type->size != 8) ||
+      (type->kind == 'f' && type->size < 4))
+    SB_SCAN_ERROR(&v->scan, "an array of type '%s'; expected one as Float64 or Int32", name);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Where the bytes of an array are. */
+static PetscErrorCode locate(Vtu *v, const char *open, const char *close, const char *format, Bytes *b)
+{
+  int64_t offset;
+
+  PetscFunctionBeginUser;
+  *b = (Bytes){close, v->scan.end, PETSC_TRUE, {0}, 0, 0};
+  if (!strcmp(format, "appended")) {
+    PetscCall(attribute_number(v, open, close, "offset", &offset));
+    if (!v->appended || offset > v->scan.end - v->appended)
+      SB_SCAN_ERROR(&v->scan, "the array lies at %lld of the appended data, which the file does not hold",
+                    (long long)offset);
+    b->at = v->appended + offset;
+    b->text = v->appended_text;
+  } else if (!strcmp(format, "binary")) {
+    b->end = (const char *)memchr(close, '<', (size_t)(v->scan.end - close));
+    if (!b->end)
+      SB_SCAN_ERROR(&v->scan, "the array has no end; the file is truncated, write or copy it again");
+  } else
+    SB_SCAN_ERROR(&v->scan, "an array of format '%s'; expected ascii, binary or appended", format);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The n numbers of the array whose element stands between open and close; *value is allocated. */
+static PetscErrorCode read_array(Vtu *v, const char *open, const char *close, int64_t n, double **value)
+{
+  SbVtkType type;
+  Bytes b;
+  char format[16], name[64];
+  size_t room;
+
+  PetscFunctionBeginUser;
+  v->scan.token = open;
+  PetscCall(read_type(v, open, close, &type));
+  attribute(open, close, "format", sizeof(format), format);
+  attribute(open, close, "Name", sizeof(name), name);
+  if (!strcmp(format, "ascii") || !format[0]) {
+    const char *end = (const char *)memchr(close, '<', (size_t)(v->scan.end - close));
+
+    if (!end) SB_SCAN_ERROR(&v->scan, "the array has no end; the file is truncated, write or copy it again");
+    if (n > (end - close) / 2 + 1)
+      SB_SCAN_ERROR(&v->scan, "array '%s' should hold %lld numbers, which is more than stand there", name,
+                    (long long)n);
+    PetscCall(PetscMalloc1((size_t)n, value));
+    PetscCall(read_text(v, close, end, (size_t)n, *value));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  PetscCall(locate(v, open, close, format, &b));
+  room = (size_t)(b.end - b.at) / (size_t)type.size;
+  if ((uint64_t)n > (v->zlib ? ZLIB_RATIO : 1) * (uint64_t)room)
+    SB_SCAN_ERROR(&v->scan,
+                  "array '%s' should hold %lld numbers, which is more than the rest of the file can tell",
+                  name, (long long)n);
+  PetscCall(PetscMalloc1((size_t)n, value));
+  PetscCall(read_binary(v, &b, name, type, (size_t)n, *value));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ the parts of a grid */
+
+/* The content of an element, from behind its > to the < of its end. */
+static PetscErrorCode content(Vtu *v, const char *name, const char **from, const char **end)
+{
+  const char *open, *close;
+  char closing[32];
+
+  PetscFunctionBeginUser;
+  (void)snprintf(closing, sizeof(closing), "/%s", name);
+  v->scan.token = v->scan.data;
+  if (!find_element(v->scan.data, v->xml_end, name, &open, from) ||
+      !find_element(*from, v->xml_end, closing, end, &close))
+    SB_SCAN_ERROR(&v->scan, "there is no element %s, or it has no end; the file is truncated or damaged",
+                  name);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The array of this name in the element Cells. */
+static PetscErrorCode read_cell_array(Vtu *v, const char *name, int64_t n, double **value)
+{
+  const char *from, *end, *open, *close;
+  char found[64];
+
+  PetscFunctionBeginUser;
+  PetscCall(content(v, "Cells", &from, &end));
+  v->cells_at = v->scan.token = from;
+  for (; find_element(from, end, "DataArray", &open, &close); from = close) {
+    attribute(open, close, "Name", sizeof(found), found);
+    if (strcmp(found, name)) continue;
+    PetscCall(read_array(v, open, close, n, value));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  SB_SCAN_ERROR(&v->scan, "the element Cells has no array '%s'", name);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode read_points(Vtu *v, int64_t n)
+{
+  const char *from, *end, *open, *close;
+  double *x = NULL;
+  int64_t ncomponent = 3;
+  PetscErrorCode ierr;
+
+  PetscFunctionBeginUser;
+  PetscCall(content(v, "Points", &from, &end));
+  v->scan.token = from;
+  if (!find_element(from, end, "DataArray", &open, &close))
+    SB_SCAN_ERROR(&v->scan, "the element Points has no array");
+  PetscCall(attribute_number(v, open, close, "NumberOfComponents", &ncomponent));
+  if (ncomponent != 3)
+    SB_SCAN_ERROR(&v->scan, "points of %lld coordinates; expected 3", (long long)ncomponent);
+  ierr = read_array(v, open, close, 3 * n, &x);
+  if (!ierr) ierr = SbVtkSetPoints(&v->scan, (PetscInt)n, x, v->im);
+  PetscCall(PetscFree(x));
+  PetscFunctionReturn(ierr);
+}
+
+static PetscErrorCode read_cells(Vtu *v, int64_t n)
+{
+  SbVtkGrid *grid = &v->grid;
+  double last;
+
+  PetscFunctionBeginUser;
+  grid->ncell = (PetscInt)n;
+  PetscCall(read_cell_array(v, "offsets", n, &grid->end));
+  PetscCall(read_cell_array(v, "types", n, &grid->type));
+  last = n ? grid->end[n - 1] : 0;
+  v->scan.token = v->cells_at;
+  if (!(last >= 0 && last < 1e12) || last != PetscFloorReal(last))
+    SB_SCAN_ERROR(&v->scan, "the last of the offsets is %g; expected the number of points of all cells",
+                  last);
+  grid->nconnect = (int64_t)last;
+  PetscCall(read_cell_array(v, "connectivity", grid->nconnect, &grid->connect));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Data of cells with one number for each: the others are passed over. */
+static PetscErrorCode read_cell_data(Vtu *v)
+{
+  SbVtkGrid *grid = &v->grid;
+  const char *from, *end, *open, *close;
+  char components[16];
+
+  PetscFunctionBeginUser;
+  if (!find_element(v->scan.data, v->xml_end, "CellData", &open, &from) || from[-2] == '/')
+    PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(content(v, "CellData", &from, &end));
+  for (; find_element(from, end, "DataArray", &open, &close) && grid->narray < SB_VTK_ARRAYS; from = close) {
+    const int a = grid->narray;
+
+    attribute(open, close, "NumberOfComponents", sizeof(components), components);
+    if (components[0] && strcmp(components, "1") != 0) continue;
+    grid->narray++;
+    grid->array[a].value = NULL;
+    attribute(open, close, "Name", sizeof(grid->array[a].name), grid->array[a].name);
+    PetscCall(read_array(v, open, close, grid->ncell, &grid->array[a].value));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ the file */
+
+static PetscErrorCode read_file_element(Vtu *v)
+{
+  SbScan *s = &v->scan;
+  const char *open, *close;
+  char value[64];
+  const uint16_t one = 1;
+  const PetscBool little = (PetscBool)(*(const unsigned char *)&one == 1);
+
+  PetscFunctionBeginUser;
+  if (!find_element(s->data, v->xml_end, "VTKFile", &open, &close))
+    SB_SCAN_ERROR(s, "expected an element VTKFile; this is no XML file of VTK");
+  s->token = open;
+  attribute(open, close, "type", sizeof(value), value);
+  if (strcmp(value, "UnstructuredGrid"))
+    SB_SCAN_ERROR(s, "a file of type '%s'; expected UnstructuredGrid with tetrahedra", value);
+  attribute(open, close, "byte_order", sizeof(value), value);
+  v->swap = (PetscBool)((!strcmp(value, "BigEndian")) == little);
+  attribute(open, close, "header_type", sizeof(value), value);
+  v->header = !strcmp(value, "UInt64") ? 8 : 4;
+  attribute(open, close, "compressor", sizeof(value), value);
+  v->zlib = (PetscBool)(value[0] != 0);
+  if (v->zlib && strcmp(value, "vtkZLibDataCompressor") != 0)
+    SB_SCAN_ERROR(s,
+                  "compressed by %s; supple knows vtkZLibDataCompressor and uncompressed files (ParaView: "
+                  "Save Data, Compressor Type)",
+                  value);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Where the XML ends and the appended data begins. */
+static PetscErrorCode find_appended(Vtu *v)
+{
+  const char *open, *close, *mark;
+  char encoding[16];
+
+  PetscFunctionBeginUser;
+  v->xml_end = v->scan.end;
+  if (!find_element(v->scan.data, v->scan.end, "AppendedData", &open, &close))
+    PetscFunctionReturn(PETSC_SUCCESS);
+  v->xml_end = open;
+  attribute(open, close, "encoding", sizeof(encoding), encoding);
+  v->appended_text = (PetscBool)!strcmp(encoding, "base64");
+  v->scan.bytes = (PetscBool)!v->appended_text;
+  v->scan.token = open;
+  mark = (const char *)memchr(close, '_', (size_t)(v->scan.end - close));
+  if (!mark) SB_SCAN_ERROR(&v->scan, "the appended data has no mark _ at its beginning");
+  v->appended = mark + 1;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode read_file(const char *path, Vtu *v)
+{
+  SbScan *s = &v->scan;
+  const char *open, *close, *open2, *close2;
+  int64_t npoint, ncell;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbScanOpen(v->im->where, path, s));
+  PetscCall(find_appended(v));
+  PetscCall(read_file_element(v));
+  if (!find_element(s->data, v->xml_end, "Piece", &open, &close))
+    SB_SCAN_ERROR(s, "there is no element Piece; the file is truncated or damaged");
+  s->token = close;
+  if (find_element(close, v->xml_end, "Piece", &open2, &close2))
+    SB_SCAN_ERROR(s, "the grid is in several pieces; save it in one (ParaView: Merge Blocks, Clean to Grid)");
+  PetscCall(attribute_number(v, open, close, "NumberOfPoints", &npoint));
+  PetscCall(attribute_number(v, open, close, "NumberOfCells", &ncell));
+  if (npoint > PETSC_MAX_INT / 8 || ncell > PETSC_MAX_INT / 8)
+    SB_SCAN_ERROR(s, "%lld points and %lld cells are more than this build can number", (long long)npoint,
+                  (long long)ncell);
+  PetscCall(read_points(v, npoint));
+  PetscCall(read_cells(v, ncell));
+  PetscCall(read_cell_data(v));
+  s->token = v->cells_at;
+  PetscCall(SbVtkGridFill(s, &v->grid, v->im));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbImportRead_VTU(const char *path, SbImport *im)
+{
+  Vtu v;
+  PetscErrorCode ierr;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscMemzero(&v, sizeof(v)));
+  v.im = im;
+  ierr = read_file(path, &v);
+  PetscCall(SbVtkGridDestroy(&v.grid));
+  PetscCall(SbScanClose(&v.scan));
+  PetscFunctionReturn(ierr);
+}

@@ -1,0 +1,281 @@
+/*
+  scan.c - a file read into memory in one piece, then taken apart token by token, as text or binary.
+
+  Every read is checked against the end of the file. Text is only walked once; the line of an error is counted when the
+  error occurs. A number of items announced in a file is compared with what the rest of the file can hold before anything
+  is allocated for it.
+*/
+#include <ctype.h>
+#include <errno.h>
+#include <stdlib.h>
+#include <sys/stat.h>
+#include "meshio_impl.h"
+
+/* Takes out the three bytes that some editors put in front of text to say that it is UTF-8; returns how many they were. */
+static size_t drop_mark(char data[], size_t n)
+{
+  if (n < 3 || memcmp(data, "\xef\xbb\xbf", 3) != 0) return 0;
+  memmove(data, data + 3, n - 3 + 1); /* with the zero at the end */
+  return 3;
+}
+
+PetscErrorCode SbScanOpen(const char *where, const char *path, SbScan *s)
+{
+  FILE *file;
+  struct stat info;
+  size_t size, got;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscMemzero(s, sizeof(*s)));
+  s->where = where;
+  file = fopen(path, "rb");
+  PetscCheck(file, PETSC_COMM_SELF, PETSC_ERR_FILE_OPEN,
+             "%s: cannot open the file (%s); check the name and the folder the run starts in", where,
+             strerror(errno));
+  if (fstat(fileno(file), &info) || !S_ISREG(info.st_mode)) {
+    (void)fclose(file);
+    SETERRQ(PETSC_COMM_SELF, PETSC_ERR_FILE_OPEN, "%s: is not a regular file; give a mesh file", where);
+  }
+  size = (size_t)info.st_size;
+  PetscCall(PetscMalloc1(size + 1, &s->data));
+  got = fread(s->data, 1, size, file);
+  (void)fclose(file);
+  s->data[got] = 0;
+  s->at = s->token = s->data;
+  s->end = s->data + got - drop_mark(s->data, got);
+  PetscCheck(got == size, PETSC_COMM_SELF, PETSC_ERR_FILE_READ, "%s: only %zu of %zu bytes could be read",
+             where, got, size);
+  PetscCheck(size, PETSC_COMM_SELF, PETSC_ERR_FILE_UNEXPECTED, "%s: is empty (0 bytes); write the mesh again",
+             where);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbScanClose(SbScan *s)
+{
+  PetscFunctionBeginUser;
+  PetscCall(PetscFree(s->data));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+const char *SbScanPlace(const SbScan *s, char place[64])
+{
+  size_t line = 1;
+
+  if (s->bytes) {
+    (void)snprintf(place, 64, "byte %zu", (size_t)(s->token - s->data) + 1);
+    return place;
+  }
+  for (const char *p = s->data; p < s->token; p++) line += *p == '\n';
+  (void)snprintf(place, 64, "line %zu", line);
+  return place;
+}
+
+static inline void skip_blanks(SbScan *s)
+{
+  while (s->at < s->end && isspace((unsigned char)*s->at)) s->at++;
+  s->token = s->at;
+}
+
+static inline PetscBool ends_token(const SbScan *s, const char *p)
+{
+  return (PetscBool)(p >= s->end || isspace((unsigned char)*p));
+}
+
+/* The error of a token that is not what was expected. */
+static PetscErrorCode unexpected(SbScan *s, const char *what, int64_t number)
+{
+  char found[24], of[32] = "";
+  size_t n = 0;
+
+  PetscFunctionBeginUser;
+  if (number) (void)snprintf(of, sizeof(of), " of node %lld", (long long)number);
+  if (s->at >= s->end)
+    SB_SCAN_ERROR(s, "the file ends where the %s%s is expected; it is truncated, write or copy it again",
+                  what, of);
+  for (; n + 1 < sizeof(found) && !ends_token(s, s->at + n); n++)
+    found[n] = isprint((unsigned char)s->at[n]) ? s->at[n] : '?';
+  found[n] = 0;
+  SB_SCAN_ERROR(s, "expected the %s%s, found '%s'", what, of, found);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbScanText(SbScan *s, const char *what, int64_t *value)
+{
+  const char *p;
+  PetscBool minus;
+  int64_t v = 0;
+  int ndigit = 0;
+
+  PetscFunctionBeginUser;
+  skip_blanks(s);
+  p = s->at;
+  minus = (PetscBool)(p < s->end && *p == '-');
+  if (p < s->end && (*p == '-' || *p == '+')) p++;
+  for (; p < s->end && *p >= '0' && *p <= '9' && ndigit < 18; p++, ndigit++) v = 10 * v + (*p - '0');
+  if (!ndigit || !ends_token(s, p)) PetscCall(unexpected(s, what, 0));
+  *value = minus ? -v : v;
+  s->at = p;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Takes n bytes, in the byte order of this machine. */
+static inline PetscErrorCode take(SbScan *s, const char *what, size_t n, void *value)
+{
+  PetscFunctionBeginUser;
+  s->token = s->at;
+  if ((size_t)(s->end - s->at) < n)
+    SB_SCAN_ERROR(s, "the file ends where the %s is expected; it is truncated, write or copy it again", what);
+  memcpy(value, s->at, n);
+  if (s->swap) {
+    unsigned char *byte = (unsigned char *)value;
+
+    for (size_t i = 0; i < n / 2; i++) {
+      const unsigned char keep = byte[i];
+
+      byte[i] = byte[n - 1 - i];
+      byte[n - 1 - i] = keep;
+    }
+  }
+  s->at += n;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbScanInt4(SbScan *s, const char *what, int64_t *value)
+{
+  int32_t v = 0;
+
+  PetscFunctionBeginUser;
+  if (s->binary) {
+    PetscCall(take(s, what, sizeof(v), &v));
+    *value = v;
+  } else
+    PetscCall(SbScanText(s, what, value));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbScanInt8(SbScan *s, const char *what, int64_t *value)
+{
+  PetscFunctionBeginUser;
+  if (s->binary)
+    PetscCall(take(s, what, sizeof(*value), value));
+  else
+    PetscCall(SbScanText(s, what, value));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* A number with the exponent letter of Fortran, 1.5D+00. Returns its end, or NULL. */
+static const char *fortran_real(const SbScan *s, PetscReal *value)
+{
+  char copy[64], *p;
+  size_t n = 0;
+
+  for (; n + 1 < sizeof(copy) && !ends_token(s, s->at + n); n++)
+    copy[n] = s->at[n] == 'D' || s->at[n] == 'd' ? 'E' : s->at[n];
+  copy[n] = 0;
+  *value = strtod(copy, &p);
+  return n && p == copy + n ? s->at + n : NULL;
+}
+
+PetscErrorCode SbScanReal(SbScan *s, const char *what, int64_t number, PetscReal *value)
+{
+  char *p;
+
+  PetscFunctionBeginUser;
+  if (s->binary) {
+    PetscCall(take(s, what, sizeof(*value), value));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  skip_blanks(s);
+  *value = strtod(s->at, &p);
+  if (s->at < s->end && p > s->at && (*p == 'D' || *p == 'd')) {
+    const char *end = fortran_real(s, value);
+
+    if (end) s->at = end;
+    if (end) PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  if (p > s->at && p + 1 < s->end && *p == ',' && isdigit((unsigned char)p[1]))
+    SB_SCAN_ERROR(s, "the %s, %.*s, has a decimal comma; write the file with decimal points", what,
+                  (int)PetscMin(24, p + strspn(p, ",0123456789") - s->at), s->at);
+  if (s->at >= s->end || p == s->at || !ends_token(s, p)) PetscCall(unexpected(s, what, number));
+  s->at = p;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbScanRoom(SbScan *s, const char *what, int64_t n, int64_t text_bytes, int64_t binary_bytes)
+{
+  const int64_t room = (s->end - s->at) / (s->binary ? binary_bytes : text_bytes) + 1;
+
+  PetscFunctionBeginUser;
+  if (n < 0) SB_SCAN_ERROR(s, "%lld %s are announced; a count cannot be negative", (long long)n, what);
+  if (n > room)
+    SB_SCAN_ERROR(
+      s, "%lld %s are announced, the rest of the file cannot hold more than %lld; it is damaged or truncated",
+      (long long)n, what, (long long)room);
+  if (n > PETSC_MAX_INT / 8)
+    SB_SCAN_ERROR(s, "%lld %s are more than this build can number", (long long)n, what);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbScanQuoted(SbScan *s, const char *what, size_t size, char value[])
+{
+  const char *close;
+  size_t n;
+
+  PetscFunctionBeginUser;
+  skip_blanks(s);
+  close = s->at < s->end && *s->at == '"' ? (const char *)memchr(s->at + 1, '"', (size_t)(s->end - s->at) - 1)
+                                          : NULL;
+  if (!close) PetscCall(unexpected(s, what, 0));
+  n = (size_t)(close - s->at) - 1;
+  if (n >= size) SB_SCAN_ERROR(s, "the %s is longer than %zu characters", what, size - 1);
+  memcpy(value, s->at + 1, n);
+  value[n] = 0;
+  s->at = close + 1;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbScanWord(SbScan *s, size_t size, char word[])
+{
+  size_t n = 0;
+
+  PetscFunctionBeginUser;
+  skip_blanks(s);
+  for (; n + 1 < size && !ends_token(s, s->at + n); n++)
+    word[n] = isprint((unsigned char)s->at[n]) ? s->at[n] : '?';
+  word[n] = 0;
+  s->at += n;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+void SbScanNext(SbScan *s, char comment)
+{
+  skip_blanks(s);
+  while (s->at < s->end && *s->at == comment) {
+    (void)SbScanEndOfLine(s);
+    skip_blanks(s);
+  }
+}
+
+PetscBool SbScanMore(SbScan *s, char comment)
+{
+  while (s->at < s->end && *s->at != '\n' && isspace((unsigned char)*s->at)) s->at++;
+  s->token = s->at;
+  return (PetscBool)(s->at < s->end && *s->at != '\n' && *s->at != comment);
+}
+
+PetscErrorCode SbScanEndOfLine(SbScan *s)
+{
+  const char *line = (const char *)memchr(s->at, '\n', (size_t)(s->end - s->at));
+
+  PetscFunctionBeginUser;
+  s->at = line ? line + 1 : s->end;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscBool SbScanFind(SbScan *s, const char *text)
+{
+  const char *found = (const char *)memmem(s->at, (size_t)(s->end - s->at), text, strlen(text));
+
+  if (found) s->at = found;
+  return found ? PETSC_TRUE : PETSC_FALSE;
+}

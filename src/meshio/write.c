@@ -1,0 +1,104 @@
+/*
+  write.c - meshes as files: read and written by their names. A file is written beside its place and renamed when it is whole.
+*/
+#include <errno.h>
+#include <strings.h>
+#include <unistd.h>
+#include "meshio_impl.h"
+
+PetscErrorCode SbMeshFileRead(const SbBody *body, SbMeshProgress progress, void *ctx, SbImport **import)
+{
+  SbImport *im;
+  PetscErrorCode ierr;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscNew(&im));
+  im->progress = progress;
+  im->progress_ctx = ctx;
+  ierr = SbImportRead(body, im);
+  if (ierr) PetscCall(SbMeshFileDestroy(&im));
+  *import = im;
+  PetscFunctionReturn(ierr);
+}
+
+PetscErrorCode SbMeshFileDestroy(SbImport **import)
+{
+  PetscFunctionBeginUser;
+  if (!*import) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(SbImportDestroy(*import));
+  PetscCall(PetscFree(*import));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+const char *SbMeshFileNote(const SbImport *im)
+{
+  return im->note;
+}
+
+void SbMeshFileCount(const SbImport *im, PetscInt *nvert, PetscInt n[4])
+{
+  *nvert = im->nvert;
+  for (int d = 0; d < 4; d++) n[d] = im->item[d].n;
+}
+
+/* ------------------------------------------------------------------ writing */
+
+/* The format that a name asks for. */
+static PetscErrorCode format_of(const char *path, SbMeshFormat *format)
+{
+  const char *dot = strrchr(path, '.');
+
+  PetscFunctionBeginUser;
+  if (*format != SB_MESH_AUTO) PetscFunctionReturn(PETSC_SUCCESS);
+  if (dot && !strcasecmp(dot, ".msh"))
+    *format = SB_MESH_MSH41;
+  else if (dot && !strcasecmp(dot, ".h5"))
+    *format = SB_MESH_H5;
+  else
+    SETERRQ(PETSC_COMM_SELF, PETSC_ERR_USER_INPUT, "%s: meshes are written as .msh (gmsh) or .h5 (supple)",
+            path);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* mesh.h5 -> mesh.xmf */
+static void index_name(const char *path, size_t size, char name[])
+{
+  const char *dot = strrchr(path, '.'), *slash = strrchr(path, '/');
+  const int stem = dot && dot > (slash ? slash : path) ? (int)(dot - path) : (int)strlen(path);
+
+  (void)snprintf(name, size, "%.*s.xmf", stem, path);
+}
+
+static PetscErrorCode move_to(const char *from, const char *to)
+{
+  PetscFunctionBeginUser;
+  if (rename(from, to)) {
+    const int error = errno;
+
+    (void)unlink(from);
+    SETERRQ(PETSC_COMM_SELF, PETSC_ERR_FILE_WRITE, "%s cannot be written: %s", to, strerror(error));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbMeshFileWrite(const SbImport *im, const char *path, SbMeshFormat format)
+{
+  char part[PETSC_MAX_PATH_LEN + 32], index[PETSC_MAX_PATH_LEN + 8];
+  PetscErrorCode ierr;
+
+  PetscFunctionBeginUser;
+  PetscCall(format_of(path, &format));
+  (void)snprintf(part, sizeof(part), "%s.part", path);
+  ierr = format == SB_MESH_H5 ? SbWrite_H5(im, part) : SbWrite_Gmsh(im, part, format);
+  if (ierr) (void)unlink(part);
+  PetscCall(ierr);
+  PetscCall(move_to(part, path));
+  if (format != SB_MESH_H5) PetscFunctionReturn(PETSC_SUCCESS);
+  index_name(path, sizeof(index), index);
+  (void)snprintf(part, sizeof(part), "%s.part", index);
+  ierr = SbWrite_Xdmf(im, part, path);
+  if (ierr) (void)unlink(part);
+  PetscCall(ierr);
+  PetscCall(move_to(part, index));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

@@ -1,0 +1,407 @@
+/*
+  write_gmsh.c - writes gmsh's .msh files, versions 4.1 and 2.2, text and binary (gmsh reference manual, "File formats").
+
+  Version 4.1 gives groups to entities of the geometry: each tag set of a dimension becomes one entity, and all nodes
+  belong to the first of the highest dimension. Blocks follow the order of the items, a new one begins where the tag set
+  changes: what is read again has the same order. Version 2.2 has one group per element: an element of several groups is
+  written once for each, which supple joins again.
+
+  Numbers are from 1 on. A double is written with 17 digits as text: what is read is what was written.
+*/
+#include <errno.h>
+#include <stdlib.h>
+#include "meshio_impl.h"
+
+typedef struct {
+  const SbImport *im;
+  FILE *file;
+  PetscBool binary;
+  PetscBool *used[4];     /* [ntags] whether an item of the dimension has this tag set */
+  int home_dim;           /* entity of the nodes */
+  PetscInt home;          /* its tag set */
+  int64_t *number;        /* [ngroup] of the groups in the file */
+  PetscInt64 total, done; /* items, for the progress */
+} Out;
+
+static const int gmsh_type[4] = {15, 1, 2, 4}; /* of items by dimension */
+
+/* ------------------------------------------------------------------ numbers */
+
+/* Digits of a whole number above or equal to 0 and a blank: fprintf() takes four times as long. */
+static void put_text(FILE *file, int64_t value, char after)
+{
+  char digits[24], *p = digits + sizeof(digits);
+
+  *--p = after;
+  do *--p = (char)('0' + value % 10);
+  while (value /= 10);
+  (void)fwrite(p, 1, (size_t)(digits + sizeof(digits) - p), file);
+}
+
+static void put_int(Out *out, int64_t value, char after)
+{
+  const int32_t small = (int32_t)value;
+
+  if (out->binary)
+    (void)fwrite(&small, 4, 1, out->file);
+  else if (value < 0)
+    (void)fprintf(out->file, "%lld%c", (long long)value, after);
+  else
+    put_text(out->file, value, after);
+}
+
+static void put_size(Out *out, int64_t value, char after)
+{
+  if (out->binary)
+    (void)fwrite(&value, 8, 1, out->file);
+  else
+    put_text(out->file, value, after);
+}
+
+static void put_real(Out *out, PetscReal value, char after)
+{
+  const double x = (double)value;
+
+  if (out->binary)
+    (void)fwrite(&x, 8, 1, out->file);
+  else
+    (void)fprintf(out->file, "%.17g%c", x, after);
+}
+
+static PetscErrorCode tell(Out *out)
+{
+  PetscFunctionBeginUser;
+  if (out->im->progress && !(out->done++ & 0xffff))
+    PetscCall(out->im->progress("elements", out->done, out->total, out->im->progress_ctx));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ groups */
+
+/* A name that only says that there is none. */
+static PetscBool is_default_name(const SbGroup *g)
+{
+  static const char *const kind[4] = {"point", "curve", "surface", "volume"};
+  char text[SB_GROUP_MAX];
+
+  (void)snprintf(text, sizeof(text), "%s_%lld", kind[g->dim], (long long)g->tag);
+  return (PetscBool)!strcmp(text, g->name);
+}
+
+/* A group of a dimension in a tag set: the next one from *k on; -1 when there is none. */
+static PetscInt next_group(const SbImport *im, PetscInt tags, int dim, PetscInt *k)
+{
+  while (*k < im->tags_start[tags + 1]) {
+    const PetscInt g = im->tags_group[(*k)++];
+
+    if (im->group[g].dim == dim) return g;
+  }
+  return -1;
+}
+
+static PetscInt count_groups(const SbImport *im, PetscInt tags, int dim)
+{
+  PetscInt n = 0, k = im->tags_start[tags];
+
+  while (next_group(im, tags, dim, &k) >= 0) n++;
+  return n;
+}
+
+/* Numbers from 1 to INT32_MAX stay; gmsh knows no others, and these get the next ones that are free. */
+static PetscErrorCode number_groups(Out *out)
+{
+  const SbImport *im = out->im;
+  int64_t highest[4] = {0, 0, 0, 0};
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscMalloc1(im->ngroup, &out->number));
+  for (PetscInt g = 0; g < im->ngroup; g++) {
+    const SbGroup *p = &im->group[g];
+
+    if (p->tag > 0 && p->tag < INT32_MAX - im->ngroup) highest[p->dim] = PetscMax(highest[p->dim], p->tag);
+  }
+  for (PetscInt g = 0; g < im->ngroup; g++) {
+    const SbGroup *p = &im->group[g];
+    const PetscBool fits = (PetscBool)(p->tag > 0 && p->tag < INT32_MAX - im->ngroup);
+
+    out->number[g] = fits ? p->tag : ++highest[p->dim];
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscBool has_name(const Out *out, PetscInt g)
+{
+  const SbGroup *p = &out->im->group[g];
+
+  return (PetscBool)(!is_default_name(p) || out->number[g] != p->tag);
+}
+
+static void write_names(Out *out)
+{
+  const SbImport *im = out->im;
+  PetscInt n = 0;
+
+  for (PetscInt g = 0; g < im->ngroup; g++) n += has_name(out, g);
+  if (!n) return;
+  (void)fprintf(out->file, "$PhysicalNames\n%lld\n", (long long)n);
+  for (PetscInt g = 0; g < im->ngroup; g++) {
+    if (has_name(out, g))
+      (void)fprintf(out->file, "%d %lld \"%s\"\n", (int)im->group[g].dim, (long long)out->number[g],
+                    im->group[g].name);
+  }
+  (void)fprintf(out->file, "$EndPhysicalNames\n");
+}
+
+/* ------------------------------------------------------------------ version 4.1 */
+
+static void box_of(const Out *out, int dim, PetscInt tags, PetscReal box[6])
+{
+  const SbItems *item = &out->im->item[dim];
+
+  for (int i = 0; i < 3; i++) box[i] = PETSC_MAX_REAL, box[3 + i] = PETSC_MIN_REAL;
+  for (PetscInt k = 0; k < item->n; k++) {
+    if (item->tags[k] != tags) continue;
+    for (int a = 0; a <= dim; a++) {
+      const PetscReal *x = out->im->x + 3 * item->vert[(dim + 1) * k + a];
+
+      for (int i = 0; i < 3; i++) {
+        box[i] = PetscMin(box[i], x[i]);
+        box[3 + i] = PetscMax(box[3 + i], x[i]);
+      }
+    }
+  }
+  for (int i = 0; i < 6; i++)
+    if (box[i] == PETSC_MAX_REAL || box[i] == PETSC_MIN_REAL) box[i] = 0;
+}
+
+static void write_entity(Out *out, int dim, PetscInt tags)
+{
+  const SbImport *im = out->im;
+  PetscReal box[6];
+  PetscInt k = im->tags_start[tags], g;
+
+  box_of(out, dim, tags, box);
+  put_int(out, tags + 1, ' ');
+  for (int i = 0; i < (dim ? 6 : 3); i++) put_real(out, box[i], ' ');
+  put_size(out, count_groups(im, tags, dim), ' ');
+  while ((g = next_group(im, tags, dim, &k)) >= 0) put_int(out, out->number[g], ' ');
+  if (dim) put_size(out, 0, ' ');
+  if (!out->binary) (void)fputc('\n', out->file);
+}
+
+static void write_entities(Out *out)
+{
+  PetscInt n[4] = {0, 0, 0, 0};
+
+  for (int d = 0; d < 4; d++)
+    for (PetscInt t = 0; t < out->im->ntags; t++) n[d] += out->used[d][t];
+  (void)fprintf(out->file, "$Entities\n");
+  for (int d = 0; d < 4; d++) put_size(out, n[d], d < 3 ? ' ' : '\n');
+  for (int d = 0; d < 4; d++)
+    for (PetscInt t = 0; t < out->im->ntags; t++)
+      if (out->used[d][t]) write_entity(out, d, t);
+  (void)fprintf(out->file, "%s$EndEntities\n", out->binary ? "\n" : "");
+}
+
+static void write_nodes_41(Out *out)
+{
+  const SbImport *im = out->im;
+  const PetscInt n = im->nvert;
+
+  (void)fprintf(out->file, "$Nodes\n");
+  put_size(out, 1, ' ');
+  put_size(out, n, ' ');
+  put_size(out, 1, ' ');
+  put_size(out, n, '\n');
+  put_int(out, out->home_dim, ' ');
+  put_int(out, out->home + 1, ' ');
+  put_int(out, 0, ' ');
+  put_size(out, n, '\n');
+  for (PetscInt v = 0; v < n; v++) put_size(out, v + 1, '\n');
+  for (PetscInt v = 0; v < n; v++)
+    for (int i = 0; i < 3; i++) put_real(out, im->x[3 * v + i], i < 2 ? ' ' : '\n');
+  (void)fprintf(out->file, "%s$EndNodes\n", out->binary ? "\n" : "");
+}
+
+/* Items from i on that have the same tag set. */
+static PetscInt run_length(const SbItems *item, PetscInt i)
+{
+  PetscInt n = 1;
+
+  while (i + n < item->n && item->tags[i + n] == item->tags[i]) n++;
+  return n;
+}
+
+static PetscErrorCode write_run_41(Out *out, int dim, PetscInt i, PetscInt n, int64_t *number)
+{
+  const SbItems *item = &out->im->item[dim];
+
+  PetscFunctionBeginUser;
+  put_int(out, dim, ' ');
+  put_int(out, item->tags[i] + 1, ' ');
+  put_int(out, gmsh_type[dim], ' ');
+  put_size(out, n, '\n');
+  for (PetscInt k = i; k < i + n; k++) {
+    const PetscInt *v = item->vert + (size_t)(dim + 1) * (size_t)k;
+
+    put_size(out, (*number)++, ' ');
+    for (int a = 0; a <= dim; a++) put_size(out, v[a] + 1, a < dim ? ' ' : '\n');
+    PetscCall(tell(out));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode write_elements_41(Out *out)
+{
+  int64_t nrun = 0, number = 1;
+
+  PetscFunctionBeginUser;
+  for (int d = 0; d < 4; d++) {
+    const SbItems *item = &out->im->item[d];
+
+    for (PetscInt i = 0; i < item->n; i += run_length(item, i)) nrun++;
+  }
+  (void)fprintf(out->file, "$Elements\n");
+  put_size(out, nrun, ' ');
+  put_size(out, out->total, ' ');
+  put_size(out, 1, ' ');
+  put_size(out, out->total, '\n');
+  for (int d = 0; d < 4; d++) {
+    const SbItems *item = &out->im->item[d];
+
+    for (PetscInt i = 0, n; i < item->n; i += n) {
+      n = run_length(item, i);
+      PetscCall(write_run_41(out, d, i, n, &number));
+    }
+  }
+  (void)fprintf(out->file, "%s$EndElements\n", out->binary ? "\n" : "");
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ version 2.2 */
+
+static void write_nodes_22(Out *out)
+{
+  const SbImport *im = out->im;
+
+  (void)fprintf(out->file, "$Nodes\n%lld\n", (long long)im->nvert);
+  for (PetscInt v = 0; v < im->nvert; v++) {
+    put_int(out, v + 1, ' ');
+    for (int i = 0; i < 3; i++) put_real(out, im->x[3 * v + i], i < 2 ? ' ' : '\n');
+  }
+  (void)fprintf(out->file, "%s$EndNodes\n", out->binary ? "\n" : "");
+}
+
+/* An element, once for each of its groups; without any, once with group 0. In binary each has a header of its own. */
+static void write_item_22(Out *out, int dim, PetscInt i, int64_t *number)
+{
+  const SbItems *item = &out->im->item[dim];
+  const PetscInt *v = item->vert + (size_t)(dim + 1) * (size_t)i;
+  PetscInt k = out->im->tags_start[item->tags[i]], g = next_group(out->im, item->tags[i], dim, &k);
+
+  do {
+    if (!out->binary) put_int(out, (*number), ' ');
+    put_int(out, gmsh_type[dim], ' ');
+    if (out->binary) put_int(out, 1, ' ');
+    put_int(out, 2, ' ');
+    if (out->binary) put_int(out, (*number), ' ');
+    put_int(out, g < 0 ? 0 : out->number[g], ' ');
+    put_int(out, item->tags[i] + 1, ' ');
+    for (int a = 0; a <= dim; a++) put_int(out, v[a] + 1, a < dim ? ' ' : '\n');
+    (*number)++;
+    g = g < 0 ? -1 : next_group(out->im, item->tags[i], dim, &k);
+  } while (g >= 0);
+}
+
+static PetscErrorCode write_elements_22(Out *out)
+{
+  const SbImport *im = out->im;
+  int64_t n = 0, number = 1;
+
+  PetscFunctionBeginUser;
+  for (int d = 0; d < 4; d++)
+    for (PetscInt i = 0; i < im->item[d].n; i++) n += PetscMax(1, count_groups(im, im->item[d].tags[i], d));
+  PetscCheck(n <= INT32_MAX, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
+             "%s: %lld elements are more than a file of version 2.2 can number; write version 4.1", im->where,
+             (long long)n);
+  (void)fprintf(out->file, "$Elements\n%lld\n", (long long)n);
+  for (int d = 0; d < 4; d++) {
+    for (PetscInt i = 0; i < im->item[d].n; i++) {
+      write_item_22(out, d, i, &number);
+      PetscCall(tell(out));
+    }
+  }
+  (void)fprintf(out->file, "%s$EndElements\n", out->binary ? "\n" : "");
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ the file */
+
+/* Which tag sets each dimension has, and where the nodes belong: to the first entity of the highest dimension. */
+static PetscErrorCode find_entities(Out *out)
+{
+  PetscFunctionBeginUser;
+  out->home_dim = 3;
+  for (int d = 0; d < 4; d++) {
+    PetscCall(PetscCalloc1(out->im->ntags, &out->used[d]));
+    for (PetscInt i = 0; i < out->im->item[d].n; i++) out->used[d][out->im->item[d].tags[i]] = PETSC_TRUE;
+    if (out->im->item[d].n) {
+      out->home_dim = d;
+      out->home = out->im->item[d].tags[0];
+    }
+    out->total += out->im->item[d].n;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode write_all(Out *out, PetscBool version22)
+{
+  const int32_t one = 1;
+
+  PetscFunctionBeginUser;
+  (void)fprintf(out->file, "$MeshFormat\n%s %d 8\n", version22 ? "2.2" : "4.1", (int)out->binary);
+  if (out->binary) {
+    (void)fwrite(&one, 4, 1, out->file);
+    (void)fputc('\n', out->file);
+  }
+  (void)fprintf(out->file, "$EndMeshFormat\n");
+  write_names(out);
+  if (version22) {
+    write_nodes_22(out);
+    PetscCall(write_elements_22(out));
+  } else {
+    write_entities(out);
+    write_nodes_41(out);
+    PetscCall(write_elements_41(out));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbWrite_Gmsh(const SbImport *im, const char *path, SbMeshFormat format)
+{
+  const PetscBool version22 = (PetscBool)(format == SB_MESH_MSH22 || format == SB_MESH_MSH22_BINARY);
+  Out out;
+  PetscErrorCode ierr;
+  int error;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscMemzero(&out, sizeof(out)));
+  out.im = im;
+  out.binary = (PetscBool)(format == SB_MESH_MSH41_BINARY || format == SB_MESH_MSH22_BINARY);
+  out.file = fopen(path, "wb");
+  PetscCheck(out.file, PETSC_COMM_SELF, PETSC_ERR_FILE_WRITE, "%s cannot be written: %s", path,
+             strerror(errno));
+  (void)setvbuf(out.file, NULL, _IOFBF, 1 << 20);
+  PetscCall(find_entities(&out));
+  PetscCall(number_groups(&out));
+  errno = 0;
+  ierr = write_all(&out, version22);
+  error = ferror(out.file) ? errno : 0;
+  if (fclose(out.file) && !error) error = errno;
+  for (int d = 0; d < 4; d++) PetscCall(PetscFree(out.used[d]));
+  PetscCall(PetscFree(out.number));
+  PetscCall(ierr);
+  PetscCheck(!error, PETSC_COMM_SELF, PETSC_ERR_FILE_WRITE, "%s cannot be written: %s", path,
+             strerror(error));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

@@ -1,0 +1,207 @@
+/*
+  write_h5.c - supple's own mesh file, HDF5, and its index for ParaView. The layout is described in docs/meshes.md.
+
+    /                attribute supple_mesh: version of the layout, 1
+    /mesh/x          [nvert][3]   double   coordinates
+    /mesh/cells      [ntet][4]    int32    vertices from 0 on
+    /mesh/cell_tags  [ntet]       int32    tag set of each tet
+    /mesh/triangles  [n][3], /mesh/triangle_tags [n]; lines [n][2], line_tags; points [n][1], point_tags
+    /groups/name     [ngroup] text, /groups/dim [ngroup] int32, /groups/number [ngroup] int64
+    /tag_sets/start  [nset + 1] int32, /tag_sets/group: groups of set k are group[start[k]] .. group[start[k + 1] - 1]
+
+  Written and read by one rank in one piece, without compression: reading takes what the disk takes.
+*/
+#include <errno.h>
+#include <hdf5.h>
+#include "meshio_impl.h"
+
+/* An open file with the first thing that failed. */
+typedef struct {
+  hid_t file;
+  PetscBool failed;
+} H5;
+
+/* Keeps in mind that something failed; HDF5's handles are negative then, and further calls with them fail as well. */
+static hid_t keep(H5 *h, hid_t id)
+{
+  if (id < 0) h->failed = PETSC_TRUE;
+  return id;
+}
+
+static void write_array(H5 *h, const char *name, int ncomp, size_t n, hid_t filetype, hid_t memtype,
+                        const void *data)
+{
+  const hsize_t size[2] = {(hsize_t)n, (hsize_t)ncomp};
+  const hid_t space = keep(h, H5Screate_simple(ncomp > 1 ? 2 : 1, size, NULL));
+  const hid_t set =
+    keep(h, H5Dcreate2(h->file, name, filetype, space, H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT));
+
+  if (n) (void)keep(h, H5Dwrite(set, memtype, H5S_ALL, H5S_ALL, H5P_DEFAULT, data));
+  if (set >= 0) (void)H5Dclose(set);
+  if (space >= 0) (void)H5Sclose(space);
+}
+
+/* Whole numbers of the program; in the file with 32 bits. */
+static void write_ints(H5 *h, const char *name, int ncomp, size_t n, const PetscInt data[])
+{
+  write_array(h, name, ncomp, n, H5T_STD_I32LE, sizeof(PetscInt) == 8 ? H5T_NATIVE_INT64 : H5T_NATIVE_INT32,
+              data);
+}
+
+static void write_items(H5 *h, const SbImport *im)
+{
+  static const char *const name[4] = {"point", "line", "triangle", "cell"};
+  char path[64];
+
+  for (int d = 3; d >= 0; d--) {
+    const SbItems *item = &im->item[d];
+
+    if (!item->n && d < 3) continue;
+    (void)snprintf(path, sizeof(path), "/mesh/%ss", name[d]);
+    write_ints(h, path, d + 1, (size_t)item->n, item->vert);
+    (void)snprintf(path, sizeof(path), "/mesh/%s_tags", name[d]);
+    write_ints(h, path, 1, (size_t)item->n, item->tags);
+  }
+}
+
+static PetscErrorCode write_groups(H5 *h, const SbImport *im)
+{
+  const hid_t text = H5Tcopy(H5T_C_S1);
+  char(*name)[SB_GROUP_MAX];
+  PetscInt *dim;
+  int64_t *number;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscCalloc3(im->ngroup, &name, im->ngroup, &dim, im->ngroup, &number));
+  for (PetscInt g = 0; g < im->ngroup; g++) {
+    (void)snprintf(name[g], SB_GROUP_MAX, "%s", im->group[g].name);
+    dim[g] = im->group[g].dim;
+    number[g] = im->group[g].tag;
+  }
+  (void)H5Tset_size(text, SB_GROUP_MAX);
+  write_array(h, "/groups/name", 1, (size_t)im->ngroup, text, text, name);
+  write_ints(h, "/groups/dim", 1, (size_t)im->ngroup, dim);
+  write_array(h, "/groups/number", 1, (size_t)im->ngroup, H5T_STD_I64LE, H5T_NATIVE_INT64, number);
+  write_ints(h, "/tag_sets/start", 1, (size_t)im->ntags + 1, im->tags_start);
+  write_ints(h, "/tag_sets/group", 1, (size_t)im->tags_start[im->ntags], im->tags_group);
+  (void)H5Tclose(text);
+  PetscCall(PetscFree3(name, dim, number));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static void write_version(H5 *h)
+{
+  const int version = 1;
+  const hid_t space = keep(h, H5Screate(H5S_SCALAR));
+  const hid_t mark =
+    keep(h, H5Acreate2(h->file, "supple_mesh", H5T_STD_I32LE, space, H5P_DEFAULT, H5P_DEFAULT));
+
+  (void)keep(h, H5Awrite(mark, H5T_NATIVE_INT, &version));
+  if (mark >= 0) (void)H5Aclose(mark);
+  if (space >= 0) (void)H5Sclose(space);
+}
+
+static void make_group(H5 *h, const char *name)
+{
+  const hid_t group = keep(h, H5Gcreate2(h->file, name, H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT));
+
+  if (group >= 0) (void)H5Gclose(group);
+}
+
+PetscErrorCode SbWrite_H5(const SbImport *im, const char *path)
+{
+  H5 h = {-1, PETSC_FALSE};
+
+  PetscFunctionBeginUser;
+  PetscCheck(im->nvert <= INT32_MAX, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
+             "%s: more vertices than the 32 bits of an .h5 mesh can number", im->where);
+  (void)H5Eset_auto2(H5E_DEFAULT, NULL, NULL); /* its stack of errors becomes one line of ours */
+  errno = 0;
+  h.file = keep(&h, H5Fcreate(path, H5F_ACC_TRUNC, H5P_DEFAULT, H5P_DEFAULT));
+  PetscCheck(!h.failed, PETSC_COMM_SELF, PETSC_ERR_FILE_WRITE, "%s cannot be written: %s", path,
+             errno ? strerror(errno) : "HDF5 cannot make it");
+  write_version(&h);
+  make_group(&h, "/mesh");
+  make_group(&h, "/groups");
+  make_group(&h, "/tag_sets");
+  write_array(&h, "/mesh/x", 3, (size_t)im->nvert, H5T_IEEE_F64LE, H5T_NATIVE_DOUBLE, im->x);
+  write_items(&h, im);
+  PetscCall(write_groups(&h, im));
+  (void)keep(&h, H5Fclose(h.file));
+  PetscCheck(!h.failed, PETSC_COMM_SELF, PETSC_ERR_FILE_WRITE,
+             "%s cannot be written: %s; is there room on the disk?", path,
+             errno ? strerror(errno) : "HDF5 failed");
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ for ParaView */
+
+/* One grid: the simplices of a dimension, coloured by tag set. */
+static void write_grid(FILE *file, const SbImport *im, int dim, const char *h5)
+{
+  static const char *const grid[4] = {"points", "lines", "surface", "tets"};
+  static const char *const kind[4] = {"Polyvertex\" NodesPerElement=\"1", "Polyline\" NodesPerElement=\"2",
+                                      "Triangle", "Tetrahedron"};
+  static const char *const name[4] = {"point", "line", "triangle", "cell"};
+  const long long n = im->item[dim].n, nvert = im->nvert;
+
+  (void)fprintf(file, "<Grid Name=\"%s\" GridType=\"Uniform\">\n", grid[dim]);
+  (void)fprintf(file,
+                "<Topology TopologyType=\"%s\" NumberOfElements=\"%lld\"><DataItem Dimensions=\"%lld %d\" "
+                "NumberType=\"Int\" Precision=\"4\" Format=\"HDF\">%s:/mesh/%ss</DataItem></Topology>\n",
+                kind[dim], n, n, dim + 1, h5, name[dim]);
+  (void)fprintf(file,
+                "<Geometry GeometryType=\"XYZ\"><DataItem Dimensions=\"%lld 3\" NumberType=\"Float\" "
+                "Precision=\"8\" Format=\"HDF\">%s:/mesh/x</DataItem></Geometry>\n",
+                nvert, h5);
+  (void)fprintf(file,
+                "<Attribute Name=\"tag_set\" AttributeType=\"Scalar\" Center=\"Cell\"><DataItem "
+                "Dimensions=\"%lld\" NumberType=\"Int\" Precision=\"4\" "
+                "Format=\"HDF\">%s:/mesh/%s_tags</DataItem></Attribute>\n</Grid>\n",
+                n, h5, name[dim]);
+}
+
+/* Text between the quotes of XML. */
+static void write_escaped(FILE *file, const char *text)
+{
+  for (; *text; text++) {
+    if (strchr("<>&\"", *text))
+      (void)fprintf(file, "&#%d;", *text);
+    else
+      (void)fputc(*text, file);
+  }
+}
+
+/* Which groups a number of tag_set stands for. */
+static void write_legend(FILE *file, const SbImport *im)
+{
+  for (PetscInt t = 1; t < im->ntags; t++) {
+    (void)fprintf(file, "<Information Name=\"tag_set %d\" Value=\"", (int)t);
+    for (PetscInt k = im->tags_start[t]; k < im->tags_start[t + 1]; k++) {
+      if (k > im->tags_start[t]) (void)fprintf(file, ", ");
+      write_escaped(file, im->group[im->tags_group[k]].name);
+    }
+    (void)fprintf(file, "\"/>\n");
+  }
+}
+
+PetscErrorCode SbWrite_Xdmf(const SbImport *im, const char *path, const char *h5)
+{
+  const char *slash = strrchr(h5, '/'), *name = slash ? slash + 1 : h5;
+  FILE *file;
+  int error;
+
+  PetscFunctionBeginUser;
+  file = fopen(path, "w");
+  PetscCheck(file, PETSC_COMM_SELF, PETSC_ERR_FILE_WRITE, "%s cannot be written: %s", path, strerror(errno));
+  (void)fprintf(file, "<?xml version=\"1.0\" ?>\n<Xdmf Version=\"3.0\">\n<Domain>\n");
+  write_legend(file, im);
+  if (im->item[3].n) write_grid(file, im, 3, name);
+  if (im->item[2].n) write_grid(file, im, 2, name);
+  (void)fprintf(file, "</Domain>\n</Xdmf>\n");
+  error = ferror(file) ? errno : 0;
+  if (fclose(file) && !error) error = errno;
+  PetscCheck(!error, PETSC_COMM_SELF, PETSC_ERR_FILE_WRITE, "%s cannot be written: %s", path,
+             strerror(error));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

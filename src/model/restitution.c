@@ -1,0 +1,108 @@
+/*
+  Restitution: what two things that meet within a step have left of their speed, and that a step gains no energy by it.
+
+  Newton's law in Moreau's form (Moreau 1988; Jean, "The non-smooth contact dynamics method", CMAME 177, 1999) for the normal velocity of
+  a point of a body relative to an obstacle or to its place on another body: v+ + e v- >= 0, force >= 0, and one of them zero, for what would
+  be behind the other at the end of the step, with the velocity v- or by what the solves find. v- is the velocity when the step begins.
+  Implicit Euler has v+ = (gap1 - gap0) / h: the pair is constrained at
+
+      gap1 = gap0 + h e |v-|,
+
+  or let go when that takes a pull and it moves beyond; in the next step it is free. Force and elasticity are solved for together, so what
+  bounces is all that moves with the point within a step: a body that is stiff against its inertia, sqrt(k/m) h >> 1, bounces as a
+  whole. In a soft one the point's share is small, whatever e is; it bounces by its elasticity (Doyen, Ern, Piperno, SIAM J. Sci.
+  Comput. 33, 2011). The effects see to this (src/effect/bounce.h).
+
+  Energy. With W = sum h N v+ over these pairs, D = 1/2 |v1 - v0|^2 in the norm of the mass and S the strain energy, a step of implicit
+  Euler gains W - D + C plus the work of the loads, C = S(u1) - S(u0) - f_int(u1) . (u1 - u0); friction and pairs that stay only take. C is
+  not positive where S is convex, that is but for rotations under stress, and not counted then. After each solve W + C <= D is seen to, W of
+  all effects and in the frame of the obstacle: where it does not hold, all e are reduced and the step is solved again. Of two bodies that
+  arrive unstressed and stiff, one of which may be an obstacle, W / D = 2 e / (1 + e) <= 1, so that nothing is reduced there.
+*/
+#include "sbmodel.h"
+
+#define REDUCTIONS 8 /* of e within a step; then it is 0 */
+#define SAFE 0.9     /* of the reduction that would do if W grew with e */
+#define STEEP \
+  2.1 /* the same for a small excess, as of a stiff body with e = 1, whose W / D grows with the root of e */
+#define ROUND 1e-9 /* of D: W that counts as not larger */
+
+PetscErrorCode SbModelRestitutionBegin(SbModel m, PetscReal dt, Vec U0, Vec V0)
+{
+  PetscFunctionBeginUser;
+  m->bounce.U0 = U0;
+  m->bounce.V0 = V0;
+  m->bounce.dt = dt;
+  m->bounce.left = 1.;
+  m->bounce.reductions = 0;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* C of the step that ends at U, J. */
+static PetscErrorCode convexity(SbModel m, Vec U, PetscReal *C)
+{
+  const SbSpace s = m->space;
+  SbStage stage = {.dt = m->bounce.dt, .shift_k = 1.};
+  PetscReal strain[2], unused[2], work = 0., *f;
+  const PetscReal *u0;
+  PetscInt inverted;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscCalloc1(3 * s->nnode, &f));
+  PetscCall(SbSpaceGetLocalRead(s, m->bounce.U0, &u0));
+  PetscCall(SbSpaceGetLocalRead(s, U, &stage.u));
+  PetscCall(SbSpaceStrainEnergy(s, u0, &strain[0], &unused[0], &inverted, &unused[1]));
+  PetscCall(SbSpaceStrainEnergy(s, stage.u, &strain[1], &unused[0], &inverted, &unused[1]));
+  PetscCall(SbSpaceAddInternalForce(s, &stage, f));
+  for (PetscInt i = 0; i < 3 * s->nnode_owned; i++) work += f[i] * (stage.u[i] - u0[i]);
+  PetscCall(SbSpaceRestoreLocalRead(s, U, &stage.u));
+  PetscCall(SbSpaceRestoreLocalRead(s, m->bounce.U0, &u0));
+  PetscCall(PetscFree(f));
+  *C = strain[1] - strain[0] - work;
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, C, 1, MPIU_REAL, MPI_SUM, m->comm));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* W, and D less what of C is positive, of the step that ends at U, J, of all ranks. */
+static PetscErrorCode measure(SbModel m, Vec U, PetscReal *W, PetscReal *most)
+{
+  PetscReal C;
+  SbEnergies e;
+  Vec change;
+
+  PetscFunctionBeginUser;
+  *W = *most = 0.;
+  for (PetscInt k = 0; k < m->nrestitution; k++) {
+    PetscReal work = 0.;
+
+    SbEffectCall(m->restitution[k], restitution, &work);
+    *W += work;
+  }
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, W, 1, MPIU_REAL, MPI_SUM, m->comm));
+  if (*W <= 0.) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(VecDuplicate(U, &change));
+  PetscCall(VecWAXPY(change, -1., m->bounce.U0, U));
+  PetscCall(VecAXPBY(change, -1., 1. / m->bounce.dt, m->bounce.V0));
+  PetscCall(SbModelEnergies(m, U, change, &e));
+  PetscCall(VecDestroy(&change));
+  PetscCall(convexity(m, U, &C));
+  *most = PetscMax(0., e.kinetic - PetscMax(0., C));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbModelRestitutionUpdate(SbModel m, Vec U, PetscBool *again)
+{
+  PetscReal W, most;
+
+  PetscFunctionBeginUser;
+  PetscCall(measure(m, U, &W, &most));
+  if (W <= most * (1. + ROUND)) PetscFunctionReturn(PETSC_SUCCESS);
+  m->bounce.left *=
+    ++m->bounce.reductions < REDUCTIONS ? PetscMax(SAFE * most / W, 1. - STEEP * (1. - most / W)) : 0.;
+  for (PetscInt k = 0; k < m->nrestitution; k++)
+    SbEffectCall(m->restitution[k], scale_restitution, m->bounce.left);
+  PetscCall(PetscInfo(NULL, "bounces do %g J, %g J may be: coefficients reduced to %g of them\n", (double)W,
+                      (double)most, (double)m->bounce.left));
+  *again = PETSC_TRUE;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

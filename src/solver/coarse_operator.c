@@ -1,0 +1,247 @@
+/*
+  The operator on the coarse space, E = Z^T A Z: its blocks by direct loops over the block rows of A, its factor.
+
+  For a node i and an aggregate b among its neighbours, W_ib = sum_j A_ij Z_j over the neighbours in b, 3x6; then
+  E_ab += Z_i^T W_ib with a the aggregate of i. Each rank makes the upper blocks of its own aggregates' rows; all ranks
+  gather the blocks (0.7 MB for 300 aggregates) and factor E each for itself. CHOLMOD factors; MUMPS where PETSc has no CHOLMOD.
+  When E is spread, a rank makes its rows whole and nothing is gathered.
+
+  Modes that vanish make E singular, but decoupled: they get the mean diagonal of their block, and multiply zeros.
+*/
+#include "coarse.h"
+#include "sbassembly.h"
+
+/* The value arrays of A: diagonal part with its first block of each row, and the part with ghost columns. */
+typedef struct {
+  PetscBool symmetric; /* only blocks on and above the diagonal are stored */
+  Mat part[2];
+  PetscScalar *value[2];
+} Blocks;
+
+static PetscErrorCode lend_blocks(Mat A, Blocks *x)
+{
+  PetscBool parallel, sequential;
+  MatType type;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscObjectTypeCompare((PetscObject)A, MATSEQSBAIJ, &x->symmetric));
+  PetscCall(PetscObjectTypeCompare((PetscObject)A, MATSEQBAIJ, &sequential));
+  PetscCall(PetscObjectTypeCompare((PetscObject)A, MATMPIBAIJ, &parallel));
+  PetscCheck(
+    x->symmetric || sequential || parallel, PetscObjectComm((PetscObject)A), PETSC_ERR_SUP,
+    "The two-level preconditioner takes BAIJ and SBAIJ matrices, this one is %s: leave -mat_type alone",
+    type);
+  x->part[0] = A;
+  x->part[1] = NULL;
+  x->value[1] = NULL;
+  if (parallel) PetscCall(MatMPIBAIJGetSeqBAIJ(A, &x->part[0], &x->part[1], NULL));
+  if (x->symmetric)
+    PetscCall(MatSeqSBAIJGetArray(A, &x->value[0]));
+  else
+    PetscCall(MatSeqBAIJGetArray(x->part[0], &x->value[0]));
+  if (parallel) PetscCall(MatSeqBAIJGetArray(x->part[1], &x->value[1]));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode return_blocks(Mat A, Blocks *x)
+{
+  PetscFunctionBeginUser;
+  if (x->symmetric)
+    PetscCall(SbMatRestoreRead(A, MatSeqSBAIJRestoreArray, &x->value[0]));
+  else
+    PetscCall(SbMatRestoreRead(x->part[0], MatSeqBAIJRestoreArray, &x->value[0]));
+  if (x->part[1]) PetscCall(SbMatRestoreRead(x->part[1], MatSeqBAIJRestoreArray, &x->value[1]));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* W[3][6] += factor K Z_j; K by columns. */
+static inline void add_column(const PetscScalar K[9], PetscReal factor, const PetscReal d[3], PetscReal W[18])
+{
+  for (int r = 0; r < 3; r++) {
+    const PetscReal k0 = factor * K[r], k1 = factor * K[3 + r], k2 = factor * K[6 + r];
+
+    W[6 * r] += k0;
+    W[6 * r + 1] += k1;
+    W[6 * r + 2] += k2;
+    W[6 * r + 3] += d[1] * k2 - d[2] * k1;
+    W[6 * r + 4] += d[2] * k0 - d[0] * k2;
+    W[6 * r + 5] += d[0] * k1 - d[1] * k0;
+  }
+}
+
+/* The sums W of one row, by aggregate. */
+typedef struct {
+  PetscInt n;
+  PetscInt *b;  /* aggregates */
+  PetscReal *W; /* [n][18] */
+} RowSums;
+
+static inline PetscReal *sum_of(RowSums *row, PetscInt b)
+{
+  PetscInt k = 0;
+
+  while (k < row->n && row->b[k] != b) k++;
+  if (k == row->n) {
+    row->b[row->n++] = b;
+    for (int e = 0; e < 18; e++) row->W[18 * k + e] = 0.;
+  }
+  return row->W + 18 * k;
+}
+
+/* Rows of prescribed components hold only their diagonal, columns likewise, which is not in the span of Z: left out by the masks. */
+static void sum_row(SbCoarse c, const Blocks *x, PetscInt i, RowSums *row)
+{
+  const SbPlan p = c->space->plan;
+  const PetscInt own = c->agg[i], lowest = c->spread ? 0 : own,
+                 first = x->symmetric ? p->diagonal[i] : p->di[i];
+  const PetscScalar *K = x->value[0] + 9 * (size_t)(x->symmetric ? p->ui[i] : p->di[i]);
+
+  row->n = 0;
+  for (PetscInt k = first; k < p->di[i + 1]; k++, K += 9) {
+    const PetscInt j = p->dj[k], b = c->agg[j];
+
+    if (b < 0 || (!x->symmetric && b < lowest)) continue;
+    if (j == i) {
+      PetscScalar D[9];
+
+      for (int e = 0; e < 9; e++) D[e] = c->space->fixed[i] & (1 << (e / 3)) ? 0. : K[e];
+      add_column(D, x->symmetric ? 0.5 : 1., c->d + 3 * j, sum_of(row, b));
+    } else
+      add_column(K, 1., c->d + 3 * j, sum_of(row, b));
+  }
+  for (PetscInt k = p->oi[i]; k < p->oi[i + 1]; k++) {
+    const PetscInt j = p->oj[k], b = c->agg[j];
+
+    if (b >= lowest) add_column(x->value[1] + 9 * (size_t)k, 1., c->d + 3 * j, sum_of(row, b));
+  }
+}
+
+/* Block (a, b), a own. */
+static inline PetscReal *block_of(SbCoarse c, PetscInt a, PetscInt b)
+{
+  PetscInt k = c->start[a - c->first];
+
+  while (c->column[k] != b) k++;
+  return c->value + 36 * k;
+}
+
+/* E_ab += Z_i^T W_ib for the aggregates b around node i. With symmetric storage blocks below the diagonal are transposed. */
+static void add_row(SbCoarse c, PetscInt i, const RowSums *row)
+{
+  const PetscInt a = c->agg[i];
+
+  for (PetscInt k = 0; k < row->n; k++) {
+    const PetscInt b = row->b[k];
+    const PetscBool below = (PetscBool)(b < a && !c->spread);
+    PetscReal *E = below ? block_of(c, b, a) : block_of(c, a, b);
+
+    for (int q = 0; q < 6; q++) {
+      const PetscReal f[3] = {row->W[18 * k + q], row->W[18 * k + 6 + q], row->W[18 * k + 12 + q]};
+      PetscReal m[6] = {0.};
+
+      SbCoarseAddMoments(c->d + 3 * i, f, m);
+      for (int e = 0; e < 6; e++) E[below ? 6 * q + e : 6 * e + q] += m[e];
+    }
+  }
+}
+
+/* Diagonal blocks: symmetric, with their vanishing modes filled. */
+static void finish_diagonal(SbCoarse c, PetscBool symmetric)
+{
+  for (PetscInt a = 0; a < c->n; a++) {
+    PetscReal *E = c->value + 36 * c->start[a], trace = 0.;
+
+    for (int i = 0; i < 6; i++) {
+      for (int j = 0; j <= i; j++)
+        E[6 * i + j] = E[6 * j + i] = (symmetric ? 1. : 0.5) * (E[6 * i + j] + E[6 * j + i]);
+      trace += E[7 * i];
+    }
+    for (int e = 0; e < 36; e++) E[e] += trace / 6. * c->null[36 * a + e];
+  }
+}
+
+static PetscErrorCode assemble(SbCoarse c, Mat A)
+{
+  const SbPlan p = c->space->plan;
+  PetscInt widest = 1;
+  Blocks x;
+  RowSums row;
+
+  PetscFunctionBeginUser;
+  for (PetscInt i = 0; i < c->space->nnode_owned; i++)
+    widest = PetscMax(widest, p->di[i + 1] - p->di[i] + p->oi[i + 1] - p->oi[i]);
+  PetscCall(PetscMalloc2(widest, &row.b, 18 * widest, &row.W));
+  PetscCall(PetscArrayzero(c->value, 36 * c->start[c->n]));
+  PetscCall(lend_blocks(A, &x));
+  for (PetscInt i = 0; i < c->space->nnode_owned; i++) {
+    if (c->agg[i] < 0) continue;
+    sum_row(c, &x, i, &row);
+    add_row(c, i, &row);
+  }
+  PetscCall(return_blocks(A, &x));
+  finish_diagonal(c, x.symmetric);
+  PetscCall(PetscFree2(row.b, row.W));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/*
+  CHOLMOD reports a matrix that is not positive definite by raising an error of PETSc, which is caught here; MUMPS by counting negative
+  pivots. Values that are not numbers are searched for first: they would pass.
+*/
+static PetscErrorCode factor(SbCoarse c)
+{
+  PetscErrorCode ierr;
+  MatFactorError failed = MAT_FACTOR_NOERROR;
+  MatSolverType type;
+  PetscBool mumps;
+  PetscReal sum = 0.;
+  PetscInt negative = 0;
+
+  PetscFunctionBeginUser;
+  c->ok = PETSC_FALSE;
+  for (PetscInt k = 0; k < c->ai[6 * c->N]; k++) sum += PetscAbsScalar(c->av[k]);
+  if (PetscIsInfOrNanReal(sum)) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscPushErrorHandler(PetscReturnErrorHandler, NULL));
+  ierr = MatCholeskyFactorNumeric(c->factor, c->E, NULL);
+  PetscCall(PetscPopErrorHandler());
+  if (ierr == PETSC_ERR_MAT_CH_ZRPVT) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(ierr);
+  PetscCall(MatFactorGetError(c->factor, &failed));
+  PetscCall(MatFactorGetSolverType(c->factor, &type));
+  PetscCall(PetscStrcmp(type, MATSOLVERMUMPS, &mumps));
+  if (mumps && !failed) PetscCall(MatGetInertia(c->factor, &negative, NULL, NULL));
+  c->ok = (PetscBool)(!failed && !negative);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbCoarseSetUp(SbCoarse c, Mat A)
+{
+  PetscInt nz = 0, block = 0;
+
+  PetscFunctionBeginUser;
+  c->ok = PETSC_TRUE;
+  if (!c->N) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(assemble(c, A));
+  if (c->spread) {
+    PetscCall(SbCoarseSetUpLevels(c));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  if (c->all != c->value) {
+    PetscCallMPI(MPI_Allgatherv(c->value, 36 * (PetscMPIInt)c->start[c->n], MPIU_REAL, c->all, c->nvalue,
+                                c->at, MPIU_REAL, c->space->comm));
+  }
+  /* the blocks of a row of blocks lie behind each other: its six rows are dealt out in turn */
+  for (PetscInt a = 0; a < c->N; a++) {
+    PetscInt nblock = 1;
+
+    for (PetscInt k = c->ai[6 * a] + 6; k < c->ai[6 * a + 1]; k += 6) nblock++;
+    for (PetscInt r = 0; r < 6; r++) {
+      for (PetscInt k = 0; k < nblock; k++) {
+        for (PetscInt q = k ? 0 : r; q < 6; q++) c->av[nz++] = c->all[36 * (block + k) + 6 * r + q];
+      }
+    }
+    block += nblock;
+  }
+  PetscCall(factor(c));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

@@ -1,0 +1,139 @@
+/*
+  Nodes that are solved exactly within the rotated preconditioner (rotated.h says why and how).
+
+  A bar of 32,000 tets swinging freely: 75 such nodes in the mean, 176 at most, all in the crease where it is constrained;
+  iterations per step 7.6 in the mean and 11 at most with them, 18 and 65 without.
+
+  Only nodes whose neighbours are all owned are taken, so that nothing here communicates.
+*/
+#include "rotated.h"
+
+#define MOST_NODES 600 /* beyond that their own factorisation costs more than it saves */
+
+PetscErrorCode SbExactNodesCreate(SbSpace s, SbExactNodes *e)
+{
+  PetscFunctionBeginUser;
+  memset(e, 0, sizeof(*e));
+  PetscCall(PetscMalloc1(s->nnode, &e->index));
+  for (PetscInt i = 0; i < s->nnode; i++) e->index[i] = -1;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode free_arrays(SbExactNodes *e)
+{
+  PetscFunctionBeginUser;
+  PetscCall(SbFactorDestroy(&e->factor));
+  PetscCall(PetscFree5(e->node, e->ia, e->ka, e->x, e->y));
+  PetscCall(PetscFree5(e->ja, e->kja, e->block, e->kblock, e->value));
+  e->n = 0;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbExactNodesDestroy(SbExactNodes *e)
+{
+  PetscFunctionBeginUser;
+  PetscCall(free_arrays(e));
+  PetscCall(PetscFree(e->index));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Counts and numbers the nodes above the limit. */
+static void choose(SbExactNodes *e, SbSpace s, const PetscReal spread[], PetscReal limit)
+{
+  const SbPlan p = s->plan;
+
+  e->n = 0;
+  for (PetscInt i = 0; i < s->nnode_owned; i++) {
+    const PetscBool chosen = (PetscBool)(spread[i] > limit && !s->fixed[i] && p->oi[i] == p->oi[i + 1]);
+
+    e->index[i] = chosen ? e->n++ : -1;
+  }
+}
+
+/* The blocks between the nodes themselves. */
+static void restrict_rows(SbExactNodes *e)
+{
+  PetscInt count = 0;
+
+  e->ka[0] = 0;
+  for (PetscInt k = 0; k < e->n; k++) {
+    for (PetscInt at = e->ia[k]; at < e->ia[k + 1]; at++) {
+      const PetscInt j = e->index[e->ja[at]];
+
+      if (j < 0) continue;
+      e->kja[count] = j;
+      for (PetscInt c = 0; c < 9; c++) e->kblock[9 * count + c] = e->block[9 * at + c];
+      count++;
+    }
+    e->ka[k + 1] = count;
+  }
+}
+
+PetscErrorCode SbExactNodesSetUp(SbExactNodes *e, SbSpace s, Mat A, const PetscReal spread[], PetscReal limit)
+{
+  PetscInt nz = 0;
+  PetscBool ok = PETSC_FALSE;
+
+  PetscFunctionBeginUser;
+  PetscCall(free_arrays(e));
+  choose(e, s, spread, limit);
+  while (e->n > MOST_NODES) choose(e, s, spread, limit *= 1.3);
+  if (!e->n) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(
+    PetscMalloc5(e->n, &e->node, e->n + 1, &e->ia, e->n + 1, &e->ka, 3 * e->n, &e->x, 3 * e->n, &e->y));
+  for (PetscInt i = 0; i < s->nnode_owned; i++) {
+    if (e->index[i] < 0) continue;
+    e->node[e->index[i]] = i;
+    nz += s->plan->di[i + 1] - s->plan->di[i];
+  }
+  PetscCall(PetscMalloc5(nz, &e->ja, nz, &e->kja, 9 * nz, &e->block, 9 * nz, &e->kblock, 9 * nz, &e->value));
+  PetscCall(SbSpaceGetRows(s, A, e->n, e->node, e->ia, e->ja, e->block));
+  for (PetscInt k = 0; k < 9 * nz; k++) e->value[k] = (float)e->block[k];
+  restrict_rows(e);
+  PetscCall(SbFactorCreate(e->n, 0, e->ka, e->kja, &e->factor));
+  PetscCall(SbFactorNumeric(e->factor, e->ka, e->kja, e->kblock, NULL, &ok));
+  /* an indefinite block: the nodes are left to the preconditioner */
+  if (!ok) {
+    PetscCall(free_arrays(e));
+    for (PetscInt i = 0; i < s->nnode_owned; i++) e->index[i] = -1;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+void SbExactNodesBefore(SbExactNodes *e, float r[])
+{
+  if (!e->n) return;
+  for (PetscInt k = 0; k < 3 * e->n; k++) e->x[k] = r[3 * e->node[k / 3] + k % 3];
+  SbFactorForward(e->factor, e->x, NULL);
+  SbFactorBackward(e->factor, NULL, e->y);
+  for (PetscInt k = 0; k < e->n; k++) {
+    const float *y = e->y + 3 * k;
+
+    for (PetscInt at = e->ia[k]; at < e->ia[k + 1]; at++) {
+      const float *a = e->value + 9 * at;
+      float *to = r + 3 * e->ja[at];
+
+      for (int c = 0; c < 3; c++) to[c] -= a[c] * y[0] + a[3 + c] * y[1] + a[6 + c] * y[2];
+    }
+  }
+}
+
+void SbExactNodesAfter(SbExactNodes *e, const float r[], float z[])
+{
+  if (!e->n) return;
+  for (PetscInt k = 0; k < 3 * e->n; k++) z[3 * e->node[k / 3] + k % 3] += e->y[k];
+  for (PetscInt k = 0; k < e->n; k++) {
+    float sum[3];
+
+    for (int c = 0; c < 3; c++) sum[c] = r[3 * e->node[k] + c];
+    for (PetscInt at = e->ia[k]; at < e->ia[k + 1]; at++) {
+      const float *a = e->value + 9 * at, *x = z + 3 * e->ja[at];
+
+      for (int c = 0; c < 3; c++) sum[c] -= a[3 * c] * x[0] + a[3 * c + 1] * x[1] + a[3 * c + 2] * x[2];
+    }
+    for (int c = 0; c < 3; c++) e->x[3 * k + c] = sum[c];
+  }
+  SbFactorForward(e->factor, e->x, NULL);
+  SbFactorBackward(e->factor, NULL, e->y);
+  for (PetscInt k = 0; k < 3 * e->n; k++) z[3 * e->node[k / 3] + k % 3] += e->y[k];
+}

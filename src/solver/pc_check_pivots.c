@@ -1,0 +1,143 @@
+/*
+  CHOLMOD through PETSc ends the program with a trace when it meets a pivot that is not positive: a body that nothing holds, or a
+  tangent that is indefinite in compression. Here that is a factorisation that failed, like those of other packages: the solve fails, the
+  step is cut or the run stops with one line. Where the matrix is gathered on one rank (pc_direct.c), all learn of it.
+
+  petsc/private/pcimpl.h: the operations of a PC that PETSc implements have no public setter.
+*/
+#include "sbsolver.h"
+#include <petsc/private/pcimpl.h>
+
+#define ORIGINAL "SbPCSetUpOriginal_C"
+#define ORIGINAL_APPLY "SbPCApplyOriginal_C"
+
+/*
+  PETSc's error path forgets the arrays that wrap the matrix for CHOLMOD (MatWrapCholmod_seqaij: as much as the matrix itself, for each factorisation that
+  fails). They are noted while the factorisation runs, through PETSc's table of allocators, and freed when it has failed.
+*/
+static struct {
+  PetscErrorCode (*allocate)(size_t, PetscBool, int, const char[], const char[], void **);
+  PetscErrorCode (*release)(void *, int, const char[], const char[]);
+  void *wrapped[8];
+  int n;
+} noted;
+
+static PetscErrorCode note_allocate(size_t size, PetscBool clear, int line, const char function[],
+                                    const char file[], void **p)
+{
+  const PetscErrorCode error = (*noted.allocate)(size, clear, line, function, file, p);
+
+  if (!error && *p && noted.n < (int)PETSC_STATIC_ARRAY_LENGTH(noted.wrapped) &&
+      strstr(function, "MatWrapCholmod"))
+    noted.wrapped[noted.n++] = *p;
+  return error;
+}
+
+static PetscErrorCode note_release(void *p, int line, const char function[], const char file[])
+{
+  for (int k = 0; k < noted.n; k++) {
+    if (noted.wrapped[k] == p) noted.wrapped[k] = NULL;
+  }
+  return (*noted.release)(p, line, function, file);
+}
+
+static PetscErrorCode guarded_setup(PC pc)
+{
+  PetscErrorCode (*original)(PC) = NULL;
+  PetscErrorCode error;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscObjectQueryFunction((PetscObject)pc, ORIGINAL, &original));
+  noted.allocate = PetscTrMalloc;
+  noted.release = PetscTrFree;
+  noted.n = 0;
+  PetscTrMalloc = note_allocate;
+  PetscTrFree = note_release;
+  PetscCall(PetscPushErrorHandler(PetscReturnErrorHandler, NULL));
+  error = (*original)(pc);
+  PetscCall(PetscPopErrorHandler());
+  PetscTrMalloc = noted.allocate;
+  PetscTrFree = noted.release;
+  if (error == PETSC_ERR_MAT_CH_ZRPVT) {
+    for (int k = 0; k < noted.n; k++) PetscCall(PetscFree(noted.wrapped[k]));
+    PetscCall(PCSetFailedReason(pc, PC_FACTOR_NUMERIC_ZEROPIVOT));
+    PetscCall(PetscInfo(pc, "CHOLMOD: a pivot is not positive\n"));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  PetscCall(error); /* what else went wrong is told as ever, but for its trace */
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* PETSc's solvers go on after a set-up that failed, until they meet what is not a number; CHOLMOD has nothing to solve with then. */
+static PetscErrorCode guarded_apply(PC pc, Vec x, Vec y)
+{
+  PetscErrorCode (*original)(PC, Vec, Vec) = NULL;
+
+  PetscFunctionBeginUser;
+  if (pc->failedreason) {
+    PetscCall(VecSet(y, PETSC_INFINITY));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  PetscCall(PetscObjectQueryFunction((PetscObject)pc, ORIGINAL_APPLY, &original));
+  PetscCall((*original)(pc, x, y));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The factorisation on the rank that has the matrix; made at the first set-up, before which PETSc has nothing inside a telescope. */
+static PetscErrorCode set_up_inner(PC pc, PC inner, PCFailedReason *reason)
+{
+  const char *package;
+  PetscBool cholmod;
+
+  PetscFunctionBeginUser;
+  PetscCall(PCGetApplicationContext(pc, &package));
+  if (package && !inner->setupcalled) {
+    PetscCall(PetscStrcmp(package, MATSOLVERCHOLMOD, &cholmod));
+    PetscCall(PCSetType(inner, cholmod ? PCCHOLESKY : PCLU));
+    PetscCall(PCFactorSetMatSolverType(inner, package));
+    PetscCall(PCSetFromOptions(inner));
+  }
+  PetscCall(SbPCCheckPivots(inner));
+  PetscCall(PCSetUp(inner));
+  PetscCall(PCGetFailedReason(inner, reason));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* PETSc would factor at the first solve; here all ranks know after the set-up whether the one that factors has failed. */
+static PetscErrorCode gathered_setup(PC pc)
+{
+  PetscErrorCode (*original)(PC) = NULL;
+  PCFailedReason reason = PC_NOERROR;
+  PetscMPIInt failed;
+  PC inner;
+  KSP ksp;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscObjectQueryFunction((PetscObject)pc, ORIGINAL, &original));
+  PetscCall((*original)(pc));
+  PetscCall(PCTelescopeGetKSP(pc, &ksp));
+  if (ksp) { /* there is none on ranks that wait */
+    PetscCall(KSPGetPC(ksp, &inner));
+    PetscCall(set_up_inner(pc, inner, &reason));
+  }
+  failed = (PetscMPIInt)reason;
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &failed, 1, MPI_INT, MPI_MAX, PetscObjectComm((PetscObject)pc)));
+  PetscCall(PCSetFailedReason(pc, (PCFailedReason)failed));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbPCCheckPivots(PC pc)
+{
+  PetscBool cholesky, gathered;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscObjectTypeCompare((PetscObject)pc, PCCHOLESKY, &cholesky));
+  PetscCall(PetscObjectTypeCompare((PetscObject)pc, PCTELESCOPE, &gathered));
+  if (!cholesky && !gathered) PetscFunctionReturn(PETSC_SUCCESS);
+  if (pc->ops->setup == guarded_setup || pc->ops->setup == gathered_setup) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscObjectComposeFunction((PetscObject)pc, ORIGINAL, pc->ops->setup));
+  PetscCall(PetscObjectComposeFunction((PetscObject)pc, ORIGINAL_APPLY, pc->ops->apply));
+  pc->ops->setup = cholesky ? guarded_setup : gathered_setup;
+  pc->ops->apply = guarded_apply;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

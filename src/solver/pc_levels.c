@@ -1,0 +1,508 @@
+/*
+  A fixed symmetric approximation of A^-1, A the tangent of CR and DG elements without its volumetric part: no large number is
+  in it, so linear elements at the vertices do not lock and serve as a coarse space for those at the faces.
+
+  DG: with the mean m and the jump d of the two nodes of a face, u = m + (1 - w) d on one side, the cells' energy depends on m
+  only, as the energy of CR does, and d has a stiffness of its own. The two meet in the penalty of jumps alone, which is of
+  the size of either: m by the cycle for CR, d by its diagonal.
+
+  CR: Gauss-Seidel forward, a correction by P1, Gauss-Seidel backward (between ranks: block Jacobi). A P1 function has at the
+  centroid of a face the mean of its values at the three vertices; its jumps vanish and its strains are the same, so the Galerkin
+  product is P1's own matrix, which is assembled from the same blocks. A vertex of a face with a prescribed unknown is constrained.
+  A DG cell that touches this rank's cells with a vertex only may have neighbours that are not here; its strain is that of its own
+  nodes there, so that in a strained body the P1 matrix is slightly nonsymmetric at the border of ranks. GMRES does not mind.
+  Springs of effects are in P1's matrix as the Galerkin product has them: they may be all that holds a body.
+  P1 by algebraic multigrid. Hiptmair and Xu (2007), Nodal auxiliary space preconditioning; Brenner (2003), Poincare-Friedrichs
+  inequalities for piecewise H1 functions.
+*/
+#include "pressure.h"
+#include "gauss_seidel.h"
+
+/* ------------------------------------------------------------------ spaces */
+
+/* Elements of a level: P1 everywhere, or CR in the place of DG. */
+static PetscErrorCode create_elements(SbSpace s, PetscBool p1, SbElement **element)
+{
+  PetscFunctionBeginUser;
+  PetscCall(PetscCalloc1(s->mesh->nbody, element));
+  for (PetscInt b = 0; b < s->mesh->nbody; b++) {
+    const PetscBool vertices = (PetscBool)(p1 || s->element[b]->nodes_per[0]);
+
+    PetscCall(SbElementCreate(vertices ? "p1" : "cr", NULL, &(*element)[b]));
+    (*element)[b]->gamma1 = s->element[b]->gamma1;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Marks of owned nodes of `to` are brought to the other ranks, and the nodes prescribed. */
+static PetscErrorCode fix_marked(SbSpace to, const uint8_t mark[])
+{
+  PetscScalar *v;
+  const PetscReal *x;
+  Vec V;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbSpaceCreateVec(to, &V));
+  PetscCall(VecGetArray(V, &v));
+  for (PetscInt i = 0; i < to->nnode_owned; i++) v[3 * i] = mark[i];
+  PetscCall(VecRestoreArray(V, &v));
+  PetscCall(SbSpaceGetLocalRead(to, V, &x));
+  for (PetscInt i = 0; i < to->nnode; i++) {
+    if (x[3 * i] > 0.) PetscCall(SbSpaceFix(to, i, (int)x[3 * i]));
+  }
+  PetscCall(SbSpaceRestoreLocalRead(to, V, &x));
+  PetscCall(VecDestroy(&V));
+  PetscCall(SbSpaceFixDone(to));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* What is prescribed in `from` is so in `to`: at the same node, or at every vertex of the face. A support holds its face. */
+static PetscErrorCode fix_like(SbSpace from, SbSpace to)
+{
+  uint8_t *mark;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscCalloc1(to->nnode, &mark));
+  for (PetscInt i = 0; i < 4 * from->mesh->ncell; i++) {
+    const PetscInt *node = to->cell_node + 4 * (i / 4), a = i % 4,
+                   support = from->dirichlet_node ? from->dirichlet_node[i] : -1;
+    const uint8_t fixed = from->fixed[support < 0 ? from->cell_node[i] : support];
+
+    if (!fixed) continue;
+    if (SbSpaceCellElement(to, i / 4)->nodes_per[0] && !SbSpaceCellElement(from, i / 4)->nodes_per[0]) {
+      for (PetscInt k = 1; k < 4; k++) mark[node[(a + k) % 4]] |= fixed;
+    } else
+      mark[node[a]] |= fixed;
+  }
+  PetscCall(fix_marked(to, mark));
+  PetscCall(PetscFree(mark));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode add_level(SbLevels v, PetscBool p1)
+{
+  const PetscInt k = v->n++;
+
+  PetscFunctionBeginUser;
+  PetscCall(create_elements(v->space, p1, &v->element[k]));
+  PetscCall(SbSpaceCreate(v->space->mesh, v->space->material, v->element[k], &v->at[k]));
+  PetscCall(fix_like(v->space, v->at[k]));
+  PetscCall(SbSpaceCreateMatrix(v->at[k], p1 ? SB_MATRIX_AIJ : SB_MATRIX_BAIJ, &v->A[k]));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ ways between them */
+
+/* DG: the CR node at each node, the node across and the weights. */
+static PetscErrorCode find_means(SbLevels v)
+{
+  SbSpace s = v->space, m = v->at[1];
+
+  PetscFunctionBeginUser;
+  PetscCall(
+    PetscMalloc4(s->nnode, &v->mean, s->nnode, &v->across, s->nnode, &v->weight, s->nnode_owned, &v->jump));
+  for (PetscInt i = 0; i < s->nnode; i++) {
+    v->across[i] = -1;
+    v->weight[i] = 1.;
+  }
+  for (PetscInt i = 0; i < 4 * s->mesh->ncell; i++) {
+    v->mean[s->cell_node[i]] = m->cell_node[i];
+    if (s->dirichlet_node && s->dirichlet_node[i] >= 0) v->mean[s->dirichlet_node[i]] = m->cell_node[i];
+  }
+  for (PetscInt b = 0; b < s->nbatch; b++) {
+    for (PetscInt k = 0; k < 4 * SB_BATCH; k++) {
+      const PetscInt *node = s->batch_clique + (size_t)b * 8 * SB_BATCH + k;
+
+      v->weight[node[0]] = s->batch_weight[4 * b + k / SB_BATCH][k % SB_BATCH];
+      if (node[4 * SB_BATCH] != node[0]) v->across[node[0]] = node[4 * SB_BATCH];
+    }
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode find_corners(SbLevels v)
+{
+  SbSpace s = v->at[v->n - 2];
+  SbSpace p = v->at[v->n - 1];
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscMalloc1(3 * s->nnode, &v->corner));
+  for (PetscInt i = 0; i < 4 * s->mesh->ncell; i++) {
+    const PetscInt *vertex = p->cell_node + 4 * (i / 4), a = i % 4;
+    const PetscBool face = (PetscBool)!SbSpaceCellElement(s, i / 4)->nodes_per[0];
+
+    for (PetscInt k = 0; k < 3; k++) v->corner[3 * s->cell_node[i] + k] = vertex[face ? (a + 1 + k) % 4 : a];
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The owned part of a plain vector into one with ghosts, and these. */
+static PetscErrorCode load(SbSpace s, Vec from, Vec to, const PetscReal **x)
+{
+  PetscFunctionBeginUser;
+  if (from != to) PetscCall(VecCopy(from, to));
+  PetscCall(SbSpaceGetLocalRead(s, to, x));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Prescribed components of node i are not passed on. */
+static inline PetscReal unless_fixed(SbSpace s, PetscInt i, PetscInt c, PetscReal x)
+{
+  return s->fixed[i] & (1 << c) ? 0. : x;
+}
+
+/* ------------------------------------------------------------------ the cycle for CR */
+
+static PetscErrorCode restrict_to_vertices(SbLevels v, Vec t)
+{
+  const PetscInt k = v->n - 2;
+  SbSpace s = v->at[k], p = v->at[k + 1];
+  const PetscReal *x;
+  PetscScalar *r;
+
+  PetscFunctionBeginUser;
+  PetscCall(load(s, t, v->g[k], &x));
+  PetscCall(VecZeroEntries(v->t[k + 1]));
+  PetscCall(VecGetArray(v->t[k + 1], &r));
+  for (PetscInt i = 0; i < s->nnode; i++) {
+    for (PetscInt a = 0; a < 3; a++) {
+      const PetscInt vertex = v->corner[3 * i + a];
+
+      if (vertex >= p->nnode_owned) continue;
+      for (PetscInt c = 0; c < 3; c++)
+        r[3 * vertex + c] += unless_fixed(p, vertex, c, unless_fixed(s, i, c, x[3 * i + c] / 3.));
+    }
+  }
+  PetscCall(VecRestoreArray(v->t[k + 1], &r));
+  PetscCall(SbSpaceRestoreLocalRead(s, v->g[k], &x));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode add_from_vertices(SbLevels v, Vec z)
+{
+  const PetscInt k = v->n - 2;
+  SbSpace s = v->at[k], p = v->at[k + 1];
+  const PetscReal *x;
+  PetscScalar *out;
+
+  PetscFunctionBeginUser;
+  PetscCall(load(p, v->w[k + 1], v->g[k + 1], &x));
+  PetscCall(VecGetArray(z, &out));
+  for (PetscInt i = 0; i < s->nnode_owned; i++) {
+    const PetscInt *a = v->corner + 3 * i;
+
+    for (PetscInt c = 0; c < 3; c++)
+      out[3 * i + c] += unless_fixed(s, i, c, (x[3 * a[0] + c] + x[3 * a[1] + c] + x[3 * a[2] + c]) / 3.);
+  }
+  PetscCall(VecRestoreArray(z, &out));
+  PetscCall(SbSpaceRestoreLocalRead(p, v->g[k + 1], &x));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode cycle_faces(SbLevels v, Vec r, Vec z)
+{
+  const PetscInt k = v->n - 2;
+  SbSpace at = v->at[k];
+  Mat A = v->A[k];
+
+  PetscFunctionBeginUser;
+  PetscCall(SbGaussSeidel(at, A, v->inverse, SB_GAUSS_SEIDEL_FORWARD, r, z));
+  PetscCall(MatMult(A, z, v->t[k]));
+  PetscCall(VecAYPX(v->t[k], -1., r));
+  PetscCall(restrict_to_vertices(v, v->t[k]));
+  PetscCall(KSPSolve(v->coarse, v->t[k + 1], v->w[k + 1]));
+  PetscCall(add_from_vertices(v, z));
+  PetscCall(MatMult(A, z, v->t[k]));
+  PetscCall(VecAYPX(v->t[k], -1., r));
+  PetscCall(SbGaussSeidel(at, A, v->inverse, SB_GAUSS_SEIDEL_BACKWARD, v->t[k], v->w[k]));
+  PetscCall(VecAXPY(z, 1., v->w[k]));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ DG */
+
+/* r of the means: the two sides of a face together. */
+static PetscErrorCode restrict_to_means(SbLevels v, const PetscReal x[])
+{
+  SbSpace s = v->space, m = v->at[1];
+  PetscScalar *r;
+
+  PetscFunctionBeginUser;
+  PetscCall(VecZeroEntries(v->r[1]));
+  PetscCall(VecGetArray(v->r[1], &r));
+  for (PetscInt i = 0; i < s->nnode; i++) {
+    const PetscInt k = v->mean[i];
+
+    if (k >= m->nnode_owned) continue;
+    for (PetscInt c = 0; c < 3; c++) r[3 * k + c] += unless_fixed(m, k, c, x[3 * i + c]);
+  }
+  PetscCall(VecRestoreArray(v->r[1], &r));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* u = m + (1 - w) d, with the jump's own residual (1 - w) r_own - w r_across. */
+static void spread(SbLevels v, const PetscReal r[], const PetscReal mean[], const PetscScalar diagonal[],
+                   PetscScalar z[])
+{
+  SbSpace s = v->space;
+
+  for (PetscInt i = 0; i < s->nnode_owned; i++) {
+    const PetscInt other = v->across[i];
+    const PetscReal w = v->weight[i];
+
+    for (PetscInt c = 0; c < 3; c++) {
+      const PetscInt k = 3 * i + c;
+
+      if (s->fixed[i] & (1 << c)) {
+        z[k] = r[k] / diagonal[k];
+        continue;
+      }
+      z[k] = mean[3 * v->mean[i] + c];
+      if (other >= 0) z[k] += (1. - w) * v->jump[i] * ((1. - w) * r[k] - w * r[3 * other + c]);
+    }
+  }
+}
+
+PetscErrorCode SbLevelsApply(SbLevels v, Vec r, Vec z)
+{
+  const PetscReal *x, *mean;
+  const PetscScalar *diagonal;
+  PetscScalar *out;
+
+  PetscFunctionBeginUser;
+  if (v->n == 2) {
+    PetscCall(cycle_faces(v, r, z));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  PetscCall(load(v->space, r, v->r[0], &x));
+  PetscCall(restrict_to_means(v, x));
+  PetscCall(cycle_faces(v, v->r[1], v->z[1]));
+  PetscCall(load(v->at[1], v->z[1], v->z[1], &mean));
+  PetscCall(VecGetArrayRead(v->t[0], &diagonal));
+  PetscCall(VecGetArray(z, &out));
+  spread(v, x, mean, diagonal, out);
+  PetscCall(VecRestoreArray(z, &out));
+  PetscCall(VecRestoreArrayRead(v->t[0], &diagonal));
+  PetscCall(SbSpaceRestoreLocalRead(v->at[1], v->z[1], &mean));
+  PetscCall(SbSpaceRestoreLocalRead(v->space, v->r[0], &x));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Diagonal of the face terms and the mass, without the cells. */
+static PetscErrorCode loose_diagonal(SbLevels v, Vec D)
+{
+  SbSpace s = v->space;
+  PetscScalar *d;
+
+  PetscFunctionBeginUser;
+  PetscCall(VecGetArray(D, &d));
+  for (PetscInt r = 0; r < s->nregion; r++) {
+    const SbRegion *region = &s->region[r];
+    const PetscReal stiffness = v->shift_k + v->shift_v * region->beta,
+                    inertia = v->shift_a + v->shift_v * region->alpha;
+
+    for (PetscInt k = 4 * SB_BATCH * region->bstart; k < 4 * SB_BATCH * region->bend; k++) {
+      const PetscInt i = s->batch_node[k];
+
+      if (i < s->nnode_owned)
+        d[3 * i] = stiffness * s->plan->face_term[0][s->plan->diagonal[i]] + inertia * s->node_mass[i];
+    }
+  }
+  PetscCall(VecRestoreArray(D, &d));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Inverse stiffness of the jumps: (1-w)^2 A_ii - 2 w (1-w) A_ij + w^2 A_jj of the face terms and the mass. */
+static PetscErrorCode jump_stiffness(SbLevels v)
+{
+  SbSpace s = v->space;
+  const SbPlan p = s->plan;
+  const PetscReal *own;
+
+  PetscFunctionBeginUser;
+  PetscCall(MatGetDiagonal(v->A[0], v->t[0]));
+  PetscCall(loose_diagonal(v, v->r[0]));
+  PetscCall(load(s, v->r[0], v->r[0], &own));
+  for (PetscInt r = 0; r < s->nregion; r++) {
+    const SbRegion *region = &s->region[r];
+
+    for (PetscInt k = 4 * SB_BATCH * region->bstart; k < 4 * SB_BATCH * region->bend; k++) {
+      const PetscInt b = k / (4 * SB_BATCH), a = k / SB_BATCH % 4, i = s->batch_node[k], j = v->across[i],
+                     at = p->offset[((size_t)b * 64 + (size_t)(8 * a + 4 + a)) * SB_BATCH +
+                                    (size_t)(k % SB_BATCH)];
+      const PetscReal w = v->weight[i];
+
+      if (i >= s->nnode_owned || j < 0) continue;
+      v->jump[i] = 1. / ((1. - w) * (1. - w) * own[3 * i] + w * w * own[3 * j] -
+                         2. * w * (1. - w) * (v->shift_k + v->shift_v * region->beta) *
+                           p->face_term[at < 0][at < 0 ? ~at : at]);
+    }
+  }
+  PetscCall(SbSpaceRestoreLocalRead(s, v->r[0], &own));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ springs */
+
+PetscErrorCode SbLevelsAddSpring(SbLevels v, PetscInt node, PetscReal factor, const PetscReal block[9])
+{
+  PetscFunctionBeginUser;
+  if (node >= v->space->nnode_owned) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!v->spring) PetscCall(PetscCalloc1(9 * (size_t)v->space->nnode_owned, &v->spring));
+  v->sprung = PETSC_TRUE;
+  for (int k = 0; k < 9; k++) v->spring[9 * node + k] += factor * block[k];
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Springs of all ranks at the nodes of at[n-2], ghosts among them, one row of the blocks after the other. */
+static PetscErrorCode gather_springs(SbLevels v)
+{
+  const SbSpace s = v->space;
+  const size_t size = 9 * (size_t)v->at[v->n - 2]->nnode;
+
+  PetscFunctionBeginUser;
+  if (!v->shared) PetscCall(PetscMalloc1(size, &v->shared));
+  PetscCall(PetscArrayzero(v->shared, size));
+  for (PetscInt row = 0; row < 3; row++) {
+    const PetscReal *x;
+    PetscScalar *own;
+
+    PetscCall(VecGetArray(v->r[0], &own));
+    for (PetscInt k = 0; k < 3 * s->nnode_owned; k++)
+      own[k] = v->spring ? v->spring[9 * (k / 3) + 3 * row + k % 3] : 0.;
+    PetscCall(VecRestoreArray(v->r[0], &own));
+    PetscCall(SbSpaceGetLocalRead(s, v->r[0], &x));
+    for (PetscInt k = 0; k < 3 * s->nnode; k++)
+      v->shared[9 * (v->mean ? v->mean[k / 3] : k / 3) + 3 * row + k % 3] += x[k];
+    PetscCall(SbSpaceRestoreLocalRead(s, v->r[0], &x));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbLevelsShareSprings(SbLevels v)
+{
+  const SbSpace s = v->at[v->n - 2], p = v->at[v->n - 1];
+  PetscBool any = v->sprung;
+
+  PetscFunctionBeginUser;
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &any, 1, SB_MPI_BOOL, MPI_LOR, v->space->comm));
+  if (!any) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(gather_springs(v));
+  for (PetscInt i = 0; i < 4 * s->mesh->ncell; i++) {
+    const PetscInt c = i / 4, a = i % 4;
+    const PetscBool face = (PetscBool)!SbSpaceCellElement(s, c)->nodes_per[0];
+    PetscReal *d = v->shared + 9 * s->cell_node[i], ninth[9];
+
+    if (d[0] + d[4] + d[8] == 0.) continue;
+    if (v->n == 3) PetscCall(SbSpaceAddCellBlock(s, v->A[v->n - 2], c, a, a, d));
+    for (int k = 0; k < 9; k++) ninth[k] = d[k] / 9.;
+    for (PetscInt k = 1; k < 4; k++) {
+      for (PetscInt l = 1; l < 4; l++)
+        PetscCall(
+          SbSpaceAddCellBlock(p, v->A[v->n - 1], c, face ? (a + k) % 4 : a, face ? (a + l) % 4 : a, ninth));
+    }
+    PetscCall(PetscArrayzero(d, 9)); /* another cell has this node too */
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ assembly and life */
+
+PetscErrorCode SbLevelsAssemble(SbLevels v, const SbStage *stage, const SbVolumetric *out)
+{
+  PetscFunctionBeginUser;
+  v->shift_a = stage->shift_a;
+  v->shift_v = stage->shift_v;
+  v->shift_k = stage->shift_k;
+  if (v->sprung) PetscCall(PetscArrayzero(v->spring, 9 * (size_t)v->space->nnode_owned));
+  v->sprung = PETSC_FALSE;
+  for (PetscInt k = 1; k < v->n; k++) {
+    for (PetscInt r = 0; r < v->space->nregion; r++) {
+      v->at[k]->region[r].alpha = v->space->region[r].alpha;
+      v->at[k]->region[r].beta = v->space->region[r].beta;
+    }
+  }
+  PetscCall(SbSpaceAssembleSplit(v->space, stage, v->n, v->at, v->A, out));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbLevelsSetUp(SbLevels v, PetscBool *positive)
+{
+  PetscFunctionBeginUser;
+  if (v->n == 3) PetscCall(jump_stiffness(v));
+  PetscCall(SbGaussSeidelSetUp(v->at[v->n - 2], v->A[v->n - 2], v->inverse, positive));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, positive, 1, SB_MPI_BOOL, MPI_LAND, v->space->comm));
+  if (!*positive) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(KSPSetOperators(v->coarse, v->A[v->n - 1], v->A[v->n - 1]));
+  PetscCall(KSPSetUp(v->coarse));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode create_coarse(SbLevels v)
+{
+  PC pc;
+
+  PetscFunctionBeginUser;
+  PetscCall(KSPCreate(v->space->comm, &v->coarse));
+  PetscCall(KSPSetOptionsPrefix(v->coarse, "pressure_coarse_"));
+  PetscCall(KSPSetType(v->coarse, KSPPREONLY));
+  PetscCall(KSPGetPC(v->coarse, &pc));
+  PetscCall(PCSetType(pc, PCGAMG));
+  PetscCall(PCGAMGSetReuseInterpolation(pc, PETSC_TRUE));
+  PetscCall(KSPSetFromOptions(v->coarse));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbLevelsCreate(SbSpace s, SbLevels *levels)
+{
+  SbLevels v;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscNew(&v));
+  v->space = v->at[0] = s;
+  v->n = 1;
+  PetscCall(SbSpaceCreateMatrix(s, SB_MATRIX_BAIJ, &v->A[0]));
+  if (s->width > 4) {
+    PetscCall(add_level(v, PETSC_FALSE));
+    PetscCall(find_means(v));
+  }
+  PetscCall(add_level(v, PETSC_TRUE));
+  PetscCall(find_corners(v));
+  for (PetscInt k = 0; k < v->n; k++) {
+    PetscCall(SbSpaceCreateVec(v->at[k], &v->r[k]));
+    PetscCall(SbSpaceCreateVec(v->at[k], &v->z[k]));
+    PetscCall(SbSpaceCreateVec(v->at[k], &v->g[k]));
+    PetscCall(MatCreateVecs(v->A[k], &v->t[k], &v->w[k]));
+  }
+  PetscCall(PetscMalloc1(9 * (size_t)v->at[v->n - 2]->nnode_owned, &v->inverse));
+  PetscCall(create_coarse(v));
+  *levels = v;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbLevelsDestroy(SbLevels *levels)
+{
+  SbLevels v = *levels;
+
+  PetscFunctionBeginUser;
+  if (!v) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscFree(v->inverse));
+  PetscCall(PetscFree(v->spring));
+  PetscCall(PetscFree(v->shared));
+  for (PetscInt k = 0; k < v->n; k++) {
+    PetscCall(MatDestroy(&v->A[k]));
+    if (k) PetscCall(SbSpaceDestroy(&v->at[k]));
+    for (PetscInt b = 0; k && b < v->space->mesh->nbody; b++) PetscCall(SbElementDestroy(&v->element[k][b]));
+    PetscCall(PetscFree(v->element[k]));
+    PetscCall(VecDestroy(&v->r[k]));
+    PetscCall(VecDestroy(&v->z[k]));
+    PetscCall(VecDestroy(&v->g[k]));
+    PetscCall(VecDestroy(&v->t[k]));
+    PetscCall(VecDestroy(&v->w[k]));
+  }
+  PetscCall(PetscFree4(v->mean, v->across, v->weight, v->jump));
+  PetscCall(PetscFree(v->corner));
+  PetscCall(KSPDestroy(&v->coarse));
+  PetscCall(PetscFree(*levels));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

@@ -1,0 +1,335 @@
+/*
+  Nearly incompressible CR and DG: the pressures of the cells as unknowns of the iteration.
+
+  K = A + B^T C^-1 B (pc_pressure_operator.c) has a condition that grows with lambda. K u = r is the first half of
+
+    [ A  B^T ] [u]   [r]
+    [ B  -C  ] [p] = [0],      C = V / lambda,
+
+  which stays well conditioned up to lambda = infinity: with one pressure per cell, CR satisfies the inf-sup condition on every
+  mesh (Crouzeix and Raviart 1973), so that S = C + 1.5 V / (2 mu) on the diagonal stands for C + B A^-1 B^T. GMRES with the
+  upper triangular preconditioner of A^ (pc_levels.c) and -S on its right takes a number of iterations that depends neither on
+  lambda nor on the mesh. Benzi, Golub and Liesen (2005), Numerical solution of saddle point problems, sections 10 and 8.
+
+  Around it, refinement: the residual f - K u is computed again, and is the next right-hand side. That is what -ksp_rtol
+  asks; the iterations reported are those of GMRES. f - K u = r_u - B^T C^-1 r_p has
+  the residual of the cells times lambda, and GMRES minimises both with these weights, up to lambda = 1e4 mu. Beyond that
+  doubles end: with nu = 0.499999 K u is known no better than eps |B^T| C^-1 |B| |u|, whoever has solved. A residual below four times
+  this is accepted, said by -info, unless it is so large that the matrix must be singular.
+
+  Not handled: with inertia S takes no notice of it; time steps far below the time in which a shear wave crosses a cell cost more
+  iterations.
+
+  petsc/private/kspimpl.h: the outer solver would report its own handful of corrections as iterations.
+*/
+#include "pressure.h"
+#include "sbsolver.h"
+#include <petsc/private/kspimpl.h>
+
+#define NAME "pressure"
+#define RESTART 120 /* vectors that GMRES keeps at most: 80 cost 97 iterations in place of 81 on 64 ranks */
+#define LARGEST_WEIGHT 1e4 /* lambda / mu in the norm of GMRES */
+#define MARGIN 0.3         /* how far below the target GMRES aims */
+#define TIGHTER 0.03       /* times that after a correction that did not help */
+#define OF_PART 1e-2 /* aim of GMRES where the operator has a part that K lacks, which FGMRES corrects */
+#define AT_MOST 1e-2 /* of the right-hand side: more is never accepted */
+#define ROUNDING 4.  /* times the rounding errors of K u: what is accepted */
+
+typedef struct {
+  SbSpace space;
+  SbPressureOperator op; /* of the operator at the last set-up */
+  KSP inner;
+  Mat M;
+  Vec x, b, t;               /* of the inner system; of the nodes */
+  PetscReal *weight;         /* [ncell_owned] on the rows of the cells, N/m^3 */
+  KSP ksp;                   /* that has the convergence test below; borrowed */
+  PetscReal target, last;    /* residual wanted, the one before, N */
+  PetscReal size, margin;    /* of the right-hand side, N; of the next correction */
+  PetscInt its, limit, slow; /* of GMRES in this solve; corrections that did not help */
+  PetscInt nsolve, total, most;
+} Pressure;
+
+/* ------------------------------------------------------------------ the system of nodes and cells */
+
+static PetscErrorCode MatMult_Mixed(Mat M, Vec X, Vec Y)
+{
+  const PetscScalar *x;
+  PetscScalar *y;
+  PetscInt n;
+  Pressure *s;
+
+  PetscFunctionBeginUser;
+  PetscCall(MatShellGetContext(M, &s));
+  n = 3 * s->space->nnode_owned;
+  PetscCall(VecGetArrayRead(X, &x));
+  PetscCall(VecGetArray(Y, &y));
+  PetscCall(SbPressureOperatorApply(s->op, x, x + n, y, y + n));
+  for (PetscInt c = 0; c < s->space->mesh->ncell_owned; c++)
+    y[n + c] = s->weight[c] * (y[n + c] - s->op->C[c] * x[n + c]);
+  PetscCall(VecRestoreArray(Y, &y));
+  PetscCall(VecRestoreArrayRead(X, &x));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* p = -S^-1 r_p, u = A^ (r_u - B^T p). */
+static PetscErrorCode PCApply_Mixed(PC pc, Vec R, Vec Z)
+{
+  SbPressureOperator op;
+  const PetscScalar *r;
+  PetscScalar *z, *t;
+  PetscInt n;
+  Pressure *s;
+
+  PetscFunctionBeginUser;
+  PetscCall(PCShellGetContext(pc, &s));
+  op = s->op;
+  n = 3 * s->space->nnode_owned;
+  PetscCall(VecGetArray(Z, &z));
+  PetscCall(VecGetArrayRead(R, &r));
+  PetscCall(VecGetArray(s->t, &t));
+  for (PetscInt c = 0; c < s->space->mesh->ncell_owned; c++) z[n + c] = -r[n + c] / (s->weight[c] * op->S[c]);
+  PetscCall(PetscArraycpy(t, r, n));
+  PetscCall(SbPressureOperatorSubtract(op, z + n, t));
+  PetscCall(VecRestoreArray(s->t, &t));
+  PetscCall(VecRestoreArrayRead(R, &r));
+  PetscCall(VecPlaceArray(op->b, z));
+  PetscCall(SbLevelsApply(op->levels, s->t, op->b));
+  PetscCall(VecResetArray(op->b));
+  PetscCall(VecRestoreArray(Z, &z));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode create_inner(Pressure *s)
+{
+  const PetscInt n = 3 * s->space->nnode_owned + s->space->mesh->ncell_owned;
+  PC pc;
+
+  PetscFunctionBeginUser;
+  PetscCall(MatCreateShell(s->space->comm, n, n, PETSC_DETERMINE, PETSC_DETERMINE, s, &s->M));
+  PetscCall(MatShellSetOperation(s->M, MATOP_MULT, SB_OPERATION(MatMult_Mixed)));
+  PetscCall(MatSetUp(s->M));
+  PetscCall(MatCreateVecs(s->M, &s->x, &s->b));
+  PetscCall(MatCreateVecs(s->op->levels->A[0], &s->t, NULL));
+  PetscCall(PetscMalloc1(s->space->mesh->ncell_owned, &s->weight));
+  PetscCall(KSPCreate(s->space->comm, &s->inner));
+  PetscCall(KSPSetOptionsPrefix(s->inner, "pressure_"));
+  PetscCall(KSPSetOperators(s->inner, s->M, s->M));
+  PetscCall(KSPSetType(s->inner, KSPGMRES));
+  PetscCall(KSPGMRESSetRestart(s->inner, RESTART));
+  PetscCall(SbKSPRefineOrthogonalization(s->inner));
+  PetscCall(KSPSetPCSide(s->inner, PC_RIGHT));
+  PetscCall(KSPSetNormType(s->inner, KSP_NORM_UNPRECONDITIONED));
+  PetscCall(KSPGetPC(s->inner, &pc));
+  PetscCall(PCSetType(pc, PCSHELL));
+  PetscCall(PCShellSetContext(pc, s));
+  PetscCall(PCShellSetName(pc, "nodes and pressures"));
+  PetscCall(PCShellSetApply(pc, PCApply_Mixed));
+  PetscCall(KSPSetFromOptions(s->inner));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ set-up and application */
+
+static PetscErrorCode PCSetUp_Pressure(PC pc)
+{
+  PetscBool positive;
+  Pressure *s;
+  Mat K;
+
+  PetscFunctionBeginUser;
+  PetscCall(PCShellGetContext(pc, &s));
+  PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_SOLVER_SETUP], pc, 0, 0, 0));
+  PetscCall(PCGetOperators(pc, NULL, &K));
+  PetscCall(SbPressureOperatorGet(K, &s->op));
+  PetscCheck(s->op, s->space->comm, PETSC_ERR_ARG_WRONG,
+             "The operator is not one of SbPressureOperatorCreate()");
+  if (!s->inner) PetscCall(create_inner(s));
+  PetscCall(SbLevelsSetUp(s->op->levels, &positive));
+  PetscCall(PCSetFailedReason(pc, positive ? PC_NOERROR : PC_FACTOR_NUMERIC_ZEROPIVOT));
+  for (PetscInt c = 0; c < s->space->mesh->ncell_owned; c++) {
+    const PetscReal limit = LARGEST_WEIGHT / (s->op->S[c] - s->op->C[c]);
+
+    s->weight[c] = s->op->Cinv[c] > 0. ? s->op->norm[c] * PetscMin(s->op->Cinv[c], limit) : 1.;
+  }
+  PetscCall(PetscLogEventEnd(SbEvents[SB_EVENT_SOLVER_SETUP], pc, 0, 0, 0));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* One correction: z = K^-1 r to the accuracy that is wanted. */
+static PetscErrorCode PCApply_Pressure(PC pc, Vec r, Vec z)
+{
+  KSPConvergedReason reason;
+  const PetscScalar *from;
+  PetscScalar *to;
+  PetscReal norm;
+  PetscReal rtol;
+  PetscInt its, n;
+  Pressure *s;
+  Mat A, K;
+
+  PetscFunctionBeginUser;
+  PetscCall(PCShellGetContext(pc, &s));
+  n = 3 * s->space->nnode_owned;
+  PetscCall(PCGetOperators(pc, &A, &K));
+  PetscCall(VecNorm(r, NORM_2, &norm));
+  rtol = A == K ? PetscMin(0.5, PetscMax(1e-10, s->margin * s->target / norm)) : OF_PART;
+  PetscCall(VecZeroEntries(s->b));
+  PetscCall(VecGetArray(s->b, &to));
+  PetscCall(VecGetArrayRead(r, &from));
+  PetscCall(PetscArraycpy(to, from, n));
+  PetscCall(VecRestoreArrayRead(r, &from));
+  PetscCall(VecRestoreArray(s->b, &to));
+  PetscCall(KSPSetTolerances(s->inner, rtol, 0., PETSC_DEFAULT, PetscMax(1, s->limit - s->its)));
+  PetscCall(KSPSolve(s->inner, s->b, s->x));
+  PetscCall(KSPGetIterationNumber(s->inner, &its));
+  PetscCall(KSPGetConvergedReason(s->inner, &reason));
+  s->its += its;
+  if (reason < 0 && reason != KSP_DIVERGED_ITS) PetscCall(PCSetFailedReason(pc, PC_SUBPC_ERROR));
+  PetscCall(VecGetArrayRead(s->x, &from));
+  PetscCall(VecGetArray(z, &to));
+  PetscCall(PetscArraycpy(to, from, n));
+  PetscCall(VecRestoreArray(z, &to));
+  PetscCall(VecRestoreArrayRead(s->x, &from));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ the solver around it */
+
+/* PETSc's test; then whether the residual is one of rounding, or no longer falls. */
+static PetscErrorCode converged(KSP ksp, PetscInt it, PetscReal norm, KSPConvergedReason *reason, void *ctx)
+{
+  PetscReal level;
+  Pressure *s;
+  Vec x;
+  PC pc;
+
+  PetscFunctionBeginUser;
+  PetscCall(KSPGetPC(ksp, &pc));
+  PetscCall(PCShellGetContext(pc, &s));
+  PetscCall(KSPConvergedDefault(ksp, it, norm, reason, ctx));
+  if (*reason || !it) {
+    s->last = norm;
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  if (s->its >= s->limit) *reason = KSP_DIVERGED_ITS;
+  if (norm > 0.5 * s->last) {
+    s->slow++;
+    s->margin *= TIGHTER;
+  }
+  s->last = norm;
+  PetscCall(KSPGetSolution(ksp, &x));
+  PetscCall(SbPressureOperatorRounding(s->op, x, &level));
+  PetscCall(PetscInfo(ksp, "residual %g after %" PetscInt_FMT " iterations, wanted %g, rounding of K u %g\n",
+                      (double)norm, s->its, (double)s->target, (double)level));
+  if (norm <= PetscMin(ROUNDING * level, AT_MOST * s->size))
+    *reason = KSP_CONVERGED_ATOL;
+  else if (s->slow > 2)
+    *reason = KSP_DIVERGED_BREAKDOWN;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode PCPreSolve_Pressure(PC pc, KSP ksp, Vec b, Vec x)
+{
+  PetscReal rtol, atol, norm;
+  void *test;
+  Pressure *s;
+
+  PetscFunctionBeginUser;
+  (void)x;
+  PetscCall(PCShellGetContext(pc, &s));
+  if (s->ksp != ksp) {
+    PetscCall(KSPConvergedDefaultCreate(&test));
+    PetscCall(KSPSetConvergenceTest(ksp, converged, test, KSPConvergedDefaultDestroy));
+    s->ksp = ksp;
+  }
+  PetscCall(KSPGetTolerances(ksp, &rtol, &atol, NULL, &s->limit));
+  PetscCall(VecNorm(b, NORM_2, &norm));
+  s->target = PetscMax(rtol * norm, atol);
+  s->size = norm;
+  s->its = s->slow = 0;
+  s->margin = MARGIN;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode PCPostSolve_Pressure(PC pc, KSP ksp, Vec b, Vec x)
+{
+  Pressure *s;
+
+  PetscFunctionBeginUser;
+  (void)b;
+  (void)x;
+  PetscCall(PCShellGetContext(pc, &s));
+  PetscCall(PetscInfo(pc, "%" PetscInt_FMT " corrections, %" PetscInt_FMT " iterations\n", ksp->its, s->its));
+  ksp->its = s->its;
+  s->nsolve++;
+  s->total += s->its;
+  s->most = PetscMax(s->most, s->its);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ life */
+
+static PetscErrorCode PCView_Pressure(PC pc, PetscViewer viewer)
+{
+  Pressure *s;
+
+  PetscFunctionBeginUser;
+  PetscCall(PCShellGetContext(pc, &s));
+  PetscCall(PetscViewerASCIIPrintf(viewer, "  nodes, and pressures of the cells as unknowns\n"));
+  if (s->inner) PetscCall(KSPView(s->inner, viewer));
+  if (s->op) PetscCall(KSPView(s->op->levels->coarse, viewer));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode PCDestroy_Pressure(PC pc)
+{
+  Pressure *s;
+
+  PetscFunctionBeginUser;
+  PetscCall(PCShellGetContext(pc, &s));
+  PetscCall(KSPDestroy(&s->inner));
+  PetscCall(MatDestroy(&s->M));
+  PetscCall(VecDestroy(&s->x));
+  PetscCall(VecDestroy(&s->b));
+  PetscCall(VecDestroy(&s->t));
+  PetscCall(PetscFree(s->weight));
+  PetscCall(PetscFree(s));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbPCPressureCreate(SbSpace space, PC pc)
+{
+  Pressure *s;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscNew(&s));
+  s->space = space;
+  PetscCall(PCSetType(pc, PCSHELL));
+  PetscCall(PCShellSetContext(pc, s));
+  PetscCall(PCShellSetName(pc, NAME));
+  PetscCall(PCShellSetSetUp(pc, PCSetUp_Pressure));
+  PetscCall(PCShellSetApply(pc, PCApply_Pressure));
+  PetscCall(PCShellSetPreSolve(pc, PCPreSolve_Pressure));
+  PetscCall(PCShellSetPostSolve(pc, PCPostSolve_Pressure));
+  PetscCall(PCShellSetView(pc, PCView_Pressure));
+  PetscCall(PCShellSetDestroy(pc, PCDestroy_Pressure));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbPCPressureGetStats(PC pc, PetscInt *nsolve, PetscInt *total, PetscInt *most)
+{
+  PetscBool is;
+  const char *name = NULL;
+  Pressure *s;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscObjectTypeCompare((PetscObject)pc, PCSHELL, &is));
+  if (is) PetscCall(PCShellGetName(pc, &name));
+  PetscCheck(name && !strcmp(name, NAME), PetscObjectComm((PetscObject)pc), PETSC_ERR_ARG_WRONG,
+             "Not a preconditioner of SbPCPressureCreate()");
+  PetscCall(PCShellGetContext(pc, &s));
+  if (nsolve) *nsolve = s->nsolve;
+  if (total) *total = s->total;
+  if (most) *most = s->most;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

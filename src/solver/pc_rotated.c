@@ -1,0 +1,472 @@
+/*
+  A preconditioner that factors seldom: P^-1 = Q A0^-1 Q^T.
+
+  The tangent of a body that has turned is nearly the old one turned with it: with Q block diagonal, one rotation per node
+  since the factorisation, P = Q A0 Q^T differs from A by how much rotations vary across a cell. Where they vary little the
+  iteration hardly notices; where they vary much the nodes are solved exactly (exact_nodes.c). So one factorisation serves a
+  whole run, and a step of a swinging bar takes six to ten iterations to 1e-4.
+
+  A0^-1 is applied by a factor in 16-bit integers (factor.c). On several ranks each eliminates its interior, and what is left on
+  the nodes between them is solved by all together (interface.c): the same preconditioner as on one rank, but for rounding.
+
+  Prescribed unknowns: nodes with all three take no part and are divided by their diagonal; nodes with one or two are not
+  turned. Renewal: see SbPCRotatedCreate(); by counts of iterations only, so that runs are repeatable.
+*/
+#include "sbsolver.h"
+#include "rotated.h"
+
+#define WORSE_FACTOR 4 /* renew when a solve takes this many times the iterations right after factoring */
+#define WORSE_PLUS 16  /* and this many more */
+
+typedef struct {
+  SbSpace space;
+  SbInterface face;
+  PetscInt n, nkeep; /* nodes of the factor: interior ones, then those of the interface that they touch */
+  PetscInt *node;    /* [n] local nodes of the space */
+  PetscInt *local;   /* [nnode] inverse, -1 for nodes without part */
+  PetscInt *ia, *ja; /* graph of the interior rows */
+  SbFactor factor;
+  SbLane *cells;     /* [nbatch][9] rotations, when the operator does not hold them */
+  PetscReal *turn;   /* [nnode_owned][9] rotations of the nodes now */
+  PetscReal *turn0;  /* and at the factorisation */
+  PetscReal *spread; /* [nnode_owned] */
+  float *Q;          /* [nnode_owned][9] the turn since the factorisation */
+  float
+    *diagonal; /* [nnode_owned][3] inverse diagonal of fully prescribed nodes; allocated when there are any */
+  float *b, *x;      /* [n][3] */
+  float *kept;       /* [nkeep][3] */
+  float *edge;       /* [3 face->n] */
+  float *r, *r1, *z; /* [nnode_owned][3] */
+  SbExactNodes exact;
+  PetscReal limit; /* spread from which on a node is solved exactly */
+  PetscReal scale; /* residuals are multiplied by this, to stay clear of the ends of the range of float */
+  PetscInt fresh;  /* iterations of the first solve with the present factor, -1 before it */
+  PetscInt nfactor;
+  PetscBool renew; /* no factor, or one that is to be renewed */
+} Rotated;
+
+/* ------------------------------------------------------------------ set-up, once */
+
+/* Numbers the nodes of the factor and finds the graph of its rows. */
+static PetscErrorCode number_nodes(Rotated *p)
+{
+  SbSpace s = p->space;
+  const SbPlan plan = s->plan;
+  PetscInt nz = 0, ninterior;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscMalloc2(s->nnode, &p->node, s->nnode, &p->local));
+  for (PetscInt i = 0; i < s->nnode; i++) p->local[i] = -1;
+  for (PetscInt i = 0; i < s->nnode_owned; i++) {
+    if (s->fixed[i] == 7 || p->face->index[i] >= 0) continue;
+    p->local[i] = p->n;
+    p->node[p->n++] = i;
+    nz += plan->di[i + 1] - plan->di[i] + plan->oi[i + 1] - plan->oi[i];
+  }
+  ninterior = p->n;
+  for (PetscInt i = 0; i < s->nnode; i++) {
+    if (p->face->index[i] < 0) continue;
+    p->local[i] = p->n;
+    p->node[p->n++] = i;
+  }
+  p->nkeep = p->n - ninterior;
+  PetscCall(PetscMalloc2(ninterior + 1, &p->ia, nz, &p->ja));
+  p->ia[0] = nz = 0;
+  for (PetscInt k = 0; k < ninterior; k++) {
+    const PetscInt i = p->node[k];
+
+    for (PetscInt e = plan->di[i]; e < plan->di[i + 1]; e++) {
+      if (p->local[plan->dj[e]] >= 0) p->ja[nz++] = p->local[plan->dj[e]];
+    }
+    for (PetscInt e = plan->oi[i]; e < plan->oi[i + 1]; e++) {
+      if (p->local[plan->oj[e]] >= 0) p->ja[nz++] = p->local[plan->oj[e]];
+    }
+    p->ia[k + 1] = nz;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode set_up_once(Rotated *p)
+{
+  SbSpace s = p->space;
+  const PetscInt n = s->nnode_owned;
+
+  PetscFunctionBeginUser;
+  if (p->factor) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!s->plan) PetscCall(SbPlanCreate(s, &s->plan));
+  PetscCall(SbInterfaceCreate(s, &p->face));
+  PetscCall(number_nodes(p));
+  PetscCall(SbFactorCreate(p->n, p->nkeep, p->ia, p->ja, &p->factor));
+  PetscCall(SbExactNodesCreate(s, &p->exact));
+  PetscCall(PetscMalloc3(9 * n, &p->turn, 9 * n, &p->turn0, n, &p->spread));
+  PetscCall(PetscMalloc5(9 * n, &p->Q, 3 * n, &p->diagonal, 3 * n, &p->r, 3 * n, &p->r1, 3 * n, &p->z));
+  PetscCall(PetscMalloc4(3 * p->n, &p->b, 3 * p->n, &p->x, 3 * p->nkeep, &p->kept, 3 * p->face->n, &p->edge));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ set-up for a new operator */
+
+/* Rotations of cells that belong to the operator. */
+static PetscErrorCode find_cells(Rotated *p, Mat A, const SbLane **cells)
+{
+  SbSpace s = p->space;
+  const PetscReal *u;
+  Vec state;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbMatrixFreeGetRotations(A, cells));
+  if (*cells) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscObjectQuery((PetscObject)A, "sb_state", (PetscObject *)&state));
+  PetscCheck(state || s->linear, s->comm, PETSC_ERR_ARG_WRONGSTATE,
+             "The operator does not carry its displacement: compose it as sb_state");
+  if (!p->cells) PetscCall(PetscMalloc1(9 * s->nbatch, &p->cells));
+  if (s->linear)
+    SbSpaceCellRotations(s, NULL, p->cells);
+  else {
+    PetscCall(SbSpaceGetLocalRead(s, state, &u));
+    SbSpaceCellRotations(s, u, p->cells);
+    PetscCall(SbSpaceRestoreLocalRead(s, state, &u));
+  }
+  *cells = (const SbLane *)p->cells;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Adds the rows of own interface nodes to the Schur complement; diagonals of prescribed nodes. */
+static PetscErrorCode add_other_rows(Rotated *p, Mat A, PetscReal schur[])
+{
+  SbSpace s = p->space;
+  const size_t m = 3 * (size_t)p->face->n;
+  PetscInt n = 0, *node, *ia, *ja;
+  PetscReal *block;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscMalloc2(s->nnode_owned, &node, s->nnode_owned + 1, &ia));
+  for (PetscInt i = 0; i < s->nnode_owned; i++) {
+    if (p->face->index[i] >= 0 || s->fixed[i] == 7) node[n++] = i;
+  }
+  PetscCall(SbSpaceGetRows(s, A, n, node, ia, NULL, NULL));
+  PetscCall(PetscMalloc2(ia[n], &ja, 9 * ia[n], &block));
+  PetscCall(SbSpaceGetRows(s, A, n, node, ia, ja, block));
+  for (PetscInt k = 0; k < n; k++) {
+    const PetscInt i = node[k];
+
+    for (PetscInt at = ia[k]; at < ia[k + 1]; at++) {
+      const PetscInt j = ja[at], row = p->face->index[i], column = p->face->index[j];
+
+      if (i == j && s->fixed[i] == 7) {
+        for (PetscInt c = 0; c < 3; c++) p->diagonal[3 * i + c] = (float)(1. / block[9 * at + 4 * c]);
+      } else if (row >= 0 && column >= 0 && row >= column) {
+        for (PetscInt e = 0; e < 9; e++)
+          schur[(size_t)(3 * column + e % 3) * m + (size_t)(3 * row + e / 3)] += block[9 * at + e];
+      }
+    }
+  }
+  PetscCall(PetscFree2(ja, block));
+  PetscCall(PetscFree2(node, ia));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Adds the Schur complement of the own interior, which is numbered locally, to the one of the interface. */
+static void add_own_schur(const Rotated *p, const PetscReal own[], PetscReal schur[])
+{
+  const size_t m = 3 * (size_t)p->face->n, k = 3 * (size_t)p->nkeep;
+  const PetscInt *node = p->node + p->n - p->nkeep;
+
+  for (size_t j = 0; j < k; j++) {
+    for (size_t i = j; i < k; i++) {
+      const size_t row = 3 * (size_t)p->face->index[node[i / 3]] + i % 3;
+      const size_t column = 3 * (size_t)p->face->index[node[j / 3]] + j % 3;
+
+      schur[PetscMin(row, column) * m + PetscMax(row, column)] += own[j * k + i];
+    }
+  }
+}
+
+static PetscErrorCode factor_operator(Rotated *p, Mat A, PetscBool *ok)
+{
+  SbSpace s = p->space;
+  const PetscInt ninterior = p->n - p->nkeep;
+  PetscInt *ia, *ja, nz = 0;
+  PetscInt64 entries, bytes;
+  PetscReal *block, *own, *schur;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscMalloc1(ninterior + 1, &ia));
+  PetscCall(SbSpaceGetRows(s, A, ninterior, p->node, ia, NULL, NULL));
+  PetscCall(PetscMalloc2(ia[ninterior], &ja, 9 * ia[ninterior], &block));
+  PetscCall(SbSpaceGetRows(s, A, ninterior, p->node, ia, ja, block));
+  /* columns of fully prescribed nodes drop out */
+  for (PetscInt at = 0; at < ia[ninterior]; at++) {
+    if (p->local[ja[at]] < 0) continue;
+    for (PetscInt e = 0; e < 9; e++) block[9 * nz + e] = block[9 * at + e];
+    nz++;
+  }
+  PetscCall(PetscCalloc2(9 * (size_t)p->nkeep * (size_t)p->nkeep, &own,
+                         9 * (size_t)p->face->n * (size_t)p->face->n, &schur));
+  PetscCall(SbFactorNumeric(p->factor, p->ia, p->ja, block, own, ok));
+  PetscCall(add_other_rows(p, A, schur));
+  add_own_schur(p, own, schur);
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, ok, 1, SB_MPI_BOOL, MPI_LAND, s->comm));
+  SbFactorSize(p->factor, &entries, &bytes);
+  if (*ok) PetscCall(SbInterfaceFactorise(p->face, 2 * bytes, schur, ok));
+  PetscCall(PetscFree2(own, schur));
+  PetscCall(PetscFree2(ja, block));
+  PetscCall(PetscFree(ia));
+  p->nfactor++;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The turn of each node since the factorisation. */
+static void find_turn(Rotated *p)
+{
+  SbSpace s = p->space;
+
+  for (PetscInt i = 0; i < s->nnode_owned; i++) {
+    PetscReal Q[9] = {1., 0., 0., 0., 1., 0., 0., 0., 1.};
+
+    if (!s->fixed[i]) SbMatMulTranspose(p->turn + 9 * i, p->turn0 + 9 * i, Q);
+    for (int k = 0; k < 9; k++) p->Q[9 * i + k] = (float)Q[k];
+  }
+}
+
+static PetscErrorCode PCSetUp_Rotated(PC pc)
+{
+  const SbLane *cells;
+  Rotated *p;
+  PetscBool ok = PETSC_TRUE;
+  Mat A;
+
+  PetscFunctionBeginUser;
+  PetscCall(PCShellGetContext(pc, &p));
+  PetscCall(PCGetOperators(pc, NULL, &A));
+  PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_SOLVER_SETUP], pc, 0, 0, 0));
+  PetscCall(set_up_once(p));
+  PetscCall(find_cells(p, A, &cells));
+  PetscCall(SbSpaceAverageRotations(p->space, cells, p->turn, p->spread));
+  if (p->renew) {
+    PetscCall(factor_operator(p, A, &ok));
+    PetscCall(PetscArraycpy(p->turn0, p->turn, 9 * p->space->nnode_owned));
+    p->fresh = -1;
+    p->renew = (PetscBool)!ok;
+    PetscCall(PetscInfo(pc, "factorisation %" PetscInt_FMT "%s\n", p->nfactor,
+                        ok ? "" : " failed: not positive definite"));
+  }
+  find_turn(p);
+  PetscCall(SbExactNodesSetUp(&p->exact, p->space, A, p->spread,
+                              p->nfactor && p->fresh >= 0 ? p->limit : PETSC_MAX_REAL));
+  PetscCall(PCSetFailedReason(pc, ok ? PC_NOERROR : PC_FACTOR_NUMERIC_ZEROPIVOT));
+  PetscCall(PetscLogEventEnd(SbEvents[SB_EVENT_SOLVER_SETUP], pc, 0, 0, 0));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ application */
+
+/* y = Q^T x or Q x of one node. */
+SB_INLINE void turn_back(const float Q[9], const float x[3], float y[3])
+{
+  for (int c = 0; c < 3; c++) y[c] = Q[c] * x[0] + Q[3 + c] * x[1] + Q[6 + c] * x[2];
+}
+
+SB_INLINE void turn_forth(const float Q[9], const float x[3], float y[3])
+{
+  for (int c = 0; c < 3; c++) y[c] = Q[3 * c] * x[0] + Q[3 * c + 1] * x[1] + Q[3 * c + 2] * x[2];
+}
+
+/* z = Q A0^-1 Q^T r on owned nodes. */
+static PetscErrorCode apply_factor(Rotated *p, const float r[], float z[])
+{
+  SbSpace s = p->space;
+  const SbInterface f = p->face;
+  const PetscInt ninterior = p->n - p->nkeep;
+
+  PetscFunctionBeginUser;
+  for (PetscInt k = 0; k < ninterior; k++) turn_back(p->Q + 9 * p->node[k], r + 3 * p->node[k], p->b + 3 * k);
+  PetscCall(PetscArrayzero(p->b + 3 * ninterior, 3 * p->nkeep));
+  SbFactorForward(p->factor, p->b, p->kept);
+  if (f->n) {
+    PetscCall(PetscArrayzero(p->edge, 3 * f->n));
+    for (PetscInt k = 0; k < f->nmine; k++) {
+      const PetscInt i = f->mine[k];
+
+      turn_back(p->Q + 9 * i, r + 3 * i, p->edge + 3 * f->index[i]);
+    }
+    for (PetscInt k = 0; k < 3 * p->nkeep; k++)
+      p->edge[3 * f->index[p->node[ninterior + k / 3]] + k % 3] += p->kept[k];
+    PetscCall(SbInterfaceSolve(f, p->edge));
+    for (PetscInt k = 0; k < 3 * p->nkeep; k++)
+      p->kept[k] = p->edge[3 * f->index[p->node[ninterior + k / 3]] + k % 3];
+  }
+  SbFactorBackward(p->factor, p->kept, p->x);
+  for (PetscInt k = 0; k < ninterior; k++)
+    turn_forth(p->Q + 9 * p->node[k], p->x + 3 * k, z + 3 * p->node[k]);
+  for (PetscInt k = 0; k < f->nmine; k++) {
+    const PetscInt i = f->mine[k];
+
+    turn_forth(p->Q + 9 * i, p->edge + 3 * f->index[i], z + 3 * i);
+  }
+  for (PetscInt k = 0; k < s->nfixed && s->fixed_node[k] < s->nnode_owned; k++) {
+    const PetscInt i = s->fixed_node[k];
+
+    for (PetscInt c = 3 * i; c < 3 * i + 3 && s->fixed[i] == 7; c++) z[c] = p->diagonal[c] * r[c];
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode PCApply_Rotated(PC pc, Vec R, Vec Z)
+{
+  Rotated *p;
+  SbSpace s;
+  const PetscScalar *r;
+  PetscScalar *z;
+
+  PetscFunctionBeginUser;
+  PetscCall(PCShellGetContext(pc, &p));
+  s = p->space;
+  PetscCall(VecGetArrayRead(R, &r));
+  for (PetscInt i = 0; i < 3 * s->nnode_owned; i++) p->r[i] = (float)(p->scale * r[i]);
+  PetscCall(VecRestoreArrayRead(R, &r));
+  PetscCall(PetscArraycpy(p->r1, p->r, 3 * s->nnode_owned));
+  SbExactNodesBefore(&p->exact, p->r1);
+  PetscCall(apply_factor(p, p->r1, p->z));
+  SbExactNodesAfter(&p->exact, p->r, p->z);
+  PetscCall(VecGetArrayWrite(Z, &z));
+  for (PetscInt i = 0; i < 3 * s->nnode_owned; i++) z[i] = p->z[i] / p->scale;
+  PetscCall(VecRestoreArrayWrite(Z, &z));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode PCPreSolve_Rotated(PC pc, KSP ksp, Vec b, Vec x)
+{
+  Rotated *p;
+  PetscReal norm;
+
+  PetscFunctionBeginUser;
+  (void)ksp;
+  (void)x;
+  PetscCall(PCShellGetContext(pc, &p));
+  PetscCall(VecNorm(b, NORM_INFINITY, &norm));
+  p->scale = norm > 0. && !PetscIsInfOrNanReal(norm) ? 1. / norm : 1.;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Decides whether the next operator is to be factored. */
+static PetscErrorCode PCPostSolve_Rotated(PC pc, KSP ksp, Vec b, Vec x)
+{
+  KSPConvergedReason reason;
+  PetscInt its;
+  Rotated *p;
+
+  PetscFunctionBeginUser;
+  (void)b;
+  (void)x;
+  PetscCall(PCShellGetContext(pc, &p));
+  PetscCall(KSPGetIterationNumber(ksp, &its));
+  PetscCall(KSPGetConvergedReason(ksp, &reason));
+  if (p->fresh < 0)
+    p->fresh = its;
+  else if (reason < 0 || its > WORSE_FACTOR * p->fresh + WORSE_PLUS)
+    p->renew = PETSC_TRUE;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ life */
+
+static PetscErrorCode PCView_Rotated(PC pc, PetscViewer viewer)
+{
+  PetscInt64 entries = 0, bytes = 0;
+  Rotated *p;
+
+  PetscFunctionBeginUser;
+  PetscCall(PCShellGetContext(pc, &p));
+  if (p->factor) SbFactorSize(p->factor, &entries, &bytes);
+  PetscCall(PetscViewerASCIIPrintf(viewer,
+                                   "  factor of a past operator turned with the nodes: %" PetscInt_FMT
+                                   " factorisations, rank 0: %g million entries, %" PetscInt_FMT
+                                   " nodes exact, interface of %" PetscInt_FMT " nodes\n",
+                                   p->nfactor, 1e-6 * (double)entries, p->exact.n, p->face ? p->face->n : 0));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode PCDestroy_Rotated(PC pc)
+{
+  Rotated *p;
+
+  PetscFunctionBeginUser;
+  PetscCall(PCShellGetContext(pc, &p));
+  PetscCall(SbInterfaceDestroy(&p->face));
+  PetscCall(SbFactorDestroy(&p->factor));
+  if (p->node) PetscCall(SbExactNodesDestroy(&p->exact));
+  PetscCall(PetscFree2(p->node, p->local));
+  PetscCall(PetscFree2(p->ia, p->ja));
+  PetscCall(PetscFree(p->cells));
+  PetscCall(PetscFree3(p->turn, p->turn0, p->spread));
+  PetscCall(PetscFree5(p->Q, p->diagonal, p->r, p->r1, p->z));
+  PetscCall(PetscFree4(p->b, p->x, p->kept, p->edge));
+  PetscCall(PetscFree(p));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbPCRotatedCreate(SbSpace s, PC pc)
+{
+  PetscReal angle = 0.35;
+  const char *prefix;
+  Rotated *p;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscNew(&p));
+  p->space = s;
+  p->renew = PETSC_TRUE;
+  p->fresh = -1;
+  p->scale = 1.;
+  PetscCall(PCGetOptionsPrefix(pc, &prefix));
+  PetscCall(PetscOptionsGetReal(NULL, prefix, "-pc_rotated_spread", &angle, NULL));
+  p->limit = 8. * PetscSqr(PetscSinReal(0.5 * angle));
+  PetscCall(PCSetType(pc, PCSHELL));
+  PetscCall(PCShellSetContext(pc, p));
+  PetscCall(PCShellSetName(pc, "rotated factor"));
+  PetscCall(PCShellSetSetUp(pc, PCSetUp_Rotated));
+  PetscCall(PCShellSetApply(pc, PCApply_Rotated));
+  PetscCall(PCShellSetPreSolve(pc, PCPreSolve_Rotated));
+  PetscCall(PCShellSetPostSolve(pc, PCPostSolve_Rotated));
+  PetscCall(PCShellSetView(pc, PCView_Rotated));
+  PetscCall(PCShellSetDestroy(pc, PCDestroy_Rotated));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbPCRotatedRenew(PC pc)
+{
+  Rotated *p;
+
+  PetscFunctionBeginUser;
+  PetscCall(PCShellGetContext(pc, &p));
+  p->renew = PETSC_TRUE;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbPCRotatedGetStats(PC pc, PetscInt *nfactor, PetscInt *nexact, PetscInt64 *entries)
+{
+  PetscInt64 found = 0, bytes;
+  Rotated *p;
+
+  PetscFunctionBeginUser;
+  PetscCall(PCShellGetContext(pc, &p));
+  if (p->factor) SbFactorSize(p->factor, &found, &bytes);
+  if (nfactor) *nfactor = p->nfactor;
+  if (nexact) *nexact = p->exact.n;
+  if (entries) *entries = found;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbPCRotatedGetWork(PC pc, PetscInt64 *interior, PetscInt64 *interface, PetscInt *nface)
+{
+  PetscInt64 entries, bytes = 0;
+  Rotated *p;
+
+  PetscFunctionBeginUser;
+  PetscCall(PCShellGetContext(pc, &p));
+  if (p->factor) SbFactorSize(p->factor, &entries, &bytes);
+  if (interior) *interior = 2 * bytes;
+  if (interface) *interface = p->face ? SbInterfaceBytes(p->face) : 0;
+  if (nface) *nface = p->face ? p->face->n : 0;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

@@ -1,0 +1,715 @@
+/*
+  Linear solvers by name. Each is a row of options for PETSc, put into its database where the user is silent, so that
+  everything stays adjustable by PETSc's own options; the matrix type is what the row's preconditioner takes.
+
+  A -pc_type of the user's that is not the row's own takes the row's place: `by_type` says which matrix it works on. The method is CG
+  then, or what -ksp_type says. SbSolverFinish() refuses what cannot work, before anything is computed.
+
+  Convergence is judged by the true residual wherever the method can tell it: the preconditioned norm can be off by orders of magnitude for nearly
+  incompressible bodies. Gauss-Seidel and SOR are wrapped in a PCCOMPOSITE of one: Richardson hands its whole loop to a bare
+  PCSOR, which does the largest number of sweeps without examining the residual. A solve that does not reach its tolerance fails; the
+  next row of a list is then tried on the same system (time/solver_list.c), and only after the last one is the step cut or the run stopped.
+*/
+#include "sbconstraint.h"
+#include "sbsolver.h"
+
+#define RESTART 100       /* of FGMRES */
+#define NU_ROTATED 0.4999 /* up to here nodes of CR and DG at faces may turn a factorisation with them */
+#define DIRECT_NEXT \
+  200000 /* unknowns up to which a factorisation is the first to be tried after another solver */
+#define NU_PRESSURE 0.45 /* from here on, dynamic runs of CR and DG do better with the pressures apart */
+
+static PetscErrorCode create_frames(SbSpace s, Mat *A)
+{
+  PetscBool frames;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbSpaceAllowsMatrixFree(s, &frames));
+  PetscCheck(frames, s->comm, PETSC_ERR_USER,
+             "-solver realtime is for -mass lumped and the materials linear, and corotated with "
+             "-body_<name>_tangent warped: choose these, or -solver rotated");
+  PetscCall(SbSpaceCreateMatrixFree(s, A));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode factor_cholmod(SbSpace s, PC pc)
+{
+  (void)s;
+  return SbPCDirectSet(pc, MATSOLVERCHOLMOD, PETSC_TRUE);
+}
+
+static PetscErrorCode factor_umfpack(SbSpace s, PC pc)
+{
+  (void)s;
+  return SbPCDirectSet(pc, MATSOLVERUMFPACK, PETSC_TRUE);
+}
+
+static PetscErrorCode factor_mumps(SbSpace s, PC pc)
+{
+  (void)s;
+  return SbPCDirectSet(pc, MATSOLVERMUMPS, PETSC_TRUE);
+}
+
+static const SbSolverPreset presets[] = {
+  {"cg", SB_MATRIX_BAIJ, PETSC_FALSE, "-ksp_type cg -pc_type none", NULL, NULL,
+   "conjugate gradients without preconditioner", NULL},
+  {"cg_jacobi", SB_MATRIX_BAIJ, PETSC_FALSE, "-ksp_type cg -pc_type jacobi", NULL, NULL,
+   "CG, diagonal preconditioner", NULL},
+  {"cg_pbjacobi", SB_MATRIX_BAIJ, PETSC_FALSE, "-ksp_type cg -pc_type pbjacobi", NULL, NULL,
+   "CG, 3x3 diagonal blocks", NULL},
+  {"cg_icc", SB_MATRIX_SBAIJ, PETSC_FALSE,
+   "-ksp_type cg -pc_type bjacobi -sub_pc_type icc -sub_pc_factor_shift_type positive_definite", NULL, NULL,
+   "CG, incomplete Cholesky on each rank", NULL},
+  {"cg_ssor", SB_MATRIX_AIJ, PETSC_FALSE, "-ksp_type cg -pc_type sor -pc_sor_local_symmetric", NULL, NULL,
+   "CG, symmetric Gauss-Seidel on each rank", NULL},
+  {"cg_two_level", SB_MATRIX_SBAIJ, PETSC_FALSE, "-ksp_type cg", NULL, SbPCCoarseCreate,
+   "CG, incomplete Cholesky on each rank and the rigid-body modes of some hundred aggregates of nodes", NULL},
+  {"cg_gamg", SB_MATRIX_AIJ, PETSC_FALSE, "-ksp_type cg -pc_type gamg", NULL, NULL,
+   "CG, algebraic multigrid with the rigid-body modes of each body", NULL},
+  {"cg_hypre", SB_MATRIX_AIJ, PETSC_FALSE,
+   "-ksp_type cg -pc_type hypre -pc_hypre_type boomeramg -pc_hypre_boomeramg_strong_threshold 0.5", "hypre",
+   NULL, "CG, BoomerAMG of hypre", NULL},
+  {"gauss_seidel", SB_MATRIX_AIJ, PETSC_FALSE,
+   "-ksp_type richardson -pc_type composite -pc_composite_pcs sor -sub_0_pc_sor_omega 1 -ksp_max_it 100000",
+   NULL, NULL, "Gauss-Seidel iteration (between ranks: block Jacobi)", NULL},
+  {"sor", SB_MATRIX_AIJ, PETSC_FALSE,
+   "-ksp_type richardson -pc_type composite -pc_composite_pcs sor -sub_0_pc_sor_omega 1.6 -ksp_max_it 100000",
+   NULL, NULL, "successive over-relaxation, omega 1.6 (between ranks: block Jacobi)", NULL},
+  {"cholmod", SB_MATRIX_AIJ, PETSC_FALSE, "-ksp_type cg", "cholmod", factor_cholmod,
+   "sparse Cholesky of SuiteSparse, on one of the ranks", NULL},
+  {"umfpack", SB_MATRIX_AIJ, PETSC_FALSE, "-ksp_type fgmres", "umfpack", factor_umfpack,
+   "sparse LU of SuiteSparse, on one of the ranks: takes indefinite tangents", NULL},
+  {"mumps", SB_MATRIX_AIJ, PETSC_FALSE, "-ksp_type fgmres", "mumps", factor_mumps,
+   "sparse factorisation of MUMPS on all ranks: takes indefinite tangents", NULL},
+  {"rotated", SB_MATRIX_BAIJ, PETSC_FALSE, "-ksp_type cg", NULL, SbPCRotatedCreate,
+   "CG, one factorisation that turns with the nodes and is seldom renewed: dynamic runs of up to about 100k "
+   "tets",
+   NULL},
+  {"realtime", SB_MATRIX_BAIJ, PETSC_TRUE, "-ksp_type cg -ksp_initial_guess_nonzero", NULL, SbPCRotatedCreate,
+   "the same without a matrix, warm-started: linear, or corotated with -body_<name>_tangent warped; fastest "
+   "with -snes_type ksponly and -ksp_rtol 1e-4",
+   create_frames},
+  {"pressure", SB_MATRIX_BAIJ, PETSC_FALSE, "-ksp_type richardson -ksp_max_it 300", NULL, SbPCPressureCreate,
+   "GMRES with the pressures of the cells as unknowns and multigrid on P1: CR and DG bodies at any Poisson's "
+   "ratio",
+   SbPressureOperatorCreate},
+};
+
+/* Preconditioners that the user names by -pc_type: what they work on, and what goes with them. The last row: all others. */
+static const SbSolverPreset by_type[] = {
+  {PCNONE, SB_MATRIX_BAIJ, PETSC_FALSE, "-ksp_type cg -pc_type none", NULL, NULL, NULL, NULL},
+  {PCJACOBI, SB_MATRIX_BAIJ, PETSC_FALSE, "-ksp_type cg -pc_type jacobi", NULL, NULL, NULL, NULL},
+  {PCPBJACOBI, SB_MATRIX_BAIJ, PETSC_FALSE, "-ksp_type cg -pc_type pbjacobi", NULL, NULL, NULL, NULL},
+  {PCICC, SB_MATRIX_SBAIJ, PETSC_FALSE, "-ksp_type cg -pc_type icc", NULL, NULL, NULL, NULL},
+  {PCBJACOBI, SB_MATRIX_AIJ, PETSC_FALSE,
+   "-ksp_type cg -pc_type bjacobi -sub_pc_factor_shift_type positive_definite", NULL, NULL, NULL, NULL},
+  {PCSOR, SB_MATRIX_AIJ, PETSC_FALSE, "-ksp_type cg -pc_type sor -pc_sor_local_symmetric", NULL, NULL, NULL,
+   NULL},
+  {PCHYPRE, SB_MATRIX_AIJ, PETSC_FALSE, "-ksp_type cg -pc_type hypre", "hypre", NULL, NULL, NULL},
+  {"", SB_MATRIX_AIJ, PETSC_FALSE, "-ksp_type cg", NULL, NULL, NULL, NULL},
+};
+
+static const SbOption rows[] = {
+  {"solver", SB_OPTION_CHOICE, 1, "", "auto",
+   "auto|direct|cg|cg_jacobi|cg_pbjacobi|cg_icc|cg_ssor|cg_two_level|cg_gamg|cg_hypre|gauss_seidel|sor|"
+   "cholmod|"
+   "umfpack|mumps|rotated|realtime|pressure",
+   "linear solver; auto chooses by size, ranks and material and says why, direct takes the fastest "
+   "factorisation "
+   "that this PETSc has for the problem. PETSc's -ksp_ and -pc_ options refine it"},
+  {"reproducible", SB_OPTION_BOOL, 1, "", "false", "",
+   "every run on the same number of ranks has the same bits: several ranks factor on one of them, and never "
+   "by MUMPS or SuperLU_DIST, "
+   "which add in the order in which messages come"},
+};
+
+PetscErrorCode SbSolverRegister(void)
+{
+  PetscFunctionBeginUser;
+  PetscCall(SbOptionsRegister("", "", (PetscInt)PETSC_STATIC_ARRAY_LENGTH(rows), rows));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbSolverSetFromOptions(char choice[], size_t size)
+{
+  SbScope scope;
+  PetscInt index;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbScopeSet(&scope, "", "", ""));
+  PetscCall(SbOptionChoice(&scope, "solver", &index));
+  PetscCall(SbOptionCheckEarly(&scope, "reproducible"));
+  /* the choices are auto, direct and then the rows of the table */
+  PetscCall(PetscStrncpy(choice, index > 1 ? presets[index - 2].name : index ? "direct" : "auto", size));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static const SbSolverPreset *find_preset(const char *name)
+{
+  for (size_t k = 0; k < PETSC_STATIC_ARRAY_LENGTH(presets); k++) {
+    if (!strcmp(presets[k].name, name)) return &presets[k];
+  }
+  return NULL;
+}
+
+/* Whether some law hands out its exact tangent, which is indefinite in compression: CHOLMOD fails there. */
+static PetscErrorCode may_be_indefinite(SbSpace s, PetscBool *maybe)
+{
+  PetscFunctionBeginUser;
+  *maybe = PETSC_FALSE;
+  for (PetscInt r = 0; r < s->nregion; r++) {
+    const SbMaterial m = s->region[r].material;
+
+    if (!m->linear && m->tangent == SB_TANGENT_EXACT) *maybe = PETSC_TRUE;
+  }
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, maybe, 1, SB_MPI_BOOL, MPI_LOR, s->comm));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The value of a row's option, "cholesky" of -pc_type; "" where there is none. */
+static PetscErrorCode preset_value(const SbSolverPreset *preset, const char *name, size_t size, char value[])
+{
+  const char *at = strstr(preset->options, name);
+
+  PetscFunctionBeginUser;
+  value[0] = 0;
+  if (at) {
+    at += strlen(name) + 1;
+    PetscCall(PetscStrncpy(value, at, PetscMin(size, strcspn(at, " ") + 1)));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscBool is_direct(const SbSolverPreset *preset)
+{
+  return (PetscBool)(preset->precondition == factor_cholmod || preset->precondition == factor_umfpack ||
+                     preset->precondition == factor_mumps);
+}
+
+/* Largest Poisson's ratio among the bodies with nodes at faces, -1 without any. */
+static PetscErrorCode largest_poisson(SbSpace s, PetscReal *nu)
+{
+  PetscFunctionBeginUser;
+  *nu = -1.;
+  for (PetscInt r = 0; r < s->nregion; r++) {
+    if (!s->region[r].element->nodes_per[0]) *nu = PetscMax(*nu, s->region[r].material->nu);
+  }
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, nu, 1, MPIU_REAL, MPI_MAX, s->comm));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The row for a -pc_type of the user's: that of -solver when it has the same one; NULL: the user gave none. */
+static PetscErrorCode find_type(const char *choice, const SbSolverPreset **preset)
+{
+  const SbSolverPreset *base = find_preset(choice);
+  char type[SB_NAME_MAX], own[SB_NAME_MAX];
+  PetscBool given;
+
+  PetscFunctionBeginUser;
+  *preset = NULL;
+  PetscCall(PetscOptionsGetString(NULL, NULL, "-pc_type", type, sizeof(type), &given));
+  if (!given) PetscFunctionReturn(PETSC_SUCCESS);
+  if (base) {
+    PetscCall(preset_value(base, "-pc_type", sizeof(own), own));
+    *preset = strcmp(own, type) ? NULL : base;
+  }
+  for (size_t k = 0; !*preset; k++) {
+    if (!strcmp(by_type[k].name, type) || !by_type[k].name[0]) *preset = &by_type[k];
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbSolverChoose(SbSpace s, PetscBool dynamic, PetscBool linear, PetscBool explicit_run,
+                              const char *choice, const SbSolverPreset **preset, char reason[], size_t size)
+{
+  const PetscInt unknowns = 3 * s->Nnode;
+  const char *name = choice, *package;
+  char method[SB_NAME_MAX] = "";
+  PetscInt nface = 0, most = 0;
+  PetscBool indefinite, has = PETSC_TRUE, turns;
+  PetscReal nu;
+  PetscMPIInt nrank;
+
+  PetscFunctionBeginUser;
+  PetscCallMPI(MPI_Comm_size(s->comm, &nrank));
+  PetscCall(may_be_indefinite(s, &indefinite));
+  PetscCall(largest_poisson(s, &nu));
+  PetscCall(SbDirectPackage(s->comm, unknowns, (PetscBool)!indefinite, &package));
+  PetscCall(PetscOptionsGetString(NULL, NULL, "-ksp_type", method, sizeof(method), NULL));
+  *preset = NULL;
+  if (!explicit_run) PetscCall(find_type(choice, preset));
+  /* a factorisation that turns with the nodes, unless ranks meet at too many of them */
+  turns = (PetscBool)(!strcmp(choice, "rotated") || !strcmp(choice, "realtime"));
+  if (!strcmp(choice, "auto"))
+    turns =
+      (PetscBool)(dynamic && !linear && unknowns <= 60000 && nu <= NU_ROTATED && strcmp(method, KSPMINRES));
+  if (*preset) turns = PETSC_FALSE;
+  if (turns && nrank > 1 && !explicit_run) PetscCall(SbSpaceInterfaceSize(s, &nface, &most));
+  if (nface > most) {
+    if (strcmp(choice, "auto"))
+      PetscCall(SbWarning(s->comm,
+                          "-solver %s is for parts of ranks that meet at %" PetscInt_FMT
+                          " nodes at most (-pc_rotated_interface), and these meet at %" PetscInt_FMT
+                          ": another solver is taken; fewer ranks may be faster",
+                          choice, most, nface));
+    turns = PETSC_FALSE;
+    choice = "auto";
+  }
+  if (explicit_run) {
+    name = "cg";
+    PetscCall(PetscSNPrintf(reason, size, "explicit integrator: no linear system"));
+  } else if (*preset) {
+    PetscCall(PetscSNPrintf(reason, size, "chosen by -pc_type"));
+  } else if (!strcmp(choice, "direct")) {
+    PetscCheck(package, s->comm, PETSC_ERR_USER,
+               "-solver direct needs SuiteSparse or MUMPS, and this PETSc was built without both: choose "
+               "another solver, or auto");
+    name = package;
+    PetscCall(PetscSNPrintf(reason, size, "the factorisation for %" PetscInt_FMT " unknowns on %d rank%s%s",
+                            unknowns, (int)nrank, nrank > 1 ? "s" : "",
+                            indefinite ? "; the exact tangent may be indefinite" : ""));
+  } else if (strcmp(choice, "auto")) {
+    PetscCall(PetscSNPrintf(reason, size, "chosen by -solver"));
+  } else if (turns) {
+    /* 51k unknowns of CR, 36k of DG, nu 0.4: ms per step of this and cg_two_level 22 and 89, 22 and 94 on two ranks, 12 and 50, 16
+       and 76 on four (docs/reports/realtime_ranks.md). Ten steps of 1.3k to 2.3k unknowns, linear iterations of this and pressure,
+       DG: 1150 and 1478 at nu 0.4999, 14521 and 1652 at 0.49999, 634312 and 4348 at 0.499999 */
+    name = "rotated";
+    PetscCall(PetscSNPrintf(reason, size,
+                            "dynamic, %" PetscInt_FMT
+                            " unknowns: one factorisation turns with the nodes and serves many steps",
+                            unknowns));
+  } else if (unknowns <= SB_DIRECT_SMALL && package) {
+    name = package;
+    PetscCall(PetscSNPrintf(
+      reason, size, "%" PetscInt_FMT " unknowns: a factorisation is fast and holds at any Poisson's ratio%s",
+      unknowns, indefinite ? "; the exact tangent may be indefinite" : ""));
+  } else if (s->faces && !s->nodal && !s->constraints && (!dynamic || nu > NU_PRESSURE)) {
+    /* 24k tets, CPU s of one rank, this and cg_two_level. Static at nu 0.3: CR 3.4 (3.2), DG 4.2 (5.6); at 0.45: 4.3 (3.6), 5.1
+       (12), more with every refinement. Dynamic, CR, three steps: at 0.3 12 (7), at 0.45 15 (11), at 0.49 17 (17) */
+    name = "pressure";
+    PetscCall(PetscSNPrintf(reason, size,
+                            "%s, %" PetscInt_FMT " unknowns of cr or dg, nu up to %g: iterations that grow "
+                            "neither towards 1/2 nor with the mesh",
+                            dynamic ? "dynamic" : "static", unknowns, (double)nu));
+  } else {
+    /* 192k tets, CPU s of one rank. Static: 0.36 (cg_gamg 1.7, cg_icc 1.4), at nu 0.45 0.7 (2.3), at 0.499 4.2 (18); dynamic, h = 0.01 s: 0.22 (1.7, 0.40) */
+    name = "cg_two_level";
+    PetscCall(
+      PetscSNPrintf(reason, size,
+                    "%s, %" PetscInt_FMT
+                    " unknowns: motions of large parts are solved directly, the rest takes few iterations",
+                    dynamic ? "dynamic" : "static", unknowns));
+  }
+  if (nface > most) {
+    size_t length;
+
+    PetscCall(PetscStrlen(reason, &length));
+    PetscCall(PetscSNPrintf(reason + length, size - length,
+                            "; %d ranks meet at %" PetscInt_FMT
+                            " nodes, and rotated and realtime take %" PetscInt_FMT,
+                            (int)nrank, nface, most));
+  }
+  if (!*preset) *preset = find_preset(name);
+  PetscCheck(*preset, s->comm, PETSC_ERR_PLIB, "No solver preset %s", name);
+  if ((*preset)->package) PetscCall(SbHasPackage((*preset)->package, &has));
+  PetscCheck(has, s->comm, PETSC_ERR_USER,
+             "%s %s needs %s, which this PETSc was built without: choose another one, or -solver auto",
+             find_preset((*preset)->name) ? "-solver" : "-pc_type", (*preset)->name, (*preset)->package);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Solvers after one that failed, in this order, and up to how many unknowns: a factorisation fails seldom, and costs most. */
+static const struct {
+  const char *name;
+  PetscInt most;
+} others[] = {{"direct", DIRECT_NEXT},
+              {"pressure", PETSC_MAX_INT},
+              {"cg_gamg", PETSC_MAX_INT},
+              {"direct", PETSC_MAX_INT}};
+
+/* The row of a name in that list that has not failed yet and can solve for this space; NULL: there is none. */
+static PetscErrorCode find_other(SbSpace s, const char *name, PetscBool indefinite, uint32_t tried,
+                                 const SbSolverPreset **preset)
+{
+  const PetscBool direct = (PetscBool)!strcmp(name, "direct");
+
+  PetscFunctionBeginUser;
+  *preset = direct ? NULL : find_preset(name);
+  /* what is not definite by rounding or by stress is next */
+  for (int k = indefinite; direct && k < 2 && !*preset; k++) {
+    const char *package;
+
+    PetscCall(SbDirectPackage(s->comm, 3 * s->Nnode, (PetscBool)!k, &package));
+    if (package) *preset = find_preset(package);
+    if (*preset && tried & 1U << (*preset - presets)) *preset = NULL;
+  }
+  if (*preset && tried & 1U << (*preset - presets)) *preset = NULL;
+  if (*preset && (*preset)->create && (!s->faces || s->nodal || s->constraints)) *preset = NULL;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbSolverNextFallback(SbSpace s, KSPConvergedReason reason, PetscBool memory, uint32_t *tried,
+                                    const SbSolverPreset **preset)
+{
+  const SbSolverPreset *failed = *preset;
+  PetscBool indefinite;
+
+  PetscFunctionBeginUser;
+  *preset = NULL;
+  if (find_preset(failed->name) == failed) *tried |= 1U << (failed - presets);
+  PetscCall(may_be_indefinite(s, &indefinite));
+  /* where the tangent itself is not definite, and may be so, the iteration is not to blame: that is Newton's affair */
+  if (indefinite && reason == KSP_DIVERGED_INDEFINITE_MAT) PetscFunctionReturn(PETSC_SUCCESS);
+  for (size_t k = 0; k < PETSC_STATIC_ARRAY_LENGTH(others) && !*preset; k++) {
+    const PetscBool direct = (PetscBool)!strcmp(others[k].name, "direct");
+
+    if (3 * s->Nnode > others[k].most || (memory && direct)) continue;
+    /* what a factorisation finds singular no iteration solves */
+    if (is_direct(failed) && !memory && !direct) continue;
+    PetscCall(find_other(s, others[k].name, indefinite, *tried, preset));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Options that the user did not give. */
+static PetscErrorCode insert_options(const char *text)
+{
+  char **word;
+  int n;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscStrToArray(text, ' ', &n, &word));
+  for (int k = 0; k < n; k++) {
+    const char *name = word[k], *value = NULL;
+    PetscBool given;
+
+    if (k + 1 < n && word[k + 1][0] != '-') value = word[++k];
+    /* the types are set by calls, so that what stands in the database is the user's */
+    if (!strcmp(name, "-ksp_type") || !strcmp(name, "-pc_type")) continue;
+    PetscCall(PetscOptionsHasName(NULL, NULL, name, &given));
+    if (!given) PetscCall(PetscOptionsSetValue(NULL, name, value));
+  }
+  PetscCall(PetscStrToArrayDestroy(n, word));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbSolverClear(const SbSolverPreset *preset)
+{
+  char **word;
+  int n;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscStrToArray(preset->options, ' ', &n, &word));
+  for (int k = 0; k < n; k++) {
+    const char *name = word[k], *value = "";
+    char there[128] = "";
+    PetscBool given;
+
+    if (k + 1 < n && word[k + 1][0] != '-') value = word[++k];
+    PetscCall(PetscOptionsGetString(NULL, NULL, name, there, sizeof(there), &given));
+    if (strcmp(name, "-ksp_type") && strcmp(name, "-pc_type") && given && !strcmp(there, value))
+      PetscCall(PetscOptionsClearValue(NULL, name));
+  }
+  PetscCall(PetscStrToArrayDestroy(n, word));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbSolverCreateOperator(SbSpace s, const SbSolverPreset *preset, Mat *A)
+{
+  SbMatrixKind kind = preset->matrix;
+  PetscMPIInt nrank;
+
+  PetscFunctionBeginUser;
+  PetscCallMPI(MPI_Comm_size(s->comm, &nrank));
+  /* PETSc's incomplete factors of blocks have no shift, and those of CR and DG are indefinite at any tangent; P1's need none, and are faster by
+     two fifths than those of numbers */
+  if (kind == SB_MATRIX_SBAIJ && !preset->precondition && s->faces) kind = SB_MATRIX_AIJ;
+  if (kind == SB_MATRIX_SBAIJ && nrank > 1) kind = SB_MATRIX_BAIJ;
+  if (preset->create)
+    PetscCall(preset->create(s, A));
+  else
+    PetscCall(SbSpaceCreateMatrix(s, kind, A));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The package that factors where the user names neither one nor -solver: PETSc's own choice knows neither sizes nor ranks. */
+static PetscErrorCode choose_package(SbSpace s, PC pc, const char *type)
+{
+  const PetscBool lu = (PetscBool)!strcmp(type, PCLU);
+  const char *package;
+  PetscBool indefinite, has;
+  PetscMPIInt size;
+
+  PetscFunctionBeginUser;
+  PetscCallMPI(MPI_Comm_size(s->comm, &size));
+  PetscCall(may_be_indefinite(s, &indefinite));
+  PetscCall(SbDirectPackage(s->comm, 3 * s->Nnode, (PetscBool)(!lu && !indefinite), &package));
+  if (size > 1) {
+    /* a type of the user's is one for distributed matrices */
+    package = MATSOLVERMUMPS;
+    PetscCall(SbHasPackage(package, &has));
+    if (!has && lu) package = MATSOLVERSUPERLU_DIST;
+    if (!has) PetscCall(SbHasPackage(package, &has));
+    if (!has) package = NULL;
+  } else if (package && !lu && !strcmp(package, MATSOLVERUMFPACK))
+    package = NULL;
+  if (package) PetscCall(PCFactorSetMatSolverType(pc, package));
+  if (package && !strcmp(package, MATSOLVERMUMPS))
+    PetscCall(insert_options("-mat_mumps_icntl_13 1 -mat_mumps_icntl_14 100"));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Methods for symmetric systems only. */
+static PetscErrorCode is_symmetric(KSP ksp, PetscBool *is)
+{
+  PetscFunctionBeginUser;
+  PetscCall(PetscObjectTypeCompareAny((PetscObject)ksp, is, KSPCG, KSPFCG, KSPMINRES, KSPPIPECG, KSPPIPEFCG,
+                                      KSPGROPPCG, KSPCR, KSPSYMMLQ, ""));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbSolverSetUp(SNES snes, SbSpace s, const SbSolverPreset *preset)
+{
+  char method[SB_NAME_MAX], type[SB_NAME_MAX], users[SB_NAME_MAX];
+  PetscBool given, symmetric;
+  KSP ksp;
+  PC pc;
+
+  PetscFunctionBeginUser;
+  PetscCall(SNESGetKSP(snes, &ksp));
+  if (s->constraints) s->constraints->general = PETSC_FALSE;
+  PetscCall(KSPGetPC(ksp, &pc));
+  PetscCall(KSPSetTolerances(ksp, 1e-8, PETSC_DEFAULT, PETSC_DEFAULT, 5000));
+  /* in a null space the residual of CG may grow a long way before it falls */
+  if (s->constraints) PetscCall(KSPSetTolerances(ksp, PETSC_DEFAULT, PETSC_DEFAULT, 1e10, PETSC_DEFAULT));
+  PetscCall(SbPCConstrainedCreate(s, pc, &pc));
+  /* the row, and over it the types of the user's */
+  PetscCall(preset_value(preset, "-ksp_type", sizeof(method), method));
+  PetscCall(preset_value(preset, "-pc_type", sizeof(type), type));
+  PetscCall(PetscOptionsGetString(NULL, NULL, "-pc_type", type, sizeof(type), NULL));
+  PetscCall(PetscOptionsGetString(NULL, NULL, "-ksp_type", users, sizeof(users), &given));
+  PetscCall(KSPSetType(ksp, given ? users : method));
+  PetscCall(is_symmetric(ksp, &symmetric));
+  if (symmetric) PetscCall(insert_options("-pc_asm_type basic -sub_0_pc_sor_local_symmetric"));
+  if (type[0]) PetscCall(PCSetType(pc, type));
+  PetscCall(insert_options(preset->options));
+  if (!strcmp(type, PCLU) || !strcmp(type, PCCHOLESKY)) PetscCall(choose_package(s, pc, type));
+  if (preset->precondition) PetscCall(preset->precondition(s, pc));
+  PetscCall(SbKSPPreferTrueResidual(ksp));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbSolverUpdateSymmetry(KSP ksp, SbSpace s)
+{
+  PetscInt restart = RESTART;
+  PetscBool symmetric;
+  SbConstraints c = s->constraints;
+  KSPType type;
+
+  PetscFunctionBeginUser;
+  if (!c || !c->nonsymmetric || c->general == c->tilted) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(is_symmetric(ksp, &symmetric));
+  if (!symmetric && !c->general) PetscFunctionReturn(PETSC_SUCCESS); /* general enough */
+  if (symmetric) {
+    PetscCall(KSPGetType(ksp, &type));
+    PetscCall(PetscStrncpy(c->method, type, sizeof(c->method)));
+    PetscCall(KSPGetNormType(ksp, &c->norm));
+    PetscCall(KSPGetPCSide(ksp, &c->side));
+  }
+  PetscCall(KSPSetType(ksp, symmetric ? KSPFGMRES : c->method));
+  PetscCall(KSPSetNormType(ksp, symmetric && c->norm != KSP_NORM_NONE ? KSP_NORM_UNPRECONDITIONED : c->norm));
+  PetscCall(KSPSetPCSide(ksp, symmetric ? PC_RIGHT : c->side));
+  PetscCall(PetscOptionsGetInt(NULL, NULL, "-ksp_gmres_restart", &restart, NULL));
+  if (symmetric) PetscCall(KSPGMRESSetRestart(ksp, restart));
+  c->general = symmetric;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* A factorisation that the matrix's type, the number of ranks or -reproducible rules out. */
+static PetscErrorCode check_factor(PC pc, Mat A)
+{
+  static const struct {
+    PCType type;
+    MatFactorType kind;
+    const char *advice;
+  } of[] = {
+    {PCLU, MAT_FACTOR_LU, "-solver direct, or an iteration: -pc_type gamg"},
+    {PCCHOLESKY, MAT_FACTOR_CHOLESKY, "-solver direct, or an iteration: -pc_type gamg"},
+    {PCICC, MAT_FACTOR_ICC, "-pc_type bjacobi -sub_pc_type icc, which does it on each rank"},
+    {PCILU, MAT_FACTOR_ILU, "-pc_type bjacobi -sub_pc_type ilu, which does it on each rank"},
+  };
+  MatSolverType package;
+  PetscMPIInt size;
+  PetscBool is, has, distributed, reproducible;
+
+  PetscFunctionBeginUser;
+  PetscCallMPI(MPI_Comm_size(PetscObjectComm((PetscObject)pc), &size));
+  PetscCall(SbSolverReproducible(&reproducible));
+  PetscCall(PetscObjectTypeCompareAny((PetscObject)pc, &distributed, PCLU, PCCHOLESKY, ""));
+  PetscCheck(!reproducible || size == 1 || !distributed, PetscObjectComm((PetscObject)pc), PETSC_ERR_USER,
+             "-reproducible: a factorisation on %d ranks has other last digits in each run; choose -solver "
+             "direct, which "
+             "factors on one of them",
+             (int)size);
+  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(of); i++) {
+    PetscCall(PetscObjectTypeCompare((PetscObject)pc, of[i].type, &is));
+    if (!is) continue;
+    PetscCall(PCFactorGetMatSolverType(pc, &package));
+    PetscCall(MatGetFactorAvailable(A, package, of[i].kind, &has));
+    PetscCheck(has, PetscObjectComm((PetscObject)pc), PETSC_ERR_USER,
+               "-pc_type %s%s%s has no factorisation on %d rank%s in this PETSc: choose %s", of[i].type,
+               package ? " -pc_factor_mat_solver_type " : "", package ? package : "", (int)size,
+               size == 1 ? "" : "s", of[i].advice);
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* One application of a preconditioner that does not solve; MINRES with one that is symmetric to single precision only. */
+static PetscErrorCode check_method(SbSpace s, KSP ksp, PC pc, const SbSolverPreset *preset, PetscBool *direct)
+{
+  PetscBool single, parts, minres;
+  char sub[SB_NAME_MAX] = "";
+  const char *package;
+  PCType type;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscObjectTypeCompare((PetscObject)ksp, KSPMINRES, &minres));
+  PetscCheck(!minres || preset->precondition != SbPCRotatedCreate, s->comm, PETSC_ERR_USER,
+             "-ksp_type minres does not converge with the single precision of -solver %s: choose -ksp_type "
+             "cg, or another "
+             "-solver",
+             preset->name);
+  PetscCall(PetscObjectTypeCompare((PetscObject)ksp, KSPPREONLY, &single));
+  PetscCall(
+    PetscObjectTypeCompareAny((PetscObject)pc, direct, PCLU, PCCHOLESKY, PCQR, PCSVD, PCREDUNDANT, ""));
+  PetscCall(SbPCDirectGathered(pc, &package));
+  if (package) *direct = PETSC_TRUE;
+  if (!single) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscObjectTypeCompareAny((PetscObject)pc, &parts, PCBJACOBI, PCASM, ""));
+  PetscCall(PetscOptionsGetString(NULL, NULL, "-sub_pc_type", sub, sizeof(sub), NULL));
+  parts = (PetscBool)(parts && (!strcmp(sub, PCLU) || !strcmp(sub, PCCHOLESKY)));
+  PetscCall(PCGetType(pc, &type));
+  PetscCheck(*direct || parts, s->comm, PETSC_ERR_USER,
+             "-ksp_type preonly takes the preconditioner for the inverse, which %s %s is not: choose "
+             "-pc_type cholesky "
+             "or lu, or a -ksp_type that iterates (cg, minres, gmres)",
+             strcmp(type, PCSHELL) ? "-pc_type" : "-solver", strcmp(type, PCSHELL) ? type : preset->name);
+  PetscCheck(
+    !s->constraints || s->constraints->saddle == SB_SADDLE_DIRECT, s->comm, PETSC_ERR_USER,
+    "-ksp_type preonly does not hold the contact constraints, which join nodes beside the matrix: choose "
+    "-ksp_type cg or fgmres");
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbSolverFinish(SNES snes, SbSpace s, const SbSolverPreset *preset, Mat P)
+{
+  PetscInt restart = RESTART;
+  PetscBool direct, single, symmetric;
+  KSP ksp;
+  Mat A;
+  PC pc;
+
+  PetscFunctionBeginUser;
+  if (!P) PetscFunctionReturn(PETSC_SUCCESS); /* explicit: no linear system */
+  PetscCall(SNESGetKSP(snes, &ksp));
+  PetscCall(KSPGetPC(ksp, &pc));
+  PetscCall(SbPCConstrainedGetInner(pc, &pc));
+  if (s->constraints) {
+    PetscCall(PCSetOperators(pc, P, P));
+    PetscCall(PCSetFromOptions(pc));
+  }
+  PetscCall(SbPCCheckPivots(pc));
+  /* what cannot work is said before anything is computed */
+  PetscCall(check_factor(pc, P));
+  PetscCall(check_method(s, ksp, pc, preset, &direct));
+  /* a matrix without what is not symmetric preconditions the whole tangent */
+  PetscCall(SNESGetJacobian(snes, &A, NULL, NULL, NULL));
+  PetscCall(is_symmetric(ksp, &symmetric));
+  PetscCall(PetscObjectTypeCompareAny((PetscObject)ksp, &single, KSPRICHARDSON, KSPPREONLY, ""));
+  if (A && A != P && !s->constraints && (symmetric || single)) {
+    PetscCall(KSPSetType(ksp, KSPFGMRES));
+    PetscCall(PetscOptionsGetInt(NULL, NULL, "-ksp_gmres_restart", &restart, NULL));
+    PetscCall(KSPGMRESSetRestart(ksp, restart));
+  }
+  PetscCall(SbKSPCheckNorm(ksp));
+  /* a solve that no Newton step examines, or whose own norm is not to be trusted */
+  PetscCall(PetscObjectTypeCompare((PetscObject)snes, SNESKSPONLY, &single));
+  if (s->constraints && s->constraints->saddle == SB_SADDLE_DIRECT) direct = PETSC_TRUE;
+  PetscCall(SbKSPCheckTrueResidual(ksp, direct, single));
+  if (s->constraints || s->nodal) PetscCall(SbKSPSetForceTolerance(ksp));
+  if (s->constraints && s->constraints->saddle == SB_SADDLE_ITERATIVE) PetscCall(SbKSPSaddleSet(s, ksp));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbSolverDescribe(SNES snes, SbSpace s, size_t size, char text[])
+{
+  MatSolverType package = NULL;
+  PetscBool shell, factor;
+  KSPType method;
+  const char *name, *gathered;
+  KSP ksp;
+  PC pc;
+
+  PetscFunctionBeginUser;
+  PetscCall(SNESGetKSP(snes, &ksp));
+  PetscCall(SbKSPSaddleGetPlain(ksp, &ksp));
+  PetscCall(KSPGetType(ksp, &method));
+  if (s->constraints && s->constraints->general) method = s->constraints->method;
+  PetscCall(KSPGetPC(ksp, &pc));
+  PetscCall(SbPCConstrainedGetInner(pc, &pc));
+  PetscCall(PCGetType(pc, &name));
+  PetscCall(PetscObjectTypeCompare((PetscObject)pc, PCSHELL, &shell));
+  if (shell) PetscCall(PCShellGetName(pc, &name));
+  PetscCall(PetscObjectTypeCompareAny((PetscObject)pc, &factor, PCLU, PCCHOLESKY, ""));
+  if (factor) PetscCall(PCFactorGetMatSolverType(pc, &package));
+  PetscCall(SbPCDirectGathered(pc, &gathered));
+  if (gathered) {
+    name = strcmp(gathered, MATSOLVERCHOLMOD) ? PCLU : PCCHOLESKY;
+    package = gathered;
+  }
+  PetscCall(PetscSNPrintf(text, size, "%s, %s%s%s%s", method ? method : "", name ? name : "",
+                          package ? " of " : "", package ? package : "", gathered ? " on one rank" : ""));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbSolverChooseIndefinite(MPI_Comm comm, size_t size, char choice[])
+{
+  PetscBool own, direct, mumps, umfpack, reproducible;
+  PetscMPIInt nrank;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscStrcmp(choice, "auto", &own));
+  PetscCall(PetscStrcmp(choice, "direct", &direct));
+  if (!own && !direct) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(SbHasPackage("mumps", &mumps));
+  PetscCall(SbHasPackage("umfpack", &umfpack));
+  PetscCheck(mumps || umfpack, comm, PETSC_ERR_USER,
+             "-static_control arc_length factors indefinite matrices, which takes MUMPS or UMFPACK, and this "
+             "PETSc has "
+             "neither: choose another -solver");
+  PetscCallMPI(MPI_Comm_size(comm, &nrank));
+  PetscCall(SbSolverReproducible(&reproducible));
+  if (reproducible && nrank > 1 && umfpack) mumps = PETSC_FALSE;
+  PetscCall(PetscStrncpy(choice, mumps ? "mumps" : "umfpack", size));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbSolverCountNegativeEigenvalues(SNES snes, SbSpace s, PetscInt *negative)
+{
+  PetscBool saddle;
+  KSP ksp;
+  PC pc;
+
+  PetscFunctionBeginUser;
+  PetscCall(SNESGetKSP(snes, &ksp));
+  PetscCall(KSPGetPC(ksp, &pc));
+  PetscCall(SbPCConstrainedIsFactored(pc, &saddle));
+  if (saddle)
+    PetscCall(SbSaddleFactorCountNegative(s, negative));
+  else {
+    PetscCall(SbPCConstrainedGetInner(pc, &pc));
+    PetscCall(SbPCDirectCountNegative(pc, negative));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

@@ -1,0 +1,147 @@
+/*
+  Which norm a solve is judged by, and what examines its answer.
+
+  The true residual is preferred wherever the method can tell it and the user does not choose a norm; a method that cannot (minres) has its own.
+
+  A direct solver's answer is examined: |b - A x| is computed once more after the solve.
+
+  A singular matrix (a body that can still turn, constrained by two of its faces only) is factored without complaint by threshold
+  pivoting, and FGMRES, which judges by its own recurrence, then reports convergence with a residual larger than the
+  right-hand side. Such a solve ends as failed. What rounding leaves is far below the bound: near nu = 1/2, where lambda / mu is a
+  million, 1e-5 of the right-hand side.
+
+  Likewise that of a method with a norm of its own where no Newton step examines it again.
+
+  petsc/private/kspimpl.h: the reason of a solve has no public setter, the norms that a method supports no public getter.
+*/
+#include "sbsolver.h"
+#include <petsc/private/kspimpl.h>
+
+#define AT_MOST 1e-2 /* of the right-hand side, where no more than that is asked for */
+
+static PetscErrorCode look(KSP ksp, Vec b, Vec x, void *ctx)
+{
+  PetscReal size, residual;
+  PetscBool single;
+  Mat A;
+  Vec r;
+
+  PetscFunctionBeginUser;
+  (void)ctx;
+  PetscCall(PetscObjectTypeCompare((PetscObject)ksp, KSPPREONLY, &single));
+  /* a number of iterations that was asked for is no promise */
+  if (ksp->reason <= 0 || (ksp->reason == KSP_CONVERGED_ITS && !single)) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(KSPGetOperators(ksp, &A, NULL));
+  PetscCall(VecDuplicate(b, &r));
+  PetscCall(MatMult(A, x, r));
+  PetscCall(VecAYPX(r, -1., b));
+  PetscCall(VecNorm(b, NORM_2, &size));
+  PetscCall(VecNorm(r, NORM_2, &residual));
+  PetscCall(VecDestroy(&r));
+  if (PetscIsInfOrNanReal(residual) ||
+      residual > PetscMax(PetscMax(AT_MOST, 2. * ksp->rtol) * size, ksp->abstol)) {
+    PetscCall(
+      PetscInfo(ksp, "true residual %g of a right-hand side of %g\n", (double)residual, (double)size));
+    ksp->reason = KSP_DIVERGED_BREAKDOWN;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbKSPCheckTrueResidual(KSP ksp, PetscBool direct, PetscBool alone)
+{
+  PetscBool single;
+  KSPNormType norm;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscObjectTypeCompare((PetscObject)ksp, KSPPREONLY, &single));
+  PetscCall(KSPGetNormType(ksp, &norm));
+  /* a Newton step looks better than a comparison of norms that differ by orders of magnitude */
+  if (single || (direct && norm == KSP_NORM_UNPRECONDITIONED) ||
+      (alone && (norm == KSP_NORM_PRECONDITIONED || norm == KSP_NORM_NATURAL)))
+    PetscCall(KSPSetPostSolve(ksp, look, NULL));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* As KSPConvergedDefault(), but for the meaning of abstol. */
+static PetscErrorCode converged(KSP ksp, PetscInt n, PetscReal norm, KSPConvergedReason *reason, void *ctx)
+{
+  PetscReal size;
+
+  PetscFunctionBeginUser;
+  (void)ctx;
+  *reason = KSP_CONVERGED_ITERATING;
+  if (!n) {
+    PetscCall(VecNorm(ksp->vec_rhs, NORM_2, &size));
+    ksp->rnorm0 = norm;
+    ksp->ttol = PetscMax(ksp->rtol, size > 0. ? ksp->abstol / size : 1.) * norm;
+  }
+  if (PetscIsInfOrNanReal(norm))
+    *reason = KSP_DIVERGED_NANORINF;
+  else if (norm <= ksp->ttol)
+    *reason = KSP_CONVERGED_RTOL;
+  else if (norm >= ksp->divtol * ksp->rnorm0 && n)
+    *reason = KSP_DIVERGED_DTOL;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbKSPSetForceTolerance(KSP ksp)
+{
+  KSPNormType norm;
+  PetscBool asked;
+
+  PetscFunctionBeginUser;
+  PetscCall(KSPGetNormType(ksp, &norm));
+  PetscCall(PetscOptionsHasName(NULL, NULL, "-ksp_convergence_test", &asked));
+  if (!asked && (norm == KSP_NORM_PRECONDITIONED || norm == KSP_NORM_NATURAL))
+    PetscCall(KSPSetConvergenceTest(ksp, converged, NULL, NULL));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* How well the method of ksp supports a norm with the side that the user may have set; 0: not at all. */
+static PetscInt support(KSP ksp, KSPNormType norm)
+{
+  PetscInt best = 0;
+
+  for (PCSide side = PC_LEFT; side < PC_SIDE_MAX; side++) {
+    if (ksp->pc_side_set == PC_SIDE_DEFAULT || ksp->pc_side_set == side)
+      best = PetscMax(best, ksp->normsupporttable[norm][side]);
+  }
+  return best;
+}
+
+PetscErrorCode SbKSPPreferTrueResidual(KSP ksp)
+{
+  PetscBool norm, side;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscOptionsHasName(NULL, NULL, "-ksp_norm_type", &norm));
+  PetscCall(PetscOptionsHasName(NULL, NULL, "-ksp_pc_side", &side));
+  if (!norm && !side && support(ksp, KSP_NORM_UNPRECONDITIONED))
+    PetscCall(KSPSetNormType(ksp, KSP_NORM_UNPRECONDITIONED));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbKSPCheckNorm(KSP ksp)
+{
+  const KSPNormType asked = ksp->normtype_set;
+  PetscInt any = 0;
+  char norms[128] = "";
+  KSPType type;
+
+  PetscFunctionBeginUser;
+  for (KSPNormType norm = KSP_NORM_NONE; norm < KSP_NORM_MAX; norm++) {
+    if (!support(ksp, norm)) continue;
+    any += asked == KSP_NORM_DEFAULT || asked == norm;
+    PetscCall(PetscStrlcat(norms, norms[0] ? ", " : "", sizeof(norms)));
+    PetscCall(PetscStrlcat(norms, KSPNormTypes[norm], sizeof(norms)));
+  }
+  PetscCall(KSPGetType(ksp, &type));
+  PetscCheck(any, PetscObjectComm((PetscObject)ksp), PETSC_ERR_USER,
+             "-ksp_type %s has no %s%s%s%s: choose -ksp_norm_type from %s, or -ksp_type fgmres", type,
+             asked == KSP_NORM_DEFAULT ? "" : "-ksp_norm_type ",
+             asked == KSP_NORM_DEFAULT ? "" : KSPNormTypes[asked],
+             ksp->pc_side_set == PC_SIDE_DEFAULT ? "" : " -ksp_pc_side ",
+             ksp->pc_side_set == PC_SIDE_DEFAULT ? "" : PCSides[ksp->pc_side_set],
+             norms[0] ? norms : "none with that side");
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

@@ -1,0 +1,399 @@
+/*
+  clean.c - small defects of a surface: vertices that differ by rounding, doubles, triangles without area, open edges.
+
+  Mended, counted and said: vertices within a tolerance of each other become one (chains of such pairs as a whole, at the place of the
+  first), a triangle that thereby has a corner twice is left out, so is one that is given twice. Two triangles back to
+  back are one wall. A triangle whose corners lie on a line is taken into its neighbour at the longest edge, which is cut in two at
+  the corner between: the shape stays what it was. Refused: open edges.
+*/
+#include <stdlib.h>
+#include "sbkernel.h"
+#include "surface_impl.h"
+
+#define PASSES 20         /* of the search for flat triangles: one may lie behind the other */
+#define PARTNERS_MAX 4000 /* open edges for which partners are searched for */
+
+/* ------------------------------------------------------------------ vertices that are one */
+
+typedef struct {
+  PetscReal along; /* projection on a direction that no mesh is aligned with */
+  PetscInt vert;
+} Along;
+
+static int compare_along(const void *a, const void *b)
+{
+  const Along *p = (const Along *)a, *q = (const Along *)b;
+
+  if (p->along != q->along) return p->along < q->along ? -1 : 1;
+  return (p->vert > q->vert) - (p->vert < q->vert);
+}
+
+static PetscInt root_of(PetscInt up[], PetscInt v)
+{
+  for (; up[v] != v; v = up[v]) up[v] = up[up[v]];
+  return v;
+}
+
+static PetscReal distance2(const SbTriangles *t, PetscInt v, PetscInt w)
+{
+  const PetscReal *a = t->x + 3 * v, *b = t->x + 3 * w, d[3] = {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
+
+  return SbDot3(d, d);
+}
+
+/* Joins near vertices; up[v] leads to the lowest one of each heap. */
+static PetscErrorCode join_near(const SbTriangles *t, PetscReal tolerance, PetscInt up[])
+{
+  const PetscReal direction[3] = {0.6180339887, 0.5352331347, 0.5758185391};
+  PetscReal largest = 0, window;
+  Along *sorted;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscMalloc1(t->nvert, &sorted));
+  for (PetscInt v = 0; v < t->nvert; v++) {
+    up[v] = v;
+    sorted[v] = (Along){SbDot3(direction, t->x + 3 * v), v};
+    largest = PetscMax(largest, PetscAbsReal(sorted[v].along));
+  }
+  qsort(sorted, (size_t)t->nvert, sizeof(*sorted), compare_along);
+  window = tolerance + 8 * PETSC_MACHINE_EPSILON * largest;
+  for (PetscInt i = 0; i < t->nvert; i++) {
+    for (PetscInt j = i + 1; j < t->nvert && sorted[j].along - sorted[i].along <= window; j++) {
+      PetscInt a, b;
+
+      if (distance2(t, sorted[i].vert, sorted[j].vert) > tolerance * tolerance) continue;
+      a = root_of(up, sorted[i].vert);
+      b = root_of(up, sorted[j].vert);
+      up[PetscMax(a, b)] = PetscMin(a, b);
+    }
+  }
+  PetscCall(PetscFree(sorted));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ triangles left out */
+
+/* Keeps the triangles marked so. */
+static PetscErrorCode keep_triangles(SbTriangleFile *f, const PetscBool keep[])
+{
+  SbTriangles *t = f->t;
+  PetscInt n = 0;
+
+  PetscFunctionBeginUser;
+  for (PetscInt i = 0; i < t->ntri; i++) {
+    if (!keep[i]) continue;
+    PetscCall(PetscArraymove(t->tri + 3 * n, t->tri + 3 * i, 3));
+    if (f->tags) f->tags[n] = f->tags[i];
+    f->number[n++] = f->number[i];
+  }
+  t->ntri = n;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+typedef struct {
+  PetscInt vert[3]; /* ascending */
+  PetscInt triangle;
+  PetscBool odd; /* the order of the corners is turned */
+} Triple;
+
+static int compare_triples(const void *a, const void *b)
+{
+  const Triple *p = (const Triple *)a, *q = (const Triple *)b;
+
+  for (int k = 0; k < 3; k++) {
+    if (p->vert[k] != q->vert[k]) return p->vert[k] < q->vert[k] ? -1 : 1;
+  }
+  return (p->triangle > q->triangle) - (p->triangle < q->triangle);
+}
+
+static Triple triple_of(const SbTriangles *t, PetscInt f)
+{
+  Triple p = {.triangle = f, .odd = PETSC_FALSE};
+
+  for (int k = 0; k < 3; k++) p.vert[k] = t->tri[3 * f + k];
+  for (int i = 0; i < 3; i++) {
+    const int k = i % 2;
+
+    if (p.vert[k] > p.vert[k + 1]) {
+      const PetscInt keep = p.vert[k];
+
+      p.vert[k] = p.vert[k + 1];
+      p.vert[k + 1] = keep;
+      p.odd = (PetscBool)!p.odd;
+    }
+  }
+  return p;
+}
+
+/* Triangle `to` gets the groups of triangle `from`, too. */
+static PetscErrorCode join_groups(SbTriangleFile *f, PetscInt to, PetscInt from)
+{
+  const SbImport *im = f->groups;
+  PetscInt group[64], n = 0;
+
+  PetscFunctionBeginUser;
+  if (!f->tags || f->tags[to] == f->tags[from]) PetscFunctionReturn(PETSC_SUCCESS);
+  for (int i = 0; i < 2; i++) {
+    const PetscInt set = f->tags[i ? from : to];
+
+    for (PetscInt k = im->tags_start[set]; k < im->tags_start[set + 1] && n < 64; k++)
+      group[n++] = im->tags_group[k];
+  }
+  PetscCall(SbImportTagSet(f->groups, n, group, &f->tags[to]));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Of triangles with the same corners the first one stays; the others give it their groups. */
+static PetscErrorCode drop_doubled(SbTriangleFile *f, PetscBool keep[], SbSurfaceRepairs *m)
+{
+  SbTriangles *t = f->t;
+  Triple *triple;
+
+  PetscFunctionBeginUser;
+  if (!t->ntri) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscMalloc1(t->ntri, &triple));
+  for (PetscInt i = 0; i < t->ntri; i++) {
+    triple[i] = triple_of(t, i);
+    keep[i] = PETSC_TRUE;
+  }
+  qsort(triple, (size_t)t->ntri, sizeof(*triple), compare_triples);
+  for (PetscInt i = 0, n; i < t->ntri; i += n) {
+    PetscBool wall = PETSC_FALSE;
+
+    for (n = 1; i + n < t->ntri && !memcmp(triple[i].vert, triple[i + n].vert, sizeof(triple[i].vert)); n++) {
+      keep[triple[i + n].triangle] = PETSC_FALSE;
+      wall = (PetscBool)(wall || triple[i + n].odd != triple[i].odd);
+      PetscCall(join_groups(f, triple[i].triangle, triple[i + n].triangle));
+    }
+    m->nwall += wall;
+    m->ndoubled += n - 1 - wall;
+  }
+  PetscCall(keep_triangles(f, keep));
+  PetscCall(PetscFree(triple));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbSurfaceMergeVertices(SbTriangleFile *f, PetscReal tolerance, SbSurfaceRepairs *m)
+{
+  SbTriangles *t = f->t;
+  PetscInt *up;
+  PetscBool *keep;
+  PetscReal moved2 = 0;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscMalloc2(t->nvert, &up, t->ntri, &keep));
+  PetscCall(join_near(t, tolerance, up));
+  for (PetscInt v = 0; v < t->nvert; v++) {
+    const PetscInt r = root_of(up, v);
+    const PetscReal d2 = distance2(t, v, r);
+
+    moved2 = PetscMax(moved2, d2);
+    m->nwelded += d2 > 0; /* those at one place are nothing to speak of */
+  }
+  for (PetscInt i = 0; i < t->ntri; i++) {
+    PetscInt *v = t->tri + 3 * i;
+
+    for (int k = 0; k < 3; k++) v[k] = root_of(up, v[k]);
+    keep[i] = (PetscBool)(v[0] != v[1] && v[1] != v[2] && v[2] != v[0]);
+    m->ncollapsed += !keep[i];
+  }
+  m->tolerance = tolerance;
+  m->moved = PetscSqrtReal(moved2);
+  PetscCall(keep_triangles(f, keep));
+  PetscCall(drop_doubled(f, keep, m));
+  PetscCall(PetscFree2(up, keep));
+  PetscCall(SbTrianglesDropUnused(t));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ triangles without area */
+
+/* The edge of a triangle that is longest. */
+static int longest_edge(const SbTriangles *t, PetscInt f)
+{
+  const PetscInt *v = t->tri + 3 * f;
+  PetscReal most = -1;
+  int edge = 0;
+
+  for (int k = 0; k < 3; k++) {
+    const PetscReal l2 = distance2(t, v[k], v[(k + 1) % 3]);
+
+    if (l2 > most) {
+      most = l2;
+      edge = k;
+    }
+  }
+  return edge;
+}
+
+/* The flat triangle f and its neighbour g at edge j become two: g cut at the corner of f that lies on the edge. */
+static void cut_neighbour(SbTriangleFile *f, PetscInt flat, PetscInt middle, PetscInt g, int j)
+{
+  PetscInt *v = f->t->tri + 3 * g, *w = f->t->tri + 3 * flat;
+  const PetscInt a = v[j], b = v[(j + 1) % 3], c = v[(j + 2) % 3];
+
+  v[0] = a;
+  v[1] = middle;
+  v[2] = c;
+  w[0] = middle;
+  w[1] = b;
+  w[2] = c;
+  f->number[flat] = f->number[g];
+  if (f->tags) f->tags[flat] = f->tags[g];
+}
+
+/* One pass over the edges; a triangle takes part in one change at most. */
+static PetscErrorCode cut_flat(SbTriangleFile *f, PetscBool touched[], SbTriangleEdge edge[], PetscInt *ncut,
+                               PetscInt *nflat)
+{
+  SbTriangles *t = f->t;
+  const PetscInt n = 3 * t->ntri;
+  PetscBool *flat;
+  PetscReal longest2, around;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscMalloc1(t->ntri, &flat));
+  *ncut = *nflat = 0;
+  for (PetscInt i = 0; i < t->ntri; i++) {
+    flat[i] = (PetscBool) !(SbTriangleMeasure(t, i, &longest2, &around) > SB_TRIANGLE_FLAT * longest2);
+    *nflat += flat[i];
+    touched[i] = PETSC_FALSE;
+  }
+  if (*nflat) PetscCall(SbTrianglesEdges(t, edge));
+  for (PetscInt i = 0, m; *nflat && i < n; i += m) {
+    m = SbTrianglesAtEdge(n, edge, i);
+    for (PetscInt k = 0; m == 2 && k < 2; k++) {
+      const PetscInt mine = edge[i + k].slot / 3, other = edge[i + 1 - k].slot / 3;
+      const int e = (int)(edge[i + k].slot % 3), j = (int)(edge[i + 1 - k].slot % 3);
+
+      if (!flat[mine] || touched[mine] || touched[other] || e != longest_edge(t, mine)) continue;
+      cut_neighbour(f, mine, t->tri[3 * mine + (e + 2) % 3], other, j);
+      touched[mine] = touched[other] = PETSC_TRUE;
+      (*ncut)++;
+    }
+  }
+  PetscCall(PetscFree(flat));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode take_flat(SbTriangleFile *f, SbTriangleEdge edge[], SbSurfaceRepairs *m)
+{
+  SbTriangles *t = f->t;
+  PetscBool *touched;
+  PetscInt ncut = 1, nflat = 1;
+  PetscReal longest2, around;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscMalloc1(t->ntri, &touched));
+  for (int pass = 0; pass < PASSES && ncut; pass++) {
+    PetscCall(cut_flat(f, touched, edge, &ncut, &nflat));
+    m->nflat += ncut;
+  }
+  PetscCall(PetscFree(touched));
+  for (PetscInt i = 0; nflat && i < t->ntri; i++) {
+    const PetscReal *x = t->x + 3 * t->tri[3 * i];
+
+    PetscCheck(
+      SbTriangleMeasure(t, i, &longest2, &around) > SB_TRIANGLE_FLAT * longest2, PETSC_COMM_SELF,
+      PETSC_ERR_USER_INPUT,
+      "%s: triangle %lld at (%.6g, %.6g, %.6g) m has no area (of %" PetscInt_FMT
+      " such ones), and no neighbour that could take it in; remove it (meshlab: remove degenerate faces)",
+      f->where, (long long)f->number[i], (double)x[0], (double)x[1], (double)x[2], nflat);
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ open edges */
+
+/* Corner of an edge: its beginning (0) or end (1). */
+static PetscInt edge_end(const SbTriangles *t, PetscInt slot, int end)
+{
+  return t->tri[end ? (slot % 3 == 2 ? slot - 2 : slot + 1) : slot];
+}
+
+/* The tolerance that would lay each open edge on another one; 0 when it were no matter of rounding. */
+static PetscReal partner_distance(const SbTriangles *t, PetscInt n, const PetscInt slot[])
+{
+  PetscReal need = 0, edge = 0;
+
+  if (n > PARTNERS_MAX) return 0;
+  for (PetscInt i = 0; i < n; i++) {
+    const PetscInt a = edge_end(t, slot[i], 0), b = edge_end(t, slot[i], 1);
+    PetscReal least = PETSC_MAX_REAL;
+
+    edge += PetscSqrtReal(distance2(t, a, b)) / (PetscReal)n;
+    for (PetscInt j = 0; j < n; j++) {
+      const PetscInt c = edge_end(t, slot[j], 0), d = edge_end(t, slot[j], 1);
+      const PetscReal against = PetscMax(distance2(t, a, d), distance2(t, b, c)),
+                      along = PetscMax(distance2(t, a, c), distance2(t, b, d));
+
+      if (i != j) least = PetscMin(least, PetscMin(against, along));
+    }
+    need = PetscMax(need, PetscSqrtReal(least));
+  }
+  return need < 0.25 * edge ? need : 0;
+}
+
+static PetscErrorCode refuse_open(const SbTriangleFile *f, PetscInt n, const PetscInt slot[])
+{
+  const SbTriangles *t = f->t;
+  const PetscReal *a = t->x + 3 * t->tri[slot[0]],
+                  *b = t->x + 3 * t->tri[slot[0] % 3 == 2 ? slot[0] - 2 : slot[0] + 1];
+  const PetscReal need = partner_distance(t, n, slot);
+  char option[SB_OPTION_NAME_MAX], what[256] = "close the holes (meshlab: close holes; blender: fill)";
+
+  PetscFunctionBeginUser;
+  if (need > 0)
+    (void)snprintf(what, sizeof(what),
+                   "every open edge has a partner within %.3g m: %s %.2g joins them, if that is "
+                   "rounding and not shape",
+                   (double)need, SbImportOption(f->groups, "merge_tolerance", option), (double)(1.1 * need));
+  SETERRQ(PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
+          "%s: the surface is open: %" PetscInt_FMT
+          " edges have a triangle on one side only, the first is that of "
+          "triangle %lld from (%.6g, %.6g, %.6g) to (%.6g, %.6g, %.6g) m; %s",
+          f->where, n, (long long)f->number[slot[0] / 3], (double)a[0], (double)a[1], (double)a[2],
+          (double)b[0], (double)b[1], (double)b[2], what);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static int compare_slots(const void *a, const void *b)
+{
+  const PetscInt p = *(const PetscInt *)a, q = *(const PetscInt *)b;
+
+  return (p > q) - (p < q);
+}
+
+static PetscErrorCode check_open(const SbTriangleFile *f, SbTriangleEdge edge[])
+{
+  const PetscInt n = 3 * f->t->ntri;
+  PetscInt *slot, nopen = 0;
+  PetscErrorCode ierr = PETSC_SUCCESS;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscMalloc1(n, &slot));
+  PetscCall(SbTrianglesEdges(f->t, edge));
+  for (PetscInt i = 0, m; i < n; i += m) {
+    m = SbTrianglesAtEdge(n, edge, i);
+    if (m == 1) slot[nopen++] = edge[i].slot;
+  }
+  if (nopen) {
+    qsort(slot, (size_t)nopen, sizeof(*slot), compare_slots);
+    ierr = refuse_open(f, nopen, slot);
+  }
+  PetscCall(PetscFree(slot));
+  PetscFunctionReturn(ierr);
+}
+
+PetscErrorCode SbSurfaceRepairTriangles(SbTriangleFile *f, SbSurfaceRepairs *m)
+{
+  SbTriangleEdge *edge;
+  PetscErrorCode ierr;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscMalloc1(3 * (size_t)f->t->ntri, &edge));
+  ierr = take_flat(f, edge, m);
+  if (!ierr) ierr = check_open(f, edge);
+  PetscCall(PetscFree(edge));
+  PetscFunctionReturn(ierr);
+}

@@ -1,0 +1,214 @@
+/*
+  import_surface.c - a body from a closed surface: read, repaired, checked, cut into regions, filled with tets.
+
+  The steps and what each refuses or repairs are in triangles_read.c and its neighbours, clean.c, cross.c,
+  region.c and tetrahedralize.c. Lengths are in metres from the reader on: the surface is scaled first.
+*/
+#include "surface_impl.h"
+
+#define WELD \
+  1e-7 /* default tolerance over the diagonal of the surface: what is lost when coordinates are written as text */
+
+static const SbOption rows[] = {
+  {"tet_size", SB_OPTION_REAL, 1, "m", "", "(0, inf)",
+   "edge length of the tets made from a surface; default: the mean edge of its triangles"},
+  {"tet_surface", SB_OPTION_CHOICE, 1, "", "auto", "auto|keep|remesh",
+   "whether the triangles of the surface stay: auto keeps them when their mean edge is within a factor of "
+   "1.5 of tet_size"},
+  {"tet_angle", SB_OPTION_REAL, 1, "degrees", "40", "(0, 180)",
+   "edges where the surface turns by more are kept when it is remeshed"},
+  {"tetrahedralizer", SB_OPTION_CHOICE, 1, "", "auto", "auto|gmsh|tetgen",
+   "who makes tets from a surface: auto tries gmsh, then tetgen"},
+  {"tet_seconds", SB_OPTION_REAL, 1, "s", "600", "(0, inf)",
+   "time that gmsh, and then tetgen, may take to make tets from a surface"},
+  {"merge_tolerance", SB_OPTION_REAL, 1, "m", "", "[0, inf)",
+   "vertices of a surface no farther apart than this are one; default: 1e-7 of the diagonal of its box"},
+  {"untangle", SB_OPTION_REAL, 1, "m", "", "[0, inf)",
+   "how far vertices may be moved to smooth out small folds where a surface cuts itself; default: half its "
+   "mean edge"},
+};
+
+PetscErrorCode SbTetRegister(void)
+{
+  PetscFunctionBeginUser;
+  PetscCall(SbOptionsRegister("body", "", (PetscInt)PETSC_STATIC_ARRAY_LENGTH(rows), rows));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscBool SbMeshFileIsSurface(const char *path)
+{
+  const SbTriangleReader read = strncmp(path, "box:", 4) ? SbTrianglesReader(path) : NULL;
+
+  return (PetscBool)(read && read != SbTrianglesRead_Gmsh);
+}
+
+PetscErrorCode SbTetOptionsRead(const SbScope *scope, const char *mesh, SbTetOptions *o)
+{
+  PetscInt backend = 0, surface = 0;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbTetDefaults(o));
+  if (!SbMeshFileIsSurface(mesh)) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(SbOptionReal(scope, "tet_size", &o->size));
+  PetscCall(SbOptionChoice(scope, "tet_surface", &surface));
+  PetscCall(SbOptionReal(scope, "tet_angle", &o->angle));
+  PetscCall(SbOptionChoice(scope, "tetrahedralizer", &backend));
+  PetscCall(SbOptionReal(scope, "tet_seconds", &o->seconds));
+  PetscCall(SbOptionReal(scope, "merge_tolerance", &o->merge_tolerance));
+  PetscCall(SbOptionReal(scope, "untangle", &o->untangle));
+  o->backend = (SbTetBackend)backend;
+  o->surface = (SbTetSurface)surface;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ what was repaired */
+
+static PetscErrorCode write_mended(const SbTriangles *t, const SbSurfaceRepairs *m, size_t size, char text[])
+{
+  const struct {
+    PetscInt n;
+    const char *what;
+  } rows_of[] = {
+    {m->ncollapsed, "triangles with two corners at one place left out"},
+    {m->ndoubled, "triangles given twice left out"},
+    {m->nwall, "triangles back to back kept once as a wall"},
+    {m->nflat, "triangles without area taken into their neighbours"},
+    {m->nturned, "triangles turned to the side of their neighbours"},
+    {m->ncavity, "cavities"},
+    {m->nidle, "triangles without material on a side left out"},
+  };
+  char one[160];
+
+  PetscFunctionBeginUser;
+  if (t->turned) PetscCall(PetscStrlcat(text, "surface inverted: taken turned", size));
+  if (m->nwelded) {
+    (void)snprintf(one, sizeof(one), "%svertices joined within %.2g m: %" PetscInt_FMT " (by up to %.2g m)",
+                   text[0] ? ", " : "", (double)m->tolerance, m->nwelded, (double)m->moved);
+    PetscCall(PetscStrlcat(text, one, size));
+  }
+  if (m->npairs) {
+    (void)snprintf(one, sizeof(one),
+                   "%spairs of triangles that cut each other smoothed apart: %" PetscInt_FMT
+                   " (%" PetscInt_FMT " vertices moved by up to %.2g m)",
+                   text[0] ? ", " : "", m->npairs, m->nuntangled, (double)m->untangled);
+    PetscCall(PetscStrlcat(text, one, size));
+  }
+  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(rows_of); i++) {
+    if (!rows_of[i].n) continue;
+    (void)snprintf(one, sizeof(one), "%s%s: %" PetscInt_FMT, text[0] ? ", " : "", rows_of[i].what,
+                   rows_of[i].n);
+    PetscCall(PetscStrlcat(text, one, size));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ from file to tets */
+
+/* To metres, and nothing that is not a number. */
+static PetscErrorCode scale_file(PetscReal scale, SbTriangleFile *f)
+{
+  char option[SB_OPTION_NAME_MAX];
+
+  PetscFunctionBeginUser;
+  for (PetscInt i = 0; i < 3 * f->t->nvert; i++) {
+    f->t->x[i] *= scale;
+    PetscCheck(isfinite(f->t->x[i]), PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
+               "%s: vertex %" PetscInt_FMT " leaves the range of numbers when scaled by %g; check %s",
+               f->where, i / 3 + 1, (double)scale, SbImportOption(f->groups, "scale", option));
+  }
+  for (PetscInt i = 0; i < f->nhole; i++) {
+    for (int k = 0; k < 3; k++) f->hole[i].x[k] *= scale;
+  }
+  for (PetscInt i = 0; i < f->nregion; i++) {
+    for (int k = 0; k < 3; k++) f->region[i].x[k] *= scale;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The tolerance of joining, which must be far below the shape, and the mean edge. */
+static PetscErrorCode weld_tolerance(const SbTriangleFile *f, PetscReal given, PetscReal *tolerance,
+                                     PetscReal *edge)
+{
+  const SbTriangles *t = f->t;
+  PetscReal lo[3], hi[3], around, longest2, sum = 0, d2 = 0;
+  char option[SB_OPTION_NAME_MAX];
+
+  PetscFunctionBeginUser;
+  for (int k = 0; k < 3; k++) lo[k] = hi[k] = t->x[k];
+  for (PetscInt i = 0; i < 3 * t->nvert; i++) {
+    lo[i % 3] = PetscMin(lo[i % 3], t->x[i]);
+    hi[i % 3] = PetscMax(hi[i % 3], t->x[i]);
+  }
+  for (int k = 0; k < 3; k++) d2 += (hi[k] - lo[k]) * (hi[k] - lo[k]);
+  for (PetscInt i = 0; i < t->ntri; i++) {
+    (void)SbTriangleMeasure(t, i, &longest2, &around);
+    sum += around / (3 * (PetscReal)t->ntri);
+  }
+  *edge = sum;
+  *tolerance = given >= 0 ? given : WELD * PetscSqrtReal(d2);
+  PetscCheck(
+    given < 0.5 * sum, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
+    "%s: %s %g m would join corners of one triangle: the mean edge is %.3g m; give less than half of it",
+    f->where, SbImportOption(f->groups, "merge_tolerance", option), (double)given, (double)sum);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode make_surface(const char *path, const SbImport *im, SbTriangleFile *f, SbSurface *s,
+                                   size_t size, char note[])
+{
+  SbSurfaceRepairs repairs;
+  PetscReal tolerance, edge;
+  char option[SB_OPTION_NAME_MAX];
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscMemzero(&repairs, sizeof(repairs)));
+  PetscCall((*SbTrianglesReader(path))(path, f));
+  PetscCheck(f->t->ntri, PETSC_COMM_SELF, PETSC_ERR_FILE_UNEXPECTED,
+             "%s: holds no triangles; give a closed surface of triangles, or a mesh of tetrahedra", f->where);
+  PetscCall(scale_file(im->scale, f));
+  PetscCall(SbTrianglesDropUnused(f->t));
+  PetscCall(weld_tolerance(f, im->tet.merge_tolerance, &tolerance, &edge));
+  PetscCall(SbSurfaceMergeVertices(f, tolerance, &repairs));
+  PetscCheck(f->t->ntri, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
+             "%s: no triangle is left when vertices within %g m are one; give a smaller %s, or "
+             "check the scale",
+             f->where, (double)tolerance, SbImportOption(im, "merge_tolerance", option));
+  PetscCall(SbSurfaceRepairTriangles(f, &repairs));
+  PetscCall(SbSurfaceUntangle(f, im->tet.untangle >= 0 ? im->tet.untangle : 0.5 * edge, &repairs));
+  PetscCall(SbSurfaceFindRegions(f, &repairs, s));
+  PetscCall(write_mended(f->t, &repairs, size, note));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbSurfaceRead(const char *path, SbImport *im, SbSurface *s)
+{
+  SbTriangles t;
+  SbTriangleFile file = {.where = im->where, .t = &t, .groups = im};
+  PetscErrorCode ierr;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscMemzero(&t, sizeof(t)));
+  PetscCall(PetscMemzero(s, sizeof(*s)));
+  ierr = make_surface(path, im, &file, s, sizeof(im->note), im->note);
+  PetscCall(PetscFree(file.number));
+  PetscCall(PetscFree(file.tags));
+  PetscCall(PetscFree(file.hole));
+  PetscCall(PetscFree(file.region));
+  PetscCall(SbTrianglesDestroy(&t));
+  if (ierr) PetscCall(SbSurfaceDestroy(s));
+  PetscCall(ierr);
+  im->scale = 1; /* it is in metres now */
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbImportRead_Surface(const char *path, SbImport *im)
+{
+  SbSurface s;
+  PetscErrorCode ierr;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbSurfaceRead(path, im, &s));
+  ierr = SbTetrahedralize(im->where, &s, &im->tet, im);
+  PetscCall(SbSurfaceDestroy(&s));
+  PetscFunctionReturn(ierr);
+}

@@ -1,0 +1,590 @@
+/*
+  region.c - the regions that closed surfaces cut space into, also where more than two triangles meet at an edge.
+
+  Every triangle has two sides, 2 f in front and 2 f + 1 behind. At an edge the triangles are sorted by their angle around it; what faces
+  each other between two that follow is one space, so these sides are joined. The joined sides are shells: one with a positive volume is the
+  outer limit of a region, one with a negative volume is a surface seen from the space around it. Which region that space is, the winding
+  number tells (sum of solid angles, van Oosterom and Strackee 1983): the smallest positive shell around it.
+
+  What is material: with a sense of turning (.stl, .obj, .off, .ply), triangles are first turned to the side of their neighbours, the
+  majority of a surface wins; a surface turned outwards holds material, also within another one (a region of its own), one turned
+  inwards within material is a cavity, one turned inwards in the open is turned. Where more than two triangles meet at an
+  edge of a surface, and without a sense of turning (.poly, .smesh), whatever is enclosed is material, but for the holes that the file names.
+*/
+#include <stdlib.h>
+#include "sbkernel.h"
+#include "surface_impl.h"
+
+#define OUTSIDE (-1)
+#define PARTS_MAX 1000 /* each is searched for in all others */
+
+typedef struct {
+  PetscInt first;   /* triangle */
+  PetscInt surface; /* to which its triangles belong */
+  PetscInt parent;  /* of a negative shell: the positive one around it, or OUTSIDE */
+  PetscReal volume, area;
+  PetscReal box[6];
+  PetscBool empty; /* of a positive shell: no material in it */
+  PetscInt region; /* of a positive shell with material */
+} Shell;
+
+typedef struct {
+  PetscInt first;
+  PetscBool branched; /* more than two triangles meet at an edge */
+  PetscInt parent;    /* positive shell around it */
+  PetscInt outer;     /* its negative shell */
+} Surface;
+
+typedef struct {
+  SbTriangleFile *f;
+  SbTriangles *t;
+  SbSurfaceRepairs *m;
+  SbTriangleEdge *edge; /* [3 ntri] */
+  PetscInt *shell;      /* [2 ntri] of each side */
+  PetscInt *surface;    /* [ntri] */
+  PetscInt nshell, nsurface;
+  Shell *shells;
+  Surface *surfaces;
+} Space;
+
+static PetscInt root_of(PetscInt up[], PetscInt v)
+{
+  for (; up[v] != v; v = up[v]) up[v] = up[up[v]];
+  return v;
+}
+
+static void join(PetscInt up[], PetscInt a, PetscInt b)
+{
+  a = root_of(up, a);
+  b = root_of(up, b);
+  up[PetscMax(a, b)] = PetscMin(a, b);
+}
+
+/* Numbers heaps in the order of their first members, in place. */
+static PetscInt number_heaps(PetscInt n, PetscInt up[])
+{
+  PetscInt count = 0;
+
+  for (PetscInt i = 0; i < n; i++) up[i] = root_of(up, i);
+  for (PetscInt i = 0; i < n; i++)
+    up[i] = up[i] == i ? count++ : up[up[i]]; /* the root comes first and has its number */
+  return count;
+}
+
+/* ------------------------------------------------------------------ turned alike */
+
+static void turn(SbTriangles *t, PetscInt f)
+{
+  const PetscInt keep = t->tri[3 * f + 1];
+
+  t->tri[3 * f + 1] = t->tri[3 * f + 2];
+  t->tri[3 * f + 2] = keep;
+}
+
+/* The two ends of a manifold edge; across[3 f + k] is the slot beyond, -1 where more than two meet. */
+static PetscErrorCode find_across(const Space *s, PetscInt across[])
+{
+  const PetscInt n = 3 * s->t->ntri;
+
+  PetscFunctionBeginUser;
+  for (PetscInt i = 0, m; i < n; i += m) {
+    m = SbTrianglesAtEdge(n, s->edge, i);
+    for (PetscInt k = 0; k < m; k++) across[s->edge[i + k].slot] = m == 2 ? s->edge[i + 1 - k].slot : -1;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode one_sided(const Space *s, PetscInt f, PetscInt g)
+{
+  PetscFunctionBeginUser;
+  SETERRQ(
+    PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
+    "%s: the surface has one side only (a Moebius strip or Klein bottle) around triangles %lld and %lld; it "
+    "encloses nothing, cut it there",
+    s->f->where, (long long)s->f->number[f], (long long)s->f->number[g]);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Walks over one piece: sense[f] tells whether f is turned as the first one (1) or the other way (-1). */
+static PetscErrorCode walk_piece(const Space *s, PetscInt first, const PetscInt across[], int sense[],
+                                 PetscInt stack[], PetscInt *n)
+{
+  const SbTriangles *t = s->t;
+  PetscInt done = 0;
+
+  PetscFunctionBeginUser;
+  *n = 0;
+  stack[(*n)++] = first;
+  sense[first] = 1;
+  while (done < *n) {
+    const PetscInt f = stack[done++];
+
+    for (PetscInt k = 3 * f; k < 3 * f + 3; k++) {
+      const PetscInt g = across[k] < 0 ? -1 : across[k] / 3;
+      int same;
+
+      if (g < 0) continue;
+      same = t->tri[across[k]] != t->tri[k]
+               ? 1
+               : -1; /* neighbours turned alike walk along their edge in opposite directions */
+      if (!sense[g]) {
+        sense[g] = same * sense[f];
+        stack[(*n)++] = g;
+      } else if (sense[g] != same * sense[f])
+        PetscCall(one_sided(s, f, g));
+    }
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Turns the minority of each piece that hangs together by edges of two triangles. */
+static PetscErrorCode turn_pieces(Space *s, const PetscInt across[], int sense[], PetscInt stack[])
+{
+  PetscFunctionBeginUser;
+  for (PetscInt f = 0; f < s->t->ntri; f++) {
+    PetscInt n, nother = 0;
+    int wrong;
+
+    if (sense[f]) continue;
+    PetscCall(walk_piece(s, f, across, sense, stack, &n));
+    for (PetscInt i = 0; i < n; i++) nother += sense[stack[i]] < 0;
+    wrong = 2 * nother > n ? 1 : -1;
+    for (PetscInt i = 0; i < n; i++) {
+      if (sense[stack[i]] != wrong) continue;
+      turn(s->t, stack[i]);
+      s->m->nturned++;
+    }
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode turn_alike(Space *s)
+{
+  PetscInt *across, *stack;
+  int *sense;
+  PetscErrorCode ierr;
+
+  PetscFunctionBeginUser;
+  if (s->f->sheets) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscMalloc3(3 * (size_t)s->t->ntri, &across, s->t->ntri, &stack, s->t->ntri, &sense));
+  PetscCall(PetscArrayzero(sense, s->t->ntri));
+  ierr = find_across(s, across);
+  if (!ierr) ierr = turn_pieces(s, across, sense, stack);
+  PetscCall(PetscFree3(across, stack, sense));
+  PetscCall(ierr);
+  PetscCall(SbTrianglesEdges(s->t, s->edge)); /* slots have changed */
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ shells */
+
+typedef struct {
+  PetscReal angle;
+  PetscInt slot;
+} Spoke;
+
+static int compare_spokes(const void *a, const void *b)
+{
+  const Spoke *p = (const Spoke *)a, *q = (const Spoke *)b;
+
+  if (p->angle != q->angle) return p->angle < q->angle ? -1 : 1;
+  return (p->slot > q->slot) - (p->slot < q->slot);
+}
+
+/* The side of a triangle that faces growing angles around the edge from vertex p on (ahead), or falling ones. */
+static PetscInt facing(const SbTriangles *t, PetscInt slot, PetscInt p, PetscBool ahead)
+{
+  const PetscBool along = (PetscBool)(t->tri[slot] == p);
+
+  return 2 * (slot / 3) + (along == ahead ? 0 : 1);
+}
+
+/* Angles of triangles around the edge from p to q, from the first one on. */
+static void sort_spokes(const SbTriangles *t, PetscInt p, PetscInt q, PetscInt n, const SbTriangleEdge edge[],
+                        Spoke spoke[])
+{
+  const PetscReal *a = t->x + 3 * p, *b = t->x + 3 * q;
+  PetscReal axis[3], u[3], v[3], length;
+
+  for (int k = 0; k < 3; k++) axis[k] = b[k] - a[k];
+  length = PetscSqrtReal(SbDot3(axis, axis));
+  for (PetscInt i = 0; i < n; i++) {
+    const PetscInt slot = edge[i].slot;
+    const PetscReal *c = t->x + 3 * t->tri[3 * (slot / 3) + (slot % 3 + 2) % 3];
+    const PetscReal w[3] = {c[0] - a[0], c[1] - a[1], c[2] - a[2]};
+
+    if (!i) { /* v = axis x w is normal to the first one, u = v x axis points along it */
+      SbCross(axis, w, v);
+      SbCross(v, axis, u);
+      for (int k = 0; k < 3; k++) u[k] /= length;
+    }
+    spoke[i] = (Spoke){i ? atan2(SbDot3(v, w), SbDot3(u, w)) : 0, slot};
+    if (spoke[i].angle < 0) spoke[i].angle += 2 * PETSC_PI;
+  }
+  qsort(spoke, (size_t)n, sizeof(*spoke), compare_spokes);
+}
+
+/* Joins what faces each other around one edge. */
+static PetscErrorCode join_at_edge(const SbTriangles *t, PetscInt n, const SbTriangleEdge edge[],
+                                   PetscInt up[])
+{
+  const PetscInt p = (PetscInt)(edge[0].key >> 32), q = (PetscInt)(edge[0].key & 0xffffffff);
+  Spoke few[8], *spoke = few;
+
+  PetscFunctionBeginUser;
+  if (n > 8) PetscCall(PetscMalloc1(n, &spoke));
+  if (n > 2)
+    sort_spokes(t, p, q, n, edge, spoke);
+  else
+    for (PetscInt i = 0; i < n; i++) spoke[i].slot = edge[i].slot;
+  for (PetscInt i = 0; i < n; i++)
+    join(up, facing(t, spoke[i].slot, p, PETSC_TRUE), facing(t, spoke[(i + 1) % n].slot, p, PETSC_FALSE));
+  if (n > 8) PetscCall(PetscFree(spoke));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode find_shells(Space *s)
+{
+  const PetscInt n = 3 * s->t->ntri;
+
+  PetscFunctionBeginUser;
+  for (PetscInt i = 0; i < 2 * s->t->ntri; i++) s->shell[i] = i;
+  for (PetscInt f = 0; f < s->t->ntri; f++) s->surface[f] = f;
+  for (PetscInt i = 0, m; i < n; i += m) {
+    m = SbTrianglesAtEdge(n, s->edge, i);
+    PetscCall(join_at_edge(s->t, m, s->edge + i, s->shell));
+    for (PetscInt k = 1; k < m; k++) join(s->surface, s->edge[i].slot / 3, s->edge[i + k].slot / 3);
+  }
+  s->nshell = number_heaps(2 * s->t->ntri, s->shell);
+  s->nsurface = number_heaps(s->t->ntri, s->surface);
+  PetscCheck(s->nsurface <= PARTS_MAX, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
+             "%s: the surface consists of %" PetscInt_FMT
+             " parts; supple takes up to %d: remove the specks around it "
+             "(meshlab: remove isolated pieces)",
+             s->f->where, s->nsurface, PARTS_MAX);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Volume, area and box of every shell; every surface has one shell with a negative volume. */
+static PetscErrorCode measure_shells(Space *s)
+{
+  const SbTriangles *t = s->t;
+  PetscReal longest2, around;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscCalloc1(s->nshell, &s->shells));
+  PetscCall(PetscCalloc1(s->nsurface, &s->surfaces));
+  for (PetscInt k = 0; k < s->nshell; k++) s->shells[k].first = -1;
+  for (PetscInt k = 0; k < s->nsurface; k++) s->surfaces[k].first = s->surfaces[k].outer = -1;
+  for (PetscInt i = 0; i < 2 * t->ntri; i++) {
+    Shell *p = &s->shells[s->shell[i]];
+    PetscReal box[6];
+
+    SbTriangleBox(t->x, t->tri + 3 * (i / 2), box);
+    if (p->first < 0) {
+      p->first = i / 2;
+      PetscCall(PetscArraycpy(p->box, box, 6));
+    }
+    for (int k = 0; k < 3; k++) {
+      p->box[k] = PetscMin(p->box[k], box[k]);
+      p->box[3 + k] = PetscMax(p->box[3 + k], box[3 + k]);
+    }
+    p->surface = s->surface[i / 2];
+    p->volume += (i % 2 ? 1 : -1) * SbTetVolumeTo(t, i / 2, t->x + 3 * t->tri[3 * p->first]);
+    p->area += 0.5 * SbTriangleMeasure(t, i / 2, &longest2, &around);
+    if (s->surfaces[s->surface[i / 2]].first < 0) s->surfaces[s->surface[i / 2]].first = i / 2;
+  }
+  for (PetscInt i = 0, m; i < 3 * t->ntri; i += m) {
+    m = SbTrianglesAtEdge(3 * t->ntri, s->edge, i);
+    if (m > 2) s->surfaces[s->surface[s->edge[i].slot / 3]].branched = PETSC_TRUE;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode check_shells(Space *s)
+{
+  PetscFunctionBeginUser;
+  for (PetscInt k = 0; k < s->nshell; k++) {
+    const Shell *p = &s->shells[k];
+    const long long number = (long long)s->f->number[p->first];
+
+    PetscCheck(PetscAbsReal(p->volume) > SB_TRIANGLE_EMPTY * PetscPowReal(p->area / 6, 1.5), PETSC_COMM_SELF,
+               PETSC_ERR_USER_INPUT,
+               "%s: the part with triangle %lld encloses no volume; give it a thickness, or remove it",
+               s->f->where, number);
+    if (p->volume > 0) continue;
+    PetscCheck(s->surfaces[p->surface].outer < 0, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
+               "%s: the triangles around triangle %lld cut each other; join the parts into one", s->f->where,
+               number);
+    s->surfaces[p->surface].outer = k;
+  }
+  for (PetscInt k = 0; k < s->nsurface; k++)
+    PetscCheck(s->surfaces[k].outer >= 0, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
+               "%s: the triangles around triangle %lld cut each other; join the parts into one", s->f->where,
+               (long long)s->f->number[s->surfaces[k].first]);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ what lies in what */
+
+/* The smallest positive shell around a point, not of the surface `except`; OUTSIDE when there is none. */
+static PetscInt shell_around(const Space *s, const PetscReal o[3], PetscInt except)
+{
+  PetscInt best = OUTSIDE;
+
+  for (PetscInt k = 0; k < s->nshell; k++) {
+    const Shell *p = &s->shells[k];
+    PetscReal around = 0;
+    PetscBool within = (PetscBool)(p->volume > 0 && p->surface != except);
+
+    for (int i = 0; i < 3; i++) within = (PetscBool)(within && o[i] >= p->box[i] && o[i] <= p->box[3 + i]);
+    if (!within || (best >= 0 && s->shells[best].volume <= p->volume)) continue;
+    for (PetscInt i = 0; i < 2 * s->t->ntri; i++) {
+      if (s->shell[i] == k) around += (i % 2 ? 1 : -1) * SbTriangleSolidAngle(s->t, i / 2, o);
+    }
+    if (around > 2 * PETSC_PI) best = k;
+  }
+  return best;
+}
+
+static PetscErrorCode find_parents(Space *s)
+{
+  PetscFunctionBeginUser;
+  for (PetscInt k = 0; k < s->nsurface; k++) {
+    const PetscInt *v = s->t->tri + 3 * s->surfaces[k].first;
+    PetscReal middle[3];
+
+    for (int i = 0; i < 3; i++)
+      middle[i] = (s->t->x[3 * v[0] + i] + s->t->x[3 * v[1] + i] + s->t->x[3 * v[2] + i]) / 3;
+    s->surfaces[k].parent = s->nsurface > 1 ? shell_around(s, middle, k) : OUTSIDE;
+    s->shells[s->surfaces[k].outer].parent = s->surfaces[k].parent;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Whether the outer side of a surface is the front of its triangles. */
+static PetscBool turned_outwards(const Space *s, PetscInt k)
+{
+  return (PetscBool)(s->shell[2 * s->surfaces[k].first] == s->surfaces[k].outer);
+}
+
+/* How deep a surface lies: 0 in the open. */
+static PetscInt depth_of(const Space *s, PetscInt k)
+{
+  PetscInt depth = 0;
+
+  for (; s->surfaces[k].parent != OUTSIDE; depth++) k = s->shells[s->surfaces[k].parent].surface;
+  return depth;
+}
+
+/* Cavities of surfaces with a sense of turning. A heap that is inverted in the open is taken turned as a whole. */
+static PetscErrorCode empty_cavities(Space *s)
+{
+  PetscInt deepest = 0;
+
+  PetscFunctionBeginUser;
+  if (s->f->sheets) PetscFunctionReturn(PETSC_SUCCESS);
+  for (PetscInt k = 0; k < s->nsurface; k++) deepest = PetscMax(deepest, depth_of(s, k));
+  for (PetscInt depth = 0; depth <= deepest; depth++) {
+    for (PetscInt k = 0; k < s->nsurface; k++) {
+      PetscInt top = k;
+      PetscBool outwards, cavity;
+
+      if (depth_of(s, k) != depth || s->surfaces[k].branched) continue;
+      while (s->surfaces[top].parent != OUTSIDE) top = s->shells[s->surfaces[top].parent].surface;
+      outwards = (PetscBool)(turned_outwards(s, k) == (turned_outwards(s, top) || s->surfaces[top].branched));
+      cavity = (PetscBool)(depth > 0 && !outwards && !s->shells[s->surfaces[k].parent].empty);
+      s->t->turned = (PetscBool)(s->t->turned || (!turned_outwards(s, k) && !cavity));
+      s->m->ncavity += cavity;
+      for (PetscInt i = 0; cavity && i < s->nshell; i++) {
+        if (s->shells[i].surface == k && s->shells[i].volume > 0) s->shells[i].empty = PETSC_TRUE;
+      }
+    }
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Holes that a file names. */
+static PetscErrorCode empty_holes(Space *s)
+{
+  PetscFunctionBeginUser;
+  for (PetscInt i = 0; i < s->f->nhole; i++) {
+    const SbSeed *h = &s->f->hole[i];
+    const PetscInt k = shell_around(s, h->x, -1);
+
+    PetscCheck(
+      k != OUTSIDE, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
+      "%s: hole %lld at (%.6g, %.6g, %.6g) m lies in no region; move it into the cavity, or remove it",
+      s->f->where, (long long)h->number, (double)h->x[0], (double)h->x[1], (double)h->x[2]);
+    s->m->ncavity += !s->shells[k].empty;
+    s->shells[k].empty = PETSC_TRUE;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ the result */
+
+/* Regions are numbered by their first triangle. */
+static PetscInt number_regions(Space *s)
+{
+  PetscInt n = 0;
+
+  for (PetscInt k = 0; k < s->nshell; k++) {
+    Shell *p = &s->shells[k];
+
+    p->region = p->volume > 0 && !p->empty ? n++ : OUTSIDE;
+  }
+  for (PetscInt k = 0; k < s->nshell; k++) {
+    Shell *p = &s->shells[k];
+
+    if (p->volume < 0 && p->parent != OUTSIDE) p->region = s->shells[p->parent].region;
+  }
+  return n;
+}
+
+/* The groups that all triangles of a shell belong to: group[n], n at most 16. */
+static PetscErrorCode groups_of_shell(const Space *s, PetscInt shell, PetscInt *n, PetscInt group[16])
+{
+  const SbImport *im = s->f->groups;
+  PetscInt last = -1; /* sets repeat: examined once */
+
+  PetscFunctionBeginUser;
+  *n = -1;
+  for (PetscInt i = 0; i < 2 * s->t->ntri && *n; i++) {
+    const PetscInt set = s->f->tags[i / 2], start = im->tags_start[set], end = im->tags_start[set + 1];
+    PetscInt kept = 0;
+
+    if (s->shell[i] != shell || set == last) continue;
+    last = set;
+    if (*n < 0) {
+      *n = PetscMin(end - start, 16);
+      for (PetscInt k = 0; k < *n; k++) group[k] = im->tags_group[start + k];
+    }
+    for (PetscInt k = 0; k < *n; k++) {
+      PetscInt at = start;
+
+      while (at < end && im->tags_group[at] != group[k]) at++;
+      if (at < end) group[kept++] = group[k];
+    }
+    *n = kept;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Every region is region_1, ...; also NAME_region when its outer limit lies in the group NAME; and what the file says. */
+static PetscErrorCode name_regions(const Space *s, SbSurface *out)
+{
+  SbImport *im = s->f->groups;
+  char name[SB_GROUP_MAX];
+
+  PetscFunctionBeginUser;
+  for (PetscInt k = 0; k < s->nshell; k++) {
+    const Shell *p = &s->shells[k];
+    PetscInt group[66], surface[16], n = 0, nsurface;
+
+    if (p->volume < 0 || p->region < 0) continue;
+    (void)snprintf(name, sizeof(name), "region_%" PetscInt_FMT, p->region + 1);
+    PetscCall(SbImportGroup(im, 3, -1 - p->region, name, &group[n++]));
+    PetscCall(groups_of_shell(s, k, &nsurface, surface));
+    for (PetscInt i = 0; i < nsurface; i++) {
+      (void)snprintf(name, sizeof(name), "%.100s_region", im->group[surface[i]].name);
+      PetscCall(SbImportGroup(im, 3, -1 - s->nshell - surface[i], name, &group[n++]));
+    }
+    for (PetscInt i = 0; i < s->f->nregion && n < 66; i++) {
+      const SbSeed *seed = &s->f->region[i];
+
+      if (shell_around(s, seed->x, -1) == k)
+        PetscCall(SbImportGroup(im, 3, seed->attribute, NULL, &group[n++]));
+    }
+    PetscCall(SbImportTagSet(im, n, group, &out->region_tags[p->region]));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Points of regions that lie nowhere are a mistake in the file. */
+static PetscErrorCode check_seeds(const Space *s)
+{
+  PetscFunctionBeginUser;
+  for (PetscInt i = 0; i < s->f->nregion; i++) {
+    const SbSeed *r = &s->f->region[i];
+
+    PetscCheck(
+      shell_around(s, r->x, -1) != OUTSIDE, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
+      "%s: the point of region %lld at (%.6g, %.6g, %.6g) m lies in no region; move it, or remove it",
+      s->f->where, (long long)r->number, (double)r->x[0], (double)r->x[1], (double)r->x[2]);
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Triangles with material on a side, and their vertices. */
+static PetscErrorCode fill_surface(const Space *s, PetscInt nregion, SbSurface *out)
+{
+  const SbTriangles *t = s->t;
+  PetscInt n = 0, nvert = 0, *map;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbSurfaceCreate(t->nvert, t->ntri, nregion, out));
+  PetscCall(PetscMalloc1(t->nvert, &map));
+  for (PetscInt v = 0; v < t->nvert; v++) map[v] = -1;
+  for (PetscInt f = 0; f < t->ntri; f++) {
+    const PetscInt front = s->shells[s->shell[2 * f]].region, back = s->shells[s->shell[2 * f + 1]].region;
+
+    if (front == OUTSIDE && back == OUTSIDE) {
+      s->m->nidle++;
+      continue;
+    }
+    PetscCall(PetscArraycpy(out->tri + 3 * n, t->tri + 3 * f, 3));
+    for (int k = 0; k < 3; k++) map[t->tri[3 * f + k]] = 0;
+    out->side[2 * n] = front;
+    out->side[2 * n + 1] = back;
+    out->tags[n] = s->f->tags ? s->f->tags[f] : 0;
+    out->number[n++] = s->f->number[f];
+  }
+  for (PetscInt v = 0; v < t->nvert; v++) {
+    if (map[v] < 0) continue;
+    PetscCall(PetscArraycpy(out->x + 3 * nvert, t->x + 3 * v, 3));
+    map[v] = nvert++;
+  }
+  for (PetscInt i = 0; i < 3 * n; i++) out->tri[i] = map[out->tri[i]];
+  out->ntri = n;
+  out->nvert = nvert;
+  PetscCall(PetscFree(map));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode find_regions(Space *s, SbSurface *out)
+{
+  PetscInt n;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbTrianglesEdges(s->t, s->edge));
+  PetscCall(turn_alike(s));
+  PetscCall(find_shells(s));
+  PetscCall(measure_shells(s));
+  PetscCall(check_shells(s));
+  PetscCall(find_parents(s));
+  PetscCall(empty_cavities(s));
+  PetscCall(empty_holes(s));
+  PetscCall(check_seeds(s));
+  n = number_regions(s);
+  PetscCheck(n, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
+             "%s: no region is left beside its holes; remove one of them", s->f->where);
+  PetscCall(fill_surface(s, n, out));
+  PetscCall(name_regions(s, out));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbSurfaceFindRegions(SbTriangleFile *f, SbSurfaceRepairs *m, SbSurface *out)
+{
+  Space s = {.f = f, .t = f->t, .m = m};
+  PetscErrorCode ierr;
+
+  PetscFunctionBeginUser;
+  PetscCall(
+    PetscMalloc3(3 * (size_t)f->t->ntri, &s.edge, 2 * (size_t)f->t->ntri, &s.shell, f->t->ntri, &s.surface));
+  ierr = find_regions(&s, out);
+  PetscCall(PetscFree(s.shells));
+  PetscCall(PetscFree(s.surfaces));
+  PetscCall(PetscFree3(s.edge, s.shell, s.surface));
+  PetscFunctionReturn(ierr);
+}

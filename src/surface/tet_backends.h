@@ -1,0 +1,29 @@
+/*
+  tet_backends.h - what tetrahedralize.c hands to gmsh or tetgen, and what comes back. Rank 0 only.
+*/
+#pragma once
+#include "surface_impl.h"
+
+#define SB_TET_MOST 5e7 /* tets that one surface may become */
+
+typedef struct {
+  const char *where;    /* begins every message */
+  const SbImport *body; /* whose options messages name */
+  const SbSurface *surface;
+  SbTetOptions options;
+  PetscReal size, edge; /* wanted edge, mean edge of the surface */
+  PetscReal expected;   /* about so many tets */
+  PetscBool
+    remesh; /* the surface gets triangles of the wanted size; else they stay, with the first vertices */
+} SbTetJob;
+
+/*
+  A backend fills x, vert_number, item[3] with the number of the region as tags, item[2] with the facets between regions and
+  outside: as tags the triangle of the surface that they are or, remeshed, lie next to.
+  Errors: PETSC_ERR_USER_INPUT, PETSC_ERR_FILE_*: the reason why it did not work.
+*/
+PetscErrorCode SbTetRun_Gmsh(const SbTetJob *job, SbImport *tets);
+PetscErrorCode SbTetRun_TetGen(const SbTetJob *job, SbImport *tets);
+
+/* The tags of item[2], for triangles that were rebuilt: the triangle of the surface nearest to their middle. */
+PetscErrorCode SbTetNearest(const SbSurface *surface, SbItems *tri, const PetscReal x[]);

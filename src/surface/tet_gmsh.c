@@ -1,0 +1,272 @@
+/*
+  tet_gmsh.c - tets by the gmsh library (Geuzaine and Remacle 2009), in its child process.
+
+  The surface becomes discrete entities, one for each pair of regions that meet there. Kept, they are the mesh of the boundary as
+  they are. Meshed again, gmsh cuts them along edges that turn by more than the angle, finds a parametrisation of each
+  piece (classifySurfaces, createGeometry) and meshes pieces and seams with the wanted size. Each region is a volume
+  within its entities. The tets are made by its Delaunay method and improved by its own optimisers, and by Netgen's where it has it.
+*/
+#include "sbgmsh.h"
+#include "tet_backends.h"
+
+enum { TRIANGLE = 2, TET = 4 }; /* gmsh's numbers of element types */
+
+/* An entity of the model and the regions on its sides. */
+typedef struct {
+  int tag;
+  PetscInt side[2]; /* in front and behind, as in SbSurface */
+} Piece;
+
+typedef struct {
+  const SbTetJob *job;
+  PetscInt npiece;
+  Piece *piece;
+} Model;
+
+/* ------------------------------------------------------------------ into the model */
+
+/* The piece between these regions, made when new. */
+static PetscErrorCode find_piece(Model *m, const PetscInt side[2], PetscInt *k)
+{
+  PetscFunctionBeginUser;
+  for (*k = 0; *k < m->npiece; (*k)++) {
+    if (m->piece[*k].side[0] == side[0] && m->piece[*k].side[1] == side[1])
+      PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  PetscCall(PetscRealloc((size_t)(m->npiece + 1) * sizeof(*m->piece), &m->piece));
+  m->piece[m->npiece] = (Piece){(int)m->npiece + 1, {side[0], side[1]}};
+  m->npiece++;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* All nodes are put on the first piece: gmsh takes them from the triangles anyway. */
+static PetscErrorCode add_nodes(const SbGmsh *g, const SbSurface *s)
+{
+  size_t *tag;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscMalloc1(s->nvert, &tag));
+  for (PetscInt v = 0; v < s->nvert; v++) tag[v] = (size_t)v + 1;
+  SB_GMSH(g, ModelMeshAddNodes, 2, 1, tag, (size_t)s->nvert, s->x, 3 * (size_t)s->nvert, NULL, 0);
+  PetscCall(PetscFree(tag));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode add_surface(const SbGmsh *g, Model *m)
+{
+  const SbSurface *s = m->job->surface;
+  PetscInt *piece;
+  size_t *tag, *node;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscMalloc3(s->ntri, &piece, s->ntri, &tag, 3 * (size_t)s->ntri, &node));
+  for (PetscInt f = 0; f < s->ntri; f++) PetscCall(find_piece(m, s->side + 2 * f, &piece[f]));
+  for (PetscInt k = 0; k < m->npiece; k++) SB_GMSH(g, ModelAddDiscreteEntity, 2, m->piece[k].tag, NULL, 0);
+  PetscCall(add_nodes(g, s));
+  for (PetscInt k = 0; k < m->npiece; k++) {
+    size_t n = 0;
+
+    for (PetscInt f = 0; f < s->ntri; f++) {
+      if (piece[f] != k) continue;
+      tag[n] = (size_t)f + 1;
+      for (int i = 0; i < 3; i++) node[3 * n + (size_t)i] = (size_t)s->tri[3 * f + i] + 1;
+      n++;
+    }
+    SB_GMSH(g, ModelMeshAddElementsByType, m->piece[k].tag, TRIANGLE, tag, n, node, 3 * n);
+  }
+  PetscCall(PetscFree3(piece, tag, node));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* After the cut along edges the pieces are new ones, of the same triangles. */
+static PetscErrorCode cut_surface(const SbGmsh *g, Model *m)
+{
+  const SbSurface *s = m->job->surface;
+  const PetscReal angle = m->job->options.angle * PETSC_PI / 180;
+  int *entity;
+  size_t n;
+
+  PetscFunctionBeginUser;
+  SB_GMSH(g, ModelMeshClassifySurfaces, angle, 1, 1, PETSC_PI, 0);
+  SB_GMSH(g, ModelMeshCreateGeometry, NULL, 0);
+  SB_GMSH(g, ModelGetEntities, &entity, &n, 2);
+  m->npiece = 0;
+  PetscCall(PetscRealloc(n / 2 * sizeof(*m->piece), &m->piece));
+  for (size_t i = 0; i + 1 < n; i += 2) {
+    size_t *tag, ntag, *node, nnode;
+
+    SB_GMSH(g, ModelMeshGetElementsByType, TRIANGLE, &tag, &ntag, &node, &nnode, entity[i + 1], 0, 1);
+    if (ntag) {
+      const size_t f = tag[0] - 1;
+
+      PetscCheck(f < (size_t)s->ntri, PETSC_COMM_SELF, PETSC_ERR_FILE_UNEXPECTED,
+                 "a piece of the surface has triangle %zu, which is not there", tag[0]);
+      m->piece[m->npiece++] = (Piece){entity[i + 1], {s->side[2 * f], s->side[2 * f + 1]}};
+    }
+    g->Free(tag);
+    g->Free(node);
+  }
+  g->Free(entity);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode add_volumes(const SbGmsh *g, const Model *m)
+{
+  int *tag;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscMalloc1(m->npiece, &tag));
+  for (PetscInt r = 0; r < m->job->surface->nregion; r++) {
+    int loop = (int)r + 1;
+    size_t n = 0;
+
+    for (PetscInt k = 0; k < m->npiece; k++) {
+      if (m->piece[k].side[0] == r || m->piece[k].side[1] == r) tag[n++] = m->piece[k].tag;
+    }
+    SB_GMSH(g, ModelGeoAddSurfaceLoop, tag, n, loop);
+    SB_GMSH(g, ModelGeoAddVolume, &loop, 1, loop);
+  }
+  SB_GMSH0(g, ModelGeoSynchronize);
+  PetscCall(PetscFree(tag));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode set_sizes(const SbGmsh *g, const SbTetJob *job)
+{
+  const struct {
+    const char *name;
+    PetscReal value;
+  } options[] = {
+    {"Mesh.MeshSizeMax", job->size},
+    {"Mesh.MeshSizeMin", job->remesh ? job->size : 0},
+    {"Mesh.MeshSizeFromPoints", 0},
+    {"Mesh.MeshSizeExtendFromBoundary", job->remesh ? 0 : 1},
+    {"Mesh.Optimize", 1},
+    {"Mesh.OptimizeThreshold", 0.4},
+  };
+
+  PetscFunctionBeginUser;
+  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(options); i++)
+    SB_GMSH(g, OptionSetNumber, options[i].name, options[i].value);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ out of the model */
+
+/* Items of one entity; their corners are tags of nodes as yet. */
+static PetscErrorCode take_items(const SbGmsh *g, int dim, int entity, PetscInt tags, SbImport *im)
+{
+  size_t *tag, ntag, *node, nnode;
+
+  PetscFunctionBeginUser;
+  SB_GMSH(g, ModelMeshGetElementsByType, dim == 3 ? TET : TRIANGLE, &tag, &ntag, &node, &nnode, entity, 0, 1);
+  for (size_t i = 0; i < ntag; i++) {
+    PetscInt vert[4] = {0, 0, 0, 0};
+
+    for (int k = 0; k <= dim; k++) vert[k] = (PetscInt)node[i * (size_t)(dim + 1) + (size_t)k];
+    PetscCall(SbImportAddItem(im, dim, vert, tags, (int64_t)i + 1));
+  }
+  g->Free(tag);
+  g->Free(node);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Vertices in the order of their tags, so that those of a kept surface are the first ones; left out: the old surface's. */
+static PetscErrorCode take_nodes(const SbGmsh *g, PetscInt nkept, SbImport *im)
+{
+  size_t *tag, ntag, nx, nparameter, most = 0;
+  double *x, *parameter;
+  PetscInt *map, n = 0;
+
+  PetscFunctionBeginUser;
+  SB_GMSH(g, ModelMeshGetNodes, &tag, &ntag, &x, &nx, &parameter, &nparameter, -1, -1, 0, 0);
+  for (size_t i = 0; i < ntag; i++) most = PetscMax(most, tag[i]);
+  PetscCheck(most < PETSC_MAX_INT / 8, PETSC_COMM_SELF, PETSC_ERR_FILE_UNEXPECTED, "too many nodes");
+  PetscCall(PetscCalloc1(most + 1, &map));
+  for (PetscInt v = 1; v <= nkept; v++) map[v] = 1;
+  for (int d = 2; d < 4; d++) {
+    for (PetscInt i = 0; i < (d + 1) * im->item[d].n; i++) map[im->item[d].vert[i]] = 1;
+  }
+  for (size_t v = 0; v <= most; v++) map[v] = map[v] ? ++n : 0;
+  PetscCall(SbImportSetVertices(im, n));
+  for (size_t i = 0; i < ntag; i++) {
+    const PetscInt v = map[tag[i]] - 1;
+
+    if (v >= 0) PetscCall(PetscArraycpy(im->x + 3 * v, x + 3 * i, 3));
+  }
+  for (int d = 2; d < 4; d++) {
+    for (PetscInt i = 0; i < (d + 1) * im->item[d].n; i++) im->item[d].vert[i] = map[im->item[d].vert[i]] - 1;
+  }
+  PetscCall(PetscFree(map));
+  g->Free(tag);
+  g->Free(x);
+  g->Free(parameter);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode take_mesh(const SbGmsh *g, const Model *m, SbImport *im)
+{
+  const SbSurface *s = m->job->surface;
+
+  PetscFunctionBeginUser;
+  for (PetscInt r = 0; r < s->nregion; r++) PetscCall(take_items(g, 3, (int)r + 1, r, im));
+  PetscCheck(im->item[3].n, PETSC_COMM_SELF, PETSC_ERR_FILE_UNEXPECTED, "no tets were made");
+  for (PetscInt k = 0; k < m->npiece; k++) PetscCall(take_items(g, 2, m->piece[k].tag, 0, im));
+  PetscCall(take_nodes(g, m->job->remesh ? 0 : s->nvert, im));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ the job */
+
+/* Beyond what Generate does by itself. Netgen's optimiser is not in every build of gmsh, and not in Debian's. */
+static PetscErrorCode improve(const SbGmsh *g)
+{
+  int missing = 0;
+
+  PetscFunctionBeginUser;
+  for (int pass = 0; pass < 2; pass++) {
+    SB_GMSH(g, ModelMeshOptimize, "Relocate3D", 0, 2, NULL, 0);
+    SB_GMSH(g, ModelMeshOptimize, "", 0, 1, NULL, 0);
+    if (!missing) g->ModelMeshOptimize("Netgen", 0, 1, NULL, 0, &missing);
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode work(const SbGmsh *g, void *ctx, SbImport *im)
+{
+  Model m = {.job = (const SbTetJob *)ctx};
+
+  PetscFunctionBeginUser;
+  PetscCall(add_surface(g, &m));
+  if (m.job->remesh) PetscCall(cut_surface(g, &m));
+  PetscCall(add_volumes(g, &m));
+  PetscCall(set_sizes(g, m.job));
+  SB_GMSH(g, ModelMeshGenerate, 3);
+  PetscCall(improve(g));
+  PetscCall(take_mesh(g, &m, im));
+  PetscCall(PetscFree(m.piece));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The triangles of a kept surface are not asked back: they are what was given. */
+static PetscErrorCode put_triangles(const SbSurface *s, SbImport *im)
+{
+  PetscFunctionBeginUser;
+  im->item[2].n = 0;
+  for (PetscInt f = 0; f < s->ntri; f++) PetscCall(SbImportAddItem(im, 2, s->tri + 3 * f, f, s->number[f]));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbTetRun_Gmsh(const SbTetJob *job, SbImport *tets)
+{
+  SbTetJob mine = *job;
+  const SbGmshJob child = {job->where, "made tetrahedra", job->options.seconds, work, &mine};
+
+  PetscFunctionBeginUser;
+  PetscCall(SbGmshRun(&child, tets));
+  if (job->remesh)
+    PetscCall(SbTetNearest(job->surface, &tets->item[2], tets->x));
+  else
+    PetscCall(put_triangles(job->surface, tets));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

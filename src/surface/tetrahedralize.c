@@ -1,0 +1,340 @@
+/*
+  tetrahedralize.c - tets from a surface that knows its regions: gmsh, then tetgen, and what must hold for their result.
+
+  A backend delivers vertices, tets with the number of their region, and triangles with the number of the surface's triangle that they lie on.
+  Here both are checked (every region is there and has its volume: to rounding when the triangles were kept, else within a few
+  percent), groups are given to tets and triangles, and slivers are counted.
+*/
+#include "sbkernel.h"
+#include "sbtet.h"
+#include "tet_backends.h"
+
+#define NEAR 1.5   /* between size and mean edge: the triangles are kept */
+#define EXACT 1e-9 /* relative error of a region's volume when the triangles are kept */
+#define ROUGH 0.1  /* the same when they are rebuilt: a coarse size rounds a curved surface off */
+#define SLIVER 5.  /* degrees */
+
+/* ------------------------------------------------------------------ surfaces */
+
+PetscErrorCode SbSurfaceCreate(PetscInt nvert, PetscInt ntri, PetscInt nregion, SbSurface *s)
+{
+  PetscFunctionBeginUser;
+  PetscCall(PetscMemzero(s, sizeof(*s)));
+  s->nvert = nvert;
+  s->ntri = ntri;
+  s->nregion = nregion;
+  PetscCall(PetscCalloc1(3 * (size_t)nvert, &s->x));
+  PetscCall(PetscCalloc1(3 * (size_t)ntri, &s->tri));
+  PetscCall(PetscCalloc1(ntri, &s->tags));
+  PetscCall(PetscCalloc1(ntri, &s->number));
+  PetscCall(PetscCalloc1(2 * (size_t)ntri, &s->side));
+  PetscCall(PetscCalloc1(nregion, &s->region_tags));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbSurfaceDestroy(SbSurface *s)
+{
+  PetscFunctionBeginUser;
+  PetscCall(PetscFree(s->x));
+  PetscCall(PetscFree(s->tri));
+  PetscCall(PetscFree(s->tags));
+  PetscCall(PetscFree(s->number));
+  PetscCall(PetscFree(s->side));
+  PetscCall(PetscFree(s->region_tags));
+  PetscCall(PetscMemzero(s, sizeof(*s)));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscReal SbSurfaceMeasure(const SbSurface *s, PetscReal volume[])
+{
+  const SbTriangles t = {.nvert = s->nvert, .ntri = s->ntri, .x = s->x, .tri = s->tri};
+  PetscReal sum = 0, longest2, around;
+
+  for (PetscInt r = 0; r < s->nregion; r++) volume[r] = 0;
+  for (PetscInt f = 0; f < s->ntri; f++) {
+    const PetscReal cone = SbTetVolumeTo(&t, f, s->x);
+
+    if (s->side[2 * f] >= 0) volume[s->side[2 * f]] -= cone;
+    if (s->side[2 * f + 1] >= 0) volume[s->side[2 * f + 1]] += cone;
+    (void)SbTriangleMeasure(&t, f, &longest2, &around);
+    sum += around;
+  }
+  return s->ntri ? sum / (3 * (PetscReal)s->ntri) : 0;
+}
+
+/* ------------------------------------------------------------------ the result of a backend */
+
+/* Volume of each region against that of its surface. */
+static PetscErrorCode check_volumes(const SbTetJob *job, const SbImport *im)
+{
+  const SbSurface *s = job->surface;
+  PetscReal *want, *got;
+  char why[256] = "";
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscCalloc2(s->nregion, &want, s->nregion, &got));
+  (void)SbSurfaceMeasure(s, want);
+  for (PetscInt c = 0; c < im->item[3].n; c++)
+    got[im->item[3].tags[c]] += PetscAbsReal(SbTetDeterminant(im->x, im->item[3].vert + 4 * c)) / 6;
+  for (PetscInt r = 0; r < s->nregion && !why[0]; r++) {
+    if (PetscAbsReal(got[r] - want[r]) > (job->remesh ? ROUGH : EXACT) * want[r])
+      (void)snprintf(why, sizeof(why), "its tets fill %.4g percent of the volume of region %" PetscInt_FMT,
+                     (double)(100 * got[r] / want[r]), r + 1);
+  }
+  PetscCall(PetscFree2(want, got));
+  PetscCheck(!why[0], PETSC_COMM_SELF, PETSC_ERR_USER_INPUT, "%s", why);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* With the surface kept: its vertices are the first ones, as they were. */
+static PetscErrorCode check_kept(const SbTetJob *job, const SbImport *im)
+{
+  const SbSurface *s = job->surface;
+
+  PetscFunctionBeginUser;
+  if (job->remesh) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCheck(im->nvert >= s->nvert, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
+             "vertices of the surface are gone");
+  for (PetscInt i = 0; i < 3 * s->nvert; i++)
+    PetscCheck(im->x[i] == s->x[i], PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
+               "vertex %" PetscInt_FMT " of the surface was moved", i / 3 + 1);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Numbers of regions and triangles become tag sets; triangles of no group are left out. */
+static PetscErrorCode give_groups(const SbSurface *s, SbImport *im)
+{
+  SbItems *tri = &im->item[2];
+  PetscInt n = 0;
+
+  PetscFunctionBeginUser;
+  for (PetscInt c = 0; c < im->item[3].n; c++) im->item[3].tags[c] = s->region_tags[im->item[3].tags[c]];
+  for (PetscInt i = 0; i < tri->n; i++) {
+    const PetscInt f = tri->tags[i];
+
+    if (!s->tags[f]) continue;
+    PetscCall(PetscArraymove(tri->vert + 3 * n, tri->vert + 3 * i, 3));
+    tri->tags[n] = s->tags[f];
+    tri->number[n++] = s->number[f];
+  }
+  tri->n = n;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ backends */
+
+static const struct {
+  const char *name;
+  PetscErrorCode (*run)(const SbTetJob *job, SbImport *tets);
+} backends[] = {{"gmsh", SbTetRun_Gmsh},
+                {"tetgen", SbTetRun_TetGen}}; /* SB_TET_GMSH - 1, SB_TET_TETGEN - 1 */
+
+/* Appends what was made, how, and how many slivers there are; `failed`: why the first backend did not work. */
+static PetscErrorCode add_note(const SbTetJob *job, int backend, PetscReal size, const char *failed,
+                               SbImport *im)
+{
+  const char *surface = job->remesh ? "remeshed" : "kept";
+  PetscReal smallest;
+  char text[512], slivers[96] = "";
+  PetscInt n;
+
+  PetscFunctionBeginUser;
+  if (job->remesh && backend + 1 == SB_TET_TETGEN) surface = job->size < job->edge ? "split" : "kept";
+  PetscCall(SbImportSlivers(im, SLIVER, &n, &smallest));
+  if (n)
+    (void)snprintf(slivers, sizeof(slivers),
+                   ", %" PetscInt_FMT " slivers (dihedral below %g degrees, smallest %.2g)", n,
+                   (double)SLIVER, (double)smallest);
+  (void)snprintf(text, sizeof(text), "%s%" PetscInt_FMT " tets of size %.3g m by %s, surface %s%s%s%.200s%s",
+                 im->note[0] ? ", " : "", im->item[3].n, (double)size, backends[backend].name, surface,
+                 slivers, failed[0] ? " (before that " : "", failed, failed[0] ? ")" : "");
+  PetscCall(PetscStrlcat(im->note, text, sizeof(im->note)));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode run_checked(int backend, const SbTetJob *job, SbImport *tets)
+{
+  PetscFunctionBeginUser;
+  PetscCall((*backends[backend].run)(job, tets));
+  PetscCheck(tets->item[3].n, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT, "it made no tets");
+  PetscCall(check_kept(job, tets));
+  PetscCall(check_volumes(job, tets));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Without the beginning that our own message has, too. */
+static const char *without(const char *where, const char *text)
+{
+  const size_t n = strlen(where);
+
+  if (strncmp(text, where, n)) return text;
+  return text + n + strspn(text + n, ": ");
+}
+
+/* One backend; its error becomes a reason. Errors that are not the input's are raised. */
+static PetscErrorCode try_road(int backend, const SbTetJob *job, SbImport *tets, PetscBool *done, size_t size,
+                               char reasons[])
+{
+  SbCaughtError caught = {0, ""};
+  PetscErrorCode ierr;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscMemzero(tets, sizeof(*tets)));
+  (void)snprintf(tets->where, sizeof(tets->where), "%s", job->where);
+  PetscCall(PetscPushErrorHandler(SbCatchError, &caught));
+  ierr = run_checked(backend, job, tets);
+  PetscCall(PetscPopErrorHandler());
+  *done = (PetscBool)!ierr;
+  if (!ierr) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(SbImportDestroy(tets));
+  PetscCheck(ierr == PETSC_ERR_USER_INPUT || ierr == PETSC_ERR_FILE_OPEN || ierr == PETSC_ERR_FILE_READ ||
+               ierr == PETSC_ERR_FILE_UNEXPECTED,
+             PETSC_COMM_SELF, ierr, "%s: %s", job->where, caught.text);
+  PetscCall(PetscStrlcat(reasons, reasons[0] ? "; " : "", size));
+  PetscCall(PetscStrlcat(reasons, backends[backend].name, size));
+  PetscCall(PetscStrlcat(reasons, ": ", size));
+  PetscCall(PetscStrlcat(reasons, without(job->where, caught.text), size));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Lengths times a power of two, which keeps every bit: programs with bounds of their own see a size between 1 and 2. */
+static PetscErrorCode scale_surface(const SbSurface *s, PetscReal factor, SbSurface *scaled)
+{
+  PetscFunctionBeginUser;
+  *scaled = *s;
+  PetscCall(PetscMalloc1(3 * (size_t)s->nvert, &scaled->x));
+  for (PetscInt i = 0; i < 3 * s->nvert; i++) scaled->x[i] = factor * s->x[i];
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The body keeps its groups and tag sets, and gets the rest. */
+static PetscErrorCode move_mesh(PetscReal factor, SbImport *tets, SbImport *body)
+{
+  PetscFunctionBeginUser;
+  PetscCall(PetscFree(body->x));
+  PetscCall(PetscFree(body->vert_number));
+  body->nvert = tets->nvert;
+  body->x = tets->x;
+  body->vert_number = tets->vert_number;
+  tets->x = NULL;
+  tets->vert_number = NULL;
+  for (int d = 0; d < 4; d++) {
+    PetscCall(PetscFree(body->item[d].vert));
+    PetscCall(PetscFree(body->item[d].tags));
+    PetscCall(PetscFree(body->item[d].number));
+    body->item[d] = tets->item[d];
+    PetscCall(PetscMemzero(&tets->item[d], sizeof(tets->item[d])));
+  }
+  for (PetscInt i = 0; i < 3 * body->nvert; i++) body->x[i] *= factor;
+  for (PetscInt v = 0; v < body->nvert; v++) body->vert_number[v] = v + 1;
+  for (PetscInt c = 0; c < body->item[3].n; c++) body->item[3].number[c] = c + 1;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbTetDefaults(SbTetOptions *o)
+{
+  PetscFunctionBeginUser;
+  *o = (SbTetOptions){.size = 0,
+                      .merge_tolerance = -1,
+                      .untangle = -1,
+                      .angle = 40,
+                      .seconds = 600,
+                      .backend = SB_TET_AUTO,
+                      .surface = SB_TET_SURFACE_AUTO};
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The size, whether the triangles stay, and what follows from the shape of the surface. */
+static PetscErrorCode prepare(const char *where, const SbSurface *s, const SbTetOptions *o,
+                              const SbImport *body, SbTetJob *job)
+{
+  PetscReal *volume, edge, all = 0;
+  char option[SB_OPTION_NAME_MAX];
+
+  PetscFunctionBeginUser;
+  PetscCheck(s->ntri > 3 && s->nregion > 0, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
+             "%s: %" PetscInt_FMT " triangles around %" PetscInt_FMT " regions enclose nothing", where,
+             s->ntri, s->nregion);
+  PetscCall(PetscCalloc1(s->nregion, &volume));
+  edge = SbSurfaceMeasure(s, volume);
+  for (PetscInt r = 0; r < s->nregion; r++) {
+    const PetscReal v = volume[r];
+
+    if (!(v > 0)) {
+      PetscCall(PetscFree(volume));
+      SETERRQ(PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
+              "%s: region %" PetscInt_FMT " has the volume %g; its triangles are turned, or not closed",
+              where, r + 1, (double)v);
+    }
+    all += v;
+  }
+  PetscCall(PetscFree(volume));
+  *job = (SbTetJob){.where = where,
+                    .body = body,
+                    .surface = s,
+                    .size = o->size > 0 ? o->size : edge,
+                    .options = *o,
+                    .edge = edge};
+  if (!(job->options.seconds > 0)) job->options.seconds = 600;
+  if (!(job->options.angle > 0)) job->options.angle = 40;
+  job->remesh =
+    (PetscBool)(o->surface == SB_TET_REMESH ||
+                (o->surface == SB_TET_SURFACE_AUTO && (job->size > NEAR * edge || edge > NEAR * job->size)));
+  /* A tet of edge h has the volume h^3 / (6 sqrt(2)); a mesh has some ten percent more tets. */
+  job->expected = 6 * PETSC_SQRT2 * all / (job->size * job->size * job->size);
+  PetscCheck(job->expected < SB_TET_MOST, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
+             "%s: a size of %g m makes about %.2g tets out of %.4g m^3; give a size of at least %.3g m "
+             "(%s)",
+             where, (double)job->size, (double)job->expected, (double)all,
+             (double)(job->size * PetscPowReal(job->expected / SB_TET_MOST, 1. / 3)),
+             SbImportOption(body, "tet_size", option));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The first backend that works; its mesh goes to the body. */
+static PetscErrorCode run_roads(const SbTetJob *job, PetscReal factor, PetscBool *done, size_t size,
+                                char reasons[], SbImport *body)
+{
+  SbImport tets;
+
+  PetscFunctionBeginUser;
+  for (int backend = 0; backend < 2 && !*done; backend++) {
+    if (job->options.backend != SB_TET_AUTO && (int)job->options.backend != backend + 1) continue;
+    PetscCall(try_road(backend, job, &tets, done, size, reasons));
+    if (!*done) continue;
+    PetscCall(move_mesh(1 / factor, &tets, body));
+    PetscCall(SbImportDestroy(&tets));
+    PetscCall(give_groups(job->surface, body));
+    PetscCall(add_note(job, backend, job->size / factor, reasons, body));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbTetrahedralize(const char *where, const SbSurface *s, const SbTetOptions *o, SbImport *body)
+{
+  SbTetJob job;
+  SbSurface scaled;
+  PetscReal factor;
+  PetscBool done = PETSC_FALSE;
+  char reasons[640] = "", size_option[SB_OPTION_NAME_MAX], surface_option[SB_OPTION_NAME_MAX];
+  int exponent;
+  PetscErrorCode ierr;
+
+  PetscFunctionBeginUser;
+  PetscCall(prepare(where, s, o, body, &job));
+  (void)frexp(job.size, &exponent);
+  factor = ldexp(1, 1 - exponent);
+  PetscCall(scale_surface(s, factor, &scaled));
+  job.surface = &scaled;
+  job.size *= factor;
+  job.edge *= factor;
+  ierr = run_roads(&job, factor, &done, sizeof(reasons), reasons, body);
+  PetscCall(PetscFree(scaled.x));
+  PetscCall(ierr);
+  PetscCheck(done, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
+             "%s: no tets could be made of the surface. %s. Try another %s, %s "
+             "keep or remesh, or repair the surface where it is thinner than its triangles",
+             where, reasons, SbImportOption(body, "tet_size", size_option),
+             SbImportOption(body, "tet_surface", surface_option));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

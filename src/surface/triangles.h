@@ -1,0 +1,87 @@
+/*
+  triangles.h - a surface of triangles on its way from a file to a rigid obstacle: what the files triangles*.c share. Rank 0 only.
+*/
+#pragma once
+#include "sbmeshio.h"
+#include "sbtriangles.h"
+
+#define SB_TRIANGLE_FLAT \
+  1e-10 /* twice the area over the longest edge squared, below which a triangle has no side */
+#define SB_TRIANGLE_EMPTY 1e-9 /* volume over (area / 6)^1.5, below which a part encloses nothing */
+
+/* A point that a file gives for the region around it. */
+typedef struct {
+  PetscReal x[3];
+  int64_t attribute; /* of a region */
+  int64_t number;    /* in the file */
+} SbSeed;
+
+/* Filled by a reader, item by item. */
+typedef struct {
+  const char *where; /* begins every message */
+  SbTriangles *t;
+  PetscInt vert_size, tri_size; /* allocated */
+  int64_t *number;              /* [ntri] of the face in the file, from 1; owned by who reads */
+  /* for bodies alone */
+  SbImport *groups; /* gets the groups of the triangles; NULL: nobody wants them, tags stays NULL */
+  PetscInt now;     /* tag set of the triangles that come next */
+  PetscInt *tags;   /* [ntri] tag set; owned by who reads */
+  PetscBool sheets; /* the order of corners says nothing about the side: .poly, .smesh */
+  PetscInt nhole, nregion;
+  SbSeed *hole, *region; /* owned by who reads */
+} SbTriangleFile;
+
+/* Readers. Errors name the file, and the line or byte. Not collective. */
+PetscErrorCode SbTrianglesRead_STL(const char *path, SbTriangleFile *file);
+PetscErrorCode SbTrianglesRead_OBJ(const char *path, SbTriangleFile *file);
+PetscErrorCode SbTrianglesRead_OFF(const char *path, SbTriangleFile *file);
+PetscErrorCode SbTrianglesRead_PLY(const char *path, SbTriangleFile *file);
+PetscErrorCode SbTrianglesRead_Poly(const char *path, SbTriangleFile *file); /* and .smesh */
+PetscErrorCode SbTrianglesRead_Gmsh(const char *path, SbTriangleFile *file);
+/* Appends a vertex, or a triangle of vertices that are there. */
+PetscErrorCode SbTrianglesAddVertex(SbTriangleFile *file, const PetscReal x[3]);
+PetscErrorCode SbTrianglesAdd(SbTriangleFile *file, PetscInt a, PetscInt b, PetscInt c, int64_t number);
+/* Appends a polygon, convex or not, as triangles between its corners; vert[n] from 0. An error names what was scanned last. */
+PetscErrorCode SbTrianglesAddPolygon(SbScan *scan, PetscInt n, const PetscInt vert[], int64_t number,
+                                     SbTriangleFile *file);
+/*
+  The same for polygons within each other: vert[start[k]] to vert[start[k + 1] - 1] is the k-th of nloop; those around one of the points
+  hole[nhole][3] are left empty, whatever else is enclosed is filled.
+*/
+PetscErrorCode SbTrianglesAddLoops(SbScan *scan, PetscInt nloop, const PetscInt start[],
+                                   const PetscInt vert[], PetscInt nhole, const PetscReal hole[],
+                                   int64_t number, SbTriangleFile *file);
+/* The triangles that come next belong to these groups; blanks in names become underscores. n = 0: to none. */
+PetscErrorCode SbTrianglesGroups(SbTriangleFile *file, PetscInt n, const char *const names[]);
+/* Reads with the file in memory; also after an error it is closed. */
+PetscErrorCode SbTrianglesScan(const char *path, PetscErrorCode (*read)(SbScan *, SbTriangleFile *),
+                               SbTriangleFile *file);
+/* Leaves out vertices without a triangle. */
+PetscErrorCode SbTrianglesDropUnused(SbTriangles *triangles);
+/* The reader of a file by its name; NULL: of no known kind. */
+typedef PetscErrorCode (*SbTriangleReader)(const char *path, SbTriangleFile *file);
+SbTriangleReader SbTrianglesReader(const char *path);
+
+/*
+  SbTrianglesCheck - closed, of one orientation, around a volume; fills neighbours, volume and mean edge, turns what is inverted.
+
+  Not collective. Errors: PETSC_ERR_USER_INPUT, one line that names the triangle and what to do.
+*/
+PetscErrorCode SbTrianglesCheck(SbTriangleFile *file);
+
+/* ------------------------------------------------------------------ triangles_check.c: what other checks use too */
+
+typedef struct {
+  uint64_t key;  /* lower and higher vertex */
+  PetscInt slot; /* 3 triangle + edge; edge k runs from corner k to the next */
+} SbTriangleEdge;
+/* edge[3 ntri], sorted: those with one key are one edge. */
+PetscErrorCode SbTrianglesEdges(const SbTriangles *triangles, SbTriangleEdge edge[]);
+/* How many triangles there are at the edge that begins at place i of n. */
+PetscInt SbTrianglesAtEdge(PetscInt n, const SbTriangleEdge edge[], PetscInt i);
+/* Twice the area of a triangle, m^2, its longest edge squared and the sum of its edges. */
+PetscReal SbTriangleMeasure(const SbTriangles *triangles, PetscInt f, PetscReal *longest2, PetscReal *around);
+/* Volume of the tet between a triangle and the point o, m^3, positive when o is behind. */
+PetscReal SbTetVolumeTo(const SbTriangles *triangles, PetscInt f, const PetscReal o[3]);
+/* Solid angle of a triangle seen from o, positive from behind. */
+PetscReal SbTriangleSolidAngle(const SbTriangles *triangles, PetscInt f, const PetscReal o[3]);

@@ -1,0 +1,155 @@
+// @ranks 1
+/*
+  Which tet holds a point: against all tets one by one, at corners, outside, beside tets that are inverted. Shapes of tets.
+*/
+#include "../../src/meshio/meshio_impl.h"
+#include "../test.h"
+#include "sbtet.h"
+
+#define N 6
+
+/* The vertices of a box: mesh, with those inside moved. */
+static PetscErrorCode make_box(PetscRandom random, SbImport *im)
+{
+  PetscFunctionBeginUser;
+  PetscCall(PetscMemzero(im, sizeof(*im)));
+  PetscCall(SbImportRead_Box("box:1,2,0.5:6,6,6", im));
+  for (PetscInt v = 0; v < im->nvert; v++) {
+    const PetscReal size[3] = {1, 2, 0.5};
+
+    for (int k = 0; k < 3; k++) {
+      PetscReal r;
+
+      PetscCall(PetscRandomGetValueReal(random, &r));
+      if (im->x[3 * v + k] > 0 && im->x[3 * v + k] < size[k])
+        im->x[3 * v + k] += 0.3 * (r - 0.5) * size[k] / N;
+    }
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscReal depth_in(const SbImport *im, PetscInt c, const PetscReal p[3])
+{
+  const PetscInt *v = im->item[3].vert + 4 * c;
+  const PetscReal whole = SbTetDeterminant(im->x, v);
+  PetscReal depth = 1;
+
+  for (int a = 0; a < 4; a++) {
+    PetscReal x[12];
+    static const PetscInt corner[4] = {0, 1, 2, 3};
+
+    for (int i = 0; i < 12; i++) x[i] = i / 3 == a ? p[i % 3] : im->x[3 * v[i / 3] + i % 3];
+    depth = PetscMin(depth, SbTetDeterminant(x, corner) / whole);
+  }
+  return depth;
+}
+
+static PetscErrorCode check_inside(PetscRandom random)
+{
+  SbLocator l;
+  SbImport im;
+
+  PetscFunctionBeginUser;
+  PetscCall(make_box(random, &im));
+  PetscCall(SbLocatorCreate(im.item[3].n, im.item[3].vert, im.x, &l));
+  for (int i = 0; i < 300; i++) {
+    PetscReal p[3], w[4], best = -1, at[3] = {0, 0, 0}, distance, sum = 0;
+    PetscInt cell;
+
+    for (int k = 0; k < 3; k++) PetscCall(PetscRandomGetValueReal(random, &p[k]));
+    p[1] *= 2;
+    p[2] *= 0.5;
+    distance = SbLocatorFind(l, p, &cell, w);
+    for (PetscInt c = 0; c < im.item[3].n; c++) best = PetscMax(best, depth_in(&im, c, p));
+    for (int a = 0; a < 4; a++) {
+      sum += w[a];
+      for (int k = 0; k < 3; k++) at[k] += w[a] * im.x[3 * im.item[3].vert[4 * cell + a] + k];
+    }
+    SB_CHECK(distance < 1e-12, "a point inside is %g away", (double)distance);
+    SB_CHECK_NEAR(sum, 1, 1e-14, "sum of weights");
+    SB_CHECK_NEAR(depth_in(&im, cell, p), best, 1e-12, "depth in the tet that was found");
+    for (int k = 0; k < 3; k++) SB_CHECK_NEAR(at[k], p[k], 1e-12, "place by the weights");
+  }
+  /* a vertex of the mesh */
+  {
+    PetscReal w[4], most = 0;
+    PetscInt cell;
+
+    SB_CHECK(SbLocatorFind(l, im.x + 3 * 100, &cell, w) == 0, "a vertex is outside");
+    for (int a = 0; a < 4; a++) most = PetscMax(most, im.item[3].vert[4 * cell + a] == 100 ? w[a] : 0);
+    SB_CHECK_NEAR(most, 1, 1e-12, "weight of a vertex at its place");
+  }
+  PetscCall(SbLocatorDestroy(&l));
+  PetscCall(SbImportDestroy(&im));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Outside a box the nearest place is known. */
+static PetscErrorCode check_outside(void)
+{
+  const PetscReal p[3][3] = {{1.3, 0.7, 0.2}, {0.4, -0.5, 0.1}, {0.5, 0.9, 0.9}},
+                  expected[3] = {0.3, 0.5, 0.4};
+  SbLocator l;
+  SbImport im;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscMemzero(&im, sizeof(im)));
+  PetscCall(SbImportRead_Box("box:1,2,0.5:6,6,6", &im));
+  PetscCall(SbLocatorCreate(im.item[3].n, im.item[3].vert, im.x, &l));
+  for (int i = 0; i < 3; i++) {
+    PetscReal w[4];
+    PetscInt cell;
+    const PetscReal distance = SbLocatorFind(l, p[i], &cell, w);
+
+    SB_CHECK(distance >= expected[i] - 1e-12 && distance < 1.1 * expected[i],
+             "%g m from the box, expected %g", (double)distance, (double)expected[i]);
+    for (int a = 0; a < 4; a++) SB_CHECK(w[a] >= 0 && w[a] <= 1, "weight %g", (double)w[a]);
+  }
+  PetscCall(SbLocatorDestroy(&l));
+  /* of two tets around one place that which is not inverted holds it */
+  {
+    const PetscReal x[12] = {0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1}, q[3] = {0.2, 0.2, 0.2};
+    const PetscInt cells[8] = {0, 2, 1, 3, 0, 1, 2, 3};
+    PetscReal w[4];
+    PetscInt cell;
+
+    PetscCall(SbLocatorCreate(2, cells, x, &l));
+    SB_CHECK(SbLocatorFind(l, q, &cell, w) == 0 && cell == 1, "found in the tet %d", (int)cell);
+    PetscCall(SbLocatorDestroy(&l));
+    PetscCall(SbLocatorCreate(1, cells, x, &l));
+    SB_CHECK(SbLocatorFind(l, q, &cell, w) == PETSC_MAX_REAL && cell == -1, "found among no tets: %d",
+             (int)cell);
+    PetscCall(SbLocatorDestroy(&l));
+  }
+  PetscCall(SbImportDestroy(&im));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static void check_quality(void)
+{
+  const PetscReal regular[4][3] = {{1, 1, 1}, {-1, -1, 1}, {1, -1, -1}, {-1, 1, -1}};
+  const PetscReal corner[4][3] = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
+  const PetscReal turned[4][3] = {{0, 0, 0}, {0, 1, 0}, {1, 0, 0}, {0, 0, 1}};
+  const PetscReal flat[4][3] = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {1, 1, 0}};
+  const PetscReal r = 1 / (3 + PetscSqrtReal(3)), R = PetscSqrtReal(3) / 2;
+
+  SB_CHECK_NEAR(PetscAbsReal(SbTetQuality(regular)), 1, 1e-14, "quality of the regular tet");
+  SB_CHECK_NEAR(SbTetQuality(corner), 3 * r / R, 1e-14, "quality of the corner of a cube");
+  SB_CHECK_NEAR(SbTetQuality(turned), -3 * r / R, 1e-14, "quality of a tet inverted");
+  SB_CHECK_NEAR(SbTetQuality(flat), 0, 0, "quality of a flat tet");
+}
+
+int main(int argc, char **argv)
+{
+  PetscRandom random;
+
+  SB_TEST_BEGIN(argc, argv);
+  PetscCall(PetscRandomCreate(PETSC_COMM_SELF, &random));
+  PetscCall(PetscRandomSetSeed(random, 7));
+  PetscCall(PetscRandomSeed(random));
+  PetscCall(check_inside(random));
+  PetscCall(check_outside());
+  check_quality();
+  PetscCall(PetscRandomDestroy(&random));
+  SB_TEST_END();
+}

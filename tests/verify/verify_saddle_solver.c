@@ -1,0 +1,219 @@
+// @ranks 1 2 3
+/*
+  Response `multiplier` against `projected`: the same nonlinear problem by another linear solve, so the same answer to what contact
+  settles to.
+
+    stack      a block on a block, no friction: displacements, by factorisation and by iterations of three solvers
+    pressed    a body that only contact carries, between two obstacles that stand still: its matrix alone is singular
+    corner     obstacles, one and two at a node, beside a plane of symmetry: rows that depend on others
+    shear      friction between blocks: displacements to what friction is settled to
+    drive      a moving obstacle: its work and its force in the account of energies
+    limit      a limit of iterations that is reached is a failed solve
+*/
+#include "verify.h"
+
+static PetscErrorCode solve(const char *scene, const char *more, PetscReal **u, PetscInt *n, SbEnergies *e)
+{
+  char text[VERIFY_TEXT];
+  TestScene t;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscSNPrintf(text, sizeof(text), "%s %s", scene, more));
+  PetscCall(test_scene_open(text, &t));
+  t.run->want_energies = PETSC_TRUE;
+  PetscCall(verify_solve(&t, more));
+  *n = 3 * verify_numbers(t.model);
+  PetscCall(verify_gather(t.model, t.run->U, u));
+  *e = t.run->energies;
+  PetscCall(PetscPrintf(PETSC_COMM_WORLD, "  %s: %d solves, %d iterations\n", more, (int)t.run->newton_total,
+                        (int)t.run->linear_total));
+  PetscCall(test_scene_close(&t));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* A scene with projected (more[0]) and otherwise (more[1..]). */
+static PetscErrorCode compare(const char *name, const char *scene, PetscInt n, const char *const more[],
+                              PetscReal tolerance)
+{
+  PetscReal *exact, *u;
+  PetscInt size;
+  SbEnergies e0, e;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscPrintf(PETSC_COMM_WORLD, "  %s\n", name));
+  PetscCall(solve(scene, more[0], &exact, &size, &e0));
+  for (PetscInt k = 1; k < n; k++) {
+    PetscReal off, work;
+
+    PetscCall(solve(scene, more[k], &u, &size, &e));
+    off = verify_difference(size, exact, u);
+    work = PetscAbsReal(e.prescribed_work - e0.prescribed_work) +
+           PetscAbsReal(e.load_work - e0.load_work); /* against the elastic energy */
+    PetscCall(PetscPrintf(PETSC_COMM_WORLD, "    differs by %.1e, works by %.1e of %.3g J\n", (double)off,
+                          (double)work, (double)e0.strain));
+    SB_CHECK(off < tolerance, "%s, %s: differs from projected by %g", name, more[k], (double)off);
+    SB_CHECK(work < 1e-4 * e0.strain, "%s, %s: works %g and %g J, projected %g and %g", name, more[k],
+             (double)e.prescribed_work, (double)e.load_work, (double)e0.prescribed_work,
+             (double)e0.load_work);
+    PetscCall(PetscFree(u));
+  }
+  PetscCall(PetscFree(exact));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+#define LAW(name)                                                                                  \
+  "-body_" name "_material linear -body_" name "_young 1e5 -body_" name "_poisson 0.3 -body_" name \
+  "_density 1000 "
+#define SETTLED 1e-8 /* of the displacements; they agree to 5e-10 */
+#define EXACT "-ksp_rtol 1e-12 -snes_rtol 1e-11 "
+
+/* ------------------------------------------------------------------ bodies */
+
+#define STACK                                                                                        \
+  "-bodies a,b -body_a_mesh box:0.2,0.1,0.05:2 -body_b_mesh box:0.08,0.06,0.05:3 -body_b_translate " \
+  "0.06,0.021,0.05 " LAW("a")                                                                        \
+    LAW("b") "-sets bottom,top -set_bottom_at plane:0,0,1,0 -set_top_at "                            \
+             "plane:0,0,1,0.1 -time static -effects hold,push,meet "                                 \
+             "-effect_hold_type fixed -effect_hold_on bottom -effect_push_type "                     \
+             "prescribed_displacement -effect_push_on top -effect_push_displacement "                \
+             "0.0005*t;0.0001*t;-0.002*t -effect_meet_type collision "
+
+static PetscErrorCode check_stack(PetscInt n)
+{
+  static const char *const more[] = {
+    "-effect_meet_response projected",
+    "-effect_meet_response multiplier -saddle_solver direct -solver cg_pbjacobi",
+    "-effect_meet_response multiplier -saddle_solver direct -solver direct",
+    "-effect_meet_response multiplier -saddle_solver iterative -solver cg_icc",
+    "-effect_meet_response multiplier -saddle_solver iterative -solver cg_gamg",
+    "-effect_meet_response multiplier -saddle_solver iterative -solver direct",
+    "-effect_meet_response multiplier -saddle_solver direct -solver cg_pbjacobi"};
+
+  PetscFunctionBeginUser;
+  PetscCall(compare("stack", STACK EXACT, n, more, SETTLED));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode check_shear(PetscInt n)
+{
+  static const char *const more[] = {"-effect_meet_response projected",
+                                     "-effect_meet_response multiplier -saddle_solver direct",
+                                     "-effect_meet_response multiplier -saddle_solver iterative"};
+
+  PetscFunctionBeginUser;
+  PetscCall(compare("shear",
+                    STACK EXACT "-effect_meet_friction 0.3 -effect_meet_passes one -effect_meet_stiffness 2",
+                    n, more, SETTLED));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ obstacles */
+
+/* A block on a floor, under another one and beside planes of symmetry: nothing but contact holds it in z. */
+#define PRESSED                                                                                             \
+  "-bodies a -body_a_mesh box:0.1,0.1,0.05:3 " LAW("a") "-time static -effects x,y,floor,roof "             \
+                                                        "-effect_x_type fixed -effect_x_on xmin "           \
+                                                        "-effect_x_components x -effect_y_type fixed "      \
+                                                        "-effect_y_on ymin -effect_y_components y "         \
+                                                        "-effect_floor_type contact -effect_floor_on zmin " \
+                                                        "-effect_floor_obstacle plane:0,0,1,0.0005 "        \
+                                                        "-effect_roof_type contact -effect_roof_on zmax "   \
+                                                        "-effect_roof_obstacle sphere:0.05,0.04,0.148,0.1 "
+#define BOTH(response) "-effect_floor_response " response " -effect_roof_response " response " "
+
+static PetscErrorCode check_pressed(PetscInt n)
+{
+  static const char *const more[] = {BOTH("projected"),
+                                     BOTH("multiplier") "-saddle_solver direct",
+                                     BOTH("multiplier") "-saddle_solver direct -solver cg_icc",
+                                     BOTH("multiplier") "-saddle_solver iterative",
+                                     BOTH("multiplier") "-saddle_solver iterative -solver cg_icc",
+                                     "-effect_floor_response multiplier -effect_roof_response projected"};
+
+  PetscFunctionBeginUser;
+  PetscCall(compare("pressed", PRESSED EXACT, n, more, 1e-5));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* A wedge of two planes at a small angle under the same nodes, the same plane twice, and a wall that supported nodes cannot leave. */
+#define CORNER                                                                  \
+  "-bodies a -body_a_mesh box:0.1,0.1,0.05:3 " LAW(                             \
+    "a") "-time static -effects x,gravity,top,floor,tilted,"                    \
+         "again,wall -effect_x_type fixed -effect_x_on xmin "                   \
+         "-effect_x_components x -effect_gravity_vector "                       \
+         "0,-20,-9.81 -effect_top_type prescribed_displacement -effect_top_on " \
+         "zmax -effect_top_displacement 0;0.0004*t;-0.001*t "                   \
+         "-effect_floor_type contact -effect_floor_on zmin "                    \
+         "-effect_floor_obstacle plane:0,0,1,0 "                                \
+         "-effect_again_type contact -effect_again_on zmin "                    \
+         "-effect_again_obstacle plane:0,0,1,0 "                                \
+         "-effect_tilted_type contact -effect_tilted_on zmin "                  \
+         "-effect_tilted_obstacle plane:0,0.05,1,0.003 "                        \
+         "-effect_wall_type contact -effect_wall_on xmin "                      \
+         "-effect_wall_obstacle plane:1,0,0,0 "
+#define FOUR(response)                                                   \
+  "-effect_floor_response " response " -effect_again_response " response \
+  " -effect_tilted_response " response " -effect_wall_response " response " "
+
+static PetscErrorCode check_corner(void)
+{
+  static const char *const more[] = {FOUR("projected"), FOUR("multiplier") "-saddle_solver direct",
+                                     FOUR("multiplier") "-saddle_solver iterative -solver cg_icc"};
+
+  PetscFunctionBeginUser;
+  PetscCall(compare("corner", CORNER EXACT, 3, more, 1e-8));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* A ball that is pressed into a clamped block and drawn along, without friction. */
+#define DRIVE                                                                                                \
+  "-bodies a -body_a_mesh box:0.1,0.06,0.04:3 -body_a_material corotated -body_a_young 2e4 -body_a_poisson " \
+  "0.4 -body_a_density 1000 -effects bed,tool -effect_bed_type fixed -effect_bed_on zmin "                   \
+  "-effect_tool_type contact -effect_tool_on zmax -effect_tool_obstacle sphere:0.05,0.031,0.07,0.03 "        \
+  "-effect_tool_displacement 0.01*ramp(t/0.1-1);0;-0.008*ramp(t/0.1) -ts_dt 0.02 -ts_max_time 0.16 "
+
+static PetscErrorCode check_drive(void)
+{
+  static const char *const more[] = {"-effect_tool_response projected -time euler_implicit",
+                                     "-effect_tool_response multiplier -saddle_solver direct",
+                                     "-effect_tool_response multiplier -saddle_solver iterative"};
+  static const char *const alpha[] = {"-effect_tool_response projected -time genalpha",
+                                      "-effect_tool_response multiplier -time genalpha"};
+
+  PetscFunctionBeginUser;
+  PetscCall(compare("prescribed_displacement", DRIVE EXACT, 3, more, 10 * SETTLED));
+  PetscCall(compare("prescribed_displacement", DRIVE EXACT, 2, alpha, 10 * SETTLED));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ limit */
+
+static PetscErrorCode check_limit(void)
+{
+  TestScene t;
+
+  PetscFunctionBeginUser;
+  PetscCall(test_scene_open(STACK "-effect_meet_response multiplier -saddle_solver iterative -solver cg_icc "
+                                  "-ksp_max_it 5 -time_max_halvings 1",
+                            &t));
+  PetscCall(SbRunSolve(t.run));
+  SB_CHECK(strstr(t.run->stop_reason, "DIVERGED_ITS"), "five iterations: \"%s\"", t.run->stop_reason);
+  PetscCall(test_scene_close(&t));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+int main(int argc, char **argv)
+{
+  PetscMPIInt size;
+
+  SB_TEST_BEGIN(argc, argv);
+  PetscCallMPI(MPI_Comm_size(PETSC_COMM_WORLD, &size));
+  /* many solves of small systems: on several ranks what differs there */
+  PetscCall(check_stack(size > 1 ? 3 : 6));
+  PetscCall(check_pressed(size > 1 ? 4 : 6));
+  PetscCall(check_corner());
+  PetscCall(check_shear(size > 1 ? 2 : 3));
+  PetscCall(check_limit());
+  if (size == 1) PetscCall(check_drive());
+  SB_TEST_END();
+}

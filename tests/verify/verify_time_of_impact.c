@@ -1,0 +1,183 @@
+// @ranks 1 2
+/*
+  What a step does in which points come into contact (-effect_<name>_time_of_impact). An elastic bar flies onto a wall: the wave solution has it there from the
+  moment of arrival for the time 2 L / c, and then away with the speed that it came with. Steps begin at several distances before
+  the wall, so that it is met in every part of a step.
+
+    wall, meet  a rigid wall and a body that is constrained: first touch, duration and speed after, whole and cut, with every response; a cut
+                step and its rest take the time back to where it would have been
+    bounds      steps that points enter near one of their ends, or not at all, are not cut
+*/
+#include "contact.h"
+
+#define SPEED 0.1 /* m/s; the bar is 1 m long, its waves run at 10 m/s */
+#define FORCE 2.5 /* N, of the wave solution: rho c v A */
+#define PHASES 5  /* on one rank; elsewhere one will do */
+
+typedef struct {
+  PetscReal first,
+    last; /* steps between which the bar touches, s: where the first of them began, where the last one ended */
+  PetscReal before; /* end of the step before, s */
+  PetscReal velocity, gain, energy;
+  PetscInt off; /* steps that ended beside the grid of ts_dt */
+  PetscReal dt;
+} Impact;
+
+static PetscErrorCode watch(SbRun run, const SbStep *step, void *ctx)
+{
+  Impact *b = (Impact *)ctx;
+  const PetscBool wall = (PetscBool)(contact_effect(run->model, "wall") != NULL);
+  const char *name = wall ? "wall" : "meet";
+  PetscReal force, sum[6];
+  SbEnergies e;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbModelEnergies(run->model, step->U, step->V, &e));
+  PetscCall(contact_column(run, step->t, name, wall ? "force_x" : "normal_force", &force));
+  PetscCall(contact_body_sums(run->model, step->V, PETSC_TRUE, sum));
+  b->velocity = sum[0] / 2.5; /* kg */
+  if (force > 1e-6 * FORCE) {
+    if (b->first == 0) b->first = b->before;
+    b->last = step->t;
+  }
+  if (step->step > 0) b->gain = PetscMax(b->gain, e.kinetic + e.strain - b->energy);
+  b->energy = e.kinetic + e.strain;
+  b->off += PetscAbsReal(step->t / b->dt - PetscFloorReal(step->t / b->dt + 0.5)) > 1e-6;
+  b->before = step->t;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+#define BAR                                                                                                 \
+  "-bodies a%s -body_a_mesh box:1,0.05,0.05:1 -body_a_material linear -body_a_young 1e5 -body_a_poisson 0 " \
+  "-body_a_density 1000 -body_a_velocity %g,0,0 -body_a_translate %.15g,0,0 -ts_dt %g -ts_max_time %g "     \
+  "-ksp_rtol 1e-10 -snes_rtol 1e-10 -effects "
+#define WALL "wall -effect_wall_type contact -effect_wall_on xmin -effect_wall_obstacle plane:1,0,0,0 "
+#define MEET                                                                                         \
+  "hold,meet -effect_meet_type collision -effect_meet_passes one -body_b_mesh box:0.05,0.15,0.15:1 " \
+  "-body_b_translate -0.05,-0.04,-0.06 "                                                             \
+  "-body_b_material linear -body_b_young 1e9 -body_b_poisson 0 -body_b_density 1000 -sets far "      \
+  "-set_far_at plane:1,0,0,-0.05 -effect_hold_type fixed -effect_hold_on far "
+
+/* A bar that is `phase` steps before the wall at the start. */
+static PetscErrorCode fly(const char *effects, const char *more, PetscReal phase, PetscReal dt, PetscReal end,
+                          Impact *b, PetscInt *solves, PetscInt *steps)
+{
+  char text[VERIFY_TEXT];
+  TestScene t;
+
+  PetscFunctionBeginUser;
+  *b = (Impact){.dt = dt};
+  PetscCall(PetscSNPrintf(text, sizeof(text), BAR "%s%s", strstr(effects, "meet") ? ",b" : "", (double)-SPEED,
+                          (double)(SPEED * phase * dt), (double)dt, (double)end, effects, more));
+  PetscCall(test_scene_open(text, &t));
+  t.run->want_energies = PETSC_TRUE;
+  PetscCall(SbRunAddMonitor(t.run, watch, b, NULL));
+  PetscCall(verify_solve(&t, more));
+  *solves = t.run->newton_total;
+  *steps = t.run->steps_total;
+  PetscCall(test_scene_close(&t));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscInt phases = PHASES;
+
+/* Largest errors over the phases, sums of counts. */
+typedef struct {
+  PetscReal first, duration, velocity; /* s, s, of the speed */
+  PetscInt solves, steps, off;
+} Errors;
+
+static PetscErrorCode measure(const char *effects, const char *more, PetscReal dt, PetscReal end, Errors *e)
+{
+  PetscFunctionBeginUser;
+  *e = (Errors){0};
+  for (int k = 0; k < phases; k++) {
+    const PetscReal phase = 10.9 - 0.2 * k;
+    PetscInt solves, steps;
+    Impact b;
+
+    PetscCall(fly(effects, more, phase, dt, end, &b, &solves, &steps));
+    e->first = PetscMax(e->first, PetscAbsReal(b.first - phase * dt));
+    e->duration = PetscMax(e->duration, PetscAbsReal(b.last - b.first - 0.2));
+    e->velocity = PetscMax(e->velocity, PetscAbsReal(b.velocity / SPEED - 1));
+    e->solves += solves;
+    e->steps += steps;
+    e->off += b.off;
+    SB_CHECK(b.gain < 1e-12, "%s: a step gains %g J", more, (double)b.gain);
+  }
+  PetscCall(
+    PetscPrintf(PETSC_COMM_WORLD,
+                "  %-50s dt %5.2g s: first touch off by %.3f steps, duration by %.2f ms, speed after by "
+                "%.4f; %d solves, %d steps\n",
+                more, (double)dt, (double)(e->first / dt), (double)(1e3 * e->duration), (double)e->velocity,
+                (int)e->solves, (int)e->steps));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Whole: the first touch is found to a step. Cut: where it is, by one step more and a few solves for each of the impacts. */
+static PetscErrorCode check(const char *effects, const char *name, const char *response, PetscReal dt)
+{
+  const PetscReal end = 0.24 + 12 * dt;
+  char more[128];
+  Errors whole, cut;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscSNPrintf(more, sizeof(more), "-effect_%s_time_of_impact no %s", name, response));
+  PetscCall(measure(effects, more, dt, end, &whole));
+  PetscCall(PetscSNPrintf(more, sizeof(more), "-effect_%s_time_of_impact yes %s", name, response));
+  PetscCall(measure(effects, more, dt, end, &cut));
+  SB_CHECK(whole.first > 0.8 * dt && whole.first < dt, "%s: whole steps find the first touch to %g s", name,
+           (double)whole.first);
+  SB_CHECK(cut.first < 1e-4 * dt, "%s: cut steps find the first touch to %g s", more, (double)cut.first);
+  SB_CHECK(cut.duration < 0.6 * whole.duration && cut.duration < 0.6 * dt,
+           "%s: duration off by %g, whole by %g", more, (double)cut.duration, (double)whole.duration);
+  SB_CHECK(cut.velocity < whole.velocity + 1e-3, "%s: speed after off by %g, whole by %g", more,
+           (double)cut.velocity, (double)whole.velocity);
+  SB_CHECK(cut.steps == whole.steps + phases, "%s: %d steps, whole %d", more, (int)cut.steps,
+           (int)whole.steps);
+  SB_CHECK(!strstr(response, "augmented") ? cut.solves <= whole.solves + 6 * phases : 1,
+           "%s: %d solves, whole %d", more, (int)cut.solves, (int)whole.solves);
+  SB_CHECK(whole.off == 0 && cut.off == phases, "%s: %d and %d steps end beside the grid", more,
+           (int)whole.off, (int)cut.off);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Points that arrive near the ends of a step, and none that arrive: no cut. */
+static PetscErrorCode check_bounds(void)
+{
+  static const PetscReal phase[] = {3.02, 3.98, 1000};
+  PetscInt solves, steps;
+  Impact b;
+
+  PetscFunctionBeginUser;
+  for (int k = 0; k < 3; k++) {
+    PetscCall(fly(WALL, "-effect_wall_time_of_impact yes", phase[k], 0.002, 0.02, &b, &solves, &steps));
+    SB_CHECK(b.off == 0 && steps == 10, "%g steps before the wall: %d steps, %d of them beside the grid",
+             (double)phase[k], (int)steps, (int)b.off);
+    SB_CHECK((b.first > 0) == (k < 2), "%g steps before the wall: first touch at %g s", (double)phase[k],
+             (double)b.first);
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+int main(int argc, char **argv)
+{
+  PetscMPIInt size;
+
+  SB_TEST_BEGIN(argc, argv);
+  PetscCallMPI(MPI_Comm_size(PETSC_COMM_WORLD, &size));
+  if (size > 1) phases = 1;
+  PetscCall(check(WALL, "wall", "", 0.005));
+  PetscCall(check(MEET, "meet", "", 0.005));
+  PetscCall(check_bounds());
+  if (size == 1) {
+    PetscCall(check(WALL, "wall", "", 0.002));
+    PetscCall(check(MEET, "meet", "", 0.002));
+    PetscCall(check(WALL, "wall", "-effect_wall_response penalty -effect_wall_stiffness 1000", 0.002));
+    PetscCall(check(WALL, "wall", "-effect_wall_response augmented", 0.002));
+    PetscCall(check(WALL, "wall", "-effect_wall_response multiplier", 0.002));
+    PetscCall(check(MEET, "meet", "-effect_meet_response multiplier", 0.002));
+    PetscCall(check(MEET, "meet", "-effect_meet_response augmented", 0.005));
+  }
+  SB_TEST_END();
+}
