@@ -166,9 +166,6 @@ PetscErrorCode SbMatrixFreeGetRotations(Mat A, const SbLane **R);
 */
 PetscErrorCode SbSpaceGetRows(SbSpace space, Mat A, PetscInt n, const PetscInt node[], PetscInt ia[],
                               PetscInt ja[], PetscReal block[]);
-/* The part of it that a matrix-free operator does. */
-PetscErrorCode SbMatrixFreeAddRows(Mat A, PetscInt n, const PetscInt node[], const PetscInt ia[],
-                                   PetscReal block[]);
 
 /*
   SbProductGetSymmetric - the rows and columns of this rank of a matrix with the fast product, as SBAIJ.

@@ -60,25 +60,13 @@ struct _p_SbCouple {
   Vec w[3];
 };
 
-/* Finds the exact constraints that rest: c->rests. Collective. */
-PetscErrorCode SbConstraintsFindRedundant(SbSpace space);
 /* x <- P x. Collective. */
 PetscErrorCode SbConstraintsProject(SbConstraints c, Vec x);
-/* y = (K + F^T k G) x, what was added to K taken away. Collective. */
-PetscErrorCode SbConstraintsMultiply(SbConstraints c, Vec x, Vec y);
-/* A direct solver for a matrix of rows by rows, G D F^T, on every rank; the caller destroys it. Collective. */
-PetscErrorCode SbConstraintsCreateGramSolver(SbSpace space, Mat gram, KSP *solver);
 /* step = (G D F^T)^-1 work, vectors of c->exact. Collective. */
 PetscErrorCode SbConstraintsSolveGram(SbConstraints c);
 /* r <- r - F^T lambda, what rows cannot take; lambda into c->exact.force, N. Collective. */
 PetscErrorCode SbConstraintsProjectForce(SbConstraints c, Vec r);
 
-/*
-  z of [K + F^T k G, F^T; G, 0] [z; m] = [r; 0] by a factorisation, which is renewed when K or the rows have changed. Collective.
-
-  Output: ok, false when the matrix could not be factored; z is not a number then.
-*/
-PetscErrorCode SbSaddleFactorSolve(SbSpace space, Vec r, Vec z, PetscBool *ok);
 /* Negative eigenvalues of K + F^T k G in the null space of the rows, from that factorisation; -1: it does not tell. Collective. */
 PetscErrorCode SbSaddleFactorCountNegative(SbSpace space, PetscInt *negative);
 PetscErrorCode SbSaddleFactorDestroy(SbSaddleFactor *factored);

@@ -124,15 +124,12 @@ PetscErrorCode SbScanReal(SbScan *scan, const char *what, int64_t number,
 /* A count of things that take at least so many bytes each as text and in binary: more than the file holds is an error. */
 PetscErrorCode SbScanRoom(SbScan *scan, const char *what, int64_t n, int64_t text_bytes,
                           int64_t binary_bytes);
-PetscErrorCode SbScanQuoted(SbScan *scan, const char *what, size_t size, char value[]); /* "in quotes" */
 /* The next word; empty at the end of the file. */
 PetscErrorCode SbScanWord(SbScan *scan, size_t size, char word[]);
 PetscErrorCode SbScanEndOfLine(SbScan *scan); /* to the first byte after it */
 void SbScanNext(SbScan *scan,
                 char comment); /* to the next word, over blank lines and comments to the end of a line */
-PetscBool SbScanMore(SbScan *scan, char comment);     /* whether another word stands on this line */
-PetscBool SbScanFind(SbScan *scan, const char *text); /* moves to its beginning */
-
+PetscBool SbScanMore(SbScan *scan, char comment);     
 #define SB_SCAN_ERROR(scan, ...)                                                    \
   do {                                                                              \
     char sb_place[64], sb_text[512];                                                \

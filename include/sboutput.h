@@ -63,16 +63,6 @@ PetscErrorCode SbOutputSetFromOptions(SbRun run);
 PetscErrorCode SbOutputAttach(SbRun run);
 
 /*
-  SbCheckpointLoad - state of a run from a file, on any number of ranks. Collective.
-
-  Fills run->U, V, A, step0, t0, dt, the running totals in run->energies and run->energy_start.
-  Input: file - path, or "latest": the newest readable checkpoint of the run's folder (others are named in a warning).
-  Errors: PETSC_ERR_FILE_OPEN / _READ for a missing, truncated or foreign file; PETSC_ERR_USER_INPUT when its mesh, bodies
-  or effects are not those of this run (the message names the first option that differs).
-*/
-PetscErrorCode SbCheckpointLoad(SbRun run, const char *file);
-
-/*
   SbOutputRestoreMeshes - with -restart from a checkpoint of a run that was re-meshed: the bodies' meshes (SbBody.given). Collective; between
   SbOutputSetFromOptions() and SbModelSetUp(). Does nothing without -restart; a file that cannot be read is left to SbOutputAttach().
 */

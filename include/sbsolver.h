@@ -45,34 +45,9 @@ PetscErrorCode SbSolverNextFallback(SbSpace space, KSPConvergedReason reason, Pe
 PetscErrorCode SbSolverClear(const SbSolverPreset *preset);
 /* Gives the linear solver of `snes` the preset's options and tolerances; before SNESSetFromOptions(). Collective. */
 PetscErrorCode SbSolverSetUp(SNES snes, SbSpace space, const SbSolverPreset *preset);
-/*
-  SbKSPCheckTrueResidual - solves of ksp whose true residual is far above the tolerance fail (KSP_DIVERGED_BREAKDOWN).
-
-  Not collective; after KSPSetFromOptions(). Input: direct, the preconditioner is a factorisation; alone, no Newton step examines what a solve has left.
-  Nothing is done for an iteration that is judged by the true residual, or by none, nor for one with a norm of its own inside Newton's method.
-*/
-PetscErrorCode SbKSPCheckTrueResidual(KSP ksp, PetscBool direct, PetscBool alone);
-/*
-  SbKSPSetForceTolerance - makes the absolute tolerance of ksp one of the true residual, N, whatever norm it is judged by.
-
-  Not collective; after KSPSetFromOptions(). A norm that is not the true one is compared with its own start, by the factor that the true residual has to fall by.
-  Nothing is done for a method that is judged by the true residual, or with -ksp_convergence_test of the user's.
-*/
-PetscErrorCode SbKSPSetForceTolerance(KSP ksp);
-/* The true residual decides, unless the user chose a norm or a side, or the type of ksp cannot tell it. After KSPSetType(). Not collective. */
-PetscErrorCode SbKSPPreferTrueResidual(KSP ksp);
-/* Errors: PETSC_ERR_USER for a norm or side that the type of ksp does not have. After KSPSetFromOptions(). Not collective. */
-PetscErrorCode SbKSPCheckNorm(KSP ksp);
 /* A method for symmetric systems gives way to FGMRES while contact constraints slide with friction, and comes back after them. Collective; before
    each solve. */
 PetscErrorCode SbSolverUpdateSymmetry(KSP ksp, SbSpace space);
-/*
-  SbPCConstrainedCreate - for a space with constraints between nodes: makes pc a preconditioner in the null space of the exact ones, P^-1 = P M^-1 P^T.
-
-  Collective. Output: inner, M; borrowed. It takes the options of pc, which gives up its prefix. inner is pc itself for a space
-  without such rows.
-*/
-PetscErrorCode SbPCConstrainedCreate(SbSpace space, PC pc, PC *inner);
 /* M of such a pc, else pc itself. Not collective. */
 PetscErrorCode SbPCConstrainedGetInner(PC pc, PC *inner);
 /* Whether a factorisation of the saddle-point system stands in the place of M now. Not collective. */
@@ -84,18 +59,6 @@ PetscErrorCode SbPCConstrainedIsFactored(PC pc, PetscBool *is);
 */
 PetscErrorCode SbSaddleChoose(SbSpace space, PetscBool dynamic, PetscInt choice, SbSaddle *saddle,
                               char reason[], size_t size);
-/*
-  SbKSPSaddleSet - makes ksp, as its options have made it, a solver of the saddle-point system by iterations (saddle.c).
-
-  Collective; after KSPSetFromOptions(). Its operator is that of SbConstraintsCreateOperator(), its preconditioner one of SbPCConstrainedCreate().
-  Tolerances are about the residual in the null space, as without it. Options read: -saddle_ksp_ (minres, or fgmres where the
-  preconditioner is not symmetric and definite).
-*/
-PetscErrorCode SbKSPSaddleSet(SbSpace space, KSP ksp);
-/* The method that such a ksp takes where nothing touches; ksp itself when it is another one. Borrowed. Not collective. */
-PetscErrorCode SbKSPSaddleGetPlain(KSP ksp, KSP *plain);
-/* -reproducible: runs on the same number of ranks have the same bits. Not collective. */
-PetscErrorCode SbSolverReproducible(PetscBool *reproducible);
 #define SB_DIRECT_SMALL \
   30000 /* unknowns up to which one rank may factor for all of them; auto takes no factorisation beyond */
 /*
@@ -111,10 +74,6 @@ PetscErrorCode SbDirectPackage(MPI_Comm comm, PetscInt unknowns, PetscBool defin
   PETSc's PCCHOLESKY or PCLU, with the prefix telescope_ where the matrix is gathered.
 */
 PetscErrorCode SbPCDirectSet(PC pc, const char *package, PetscBool symmetric);
-/* negative: pivots below zero of a factorisation that is done, -1 where it does not tell: L D L^T of MUMPS does. Collective. */
-PetscErrorCode SbPCDirectCountNegative(PC pc, PetscInt *negative);
-/* The package of such a factorisation that is gathered on one rank, NULL for any other pc. Not collective. */
-PetscErrorCode SbPCDirectGathered(PC pc, const char **package);
 /* A Cholesky factorisation whose pivot is not positive is one that failed (KSP_DIVERGED_PC_FAILED), with CHOLMOD too and where it is gathered on
    one rank; other types of pc are left alone. After PCSetFromOptions(). Not collective. */
 PetscErrorCode SbPCCheckPivots(PC pc);
@@ -159,15 +118,6 @@ PetscErrorCode SbPCCoarseGetStats(PC pc, PetscInt *naggregate, PetscInt *nsolved
   without face nodes.
 */
 PetscErrorCode SbPressureOperatorCreate(SbSpace space, Mat *K);
-/*
-  SbPCPressureCreate - makes pc the solver for such an operator: GMRES in nodes and pressures. Put it into KSPRICHARDSON with
-  the unpreconditioned norm, which then refines until -ksp_rtol holds for the true residual, or it is one of rounding.
-
-  Collective. The space is borrowed. -ksp_max_it limits the iterations of GMRES, and they are what the KSP reports. A residual
-  that two corrections no longer halve fails the solve (KSP_DIVERGED_BREAKDOWN).
-  Options read: -pressure_ksp_ (GMRES), -pressure_coarse_ (P1).
-*/
-PetscErrorCode SbPCPressureCreate(SbSpace space, PC pc);
 /* Solves so far, iterations of all of them, most in one. Outputs may be NULL. Not collective. */
 PetscErrorCode SbPCPressureGetStats(PC pc, PetscInt *nsolve, PetscInt *total, PetscInt *most);
 

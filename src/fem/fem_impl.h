@@ -75,3 +75,13 @@ PetscErrorCode SbConstraintsDestroy(SbConstraints *couple);
 
 /* Gives a BAIJ or SBAIJ matrix of the space the fast product of product.c. Collective. */
 PetscErrorCode SbProductAttach(SbSpace space, SbMatrixKind kind, Mat A);
+
+/* A direct solver for a matrix of rows by rows, G D F^T, on every rank; the caller destroys it. Collective. */
+PetscErrorCode SbConstraintsCreateGramSolver(SbSpace space, Mat gram, KSP *solver);
+
+/* Finds the exact constraints that rest: c->rests. Collective. */
+PetscErrorCode SbConstraintsFindRedundant(SbSpace space);
+
+/* The part of it that a matrix-free operator does. */
+PetscErrorCode SbMatrixFreeAddRows(Mat A, PetscInt n, const PetscInt node[], const PetscInt ia[],
+                                   PetscReal block[]);

@@ -8,6 +8,7 @@
   Kept: points, lines, triangles that belong to a group, and all tets; all triangles where a surface is wanted, which needs no tets.
   Sections that do not concern us are skipped. Refused: volume elements other than 4-node tets, files cut into partitions, other versions.
 */
+#include "meshio_impl.h"
 #include "gmsh_types.h"
 
 /* An entity of the geometry in a 4.1 file. */

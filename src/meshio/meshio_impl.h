@@ -55,3 +55,8 @@ typedef PetscErrorCode (*SbChildWork)(void *ctx, SbImport *result);
 */
 PetscErrorCode SbChildRun(const char *who, const char *doing, PetscReal seconds, SbChildWork work, void *ctx,
                           SbImport *result);
+
+/* whether another word stands on this line */
+PetscBool SbScanFind(SbScan *scan, const char *text); /* moves to its beginning */
+
+PetscErrorCode SbScanQuoted(SbScan *scan, const char *what, size_t size, char value[]); /* "in quotes" */

@@ -307,3 +307,13 @@ PetscErrorCode SbPhasesGet(SbOutput out, SbPhases *phases); /* collective */
 PetscErrorCode SbOutputFiles(SbOutput out, SbFileFn fn, void *ctx);
 /* Name of the time preset, e.g. "newmark". */
 PetscErrorCode SbPresetName(SbRun run, size_t size, char name[]);
+
+/*
+  SbCheckpointLoad - state of a run from a file, on any number of ranks. Collective.
+
+  Fills run->U, V, A, step0, t0, dt, the running totals in run->energies and run->energy_start.
+  Input: file - path, or "latest": the newest readable checkpoint of the run's folder (others are named in a warning).
+  Errors: PETSC_ERR_FILE_OPEN / _READ for a missing, truncated or foreign file; PETSC_ERR_USER_INPUT when its mesh, bodies
+  or effects are not those of this run (the message names the first option that differs).
+*/
+PetscErrorCode SbCheckpointLoad(SbRun run, const char *file);

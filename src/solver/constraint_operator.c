@@ -4,6 +4,7 @@
   With SB_SADDLE_DIRECT the part of M is taken by the solution of the saddle-point system, which is A's inverse in the null space: one
   iteration and what rounding asks for. Where nothing touches, M itself is used.
 */
+#include "solver_impl.h"
 #include "sbconstraint.h"
 #include "sbsolver.h"
 

@@ -5,6 +5,7 @@
   PETSc's telescope gathers the matrix and each right-hand side there, and the others wait: cheaper than to factor the whole on each of
   them (redundant), and up to SB_DIRECT_SMALL unknowns than MUMPS (docs/reports/gathered.md).
 */
+#include "solver_impl.h"
 #include "sbsolver.h"
 
 PetscErrorCode SbSolverReproducible(PetscBool *reproducible)

@@ -22,6 +22,7 @@
 
   petsc/private/kspimpl.h: the outer solver would report its own handful of corrections as iterations.
 */
+#include "solver_impl.h"
 #include "pressure.h"
 #include "sbsolver.h"
 #include <petsc/private/kspimpl.h>

@@ -20,6 +20,7 @@
 
   petsc/private/kspimpl.h: a KSPType reads right-hand side, tolerances and solution there; PETSc's KSPSHELL does not exist.
 */
+#include "solver_impl.h"
 #include "sbconstraint.h"
 #include "sbsolver.h"
 #include <petsc/private/kspimpl.h>

@@ -10,6 +10,7 @@
   The matrix is indefinite, and symmetric but for friction: LDL^T or LU of MUMPS, or LU of UMFPACK on one of the ranks (pc_direct.c). Springs stand in it, although
   they join nodes that K's graph does not. Made again when K or the rows have changed, and only then.
 */
+#include "solver_impl.h"
 #include "sbconstraint.h"
 #include "rotated.h"
 #include "sbsolver.h"

@@ -10,6 +10,7 @@
   PCSOR, which does the largest number of sweeps without examining the residual. A solve that does not reach its tolerance fails; the
   next row of a list is then tried on the same system (time/solver_list.c), and only after the last one is the step cut or the run stopped.
 */
+#include "solver_impl.h"
 #include "sbconstraint.h"
 #include "sbsolver.h"
 

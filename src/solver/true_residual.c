@@ -14,6 +14,7 @@
 
   petsc/private/kspimpl.h: the reason of a solve has no public setter, the norms that a method supports no public getter.
 */
+#include "solver_impl.h"
 #include "sbsolver.h"
 #include <petsc/private/kspimpl.h>
 
