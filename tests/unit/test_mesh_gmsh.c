@@ -157,7 +157,7 @@ static PetscErrorCode test_damage(void)
     {"bad_truncated_bin.msh",
      "byte 1996: the file ends where the number of bounding entities is expected; it is truncated"},
     {"bad_nan.msh", "line 9: coordinate of node 4 is not a finite number; repair the file"},
-    {"bad_number.msh", "line 9: the coordinate of node 4, 1,5, has a decimal comma"},
+    {"bad_number.msh", "line 9: the coordinate, 1,5, has a decimal comma"},
     {"bad_count.msh", "line 5: 900000000000 nodes are announced, the rest of the file cannot hold more than"},
     {"bad_more.msh", "line 10: expected $EndNodes, found '5'"},
     {"bad_block.msh", "line 6: block of 7 nodes; only 4 of those announced for the section are left"},

@@ -61,7 +61,7 @@ static PetscErrorCode build(const char *text, SbSet *set, SbMergedMesh *whole)
   PetscFunctionBeginUser;
   body[1].translate[0] = 5;
   PetscCall(test_set("clamp", text, set));
-  PetscCall(SbMergedMeshCreate(2, body, 1, set, whole));
+  PetscCall(SbMergedMeshCreate(PETSC_COMM_SELF, SB_READING_AUTO, 2, body, 1, set, whole));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
