@@ -145,7 +145,7 @@ PetscErrorCode SbScanWord(SbScan *scan, size_t size, char word[]);
 PetscErrorCode SbScanEndOfLine(SbScan *scan); /* to the first byte after it */
 void SbScanNext(SbScan *scan,
                 char comment); /* to the next word, over blank lines and comments to the end of a line */
-PetscBool SbScanMore(SbScan *scan, char comment);     
+PetscBool SbScanMore(SbScan *scan, char comment);
 #define SB_SCAN_ERROR(scan, ...)                                                    \
   do {                                                                              \
     char sb_place[64], sb_text[512];                                                \
