@@ -10,25 +10,6 @@
 #include <signal.h>
 #include "sb.h"
 
-/* -help, -version, -options_markdown: answers, and nothing is simulated. */
-static PetscErrorCode answer(const SbCommand *command, PetscBool *answered)
-{
-  char petsc[256];
-
-  PetscFunctionBeginUser;
-  *answered = PETSC_TRUE;
-  if (command->help) {
-    PetscCall(SbOptionsHelp(PETSC_COMM_WORLD, command->topic));
-  } else if (command->version) {
-    PetscCall(PetscGetVersion(petsc, sizeof(petsc)));
-    PetscCall(PetscPrintf(PETSC_COMM_WORLD, "supple %s\n%s\n", SB_VERSION, petsc));
-  } else if (command->markdown[0]) {
-    PetscCall(SbOptionsMarkdown(PETSC_COMM_WORLD, command->markdown));
-  } else
-    *answered = PETSC_FALSE;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* What there is of a simulation; re-meshing replaces the first three. */
 typedef struct {
   SbModel model;
@@ -36,31 +17,6 @@ typedef struct {
   SbLedger ledger;
   SbRemesh remesh;
 } Scene;
-
-/* Everything that options say, checked. Nothing is computed yet. */
-static PetscErrorCode read_scenario(Scene *s)
-{
-  PetscFunctionBeginUser;
-  PetscCall(SbSceneCreate(PETSC_COMM_WORLD, &s->model));
-  PetscCall(SbRunCreate(s->model, &s->run));
-  PetscCall(SbLedgerSetFromOptions(s->run, &s->ledger));
-  PetscCall(SbRemeshSetFromOptions(s->model, &s->remesh));
-  PetscCall(SbOutputSetFromOptions(s->run));
-  PetscCall(SbOptionsCheck());
-  PetscCall(SbSceneCheck(s->model));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode view_scenario(const char *file)
-{
-  PetscViewer viewer;
-
-  PetscFunctionBeginUser;
-  PetscCall(SbViewerOpen(PETSC_COMM_WORLD, file, &viewer));
-  PetscCall(SbOptionsView(viewer));
-  PetscCall(PetscViewerDestroy(&viewer));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
 
 /* The run failed: says so in its folder. */
 static void report_failure(const char *message, void *scene)
@@ -75,6 +31,7 @@ static PetscErrorCode simulate(Scene *s)
 
   PetscFunctionBeginUser;
   SbErrorSetFailureHandler(report_failure, s);
+  /* set-up: meshes of a restart, space, integrator, who looks on */
   PetscCall(PetscLogStagePush(SbStageSetup));
   PetscCall(SbOutputRestoreMeshes(s->run));
   PetscCall(SbModelSetUp(s->model));
@@ -84,6 +41,8 @@ static PetscErrorCode simulate(Scene *s)
   PetscCall(SbRemeshAttach(s->remesh, s->run));
   PetscCall(SbOutputAttach(s->run));
   PetscCall(PetscLogStagePop());
+
+  /* the run, from header to summary */
   PetscCall(SbReportHeader(s->run));
   PetscCall(SbRemeshSolve(s->remesh, &s->model, &s->run, &s->ledger));
   PetscCall(SbReportSummary(s->run));
@@ -99,16 +58,20 @@ static PetscErrorCode supple(int argc, char *argv[])
   SbCommand command;
   static Scene scene; /* an error that ends the program asks for it */
   const PetscBool bare = (PetscBool)(argc < 2);
-  PetscBool answered, left;
+  PetscBool left;
   PetscInt unused;
+  char petsc[256];
 
   PetscFunctionBeginUser;
+  /* the libraries, and how errors reach the user */
   PetscCall(SbErrorHandlerInstall());
   PetscCall(SbCommandLine(&argc, argv, &command));
   PetscCall(PetscInitialize(&argc, &argv, command.scenario[0] ? command.scenario : NULL, NULL));
   SbMemoryReturnLarge();
   (void)SbThreadsSetOne();
   (void)signal(SIGPIPE, SIG_IGN); /* a terminal that is gone must not end a run that writes files */
+
+  /* options: what may be given, and what was */
   PetscCheck(!command.problem[0], PETSC_COMM_SELF, PETSC_ERR_USER, "%s", command.problem);
   PetscCall(SbOptionsRemember());
   PetscCall(PetscOptionsHasName(NULL, NULL, "-options_left", &left));
@@ -119,13 +82,36 @@ static PetscErrorCode supple(int argc, char *argv[])
 
   if (bare)
     PetscCall(SbOptionsHelp(PETSC_COMM_WORLD, "")); /* and then the error that there is nothing to run */
-  PetscCall(answer(&command, &answered));
-  if (!answered) {
-    PetscCall(read_scenario(&scene));
-    if (command.view)
-      PetscCall(view_scenario(command.view_file));
-    else
+
+  /* -help, -version, -options_markdown: answers, and nothing is simulated */
+  if (command.help) {
+    PetscCall(SbOptionsHelp(PETSC_COMM_WORLD, command.topic));
+  } else if (command.version) {
+    PetscCall(PetscGetVersion(petsc, sizeof(petsc)));
+    PetscCall(PetscPrintf(PETSC_COMM_WORLD, "supple %s\n%s\n", SB_VERSION, petsc));
+  } else if (command.markdown[0]) {
+    PetscCall(SbOptionsMarkdown(PETSC_COMM_WORLD, command.markdown));
+  } else {
+    /* what options say, checked: nothing is computed yet */
+    PetscCall(SbSceneCreate(PETSC_COMM_WORLD, &scene.model));
+    PetscCall(SbRunCreate(scene.model, &scene.run));
+    PetscCall(SbLedgerSetFromOptions(scene.run, &scene.ledger));
+    PetscCall(SbRemeshSetFromOptions(scene.model, &scene.remesh));
+    PetscCall(SbOutputSetFromOptions(scene.run));
+    PetscCall(SbOptionsCheck());
+    PetscCall(SbSceneCheck(scene.model));
+
+    /* the scenario with all its defaults, or the simulation */
+    if (command.view) {
+      PetscViewer viewer;
+
+      PetscCall(SbViewerOpen(PETSC_COMM_WORLD, command.view_file, &viewer));
+      PetscCall(SbOptionsView(viewer));
+      PetscCall(PetscViewerDestroy(&viewer));
+    } else
       PetscCall(simulate(&scene));
+
+    /* the end; options that nobody has read are told */
     PetscCall(SbRemeshDestroy(&scene.remesh));
     PetscCall(SbLedgerDestroy(&scene.ledger));
     PetscCall(SbRunDestroy(&scene.run));

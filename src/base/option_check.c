@@ -204,25 +204,6 @@ static PetscErrorCode near_options(const char *dashed, size_t size, char text[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Instances of a class that have been read, "liver, stone"; "" when there are none. */
-static PetscErrorCode instances_of(const char *klass, size_t size, char text[])
-{
-  const SbOptionRecord *last = NULL;
-
-  PetscFunctionBeginUser;
-  text[0] = 0;
-  for (PetscInt i = 0; i < SbTheOptions.nrecord; i++) {
-    const SbOptionRecord *r = &SbTheOptions.record[i];
-
-    if (strcmp(r->scope.klass, klass)) continue;
-    if (last && !strcmp(last->scope.instance, r->scope.instance)) continue;
-    if (last) PetscCall(PetscStrlcat(text, ", ", size));
-    PetscCall(PetscStrlcat(text, r->scope.instance, size));
-    last = r;
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* Keys that were read for the instance that a name belongs to: "body liver has mesh, young"; "" when there are none. */
 static PetscErrorCode keys_of(const char *klass, const char *name, size_t size, char text[])
 {
@@ -240,22 +221,6 @@ static PetscErrorCode keys_of(const char *klass, const char *name, size_t size, 
     PetscCall(PetscStrlcat(text, text[0] ? ", " : begin, size));
     PetscCall(PetscStrlcat(text, r->row->key, size));
   }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Why an option with the prefix of a class was not read, when no name is near. */
-static PetscErrorCode explain(const char *klass, const char *name, size_t size, char why[])
-{
-  char keys[768], instances[256];
-
-  PetscFunctionBeginUser;
-  PetscCall(keys_of(klass, name, sizeof(keys), keys));
-  PetscCall(instances_of(klass, sizeof(instances), instances));
-  if (keys[0])
-    PetscCall(PetscSNPrintf(why, size, " here; %s", keys));
-  else
-    PetscCall(PetscSNPrintf(why, size, ": it names no %s of this scenario (%s)", klass,
-                            instances[0] ? instances : "there are none"));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -359,8 +324,30 @@ static PetscErrorCode find_verdict(const char *name, size_t size, char text[], V
   *verdict = WRONG;
   if (near[0])
     PetscCall(PetscSNPrintf(why, sizeof(why), "; did you mean %s?", near));
-  else
-    PetscCall(explain(klass, name, sizeof(why), why));
+  else {
+    /* why an option with the prefix of a class was not read, when no name is near */
+    char keys[768], instances[256];
+    const SbOptionRecord *last = NULL;
+
+    PetscCall(keys_of(klass, name, sizeof(keys), keys));
+
+    /* instances of a class that have been read, "liver, stone"; "" when there are none */
+    instances[0] = 0;
+    for (PetscInt i = 0; i < SbTheOptions.nrecord; i++) {
+      const SbOptionRecord *r = &SbTheOptions.record[i];
+
+      if (strcmp(r->scope.klass, klass)) continue;
+      if (last && !strcmp(last->scope.instance, r->scope.instance)) continue;
+      if (last) PetscCall(PetscStrlcat(instances, ", ", sizeof(instances)));
+      PetscCall(PetscStrlcat(instances, r->scope.instance, sizeof(instances)));
+      last = r;
+    }
+    if (keys[0])
+      PetscCall(PetscSNPrintf(why, sizeof(why), " here; %s", keys));
+    else
+      PetscCall(PetscSNPrintf(why, sizeof(why), ": it names no %s of this scenario (%s)", klass,
+                              instances[0] ? instances : "there are none"));
+  }
   PetscCall(PetscSNPrintf(text, size, "%s is not an option of supple%s", dashed, why));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -57,32 +57,26 @@ static PetscBool parse_real(const char *text, PetscReal *value)
 
 /* ------------------------------------------------------------------ ranges */
 
-/* Whether x lies in "[a, b)"; an empty range holds every number but NaN. Our own rows only: a bad range is our error. */
-static PetscErrorCode in_range(const char *range, PetscReal x, PetscBool *in)
+static PetscErrorCode check_range(const SbOptionRecord *r, PetscReal x)
 {
+  PetscBool in;
+  const char *unit = r->row->unit, *blank = unit[0] ? " " : "";
   char open, close;
   char lo_text[64], hi_text[64];
   PetscReal lo, hi;
 
   PetscFunctionBeginUser;
-  *in = (PetscBool)(x == x);
-  if (!range[0]) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCheck(sscanf(range, "%c%63[^,],%63[^])]%c", &open, lo_text, hi_text, &close) == 4 &&
-               strchr("([", open) && strchr(")]", close),
-             PETSC_COMM_SELF, PETSC_ERR_PLIB, "Unreadable range '%s' in a row of the option table", range);
-  lo = strtod(lo_text, NULL);
-  hi = strtod(hi_text, NULL);
-  *in = (PetscBool)((open == '[' ? x >= lo : x > lo) && (close == ']' ? x <= hi : x < hi));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode check_range(const SbOptionRecord *r, PetscReal x)
-{
-  PetscBool in;
-  const char *unit = r->row->unit, *blank = unit[0] ? " " : "";
-
-  PetscFunctionBeginUser;
-  PetscCall(in_range(r->row->range, x, &in));
+  /* whether x lies in "[a, b)"; an empty range holds every number but NaN. Our own rows only: a bad range is our error */
+  in = (PetscBool)(x == x);
+  if (r->row->range[0]) {
+    PetscCheck(sscanf(r->row->range, "%c%63[^,],%63[^])]%c", &open, lo_text, hi_text, &close) == 4 &&
+                 strchr("([", open) && strchr(")]", close),
+               PETSC_COMM_SELF, PETSC_ERR_PLIB, "Unreadable range '%s' in a row of the option table",
+               r->row->range);
+    lo = strtod(lo_text, NULL);
+    hi = strtod(hi_text, NULL);
+    in = (PetscBool)((open == '[' ? x >= lo : x > lo) && (close == ']' ? x <= hi : x < hi));
+  }
   PetscCheck(in, PETSC_COMM_SELF, PETSC_ERR_USER, "%s %s%s%s is outside %s%s%s: %s", r->name, r->text, blank,
              unit, r->row->range[0] ? r->row->range : "the numbers", blank, unit, r->row->help);
   PetscFunctionReturn(PETSC_SUCCESS);

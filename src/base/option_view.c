@@ -57,34 +57,6 @@ static PetscBool same_instance(const SbOptionRecord *a, const SbOptionRecord *b)
                      !strcmp(a->scope.instance, b->scope.instance));
 }
 
-/* All records of one instance under one headline. */
-static PetscErrorCode print_instance(PetscViewer viewer, const SbOptionRecord *first, PetscBool with_presets)
-{
-  PetscFunctionBeginUser;
-  PetscCall(PetscViewerASCIIPrintf(viewer, "\n# %s %s\n", first->scope.klass, first->scope.instance));
-  for (const SbOptionRecord *r = first; r < SbTheOptions.record + SbTheOptions.nrecord; r++)
-    if (same_instance(r, first)) PetscCall(print_record(viewer, r, with_presets));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* The program-wide records in the order of the manual, which does not depend on who reads first. */
-static PetscErrorCode print_run(PetscViewer viewer, PetscBool with_presets)
-{
-  PetscFunctionBeginUser;
-  PetscCall(PetscViewerASCIIPrintf(viewer, "\n# the run\n"));
-  for (PetscInt i = 0; i < SbTheOptions.nblock; i++) {
-    const SbOptionBlock *block = &SbTheOptions.block[i];
-
-    for (PetscInt j = 0; j < SbTheOptions.nrecord; j++) {
-      const SbOptionRecord *r = &SbTheOptions.record[j];
-
-      if (!r->scope.klass[0] && r->row >= block->rows && r->row < block->rows + block->n)
-        PetscCall(print_record(viewer, r, with_presets));
-    }
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 static PetscBool is_ours(const char *name)
 {
   for (PetscInt i = 0; i < SbTheOptions.nrecord; i++)
@@ -128,13 +100,33 @@ PetscErrorCode SbOptionsView(PetscViewer viewer)
   if (!with_presets)
     PetscCall(
       PetscViewerASCIIPrintf(viewer, "# Defaults are comments: PETSc 3.18 holds at most 512 options.\n"));
-  PetscCall(print_run(viewer, with_presets));
+
+  /* the program-wide records in the order of the manual, which does not depend on who reads first */
+  PetscCall(PetscViewerASCIIPrintf(viewer, "\n# the run\n"));
+  for (PetscInt i = 0; i < SbTheOptions.nblock; i++) {
+    const SbOptionBlock *block = &SbTheOptions.block[i];
+
+    for (PetscInt j = 0; j < SbTheOptions.nrecord; j++) {
+      const SbOptionRecord *r = &SbTheOptions.record[j];
+
+      if (!r->scope.klass[0] && r->row >= block->rows && r->row < block->rows + block->n)
+        PetscCall(print_record(viewer, r, with_presets));
+    }
+  }
   for (PetscInt i = 0; i < SbTheOptions.nrecord; i++) {
     PetscBool seen = (PetscBool)!SbTheOptions.record[i].scope.klass[0];
 
     for (PetscInt j = 0; j < i && !seen; j++)
       seen = same_instance(&SbTheOptions.record[i], &SbTheOptions.record[j]);
-    if (!seen) PetscCall(print_instance(viewer, &SbTheOptions.record[i], with_presets));
+
+    /* all records of one instance under one headline */
+    if (!seen) {
+      PetscCall(PetscViewerASCIIPrintf(viewer, "\n# %s %s\n", SbTheOptions.record[i].scope.klass,
+                                       SbTheOptions.record[i].scope.instance));
+      for (const SbOptionRecord *r = &SbTheOptions.record[i]; r < SbTheOptions.record + SbTheOptions.nrecord;
+           r++)
+        if (same_instance(r, &SbTheOptions.record[i])) PetscCall(print_record(viewer, r, with_presets));
+    }
   }
   if (SbTheOptions.remembered) {
     PetscCall(print_petsc(viewer, SbTheOptions.nuser, SbTheOptions.user));

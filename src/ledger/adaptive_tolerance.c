@@ -103,17 +103,6 @@ PetscErrorCode SbAdaptiveToleranceAttach(SbLedger l)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Until something has moved, the energy that counts is that of the first attempt. */
-static PetscErrorCode first_energy(SbLedger l, const SbSolvedStep *step)
-{
-  SbEnergies e;
-
-  PetscFunctionBeginUser;
-  PetscCall(SbModelEnergies(l->run->model, step->U, step->V, &e));
-  l->stored = PetscMax(l->stored, e.strain + (step->V ? e.kinetic : 0.));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode SbAdaptiveToleranceUpdate(SbLedger l, const SbSolvedStep *step, PetscBool *again)
 {
   const SbRun run = l->run;
@@ -121,7 +110,13 @@ PetscErrorCode SbAdaptiveToleranceUpdate(SbLedger l, const SbSolvedStep *step, P
   PetscReal allowed, left;
 
   PetscFunctionBeginUser;
-  if (!step->V || step->t == run->t0) PetscCall(first_energy(l, step));
+  /* until something has moved, the energy that counts is that of the first attempt */
+  if (!step->V || step->t == run->t0) {
+    SbEnergies e;
+
+    PetscCall(SbModelEnergies(l->run->model, step->U, step->V, &e));
+    l->stored = PetscMax(l->stored, e.strain + (step->V ? e.kinetic : 0.));
+  }
   if (!l->may_tune || !step->solved) PetscFunctionReturn(PETSC_SUCCESS);
   allowed = SOLVERS * l->accuracy * PetscSqrtReal(l->stored) * part;
   left = left_by_solves(l);

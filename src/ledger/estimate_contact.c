@@ -10,22 +10,6 @@
 
 #define CLOSELY 1e-3 /* delta is nearly the gap, and what strains is the difference */
 
-/* Half the force times gap of all places, J. */
-static PetscErrorCode open_work(SbLedger l, const SbStep *step, PetscReal *work)
-{
-  const SbModel m = l->run->model;
-  SbContactPoints list = {0};
-
-  PetscFunctionBeginUser;
-  *work = 0.;
-  PetscCall(SbModelContactPoints(m, step->t, step->U, step->R, &list));
-  for (PetscInt i = 0; i < list.n; i++)
-    *work += 0.5 * PetscAbsReal(list.place[i].gap * SbDot3(list.place[i].force, list.place[i].normal));
-  PetscCall(PetscFree(list.place));
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, work, 1, MPIU_REAL, MPI_SUM, m->comm));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* D . f_int(U + length D) */
 static PetscErrorCode elastic_work(SbLedger l, Vec U, PetscReal length, Vec D, PetscReal *work)
 {
@@ -75,9 +59,16 @@ PetscErrorCode SbEstimateContact(SbLedger l, const SbStep *step, PetscReal *erro
   const SbModel m = l->run->model;
   PetscReal energy, strained;
   PetscBool springs = PETSC_FALSE;
+  SbContactPoints list = {0};
 
   PetscFunctionBeginUser;
-  PetscCall(open_work(l, step, &energy));
+  /* half the force times gap of all places, J */
+  energy = 0.;
+  PetscCall(SbModelContactPoints(m, step->t, step->U, step->R, &list));
+  for (PetscInt i = 0; i < list.n; i++)
+    energy += 0.5 * PetscAbsReal(list.place[i].gap * SbDot3(list.place[i].force, list.place[i].normal));
+  PetscCall(PetscFree(list.place));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &energy, 1, MPIU_REAL, MPI_SUM, m->comm));
   for (PetscInt e = 0; e < m->nbegin_step; e++) springs = (PetscBool)(springs || m->begin_step[e]->springs);
   if (springs && !m->dynamic && energy > 0.) {
     PetscCall(spring_energy(l, step, &strained));

@@ -218,22 +218,6 @@ static PetscReal stiff_error(const PetscReal sum[NSUM])
   return loss * (1. + theta * (a / b - 1.));
 }
 
-/* Results of each body from its sums. */
-static void finish(SbSpaceEstimate est, PetscReal (*const sum)[NSUM])
-{
-  SbModel model = est->model;
-
-  for (PetscInt b = 0; b < model->nbody; b++) {
-    const PetscReal off = sum[b][SHEAR_OFF] + sum[b][PRESSURE_OFF];
-
-    est->strain[b] = sum[b][STRAIN];
-    est->body2[b] = model->element[b]->nodes_per[0] > 0 ? stiff_error(sum[b]) : off;
-    est->factor[b] = off > 0. ? est->body2[b] / off : 1.;
-  }
-  for (PetscInt c = 0; c < model->mesh->ncell_owned; c++)
-    est->cell2[c] *= est->factor[model->mesh->cell_body[c]];
-}
-
 PetscErrorCode SbSpaceEstimateCompute(SbSpaceEstimate est, PetscReal t, Vec U, Vec V, Vec A)
 {
   SbModel model = est->model;
@@ -251,7 +235,17 @@ PetscErrorCode SbSpaceEstimateCompute(SbSpaceEstimate est, PetscReal t, Vec U, V
   if (est->residual) PetscCall(add_reactions(est, t, U, V, A, sum));
   PetscCallMPI(
     MPI_Allreduce(MPI_IN_PLACE, sum, (PetscMPIInt)(NSUM * model->nbody), MPIU_REAL, MPI_SUM, model->comm));
-  finish(est, sum);
+
+  /* results of each body from its sums */
+  for (PetscInt b = 0; b < model->nbody; b++) {
+    const PetscReal off = sum[b][SHEAR_OFF] + sum[b][PRESSURE_OFF];
+
+    est->strain[b] = sum[b][STRAIN];
+    est->body2[b] = model->element[b]->nodes_per[0] > 0 ? stiff_error(sum[b]) : off;
+    est->factor[b] = off > 0. ? est->body2[b] / off : 1.;
+  }
+  for (PetscInt c = 0; c < model->mesh->ncell_owned; c++)
+    est->cell2[c] *= est->factor[model->mesh->cell_body[c]];
   PetscCall(PetscFree(sum));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

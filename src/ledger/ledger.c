@@ -86,46 +86,38 @@ static PetscErrorCode end(SbLedger l)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The accelerations that third differences need; an attempt that is repeated does not count twice. */
-static PetscErrorCode keep_acceleration(SbLedger l, const SbSolvedStep *step)
-{
-  Vec spare = l->before;
-
-  PetscFunctionBeginUser;
-  if (l->kept && step->t == l->kept_t) PetscFunctionReturn(PETSC_SUCCESS);
-  if (l->kept) l->before_dt = step->t - l->kept_t;
-  l->before = l->kept;
-  l->kept = spare;
-  if (!l->kept) PetscCall(VecDuplicate(step->A0, &l->kept));
-  PetscCall(VecCopy(step->A0, l->kept));
-  l->kept_t = step->t;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* What the solver has seen of the residual that it left, N: known without an evaluation. */
-static PetscErrorCode last_residual(SbLedger l)
-{
-  PetscBool single;
-  KSP ksp;
-
-  PetscFunctionBeginUser;
-  PetscCall(PetscObjectTypeCompare((PetscObject)l->run->snes, SNESKSPONLY, &single));
-  PetscCall(SNESGetKSP(l->run->snes, &ksp));
-  if (single)
-    PetscCall(KSPGetResidualNorm(ksp, &l->residual));
-  else
-    PetscCall(SNESGetFunctionNorm(l->run->snes, &l->residual));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 static PetscErrorCode look(SbRun run, const SbSolvedStep *step, void *ctx, PetscBool *again)
 {
   SbLedger l = (SbLedger)ctx;
 
   PetscFunctionBeginUser;
-  if (step->A0 && l->order == 2) PetscCall(keep_acceleration(l, step));
+  /* the accelerations that third differences need; an attempt that is repeated does not count twice */
+  if (step->A0 && l->order == 2) {
+    Vec spare = l->before;
+
+    if (!l->kept || step->t != l->kept_t) {
+      if (l->kept) l->before_dt = step->t - l->kept_t;
+      l->before = l->kept;
+      l->kept = spare;
+      if (!l->kept) PetscCall(VecDuplicate(step->A0, &l->kept));
+      PetscCall(VecCopy(step->A0, l->kept));
+      l->kept_t = step->t;
+    }
+  }
   l->seen = (PetscBool)(!run->model->dynamic || l->own_work <= SHARE * l->work);
-  if (step->solved) PetscCall(last_residual(l));
+
+  /* what the solver has seen of the residual that it left, N: known without an evaluation */
+  if (step->solved) {
+    PetscBool single;
+    KSP ksp;
+
+    PetscCall(PetscObjectTypeCompare((PetscObject)l->run->snes, SNESKSPONLY, &single));
+    PetscCall(SNESGetKSP(l->run->snes, &ksp));
+    if (single)
+      PetscCall(KSPGetResidualNorm(ksp, &l->residual));
+    else
+      PetscCall(SNESGetFunctionNorm(l->run->snes, &l->residual));
+  }
   if (!l->seen && l->accuracy == 0.) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(begin(l));
   if (step->V) PetscCall(SbEstimateTime(l, step, l->seen));
@@ -149,22 +141,6 @@ static PetscReal damped_part(const SbRun run, const SbStep *step)
   return PetscExpReal(-0.5 * PetscMin(step->dt * run->damping_power / energy, 2.));
 }
 
-/*
-  Errors of a static run are those of the last solve. In a dynamic one losses of the integrator add up. What linear solves leave is rough and
-  has another direction in each step; what linearisation leaves is smooth and has the same one. A step that was not examined left as much
-  more as its last residual is larger.
-*/
-static void add_step(SbLedger l, const SbStep *step)
-{
-  const PetscReal left = step->V ? damped_part(l->run, step) : 0.;
-  const PetscReal part = l->seen_residual > 0. ? l->residual / l->seen_residual : 1.;
-  PetscReal *linear = &l->error[SB_ERROR_LINEAR], *nonlinear = &l->error[SB_ERROR_NONLINEAR];
-
-  if (step->V) SbEstimateTimeAdd(l, step->dt, left);
-  *linear = PetscSqrtReal(PetscSqr(left * l->kept_part * *linear) + PetscSqr(part * l->step_linear));
-  *nonlinear = left * PetscSqrtReal(l->kept_part) * *nonlinear + part * l->step_nonlinear;
-}
-
 static PetscErrorCode estimate_state(SbLedger l, const SbStep *step)
 {
   const SbModel m = l->run->model;
@@ -184,14 +160,6 @@ static PetscErrorCode estimate_state(SbLedger l, const SbStep *step)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static void update_columns(SbLedger l)
-{
-  const PetscReal scale = l->stored > 0. ? 1. / PetscSqrtReal(l->stored) : 0.;
-
-  for (int i = 0; i < SB_ERROR_COUNT; i++) l->relative[i] = scale * l->error[i];
-  l->relative[SB_ERROR_TIME] += scale * l->offset;
-}
-
 /* In units of a residual: a tangent is three, an iteration with its preconditioner two. */
 static PetscReal work_of(const SbRun run, const SbStep *step)
 {
@@ -203,11 +171,28 @@ static PetscErrorCode monitor(SbRun run, const SbStep *step, void *ctx)
   SbLedger l = (SbLedger)ctx;
   const PetscBool first = (PetscBool)(step->step == run->step0);
   const PetscReal energy = step->energies.strain + step->energies.kinetic;
+  PetscReal scale;
 
   PetscFunctionBeginUser;
   l->stored = run->model->dynamic ? PetscMax(l->stored, energy) : energy;
   l->work += work_of(run, step);
-  if (!first) add_step(l, step);
+
+  /*
+    Errors of a static run are those of the last solve. In a dynamic one losses of the integrator add up. What linear solves leave is rough and
+    has another direction in each step; what linearisation leaves is smooth and has the same one. A step that was not examined left as much
+    more as its last residual is larger.
+  */
+  if (!first) {
+    const PetscReal left = step->V ? damped_part(run, step) : 0.;
+    const PetscReal part = l->seen_residual > 0. ? l->residual / l->seen_residual : 1.;
+    PetscReal *linear = &l->error[SB_ERROR_LINEAR], *nonlinear = &l->error[SB_ERROR_NONLINEAR];
+
+    if (step->V) SbEstimateTimeAdd(l, step->dt, left);
+    *linear = PetscSqrtReal(PetscSqr(left * l->kept_part * *linear) + PetscSqr(part * l->step_linear));
+    *nonlinear = left * PetscSqrtReal(l->kept_part) * *nonlinear + part * l->step_nonlinear;
+  }
+
+  /* what is computed at this state, at the price that goes into own_work */
   PetscCall(begin(l));
   if (!first && (step->last || (l->every && step->step % l->every == 0))) PetscCall(estimate_state(l, step));
   if (l->quantity.kind) PetscCall(SbQuantityValue(l, step));
@@ -215,7 +200,11 @@ static PetscErrorCode monitor(SbRun run, const SbStep *step, void *ctx)
     PetscCall(SbEstimateRounding(l, step->t, step->U, &l->error[SB_ERROR_ROUNDING]));
     if (l->quantity.kind) PetscCall(SbQuantityErrors(l, step));
   }
-  update_columns(l);
+
+  /* in parts of the energy that is stored */
+  scale = l->stored > 0. ? 1. / PetscSqrtReal(l->stored) : 0.;
+  for (int i = 0; i < SB_ERROR_COUNT; i++) l->relative[i] = scale * l->error[i];
+  l->relative[SB_ERROR_TIME] += scale * l->offset;
   PetscCall(end(l));
   PetscCall(SbAdaptiveToleranceAccept(l, step));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -243,23 +232,6 @@ static PetscErrorCode cell_error(SbRun run, const SbStep *step, PetscReal values
 }
 
 /* ------------------------------------------------------------------ beginning and end */
-
-static PetscErrorCode name_columns(SbLedger l)
-{
-  static const char *const names[] = {"space", "time", "nonlinear", "linear", "contact", "rounding"};
-
-  PetscFunctionBeginUser;
-  for (int i = 0; i < SB_ERROR_COUNT; i++) {
-    SbColumn *c = &l->column[i];
-
-    PetscCall(PetscSNPrintf(c->name, sizeof(c->name), "error_%s", names[i]));
-    c->unit = "1";
-    c->value = &l->relative[i];
-  }
-  l->run->column = l->column;
-  l->run->ncolumn = SB_ERROR_COUNT;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
 
 /* What the errors add up from goes on over a restart. */
 static PetscErrorCode carry(SbLedger l)
@@ -305,6 +277,7 @@ static PetscErrorCode carry(SbLedger l)
 PetscErrorCode SbLedgerAttach(SbLedger l)
 {
   SbRun run;
+  static const char *const names[] = {"space", "time", "nonlinear", "linear", "contact", "rounding"};
 
   PetscFunctionBeginUser;
   if (!l) PetscFunctionReturn(PETSC_SUCCESS);
@@ -316,7 +289,17 @@ PetscErrorCode SbLedgerAttach(SbLedger l)
   PetscCall(VecDuplicate(run->U, &l->delta));
   if (run->model->dynamic) PetscCall(SbRunMethodError(run, &l->order, &l->c, &l->ahead));
   PetscCall(SbQuantityAttach(l));
-  PetscCall(name_columns(l));
+
+  /* columns of history.csv */
+  for (int i = 0; i < SB_ERROR_COUNT; i++) {
+    SbColumn *c = &l->column[i];
+
+    PetscCall(PetscSNPrintf(c->name, sizeof(c->name), "error_%s", names[i]));
+    c->unit = "1";
+    c->value = &l->relative[i];
+  }
+  run->column = l->column;
+  run->ncolumn = SB_ERROR_COUNT;
   PetscCall(carry(l));
   PetscCall(end(l));
   run->want_energies = PETSC_TRUE;

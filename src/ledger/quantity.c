@@ -171,31 +171,14 @@ static PetscErrorCode gradient(SbLedger l, const SbStep *step, Vec B)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The mesh's share: a(e_u, e_z). */
-static PetscErrorCode mesh_share(SbLedger l, const SbStep *step, PetscReal energy, Vec Z, PetscReal *error)
-{
-  const SbModel m = l->run->model;
-  PetscReal s, sums[2] = {0., 0.};
-
-  PetscFunctionBeginUser;
-  *error = 0.;
-  if (!(energy > 0.) || !(l->stored > 0.)) PetscFunctionReturn(PETSC_SUCCESS);
-  s = MIX * PetscSqrtReal(2. * l->stored / energy);
-  for (int side = 0; side < 2; side++) {
-    PetscCall(VecWAXPY(l->w[1], side ? s : -s, Z, step->U));
-    PetscCall(SbSpaceEstimateCompute(l->space, step->t, l->w[1], NULL, NULL));
-    for (PetscInt b = 0; b < m->nbody; b++) sums[side] += l->space->body2[b];
-  }
-  *error = PetscAbsReal(sums[1] - sums[0]) / (2. * s);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 static PetscErrorCode by_duality(SbLedger l, const SbStep *step)
 {
   SbQuantity *q = &l->quantity;
   const PetscReal both = PetscSqr(l->step_linear) + PetscSqr(l->step_nonlinear);
   PetscReal left, energy;
   Vec B, Z;
+  const SbModel m = l->run->model;
+  PetscReal s, sums[2] = {0., 0.};
 
   PetscFunctionBeginUser;
   PetscCall(VecDuplicate(step->U, &B));
@@ -209,7 +192,18 @@ static PetscErrorCode by_duality(SbLedger l, const SbStep *step)
   PetscCall(VecDot(B, Z, &energy));
   /* of a reaction: what a motion of the support does to the body, which moves as a whole where nothing else holds it */
   if (q->kind == SB_QUANTITY_REACTION) PetscCall(VecAYPX(Z, -1., q->weight));
-  PetscCall(mesh_share(l, step, energy, Z, &q->error[SB_ERROR_SPACE]));
+
+  /* the mesh's share: a(e_u, e_z) */
+  q->error[SB_ERROR_SPACE] = 0.;
+  if (energy > 0. && l->stored > 0.) {
+    s = MIX * PetscSqrtReal(2. * l->stored / energy);
+    for (int side = 0; side < 2; side++) {
+      PetscCall(VecWAXPY(l->w[1], side ? s : -s, Z, step->U));
+      PetscCall(SbSpaceEstimateCompute(l->space, step->t, l->w[1], NULL, NULL));
+      for (PetscInt b = 0; b < m->nbody; b++) sums[side] += l->space->body2[b];
+    }
+    q->error[SB_ERROR_SPACE] = PetscAbsReal(sums[1] - sums[0]) / (2. * s);
+  }
   PetscCall(VecDestroy(&B));
   PetscCall(VecDestroy(&Z));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -78,21 +78,6 @@ static PetscErrorCode create_links(SbRecovery r)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Cells around each vertex: corners 4 c + a, at[start[v]..start[v + 1]). */
-static PetscErrorCode list_stars(SbMesh mesh, PetscInt **start, PetscInt **at)
-{
-  PetscInt *next;
-
-  PetscFunctionBeginUser;
-  PetscCall(PetscCalloc1(mesh->nvert + 2, &next));
-  PetscCall(PetscMalloc1(4 * (size_t)mesh->ncell, at));
-  for (PetscInt i = 0; i < 4 * mesh->ncell; i++) next[mesh->cell[i] + 2]++;
-  for (PetscInt v = 0; v < mesh->nvert; v++) next[v + 2] += next[v + 1];
-  for (PetscInt i = 0; i < 4 * mesh->ncell; i++) (*at)[next[mesh->cell[i] + 1]++] = i;
-  *start = next;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* Different materials of the cells around a vertex, ascending, in found[]: how many. */
 static PetscErrorCode list_materials(SbMesh mesh, PetscInt n, const PetscInt at[], PetscInt found[],
                                      PetscInt *count)
@@ -108,10 +93,15 @@ static PetscErrorCode list_materials(SbMesh mesh, PetscInt n, const PetscInt at[
 static PetscErrorCode create_slots(SbRecovery r)
 {
   SbMesh mesh = r->mesh;
-  PetscInt *start = NULL, *at = NULL, *found, *material, most = 1, longest = 0;
+  PetscInt *start, *at, *found, *material, most = 1, longest = 0;
 
   PetscFunctionBeginUser;
-  PetscCall(list_stars(mesh, &start, &at));
+  /* cells around each vertex: corners 4 c + a, at[start[v]..start[v + 1]) */
+  PetscCall(PetscCalloc1(mesh->nvert + 2, &start));
+  PetscCall(PetscMalloc1(4 * (size_t)mesh->ncell, &at));
+  for (PetscInt i = 0; i < 4 * mesh->ncell; i++) start[mesh->cell[i] + 2]++;
+  for (PetscInt v = 0; v < mesh->nvert; v++) start[v + 2] += start[v + 1];
+  for (PetscInt i = 0; i < 4 * mesh->ncell; i++) at[start[mesh->cell[i] + 1]++] = i;
   for (PetscInt v = 0; v < mesh->nvert_owned; v++) longest = PetscMax(longest, start[v + 1] - start[v]);
   PetscCall(PetscMalloc1(longest, &found));
   for (PetscInt v = 0; v < mesh->nvert_owned; v++) {

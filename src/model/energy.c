@@ -18,22 +18,6 @@ typedef enum {
   NSUM = CENTRE + 3
 } Sum;
 
-/* p = M v with the run's mass matrix, [nnode][3]; v holds ghosts. */
-static PetscErrorCode momentum_density(SbModel m, const PetscReal v[], PetscReal p[])
-{
-  SbSpace s = m->space;
-
-  PetscFunctionBeginUser;
-  if (s->consistent_mass) {
-    const SbStage stage = {.a = v}; /* no v: inertia alone, without mass-proportional damping */
-
-    PetscCall(SbSpaceAddInertia(s, &stage, p));
-  } else {
-    for (PetscInt i = 0; i < 3 * s->nnode_owned; i++) p[i] = s->node_mass[i / 3] * v[i];
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode SbModelEnergies(SbModel m, Vec U, Vec V, SbEnergies *e)
 {
   SbSpace s = m->space;
@@ -51,7 +35,14 @@ PetscErrorCode SbModelEnergies(SbModel m, Vec U, Vec V, SbEnergies *e)
   if (V) {
     PetscCall(SbSpaceGetLocalRead(s, V, &v));
     PetscCall(PetscCalloc1(3 * s->nnode, &p));
-    PetscCall(momentum_density(m, v, p));
+    /* p = M v with the run's mass matrix, [nnode][3]; v holds ghosts */
+    if (s->consistent_mass) {
+      const SbStage stage = {.a = v}; /* no v: inertia alone, without mass-proportional damping */
+
+      PetscCall(SbSpaceAddInertia(s, &stage, p));
+    } else {
+      for (PetscInt i = 0; i < 3 * s->nnode_owned; i++) p[i] = s->node_mass[i / 3] * v[i];
+    }
   }
   for (PetscInt i = 0; i < s->nnode_owned; i++) {
     PetscReal x[3], v2 = 0., u2 = 0.;

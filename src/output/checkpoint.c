@@ -41,30 +41,15 @@ static PetscErrorCode sum_ranks(MPI_Comm comm, uint64_t mine, uint64_t *sum)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode hash_mesh(const SbMesh mesh, uint64_t *hash)
-{
-  uint64_t sum = 0;
-
-  PetscFunctionBeginUser;
-  for (PetscInt i = 0; i < mesh->nvert_owned; i++) {
-    for (PetscInt c = 0; c < 3; c++)
-      sum += SbMixReal(3 * (uint64_t)mesh->vert_orig[i] + (uint64_t)c, mesh->x[3 * i + c]);
-  }
-  for (PetscInt k = 0; k < mesh->ncell_owned; k++) {
-    for (PetscInt a = 0; a < 4; a++)
-      sum += mix(mix((uint64_t)mesh->cell_orig[k]) ^ (uint64_t)mesh->vert_orig[mesh->cell[4 * k + a]]);
-  }
-  PetscCall(sum_ranks(mesh->comm, sum, hash));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode SbOutputOrder(SbRun run, SbOutput out)
 {
   const SbMesh mesh = run->model->mesh;
   const SbSpace space = run->model->space;
+  uint64_t sum = 0;
 
   PetscFunctionBeginUser;
   if (out->ordered) PetscFunctionReturn(PETSC_SUCCESS);
+  /* the places of vertices, cells and nodes in a file, whatever the partition */
   PetscCall(SbOrderCreate(out->comm, mesh->Nvert, mesh->nvert_owned, mesh->vert_orig, &out->vertex));
   PetscCall(SbOrderCreate(out->comm, mesh->Ncell, mesh->ncell_owned, mesh->cell_orig, &out->cell));
   if (space->faces) {
@@ -77,7 +62,17 @@ PetscErrorCode SbOutputOrder(SbRun run, SbOutput out)
     PetscCall(SbOrderRepeat(&out->cell, 4, &out->point));
   else
     PetscCall(SbOrderRepeat(&out->vertex, 1, &out->point));
-  PetscCall(hash_mesh(mesh, &out->mesh_hash));
+
+  /* the mesh in one number: a restart on another mesh is refused */
+  for (PetscInt i = 0; i < mesh->nvert_owned; i++) {
+    for (PetscInt c = 0; c < 3; c++)
+      sum += SbMixReal(3 * (uint64_t)mesh->vert_orig[i] + (uint64_t)c, mesh->x[3 * i + c]);
+  }
+  for (PetscInt k = 0; k < mesh->ncell_owned; k++) {
+    for (PetscInt a = 0; a < 4; a++)
+      sum += mix(mix((uint64_t)mesh->cell_orig[k]) ^ (uint64_t)mesh->vert_orig[mesh->cell[4 * k + a]]);
+  }
+  PetscCall(sum_ranks(mesh->comm, sum, &out->mesh_hash));
   out->ordered = PETSC_TRUE;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -117,33 +112,6 @@ static void totals_of(SbRun run, Total total[NTOTAL])
   total[3] = (Total){"integrator_loss", &e->integrator_loss};
   total[4] = (Total){"energy_start", &run->energy_start};
   total[5] = (Total){"load_factor", &run->model->load};
-}
-
-static PetscErrorCode write_carried(SbRun run, SbH5 *h)
-{
-  PetscFunctionBeginUser;
-  for (PetscInt i = 0; i < run->ncarried; i++)
-    PetscCall(SbH5PutReal(h, h->file, run->carried[i].name, *run->carried[i].value));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* All or none: a checkpoint of a run that did not ask for them has none. */
-static PetscErrorCode read_carried(SbRun run, SbOutput out, SbH5 *h)
-{
-  PetscBool there = PETSC_TRUE;
-  PetscReal *values;
-
-  PetscFunctionBeginUser;
-  if (!run->ncarried) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(PetscMalloc1(run->ncarried, &values));
-  for (PetscInt i = 0; i < run->ncarried && there; i++)
-    PetscCall(SbH5GetReal(h->file, run->carried[i].name, &values[i], &there));
-  for (PetscInt i = 0; i < run->ncarried && there; i++) *run->carried[i].value = values[i];
-  PetscCall(PetscFree(values));
-  if (!there)
-    PetscCall(SbWarning(
-      out->comm, "%s has no errors, as it was written without -ledger: they count from there", h->path));
-  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 static PetscErrorCode checksum_of(const SbOrder *order, uint64_t salt, const PetscReal slice[], uint64_t *sum)
@@ -205,20 +173,29 @@ static PetscErrorCode write_numbers(SbRun run, SbOutput out, const SbStep *step,
   PetscReal dt = run->dt;
 
   PetscFunctionBeginUser;
+  /* works and losses so far */
   if (run->ts) PetscCall(TSGetTimeStep(run->ts, &dt));
   totals_of(run, total);
   for (int i = 0; i < NTOTAL; i++) PetscCall(SbH5PutReal(h, h->file, total[i].name, *total[i].value));
-  PetscCall(write_carried(run, h));
-  PetscCall(SbProbesWrite(run, out, h));
+
   for (int k = 0; k < NREMESH; k++)
     if (*remesh_total(run, k) != 0.)
       PetscCall(SbH5PutReal(h, h->file, remesh_names[k], *remesh_total(run, k)));
+
+  /* errors that the ledger has added up, and the material points that probes follow */
+  for (PetscInt i = 0; i < run->ncarried; i++)
+    PetscCall(SbH5PutReal(h, h->file, run->carried[i].name, *run->carried[i].value));
+  PetscCall(SbProbesWrite(run, out, h));
+
+  /* where in time it is, and how long the next step would be */
   if (run->paused) PetscCall(SbH5PutReal(h, h->file, "paused_after", run->after.dt));
   PetscCall(SbH5PutReal(h, h->file, "time", step->t));
   PetscCall(SbH5PutReal(h, h->file, "dt_next", dt));
   PetscCall(SbH5PutReal(h, h->file, "dt", run->dt));
   PetscCall(SbH5PutReal(h, h->file, "t_end", run->t_end));
   PetscCall(SbH5PutInt(h, h->file, "step", step->step));
+
+  /* by what a restart knows that the file fits the run and is whole */
   PetscCall(SbH5PutInt(h, h->file, "mesh_hash", (int64_t)out->mesh_hash));
   PetscCall(SbH5PutInt(h, h->file, "checksum", (int64_t)checksum));
   PetscCall(SbH5PutInt(h, h->file, "format", FORMAT));
@@ -259,15 +236,16 @@ static void free_names(int n, struct dirent **names)
   free(names);
 }
 
-/* Removes all but the newest `keep`. Rank 0. */
-static PetscErrorCode prune(SbOutput out, PetscInt keep)
+/* Removes those of steps after `step`, and all but the newest `keep` of the others. Rank 0. */
+static PetscErrorCode prune(SbOutput out, PetscInt step, PetscInt keep)
 {
   struct dirent **names;
   const int n = list_checkpoints(out->dir, &names);
   char path[PETSC_MAX_PATH_LEN];
 
   PetscFunctionBeginUser;
-  for (int i = 0; i < n - (int)keep; i++) {
+  for (int i = 0; i < n; i++) {
+    if (i >= n - keep && strtol(names[i]->d_name + strlen("checkpoint_"), NULL, 10) <= step) continue;
     PetscCall(SbOutputPath(out, names[i]->d_name, sizeof(path), path));
     (void)unlink(path);
   }
@@ -293,17 +271,8 @@ PetscErrorCode SbCheckpointFiles(SbOutput out, SbFileFn fn, void *ctx)
 
 PetscErrorCode SbCheckpointRemoveAfter(SbOutput out, PetscInt step)
 {
-  struct dirent **names;
-  const int n = list_checkpoints(out->dir, &names);
-  char path[PETSC_MAX_PATH_LEN];
-
   PetscFunctionBeginUser;
-  for (int i = 0; i < n; i++) {
-    if (strtol(names[i]->d_name + strlen("checkpoint_"), NULL, 10) <= step) continue;
-    PetscCall(SbOutputPath(out, names[i]->d_name, sizeof(path), path));
-    (void)unlink(path);
-  }
-  free_names(n, names);
+  PetscCall(prune(out, step, PETSC_MAX_INT));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -315,6 +284,7 @@ static PetscErrorCode write_checkpoint(SbRun run, SbOutput out, const SbStep *st
   uint64_t checksum;
 
   PetscFunctionBeginUser;
+  /* a file beside its place, with room for all of it: a full disk shows before anything is written */
   (void)snprintf(name, sizeof(name), "checkpoint_%06" PetscInt_FMT ".h5", step->step);
   PetscCall(SbOutputPath(out, name, sizeof(path), path));
   PetscCall(SbOutputPath(out, "checkpoint.tmp", sizeof(tmp), tmp));
@@ -322,17 +292,21 @@ static PetscErrorCode write_checkpoint(SbRun run, SbOutput out, const SbStep *st
   PetscCall(SbCheckpointMeshBytes(run, &mesh_bytes));
   PetscCall(SbH5Reserve(&h, (PetscInt64)out->node.N * 3 * 32 + (PetscInt64)strlen(out->identity) + 65536 +
                               mesh_bytes));
+
+  /* the state */
   PetscCall(write_vectors(run, out, &h, &checksum));
   PetscCall(SbCheckpointWriteEffects(run, &h, &checksum));
   PetscCall(SbCheckpointWriteMeshes(run, &h, &checksum));
   PetscCall(write_numbers(run, out, step, &h, checksum));
   PetscCall(SbH5Flush(&h));
   PetscCall(SbH5Close(&h));
+
+  /* once it is on disk, it takes its place, and the oldest ones go */
   if (!out->rank) {
     if (rename(tmp, path))
       SbFormat(sizeof(message), message, "cannot rename %s to %s: %s", tmp, path, strerror(errno));
     else
-      PetscCall(prune(out, out->checkpoint_keep));
+      PetscCall(prune(out, PETSC_MAX_INT, out->checkpoint_keep));
   }
   PetscCall(SbAgree(out->comm, PETSC_ERR_FILE_WRITE, message));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -344,11 +318,13 @@ static PetscErrorCode monitor(SbRun run, const SbStep *step, void *ctx)
   PetscBool due = step->last;
 
   PetscFunctionBeginUser;
+  /* whether this step is to be kept: by time, by number, or as the last one */
   if (step->step == run->step0) PetscFunctionReturn(PETSC_SUCCESS);
   if (out->checkpoint_every > 0.)
     due = (PetscBool)(due || SbOutputDue(out->checkpoint_every, step->t, step->dt));
   if (out->checkpoint_every_steps) due = (PetscBool)(due || step->step % out->checkpoint_every_steps == 0);
   if (!due) PetscFunctionReturn(PETSC_SUCCESS);
+
   PetscCall(PetscLogStagePush(SbStageOutput));
   PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_CHECKPOINT], 0, 0, 0, 0));
   PetscCall(PetscLogEventBegin(out->event.checkpoint, 0, 0, 0, 0));
@@ -443,23 +419,6 @@ static PetscErrorCode read_vectors(SbRun run, SbOutput out, SbH5 *h, uint64_t *a
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/*
-  Length of the step after a restart: that of the uninterrupted run, which may be a short one that would have met t_end. A
-  run of fixed steps that is given another step or another end takes its own.
-*/
-static PetscErrorCode set_step(SbRun run, hid_t file, PetscBool *ok)
-{
-  PetscReal next, dt, t_end;
-
-  PetscFunctionBeginUser;
-  PetscCall(SbH5GetReal(file, "dt_next", &next, ok));
-  PetscCall(SbH5GetReal(file, "dt", &dt, ok));
-  PetscCall(SbH5GetReal(file, "t_end", &t_end, ok));
-  if (!*ok || !run->ts) PetscFunctionReturn(PETSC_SUCCESS);
-  if (!run->fixed_step || (dt == run->dt && t_end == run->t_end)) PetscCall(TSSetTimeStep(run->ts, next));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* Loads one file; ok is false when it is truncated, damaged or no checkpoint. One that does not fit the run is an error. */
 static PetscErrorCode load(SbRun run, SbOutput out, const char *path, PetscBool *ok)
 {
@@ -468,32 +427,57 @@ static PetscErrorCode load(SbRun run, SbOutput out, const char *path, PetscBool 
   int64_t step, mesh_hash, checksum = 0, format;
   uint64_t sum = 0;
   SbRecords *records;
-  PetscReal t, values[NTOTAL], remeshed[NREMESH] = {0.}, paused = 0.;
+  PetscReal t, next, dt, t_end, values[NTOTAL], remeshed[NREMESH] = {0.}, paused = 0.;
   PetscBool there[NREMESH] = {PETSC_TRUE, PETSC_TRUE, PETSC_TRUE}, pauses = PETSC_TRUE;
 
   PetscFunctionBeginUser;
   PetscCall(SbH5Open(out->comm, path, PETSC_FALSE, &h, ok));
   if (!*ok) PetscFunctionReturn(PETSC_SUCCESS);
+  /* numbers; those of re-meshing and of a pause are not in every file */
   PetscCall(SbH5GetInt(h.file, "format", &format, ok));
   PetscCall(SbH5GetInt(h.file, "step", &step, ok));
   PetscCall(SbH5GetInt(h.file, "mesh_hash", &mesh_hash, ok));
   PetscCall(SbH5GetInt(h.file, "checksum", &checksum, ok));
   PetscCall(SbH5GetReal(h.file, "time", &t, ok));
+  PetscCall(SbH5GetReal(h.file, "dt_next", &next, ok));
+  PetscCall(SbH5GetReal(h.file, "dt", &dt, ok));
+  PetscCall(SbH5GetReal(h.file, "t_end", &t_end, ok));
   totals_of(run, total);
   for (int i = 0; i < NTOTAL; i++) PetscCall(SbH5GetReal(h.file, total[i].name, &values[i], ok));
   for (int k = 0; k < NREMESH; k++) PetscCall(SbH5GetReal(h.file, remesh_names[k], &remeshed[k], &there[k]));
   PetscCall(SbH5GetReal(h.file, "paused_after", &paused, &pauses));
   if (*ok && format != FORMAT) *ok = PETSC_FALSE;
+
+  /* the state, and whether it is what was written for such a run */
   if (*ok) PetscCall(check_identity(run, out, &h, mesh_hash));
   PetscCall(PetscCalloc1(run->model->neffect, &records));
   if (*ok) PetscCall(read_vectors(run, out, &h, &sum, ok));
   if (*ok) PetscCall(SbCheckpointReadEffects(run, &h, records, &sum, ok));
   if (*ok) PetscCall(SbCheckpointSumMeshes(run, &h, &sum, ok));
   if (sum != (uint64_t)checksum) *ok = PETSC_FALSE;
-  if (*ok) PetscCall(set_step(run, h.file, ok));
-  if (*ok) PetscCall(read_carried(run, out, &h));
+
+  /* the next step is that of the uninterrupted run, which may be a short one before t_end; with another fixed step or end the run takes its own */
+  if (*ok && run->ts && (!run->fixed_step || (dt == run->dt && t_end == run->t_end)))
+    PetscCall(TSSetTimeStep(run->ts, next));
+
+  /* errors that the ledger has added up: all or none, as a run without -ledger writes none */
+  if (*ok && run->ncarried) {
+    PetscBool all = PETSC_TRUE;
+    PetscReal *errors;
+
+    PetscCall(PetscMalloc1(run->ncarried, &errors));
+    for (PetscInt i = 0; i < run->ncarried && all; i++)
+      PetscCall(SbH5GetReal(h.file, run->carried[i].name, &errors[i], &all));
+    for (PetscInt i = 0; i < run->ncarried && all; i++) *run->carried[i].value = errors[i];
+    PetscCall(PetscFree(errors));
+    if (!all)
+      PetscCall(SbWarning(
+        out->comm, "%s has no errors, as it was written without -ledger: they count from there", h.path));
+  }
   if (*ok) PetscCall(SbProbesRead(run, out, &h));
   PetscCall(SbH5Close(&h));
+
+  /* effects take up what they remember, and the run stands where the file was written */
   if (*ok) PetscCall(SbCheckpointLoadEffects(run, t, records));
   PetscCall(SbCheckpointFreeEffects(run, records));
   PetscCall(PetscFree(records));
@@ -506,32 +490,26 @@ static PetscErrorCode load(SbRun run, SbOutput out, const char *path, PetscBool 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Name of the k-th newest checkpoint of the folder, the same on all ranks; empty when there is none. */
-static PetscErrorCode nth_newest(SbOutput out, int k, size_t size, char path[])
-{
-  char name[SB_FILE_MAX] = "";
-
-  PetscFunctionBeginUser;
-  if (!out->rank) {
-    struct dirent **names;
-    const int n = list_checkpoints(out->dir, &names);
-
-    if (k < n) (void)snprintf(name, sizeof(name), "%.63s", names[n - 1 - k]->d_name);
-    free_names(n, names);
-  }
-  PetscCallMPI(MPI_Bcast(name, (PetscMPIInt)sizeof(name), MPI_CHAR, 0, out->comm));
-  path[0] = 0;
-  if (name[0]) PetscCall(SbOutputPath(out, name, size, path));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode SbCheckpointFind(SbOutput out, const char *file, int k, size_t size, char path[])
 {
   PetscFunctionBeginUser;
   if (strcmp(file, "latest"))
     PetscCall(PetscStrncpy(path, file, size));
-  else
-    PetscCall(nth_newest(out, k, size, path));
+  else {
+    /* the k-th newest of the folder, which rank 0 knows; empty when there is none */
+    char name[SB_FILE_MAX] = "";
+
+    if (!out->rank) {
+      struct dirent **names;
+      const int n = list_checkpoints(out->dir, &names);
+
+      if (k < n) (void)snprintf(name, sizeof(name), "%.63s", names[n - 1 - k]->d_name);
+      free_names(n, names);
+    }
+    PetscCallMPI(MPI_Bcast(name, (PetscMPIInt)sizeof(name), MPI_CHAR, 0, out->comm));
+    path[0] = 0;
+    if (name[0]) PetscCall(SbOutputPath(out, name, size, path));
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -545,6 +523,7 @@ PetscErrorCode SbCheckpointLoad(SbRun run, const char *file)
   PetscCall(SbOutputOrder(run, out));
   for (int k = 0; !ok; k++) {
     PetscCall(SbCheckpointFind(out, file, k, sizeof(path), path));
+    /* one that cannot be read is passed over where another one may be taken */
     PetscCheck(path[0], out->comm, PETSC_ERR_FILE_OPEN, "-restart latest: there is no %scheckpoint in %s",
                k ? "readable " : "", out->dir);
     PetscCall(load(run, out, path, &ok));

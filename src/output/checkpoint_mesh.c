@@ -213,24 +213,6 @@ PetscErrorCode SbCheckpointSumMeshes(SbRun run, SbH5 *h, uint64_t *sum, PetscBoo
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* On rank 0: the meshes of one file; ok is false when it cannot be read. */
-static PetscErrorCode read_file(SbModel m, const char *path, SbMemoryMesh *in_memory[], PetscBool *ok)
-{
-  hid_t file = -1;
-
-  PetscFunctionBeginUser;
-  *ok = PETSC_FALSE;
-  if (access(path, R_OK)) PetscFunctionReturn(PETSC_SUCCESS);
-  H5E_BEGIN_TRY file = H5Fopen(path, H5F_ACC_RDONLY, H5P_DEFAULT);
-  H5E_END_TRY
-  if (file < 0) PetscFunctionReturn(PETSC_SUCCESS);
-  *ok = PETSC_TRUE;
-  for (PetscInt b = 0; b < m->nbody; b++) PetscCall(read_mesh(file, m->body[b].name, &in_memory[b], ok));
-  (void)H5Fclose(file);
-  for (PetscInt b = 0; b < m->nbody && !*ok; b++) PetscCall(SbMemoryMeshDestroy(&in_memory[b]));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* All ranks know which bodies have a mesh of their own, and its numbers. */
 static PetscErrorCode share(SbModel m, SbOutput out, SbMemoryMesh *in_memory[])
 {
@@ -266,7 +248,19 @@ PetscErrorCode SbOutputRestoreMeshes(SbRun run)
   for (int k = 0; !ok && (latest || !k); k++) {
     PetscCall(SbCheckpointFind(out, out->restart, k, sizeof(path), path));
     if (!path[0]) break;
-    if (!out->rank) PetscCall(read_file(m, path, in_memory, &ok));
+
+    /* the meshes of that file, on rank 0 */
+    if (!out->rank) {
+      hid_t file = -1;
+
+      H5E_BEGIN_TRY if (!access(path, R_OK)) file = H5Fopen(path, H5F_ACC_RDONLY, H5P_DEFAULT);
+      H5E_END_TRY
+      ok = (PetscBool)(file >= 0);
+      for (PetscInt b = 0; b < m->nbody && file >= 0; b++)
+        PetscCall(read_mesh(file, m->body[b].name, &in_memory[b], &ok));
+      if (file >= 0) (void)H5Fclose(file);
+      for (PetscInt b = 0; b < m->nbody && !ok; b++) PetscCall(SbMemoryMeshDestroy(&in_memory[b]));
+    }
     PetscCallMPI(MPI_Bcast(&ok, 1, SB_MPI_BOOL, 0, out->comm));
   }
   PetscCall(share(m, out, in_memory));

@@ -85,23 +85,6 @@ static PetscErrorCode write_points(SbRun run, SbOutput out, hid_t group)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* "liver,stone": the bodies that the numbers of /mesh/body stand for. */
-static PetscErrorCode write_names(SbFrames fr, hid_t group, SbModel model)
-{
-  char *names;
-  const size_t size = (size_t)model->nbody * SB_NAME_MAX + 1;
-
-  PetscFunctionBeginUser;
-  PetscCall(PetscCalloc1(size, &names));
-  for (PetscInt b = 0; b < model->nbody; b++) {
-    PetscCall(PetscStrlcat(names, b ? "," : "", size));
-    PetscCall(PetscStrlcat(names, model->body[b].name, size));
-  }
-  PetscCall(SbH5PutText(&fr->h5, group, "bodies", names));
-  PetscCall(PetscFree(names));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* "set_fat_tissue": letters that a path or XML takes for its own become underscores. */
 static void array_of_set(const char *prefix, const char *set, size_t size, char name[])
 {
@@ -132,20 +115,13 @@ static PetscErrorCode write_set(SbRun run, SbOutput out, PetscInt k, hid_t group
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode write_sets(SbRun run, SbOutput out, hid_t group)
-{
-  PetscFunctionBeginUser;
-  PetscCall(SbH5Reserve(&out->frames->h5, (PetscInt64)run->model->mesh->nset *
-                                            (4 * ((PetscInt64)out->point.N + out->cell.N) + 8192)));
-  for (PetscInt k = 0; k < run->model->mesh->nset; k++) PetscCall(write_set(run, out, k, group));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 static PetscErrorCode write_mesh(SbRun run, SbOutput out)
 {
   SbFrames fr = out->frames;
   char name[32];
   hid_t group;
+  char *names;
+  const size_t size = (size_t)run->model->nbody * SB_NAME_MAX + 1;
 
   PetscFunctionBeginUser;
   mesh_name(fr->mesh, sizeof(name), name);
@@ -154,7 +130,15 @@ static PetscErrorCode write_mesh(SbRun run, SbOutput out)
   PetscCall(SbH5Reserve(&fr->h5, (PetscInt64)out->point.N * 24 + (PetscInt64)out->cell.N * 40 + 65536));
   PetscCall(SbH5GroupCreate(&fr->h5, 8, 8, &group));
   PetscCall(SbH5PutInt(&fr->h5, group, "hash", (int64_t)out->mesh_hash));
-  PetscCall(write_names(fr, group, run->model));
+
+  /* the bodies that the numbers of /mesh/body stand for: "liver,stone" */
+  PetscCall(PetscCalloc1(size, &names));
+  for (PetscInt b = 0; b < run->model->nbody; b++) {
+    PetscCall(PetscStrlcat(names, b ? "," : "", size));
+    PetscCall(PetscStrlcat(names, run->model->body[b].name, size));
+  }
+  PetscCall(SbH5PutText(&fr->h5, group, "bodies", names));
+  PetscCall(PetscFree(names));
   PetscCall(write_points(run, out, group));
   for (PetscInt i = 0; i < out->nfield; i++) {
     if (!out->field[i]->constant) continue;
@@ -162,8 +146,12 @@ static PetscErrorCode write_mesh(SbRun run, SbOutput out)
     if (out->field[i]->compute) {
       PetscCall(out->field[i]->compute(run, NULL, fr->owned));
       PetscCall(write_whole(fr, group, out->field[i]->name, &out->cell, 1));
-    } else
-      PetscCall(write_sets(run, out, group));
+    } else {
+      /* one array per set */
+      PetscCall(SbH5Reserve(&fr->h5, (PetscInt64)run->model->mesh->nset *
+                                       (4 * ((PetscInt64)out->point.N + out->cell.N) + 8192)));
+      for (PetscInt k = 0; k < run->model->mesh->nset; k++) PetscCall(write_set(run, out, k, group));
+    }
     PetscCall(PetscLogEventEnd(out->field_event[i], 0, 0, 0, 0));
   }
   PetscCall(SbH5GroupLink(&fr->h5, group, fr->h5.file, name));
@@ -506,24 +494,6 @@ PetscErrorCode SbFramesCheck(SbRun run, SbOutput out)
 
 /* ------------------------------------------------------------------ from beginning to end */
 
-static PetscErrorCode create(SbRun run, SbOutput out, const char *path)
-{
-  SbFrames fr = out->frames;
-
-  PetscFunctionBeginUser;
-  // An index without its frames would mislead; the next one comes with the first frame.
-  if (fr->xdmf) PetscCall(SbXdmfRemove(fr->xdmf));
-  PetscCall(SbContactsRemoveIndex(out));
-  PetscCall(SbH5Create(out->comm, path, &fr->h5));
-  PetscCall(SbH5PutText(&fr->h5, fr->h5.file, "program", "supple " SB_VERSION));
-  PetscCall(write_mesh(run, out));
-  PetscCall(SbH5GroupCreate(&fr->h5, SB_H5_NODE_LINKS, 4, &fr->top));
-  PetscCall(SbH5GroupLink(&fr->h5, fr->top, fr->h5.file, "step"));
-  PetscCall(SbH5Flush(&fr->h5));
-  if (fr->xdmf) PetscCall(index_mesh(fr, fr->mesh));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* What depends on the mesh. */
 static PetscErrorCode allocate(SbRun run, SbOutput out)
 {
@@ -548,17 +518,6 @@ static PetscErrorCode free_work(SbFrames fr)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode create_index(SbOutput out)
-{
-  char path[PETSC_MAX_PATH_LEN];
-
-  PetscFunctionBeginUser;
-  if (out->rank) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(SbOutputPath(out, "fields.xmf", sizeof(path), path));
-  PetscCall(SbXdmfCreate(path, &out->frames->xdmf));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode SbFramesAttach(SbRun run, SbOutput out)
 {
   char path[PETSC_MAX_PATH_LEN];
@@ -573,11 +532,30 @@ PetscErrorCode SbFramesAttach(SbRun run, SbOutput out)
   out->frames->last_step = -1;
   PetscCall(SbOutputOrder(run, out));
   PetscCall(allocate(run, out));
-  PetscCall(create_index(out));
+
+  /* the index for viewers, on rank 0 */
+  if (!out->rank) {
+    PetscCall(SbOutputPath(out, "fields.xmf", sizeof(path), path));
+    PetscCall(SbXdmfCreate(path, &out->frames->xdmf));
+  }
   PetscCall(SbContactsCreate(run, out));
   PetscCall(SbOutputPath(out, "fields.h5", sizeof(path), path));
   if (out->restarted) PetscCall(resume(run, out, path, &resumed));
-  if (!resumed) PetscCall(create(run, out, path));
+
+  /* else a new file with the mesh, and no index: one without its frames would mislead */
+  if (!resumed) {
+    SbFrames fr = out->frames;
+
+    if (fr->xdmf) PetscCall(SbXdmfRemove(fr->xdmf));
+    PetscCall(SbContactsRemoveIndex(out));
+    PetscCall(SbH5Create(out->comm, path, &fr->h5));
+    PetscCall(SbH5PutText(&fr->h5, fr->h5.file, "program", "supple " SB_VERSION));
+    PetscCall(write_mesh(run, out));
+    PetscCall(SbH5GroupCreate(&fr->h5, SB_H5_NODE_LINKS, 4, &fr->top));
+    PetscCall(SbH5GroupLink(&fr->h5, fr->top, fr->h5.file, "step"));
+    PetscCall(SbH5Flush(&fr->h5));
+    if (fr->xdmf) PetscCall(index_mesh(fr, fr->mesh));
+  }
   PetscCall(SbRunAddMonitor(run, monitor, out, NULL));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

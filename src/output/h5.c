@@ -31,16 +31,6 @@ static int leave_at_once(MPI_Comm comm, int key, void *attribute, void *state)
   _exit(1);
 }
 
-static void spare_the_end(SbH5 *h)
-{
-  int key;
-
-  // Attributes of MPI_COMM_SELF are deleted first by MPI_Finalize(), the newest before the one of HDF5.
-  if (h->failed || MPI_Comm_create_keyval(MPI_COMM_NULL_COPY_FN, leave_at_once, &key, NULL)) return;
-  h->failed = PETSC_TRUE;
-  (void)MPI_Comm_set_attr(MPI_COMM_SELF, key, NULL);
-}
-
 /* The innermost message of the error that HDF5 has on its stack. */
 static herr_t take_message(unsigned n, const H5E_error2_t *error, void *ctx)
 {
@@ -67,7 +57,15 @@ static PetscErrorCode agree(SbH5 *h)
     SbFormat(sizeof(message), message, "cannot write %" PetscInt64_FMT " bytes to %s: HDF5 says '%s'",
              h->bytes, h->path, h->reason);
   ierr = SbAgree(h->comm, PETSC_ERR_FILE_WRITE, message);
-  if (ierr) spare_the_end(h);
+  if (ierr) {
+    int key;
+
+    // HDF5 must not come to its end of the program: attributes of MPI_COMM_SELF are deleted first by MPI_Finalize(), the newest before its own.
+    if (!h->failed && !MPI_Comm_create_keyval(MPI_COMM_NULL_COPY_FN, leave_at_once, &key, NULL)) {
+      h->failed = PETSC_TRUE;
+      (void)MPI_Comm_set_attr(MPI_COMM_SELF, key, NULL);
+    }
+  }
   PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

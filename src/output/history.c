@@ -61,13 +61,6 @@ static const char *const units[] = {"1",        "s",        "s", "J",      "J", 
 
 /* ------------------------------------------------------------------ text */
 
-static PetscErrorCode begin_row(SbHistory h)
-{
-  PetscFunctionBeginUser;
-  h->size = 0;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* The buffer holds any row: it is allocated for the number of columns. */
 static PetscErrorCode put(SbHistory h, const char *format, ...)
 {
@@ -86,7 +79,7 @@ static PetscErrorCode put(SbHistory h, const char *format, ...)
 static PetscErrorCode put_header(SbRun run, SbOutput out, SbHistory h)
 {
   PetscFunctionBeginUser;
-  PetscCall(begin_row(h));
+  h->size = 0;
   for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(names); i++)
     PetscCall(put(h, "%s%s", i ? "," : "", names[i]));
   for (PetscInt e = 0; e < run->model->nhistory; e++) {
@@ -143,36 +136,6 @@ static PetscErrorCode effect_columns(SbRun run, const SbStep *step, PetscReal *v
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode probe_columns(SbRun run, SbOutput out, const SbStep *step, PetscReal *values)
-{
-  const PetscReal *u;
-
-  PetscFunctionBeginUser;
-  PetscCall(PetscLogEventBegin(out->event.probes, 0, 0, 0, 0));
-  PetscCall(SbSpaceGetLocalRead(run->model->space, step->U, &u));
-  for (PetscInt p = 0; p < out->nprobe; p++) SbProbeValue(run, out, &out->probe[p], u, values + 3 * p);
-  PetscCall(SbSpaceRestoreLocalRead(run->model->space, step->U, &u));
-  PetscCall(PetscLogEventEnd(out->event.probes, 0, 0, 0, 0));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Sums of all ranks for the columns of effects and probes; ends the run when the row before could not be written. */
-static PetscErrorCode extra_columns(SbRun run, SbOutput out, const SbStep *step)
-{
-  SbHistory h = out->hist;
-  PetscMPIInt n;
-
-  PetscFunctionBeginUser;
-  PetscCall(PetscArrayzero(h->mine, h->nextra + 1));
-  if (run->model->nhistory) PetscCall(effect_columns(run, step, h->mine));
-  if (out->nprobe) PetscCall(probe_columns(run, out, step, h->mine + h->nextra - 3 * out->nprobe));
-  h->mine[h->nextra] = h->message[0] ? 1. : 0.;
-  PetscCall(PetscMPIIntCast(h->nextra + 1, &n));
-  PetscCallMPI(MPI_Allreduce(h->mine, h->sum, n, MPIU_REAL, MPI_SUM, out->comm));
-  if (h->sum[h->nextra] > 0.) PetscCall(SbAgree(out->comm, PETSC_ERR_FILE_WRITE, h->message));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 static PetscErrorCode put_row(SbHistory h, const SbStep *step, SbRun run)
 {
   const SbEnergies *e = &step->energies;
@@ -196,7 +159,7 @@ static PetscErrorCode put_row(SbHistory h, const SbStep *step, SbRun run)
                          e->min_J};
 
   PetscFunctionBeginUser;
-  PetscCall(begin_row(h));
+  h->size = 0;
   PetscCall(put(h, "%" PetscInt_FMT ",%.17g,%.17g", step->step, (double)step->t, (double)step->dt));
   for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(x); i++) PetscCall(put(h, ",%.17g", (double)x[i]));
   PetscCall(put(h, ",%" PetscInt_FMT ",%.17g,%.17g", e->ninverted, (double)e->max_speed,
@@ -227,13 +190,36 @@ static PetscErrorCode monitor(SbRun run, const SbStep *step, void *ctx)
   SbOutput out = (SbOutput)ctx;
   SbHistory h = out->hist;
   const PetscBool first = (PetscBool)(step->step == run->step0);
+  PetscMPIInt n;
 
   PetscFunctionBeginUser;
   if (!first && !step->last && step->step % out->history_every) PetscFunctionReturn(PETSC_SUCCESS);
   if (h->last_step >= step->step) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_OUTPUT], 0, 0, 0, 0));
   PetscCall(PetscLogEventBegin(out->event.history, 0, 0, 0, 0));
-  PetscCall(extra_columns(run, out, step));
+
+  /* this rank's part of the columns of effects and probes */
+  PetscCall(PetscArrayzero(h->mine, h->nextra + 1));
+  if (run->model->nhistory) PetscCall(effect_columns(run, step, h->mine));
+
+  if (out->nprobe) {
+    const PetscReal *u;
+
+    PetscCall(PetscLogEventBegin(out->event.probes, 0, 0, 0, 0));
+    PetscCall(SbSpaceGetLocalRead(run->model->space, step->U, &u));
+    for (PetscInt p = 0; p < out->nprobe; p++)
+      SbProbeValue(run, out, &out->probe[p], u, h->mine + h->nextra - 3 * (out->nprobe - p));
+    PetscCall(SbSpaceRestoreLocalRead(run->model->space, step->U, &u));
+    PetscCall(PetscLogEventEnd(out->event.probes, 0, 0, 0, 0));
+  }
+
+  /* sums of all ranks; the run ends when the row before could not be written */
+  h->mine[h->nextra] = h->message[0] ? 1. : 0.;
+  PetscCall(PetscMPIIntCast(h->nextra + 1, &n));
+  PetscCallMPI(MPI_Allreduce(h->mine, h->sum, n, MPIU_REAL, MPI_SUM, out->comm));
+  if (h->sum[h->nextra] > 0.) PetscCall(SbAgree(out->comm, PETSC_ERR_FILE_WRITE, h->message));
+
+  /* the row, as text, in one piece */
   h->last_step = step->step;
   if (h->fd >= 0) {
     PetscCall(put_row(h, step, run));
@@ -274,20 +260,6 @@ static PetscErrorCode keep_rows(SbHistory h, PetscInt step0, PetscBool *kept, si
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A history with other columns stays, under another name. */
-static PetscErrorCode set_aside(SbHistory h, PetscInt step0)
-{
-  char other[PETSC_MAX_PATH_LEN + 32];
-
-  PetscFunctionBeginUser;
-  if (access(h->path, F_OK)) PetscFunctionReturn(PETSC_SUCCESS);
-  (void)snprintf(other, sizeof(other), "%.*s_before_%06" PetscInt_FMT ".csv", (int)(strlen(h->path) - 4),
-                 h->path, step0);
-  if (rename(h->path, other)) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(PetscPrintf(PETSC_COMM_SELF, "%s has other columns: kept as %s\n", h->path, other));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 static PetscErrorCode open_file(SbRun run, SbOutput out, size_t nmessage, char message[])
 {
   SbHistory h = out->hist;
@@ -297,7 +269,16 @@ static PetscErrorCode open_file(SbRun run, SbOutput out, size_t nmessage, char m
   PetscCall(put_header(run, out, h));
   if (out->restarted) {
     PetscCall(keep_rows(h, run->step0, &kept, nmessage, message));
-    if (!kept) PetscCall(set_aside(h, run->step0));
+
+    /* a history with other columns stays, under another name */
+    if (!kept && !access(h->path, F_OK)) {
+      char other[PETSC_MAX_PATH_LEN + 32];
+
+      (void)snprintf(other, sizeof(other), "%.*s_before_%06" PetscInt_FMT ".csv", (int)(strlen(h->path) - 4),
+                     h->path, run->step0);
+      if (!rename(h->path, other))
+        PetscCall(PetscPrintf(PETSC_COMM_SELF, "%s has other columns: kept as %s\n", h->path, other));
+    }
   }
   if (message[0]) PetscFunctionReturn(PETSC_SUCCESS);
   h->fd = open(h->path, O_WRONLY | O_CREAT | (kept ? O_APPEND : O_TRUNC), 0666);

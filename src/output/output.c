@@ -108,22 +108,6 @@ static PetscErrorCode find_scenario(size_t size, char file[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* out/<scenario without folder and ending>. */
-static PetscErrorCode default_folder(SbOutput out)
-{
-  const char *base = strrchr(out->scenario, '/'), *dot;
-
-  PetscFunctionBeginUser;
-  base = base ? base + 1 : out->scenario;
-  dot = strrchr(base, '.');
-  if (!base[0])
-    PetscCall(PetscStrncpy(out->dir, "out/run", sizeof(out->dir)));
-  else
-    (void)snprintf(out->dir, sizeof(out->dir), "out/%.*s",
-                   dot && dot > base ? (int)(dot - base) : (int)strlen(base), base);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* Fields asked for, those of a static run only where it is one; body always. */
 static PetscErrorCode read_fields(SbOutput out, const SbScope *scope, PetscBool dynamic)
 {
@@ -153,34 +137,30 @@ static PetscErrorCode read_fields(SbOutput out, const SbScope *scope, PetscBool 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode read_probes(SbOutput out, const SbScope *scope)
-{
-  char(*names)[SB_NAME_MAX];
-
-  PetscFunctionBeginUser;
-  PetscCall(SbOptionNames(scope, "probes", &out->nprobe, &names));
-  PetscCall(PetscCalloc1(out->nprobe, &out->probe));
-  for (PetscInt p = 0; p < out->nprobe; p++) {
-    SbScope at;
-
-    PetscCall(PetscStrncpy(out->probe[p].name, names[p], SB_NAME_MAX));
-    PetscCall(SbScopeSet(&at, "probe", "", names[p]));
-    PetscCall(SbOptionReals(&at, "at", out->probe[p].at));
-  }
-  PetscCall(PetscFree(names));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 static PetscErrorCode read_options(SbOutput out, PetscBool dynamic)
 {
   SbScope scope;
+  char(*names)[SB_NAME_MAX];
   PetscInt precision;
 
   PetscFunctionBeginUser;
+  /* the folder; without a name, out/<scenario without folder and ending> */
   PetscCall(SbScopeSet(&scope, "", "", ""));
   PetscCall(find_scenario(sizeof(out->scenario), out->scenario));
   PetscCall(SbOptionString(&scope, "output_dir", sizeof(out->dir), out->dir));
-  if (!out->dir[0]) PetscCall(default_folder(out));
+  if (!out->dir[0]) {
+    const char *base = strrchr(out->scenario, '/'), *dot;
+
+    base = base ? base + 1 : out->scenario;
+    dot = strrchr(base, '.');
+    if (!base[0])
+      PetscCall(PetscStrncpy(out->dir, "out/run", sizeof(out->dir)));
+    else
+      (void)snprintf(out->dir, sizeof(out->dir), "out/%.*s",
+                     dot && dot > base ? (int)(dot - base) : (int)strlen(base), base);
+  }
+
+  /* what is written into it, and how often */
   PetscCall(read_fields(out, &scope, dynamic));
   PetscCall(SbOptionReal(&scope, "output_every", &out->every));
   PetscCall(SbOptionInt(&scope, "output_every_steps", &out->every_steps));
@@ -197,7 +177,20 @@ static PetscErrorCode read_options(SbOutput out, PetscBool dynamic)
   PetscCall(SbOptionInt(&scope, "checkpoint_every_steps", &out->checkpoint_every_steps));
   PetscCall(SbOptionInt(&scope, "checkpoint_keep", &out->checkpoint_keep));
   PetscCall(SbOptionString(&scope, "restart", sizeof(out->restart), out->restart));
-  PetscCall(read_probes(out, &scope));
+
+  /* places that history.csv follows */
+  PetscCall(SbOptionNames(&scope, "probes", &out->nprobe, &names));
+  PetscCall(PetscCalloc1(out->nprobe, &out->probe));
+  for (PetscInt p = 0; p < out->nprobe; p++) {
+    SbScope at;
+
+    PetscCall(PetscStrncpy(out->probe[p].name, names[p], SB_NAME_MAX));
+    PetscCall(SbScopeSet(&at, "probe", "", names[p]));
+    PetscCall(SbOptionReals(&at, "at", out->probe[p].at));
+  }
+  PetscCall(PetscFree(names));
+
+  /* what the screen shows */
   PetscCall(SbOptionBool(&scope, "progress", &out->progress));
   PetscCall(SbOptionBool(&scope, "quiet", &out->quiet));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -324,19 +317,6 @@ static PetscErrorCode view_scenario(SbRun run, SbOutput out, char **text, size_t
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode write_scenario(SbOutput out, char *text, size_t size)
-{
-  const SbPiece piece = {text, size};
-  char path[PETSC_MAX_PATH_LEN], message[SB_MESSAGE_MAX] = "";
-
-  PetscFunctionBeginUser;
-  PetscCall(SbOutputPath(out, "scenario.opts", sizeof(path), path));
-  if (!out->rank) SbFileReplace(path, 1, &piece, sizeof(message), message);
-  free(text);
-  PetscCall(SbAgree(out->comm, PETSC_ERR_FILE_WRITE, message));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* ------------------------------------------------------------------ life of the output */
 
 static PetscErrorCode destroy(SbRun run)
@@ -395,10 +375,17 @@ PetscErrorCode SbOutputCountNodes(SbSpace space, SbOutput out)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Log events of what the scenario asks for: alike on all ranks, also where some have nothing to write. */
-static PetscErrorCode name_events(SbOutput out)
+PetscErrorCode SbOutputAttach(SbRun run)
 {
+  SbOutput out = (SbOutput)run->output;
+  char *scenario = NULL, path[PETSC_MAX_PATH_LEN], message[SB_MESSAGE_MAX] = "";
+  size_t size = 0;
+  SbPiece piece;
+
   PetscFunctionBeginUser;
+  PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_OUTPUT], 0, 0, 0, 0));
+
+  /* log events of what the scenario asks for: alike on all ranks, also where some have nothing to write */
   if (out->nfield) PetscCall(SbLogNamed("Out", "fields", &out->event.fields));
   for (PetscInt i = 0; i < out->nfield; i++)
     PetscCall(SbLogNamed("Field", out->field[i]->name, &out->field_event[i]));
@@ -408,27 +395,26 @@ static PetscErrorCode name_events(SbOutput out)
   if (out->checkpoint_every > 0. || out->checkpoint_every_steps)
     PetscCall(SbLogNamed("Out", "checkpoint", &out->event.checkpoint));
   if (out->progress && !out->quiet) PetscCall(SbLogNamed("Out", "progress", &out->event.progress));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
 
-PetscErrorCode SbOutputAttach(SbRun run)
-{
-  SbOutput out = (SbOutput)run->output;
-  char *scenario = NULL;
-  size_t size = 0;
-
-  PetscFunctionBeginUser;
-  PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_OUTPUT], 0, 0, 0, 0));
-  PetscCall(name_events(out));
+  /* the state to go on from; a checkpoint that is refused leaves the folder as it was */
   PetscCall(SbOutputCountNodes(run->model->space, out));
   PetscCall(view_scenario(run, out, &scenario, &size));
-  // A checkpoint that is refused leaves the folder as it was.
   if (out->restart[0]) PetscCall(SbCheckpointLoad(run, out->restart));
   if (out->restart[0]) PetscCall(SbFramesCheck(run, out));
   if (!out->rank) PetscCall(clear_folder(out, run->step0));
-  PetscCall(write_scenario(out, scenario, size));
+
+  /* the complete scenario, and what runs, beside the results */
+  piece.text = scenario;
+  piece.size = size;
+  PetscCall(SbOutputPath(out, "scenario.opts", sizeof(path), path));
+  if (!out->rank) SbFileReplace(path, 1, &piece, sizeof(message), message);
+  free(scenario);
+  PetscCall(SbAgree(out->comm, PETSC_ERR_FILE_WRITE, message));
+
   PetscCall(SbRunJson(run, out, "running", ""));
   out->attached = PETSC_TRUE;
+
+  /* who looks on from now on */
   PetscCall(SbFramesAttach(run, out));
   PetscCall(SbHistoryAttach(run, out));
   PetscCall(SbCheckpointAttach(run, out));

@@ -49,15 +49,6 @@ static PetscErrorCode find_around(SbMesh mesh, SbPoints p)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode find_volumes(SbSpace s, SbPoints p)
-{
-  PetscFunctionBeginUser;
-  PetscCall(PetscMalloc1(s->mesh->ncell, &p->V));
-  for (PetscInt b = 0; b < s->nbatch; b++)
-    PetscCall(PetscArraycpy(p->V + s->batch_cell[b], s->batch_V[b], s->batch_n[b]));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode SbPointsPrepare(SbRun run, SbOutput out)
 {
   const SbSpace s = run->model->space;
@@ -67,7 +58,11 @@ PetscErrorCode SbPointsPrepare(SbRun run, SbOutput out)
   PetscCall(PetscNew(&out->points));
   if (!s->faces) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(find_around(s->mesh, out->points));
-  PetscCall(find_volumes(s, out->points));
+
+  /* weights of the means over cells */
+  PetscCall(PetscMalloc1(s->mesh->ncell, &out->points->V));
+  for (PetscInt b = 0; b < s->nbatch; b++)
+    PetscCall(PetscArraycpy(out->points->V + s->batch_cell[b], s->batch_V[b], s->batch_n[b]));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

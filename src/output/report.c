@@ -235,29 +235,13 @@ static PetscErrorCode add_file(const char *name, PetscInt64 bytes, void *ctx)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* What effects have to say of their work. Collective. */
-static PetscErrorCode print_work(SbModel m, PetscBool silent)
-{
-  char text[512];
-
-  PetscFunctionBeginUser;
-  for (PetscInt e = 0; e < m->neffect; e++) {
-    const SbEffect effect = m->effect[e];
-
-    if (!effect->ops.summary) continue;
-    text[0] = 0;
-    PetscCall(effect->ops.summary(effect, m->space, sizeof(text), text));
-    if (!silent && text[0]) PetscCall(entry("effect", "%s: %s", effect->name, text));
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode SbReportSummary(SbRun run)
 {
   SbOutput out = (SbOutput)run->output;
   const PetscBool stopped = (PetscBool)(run->stop_reason[0] != 0);
   SbPhases phases;
   char files[1024] = "", memory[32], sum[32], solver[SB_NAME_MAX];
+  char text[512];
 
   PetscFunctionBeginUser;
   PetscCall(SbProgressEnd(out));
@@ -273,7 +257,16 @@ PetscErrorCode SbReportSummary(SbRun run)
                         run->energies.ninverted, (double)run->energies.min_J));
   if (out->quiet) PetscFunctionReturn(PETSC_SUCCESS);
   if (!out->rank) PetscCall(print_phases(run, &phases));
-  PetscCall(print_work(run->model, (PetscBool)(out->rank > 0)));
+
+  /* what effects have to say of their work */
+  for (PetscInt e = 0; e < run->model->neffect; e++) {
+    const SbEffect effect = run->model->effect[e];
+
+    if (!effect->ops.summary) continue;
+    text[0] = 0;
+    PetscCall(effect->ops.summary(effect, run->model->space, sizeof(text), text));
+    if (!out->rank && text[0]) PetscCall(entry("effect", "%s: %s", effect->name, text));
+  }
   if (out->rank) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(entry("steps",
                   "%" PetscInt_FMT " (%" PetscInt_FMT " attempts rejected), %" PetscInt_FMT

@@ -52,18 +52,6 @@ static PetscBool mesh_is_there(const char *mesh)
   return (PetscBool)(!access(node, R_OK) || !access(mesh, R_OK));
 }
 
-/* "; make meshes/lobe.msh makes it" where its description for gmsh lies beside it, as for those of the scenarios. */
-static void how_made(const char *mesh, size_t size, char text[])
-{
-  const char *dot = strrchr(mesh, '.');
-  char geo[PETSC_MAX_PATH_LEN + 4];
-
-  text[0] = 0;
-  if (!dot || strcmp(dot, ".msh") != 0 || strncmp(mesh, "meshes/", 7) != 0) return;
-  (void)snprintf(geo, sizeof(geo), "%.*s.geo", (int)(dot - mesh), mesh);
-  if (!access(geo, R_OK)) (void)snprintf(text, size, "; make %s makes it", mesh);
-}
-
 /* Rank 0 looks, all ranks learn the result. */
 static PetscErrorCode check_mesh_file(MPI_Comm comm, const SbBody *body)
 {
@@ -75,7 +63,17 @@ static PetscErrorCode check_mesh_file(MPI_Comm comm, const SbBody *body)
   PetscCallMPI(MPI_Comm_rank(comm, &rank));
   if (!rank && !mesh_is_there(body->mesh)) {
     error = errno;
-    if (error == ENOENT) how_made(body->mesh, sizeof(make), make);
+
+    /* "; make meshes/lobe.msh makes it" where its description for gmsh lies beside it, as for those of the scenarios */
+    if (error == ENOENT) {
+      const char *dot = strrchr(body->mesh, '.');
+      char geo[PETSC_MAX_PATH_LEN + 4];
+
+      if (dot && !strcmp(dot, ".msh") && !strncmp(body->mesh, "meshes/", 7)) {
+        (void)snprintf(geo, sizeof(geo), "%.*s.geo", (int)(dot - body->mesh), body->mesh);
+        if (!access(geo, R_OK)) (void)snprintf(make, sizeof(make), "; make %s makes it", body->mesh);
+      }
+    }
     if (error == ENOENT && !make[0]) PetscCall(near_files(body->mesh, sizeof(near), near));
   }
   PetscCallMPI(MPI_Bcast(&error, 1, MPI_INT, 0, comm));

@@ -242,45 +242,32 @@ static PetscErrorCode read_bodies(SbModel model)
 
 /* ------------------------------------------------------------------ the whole scene */
 
-static PetscErrorCode read_effects(SbModel model)
+PetscErrorCode SbSceneCreate(MPI_Comm comm, SbModel *model)
 {
   char(*names)[SB_NAME_MAX];
   PetscInt n;
+  static const char *const keys[] = {"mass", "mesh_partitioner", "mesh_report", "validate"};
+  SbScope scope;
 
   PetscFunctionBeginUser;
+  PetscCall(PetscNew(model));
+  (*model)->comm = comm;
+  PetscCall(read_bodies(*model));
+
   PetscCall(SbSceneReadNames("effects", "effect", &n, &names));
-  PetscCall(PetscCalloc1(n, &model->effect));
+  PetscCall(PetscCalloc1(n, &(*model)->effect));
   for (PetscInt i = 0; i < n; i++) {
-    const PetscErrorCode ierr = SbEffectCreate(names[i], &model->effect[model->neffect++]);
+    const PetscErrorCode ierr = SbEffectCreate(names[i], &(*model)->effect[(*model)->neffect++]);
 
     if (ierr) PetscCall(PetscFree(names));
     PetscCall(ierr);
   }
   PetscCall(PetscFree(names));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
+  PetscCall(SbSceneReadSets(*model));
 
-/* Options whose readers come after the mesh: read ahead, so that a bad value is found before it. */
-static PetscErrorCode read_ahead(void)
-{
-  static const char *const keys[] = {"mass", "mesh_partitioner", "mesh_report", "validate"};
-  SbScope scope;
-
-  PetscFunctionBeginUser;
+  /* options whose readers come after the mesh: read ahead, so that a bad value is found before it */
   PetscCall(SbScopeSet(&scope, "", "", ""));
   for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(keys); i++) PetscCall(SbOptionCheckEarly(&scope, keys[i]));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode SbSceneCreate(MPI_Comm comm, SbModel *model)
-{
-  PetscFunctionBeginUser;
-  PetscCall(PetscNew(model));
-  (*model)->comm = comm;
-  PetscCall(read_bodies(*model));
-  PetscCall(read_effects(*model));
-  PetscCall(SbSceneReadSets(*model));
-  PetscCall(read_ahead());
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

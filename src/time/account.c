@@ -6,20 +6,6 @@
 */
 #include "time_impl.h"
 
-/* Leaves of a residual what is on prescribed unknowns. */
-static PetscErrorCode keep_reactions(SbSpace s, Vec R)
-{
-  PetscScalar *r;
-
-  PetscFunctionBeginUser;
-  PetscCall(VecGetArray(R, &r));
-  for (PetscInt i = 0; i < 3 * s->nnode_owned; i++) {
-    if (!(s->fixed[i / 3] & (1 << i % 3))) r[i] = 0.;
-  }
-  PetscCall(VecRestoreArray(R, &r));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode SbRunReactions(SbRun run, PetscReal t, Vec R)
 {
   PetscFunctionBeginUser;
@@ -33,7 +19,16 @@ PetscErrorCode SbRunReactions(SbRun run, PetscReal t, Vec R)
     PetscCall(VecRestoreArray(R, &r));
   }
   if (SbSpaceHasExternalConstraints(run->model->space)) {
-    if (!run->model->space->nodal) PetscCall(keep_reactions(run->model->space, R));
+    /* only what is on prescribed unknowns, and what contact has exerted */
+    if (!run->model->space->nodal) {
+      PetscScalar *r;
+
+      PetscCall(VecGetArray(R, &r));
+      for (PetscInt i = 0; i < 3 * run->model->space->nnode_owned; i++) {
+        if (!(run->model->space->fixed[i / 3] & (1 << i % 3))) r[i] = 0.;
+      }
+      PetscCall(VecRestoreArray(R, &r));
+    }
     PetscCall(SbSpaceAddConstraintReactions(run->model->space, R));
   }
   PetscFunctionReturn(PETSC_SUCCESS);

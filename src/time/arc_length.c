@@ -68,23 +68,6 @@ static PetscErrorCode evaluate(void *snes, Vec X, Vec R)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Pressure that follows a free rim has a tangent that is not symmetric, and the matrix has its symmetric part: a preconditioner here. */
-static PetscErrorCode create_exact(Path *p)
-{
-  PetscInt n, N;
-  KSP ksp;
-
-  PetscFunctionBeginUser;
-  PetscCall(VecGetLocalSize(p->X, &n));
-  PetscCall(VecGetSize(p->X, &N));
-  PetscCall(MatCreateMFFD(p->run->model->comm, n, n, N, N, &p->exact));
-  PetscCall(MatMFFDSetFunction(p->exact, evaluate, p->run->snes));
-  PetscCall(MatSetUp(p->exact));
-  PetscCall(SNESGetKSP(p->run->snes, &ksp));
-  PetscCall(KSPSetTolerances(ksp, ROUGH, PETSC_DEFAULT, PETSC_DEFAULT, PETSC_DEFAULT));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 static PetscErrorCode create(SbRun run, Path *p)
 {
   const SbModel m = run->model;
@@ -114,7 +97,20 @@ static PetscErrorCode create(SbRun run, Path *p)
   for (PetscInt e = 0; e < m->nprescribe; e++) p->delta = m->prescribe[e]->steady ? p->delta : FINE;
   PetscCall(VecCopy(run->U, p->X));
   PetscCall(put_at(p, run->t0));
-  if (m->ntangent) PetscCall(create_exact(p));
+
+  /* pressure that follows a free rim has a tangent that is not symmetric, and the matrix has its symmetric part: a preconditioner here */
+  if (m->ntangent) {
+    PetscInt n, N;
+    KSP ksp;
+
+    PetscCall(VecGetLocalSize(p->X, &n));
+    PetscCall(VecGetSize(p->X, &N));
+    PetscCall(MatCreateMFFD(p->run->model->comm, n, n, N, N, &p->exact));
+    PetscCall(MatMFFDSetFunction(p->exact, evaluate, p->run->snes));
+    PetscCall(MatSetUp(p->exact));
+    PetscCall(SNESGetKSP(p->run->snes, &ksp));
+    PetscCall(KSPSetTolerances(ksp, ROUGH, PETSC_DEFAULT, PETSC_DEFAULT, PETSC_DEFAULT));
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -269,25 +265,6 @@ static PetscErrorCode attempt(Path *p, PetscReal from, PetscReal l, PetscReal si
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Length of a first step: its load increment is 1 / static_steps; near a limit load, where a load path ended, by what the load has moved so far. */
-static PetscErrorCode first_length(Path *p, PetscReal factor, PetscReal *l)
-{
-  const SbRun run = p->run;
-  PetscReal rate, uu;
-
-  PetscFunctionBeginUser;
-  PetscCall(product(p, p->begin, p->begin, &rate));
-  PetscCheck(rate > 0., run->model->comm, PETSC_ERR_USER_INPUT,
-             "-static_control arc_length: no effect loads or moves the bodies more with the load factor");
-  rate = PetscSqrtReal(rate);
-  if (factor > 0.) {
-    PetscCall(product(p, run->U, run->U, &uu));
-    rate = PetscMin(rate, PetscSqrtReal(uu) / factor);
-  }
-  *l = run->arc.first = rate / (PetscReal)run->static_steps;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* v at U, where the residual is zero but for the tolerance, in `begin`; a bifurcation on the way there is told. */
 static PetscErrorCode begin_step(Path *p, PetscReal *sign, PetscBool *ok)
 {
@@ -315,24 +292,6 @@ static PetscErrorCode begin_step(Path *p, PetscReal *sign, PetscBool *ok)
                         (double)p->factor, negative, p->negative));
   p->negative = negative;
   p->turned = *sign;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Whether some displacement is as large as asked for. */
-static PetscErrorCode far_enough(SbRun run, PetscBool *enough)
-{
-  const PetscScalar *u;
-  PetscReal most = 0.;
-
-  PetscFunctionBeginUser;
-  *enough = PETSC_FALSE;
-  if (run->arc.displacement == 0.) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(VecGetArrayRead(run->U, &u));
-  for (PetscInt i = 0; i < run->model->space->nnode_owned; i++)
-    most = PetscMax(most, PetscSqr(u[3 * i]) + PetscSqr(u[3 * i + 1]) + PetscSqr(u[3 * i + 2]));
-  PetscCall(VecRestoreArrayRead(run->U, &u));
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &most, 1, MPIU_REAL, MPI_MAX, run->model->comm));
-  *enough = (PetscBool)(PetscSqrtReal(most) >= run->arc.displacement);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -406,7 +365,23 @@ PetscErrorCode SbArcLengthSolve(SbRun run)
       if (!ok) break;
       known = PETSC_TRUE;
     }
-    if (l == 0.) PetscCall(first_length(&p, factor, &l));
+
+    /* length of a first step: its load increment is 1 / static_steps; near a limit load, where a load path ended, by what the load has moved so far */
+    if (l == 0.) {
+      PetscReal rate, uu;
+
+      PetscCall(product(&p, p.begin, p.begin, &rate));
+      PetscCheck(rate > 0., run->model->comm, PETSC_ERR_USER_INPUT,
+                 "-static_control arc_length: no effect loads or moves the bodies more with the load factor");
+      rate = PetscSqrtReal(rate);
+      if (factor > 0.) {
+        PetscCall(product(&p, run->U, run->U, &uu));
+        rate = PetscMin(rate, PetscSqrtReal(uu) / factor);
+      }
+      l = run->arc.first = rate / (PetscReal)run->static_steps;
+    }
+
+    /* a step along it, half as long where that fails */
     PetscCall(SbRunStepBegin(run, factor, 0.));
     PetscCall(attempt(&p, factor, l, sign, &its, &ok));
     if (!ok) {
@@ -417,6 +392,7 @@ PetscErrorCode SbArcLengthSolve(SbRun run)
       if (++cuts <= run->max_halvings && l >= run->min_increment * run->arc.first) continue;
       break;
     }
+
     /* the new equilibrium, and the length of the step behind it */
     run->stop_reason[0] = 0;
     known = PETSC_FALSE;
@@ -427,7 +403,19 @@ PetscErrorCode SbArcLengthSolve(SbRun run)
     l = PetscMin(l, run->arc.longest * run->arc.first);
     PetscCall(VecScale(run->path, l / PetscSqrtReal(length)));
     PetscCall(VecCopy(p.X, run->U));
-    PetscCall(far_enough(run, &last));
+
+    /* whether some displacement is as large as asked for */
+    if (run->arc.displacement != 0.) {
+      const PetscScalar *u;
+      PetscReal most = 0.;
+
+      PetscCall(VecGetArrayRead(run->U, &u));
+      for (PetscInt i = 0; i < run->model->space->nnode_owned; i++)
+        most = PetscMax(most, PetscSqr(u[3 * i]) + PetscSqr(u[3 * i + 1]) + PetscSqr(u[3 * i + 2]));
+      PetscCall(VecRestoreArrayRead(run->U, &u));
+      PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &most, 1, MPIU_REAL, MPI_MAX, run->model->comm));
+      last = (PetscBool)(PetscSqrtReal(most) >= run->arc.displacement);
+    }
     last = (PetscBool)(last || p.factor == 1.);
     if (!last && step + 1 - run->step0 == run->arc.steps) {
       last = PETSC_TRUE;

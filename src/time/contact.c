@@ -22,16 +22,6 @@ typedef struct {
   PetscBool single; /* one linear solve in the place of Newton */
 } Aim;
 
-static PetscErrorCode get_aim(SNES snes, Aim *aim)
-{
-  PetscFunctionBeginUser;
-  PetscCall(SNESGetKSP(snes, &aim->ksp));
-  PetscCall(SNESGetTolerances(snes, &aim->atol, &aim->rtol, &aim->stol, &aim->max_it, &aim->max_f));
-  PetscCall(KSPGetTolerances(aim->ksp, &aim->linear_rtol, &aim->linear_atol, &aim->dtol, &aim->linear_max));
-  PetscCall(PetscObjectTypeCompare((PetscObject)snes, SNESKSPONLY, &aim->single));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* Absolute tolerances for solves of a step whose first residual is `size`, N; 0: those of the user. least: what can be had, N. */
 static PetscErrorCode set_aim(SNES snes, const Aim *aim, PetscReal size, PetscReal least, PetscBool rough)
 {
@@ -44,41 +34,6 @@ static PetscErrorCode set_aim(SNES snes, const Aim *aim, PetscReal size, PetscRe
   PetscCall(SNESSetTolerances(snes, atol, aim->rtol, aim->stol, aim->max_it, aim->max_f));
   PetscCall(KSPSetTolerances(aim->ksp, PETSC_DEFAULT, PetscMax(aim->linear_atol, linear), PETSC_DEFAULT,
                              PETSC_DEFAULT));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode first_residual(SNES snes, Vec U, Vec R, PetscReal *size)
-{
-  PetscFunctionBeginUser;
-  PetscCall(SNESComputeFunction(snes, U, R));
-  PetscCall(VecNorm(R, NORM_2, size));
-  if (PetscIsInfOrNanReal(*size)) *size = 0;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Where in the step the first points come into contact, if it is worth cutting there. */
-static PetscErrorCode find_arrival(SbRun run)
-{
-  PetscFunctionBeginUser;
-  PetscCall(SbModelContactTimeOfImpact(run->model, &run->time_of_impact));
-  if (run->time_of_impact < SB_TIME_OF_IMPACT_LEAST || run->time_of_impact > 1. - SB_TIME_OF_IMPACT_LEAST)
-    run->time_of_impact = 1.;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/*
-  What is left behind a solve that failed may be the tangent of a wild state, from whose diagonal rows take their weights: the next attempt
-  would fail on them. So it is that of the step's start again.
-*/
-static PetscErrorCode renew_tangent(SbRun run, SNES snes, Vec U0)
-{
-  Mat A, P;
-
-  PetscFunctionBeginUser;
-  if (!run->model->space->constraints) PetscFunctionReturn(PETSC_SUCCESS);
-  run->tangent_known = PETSC_FALSE;
-  PetscCall(SNESGetJacobian(snes, &A, &P, NULL, NULL));
-  PetscCall(SNESComputeJacobian(snes, U0, A, P));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -95,7 +50,14 @@ PetscErrorCode SbRunSolveContact(SbRun run, const SbAttempt *step, SNESConverged
   PetscFunctionBeginUser;
   if (!run->R) PetscCall(VecDuplicate(U, &run->R));
   run->time_of_impact = 1.;
-  PetscCall(get_aim(snes, &aim));
+
+  /* tolerances as the user left them */
+  PetscCall(SNESGetKSP(snes, &aim.ksp));
+  PetscCall(SNESGetTolerances(snes, &aim.atol, &aim.rtol, &aim.stol, &aim.max_it, &aim.max_f));
+  PetscCall(KSPGetTolerances(aim.ksp, &aim.linear_rtol, &aim.linear_atol, &aim.dtol, &aim.linear_max));
+  PetscCall(PetscObjectTypeCompare((PetscObject)snes, SNESKSPONLY, &aim.single));
+
+  /* a first guess of who touches */
   PetscCall(SbModelContactBeginStep(m, t, dt, U0, run->V, U));
   held = SbSpaceIsConstrained(m->space);
   rough = (PetscBool)(held && m->dynamic);
@@ -107,16 +69,25 @@ PetscErrorCode SbRunSolveContact(SbRun run, const SbAttempt *step, SNESConverged
     PetscCall(VecNorm(run->R, NORM_2, &least));
     least = PetscIsInfOrNanReal(least) ? 0 : DIGITS * least;
   }
-  PetscCall(first_residual(snes, U, run->R, &size));
+
+  /* the aim of all solves of this step: what the first one would go for */
+  PetscCall(SNESComputeFunction(snes, U, run->R));
+  PetscCall(VecNorm(run->R, NORM_2, &size));
+  if (PetscIsInfOrNanReal(size)) size = 0;
   if (held) PetscCall(set_aim(snes, &aim, size, least, rough)); /* if not, as without contact */
   PetscCall(SbSolverUpdateSymmetry(aim.ksp, m->space));
   PetscCall((*step->solve)(step->ctx, U, reason));
+
+  /* examined, and solved again until the guess was right */
   for (PetscInt round = 1; *reason > 0; round++) {
     PetscCall((*step->residual)(step->ctx, U, run->R));
     m->space->rough = rough;
     PetscCall(SbModelContactUpdateActiveSet(m, t + dt, U, run->R, &again));
     if (round == 1 && run->may_end_at_impact) {
-      PetscCall(find_arrival(run));
+      /* where in the step the first points come into contact, if it is worth cutting there */
+      PetscCall(SbModelContactTimeOfImpact(run->model, &run->time_of_impact));
+      if (run->time_of_impact < SB_TIME_OF_IMPACT_LEAST || run->time_of_impact > 1. - SB_TIME_OF_IMPACT_LEAST)
+        run->time_of_impact = 1.;
       if (run->time_of_impact < 1.) *reason = SNES_CONVERGED_ITERATING;
     }
     if ((!again && !rough) || !*reason) break;
@@ -131,6 +102,14 @@ PetscErrorCode SbRunSolveContact(SbRun run, const SbAttempt *step, SNESConverged
     PetscCall((*step->solve)(step->ctx, U, reason));
   }
   PetscCall(set_aim(snes, &aim, 0, 0, PETSC_FALSE));
-  if (*reason < 0) PetscCall(renew_tangent(run, snes, U0));
+
+  /* a solve that failed may leave the tangent of a wild state, from whose diagonal rows take their weights: the next attempt has that of the start again */
+  if (*reason < 0 && run->model->space->constraints) {
+    Mat A, P;
+
+    run->tangent_known = PETSC_FALSE;
+    PetscCall(SNESGetJacobian(snes, &A, &P, NULL, NULL));
+    PetscCall(SNESComputeJacobian(snes, U0, A, P));
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -42,23 +42,10 @@ static PetscBool is_explicit(const SbRun run)
   return (PetscBool)(run->preset == SB_TIME_EULER_EXPLICIT || run->preset == SB_TIME_EULER_SYMPLECTIC);
 }
 
-/* Fixed steps have their nominal length again, also where the last one was cut. */
-static PetscErrorCode take_step(SbRun from, SbRun to)
+PetscErrorCode SbRunContinue(SbRun from, SbRun to)
 {
   PetscReal dt;
 
-  PetscFunctionBeginUser;
-  if (!is_explicit(to) || from->dt_given) to->dt = from->dt;
-  to->dt_given = from->dt_given;
-  if (!to->ts) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(TSGetTimeStep(from->ts, &dt));
-  if (to->fixed_step) dt = to->dt;
-  PetscCall(TSSetTimeStep(to->ts, PetscMin(dt, to->t_end - from->t_now)));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode SbRunContinue(SbRun from, SbRun to)
-{
   PetscFunctionBeginUser;
   to->step0 = to->step_now = from->step_now;
   to->t0 = to->t_now = from->t_now;
@@ -70,7 +57,15 @@ PetscErrorCode SbRunContinue(SbRun from, SbRun to)
   to->rejected_total = from->rejected_total;
   to->steps_total = from->steps_total;
   to->wall_start = from->wall_start;
-  PetscCall(take_step(from, to));
+
+  /* fixed steps have their nominal length again, also where the last one was cut */
+  if (!is_explicit(to) || from->dt_given) to->dt = from->dt;
+  to->dt_given = from->dt_given;
+  if (to->ts) {
+    PetscCall(TSGetTimeStep(from->ts, &dt));
+    if (to->fixed_step) dt = to->dt;
+    PetscCall(TSSetTimeStep(to->ts, PetscMin(dt, to->t_end - from->t_now)));
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -73,19 +73,6 @@ PetscErrorCode SbTimeRegister(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Both names of the step option work with every PETSc: -ts_time_step is the new one. */
-static PetscErrorCode step_option_names(void)
-{
-  char text[64];
-  PetscBool given, given_new;
-
-  PetscFunctionBeginUser;
-  PetscCall(PetscOptionsHasName(NULL, NULL, "-ts_dt", &given));
-  PetscCall(PetscOptionsGetString(NULL, NULL, "-ts_time_step", text, sizeof(text), &given_new));
-  if (given_new && !given) PetscCall(PetscOptionsSetValue(NULL, "-ts_dt", text));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* Arc length needs the tangents that are exact: those of laws that were not chosen become so. */
 static PetscErrorCode read_arc_length(SbRun run, const SbScope *scope)
 {
@@ -124,7 +111,13 @@ PetscErrorCode SbRunCreate(SbModel model, SbRun *run)
   r->preset = (SbTimePreset)preset;
   model->dynamic = (PetscBool)(r->preset != SB_TIME_STATIC);
   if (model->dynamic) {
-    PetscCall(step_option_names());
+    char text[64];
+    PetscBool given, given_new;
+
+    /* both names of the step option work with every PETSc: -ts_time_step is the new one */
+    PetscCall(PetscOptionsHasName(NULL, NULL, "-ts_dt", &given));
+    PetscCall(PetscOptionsGetString(NULL, NULL, "-ts_time_step", text, sizeof(text), &given_new));
+    if (given_new && !given) PetscCall(PetscOptionsSetValue(NULL, "-ts_dt", text));
     PetscCall(SbOptionReal(&scope, "ts_dt", &r->dt));
     PetscCall(SbOptionGiven(&scope, "ts_dt", &r->dt_given));
     PetscCall(SbOptionReal(&scope, "ts_max_time", &r->t_end));
@@ -304,23 +297,6 @@ static PetscErrorCode step_accepted(TS ts, PetscInt step, PetscReal t, Vec U, vo
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode explicit_step(SbRun run)
-{
-  PetscReal stable;
-
-  PetscFunctionBeginUser;
-  PetscCall(SbSpaceStableStep(run->model->space, &stable));
-  if (!run->dt_given)
-    run->dt = 0.9 * stable;
-  else if (run->dt > stable) {
-    PetscCall(SbWarning(
-      run->model->comm,
-      "-ts_dt %g s is beyond the stable step of this mesh and material, %g s: expect the solution to blow up",
-      (double)run->dt, (double)stable));
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* Twice the largest distance of a node from the middle of its body, m: like the length, but of no direction. */
 static PetscErrorCode largest_body(SbModel m, PetscReal *size)
 {
@@ -358,8 +334,21 @@ static PetscErrorCode set_up_ts(SbRun run)
   Vec F;
 
   PetscFunctionBeginUser;
-  if (run->preset == SB_TIME_EULER_EXPLICIT || run->preset == SB_TIME_EULER_SYMPLECTIC)
-    PetscCall(explicit_step(run));
+  if (run->preset == SB_TIME_EULER_EXPLICIT || run->preset == SB_TIME_EULER_SYMPLECTIC) {
+    /* explicit integrators know the step that they can take */
+    PetscReal stable;
+
+    PetscCall(SbSpaceStableStep(run->model->space, &stable));
+    if (!run->dt_given)
+      run->dt = 0.9 * stable;
+    else if (run->dt > stable)
+      PetscCall(SbWarning(m->comm,
+                          "-ts_dt %g s is beyond the stable step of this mesh and material, %g s: expect the "
+                          "solution to blow up",
+                          (double)run->dt, (double)stable));
+  }
+
+  /* the equation of motion and who integrates it */
   PetscCall(SbSpaceCreateVec(m->space, &F));
   PetscCall(TSCreate(m->comm, &run->ts));
   PetscCall(TSSetProblemType(run->ts, TS_NONLINEAR));
@@ -372,14 +361,17 @@ static PetscErrorCode set_up_ts(SbRun run)
     PetscCall(TSAlpha2SetRadius(run->ts, run->spectral_radius));
   } else
     PetscCall(TSSetType(run->ts, SB_TS_SECOND_ORDER));
+
+  /* displacement error per step that adaptive runs allow, relative to the size of the bodies: unit-free */
   PetscCall(TSGetAdapt(run->ts, &adapt));
   PetscCall(TSAdaptSetType(adapt, TSADAPTNONE));
-  /* displacement error per step that adaptive runs allow, relative to the size of the bodies: unit-free */
   PetscCall(largest_body(m, &size));
   PetscCall(TSSetTolerances(run->ts, 1e-4 * size, NULL, 0., NULL));
   PetscCall(TSSetMaxSteps(run->ts, PETSC_MAX_INT));
   PetscCall(TSSetExactFinalTime(run->ts, TS_EXACTFINALTIME_MATCHSTEP));
   PetscCall(TSSetErrorIfStepFails(run->ts, PETSC_FALSE));
+
+  /* solvers; PETSc's own options go over all that is set so far */
   PetscCall(TSGetSNES(run->ts, &run->snes));
   PetscCall(set_up_snes(run));
   PetscCall(SbSolverSetUp(run->snes, m->space, run->solver_used));
@@ -389,6 +381,8 @@ static PetscErrorCode set_up_ts(SbRun run)
   PetscCall(SbSolverFinish(run->snes, m->space, run->solver_used, run->J));
   PetscCall(SbNewtonSetRun(run->snes, run));
   PetscCall(forcing_terms(run->snes));
+
+  /* the end and the length of steps; their monitors */
   PetscCall(TSSetMaxTime(run->ts, run->t_end));
   PetscCall(TSSetTimeStep(run->ts, run->dt));
   PetscCall(TSMonitorSet(run->ts, step_accepted, run, NULL));
@@ -444,25 +438,6 @@ static PetscErrorCode check_newmark(SbRun run)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* One solve per step, begun where the body flies to, with a tangent that may be softer than the forces: no bound on the energy (docs/reference/theory.md). */
-static PetscErrorCode warn_growth(SbRun run)
-{
-  const SbSpace s = run->model->space;
-  PetscBool single, warped = PETSC_FALSE;
-
-  PetscFunctionBeginUser;
-  if (!run->velocity_predictor || run->model->linear || !run->snes) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(PetscObjectTypeCompare((PetscObject)run->snes, SNESKSPONLY, &single));
-  for (PetscInt r = 0; r < s->nregion; r++)
-    warped = (PetscBool)(warped || s->region[r].material->tangent == SB_TANGENT_WARPED);
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &warped, 1, SB_MPI_BOOL, MPI_LOR, s->comm));
-  if (single && warped)
-    PetscCall(SbWarning(s->comm, "-snes_type ksponly with -time_predictor velocity and a warped tangent may "
-                                 "gain energy without bound: give -body_<name>_tangent exact_spd, or leave "
-                                 "the predictor out"));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* What contact needs: several solves in a step, and a matrix that can be projected. */
 static PetscErrorCode check_contact(SbRun run, PetscBool explicit)
 {
@@ -501,48 +476,14 @@ static PetscErrorCode check_contact(SbRun run, PetscBool explicit)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* How rows with multipliers are solved, and what is said of it. */
-static PetscErrorCode choose_saddle(SbRun run)
-{
-  const SbSpace s = run->model->space;
-  const size_t size = sizeof(run->solver_reason);
-  char reason[128];
-  size_t length;
-
-  PetscFunctionBeginUser;
-  if (!run->saddle) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(
-    SbSaddleChoose(s, run->model->dynamic, run->saddle_choice, &run->saddle_used, reason, sizeof(reason)));
-  PetscCall(PetscStrlen(run->solver_reason, &length));
-  PetscCall(PetscSNPrintf(run->solver_reason + length, size - length, "; %s", reason));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* The matrix, and what solves see of it when rows join nodes. */
-static PetscErrorCode create_operator(SbRun run)
-{
-  const SbModel m = run->model;
-
-  PetscFunctionBeginUser;
-  PetscCall(SbSolverCreateOperator(m->space, run->solver_used, &run->J));
-  if (m->space->constraints)
-    PetscCall(SbConstraintsCreateOperator(m->space, run->J, (PetscBool)!m->dynamic, run->saddle_used,
-                                          &run->operator));
-  else if (m->nnonsymmetric)
-    PetscCall(SbFormCreateOperator(run));
-  else {
-    PetscCall(PetscObjectReference((PetscObject)run->J));
-    run->operator= run->J;
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode SbRunSetUp(SbRun run)
 {
   SbModel m = run->model;
   PetscBool explicit =
     (PetscBool)(run->preset == SB_TIME_EULER_EXPLICIT || run->preset == SB_TIME_EULER_SYMPLECTIC);
-
+  const SbSpace s = m->space;
+  PetscBool single, warped = PETSC_FALSE;
+  char reason[128];
   PetscFunctionBeginUser;
   for (PetscInt r = 0; r < m->space->nregion; r++) {
     if (m->space->region[r].alpha != 0. || m->space->region[r].beta != 0.) run->damped = m->dynamic;
@@ -563,8 +504,28 @@ PetscErrorCode SbRunSetUp(SbRun run)
                            run->solver_reason, sizeof(run->solver_reason)));
   PetscCall(PetscStrncpy(run->solver, run->solver_used->name, sizeof(run->solver)));
   PetscCall(check_contact(run, explicit));
-  PetscCall(choose_saddle(run));
-  if (!explicit) PetscCall(create_operator(run));
+
+  /* how rows with multipliers are solved, and what is said of it */
+  if (run->saddle) {
+    PetscCall(
+      SbSaddleChoose(s, run->model->dynamic, run->saddle_choice, &run->saddle_used, reason, sizeof(reason)));
+    PetscCall(PetscStrlcat(run->solver_reason, "; ", sizeof(run->solver_reason)));
+    PetscCall(PetscStrlcat(run->solver_reason, reason, sizeof(run->solver_reason)));
+  }
+
+  /* the matrix, and what solves see of it when rows join nodes */
+  if (!explicit) {
+    PetscCall(SbSolverCreateOperator(m->space, run->solver_used, &run->J));
+    if (m->space->constraints)
+      PetscCall(SbConstraintsCreateOperator(m->space, run->J, (PetscBool)!m->dynamic, run->saddle_used,
+                                            &run->operator));
+    else if (m->nnonsymmetric)
+      PetscCall(SbFormCreateOperator(run));
+    else {
+      PetscCall(PetscObjectReference((PetscObject)run->J));
+      run->operator= run->J;
+    }
+  }
   PetscCheck(!run->solver_used->matrix_free || !m->ntangent, m->comm, PETSC_ERR_USER,
              "-solver %s works without a matrix, and the effect %s adds to it: use -solver rotated",
              run->solver, m->tangent[0]->name);
@@ -578,7 +539,19 @@ PetscErrorCode SbRunSetUp(SbRun run)
     PetscCall(SbSolverDescribe(run->snes, m->space, sizeof(run->solver_parts), run->solver_parts));
     if (!run->solver_used->help) PetscCall(PetscStrncpy(run->solver, run->solver_parts, sizeof(run->solver)));
   }
-  PetscCall(warn_growth(run));
+
+  /* one solve per step, begun where the body flies to, with a tangent that may be softer than the forces: no bound on the energy (docs/reference/theory.md) */
+  if (run->velocity_predictor && !run->model->linear && run->snes) {
+    PetscCall(PetscObjectTypeCompare((PetscObject)run->snes, SNESKSPONLY, &single));
+    for (PetscInt r = 0; r < s->nregion; r++)
+      warped = (PetscBool)(warped || s->region[r].material->tangent == SB_TANGENT_WARPED);
+    PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &warped, 1, SB_MPI_BOOL, MPI_LOR, s->comm));
+    if (single && warped)
+      PetscCall(SbWarning(s->comm,
+                          "-snes_type ksponly with -time_predictor velocity and a warped tangent may "
+                          "gain energy without bound: give -body_<name>_tangent exact_spd, or leave "
+                          "the predictor out"));
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -249,38 +249,6 @@ static PetscErrorCode step_explicitly(void *ctx, Vec X, SNESConvergedReason *rea
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A step that ends where points come into contact, and another one for the rest of it. */
-static void cut_at_arrival(TS ts, PetscReal *next)
-{
-  SecondOrder *so = (SecondOrder *)ts->data;
-
-  *next = so->run->time_of_impact * ts->time_step;
-  so->whole = ts->time_step;
-  so->rest = ts->time_step - *next;
-}
-
-/* The step that was cut was taken, or its rest was. */
-static void go_on_after_arrival(SecondOrder *so)
-{
-  if (so->rest > 0.)
-    so->rest = 0.;
-  else
-    so->whole = 0.;
-}
-
-/* Length that the next step should have: back towards the nominal one when four steps after a cut went well. */
-static PetscErrorCode wanted_step(TS ts, PetscReal *h)
-{
-  SecondOrder *so = (SecondOrder *)ts->data;
-  PetscBool fixed;
-
-  PetscFunctionBeginUser;
-  PetscCall(PetscObjectTypeCompare((PetscObject)ts->adapt, TSADAPTNONE, &fixed));
-  *h = fixed && so->good >= 3 ? PetscMin(2. * ts->time_step, so->nominal) : ts->time_step;
-  if (fixed && so->whole > 0.) *h = so->rest > 0. ? so->rest : so->whole;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 static PetscErrorCode TSStep_SecondOrder(TS ts)
 {
   SecondOrder *so = (SecondOrder *)ts->data;
@@ -296,12 +264,15 @@ static PetscErrorCode TSStep_SecondOrder(TS ts)
 
   PetscFunctionBeginUser;
   if (so->nominal == 0.) so->nominal = ts->time_step;
+
   /* a restarted run brings its acceleration along: that of generalized-alpha does not follow from the state */
   if (!so->started && so->run->step0 == 0 && so->set.method != SB_METHOD_EULER_IMPLICIT)
     PetscCall(SbFormAcceleration(so->run, ts->ptime, ts->vec_sol, ts->vec_dot, so->run->A));
   if (!so->started && so->own0)
     PetscCall(SbNewmarkOwn(so->run, ts->ptime, ts->vec_sol, ts->vec_dot, so->run->A, so->own0));
   so->started = PETSC_TRUE;
+
+  /* the state of the start, to which a step that is rejected returns */
   PetscCall(VecCopy(ts->vec_sol, so->X0));
   PetscCall(VecCopy(ts->vec_dot, so->V0));
   so->run->stage = so->Xa;
@@ -309,8 +280,10 @@ static PetscErrorCode TSStep_SecondOrder(TS ts)
   so->run->stage_part = so->set.alpha_f;
   for (;;) {
     PetscBool ok = PETSC_FALSE, accept = PETSC_FALSE;
-    PetscReal next, h = 0.;
+    PetscBool fixed;
+    PetscReal next, h;
 
+    /* an attempt */
     so->run->may_end_at_impact = (PetscBool)(so->run->model->ntime_of_impact && !cuts && so->whole == 0.);
     so->run->time_of_impact = 1.;
     attempt.t = ts->ptime;
@@ -319,7 +292,11 @@ static PetscErrorCode TSStep_SecondOrder(TS ts)
     if (ok) {
       PetscCall(VecCopy(so->X1, ts->vec_sol));
       PetscCall(VecCopy(so->V1, ts->vec_dot));
-      PetscCall(wanted_step(ts, &h));
+
+      /* back towards the nominal length when four steps after a cut went well */
+      PetscCall(PetscObjectTypeCompare((PetscObject)ts->adapt, TSADAPTNONE, &fixed));
+      h = fixed && so->good >= 3 ? PetscMin(2. * ts->time_step, so->nominal) : ts->time_step;
+      if (fixed && so->whole > 0.) h = so->rest > 0. ? so->rest : so->whole;
       PetscCall(TSAdaptChoose(ts->adapt, ts, h, NULL, &next, &accept));
       if (accept) {
         PetscCall(VecCopy(so->A1, so->run->A));
@@ -328,16 +305,25 @@ static PetscErrorCode TSStep_SecondOrder(TS ts)
         so->good = next > ts->time_step ? 0 : so->good + 1;
         ts->time_step = next;
         so->run->stop_reason[0] = 0;
-        go_on_after_arrival(so);
+
+        /* a step that was cut was taken, or its rest was */
+        if (so->rest > 0.)
+          so->rest = 0.;
+        else
+          so->whole = 0.;
         break;
       }
     } else if (!so->run->rejected_inverted && so->run->time_of_impact < 1.) {
-      cut_at_arrival(ts, &next);
+      /* the step ends where points come into contact, and another one takes the rest of it */
+      next = so->run->time_of_impact * ts->time_step;
+      so->whole = ts->time_step;
+      so->rest = ts->time_step - next;
       cuts--;
     } else {
       so->whole = so->rest = 0.;
       next = 0.5 * ts->time_step;
     }
+
     /* rejected: the state of the start comes back, and the step is tried with another length */
     PetscCall(VecCopy(so->X0, ts->vec_sol));
     PetscCall(VecCopy(so->V0, ts->vec_dot));

@@ -102,25 +102,6 @@ static PetscErrorCode may_replace(SbSolverList l, KSP ksp, Vec b, PetscBool *is)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The operator that `next` works on, in the place of the run's. */
-static PetscErrorCode replace_operator(SbRun run, const SbSolverPreset *next)
-{
-  SbSpace s = run->model->space;
-
-  PetscFunctionBeginUser;
-  PetscCall(MatDestroy(&run->J));
-  PetscCall(SbSolverCreateOperator(s, next, &run->J));
-  if (s->constraints)
-    PetscCall(SbConstraintsSetMatrix(s, run->J));
-  else if (!run->nonsymmetric.U) { /* that one multiplies by run->J, whichever it is */
-    PetscCall(MatDestroy(&run->operator));
-    PetscCall(PetscObjectReference((PetscObject)run->J));
-    run->operator= run->J;
-  }
-  PetscCall(SNESSetJacobian(run->snes, run->operator, run->J, NULL, NULL));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* Makes of the run's KSP the solver `next`, with the tangent of Newton's iterate. */
 static PetscErrorCode replace(SbSolverList l, KSP ksp, const SbSolverPreset *next)
 {
@@ -145,7 +126,22 @@ static PetscErrorCode replace(SbSolverList l, KSP ksp, const SbSolverPreset *nex
   PetscCall(KSPConvergedDefaultCreate(&test));
   PetscCall(KSPSetConvergenceTest(ksp, KSPConvergedDefault, test, KSPConvergedDefaultDestroy));
   PetscCall(KSPSetInitialGuessNonzero(ksp, PETSC_FALSE));
-  if (old->create || next->create || old->matrix != next->matrix) PetscCall(replace_operator(run, next));
+
+  /* the operator that `next` works on, in the place of the run's */
+  if (old->create || next->create || old->matrix != next->matrix) {
+    SbSpace s = run->model->space;
+
+    PetscCall(MatDestroy(&run->J));
+    PetscCall(SbSolverCreateOperator(s, next, &run->J));
+    if (s->constraints)
+      PetscCall(SbConstraintsSetMatrix(s, run->J));
+    else if (!run->nonsymmetric.U) { /* that one multiplies by run->J, whichever it is */
+      PetscCall(MatDestroy(&run->operator));
+      PetscCall(PetscObjectReference((PetscObject)run->J));
+      run->operator= run->J;
+    }
+    PetscCall(SNESSetJacobian(run->snes, run->operator, run->J, NULL, NULL));
+  }
   run->solver_used = next;
   PetscCall(PetscStrncpy(run->solver, next->name, sizeof(run->solver)));
   PetscCall(SbSolverSetUp(run->snes, run->model->space, next));

@@ -72,85 +72,40 @@ static PetscErrorCode look_for_free_body(SbRun run, PetscReal factor, PetscBool 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Why the solve failed. */
-static PetscErrorCode explain(SbRun run, PetscReal factor, SNESConvergedReason reason)
-{
-  PetscBool found = PETSC_FALSE;
-  char why[512] = "use more -static_steps";
-
-  PetscFunctionBeginUser;
-  PetscCall(look_for_free_body(run, factor, &found));
-  if (found) PetscFunctionReturn(PETSC_SUCCESS);
-  if (reason == SNES_DIVERGED_LINEAR_SOLVE) PetscCall(SbSolverListExplain(run, sizeof(why), why));
-  PetscCall(SbRunFail(run, "load factor %g: %s; %s", (double)factor, SNESConvergedReasons[reason], why));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Loads in balance leave a singular system with a solution, and a solver may find it with any rigid motion on top. */
-static PetscErrorCode refuse_free_body(SbRun run, PetscReal factor, PetscBool *ok)
-{
-  PetscBool found = PETSC_FALSE;
-
-  PetscFunctionBeginUser;
-  if (!*ok || run->steps_total || run->model->nbegin_step || !run->newton_step)
-    PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(look_for_free_body(run, factor, &found));
-  if (found) *ok = PETSC_FALSE;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 static PetscErrorCode complete(void *ctx, SNESConvergedReason reason, SbSolvedStep *step, PetscBool *ok)
 {
   const LoadStep *l = (LoadStep *)ctx;
-  PetscBool far;
+  PetscBool far, found = PETSC_FALSE;
 
   PetscFunctionBeginUser;
   *step = (SbSolvedStep){.t = l->factor - l->length, .dt = l->length, .U = l->X, .solved = PETSC_TRUE};
   PetscCall(SbRunTooFar(l->run, l->X, &far));
   *ok = (PetscBool)(reason > 0 && !far);
-  if (!*ok) PetscCall(explain(l->run, l->factor, reason));
-  PetscCall(refuse_free_body(l->run, l->factor, ok));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
 
-/* U <- X, and how many times as fast as in the first step displacements have grown with the load. */
-static PetscErrorCode take(SbRun run, PetscReal length, Vec X, PetscReal *first)
-{
-  PetscReal rate;
+  /* why the solve failed */
+  if (!*ok) {
+    char why[512] = "use more -static_steps";
 
-  PetscFunctionBeginUser;
-  PetscCall(VecAXPY(run->U, -1., X));
-  PetscCall(VecNorm(run->U, NORM_2, &rate));
-  rate /= length;
-  if (*first == 0.) *first = rate;
-  if (*first > 0. && run->newton_step) run->softening = rate / *first;
-  PetscCall(VecCopy(X, run->U));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
+    PetscCall(look_for_free_body(l->run, l->factor, &found));
+    if (!found) {
+      if (reason == SNES_DIVERGED_LINEAR_SOLVE) PetscCall(SbSolverListExplain(l->run, sizeof(why), why));
+      PetscCall(
+        SbRunFail(l->run, "load factor %g: %s; %s", (double)l->factor, SNESConvergedReasons[reason], why));
+    }
+  }
 
-/* Steps have become too short: how far the load has got, and what is likely in the way. */
-static PetscErrorCode explain_end(SbRun run, PetscReal factor, PetscReal length)
-{
-  char why[sizeof(run->stop_reason)];
-
-  PetscFunctionBeginUser;
-  PetscCall(PetscStrncpy(why, run->stop_reason, sizeof(why)));
-  if (run->softening > LIMIT)
-    PetscCall(
-      SbRunFail(run,
-                "the load factor reached %.7g of 1, and no equilibrium was found %.1e further on: a limit "
-                "load is likely, as displacements grow %.0f times as fast with the load as at first; "
-                "-static_control arc_length goes past it",
-                (double)factor, (double)(2. * length), (double)run->softening));
-  else if (factor > 0.)
-    PetscCall(SbRunFail(run, "the load factor reached %.7g of 1; %s", (double)factor, why));
+  /* loads in balance leave a singular system with a solution, and a solver may find it with any rigid motion on top */
+  if (*ok && !l->run->steps_total && !l->run->model->nbegin_step && l->run->newton_step) {
+    PetscCall(look_for_free_body(l->run, l->factor, &found));
+    if (found) *ok = PETSC_FALSE;
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode SbStaticSolve(SbRun run)
 {
   const PetscReal nominal = 1. / (PetscReal)run->static_steps, least = run->min_increment * nominal;
-  PetscReal factor = run->t0, length = nominal, rate = 0.;
+  PetscReal factor = run->t0, length = nominal, rate, first = 0.;
   PetscInt step = run->step0, cuts = 0;
   LoadStep load;
   SbAttempt attempt = {.U0 = run->U,
@@ -175,18 +130,42 @@ PetscErrorCode SbStaticSolve(SbRun run)
     attempt.t = factor;
     attempt.dt = next - factor;
     PetscCall(SbRunAttempt(run, &attempt, &ok));
+
+    /* a step that failed is halved, as far as that makes sense */
     if (!ok) {
+      char why[sizeof(run->stop_reason)];
+
       run->rejected_step++;
       run->rejected_total++;
       length *= 0.5;
       run->tangent_known = PETSC_FALSE;
       if (run->free_body) break;
       if (++cuts <= run->max_halvings && length >= least && !SbRunTooShort(run, length)) continue;
-      PetscCall(explain_end(run, factor, length));
+
+      /* steps have become too short: how far the load has got, and what is likely in the way */
+      PetscCall(PetscStrncpy(why, run->stop_reason, sizeof(why)));
+      if (run->softening > LIMIT)
+        PetscCall(SbRunFail(
+          run,
+          "the load factor reached %.7g of 1, and no equilibrium was found %.1e further on: a limit "
+          "load is likely, as displacements grow %.0f times as fast with the load as at first; "
+          "-static_control arc_length goes past it",
+          (double)factor, (double)(2. * length), (double)run->softening));
+      else if (factor > 0.)
+        PetscCall(SbRunFail(run, "the load factor reached %.7g of 1; %s", (double)factor, why));
       break;
     }
     run->stop_reason[0] = 0;
-    PetscCall(take(run, next - factor, X, &rate));
+
+    /* the new equilibrium, and how many times as fast as in the first step displacements grow with the load */
+    PetscCall(VecAXPY(run->U, -1., X));
+    PetscCall(VecNorm(run->U, NORM_2, &rate));
+    rate /= next - factor;
+    if (first == 0.) first = rate;
+    if (first > 0. && run->newton_step) run->softening = rate / first;
+    PetscCall(VecCopy(X, run->U));
+
+    /* who wants to go on with another mesh, effects and monitors */
     run->after.dt = next - factor;
     if (run->after.fn && next < 1.)
       PetscCall((*run->after.fn)(run, step + 1, next, next - factor, run->after.ctx, &run->paused));
@@ -194,6 +173,8 @@ PetscErrorCode SbStaticSolve(SbRun run)
     if (run->newton_step) cuts = 0;
     run->newton_step = run->linear_step = run->rejected_step = 0;
     if (run->paused) break;
+
+    /* and the next one may be longer again */
     factor = next;
     length = PetscMin(2. * length, nominal);
   }

@@ -54,42 +54,41 @@ PetscErrorCode SbRunAttempt(SbRun run, const SbAttempt *a, PetscBool *ok)
     if (*ok && run->post_solve.fn && solves < SB_LOOKS)
       PetscCall((*run->post_solve.fn)(run, &step, run->post_solve.ctx, &again));
   }
-  /* tets that it would turn inverted */
+
+  /* a step that turns tets inverted is refused where that was asked for */
   PetscCall(SbRunRejectInverted(run, a->t, a->dt, (Vec[2]){a->U0, a->U}, ok));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode accept_effects(SbRun run, PetscInt step, PetscReal t, PetscReal dt)
-{
-  SbModel m = run->model;
-  SbStage stage = {.t = t, .dt = dt, .step = step, .shift_k = 1.};
-
-  PetscFunctionBeginUser;
-  if (!m->naccept) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(SbSpaceGetLocalRead(m->space, run->U, &stage.u));
-  if (run->V) PetscCall(SbSpaceGetLocalRead(m->space, run->V, &stage.v));
-  for (PetscInt e = 0; e < m->naccept; e++) SbEffectCall(m->accept[e], accept, m->space, &stage);
-  if (run->V) PetscCall(SbSpaceRestoreLocalRead(m->space, run->V, &stage.v));
-  PetscCall(SbSpaceRestoreLocalRead(m->space, run->U, &stage.u));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode SbRunStepAccepted(SbRun run, PetscInt step, PetscReal t, PetscReal dt, PetscBool last)
 {
   const PetscBool first = (PetscBool)(step == run->step0);
+  const SbModel m = run->model;
+  SbStage stage = {.t = t, .dt = dt, .step = step, .shift_k = 1.};
   SbStep now = {
     .step = step, .t = t, .dt = dt, .t_end = run->t_end, .U = run->U, .V = run->V, .A = run->A, .last = last};
 
   PetscFunctionBeginUser;
+  /* effects keep their history */
   run->step_now = step;
   run->t_now = t;
-  if (!first) PetscCall(accept_effects(run, step, t, dt));
+  if (!first && m->naccept) {
+    PetscCall(SbSpaceGetLocalRead(m->space, run->U, &stage.u));
+    if (run->V) PetscCall(SbSpaceGetLocalRead(m->space, run->V, &stage.v));
+    for (PetscInt e = 0; e < m->naccept; e++) SbEffectCall(m->accept[e], accept, m->space, &stage);
+    if (run->V) PetscCall(SbSpaceRestoreLocalRead(m->space, run->V, &stage.v));
+    PetscCall(SbSpaceRestoreLocalRead(m->space, run->U, &stage.u));
+  }
+
+  /* the account of energies is closed */
   if (run->want_energies)
     PetscCall(SbRunAccount(run, t, dt, first));
   else if (run->want_residual) {
     if (!run->reaction) PetscCall(VecDuplicate(run->U, &run->reaction));
     PetscCall(SbRunReactions(run, t, run->reaction));
   }
+
+  /* monitors look at the state, what it cost, and how far it is to the end */
   now.R = run->reaction;
   now.energies = run->energies;
   now.step_end = run->fixed_step ? step + (PetscInt)PetscCeilReal((run->t_end - t) / run->dt - 1e-6) : -1;

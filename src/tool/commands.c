@@ -19,28 +19,13 @@ static PetscErrorCode read_mesh(SbTool *tool, SbImport **mesh)
   PetscFunctionReturn(ierr);
 }
 
-/* "out.h5: 1,234 vertices, 5,678 tets, 910 triangles in groups, 1.2 MB" */
-static PetscErrorCode tell_result(const SbTool *tool, const SbImport *mesh)
-{
-  static const char *const what[4] = {"points", "lines", "triangles", "tets"};
-  PetscInt nvert, n[4];
-  char number[32];
-
-  PetscFunctionBeginUser;
-  if (tool->quiet) PetscFunctionReturn(PETSC_SUCCESS);
-  SbMeshFileCount(mesh, &nvert, n);
-  PetscCall(PetscPrintf(PETSC_COMM_SELF, "%s: %s vertices", tool->out, SbToolNumber(nvert, number)));
-  for (int d = 3; d >= 0; d--)
-    if (n[d] || d == 3)
-      PetscCall(PetscPrintf(PETSC_COMM_SELF, ", %s %s", SbToolNumber(n[d], number), what[d]));
-  PetscCall(PetscPrintf(PETSC_COMM_SELF, "\n"));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode write_mesh(SbTool *tool, const SbImport *mesh)
+static PetscErrorCode write_mesh(SbTool *tool, SbImport *mesh)
 {
   char phase[PETSC_MAX_PATH_LEN + 16];
   PetscErrorCode ierr;
+  static const char *const what[4] = {"points", "lines", "triangles", "tets"};
+  PetscInt nvert, n[4];
+  char number[32];
 
   PetscFunctionBeginUser;
   (void)snprintf(phase, sizeof(phase), "writing %s", tool->out);
@@ -48,18 +33,20 @@ static PetscErrorCode write_mesh(SbTool *tool, const SbImport *mesh)
   ierr = SbMeshFileWrite(mesh, tool->out, tool->format);
   PetscCall(SbToolEnd(tool));
   PetscCall(ierr);
-  PetscCall(tell_result(tool, mesh));
+
+  /* "out.h5: 1,234 vertices, 5,678 tets, 910 triangles" */
+  if (!tool->quiet) {
+    SbMeshFileCount(mesh, &nvert, n);
+    PetscCall(PetscPrintf(PETSC_COMM_SELF, "%s: %s vertices", tool->out, SbToolNumber(nvert, number)));
+    for (int d = 3; d >= 0; d--)
+      if (n[d] || d == 3)
+        PetscCall(PetscPrintf(PETSC_COMM_SELF, ", %s %s", SbToolNumber(n[d], number), what[d]));
+    PetscCall(PetscPrintf(PETSC_COMM_SELF, "\n"));
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* ------------------------------------------------------------------ the commands */
-
-static PetscErrorCode convert(SbTool *tool, SbImport *mesh)
-{
-  PetscFunctionBeginUser;
-  PetscCall(write_mesh(tool, mesh));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
 
 /* Reading has filled the surface already. */
 static PetscErrorCode tet(SbTool *tool, SbImport *mesh)
@@ -128,7 +115,7 @@ static PetscErrorCode repair(SbTool *tool, SbImport *mesh)
 const SbToolCommand SbToolCommands[] = {
   {"info", "FILE", "what is in it: size, groups, shape of the tets, memory that a run will take", 1,
    SbToolInfo},
-  {"convert", "FILE OUT", "writes it in another format, groups and order kept", 2, convert},
+  {"convert", "FILE OUT", "writes it in another format, groups and order kept", 2, write_mesh},
   {"tet", "SURFACE OUT", "fills a closed surface (.stl, .obj, .off, .ply, ...) with tets of a -size", 2, tet},
   {"repair", "FILE OUT", "drops, turns and welds what keeps a mesh from being simulated; says what it did", 2,
    repair},

@@ -18,22 +18,6 @@ static PetscErrorCode print(const char *format, ...)
 
 /* ------------------------------------------------------------------ parts of the report */
 
-static PetscErrorCode counts(const SbTool *tool, const SbImport *mesh)
-{
-  PetscInt nvert, n[4];
-  char number[32];
-
-  PetscFunctionBeginUser;
-  SbMeshFileCount(mesh, &nvert, n);
-  PetscCall(print("%s\n", tool->in));
-  PetscCall(print("  %-26s %12s\n", "vertices", SbToolNumber(nvert, number)));
-  PetscCall(print("  %-26s %12s\n", "tets", SbToolNumber(n[3], number)));
-  if (n[2]) PetscCall(print("  %-26s %12s\n", "triangles of groups", SbToolNumber(n[2], number)));
-  if (n[1]) PetscCall(print("  %-26s %12s\n", "lines of groups", SbToolNumber(n[1], number)));
-  if (n[0]) PetscCall(print("  %-26s %12s\n", "points of groups", SbToolNumber(n[0], number)));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 static PetscErrorCode groups(const SbImport *mesh)
 {
   static const char *const title[4] = {"points", "curves", "surfaces", "regions"};
@@ -148,9 +132,17 @@ PetscErrorCode SbToolInfo(SbTool *tool, SbImport *mesh)
 {
   SbMeshFacts facts;
   PetscErrorCode ierr;
+  PetscInt nvert, n[4];
+  char number[32];
 
   PetscFunctionBeginUser;
-  PetscCall(counts(tool, mesh));
+  SbMeshFileCount(mesh, &nvert, n);
+  PetscCall(print("%s\n", tool->in));
+  PetscCall(print("  %-26s %12s\n", "vertices", SbToolNumber(nvert, number)));
+  PetscCall(print("  %-26s %12s\n", "tets", SbToolNumber(n[3], number)));
+  if (n[2]) PetscCall(print("  %-26s %12s\n", "triangles of groups", SbToolNumber(n[2], number)));
+  if (n[1]) PetscCall(print("  %-26s %12s\n", "lines of groups", SbToolNumber(n[1], number)));
+  if (n[0]) PetscCall(print("  %-26s %12s\n", "points of groups", SbToolNumber(n[0], number)));
   PetscCall(groups(mesh));
   (void)fflush(stdout);
   PetscCall(SbToolBegin(tool, "measuring"));

@@ -221,35 +221,28 @@ static PetscErrorCode check_words(const SbToolLine *line, const SbToolCommand **
 
 /* ------------------------------------------------------------------ values */
 
-/* How a surface becomes tets. */
-static PetscErrorCode read_tet(const SbScope *scope, SbTetOptions *o)
-{
-  PetscInt backend, surface;
-
-  PetscFunctionBeginUser;
-  PetscCall(SbTetDefaults(o));
-  PetscCall(SbOptionReal(scope, "size", &o->size));
-  PetscCall(SbOptionChoice(scope, "surface", &surface));
-  PetscCall(SbOptionReal(scope, "angle", &o->angle));
-  PetscCall(SbOptionChoice(scope, "tetrahedralizer", &backend));
-  PetscCall(SbOptionReal(scope, "seconds", &o->seconds));
-  PetscCall(SbOptionReal(scope, "untangle", &o->untangle));
-  PetscCall(SbOptionReal(scope, "merge_tolerance", &o->merge_tolerance));
-  o->backend = (SbTetBackend)backend; /* in the order of the rows */
-  o->surface = (SbTetSurface)surface;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 static PetscErrorCode read_options(SbTool *tool)
 {
   SbScope scope;
   PetscInt format;
+  PetscInt backend, surface;
 
   PetscFunctionBeginUser;
   PetscCall(SbScopeSet(&scope, "", "", ""));
   tool->merge_tolerance = -1;
   PetscCall(SbOptionReal(&scope, "merge_tolerance", &tool->merge_tolerance));
-  PetscCall(read_tet(&scope, &tool->body.tet));
+
+  /* how a surface becomes tets */
+  PetscCall(SbTetDefaults(&tool->body.tet));
+  PetscCall(SbOptionReal(&scope, "size", &tool->body.tet.size));
+  PetscCall(SbOptionChoice(&scope, "surface", &surface));
+  PetscCall(SbOptionReal(&scope, "angle", &tool->body.tet.angle));
+  PetscCall(SbOptionChoice(&scope, "tetrahedralizer", &backend));
+  PetscCall(SbOptionReal(&scope, "seconds", &tool->body.tet.seconds));
+  PetscCall(SbOptionReal(&scope, "untangle", &tool->body.tet.untangle));
+  PetscCall(SbOptionReal(&scope, "merge_tolerance", &tool->body.tet.merge_tolerance));
+  tool->body.tet.backend = (SbTetBackend)backend; /* in the order of the rows */
+  tool->body.tet.surface = (SbTetSurface)surface;
   PetscCall(SbOptionInt(&scope, "levels", &tool->levels));
   PetscCall(SbOptionChoice(&scope, "format", &format));
   tool->format = (SbMeshFormat)format; /* in the order of the row */

@@ -54,25 +54,17 @@ static PetscErrorCode draw(const char *render, const char *file, const char *pic
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode check_picture(const char *name)
-{
-  const char *dot = strrchr(name, '.');
-
-  PetscFunctionBeginUser;
-  PetscCheck(dot && !strcmp(dot, ".png"), PETSC_COMM_SELF, PETSC_ERR_USER,
-             "-view %s: give a name that ends in .png", name);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode SbToolView(SbTool *tool, const SbImport *mesh)
 {
   const char *tmp = getenv("TMPDIR"), *name = tool->out ? tool->out : tool->in;
   char render[2 * PETSC_MAX_PATH_LEN], folder[PETSC_MAX_PATH_LEN], file[PETSC_MAX_PATH_LEN + 16],
     index[PETSC_MAX_PATH_LEN + 16];
   PetscErrorCode ierr;
+  const char *dot = strrchr(tool->view, '.');
 
   PetscFunctionBeginUser;
-  PetscCall(check_picture(tool->view));
+  PetscCheck(dot && !strcmp(dot, ".png"), PETSC_COMM_SELF, PETSC_ERR_USER,
+             "-view %s: give a name that ends in .png", tool->view);
   PetscCall(find_render(sizeof(render), render));
   (void)snprintf(folder, sizeof(folder), "%s/supple-mesh-XXXXXX", tmp && tmp[0] ? tmp : "/tmp");
   PetscCheck(mkdtemp(folder), PETSC_COMM_SELF, PETSC_ERR_FILE_WRITE, "cannot make a folder %s: %s", folder,
