@@ -124,8 +124,8 @@ PetscErrorCode SbNearestNames(const char *word, PetscInt n, const char *const na
   MPI_Init() and before PetscInitialize().
 */
 PetscErrorCode SbErrorHandlerInstall(void);
-PetscErrorCode SbErrorRegister(void);
-PetscErrorCode SbErrorSetFromOptions(void); /* reads -error_trace */
+void SbErrorSetTrace(
+  PetscBool trace); /* the stack of calls with every error, also with errors of the input */
 /* The name that begins error lines and warnings, "supple" without this call; a literal. */
 void SbErrorSetProgram(const char *name);
 /* The option file that PETSc is about to read: PETSc's messages about YAML do not name it. */

@@ -77,7 +77,7 @@ static PetscErrorCode supple(int argc, char *argv[])
   PetscCall(PetscOptionsHasName(NULL, NULL, "-options_left", &left));
   if (!left) PetscCall(PetscOptionsSetValue(NULL, "-options_left", "no")); /* SbOptionsUnused() says it */
   PetscCall(SbRegisterAll());
-  PetscCall(SbErrorSetFromOptions());
+  PetscCall(SbCommandSetErrorTrace());
   for (PetscInt i = 0; i < command.nfile; i++) PetscCall(SbOptionsFile(PETSC_COMM_WORLD, command.file[i]));
 
   if (bare)

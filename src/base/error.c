@@ -27,11 +27,6 @@ static struct {
   void *farewell_ctx;
 } state = {.comm = MPI_COMM_NULL, .program = "supple"};
 
-static const SbOption rows[] = {
-  {"error_trace", SB_OPTION_BOOL, 1, "", "false", "",
-   "print the stack of calls with every error, also with errors of the input"},
-};
-
 /* PETSc's functions that read options; their messages do not always name the option. */
 static PetscBool of_options(const char *function)
 {
@@ -90,21 +85,9 @@ PetscErrorCode SbErrorHandlerInstall(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbErrorRegister(void)
+void SbErrorSetTrace(PetscBool trace)
 {
-  PetscFunctionBeginUser;
-  PetscCall(SbOptionsRegister("", "", PETSC_STATIC_ARRAY_LENGTH(rows), rows));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode SbErrorSetFromOptions(void)
-{
-  SbScope scope;
-
-  PetscFunctionBeginUser;
-  PetscCall(SbScopeSet(&scope, "", "", ""));
-  PetscCall(SbOptionBool(&scope, "error_trace", &state.trace));
-  PetscFunctionReturn(PETSC_SUCCESS);
+  state.trace = trace;
 }
 
 void SbErrorSetProgram(const char *name)

@@ -104,8 +104,7 @@ PetscErrorCode SbOptionManualName(const SbOptionBlock *block, const SbOption *ro
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The record of a full name, made when there is none yet. */
-static PetscErrorCode find_record(const SbScope *scope, const SbOption *row, SbOptionRecord **record)
+PetscErrorCode SbOptionFindRecord(const SbScope *scope, const SbOption *row, SbOptionRecord **record)
 {
   char name[SB_OPTION_NAME_MAX];
   SbOptionRecord *r;
@@ -130,27 +129,6 @@ static PetscErrorCode find_record(const SbScope *scope, const SbOption *row, SbO
   PetscCall(PetscStrncpy(r->name, name, sizeof(r->name)));
   r->scope = *scope;
   r->row = row;
-  *record = r;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode SbOptionText(const SbScope *scope, const char *key, const SbOptionRecord **record)
-{
-  const SbOption *row = SbOptionFind(scope, key);
-  SbOptionRecord *r = NULL;
-  const char *value = NULL;
-
-  PetscFunctionBeginUser;
-  PetscCheck(row, PETSC_COMM_SELF, PETSC_ERR_PLIB, "No row for key '%s' of class '%s', type '%s'", key,
-             scope->klass, scope->type);
-  PetscCall(find_record(scope, row, &r));
-  PetscCall(PetscOptionsFindPair(NULL, NULL, r->name, &value, &r->given));
-  if (r->given && !value && row->kind == SB_OPTION_BOOL) value = "true";
-  PetscCheck(!r->given || value, PETSC_COMM_SELF, PETSC_ERR_USER, "%s has no value: %s%s", r->name, row->help,
-             row->kind == SB_OPTION_FORMULA ? "; write -x as 0-x, or PETSc takes it for an option" : "");
-  if (!r->given && !row->preset) PetscCall(SbOptionMissing(r));
-  PetscCall(PetscFree(r->text));
-  PetscCall(PetscStrallocpy(r->given ? value : row->preset, &r->text));
   *record = r;
   PetscFunctionReturn(PETSC_SUCCESS);
 }

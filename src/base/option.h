@@ -43,8 +43,8 @@ extern SbOptionTable SbTheOptions; /* the registry of options */
 
 /* The row of a key in a scope; NULL when there is none. */
 const SbOption *SbOptionFind(const SbScope *scope, const char *key);
-/* The text of an option: the user's, or else the preset; recorded. Name, row and text are lent. */
-PetscErrorCode SbOptionText(const SbScope *scope, const char *key, const SbOptionRecord **record);
+/* The record of an option, by its full name; made when there is none yet. Lent. */
+PetscErrorCode SbOptionFindRecord(const SbScope *scope, const SbOption *row, SbOptionRecord **record);
 /* The error that a required option is missing; names the option of the user's that looks like a slip of it, if there is one. */
 PetscErrorCode SbOptionMissing(const SbOptionRecord *record);
 /* The database as it is now: every name and value. Free with SbOptionUsersFree(). */

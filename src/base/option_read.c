@@ -84,14 +84,28 @@ static PetscErrorCode check_range(const SbOptionRecord *r, PetscReal x)
 
 /* ------------------------------------------------------------------ readers */
 
-/* The record of an option whose row is of this kind. */
+/* The record of an option of this kind, with its text: the user's, or else the preset. */
 static PetscErrorCode text_of(const SbScope *scope, const char *key, SbOptionKind kind,
-                              const SbOptionRecord **r)
+                              const SbOptionRecord **record)
 {
+  const SbOption *row = SbOptionFind(scope, key);
+  SbOptionRecord *r = NULL;
+  const char *value = NULL;
+
   PetscFunctionBeginUser;
-  PetscCall(SbOptionText(scope, key, r));
-  PetscCheck((*r)->row->kind == kind, PETSC_COMM_SELF, PETSC_ERR_PLIB,
-             "Option %s has kind %d, asked for as %d", (*r)->name, (int)(*r)->row->kind, (int)kind);
+  PetscCheck(row, PETSC_COMM_SELF, PETSC_ERR_PLIB, "No row for key '%s' of class '%s', type '%s'", key,
+             scope->klass, scope->type);
+  PetscCall(SbOptionFindRecord(scope, row, &r));
+  PetscCheck(row->kind == kind, PETSC_COMM_SELF, PETSC_ERR_PLIB, "Option %s has kind %d, asked for as %d",
+             r->name, (int)row->kind, (int)kind);
+  PetscCall(PetscOptionsFindPair(NULL, NULL, r->name, &value, &r->given));
+  if (r->given && !value && row->kind == SB_OPTION_BOOL) value = "true";
+  PetscCheck(!r->given || value, PETSC_COMM_SELF, PETSC_ERR_USER, "%s has no value: %s%s", r->name, row->help,
+             row->kind == SB_OPTION_FORMULA ? "; write -x as 0-x, or PETSc takes it for an option" : "");
+  if (!r->given && !row->preset) PetscCall(SbOptionMissing(r));
+  PetscCall(PetscFree(r->text));
+  PetscCall(PetscStrallocpy(r->given ? value : row->preset, &r->text));
+  *record = r;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

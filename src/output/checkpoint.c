@@ -4,76 +4,18 @@
   Displacement, velocity and acceleration (the integrator's own) of all nodes in original order and double precision, the step, its time,
   the next step's length, works and losses so far, and what effects remember (checkpoint_effects.c). A file is written beside its place, flushed and renamed; the newest ones
   are kept. What makes it fit a run: a hash of the mesh (every coordinate and cell by its original number), and the text of
-  the options that decide the mechanics. A checksum over the three vectors detects a file that was damaged later. Both sums
-  are of mixed 64-bit words (the finaliser of splitmix64; Steele, Lea and Flood 2014), which do not depend on the order.
+  the options that decide the mechanics. A checksum over the three vectors detects a file that was damaged later (mesh.c says what both sums are of).
 */
-#include <ctype.h>
-#include <dirent.h>
 #include <errno.h>
-#include <sys/stat.h>
 #include <unistd.h>
 #include "output_impl.h"
 
 #define FORMAT 1
 
-static uint64_t mix(uint64_t x)
-{
-  x += 0x9e3779b97f4a7c15u;
-  x = (x ^ (x >> 30)) * 0xbf58476d1ce4e5b9u;
-  x = (x ^ (x >> 27)) * 0x94d049bb133111ebu;
-  return x ^ (x >> 31);
-}
-
-/* A number at a place. Zero has one sign here. */
-uint64_t SbMixReal(uint64_t place, PetscReal value)
-{
-  uint64_t bits;
-
-  value += 0.;
-  memcpy(&bits, &value, sizeof(bits));
-  return mix(place ^ mix(bits));
-}
-
 static PetscErrorCode sum_ranks(MPI_Comm comm, uint64_t mine, uint64_t *sum)
 {
   PetscFunctionBeginUser;
   PetscCallMPI(MPI_Allreduce(&mine, sum, 1, MPI_UINT64_T, MPI_SUM, comm));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode SbOutputOrder(SbRun run, SbOutput out)
-{
-  const SbMesh mesh = run->model->mesh;
-  const SbSpace space = run->model->space;
-  uint64_t sum = 0;
-
-  PetscFunctionBeginUser;
-  if (out->ordered) PetscFunctionReturn(PETSC_SUCCESS);
-  /* the places of vertices, cells and nodes in a file, whatever the partition */
-  PetscCall(SbOrderCreate(out->comm, mesh->Nvert, mesh->nvert_owned, mesh->vert_orig, &out->vertex));
-  PetscCall(SbOrderCreate(out->comm, mesh->Ncell, mesh->ncell_owned, mesh->cell_orig, &out->cell));
-  if (space->faces) {
-    PetscCall(SbOrderCreateSparse(out->comm, mesh->Nvert + 8 * mesh->Ncell, space->nnode_owned,
-                                  space->node_orig, &out->node));
-  } else {
-    PetscCall(SbOrderRepeat(&out->vertex, 1, &out->node));
-  }
-  if (out->discontinuous)
-    PetscCall(SbOrderRepeat(&out->cell, 4, &out->point));
-  else
-    PetscCall(SbOrderRepeat(&out->vertex, 1, &out->point));
-
-  /* the mesh in one number: a restart on another mesh is refused */
-  for (PetscInt i = 0; i < mesh->nvert_owned; i++) {
-    for (PetscInt c = 0; c < 3; c++)
-      sum += SbMixReal(3 * (uint64_t)mesh->vert_orig[i] + (uint64_t)c, mesh->x[3 * i + c]);
-  }
-  for (PetscInt k = 0; k < mesh->ncell_owned; k++) {
-    for (PetscInt a = 0; a < 4; a++)
-      sum += mix(mix((uint64_t)mesh->cell_orig[k]) ^ (uint64_t)mesh->vert_orig[mesh->cell[4 * k + a]]);
-  }
-  PetscCall(sum_ranks(mesh->comm, sum, &out->mesh_hash));
-  out->ordered = PETSC_TRUE;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -203,79 +145,6 @@ static PetscErrorCode write_numbers(SbRun run, SbOutput out, const SbStep *step,
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static int is_checkpoint(const struct dirent *entry)
-{
-  const char *digits = entry->d_name + strlen("checkpoint_");
-  size_t n = 0;
-
-  if (strncmp(entry->d_name, "checkpoint_", strlen("checkpoint_"))) return 0;
-  while (isdigit((unsigned char)digits[n])) n++;
-  return n > 0 && !strcmp(digits + n, ".h5");
-}
-
-static int by_number(const struct dirent **a, const struct dirent **b)
-{
-  const long p = strtol((*a)->d_name + strlen("checkpoint_"), NULL, 10),
-             q = strtol((*b)->d_name + strlen("checkpoint_"), NULL, 10);
-
-  return (p > q) - (p < q);
-}
-
-/* Names of the checkpoints in a folder, oldest first; free with free_names(). */
-static int list_checkpoints(const char *dir, struct dirent ***names)
-{
-  const int n = scandir(dir, names, is_checkpoint, by_number);
-
-  if (n < 0) *names = NULL;
-  return PetscMax(n, 0);
-}
-
-static void free_names(int n, struct dirent **names)
-{
-  for (int i = 0; i < n; i++) free(names[i]);
-  free(names);
-}
-
-/* Removes those of steps after `step`, and all but the newest `keep` of the others. Rank 0. */
-static PetscErrorCode prune(SbOutput out, PetscInt step, PetscInt keep)
-{
-  struct dirent **names;
-  const int n = list_checkpoints(out->dir, &names);
-  char path[PETSC_MAX_PATH_LEN];
-
-  PetscFunctionBeginUser;
-  for (int i = 0; i < n; i++) {
-    if (i >= n - keep && strtol(names[i]->d_name + strlen("checkpoint_"), NULL, 10) <= step) continue;
-    PetscCall(SbOutputPath(out, names[i]->d_name, sizeof(path), path));
-    (void)unlink(path);
-  }
-  free_names(n, names);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode SbCheckpointFiles(SbOutput out, SbFileFn fn, void *ctx)
-{
-  struct dirent **names;
-  const int n = list_checkpoints(out->dir, &names);
-  char path[PETSC_MAX_PATH_LEN];
-  struct stat info;
-
-  PetscFunctionBeginUser;
-  for (int i = 0; i < n; i++) {
-    PetscCall(SbOutputPath(out, names[i]->d_name, sizeof(path), path));
-    if (!stat(path, &info)) PetscCall(fn(names[i]->d_name, (PetscInt64)info.st_size, ctx));
-  }
-  free_names(n, names);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode SbCheckpointRemoveAfter(SbOutput out, PetscInt step)
-{
-  PetscFunctionBeginUser;
-  PetscCall(prune(out, step, PETSC_MAX_INT));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 static PetscErrorCode write_checkpoint(SbRun run, SbOutput out, const SbStep *step)
 {
   SbH5 h;
@@ -306,7 +175,7 @@ static PetscErrorCode write_checkpoint(SbRun run, SbOutput out, const SbStep *st
     if (rename(tmp, path))
       SbFormat(sizeof(message), message, "cannot rename %s to %s: %s", tmp, path, strerror(errno));
     else
-      PetscCall(prune(out, PETSC_MAX_INT, out->checkpoint_keep));
+      PetscCall(SbCheckpointPrune(out, PETSC_MAX_INT, out->checkpoint_keep));
   }
   PetscCall(SbAgree(out->comm, PETSC_ERR_FILE_WRITE, message));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -487,29 +356,6 @@ static PetscErrorCode load(SbRun run, SbOutput out, const char *path, PetscBool 
   run->after.dt = paused;
   run->step0 = (PetscInt)step;
   run->t0 = t;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode SbCheckpointFind(SbOutput out, const char *file, int k, size_t size, char path[])
-{
-  PetscFunctionBeginUser;
-  if (strcmp(file, "latest"))
-    PetscCall(PetscStrncpy(path, file, size));
-  else {
-    /* the k-th newest of the folder, which rank 0 knows; empty when there is none */
-    char name[SB_FILE_MAX] = "";
-
-    if (!out->rank) {
-      struct dirent **names;
-      const int n = list_checkpoints(out->dir, &names);
-
-      if (k < n) (void)snprintf(name, sizeof(name), "%.63s", names[n - 1 - k]->d_name);
-      free_names(n, names);
-    }
-    PetscCallMPI(MPI_Bcast(name, (PetscMPIInt)sizeof(name), MPI_CHAR, 0, out->comm));
-    path[0] = 0;
-    if (name[0]) PetscCall(SbOutputPath(out, name, size, path));
-  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -1,15 +1,8 @@
 /*
-  What a run leaves behind: options, the folder, and which monitors are attached.
-
-  The folder is made and tried before anything is computed. What an earlier run left there under our names is replaced only
-  when the model is set up and the run is about to start; files with other names are never touched.
+  What a run leaves behind: options, the complete scenario, and which monitors are attached.
 */
-#include <errno.h>
-#include <fcntl.h>
 #include <signal.h>
-#include <sys/stat.h>
 #include <time.h>
-#include <unistd.h>
 #include "output_impl.h"
 
 static const SbOption rows[] = {
@@ -57,14 +50,6 @@ PetscErrorCode SbOutputRegister(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbOutputPath(SbOutput out, const char *name, size_t size, char path[])
-{
-  PetscFunctionBeginUser;
-  PetscCheck((size_t)snprintf(path, size, "%s/%s", out->dir, name) < size, PETSC_COMM_SELF, PETSC_ERR_USER,
-             "-output_dir %s is too long", out->dir);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode SbOutputFile(SbRun run, const char *name, size_t size, char path[], PetscBool *quiet)
 {
   const SbOutput out = (SbOutput)run->output;
@@ -73,14 +58,6 @@ PetscErrorCode SbOutputFile(SbRun run, const char *name, size_t size, char path[
   *quiet = out->quiet;
   PetscCall(SbOutputPath(out, name, size, path));
   PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscBool SbOutputDue(PetscReal every, PetscReal t, PetscReal dt)
-{
-  // A step that ends at the multiple but for rounding counts as having reached it. A load factor may come back.
-  const PetscReal ahead = 1e-6 * PetscAbsReal(dt);
-
-  return (PetscBool)(PetscFloorReal((t + ahead) / every) != PetscFloorReal((t - dt + ahead) / every));
 }
 
 /* ------------------------------------------------------------------ options */
@@ -196,76 +173,6 @@ static PetscErrorCode read_options(SbOutput out, PetscBool dynamic)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* ------------------------------------------------------------------ the folder */
-
-/* Makes the folder with its parents and tries to write into it. Rank 0. */
-static PetscErrorCode make_folder(SbOutput out, size_t nmessage, char message[])
-{
-  char part[PETSC_MAX_PATH_LEN], probe[PETSC_MAX_PATH_LEN];
-  int fd, error = 0;
-
-  PetscFunctionBeginUser;
-  PetscCall(SbOutputPath(out, ".supple_tries_to_write", sizeof(probe), probe));
-  for (size_t i = 1; i <= strlen(out->dir) && !error; i++) {
-    if (out->dir[i] != '/' && out->dir[i]) continue;
-    PetscCall(PetscStrncpy(part, out->dir, i + 1));
-    if (mkdir(part, 0777) && errno != EEXIST && errno != EISDIR && access(part, F_OK)) error = errno;
-  }
-  if (!error) {
-    fd = open(probe, O_WRONLY | O_CREAT | O_TRUNC, 0666);
-    error = fd < 0 ? errno : 0;
-    if (fd >= 0) (void)close(fd);
-    (void)unlink(probe);
-  }
-  if (error) {
-    SbFormat(nmessage, message, "-output_dir %s cannot be written: %s; give another folder", out->dir,
-             strerror(error));
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static const char *const ours[] = {"fields.h5",     "fields.xmf", "contacts.xmf", "history.csv",
-                                   "scenario.opts", "run.json",   "ledger.csv"};
-
-/* Removes what an earlier run left under our names, and says so. Rank 0. */
-static PetscErrorCode clear_folder(SbOutput out, PetscInt step0)
-{
-  static const char *const leftovers[] = {"fields.xmf.tmp",    "contacts.xmf.tmp", "history.csv.tmp",
-                                          "scenario.opts.tmp", "run.json.tmp",     "checkpoint.tmp"};
-  char path[PETSC_MAX_PATH_LEN];
-  PetscBool found = PETSC_FALSE;
-
-  PetscFunctionBeginUser;
-  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(leftovers); i++) {
-    PetscCall(SbOutputPath(out, leftovers[i], sizeof(path), path));
-    (void)unlink(path);
-  }
-  // Checkpoints of what is computed again would be the latest ones.
-  PetscCall(SbCheckpointRemoveAfter(out, out->restarted ? step0 : -1));
-  if (out->restarted) PetscFunctionReturn(PETSC_SUCCESS);
-  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(ours); i++) {
-    PetscCall(SbOutputPath(out, ours[i], sizeof(path), path));
-    if (!unlink(path)) found = PETSC_TRUE;
-  }
-  if (found && !out->quiet)
-    PetscCall(PetscPrintf(PETSC_COMM_SELF, "%s: results of an earlier run are replaced\n", out->dir));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode SbOutputFiles(SbOutput out, SbFileFn fn, void *ctx)
-{
-  char path[PETSC_MAX_PATH_LEN];
-  struct stat info;
-
-  PetscFunctionBeginUser;
-  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(ours); i++) {
-    PetscCall(SbOutputPath(out, ours[i], sizeof(path), path));
-    if (!stat(path, &info)) PetscCall(fn(ours[i], (PetscInt64)info.st_size, ctx));
-  }
-  PetscCall(SbCheckpointFiles(out, fn, ctx));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* ------------------------------------------------------------------ scenario.opts */
 
 /* Of the complete scenario, the lines that decide the mechanics: what a checkpoint must agree with. */
@@ -356,22 +263,10 @@ PetscErrorCode SbOutputSetFromOptions(SbRun run)
   PetscCall(read_options(out, run->model->dynamic));
   // A limit on the size of files is met as a failed write, with its message, not as a signal.
   (void)signal(SIGXFSZ, SIG_IGN);
-  if (!out->rank) PetscCall(make_folder(out, sizeof(message), message));
+  if (!out->rank) PetscCall(SbFolderMake(out, sizeof(message), message));
   PetscCall(SbAgree(out->comm, PETSC_ERR_FILE_OPEN, message));
   // The closing table needs the log events.
   PetscCall(PetscLogDefaultBegin());
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode SbOutputCountNodes(SbSpace space, SbOutput out)
-{
-  PetscMPIInt n;
-
-  PetscFunctionBeginUser;
-  PetscCall(PetscCalloc1(space->mesh->nbody, &out->body_nodes));
-  for (PetscInt i = 0; i < space->nnode_owned; i++) out->body_nodes[space->node_body[i]]++;
-  PetscCall(PetscMPIIntCast(space->mesh->nbody, &n));
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, out->body_nodes, n, MPIU_INT, MPI_SUM, out->comm));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -401,7 +296,7 @@ PetscErrorCode SbOutputAttach(SbRun run)
   PetscCall(view_scenario(run, out, &scenario, &size));
   if (out->restart[0]) PetscCall(SbCheckpointLoad(run, out->restart));
   if (out->restart[0]) PetscCall(SbFramesCheck(run, out));
-  if (!out->rank) PetscCall(clear_folder(out, run->step0));
+  if (!out->rank) PetscCall(SbFolderClear(out, run->step0));
 
   /* the complete scenario, and what runs, beside the results */
   piece.text = scenario;
@@ -419,6 +314,28 @@ PetscErrorCode SbOutputAttach(SbRun run)
   PetscCall(SbHistoryAttach(run, out));
   PetscCall(SbCheckpointAttach(run, out));
   PetscCall(SbProgressAttach(run, out));
+  PetscCall(PetscLogEventEnd(SbEvents[SB_EVENT_OUTPUT], 0, 0, 0, 0));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The row and the frame of the step are there already, on the old mesh; the next ones are on the new one. */
+PetscErrorCode SbOutputReattach(SbRun from, SbRun to)
+{
+  SbOutput out = (SbOutput)from->output;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_OUTPUT], 0, 0, 0, 0));
+  to->output = out;
+  to->output_destroy = from->output_destroy;
+  from->output = NULL;
+  from->output_destroy = NULL;
+  PetscCall(SbOutputForgetMesh(out));
+  PetscCall(SbOutputCountNodes(to->model->space, out));
+  PetscCall(SbOutputOrder(to, out));
+  PetscCall(SbFramesReattach(to, out));
+  PetscCall(SbHistoryReattach(to, out));
+  PetscCall(SbCheckpointAttach(to, out));
+  PetscCall(SbProgressReattach(to, out));
   PetscCall(PetscLogEventEnd(SbEvents[SB_EVENT_OUTPUT], 0, 0, 0, 0));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -173,6 +173,10 @@ struct _p_SbOutput {
   SbRemeshed *remeshed; /* [nremeshed] for run.json */
 };
 
+/* folder.c: the folder with its parents is made, and tried by writing into it; why it cannot be is in message. Rank 0. */
+PetscErrorCode SbFolderMake(SbOutput out, size_t nmessage, char message[]);
+/* Removes what an earlier run left under our names, after a restart only checkpoints of later steps; says so. Rank 0. */
+PetscErrorCode SbFolderClear(SbOutput out, PetscInt step0);
 /* Path of a file of the run's folder. */
 PetscErrorCode SbOutputPath(SbOutput out, const char *name, size_t size, char path[]);
 /* Whether a multiple of `every` lies in (t - dt, t]. */
@@ -181,7 +185,7 @@ PetscBool SbOutputDue(PetscReal every, PetscReal t, PetscReal dt);
 PetscInt SbOutputMeshStep(SbRun run);
 /* Original orders and the mesh's hash; made once. Collective. */
 PetscErrorCode SbOutputOrder(SbRun run, SbOutput out);
-/* reattach.c: frees what belongs to the mesh: orders, points, cell quantities, counts. */
+/* Frees what belongs to the mesh: orders, points, cell quantities, counts. */
 PetscErrorCode SbOutputForgetMesh(SbOutput out);
 PetscErrorCode SbOutputCountNodes(SbSpace space, SbOutput out); /* collective */
 
@@ -256,9 +260,9 @@ PetscErrorCode SbCheckpointMeshBytes(SbRun run, PetscInt64 *bytes);
 /* Path of the checkpoint that -restart names; of `latest` the k-th newest one, "" when there is none. Collective. */
 PetscErrorCode SbCheckpointFind(SbOutput out, const char *file, int k, size_t size, char path[]);
 PetscErrorCode SbCheckpointAttach(SbRun run, SbOutput out);
-PetscErrorCode SbCheckpointRemoveAfter(SbOutput out, PetscInt step); /* rank 0 */
+/* Removes those of steps after `step`, and all but the newest `keep` of the others. Rank 0. */
+PetscErrorCode SbCheckpointPrune(SbOutput out, PetscInt step, PetscInt keep);
 typedef PetscErrorCode (*SbFileFn)(const char *name, PetscInt64 bytes, void *ctx);
-PetscErrorCode SbCheckpointFiles(SbOutput out, SbFileFn fn, void *ctx);
 PetscErrorCode SbProgressAttach(SbRun run, SbOutput out);
 PetscErrorCode SbProgressReattach(SbRun run, SbOutput out);
 PetscErrorCode SbProgressEnd(SbOutput out); /* ends a line that is being rewritten */

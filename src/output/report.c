@@ -8,16 +8,6 @@
 #define WIDTH 79
 #define INDENT 11
 
-PetscErrorCode SbPresetName(SbRun run, size_t size, char name[])
-{
-  const char *word = SbTimePresets;
-
-  PetscFunctionBeginUser;
-  for (int i = 0; i < (int)run->preset; i++) word = strchr(word, '|') + 1;
-  (void)snprintf(name, size, "%.*s", (int)strcspn(word, "|"), word);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* "title      words ..." with the words wrapped at WIDTH and indented. */
 static PetscErrorCode entry(const char *title, const char *format, ...)
 {
@@ -182,6 +172,30 @@ PetscErrorCode SbReportHeader(SbRun run)
     PetscCall(entry("solver", "%s: %s", run->solver, run->solver_reason));
   PetscCall(print_output(out));
   (void)fflush(PETSC_STDOUT);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbReportRemeshed(SbRun run, const SbRemeshed *told)
+{
+  SbOutput out = (SbOutput)run->output;
+  const PetscReal change = told->energy[1] - told->energy[0];
+
+  PetscFunctionBeginUser;
+  if (!out) PetscFunctionReturn(PETSC_SUCCESS);
+  if (out->nremeshed == out->remeshed_size) {
+    out->remeshed_size = PetscMax(8, 2 * out->remeshed_size);
+    PetscCall(PetscRealloc((size_t)out->remeshed_size * sizeof(*told), &out->remeshed));
+  }
+  out->remeshed[out->nremeshed++] = *told;
+  if (out->quiet) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(SbProgressEnd(out));
+  PetscCall(
+    PetscPrintf(out->comm,
+                "body '%s' is re-meshed after step %" PetscInt_FMT ", t = %g%s: worst quality %.3g -> %.3g, "
+                "%" PetscInt_FMT " -> %" PetscInt_FMT " tets, energy %+.3g J (%+.2g %%)\n",
+                told->body, told->step, (double)told->t, run->model->dynamic ? " s" : "",
+                (double)told->quality[0], (double)told->quality[1], told->tets[0], told->tets[1],
+                (double)change, (double)(told->energy[0] > 0. ? 100. * change / told->energy[0] : 0.)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

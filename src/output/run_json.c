@@ -7,6 +7,16 @@
 #include "output_impl.h"
 #include "sbsolver.h"
 
+PetscErrorCode SbPresetName(SbRun run, size_t size, char name[])
+{
+  const char *word = SbTimePresets;
+
+  PetscFunctionBeginUser;
+  for (int i = 0; i < (int)run->preset; i++) word = strchr(word, '|') + 1;
+  (void)snprintf(name, size, "%.*s", (int)strcspn(word, "|"), word);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* A JSON string with its quotes. */
 static void put_string(FILE *f, const char *text)
 {

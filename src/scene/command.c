@@ -10,6 +10,8 @@
 #include "scene_impl.h"
 
 static const SbOption rows[] = {
+  {"error_trace", SB_OPTION_BOOL, 1, "", "false", "",
+   "print the stack of calls with every error, also with errors of the input"},
   {"help", SB_OPTION_BOOL, 1, "", "false", "",
    "how to run it and the topics, or the options of a topic, and nothing else; -help all: every option; "
    "-help petsc runs and lists PETSc's own"},
@@ -27,6 +29,18 @@ PetscErrorCode SbCommandRegister(void)
 {
   PetscFunctionBeginUser;
   PetscCall(SbOptionsRegister("", "", PETSC_STATIC_ARRAY_LENGTH(rows), rows));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbCommandSetErrorTrace(void)
+{
+  SbScope scope;
+  PetscBool trace;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbScopeSet(&scope, "", "", ""));
+  PetscCall(SbOptionBool(&scope, "error_trace", &trace));
+  SbErrorSetTrace(trace);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -21,7 +21,6 @@ PetscErrorCode SbRegisterAll(void)
   PetscCall(SbOutputRegister());
   PetscCall(SbLedgerRegister());
   PetscCall(SbRemeshRegister());
-  PetscCall(SbErrorRegister());
   PetscCall(SbCommandRegister());
 
   PetscCall(SbElementRegisterAll());

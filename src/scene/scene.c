@@ -1,14 +1,7 @@
 /*
   scene.c - from options to a model: bodies with material and element, effects, sets. Nothing is computed here.
-
-  Names of bodies, sets and effects become parts of option names: -body_<name>_young. PETSc does not tell upper from lower
-  case there, so neither may names. It also takes `-body_young` for a missing `-body_1_young`; a part of a name that is
-  only digits would silently read another one's options and is refused.
 */
-#include <ctype.h>
 #include "scene_impl.h"
-
-#define NAME_LENGTH 31 /* PETSc holds 63 characters of an option's name in YAML files */
 
 static const SbOption run_rows[] = {
   {"bodies", SB_OPTION_NAMES, 1, "", NULL, "", "names of the bodies, with commas between them"},
@@ -54,66 +47,6 @@ PetscErrorCode SbSceneRegister(void)
   PetscCall(SbOptionsRegister("inclusion", "", PETSC_STATIC_ARRAY_LENGTH(inclusion_rows), inclusion_rows));
   PetscCall(SbOptionsRegister("", "", PETSC_STATIC_ARRAY_LENGTH(run_rows), run_rows));
   PetscCall(SbOptionsRegister("body", "", PETSC_STATIC_ARRAY_LENGTH(body_rows), body_rows));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* ------------------------------------------------------------------ names */
-
-/* What is wrong with a name; NULL when nothing is. */
-static const char *name_problem(const char *name)
-{
-  PetscBool only_digits = PETSC_FALSE;
-
-  if (strlen(name) > NAME_LENGTH) return "is longer than 31 characters";
-  if (!isalpha((unsigned char)name[0])) return "does not begin with a letter";
-  for (const char *c = name; *c; c++)
-    if (!isalnum((unsigned char)*c) && *c != '_') return "may hold letters, digits and underscores only";
-  for (const char *c = name; *c; c++) {
-    if (*c == '_') {
-      if (!c[1] || c[1] == '_') return "has an underscore without a word after it";
-      only_digits = PETSC_TRUE;
-    } else if (!isdigit((unsigned char)*c))
-      only_digits = PETSC_FALSE;
-    if (only_digits && *c != '_' && (c[1] == '_' || !c[1]))
-      return "has a part of digits only; leave out the underscore before it";
-  }
-  if (!strcasecmp(name, "all") || !strcasecmp(name, "boundary"))
-    return "has a meaning of its own where sets are named";
-  return NULL;
-}
-
-/* The first thing that is wrong with a list of names; "" when nothing is. */
-static PetscErrorCode names_problem(const char *what, PetscInt n, char (*names)[SB_NAME_MAX], size_t size,
-                                    char text[])
-{
-  PetscFunctionBeginUser;
-  text[0] = 0;
-  for (PetscInt i = 0; i < n && !text[0]; i++) {
-    const char *problem = name_problem(names[i]);
-
-    if (problem) PetscCall(PetscSNPrintf(text, size, "the name '%s' %s", names[i], problem));
-    for (PetscInt j = 0; j < i && !text[0]; j++) {
-      const char *hint = strcmp(names[i], names[j]) ? " (upper and lower case count as one)" : "";
-
-      if (strcasecmp(names[i], names[j])) continue;
-      PetscCall(PetscSNPrintf(text, size, "two are named '%s'%s; every %s needs a name of its own", names[i],
-                              hint, what));
-    }
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode SbSceneReadNames(const char *key, const char *what, PetscInt *n, char (**names)[SB_NAME_MAX])
-{
-  SbScope scope;
-  char problem[4 * SB_NAME_MAX];
-
-  PetscFunctionBeginUser;
-  PetscCall(SbScopeSet(&scope, "", "", ""));
-  PetscCall(SbOptionNames(&scope, key, n, names));
-  PetscCall(names_problem(what, *n, *names, sizeof(problem), problem));
-  if (problem[0]) PetscCall(PetscFree(*names));
-  PetscCheck(!problem[0], PETSC_COMM_SELF, PETSC_ERR_USER, "-%s: %s", key, problem);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -43,9 +43,3 @@ PetscErrorCode SbRunRejectInverted(SbRun run, PetscReal t, PetscReal dt, const V
     n[1] - n[0], n[1] - n[0] == 1 ? "" : "s", (double)least[1], (double)least[0]));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
-
-PetscBool SbRunTooShort(SbRun run, PetscReal dt)
-{
-  return (PetscBool)(run->rejected_inverted &&
-                     dt < 0.999 * PetscPowReal(0.5, (PetscReal)run->max_halvings) * run->dt);
-}

@@ -4,20 +4,7 @@
     attempt: effects move, a first guess, Newton's method with the loop of contact around it, who examines solutions, what is refused
     accepted: effects keep their history, the account of energies is closed (account.c), monitors look
 */
-#include <stdarg.h>
 #include "time_impl.h"
-
-PetscErrorCode SbRunFail(SbRun run, const char *format, ...)
-{
-  va_list args;
-
-  PetscFunctionBeginUser;
-  va_start(args, format);
-  PetscCall(PetscVSNPrintf(run->stop_reason, sizeof(run->stop_reason), format, NULL, args));
-  va_end(args);
-  PetscCall(PetscInfo(NULL, "%s\n", run->stop_reason));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
 
 PetscErrorCode SbRunStepBegin(SbRun run, PetscReal t, PetscReal dt)
 {

@@ -52,7 +52,11 @@ PetscErrorCode SbRunStepAccepted(SbRun run, PetscInt step, PetscReal t, PetscRea
 #define SB_SNES_NEWTON "newton"
 PetscErrorCode SbNewtonRegister(void);
 PetscErrorCode SbNewtonSetRun(SNES snes, SbRun run);
+
+/* stop.c: the reason that a run gives when it ends early. */
 PetscErrorCode SbRunFail(SbRun run, const char *format, ...) __attribute__((format(printf, 2, 3)));
+/* Whether the last step was refused by inverted.c, and one of this length is not worth trying. */
+PetscBool SbRunTooShort(SbRun run, PetscReal dt);
 
 /*
   inverted.c, after a step from t to t + dt was solved. Collective; nothing happens without -time_inverted reject.
@@ -60,8 +64,6 @@ PetscErrorCode SbRunFail(SbRun run, const char *format, ...) __attribute__((form
   U: displacements at its start and at its end. ok: false when the step inverted tets; run->refused and run->stop_reason say so, too.
 */
 PetscErrorCode SbRunRejectInverted(SbRun run, PetscReal t, PetscReal dt, const Vec U[2], PetscBool *ok);
-/* Whether the last step was refused, and one of this length is not worth trying. */
-PetscBool SbRunTooShort(SbRun run, PetscReal dt);
 
 /* form.c: the model as PETSc sees it. */
 PetscErrorCode SbFormI2Function(TS ts, PetscReal t, Vec U, Vec V, Vec A, Vec F, void *run);

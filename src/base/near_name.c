@@ -1,0 +1,54 @@
+/*
+  near_name.c - which of some names a misspelt one may mean.
+
+  Distance between words: optimal string alignment (Levenshtein's distance, an exchange of neighbours counts as one edit;
+  Damerau, Communications of the ACM 7, 1964). Case does not count, as in PETSc.
+*/
+#include <ctype.h>
+#include "option.h"
+
+#define WORD_MAX SB_OPTION_NAME_MAX
+
+static PetscInt edit_distance(const char *a, const char *b)
+{
+  PetscInt row[3][WORD_MAX + 1];
+  const size_t na = PetscMin(strlen(a), WORD_MAX), nb = PetscMin(strlen(b), WORD_MAX);
+
+  for (size_t j = 0; j <= nb; j++) row[0][j] = (PetscInt)j;
+  for (size_t i = 1; i <= na; i++) {
+    PetscInt *now = row[i % 3], *before = row[(i + 2) % 3], *older = row[(i + 1) % 3];
+
+    now[0] = (PetscInt)i;
+    for (size_t j = 1; j <= nb; j++) {
+      const int same = tolower((unsigned char)a[i - 1]) == tolower((unsigned char)b[j - 1]);
+
+      now[j] = PetscMin(PetscMin(before[j], now[j - 1]) + 1, before[j - 1] + !same);
+      if (i > 1 && j > 1 && a[i - 1] == b[j - 2] && a[i - 2] == b[j - 1])
+        now[j] = PetscMin(now[j], older[j - 2] + 1);
+    }
+  }
+  return row[na % 3][nb];
+}
+
+PetscErrorCode SbNearestNames(const char *word, PetscInt n, const char *const names[], size_t size,
+                              char text[])
+{
+  const PetscInt farthest = strlen(word) < 6 ? 1 : 2; /* edits that still look like a slip */
+  PetscInt best = farthest + 1, nbest = 0;
+
+  PetscFunctionBeginUser;
+  text[0] = 0;
+  for (PetscInt i = 0; i < n; i++)
+    if (names[i]) best = PetscMin(best, edit_distance(word, names[i]));
+  if (best > farthest) PetscFunctionReturn(PETSC_SUCCESS);
+  for (PetscInt i = 0; i < n && nbest < 3; i++) {
+    PetscBool again = PETSC_FALSE;
+
+    if (!names[i] || edit_distance(word, names[i]) != best) continue;
+    for (PetscInt j = 0; j < i && !again; j++) again = (PetscBool)(names[j] && !strcmp(names[i], names[j]));
+    if (again) continue;
+    if (nbest++) PetscCall(PetscStrlcat(text, " or ", size));
+    PetscCall(PetscStrlcat(text, names[i], size));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

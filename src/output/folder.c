@@ -1,0 +1,185 @@
+/*
+  The folder of the results: made and tried before anything is computed; what an earlier run left there under our names is removed when the run is about to start, and
+  files with other names are never touched. Checkpoints are found by the number in their names.
+*/
+#include <ctype.h>
+#include <dirent.h>
+#include <errno.h>
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+#include "output_impl.h"
+
+static const char *const ours[] = {"fields.h5",     "fields.xmf", "contacts.xmf", "history.csv",
+                                   "scenario.opts", "run.json",   "ledger.csv"};
+
+PetscErrorCode SbOutputPath(SbOutput out, const char *name, size_t size, char path[])
+{
+  PetscFunctionBeginUser;
+  PetscCheck((size_t)snprintf(path, size, "%s/%s", out->dir, name) < size, PETSC_COMM_SELF, PETSC_ERR_USER,
+             "-output_dir %s is too long", out->dir);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscBool SbOutputDue(PetscReal every, PetscReal t, PetscReal dt)
+{
+  // A step that ends at the multiple but for rounding counts as having reached it. A load factor may come back.
+  const PetscReal ahead = 1e-6 * PetscAbsReal(dt);
+
+  return (PetscBool)(PetscFloorReal((t + ahead) / every) != PetscFloorReal((t - dt + ahead) / every));
+}
+
+PetscErrorCode SbFolderMake(SbOutput out, size_t nmessage, char message[])
+{
+  char part[PETSC_MAX_PATH_LEN], probe[PETSC_MAX_PATH_LEN];
+  int fd, error = 0;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbOutputPath(out, ".supple_tries_to_write", sizeof(probe), probe));
+  for (size_t i = 1; i <= strlen(out->dir) && !error; i++) {
+    if (out->dir[i] != '/' && out->dir[i]) continue;
+    PetscCall(PetscStrncpy(part, out->dir, i + 1));
+    if (mkdir(part, 0777) && errno != EEXIST && errno != EISDIR && access(part, F_OK)) error = errno;
+  }
+  if (!error) {
+    fd = open(probe, O_WRONLY | O_CREAT | O_TRUNC, 0666);
+    error = fd < 0 ? errno : 0;
+    if (fd >= 0) (void)close(fd);
+    (void)unlink(probe);
+  }
+  if (error) {
+    SbFormat(nmessage, message, "-output_dir %s cannot be written: %s; give another folder", out->dir,
+             strerror(error));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ checkpoints in it */
+
+static int is_checkpoint(const struct dirent *entry)
+{
+  const char *digits = entry->d_name + strlen("checkpoint_");
+  size_t n = 0;
+
+  if (strncmp(entry->d_name, "checkpoint_", strlen("checkpoint_"))) return 0;
+  while (isdigit((unsigned char)digits[n])) n++;
+  return n > 0 && !strcmp(digits + n, ".h5");
+}
+
+static int by_number(const struct dirent **a, const struct dirent **b)
+{
+  const long p = strtol((*a)->d_name + strlen("checkpoint_"), NULL, 10),
+             q = strtol((*b)->d_name + strlen("checkpoint_"), NULL, 10);
+
+  return (p > q) - (p < q);
+}
+
+/* Names of the checkpoints in a folder, oldest first; free with free_names(). */
+static int list_checkpoints(const char *dir, struct dirent ***names)
+{
+  const int n = scandir(dir, names, is_checkpoint, by_number);
+
+  if (n < 0) *names = NULL;
+  return PetscMax(n, 0);
+}
+
+static void free_names(int n, struct dirent **names)
+{
+  for (int i = 0; i < n; i++) free(names[i]);
+  free(names);
+}
+
+PetscErrorCode SbCheckpointPrune(SbOutput out, PetscInt step, PetscInt keep)
+{
+  struct dirent **names;
+  const int n = list_checkpoints(out->dir, &names);
+  char path[PETSC_MAX_PATH_LEN];
+
+  PetscFunctionBeginUser;
+  for (int i = 0; i < n; i++) {
+    if (i >= n - keep && strtol(names[i]->d_name + strlen("checkpoint_"), NULL, 10) <= step) continue;
+    PetscCall(SbOutputPath(out, names[i]->d_name, sizeof(path), path));
+    (void)unlink(path);
+  }
+  free_names(n, names);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode checkpoint_files(SbOutput out, SbFileFn fn, void *ctx)
+{
+  struct dirent **names;
+  const int n = list_checkpoints(out->dir, &names);
+  char path[PETSC_MAX_PATH_LEN];
+  struct stat info;
+
+  PetscFunctionBeginUser;
+  for (int i = 0; i < n; i++) {
+    PetscCall(SbOutputPath(out, names[i]->d_name, sizeof(path), path));
+    if (!stat(path, &info)) PetscCall(fn(names[i]->d_name, (PetscInt64)info.st_size, ctx));
+  }
+  free_names(n, names);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbCheckpointFind(SbOutput out, const char *file, int k, size_t size, char path[])
+{
+  PetscFunctionBeginUser;
+  if (strcmp(file, "latest"))
+    PetscCall(PetscStrncpy(path, file, size));
+  else {
+    /* the k-th newest of the folder, which rank 0 knows; empty when there is none */
+    char name[SB_FILE_MAX] = "";
+
+    if (!out->rank) {
+      struct dirent **names;
+      const int n = list_checkpoints(out->dir, &names);
+
+      if (k < n) (void)snprintf(name, sizeof(name), "%.63s", names[n - 1 - k]->d_name);
+      free_names(n, names);
+    }
+    PetscCallMPI(MPI_Bcast(name, (PetscMPIInt)sizeof(name), MPI_CHAR, 0, out->comm));
+    path[0] = 0;
+    if (name[0]) PetscCall(SbOutputPath(out, name, size, path));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ all of it */
+
+PetscErrorCode SbFolderClear(SbOutput out, PetscInt step0)
+{
+  static const char *const leftovers[] = {"fields.xmf.tmp",    "contacts.xmf.tmp", "history.csv.tmp",
+                                          "scenario.opts.tmp", "run.json.tmp",     "checkpoint.tmp"};
+  char path[PETSC_MAX_PATH_LEN];
+  PetscBool found = PETSC_FALSE;
+
+  PetscFunctionBeginUser;
+  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(leftovers); i++) {
+    PetscCall(SbOutputPath(out, leftovers[i], sizeof(path), path));
+    (void)unlink(path);
+  }
+  // Checkpoints of what is computed again would be the latest ones.
+  PetscCall(SbCheckpointPrune(out, out->restarted ? step0 : -1, PETSC_MAX_INT));
+  if (out->restarted) PetscFunctionReturn(PETSC_SUCCESS);
+  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(ours); i++) {
+    PetscCall(SbOutputPath(out, ours[i], sizeof(path), path));
+    if (!unlink(path)) found = PETSC_TRUE;
+  }
+  if (found && !out->quiet)
+    PetscCall(PetscPrintf(PETSC_COMM_SELF, "%s: results of an earlier run are replaced\n", out->dir));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbOutputFiles(SbOutput out, SbFileFn fn, void *ctx)
+{
+  char path[PETSC_MAX_PATH_LEN];
+  struct stat info;
+
+  PetscFunctionBeginUser;
+  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(ours); i++) {
+    PetscCall(SbOutputPath(out, ours[i], sizeof(path), path));
+    if (!stat(path, &info)) PetscCall(fn(ours[i], (PetscInt64)info.st_size, ctx));
+  }
+  PetscCall(checkpoint_files(out, fn, ctx));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
