@@ -23,9 +23,10 @@ typedef struct {
   Collective; rank 0 reads and checks, every rank gets all of it.
 
   Input: option - for messages; path; scale > 0; at, m.
+  What is mended is told by a warning: vertices that differ by rounding, doubled, flat and turned triangles, a surface inside out; triangles with material on
+  both sides, of solids within each other or side by side, are left out.
   Errors: PETSC_ERR_FILE_*, PETSC_ERR_USER_INPUT, alike on all ranks, one line with option, file, line or triangle (numbered as in the
-  file) and what to do: unreadable; open; more than two triangles at an edge; turned to opposite sides; flat, doubled; no volume; a
-  part within another that is no cavity. A surface that is inside out as a whole is turned, with a warning.
+  file) and what to do: unreadable; open; more than two triangles at an edge; no volume.
 */
 PetscErrorCode SbTrianglesRead(MPI_Comm comm, const char *option, const char *path, PetscReal scale,
                                const PetscReal at[3], SbTriangles *triangles);

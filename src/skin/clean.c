@@ -343,7 +343,7 @@ static PetscErrorCode refuse_open(const SbTriangleFile *f, PetscInt n, const Pet
   char option[SB_OPTION_NAME_MAX], what[256] = "close the holes (meshlab: close holes; blender: fill)";
 
   PetscFunctionBeginUser;
-  if (need > 0)
+  if (need > 0 && f->groups)
     (void)snprintf(what, sizeof(what),
                    "every open edge has a partner within %.3g m: %s %.2g joins them, if that is "
                    "rounding and not shape",

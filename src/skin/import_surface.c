@@ -76,6 +76,7 @@ static PetscErrorCode write_mended(const SbTriangles *t, const SbMended *m, size
     {m->nturned, "triangles turned to the side of their neighbours"},
     {m->ncavity, "cavities"},
     {m->nidle, "triangles without material on a side left out"},
+    {m->ninner, "triangles within the obstacle left out"},
   };
   char one[160];
 
@@ -176,6 +177,82 @@ static PetscErrorCode make_surface(const char *path, const SbImport *im, SbTrian
   PetscCall(SbSkinClose(f, &mended));
   PetscCall(SbSkinCross(f, im->tet.untangle >= 0 ? im->tet.untangle : 0.5 * edge, &mended));
   PetscCall(SbSkinRegions(f, &mended, s));
+  PetscCall(write_mended(f->t, &mended, size, note));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Triangles with material on one side, turned to it, and who is whose neighbour. */
+static PetscErrorCode take_boundary(const SbTriangleFile *f, const SbSkin *s, PetscInt *nwall)
+{
+  SbTriangles *t = f->t;
+  SbTriangleEdge *edge;
+  PetscReal longest2, around;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscArraycpy(t->x, s->x, 3 * (size_t)s->nvert));
+  t->nvert = s->nvert;
+  t->ntri = 0;
+  t->volume = t->edge = 0;
+  for (PetscInt i = 0; i < s->ntri; i++) {
+    const PetscBool front = (PetscBool)(s->side[2 * i] >= 0), back = (PetscBool)(s->side[2 * i + 1] >= 0);
+    PetscInt *v = t->tri + 3 * t->ntri;
+
+    if (front == back) {
+      (*nwall)++;
+      continue;
+    }
+    for (int k = 0; k < 3; k++) v[k] = s->tri[3 * i + (front ? 2 - k : k)];
+    f->number[t->ntri++] = s->number[i];
+  }
+  PetscCall(SbTrianglesDropUnused(t));
+  for (PetscInt i = 0; i < t->ntri; i++) {
+    t->volume += SbTriangleCone(t, i, t->x);
+    (void)SbTriangleMeasure(t, i, &longest2, &around);
+    t->edge += around / (3 * (PetscReal)t->ntri);
+  }
+  PetscCall(PetscMalloc1(3 * (size_t)t->ntri, &t->across));
+  PetscCall(PetscMalloc1(3 * (size_t)t->ntri, &edge));
+  PetscCall(SbTrianglesEdges(t, edge));
+  for (PetscInt i = 0; i < 3 * t->ntri; i += 2) {
+    const PetscInt n = SbTrianglesAtEdge(3 * t->ntri, edge, i), a = edge[i].slot;
+    const PetscReal *p = t->x + 3 * t->tri[a], *q = t->x + 3 * t->tri[a % 3 == 2 ? a - 2 : a + 1];
+
+    if (n != 2) {
+      PetscCall(PetscFree(edge));
+      SETERRQ(PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
+              "%s: %lld triangles meet at the edge from (%.6g, %.6g, %.6g) to (%.6g, %.6g, %.6g) m, triangle "
+              "%lld among them; an edge of an obstacle has two, take parts that touch apart",
+              f->where, (long long)n, (double)p[0], (double)p[1], (double)p[2], (double)q[0], (double)q[1],
+              (double)q[2], (long long)f->number[a / 3]);
+    }
+    t->across[a] = edge[i + 1].slot / 3;
+    t->across[edge[i + 1].slot] = a / 3;
+  }
+  PetscCall(PetscFree(edge));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbSkinObstacle(SbTriangleFile *f, size_t size, char note[])
+{
+  SbMended mended;
+  SbSkin s;
+  PetscReal tolerance, edge;
+  PetscErrorCode ierr;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscMemzero(&mended, sizeof(mended)));
+  PetscCall(PetscMemzero(&s, sizeof(s)));
+  PetscCall(weld_tolerance(f, -1, &tolerance, &edge));
+  PetscCall(SbSkinWeld(f, tolerance, &mended));
+  PetscCheck(f->t->ntri, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
+             "%s: no triangle is left when vertices within %g m are one; check the file", f->where,
+             (double)tolerance);
+  PetscCall(SbSkinClose(f, &mended));
+  ierr = SbSkinRegions(f, &mended, &s);
+  if (!ierr) ierr = take_boundary(f, &s, &mended.ninner);
+  PetscCall(SbSkinDestroy(&s));
+  PetscCall(ierr);
+  mended.ncavity = 0; /* nothing was changed for them */
   PetscCall(write_mended(f->t, &mended, size, note));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

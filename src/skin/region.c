@@ -570,7 +570,7 @@ static PetscErrorCode find_regions(Space *s, SbSkin *out)
   PetscCheck(n, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
              "%s: no region is left beside its holes; remove one of them", s->f->where);
   PetscCall(fill_surface(s, n, out));
-  PetscCall(name_regions(s, out));
+  if (s->f->groups) PetscCall(name_regions(s, out));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

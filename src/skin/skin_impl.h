@@ -28,6 +28,7 @@ typedef struct {
   PetscInt npairs, nuntangled; /* triangles that cut each other, and vertices moved to part them */
   PetscReal untangled;         /* by how much */
   PetscInt nidle;              /* triangles with nothing on both sides, left out */
+  PetscInt ninner;             /* triangles of an obstacle with material on both sides, left out */
 } SbMended;
 
 /* Joins vertices no farther apart than the tolerance; leaves out what collapses, doubles and unused vertices. */

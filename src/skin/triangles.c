@@ -169,7 +169,8 @@ static PetscErrorCode place(PetscReal scale, const PetscReal at[3], SbTriangleFi
 }
 
 /* On rank 0. */
-static PetscErrorCode read_file(const char *path, PetscReal scale, const PetscReal at[3], SbTriangleFile *f)
+static PetscErrorCode read_file(const char *path, PetscReal scale, const PetscReal at[3], SbTriangleFile *f,
+                                size_t size, char note[])
 {
   const char *dot = strrchr(path, '.');
 
@@ -182,7 +183,7 @@ static PetscErrorCode read_file(const char *path, PetscReal scale, const PetscRe
                f->where);
     PetscCall(SbTrianglesDropUnused(f->t));
     PetscCall(place(scale, at, f));
-    PetscCall(SbTrianglesCheck(f));
+    PetscCall(SbSkinObstacle(f, size, note));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   SETERRQ(PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
@@ -192,7 +193,7 @@ static PetscErrorCode read_file(const char *path, PetscReal scale, const PetscRe
 
 /* Rank 0 reads; all ranks fail together. */
 static PetscErrorCode read_first(MPI_Comm comm, const char *where, const char *path, PetscReal scale,
-                                 const PetscReal at[3], SbTriangles *t)
+                                 const PetscReal at[3], SbTriangles *t, size_t size, char note[])
 {
   SbCaught caught = {0, ""};
   PetscMPIInt rank;
@@ -204,7 +205,7 @@ static PetscErrorCode read_first(MPI_Comm comm, const char *where, const char *p
     PetscErrorCode ierr;
 
     PetscCall(PetscPushErrorHandler(SbCatchError, &caught));
-    ierr = read_file(path, scale, at, &file);
+    ierr = read_file(path, scale, at, &file, size, note);
     PetscCall(PetscPopErrorHandler());
     PetscCall(PetscFree(file.number));
     if (ierr) PetscCall(SbTrianglesDestroy(t));
@@ -218,14 +219,14 @@ static PetscErrorCode read_first(MPI_Comm comm, const char *where, const char *p
 PetscErrorCode SbTrianglesRead(MPI_Comm comm, const char *option, const char *path, PetscReal scale,
                                const PetscReal at[3], SbTriangles *t)
 {
-  char where[PETSC_MAX_PATH_LEN + 3 * SB_NAME_MAX];
+  char where[PETSC_MAX_PATH_LEN + 3 * SB_NAME_MAX], note[512] = ""; /* of rank 0, as warnings are */
   SbTriangles head;
   PetscMPIInt rank, n[2];
 
   PetscFunctionBeginUser;
   PetscCall(PetscMemzero(t, sizeof(*t)));
   (void)snprintf(where, sizeof(where), "%s: %s", option, path);
-  PetscCall(read_first(comm, where, path, scale, at, t));
+  PetscCall(read_first(comm, where, path, scale, at, t, sizeof(note), note));
   PetscCallMPI(MPI_Comm_rank(comm, &rank));
   head = *t;
   PetscCallMPI(MPI_Bcast(&head, (int)sizeof(head), MPI_BYTE, 0, comm));
@@ -242,7 +243,7 @@ PetscErrorCode SbTrianglesRead(MPI_Comm comm, const char *option, const char *pa
   PetscCallMPI(MPI_Bcast(t->x, n[0], MPIU_REAL, 0, comm));
   PetscCallMPI(MPI_Bcast(t->tri, n[1], MPIU_INT, 0, comm));
   PetscCallMPI(MPI_Bcast(t->across, n[1], MPIU_INT, 0, comm));
-  if (t->turned) PetscCall(SbWarning(comm, "%s: is inside out as a whole: it is taken turned", where));
+  if (note[0]) PetscCall(SbWarning(comm, "%s: %s", where, note));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

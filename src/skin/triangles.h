@@ -63,13 +63,15 @@ typedef PetscErrorCode (*SbTriangleReader)(const char *path, SbTriangleFile *fil
 SbTriangleReader SbTrianglesReader(const char *path);
 
 /*
-  SbTrianglesCheck - closed, of one orientation, around a volume; fills neighbours, volume and mean edge, turns what is inside out.
+  SbSkinObstacle - a surface that was read and placed becomes the boundary of all its material: mended and checked as that of a body, but that triangles
+  may cut each other far from their edges; triangles with material on both sides are left out.
 
-  Not collective. Errors: PETSC_ERR_USER_INPUT, one line that names the triangle and what to do.
+  Not collective. Output: file->t with neighbours, volume and mean edge; note - what was mended, "" when nothing.
+  Errors: PETSC_ERR_USER_INPUT, one line that names the triangle and what to do.
 */
-PetscErrorCode SbTrianglesCheck(SbTriangleFile *file);
+PetscErrorCode SbSkinObstacle(SbTriangleFile *file, size_t size, char note[]);
 
-/* ------------------------------------------------------------------ triangles_check.c: what other checks use too */
+/* ------------------------------------------------------------------ triangles_measure.c */
 
 typedef struct {
   uint64_t key;  /* lower and higher vertex */

@@ -1,0 +1,90 @@
+/*
+  triangles_measure.c - triangles and edges of a surface: areas, volumes, solid angles (van Oosterom and Strackee 1983), which triangles meet at an
+  edge.
+*/
+#include <stdlib.h>
+#include "sbkernel.h"
+#include "triangles.h"
+
+static const PetscReal *corner(const SbTriangles *t, PetscInt f, int k)
+{
+  return t->x + 3 * t->tri[3 * f + k];
+}
+
+static void difference(const PetscReal a[3], const PetscReal b[3], PetscReal c[3])
+{
+  for (int i = 0; i < 3; i++) c[i] = a[i] - b[i];
+}
+
+PetscReal SbTriangleMeasure(const SbTriangles *t, PetscInt f, PetscReal *longest2, PetscReal *around)
+{
+  PetscReal e[3][3], n[3];
+
+  *longest2 = *around = 0;
+  for (int k = 0; k < 3; k++) {
+    PetscReal l2;
+
+    difference(corner(t, f, (k + 1) % 3), corner(t, f, k), e[k]);
+    l2 = SbDot3(e[k], e[k]);
+    *longest2 = PetscMax(*longest2, l2);
+    *around += PetscSqrtReal(l2);
+  }
+  SbCross(e[0], e[1], n);
+  return PetscSqrtReal(SbDot3(n, n));
+}
+
+/* ------------------------------------------------------------------ edges */
+
+static int compare_edges(const void *a, const void *b)
+{
+  const SbTriangleEdge *p = (const SbTriangleEdge *)a, *q = (const SbTriangleEdge *)b;
+
+  if (p->key != q->key) return p->key < q->key ? -1 : 1;
+  return (p->slot > q->slot) - (p->slot < q->slot);
+}
+
+PetscErrorCode SbTrianglesEdges(const SbTriangles *t, SbTriangleEdge edge[])
+{
+  const PetscInt n = 3 * t->ntri;
+
+  PetscFunctionBeginUser;
+  for (PetscInt i = 0; i < n; i++) {
+    const PetscInt a = t->tri[i], b = t->tri[i % 3 == 2 ? i - 2 : i + 1];
+
+    edge[i].key = (uint64_t)PetscMin(a, b) << 32 | (uint64_t)PetscMax(a, b);
+    edge[i].slot = i;
+  }
+  if (n) qsort(edge, (size_t)n, sizeof(*edge), compare_edges);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscInt SbTrianglesAtEdge(PetscInt n, const SbTriangleEdge edge[], PetscInt i)
+{
+  PetscInt m = 1;
+
+  for (; i + m < n && edge[i + m].key == edge[i].key;) m++;
+  return m;
+}
+
+PetscReal SbTriangleCone(const SbTriangles *t, PetscInt f, const PetscReal o[3])
+{
+  PetscReal a[3][3], n[3];
+
+  for (int k = 0; k < 3; k++) difference(corner(t, f, k), o, a[k]);
+  SbCross(a[0], a[1], n);
+  return SbDot3(n, a[2]) / 6;
+}
+
+PetscReal SbTriangleAngle(const SbTriangles *t, PetscInt f, const PetscReal o[3])
+{
+  PetscReal a[3][3], l[3], n[3], down;
+
+  for (int k = 0; k < 3; k++) {
+    difference(corner(t, f, k), o, a[k]);
+    l[k] = PetscSqrtReal(SbDot3(a[k], a[k]));
+  }
+  SbCross(a[0], a[1], n);
+  down =
+    l[0] * l[1] * l[2] + SbDot3(a[0], a[1]) * l[2] + SbDot3(a[1], a[2]) * l[0] + SbDot3(a[2], a[0]) * l[1];
+  return 2 * atan2(SbDot3(n, a[2]), down);
+}
