@@ -116,7 +116,7 @@ demo: deps ## install what is missing, build, run scenarios/demo.opts on 2 ranks
 	@scripts/render out/demo --animate out/demo/animation.gif
 	@echo "open out/demo/fields.xmf in ParaView; out/demo/picture.png and animation.gif show the run"
 
-pictures: deps ## run the scenarios of contact on 1 rank and draw them: docs/*.png and out/*/animation.gif (1 to 2 minutes)
+pictures: deps ## run the scenarios of contact on 1 rank and draw them: docs/pictures/*.png and out/*/animation.gif (1 to 2 minutes)
 	$(AGAIN) bin/supple meshes/lobe.msh meshes/hook.msh
 	@scripts/venv
 	@scripts/pictures
@@ -137,7 +137,7 @@ check-hard: deps ## every hard case on 1, 2 and 3 ranks, ten jittered runs each,
 	$(AGAIN) $(BUILD)/tests/hard/hard
 	@tests/run --build $(BUILD) --group hard --all $(if $(T),--match '$(T)'); status=$$?; scripts/stability --build $(BUILD); exit $$status
 
-stability: check-hard ## the same, with the table written into docs/stability.md
+stability: check-hard ## the same, with the table written into docs/reports/stability.md
 	@scripts/stability --build $(BUILD) --write
 
 lint: ## format, layers of the include lines, clang-tidy, shellcheck, Python syntax
@@ -173,21 +173,24 @@ bench: deps ## speed, kept as CSV below tests/perf/results; QUICK=1 measures les
 	$(AGAIN) bin/supple bin/supple-mesh tests
 	@scripts/bench --build $(BUILD) $(if $(QUICK),--quick)
 
-locking: deps ## how P1, CR and DG behave near nu = 1/2, measured into docs/locking.md with its plots (about 10 minutes)
+locking: deps ## how P1, CR and DG behave near nu = 1/2, measured into docs/reports/locking.md with its plots (about 10 minutes)
 	$(AGAIN) $(BUILD)/tests/perf/locking
 	@scripts/locking --build $(BUILD)
 
-solvers: deps ## linear solvers for CR and DG near nu = 1/2, measured into docs/solvers.md; QUICK=1 measures less and writes nothing
+solvers: deps ## linear solvers for CR and DG near nu = 1/2, measured into docs/reports/solvers.md; QUICK=1 measures less and writes nothing
 	$(AGAIN) $(BUILD)/tests/perf/solvers
 	@scripts/solvers --build $(BUILD) $(if $(QUICK),--quick)
 
-accuracy: deps ## error against time for every choice, measured into docs/accuracy.md with plots and a CSV (5 to 10 minutes); QUICK=1: a test, in build
+accuracy: deps ## error against time for every choice, measured into docs/reports/accuracy.md with plots and a CSV (5 to 10 minutes); QUICK=1: a test, in build
 	$(AGAIN) bin/supple
 	@scripts/venv
 	@.venv/bin/python scripts/accuracy --build $(BUILD) $(if $(QUICK),--quick)
 
-docs: bin/supple ## docs/options.md from the option table
+docs: bin/supple ## docs/options.md from the option table, and all documents as a site: build/site/index.html
 	bin/supple -options_markdown docs/options.md
+	@scripts/venv
+	@.venv/bin/mkdocs build --strict --quiet --site-dir $(BUILD)/site
+	@echo "open $(BUILD)/site/index.html"
 
 install: bin/supple bin/supple-mesh $(MESHES) ## programs, scenarios and documents to PREFIX=/usr/local (DESTDIR= in front)
 	install -d $(DESTDIR)$(PREFIX)/bin $(DESTDIR)$(PREFIX)/share/supple/scenarios $(DESTDIR)$(PREFIX)/share/supple/meshes $(DESTDIR)$(PREFIX)/share/supple/scripts $(DESTDIR)$(PREFIX)/share/doc/supple
@@ -195,7 +198,8 @@ install: bin/supple bin/supple-mesh $(MESHES) ## programs, scenarios and documen
 	install -m 755 scripts/render scripts/venv $(DESTDIR)$(PREFIX)/share/supple/scripts
 	install -m 644 scenarios/*.opts $(DESTDIR)$(PREFIX)/share/supple/scenarios
 	install -m 644 meshes/*.geo $(MESHES) $(DESTDIR)$(PREFIX)/share/supple/meshes
-	install -m 644 README.md CHANGELOG.md LICENSE $(wildcard docs/*.md) $(DESTDIR)$(PREFIX)/share/doc/supple
+	install -m 644 README.md CHANGELOG.md LICENSE $(DESTDIR)$(PREFIX)/share/doc/supple
+	cp -r docs $(DESTDIR)$(PREFIX)/share/doc/supple
 
 clean: ## remove what was built and meshed; results in out/ stay
 	rm -rf build build-* bin meshes/*.msh

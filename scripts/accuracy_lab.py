@@ -135,7 +135,7 @@ SCENES = {
 }
 
 # Displacement of the end of the static bar, and of the corner of Cook's membrane, in m, by Poisson's ratio: elements of high order on
-# graded hexahedra, checked with another program (docs/verification.md names both scenes); 1e-5 and 2e-5 of it.
+# graded hexahedra, checked with another program (docs/reports/verification.md names both scenes); 1e-5 and 2e-5 of it.
 BAR = {0.3: -0.785713, 0.49: -0.762295}
 COOK = {1 / 3: 22.6106, 0.49: 19.6653, 0.4999: 19.4285}
 # Displacement (x, z) of the end of the swinging bar at LOW, m: CR, Newmark, Newton, on 8 and 4 cells across with steps of 5 ms, extrapolated with order 2 in

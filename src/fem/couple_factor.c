@@ -15,7 +15,7 @@
 #include "sbsolver.h"
 
 #define DIRECT_STATIC \
-  30000 /* unknowns up to which a factorisation per solve is chosen; see docs/contact.md */
+  30000 /* unknowns up to which a factorisation per solve is chosen; see docs/reports/contact.md */
 #define DIRECT_DYNAMIC 1000
 
 struct _p_SbFactored {

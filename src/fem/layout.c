@@ -325,7 +325,7 @@ static void across(SbSpace s, const PetscReal stiffness[], PetscInt cell, PetscI
 
 /*
   Nodes across the faces of DG cells. The mean of the two sides of a face is weighted by (2 mu + lambda) / |T|: then the
-  constant in the bound of the lifting does not depend on the volumes and moduli on the two sides (docs/theory.md).
+  constant in the bound of the lifting does not depend on the volumes and moduli on the two sides (docs/reference/theory.md).
 */
 PetscErrorCode SbLayoutCliques(SbSpace s)
 {

@@ -1,5 +1,5 @@
 /*
-  write_h5.c - supple's own mesh file, HDF5, and its index for ParaView. The layout is told in docs/meshes.md.
+  write_h5.c - supple's own mesh file, HDF5, and its index for ParaView. The layout is told in docs/reference/meshes.md.
 
     /                attribute supple_mesh: version of the layout, 1
     /mesh/x          [nvert][3]   double   coordinates

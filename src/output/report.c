@@ -269,7 +269,7 @@ PetscErrorCode SbReportSummary(SbRun run)
                         "%" PetscInt_FMT
                         " tetrahedra are inverted or flat at the end (det F down to %g): what "
                         "they show is no deformation of a body. Smaller steps or loads may avoid it; laws "
-                        "differ in how they come back, see docs/stability.md",
+                        "differ in how they come back, see docs/reference/guarantees.md",
                         run->energies.ninverted, (double)run->energies.min_J));
   if (out->quiet) PetscFunctionReturn(PETSC_SUCCESS);
   if (!out->rank) PetscCall(print_phases(run, &phases));

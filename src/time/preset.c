@@ -443,7 +443,7 @@ static PetscErrorCode check_newmark(SbRun run)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* One solve per step, begun where the body flies to, with a tangent that may be softer than the forces: no bound on the energy (docs/theory.md). */
+/* One solve per step, begun where the body flies to, with a tangent that may be softer than the forces: no bound on the energy (docs/reference/theory.md). */
 static PetscErrorCode warn_growth(SbRun run)
 {
   const SbSpace s = run->model->space;

@@ -9,7 +9,7 @@
         faces of one side with those of the other
     dg  16 for each tet + 32 for each inner face
 
-  The rest was measured: see the constants. docs/meshes.md says how good it is.
+  The rest was measured: see the constants. docs/reference/meshes.md says how good it is.
 */
 #include "tool.h"
 

@@ -45,7 +45,7 @@ extern const SbToolCommand SbToolCommands[];
 
 /* info.c, memory.c */
 PetscErrorCode SbToolInfo(SbTool *tool, SbImport *mesh);
-/* Bytes that a run of one step takes on one rank, by element: p1, cr, dg. docs/meshes.md says how good it is. */
+/* Bytes that a run of one step takes on one rank, by element: p1, cr, dg. docs/reference/meshes.md says how good it is. */
 PetscReal SbToolMemory(const SbMeshFacts *facts, const char *element, PetscInt *unknowns, PetscReal *matrix);
 
 /* view.c: draws the mesh to tool->view. */

@@ -14,7 +14,7 @@
     scripts/mpi 2 build/tests/hard/hard -case spin.p1     all runs of a case; -runs 1: the first only; -verbose: each step; -more "OPTIONS": on top
     tests/run --build build --group hard --match spin     cases with `quick` runs, on two ranks: what `make check` does
     tests/run --build build --group hard --all            everything, on the ranks of each case: what `make check-hard` does
-    scripts/stability                                     table of the margins of the last runs; --write: into docs/stability.md
+    scripts/stability                                     table of the margins of the last runs; --write: into docs/reports/stability.md
 */
 #pragma once
 #include <sb.h>

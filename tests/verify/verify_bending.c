@@ -2,7 +2,7 @@
 /*
   Bending near nu = 1/2 with CR and DG, and with P1 beside them: the clamped bar under its weight and Cook's membrane
   (references: elements of high order, mixed at nu near 1/2). The penalty gamma1 is a compromise of both problems and of
-  verify_locking.c; docs/locking.md has finer meshes.
+  verify_locking.c; docs/reports/locking.md has finer meshes.
 */
 #include "locking.h"
 

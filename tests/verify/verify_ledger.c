@@ -149,7 +149,7 @@ static PetscErrorCode solves(void)
   for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(of); i++) {
     char scene[VERIFY_TEXT];
 
-    /* with a factor per rank what CG leaves is smooth and adds up: docs/ledger.md */
+    /* with a factor per rank what CG leaves is smooth and adds up: docs/reports/error_estimates.md */
     if (size > 1 && strstr(of[i].scene, "ts_dt") && of[i].source == SB_ERROR_LINEAR) continue;
     PetscCall(PetscSNPrintf(scene, sizeof(scene), BAR "%s %s", cg, of[i].scene));
     PetscCall(compare(of[i].what, of[i].name, of[i].source, scene, of[i].coarse, of[i].fine, 0.3, 3));

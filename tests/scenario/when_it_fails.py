@@ -1,0 +1,176 @@
+"""Each class of errors and warnings in docs/guides/when_it_fails.md, shown by a scenario that is broken on purpose: a row of CASES.
+
+A row is: class of the guide; "error" or "warning"; arguments of the program; what the line must name: options, values, files, line numbers, bodies, never its words.
+An error ends the run with exit code 1 and one line `supple: error:` that names all of it, and no trace; a warning leaves the exit code 0, or 1 where the row says so. Every class of the
+guide has a row, and every row a class.
+
+@cpu 300
+"""
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+TOP = Path(__file__).resolve().parents[2]
+OUT = Path(os.environ["SB_OUT"]).resolve()
+SUPPLE = str((TOP / os.environ["SB_SUPPLE"]).resolve())
+MPI = os.environ["SB_MPI"].split()
+DATA = str(TOP / "tests/data")
+
+# A bar that is held at one end and pulled at the other; a cube without anything.
+BAR = """-bodies bar
+-body_bar_mesh box:0.4,0.1,0.1:6,2,2
+-body_bar_material corotated
+-body_bar_young 5e4
+-body_bar_poisson 0.4
+-sets left
+-set_left_at plane:1,0,0,0
+-effects gravity,hold,pull
+-effect_hold_type support
+-effect_hold_on left
+-effect_pull_type traction
+-effect_pull_on xmax
+-effect_pull_vector 0;10*sin(2*pi*t);0
+-ts_dt 0.01
+-ts_max_time 0.02
+-output_fields none
+-quiet
+"""
+CUBE = """-bodies a
+-body_a_mesh box:0.1,0.1,0.1:1
+-body_a_material linear
+-body_a_young 1e5
+-body_a_poisson 0.3
+-time static
+-output_fields none
+-quiet
+"""
+OPEN = "solid lid\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\nendsolid lid\n"
+# A tet of unit edges whose triangles are turned inwards, as an obstacle below the bar.
+INWARDS = "OFF\n4 4 6\n0 0 -1\n1 0 -1\n0 1 -1\n0 0 -0.5\n3 0 1 2\n3 0 3 1\n3 1 3 2\n3 0 2 3\n"
+FILES = {"bar.opts": BAR, "cube.opts": CUBE, "lid.stl": OPEN, "inwards.off": INWARDS, "table.txt": "0 0\n1 2\n1 3\n", "empty.msh": ""}
+
+HELD = "-effects hold -effect_hold_type support -effect_hold_on xmin"
+DRIVEN = HELD.replace("hold ", "hold,end ", 1) + " -effect_end_type drive -effect_end_on xmax -effect_end_displacement"
+ARC = "-bodies a -body_a_mesh box:1,1,1:1 -body_a_material stvk -body_a_young 1 -body_a_poisson 0 -body_a_density 1 -effects hold,push " \
+    "-effect_hold_type support -effect_hold_on zmin -effect_push_type gravity -time static -static_control arc_length -output_fields none -quiet"
+SNAP = f"{TOP}/scenarios/snap.opts -body_bar_mesh box:0.2,0.004,0.005:40,1,2 -output_fields none -quiet"
+
+CASES = [
+    ("O1", "error", "bar.opts -body_bar_yuong 3", ["-body_bar_yuong", "-body_bar_young"]),
+    ("O1", "error", "bar.opts -effcts gravity", ["-effcts", "-effects"]),
+    ("O2", "error", "", ["-bodies"]),
+    ("O2", "error", "bar.opts -bodies bar,rod", ["-body_rod_mesh"]),
+    ("O2", "error", "bar.opts -effects", ["-effects"]),
+    ("O3", "error", "bar.opts -body_bar_young -5", ["-body_bar_young", "-5 Pa", "(0, inf)"]),
+    ("O3", "error", "bar.opts -body_bar_young 5e4Pa", ["-body_bar_young", "5e4Pa"]),
+    ("O3", "error", "bar.opts -body_bar_translate 1,2", ["-body_bar_translate", "1,2", "3"]),
+    ("O3", "error", "bar.opts -time newmrk", ["-time", "newmrk", "newmark"]),
+    ("O4", "error", "bar.opts -effect_pull_vector 0;0;2*s", ["-effect_pull_vector", "2*s", "'s'"]),
+    ("O4", "error", "bar.opts -effect_pull_vector 0;0;table:table.txt", ["-effect_pull_vector", "table.txt", "line 3"]),
+    ("O5", "error", "bar.opts -effects gravty", ["gravty", "gravity"]),
+    ("O5", "error", "bar.opts -effect_pull_on xmx", ["'xmx'", "xmax"]),
+    ("O5", "error", "bar.opts -body_bar_material corotatd", ["-body_bar_material", "corotatd", "corotated"]),
+    ("O5", "error", "bar.opts -output_fields displacment", ["-output_fields", "displacment", "displacement"]),
+    ("O6", "error", "bar.opts -accuracy 0.1 -time_budget 1", ["-accuracy", "-time_budget"]),
+    ("O6", "error", f"{ARC} -body_a_tangent exact_spd", ["-static_control", "-body_a_tangent"]),
+    ("O6", "error", "bar.opts -effects floor -effect_floor_type contact -effect_floor_obstacle plane:0,0,1,-1 -time euler_explicit -ts_dt 1e-5",
+     ["floor", "-time"]),
+    ("O7", "warning", "bar.opts -static_steps 3", ["-static_steps"]),
+    ("O7", "warning", "bar.opts -ksp_rtoll 1e-3", ["-ksp_rtoll", "1e-3"]),
+    ("F1", "error", "nix.opts", ["nix.opts"]),
+    ("F1", "error", "bar.opts -body_bar_mesh nix.msh", ["-body_bar_mesh", "nix.msh"]),
+    ("F2", "error", f"cube.opts -body_a_mesh {DATA}/bad_number.msh {HELD}", ["bad_number.msh", "line "]),
+    ("F2", "error", f"cube.opts -body_a_mesh {DATA}/bad_truncated_bin.msh {HELD}", ["bad_truncated_bin.msh", "byte "]),
+    ("F3", "error", f"cube.opts -body_a_mesh {DATA}/bad_hexes.msh {HELD}", ["bad_hexes.msh"]),
+    ("F3", "error", f"cube.opts -body_a_mesh {DATA}/bad_surface.msh {HELD}", ["bad_surface.msh"]),
+    ("F4", "error", "bar.opts -output_dir table.txt/out", ["-output_dir", "table.txt/out"]),
+    ("F5", "error", "bar.opts -output_dir none -restart latest", ["-restart", "none"]),
+    ("F5", "error", "bar.opts -output_dir saved -restart saved/checkpoint_000002.h5 -body_bar_mesh box:0.4,0.1,0.1:4", ["saved/checkpoint_000002.h5"]),
+    ("F6", "warning", "bar.opts -output_dir cut -restart latest", ["cut/checkpoint_000002.h5"]),
+    ("M1", "error", f"cube.opts -body_a_mesh {DATA}/bad_flat.msh {HELD}", ["bad_flat.msh", "tetrahedron"]),
+    ("M1", "error", f"cube.opts -body_a_mesh {DATA}/bad_twins.msh {HELD}", ["bad_twins.msh"]),
+    ("M2", "error", f"cube.opts -body_a_mesh lid.stl {HELD}", ["lid.stl", "triangle 1"]),
+    ("M3", "error", f"cube.opts -body_a_mesh {DATA}/bead.obj -body_a_tet_size 1e-7 {HELD}", ["bead.obj", "1e-07 m", "tet_size"]),
+    ("M4", "warning", "bar.opts -effects gravity,stop -effect_stop_type contact -effect_stop_obstacle mesh:inwards.off", ["inwards.off"]),
+    ("M5", "error", f"cube.opts -body_a_mesh {DATA}/two_cubes_41.msh -body_a_scale 1.7e308 {HELD}", ["two_cubes_41.msh", "-body_a_scale", "1.7e+308"]),
+    ("M6", "warning", f"cube.opts -body_a_mesh box:0.1,0.1,0.1:3 -remesh_quality 0.99 -static_steps 2 {HELD}", ["'a'", " 1:"]),
+    ("S1", "error", "bar.opts -set_left_at plane:1,0,0,9", ["'left'", "0.4"]),
+    ("S1", "error", "bar.opts -sets left,tip -set_tip_at box:0.39,0.04,0.04,0.41,0.06,0.06 -effect_pull_on tip", ["-effect_pull_on", "tip"]),
+    ("S2", "error", "cube.opts -effects gravity", ["-time static"]),
+    ("S2", "error", "cube.opts -effects push,hold -effect_push_type gravity -effect_push_vector 1,0,0 -effect_hold_type support -effect_hold_on zmin "
+     "-effect_hold_components z", [" a "]),
+    ("S3", "error", "bar.opts -effects hold,again -effect_again_type support -effect_again_on left", ["-effect_again_on"]),
+    ("S4", "error", "cube.opts -bodies a,b -body_a_mesh box:1,1,1:9 -body_b_mesh box:0.1,0.1,0.1:1 -body_b_translate 0.45,0.45,0.45 -body_b_material linear "
+     "-body_b_young 1e5 -body_b_poisson 0.3 -effects meet -effect_meet_type collision -time euler_implicit -ts_dt 1e-3 -ts_max_time 1e-3",
+     ["body b", "body a", "-body_b_translate"]),
+    ("R1", "error", "bar.opts -effect_pull_vector 0;0;1e9 -snes_max_it 2 -time_max_cuts 2", ["0.0025 s"]),
+    ("R2", "error", "-bodies a -body_a_mesh box:1,1,1:2 -body_a_material stvk -body_a_young 1 -body_a_poisson 0 -effects low,press,x,y -effect_low_type support "
+     "-effect_low_on zmin -effect_low_components z -effect_x_type support -effect_x_on xmin -effect_x_components x -effect_y_type support -effect_y_on ymin "
+     "-effect_y_components y -effect_press_type traction -effect_press_on zmax -effect_press_vector 0;0;-0.2 -time static -static_steps 10 -time_inverted refuse "
+     "-output_fields none -quiet", ["0.962"]),
+    ("R3", "warning", "bar.opts -solver cg_jacobi -ksp_max_it 2", ["cg_jacobi", "-solver"]),
+    ("R4", "warning", "bar.opts -time euler_explicit -ts_dt 0.005 -ts_max_time 0.01", ["-ts_dt", "0.005 s"]),
+    ("R4", "error", "bar.opts -time euler_explicit -ts_dt 0.01 -ts_max_time 10", [" s"]),
+    ("R5", "warning", f"cube.opts {DRIVEN} -0.12;0;0", ["6 ", "-0.2"]),
+    ("R6", "warning", "bar.opts -snes_type ksponly -time_predictor velocity -body_bar_tangent warped", ["-snes_type", "-time_predictor", "exact_spd"]),
+    ("R7", "warning", f"cube.opts -body_a_mesh box:0.4,0.1,0.1:6 -body_a_element cr -solver cg_two_level {HELD.replace('hold ', 'hold,gravity ', 1)}", ["-solver"]),
+    ("R8", "warning", f"{SNAP} -effect_symmetry_components x", ["load factor 0.5", " 1 "]),
+    ("R9", "warning", f"{SNAP} -static_max_steps 2", ["-static_max_steps", "2"]),
+    ("R10", "warning", "RANKS 2 bar.opts -solver rotated -pc_rotated_interface 1", ["-solver rotated", "-pc_rotated_interface", "1"]),
+    ("R11", "warning", "bar.opts -effect_pull_vector 0;0;1e9 -snes_max_it 2 -time_max_cuts 2 -remesh_failed yes", ["-remesh_failed"]),
+    ("P1", "error", "bar.opts -pc_type lu -pc_factor_mat_solver_type mkl_pardiso", ["-pc_type lu", "mkl_pardiso", "-solver"]),
+]
+FAILS_TOO = {"R11"}  # a warning before an error
+
+passed = failed = 0
+
+
+def check(text, good):
+    global passed, failed
+    passed, failed = passed + bool(good), failed + (not good)
+    if not good:
+        print(f"failed: {text}")
+
+
+def run(arguments):
+    words, ranks = arguments.split(), 1
+    if words[:1] == ["RANKS"]:
+        ranks, words = int(words[1]), words[2:]
+    start = [*MPI, str(ranks)] if ranks > 1 else []
+    done = subprocess.run([*start, SUPPLE, *words], cwd=OUT, env={**os.environ, "PETSC_OPTIONS": ""}, stdin=subprocess.DEVNULL, capture_output=True, text=True, errors="replace")
+    return done.returncode, done.stdout + done.stderr
+
+
+def main():
+    for name, text in FILES.items():
+        (OUT / name).write_text(text)
+    # checkpoints: of two steps, and with the newer one cut off
+    for folder in ("saved", "cut"):
+        code, text = run(f"bar.opts -output_dir {folder} -checkpoint_every_steps 1")
+        check(f"checkpoints: {text}", code == 0)
+    last = OUT / "cut/checkpoint_000002.h5"
+    last.write_bytes(last.read_bytes()[:1000])
+
+    for name, kind, arguments, named in CASES:
+        if name == "R8" and "mumps" not in os.environ["SB_PACKAGES"].split():  # which counts the eigenvalues
+            continue
+        code, text = run(arguments)
+        lines = [line for line in text.split("\n") if line.startswith(f"supple: {kind}: ")]
+        say = f"{name}: supple {arguments}: "
+        check(f"{say}exit code {code}", code == (kind == "error" or name in FAILS_TOO))
+        check(f"{say}a trace", "PETSC ERROR" not in text)
+        if kind == "error":
+            check(f"{say}{len(lines)} error lines", len(lines) == 1)
+        check(f"{say}names not all of {named}: {text[-600:]}", any(all(word in line for word in named) for line in lines))
+
+    guide = (TOP / "docs/guides/when_it_fails.md").read_text()
+    told, shown = set(re.findall(r"^\| ([A-Z]\d+) \|", guide, re.M)), {case[0] for case in CASES}
+    check(f"no scenario for {sorted(told - shown)}", not told - shown)
+    check(f"not in the guide: {sorted(shown - told)}", not shown - told)
+    print(f"{passed} passed, {failed} failed")
+    sys.exit(failed > 0)
+
+
+main()
