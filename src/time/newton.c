@@ -14,7 +14,7 @@
 
   Provisional steps. In bending and rotation the first full step stretches what it should turn, and E rises a long way that the next step comes back
   from; a search that never lets E rise creeps where full steps need five. So a full step that turns no tet inside out may raise E,
-  and the next one has to bring it below where it was, or the search starts again from there (watchdog technique: Chamberlain et al. 1982; Nocedal
+  and the next one has to bring it below where it was, with an accurate linear solve where a loose one is not enough, or the search starts again from there (watchdog technique: Chamberlain et al. 1982; Nocedal
   and Wright, section 15.6).
 
   Tangent. With -body_NAME_tangent auto it is the exact one. When the linear solver meets a direction of negative curvature or counts negative pivots, or p goes up, the eigenvalues of
@@ -27,6 +27,7 @@
 #define DECREASE 1e-4  /* c above */
 #define SHORTEST 1e-7  /* of a step, before the search gives up */
 #define ROUNDING 1e-11 /* of the terms that E's change is the difference of */
+#define ACCURATE 1e-6  /* relative tolerance of a linear solve whose step has to come back */
 #define PROVISIONAL 1  /* steps that may follow each other while E is above where they began */
 
 /* What a solve keeps from iteration to iteration. */
@@ -105,12 +106,43 @@ static PetscErrorCode find_direction(SNES snes, PetscBool *filtered, PetscReal *
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Solves once more, to a tolerance of ACCURATE; `better`: what was there was worse. */
+static PetscErrorCode solve_accurately(SNES snes, PetscReal *slope, PetscBool *better)
+{
+  Newton *n = (Newton *)snes->data;
+  const Vec F = snes->vec_func, Y = snes->vec_sol_update;
+  KSPConvergedReason reason;
+  PetscReal rtol, left;
+  PetscInt iterations;
+
+  PetscFunctionBeginUser;
+  PetscCall(SNESKSPGetUseEW(snes, better));
+  PetscCall(KSPGetTolerances(snes->ksp, &rtol, NULL, NULL, NULL));
+  PetscCall(KSPGetResidualNorm(snes->ksp, &left));
+  *better = (PetscBool)(*better && rtol > ACCURATE && left > ACCURATE * snes->norm);
+  if (!*better) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(SNESKSPSetUseEW(snes, PETSC_FALSE));
+  PetscCall(KSPSetTolerances(snes->ksp, ACCURATE, PETSC_DEFAULT, PETSC_DEFAULT, PETSC_DEFAULT));
+  PetscCall(VecZeroEntries(n->G));
+  PetscCall(KSPSolve(snes->ksp, F, n->G));
+  PetscCall(SNESKSPSetUseEW(snes, PETSC_TRUE));
+  PetscCall(KSPGetIterationNumber(snes->ksp, &iterations));
+  PetscCall(KSPGetConvergedReason(snes->ksp, &reason));
+  snes->linear_its += iterations;
+  *better = (PetscBool)(reason > 0);
+  if (!*better) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(VecCopy(n->G, Y));
+  PetscCall(VecDot(F, Y, slope));
+  *slope = -*slope;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Goes from X along -Y, E having the slope `slope` there, to the next X and F; s: how far, as part of Y. */
 static PetscErrorCode search(SNES snes, PetscReal slope, PetscReal *s)
 {
   Newton *n = (Newton *)snes->data;
   const Vec X = snes->vec_sol, F = snes->vec_func, Y = snes->vec_sol_update;
-  PetscBool enough, provisional, plain = PETSC_FALSE;
+  PetscBool enough, provisional, better, plain = PETSC_FALSE;
   PetscReal change, noise, total, goal;
   Place from, to;
 
@@ -144,6 +176,15 @@ static PetscErrorCode search(SNES snes, PetscReal slope, PetscReal *s)
     provisional = (PetscBool)(!enough && !plain && slope < 0. && n->provisional < PROVISIONAL &&
                               change < PETSC_INFINITY && to.ninverted <= from.ninverted);
     if (enough || provisional) break;
+
+    /* to come back from far above takes more than a loose solve: what it leaves may be more than E has to fall by */
+    if (n->provisional) {
+      PetscCall(solve_accurately(snes, &slope, &better));
+      if (better) {
+        PetscCall(look_at_place(n, X, F, Y, &from));
+        continue;
+      }
+    }
 
     /* back to where provisional steps began, and a shorter step: to where the parabola through slope and both ends is lowest */
     if (n->provisional) {
