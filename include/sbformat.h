@@ -57,6 +57,22 @@ struct _p_SbImport {
 /* Chooses the reader by the name of the mesh, reads, places. Not collective. */
 PetscErrorCode SbImportRead(const SbBody *body, SbImport *import);
 PetscErrorCode SbImportDestroy(SbImport *import);
+/* Which rows of the arrays of an .h5 mesh a slab has: from first, in blocks of `block`, N in the file. */
+typedef struct {
+  PetscInt N, block, first;
+} SbSlabRows;
+/* Tets of a mesh that can be read in slabs, an .h5 of supple's own; 0: it cannot, or is not there. */
+PetscErrorCode SbImportSlabs(const SbBody *body, PetscInt *ncell);
+/*
+  SbImportSlab - slab k of n of such a mesh, placed. Not collective.
+
+  Output:
+    import - the k-th block of the vertices and that of the simplices of each dimension, with numbers of vertices in the file, from 0 on; all
+             groups
+    rows   - of the vertices
+  Errors: those of SbImportRead() that these blocks show.
+*/
+PetscErrorCode SbImportSlab(const SbBody *body, PetscInt k, PetscInt n, SbImport *import, SbSlabRows *rows);
 /* How the user writes an option of this body, for messages: "-body_liver_tet_size"; in supple-mesh "-size". */
 #define SB_OPTION_NAME_MAX (SB_NAME_MAX + 32)
 const char *SbImportOption(const SbImport *import, const char *key, char name[SB_OPTION_NAME_MAX]);

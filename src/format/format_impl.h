@@ -22,6 +22,9 @@ PetscErrorCode SbImportRead_UNV(const char *path, SbImport *body);
 PetscErrorCode SbImportRead_Box(const char *text, SbImport *body);
 PetscErrorCode SbImportRead_H5(const char *path, SbImport *body);
 PetscErrorCode SbImportRead_Xdmf(const char *path, SbImport *body);
+/* Block k of n of everything in an .h5 mesh of supple's own; its tets, without an error when there is no such mesh. */
+PetscErrorCode SbImportSlab_H5(const char *path, PetscInt k, PetscInt n, SbImport *body, SbSlabRows *rows);
+PetscErrorCode SbImportSlabs_H5(const char *path, PetscInt *ncell);
 
 /* ------------------------------------------------------------------ members.c: sets that are listed apart from their items */
 

@@ -305,13 +305,12 @@ static PetscErrorCode find_reader(const SbBody *body, SbReader *read)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbImportRead(const SbBody *body, SbImport *im)
+/* What is given about a body before it is read. */
+static PetscErrorCode begin(const SbBody *body, SbImport *im)
 {
-  SbReader read;
   PetscInt none;
 
   PetscFunctionBeginUser;
-  PetscCall(find_reader(body, &read));
   if (body->name[0])
     (void)snprintf(im->where, sizeof(im->where), "body '%s': %s", body->name, body->mesh);
   else
@@ -321,7 +320,37 @@ PetscErrorCode SbImportRead(const SbBody *body, SbImport *im)
   PetscCall(SbImportTagSet(im, 0, NULL, &none));
   im->tet = body->tet;
   im->scale = body->scale;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbImportRead(const SbBody *body, SbImport *im)
+{
+  SbReader read;
+
+  PetscFunctionBeginUser;
+  PetscCall(find_reader(body, &read));
+  PetscCall(begin(body, im));
   PetscCall(read(body->mesh, im));
+  PetscCall(place(body, im));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbImportSlabs(const SbBody *body, PetscInt *ncell)
+{
+  char known[256];
+
+  PetscFunctionBeginUser;
+  *ncell = 0;
+  if (!body->given && !body->mesh_step && reader_of(body->mesh, sizeof(known), known) == SbImportRead_H5)
+    PetscCall(SbImportSlabs_H5(body->mesh, ncell));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbImportSlab(const SbBody *body, PetscInt k, PetscInt n, SbImport *im, SbSlabRows *rows)
+{
+  PetscFunctionBeginUser;
+  PetscCall(begin(body, im));
+  PetscCall(SbImportSlab_H5(body->mesh, k, n, im, rows));
   PetscCall(place(body, im));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

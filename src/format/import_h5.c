@@ -7,6 +7,8 @@
 
   An .xmf names the .h5 that its mesh is in.
 
+  Of own meshes a block of rows may be wanted of each array under /mesh: several ranks read one each (mesh/slab.c).
+
   A file is not trusted: shape and type of every array, every number of a vertex, group or tag set is checked, and nothing
   is allocated for an array that the file is too short to hold (stored without compression, as here, it takes its full size;
   compressed by others, at most a thousandth of it).
@@ -20,8 +22,10 @@
 typedef struct {
   SbImport *im;
   hid_t file;
-  uint64_t bytes; /* length of the file */
-  char frame[64]; /* group of the wanted step; "" at rest */
+  uint64_t bytes;        /* length of the file */
+  char frame[64];        /* group of the wanted step; "" at rest */
+  PetscInt part, nparts; /* which block of rows of how many; nparts 0: all rows */
+  PetscInt nvert;        /* of the file */
 } File;
 
 #define H5_ERROR(f, ...)                                                                    \
@@ -86,6 +90,8 @@ typedef struct {
   const char *name;
   hid_t set, type;
   hsize_t n, ncomp; /* ncomp 1: a list */
+  hsize_t first;    /* row of the file that is read first */
+  PetscBool block;  /* n rows from there, not all */
 } Array;
 
 static PetscErrorCode close_array(Array *a)
@@ -127,6 +133,8 @@ static PetscErrorCode open_array(const File *f, const char *name, H5T_class_t kl
   PetscFunctionBeginUser;
   a->name = name;
   a->type = -1;
+  a->first = 0;
+  a->block = PETSC_FALSE;
   a->ncomp = ncomp;
   a->set = is_there(f, name) ? H5Dopen2(f->file, name, H5P_DEFAULT) : -1;
   if (a->set < 0) H5_ERROR(f, "has no array %s; it is no mesh of supple, or damaged", name);
@@ -148,11 +156,39 @@ static PetscErrorCode open_array(const File *f, const char *name, H5T_class_t kl
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The rows of an array that belong to the block that is wanted. */
+static SbSlabRows take_block(const File *f, Array *a)
+{
+  SbSlabRows rows = {(PetscInt)a->n, (PetscInt)a->n, 0};
+
+  if (f->nparts) {
+    rows.block = (PetscInt)a->n / f->nparts + 1;
+    rows.first = (PetscInt)PetscMin((PetscInt64)rows.N, (PetscInt64)rows.block * f->part);
+    a->first = (hsize_t)rows.first;
+    a->n = (hsize_t)PetscMin(rows.block, rows.N - rows.first);
+    a->block = PETSC_TRUE;
+  }
+  return rows;
+}
+
 static PetscErrorCode read_values(const File *f, const Array *a, hid_t type, void *values)
 {
+  const hsize_t first[2] = {a->first, 0}, n[2] = {a->n, a->ncomp};
+  hid_t in_file = H5S_ALL, in_memory = H5S_ALL;
+  herr_t status = 0;
+
   PetscFunctionBeginUser;
-  if (a->n && H5Dread(a->set, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, values) < 0)
-    H5_ERROR(f, "%s cannot be read; the file is damaged, write or copy it again", a->name);
+  if (a->block && a->n) {
+    in_file = H5Dget_space(a->set);
+    in_memory = H5Screate_simple(H5Sget_simple_extent_ndims(in_file), n, NULL);
+    status = H5Sselect_hyperslab(in_file, H5S_SELECT_SET, first, NULL, n, NULL);
+  }
+  if (a->n && status >= 0) status = H5Dread(a->set, type, in_memory, in_file, H5P_DEFAULT, values);
+  if (a->block && a->n) {
+    (void)H5Sclose(in_file);
+    (void)H5Sclose(in_memory);
+  }
+  if (status < 0) H5_ERROR(f, "%s cannot be read; the file is damaged, write or copy it again", a->name);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -164,23 +200,25 @@ static PetscErrorCode read_ints(const File *f, const Array *a, int64_t low, int6
   for (size_t i = 0; i < (size_t)(a->n * a->ncomp); i++) {
     if (values[i] < low || values[i] >= high)
       H5_ERROR(f, "%s holds %lld in row %llu; it must be from %lld to %lld", a->name, (long long)values[i],
-               (unsigned long long)(i / a->ncomp) + 1, (long long)low, (long long)high - 1);
+               (unsigned long long)(a->first + i / a->ncomp) + 1, (long long)low, (long long)high - 1);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* ------------------------------------------------------------------ vertices and simplices */
 
-static PetscErrorCode check_finite(const File *f, const char *name, size_t n, const PetscReal x[])
+static PetscErrorCode check_finite(const File *f, const Array *a, const PetscReal x[])
 {
   PetscFunctionBeginUser;
-  for (size_t i = 0; i < n; i++)
-    if (!isfinite(x[i])) H5_ERROR(f, "%s holds no finite number in row %zu", name, i / 3 + 1);
+  for (size_t i = 0; i < 3 * (size_t)a->n; i++)
+    if (!isfinite(x[i]))
+      H5_ERROR(f, "%s holds no finite number in row %zu", a->name, (size_t)a->first + i / 3 + 1);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* [n][3] of a group or of the mesh; PetscFree(). */
-static PetscErrorCode read_vectors(const File *f, const char *name, PetscInt *n, PetscReal **x)
+/* [n][3] of a group or of the mesh, of the block that is wanted; PetscFree(). */
+static PetscErrorCode read_vectors(const File *f, const char *name, SbSlabRows *rows, PetscInt *n,
+                                   PetscReal **x)
 {
   Array a;
   PetscErrorCode ierr;
@@ -189,19 +227,20 @@ static PetscErrorCode read_vectors(const File *f, const char *name, PetscInt *n,
   *x = NULL;
   ierr = open_array(f, name, H5T_FLOAT, 3, &a);
   if (!ierr) {
+    *rows = take_block(f, &a);
     *n = (PetscInt)a.n;
     ierr = PetscMalloc1(3 * (size_t)a.n, x);
   }
   if (!ierr) ierr = read_values(f, &a, H5T_NATIVE_DOUBLE, *x);
-  if (!ierr) ierr = check_finite(f, name, 3 * (size_t)a.n, *x);
+  if (!ierr) ierr = check_finite(f, &a, *x);
   PetscCall(close_array(&a));
   if (ierr) PetscCall(PetscFree(*x));
   PetscFunctionReturn(ierr);
 }
 
-/* An array of whole numbers in [0, high); PetscFree(). */
-static PetscErrorCode read_table(const File *f, const char *name, PetscInt ncomp, int64_t high, PetscInt *n,
-                                 PetscInt **values)
+/* An array of whole numbers in [0, high), all of it unless `rows` asks for the block that is wanted; PetscFree(). */
+static PetscErrorCode read_table(const File *f, const char *name, PetscInt ncomp, int64_t high,
+                                 SbSlabRows *rows, PetscInt *n, PetscInt **values)
 {
   Array a;
   PetscErrorCode ierr;
@@ -210,6 +249,7 @@ static PetscErrorCode read_table(const File *f, const char *name, PetscInt ncomp
   *values = NULL;
   ierr = open_array(f, name, H5T_INTEGER, (hsize_t)ncomp, &a);
   if (!ierr) {
+    if (rows) *rows = take_block(f, &a);
     *n = (PetscInt)a.n;
     ierr = PetscMalloc1((size_t)(a.n * a.ncomp), values);
   }
@@ -223,14 +263,19 @@ static PetscErrorCode read_table(const File *f, const char *name, PetscInt ncomp
 static PetscErrorCode read_items(const File *f, int dim, const char *name)
 {
   SbImport *im = f->im;
+  SbSlabRows rows;
   Array a;
   PetscErrorCode ierr;
 
   PetscFunctionBeginUser;
   ierr = open_array(f, name, H5T_INTEGER, (hsize_t)dim + 1, &a);
-  if (!ierr) ierr = SbImportSetItems(im, dim, (PetscInt)a.n);
-  if (!ierr) ierr = read_ints(f, &a, 0, im->nvert, im->item[dim].vert);
+  if (!ierr) {
+    rows = take_block(f, &a);
+    ierr = SbImportSetItems(im, dim, (PetscInt)a.n);
+  }
+  if (!ierr) ierr = read_ints(f, &a, 0, f->nvert, im->item[dim].vert);
   PetscCall(close_array(&a));
+  for (PetscInt i = 0; i < im->item[dim].n && !ierr; i++) im->item[dim].number[i] += rows.first;
   if (!ierr) ierr = PetscArrayzero(im->item[dim].tags, im->item[dim].n);
   PetscFunctionReturn(ierr);
 }
@@ -307,7 +352,7 @@ static PetscErrorCode read_groups(const File *f, PetscInt *ngroup, PetscInt **ma
   PetscCall(PetscMemzero(&g, sizeof(g)));
   *map = NULL;
   ierr = read_names(f, &g.n, &g.names, &g.width);
-  if (!ierr) ierr = read_table(f, "/groups/dim", 1, 4, &g.ndim, &g.dim);
+  if (!ierr) ierr = read_table(f, "/groups/dim", 1, 4, NULL, &g.ndim, &g.dim);
   if (!ierr) ierr = read_numbers(f, &g.nnumber, &g.number);
   if (!ierr) ierr = PetscMalloc1(g.n, map);
   if (!ierr) ierr = add_groups(f, &g, *map);
@@ -342,8 +387,8 @@ static PetscErrorCode read_sets(const File *f, PetscInt *nset, PetscInt **map)
   PetscFunctionBeginUser;
   *map = NULL;
   ierr = read_groups(f, &ngroup, &group);
-  if (!ierr) ierr = read_table(f, "/tag_sets/group", 1, ngroup, &nmember, &member);
-  if (!ierr) ierr = read_table(f, "/tag_sets/start", 1, (int64_t)nmember + 1, &nstart, &start);
+  if (!ierr) ierr = read_table(f, "/tag_sets/group", 1, ngroup, NULL, &nmember, &member);
+  if (!ierr) ierr = read_table(f, "/tag_sets/start", 1, (int64_t)nmember + 1, NULL, &nstart, &start);
   *nset = PetscMax(nstart - 1, 0);
   if (!ierr) ierr = PetscMalloc1(*nset, map);
   if (!ierr) ierr = add_sets(f, *nset, start, nmember, member, group, *map);
@@ -358,9 +403,10 @@ static PetscErrorCode read_tags(const File *f, int dim, const char *name, PetscI
 {
   SbItems *item = &f->im->item[dim];
   PetscInt n, *tags;
+  SbSlabRows rows;
 
   PetscFunctionBeginUser;
-  PetscCall(read_table(f, name, 1, nset, &n, &tags));
+  PetscCall(read_table(f, name, 1, nset, &rows, &n, &tags));
   if (n == item->n)
     for (PetscInt i = 0; i < n; i++) item->tags[i] = map[tags[i]];
   PetscCall(PetscFree(tags));
@@ -450,6 +496,7 @@ static PetscErrorCode add_displacement(const File *f)
 {
   SbImport *im = f->im;
   char name[96];
+  SbSlabRows rows;
   PetscInt n;
   PetscReal *u;
 
@@ -457,7 +504,7 @@ static PetscErrorCode add_displacement(const File *f)
   (void)snprintf(name, sizeof(name), "%s/displacement", f->frame);
   if (!is_there(f, name))
     H5_ERROR(f, "has no displacement at the step; the run needs it among its -output_fields");
-  PetscCall(read_vectors(f, name, &n, &u));
+  PetscCall(read_vectors(f, name, &rows, &n, &u));
   for (PetscInt i = 0; i < 3 * n && n == im->nvert; i++) im->x[i] += u[i];
   PetscCall(PetscFree(u));
   if (n != im->nvert)
@@ -473,7 +520,7 @@ static PetscErrorCode join_points(const File *f)
   PetscReal *x;
 
   PetscFunctionBeginUser;
-  PetscCall(read_table(f, "/mesh/vertices", 4, PETSC_MAX_INT / 8, &n, &vertex));
+  PetscCall(read_table(f, "/mesh/vertices", 4, PETSC_MAX_INT / 8, NULL, &n, &vertex));
   for (PetscInt i = 0; i < 4 * n; i++) nvert = PetscMax(nvert, vertex[i] + 1);
   if (n != im->item[3].n || nvert > im->nvert) {
     PetscCall(PetscFree(vertex));
@@ -520,7 +567,7 @@ static PetscErrorCode read_bodies(const File *f)
 
   PetscFunctionBeginUser;
   if (!is_there(f, "/mesh/body")) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(read_table(f, "/mesh/body", 1, 1 << 16, &n, &body));
+  PetscCall(read_table(f, "/mesh/body", 1, 1 << 16, NULL, &n, &body));
   if (n != im->item[3].n) {
     PetscCall(PetscFree(body));
     H5_ERROR(f, "/mesh/body has %lld rows for %lld tets", (long long)n, (long long)im->item[3].n);
@@ -586,7 +633,7 @@ static PetscErrorCode check_layout(const File *f, PetscBool *own)
            content[0] ? "; it holds " : "", content);
 }
 
-static PetscErrorCode read_mesh(File *f)
+static PetscErrorCode read_mesh(File *f, SbSlabRows *rows)
 {
   SbImport *im = f->im;
   PetscBool own;
@@ -594,26 +641,57 @@ static PetscErrorCode read_mesh(File *f)
   PetscFunctionBeginUser;
   PetscCall(check_layout(f, &own));
   PetscCall(find_frame(f));
-  PetscCall(read_vectors(f, "/mesh/x", &im->nvert, &im->x));
+  PetscCall(read_vectors(f, "/mesh/x", rows, &im->nvert, &im->x));
+  f->nvert = rows->N;
   PetscCall(PetscMalloc1(im->nvert, &im->vert_number));
-  for (PetscInt v = 0; v < im->nvert; v++) im->vert_number[v] = v + 1;
+  for (PetscInt v = 0; v < im->nvert; v++) im->vert_number[v] = rows->first + v + 1;
   PetscCall(read_items(f, 3, "/mesh/cells"));
   PetscCall(own ? read_own(f) : read_output(f));
-  if (!im->item[3].n && !(im->surface && im->item[2].n))
+  if (!im->item[3].n && !f->nparts && !(im->surface && im->item[2].n))
     H5_ERROR(f, "holds no tetrahedra; mesh the volume (supple-mesh tet)");
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbImportRead_H5(const char *path, SbImport *im)
+PetscErrorCode SbImportSlab_H5(const char *path, PetscInt k, PetscInt n, SbImport *im, SbSlabRows *rows)
 {
-  File f = {.im = im, .file = -1};
+  File f = {.im = im, .file = -1, .part = k, .nparts = n};
   PetscErrorCode ierr;
 
   PetscFunctionBeginUser;
   PetscCall(open_file(path, &f));
-  ierr = read_mesh(&f);
+  ierr = read_mesh(&f, rows);
   (void)H5Fclose(f.file);
   PetscFunctionReturn(ierr);
+}
+
+PetscErrorCode SbImportRead_H5(const char *path, SbImport *im)
+{
+  SbSlabRows rows;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbImportSlab_H5(path, 0, 0, im, &rows));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbImportSlabs_H5(const char *path, PetscInt *ncell)
+{
+  hid_t file, set, space;
+  hsize_t size[2] = {0, 0};
+
+  PetscFunctionBeginUser;
+  *ncell = 0;
+  (void)H5Eset_auto2(H5E_DEFAULT, NULL, NULL);
+  file = H5Fopen(path, H5F_ACC_RDONLY, H5P_DEFAULT);
+  if (file < 0) PetscFunctionReturn(PETSC_SUCCESS);
+  set = H5Aexists(file, "supple_mesh") > 0 ? H5Dopen2(file, "/mesh/cells", H5P_DEFAULT) : -1;
+  space = set >= 0 ? H5Dget_space(set) : -1;
+  if (space >= 0 && H5Sget_simple_extent_ndims(space) == 2)
+    (void)H5Sget_simple_extent_dims(space, size, NULL);
+  if (size[0] <= (hsize_t)PETSC_MAX_INT / 8) *ncell = (PetscInt)size[0];
+  if (space >= 0) (void)H5Sclose(space);
+  if (set >= 0) (void)H5Dclose(set);
+  (void)H5Fclose(file);
+  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* ------------------------------------------------------------------ .xmf */

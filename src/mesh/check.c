@@ -117,12 +117,19 @@ PetscBool SbTetFlat(const PetscReal x[], const PetscInt v[4], PetscReal largest,
   return (PetscBool) !(PetscAbsReal(*det) > (1e-12 * L + 8 * PETSC_MACHINE_EPSILON * largest) * L2);
 }
 
-static PetscErrorCode orient(SbImport *im)
+PetscReal SbImportLargest(const SbImport *im)
 {
-  PetscReal largest = 0, det;
+  PetscReal largest = 0;
+
+  for (PetscInt i = 0; i < 3 * im->nvert; i++) largest = PetscMax(largest, PetscAbsReal(im->x[i]));
+  return largest;
+}
+
+PetscErrorCode SbImportOrient(SbImport *im, PetscReal largest)
+{
+  PetscReal det;
 
   PetscFunctionBeginUser;
-  for (PetscInt i = 0; i < 3 * im->nvert; i++) largest = PetscMax(largest, PetscAbsReal(im->x[i]));
   for (PetscInt c = 0; c < im->item[3].n; c++) {
     PetscInt *v = im->item[3].vert + 4 * c;
 
@@ -141,18 +148,30 @@ static PetscErrorCode orient(SbImport *im)
 
 /* ------------------------------------------------------------------ tets together */
 
-static PetscErrorCode twice(const SbImport *im, PetscInt c, PetscInt d)
+PetscErrorCode SbImportTwice(const SbImport *im, int64_t a, int64_t b)
 {
   PetscFunctionBeginUser;
   SETERRQ(PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
           "%s: tetrahedra %lld and %lld have the same four nodes; remove one", im->where,
-          (long long)im->item[3].number[PetscMin(c, d)], (long long)im->item[3].number[PetscMax(c, d)]);
+          (long long)PetscMin(a, b), (long long)PetscMax(a, b));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbImportOverlap(const SbImport *im, const int64_t number[3], PetscInt nshared)
+{
+  PetscFunctionBeginUser;
+  SETERRQ(PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
+          "%s: tetrahedra %lld, %lld and %lld share one face (of %" PetscInt_FMT
+          " such faces); a face has at most two, remove what overlaps",
+          im->where, (long long)number[0], (long long)number[1], (long long)number[2], nshared);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Two cells with equal vertices share all four faces; a third cell at one of these faces makes it a shared one. */
-static PetscErrorCode check_faces(const SbImport *im, const SbFaces *faces)
+PetscErrorCode SbImportCheckFaces(const SbImport *im, const SbFaces *faces)
 {
+  const int64_t *number = im->item[3].number;
+
   PetscFunctionBeginUser;
   if (faces->nshared) {
     const PetscInt *s = faces->shared;
@@ -166,18 +185,16 @@ static PetscErrorCode check_faces(const SbImport *im, const SbFaces *faces)
       PetscCall(PetscSortInt(4, a));
       PetscCall(PetscSortInt(4, b));
       PetscCall(PetscArraycmp(a, b, 4, &same));
-      if (same) PetscCall(twice(im, s[i], s[(i + 1) % 3]));
+      if (same) PetscCall(SbImportTwice(im, number[s[i]], number[s[(i + 1) % 3]]));
     }
-    SETERRQ(PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
-            "%s: tetrahedra %lld, %lld and %lld share one face (of %" PetscInt_FMT
-            " such faces); a face has at most two, remove what overlaps",
-            im->where, (long long)im->item[3].number[s[0]], (long long)im->item[3].number[s[1]],
-            (long long)im->item[3].number[s[2]], faces->nshared);
+    PetscCall(
+      SbImportOverlap(im, (const int64_t[3]){number[s[0]], number[s[1]], number[s[2]]}, faces->nshared));
   }
   for (PetscInt c = 0; c < faces->ncell; c++) {
     const PetscInt *n = faces->neighbour + 4 * c;
 
-    if (n[0] >= 0 && n[0] == n[1] && n[0] == n[2] && n[0] == n[3]) PetscCall(twice(im, c, n[0]));
+    if (n[0] >= 0 && n[0] == n[1] && n[0] == n[2] && n[0] == n[3])
+      PetscCall(SbImportTwice(im, number[c], number[n[0]]));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -230,9 +247,9 @@ PetscErrorCode SbImportCheck(SbImport *im, SbFaces *faces)
 {
   PetscFunctionBeginUser;
   PetscCall(drop_unused(im));
-  PetscCall(orient(im));
+  PetscCall(SbImportOrient(im, SbImportLargest(im)));
   PetscCall(SbFacesCreate(im->nvert, im->item[3].n, im->item[3].vert, faces));
-  PetscCall(check_faces(im, faces));
+  PetscCall(SbImportCheckFaces(im, faces));
   PetscCall(count_lost(im, faces));
   PetscCall(count_pinched(im, faces));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -1,9 +1,4 @@
-/*
-  create.c - the mesh of a scene, from bodies on rank 0 to numbered pieces on all ranks.
-
-  Rank 0 reads and checks alone. When that fails, its message is caught, sent to the others, and raised by all of them,
-  so that nobody waits for a rank that is gone.
-*/
+/* create.c - the mesh of a scene, from files to numbered pieces on all ranks. */
 #include "mesh_impl.h"
 #include "sbskin.h"
 
@@ -11,6 +6,10 @@ static const SbOption rows[] = {
   {"mesh_partitioner", SB_OPTION_CHOICE, 1, "", "auto", "auto|metis|bisection",
    "how the mesh is cut into one part per rank: METIS (short borders, on rank 0), bisection (in parallel), "
    "auto: METIS up to 50,000 tets"},
+  {"mesh_reading", SB_OPTION_CHOICE, 1, "", "auto", "auto|rank0|slabs",
+   "who reads an .h5 mesh of supple-mesh on several ranks: rank 0 all of it, or every rank a slab, so that "
+   "its memory falls with "
+   "the ranks; auto: slabs from 50,000 tets on. Other meshes are read by rank 0"},
   {"mesh_report", SB_OPTION_BOOL, 1, "", "false", "",
    "print one line per body with the size, shape and groups of its mesh"},
 };
@@ -20,43 +19,6 @@ PetscErrorCode SbMeshRegister(void)
   PetscFunctionBeginUser;
   PetscCall(SbOptionsRegister("", "", (PetscInt)PETSC_STATIC_ARRAY_LENGTH(rows), rows));
   PetscCall(SbTetRegister());
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* ------------------------------------------------------------------ errors of rank 0 */
-
-/* Collective: builds the whole mesh on rank 0; all ranks fail together, or all know what was found. */
-static PetscErrorCode create_whole(MPI_Comm comm, PetscInt nbody, SbBody body[], PetscInt nset, SbSet set[],
-                                   SbWhole *whole)
-{
-  PetscMPIInt rank;
-  SbCaught caught = {0, ""};
-  SbGiven **given; /* each rank has its own */
-
-  PetscFunctionBeginUser;
-  PetscCallMPI(MPI_Comm_rank(comm, &rank));
-  PetscCall(PetscMemzero(whole, sizeof(*whole)));
-  if (!rank) {
-    PetscErrorCode ierr;
-
-    PetscCall(PetscPushErrorHandler(SbCatchError, &caught));
-    ierr = SbWholeCreate(nbody, body, nset, set, whole);
-    PetscCall(PetscPopErrorHandler());
-    caught.code = (int)ierr;
-  }
-  PetscCallMPI(MPI_Bcast(&caught, (int)sizeof(caught), MPI_BYTE, 0, comm));
-  PetscCheck(!caught.code, comm, (PetscErrorCode)caught.code, "%s", caught.text);
-  PetscCall(PetscMalloc1(nbody, &given));
-  for (PetscInt b = 0; b < nbody; b++) given[b] = body[b].given;
-  PetscCallMPI(MPI_Bcast(body, (int)((size_t)nbody * sizeof(*body)), MPI_BYTE, 0, comm));
-  for (PetscInt b = 0; b < nbody; b++) body[b].given = given[b];
-  PetscCall(PetscFree(given));
-  PetscCallMPI(MPI_Bcast(set, (int)((size_t)nset * sizeof(*set)), MPI_BYTE, 0, comm));
-  whole->Nvert = whole->Ncell = 0;
-  for (PetscInt b = 0; b < nbody; b++) {
-    whole->Nvert += body[b].nvert;
-    whole->Ncell += body[b].ncell;
-  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -92,7 +54,7 @@ PetscErrorCode SbMeshCreate(MPI_Comm comm, PetscInt nbody, SbBody body[], PetscI
   SbScope scope;
   SbWhole whole;
   SbPiece piece;
-  PetscInt partitioner;
+  PetscInt partitioner, reading;
   PetscBool full, all = PETSC_FALSE;
 
   PetscFunctionBeginUser;
@@ -100,9 +62,10 @@ PetscErrorCode SbMeshCreate(MPI_Comm comm, PetscInt nbody, SbBody body[], PetscI
              "%" PetscInt_FMT " sets; a scenario may have up to %d", nset, SB_SET_MAX);
   PetscCall(SbScopeSet(&scope, "", "", ""));
   PetscCall(SbOptionChoice(&scope, "mesh_partitioner", &partitioner));
+  PetscCall(SbOptionChoice(&scope, "mesh_reading", &reading));
   PetscCall(SbOptionBool(&scope, "mesh_report", &full));
   PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_MESH_READ], 0, 0, 0, 0));
-  PetscCall(create_whole(comm, nbody, body, nset, set, &whole));
+  PetscCall(SbWholeCreate(comm, (SbReading)reading, nbody, body, nset, set, &whole));
   PetscCall(PetscLogEventEnd(SbEvents[SB_EVENT_MESH_READ], 0, 0, 0, 0));
   PetscCall(report(comm, nbody, body, full));
   PetscCall(PetscNew(&m));

@@ -26,6 +26,28 @@ PetscInt SbImportEdgesFind(const SbImportEdges *edges, PetscInt a, PetscInt b);
 
 /* ------------------------------------------------------------------ check.c, quality.c, sets.c */
 
+/* Largest coordinate in size, m. */
+PetscReal SbImportLargest(const SbImport *import);
+/* Turns inverted tets, refuses flat ones; `largest` is the largest coordinate in size. */
+PetscErrorCode SbImportOrient(SbImport *import, PetscReal largest);
+/* Refuses tets given twice and faces of three tets. */
+PetscErrorCode SbImportCheckFaces(const SbImport *import, const SbFaces *faces);
+/* Their errors: numbers of the tets in the file, and how many faces have more than two. */
+PetscErrorCode SbImportTwice(const SbImport *import, int64_t a, int64_t b);
+PetscErrorCode SbImportOverlap(const SbImport *import, const int64_t number[3], PetscInt nshared);
+/* Sums and maxima over tets and vertices; neutral where there are none. */
+typedef struct {
+  PetscInt nsliver;
+  PetscReal volume;  /* m^3 */
+  PetscReal most[8]; /* cosine of a dihedral angle, radius ratio, -x, -y, -z, x, y, z */
+} SbShape;
+void SbImportShape(const SbImport *import, SbShape *shape);
+/* The "found" fields that follow from them. */
+void SbShapeKeep(const SbShape *shape, SbBody *body);
+/* What was repaired or is odd: fills the note of the body, whose number of parts is known. */
+PetscErrorCode SbImportNote(const SbImport *import, SbBody *body);
+/* parent[nvert]: the lowest vertex of the part that each vertex belongs to. */
+void SbImportJoin(const SbImport *import, PetscInt parent[], PetscInt *npart);
 /* Volume, shape, extent and number of parts: fills the "found" fields of the body. */
 PetscErrorCode SbImportQuality(const SbImport *import, const SbFaces *faces, SbBody *body);
 /* Volume, cosines of the six dihedral angles, radius ratio of a tet. */
@@ -42,9 +64,14 @@ typedef struct {
   uint64_t *cell; /* [ncell] */
   uint64_t *face; /* [ncell][4] */
 } SbMasks;
-/* Marks boundary faces and the members of all sets in body b; adds to the counts of the sets. */
+/* Marks boundary faces and the members of all sets in body b. */
 PetscErrorCode SbSetsMark(const SbImport *import, const SbFaces *faces, PetscInt nbody, const SbBody body[],
-                          PetscInt b, PetscInt nset, SbSet set[], SbMasks *masks);
+                          PetscInt b, PetscInt nset, const SbSet set[], SbMasks *masks);
+/* The bits of sets that are groups, for each tag set: bits[ntags]. */
+PetscErrorCode SbSetsBits(const SbImport *import, PetscInt nbody, const SbBody body[], PetscInt b,
+                          PetscInt nset, const SbSet set[], uint64_t bits[]);
+/* Adds the vertices, boundary facets and cells that each set holds: count[nset][3]. */
+void SbSetsCount(PetscInt nvert, PetscInt ncell, const SbMasks *masks, PetscInt nset, PetscInt count[][3]);
 /* Adds the members of sets that are groups. */
 PetscErrorCode SbGivenMark(const SbBody *body, const SbFaces *faces, SbMasks *masks);
 /* A set that selects nothing is an error, which lists the groups that exist. */
@@ -100,8 +127,38 @@ typedef struct {
   PetscSFNode *remote; /* [nremote] */
 } SbWhole;
 
-/* Rank 0: reads, checks and merges all bodies, fills their "found" fields and those of the sets. */
-PetscErrorCode SbWholeCreate(PetscInt nbody, SbBody body[], PetscInt nset, SbSet set[], SbWhole *whole);
+typedef enum {
+  SB_READING_AUTO,  /* slabs of large meshes on several ranks, where the format has them */
+  SB_READING_RANK0, /* rank 0 reads all */
+  SB_READING_SLABS  /* each rank a slab, where the format has them */
+} SbReading;
+/* Reads, checks and merges all bodies, fills their "found" fields and those of the sets, alike on all ranks. Collective. */
+PetscErrorCode SbWholeCreate(MPI_Comm comm, SbReading reading, PetscInt nbody, SbBody body[], PetscInt nset,
+                             SbSet set[], SbWhole *whole);
+/* Keeps the error of a call that this rank makes alone: SB_CATCH(&caught, call). */
+#define SB_CATCH(caught, call)                              \
+  do {                                                      \
+    PetscErrorCode sb_ierr;                                 \
+    PetscCall(PetscPushErrorHandler(SbCatchError, caught)); \
+    sb_ierr = call;                                         \
+    PetscCall(PetscPopErrorHandler());                      \
+    (caught)->code = (int)sb_ierr;                          \
+  } while (0)
+/* Raises on all ranks what the lowest rank that failed has caught. Collective. */
+PetscErrorCode SbCaughtRaise(MPI_Comm comm, const SbCaught *caught);
+
+/* A body before the merge: what this rank has of it, beside its SbImport. */
+typedef struct {
+  SbFaces faces; /* neighbours: ncell + k is remote[k] */
+  SbMasks masks;
+  PetscInt first; /* original number of the first cell */
+  PetscInt *orig; /* [nvert] original numbers, ascending; NULL: 0, 1, ... */
+  PetscInt nremote;
+  PetscSFNode *remote; /* [nremote] cells of other ranks, numbered there from its first body on */
+} SbPart;
+/* slab.c: reads and prepares body b of `body` in slabs; `before` cells of earlier bodies are on this rank. Collective. */
+PetscErrorCode SbSlabPrepare(MPI_Comm comm, PetscInt before, PetscInt nbody, SbBody body[], PetscInt b,
+                             PetscInt nset, SbSet set[], SbImport *import, SbPart *part);
 PetscErrorCode SbWholeDestroy(SbWhole *whole);
 
 typedef enum {

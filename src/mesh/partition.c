@@ -78,10 +78,35 @@ static void select_kth(PetscInt n, PetscReal (*x)[3], int axis, PetscInt k)
   }
 }
 
+/* Puts the samples below the cut first. What lies on it goes up, as tets will, and not by the order of the samples; when nothing is below it, it is raised. */
+static PetscInt split_at(PetscInt n, PetscReal (*x)[3], int axis, PetscReal middle, PetscReal *cut)
+{
+  PetscReal low = PETSC_MAX_REAL, next = PETSC_MAX_REAL;
+  PetscInt below = 0;
+
+  for (PetscInt i = 0; i < n; i++) {
+    low = PetscMin(low, x[i][axis]);
+    if (x[i][axis] > middle) next = PetscMin(next, x[i][axis]);
+  }
+  *cut = low < middle ? middle : next;
+  for (PetscInt i = 0; i < n; i++) {
+    if (x[i][axis] >= *cut) continue;
+    for (int d = 0; d < 3; d++) {
+      const PetscReal keep = x[i][d];
+
+      x[i][d] = x[below][d];
+      x[below][d] = keep;
+    }
+    below++;
+  }
+  return below;
+}
+
 /* Splits the samples x[n] into k leaves below a node. */
 static void split(Tree *t, PetscInt at, PetscInt n, PetscReal (*x)[3], PetscInt k)
 {
   PetscReal low[3] = {0, 0, 0}, high[3] = {0, 0, 0};
+  PetscReal cut;
   PetscInt below, half = k / 2;
   int axis = 0;
 
@@ -99,7 +124,8 @@ static void split(Tree *t, PetscInt at, PetscInt n, PetscReal (*x)[3], PetscInt 
     if (high[d] - low[d] > high[axis] - low[axis]) axis = d;
   below = (PetscInt)((PetscInt64)n * half / k);
   select_kth(n, x, axis, below);
-  t->node[at] = (Node){axis, x[below][axis], t->nnode};
+  below = split_at(n, x, axis, x[below][axis], &cut);
+  t->node[at] = (Node){axis, cut, t->nnode};
   t->nnode += 2;
   split(t, t->node[at].next, below, x, half);
   split(t, t->node[at].next + 1, n - below, x + below, k - half);

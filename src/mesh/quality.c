@@ -78,12 +78,8 @@ PetscReal SbTetQuality(const PetscReal x[4][3])
 }
 
 /* Sets of vertices, joined by every tet. */
-PetscErrorCode SbImportParts(const SbImport *im, PetscInt *npart)
+void SbImportJoin(const SbImport *im, PetscInt parent[], PetscInt *npart)
 {
-  PetscInt *parent;
-
-  PetscFunctionBeginUser;
-  PetscCall(PetscMalloc1(im->nvert, &parent));
   for (PetscInt v = 0; v < im->nvert; v++) parent[v] = v;
   *npart = im->nvert;
   for (PetscInt c = 0; c < im->item[3].n; c++) {
@@ -100,12 +96,23 @@ PetscErrorCode SbImportParts(const SbImport *im, PetscInt *npart)
       (*npart)--;
     }
   }
+  /* a parent is lower than its child */
+  for (PetscInt v = 0; v < im->nvert; v++) parent[v] = parent[parent[v]];
+}
+
+PetscErrorCode SbImportParts(const SbImport *im, PetscInt *npart)
+{
+  PetscInt *parent;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscMalloc1(im->nvert, &parent));
+  SbImportJoin(im, parent, npart);
   PetscCall(PetscFree(parent));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* What was repaired or is odd, in one line; empty when there is nothing. */
-static PetscErrorCode write_note(const SbImport *im, SbBody *body)
+PetscErrorCode SbImportNote(const SbImport *im, SbBody *body)
 {
   const struct {
     PetscInt n;
@@ -130,37 +137,54 @@ static PetscErrorCode write_note(const SbImport *im, SbBody *body)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbImportQuality(const SbImport *im, const SbFaces *faces, SbBody *body)
+void SbImportShape(const SbImport *im, SbShape *s)
 {
-  PetscReal V, cosine[6], ratio, max_cos = -1, volume = 0, max_ratio = 0;
+  PetscReal V, cosine[6], ratio;
   const PetscReal sliver = PetscCosReal(SB_SLIVER * PETSC_PI / 180);
 
-  PetscFunctionBeginUser;
-  body->nsliver = 0;
+  *s = (SbShape){.most = {-1, 0}};
   for (PetscInt c = 0; c < im->item[3].n; c++) {
     PetscReal largest = -1;
 
     SbTetShape(im->x, im->item[3].vert + 4 * c, &V, cosine, &ratio);
-    volume += V;
+    s->volume += V;
     for (int e = 0; e < 6; e++) largest = PetscMax(largest, cosine[e]);
-    max_cos = PetscMax(max_cos, largest);
-    body->nsliver += largest > sliver;
-    max_ratio = PetscMax(max_ratio, ratio);
+    s->nsliver += largest > sliver;
+    s->most[0] = PetscMax(s->most[0], largest);
+    s->most[1] = PetscMax(s->most[1], ratio);
   }
+  for (int i = 0; i < 6; i++) s->most[2 + i] = -PETSC_MAX_REAL;
+  for (PetscInt v = 0; v < im->nvert; v++) {
+    for (int i = 0; i < 3; i++) {
+      s->most[2 + i] = PetscMax(s->most[2 + i], -im->x[3 * v + i]);
+      s->most[5 + i] = PetscMax(s->most[5 + i], im->x[3 * v + i]);
+    }
+  }
+}
+
+void SbShapeKeep(const SbShape *s, SbBody *body)
+{
+  body->nsliver = s->nsliver;
+  body->volume = s->volume;
+  body->min_dihedral = acos(PetscMin(s->most[0], 1)) * 180 / PETSC_PI;
+  body->max_radius_ratio = s->most[1];
+  for (int i = 0; i < 3; i++) {
+    body->bbox[i] = -s->most[2 + i];
+    body->bbox[3 + i] = s->most[5 + i];
+  }
+}
+
+PetscErrorCode SbImportQuality(const SbImport *im, const SbFaces *faces, SbBody *body)
+{
+  SbShape shape;
+
+  PetscFunctionBeginUser;
+  SbImportShape(im, &shape);
+  SbShapeKeep(&shape, body);
   body->nvert = im->nvert;
   body->ncell = im->item[3].n;
   body->nfacet = faces->nboundary;
-  body->volume = volume;
-  body->min_dihedral = acos(PetscMin(max_cos, 1)) * 180 / PETSC_PI;
-  body->max_radius_ratio = max_ratio;
-  for (int i = 0; i < 3; i++) body->bbox[i] = body->bbox[3 + i] = im->x[i];
-  for (PetscInt v = 0; v < im->nvert; v++) {
-    for (int i = 0; i < 3; i++) {
-      body->bbox[i] = PetscMin(body->bbox[i], im->x[3 * v + i]);
-      body->bbox[3 + i] = PetscMax(body->bbox[3 + i], im->x[3 * v + i]);
-    }
-  }
   PetscCall(SbImportParts(im, &body->npart));
-  PetscCall(write_note(im, body));
+  PetscCall(SbImportNote(im, body));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -163,9 +163,8 @@ static PetscBool is_named(const SbGroup *group, const char *name)
   return (PetscBool)(!*p && !*name);
 }
 
-/* Bits of each tag set. */
-static PetscErrorCode mark_tags(const SbImport *im, PetscInt nbody, const SbBody body[], PetscInt b,
-                                PetscInt nset, const SbSet set[], uint64_t bits[])
+PetscErrorCode SbSetsBits(const SbImport *im, PetscInt nbody, const SbBody body[], PetscInt b, PetscInt nset,
+                          const SbSet set[], uint64_t bits[])
 {
   PetscFunctionBeginUser;
   PetscCall(PetscArrayzero(bits, im->ntags));
@@ -246,33 +245,33 @@ static PetscErrorCode mark_groups(const SbImport *im, const SbFaces *faces, cons
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static void count_bits(uint64_t mask, PetscInt nset, PetscInt *count, size_t stride)
+static void count_bits(uint64_t mask, PetscInt nset, PetscInt *count)
 {
-  for (PetscInt k = 0; mask && k < nset; k++) {
-    if (mask & SB_SET_BIT(k)) (*(PetscInt *)((char *)count + (size_t)k * stride))++;
-  }
+  for (PetscInt k = 0; mask && k < nset; k++) count[3 * k] += (mask & SB_SET_BIT(k)) != 0;
 }
 
 PetscErrorCode SbSetsMark(const SbImport *im, const SbFaces *faces, PetscInt nbody, const SbBody body[],
-                          PetscInt b, PetscInt nset, SbSet set[], SbMasks *m)
+                          PetscInt b, PetscInt nset, const SbSet set[], SbMasks *m)
 {
   uint64_t *bits;
 
   PetscFunctionBeginUser;
   PetscCall(mark_shapes(im, faces, &body[b], nset, set, m));
   PetscCall(PetscMalloc1(im->ntags, &bits));
-  PetscCall(mark_tags(im, nbody, body, b, nset, set, bits));
+  PetscCall(SbSetsBits(im, nbody, body, b, nset, set, bits));
   PetscCall(mark_groups(im, faces, bits, m));
   PetscCall(PetscFree(bits));
   if (body[b].given) PetscCall(SbGivenMark(&body[b], faces, m));
-  if (!nset) PetscFunctionReturn(PETSC_SUCCESS);
-  for (PetscInt v = 0; v < im->nvert; v++) count_bits(m->vert[v], nset, &set->nvert, sizeof(*set));
-  for (PetscInt c = 0; c < im->item[3].n; c++) count_bits(m->cell[c], nset, &set->ncell, sizeof(*set));
-  for (PetscInt s = 0; s < 4 * im->item[3].n; s++) {
-    if (m->face[s] & SB_ON_BOUNDARY)
-      count_bits(m->face[s] & ~SB_ON_BOUNDARY, nset, &set->nfacet, sizeof(*set));
-  }
   PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+void SbSetsCount(PetscInt nvert, PetscInt ncell, const SbMasks *m, PetscInt nset, PetscInt count[][3])
+{
+  for (PetscInt v = 0; v < nvert; v++) count_bits(m->vert[v], nset, &count[0][0]);
+  for (PetscInt c = 0; c < ncell; c++) count_bits(m->cell[c], nset, &count[0][2]);
+  for (PetscInt s = 0; s < 4 * ncell; s++) {
+    if (m->face[s] & SB_ON_BOUNDARY) count_bits(m->face[s] & ~SB_ON_BOUNDARY, nset, &count[0][1]);
+  }
 }
 
 /* ------------------------------------------------------------------ sets that hold nothing */

@@ -1,21 +1,37 @@
 /*
-  whole.c - all bodies in one piece, on rank 0: read, placed, checked, marked by sets, numbered one after the other.
+  whole.c - all bodies in one piece: read, placed, checked, marked by sets, numbered one after the other.
 
-  Reading a mesh takes the most memory here, on one rank: what is no longer needed is freed before the next thing is made.
+  Rank 0 reads a body alone, unless its file has slabs: then every rank reads one (slab.c). When a rank fails alone, its message is caught, sent to
+  the others, and raised by all of them, so that nobody waits for a rank that is gone.
+
+  Reading a mesh takes the most memory here: what is no longer needed is freed before the next thing is made.
 
   Original numbers follow from here: bodies in the order of the scenario, vertices and cells in the order of their files.
 */
 #include "mesh_impl.h"
 
-/* A body before the merge. */
-typedef struct {
-  SbFaces faces;
-  SbMasks masks;
-} Part;
+#define FEW 50000 /* tets that rank 0 reads alone: it takes 0.02 s */
+
+PetscErrorCode SbCaughtRaise(MPI_Comm comm, const SbCaught *caught)
+{
+  SbCaught first = *caught;
+  PetscMPIInt rank, size, who;
+
+  PetscFunctionBeginUser;
+  PetscCallMPI(MPI_Comm_rank(comm, &rank));
+  PetscCallMPI(MPI_Comm_size(comm, &size));
+  who = caught->code ? rank : size;
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &who, 1, MPI_INT, MPI_MIN, comm));
+  if (who == size) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCallMPI(MPI_Bcast(&first, (int)sizeof(first), MPI_BYTE, who, comm));
+  SETERRQ(comm, (PetscErrorCode)first.code, "%s", first.text);
+}
 
 static PetscErrorCode prepare(PetscInt nbody, SbBody body[], PetscInt b, PetscInt nset, SbSet set[],
-                              SbImport *im, Part *part)
+                              SbImport *im, SbPart *part)
 {
+  PetscInt *count;
+
   PetscFunctionBeginUser;
   if (body[b].given)
     PetscCall(SbImportGiven(&body[b], im));
@@ -27,21 +43,48 @@ static PetscErrorCode prepare(PetscInt nbody, SbBody body[], PetscInt b, PetscIn
   PetscCall(PetscCalloc1(im->item[3].n, &part->masks.cell));
   PetscCall(PetscCalloc1(4 * (size_t)im->item[3].n, &part->masks.face));
   PetscCall(SbSetsMark(im, &part->faces, nbody, body, b, nset, set, &part->masks));
+  PetscCall(PetscCalloc1(3 * nset, &count));
+  SbSetsCount(im->nvert, im->item[3].n, &part->masks, nset, (PetscInt(*)[3])count);
+  for (PetscInt k = 0; k < nset; k++) {
+    set[k].nvert += count[3 * k];
+    set[k].nfacet += count[3 * k + 1];
+    set[k].ncell += count[3 * k + 2];
+  }
+  PetscCall(PetscFree(count));
   PetscCall(PetscFree(part->faces.face)); /* the neighbours are found */
   PetscCall(PetscFree(part->faces.start));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Copies the tets of a body behind those already there, and frees them. */
-static PetscErrorCode append_cells(SbImport *im, Part *part, PetscInt vert0, PetscInt cell0, SbWhole *w)
+/* Where a body begins: among the original numbers, and on this rank. */
+typedef struct {
+  PetscInt orig_vert, orig_cell, vert, cell, remote;
+} Begin;
+
+static void next_body(const SbBody *body, const SbImport *im, PetscInt ncell, const SbPart *part, Begin *at)
 {
+  at->orig_vert += body->nvert;
+  at->orig_cell += body->ncell;
+  at->vert += im->nvert;
+  at->cell += ncell;
+  at->remote += part->nremote;
+}
+
+/* Copies the tets of a body behind those already there, and frees them. */
+static PetscErrorCode append_cells(SbImport *im, SbPart *part, const Begin *at, SbWhole *w)
+{
+  const PetscInt ncell = im->item[3].n;
+
   PetscFunctionBeginUser;
-  for (PetscInt i = 0; i < 4 * im->item[3].n; i++) {
+  for (PetscInt i = 0; i < 4 * ncell; i++) {
     const PetscInt n = part->faces.neighbour[i];
 
-    w->cell[4 * cell0 + i] = vert0 + im->item[3].vert[i];
-    w->neighbour[4 * cell0 + i] = n < 0 ? -1 : cell0 + n;
+    w->cell[4 * at->cell + i] = at->vert + im->item[3].vert[i];
+    w->neighbour[4 * at->cell + i] = n < 0       ? -1
+                                     : n < ncell ? at->cell + n
+                                                 : w->ncell + at->remote + n - ncell;
   }
+  PetscCall(PetscArraycpy(w->remote + at->remote, part->remote, part->nremote));
   PetscCall(SbFacesDestroy(&part->faces));
   for (int d = 0; d < 4; d++) {
     PetscCall(PetscFree(im->item[d].vert));
@@ -52,22 +95,22 @@ static PetscErrorCode append_cells(SbImport *im, Part *part, PetscInt vert0, Pet
 }
 
 /* What travels with the points of body b. */
-static PetscErrorCode append_points(const SbImport *im, const Part *part, PetscInt b, PetscInt vert0,
-                                    PetscInt cell0, SbWhole *w)
+static PetscErrorCode append_points(const SbImport *im, const SbPart *part, PetscInt b, const Begin *at,
+                                    SbWhole *w)
 {
   PetscFunctionBeginUser;
   for (PetscInt c = 0; c < im->item[3].n; c++) {
-    SbCellData *p = &w->data[cell0 + c];
+    SbCellData *p = &w->data[at->cell + c];
 
-    p->orig = cell0 + c;
+    p->orig = at->orig_cell + part->first + c;
     p->body = b;
     p->set = part->masks.cell[c];
     for (int f = 0; f < 4; f++) p->face[f] = part->masks.face[4 * c + f];
   }
   for (PetscInt v = 0; v < im->nvert; v++) {
-    SbVertexData *p = &w->vertex[vert0 + v];
+    SbVertexData *p = &w->vertex[at->vert + v];
 
-    p->orig = vert0 + v;
+    p->orig = at->orig_vert + (part->orig ? part->orig[v] : v);
     p->body = b;
     p->set = part->masks.vert[v];
     for (int i = 0; i < 3; i++) p->x[i] = im->x[3 * v + i];
@@ -76,67 +119,135 @@ static PetscErrorCode append_points(const SbImport *im, const Part *part, PetscI
 }
 
 /* All bodies one after the other. */
-static PetscErrorCode merge(PetscInt nbody, const SbBody body[], SbImport im[], Part part[], SbWhole *w)
+static PetscErrorCode merge(PetscInt nbody, const SbBody body[], SbImport im[], SbPart part[], SbWhole *w)
 {
-  PetscInt vert0 = 0, cell0 = 0;
+  Begin at = {0};
 
   PetscFunctionBeginUser;
   PetscCall(PetscMalloc1(4 * (size_t)w->ncell, &w->cell));
   PetscCall(PetscMalloc1(4 * (size_t)w->ncell, &w->neighbour));
+  PetscCall(PetscMalloc1(w->nremote, &w->remote));
   for (PetscInt b = 0; b < nbody; b++) {
-    PetscCall(append_cells(&im[b], &part[b], vert0, cell0, w));
-    vert0 += body[b].nvert;
-    cell0 += body[b].ncell;
+    PetscCall(append_cells(&im[b], &part[b], &at, w));
+    next_body(&body[b], &im[b], im[b].item[3].n, &part[b], &at);
   }
   PetscCall(PetscMalloc1(w->ncell, &w->data));
   PetscCall(PetscMalloc1(w->nvert, &w->vertex));
-  vert0 = cell0 = 0;
+  at = (Begin){0};
   for (PetscInt b = 0; b < nbody; b++) {
-    PetscCall(append_points(&im[b], &part[b], b, vert0, cell0, w));
-    vert0 += body[b].nvert;
-    cell0 += body[b].ncell;
+    PetscCall(append_points(&im[b], &part[b], b, &at, w));
+    next_body(&body[b], &im[b], im[b].item[3].n, &part[b], &at);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode build(PetscInt nbody, SbBody body[], PetscInt nset, SbSet set[], SbImport im[],
-                            Part part[], SbWhole *w)
+/* Which bodies are read in slabs, alike on all ranks. */
+static PetscErrorCode find_slabs(MPI_Comm comm, SbReading reading, PetscInt nbody, const SbBody body[],
+                                 PetscBool slabs[])
 {
+  PetscMPIInt rank, size;
+  PetscInt ncell;
+
   PetscFunctionBeginUser;
-  for (PetscInt k = 0; k < nset; k++) set[k].nvert = set[k].nfacet = set[k].ncell = 0;
+  PetscCallMPI(MPI_Comm_rank(comm, &rank));
+  PetscCallMPI(MPI_Comm_size(comm, &size));
   for (PetscInt b = 0; b < nbody; b++) {
-    PetscCall(prepare(nbody, body, b, nset, set, &im[b], &part[b]));
-    PetscCheck(w->ncell <= PETSC_MAX_INT / 8 - body[b].ncell && w->nvert <= PETSC_MAX_INT / 8 - body[b].nvert,
+    slabs[b] = PETSC_FALSE;
+    if (size == 1 || rank || reading == SB_READING_RANK0) continue;
+    PetscCall(SbImportSlabs(&body[b], &ncell));
+    slabs[b] = (PetscBool)(ncell > (reading == SB_READING_SLABS ? 0 : FEW));
+  }
+  PetscCallMPI(MPI_Bcast(slabs, (PetscMPIInt)nbody, SB_MPI_BOOL, 0, comm));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Rank 0 tells what it knows of bodies and sets; a mesh in memory is each rank's own. */
+static PetscErrorCode tell(MPI_Comm comm, PetscInt nbody, SbBody body[], PetscInt nset, SbSet set[])
+{
+  SbGiven **given;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscMalloc1(nbody, &given));
+  for (PetscInt b = 0; b < nbody; b++) given[b] = body[b].given;
+  PetscCallMPI(MPI_Bcast(body, (int)((size_t)nbody * sizeof(*body)), MPI_BYTE, 0, comm));
+  for (PetscInt b = 0; b < nbody; b++) body[b].given = given[b];
+  PetscCall(PetscFree(given));
+  PetscCallMPI(MPI_Bcast(set, (int)((size_t)nset * sizeof(*set)), MPI_BYTE, 0, comm));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Rank 0: more than can be numbered, and sets that hold nothing. */
+static PetscErrorCode check_all(PetscInt nbody, const SbBody body[], const SbImport im[], PetscInt nset,
+                                const SbSet set[])
+{
+  PetscInt nvert = 0, ncell = 0;
+
+  PetscFunctionBeginUser;
+  for (PetscInt b = 0; b < nbody; b++) {
+    PetscCheck(ncell <= PETSC_MAX_INT / 8 - body[b].ncell && nvert <= PETSC_MAX_INT / 8 - body[b].nvert,
                PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
                "body '%s': all bodies together have more tets than this build can number", body[b].name);
-    w->ncell += body[b].ncell;
-    w->nvert += body[b].nvert;
+    ncell += body[b].ncell;
+    nvert += body[b].nvert;
   }
   PetscCall(SbSetsCheck(nbody, body, im, nset, set));
-  w->Nvert = w->nvert;
-  w->Ncell = w->ncell;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode build(MPI_Comm comm, const PetscBool slabs[], PetscInt nbody, SbBody body[],
+                            PetscInt nset, SbSet set[], SbImport im[], SbPart part[], SbWhole *w)
+{
+  SbCaught caught = {0, ""};
+  PetscMPIInt rank;
+
+  PetscFunctionBeginUser;
+  PetscCallMPI(MPI_Comm_rank(comm, &rank));
+  for (PetscInt k = 0; k < nset; k++) set[k].nvert = set[k].nfacet = set[k].ncell = 0;
+  for (PetscInt b = 0; b < nbody; b++) {
+    if (slabs[b]) {
+      PetscCall(SbSlabPrepare(comm, w->ncell, nbody, body, b, nset, set, &im[b], &part[b]));
+    } else {
+      if (!rank) SB_CATCH(&caught, prepare(nbody, body, b, nset, set, &im[b], &part[b]));
+      PetscCall(SbCaughtRaise(comm, &caught));
+    }
+    w->ncell += im[b].item[3].n;
+    w->nvert += im[b].nvert;
+    w->nremote += part[b].nremote;
+  }
+  if (!rank) SB_CATCH(&caught, check_all(nbody, body, im, nset, set));
+  PetscCall(SbCaughtRaise(comm, &caught));
+  PetscCall(tell(comm, nbody, body, nset, set));
+  for (PetscInt b = 0; b < nbody; b++) {
+    w->Nvert += body[b].nvert;
+    w->Ncell += body[b].ncell;
+  }
   PetscCall(merge(nbody, body, im, part, w));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbWholeCreate(PetscInt nbody, SbBody body[], PetscInt nset, SbSet set[], SbWhole *w)
+PetscErrorCode SbWholeCreate(MPI_Comm comm, SbReading reading, PetscInt nbody, SbBody body[], PetscInt nset,
+                             SbSet set[], SbWhole *w)
 {
   SbImport *im;
-  Part *part;
+  SbPart *part;
+  PetscBool *slabs;
   PetscErrorCode ierr;
 
   PetscFunctionBeginUser;
   PetscCall(PetscMemzero(w, sizeof(*w)));
-  PetscCall(PetscCalloc2(nbody, &im, nbody, &part));
-  ierr = build(nbody, body, nset, set, im, part, w);
+  PetscCall(PetscCalloc3(nbody, &im, nbody, &part, nbody, &slabs));
+  PetscCall(find_slabs(comm, reading, nbody, body, slabs));
+  ierr = build(comm, slabs, nbody, body, nset, set, im, part, w);
   for (PetscInt b = 0; b < nbody; b++) {
     PetscCall(SbImportDestroy(&im[b]));
     PetscCall(SbFacesDestroy(&part[b].faces));
     PetscCall(PetscFree(part[b].masks.vert));
     PetscCall(PetscFree(part[b].masks.cell));
     PetscCall(PetscFree(part[b].masks.face));
+    PetscCall(PetscFree(part[b].orig));
+    PetscCall(PetscFree(part[b].remote));
   }
-  PetscCall(PetscFree2(im, part));
+  PetscCall(PetscFree3(im, part, slabs));
   if (ierr) PetscCall(SbWholeDestroy(w));
   PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -2,10 +2,11 @@
   Seconds and memory from a mesh file to the distributed mesh, phase by phase.
 
     mesh -mesh big.msh
+    mesh -mesh big.h5 -slabs      (all ranks read)
 
   Seconds are elapsed ones, and as NAME_cpu those that the busiest rank has computed for (also while it waits for messages).
 
-  read: the file to arrays on rank 0; check: what a run checks, and all bodies in one piece; distribute: partition and
+  read: the file to arrays on rank 0; read_and_check: and what a run checks, all bodies in one piece; distribute: partition and
   migration; number: own numbering. Memory is the largest resident size within a phase (VmHWM, set back before it), of rank 0
   and of the largest other rank, less what the process had at its start. One run per process: pages that were freed stay.
 */
@@ -81,20 +82,7 @@ static PetscErrorCode read_only(const SbBody *body)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode whole_mesh(SbBody *body, SbWhole *whole)
-{
-  PetscMPIInt rank;
-
-  PetscFunctionBeginUser;
-  PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
-  PetscCall(PetscMemzero(whole, sizeof(*whole)));
-  if (!rank) PetscCall(SbWholeCreate(1, body, 0, NULL, whole));
-  PetscCallMPI(MPI_Bcast(&whole->Nvert, 1, MPIU_INT, 0, PETSC_COMM_WORLD));
-  PetscCallMPI(MPI_Bcast(&whole->Ncell, 1, MPIU_INT, 0, PETSC_COMM_WORLD));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode measure(SbBody *body)
+static PetscErrorCode measure(SbBody *body, SbReading reading)
 {
   Phase p;
   SbWhole whole;
@@ -104,11 +92,13 @@ static PetscErrorCode measure(SbBody *body)
   PetscFunctionBeginUser;
   PetscCall(PetscMemzero(&p, sizeof(p)));
   p.base = status("VmRSS:");
+  if (reading == SB_READING_RANK0) {
+    phase_begin(&p);
+    PetscCall(read_only(body));
+    PetscCall(phase_end(&p, "read"));
+  }
   phase_begin(&p);
-  PetscCall(read_only(body));
-  PetscCall(phase_end(&p, "read"));
-  phase_begin(&p);
-  PetscCall(whole_mesh(body, &whole));
+  PetscCall(SbWholeCreate(PETSC_COMM_WORLD, reading, 1, body, 0, NULL, &whole));
   PetscCall(phase_end(&p, "read_and_check"));
   PetscCall(PetscNew(&mesh));
   mesh->comm = PETSC_COMM_WORLD;
@@ -131,6 +121,7 @@ static PetscErrorCode measure(SbBody *body)
 int main(int argc, char **argv)
 {
   SbBody body;
+  PetscBool slabs = PETSC_FALSE;
 
   PetscFunctionBeginUser;
   PetscCall(PetscInitialize(&argc, &argv, NULL, NULL));
@@ -140,7 +131,8 @@ int main(int argc, char **argv)
   body.scale = 1;
   PetscCall(PetscStrncpy(body.mesh, "box:0.4,0.1,0.1:8", sizeof(body.mesh)));
   PetscCall(perf_argument("-mesh", sizeof(body.mesh), body.mesh));
-  PetscCall(measure(&body));
+  PetscCall(PetscOptionsGetBool(NULL, NULL, "-slabs", &slabs, NULL));
+  PetscCall(measure(&body, slabs ? SB_READING_SLABS : SB_READING_RANK0));
   PetscCall(SbOptionsReset());
   PetscCall(PetscFinalize());
   return 0;

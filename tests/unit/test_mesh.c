@@ -104,7 +104,7 @@ static PetscErrorCode test_scene(const char *partitioner, PetscBool face_nodes)
   body[0].face_nodes = face_nodes;
   PetscCall(SbMeshCreate(PETSC_COMM_WORLD, 3, body, NSET, set, &mesh));
   PetscCall(SbMeshValidate(mesh));
-  PetscCall(SbWholeCreate(3, body_again, NSET, set_again, &whole));
+  PetscCall(SbWholeCreate(PETSC_COMM_SELF, SB_READING_AUTO, 3, body_again, NSET, set_again, &whole));
   PetscCall(compare_with_whole(mesh, &whole));
   PetscCall(check_broadcast(mesh));
   if (face_nodes) PetscCall(check_layer(mesh));

@@ -14,7 +14,7 @@ static PetscErrorCode cut(const char *mesh, SbPartitioner type, PetscInt *most, 
   PetscFunctionBeginUser;
   PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
   PetscCallMPI(MPI_Comm_size(PETSC_COMM_WORLD, &size));
-  PetscCall(SbWholeCreate(1, &body, 0, NULL, &whole));
+  PetscCall(SbWholeCreate(PETSC_COMM_SELF, SB_READING_AUTO, 1, &body, 0, NULL, &whole));
   if (rank) whole.nvert = whole.ncell = 0;
   PetscCall(PetscMalloc1(whole.ncell, &part));
   PetscCall(SbPartition(PETSC_COMM_WORLD, type, &whole, part));

@@ -61,7 +61,7 @@ static PetscErrorCode build(const char *text, SbSet *set, SbWhole *whole)
   PetscFunctionBeginUser;
   body[1].translate[0] = 5;
   PetscCall(test_set("clamp", text, set));
-  PetscCall(SbWholeCreate(2, body, 1, set, whole));
+  PetscCall(SbWholeCreate(PETSC_COMM_SELF, SB_READING_AUTO, 2, body, 1, set, whole));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

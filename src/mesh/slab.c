@@ -1,0 +1,675 @@
+/*
+  slab.c - one body read by all ranks: each has a block of the file's tets and keeps a block of its vertices.
+
+  The keeper of a vertex is asked for its place, and knows which ranks' tets use it; there vertices that no tet uses are found, and
+  what belongs to a vertex on several ranks is joined. A face between tets of two ranks is matched by the keeper of its lowest
+  vertex, and so are the edges of the surface. A triangle of a group goes to the keeper of its lowest vertex, and from there to all ranks that use it: one of them has
+  the tet. The parts that tets hang together in on each rank are joined on rank 0, along vertices that several ranks use.
+
+  A rank has about as much of the mesh as any other: everything here is of the size of its block, but for the pairs of parts that rank 0 joins (few,
+  unless the tets of the file are in random order) and 4 bytes for each vertex between the lowest and the highest one of its tets.
+  What comes out is, number by number, what rank 0 alone makes of the file (whole.c), whatever the ranks; volumes may differ in the last bits.
+*/
+#include <stdlib.h>
+#include "mesh_impl.h"
+
+typedef struct {
+  MPI_Comm comm;
+  PetscMPIInt rank, size;
+  SbImport *im;
+  SbPart *part;
+  SbSlabRows rows; /* vertices that this rank keeps */
+  PetscInt nkept;
+  PetscReal *x;      /* [nkept][3] */
+  PetscInt *number;  /* [nkept] original number, -1: no tet uses it */
+  uint64_t *mask;    /* [nkept] sets */
+  SbRoute vert;      /* vertices of this rank's tets, to their keepers */
+  PetscInt *used;    /* [im->nvert] their numbers in the file, ascending */
+  PetscInt *asked;   /* [vert.nrecv] place of each among those that are kept */
+  PetscInt *start;   /* [nkept + 1] */
+  PetscMPIInt *user; /* [start[nkept]] ranks that use a vertex, ascending */
+  PetscBool *shared; /* [im->nvert] other ranks use it, too */
+} Slab;
+
+static PetscErrorCode slab_destroy(Slab *s)
+{
+  PetscFunctionBeginUser;
+  PetscCall(PetscFree(s->x));
+  PetscCall(PetscFree(s->number));
+  PetscCall(PetscFree(s->mask));
+  if (s->vert.scount) PetscCall(SbRouteDestroy(&s->vert));
+  PetscCall(PetscFree(s->used));
+  PetscCall(PetscFree(s->asked));
+  PetscCall(PetscFree(s->start));
+  PetscCall(PetscFree(s->user));
+  PetscCall(PetscFree(s->shared));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static inline PetscMPIInt keeper(const Slab *s, PetscInt vert)
+{
+  return (PetscMPIInt)(vert / s->rows.block);
+}
+
+static PetscErrorCode sum(const Slab *s, PetscInt n, PetscInt value[])
+{
+  PetscFunctionBeginUser;
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, value, (PetscMPIInt)n, MPIU_INT, MPI_SUM, s->comm));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ vertices */
+
+/* The vertices of the tets, ascending; tets then refer to them. */
+static PetscErrorCode find_used(Slab *s)
+{
+  SbItems *tets = &s->im->item[3];
+  PetscInt low = PETSC_MAX_INT, high = -1, n = 0, *map;
+
+  PetscFunctionBeginUser;
+  for (PetscInt i = 0; i < 4 * tets->n; i++) {
+    low = PetscMin(low, tets->vert[i]);
+    high = PetscMax(high, tets->vert[i]);
+  }
+  PetscCall(PetscCalloc1(PetscMax(0, high - low + 1), &map));
+  for (PetscInt i = 0; i < 4 * tets->n; i++) {
+    n += !map[tets->vert[i] - low];
+    map[tets->vert[i] - low] = 1;
+  }
+  PetscCall(PetscMalloc1(n, &s->used));
+  n = 0;
+  for (PetscInt v = low; v <= high; v++) {
+    if (!map[v - low]) continue;
+    s->used[n] = v;
+    map[v - low] = n++;
+  }
+  for (PetscInt i = 0; i < 4 * tets->n; i++) tets->vert[i] = map[tets->vert[i] - low];
+  PetscCall(PetscFree(map));
+  /* what was read is what this rank keeps */
+  s->nkept = s->im->nvert;
+  s->x = s->im->x;
+  s->im->x = NULL;
+  PetscCall(PetscFree(s->im->vert_number));
+  s->im->nvert = n;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Who uses the vertices that are kept here, and their original numbers. */
+static PetscErrorCode list_users(Slab *s)
+{
+  PetscInt n = 0, before;
+
+  PetscFunctionBeginUser;
+  for (PetscInt i = 0; i < s->vert.nrecv; i++) s->asked[i] -= s->rows.first;
+  PetscCall(PetscCalloc1(s->nkept + 2, &s->start));
+  PetscCall(PetscMalloc1(s->vert.nrecv, &s->user));
+  for (PetscInt i = 0; i < s->vert.nrecv; i++) s->start[s->asked[i] + 2]++;
+  for (PetscInt v = 0; v < s->nkept; v++) s->start[v + 2] += s->start[v + 1];
+  for (PetscMPIInt r = 0; r < s->size; r++) {
+    for (PetscInt i = s->vert.rfirst[r]; i < s->vert.rfirst[r] + s->vert.rcount[r]; i++)
+      s->user[s->start[s->asked[i] + 1]++] = r;
+  }
+  for (PetscInt v = 0; v < s->nkept; v++) n += s->start[v + 1] > s->start[v];
+  PetscCallMPI(MPI_Scan(&n, &before, 1, MPIU_INT, MPI_SUM, s->comm));
+  before -= n;
+  PetscCall(PetscMalloc1(s->nkept, &s->number));
+  for (PetscInt v = 0; v < s->nkept; v++) s->number[v] = s->start[v + 1] > s->start[v] ? before++ : -1;
+  s->im->nunused = s->nkept - n;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Places and original numbers of the vertices of this rank's tets. */
+static PetscErrorCode ask_keepers(Slab *s)
+{
+  typedef struct {
+    PetscReal x[3];
+    PetscInt number, nuser;
+  } Answer;
+  SbImport *im = s->im;
+  PetscMPIInt *dest;
+  Answer *answer, *result;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscMalloc1(im->nvert, &dest));
+  for (PetscInt v = 0; v < im->nvert; v++) dest[v] = keeper(s, s->used[v]);
+  PetscCall(SbRouteCreate(s->comm, im->nvert, dest, &s->vert));
+  PetscCall(PetscFree(dest));
+  PetscCall(SbRouteSend(&s->vert, sizeof(PetscInt), s->used, &s->asked));
+  PetscCall(list_users(s));
+  PetscCall(PetscMalloc2(s->vert.nrecv, &answer, im->nvert, &result));
+  for (PetscInt i = 0; i < s->vert.nrecv; i++) {
+    const PetscInt v = s->asked[i];
+
+    for (int k = 0; k < 3; k++) answer[i].x[k] = s->x[3 * v + k];
+    answer[i].number = s->number[v];
+    answer[i].nuser = s->start[v + 1] - s->start[v];
+  }
+  PetscCall(SbRouteReply(&s->vert, sizeof(Answer), answer, result));
+  PetscCall(PetscFree(s->x));
+  PetscCall(SbImportSetVertices(im, im->nvert));
+  PetscCall(PetscMalloc1(im->nvert, &s->part->orig));
+  PetscCall(PetscMalloc1(im->nvert, &s->shared));
+  for (PetscInt v = 0; v < im->nvert; v++) {
+    for (int k = 0; k < 3; k++) im->x[3 * v + k] = result[v].x[k];
+    im->vert_number[v] = s->used[v] + 1;
+    s->part->orig[v] = result[v].number;
+    s->shared[v] = (PetscBool)(result[v].nuser > 1);
+  }
+  PetscCall(PetscFree2(answer, result));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ faces between tets of two ranks */
+
+typedef struct {
+  PetscInt vert[3], cell; /* ascending; `cell` as SbPart.remote numbers it */
+  int64_t number;         /* of the tet in the file */
+  PetscInt at;            /* place among those received */
+} Face;
+typedef struct {
+  PetscInt rank, cell;
+  int64_t number;
+} Across;
+
+static int compare_faces(const void *a, const void *b)
+{
+  const Face *p = (const Face *)a, *q = (const Face *)b;
+
+  for (int k = 0; k < 3; k++)
+    if (p->vert[k] != q->vert[k]) return p->vert[k] < q->vert[k] ? -1 : 1;
+  return (p->at > q->at) - (p->at < q->at);
+}
+
+/* What lies across each of the faces that came here. */
+static PetscErrorCode match_faces(const Slab *s, const SbRoute *route, Face face[], Across across[])
+{
+  PetscInt nshared = 0, first = -1, m;
+
+  PetscFunctionBeginUser;
+  for (PetscInt i = 0; i < route->nrecv; i++) {
+    face[i].at = i;
+    across[i] = (Across){-1, -1, 0};
+  }
+  qsort(face, (size_t)route->nrecv, sizeof(*face), compare_faces);
+  for (PetscInt i = 0; i < route->nrecv; i += m) {
+    const Face *f = face + i;
+
+    for (m = 1; i + m < route->nrecv && !memcmp(f->vert, f[m].vert, sizeof(f->vert));) m++;
+    if (m == 2) {
+      for (int k = 0; k < 2; k++)
+        across[f[k].at] = (Across){SbRouteSource(route, f[1 - k].at), f[1 - k].cell, f[1 - k].number};
+    } else if (m > 2 && !nshared++)
+      first = i;
+  }
+  if (nshared)
+    PetscCall(SbImportOverlap(
+      s->im, (const int64_t[3]){face[first].number, face[first + 1].number, face[first + 2].number},
+      nshared));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Cells of other ranks become neighbours; one that lies across all four faces is the same tet again. */
+static PetscErrorCode link_faces(Slab *s, PetscInt nsend, const PetscInt slot[], const Across across[])
+{
+  SbFaces *faces = &s->part->faces;
+  const PetscInt ncell = s->im->item[3].n;
+  PetscInt n = 0;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscMalloc1(nsend, &s->part->remote));
+  for (PetscInt i = 0; i < nsend; i++) {
+    if (across[i].rank < 0 || across[i].rank == s->rank) continue;
+    faces->neighbour[slot[i]] = ncell + n;
+    s->part->remote[n++] = (PetscSFNode){across[i].rank, across[i].cell};
+    faces->nboundary--;
+  }
+  s->part->nremote = n;
+  for (PetscInt i = 3; i < nsend; i++) {
+    if (slot[i] != slot[i - 3] + 3 || slot[i] % 4 != 3 || across[i].rank < 0 || across[i].rank == s->rank)
+      continue;
+    if (across[i].number == across[i - 1].number && across[i].number == across[i - 2].number &&
+        across[i].number == across[i - 3].number)
+      PetscCall(SbImportTwice(s->im, s->im->item[3].number[slot[i] / 4], across[i].number));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* All faces whose vertices other ranks use, too, those with a tet of this rank on both sides among them: a third one is found. */
+static PetscErrorCode join_faces(Slab *s, PetscInt before)
+{
+  const SbItems *tets = &s->im->item[3];
+  SbCaught caught = {0, ""};
+  PetscInt n = 0, *slot;
+  PetscMPIInt *dest;
+  SbRoute route;
+  Face *face, *got;
+  Across *across, *result;
+
+  PetscFunctionBeginUser;
+  for (int pass = 0; pass < 2; pass++) {
+    if (pass) PetscCall(PetscMalloc3(n, &face, n, &slot, n, &dest));
+    n = 0;
+    for (PetscInt i = 0; i < 4 * tets->n; i++) {
+      PetscInt v[3];
+      PetscBool all = PETSC_TRUE;
+
+      for (int k = 0; k < 3; k++) {
+        v[k] = tets->vert[4 * (i / 4) + SbFaceVertex[i % 4][k]];
+        all = (PetscBool)(all && s->shared[v[k]]);
+      }
+      if (!all) continue;
+      if (pass) {
+        PetscCall(PetscSortInt(3, v));
+        PetscCall(PetscMemzero(&face[n], sizeof(*face)));
+        for (int k = 0; k < 3; k++) face[n].vert[k] = s->used[v[k]];
+        face[n].cell = before + i / 4;
+        face[n].number = tets->number[i / 4];
+        slot[n] = i;
+        dest[n] = keeper(s, face[n].vert[0]);
+      }
+      n++;
+    }
+  }
+  PetscCall(SbRouteCreate(s->comm, n, dest, &route));
+  PetscCall(SbRouteSend(&route, sizeof(Face), face, &got));
+  PetscCall(PetscMalloc2(route.nrecv, &across, n, &result));
+  SB_CATCH(&caught, match_faces(s, &route, got, across));
+  PetscCall(SbRouteReply(&route, sizeof(Across), across, result));
+  if (!caught.code) SB_CATCH(&caught, link_faces(s, n, slot, result));
+  PetscCall(PetscFree(got));
+  PetscCall(PetscFree2(across, result));
+  PetscCall(PetscFree3(face, slot, dest));
+  PetscCall(SbRouteDestroy(&route));
+  PetscCall(SbCaughtRaise(s->comm, &caught));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static int compare_pairs(const void *a, const void *b)
+{
+  return memcmp(a, b, 2 * sizeof(PetscInt));
+}
+
+/* Edges of the surface with more than two facets. */
+static PetscErrorCode count_pinched(Slab *s)
+{
+  const SbItems *tets = &s->im->item[3];
+  const PetscInt n = 3 * s->part->faces.nboundary;
+  PetscInt *edge, *got, at = 0, m;
+  PetscMPIInt *dest;
+  SbRoute route;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscMalloc2(2 * (size_t)n, &edge, n, &dest));
+  for (PetscInt i = 0; i < 4 * tets->n; i++) {
+    if (s->part->faces.neighbour[i] >= 0) continue;
+    for (int k = 0; k < 3; k++) {
+      const PetscInt *v = tets->vert + 4 * (i / 4), a = v[SbFaceVertex[i % 4][k]],
+                     b = v[SbFaceVertex[i % 4][(k + 1) % 3]];
+
+      edge[2 * at] = s->used[PetscMin(a, b)];
+      edge[2 * at + 1] = s->used[PetscMax(a, b)];
+      dest[at] = keeper(s, edge[2 * at]);
+      at++;
+    }
+  }
+  PetscCall(SbRouteCreate(s->comm, n, dest, &route));
+  PetscCall(SbRouteSend(&route, 2 * sizeof(PetscInt), edge, &got));
+  PetscCall(PetscFree2(edge, dest));
+  qsort(got, (size_t)route.nrecv, 2 * sizeof(PetscInt), compare_pairs);
+  for (PetscInt i = 0; i < route.nrecv; i += m) {
+    for (m = 1; i + m < route.nrecv && !compare_pairs(got + 2 * i, got + 2 * (i + m));) m++;
+    s->im->npinched += m > 2;
+  }
+  PetscCall(PetscFree(got));
+  PetscCall(SbRouteDestroy(&route));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ parts that share no vertex */
+
+/* Rank 0 joins the parts of all ranks along these pairs. */
+static PetscErrorCode join_parts(const Slab *s, PetscInt N, PetscInt npair, const PetscInt pair[],
+                                 PetscInt *npart)
+{
+  PetscInt *parent, *got;
+  PetscMPIInt *dest;
+  SbRoute route;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscCalloc1(npair, &dest));
+  PetscCall(SbRouteCreate(s->comm, npair, dest, &route));
+  PetscCall(SbRouteSend(&route, 2 * sizeof(PetscInt), pair, &got));
+  PetscCall(PetscFree(dest));
+  *npart = N;
+  PetscCall(PetscMalloc1(s->rank ? 0 : N, &parent));
+  for (PetscInt p = 0; p < N && !s->rank; p++) parent[p] = p;
+  for (PetscInt i = 0; i < route.nrecv; i++) {
+    PetscInt a = got[2 * i], b = got[2 * i + 1];
+
+    for (; parent[a] != a; a = parent[a]) parent[a] = parent[parent[a]];
+    for (; parent[b] != b; b = parent[b]) parent[b] = parent[parent[b]];
+    if (a == b) continue;
+    parent[PetscMax(a, b)] = PetscMin(a, b);
+    (*npart)--;
+  }
+  PetscCall(PetscFree(parent));
+  PetscCall(PetscFree(got));
+  PetscCall(SbRouteDestroy(&route));
+  PetscCallMPI(MPI_Bcast(npart, 1, MPIU_INT, 0, s->comm));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode count_parts(const Slab *s, PetscInt *npart)
+{
+  const SbImport *im = s->im;
+  PetscInt *part, *got, *pair, *user, n, first, total, npair = 0, kept = 0;
+
+  PetscFunctionBeginUser;
+  /* parts of this rank, numbered over all ranks */
+  PetscCall(PetscMalloc1(im->nvert, &part));
+  SbImportJoin(im, part, &n);
+  total = n;
+  PetscCallMPI(MPI_Scan(&n, &first, 1, MPIU_INT, MPI_SUM, s->comm));
+  PetscCall(sum(s, 1, &total));
+  first -= n;
+  for (PetscInt v = 0; v < im->nvert; v++) part[v] = part[v] == v ? first++ : part[part[v]];
+  /* those that meet at a vertex, each pair once */
+  PetscCall(SbRouteSend(&s->vert, sizeof(PetscInt), part, &got));
+  PetscCall(PetscFree(part));
+  PetscCall(PetscMalloc2(s->vert.nrecv, &user, 2 * (size_t)s->vert.nrecv, &pair));
+  for (PetscInt v = 0; v < s->nkept; v++) user[s->start[v]] = -1;
+  for (PetscInt i = 0; i < s->vert.nrecv; i++) {
+    PetscInt *other = &user[s->start[s->asked[i]]];
+
+    if (*other >= 0) {
+      pair[2 * npair] = *other;
+      pair[2 * npair++ + 1] = got[i];
+    }
+    *other = got[i];
+  }
+  PetscCall(PetscFree(got));
+  qsort(pair, (size_t)npair, 2 * sizeof(PetscInt), compare_pairs);
+  for (PetscInt i = 0; i < npair; i++) {
+    if (kept && !compare_pairs(pair + 2 * i, pair + 2 * (kept - 1))) continue;
+    PetscCall(PetscArraymove(pair + 2 * kept, pair + 2 * i, 2));
+    kept++;
+  }
+  PetscCall(join_parts(s, total, kept, pair, npart));
+  PetscCall(PetscFree2(user, pair));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ points, lines and triangles of groups */
+
+/* Drops items with a vertex that no tet uses; the keepers of the others get the bits of their tag sets. */
+static PetscErrorCode mark_items(Slab *s, const uint64_t bits[])
+{
+  SbImport *im = s->im;
+  SbRoute route;
+  uint64_t *mark, *got_mark;
+  PetscInt n = 0, *vert, *got;
+  PetscMPIInt *dest;
+  PetscBool *there, *is;
+
+  PetscFunctionBeginUser;
+  for (int d = 0; d < 3; d++) n += (d + 1) * im->item[d].n;
+  PetscCall(PetscMalloc4(n, &vert, n, &dest, n, &mark, n, &there));
+  n = 0;
+  for (int d = 0; d < 3; d++) {
+    for (PetscInt i = 0; i < (d + 1) * im->item[d].n; i++) {
+      vert[n] = im->item[d].vert[i];
+      dest[n] = keeper(s, vert[n]);
+      n++;
+    }
+  }
+  PetscCall(SbRouteCreate(s->comm, n, dest, &route));
+  PetscCall(SbRouteSend(&route, sizeof(PetscInt), vert, &got));
+  PetscCall(PetscMalloc1(route.nrecv, &is));
+  for (PetscInt i = 0; i < route.nrecv; i++) is[i] = (PetscBool)(s->number[got[i] - s->rows.first] >= 0);
+  PetscCall(SbRouteReply(&route, sizeof(PetscBool), is, there));
+  PetscCall(PetscFree(is));
+  n = 0;
+  for (int d = 0; d < 3; d++) {
+    SbItems *item = &im->item[d];
+    PetscInt kept = 0;
+
+    for (PetscInt i = 0; i < item->n; i++) {
+      PetscBool all = PETSC_TRUE;
+
+      for (int k = 0; k <= d; k++) all = (PetscBool)(all && there[n + k]);
+      for (int k = 0; k <= d; k++) mark[n++] = all ? bits[item->tags[i]] : 0;
+      if (!all) continue;
+      PetscCall(PetscArraymove(item->vert + (d + 1) * (size_t)kept, item->vert + (d + 1) * (size_t)i, d + 1));
+      item->tags[kept++] = item->tags[i];
+    }
+    if (d == 2) im->nlost += item->n - kept;
+    item->n = d == 2 ? kept : 0;
+  }
+  PetscCall(SbRouteSend(&route, sizeof(uint64_t), mark, &got_mark));
+  for (PetscInt i = 0; i < route.nrecv; i++) s->mask[got[i] - s->rows.first] |= got_mark[i];
+  PetscCall(PetscFree(got));
+  PetscCall(PetscFree(got_mark));
+  PetscCall(PetscFree4(vert, dest, mark, there));
+  PetscCall(SbRouteDestroy(&route));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+typedef struct {
+  PetscInt vert[3], tags;
+} Triangle;
+
+/* The triangles that are faces of this rank's tets become the triangles of its import; found[n]. */
+static PetscErrorCode keep_triangles(Slab *s, PetscInt n, const Triangle triangle[], PetscBool found[])
+{
+  SbImport *im = s->im;
+  PetscInt slots[2];
+
+  PetscFunctionBeginUser;
+  im->item[2].n = 0;
+  for (PetscInt i = 0; i < n; i++) {
+    PetscInt v[3];
+    PetscBool here = PETSC_TRUE;
+
+    for (int k = 0; k < 3; k++) {
+      PetscCall(PetscFindInt(triangle[i].vert[k], im->nvert, s->used, &v[k]));
+      here = (PetscBool)(here && v[k] >= 0);
+    }
+    found[i] = (PetscBool)(here && SbFacesFind(&s->part->faces, v, slots));
+    if (found[i]) PetscCall(SbImportAddItem(im, 2, v, triangle[i].tags, 0));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Each triangle goes to all ranks that use its lowest vertex, by way of that vertex's keeper. */
+static PetscErrorCode find_triangles(Slab *s)
+{
+  const SbItems *item = &s->im->item[2];
+  Triangle *mine, *got, *out, *in;
+  PetscInt n = 0, *from;
+  PetscMPIInt *dest;
+  PetscBool *found, *told;
+  SbRoute there, on;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscMalloc2(item->n, &mine, item->n, &dest));
+  for (PetscInt i = 0; i < item->n; i++) {
+    const PetscInt *v = item->vert + 3 * (size_t)i;
+
+    mine[i] = (Triangle){{v[0], v[1], v[2]}, item->tags[i]};
+    dest[i] = keeper(s, PetscMin(v[0], PetscMin(v[1], v[2])));
+  }
+  PetscCall(SbRouteCreate(s->comm, item->n, dest, &there));
+  PetscCall(SbRouteSend(&there, sizeof(Triangle), mine, &got));
+  PetscCall(PetscFree2(mine, dest));
+  for (int pass = 0; pass < 2; pass++) {
+    if (pass) PetscCall(PetscMalloc4(n, &out, n, &from, n, &dest, n, &told));
+    n = 0;
+    for (PetscInt i = 0; i < there.nrecv; i++) {
+      const PetscInt *t = got[i].vert, v = PetscMin(t[0], PetscMin(t[1], t[2])) - s->rows.first;
+
+      for (PetscInt k = s->start[v]; k < s->start[v + 1]; k++) {
+        if (pass) {
+          out[n] = got[i];
+          from[n] = i;
+          dest[n] = s->user[k];
+        }
+        n++;
+      }
+    }
+  }
+  PetscCall(SbRouteCreate(s->comm, n, dest, &on));
+  PetscCall(SbRouteSend(&on, sizeof(Triangle), out, &in));
+  PetscCall(PetscMalloc1(on.nrecv, &found));
+  PetscCall(keep_triangles(s, on.nrecv, in, found));
+  PetscCall(SbRouteReply(&on, sizeof(PetscBool), found, told));
+  PetscCall(PetscFree(found));
+  /* lost: found by none of them */
+  PetscCall(PetscCalloc1(there.nrecv, &found));
+  for (PetscInt i = 0; i < n; i++) found[from[i]] = (PetscBool)(found[from[i]] || told[i]);
+  for (PetscInt i = 0; i < there.nrecv; i++) s->im->nlost += !found[i];
+  PetscCall(PetscFree(found));
+  PetscCall(PetscFree(in));
+  PetscCall(PetscFree(got));
+  PetscCall(PetscFree4(out, from, dest, told));
+  PetscCall(SbRouteDestroy(&on));
+  PetscCall(SbRouteDestroy(&there));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ sets */
+
+/* What a vertex belongs to on any rank, it belongs to on all. */
+static PetscErrorCode join_masks(Slab *s)
+{
+  uint64_t *got;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbRouteSend(&s->vert, sizeof(uint64_t), s->part->masks.vert, &got));
+  for (PetscInt i = 0; i < s->vert.nrecv; i++) s->mask[s->asked[i]] |= got[i];
+  for (PetscInt i = 0; i < s->vert.nrecv; i++) got[i] = s->mask[s->asked[i]];
+  PetscCall(SbRouteReply(&s->vert, sizeof(uint64_t), got, s->part->masks.vert));
+  PetscCall(PetscFree(got));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode mark(Slab *s, PetscInt nbody, const SbBody body[], PetscInt b, PetscInt nset,
+                           SbSet set[])
+{
+  SbImport *im = s->im;
+  SbMasks *m = &s->part->masks, kept;
+  uint64_t *bits;
+  PetscInt *count;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscMalloc2(im->ntags, &bits, 3 * nset, &count));
+  PetscCall(PetscArrayzero(count, 3 * nset));
+  PetscCall(PetscCalloc1(s->nkept, &s->mask));
+  PetscCall(SbSetsBits(im, nbody, body, b, nset, set, bits));
+  PetscCall(mark_items(s, bits));
+  PetscCall(find_triangles(s));
+  PetscCall(PetscCalloc1(im->nvert, &m->vert));
+  PetscCall(PetscCalloc1(im->item[3].n, &m->cell));
+  PetscCall(PetscCalloc1(4 * (size_t)im->item[3].n, &m->face));
+  PetscCall(SbSetsMark(im, &s->part->faces, nbody, body, b, nset, set, m));
+  PetscCall(join_masks(s));
+  /* vertices are counted by their keepers */
+  kept = *m;
+  kept.vert = s->mask;
+  SbSetsCount(s->nkept, im->item[3].n, &kept, nset, (PetscInt(*)[3])count);
+  PetscCall(sum(s, 3 * nset, count));
+  for (PetscInt k = 0; k < nset; k++) {
+    set[k].nvert += count[3 * k];
+    set[k].nfacet += count[3 * k + 1];
+    set[k].ncell += count[3 * k + 2];
+  }
+  PetscCall(PetscFree2(bits, count));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ all of it */
+
+/* Size and shape, from those of all ranks. */
+static PetscErrorCode measure(const Slab *s, SbBody *body)
+{
+  SbShape shape;
+
+  PetscFunctionBeginUser;
+  SbImportShape(s->im, &shape);
+  PetscCall(sum(s, 1, &shape.nsliver));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &shape.volume, 1, MPIU_REAL, MPI_SUM, s->comm));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, shape.most, 8, MPIU_REAL, MPI_MAX, s->comm));
+  SbShapeKeep(&shape, body);
+  body->ncell = s->im->item[3].n;
+  body->nfacet = s->part->faces.nboundary;
+  PetscCall(sum(s, 1, &body->ncell));
+  PetscCall(sum(s, 1, &body->nfacet));
+  body->nvert = s->rows.N - s->im->nunused;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode read_slab(Slab *s, const SbBody *body)
+{
+  SbImport *im = s->im;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbImportSlab(body, s->rank, s->size, im, &s->rows));
+  s->part->first = im->item[3].n ? (PetscInt)im->item[3].number[0] - 1 : 0;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode check_cells(Slab *s, PetscReal largest)
+{
+  SbImport *im = s->im;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbImportOrient(im, largest));
+  PetscCall(SbFacesCreate(im->nvert, im->item[3].n, im->item[3].vert, &s->part->faces));
+  PetscCall(SbImportCheckFaces(im, &s->part->faces));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode prepare(Slab *s, PetscInt before, PetscInt nbody, SbBody body[], PetscInt b,
+                              PetscInt nset, SbSet set[])
+{
+  SbImport *im = s->im;
+  SbCaught caught = {0, ""};
+  PetscReal largest;
+
+  PetscFunctionBeginUser;
+  SB_CATCH(&caught, read_slab(s, &body[b]));
+  PetscCall(SbCaughtRaise(s->comm, &caught));
+  PetscCall(find_used(s));
+  PetscCall(ask_keepers(s));
+  largest = SbImportLargest(im);
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &largest, 1, MPIU_REAL, MPI_MAX, s->comm));
+  SB_CATCH(&caught, check_cells(s, largest));
+  PetscCall(SbCaughtRaise(s->comm, &caught));
+  PetscCall(join_faces(s, before));
+  PetscCall(sum(s, 1, &im->nunused));
+  PetscCall(sum(s, 1, &im->nreoriented));
+  PetscCall(measure(s, &body[b]));
+  PetscCall(count_parts(s, &body[b].npart));
+  PetscCall(count_pinched(s));
+  PetscCall(mark(s, nbody, body, b, nset, set));
+  PetscCall(sum(s, 1, &im->npinched));
+  PetscCall(sum(s, 1, &im->nlost));
+  PetscCall(SbImportNote(im, &body[b]));
+  PetscCall(PetscFree(s->part->faces.face)); /* the neighbours are found */
+  PetscCall(PetscFree(s->part->faces.start));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbSlabPrepare(MPI_Comm comm, PetscInt before, PetscInt nbody, SbBody body[], PetscInt b,
+                             PetscInt nset, SbSet set[], SbImport *im, SbPart *part)
+{
+  Slab s = {.comm = comm, .im = im, .part = part};
+  PetscErrorCode ierr;
+
+  PetscFunctionBeginUser;
+  PetscCallMPI(MPI_Comm_rank(comm, &s.rank));
+  PetscCallMPI(MPI_Comm_size(comm, &s.size));
+  ierr = prepare(&s, before, nbody, body, b, nset, set);
+  PetscCall(slab_destroy(&s));
+  PetscCall(ierr);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
