@@ -47,33 +47,6 @@ static inline const PetscInt *slot_group(const Groups *g, PetscInt slot)
   return g->node + slot / (g->nodes * SB_BATCH) * (g->nodes * SB_BATCH) + slot % SB_BATCH;
 }
 
-/* Insertion sort: rows hold about fifteen columns, with face terms thirty. */
-static void sort_columns(PetscInt n, PetscInt column[])
-{
-  for (PetscInt i = 1; i < n; i++) {
-    const PetscInt c = column[i];
-    PetscInt j = i;
-
-    for (; j > 0 && column[j - 1] > c; j--) column[j] = column[j - 1];
-    column[j] = c;
-  }
-}
-
-/* Adds the columns of one row; seen[] marks them with the row's number. */
-static PetscInt row_columns(const Groups *g, PetscInt row, PetscInt count, PetscInt seen[], PetscInt column[])
-{
-  for (PetscInt k = g->start[row]; k < g->start[row + 1]; k++) {
-    const PetscInt *node = slot_group(g, g->slot[k]);
-
-    for (PetscInt b = 0; b < g->nodes * SB_BATCH; b += SB_BATCH) {
-      if (seen[node[b]] == row) continue;
-      seen[node[b]] = row;
-      column[count++] = node[b];
-    }
-  }
-  return count;
-}
-
 /* Regions are runs of cells and of batches. */
 size_t SbPlanCellOffset(SbSpace s, PetscInt cell)
 {
@@ -119,37 +92,6 @@ static PetscErrorCode plan_fresh(SbSpace s, SbPlan p)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Row i: its columns go to the graph. */
-static void plan_row(SbSpace s, PetscInt i, PetscInt ncolumn, const PetscInt column[], PetscInt place[],
-                     SbPlan p)
-{
-  PetscInt nd = p->di[i], no = p->oi[i];
-
-  for (PetscInt k = 0; k < ncolumn; k++) {
-    if (column[k] < s->nnode_owned) {
-      place[column[k]] = nd;
-      p->dj[nd++] = column[k];
-    } else {
-      place[column[k]] = ~no;
-      p->oj[no++] = column[k];
-    }
-  }
-  p->diagonal[i] = place[i];
-  p->di[i + 1] = nd;
-  p->oi[i + 1] = no;
-}
-
-/* The places of the blocks of row i go to the groups around. */
-static void place_row(const Groups *g, PetscInt i, const PetscInt place[])
-{
-  for (PetscInt k = g->start[i]; k < g->start[i + 1]; k++) {
-    const PetscInt *node = slot_group(g, g->slot[k]), lane = g->slot[k] % SB_BATCH;
-    PetscInt *offset = g->offset + g->nodes * (size_t)(g->slot[k] - lane) + lane;
-
-    for (PetscInt b = 0; b < g->nodes * SB_BATCH; b += SB_BATCH) offset[b] = place[node[b]];
-  }
-}
-
 /* The face terms, which do not change: their factor of the identity in each block. */
 static PetscErrorCode plan_glue(SbSpace s, const Groups *faces, SbPlan p)
 {
@@ -186,52 +128,87 @@ static PetscErrorCode create_groups(SbSpace s, const PetscInt node[], PetscInt n
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Most columns that a row can have, and that all rows can have together. */
-static void bound_columns(PetscInt nrow, PetscInt ngroup, const Groups group[], PetscInt *widest,
-                          PetscInt *all)
-{
-  *widest = 1;
-  *all = nrow;
-  for (PetscInt i = 0; i < nrow; i++) {
-    PetscInt width = 1;
-
-    for (PetscInt k = 0; k < ngroup; k++)
-      width += (group[k].nodes - 1) * (group[k].start[i + 1] - group[k].start[i]);
-    *widest = PetscMax(*widest, width);
-    *all += width - 1;
-  }
-}
-
 PetscErrorCode SbPlanCreate(SbSpace s, SbPlan *plan)
 {
-  const PetscInt nrow = s->nnode_owned, *node, ngroup = s->jump ? 2 : 1;
-  PetscInt *seen, *place, *column, widest, capacity;
+  const PetscInt nrow = s->nnode_owned, ngroup = s->jump ? 2 : 1;
+  PetscInt *seen, *place, *column, widest = 1, capacity = nrow;
   Groups group[2];
   SbPlan p;
 
   PetscFunctionBeginUser;
   PetscCall(PetscNew(&p));
+  // for each owned node the cells around it, and the faces where jumps across them are penalised
   PetscCall(create_groups(s, s->batch_clique, s->width, s->nbatch, &group[0]));
   if (s->jump) {
-    const PetscInt nbatch = SbJumpCliques(s, &node);
+    const PetscInt *node, nbatch = SbJumpCliques(s, &node);
 
     PetscCall(create_groups(s, node, 8, nbatch, &group[1]));
   }
-  bound_columns(nrow, ngroup, group, &widest, &capacity);
+  // room for the graph: a node shares each group with all its other nodes, and with none twice
+  for (PetscInt i = 0; i < nrow; i++) {
+    PetscInt most = 1;
+
+    for (PetscInt k = 0; k < ngroup; k++)
+      most += (group[k].nodes - 1) * (group[k].start[i + 1] - group[k].start[i]);
+    widest = PetscMax(widest, most);
+    capacity += most - 1;
+  }
   PetscCall(PetscMalloc3(s->nnode, &seen, s->nnode, &place, widest, &column));
   PetscCall(PetscMalloc4(nrow + 1, &p->di, capacity, &p->dj, nrow + 1, &p->oi, capacity, &p->oj));
   PetscCall(PetscMalloc1(nrow, &p->diagonal));
   for (PetscInt i = 0; i < s->nnode; i++) seen[i] = -1;
   p->di[0] = p->oi[0] = 0;
   for (PetscInt i = 0; i < nrow; i++) {
-    PetscInt n = 0;
+    PetscInt n = 0, nd = p->di[i], no = p->oi[i];
 
-    for (PetscInt k = 0; k < ngroup; k++) n = row_columns(&group[k], i, n, seen, column);
-    /* local ghosts are sorted globally, so local order is global order within each part */
-    sort_columns(n, column);
-    plan_row(s, i, n, column, place, p);
-    for (PetscInt k = 0; k < ngroup; k++) place_row(&group[k], i, place);
+    // the columns of the row: every node that shares a group with it, once
+    for (PetscInt k = 0; k < ngroup; k++) {
+      const Groups *g = &group[k];
+
+      for (PetscInt at = g->start[i]; at < g->start[i + 1]; at++) {
+        const PetscInt *node = slot_group(g, g->slot[at]);
+
+        for (PetscInt b = 0; b < g->nodes * SB_BATCH; b += SB_BATCH) {
+          if (seen[node[b]] == i) continue;
+          seen[node[b]] = i;
+          column[n++] = node[b];
+        }
+      }
+    }
+    // fifteen to thirty columns in local order: ghosts are sorted globally, so global order within each part
+    for (PetscInt k = 1; k < n; k++) {
+      const PetscInt c = column[k];
+      PetscInt j = k;
+
+      for (; j > 0 && column[j - 1] > c; j--) column[j] = column[j - 1];
+      column[j] = c;
+    }
+    // the row of the graph: owned columns in the diagonal part, ghosts in the other one
+    for (PetscInt k = 0; k < n; k++) {
+      if (column[k] < nrow) {
+        place[column[k]] = nd;
+        p->dj[nd++] = column[k];
+      } else {
+        place[column[k]] = ~no;
+        p->oj[no++] = column[k];
+      }
+    }
+    p->diagonal[i] = place[i];
+    p->di[i + 1] = nd;
+    p->oi[i + 1] = no;
+    // while the places of the row are known, the groups around take those of their blocks
+    for (PetscInt k = 0; k < ngroup; k++) {
+      const Groups *g = &group[k];
+
+      for (PetscInt at = g->start[i]; at < g->start[i + 1]; at++) {
+        const PetscInt *node = slot_group(g, g->slot[at]), lane = g->slot[at] % SB_BATCH;
+        PetscInt *offset = g->offset + g->nodes * (size_t)(g->slot[at] - lane) + lane;
+
+        for (PetscInt b = 0; b < g->nodes * SB_BATCH; b += SB_BATCH) offset[b] = place[node[b]];
+      }
+    }
   }
+  // the places of the cells are kept, those of the faces only until their constant terms are summed
   p->offset = group[0].offset;
   if (s->jump) {
     PetscCall(plan_glue(s, &group[1], p));
@@ -242,6 +219,7 @@ PetscErrorCode SbPlanCreate(SbSpace s, SbPlan *plan)
     PetscCall(PetscFree(group[k].slot));
   }
   PetscCall(PetscFree3(seen, place, column));
+  // where assembly first touches each row, so that it is cleared while in the cache
   PetscCall(plan_fresh(s, p));
   *plan = p;
   PetscFunctionReturn(PETSC_SUCCESS);

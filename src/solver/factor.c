@@ -43,9 +43,11 @@ static PetscErrorCode cut_panels(SbFactor f)
   const SbElimination *e = &f->e;
 
   PetscFunctionBeginUser;
+  // how many: a group is cut evenly into panels of at most PANEL nodes
   for (PetscInt g = 0; g < e->nsuper; g++) f->npanel += (e->first[g + 1] - e->first[g] + PANEL - 1) / PANEL;
   PetscCall(PetscMalloc1(f->npanel, &f->panel));
   f->npanel = 0;
+  // each panel's nodes, the rows below it, and its part of the stored words
   for (PetscInt g = 0; g < e->nsuper; g++) {
     const PetscInt ncol = e->first[g + 1] - e->first[g], nall = e->start[g + 1] - e->start[g];
     const PetscInt npart = (ncol + PANEL - 1) / PANEL;
@@ -159,40 +161,6 @@ static void add_update(const PetscScalar *update, PetscInt nrow, const PetscInt 
   }
 }
 
-/* Inverse of a lower triangle of order n <= 3 PANEL, column by column, into the panel. */
-static void store_diagonal(size_t n, const PetscScalar *L, size_t ld, int32_t *to, float *scale)
-{
-  for (size_t j = 0; j < n; j++) {
-    PetscScalar y[3 * PANEL] = {0.};
-
-    y[j] = 1.;
-    for (size_t c = j; c < n; c++) {
-      y[c] /= L[c + c * ld];
-      for (size_t i = c + 1; i < n; i++) y[i] -= L[i + c * ld] * y[c];
-    }
-    scale[2 * j] = store_column(n, j, y, n, j, to);
-  }
-}
-
-/* Rounds the factored columns of group g into its panels, which begin with panel q. Returns the next panel. */
-static PetscInt store_group(SbFactor f, PetscInt g, PetscInt q, const PetscScalar *front, PetscInt ld)
-{
-  for (; q < f->npanel && f->panel[q].group == g; q++) {
-    const Panel *p = &f->panel[q];
-    const PetscInt ncol = 3 * p->ncol, from = 3 * (p->first - f->e.first[g]);
-    const PetscScalar *L = front + (size_t)from * (size_t)(ld + 1);
-    float *scale = f->scale + 6 * p->first;
-
-    int32_t *below = f->word + p->offset + (size_t)ncol * round_up(ncol) / 2;
-
-    store_diagonal((size_t)ncol, L, (size_t)ld, f->word + p->offset, scale);
-    for (size_t j = 0; j < (size_t)ncol; j++)
-      scale[2 * j + 1] =
-        store_column(3 * (size_t)p->nrow, 0, L + ncol + j * (size_t)ld, (size_t)ncol, j, below);
-  }
-  return q;
-}
-
 /* Factors the leading ncol columns of the front of order size and forms the update. */
 static PetscErrorCode factor_front(PetscScalar *front, PetscInt size, PetscInt ncol, PetscScalar *update,
                                    PetscBool *ok)
@@ -204,10 +172,13 @@ static PetscErrorCode factor_front(PetscScalar *front, PetscInt size, PetscInt n
   PetscCall(PetscBLASIntCast(ncol, &n));
   PetscCall(PetscBLASIntCast(size - ncol, &m));
   PetscCall(PetscBLASIntCast(size, &ld));
+  // leading block = L L^T; a pivot that is not positive ends the factorisation
   PetscCallBLAS("LAPACKpotrf", LAPACKpotrf_("L", &n, front, &ld, &info));
   *ok = (PetscBool)(info == 0);
   if (info || !m) PetscFunctionReturn(PETSC_SUCCESS);
+  // the rows below it: L21 = A21 L^-T
   PetscCallBLAS("BLAStrsm", BLAStrsm_("R", "L", "T", "N", &m, &n, &one, front, &ld, front + n, &ld));
+  // the update: A22 - L21 L21^T
   for (PetscInt j = 0; j < m; j++)
     PetscCall(
       PetscArraycpy(update + (size_t)j * (size_t)m, front + (size_t)(n + j) * (size_t)ld + n, (size_t)m));
@@ -224,9 +195,11 @@ static PetscErrorCode eliminate(SbFactor f, PetscInt g, const PetscInt ia[], con
   const PetscInt *list = e->list + e->start[g], nrow = nall - ncol;
 
   PetscFunctionBeginUser;
+  // the front begins with the entries of A in the columns of the group
   for (PetscInt k = 0; k < nall; k++) work->position[list[k]] = k;
   PetscCall(PetscArrayzero(work->front, 9 * (size_t)nall * (size_t)nall));
   add_entries(f, g, ia, ja, block, work, 3 * nall);
+  // the updates of the children join it and are given up
   for (PetscInt c = work->child[g]; c >= 0; c = work->sibling[c]) {
     const PetscInt below = e->start[c] + e->first[c + 1] - e->first[c], n = e->start[c + 1] - below;
     PetscInt *at;
@@ -237,24 +210,9 @@ static PetscErrorCode eliminate(SbFactor f, PetscInt g, const PetscInt ia[], con
     PetscCall(PetscFree(at));
     PetscCall(PetscFree(work->update[c]));
   }
+  // the columns of the group are factored; what is left is the update for its parent
   if (nrow) PetscCall(PetscMalloc1(9 * (size_t)nrow * (size_t)nrow, &work->update[g]));
   PetscCall(factor_front(work->front, 3 * nall, 3 * ncol, work->update[g], ok));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* An update of which only kept nodes are left belongs to the Schur complement. */
-static PetscErrorCode give_schur(SbFactor f, PetscInt g, Work *work, PetscReal schur[])
-{
-  const SbElimination *e = &f->e;
-  const PetscInt below = e->start[g] + e->first[g + 1] - e->first[g], n = e->start[g + 1] - below;
-  PetscInt *at;
-
-  PetscFunctionBeginUser;
-  PetscCall(PetscMalloc1(n, &at));
-  for (PetscInt k = 0; k < n; k++) at[k] = e->list[below + k] - e->nfree;
-  add_update(work->update[g], n, at, schur, 3 * (e->n - e->nfree));
-  PetscCall(PetscFree(at));
-  PetscCall(PetscFree(work->update[g]));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -270,17 +228,48 @@ PetscErrorCode SbFactorNumeric(SbFactor f, const PetscInt ia[], const PetscInt j
   PetscCall(PetscMalloc2(e->nsuper, &work.child, e->nsuper, &work.sibling));
   PetscCall(PetscCalloc1(e->nsuper, &work.update));
   for (PetscInt g = 0; g < e->nsuper; g++) work.child[g] = -1;
+  // groups come after all their children
   *ok = PETSC_TRUE;
   for (PetscInt g = 0; g < e->nsuper && *ok; g++) {
     PetscCall(eliminate(f, g, ia, ja, block, &work, ok));
     if (!*ok) break;
-    q = store_group(f, g, q, work.front, 3 * (e->start[g + 1] - e->start[g]));
+    // its factored columns are rounded into its panels: diagonal blocks inverted, rows below as they are
+    for (; q < f->npanel && f->panel[q].group == g; q++) {
+      const Panel *p = &f->panel[q];
+      const size_t m = 3 * (size_t)p->ncol, ld = 3 * (size_t)(e->start[g + 1] - e->start[g]);
+      const PetscScalar *L = work.front + 3 * (size_t)(p->first - e->first[g]) * (ld + 1);
+      int32_t *inverse = f->word + p->offset, *below = inverse + m * round_up(3 * p->ncol) / 2;
+      float *scale = f->scale + 6 * p->first;
+
+      for (size_t j = 0; j < m; j++) {
+        PetscScalar y[3 * PANEL] = {0.};
+
+        // column j of the inverse: L y = e_j
+        y[j] = 1.;
+        for (size_t c = j; c < m; c++) {
+          y[c] /= L[c + c * ld];
+          for (size_t i = c + 1; i < m; i++) y[i] -= L[i + c * ld] * y[c];
+        }
+        scale[2 * j] = store_column(m, j, y, m, j, inverse);
+        scale[2 * j + 1] = store_column(3 * (size_t)p->nrow, 0, L + m + j * ld, m, j, below);
+      }
+    }
+    // its update waits for the parent; one that reaches kept nodes only belongs to the Schur complement
     if (e->parent[g] >= 0) {
       work.sibling[g] = work.child[e->parent[g]];
       work.child[e->parent[g]] = g;
-    } else if (work.update[g])
-      PetscCall(give_schur(f, g, &work, schur));
+    } else if (work.update[g]) {
+      const PetscInt first = e->start[g] + e->first[g + 1] - e->first[g], n = e->start[g + 1] - first;
+      PetscInt *at;
+
+      PetscCall(PetscMalloc1(n, &at));
+      for (PetscInt k = 0; k < n; k++) at[k] = e->list[first + k] - e->nfree;
+      add_update(work.update[g], n, at, schur, 3 * (e->n - e->nfree));
+      PetscCall(PetscFree(at));
+      PetscCall(PetscFree(work.update[g]));
+    }
   }
+  // after a failure updates are left that no parent took
   for (PetscInt g = 0; g < e->nsuper; g++) PetscCall(PetscFree(work.update[g]));
   PetscCall(PetscFree2(work.position, work.front));
   PetscCall(PetscFree2(work.child, work.sibling));
@@ -290,7 +279,7 @@ PetscErrorCode SbFactorNumeric(SbFactor f, const PetscInt ia[], const PetscInt j
 
 /* ------------------------------------------------------------------ solves */
 
-/* The diagonal block in the layout of the rows below it. */
+/* w <- L^-1 w, from the first panel to the last. */
 SB_KERNEL static void forward(SbFactor f)
 {
   float *w = f->w, *below = f->below, pivot[3 * PANEL + PAIR] __attribute__((aligned(64)));
@@ -300,8 +289,10 @@ SB_KERNEL static void forward(SbFactor f)
     const PetscInt ncol = 3 * p->ncol;
     const float *scale = f->scale + 6 * p->first;
     float *x = w + 3 * p->first;
+    // the unknowns of the panel: inverse of its diagonal block times their right-hand side
     const int32_t *a = panel_multiply(round_up(ncol), ncol, f->word + p->offset, x, scale, pivot);
 
+    // and leave the rows below without their part
     for (PetscInt j = 0; j < ncol; j++) x[j] = pivot[j];
     panel_multiply(round_up(3 * p->nrow), ncol, a, pivot, scale + 1, below);
     for (PetscInt k = 0; k < p->nrow; k++) {
@@ -314,6 +305,7 @@ SB_KERNEL static void forward(SbFactor f)
   }
 }
 
+/* w <- L^-T w, from the last panel to the first. */
 SB_KERNEL static void backward(SbFactor f)
 {
   float *w = f->w, *below = f->below, pivot[3 * PANEL + PAIR] __attribute__((aligned(64)));
@@ -326,6 +318,7 @@ SB_KERNEL static void backward(SbFactor f)
     const int32_t *a = f->word + p->offset;
     float *x = w + 3 * p->first;
 
+    // what the solution in the rows below takes from the right-hand side of the panel
     for (PetscInt k = 0; k < p->nrow; k++) {
       const float *from = w + 3 * p->row[k];
 
@@ -335,6 +328,7 @@ SB_KERNEL static void backward(SbFactor f)
     }
     for (size_t k = 3 * (size_t)p->nrow; k < height; k++) below[k] = 0.f;
     panel_transposed(height, ncol, a + (size_t)ncol * square / 2, below, scale + 1, pivot);
+    // the unknowns of the panel: transposed inverse times what is left
     for (PetscInt j = 0; j < ncol; j++) pivot[j] = x[j] - pivot[j];
     for (size_t j = (size_t)ncol; j < square; j++) pivot[j] = 0.f;
     panel_transposed(square, ncol, a, pivot, scale, x);
