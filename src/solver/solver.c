@@ -14,11 +14,19 @@
 #include "sbconstraint.h"
 #include "sbsolver.h"
 
-#define RESTART 100       /* of FGMRES */
-#define NU_ROTATED 0.4999 /* up to here nodes of CR and DG at faces may turn a factorisation with them */
+#define RESTART 100 /* of FGMRES */
+/* From docs/reports/solver_choice.md. Unknowns up to which a factorisation ... */
+#define ROTATED 60000          /* turns with the nodes */
+#define ROTATED_SLIVERS 120000 /* also with slivers, up to NU_SLIVERS */
+#define DIRECT_P1 80000        /* is faster for P1 than iterations, from NU_LOCKED on */
 #define DIRECT_NEXT \
-  200000 /* unknowns up to which a factorisation is the first to be tried after another solver */
-#define NU_PRESSURE 0.45 /* from here on, dynamic runs of CR and DG do better with the pressures apart */
+  200000 /* is faster with slivers, from NU_PRESSURE on, and the first to be tried after another solver */
+/* Poisson's ratio */
+#define NU_PRESSURE 0.45 /* from which on CR does better with the pressures apart in dynamic runs, too */
+#define NU_SLIVERS 0.49
+#define NU_LOCKED 0.4995
+#define NU_ROTATED 0.4999 /* up to which nodes of CR and DG at faces may turn a factorisation with them */
+#define SLIVERS 0.001     /* part of the tets from which on slivers count */
 
 static PetscErrorCode create_frames(SbSpace s, Mat *A)
 {
@@ -153,7 +161,8 @@ static const SbSolverPreset *find_preset(const char *name)
   return NULL;
 }
 
-/* Whether some law hands out its exact tangent, which is indefinite in compression: CHOLMOD fails there. */
+/* Whether some law always hands out its exact tangent, which is indefinite in compression: CHOLMOD fails there. Where Newton's method chooses (auto), it takes that
+   failure for a reason to filter. */
 static PetscErrorCode may_be_indefinite(SbSpace s, PetscBool *maybe)
 {
   PetscFunctionBeginUser;
@@ -161,7 +170,7 @@ static PetscErrorCode may_be_indefinite(SbSpace s, PetscBool *maybe)
   for (PetscInt r = 0; r < s->nregion; r++) {
     const SbMaterial m = s->region[r].material;
 
-    if (!m->linear && m->tangent == SB_TANGENT_EXACT) *maybe = PETSC_TRUE;
+    if (!m->linear && !m->adaptive && m->tangent == SB_TANGENT_EXACT) *maybe = PETSC_TRUE;
   }
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, maybe, 1, SB_MPI_BOOL, MPI_LOR, s->comm));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -187,15 +196,37 @@ static PetscBool is_direct(const SbSolverPreset *preset)
                      preset->precondition == factor_mumps);
 }
 
-/* Largest Poisson's ratio among the bodies with nodes at faces, -1 without any. */
-static PetscErrorCode largest_poisson(SbSpace s, PetscReal *nu)
+/* What of the bodies makes systems hard. */
+typedef struct {
+  PetscReal nu, face_nu; /* largest Poisson's ratio; that of bodies with nodes at faces, -1 without any */
+  PetscReal sliver_part; /* tets with an angle below SB_SLIVER as a part of all */
+  PetscBool slivers;     /* so many that they count */
+  PetscBool dg;          /* some element has nodes of its own in each cell */
+} Hardness;
+
+static PetscErrorCode find_hardness(SbSpace s, Hardness *h)
 {
+  PetscReal most[3] = {-1., -1., 0.};
+  PetscInt nsliver = 0, ncell = 0;
+
   PetscFunctionBeginUser;
-  *nu = -1.;
   for (PetscInt r = 0; r < s->nregion; r++) {
-    if (!s->region[r].element->nodes_per[0]) *nu = PetscMax(*nu, s->region[r].material->nu);
+    const PetscInt *per = s->region[r].element->nodes_per;
+
+    most[0] = PetscMax(most[0], s->region[r].material->nu);
+    if (!per[0]) most[1] = PetscMax(most[1], s->region[r].material->nu);
+    if (per[3]) most[2] = 1.;
   }
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, nu, 1, MPIU_REAL, MPI_MAX, s->comm));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, most, 3, MPIU_REAL, MPI_MAX, s->comm));
+  for (PetscInt b = 0; b < s->mesh->nbody; b++) {
+    nsliver += s->mesh->body[b].nsliver;
+    ncell += s->mesh->body[b].ncell;
+  }
+  h->nu = most[0];
+  h->face_nu = most[1];
+  h->sliver_part = (PetscReal)nsliver / (PetscReal)PetscMax(1, ncell);
+  h->slivers = (PetscBool)(h->sliver_part >= SLIVERS);
+  h->dg = (PetscBool)(most[2] > 0.);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -228,13 +259,13 @@ PetscErrorCode SbSolverChoose(SbSpace s, PetscBool dynamic, PetscBool linear, Pe
   char method[SB_NAME_MAX] = "";
   PetscInt nface = 0, most = 0;
   PetscBool indefinite, has = PETSC_TRUE, turns;
-  PetscReal nu;
   PetscMPIInt nrank;
+  Hardness hard;
 
   PetscFunctionBeginUser;
   PetscCallMPI(MPI_Comm_size(s->comm, &nrank));
   PetscCall(may_be_indefinite(s, &indefinite));
-  PetscCall(largest_poisson(s, &nu));
+  PetscCall(find_hardness(s, &hard));
   PetscCall(SbDirectPackage(s->comm, unknowns, (PetscBool)!indefinite, &package));
   PetscCall(PetscOptionsGetString(NULL, NULL, "-ksp_type", method, sizeof(method), NULL));
   *preset = NULL;
@@ -242,8 +273,8 @@ PetscErrorCode SbSolverChoose(SbSpace s, PetscBool dynamic, PetscBool linear, Pe
   /* a factorisation that turns with the nodes, unless ranks meet at too many of them */
   turns = (PetscBool)(!strcmp(choice, "rotated") || !strcmp(choice, "realtime"));
   if (!strcmp(choice, "auto"))
-    turns =
-      (PetscBool)(dynamic && !linear && unknowns <= 60000 && nu <= NU_ROTATED && strcmp(method, KSPMINRES));
+    turns = (PetscBool)(dynamic && !linear && hard.face_nu <= NU_ROTATED && strcmp(method, KSPMINRES) &&
+                        unknowns <= (hard.slivers && hard.nu <= NU_SLIVERS ? ROTATED_SLIVERS : ROTATED));
   if (*preset) turns = PETSC_FALSE;
   if (turns && nrank > 1 && !explicit_run) PetscCall(SbSpaceInterfaceSize(s, &nface, &most));
   if (nface > most) {
@@ -285,14 +316,26 @@ PetscErrorCode SbSolverChoose(SbSpace s, PetscBool dynamic, PetscBool linear, Pe
     PetscCall(PetscSNPrintf(
       reason, size, "%" PetscInt_FMT " unknowns: a factorisation is fast and holds at any Poisson's ratio%s",
       unknowns, indefinite ? "; the exact tangent may be indefinite" : ""));
-  } else if (s->faces && !s->nodal && !s->constraints && (!dynamic || nu > NU_PRESSURE)) {
+  } else if (!dynamic && package &&
+             unknowns <= (hard.nu > NU_PRESSURE && hard.slivers ? DIRECT_NEXT
+                          : !s->faces && hard.nu > NU_LOCKED    ? DIRECT_P1
+                                                                : 0)) {
+    /* docs/reports/solver_choice.md */
+    name = package;
+    PetscCall(PetscSNPrintf(reason, size,
+                            "%" PetscInt_FMT
+                            " unknowns, nu up to %g, %.2g %% of the tets slivers (angles below %g "
+                            "degrees): a factorisation, iterations hardly get there",
+                            unknowns, (double)hard.nu, 100. * (double)hard.sliver_part, SB_SLIVER));
+  } else if (s->faces && !s->nodal && !s->constraints &&
+             (hard.face_nu > NU_PRESSURE || hard.dg || (!dynamic && !hard.slivers))) {
     /* 24k tets, CPU s of one rank, this and cg_two_level. Static at nu 0.3: CR 3.4 (3.2), DG 4.2 (5.6); at 0.45: 4.3 (3.6), 5.1
        (12), more with every refinement. Dynamic, CR, three steps: at 0.3 12 (7), at 0.45 15 (11), at 0.49 17 (17) */
     name = "pressure";
     PetscCall(PetscSNPrintf(reason, size,
                             "%s, %" PetscInt_FMT " unknowns of cr or dg, nu up to %g: iterations that grow "
                             "neither towards 1/2 nor with the mesh",
-                            dynamic ? "dynamic" : "static", unknowns, (double)nu));
+                            dynamic ? "dynamic" : "static", unknowns, (double)hard.face_nu));
   } else {
     /* 192k tets, CPU s of one rank. Static: 0.36 (cg_gamg 1.7, cg_icc 1.4), at nu 0.45 0.7 (2.3), at 0.499 4.2 (18); dynamic, h = 0.01 s: 0.22 (1.7, 0.40) */
     name = "cg_two_level";
@@ -355,9 +398,11 @@ PetscErrorCode SbSolverNextFallback(SbSpace s, KSPConvergedReason reason, PetscB
 {
   const SbSolverPreset *failed = *preset;
   PetscBool indefinite;
+  Hardness hard;
 
   PetscFunctionBeginUser;
   *preset = NULL;
+  PetscCall(find_hardness(s, &hard));
   if (find_preset(failed->name) == failed) *tried |= 1U << (failed - presets);
   PetscCall(may_be_indefinite(s, &indefinite));
   /* where the tangent itself is not definite, and may be so, the iteration is not to blame: that is Newton's affair */
@@ -366,6 +411,8 @@ PetscErrorCode SbSolverNextFallback(SbSpace s, KSPConvergedReason reason, PetscB
     const PetscBool direct = (PetscBool)!strcmp(others[k].name, "direct");
 
     if (3 * s->Nnode > others[k].most || (memory && direct)) continue;
+    /* multigrid on displacements of nodes at faces takes thousands of iterations near 1/2 */
+    if (!strcmp(others[k].name, "cg_gamg") && hard.face_nu > NU_PRESSURE) continue;
     /* what a factorisation finds singular no iteration solves */
     if (is_direct(failed) && !memory && !direct) continue;
     PetscCall(find_other(s, others[k].name, indefinite, *tried, preset));

@@ -93,6 +93,7 @@ static PetscErrorCode read_arc_length(SbRun run, const SbScope *scope)
     PetscCheck(!given, m->comm, PETSC_ERR_USER_INPUT,
                "-static_control arc_length needs exact tangents: leave %s out, or make it exact", option);
     PetscCall(SbMaterialSetTangent(m->material[k], SB_TANGENT_EXACT));
+    m->material[k]->adaptive = PETSC_FALSE;
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -84,6 +84,67 @@ static PetscErrorCode check_slivers(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The solver of a clamped bar with so many slivers, without solving. */
+static PetscErrorCode choose(const char *path, const char *solver, char name[SB_NAME_MAX])
+{
+  char text[1024];
+  TestScene t;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscSNPrintf(
+    text, sizeof(text),
+    BAR "-body_a_mesh %s -effect_clamp_on held -sets held -set_held_at plane:1,0,0,0 -time static "
+        "-body_a_material linear -body_a_poisson 0.4999 -body_a_element cr -solver %s",
+    path, solver));
+  PetscCall(test_scene_open(text, &t));
+  PetscCall(PetscStrncpy(name, t.run->solver, SB_NAME_MAX));
+  PetscCall(test_scene_close(&t));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Slivers count in the choice: beyond the size up to which everything is factored, auto factors for them only. */
+static PetscErrorCode check_choice(void)
+{
+  static const PetscReal part[] = {0., 0.01};
+  char path[512], chosen[SB_NAME_MAX], direct[SB_NAME_MAX];
+  PetscInt made = 0;
+
+  PetscFunctionBeginUser;
+  for (int k = 0; k < 2; k++) {
+    const Slivers s = {.n = {24, 6, 6}, .size = {0.4, 0.1, 0.1}, .part = part[k], .degrees = 0.1};
+
+    PetscCall(slivers_write(&s, path, &made));
+    PetscCall(choose(path, "auto", chosen));
+    PetscCall(choose(path, "direct", direct));
+    PetscCall(test_file_remove(path));
+    SB_CHECK(!strcmp(chosen, k ? direct : "pressure"), "%g of the tets are slivers: auto took %s",
+             (double)part[k], chosen);
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* With the tangent auto the factorisation is the one for definite matrices, whichever tangent Newton's method has just used; with exact one for others. */
+static PetscErrorCode check_tangent(const char *tangent, PetscBool definite)
+{
+  const SbSolverPreset *preset;
+  const char *package;
+  char text[1024], reason[512];
+  TestScene t;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscSNPrintf(text, sizeof(text), STATIC "-body_a_tangent %s -solver direct", tangent));
+  PetscCall(test_scene_open(text, &t));
+  PetscCall(SbDirectPackage(t.model->comm, 3 * t.model->space->Nnode, definite, &package));
+  SB_CHECK(!strcmp(t.run->solver, package), "%s: %s, not %s", tangent, t.run->solver, package);
+  PetscCall(SbRunSolve(t.run));
+  SB_CHECK(t.model->material[0]->tangent == SB_TANGENT_EXACT, "%s: the tangent was filtered", tangent);
+  PetscCall(SbSolverChoose(t.model->space, PETSC_FALSE, PETSC_FALSE, PETSC_FALSE, "direct", &preset, reason,
+                           sizeof(reason)));
+  SB_CHECK(!strcmp(preset->name, package), "%s, after the run: %s, not %s", tangent, preset->name, package);
+  PetscCall(test_scene_close(&t));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 int main(int argc, char **argv)
 {
   Outcome o;
@@ -111,6 +172,9 @@ int main(int argc, char **argv)
         "gravity,clamp,meet -effect_meet_type collision -ksp_rtol 1e-10",
     "cg", "-ksp_max_it 20", 1e-4));
   PetscCall(check_slivers());
+  PetscCall(check_choice());
+  PetscCall(check_tangent("auto", PETSC_TRUE));
+  PetscCall(check_tangent("exact", PETSC_FALSE));
   /* the user's own method stays, and the run says that it failed */
   PetscCall(run(STATIC, "-solver cg -ksp_type cg -ksp_max_it 3 -time_max_halvings 0", &o));
   SB_CHECK(o.stop[0] && !strcmp(o.solver, "cg"), "the user's method was replaced by %s", o.solver);
