@@ -188,16 +188,6 @@ PetscErrorCode SbImportCheckFaces(const SbImport *im, const SbFaces *faces)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode count_lost(SbImport *im, const SbFaces *faces)
-{
-  PetscInt slots[2];
-
-  PetscFunctionBeginUser;
-  for (PetscInt t = 0; t < im->item[2].n; t++)
-    im->nlost += !SbFacesFind(faces, im->item[2].vert + 3 * t, slots);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 static int compare_edges(const void *a, const void *b)
 {
   const uint64_t p = *(const uint64_t *)a, q = *(const uint64_t *)b;
@@ -234,12 +224,16 @@ static PetscErrorCode count_pinched(SbImport *im, const SbFaces *faces)
 
 PetscErrorCode SbImportCheck(SbImport *im, SbFaces *faces)
 {
+  PetscInt slots[2];
+
   PetscFunctionBeginUser;
   PetscCall(drop_unused(im));
   PetscCall(SbImportOrient(im, SbImportLargest(im)));
   PetscCall(SbFacesCreate(im->nvert, im->item[3].n, im->item[3].vert, faces));
   PetscCall(SbImportCheckFaces(im, faces));
-  PetscCall(count_lost(im, faces));
+  // triangles of groups that are no face of a tet
+  for (PetscInt t = 0; t < im->item[2].n; t++)
+    im->nlost += !SbFacesFind(faces, im->item[2].vert + 3 * t, slots);
   PetscCall(count_pinched(im, faces));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

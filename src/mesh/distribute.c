@@ -250,14 +250,6 @@ static PetscErrorCode border_create(MPI_Comm comm, PetscInt Nvert, const SbPiece
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode border_destroy(Border *border)
-{
-  PetscFunctionBeginUser;
-  PetscCall(PetscFree(border->vert));
-  PetscCall(PetscFree(border->pair));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 static int compare_ranks(const void *a, const void *b)
 {
   const Shared *p = (const Shared *)a, *q = (const Shared *)b;
@@ -399,7 +391,8 @@ static PetscErrorCode add_ghosts(MPI_Comm comm, PetscInt Nvert, PetscBool all, S
   PetscCall(border_create(comm, Nvert, piece, &border));
   PetscCall(choose_owners(piece, &border, rank, piece->owner));
   PetscCall(list_copies(piece, &border, all, rank, size, &n, &piece->copied, &dest));
-  PetscCall(border_destroy(&border));
+  PetscCall(PetscFree(border.vert));
+  PetscCall(PetscFree(border.pair));
   PetscCall(SbRouteCreate(comm, n, dest, &piece->ghost));
   own =
     (Cells){PETSC_TRUE, piece->ncell, piece->nvert, piece->cell, piece->data, piece->vertex, piece->owner};

@@ -21,36 +21,11 @@ static inline void edge_of(const SbItems *item, int dim, PetscInt i, int e, Pets
   *high = PetscMax(a, b);
 }
 
-static int compare(const void *a, const void *b)
-{
-  const PetscInt p = *(const PetscInt *)a, q = *(const PetscInt *)b;
-
-  return (p > q) - (p < q);
-}
-
-/* Sorts each bucket and closes the gaps that repeats leave. */
-static void drop_repeats(SbImportEdges *edges)
-{
-  PetscInt begin = 0, kept = 0;
-
-  for (PetscInt v = 0; v < edges->nvert; v++) {
-    const PetscInt end = edges->start[v + 1];
-
-    qsort(edges->high + begin, (size_t)(end - begin), sizeof(*edges->high), compare);
-    for (PetscInt i = begin; i < end; i++) {
-      if (i > begin && edges->high[i] == edges->high[i - 1]) continue;
-      edges->high[kept++] = edges->high[i];
-    }
-    edges->start[v + 1] = kept;
-    begin = end;
-  }
-  edges->nedge = kept;
-}
-
 PetscErrorCode SbImportEdgesCreate(const SbImport *im, SbImportEdges *edges)
 {
   PetscInt *next, low, high;
   PetscInt64 total = 0;
+  PetscInt begin = 0, kept = 0;
 
   PetscFunctionBeginUser;
   PetscCall(PetscMemzero(edges, sizeof(*edges)));
@@ -80,7 +55,19 @@ PetscErrorCode SbImportEdgesCreate(const SbImport *im, SbImportEdges *edges)
     }
   }
   PetscCall(PetscFree(next));
-  drop_repeats(edges);
+  // sorts each bucket and closes the gaps of repeated edges
+  for (PetscInt v = 0; v < edges->nvert; v++) {
+    const PetscInt end = edges->start[v + 1];
+
+    PetscCall(PetscSortInt(end - begin, edges->high + begin));
+    for (PetscInt i = begin; i < end; i++) {
+      if (i > begin && edges->high[i] == edges->high[i - 1]) continue;
+      edges->high[kept++] = edges->high[i];
+    }
+    edges->start[v + 1] = kept;
+    begin = end;
+  }
+  edges->nedge = kept;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

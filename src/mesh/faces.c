@@ -75,25 +75,6 @@ static PetscErrorCode fill_buckets(const PetscInt cell[], SbFaces *faces)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Equal keys in a sorted bucket: one is a boundary face, two are neighbours, more is wrong. */
-static void match_bucket(SbFaces *faces, PetscInt begin, PetscInt end)
-{
-  const SbFaceKey *face = faces->face;
-
-  for (PetscInt i = begin, n; i < end; i += n) {
-    for (n = 1; i + n < end && face[i + n].key == face[i].key; n++) {
-    }
-    if (n == 1)
-      faces->nboundary++;
-    else if (n == 2) {
-      faces->neighbour[face[i].slot] = face[i + 1].slot / 4;
-      faces->neighbour[face[i + 1].slot] = face[i].slot / 4;
-    } else if (!faces->nshared++) {
-      for (int k = 0; k < 3; k++) faces->shared[k] = face[i + k].slot / 4;
-    }
-  }
-}
-
 PetscErrorCode SbFacesCreate(PetscInt nvert, PetscInt ncell, const PetscInt cell[], SbFaces *faces)
 {
   PetscFunctionBeginUser;
@@ -104,8 +85,22 @@ PetscErrorCode SbFacesCreate(PetscInt nvert, PetscInt ncell, const PetscInt cell
   PetscCall(PetscMalloc1(4 * (size_t)ncell, &faces->neighbour));
   for (PetscInt s = 0; s < 4 * ncell; s++) faces->neighbour[s] = -1;
   for (PetscInt v = 0; v < nvert; v++) {
+    const SbFaceKey *face = faces->face;
+
     sort_bucket(faces->start[v + 1] - faces->start[v], faces->face + faces->start[v]);
-    match_bucket(faces, faces->start[v], faces->start[v + 1]);
+    // equal keys: one is a boundary face, two are neighbours, more is an error
+    for (PetscInt i = faces->start[v], n; i < faces->start[v + 1]; i += n) {
+      for (n = 1; i + n < faces->start[v + 1] && face[i + n].key == face[i].key; n++) {
+      }
+      if (n == 1)
+        faces->nboundary++;
+      else if (n == 2) {
+        faces->neighbour[face[i].slot] = face[i + 1].slot / 4;
+        faces->neighbour[face[i + 1].slot] = face[i].slot / 4;
+      } else if (!faces->nshared++) {
+        for (int k = 0; k < 3; k++) faces->shared[k] = face[i + k].slot / 4;
+      }
+    }
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }

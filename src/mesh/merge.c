@@ -70,30 +70,6 @@ static void next_body(const SbBody *body, const SbImport *im, PetscInt ncell, co
   at->remote += part->nremote;
 }
 
-/* Copies the tets of a body behind those already there, and frees them. */
-static PetscErrorCode append_cells(SbImport *im, SbPart *part, const Begin *at, SbMergedMesh *w)
-{
-  const PetscInt ncell = im->item[3].n;
-
-  PetscFunctionBeginUser;
-  for (PetscInt i = 0; i < 4 * ncell; i++) {
-    const PetscInt n = part->faces.neighbour[i];
-
-    w->cell[4 * at->cell + i] = at->vert + im->item[3].vert[i];
-    w->neighbour[4 * at->cell + i] = n < 0       ? -1
-                                     : n < ncell ? at->cell + n
-                                                 : w->ncell + at->remote + n - ncell;
-  }
-  PetscCall(PetscArraycpy(w->remote + at->remote, part->remote, part->nremote));
-  PetscCall(SbFacesDestroy(&part->faces));
-  for (int d = 0; d < 4; d++) {
-    PetscCall(PetscFree(im->item[d].vert));
-    PetscCall(PetscFree(im->item[d].tags));
-    PetscCall(PetscFree(im->item[d].number));
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* What travels with the points of body b. */
 static PetscErrorCode append_points(const SbImport *im, const SbPart *part, PetscInt b, const Begin *at,
                                     SbMergedMesh *w)
@@ -129,7 +105,22 @@ static PetscErrorCode merge(PetscInt nbody, const SbBody body[], SbImport im[], 
   PetscCall(PetscMalloc1(4 * (size_t)w->ncell, &w->neighbour));
   PetscCall(PetscMalloc1(w->nremote, &w->remote));
   for (PetscInt b = 0; b < nbody; b++) {
-    PetscCall(append_cells(&im[b], &part[b], &at, w));
+    const PetscInt ncell = im[b].item[3].n;
+
+    // tets of the body behind those already there; its own are freed
+    for (PetscInt i = 0; i < 4 * ncell; i++) {
+      const PetscInt n = part[b].faces.neighbour[i];
+
+      w->cell[4 * at.cell + i] = at.vert + im[b].item[3].vert[i];
+      w->neighbour[4 * at.cell + i] = n < 0 ? -1 : n < ncell ? at.cell + n : w->ncell + at.remote + n - ncell;
+    }
+    PetscCall(PetscArraycpy(w->remote + at.remote, part[b].remote, part[b].nremote));
+    PetscCall(SbFacesDestroy(&part[b].faces));
+    for (int d = 0; d < 4; d++) {
+      PetscCall(PetscFree(im[b].item[d].vert));
+      PetscCall(PetscFree(im[b].item[d].tags));
+      PetscCall(PetscFree(im[b].item[d].number));
+    }
     next_body(&body[b], &im[b], im[b].item[3].n, &part[b], &at);
   }
   PetscCall(PetscMalloc1(w->ncell, &w->data));

@@ -41,16 +41,6 @@ static PetscErrorCode graph_create(PetscInt nvert, PetscInt ncell, const PetscIn
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode graph_destroy(Graph *g)
-{
-  PetscFunctionBeginUser;
-  PetscCall(PetscFree(g->start));
-  PetscCall(PetscFree(g->incident));
-  PetscCall(PetscFree(g->vert_mark));
-  PetscCall(PetscFree(g->cell_mark));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 static inline PetscInt degree(const Graph *g, PetscInt v)
 {
   return g->start[v + 1] - g->start[v];
@@ -99,18 +89,6 @@ static PetscInt search(Graph *g, PetscInt root, PetscInt queue[], PetscInt *last
   return n;
 }
 
-/* Cuthill-McKee order of the part that holds `first`, from a vertex of few cells as far away as any. */
-static PetscInt order_part(Graph *g, PetscInt first, PetscInt queue[])
-{
-  PetscInt last, root, n = search(g, first, queue, &last);
-
-  root = queue[last];
-  for (PetscInt k = last; k < n; k++) {
-    if (degree(g, queue[k]) < degree(g, root)) root = queue[k];
-  }
-  return search(g, root, queue, &last);
-}
-
 PetscErrorCode SbOrderRCM(PetscInt nvert, PetscInt ncell, const PetscInt cell[], PetscInt order[])
 {
   Graph g;
@@ -118,10 +96,16 @@ PetscErrorCode SbOrderRCM(PetscInt nvert, PetscInt ncell, const PetscInt cell[],
   PetscFunctionBeginUser;
   PetscCall(graph_create(nvert, ncell, cell, &g));
   for (PetscInt v = 0, done = 0; v < nvert; v++) {
-    PetscInt n;
+    PetscInt n, last, root;
 
     if (g.vert_mark[v]) continue; /* seen by the search of an earlier part */
-    n = order_part(&g, v, order + done);
+    // Cuthill-McKee order of the part that holds v, from a vertex of few cells as far away as any
+    n = search(&g, v, order + done, &last);
+    root = order[done + last];
+    for (PetscInt k = last; k < n; k++) {
+      if (degree(&g, order[done + k]) < degree(&g, root)) root = order[done + k];
+    }
+    n = search(&g, root, order + done, &last);
     for (PetscInt i = 0; i < n / 2; i++) {
       const PetscInt keep = order[done + i];
 
@@ -130,6 +114,9 @@ PetscErrorCode SbOrderRCM(PetscInt nvert, PetscInt ncell, const PetscInt cell[],
     }
     done += n;
   }
-  PetscCall(graph_destroy(&g));
+  PetscCall(PetscFree(g.start));
+  PetscCall(PetscFree(g.incident));
+  PetscCall(PetscFree(g.vert_mark));
+  PetscCall(PetscFree(g.cell_mark));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -52,25 +52,6 @@ static void split_tet(const PetscReal x[], const PetscInt v[4], const PetscInt m
   }
 }
 
-/* Vertices in the middle of the edges, behind those that are there. */
-static PetscErrorCode add_middles(SbImport *im, const SbImportEdges *edges)
-{
-  const PetscInt n = im->nvert + edges->nedge;
-
-  PetscFunctionBeginUser;
-  PetscCall(PetscRealloc(3 * (size_t)n * sizeof(PetscReal), &im->x));
-  PetscCall(PetscRealloc((size_t)n * sizeof(int64_t), &im->vert_number));
-  for (PetscInt a = 0; a < edges->nvert; a++) {
-    for (PetscInt e = edges->start[a]; e < edges->start[a + 1]; e++) {
-      for (int i = 0; i < 3; i++)
-        im->x[3 * (im->nvert + e) + i] = (im->x[3 * a + i] + im->x[3 * edges->high[e] + i]) / 2;
-    }
-  }
-  for (PetscInt v = 0; v < n; v++) im->vert_number[v] = v + 1;
-  im->nvert = n;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* Children of one item, [2^dim][dim + 1]. */
 static void split(const SbImport *im, int dim, const PetscInt v[], const SbImportEdges *edges,
                   PetscInt child[])
@@ -122,13 +103,25 @@ static PetscErrorCode split_items(SbImport *im, int dim, const SbImportEdges *ed
 PetscErrorCode SbMeshFileRefine(SbImport *im)
 {
   SbImportEdges edges;
+  PetscInt n;
 
   PetscFunctionBeginUser;
   PetscCheck(im->item[3].n <= PETSC_MAX_INT / 64, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
              "%s: %" PetscInt_FMT " tets, refined, are more than this build can number", im->where,
              im->item[3].n);
   PetscCall(SbImportEdgesCreate(im, &edges));
-  PetscCall(add_middles(im, &edges));
+  // vertices in the middle of the edges, behind the old ones
+  n = im->nvert + edges.nedge;
+  PetscCall(PetscRealloc(3 * (size_t)n * sizeof(PetscReal), &im->x));
+  PetscCall(PetscRealloc((size_t)n * sizeof(int64_t), &im->vert_number));
+  for (PetscInt a = 0; a < edges.nvert; a++) {
+    for (PetscInt e = edges.start[a]; e < edges.start[a + 1]; e++) {
+      for (int i = 0; i < 3; i++)
+        im->x[3 * (im->nvert + e) + i] = (im->x[3 * a + i] + im->x[3 * edges.high[e] + i]) / 2;
+    }
+  }
+  for (PetscInt v = 0; v < n; v++) im->vert_number[v] = v + 1;
+  im->nvert = n;
   for (int d = 1; d < 4; d++) PetscCall(split_items(im, d, &edges));
   PetscCall(SbImportEdgesDestroy(&edges));
   PetscFunctionReturn(PETSC_SUCCESS);

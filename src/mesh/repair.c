@@ -52,31 +52,26 @@ static PetscInt find_near(const Cubes *cubes, const PetscReal x[], const PetscRe
   return -1;
 }
 
-static void extent(const SbImport *im, PetscReal low[3], PetscReal *diagonal)
-{
-  PetscReal high[3];
-
-  for (int i = 0; i < 3; i++) low[i] = high[i] = im->nvert ? im->x[i] : 0;
-  for (PetscInt v = 0; v < im->nvert; v++) {
-    for (int i = 0; i < 3; i++) {
-      low[i] = PetscMin(low[i], im->x[3 * v + i]);
-      high[i] = PetscMax(high[i], im->x[3 * v + i]);
-    }
-  }
-  *diagonal =
-    PetscSqrtReal((high[0] - low[0]) * (high[0] - low[0]) + (high[1] - low[1]) * (high[1] - low[1]) +
-                  (high[2] - low[2]) * (high[2] - low[2]));
-}
-
 /* Lets items use the first of the vertices that lie together. Those left over are unused from then on. */
 static PetscErrorCode weld(SbImport *im, PetscReal tolerance, SbRepair *done)
 {
   Cubes cubes;
   PetscReal diagonal;
   PetscInt *map;
+  PetscReal high[3];
 
   PetscFunctionBeginUser;
-  extent(im, cubes.origin, &diagonal);
+  // bounding box and its diagonal
+  for (int i = 0; i < 3; i++) cubes.origin[i] = high[i] = im->nvert ? im->x[i] : 0;
+  for (PetscInt v = 0; v < im->nvert; v++) {
+    for (int i = 0; i < 3; i++) {
+      cubes.origin[i] = PetscMin(cubes.origin[i], im->x[3 * v + i]);
+      high[i] = PetscMax(high[i], im->x[3 * v + i]);
+    }
+  }
+  diagonal = PetscSqrtReal((high[0] - cubes.origin[0]) * (high[0] - cubes.origin[0]) +
+                           (high[1] - cubes.origin[1]) * (high[1] - cubes.origin[1]) +
+                           (high[2] - cubes.origin[2]) * (high[2] - cubes.origin[2]));
   done->merge_tolerance = tolerance < 0 ? 1e-9 * diagonal : tolerance;
   if (done->merge_tolerance == 0 || !(diagonal > 0)) PetscFunctionReturn(PETSC_SUCCESS);
   cubes.h = PetscMax(4 * done->merge_tolerance, diagonal / (1 + cbrt((double)im->nvert)));

@@ -358,21 +358,6 @@ static PetscErrorCode empty_shape(PetscInt nbody, const SbBody body[], const SbS
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode empty_body(PetscInt nbody, const SbBody body[], const SbSet *set)
-{
-  const char **names;
-  char near[256];
-
-  PetscFunctionBeginUser;
-  PetscCall(PetscMalloc1(nbody, &names));
-  for (PetscInt b = 0; b < nbody; b++) names[b] = body[b].name;
-  PetscCall(SbNearestNames(set->group, nbody, names, sizeof(near), near));
-  PetscCall(PetscFree(names));
-  SETERRQ(PETSC_COMM_SELF, PETSC_ERR_USER_INPUT, "set '%s': there is no body '%s'%s%s%s", set->name,
-          set->group, near[0] ? "; did you mean " : "", near, near[0] ? "?" : "");
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode SbSetsCheck(PetscInt nbody, const SbBody body[], const SbImport import[], PetscInt nset,
                            const SbSet set[])
 {
@@ -380,7 +365,17 @@ PetscErrorCode SbSetsCheck(PetscInt nbody, const SbBody body[], const SbImport i
   for (PetscInt k = 0; k < nset; k++) {
     if (set[k].nvert || set[k].nfacet || set[k].ncell) continue;
     if (set[k].shape == SB_SET_GROUP) PetscCall(empty_group(nbody, body, import, &set[k]));
-    if (set[k].shape == SB_SET_BODY) PetscCall(empty_body(nbody, body, &set[k]));
+    if (set[k].shape == SB_SET_BODY) {
+      const char **names;
+      char near[256];
+
+      PetscCall(PetscMalloc1(nbody, &names));
+      for (PetscInt b = 0; b < nbody; b++) names[b] = body[b].name;
+      PetscCall(SbNearestNames(set[k].group, nbody, names, sizeof(near), near));
+      PetscCall(PetscFree(names));
+      SETERRQ(PETSC_COMM_SELF, PETSC_ERR_USER_INPUT, "set '%s': there is no body '%s'%s%s%s", set[k].name,
+              set[k].group, near[0] ? "; did you mean " : "", near, near[0] ? "?" : "");
+    }
     PetscCall(empty_shape(nbody, body, &set[k]));
   }
   PetscFunctionReturn(PETSC_SUCCESS);

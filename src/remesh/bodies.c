@@ -104,17 +104,6 @@ static PetscErrorCode open_work(SbModel m, const SbGathered *g, PetscInt b, Work
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode close_work(Work *w)
-{
-  PetscFunctionBeginUser;
-  PetscCall(SbNewMeshDestroy(&w->mesh));
-  PetscCall(SbLocatorDestroy(&w->rest));
-  PetscCall(PetscFree(w->cell));
-  PetscCall(PetscFree(w->at));
-  PetscCall(PetscFree(w->side));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* The place 4 cell + face of a triangle of the new mesh on the old surface, -1: it is inside. */
 static PetscInt old_slot(const Work *w, PetscInt slot)
 {
@@ -306,18 +295,6 @@ static void look_up(const Work *w, const PetscReal X[3], const PetscReal near[3]
   }
 }
 
-/* Middle of face f of a new cell at rest, the same for both cells of it, to the last bit; and a place a little towards the cell's own middle. */
-static void face_place(const Work *w, PetscInt c, PetscInt f, PetscReal X[3], PetscReal inside[3])
-{
-  const Side side = side_of(w->mesh.cell, 4 * c + f);
-  const PetscReal *at = w->mesh.X, *apex = at + 3 * w->mesh.cell[4 * c + f];
-
-  for (int k = 0; k < 3; k++) {
-    X[k] = (at[3 * side.vert[0] + k] + at[3 * side.vert[1] + k] + at[3 * side.vert[2] + k]) / 3.;
-    inside[k] = X[k] + INWARDS * 0.25 * (apex[k] - X[k]);
-  }
-}
-
 static void new_values(const Work *w, PetscInt c, PetscReal value[])
 {
   for (PetscInt a = 0; a < 4; a++) {
@@ -333,8 +310,16 @@ static void new_values(const Work *w, PetscInt c, PetscReal value[])
       from = old_value(w, slot / 4, slot % 4);
     if (!from && w->element->nodes_per[0])
       for (int k = 0; k < 3; k++) X[k] = w->mesh.X[3 * v + k];
-    else if (!from)
-      face_place(w, c, a, X, inside);
+    else if (!from) {
+      const Side side = side_of(w->mesh.cell, 4 * c + a);
+      const PetscReal *at = w->mesh.X, *apex = at + 3 * w->mesh.cell[4 * c + a];
+
+      // the middle of the face, bitwise the same from both cells, and a point slightly inside
+      for (int k = 0; k < 3; k++) {
+        X[k] = (at[3 * side.vert[0] + k] + at[3 * side.vert[1] + k] + at[3 * side.vert[2] + k]) / 3.;
+        inside[k] = X[k] + INWARDS * 0.25 * (apex[k] - X[k]);
+      }
+    }
     if (!from) look_up(w, X, w->element->nodes_per[3] ? inside : X, to);
     for (PetscInt k = 0; k < w->each && from; k++) to[k] = from[k];
     for (PetscInt k = 0; k < w->each && w->g->width == 8; k++)
@@ -412,24 +397,6 @@ static PetscErrorCode try_body(Work *w, const SbRemeshing *how, SbMade *made, Pe
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Counts, and room for the values. */
-static PetscErrorCode begin_next(const SbGathered *g, const SbMade made[], SbGathered *next)
-{
-  PetscFunctionBeginUser;
-  next->nbody = g->nbody;
-  next->nfield = g->nfield;
-  next->width = g->width;
-  PetscCall(PetscCalloc2(g->nbody + 1, &next->vert0, g->nbody + 1, &next->cell0));
-  for (PetscInt b = 0; b < g->nbody; b++) {
-    next->vert0[b + 1] = next->vert0[b] + made[b].nvert[1];
-    next->cell0[b + 1] = next->cell0[b] + made[b].ncell[1];
-  }
-  next->nvert = next->vert0[g->nbody];
-  next->ncell = next->cell0[g->nbody];
-  PetscCall(PetscMalloc1((size_t)(next->width * next->nfield * 3) * (size_t)next->ncell, &next->value));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* Mesh, values and names of one body. */
 static PetscErrorCode finish_body(const Work *w, PetscBool done, PetscInt step, SbRemade *remade)
 {
@@ -494,11 +461,27 @@ PetscErrorCode SbRemeshBodies(SbModel m, const SbGathered *g, const PetscBool du
     if (due[b]) PetscCall(try_body(&work[b], how, &r->made[b], &r->done[b]));
     room += nvert + 2 * work[b].nside;
   }
-  PetscCall(begin_next(g, r->made, &r->next));
+  // counts of the next meshes, and room for their values
+  r->next.nbody = g->nbody;
+  r->next.nfield = g->nfield;
+  r->next.width = g->width;
+  PetscCall(PetscCalloc2(g->nbody + 1, &r->next.vert0, g->nbody + 1, &r->next.cell0));
+  for (PetscInt b = 0; b < g->nbody; b++) {
+    r->next.vert0[b + 1] = r->next.vert0[b] + r->made[b].nvert[1];
+    r->next.cell0[b + 1] = r->next.cell0[b] + r->made[b].ncell[1];
+  }
+  r->next.nvert = r->next.vert0[g->nbody];
+  r->next.ncell = r->next.cell0[g->nbody];
+  PetscCall(
+    PetscMalloc1((size_t)(r->next.width * r->next.nfield * 3) * (size_t)r->next.ncell, &r->next.value));
   PetscCall(PetscMalloc2(room, &r->renamed.from, room, &r->renamed.to));
   for (PetscInt b = 0; b < m->nbody; b++) {
     PetscCall(finish_body(&work[b], r->done[b], step, r));
-    PetscCall(close_work(&work[b]));
+    PetscCall(SbNewMeshDestroy(&work[b].mesh));
+    PetscCall(SbLocatorDestroy(&work[b].rest));
+    PetscCall(PetscFree(work[b].cell));
+    PetscCall(PetscFree(work[b].at));
+    PetscCall(PetscFree(work[b].side));
   }
   PetscCall(PetscSortIntWithArray(r->renamed.n, r->renamed.from, r->renamed.to));
   PetscCall(PetscFree(work));

@@ -60,23 +60,12 @@ static PetscBool in_hull(const SbFaces *faces, const PetscInt component[], Petsc
   return (PetscBool)(other < 0 || (c < other && component[other] != component[c]));
 }
 
-static PetscReal mean_edge(const SbHull *hull)
-{
-  PetscReal sum = 0;
-
-  for (PetscInt i = 0; i < 3 * hull->ntri; i++) {
-    const PetscReal *p = hull->x + 3 * hull->tri[i], *q = hull->x + 3 * hull->tri[i % 3 == 2 ? i - 2 : i + 1];
-
-    sum += PetscSqrtReal(PetscSqr(p[0] - q[0]) + PetscSqr(p[1] - q[1]) + PetscSqr(p[2] - q[2]));
-  }
-  return sum / (3 * (PetscReal)hull->ntri);
-}
-
 /* Triangles and vertices of the hull, these in the order of the old mesh: kept[hull->nvert]. */
 static PetscErrorCode fill_hull(const SbOldMesh *old, const SbFaces *faces, const PetscInt component[],
                                 const PetscReal x[], SbHull *hull, PetscInt **kept)
 {
   PetscInt *number, n = 0;
+  PetscReal sum = 0;
 
   PetscFunctionBeginUser;
   for (PetscInt s = 0; s < 4 * old->ncell; s++) hull->ntri += in_hull(faces, component, s / 4, s % 4);
@@ -105,24 +94,14 @@ static PetscErrorCode fill_hull(const SbOldMesh *old, const SbFaces *faces, cons
     number[v] = n++;
   }
   for (PetscInt i = 0; i < 3 * hull->ntri; i++) hull->tri[i] = number[hull->tri[i]];
-  hull->edge = mean_edge(hull);
+  // mean edge length
+  for (PetscInt i = 0; i < 3 * hull->ntri; i++) {
+    const PetscReal *p = hull->x + 3 * hull->tri[i], *q = hull->x + 3 * hull->tri[i % 3 == 2 ? i - 2 : i + 1];
+
+    sum += PetscSqrtReal(PetscSqr(p[0] - q[0]) + PetscSqr(p[1] - q[1]) + PetscSqr(p[2] - q[2]));
+  }
+  hull->edge = sum / (3 * (PetscReal)hull->ntri);
   PetscCall(PetscFree(number));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode make_hull(const SbOldMesh *old, const PetscReal x[], SbHull *hull, PetscInt **kept)
-{
-  SbFaces faces;
-  PetscInt *component;
-
-  PetscFunctionBeginUser;
-  PetscCall(PetscMemzero(hull, sizeof(*hull)));
-  PetscCall(SbFacesCreate(old->nvert, old->ncell, old->cell, &faces));
-  PetscCall(PetscMalloc1(old->ncell, &component));
-  PetscCall(find_regions(old, &faces, &hull->nregion, component));
-  PetscCall(fill_hull(old, &faces, component, x, hull, kept));
-  PetscCall(PetscFree(component));
-  PetscCall(SbFacesDestroy(&faces));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -204,19 +183,6 @@ typedef struct {
   PetscInt *start, *cells;
 } Stars;
 
-static PetscErrorCode make_stars(const SbNewMesh *m, Stars *s)
-{
-  PetscFunctionBeginUser;
-  PetscCall(PetscCalloc1(m->nvert + 1, &s->start));
-  PetscCall(PetscMalloc1(4 * (size_t)m->ncell, &s->cells));
-  for (PetscInt i = 0; i < 4 * m->ncell; i++) s->start[m->cell[i] + 1]++;
-  for (PetscInt v = 0; v < m->nvert; v++) s->start[v + 1] += s->start[v];
-  for (PetscInt i = 0; i < 4 * m->ncell; i++) s->cells[s->start[m->cell[i]]++] = i / 4;
-  for (PetscInt v = m->nvert; v > 0; v--) s->start[v] = s->start[v - 1];
-  s->start[0] = 0;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 static PetscReal worst_around(const SbNewMesh *m, const Stars *s, PetscInt v)
 {
   PetscReal worst = 1;
@@ -274,7 +240,14 @@ static PetscErrorCode move_vertices(const SbOldMesh *old, const SbRemeshing *how
   Stars stars;
 
   PetscFunctionBeginUser;
-  PetscCall(make_stars(m, &stars));
+  // tets around each vertex
+  PetscCall(PetscCalloc1(m->nvert + 1, &stars.start));
+  PetscCall(PetscMalloc1(4 * (size_t)m->ncell, &stars.cells));
+  for (PetscInt i = 0; i < 4 * m->ncell; i++) stars.start[m->cell[i] + 1]++;
+  for (PetscInt v = 0; v < m->nvert; v++) stars.start[v + 1] += stars.start[v];
+  for (PetscInt i = 0; i < 4 * m->ncell; i++) stars.cells[stars.start[m->cell[i]]++] = i / 4;
+  for (PetscInt v = m->nvert; v > 0; v--) stars.start[v] = stars.start[v - 1];
+  stars.start[0] = 0;
   PetscCall(PetscCalloc1(m->nvert, &moved));
   for (int sweep = 0; sweep < SWEEPS && better; sweep++) {
     better = PETSC_FALSE;
@@ -305,17 +278,6 @@ static int by_key(const void *a, const void *b)
   const uint64_t p = *(const uint64_t *)a, q = *(const uint64_t *)b;
 
   return (p > q) - (p < q);
-}
-
-/* Edges of the hull, [3 hull->ntri] in order, which stay whole. */
-static PetscErrorCode list_edges(const SbHull *hull, uint64_t **edge)
-{
-  PetscFunctionBeginUser;
-  PetscCall(PetscMalloc1(3 * (size_t)hull->ntri, edge));
-  for (PetscInt i = 0; i < 3 * hull->ntri; i++)
-    (*edge)[i] = edge_key(hull->tri[i], hull->tri[i % 3 == 2 ? i - 2 : i + 1]);
-  qsort(*edge, 3 * (size_t)hull->ntri, sizeof(**edge), by_key);
-  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* The longest edge of a tet, now, that is not of the hull; false when there is none. */
@@ -385,7 +347,11 @@ static PetscErrorCode mend(const SbOldMesh *old, const SbRemeshing *how, const S
   uint64_t *edge;
 
   PetscFunctionBeginUser;
-  PetscCall(list_edges(hull, &edge));
+  // edges of the hull, sorted: they are never split
+  PetscCall(PetscMalloc1(3 * (size_t)hull->ntri, &edge));
+  for (PetscInt i = 0; i < 3 * hull->ntri; i++)
+    edge[i] = edge_key(hull->tri[i], hull->tri[i % 3 == 2 ? i - 2 : i + 1]);
+  qsort(edge, 3 * (size_t)hull->ntri, sizeof(*edge), by_key);
   for (int round = 0; round < ROUNDS && split; round++) {
     const PetscInt ncell = m->ncell;
 
@@ -443,28 +409,30 @@ static PetscErrorCode judge(const SbOldMesh *old, const SbRemeshing *how, SbNewM
 
 /* ------------------------------------------------------------------ from beginning to end */
 
-static PetscErrorCode find_within(SbLocator rest, SbNewMesh *m)
+static PetscErrorCode remesh(const char *where, const SbOldMesh *old, const SbRemeshing *how, SbHull *hull,
+                             SbLocator *rest, SbNewMesh *m)
 {
-  PetscFunctionBeginUser;
-  PetscCall(PetscMalloc1(m->ncell, &m->within));
-  for (PetscInt c = 0; c < m->ncell; c++) {
-    PetscReal middle[3], w[4];
-
-    for (int k = 0; k < 3; k++) {
-      middle[k] = 0;
-      for (int a = 0; a < 4; a++) middle[k] += m->X[3 * m->cell[4 * c + a] + k] / 4;
-    }
-    (void)SbLocatorFind(rest, middle, &m->within[c], w);
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* A mesher of the user's tests, or a new one, may not keep what it promises. */
-static PetscErrorCode check_mesher(const SbHull *hull, const SbNewMesh *m)
-{
+  SbTets tets = {0};
   PetscBool *used, all = PETSC_TRUE;
+  SbFaces faces;
+  PetscInt *component;
 
   PetscFunctionBeginUser;
+  // the hull: outer surface and interfaces between regions
+  PetscCall(PetscMemzero(hull, sizeof(*hull)));
+  PetscCall(SbFacesCreate(old->nvert, old->ncell, old->cell, &faces));
+  PetscCall(PetscMalloc1(old->ncell, &component));
+  PetscCall(find_regions(old, &faces, &hull->nregion, component));
+  PetscCall(fill_hull(old, &faces, component, how->rest ? old->X : old->x, hull, &m->kept));
+  PetscCall(PetscFree(component));
+  PetscCall(SbFacesDestroy(&faces));
+  m->nkept = hull->nvert;
+  PetscCall((*how->mesher)(where, hull, how->size * hull->edge, how->ctx, &tets));
+  m->nvert = tets.nvert;
+  m->ncell = tets.ncell;
+  m->x = tets.x;
+  m->cell = tets.cell;
+  // a mesher must return tets that use all vertices
   PetscCheck(m->ncell && m->nvert >= hull->nvert, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
              "the mesher made no tetrahedra");
   PetscCall(PetscCalloc1(m->nvert, &used));
@@ -473,28 +441,21 @@ static PetscErrorCode check_mesher(const SbHull *hull, const SbNewMesh *m)
   PetscCall(PetscFree(used));
   PetscCheck(all, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
              "the mesher left out vertices of the surface, or made some of no tetrahedron");
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode remesh(const char *where, const SbOldMesh *old, const SbRemeshing *how, SbHull *hull,
-                             SbLocator *rest, SbNewMesh *m)
-{
-  SbTets tets = {0};
-
-  PetscFunctionBeginUser;
-  PetscCall(make_hull(old, how->rest ? old->X : old->x, hull, &m->kept));
-  m->nkept = hull->nvert;
-  PetscCall((*how->mesher)(where, hull, how->size * hull->edge, how->ctx, &tets));
-  m->nvert = tets.nvert;
-  m->ncell = tets.ncell;
-  m->x = tets.x;
-  m->cell = tets.cell;
-  PetscCall(check_mesher(hull, m));
   PetscCall(SbLocatorCreate(old->ncell, old->cell, old->X, rest));
   PetscCall(find_material(old, how, *rest, m));
   PetscCall(mend(old, how, hull, *rest, m));
   PetscCall(judge(old, how, m));
-  PetscCall(find_within(*rest, m));
+  // the old tet around the middle of each new one
+  PetscCall(PetscMalloc1(m->ncell, &m->within));
+  for (PetscInt c = 0; c < m->ncell; c++) {
+    PetscReal middle[3], w[4];
+
+    for (int k = 0; k < 3; k++) {
+      middle[k] = 0;
+      for (int a = 0; a < 4; a++) middle[k] += m->X[3 * m->cell[4 * c + a] + k] / 4;
+    }
+    (void)SbLocatorFind(*rest, middle, &m->within[c], w);
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -83,23 +83,22 @@ PetscErrorCode SbBodyQualities(SbModel m, Vec U, const PetscBool named[], PetscR
 
 /* ------------------------------------------------------------------ momenta */
 
-/* p[nnode][3] = M v on owned nodes. */
-static PetscErrorCode apply_mass(SbModel m, const PetscReal v[], PetscReal p[])
+static PetscErrorCode momenta_about(SbModel m, Vec U, const PetscReal v[], const PetscReal about[][3],
+                                    PetscReal momenta[][6])
 {
+  const PetscReal *u;
+  PetscReal *p;
   const SbStage stage = {.a = v};
-
-  PetscFunctionBeginUser;
-  PetscCall(PetscArrayzero(p, 3 * m->space->nnode));
-  PetscCall(SbSpaceAddInertia(m->space, &stage, p));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Momenta of this rank's part of each body, about a point of each. */
-static void add_momenta(SbModel m, const PetscReal u[], const PetscReal p[], const PetscReal about[][3],
-                        PetscReal momenta[][6])
-{
   const SbSpace s = m->space;
 
+  PetscFunctionBeginUser;
+  PetscCall(PetscMalloc1(3 * m->space->nnode, &p));
+  // p = M v
+  PetscCall(PetscArrayzero(p, 3 * m->space->nnode));
+  PetscCall(SbSpaceAddInertia(m->space, &stage, p));
+  PetscCall(PetscArrayzero(&momenta[0][0], 6 * m->nbody));
+  PetscCall(SbSpaceGetLocalRead(m->space, U, &u));
+  // momenta of this rank's part of each body
   for (PetscInt i = 0; i < s->nnode_owned; i++) {
     const PetscInt b = s->node_body[i];
     PetscReal r[3], L[3];
@@ -111,20 +110,6 @@ static void add_momenta(SbModel m, const PetscReal u[], const PetscReal p[], con
       momenta[b][3 + k] += L[k];
     }
   }
-}
-
-static PetscErrorCode momenta_about(SbModel m, Vec U, const PetscReal v[], const PetscReal about[][3],
-                                    PetscReal momenta[][6])
-{
-  const PetscReal *u;
-  PetscReal *p;
-
-  PetscFunctionBeginUser;
-  PetscCall(PetscMalloc1(3 * m->space->nnode, &p));
-  PetscCall(apply_mass(m, v, p));
-  PetscCall(PetscArrayzero(&momenta[0][0], 6 * m->nbody));
-  PetscCall(SbSpaceGetLocalRead(m->space, U, &u));
-  add_momenta(m, u, p, about, momenta);
   PetscCall(SbSpaceRestoreLocalRead(m->space, U, &u));
   PetscCallMPI(
     MPI_Allreduce(MPI_IN_PLACE, &momenta[0][0], (PetscMPIInt)(6 * m->nbody), MPIU_REAL, MPI_SUM, m->comm));

@@ -36,23 +36,6 @@ static PetscErrorCode collect(PetscSF sf, PetscInt n, MPI_Datatype one, const vo
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode gather_vertices(SbMesh mesh, PetscBool root, SbGathered *g)
-{
-  PetscSF sf;
-
-  PetscFunctionBeginUser;
-  if (root) {
-    PetscCall(PetscMalloc1(3 * (size_t)g->nvert, &g->X));
-    PetscCall(PetscMalloc1(3 * (size_t)g->nvert, &g->x));
-    PetscCall(PetscMalloc1(g->nvert, &g->vert_set));
-  }
-  PetscCall(forest(mesh->comm, mesh->Nvert, mesh->nvert_owned, mesh->vert_orig, &sf));
-  PetscCall(collect(sf, 3, MPIU_REAL, mesh->x, g->X));
-  PetscCall(collect(sf, 1, MPI_UINT64_T, mesh->vert_set, g->vert_set));
-  PetscCall(PetscSFDestroy(&sf));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 static PetscErrorCode gather_cells(SbMesh mesh, PetscBool root, PetscSF sf, SbGathered *g)
 {
   const PetscInt n = mesh->ncell_owned;
@@ -163,14 +146,6 @@ static PetscErrorCode find_places(SbModel m, SbGathered *g)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode body_masses(SbModel m, PetscReal mass[])
-{
-  PetscFunctionBeginUser;
-  for (PetscInt i = 0; i < m->space->nnode_owned; i++) mass[m->space->node_body[i]] += m->space->node_mass[i];
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, mass, (PetscMPIInt)m->nbody, MPIU_REAL, MPI_SUM, m->comm));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode SbGather(SbRun run, SbGathered *g)
 {
   const SbModel m = run->model;
@@ -194,8 +169,20 @@ PetscErrorCode SbGather(SbRun run, SbGathered *g)
     g->vert0[b + 1] = g->vert0[b] + m->body[b].nvert;
     g->cell0[b + 1] = g->cell0[b] + m->body[b].ncell;
   }
-  PetscCall(body_masses(m, g->mass));
-  PetscCall(gather_vertices(mesh, (PetscBool)!rank, g));
+  // masses of the bodies
+  for (PetscInt i = 0; i < m->space->nnode_owned; i++)
+    g->mass[m->space->node_body[i]] += m->space->node_mass[i];
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, g->mass, (PetscMPIInt)m->nbody, MPIU_REAL, MPI_SUM, m->comm));
+  // vertices and their sets to rank 0
+  if (!rank) {
+    PetscCall(PetscMalloc1(3 * (size_t)g->nvert, &g->X));
+    PetscCall(PetscMalloc1(3 * (size_t)g->nvert, &g->x));
+    PetscCall(PetscMalloc1(g->nvert, &g->vert_set));
+  }
+  PetscCall(forest(mesh->comm, mesh->Nvert, mesh->nvert_owned, mesh->vert_orig, &sf));
+  PetscCall(collect(sf, 3, MPIU_REAL, mesh->x, g->X));
+  PetscCall(collect(sf, 1, MPI_UINT64_T, mesh->vert_set, g->vert_set));
+  PetscCall(PetscSFDestroy(&sf));
   PetscCall(forest(m->comm, mesh->Ncell, mesh->ncell_owned, mesh->cell_orig, &sf));
   PetscCall(gather_cells(mesh, (PetscBool)!rank, sf, g));
   PetscCall(gather_values(run, (PetscBool)!rank, sf, g));

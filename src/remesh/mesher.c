@@ -12,37 +12,6 @@
 #define BITS 10   /* an edge has 2^10 to 2^11 steps */
 #define AHEAD 0.3 /* of a step: with one half, round numbers would lie where rounding is not sure */
 
-static PetscErrorCode make_skin(const SbHull *hull, SbSurface *body_surface)
-{
-  PetscFunctionBeginUser;
-  PetscCall(SbSurfaceCreate(hull->nvert, hull->ntri, hull->nregion, body_surface));
-  PetscCall(PetscArraycpy(body_surface->x, hull->x, 3 * (size_t)hull->nvert));
-  PetscCall(PetscArraycpy(body_surface->tri, hull->tri, 3 * (size_t)hull->ntri));
-  PetscCall(PetscArraycpy(body_surface->side, hull->side, 2 * (size_t)hull->ntri));
-  PetscCall(PetscArrayzero(body_surface->tags, hull->ntri));
-  PetscCall(PetscArrayzero(body_surface->region_tags, hull->nregion));
-  for (PetscInt t = 0; t < hull->ntri; t++) body_surface->number[t] = t + 1;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Takes vertices and tets out of an import, which loses them; tets are turned where they need it. */
-static PetscErrorCode take(SbImport *im, SbTets *tets)
-{
-  PetscFunctionBeginUser;
-  *tets = (SbTets){.nvert = im->nvert, .ncell = im->item[3].n, .x = im->x, .cell = im->item[3].vert};
-  im->x = NULL;
-  im->item[3].vert = NULL;
-  for (PetscInt c = 0; c < tets->ncell; c++) {
-    PetscInt *v = tets->cell + 4 * (size_t)c;
-    const PetscInt keep = v[3];
-
-    if (SbTetDeterminant(tets->x, v) > 0) continue;
-    v[3] = v[2];
-    v[2] = keep;
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* One attempt. step: coordinates are rounded to multiples of it, m; 0: they stay as they are. */
 static PetscErrorCode fill(const char *where, const SbHull *hull, PetscReal size, PetscReal step,
                            SbImport *im)
@@ -59,7 +28,14 @@ static PetscErrorCode fill(const char *where, const SbHull *hull, PetscReal size
   PetscCall(SbTetDefaults(&options));
   options.size = step > 0 ? step * PetscMax(1, PetscFloorReal(size / step)) : size;
   options.surface = SB_TET_KEEP;
-  PetscCall(make_skin(hull, &body_surface));
+  // the hull as a surface of its own
+  PetscCall(SbSurfaceCreate(hull->nvert, hull->ntri, hull->nregion, &body_surface));
+  PetscCall(PetscArraycpy(body_surface.x, hull->x, 3 * (size_t)hull->nvert));
+  PetscCall(PetscArraycpy(body_surface.tri, hull->tri, 3 * (size_t)hull->ntri));
+  PetscCall(PetscArraycpy(body_surface.side, hull->side, 2 * (size_t)hull->ntri));
+  PetscCall(PetscArrayzero(body_surface.tags, hull->ntri));
+  PetscCall(PetscArrayzero(body_surface.region_tags, hull->nregion));
+  for (PetscInt t = 0; t < hull->ntri; t++) body_surface.number[t] = t + 1;
   for (PetscInt i = 0; i < 3 * hull->nvert && step > 0; i++)
     body_surface.x[i] = step * PetscFloorReal(body_surface.x[i] / step + AHEAD);
   ierr = SbTetrahedralize(where, &body_surface, &options, im);
@@ -81,7 +57,18 @@ PetscErrorCode SbMesherDefault(const char *where, const SbHull *hull, PetscReal 
   ierr = fill(where, hull, size, step, &im);
   PetscCall(PetscPopErrorHandler());
   if (ierr) PetscCall(fill(where, hull, size, 0, &im));
-  PetscCall(take(&im, tets));
+  // vertices and tets move to the caller; inverted tets are turned
+  *tets = (SbTets){.nvert = im.nvert, .ncell = im.item[3].n, .x = im.x, .cell = im.item[3].vert};
+  im.x = NULL;
+  im.item[3].vert = NULL;
+  for (PetscInt c = 0; c < tets->ncell; c++) {
+    PetscInt *v = tets->cell + 4 * (size_t)c;
+    const PetscInt keep = v[3];
+
+    if (SbTetDeterminant(tets->x, v) > 0) continue;
+    v[3] = v[2];
+    v[2] = keep;
+  }
   PetscCall(SbImportDestroy(&im));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -291,15 +291,6 @@ typedef struct {
   SbLedger ledger;
 } Scene;
 
-static PetscErrorCode destroy_scene(Scene *s)
-{
-  PetscFunctionBeginUser;
-  PetscCall(SbLedgerDestroy(&s->ledger));
-  PetscCall(SbRunDestroy(&s->run));
-  PetscCall(SbModelDestroy(&s->model));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* The bodies' meshes, which are on rank 0; the model owns them from now on. */
 static PetscErrorCode hand_meshes(SbModel m, SbMemoryMesh *in_memory[])
 {
@@ -324,72 +315,9 @@ static PetscErrorCode hand_meshes(SbModel m, SbMemoryMesh *in_memory[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Everything from the options again, on the new meshes. The solver is the one of before, whose options are in PETSc's database. */
-static PetscErrorCode make_scene(const Scene *old, SbMemoryMesh *in_memory[], Scene *s)
-{
-  PetscFunctionBeginUser;
-  PetscCall(SbSceneCreate(old->model->comm, &s->model));
-  PetscCall(SbRunCreate(s->model, &s->run));
-  PetscCall(PetscStrncpy(s->run->solver_choice, old->run->solver, sizeof(s->run->solver_choice)));
-  PetscCall(SbLedgerSetFromOptions(s->run, &s->ledger));
-  PetscCall(hand_meshes(s->model, in_memory));
-  PetscCall(SbModelSetUp(s->model));
-  PetscCall(SbSceneValidate(s->model));
-  PetscCall(SbRunSetUp(s->run));
-  PetscCall(PetscStrncpy(s->run->solver_reason, old->run->solver_reason, sizeof(s->run->solver_reason)));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Momenta of the bodies, and rates of theirs where the integrator brings its acceleration along: else it would push them for a step. */
-static PetscErrorCode conserve_momenta(const Scene *old, const PetscBool done[], SbRun run, PetscReal *speed)
-{
-  const SbRun before = old->run;
-  PetscReal(*momenta)[6], rate;
-
-  PetscFunctionBeginUser;
-  if (!run->V) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(PetscCalloc1(old->model->nbody, &momenta));
-  PetscCall(SbBodyMomenta(old->model, before->U, before->V, momenta));
-  PetscCall(SbBodySetMomenta(run->model, run->U, run->V, done, (const PetscReal(*)[6])momenta, speed));
-  if (run->A) {
-    PetscCall(SbBodyMomenta(old->model, before->U, before->A, momenta));
-    PetscCall(SbBodySetMomenta(run->model, run->U, run->A, done, (const PetscReal(*)[6])momenta, &rate));
-  }
-  PetscCall(PetscFree(momenta));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* The state goes from the old scene to the new one. */
-static PetscErrorCode hand_over(const Scene *old, const SbRemade *remade, Scene *s, PetscReal *speed)
-{
-  SbRun run = s->run;
-
-  PetscFunctionBeginUser;
-  PetscCall(SbRunContinue(old->run, run));
-  PetscCall(SbScatter(&remade->next, run));
-  PetscCall(SbModelPrescribe(s->model, run->t_now, run->U));
-  PetscCall(conserve_momenta(old, remade->done, run, speed));
-  PetscCall(SbEffectsHandOver(old->run, run, &remade->renamed));
-  PetscCall(SbRunRestartAcceleration(run));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 static PetscReal distance(const PetscReal a[3], const PetscReal b[3])
 {
   return PetscSqrtReal(PetscSqr(a[0] - b[0]) + PetscSqr(a[1] - b[1]) + PetscSqr(a[2] - b[2]));
-}
-
-/* Energies, mass and momentum of both states: what is between them was lost. */
-static PetscErrorCode close_account(const Scene *old, Scene *s, SbEnergies e[2])
-{
-  PetscFunctionBeginUser;
-  PetscCall(PetscMemzero(e, 2 * sizeof(*e)));
-  PetscCall(SbModelEnergies(old->model, old->run->U, old->run->V, &e[0]));
-  PetscCall(SbModelEnergies(s->model, s->run->U, s->run->V, &e[1]));
-  s->run->energies.remesh_loss += e[0].kinetic + e[0].strain - e[1].kinetic - e[1].strain;
-  s->run->energies.remesh_mass += PetscAbsReal(s->model->mass - old->model->mass);
-  s->run->energies.remesh_momentum += distance(e[0].momentum, e[1].momentum);
-  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* ------------------------------------------------------------------ a re-meshing from beginning to end */
@@ -427,23 +355,6 @@ static PetscErrorCode make_meshes(SbRemesh r, SbRun run, SbRemade *remade, Petsc
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Below which quality, and from which step on, the bodies that were due are re-meshed again. */
-static void set_bounds(SbRemesh r, PetscInt step, const SbRemade *remade)
-{
-  const SbMade *made = remade->made;
-  const PetscBool *done = remade->done;
-
-  for (PetscInt b = 0; b < r->nbody; b++) {
-    const PetscReal reached = done[b] ? made[b].quality : r->worst[b];
-
-    if (!r->due[b]) continue;
-    if (reached > 0.) r->bound[b] = PetscMin(r->asked[b], AGAIN * reached);
-    r->rest[b] = done[b] && reached > 0. ? 0 : PetscMax(1, 2 * r->rest[b]);
-    r->from[b] = step + r->rest[b];
-    if (remade->in_memory[b] && done[b]) remade->in_memory[b]->bound = r->bound[b];
-  }
-}
-
 static PetscErrorCode report(SbRemesh r, const Scene *s, const SbRemade *remade, const SbEnergies e[2],
                              PetscReal speed)
 {
@@ -476,47 +387,96 @@ static PetscErrorCode replace(SbRemesh r, Scene *old, SbRemade *remade)
   Scene s = {NULL, NULL, NULL};
   SbEnergies e[2];
   PetscReal speed = 0.;
+  SbRun run;
+  const SbRun before = old->run;
+  PetscReal(*momenta)[6], rate;
 
   PetscFunctionBeginUser;
-  PetscCall(make_scene(old, remade->in_memory, &s));
-  PetscCall(hand_over(old, remade, &s, &speed));
-  PetscCall(close_account(old, &s, e));
+  // everything from the options again, on the new meshes; the solver stays the one chosen before
+  PetscCall(SbSceneCreate(old->model->comm, &s.model));
+  PetscCall(SbRunCreate(s.model, &s.run));
+  PetscCall(PetscStrncpy(s.run->solver_choice, old->run->solver, sizeof(s.run->solver_choice)));
+  PetscCall(SbLedgerSetFromOptions(s.run, &s.ledger));
+  PetscCall(hand_meshes(s.model, remade->in_memory));
+  PetscCall(SbModelSetUp(s.model));
+  PetscCall(SbSceneValidate(s.model));
+  PetscCall(SbRunSetUp(s.run));
+  PetscCall(PetscStrncpy(s.run->solver_reason, old->run->solver_reason, sizeof(s.run->solver_reason)));
+  // the state goes from the old scene to the new one
+  run = s.run;
+  PetscCall(SbRunContinue(old->run, run));
+  PetscCall(SbScatter(&remade->next, run));
+  PetscCall(SbModelPrescribe(s.model, run->t_now, run->U));
+  // keeps the bodies' momenta, and their rates where the integrator carries accelerations
+  if (run->V) {
+    PetscCall(PetscCalloc1(old->model->nbody, &momenta));
+    PetscCall(SbBodyMomenta(old->model, before->U, before->V, momenta));
+    PetscCall(
+      SbBodySetMomenta(run->model, run->U, run->V, remade->done, (const PetscReal(*)[6])momenta, &speed));
+    if (run->A) {
+      PetscCall(SbBodyMomenta(old->model, before->U, before->A, momenta));
+      PetscCall(
+        SbBodySetMomenta(run->model, run->U, run->A, remade->done, (const PetscReal(*)[6])momenta, &rate));
+    }
+    PetscCall(PetscFree(momenta));
+  }
+  PetscCall(SbEffectsHandOver(old->run, run, &remade->renamed));
+  PetscCall(SbRunRestartAcceleration(run));
+  // energy, mass and momentum of both states: the difference is the loss by remeshing
+  PetscCall(PetscMemzero(e, 2 * sizeof(*e)));
+  PetscCall(SbModelEnergies(old->model, old->run->U, old->run->V, &e[0]));
+  PetscCall(SbModelEnergies(s.model, s.run->U, s.run->V, &e[1]));
+  s.run->energies.remesh_loss += e[0].kinetic + e[0].strain - e[1].kinetic - e[1].strain;
+  s.run->energies.remesh_mass += PetscAbsReal(s.model->mass - old->model->mass);
+  s.run->energies.remesh_momentum += distance(e[0].momentum, e[1].momentum);
   PetscCall(SbLedgerAttach(s.ledger));
   if (s.ledger) PetscCall(SbLedgerContinue(old->ledger, s.ledger));
   PetscCall(SbRemeshAttach(r, s.run));
   if (old->run->output) PetscCall(SbOutputReattach(old->run, s.run));
   PetscCall(report(r, &s, remade, e, speed));
-  PetscCall(destroy_scene(old));
+  PetscCall(SbLedgerDestroy(&old->ledger));
+  PetscCall(SbRunDestroy(&old->run));
+  PetscCall(SbModelDestroy(&old->model));
   *old = s;
   PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* The old mesh stays, and the time loop begins again where it was. */
-static void go_on(SbRun run)
-{
-  run->step0 = run->step_now;
-  run->t0 = run->t_now;
-  run->newton_before = run->newton_total;
-  run->linear_before = run->linear_total;
-  run->rejected_seen = 0;
 }
 
 /* any: some body has a new mesh. */
 static PetscErrorCode apply(SbRemesh r, Scene *scene, PetscBool *any)
 {
   SbRemade remade;
+  const SbMade *made;
+  const PetscBool *done;
 
   PetscFunctionBeginUser;
   PetscCall(PetscLogStagePush(SbStageSetup));
   PetscCall(PetscLogEventBegin(r->event, 0, 0, 0, 0));
   PetscCall(SbRemadeCreate(scene->model->nbody, &remade));
   PetscCall(make_meshes(r, scene->run, &remade, any));
-  set_bounds(r, scene->run->step_now, &remade);
+  // quality and step from which a body may be remeshed again
+  made = remade.made;
+  done = remade.done;
+  for (PetscInt b = 0; b < r->nbody; b++) {
+    const PetscReal reached = done[b] ? made[b].quality : r->worst[b];
+
+    if (!r->due[b]) continue;
+    if (reached > 0.) r->bound[b] = PetscMin(r->asked[b], AGAIN * reached);
+    r->rest[b] = done[b] && reached > 0. ? 0 : PetscMax(1, 2 * r->rest[b]);
+    r->from[b] = scene->run->step_now + r->rest[b];
+    if (remade.in_memory[b] && done[b]) remade.in_memory[b]->bound = r->bound[b];
+  }
   if (*any) PetscCall(replace(r, scene, &remade));
   PetscCall(SbRemadeDestroy(&remade));
   PetscCall(PetscLogEventEnd(r->event, 0, 0, 0, 0));
   PetscCall(PetscLogStagePop());
-  if (!*any) go_on(scene->run);
+  // without a new mesh the time loop resumes at the current step
+  if (!*any) {
+    scene->run->step0 = scene->run->step_now;
+    scene->run->t0 = scene->run->t_now;
+    scene->run->newton_before = scene->run->newton_total;
+    scene->run->linear_before = scene->run->linear_total;
+    scene->run->rejected_seen = 0;
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

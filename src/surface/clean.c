@@ -357,13 +357,6 @@ static PetscErrorCode refuse_open(const SbTriangleFile *f, PetscInt n, const Pet
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static int compare_slots(const void *a, const void *b)
-{
-  const PetscInt p = *(const PetscInt *)a, q = *(const PetscInt *)b;
-
-  return (p > q) - (p < q);
-}
-
 static PetscErrorCode check_open(const SbTriangleFile *f, SbTriangleEdge edge[])
 {
   const PetscInt n = 3 * f->t->ntri;
@@ -377,10 +370,8 @@ static PetscErrorCode check_open(const SbTriangleFile *f, SbTriangleEdge edge[])
     m = SbTrianglesAtEdge(n, edge, i);
     if (m == 1) slot[nopen++] = edge[i].slot;
   }
-  if (nopen) {
-    qsort(slot, (size_t)nopen, sizeof(*slot), compare_slots);
-    ierr = refuse_open(f, nopen, slot);
-  }
+  PetscCall(PetscSortInt(nopen, slot));
+  if (nopen) ierr = refuse_open(f, nopen, slot);
   PetscCall(PetscFree(slot));
   PetscFunctionReturn(ierr);
 }

@@ -73,38 +73,6 @@ static PetscInt number_heaps(PetscInt n, PetscInt up[])
 
 /* ------------------------------------------------------------------ turned alike */
 
-static void turn(SbTriangles *t, PetscInt f)
-{
-  const PetscInt keep = t->tri[3 * f + 1];
-
-  t->tri[3 * f + 1] = t->tri[3 * f + 2];
-  t->tri[3 * f + 2] = keep;
-}
-
-/* The two ends of a manifold edge; across[3 f + k] is the slot beyond, -1 where more than two meet. */
-static PetscErrorCode find_across(const Space *s, PetscInt across[])
-{
-  const PetscInt n = 3 * s->t->ntri;
-
-  PetscFunctionBeginUser;
-  for (PetscInt i = 0, m; i < n; i += m) {
-    m = SbTrianglesAtEdge(n, s->edge, i);
-    for (PetscInt k = 0; k < m; k++) across[s->edge[i + k].slot] = m == 2 ? s->edge[i + 1 - k].slot : -1;
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode one_sided(const Space *s, PetscInt f, PetscInt g)
-{
-  PetscFunctionBeginUser;
-  SETERRQ(
-    PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
-    "%s: the surface has one side only (a Moebius strip or Klein bottle) around triangles %lld and %lld; it "
-    "encloses nothing, cut it there",
-    s->f->where, (long long)s->f->number[f], (long long)s->f->number[g]);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* Walks over one piece: sense[f] tells whether f is turned as the first one (1) or the other way (-1). */
 static PetscErrorCode walk_piece(const Space *s, PetscInt first, const PetscInt across[], int sense[],
                                  PetscInt stack[], PetscInt *n)
@@ -130,8 +98,13 @@ static PetscErrorCode walk_piece(const Space *s, PetscInt first, const PetscInt 
       if (!sense[g]) {
         sense[g] = same * sense[f];
         stack[(*n)++] = g;
-      } else if (sense[g] != same * sense[f])
-        PetscCall(one_sided(s, f, g));
+      } else if (sense[g] != same * sense[f]) {
+        SETERRQ(PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
+                "%s: the surface has one side only (a Moebius strip or Klein bottle) around triangles %lld "
+                "and %lld; it "
+                "encloses nothing, cut it there",
+                s->f->where, (long long)s->f->number[f], (long long)s->f->number[g]);
+      }
     }
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -150,8 +123,13 @@ static PetscErrorCode turn_pieces(Space *s, const PetscInt across[], int sense[]
     for (PetscInt i = 0; i < n; i++) nother += sense[stack[i]] < 0;
     wrong = 2 * nother > n ? 1 : -1;
     for (PetscInt i = 0; i < n; i++) {
+      PetscInt keep;
+
       if (sense[stack[i]] != wrong) continue;
-      turn(s->t, stack[i]);
+      // reverses the corners' order
+      keep = s->t->tri[3 * stack[i] + 1];
+      s->t->tri[3 * stack[i] + 1] = s->t->tri[3 * stack[i] + 2];
+      s->t->tri[3 * stack[i] + 2] = keep;
       s->m->nturned++;
     }
   }
@@ -163,13 +141,18 @@ static PetscErrorCode turn_alike(Space *s)
   PetscInt *across, *stack;
   int *sense;
   PetscErrorCode ierr;
+  const PetscInt n = 3 * s->t->ntri;
 
   PetscFunctionBeginUser;
   if (s->f->sheets) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscMalloc3(3 * (size_t)s->t->ntri, &across, s->t->ntri, &stack, s->t->ntri, &sense));
   PetscCall(PetscArrayzero(sense, s->t->ntri));
-  ierr = find_across(s, across);
-  if (!ierr) ierr = turn_pieces(s, across, sense, stack);
+  // the slot on the other side of each edge of two triangles; -1 where more meet
+  for (PetscInt i = 0, m; i < n; i += m) {
+    m = SbTrianglesAtEdge(n, s->edge, i);
+    for (PetscInt k = 0; k < m; k++) across[s->edge[i + k].slot] = m == 2 ? s->edge[i + 1 - k].slot : -1;
+  }
+  ierr = turn_pieces(s, across, sense, stack);
   PetscCall(PetscFree3(across, stack, sense));
   PetscCall(ierr);
   PetscCall(SbTrianglesEdges(s->t, s->edge)); /* slots have changed */
@@ -347,21 +330,6 @@ static PetscInt shell_around(const Space *s, const PetscReal o[3], PetscInt exce
   return best;
 }
 
-static PetscErrorCode find_parents(Space *s)
-{
-  PetscFunctionBeginUser;
-  for (PetscInt k = 0; k < s->nsurface; k++) {
-    const PetscInt *v = s->t->tri + 3 * s->surfaces[k].first;
-    PetscReal middle[3];
-
-    for (int i = 0; i < 3; i++)
-      middle[i] = (s->t->x[3 * v[0] + i] + s->t->x[3 * v[1] + i] + s->t->x[3 * v[2] + i]) / 3;
-    s->surfaces[k].parent = s->nsurface > 1 ? shell_around(s, middle, k) : OUTSIDE;
-    s->shells[s->surfaces[k].outer].parent = s->surfaces[k].parent;
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* Whether the outer side of a surface is the front of its triangles. */
 static PetscBool turned_outwards(const Space *s, PetscInt k)
 {
@@ -400,24 +368,6 @@ static PetscErrorCode empty_cavities(Space *s)
         if (s->shells[i].surface == k && s->shells[i].volume > 0) s->shells[i].empty = PETSC_TRUE;
       }
     }
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Holes that a file names. */
-static PetscErrorCode empty_holes(Space *s)
-{
-  PetscFunctionBeginUser;
-  for (PetscInt i = 0; i < s->f->nhole; i++) {
-    const SbSeed *h = &s->f->hole[i];
-    const PetscInt k = shell_around(s, h->x, -1);
-
-    PetscCheck(
-      k != OUTSIDE, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
-      "%s: hole %lld at (%.6g, %.6g, %.6g) m lies in no region; move it into the cavity, or remove it",
-      s->f->where, (long long)h->number, (double)h->x[0], (double)h->x[1], (double)h->x[2]);
-    s->m->ncavity += !s->shells[k].empty;
-    s->shells[k].empty = PETSC_TRUE;
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -501,21 +451,6 @@ static PetscErrorCode name_regions(const Space *s, SbSurface *out)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Points of regions that lie nowhere are a mistake in the file. */
-static PetscErrorCode check_seeds(const Space *s)
-{
-  PetscFunctionBeginUser;
-  for (PetscInt i = 0; i < s->f->nregion; i++) {
-    const SbSeed *r = &s->f->region[i];
-
-    PetscCheck(
-      shell_around(s, r->x, -1) != OUTSIDE, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
-      "%s: the point of region %lld at (%.6g, %.6g, %.6g) m lies in no region; move it, or remove it",
-      s->f->where, (long long)r->number, (double)r->x[0], (double)r->x[1], (double)r->x[2]);
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* Triangles with material on a side, and their vertices. */
 static PetscErrorCode fill_surface(const Space *s, PetscInt nregion, SbSurface *out)
 {
@@ -562,10 +497,38 @@ static PetscErrorCode find_regions(Space *s, SbSurface *out)
   PetscCall(find_shells(s));
   PetscCall(measure_shells(s));
   PetscCall(check_shells(s));
-  PetscCall(find_parents(s));
+  // the shell around each surface, from the middle of one of its triangles
+  for (PetscInt k = 0; k < s->nsurface; k++) {
+    const PetscInt *v = s->t->tri + 3 * s->surfaces[k].first;
+    PetscReal middle[3];
+
+    for (int i = 0; i < 3; i++)
+      middle[i] = (s->t->x[3 * v[0] + i] + s->t->x[3 * v[1] + i] + s->t->x[3 * v[2] + i]) / 3;
+    s->surfaces[k].parent = s->nsurface > 1 ? shell_around(s, middle, k) : OUTSIDE;
+    s->shells[s->surfaces[k].outer].parent = s->surfaces[k].parent;
+  }
   PetscCall(empty_cavities(s));
-  PetscCall(empty_holes(s));
-  PetscCall(check_seeds(s));
+  // the regions around the hole points of the file hold no material
+  for (PetscInt i = 0; i < s->f->nhole; i++) {
+    const SbSeed *h = &s->f->hole[i];
+    const PetscInt k = shell_around(s, h->x, -1);
+
+    PetscCheck(
+      k != OUTSIDE, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
+      "%s: hole %lld at (%.6g, %.6g, %.6g) m lies in no region; move it into the cavity, or remove it",
+      s->f->where, (long long)h->number, (double)h->x[0], (double)h->x[1], (double)h->x[2]);
+    s->m->ncavity += !s->shells[k].empty;
+    s->shells[k].empty = PETSC_TRUE;
+  }
+  // every region point of the file must lie in a region
+  for (PetscInt i = 0; i < s->f->nregion; i++) {
+    const SbSeed *r = &s->f->region[i];
+
+    PetscCheck(
+      shell_around(s, r->x, -1) != OUTSIDE, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
+      "%s: the point of region %lld at (%.6g, %.6g, %.6g) m lies in no region; move it, or remove it",
+      s->f->where, (long long)r->number, (double)r->x[0], (double)r->x[1], (double)r->x[2]);
+  }
   n = number_regions(s);
   PetscCheck(n, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
              "%s: no region is left beside its holes; remove one of them", s->f->where);

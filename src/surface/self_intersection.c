@@ -298,22 +298,6 @@ static void smooth(SbTriangles *t, const PetscBool active[], PetscReal (*sum)[4]
   }
 }
 
-/* Largest way from x0, and how many vertices were moved. */
-static PetscReal farthest(const SbTriangles *t, const PetscReal x0[], PetscInt *n)
-{
-  PetscReal most = 0;
-
-  *n = 0;
-  for (PetscInt v = 0; v < t->nvert; v++) {
-    const PetscReal *a = t->x + 3 * v, *b = x0 + 3 * v, d[3] = {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
-    const PetscReal d2 = SbDot3(d, d);
-
-    *n += d2 > 0;
-    most = PetscMax(most, d2);
-  }
-  return PetscSqrtReal(most);
-}
-
 /* Smooths around what crosses until nothing does; gives up beyond the reach. s: pairs at the start, then those that are left. */
 static PetscErrorCode untangle(SbTriangles *t, PetscReal reach, Search *s, SbSurfaceRepairs *m)
 {
@@ -325,9 +309,19 @@ static PetscErrorCode untangle(SbTriangles *t, PetscReal reach, Search *s, SbSur
   PetscCall(PetscArrayzero(active, t->nvert));
   PetscCall(PetscArraycpy(x0, t->x, 3 * (size_t)t->nvert));
   for (int pass = 0; pass < PASSES && s->n && m->untangled <= reach; pass++) {
+    PetscReal most = 0;
+
     PetscCall(grow(t, s->crossing, pass % 4 == 3, active));
     smooth(t, active, sum);
-    m->untangled = farthest(t, x0, &m->nuntangled);
+    m->nuntangled = 0;
+    for (PetscInt v = 0; v < t->nvert; v++) {
+      const PetscReal *a = t->x + 3 * v, *b = x0 + 3 * v, d[3] = {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
+      const PetscReal d2 = SbDot3(d, d);
+
+      m->nuntangled += d2 > 0;
+      most = PetscMax(most, d2);
+    }
+    m->untangled = PetscSqrtReal(most);
     PetscCall(find_pairs(t, s));
   }
   if (s->n || m->untangled > reach) PetscCall(PetscArraycpy(t->x, x0, 3 * (size_t)t->nvert));

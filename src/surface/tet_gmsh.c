@@ -39,30 +39,21 @@ static PetscErrorCode find_piece(Model *m, const PetscInt side[2], PetscInt *k)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* All nodes are put on the first piece: gmsh takes them from the triangles anyway. */
-static PetscErrorCode add_nodes(const SbGmsh *g, const SbSurface *s)
-{
-  size_t *tag;
-
-  PetscFunctionBeginUser;
-  PetscCall(PetscMalloc1(s->nvert, &tag));
-  for (PetscInt v = 0; v < s->nvert; v++) tag[v] = (size_t)v + 1;
-  SB_GMSH(g, ModelMeshAddNodes, 2, 1, tag, (size_t)s->nvert, s->x, 3 * (size_t)s->nvert, NULL, 0);
-  PetscCall(PetscFree(tag));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 static PetscErrorCode add_surface(const SbGmsh *g, Model *m)
 {
   const SbSurface *s = m->job->surface;
   PetscInt *piece;
-  size_t *tag, *node;
+  size_t *tag, *node, *vertex;
 
   PetscFunctionBeginUser;
   PetscCall(PetscMalloc3(s->ntri, &piece, s->ntri, &tag, 3 * (size_t)s->ntri, &node));
   for (PetscInt f = 0; f < s->ntri; f++) PetscCall(find_piece(m, s->side + 2 * f, &piece[f]));
   for (PetscInt k = 0; k < m->npiece; k++) SB_GMSH(g, ModelAddDiscreteEntity, 2, m->piece[k].tag, NULL, 0);
-  PetscCall(add_nodes(g, s));
+  // nodes: all on the first entity, gmsh assigns them by the triangles
+  PetscCall(PetscMalloc1(s->nvert, &vertex));
+  for (PetscInt v = 0; v < s->nvert; v++) vertex[v] = (size_t)v + 1;
+  SB_GMSH(g, ModelMeshAddNodes, 2, 1, vertex, (size_t)s->nvert, s->x, 3 * (size_t)s->nvert, NULL, 0);
+  PetscCall(PetscFree(vertex));
   for (PetscInt k = 0; k < m->npiece; k++) {
     size_t n = 0;
 
@@ -204,37 +195,13 @@ static PetscErrorCode take_nodes(const SbGmsh *g, PetscInt nkept, SbImport *im)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode take_mesh(const SbGmsh *g, const Model *m, SbImport *im)
-{
-  const SbSurface *s = m->job->surface;
-
-  PetscFunctionBeginUser;
-  for (PetscInt r = 0; r < s->nregion; r++) PetscCall(take_items(g, 3, (int)r + 1, r, im));
-  PetscCheck(im->item[3].n, PETSC_COMM_SELF, PETSC_ERR_FILE_UNEXPECTED, "no tets were made");
-  for (PetscInt k = 0; k < m->npiece; k++) PetscCall(take_items(g, 2, m->piece[k].tag, 0, im));
-  PetscCall(take_nodes(g, m->job->remesh ? 0 : s->nvert, im));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* ------------------------------------------------------------------ the job */
-
-/* Beyond what Generate does by itself. Netgen's optimiser is not in every build of gmsh, and not in Debian's. */
-static PetscErrorCode improve(const SbGmsh *g)
-{
-  int missing = 0;
-
-  PetscFunctionBeginUser;
-  for (int pass = 0; pass < 2; pass++) {
-    SB_GMSH(g, ModelMeshOptimize, "Relocate3D", 0, 2, NULL, 0);
-    SB_GMSH(g, ModelMeshOptimize, "", 0, 1, NULL, 0);
-    if (!missing) g->ModelMeshOptimize("Netgen", 0, 1, NULL, 0, &missing);
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
 
 static PetscErrorCode work(const SbGmsh *g, void *ctx, SbImport *im)
 {
   Model m = {.job = (const SbTetJob *)ctx};
+  const SbSurface *s;
+  int missing = 0;
 
   PetscFunctionBeginUser;
   PetscCall(add_surface(g, &m));
@@ -242,18 +209,19 @@ static PetscErrorCode work(const SbGmsh *g, void *ctx, SbImport *im)
   PetscCall(add_volumes(g, &m));
   PetscCall(set_sizes(g, m.job));
   SB_GMSH(g, ModelMeshGenerate, 3);
-  PetscCall(improve(g));
-  PetscCall(take_mesh(g, &m, im));
+  // optimises beyond Generate; Netgen's optimiser is not in every build of gmsh
+  for (int pass = 0; pass < 2; pass++) {
+    SB_GMSH(g, ModelMeshOptimize, "Relocate3D", 0, 2, NULL, 0);
+    SB_GMSH(g, ModelMeshOptimize, "", 0, 1, NULL, 0);
+    if (!missing) g->ModelMeshOptimize("Netgen", 0, 1, NULL, 0, &missing);
+  }
+  // tets by region, triangles by entity, then the nodes they use
+  s = m.job->surface;
+  for (PetscInt r = 0; r < s->nregion; r++) PetscCall(take_items(g, 3, (int)r + 1, r, im));
+  PetscCheck(im->item[3].n, PETSC_COMM_SELF, PETSC_ERR_FILE_UNEXPECTED, "no tets were made");
+  for (PetscInt k = 0; k < m.npiece; k++) PetscCall(take_items(g, 2, m.piece[k].tag, 0, im));
+  PetscCall(take_nodes(g, m.job->remesh ? 0 : s->nvert, im));
   PetscCall(PetscFree(m.piece));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* The triangles of a kept surface are not asked back: they are what was given. */
-static PetscErrorCode put_triangles(const SbSurface *s, SbImport *im)
-{
-  PetscFunctionBeginUser;
-  im->item[2].n = 0;
-  for (PetscInt f = 0; f < s->ntri; f++) PetscCall(SbImportAddItem(im, 2, s->tri + 3 * f, f, s->number[f]));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -266,7 +234,11 @@ PetscErrorCode SbTetRun_Gmsh(const SbTetJob *job, SbImport *tets)
   PetscCall(SbGmshRun(&child, tets));
   if (job->remesh)
     PetscCall(SbTetNearest(job->surface, &tets->item[2], tets->x));
-  else
-    PetscCall(put_triangles(job->surface, tets));
+  else {
+    // a kept surface is not asked back: its triangles are the input's
+    tets->item[2].n = 0;
+    for (PetscInt f = 0; f < job->surface->ntri; f++)
+      PetscCall(SbImportAddItem(tets, 2, job->surface->tri + 3 * f, f, job->surface->number[f]));
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -29,33 +29,6 @@
 
 /* ------------------------------------------------------------------ the folder */
 
-static PetscErrorCode make_folder(size_t size, char folder[])
-{
-  const char *base = getenv("TMPDIR");
-
-  PetscFunctionBeginUser;
-  (void)snprintf(folder, size, "%s/supple-tetgen-XXXXXX", base && base[0] ? base : "/tmp");
-  PetscCheck(mkdtemp(folder), PETSC_COMM_SELF, PETSC_ERR_FILE_OPEN,
-             "no temporary folder %s (%s); set TMPDIR to a folder that can be written", folder,
-             strerror(errno));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* With the files that are in it; folders below it are not ours. */
-static void remove_folder(const char *folder)
-{
-  DIR *d = opendir(folder);
-  const struct dirent *entry;
-  char path[PATH_LENGTH];
-
-  while (d && (entry = readdir(d)) != NULL) {
-    (void)snprintf(path, sizeof(path), "%s/%s", folder, entry->d_name);
-    (void)unlink(path);
-  }
-  if (d) (void)closedir(d);
-  (void)rmdir(folder);
-}
-
 static PetscErrorCode write_surface(const char *folder, const SbSurface *s)
 {
   char path[PATH_LENGTH];
@@ -109,34 +82,28 @@ static void become_tetgen(const char *folder, const char *flags)
   _exit(127);
 }
 
-/* The last lines of what the program said, as one line. */
-static void read_log(const char *folder, size_t size, char text[])
-{
-  char path[PATH_LENGTH], line[256];
-  FILE *f;
-
-  text[0] = 0;
-  (void)snprintf(path, sizeof(path), "%s/log", folder);
-  f = fopen(path, "r");
-  while (f && fgets(line, (int)sizeof(line), f)) {
-    const size_t n = strlen(text);
-
-    line[strcspn(line, "\r\n")] = 0;
-    if (!line[0] || strstr(line, "@") || strstr(line, "report this bug")) continue;
-    (void)snprintf(text + n, size - n, "%s%s", n ? " / " : "", line + strspn(line, " "));
-  }
-  if (f) (void)fclose(f);
-}
-
 static PetscErrorCode check_end(const char *folder, int status)
 {
   char said[256];
+  char path[PATH_LENGTH], line[256];
+  FILE *f;
 
   PetscFunctionBeginUser;
   PetscCheck(!WIFEXITED(status) || WEXITSTATUS(status) != 127, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
              "there is no program tetgen; install the package tetgen (Debian, Ubuntu)");
   if (WIFEXITED(status) && !WEXITSTATUS(status)) PetscFunctionReturn(PETSC_SUCCESS);
-  read_log(folder, sizeof(said), said);
+  // the last lines of the log as one line
+  said[0] = 0;
+  (void)snprintf(path, sizeof(path), "%s/log", folder);
+  f = fopen(path, "r");
+  while (f && fgets(line, (int)sizeof(line), f)) {
+    const size_t n = strlen(said);
+
+    line[strcspn(line, "\r\n")] = 0;
+    if (!line[0] || strstr(line, "@") || strstr(line, "report this bug")) continue;
+    (void)snprintf(said + n, sizeof(said) - n, "%s%s", n ? " / " : "", line + strspn(line, " "));
+  }
+  if (f) (void)fclose(f);
   SETERRQ(PETSC_COMM_SELF, PETSC_ERR_USER_INPUT, "it %s %d%s%s",
           WIFSIGNALED(status) ? "was ended by signal" : "gave up with code",
           WIFSIGNALED(status) ? WTERMSIG(status) : WEXITSTATUS(status), said[0] ? ", saying: " : "", said);
@@ -358,27 +325,11 @@ static PetscErrorCode find_regions(const SbTetJob *job, SbImport *im)
 
 /* ------------------------------------------------------------------ the backend */
 
-/* Coordinates come back as text: those of a kept surface are put back as they were. */
-static PetscErrorCode restore_vertices(const SbTetJob *job, SbImport *im)
-{
-  const SbSurface *s = job->surface;
-
-  PetscFunctionBeginUser;
-  if (job->remesh) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCheck(im->nvert >= s->nvert, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
-             "vertices of the surface are gone");
-  for (PetscInt i = 0; i < 3 * s->nvert; i++) {
-    PetscCheck(PetscAbsReal(im->x[i] - s->x[i]) < 1e-6 * job->edge, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
-               "vertex %" PetscInt_FMT " of the surface was moved", i / 3 + 1);
-    im->x[i] = s->x[i];
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 static PetscErrorCode work_in(const char *folder, const SbTetJob *job, SbImport *im)
 {
   const PetscReal volume = job->size * job->size * job->size / (6 * PETSC_SQRT2);
   char flags[96];
+  const SbSurface *s = job->surface;
 
   PetscFunctionBeginUser;
   PetscCall(write_surface(folder, job->surface));
@@ -389,7 +340,16 @@ static PetscErrorCode work_in(const char *folder, const SbTetJob *job, SbImport 
   PetscCall(read_items(folder, "s.1.node", 3, take_vertex, im));
   PetscCall(read_items(folder, "s.1.ele", 4, take_tet, im));
   PetscCall(read_items(folder, "s.1.face", 2, take_facet, im));
-  PetscCall(restore_vertices(job, im));
+  // coordinates come back as text: a kept surface gets its exact ones again
+  if (!job->remesh) {
+    PetscCheck(im->nvert >= s->nvert, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
+               "vertices of the surface are gone");
+    for (PetscInt i = 0; i < 3 * s->nvert; i++) {
+      PetscCheck(PetscAbsReal(im->x[i] - s->x[i]) < 1e-6 * job->edge, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
+                 "vertex %" PetscInt_FMT " of the surface was moved", i / 3 + 1);
+      im->x[i] = s->x[i];
+    }
+  }
   PetscCall(find_regions(job, im));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -398,11 +358,27 @@ PetscErrorCode SbTetRun_TetGen(const SbTetJob *job, SbImport *tets)
 {
   char folder[PETSC_MAX_PATH_LEN];
   PetscErrorCode ierr;
+  const char *base;
+  DIR *d;
+  const struct dirent *entry;
+  char path[PATH_LENGTH];
 
   PetscFunctionBeginUser;
-  PetscCall(make_folder(sizeof(folder) - 16, folder));
+  // a temporary folder of its own
+  base = getenv("TMPDIR");
+  (void)snprintf(folder, sizeof(folder) - 16, "%s/supple-tetgen-XXXXXX", base && base[0] ? base : "/tmp");
+  PetscCheck(mkdtemp(folder), PETSC_COMM_SELF, PETSC_ERR_FILE_OPEN,
+             "no temporary folder %s (%s); set TMPDIR to a folder that can be written", folder,
+             strerror(errno));
   ierr = work_in(folder, job, tets);
-  remove_folder(folder);
+  // removes the folder with the files in it
+  d = opendir(folder);
+  while (d && (entry = readdir(d)) != NULL) {
+    (void)snprintf(path, sizeof(path), "%s/%s", folder, entry->d_name);
+    (void)unlink(path);
+  }
+  if (d) (void)closedir(d);
+  (void)rmdir(folder);
   PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -86,21 +86,6 @@ static PetscErrorCode check_volumes(const SbTetJob *job, const SbImport *im)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* With the surface kept: its vertices are the first ones, as they were. */
-static PetscErrorCode check_kept(const SbTetJob *job, const SbImport *im)
-{
-  const SbSurface *s = job->surface;
-
-  PetscFunctionBeginUser;
-  if (job->remesh) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCheck(im->nvert >= s->nvert, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
-             "vertices of the surface are gone");
-  for (PetscInt i = 0; i < 3 * s->nvert; i++)
-    PetscCheck(im->x[i] == s->x[i], PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
-               "vertex %" PetscInt_FMT " of the surface was moved", i / 3 + 1);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* Numbers of regions and triangles become tag sets; triangles of no group are left out. */
 static PetscErrorCode give_groups(const SbSurface *s, SbImport *im)
 {
@@ -154,10 +139,19 @@ static PetscErrorCode add_note(const SbTetJob *job, int backend, PetscReal size,
 
 static PetscErrorCode run_checked(int backend, const SbTetJob *job, SbImport *tets)
 {
+  const SbSurface *s = job->surface;
+
   PetscFunctionBeginUser;
   PetscCall((*backends[backend].run)(job, tets));
   PetscCheck(tets->item[3].n, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT, "it made no tets");
-  PetscCall(check_kept(job, tets));
+  // a kept surface has its vertices first and unmoved
+  if (!job->remesh) {
+    PetscCheck(tets->nvert >= s->nvert, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
+               "vertices of the surface are gone");
+    for (PetscInt i = 0; i < 3 * s->nvert; i++)
+      PetscCheck(tets->x[i] == s->x[i], PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
+                 "vertex %" PetscInt_FMT " of the surface was moved", i / 3 + 1);
+  }
   PetscCall(check_volumes(job, tets));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -194,16 +188,6 @@ static PetscErrorCode try_road(int backend, const SbTetJob *job, SbImport *tets,
   PetscCall(PetscStrlcat(reasons, backends[backend].name, size));
   PetscCall(PetscStrlcat(reasons, ": ", size));
   PetscCall(PetscStrlcat(reasons, without(job->where, caught.text), size));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Lengths times a power of two, which keeps every bit: programs with bounds of their own see a size between 1 and 2. */
-static PetscErrorCode scale_surface(const SbSurface *s, PetscReal factor, SbSurface *scaled)
-{
-  PetscFunctionBeginUser;
-  *scaled = *s;
-  PetscCall(PetscMalloc1(3 * (size_t)s->nvert, &scaled->x));
-  for (PetscInt i = 0; i < 3 * s->nvert; i++) scaled->x[i] = factor * s->x[i];
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -324,7 +308,10 @@ PetscErrorCode SbTetrahedralize(const char *where, const SbSurface *s, const SbT
   PetscCall(prepare(where, s, o, body, &job));
   (void)frexp(job.size, &exponent);
   factor = ldexp(1, 1 - exponent);
-  PetscCall(scale_surface(s, factor, &scaled));
+  // lengths times a power of two, which is exact: backends with absolute bounds see a size between 1 and 2
+  scaled = *s;
+  PetscCall(PetscMalloc1(3 * (size_t)s->nvert, &scaled.x));
+  for (PetscInt i = 0; i < 3 * s->nvert; i++) scaled.x[i] = factor * s->x[i];
   job.surface = &scaled;
   job.size *= factor;
   job.edge *= factor;

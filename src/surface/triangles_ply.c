@@ -93,37 +93,6 @@ static PetscErrorCode read_property(Ply *p)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode read_element(Ply *p)
-{
-  Element *e;
-
-  PetscFunctionBeginUser;
-  if (p->nelement == ELEMENTS_MAX)
-    SB_SCAN_ERROR(p->s, "the file has more than %d kinds of elements", ELEMENTS_MAX);
-  e = &p->element[p->nelement++];
-  PetscCall(PetscMemzero(e, sizeof(*e)));
-  PetscCall(SbScanWord(p->s, sizeof(e->name), e->name));
-  PetscCall(SbScanText(p->s, "number of elements", &e->n));
-  if (!strcmp(e->name, "tristrips"))
-    SB_SCAN_ERROR(p->s, "the file holds triangle strips; write it with single faces");
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode read_format(Ply *p)
-{
-  const uint16_t one = 1;
-  const PetscBool little = (PetscBool)(*(const unsigned char *)&one == 1);
-  char word[32];
-
-  PetscFunctionBeginUser;
-  PetscCall(SbScanWord(p->s, sizeof(word), word));
-  if (strcmp(word, "ascii") && strcmp(word, "binary_little_endian") && strcmp(word, "binary_big_endian"))
-    SB_SCAN_ERROR(p->s, "format '%s'; expected ascii, binary_little_endian or binary_big_endian", word);
-  p->binary = (PetscBool)(word[0] == 'b');
-  p->swap = (PetscBool)(p->binary && little != (PetscBool)!strcmp(word, "binary_little_endian"));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 static PetscErrorCode read_header(Ply *p)
 {
   char word[32];
@@ -140,11 +109,27 @@ static PetscErrorCode read_header(Ply *p)
                     "the file ends where 'end_header' is expected; it is truncated, write or copy it again");
     if (!strcmp(word, "end_header")) break;
     if (!strcmp(word, "format")) {
-      PetscCall(read_format(p));
+      const uint16_t one = 1;
+      const PetscBool little = (PetscBool)(*(const unsigned char *)&one == 1);
+
+      PetscCall(SbScanWord(p->s, sizeof(word), word));
+      if (strcmp(word, "ascii") && strcmp(word, "binary_little_endian") && strcmp(word, "binary_big_endian"))
+        SB_SCAN_ERROR(p->s, "format '%s'; expected ascii, binary_little_endian or binary_big_endian", word);
+      p->binary = (PetscBool)(word[0] == 'b');
+      p->swap = (PetscBool)(p->binary && little != (PetscBool)!strcmp(word, "binary_little_endian"));
       format = PETSC_TRUE;
-    } else if (!strcmp(word, "element"))
-      PetscCall(read_element(p));
-    else if (!strcmp(word, "property"))
+    } else if (!strcmp(word, "element")) {
+      Element *e;
+
+      if (p->nelement == ELEMENTS_MAX)
+        SB_SCAN_ERROR(p->s, "the file has more than %d kinds of elements", ELEMENTS_MAX);
+      e = &p->element[p->nelement++];
+      PetscCall(PetscMemzero(e, sizeof(*e)));
+      PetscCall(SbScanWord(p->s, sizeof(e->name), e->name));
+      PetscCall(SbScanText(p->s, "number of elements", &e->n));
+      if (!strcmp(e->name, "tristrips"))
+        SB_SCAN_ERROR(p->s, "the file holds triangle strips; write it with single faces");
+    } else if (!strcmp(word, "property"))
       PetscCall(read_property(p));
     else if (strcmp(word, "comment") && strcmp(word, "obj_info"))
       SB_SCAN_ERROR(p->s, "'%s' is no line of a PLY header", word);

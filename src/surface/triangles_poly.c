@@ -149,21 +149,6 @@ static PetscErrorCode end_facet(Poly *p, int64_t marker, int64_t facet)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* One facet of .smesh: number of corners, corners, marker when there are markers. */
-static PetscErrorCode read_smesh_facet(Poly *p, PetscBool marked, int64_t facet)
-{
-  int64_t n, marker = 0;
-
-  PetscFunctionBeginUser;
-  SbScanNext(p->s, '#');
-  PetscCall(SbScanText(p->s, "number of corners of a facet", &n));
-  PetscCall(read_polygon(p, n, facet));
-  if (marked && SbScanMore(p->s, '#')) PetscCall(SbScanText(p->s, "marker of a facet", &marker));
-  PetscCall(SbScanEndOfLine(p->s));
-  PetscCall(end_facet(p, marker, facet));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* One facet of .poly: numbers of polygons and holes, marker; then these. */
 static PetscErrorCode read_poly_facet(Poly *p, int64_t facet)
 {
@@ -236,9 +221,17 @@ static PetscErrorCode read_all(Poly *p, const char *path)
     PetscCall(read_node_file(p, path));
   PetscCall(read_counts(p->s, "number of facets", 2, count));
   for (int64_t i = 1; i <= count[0]; i++) {
-    if (smesh)
-      PetscCall(read_smesh_facet(p, (PetscBool)(count[1] != 0), i));
-    else
+    if (smesh) {
+      int64_t n, marker = 0;
+
+      // number of corners, corners, marker
+      SbScanNext(p->s, '#');
+      PetscCall(SbScanText(p->s, "number of corners of a facet", &n));
+      PetscCall(read_polygon(p, n, i));
+      if (count[1] && SbScanMore(p->s, '#')) PetscCall(SbScanText(p->s, "marker of a facet", &marker));
+      PetscCall(SbScanEndOfLine(p->s));
+      PetscCall(end_facet(p, marker, i));
+    } else
       PetscCall(read_poly_facet(p, i));
   }
   PetscCall(read_seeds(p, "hole", PETSC_FALSE, &p->f->nhole, &p->f->hole));

@@ -106,21 +106,6 @@ static PetscErrorCode cut_ears(const Polygon *p, PetscInt n, PetscInt left[], in
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The corner that comes first by its coordinates: so that two copies of a polygon are cut alike, wherever they begin. */
-static PetscInt first_corner(const PetscReal x[], PetscInt n, const PetscInt vert[])
-{
-  PetscInt first = 0;
-
-  for (PetscInt i = 1; i < n; i++) {
-    const PetscReal *a = x + 3 * vert[i], *b = x + 3 * vert[first];
-    int k = 0;
-
-    while (k < 2 && a[k] == b[k]) k++;
-    if (a[k] < b[k]) first = i;
-  }
-  return first;
-}
-
 static PetscErrorCode too_many(SbScan *s, PetscInt n, int64_t number)
 {
   PetscFunctionBeginUser;
@@ -139,7 +124,17 @@ PetscErrorCode SbTrianglesAddPolygon(SbScan *s, PetscInt n, const PetscInt vert[
 
   PetscFunctionBeginUser;
   if (n > 3) {
-    o = first_corner(p.x, n, vert);
+    PetscInt first = 0;
+
+    // begins at the lowest corner: copies of a polygon are cut alike wherever they begin
+    for (PetscInt i = 1; i < n; i++) {
+      const PetscReal *a = p.x + 3 * vert[i], *b = p.x + 3 * vert[first];
+      int k = 0;
+
+      while (k < 2 && a[k] == b[k]) k++;
+      if (a[k] < b[k]) first = i;
+    }
+    o = first;
     find_normal(n, vert, &p);
     fan = is_fan(&p, n, vert, o, PetscSqrtReal(SbDot3(p.normal, p.normal)));
   }

@@ -144,25 +144,6 @@ static PetscErrorCode stl_facet(SbScan *s, SbTriangleFile *f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The name behind `solid` is the rest of the line. */
-static PetscErrorCode stl_solid(SbScan *s, PetscInt nsolid, SbTriangleFile *f)
-{
-  char name[SB_NAME_MAX], *last;
-  const char *const names[1] = {name};
-  const char *end;
-
-  PetscFunctionBeginUser;
-  while (s->at < s->end && (*s->at == ' ' || *s->at == '\t')) s->at++;
-  end = (const char *)memchr(s->at, '\n', (size_t)(s->end - s->at));
-  if (!end) end = s->end;
-  (void)snprintf(name, sizeof(name), "%.*s", (int)PetscMin(end - s->at, (ptrdiff_t)sizeof(name) - 1), s->at);
-  for (last = name + strlen(name); last > name && isspace((unsigned char)last[-1]);) *--last = 0;
-  if (!name[0]) (void)snprintf(name, sizeof(name), "solid_%" PetscInt_FMT, nsolid);
-  PetscCall(SbTrianglesGroups(f, 1, names));
-  PetscCall(SbScanEndOfLine(s));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* One or more solids: together they are the surface. */
 static PetscErrorCode stl_text(SbScan *s, SbTriangleFile *f)
 {
@@ -177,7 +158,23 @@ static PetscErrorCode stl_text(SbScan *s, SbTriangleFile *f)
     SB_SCAN_ERROR(s, "expected 'solid', and the size of the file is not that of a binary one: it is no STL "
                      "file, or truncated");
   for (PetscBool open = PETSC_TRUE; word[0];) {
-    if (!strcasecmp(word, "solid")) PetscCall(stl_solid(s, ++nsolid, f));
+    // the rest of the line is the name of the solid
+    if (!strcasecmp(word, "solid")) {
+      char name[SB_NAME_MAX], *last;
+      const char *const names[1] = {name};
+      const char *end;
+
+      nsolid++;
+      while (s->at < s->end && (*s->at == ' ' || *s->at == '\t')) s->at++;
+      end = (const char *)memchr(s->at, '\n', (size_t)(s->end - s->at));
+      if (!end) end = s->end;
+      (void)snprintf(name, sizeof(name), "%.*s", (int)PetscMin(end - s->at, (ptrdiff_t)sizeof(name) - 1),
+                     s->at);
+      for (last = name + strlen(name); last > name && isspace((unsigned char)last[-1]);) *--last = 0;
+      if (!name[0]) (void)snprintf(name, sizeof(name), "solid_%" PetscInt_FMT, nsolid);
+      PetscCall(SbTrianglesGroups(f, 1, names));
+      PetscCall(SbScanEndOfLine(s));
+    }
     if (!strcasecmp(word, "endsolid")) PetscCall(SbScanEndOfLine(s)); /* its name again */
     if (open && !strcasecmp(word, "facet")) PetscCall(stl_facet(s, f));
     PetscCall(stl_next(s, word));
