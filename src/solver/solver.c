@@ -328,9 +328,8 @@ PetscErrorCode SbSolverChoose(SbSpace s, PetscBool dynamic, PetscBool linear, Pe
                             "degrees): a factorisation, iterations hardly get there",
                             unknowns, (double)hard.nu, 100. * (double)hard.sliver_part, SB_SLIVER));
   } else if (s->faces && !s->nodal && !s->constraints &&
-             (hard.face_nu > NU_PRESSURE || hard.dg || (!dynamic && !hard.slivers))) {
-    /* 24k tets, CPU s of one rank, this and cg_two_level. Static at nu 0.3: CR 3.4 (3.2), DG 4.2 (5.6); at 0.45: 4.3 (3.6), 5.1
-       (12), more with every refinement. Dynamic, CR, three steps: at 0.3 12 (7), at 0.45 15 (11), at 0.49 17 (17) */
+             (hard.face_nu > NU_PRESSURE || (!hard.slivers && (!dynamic || hard.dg)))) {
+    /* docs/reports/solver_choice.md; 24k tets of CR, dynamic, CPU s of this and cg_two_level at nu 0.3 12 and 7, at 0.45 15 and 11, at 0.49 17 and 17 */
     name = "pressure";
     PetscCall(PetscSNPrintf(reason, size,
                             "%s, %" PetscInt_FMT " unknowns of cr or dg, nu up to %g: iterations that grow "

@@ -85,7 +85,7 @@ static PetscErrorCode check_slivers(void)
 }
 
 /* The solver of a clamped bar with so many slivers, without solving. */
-static PetscErrorCode choose(const char *path, const char *solver, char name[SB_NAME_MAX])
+static PetscErrorCode choose(const char *path, const char *solver, const char *body, char name[SB_NAME_MAX])
 {
   char text[1024];
   TestScene t;
@@ -94,15 +94,15 @@ static PetscErrorCode choose(const char *path, const char *solver, char name[SB_
   PetscCall(PetscSNPrintf(
     text, sizeof(text),
     BAR "-body_a_mesh %s -effect_clamp_on held -sets held -set_held_at plane:1,0,0,0 -time static "
-        "-body_a_material linear -body_a_poisson 0.4999 -body_a_element cr -solver %s",
-    path, solver));
+        "-body_a_material linear %s -solver %s",
+    path, body, solver));
   PetscCall(test_scene_open(text, &t));
   PetscCall(PetscStrncpy(name, t.run->solver, SB_NAME_MAX));
   PetscCall(test_scene_close(&t));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Slivers count in the choice: beyond the size up to which everything is factored, auto factors for them only. */
+/* Slivers count in the choice: beyond the size up to which everything is factored, auto factors for them near 1/2, and leaves `pressure` far from it. */
 static PetscErrorCode check_choice(void)
 {
   static const PetscReal part[] = {0., 0.01};
@@ -114,11 +114,14 @@ static PetscErrorCode check_choice(void)
     const Slivers s = {.n = {24, 6, 6}, .size = {0.4, 0.1, 0.1}, .part = part[k], .degrees = 0.1};
 
     PetscCall(slivers_write(&s, path, &made));
-    PetscCall(choose(path, "auto", chosen));
-    PetscCall(choose(path, "direct", direct));
-    PetscCall(test_file_remove(path));
+    PetscCall(choose(path, "auto", "-body_a_poisson 0.4999 -body_a_element cr", chosen));
+    PetscCall(choose(path, "direct", "-body_a_poisson 0.4999 -body_a_element cr", direct));
     SB_CHECK(!strcmp(chosen, k ? direct : "pressure"), "%g of the tets are slivers: auto took %s",
              (double)part[k], chosen);
+    PetscCall(choose(path, "auto", "-body_a_poisson 0.3 -body_a_element dg", chosen));
+    SB_CHECK(!strcmp(chosen, k ? "cg_two_level" : "pressure"),
+             "%g of the tets are slivers, DG, nu 0.3: auto took %s", (double)part[k], chosen);
+    PetscCall(test_file_remove(path));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
