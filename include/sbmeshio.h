@@ -137,6 +137,8 @@ PetscErrorCode SbScanInt4(SbScan *scan, const char *what, int64_t *value);
 PetscErrorCode SbScanInt8(SbScan *scan, const char *what, int64_t *value);
 PetscErrorCode SbScanReal(SbScan *scan, const char *what, int64_t number,
                           PetscReal *value); /* `what` of `number` */
+PetscErrorCode SbScanPoint(SbScan *scan, const char *what, int64_t number,
+                           PetscReal x[3]); /* three finite ones */
 /* A count of things that take at least so many bytes each as text and in binary: more than the file holds is an error. */
 PetscErrorCode SbScanRoom(SbScan *scan, const char *what, int64_t n, int64_t text_bytes,
                           int64_t binary_bytes);

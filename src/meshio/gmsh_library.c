@@ -59,20 +59,6 @@ static PetscErrorCode load(const char *where, void **library, int *minor)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode find_functions(void *library, SbGmsh *g)
-{
-  PetscFunctionBeginUser;
-  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(functions); i++) {
-    void *address = dlsym(library, functions[i].name);
-
-    PetscCheck(address, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
-               "%s: the gmsh library has no function %s; install a version from 4.8 on", g->where,
-               functions[i].name);
-    memcpy((char *)g + functions[i].offset, &address, sizeof(address));
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 static PetscErrorCode initialise(void *library, int minor, SbGmsh *g)
 {
   void (*before_9)(int, char **, int, int *);
@@ -325,7 +311,15 @@ static PetscErrorCode in_child(void *ctx, SbImport *im)
   PetscCall(PetscMemzero(&g, sizeof(g)));
   g.where = job->where;
   PetscCall(load(g.where, &library, &minor));
-  PetscCall(find_functions(library, &g));
+  // the functions of the library, by name
+  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(functions); i++) {
+    void *address = dlsym(library, functions[i].name);
+
+    PetscCheck(address, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
+               "%s: the gmsh library has no function %s; install a version from 4.8 on", g.where,
+               functions[i].name);
+    memcpy((char *)&g + functions[i].offset, &address, sizeof(address));
+  }
   PetscCall(initialise(library, minor, &g));
   PetscCall((*job->work)(&g, job->ctx, im));
   PetscFunctionReturn(PETSC_SUCCESS);

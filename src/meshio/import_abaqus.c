@@ -38,16 +38,11 @@ typedef struct {
   const char *at;
 } Side;
 
-/* An array that grows by one at its end. */
-typedef struct {
-  PetscInt n, capacity;
-} Count;
-
 typedef struct {
   SbScan scan;
   SbImport *im;
   const char *line_end; /* of the line being taken apart */
-  Count nnode, nelement, nset, nside, nsurface;
+  SbCount nnode, nelement, nset, nside, nsurface;
   int64_t *node; /* [nnode] labels */
   PetscReal *x;  /* [nnode][3] */
   Element *element;
@@ -63,17 +58,6 @@ typedef struct {
   int64_t nmember; /* of all sets, as far as they are taken apart */
   PetscBool in_instance;
 } Abaqus;
-
-static PetscErrorCode grow(Count *count, size_t unit, void *array)
-{
-  PetscFunctionBeginUser;
-  if (count->n == count->capacity) {
-    count->capacity = PetscMax(64, 2 * count->capacity);
-    PetscCall(PetscRealloc((size_t)count->capacity * unit, (void **)array));
-  }
-  count->n++;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
 
 /* ------------------------------------------------------------------ lines and words */
 
@@ -165,7 +149,7 @@ static PetscErrorCode find_set(Abaqus *a, int kind, const char *name, PetscInt *
   for (*set = 0; *set < a->nset.n; (*set)++) {
     if (a->set[*set].kind == kind && !strcasecmp(a->set[*set].name, name)) PetscFunctionReturn(PETSC_SUCCESS);
   }
-  PetscCall(grow(&a->nset, sizeof(*a->set), &a->set));
+  PetscCall(SbImportGrow(&a->nset, sizeof(*a->set), &a->set));
   PetscCall(PetscMemzero(&a->set[*set], sizeof(*a->set)));
   (void)snprintf(a->set[*set].name, SB_GROUP_MAX, "%s", name);
   a->set[*set].kind = kind;
@@ -211,24 +195,6 @@ static PetscErrorCode count_members(Abaqus *a, int64_t n)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* first, last, step */
-static PetscErrorCode generate(Abaqus *a, PetscInt set)
-{
-  int64_t value[3] = {0, 0, 1};
-  char word[WORD];
-
-  PetscFunctionBeginUser;
-  for (int i = 0; i < 3 && next_word(a, word); i++)
-    if (word[0]) PetscCall(number_of(a, word, "first, last or step of a set", &value[i]));
-  if (value[2] < 1 || value[1] < value[0])
-    SB_SCAN_ERROR(&a->scan, "a set from %lld to %lld by %lld; it is empty", (long long)value[0],
-                  (long long)value[1], (long long)value[2]);
-  PetscCall(count_members(a, (value[1] - value[0]) / value[2] + 1));
-  for (int64_t label = value[0]; label <= value[1]; label += value[2])
-    PetscCall(add_label(&a->set[set], label));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 static PetscErrorCode read_set(Abaqus *a, const char *line, int kind)
 {
   char name[WORD], word[WORD];
@@ -241,9 +207,18 @@ static PetscErrorCode read_set(Abaqus *a, const char *line, int kind)
     SB_SCAN_ERROR(&a->scan, "a set without a name");
   PetscCall(find_set(a, kind, name, &set));
   for (leave_line(a); next_line(a) && *a->scan.at != '*'; leave_line(a)) {
-    if (generated)
-      PetscCall(generate(a, set));
-    else
+    if (generated) {
+      int64_t value[3] = {0, 0, 1};
+      char number[WORD];
+
+      for (int i = 0; i < 3 && next_word(a, number); i++)
+        if (number[0]) PetscCall(number_of(a, number, "first, last or step of a set", &value[i]));
+      if (value[2] < 1 || value[1] < value[0])
+        SB_SCAN_ERROR(&a->scan, "a set from %lld to %lld by %lld; it is empty", (long long)value[0],
+                      (long long)value[1], (long long)value[2]);
+      PetscCall(count_members(a, (value[1] - value[0]) / value[2] + 1));
+      for (label = value[0]; label <= value[1]; label += value[2]) PetscCall(add_label(&a->set[set], label));
+    } else
       while (next_word(a, word)) {
         if (!word[0]) continue;
         PetscCall(label_of(a, kind, word, &label));
@@ -266,7 +241,7 @@ static PetscErrorCode read_nodes(Abaqus *a, const char *line)
     const PetscInt v = a->nnode.n;
     PetscInt capacity = a->nnode.capacity;
 
-    PetscCall(grow(&a->nnode, sizeof(*a->node), &a->node));
+    PetscCall(SbImportGrow(&a->nnode, sizeof(*a->node), &a->node));
     if (capacity != a->nnode.capacity)
       PetscCall(PetscRealloc(3 * (size_t)a->nnode.capacity * sizeof(*a->x), &a->x));
     (void)next_word(a, word);
@@ -349,7 +324,7 @@ static PetscErrorCode read_elements(Abaqus *a, const char *line)
                   name);
   if (parameter(a, line, "ELSET", word)) PetscCall(find_set(a, KIND_ELEMENT, word, &set));
   for (leave_line(a); next_line(a) && *a->scan.at != '*'; leave_line(a)) {
-    PetscCall(grow(&a->nelement, sizeof(*a->element), &a->element));
+    PetscCall(SbImportGrow(&a->nelement, sizeof(*a->element), &a->element));
     PetscCall(read_element(a, type, &a->element[a->nelement.n - 1]));
     a->count[type]++;
     if (set >= 0) PetscCall(add_label(&a->set[set], a->element[a->nelement.n - 1].label));
@@ -366,7 +341,7 @@ static PetscErrorCode read_side(Abaqus *a, PetscInt surface)
 
   PetscFunctionBeginUser;
   (void)next_word(a, word);
-  PetscCall(grow(&a->nside, sizeof(*a->side), &a->side));
+  PetscCall(SbImportGrow(&a->nside, sizeof(*a->side), &a->side));
   one = &a->side[a->nside.n - 1];
   *one = (Side){surface, 0, -1, a->scan.token};
   PetscCall(label_of(a, KIND_ELEMENT, word, &one->element));
@@ -388,7 +363,7 @@ static PetscErrorCode read_surface(Abaqus *a, const char *line)
     leave_line(a); /* of nodes, or analytical: nothing of the mesh */
     PetscFunctionReturn(PETSC_SUCCESS);
   }
-  PetscCall(grow(&a->nsurface, sizeof(*a->surface), &a->surface));
+  PetscCall(SbImportGrow(&a->nsurface, sizeof(*a->surface), &a->surface));
   (void)snprintf(a->surface[a->nsurface.n - 1], SB_GROUP_MAX, "%s", name);
   for (leave_line(a); next_line(a) && *a->scan.at != '*'; leave_line(a))
     PetscCall(read_side(a, a->nsurface.n - 1));

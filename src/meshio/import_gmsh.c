@@ -166,19 +166,6 @@ static PetscInt entity_tags(const Gmsh *g, int64_t dim, int64_t tag)
 
 /* ------------------------------------------------------------------ nodes */
 
-static PetscErrorCode read_node(Gmsh *g, PetscInt v)
-{
-  PetscFunctionBeginUser;
-  for (int i = 0; i < 3; i++) {
-    const long long number = g->im->vert_number[v];
-
-    PetscCall(SbScanReal(&g->scan, "coordinate", number, &g->im->x[3 * v + i]));
-    if (!isfinite(g->im->x[3 * v + i]))
-      SB_SCAN_ERROR(&g->scan, "coordinate of node %lld is not a finite number; repair the file", number);
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 static PetscErrorCode read_nodes_22(Gmsh *g)
 {
   SbScan *s = &g->scan;
@@ -193,7 +180,7 @@ static PetscErrorCode read_nodes_22(Gmsh *g)
   PetscCall(SbImportSetVertices(g->im, (PetscInt)n));
   for (PetscInt v = 0; v < n; v++) {
     PetscCall(SbScanInt4(s, "number of a node", &g->im->vert_number[v]));
-    PetscCall(read_node(g, v));
+    PetscCall(SbScanPoint(s, "coordinate", g->im->vert_number[v], g->im->x + 3 * v));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -217,43 +204,11 @@ static PetscErrorCode read_node_block(Gmsh *g, PetscInt *v)
                   (long long)n, (long long)(g->im->nvert - *v));
   for (PetscInt i = 0; i < n; i++) PetscCall(SbScanInt8(s, "number of a node", &g->im->vert_number[*v + i]));
   for (PetscInt i = 0; i < n; i++) {
-    PetscCall(read_node(g, *v + i));
+    PetscCall(SbScanPoint(s, "coordinate", g->im->vert_number[*v + i], g->im->x + 3 * (*v + i)));
     for (int k = 0; parametric && k < dim; k++)
       PetscCall(SbScanReal(s, "parameter", g->im->vert_number[*v + i], &parameter));
   }
   *v += (PetscInt)n;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode read_nodes_41(Gmsh *g)
-{
-  SbScan *s = &g->scan;
-  int64_t nblock, n, bound;
-  PetscInt v = 0;
-
-  PetscFunctionBeginUser;
-  PetscCall(SbScanInt8(s, "number of blocks of nodes", &nblock));
-  PetscCall(SbScanInt8(s, "number of nodes", &n));
-  PetscCall(SbScanInt8(s, "lowest number of a node", &bound));
-  PetscCall(SbScanInt8(s, "highest number of a node", &bound));
-  PetscCall(SbScanRoom(s, "nodes", n, 8, 32));
-  PetscCall(SbImportSetVertices(g->im, (PetscInt)n));
-  for (int64_t b = 0; b < nblock; b++) PetscCall(read_node_block(g, &v));
-  if (v < n) SB_SCAN_ERROR(s, "%lld nodes are announced, the blocks hold %lld", (long long)n, (long long)v);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode read_nodes(Gmsh *g)
-{
-  PetscFunctionBeginUser;
-  if (g->im->x) SB_SCAN_ERROR(&g->scan, "second section $Nodes");
-  if (g->version <= 2)
-    PetscCall(read_nodes_22(g));
-  else
-    PetscCall(read_nodes_41(g));
-  PetscCall(SbNumbersCreate(g->im->nvert, g->im->vert_number, &g->nodes));
-  if (g->nodes.repeated)
-    SB_SCAN_ERROR(&g->scan, "node %lld is given twice; renumber the nodes", (long long)g->nodes.twice);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -296,38 +251,6 @@ static PetscErrorCode read_element(Gmsh *g, int type, int64_t number, PetscInt t
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Tags of one element of a 2.2 file: the first is its group, 0 for none; the others do not concern us. */
-static PetscErrorCode read_tags_22(Gmsh *g, int dim, int64_t ntag, PetscInt *tags)
-{
-  int64_t tag = 0, other;
-  PetscInt group;
-
-  PetscFunctionBeginUser;
-  PetscCall(SbScanRoom(&g->scan, "tags of an element", ntag, 2, 4));
-  for (int64_t k = 0; k < ntag; k++) PetscCall(SbScanInt4(&g->scan, "tag of an element", k ? &other : &tag));
-  if (tag && (tag != g->last.tag || dim != g->last.dim)) {
-    PetscCall(SbImportGroup(g->im, dim, tag < 0 ? -tag : tag, NULL, &group));
-    PetscCall(SbImportTagSet(g->im, 1, &group, &g->last.tags));
-    g->last.dim = dim;
-    g->last.tag = tag;
-  }
-  *tags = tag ? g->last.tags : 0;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* In a file of version 1 every element tells how many nodes it has. */
-static PetscErrorCode read_node_count_1(Gmsh *g, int type)
-{
-  int64_t n;
-
-  PetscFunctionBeginUser;
-  PetscCall(SbScanText(&g->scan, "number of nodes of an element", &n));
-  if (n != SbGmshTypes[type].nnode)
-    SB_SCAN_ERROR(&g->scan, "an element of type %d with %lld nodes; expected %d", type, (long long)n,
-                  SbGmshTypes[type].nnode);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* Elements of one type: as text one, whose line tells type and number of tags; in binary as many as their header says. */
 static PetscErrorCode read_elements_22_run(Gmsh *g, int64_t left, int64_t *nread)
 {
@@ -348,9 +271,30 @@ static PetscErrorCode read_elements_22_run(Gmsh *g, int64_t left, int64_t *nread
     SB_SCAN_ERROR(s, "block of %lld elements; only %lld of those announced for the section are left",
                   (long long)n, (long long)left);
   for (int64_t i = 0; i < n; i++) {
+    int64_t tag = 0, other;
+    PetscInt group;
+
     if (s->binary) PetscCall(SbScanInt4(s, "number of an element", &number));
-    PetscCall(read_tags_22(g, SbGmshTypes[type].dim, ntag, &tags));
-    if (g->version == 1) PetscCall(read_node_count_1(g, (int)type));
+    // the first tag is the group, 0 for none; the others are not used
+    PetscCall(SbScanRoom(&g->scan, "tags of an element", ntag, 2, 4));
+    for (int64_t k = 0; k < ntag; k++)
+      PetscCall(SbScanInt4(&g->scan, "tag of an element", k ? &other : &tag));
+    if (tag && (tag != g->last.tag || SbGmshTypes[type].dim != g->last.dim)) {
+      PetscCall(SbImportGroup(g->im, SbGmshTypes[type].dim, tag < 0 ? -tag : tag, NULL, &group));
+      PetscCall(SbImportTagSet(g->im, 1, &group, &g->last.tags));
+      g->last.dim = SbGmshTypes[type].dim;
+      g->last.tag = tag;
+    }
+    tags = tag ? g->last.tags : 0;
+    // in version 1 every element states its number of nodes
+    if (g->version == 1) {
+      int64_t nnode;
+
+      PetscCall(SbScanText(&g->scan, "number of nodes of an element", &nnode));
+      if (nnode != SbGmshTypes[type].nnode)
+        SB_SCAN_ERROR(&g->scan, "an element of type %d with %lld nodes; expected %d", (int)type,
+                      (long long)nnode, SbGmshTypes[type].nnode);
+    }
     PetscCall(read_element(g, (int)type, number, tags));
   }
   *nread = n;
@@ -496,9 +440,29 @@ static PetscErrorCode read_section(Gmsh *g, const char *name, PetscBool *known)
   else if (!strcmp(name, "$Entities") || !strcmp(name, nodes) || !strcmp(name, elements)) {
     PetscCall(SbScanEndOfLine(s));
     s->binary = g->binary;
-    if (!strcmp(name, nodes))
-      PetscCall(read_nodes(g));
-    else if (!strcmp(name, elements))
+    if (!strcmp(name, nodes)) {
+      if (g->im->x) SB_SCAN_ERROR(&g->scan, "second section $Nodes");
+      if (g->version <= 2)
+        PetscCall(read_nodes_22(g));
+      else {
+        int64_t nblock, n, bound;
+        PetscInt v = 0;
+
+        // blocks of nodes
+        PetscCall(SbScanInt8(s, "number of blocks of nodes", &nblock));
+        PetscCall(SbScanInt8(s, "number of nodes", &n));
+        PetscCall(SbScanInt8(s, "lowest number of a node", &bound));
+        PetscCall(SbScanInt8(s, "highest number of a node", &bound));
+        PetscCall(SbScanRoom(s, "nodes", n, 8, 32));
+        PetscCall(SbImportSetVertices(g->im, (PetscInt)n));
+        for (int64_t b = 0; b < nblock; b++) PetscCall(read_node_block(g, &v));
+        if (v < n)
+          SB_SCAN_ERROR(s, "%lld nodes are announced, the blocks hold %lld", (long long)n, (long long)v);
+      }
+      PetscCall(SbNumbersCreate(g->im->nvert, g->im->vert_number, &g->nodes));
+      if (g->nodes.repeated)
+        SB_SCAN_ERROR(&g->scan, "node %lld is given twice; renumber the nodes", (long long)g->nodes.twice);
+    } else if (!strcmp(name, elements))
       PetscCall(read_elements(g));
     else
       PetscCall(read_entities(g));

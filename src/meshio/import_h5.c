@@ -103,21 +103,6 @@ static PetscErrorCode close_array(Array *a)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* More bytes than the file can hold are a lie. */
-static PetscErrorCode check_room(const File *f, const Array *a)
-{
-  const hid_t plist = H5Dget_create_plist(a->set);
-  const PetscBool packed = (PetscBool)(plist >= 0 && H5Pget_nfilters(plist) > 0);
-  const double want = (double)a->n * (double)a->ncomp * (double)H5Tget_size(a->type);
-
-  PetscFunctionBeginUser;
-  if (plist >= 0) (void)H5Pclose(plist);
-  if (want > (packed ? 1000. : 1.) * (double)f->bytes)
-    H5_ERROR(f, "%s announces %llu x %llu numbers, more than the %llu bytes of the file hold; it is damaged",
-             a->name, (unsigned long long)a->n, (unsigned long long)a->ncomp, (unsigned long long)f->bytes);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 static const char *class_name(H5T_class_t klass)
 {
   return klass == H5T_FLOAT ? "real numbers" : klass == H5T_INTEGER ? "whole numbers" : "texts";
@@ -129,6 +114,9 @@ static PetscErrorCode open_array(const File *f, const char *name, H5T_class_t kl
   hsize_t size[2] = {0, 1};
   hid_t space;
   int ndim;
+  hid_t plist;
+  PetscBool packed;
+  double want;
 
   PetscFunctionBeginUser;
   a->name = name;
@@ -152,7 +140,14 @@ static PetscErrorCode open_array(const File *f, const char *name, H5T_class_t kl
              (unsigned long long)size[1], (unsigned long long)ncomp);
   if (a->n > (hsize_t)PETSC_MAX_INT / 8)
     H5_ERROR(f, "%s has %llu rows, more than this build can number", name, (unsigned long long)a->n);
-  PetscCall(check_room(f, a));
+  // an array larger than the file can hold is refused before anything is allocated
+  plist = H5Dget_create_plist(a->set);
+  packed = (PetscBool)(plist >= 0 && H5Pget_nfilters(plist) > 0);
+  want = (double)a->n * (double)a->ncomp * (double)H5Tget_size(a->type);
+  if (plist >= 0) (void)H5Pclose(plist);
+  if (want > (packed ? 1000. : 1.) * (double)f->bytes)
+    H5_ERROR(f, "%s announces %llu x %llu numbers, more than the %llu bytes of the file hold; it is damaged",
+             a->name, (unsigned long long)a->n, (unsigned long long)a->ncomp, (unsigned long long)f->bytes);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -473,25 +468,6 @@ static herr_t visit_hundred(hid_t where, const char *name, const H5L_info_t *inf
   return 0;
 }
 
-/* Finds the group of the wanted step. */
-static PetscErrorCode find_frame(File *f)
-{
-  Frames s = {.wanted = f->im->step};
-
-  PetscFunctionBeginUser;
-  if (!f->im->step) PetscFunctionReturn(PETSC_SUCCESS);
-  if (!is_there(f, "/step"))
-    H5_ERROR(f, "holds a mesh, no steps of a run; leave out the step %lld", (long long)s.wanted);
-  (void)H5Literate_by_name(f->file, "/step", H5_INDEX_NAME, H5_ITER_INC, NULL, visit_hundred, &s,
-                           H5P_DEFAULT);
-  if (!s.n) H5_ERROR(f, "has no step yet");
-  if (!s.found[0])
-    H5_ERROR(f, "has no step %lld; it has %lld of them, from %lld to %lld (-1: the last one)",
-             (long long)s.wanted, (long long)s.n, (long long)s.first, (long long)s.last);
-  (void)snprintf(f->frame, sizeof(f->frame), "%s", s.found);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 static PetscErrorCode add_displacement(const File *f)
 {
   SbImport *im = f->im;
@@ -542,28 +518,13 @@ static PetscErrorCode join_points(const File *f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Names of the bodies, "liver,stone"; "" in files of before they were kept. */
-static void body_names(const File *f, size_t size, char names[])
-{
-  const hid_t a = H5Aexists_by_name(f->file, "/mesh", "bodies", H5P_DEFAULT) > 0
-                    ? H5Aopen_by_name(f->file, "/mesh", "bodies", H5P_DEFAULT, H5P_DEFAULT)
-                    : -1;
-  const hid_t type = a >= 0 ? H5Aget_type(a) : -1;
-
-  memset(names, 0, size);
-  if (type >= 0 && H5Tget_class(type) == H5T_STRING && H5Tis_variable_str(type) <= 0 &&
-      H5Tget_size(type) < size)
-    (void)H5Aread(a, type, names);
-  if (type >= 0) (void)H5Tclose(type);
-  if (a >= 0) (void)H5Aclose(a);
-}
-
 /* Each body is a group of tets. */
 static PetscErrorCode read_bodies(const File *f)
 {
   SbImport *im = f->im;
   PetscInt n, *body, nbody = 0, group, *tags;
   char names[4096], *name, *rest = names;
+  hid_t attribute, kind;
 
   PetscFunctionBeginUser;
   if (!is_there(f, "/mesh/body")) PetscFunctionReturn(PETSC_SUCCESS);
@@ -573,7 +534,17 @@ static PetscErrorCode read_bodies(const File *f)
     H5_ERROR(f, "/mesh/body has %lld rows for %lld tets", (long long)n, (long long)im->item[3].n);
   }
   for (PetscInt c = 0; c < n; c++) nbody = PetscMax(nbody, body[c] + 1);
-  body_names(f, sizeof(names), names);
+  // names of the bodies; none in old files
+  attribute = H5Aexists_by_name(f->file, "/mesh", "bodies", H5P_DEFAULT) > 0
+                ? H5Aopen_by_name(f->file, "/mesh", "bodies", H5P_DEFAULT, H5P_DEFAULT)
+                : -1;
+  kind = attribute >= 0 ? H5Aget_type(attribute) : -1;
+  memset(names, 0, sizeof(names));
+  if (kind >= 0 && H5Tget_class(kind) == H5T_STRING && H5Tis_variable_str(kind) <= 0 &&
+      H5Tget_size(kind) < sizeof(names))
+    (void)H5Aread(attribute, kind, names);
+  if (kind >= 0) (void)H5Tclose(kind);
+  if (attribute >= 0) (void)H5Aclose(attribute);
   PetscCall(PetscMalloc1(nbody, &tags));
   for (PetscInt b = 0; b < nbody; b++) {
     char plain[32];
@@ -637,10 +608,22 @@ static PetscErrorCode read_mesh(File *f, SbSlabRows *rows)
 {
   SbImport *im = f->im;
   PetscBool own;
+  Frames s = {.wanted = f->im->step};
 
   PetscFunctionBeginUser;
   PetscCall(check_layout(f, &own));
-  PetscCall(find_frame(f));
+  // the group of the wanted step
+  if (im->step) {
+    if (!is_there(f, "/step"))
+      H5_ERROR(f, "holds a mesh, no steps of a run; leave out the step %lld", (long long)s.wanted);
+    (void)H5Literate_by_name(f->file, "/step", H5_INDEX_NAME, H5_ITER_INC, NULL, visit_hundred, &s,
+                             H5P_DEFAULT);
+    if (!s.n) H5_ERROR(f, "has no step yet");
+    if (!s.found[0])
+      H5_ERROR(f, "has no step %lld; it has %lld of them, from %lld to %lld (-1: the last one)",
+               (long long)s.wanted, (long long)s.n, (long long)s.first, (long long)s.last);
+    (void)snprintf(f->frame, sizeof(f->frame), "%s", s.found);
+  }
   PetscCall(read_vectors(f, "/mesh/x", rows, &im->nvert, &im->x));
   f->nvert = rows->N;
   PetscCall(PetscMalloc1(im->nvert, &im->vert_number));

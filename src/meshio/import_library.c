@@ -41,18 +41,6 @@ static PetscErrorCode check_begin(const char *path, const char *where)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode read_by_library(const char *path, SbImport *im)
-{
-  char copy[PETSC_MAX_PATH_LEN];
-  const SbGmshJob job = {im->where, "read the file", read_seconds, open_msh, copy};
-
-  PetscFunctionBeginUser;
-  PetscCall(check_begin(path, im->where));
-  PetscCall(PetscStrncpy(copy, path, sizeof(copy)));
-  PetscCall(SbGmshRun(&job, im));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* Whether it is of version 4.0, which the own reader does not know. */
 static PetscErrorCode foreign_msh(const char *path, const char *where, PetscBool *foreign)
 {
@@ -75,9 +63,14 @@ PetscErrorCode SbImportRead_Msh(const char *path, SbImport *im)
 
   PetscFunctionBeginUser;
   PetscCall(foreign_msh(path, im->where, &foreign));
-  if (foreign)
-    PetscCall(read_by_library(path, im));
-  else
+  if (foreign) {
+    char copy[PETSC_MAX_PATH_LEN];
+    const SbGmshJob job = {im->where, "read the file", read_seconds, open_msh, copy};
+
+    PetscCall(check_begin(path, im->where));
+    PetscCall(PetscStrncpy(copy, path, sizeof(copy)));
+    PetscCall(SbGmshRun(&job, im));
+  } else
     PetscCall(SbImportRead_Gmsh(path, im));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -48,12 +48,7 @@ static PetscErrorCode read_vertices(Medit *m)
   for (PetscInt v = 0; v < n; v++) {
     m->im->vert_number[v] = v + 1;
     SbScanNext(s, '#');
-    for (int i = 0; i < 3; i++) {
-      PetscCall(SbScanReal(s, "coordinate", v + 1, &m->im->x[3 * v + i]));
-      if (!isfinite(m->im->x[3 * v + i]))
-        SB_SCAN_ERROR(s, "coordinate of vertex %lld is not a finite number; repair the file",
-                      (long long)v + 1);
-    }
+    PetscCall(SbScanPoint(s, "coordinate", v + 1, m->im->x + 3 * v));
     PetscCall(SbScanReal(s, "reference", v + 1, &reference));
   }
   PetscFunctionReturn(PETSC_SUCCESS);

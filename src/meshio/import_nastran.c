@@ -43,17 +43,13 @@ typedef struct {
 } Name;
 
 typedef struct {
-  PetscInt n, capacity;
-} Count;
-
-typedef struct {
   SbScan scan;
   SbImport *im;
   size_t length;         /* of the line */
   char line[LINE];       /* the current one, tabs replaced, without its comment */
   PetscBool commas, cut; /* cut: it was longer than this */
   int field, per_line;   /* last field taken; fields of values on the line */
-  Count nnode, nelement, nrange, nname;
+  SbCount nnode, nelement, nrange, nname;
   Grid *node;
   Element *element;
   Range *range;
@@ -64,17 +60,6 @@ typedef struct {
 } Nastran;
 
 static const char *const set_names[] = {"spc", "set"};
-
-static PetscErrorCode grow(Count *count, size_t unit, void *array)
-{
-  PetscFunctionBeginUser;
-  if (count->n == count->capacity) {
-    count->capacity = PetscMax(64, 2 * count->capacity);
-    PetscCall(PetscRealloc((size_t)count->capacity * unit, (void **)array));
-  }
-  count->n++;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
 
 /* ------------------------------------------------------------------ names in comments */
 
@@ -94,7 +79,7 @@ static PetscErrorCode add_name(Nastran *b, int64_t number, const char *name)
 {
   PetscFunctionBeginUser;
   if (!name[0] || number <= 0) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(grow(&b->nname, sizeof(*b->name), &b->name));
+  PetscCall(SbImportGrow(&b->nname, sizeof(*b->name), &b->name));
   b->name[b->nname.n - 1].number = number;
   PetscCall(PetscStrncpy(b->name[b->nname.n - 1].name, name, SB_GROUP_MAX));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -323,27 +308,11 @@ static PetscErrorCode read_grid(Nastran *b)
       (long long)label, (long long)system);
   PetscCheck(b->nnode.n < PETSC_MAX_INT / 8, PETSC_COMM_SELF, PETSC_ERR_FILE_UNEXPECTED,
              "%s: has more nodes than this build can number", b->im->where);
-  PetscCall(grow(&b->nnode, sizeof(*b->node), &b->node));
+  PetscCall(SbImportGrow(&b->nnode, sizeof(*b->node), &b->node));
   node = &b->node[b->nnode.n - 1];
   node->label = label;
   node->at = b->scan.token;
   for (int i = 0; i < 3; i++) PetscCall(next_real(b, label, &node->x[i]));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Points of the file are in the system of GRDSET where GRID leaves it empty. */
-static PetscErrorCode read_default(Nastran *b)
-{
-  char word[WORD];
-  PetscBool there;
-  int64_t system;
-
-  PetscFunctionBeginUser;
-  PetscCall(next_field(b, word, &there));
-  PetscCall(next_number(b, "coordinate system of the nodes", 0, &system));
-  if (system)
-    SB_SCAN_ERROR(&b->scan, "GRDSET gives the nodes in coordinate system %lld; write them in the basic one",
-                  (long long)system);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -385,7 +354,7 @@ static PetscErrorCode read_element(Nastran *b, int kind)
   b->count[e.type]++;
   if (e.type != SB_GMSH_TET && e.type != SB_GMSH_TRIANGLE && e.type != SB_GMSH_LINE)
     PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(grow(&b->nelement, sizeof(e), &b->element));
+  PetscCall(SbImportGrow(&b->nelement, sizeof(e), &b->element));
   b->element[b->nelement.n - 1] = e;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -393,7 +362,7 @@ static PetscErrorCode read_element(Nastran *b, int kind)
 static PetscErrorCode add_range(Nastran *b, int kind, int64_t number, int64_t first, int64_t last)
 {
   PetscFunctionBeginUser;
-  PetscCall(grow(&b->nrange, sizeof(*b->range), &b->range));
+  PetscCall(SbImportGrow(&b->nrange, sizeof(*b->range), &b->range));
   b->range[b->nrange.n - 1] = (Range){kind, number, first, PetscMax(first, last)};
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -423,23 +392,6 @@ static PetscErrorCode read_list(Nastran *b, int kind, int nskip)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* SPC: twice a node, its components and their displacement. */
-static PetscErrorCode read_spc(Nastran *b)
-{
-  char word[WORD];
-  PetscBool there;
-  int64_t number = 0, node;
-
-  PetscFunctionBeginUser;
-  PetscCall(next_label(b, "number of a set", &number));
-  for (int i = 0; i < 2; i++) {
-    PetscCall(next_number(b, "node of a set", 0, &node));
-    if (node) PetscCall(add_range(b, 0, number, node, node));
-    for (int k = 0; k < 2; k++) PetscCall(next_field(b, word, &there));
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 static PetscErrorCode read_entry(Nastran *b)
 {
   char name[WORD];
@@ -450,8 +402,31 @@ static PetscErrorCode read_entry(Nastran *b)
   get_field(b, 0, name);
   name[strcspn(name, "*")] = 0;
   if (!strcasecmp(name, "GRID")) PetscCall(read_grid(b));
-  if (!strcasecmp(name, "GRDSET")) PetscCall(read_default(b));
-  if (!strcasecmp(name, "SPC")) PetscCall(read_spc(b));
+  // coordinate system of the points that name none
+  if (!strcasecmp(name, "GRDSET")) {
+    char word[WORD];
+    PetscBool there;
+    int64_t system;
+
+    PetscCall(next_field(b, word, &there));
+    PetscCall(next_number(b, "coordinate system of the nodes", 0, &system));
+    if (system)
+      SB_SCAN_ERROR(&b->scan, "GRDSET gives the nodes in coordinate system %lld; write them in the basic one",
+                    (long long)system);
+  }
+  // SPC: twice a node, its components and their displacement
+  if (!strcasecmp(name, "SPC")) {
+    char word[WORD];
+    PetscBool there;
+    int64_t spc = 0, node;
+
+    PetscCall(next_label(b, "spc of a set", &spc));
+    for (int i = 0; i < 2; i++) {
+      PetscCall(next_number(b, "node of a set", 0, &node));
+      if (node) PetscCall(add_range(b, 0, spc, node, node));
+      for (int k = 0; k < 2; k++) PetscCall(next_field(b, word, &there));
+    }
+  }
   if (!strcasecmp(name, "SPC1")) PetscCall(read_list(b, 0, 1));
   if (!strcasecmp(name, "SET1")) PetscCall(read_list(b, 1, 0));
   if (!strncasecmp(name, "INCLUDE", 7))
@@ -516,22 +491,6 @@ static int compare_names(const void *a, const void *b)
   const Name *p = (const Name *)a, *q = (const Name *)b;
 
   return (p->number > q->number) - (p->number < q->number);
-}
-
-/* Properties that elements use get their names. */
-static PetscErrorCode name_groups(Nastran *b)
-{
-  PetscFunctionBeginUser;
-  if (!b->nname.n) PetscFunctionReturn(PETSC_SUCCESS);
-  qsort(b->name, (size_t)b->nname.n, sizeof(*b->name), compare_names);
-  for (PetscInt g = 0; g < b->im->ngroup; g++) {
-    const Name wanted = {.number = b->im->group[g].tag};
-    const Name *found =
-      (const Name *)bsearch(&wanted, b->name, (size_t)b->nname.n, sizeof(wanted), compare_names);
-
-    if (found) PetscCall(PetscStrncpy(b->im->group[g].name, found->name, SB_GROUP_MAX));
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 typedef struct {
@@ -633,7 +592,17 @@ static PetscErrorCode read_file(const char *path, Nastran *b)
   }
   PetscCall(make_nodes(b));
   PetscCall(make_items(b));
-  PetscCall(name_groups(b));
+  // properties that elements use get their names
+  if (b->nname.n) {
+    qsort(b->name, (size_t)b->nname.n, sizeof(*b->name), compare_names);
+    for (PetscInt g = 0; g < b->im->ngroup; g++) {
+      const Name wanted = {.number = b->im->group[g].tag};
+      const Name *found =
+        (const Name *)bsearch(&wanted, b->name, (size_t)b->nname.n, sizeof(wanted), compare_names);
+
+      if (found) PetscCall(PetscStrncpy(b->im->group[g].name, found->name, SB_GROUP_MAX));
+    }
+  }
   PetscCall(make_sets(b));
   PetscCall(SbGmshCheckTypes(b->im, b->count));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -60,12 +60,7 @@ static PetscErrorCode read_points(Netgen *g)
   for (PetscInt v = 0; v < n; v++) {
     g->im->vert_number[v] = v + 1;
     SbScanNext(s, '#');
-    for (int i = 0; i < 3; i++) {
-      PetscCall(SbScanReal(s, "coordinate", v + 1, &g->im->x[3 * v + i]));
-      if (!isfinite(g->im->x[3 * v + i]))
-        SB_SCAN_ERROR(s, "coordinate of point %lld is not a finite number; repair the file",
-                      (long long)v + 1);
-    }
+    PetscCall(SbScanPoint(s, "coordinate", v + 1, g->im->x + 3 * v));
     PetscCall(SbScanEndOfLine(s));
   }
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -99,23 +99,6 @@ static PetscErrorCode read_mark(TetGen *t, const char *what, int64_t *mark)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Numbers of points on this line, as vertices. */
-static PetscErrorCode read_points(TetGen *t, int n, PetscInt vert[])
-{
-  int64_t point;
-
-  PetscFunctionBeginUser;
-  for (int i = 0; i < n; i++) {
-    PetscCall(on_line(t, "number of a point"));
-    PetscCall(SbScanText(&t->scan, "number of a point", &point));
-    if (point < t->first || point - t->first >= t->im->nvert)
-      SB_SCAN_ERROR(&t->scan, "point %lld is not in the .node file, which holds %lld to %lld",
-                    (long long)point, (long long)t->first, (long long)(t->first + t->im->nvert - 1));
-    vert[i] = (PetscInt)(point - t->first);
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* ------------------------------------------------------------------ .node */
 
 /* counts: points, dimension, attributes, marks */
@@ -186,9 +169,19 @@ static PetscErrorCode read_items(TetGen *t, int dim, int64_t n, PetscBool marks)
 
   PetscFunctionBeginUser;
   for (int64_t i = 0; i < n; i++) {
+    int64_t point;
+
     SbScanNext(s, '#');
     PetscCall(SbScanText(s, "number of an item", &number));
-    PetscCall(read_points(t, dim + 1, vert));
+    // corners of the item
+    for (int k = 0; k < dim + 1; k++) {
+      PetscCall(on_line(t, "number of a point"));
+      PetscCall(SbScanText(&t->scan, "number of a point", &point));
+      if (point < t->first || point - t->first >= t->im->nvert)
+        SB_SCAN_ERROR(&t->scan, "point %lld is not in the .node file, which holds %lld to %lld",
+                      (long long)point, (long long)t->first, (long long)(t->first + t->im->nvert - 1));
+      vert[k] = (PetscInt)(point - t->first);
+    }
     mark = tags = 0;
     if (marks) PetscCall(read_mark(t, what[dim], &mark));
     if (marks && (mark || dim == 3)) PetscCall(SbImportTagsAlone(t->im, dim, mark, NULL, &tags));

@@ -90,12 +90,7 @@ static PetscErrorCode read_nodes(Unv *u, int nline)
     if (v >= n) SB_SCAN_ERROR(s, "a node without coordinates; the file is damaged");
     PetscCall(SbScanText(s, "label of a node", &u->im->vert_number[v]));
     for (int i = 0; i < 3; i++) PetscCall(SbScanText(s, "coordinate system or colour of a node", &other));
-    for (int i = 0; i < 3; i++) {
-      PetscCall(SbScanReal(s, "coordinate", u->im->vert_number[v], &u->im->x[3 * v + i]));
-      if (!isfinite(u->im->x[3 * v + i]))
-        SB_SCAN_ERROR(s, "coordinate of node %lld is not a finite number; repair the file",
-                      (long long)u->im->vert_number[v]);
-    }
+    PetscCall(SbScanPoint(s, "coordinate", u->im->vert_number[v], u->im->x + 3 * v));
     PetscCall(SbScanEndOfLine(s));
   }
   u->im->nvert = v;
@@ -106,24 +101,6 @@ static PetscErrorCode read_nodes(Unv *u, int nline)
 }
 
 /* ------------------------------------------------------------------ elements */
-
-static PetscErrorCode keep_element(Unv *u, int type, int64_t label, int64_t property, const PetscInt vert[4])
-{
-  const int dim = SbGmshTypes[type].dim;
-  PetscInt tags;
-
-  PetscFunctionBeginUser;
-  if (u->nelement == u->capacity) {
-    u->capacity = PetscMax(256, 2 * u->capacity);
-    PetscCall(PetscRealloc((size_t)u->capacity * sizeof(*u->label), &u->label));
-    PetscCall(PetscRealloc((size_t)u->capacity * sizeof(*u->item), &u->item));
-  }
-  u->label[u->nelement] = label;
-  u->item[u->nelement++] = (SbGroupMember){dim, u->im->item[dim].n, 0};
-  PetscCall(SbImportTagsAlone(u->im, dim, property, NULL, &tags));
-  PetscCall(SbImportAddItem(u->im, dim, vert, tags, label));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
 
 static PetscErrorCode read_element(Unv *u)
 {
@@ -156,8 +133,21 @@ static PetscErrorCode read_element(Unv *u)
       SB_SCAN_ERROR(s, "element %lld uses node %lld, which is not there", (long long)label, (long long)node);
   }
   if (type) u->count[type]++;
-  if (type == SB_GMSH_TET || type == SB_GMSH_TRIANGLE || type == SB_GMSH_LINE)
-    PetscCall(keep_element(u, type, label, property, vert));
+  if (type == SB_GMSH_TET || type == SB_GMSH_TRIANGLE || type == SB_GMSH_LINE) {
+    const int dim = SbGmshTypes[type].dim;
+    PetscInt tags;
+
+    // kept elements are listed for the groups that name them
+    if (u->nelement == u->capacity) {
+      u->capacity = PetscMax(256, 2 * u->capacity);
+      PetscCall(PetscRealloc((size_t)u->capacity * sizeof(*u->label), &u->label));
+      PetscCall(PetscRealloc((size_t)u->capacity * sizeof(*u->item), &u->item));
+    }
+    u->label[u->nelement] = label;
+    u->item[u->nelement++] = (SbGroupMember){dim, u->im->item[dim].n, 0};
+    PetscCall(SbImportTagsAlone(u->im, dim, property, NULL, &tags));
+    PetscCall(SbImportAddItem(u->im, dim, vert, tags, label));
+  }
   PetscCall(SbScanEndOfLine(s));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

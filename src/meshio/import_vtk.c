@@ -45,24 +45,17 @@ static PetscErrorCode read_type(Vtk *v, SbVtkType *type)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Leaves out a line end, which stands before binary data. */
-static PetscErrorCode begin_data(Vtk *v, const char *what, int64_t n, SbVtkType type)
-{
-  PetscFunctionBeginUser;
-  if (v->binary) PetscCall(SbScanEndOfLine(&v->scan));
-  v->scan.binary = v->binary;
-  PetscCall(SbScanRoom(&v->scan, what, n, 2, type.size));
-  v->scan.binary = PETSC_FALSE;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* n numbers of this type; value may be NULL to pass over them. */
 static PetscErrorCode read_numbers(Vtk *v, const char *what, int64_t n, SbVtkType type, double *value)
 {
   SbScan *s = &v->scan;
 
   PetscFunctionBeginUser;
-  PetscCall(begin_data(v, what, n, type));
+  // binary data begins behind the end of the line
+  if (v->binary) PetscCall(SbScanEndOfLine(&v->scan));
+  v->scan.binary = v->binary;
+  PetscCall(SbScanRoom(&v->scan, what, n, 2, type.size));
+  v->scan.binary = PETSC_FALSE;
   if (v->binary) {
     const size_t bytes = (size_t)n * (size_t)type.size;
 

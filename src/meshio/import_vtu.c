@@ -245,40 +245,6 @@ static PetscErrorCode read_binary(Vtu *v, Bytes *b, const char *name, SbVtkType 
   PetscFunctionReturn(ierr);
 }
 
-static PetscErrorCode read_text(Vtu *v, const char *from, const char *end, size_t n, double value[])
-{
-  SbScan s = v->scan;
-
-  PetscFunctionBeginUser;
-  s.at = from;
-  s.end = end;
-  s.bytes = PETSC_FALSE;
-  for (size_t i = 0; i < n; i++) {
-    PetscReal x;
-
-    PetscCall(SbScanReal(&s, "value of an array", 0, &x));
-    value[i] = x;
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode read_type(Vtu *v, const char *open, const char *close, SbVtkType *type)
-{
-  char name[32];
-
-  PetscFunctionBeginUser;
-  attribute(open, close, "type", sizeof(name), name);
-  type->kind = !strncmp(name, "Int", 3)     ? 'i'
-               : !strncmp(name, "UInt", 4)  ? 'u'
-               : !strncmp(name, "Float", 5) ? 'f'
-                                            : 0;
-  type->size = atoi(name + strcspn(name, "0123456789")) / 8;
-  if (!type->kind || (type->size != 1 && type->size != 2 && type->size != 4 && type->size != 8) ||
-      (type->kind == 'f' && type->size < 4))
-    SB_SCAN_ERROR(&v->scan, "an array of type '%s'; expected one as Float64 or Int32", name);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* Where the bytes of an array are. */
 static PetscErrorCode locate(Vtu *v, const char *open, const char *close, const char *format, Bytes *b)
 {
@@ -309,21 +275,41 @@ static PetscErrorCode read_array(Vtu *v, const char *open, const char *close, in
   Bytes b;
   char format[16], name[64];
   size_t room;
+  char kind[32];
 
   PetscFunctionBeginUser;
   v->scan.token = open;
-  PetscCall(read_type(v, open, close, &type));
+  attribute(open, close, "type", sizeof(kind), kind);
+  type.kind = !strncmp(kind, "Int", 3)     ? 'i'
+              : !strncmp(kind, "UInt", 4)  ? 'u'
+              : !strncmp(kind, "Float", 5) ? 'f'
+                                           : 0;
+  type.size = atoi(kind + strcspn(kind, "0123456789")) / 8;
+  if (!type.kind || (type.size != 1 && type.size != 2 && type.size != 4 && type.size != 8) ||
+      (type.kind == 'f' && type.size < 4))
+    SB_SCAN_ERROR(&v->scan, "an array of type '%s'; expected one as Float64 or Int32", kind);
   attribute(open, close, "format", sizeof(format), format);
   attribute(open, close, "Name", sizeof(name), name);
   if (!strcmp(format, "ascii") || !format[0]) {
     const char *end = (const char *)memchr(close, '<', (size_t)(v->scan.end - close));
+    SbScan s;
 
     if (!end) SB_SCAN_ERROR(&v->scan, "the array has no end; the file is truncated, write or copy it again");
     if (n > (end - close) / 2 + 1)
       SB_SCAN_ERROR(&v->scan, "array '%s' should hold %lld numbers, which is more than stand there", name,
                     (long long)n);
     PetscCall(PetscMalloc1((size_t)n, value));
-    PetscCall(read_text(v, close, end, (size_t)n, *value));
+    // text: numbers between blanks
+    s = v->scan;
+    s.at = close;
+    s.end = end;
+    s.bytes = PETSC_FALSE;
+    for (size_t i = 0; i < (size_t)n; i++) {
+      PetscReal x;
+
+      PetscCall(SbScanReal(&s, "value of an array", 0, &x));
+      (*value)[i] = x;
+    }
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   PetscCall(locate(v, open, close, format, &b));

@@ -4,6 +4,12 @@
 #pragma once
 #include "sbmeshio.h"
 
+/* An array that grows by one at its end: unit bytes each, of which there are n. */
+typedef struct {
+  PetscInt n, capacity;
+} SbCount;
+PetscErrorCode SbImportGrow(SbCount *count, size_t unit, void *array);
+
 /* A reader fills x, vert_number, items and groups from the file or description `text`. */
 typedef PetscErrorCode (*SbReader)(const char *text, SbImport *body);
 PetscErrorCode SbImportRead_Gmsh(const char *path, SbImport *body);

@@ -13,37 +13,6 @@ static int compare_numbers(const void *a, const void *b)
   return (p > q) - (p < q);
 }
 
-static PetscErrorCode fill_table(PetscInt n, const int64_t number[], SbNumbers *index)
-{
-  PetscFunctionBeginUser;
-  PetscCall(PetscMalloc1((size_t)index->ntable, &index->table));
-  for (int64_t i = 0; i < index->ntable; i++) index->table[i] = -1;
-  for (PetscInt v = 0; v < n; v++) {
-    PetscInt *slot = index->table + (number[v] - index->first);
-
-    if (*slot >= 0) {
-      index->repeated = PETSC_TRUE;
-      index->twice = number[v];
-    }
-    *slot = v;
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode fill_pairs(PetscInt n, const int64_t number[], SbNumbers *index)
-{
-  PetscFunctionBeginUser;
-  PetscCall(PetscMalloc1(n, &index->sorted));
-  for (PetscInt v = 0; v < n; v++) index->sorted[v] = (SbNumbered){number[v], v};
-  qsort(index->sorted, (size_t)n, sizeof(*index->sorted), compare_numbers);
-  for (PetscInt v = 1; v < n; v++) {
-    if (index->sorted[v].number != index->sorted[v - 1].number) continue;
-    index->repeated = PETSC_TRUE;
-    index->twice = index->sorted[v].number;
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode SbNumbersCreate(PetscInt n, const int64_t number[], SbNumbers *index)
 {
   int64_t lo = n ? number[0] : 0, hi = lo;
@@ -58,9 +27,29 @@ PetscErrorCode SbNumbersCreate(PetscInt n, const int64_t number[], SbNumbers *in
   index->first = lo;
   if ((uint64_t)hi - (uint64_t)lo < 16 * (uint64_t)n + 1024) {
     index->ntable = hi - lo + 1;
-    PetscCall(fill_table(n, number, index));
-  } else
-    PetscCall(fill_pairs(n, number, index));
+    // dense numbers: a table
+    PetscCall(PetscMalloc1((size_t)index->ntable, &index->table));
+    for (int64_t i = 0; i < index->ntable; i++) index->table[i] = -1;
+    for (PetscInt v = 0; v < n; v++) {
+      PetscInt *slot = index->table + (number[v] - index->first);
+
+      if (*slot >= 0) {
+        index->repeated = PETSC_TRUE;
+        index->twice = number[v];
+      }
+      *slot = v;
+    }
+  } else {
+    // sparse numbers: sorted pairs
+    PetscCall(PetscMalloc1(n, &index->sorted));
+    for (PetscInt v = 0; v < n; v++) index->sorted[v] = (SbNumbered){number[v], v};
+    qsort(index->sorted, (size_t)n, sizeof(*index->sorted), compare_numbers);
+    for (PetscInt v = 1; v < n; v++) {
+      if (index->sorted[v].number != index->sorted[v - 1].number) continue;
+      index->repeated = PETSC_TRUE;
+      index->twice = index->sorted[v].number;
+    }
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

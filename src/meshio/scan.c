@@ -201,6 +201,19 @@ PetscErrorCode SbScanReal(SbScan *s, const char *what, int64_t number, PetscReal
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscErrorCode SbScanPoint(SbScan *s, const char *what, int64_t number, PetscReal x[3])
+{
+  PetscFunctionBeginUser;
+  for (int i = 0; i < 3; i++) {
+    PetscCall(SbScanReal(s, what, number, &x[i]));
+    if (isfinite(x[i])) continue;
+    if (number)
+      SB_SCAN_ERROR(s, "%s of node %lld is not a finite number; repair the file", what, (long long)number);
+    SB_SCAN_ERROR(s, "the %s is not a finite number; repair the file", what);
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode SbScanRoom(SbScan *s, const char *what, int64_t n, int64_t text_bytes, int64_t binary_bytes)
 {
   const int64_t room = (s->end - s->at) / (s->binary ? binary_bytes : text_bytes) + 1;

@@ -195,35 +195,6 @@ static PetscErrorCode cell_type(SbScan *s, const SbVtkGrid *grid, PetscInt c, in
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The points of a cell, checked; from `begin` on. */
-static PetscErrorCode cell_points(SbScan *s, const SbVtkGrid *grid, PetscInt c, int64_t begin, int64_t nnode,
-                                  PetscInt nvert, PetscInt vert[4])
-{
-  PetscFunctionBeginUser;
-  for (int64_t k = 0; k < nnode; k++) {
-    const double point = grid->connect[begin + k];
-
-    if (!(point >= 0 && point < (double)nvert) || point != PetscFloorReal(point))
-      SB_SCAN_ERROR(s, "cell %lld uses point %g; the points are 0 to %lld", (long long)c, point,
-                    (long long)nvert - 1);
-    if (k < 4) vert[k] = (PetscInt)point;
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Where the next cell ends; it has a point at least and stays within what is there. */
-static PetscErrorCode cell_end(SbScan *s, const SbVtkGrid *grid, PetscInt c, int64_t begin, int64_t *end)
-{
-  const double value = grid->end[c];
-
-  PetscFunctionBeginUser;
-  if (!(value > (double)begin && value <= (double)grid->nconnect) || value != PetscFloorReal(value))
-    SB_SCAN_ERROR(s, "the points of cell %lld end at %g; expected a whole number above %lld, up to %lld",
-                  (long long)c, value, (long long)begin, (long long)grid->nconnect);
-  *end = (int64_t)value;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode SbVtkGridFill(SbScan *s, SbVtkGrid *grid, SbImport *im)
 {
   int64_t count[SB_GMSH_NTYPES] = {0}, begin = 0, end;
@@ -234,9 +205,23 @@ PetscErrorCode SbVtkGridFill(SbScan *s, SbVtkGrid *grid, SbImport *im)
   PetscFunctionBeginUser;
   PetscCall(choose_arrays(grid, use, &regions));
   for (PetscInt c = 0; c < grid->ncell; c++, begin = end) {
-    PetscCall(cell_end(s, grid, c, begin, &end));
+    const double value = grid->end[c];
+
+    // the cell has a point at least and ends within the list
+    if (!(value > (double)begin && value <= (double)grid->nconnect) || value != PetscFloorReal(value))
+      SB_SCAN_ERROR(s, "the points of cell %lld end at %g; expected a whole number above %lld, up to %lld",
+                    (long long)c, value, (long long)begin, (long long)grid->nconnect);
+    end = (int64_t)value;
     PetscCall(cell_type(s, grid, c, end - begin, &type));
-    PetscCall(cell_points(s, grid, c, begin, end - begin, im->nvert, vert));
+    // the points of the cell, checked
+    for (int64_t k = 0; k < end - begin; k++) {
+      const double point = grid->connect[begin + k];
+
+      if (!(point >= 0 && point < (double)im->nvert) || point != PetscFloorReal(point))
+        SB_SCAN_ERROR(s, "cell %lld uses point %g; the points are 0 to %lld", (long long)c, point,
+                      (long long)im->nvert - 1);
+      if (k < 4) vert[k] = (PetscInt)point;
+    }
     count[type]++;
     if (type != SB_GMSH_TET && type != SB_GMSH_TRIANGLE && type != SB_GMSH_LINE && type != SB_GMSH_POINT)
       continue;

@@ -43,23 +43,6 @@ void SbMeshFileCount(const SbImport *im, PetscInt *nvert, PetscInt n[4])
 
 /* ------------------------------------------------------------------ writing */
 
-/* The format that a name asks for. */
-static PetscErrorCode format_of(const char *path, SbMeshFormat *format)
-{
-  const char *dot = strrchr(path, '.');
-
-  PetscFunctionBeginUser;
-  if (*format != SB_MESH_AUTO) PetscFunctionReturn(PETSC_SUCCESS);
-  if (dot && !strcasecmp(dot, ".msh"))
-    *format = SB_MESH_MSH41;
-  else if (dot && !strcasecmp(dot, ".h5"))
-    *format = SB_MESH_H5;
-  else
-    SETERRQ(PETSC_COMM_SELF, PETSC_ERR_USER_INPUT, "%s: meshes are written as .msh (gmsh) or .h5 (supple)",
-            path);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* mesh.h5 -> mesh.xmf */
 static void index_name(const char *path, size_t size, char name[])
 {
@@ -85,9 +68,20 @@ PetscErrorCode SbMeshFileWrite(const SbImport *im, const char *path, SbMeshForma
 {
   char part[PETSC_MAX_PATH_LEN + 32], index[PETSC_MAX_PATH_LEN + 8];
   PetscErrorCode ierr;
+  const char *dot;
 
   PetscFunctionBeginUser;
-  PetscCall(format_of(path, &format));
+  // the format by the ending of the name
+  if (format == SB_MESH_AUTO) {
+    dot = strrchr(path, '.');
+    if (dot && !strcasecmp(dot, ".msh"))
+      format = SB_MESH_MSH41;
+    else if (dot && !strcasecmp(dot, ".h5"))
+      format = SB_MESH_H5;
+    else
+      SETERRQ(PETSC_COMM_SELF, PETSC_ERR_USER_INPUT, "%s: meshes are written as .msh (gmsh) or .h5 (supple)",
+              path);
+  }
   (void)snprintf(part, sizeof(part), "%s.part", path);
   ierr = format == SB_MESH_H5 ? SbWrite_H5(im, part) : SbWrite_Gmsh(im, part, format);
   if (ierr) (void)unlink(part);

@@ -189,20 +189,6 @@ static void write_entity(Out *out, int dim, PetscInt tags)
   if (!out->binary) (void)fputc('\n', out->file);
 }
 
-static void write_entities(Out *out)
-{
-  PetscInt n[4] = {0, 0, 0, 0};
-
-  for (int d = 0; d < 4; d++)
-    for (PetscInt t = 0; t < out->im->ntags; t++) n[d] += out->used[d][t];
-  (void)fprintf(out->file, "$Entities\n");
-  for (int d = 0; d < 4; d++) put_size(out, n[d], d < 3 ? ' ' : '\n');
-  for (int d = 0; d < 4; d++)
-    for (PetscInt t = 0; t < out->im->ntags; t++)
-      if (out->used[d][t]) write_entity(out, d, t);
-  (void)fprintf(out->file, "%s$EndEntities\n", out->binary ? "\n" : "");
-}
-
 static void write_nodes_41(Out *out)
 {
   const SbImport *im = out->im;
@@ -280,18 +266,6 @@ static PetscErrorCode write_elements_41(Out *out)
 
 /* ------------------------------------------------------------------ version 2.2 */
 
-static void write_nodes_22(Out *out)
-{
-  const SbImport *im = out->im;
-
-  (void)fprintf(out->file, "$Nodes\n%lld\n", (long long)im->nvert);
-  for (PetscInt v = 0; v < im->nvert; v++) {
-    put_int(out, v + 1, ' ');
-    for (int i = 0; i < 3; i++) put_real(out, im->x[3 * v + i], i < 2 ? ' ' : '\n');
-  }
-  (void)fprintf(out->file, "%s$EndNodes\n", out->binary ? "\n" : "");
-}
-
 /* An element, once for each of its groups; without any, once with group 0. In binary each has a header of its own. */
 static void write_item_22(Out *out, int dim, PetscInt i, int64_t *number)
 {
@@ -337,23 +311,6 @@ static PetscErrorCode write_elements_22(Out *out)
 
 /* ------------------------------------------------------------------ the file */
 
-/* Which tag sets each dimension has, and where the nodes belong: to the first entity of the highest dimension. */
-static PetscErrorCode find_entities(Out *out)
-{
-  PetscFunctionBeginUser;
-  out->home_dim = 3;
-  for (int d = 0; d < 4; d++) {
-    PetscCall(PetscCalloc1(out->im->ntags, &out->used[d]));
-    for (PetscInt i = 0; i < out->im->item[d].n; i++) out->used[d][out->im->item[d].tags[i]] = PETSC_TRUE;
-    if (out->im->item[d].n) {
-      out->home_dim = d;
-      out->home = out->im->item[d].tags[0];
-    }
-    out->total += out->im->item[d].n;
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 static PetscErrorCode write_all(Out *out, PetscBool version22)
 {
   const int32_t one = 1;
@@ -367,10 +324,27 @@ static PetscErrorCode write_all(Out *out, PetscBool version22)
   (void)fprintf(out->file, "$EndMeshFormat\n");
   write_names(out);
   if (version22) {
-    write_nodes_22(out);
+    const SbImport *im = out->im;
+
+    (void)fprintf(out->file, "$Nodes\n%lld\n", (long long)im->nvert);
+    for (PetscInt v = 0; v < im->nvert; v++) {
+      put_int(out, v + 1, ' ');
+      for (int i = 0; i < 3; i++) put_real(out, im->x[3 * v + i], i < 2 ? ' ' : '\n');
+    }
+    (void)fprintf(out->file, "%s$EndNodes\n", out->binary ? "\n" : "");
     PetscCall(write_elements_22(out));
   } else {
-    write_entities(out);
+    PetscInt n[4] = {0, 0, 0, 0};
+
+    // entities: one for each tag set of a dimension
+    for (int d = 0; d < 4; d++)
+      for (PetscInt t = 0; t < out->im->ntags; t++) n[d] += out->used[d][t];
+    (void)fprintf(out->file, "$Entities\n");
+    for (int d = 0; d < 4; d++) put_size(out, n[d], d < 3 ? ' ' : '\n');
+    for (int d = 0; d < 4; d++)
+      for (PetscInt t = 0; t < out->im->ntags; t++)
+        if (out->used[d][t]) write_entity(out, d, t);
+    (void)fprintf(out->file, "%s$EndEntities\n", out->binary ? "\n" : "");
     write_nodes_41(out);
     PetscCall(write_elements_41(out));
   }
@@ -392,7 +366,17 @@ PetscErrorCode SbWrite_Gmsh(const SbImport *im, const char *path, SbMeshFormat f
   PetscCheck(out.file, PETSC_COMM_SELF, PETSC_ERR_FILE_WRITE, "%s cannot be written: %s", path,
              strerror(errno));
   (void)setvbuf(out.file, NULL, _IOFBF, 1 << 20);
-  PetscCall(find_entities(&out));
+  // which tag sets each dimension has; nodes belong to the first entity of the highest dimension
+  out.home_dim = 3;
+  for (int d = 0; d < 4; d++) {
+    PetscCall(PetscCalloc1(out.im->ntags, &out.used[d]));
+    for (PetscInt i = 0; i < out.im->item[d].n; i++) out.used[d][out.im->item[d].tags[i]] = PETSC_TRUE;
+    if (out.im->item[d].n) {
+      out.home_dim = d;
+      out.home = out.im->item[d].tags[0];
+    }
+    out.total += out.im->item[d].n;
+  }
   PetscCall(number_groups(&out));
   errno = 0;
   ierr = write_all(&out, version22);

@@ -48,22 +48,6 @@ static void write_ints(H5 *h, const char *name, int ncomp, size_t n, const Petsc
               data);
 }
 
-static void write_items(H5 *h, const SbImport *im)
-{
-  static const char *const name[4] = {"point", "line", "triangle", "cell"};
-  char path[64];
-
-  for (int d = 3; d >= 0; d--) {
-    const SbItems *item = &im->item[d];
-
-    if (!item->n && d < 3) continue;
-    (void)snprintf(path, sizeof(path), "/mesh/%ss", name[d]);
-    write_ints(h, path, d + 1, (size_t)item->n, item->vert);
-    (void)snprintf(path, sizeof(path), "/mesh/%s_tags", name[d]);
-    write_ints(h, path, 1, (size_t)item->n, item->tags);
-  }
-}
-
 static PetscErrorCode write_groups(H5 *h, const SbImport *im)
 {
   const hid_t text = H5Tcopy(H5T_C_S1);
@@ -89,18 +73,6 @@ static PetscErrorCode write_groups(H5 *h, const SbImport *im)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static void write_version(H5 *h)
-{
-  const int version = 1;
-  const hid_t space = keep(h, H5Screate(H5S_SCALAR));
-  const hid_t mark =
-    keep(h, H5Acreate2(h->file, "supple_mesh", H5T_STD_I32LE, space, H5P_DEFAULT, H5P_DEFAULT));
-
-  (void)keep(h, H5Awrite(mark, H5T_NATIVE_INT, &version));
-  if (mark >= 0) (void)H5Aclose(mark);
-  if (space >= 0) (void)H5Sclose(space);
-}
-
 static void make_group(H5 *h, const char *name)
 {
   const hid_t group = keep(h, H5Gcreate2(h->file, name, H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT));
@@ -111,6 +83,10 @@ static void make_group(H5 *h, const char *name)
 PetscErrorCode SbWrite_H5(const SbImport *im, const char *path)
 {
   H5 h = {-1, PETSC_FALSE};
+  static const char *const name[4] = {"point", "line", "triangle", "cell"};
+  char array[64];
+  const int version = 1;
+  hid_t space, mark;
 
   PetscFunctionBeginUser;
   PetscCheck(im->nvert <= INT32_MAX, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
@@ -120,12 +96,26 @@ PetscErrorCode SbWrite_H5(const SbImport *im, const char *path)
   h.file = keep(&h, H5Fcreate(path, H5F_ACC_TRUNC, H5P_DEFAULT, H5P_DEFAULT));
   PetscCheck(!h.failed, PETSC_COMM_SELF, PETSC_ERR_FILE_WRITE, "%s cannot be written: %s", path,
              errno ? strerror(errno) : "HDF5 cannot make it");
-  write_version(&h);
+  // version of the layout
+  space = keep(&h, H5Screate(H5S_SCALAR));
+  mark = keep(&h, H5Acreate2(h.file, "supple_mesh", H5T_STD_I32LE, space, H5P_DEFAULT, H5P_DEFAULT));
+  (void)keep(&h, H5Awrite(mark, H5T_NATIVE_INT, &version));
+  if (mark >= 0) (void)H5Aclose(mark);
+  if (space >= 0) (void)H5Sclose(space);
   make_group(&h, "/mesh");
   make_group(&h, "/groups");
   make_group(&h, "/tag_sets");
   write_array(&h, "/mesh/x", 3, (size_t)im->nvert, H5T_IEEE_F64LE, H5T_NATIVE_DOUBLE, im->x);
-  write_items(&h, im);
+  // simplices and their tag sets
+  for (int d = 3; d >= 0; d--) {
+    const SbItems *item = &im->item[d];
+
+    if (!item->n && d < 3) continue;
+    (void)snprintf(array, sizeof(array), "/mesh/%ss", name[d]);
+    write_ints(&h, array, d + 1, (size_t)item->n, item->vert);
+    (void)snprintf(array, sizeof(array), "/mesh/%s_tags", name[d]);
+    write_ints(&h, array, 1, (size_t)item->n, item->tags);
+  }
   PetscCall(write_groups(&h, im));
   (void)keep(&h, H5Fclose(h.file));
   PetscCheck(!h.failed, PETSC_COMM_SELF, PETSC_ERR_FILE_WRITE,
@@ -161,30 +151,6 @@ static void write_grid(FILE *file, const SbImport *im, int dim, const char *h5)
                 n, h5, name[dim]);
 }
 
-/* Text between the quotes of XML. */
-static void write_escaped(FILE *file, const char *text)
-{
-  for (; *text; text++) {
-    if (strchr("<>&\"", *text))
-      (void)fprintf(file, "&#%d;", *text);
-    else
-      (void)fputc(*text, file);
-  }
-}
-
-/* Which groups a number of tag_set stands for. */
-static void write_legend(FILE *file, const SbImport *im)
-{
-  for (PetscInt t = 1; t < im->ntags; t++) {
-    (void)fprintf(file, "<Information Name=\"tag_set %d\" Value=\"", (int)t);
-    for (PetscInt k = im->tags_start[t]; k < im->tags_start[t + 1]; k++) {
-      if (k > im->tags_start[t]) (void)fprintf(file, ", ");
-      write_escaped(file, im->group[im->tags_group[k]].name);
-    }
-    (void)fprintf(file, "\"/>\n");
-  }
-}
-
 PetscErrorCode SbWrite_Xdmf(const SbImport *im, const char *path, const char *h5)
 {
   const char *slash = strrchr(h5, '/'), *name = slash ? slash + 1 : h5;
@@ -195,7 +161,23 @@ PetscErrorCode SbWrite_Xdmf(const SbImport *im, const char *path, const char *h5
   file = fopen(path, "w");
   PetscCheck(file, PETSC_COMM_SELF, PETSC_ERR_FILE_WRITE, "%s cannot be written: %s", path, strerror(errno));
   (void)fprintf(file, "<?xml version=\"1.0\" ?>\n<Xdmf Version=\"3.0\">\n<Domain>\n");
-  write_legend(file, im);
+  // the groups behind each number of tag_set
+  for (PetscInt t = 1; t < im->ntags; t++) {
+    (void)fprintf(file, "<Information Name=\"tag_set %d\" Value=\"", (int)t);
+    for (PetscInt k = im->tags_start[t]; k < im->tags_start[t + 1]; k++) {
+      const char *text;
+
+      if (k > im->tags_start[t]) (void)fprintf(file, ", ");
+      text = im->group[im->tags_group[k]].name;
+      for (; *text; text++) {
+        if (strchr("<>&\"", *text))
+          (void)fprintf(file, "&#%d;", *text);
+        else
+          (void)fputc(*text, file);
+      }
+    }
+    (void)fprintf(file, "\"/>\n");
+  }
   if (im->item[3].n) write_grid(file, im, 3, name);
   if (im->item[2].n) write_grid(file, im, 2, name);
   (void)fprintf(file, "</Domain>\n</Xdmf>\n");

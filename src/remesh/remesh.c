@@ -480,28 +480,21 @@ static PetscErrorCode apply(SbRemesh r, Scene *scene, PetscBool *any)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A checkpoint of a step that bodies were to be re-meshed after holds the meshes of before: a restart does it first. */
-static PetscErrorCode make_up(SbRemesh r, Scene *scene)
-{
-  const SbRun run = scene->run;
-  PetscBool again = PETSC_FALSE, any;
-
-  PetscFunctionBeginUser;
-  if (!r || !run->step0 || !(run->after.dt > 0.)) PetscFunctionReturn(PETSC_SUCCESS);
-  run->step_now = run->step0;
-  run->t_now = run->t0;
-  PetscCall(look(run, run->step0, run->t0, run->after.dt, r, &again));
-  if (again) PetscCall(apply(r, scene, &any));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode SbRemeshSolve(SbRemesh r, SbModel *model, SbRun *run, SbLedger *ledger)
 {
   Scene scene = {*model, *run, ledger ? *ledger : NULL};
-  PetscBool again, failed = PETSC_FALSE, any = PETSC_FALSE;
+  PetscBool again = PETSC_FALSE, failed = PETSC_FALSE, any = PETSC_FALSE;
+  SbRun first;
 
   PetscFunctionBeginUser;
-  PetscCall(make_up(r, &scene));
+  // a checkpoint taken before a due remeshing holds the old meshes: a restart remeshes first
+  first = scene.run;
+  if (r && first->step0 && first->after.dt > 0.) {
+    first->step_now = first->step0;
+    first->t_now = first->t0;
+    PetscCall(look(first, first->step0, first->t0, first->after.dt, r, &again));
+    if (again) PetscCall(apply(r, &scene, &any));
+  }
   do {
     PetscCall(SbRunSolve(scene.run));
     again = scene.run->paused;

@@ -28,12 +28,6 @@ static int compare_along(const void *a, const void *b)
   return (p->vert > q->vert) - (p->vert < q->vert);
 }
 
-static PetscInt root_of(PetscInt up[], PetscInt v)
-{
-  for (; up[v] != v; v = up[v]) up[v] = up[up[v]];
-  return v;
-}
-
 static PetscReal distance2(const SbTriangles *t, PetscInt v, PetscInt w)
 {
   const PetscReal *a = t->x + 3 * v, *b = t->x + 3 * w, d[3] = {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
@@ -62,8 +56,8 @@ static PetscErrorCode join_near(const SbTriangles *t, PetscReal tolerance, Petsc
       PetscInt a, b;
 
       if (distance2(t, sorted[i].vert, sorted[j].vert) > tolerance * tolerance) continue;
-      a = root_of(up, sorted[i].vert);
-      b = root_of(up, sorted[j].vert);
+      a = SbUnionRoot(up, sorted[i].vert);
+      b = SbUnionRoot(up, sorted[j].vert);
       up[PetscMax(a, b)] = PetscMin(a, b);
     }
   }
@@ -184,7 +178,7 @@ PetscErrorCode SbSurfaceMergeVertices(SbTriangleFile *f, PetscReal tolerance, Sb
   PetscCall(PetscMalloc2(t->nvert, &up, t->ntri, &keep));
   PetscCall(join_near(t, tolerance, up));
   for (PetscInt v = 0; v < t->nvert; v++) {
-    const PetscInt r = root_of(up, v);
+    const PetscInt r = SbUnionRoot(up, v);
     const PetscReal d2 = distance2(t, v, r);
 
     moved2 = PetscMax(moved2, d2);
@@ -193,7 +187,7 @@ PetscErrorCode SbSurfaceMergeVertices(SbTriangleFile *f, PetscReal tolerance, Sb
   for (PetscInt i = 0; i < t->ntri; i++) {
     PetscInt *v = t->tri + 3 * i;
 
-    for (int k = 0; k < 3; k++) v[k] = root_of(up, v[k]);
+    for (int k = 0; k < 3; k++) v[k] = SbUnionRoot(up, v[k]);
     keep[i] = (PetscBool)(v[0] != v[1] && v[1] != v[2] && v[2] != v[0]);
     m->ncollapsed += !keep[i];
   }

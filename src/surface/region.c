@@ -47,16 +47,10 @@ typedef struct {
   Surface *surfaces;
 } Space;
 
-static PetscInt root_of(PetscInt up[], PetscInt v)
-{
-  for (; up[v] != v; v = up[v]) up[v] = up[up[v]];
-  return v;
-}
-
 static void join(PetscInt up[], PetscInt a, PetscInt b)
 {
-  a = root_of(up, a);
-  b = root_of(up, b);
+  a = SbUnionRoot(up, a);
+  b = SbUnionRoot(up, b);
   up[PetscMax(a, b)] = PetscMin(a, b);
 }
 
@@ -65,7 +59,7 @@ static PetscInt number_heaps(PetscInt n, PetscInt up[])
 {
   PetscInt count = 0;
 
-  for (PetscInt i = 0; i < n; i++) up[i] = root_of(up, i);
+  for (PetscInt i = 0; i < n; i++) up[i] = SbUnionRoot(up, i);
   for (PetscInt i = 0; i < n; i++)
     up[i] = up[i] == i ? count++ : up[up[i]]; /* the root comes first and has its number */
   return count;

@@ -33,16 +33,6 @@ static PetscErrorCode grow(PetscInt need, PetscInt *size, size_t unit, void *arr
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode read_point(Poly *p, const char *what, PetscReal x[3])
-{
-  PetscFunctionBeginUser;
-  for (int k = 0; k < 3; k++) {
-    PetscCall(SbScanReal(p->s, what, 0, &x[k]));
-    if (!isfinite(x[k])) SB_SCAN_ERROR(p->s, "the %s is not a finite number; repair the file", what);
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* A count at the beginning of a part; the marks behind it, 0 where there are none. */
 static PetscErrorCode read_counts(SbScan *s, const char *what, int n, int64_t count[])
 {
@@ -71,7 +61,7 @@ static PetscErrorCode read_points(Poly *p, int64_t n)
 
     SbScanNext(p->s, '#');
     ierr = SbScanText(p->s, "number of a point", &number[i]);
-    if (!ierr) ierr = read_point(p, "coordinate of a point", x);
+    if (!ierr) ierr = SbScanPoint(p->s, "coordinate of a point", 0, x);
     if (!ierr) ierr = SbScanEndOfLine(p->s);
     if (!ierr) ierr = SbTrianglesAddVertex(p->f, x);
   }
@@ -167,7 +157,7 @@ static PetscErrorCode read_poly_facet(Poly *p, int64_t facet)
     SbScanNext(p->s, '#');
     PetscCall(SbScanText(p->s, "number of a hole", &number));
     PetscCall(grow(3 * (p->nhole + 1), &p->hole_size, sizeof(*p->hole), &p->hole));
-    PetscCall(read_point(p, "coordinate of a hole", p->hole + 3 * p->nhole));
+    PetscCall(SbScanPoint(p->s, "coordinate of a hole", 0, p->hole + 3 * p->nhole));
     p->nhole++;
     PetscCall(SbScanEndOfLine(p->s));
   }
@@ -192,7 +182,7 @@ static PetscErrorCode read_seeds(Poly *p, const char *what, PetscBool attribute,
 
     SbScanNext(p->s, '#');
     PetscCall(SbScanText(p->s, what, &one->number));
-    PetscCall(read_point(p, what, one->x));
+    PetscCall(SbScanPoint(p->s, what, 0, one->x));
     if (attribute && SbScanMore(p->s, '#')) PetscCall(SbScanReal(p->s, "attribute of a region", 0, &value));
     if (value != PetscFloorReal(value) || PetscAbsReal(value) > 1e15)
       SB_SCAN_ERROR(p->s, "the attribute %g of a region is no whole number; it becomes the name volume_N",

@@ -132,10 +132,7 @@ static PetscErrorCode stl_facet(SbScan *s, SbTriangleFile *f)
     PetscReal x[3];
 
     PetscCall(stl_word(s, "vertex"));
-    for (int c = 0; c < 3; c++) {
-      PetscCall(SbScanReal(s, "coordinate of a vertex", 0, &x[c]));
-      if (!isfinite(x[c])) SB_SCAN_ERROR(s, "the coordinate is not a finite number; repair the file");
-    }
+    PetscCall(SbScanPoint(s, "coordinate of a vertex", 0, x));
     PetscCall(SbTrianglesAddVertex(f, x));
   }
   PetscCall(stl_word(s, "endloop"));
@@ -236,10 +233,7 @@ static PetscErrorCode add_vertex(SbScan *s, SbTriangleFile *f)
   PetscReal x[3];
 
   PetscFunctionBeginUser;
-  for (int c = 0; c < 3; c++) {
-    PetscCall(SbScanReal(s, "coordinate of a vertex", 0, &x[c]));
-    if (!isfinite(x[c])) SB_SCAN_ERROR(s, "the coordinate is not a finite number; repair the file");
-  }
+  PetscCall(SbScanPoint(s, "coordinate of a vertex", 0, x));
   PetscCall(SbTrianglesAddVertex(f, x));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -118,7 +118,7 @@ static PetscErrorCode test_netgen(void)
     {POINTS "1\n1 1 2 3\n", "line 7: a volume element of 3 points; expected 4"},
     {POINTS "0\n1\n1 1 2 3\n", "is a surface: 1 3-node triangles and no tetrahedra"},
     {"70000000\n0 0 0\n", "line 1: 70000000 points are announced"},
-    {"4\n0 0 0\n1 0 0\n0 1 0\n0 0 inf\n", "line 5: coordinate of point 4 is not a finite number"},
+    {"4\n0 0 0\n1 0 0\n0 1 0\n0 0 inf\n", "line 5: coordinate of node 4 is not a finite number"},
     {NULL, NULL}};
   static const Case vol[] = {
     {"mesh3d\nvolumeelements\n1\n1 4 1 2 3 4\npoints\n" POINTS, NULL},

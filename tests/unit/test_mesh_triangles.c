@@ -284,7 +284,7 @@ static PetscErrorCode check_files(void)
   PetscCall(refuse_text(".stl", "solid a\n", "the file ends where 'endsolid' is expected"));
   PetscCall(refuse_text(".stl", "solid a\nendsolid a\n", "holds no triangles"));
   PetscCall(refuse_text(".stl", "solid a\nfacet normal 0 0 1\nouter loop\nvertex 1 2 inf\n",
-                        "line 4: the coordinate is not a finite number"));
+                        "line 4: the coordinate of a vertex is not a finite number"));
   PetscCall(refuse_text(".obj", "v 0 0 0\nv 1 0 0\nf 1 2 3\n",
                         "line 3: face 1 uses a vertex that is not there (3 of 2)"));
   PetscCall(refuse_text(".obj", "v 0 0 0\nv 1 0 0\nf 1 2\n", "line 3: face 1 has 2 corners; it needs three"));

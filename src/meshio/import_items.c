@@ -1,0 +1,200 @@
+/*
+  import_items.c - what a reader fills: vertices, simplices of each dimension, and the groups they belong to.
+
+  An entity of a file may belong to several physical groups. The set of groups of an item is stored once (a "tag set") and items
+  refer to it; set 0 is the empty one.
+*/
+#include "meshio_impl.h"
+
+/* Room for at least `need` elements of `unit` bytes; doubles, so that appending is cheap. */
+static PetscErrorCode reserve(PetscInt need, PetscInt *capacity, size_t unit, void *array)
+{
+  PetscInt grown = PetscMax(need, 2 * *capacity);
+
+  PetscFunctionBeginUser;
+  if (need <= *capacity) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscRealloc((size_t)PetscMax(grown, 16) * unit, (void **)array));
+  *capacity = PetscMax(grown, 16);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbImportGrow(SbCount *count, size_t unit, void *array)
+{
+  PetscFunctionBeginUser;
+  PetscCall(reserve(++count->n, &count->capacity, unit, array));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbImportSetVertices(SbImport *im, PetscInt n)
+{
+  PetscFunctionBeginUser;
+  PetscCall(PetscMalloc1(3 * (size_t)n, &im->x));
+  PetscCall(PetscMalloc1(n, &im->vert_number));
+  im->nvert = n;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbImportAddItem(SbImport *im, int dim, const PetscInt vert[], PetscInt tags, int64_t number)
+{
+  SbItems *item = &im->item[dim];
+
+  PetscFunctionBeginUser;
+  if (item->n == item->capacity) {
+    const PetscInt grown = PetscMax(64, 2 * item->capacity);
+
+    PetscCall(PetscRealloc((size_t)grown * (size_t)(dim + 1) * sizeof(PetscInt), &item->vert));
+    PetscCall(PetscRealloc((size_t)grown * sizeof(PetscInt), &item->tags));
+    PetscCall(PetscRealloc((size_t)grown * sizeof(int64_t), &item->number));
+    item->capacity = grown;
+  }
+  for (int i = 0; i <= dim; i++) item->vert[(dim + 1) * item->n + i] = vert[i];
+  item->tags[item->n] = tags;
+  item->number[item->n++] = number;
+  if (im->progress && !(item->n & 0xffff))
+    PetscCall(im->progress(dim == 3 ? "tets" : "triangles", item->n, 0, im->progress_ctx));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbImportSetItems(SbImport *im, int dim, PetscInt n)
+{
+  SbItems *item = &im->item[dim];
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscMalloc1((size_t)n * (size_t)(dim + 1), &item->vert));
+  PetscCall(PetscMalloc1(n, &item->tags));
+  PetscCall(PetscMalloc1(n, &item->number));
+  for (PetscInt i = 0; i < n; i++) item->number[i] = i + 1;
+  item->n = item->capacity = n;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Slot of a group, or the free one where it belongs. */
+static PetscInt find_slot(const SbImport *im, PetscInt dim, int64_t tag)
+{
+  const uint64_t hash = ((uint64_t)tag * 4 + (uint64_t)dim) * 0x9e3779b97f4a7c15u;
+  PetscInt s = (PetscInt)(hash >> 33) & (im->nslot - 1);
+
+  for (; im->slot[s] >= 0; s = (s + 1) & (im->nslot - 1)) {
+    const SbGroup *group = &im->group[im->slot[s]];
+
+    if (group->dim == dim && group->tag == tag) break;
+  }
+  return s;
+}
+
+/* Slots for all groups and one more, at most half of them taken. */
+static PetscErrorCode hash_groups(SbImport *im)
+{
+  PetscFunctionBeginUser;
+  if (2 * (im->ngroup + 1) <= im->nslot) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscFree(im->slot));
+  for (im->nslot = 64; im->nslot < 4 * (im->ngroup + 1);) im->nslot *= 2;
+  PetscCall(PetscMalloc1(im->nslot, &im->slot));
+  for (PetscInt s = 0; s < im->nslot; s++) im->slot[s] = -1;
+  for (PetscInt g = 0; g < im->ngroup; g++) im->slot[find_slot(im, im->group[g].dim, im->group[g].tag)] = g;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbImportGroup(SbImport *im, PetscInt dim, int64_t tag, const char *name, PetscInt *group)
+{
+  static const char *const kind[4] = {"point", "curve", "surface", "volume"};
+  PetscInt s, g;
+
+  PetscFunctionBeginUser;
+  PetscCall(hash_groups(im));
+  s = find_slot(im, dim, tag);
+  g = im->slot[s];
+  if (g < 0) {
+    g = im->slot[s] = im->ngroup;
+    PetscCall(reserve(g + 1, &im->capacity[0], sizeof(SbGroup), &im->group));
+    im->group[g].dim = dim;
+    im->group[g].tag = tag;
+    im->group[g].alone = -1;
+    (void)snprintf(im->group[g].name, SB_GROUP_MAX, "%s_%lld", kind[dim], (long long)tag);
+    im->ngroup++;
+  }
+  if (name) PetscCall(PetscStrncpy(im->group[g].name, name, SB_GROUP_MAX));
+  *group = g;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Appends a tag set. */
+static PetscErrorCode add_tag_set(SbImport *im, PetscInt n, const PetscInt groups[], PetscInt *tags)
+{
+  const PetscInt start = im->tags_start[im->ntags];
+
+  PetscFunctionBeginUser;
+  PetscCall(reserve(start + n, &im->capacity[2], sizeof(PetscInt), &im->tags_group));
+  PetscCall(reserve(im->ntags + 2, &im->capacity[1], sizeof(PetscInt), &im->tags_start));
+  for (PetscInt i = 0; i < n; i++) im->tags_group[start + i] = groups[i];
+  *tags = im->ntags;
+  im->tags_start[++im->ntags] = start + n;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbImportTagsAlone(SbImport *im, PetscInt dim, int64_t tag, const char *name, PetscInt *tags)
+{
+  PetscInt group;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbImportGroup(im, dim, tag, name, &group));
+  if (im->group[group].alone < 0) PetscCall(add_tag_set(im, 1, &group, &im->group[group].alone));
+  *tags = im->group[group].alone;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbImportTagSet(SbImport *im, PetscInt n, PetscInt groups[], PetscInt *tags)
+{
+  PetscInt start;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscSortRemoveDupsInt(&n, groups));
+  /* Set 0 exists from the first call on. */
+  if (!im->ntags) {
+    PetscCall(reserve(2, &im->capacity[1], sizeof(PetscInt), &im->tags_start));
+    im->tags_start[0] = im->tags_start[1] = 0;
+    im->ntags = 1;
+  }
+  if (n == 1 && im->group) {
+    PetscInt *alone = &im->group[groups[0]].alone;
+
+    if (*alone < 0) PetscCall(add_tag_set(im, 1, groups, alone));
+    *tags = *alone;
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  for (*tags = 0; *tags < im->ntags; (*tags)++) {
+    start = im->tags_start[*tags];
+    if (im->tags_start[*tags + 1] - start != n) continue;
+    if (!n || !memcmp(groups, im->tags_group + start, (size_t)n * sizeof(PetscInt)))
+      PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  PetscCall(add_tag_set(im, n, groups, tags));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+const char *SbImportOption(const SbImport *im, const char *key, char name[SB_OPTION_NAME_MAX])
+{
+  if (im->body[0])
+    (void)snprintf(name, SB_OPTION_NAME_MAX, "-body_%s_%s", im->body, key);
+  else
+    (void)snprintf(name, SB_OPTION_NAME_MAX, "-%s", strncmp(key, "tet_", 4) ? key : key + 4);
+  return name;
+}
+
+PetscErrorCode SbImportDestroy(SbImport *im)
+{
+  PetscFunctionBeginUser;
+  PetscCall(PetscFree(im->x));
+  PetscCall(PetscFree(im->vert_number));
+  for (int d = 0; d < 4; d++) {
+    PetscCall(PetscFree(im->item[d].vert));
+    PetscCall(PetscFree(im->item[d].tags));
+    PetscCall(PetscFree(im->item[d].number));
+  }
+  PetscCall(PetscFree(im->group));
+  PetscCall(PetscFree(im->tags_start));
+  PetscCall(PetscFree(im->tags_group));
+  PetscCall(PetscFree(im->slot));
+  PetscCall(PetscMemzero(im, sizeof(*im)));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
