@@ -153,8 +153,9 @@ static PetscErrorCode find_slabs(MPI_Comm comm, SbReading reading, PetscInt nbod
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Rank 0 tells what it knows of bodies and sets; a mesh in memory is each rank's own. */
-static PetscErrorCode tell(MPI_Comm comm, PetscInt nbody, SbBody body[], PetscInt nset, SbSet set[])
+/* Bodies and sets as rank 0 has them, to all ranks; a mesh in memory is each rank's own. */
+static PetscErrorCode broadcast_bodies(MPI_Comm comm, PetscInt nbody, SbBody body[], PetscInt nset,
+                                       SbSet set[])
 {
   SbMemoryMesh **in_memory;
 
@@ -208,7 +209,7 @@ static PetscErrorCode build(MPI_Comm comm, const PetscBool slabs[], PetscInt nbo
   }
   if (!rank) SB_CATCH(&caught, check_all(nbody, body, im, nset, set));
   PetscCall(SbCaughtRaise(comm, &caught));
-  PetscCall(tell(comm, nbody, body, nset, set));
+  PetscCall(broadcast_bodies(comm, nbody, body, nset, set));
   for (PetscInt b = 0; b < nbody; b++) {
     w->Nvert += body[b].nvert;
     w->Ncell += body[b].ncell;

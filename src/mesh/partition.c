@@ -163,19 +163,6 @@ static PetscErrorCode tree_create(MPI_Comm comm, const SbMergedMesh *w, PetscInt
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The leaf that each cell lies in. */
-static void tree_find(const Tree *t, const SbMergedMesh *w, PetscInt leaf[])
-{
-  for (PetscInt c = 0; c < w->ncell; c++) {
-    const Node *node = t->node;
-    PetscReal x[3];
-
-    centre(w, c, x);
-    while (node->axis >= 0) node = t->node + node->next + (x[node->axis] >= node->cut);
-    leaf[c] = node->next;
-  }
-}
-
 /* ------------------------------------------------------------------ METIS */
 
 /* The part of each cell, of a graph on one rank. */
@@ -309,7 +296,15 @@ PetscErrorCode SbPartition(MPI_Comm comm, SbPartitioner type, const SbMergedMesh
     PetscCall(cut_graph(comm, w, sf, to));
   } else {
     PetscCall(tree_create(comm, w, size, &tree));
-    tree_find(&tree, w, to);
+    // the leaf that each cell lies in
+    for (PetscInt c = 0; c < w->ncell; c++) {
+      const Node *node = tree.node;
+      PetscReal x[3];
+
+      centre(w, c, x);
+      while (node->axis >= 0) node = tree.node + node->next + (x[node->axis] >= node->cut);
+      to[c] = node->next;
+    }
     PetscCall(PetscFree(tree.node));
     PetscCall(smooth(w, sf, to));
   }

@@ -487,7 +487,7 @@ static PetscErrorCode find_triangles(Slab *s)
   Triangle *mine, *got, *out, *in;
   PetscInt n = 0, *from;
   PetscMPIInt *dest;
-  PetscBool *found, *told;
+  PetscBool *found, *answered;
   SbRoute there, on;
 
   PetscFunctionBeginUser;
@@ -502,7 +502,7 @@ static PetscErrorCode find_triangles(Slab *s)
   PetscCall(SbRouteSend(&there, sizeof(Triangle), mine, &got));
   PetscCall(PetscFree2(mine, dest));
   for (int pass = 0; pass < 2; pass++) {
-    if (pass) PetscCall(PetscMalloc4(n, &out, n, &from, n, &dest, n, &told));
+    if (pass) PetscCall(PetscMalloc4(n, &out, n, &from, n, &dest, n, &answered));
     n = 0;
     for (PetscInt i = 0; i < there.nrecv; i++) {
       const PetscInt *t = got[i].vert, v = PetscMin(t[0], PetscMin(t[1], t[2])) - s->rows.first;
@@ -521,36 +521,22 @@ static PetscErrorCode find_triangles(Slab *s)
   PetscCall(SbRouteSend(&on, sizeof(Triangle), out, &in));
   PetscCall(PetscMalloc1(on.nrecv, &found));
   PetscCall(keep_triangles(s, on.nrecv, in, found));
-  PetscCall(SbRouteReply(&on, sizeof(PetscBool), found, told));
+  PetscCall(SbRouteReply(&on, sizeof(PetscBool), found, answered));
   PetscCall(PetscFree(found));
   /* lost: found by none of them */
   PetscCall(PetscCalloc1(there.nrecv, &found));
-  for (PetscInt i = 0; i < n; i++) found[from[i]] = (PetscBool)(found[from[i]] || told[i]);
+  for (PetscInt i = 0; i < n; i++) found[from[i]] = (PetscBool)(found[from[i]] || answered[i]);
   for (PetscInt i = 0; i < there.nrecv; i++) s->im->nlost += !found[i];
   PetscCall(PetscFree(found));
   PetscCall(PetscFree(in));
   PetscCall(PetscFree(got));
-  PetscCall(PetscFree4(out, from, dest, told));
+  PetscCall(PetscFree4(out, from, dest, answered));
   PetscCall(SbRouteDestroy(&on));
   PetscCall(SbRouteDestroy(&there));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* ------------------------------------------------------------------ sets */
-
-/* What a vertex belongs to on any rank, it belongs to on all. */
-static PetscErrorCode join_masks(Slab *s)
-{
-  uint64_t *got;
-
-  PetscFunctionBeginUser;
-  PetscCall(SbRouteSend(&s->vert, sizeof(uint64_t), s->part->masks.vert, &got));
-  for (PetscInt i = 0; i < s->vert.nrecv; i++) s->mask[s->asked[i]] |= got[i];
-  for (PetscInt i = 0; i < s->vert.nrecv; i++) got[i] = s->mask[s->asked[i]];
-  PetscCall(SbRouteReply(&s->vert, sizeof(uint64_t), got, s->part->masks.vert));
-  PetscCall(PetscFree(got));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
 
 static PetscErrorCode mark(Slab *s, PetscInt nbody, const SbBody body[], PetscInt b, PetscInt nset,
                            SbSet set[])
@@ -559,6 +545,7 @@ static PetscErrorCode mark(Slab *s, PetscInt nbody, const SbBody body[], PetscIn
   SbMasks *m = &s->part->masks, kept;
   uint64_t *bits;
   PetscInt *count;
+  uint64_t *got;
 
   PetscFunctionBeginUser;
   PetscCall(PetscMalloc2(im->ntags, &bits, 3 * nset, &count));
@@ -571,7 +558,12 @@ static PetscErrorCode mark(Slab *s, PetscInt nbody, const SbBody body[], PetscIn
   PetscCall(PetscCalloc1(im->item[3].n, &m->cell));
   PetscCall(PetscCalloc1(4 * (size_t)im->item[3].n, &m->face));
   PetscCall(SbSetsMark(im, &s->part->faces, nbody, body, b, nset, set, m));
-  PetscCall(join_masks(s));
+  // a vertex belongs to the sets that it has on any rank
+  PetscCall(SbRouteSend(&s->vert, sizeof(uint64_t), s->part->masks.vert, &got));
+  for (PetscInt i = 0; i < s->vert.nrecv; i++) s->mask[s->asked[i]] |= got[i];
+  for (PetscInt i = 0; i < s->vert.nrecv; i++) got[i] = s->mask[s->asked[i]];
+  PetscCall(SbRouteReply(&s->vert, sizeof(uint64_t), got, s->part->masks.vert));
+  PetscCall(PetscFree(got));
   /* vertices are counted by their keepers */
   kept = *m;
   kept.vert = s->mask;
@@ -587,25 +579,6 @@ static PetscErrorCode mark(Slab *s, PetscInt nbody, const SbBody body[], PetscIn
 }
 
 /* ------------------------------------------------------------------ all of it */
-
-/* Size and shape, from those of all ranks. */
-static PetscErrorCode measure(const Slab *s, SbBody *body)
-{
-  SbShape shape;
-
-  PetscFunctionBeginUser;
-  SbImportShape(s->im, &shape);
-  PetscCall(sum(s, 1, &shape.nsliver));
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &shape.volume, 1, MPIU_REAL, MPI_SUM, s->comm));
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, shape.most, 8, MPIU_REAL, MPI_MAX, s->comm));
-  SbShapeKeep(&shape, body);
-  body->ncell = s->im->item[3].n;
-  body->nfacet = s->part->faces.nboundary;
-  PetscCall(sum(s, 1, &body->ncell));
-  PetscCall(sum(s, 1, &body->nfacet));
-  body->nvert = s->rows.N - s->im->nunused;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
 
 static PetscErrorCode read_slab(Slab *s, const SbBody *body)
 {
@@ -634,6 +607,7 @@ static PetscErrorCode prepare(Slab *s, PetscInt before, PetscInt nbody, SbBody b
   SbImport *im = s->im;
   SbCaughtError caught = {0, ""};
   PetscReal largest;
+  SbShape shape;
 
   PetscFunctionBeginUser;
   SB_CATCH(&caught, read_slab(s, &body[b]));
@@ -647,7 +621,17 @@ static PetscErrorCode prepare(Slab *s, PetscInt before, PetscInt nbody, SbBody b
   PetscCall(join_faces(s, before));
   PetscCall(sum(s, 1, &im->nunused));
   PetscCall(sum(s, 1, &im->nreoriented));
-  PetscCall(measure(s, &body[b]));
+  // size and shape of the body, from those of all ranks
+  SbImportShape(s->im, &shape);
+  PetscCall(sum(s, 1, &shape.nsliver));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &shape.volume, 1, MPIU_REAL, MPI_SUM, s->comm));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, shape.most, 8, MPIU_REAL, MPI_MAX, s->comm));
+  SbShapeKeep(&shape, &body[b]);
+  body[b].ncell = s->im->item[3].n;
+  body[b].nfacet = s->part->faces.nboundary;
+  PetscCall(sum(s, 1, &body[b].ncell));
+  PetscCall(sum(s, 1, &body[b].nfacet));
+  body[b].nvert = s->rows.N - s->im->nunused;
   PetscCall(count_parts(s, &body[b].npart));
   PetscCall(count_pinched(s));
   PetscCall(mark(s, nbody, body, b, nset, set));

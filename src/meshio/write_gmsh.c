@@ -68,7 +68,7 @@ static void put_real(Out *out, PetscReal value, char after)
     (void)fprintf(out->file, "%.17g%c", x, after);
 }
 
-static PetscErrorCode tell(Out *out)
+static PetscErrorCode report_progress(Out *out)
 {
   PetscFunctionBeginUser;
   if (out->im->progress && !(out->done++ & 0xffff))
@@ -232,7 +232,7 @@ static PetscErrorCode write_run_41(Out *out, int dim, PetscInt i, PetscInt n, in
 
     put_size(out, (*number)++, ' ');
     for (int a = 0; a <= dim; a++) put_size(out, v[a] + 1, a < dim ? ' ' : '\n');
-    PetscCall(tell(out));
+    PetscCall(report_progress(out));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -302,7 +302,7 @@ static PetscErrorCode write_elements_22(Out *out)
   for (int d = 0; d < 4; d++) {
     for (PetscInt i = 0; i < im->item[d].n; i++) {
       write_item_22(out, d, i, &number);
-      PetscCall(tell(out));
+      PetscCall(report_progress(out));
     }
   }
   (void)fprintf(out->file, "%s$EndElements\n", out->binary ? "\n" : "");

@@ -278,7 +278,7 @@ static const PetscReal *old_value(const Work *w, PetscInt cell, PetscInt k)
 }
 
 /* The old fields at a place at rest, as the tet has them that holds `near`. */
-static void look_up(const Work *w, const PetscReal X[3], const PetscReal near[3], PetscReal value[])
+static void interpolate_old(const Work *w, const PetscReal X[3], const PetscReal near[3], PetscReal value[])
 {
   PetscReal weight[4];
   PetscInt cell;
@@ -320,7 +320,7 @@ static void new_values(const Work *w, PetscInt c, PetscReal value[])
         inside[k] = X[k] + INWARDS * 0.25 * (apex[k] - X[k]);
       }
     }
-    if (!from) look_up(w, X, w->element->nodes_per[3] ? inside : X, to);
+    if (!from) interpolate_old(w, X, w->element->nodes_per[3] ? inside : X, to);
     for (PetscInt k = 0; k < w->each && from; k++) to[k] = from[k];
     for (PetscInt k = 0; k < w->each && w->g->width == 8; k++)
       support[k] = slot < 0 ? PETSC_MAX_REAL : old_value(w, slot / 4, 4 + slot % 4)[k];

@@ -340,8 +340,8 @@ static PetscErrorCode split_edge(const SbOldMesh *old, SbLocator rest, const Pet
 }
 
 /* Vertices are moved, and edges of tets that have none to move are split, until all tets are good enough or nothing helps. */
-static PetscErrorCode mend(const SbOldMesh *old, const SbRemeshing *how, const SbHull *hull, SbLocator rest,
-                           SbNewMesh *m)
+static PetscErrorCode repair_tets(const SbOldMesh *old, const SbRemeshing *how, const SbHull *hull,
+                                  SbLocator rest, SbNewMesh *m)
 {
   PetscBool split = PETSC_TRUE;
   uint64_t *edge;
@@ -370,7 +370,7 @@ static PetscErrorCode mend(const SbOldMesh *old, const SbRemeshing *how, const S
 }
 
 /* Refuses what could not be repaired: tets inverted now are allowed where the old mesh had some, too. */
-static PetscErrorCode judge(const SbOldMesh *old, const SbRemeshing *how, SbNewMesh *m)
+static PetscErrorCode check_quality(const SbOldMesh *old, const SbRemeshing *how, SbNewMesh *m)
 {
   PetscInt at_rest = 0, now = 0, before = 0;
   PetscReal worst = 1;
@@ -443,8 +443,8 @@ static PetscErrorCode remesh(const char *where, const SbOldMesh *old, const SbRe
              "the mesher left out vertices of the surface, or made some of no tetrahedron");
   PetscCall(SbLocatorCreate(old->ncell, old->cell, old->X, rest));
   PetscCall(find_material(old, how, *rest, m));
-  PetscCall(mend(old, how, hull, *rest, m));
-  PetscCall(judge(old, how, m));
+  PetscCall(repair_tets(old, how, hull, *rest, m));
+  PetscCall(check_quality(old, how, m));
   // the old tet around the middle of each new one
   PetscCall(PetscMalloc1(m->ncell, &m->within));
   for (PetscInt c = 0; c < m->ncell; c++) {

@@ -17,7 +17,7 @@
 /* ------------------------------------------------------------------ quality */
 
 /* Where all corners of owned cells are now, x[nvert][3], for bodies with their nodes at faces: their cells are all local. */
-static PetscErrorCode face_places(SbSpace s, const PetscReal u[], PetscReal x[])
+static PetscErrorCode corner_positions(SbSpace s, const PetscReal u[], PetscReal x[])
 {
   const SbMesh mesh = s->mesh;
   PetscReal *weight;
@@ -58,7 +58,7 @@ PetscErrorCode SbBodyQualities(SbModel m, Vec U, const PetscBool named[], PetscR
   PetscCall(SbSpaceGetLocalRead(s, U, &u));
   if (s->faces) {
     PetscCall(PetscMalloc1(3 * mesh->nvert, &at_vertices));
-    PetscCall(face_places(s, u, at_vertices));
+    PetscCall(corner_positions(s, u, at_vertices));
   }
   for (PetscInt c = 0; c < mesh->ncell_owned; c++) {
     const PetscInt body = mesh->cell_body[c];

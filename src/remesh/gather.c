@@ -109,7 +109,7 @@ static PetscErrorCode gather_values(SbRun run, PetscBool root, PetscSF sf, SbGat
 }
 
 /* Where vertices are now: P1 has them; of CR and DG the mean of the cells around, weighted with their volumes. */
-static PetscErrorCode find_places(SbModel m, SbGathered *g)
+static PetscErrorCode current_positions(SbModel m, SbGathered *g)
 {
   const PetscInt step = g->nfield * 3;
   PetscReal *weight;
@@ -187,7 +187,7 @@ PetscErrorCode SbGather(SbRun run, SbGathered *g)
   PetscCall(gather_cells(mesh, (PetscBool)!rank, sf, g));
   PetscCall(gather_values(run, (PetscBool)!rank, sf, g));
   PetscCall(PetscSFDestroy(&sf));
-  if (!rank) PetscCall(find_places(m, g));
+  if (!rank) PetscCall(current_positions(m, g));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

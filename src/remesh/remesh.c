@@ -210,7 +210,8 @@ PetscErrorCode SbRemeshDestroy(SbRemesh *remesh)
 
 /* ------------------------------------------------------------------ whether, and which bodies */
 
-static PetscErrorCode look(SbRun run, PetscInt step, PetscReal t, PetscReal dt, void *ctx, PetscBool *pause)
+static PetscErrorCode check_quality(SbRun run, PetscInt step, PetscReal t, PetscReal dt, void *ctx,
+                                    PetscBool *pause)
 {
   const PetscReal ahead = 1e-6 * dt; /* a step that ends there but for rounding has reached it */
   SbRemesh r = (SbRemesh)ctx;
@@ -234,7 +235,7 @@ static PetscErrorCode look(SbRun run, PetscInt step, PetscReal t, PetscReal dt, 
 }
 
 /* The step that follows failed: the body with the worst tet is due, once for each state. */
-static PetscErrorCode look_after_failure(SbRemesh r, SbRun run, PetscBool *again)
+static PetscErrorCode check_after_failure(SbRemesh r, SbRun run, PetscBool *again)
 {
   PetscInt worst = -1;
 
@@ -278,7 +279,7 @@ PetscErrorCode SbRemeshAttach(SbRemesh r, SbRun run)
 
     if (in_memory && in_memory->bound > 0.) r->bound[b] = PetscMin(r->bound[b], in_memory->bound);
   }
-  PetscCall(SbRunSetPause(run, look, r));
+  PetscCall(SbRunSetPause(run, check_quality, r));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -362,21 +363,21 @@ static PetscErrorCode report(SbRemesh r, const Scene *s, const SbRemade *remade,
 
   PetscFunctionBeginUser;
   for (PetscInt b = 0; b < r->nbody; b++) {
-    SbRemeshed told = {.step = s->run->step_now, .t = s->run->t_now};
+    SbRemeshed entry = {.step = s->run->step_now, .t = s->run->t_now};
 
     if (!remade->done[b]) continue;
-    PetscCall(PetscStrncpy(told.body, s->model->body[b].name, sizeof(told.body)));
+    PetscCall(PetscStrncpy(entry.body, s->model->body[b].name, sizeof(entry.body)));
     for (int i = 0; i < 2; i++) {
-      told.tets[i] = made[b].ncell[i];
-      told.vertices[i] = made[b].nvert[i];
-      told.energy[i] = e[i].kinetic + e[i].strain;
+      entry.tets[i] = made[b].ncell[i];
+      entry.vertices[i] = made[b].nvert[i];
+      entry.energy[i] = e[i].kinetic + e[i].strain;
     }
-    told.quality[0] = r->worst[b];
-    told.quality[1] = made[b].quality;
-    told.moved = made[b].nmoved;
-    told.speed = speed;
-    told.shift = distance(e[0].centre, e[1].centre);
-    PetscCall(SbReportRemeshed(s->run, &told));
+    entry.quality[0] = r->worst[b];
+    entry.quality[1] = made[b].quality;
+    entry.moved = made[b].nmoved;
+    entry.speed = speed;
+    entry.shift = distance(e[0].centre, e[1].centre);
+    PetscCall(SbReportRemeshed(s->run, &entry));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -492,13 +493,13 @@ PetscErrorCode SbRemeshSolve(SbRemesh r, SbModel *model, SbRun *run, SbLedger *l
   if (r && first->step0 && first->after.dt > 0.) {
     first->step_now = first->step0;
     first->t_now = first->t0;
-    PetscCall(look(first, first->step0, first->t0, first->after.dt, r, &again));
+    PetscCall(check_quality(first, first->step0, first->t0, first->after.dt, r, &again));
     if (again) PetscCall(apply(r, &scene, &any));
   }
   do {
     PetscCall(SbRunSolve(scene.run));
     again = scene.run->paused;
-    if (r && !again) PetscCall(look_after_failure(r, scene.run, &failed));
+    if (r && !again) PetscCall(check_after_failure(r, scene.run, &failed));
     if (again || failed) PetscCall(apply(r, &scene, &any));
     if (failed) again = any;
     failed = PETSC_FALSE;

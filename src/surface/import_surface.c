@@ -1,7 +1,7 @@
 /*
   import_surface.c - a body from a closed surface: read, repaired, checked, cut into regions, filled with tets.
 
-  The steps and what each refuses or repairs are in triangles_read.c and its neighbours, clean.c, cross.c,
+  The steps and what each refuses or repairs are in triangles_read.c and its neighbours, clean.c, self_intersection.c,
   region.c and tetrahedralize.c. Lengths are in metres from the reader on: the surface is scaled first.
 */
 #include "surface_impl.h"
@@ -63,7 +63,7 @@ PetscErrorCode SbTetOptionsRead(const SbScope *scope, const char *mesh, SbTetOpt
 
 /* ------------------------------------------------------------------ what was repaired */
 
-static PetscErrorCode write_mended(const SbTriangles *t, const SbSurfaceRepairs *m, size_t size, char text[])
+static PetscErrorCode write_repairs(const SbTriangles *t, const SbSurfaceRepairs *m, size_t size, char text[])
 {
   const struct {
     PetscInt n;
@@ -177,7 +177,7 @@ static PetscErrorCode make_surface(const char *path, const SbImport *im, SbTrian
   PetscCall(SbSurfaceRepairTriangles(f, &repairs));
   PetscCall(SbSurfaceUntangle(f, im->tet.untangle >= 0 ? im->tet.untangle : 0.5 * edge, &repairs));
   PetscCall(SbSurfaceFindRegions(f, &repairs, s));
-  PetscCall(write_mended(f->t, &repairs, size, note));
+  PetscCall(write_repairs(f->t, &repairs, size, note));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -253,7 +253,7 @@ PetscErrorCode SbSurfaceObstacle(SbTriangleFile *f, size_t size, char note[])
   PetscCall(SbSurfaceDestroy(&s));
   PetscCall(ierr);
   repairs.ncavity = 0; /* nothing was changed for them */
-  PetscCall(write_mended(f->t, &repairs, size, note));
+  PetscCall(write_repairs(f->t, &repairs, size, note));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -368,24 +368,6 @@ static PetscErrorCode empty_cavities(Space *s)
 
 /* ------------------------------------------------------------------ the result */
 
-/* Regions are numbered by their first triangle. */
-static PetscInt number_regions(Space *s)
-{
-  PetscInt n = 0;
-
-  for (PetscInt k = 0; k < s->nshell; k++) {
-    Shell *p = &s->shells[k];
-
-    p->region = p->volume > 0 && !p->empty ? n++ : OUTSIDE;
-  }
-  for (PetscInt k = 0; k < s->nshell; k++) {
-    Shell *p = &s->shells[k];
-
-    if (p->volume < 0 && p->parent != OUTSIDE) p->region = s->shells[p->parent].region;
-  }
-  return n;
-}
-
 /* The groups that all triangles of a shell belong to: group[n], n at most 16. */
 static PetscErrorCode groups_of_shell(const Space *s, PetscInt shell, PetscInt *n, PetscInt group[16])
 {
@@ -523,7 +505,18 @@ static PetscErrorCode find_regions(Space *s, SbSurface *out)
       "%s: the point of region %lld at (%.6g, %.6g, %.6g) m lies in no region; move it, or remove it",
       s->f->where, (long long)r->number, (double)r->x[0], (double)r->x[1], (double)r->x[2]);
   }
-  n = number_regions(s);
+  // numbers regions by their first triangle; an inner shell has the number of the region around it
+  n = 0;
+  for (PetscInt k = 0; k < s->nshell; k++) {
+    Shell *p = &s->shells[k];
+
+    p->region = p->volume > 0 && !p->empty ? n++ : OUTSIDE;
+  }
+  for (PetscInt k = 0; k < s->nshell; k++) {
+    Shell *p = &s->shells[k];
+
+    if (p->volume < 0 && p->parent != OUTSIDE) p->region = s->shells[p->parent].region;
+  }
   PetscCheck(n, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
              "%s: no region is left beside its holes; remove one of them", s->f->where);
   PetscCall(fill_surface(s, n, out));

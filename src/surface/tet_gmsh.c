@@ -2,7 +2,7 @@
   tet_gmsh.c - tets by the gmsh library (Geuzaine and Remacle 2009), in its child process.
 
   The surface becomes discrete entities, one for each pair of regions that meet there. Kept, they are the mesh of the boundary as
-  they are. Meshed again, gmsh cuts them along edges that turn by more than the angle, finds a parametrisation of each
+  they are. Remeshed, gmsh cuts them along edges that turn by more than the angle, finds a parametrisation of each
   piece (classifySurfaces, createGeometry) and meshes pieces and seams with the wanted size. Each region is a volume
   within its entities. The tets are made by its Delaunay method and improved by its own optimisers, and by Netgen's where it has it.
 */

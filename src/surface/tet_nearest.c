@@ -63,25 +63,6 @@ static PetscErrorCode try_triangle(void *ctx, PetscInt f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The first box has the size of the new triangle; what it finds within its half width is the nearest one. */
-static PetscErrorCode find_nearest(const SbBoxTree *tree, Search *search, PetscReal reach)
-{
-  PetscFunctionBeginUser;
-  search->best = PETSC_MAX_REAL;
-  search->triangle = 0;
-  for (int tries = 0; tries < 60; tries++, reach *= 2) {
-    PetscReal box[6];
-
-    for (int k = 0; k < 3; k++) {
-      box[k] = search->p[k] - reach;
-      box[3 + k] = search->p[k] + reach;
-    }
-    PetscCall(SbBoxTreeVisit(tree, box, try_triangle, search));
-    if (search->best <= reach * reach) break;
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode SbTetNearest(const SbSurface *s, SbItems *tri, const PetscReal x[])
 {
   PetscReal(*box)[6];
@@ -95,12 +76,25 @@ PetscErrorCode SbTetNearest(const SbSurface *s, SbItems *tri, const PetscReal x[
   for (PetscInt i = 0; i < tri->n; i++) {
     const PetscInt *v = tri->vert + 3 * i;
     PetscReal middle[3], own[6];
+    PetscReal reach;
 
     SbTriangleBox(x, v, own);
     for (int k = 0; k < 3; k++) middle[k] = (x[3 * v[0] + k] + x[3 * v[1] + k] + x[3 * v[2] + k]) / 3;
     search.p = middle;
-    PetscCall(
-      find_nearest(&tree, &search, PetscMax(own[3] - own[0], PetscMax(own[4] - own[1], own[5] - own[2]))));
+    // the box begins with the size of the new triangle and doubles; what it finds within its half width is nearest
+    reach = PetscMax(own[3] - own[0], PetscMax(own[4] - own[1], own[5] - own[2]));
+    search.best = PETSC_MAX_REAL;
+    search.triangle = 0;
+    for (int tries = 0; tries < 60; tries++, reach *= 2) {
+      PetscReal query[6];
+
+      for (int k = 0; k < 3; k++) {
+        query[k] = search.p[k] - reach;
+        query[3 + k] = search.p[k] + reach;
+      }
+      PetscCall(SbBoxTreeVisit(&tree, query, try_triangle, &search));
+      if (search.best <= reach * reach) break;
+    }
     tri->tags[i] = search.triangle;
   }
   PetscCall(SbBoxTreeDestroy(&tree));

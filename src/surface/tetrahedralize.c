@@ -166,8 +166,8 @@ static const char *without(const char *where, const char *text)
 }
 
 /* One backend; its error becomes a reason. Errors that are not the input's are raised. */
-static PetscErrorCode try_road(int backend, const SbTetJob *job, SbImport *tets, PetscBool *done, size_t size,
-                               char reasons[])
+static PetscErrorCode try_backend(int backend, const SbTetJob *job, SbImport *tets, PetscBool *done,
+                                  size_t size, char reasons[])
 {
   SbCaughtError caught = {0, ""};
   PetscErrorCode ierr;
@@ -276,15 +276,15 @@ static PetscErrorCode prepare(const char *where, const SbSurface *s, const SbTet
 }
 
 /* The first backend that works; its mesh goes to the body. */
-static PetscErrorCode run_roads(const SbTetJob *job, PetscReal factor, PetscBool *done, size_t size,
-                                char reasons[], SbImport *body)
+static PetscErrorCode run_backends(const SbTetJob *job, PetscReal factor, PetscBool *done, size_t size,
+                                   char reasons[], SbImport *body)
 {
   SbImport tets;
 
   PetscFunctionBeginUser;
   for (int backend = 0; backend < 2 && !*done; backend++) {
     if (job->options.backend != SB_TET_AUTO && (int)job->options.backend != backend + 1) continue;
-    PetscCall(try_road(backend, job, &tets, done, size, reasons));
+    PetscCall(try_backend(backend, job, &tets, done, size, reasons));
     if (!*done) continue;
     PetscCall(move_mesh(1 / factor, &tets, body));
     PetscCall(SbImportDestroy(&tets));
@@ -315,7 +315,7 @@ PetscErrorCode SbTetrahedralize(const char *where, const SbSurface *s, const SbT
   job.surface = &scaled;
   job.size *= factor;
   job.edge *= factor;
-  ierr = run_roads(&job, factor, &done, sizeof(reasons), reasons, body);
+  ierr = run_backends(&job, factor, &done, sizeof(reasons), reasons, body);
   PetscCall(PetscFree(scaled.x));
   PetscCall(ierr);
   PetscCheck(done, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
