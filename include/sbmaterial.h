@@ -24,6 +24,16 @@ typedef struct {
   PetscErrorCode (*setfromoptions)(SbMaterial m, const SbScope *scope);
   /* checks that the law has this tangent and sets `tangent` and `frame` below; NULL when there is one tangent only */
   PetscErrorCode (*settangent)(SbMaterial m, SbTangentKind kind);
+  /*
+    Stiffness at rest, from the parameters of the material alone: what scales with it or chooses by it asks here, once per
+    region, face or facet, never per cell. Laws that are Hooke's with E and nu at rest share their answers.
+  */
+  PetscReal (*shear_modulus)(const struct _p_SbMaterial *m); /* G = mu, Pa */
+  PetscReal (*bulk_modulus)(const struct _p_SbMaterial *m);  /* K = lambda + 2/3 mu, Pa */
+  PetscReal (*volumetric_modulus)(
+    const struct _p_SbMaterial *m); /* lambda of pressure and volumetric, below, Pa */
+  PetscReal (*wave_speed)(
+    const struct _p_SbMaterial *m); /* of the fastest wave, sqrt((lambda + 2 mu) / rho), m/s */
   /* psi = energy per rest volume, J/m^3; zero at rest */
   void (*energy)(const struct _p_SbMaterial *m, const SbLane F[9], SbLane psi);
   /* Every law is psi = psi_mu(F) + lambda/2 theta(F)^2 with theta the law's measure of the change of volume: tr(eps) (linear),
@@ -32,7 +42,7 @@ typedef struct {
   void (*pressure)(const struct _p_SbMaterial *m, const SbLane F[9], SbLane p);
   /* P = dPsi/dF, Pa */
   void (*stress)(const struct _p_SbMaterial *m, const SbLane F[9], SbLane P[9]);
-  /* The tangent is the isotropic Hooke tensor (lambda, mu) turned by R: fills R. NULL when the law needs the full tangent.
+  /* The tangent is the isotropic Hooke tensor of volumetric_modulus and shear_modulus, turned by R: fills R. NULL when the law needs the full tangent.
      Co-rotated has it with the warped tangent, linear always (R = I). */
   void (*frame)(const struct _p_SbMaterial *m, const SbLane F[9], SbLane R[9]);
   /* The tangent is dP = 2 mu dF + lambda (R : dF) R + R [W y]x with y = axial(R^T dF - dF^T R), what a law of R^T F has:
@@ -51,12 +61,11 @@ struct _p_SbMaterial {
   char law[SB_NAME_MAX];
   PetscLogEvent event; /* SbMat_<law>, around the loops over its cells for forces and assembled tangents */
   SbMaterialOps ops;
-  PetscReal E, nu;      /* Young's modulus, Pa; Poisson's ratio, (-1, 0.5) */
-  PetscReal lambda, mu; /* Lame parameters, Pa */
-  PetscReal density;    /* kg/m^3 */
-  PetscBool linear;     /* stress is linear in F: K is constant */
-  PetscBool symmetric;  /* always true for hyperelastic laws */
-  PetscBool adaptive;   /* -body_NAME_tangent auto: the solver of a step chooses between the two exact ones */
+  PetscReal E, nu;     /* Young's modulus, Pa; Poisson's ratio, (-1, 0.5): as given */
+  PetscReal density;   /* kg/m^3 */
+  PetscBool linear;    /* stress is linear in F: K is constant */
+  PetscBool symmetric; /* always true for hyperelastic laws */
+  PetscBool adaptive;  /* -body_NAME_tangent auto: the solver of a step chooses between the two exact ones */
   SbTangentKind tangent; /* what ops.frame or ops.tangent hands out */
   void *data;
 };
@@ -84,8 +93,13 @@ PetscErrorCode SbMaterialCreateElastic(const char *law, PetscReal E, PetscReal n
 /* Chooses the tangent. Error: PETSC_ERR_USER when the law does not have it. */
 PetscErrorCode SbMaterialSetTangent(SbMaterial m, SbTangentKind kind);
 PetscErrorCode SbMaterialDestroy(SbMaterial *m);
-/* Largest wave speed sqrt((lambda + 2 mu) / rho) at rest, m/s. */
-PetscReal SbMaterialWaveSpeed(SbMaterial m);
+/* Modulus of the fastest wave at rest, rho c^2 = lambda + 2 mu, Pa: the stiffest answer to a change of one length. */
+SB_INLINE PetscReal SbMaterialWaveModulus(const struct _p_SbMaterial *m)
+{
+  const PetscReal c = m->ops.wave_speed(m);
+
+  return m->density * c * c;
+}
 /*
   SbMaterialDampingStress - dP = R hooke(sym(R^T H)) = mu (H + R H^T R) + lambda (R : H) R, R the rotation in F: the stress
   of stiffness-proportional damping, per second of beta; R = I for the linear law. One rule for every other law and every

@@ -150,7 +150,7 @@ static PetscReal facet_stiffness(const Collision *c, SbSpace space, const SbFace
 {
   const SbMaterial m = space->material[space->mesh->cell_material[facet->cell]];
 
-  return c->stiffness * (m->lambda + 2 * m->mu) * facet->area / facet->height;
+  return c->stiffness * SbMaterialWaveModulus(m) * facet->area / facet->height;
 }
 
 /* Springs: (lambda + 2 mu) area / height, summed over the facets at a point; of an edge that of its first facet. */

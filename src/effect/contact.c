@@ -173,7 +173,7 @@ static void add_share(SbSpace space, const SbFacet *facet, PetscInt a, PetscReal
     c->touch[slot[node]] = (Touch){.node = node, .cell = facet->cell, .a = a};
   }
   touch = &c->touch[slot[node]];
-  touch->k += c->stiffness * (m->lambda + 2 * m->mu) * share / facet->height;
+  touch->k += c->stiffness * SbMaterialWaveModulus(m) * share / facet->height;
   touch->stiff = touch->k;
 }
 

@@ -89,8 +89,8 @@ static void face_factors(SbSpace s, const Face *face, const PetscInt region_of[]
   for (int side = 0; side < (face->cell[1] == SUPPORT ? 1 : 2); side++) {
     const SbMaterial m = s->region[region_of[face->cell[side]]].material;
 
-    k1[side] = 2. * m->mu * area / V[face->cell[side]];
-    k0[side] = k1[side] + m->lambda * area / V[face->cell[side]];
+    k1[side] = 2. * m->ops.shear_modulus(m) * area / V[face->cell[side]];
+    k0[side] = SbMaterialWaveModulus(m) * area / V[face->cell[side]];
   }
   if (face->cell[1] == SUPPORT) {
     *c1 = 0.;

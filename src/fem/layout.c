@@ -341,7 +341,7 @@ PetscErrorCode SbLayoutCliques(SbSpace s)
   PetscCall(PetscMalloc1(s->mesh->ncell, &stiffness));
   for (PetscInt r = 0; r < s->nregion; r++) {
     const SbRegion *region = &s->region[r];
-    const PetscReal modulus = 2. * region->material->mu + region->material->lambda;
+    const PetscReal modulus = SbMaterialWaveModulus(region->material);
 
     for (PetscInt b = region->bstart; b < region->bend; b++) {
       for (PetscInt l = 0; l < s->batch_n[b]; l++)

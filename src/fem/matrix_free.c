@@ -277,13 +277,13 @@ PetscErrorCode SbMatrixFreeSetState(Mat A, const SbStage *stage, PetscBool *is)
   for (PetscInt i = 0; i < s->nnode_owned; i++) o->inertia[i] = stage->shift_a * s->node_mass[i];
   for (PetscInt r = 0; r < s->nregion; r++) {
     const SbRegion *region = &s->region[r];
+    const SbMaterial m = region->material;
     const PetscReal factor = stage->shift_k + stage->shift_v * region->beta;
-    const PetscReal damping =
-      stage->shift_v * region->alpha * region->material->density * region->element->ops.mass_lumped;
+    const PetscReal damping = stage->shift_v * region->alpha * m->density * region->element->ops.mass_lumped;
 
-    o->lambda[r] = factor * region->material->lambda;
-    o->mu[r] = factor * region->material->mu;
-    stiffest = PetscMax(stiffest, factor * region->material->E);
+    o->lambda[r] = factor * m->ops.volumetric_modulus(m);
+    o->mu[r] = factor * m->ops.shear_modulus(m);
+    stiffest = PetscMax(stiffest, factor * m->E);
     for (PetscInt b = region->bstart; damping != 0. && b < region->bend; b++) {
       for (PetscInt l = 0; l < 4 * SB_BATCH; l++) {
         const PetscInt node = s->batch_node[4 * SB_BATCH * b + l];

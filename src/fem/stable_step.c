@@ -25,7 +25,8 @@ static void multiply_stiffness(SbSpace s, const PetscReal x[], PetscReal f[])
 {
   for (PetscInt r = 0; r < s->nregion; r++) {
     const SbRegion *region = &s->region[r];
-    const PetscReal mu = region->material->mu, lambda = region->material->lambda;
+    const SbMaterial m = region->material;
+    const PetscReal mu = m->ops.shear_modulus(m), lambda = m->ops.volumetric_modulus(m);
 
     for (PetscInt b = region->bstart; b < region->bend; b++) {
       SbLane u[12], H[9], P[9], fe[12];

@@ -65,6 +65,8 @@ typedef struct {
   PetscReal stiffness; /* on dP/dF */
   PetscReal damping;   /* on Hooke's tensor turned by R (sbmaterial.h, SbMaterialDampingStress) */
   PetscReal inertia;   /* on the consistent mass */
+  PetscReal lambda;    /* volumetric modulus of the law, Pa */
+  PetscReal mu;        /* shear modulus of the law, Pa */
 } Factors;
 
 static void add_consistent_mass(const SbElementOps *e, PetscReal inertia, const SbLane V, SbLane K[10][9])
@@ -109,7 +111,7 @@ static void general_blocks(const SbMaterial m, const SbLane *g, const SbLane V, 
   if (split) {
     m->ops.volumetric(m, F, split->D);
     split->factor = x->stiffness;
-    remove_volumetric(m->lambda, (const SbLane *)split->D, C);
+    remove_volumetric(x->lambda, (const SbLane *)split->D, C);
   }
   scaled_volumes(V, x->stiffness, W);
   SbCellBlocksGeneral(g, W, (const SbLane *)C, K);
@@ -118,7 +120,7 @@ static void general_blocks(const SbMaterial m, const SbLane *g, const SbLane V, 
 
     SbPolar(F, R);
     scaled_volumes(V, x->damping, W);
-    SbCellBlocksIsotropic(g, W, m->lambda, m->mu, (const SbLane *)R, D);
+    SbCellBlocksIsotropic(g, W, x->lambda, x->mu, (const SbLane *)R, D);
     for (int k = 0; k < 90; k++) {
       for (int l = 0; l < SB_BATCH; l++) K[k / 9][k % 9][l] += D[k / 9][k % 9][l];
     }
@@ -129,17 +131,17 @@ static void general_blocks(const SbMaterial m, const SbLane *g, const SbLane V, 
 static void spin_blocks(const SbMaterial m, const SbLane *g, const SbLane V, const Factors *x,
                         const SbLane F[9], Split *split, SbLane K[10][9])
 {
-  const PetscReal both = x->stiffness + x->damping, lambda = split ? 0. : m->lambda;
+  const PetscReal both = x->stiffness + x->damping, lambda = split ? 0. : x->lambda;
   SbLane R[9], T[9], W;
 
   m->ops.spin(m, F, R, T);
   for (int k = 0; x->damping != 0. && k < 9; k++) {
-    const PetscReal rest = k % 4 ? 0. : x->damping * m->mu;
+    const PetscReal rest = k % 4 ? 0. : x->damping * x->mu;
 
     for (int l = 0; l < SB_BATCH; l++) T[k][l] = (x->stiffness * T[k][l] - rest) / both;
   }
   scaled_volumes(V, both, W);
-  SbCellBlocksSpin(g, W, lambda, m->mu, (const SbLane *)R, (const SbLane *)T, K);
+  SbCellBlocksSpin(g, W, lambda, x->mu, (const SbLane *)R, (const SbLane *)T, K);
   if (split) {
     memcpy(split->D, R, sizeof(R));
     split->factor = both;
@@ -154,7 +156,7 @@ static void isotropic_blocks(const SbMaterial m, const SbLane *g, const SbLane V
   SbLane W;
 
   scaled_volumes(V, both, W);
-  SbCellBlocksIsotropic(g, W, split ? 0. : m->lambda, m->mu, m->linear ? NULL : R, K);
+  SbCellBlocksIsotropic(g, W, split ? 0. : x->lambda, x->mu, m->linear ? NULL : R, K);
   if (split) {
     memcpy(split->D, R, sizeof(split->D));
     split->factor = both;
@@ -183,15 +185,15 @@ static void batch_blocks(SbSpace s, const SbRegion *region, const PetscReal disp
 }
 
 /* b_a = V D grad psi_a and the moduli of a batch. */
-static void keep_volumetric(SbSpace s, const SbMaterial m, PetscInt batch, const Split *split,
+static void keep_volumetric(SbSpace s, const Factors *x, PetscInt batch, const Split *split,
                             const SbVolumetric *out)
 {
   const SbLane *g = s->batch_g + 9 * batch;
   SbLane *b = out->b + 12 * batch;
 
   for (int l = 0; l < SB_BATCH; l++) {
-    out->modulus[batch][l] = split ? split->factor * m->lambda : 0.;
-    out->shear[batch][l] = split ? split->factor * m->mu : 0.;
+    out->modulus[batch][l] = split ? split->factor * x->lambda : 0.;
+    out->shear[batch][l] = split ? split->factor * x->mu : 0.;
     for (int i = 0; i < 3; i++) {
       b[i][l] = 0.;
       for (int a = 0; a < 3; a++) {
@@ -251,16 +253,21 @@ static void fill_region(SbSpace s, PetscInt r, const SbStage *stage, PetscInt nf
                         const SbVolumetric *out)
 {
   const SbRegion *region = &s->region[r];
-  const PetscReal inertia = region->material->density * (stage->shift_a + stage->shift_v * region->alpha);
-  const Factors factors = {stage->shift_k, stage->shift_v * region->beta, s->consistent_mass ? inertia : 0.};
+  const SbMaterial m = region->material;
+  const PetscReal inertia = m->density * (stage->shift_a + stage->shift_v * region->alpha);
+  const Factors factors = {.stiffness = stage->shift_k,
+                           .damping = stage->shift_v * region->beta,
+                           .inertia = s->consistent_mass ? inertia : 0.,
+                           .lambda = m->ops.volumetric_modulus(m),
+                           .mu = m->ops.shear_modulus(m)};
   const PetscBool faces = (PetscBool)!region->element->nodes_per[0];
-  Split kept, *split = out && faces && region->material->lambda > 0. ? &kept : NULL;
+  Split kept, *split = out && faces && factors.lambda > 0. ? &kept : NULL;
 
   for (PetscInt b = region->bstart; b < region->bend; b++) {
     SbLane K[10][9] __attribute__((aligned(64)));
 
     batch_blocks(s, region, stage->u, &factors, b, split, K);
-    if (out) keep_volumetric(s, region->material, b, split, out);
+    if (out) keep_volumetric(s, &factors, b, split, out);
     for (PetscInt n = nfill - 1; n > 0; n--)
       fill_other(&fill[n], r, b, faces, factors.inertia, (const SbLane(*)[9])K);
     fill_batch(&fill[0], r, b, factors.inertia, K);

@@ -140,15 +140,13 @@ static PetscReal cell_volume(SbMesh mesh, PetscInt c)
 }
 
 /*
-  Adds the energies of an owned cell, and gives off_T. The integral over a tet of the square of what is linear there with the values d_a at the
+  Adds the energies of an owned cell whose law has the moduli G and K, and gives off_T. The integral over a tet of the square of what is linear there with the values d_a at the
   vertices is V / 20 (sum |d_a|^2 + |sum d_a|^2).
 */
-static PetscReal add_cell(SbSpaceEstimate est, PetscInt c, PetscReal sum[NSUM])
+static PetscReal add_cell(SbSpaceEstimate est, PetscInt c, PetscReal G, PetscReal K, PetscReal sum[NSUM])
 {
-  SbMesh mesh = est->model->mesh;
-  const struct _p_SbMaterial *m = est->model->space->material[mesh->cell_material[c]];
-  const PetscReal *R = est->R ? est->R + 9 * c : NULL, V = cell_volume(mesh, c);
-  const PetscReal shear_part = V / (4. * m->mu), pressure_part = V / (18. * m->lambda + 12. * m->mu);
+  const PetscReal *R = est->R ? est->R + 9 * c : NULL, V = cell_volume(est->model->mesh, c);
+  const PetscReal shear_part = V / (4. * G), pressure_part = V / (18. * K);
   PetscReal s[6], star[5][6] = {{0.}}, off[5][6] = {{0.}}, squares[3] = {0., 0., 0.};
 
   turn(R, est->P + 9 * c, s);
@@ -222,16 +220,27 @@ PetscErrorCode SbSpaceEstimateCompute(SbSpaceEstimate est, PetscReal t, Vec U, V
 {
   SbModel model = est->model;
   const PetscReal *u;
-  PetscReal(*sum)[NSUM];
+  PetscReal(*sum)[NSUM], *G, *K;
 
   PetscFunctionBeginUser;
   PetscCall(SbSpaceGetLocalRead(model->space, U, &u));
   PetscCall(SbSpaceCellPiola(model->space, u, est->P, est->R, est->psi));
   PetscCall(SbSpaceRestoreLocalRead(model->space, U, &u));
   PetscCall(SbRecoveryApply(est->recovery, est->P));
+
+  /* sums over the cells of each body, with the moduli of each law asked for once */
   PetscCall(PetscCalloc1(model->nbody, &sum));
-  for (PetscInt c = 0; c < model->mesh->ncell_owned; c++)
-    est->cell2[c] = add_cell(est, c, sum[model->mesh->cell_body[c]]);
+  PetscCall(PetscMalloc2(model->nmaterial, &G, model->nmaterial, &K));
+  for (PetscInt k = 0; k < model->nmaterial; k++) {
+    G[k] = model->material[k]->ops.shear_modulus(model->material[k]);
+    K[k] = model->material[k]->ops.bulk_modulus(model->material[k]);
+  }
+  for (PetscInt c = 0; c < model->mesh->ncell_owned; c++) {
+    const PetscInt k = model->mesh->cell_material[c];
+
+    est->cell2[c] = add_cell(est, c, G[k], K[k], sum[model->mesh->cell_body[c]]);
+  }
+  PetscCall(PetscFree2(G, K));
   if (est->residual) PetscCall(add_reactions(est, t, U, V, A, sum));
   PetscCallMPI(
     MPI_Allreduce(MPI_IN_PLACE, sum, (PetscMPIInt)(NSUM * model->nbody), MPIU_REAL, MPI_SUM, model->comm));

@@ -21,7 +21,7 @@
 
 SB_KERNEL static void energy_corotated(const struct _p_SbMaterial *m, const SbLane F[restrict 9], SbLane psi)
 {
-  const PetscReal mu = m->mu, lambda = m->lambda;
+  const PetscReal mu = sb_lame(m)->mu, lambda = sb_lame(m)->lambda;
   SbLane R[9];
 
   SbPolar(F, R);
@@ -39,7 +39,7 @@ SB_KERNEL static void energy_corotated(const struct _p_SbMaterial *m, const SbLa
 SB_KERNEL static void stress_corotated(const struct _p_SbMaterial *m, const SbLane F[restrict 9],
                                        SbLane P[restrict 9])
 {
-  const PetscReal mu = m->mu, lambda = m->lambda;
+  const PetscReal mu = sb_lame(m)->mu, lambda = sb_lame(m)->lambda;
   SbLane R[9];
 
   SbPolar(F, R);
@@ -63,7 +63,7 @@ SB_KERNEL static void pressure_corotated(const struct _p_SbMaterial *m, const Sb
 
     SbLaneGet(9, F, l, f);
     SbLaneGet(9, R, l, r);
-    p[l] = -m->lambda * (SbDot9(r, f) - 3);
+    p[l] = -sb_lame(m)->lambda * (SbDot9(r, f) - 3);
   }
 }
 
@@ -77,7 +77,7 @@ static void frame_corotated(const struct _p_SbMaterial *m, const SbLane F[9], Sb
 SB_KERNEL static void stretch(const struct _p_SbMaterial *m, const SbLane F[restrict 9],
                               const SbLane R[restrict 9], SbLane S[restrict 6], SbLane kappa)
 {
-  const PetscReal mu = m->mu, lambda = m->lambda;
+  const PetscReal mu = sb_lame(m)->mu, lambda = sb_lame(m)->lambda;
 
   for (int l = 0; l < SB_BATCH; l++) {
     PetscReal f[9], r[9], s[9];
@@ -147,7 +147,7 @@ SB_KERNEL static void twist_spd(PetscReal mu, const SbLane S[restrict 6], const 
 SB_KERNEL static void add_modes(const struct _p_SbMaterial *m, const SbLane R[restrict 9],
                                 const SbLane W[restrict 9], SbLane C[restrict 81])
 {
-  const PetscReal mu = m->mu, lambda = m->lambda;
+  const PetscReal mu = sb_lame(m)->mu, lambda = sb_lame(m)->lambda;
   SbLane ZW[27];
 
   for (int l = 0; l < SB_BATCH; l++) {
@@ -184,7 +184,7 @@ static void spin_corotated(const struct _p_SbMaterial *m, const SbLane F[9], SbL
   SbPolar(F, R);
   stretch(m, F, (const SbLane *)R, S, kappa);
   if (m->tangent == SB_TANGENT_EXACT_SPD)
-    twist_spd(m->mu, (const SbLane *)S, kappa, W);
+    twist_spd(sb_lame(m)->mu, (const SbLane *)S, kappa, W);
   else
     twist_exact((const SbLane *)S, kappa, W);
 }
@@ -220,6 +220,7 @@ static PetscErrorCode setfromoptions_corotated(SbMaterial m, const SbScope *scop
 PetscErrorCode SbMaterialCreate_Corotated(SbMaterial m)
 {
   PetscFunctionBeginUser;
+  PetscCall(SbMaterialSetHooke(m));
   m->ops.setfromoptions = setfromoptions_corotated;
   m->ops.settangent = settangent_corotated;
   m->ops.energy = energy_corotated;

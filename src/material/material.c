@@ -1,27 +1,11 @@
 /*
-  Creation of material laws by name, their options, and what follows from the tables of all laws alike.
+  Creation of material laws by name, and what several laws share: Hooke's stiffness at rest, two exact tangents, damping.
 
   Lame parameters: mu = E / (2 (1 + nu)), lambda = E nu / ((1 + nu) (1 - 2 nu)).
 */
 #include "material_impl.h"
 
 PetscFunctionList SbMaterialList = NULL;
-
-static const SbOption body_rows[] = {
-  {"young", SB_OPTION_REAL, 1, "Pa", NULL, "(0, inf)", "Young's modulus."},
-  {"poisson", SB_OPTION_REAL, 1, "", NULL, "(-1, 0.5)",
-   "Poisson's ratio; soft tissue is near 0.5, where p1 elements lock."},
-  {"density", SB_OPTION_REAL, 1, "kg/m^3", "1000", "(0, inf)", "Mass per rest volume."},
-};
-static const SbOption corotated_rows[] = {
-  {"tangent", SB_OPTION_CHOICE, 1, "", "auto", "auto|warped|exact|exact_spd",
-   "Stiffness: Hooke's turned with the cell (positive definite), the exact derivative, or that without "
-   "negative eigenvalues."},
-};
-static const SbOption exact_rows[] = {
-  {"tangent", SB_OPTION_CHOICE, 1, "", "auto", "auto|exact|exact_spd",
-   "Stiffness: the exact derivative of the force, or that without negative eigenvalues (for CG)."},
-};
 
 static PetscErrorCode destroy_list(void)
 {
@@ -38,21 +22,6 @@ PetscErrorCode SbMaterialRegister(const char *law, PetscErrorCode (*create)(SbMa
   PetscCall(PetscFunctionListAdd(&SbMaterialList, law, create));
   if (nrows) PetscCall(SbOptionsRegister("body", law, nrows, rows));
   if (nrows) PetscCall(SbOptionsRegister("inclusion", law, nrows, rows));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode SbMaterialRegisterAll(void)
-{
-  PetscFunctionBeginUser;
-  PetscCall(SbOptionsRegister("body", "", PETSC_STATIC_ARRAY_LENGTH(body_rows), body_rows));
-  PetscCall(SbOptionsRegister("inclusion", "", PETSC_STATIC_ARRAY_LENGTH(body_rows), body_rows));
-  PetscCall(SbMaterialRegister("linear", SbMaterialCreate_Linear, 0, NULL));
-  PetscCall(SbMaterialRegister("corotated", SbMaterialCreate_Corotated,
-                               PETSC_STATIC_ARRAY_LENGTH(corotated_rows), corotated_rows));
-  PetscCall(
-    SbMaterialRegister("stvk", SbMaterialCreate_StVK, PETSC_STATIC_ARRAY_LENGTH(exact_rows), exact_rows));
-  PetscCall(SbMaterialRegister("neohookean", SbMaterialCreate_NeoHookean,
-                               PETSC_STATIC_ARRAY_LENGTH(exact_rows), exact_rows));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -96,8 +65,6 @@ static PetscErrorCode create_law(const char *law, PetscErrorCode (*create)(SbMat
   m->E = E;
   m->nu = nu;
   m->density = density;
-  m->mu = E / (2 * (1 + nu));
-  m->lambda = E * nu / ((1 + nu) * (1 - 2 * nu));
   PetscCall((*create)(m));
   *material = m;
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -174,9 +141,48 @@ PetscErrorCode SbMaterialSetFromOptions_Exact(SbMaterial m, const SbScope *scope
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscReal SbMaterialWaveSpeed(SbMaterial m)
+static PetscReal shear_modulus_hooke(const struct _p_SbMaterial *m)
 {
-  return sqrt((m->lambda + 2 * m->mu) / m->density);
+  return sb_lame(m)->mu;
+}
+
+static PetscReal bulk_modulus_hooke(const struct _p_SbMaterial *m)
+{
+  return sb_lame(m)->lambda + 2 * sb_lame(m)->mu / 3;
+}
+
+static PetscReal volumetric_modulus_hooke(const struct _p_SbMaterial *m)
+{
+  return sb_lame(m)->lambda;
+}
+
+static PetscReal wave_speed_hooke(const struct _p_SbMaterial *m)
+{
+  return sqrt((sb_lame(m)->lambda + 2 * sb_lame(m)->mu) / m->density);
+}
+
+static PetscErrorCode destroy_hooke(SbMaterial m)
+{
+  PetscFunctionBeginUser;
+  PetscCall(PetscFree(m->data));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbMaterialSetHooke(SbMaterial m)
+{
+  SbLame *lame;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscNew(&lame));
+  lame->mu = m->E / (2 * (1 + m->nu));
+  lame->lambda = m->E * m->nu / ((1 + m->nu) * (1 - 2 * m->nu));
+  m->data = lame;
+  m->ops.shear_modulus = shear_modulus_hooke;
+  m->ops.bulk_modulus = bulk_modulus_hooke;
+  m->ops.volumetric_modulus = volumetric_modulus_hooke;
+  m->ops.wave_speed = wave_speed_hooke;
+  m->ops.destroy = destroy_hooke;
+  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* dP = mu (H + R H^T R) + lambda (R : H) R */
@@ -204,5 +210,5 @@ void SbMaterialDampingStress(const struct _p_SbMaterial *m, const SbLane F[9], c
     m->ops.frame(m, F, R);
   else
     SbPolar(F, R);
-  turned_hooke(m->lambda, m->mu, (const SbLane *)R, H, dP);
+  turned_hooke(m->ops.volumetric_modulus(m), m->ops.shear_modulus(m), (const SbLane *)R, H, dP);
 }

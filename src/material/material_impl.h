@@ -9,6 +9,24 @@ PetscErrorCode SbMaterialCreate_Corotated(SbMaterial m);
 PetscErrorCode SbMaterialCreate_StVK(SbMaterial m);
 PetscErrorCode SbMaterialCreate_NeoHookean(SbMaterial m);
 
+/* Lame parameters, Pa. */
+typedef struct {
+  PetscReal lambda, mu;
+} SbLame;
+
+/*
+  SbMaterialSetHooke - makes m->data an SbLame from E and nu, and the law answer for its stiffness with it.
+
+  Not collective. Sets shear_modulus, bulk_modulus, volumetric_modulus, wave_speed and destroy of the table. For laws whose tangent
+  at rest is Hooke's tensor; another law sets its own.
+*/
+PetscErrorCode SbMaterialSetHooke(SbMaterial m);
+/* Of a law that called SbMaterialSetHooke(). */
+SB_INLINE const SbLame *sb_lame(const struct _p_SbMaterial *m)
+{
+  return (const SbLame *)m->data;
+}
+
 /* Options of laws whose tangents are exact and exact_spd: reads `tangent`. And the check behind it. */
 PetscErrorCode SbMaterialSetFromOptions_Exact(SbMaterial m, const SbScope *scope);
 PetscErrorCode SbMaterialSetTangent_Exact(SbMaterial m, SbTangentKind kind);

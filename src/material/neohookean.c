@@ -25,7 +25,7 @@
 */
 SB_KERNEL static void energy_neohookean(const struct _p_SbMaterial *m, const SbLane F[restrict 9], SbLane psi)
 {
-  const PetscReal a = 4 * m->mu / 3, b = m->lambda + 5 * m->mu / 6;
+  const PetscReal a = 4 * sb_lame(m)->mu / 3, b = sb_lame(m)->lambda + 5 * sb_lame(m)->mu / 6;
   SbLane x;
 
   for (int l = 0; l < SB_BATCH; l++) {
@@ -47,7 +47,7 @@ SB_KERNEL static void energy_neohookean(const struct _p_SbMaterial *m, const SbL
 SB_KERNEL static void stress_neohookean(const struct _p_SbMaterial *m, const SbLane F[restrict 9],
                                         SbLane P[restrict 9])
 {
-  const PetscReal a = 4 * m->mu / 3, b = m->lambda + 5 * m->mu / 6;
+  const PetscReal a = 4 * sb_lame(m)->mu / 3, b = sb_lame(m)->lambda + 5 * sb_lame(m)->mu / 6;
 
   for (int l = 0; l < SB_BATCH; l++) {
     PetscReal f[9], c[9];
@@ -70,14 +70,14 @@ SB_KERNEL static void pressure_neohookean(const struct _p_SbMaterial *m, const S
     h[4] -= 1;
     h[8] -= 1;
     SbMatCofactor(h, c);
-    p[l] = -m->lambda * (h[0] + h[4] + h[8] + c[0] + c[4] + c[8] + SbDot3(h, c));
+    p[l] = -sb_lame(m)->lambda * (h[0] + h[4] + h[8] + c[0] + c[4] + c[8] + SbDot3(h, c));
   }
 }
 
 SB_KERNEL static void tangent_exact(const struct _p_SbMaterial *m, const SbLane F[restrict 9],
                                     SbLane C[restrict 81])
 {
-  const PetscReal a = 4 * m->mu / 3, b = m->lambda + 5 * m->mu / 6;
+  const PetscReal a = 4 * sb_lame(m)->mu / 3, b = sb_lame(m)->lambda + 5 * sb_lame(m)->mu / 6;
   SbLane cof[9], pF[9], shear, stretch;
 
   for (int l = 0; l < SB_BATCH; l++) {
@@ -111,7 +111,7 @@ SB_KERNEL static void tangent_exact(const struct _p_SbMaterial *m, const SbLane 
 SB_KERNEL static void tangent_spd(const struct _p_SbMaterial *m, const SbLane F[restrict 9],
                                   SbLane C[restrict 81])
 {
-  const PetscReal a = 4 * m->mu / 3, b = m->lambda + 5 * m->mu / 6;
+  const PetscReal a = 4 * sb_lame(m)->mu / 3, b = sb_lame(m)->lambda + 5 * sb_lame(m)->mu / 6;
   SbLane U[9], V[9], s[3], hessian[6], flip[3], twist[3];
 
   SbStretches(F, U, s, V);
@@ -158,6 +158,7 @@ SB_KERNEL static void volumetric_neohookean(const struct _p_SbMaterial *m, const
 PetscErrorCode SbMaterialCreate_NeoHookean(SbMaterial m)
 {
   PetscFunctionBeginUser;
+  PetscCall(SbMaterialSetHooke(m));
   m->ops.setfromoptions = SbMaterialSetFromOptions_Exact;
   m->ops.settangent = SbMaterialSetTangent_Exact;
   m->ops.energy = energy_neohookean;

@@ -243,8 +243,11 @@ static PetscErrorCode set_up_snes(SbRun run)
   PetscFunctionBeginUser;
   /* rounding of the internal forces: below 1e-13 of (stress modulus) x (area of the body) no residual is meaningful; near
      nu = 1/2 it is the pressure that rounds, lambda times the last digit of the change of volume */
-  for (PetscInt b = 0; b < m->nbody; b++)
-    force += (m->material[b]->E + 0.01 * m->material[b]->lambda) * PetscPowReal(m->body[b].volume, 2. / 3.);
+  for (PetscInt b = 0; b < m->nbody; b++) {
+    const SbMaterial law = m->material[b];
+
+    force += (law->E + 0.01 * law->ops.volumetric_modulus(law)) * PetscPowReal(m->body[b].volume, 2. / 3.);
+  }
   /* a line search of PETSc's comes with PETSc's loop, and TSALPHA2 has stages of its own */
   PetscCall(PetscOptionsHasName(NULL, NULL, "-snes_linesearch_type", &asked));
   PetscCall(SNESSetType(run->snes, m->linear                                ? SNESKSPONLY

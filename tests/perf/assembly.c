@@ -52,7 +52,8 @@ static void blocks(Bench *w, const SbRegion *region, PetscInt b, SbLane K[10][9]
   }
   SbCellGradient(w->s->batch_g + 9 * b, (const SbLane *)u, F);
   m->ops.frame(m, (const SbLane *)F, R);
-  SbCellBlocksIsotropic(w->s->batch_g + 9 * b, w->s->batch_V[b], m->lambda, m->mu, (const SbLane *)R, K);
+  SbCellBlocksIsotropic(w->s->batch_g + 9 * b, w->s->batch_V[b], m->ops.volumetric_modulus(m),
+                        m->ops.shear_modulus(m), (const SbLane *)R, K);
 }
 
 static PetscErrorCode bare_kernel(Bench *w)

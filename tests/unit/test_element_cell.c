@@ -181,7 +181,7 @@ static PetscErrorCode test_blocks(SbElement e, SbMaterial m, SbTangentKind kind)
     SbCellGradient((const SbLane *)c.g, (const SbLane *)u, F);
     m->ops.tangent(m, (const SbLane *)F, C);
     SbCellBlocksGeneral((const SbLane *)c.g, c.V, (const SbLane *)C, K);
-    check_block_sums((const SbLane(*)[9])K, (m->E + m->lambda) * size);
+    check_block_sums((const SbLane(*)[9])K, (m->E + m->ops.volumetric_modulus(m)) * size);
     for (int column = 0; kind == SB_TANGENT_EXACT && column < 12; column++) {
       for (int l = 0; l < SB_BATCH; l++) u[column][l] += h;
       force_of(m, &c, (const SbLane *)u, plus);
@@ -199,21 +199,23 @@ static PetscErrorCode test_blocks(SbElement e, SbMaterial m, SbTangentKind kind)
       SbLane R[9], W[9];
 
       m->ops.spin(m, (const SbLane *)F, R, W);
-      SbCellBlocksSpin((const SbLane *)c.g, c.V, m->lambda, m->mu, (const SbLane *)R, (const SbLane *)W, J);
-      check_block_sums((const SbLane(*)[9])J, (m->E + m->lambda) * size);
+      SbCellBlocksSpin((const SbLane *)c.g, c.V, m->ops.volumetric_modulus(m), m->ops.shear_modulus(m),
+                       (const SbLane *)R, (const SbLane *)W, J);
+      check_block_sums((const SbLane(*)[9])J, (m->E + m->ops.volumetric_modulus(m)) * size);
       for (int p = 0; p < 10; p++) {
         SB_CHECK(lane_difference(9, (const SbLane *)J[p], (const SbLane *)K[p]) <
-                   1e-13 * (m->E + m->lambda) * size,
+                   1e-13 * (m->E + m->ops.volumetric_modulus(m)) * size,
                  "block %d from the spin is %g from the general one", p,
                  lane_difference(9, (const SbLane *)J[p], (const SbLane *)K[p]));
       }
     }
     if (m->linear) {
-      SbCellBlocksIsotropic((const SbLane *)c.g, c.V, m->lambda, m->mu, NULL, J);
-      check_block_sums((const SbLane(*)[9])J, (m->E + m->lambda) * size);
+      SbCellBlocksIsotropic((const SbLane *)c.g, c.V, m->ops.volumetric_modulus(m), m->ops.shear_modulus(m),
+                            NULL, J);
+      check_block_sums((const SbLane(*)[9])J, (m->E + m->ops.volumetric_modulus(m)) * size);
       for (int p = 0; p < 10; p++) {
         SB_CHECK(lane_difference(9, (const SbLane *)J[p], (const SbLane *)K[p]) <
-                   1e-14 * (m->E + m->lambda) * size,
+                   1e-14 * (m->E + m->ops.volumetric_modulus(m)) * size,
                  "isotropic block %d is not the general one", p);
       }
     }
@@ -239,17 +241,19 @@ static PetscErrorCode test_warped(SbElement e, SbMaterial m)
     }
     SbCellGradient((const SbLane *)c.g, (const SbLane *)u, F);
     m->ops.frame(m, (const SbLane *)F, R);
-    SbCellBlocksIsotropic((const SbLane *)c.g, c.V, m->lambda, m->mu, (const SbLane *)R, K);
+    SbCellBlocksIsotropic((const SbLane *)c.g, c.V, m->ops.volumetric_modulus(m), m->ops.shear_modulus(m),
+                          (const SbLane *)R, K);
     for (int k = 0; k < 9; k++) {
-      for (int l = 0; l < SB_BATCH; l++) W[k][l] = k % 4 == 0 ? -m->mu : 0;
+      for (int l = 0; l < SB_BATCH; l++) W[k][l] = k % 4 == 0 ? -m->ops.shear_modulus(m) : 0;
     }
-    SbCellBlocksSpin((const SbLane *)c.g, c.V, m->lambda, m->mu, (const SbLane *)R, (const SbLane *)W, J);
+    SbCellBlocksSpin((const SbLane *)c.g, c.V, m->ops.volumetric_modulus(m), m->ops.shear_modulus(m),
+                     (const SbLane *)R, (const SbLane *)W, J);
     for (int p = 0; p < 10; p++) {
       SB_CHECK(lane_difference(9, (const SbLane *)J[p], (const SbLane *)K[p]) <
-                 1e-14 * (m->E + m->lambda) * size,
+                 1e-14 * (m->E + m->ops.volumetric_modulus(m)) * size,
                "block %d with W = -mu I is not Hooke's", p);
     }
-    check_block_sums((const SbLane(*)[9])K, (m->E + m->lambda) * size);
+    check_block_sums((const SbLane(*)[9])K, (m->E + m->ops.volumetric_modulus(m)) * size);
     SbCellGradientRate((const SbLane *)c.g, (const SbLane *)v, H);
     SbMaterialDampingStress(m, (const SbLane *)F, (const SbLane *)H, dP);
     SbCellForce((const SbLane *)c.g, c.V, (const SbLane *)dP, f);
@@ -261,7 +265,7 @@ static PetscErrorCode test_warped(SbElement e, SbMaterial m)
 
         for (int column = 0; column < 12; column++)
           sum += entry((const SbLane(*)[9])K, row, column, l) * v[column][l];
-        SB_CHECK_NEAR(sum, f[row][l], 1e-13 * (m->E + m->lambda) * size,
+        SB_CHECK_NEAR(sum, f[row][l], 1e-13 * (m->E + m->ops.volumetric_modulus(m)) * size,
                       "warped K v against the damping stress");
         power += sum * v[row][l];
       }
@@ -340,10 +344,12 @@ static void test_patch(SbElement e, SbMaterial m)
   stress_of(m, F, P);
   SB_CHECK_NEAR(volume, 1, 1e-14, "volume of the patch");
   for (int i = 0; i < 3; i++) {
-    SB_CHECK_NEAR(f[8][i], 0, 1e-13 * (m->E + m->lambda), "force on the inner point of the patch");
+    SB_CHECK_NEAR(f[8][i], 0, 1e-13 * (m->E + m->ops.volumetric_modulus(m)),
+                  "force on the inner point of the patch");
     for (int j = 0; j < 3; j++) {
       for (int k = 0; k < 9; k++) virial[3 * i + j] += f[k][i] * X[k][j];
-      SB_CHECK_NEAR(virial[3 * i + j], P[3 * i + j], 1e-13 * (m->E + m->lambda), "virial of the patch");
+      SB_CHECK_NEAR(virial[3 * i + j], P[3 * i + j], 1e-13 * (m->E + m->ops.volumetric_modulus(m)),
+                    "virial of the patch");
     }
   }
 }

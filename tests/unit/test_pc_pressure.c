@@ -25,7 +25,7 @@ static PetscReal volume_measure(SbMaterial m, const PetscReal f[9], PetscReal sc
     for (int l = 0; l < SB_BATCH; l++) F[k][l] = scale * f[k];
   }
   m->ops.pressure(m, (const SbLane *)F, p);
-  return -p[0] / m->lambda;
+  return -p[0] / m->ops.volumetric_modulus(m);
 }
 
 /* dP/dF - lambda D D^T at a state whose theta vanishes, over mu. */
@@ -49,7 +49,8 @@ static PetscErrorCode rest_of_tangent(const char *law, PetscReal nu, const Petsc
   }
   m->ops.tangent(m, (const SbLane *)F, C);
   m->ops.volumetric(m, (const SbLane *)F, D);
-  for (int k = 0; k < 81; k++) rest[k] = (C[k][1] - m->lambda * D[k / 9][1] * D[k % 9][1]) / mu;
+  for (int k = 0; k < 81; k++)
+    rest[k] = (C[k][1] - m->ops.volumetric_modulus(m) * D[k / 9][1] * D[k % 9][1]) / mu;
   PetscCall(SbMaterialDestroy(&m));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -167,6 +167,7 @@ static PetscErrorCode pressed(const char *element, const char *law, PetscReal ra
 {
   TestScene t;
   PetscInt n;
+  SbMaterial m;
   PetscReal *w, eps;
   PetscScalar *u;
   char text[VERIFY_TEXT];
@@ -179,8 +180,8 @@ static PetscErrorCode pressed(const char *element, const char *law, PetscReal ra
     "-effect_hold_type fixed -effect_hold_on boundary",
     element, law));
   PetscCall(test_scene_open(text, &t));
-  eps =
-    ratio * t.model->material[0]->mu / (3. * t.model->material[0]->lambda + 2. * t.model->material[0]->mu);
+  m = t.model->material[0];
+  eps = ratio * m->ops.shear_modulus(m) / (3. * m->ops.bulk_modulus(m));
   PetscCall(VecGetArray(t.run->U, &u));
   for (PetscInt i = 0; i < 3 * t.model->space->nnode_owned; i++) u[i] = -eps * t.model->space->node_x[i];
   PetscCall(VecRestoreArray(t.run->U, &u));

@@ -65,7 +65,8 @@ static PetscReal energy(SbMaterial m, const PetscReal R[9], const PetscReal T[9]
     memcpy(s, T, sizeof(s));
   for (int k = 0; k < 9; k++) square += PetscSqr(0.5 * (s[k] + s[3 * (k % 3) + k / 3]));
   trace = s[0] + s[4] + s[8];
-  return (square - trace * trace / 3.) / (4. * m->mu) + trace * trace / (18. * m->lambda + 12. * m->mu);
+  return (square - trace * trace / 3.) / (4. * m->ops.shear_modulus(m)) +
+         trace * trace / (18. * m->ops.bulk_modulus(m));
 }
 
 /* Stresses of a solved run. */
@@ -193,6 +194,7 @@ static PetscErrorCode jump_estimate(SbModel m, Vec U, PetscReal *eta2)
   *eta2 = 0.;
   for (PetscInt i = 0; i < 4 * mesh->ncell; i++) {
     const PetscInt c = i / 4, other = neighbour[i], *v = mesh->cell + 4 * c;
+    const SbMaterial law = m->material[s.material[c]];
     const PetscReal *x[3];
     PetscReal p[3], q[3], N[3], jump = 0.;
 
@@ -205,7 +207,7 @@ static PetscErrorCode jump_estimate(SbModel m, Vec U, PetscReal *eta2)
     SbCross(p, q, N);
     for (int k = 0; k < 3; k++)
       jump += PetscSqr(SbDot3(s.P + 9 * c + 3 * k, N) - SbDot3(s.P + 9 * other + 3 * k, N));
-    *eta2 += 0.5 * (s.V[c] + s.V[other]) * jump / SbDot3(N, N) / m->material[s.material[c]]->mu;
+    *eta2 += 0.5 * (s.V[c] + s.V[other]) * jump / SbDot3(N, N) / law->ops.shear_modulus(law);
   }
   PetscCall(PetscFree(neighbour));
   PetscCall(stress_free(&s));

@@ -1,0 +1,35 @@
+/*
+  The laws of the program and the options that they read.
+*/
+#include "material_impl.h"
+
+static const SbOption body_rows[] = {
+  {"young", SB_OPTION_REAL, 1, "Pa", NULL, "(0, inf)", "Young's modulus."},
+  {"poisson", SB_OPTION_REAL, 1, "", NULL, "(-1, 0.5)",
+   "Poisson's ratio; soft tissue is near 0.5, where p1 elements lock."},
+  {"density", SB_OPTION_REAL, 1, "kg/m^3", "1000", "(0, inf)", "Mass per rest volume."},
+};
+static const SbOption corotated_rows[] = {
+  {"tangent", SB_OPTION_CHOICE, 1, "", "auto", "auto|warped|exact|exact_spd",
+   "Stiffness: Hooke's turned with the cell (positive definite), the exact derivative, or that without "
+   "negative eigenvalues."},
+};
+static const SbOption exact_rows[] = {
+  {"tangent", SB_OPTION_CHOICE, 1, "", "auto", "auto|exact|exact_spd",
+   "Stiffness: the exact derivative of the force, or that without negative eigenvalues (for CG)."},
+};
+
+PetscErrorCode SbMaterialRegisterAll(void)
+{
+  PetscFunctionBeginUser;
+  PetscCall(SbOptionsRegister("body", "", PETSC_STATIC_ARRAY_LENGTH(body_rows), body_rows));
+  PetscCall(SbOptionsRegister("inclusion", "", PETSC_STATIC_ARRAY_LENGTH(body_rows), body_rows));
+  PetscCall(SbMaterialRegister("linear", SbMaterialCreate_Linear, 0, NULL));
+  PetscCall(SbMaterialRegister("corotated", SbMaterialCreate_Corotated,
+                               PETSC_STATIC_ARRAY_LENGTH(corotated_rows), corotated_rows));
+  PetscCall(
+    SbMaterialRegister("stvk", SbMaterialCreate_StVK, PETSC_STATIC_ARRAY_LENGTH(exact_rows), exact_rows));
+  PetscCall(SbMaterialRegister("neohookean", SbMaterialCreate_NeoHookean,
+                               PETSC_STATIC_ARRAY_LENGTH(exact_rows), exact_rows));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
