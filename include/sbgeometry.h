@@ -102,6 +102,78 @@ PetscBool SbCCDEdgeEdge(const PetscReal *const e0[2], const PetscReal *const e1[
 PetscBool SbRayTriangle(const PetscReal p[3], const PetscReal way[3], const PetscReal *const x[3],
                         PetscReal *t, PetscReal weight[3], PetscBool *out);
 
+/* ------------------------------------------------------------------ distance.c, ccd.c: pairs of vertices, edges, triangles */
+
+/* What a pair consists of, and which features of it are closest; the vertices in their order, those of the first side before the bar. */
+typedef enum {
+  SB_PAIR_VERTEX_VERTEX,   /* 0 | 1 */
+  SB_PAIR_VERTEX_EDGE,     /* 0 | 1 2 */
+  SB_PAIR_VERTEX_TRIANGLE, /* 0 | 1 2 3 */
+  SB_PAIR_EDGE_EDGE        /* 0 1 | 2 3 */
+} SbPairKind;
+
+typedef struct {
+  SbPairKind feature; /* closest: of an edge pair also a vertex and an edge, or two vertices */
+  int mask;           /* bit a: vertex a belongs to the closest feature */
+  PetscReal weight
+    [4]; /* sum 0; sum_a weight[a] x_a leads from the closest point of the second side to that of the first; 0 off the mask */
+  PetscReal d; /* the distance, m */
+  PetscReal
+    n[3]; /* unit vector from the second side to the first; 0 where d = 0 and the feature has no plane */
+} SbDistance;
+
+/*
+  SbDistanceFind - the closest features of a pair, their distance, direction and closest points.
+
+  Not collective. Input: x[4][3], vertices, m; those that the kind has are read. Edges and triangles may be degenerate: then the closest
+  feature is a lower one. The gradient of d with respect to vertex a is weight[a] n.
+*/
+void SbDistanceFind(SbPairKind kind, const PetscReal x[], SbDistance *distance);
+
+/*
+  SbDistanceHessian - a grad d grad d^T + b Hess d for the closest features as found, with factor[2] = (a, b).
+
+  Not collective. For an energy f(d): a = f'', b = f'. Input: x[4][3] as for SbDistanceFind(), m; distance, d > 0; clamp, whether its
+  positive semi-definite part (the nearest such matrix) is wanted. Output: H[12][12], rows and columns 3 a + k; symmetric.
+*/
+void SbDistanceHessian(const PetscReal x[], const SbDistance *distance, const PetscReal factor[2],
+                       PetscBool clamp, PetscReal H[]);
+
+/*
+  SbEdgeMollifier - e = (2 - s/eps) s/eps with s = |u x v|^2 of two edges u, v, and 1 for s > eps: it switches a pair of edges off where they become
+  parallel and their distance is not smooth.
+
+  Not collective. Input: x[4][3], ends of the first and of the second edge, m; eps, m^4. Output: g[12], H[12][12], first and second
+  derivatives of e; either may be NULL.
+*/
+PetscReal SbEdgeMollifier(const PetscReal x[], PetscReal eps, PetscReal g[], PetscReal H[]);
+
+/* Replaces a symmetric matrix A[n][n] by its positive semi-definite part. Not collective; n <= SB_CLAMP_MAX. */
+#define SB_CLAMP_MAX 12
+void SbSymmetricClamp(int n, PetscReal A[]);
+
+/*
+  SbTimeOfImpact - how much of a step a pair may go before the gap between its sides is used up; never later than the true time.
+
+  Not collective. The vertices go on straight lines from x0[4][3] to x1[4][3], m. The gap is their distance less the radius. Let g be the gap at
+  the start, and least = min(separation, g / 2). At the time returned the gap is between least + 0.9 keep (g - least) and least + keep (g - least), and
+  nowhere before is it smaller. Much rotation at a small gap takes many steps; after 1024 the time reached is returned, at which more is left.
+
+  least is not below SB_CCD_ROUNDING eps |x|, what coordinates may be rounded to; the same of |x1 - x0| is added in the course of the step. A gap
+  that is not larger than this at the start, or negative, cannot be guarded: the time is 0, unless nothing moves relative to each other. So it
+  is with a NaN.
+
+  Output: time, in [0, 1]; 1 if there is no impact. Returns whether there is one.
+*/
+typedef struct {
+  PetscReal radius;     /* sum of the radii of the balls or capsules around vertices and edges, m */
+  PetscReal separation; /* gap that is not used up, m */
+  PetscReal keep;       /* part of the rest that is not used up, above 0 and below 1; 0.1 is usual */
+} SbCCDLimits;
+#define SB_CCD_ROUNDING 32
+PetscBool SbTimeOfImpact(SbPairKind kind, const PetscReal x0[], const PetscReal x1[],
+                         const SbCCDLimits *limits, PetscReal *time);
+
 /* ------------------------------------------------------------------ box_tree.c: which boxes meet a box */
 
 /* A tree over boxes; nodes[1] is the root, the children of k are 2 k and 2 k + 1. */

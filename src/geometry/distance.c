@@ -1,0 +1,386 @@
+/*
+  distance.c - the distance between two simplices, a vertex and a triangle or two edges, with its derivatives.
+
+  The closest points are sum_a w_a x_a = r, from the second side to the first, d = |r|. Vertices with a weight other than zero are the
+  closest feature: two vertices, a vertex and an edge, or the inside of both sides. Let t_k = sum_a w_a,k x_a be the derivatives of r with respect
+  to the coordinates on the feature (none, one or two), q_k their dual basis, and c_a = sum_k w_a,k q_k. As r is orthogonal to all t_k,
+
+      d,a    = w_a n,                                              n = r / d
+      d,ab   = w_a w_b P / d - w_a c_b n^T - w_b n c_a^T - d (c_a . c_b) n n^T
+
+  with P the projection on what is orthogonal to n and all t_k. P is zero in the inside of both sides: there no term grows as d falls.
+
+  a grad d grad d^T + b Hess d acts on five dimensions only: n on the three sets of weights whose sum is zero, and the two directions
+  orthogonal to n on w. Its positive semi-definite part is found there.
+
+  Near a plane that both sides lie in, r is a small difference of large numbers; where it is less certain than the normal of the plane,
+  n is that normal and d the distance along it.
+
+  Edges: the lines' closest points where they are on both edges, else the nearest end (after Lumelsky, "On fast computation of distance
+  between line segments", 1985; cross products in place of differences of squares, which near-parallel edges do not bear). Mollifier: Li et
+  al., "Incremental Potential Contact", 2020, section 5.
+*/
+#include "sbgeometry.h"
+
+#define ALONG 1e-4     /* sine between edges, below which the lines' closest points may be wrong */
+#define PARALLEL 1e-12 /* the same, below which there are none */
+
+static inline void subtract(const PetscReal a[3], const PetscReal b[3], PetscReal c[3])
+{
+  for (int k = 0; k < 3; k++) c[k] = a[k] - b[k];
+}
+
+/*
+  The distance of `vertex` from the edge from a to b, when it is less than s->d, which is squared here. The vertex is on the first
+  side for sign = 1, on the second for -1.
+*/
+static inline void try_edge(const PetscReal x[], int vertex, int a, int b, PetscReal sign, SbDistance *s)
+{
+  PetscReal e[3], r[3], ee, er, t, d2;
+
+  subtract(x + 3 * b, x + 3 * a, e);
+  subtract(x + 3 * vertex, x + 3 * a, r);
+  ee = SbDot3(e, e);
+  er = SbDot3(e, r);
+  t = er <= 0 ? 0 : er >= ee ? 1 : er / ee;
+  // from the nearer end, where the difference is smaller
+  if (t > 0.5) subtract(x + 3 * vertex, x + 3 * b, r);
+  for (int k = 0; k < 3; k++) r[k] -= (t > 0.5 ? t - 1 : t) * e[k];
+  d2 = SbDot3(r, r);
+  if (!(d2 < s->d)) return;
+  s->d = d2;
+  for (int k = 0; k < 4; k++) s->weight[k] = 0;
+  s->weight[vertex] = sign;
+  s->weight[a] = sign * (t - 1);
+  s->weight[b] = -sign * t;
+  s->mask = 1 << vertex | (t < 1) << a | (t > 0) << b;
+  s->feature = t > 0 && t < 1 ? SB_PAIR_VERTEX_EDGE : SB_PAIR_VERTEX_VERTEX;
+  for (int k = 0; k < 3; k++) s->n[k] = sign * r[k];
+}
+
+/* Length and direction from r, left in s->n, or from the normal of a plane in which both sides lie but for d; size2: squared. */
+static inline void finish(const PetscReal between[3], const PetscReal normal[3], PetscReal size2,
+                          SbDistance *s)
+{
+  const PetscReal d2 = SbDot3(s->n, s->n), nn = normal ? SbDot3(normal, normal) : 0;
+
+  s->d = PetscSqrtReal(d2);
+  if (normal && nn > 0 && nn >= d2 * size2) {
+    const PetscReal length = PetscSqrtReal(nn), height = SbDot3(between, normal), side = height < 0 ? -1 : 1;
+
+    s->d = side * height / length;
+    for (int k = 0; k < 3; k++) s->n[k] = side * normal[k] / length;
+  } else if (s->d > 0) {
+    for (int k = 0; k < 3; k++) s->n[k] /= s->d;
+  }
+}
+
+static inline void vertex_triangle(const PetscReal x[], SbDistance *s)
+{
+  const PetscReal *const corner[3] = {x + 3, x + 6, x + 9};
+  PetscReal w[3], d2, e[2][3], normal[3], r[3][3];
+  const SbTriangleFeature feature = SbTriangleClosestPoint(x, corner, w, &d2);
+
+  s->weight[0] = 1;
+  s->mask = 1;
+  for (int a = 0; a < 3; a++) {
+    subtract(x, corner[a], r[a]);
+    s->weight[1 + a] = -w[a];
+    s->mask |= (w[a] != 0 || feature == SB_FEATURE_FACE) << (1 + a);
+  }
+  s->feature = feature == SB_FEATURE_FACE                     ? SB_PAIR_VERTEX_TRIANGLE
+               : (w[0] != 0) + (w[1] != 0) + (w[2] != 0) == 2 ? SB_PAIR_VERTEX_EDGE
+                                                              : SB_PAIR_VERTEX_VERTEX;
+  for (int k = 0; k < 3; k++) s->n[k] = w[0] * r[0][k] + w[1] * r[1][k] + w[2] * r[2][k];
+  if (feature != SB_FEATURE_FACE) {
+    finish(NULL, NULL, 0, s);
+    return;
+  }
+  subtract(corner[1], corner[0], e[0]);
+  subtract(corner[2], corner[0], e[1]);
+  SbCross(e[0], e[1], normal);
+  finish(r[0], normal, PetscMax(SbDot3(e[0], e[0]), SbDot3(e[1], e[1])), s);
+}
+
+static inline void edge_edge(const PetscReal x[], SbDistance *s)
+{
+  PetscReal u[3], v[3], r[3], normal[3], c[3], uu, vv, nn, a = 0, b = 0;
+  PetscBool inside = PETSC_FALSE;
+
+  subtract(x + 3, x, u);
+  subtract(x + 9, x + 6, v);
+  subtract(x, x + 6, r);
+  uu = SbDot3(u, u);
+  vv = SbDot3(v, v);
+  SbCross(u, v, normal);
+  nn = SbDot3(normal, normal);
+  if (nn > PARALLEL * PARALLEL * uu * vv) {
+    SbCross(v, r, c);
+    a = SbDot3(c, normal) / nn;
+    SbCross(u, r, c);
+    b = SbDot3(c, normal) / nn;
+    inside = (PetscBool)(a > 0 && a < 1 && b > 0 && b < 1);
+  }
+  *s = (SbDistance){.d = PETSC_MAX_REAL};
+  if (inside) {
+    const PetscReal w[4] = {1 - a, a, b - 1, -b};
+
+    s->feature = SB_PAIR_EDGE_EDGE;
+    s->mask = 15;
+    for (int k = 0; k < 4; k++) s->weight[k] = w[k];
+    for (int k = 0; k < 3; k++) s->n[k] = r[k] + a * u[k] - b * v[k];
+    s->d = SbDot3(s->n, s->n);
+  }
+  if (!inside || nn < ALONG * ALONG * uu * vv) {
+    try_edge(x, 0, 2, 3, 1, s);
+    try_edge(x, 1, 2, 3, 1, s);
+    try_edge(x, 2, 0, 1, -1, s);
+    try_edge(x, 3, 0, 1, -1, s);
+  }
+  finish(r, s->feature == SB_PAIR_EDGE_EDGE ? normal : NULL, PetscMax(uu, vv), s);
+}
+
+void SbDistanceFind(SbPairKind kind, const PetscReal x[], SbDistance *s)
+{
+  PetscReal r[3];
+
+  switch (kind) {
+  case SB_PAIR_VERTEX_TRIANGLE:
+    vertex_triangle(x, s);
+    break;
+  case SB_PAIR_EDGE_EDGE:
+    edge_edge(x, s);
+    break;
+  case SB_PAIR_VERTEX_EDGE:
+    *s = (SbDistance){.d = PETSC_MAX_REAL};
+    try_edge(x, 0, 1, 2, 1, s);
+    finish(NULL, NULL, 0, s);
+    break;
+  case SB_PAIR_VERTEX_VERTEX:
+    subtract(x, x + 3, r);
+    *s = (SbDistance){.feature = kind, .mask = 3, .weight = {1, -1}, .n = {r[0], r[1], r[2]}};
+    finish(NULL, NULL, 0, s);
+    break;
+  }
+}
+
+/* ------------------------------------------------------------------ derivatives */
+
+/* c_a of the head of this file. */
+static void point_derivatives(const PetscReal x[], const SbDistance *s, PetscReal c[4][3])
+{
+  PetscReal t[2][3], q[2][3], normal[3];
+
+  for (int a = 0; a < 4; a++) c[a][0] = c[a][1] = c[a][2] = 0;
+  if (s->feature == SB_PAIR_VERTEX_EDGE) {
+    int end[2], n = 0, npositive = 0;
+
+    // the ends of the edge have weights of one sign, the vertex that of the other
+    for (int a = 0; a < 4; a++) npositive += s->weight[a] > 0;
+    for (int a = 0; a < 4; a++) {
+      if (npositive == 1 ? s->weight[a] < 0 : s->weight[a] > 0) end[n++] = a;
+    }
+    subtract(x + 3 * end[1], x + 3 * end[0], t[0]);
+    for (int k = 0; k < 3; k++) {
+      c[end[1]][k] = t[0][k] / SbDot3(t[0], t[0]);
+      c[end[0]][k] = -c[end[1]][k];
+    }
+  } else if (s->feature != SB_PAIR_VERTEX_VERTEX) {
+    const PetscBool face = (PetscBool)(s->feature == SB_PAIR_VERTEX_TRIANGLE);
+    PetscReal nn;
+
+    subtract(x + 3, x + (face ? 6 : 0), t[0]);
+    subtract(x + (face ? 3 : 6), x + 9, t[1]);
+    SbCross(t[0], t[1], normal);
+    nn = SbDot3(normal, normal);
+    SbCross(t[1], normal, q[0]);
+    SbCross(normal, t[0], q[1]);
+    for (int k = 0; k < 3; k++) {
+      const PetscReal q0 = q[0][k] / nn, q1 = q[1][k] / nn;
+
+      c[1][k] = face ? q0 + q1 : q0;
+      c[face ? 2 : 0][k] = -q0;
+      c[3][k] = -q1;
+      if (!face) c[2][k] = q1;
+    }
+  }
+}
+
+void SbSymmetricClamp(int n, PetscReal A[])
+{
+  PetscReal V[SB_CLAMP_MAX * SB_CLAMP_MAX], D[SB_CLAMP_MAX * SB_CLAMP_MAX], size = 0;
+  PetscBool negative = PETSC_FALSE;
+
+  // Jacobi's method: each rotation makes one entry zero
+  for (int i = 0; i < n; i++) {
+    for (int j = 0; j < n; j++) {
+      V[n * i + j] = i == j;
+      D[n * i + j] = A[n * i + j];
+      size = PetscMax(size, PetscAbsReal(A[n * i + j]));
+    }
+  }
+  for (int sweep = 0; sweep < 30; sweep++) {
+    PetscReal most = 0;
+
+    for (int p = 0; p < n; p++) {
+      for (int q = p + 1; q < n; q++) {
+        const PetscReal off = D[n * p + q];
+        PetscReal theta, tau, c, s;
+
+        most = PetscMax(most, PetscAbsReal(off));
+        if (!(PetscAbsReal(off) > PETSC_MACHINE_EPSILON * size)) continue;
+        theta = 0.5 * (D[n * q + q] - D[n * p + p]) / off;
+        tau = (theta < 0 ? -1 : 1) / (PetscAbsReal(theta) + PetscSqrtReal(1 + theta * theta));
+        c = 1 / PetscSqrtReal(1 + tau * tau);
+        s = tau * c;
+        for (int k = 0; k < n; k++) {
+          const PetscReal a = D[n * k + p], b = D[n * k + q], v = V[n * k + p], w = V[n * k + q];
+
+          D[n * k + p] = c * a - s * b;
+          D[n * k + q] = s * a + c * b;
+          V[n * k + p] = c * v - s * w;
+          V[n * k + q] = s * v + c * w;
+        }
+        for (int k = 0; k < n; k++) {
+          const PetscReal a = D[n * p + k], b = D[n * q + k];
+
+          D[n * p + k] = c * a - s * b;
+          D[n * q + k] = s * a + c * b;
+        }
+      }
+    }
+    if (!(most > PETSC_MACHINE_EPSILON * size)) break;
+  }
+  for (int k = 0; k < n; k++) negative = (PetscBool)(negative || D[n * k + k] < 0);
+  if (!negative) return;
+  for (int i = 0; i < n; i++) {
+    for (int j = 0; j <= i; j++) {
+      PetscReal sum = 0;
+
+      for (int k = 0; k < n; k++) sum += PetscMax(D[n * k + k], 0) * V[n * i + k] * V[n * j + k];
+      A[n * i + j] = A[n * j + i] = sum;
+    }
+  }
+}
+
+void SbDistanceHessian(const PetscReal x[], const SbDistance *s, const PetscReal factor[2], PetscBool clamp,
+                       PetscReal H[])
+{
+  static const PetscReal h[3][4] = {{.5, .5, -.5, -.5}, {.5, -.5, .5, -.5}, {.5, -.5, -.5, .5}};
+  const PetscReal *n = s->n, *w = s->weight, a = factor[0], b = factor[1];
+  const PetscReal size = PetscSqrtReal(w[0] * w[0] + w[1] * w[1] + w[2] * w[2] + w[3] * w[3]);
+  const int least = PetscAbsReal(n[0]) < PetscAbsReal(n[1])
+                      ? (PetscAbsReal(n[0]) < PetscAbsReal(n[2]) ? 0 : 2)
+                      : (PetscAbsReal(n[1]) < PetscAbsReal(n[2]) ? 1 : 2);
+  PetscReal c[4][3], m[2][3], along[4][2], alpha[3], C[3][2], K[25], bend[2], length;
+
+  // directions orthogonal to n; the derivatives of the closest points along them
+  point_derivatives(x, s, c);
+  for (int k = 0; k < 3; k++) m[0][k] = (k == least) - n[least] * n[k];
+  length = PetscSqrtReal(SbDot3(m[0], m[0]));
+  for (int k = 0; k < 3; k++) m[0][k] /= length;
+  SbCross(n, m[0], m[1]);
+  for (int i = 0; i < 4; i++) {
+    for (int l = 0; l < 2; l++) along[i][l] = SbDot3(c[i], m[l]);
+  }
+  for (int i = 0; i < 3; i++) {
+    alpha[i] = h[i][0] * w[0] + h[i][1] * w[1] + h[i][2] * w[2] + h[i][3] * w[3];
+    for (int l = 0; l < 2; l++)
+      C[i][l] = h[i][0] * along[0][l] + h[i][1] * along[1][l] + h[i][2] * along[2][l] + h[i][3] * along[3][l];
+  }
+
+  // in five dimensions: n on the weights h, and m on w / |w|
+  for (int i = 0; i < 3; i++) {
+    for (int j = 0; j < 3; j++)
+      K[5 * i + j] = a * alpha[i] * alpha[j] - b * s->d * (C[i][0] * C[j][0] + C[i][1] * C[j][1]);
+    for (int l = 0; l < 2; l++) K[5 * i + 3 + l] = K[5 * (3 + l) + i] = -b * size * C[i][l];
+  }
+  K[18] = K[24] = s->feature <= SB_PAIR_VERTEX_EDGE ? b * size * size / s->d : 0;
+  K[19] = K[23] = 0;
+  if (s->feature == SB_PAIR_VERTEX_EDGE) {
+    // without the direction of the edge
+    int end = 0;
+    PetscReal ee;
+
+    while (along[end][0] == 0 && along[end][1] == 0) end++;
+    ee = along[end][0] * along[end][0] + along[end][1] * along[end][1];
+    bend[0] = along[end][1];
+    bend[1] = -along[end][0];
+    K[19] = K[23] = K[18] * bend[0] * bend[1] / ee;
+    K[24] *= bend[1] * bend[1] / ee;
+    K[18] *= bend[0] * bend[0] / ee;
+  }
+  if (clamp) SbSymmetricClamp(5, K);
+
+  // back to the vertices
+  for (int i = 0; i < 4; i++) {
+    for (int j = 0; j < 4; j++) {
+      PetscReal nn = 0, nm[2] = {0, 0}, mn[2] = {0, 0};
+
+      for (int k = 0; k < 3; k++) {
+        for (int l = 0; l < 3; l++) nn += K[5 * k + l] * h[k][i] * h[l][j];
+        for (int l = 0; l < 2; l++) {
+          nm[l] += K[5 * k + 3 + l] * h[k][i] * w[j] / size;
+          mn[l] += K[5 * k + 3 + l] * h[k][j] * w[i] / size;
+        }
+      }
+      for (int p = 0; p < 3; p++) {
+        for (int q = 0; q < 3; q++) {
+          const PetscReal f = w[i] * w[j] / (size * size);
+
+          H[12 * (3 * i + p) + 3 * j + q] =
+            nn * n[p] * n[q] + n[p] * (nm[0] * m[0][q] + nm[1] * m[1][q]) +
+            n[q] * (mn[0] * m[0][p] + mn[1] * m[1][p]) +
+            f * (K[18] * m[0][p] * m[0][q] + K[19] * (m[0][p] * m[1][q] + m[1][p] * m[0][q]) +
+                 K[24] * m[1][p] * m[1][q]);
+        }
+      }
+    }
+  }
+}
+
+PetscReal SbEdgeMollifier(const PetscReal x[], PetscReal eps, PetscReal g[], PetscReal H[])
+{
+  PetscReal u[3], v[3], c[3], uu, vv, uv, d[2][3], area, value, first, second;
+
+  subtract(x + 3, x, u);
+  subtract(x + 9, x + 6, v);
+  SbCross(u, v, c);
+  area = SbDot3(c, c);
+  value = area < eps ? (2 - area / eps) * area / eps : 1;
+  first = area < eps ? 2 * (1 - area / eps) / eps : 0;
+  second = area < eps ? -2 / (eps * eps) : 0;
+  if (!g && !H) return value;
+
+  // |u x v|^2 = (u . u) (v . v) - (u . v)^2, derivatives with respect to u and v, then to the ends
+  uu = SbDot3(u, u);
+  vv = SbDot3(v, v);
+  uv = SbDot3(u, v);
+  for (int k = 0; k < 3; k++) {
+    d[0][k] = 2 * (vv * u[k] - uv * v[k]);
+    d[1][k] = 2 * (uu * v[k] - uv * u[k]);
+  }
+  for (int a = 0; g && a < 4; a++) {
+    for (int k = 0; k < 3; k++) g[3 * a + k] = (a % 2 ? 1 : -1) * first * d[a / 2][k];
+  }
+  for (int a = 0; H && a < 4; a++) {
+    for (int b = 0; b < 4; b++) {
+      const PetscReal sign = a % 2 == b % 2 ? 1 : -1;
+
+      for (int p = 0; p < 3; p++) {
+        for (int q = 0; q < 3; q++) {
+          PetscReal dd;
+
+          if (a / 2 != b / 2) {
+            const PetscReal *e = a / 2 ? v : u, *f = a / 2 ? u : v;
+
+            dd = 2 * (2 * e[p] * f[q] - f[p] * e[q] - (p == q) * uv);
+          } else
+            dd = 2 * ((p == q) * (a / 2 ? uu : vv) - (a / 2 ? u[p] * u[q] : v[p] * v[q]));
+          H[12 * (3 * a + p) + 3 * b + q] = sign * (first * dd + second * d[a / 2][p] * d[b / 2][q]);
+        }
+      }
+    }
+  }
+  return value;
+}
