@@ -6,6 +6,7 @@
 */
 #pragma once
 #include <sbbase.h>
+#include <ctype.h>
 #include <math.h>
 
 static int sb_test_passed, sb_test_failed;
@@ -37,14 +38,54 @@ static inline void sb_test_record(PetscBool ok, const char *file, int line, cons
                    "%s is %.15g, expected %.15g within %.3g", what, sb_v, sb_e, sb_t);          \
   } while (0)
 
-/* The call must fail; its error output is swallowed. */
-#define SB_CHECK_ERROR(call, what)                                                                \
+/* Text of the last error. */
+static char sb_test_text[2048];
+
+static inline PetscErrorCode sb_test_keep(MPI_Comm comm, int line, const char *function, const char *file,
+                                          PetscErrorCode code, PetscErrorType kind, const char *text,
+                                          void *ctx)
+{
+  (void)comm, (void)line, (void)function, (void)file, (void)ctx;
+  if (kind == PETSC_ERROR_INITIAL) (void)snprintf(sb_test_text, sizeof(sb_test_text), "%s", text ? text : "");
+  return code;
+}
+
+/* Each part of `names`, with | between them, stands in the text, and no part of a longer word or number does for it. */
+static inline PetscBool sb_test_names(const char *text, const char *names)
+{
+#define SB_WORD(c) (isalnum((unsigned char)(c)) || (c) == '_')
+  for (const char *end; *names; names = end + (*end == '|')) {
+    const char *at;
+    size_t n;
+
+    end = names + strcspn(names, "|");
+    n = (size_t)(end - names);
+    for (at = text; *at; at++) {
+      if (strncmp(at, names, n)) continue;
+      if (at > text && SB_WORD(at[-1]) && SB_WORD(names[0])) continue;
+      if (!SB_WORD(at[n]) || !SB_WORD(end[-1])) break;
+    }
+    if (n && !*at) return PETSC_FALSE;
+  }
+  return PETSC_TRUE;
+#undef SB_WORD
+}
+
+/*
+  The call must fail with the code `expected`, in one line that names all of `names`: option, file, line, value, with | between
+  them. How the sentence reads is not checked.
+*/
+#define SB_CHECK_ERROR(call, expected, names)                                                     \
   do {                                                                                            \
     PetscErrorCode sb_ierr;                                                                       \
-    PetscCall(PetscPushErrorHandler(PetscReturnErrorHandler, NULL));                              \
+    sb_test_text[0] = 0;                                                                          \
+    PetscCall(PetscPushErrorHandler(sb_test_keep, NULL));                                         \
     sb_ierr = call;                                                                               \
     PetscCall(PetscPopErrorHandler());                                                            \
-    sb_test_record(sb_ierr ? PETSC_TRUE : PETSC_FALSE, __FILE__, __LINE__, "no error: %s", what); \
+    SB_CHECK(sb_ierr == (expected), "code %d instead of %d: '%s'", (int)sb_ierr, (int)(expected), \
+             sb_test_text);                                                                       \
+    SB_CHECK(sb_test_names(sb_test_text, names), "'%s' does not name %s", sb_test_text, names);   \
+    SB_CHECK(!strchr(sb_test_text, '\n'), "more than one line: '%s'", sb_test_text);              \
   } while (0)
 
 #define SB_TEST_BEGIN(argc, argv)                             \

@@ -209,30 +209,3 @@ static inline void deform(Fixture *x, PetscReal amplitude)
     x->u[3 * i + 2] = amplitude * (0.25 * X[0] * X[0] - 0.15 * X[2] + 0.1 * X[1] * X[0]);
   }
 }
-
-/* Keeps the text of the last error. */
-static char last_error[1024];
-static inline PetscErrorCode keep_error(MPI_Comm comm, int line, const char *function, const char *file,
-                                        PetscErrorCode code, PetscErrorType type, const char *message,
-                                        void *ctx)
-{
-  (void)comm;
-  (void)line;
-  (void)function;
-  (void)file;
-  (void)ctx;
-  if (type == PETSC_ERROR_INITIAL && message) (void)PetscStrncpy(last_error, message, sizeof(last_error));
-  return code;
-}
-
-/* The call must fail with a message that contains `part`. */
-#define CHECK_MESSAGE(call, part)                                                                      \
-  do {                                                                                                 \
-    PetscErrorCode ierr_;                                                                              \
-    last_error[0] = 0;                                                                                 \
-    PetscCall(PetscPushErrorHandler(keep_error, NULL));                                                \
-    ierr_ = call;                                                                                      \
-    PetscCall(PetscPopErrorHandler());                                                                 \
-    SB_CHECK(ierr_ &&strstr(last_error, part), "error %d \"%s\" lacks \"%s\"", (int)ierr_, last_error, \
-             part);                                                                                    \
-  } while (0)

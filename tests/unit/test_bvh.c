@@ -513,10 +513,10 @@ static PetscErrorCode check_errors(void)
 
   PetscFunctionBeginUser;
   PetscCall(SbDetectorCreate(SB_DETECT_BVH, &d));
-  SB_CHECK_ERROR(SbBvhSet(d, 12), "12-DOPs");
+  SB_CHECK_ERROR(SbBvhSet(d, 12), PETSC_ERR_ARG_OUTOFRANGE, "12|14");
   PetscCall(SbDetectorDestroy(&d));
   PetscCall(SbDetectorCreate(SB_DETECT_BRUTE, &d));
-  SB_CHECK_ERROR(SbBvhSet(d, 6), "volumes of the tree for another kind");
+  SB_CHECK_ERROR(SbBvhSet(d, 6), PETSC_ERR_ARG_WRONG, "brute|bvh");
   PetscCall(SbDetectorDestroy(&d));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

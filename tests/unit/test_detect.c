@@ -463,7 +463,7 @@ static PetscErrorCode check_stats(void)
 
   PetscFunctionBeginUser;
   PetscCall(SbDetectorDestroy(&detector));
-  SB_CHECK_ERROR(SbDetectorCreate((SbDetectKind)17, &detector), "a kind that does not exist");
+  SB_CHECK_ERROR(SbDetectorCreate((SbDetectKind)17, &detector), PETSC_ERR_ARG_OUTOFRANGE, "kind 17");
   PetscCall(world_create(&w));
   PetscCall(SbDetectorCreate(SB_DETECT_HASH, &detector));
   PetscCall(random_world(&w, 3)); /* with a huge facet */
@@ -476,7 +476,7 @@ static PetscErrorCode check_stats(void)
   SB_CHECK(strstr(stats.text, "cells of") && strstr(stats.text, "facets too wide"), "it says: %s",
            stats.text);
   w.scene.reach = 0;
-  SB_CHECK_ERROR(SbDetectorFind(detector, &w.scene, &n, &near), "a reach of zero");
+  SB_CHECK_ERROR(SbDetectorFind(detector, &w.scene, &n, &near), PETSC_ERR_ARG_OUTOFRANGE, "0");
   PetscCall(SbDetectorDestroy(&detector));
   SB_CHECK(!detector, "not NULL after it was destroyed");
   PetscCall(world_destroy(&w));

@@ -51,35 +51,35 @@ static PetscErrorCode test_errors(void)
   SbEffect e;
 
   PetscFunctionBeginUser;
-  CHECK_MESSAGE(SbEffectCreate("gravty", &e), "gravity");
+  SB_CHECK_ERROR(SbEffectCreate("gravty", &e), PETSC_ERR_USER_INPUT, "gravity");
   PetscCall(SbEffectDestroy(&e));
   // Nothing near: the whole list.
-  CHECK_MESSAGE(SbEffectCreate("qqqqqqqqqqqq", &e), "body_force");
+  SB_CHECK_ERROR(SbEffectCreate("qqqqqqqqqqqq", &e), PETSC_ERR_USER_INPUT, "body_force");
   PetscCall(SbEffectDestroy(&e));
   PetscCall(PetscOptionsInsertString(NULL, "-effect_lid_type tractoin"));
-  CHECK_MESSAGE(SbEffectCreate("lid", &e), "-effect_lid_type");
-  CHECK_MESSAGE(SbEffectCreate("lid", &e), "traction");
+  SB_CHECK_ERROR(SbEffectCreate("lid", &e), PETSC_ERR_USER_INPUT, "-effect_lid_type");
+  SB_CHECK_ERROR(SbEffectCreate("lid", &e), PETSC_ERR_USER_INPUT, "traction");
   PetscCall(SbEffectDestroy(&e));
 
   // Neither a traction nor a total force; a load with a place where only time makes sense; what must be given.
   PetscCall(PetscOptionsInsertString(NULL, "-effect_lid_type traction -effect_lid_on top"));
-  CHECK_MESSAGE(SbEffectCreate("lid", &e), "-effect_lid_total");
+  SB_CHECK_ERROR(SbEffectCreate("lid", &e), PETSC_ERR_USER_INPUT, "-effect_lid_total");
   PetscCall(SbEffectDestroy(&e));
   PetscCall(
     PetscOptionsInsertString(NULL, "-effect_air_type pressure -effect_air_on top -effect_air_value 5*x"));
-  CHECK_MESSAGE(SbEffectCreate("air", &e), "-effect_air_value");
+  SB_CHECK_ERROR(SbEffectCreate("air", &e), PETSC_ERR_USER_INPUT, "-effect_air_value");
   PetscCall(SbEffectDestroy(&e));
   PetscCall(PetscOptionsInsertString(NULL, "-effect_hold_type fixed"));
-  CHECK_MESSAGE(SbEffectCreate("hold", &e), "-effect_hold_on");
+  SB_CHECK_ERROR(SbEffectCreate("hold", &e), PETSC_ERR_USER, "-effect_hold_on");
   PetscCall(SbEffectDestroy(&e));
   PetscCall(PetscOptionsInsertString(NULL, "-effect_push_type prescribed_displacement -effect_push_on top"));
-  CHECK_MESSAGE(SbEffectCreate("push", &e), "-effect_push_displacement");
+  SB_CHECK_ERROR(SbEffectCreate("push", &e), PETSC_ERR_USER_INPUT, "-effect_push_displacement");
   PetscCall(SbEffectDestroy(&e));
   PetscCall(PetscOptionsInsertString(NULL, "-effect_push_angle 10 -effect_push_axis 0,0,0"));
-  CHECK_MESSAGE(SbEffectCreate("push", &e), "-effect_push_axis");
+  SB_CHECK_ERROR(SbEffectCreate("push", &e), PETSC_ERR_USER_INPUT, "-effect_push_axis");
   PetscCall(SbEffectDestroy(&e));
   PetscCall(PetscOptionsInsertString(NULL, "-effect_thick_type damping -effect_thick_alpha -1"));
-  CHECK_MESSAGE(SbEffectCreate("thick", &e), "-effect_thick_alpha");
+  SB_CHECK_ERROR(SbEffectCreate("thick", &e), PETSC_ERR_USER, "-effect_thick_alpha");
   PetscCall(SbEffectDestroy(&e));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

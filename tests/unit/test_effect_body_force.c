@@ -44,10 +44,10 @@ static PetscErrorCode check_part(Fixture *x)
     if (x->space->node_x[3 * i + 2] > 0.75) SB_CHECK(x->f[3 * i + 2] == 0, "force outside the set");
   }
   PetscCall(SbEffectDestroy(&e));
-  CHECK_MESSAGE(effect_create(x, "flat",
-                              "-effect_flat_type body_force -effect_flat_on shell -effect_flat_density 0;0;8",
-                              &e),
-                "shell selects no tetrahedra");
+  SB_CHECK_ERROR(
+    effect_create(x, "flat", "-effect_flat_type body_force -effect_flat_on shell -effect_flat_density 0;0;8",
+                  &e),
+    PETSC_ERR_USER_INPUT, "-effect_flat_on|set shell|9 vertices");
   PetscCall(SbEffectDestroy(&e));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -12,45 +12,41 @@ static const char *const hull[][2] = {{"boundary", "boundary"}};
 
 /* ------------------------------------------------------------------ options */
 
-static PetscErrorCode check_error(Fixture *x, const char *options, const char *part)
+static PetscErrorCode check_options(void)
 {
+  static const struct {
+    const char *options, *names;
+    PetscErrorCode code;
+  } refused[] = {
+    {"-effect_floor_type contact", "-effect_floor_obstacle", PETSC_ERR_USER},
+    {"-effect_floor_type contact -effect_floor_obstacle ball:1,2,3,4", "-effect_floor_obstacle ball:1,2,3,4",
+     PETSC_ERR_USER_INPUT},
+    {FLOOR "-effect_floor_response glue", "-effect_floor_response glue|projected", PETSC_ERR_USER},
+    {FLOOR "-effect_floor_friction -1", "-effect_floor_friction -1", PETSC_ERR_USER},
+    {FLOOR "-effect_floor_friction 0.2 -effect_floor_friction_kinetic 0.3",
+     "-effect_floor_friction_kinetic 0.3", PETSC_ERR_USER_INPUT},
+    {FLOOR "-effect_floor_restitution 1.5", "-effect_floor_restitution 1.5", PETSC_ERR_USER},
+    {FLOOR "-effect_floor_damping 0.01", "-effect_floor_damping 0.01 s", PETSC_ERR_USER_INPUT},
+    {FLOOR "-effect_floor_restitution 0.5 -effect_floor_response penalty",
+     "-effect_floor_restitution 0.5|-effect_floor_response projected", PETSC_ERR_USER_INPUT},
+    {FLOOR "-effect_floor_separation_steps 0.5", "-effect_floor_separation_steps 0.5", PETSC_ERR_USER},
+    {"-effect_floor_type contact -effect_floor_obstacle mesh:no.stl", "-effect_floor_obstacle|no.stl",
+     PETSC_ERR_FILE_OPEN},
+    {FLOOR "-effect_floor_time_of_impact yes -effect_floor_restitution 0.5",
+     "-effect_floor_restitution 0.5|-effect_floor_time_of_impact yes", PETSC_ERR_USER_INPUT},
+    {FLOOR "-effect_floor_axis 0,0,0", "-effect_floor_axis|0,0,0", PETSC_ERR_USER_INPUT},
+    {FLOOR "-effect_floor_displacement x;0;0", "-effect_floor_displacement", PETSC_ERR_USER_INPUT},
+  };
+  Fixture x;
   SbEffect e = NULL;
 
   PetscFunctionBeginUser;
-  CHECK_MESSAGE(effect_create(x, "floor", options, &e), part);
-  PetscCall(SbEffectDestroy(&e));
-  PetscCall(PetscOptionsClear(NULL));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode check_options(void)
-{
-  Fixture x;
-  SbEffect e;
-
-  PetscFunctionBeginUser;
   PetscCall(fixture_create(PETSC_COMM_WORLD, 1, "box:1,1,1:2", 1, hull, &x));
-  PetscCall(check_error(&x, "-effect_floor_type contact", "-effect_floor_obstacle"));
-  PetscCall(check_error(&x, "-effect_floor_type contact -effect_floor_obstacle ball:1,2,3,4",
-                        "-effect_floor_obstacle ball:1,2,3,4: write one of plane:"));
-  PetscCall(check_error(&x, FLOOR "-effect_floor_response glue", "projected"));
-  PetscCall(check_error(&x, FLOOR "-effect_floor_friction -1", "-effect_floor_friction"));
-  PetscCall(check_error(&x, FLOOR "-effect_floor_friction 0.2 -effect_floor_friction_kinetic 0.3",
-                        "-effect_floor_friction_kinetic 0.3 is above"));
-  PetscCall(check_error(&x, FLOOR "-effect_floor_restitution 1.5", "-effect_floor_restitution 1.5"));
-  PetscCall(check_error(&x, FLOOR "-effect_floor_damping 0.01",
-                        "-effect_floor_damping 0.01 s is for springs that give"));
-  PetscCall(check_error(&x, FLOOR "-effect_floor_restitution 0.5 -effect_floor_response penalty",
-                        "-effect_floor_restitution 0.5 needs -effect_floor_response projected"));
-  PetscCall(
-    check_error(&x, FLOOR "-effect_floor_separation_steps 0.5", "-effect_floor_separation_steps 0.5"));
-  PetscCall(check_error(&x, "-effect_floor_type contact -effect_floor_obstacle mesh:no.stl",
-                        "-effect_floor_obstacle: no.stl: cannot open the file"));
-  PetscCall(
-    check_error(&x, FLOOR "-effect_floor_time_of_impact yes -effect_floor_restitution 0.5",
-                "-effect_floor_restitution 0.5 and -effect_floor_time_of_impact yes do not go together"));
-  PetscCall(check_error(&x, FLOOR "-effect_floor_axis 0,0,0", "-effect_floor_axis: 0,0,0 is no direction"));
-  PetscCall(check_error(&x, FLOOR "-effect_floor_displacement x;0;0", "-effect_floor_displacement"));
+  for (size_t k = 0; k < PETSC_STATIC_ARRAY_LENGTH(refused); k++) {
+    SB_CHECK_ERROR(effect_create(&x, "floor", refused[k].options, &e), refused[k].code, refused[k].names);
+    PetscCall(SbEffectDestroy(&e));
+    PetscCall(PetscOptionsClear(NULL));
+  }
   PetscCall(effect_create(&x, "floor", FLOOR, &e));
   SB_CHECK(e->linear && !e->steady && !e->ops.tangent && e->ops.assemble_constraints &&
              e->ops.update_active_set && x.space->nodal,
@@ -332,23 +328,24 @@ static PetscErrorCode check_scene(void)
 
 static PetscErrorCode check_refused(void)
 {
+  static const char *const cases[][2] = {
+    {"-time euler_symplectic ", "effect floor"},
+    {"-time alpha2 ", "effect floor"},
+    {"-time newmark -effect_floor_response penalty ", "-time newmark|effect floor"},
+    {"-time newmark -effect_floor_friction 0.3 ", "-time newmark|effect floor"},
+    {"-time newmark -mass consistent ", "-time newmark|effect floor|-mass lumped"},
+    {"-time genalpha -effect_floor_restitution 0.5 ", "-effect_floor_restitution|-time euler_implicit"},
+    {"-body_a_tangent warped -solver realtime ", "-solver realtime|effect floor"},
+    {"-body_a_element cr -solver pressure ", "-solver pressure"},
+  };
+
   PetscFunctionBeginUser;
-  CHECK_MESSAGE(open_only(BLOCK "-effects gravity,floor -time euler_symplectic " FLOOR),
-                "The effect floor needs several solves in a step");
-  CHECK_MESSAGE(open_only(BLOCK "-effects gravity,floor -time alpha2 " FLOOR),
-                "The effect floor needs several solves in a step");
-  CHECK_MESSAGE(open_only(BLOCK "-effects gravity,floor -time newmark -effect_floor_response penalty " FLOOR),
-                "-time newmark gains energy by springs and friction of the effect floor");
-  CHECK_MESSAGE(open_only(BLOCK "-effects gravity,floor -time newmark -effect_floor_friction 0.3 " FLOOR),
-                "-time newmark gains energy by springs and friction of the effect floor");
-  CHECK_MESSAGE(open_only(BLOCK "-effects gravity,floor -time newmark -mass consistent " FLOOR),
-                "-time newmark with the effect floor needs -mass lumped");
-  CHECK_MESSAGE(open_only(BLOCK "-effects gravity,floor -time genalpha -effect_floor_restitution 0.5 " FLOOR),
-                "-effect_floor_restitution needs -time euler_implicit");
-  CHECK_MESSAGE(open_only(BLOCK "-body_a_tangent warped -effects gravity,floor -solver realtime " FLOOR),
-                "-solver realtime has no matrix of everything, in which the effect floor could hold nodes");
-  CHECK_MESSAGE(open_only(BLOCK "-body_a_element cr -effects gravity,floor -solver pressure " FLOOR),
-                "-solver pressure has no matrix of everything");
+  for (size_t k = 0; k < PETSC_STATIC_ARRAY_LENGTH(cases); k++) {
+    char options[2048];
+
+    PetscCall(PetscSNPrintf(options, sizeof(options), BLOCK "-effects gravity,floor %s" FLOOR, cases[k][0]));
+    SB_CHECK_ERROR(open_only(options), PETSC_ERR_USER_INPUT, cases[k][1]);
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -89,8 +89,8 @@ int main(int argc, char **argv)
              "nothing to do at run time");
     PetscCall(SbEffectDestroy(&e[i]));
   }
-  CHECK_MESSAGE(effect_create(&x, "wrong", "-effect_wrong_type damping -effect_wrong_on blok", &e[2]),
-                "block");
+  SB_CHECK_ERROR(effect_create(&x, "wrong", "-effect_wrong_type damping -effect_wrong_on blok", &e[2]),
+                 PETSC_ERR_USER_INPUT, "block");
   PetscCall(SbEffectDestroy(&e[2]));
   check_regions(&x, (const PetscReal[2]){0.5, 1.5}, (const PetscReal[2]){0.25, 0.25 + 0.01});
   PetscCall(fixture_destroy(&x));

@@ -78,9 +78,9 @@ static PetscErrorCode check_element(const char *element, PetscBool held)
   PetscCall(check_resultant(&x, G, N, 12, "force on one vertex"));
   PetscCall(check_work(&x, (const PetscReal[3]){1, 1, 1}, G));
   PetscCall(SbEffectDestroy(&e));
-  CHECK_MESSAGE(
+  SB_CHECK_ERROR(
     effect_create(&x, "bad", "-effect_bad_type point_force -effect_bad_on tip -effect_bad_vector 0;x;0", &e),
-    "-effect_bad_vector");
+    PETSC_ERR_USER_INPUT, "-effect_bad_vector");
   PetscCall(SbEffectDestroy(&e));
   PetscCall(fixture_destroy(&x));
   PetscCall(fixture_destroy(&serial));

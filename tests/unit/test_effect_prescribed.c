@@ -98,8 +98,8 @@ static PetscErrorCode check_element(const char *element)
   PetscCall(count(&west, &n));
   SB_CHECK_NEAR(n, p1 ? 9 * 3 - 3 * 2 : 8 * 3, 0, "unknowns of the west side without those of the bottom");
   check_bits(&x);
-  CHECK_MESSAGE(SbPrescribedSetUp(&edge, x.space, &on[2], 5),
-                p1 ? "edge is already prescribed" : "vertices of body block but none of its triangles");
+  SB_CHECK_ERROR(SbPrescribedSetUp(&edge, x.space, &on[2], 5), PETSC_ERR_USER_INPUT,
+                 p1 ? "-effect_test_on" : "body block");
   PetscCall(SbSpaceFixDone(x.space));
   PetscCall(check_values(&x, &bottom, &west));
 

@@ -100,16 +100,15 @@ static PetscErrorCode check_errors(Fixture *x)
   PetscFunctionBeginUser;
   // One vertex, no facet, no cell: the message names set and counts.
   PetscCall(make_on("bottom", "corner", &on));
-  CHECK_MESSAGE(SbEffectFacets(x->space, &on, &n, &facets),
-                "corner selects no boundary facets (1 vertices, 0");
-  CHECK_MESSAGE(SbEffectCells(x->space, &on, &n, &items),
-                "-effect_test_on: set bottom selects no tetrahedra");
+  SB_CHECK_ERROR(SbEffectFacets(x->space, &on, &n, &facets), PETSC_ERR_USER_INPUT, "1 vertices|0");
+  SB_CHECK_ERROR(SbEffectCells(x->space, &on, &n, &items), PETSC_ERR_USER_INPUT,
+                 "-effect_test_on|set bottom");
   PetscCall(SbEffectFreeOn(&on));
   PetscCall(make_on("botom", NULL, &on));
-  CHECK_MESSAGE(SbEffectNodes(x->space, &on, &n, &items), "bottom");
+  SB_CHECK_ERROR(SbEffectNodes(x->space, &on, &n, &items), PETSC_ERR_USER, "bottom");
   PetscCall(SbEffectFreeOn(&on));
   PetscCall(make_on(NULL, NULL, &on));
-  CHECK_MESSAGE(SbEffectNodes(x->space, &on, &n, &items), "-effect_test_on");
+  SB_CHECK_ERROR(SbEffectNodes(x->space, &on, &n, &items), PETSC_ERR_USER_INPUT, "-effect_test_on");
   PetscCall(SbEffectFreeOn(&on));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -132,8 +131,8 @@ static PetscErrorCode check_faces(const char *element, PetscInt all, PetscInt bo
   PetscCall(check_nodes(&x, "all", "corner", all));
   PetscCall(check_errors(&x));
   PetscCall(make_on("corner", NULL, &on));
-  CHECK_MESSAGE(SbEffectNodes(x.space, &on, &n, &items),
-                "-effect_test_on selects 1 vertices of body block but none of its triangles");
+  SB_CHECK_ERROR(SbEffectNodes(x.space, &on, &n, &items), PETSC_ERR_USER_INPUT,
+                 "-effect_test_on|1 vertices|body block");
   PetscCall(SbEffectFreeOn(&on));
   PetscCall(fixture_destroy(&x));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -72,9 +72,9 @@ static PetscErrorCode check_element(const char *element, PetscBool held)
     fixture_create(PETSC_COMM_SELF, 1, "box:1,1,1:2", PETSC_STATIC_ARRAY_LENGTH(sets), sets, &serial));
   PetscCall(check_vector(&x, &serial));
   PetscCall(check_total(&x));
-  CHECK_MESSAGE(
+  SB_CHECK_ERROR(
     effect_create(&x, "dot", "-effect_dot_type traction -effect_dot_on tip -effect_dot_total 0,0,1", &e),
-    "-effect_dot_on: set tip selects no boundary facets (1 vertices, 0 boundary facets, 0 tetrahedra)");
+    PETSC_ERR_USER_INPUT, "-effect_dot_on|set tip|1 vertices|0 boundary|0 tetrahedra");
   PetscCall(SbEffectDestroy(&e));
   PetscCall(fixture_destroy(&x));
   PetscCall(fixture_destroy(&serial));

@@ -145,7 +145,7 @@ static PetscErrorCode test_options(void)
   for (size_t k = 0; k < PETSC_STATIC_ARRAY_LENGTH(refused); k++) {
     PetscCall(PetscOptionsClear(NULL));
     PetscCall(PetscOptionsInsertString(NULL, refused[k]));
-    SB_CHECK_ERROR(SbElementCreate("dg", &body, &e), refused[k]);
+    SB_CHECK_ERROR(SbElementCreate("dg", &body, &e), PETSC_ERR_USER, refused[k]);
     PetscCall(SbElementDestroy(&e));
   }
   PetscCall(PetscOptionsClear(NULL));
@@ -159,7 +159,7 @@ int main(int argc, char **argv)
 
   SB_TEST_BEGIN(argc, argv);
   PetscCall(SbElementRegisterAll());
-  SB_CHECK_ERROR(SbElementCreate("p2", NULL, &e), "unknown element");
+  SB_CHECK_ERROR(SbElementCreate("p2", NULL, &e), PETSC_ERR_USER, "\"p2\"");
   PetscCall(PetscRandomCreate(PETSC_COMM_SELF, &random));
   PetscCall(PetscRandomSetSeed(random, 99));
   PetscCall(PetscRandomSeed(random));

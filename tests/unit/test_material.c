@@ -63,55 +63,32 @@ static PetscErrorCode test_refusals(void)
   SbMaterial m;
 
   PetscFunctionBeginUser;
-  SB_CHECK_ERROR(create("corotatd", "5e3", "0.25", "1", NULL, &m), "unknown law");
-  SB_CHECK_ERROR(create("corotated", NULL, "0.25", "1", NULL, &m), "no Young's modulus");
-  SB_CHECK_ERROR(create("corotated", "-1", "0.25", "1", NULL, &m), "negative Young's modulus");
-  SB_CHECK_ERROR(create("corotated", "5e3", NULL, "1", NULL, &m), "no Poisson's ratio");
-  SB_CHECK_ERROR(create("corotated", "5e3", "0.5", "1", NULL, &m), "Poisson's ratio 0.5");
-  SB_CHECK_ERROR(create("corotated", "5e3", "-1", "1", NULL, &m), "Poisson's ratio -1");
-  SB_CHECK_ERROR(create("corotated", "5e3", "0.3", "0", NULL, &m), "density 0");
-  SB_CHECK_ERROR(create("corotated", "5e3", "0.3", "1", "exakt", &m), "unknown tangent");
-  SB_CHECK_ERROR(create("stvk", "5e3", "0.3", "1", "warped", &m), "warped tangent of stvk");
-  SB_CHECK_ERROR(SbMaterialCreateElastic("linear", PETSC_INFINITY, 0.3, 1, &m), "infinite Young's modulus");
-  SB_CHECK_ERROR(SbMaterialCreateElastic("linear", 1, NAN, 1, &m), "Poisson's ratio NaN");
-  SB_CHECK_ERROR(SbMaterialCreateElastic("linear", 1, 0.5, 1, &m), "Poisson's ratio 0.5 from a number");
-  SB_CHECK_ERROR(SbMaterialCreateElastic("linear", 0, 0.3, 1, &m), "Young's modulus 0 from a number");
-  SB_CHECK_ERROR(SbMaterialCreateElastic("linear", 1, 0.3, 0, &m), "density 0 from a number");
-  SB_CHECK_ERROR(SbMaterialCreateElastic("rubber", 1, 0.3, 1, &m), "unknown law from a number");
+  SB_CHECK_ERROR(create("corotatd", "5e3", "0.25", "1", NULL, &m), PETSC_ERR_USER,
+                 "-body_bcorotatd_material|\"corotatd\"|corotated|linear|stvk|neohookean");
+  SB_CHECK_ERROR(create("corotated", NULL, "0.25", "1", NULL, &m), PETSC_ERR_USER,
+                 "-body_bcorotated_young|(0, inf)");
+  SB_CHECK_ERROR(create("corotated", "-1", "0.25", "1", NULL, &m), PETSC_ERR_USER,
+                 "-body_bcorotated_young -1 Pa|(0, inf) Pa");
+  SB_CHECK_ERROR(create("corotated", "5e3", NULL, "1", NULL, &m), PETSC_ERR_USER,
+                 "-body_bcorotated_poisson|(-1, 0.5)");
+  SB_CHECK_ERROR(create("corotated", "5e3", "0.5", "1", NULL, &m), PETSC_ERR_USER,
+                 "-body_bcorotated_poisson 0.5|(-1, 0.5)");
+  SB_CHECK_ERROR(create("corotated", "5e3", "-1", "1", NULL, &m), PETSC_ERR_USER,
+                 "-body_bcorotated_poisson -1|(-1, 0.5)");
+  SB_CHECK_ERROR(create("corotated", "5e3", "0.3", "0", NULL, &m), PETSC_ERR_USER,
+                 "-body_bcorotated_density 0 kg/m^3|(0, inf) kg/m^3");
+  SB_CHECK_ERROR(create("corotated", "5e3", "0.3", "1", "exakt", &m), PETSC_ERR_USER,
+                 "-body_bcorotated_tangent exakt|exact");
+  SB_CHECK_ERROR(create("stvk", "5e3", "0.3", "1", "warped", &m), PETSC_ERR_USER,
+                 "-body_bstvk_tangent warped");
+  SB_CHECK_ERROR(SbMaterialCreateElastic("linear", PETSC_INFINITY, 0.3, 1, &m), PETSC_ERR_USER, "(0, inf)");
+  SB_CHECK_ERROR(SbMaterialCreateElastic("linear", 1, NAN, 1, &m), PETSC_ERR_USER, "(-1, 0.5)");
+  SB_CHECK_ERROR(SbMaterialCreateElastic("linear", 1, 0.5, 1, &m), PETSC_ERR_USER, "(-1, 0.5)");
+  SB_CHECK_ERROR(SbMaterialCreateElastic("linear", 0, 0.3, 1, &m), PETSC_ERR_USER, "(0, inf)");
+  SB_CHECK_ERROR(SbMaterialCreateElastic("linear", 1, 0.3, 0, &m), PETSC_ERR_USER, "(0, inf)");
+  SB_CHECK_ERROR(SbMaterialCreateElastic("rubber", 1, 0.3, 1, &m), PETSC_ERR_USER, "\"rubber\"");
   PetscCall(create("linear", "1", "0", "1", NULL, &m));
   PetscCall(SbMaterialDestroy(&m));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static char the_message[1024];
-static PetscErrorCode keep_message(MPI_Comm comm, int line, const char *function, const char *file,
-                                   PetscErrorCode n, PetscErrorType p, const char *message, void *ctx)
-{
-  (void)comm;
-  (void)line;
-  (void)function;
-  (void)file;
-  (void)ctx;
-  if (p == PETSC_ERROR_INITIAL) (void)snprintf(the_message, sizeof(the_message), "%s", message);
-  return n;
-}
-
-/* The message for a misspelt law names the option, the law and what there is. */
-static PetscErrorCode test_message(void)
-{
-  const char *parts[] = {
-    "-body_bcorotatd_material", "\"corotatd\"", "did you mean corotated", "linear", "stvk", "neohookean"};
-  SbMaterial m;
-  PetscErrorCode ierr;
-
-  PetscFunctionBeginUser;
-  PetscCall(PetscPushErrorHandler(keep_message, NULL));
-  ierr = create("corotatd", "1", "0", "1", NULL, &m);
-  PetscCall(PetscPopErrorHandler());
-  SB_CHECK(ierr == PETSC_ERR_USER, "error code %d", (int)ierr);
-  for (size_t k = 0; k < sizeof(parts) / sizeof(parts[0]); k++) {
-    SB_CHECK(strstr(the_message, parts[k]) != NULL, "\"%s\" is missing in \"%s\"", parts[k], the_message);
-  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -121,7 +98,6 @@ int main(int argc, char **argv)
   PetscCall(SbMaterialRegisterAll());
   PetscCall(test_options());
   PetscCall(test_refusals());
-  PetscCall(test_message());
   PetscCall(SbOptionsReset());
   PetscCall(PetscOptionsClear(NULL));
   SB_TEST_END();

@@ -151,17 +151,13 @@ static PetscErrorCode no_mesh(const SbGmsh *gmsh, void *ctx, SbImport *result)
 static PetscErrorCode test_failures(void)
 {
   PetscFunctionBeginUser;
-  TEST_MESSAGE(try_work(60, crash, NULL), PETSC_ERR_FILE_UNEXPECTED,
-               "body 'b': thing: gmsh crashed (Segmentation fault) while it made tetrahedra");
-  TEST_MESSAGE(try_work(1.5, hang, NULL), PETSC_ERR_FILE_UNEXPECTED,
-               "body 'b': thing: gmsh was stopped: after 1.5 s it had not made tetrahedra");
-  TEST_MESSAGE(try_work(60, leave, NULL), PETSC_ERR_FILE_UNEXPECTED,
-               "body 'b': thing: gmsh ended (exit code 3) while it made tetrahedra");
-  TEST_MESSAGE(try_work(60, refuse, "seven is too many"), PETSC_ERR_USER_INPUT, "seven is too many");
-  TEST_MESSAGE(try_work(60, fail_in_gmsh, NULL), PETSC_ERR_FILE_UNEXPECTED, "body 'b': thing: gmsh failed: ");
-  TEST_MESSAGE(try_work(60, fail_in_gmsh, NULL), PETSC_ERR_FILE_UNEXPECTED, "/nowhere/at/all.msh");
-  TEST_MESSAGE(try_work(60, no_mesh, NULL), PETSC_ERR_FILE_UNEXPECTED,
-               "body 'b': thing: holds no tetrahedra");
+  SB_CHECK_ERROR(try_work(60, crash, NULL), PETSC_ERR_FILE_UNEXPECTED, "body 'b'");
+  SB_CHECK_ERROR(try_work(1.5, hang, NULL), PETSC_ERR_FILE_UNEXPECTED, "body 'b'|1.5 s");
+  SB_CHECK_ERROR(try_work(60, leave, NULL), PETSC_ERR_FILE_UNEXPECTED, "body 'b'|code 3");
+  SB_CHECK_ERROR(try_work(60, refuse, "seven is too many"), PETSC_ERR_USER_INPUT, "seven is too many");
+  SB_CHECK_ERROR(try_work(60, fail_in_gmsh, NULL), PETSC_ERR_FILE_UNEXPECTED, "body 'b'");
+  SB_CHECK_ERROR(try_work(60, fail_in_gmsh, NULL), PETSC_ERR_FILE_UNEXPECTED, "/nowhere/at/all.msh");
+  SB_CHECK_ERROR(try_work(60, no_mesh, NULL), PETSC_ERR_FILE_UNEXPECTED, "body 'b'");
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -161,8 +161,7 @@ static PetscErrorCode test_output(void)
     SB_CHECK(!strcmp(text, "3 2 liver"), "the tet is of '%s'", text);
     PetscCall(SbMeshFileDestroy(&im));
   }
-  TEST_MESSAGE(test_read(path, 7, &im), PETSC_ERR_FILE_UNEXPECTED,
-               "has no step 7; it has 2 of them, from 3 to 120 (-1: the last one)");
+  SB_CHECK_ERROR(test_read(path, 7, &im), PETSC_ERR_FILE_UNEXPECTED, "step 7|3|120|-1");
   (void)unlink(path);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -213,7 +212,7 @@ static PetscErrorCode with_array(const char *path, const char *name, int ndim, c
   (void)H5Ldelete(file, name, H5P_DEFAULT);
   if (ndim) put_array(file, name, ndim, size, type, data);
   (void)H5Fclose(file);
-  TEST_MESSAGE(test_read(path, 0, &im), PETSC_ERR_FILE_UNEXPECTED, words);
+  SB_CHECK_ERROR(test_read(path, 0, &im), PETSC_ERR_FILE_UNEXPECTED, words);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -227,30 +226,21 @@ static PetscErrorCode test_damage(void)
 
   PetscFunctionBeginUser;
   test_path("bad.h5", sizeof(path), path);
+  PetscCall(with_array(path, "/mesh/x", 0, NULL, 0, NULL, "/mesh/x|/mesh/cells"));
+  PetscCall(with_array(path, "/mesh/x", 2, four_by_three, H5T_NATIVE_DOUBLE, bad, "/mesh/x|row 4"));
+  PetscCall(with_array(path, "/mesh/x", 2, pair, H5T_NATIVE_DOUBLE, bad, "/mesh/x|2 dimensions|2 columns|3"));
+  PetscCall(with_array(path, "/mesh/cells", 2, one_by_four, H5T_NATIVE_DOUBLE, bad, "/mesh/cells"));
   PetscCall(
-    with_array(path, "/mesh/x", 0, NULL, 0, NULL, "holds no mesh: /mesh/x and /mesh/cells are missing"));
-  PetscCall(with_array(path, "/mesh/x", 2, four_by_three, H5T_NATIVE_DOUBLE, bad,
-                       "/mesh/x holds no finite number in row 4"));
-  PetscCall(with_array(path, "/mesh/x", 2, pair, H5T_NATIVE_DOUBLE, bad,
-                       "/mesh/x has 2 dimensions and 2 columns; expected 3"));
-  PetscCall(with_array(path, "/mesh/cells", 2, one_by_four, H5T_NATIVE_DOUBLE, bad,
-                       "/mesh/cells does not hold whole numbers"));
-  PetscCall(with_array(path, "/mesh/cells", 2, one_by_four, H5T_NATIVE_INT, wild,
-                       "/mesh/cells holds 4711 in row 1; it must be from 0 to 22"));
+    with_array(path, "/mesh/cells", 2, one_by_four, H5T_NATIVE_INT, wild, "/mesh/cells|4711|row 1|0|22"));
+  PetscCall(with_array(path, "/mesh/cells", 2, one_by_four, H5T_NATIVE_INT, below, "/mesh/cells|-1|row 1"));
+  PetscCall(with_array(path, "/mesh/cells", 2, lie, H5T_NATIVE_INT, NULL, "/mesh/cells|100000000|4 numbers"));
+  PetscCall(with_array(path, "/mesh/cell_tags", 1, few, H5T_NATIVE_INT, tet, "/mesh/cell_tags|3 rows|48"));
   PetscCall(
-    with_array(path, "/mesh/cells", 2, one_by_four, H5T_NATIVE_INT, below, "/mesh/cells holds -1 in row 1"));
-  PetscCall(with_array(path, "/mesh/cells", 2, lie, H5T_NATIVE_INT, NULL,
-                       "/mesh/cells announces 100000000 x 4 numbers, more than the "));
-  PetscCall(with_array(path, "/mesh/cell_tags", 1, few, H5T_NATIVE_INT, tet,
-                       "/mesh/cell_tags has 3 rows for 48 simplices"));
-  PetscCall(with_array(path, "/mesh/cell_tags", 1, few, H5T_NATIVE_INT, wild + 1,
-                       "/mesh/cell_tags holds 4711 in row 3"));
-  PetscCall(with_array(path, "/groups/dim", 1, groups, H5T_NATIVE_INT, high,
-                       "/groups/dim holds 4 in row 5; it must be from 0 to 3"));
-  PetscCall(with_array(path, "/groups/dim", 1, two, H5T_NATIVE_INT, high, " names, 2 dimensions and "));
-  PetscCall(with_array(path, "/tag_sets/start", 1, two, H5T_NATIVE_INT, falling,
-                       "/tag_sets/start falls from 1 to 0"));
-  PetscCall(with_array(path, "/groups/name", 0, NULL, 0, NULL, "has no array /groups/name"));
+    with_array(path, "/mesh/cell_tags", 1, few, H5T_NATIVE_INT, wild + 1, "/mesh/cell_tags|4711|row 3"));
+  PetscCall(with_array(path, "/groups/dim", 1, groups, H5T_NATIVE_INT, high, "/groups/dim|4|row 5|0|3"));
+  PetscCall(with_array(path, "/groups/dim", 1, two, H5T_NATIVE_INT, high, "2 dimensions"));
+  PetscCall(with_array(path, "/tag_sets/start", 1, two, H5T_NATIVE_INT, falling, "/tag_sets/start|1|0"));
+  PetscCall(with_array(path, "/groups/name", 0, NULL, 0, NULL, "/groups/name"));
   (void)unlink(path);
   (void)snprintf(index, sizeof(index), "%.*s.xmf", (int)(strlen(path) - 3), path);
   (void)unlink(index);
@@ -282,8 +272,8 @@ static PetscErrorCode test_truncated(void)
     file = fopen(cut, "wb");
     (void)fwrite(bytes, 1, n, file);
     (void)fclose(file);
-    TEST_MESSAGE(test_read(cut, 0, &im), PETSC_ERR_FILE_UNEXPECTED,
-                 n < 8 ? "is no HDF5 file (0 bytes)" : "it is truncated, damaged or being written");
+    SB_CHECK_ERROR(test_read(cut, 0, &im), PETSC_ERR_FILE_UNEXPECTED,
+                   n < 8 ? "HDF5|0 bytes" : "body 'b'|HDF5");
   }
   PetscCall(PetscFree(bytes));
   (void)unlink(cut);
@@ -301,14 +291,12 @@ static PetscErrorCode test_foreign(void)
   hid_t file, space, a;
 
   PetscFunctionBeginUser;
-  TEST_MESSAGE(test_read("tests/data/none.h5", 0, &im), PETSC_ERR_FILE_OPEN,
-               "cannot open the file (No such file");
+  SB_CHECK_ERROR(test_read("tests/data/none.h5", 0, &im), PETSC_ERR_FILE_OPEN, "body 'b'|tests/data/none.h5");
   test_path("foreign.h5", sizeof(path), path);
   file = H5Fcreate(path, H5F_ACC_TRUNC, H5P_DEFAULT, H5P_DEFAULT);
   put_array(file, "/weather/rain", 2, one_by_four, H5T_NATIVE_INT, tet);
   (void)H5Fclose(file);
-  TEST_MESSAGE(test_read(path, 0, &im), PETSC_ERR_FILE_UNEXPECTED,
-               "are missing; it holds weather; give an .h5 mesh");
+  SB_CHECK_ERROR(test_read(path, 0, &im), PETSC_ERR_FILE_UNEXPECTED, "body 'b'|/mesh/x|/mesh/cells");
   file = H5Fcreate(path, H5F_ACC_TRUNC, H5P_DEFAULT, H5P_DEFAULT);
   space = H5Screate(H5S_SCALAR);
   a = H5Acreate2(file, "supple_mesh", H5T_NATIVE_INT, space, H5P_DEFAULT, H5P_DEFAULT);
@@ -316,8 +304,7 @@ static PetscErrorCode test_foreign(void)
   (void)H5Aclose(a);
   (void)H5Sclose(space);
   (void)H5Fclose(file);
-  TEST_MESSAGE(test_read(path, 0, &im), PETSC_ERR_FILE_UNEXPECTED,
-               "is a mesh of layout 2; this supple reads layout 1");
+  SB_CHECK_ERROR(test_read(path, 0, &im), PETSC_ERR_FILE_UNEXPECTED, "layout 2|layout 1");
   (void)unlink(path);
   test_path("none.xmf", sizeof(path), path);
   {
@@ -326,7 +313,7 @@ static PetscErrorCode test_foreign(void)
     (void)fprintf(text, "<Xdmf/>\n");
     (void)fclose(text);
   }
-  TEST_MESSAGE(test_read(path, 0, &im), PETSC_ERR_FILE_UNEXPECTED, "names no mesh in an .h5 file");
+  SB_CHECK_ERROR(test_read(path, 0, &im), PETSC_ERR_FILE_UNEXPECTED, "body 'b'|line 1");
   (void)unlink(path);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -70,7 +70,7 @@ static PetscErrorCode test_refused(void)
 
   PetscFunctionBeginUser;
   PetscCall(test_read("tests/data/bad_twice.msh", 0, &im));
-  TEST_MESSAGE(SbMeshFileMeasure(im, &f), PETSC_ERR_USER_INPUT, "have the same four nodes");
+  SB_CHECK_ERROR(SbMeshFileMeasure(im, &f), PETSC_ERR_USER_INPUT, "body 'b'|tests/data/bad_twice.msh|1");
   PetscCall(SbMeshFileDestroy(&im));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

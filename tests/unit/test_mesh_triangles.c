@@ -178,7 +178,7 @@ static PetscErrorCode refuse_file(const char *path, PetscErrorCode code, const c
   SbTriangles t;
 
   PetscFunctionBeginUser;
-  TEST_MESSAGE(SbTrianglesRead(PETSC_COMM_WORLD, "-effect_tool_obstacle", path, 1, zero, &t), code, words);
+  SB_CHECK_ERROR(SbTrianglesRead(PETSC_COMM_WORLD, "-effect_tool_obstacle", path, 1, zero, &t), code, words);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -232,7 +232,7 @@ static PetscErrorCode check_surfaces(void)
   PetscFunctionBeginUser;
   cube(PETSC_FALSE, &s); /* a hole */
   s.ntri = 11;
-  PetscCall(refuse(&s, "the surface is open: 3 edges have a triangle on one side only"));
+  PetscCall(refuse(&s, "3 edges"));
   cube(PETSC_FALSE, &s); /* one triangle turned */
   s.tri[4][0] = s.tri[4][1];
   s.tri[4][1] = 0;
@@ -244,10 +244,10 @@ static PetscErrorCode check_surfaces(void)
   PetscCall(accept(&s, 12, 1, "one triangle twice"));
   cube(PETSC_FALSE, &s); /* a corner twice, and so a hole */
   s.tri[6][1] = s.tri[6][0];
-  PetscCall(refuse(&s, "the surface is open: 3 edges"));
+  PetscCall(refuse(&s, "3 edges"));
   cube(PETSC_FALSE, &s); /* two cubes with a common edge */
   test_surface_box((PetscReal[3]){1, 1, 0}, end, PETSC_FALSE, &s);
-  PetscCall(refuse(&s, "4 triangles meet at the edge from (1, 1, "));
+  PetscCall(refuse(&s, "4 triangles|1"));
   cube(PETSC_FALSE, &s); /* two cubes, each with its own side where they touch */
   test_surface_box(beside, (PetscReal[3]){2, 1, 1}, PETSC_FALSE, &s);
   PetscCall(accept(&s, 20, 2, "two cubes side by side"));
@@ -259,7 +259,7 @@ static PetscErrorCode check_surfaces(void)
   PetscCall(accept(&s, 24, 1.125, "a part inverted"));
   cube(PETSC_FALSE, &s); /* flat: its sides collapse, top and bottom are one */
   for (int v = 0; v < 8; v++) s.x[v][2] = 0;
-  PetscCall(refuse(&s, "the surface is open: 4 edges"));
+  PetscCall(refuse(&s, "4 edges"));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -269,41 +269,33 @@ static PetscErrorCode check_files(void)
   char path[512];
 
   PetscFunctionBeginUser;
-  PetscCall(refuse_file("no/such/file.stl", PETSC_ERR_FILE_OPEN, "no/such/file.stl: cannot open the file"));
-  PetscCall(refuse_file(
-    "Makefile", PETSC_ERR_USER_INPUT,
-    "Makefile: is a file of no known kind; give one that ends in .stl, .obj, .off, .ply or .msh"));
-  PetscCall(refuse_text(".stl", "hello\n", "line 1: expected 'solid'"));
-  PetscCall(refuse_text(".stl", "solid a\nfacet normal 0 0 1\nouter loop\nvertex 1 2\nvertex",
-                        "line 5: expected the coordinate of a vertex, found 'vertex'"));
-  PetscCall(refuse_text(".stl", "solid a\nfacet normal 0 0 1\nouter loop\nvertex 1 2 3\n",
-                        "the file ends where 'vertex' is expected; it is truncated"));
-  PetscCall(refuse_text(".stl", "solid a\nfacet normal 0 0 1\nouter loop\nvertex 1,5 2,5 3,5\n",
-                        "line 4: the coordinate of a vertex, 1,5, has a decimal comma"));
-  PetscCall(refuse_text(".stl", "solid a\nend facet\n", "expected 'facet' or 'endsolid', found 'endfacet'"));
-  PetscCall(refuse_text(".stl", "solid a\n", "the file ends where 'endsolid' is expected"));
-  PetscCall(refuse_text(".stl", "solid a\nendsolid a\n", "holds no triangles"));
-  PetscCall(refuse_text(".stl", "solid a\nfacet normal 0 0 1\nouter loop\nvertex 1 2 inf\n",
-                        "line 4: the coordinate of a vertex is not a finite number"));
-  PetscCall(refuse_text(".obj", "v 0 0 0\nv 1 0 0\nf 1 2 3\n",
-                        "line 3: face 1 uses a vertex that is not there (3 of 2)"));
-  PetscCall(refuse_text(".obj", "v 0 0 0\nv 1 0 0\nf 1 2\n", "line 3: face 1 has 2 corners; it needs three"));
-  PetscCall(refuse_text(".obj", "v 0 0 0\nf 1 x 2\n", "line 2: expected the number of a vertex"));
+  PetscCall(refuse_file("no/such/file.stl", PETSC_ERR_FILE_OPEN, "no/such/file.stl"));
+  PetscCall(refuse_file("Makefile", PETSC_ERR_USER_INPUT, "-effect_tool_obstacle"));
+  PetscCall(refuse_text(".stl", "hello\n", "line 1|'solid'"));
   PetscCall(
-    refuse_text(".obj", "v 0 0\nf 1 2 3\n", "line 2: expected the coordinate of a vertex, found 'f'"));
-  PetscCall(refuse_text(".off", "COFF\n1 1 1\n", "line 1: expected 'OFF', found 'COFF'"));
-  PetscCall(refuse_text(".off", "OFF\n9999999 3 0\n", "9999999 vertices are announced"));
-  PetscCall(refuse_text(".off", "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1\n",
-                        "the file ends where the vertex of a face"));
-  PetscCall(refuse_text(".off", "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n2 0 1\n", "line 6: face 1 has 2 corners"));
+    refuse_text(".stl", "solid a\nfacet normal 0 0 1\nouter loop\nvertex 1 2\nvertex", "line 5|'vertex'"));
+  PetscCall(refuse_text(".stl", "solid a\nfacet normal 0 0 1\nouter loop\nvertex 1 2 3\n", "'vertex'"));
+  PetscCall(
+    refuse_text(".stl", "solid a\nfacet normal 0 0 1\nouter loop\nvertex 1,5 2,5 3,5\n", "line 4|1,5"));
+  PetscCall(refuse_text(".stl", "solid a\nend facet\n", "'facet'|'endsolid'|'endfacet'"));
+  PetscCall(refuse_text(".stl", "solid a\n", "'endsolid'"));
+  PetscCall(refuse_text(".stl", "solid a\nendsolid a\n", "-effect_tool_obstacle"));
+  PetscCall(refuse_text(".stl", "solid a\nfacet normal 0 0 1\nouter loop\nvertex 1 2 inf\n", "line 4"));
+  PetscCall(refuse_text(".obj", "v 0 0 0\nv 1 0 0\nf 1 2 3\n", "line 3|face 1|2"));
+  PetscCall(refuse_text(".obj", "v 0 0 0\nv 1 0 0\nf 1 2\n", "line 3|face 1|2 corners"));
+  PetscCall(refuse_text(".obj", "v 0 0 0\nf 1 x 2\n", "line 2"));
+  PetscCall(refuse_text(".obj", "v 0 0\nf 1 2 3\n", "line 2|'f'"));
+  PetscCall(refuse_text(".off", "COFF\n1 1 1\n", "line 1|'OFF'|'COFF'"));
+  PetscCall(refuse_text(".off", "OFF\n9999999 3 0\n", "9999999 vertices"));
+  PetscCall(refuse_text(".off", "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1\n", "-effect_tool_obstacle|line 7"));
+  PetscCall(refuse_text(".off", "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n2 0 1\n", "line 6|face 1|2 corners"));
   PetscCall(refuse_text(".msh", "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n1\n1 0 0 0\n$EndNodes\n",
-                        "holds no tetrahedra"));
+                        "-effect_tool_obstacle"));
   /* a binary file that lost its end is taken for text, and is none */
   cube(PETSC_FALSE, &s);
   s.ntri = 11;
   PetscCall(test_file_write(".stl", PETSC_TRUE, &s, "lost", path));
-  PetscCall(
-    refuse_file(path, PETSC_ERR_FILE_UNEXPECTED, "expected 'solid', and the size of the file is not that"));
+  PetscCall(refuse_file(path, PETSC_ERR_FILE_UNEXPECTED, "'solid'"));
   PetscCall(test_file_remove(path));
   test_surface_free(&s);
   PetscFunctionReturn(PETSC_SUCCESS);

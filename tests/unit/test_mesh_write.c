@@ -84,14 +84,12 @@ static PetscErrorCode test_errors(void)
 
   PetscFunctionBeginUser;
   PetscCall(test_read("box:1,1,1:1", 0, &im));
-  TEST_MESSAGE(SbMeshFileWrite(im, "mesh.stl", SB_MESH_AUTO), PETSC_ERR_USER_INPUT,
-               "mesh.stl: meshes are written as .msh (gmsh) or .h5 (supple)");
-  TEST_MESSAGE(SbMeshFileWrite(im, "/nowhere/mesh.msh", SB_MESH_AUTO), PETSC_ERR_FILE_WRITE,
-               "/nowhere/mesh.msh.part cannot be written: No such file or directory");
-  TEST_MESSAGE(SbMeshFileWrite(im, "/nowhere/mesh.h5", SB_MESH_AUTO), PETSC_ERR_FILE_WRITE,
-               "/nowhere/mesh.h5.part cannot be written: ");
-  TEST_MESSAGE(SbWrite_Gmsh(im, "/dev/full", SB_MESH_MSH41), PETSC_ERR_FILE_WRITE,
-               "/dev/full cannot be written: No space left on device");
+  SB_CHECK_ERROR(SbMeshFileWrite(im, "mesh.stl", SB_MESH_AUTO), PETSC_ERR_USER_INPUT, "mesh.stl");
+  SB_CHECK_ERROR(SbMeshFileWrite(im, "/nowhere/mesh.msh", SB_MESH_AUTO), PETSC_ERR_FILE_WRITE,
+                 "/nowhere/mesh.msh.part");
+  SB_CHECK_ERROR(SbMeshFileWrite(im, "/nowhere/mesh.h5", SB_MESH_AUTO), PETSC_ERR_FILE_WRITE,
+                 "/nowhere/mesh.h5.part");
+  SB_CHECK_ERROR(SbWrite_Gmsh(im, "/dev/full", SB_MESH_MSH41), PETSC_ERR_FILE_WRITE, "/dev/full");
   PetscCall(SbMeshFileDestroy(&im));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

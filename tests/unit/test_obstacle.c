@@ -138,23 +138,28 @@ static PetscErrorCode check_errors(void)
   SbObstacle o = NULL;
 
   PetscFunctionBeginUser;
-  CHECK_MESSAGE(SbObstacleCreate("-floor", "cone:1,2,3", &o), "-floor cone:1,2,3: write one of plane:");
-  CHECK_MESSAGE(SbObstacleCreate("-floor", "plane", &o), "write one of plane:");
-  CHECK_MESSAGE(SbObstacleCreate("-floor", "plane:0,0,1", &o), "write plane:nx,ny,nz,d");
+  SB_CHECK_ERROR(SbObstacleCreate("-floor", "cone:1,2,3", &o), PETSC_ERR_USER_INPUT, "-floor cone:1,2,3");
+  SB_CHECK_ERROR(SbObstacleCreate("-floor", "plane", &o), PETSC_ERR_USER_INPUT, "-floor plane|mesh:FILE");
+  SB_CHECK_ERROR(SbObstacleCreate("-floor", "plane:0,0,1", &o), PETSC_ERR_USER_INPUT, "plane:nx,ny,nz,d");
   PetscCall(SbObstacleDestroy(&o));
-  CHECK_MESSAGE(SbObstacleCreate("-floor", "plane:0,0,0,1", &o), "has no direction");
+  SB_CHECK_ERROR(SbObstacleCreate("-floor", "plane:0,0,0,1", &o), PETSC_ERR_USER_INPUT,
+                 "-floor plane:0,0,0,1");
   PetscCall(SbObstacleDestroy(&o));
-  CHECK_MESSAGE(SbObstacleCreate("-floor", "sphere:0,0,0,-1", &o), "the radius must be positive");
+  SB_CHECK_ERROR(SbObstacleCreate("-floor", "sphere:0,0,0,-1", &o), PETSC_ERR_USER_INPUT,
+                 "-floor sphere:0,0,0,-1");
   PetscCall(SbObstacleDestroy(&o));
-  CHECK_MESSAGE(SbObstacleCreate("-floor", "sphere:0,0,0,1,5", &o), "write sphere:x,y,z,r");
+  SB_CHECK_ERROR(SbObstacleCreate("-floor", "sphere:0,0,0,1,5", &o), PETSC_ERR_USER_INPUT, "sphere:x,y,z,r");
   PetscCall(SbObstacleDestroy(&o));
-  CHECK_MESSAGE(SbObstacleCreate("-floor", "sphere:0,0,nan,1", &o), "write sphere:x,y,z,r");
+  SB_CHECK_ERROR(SbObstacleCreate("-floor", "sphere:0,0,nan,1", &o), PETSC_ERR_USER_INPUT, "sphere:x,y,z,r");
   PetscCall(SbObstacleDestroy(&o));
-  CHECK_MESSAGE(SbObstacleCreate("-floor", "box:0,0,0,1,-1,1", &o), "the first corner must be the lower one");
+  SB_CHECK_ERROR(SbObstacleCreate("-floor", "box:0,0,0,1,-1,1", &o), PETSC_ERR_USER_INPUT,
+                 "-floor box:0,0,0,1,-1,1");
   PetscCall(SbObstacleDestroy(&o));
-  CHECK_MESSAGE(SbObstacleCreate("-floor", "capsule:1,1,1,1,1,1,1", &o), "its two ends are one point");
+  SB_CHECK_ERROR(SbObstacleCreate("-floor", "capsule:1,1,1,1,1,1,1", &o), PETSC_ERR_USER_INPUT,
+                 "-floor capsule:1,1,1,1,1,1,1");
   PetscCall(SbObstacleDestroy(&o));
-  CHECK_MESSAGE(SbObstacleCreate("-floor", "cylinder:1,1,1,1,1,2,0", &o), "the radius must be positive");
+  SB_CHECK_ERROR(SbObstacleCreate("-floor", "cylinder:1,1,1,1,1,2,0", &o), PETSC_ERR_USER_INPUT,
+                 "-floor cylinder:1,1,1,1,1,2,0");
   PetscCall(SbObstacleDestroy(&o));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

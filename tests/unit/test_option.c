@@ -58,19 +58,6 @@ static PetscErrorCode end(PetscOptions *database)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The call must fail with exactly this message. */
-#define EXPECT_MESSAGE(call, expected)                                                                   \
-  do {                                                                                                   \
-    PetscErrorCode expect_ierr;                                                                          \
-    SbErrorText expect_text;                                                                             \
-    PetscCall(PetscPushErrorHandler(PetscReturnErrorHandler, NULL));                                     \
-    expect_ierr = call;                                                                                  \
-    PetscCall(PetscPopErrorHandler());                                                                   \
-    SB_CHECK(expect_ierr == PETSC_ERR_USER, "code %d for: %s", (int)expect_ierr, expected);              \
-    PetscCall(PetscErrorMessage(PETSC_ERR_USER, NULL, &expect_text));                                    \
-    SB_CHECK(!strcmp(expect_text, expected), "message is\n  %s\nexpected\n  %s", expect_text, expected); \
-  } while (0)
-
 /* One option with a text that must be refused. */
 static PetscErrorCode refused_real(const char *options, const char *key, const char *message)
 {
@@ -80,9 +67,9 @@ static PetscErrorCode refused_real(const char *options, const char *key, const c
   PetscFunctionBeginUser;
   PetscCall(begin(options, &database));
   if (!strcmp(key, "translate"))
-    EXPECT_MESSAGE(SbOptionReals(&body_scope, key, x), message);
+    SB_CHECK_ERROR(SbOptionReals(&body_scope, key, x), PETSC_ERR_USER, message);
   else
-    EXPECT_MESSAGE(SbOptionReal(&body_scope, key, x), message);
+    SB_CHECK_ERROR(SbOptionReal(&body_scope, key, x), PETSC_ERR_USER, message);
   PetscCall(end(&database));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -90,37 +77,22 @@ static PetscErrorCode refused_real(const char *options, const char *key, const c
 static PetscErrorCode test_refused_numbers(void)
 {
   PetscFunctionBeginUser;
-  PetscCall(refused_real("-body_liver_young -3", "young",
-                         "-body_liver_young -3 Pa is outside (0, inf) Pa: Young's modulus"));
-  PetscCall(refused_real("-body_liver_young 0", "young",
-                         "-body_liver_young 0 Pa is outside (0, inf) Pa: Young's modulus"));
-  PetscCall(refused_real("-body_liver_young inf", "young",
-                         "-body_liver_young inf Pa is outside (0, inf) Pa: Young's modulus"));
-  PetscCall(refused_real("-body_liver_young nan", "young",
-                         "-body_liver_young nan Pa is outside (0, inf) Pa: Young's modulus"));
-  PetscCall(refused_real("-body_liver_young 5e3x", "young",
-                         "-body_liver_young 5e3x is not a number: Young's modulus"));
+  PetscCall(refused_real("-body_liver_young -3", "young", "-body_liver_young -3 Pa|(0, inf) Pa"));
+  PetscCall(refused_real("-body_liver_young 0", "young", "-body_liver_young 0 Pa|(0, inf) Pa"));
+  PetscCall(refused_real("-body_liver_young inf", "young", "-body_liver_young inf Pa|(0, inf) Pa"));
+  PetscCall(refused_real("-body_liver_young nan", "young", "-body_liver_young nan Pa|(0, inf) Pa"));
+  PetscCall(refused_real("-body_liver_young 5e3x", "young", "-body_liver_young 5e3x"));
+  PetscCall(refused_real("", "young", "-body_liver_young|(0, inf)"));
+  PetscCall(refused_real("-body_liver_poisson 0.5", "poisson", "-body_liver_poisson 0.5|[0, 0.5)"));
+  PetscCall(refused_real("-body_liver_poisson -1e-9", "poisson", "-body_liver_poisson -1e-9|[0, 0.5)"));
+  PetscCall(refused_real("-body_liver_closed 0", "closed", "-body_liver_closed 0|(0, 1]"));
+  PetscCall(refused_real("-body_liver_closed 1.0001", "closed", "-body_liver_closed 1.0001|(0, 1]"));
+  PetscCall(refused_real("-body_liver_translate 1,2", "translate", "-body_liver_translate 1,2|2 numbers|3"));
   PetscCall(
-    refused_real("", "young", "-body_liver_young must be given: Young's modulus, in (0, inf), unit Pa"));
-  PetscCall(refused_real(
-    "-body_liver_poisson 0.5", "poisson",
-    "-body_liver_poisson 0.5 is outside [0, 0.5): Poisson's ratio; 0.5 itself is incompressible, use 0.499"));
-  PetscCall(refused_real("-body_liver_poisson -1e-9", "poisson",
-                         "-body_liver_poisson -1e-9 is outside [0, 0.5): Poisson's ratio; 0.5 itself is "
-                         "incompressible, use 0.499"));
-  PetscCall(refused_real("-body_liver_closed 0", "closed",
-                         "-body_liver_closed 0 is outside (0, 1]: a range with a closed end"));
-  PetscCall(refused_real("-body_liver_closed 1.0001", "closed",
-                         "-body_liver_closed 1.0001 is outside (0, 1]: a range with a closed end"));
-  PetscCall(refused_real("-body_liver_translate 1,2", "translate",
-                         "-body_liver_translate 1,2 has 2 numbers, needs 3 with commas between them: shift"));
-  PetscCall(
-    refused_real("-body_liver_translate 1,2,3,4", "translate",
-                 "-body_liver_translate 1,2,3,4 has 4 numbers, needs 3 with commas between them: shift"));
-  PetscCall(refused_real("-body_liver_translate 1,,3", "translate",
-                         "-body_liver_translate 1,,3: entry 2 is not a number: shift"));
+    refused_real("-body_liver_translate 1,2,3,4", "translate", "-body_liver_translate 1,2,3,4|4 numbers"));
+  PetscCall(refused_real("-body_liver_translate 1,,3", "translate", "-body_liver_translate 1,,3|entry 2"));
   PetscCall(refused_real("-body_liver_translate 1,nan,3", "translate",
-                         "-body_liver_translate 1,nan,3 m is outside (-inf, inf) m: shift"));
+                         "-body_liver_translate 1,nan,3 m|(-inf, inf) m"));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -156,24 +128,20 @@ static PetscErrorCode test_refused_words(void)
     "-verbose perhaps -repeat 2.5 -integrator newmrk -body_liver_tags a,,b -body_liver_pull 1;2 -bodies "
     "-body_liver_mesh long_name.msh",
     &database));
-  EXPECT_MESSAGE(SbOptionBool(&run_scope, "verbose", &b),
-                 "-verbose perhaps is neither true nor false: say more");
-  EXPECT_MESSAGE(SbOptionInt(&run_scope, "repeat", &n), "-repeat 2.5 is not a whole number: how often");
-  EXPECT_MESSAGE(
-    SbOptionChoice(&run_scope, "integrator", &n),
-    "-integrator newmrk is not one of newmark|genalpha|static (did you mean newmark?): integrator");
-  EXPECT_MESSAGE(SbOptionNames(&body_scope, "tags", &n, &names),
-                 "-body_liver_tags a,,b: name 2 is empty or longer than 63 characters: names");
-  EXPECT_MESSAGE(SbOptionFormulas(&body_scope, "pull", f),
-                 "-body_liver_pull 1;2 has 2 formulas, needs 3 with semicolons between them: force");
-  EXPECT_MESSAGE(SbOptionNames(&run_scope, "bodies", &n, &names),
-                 "-bodies has no value: names of the bodies");
-  EXPECT_MESSAGE(SbOptionString(&body_scope, "mesh", sizeof(text), text),
-                 "-body_liver_mesh is longer than 7 characters: mesh file");
+  SB_CHECK_ERROR(SbOptionBool(&run_scope, "verbose", &b), PETSC_ERR_USER, "-verbose perhaps");
+  SB_CHECK_ERROR(SbOptionInt(&run_scope, "repeat", &n), PETSC_ERR_USER, "-repeat 2.5");
+  SB_CHECK_ERROR(SbOptionChoice(&run_scope, "integrator", &n), PETSC_ERR_USER, "-integrator newmrk|newmark");
+  SB_CHECK_ERROR(SbOptionNames(&body_scope, "tags", &n, &names), PETSC_ERR_USER,
+                 "-body_liver_tags a,,b|name 2|63 characters");
+  SB_CHECK_ERROR(SbOptionFormulas(&body_scope, "pull", f), PETSC_ERR_USER,
+                 "-body_liver_pull 1;2|2 formulas|3");
+  SB_CHECK_ERROR(SbOptionNames(&run_scope, "bodies", &n, &names), PETSC_ERR_USER, "-bodies");
+  SB_CHECK_ERROR(SbOptionString(&body_scope, "mesh", sizeof(text), text), PETSC_ERR_USER,
+                 "-body_liver_mesh|7 characters");
   PetscCall(end(&database));
   PetscCall(begin("-repeat 0", &database));
-  EXPECT_MESSAGE(SbOptionInt(&run_scope, "repeat", &n), "-repeat 0 is outside [1, inf): how often");
-  SB_CHECK_ERROR(SbOptionReal(&run_scope, "nonesuch", NULL), "a key without a row");
+  SB_CHECK_ERROR(SbOptionInt(&run_scope, "repeat", &n), PETSC_ERR_USER, "-repeat 0|[1, inf)");
+  SB_CHECK_ERROR(SbOptionReal(&run_scope, "nonesuch", NULL), PETSC_ERR_PLIB, "'nonesuch'");
   PetscCall(end(&database));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -363,7 +331,7 @@ static PetscErrorCode unread(const char *options, const char *message)
   PetscCall(PetscOptionsInsertString(NULL, options));
   PetscCall(read_all(PETSC_FALSE));
   if (message)
-    EXPECT_MESSAGE(SbOptionsCheck(), message);
+    SB_CHECK_ERROR(SbOptionsCheck(), PETSC_ERR_USER, message);
   else
     PetscCall(SbOptionsCheck());
   PetscCall(end(&database));
@@ -373,23 +341,15 @@ static PetscErrorCode unread(const char *options, const char *message)
 static PetscErrorCode test_check(void)
 {
   PetscFunctionBeginUser;
-  PetscCall(unread("-body_liver_yuong 3",
-                   "-body_liver_yuong is not an option of supple; did you mean -body_liver_young?"));
-  PetscCall(unread("-body_livr_young 3",
-                   "-body_livr_young is not an option of supple; did you mean -body_liver_young?"));
-  PetscCall(unread("-bodeis 3", "-bodeis is not an option of supple; did you mean -bodies?"));
-  PetscCall(unread("-integratr 3", "-integratr is not an option of supple; did you mean -integrator?"));
-  PetscCall(unread("-body_liver_colour red",
-                   "-body_liver_colour is not an option of supple here; body liver has "
-                   "mesh, scale, translate, young, tags, pull"));
-  PetscCall(
-    unread("-body_spleen_mesh a.msh",
-           "-body_spleen_mesh is not an option of supple: it names no body of this scenario (liver)"));
+  PetscCall(unread("-body_liver_yuong 3", "-body_liver_yuong|-body_liver_young"));
+  PetscCall(unread("-body_livr_young 3", "-body_livr_young|-body_liver_young"));
+  PetscCall(unread("-bodeis 3", "-bodeis|-bodies"));
+  PetscCall(unread("-integratr 3", "-integratr|-integrator"));
+  PetscCall(unread("-body_liver_colour red", "-body_liver_colour|body liver"));
+  PetscCall(unread("-body_spleen_mesh a.msh", "-body_spleen_mesh"));
   /* right, and of no use here: a warning */
   PetscCall(unread("-other 2", NULL));
-  PetscCall(unread(
-    "-body_liver_yuong 3 -body_liver_yung 4",
-    "-body_liver_yung is not an option of supple; did you mean -body_liver_young? (and 1 more like it)"));
+  PetscCall(unread("-body_liver_yuong 3 -body_liver_yung 4", "-body_liver_yung|-body_liver_young|1"));
   /* not ours: PETSc's, or near nothing */
   PetscCall(unread("-ksp_rtoll 1e-3 -frobnicate 2 -ts_st 3", NULL));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -403,12 +363,9 @@ static PetscErrorCode test_left_out(const char *folder)
   } of[] = {
     {"-body_spleen_mesh a.msh -body_spleen_young 3 -body_spleen_fibre 2", NULL},
     {"-body_liver_fibre 2", NULL},
-    {"-body_spleen_yuong 3",
-     "-body_spleen_yuong is not an option of supple; did you mean -body_spleen_young?"},
-    {"-body_spelen_young 3",
-     "-body_spelen_young is not an option of supple; did you mean -body_spleen_young?"},
-    {"-body_kidney_young 3",
-     "-body_kidney_young is not an option of supple: it names no body of this scenario (liver)"},
+    {"-body_spleen_yuong 3", "-body_spleen_yuong|-body_spleen_young"},
+    {"-body_spelen_young 3", "-body_spelen_young|-body_spleen_young"},
+    {"-body_kidney_young 3", "-body_kidney_young"},
   };
   char file[PETSC_MAX_PATH_LEN];
   PetscOptions database;
@@ -423,7 +380,7 @@ static PetscErrorCode test_left_out(const char *folder)
     PetscCall(PetscOptionsInsertString(NULL, of[i].options));
     PetscCall(read_all(PETSC_FALSE));
     if (of[i].message)
-      EXPECT_MESSAGE(SbOptionsCheck(), of[i].message);
+      SB_CHECK_ERROR(SbOptionsCheck(), PETSC_ERR_USER, of[i].message);
     else
       PetscCall(SbOptionsCheck());
     PetscCall(end(&database));
@@ -441,15 +398,13 @@ static PetscErrorCode test_missing(void)
 
   PetscFunctionBeginUser;
   PetscCall(begin("-body_liver_yuong 3 -bodis liver", &database));
-  EXPECT_MESSAGE(SbOptionReal(&body_scope, "young", &x),
-                 "-body_liver_yuong is not an option of supple; did you mean -body_liver_young?");
-  EXPECT_MESSAGE(SbOptionNames(&run_scope, "bodies", &n, &names),
-                 "-bodis is not an option of supple; did you mean -bodies?");
+  SB_CHECK_ERROR(SbOptionReal(&body_scope, "young", &x), PETSC_ERR_USER,
+                 "-body_liver_yuong|-body_liver_young");
+  SB_CHECK_ERROR(SbOptionNames(&run_scope, "bodies", &n, &names), PETSC_ERR_USER, "-bodis|-bodies");
   PetscCall(end(&database));
   /* the same key of another instance is no slip */
   PetscCall(begin("-body_livre_young 3", &database));
-  EXPECT_MESSAGE(SbOptionReal(&body_scope, "young", &x),
-                 "-body_liver_young must be given: Young's modulus, in (0, inf), unit Pa");
+  SB_CHECK_ERROR(SbOptionReal(&body_scope, "young", &x), PETSC_ERR_USER, "-body_liver_young|(0, inf)");
   PetscCall(end(&database));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -477,8 +432,7 @@ static PetscErrorCode test_ahead(void)
   SB_CHECK(!exists, "young belongs to another type");
   PetscCall(end(&database));
   PetscCall(begin("-body_liver_scale -1", &database));
-  EXPECT_MESSAGE(SbOptionCheckEarly(&body_scope, "scale"),
-                 "-body_liver_scale -1 is outside (0, inf): factor on the file's coordinates");
+  SB_CHECK_ERROR(SbOptionCheckEarly(&body_scope, "scale"), PETSC_ERR_USER, "-body_liver_scale -1|(0, inf)");
   PetscCall(end(&database));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -498,10 +452,8 @@ static PetscErrorCode test_underscores(void)
   PetscCall(SbScopeSet(&other, "body", "corotated", "liver_mesh"));
   PetscCall(SbOptionReal(&other, "scale", &x));
   SB_CHECK(x == 3, "scale of liver_mesh is %g", (double)x);
-  EXPECT_MESSAGE(
-    SbOptionReal(&body_scope, "mesh_scale", &x),
-    "-body_liver_mesh_scale has two meanings: scale of body 'liver_mesh' and mesh_scale of body 'liver'; "
-    "rename one of the two");
+  SB_CHECK_ERROR(SbOptionReal(&body_scope, "mesh_scale", &x), PETSC_ERR_USER,
+                 "-body_liver_mesh_scale|body 'liver_mesh'|body 'liver'");
   PetscCall(end(&database));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -551,8 +503,8 @@ static PetscErrorCode test_manual(const char *folder)
     SB_CHECK(headlines == 4, "%d headlines in the manual", headlines);
     SB_CHECK(required == 1, "young is not marked as required");
   }
-  SB_CHECK_ERROR(SbOptionsMarkdown(PETSC_COMM_WORLD, "/nonexistent/folder/options.md"),
-                 "a folder that does not exist");
+  SB_CHECK_ERROR(SbOptionsMarkdown(PETSC_COMM_WORLD, "/nonexistent/folder/options.md"), PETSC_ERR_FILE_OPEN,
+                 "/nonexistent/folder/options.md");
   PetscCall(end(&database));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -85,7 +85,7 @@ static PetscErrorCode test_elements(void)
     PetscCall(test_scene_close(&scene));
     SbFormat(sizeof(options), options, HELD EULER "%s %s -body_a_element %s -restart latest",
              i == 3 ? more : "-output_fields none", elements[i], i == 0 || i == 2 ? "cr" : "dg");
-    SB_CHECK_ERROR(test_scene_open_in(dir, options, &scene), "a checkpoint of other elements");
+    SB_CHECK_ERROR(test_scene_open_in(dir, options, &scene), PETSC_ERR_USER_INPUT, "'-body_a_element cr'");
     PetscCall(test_scene_close(&scene));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -160,7 +160,9 @@ static PetscErrorCode test_refused(void)
   PetscCall(test_scene_close(&scene));
   for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(others); i++) {
     SbFormat(sizeof(options), options, BOX EULER "-output_fields none -restart latest%s", others[i]);
-    SB_CHECK_ERROR(test_scene_open_in(dir, options, &scene), others[i]);
+    SB_CHECK_ERROR(test_scene_open_in(dir, options, &scene),
+                   i < 4 ? PETSC_ERR_USER_INPUT : PETSC_ERR_FILE_READ,
+                   i < 4 ? "checkpoint_000001.h5" : "nowhere.h5");
     SB_CHECK(fixture_exists(dir, "checkpoint_000001.h5"), "'%s': refused, but the folder was cleared",
              others[i]);
     PetscCall(test_scene_close(&scene));

@@ -40,7 +40,7 @@ static PetscErrorCode test_folder(void)
   SB_CHECK(!fixture_exists(dir, "a/b/checkpoint_000007.h5"), "a checkpoint of an earlier run is still there");
   PetscCall(test_scene_close(&scene));
   SbFormat(sizeof(deep), deep, "%s/a/b/notes.txt/c", dir);
-  SB_CHECK_ERROR(test_scene_open_in(deep, BOX EULER, &scene), "a folder below a file");
+  SB_CHECK_ERROR(test_scene_open_in(deep, BOX EULER, &scene), PETSC_ERR_FILE_OPEN, "-output_dir");
   PetscCall(test_scene_close(&scene));
   SbFormat(sizeof(deep), deep, "%s/a/b", dir);
   PetscCall(fixture_remove(deep));
@@ -82,7 +82,7 @@ static PetscErrorCode test_fields(void)
     SB_CHECK((fields[i].compute || !strcmp(fields[i].name, "sets")) && fields[i].unit[0] && fields[i].help[0],
              "field %s is not complete", fields[i].name);
   }
-  SB_CHECK_ERROR(SbFieldFind("von_mizes", &found), "a misspelt field");
+  SB_CHECK_ERROR(SbFieldFind("von_mizes", &found), PETSC_ERR_USER, "-output_fields|'von_mizes'|von_mises");
   PetscCall(test_scene_open_in(dir, BOX EULER "-output_fields J,J,stress", &scene));
   out = (SbOutput)scene.run->output;
   SB_CHECK(out->nfield == 3 && !strcmp(out->field[2]->name, "body"), "a field named twice: %d fields",

@@ -246,7 +246,8 @@ static PetscErrorCode test_restart(void)
     PetscCall(test_scene_close(&scene));
     SbFormat(sizeof(options), options, BODIES EULER FIELDS " -restart %s/checkpoint_000001.h5%s", dir,
              second);
-    SB_CHECK_ERROR(test_scene_open_in(dir, options, &scene), "frames with other points");
+    SB_CHECK_ERROR(test_scene_open_in(dir, options, &scene), PETSC_ERR_USER_INPUT,
+                   "-output_discontinuous|-output_dir");
     PetscCall(test_scene_close(&scene));
     SB_CHECK(fixture_exists(dir, "checkpoint_000002.h5"), "refused, but the folder was cleared");
     SbFormat(sizeof(options), options, BODIES EULER FIELDS " -restart %s/checkpoint_000001.h5%s", dir, first);

@@ -380,7 +380,7 @@ static PetscErrorCode test_failures(void)
     test_scene_open("-bodies one " BODY("one", "box:0.3,0.1,0.1:2", "linear", "p1", "-body_one_poisson 0.49 ")
                       CLAMPED STATIC "-solver pressure",
                     &scene),
-    "P1 only");
+    PETSC_ERR_USER, "-solver pressure");
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

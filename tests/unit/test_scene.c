@@ -146,24 +146,24 @@ static PetscErrorCode test_model(const char *folder)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Creation, or the check after it, must fail with this message. */
-static PetscErrorCode refused(const char *options, const char *message)
+static PetscErrorCode create_and_check(SbModel *model)
+{
+  PetscFunctionBeginUser;
+  PetscCall(SbSceneCreate(PETSC_COMM_WORLD, model));
+  PetscCall(SbOptionsCheck());
+  PetscCall(SbSceneCheck(*model));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Creation, or the check after it, must fail and name these. */
+static PetscErrorCode refused(const char *options, const char *names)
 {
   PetscOptions database;
   SbModel model = NULL;
-  PetscErrorCode ierr;
-  SbErrorText said;
 
   PetscFunctionBeginUser;
   PetscCall(begin(options, &database));
-  PetscCall(PetscPushErrorHandler(PetscReturnErrorHandler, NULL));
-  ierr = SbSceneCreate(PETSC_COMM_WORLD, &model);
-  if (!ierr) ierr = SbOptionsCheck();
-  if (!ierr) ierr = SbSceneCheck(model);
-  PetscCall(PetscPopErrorHandler());
-  SB_CHECK(ierr == PETSC_ERR_USER, "code %d for %s", (int)ierr, options);
-  PetscCall(PetscErrorMessage(PETSC_ERR_USER, NULL, &said));
-  SB_CHECK(!strncmp(said, message, strlen(message)), "message is\n  %s\nexpected\n  %s", said, message);
+  SB_CHECK_ERROR(create_and_check(&model), PETSC_ERR_USER, names);
   PetscCall(end(&database, &model));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -171,55 +171,41 @@ static PetscErrorCode refused(const char *options, const char *message)
 static PetscErrorCode test_names(void)
 {
   PetscFunctionBeginUser;
-  PetscCall(refused("", "-bodies must be given: names of the bodies"));
-  PetscCall(refused("-bodies \" \"", "-bodies names no body; at least one is needed"));
-  PetscCall(refused("-bodies liver,stone,liver",
-                    "-bodies: two are named 'liver'; every body needs a name of its own"));
-  PetscCall(refused("-bodies liver,LIVER",
-                    "-bodies: two are named 'LIVER' (upper and lower case count as one); every body"));
-  PetscCall(refused("-bodies 1liver", "-bodies: the name '1liver' does not begin with a letter"));
-  PetscCall(refused("-bodies my-liver",
-                    "-bodies: the name 'my-liver' may hold letters, digits and underscores only"));
+  PetscCall(refused("", "-bodies"));
+  PetscCall(refused("-bodies \" \"", "-bodies"));
+  PetscCall(refused("-bodies liver,stone,liver", "-bodies|'liver'"));
+  PetscCall(refused("-bodies liver,LIVER", "-bodies|'LIVER'"));
+  PetscCall(refused("-bodies 1liver", "-bodies|name '1liver'"));
+  PetscCall(refused("-bodies my-liver", "-bodies|name 'my-liver'"));
+  PetscCall(refused("-bodies liver_", "-bodies|name 'liver_'"));
+  PetscCall(refused("-bodies a__b", "-bodies|name 'a__b'"));
+  PetscCall(refused("-bodies liver_1", "-bodies|name 'liver_1'"));
+  PetscCall(refused("-bodies a_12_b", "-bodies|name 'a_12_b'"));
   PetscCall(
-    refused("-bodies liver_", "-bodies: the name 'liver_' has an underscore without a word after it"));
-  PetscCall(refused("-bodies a__b", "-bodies: the name 'a__b' has an underscore without a word after it"));
-  PetscCall(refused("-bodies liver_1", "-bodies: the name 'liver_1' has a part of digits only; leave out"));
-  PetscCall(refused("-bodies a_12_b", "-bodies: the name 'a_12_b' has a part of digits only; leave out"));
-  PetscCall(refused("-bodies a23456789_123456789_123456789_12",
-                    "-bodies: the name 'a23456789_123456789_123456789_12' is longer"));
-  PetscCall(refused("-bodies all", "-bodies: the name 'all' has a meaning of its own where sets are named"));
-  PetscCall(refused(LIVER " -effects gravity,gravity", "-effects: two are named 'gravity'; every effect"));
-  PetscCall(refused(LIVER " -sets boundary", "-sets: the name 'boundary' has a meaning of its own"));
-  PetscCall(refused(LIVER " -sets liver -set_liver_at boundary",
-                    "-sets: 'liver' is the name of a body and means the whole"));
-  PetscCall(refused(LIVER " -sets a", "-set_a_at must be given: where the set is"));
-  PetscCall(
-    refused(LIVER " -sets a -set_a_at body:lver", "-set_a_at body:lver: the scenario has no body lver"));
+    refused("-bodies a23456789_123456789_123456789_12", "-bodies|name 'a23456789_123456789_123456789_12'"));
+  PetscCall(refused("-bodies all", "-bodies|name 'all'"));
+  PetscCall(refused(LIVER " -effects gravity,gravity", "-effects|'gravity'"));
+  PetscCall(refused(LIVER " -sets boundary", "-sets|name 'boundary'"));
+  PetscCall(refused(LIVER " -sets liver -set_liver_at boundary", "-sets|'liver'"));
+  PetscCall(refused(LIVER " -sets a", "-set_a_at"));
+  PetscCall(refused(LIVER " -sets a -set_a_at body:lver", "-set_a_at body:lver|body lver"));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 static PetscErrorCode test_values(void)
 {
   PetscFunctionBeginUser;
-  PetscCall(refused("-bodies liver", "-body_liver_mesh must be given: mesh of tetrahedra"));
-  PetscCall(refused("-bodies liver -body_liver_mesh box:1,1,1:2",
-                    "-body_liver_material must be given: one of corotated, linear, neohookean, stvk"));
-  PetscCall(refused(LIVER " -body_liver_material corotate",
-                    "-body_liver_material corotate is not one of corotated, "
-                    "linear, neohookean, stvk; did you mean corotated?"));
-  PetscCall(refused(LIVER " -body_liver_element p2",
-                    "-body_liver_element p2 is not one of cr, dg, p1; did you mean p1?"));
-  PetscCall(refused(LIVER " -body_liver_scale 0",
-                    "-body_liver_scale 0 is outside (0, inf): factor on the coordinates"));
-  PetscCall(
-    refused(LIVER " -body_liver_rotate 0,0,0,10", "-body_liver_rotate: the axis 0,0,0 has no direction"));
-  PetscCall(refused(LIVER " -body_liver_young -1", "-body_liver_young -1 Pa is outside (0, inf) Pa: "));
-  PetscCall(refused(LIVER " -body_liver_poisson 0.5", "-body_liver_poisson 0.5 is outside (-1, 0.5): "));
-  PetscCall(
-    refused(LIVER " -body_liver_density 0", "-body_liver_density 0 kg/m^3 is outside (0, inf) kg/m^3: "));
-  PetscCall(refused(LIVER " -mass lump", "-mass lump is not one of lumped|consistent"));
-  PetscCall(
-    refused(LIVER " -body_stone_young 1", "-body_stone_young is not an option of supple: it names no body"));
+  PetscCall(refused("-bodies liver", "-body_liver_mesh"));
+  PetscCall(refused("-bodies liver -body_liver_mesh box:1,1,1:2", "-body_liver_material"));
+  PetscCall(refused(LIVER " -body_liver_material corotate", "-body_liver_material corotate|corotated"));
+  PetscCall(refused(LIVER " -body_liver_element p2", "-body_liver_element p2|p1"));
+  PetscCall(refused(LIVER " -body_liver_scale 0", "-body_liver_scale 0|(0, inf)"));
+  PetscCall(refused(LIVER " -body_liver_rotate 0,0,0,10", "-body_liver_rotate|0,0,0"));
+  PetscCall(refused(LIVER " -body_liver_young -1", "-body_liver_young -1 Pa|(0, inf) Pa"));
+  PetscCall(refused(LIVER " -body_liver_poisson 0.5", "-body_liver_poisson 0.5|(-1, 0.5)"));
+  PetscCall(refused(LIVER " -body_liver_density 0", "-body_liver_density 0 kg/m^3|(0, inf) kg/m^3"));
+  PetscCall(refused(LIVER " -mass lump", "-mass lump|lumped"));
+  PetscCall(refused(LIVER " -body_stone_young 1", "-body_stone_young"));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -241,14 +227,12 @@ static PetscErrorCode test_check(const char *folder)
   PetscCallMPI(MPI_Barrier(PETSC_COMM_WORLD));
   PetscCall(
     PetscSNPrintf(options, sizeof(options), "-bodies liver -body_liver_mesh %s/livr.msh" LAW, folder));
-  PetscCall(PetscSNPrintf(
-    message, sizeof(message),
-    "-body_liver_mesh %s/livr.msh: No such file or directory; did you mean %s/liver.msh?", folder, folder));
+  PetscCall(
+    PetscSNPrintf(message, sizeof(message), "-body_liver_mesh %s/livr.msh|%s/liver.msh", folder, folder));
   PetscCall(refused(options, message));
-  PetscCall(refused("-bodies liver -body_liver_mesh nowhere.msh" LAW,
-                    "-body_liver_mesh nowhere.msh: No such file or directory; relative names begin in /"));
+  PetscCall(refused("-bodies liver -body_liver_mesh nowhere.msh" LAW, "-body_liver_mesh nowhere.msh"));
   /* not dynamic, and nothing holds the body */
-  PetscCall(refused(LIVER " -effects gravity", "-time static: nothing holds the bodies"));
+  PetscCall(refused(LIVER " -effects gravity", "-time static"));
   PetscCall(begin(LIVER " -effects hold -effect_hold_type fixed -effect_hold_on xmin", &database));
   PetscCall(SbSceneCreate(PETSC_COMM_WORLD, &model));
   PetscCall(SbSceneCheck(model));
@@ -267,8 +251,7 @@ static PetscErrorCode test_many_sets(void)
     (void)snprintf(name, sizeof(name), ",s%d", i);
     PetscCall(PetscStrlcat(options, name, sizeof(options)));
   }
-  PetscCall(refused(
-    options, "the scenario uses more than 63 sets (0 in -sets, the others named by effects and inclusions)"));
+  PetscCall(refused(options, "63 sets|0|-sets"));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -292,17 +292,16 @@ static PetscErrorCode check_errors(void)
   PetscCall(test_file_write(".off", PETSC_FALSE, &s, NULL, path));
   PetscCall(PetscSNPrintf(text, sizeof(text), "mesh:%s,1e-4", path));
   PetscCall(SbObstacleCreate("-o", text, &o));
-  TEST_MESSAGE(SbObstacleSetUp(o, PETSC_COMM_WORLD, "-o", 1, zero, sizeof(note), note), PETSC_ERR_USER_INPUT,
-               "-o: cells of 0.0001 m around an obstacle of");
+  SB_CHECK_ERROR(SbObstacleSetUp(o, PETSC_COMM_WORLD, "-o", 1, zero, sizeof(note), note),
+                 PETSC_ERR_USER_INPUT, "-o|0.0001 m");
   PetscCall(SbObstacleDestroy(&o));
-  TEST_MESSAGE(SbObstacleCreate("-o", "mesh:", &o), PETSC_ERR_USER_INPUT, "write mesh:FILE[,cell]");
+  SB_CHECK_ERROR(SbObstacleCreate("-o", "mesh:", &o), PETSC_ERR_USER_INPUT, "mesh:FILE[,cell]");
   PetscCall(SbObstacleDestroy(&o));
-  TEST_MESSAGE(SbObstacleCreate("-o", "mesh:a.stl,-1", &o), PETSC_ERR_USER_INPUT,
-               "-o mesh:a.stl,-1: the cell must be positive");
+  SB_CHECK_ERROR(SbObstacleCreate("-o", "mesh:a.stl,-1", &o), PETSC_ERR_USER_INPUT, "-o mesh:a.stl,-1");
   PetscCall(SbObstacleDestroy(&o));
   PetscCall(SbObstacleCreate("-o", "mesh:no,such.stl", &o));
-  TEST_MESSAGE(SbObstacleSetUp(o, PETSC_COMM_WORLD, "-o", 1, zero, sizeof(note), note), PETSC_ERR_FILE_OPEN,
-               "-o: no,such.stl: cannot open the file");
+  SB_CHECK_ERROR(SbObstacleSetUp(o, PETSC_COMM_WORLD, "-o", 1, zero, sizeof(note), note), PETSC_ERR_FILE_OPEN,
+                 "-o|no,such.stl");
   PetscCall(SbObstacleDestroy(&o));
   PetscCall(test_file_remove(path));
   test_surface_free(&s);

@@ -77,16 +77,6 @@ static const char *const norms[][2] = {
   {"bcgs", "none preconditioned unpreconditioned"},
 };
 
-static char message[2048];
-
-static PetscErrorCode keep(MPI_Comm comm, int line, const char *function, const char *file, PetscErrorCode n,
-                           PetscErrorType p, const char *text, void *ctx)
-{
-  (void)comm, (void)line, (void)function, (void)file, (void)ctx;
-  if (p == PETSC_ERROR_INITIAL) (void)snprintf(message, sizeof(message), "%s", text ? text : "");
-  return n;
-}
-
 /* Runs a case with more options; x: the largest displacement of all nodes, m. */
 static PetscErrorCode run(const Case *c, const char *more, PetscErrorCode *code, PetscReal *x, char stop[512])
 {
@@ -97,8 +87,8 @@ static PetscErrorCode run(const Case *c, const char *more, PetscErrorCode *code,
   PetscCall(PetscSNPrintf(text, sizeof(text), "%s -ksp_rtol 1e-6 -snes_rtol 1e-5 -ksp_gmres_restart 100 %s",
                           c->options, more));
   *x = 0.;
-  message[0] = stop[0] = 0;
-  PetscCall(PetscPushErrorHandler(keep, NULL));
+  sb_test_text[0] = stop[0] = 0;
+  PetscCall(PetscPushErrorHandler(sb_test_keep, NULL));
   *code = test_scene_open(text, &t);
   if (!*code) *code = SbRunSolve(t.run);
   PetscCall(PetscPopErrorHandler());
@@ -121,10 +111,11 @@ static PetscErrorCode check(const Case *c, const char *more, PetscReal exact, co
   PetscCall(run(c, more, &code, &x, stop));
   if (option) {
     SB_CHECK(code == PETSC_ERR_USER || code == PETSC_ERR_USER_INPUT, "%s, %s: not refused, code %d, %s",
-             c->name, more, (int)code, message);
-    SB_CHECK(strstr(message, option) && !strchr(message, '\n'), "%s, %s: %s", c->name, more, message);
+             c->name, more, (int)code, sb_test_text);
+    SB_CHECK(sb_test_names(sb_test_text, option) && !strchr(sb_test_text, '\n'), "%s, %s: %s", c->name, more,
+             sb_test_text);
   } else {
-    SB_CHECK(!code && !stop[0], "%s, %s: code %d, %s%s", c->name, more, (int)code, message, stop);
+    SB_CHECK(!code && !stop[0], "%s, %s: code %d, %s%s", c->name, more, (int)code, sb_test_text, stop);
     if (!code && !stop[0] && exact > 0.)
       SB_CHECK(PetscAbsReal(x - exact) <= 1e-4 * exact, "%s, %s: %.10g, not %.10g", c->name, more, (double)x,
                (double)exact);
@@ -180,7 +171,7 @@ static PetscErrorCode check_case(const Case *c, PetscMPIInt size, PetscBool all)
 
   PetscFunctionBeginUser;
   PetscCall(run(c, "", &code, &exact, stop));
-  SB_CHECK(!code && !stop[0] && exact > 0., "%s: code %d, %s%s", c->name, (int)code, message, stop);
+  SB_CHECK(!code && !stop[0] && exact > 0., "%s: code %d, %s%s", c->name, (int)code, sb_test_text, stop);
   for (size_t k = 0; k < PETSC_STATIC_ARRAY_LENGTH(methods); k++) {
     for (size_t p = 0; p < PETSC_STATIC_ARRAY_LENGTH(types); p++) {
       PetscCall(available(types[p], size, &has));
