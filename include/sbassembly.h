@@ -31,10 +31,7 @@ typedef struct _p_SbPlan {
 } * SbPlan;
 #define SB_NOT_OWNED PETSC_MIN_INT
 
-/* Where a cell's places begin in `offset`: block (a, b) follows at SB_BATCH (width a + b). */
-size_t SbPlanCellOffset(SbSpace space, PetscInt cell);
 PetscErrorCode SbPlanCreate(SbSpace space, SbPlan *plan);
-PetscErrorCode SbPlanDestroy(SbPlan *plan);
 
 /*
   The volumetric part of a tangent, kept out of the matrix: sum over cells of modulus / V b b^T, b_a = V D grad psi_a with D from
@@ -53,13 +50,17 @@ typedef struct {
 */
 PetscErrorCode SbSpaceAssembleSplit(SbSpace s, const SbStage *stage, PetscInt n, const SbSpace space[],
                                     const Mat A[], const SbVolumetric *out);
-/* pc_pressure_operator.c, for an operator of SbPressureOperatorCreate(); other matrices are left alone. */
-PetscErrorCode SbPressureOperatorAssemble(Mat A, const SbStage *stage, PetscBool *is);
-PetscErrorCode SbPressureOperatorFinish(Mat A);
-/* Between the two, factor times a block (N/m) that is in its matrix already, for the coarse spaces. Not collective. */
-PetscErrorCode SbPressureOperatorAddSpring(Mat A, PetscInt node, PetscReal factor, const PetscReal block[9]);
-/* Its matrix; A itself when A is not one. */
-PetscErrorCode SbPressureOperatorMatrix(Mat A, Mat *inner);
+
+/* How an operator that is more, or less, than one matrix of blocks is assembled. */
+typedef struct {
+  Mat stored; /* what SbSpaceAddCellBlock() adds to; borrowed; NULL: there is no such matrix */
+  PetscErrorCode (*assemble)(Mat A, const SbStage *stage); /* for SbSpaceAssembleTangent(). Not collective */
+  /* for SbSpaceAddSpring(): factor times a block, N/m, of a local node; it is in `stored` already. NULL: nothing more. Not collective */
+  PetscErrorCode (*add_spring)(Mat A, PetscInt node, PetscReal factor, const PetscReal block[9]);
+  PetscErrorCode (*finish)(Mat A); /* for SbSpaceFinishTangent(); NULL: nothing is to be done. Collective */
+} SbAssembly;
+/* Makes the functions of sbfem.h assemble A so. The table is borrowed and lives as long as A. Collective. */
+PetscErrorCode SbMatrixSetAssembly(Mat A, const SbAssembly *assembly);
 
 /* u[3 a + i][lane] of a batch from a local array [nnode][3]. */
 static inline void sb_gather(const PetscInt node[4 * SB_BATCH], const PetscReal x[], SbLane u[12])

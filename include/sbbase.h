@@ -148,6 +148,17 @@ typedef struct {
 /* For PetscPushErrorHandler(), ctx an SbCaughtError: keeps the message. An error that is not the user's is also printed with its trace. */
 PetscErrorCode SbCatchError(MPI_Comm comm, int line, const char *function, const char *file,
                             PetscErrorCode code, PetscErrorType kind, const char *text, void *ctx);
+/* Keeps the error of a call that this rank makes alone: SB_CATCH(&caught, call). */
+#define SB_CATCH(caught, call)                              \
+  do {                                                      \
+    PetscErrorCode sb_ierr;                                 \
+    PetscCall(PetscPushErrorHandler(SbCatchError, caught)); \
+    sb_ierr = call;                                         \
+    PetscCall(PetscPopErrorHandler());                      \
+    (caught)->code = (int)sb_ierr;                          \
+  } while (0)
+/* Raises on all ranks what the lowest rank that failed has caught. Collective. */
+PetscErrorCode SbCaughtRaise(MPI_Comm comm, const SbCaughtError *caught);
 /* One line `supple: warning: ...` on stderr by rank 0 of comm; a printf format without newline. Collective. */
 PetscErrorCode SbWarning(MPI_Comm comm, const char *format, ...) PETSC_ATTRIBUTE_FORMAT(2, 3);
 

@@ -27,9 +27,10 @@ struct _p_SbCouple {
   PetscBool external;       /* rows may tie nodes to something that is no body */
   PetscInt version, matrix; /* raised when the rows change, and when K does */
   SbSaddleFactor factored;  /* NULL before the first solve with SB_SADDLE_DIRECT */
-  PetscInt n, size;         /* rows, room */
-  PetscInt ntotal;          /* rows of all ranks */
-  PetscInt *start;          /* [n+1] */
+  PetscErrorCode (*destroy_factored)(SbSaddleFactor *); /* by who made it */
+  PetscInt n, size;                                     /* rows, room */
+  PetscInt ntotal;                                      /* rows of all ranks */
+  PetscInt *start;                                      /* [n+1] */
   PetscInt nentry, entry_size;
   PetscInt *gnode;                         /* [nentry] */
   PetscReal *coef, *along;                 /* [nentry][3] of the sum, and of the force */
@@ -66,7 +67,3 @@ PetscErrorCode SbConstraintsProject(SbConstraints c, Vec x);
 PetscErrorCode SbConstraintsSolveGram(SbConstraints c);
 /* r <- r - F^T lambda, what rows cannot take; lambda into c->exact.force, N. Collective. */
 PetscErrorCode SbConstraintsProjectForce(SbConstraints c, Vec r);
-
-/* Negative eigenvalues of K + F^T k G in the null space of the rows, from that factorisation; -1: it does not tell. Collective. */
-PetscErrorCode SbSaddleFactorCountNegative(SbSpace space, PetscInt *negative);
-PetscErrorCode SbSaddleFactorDestroy(SbSaddleFactor *factored);

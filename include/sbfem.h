@@ -284,8 +284,6 @@ PetscErrorCode SbSpaceFindSet(SbSpace space, const char *name, const char *where
 PetscErrorCode SbSpaceCreateMatrixFree(SbSpace space, Mat *A);
 /* PETSC_TRUE when the space's laws and mass allow a matrix-free operator. Not collective, same on all ranks. */
 PetscErrorCode SbSpaceAllowsMatrixFree(SbSpace space, PetscBool *has);
-/* Sets the state of a matrix-free operator: u and the shifts of the stage. PETSC_FALSE in `is` (and nothing done) for another matrix. */
-PetscErrorCode SbMatrixFreeSetState(Mat A, const SbStage *stage, PetscBool *is);
 
 /*
   SbSpaceNodeRotations - how the material around each owned node is turned: the proper rotation next to the volume-weighted

@@ -40,8 +40,6 @@ PetscErrorCode SbLedgerAttach(SbLedger ledger);
 PetscErrorCode SbLedgerContinue(SbLedger from, SbLedger to);
 /* The error of a source in the norm of the energy, J^(1/2), and the energy that it is relative to, J. Not collective. */
 PetscErrorCode SbLedgerGet(SbLedger ledger, SbErrorSource source, PetscReal *error, PetscReal *stored);
-/* The error of the quantity that -ledger_quantity names, and its value, in its own unit. Not collective. */
-PetscErrorCode SbLedgerGetQuantity(SbLedger ledger, SbErrorSource source, PetscReal *error, PetscReal *value);
 /* Writes the table as `file`, and prints it unless quiet. NULL: nothing. Collective. */
 PetscErrorCode SbLedgerReport(SbLedger ledger, const char *file, PetscBool quiet);
 PetscErrorCode SbLedgerDestroy(SbLedger *ledger);

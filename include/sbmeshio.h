@@ -131,10 +131,8 @@ PetscErrorCode SbScanOpen(const char *where, const char *path, SbScan *scan);
 PetscErrorCode SbScanClose(SbScan *scan);
 /* "line 12" or "byte 4711" of the last token. */
 const char *SbScanPlace(const SbScan *scan, char place[64]);
-/* Numbers, as text or in binary of 4 or 8 bytes; `what` tells what is expected there. */
-PetscErrorCode SbScanText(SbScan *scan, const char *what, int64_t *value); /* always text */
-PetscErrorCode SbScanInt4(SbScan *scan, const char *what, int64_t *value);
-PetscErrorCode SbScanInt8(SbScan *scan, const char *what, int64_t *value);
+/* Numbers, as text or, but for SbScanText(), in binary; `what` names what is expected there. */
+PetscErrorCode SbScanText(SbScan *scan, const char *what, int64_t *value);
 PetscErrorCode SbScanReal(SbScan *scan, const char *what, int64_t number,
                           PetscReal *value); /* `what` of `number` */
 PetscErrorCode SbScanPoint(SbScan *scan, const char *what, int64_t number,

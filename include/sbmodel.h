@@ -88,10 +88,6 @@ PetscErrorCode SbModelContactUpdateActiveSet(SbModel model, PetscReal t, Vec U, 
 /* After effects have loaded their state from a checkpoint: holds what was constrained then, so that forces and reactions of that time are known.
    Collective. */
 PetscErrorCode SbModelContactResume(SbModel model);
-/* Restitution, of these two: Begin starts an attempt at a step; Settle, once who touches is right, sees to the energy: `again` when
-   coefficients had to be reduced. Collective. */
-PetscErrorCode SbModelRestitutionBegin(SbModel model, PetscReal dt, Vec U0, Vec V0);
-PetscErrorCode SbModelRestitutionUpdate(SbModel model, Vec U, PetscBool *again);
 /* After the first Settle of a step: the part of it after which the first point arrives at what it did not touch before, 1: none
    does; effects that do not ask for it are not examined. Collective. */
 PetscErrorCode SbModelContactTimeOfImpact(SbModel model, PetscReal *part);

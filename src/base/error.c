@@ -174,6 +174,21 @@ PetscErrorCode SbCatchError(MPI_Comm comm, int line, const char *function, const
   return code;
 }
 
+PetscErrorCode SbCaughtRaise(MPI_Comm comm, const SbCaughtError *caught)
+{
+  SbCaughtError first = *caught;
+  PetscMPIInt rank, size, who;
+
+  PetscFunctionBeginUser;
+  PetscCallMPI(MPI_Comm_rank(comm, &rank));
+  PetscCallMPI(MPI_Comm_size(comm, &size));
+  who = caught->code ? rank : size;
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &who, 1, MPI_INT, MPI_MIN, comm));
+  if (who == size) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCallMPI(MPI_Bcast(&first, (int)sizeof(first), MPI_BYTE, who, comm));
+  SETERRQ(comm, (PetscErrorCode)first.code, "%s", first.text);
+}
+
 PetscErrorCode SbWarning(MPI_Comm comm, const char *format, ...)
 {
   PetscMPIInt rank;

@@ -4,7 +4,7 @@
   f_a = s(t) integral of phi_a b(X, t) over the rest volume, by the quadrature of deadload.c. Every rank
   integrates its owned and its ghost cells, so rows of owned nodes are complete without communication.
 */
-#include "sbeffect.h"
+#include "effect_impl.h"
 
 typedef struct {
   SbEffectOn on;

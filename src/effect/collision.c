@@ -309,7 +309,7 @@ static PetscErrorCode touch_collision(SbEffect e, SbSpace space, PetscReal t, Pe
 /* ------------------------------------------------------------------ rows */
 
 /* Edges come after points, which so are preferred where both say the same. */
-PetscInt SbCollisionId(const Collision *c, PetscInt i)
+static PetscInt row_id(const Collision *c, PetscInt i)
 {
   const Hit *hit = &c->hit[i];
   const SbDetectScene *s = &c->surface->scene;
@@ -341,13 +341,13 @@ static PetscErrorCode hold_collision(SbEffect e, SbSpace space)
     SbCollisionCoef(hit, hit->normal, coef);
     if (c->friction.mu > 0) SbCollisionFrictionPush(c, hit, push, &oblique);
     if (exact(c->response))
-      PetscCall(SbSpaceAddConstraint(space, SbCollisionId(c, i), hit->n, hit->node, coef,
-                                     oblique ? push : NULL, SbCollisionPlace(hit), &hit->row));
+      PetscCall(SbSpaceAddConstraint(space, row_id(c, i), hit->n, hit->node, coef, oblique ? push : NULL,
+                                     SbCollisionPlace(hit), &hit->row));
     else
       PetscCall(SbSpaceAddPenaltyConstraint(space, hit->n, hit->node, coef, oblique ? push : NULL,
                                             SbCollisionPlace(hit), hit->k * (1 + c->damp),
                                             hit->lambda + SbCollisionBefore(c, hit), &hit->row));
-    if (c->friction.mu > 0) PetscCall(SbCollisionFrictionHold(c, space, i));
+    if (c->friction.mu > 0) PetscCall(SbCollisionFrictionHold(c, space, i, row_id(c, i)));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -6,7 +6,7 @@
 #include "rebound.h"
 #include "overlap.h"
 #include "sbdetect.h"
-#include "sbeffect.h"
+#include "effect_impl.h"
 
 #define FEW_LOOKS 3    /* how often normal and weights of a row are taken again within a step in any case */
 #define LOOKS 8        /* and how often while its gap is not closed */
@@ -177,16 +177,14 @@ PetscErrorCode SbEffectScaleRestitution_Collision(SbEffect e, PetscReal share);
 
 /* The body whose point or edge the pair begins with. */
 PetscInt SbCollisionFirst(const Collision *c, const Hit *hit);
-/* collision.c: identity of hit i, the same for any partition, below SB_COLLISION_IDS. */
-PetscInt SbCollisionId(const Collision *c, PetscInt i);
 #define SB_COLLISION_IDS (PETSC_MAX_INT / 3)
 
 /* collision_friction.c, by the functions of friction.h. The pair touches from now on. */
 void SbCollisionFrictionEnter(const Collision *c, Hit *hit);
 /* Coefficients that the normal force of a pair pushes along, if not its own (oblique). */
 void SbCollisionFrictionPush(const Collision *c, Hit *hit, PetscReal push[3 * NODES], PetscBool *oblique);
-/* Rows across the normal of hit i, which touches. Not collective. */
-PetscErrorCode SbCollisionFrictionHold(const Collision *c, SbSpace space, PetscInt i);
+/* Constraints across the normal of hit i, which touches; id: identity of its normal constraint. Not collective. */
+PetscErrorCode SbCollisionFrictionHold(const Collision *c, SbSpace space, PetscInt i, PetscInt id);
 /* What a solve made of them; along: the sum of the normal's row, m. */
 void SbCollisionFrictionRead(const Collision *c, SbSpace space, PetscReal along, Hit *hit);
 /* Who sticks and who slides from now on; changed: the solve was not right. largest: normal force of all pairs, N. Not collective. */

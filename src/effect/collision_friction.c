@@ -33,12 +33,12 @@ void SbCollisionFrictionPush(const Collision *c, Hit *hit, PetscReal push[3 * NO
   if (*oblique) SbCollisionCoef(hit, direction, push);
 }
 
-PetscErrorCode SbCollisionFrictionHold(const Collision *c, SbSpace space, PetscInt i)
+PetscErrorCode SbCollisionFrictionHold(const Collision *c, SbSpace space, PetscInt i, PetscInt id)
 {
   const SbFrictionPair p = pair_of(&c->hit[i]);
 
   PetscFunctionBeginUser;
-  PetscCall(SbFrictionHold(&c->friction, space, &p, SB_COLLISION_IDS + 2 * SbCollisionId(c, i)));
+  PetscCall(SbFrictionHold(&c->friction, space, &p, SB_COLLISION_IDS + 2 * id));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

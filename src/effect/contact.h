@@ -6,7 +6,7 @@
 #include "overlap.h"
 #include "rebound.h"
 #include "sbcontact.h"
-#include "sbeffect.h"
+#include "effect_impl.h"
 
 #define TOLERANCE 1e-7 /* of the size of the bodies: largest penetration that counts as touching */
 

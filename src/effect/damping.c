@@ -6,7 +6,7 @@
   the two numbers into the regions of the space at set-up; the forces come with inertia and with the internal
   force. Two dampings of one body add up.
 */
-#include "sbeffect.h"
+#include "effect_impl.h"
 
 typedef struct {
   SbEffectOn on;         /* names of bodies */

@@ -16,7 +16,7 @@
 
   Sums are kept in a list of the nodes touched, not in a field over the whole body.
 */
-#include "sbeffect.h"
+#include "effect_impl.h"
 
 struct _p_SbDeadLoad {
   PetscInt ncorner, nitem;

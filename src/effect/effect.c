@@ -4,7 +4,7 @@
   An effect is created by its constructor, which fills the table of operations and the private data; then it
   reads its options. Everything that needs the mesh waits for its setup operation.
 */
-#include "sbeffect.h"
+#include "effect_impl.h"
 
 PetscFunctionList SbEffectList = NULL;
 

@@ -10,7 +10,7 @@
   by a penalty (src/fem/layout.c; -body_X_dirichlet strong: the mean itself is prescribed). Single directions are
   constrained in the mean itself.
 */
-#include "sbeffect.h"
+#include "effect_impl.h"
 
 typedef struct {
   SbEffectOn on;

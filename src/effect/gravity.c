@@ -4,7 +4,7 @@
   f_a = s(t) m_a g with the lumped mass m_a of each node. For linear elements a row of the consistent mass
   matrix sums to m_a, so M g is the same vector for both kinds of mass.
 */
-#include "sbeffect.h"
+#include "effect_impl.h"
 
 typedef struct {
   PetscReal g[3]; /* m/s^2 */

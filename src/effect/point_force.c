@@ -9,7 +9,7 @@
   A force on a single vertex has no limit under mesh refinement (the displacement under it grows like 1/h); use a
   traction where the area matters.
 */
-#include "sbeffect.h"
+#include "effect_impl.h"
 
 typedef struct {
   SbEffectOn on;

@@ -5,7 +5,7 @@
   exert: the support acts on the body with +r. A body hanging at rest under its weight m g pulls its support
   down; the reaction reported here points up, +m g.
 */
-#include "sbeffect.h"
+#include "effect_impl.h"
 
 int SbPrescribedComponents(PetscInt choice)
 {

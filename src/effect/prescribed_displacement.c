@@ -9,7 +9,7 @@
   X being a vertex, or with CR and DG the centroid of a triangle. Written this way nothing cancels at small angles. Reaction: force of the drive on the body (prescribed.c has the
   sign); torque: moment of that force about the axis at rest, taken with the current positions.
 */
-#include "sbeffect.h"
+#include "effect_impl.h"
 
 typedef struct {
   SbEffectOn on;

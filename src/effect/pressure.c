@@ -28,7 +28,7 @@
   With follower = no the pressure acts on the rest area and normal, as small-strain theory has it; then there
   is no tangent.
 */
-#include "sbeffect.h"
+#include "effect_impl.h"
 
 typedef struct {
   SbEffectOn on;

@@ -9,7 +9,7 @@
   Nodes of P1 bodies are vertices; those of CR and DG lie at faces. A set that holds a corner or an edge of such a body
   holds none of its nodes. To take no notice would let go what a P1 body is constrained by, so that is an error.
 */
-#include "sbeffect.h"
+#include "effect_impl.h"
 
 PetscErrorCode SbEffectReadOn(const SbScope *scope, SbEffectOn *on)
 {

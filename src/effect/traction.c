@@ -5,7 +5,7 @@
   force F is the uniform traction F / |S|, with the area |S| summed over the facets of owned cells of all
   ranks. Vector and total add up.
 */
-#include "sbeffect.h"
+#include "effect_impl.h"
 
 typedef struct {
   SbEffectOn on;

@@ -86,7 +86,7 @@ PetscErrorCode SbConstraintsDestroy(SbConstraints *couple)
   PetscFunctionBeginUser;
   if (!c) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(destroy_matrices(c));
-  PetscCall(SbSaddleFactorDestroy(&c->factored));
+  if (c->factored) PetscCall((c->destroy_factored)(&c->factored));
   PetscCall(VecDestroy(&c->anchor));
   PetscCall(VecDestroy(&c->added));
   PetscCall(VecDestroy(&c->free));

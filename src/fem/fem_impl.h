@@ -22,6 +22,10 @@ PetscInt SbJumpCliques(SbSpace space, const PetscInt **node);
 /* The matrix of the face in lane l of batch b, times the 3x3 identity; zero in padding. */
 void SbJumpMatrix(SbSpace space, PetscInt b, PetscInt l, PetscReal K[8][8]);
 
+/* plan.c. Where a cell begins in SbPlan.offset: block (a, b) follows at SB_BATCH (width a + b). */
+size_t SbPlanCellOffset(SbSpace space, PetscInt cell);
+PetscErrorCode SbPlanDestroy(SbPlan *plan);
+
 /* The value arrays of a matrix and how blocks lie in them. */
 typedef struct {
   SbMatrixKind kind;

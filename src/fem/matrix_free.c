@@ -178,6 +178,59 @@ static PetscErrorCode MatDestroy_Frames(Mat A)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* h = R grad phi of one batch. */
+SB_KERNEL static void rotate_gradients(const SbLane R[restrict 9], const SbLane g[restrict 9],
+                                       SbLane h[restrict 9])
+{
+  for (int l = 0; l < SB_BATCH; l++) {
+    PetscReal r[9], e[9], t[9];
+
+    SbLaneGet(9, R, l, r);
+    SbLaneGet(9, g, l, e);
+    SbMatMulTranspose(e, r, t);
+    SbLanePut(9, t, l, h);
+  }
+}
+
+/* Rotations and factors of a stage. */
+static PetscErrorCode assemble(Mat A, const SbStage *stage)
+{
+  Operator *o;
+  SbSpace s;
+  PetscReal stiffest = 0.;
+
+  PetscFunctionBeginUser;
+  PetscCall(MatShellGetContext(A, &o));
+  s = o->space;
+  SbSpaceCellRotations(s, stage->u, o->R);
+  for (PetscInt b = 0; b < s->nbatch; b++)
+    rotate_gradients((const SbLane *)o->R + 9 * b, (const SbLane *)s->batch_g + 9 * b, o->h + 9 * b);
+  for (PetscInt i = 0; i < s->nnode_owned; i++) o->inertia[i] = stage->shift_a * s->node_mass[i];
+  for (PetscInt r = 0; r < s->nregion; r++) {
+    const SbRegion *region = &s->region[r];
+    const SbMaterial m = region->material;
+    const PetscReal factor = stage->shift_k + stage->shift_v * region->beta;
+    const PetscReal damping = stage->shift_v * region->alpha * m->density * region->element->ops.mass_lumped;
+
+    o->lambda[r] = factor * m->ops.volumetric_modulus(m);
+    o->mu[r] = factor * m->ops.shear_modulus(m);
+    stiffest = PetscMax(stiffest, factor * m->E);
+    for (PetscInt b = region->bstart; damping != 0. && b < region->bend; b++) {
+      for (PetscInt l = 0; l < 4 * SB_BATCH; l++) {
+        const PetscInt node = s->batch_node[4 * SB_BATCH * b + l];
+
+        if (node < s->nnode_owned) o->inertia[node] += damping * s->batch_V[b][l % SB_BATCH];
+      }
+    }
+  }
+  /* of the size of the other diagonal entries: E times the edge of a typical cell; equal on all ranks is not needed */
+  o->prescribed_diagonal =
+    s->nbatch ? stiffest * PetscCbrtReal(s->batch_V[0][0]) + (s->nnode_owned ? o->inertia[0] : 0.) : 1.;
+  PetscCall(MatAssemblyBegin(A, MAT_FINAL_ASSEMBLY));
+  PetscCall(MatAssemblyEnd(A, MAT_FINAL_ASSEMBLY));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode SbSpaceAllowsMatrixFree(SbSpace s, PetscBool *has)
 {
   PetscFunctionBeginUser;
@@ -190,6 +243,7 @@ PetscErrorCode SbSpaceAllowsMatrixFree(SbSpace s, PetscBool *has)
 
 PetscErrorCode SbSpaceCreateMatrixFree(SbSpace s, Mat *A)
 {
+  static const SbAssembly assembly = {.assemble = assemble};
   const size_t batches = 18 * (size_t)s->nbatch * sizeof(SbLane),
                nodes = 8 * (size_t)s->nnode * sizeof(PetscReal);
   PetscMPIInt size;
@@ -221,6 +275,7 @@ PetscErrorCode SbSpaceCreateMatrixFree(SbSpace s, Mat *A)
   PetscCall(MatSetOption(*A, MAT_SYMMETRY_ETERNAL, PETSC_TRUE));
   PetscCall(MatSetUp(*A));
   PetscCall(PetscObjectComposeFunction((PetscObject)*A, FRAME_OPERATOR, MatMult_Frames));
+  PetscCall(SbMatrixSetAssembly(*A, &assembly));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -242,62 +297,6 @@ PetscErrorCode SbMatrixFreeGetRotations(Mat A, const SbLane **R)
   PetscFunctionBeginUser;
   PetscCall(get_operator(A, &o));
   *R = o ? (const SbLane *)o->R : NULL;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* h = R grad phi of one batch. */
-SB_KERNEL static void rotate_gradients(const SbLane R[restrict 9], const SbLane g[restrict 9],
-                                       SbLane h[restrict 9])
-{
-  for (int l = 0; l < SB_BATCH; l++) {
-    PetscReal r[9], e[9], t[9];
-
-    SbLaneGet(9, R, l, r);
-    SbLaneGet(9, g, l, e);
-    SbMatMulTranspose(e, r, t);
-    SbLanePut(9, t, l, h);
-  }
-}
-
-PetscErrorCode SbMatrixFreeSetState(Mat A, const SbStage *stage, PetscBool *is)
-{
-  Operator *o;
-  SbSpace s;
-  PetscReal stiffest = 0.;
-
-  PetscFunctionBeginUser;
-  PetscCall(get_operator(A, &o));
-  *is = (PetscBool)(o != NULL);
-  if (!o) PetscFunctionReturn(PETSC_SUCCESS);
-  s = o->space;
-  PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_TANGENT], A, 0, 0, 0));
-  SbSpaceCellRotations(s, stage->u, o->R);
-  for (PetscInt b = 0; b < s->nbatch; b++)
-    rotate_gradients((const SbLane *)o->R + 9 * b, (const SbLane *)s->batch_g + 9 * b, o->h + 9 * b);
-  for (PetscInt i = 0; i < s->nnode_owned; i++) o->inertia[i] = stage->shift_a * s->node_mass[i];
-  for (PetscInt r = 0; r < s->nregion; r++) {
-    const SbRegion *region = &s->region[r];
-    const SbMaterial m = region->material;
-    const PetscReal factor = stage->shift_k + stage->shift_v * region->beta;
-    const PetscReal damping = stage->shift_v * region->alpha * m->density * region->element->ops.mass_lumped;
-
-    o->lambda[r] = factor * m->ops.volumetric_modulus(m);
-    o->mu[r] = factor * m->ops.shear_modulus(m);
-    stiffest = PetscMax(stiffest, factor * m->E);
-    for (PetscInt b = region->bstart; damping != 0. && b < region->bend; b++) {
-      for (PetscInt l = 0; l < 4 * SB_BATCH; l++) {
-        const PetscInt node = s->batch_node[4 * SB_BATCH * b + l];
-
-        if (node < s->nnode_owned) o->inertia[node] += damping * s->batch_V[b][l % SB_BATCH];
-      }
-    }
-  }
-  /* of the size of the other diagonal entries: E times the edge of a typical cell; equal on all ranks is not needed */
-  o->prescribed_diagonal =
-    s->nbatch ? stiffest * PetscCbrtReal(s->batch_V[0][0]) + (s->nnode_owned ? o->inertia[0] : 0.) : 1.;
-  PetscCall(MatAssemblyBegin(A, MAT_FINAL_ASSEMBLY));
-  PetscCall(MatAssemblyEnd(A, MAT_FINAL_ASSEMBLY));
-  PetscCall(PetscLogEventEnd(SbEvents[SB_EVENT_TANGENT], A, 0, 0, 0));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -15,12 +15,40 @@
 #include "sbkernel.h"
 #include <petsc/private/petscimpl.h>
 
+#define ASSEMBLY "SbAssembly"
+
+PetscErrorCode SbMatrixSetAssembly(Mat A, const SbAssembly *assembly)
+{
+  PetscContainer container;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscContainerCreate(PetscObjectComm((PetscObject)A), &container));
+  PetscCall(PetscContainerSetPointer(container, (void *)assembly));
+  PetscCall(PetscObjectCompose((PetscObject)A, ASSEMBLY, (PetscObject)container));
+  PetscCall(PetscContainerDestroy(&container));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* NULL for a matrix of blocks. */
+static PetscErrorCode get_assembly(Mat A, const SbAssembly **assembly)
+{
+  PetscObject container;
+
+  PetscFunctionBeginUser;
+  *assembly = NULL;
+  PetscCall(PetscObjectQuery((PetscObject)A, ASSEMBLY, &container));
+  if (container) PetscCall(PetscContainerGetPointer((PetscContainer)container, (void **)assembly));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode SbValuesBegin(Mat A, SbValues *x)
 {
+  const SbAssembly *own;
   PetscBool is[5];
 
   PetscFunctionBeginUser;
-  PetscCall(SbPressureOperatorMatrix(A, &A));
+  PetscCall(get_assembly(A, &own));
+  if (own && own->stored) A = own->stored;
   PetscCall(PetscObjectTypeCompare((PetscObject)A, MATSEQAIJ, &is[0]));
   PetscCall(PetscObjectTypeCompare((PetscObject)A, MATMPIAIJ, &is[1]));
   PetscCall(PetscObjectTypeCompare((PetscObject)A, MATSEQBAIJ, &is[2]));
@@ -343,13 +371,15 @@ PetscErrorCode SbSpaceAssembleSplit(SbSpace s, const SbStage *stage, PetscInt n,
 
 PetscErrorCode SbSpaceAssembleTangent(SbSpace s, const SbStage *stage, Mat A)
 {
-  PetscBool done;
+  const SbAssembly *own;
 
   PetscFunctionBeginUser;
   PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_TANGENT], A, 0, 0, 0));
-  PetscCall(SbMatrixFreeSetState(A, stage, &done));
-  if (!done) PetscCall(SbPressureOperatorAssemble(A, stage, &done));
-  if (!done) PetscCall(SbSpaceAssembleSplit(s, stage, 1, &s, &A, NULL));
+  PetscCall(get_assembly(A, &own));
+  if (own)
+    PetscCall((own->assemble)(A, stage));
+  else
+    PetscCall(SbSpaceAssembleSplit(s, stage, 1, &s, &A, NULL));
   PetscCall(PetscLogEventEnd(SbEvents[SB_EVENT_TANGENT], A, 0, 0, 0));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -378,9 +408,13 @@ PetscErrorCode SbSpaceAddCellBlock(SbSpace s, Mat A, PetscInt cell, PetscInt a, 
 
 PetscErrorCode SbSpaceAddSpring(SbSpace s, Mat A, PetscInt cell, PetscInt a, const PetscReal block[9])
 {
+  const SbAssembly *own;
+
   PetscFunctionBeginUser;
   PetscCall(SbSpaceAddCellBlock(s, A, cell, a, a, block));
-  PetscCall(SbPressureOperatorAddSpring(A, s->cell_node[4 * cell + a], s->block_scale, block));
+  PetscCall(get_assembly(A, &own));
+  if (own && own->add_spring)
+    PetscCall((own->add_spring)(A, s->cell_node[4 * cell + a], s->block_scale, block));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -412,13 +446,15 @@ static void clear_fixed(SbSpace s, const SbValues *x)
 
 PetscErrorCode SbSpaceFinishTangent(SbSpace s, Mat A)
 {
-  PetscBool matrix_free;
+  const SbAssembly *own;
   SbValues x;
 
   PetscFunctionBeginUser;
-  PetscCall(SbPressureOperatorFinish(A));
-  PetscCall(PetscObjectTypeCompare((PetscObject)A, MATSHELL, &matrix_free));
-  if (matrix_free) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(get_assembly(A, &own));
+  if (own) {
+    if (own->finish) PetscCall((own->finish)(A));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
   PetscCall(SbValuesBegin(A, &x));
   clear_fixed(s, &x);
   if (s->nodal) SbNodalConstraintsProjectMatrix(s, &x);

@@ -341,14 +341,6 @@ PetscErrorCode SbLedgerGet(SbLedger l, SbErrorSource source, PetscReal *error, P
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbLedgerGetQuantity(SbLedger l, SbErrorSource source, PetscReal *error, PetscReal *value)
-{
-  PetscFunctionBeginUser;
-  *error = l->quantity.error[source];
-  *value = l->quantity.value;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode SbLedgerDestroy(SbLedger *ledger)
 {
   SbLedger l = *ledger;

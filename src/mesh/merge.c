@@ -12,21 +12,6 @@
 
 #define FEW 50000 /* tets that rank 0 reads alone: it takes 0.02 s */
 
-PetscErrorCode SbCaughtRaise(MPI_Comm comm, const SbCaughtError *caught)
-{
-  SbCaughtError first = *caught;
-  PetscMPIInt rank, size, who;
-
-  PetscFunctionBeginUser;
-  PetscCallMPI(MPI_Comm_rank(comm, &rank));
-  PetscCallMPI(MPI_Comm_size(comm, &size));
-  who = caught->code ? rank : size;
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &who, 1, MPI_INT, MPI_MIN, comm));
-  if (who == size) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCallMPI(MPI_Bcast(&first, (int)sizeof(first), MPI_BYTE, who, comm));
-  SETERRQ(comm, (PetscErrorCode)first.code, "%s", first.text);
-}
-
 static PetscErrorCode prepare(PetscInt nbody, SbBody body[], PetscInt b, PetscInt nset, SbSet set[],
                               SbImport *im, SbPart *part)
 {

@@ -135,17 +135,6 @@ typedef enum {
 /* Reads, checks and merges all bodies, fills their "found" fields and those of the sets, alike on all ranks. Collective. */
 PetscErrorCode SbMergedMeshCreate(MPI_Comm comm, SbReading reading, PetscInt nbody, SbBody body[],
                                   PetscInt nset, SbSet set[], SbMergedMesh *merged);
-/* Keeps the error of a call that this rank makes alone: SB_CATCH(&caught, call). */
-#define SB_CATCH(caught, call)                              \
-  do {                                                      \
-    PetscErrorCode sb_ierr;                                 \
-    PetscCall(PetscPushErrorHandler(SbCatchError, caught)); \
-    sb_ierr = call;                                         \
-    PetscCall(PetscPopErrorHandler());                      \
-    (caught)->code = (int)sb_ierr;                          \
-  } while (0)
-/* Raises on all ranks what the lowest rank that failed has caught. Collective. */
-PetscErrorCode SbCaughtRaise(MPI_Comm comm, const SbCaughtError *caught);
 
 /* A body before the merge: what this rank has of it, beside its SbImport. */
 typedef struct {

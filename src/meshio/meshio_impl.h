@@ -10,6 +10,10 @@ typedef struct {
 } SbCount;
 PetscErrorCode SbImportGrow(SbCount *count, size_t unit, void *array);
 
+/* scan.c: an integer as text or in binary of 4 or 8 bytes; `what` names what is expected there. */
+PetscErrorCode SbScanInt4(SbScan *scan, const char *what, int64_t *value);
+PetscErrorCode SbScanInt8(SbScan *scan, const char *what, int64_t *value);
+
 /* A reader fills x, vert_number, items and groups from the file or description `text`. */
 typedef PetscErrorCode (*SbReader)(const char *text, SbImport *body);
 PetscErrorCode SbImportRead_Gmsh(const char *path, SbImport *body);

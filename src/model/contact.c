@@ -1,7 +1,7 @@
 /*
   Contact around the solves of a step: who touches, what is constrained, whether that was right.
 */
-#include "sbmodel.h"
+#include "model_impl.h"
 
 /* All effects write what they hold. */
 static PetscErrorCode write_holds(SbModel m)

@@ -19,7 +19,7 @@
   all effects and in the frame of the obstacle: where it does not hold, all e are reduced and the step is solved again. Of two bodies that
   arrive unstressed and stiff, one of which may be an obstacle, W / D = 2 e / (1 + e) <= 1, so that nothing is reduced there.
 */
-#include "sbmodel.h"
+#include "model_impl.h"
 
 #define REDUCTIONS 8 /* of e within a step; then it is 0 */
 #define SAFE 0.9     /* of the reduction that would do if W grew with e */

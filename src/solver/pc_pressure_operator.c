@@ -247,34 +247,23 @@ PetscErrorCode SbPressureOperatorGet(Mat K, SbPressureOperator *op)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbPressureOperatorMatrix(Mat K, Mat *inner)
+static PetscErrorCode assemble(Mat K, const SbStage *stage)
 {
   SbPressureOperator op;
 
   PetscFunctionBeginUser;
-  PetscCall(SbPressureOperatorGet(K, &op));
-  *inner = op ? op->levels->A[0] : K;
+  PetscCall(MatShellGetContext(K, &op));
+  PetscCall(SbLevelsAssemble(op->levels, stage, &op->volume));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbPressureOperatorAssemble(Mat K, const SbStage *stage, PetscBool *is)
+static PetscErrorCode add_spring(Mat K, PetscInt node, PetscReal factor, const PetscReal block[9])
 {
   SbPressureOperator op;
 
   PetscFunctionBeginUser;
-  PetscCall(SbPressureOperatorGet(K, &op));
-  *is = (PetscBool)(op != NULL);
-  if (op) PetscCall(SbLevelsAssemble(op->levels, stage, &op->volume));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode SbPressureOperatorAddSpring(Mat K, PetscInt node, PetscReal factor, const PetscReal block[9])
-{
-  SbPressureOperator op;
-
-  PetscFunctionBeginUser;
-  PetscCall(SbPressureOperatorGet(K, &op));
-  if (op) PetscCall(SbLevelsAddSpring(op->levels, node, factor, block));
+  PetscCall(MatShellGetContext(K, &op));
+  PetscCall(SbLevelsAddSpring(op->levels, node, factor, block));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -302,13 +291,12 @@ static void cell_numbers(SbPressureOperator op)
   }
 }
 
-PetscErrorCode SbPressureOperatorFinish(Mat K)
+static PetscErrorCode finish(Mat K)
 {
   SbPressureOperator op;
 
   PetscFunctionBeginUser;
-  PetscCall(SbPressureOperatorGet(K, &op));
-  if (!op) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(MatShellGetContext(K, &op));
   PetscCall(SbLevelsShareSprings(op->levels));
   for (PetscInt k = 0; k < op->levels->n; k++)
     PetscCall(SbSpaceFinishTangent(op->levels->at[k], op->levels->A[k]));
@@ -402,5 +390,7 @@ PetscErrorCode SbPressureOperatorCreate(SbSpace s, Mat *K)
   PetscCall(MatSetOption(*K, MAT_SYMMETRY_ETERNAL, PETSC_TRUE));
   PetscCall(MatSetUp(*K));
   PetscCall(PetscObjectComposeFunction((PetscObject)*K, PRESSURE_OPERATOR, MatMult_Pressure));
+  op->assembly = (SbAssembly){op->levels->A[0], assemble, add_spring, finish};
+  PetscCall(SbMatrixSetAssembly(*K, &op->assembly));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

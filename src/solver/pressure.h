@@ -51,6 +51,7 @@ typedef struct _p_SbPressureOperator *SbPressureOperator;
 struct _p_SbPressureOperator {
   SbSpace space; /* borrowed */
   SbLevels levels;
+  SbAssembly assembly; /* of the matrix */
   SbVolumetric volume;
   void *memory;    /* what volume lives in */
   PetscReal *C;    /* [ncell_owned] m^3/Pa; 1 where the cell is whole in A */

@@ -46,12 +46,11 @@ PetscErrorCode SbSaddleChoose(SbSpace s, PetscBool dynamic, PetscInt choice, SbS
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbSaddleFactorDestroy(SbSaddleFactor *factored)
+static PetscErrorCode destroy_factor(SbSaddleFactor *factored)
 {
   SbSaddleFactor f = *factored;
 
   PetscFunctionBeginUser;
-  if (!f) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PCDestroy(&f->pc));
   PetscCall(VecDestroy(&f->b));
   PetscCall(VecDestroy(&f->x));
@@ -179,7 +178,10 @@ static PetscErrorCode update(SbSpace s)
   SbSaddleFactor f;
 
   PetscFunctionBeginUser;
-  if (!c->factored) PetscCall(PetscNew(&c->factored));
+  if (!c->factored) {
+    PetscCall(PetscNew(&c->factored));
+    c->destroy_factored = destroy_factor;
+  }
   f = c->factored;
   if (f->pc && f->matrix == c->matrix && f->version == c->version) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(factor(s, f));

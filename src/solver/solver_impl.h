@@ -72,6 +72,8 @@ PetscErrorCode SbPCPressureCreate(SbSpace space, PC pc);
   Output: ok, false when the matrix could not be factored; z is not a number then.
 */
 PetscErrorCode SbSaddleFactorSolve(SbSpace space, Vec r, Vec z, PetscBool *ok);
+/* Negative eigenvalues of K + F^T k G in the null space of the constraints, from that factorisation; -1: it does not tell. Collective. */
+PetscErrorCode SbSaddleFactorCountNegative(SbSpace space, PetscInt *negative);
 
 /* -reproducible: runs on the same number of ranks have the same bits. Not collective. */
 PetscErrorCode SbSolverReproducible(PetscBool *reproducible);

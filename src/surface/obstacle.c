@@ -48,8 +48,7 @@ static PetscErrorCode read_first(MPI_Comm comm, const char *where, const char *p
     if (ierr) PetscCall(SbTrianglesDestroy(t));
     caught.code = (int)ierr;
   }
-  PetscCallMPI(MPI_Bcast(&caught, (int)sizeof(caught), MPI_BYTE, 0, comm));
-  PetscCheck(!caught.code, comm, (PetscErrorCode)caught.code, "%s", caught.text);
+  PetscCall(SbCaughtRaise(comm, &caught));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

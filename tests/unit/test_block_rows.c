@@ -102,7 +102,6 @@ int main(int argc, char **argv)
   TestScene t;
   SbStage stage = {.shift_a = 50., .shift_v = 0., .shift_k = 1.};
   PetscReal worst;
-  PetscBool is;
   PetscMPIInt size;
   int kinds;
   SbSpace s;
@@ -129,7 +128,7 @@ int main(int argc, char **argv)
     PetscCall(SbModelTangent(t.model, 0., stage.shift_v, stage.shift_a, 1., U, NULL, A[3]));
   }
   PetscCall(SbSpaceGetLocalRead(s, U, &stage.u));
-  PetscCall(SbMatrixFreeSetState(A[2], &stage, &is));
+  PetscCall(SbSpaceAssembleTangent(s, &stage, A[2]));
   PetscCall(SbSpaceRestoreLocalRead(s, U, &stage.u));
   for (int k = 0; k < kinds; k++) PetscCall(get(s, A[k], &rows[k]));
   for (int k = 0; k < kinds; k++) {

@@ -7,6 +7,7 @@
   exactly: degree 4 of q on rules of degree 5.
 */
 // @ranks 1 3
+#include "../../src/effect/effect_impl.h"
 #include "effect_fixture.h"
 
 static const char *const sets[][2] = {{"top", "plane:0,0,1,1"}};

@@ -3,6 +3,7 @@
   effect that is left with nothing is an error; with every element; supports of DG faces.
 */
 // @ranks 1 3
+#include "../../src/effect/effect_impl.h"
 #include "effect_fixture.h"
 
 static const char *const sets[][2] = {

@@ -3,6 +3,7 @@
   when sets overlap, and what a wrong set is answered.
 */
 // @ranks 1 3
+#include "../../src/effect/effect_impl.h"
 #include "effect_fixture.h"
 
 static const char *const sets[][2] = {

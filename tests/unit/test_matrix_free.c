@@ -49,7 +49,7 @@ static PetscErrorCode compare(const char *law)
   char text[2048];
   SbStage stage = {.shift_a = 50., .shift_v = 7., .shift_k = 1.};
   PetscReal norm, difference, a, b;
-  PetscBool is, has;
+  PetscBool has;
   SbSpace s;
   Vec U, X, W, Y, Z;
   Mat A, F;
@@ -74,10 +74,8 @@ static PetscErrorCode compare(const char *law)
   PetscCall(SbModelTangent(t.model, 0., stage.shift_v, stage.shift_a, stage.shift_k, U, U, A));
   PetscCall(SbSpaceCreateMatrixFree(s, &F));
   PetscCall(SbSpaceGetLocalRead(s, U, &stage.u));
-  PetscCall(SbMatrixFreeSetState(A, &stage, &is));
-  SB_CHECK(!is, "a matrix was taken for a matrix-free operator");
-  PetscCall(SbMatrixFreeSetState(F, &stage, &is));
-  SB_CHECK(is, "a matrix-free operator was not recognised");
+  PetscCall(SbSpaceAssembleTangent(s, &stage, F));
+  PetscCall(SbSpaceFinishTangent(s, F));
   PetscCall(SbSpaceRestoreLocalRead(s, U, &stage.u));
   PetscCall(MatMult(A, X, Y));
   PetscCall(MatMult(F, X, Z));

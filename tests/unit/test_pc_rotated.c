@@ -100,7 +100,6 @@ static PetscErrorCode solve(Case *c, void (*state)(const PetscReal x[3], PetscRe
   SbStage stage = {.shift_a = 3600., .shift_v = 60., .shift_k = 1.};
   KSPConvergedReason reason;
   PetscReal norm, error;
-  PetscBool is;
   Vec r;
 
   PetscFunctionBeginUser;
@@ -110,7 +109,7 @@ static PetscErrorCode solve(Case *c, void (*state)(const PetscReal x[3], PetscRe
     PetscCall(VecZeroEntries(c->U));
   if (c->frames) {
     PetscCall(SbSpaceGetLocalRead(m->space, c->U, &stage.u));
-    PetscCall(SbMatrixFreeSetState(c->A, &stage, &is));
+    PetscCall(SbSpaceAssembleTangent(m->space, &stage, c->A));
     PetscCall(SbSpaceRestoreLocalRead(m->space, c->U, &stage.u));
   } else
     PetscCall(SbModelTangent(m, 0., stage.shift_v, stage.shift_a, 1., c->U, c->U, c->A));
@@ -218,13 +217,12 @@ static PetscErrorCode check_work(PetscMPIInt size)
     MPI_Comm comm = k ? PETSC_COMM_WORLD : PETSC_COMM_SELF;
     SbStage stage = {.shift_a = 3600., .shift_v = 60., .shift_k = 1.};
     TestScene t;
-    PetscBool is;
     Mat A;
     PC pc;
 
     PetscCall(test_scene_open_on(comm, NULL, options, &t));
     PetscCall(SbSpaceCreateMatrixFree(t.model->space, &A));
-    PetscCall(SbMatrixFreeSetState(A, &stage, &is));
+    PetscCall(SbSpaceAssembleTangent(t.model->space, &stage, A));
     PetscCall(PCCreate(comm, &pc));
     PetscCall(PCSetOperators(pc, A, A));
     PetscCall(SbPCRotatedCreate(t.model->space, pc));

@@ -1,0 +1,104 @@
+/*
+  effect_impl.h - what several effects share: formulas, selection by sets, dead loads, prescribed unknowns, contact points.
+*/
+#pragma once
+#include "sbeffect.h"
+
+/*
+  SbEffectFormulas - reads the formulas of an option and says whether they change with time.
+
+  Not collective.
+
+  Input:
+    scope, key - as for SbOptionFormulas(); the row of the key says how many formulas there are (n)
+    n          - how many the caller expects, 1..3
+    place      - whether the formulas may use x, y, z
+  Output:
+    formulas[n] - the caller destroys each
+    steady      - cleared when a formula uses t, untouched otherwise
+
+  Errors: PETSC_ERR_USER_INPUT when a formula uses x, y or z and may not.
+*/
+PetscErrorCode SbEffectFormulas(const SbScope *scope, const char *key, PetscInt n, PetscBool place,
+                                SbFormula formulas[], PetscBool *steady);
+
+/* The sets named by the option -effect_<name>_on, as read by SbEffectReadOn(). */
+typedef struct SbEffectOn_ {
+  char option[2 * SB_NAME_MAX]; /* full name of the option, for messages */
+  PetscInt n;
+  char (*name)[SB_NAME_MAX]; /* [n] owned */
+} SbEffectOn;
+PetscErrorCode SbEffectReadOn(const SbScope *scope, SbEffectOn *on); /* release with SbEffectFreeOn() */
+PetscErrorCode SbEffectFreeOn(SbEffectOn *on);
+
+/*
+  What the named sets select on this rank, each item once even when it is in several of the sets. Collective; the caller
+  releases the array with PetscFree(). Errors (PETSC_ERR_USER_INPUT, alike on all ranks): no such set; a set that selects
+  nothing of the kind, with what it does select.
+
+  SbEffectFacets - boundary facets of owned and ghost cells.
+  SbEffectNodes  - nodes that can be constrained, ascending, owned ones first. An error for a body with nodes at faces of which the
+                   sets hold vertices but no face.
+  SbEffectVertices - vertices of the mesh, ascending, owned ones first.
+  SbEffectCells  - cells, ascending, owned ones first; every local cell when no set is named.
+*/
+PetscErrorCode SbEffectFacets(SbSpace space, const SbEffectOn *on, PetscInt *n, SbFacet **facets);
+PetscErrorCode SbEffectNodes(SbSpace space, const SbEffectOn *on, PetscInt *n, PetscInt **nodes);
+PetscErrorCode SbEffectVertices(SbSpace space, const SbEffectOn *on, PetscInt *n, PetscInt **vertices);
+PetscErrorCode SbEffectCells(SbSpace space, const SbEffectOn *on, PetscInt *n, PetscInt **cells);
+
+/*
+  SbDeadLoad - a force per volume or per area, given by three formulas of time and rest position, integrated against the
+  basis functions of the cells or facets that carry it (src/effect/deadload.c). What is kept is one force per node; it is
+  integrated again only when the formulas use t and t has changed.
+*/
+typedef struct _p_SbDeadLoad *SbDeadLoad;
+/*
+  SbDeadLoadCreate - collects nodes and integrates once.
+
+  Not collective.
+
+  Input:
+    space    - gives elements and rest positions; borrowed, must outlive the load
+    ncorner  - 4 for cells, 3 for facets
+    nitem    - cells or facets on this rank
+    corner   - [nitem][ncorner] 4 c + a for vertex a of local cell c; those of an item are of one cell
+    density  - three formulas, N/m^3 or Pa; borrowed, must outlive the load
+  Output:
+    load     - the caller destroys it
+*/
+PetscErrorCode SbDeadLoadCreate(SbSpace space, PetscInt ncorner, PetscInt nitem, const PetscInt corner[],
+                                const SbFormula density[3], SbDeadLoad *load);
+/* f[nnode][3] += factor times the load at time t on owned nodes, N. Not collective. */
+PetscErrorCode SbDeadLoadAdd(SbDeadLoad load, PetscReal t, PetscReal factor, PetscReal f[]);
+PetscErrorCode SbDeadLoadDestroy(SbDeadLoad *load);
+
+/*
+  SbPrescribed - unknowns that an effect prescribes. An unknown belongs to the first effect that asks for it, in the order of
+  the scenario; so no two effects write one value, and no reaction is counted twice.
+*/
+typedef struct {
+  PetscInt n;
+  PetscInt *node;      /* [n] local nodes, ascending, owned ones first; owned by this struct */
+  uint8_t *components; /* [n] bit c: component c is constrained by this effect; owned by this struct */
+  PetscInt *row;       /* [n] index into space->fixed_node; filled by the first SbPrescribedSetValues() */
+  PetscBool have_rows;
+  PetscInt nowned;
+} SbPrescribed;
+/*
+  SbPrescribedSetUp - claims `components` (bits 0..2) of the nodes of the named sets. Collective; release with SbPrescribedFree().
+
+  Errors: PETSC_ERR_USER_INPUT when earlier effects already hold all of them.
+*/
+PetscErrorCode SbPrescribedSetUp(SbPrescribed *hold, SbSpace space, const SbEffectOn *on, int components);
+/* Writes value[n][3] (NULL: zero), m, into space->fixed_value. Not collective; after SbSpaceFixDone(). */
+PetscErrorCode SbPrescribedSetValues(SbPrescribed *hold, SbSpace space, const PetscReal value[]);
+/* force[3] = sum over the owned held unknowns of the residual: what holds the body, acting on it, N. Not collective. */
+void SbPrescribedReaction(const SbPrescribed *hold, const PetscReal residual[], PetscReal force[3]);
+PetscErrorCode SbPrescribedFree(SbPrescribed *hold);
+/* Bits of the choice "x|y|z|xy|yz|xz|xyz", by its position. */
+int SbPrescribedComponents(PetscInt choice);
+#define SB_COMPONENT_CHOICES "x|y|z|xy|yz|xz|xyz"
+
+/* Appends one. Not collective. */
+PetscErrorCode SbContactPointsAdd(SbContactPoints *list, const SbContactPoint *place);

@@ -1,0 +1,73 @@
+/*
+  Vectors of a space: the storage of a ghosted PETSc vector is the local array that the kernels read, owned nodes first.
+
+  A read brings the ghosts up to date; a write does not send anything. On one rank there are no ghosts, and vectors are plain ones.
+*/
+#include "fem_impl.h"
+
+PetscErrorCode SbSpaceCreateVec(SbSpace s, Vec *v)
+{
+  PetscFunctionBeginUser;
+  PetscCall(VecDuplicate(s->template_vec, v));
+  PetscCall(VecZeroEntries(*v));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbSpaceGetLocalRead(SbSpace s, Vec v, const PetscReal **array)
+{
+  Vec local = NULL;
+
+  PetscFunctionBeginUser;
+  if (!s->ghosted) {
+    PetscCall(VecGetArrayRead(v, array));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  PetscCall(VecGhostUpdateBegin(v, INSERT_VALUES, SCATTER_FORWARD));
+  PetscCall(VecGhostUpdateEnd(v, INSERT_VALUES, SCATTER_FORWARD));
+  PetscCall(VecGhostGetLocalForm(v, &local));
+  PetscCheck(local, s->comm, PETSC_ERR_ARG_WRONG,
+             "The vector has no ghost entries: make it by SbSpaceCreateVec()");
+  PetscCall(VecGetArrayRead(local, array));
+  PetscCall(VecGhostRestoreLocalForm(v, &local));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The local form has one reference, held by v itself: it outlives the restore of the form above. */
+PetscErrorCode SbSpaceRestoreLocalRead(SbSpace s, Vec v, const PetscReal **array)
+{
+  Vec local = NULL;
+
+  PetscFunctionBeginUser;
+  if (!s->ghosted) {
+    PetscCall(VecRestoreArrayRead(v, array));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  PetscCall(VecGhostGetLocalForm(v, &local));
+  PetscCall(VecRestoreArrayRead(local, array));
+  PetscCall(VecGhostRestoreLocalForm(v, &local));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbSpaceGetLocalWrite(SbSpace s, Vec v, PetscReal **array)
+{
+  PetscFunctionBeginUser;
+  if (s->ghosted) {
+    Vec local = NULL;
+
+    PetscCall(VecGhostGetLocalForm(v, &local));
+    PetscCheck(local, s->comm, PETSC_ERR_ARG_WRONG,
+               "The vector has no ghost entries: make it by SbSpaceCreateVec()");
+    PetscCall(VecGhostRestoreLocalForm(v, &local));
+  }
+  /* the storage of a ghosted vector goes on behind its owned entries */
+  PetscCall(VecGetArray(v, array));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbSpaceRestoreLocalWrite(SbSpace s, Vec v, PetscReal **array)
+{
+  PetscFunctionBeginUser;
+  (void)s;
+  PetscCall(VecRestoreArray(v, array));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

@@ -1,0 +1,10 @@
+/*
+  model_impl.h - what the files of src/model share.
+*/
+#pragma once
+#include "sbmodel.h"
+
+/* restitution.c, for SbModelContactBeginStep() and SbModelContactUpdateActiveSet(): Begin starts an attempt at a step; Update, once the active set is right, sees to the energy: `again` when
+   coefficients had to be reduced. Collective. */
+PetscErrorCode SbModelRestitutionBegin(SbModel model, PetscReal dt, Vec U0, Vec V0);
+PetscErrorCode SbModelRestitutionUpdate(SbModel model, Vec U, PetscBool *again);
