@@ -174,21 +174,102 @@ typedef struct {
 PetscBool SbTimeOfImpact(SbPairKind kind, const PetscReal x0[], const PetscReal x1[],
                          const SbCCDLimits *limits, PetscReal *time);
 
-/* ------------------------------------------------------------------ box_tree.c: which boxes meet a box */
+/* ------------------------------------------------------------------ box_tree.c: which boxes meet, which are near */
 
-/* A tree over boxes; nodes[1] is the root, the children of k are 2 k and 2 k + 1. */
+/*
+  A tree over boxes with four children to a node: four boxes form a group, four groups one of the next level. Not collective. Boxes that are empty
+  or have coordinates that are no numbers meet nothing; they may come and go with the positions.
+*/
+#define SB_BOX_TREE_LEVELS 32
 typedef struct {
-  PetscInt n, nleaf;   /* boxes; leaves, a power of two */
-  PetscInt *order;     /* [n] boxes in the order of the leaves */
-  PetscReal (*box)[6]; /* [2 nleaf] lower and upper corner of each node */
+  PetscInt n;
+  int nlevel;
+  PetscInt start[SB_BOX_TREE_LEVELS +
+                 1]; /* first group of each level; level 0 holds the boxes, the last one has one group */
+  PetscInt *order;   /* [4 start[1]] box at each place of level 0, -1: none */
+  PetscReal (*group)[6][4]; /* [start[nlevel]] lower and upper corners of the four boxes or groups in it, m */
+  PetscReal hull[6];        /* of all, m */
 } SbBoxTree;
 PetscErrorCode SbBoxTreeCreate(PetscInt n, const PetscReal (*box)[6], SbBoxTree *tree);
 PetscErrorCode SbBoxTreeDestroy(SbBoxTree *tree);
+/* The same boxes elsewhere: keeps the order, O(n). box[n][6], m. */
+PetscErrorCode SbBoxTreeRefit(SbBoxTree *tree, const PetscReal (*box)[6]);
+
+/*
+  The boxes that meet a given one, each once:
+
+      for (SbBoxQueryBegin(&tree, box, &query); SbBoxQueryNext(&query, &i);) ...
+*/
+typedef struct {
+  const SbBoxTree *tree; /* borrowed */
+  PetscReal box[6];
+  unsigned hits; /* children of the last group that are still to be given */
+  PetscInt leaf; /* place of its first child */
+  int depth;
+  PetscInt stack[3 * SB_BOX_TREE_LEVELS + 4][2]; /* level and group */
+} SbBoxQuery;
+void SbBoxQueryBegin(const SbBoxTree *tree, const PetscReal box[6], SbBoxQuery *query);
+PetscBool SbBoxQueryNext(SbBoxQuery *query, PetscInt *i);
+
+/*
+  The boxes nearer to a box (or a point, as a box without extent) than sqrt(limit2), near ones first on the whole. The caller lowers
+  `limit2` as it measures what is in them, until nothing nearer is left:
+
+      for (SbBoxNearestBegin(&tree, box, limit2, &nearest); SbBoxNearestNext(&nearest, &i);) {
+        const PetscReal d2 = ...;
+        if (d2 < nearest.limit2) { nearest.limit2 = d2; found = i; }
+      }
+*/
+typedef struct {
+  int level; /* -1: a box */
+  PetscInt index;
+  PetscReal d2;
+} SbBoxNearestEntry;
+typedef struct {
+  const SbBoxTree *tree; /* borrowed */
+  PetscReal box[6], limit2;
+  int depth;
+  SbBoxNearestEntry stack[3 * SB_BOX_TREE_LEVELS + 4];
+} SbBoxNearest;
+void SbBoxNearestBegin(const SbBoxTree *tree, const PetscReal box[6], PetscReal limit2,
+                       SbBoxNearest *nearest);
+PetscBool SbBoxNearestNext(SbBoxNearest *nearest, PetscInt *i);
+
+/*
+  All pairs of a box of one tree, grown by `grown` on each side, m, and a box of another one that meet; with the same tree twice all pairs
+  of two boxes of it, each once, in either order. Next writes up to `room` >= 16 pairs to pair[room][2] and returns how many: 0 when there are no more.
+*/
+typedef struct {
+  int level[2];
+  PetscInt group[2];
+} SbBoxPairsEntry;
+typedef struct {
+  const SbBoxTree *tree[2]; /* borrowed */
+  PetscReal grown;
+  int depth;
+  SbBoxPairsEntry stack[15 * SB_BOX_TREE_LEVELS + 16];
+} SbBoxPairs;
+void SbBoxPairsBegin(const SbBoxTree *a, const SbBoxTree *b, PetscReal grown, SbBoxPairs *pairs);
+PetscInt SbBoxPairsNext(SbBoxPairs *pairs, PetscInt room, PetscInt pair[]);
+
 /* Box of a triangle, vert[3]. */
 void SbTriangleBox(const PetscReal x[], const PetscInt vert[], PetscReal box[6]);
-/* Calls visit(ctx, i) for each box that meets the given one, until it returns an error. */
-PetscErrorCode SbBoxTreeVisit(const SbBoxTree *tree, const PetscReal box[6],
-                              PetscErrorCode (*visit)(void *ctx, PetscInt i), void *ctx);
+/* ------------------------------------------------------------------ weld.c */
+
+/* The root of a vertex in a forest of parents up[], whose paths are halved on the way. */
+static inline PetscInt SbUnionRoot(PetscInt up[], PetscInt v)
+{
+  for (; up[v] != v; v = up[v]) up[v] = up[up[v]];
+  return v;
+}
+
+/*
+  SbWeld - points that are one: those within `tolerance` of each other, m; 0: at the same place. Not collective.
+
+  Input: x[n][3], m; chains, whether chains of such pairs become one as a whole, else each point joins the first one before it that has not joined
+  another. Output: map[n], the first point of those that each point is one with.
+*/
+PetscErrorCode SbWeld(PetscInt n, const PetscReal x[], PetscReal tolerance, PetscBool chains, PetscInt map[]);
 
 /* Six times the signed volume of a tet, m^3. */
 PetscReal SbTetDeterminant(const PetscReal x[], const PetscInt vert[4]);
@@ -206,8 +287,6 @@ PetscErrorCode SbLocatorCreate(PetscInt ncell, const PetscInt cell[], const Pets
                                SbLocator *locator);
 PetscErrorCode SbLocatorDestroy(SbLocator *locator);
 PetscReal SbLocatorFind(SbLocator locator, const PetscReal point[3], PetscInt *cell, PetscReal weight[4]);
-/* The weights of the corners of a tet at a point, in it or not. */
-/* Of a tet with the corners v of x[][3] alone: sum w_a x_a = point; negative where it lies outside. */
+/* The weights of the corners v of a tet of x[][3] at a point, in it or not: sum w_a x_a = point, sum 1; negative where it lies outside. */
 void SbTetBarycentric(const PetscReal x[], const PetscInt v[4], const PetscReal point[3],
                       PetscReal weight[4]);
-void SbLocatorBarycentric(SbLocator locator, PetscInt cell, const PetscReal point[3], PetscReal weight[4]);

@@ -1,139 +1,345 @@
 /*
-  box_tree.c - which of many boxes meet a given one: a binary tree over the boxes, sorted along a Morton curve of their middles.
+  box_tree.c - which of many boxes meet a given one, or those of another tree, or each other, and which is nearest: a tree with four children to a node.
 
-  The tree is complete: leaves hold one box each (those beyond the last are empty), an inner node the hull of its two children, so
-  that no pointers are needed. Building is a sort; a query visits the nodes whose box meets the given one.
+  The boxes are ordered so that neighbours follow each other: the range is halved again and again at the median of the middles along the longer
+  axis, always at a multiple of the number of boxes below a child. Four boxes in this order form a group, four groups one of the next level; each
+  group holds the hulls of its four children side by side, so that one look tests them all, and nothing but the order has to be stored.
+  When boxes move, the order stays and the hulls are made anew.
+
+  Walks are kept by the caller and give what they find piece by piece: nothing is allocated, and what is found need not fit into memory.
 */
-#include <stdlib.h>
 #include "sbgeometry.h"
 
+/* ------------------------------------------------------------------ making a tree */
+
 typedef struct {
-  uint64_t key;
+  PetscReal middle[3];
   PetscInt box;
-} Place;
+} Item;
 
-static int compare_places(const void *a, const void *b)
+static inline PetscBool before(const Item *a, const Item *b, int axis)
 {
-  const Place *p = (const Place *)a, *q = (const Place *)b;
-
-  if (p->key != q->key) return p->key < q->key ? -1 : 1;
-  return (p->box > q->box) - (p->box < q->box);
+  return (PetscBool)(a->middle[axis] != b->middle[axis] ? a->middle[axis] < b->middle[axis]
+                                                        : a->box < b->box);
 }
 
-/* Two zero bits between the 21 bits of a coordinate. */
-static uint64_t spread(uint64_t v)
+static inline void swap(Item *a, Item *b)
 {
-  v &= 0x1fffff;
-  v = (v | v << 32) & 0x1f00000000ffffULL;
-  v = (v | v << 16) & 0x1f0000ff0000ffULL;
-  v = (v | v << 8) & 0x100f00f00f00f00fULL;
-  v = (v | v << 4) & 0x10c30c30c30c30c3ULL;
-  return (v | v << 2) & 0x1249249249249249ULL;
+  const Item keep = *a;
+
+  *a = *b;
+  *b = keep;
 }
 
-static void join(const PetscReal a[6], const PetscReal b[6], PetscReal hull[6])
+/* Brings the m first along the axis to the front (Hoare, "Algorithm 65: Find", 1961, with the median of three as pivot). */
+static void select_first(Item item[], PetscInt n, PetscInt m, int axis)
 {
-  for (int k = 0; k < 3; k++) {
-    hull[k] = PetscMin(a[k], b[k]);
-    hull[3 + k] = PetscMax(a[3 + k], b[3 + k]);
+  PetscInt low = 0, high = n - 1;
+
+  while (low < high) {
+    const PetscInt centre = low + (high - low) / 2;
+    PetscInt i = low, j = high;
+    Item pivot;
+
+    if (before(&item[centre], &item[low], axis)) swap(&item[centre], &item[low]);
+    if (before(&item[high], &item[low], axis)) swap(&item[high], &item[low]);
+    if (before(&item[high], &item[centre], axis)) swap(&item[high], &item[centre]);
+    pivot = item[centre];
+    while (i <= j) {
+      while (before(&item[i], &pivot, axis)) i++;
+      while (before(&pivot, &item[j], axis)) j--;
+      if (i <= j) swap(&item[i++], &item[j--]);
+    }
+    if (m <= j)
+      high = j;
+    else if (m >= i)
+      low = i;
+    else
+      break;
   }
 }
 
-/* Boxes along the Morton curve. */
-static PetscErrorCode sort_boxes(PetscInt n, const PetscReal (*box)[6], PetscInt order[])
+/* Orders n boxes that `below` go into each child of their node. */
+static void order_items(Item item[], PetscInt n, PetscInt below)
 {
-  PetscReal all[6], size = 0;
-  Place *place;
+  PetscReal box[6];
+  PetscInt nchild, left;
+  int axis = 0;
 
+  while (below >= n) below /= 4;
+  if (below == 0) return;
+  nchild = (n + below - 1) / below;
+  left = (nchild + 1) / 2 * below;
+  SbBoxClear(box);
+  for (PetscInt i = 0; i < n; i++) SbBoxAdd(box, item[i].middle);
+  for (int k = 1; k < 3; k++) {
+    if (box[3 + k] - box[k] > box[3 + axis] - box[axis]) axis = k;
+  }
+  select_first(item, n, left, axis);
+  order_items(item, left, below);
+  order_items(item + left, n - left, below);
+}
+
+PetscErrorCode SbBoxTreeRefit(SbBoxTree *tree, const PetscReal (*box)[6])
+{
   PetscFunctionBeginUser;
-  PetscCall(PetscMalloc1(n, &place));
-  PetscCall(PetscArraycpy(all, box[0], 6));
-  for (PetscInt i = 1; i < n; i++) join(all, box[i], all);
-  for (int k = 0; k < 3; k++) size = PetscMax(size, all[3 + k] - all[k]);
-  for (PetscInt i = 0; i < n; i++) {
-    place[i].key = 0;
-    place[i].box = i;
-    for (int k = 0; k < 3; k++) {
-      const PetscReal at = size > 0 ? (0.5 * box[i][k] + 0.5 * box[i][3 + k] - all[k]) / size : 0;
+  SbBoxClear(tree->hull);
+  for (int level = 0; level < tree->nlevel; level++) {
+    const PetscInt first = tree->start[level], n = tree->start[level + 1] - first;
 
-      place[i].key |= spread((uint64_t)(at * 2097151)) << k;
+    for (PetscInt g = 0; g < n; g++) {
+      PetscReal hull[6];
+
+      SbBoxClear(hull);
+      if (level == 0) {
+        for (int l = 0; l < 4; l++) {
+          const PetscInt i = tree->order[4 * g + l];
+
+          for (int k = 0; k < 6 && i >= 0; k++) tree->group[g][k][l] = box[i][k];
+          if (i >= 0) SbBoxMerge(hull, box[i]);
+        }
+      } else {
+        for (int l = 0; l < 4; l++) {
+          PetscReal child[6];
+
+          for (int k = 0; k < 6; k++) child[k] = tree->group[first + g][k][l];
+          SbBoxMerge(hull, child);
+        }
+      }
+      if (level + 1 == tree->nlevel)
+        (void)PetscArraycpy(tree->hull, hull, 6);
+      else {
+        for (int k = 0; k < 6; k++) tree->group[tree->start[level + 1] + g / 4][k][g % 4] = hull[k];
+      }
     }
   }
-  qsort(place, (size_t)n, sizeof(*place), compare_places);
-  for (PetscInt i = 0; i < n; i++) order[i] = place[i].box;
-  PetscCall(PetscFree(place));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode SbBoxTreeCreate(PetscInt n, const PetscReal (*box)[6], SbBoxTree *tree)
 {
+  PetscInt ngroup, below = 1;
+  Item *item;
+
   PetscFunctionBeginUser;
   PetscCall(PetscMemzero(tree, sizeof(*tree)));
-  if (!n) PetscFunctionReturn(PETSC_SUCCESS);
   tree->n = n;
-  for (tree->nleaf = 1; tree->nleaf < n;) tree->nleaf *= 2;
-  PetscCall(PetscMalloc1(n, &tree->order));
-  PetscCall(sort_boxes(n, box, tree->order));
-  PetscCall(PetscMalloc1(2 * (size_t)tree->nleaf, &tree->box));
-  for (PetscInt i = 0; i < tree->nleaf; i++) {
-    PetscReal *leaf = tree->box[tree->nleaf + i];
-
+  SbBoxClear(tree->hull);
+  if (!n) PetscFunctionReturn(PETSC_SUCCESS);
+  for (ngroup = n; ngroup > 1 || !tree->nlevel;) {
+    ngroup = (ngroup + 3) / 4;
+    tree->start[tree->nlevel + 1] = tree->start[tree->nlevel] + ngroup;
+    tree->nlevel++;
+  }
+  PetscCall(PetscMalloc2(4 * (size_t)tree->start[1], &tree->order, tree->start[tree->nlevel], &tree->group));
+  PetscCall(PetscMalloc1(n, &item));
+  for (PetscInt i = 0; i < n; i++) {
+    for (int k = 0; k < 3; k++) item[i].middle[k] = 0.5 * box[i][k] + 0.5 * box[i][3 + k];
+    item[i].box = i;
+  }
+  while (below <= n / 4) below *= 4;
+  order_items(item, n, below);
+  for (PetscInt i = 0; i < 4 * tree->start[1]; i++) tree->order[i] = i < n ? item[i].box : -1;
+  PetscCall(PetscFree(item));
+  for (PetscInt g = 0; g < tree->start[tree->nlevel]; g++) {
     for (int k = 0; k < 6; k++) {
-      if (i < n)
-        leaf[k] = box[tree->order[i]][k];
-      else
-        leaf[k] = k < 3 ? PETSC_MAX_REAL : PETSC_MIN_REAL;
+      for (int l = 0; l < 4; l++) tree->group[g][k][l] = k < 3 ? PETSC_MAX_REAL : -PETSC_MAX_REAL;
     }
   }
-  for (PetscInt k = tree->nleaf - 1; k > 0; k--) join(tree->box[2 * k], tree->box[2 * k + 1], tree->box[k]);
+  PetscCall(SbBoxTreeRefit(tree, box));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode SbBoxTreeDestroy(SbBoxTree *tree)
 {
   PetscFunctionBeginUser;
-  PetscCall(PetscFree(tree->order));
-  PetscCall(PetscFree(tree->box));
+  PetscCall(PetscFree2(tree->order, tree->group));
   PetscCall(PetscMemzero(tree, sizeof(*tree)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-void SbTriangleBox(const PetscReal x[], const PetscInt v[], PetscReal box[6])
+/* ------------------------------------------------------------------ walks */
+
+/* Bit l: child l of the group meets the box. */
+static inline unsigned meeting(const PetscReal (*group)[4], const PetscReal box[6])
+{
+  unsigned mask = 0;
+
+  for (int l = 0; l < 4; l++)
+    mask |= (unsigned)((group[0][l] <= box[3]) & (group[1][l] <= box[4]) & (group[2][l] <= box[5]) &
+                       (group[3][l] >= box[0]) & (group[4][l] >= box[1]) & (group[5][l] >= box[2]))
+            << l;
+  return mask;
+}
+
+static inline void grow(PetscReal (*group)[4], int l, PetscReal grown, PetscReal box[6])
 {
   for (int k = 0; k < 3; k++) {
-    const PetscReal a = x[3 * v[0] + k], b = x[3 * v[1] + k], c = x[3 * v[2] + k];
-
-    box[k] = PetscMin(PetscMin(a, b), c);
-    box[3 + k] = PetscMax(PetscMax(a, b), c);
+    box[k] = group[k][l] - grown;
+    box[3 + k] = group[3 + k][l] + grown;
   }
 }
 
-static PetscBool meet(const PetscReal a[6], const PetscReal b[6])
+void SbBoxQueryBegin(const SbBoxTree *tree, const PetscReal box[6], SbBoxQuery *query)
 {
-  for (int k = 0; k < 3; k++) {
-    if (a[k] > b[3 + k] || b[k] > a[3 + k]) return PETSC_FALSE;
+  query->tree = tree;
+  for (int k = 0; k < 6; k++) query->box[k] = box[k];
+  query->hits = 0;
+  query->depth = tree->n > 0;
+  query->stack[0][0] = tree->nlevel - 1;
+  query->stack[0][1] = 0;
+}
+
+PetscBool SbBoxQueryNext(SbBoxQuery *query, PetscInt *i)
+{
+  const SbBoxTree *tree = query->tree;
+
+  while (!query->hits) {
+    PetscInt level, g;
+    unsigned mask;
+
+    if (!query->depth) return PETSC_FALSE;
+    query->depth--;
+    level = query->stack[query->depth][0];
+    g = query->stack[query->depth][1];
+    mask = meeting((const PetscReal(*)[4])tree->group[tree->start[level] + g], query->box);
+    if (level == 0) {
+      query->hits = mask;
+      query->leaf = 4 * g;
+      continue;
+    }
+    for (int l = 3; l >= 0; l--) {
+      if (!(mask >> l & 1)) continue;
+      query->stack[query->depth][0] = level - 1;
+      query->stack[query->depth++][1] = 4 * g + l;
+    }
+  }
+  for (int l = 0; l < 4; l++) {
+    if (!(query->hits >> l & 1)) continue;
+    query->hits &= ~(1U << l);
+    *i = tree->order[query->leaf + l];
+    break;
   }
   return PETSC_TRUE;
 }
 
-PetscErrorCode SbBoxTreeVisit(const SbBoxTree *tree, const PetscReal box[6],
-                              PetscErrorCode (*visit)(void *ctx, PetscInt i), void *ctx)
+void SbBoxNearestBegin(const SbBoxTree *tree, const PetscReal box[6], PetscReal limit2, SbBoxNearest *nearest)
 {
-  PetscInt stack[64], depth = 0;
+  nearest->tree = tree;
+  for (int k = 0; k < 6; k++) nearest->box[k] = box[k];
+  nearest->limit2 = limit2;
+  nearest->depth = tree->n > 0;
+  nearest->stack[0].level = tree->nlevel - 1;
+  nearest->stack[0].index = 0;
+  nearest->stack[0].d2 = 0;
+}
 
-  PetscFunctionBeginUser;
-  if (!tree->n) PetscFunctionReturn(PETSC_SUCCESS);
-  stack[depth++] = 1;
-  while (depth) {
-    const PetscInt k = stack[--depth];
+PetscBool SbBoxNearestNext(SbBoxNearest *nearest, PetscInt *i)
+{
+  const SbBoxTree *tree = nearest->tree;
 
-    if (!meet(tree->box[k], box)) continue;
-    if (k >= tree->nleaf)
-      PetscCall((*visit)(ctx, tree->order[k - tree->nleaf]));
-    else {
-      stack[depth++] = 2 * k + 1;
-      stack[depth++] = 2 * k;
+  while (nearest->depth) {
+    const SbBoxNearestEntry top = nearest->stack[--nearest->depth];
+    SbBoxNearestEntry *child = nearest->stack + nearest->depth;
+    const PetscReal(*group)[4];
+    PetscReal d2[4] = {0, 0, 0, 0};
+    int n = 0;
+
+    if (!(top.d2 <= nearest->limit2)) continue;
+    if (top.level < 0) {
+      *i = tree->order[top.index];
+      return PETSC_TRUE;
+    }
+    group = (const PetscReal(*)[4])tree->group[tree->start[top.level] + top.index];
+    // children that are near enough, the nearest last, so that it is taken first; the hull of none is infinitely far
+    for (int k = 0; k < 3; k++) {
+      for (int l = 0; l < 4; l++) {
+        const PetscReal above = group[k][l] - nearest->box[3 + k], below = nearest->box[k] - group[3 + k][l];
+        const PetscReal off = above > below ? above : below;
+
+        d2[l] += off > 0 ? off * off : 0;
+      }
+    }
+    for (int l = 0; l < 4; l++) {
+      int at = n;
+
+      if (!(d2[l] <= nearest->limit2)) continue;
+      for (; at > 0 && child[at - 1].d2 < d2[l]; at--) child[at] = child[at - 1];
+      child[at] = (SbBoxNearestEntry){.level = top.level - 1, .index = 4 * top.index + l, .d2 = d2[l]};
+      n++;
+    }
+    nearest->depth += n;
+  }
+  return PETSC_FALSE;
+}
+
+void SbBoxPairsBegin(const SbBoxTree *a, const SbBoxTree *b, PetscReal grown, SbBoxPairs *pairs)
+{
+  pairs->tree[0] = a;
+  pairs->tree[1] = b;
+  pairs->grown = grown;
+  pairs->depth = a->n > 0 && b->n > 0;
+  pairs->stack[0] = (SbBoxPairsEntry){.level = {a->nlevel - 1, b->nlevel - 1}, .group = {0, 0}};
+}
+
+PetscInt SbBoxPairsNext(SbBoxPairs *pairs, PetscInt room, PetscInt pair[])
+{
+  PetscInt n = 0;
+
+  while (pairs->depth && n + 16 <= room) {
+    const SbBoxPairsEntry top = pairs->stack[--pairs->depth];
+    const SbBoxTree *a = pairs->tree[0], *b = pairs->tree[1];
+    PetscReal(*group)[6][4] = a->group + a->start[top.level[0]] + top.group[0];
+    PetscReal(*other)[6][4] = b->group + b->start[top.level[1]] + top.group[1];
+    const PetscBool same = (PetscBool)(group == other);
+    PetscReal box[6];
+
+    if (top.level[0] != top.level[1]) {
+      // the children of the group of the higher level against the hull of the other
+      const int up = top.level[1] > top.level[0], down = 1 - up, level = top.level[down] + 1;
+      const SbBoxTree *t = pairs->tree[down];
+      unsigned mask;
+
+      if (level == t->nlevel)
+        for (int k = 0; k < 3; k++) {
+          box[k] = t->hull[k] - pairs->grown;
+          box[3 + k] = t->hull[3 + k] + pairs->grown;
+        }
+      else
+        grow(t->group[t->start[level] + top.group[down] / 4], top.group[down] % 4, pairs->grown, box);
+      mask = meeting((const PetscReal(*)[4])(up ? other : group)[0], box);
+      for (int l = 3; l >= 0; l--) {
+        if (!(mask >> l & 1)) continue;
+        pairs->stack[pairs->depth] = top;
+        pairs->stack[pairs->depth].level[up]--;
+        pairs->stack[pairs->depth++].group[up] = 4 * top.group[up] + l;
+      }
+      continue;
+    }
+    for (int i = 3; i >= 0; i--) {
+      unsigned mask;
+
+      grow(*group, i, pairs->grown, box);
+      mask = meeting((const PetscReal(*)[4])(*other), box);
+      if (same) mask &= top.level[0] ? 15U << i : 15U << i << 1;
+      for (int j = 3; mask && j >= 0; j--) {
+        if (!(mask >> j & 1)) continue;
+        if (top.level[0] > 0)
+          pairs->stack[pairs->depth++] =
+            (SbBoxPairsEntry){.level = {top.level[0] - 1, top.level[1] - 1},
+                              .group = {4 * top.group[0] + i, 4 * top.group[1] + j}};
+        else {
+          pair[2 * n] = a->order[4 * top.group[0] + i];
+          pair[2 * n++ + 1] = b->order[4 * top.group[1] + j];
+        }
+      }
     }
   }
-  PetscFunctionReturn(PETSC_SUCCESS);
+  return n;
+}
+
+void SbTriangleBox(const PetscReal x[], const PetscInt v[], PetscReal box[6])
+{
+  SbBoxClear(box);
+  for (int k = 0; k < 3; k++) SbBoxAdd(box, x + 3 * v[k]);
 }

@@ -1,102 +1,36 @@
 /*
   repair.c - makes a mesh that a run accepts, where dropping, turning and welding can do it.
 
-  In this order: vertices closer than a tolerance become one (a hash of cubes; each vertex joins the first one before it
-  within reach); tets that then use a vertex twice are dropped, these are collapsed and leave no gap; so are further copies of
-  a tet, whose groups go to the first; flat tets are dropped, which leaves a slit without width where they had a neighbour at
-  every face, and these are counted; inverted tets are turned; triangles and lines of groups that collapsed, came again or are no face of a
-  tet, and unused vertices, are dropped. The check of a run has the last word: what overlaps cannot be repaired here.
+  In this order: vertices closer than a tolerance become one, each with the first before it; tets that then use a vertex twice are dropped, these are
+  collapsed and leave no gap; so are further copies of a tet, whose groups go to the first; flat tets are dropped, which leaves a slit
+  without width where they had a neighbour at every face, and these are counted; inverted tets are turned; triangles and lines of groups that
+  collapsed, came again or are no face of a tet, and unused vertices, are dropped. The check of a run has the last word: what overlaps cannot
+  be repaired here.
 */
+#include "sbgeometry.h"
 #include "mesh_impl.h"
 
 /* ------------------------------------------------------------------ welding */
 
-/* Chains of vertices by the cube that they lie in. */
-typedef struct {
-  PetscReal origin[3], h;
-  uint64_t mask;
-  PetscInt *head, *next;
-} Cubes;
-
-static uint64_t cube_hash(const Cubes *cubes, const int64_t at[3])
-{
-  uint64_t key = (uint64_t)at[0] * 0x9e3779b97f4a7c15u;
-
-  key = (key ^ (uint64_t)at[1]) * 0xc2b2ae3d27d4eb4fu;
-  key = (key ^ (uint64_t)at[2]) * 0x165667b19e3779f9u;
-  return (key ^ key >> 32) & cubes->mask;
-}
-
-static inline int64_t cube_of(const Cubes *cubes, int i, PetscReal x)
-{
-  return (int64_t)floor((x - cubes->origin[i]) / cubes->h);
-}
-
-/* A vertex in the cubes within reach of x, -1 when there is none. */
-static PetscInt find_near(const Cubes *cubes, const PetscReal x[], const PetscReal p[3], PetscReal reach)
-{
-  int64_t low[3], high[3], at[3];
-
-  for (int i = 0; i < 3; i++) {
-    low[i] = cube_of(cubes, i, p[i] - reach);
-    high[i] = cube_of(cubes, i, p[i] + reach);
-  }
-  for (at[0] = low[0]; at[0] <= high[0]; at[0]++)
-    for (at[1] = low[1]; at[1] <= high[1]; at[1]++)
-      for (at[2] = low[2]; at[2] <= high[2]; at[2]++)
-        for (PetscInt v = cubes->head[cube_hash(cubes, at)]; v >= 0; v = cubes->next[v]) {
-          const PetscReal *q = x + 3 * v, d[3] = {q[0] - p[0], q[1] - p[1], q[2] - p[2]};
-
-          if (d[0] * d[0] + d[1] * d[1] + d[2] * d[2] <= reach * reach) return v;
-        }
-  return -1;
-}
-
 /* Lets items use the first of the vertices that lie together. Those left over are unused from then on. */
 static PetscErrorCode weld(SbImport *im, PetscReal tolerance, SbRepair *done)
 {
-  Cubes cubes;
-  PetscReal diagonal;
+  PetscReal box[6], diagonal2 = 0;
   PetscInt *map;
-  PetscReal high[3];
 
   PetscFunctionBeginUser;
-  // bounding box and its diagonal
-  for (int i = 0; i < 3; i++) cubes.origin[i] = high[i] = im->nvert ? im->x[i] : 0;
-  for (PetscInt v = 0; v < im->nvert; v++) {
-    for (int i = 0; i < 3; i++) {
-      cubes.origin[i] = PetscMin(cubes.origin[i], im->x[3 * v + i]);
-      high[i] = PetscMax(high[i], im->x[3 * v + i]);
-    }
-  }
-  diagonal = PetscSqrtReal((high[0] - cubes.origin[0]) * (high[0] - cubes.origin[0]) +
-                           (high[1] - cubes.origin[1]) * (high[1] - cubes.origin[1]) +
-                           (high[2] - cubes.origin[2]) * (high[2] - cubes.origin[2]));
-  done->merge_tolerance = tolerance < 0 ? 1e-9 * diagonal : tolerance;
-  if (done->merge_tolerance == 0 || !(diagonal > 0)) PetscFunctionReturn(PETSC_SUCCESS);
-  cubes.h = PetscMax(4 * done->merge_tolerance, diagonal / (1 + cbrt((double)im->nvert)));
-  for (cubes.mask = 1; cubes.mask < (uint64_t)im->nvert; cubes.mask *= 2) {
-  }
-  PetscCall(PetscMalloc3((size_t)cubes.mask, &cubes.head, im->nvert, &cubes.next, im->nvert, &map));
-  for (uint64_t i = 0; i < cubes.mask; i++) cubes.head[i] = -1;
-  cubes.mask--;
-  for (PetscInt v = 0; v < im->nvert; v++) {
-    const PetscReal *p = im->x + 3 * v;
-    const PetscInt near = find_near(&cubes, im->x, p, done->merge_tolerance);
-
-    map[v] = near < 0 ? v : near;
-    if (near < 0) {
-      const int64_t at[3] = {cube_of(&cubes, 0, p[0]), cube_of(&cubes, 1, p[1]), cube_of(&cubes, 2, p[2])};
-      const uint64_t slot = cube_hash(&cubes, at);
-
-      cubes.next[v] = cubes.head[slot];
-      cubes.head[slot] = v;
-    } else
-      done->nwelded++;
-  }
+  if (!im->nvert) PetscFunctionReturn(PETSC_SUCCESS);
+  SbBoxClear(box);
+  for (PetscInt v = 0; v < im->nvert; v++) SbBoxAdd(box, im->x + 3 * v);
+  for (int k = 0; k < 3; k++) diagonal2 += PetscSqr(box[3 + k] - box[k]);
+  done->merge_tolerance = tolerance < 0 ? 1e-9 * PetscSqrtReal(diagonal2) : tolerance;
+  if (done->merge_tolerance == 0 || !(diagonal2 > 0)) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscMalloc1(im->nvert, &map));
+  PetscCall(SbWeld(im->nvert, im->x, done->merge_tolerance, PETSC_FALSE, map));
+  for (PetscInt v = 0; v < im->nvert; v++) done->nwelded += map[v] != v;
   for (int d = 0; d < 4; d++)
     for (PetscInt i = 0; i < (d + 1) * im->item[d].n; i++) im->item[d].vert[i] = map[im->item[d].vert[i]];
-  PetscCall(PetscFree3(cubes.head, cubes.next, map));
+  PetscCall(PetscFree(map));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -284,7 +284,7 @@ static void interpolate_old(const Work *w, const PetscReal X[3], const PetscReal
   PetscInt cell;
 
   (void)SbLocatorFind(w->rest, near, &cell, weight);
-  if (near != X) SbLocatorBarycentric(w->rest, cell, X, weight);
+  if (near != X) SbTetBarycentric(w->g->X + 3 * w->vert0, w->cell + 4 * cell, X, weight);
   for (PetscInt k = 0; k < w->each; k++) value[k] = 0.;
   for (int a = 0; a < 4; a++) {
     const PetscReal *from = old_value(w, cell, a);

@@ -13,56 +13,11 @@
 #define PASSES 20         /* of the search for flat triangles: one may lie behind the other */
 #define PARTNERS_MAX 4000 /* open edges for which partners are searched for */
 
-/* ------------------------------------------------------------------ vertices that are one */
-
-typedef struct {
-  PetscReal along; /* projection on a direction that no mesh is aligned with */
-  PetscInt vert;
-} Along;
-
-static int compare_along(const void *a, const void *b)
-{
-  const Along *p = (const Along *)a, *q = (const Along *)b;
-
-  if (p->along != q->along) return p->along < q->along ? -1 : 1;
-  return (p->vert > q->vert) - (p->vert < q->vert);
-}
-
 static PetscReal distance2(const SbTriangles *t, PetscInt v, PetscInt w)
 {
   const PetscReal *a = t->x + 3 * v, *b = t->x + 3 * w, d[3] = {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
 
   return SbDot3(d, d);
-}
-
-/* Joins near vertices; up[v] leads to the lowest one of each heap. */
-static PetscErrorCode join_near(const SbTriangles *t, PetscReal tolerance, PetscInt up[])
-{
-  const PetscReal direction[3] = {0.6180339887, 0.5352331347, 0.5758185391};
-  PetscReal largest = 0, window;
-  Along *sorted;
-
-  PetscFunctionBeginUser;
-  PetscCall(PetscMalloc1(t->nvert, &sorted));
-  for (PetscInt v = 0; v < t->nvert; v++) {
-    up[v] = v;
-    sorted[v] = (Along){SbDot3(direction, t->x + 3 * v), v};
-    largest = PetscMax(largest, PetscAbsReal(sorted[v].along));
-  }
-  qsort(sorted, (size_t)t->nvert, sizeof(*sorted), compare_along);
-  window = tolerance + 8 * PETSC_MACHINE_EPSILON * largest;
-  for (PetscInt i = 0; i < t->nvert; i++) {
-    for (PetscInt j = i + 1; j < t->nvert && sorted[j].along - sorted[i].along <= window; j++) {
-      PetscInt a, b;
-
-      if (distance2(t, sorted[i].vert, sorted[j].vert) > tolerance * tolerance) continue;
-      a = SbUnionRoot(up, sorted[i].vert);
-      b = SbUnionRoot(up, sorted[j].vert);
-      up[PetscMax(a, b)] = PetscMin(a, b);
-    }
-  }
-  PetscCall(PetscFree(sorted));
-  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* ------------------------------------------------------------------ triangles left out */
@@ -170,16 +125,15 @@ static PetscErrorCode drop_doubled(SbTriangleFile *f, PetscBool keep[], SbSurfac
 PetscErrorCode SbSurfaceMergeVertices(SbTriangleFile *f, PetscReal tolerance, SbSurfaceRepairs *m)
 {
   SbTriangles *t = f->t;
-  PetscInt *up;
+  PetscInt *first;
   PetscBool *keep;
   PetscReal moved2 = 0;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscMalloc2(t->nvert, &up, t->ntri, &keep));
-  PetscCall(join_near(t, tolerance, up));
+  PetscCall(PetscMalloc2(t->nvert, &first, t->ntri, &keep));
+  PetscCall(SbWeld(t->nvert, t->x, tolerance, PETSC_TRUE, first));
   for (PetscInt v = 0; v < t->nvert; v++) {
-    const PetscInt r = SbUnionRoot(up, v);
-    const PetscReal d2 = distance2(t, v, r);
+    const PetscReal d2 = distance2(t, v, first[v]);
 
     moved2 = PetscMax(moved2, d2);
     m->nwelded += d2 > 0; /* those at one place are nothing to speak of */
@@ -187,7 +141,7 @@ PetscErrorCode SbSurfaceMergeVertices(SbTriangleFile *f, PetscReal tolerance, Sb
   for (PetscInt i = 0; i < t->ntri; i++) {
     PetscInt *v = t->tri + 3 * i;
 
-    for (int k = 0; k < 3; k++) v[k] = SbUnionRoot(up, v[k]);
+    for (int k = 0; k < 3; k++) v[k] = first[v[k]];
     keep[i] = (PetscBool)(v[0] != v[1] && v[1] != v[2] && v[2] != v[0]);
     m->ncollapsed += !keep[i];
   }
@@ -195,7 +149,7 @@ PetscErrorCode SbSurfaceMergeVertices(SbTriangleFile *f, PetscReal tolerance, Sb
   m->moved = PetscSqrtReal(moved2);
   PetscCall(keep_triangles(f, keep));
   PetscCall(drop_doubled(f, keep, m));
-  PetscCall(PetscFree2(up, keep));
+  PetscCall(PetscFree2(first, keep));
   PetscCall(SbTrianglesDropUnused(t));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

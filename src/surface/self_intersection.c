@@ -190,27 +190,10 @@ static PetscBool triangles_cross(const SbTriangles *t, PetscInt f, PetscInt g)
 /* ------------------------------------------------------------------ all pairs */
 
 typedef struct {
-  const SbTriangles *t;
-  PetscInt triangle; /* whose box is asked for */
-  PetscInt n;        /* pairs found */
+  PetscInt n; /* pairs found */
   PetscInt pair[NAMED][2];
   PetscBool *crossing; /* [ntri] */
 } Search;
-
-static PetscErrorCode try_pair(void *ctx, PetscInt other)
-{
-  Search *s = (Search *)ctx;
-
-  PetscFunctionBeginUser;
-  if (other <= s->triangle || !triangles_cross(s->t, s->triangle, other)) PetscFunctionReturn(PETSC_SUCCESS);
-  if (s->n < NAMED) {
-    s->pair[s->n][0] = s->triangle;
-    s->pair[s->n][1] = other;
-  }
-  s->crossing[s->triangle] = s->crossing[other] = PETSC_TRUE;
-  s->n++;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
 
 /* All pairs, into *s, which has room for the marks. */
 static PetscErrorCode find_pairs(const SbTriangles *t, Search *s)
@@ -219,14 +202,24 @@ static PetscErrorCode find_pairs(const SbTriangles *t, Search *s)
   SbBoxTree tree;
 
   PetscFunctionBeginUser;
-  s->t = t;
   s->n = 0;
   PetscCall(PetscArrayzero(s->crossing, t->ntri));
   PetscCall(PetscMalloc1(t->ntri, &box));
   for (PetscInt i = 0; i < t->ntri; i++) SbTriangleBox(t->x, t->tri + 3 * i, box[i]);
   PetscCall(SbBoxTreeCreate(t->ntri, (const PetscReal(*)[6])box, &tree));
-  for (s->triangle = 0; s->triangle < t->ntri; s->triangle++)
-    PetscCall(SbBoxTreeVisit(&tree, box[s->triangle], try_pair, s));
+  for (PetscInt i = 0, other; i < t->ntri; i++) {
+    SbBoxQuery query;
+
+    for (SbBoxQueryBegin(&tree, box[i], &query); SbBoxQueryNext(&query, &other);) {
+      if (other <= i || !triangles_cross(t, i, other)) continue;
+      if (s->n < NAMED) {
+        s->pair[s->n][0] = i;
+        s->pair[s->n][1] = other;
+      }
+      s->crossing[i] = s->crossing[other] = PETSC_TRUE;
+      s->n++;
+    }
+  }
   PetscCall(SbBoxTreeDestroy(&tree));
   PetscCall(PetscFree(box));
   PetscFunctionReturn(PETSC_SUCCESS);

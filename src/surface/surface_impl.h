@@ -6,13 +6,6 @@
 #include "sbsurface.h"
 #include "triangles.h"
 
-/* The root of a vertex in a forest of parents up[], whose paths are halved on the way. */
-static inline PetscInt SbUnionRoot(PetscInt up[], PetscInt v)
-{
-  for (; up[v] != v; v = up[v]) up[v] = up[up[v]];
-  return v;
-}
-
 /* Volume of each region, volume[nregion]; returns the mean edge of the triangles. */
 PetscReal SbSurfaceMeasure(const SbSurface *surface, PetscReal volume[]);
 /*

@@ -1,0 +1,41 @@
+/*
+  weld.c - points that are one: those within a tolerance of each other.
+*/
+#include "sbgeometry.h"
+
+PetscErrorCode SbWeld(PetscInt n, const PetscReal x[], PetscReal tolerance, PetscBool chains, PetscInt map[])
+{
+  PetscReal(*box)[6], largest = 0, grown;
+  SbBoxTree tree;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscMalloc1(n, &box));
+  for (PetscInt v = 0; v < n; v++) {
+    for (int k = 0; k < 6; k++) box[v][k] = x[3 * v + k % 3];
+    for (int k = 0; k < 3; k++) largest = PetscMax(largest, PetscAbsReal(x[3 * v + k]));
+  }
+  PetscCall(SbBoxTreeCreate(n, (const PetscReal(*)[6])box, &tree));
+  grown = tolerance + SB_BOX_ROUNDING * PETSC_MACHINE_EPSILON * largest;
+  for (PetscInt v = 0, w; v < n; v++) {
+    PetscReal around[6];
+    SbBoxQuery query;
+
+    map[v] = v;
+    for (int k = 0; k < 6; k++) around[k] = box[v][k] + (k < 3 ? -grown : grown);
+    for (SbBoxQueryBegin(&tree, around, &query); SbBoxQueryNext(&query, &w);) {
+      const PetscReal r[3] = {box[v][0] - box[w][0], box[v][1] - box[w][1], box[v][2] - box[w][2]};
+
+      if (w >= v || SbDot3(r, r) > tolerance * tolerance) continue;
+      if (chains) {
+        const PetscInt a = SbUnionRoot(map, v), b = SbUnionRoot(map, w);
+
+        map[PetscMax(a, b)] = PetscMin(a, b);
+      } else if (map[w] == w)
+        map[v] = PetscMin(map[v], w);
+    }
+  }
+  for (PetscInt v = 0; v < n; v++) map[v] = SbUnionRoot(map, v);
+  PetscCall(SbBoxTreeDestroy(&tree));
+  PetscCall(PetscFree(box));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
