@@ -6,93 +6,6 @@
 
 #define SB_GROUP_MAX (2 * SB_NAME_MAX) /* longest name of a physical group, with the terminating zero */
 
-/* ------------------------------------------------------------------ import.c: one body in memory */
-
-/* A physical group of a file, or a side of a box: a name for entities of one dimension. */
-typedef struct {
-  PetscInt dim; /* 0 points, 1 curves, 2 surfaces, 3 volumes */
-  int64_t tag;  /* number in the file */
-  char name[SB_GROUP_MAX];
-  PetscInt alone; /* tag set that holds only this group; -1 until somebody wants it */
-} SbGroup;
-
-/* Simplices of one dimension. */
-typedef struct {
-  PetscInt n, capacity;
-  PetscInt *vert;  /* [n][dim + 1] */
-  PetscInt *tags;  /* [n] tag set */
-  int64_t *number; /* [n] number in the file, for messages */
-} SbItems;
-
-/* A body as its reader delivers it. Zeroed before the reader is called; freed by SbImportDestroy(), also after an error. */
-struct _p_SbImport {
-  char where[PETSC_MAX_PATH_LEN + 2 * SB_NAME_MAX]; /* "body 'liver': liver.msh", begins every message */
-  char body[SB_NAME_MAX];                           /* "liver"; "" in supple-mesh */
-  PetscInt nvert;
-  PetscReal *x;         /* [nvert][3] m once placed */
-  int64_t *vert_number; /* [nvert] number in the file */
-  SbItems item[4];      /* by dimension; item[3] are the tets */
-  PetscInt ngroup;
-  SbGroup *group;       /* [ngroup] */
-  PetscInt ntags;       /* tag sets: which groups an item belongs to. Set 0 is empty */
-  PetscInt *tags_start; /* [ntags + 1] */
-  PetscInt *tags_group; /* [tags_start[ntags]] groups, ascending in each set */
-  PetscInt capacity[3]; /* of group, tags_start, tags_group */
-  PetscInt nslot;       /* a power of two */
-  PetscInt *slot;       /* [nslot] groups by a hash of (dim, tag), or -1; made when needed */
-  PetscBool surface;    /* given: all triangles are wanted, and tets need not be there */
-  SbTetOptions tet;     /* given: how a surface becomes tets */
-  PetscReal scale;      /* given: factor that placing will use; a reader that has scaled sets it to 1 */
-  char note[512];       /* what the reader repaired, for SbBody.note */
-  PetscInt step; /* given: step of a run's output whose positions are wanted; 0 at rest, -1 the last one */
-  SbMeshProgress progress; /* given: told how far a long read is; may be NULL */
-  void *progress_ctx;
-  /* found by SbImportCheck() */
-  PetscInt nunused;     /* vertices left out */
-  PetscInt nreoriented; /* cells turned */
-  PetscInt nlost;       /* triangles of groups that are no face of a tet */
-  PetscInt npinched;    /* surface edges with more than two facets */
-};
-
-/* Chooses the reader by the name of the mesh, reads, places. Not collective. */
-PetscErrorCode SbImportRead(const SbBody *body, SbImport *import);
-PetscErrorCode SbImportDestroy(SbImport *import);
-/* Which rows of the arrays of an .h5 mesh a slab has: from first, in blocks of `block`, N in the file. */
-typedef struct {
-  PetscInt N, block, first;
-} SbSlabRows;
-/* Tets of a mesh that can be read in slabs, an .h5 of supple's own; 0: it cannot, or is not there. */
-PetscErrorCode SbImportSlabs(const SbBody *body, PetscInt *ncell);
-/*
-  SbImportSlab - slab k of n of such a mesh, placed. Not collective.
-
-  Output:
-    import - the k-th block of the vertices and that of the simplices of each dimension, with numbers of vertices in the file, from 0 on; all
-             groups
-    rows   - of the vertices
-  Errors: those of SbImportRead() that these blocks show.
-*/
-PetscErrorCode SbImportSlab(const SbBody *body, PetscInt k, PetscInt n, SbImport *import, SbSlabRows *rows);
-/* How the user writes an option of this body, for messages: "-body_liver_tet_size"; in supple-mesh "-size". */
-#define SB_OPTION_NAME_MAX (SB_NAME_MAX + 32)
-const char *SbImportOption(const SbImport *import, const char *key, char name[SB_OPTION_NAME_MAX]);
-/* A .msh of any version, by the program's own reader or by the gmsh library. */
-PetscErrorCode SbImportRead_Msh(const char *path, SbImport *body);
-/* Room for n vertices. */
-PetscErrorCode SbImportSetVertices(SbImport *import, PetscInt n);
-/* Appends a simplex; vert[dim + 1]. */
-PetscErrorCode SbImportAddItem(SbImport *import, int dim, const PetscInt vert[], PetscInt tags,
-                               int64_t number);
-/* Room for exactly n simplices of a dimension that has none yet, numbered from 1 on, for the caller to fill. */
-PetscErrorCode SbImportSetItems(SbImport *import, int dim, PetscInt n);
-/* The group (dim, tag), made when new; a NULL name means "surface_12" until somebody gives one. */
-PetscErrorCode SbImportGroup(SbImport *import, PetscInt dim, int64_t tag, const char *name, PetscInt *group);
-/* The tag set that holds this group alone. */
-PetscErrorCode SbImportTagsAlone(SbImport *import, PetscInt dim, int64_t tag, const char *name,
-                                 PetscInt *tags);
-/* The tag set that holds exactly these groups (any order, repeats allowed, reordered here), made when new. */
-PetscErrorCode SbImportTagSet(SbImport *import, PetscInt n, PetscInt groups[], PetscInt *tags);
-
 /* ------------------------------------------------------------------ numbers.c: from numbers of a file to places in memory */
 
 typedef struct {
@@ -153,3 +66,114 @@ PetscBool SbScanMore(SbScan *scan, char comment);
     SETERRQ(PETSC_COMM_SELF, PETSC_ERR_FILE_UNEXPECTED, "%s %s: %s", (scan)->where, \
             SbScanPlace(scan, sb_place), sb_text);                                  \
   } while (0)
+
+/* ------------------------------------------------------------------ import.c: one body in memory */
+
+/* A physical group of a file, or a side of a box: a name for entities of one dimension. */
+typedef struct {
+  PetscInt dim; /* 0 points, 1 curves, 2 surfaces, 3 volumes */
+  int64_t tag;  /* number in the file */
+  char name[SB_GROUP_MAX];
+  PetscInt alone; /* tag set that holds only this group; -1 until somebody wants it */
+} SbGroup;
+
+/* Types of elements as gmsh numbers them: what readers of all formats count. */
+enum { SB_GMSH_LINE = 1, SB_GMSH_TRIANGLE = 2, SB_GMSH_TET = 4, SB_GMSH_POINT = 15, SB_GMSH_NTYPES = 32 };
+
+/* Simplices of one dimension. */
+typedef struct {
+  PetscInt n, capacity;
+  PetscInt *vert;  /* [n][dim + 1] */
+  PetscInt *tags;  /* [n] tag set */
+  int64_t *number; /* [n] number in the file, for messages */
+} SbItems;
+
+/* Item `item` of dimension dim belongs to a group. */
+typedef struct {
+  PetscInt dim, item, group;
+} SbGroupMember;
+
+/* An array that grows by one at its end, of which there are n. */
+typedef struct {
+  PetscInt n, capacity;
+} SbCount;
+
+/* A body as its reader delivers it. Zeroed before the reader is called; freed by SbImportDestroy(), also after an error. */
+struct _p_SbImport {
+  char where[PETSC_MAX_PATH_LEN + 2 * SB_NAME_MAX]; /* "body 'liver': liver.msh", begins every message */
+  char body[SB_NAME_MAX];                           /* "liver"; "" in supple-mesh */
+  PetscInt nvert;
+  PetscReal *x;         /* [nvert][3] m once placed */
+  int64_t *vert_number; /* [nvert] number in the file */
+  SbItems item[4];      /* by dimension; item[3] are the tets */
+  PetscInt ngroup;
+  SbGroup *group;       /* [ngroup] */
+  PetscInt ntags;       /* tag sets: which groups an item belongs to. Set 0 is empty */
+  PetscInt *tags_start; /* [ntags + 1] */
+  PetscInt *tags_group; /* [tags_start[ntags]] groups, ascending in each set */
+  PetscInt capacity[3]; /* of group, tags_start, tags_group */
+  PetscInt nslot;       /* a power of two */
+  PetscInt *slot;       /* [nslot] groups by a hash of (dim, tag), or -1; made when needed */
+  PetscBool surface;    /* given: all triangles are wanted, and tets need not be there */
+  SbTetOptions tet;     /* given: how a surface becomes tets */
+  PetscReal scale;      /* given: factor that placing will use; a reader that has scaled sets it to 1 */
+  char note[512];       /* what the reader repaired, for SbBody.note */
+  PetscInt step; /* given: step of a run's output whose positions are wanted; 0 at rest, -1 the last one */
+  SbMeshProgress progress; /* given: told how far a long read is; may be NULL */
+  void *progress_ctx;
+  /* while a file is read; SbImportForget() */
+  SbScan scan;
+  SbNumbers nodes, elements;     /* by the numbers that the file gives them */
+  int64_t count[SB_GMSH_NTYPES]; /* elements that the file holds, by type */
+  SbCount nmember;
+  SbGroupMember *member;        /* [nmember] sets that the file lists apart from their items */
+  struct _p_SbScratch *scratch; /* arrays of the reader */
+  /* found by SbImportCheck() */
+  PetscInt nunused;     /* vertices left out */
+  PetscInt nreoriented; /* cells turned */
+  PetscInt nlost;       /* triangles of groups that are no face of a tet */
+  PetscInt npinched;    /* surface edges with more than two facets */
+};
+
+/* Chooses the reader by the name of the mesh, reads, places. Not collective. */
+PetscErrorCode SbImportRead(const SbBody *body, SbImport *import);
+PetscErrorCode SbImportDestroy(SbImport *import);
+/* Which rows of the arrays of an .h5 mesh a slab has: from first, in blocks of `block`, N in the file. */
+typedef struct {
+  PetscInt N, block, first;
+} SbSlabRows;
+/* Tets of a mesh that can be read in slabs, an .h5 of supple's own; 0: it cannot, or is not there. */
+PetscErrorCode SbImportSlabs(const SbBody *body, PetscInt *ncell);
+/*
+  SbImportSlab - slab k of n of such a mesh, placed. Not collective.
+
+  Output:
+    import - the k-th block of the vertices and that of the simplices of each dimension, with numbers of vertices in the file, from 0 on; all
+             groups
+    rows   - of the vertices
+  Errors: those of SbImportRead() that these blocks show.
+*/
+PetscErrorCode SbImportSlab(const SbBody *body, PetscInt k, PetscInt n, SbImport *import, SbSlabRows *rows);
+/* How the user writes an option of this body, for messages: "-body_liver_tet_size"; in supple-mesh "-size". */
+#define SB_OPTION_NAME_MAX (SB_NAME_MAX + 32)
+const char *SbImportOption(const SbImport *import, const char *key, char name[SB_OPTION_NAME_MAX]);
+/* A .msh of any version, by the program's own reader or by the gmsh library. */
+PetscErrorCode SbImportRead_Msh(const char *path, SbImport *body);
+/* Room for n vertices. */
+PetscErrorCode SbImportSetVertices(SbImport *import, PetscInt n);
+/* Appends a simplex; vert[dim + 1]. */
+PetscErrorCode SbImportAddItem(SbImport *import, int dim, const PetscInt vert[], PetscInt tags,
+                               int64_t number);
+/* Room for exactly n simplices of a dimension that has none yet, numbered from 1 on, for the caller to fill. */
+PetscErrorCode SbImportSetItems(SbImport *import, int dim, PetscInt n);
+PetscErrorCode SbItemsFree(SbItems *items);
+/* The group (dim, tag), made when new; a NULL name means "surface_12" until somebody gives one. */
+PetscErrorCode SbImportGroup(SbImport *import, PetscInt dim, int64_t tag, const char *name, PetscInt *group);
+/* The tag set that holds this group alone. */
+PetscErrorCode SbImportTagsAlone(SbImport *import, PetscInt dim, int64_t tag, const char *name,
+                                 PetscInt *tags);
+/* The tag set that holds exactly these groups (any order, repeats allowed, reordered here), made when new. */
+PetscErrorCode SbImportTagSet(SbImport *import, PetscInt n, PetscInt groups[], PetscInt *tags);
+/* Notes that an item belongs to a group; SbImportJoinGroups() gives every item the groups noted for it, beside those that it has. */
+PetscErrorCode SbImportAddMember(SbImport *import, PetscInt dim, PetscInt item, PetscInt group);
+PetscErrorCode SbImportJoinGroups(SbImport *import);

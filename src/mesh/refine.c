@@ -94,9 +94,7 @@ static PetscErrorCode split_items(SbImport *im, int dim, const SbImportEdges *ed
       PetscCall(
         im->progress(what[dim], (PetscInt64)nchild * i, (PetscInt64)nchild * parent.n, im->progress_ctx));
   }
-  PetscCall(PetscFree(parent.vert));
-  PetscCall(PetscFree(parent.tags));
-  PetscCall(PetscFree(parent.number));
+  PetscCall(SbItemsFree(&parent));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

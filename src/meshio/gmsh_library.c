@@ -7,7 +7,7 @@
 #include <dlfcn.h>
 #include <stddef.h>
 #include <stdlib.h>
-#include "gmsh_types.h"
+#include "meshio_impl.h"
 #include "sbgmsh.h"
 
 enum { OLDEST = 8, NEWEST = 30 }; /* 4.8 to 4.30 */
@@ -191,50 +191,39 @@ static PetscErrorCode entity_tags(const SbGmsh *g, int dim, int entity, PetscBoo
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode collect_elements(const SbGmsh *g, int type, size_t n, const size_t number[],
-                                       const size_t node[], PetscInt tags, const SbNumbers *nodes,
-                                       SbImport *im)
-{
-  const int nnode = SbGmshTypes[type].nnode, dim = SbGmshTypes[type].dim;
-
-  PetscFunctionBeginUser;
-  for (size_t i = 0; i < n; i++) {
-    PetscInt vert[4] = {0, 0, 0, 0};
-
-    for (int k = 0; k < nnode; k++) {
-      vert[k] = SbNumbersFind(nodes, (int64_t)node[i * (size_t)nnode + (size_t)k]);
-      PetscCheck(vert[k] >= 0, PETSC_COMM_SELF, PETSC_ERR_FILE_UNEXPECTED,
-                 "%s: element %zu uses node %zu, which is not there", g->where, number[i],
-                 node[i * (size_t)nnode + (size_t)k]);
-    }
-    PetscCall(SbImportAddItem(im, dim, vert, tags, (int64_t)number[i]));
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* The elements of one entity: those of use are kept, all are counted by type. */
-static PetscErrorCode collect_entity(const SbGmsh *g, int dim, int entity, PetscBool itself,
-                                     const SbNumbers *nodes, int64_t count[], SbImport *im)
+static PetscErrorCode collect_entity(const SbGmsh *g, int dim, int entity, PetscBool itself, SbImport *im)
 {
-  int *type;
+  int *types;
   size_t ntype, **number, *nnumber, nn, **node, *nnode, nnn;
   PetscInt tags;
 
   PetscFunctionBeginUser;
-  SB_GMSH(g, ModelMeshGetElements, &type, &ntype, &number, &nnumber, &nn, &node, &nnode, &nnn, dim, entity);
+  SB_GMSH(g, ModelMeshGetElements, &types, &ntype, &number, &nnumber, &nn, &node, &nnode, &nnn, dim, entity);
   if (ntype) PetscCall(entity_tags(g, dim, entity, itself, im, &tags));
   for (size_t t = 0; t < ntype; t++) {
-    PetscCheck(type[t] > 0 && type[t] < SB_GMSH_NTYPES, PETSC_COMM_SELF, PETSC_ERR_FILE_UNEXPECTED,
+    const int type = types[t];
+
+    PetscCheck(type > 0 && type < SB_GMSH_NTYPES, PETSC_COMM_SELF, PETSC_ERR_FILE_UNEXPECTED,
                "%s: holds elements of gmsh's type %d; supple simulates 4-node tetrahedra only", g->where,
-               type[t]);
-    count[type[t]] += (int64_t)nnumber[t];
-    if (type[t] == SB_GMSH_TET || (type[t] == SB_GMSH_TRIANGLE && im->surface) ||
-        (tags && (type[t] == SB_GMSH_TRIANGLE || type[t] == SB_GMSH_LINE || type[t] == SB_GMSH_POINT)))
-      PetscCall(collect_elements(g, type[t], nnumber[t], number[t], node[t], tags, nodes, im));
+               type);
+    for (size_t i = 0; i < nnumber[t]; i++) {
+      const int n = SbGmshTypes[type].nnode;
+      PetscInt vert[4] = {0, 0, 0, 0};
+
+      for (int k = 0; k < PetscMin(n, 4); k++) {
+        const size_t tag = node[t][i * (size_t)n + (size_t)k];
+
+        vert[k] = SbNumbersFind(&im->nodes, (int64_t)tag);
+        PetscCheck(vert[k] >= 0, PETSC_COMM_SELF, PETSC_ERR_FILE_UNEXPECTED,
+                   "%s: element %zu uses node %zu, which is not there", g->where, number[t][i], tag);
+      }
+      PetscCall(SbImportAddElement(im, type, vert, tags, (int64_t)number[t][i]));
+    }
     g->Free(number[t]);
     g->Free(node[t]);
   }
-  g->Free(type);
+  g->Free(types);
   g->Free(number);
   g->Free(nnumber);
   g->Free(node);
@@ -243,58 +232,47 @@ static PetscErrorCode collect_entity(const SbGmsh *g, int dim, int entity, Petsc
 }
 
 /* Items in the order of their numbers: entities had torn that of the file. */
-static PetscErrorCode sort_items(int dim, SbItems *item)
+static PetscErrorCode sort_items(int dim, SbImport *im)
 {
+  SbItems *item = &im->item[dim], old = *item;
   Order *order;
-  SbItems sorted = *item;
 
   PetscFunctionBeginUser;
-  if (!item->n) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(PetscMalloc1(item->n, &order));
-  for (PetscInt i = 0; i < item->n; i++) order[i] = (Order){(size_t)item->number[i], (size_t)i};
-  qsort(order, (size_t)item->n, sizeof(*order), compare_tags);
-  PetscCall(PetscMalloc((size_t)item->n * (size_t)(dim + 1) * sizeof(PetscInt), &sorted.vert));
-  PetscCall(PetscMalloc((size_t)item->n * sizeof(PetscInt), &sorted.tags));
-  PetscCall(PetscMalloc((size_t)item->n * sizeof(int64_t), &sorted.number));
-  sorted.capacity = item->n;
-  for (PetscInt i = 0; i < item->n; i++) {
-    PetscCall(
-      PetscArraycpy(sorted.vert + (dim + 1) * i, item->vert + (dim + 1) * (PetscInt)order[i].from, dim + 1));
-    sorted.tags[i] = item->tags[order[i].from];
-    sorted.number[i] = item->number[order[i].from];
+  PetscCall(PetscMalloc1(old.n, &order));
+  for (PetscInt i = 0; i < old.n; i++) order[i] = (Order){(size_t)old.number[i], (size_t)i};
+  if (old.n) qsort(order, (size_t)old.n, sizeof(*order), compare_tags);
+  PetscCall(SbImportSetItems(im, dim, old.n));
+  for (PetscInt i = 0; i < old.n; i++) {
+    const PetscInt from = (PetscInt)order[i].from;
+
+    for (int k = 0; k <= dim; k++) item->vert[(dim + 1) * i + k] = old.vert[(dim + 1) * from + k];
+    item->tags[i] = old.tags[from];
+    item->number[i] = old.number[from];
   }
-  PetscCall(PetscFree(item->vert));
-  PetscCall(PetscFree(item->tags));
-  PetscCall(PetscFree(item->number));
+  PetscCall(SbItemsFree(&old));
   PetscCall(PetscFree(order));
-  *item = sorted;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode SbGmshCollect(const SbGmsh *g, SbGmshGroups groups, SbImport *im)
 {
-  int64_t count[SB_GMSH_NTYPES] = {0};
   int *entity, *physical;
   size_t n, nphysical;
   PetscBool itself = PETSC_FALSE;
-  SbNumbers nodes;
 
   PetscFunctionBeginUser;
   PetscCall(collect_nodes(g, im));
-  PetscCall(PetscMemzero(&nodes, sizeof(nodes)));
-  PetscCall(SbNumbersCreate(im->nvert, im->vert_number, &nodes));
+  PetscCall(SbNumbersCreate(im->nvert, im->vert_number, &im->nodes));
   if (groups == SB_GMSH_ENTITIES) {
     SB_GMSH(g, ModelGetPhysicalGroups, &physical, &nphysical, -1);
     itself = (PetscBool)(nphysical == 0);
     g->Free(physical);
   }
   SB_GMSH(g, ModelGetEntities, &entity, &n, -1);
-  for (size_t i = 0; i + 1 < n; i += 2)
-    PetscCall(collect_entity(g, entity[i], entity[i + 1], itself, &nodes, count, im));
+  for (size_t i = 0; i + 1 < n; i += 2) PetscCall(collect_entity(g, entity[i], entity[i + 1], itself, im));
   g->Free(entity);
-  PetscCall(SbNumbersDestroy(&nodes));
-  for (int d = 0; d < 4; d++) PetscCall(sort_items(d, &im->item[d]));
-  PetscCall(SbGmshCheckTypes(im, count));
+  for (int d = 0; d < 4; d++) PetscCall(sort_items(d, im));
+  PetscCall(SbImportCheckTypes(im));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -1,7 +1,7 @@
 /*
   gmsh_types.c - the types of elements as gmsh numbers them (reference manual, "MSH file format"), and which of them make a body.
 */
-#include "gmsh_types.h"
+#include "meshio_impl.h"
 
 const SbGmshType SbGmshTypes[SB_GMSH_NTYPES] = {
   {NULL, 0, 0},
@@ -38,7 +38,7 @@ const SbGmshType SbGmshTypes[SB_GMSH_NTYPES] = {
   {"56-node tetrahedra", 3, 56},
 };
 
-PetscErrorCode SbGmshCheckTypes(const SbImport *im, const int64_t count[])
+PetscErrorCode SbImportCheckTypes(const SbImport *im)
 {
   PetscFunctionBeginUser;
   for (int t = 1; t < SB_GMSH_NTYPES; t++) {
@@ -48,15 +48,16 @@ PetscErrorCode SbGmshCheckTypes(const SbImport *im, const int64_t count[])
         : "supple simulates tetrahedra only: split them (gmsh: Mesh.SubdivisionAlgorithm = 0, "
           "Recombine off)";
 
-    PetscCheck(t == SB_GMSH_TET || SbGmshTypes[t].dim < 3 || !count[t], PETSC_COMM_SELF,
-               PETSC_ERR_FILE_UNEXPECTED, "%s: holds %lld %s; %s", im->where, (long long)count[t],
+    PetscCheck(t == SB_GMSH_TET || SbGmshTypes[t].dim < 3 || !im->count[t], PETSC_COMM_SELF,
+               PETSC_ERR_FILE_UNEXPECTED, "%s: holds %lld %s; %s", im->where, (long long)im->count[t],
                SbGmshTypes[t].name, advice);
   }
-  if (count[SB_GMSH_TET] || (im->surface && count[SB_GMSH_TRIANGLE])) PetscFunctionReturn(PETSC_SUCCESS);
+  if (im->count[SB_GMSH_TET] || (im->surface && im->count[SB_GMSH_TRIANGLE]))
+    PetscFunctionReturn(PETSC_SUCCESS);
   for (int t = 1; t < SB_GMSH_NTYPES; t++) {
-    PetscCheck(SbGmshTypes[t].dim < 2 || !count[t], PETSC_COMM_SELF, PETSC_ERR_FILE_UNEXPECTED,
+    PetscCheck(SbGmshTypes[t].dim < 2 || !im->count[t], PETSC_COMM_SELF, PETSC_ERR_FILE_UNEXPECTED,
                "%s: is a surface: %lld %s and no tetrahedra; mesh the volume (gmsh -3)", im->where,
-               (long long)count[t], SbGmshTypes[t].name);
+               (long long)im->count[t], SbGmshTypes[t].name);
   }
   SETERRQ(PETSC_COMM_SELF, PETSC_ERR_FILE_UNEXPECTED,
           "%s: holds no tetrahedra; mesh the volume (gmsh -3) and save all of it", im->where);

@@ -140,6 +140,7 @@ PetscErrorCode SbImportRead(const SbBody *body, SbImport *im)
   PetscCall(find_reader(body, &read));
   PetscCall(begin(body, im));
   PetscCall(read(body->mesh, im));
+  PetscCall(SbImportForget(im));
   PetscCall(place(body, im));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -160,6 +161,7 @@ PetscErrorCode SbImportSlab(const SbBody *body, PetscInt k, PetscInt n, SbImport
   PetscFunctionBeginUser;
   PetscCall(begin(body, im));
   PetscCall(SbImportSlab_H5(body->mesh, k, n, im, rows));
+  PetscCall(SbImportForget(im));
   PetscCall(place(body, im));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

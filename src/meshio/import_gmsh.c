@@ -9,7 +9,6 @@
   Sections that do not concern us are skipped. Refused: volume elements other than 4-node tets, files cut into partitions, other versions.
 */
 #include "meshio_impl.h"
-#include "gmsh_types.h"
 
 /* An entity of the geometry in a 4.1 file. */
 typedef struct {
@@ -18,14 +17,11 @@ typedef struct {
 } Entity;
 
 typedef struct {
-  SbScan scan;
   SbImport *im;
   int version; /* 1, 2 or 41 */
   PetscBool binary;
-  SbNumbers nodes; /* node numbers to vertices */
   PetscInt nentity;
-  Entity *entity;                /* [nentity] */
-  int64_t count[SB_GMSH_NTYPES]; /* elements read, by type */
+  Entity *entity; /* [nentity] */
   struct {
     int dim;
     int64_t tag;
@@ -41,7 +37,7 @@ static PetscErrorCode read_format(Gmsh *g)
     const char *name;
     int version;
   } versions[] = {{"2", 2}, {"2.0", 2}, {"2.1", 2}, {"2.2", 2}, {"4.1", 41}};
-  SbScan *s = &g->scan;
+  SbScan *s = &g->im->scan;
   char version[16];
   int64_t kind, size, one;
 
@@ -75,7 +71,7 @@ static PetscErrorCode read_format(Gmsh *g)
 /* Names are text also in binary files. */
 static PetscErrorCode read_names(Gmsh *g)
 {
-  SbScan *s = &g->scan;
+  SbScan *s = &g->im->scan;
   int64_t n, dim, tag;
   PetscInt group;
   char name[SB_GROUP_MAX];
@@ -98,29 +94,23 @@ static PetscErrorCode read_names(Gmsh *g)
 static PetscErrorCode read_entity_groups(Gmsh *g, int dim, PetscInt *tags)
 {
   int64_t n, tag;
-  PetscInt *group;
+  PetscInt *group = NULL;
 
   PetscFunctionBeginUser;
-  PetscCall(SbScanInt8(&g->scan, "number of physical groups of an entity", &n));
-  PetscCall(SbScanRoom(&g->scan, "physical groups", n, 2, 4));
-  PetscCall(PetscMalloc1(n, &group));
+  PetscCall(SbScanInt8(&g->im->scan, "number of physical groups of an entity", &n));
+  PetscCall(SbScanRoom(&g->im->scan, "physical groups", n, 2, 4));
+  if (n) PetscCall(SbImportScratch(g->im, (size_t)n * sizeof(*group), &group));
   for (int64_t i = 0; i < n; i++) {
-    const PetscErrorCode ierr = SbScanInt4(&g->scan, "physical group of an entity", &tag);
-
-    if (ierr) {
-      (void)PetscFree(group);
-      PetscFunctionReturn(ierr);
-    }
+    PetscCall(SbScanInt4(&g->im->scan, "physical group of an entity", &tag));
     PetscCall(SbImportGroup(g->im, dim, tag < 0 ? -tag : tag, NULL, &group[i]));
   }
   PetscCall(SbImportTagSet(g->im, (PetscInt)n, group, tags));
-  PetscCall(PetscFree(group));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 static PetscErrorCode read_entity(Gmsh *g, int dim, Entity *e)
 {
-  SbScan *s = &g->scan;
+  SbScan *s = &g->im->scan;
   PetscReal box;
   int64_t n, border;
 
@@ -138,7 +128,7 @@ static PetscErrorCode read_entity(Gmsh *g, int dim, Entity *e)
 
 static PetscErrorCode read_entities(Gmsh *g)
 {
-  SbScan *s = &g->scan;
+  SbScan *s = &g->im->scan;
   int64_t n[4], total = 0;
 
   PetscFunctionBeginUser;
@@ -148,7 +138,7 @@ static PetscErrorCode read_entities(Gmsh *g)
     PetscCall(SbScanRoom(s, "entities", n[d], 10, 28));
     total += n[d];
   }
-  PetscCall(PetscMalloc1(total, &g->entity));
+  PetscCall(SbImportScratch(g->im, (size_t)total * sizeof(*g->entity), &g->entity));
   for (int d = 0; d < 4; d++) {
     for (int64_t i = 0; i < n[d]; i++) PetscCall(read_entity(g, d, &g->entity[g->nentity++]));
   }
@@ -168,7 +158,7 @@ static PetscInt entity_tags(const Gmsh *g, int64_t dim, int64_t tag)
 
 static PetscErrorCode read_nodes_22(Gmsh *g)
 {
-  SbScan *s = &g->scan;
+  SbScan *s = &g->im->scan;
   int64_t n;
 
   PetscFunctionBeginUser;
@@ -188,7 +178,7 @@ static PetscErrorCode read_nodes_22(Gmsh *g)
 /* One block: all numbers, then all coordinates with up to three parameters on the entity. */
 static PetscErrorCode read_node_block(Gmsh *g, PetscInt *v)
 {
-  SbScan *s = &g->scan;
+  SbScan *s = &g->im->scan;
   int64_t dim, tag, parametric, n;
   PetscReal parameter;
 
@@ -218,7 +208,7 @@ static PetscErrorCode check_type(Gmsh *g, int64_t type)
 {
   PetscFunctionBeginUser;
   if (type < 1 || type >= SB_GMSH_NTYPES)
-    SB_SCAN_ERROR(&g->scan,
+    SB_SCAN_ERROR(&g->im->scan,
                   "element type %lld; supple needs 4-node tetrahedra (type 4), with points, lines and "
                   "triangles for groups",
                   (long long)type);
@@ -228,7 +218,7 @@ static PetscErrorCode check_type(Gmsh *g, int64_t type)
 /* Reads the nodes of one element and keeps what is of use. */
 static PetscErrorCode read_element(Gmsh *g, int type, int64_t number, PetscInt tags)
 {
-  SbScan *s = &g->scan;
+  SbScan *s = &g->im->scan;
   int64_t node;
   PetscInt vert[64];
   const int n = SbGmshTypes[type].nnode;
@@ -239,22 +229,19 @@ static PetscErrorCode read_element(Gmsh *g, int type, int64_t number, PetscInt t
       PetscCall(SbScanInt4(s, "node of an element", &node));
     else
       PetscCall(SbScanInt8(s, "node of an element", &node));
-    vert[i] = SbNumbersFind(&g->nodes, node);
+    vert[i] = SbNumbersFind(&g->im->nodes, node);
     if (vert[i] < 0)
       SB_SCAN_ERROR(s, "element %lld uses node %lld, which $Nodes does not list", (long long)number,
                     (long long)node);
   }
-  g->count[type]++;
-  if (type == SB_GMSH_TET || (type == SB_GMSH_TRIANGLE && g->im->surface) ||
-      (tags && (type == SB_GMSH_POINT || type == SB_GMSH_LINE || type == SB_GMSH_TRIANGLE)))
-    PetscCall(SbImportAddItem(g->im, SbGmshTypes[type].dim, vert, tags, number));
+  PetscCall(SbImportAddElement(g->im, type, vert, tags, number));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Elements of one type: as text one, whose line tells type and number of tags; in binary as many as their header says. */
 static PetscErrorCode read_elements_22_run(Gmsh *g, int64_t left, int64_t *nread)
 {
-  SbScan *s = &g->scan;
+  SbScan *s = &g->im->scan;
   int64_t number = 0, type, ntag, n = 1;
   PetscInt tags = 0;
 
@@ -276,9 +263,9 @@ static PetscErrorCode read_elements_22_run(Gmsh *g, int64_t left, int64_t *nread
 
     if (s->binary) PetscCall(SbScanInt4(s, "number of an element", &number));
     // the first tag is the group, 0 for none; the others are not used
-    PetscCall(SbScanRoom(&g->scan, "tags of an element", ntag, 2, 4));
+    PetscCall(SbScanRoom(&g->im->scan, "tags of an element", ntag, 2, 4));
     for (int64_t k = 0; k < ntag; k++)
-      PetscCall(SbScanInt4(&g->scan, "tag of an element", k ? &other : &tag));
+      PetscCall(SbScanInt4(&g->im->scan, "tag of an element", k ? &other : &tag));
     if (tag && (tag != g->last.tag || SbGmshTypes[type].dim != g->last.dim)) {
       PetscCall(SbImportGroup(g->im, SbGmshTypes[type].dim, tag < 0 ? -tag : tag, NULL, &group));
       PetscCall(SbImportTagSet(g->im, 1, &group, &g->last.tags));
@@ -290,9 +277,9 @@ static PetscErrorCode read_elements_22_run(Gmsh *g, int64_t left, int64_t *nread
     if (g->version == 1) {
       int64_t nnode;
 
-      PetscCall(SbScanText(&g->scan, "number of nodes of an element", &nnode));
+      PetscCall(SbScanText(&g->im->scan, "number of nodes of an element", &nnode));
       if (nnode != SbGmshTypes[type].nnode)
-        SB_SCAN_ERROR(&g->scan, "an element of type %d with %lld nodes; expected %d", (int)type,
+        SB_SCAN_ERROR(&g->im->scan, "an element of type %d with %lld nodes; expected %d", (int)type,
                       (long long)nnode, SbGmshTypes[type].nnode);
     }
     PetscCall(read_element(g, (int)type, number, tags));
@@ -303,7 +290,7 @@ static PetscErrorCode read_elements_22_run(Gmsh *g, int64_t left, int64_t *nread
 
 static PetscErrorCode read_elements_22(Gmsh *g)
 {
-  SbScan *s = &g->scan;
+  SbScan *s = &g->im->scan;
   int64_t n, nrun = 1;
 
   PetscFunctionBeginUser;
@@ -318,7 +305,7 @@ static PetscErrorCode read_elements_22(Gmsh *g)
 
 static PetscErrorCode read_elements_41(Gmsh *g)
 {
-  SbScan *s = &g->scan;
+  SbScan *s = &g->im->scan;
   int64_t nblock, total, bound, dim, tag, type, n, number, nread = 0;
 
   PetscFunctionBeginUser;
@@ -354,7 +341,7 @@ static PetscErrorCode read_elements(Gmsh *g)
 {
   PetscFunctionBeginUser;
   if (!g->im->x)
-    SB_SCAN_ERROR(&g->scan, "section %s before the nodes", g->version == 1 ? "$ELM" : "$Elements");
+    SB_SCAN_ERROR(&g->im->scan, "section %s before the nodes", g->version == 1 ? "$ELM" : "$Elements");
   if (g->version <= 2)
     PetscCall(read_elements_22(g));
   else
@@ -430,7 +417,7 @@ static PetscErrorCode merge_repeats(SbImport *im)
 /* The sections that concern us; all others are skipped. */
 static PetscErrorCode read_section(Gmsh *g, const char *name, PetscBool *known)
 {
-  SbScan *s = &g->scan;
+  SbScan *s = &g->im->scan;
   const char *nodes = g->version == 1 ? "$NOD" : "$Nodes", *elements = g->version == 1 ? "$ELM" : "$Elements";
 
   PetscFunctionBeginUser;
@@ -441,7 +428,7 @@ static PetscErrorCode read_section(Gmsh *g, const char *name, PetscBool *known)
     PetscCall(SbScanEndOfLine(s));
     s->binary = g->binary;
     if (!strcmp(name, nodes)) {
-      if (g->im->x) SB_SCAN_ERROR(&g->scan, "second section $Nodes");
+      if (g->im->x) SB_SCAN_ERROR(&g->im->scan, "second section $Nodes");
       if (g->version <= 2)
         PetscCall(read_nodes_22(g));
       else {
@@ -459,9 +446,10 @@ static PetscErrorCode read_section(Gmsh *g, const char *name, PetscBool *known)
         if (v < n)
           SB_SCAN_ERROR(s, "%lld nodes are announced, the blocks hold %lld", (long long)n, (long long)v);
       }
-      PetscCall(SbNumbersCreate(g->im->nvert, g->im->vert_number, &g->nodes));
-      if (g->nodes.repeated)
-        SB_SCAN_ERROR(&g->scan, "node %lld is given twice; renumber the nodes", (long long)g->nodes.twice);
+      PetscCall(SbNumbersCreate(g->im->nvert, g->im->vert_number, &g->im->nodes));
+      if (g->im->nodes.repeated)
+        SB_SCAN_ERROR(&g->im->scan, "node %lld is given twice; renumber the nodes",
+                      (long long)g->im->nodes.twice);
     } else if (!strcmp(name, elements))
       PetscCall(read_elements(g));
     else
@@ -477,7 +465,7 @@ static PetscErrorCode read_section(Gmsh *g, const char *name, PetscBool *known)
 /* Reads a section, or passes over it; then its closing word. */
 static PetscErrorCode read_whole_section(Gmsh *g, const char *name)
 {
-  SbScan *s = &g->scan;
+  SbScan *s = &g->im->scan;
   char end[64], closing[72];
   PetscBool known;
 
@@ -503,7 +491,7 @@ static PetscErrorCode read_whole_section(Gmsh *g, const char *name)
 /* Version 1 begins with its nodes. */
 static PetscErrorCode read_sections(Gmsh *g)
 {
-  SbScan *s = &g->scan;
+  SbScan *s = &g->im->scan;
   char name[64];
 
   PetscFunctionBeginUser;
@@ -519,30 +507,16 @@ static PetscErrorCode read_sections(Gmsh *g)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode read_file(const char *path, Gmsh *g)
-{
-  PetscFunctionBeginUser;
-  PetscCall(SbScanOpen(g->im->where, path, &g->scan));
-  PetscCall(read_sections(g));
-  PetscCheck(g->im->x, PETSC_COMM_SELF, PETSC_ERR_FILE_UNEXPECTED,
-             "%s: has no section $Nodes; it is truncated or not a mesh", g->im->where);
-  PetscCall(SbGmshCheckTypes(g->im, g->count));
-  if (g->version <= 2 && g->im->ngroup > 1) PetscCall(merge_repeats(g->im));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode SbImportRead_Gmsh(const char *path, SbImport *im)
 {
-  Gmsh g;
-  PetscErrorCode ierr;
+  Gmsh g = {.im = im};
 
   PetscFunctionBeginUser;
-  PetscCall(PetscMemzero(&g, sizeof(g)));
-  g.im = im;
-  ierr = read_file(path, &g);
-  PetscCall(SbScanClose(&g.scan));
-  PetscCall(SbNumbersDestroy(&g.nodes));
-  PetscCall(PetscFree(g.entity));
-  PetscCall(ierr);
+  PetscCall(SbScanOpen(im->where, path, &im->scan));
+  PetscCall(read_sections(&g));
+  PetscCheck(im->x, PETSC_COMM_SELF, PETSC_ERR_FILE_UNEXPECTED,
+             "%s: has no section $Nodes; it is truncated or not a mesh", im->where);
+  PetscCall(SbImportCheckTypes(im));
+  if (g.version <= 2 && im->ngroup > 1) PetscCall(merge_repeats(im));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

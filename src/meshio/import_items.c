@@ -4,6 +4,7 @@
   An entity of a file may belong to several physical groups. The set of groups of an item is stored once (a "tag set") and items
   refer to it; set 0 is the empty one.
 */
+#include <stdlib.h>
 #include "meshio_impl.h"
 
 /* Room for at least `need` elements of `unit` bytes; doubles, so that appending is cheap. */
@@ -18,12 +19,59 @@ static PetscErrorCode reserve(PetscInt need, PetscInt *capacity, size_t unit, vo
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbImportGrow(SbCount *count, size_t unit, void *array)
+/* ------------------------------------------------------------------ arrays of readers */
+
+/* Stands before each array. */
+struct _p_SbScratch {
+  struct _p_SbScratch *next, *before;
+};
+
+PetscErrorCode SbImportScratch(SbImport *im, size_t bytes, void *array)
 {
+  struct _p_SbScratch *block = NULL;
+  void *old = *(void **)array;
+
   PetscFunctionBeginUser;
-  PetscCall(reserve(++count->n, &count->capacity, unit, array));
+  if (old) block = (struct _p_SbScratch *)old - 1;
+  PetscCall(PetscRealloc(sizeof(*block) + bytes, &block));
+  if (!old) *block = (struct _p_SbScratch){im->scratch, NULL};
+  if (block->next) block->next->before = block;
+  *(block->before ? &block->before->next : &im->scratch) = block;
+  *(void **)array = block + 1;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
+
+PetscErrorCode SbImportGrow(SbImport *im, SbCount *count, size_t unit, void *array)
+{
+  PetscFunctionBeginUser;
+  if (count->n == count->capacity) {
+    const PetscInt grown = PetscMax(64, 2 * count->capacity);
+
+    PetscCall(SbImportScratch(im, (size_t)grown * unit, array));
+    count->capacity = grown;
+  }
+  count->n++;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbImportForget(SbImport *im)
+{
+  PetscFunctionBeginUser;
+  PetscCall(SbScanClose(&im->scan));
+  PetscCall(SbNumbersDestroy(&im->nodes));
+  PetscCall(SbNumbersDestroy(&im->elements));
+  while (im->scratch) {
+    struct _p_SbScratch *block = im->scratch;
+
+    im->scratch = block->next;
+    PetscCall(PetscFree(block));
+  }
+  im->member = NULL;
+  im->nmember = (SbCount){0, 0};
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ vertices and simplices */
 
 PetscErrorCode SbImportSetVertices(SbImport *im, PetscInt n)
 {
@@ -67,6 +115,29 @@ PetscErrorCode SbImportSetItems(SbImport *im, int dim, PetscInt n)
   item->n = item->capacity = n;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
+
+PetscErrorCode SbItemsFree(SbItems *item)
+{
+  PetscFunctionBeginUser;
+  PetscCall(PetscFree(item->vert));
+  PetscCall(PetscFree(item->tags));
+  PetscCall(PetscFree(item->number));
+  item->n = item->capacity = 0;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbImportAddElement(SbImport *im, int type, const PetscInt vert[], PetscInt tags,
+                                  int64_t number)
+{
+  PetscFunctionBeginUser;
+  im->count[type]++;
+  if (type == SB_GMSH_TET || (type == SB_GMSH_TRIANGLE && im->surface) ||
+      (tags && (type == SB_GMSH_POINT || type == SB_GMSH_LINE || type == SB_GMSH_TRIANGLE)))
+    PetscCall(SbImportAddItem(im, SbGmshTypes[type].dim, vert, tags, number));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ groups */
 
 /* Slot of a group, or the free one where it belongs. */
 static PetscInt find_slot(const SbImport *im, PetscInt dim, int64_t tag)
@@ -115,6 +186,17 @@ PetscErrorCode SbImportGroup(SbImport *im, PetscInt dim, int64_t tag, const char
   }
   if (name) PetscCall(PetscStrncpy(im->group[g].name, name, SB_GROUP_MAX));
   *group = g;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbImportNameGroup(SbImport *im, PetscInt dim, int64_t tag, const char *name)
+{
+  PetscInt g;
+
+  PetscFunctionBeginUser;
+  PetscCall(hash_groups(im));
+  g = im->slot[find_slot(im, dim, tag)];
+  if (g >= 0) PetscCall(PetscStrncpy(im->group[g].name, name, SB_GROUP_MAX));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -172,6 +254,45 @@ PetscErrorCode SbImportTagSet(SbImport *im, PetscInt n, PetscInt groups[], Petsc
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscErrorCode SbImportAddMember(SbImport *im, PetscInt dim, PetscInt item, PetscInt group)
+{
+  PetscFunctionBeginUser;
+  PetscCall(SbImportGrow(im, &im->nmember, sizeof(*im->member), &im->member));
+  im->member[im->nmember.n - 1] = (SbGroupMember){dim, item, group};
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static int compare_members(const void *a, const void *b)
+{
+  const SbGroupMember *p = (const SbGroupMember *)a, *q = (const SbGroupMember *)b;
+
+  if (p->dim != q->dim) return p->dim < q->dim ? -1 : 1;
+  if (p->item != q->item) return p->item < q->item ? -1 : 1;
+  return (p->group > q->group) - (p->group < q->group);
+}
+
+PetscErrorCode SbImportJoinGroups(SbImport *im)
+{
+  const SbGroupMember *m = im->member, *end = im->member + im->nmember.n;
+  PetscInt *group = NULL;
+
+  PetscFunctionBeginUser;
+  if (!im->nmember.n) PetscFunctionReturn(PETSC_SUCCESS);
+  qsort(im->member, (size_t)im->nmember.n, sizeof(*m), compare_members);
+  PetscCall(SbImportScratch(im, (size_t)(im->nmember.n + im->ngroup) * sizeof(*group), &group));
+  while (m < end) {
+    const SbGroupMember *first = m;
+    PetscInt *tags = &im->item[m->dim].tags[m->item], n = 0;
+
+    for (PetscInt i = im->tags_start[*tags]; i < im->tags_start[*tags + 1]; i++)
+      group[n++] = im->tags_group[i];
+    for (; m < end && m->dim == first->dim && m->item == first->item; m++) group[n++] = m->group;
+    PetscCall(SbImportTagSet(im, n, group, tags));
+  }
+  im->nmember.n = 0;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 const char *SbImportOption(const SbImport *im, const char *key, char name[SB_OPTION_NAME_MAX])
 {
   if (im->body[0])
@@ -184,13 +305,10 @@ const char *SbImportOption(const SbImport *im, const char *key, char name[SB_OPT
 PetscErrorCode SbImportDestroy(SbImport *im)
 {
   PetscFunctionBeginUser;
+  PetscCall(SbImportForget(im));
   PetscCall(PetscFree(im->x));
   PetscCall(PetscFree(im->vert_number));
-  for (int d = 0; d < 4; d++) {
-    PetscCall(PetscFree(im->item[d].vert));
-    PetscCall(PetscFree(im->item[d].tags));
-    PetscCall(PetscFree(im->item[d].number));
-  }
+  for (int d = 0; d < 4; d++) PetscCall(SbItemsFree(&im->item[d]));
   PetscCall(PetscFree(im->group));
   PetscCall(PetscFree(im->tags_start));
   PetscCall(PetscFree(im->tags_group));

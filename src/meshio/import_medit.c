@@ -7,13 +7,7 @@
   their numbers. Refused: binary files (.meshb), elements other than 4-node tets in the volume.
 */
 #include <ctype.h>
-#include "gmsh_types.h"
-
-typedef struct {
-  SbScan scan;
-  SbImport *im;
-  int64_t count[SB_GMSH_NTYPES];
-} Medit;
+#include "meshio_impl.h"
 
 /* Elements by their keyword: what gmsh calls them. */
 static const struct {
@@ -33,146 +27,111 @@ static const struct {
   {"EdgesP2", 8},
 };
 
-static PetscErrorCode read_vertices(Medit *m)
+static PetscErrorCode read_vertices(SbImport *im)
 {
-  SbScan *s = &m->scan;
+  SbScan *s = &im->scan;
   int64_t n;
   PetscReal reference;
 
   PetscFunctionBeginUser;
-  if (m->im->x) SB_SCAN_ERROR(s, "second section Vertices");
+  if (im->x) SB_SCAN_ERROR(s, "second section Vertices");
   SbScanNext(s, '#');
   PetscCall(SbScanText(s, "number of vertices", &n));
   PetscCall(SbScanRoom(s, "vertices", n, 8, 8));
-  PetscCall(SbImportSetVertices(m->im, (PetscInt)n));
+  PetscCall(SbImportSetVertices(im, (PetscInt)n));
   for (PetscInt v = 0; v < n; v++) {
-    m->im->vert_number[v] = v + 1;
+    im->vert_number[v] = v + 1;
     SbScanNext(s, '#');
-    PetscCall(SbScanPoint(s, "coordinate", v + 1, m->im->x + 3 * v));
+    PetscCall(SbScanPoint(s, "coordinate", v + 1, im->x + 3 * v));
     PetscCall(SbScanReal(s, "reference", v + 1, &reference));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode read_elements(Medit *m, int type)
+static PetscErrorCode read_elements(SbImport *im, int type)
 {
-  SbScan *s = &m->scan;
+  SbScan *s = &im->scan;
   const int dim = SbGmshTypes[type].dim, nnode = SbGmshTypes[type].nnode;
   int64_t n, point, reference;
   PetscInt vert[4], tags;
 
   PetscFunctionBeginUser;
-  if (!m->im->x) SB_SCAN_ERROR(s, "elements before the section Vertices");
+  if (!im->x) SB_SCAN_ERROR(s, "elements before the section Vertices");
   SbScanNext(s, '#');
   PetscCall(SbScanText(s, "number of elements", &n));
   PetscCall(SbScanRoom(s, SbGmshTypes[type].name, n, 2 * nnode, 2 * nnode));
-  m->count[type] += n;
   for (int64_t i = 0; i < n; i++) {
     SbScanNext(s, '#');
     for (int k = 0; k < nnode; k++) {
       PetscCall(SbScanText(s, "vertex of an element", &point));
-      if (point < 1 || point > m->im->nvert)
+      if (point < 1 || point > im->nvert)
         SB_SCAN_ERROR(s, "element %lld uses vertex %lld of %lld", (long long)i + 1, (long long)point,
-                      (long long)m->im->nvert);
+                      (long long)im->nvert);
       if (k < 4) vert[k] = (PetscInt)(point - 1);
     }
     PetscCall(SbScanText(s, "reference of an element", &reference));
-    if (type != SB_GMSH_TET && type != SB_GMSH_TRIANGLE && type != SB_GMSH_LINE) continue;
     tags = 0;
-    if (reference || dim == 3) PetscCall(SbImportTagsAlone(m->im, dim, reference, NULL, &tags));
-    if (tags || (dim == 2 && m->im->surface)) PetscCall(SbImportAddItem(m->im, dim, vert, tags, i + 1));
+    if (nnode == dim + 1 && (reference || dim == 3))
+      PetscCall(SbImportTagsAlone(im, dim, reference, NULL, &tags));
+    PetscCall(SbImportAddElement(im, type, vert, tags, i + 1));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* To the next word that is no number. */
-static PetscErrorCode skip_numbers(Medit *m)
+static void skip_numbers(SbScan *s)
 {
-  SbScan *s = &m->scan;
-
-  PetscFunctionBeginUser;
   for (;;) {
     SbScanNext(s, '#');
     if (s->at >= s->end || isalpha((unsigned char)*s->at)) break;
     while (s->at < s->end && !isspace((unsigned char)*s->at)) s->at++;
   }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode read_keyword(Medit *m, const char *word)
-{
-  SbScan *s = &m->scan;
-  int64_t dimension;
-
-  PetscFunctionBeginUser;
-  if (!strcmp(word, "Vertices")) PetscCall(read_vertices(m));
-  if (!strcmp(word, "Dimension")) {
-    SbScanNext(s, '#');
-    PetscCall(SbScanText(s, "dimension", &dimension));
-    if (dimension != 3) SB_SCAN_ERROR(s, "dimension %lld; expected 3", (long long)dimension);
-  }
-  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(elements); i++) {
-    if (!strcmp(word, elements[i].word)) PetscCall(read_elements(m, elements[i].type));
-  }
-  PetscCall(skip_numbers(m));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode read_file(const char *path, Medit *m)
-{
-  SbScan *s = &m->scan;
-  char word[32];
-  PetscBool ended = PETSC_FALSE;
-
-  PetscFunctionBeginUser;
-  PetscCall(SbScanOpen(m->im->where, path, s));
-  SbScanNext(s, '#');
-  PetscCall(SbScanWord(s, sizeof(word), word));
-  if (strcmp(word, "MeshVersionFormatted"))
-    SB_SCAN_ERROR(s, "expected 'MeshVersionFormatted', found '%s'; this is no text file of Medit", word);
-  PetscCall(skip_numbers(m));
-  while (!ended) {
-    SbScanNext(s, '#');
-    PetscCall(SbScanWord(s, sizeof(word), word));
-    if (!word[0])
-      SB_SCAN_ERROR(
-        s, "the file ends where a section, or 'End', is expected; it is truncated, write or copy it again");
-    ended = (PetscBool)!strcmp(word, "End");
-    if (!ended) PetscCall(read_keyword(m, word));
-  }
-  PetscCall(SbGmshCheckTypes(m->im, m->count));
-  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode SbImportRead_Medit(const char *path, SbImport *im)
 {
-  Medit m;
-  PetscErrorCode ierr;
+  SbScan *s = &im->scan;
+  char word[32];
+  int64_t dimension;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscMemzero(&m, sizeof(m)));
-  m.im = im;
-  ierr = read_file(path, &m);
-  PetscCall(SbScanClose(&m.scan));
-  PetscFunctionReturn(ierr);
+  PetscCall(SbScanOpen(im->where, path, s));
+  SbScanNext(s, '#');
+  PetscCall(SbScanWord(s, sizeof(word), word));
+  if (strcmp(word, "MeshVersionFormatted"))
+    SB_SCAN_ERROR(s, "expected 'MeshVersionFormatted', found '%s'; this is no text file of Medit", word);
+  for (;;) {
+    skip_numbers(s);
+    PetscCall(SbScanWord(s, sizeof(word), word));
+    if (!word[0])
+      SB_SCAN_ERROR(
+        s, "the file ends where a section, or 'End', is expected; it is truncated, write or copy it again");
+    if (!strcmp(word, "End")) break;
+    if (!strcmp(word, "Vertices")) PetscCall(read_vertices(im));
+    if (!strcmp(word, "Dimension")) {
+      SbScanNext(s, '#');
+      PetscCall(SbScanText(s, "dimension", &dimension));
+      if (dimension != 3) SB_SCAN_ERROR(s, "dimension %lld; expected 3", (long long)dimension);
+    }
+    for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(elements); i++) {
+      if (!strcmp(word, elements[i].word)) PetscCall(read_elements(im, elements[i].type));
+    }
+  }
+  PetscCall(SbImportCheckTypes(im));
+  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* The two share their ending: Netgen's begins with a number. */
 PetscErrorCode SbImportRead_Mesh(const char *path, SbImport *im)
 {
-  SbScan s;
+  SbScan *s = &im->scan;
   PetscBool number;
-  PetscErrorCode ierr;
 
   PetscFunctionBeginUser;
-  ierr = SbScanOpen(im->where, path, &s);
-  if (!ierr) SbScanNext(&s, '#');
-  number = (PetscBool)(!ierr && s.at < s.end && isdigit((unsigned char)*s.at));
-  PetscCall(SbScanClose(&s));
-  PetscCall(ierr);
-  if (number)
-    PetscCall(SbImportRead_NetgenNeutral(path, im));
-  else
-    PetscCall(SbImportRead_Medit(path, im));
+  PetscCall(SbScanOpen(im->where, path, s));
+  SbScanNext(s, '#');
+  number = (PetscBool)(s->at < s->end && isdigit((unsigned char)*s->at));
+  PetscCall(SbScanClose(s));
+  PetscCall(number ? SbImportRead_NetgenNeutral(path, im) : SbImportRead_Medit(path, im));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

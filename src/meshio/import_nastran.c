@@ -15,27 +15,9 @@
 #include <ctype.h>
 #include <stdlib.h>
 #include <strings.h>
-#include "gmsh_types.h"
+#include "meshio_impl.h"
 
 enum { LINE = 256, WORD = 64 };
-
-typedef struct {
-  int64_t label;
-  PetscReal x[3];
-  const char *at; /* for messages */
-} Grid;
-
-typedef struct {
-  int64_t label, property, node[4];
-  int type;
-  const char *at; /* for messages */
-} Element;
-
-/* Nodes first to last are in a set: SPC, SPC1 or SET1 of a number. */
-typedef struct {
-  int kind;
-  int64_t number, first, last;
-} Range;
 
 typedef struct {
   int64_t number;
@@ -43,23 +25,16 @@ typedef struct {
 } Name;
 
 typedef struct {
-  SbScan scan;
-  SbImport *im;
+  SbDeck deck;
+  SbScan *scan;
   size_t length;         /* of the line */
   char line[LINE];       /* the current one, tabs replaced, without its comment */
   PetscBool commas, cut; /* cut: it was longer than this */
   int field, per_line;   /* last field taken; fields of values on the line */
-  SbCount nnode, nelement, nrange, nname;
-  Grid *node;
-  Element *element;
-  Range *range;
-  Name *name;
+  SbCount nname;
+  Name *name;                 /* [nname] of properties */
   char pending[SB_GROUP_MAX]; /* name that Patran gives to the next property */
-  SbNumbers nodes;
-  int64_t count[SB_GMSH_NTYPES];
 } Nastran;
-
-static const char *const set_names[] = {"spc", "set"};
 
 /* ------------------------------------------------------------------ names in comments */
 
@@ -79,7 +54,7 @@ static PetscErrorCode add_name(Nastran *b, int64_t number, const char *name)
 {
   PetscFunctionBeginUser;
   if (!name[0] || number <= 0) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(SbImportGrow(&b->nname, sizeof(*b->name), &b->name));
+  PetscCall(SbImportGrow(b->deck.im, &b->nname, sizeof(*b->name), &b->name));
   b->name[b->nname.n - 1].number = number;
   PetscCall(PetscStrncpy(b->name[b->nname.n - 1].name, name, SB_GROUP_MAX));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -164,7 +139,7 @@ static void get_field(const Nastran *b, int k, char word[WORD])
 /* Takes the next line that is neither a comment nor empty; false at the end. */
 static PetscErrorCode next_line(Nastran *b, PetscBool *there)
 {
-  SbScan *s = &b->scan;
+  SbScan *s = b->scan;
   char name[WORD];
 
   PetscFunctionBeginUser;
@@ -203,7 +178,7 @@ static PetscBool continues(const Nastran *b)
 /* The next field of the entry, on this line or one that continues it; false at the end of the entry. */
 static PetscErrorCode next_field(Nastran *b, char word[WORD], PetscBool *there)
 {
-  SbScan *s = &b->scan;
+  SbScan *s = b->scan;
   const char *at = s->at, *token = s->token;
 
   PetscFunctionBeginUser;
@@ -245,7 +220,7 @@ static PetscErrorCode to_number(Nastran *b, const char *word, const char *what, 
   if (!word[0]) PetscFunctionReturn(PETSC_SUCCESS);
   *value = strtoll(word, &end, 10);
   if (*end || *value < 0 || *value > (int64_t)1 << 40)
-    SB_SCAN_ERROR(&b->scan, "expected the %s, found '%.24s'", what, word);
+    SB_SCAN_ERROR(b->scan, "expected the %s, found '%.24s'", what, word);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -265,7 +240,7 @@ static PetscErrorCode next_label(Nastran *b, const char *what, int64_t *value)
 {
   PetscFunctionBeginUser;
   PetscCall(next_number(b, what, 0, value));
-  if (!*value) SB_SCAN_ERROR(&b->scan, "the %s is missing", what);
+  if (!*value) SB_SCAN_ERROR(b->scan, "the %s is missing", what);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -286,7 +261,7 @@ static PetscErrorCode next_real(Nastran *b, int64_t node, PetscReal *value)
   full[PetscMin(n, WORD)] = 0;
   *value = strtod(full, &end);
   if (*end || full[strspn(full, "0123456789.+-Ee")] || !isfinite(*value))
-    SB_SCAN_ERROR(&b->scan, "expected the coordinate of node %lld, found '%.24s'", (long long)node, word);
+    SB_SCAN_ERROR(b->scan, "expected the coordinate of node %lld, found '%.24s'", (long long)node, word);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -295,24 +270,19 @@ static PetscErrorCode next_real(Nastran *b, int64_t node, PetscReal *value)
 static PetscErrorCode read_grid(Nastran *b)
 {
   int64_t label, system;
-  Grid *node;
+  PetscReal *x;
 
   PetscFunctionBeginUser;
   PetscCall(next_label(b, "number of a node", &label));
   PetscCall(next_number(b, "coordinate system of a node", 0, &system));
   if (system)
     SB_SCAN_ERROR(
-      &b->scan,
+      b->scan,
       "node %lld is given in coordinate system %lld; write all nodes in the basic one (field 3 of "
       "GRID empty or 0)",
       (long long)label, (long long)system);
-  PetscCheck(b->nnode.n < PETSC_MAX_INT / 8, PETSC_COMM_SELF, PETSC_ERR_FILE_UNEXPECTED,
-             "%s: has more nodes than this build can number", b->im->where);
-  PetscCall(SbImportGrow(&b->nnode, sizeof(*b->node), &b->node));
-  node = &b->node[b->nnode.n - 1];
-  node->label = label;
-  node->at = b->scan.token;
-  for (int i = 0; i < 3; i++) PetscCall(next_real(b, label, &node->x[i]));
+  PetscCall(SbDeckAddNode(&b->deck, label, &x));
+  for (int i = 0; i < 3; i++) PetscCall(next_real(b, label, &x[i]));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -332,7 +302,7 @@ static const struct {
 
 static PetscErrorCode read_element(Nastran *b, int kind)
 {
-  Element e = {.at = b->scan.token};
+  SbDeckElement e = {.property = 0, .at = b->scan->token};
   char word[WORD];
   PetscBool there, more = PETSC_FALSE;
   int64_t node;
@@ -340,6 +310,7 @@ static PetscErrorCode read_element(Nastran *b, int kind)
   PetscFunctionBeginUser;
   PetscCall(next_label(b, "number of an element", &e.label));
   if (kinds[kind].property) PetscCall(next_number(b, "property of an element", 0, &e.property));
+  if (!e.property) e.property = -1;
   for (int k = 0; k < kinds[kind].ncorner; k++) {
     PetscCall(next_label(b, "node of an element", &node));
     if (k < 4) e.node[k] = node;
@@ -351,24 +322,25 @@ static PetscErrorCode read_element(Nastran *b, int kind)
     more = (PetscBool)(word[0] != 0 && word[0] != '+' && !strchr(word, '.'));
   }
   e.type = more ? kinds[kind].higher : kinds[kind].linear;
-  b->count[e.type]++;
-  if (e.type != SB_GMSH_TET && e.type != SB_GMSH_TRIANGLE && e.type != SB_GMSH_LINE)
-    PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(SbImportGrow(&b->nelement, sizeof(e), &b->element));
-  b->element[b->nelement.n - 1] = e;
+  PetscCall(SbDeckAddElement(&b->deck, &e));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode add_range(Nastran *b, int kind, int64_t number, int64_t first, int64_t last)
+/* Nodes first to last are in set `number` of this kind: spc_12. */
+static PetscErrorCode add_range(Nastran *b, const char *kind, int64_t number, int64_t first, int64_t last)
 {
+  char name[SB_GROUP_MAX];
+  PetscInt set;
+
   PetscFunctionBeginUser;
-  PetscCall(SbImportGrow(&b->nrange, sizeof(*b->range), &b->range));
-  b->range[b->nrange.n - 1] = (Range){kind, number, first, PetscMax(first, last)};
+  (void)snprintf(name, sizeof(name), "%s_%lld", kind, (long long)number);
+  PetscCall(SbDeckFindSet(&b->deck, PETSC_TRUE, name, &set));
+  PetscCall(SbDeckAddRange(&b->deck, set, first, PetscMax(first, last), 1));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Nodes one by one or from THRU to, behind the number of the set and `nskip` fields. */
-static PetscErrorCode read_list(Nastran *b, int kind, int nskip)
+static PetscErrorCode read_list(Nastran *b, const char *kind, int nskip)
 {
   char word[WORD];
   PetscBool there, thru = PETSC_FALSE;
@@ -411,7 +383,7 @@ static PetscErrorCode read_entry(Nastran *b)
     PetscCall(next_field(b, word, &there));
     PetscCall(next_number(b, "coordinate system of the nodes", 0, &system));
     if (system)
-      SB_SCAN_ERROR(&b->scan, "GRDSET gives the nodes in coordinate system %lld; write them in the basic one",
+      SB_SCAN_ERROR(b->scan, "GRDSET gives the nodes in coordinate system %lld; write them in the basic one",
                     (long long)system);
   }
   // SPC: twice a node, its components and their displacement
@@ -423,14 +395,14 @@ static PetscErrorCode read_entry(Nastran *b)
     PetscCall(next_label(b, "spc of a set", &spc));
     for (int i = 0; i < 2; i++) {
       PetscCall(next_number(b, "node of a set", 0, &node));
-      if (node) PetscCall(add_range(b, 0, spc, node, node));
+      if (node) PetscCall(add_range(b, "spc", spc, node, node));
       for (int k = 0; k < 2; k++) PetscCall(next_field(b, word, &there));
     }
   }
-  if (!strcasecmp(name, "SPC1")) PetscCall(read_list(b, 0, 1));
-  if (!strcasecmp(name, "SET1")) PetscCall(read_list(b, 1, 0));
+  if (!strcasecmp(name, "SPC1")) PetscCall(read_list(b, "spc", 1));
+  if (!strcasecmp(name, "SET1")) PetscCall(read_list(b, "set", 0));
   if (!strncasecmp(name, "INCLUDE", 7))
-    SB_SCAN_ERROR(&b->scan, "INCLUDE is not followed; put all into one file");
+    SB_SCAN_ERROR(b->scan, "INCLUDE is not followed; put all into one file");
   for (int k = 0; k < (int)PETSC_STATIC_ARRAY_LENGTH(kinds); k++)
     if (!strcasecmp(name, kinds[k].name)) PetscCall(read_element(b, k));
   if (b->pending[0] && (name[0] == 'P' || name[0] == 'p')) {
@@ -441,130 +413,12 @@ static PetscErrorCode read_entry(Nastran *b)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* ------------------------------------------------------------------ putting it together */
-
-static PetscErrorCode make_nodes(Nastran *b)
-{
-  SbImport *im = b->im;
-
-  PetscFunctionBeginUser;
-  if (!b->nnode.n) {
-    b->scan.token = b->scan.end;
-    SB_SCAN_ERROR(&b->scan,
-                  "there is no GRID up to here; this is no bulk data of Nastran, or it is truncated");
-  }
-  PetscCall(SbImportSetVertices(im, b->nnode.n));
-  for (PetscInt v = 0; v < im->nvert; v++) {
-    PetscCall(PetscArraycpy(im->x + 3 * v, b->node[v].x, 3));
-    im->vert_number[v] = b->node[v].label;
-  }
-  PetscCall(SbNumbersCreate(im->nvert, im->vert_number, &b->nodes));
-  if (!b->nodes.repeated) PetscFunctionReturn(PETSC_SUCCESS);
-  for (PetscInt v = 0; v < im->nvert; v++)
-    if (b->node[v].label == b->nodes.twice) b->scan.token = b->node[v].at;
-  SB_SCAN_ERROR(&b->scan, "node %lld is given twice; renumber the nodes", (long long)b->nodes.twice);
-}
-
-static PetscErrorCode make_items(Nastran *b)
-{
-  PetscFunctionBeginUser;
-  for (PetscInt i = 0; i < b->nelement.n; i++) {
-    const Element *e = &b->element[i];
-    const int dim = SbGmshTypes[e->type].dim;
-    PetscInt vert[4] = {0, 0, 0, 0}, tags = 0;
-
-    b->scan.token = e->at;
-    for (int k = 0; k <= dim; k++) {
-      vert[k] = SbNumbersFind(&b->nodes, e->node[k]);
-      if (vert[k] < 0)
-        SB_SCAN_ERROR(&b->scan, "element %lld uses node %lld, which is not there", (long long)e->label,
-                      (long long)e->node[k]);
-    }
-    if (e->property) PetscCall(SbImportTagsAlone(b->im, dim, e->property, NULL, &tags));
-    if (tags || dim == 3) PetscCall(SbImportAddItem(b->im, dim, vert, tags, e->label));
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static int compare_names(const void *a, const void *b)
-{
-  const Name *p = (const Name *)a, *q = (const Name *)b;
-
-  return (p->number > q->number) - (p->number < q->number);
-}
-
-typedef struct {
-  int64_t label;
-  PetscInt vert;
-} Node;
-
-static int compare_nodes(const void *a, const void *b)
-{
-  const Node *p = (const Node *)a, *q = (const Node *)b;
-
-  return (p->label > q->label) - (p->label < q->label);
-}
-
-static int compare_ranges(const void *a, const void *b)
-{
-  const Range *p = (const Range *)a, *q = (const Range *)b;
-
-  if (p->kind != q->kind) return p->kind - q->kind;
-  if (p->number != q->number) return p->number < q->number ? -1 : 1;
-  return (p->first > q->first) - (p->first < q->first);
-}
-
-/* First of the sorted nodes whose label is not below this. */
-static PetscInt lower_bound(PetscInt n, const Node node[], int64_t label)
-{
-  PetscInt low = 0;
-
-  while (n > low) {
-    const PetscInt middle = low + (n - low) / 2;
-
-    if (node[middle].label < label)
-      low = middle + 1;
-    else
-      n = middle;
-  }
-  return low;
-}
-
-/* Each node once in each set; numbers without a node are those of other kinds of points. */
-static PetscErrorCode make_sets(Nastran *b)
-{
-  const PetscInt n = b->im->nvert;
-  Node *node;
-  PetscInt next = 0, tags = 0;
-
-  PetscFunctionBeginUser;
-  if (!b->nrange.n) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(PetscMalloc1(n, &node));
-  for (PetscInt v = 0; v < n; v++) node[v] = (Node){b->im->vert_number[v], v};
-  qsort(node, (size_t)n, sizeof(*node), compare_nodes);
-  qsort(b->range, (size_t)b->nrange.n, sizeof(*b->range), compare_ranges);
-  for (PetscInt i = 0; i < b->nrange.n; i++) {
-    const Range *r = &b->range[i];
-    const PetscBool same = (PetscBool)(i && r[-1].kind == r->kind && r[-1].number == r->number);
-    char name[SB_GROUP_MAX];
-
-    (void)snprintf(name, sizeof(name), "%s_%lld", set_names[r->kind], (long long)r->number);
-    if (!same)
-      PetscCall(SbImportTagsAlone(b->im, 0, r->number + ((int64_t)(r->kind + 1) << 40), name, &tags));
-    next = PetscMax(same ? next : 0, lower_bound(n, node, r->first));
-    for (; next < n && node[next].label <= r->last; next++)
-      PetscCall(SbImportAddItem(b->im, 0, &node[next].vert, tags, node[next].label));
-  }
-  PetscCall(PetscFree(node));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* ------------------------------------------------------------------ the file */
 
 /* Behind the line BEGIN BULK, or at the start of a file that has none. */
 static void find_bulk(Nastran *b)
 {
-  SbScan *s = &b->scan;
+  SbScan *s = b->scan;
 
   for (const char *p = s->data; p < s->end;) {
     const char *end = (const char *)memchr(p, '\n', (size_t)(s->end - p));
@@ -578,50 +432,28 @@ static void find_bulk(Nastran *b)
   }
 }
 
-static PetscErrorCode read_file(const char *path, Nastran *b)
+PetscErrorCode SbImportRead_Nastran(const char *path, SbImport *im)
 {
+  Nastran b = {.scan = &im->scan, .deck = {.im = im, .compare = strcasecmp, .cure = "renumber the nodes"}};
   PetscBool there;
 
   PetscFunctionBeginUser;
-  PetscCall(SbScanOpen(b->im->where, path, &b->scan));
-  find_bulk(b);
+  PetscCall(SbScanOpen(im->where, path, b.scan));
+  find_bulk(&b);
   for (;;) {
-    PetscCall(next_line(b, &there));
-    if (!there || !strncasecmp(b->line, "ENDDATA", 7)) break;
-    PetscCall(read_entry(b));
+    PetscCall(next_line(&b, &there));
+    if (!there || !strncasecmp(b.line, "ENDDATA", 7)) break;
+    PetscCall(read_entry(&b));
   }
-  PetscCall(make_nodes(b));
-  PetscCall(make_items(b));
-  // properties that elements use get their names
-  if (b->nname.n) {
-    qsort(b->name, (size_t)b->nname.n, sizeof(*b->name), compare_names);
-    for (PetscInt g = 0; g < b->im->ngroup; g++) {
-      const Name wanted = {.number = b->im->group[g].tag};
-      const Name *found =
-        (const Name *)bsearch(&wanted, b->name, (size_t)b->nname.n, sizeof(wanted), compare_names);
-
-      if (found) PetscCall(PetscStrncpy(b->im->group[g].name, found->name, SB_GROUP_MAX));
-    }
+  if (!b.deck.nnode.n) {
+    b.scan->token = b.scan->end;
+    SB_SCAN_ERROR(b.scan, "there is no GRID up to here; this is no bulk data of Nastran, or it is truncated");
   }
-  PetscCall(make_sets(b));
-  PetscCall(SbGmshCheckTypes(b->im, b->count));
+  PetscCall(SbDeckBuild(&b.deck));
+  PetscCall(SbImportJoinGroups(im));
+  /* properties that elements use get their names */
+  for (PetscInt i = 0; i < b.nname.n; i++)
+    for (PetscInt dim = 1; dim < 4; dim++)
+      PetscCall(SbImportNameGroup(im, dim, b.name[i].number, b.name[i].name));
   PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode SbImportRead_Nastran(const char *path, SbImport *im)
-{
-  Nastran b;
-  PetscErrorCode ierr;
-
-  PetscFunctionBeginUser;
-  PetscCall(PetscMemzero(&b, sizeof(b)));
-  b.im = im;
-  ierr = read_file(path, &b);
-  PetscCall(SbNumbersDestroy(&b.nodes));
-  PetscCall(PetscFree(b.node));
-  PetscCall(PetscFree(b.element));
-  PetscCall(PetscFree(b.range));
-  PetscCall(PetscFree(b.name));
-  PetscCall(SbScanClose(&b.scan));
-  PetscFunctionReturn(ierr);
 }

@@ -6,18 +6,7 @@
   physical property, and to the groups that list it, by name. Groups of nodes are kept too. Refused: volume elements other than 4-node tets.
 */
 #include <ctype.h>
-#include "gmsh_types.h"
-
-typedef struct {
-  SbScan scan;
-  SbImport *im;
-  SbNumbers nodes, elements;
-  SbGroupMembership members;
-  PetscInt nelement, capacity;
-  int64_t *label;      /* [nelement] of every kept element */
-  SbGroupMember *item; /* [nelement] where it is; group is not used */
-  int64_t count[SB_GMSH_NTYPES];
-} Unv;
+#include "meshio_impl.h"
 
 /* FE descriptor ids: what gmsh calls them. Others (springs, masses) have no place in a body and are passed over. */
 static const struct {
@@ -46,10 +35,8 @@ static PetscBool is_mark(const SbScan *s)
 }
 
 /* Whether the data set ends here: at a mark, or with the file, which is an error. */
-static PetscErrorCode at_end(Unv *u, PetscBool *end)
+static PetscErrorCode at_end(SbScan *s, PetscBool *end)
 {
-  SbScan *s = &u->scan;
-
   PetscFunctionBeginUser;
   while (s->at < s->end && (*s->at == '\n' || *s->at == '\r')) s->at++;
   s->token = s->at;
@@ -59,238 +46,130 @@ static PetscErrorCode at_end(Unv *u, PetscBool *end)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Lines up to the next mark. */
-static int64_t lines_left(const Unv *u)
-{
-  SbScan s = u->scan;
-  int64_t n = 0;
-
-  for (; s.at < s.end && !is_mark(&s); n++) (void)SbScanEndOfLine(&s);
-  return n;
-}
-
-/* ------------------------------------------------------------------ nodes */
+/* ------------------------------------------------------------------ nodes and elements */
 
 /* Set 2411 has the coordinates on a line of their own, set 15 on the same one. */
-static PetscErrorCode read_nodes(Unv *u, int nline)
+static PetscErrorCode read_node(SbDeck *d)
 {
-  SbScan *s = &u->scan;
-  const int64_t n = lines_left(u) / nline;
-  int64_t other;
-  PetscBool end;
-  PetscInt v = 0;
+  SbScan *s = &d->im->scan;
+  int64_t label, other;
+  PetscReal *x;
 
   PetscFunctionBeginUser;
-  if (u->im->x) SB_SCAN_ERROR(s, "second set of nodes");
-  PetscCall(SbScanRoom(s, "nodes", n, 8, 8));
-  PetscCall(SbImportSetVertices(u->im, (PetscInt)n));
-  for (;; v++) {
-    PetscCall(at_end(u, &end));
-    if (end) break;
-    if (v >= n) SB_SCAN_ERROR(s, "a node without coordinates; the file is damaged");
-    PetscCall(SbScanText(s, "label of a node", &u->im->vert_number[v]));
-    for (int i = 0; i < 3; i++) PetscCall(SbScanText(s, "coordinate system or colour of a node", &other));
-    PetscCall(SbScanPoint(s, "coordinate", u->im->vert_number[v], u->im->x + 3 * v));
-    PetscCall(SbScanEndOfLine(s));
-  }
-  u->im->nvert = v;
-  PetscCall(SbNumbersCreate(v, u->im->vert_number, &u->nodes));
-  if (u->nodes.repeated)
-    SB_SCAN_ERROR(s, "node %lld is given twice; renumber the nodes", (long long)u->nodes.twice);
+  PetscCall(SbScanText(s, "label of a node", &label));
+  PetscCall(SbDeckAddNode(d, label, &x));
+  for (int i = 0; i < 3; i++) PetscCall(SbScanText(s, "coordinate system or colour of a node", &other));
+  PetscCall(SbScanPoint(s, "coordinate", label, x));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* ------------------------------------------------------------------ elements */
-
-static PetscErrorCode read_element(Unv *u)
+static PetscErrorCode read_element(SbDeck *d)
 {
-  SbScan *s = &u->scan;
-  int64_t label, id, property, other, n, node;
-  PetscInt vert[4] = {0, 0, 0, 0};
-  int type = 0;
+  static const char *const what[6] = {
+    "label of an element",    "kind of an element",   "physical property of an element",
+    "material of an element", "colour of an element", "number of nodes of an element"};
+  SbScan *s = &d->im->scan;
+  int64_t head[6], n, other, node;
+  SbDeckElement e = {.type = 0};
 
   PetscFunctionBeginUser;
-  PetscCall(SbScanText(s, "label of an element", &label));
-  PetscCall(SbScanText(s, "kind of an element", &id));
-  PetscCall(SbScanText(s, "physical property of an element", &property));
-  PetscCall(SbScanText(s, "material of an element", &other));
-  PetscCall(SbScanText(s, "colour of an element", &other));
-  PetscCall(SbScanText(s, "number of nodes of an element", &n));
+  for (int i = 0; i < 6; i++) PetscCall(SbScanText(s, what[i], &head[i]));
+  e.label = head[0];
+  e.property = head[2];
+  n = head[5];
   PetscCall(SbScanRoom(s, "nodes of an element", n, 2, 2));
   for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(types); i++) {
-    if (types[i].id == id) type = types[i].type;
+    if (types[i].id == head[1]) e.type = types[i].type;
   }
-  if (type && SbGmshTypes[type].nnode != n)
-    SB_SCAN_ERROR(s, "element %lld of kind %lld has %lld nodes; expected %d", (long long)label, (long long)id,
-                  (long long)n, SbGmshTypes[type].nnode);
-  if (type == 1 || type == 8) { /* a beam has a record of its own */
+  if (e.type && SbGmshTypes[e.type].nnode != n)
+    SB_SCAN_ERROR(s, "element %lld of kind %lld has %lld nodes; expected %d", (long long)e.label,
+                  (long long)head[1], (long long)n, SbGmshTypes[e.type].nnode);
+  if (e.type == 1 || e.type == 8) { /* a beam has a record of its own */
     for (int i = 0; i < 3; i++) PetscCall(SbScanText(s, "section of a beam", &other));
   }
   for (int64_t k = 0; k < n; k++) {
     PetscCall(SbScanText(s, "node of an element", &node));
-    if (k < 4) vert[k] = SbNumbersFind(&u->nodes, node);
-    if (type && k < 4 && vert[k] < 0)
-      SB_SCAN_ERROR(s, "element %lld uses node %lld, which is not there", (long long)label, (long long)node);
+    if (!k) e.at = s->token;
+    if (k < 4) e.node[k] = node;
   }
-  if (type) u->count[type]++;
-  if (type == SB_GMSH_TET || type == SB_GMSH_TRIANGLE || type == SB_GMSH_LINE) {
-    const int dim = SbGmshTypes[type].dim;
-    PetscInt tags;
-
-    // kept elements are listed for the groups that name them
-    if (u->nelement == u->capacity) {
-      u->capacity = PetscMax(256, 2 * u->capacity);
-      PetscCall(PetscRealloc((size_t)u->capacity * sizeof(*u->label), &u->label));
-      PetscCall(PetscRealloc((size_t)u->capacity * sizeof(*u->item), &u->item));
-    }
-    u->label[u->nelement] = label;
-    u->item[u->nelement++] = (SbGroupMember){dim, u->im->item[dim].n, 0};
-    PetscCall(SbImportTagsAlone(u->im, dim, property, NULL, &tags));
-    PetscCall(SbImportAddItem(u->im, dim, vert, tags, label));
-  }
-  PetscCall(SbScanEndOfLine(s));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode read_elements(Unv *u)
-{
-  PetscBool end;
-
-  PetscFunctionBeginUser;
-  if (!u->im->x) SB_SCAN_ERROR(&u->scan, "elements before the nodes");
-  for (;;) {
-    PetscCall(at_end(u, &end));
-    if (end) break;
-    PetscCall(read_element(u));
-  }
-  PetscCall(SbNumbersCreate(u->nelement, u->label, &u->elements));
+  if (e.type) PetscCall(SbDeckAddElement(d, &e));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* ------------------------------------------------------------------ groups */
 
-/* A node or an element joins group `number`; what is no part of the body is left out. */
-static PetscErrorCode add_member(Unv *u, int64_t kind, int64_t label, int64_t number, const char *name)
+/* Each member has so many values: kind (7 a node, 8 an element) and label, and since set 2435 two more. */
+static PetscErrorCode read_group(SbDeck *d, int nvalue)
 {
-  const int64_t tag = number + ((int64_t)1 << 40); /* apart from the numbers of properties */
-  PetscInt at, group, tags;
-
-  PetscFunctionBeginUser;
-  if (kind == 7) {
-    at = SbNumbersFind(&u->nodes, label);
-    if (at < 0)
-      SB_SCAN_ERROR(&u->scan, "group '%s' lists node %lld, which is not there", name, (long long)label);
-    PetscCall(SbImportTagsAlone(u->im, 0, tag, name, &tags));
-    PetscCall(SbImportAddItem(u->im, 0, &at, tags, label));
-  } else if (kind == 8) {
-    at = SbNumbersFind(&u->elements, label);
-    if (at < 0) PetscFunctionReturn(PETSC_SUCCESS);
-    PetscCall(SbImportGroup(u->im, u->item[at].dim, tag, name, &group));
-    PetscCall(SbGroupMembershipAdd(&u->members, u->item[at].dim, u->item[at].item, group));
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode read_group(Unv *u, int nvalue)
-{
-  SbScan *s = &u->scan;
-  int64_t number, n = 0, kind, label, other;
+  SbScan *s = &d->im->scan;
+  int64_t number, n = 0, value[4];
   char name[SB_GROUP_MAX];
-  size_t length = 0;
+  PetscInt set[2] = {-1, -1};
 
   PetscFunctionBeginUser;
   PetscCall(SbScanText(s, "number of a group", &number));
   while (SbScanMore(s, '\n')) PetscCall(SbScanText(s, "number of members of a group", &n));
   PetscCall(SbScanRoom(s, "members of a group", n, 4, 4));
   PetscCall(SbScanEndOfLine(s));
-  (void)SbScanMore(s, '\n');
-  for (; s->at < s->end && *s->at != '\n'; s->at++) {
-    if (length + 1 < sizeof(name)) name[length++] = isprint((unsigned char)*s->at) ? *s->at : ' ';
-  }
-  while (length && name[length - 1] == ' ') length--;
-  name[length] = 0;
-  if (!length) (void)snprintf(name, sizeof(name), "group_%lld", (long long)number);
+  PetscCall(SbScanRestOfLine(s, sizeof(name), name));
+  if (!name[0]) (void)snprintf(name, sizeof(name), "group_%lld", (long long)number);
   for (int64_t i = 0; i < n; i++) {
-    PetscCall(SbScanText(s, "kind of a member of a group", &kind));
-    PetscCall(SbScanText(s, "label of a member of a group", &label));
-    for (int k = 2; k < nvalue; k++) PetscCall(SbScanText(s, "value of a member of a group", &other));
-    PetscCall(add_member(u, kind, label, number, name));
-  }
-  PetscCall(SbScanEndOfLine(s));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
+    PetscCall(SbScanText(s, "kind of a member of a group", &value[0]));
+    PetscCall(SbScanText(s, "label of a member of a group", &value[1]));
+    if (value[0] == 7 || value[0] == 8) {
+      PetscInt *mine = &set[value[0] - 7];
 
-/* Each member has so many values: kind and label, and since set 2435 two more. */
-static PetscErrorCode read_groups(Unv *u, int nvalue)
-{
-  PetscBool end;
-
-  PetscFunctionBeginUser;
-  for (;;) {
-    PetscCall(at_end(u, &end));
-    if (end) break;
-    PetscCall(read_group(u, nvalue));
+      if (*mine < 0) PetscCall(SbDeckFindSet(d, (PetscBool)(value[0] == 7), name, mine));
+      PetscCall(SbDeckAddRange(d, *mine, value[1], value[1], 1));
+    }
+    for (int k = 2; k < nvalue; k++) PetscCall(SbScanText(s, "value of a member of a group", &value[k]));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* ------------------------------------------------------------------ the file */
 
-static PetscErrorCode read_set(Unv *u)
+/* A data set: its number, then as many of what it holds as there are. */
+static PetscErrorCode read_set(SbDeck *d)
 {
-  SbScan *s = &u->scan;
+  SbScan *s = &d->im->scan;
   int64_t id;
+  PetscBool end;
 
   PetscFunctionBeginUser;
   PetscCall(SbScanText(s, "number of a data set", &id));
   PetscCall(SbScanEndOfLine(s));
-  if (id == 2411 || id == 781) return read_nodes(u, 2);
-  if (id == 15) return read_nodes(u, 1);
-  if (id == 2412) return read_elements(u);
-  if (id == 2429 || id == 2430 || id == 2432) return read_groups(u, 2);
-  if (id == 2435 || id == 2452 || id == 2467 || id == 2477) return read_groups(u, 4);
-  while (s->at < s->end && !is_mark(s)) PetscCall(SbScanEndOfLine(s));
+  if (id == 2412 && !d->nnode.n) SB_SCAN_ERROR(s, "elements before the nodes");
+  for (;;) {
+    PetscCall(at_end(s, &end));
+    if (end) break;
+    if (id == 2411 || id == 781 || id == 15) PetscCall(read_node(d));
+    if (id == 2412) PetscCall(read_element(d));
+    if (id == 2429 || id == 2430 || id == 2432) PetscCall(read_group(d, 2));
+    if (id == 2435 || id == 2452 || id == 2467 || id == 2477) PetscCall(read_group(d, 4));
+    PetscCall(SbScanEndOfLine(s)); /* data sets of no concern are passed over */
+  }
+  PetscCall(SbScanEndOfLine(s));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode read_file(const char *path, Unv *u)
+PetscErrorCode SbImportRead_UNV(const char *path, SbImport *im)
 {
-  SbScan *s = &u->scan;
+  SbScan *s = &im->scan;
+  SbDeck d = {.im = im, .cure = "renumber the nodes", .compare = strcmp, .strict = PETSC_TRUE};
 
   PetscFunctionBeginUser;
-  PetscCall(SbScanOpen(u->im->where, path, s));
+  PetscCall(SbScanOpen(im->where, path, s));
   for (;;) {
     SbScanNext(s, 0);
     if (s->at >= s->end) break;
     while (s->at > s->data && s->at[-1] != '\n') s->at--; /* the whole line */
     if (!is_mark(s)) SB_SCAN_ERROR(s, "expected a line of -1; this is no universal file, or it is damaged");
     PetscCall(SbScanEndOfLine(s));
-    PetscCall(read_set(u));
-    if (s->at >= s->end)
-      SB_SCAN_ERROR(s,
-                    "the file ends where a line of -1 is expected; it is truncated, write or copy it again");
-    PetscCall(SbScanEndOfLine(s));
+    PetscCall(read_set(&d));
   }
-  if (!u->im->x) SB_SCAN_ERROR(s, "there are no nodes (data set 2411 or 15)");
-  PetscCall(SbGmshCheckTypes(u->im, u->count));
-  PetscCall(SbGroupMembershipApply(&u->members, u->im));
+  if (!d.nnode.n) SB_SCAN_ERROR(s, "there are no nodes (data set 2411 or 15)");
+  PetscCall(SbDeckBuild(&d));
+  PetscCall(SbImportJoinGroups(im));
   PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode SbImportRead_UNV(const char *path, SbImport *im)
-{
-  Unv u;
-  PetscErrorCode ierr;
-
-  PetscFunctionBeginUser;
-  PetscCall(PetscMemzero(&u, sizeof(u)));
-  u.im = im;
-  ierr = read_file(path, &u);
-  PetscCall(SbNumbersDestroy(&u.nodes));
-  PetscCall(SbNumbersDestroy(&u.elements));
-  PetscCall(SbGroupMembershipDestroy(&u.members));
-  PetscCall(PetscFree(u.label));
-  PetscCall(PetscFree(u.item));
-  PetscCall(SbScanClose(&u.scan));
-  PetscFunctionReturn(ierr);
 }

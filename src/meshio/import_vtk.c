@@ -9,7 +9,7 @@
 #include "vtk_grid.h"
 
 typedef struct {
-  SbScan scan;
+  SbScan *scan;
   SbImport *im;
   SbVtkGrid grid;
   PetscBool binary, points, cells, on_cells; /* on_cells: what follows is data of cells */
@@ -35,56 +35,43 @@ static PetscErrorCode read_type(Vtk *v, SbVtkType *type)
   char word[32];
 
   PetscFunctionBeginUser;
-  PetscCall(SbScanWord(&v->scan, sizeof(word), word));
+  PetscCall(SbScanWord(v->scan, sizeof(word), word));
   for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(types); i++) {
     if (strcasecmp(word, types[i].name)) continue;
     *type = types[i].type;
     PetscFunctionReturn(PETSC_SUCCESS);
   }
-  SB_SCAN_ERROR(&v->scan, "expected a type of numbers, as float or int, found '%s'", word);
+  SB_SCAN_ERROR(v->scan, "expected a type of numbers, as float or int, found '%s'", word);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* n numbers of this type; value may be NULL to pass over them. */
-static PetscErrorCode read_numbers(Vtk *v, const char *what, int64_t n, SbVtkType type, double *value)
+/* n numbers of this type; value NULL: they are passed over, else it is allocated. */
+static PetscErrorCode read_array(Vtk *v, const char *what, int64_t n, SbVtkType type, double **value)
 {
-  SbScan *s = &v->scan;
+  SbScan *s = v->scan;
+  const size_t bytes = (size_t)n * (size_t)type.size;
 
   PetscFunctionBeginUser;
   // binary data begins behind the end of the line
-  if (v->binary) PetscCall(SbScanEndOfLine(&v->scan));
-  v->scan.binary = v->binary;
-  PetscCall(SbScanRoom(&v->scan, what, n, 2, type.size));
-  v->scan.binary = PETSC_FALSE;
-  if (v->binary) {
-    const size_t bytes = (size_t)n * (size_t)type.size;
+  if (v->binary) PetscCall(SbScanEndOfLine(s));
+  s->binary = v->binary;
+  PetscCall(SbScanRoom(s, what, n, 2, type.size));
+  s->binary = PETSC_FALSE;
+  if (value) PetscCall(SbImportScratch(v->im, (size_t)n * sizeof(**value), value));
+  if (!v->binary) {
+    for (int64_t i = 0; i < n; i++) {
+      PetscReal x;
 
-    s->token = s->at;
-    if ((size_t)(s->end - s->at) < bytes)
-      SB_SCAN_ERROR(s, "the file ends within the %s; it is truncated, write or copy it again", what);
-    if (value) SbVtkConvert(type, PETSC_TRUE, (size_t)n, s->at, value);
-    s->at += bytes;
+      PetscCall(SbScanReal(s, what, 0, &x));
+      if (value) (*value)[i] = x;
+    }
     PetscFunctionReturn(PETSC_SUCCESS);
   }
-  for (int64_t i = 0; i < n; i++) {
-    PetscReal x;
-
-    PetscCall(SbScanReal(s, what, 0, &x));
-    if (value) value[i] = x;
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Allocates and reads. */
-static PetscErrorCode read_array(Vtk *v, const char *what, int64_t n, SbVtkType type, double **value)
-{
-  PetscFunctionBeginUser;
-  v->scan.binary = v->binary;
-  PetscCall(SbScanRoom(&v->scan, what, n, 2, type.size));
-  v->scan.binary = PETSC_FALSE;
-  PetscCall(PetscFree(*value));
-  PetscCall(PetscMalloc1((size_t)n, value));
-  PetscCall(read_numbers(v, what, n, type, *value));
+  s->token = s->at;
+  if ((size_t)(s->end - s->at) < bytes)
+    SB_SCAN_ERROR(s, "the file ends within the %s; it is truncated, write or copy it again", what);
+  if (value) SbVtkConvert(type, PETSC_TRUE, (size_t)n, s->at, *value);
+  s->at += bytes;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -95,18 +82,16 @@ static PetscErrorCode read_points(Vtk *v)
   SbVtkType type;
   int64_t n;
   double *x = NULL;
-  PetscErrorCode ierr;
 
   PetscFunctionBeginUser;
-  if (v->points) SB_SCAN_ERROR(&v->scan, "second section POINTS");
+  if (v->points) SB_SCAN_ERROR(v->scan, "second section POINTS");
   v->points = PETSC_TRUE;
-  PetscCall(SbScanText(&v->scan, "number of points", &n));
+  PetscCall(SbScanText(v->scan, "number of points", &n));
   PetscCall(read_type(v, &type));
-  PetscCall(SbScanRoom(&v->scan, "points", n, 3, 3));
-  ierr = read_array(v, "coordinates", 3 * n, type, &x);
-  if (!ierr) ierr = SbVtkSetPoints(&v->scan, (PetscInt)n, x, v->im);
-  PetscCall(PetscFree(x));
-  PetscFunctionReturn(ierr);
+  PetscCall(SbScanRoom(v->scan, "points", n, 3, 3));
+  PetscCall(read_array(v, "coordinates", 3 * n, type, &x));
+  PetscCall(SbVtkSetPoints((PetscInt)n, x, v->im));
+  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Cells with their counts before version 5: [n, p1 ... pn] one after the other in `all`. */
@@ -116,13 +101,13 @@ static PetscErrorCode split_cells(Vtk *v, int64_t size, const double all[])
   int64_t at = 0;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscMalloc1((size_t)size, &grid->connect));
-  PetscCall(PetscMalloc1(grid->ncell, &grid->end));
+  PetscCall(SbImportScratch(v->im, (size_t)size * sizeof(double), &grid->connect));
+  PetscCall(SbImportScratch(v->im, (size_t)grid->ncell * sizeof(double), &grid->end));
   for (PetscInt c = 0; c < grid->ncell; c++) {
     const double n = at < size ? all[at] : 0;
 
     if (!(n >= 1 && n <= (double)(size - at - 1)) || n != PetscFloorReal(n))
-      SB_SCAN_ERROR(&v->scan,
+      SB_SCAN_ERROR(v->scan,
                     "cell %lld of %lld has %g points, more than the section announces or less than one",
                     (long long)c, (long long)grid->ncell, n);
     for (int64_t k = 0; k < (int64_t)n; k++) grid->connect[grid->nconnect++] = all[at + 1 + k];
@@ -143,8 +128,8 @@ static PetscErrorCode read_offsets(Vtk *v, int64_t n, int64_t nconnect)
   PetscCall(read_type(v, &type));
   PetscCall(read_array(v, "offsets", n, type, &grid->end));
   for (int64_t c = 0; c + 1 < n; c++) grid->end[c] = grid->end[c + 1]; /* the first is 0 */
-  PetscCall(SbScanWord(&v->scan, sizeof(word), word));
-  if (strcasecmp(word, "CONNECTIVITY")) SB_SCAN_ERROR(&v->scan, "expected CONNECTIVITY, found '%s'", word);
+  PetscCall(SbScanWord(v->scan, sizeof(word), word));
+  if (strcasecmp(word, "CONNECTIVITY")) SB_SCAN_ERROR(v->scan, "expected CONNECTIVITY, found '%s'", word);
   PetscCall(read_type(v, &type));
   PetscCall(read_array(v, "points of cells", nconnect, type, &grid->connect));
   grid->ncell = (PetscInt)PetscMax(n - 1, 0);
@@ -154,10 +139,9 @@ static PetscErrorCode read_offsets(Vtk *v, int64_t n, int64_t nconnect)
 
 static PetscErrorCode read_cells(Vtk *v)
 {
-  SbScan *s = &v->scan;
+  SbScan *s = v->scan;
   int64_t n, size;
   double *all = NULL;
-  PetscErrorCode ierr;
   char word[32];
   const char *at;
 
@@ -177,10 +161,9 @@ static PetscErrorCode read_cells(Vtk *v)
   }
   s->at = at;
   v->grid.ncell = (PetscInt)n;
-  ierr = read_array(v, "list of cells", size, (SbVtkType){'i', 4}, &all);
-  if (!ierr) ierr = split_cells(v, size, all);
-  PetscCall(PetscFree(all));
-  PetscFunctionReturn(ierr);
+  PetscCall(read_array(v, "list of cells", size, (SbVtkType){'i', 4}, &all));
+  PetscCall(split_cells(v, size, all));
+  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 static PetscErrorCode read_cell_types(Vtk *v)
@@ -188,9 +171,9 @@ static PetscErrorCode read_cell_types(Vtk *v)
   int64_t n;
 
   PetscFunctionBeginUser;
-  PetscCall(SbScanText(&v->scan, "number of types of cells", &n));
+  PetscCall(SbScanText(v->scan, "number of types of cells", &n));
   if (!v->cells || n != v->grid.ncell)
-    SB_SCAN_ERROR(&v->scan, "%lld types of cells for %lld cells", (long long)n, (long long)v->grid.ncell);
+    SB_SCAN_ERROR(v->scan, "%lld types of cells for %lld cells", (long long)n, (long long)v->grid.ncell);
   PetscCall(read_array(v, "types of cells", n, (SbVtkType){'i', 4}, &v->grid.type));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -204,9 +187,8 @@ static PetscErrorCode read_data(Vtk *v, const char *name, int64_t ncomponent, in
 
   PetscFunctionBeginUser;
   if (ncomponent < 0 || ncomponent > 1024)
-    SB_SCAN_ERROR(&v->scan, "array '%s' of %lld components; expected up to 1024", name,
-                  (long long)ncomponent);
-  PetscCall(SbScanRoom(&v->scan, "tuples", ntuple, 1, 1));
+    SB_SCAN_ERROR(v->scan, "array '%s' of %lld components; expected up to 1024", name, (long long)ncomponent);
+  PetscCall(SbScanRoom(v->scan, "tuples", ntuple, 1, 1));
   if (v->on_cells && ncomponent == 1 && ntuple == grid->ncell && grid->narray < SB_VTK_ARRAYS) {
     const int a = grid->narray++;
 
@@ -214,14 +196,14 @@ static PetscErrorCode read_data(Vtk *v, const char *name, int64_t ncomponent, in
     PetscCall(PetscStrncpy(grid->array[a].name, name, sizeof(grid->array[a].name)));
     PetscCall(read_array(v, "data of cells", ntuple, type, &grid->array[a].value));
   } else
-    PetscCall(read_numbers(v, "data", ncomponent * ntuple, type, NULL));
+    PetscCall(read_array(v, "data", ncomponent * ntuple, type, NULL));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* SCALARS name type [components] / LOOKUP_TABLE name / numbers */
 static PetscErrorCode read_scalars(Vtk *v)
 {
-  SbScan *s = &v->scan;
+  SbScan *s = v->scan;
   SbVtkType type;
   int64_t ncomponent = 1;
   char name[SB_NAME_MAX], word[32];
@@ -244,7 +226,7 @@ static PetscErrorCode read_scalars(Vtk *v)
 /* FIELD name n, then n times: name components tuples type / numbers */
 static PetscErrorCode read_field(Vtk *v)
 {
-  SbScan *s = &v->scan;
+  SbScan *s = v->scan;
   SbVtkType type;
   char name[SB_NAME_MAX], word[32];
   int64_t n, ncomponent, ntuple;
@@ -276,7 +258,7 @@ static PetscErrorCode read_tuples(Vtk *v, int64_t ncomponent)
   char name[SB_NAME_MAX];
 
   PetscFunctionBeginUser;
-  PetscCall(SbScanWord(&v->scan, sizeof(name), name));
+  PetscCall(SbScanWord(v->scan, sizeof(name), name));
   PetscCall(read_type(v, &type));
   PetscCall(read_data(v, name, ncomponent, v->ntuple, type));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -288,10 +270,10 @@ static PetscErrorCode read_owner(Vtk *v, PetscBool on_cells)
   const int64_t expected = on_cells ? v->grid.ncell : v->im->nvert;
 
   PetscFunctionBeginUser;
-  if (!v->points || !v->cells) SB_SCAN_ERROR(&v->scan, "data before the sections POINTS and CELLS");
-  PetscCall(SbScanText(&v->scan, "number of data", &v->ntuple));
+  if (!v->points || !v->cells) SB_SCAN_ERROR(v->scan, "data before the sections POINTS and CELLS");
+  PetscCall(SbScanText(v->scan, "number of data", &v->ntuple));
   if (v->ntuple != expected)
-    SB_SCAN_ERROR(&v->scan, "data for %lld %s; there are %lld", (long long)v->ntuple,
+    SB_SCAN_ERROR(v->scan, "data for %lld %s; there are %lld", (long long)v->ntuple,
                   on_cells ? "cells" : "points", (long long)expected);
   v->on_cells = on_cells;
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -304,17 +286,17 @@ static PetscErrorCode read_table(Vtk *v)
   int64_t n;
 
   PetscFunctionBeginUser;
-  PetscCall(SbScanWord(&v->scan, sizeof(name), name));
-  PetscCall(SbScanText(&v->scan, "number of colours", &n));
-  PetscCall(SbScanRoom(&v->scan, "colours", n, 1, 1));
-  PetscCall(read_numbers(v, "colours", 4 * n, (SbVtkType){'u', 1}, NULL));
+  PetscCall(SbScanWord(v->scan, sizeof(name), name));
+  PetscCall(SbScanText(v->scan, "number of colours", &n));
+  PetscCall(SbScanRoom(v->scan, "colours", n, 1, 1));
+  PetscCall(read_array(v, "colours", 4 * n, (SbVtkType){'u', 1}, NULL));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* A block of lines up to an empty one. */
 static PetscErrorCode skip_metadata(Vtk *v)
 {
-  SbScan *s = &v->scan;
+  SbScan *s = v->scan;
 
   PetscFunctionBeginUser;
   do {
@@ -327,7 +309,7 @@ static PetscErrorCode skip_metadata(Vtk *v)
 
 static PetscErrorCode read_header(Vtk *v)
 {
-  SbScan *s = &v->scan;
+  SbScan *s = v->scan;
   char word[32], kind[32];
 
   PetscFunctionBeginUser;
@@ -368,43 +350,30 @@ static PetscErrorCode read_section(Vtk *v, const char *name)
   for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(tuples); i++) {
     if (!strcasecmp(name, tuples[i].name)) return read_tuples(v, tuples[i].ncomponent);
   }
-  SB_SCAN_ERROR(&v->scan, "expected a section, as POINTS or CELLS, found '%s'", name);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode read_file(const char *path, Vtk *v)
-{
-  SbScan *s = &v->scan;
-  char name[32];
-
-  PetscFunctionBeginUser;
-  PetscCall(SbScanOpen(v->im->where, path, s));
-  PetscCall(read_header(v));
-  for (;;) {
-    PetscCall(SbScanWord(s, sizeof(name), name));
-    if (!name[0]) break;
-    PetscCall(read_section(v, name));
-  }
-  if (!v->points || !v->cells || !v->grid.type)
-    SB_SCAN_ERROR(s, "the file ends before the section %s; it is truncated, write or copy it again",
-                  !v->points  ? "POINTS"
-                  : !v->cells ? "CELLS"
-                              : "CELL_TYPES");
-  s->token = v->cells_at;
-  PetscCall(SbVtkGridFill(s, &v->grid, v->im));
+  SB_SCAN_ERROR(v->scan, "expected a section, as POINTS or CELLS, found '%s'", name);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode SbImportRead_VTK(const char *path, SbImport *im)
 {
-  Vtk v;
-  PetscErrorCode ierr;
+  SbScan *s = &im->scan;
+  Vtk v = {.scan = s, .im = im};
+  char name[32];
 
   PetscFunctionBeginUser;
-  PetscCall(PetscMemzero(&v, sizeof(v)));
-  v.im = im;
-  ierr = read_file(path, &v);
-  PetscCall(SbVtkGridDestroy(&v.grid));
-  PetscCall(SbScanClose(&v.scan));
-  PetscFunctionReturn(ierr);
+  PetscCall(SbScanOpen(im->where, path, s));
+  PetscCall(read_header(&v));
+  for (;;) {
+    PetscCall(SbScanWord(s, sizeof(name), name));
+    if (!name[0]) break;
+    PetscCall(read_section(&v, name));
+  }
+  if (!v.points || !v.cells || !v.grid.type)
+    SB_SCAN_ERROR(s, "the file ends before the section %s; it is truncated, write or copy it again",
+                  !v.points  ? "POINTS"
+                  : !v.cells ? "CELLS"
+                             : "CELL_TYPES");
+  s->token = v.cells_at;
+  PetscCall(SbVtkGridFill(&v.grid, im));
+  PetscFunctionReturn(PETSC_SUCCESS);
 }

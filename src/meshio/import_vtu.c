@@ -16,7 +16,7 @@
 enum { ZLIB_RATIO = 1032 }; /* no compressed byte tells of more */
 
 typedef struct {
-  SbScan scan;
+  SbScan *scan;
   SbImport *im;
   SbVtkGrid grid;
   PetscBool swap, zlib;
@@ -25,6 +25,7 @@ typedef struct {
   const char *appended;    /* first byte behind the mark _, or NULL */
   PetscBool appended_text; /* and it is base64 */
   const char *cells_at;    /* for messages */
+  unsigned char *raw;      /* the bytes of the last array */
 } Vtu;
 
 /* ------------------------------------------------------------------ XML */
@@ -79,15 +80,15 @@ static PetscErrorCode attribute_number(Vtu *v, const char *open, const char *clo
   PetscFunctionBeginUser;
   attribute(open, close, name, sizeof(value), value);
   *n = strtoll(value, &end, 10);
-  v->scan.token = open;
+  v->scan->token = open;
   if (!value[0] || *end || *n < 0)
-    SB_SCAN_ERROR(&v->scan, "expected a number %s=\"...\", found '%s'", name, value);
+    SB_SCAN_ERROR(v->scan, "expected a number %s=\"...\", found '%s'", name, value);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* ------------------------------------------------------------------ bytes */
 
-/* Bytes on their separation direction of raw data or base64. */
+/* Bytes on their way out of raw data or base64. */
 typedef struct {
   const char *at, *end;
   PetscBool text;
@@ -154,10 +155,10 @@ static PetscErrorCode take_length(Vtu *v, Bytes *b, const char *name, size_t *le
 
   PetscFunctionBeginUser;
   if (!take_bytes(b, (size_t)v->header, raw))
-    SB_SCAN_ERROR(&v->scan, "the data of array '%s' is truncated, or no base64", name);
+    SB_SCAN_ERROR(v->scan, "the data of array '%s' is truncated, or no base64", name);
   for (int i = 0; i < v->header; i++) value |= (uint64_t)raw[i] << 8 * (v->swap ? v->header - 1 - i : i);
   if (value > (uint64_t)1 << 40)
-    SB_SCAN_ERROR(&v->scan, "array '%s' announces %llu bytes or blocks; it is damaged", name,
+    SB_SCAN_ERROR(v->scan, "array '%s' announces %llu bytes or blocks; it is damaged", name,
                   (unsigned long long)value);
   *length = (size_t)value;
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -165,34 +166,11 @@ static PetscErrorCode take_length(Vtu *v, Bytes *b, const char *name, size_t *le
 
 /* ------------------------------------------------------------------ arrays */
 
-/* One compressed block into out[size]. */
-static PetscErrorCode inflate_block(Vtu *v, Bytes *b, const char *name, size_t packed, size_t size,
-                                    unsigned char out[])
-{
-  unsigned char *in;
-  uLongf got = (uLongf)size;
-  PetscBool complete;
-  int result = Z_OK;
-
-  PetscFunctionBeginUser;
-  if (packed > (size_t)(b->end - b->at) + 3)
-    SB_SCAN_ERROR(&v->scan, "a block of array '%s' announces %zu bytes, which the file does not hold", name,
-                  packed);
-  PetscCall(PetscMalloc1(packed + 1, &in));
-  complete = take_bytes(b, packed, in);
-  if (complete) result = uncompress(out, &got, in, (uLong)packed);
-  PetscCall(PetscFree(in));
-  if (!complete) SB_SCAN_ERROR(&v->scan, "the data of array '%s' is truncated, or no base64", name);
-  if (result != Z_OK || got != size)
-    SB_SCAN_ERROR(&v->scan, "a compressed block of array '%s' is damaged", name);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* Compressed: number of blocks, their size, that of the last when it is smaller, then the packed size of each. */
 static PetscErrorCode take_blocks(Vtu *v, Bytes *b, const char *name, size_t want, unsigned char out[])
 {
-  size_t nblock, size, last, full, *packed, at = 0;
-  PetscErrorCode ierr = PETSC_SUCCESS;
+  size_t nblock, size, last, full, *packed = NULL, at = 0;
+  unsigned char *in = NULL;
 
   PetscFunctionBeginUser;
   PetscCall(take_length(v, b, name, &nblock));
@@ -201,19 +179,26 @@ static PetscErrorCode take_blocks(Vtu *v, Bytes *b, const char *name, size_t wan
   full = nblock - (nblock && last);
   if (nblock > (size_t)(b->end - b->at) || last > want || (size && full > want / size) ||
       full * size + (nblock ? last : 0) != want)
-    SB_SCAN_ERROR(&v->scan,
+    SB_SCAN_ERROR(v->scan,
                   "array '%s' has %zu blocks of %zu bytes, the last of %zu; expected %zu bytes in all", name,
                   nblock, size, last, want);
-  PetscCall(PetscMalloc1(nblock, &packed));
-  for (size_t i = 0; i < nblock && !ierr; i++) ierr = take_length(v, b, name, &packed[i]);
-  for (size_t i = 0; i < nblock && !ierr; i++) {
+  PetscCall(SbImportScratch(v->im, nblock * sizeof(*packed), &packed));
+  for (size_t i = 0; i < nblock; i++) PetscCall(take_length(v, b, name, &packed[i]));
+  for (size_t i = 0; i < nblock; i++) {
     const size_t n = i + 1 == nblock && last ? last : size;
+    uLongf got = (uLongf)n;
 
-    ierr = inflate_block(v, b, name, packed[i], n, out + at);
+    if (packed[i] > (size_t)(b->end - b->at) + 3)
+      SB_SCAN_ERROR(v->scan, "a block of array '%s' announces %zu bytes, which the file does not hold", name,
+                    packed[i]);
+    PetscCall(SbImportScratch(v->im, packed[i], &in));
+    if (!take_bytes(b, packed[i], in))
+      SB_SCAN_ERROR(v->scan, "the data of array '%s' is truncated, or no base64", name);
+    if (uncompress(out + at, &got, in, (uLong)packed[i]) != Z_OK || got != n)
+      SB_SCAN_ERROR(v->scan, "a compressed block of array '%s' is damaged", name);
     at += n;
   }
-  PetscCall(PetscFree(packed));
-  PetscFunctionReturn(ierr);
+  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* n binary numbers of this type. */
@@ -223,26 +208,20 @@ static PetscErrorCode read_binary(Vtu *v, Bytes *b, const char *name, SbVtkType 
   const size_t want = n * (size_t)type.size;
   unsigned char *raw;
   size_t length = want;
-  PetscErrorCode ierr = PETSC_SUCCESS;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscMalloc1(want, &raw));
+  PetscCall(SbImportScratch(v->im, want, &v->raw));
+  raw = v->raw;
   if (v->zlib)
-    ierr = take_blocks(v, b, name, want, raw);
+    PetscCall(take_blocks(v, b, name, want, raw));
   else {
-    PetscBool complete;
-
-    ierr = take_length(v, b, name, &length);
-    complete = (PetscBool)(!ierr && length == want && take_bytes(b, want, raw));
-    if (!ierr && !complete) {
-      (void)PetscFree(raw);
-      SB_SCAN_ERROR(&v->scan, "array '%s' has %zu bytes; expected %zu, or it is truncated, or no base64",
-                    name, length, want);
-    }
+    PetscCall(take_length(v, b, name, &length));
+    if (length != want || !take_bytes(b, want, raw))
+      SB_SCAN_ERROR(v->scan, "array '%s' has %zu bytes; expected %zu, or it is truncated, or no base64", name,
+                    length, want);
   }
-  if (!ierr) SbVtkConvert(type, v->swap, n, raw, value);
-  PetscCall(PetscFree(raw));
-  PetscFunctionReturn(ierr);
+  SbVtkConvert(type, v->swap, n, raw, value);
+  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Where the bytes of an array are. */
@@ -251,20 +230,20 @@ static PetscErrorCode locate(Vtu *v, const char *open, const char *close, const 
   int64_t offset;
 
   PetscFunctionBeginUser;
-  *b = (Bytes){close, v->scan.end, PETSC_TRUE, {0}, 0, 0};
+  *b = (Bytes){close, v->scan->end, PETSC_TRUE, {0}, 0, 0};
   if (!strcmp(format, "appended")) {
     PetscCall(attribute_number(v, open, close, "offset", &offset));
-    if (!v->appended || offset > v->scan.end - v->appended)
-      SB_SCAN_ERROR(&v->scan, "the array lies at %lld of the appended data, which the file does not hold",
+    if (!v->appended || offset > v->scan->end - v->appended)
+      SB_SCAN_ERROR(v->scan, "the array lies at %lld of the appended data, which the file does not hold",
                     (long long)offset);
     b->at = v->appended + offset;
     b->text = v->appended_text;
   } else if (!strcmp(format, "binary")) {
-    b->end = (const char *)memchr(close, '<', (size_t)(v->scan.end - close));
+    b->end = (const char *)memchr(close, '<', (size_t)(v->scan->end - close));
     if (!b->end)
-      SB_SCAN_ERROR(&v->scan, "the array has no end; the file is truncated, write or copy it again");
+      SB_SCAN_ERROR(v->scan, "the array has no end; the file is truncated, write or copy it again");
   } else
-    SB_SCAN_ERROR(&v->scan, "an array of format '%s'; expected ascii, binary or appended", format);
+    SB_SCAN_ERROR(v->scan, "an array of format '%s'; expected ascii, binary or appended", format);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -278,7 +257,7 @@ static PetscErrorCode read_array(Vtu *v, const char *open, const char *close, in
   char kind[32];
 
   PetscFunctionBeginUser;
-  v->scan.token = open;
+  v->scan->token = open;
   attribute(open, close, "type", sizeof(kind), kind);
   type.kind = !strncmp(kind, "Int", 3)     ? 'i'
               : !strncmp(kind, "UInt", 4)  ? 'u'
@@ -287,20 +266,20 @@ static PetscErrorCode read_array(Vtu *v, const char *open, const char *close, in
   type.size = atoi(kind + strcspn(kind, "0123456789")) / 8;
   if (!type.kind || (type.size != 1 && type.size != 2 && type.size != 4 && type.size != 8) ||
       (type.kind == 'f' && type.size < 4))
-    SB_SCAN_ERROR(&v->scan, "an array of type '%s'; expected one as Float64 or Int32", kind);
+    SB_SCAN_ERROR(v->scan, "an array of type '%s'; expected one as Float64 or Int32", kind);
   attribute(open, close, "format", sizeof(format), format);
   attribute(open, close, "Name", sizeof(name), name);
   if (!strcmp(format, "ascii") || !format[0]) {
-    const char *end = (const char *)memchr(close, '<', (size_t)(v->scan.end - close));
+    const char *end = (const char *)memchr(close, '<', (size_t)(v->scan->end - close));
     SbScan s;
 
-    if (!end) SB_SCAN_ERROR(&v->scan, "the array has no end; the file is truncated, write or copy it again");
+    if (!end) SB_SCAN_ERROR(v->scan, "the array has no end; the file is truncated, write or copy it again");
     if (n > (end - close) / 2 + 1)
-      SB_SCAN_ERROR(&v->scan, "array '%s' should hold %lld numbers, which is more than stand there", name,
+      SB_SCAN_ERROR(v->scan, "array '%s' should hold %lld numbers, which is more than stand there", name,
                     (long long)n);
-    PetscCall(PetscMalloc1((size_t)n, value));
+    PetscCall(SbImportScratch(v->im, (size_t)n * sizeof(**value), value));
     // text: numbers between blanks
-    s = v->scan;
+    s = *v->scan;
     s.at = close;
     s.end = end;
     s.bytes = PETSC_FALSE;
@@ -315,10 +294,10 @@ static PetscErrorCode read_array(Vtu *v, const char *open, const char *close, in
   PetscCall(locate(v, open, close, format, &b));
   room = (size_t)(b.end - b.at) / (size_t)type.size;
   if ((uint64_t)n > (v->zlib ? ZLIB_RATIO : 1) * (uint64_t)room)
-    SB_SCAN_ERROR(&v->scan,
+    SB_SCAN_ERROR(v->scan,
                   "array '%s' should hold %lld numbers, which is more than the rest of the file can tell",
                   name, (long long)n);
-  PetscCall(PetscMalloc1((size_t)n, value));
+  PetscCall(SbImportScratch(v->im, (size_t)n * sizeof(**value), value));
   PetscCall(read_binary(v, &b, name, type, (size_t)n, *value));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -333,10 +312,10 @@ static PetscErrorCode content(Vtu *v, const char *name, const char **from, const
 
   PetscFunctionBeginUser;
   (void)snprintf(closing, sizeof(closing), "/%s", name);
-  v->scan.token = v->scan.data;
-  if (!find_element(v->scan.data, v->xml_end, name, &open, from) ||
+  v->scan->token = v->scan->data;
+  if (!find_element(v->scan->data, v->xml_end, name, &open, from) ||
       !find_element(*from, v->xml_end, closing, end, &close))
-    SB_SCAN_ERROR(&v->scan, "there is no element %s, or it has no end; the file is truncated or damaged",
+    SB_SCAN_ERROR(v->scan, "there is no element %s, or it has no end; the file is truncated or damaged",
                   name);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -349,14 +328,14 @@ static PetscErrorCode read_cell_array(Vtu *v, const char *name, int64_t n, doubl
 
   PetscFunctionBeginUser;
   PetscCall(content(v, "Cells", &from, &end));
-  v->cells_at = v->scan.token = from;
+  v->cells_at = v->scan->token = from;
   for (; find_element(from, end, "DataArray", &open, &close); from = close) {
     attribute(open, close, "Name", sizeof(found), found);
     if (strcmp(found, name)) continue;
     PetscCall(read_array(v, open, close, n, value));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
-  SB_SCAN_ERROR(&v->scan, "the element Cells has no array '%s'", name);
+  SB_SCAN_ERROR(v->scan, "the element Cells has no array '%s'", name);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -365,20 +344,18 @@ static PetscErrorCode read_points(Vtu *v, int64_t n)
   const char *from, *end, *open, *close;
   double *x = NULL;
   int64_t ncomponent = 3;
-  PetscErrorCode ierr;
 
   PetscFunctionBeginUser;
   PetscCall(content(v, "Points", &from, &end));
-  v->scan.token = from;
+  v->scan->token = from;
   if (!find_element(from, end, "DataArray", &open, &close))
-    SB_SCAN_ERROR(&v->scan, "the element Points has no array");
+    SB_SCAN_ERROR(v->scan, "the element Points has no array");
   PetscCall(attribute_number(v, open, close, "NumberOfComponents", &ncomponent));
   if (ncomponent != 3)
-    SB_SCAN_ERROR(&v->scan, "points of %lld coordinates; expected 3", (long long)ncomponent);
-  ierr = read_array(v, open, close, 3 * n, &x);
-  if (!ierr) ierr = SbVtkSetPoints(&v->scan, (PetscInt)n, x, v->im);
-  PetscCall(PetscFree(x));
-  PetscFunctionReturn(ierr);
+    SB_SCAN_ERROR(v->scan, "points of %lld coordinates; expected 3", (long long)ncomponent);
+  PetscCall(read_array(v, open, close, 3 * n, &x));
+  PetscCall(SbVtkSetPoints((PetscInt)n, x, v->im));
+  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 static PetscErrorCode read_cells(Vtu *v, int64_t n)
@@ -391,10 +368,9 @@ static PetscErrorCode read_cells(Vtu *v, int64_t n)
   PetscCall(read_cell_array(v, "offsets", n, &grid->end));
   PetscCall(read_cell_array(v, "types", n, &grid->type));
   last = n ? grid->end[n - 1] : 0;
-  v->scan.token = v->cells_at;
+  v->scan->token = v->cells_at;
   if (!(last >= 0 && last < 1e12) || last != PetscFloorReal(last))
-    SB_SCAN_ERROR(&v->scan, "the last of the offsets is %g; expected the number of points of all cells",
-                  last);
+    SB_SCAN_ERROR(v->scan, "the last of the offsets is %g; expected the number of points of all cells", last);
   grid->nconnect = (int64_t)last;
   PetscCall(read_cell_array(v, "connectivity", grid->nconnect, &grid->connect));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -408,7 +384,7 @@ static PetscErrorCode read_cell_data(Vtu *v)
   char components[16];
 
   PetscFunctionBeginUser;
-  if (!find_element(v->scan.data, v->xml_end, "CellData", &open, &from) || from[-2] == '/')
+  if (!find_element(v->scan->data, v->xml_end, "CellData", &open, &from) || from[-2] == '/')
     PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(content(v, "CellData", &from, &end));
   for (; find_element(from, end, "DataArray", &open, &close) && grid->narray < SB_VTK_ARRAYS; from = close) {
@@ -428,7 +404,7 @@ static PetscErrorCode read_cell_data(Vtu *v)
 
 static PetscErrorCode read_file_element(Vtu *v)
 {
-  SbScan *s = &v->scan;
+  SbScan *s = v->scan;
   const char *open, *close;
   char value[64];
   const uint16_t one = 1;
@@ -462,28 +438,29 @@ static PetscErrorCode find_appended(Vtu *v)
   char encoding[16];
 
   PetscFunctionBeginUser;
-  v->xml_end = v->scan.end;
-  if (!find_element(v->scan.data, v->scan.end, "AppendedData", &open, &close))
+  v->xml_end = v->scan->end;
+  if (!find_element(v->scan->data, v->scan->end, "AppendedData", &open, &close))
     PetscFunctionReturn(PETSC_SUCCESS);
   v->xml_end = open;
   attribute(open, close, "encoding", sizeof(encoding), encoding);
   v->appended_text = (PetscBool)!strcmp(encoding, "base64");
-  v->scan.bytes = (PetscBool)!v->appended_text;
-  v->scan.token = open;
-  mark = (const char *)memchr(close, '_', (size_t)(v->scan.end - close));
-  if (!mark) SB_SCAN_ERROR(&v->scan, "the appended data has no mark _ at its beginning");
+  v->scan->bytes = (PetscBool)!v->appended_text;
+  v->scan->token = open;
+  mark = (const char *)memchr(close, '_', (size_t)(v->scan->end - close));
+  if (!mark) SB_SCAN_ERROR(v->scan, "the appended data has no mark _ at its beginning");
   v->appended = mark + 1;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode read_file(const char *path, Vtu *v)
+PetscErrorCode SbImportRead_VTU(const char *path, SbImport *im)
 {
-  SbScan *s = &v->scan;
+  SbScan *s = &im->scan;
+  Vtu vtu = {.scan = s, .im = im}, *v = &vtu;
   const char *open, *close, *open2, *close2;
   int64_t npoint, ncell;
 
   PetscFunctionBeginUser;
-  PetscCall(SbScanOpen(v->im->where, path, s));
+  PetscCall(SbScanOpen(im->where, path, s));
   PetscCall(find_appended(v));
   PetscCall(read_file_element(v));
   if (!find_element(s->data, v->xml_end, "Piece", &open, &close))
@@ -500,20 +477,6 @@ static PetscErrorCode read_file(const char *path, Vtu *v)
   PetscCall(read_cells(v, ncell));
   PetscCall(read_cell_data(v));
   s->token = v->cells_at;
-  PetscCall(SbVtkGridFill(s, &v->grid, v->im));
+  PetscCall(SbVtkGridFill(&v->grid, im));
   PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode SbImportRead_VTU(const char *path, SbImport *im)
-{
-  Vtu v;
-  PetscErrorCode ierr;
-
-  PetscFunctionBeginUser;
-  PetscCall(PetscMemzero(&v, sizeof(v)));
-  v.im = im;
-  ierr = read_file(path, &v);
-  PetscCall(SbVtkGridDestroy(&v.grid));
-  PetscCall(SbScanClose(&v.scan));
-  PetscFunctionReturn(ierr);
 }

@@ -4,11 +4,14 @@
 #pragma once
 #include "sbmeshio.h"
 
-/* An array that grows by one at its end: unit bytes each, of which there are n. */
-typedef struct {
-  PetscInt n, capacity;
-} SbCount;
-PetscErrorCode SbImportGrow(SbCount *count, size_t unit, void *array);
+/* Gives back what only reading needs: the text of the file, arrays of the reader. */
+PetscErrorCode SbImportForget(SbImport *import);
+/* Gives a name to the group (dim, tag), if there is one. */
+PetscErrorCode SbImportNameGroup(SbImport *import, PetscInt dim, int64_t tag, const char *name);
+/* Room of so many bytes for an array of a reader: *array is NULL, or grows and keeps what is in it. SbImportForget() gives it back. */
+PetscErrorCode SbImportScratch(SbImport *import, size_t bytes, void *array);
+/* The same for one more of `unit` bytes each. */
+PetscErrorCode SbImportGrow(SbImport *import, SbCount *count, size_t unit, void *array);
 
 /* scan.c: an integer as text or in binary of 4 or 8 bytes; `what` names what is expected there. */
 PetscErrorCode SbScanInt4(SbScan *scan, const char *what, int64_t *value);
@@ -36,21 +39,80 @@ PetscErrorCode SbImportRead_Xdmf(const char *path, SbImport *body);
 PetscErrorCode SbImportSlab_H5(const char *path, PetscInt k, PetscInt n, SbImport *body, SbSlabRows *rows);
 PetscErrorCode SbImportSlabs_H5(const char *path, PetscInt *ncell);
 
-/* ------------------------------------------------------------------ group_membership.c: sets that are listed apart from their items */
+/* ------------------------------------------------------------------ elements by the types of gmsh */
 
-/* Item `item` of dimension dim belongs to a group. */
 typedef struct {
-  PetscInt dim, item, group;
-} SbGroupMember;
-typedef struct {
-  PetscInt n, capacity;
-  SbGroupMember *row; /* [n] */
-} SbGroupMembership;
+  const char *name; /* "4-node tetrahedra" */
+  int dim, nnode;
+} SbGmshType;
+extern const SbGmshType SbGmshTypes[SB_GMSH_NTYPES];
 
-PetscErrorCode SbGroupMembershipAdd(SbGroupMembership *members, PetscInt dim, PetscInt item, PetscInt group);
-/* Gives every item the groups listed for it, beside those that it has; frees the list. */
-PetscErrorCode SbGroupMembershipApply(SbGroupMembership *members, SbImport *im);
-PetscErrorCode SbGroupMembershipDestroy(SbGroupMembership *members);
+/* Counts an element, and keeps it when it is of use: a tet, a simplex of groups, a triangle where a surface is wanted. */
+PetscErrorCode SbImportAddElement(SbImport *import, int type, const PetscInt vert[], PetscInt tags,
+                                  int64_t number);
+/*
+  SbImportCheckTypes - what was read must be a mesh of 4-node tets and of nothing else in the volume (or triangles, for a surface).
+
+  Not collective. Errors: PETSC_ERR_FILE_UNEXPECTED, which says what is there.
+*/
+PetscErrorCode SbImportCheckTypes(const SbImport *import);
+
+/* ------------------------------------------------------------------ deck.c: a file that names nodes and elements by labels */
+
+typedef struct {
+  int64_t label;
+  PetscReal x[3];
+  const char *at; /* in the file, for messages */
+} SbDeckNode;
+typedef struct {
+  int64_t label, property, node[4]; /* property: number of its group; -1: none */
+  int type;                         /* as gmsh numbers it */
+  const char *at;
+  PetscInt item; /* when put together: of the import; -1: it is no simplex */
+} SbDeckElement;
+/* Labels from first to last, or all those of another set. */
+typedef struct {
+  int64_t first, last, step;
+  PetscInt set; /* -1: the labels */
+  const char *at;
+} SbDeckRange;
+typedef struct {
+  char name[SB_GROUP_MAX];
+  PetscBool of_nodes; /* else of elements */
+  SbCount nrange;
+  SbDeckRange *range; /* [nrange] */
+} SbDeckSet;
+/* What was read so far; zeroed but for the first five. Arrays are the reader's, see SbImportScratch(). */
+typedef struct {
+  SbImport *im;
+  int (*compare)(const char *, const char *); /* of names of sets: strcmp() or strcasecmp() */
+  const char *cure;                           /* what to do about a label that is given twice */
+  PetscBool unique;                           /* labels of elements, too, may be given once only */
+  PetscBool strict;                           /* nodes of sets must be there */
+  SbCount nnode, nelement, nset, nfound;
+  SbDeckNode *node;       /* [nnode] */
+  SbDeckElement *element; /* [nelement] */
+  SbDeckSet *set;         /* [nset] */
+  PetscInt *found;        /* [nfound] by SbDeckFind(): nodes or elements */
+  PetscInt *stack;        /* [nset] sets to look into */
+  PetscBool *seen;        /* [nset] */
+  int64_t nlooked;        /* labels looked for */
+} SbDeck;
+#define SB_DECK_TAG \
+  ((int64_t)1 << 40) /* number of the group of set 0: apart from the numbers of properties */
+
+/* A node at the last token; its coordinates, 0, are for the caller to fill. */
+PetscErrorCode SbDeckAddNode(SbDeck *deck, int64_t label, PetscReal **x);
+PetscErrorCode SbDeckAddElement(SbDeck *deck, const SbDeckElement *element);
+/* The set of this name, made when new. */
+PetscErrorCode SbDeckFindSet(SbDeck *deck, PetscBool of_nodes, const char *name, PetscInt *set);
+PetscErrorCode SbDeckAddRange(SbDeck *deck, PetscInt set, int64_t first, int64_t last, int64_t step);
+/* The members of `other` belong to the set, too. */
+PetscErrorCode SbDeckAddSet(SbDeck *deck, PetscInt set, PetscInt other);
+/* Vertices, items, and the sets as groups noted for SbImportJoinGroups(). What a set lists and the file does not define is left out. */
+PetscErrorCode SbDeckBuild(SbDeck *deck);
+/* The members of a set and of those that it names, each of these once, whatever circles they form; in deck->found. */
+PetscErrorCode SbDeckFind(SbDeck *deck, PetscInt set);
 
 /* ------------------------------------------------------------------ write_gmsh.c, write_h5.c: one file, written to `path` as it is */
 
@@ -69,7 +131,9 @@ typedef PetscErrorCode (*SbChildWork)(void *ctx, SbImport *result);
 PetscErrorCode SbChildRun(const char *who, const char *doing, PetscReal seconds, SbChildWork work, void *ctx,
                           SbImport *result);
 
-/* whether another word stands on this line */
-PetscBool SbScanFind(SbScan *scan, const char *text); /* moves to its beginning */
+/* Moves to the beginning of a text; false when it does not come. */
+PetscBool SbScanFind(SbScan *scan, const char *text);
 
 PetscErrorCode SbScanQuoted(SbScan *scan, const char *what, size_t size, char value[]); /* "in quotes" */
+/* A name, up to the end of the line, without blanks around it; "" when there is none. */
+PetscErrorCode SbScanRestOfLine(SbScan *scan, size_t size, char name[]);

@@ -247,6 +247,21 @@ PetscErrorCode SbScanQuoted(SbScan *s, const char *what, size_t size, char value
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscErrorCode SbScanRestOfLine(SbScan *s, size_t size, char name[])
+{
+  size_t n = 0;
+
+  PetscFunctionBeginUser;
+  (void)SbScanMore(s, '\n');
+  for (; s->at < s->end && *s->at != '\n'; s->at++) {
+    if (n + 1 >= size) SB_SCAN_ERROR(s, "the name is longer than %zu characters", size - 1);
+    name[n++] = isprint((unsigned char)*s->at) ? *s->at : ' ';
+  }
+  while (n && name[n - 1] == ' ') n--;
+  name[n] = 0;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode SbScanWord(SbScan *s, size_t size, char word[])
 {
   size_t n = 0;

@@ -5,7 +5,6 @@
 */
 #include <stdlib.h>
 #include <strings.h>
-#include "gmsh_types.h"
 #include "vtk_grid.h"
 
 /* VTK's types of cells: what gmsh calls them. nnode 0: any number of nodes. */
@@ -40,17 +39,6 @@ static const char *const region_names[] = {
   "CellEntityIds", "gmsh:physical", "medit:ref", "region", "regions", "RegionId",  "RegionIds", "material",
   "MaterialId",    "MaterialIds",   "subdomain", "label",  "labels",  "cell_tags", "tag"};
 
-PetscErrorCode SbVtkGridDestroy(SbVtkGrid *grid)
-{
-  PetscFunctionBeginUser;
-  PetscCall(PetscFree(grid->connect));
-  PetscCall(PetscFree(grid->end));
-  PetscCall(PetscFree(grid->type));
-  for (int a = 0; a < grid->narray; a++) PetscCall(PetscFree(grid->array[a].value));
-  PetscCall(PetscMemzero(grid, sizeof(*grid)));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 void SbVtkConvert(SbVtkType type, PetscBool swap, size_t n, const void *bytes, double value[])
 {
   const unsigned char *from = (const unsigned char *)bytes;
@@ -78,7 +66,7 @@ void SbVtkConvert(SbVtkType type, PetscBool swap, size_t n, const void *bytes, d
   }
 }
 
-PetscErrorCode SbVtkSetPoints(SbScan *s, PetscInt n, const double x[], SbImport *im)
+PetscErrorCode SbVtkSetPoints(PetscInt n, const double x[], SbImport *im)
 {
   PetscFunctionBeginUser;
   PetscCall(SbImportSetVertices(im, n));
@@ -87,7 +75,8 @@ PetscErrorCode SbVtkSetPoints(SbScan *s, PetscInt n, const double x[], SbImport 
     for (int i = 0; i < 3; i++) {
       im->x[3 * v + i] = x[3 * v + i];
       if (!isfinite(x[3 * v + i]))
-        SB_SCAN_ERROR(s, "coordinate of point %lld is not a finite number; repair the file", (long long)v);
+        SB_SCAN_ERROR(&im->scan, "coordinate of point %lld is not a finite number; repair the file",
+                      (long long)v);
     }
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -195,9 +184,10 @@ static PetscErrorCode cell_type(SbScan *s, const SbVtkGrid *grid, PetscInt c, in
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbVtkGridFill(SbScan *s, SbVtkGrid *grid, SbImport *im)
+PetscErrorCode SbVtkGridFill(SbVtkGrid *grid, SbImport *im)
 {
-  int64_t count[SB_GMSH_NTYPES] = {0}, begin = 0, end;
+  SbScan *s = &im->scan;
+  int64_t begin = 0, end;
   PetscBool use[SB_VTK_ARRAYS];
   PetscInt vert[4] = {0, 0, 0, 0}, tags;
   int regions, type;
@@ -222,14 +212,12 @@ PetscErrorCode SbVtkGridFill(SbScan *s, SbVtkGrid *grid, SbImport *im)
                       (long long)im->nvert - 1);
       if (k < 4) vert[k] = (PetscInt)point;
     }
-    count[type]++;
-    if (type != SB_GMSH_TET && type != SB_GMSH_TRIANGLE && type != SB_GMSH_LINE && type != SB_GMSH_POINT)
-      continue;
-    if (end - begin != SbGmshTypes[type].nnode) continue; /* a line of many pieces */
-    PetscCall(cell_tags(grid, use, regions, c, SbGmshTypes[type].dim, im, &tags));
-    if (type == SB_GMSH_TET || tags || (type == SB_GMSH_TRIANGLE && im->surface))
-      PetscCall(SbImportAddItem(im, SbGmshTypes[type].dim, vert, tags, c));
+    /* groups of simplices, but not of a line of many pieces */
+    tags = 0;
+    if (end - begin == SbGmshTypes[type].dim + 1)
+      PetscCall(cell_tags(grid, use, regions, c, SbGmshTypes[type].dim, im, &tags));
+    PetscCall(SbImportAddElement(im, type, vert, tags, c));
   }
-  PetscCall(SbGmshCheckTypes(im, count));
+  PetscCall(SbImportCheckTypes(im));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

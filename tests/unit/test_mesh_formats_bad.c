@@ -235,15 +235,28 @@ static PetscErrorCode test_abaqus(void)
     {"*PART, NAME=A\n" NODE "*PART, NAME=B\n", "a.inp|line 7|*PART"},
     {"*INCLUDE, INPUT=more.inp\n", "a.inp|line 1|*INCLUDE"},
     {NODE "*ELEMENT, TYPE=C3D4\n1, 1,2,3,4\n*INSTANCE, NAME=I, PART=P\n1., 0., 0.\n", "a.inp|line 9"},
-    {NODE "*NSET, NSET=N, GENERATE\n1, 1000000000, 1\n", "a.inp|line 7|0 members"},
+    {NODE "*ELEMENT, TYPE=C3D4\n1, 1,2,3,4\n*NSET, NSET=N, GENERATE\n1, 1000000000, 1\n", NULL},
     {NODE "*ELEMENT, TYPE=C3D4\n1, 1,2,3,4\n*SURFACE, NAME=S\n1, S5\n", "a.inp|line 9|'S5'"},
     {NODE "*ELEMENT, TYPE=C3D4\n1, 1,2,3,4\n*SURFACE, NAME=S\n2, S1\n", "a.inp|line 9|surface 'S'|element 2"},
     {"*NODE\n1, 0, zero, 0\n", "a.inp|line 2|node 1|'zero'"},
     {"solid\n", "*NODE"},
     {NULL, NULL}};
 
+  char path[128];
+  FILE *file;
+
   PetscFunctionBeginUser;
   PetscCall(test_cases("a.inp", cases));
+  /* as many lines that each tell of all nodes: no file of this size can mean that */
+  (void)snprintf(path, sizeof(path), "%s/many.inp", folder);
+  file = fopen(path, "w");
+  SB_CHECK(file, "%s cannot be written", path);
+  (void)fputs(NODE "*ELEMENT, TYPE=C3D4\n1, 1,2,3,4\n*NODE\n", file);
+  for (int i = 5; i < 3000; i++) (void)fprintf(file, "%d,9,9,9\n", i);
+  (void)fputs("*NSET, NSET=N, GENERATE\n", file);
+  for (int i = 0; i < 3000; i++) (void)fputs("1,9999,1\n", file);
+  (void)fclose(file);
+  SB_CHECK_ERROR(use_mesh("many.inp"), PETSC_ERR_FILE_UNEXPECTED, "many.inp|members");
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

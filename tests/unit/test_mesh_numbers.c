@@ -65,12 +65,10 @@ static PetscErrorCode test_members(void)
   enum { NITEM = 40, NGROUP = 9 };
   static PetscBool expected[4][NITEM][NGROUP + 1];
   SbImport im;
-  SbGroupMembership members;
   PetscInt group[NGROUP + 1], tags, wrong = 0;
 
   PetscFunctionBeginUser;
   memset(&im, 0, sizeof(im));
-  memset(&members, 0, sizeof(members));
   PetscCall(SbImportTagSet(&im, 0, NULL, &tags));
   for (int g = 0; g <= NGROUP; g++) PetscCall(SbImportGroup(&im, g % 4, 100 + g, NULL, &group[g]));
   PetscCall(SbImportTagSet(&im, 1, &group[NGROUP], &tags));
@@ -86,17 +84,17 @@ static PetscErrorCode test_members(void)
   for (int k = 0; k < 700; k++) {
     const int d = rand() % 4, i = rand() % NITEM, g = rand() % NGROUP;
 
-    PetscCall(SbGroupMembershipAdd(&members, d, i, group[g]));
+    PetscCall(SbImportAddMember(&im, d, i, group[g]));
     expected[d][i][g] = PETSC_TRUE;
   }
-  PetscCall(SbGroupMembershipApply(&members, &im));
+  PetscCall(SbImportJoinGroups(&im));
   for (int d = 0; d < 4; d++) {
     for (PetscInt i = 0; i < NITEM; i++) {
       for (int g = 0; g <= NGROUP; g++) wrong += has_group(&im, d, i, group[g]) != expected[d][i][g];
     }
   }
   SB_CHECK(!wrong, "%d wrong memberships", (int)wrong);
-  SB_CHECK(!members.n && !members.row, "the list is not freed");
+  SB_CHECK(!im.nmember.n, "the list is not empty");
   PetscCall(SbImportDestroy(&im));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

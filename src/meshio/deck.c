@@ -1,0 +1,221 @@
+/*
+  deck.c - nodes, elements and sets of a file that names them by labels, in any order: collected first, then put together.
+
+  What Abaqus, Nastran and universal files have in common. A set may name nodes, elements and other sets that come later, hence it is taken
+  apart when all are there.
+*/
+#include "meshio_impl.h"
+
+PetscErrorCode SbDeckAddNode(SbDeck *d, int64_t label, PetscReal **x)
+{
+  PetscFunctionBeginUser;
+  PetscCheck(d->nnode.n < PETSC_MAX_INT / 8, PETSC_COMM_SELF, PETSC_ERR_FILE_UNEXPECTED,
+             "%s: has more nodes than this build can number", d->im->where);
+  PetscCall(SbImportGrow(d->im, &d->nnode, sizeof(*d->node), &d->node));
+  d->node[d->nnode.n - 1] = (SbDeckNode){.label = label, .at = d->im->scan.token};
+  *x = d->node[d->nnode.n - 1].x;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbDeckAddElement(SbDeck *d, const SbDeckElement *element)
+{
+  PetscFunctionBeginUser;
+  d->im->count[element->type]++;
+  PetscCall(SbImportGrow(d->im, &d->nelement, sizeof(*element), &d->element));
+  d->element[d->nelement.n - 1] = *element;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbDeckFindSet(SbDeck *d, PetscBool of_nodes, const char *name, PetscInt *set)
+{
+  PetscFunctionBeginUser;
+  for (*set = 0; *set < d->nset.n; (*set)++)
+    if (d->set[*set].of_nodes == of_nodes && !(*d->compare)(d->set[*set].name, name))
+      PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(SbImportGrow(d->im, &d->nset, sizeof(*d->set), &d->set));
+  PetscCall(PetscMemzero(&d->set[*set], sizeof(*d->set)));
+  (void)snprintf(d->set[*set].name, SB_GROUP_MAX, "%s", name);
+  d->set[*set].of_nodes = of_nodes;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode add_range(SbDeck *d, PetscInt set, SbDeckRange range)
+{
+  SbDeckSet *s = &d->set[set];
+
+  PetscFunctionBeginUser;
+  PetscCall(SbImportGrow(d->im, &s->nrange, sizeof(range), &s->range));
+  range.at = d->im->scan.token;
+  s->range[s->nrange.n - 1] = range;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbDeckAddRange(SbDeck *d, PetscInt set, int64_t first, int64_t last, int64_t step)
+{
+  const SbDeckSet *s = &d->set[set];
+  SbDeckRange *before = s->nrange.n ? &s->range[s->nrange.n - 1] : NULL;
+
+  PetscFunctionBeginUser;
+  /* labels one by one, as an element gives its set: a range grows. Where one may be missing its place is wanted */
+  if (before && !d->strict && before->set < 0 && before->step == 1 && step == 1 && first == before->last + 1)
+    before->last = last;
+  else
+    PetscCall(add_range(d, set, (SbDeckRange){.first = first, .last = last, .step = step, .set = -1}));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbDeckAddSet(SbDeck *d, PetscInt set, PetscInt other)
+{
+  return add_range(d, set, (SbDeckRange){.set = other});
+}
+
+/* ------------------------------------------------------------------ put together */
+
+static PetscErrorCode make_vertices(SbDeck *d)
+{
+  SbImport *im = d->im;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbImportSetVertices(im, d->nnode.n));
+  for (PetscInt v = 0; v < im->nvert; v++) {
+    PetscCall(PetscArraycpy(im->x + 3 * v, d->node[v].x, 3));
+    im->vert_number[v] = d->node[v].label;
+  }
+  PetscCall(SbNumbersCreate(im->nvert, im->vert_number, &im->nodes));
+  for (PetscInt v = 0; v < im->nvert && im->nodes.repeated; v++)
+    if (d->node[v].label == im->nodes.twice) im->scan.token = d->node[v].at;
+  if (im->nodes.repeated)
+    SB_SCAN_ERROR(&im->scan, "node %lld is given twice; %s", (long long)im->nodes.twice, d->cure);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The simplices, with the groups of their properties. */
+static PetscErrorCode make_items(SbDeck *d)
+{
+  SbImport *im = d->im;
+  int64_t *label = NULL;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbImportScratch(im, (size_t)d->nelement.n * sizeof(*label), &label));
+  for (PetscInt e = 0; e < d->nelement.n; e++) {
+    SbDeckElement *element = &d->element[e];
+    const int dim = SbGmshTypes[element->type].dim;
+    PetscInt vert[4] = {0, 0, 0, 0}, tags = 0;
+
+    label[e] = element->label;
+    element->item = -1;
+    if (SbGmshTypes[element->type].nnode != dim + 1) continue;
+    im->scan.token = element->at;
+    for (int k = 0; k <= dim; k++) {
+      vert[k] = SbNumbersFind(&im->nodes, element->node[k]);
+      if (vert[k] < 0)
+        SB_SCAN_ERROR(&im->scan, "element %lld uses node %lld, which is not there", (long long)element->label,
+                      (long long)element->node[k]);
+    }
+    if (element->property >= 0) PetscCall(SbImportTagsAlone(im, dim, element->property, NULL, &tags));
+    element->item = im->item[dim].n;
+    PetscCall(SbImportAddItem(im, dim, vert, tags, element->label));
+  }
+  PetscCall(SbNumbersCreate(d->nelement.n, label, &im->elements));
+  if (im->elements.repeated && d->unique)
+    SB_SCAN_ERROR(&im->scan, "element %lld is given twice; %s", (long long)im->elements.twice, d->cure);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Adds the nodes or elements of a range to those found, by their places. */
+static PetscErrorCode find_range(SbDeck *d, const SbDeckSet *set, const SbDeckRange *r)
+{
+  SbImport *im = d->im;
+  const SbNumbers *numbers = set->of_nodes ? &im->nodes : &im->elements;
+  const int64_t length = (r->last - r->first) / r->step + 1;
+  const PetscBool all =
+    (PetscBool)(length > numbers->n); /* then each node or element is looked at instead of each label */
+  const int64_t n = all ? numbers->n : length;
+
+  PetscFunctionBeginUser;
+  /* sets that name each other can tell of far more members than a file of this size has use for */
+  im->scan.token = r->at;
+  d->nlooked += n;
+  if (d->nlooked > 64 * (int64_t)(im->scan.end - im->scan.data))
+    SB_SCAN_ERROR(
+      &im->scan,
+      "the sets have more than %lld members, more than a file of this size can mean; it is damaged",
+      (long long)(d->nlooked - n));
+  for (int64_t i = 0; i < n; i++) {
+    int64_t label = r->first + i * r->step;
+    PetscInt at = (PetscInt)i;
+
+    if (all) {
+      label = set->of_nodes ? d->node[i].label : d->element[i].label;
+      if (label < r->first || label > r->last || (label - r->first) % r->step) continue;
+    } else
+      at = SbNumbersFind(numbers, label);
+    if (at < 0 && d->strict && set->of_nodes)
+      SB_SCAN_ERROR(&im->scan, "group '%s' lists node %lld, which is not there", set->name, (long long)label);
+    if (at < 0) continue;
+    PetscCall(SbImportGrow(im, &d->nfound, sizeof(*d->found), &d->found));
+    d->found[d->nfound.n - 1] = at;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbDeckFind(SbDeck *d, PetscInt s)
+{
+  PetscInt n = 0;
+
+  PetscFunctionBeginUser;
+  if (!d->stack) {
+    PetscCall(SbImportScratch(d->im, (size_t)d->nset.n * sizeof(*d->stack), &d->stack));
+    PetscCall(SbImportScratch(d->im, (size_t)d->nset.n * sizeof(*d->seen), &d->seen));
+  }
+  PetscCall(PetscArrayzero(d->seen, d->nset.n));
+  d->nfound.n = 0;
+  d->seen[s] = PETSC_TRUE;
+  d->stack[n++] = s;
+  while (n) {
+    const SbDeckSet *set = &d->set[d->stack[--n]];
+
+    for (PetscInt i = 0; i < set->nrange.n; i++) {
+      const PetscInt other = set->range[i].set;
+
+      if (other < 0)
+        PetscCall(find_range(d, set, &set->range[i]));
+      else if (!d->seen[other]) {
+        d->seen[other] = PETSC_TRUE;
+        d->stack[n++] = other;
+      }
+    }
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbDeckBuild(SbDeck *d)
+{
+  SbImport *im = d->im;
+  PetscInt *point = NULL, group; /* [nvert] item of a node that is in a set, or -1 */
+
+  PetscFunctionBeginUser;
+  PetscCall(SbImportCheckTypes(im));
+  PetscCall(make_vertices(d));
+  PetscCall(make_items(d));
+  PetscCall(SbImportScratch(im, (size_t)im->nvert * sizeof(*point), &point));
+  for (PetscInt v = 0; v < im->nvert; v++) point[v] = -1;
+  for (PetscInt s = 0; s < d->nset.n; s++) {
+    PetscCall(SbDeckFind(d, s));
+    for (PetscInt i = 0; i < d->nfound.n; i++) {
+      const PetscInt at = d->found[i];
+      int dim = 0;
+
+      if (!d->set[s].of_nodes) {
+        dim = SbGmshTypes[d->element[at].type].dim;
+        if (d->element[at].item < 0) continue;
+      } else if (point[at] < 0) {
+        point[at] = im->item[0].n;
+        PetscCall(SbImportAddItem(im, 0, &at, 0, d->node[at].label));
+      }
+      PetscCall(SbImportGroup(im, dim, SB_DECK_TAG + s, d->set[s].name, &group));
+      PetscCall(SbImportAddMember(im, dim, dim ? d->element[at].item : point[at], group));
+    }
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
