@@ -13,16 +13,14 @@
   is allocated for an array that the file is too short to hold (stored without compression, as here, it takes its full size;
   compressed by others, at most a thousandth of it).
 */
-#include <errno.h>
 #include <hdf5.h>
 #include <stdlib.h>
-#include <sys/stat.h>
 #include "meshio_impl.h"
 
 typedef struct {
   SbImport *im;
   hid_t file;
-  uint64_t bytes;        /* length of the file */
+  size_t bytes;          /* length of the file */
   char frame[64];        /* group of the wanted step; "" at rest */
   PetscInt part, nparts; /* which block of rows of how many; nparts 0: all rows */
   PetscInt nvert;        /* of the file */
@@ -37,38 +35,29 @@ typedef struct {
 
 /* ------------------------------------------------------------------ the file */
 
-static const unsigned char signature[8] = {0x89, 'H', 'D', 'F', '\r', '\n', 0x1a, '\n'};
-
 /* Says why HDF5 cannot open it: not there, no HDF5, or cut off. */
 static PetscErrorCode open_file(const char *path, File *f)
 {
-  unsigned char begin[8] = {0};
-  struct stat info;
-  FILE *file = fopen(path, "rb");
-  size_t got;
+  const hid_t access = H5Pcreate(H5P_FILE_ACCESS);
+  htri_t is_hdf5;
+  FILE *file;
 
   PetscFunctionBeginUser;
-  PetscCheck(file, PETSC_COMM_SELF, PETSC_ERR_FILE_OPEN,
-             "%s: cannot open the file (%s); check the name and the folder the run starts in", f->im->where,
-             strerror(errno));
-  if (fstat(fileno(file), &info) || !S_ISREG(info.st_mode)) {
-    (void)fclose(file);
-    SETERRQ(PETSC_COMM_SELF, PETSC_ERR_FILE_OPEN, "%s: is not a regular file; give a mesh file",
-            f->im->where);
-  }
-  f->bytes = (uint64_t)info.st_size;
-  got = fread(begin, 1, sizeof(begin), file);
+  PetscCall(SbScanOpenFile(f->im->where, path, &file, &f->bytes));
   (void)fclose(file);
-  if (got < sizeof(begin) || memcmp(begin, signature, sizeof(begin)))
-    H5_ERROR(f, "is no HDF5 file (%llu bytes); give an .h5 mesh of supple-mesh, or the fields.h5 of a run",
-             (unsigned long long)f->bytes);
   (void)H5Eset_auto2(H5E_DEFAULT, NULL, NULL); /* its stack of errors becomes one line of ours */
-  f->file = H5Fopen(path, H5F_ACC_RDONLY, H5P_DEFAULT);
+  is_hdf5 = H5Fis_hdf5(path);
+  (void)H5Pset_fclose_degree(
+    access, H5F_CLOSE_STRONG); /* with the file all of its arrays are closed, also after an error */
+  f->file = is_hdf5 > 0 ? H5Fopen(path, H5F_ACC_RDONLY, access) : -1;
+  (void)H5Pclose(access);
+  if (is_hdf5 <= 0)
+    H5_ERROR(f, "is no HDF5 file (%zu bytes); give an .h5 mesh of supple-mesh, or the fields.h5 of a run",
+             f->bytes);
   if (f->file < 0)
     H5_ERROR(
-      f,
-      "HDF5 cannot open it (%llu bytes); it is truncated, damaged or being written: write or copy it again",
-      (unsigned long long)f->bytes);
+      f, "HDF5 cannot open it (%zu bytes); it is truncated, damaged or being written: write or copy it again",
+      f->bytes);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -86,350 +75,211 @@ static PetscBool is_there(const File *f, const char *path)
 
 /* ------------------------------------------------------------------ arrays */
 
+/* What is wanted of an array, and what there is of it. */
 typedef struct {
   const char *name;
+  H5T_class_t klass;
+  hsize_t ncomp;   /* 1: a list */
+  int64_t bound;   /* whole numbers lie in [0, bound); -1: they may be any, of 64 bits */
+  PetscBool block; /* of the rows only the block that is wanted */
   hid_t set, type;
-  hsize_t n, ncomp; /* ncomp 1: a list */
-  hsize_t first;    /* row of the file that is read first */
-  PetscBool block;  /* n rows from there, not all */
+  hsize_t n;    /* rows that are read */
+  size_t width; /* bytes of a value in the file */
+  SbSlabRows rows;
 } Array;
 
-static PetscErrorCode close_array(Array *a)
-{
-  PetscFunctionBeginUser;
-  if (a->type >= 0) (void)H5Tclose(a->type);
-  if (a->set >= 0) (void)H5Dclose(a->set);
-  a->set = a->type = -1;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static const char *class_name(H5T_class_t klass)
-{
-  return klass == H5T_FLOAT ? "real numbers" : klass == H5T_INTEGER ? "whole numbers" : "texts";
-}
-
-/* Opens an array of this kind and number of columns. */
-static PetscErrorCode open_array(const File *f, const char *name, H5T_class_t klass, hsize_t ncomp, Array *a)
+/* Opens an array and checks its kind and shape. */
+static PetscErrorCode open_array(const File *f, Array *a)
 {
   hsize_t size[2] = {0, 1};
-  hid_t space;
+  hid_t space, plist;
   int ndim;
-  hid_t plist;
   PetscBool packed;
   double want;
 
   PetscFunctionBeginUser;
-  a->name = name;
-  a->type = -1;
-  a->first = 0;
-  a->block = PETSC_FALSE;
-  a->ncomp = ncomp;
-  a->set = is_there(f, name) ? H5Dopen2(f->file, name, H5P_DEFAULT) : -1;
-  if (a->set < 0) H5_ERROR(f, "has no array %s; it is no mesh of supple, or damaged", name);
+  a->set = is_there(f, a->name) ? H5Dopen2(f->file, a->name, H5P_DEFAULT) : -1;
+  if (a->set < 0) H5_ERROR(f, "has no array %s; it is no mesh of supple, or damaged", a->name);
   a->type = H5Dget_type(a->set);
+  a->width = H5Tget_size(a->type);
   space = H5Dget_space(a->set);
   ndim = H5Sget_simple_extent_ndims(space);
   if (ndim == 1 || ndim == 2) (void)H5Sget_simple_extent_dims(space, size, NULL);
   (void)H5Sclose(space);
-  a->n = size[0];
-  if (H5Tget_class(a->type) != klass || (klass == H5T_STRING && H5Tis_variable_str(a->type) > 0))
-    H5_ERROR(f, "%s does not hold %s%s", name, class_name(klass),
-             klass == H5T_STRING ? " of one length" : "");
-  if ((ndim != 1 && ndim != 2) || size[1] != ncomp)
-    H5_ERROR(f, "%s has %d dimensions and %llu columns; expected %llu columns", name, ndim,
-             (unsigned long long)size[1], (unsigned long long)ncomp);
-  if (a->n > (hsize_t)PETSC_MAX_INT / 8)
-    H5_ERROR(f, "%s has %llu rows, more than this build can number", name, (unsigned long long)a->n);
-  // an array larger than the file can hold is refused before anything is allocated
   plist = H5Dget_create_plist(a->set);
   packed = (PetscBool)(plist >= 0 && H5Pget_nfilters(plist) > 0);
-  want = (double)a->n * (double)a->ncomp * (double)H5Tget_size(a->type);
   if (plist >= 0) (void)H5Pclose(plist);
+  if (H5Tget_class(a->type) != a->klass || (a->klass == H5T_STRING && H5Tis_variable_str(a->type) > 0))
+    H5_ERROR(f, "%s does not hold %s", a->name,
+             a->klass == H5T_FLOAT     ? "real numbers"
+             : a->klass == H5T_INTEGER ? "whole numbers"
+                                       : "texts of one length");
+  if ((ndim != 1 && ndim != 2) || size[1] != a->ncomp)
+    H5_ERROR(f, "%s has %d dimensions and %llu columns; expected %llu columns", a->name, ndim,
+             (unsigned long long)size[1], (unsigned long long)a->ncomp);
+  if (size[0] > (hsize_t)PETSC_MAX_INT / 8)
+    H5_ERROR(f, "%s has %llu rows, more than this build can number", a->name, (unsigned long long)size[0]);
+  // an array larger than the file can hold is refused before anything is allocated
+  want = (double)size[0] * (double)a->ncomp * (double)a->width;
   if (want > (packed ? 1000. : 1.) * (double)f->bytes)
-    H5_ERROR(f, "%s announces %llu x %llu numbers, more than the %llu bytes of the file hold; it is damaged",
-             a->name, (unsigned long long)a->n, (unsigned long long)a->ncomp, (unsigned long long)f->bytes);
+    H5_ERROR(f, "%s announces %llu x %llu numbers, more than the %zu bytes of the file hold; it is damaged",
+             a->name, (unsigned long long)size[0], (unsigned long long)a->ncomp, f->bytes);
+  // the rows of the block
+  a->rows = (SbSlabRows){(PetscInt)size[0], (PetscInt)size[0], 0};
+  a->n = size[0];
+  if (a->block && f->nparts) {
+    a->rows.block = a->rows.N / f->nparts + 1;
+    a->rows.first = (PetscInt)PetscMin((PetscInt64)a->rows.N, (PetscInt64)a->rows.block * f->part);
+    a->n = (hsize_t)PetscMin(a->rows.block, a->rows.N - a->rows.first);
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The rows of an array that belong to the block that is wanted. */
-static SbSlabRows take_block(const File *f, Array *a)
+/* The rows of an open array, checked; what is out of range is named with its place. */
+static PetscErrorCode read_values(const File *f, const Array *a, void *values)
 {
-  SbSlabRows rows = {(PetscInt)a->n, (PetscInt)a->n, 0};
-
-  if (f->nparts) {
-    rows.block = (PetscInt)a->n / f->nparts + 1;
-    rows.first = (PetscInt)PetscMin((PetscInt64)rows.N, (PetscInt64)rows.block * f->part);
-    a->first = (hsize_t)rows.first;
-    a->n = (hsize_t)PetscMin(rows.block, rows.N - rows.first);
-    a->block = PETSC_TRUE;
-  }
-  return rows;
-}
-
-static PetscErrorCode read_values(const File *f, const Array *a, hid_t type, void *values)
-{
-  const hsize_t first[2] = {a->first, 0}, n[2] = {a->n, a->ncomp};
-  hid_t in_file = H5S_ALL, in_memory = H5S_ALL;
+  const hid_t whole = a->bound >= 0 && sizeof(PetscInt) == 4 ? H5T_NATIVE_INT32 : H5T_NATIVE_INT64;
+  const hid_t type = a->klass == H5T_FLOAT ? H5T_NATIVE_DOUBLE : a->klass == H5T_INTEGER ? whole : a->type;
+  const hsize_t first[2] = {(hsize_t)a->rows.first, 0}, n[2] = {a->n, a->ncomp};
   herr_t status = 0;
 
   PetscFunctionBeginUser;
-  if (a->block && a->n) {
-    in_file = H5Dget_space(a->set);
-    in_memory = H5Screate_simple(H5Sget_simple_extent_ndims(in_file), n, NULL);
+  if (a->n) {
+    const hid_t in_file = H5Dget_space(a->set);
+    const hid_t in_memory = H5Screate_simple(H5Sget_simple_extent_ndims(in_file), n, NULL);
+
     status = H5Sselect_hyperslab(in_file, H5S_SELECT_SET, first, NULL, n, NULL);
-  }
-  if (a->n && status >= 0) status = H5Dread(a->set, type, in_memory, in_file, H5P_DEFAULT, values);
-  if (a->block && a->n) {
+    if (status >= 0) status = H5Dread(a->set, type, in_memory, in_file, H5P_DEFAULT, values);
     (void)H5Sclose(in_file);
     (void)H5Sclose(in_memory);
   }
   if (status < 0) H5_ERROR(f, "%s cannot be read; the file is damaged, write or copy it again", a->name);
+  for (size_t i = 0; i < (size_t)(a->n * a->ncomp) && a->klass != H5T_STRING; i++) {
+    const size_t row = (size_t)a->rows.first + i / (size_t)a->ncomp + 1;
+
+    if (a->klass == H5T_FLOAT && !isfinite(((PetscReal *)values)[i]))
+      H5_ERROR(f, "%s holds no finite number in row %zu", a->name, row);
+    if (a->klass == H5T_FLOAT || a->bound < 0) continue;
+    if (((PetscInt *)values)[i] < 0 || ((PetscInt *)values)[i] >= a->bound)
+      H5_ERROR(f, "%s holds %lld in row %zu; it must be from 0 to %lld", a->name,
+               (long long)((PetscInt *)values)[i], row, (long long)a->bound - 1);
+  }
+  (void)H5Tclose(a->type);
+  (void)H5Dclose(a->set);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A list of whole numbers in [low, high); PetscFree(). What is out of range is named with its place. */
-static PetscErrorCode read_ints(const File *f, const Array *a, int64_t low, int64_t high, PetscInt values[])
+/* Both, into an array of the reader. */
+static PetscErrorCode read_array(const File *f, Array *a, PetscInt *n, void *values)
 {
   PetscFunctionBeginUser;
-  PetscCall(read_values(f, a, sizeof(PetscInt) == 8 ? H5T_NATIVE_INT64 : H5T_NATIVE_INT32, values));
-  for (size_t i = 0; i < (size_t)(a->n * a->ncomp); i++) {
-    if (values[i] < low || values[i] >= high)
-      H5_ERROR(f, "%s holds %lld in row %llu; it must be from %lld to %lld", a->name, (long long)values[i],
-               (unsigned long long)(a->first + i / a->ncomp) + 1, (long long)low, (long long)high - 1);
-  }
+  PetscCall(open_array(f, a));
+  *n = (PetscInt)a->n;
+  *(void **)values = NULL;
+  PetscCall(SbImportScratch(f->im, (size_t)(a->n * a->ncomp) * PetscMax(a->width, 8), values));
+  PetscCall(read_values(f, a, *(void **)values));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* ------------------------------------------------------------------ vertices and simplices */
-
-static PetscErrorCode check_finite(const File *f, const Array *a, const PetscReal x[])
+/* A list or table of whole numbers in [0, bound). */
+static PetscErrorCode read_table(const File *f, const char *name, hsize_t ncomp, int64_t bound, PetscInt *n,
+                                 PetscInt **values)
 {
-  PetscFunctionBeginUser;
-  for (size_t i = 0; i < 3 * (size_t)a->n; i++)
-    if (!isfinite(x[i]))
-      H5_ERROR(f, "%s holds no finite number in row %zu", a->name, (size_t)a->first + i / 3 + 1);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* [n][3] of a group or of the mesh, of the block that is wanted; PetscFree(). */
-static PetscErrorCode read_vectors(const File *f, const char *name, SbSlabRows *rows, PetscInt *n,
-                                   PetscReal **x)
-{
-  Array a;
-  PetscErrorCode ierr;
-
-  PetscFunctionBeginUser;
-  *x = NULL;
-  ierr = open_array(f, name, H5T_FLOAT, 3, &a);
-  if (!ierr) {
-    *rows = take_block(f, &a);
-    *n = (PetscInt)a.n;
-    ierr = PetscMalloc1(3 * (size_t)a.n, x);
-  }
-  if (!ierr) ierr = read_values(f, &a, H5T_NATIVE_DOUBLE, *x);
-  if (!ierr) ierr = check_finite(f, &a, *x);
-  PetscCall(close_array(&a));
-  if (ierr) PetscCall(PetscFree(*x));
-  PetscFunctionReturn(ierr);
-}
-
-/* An array of whole numbers in [0, high), all of it unless `rows` asks for the block that is wanted; PetscFree(). */
-static PetscErrorCode read_table(const File *f, const char *name, PetscInt ncomp, int64_t high,
-                                 SbSlabRows *rows, PetscInt *n, PetscInt **values)
-{
-  Array a;
-  PetscErrorCode ierr;
-
-  PetscFunctionBeginUser;
-  *values = NULL;
-  ierr = open_array(f, name, H5T_INTEGER, (hsize_t)ncomp, &a);
-  if (!ierr) {
-    if (rows) *rows = take_block(f, &a);
-    *n = (PetscInt)a.n;
-    ierr = PetscMalloc1((size_t)(a.n * a.ncomp), values);
-  }
-  if (!ierr) ierr = read_ints(f, &a, 0, high, *values);
-  PetscCall(close_array(&a));
-  if (ierr) PetscCall(PetscFree(*values));
-  PetscFunctionReturn(ierr);
+  return read_array(f, &(Array){.name = name, .klass = H5T_INTEGER, .ncomp = ncomp, .bound = bound}, n,
+                    values);
 }
 
 /* Simplices of one dimension, without groups yet. */
 static PetscErrorCode read_items(const File *f, int dim, const char *name)
 {
-  SbImport *im = f->im;
-  SbSlabRows rows;
-  Array a;
-  PetscErrorCode ierr;
+  SbItems *item = &f->im->item[dim];
+  Array a = {
+    .name = name, .klass = H5T_INTEGER, .ncomp = (hsize_t)dim + 1, .bound = f->nvert, .block = PETSC_TRUE};
 
   PetscFunctionBeginUser;
-  ierr = open_array(f, name, H5T_INTEGER, (hsize_t)dim + 1, &a);
-  if (!ierr) {
-    rows = take_block(f, &a);
-    ierr = SbImportSetItems(im, dim, (PetscInt)a.n);
-  }
-  if (!ierr) ierr = read_ints(f, &a, 0, f->nvert, im->item[dim].vert);
-  PetscCall(close_array(&a));
-  for (PetscInt i = 0; i < im->item[dim].n && !ierr; i++) im->item[dim].number[i] += rows.first;
-  if (!ierr) ierr = PetscArrayzero(im->item[dim].tags, im->item[dim].n);
-  PetscFunctionReturn(ierr);
+  PetscCall(open_array(f, &a));
+  PetscCall(SbImportSetItems(f->im, dim, (PetscInt)a.n));
+  PetscCall(read_values(f, &a, item->vert));
+  for (PetscInt i = 0; i < item->n; i++) item->number[i] += a.rows.first;
+  PetscCall(PetscArrayzero(item->tags, item->n));
+  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* ------------------------------------------------------------------ groups of an own mesh */
 
-static PetscErrorCode read_names(const File *f, PetscInt *n, char **names, size_t *width)
+/* The groups of the file; map[] leads to their numbers here. */
+static PetscErrorCode read_groups(const File *f, PetscInt *n, PetscInt **map)
 {
-  Array a;
-  PetscErrorCode ierr;
+  PetscInt ndim, nnumber, *dim;
+  int64_t *number;
+  char *names;
+  Array a = {.name = "/groups/name", .klass = H5T_STRING, .ncomp = 1};
 
   PetscFunctionBeginUser;
-  *names = NULL;
-  ierr = open_array(f, "/groups/name", H5T_STRING, 1, &a);
-  if (!ierr) {
-    *n = (PetscInt)a.n;
-    *width = H5Tget_size(a.type);
-    ierr = PetscMalloc1(*width * (size_t)a.n, names);
-  }
-  if (!ierr) ierr = read_values(f, &a, a.type, *names);
-  PetscCall(close_array(&a));
-  if (ierr) PetscCall(PetscFree(*names));
-  PetscFunctionReturn(ierr);
-}
-
-/* Numbers of groups may be any. */
-static PetscErrorCode read_numbers(const File *f, PetscInt *n, int64_t **numbers)
-{
-  Array a;
-  PetscErrorCode ierr;
-
-  PetscFunctionBeginUser;
-  ierr = open_array(f, "/groups/number", H5T_INTEGER, 1, &a);
-  if (!ierr) {
-    *n = (PetscInt)a.n;
-    ierr = PetscMalloc1(a.n, numbers);
-  }
-  if (!ierr) ierr = read_values(f, &a, H5T_NATIVE_INT64, *numbers);
-  PetscCall(close_array(&a));
-  PetscFunctionReturn(ierr);
-}
-
-/* The groups of a file as they lie in it. */
-typedef struct {
-  PetscInt n, ndim, nnumber, *dim; /* [n] */
-  int64_t *number;                 /* [n] */
-  char *names;                     /* [n][width] */
-  size_t width;
-} Groups;
-
-/* Adds the groups of the file; map[] leads to their numbers here. */
-static PetscErrorCode add_groups(const File *f, const Groups *g, PetscInt map[])
-{
-  PetscFunctionBeginUser;
-  if (g->ndim != g->n || g->nnumber != g->n)
+  PetscCall(read_array(f, &a, n, &names));
+  PetscCall(read_table(f, "/groups/dim", 1, 4, &ndim, &dim));
+  PetscCall(read_array(f, &(Array){.name = "/groups/number", .klass = H5T_INTEGER, .ncomp = 1, .bound = -1},
+                       &nnumber, &number));
+  if (ndim != *n || nnumber != *n)
     H5_ERROR(f, "/groups has %lld names, %lld dimensions and %lld numbers; the file is damaged",
-             (long long)g->n, (long long)g->ndim, (long long)g->nnumber);
-  for (PetscInt i = 0; i < g->n; i++) {
+             (long long)*n, (long long)ndim, (long long)nnumber);
+  *map = NULL;
+  PetscCall(SbImportScratch(f->im, (size_t)*n * sizeof(**map), map));
+  for (PetscInt i = 0; i < *n; i++) {
     char name[SB_GROUP_MAX];
 
-    (void)snprintf(name, sizeof(name), "%.*s", (int)PetscMin(g->width, sizeof(name) - 1),
-                   g->names + g->width * (size_t)i);
-    PetscCall(SbImportGroup(f->im, g->dim[i], g->number[i], name[0] ? name : NULL, &map[i]));
+    (void)snprintf(name, sizeof(name), "%.*s", (int)PetscMin(a.width, sizeof(name) - 1),
+                   names + a.width * (size_t)i);
+    PetscCall(SbImportGroup(f->im, dim[i], number[i], name[0] ? name : NULL, &(*map)[i]));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode read_groups(const File *f, PetscInt *ngroup, PetscInt **map)
-{
-  Groups g;
-  PetscErrorCode ierr;
-
-  PetscFunctionBeginUser;
-  PetscCall(PetscMemzero(&g, sizeof(g)));
-  *map = NULL;
-  ierr = read_names(f, &g.n, &g.names, &g.width);
-  if (!ierr) ierr = read_table(f, "/groups/dim", 1, 4, NULL, &g.ndim, &g.dim);
-  if (!ierr) ierr = read_numbers(f, &g.nnumber, &g.number);
-  if (!ierr) ierr = PetscMalloc1(g.n, map);
-  if (!ierr) ierr = add_groups(f, &g, *map);
-  PetscCall(PetscFree(g.names));
-  PetscCall(PetscFree(g.dim));
-  PetscCall(PetscFree(g.number));
-  if (ierr) PetscCall(PetscFree(*map));
-  *ngroup = g.n;
-  PetscFunctionReturn(ierr);
 }
 
 /* The tag sets of the file; map[] leads to their numbers here. */
-static PetscErrorCode add_sets(const File *f, PetscInt n, const PetscInt start[], PetscInt nmember,
-                               PetscInt member[], const PetscInt group[], PetscInt map[])
+static PetscErrorCode read_sets(const File *f, PetscInt *n, PetscInt **map)
 {
+  PetscInt ngroup, nmember, nstart, *group, *member, *start;
+
   PetscFunctionBeginUser;
+  PetscCall(read_groups(f, &ngroup, &group));
+  PetscCall(read_table(f, "/tag_sets/group", 1, ngroup, &nmember, &member));
+  PetscCall(read_table(f, "/tag_sets/start", 1, (int64_t)nmember + 1, &nstart, &start));
+  *n = PetscMax(nstart - 1, 0);
+  *map = NULL;
+  PetscCall(SbImportScratch(f->im, (size_t)*n * sizeof(**map), map));
   for (PetscInt i = 0; i < nmember; i++) member[i] = group[member[i]];
-  for (PetscInt t = 0; t < n; t++) {
+  for (PetscInt t = 0; t < *n; t++) {
     if (start[t] > start[t + 1])
       H5_ERROR(f, "/tag_sets/start falls from %lld to %lld; the file is damaged", (long long)start[t],
                (long long)start[t + 1]);
-    PetscCall(SbImportTagSet(f->im, start[t + 1] - start[t], nmember ? member + start[t] : NULL, &map[t]));
+    PetscCall(SbImportTagSet(f->im, start[t + 1] - start[t], nmember ? member + start[t] : NULL, &(*map)[t]));
   }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode read_sets(const File *f, PetscInt *nset, PetscInt **map)
-{
-  PetscInt ngroup = 0, nmember = 0, nstart = 0, *group = NULL, *member = NULL, *start = NULL;
-  PetscErrorCode ierr;
-
-  PetscFunctionBeginUser;
-  *map = NULL;
-  ierr = read_groups(f, &ngroup, &group);
-  if (!ierr) ierr = read_table(f, "/tag_sets/group", 1, ngroup, NULL, &nmember, &member);
-  if (!ierr) ierr = read_table(f, "/tag_sets/start", 1, (int64_t)nmember + 1, NULL, &nstart, &start);
-  *nset = PetscMax(nstart - 1, 0);
-  if (!ierr) ierr = PetscMalloc1(*nset, map);
-  if (!ierr) ierr = add_sets(f, *nset, start, nmember, member, group, *map);
-  PetscCall(PetscFree(group));
-  PetscCall(PetscFree(member));
-  PetscCall(PetscFree(start));
-  if (ierr) PetscCall(PetscFree(*map));
-  PetscFunctionReturn(ierr);
-}
-
-static PetscErrorCode read_tags(const File *f, int dim, const char *name, PetscInt nset, const PetscInt map[])
-{
-  SbItems *item = &f->im->item[dim];
-  PetscInt n, *tags;
-  SbSlabRows rows;
-
-  PetscFunctionBeginUser;
-  PetscCall(read_table(f, name, 1, nset, &rows, &n, &tags));
-  if (n == item->n)
-    for (PetscInt i = 0; i < n; i++) item->tags[i] = map[tags[i]];
-  PetscCall(PetscFree(tags));
-  if (n != item->n)
-    H5_ERROR(f, "%s has %lld rows for %lld simplices; the file is damaged", name, (long long)n,
-             (long long)item->n);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 static PetscErrorCode read_own(const File *f)
 {
   static const char *const names[4] = {"point", "line", "triangle", "cell"};
-  PetscInt nset, *map;
-  PetscErrorCode ierr = PETSC_SUCCESS;
+  PetscInt nset = 0, n, *map, *set;
 
   PetscFunctionBeginUser;
   PetscCall(read_sets(f, &nset, &map));
-  for (int d = 0; d < 4 && !ierr; d++) {
+  for (int d = 0; d < 4; d++) {
+    SbItems *item = &f->im->item[d];
     char items[32], tags[32];
+    Array a = {.name = tags, .klass = H5T_INTEGER, .ncomp = 1, .bound = nset, .block = PETSC_TRUE};
 
     (void)snprintf(items, sizeof(items), "/mesh/%ss", names[d]);
     (void)snprintf(tags, sizeof(tags), "/mesh/%s_tags", names[d]);
     if (d < 3 && !is_there(f, items)) continue;
-    if (d < 3) ierr = read_items(f, d, items);
-    if (!ierr) ierr = read_tags(f, d, tags, nset, map);
+    if (d < 3) PetscCall(read_items(f, d, items));
+    PetscCall(read_array(f, &a, &n, &set));
+    if (n != item->n)
+      H5_ERROR(f, "%s has %lld rows for %lld simplices; the file is damaged", tags, (long long)n,
+               (long long)item->n);
+    for (PetscInt i = 0; i < n; i++) item->tags[i] = map[set[i]];
   }
-  PetscCall(PetscFree(map));
-  PetscFunctionReturn(ierr);
+  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* ------------------------------------------------------------------ what a run wrote */
@@ -472,7 +322,6 @@ static PetscErrorCode add_displacement(const File *f)
 {
   SbImport *im = f->im;
   char name[96];
-  SbSlabRows rows;
   PetscInt n;
   PetscReal *u;
 
@@ -480,11 +329,10 @@ static PetscErrorCode add_displacement(const File *f)
   (void)snprintf(name, sizeof(name), "%s/displacement", f->frame);
   if (!is_there(f, name))
     H5_ERROR(f, "has no displacement at the step; the run needs it among its -output_fields");
-  PetscCall(read_vectors(f, name, &rows, &n, &u));
-  for (PetscInt i = 0; i < 3 * n && n == im->nvert; i++) im->x[i] += u[i];
-  PetscCall(PetscFree(u));
+  PetscCall(read_array(f, &(Array){.name = name, .klass = H5T_FLOAT, .ncomp = 3}, &n, &u));
   if (n != im->nvert)
     H5_ERROR(f, "%s has %lld rows for %lld points", name, (long long)n, (long long)im->nvert);
+  for (PetscInt i = 0; i < 3 * n; i++) im->x[i] += u[i];
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -496,12 +344,10 @@ static PetscErrorCode join_points(const File *f)
   PetscReal *x;
 
   PetscFunctionBeginUser;
-  PetscCall(read_table(f, "/mesh/vertices", 4, PETSC_MAX_INT / 8, NULL, &n, &vertex));
+  PetscCall(read_table(f, "/mesh/vertices", 4, PETSC_MAX_INT / 8, &n, &vertex));
   for (PetscInt i = 0; i < 4 * n; i++) nvert = PetscMax(nvert, vertex[i] + 1);
-  if (n != im->item[3].n || nvert > im->nvert) {
-    PetscCall(PetscFree(vertex));
+  if (n != im->item[3].n || nvert > im->nvert)
     H5_ERROR(f, "/mesh/vertices does not fit /mesh/cells; the file is damaged");
-  }
   PetscCall(PetscCalloc2(3 * (size_t)nvert, &x, nvert, &share));
   for (PetscInt i = 0; i < 4 * n; i++) {
     for (int k = 0; k < 3; k++) x[3 * vertex[i] + k] += im->x[3 * im->item[3].vert[i] + k];
@@ -514,7 +360,6 @@ static PetscErrorCode join_points(const File *f)
   PetscCall(PetscArraycpy(im->item[3].vert, vertex, 4 * n));
   im->nvert = nvert;
   PetscCall(PetscFree2(x, share));
-  PetscCall(PetscFree(vertex));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -528,11 +373,9 @@ static PetscErrorCode read_bodies(const File *f)
 
   PetscFunctionBeginUser;
   if (!is_there(f, "/mesh/body")) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(read_table(f, "/mesh/body", 1, 1 << 16, NULL, &n, &body));
-  if (n != im->item[3].n) {
-    PetscCall(PetscFree(body));
+  PetscCall(read_table(f, "/mesh/body", 1, 1 << 16, &n, &body));
+  if (n != im->item[3].n)
     H5_ERROR(f, "/mesh/body has %lld rows for %lld tets", (long long)n, (long long)im->item[3].n);
-  }
   for (PetscInt c = 0; c < n; c++) nbody = PetscMax(nbody, body[c] + 1);
   // names of the bodies; none in old files
   attribute = H5Aexists_by_name(f->file, "/mesh", "bodies", H5P_DEFAULT) > 0
@@ -556,7 +399,6 @@ static PetscErrorCode read_bodies(const File *f)
   }
   for (PetscInt c = 0; c < n; c++) im->item[3].tags[c] = tags[body[c]];
   PetscCall(PetscFree(tags));
-  PetscCall(PetscFree(body));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -608,6 +450,7 @@ static PetscErrorCode read_mesh(File *f, SbSlabRows *rows)
 {
   SbImport *im = f->im;
   PetscBool own;
+  Array x = {.name = "/mesh/x", .klass = H5T_FLOAT, .ncomp = 3, .block = PETSC_TRUE};
   Frames s = {.wanted = f->im->step};
 
   PetscFunctionBeginUser;
@@ -624,9 +467,11 @@ static PetscErrorCode read_mesh(File *f, SbSlabRows *rows)
                (long long)s.wanted, (long long)s.n, (long long)s.first, (long long)s.last);
     (void)snprintf(f->frame, sizeof(f->frame), "%s", s.found);
   }
-  PetscCall(read_vectors(f, "/mesh/x", rows, &im->nvert, &im->x));
+  PetscCall(open_array(f, &x));
+  PetscCall(SbImportSetVertices(im, (PetscInt)x.n));
+  PetscCall(read_values(f, &x, im->x));
+  *rows = x.rows;
   f->nvert = rows->N;
-  PetscCall(PetscMalloc1(im->nvert, &im->vert_number));
   for (PetscInt v = 0; v < im->nvert; v++) im->vert_number[v] = rows->first + v + 1;
   PetscCall(read_items(f, 3, "/mesh/cells"));
   PetscCall(own ? read_own(f) : read_output(f));
@@ -680,32 +525,21 @@ PetscErrorCode SbImportSlabs_H5(const char *path, PetscInt *ncell)
 /* ------------------------------------------------------------------ .xmf */
 
 /* The .h5 of the first array that an .xmf names, from the folder of the .xmf. */
-static PetscErrorCode heavy_file(SbScan *s, const char *path, size_t size, char h5[])
-{
-  static const char mark[] = ".h5:/mesh/";
-  const char *slash = strrchr(path, '/'), *end, *begin;
-
-  PetscFunctionBeginUser;
-  if (!SbScanFind(s, mark))
-    SB_SCAN_ERROR(s, "names no mesh in an .h5 file; supple reads the .xmf of its own output and meshes");
-  end = s->at + 3;
-  for (begin = s->at; begin > s->data && !strchr(" \t\r\n>\"", begin[-1]); begin--) {
-  }
-  (void)snprintf(h5, size, "%.*s%.*s", slash && *begin != '/' ? (int)(slash + 1 - path) : 0, path,
-                 (int)(end - begin), begin);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode SbImportRead_Xdmf(const char *path, SbImport *im)
 {
+  static const char mark[] = ".h5:/mesh/";
+  const char *slash = strrchr(path, '/'), *begin;
+  SbScan *s = &im->scan;
   char h5[2 * PETSC_MAX_PATH_LEN] = "";
-  SbScan scan;
-  PetscErrorCode ierr;
 
   PetscFunctionBeginUser;
-  ierr = SbScanOpen(im->where, path, &scan);
-  if (!ierr) ierr = heavy_file(&scan, path, sizeof(h5), h5);
-  PetscCall(SbScanClose(&scan));
-  if (!ierr) ierr = SbImportRead_H5(h5, im);
-  PetscFunctionReturn(ierr);
+  PetscCall(SbScanOpen(im->where, path, s));
+  if (!SbScanFind(s, mark))
+    SB_SCAN_ERROR(s, "names no mesh in an .h5 file; supple reads the .xmf of its own output and meshes");
+  for (begin = s->at; begin > s->data && !strchr(" \t\r\n>\"", begin[-1]); begin--) {
+  }
+  (void)snprintf(h5, sizeof(h5), "%.*s%.*s", slash && *begin != '/' ? (int)(slash + 1 - path) : 0, path,
+                 (int)(s->at + 3 - begin), begin);
+  PetscCall(SbImportRead_H5(h5, im));
+  PetscFunctionReturn(PETSC_SUCCESS);
 }

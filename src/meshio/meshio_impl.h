@@ -131,6 +131,8 @@ typedef PetscErrorCode (*SbChildWork)(void *ctx, SbImport *result);
 PetscErrorCode SbChildRun(const char *who, const char *doing, PetscReal seconds, SbChildWork work, void *ctx,
                           SbImport *result);
 
+/* Opens a regular file and tells its size; else says what is wrong with the name. */
+PetscErrorCode SbScanOpenFile(const char *where, const char *path, FILE **file, size_t *size);
 /* Moves to the beginning of a text; false when it does not come. */
 PetscBool SbScanFind(SbScan *scan, const char *text);
 

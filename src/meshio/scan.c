@@ -11,38 +11,44 @@
 #include <sys/stat.h>
 #include "meshio_impl.h"
 
-/* Takes out the three bytes that some editors put in front of text to say that it is UTF-8; returns how many they were. */
-static size_t drop_mark(char data[], size_t n)
+PetscErrorCode SbScanOpenFile(const char *where, const char *path, FILE **file, size_t *size)
 {
-  if (n < 3 || memcmp(data, "\xef\xbb\xbf", 3) != 0) return 0;
-  memmove(data, data + 3, n - 3 + 1); /* with the zero at the end */
-  return 3;
+  struct stat info;
+
+  PetscFunctionBeginUser;
+  *file = fopen(path, "rb");
+  PetscCheck(*file, PETSC_COMM_SELF, PETSC_ERR_FILE_OPEN,
+             "%s: cannot open the file (%s); check the name and the folder the run starts in", where,
+             strerror(errno));
+  if (fstat(fileno(*file), &info) || !S_ISREG(info.st_mode)) {
+    (void)fclose(*file);
+    SETERRQ(PETSC_COMM_SELF, PETSC_ERR_FILE_OPEN, "%s: is not a regular file; give a mesh file", where);
+  }
+  *size = (size_t)info.st_size;
+  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode SbScanOpen(const char *where, const char *path, SbScan *s)
 {
   FILE *file;
-  struct stat info;
   size_t size, got;
 
   PetscFunctionBeginUser;
   PetscCall(PetscMemzero(s, sizeof(*s)));
   s->where = where;
-  file = fopen(path, "rb");
-  PetscCheck(file, PETSC_COMM_SELF, PETSC_ERR_FILE_OPEN,
-             "%s: cannot open the file (%s); check the name and the folder the run starts in", where,
-             strerror(errno));
-  if (fstat(fileno(file), &info) || !S_ISREG(info.st_mode)) {
-    (void)fclose(file);
-    SETERRQ(PETSC_COMM_SELF, PETSC_ERR_FILE_OPEN, "%s: is not a regular file; give a mesh file", where);
-  }
-  size = (size_t)info.st_size;
+  PetscCall(SbScanOpenFile(where, path, &file, &size));
   PetscCall(PetscMalloc1(size + 1, &s->data));
   got = fread(s->data, 1, size, file);
   (void)fclose(file);
   s->data[got] = 0;
+  /* without the three bytes that some editors put in front of text to say that it is UTF-8 */
+  if (got >= 3 && !memcmp(s->data, "\xef\xbb\xbf", 3)) {
+    got -= 3;
+    size -= 3;
+    memmove(s->data, s->data + 3, got + 1);
+  }
   s->at = s->token = s->data;
-  s->end = s->data + got - drop_mark(s->data, got);
+  s->end = s->data + got;
   PetscCheck(got == size, PETSC_COMM_SELF, PETSC_ERR_FILE_READ, "%s: only %zu of %zu bytes could be read",
              where, got, size);
   PetscCheck(size, PETSC_COMM_SELF, PETSC_ERR_FILE_UNEXPECTED, "%s: is empty (0 bytes); write the mesh again",
