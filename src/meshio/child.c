@@ -2,20 +2,19 @@
   child.c - a function that fills a body, run in a forked child: when it crashes or hangs the program goes on, with a message.
 
   The child must not disturb what it inherits: it never returns but ends by _exit() (no MPI, no buffers, no
-  PetscFinalize()), takes back every signal handler (of PETSc and MPI), prints nothing, leaves no core file, and dies with its parent. It calls neither MPI nor
-  HDF5. What it sends is a header with counts and the text of its error, then the arrays one after the other.
+  PetscFinalize()), takes back every signal handler (of PETSc and MPI), prints nothing, leaves no core file, dies with its parent, and by a
+  timer of its own when it takes too long. It calls neither MPI nor HDF5. It leaves what it made in a file in memory that both
+  have: a header with counts and the text of its error, then the arrays one after the other.
 */
 #include <errno.h>
 #include <fcntl.h>
-#include <poll.h>
 #include <signal.h>
+#include <sys/mman.h>
+#include <sys/prctl.h>
 #include <sys/resource.h>
+#include <sys/time.h>
 #include <sys/wait.h>
-#include <time.h>
 #include <unistd.h>
-#ifdef __linux__
-  #include <sys/prctl.h>
-#endif
 #include "meshio_impl.h"
 
 typedef struct {
@@ -50,23 +49,11 @@ static void list_parts(SbImport *im, const Header *h, Part part[NPART])
 
 /* ------------------------------------------------------------------ the child */
 
-static void send_bytes(int pipe_end, const void *data, size_t n)
+/* Nothing of the parent's is left in the way: handlers, masks, terminal. After so many seconds SIGALRM ends it. */
+static void isolate(pid_t parent, PetscReal seconds)
 {
-  const char *p = (const char *)data;
-
-  while (n) {
-    const ssize_t sent = write(pipe_end, p, n);
-
-    if (sent < 0 && errno == EINTR) continue;
-    if (sent <= 0) _exit(1);
-    p += sent;
-    n -= (size_t)sent;
-  }
-}
-
-/* Nothing of the parent's is left in the way: handlers, masks, terminal. */
-static void isolate(pid_t parent)
-{
+  const PetscReal most = PetscMin(seconds, 1e9), whole = PetscFloorReal(most);
+  const struct itimerval end = {.it_value = {(time_t)whole, 1 + (suseconds_t)(999998 * (most - whole))}};
   const struct rlimit no_core = {0, 0};
   struct sigaction usual;
   sigset_t none;
@@ -78,15 +65,14 @@ static void isolate(pid_t parent)
   (void)sigemptyset(&none);
   (void)sigprocmask(SIG_SETMASK, &none, NULL);
   (void)setrlimit(RLIMIT_CORE, &no_core);
-#ifdef __linux__
   (void)prctl(PR_SET_PDEATHSIG, SIGKILL);
-#endif
   if (getppid() != parent) _exit(1);
+  (void)setitimer(ITIMER_REAL, &end, NULL);
   for (int i = 0; nothing >= 0 && i < 3; i++) (void)dup2(nothing, i);
 }
 
 /* Never returns. */
-static void child(int pipe_end, SbChildWork work, void *ctx, const SbImport *like)
+static void child(FILE *file, SbChildWork work, void *ctx, const SbImport *like)
 {
   Header h;
   SbImport im;
@@ -107,67 +93,26 @@ static void child(int pipe_end, SbChildWork work, void *ctx, const SbImport *lik
     h.ntags = im.ntags;
     h.nmember = im.ntags ? im.tags_start[im.ntags] : 0;
   }
-  send_bytes(pipe_end, &h, sizeof(h));
+  (void)fwrite(&h, sizeof(h), 1, file);
   list_parts(&im, &h, part);
-  for (int i = 0; i < NPART; i++) send_bytes(pipe_end, *part[i].array, part[i].bytes);
-  _exit(0);
+  for (int i = 0; i < NPART; i++)
+    if (part[i].bytes) (void)fwrite(*part[i].array, part[i].bytes, 1, file);
+  _exit(fflush(file) || ferror(file) ? 1 : 0);
 }
 
 /* ------------------------------------------------------------------ the parent */
 
-typedef struct {
-  int pipe_end;
-  double deadline; /* s of the monotonic clock */
-  PetscBool late;
-} Receiver;
-
-static double now(void)
-{
-  struct timespec t;
-
-  (void)clock_gettime(CLOCK_MONOTONIC, &t);
-  return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
-}
-
-/* False when the child is gone or late. */
-static PetscBool receive(Receiver *r, void *data, size_t n)
-{
-  char *p = (char *)data;
-
-  while (n) {
-    struct pollfd wait_for = {r->pipe_end, POLLIN, 0};
-    const double left = r->deadline - now();
-    ssize_t got;
-    int ready;
-
-    if (left <= 0) {
-      r->late = PETSC_TRUE;
-      return PETSC_FALSE;
-    }
-    ready = poll(&wait_for, 1, (int)PetscMin(1000 * left + 1, 1e6));
-    if (ready < 0 && errno != EINTR) return PETSC_FALSE;
-    if (ready <= 0) continue;
-    got = read(r->pipe_end, p, n);
-    if (got < 0 && errno == EINTR) continue;
-    if (got <= 0) return PETSC_FALSE;
-    p += got;
-    n -= (size_t)got;
-  }
-  return PETSC_TRUE;
-}
-
 /* The arrays, in place of those that `im` has. */
-static PetscErrorCode receive_body(Receiver *r, const Header *h, SbImport *im, PetscBool *complete)
+static PetscErrorCode take_body(FILE *file, const Header *h, SbImport *im, PetscBool *complete)
 {
   Part part[NPART];
 
   PetscFunctionBeginUser;
   list_parts(im, h, part);
-  *complete = PETSC_TRUE;
   for (int i = 0; i < NPART && *complete; i++) {
     PetscCall(PetscFree(*part[i].array));
     PetscCall(PetscMalloc(part[i].bytes, part[i].array));
-    *complete = receive(r, *part[i].array, part[i].bytes);
+    *complete = (PetscBool)(!part[i].bytes || fread(*part[i].array, part[i].bytes, 1, file) == 1);
   }
   if (!*complete) PetscFunctionReturn(PETSC_SUCCESS);
   im->nvert = h->nvert;
@@ -181,69 +126,52 @@ static PetscErrorCode receive_body(Receiver *r, const Header *h, SbImport *im, P
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Whatever happened, the child is gone afterwards. One that closed its pipe early is ending by itself; its status tells why. */
-static void finish(pid_t pid, PetscBool complete, PetscBool late, int *status)
-{
-  for (int i = 0; i < 200 && !complete && !late; i++) {
-    if (waitpid(pid, status, WNOHANG) == pid) return;
-    (void)poll(NULL, 0, 10);
-  }
-  if (!complete) (void)kill(pid, SIGKILL);
-  while (waitpid(pid, status, 0) < 0 && errno == EINTR) {
-  }
-}
-
-/* What is said of a child that sent nothing complete. */
-static PetscErrorCode lost(const SbImport *im, const char *who, const char *doing, int status)
-{
-  PetscFunctionBeginUser;
-  if (WIFSIGNALED(status) && WTERMSIG(status) == SIGKILL)
-    SETERRQ(PETSC_COMM_SELF, PETSC_ERR_FILE_UNEXPECTED,
-            "%s: %s was killed from outside while it %s; most often memory ran out: give a smaller mesh or "
-            "more memory",
-            im->where, who, doing);
-  if (WIFSIGNALED(status))
-    SETERRQ(PETSC_COMM_SELF, PETSC_ERR_FILE_UNEXPECTED,
-            "%s: %s crashed (%s) while it %s; the input is damaged, or of a kind it cannot take", im->where,
-            who, strsignal(WTERMSIG(status)), doing);
-  SETERRQ(PETSC_COMM_SELF, PETSC_ERR_FILE_UNEXPECTED, "%s: %s ended (exit code %d) while it %s", im->where,
-          who, WIFEXITED(status) ? WEXITSTATUS(status) : -1, doing);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode SbChildRun(const char *who, const char *doing, PetscReal seconds, SbChildWork work, void *ctx,
                           SbImport *im)
 {
-  int ends[2], status = 0;
   const pid_t self = getpid();
+  const int memory = memfd_create("supple", MFD_CLOEXEC);
+  FILE *file = memory < 0 ? NULL : fdopen(memory, "w+b");
+  int status = 0;
   pid_t pid;
   Header h;
-  Receiver r;
   PetscBool complete;
   PetscErrorCode ierr = PETSC_SUCCESS;
 
   PetscFunctionBeginUser;
-  PetscCheck(!pipe(ends), PETSC_COMM_SELF, PETSC_ERR_SYS, "%s: no pipe to a child process (%s)", im->where,
-             strerror(errno));
+  PetscCheck(file, PETSC_COMM_SELF, PETSC_ERR_SYS, "%s: no memory shared with a child process (%s)",
+             im->where, strerror(errno));
   pid = fork();
   if (!pid) {
-    (void)close(ends[0]);
-    isolate(self);
-    child(ends[1], work, ctx, im);
+    isolate(self, seconds);
+    child(file, work, ctx, im);
   }
-  (void)close(ends[1]);
-  r = (Receiver){ends[0], now() + seconds, PETSC_FALSE};
-  complete = (PetscBool)(pid > 0 && receive(&r, &h, sizeof(h)));
-  if (complete && !h.caught.code) ierr = receive_body(&r, &h, im, &complete);
-  (void)close(ends[0]);
+  while (pid > 0 && waitpid(pid, &status, 0) < 0 && errno == EINTR) {
+  }
+  rewind(file);
+  complete =
+    (PetscBool)(pid > 0 && WIFEXITED(status) && !WEXITSTATUS(status) && fread(&h, sizeof(h), 1, file) == 1);
+  if (complete && !h.caught.code) ierr = take_body(file, &h, im, &complete);
+  (void)fclose(file);
+  PetscCall(ierr);
   PetscCheck(pid > 0, PETSC_COMM_SELF, PETSC_ERR_SYS, "%s: no child process for %s (%s)", im->where, who,
              strerror(errno));
-  finish(pid, (PetscBool)(complete && !ierr), r.late, &status);
-  PetscCall(ierr);
-  PetscCheck(!r.late, PETSC_COMM_SELF, PETSC_ERR_FILE_UNEXPECTED,
+
+  /* what is said of a child that left nothing complete */
+  PetscCheck(complete || !WIFSIGNALED(status) || WTERMSIG(status) != SIGALRM, PETSC_COMM_SELF,
+             PETSC_ERR_FILE_UNEXPECTED,
              "%s: %s was stopped: after %g s it had not %s; give a smaller or repaired input", im->where, who,
              (double)seconds, doing);
-  if (!complete) PetscCall(lost(im, who, doing, status));
+  PetscCheck(complete || !WIFSIGNALED(status) || WTERMSIG(status) != SIGKILL, PETSC_COMM_SELF,
+             PETSC_ERR_FILE_UNEXPECTED,
+             "%s: %s was killed from outside while it %s; most often memory ran out: give a smaller mesh or "
+             "more memory",
+             im->where, who, doing);
+  PetscCheck(complete || !WIFSIGNALED(status), PETSC_COMM_SELF, PETSC_ERR_FILE_UNEXPECTED,
+             "%s: %s crashed (%s) while it %s; the input is damaged, or of a kind it cannot take", im->where,
+             who, strsignal(WTERMSIG(status)), doing);
+  PetscCheck(complete, PETSC_COMM_SELF, PETSC_ERR_FILE_UNEXPECTED, "%s: %s ended (exit code %d) while it %s",
+             im->where, who, WEXITSTATUS(status), doing);
   PetscCheck(!h.caught.code, PETSC_COMM_SELF, (PetscErrorCode)h.caught.code, "%s", h.caught.text);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -325,7 +325,9 @@ static PetscErrorCode use_sides(Abaqus *a)
   SbDeck *d = &a->deck;
 
   PetscFunctionBeginUser;
-  for (const Side *side = a->side; side < a->side + a->nside.n; side++) {
+  for (PetscInt k = 0; k < a->nside.n; k++) {
+    const Side *side = &a->side[k];
+
     if (side->set >= 0) {
       PetscCall(SbDeckFind(d, side->set));
       for (PetscInt i = 0; i < d->nfound.n; i++) PetscCall(use_side(a, side, &d->element[d->found[i]]));

@@ -273,14 +273,15 @@ static int compare_members(const void *a, const void *b)
 
 PetscErrorCode SbImportJoinGroups(SbImport *im)
 {
-  const SbGroupMember *m = im->member, *end = im->member + im->nmember.n;
+  const SbGroupMember *m, *end;
   PetscInt *group = NULL;
 
   PetscFunctionBeginUser;
   if (!im->nmember.n) PetscFunctionReturn(PETSC_SUCCESS);
   qsort(im->member, (size_t)im->nmember.n, sizeof(*m), compare_members);
   PetscCall(SbImportScratch(im, (size_t)(im->nmember.n + im->ngroup) * sizeof(*group), &group));
-  while (m < end) {
+  end = im->member + im->nmember.n;
+  for (m = im->member; m < end;) {
     const SbGroupMember *first = m;
     PetscInt *tags = &im->item[m->dim].tags[m->item], n = 0;
 
