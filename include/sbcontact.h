@@ -14,7 +14,7 @@ typedef struct _p_SbObstacle *SbObstacle;
     plane:nx,ny,nz,d                 the half-space n.x <= d is solid
     sphere:x,y,z,r   box:x0,y0,z0,x1,y1,z1   capsule:x0,y0,z0,x1,y1,z1,r   cylinder:x0,y0,z0,x1,y1,z1,r
     bowl:x,y,z,r                     everything outside the sphere is solid
-    mesh:FILE[,cell]                 what a closed surface encloses: .stl, .obj, .off or .msh; cell of the grid, m
+    mesh:FILE                        what a closed surface encloses: .stl, .obj, .off or .msh
   Output: obstacle; the caller destroys it.
   Errors: PETSC_ERR_USER_INPUT, one line that names option, text and the right form.
 */
@@ -22,20 +22,20 @@ PetscErrorCode SbObstacleCreate(const char *option, const char *text, SbObstacle
 PetscErrorCode SbObstacleDestroy(SbObstacle *obstacle);
 PetscBool SbObstacleIsMesh(SbObstacle obstacle);
 /*
-  SbObstacleSetUp - reads the file of a mesh: obstacle and makes its grid; nothing with other shapes. Before SbObstacleDistance().
+  SbObstacleSetUp - reads the file of a mesh: obstacle; nothing with other shapes. Before SbObstacleDistance().
 
   Collective. Every rank holds the whole obstacle.
 
   Input: option - for messages; scale, at - x <- scale x + at (m) for the coordinates of the file.
   Output: note[size] - one line on the obstacle for the run's report; untouched with other shapes.
-  Errors: those of SbTrianglesRead(), alike on all ranks; PETSC_ERR_USER_INPUT for too many cells.
+  Errors: those of SbTrianglesRead(), alike on all ranks.
 */
 PetscErrorCode SbObstacleSetUp(SbObstacle obstacle, MPI_Comm comm, const char *option, PetscReal scale,
                                const PetscReal at[3], size_t size, char note[]);
 /*
   SbObstacleDistance - signed distance of a point from the obstacle at rest, m, negative inside, and the unit outward normal
-  at the nearest point of its surface. Where the nearest point is not unique (centre of a sphere), one of them. A mesh: is
-  exact near its surface, elsewhere of the right sign (src/contact/signed_distance.c). Not collective.
+  at the nearest point of its surface. Where the nearest point is not unique (centre of a sphere), one of them. Not
+  collective.
 */
 PetscReal SbObstacleDistance(SbObstacle obstacle, const PetscReal x[3], PetscReal normal[3]);
 

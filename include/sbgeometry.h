@@ -254,6 +254,21 @@ PetscInt SbBoxPairsNext(SbBoxPairs *pairs, PetscInt room, PetscInt pair[]);
 
 /* Box of a triangle, vert[3]. */
 void SbTriangleBox(const PetscReal x[], const PetscInt vert[], PetscReal box[6]);
+/* ------------------------------------------------------------------ signed_distance.c */
+
+/*
+  SbSignedDistance - distance from a closed surface of triangles, m, negative inside.
+
+  Not collective. Input: x[nvert][3], m; tri[ntri][3], counter-clockwise seen from outside; across[ntri][3], triangle beyond edge k, which runs from
+  corner k to the next: borrowed. Evaluate: x[3], m; output: n[3], unit outward normal at the nearest point of the surface, or one of them.
+*/
+typedef struct _p_SbSignedDistance *SbSignedDistance;
+PetscErrorCode SbSignedDistanceCreate(PetscInt nvert, const PetscReal x[], PetscInt ntri,
+                                      const PetscInt tri[], const PetscInt across[],
+                                      SbSignedDistance *distance);
+PetscErrorCode SbSignedDistanceDestroy(SbSignedDistance *distance);
+PetscReal SbSignedDistanceEvaluate(SbSignedDistance distance, const PetscReal x[3], PetscReal n[3]);
+
 /* ------------------------------------------------------------------ weld.c */
 
 /* The root of a vertex in a forest of parents up[], whose paths are halved on the way. */

@@ -3,19 +3,20 @@
 
   Each shape is a core with a radius: distance = |x - nearest point of the core| - r, the core being a point (sphere), a segment
   (capsule), a solid box or a solid cylinder (r = 0; inside them the nearest side counts). A bowl is a sphere inverted.
-  What a closed mesh encloses is in signed_distance.c.
+  What a closed mesh encloses is in src/geometry/signed_distance.c.
 */
 #include "sbcontact.h"
-#include "signed_distance.h"
+#include "sbgeometry.h"
+#include "sbtriangles.h"
 
 typedef enum { PLANE, SPHERE, BOX, CAPSULE, CYLINDER, BOWL, MESH } Shape;
 
 struct _p_SbObstacle {
   Shape shape;
   PetscReal p[7];
-  char *file;             /* mesh: its path */
-  PetscReal cell;         /* mesh: of the grid, m; 0: chosen */
-  SbSignedDistance shell; /* mesh: after SbObstacleSetUp() */
+  char *file;                /* mesh: its path */
+  SbTriangles surface;       /* mesh: after SbObstacleSetUp() */
+  SbSignedDistance distance; /* mesh: likewise; of the surface */
 };
 
 static const struct {
@@ -28,7 +29,7 @@ static const struct {
   {"capsule", "capsule:x0,y0,z0,x1,y1,z1,r", 7},
   {"cylinder", "cylinder:x0,y0,z0,x1,y1,z1,r", 7},
   {"bowl", "bowl:x,y,z,r", 4},
-  {"mesh", "mesh:FILE[,cell]", 0},
+  {"mesh", "mesh:FILE", 0},
 };
 
 /* Numbers with commas; how many there are, -1 when the text is something else or holds more than `most`. */
@@ -75,26 +76,6 @@ static const char *normalise(SbObstacle o)
   }
 }
 
-/* FILE, or FILE,cell when what follows the last comma is a number. */
-static PetscErrorCode read_mesh(const char *option, const char *text, SbObstacle o)
-{
-  const char *from = text + 5;
-  char *comma;
-
-  PetscFunctionBeginUser;
-  PetscCall(PetscStrallocpy(from, &o->file));
-  comma = strrchr(o->file, ',');
-  if (comma && read_numbers(comma + 1, 1, &o->cell) == 1) {
-    *comma = 0;
-    PetscCheck(o->cell > 0, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT, "%s %s: the cell must be positive, in m",
-               option, text);
-  } else
-    o->cell = 0;
-  PetscCheck(o->file[0], PETSC_COMM_SELF, PETSC_ERR_USER_INPUT, "%s %s: write mesh:FILE[,cell], lengths in m",
-             option, text);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode SbObstacleCreate(const char *option, const char *text, SbObstacle *obstacle)
 {
   const char *colon = strchr(text, ':'), *problem;
@@ -114,7 +95,9 @@ PetscErrorCode SbObstacleCreate(const char *option, const char *text, SbObstacle
   *obstacle = o;
   o->shape = (Shape)k;
   if (o->shape == MESH) {
-    PetscCall(read_mesh(option, text, o));
+    PetscCheck(colon[1], PETSC_COMM_SELF, PETSC_ERR_USER_INPUT, "%s %s: write %s", option, text,
+               shapes[k].form);
+    PetscCall(PetscStrallocpy(colon + 1, &o->file));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   PetscCheck(read_numbers(colon + 1, 7, o->p) == shapes[k].numbers, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
@@ -132,24 +115,14 @@ PetscBool SbObstacleIsMesh(SbObstacle o)
 PetscErrorCode SbObstacleSetUp(SbObstacle o, MPI_Comm comm, const char *option, PetscReal scale,
                                const PetscReal at[3], size_t size, char note[])
 {
-  SbTriangles t;
-  PetscInt n[3], ntri;
-  PetscInt64 bytes;
-  PetscReal cell, volume;
-  PetscBool turned;
+  SbTriangles *t = &o->surface;
 
   PetscFunctionBeginUser;
   if (o->shape != MESH) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(SbTrianglesRead(comm, option, o->file, scale, at, &t));
-  volume = t.volume;
-  turned = t.turned;
-  PetscCall(SbSignedDistanceCreate(option, &t, o->cell, &o->shell));
-  SbSignedDistanceGetSize(o->shell, n, &cell, &bytes, &ntri);
-  (void)snprintf(note, size,
-                 "%s: %" PetscInt_FMT " triangles around %.4g m^3%s, grid of %" PetscInt_FMT
-                 " x %" PetscInt_FMT " x %" PetscInt_FMT " cells of %.3g m, %.3g MB on every rank",
-                 o->file, ntri, (double)volume, turned ? " (turned: they were inverted)" : "", n[0], n[1],
-                 n[2], (double)cell, 1e-6 * (double)bytes);
+  PetscCall(SbTrianglesRead(comm, option, o->file, scale, at, t));
+  PetscCall(SbSignedDistanceCreate(t->nvert, t->x, t->ntri, t->tri, t->across, &o->distance));
+  (void)snprintf(note, size, "%s: %" PetscInt_FMT " triangles around %.4g m^3%s", o->file, t->ntri,
+                 (double)t->volume, t->turned ? " (turned: they were inverted)" : "");
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -158,7 +131,8 @@ PetscErrorCode SbObstacleDestroy(SbObstacle *obstacle)
   PetscFunctionBeginUser;
   if (*obstacle) {
     PetscCall(PetscFree((*obstacle)->file));
-    PetscCall(SbSignedDistanceDestroy(&(*obstacle)->shell));
+    PetscCall(SbSignedDistanceDestroy(&(*obstacle)->distance));
+    PetscCall(SbTrianglesDestroy(&(*obstacle)->surface));
   }
   PetscCall(PetscFree(*obstacle));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -267,7 +241,7 @@ PetscReal SbObstacleDistance(SbObstacle o, const PetscReal x[3], PetscReal n[3])
   case CAPSULE:
     return from_capsule(p, x, n);
   case MESH:
-    return SbSignedDistanceEvaluate(o->shell, x, n);
+    return SbSignedDistanceEvaluate(o->distance, x, n);
   default:
     return from_cylinder(p, x, n);
   }

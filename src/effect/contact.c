@@ -37,7 +37,7 @@ static const SbOption rows[] = {
   {"obstacle", SB_OPTION_STRING, 1, "", NULL, "",
    "rigid obstacle (m): plane:nx,ny,nz,d (n.x <= d is solid), sphere:x,y,z,r, box:x0,y0,z0,x1,y1,z1, "
    "capsule:x0,y0,z0,x1,y1,z1,r, cylinder:x0,y0,z0,x1,y1,z1,r, bowl:x,y,z,r (solid outside the sphere), "
-   "mesh:FILE[,cell] (what a closed surface encloses: .stl, .obj, .off, .msh; cell: of its grid)"},
+   "mesh:FILE (what a closed surface encloses: .stl, .obj, .off, .msh)"},
   {"obstacle_scale", SB_OPTION_REAL, 1, "", "1", "(0, inf)",
    "mesh: factor on the coordinates of the file; 0.001 for a file in mm"},
   {"obstacle_at", SB_OPTION_REALS, 3, "m", "0,0,0", "(-inf, inf)", "mesh: shift of the scaled mesh"},

@@ -208,7 +208,7 @@ static PetscErrorCode check_groove(void)
                     "5 5 6 7 8 9\n4 0 1 6 5\n4 1 2 7 6\n4 2 3 8 7\n4 3 4 9 8\n4 4 0 5 9\n",
                     path));
   PetscCall(PetscSNPrintf(text, sizeof(text),
-                          "-effects gravity,l -effect_l_type contact -effect_l_obstacle mesh:%s,0.02", path));
+                          "-effects gravity,l -effect_l_type contact -effect_l_obstacle mesh:%s", path));
   PetscCall(
     lie("-effects gravity,l,r -effect_l_type contact -effect_l_obstacle plane:1,0,1,0 -effect_r_type contact "
         "-effect_r_obstacle plane:-1,0,1,0",
