@@ -181,11 +181,11 @@ PetscErrorCode SbContactSurfaceUpdate(SbContactSurface surface, const PetscReal 
 /*
   SbInside - which points of a surface lie in tets of another part or, with `self`, of their own (src/contact/inside.c).
 
-  Create: collective; `kind` is SB_DETECT_HASH or SB_DETECT_BRUTE, how points and tets are brought together; the surface is borrowed.
+  Create: collective; the surface is borrowed.
   Find: collective, after an SbContactSurfaceUpdate(), for local displacements u (m). Output: part[npoint], the part that a point is in, with the lowest number of several, -1: none.
   Points on the boundary of a body are not in it. In its own part a point is in those tets that were farther from it than twice the reach at rest.
 */
 typedef struct _p_SbInside *SbInside;
-PetscErrorCode SbInsideCreate(SbContactSurface surface, SbDetectKind kind, SbInside *inside);
+PetscErrorCode SbInsideCreate(SbContactSurface surface, SbInside *inside);
 PetscErrorCode SbInsideDestroy(SbInside *inside);
 PetscErrorCode SbInsideFind(SbInside inside, const PetscReal u[], PetscBool self, PetscInt part[]);

@@ -44,6 +44,18 @@ static inline void SbBoxMerge(PetscReal box[6], const PetscReal other[6])
   SbBoxJoin(box, other, other + 3);
 }
 
+/* Grows the box of what is within it now to what may come within the reach. */
+static inline void SbBoxGrow(PetscReal reach, PetscReal box[6])
+{
+  for (int k = 0; k < 3; k++) {
+    const PetscReal far = PetscMax(PetscAbsReal(box[k]), PetscAbsReal(box[3 + k]));
+    const PetscReal margin = reach + SB_BOX_ROUNDING * PETSC_MACHINE_EPSILON * (far + reach);
+
+    box[k] -= margin;
+    box[3 + k] += margin;
+  }
+}
+
 /* Whether two boxes are nearer than `grown` in every coordinate. Empty ones never are. */
 static inline PetscBool SbBoxesWithin(const PetscReal a[6], const PetscReal b[6], PetscReal grown)
 {
@@ -101,6 +113,15 @@ PetscBool SbCCDEdgeEdge(const PetscReal *const e0[2], const PetscReal *const e1[
 */
 PetscBool SbRayTriangle(const PetscReal p[3], const PetscReal way[3], const PetscReal *const x[3],
                         PetscReal *t, PetscReal weight[3], PetscBool *out);
+
+/* ------------------------------------------------------------------ intersection.c */
+
+/*
+  Whether a segment from p to q and a triangle with the corners t share a point; whether two triangles with the vertices a[3] and b[3] of
+  x[][3] share more than common vertices and a common edge. Not collective. To touch is to meet; rounding is no error (the head of the file).
+*/
+PetscBool SbSegmentMeetsTriangle(const PetscReal p[3], const PetscReal q[3], PetscReal const *const t[3]);
+PetscBool SbTrianglesCross(const PetscReal x[], const PetscInt a[3], const PetscInt b[3]);
 
 /* ------------------------------------------------------------------ distance.c, ccd.c: pairs of vertices, edges, triangles */
 

@@ -98,7 +98,7 @@ static void boxes(SbDetector d, const SbDetectScene *s)
     box_of(x + 3 * c[0], box);
     for (int k = 1; k < 3; k++) box_add(x + 3 * c[k], box);
     for (int k = 0; x0 && k < 3; k++) box_add(x0 + 3 * c[k], box);
-    SbDetectBoxGrow(SbDetectRange(s), box);
+    SbBoxGrow(SbDetectRange(s), box);
   }
   for (PetscInt i = 0; i < s->npoint; i++) {
     box_of(s->p + 3 * i, d->point_box + 6 * i);

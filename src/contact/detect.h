@@ -63,18 +63,6 @@ PetscErrorCode SbDetectCandidates(SbDetector d, const SbDetectScene *scene);
 /* Not collective. */
 PetscErrorCode SbDetectSharpDestroy(SbDetector d);
 
-/* Grows the box of what is within it now to what may come within the reach. */
-static inline void SbDetectBoxGrow(PetscReal reach, PetscReal box[6])
-{
-  for (int k = 0; k < 3; k++) {
-    const PetscReal far = PetscMax(PetscAbsReal(box[k]), PetscAbsReal(box[3 + k]));
-    const PetscReal margin = reach + SB_BOX_ROUNDING * PETSC_MACHINE_EPSILON * (far + reach);
-
-    box[k] -= margin;
-    box[3 + k] += margin;
-  }
-}
-
 /* Makes room for n candidates; those there are kept. Not collective. */
 PetscErrorCode SbCandidatesReserve(SbDetector d, PetscInt64 n);
 

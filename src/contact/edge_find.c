@@ -186,7 +186,7 @@ static PetscErrorCode search(Sharp *q)
 
     box_of(&q->place[j], box);
     if (j < q->nown) PetscCall(PetscArraycpy(d->point_box + 6 * j, box, 6));
-    SbDetectBoxGrow(q->scene.reach, box);
+    SbBoxGrow(q->scene.reach, box);
   }
   PetscCall(SbDetectCandidates(d, &q->scene));
   d->version = q->scene.version;

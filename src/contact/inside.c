@@ -1,9 +1,7 @@
 /*
   inside.c - which points of a surface lie in tets: of other bodies and, where that is wanted, of their own.
 
-  Vertices against tets by a spatial hash, as Teschner, Heidelberger, Mueller, Pomeranets and Gross do it ("Optimized spatial hashing for
-  collision detection of deformable objects", VMV 2003): points go into hashed cells, each tet looks up the cells of its box, and barycentric
-  coordinates decide. The table is that of hash.c, with the boxes of tets in the place of those of facets.
+  A tree over the boxes of the tets gives those around a point, and barycentric coordinates decide. Its order stays while the tets move.
 
   Points go to the tets: each rank tells the boxes of its tets, body by body, and gets the points of others that are within them; what goes back are
   two numbers for each point. Who asks does so only while boxes of two bodies meet.
@@ -12,7 +10,7 @@
   on edges and faces within a body: the tet with the boundary facet, on whichever rank, tells which it is. With CR and DG tets come apart a little, and a point in
   such a joint is in none.
 */
-#include "detect.h"
+#include "sbgeometry.h"
 #include "surface_impl.h"
 
 #define ON 1e-6   /* of a barycentric coordinate, and of a tet's box: so near a face a point lies on it */
@@ -24,10 +22,11 @@
 
 struct _p_SbInside {
   SbContactSurface surface;
-  SbDetector detector;
   PetscInt ncell;
-  PetscInt *cell; /* [ncell] own cells of the parts that have a surface anywhere */
-  PetscInt *part; /* [ncell] */
+  PetscInt *cell;      /* [ncell] own cells of the parts that have a surface anywhere */
+  PetscInt *part;      /* [ncell] */
+  PetscReal (*box)[6]; /* [ncell] now, m */
+  SbBoxTree tree;
 };
 
 /* The part that a point is in, and one that it is on the boundary of; -1: none. Goes as MPIU_2INT. */
@@ -64,7 +63,7 @@ static PetscErrorCode list_cells(SbInside in)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbInsideCreate(SbContactSurface surface, SbDetectKind kind, SbInside *inside)
+PetscErrorCode SbInsideCreate(SbContactSurface surface, SbInside *inside)
 {
   SbInside in;
 
@@ -72,8 +71,8 @@ PetscErrorCode SbInsideCreate(SbContactSurface surface, SbDetectKind kind, SbIns
   PetscCall(PetscNew(&in));
   *inside = in;
   in->surface = surface;
-  PetscCall(SbDetectorCreate(kind, &in->detector));
   PetscCall(list_cells(in));
+  PetscCall(PetscMalloc1(in->ncell, &in->box));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -83,7 +82,8 @@ PetscErrorCode SbInsideDestroy(SbInside *inside)
 
   PetscFunctionBeginUser;
   if (!in) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(SbDetectorDestroy(&in->detector));
+  PetscCall(SbBoxTreeDestroy(&in->tree));
+  PetscCall(PetscFree(in->box));
   PetscCall(PetscFree2(in->cell, in->part));
   PetscCall(PetscFree(*inside));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -121,7 +121,7 @@ static PetscErrorCode address(const SbHalo *h, Mail *mail)
 }
 
 /* The boxes of the tets of all parts on all ranks, [start[size]][BOX]; room for them is allocated. */
-static PetscErrorCode gather_boxes(SbInside in, const PetscReal tet[], PetscMPIInt start[], PetscReal **all)
+static PetscErrorCode gather_boxes(SbInside in, PetscMPIInt start[], PetscReal **all)
 {
   const SbContactSurfaceData *d = (const SbContactSurfaceData *)in->surface->data;
   const SbHalo *h = &d->halo;
@@ -137,7 +137,7 @@ static PetscErrorCode gather_boxes(SbInside in, const PetscReal tet[], PetscMPII
   }
   for (PetscInt j = 0; j < in->ncell; j++) {
     mine[BOX * in->part[j]] = (PetscReal)in->part[j];
-    SbBoxMerge(mine + BOX * in->part[j] + 1, tet + 6 * j);
+    SbBoxMerge(mine + BOX * in->part[j] + 1, in->box[j]);
   }
   for (PetscInt b = 0; b < d->npart; b++) {
     if (mine[BOX * b] < 0) continue;
@@ -175,8 +175,8 @@ static PetscBool within(PetscInt n, const PetscReal box[], PetscBool self, Petsc
   Sends own points to the ranks that may have tets around them. Output, allocated: sent[mail->nto], which points these were; asked[mail->nfrom][ASK],
   those of all ranks for this one.
 */
-static PetscErrorCode ask(SbInside in, const PetscReal u[], PetscBool self, const PetscReal tet[], Mail *mail,
-                          PetscInt **sent, PetscReal **asked)
+static PetscErrorCode ask(SbInside in, const PetscReal u[], PetscBool self, Mail *mail, PetscInt **sent,
+                          PetscReal **asked)
 {
   const SbContactSurfaceData *d = (const SbContactSurfaceData *)in->surface->data;
   const SbHalo *h = &d->halo;
@@ -188,7 +188,7 @@ static PetscErrorCode ask(SbInside in, const PetscReal u[], PetscBool self, cons
 
   PetscFunctionBeginUser;
   PetscCall(PetscMalloc1(h->size + 1, &start));
-  PetscCall(gather_boxes(in, tet, start, &box));
+  PetscCall(gather_boxes(in, start, &box));
   PetscCall(PetscMalloc1(3 * in->surface->scene.npoint, &x));
   for (PetscInt i = 0; i < 3 * in->surface->scene.npoint; i++) {
     const PetscInt at = 3 * in->surface->point_node[i / 3] + i % 3;
@@ -286,27 +286,32 @@ static Place place_in(SbInside in, PetscInt j, const PetscReal u[], const PetscR
   return WITHIN;
 }
 
-/* Of the parts of a point's candidates, the lowest that it is in, and the lowest that it is on the boundary of. */
-static Answer answer_one(SbInside in, const PetscReal u[], PetscInt i, const PetscReal asked[ASK],
-                         PetscInt (*seen)[2])
+/*
+  Of the parts of the tets around a point the lowest that it is in, and the lowest that it is on the boundary of; asked[ASK]. `mark` is another one
+  for each point: seen[part][0] and [1] are set to it where the point is in a part, and on its boundary.
+*/
+static Answer answer_one(SbInside in, const PetscReal u[], PetscBool self, const PetscReal asked[],
+                         PetscInt mark, PetscInt (*seen)[2])
 {
-  const SbDetector d = in->detector;
+  const PetscReal box[6] = {asked[0], asked[1], asked[2], asked[0], asked[1], asked[2]};
+  const PetscInt mine = (PetscInt)asked[6];
+  SbBoxQuery query;
+  PetscInt j;
   Answer a = {-1, -1};
 
-  for (PetscInt k = d->start[i]; k < d->start[i + 1]; k++) {
-    const PetscInt j = d->candidate[k], b = in->part[j];
+  for (SbBoxQueryBegin(&in->tree, box, &query); SbBoxQueryNext(&query, &j);) {
     Place place;
 
-    if (b == (PetscInt)asked[6] && surrounds(in, j, asked + 3)) continue;
+    if (in->part[j] == mine && (!self || surrounds(in, j, asked + 3))) continue;
     place = place_in(in, j, u, asked);
-    if (place != OUTSIDE) seen[b][place == ON_BOUNDARY] = i + 1;
+    if (place != OUTSIDE) seen[in->part[j]][place == ON_BOUNDARY] = mark;
   }
-  for (PetscInt k = d->start[i]; k < d->start[i + 1]; k++) {
-    const PetscInt b = in->part[d->candidate[k]];
+  for (SbBoxQueryBegin(&in->tree, box, &query); SbBoxQueryNext(&query, &j);) {
+    const PetscInt b = in->part[j];
 
-    if (seen[b][1] == i + 1)
+    if (seen[b][1] == mark)
       a.on = a.on < 0 ? b : PetscMin(a.on, b);
-    else if (seen[b][0] == i + 1)
+    else if (seen[b][0] == mark)
       a.in = a.in < 0 ? b : PetscMin(a.in, b);
   }
   return a;
@@ -316,45 +321,34 @@ static Answer answer_one(SbInside in, const PetscReal u[], PetscInt i, const Pet
 static PetscErrorCode answer(SbInside in, const PetscReal u[], PetscBool self, PetscInt n,
                              const PetscReal asked[], Answer said[])
 {
-  SbDetector d = in->detector;
-  SbDetectScene s = {.nfacet = in->ncell, .facet_part = in->part, .npoint = n, .self = self};
-  PetscInt *mine,
-    (*seen)[2]; /* [npart][2] the last point, counted from 1, that was in a part and on its boundary */
+  PetscInt(*seen)[2]; /* [npart] */
 
   PetscFunctionBeginUser;
-  PetscCall(PetscMalloc1(n, &mine));
   PetscCall(PetscCalloc1(((const SbContactSurfaceData *)in->surface->data)->npart, &seen));
-  for (PetscInt i = 0; i < n; i++) mine[i] = (PetscInt)asked[ASK * i + 6];
-  s.point_part = mine;
-  PetscCall(SbDetectBegin(d, &s));
-  for (PetscInt i = 0; i < n; i++) {
-    for (int k = 0; k < 6; k++) d->point_box[6 * i + k] = asked[ASK * i + k % 3];
-  }
-  PetscCall(d->ops.search(d, &s));
-  for (PetscInt i = 0; i < n; i++) said[i] = answer_one(in, u, i, asked + ASK * i, seen);
+  for (PetscInt i = 0; i < n; i++) said[i] = answer_one(in, u, self, asked + ASK * i, i + 1, seen);
   PetscCall(PetscFree(seen));
-  PetscCall(PetscFree(mine));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Boxes of the tets, kept by the detector. */
 static PetscErrorCode box_tets(SbInside in, const PetscReal u[])
 {
-  const SbDetectScene s = {.nfacet = in->ncell};
   PetscReal x[3];
 
   PetscFunctionBeginUser;
-  PetscCall(SbDetectBegin(in->detector, &s));
   for (PetscInt j = 0; j < in->ncell; j++) {
-    PetscReal *box = in->detector->facet_box + 6 * j;
+    PetscReal *box = in->box[j];
 
     SbBoxClear(box);
     for (int k = 0; k < 4; k++) {
       SbContactSurfacePosition(in->surface->space, 4 * in->cell[j] + k, u, x);
       SbBoxAdd(box, x);
     }
-    SbDetectBoxGrow(ON * PetscMax(box[3] - box[0], PetscMax(box[4] - box[1], box[5] - box[2])), box);
+    SbBoxGrow(ON * PetscMax(box[3] - box[0], PetscMax(box[4] - box[1], box[5] - box[2])), box);
   }
+  if (in->tree.n)
+    PetscCall(SbBoxTreeRefit(&in->tree, (const PetscReal(*)[6])in->box));
+  else
+    PetscCall(SbBoxTreeCreate(in->ncell, (const PetscReal(*)[6])in->box, &in->tree));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -371,7 +365,7 @@ PetscErrorCode SbInsideFind(SbInside in, const PetscReal u[], PetscBool self, Pe
   PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_INSIDE], 0, 0, 0, 0));
   PetscCall(create_mail(h->size, &mail));
   PetscCall(box_tets(in, u));
-  PetscCall(ask(in, u, self, in->detector->facet_box, &mail, &sent, &asked));
+  PetscCall(ask(in, u, self, &mail, &sent, &asked));
   PetscCall(PetscMalloc2(mail.nfrom, &said, mail.nto, &back));
   PetscCall(answer(in, u, self, mail.nfrom, asked, said));
   PetscCallMPI(MPI_Alltoallv(said, mail.from, mail.from_start, MPIU_2INT, back, mail.to, mail.to_start,

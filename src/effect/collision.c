@@ -221,7 +221,7 @@ static PetscErrorCode setup_collision(SbEffect e, SbSpace space)
   PetscCall(SbContactSurfaceCreate(space, n, facet, &c->surface));
   PetscCall(find_stiffness(c, space, n, facet));
   PetscCall(find_edges(c, space, n, facet, &nskin));
-  PetscCall(SbInsideCreate(c->surface, SB_DETECT_HASH, &c->inside));
+  PetscCall(SbInsideCreate(c->surface, &c->inside));
   PetscCall(PetscCalloc1(c->surface->scene.npoint, &c->alone));
   c->watched = -PETSC_MAX_REAL;
   PetscCall(PetscFree(facet));

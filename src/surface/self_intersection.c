@@ -1,191 +1,13 @@
 /*
-  self_intersection.c - whether triangles cut or touch each other beyond the corners that they share.
+  self_intersection.c - whether triangles of a surface cut or touch each other beyond the corners that they share, and small folds smoothed out.
 
-  Two triangles meet exactly when an edge of one meets the other. With a common corner only the two edges opposite to it need
-  be examined; with a common edge only whether one triangle is folded onto the other. Signs of determinants decide:
-  orient(a, b, c, d) = (a - d) . (b - d) x (c - d), in double precision where its size is above the bound of its rounding (Shewchuk, "Adaptive
-  precision floating-point arithmetic", 1997, the first stage), else in long double, and zero below the bound of that. What is
-  in one plane is decided in that plane. Pairs come from a tree of boxes.
+  Pairs come from a tree of boxes, the exact test from src/geometry/intersection.c.
 */
-#include <float.h>
-#include "sbkernel.h"
 #include "surface_impl.h"
 
 #define NAMED 3   /* pairs that a message names */
 #define PASSES 60 /* of smoothing */
 #define FEW 0.02  /* part of the triangles that may cross others and be smoothed */
-
-static int sign_of(long double value, long double bound)
-{
-  return value > bound ? 1 : value < -bound ? -1 : 0;
-}
-
-static int orient_long(const PetscReal a[3], const PetscReal b[3], const PetscReal c[3], const PetscReal d[3])
-{
-  long double u[3], v[3], w[3], det = 0, size = 0;
-
-  for (int k = 0; k < 3; k++) {
-    u[k] = (long double)a[k] - d[k];
-    v[k] = (long double)b[k] - d[k];
-    w[k] = (long double)c[k] - d[k];
-  }
-  for (int k = 0; k < 3; k++) {
-    const int i = (k + 1) % 3, j = (k + 2) % 3;
-
-    det += u[k] * (v[i] * w[j] - v[j] * w[i]);
-    size += fabsl(u[k]) * (fabsl(v[i] * w[j]) + fabsl(v[j] * w[i]));
-  }
-  return sign_of(det, 16 * LDBL_EPSILON * size);
-}
-
-/* On which side of the plane through a, b, c the point d lies: -1 above (the corners are seen counter-clockwise), 0 in it, 1. */
-static int orient(const PetscReal a[3], const PetscReal b[3], const PetscReal c[3], const PetscReal d[3])
-{
-  PetscReal u[3], v[3], w[3], det = 0, size = 0;
-
-  for (int k = 0; k < 3; k++) {
-    u[k] = a[k] - d[k];
-    v[k] = b[k] - d[k];
-    w[k] = c[k] - d[k];
-  }
-  for (int k = 0; k < 3; k++) {
-    const int i = (k + 1) % 3, j = (k + 2) % 3;
-
-    det += u[k] * (v[i] * w[j] - v[j] * w[i]);
-    size += PetscAbsReal(u[k]) * (PetscAbsReal(v[i] * w[j]) + PetscAbsReal(v[j] * w[i]));
-  }
-  if (PetscAbsReal(det) > 8 * PETSC_MACHINE_EPSILON * size) return det > 0 ? 1 : -1;
-  return orient_long(a, b, c, d);
-}
-
-/* ------------------------------------------------------------------ in one plane */
-
-/* The two coordinates of the plane that see most of it. */
-static void axes_of(PetscReal const *const t[3], int axis[2])
-{
-  PetscReal e[3], f[3], n[3];
-  int most = 0;
-
-  for (int k = 0; k < 3; k++) {
-    e[k] = t[1][k] - t[0][k];
-    f[k] = t[2][k] - t[0][k];
-  }
-  SbCross(e, f, n);
-  for (int k = 1; k < 3; k++) {
-    if (PetscAbsReal(n[k]) > PetscAbsReal(n[most])) most = k;
-  }
-  axis[0] = (most + 1) % 3;
-  axis[1] = (most + 2) % 3;
-}
-
-/* Which side of the line from a to b the point c lies on, in these two coordinates. */
-static int orient_plane(const int axis[2], const PetscReal a[3], const PetscReal b[3], const PetscReal c[3])
-{
-  const int x = axis[0], y = axis[1];
-  const long double l = ((long double)a[x] - c[x]) * ((long double)b[y] - c[y]),
-                    r = ((long double)a[y] - c[y]) * ((long double)b[x] - c[x]);
-
-  return sign_of(l - r, 8 * LDBL_EPSILON * (fabsl(l) + fabsl(r)));
-}
-
-/* Whether c, known to be on the line through a and b, lies between them. */
-static PetscBool between(const int axis[2], const PetscReal a[3], const PetscReal b[3], const PetscReal c[3])
-{
-  for (int k = 0; k < 2; k++) {
-    const int x = axis[k];
-
-    if (c[x] < PetscMin(a[x], b[x]) || c[x] > PetscMax(a[x], b[x])) return PETSC_FALSE;
-  }
-  return PETSC_TRUE;
-}
-
-static PetscBool segments_meet(const int axis[2], const PetscReal a[3], const PetscReal b[3],
-                               const PetscReal c[3], const PetscReal d[3])
-{
-  const int abc = orient_plane(axis, a, b, c), abd = orient_plane(axis, a, b, d);
-  const int cda = orient_plane(axis, c, d, a), cdb = orient_plane(axis, c, d, b);
-
-  if (abc * abd < 0 && cda * cdb < 0) return PETSC_TRUE;
-  if (!abc && between(axis, a, b, c)) return PETSC_TRUE;
-  if (!abd && between(axis, a, b, d)) return PETSC_TRUE;
-  if (!cda && between(axis, c, d, a)) return PETSC_TRUE;
-  return (PetscBool)(!cdb && between(axis, c, d, b));
-}
-
-/* A segment and a triangle in one plane. */
-static PetscBool meet_in_plane(const PetscReal p[3], const PetscReal q[3], PetscReal const *const t[3])
-{
-  int axis[2], side[3];
-
-  axes_of(t, axis);
-  for (int k = 0; k < 3; k++) {
-    if (segments_meet(axis, p, q, t[k], t[(k + 1) % 3])) return PETSC_TRUE;
-  }
-  for (int k = 0; k < 3; k++) side[k] = orient_plane(axis, t[k], t[(k + 1) % 3], p);
-  return (PetscBool)(side[0] && side[0] == side[1] && side[1] == side[2]);
-}
-
-/* ------------------------------------------------------------------ in space */
-
-static PetscBool segment_meets(const PetscReal p[3], const PetscReal q[3], PetscReal const *const t[3])
-{
-  const int above = orient(t[0], t[1], t[2], p), below = orient(t[0], t[1], t[2], q);
-  int least = 1, most = -1;
-
-  if (above && above == below) return PETSC_FALSE;
-  if (!above && !below) return meet_in_plane(p, q, t);
-  for (int k = 0; k < 3; k++) {
-    const int s = orient(p, q, t[k], t[(k + 1) % 3]);
-
-    least = PetscMin(least, s);
-    most = PetscMax(most, s);
-  }
-  return (PetscBool)(least >= 0 || most <= 0);
-}
-
-/* Triangles at one edge, a the corner of one and b that of the other opposite to it. */
-static PetscBool folded(const PetscReal p[3], const PetscReal q[3], const PetscReal a[3],
-                        const PetscReal b[3])
-{
-  PetscReal const *const t[3] = {p, q, a};
-  int axis[2];
-
-  if (orient(p, q, a, b)) return PETSC_FALSE;
-  axes_of(t, axis);
-  return (PetscBool)(orient_plane(axis, p, q, a) * orient_plane(axis, p, q, b) >= 0);
-}
-
-/* Whether two different triangles have more in common than corners and an edge. */
-static PetscBool triangles_cross(const SbTriangles *t, PetscInt f, PetscInt g)
-{
-  const PetscInt *v[2] = {t->tri + 3 * f, t->tri + 3 * g};
-  PetscReal const *x[2][3];
-  int ncommon = 0,
-      own[2] = {3, 3}; /* sum of the common corners' places: the remainder of 0 + 1 + 2 is the other one */
-  int common[2] = {0, 0};
-
-  for (int i = 0; i < 3; i++) {
-    x[0][i] = t->x + 3 * v[0][i];
-    x[1][i] = t->x + 3 * v[1][i];
-    for (int j = 0; j < 3; j++) {
-      if (v[0][i] != v[1][j]) continue;
-      ncommon++;
-      own[0] -= i;
-      own[1] -= j;
-      common[0] = i;
-      common[1] = j;
-    }
-  }
-  if (ncommon == 3) return PETSC_TRUE;
-  if (ncommon == 2) return folded(x[0][(own[0] + 1) % 3], x[0][(own[0] + 2) % 3], x[0][own[0]], x[1][own[1]]);
-  for (int s = 0; s < 2; s++) {
-    for (int k = 0; k < 3; k++) {
-      if (ncommon && k != (common[s] + 1) % 3) continue;
-      if (segment_meets(x[s][k], x[s][(k + 1) % 3], x[1 - s])) return PETSC_TRUE;
-    }
-  }
-  return PETSC_FALSE;
-}
 
 /* ------------------------------------------------------------------ all pairs */
 
@@ -211,7 +33,7 @@ static PetscErrorCode find_pairs(const SbTriangles *t, Search *s)
     SbBoxQuery query;
 
     for (SbBoxQueryBegin(&tree, box[i], &query); SbBoxQueryNext(&query, &other);) {
-      if (other <= i || !triangles_cross(t, i, other)) continue;
+      if (other <= i || !SbTrianglesCross(t->x, t->tri + 3 * i, t->tri + 3 * other)) continue;
       if (s->n < NAMED) {
         s->pair[s->n][0] = i;
         s->pair[s->n][1] = other;

@@ -1,6 +1,6 @@
 // @ranks 1 2 3 4
 /*
-  Points in tets: those that the hash finds, on any number of ranks, are those of a loop over all tets on one: bodies of all elements in each other, one bent
+  Points in tets: those that the tree finds, on any number of ranks, are those of a loop over all tets on one: bodies of all elements in each other, one bent
   into itself, and bodies whose meshes coincide.
 */
 #include "../../src/contact/surface_impl.h"
@@ -90,7 +90,7 @@ static PetscErrorCode compare(const Case x[2], SbInside inside, PetscBool self, 
 }
 
 /* Two bodies ever deeper in each other. */
-static PetscErrorCode test_pair(const char *options, SbDetectKind kind)
+static PetscErrorCode test_pair(const char *options)
 {
   Case x[2];
   SbInside inside;
@@ -98,7 +98,7 @@ static PetscErrorCode test_pair(const char *options, SbDetectKind kind)
 
   PetscFunctionBeginUser;
   for (int k = 0; k < 2; k++) PetscCall(open_on(k ? PETSC_COMM_SELF : PETSC_COMM_WORLD, options, 0, &x[k]));
-  PetscCall(SbInsideCreate(x[0].s, kind, &inside));
+  PetscCall(SbInsideCreate(x[0].s, &inside));
   for (int step = 0; step < 6; step++) {
     PetscBool close;
 
@@ -126,7 +126,7 @@ static PetscErrorCode test_ring(const char *element)
   PetscFunctionBeginUser;
   PetscCall(PetscSNPrintf(options, sizeof(options), RING, element));
   for (int k = 0; k < 2; k++) PetscCall(open_on(k ? PETSC_COMM_SELF : PETSC_COMM_WORLD, options, 0, &x[k]));
-  PetscCall(SbInsideCreate(x[0].s, SB_DETECT_HASH, &inside));
+  PetscCall(SbInsideCreate(x[0].s, &inside));
   for (int step = 0; step < 4; step++) {
     PetscBool close;
 
@@ -161,7 +161,7 @@ static PetscErrorCode test_coincident(const char *options, PetscInt set, PetscRe
 
   PetscFunctionBeginUser;
   PetscCall(open_on(PETSC_COMM_WORLD, options, set, &c));
-  PetscCall(SbInsideCreate(c.s, SB_DETECT_HASH, &inside));
+  PetscCall(SbInsideCreate(c.s, &inside));
   PetscCall(fill(&c, 0, 0, shift, lift, c.u));
   PetscCall(SbContactSurfaceUpdate(c.s, NULL, c.u, 0.1, PETSC_FALSE, &close));
   PetscCall(PetscMalloc1(c.s->scene.npoint, &part));
@@ -187,10 +187,9 @@ static PetscErrorCode test_coincident(const char *options, PetscInt set, PetscRe
 int main(int argc, char **argv)
 {
   SB_TEST_BEGIN(argc, argv);
-  PetscCall(test_pair(PAIR("p1", "p1"), SB_DETECT_HASH));
-  PetscCall(test_pair(PAIR("p1", "p1"), SB_DETECT_BRUTE));
-  PetscCall(test_pair(PAIR("cr", "dg"), SB_DETECT_HASH));
-  PetscCall(test_pair(CROSS("p1", "cr"), SB_DETECT_HASH));
+  PetscCall(test_pair(PAIR("p1", "p1")));
+  PetscCall(test_pair(PAIR("cr", "dg")));
+  PetscCall(test_pair(CROSS("p1", "cr")));
   PetscCall(test_ring("p1"));
   PetscCall(test_ring("dg"));
   PetscCall(test_coincident(CUBES, 0, 1, 0, 0));         /* face on face */

@@ -33,7 +33,7 @@ static PetscErrorCode watch_alone(SbRun run, const SbStep *step, Overlap *o)
 
   PetscFunctionBeginUser;
   if (!o->look) {
-    PetscCall(SbInsideCreate(c->surface, SB_DETECT_BRUTE, &o->look));
+    PetscCall(SbInsideCreate(c->surface, &o->look));
     PetscCall(PetscCalloc2(n, &o->inside, n, &o->steps));
   }
   PetscCall(SbSpaceGetLocalRead(run->model->space, step->U, &u));
