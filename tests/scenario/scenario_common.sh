@@ -16,15 +16,19 @@ check() { # text of the check, then a command that must succeed
   fi
 }
 
-# error RANKS TEXT ARGUMENT...: the run must fail with one line that holds TEXT
+# error RANKS NAMES ARGUMENT...: the run must fail with one line that names all of NAMES, with | between them: options, files, lines, values.
+# How the sentence reads is not checked.
 error() {
-  local ranks=$1 text=$2 code
+  local ranks=$1 code line name
+  local -a names
+  IFS='|' read -ra names <<<"$2"
   shift 2
   "${mpi[@]}" "$ranks" "$supple" "$@" >out.txt 2>err.txt
   code=$?
   check "$*: exit code $code" test "$code" -ne 0
   check "$*: $(grep -c '^supple: error: ' err.txt) error lines" test "$(grep -c '^supple: error: ' err.txt)" = 1
-  check "$*: not '$text' but '$(grep '^supple: error: ' err.txt)'" grep -qF -- "supple: error: $text" err.txt
+  line=$(grep '^supple: error: ' err.txt)
+  for name in "${names[@]}"; do check "$*: '$line' does not name $name" grep -qF -- "$name" <<<"$line"; done
   check "$*: a trace" test -z "$(cat out.txt err.txt | grep 'PETSC ERROR')"
 }
 

@@ -1,12 +1,11 @@
 /*
-  contact.h - what the verification of contact shares: history columns by name, sums over each body, an account of energy and
-  momentum around each step, balls made of boxes.
+  contact.h - what the verification of contact shares: history columns by name, sums over each body, the history of a run as a
+  table, balls made of boxes.
 */
 #pragma once
 #include "verify.h"
 
 #define CONTACT_BODIES 64
-#define CONTACT_NAMES 4
 
 static inline SbEffect contact_effect(SbModel m, const char *name)
 {
@@ -16,29 +15,37 @@ static inline SbEffect contact_effect(SbModel m, const char *name)
   return NULL;
 }
 
-/* A column of the history of an effect for the residual R (N, without constraints), on every rank. */
-static inline PetscErrorCode contact_column_of(SbRun run, PetscReal t, Vec R, const char *effect,
-                                               const char *column, PetscReal *value)
+/* The columns of the history of an effect for the residual R (N, without constraints), on every rank: value[ncolumn]. */
+static inline PetscErrorCode contact_columns(SbRun run, PetscReal t, Vec R, SbEffect e, PetscReal value[])
 {
   SbModel m = run->model;
-  SbEffect e = contact_effect(m, effect);
   SbStage stage = {.t = t, .shift_k = 1};
-  PetscReal *values;
-  PetscInt at = -1;
   const PetscReal *r;
 
   PetscFunctionBeginUser;
-  for (PetscInt k = 0; k < e->ncolumn; k++) at = strcmp(e->column[k], column) ? at : k;
-  PetscCheck(at >= 0 && R, PETSC_COMM_SELF, PETSC_ERR_PLIB, "No column %s_%s", effect, column);
-  PetscCall(PetscCalloc1(e->ncolumn, &values));
   PetscCall(SbSpaceGetLocalRead(m->space, R, &r));
   PetscCall(SbSpaceGetLocalRead(m->space, run->U, &stage.u));
-  PetscCall((*e->ops.history)(e, m->space, &stage, r, values));
+  PetscCall((*e->ops.history)(e, m->space, &stage, r, value));
   PetscCall(SbSpaceRestoreLocalRead(m->space, run->U, &stage.u));
   PetscCall(SbSpaceRestoreLocalRead(m->space, R, &r));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, value, (PetscMPIInt)e->ncolumn, MPIU_REAL, MPI_SUM, m->comm));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* One of them by its name. */
+static inline PetscErrorCode contact_column_of(SbRun run, PetscReal t, Vec R, const char *effect,
+                                               const char *column, PetscReal *value)
+{
+  SbEffect e = contact_effect(run->model, effect);
+  PetscReal values[64] = {0};
+  PetscInt at = -1;
+
+  PetscFunctionBeginUser;
+  *value = 0;
+  for (PetscInt k = 0; k < e->ncolumn; k++) at = strcmp(e->column[k], column) ? at : k;
+  PetscCheck(at >= 0 && R, PETSC_COMM_SELF, PETSC_ERR_PLIB, "No column %s_%s", effect, column);
+  PetscCall(contact_columns(run, t, R, e, values));
   *value = values[at];
-  PetscCall(PetscFree(values));
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, value, 1, MPIU_REAL, MPI_SUM, m->comm));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -91,98 +98,235 @@ static inline PetscErrorCode contact_body_forces(SbRun run, PetscReal t, PetscRe
 }
 
 /*
-  What a run does in its steps: energy with the potential of gravity, momentum against weight and the forces of obstacles, how deep
-  things are. Set the names (NULL: there is none) and g, then contact_watch_add().
+  The history of a run: a row per step, the start included, of named columns: t, dt, kinetic, strain, energy (both and the
+  potential of gravity g along -z), momentum_x, angular_x, centre_x, volume, min_J, speed, BODY_vx (of its centre), EFFECT_COLUMN of the
+  effects of contact, missing (largest component of the change of momentum in the step that weight and the forces of obstacles do not
+  explain, kg m/s), and, when asked for, net (likewise of the sum of contact forces on all bodies) and push (on the first), N.
 */
 typedef struct {
-  const char *obstacle[CONTACT_NAMES], *meet; /* names of the effects */
-  PetscReal g;                                /* m/s^2, along -z */
-  PetscReal start, energy;                    /* at the start and now, J */
-  PetscReal most, gain;      /* above the start, and gained in a step, the largest of all steps, J */
-  PetscReal momentum[3];     /* now, kg m/s */
-  PetscReal missing;         /* largest change of momentum that no force explains, kg m/s */
-  PetscReal impulse;         /* of the obstacles, z, N s */
-  PetscReal force;           /* largest force of the obstacles, z, N */
-  PetscReal behind, deepest; /* deepest penetration of obstacles and of bodies, m */
-  PetscReal contacts;        /* most pairs of `meet` at a time */
-  PetscReal min_J;
-  PetscInt landings, meetings; /* how often the first obstacle and bodies came to touch */
-  PetscBool lands, meets;      /* they touch now */
-} ContactWatch;
+  PetscReal g;            /* set before the run, m/s^2 */
+  PetscBool forces;       /* likewise: net and push */
+  PetscReal from;         /* rows up to this time are left out by record_max, record_min, record_gain; s */
+  PetscReal mass, lowest; /* kg; lowest node at rest, z, m */
+  PetscInt newton, steps, rejected; /* totals of the run */
+  PetscInt n, ncolumn, room, at;    /* rows, columns, room for values, column that is filled next */
+  char (*name)[2 * SB_NAME_MAX];    /* [ncolumn] */
+  PetscReal *value;                 /* [n][ncolumn] */
+} Record;
 
-/* Sum of the forces of the obstacles; notes depth and landings. */
-static inline PetscErrorCode contact_watch_obstacles(SbRun run, const SbStep *step, ContactWatch *w,
-                                                     PetscReal force[3])
+/* A column in every row: [n], the distance between rows is ncolumn. */
+static inline const PetscReal *record_column(const Record *r, const char *name)
 {
-  static const char *const columns[3] = {"force_x", "force_y", "force_z"};
+  static PetscReal none = NAN;
 
-  PetscFunctionBeginUser;
-  force[0] = force[1] = force[2] = 0;
-  for (int o = 0; o < CONTACT_NAMES && w->obstacle[o]; o++) {
-    PetscReal value;
-
-    for (int k = 0; k < 3; k++) {
-      PetscCall(contact_column(run, step->t, w->obstacle[o], columns[k], &value));
-      force[k] += value;
-    }
-    PetscCall(contact_column(run, step->t, w->obstacle[o], "penetration", &value));
-    w->behind = PetscMax(w->behind, value);
-    if (o) continue;
-    PetscCall(contact_column(run, step->t, w->obstacle[o], "contacts", &value));
-    if (value > 0 && !w->lands) w->landings++;
-    w->lands = (PetscBool)(value > 0);
+  for (PetscInt c = 0; c < r->ncolumn; c++) {
+    if (!strcmp(r->name[c], name)) return r->value + c;
   }
-  w->force = PetscMax(w->force, force[2]);
-  w->impulse += step->dt * force[2];
-  PetscFunctionReturn(PETSC_SUCCESS);
+  SB_CHECK(0, "the run has no column %s", name);
+  return &none;
 }
 
-static inline PetscErrorCode contact_watch_bodies(SbRun run, const SbStep *step, ContactWatch *w)
+static inline PetscReal record_at(const Record *r, const char *name, PetscInt row)
 {
-  PetscReal value;
+  const PetscReal *v = record_column(r, name);
 
+  return isnan(*v) ? *v : v[row * r->ncolumn];
+}
+
+static inline PetscReal record_last(const Record *r, const char *name)
+{
+  return record_at(r, name, r->n - 1);
+}
+
+/* Extreme of sign times a column, or of its change in a step. */
+static inline PetscReal record_extreme(const Record *r, const char *name, PetscReal sign, PetscBool change)
+{
+  const PetscReal *v = record_column(r, name), *t = record_column(r, "t");
+  PetscReal most = -PETSC_MAX_REAL;
+
+  for (PetscInt i = change; i < r->n && !isnan(*v); i++) {
+    if (r->from > 0 && t[i * r->ncolumn] <= r->from) continue;
+    most = PetscMax(most, sign * (v[i * r->ncolumn] - (change ? v[(i - 1) * r->ncolumn] : 0)));
+  }
+  return isnan(*v) ? *v : sign * most;
+}
+#define record_max(r, name) record_extreme(r, name, 1, PETSC_FALSE)
+#define record_min(r, name) record_extreme(r, name, -1, PETSC_FALSE)
+#define record_gain(r, name) record_extreme(r, name, 1, PETSC_TRUE) /* largest increase in a step */
+
+/* Largest size of three columns NAME_x, NAME_y, NAME_z, or of their change in a step. */
+static inline PetscReal record_size(const Record *r, const char *name, PetscBool change)
+{
+  PetscReal most = 0;
+
+  for (int k = 0; k < 3; k++) {
+    char column[SB_NAME_MAX];
+
+    (void)snprintf(column, sizeof(column), "%s_%c", name, "xyz"[k]);
+    most =
+      PetscMax(most, PetscMax(record_extreme(r, column, 1, change), -record_extreme(r, column, -1, change)));
+  }
+  return most;
+}
+
+/* Integral of a column over time. */
+static inline PetscReal record_impulse(const Record *r, const char *name)
+{
+  PetscReal sum = 0;
+
+  for (PetscInt i = 1; i < r->n; i++) sum += record_at(r, "dt", i) * record_at(r, name, i);
+  return sum;
+}
+
+/* How often a column rises above zero after the start. */
+static inline PetscInt record_starts(const Record *r, const char *name)
+{
+  PetscInt starts = 0;
+
+  for (PetscInt i = 1; i < r->n; i++)
+    starts += record_at(r, name, i) > 0 && (i == 1 || record_at(r, name, i - 1) <= 0);
+  return starts;
+}
+
+/* The first step in which a column is above `least`: where it began; the end of the last one; 0 without one. s */
+static inline void record_span(const Record *r, const char *name, PetscReal least, PetscReal *first,
+                               PetscReal *last)
+{
+  *first = *last = 0;
+  for (PetscInt i = 0; i < r->n; i++) {
+    if (!(record_at(r, name, i) > least)) continue;
+    if (*last == 0) *first = i ? record_at(r, "t", i - 1) : 0;
+    *last = record_at(r, "t", i);
+  }
+}
+
+/* Puts the next value of a row; the first row names the columns. */
+static inline PetscErrorCode record_put(Record *r, const char *first, const char *second, const char *third,
+                                        PetscReal value)
+{
   PetscFunctionBeginUser;
-  PetscCall(contact_column(run, step->t, w->meet, "penetration", &value));
-  w->deepest = PetscMax(w->deepest, value);
-  PetscCall(contact_column(run, step->t, w->meet, "contacts", &value));
-  w->contacts = PetscMax(w->contacts, value);
-  if (value > 0 && !w->meets) w->meetings++;
-  w->meets = (PetscBool)(value > 0);
+  if (r->n == 0) {
+    PetscCall(PetscRealloc((size_t)(r->ncolumn + 1) * sizeof(*r->name), &r->name));
+    PetscCall(PetscSNPrintf(r->name[r->ncolumn++], sizeof(*r->name), "%s%s%s", first, second, third));
+  }
+  if (r->n * r->ncolumn + r->at >= r->room) {
+    r->room = 2 * r->room + 256;
+    PetscCall(PetscRealloc((size_t)r->room * sizeof(PetscReal), &r->value));
+  }
+  r->value[r->n * r->ncolumn + r->at++] = value;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static inline PetscErrorCode contact_watch(SbRun run, const SbStep *step, void *ctx)
+static inline PetscErrorCode record_step(SbRun run, const SbStep *step, void *ctx)
 {
-  ContactWatch *w = (ContactWatch *)ctx;
+  static const char *const xyz[3] = {"x", "y", "z"};
+  Record *r = (Record *)ctx;
+  const SbModel m = run->model;
   const SbEnergies *e = &step->energies;
-  const PetscReal weight = run->model->mass * w->g;
-  const PetscReal energy = e->kinetic + e->strain + weight * e->centre[2];
-  PetscReal force[3];
+  PetscReal force[3] = {0, 0, -m->mass * r->g}, missing = 0, sum[3 * CONTACT_BODIES], mass[CONTACT_BODIES];
 
   PetscFunctionBeginUser;
-  if (step->step == 0) {
-    w->start = energy;
-    w->min_J = 1;
-  } else {
-    PetscCall(contact_watch_obstacles(run, step, w, force));
-    force[2] -= weight;
-    for (int k = 0; k < 3; k++)
-      w->missing = PetscMax(w->missing, PetscAbsReal(e->momentum[k] - w->momentum[k] - step->dt * force[k]));
-    w->gain = PetscMax(w->gain, energy - w->energy);
-    w->most = PetscMax(w->most, energy - w->start);
-    if (w->meet) PetscCall(contact_watch_bodies(run, step, w));
+  r->at = 0;
+  PetscCall(record_put(r, "t", "", "", step->t));
+  PetscCall(record_put(r, "dt", "", "", step->dt));
+  PetscCall(record_put(r, "kinetic", "", "", e->kinetic));
+  PetscCall(record_put(r, "strain", "", "", e->strain));
+  PetscCall(record_put(r, "energy", "", "", e->kinetic + e->strain + m->mass * r->g * e->centre[2]));
+  for (int k = 0; k < 3; k++) PetscCall(record_put(r, "momentum_", xyz[k], "", e->momentum[k]));
+  for (int k = 0; k < 3; k++) PetscCall(record_put(r, "angular_", xyz[k], "", e->angular[k]));
+  for (int k = 0; k < 3; k++) PetscCall(record_put(r, "centre_", xyz[k], "", e->centre[k]));
+  PetscCall(record_put(r, "volume", "", "", e->volume));
+  PetscCall(record_put(r, "min_J", "", "", e->min_J));
+  PetscCall(record_put(r, "speed", "", "", e->max_speed));
+  // Velocities of the centres of the bodies.
+  if (step->V && m->nbody <= CONTACT_BODIES) {
+    PetscCall(contact_body_sums(m, step->V, PETSC_TRUE, sum));
+    PetscCall(contact_body_masses(m, mass));
+    for (PetscInt i = 0; i < 3 * m->nbody; i++)
+      PetscCall(record_put(r, m->body[i / 3].name, "_v", xyz[i % 3], sum[i] / mass[i / 3]));
   }
-  w->energy = energy;
-  w->min_J = PetscMin(w->min_J, e->min_J);
-  for (int k = 0; k < 3; k++) w->momentum[k] = e->momentum[k];
+  // The columns of contact; the forces of obstacles among them.
+  for (PetscInt i = 0; i < m->neffect; i++) {
+    const SbEffect f = m->effect[i];
+    PetscReal value[64] = {0};
+
+    if (!f->ops.begin_step) continue;
+    if (run->reaction) PetscCall(contact_columns(run, step->t, run->reaction, f, value));
+    for (PetscInt c = 0; c < f->ncolumn; c++) {
+      PetscCall(record_put(r, f->name, "_", f->column[c], value[c]));
+      for (int k = 0; k < 3; k++)
+        force[k] += !strncmp(f->column[c], "force_", 6) && f->column[c][6] == xyz[k][0] ? value[c] : 0;
+    }
+  }
+  if (!r->n) {
+    r->mass = m->mass;
+    r->lowest = PETSC_MAX_REAL;
+    for (PetscInt i = 0; i < m->space->nnode_owned; i++)
+      r->lowest = PetscMin(r->lowest, m->space->node_x[3 * i + 2]);
+    PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &r->lowest, 1, MPIU_REAL, MPI_MIN, m->comm));
+  }
+  for (int k = 0; k < 3 && r->n; k++) {
+    const PetscReal before = r->value[(r->n - 1) * r->ncolumn + 5 + k]; // momentum_x and the two behind it
+
+    missing = PetscMax(missing, PetscAbsReal(e->momentum[k] - before - step->dt * force[k]));
+  }
+  PetscCall(record_put(r, "missing", "", "", missing));
+  if (r->forces) {
+    PetscReal push = 0, net = 0;
+
+    PetscCall(contact_body_forces(run, step->t, sum));
+    for (int k = 0; k < 3; k++) {
+      push = PetscMax(push, PetscAbsReal(sum[k]));
+      for (PetscInt b = 1; b < m->nbody; b++) sum[k] += sum[3 * b + k];
+      net = PetscMax(net, PetscAbsReal(sum[k]));
+    }
+    PetscCall(record_put(r, "push", "", "", push));
+    PetscCall(record_put(r, "net", "", "", net));
+  }
+  r->n++;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static inline PetscErrorCode contact_watch_add(TestScene *t, ContactWatch *w)
+static inline PetscErrorCode record_add(TestScene *t, Record *r)
 {
   PetscFunctionBeginUser;
   t->run->want_energies = PETSC_TRUE;
-  PetscCall(SbRunAddMonitor(t->run, contact_watch, w, NULL));
+  PetscCall(SbRunAddMonitor(t->run, record_step, r, NULL));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static inline PetscErrorCode record_free(Record *r)
+{
+  PetscFunctionBeginUser;
+  PetscCall(PetscFree(r->name));
+  PetscCall(PetscFree(r->value));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Solves a scene that is open, with its record; it stays open. */
+static inline PetscErrorCode record_solve(TestScene *t, Record *r)
+{
+  PetscFunctionBeginUser;
+  PetscCall(record_add(t, r));
+  PetscCall(verify_solve(t, verify_title));
+  r->newton = t->run->newton_total;
+  r->steps = t->run->steps_total;
+  r->rejected = t->run->rejected_total;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The scene of these options, solved and closed; the record is freed by the caller with record_free(). */
+static inline PetscErrorCode record_run(Record *r, const char *format, ...)
+{
+  TestScene t;
+  va_list args;
+
+  PetscFunctionBeginUser;
+  va_start(args, format);
+  PetscCall(verify_vopen(&t, format, args));
+  va_end(args);
+  PetscCall(record_solve(&t, r));
+  PetscCall(test_scene_close(&t));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -205,4 +349,14 @@ static inline void contact_ball(const PetscInt n[3], const PetscInt at[3], Petsc
   }
   length = PetscSqrtReal(SbDot3(x, x));
   for (int k = 0; k < 3; k++) x[k] *= length > 0 ? b->radius * layer / length : 0;
+}
+
+/* A ball of n layers of cells around its middle, on each side n / 2; remove the file with test_file_remove(). */
+static inline PetscErrorCode contact_ball_write(PetscInt n, PetscReal radius, char path[512])
+{
+  ContactBall ball = {.radius = radius};
+
+  PetscFunctionBeginUser;
+  PetscCall(verify_mesh_write((const PetscInt[3]){n, n, n}, contact_ball, &ball, path));
+  PetscFunctionReturn(PETSC_SUCCESS);
 }

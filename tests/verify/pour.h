@@ -83,11 +83,6 @@ static inline PetscErrorCode pour_furthest(TestScene *t, const PetscReal bowl[3]
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-typedef struct {
-  ContactWatch w;
-  PetscReal inside; /* deepest place of a body inside another, by its own measure, m */
-} Pour;
-
 /* Depth of a point in a convex body, behind the facets [from, to) of a scene, m; negative outside. */
 static inline PetscReal pour_depth(const SbDetectScene *s, const PetscInt from[], PetscInt n,
                                    const PetscReal p[3])
@@ -137,15 +132,14 @@ static inline PetscErrorCode pour_inside(SbModel m, PetscReal *inside)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The deepest place of a body inside another in any step, by pour_inside(), m. */
 static inline PetscErrorCode pour_watch(SbRun run, const SbStep *step, void *ctx)
 {
-  Pour *p = (Pour *)ctx;
   PetscMPIInt size;
 
   PetscFunctionBeginUser;
-  PetscCall(contact_watch(run, step, &p->w));
   PetscCallMPI(MPI_Comm_size(PETSC_COMM_WORLD, &size));
-  if (size == 1 && step->step > 0) PetscCall(pour_inside(run->model, &p->inside));
+  if (size == 1 && step->step > 0) PetscCall(pour_inside(run->model, (PetscReal *)ctx));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -156,9 +150,8 @@ static inline PetscErrorCode pour(PetscInt n, PetscReal end, PetscReal radius, P
 {
   const size_t size = 1024 * (size_t)n + VERIFY_TEXT;
   const PetscReal bowl[3] = {0, 0, radius - 0.15};
-  Pour p = {.w = {.obstacle = {"bowl"}, .meet = "meet", .g = POUR_G}};
-  const ContactWatch *w = &p.w;
-  PetscReal furthest = 0, weight;
+  Record r = {.g = POUR_G};
+  PetscReal furthest = 0, inside = 0, weight, lost;
   char *text, effects[1024];
   TestScene t;
 
@@ -174,37 +167,28 @@ static inline PetscErrorCode pour(PetscInt n, PetscReal end, PetscReal radius, P
   PetscCall(PetscStrlcat(text, effects, size));
   PetscCall(test_scene_open(text, &t));
   PetscCall(PetscFree(text));
-  t.run->want_energies = PETSC_TRUE;
-  PetscCall(SbRunAddMonitor(t.run, pour_watch, &p, NULL));
-  PetscCall(verify_solve(&t, "pour"));
-  weight = POUR_G * t.model->mass;
+  verify_case("%d bodies", (int)n);
+  PetscCall(SbRunAddMonitor(t.run, pour_watch, &inside, NULL));
+  PetscCall(record_solve(&t, &r));
   PetscCall(pour_furthest(&t, bowl, &furthest));
-  PetscCall(PetscPrintf(
-    PETSC_COMM_WORLD,
-    "  %d bodies of %.2f kg in all, %d steps, %d cut, %d solves: energy %.2g J above the start at most, "
-    "%.1e J gained in a step, now %.3g J less; momentum off by %.1e kg m/s\n",
-    (int)n, (double)t.model->mass, (int)t.run->steps_total, (int)t.run->rejected_total,
-    (int)t.run->newton_total, (double)w->most, (double)w->gain, (double)(w->start - w->energy),
-    (double)w->missing));
-  PetscCall(PetscPrintf(
-    PETSC_COMM_WORLD,
-    "  behind the bowl %.1e m, in bodies %.1e m (history %.1e); %g pairs at most; centres within %.3f m of "
-    "%g; mean force of the bowl %.3f of the weight; min J %.2f\n",
-    (double)w->behind, (double)p.inside, (double)w->deepest, (double)w->contacts, (double)furthest,
-    (double)radius, (double)(w->impulse / (end * weight)), (double)w->min_J));
-  SB_CHECK(w->most <= 1e-6 * weight * radius, "energy is %g J above that of the start", (double)w->most);
-  /* what nodes pull with that stay for the rest of a step is not in the history of the bowl */
-  SB_CHECK(w->missing < missing * weight * 0.004, "momentum changed by %g kg m/s without a force",
-           (double)w->missing);
-  SB_CHECK(w->behind < 1e-6 * radius, "%g m behind the bowl", (double)w->behind);
-  SB_CHECK(p.inside < deep * POUR_SIZE, "%g m inside another body", (double)p.inside);
-  SB_CHECK(w->deepest < deep * POUR_SIZE, "the history says %g m inside another body", (double)w->deepest);
-  SB_CHECK(furthest < radius, "a body's centre is %g m from the centre of the bowl", (double)furthest);
-  SB_CHECK(w->contacts >= 2 * n && w->force > weight, "%g pairs, %g N: the bodies do not meet",
-           (double)w->contacts, (double)w->force);
-  SB_CHECK(w->start - w->energy > 0.1 * weight * radius, "the bodies do not fall: %g J",
-           (double)(w->start - w->energy));
-  SB_CHECK(w->min_J > 0, "a cell is inverted");
   PetscCall(test_scene_close(&t));
+  weight = POUR_G * r.mass;
+  lost = record_at(&r, "energy", 0) - record_last(&r, "energy");
+  verify_show("steps cut", (PetscReal)r.rejected);
+  verify_show("solves", (PetscReal)r.newton);
+  verify_show("mean force of the bowl, of the weight", record_impulse(&r, "bowl_force_z") / (end * weight));
+  VERIFY_LESS(record_max(&r, "energy") - record_at(&r, "energy", 0), 1e-6 * weight * radius,
+              "energy above the start, J");
+  /* what nodes pull with that stay for the rest of a step is not in the history of the bowl */
+  VERIFY_LESS(record_max(&r, "missing"), missing * weight * 0.004, "momentum that no force explains, kg m/s");
+  VERIFY_LESS(record_max(&r, "bowl_penetration"), 1e-6 * radius, "behind the bowl, m");
+  VERIFY_LESS(inside, deep * POUR_SIZE, "inside another body, m");
+  VERIFY_LESS(record_max(&r, "meet_penetration"), deep * POUR_SIZE, "inside another body by the history, m");
+  VERIFY_LESS(furthest, radius, "furthest centre from that of the bowl, m");
+  VERIFY_MORE(record_max(&r, "meet_contacts"), (PetscReal)(2 * n - 1), "pairs");
+  VERIFY_MORE(record_max(&r, "bowl_force_z"), weight, "largest force of the bowl, N");
+  VERIFY_MORE(lost, 0.1 * weight * radius, "energy lost in the fall, J");
+  VERIFY_MORE(record_min(&r, "min_J"), 0, "least det F");
+  PetscCall(record_free(&r));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -159,19 +159,27 @@ static inline PetscReal verify_aitken(const PetscReal v[3])
 }
 
 /* test_scene_open() of options that are written as with printf. */
-static inline PetscErrorCode verify_open(TestScene *t, const char *format, ...)
+static inline PetscErrorCode verify_vopen(TestScene *t, const char *format, va_list args)
 {
   char text[VERIFY_TEXT];
   size_t length;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscVSNPrintf(text, sizeof(text), format, &length, args));
+  PetscCheck(length <= sizeof(text), PETSC_COMM_SELF, PETSC_ERR_PLIB, "%d characters, room for %d",
+             (int)length, VERIFY_TEXT);
+  PetscCall(test_scene_open(text, t));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static inline PetscErrorCode verify_open(TestScene *t, const char *format, ...)
+{
   va_list args;
 
   PetscFunctionBeginUser;
   va_start(args, format);
-  PetscCall(PetscVSNPrintf(text, sizeof(text), format, &length, args));
+  PetscCall(verify_vopen(t, format, args));
   va_end(args);
-  PetscCheck(length <= sizeof(text), PETSC_COMM_SELF, PETSC_ERR_PLIB, "%d characters, room for %d",
-             (int)length, VERIFY_TEXT);
-  PetscCall(test_scene_open(text, t));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -183,3 +191,49 @@ static inline PetscErrorCode verify_solve(TestScene *t, const char *what)
   SB_CHECK(!t->run->stop_reason[0], "%s: %s", what, t->run->stop_reason);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
+
+/* The case that the next checks are about. */
+static char verify_title[256];
+
+static inline void verify_case(const char *format, ...)
+{
+  va_list args;
+
+  va_start(args, format);
+  (void)vsnprintf(verify_title, sizeof(verify_title), format, args);
+  va_end(args);
+  (void)PetscPrintf(PETSC_COMM_WORLD, "  %s\n", verify_title);
+}
+
+/* A number that a report quotes. */
+static inline void verify_show(const char *what, PetscReal value)
+{
+  (void)PetscPrintf(PETSC_COMM_WORLD, "    %s: %.5g\n", what, (double)value);
+}
+
+/* Checks that say what they compare, also when it is right. */
+#define VERIFY_NEAR(value, expected, tolerance, what)                                                       \
+  do {                                                                                                      \
+    const double verify_v = (double)(value), verify_e = (double)(expected), verify_t = (double)(tolerance); \
+    (void)PetscPrintf(PETSC_COMM_WORLD, "    %s: %.7g (%.7g within %.2g)\n", what, verify_v, verify_e,      \
+                      verify_t);                                                                            \
+    SB_CHECK(fabs(verify_v - verify_e) <= verify_t, "%s: %s: %.15g, expected %.15g within %.3g",            \
+             verify_title, what, verify_v, verify_e, verify_t);                                             \
+  } while (0)
+#define VERIFY_LESS(value, bound, what)                                                                      \
+  do {                                                                                                       \
+    const double verify_v = (double)(value), verify_b = (double)(bound);                                     \
+    (void)PetscPrintf(PETSC_COMM_WORLD, "    %s: %.5g (below %.3g)\n", what, verify_v, verify_b);            \
+    SB_CHECK(verify_v < verify_b, "%s: %s: %.15g, not below %.15g", verify_title, what, verify_v, verify_b); \
+  } while (0)
+#define VERIFY_MORE(value, bound, what)                                                                      \
+  do {                                                                                                       \
+    const double verify_v = (double)(value), verify_b = (double)(bound);                                     \
+    (void)PetscPrintf(PETSC_COMM_WORLD, "    %s: %.5g (above %.3g)\n", what, verify_v, verify_b);            \
+    SB_CHECK(verify_v > verify_b, "%s: %s: %.15g, not above %.15g", verify_title, what, verify_v, verify_b); \
+  } while (0)
+
+/* Options of a body; all arguments are strings. */
+#define VERIFY_BODY(b, mesh, law, young, poisson)                                                \
+  " -body_" b "_mesh " mesh " -body_" b "_material " law " -body_" b "_young " young " -body_" b \
+  "_poisson " poisson " -body_" b "_density 1000 "

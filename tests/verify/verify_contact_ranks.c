@@ -10,27 +10,12 @@
 #include "contact.h"
 
 #define STEPS 60
-#define COLUMNS 4
 
 typedef struct {
-  PetscInt n, steps;
+  PetscInt n;
   PetscReal *u, *v;
-  PetscReal column[COLUMNS][STEPS + 1];
+  Record r;
 } Motion;
-
-static const char *const columns[COLUMNS][2] = {
-  {"floor", "contacts"}, {"ball", "contacts"}, {"meet", "contacts"}, {"floor", "force_z"}};
-
-static PetscErrorCode watch(SbRun run, const SbStep *step, void *ctx)
-{
-  Motion *m = (Motion *)ctx;
-
-  PetscFunctionBeginUser;
-  if (step->step > STEPS) PetscFunctionReturn(PETSC_SUCCESS);
-  for (int c = 0; c < COLUMNS; c++)
-    PetscCall(contact_column(run, step->t, columns[c][0], columns[c][1], &m->column[c][step->step]));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
 
 static PetscErrorCode solve(MPI_Comm comm, const char *sides, Motion *motion)
 {
@@ -52,19 +37,9 @@ static PetscErrorCode solve(MPI_Comm comm, const char *sides, Motion *motion)
     "-effect_ball_obstacle sphere:0.17,0.05,0.07,0.04 -effect_meet_type collision -effect_meet_passes %s "
     "-time euler_implicit -ts_dt 0.003 -ts_max_time %g -snes_rtol 1e-11 -ksp_rtol 1e-10",
     sides, 0.003 * STEPS));
-  PetscCall(PetscOptionsClear(NULL));
-  PetscCall(SbOptionsReset());
-  PetscCall(SbRegisterAll());
-  PetscCall(PetscOptionsInsertString(NULL, text));
-  PetscCall(SbSceneCreate(comm, &t.model));
-  PetscCall(test_scene_run(&t));
-  PetscCall(SbModelSetUp(t.model));
-  PetscCall(SbRunSetUp(t.run));
-  t.run->want_energies = PETSC_TRUE;
-  PetscCall(SbRunAddMonitor(t.run, watch, motion, NULL));
-  PetscCall(verify_solve(&t, sides));
+  PetscCall(test_scene_open_on(comm, NULL, text, &t));
+  PetscCall(record_solve(&t, &motion->r));
   motion->n = verify_numbers(t.model);
-  motion->steps = t.run->steps_total;
   PetscCall(verify_gather(t.model, t.run->U, &motion->u));
   PetscCall(verify_gather(t.model, t.run->V, &motion->v));
   PetscCall(test_scene_close(&t));
@@ -73,39 +48,34 @@ static PetscErrorCode solve(MPI_Comm comm, const char *sides, Motion *motion)
 
 static PetscErrorCode check(const char *sides, PetscReal tolerance)
 {
-  Motion alone, together;
-  PetscReal off[3], most[3] = {0};
-  PetscInt other = 0;
+  static const char *const contacts[3] = {"floor_contacts", "ball_contacts", "meet_contacts"};
+  Motion m[2]; /* alone, together */
+  PetscReal force[2][STEPS + 1] = {{0}};
 
   PetscFunctionBeginUser;
-  PetscCall(solve(PETSC_COMM_SELF, sides, &alone));
-  PetscCall(solve(PETSC_COMM_WORLD, sides, &together));
-  off[0] = verify_difference(3 * alone.n, alone.u, together.u);
-  off[1] = verify_difference(3 * alone.n, alone.v, together.v);
-  off[2] = verify_difference(STEPS + 1, alone.column[3], together.column[3]);
-  for (int c = 0; c < 3; c++) {
-    for (int k = 0; k <= STEPS; k++) {
-      most[c] = PetscMax(most[c], alone.column[c][k]);
-      other += alone.column[c][k] != together.column[c][k];
-    }
+  verify_case("passes %s", sides);
+  for (int k = 0; k < 2; k++) {
+    PetscCall(solve(k ? PETSC_COMM_WORLD : PETSC_COMM_SELF, sides, &m[k]));
+    VERIFY_NEAR(m[k].r.steps, STEPS, 0, "steps");
+    for (PetscInt i = 0; i < m[k].r.n && i <= STEPS; i++)
+      force[k][i] = record_at(&m[k].r, "floor_force_z", i);
   }
-  PetscCall(PetscPrintf(
-    PETSC_COMM_WORLD,
-    "  passes %s, %d steps: at most %g, %g and %g contacts with floor, ball and each other, %d numbers "
-    "differ; displacement %.1e, velocity %.1e, force %.1e\n",
-    sides, (int)alone.steps, (double)most[0], (double)most[1], (double)most[2], (int)other, (double)off[0],
-    (double)off[1], (double)off[2]));
-  SB_CHECK(alone.steps == together.steps && alone.steps == STEPS, "%s: %d and %d steps", sides,
-           (int)alone.steps, (int)together.steps);
-  SB_CHECK(most[0] > 3 && most[1] > 0 && most[2] > 3, "%s: something is not met", sides);
-  SB_CHECK(!other, "%s: %d numbers of contacts differ", sides, (int)other);
-  SB_CHECK(off[0] < tolerance && off[1] < tolerance && off[2] < tolerance,
-           "%s: displacement differs by %g, velocity by %g, force by %g", sides, (double)off[0],
-           (double)off[1], (double)off[2]);
-  PetscCall(PetscFree(alone.u));
-  PetscCall(PetscFree(alone.v));
-  PetscCall(PetscFree(together.u));
-  PetscCall(PetscFree(together.v));
+  for (int c = 0; c < 3; c++) {
+    PetscInt other = 0;
+
+    for (PetscInt i = 0; i < m[0].r.n && i < m[1].r.n; i++)
+      other += record_at(&m[0].r, contacts[c], i) != record_at(&m[1].r, contacts[c], i);
+    VERIFY_MORE(record_max(&m[0].r, contacts[c]), c == 1 ? 0 : 3, contacts[c]);
+    VERIFY_NEAR(other, 0, 0, "numbers of contacts that differ");
+  }
+  VERIFY_LESS(verify_difference(3 * m[0].n, m[0].u, m[1].u), tolerance, "difference of displacements");
+  VERIFY_LESS(verify_difference(3 * m[0].n, m[0].v, m[1].v), tolerance, "difference of velocities");
+  VERIFY_LESS(verify_difference(STEPS + 1, force[0], force[1]), tolerance, "difference of forces");
+  for (int k = 0; k < 2; k++) {
+    PetscCall(PetscFree(m[k].u));
+    PetscCall(PetscFree(m[k].v));
+    PetscCall(record_free(&m[k].r));
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -27,53 +27,30 @@ static PetscReal leaving(PetscReal k, PetscReal tau)
   return v;
 }
 
-typedef struct {
-  const char *column;
-  PetscReal speed, force; /* at the end, m/s; the largest, N */
-} Damped;
-
-static PetscErrorCode watch(SbRun run, const SbStep *step, void *ctx)
-{
-  Damped *d = (Damped *)ctx;
-  PetscReal force;
-  SbEnergies e;
-
-  PetscFunctionBeginUser;
-  PetscCall(SbModelEnergies(run->model, step->U, step->V, &e));
-  PetscCall(contact_column(run, step->t, "meet", d->column, &force));
-  d->force = PetscMax(d->force, force);
-  d->speed = PetscSqrtReal(2 * e.kinetic / MASS);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* k: of all springs, N/m; set when there is no damper, by the largest force, SPEED sqrt(k MASS). */
 static PetscErrorCode check(const char *what, const char *scene, PetscReal tau, PetscReal *k)
 {
-  Damped d = {.column = strstr(scene, "collision") ? "normal_force" : "force_z"};
-  PetscReal expected;
-  TestScene t;
+  Record r = {0};
+  PetscReal speed;
 
   PetscFunctionBeginUser;
-  PetscCall(verify_open(
-    &t,
-    "-bodies %s -body_a_mesh box:0.05,0.05,0.05:1 -body_a_material linear -body_a_young %g -body_a_poisson "
-    "0.3 "
-    "-body_a_velocity 0,0,%g -effect_meet_response penalty -effect_meet_stiffness %g -effect_meet_damping %g "
-    "-time euler_implicit -ts_dt %g -ts_max_time 0.06 -snes_rtol 1e-10",
-    scene, YOUNG, -SPEED, FACTOR, (double)tau, STEP));
-  t.run->want_energies = PETSC_TRUE;
-  PetscCall(SbRunAddMonitor(t.run, watch, &d, NULL));
-  PetscCall(verify_solve(&t, "damper"));
-  if (tau == 0) *k = PetscSqr(d.force / SPEED) / MASS;
-  expected = leaving(*k, tau);
-  PetscCall(
-    PetscPrintf(PETSC_COMM_WORLD,
-                "  %s, damping %g s: springs of %.4g N/m, leaves with %.5f m/s, the oscillator with %.5f\n",
-                what, (double)tau, (double)*k, (double)d.speed, (double)expected));
-  SB_CHECK_NEAR(d.speed, expected, 0.02 * SPEED, "speed after the impact");
+  verify_case("%s, damping %g s", what, (double)tau);
+  PetscCall(record_run(
+    &r,
+    VERIFY_BODY("a", "box:0.05,0.05,0.05:1", "linear", "%g",
+                "0.3") "-body_a_velocity 0,0,%g "
+                       "-effect_meet_response penalty -effect_meet_stiffness %g -effect_meet_damping %g "
+                       "-time euler_implicit -ts_dt %g -ts_max_time 0.06 -snes_rtol 1e-10 -bodies %s",
+    YOUNG, -SPEED, FACTOR, (double)tau, STEP, scene));
+  if (tau == 0)
+    *k = PetscSqr(record_max(&r, strstr(scene, "collision") ? "meet_normal_force" : "meet_force_z") / SPEED) /
+         MASS;
+  verify_show("springs, N/m", *k);
+  speed = PetscSqrtReal(2 * record_last(&r, "kinetic") / MASS);
+  VERIFY_NEAR(speed, leaving(*k, tau), 0.02 * SPEED, "speed after the impact, m/s");
   /* what a spring gives back is motion again: less than there was */
-  SB_CHECK(d.speed <= SPEED, "%s: it leaves with %g m/s", what, (double)d.speed);
-  PetscCall(test_scene_close(&t));
+  VERIFY_LESS(speed, SPEED * (1 + PETSC_SMALL), "speed after the impact, m/s");
+  PetscCall(record_free(&r));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

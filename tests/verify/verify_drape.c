@@ -35,16 +35,14 @@ static PetscErrorCode lowered(TestScene *t, PetscReal depth[3])
 
 static PetscErrorCode check_drape(PetscBool rigid, PetscInt cells, PetscInt thick)
 {
-  const PetscInt n[3] = {4, 4, 4};
-  ContactBall ball = {RADIUS, PETSC_FALSE};
-  Pour p = {.w = {.obstacle = {rigid ? "ball" : NULL}, .meet = rigid ? NULL : "meet", .g = G}};
-  const ContactWatch *const w = &p.w;
-  PetscReal depth[3], weight, behind;
+  Record r = {.g = G};
+  PetscReal depth[3], weight, behind, inside = 0;
   char path[512], how[VERIFY_TEXT / 4];
   TestScene t;
 
   PetscFunctionBeginUser;
-  PetscCall(verify_mesh_write(n, contact_ball, &ball, path));
+  verify_case("drape, %s, %d cells thick", rigid ? "obstacle" : "body", (int)thick);
+  PetscCall(contact_ball_write(4, RADIUS, path));
   if (rigid)
     PetscCall(
       PetscSNPrintf(how, sizeof(how),
@@ -66,30 +64,21 @@ static PetscErrorCode check_drape(PetscBool rigid, PetscInt cells, PetscInt thic
     "-snes_rtol 1e-9 "
     "-ksp_rtol 1e-8",
     how, SIDE, SIDE, THICK, (int)cells, (int)cells, (int)thick, -0.5 * SIDE, -0.5 * SIDE, DROP));
-  t.run->want_energies = PETSC_TRUE;
-  PetscCall(SbRunAddMonitor(t.run, rigid ? contact_watch : pour_watch, &p, NULL));
-  PetscCall(verify_solve(&t, "drape"));
+  if (!rigid) PetscCall(SbRunAddMonitor(t.run, pour_watch, &inside, NULL));
+  PetscCall(record_solve(&t, &r));
   PetscCall(lowered(&t, depth));
-  weight = G * 1000 * SIDE * SIDE * THICK;
-  behind = PetscMax(w->behind, p.inside);
-  PetscCall(PetscPrintf(PETSC_COMM_WORLD,
-                        "  drape, %s, %d cells thick: corners %.4f m lower, sides %.4f m, middle %.4f m; "
-                        "energy gained %.1e J in a step, %.3g J "
-                        "lost; momentum off by %.1e kg m/s, penetration %.1e m, min J %.3f, fastest %.2g "
-                        "m/s, %g pairs, force up to %.3g of the "
-                        "weight; %d solves in %d steps, %d cut\n",
-                        rigid ? "obstacle" : "body", (int)thick, (double)depth[2], (double)depth[1],
-                        (double)depth[0], (double)w->gain, (double)(w->start - w->energy), (double)w->missing,
-                        (double)behind, (double)w->min_J, (double)t.run->energies.max_speed,
-                        (double)w->contacts, (double)(w->force / weight), (int)t.run->newton_total,
-                        (int)t.run->steps_total, (int)t.run->rejected_total));
-  SB_CHECK(depth[2] > depth[1] + 0.01 && depth[1] > depth[0] + 0.01 && depth[0] > 0.5 * DROP,
-           "the plate does not drape: %g, %g and %g m", (double)depth[2], (double)depth[1], (double)depth[0]);
-  SB_CHECK(behind < (rigid ? 1e-6 : 0.4) * THICK, "%g m inside the ball", (double)behind);
-  SB_CHECK(w->min_J > 0, "a cell is inverted");
-  SB_CHECK(w->gain < 1e-6 * weight * SIDE, "a step gained %g J", (double)w->gain);
-  if (rigid) SB_CHECK(w->missing < 1e-5, "momentum changed by %g kg m/s without a force", (double)w->missing);
   PetscCall(test_scene_close(&t));
+  weight = G * 1000 * SIDE * SIDE * THICK;
+  behind = rigid ? record_max(&r, "ball_penetration") : inside;
+  verify_show("solves", (PetscReal)r.newton);
+  VERIFY_MORE(depth[2], depth[1] + 0.01, "corners are lower by, m");
+  VERIFY_MORE(depth[1], depth[0] + 0.01, "middles of the sides are lower by, m");
+  VERIFY_MORE(depth[0], 0.5 * DROP, "the middle is lower by, m");
+  VERIFY_LESS(behind, (rigid ? 1e-6 : 0.4) * THICK, "inside the ball, m");
+  VERIFY_MORE(record_min(&r, "min_J"), 0, "least det F");
+  VERIFY_LESS(record_gain(&r, "energy"), 1e-6 * weight * SIDE, "largest gain of a step, J");
+  if (rigid) VERIFY_LESS(record_max(&r, "missing"), 1e-5, "momentum that no force explains, kg m/s");
+  PetscCall(record_free(&r));
   PetscCall(test_file_remove(path));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

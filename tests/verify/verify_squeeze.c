@@ -22,44 +22,6 @@ static void cushion(const PetscInt n[3], const PetscInt at[3], PetscReal x[3], v
   for (int k = 0; k < 3; k++) x[k] *= RADIUS;
 }
 
-typedef struct {
-  PetscReal force[2];      /* of the plates in the last step, z, N */
-  PetscReal last;          /* of the upper one in the step before, N */
-  PetscReal apart;         /* largest sum of both as a part of the force */
-  PetscReal drift;         /* of the centre of mass, z, m */
-  PetscReal behind, min_J; /* m */
-  PetscReal volume;        /* at rest, m^3 */
-  PetscReal fall;          /* largest loss of force in a step, N */
-  PetscReal contacts[2];   /* at the end */
-} Squeeze;
-
-static PetscErrorCode watch(SbRun run, const SbStep *step, void *ctx)
-{
-  static const char *const plates[2] = {"top", "bottom"};
-  Squeeze *s = (Squeeze *)ctx;
-
-  PetscFunctionBeginUser;
-  if (step->step == 0) {
-    s->volume = step->energies.volume;
-    s->min_J = 1;
-    PetscFunctionReturn(PETSC_SUCCESS);
-  }
-  for (int k = 0; k < 2; k++) {
-    PetscReal behind;
-
-    PetscCall(contact_column(run, step->t, plates[k], "force_z", &s->force[k]));
-    PetscCall(contact_column(run, step->t, plates[k], "contacts", &s->contacts[k]));
-    PetscCall(contact_column(run, step->t, plates[k], "penetration", &behind));
-    s->behind = PetscMax(s->behind, behind);
-  }
-  s->fall = PetscMax(s->fall, s->last + s->force[0]);
-  s->last = -s->force[0];
-  s->apart = PetscMax(s->apart, PetscAbsReal(s->force[0] + s->force[1]) / s->last);
-  s->drift = PetscMax(s->drift, PetscAbsReal(step->energies.centre[2]));
-  s->min_J = PetscMin(s->min_J, step->energies.min_J);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* Integral of the trace of the Cauchy stress over the deformed body, N m. */
 static PetscErrorCode stress_trace(TestScene *t, PetscReal *integral)
 {
@@ -93,12 +55,13 @@ static PetscErrorCode check_squeeze(const char *element, PetscInt cells, PetscRe
 {
   const PetscInt n[3] = {cells, cells, 2 * cells};
   const PetscReal young = 1e4;
-  Squeeze s = {.last = 0};
-  PetscReal trace, virial, lost, account;
+  Record r = {0};
+  PetscReal trace, force, work, apart = 0, fall = 0, drift;
   char path[512];
   TestScene t;
 
   PetscFunctionBeginUser;
+  verify_case("squeeze, %s, nu %g", element, (double)poisson);
   PetscCall(verify_mesh_write(n, cushion, NULL, path));
   PetscCall(verify_open(
     &t,
@@ -111,38 +74,34 @@ static PetscErrorCode check_squeeze(const char *element, PetscInt cells, PetscRe
     "-effect_bottom_type contact -effect_bottom_obstacle plane:0,0,1,%g -effect_bottom_displacement 0;0;%g*t "
     "-time static -static_steps %d -snes_rtol 1e-8 -ksp_rtol 1e-8",
     path, element, (double)young, (double)poisson, -RADIUS, -0.5 * RADIUS, -RADIUS, 0.5 * RADIUS, STEPS));
-  t.run->want_energies = PETSC_TRUE;
-  PetscCall(SbRunAddMonitor(t.run, watch, &s, NULL));
-  PetscCall(verify_solve(&t, "squeeze"));
+  PetscCall(record_solve(&t, &r));
   PetscCall(stress_trace(&t, &trace));
-  virial = s.force[0] * RADIUS / trace; /* it is RADIUS high now */
-  lost = 1 - t.run->energies.volume / s.volume;
-  account = t.run->energies.prescribed_work / t.run->energies.strain;
-  PetscCall(PetscPrintf(
-    PETSC_COMM_WORLD,
-    "  squeeze, %s, nu %g: %g and %g contacts, force %.4f N, both plates to %.1e of it, it fell by %.1e of "
-    "it at most; centre moved by %.1e m; volume lost %.3f %%\n",
-    element, (double)poisson, (double)s.contacts[0], (double)s.contacts[1], (double)s.last, (double)s.apart,
-    (double)(s.fall / s.last), (double)s.drift, (double)(100 * lost)));
-  PetscCall(PetscPrintf(
-    PETSC_COMM_WORLD,
-    "  work of the plates %.4f of the energy, height times force %.7f of the trace, penetration %.1e m, "
-    "min J %.3f, %d solves in %d steps, %d cut\n",
-    (double)account, (double)virial, (double)s.behind, (double)s.min_J, (int)t.run->newton_total,
-    (int)t.run->steps_total, (int)t.run->rejected_total));
-  SB_CHECK(s.apart < 1e-6, "%s: the plates push with forces that differ by %g", element, (double)s.apart);
-  SB_CHECK(s.fall < 2e-3 * s.last, "%s: the force fell by %g N", element, (double)s.fall);
-  SB_CHECK(s.contacts[0] == s.contacts[1] && s.contacts[0] > 10, "%s: %g and %g nodes touch", element,
-           (double)s.contacts[0], (double)s.contacts[1]);
-  SB_CHECK(s.drift < 1e-7 * RADIUS, "%s: the centre moved by %g m", element, (double)s.drift);
-  SB_CHECK(s.min_J > 0, "%s: det F %g", element, (double)s.min_J);
-  SB_CHECK(s.behind < 1e-6 * RADIUS, "%s: penetration %g m", element, (double)s.behind);
-  SB_CHECK(PetscAbsReal(lost) < swell, "%s, nu %g: the volume changed by %g", element, (double)poisson,
-           (double)lost);
-  SB_CHECK_NEAR(account, 1, 0.02, "work of the plates against the energy");
-  if (!strcmp(element, "p1"))
-    SB_CHECK_NEAR(virial, 1, 1e-6, "height times force against the trace of the stress");
+  work = t.run->energies.prescribed_work;
   PetscCall(test_scene_close(&t));
+  force = -record_last(&r, "top_force_z");
+  for (PetscInt i = 1; i < r.n; i++) {
+    const PetscReal top = record_at(&r, "top_force_z", i);
+
+    apart = PetscMax(apart, PetscAbsReal(top + record_at(&r, "bottom_force_z", i)) / -top);
+    fall = PetscMax(fall, top - (i > 1 ? record_at(&r, "top_force_z", i - 1) : 0));
+  }
+  drift = PetscMax(record_max(&r, "centre_z"), -record_min(&r, "centre_z"));
+  VERIFY_LESS(apart, 1e-6, "difference of the plates' forces, of the force");
+  VERIFY_LESS(fall, 2e-3 * force, "the force fell by, N");
+  VERIFY_MORE(record_last(&r, "top_contacts"), 10, "nodes at a plate");
+  VERIFY_NEAR(record_last(&r, "bottom_contacts"), record_last(&r, "top_contacts"), 0,
+              "nodes at the other one");
+  VERIFY_LESS(drift, 1e-7 * RADIUS, "motion of the centre, m");
+  VERIFY_MORE(record_min(&r, "min_J"), 0, "least det F");
+  for (int k = 0; k < 2; k++)
+    VERIFY_LESS(record_max(&r, k ? "top_penetration" : "bottom_penetration"), 1e-6 * RADIUS,
+                "behind a plate, m");
+  VERIFY_NEAR(record_last(&r, "volume") / record_at(&r, "volume", 0), 1, swell, "volume, of that at rest");
+  VERIFY_NEAR(work / record_last(&r, "strain"), 1, 0.02, "work of the plates against the energy");
+  /* it is RADIUS high now */
+  if (!strcmp(element, "p1"))
+    VERIFY_NEAR(-force * RADIUS / trace, 1, 1e-6, "height times force against the trace of the stress");
+  PetscCall(record_free(&r));
   PetscCall(test_file_remove(path));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -66,18 +66,18 @@ static PetscErrorCode write_blocks(PetscBool rough, size_t size, char text[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Keeps the displacement at a time. */
 typedef struct {
-  ContactWatch w;
   PetscReal since; /* s */
-  Vec U;           /* the displacement then, m */
-} Stack;
+  Vec U;           /* m */
+} Since;
 
-static PetscErrorCode watch(SbRun run, const SbStep *step, void *ctx)
+static PetscErrorCode keep(SbRun run, const SbStep *step, void *ctx)
 {
-  Stack *s = (Stack *)ctx;
+  Since *s = (Since *)ctx;
 
   PetscFunctionBeginUser;
-  PetscCall(contact_watch(run, step, &s->w));
+  (void)run;
   if (s->U || step->t < s->since) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(VecDuplicate(step->U, &s->U));
   PetscCall(VecCopy(step->U, s->U));
@@ -109,59 +109,47 @@ static PetscErrorCode check_forces(SbRun run, PetscReal t, PetscReal *vertical, 
 static PetscErrorCode check_stack(const char *sides, PetscReal friction, PetscReal slow, PetscReal depth)
 {
   const PetscReal end = friction > 0 ? 0.8 : 1, size = 0.12;
-  Stack s = {.w = {.obstacle = {"floor"}, .meet = "meet", .g = G}, .since = 0.8 * end};
-  const ContactWatch *w = &s.w;
-  PetscReal drift;
-  PetscReal vertical = 0, sideways = 0, sum = 0, floor = 0, normal = 0, weight;
+  Since at = {.since = 0.8 * end};
+  Record r = {.g = G};
+  PetscReal drift, vertical = 0, sideways = 0, sum = 0, weight;
   char bodies[VERIFY_TEXT / 2];
   TestScene t;
 
   PetscFunctionBeginUser;
+  verify_case("stack, passes %s, friction %g", sides, (double)friction);
   PetscCall(write_blocks((PetscBool)(friction > 0), sizeof(bodies), bodies));
-  PetscCall(verify_open(&t,
-                        "%s %s -effect_floor_type contact -effect_floor_on b0 "
-                        "-effect_floor_obstacle plane:0,0,1,0 -effect_floor_friction %g -effect_meet_type "
-                        "collision -effect_meet_passes %s "
-                        "-effect_meet_friction %g -time euler_implicit -ts_dt 0.01 -ts_max_time %g "
-                        "-snes_rtol 1e-10 -ksp_rtol 1e-9",
-                        bodies, friction > 0 ? "-effects gravity,floor,meet" : GUIDED, (double)friction,
-                        sides, (double)friction, (double)end));
-  t.run->want_energies = PETSC_TRUE;
-  PetscCall(SbRunAddMonitor(t.run, watch, &s, NULL));
-  PetscCall(verify_solve(&t, "stack"));
-  PetscCall(VecAXPY(s.U, -1, t.run->U));
-  PetscCall(VecNorm(s.U, NORM_INFINITY, &drift));
-  PetscCall(VecDestroy(&s.U));
-  weight = G * t.model->mass;
+  PetscCall(
+    verify_open(&t,
+                "%s %s -effect_floor_type contact -effect_floor_on b0 "
+                "-effect_floor_obstacle plane:0,0,1,0 -effect_floor_friction %g -effect_meet_type collision "
+                "-effect_meet_passes %s -effect_meet_friction %g -time euler_implicit -ts_dt 0.01 "
+                "-ts_max_time %g -snes_rtol 1e-10 -ksp_rtol 1e-9",
+                bodies, friction > 0 ? "-effects gravity,floor,meet" : GUIDED, (double)friction, sides,
+                (double)friction, (double)end));
+  PetscCall(SbRunAddMonitor(t.run, keep, &at, NULL));
+  PetscCall(record_solve(&t, &r));
+  PetscCall(VecAXPY(at.U, -1, t.run->U));
+  PetscCall(VecNorm(at.U, NORM_INFINITY, &drift));
+  PetscCall(VecDestroy(&at.U));
   PetscCall(check_forces(t.run, end, &vertical, &sideways, &sum));
-  PetscCall(contact_column(t.run, end, "floor", "force_z", &floor));
-  PetscCall(contact_column(t.run, end, "meet", "normal_force", &normal));
-  PetscCall(PetscPrintf(
-    PETSC_COMM_WORLD,
-    "  stack, passes %s, friction %g: forces %.1e from the weights above, sideways %.1e, floor %.1e, history "
-    "%.1e, fastest "
-    "%.1e m/s, penetration %.1e and %.1e m, momentum %.1e kg m/s, energy gained %.1e J, drift %.1e m, %d "
-    "solves in %d "
-    "steps\n",
-    sides, (double)friction, (double)vertical, (double)sideways, (double)(floor / weight - 1),
-    (double)(normal / sum - 1), (double)t.run->energies.max_speed, (double)w->behind, (double)w->deepest,
-    (double)w->missing, (double)w->gain, (double)drift, (int)t.run->newton_total, (int)t.run->steps_total));
-  SB_CHECK(vertical < 1e-3, "an interface carries %g of the weight above too much or too little",
-           (double)vertical);
-  if (friction > 0)
-    SB_CHECK(sideways < 1e-3, "a block is pushed aside by %g of its weight", (double)sideways);
-  SB_CHECK_NEAR(floor / weight, 1, 1e-3, "force of the floor against the weight");
-  SB_CHECK_NEAR(normal / sum, 1, 1e-3, "sum of the normal forces in the history against the weights");
-  SB_CHECK(t.run->energies.max_speed < slow, "a node moves by %g m/s", (double)t.run->energies.max_speed);
-  SB_CHECK(drift < 1e-5 * size, "a node has moved by %g m at rest", (double)drift);
-  SB_CHECK(w->behind <= 1e-6 * size && w->deepest <= depth * size, "penetration %g and %g m",
-           (double)w->behind, (double)w->deepest);
-  SB_CHECK(w->landings >= 1 && w->contacts > 20 && w->force > 1.2 * weight, "the blocks did not fall: %g N",
-           (double)w->force);
-  if (friction > 0) /* the guides of the other one push, too */
-    SB_CHECK(w->missing < 1e-4, "momentum changed by %g kg m/s without a force", (double)w->missing);
-  SB_CHECK(w->gain < 1e-6, "a step gained %g J", (double)w->gain);
   PetscCall(test_scene_close(&t));
+  weight = G * r.mass;
+  VERIFY_LESS(vertical, 1e-3, "force of an interface against the weight above, off by");
+  if (friction > 0) VERIFY_LESS(sideways, 1e-3, "force on a block sideways, of its weight");
+  VERIFY_NEAR(record_last(&r, "floor_force_z") / weight, 1, 1e-3, "force of the floor against the weight");
+  VERIFY_NEAR(record_last(&r, "meet_normal_force") / sum, 1, 1e-3,
+              "normal forces in the history against the weights");
+  VERIFY_LESS(record_last(&r, "speed"), slow, "fastest node, m/s");
+  VERIFY_LESS(drift, 1e-5 * size, "motion at rest, m");
+  VERIFY_LESS(record_max(&r, "floor_penetration"), 1e-6 * size, "behind the floor, m");
+  VERIFY_LESS(record_max(&r, "meet_penetration"), depth * size, "in each other, m");
+  SB_CHECK(record_starts(&r, "floor_contacts") >= 1, "the blocks did not fall");
+  VERIFY_MORE(record_max(&r, "meet_contacts"), 20, "pairs");
+  VERIFY_MORE(record_max(&r, "floor_force_z"), 1.2 * weight, "largest force of the floor, N");
+  if (friction > 0) /* the guides of the other one push, too */
+    VERIFY_LESS(record_max(&r, "missing"), 1e-4, "momentum that no force explains, kg m/s");
+  VERIFY_LESS(record_gain(&r, "energy"), 1e-6, "largest gain of a step, J");
+  PetscCall(record_free(&r));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -15,37 +15,9 @@
 #define PHASES 5  /* on one rank; elsewhere one will do */
 
 typedef struct {
-  PetscReal first,
-    last; /* steps between which the bar touches, s: where the first of them began, where the last one ended */
-  PetscReal before; /* end of the step before, s */
-  PetscReal velocity, gain, energy;
-  PetscInt off; /* steps that ended beside the grid of ts_dt */
-  PetscReal dt;
+  PetscReal first, last, velocity, gain; /* span of contact, s; at the end, m/s; of a step, J */
+  PetscInt off, solves, steps;           /* off: steps that ended beside the grid of ts_dt */
 } Impact;
-
-static PetscErrorCode watch(SbRun run, const SbStep *step, void *ctx)
-{
-  Impact *b = (Impact *)ctx;
-  const PetscBool wall = (PetscBool)(contact_effect(run->model, "wall") != NULL);
-  const char *name = wall ? "wall" : "meet";
-  PetscReal force, sum[6];
-  SbEnergies e;
-
-  PetscFunctionBeginUser;
-  PetscCall(SbModelEnergies(run->model, step->U, step->V, &e));
-  PetscCall(contact_column(run, step->t, name, wall ? "force_x" : "normal_force", &force));
-  PetscCall(contact_body_sums(run->model, step->V, PETSC_TRUE, sum));
-  b->velocity = sum[0] / 2.5; /* kg */
-  if (force > 1e-6 * FORCE) {
-    if (b->first == 0) b->first = b->before;
-    b->last = step->t;
-  }
-  if (step->step > 0) b->gain = PetscMax(b->gain, e.kinetic + e.strain - b->energy);
-  b->energy = e.kinetic + e.strain;
-  b->off += PetscAbsReal(step->t / b->dt - PetscFloorReal(step->t / b->dt + 0.5)) > 1e-6;
-  b->before = step->t;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
 
 #define BAR                                                                                                 \
   "-bodies a%s -body_a_mesh box:1,0.05,0.05:1 -body_a_material linear -body_a_young 1e5 -body_a_poisson 0 " \
@@ -60,22 +32,25 @@ static PetscErrorCode watch(SbRun run, const SbStep *step, void *ctx)
 
 /* A bar that is `phase` steps before the wall at the start. */
 static PetscErrorCode fly(const char *effects, const char *more, PetscReal phase, PetscReal dt, PetscReal end,
-                          Impact *b, PetscInt *solves, PetscInt *steps)
+                          Impact *b)
 {
-  char text[VERIFY_TEXT];
-  TestScene t;
+  const PetscBool wall = (PetscBool)!strstr(effects, "meet");
+  Record r = {0};
 
   PetscFunctionBeginUser;
-  *b = (Impact){.dt = dt};
-  PetscCall(PetscSNPrintf(text, sizeof(text), BAR "%s%s", strstr(effects, "meet") ? ",b" : "", (double)-SPEED,
-                          (double)(SPEED * phase * dt), (double)dt, (double)end, effects, more));
-  PetscCall(test_scene_open(text, &t));
-  t.run->want_energies = PETSC_TRUE;
-  PetscCall(SbRunAddMonitor(t.run, watch, b, NULL));
-  PetscCall(verify_solve(&t, more));
-  *solves = t.run->newton_total;
-  *steps = t.run->steps_total;
-  PetscCall(test_scene_close(&t));
+  PetscCall(record_run(&r, BAR "%s%s", wall ? "" : ",b", (double)-SPEED, (double)(SPEED * phase * dt),
+                       (double)dt, (double)end, effects, more));
+  *b = (Impact){.velocity = record_last(&r, "a_vx"),
+                .gain = record_gain(&r, "energy"),
+                .solves = r.newton,
+                .steps = r.steps};
+  record_span(&r, wall ? "wall_force_x" : "meet_normal_force", 1e-6 * FORCE, &b->first, &b->last);
+  for (PetscInt i = 0; i < r.n; i++) {
+    const PetscReal step = record_at(&r, "t", i) / dt;
+
+    b->off += PetscAbsReal(step - PetscFloorReal(step + 0.5)) > 1e-6;
+  }
+  PetscCall(record_free(&r));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -93,15 +68,14 @@ static PetscErrorCode measure(const char *effects, const char *more, PetscReal d
   *e = (Errors){0};
   for (int k = 0; k < phases; k++) {
     const PetscReal phase = 10.9 - 0.2 * k;
-    PetscInt solves, steps;
     Impact b;
 
-    PetscCall(fly(effects, more, phase, dt, end, &b, &solves, &steps));
+    PetscCall(fly(effects, more, phase, dt, end, &b));
     e->first = PetscMax(e->first, PetscAbsReal(b.first - phase * dt));
     e->duration = PetscMax(e->duration, PetscAbsReal(b.last - b.first - 0.2));
     e->velocity = PetscMax(e->velocity, PetscAbsReal(b.velocity / SPEED - 1));
-    e->solves += solves;
-    e->steps += steps;
+    e->solves += b.solves;
+    e->steps += b.steps;
     e->off += b.off;
     SB_CHECK(b.gain < 1e-12, "%s: a step gains %g J", more, (double)b.gain);
   }
@@ -146,14 +120,13 @@ static PetscErrorCode check(const char *effects, const char *name, const char *r
 static PetscErrorCode check_bounds(void)
 {
   static const PetscReal phase[] = {3.02, 3.98, 1000};
-  PetscInt solves, steps;
   Impact b;
 
   PetscFunctionBeginUser;
   for (int k = 0; k < 3; k++) {
-    PetscCall(fly(WALL, "-effect_wall_time_of_impact yes", phase[k], 0.002, 0.02, &b, &solves, &steps));
-    SB_CHECK(b.off == 0 && steps == 10, "%g steps before the wall: %d steps, %d of them beside the grid",
-             (double)phase[k], (int)steps, (int)b.off);
+    PetscCall(fly(WALL, "-effect_wall_time_of_impact yes", phase[k], 0.002, 0.02, &b));
+    SB_CHECK(b.off == 0 && b.steps == 10, "%g steps before the wall: %d steps, %d of them beside the grid",
+             (double)phase[k], (int)b.steps, (int)b.off);
     SB_CHECK((b.first > 0) == (k < 2), "%g steps before the wall: first touch at %g s", (double)phase[k],
              (double)b.first);
   }
