@@ -6,7 +6,7 @@
 
 /*
   The plan: sparsity graph of the owned node rows, split as PETSc splits it (diagonal part: owned columns; off-diagonal
-  part: ghost columns), and for each local cell the place of its width^2 node blocks in it. A block index k of row i is the same
+  part: ghost columns), and for each local cell the position of its width^2 node blocks in it. A block index k of row i is the same
   for BAIJ (values 9 k ..) and for AIJ with full 3x3 blocks (see block_position in tangent.c).
 */
 typedef struct _p_SbPlan {

@@ -1,5 +1,5 @@
 /*
-  sbbase.h - layer 0: options described by tables, formulas of time and place, log events, bounded strings.
+  sbbase.h - layer 0: options described by tables, formulas of time and position, log events, bounded strings.
 */
 #pragma once
 #include <petsc.h>
@@ -173,7 +173,7 @@ void SbMemoryReturnLarge(void);
   SbThreadsSetOne - from here on the libraries of this process (OpenMP's, BLAS) compute on the calling thread alone.
 
   Not collective. Returns the number of threads that some library would still use, 1 when all obey. Libraries that are loaded
-  later are not told: call it again.
+  later are not included: call it again.
 */
 int SbThreadsSetOne(void);
 
@@ -192,7 +192,7 @@ PetscErrorCode SbFormulaCreate(MPI_Comm comm, const char *text, const char *wher
                                SbFormula *formula); /* where: option name, for messages */
 PetscReal SbFormulaEval(SbFormula formula, PetscReal t,
                         const PetscReal x[3]); /* x may be NULL when the formula does not use it */
-PetscErrorCode SbFormulaUses(SbFormula formula, PetscBool *time, PetscBool *place);
+PetscErrorCode SbFormulaUses(SbFormula formula, PetscBool *time, PetscBool *position);
 PetscErrorCode SbFormulaDestroy(SbFormula *formula);
 /* Reads an option of kind SB_OPTION_FORMULA: `count` formulas as in the row; destroy each. */
 PetscErrorCode SbOptionFormulas(const SbScope *scope, const char *key, SbFormula formulas[]);
@@ -225,7 +225,7 @@ PetscErrorCode SbLogInitialize(void);
   SbLogNamed - the log event of something that a scene names: "SbEff_gravity", made when it is first asked for. What no scene of the
   process has named has none.
 
-  Not collective, but to be called alike on all ranks: PETSc tells events by their order.
+  Not collective, but to be called alike on all ranks: PETSc identifies events by their order.
 
   Input:
     kind, name - "Eff" (effects), "Mat" (laws), "Elem" (elements), "Field" (fields of fields.h5), "Out" (other output), "Est" (estimates), "Mesh" (re-meshing), and the name

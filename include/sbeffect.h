@@ -9,7 +9,7 @@
 
 typedef struct _p_SbEffect *SbEffect;
 
-/* A place where something pushes a body. */
+/* A point where something pushes a body. */
 typedef struct {
   PetscInt id[3];      /* numbers that name it among those of its effect, the same for any partition */
   PetscInt effect;     /* number of the effect in the scenario; filled by the model */
@@ -19,10 +19,10 @@ typedef struct {
   PetscReal gap;       /* m; negative inside */
   PetscReal force[3];  /* on the body that is pushed, with friction, N */
 } SbContactPoint;
-/* Start with {0}; the room is kept when n is set to zero. Release with PetscFree(list->place). */
+/* Start with {0}; the room is kept when n is set to zero. Release with PetscFree(list->point). */
 typedef struct {
   PetscInt n, size;
-  SbContactPoint *place; /* [n] */
+  SbContactPoint *point; /* [n] */
 } SbContactPoints;
 
 typedef struct {
@@ -38,7 +38,7 @@ typedef struct {
      t + dt, m; v0 are the velocities at t, m/s, NULL unless an effect has `restitution`. Collective. */
   PetscErrorCode (*begin_step)(SbEffect e, SbSpace space, PetscReal t, PetscReal dt, const PetscReal u0[],
                                const PetscReal v0[], const PetscReal u[]);
-  /* writes what contact holds by SbSpaceAddNodalConstraint(), and its rows by SbSpaceAddConstraint(). Not collective. */
+  /* adds the constraints of contact by SbSpaceAddNodalConstraint() and SbSpaceAddConstraint(). Not collective. */
   PetscErrorCode (*assemble_constraints)(SbEffect e, SbSpace space);
   /* after a solve, with the residual r without constraints, N: sets `changed` when another solve is needed. Collective. */
   PetscErrorCode (*update_active_set)(SbEffect e, SbSpace space, const PetscReal u[], const PetscReal r[],
@@ -51,8 +51,8 @@ typedef struct {
   PetscErrorCode (*restitution)(SbEffect e, PetscReal *work);
   /* its coefficients have `share` left of them in this step, 0..1: what bounces is constrained accordingly from now on. Not collective. */
   PetscErrorCode (*scale_restitution)(SbEffect e, PetscReal share);
-  /* contact, when a step of Newmark that ends at t has been solved: at what speed that moves on which it holds something, at the end, by
-     SbSpaceSetNodalConstraintVelocity() and SbSpaceSetConstraintVelocity(); bodies' rows have none. Not collective. */
+  /* contact, when a step of Newmark that ends at t has been solved: at what speed that moves to which it constrains something, at the end, by
+     SbSpaceSetNodalConstraintVelocity() and SbSpaceSetConstraintVelocity(); bodies' constraints have none. Not collective. */
   PetscErrorCode (*target_velocity)(SbEffect e, SbSpace space, const SbStage *stage);
   /* f[nnode][3] += what contact pushes owned nodes with, N, residual r as for history(). For output only; constraints between nodes add
      theirs without it. Not collective. */
@@ -74,8 +74,8 @@ typedef struct {
   /* for checkpoints: what the effect takes from step to step beyond displacement and velocity, as records of `nstate` numbers each, in
      which things have numbers that no partition changes; n of this rank, allocated here, the caller frees. Collective. */
   PetscErrorCode (*save)(SbEffect e, SbSpace space, PetscInt *n, PetscReal **records);
-  /* takes from the n records of all ranks what is this rank's, in place of what was there; local displacements u (m) at the time t at which they
-     were saved. hold() then writes the rows of that time. Collective. */
+  /* takes from the n records of all ranks what is this rank's, instead of what was there; local displacements u (m) at the time t at which they
+     were saved. assemble_constraints() then gives the constraints of that time. Collective. */
   PetscErrorCode (*load)(SbEffect e, SbSpace space, PetscReal t, const PetscReal u[], PetscInt n,
                          const PetscReal records[]);
   /* for re-meshing: the n records of all ranks from save() get the names of another mesh, in which node from[i] (original number; ascending) is to[i];
@@ -86,7 +86,7 @@ typedef struct {
      which on prescribed unknowns is the reaction. Values are this rank's part and are summed. */
   PetscErrorCode (*history)(SbEffect e, SbSpace space, const SbStage *stage, const PetscReal residual[],
                             PetscReal values[]);
-  /* adds the places where it pushes the bodies, those of this rank, residual as for history(); for output only. Not collective. */
+  /* adds the points where it pushes the bodies, those of this rank, residual as for history(); for output only. Not collective. */
   PetscErrorCode (*contact_points)(SbEffect e, SbSpace space, const SbStage *stage,
                                    const PetscReal residual[], SbContactPoints *list);
   /* for the summary when a run ends: a line on its work, "": nothing. Collective. */
@@ -103,10 +103,10 @@ struct _p_SbEffect {
   PetscBool linear;  /* force does not depend on u: the tangent stays constant. Default PETSC_TRUE */
   PetscBool steady;  /* no formula uses t: a static run multiplies the effect by the load factor */
   PetscBool dynamic; /* the run has inertia; known from set-up on */
-  PetscBool saddle;  /* its rows are to be solved with their multipliers as unknowns */
+  PetscBool saddle;  /* its constraints are to be solved with their multipliers as unknowns */
   PetscBool euler;   /* made for implicit Euler only. Default PETSC_FALSE */
   PetscBool
-    springs; /* of contact: it pushes with springs or friction, not by what it holds alone. Default PETSC_FALSE */
+    springs; /* of contact: it pushes with springs or friction, not with constraints alone. Default PETSC_FALSE */
   const struct SbEffectOn_ *prescribed; /* the sets whose nodes it prescribes in all directions; NULL: none */
   PetscInt nstate;                      /* numbers in a record of save() */
   PetscInt ncolumn;                     /* history columns, known after set-up */
@@ -141,7 +141,7 @@ PetscErrorCode SbEffectRegister(const char *type, PetscErrorCode (*create)(SbEff
 PetscErrorCode SbEffectCreate(const char *name, SbEffect *e);
 PetscErrorCode SbEffectDestroy(SbEffect *e); /* sets *e to NULL; NULL is accepted */
 /*
-  SbEffectMarkPrescribed - marks the sets that the effect holds in all directions (SbSet.held), for the space to be made.
+  SbEffectMarkPrescribed - marks the sets that the effect prescribes in all directions (SbSet.prescribed), for the space to be made.
 
   Not collective. Call it for every effect between SbMeshCreate() and SbSpaceCreate(). Names without a set are left to set-up.
 */

@@ -12,7 +12,7 @@ static const int SbPairA[10] = {0, 0, 0, 0, 1, 1, 1, 2, 2, 3};
 static const int SbPairB[10] = {0, 1, 2, 3, 1, 2, 3, 2, 3, 3};
 
 /*
-  SbElement - what tells one element from another. All are linear in a cell and have four nodes there: P1 at the vertices, CR
+  SbElement - what distinguishes one element from another. All are linear in a cell and have four nodes there: P1 at the vertices, CR
   and DG at the centroids of the faces, node a opposite vertex a. CR shares a node between the two cells of a face; in DG each
   cell has its own. They differ in `tabulate`, in the mass, and in the face terms (src/fem/jump.c).
 */
@@ -33,7 +33,7 @@ struct _p_SbElement {
   PetscInt nodes_per[4]; /* nodes per vertex, edge, face, cell. P1: 1,0,0,0; CR: 0,0,1,0; DG: 0,0,0,4 */
   PetscReal gamma0;      /* DG: factor on the penalty of mean jumps */
   PetscReal gamma1;      /* CR and DG: factor on the penalty of jumps */
-  PetscBool weak;        /* DG: a held boundary face gets a node of its own, to which the cell is tied */
+  PetscBool weak; /* DG: a prescribed boundary face gets a node of its own, to which the cell is tied */
   SbElementOps ops;
 };
 extern PetscFunctionList SbElementList;

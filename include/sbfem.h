@@ -36,8 +36,8 @@ typedef struct {
   that this rank owns.
 */
 typedef struct _p_SbJump *SbJump;
-typedef struct _p_SbHeld *SbNodalConstraints; /* src/fem/nodal_constraint.c */
-typedef struct _p_SbCouple *SbConstraints;    /* src/fem/constraint.c */
+typedef struct _p_SbNodalConstraints *SbNodalConstraints; /* src/fem/nodal_constraint.c */
+typedef struct _p_SbConstraints *SbConstraints;           /* src/fem/constraint.c */
 
 typedef struct _p_SbSpace *SbSpace;
 struct _p_SbSpace {
@@ -57,7 +57,7 @@ struct _p_SbSpace {
   PetscBool faces;     /* some body has its nodes at faces; if not, nodes are the mesh's vertices */
   PetscInt *neighbour; /* [ncell][4] local cell across each face, -1: none; NULL without face nodes */
   PetscInt *
-    dirichlet_node; /* [ncell][4] node without mass that a held boundary face of a DG cell is tied to, -1: none; NULL without any */
+    dirichlet_node; /* [ncell][4] node without mass that a prescribed boundary face of a DG cell is tied to, -1: none; NULL without any */
   const SbElement *element;   /* [nbody] borrowed */
   const SbMaterial *material; /* by SbMesh.cell_material; borrowed */
   PetscInt nregion;
@@ -73,8 +73,8 @@ struct _p_SbSpace {
   SbLane
     *batch_weight; /* [nbatch][4] weight of a cell's own node in the mean of the two; NULL when width is 4 */
   SbJump jump;     /* NULL without face nodes */
-  SbNodalConstraints nodal;  /* NULL unless an effect may hold nodes along directions of their own */
-  SbConstraints constraints; /* NULL unless an effect may join nodes by rows */
+  SbNodalConstraints nodal;  /* NULL unless an effect may constrain nodes along directions of their own */
+  SbConstraints constraints; /* NULL unless an effect may join nodes by constraints */
   SbLane *batch_g;           /* [nbatch][9] basis gradients of nodes 1..3, 1/m; 64-byte aligned */
   SbLane *batch_V;           /* [nbatch] volumes, m^3; 0 in padding; 64-byte aligned */
   void *batch_memory;        /* what batch_g and batch_V live in */
@@ -127,7 +127,7 @@ PetscErrorCode SbSpaceFinishTangent(SbSpace space, Mat A);
 /* Between the two: A += a 3x3 block (row-major, N/m) for two nodes a, b = 0..3 of a local cell. Not collective. */
 PetscErrorCode SbSpaceAddCellBlock(SbSpace space, Mat A, PetscInt cell, PetscInt a, PetscInt b,
                                    const PetscReal block[9]);
-/* The same for a spring from node a to something rigid, which may be all that holds a body: it reaches the coarse spaces of
+/* The same for a spring from node a to something rigid, which may be all that supports a body: it reaches the coarse spaces of
    -solver pressure too. The block is not negative; the rank that owns the node must be among the callers. */
 PetscErrorCode SbSpaceAddSpring(SbSpace space, Mat A, PetscInt cell, PetscInt a, const PetscReal block[9]);
 
@@ -153,7 +153,7 @@ PetscInt SbSpaceFixedIndex(SbSpace space, PetscInt node);
 PetscErrorCode SbSpaceCreateNodalConstraints(SbSpace space);
 void SbSpaceClearNodalConstraints(SbSpace space);
 /* n . u = value (m) at an owned node, n of length one. Returns the number of the direction at the node, 0..2, or -1 when the
-   node's earlier directions or prescribed unknowns hold it already: nothing is done then. */
+   node's earlier directions or prescribed unknowns contain it already: nothing is done then. */
 PetscInt SbSpaceAddNodalConstraint(SbSpace space, PetscInt node, const PetscReal n[3], PetscReal value);
 PetscErrorCode SbSpaceAssembleNodalConstraints(SbSpace space);
 /* u <- (I - Q) u + d, and f <- (I - Q) f, on owned nodes [nnode_owned][3]. Not collective. */
@@ -161,7 +161,7 @@ void SbNodalConstraintsPrescribe(SbSpace space, PetscReal u[]);
 void SbNodalConstraintsProject(SbSpace space, PetscReal f[]);
 /* Leaves of a residual what the constraints must exert: Q f, and f at prescribed unknowns. */
 void SbNodalConstraintsReaction(SbSpace space, PetscReal f[]);
-/* Speed along direction k of an owned node at the end of the step, m/s; 0 unless told. Then v <- the nearest velocity with these speeds,
+/* Speed along direction k of an owned node at the end of the step, m/s; 0 unless set. Then v <- the nearest velocity with these speeds,
    on owned nodes [nnode_owned][3]. Not collective. */
 void SbSpaceSetNodalConstraintVelocity(SbSpace space, PetscInt node, PetscInt k, PetscReal rate);
 void SbNodalConstraintsVelocity(SbSpace space, PetscReal v[]);
@@ -169,66 +169,66 @@ void SbNodalConstraintsVelocity(SbSpace space, PetscReal v[]);
 PetscReal SbSpaceGetNodalConstraintForce(SbSpace space, PetscInt node, PetscInt k, const PetscReal r[3]);
 
 /*
-  Rows that join nodes of any rank (contact between bodies, src/fem/constraint.c): sum_k coef_k . u_k = value, exactly or by a spring.
+  Constraints that join nodes of any rank (contact between bodies, src/fem/constraint.c): sum_k coef_k . u_k = value, exactly or by a spring.
 
-  SbSpaceCreateConstraints() during set-up of an effect that may need them. Then, as often as they change: SbSpaceClearConstraints(), rows on
+  SbSpaceCreateConstraints() during set-up of an effect that may need them. Then, as often as they change: SbSpaceClearConstraints(), constraints on
   any rank, SbSpaceAssembleConstraints() (collective). SbModelPrescribe(), residuals and solves follow: solves run in the null space of
   the exact constraints, or find their multipliers as unknowns. nonsymmetric: constraints may push along other coefficients than those of their sums; then
   solves are not symmetric.
 */
 /* How solves treat the exact constraints: in their null space, or as [K F^T; G 0] by a factorisation or by iterations. */
 typedef enum { SB_SADDLE_NONE, SB_SADDLE_DIRECT, SB_SADDLE_ITERATIVE } SbSaddle;
-/* external: constraints may hold nodes on something that is no body (those of a negative id), whose forces are reactions. Alike on all ranks. */
+/* external: constraints may join nodes to something that is no body (those of a negative id), whose forces are reactions. Alike on all ranks. */
 PetscErrorCode SbSpaceCreateConstraints(SbSpace space, PetscBool external, PetscBool nonsymmetric);
-/* Whether there may be such rows. Not collective. */
+/* Whether there may be such constraints. Not collective. */
 PetscBool SbSpaceHasExternalConstraints(SbSpace space);
 /* Whether solves of this space are not symmetric. Not collective. */
 PetscBool SbSpaceHasNonsymmetricConstraints(SbSpace space);
 /* Not collective. */
 void SbSpaceClearConstraints(SbSpace space);
-/* gnode[n]: global numbers of nodes; coef[n][3] of the sum; push[n][3] of the force, NULL: the same; value in m; id: rows that say nearly
+/* gnode[n]: global numbers of nodes; coef[n][3] of the sum; push[n][3] of the force, NULL: the same; value in m; id: constraints that say nearly
    what those of lower ids say rest, so that no partition changes which; negative: of a node and something that is no body, which rest only
-   if they are fully said by others. Output: row, its number on this rank. Not collective. */
+   if they are fully said by others. Output: constraint, its number on this rank. Not collective. */
 PetscErrorCode SbSpaceAddConstraint(SbSpace space, PetscInt id, PetscInt n, const PetscInt gnode[],
                                     const PetscReal coef[], const PetscReal push[], PetscReal value,
-                                    PetscInt *row);
-/* A force of constant + stiffness (value - sum_k coef_k . u_k) along the row, N; stiffness >= 0, N/m. Not collective. */
+                                    PetscInt *constraint);
+/* A force of constant + stiffness (value - sum_k coef_k . u_k) along the constraint, N; stiffness >= 0, N/m. Not collective. */
 PetscErrorCode SbSpaceAddPenaltyConstraint(SbSpace space, PetscInt n, const PetscInt gnode[],
                                            const PetscReal coef[], const PetscReal push[], PetscReal value,
-                                           PetscReal stiffness, PetscReal constant, PetscInt *row);
-/* The spring holds nodes on something that is no body: its force is a reaction. Not collective. */
-void SbSpaceSetConstraintExternal(SbSpace space, PetscInt row);
-/* Makes matrices of the rows; without rows on any rank it exchanges no more than their number. Collective. */
+                                           PetscReal stiffness, PetscReal constant, PetscInt *constraint);
+/* The spring joins nodes to something that is no body: its force is a reaction. Not collective. */
+void SbSpaceSetConstraintExternal(SbSpace space, PetscInt constraint);
+/* Makes matrices of the constraints; without constraints on any rank it exchanges no more than their number. Collective. */
 PetscErrorCode SbSpaceAssembleConstraints(SbSpace space);
-/* What rows exert and where they are, for the displacement U and its residual R without constraints (N). R <- R less the
+/* What constraints exert and where they are, for the displacement U and its residual R without constraints (N). R <- R less the
    forces of the exact constraints: what is left is for supports and obstacles. Collective. */
 PetscErrorCode SbSpaceComputeConstraintForces(SbSpace space, Vec U, Vec R);
-/* R += what rows of negative ids push free unknowns with, N, after SbSpaceComputeConstraintForces(). Collective. */
+/* R += what constraints of negative ids push free unknowns with, N, after SbSpaceComputeConstraintForces(). Collective. */
 PetscErrorCode SbSpaceAddConstraintReactions(SbSpace space, Vec R);
 /* Whether an exact constraint rests: others say it, or it has no free direction. It has no force, and its sum is not looked after. */
-PetscBool SbSpaceIsConstraintRedundant(SbSpace space, PetscInt row);
+PetscBool SbSpaceIsConstraintRedundant(SbSpace space, PetscInt constraint);
 /* What SbSpaceComputeConstraintForces() found: force (N, positive: it raises the sum) and sum_k coef_k . u_k (m). Not collective. */
-void SbSpaceGetConstraint(SbSpace space, PetscInt row, PetscReal *force, PetscReal *sum);
-/* Of the first n nodes of a row: the sum of its coefficients, and force += what it pushes them with, N, as SbSpaceComputeConstraintForces() has found
+void SbSpaceGetConstraint(SbSpace space, PetscInt constraint, PetscReal *force, PetscReal *sum);
+/* Of the first n nodes of a constraint: the sum of its coefficients, and force += what it pushes them with, N, as SbSpaceComputeConstraintForces() has found
    it. Not collective. */
-void SbSpaceGetConstraintForce(SbSpace space, PetscInt row, PetscInt n, PetscReal direction[3],
+void SbSpaceGetConstraintForce(SbSpace space, PetscInt constraint, PetscInt n, PetscReal direction[3],
                                PetscReal force[3]);
-/* F += what all rows exert at the displacement U, as SbSpaceComputeConstraintForces() has found it. Collective. */
+/* F += what all constraints exert at the displacement U, as SbSpaceComputeConstraintForces() has found it. Collective. */
 PetscErrorCode SbSpaceAddConstraintForces(SbSpace space, Vec U, Vec F);
 /* U <- nearest displacement on which the exact constraints hold. Collective. */
 PetscErrorCode SbConstraintsPrescribe(SbSpace space, Vec U);
 /*
-  Velocities of what exact constraints tie (src/fem/constraint_velocity.c). Rate: of the sum of a row at the end of the step, m/s, 0 unless told; not
+  Velocities of what exact constraints tie (src/fem/constraint_velocity.c). Rate: of the sum of a constraint at the end of the step, m/s, 0 unless set; not
   collective. Velocity: V <- the nearest one in the norm of the lumped mass that has these rates, and the impulses that this takes over
-  the length dt of the step (s) are added to the forces of the rows. Collective.
+  the length dt of the step (s) are added to the forces of the constraints. Collective.
 */
-PetscErrorCode SbSpaceSetConstraintVelocity(SbSpace space, PetscInt row, PetscReal rate);
+PetscErrorCode SbSpaceSetConstraintVelocity(SbSpace space, PetscInt constraint, PetscReal rate);
 PetscErrorCode SbConstraintsProjectVelocity(SbSpace space, PetscReal dt, Vec V);
 /* z <- the part of it that moves nothing that is prescribed, constrained, or tied by exact constraints. Collective. */
 PetscErrorCode SbSpaceProjectAdmissible(SbSpace space, Vec z);
 /* F <- F less the springs' forces, and without what the exact constraints take when `constrain`. Collective. */
 PetscErrorCode SbConstraintsResidual(SbSpace space, Vec U, PetscBool constrain, Vec F);
-/* Whether any node of any rank is constrained, or any row there, since the last Done. Not collective, alike on all ranks. */
+/* Whether any node of any rank is constrained, or any constraint there, since the last Done. Not collective, alike on all ranks. */
 PetscBool SbSpaceIsConstrained(SbSpace space);
 
 /* Per owned cell: Cauchy stress sigma[6] = xx yy zz xy yz xz (Pa), J, energy density (J/m^3, rest). Outputs may be NULL. */

@@ -75,7 +75,7 @@ typedef struct {
   struct {
     PetscInt set, material; /* set that holds the tets; number of the material */
   } inclusion[SB_INCLUSION_MAX];
-  SbMemoryMesh *in_memory; /* a mesh in memory in the place of the file, NULL: none; owned by the model */
+  SbMemoryMesh *in_memory; /* a mesh in memory instead of the file, NULL: none; owned by the model */
   /* found by SbMeshCreate(), equal on all ranks */
   PetscInt nvert, ncell, nfacet; /* global counts; nfacet counts boundary facets */
   PetscInt npart;                /* connected parts */
@@ -151,7 +151,7 @@ struct _p_SbMesh {
 };
 
 /*
-  SbMeshCreate - reads, checks, places, merges, partitions and distributes the bodies. Collective.
+  SbMeshCreate - reads, checks, transforms, merges, partitions and distributes the bodies. Collective.
 
   Input: comm; bodies and sets as the scenario gives them (their "found" fields are filled; both must outlive the mesh).
   Options read: -mesh_partitioner, -mesh_report (one line of checks and quality per body on rank 0).

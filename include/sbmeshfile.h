@@ -16,7 +16,7 @@ typedef PetscErrorCode (*SbMeshProgress)(const char *what, PetscInt64 done, Pets
 
   Input:
     body          - name (for messages; "": the file alone), mesh, mesh_step, scale, rotate, translate, tet
-    progress, ctx - told how far it is; progress may be NULL
+    progress, ctx - called with how far it is; progress may be NULL
   Output:
     import        - to be freed by SbMeshFileDestroy()
 */
@@ -40,7 +40,7 @@ typedef struct {
   PetscInt n;     /* simplices of this dimension in it */
   PetscReal size; /* their length, area or volume; m, m^2, m^3; 0 for points */
 } SbMeshGroup;
-/* Group i; *group is left alone when there is none, and *found tells. */
+/* Group i; *group is left alone when there is none, and *found says so. */
 PetscErrorCode SbMeshFileGroup(const SbImport *import, PetscInt i, SbMeshGroup *group, PetscBool *found);
 
 /* ------------------------------------------------------------------ size and shape */
@@ -107,6 +107,6 @@ typedef enum {
 /*
   SbMeshFileWrite - writes a mesh with all its groups: gmsh's .msh, or supple's .h5 with an .xmf beside it for ParaView.
 
-  The file is written beside its place and renamed when it is whole.
+  The file is written beside its target and renamed when it is whole.
 */
 PetscErrorCode SbMeshFileWrite(const SbImport *import, const char *path, SbMeshFormat format);

@@ -6,7 +6,7 @@
 
 #define SB_GROUP_MAX (2 * SB_NAME_MAX) /* longest name of a physical group, with the terminating zero */
 
-/* ------------------------------------------------------------------ numbers.c: from numbers of a file to places in memory */
+/* ------------------------------------------------------------------ numbers.c: from numbers of a file to indices in memory */
 
 typedef struct {
   int64_t number;
@@ -15,7 +15,7 @@ typedef struct {
 typedef struct {
   PetscInt n;
   int64_t first, ntable;
-  PetscInt *table;    /* [ntable] place of number first + i, or -1; NULL when the numbers are far apart */
+  PetscInt *table;    /* [ntable] index of number first + i, or -1; NULL when the numbers are far apart */
   SbNumbered *sorted; /* [n] then this */
   PetscBool repeated; /* a number stands twice */
   int64_t twice;      /* this one */
@@ -24,7 +24,7 @@ typedef struct {
 /* Prepares the way from number[n] to 0 ... n - 1; zeroed, or made before: then it is made again. */
 PetscErrorCode SbNumbersCreate(PetscInt n, const int64_t number[], SbNumbers *index);
 PetscErrorCode SbNumbersDestroy(SbNumbers *index);
-/* Place of a number, -1 when there is none. */
+/* Index of a number, -1 when there is none. */
 PetscInt SbNumbersFind(const SbNumbers *index, int64_t number);
 
 /* ------------------------------------------------------------------ scan.c: a file in memory */
@@ -43,7 +43,7 @@ typedef struct {
 PetscErrorCode SbScanOpen(const char *where, const char *path, SbScan *scan);
 PetscErrorCode SbScanClose(SbScan *scan);
 /* "line 12" or "byte 4711" of the last token. */
-const char *SbScanPlace(const SbScan *scan, char place[64]);
+const char *SbScanPosition(const SbScan *scan, char position[64]);
 /* Numbers, as text or, but for SbScanText(), in binary; `what` names what is expected there. */
 PetscErrorCode SbScanText(SbScan *scan, const char *what, int64_t *value);
 PetscErrorCode SbScanReal(SbScan *scan, const char *what, int64_t number,
@@ -61,10 +61,10 @@ void SbScanNext(SbScan *scan,
 PetscBool SbScanMore(SbScan *scan, char comment);
 #define SB_SCAN_ERROR(scan, ...)                                                    \
   do {                                                                              \
-    char sb_place[64], sb_text[512];                                                \
+    char sb_position[64], sb_text[512];                                             \
     (void)snprintf(sb_text, sizeof(sb_text), __VA_ARGS__);                          \
     SETERRQ(PETSC_COMM_SELF, PETSC_ERR_FILE_UNEXPECTED, "%s %s: %s", (scan)->where, \
-            SbScanPlace(scan, sb_place), sb_text);                                  \
+            SbScanPosition(scan, sb_position), sb_text);                            \
   } while (0)
 
 /* ------------------------------------------------------------------ import.c: one body in memory */
@@ -119,7 +119,7 @@ struct _p_SbImport {
   PetscReal scale;      /* given: factor that placing will use; a reader that has scaled sets it to 1 */
   char note[512];       /* what the reader repaired, for SbBody.note */
   PetscInt step; /* given: step of a run's output whose positions are wanted; 0 at rest, -1 the last one */
-  SbMeshProgress progress; /* given: told how far a long read is; may be NULL */
+  SbMeshProgress progress; /* given: called with how far a long read is; may be NULL */
   void *progress_ctx;
   /* while a file is read; SbImportForget() */
   SbScan scan;
@@ -135,7 +135,7 @@ struct _p_SbImport {
   PetscInt npinched;    /* surface edges with more than two facets */
 };
 
-/* Chooses the reader by the name of the mesh, reads, places. Not collective. */
+/* Chooses the reader by the name of the mesh, reads, transforms. Not collective. */
 PetscErrorCode SbImportRead(const SbBody *body, SbImport *import);
 PetscErrorCode SbImportDestroy(SbImport *import);
 /* Which rows of the arrays of an .h5 mesh a slab has: from first, in blocks of `block`, N in the file. */

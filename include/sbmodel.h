@@ -80,19 +80,19 @@ PetscErrorCode SbModelNonsymmetric(SbModel model, PetscReal t, Vec U, Vec X, Vec
 PetscErrorCode SbModelPrescribe(SbModel model, PetscReal t, Vec U);
 /*
   Contact, for effects that have it (model->nbegin_step > 0). Begin: before the first solve of a step from t to t + dt, U0 and V0 (NULL in
-  a static run) at t, to stay as they are until the step ends; U, the guess at t + dt, is put where contact holds it. Settle: after a solve with the residual R without constraints; `again` when
+  a static run) at t, to stay as they are until the step ends; U, the guess at t + dt, is put where the constraints hold. Update: after a solve with the residual R without constraints; `again` when
   what is constrained has changed: U is put there, and has to be solved for once more. Collective.
 */
 PetscErrorCode SbModelContactBeginStep(SbModel model, PetscReal t, PetscReal dt, Vec U0, Vec V0, Vec U);
 PetscErrorCode SbModelContactUpdateActiveSet(SbModel model, PetscReal t, Vec U, Vec R, PetscBool *again);
-/* After effects have loaded their state from a checkpoint: holds what was constrained then, so that forces and reactions of that time are known.
+/* After effects have loaded their state from a checkpoint: assembles the constraints of then, so that forces and reactions of that time are known.
    Collective. */
 PetscErrorCode SbModelContactResume(SbModel model);
 /* After the first Settle of a step: the part of it after which the first point arrives at what it did not touch before, 1: none
    does; effects that do not ask for it are not examined. Collective. */
 PetscErrorCode SbModelContactTimeOfImpact(SbModel model, PetscReal *part);
 /* V <- the nearest velocity in the norm of the lumped mass with which what touches stays so, after a step of the length dt that ended at
-   t with the displacement U; the forces of rows are raised by the impulses over dt. Collective. */
+   t with the displacement U; the forces of constraints are raised by the impulses over dt. Collective. */
 PetscErrorCode SbModelContactVelocity(SbModel model, PetscReal t, PetscReal dt, Vec U, Vec V);
 /* G = gap of each node along the normal of the nearest thing that it may touch, m, after the step that ended at t with the displacement U;
    0 where nothing is near. Collective. */
@@ -100,7 +100,7 @@ PetscErrorCode SbModelContactGap(SbModel model, PetscReal t, Vec U, Vec G);
 /* F = what contact pushes the nodes with, N, after the step that ended at t with the displacement U and the residual R without
    constraints. Collective. */
 PetscErrorCode SbModelContactForce(SbModel model, PetscReal t, Vec U, Vec R, Vec F);
-/* Appends the places of this rank where contact pushes bodies, after the same step. Collective. */
+/* Appends the points of this rank where contact pushes bodies, after the same step. Collective. */
 PetscErrorCode SbModelContactPoints(SbModel model, PetscReal t, Vec U, Vec R, SbContactPoints *list);
 /* Initial velocities of bodies (translation and spin). */
 PetscErrorCode SbModelInitialState(SbModel model, Vec U, Vec V);

@@ -70,7 +70,7 @@ PetscErrorCode SbOutputRestoreMeshes(SbRun run);
 
 /*
   SbOutputReattach - the output of a run goes on with another one of the same scene, whose bodies have other meshes: the same files, in which
-  the mesh changes. Collective; in place of SbOutputSetFromOptions() and SbOutputAttach() for `to`.
+  the mesh changes. Collective; instead of SbOutputSetFromOptions() and SbOutputAttach() for `to`.
 */
 PetscErrorCode SbOutputReattach(SbRun from, SbRun to);
 
@@ -87,7 +87,7 @@ typedef struct {
   PetscReal shift;               /* of the centre of mass of all bodies, m */
 } SbRemeshed;
 /* Prints a line and keeps it for run.json; without output it does nothing. Collective. */
-PetscErrorCode SbReportRemeshed(SbRun run, const SbRemeshed *told);
+PetscErrorCode SbReportRemeshed(SbRun run, const SbRemeshed *event);
 
 /* What people see: before the run, and after it (rank 0 prints, nothing with -quiet). The latter also ends run.json. Collective. */
 PetscErrorCode SbReportHeader(SbRun run);

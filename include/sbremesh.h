@@ -34,13 +34,13 @@ PetscErrorCode SbMesherDefault(const char *where, const SbHull *hull, PetscReal 
   SbRemesh - bodies get other meshes while the run goes on (src/remesh/remesh.c).
 
   Order of calls: SbRemeshSetFromOptions() after SbSceneCreate(); SbRemeshAttach() after SbRunSetUp() and SbLedgerAttach(), before
-  SbOutputAttach(), whose history gets the column remesh_loss; SbRemeshSolve() in the place of SbRunSolve(); SbRemeshDestroy().
+  SbOutputAttach(), whose history gets the column remesh_loss; SbRemeshSolve() instead of SbRunSolve(); SbRemeshDestroy().
 */
 typedef struct _p_SbRemesh *SbRemesh;
 PetscErrorCode SbRemeshRegister(void); /* option rows */
 /* Options read: -remesh_..., -body_<name>_remesh_quality. remesh: NULL when none of them asks for it. Collective. */
 PetscErrorCode SbRemeshSetFromOptions(SbModel model, SbRemesh *remesh);
-/* Who makes the tets, in place of SbMesherDefault(). Not collective. */
+/* Who makes the tets, instead of SbMesherDefault(). Not collective. */
 PetscErrorCode SbRemeshSetMesher(SbRemesh remesh, SbMesher mesher, void *ctx);
 /* NULL: nothing. Not collective. */
 PetscErrorCode SbRemeshAttach(SbRemesh remesh, SbRun run);

@@ -8,7 +8,7 @@
 typedef struct _SbSolverPreset {
   const char *name;
   SbMatrixKind matrix;   /* on several ranks SBAIJ becomes BAIJ */
-  PetscBool matrix_free; /* a matrix-free operator in place of the matrix */
+  PetscBool matrix_free; /* a matrix-free operator instead of the matrix */
   const char *options;   /* "-ksp_type cg -pc_type gamg ..." */
   const char *package;   /* of PETSc's that the row needs; NULL: none */
   PetscErrorCode (*precondition)(SbSpace space,
@@ -30,7 +30,7 @@ PetscErrorCode SbSolverChooseIndefinite(MPI_Comm comm, size_t size, char choice[
 /*
   SbSolverCountNegativeEigenvalues - eigenvalues below zero of the matrix that `snes` has factored last, in the null space of its contact constraints.
 
-  Collective. Output: negative, -1: the solver does not tell.
+  Collective. Output: negative, -1: the solver does not count them.
 */
 PetscErrorCode SbSolverCountNegativeEigenvalues(SNES snes, SbSpace space, PetscInt *negative);
 /*
@@ -50,10 +50,10 @@ PetscErrorCode SbSolverSetUp(SNES snes, SbSpace space, const SbSolverPreset *pre
 PetscErrorCode SbSolverUpdateSymmetry(KSP ksp, SbSpace space);
 /* M of such a pc, else pc itself. Not collective. */
 PetscErrorCode SbPCConstrainedGetInner(PC pc, PC *inner);
-/* Whether a factorisation of the saddle-point system stands in the place of M now. Not collective. */
+/* Whether a factorisation of the saddle-point system replaces M now. Not collective. */
 PetscErrorCode SbPCConstrainedIsFactored(PC pc, PetscBool *is);
 /*
-  SbSaddleChoose - how the saddle-point system of rows is solved: `choice` 0 by size, 1 directly, 2 by iterations, with the reason in words.
+  SbSaddleChoose - how the saddle-point system of constraints is solved: `choice` 0 by size, 1 directly, 2 by iterations, with the reason in words.
 
   Collective. Errors: PETSC_ERR_USER for 1 where this PETSc has no factorisation for it.
 */
@@ -146,8 +146,8 @@ PetscErrorCode SbPCRotatedGetStats(PC pc, PetscInt *nfactor, PetscInt *nexact, P
    factorisation. nface: nodes of the interface. Outputs may be NULL. Not collective. */
 PetscErrorCode SbPCRotatedGetWork(PC pc, PetscInt64 *interior, PetscInt64 *interface, PetscInt *nface);
 
-/* The operator of solves: K, its springs, projected. singular: K may be so, because only rows hold some body: it is made regular for
+/* The operator of solves: K, its springs, projected. singular: K may be so, because only constraints support some body: it is made regular for
    preconditioners, but for the operator; SB_SADDLE_DIRECT needs none of that. Collective; the caller destroys it; K is borrowed until then. */
 PetscErrorCode SbConstraintsCreateOperator(SbSpace space, Mat K, PetscBool singular, SbSaddle saddle, Mat *A);
-/* Another matrix in the place of K; borrowed. Not collective. */
+/* Another matrix instead of K; borrowed. Not collective. */
 PetscErrorCode SbConstraintsSetMatrix(SbSpace space, Mat K);

@@ -111,7 +111,7 @@ static PetscErrorCode supple(int argc, char *argv[])
     } else
       PetscCall(simulate(&scene));
 
-    /* the end; options that nobody has read are told */
+    /* the end; options that nobody has read are named */
     PetscCall(SbRemeshDestroy(&scene.remesh));
     PetscCall(SbLedgerDestroy(&scene.ledger));
     PetscCall(SbRunDestroy(&scene.run));

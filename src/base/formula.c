@@ -1,5 +1,5 @@
 /*
-  formula.c - formulas of time and place: recursive descent to a postfix program, run on a small stack.
+  formula.c - formulas of time and position: recursive descent to a postfix program, run on a small stack.
 
     expression = term { (+|-) term }
     term       = unary { (*|/) unary }
@@ -144,7 +144,7 @@ static PetscErrorCode word(Parser *p)
   for (int i = 0; i < 4; i++) {
     if (strcmp(name, variables[i])) continue;
     if (i)
-      p->formula->uses_place = PETSC_TRUE;
+      p->formula->uses_position = PETSC_TRUE;
     else
       p->formula->uses_time = PETSC_TRUE;
     PetscCall(emit(p, SB_OP_VARIABLE, i, 0, 1));
@@ -296,11 +296,11 @@ PetscReal SbFormulaEval(SbFormula f, PetscReal t, const PetscReal x[3])
   return stack[0];
 }
 
-PetscErrorCode SbFormulaUses(SbFormula formula, PetscBool *time, PetscBool *place)
+PetscErrorCode SbFormulaUses(SbFormula formula, PetscBool *time, PetscBool *position)
 {
   PetscFunctionBeginUser;
   *time = formula->uses_time;
-  *place = formula->uses_place;
+  *position = formula->uses_position;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -27,7 +27,7 @@ typedef struct {
 struct _p_SbFormula {
   PetscInt nstep;
   SbFormulaStep *step; /* [nstep] postfix; NULL for a table */
-  PetscBool uses_time, uses_place;
+  PetscBool uses_time, uses_position;
   PetscInt nrow;
   PetscReal *time;  /* [nrow] s, ascending */
   PetscReal *value; /* [nrow] */

@@ -173,7 +173,7 @@ static PetscErrorCode add_user(PetscInt *n, SbOptionUser **users, const char *na
 }
 
 /*
-  PETSc tells names and values apart only for options that nobody has read yet. Those that were read come as one
+  PETSc distinguishes names and values only for options that nobody has read yet. Those that were read come as one
   string; their names are known by being read, and a value goes on until the next name.
 */
 PetscErrorCode SbOptionUsersGet(PetscInt *n, SbOptionUser **users)

@@ -1,7 +1,7 @@
 /*
   option_check.c - options that nobody read: which are ours and misspelt, which are right but of no use in this run, which are PETSc's and did nothing.
 
-  PETSc cannot tell a misspelt option from one that an object created later would read, so it stays silent. Ours are all
+  PETSc cannot distinguish a misspelt option from one that an object created later would read, so it stays silent. Ours are all
   read before anything is computed. A name is ours when it begins with the prefix of one of our classes, when it is a
   program-wide key, or when it is within two edits of one and does not begin like an option of PETSc.
 

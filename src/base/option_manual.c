@@ -131,8 +131,8 @@ static PetscErrorCode headline(PetscViewer viewer, const SbOptionBlock *block, P
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Whether a text holds the word, in capitals or not. */
-static PetscBool holds(const char *text, const char *word)
+/* Whether a text contains the word, in capitals or not. */
+static PetscBool contains(const char *text, const char *word)
 {
   return (PetscBool)(strcasestr(text, word) != NULL);
 }
@@ -150,7 +150,7 @@ static PetscErrorCode answers(const SbOptionBlock *block, const SbOption *row, c
     *how = 3;
   else if (!block->klass[0] && !strncasecmp(row->key, topic, n) && (!row->key[n] || row->key[n] == '_'))
     *how = 2;
-  else if (holds(name, topic) || holds(row->help, topic) || holds(row->range, topic))
+  else if (contains(name, topic) || contains(row->help, topic) || contains(row->range, topic))
     *how = 1;
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -3,7 +3,7 @@
 
   CHOLMOD's OpenMP regions ask for a number of threads that was fixed when it was compiled, whatever OMP_NUM_THREADS says, and idle
   threads of GNU's OpenMP spin: two ranks on four cores then fight for them. A largest nesting level of 0 makes every
-  region run on its own thread. Threaded BLAS libraries are told separately. The functions are looked up among the libraries of the
+  region run on its own thread. Threaded BLAS libraries are set separately. The functions are looked up among the libraries of the
   process, so nothing of OpenMP is needed to build; where a library has none of them it has no threads either.
 */
 #include <dlfcn.h>

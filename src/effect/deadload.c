@@ -182,10 +182,10 @@ PetscErrorCode SbDeadLoadCreate(SbSpace space, PetscInt ncorner, PetscInt nitem,
   load->nitem = nitem;
   load->space = space;
   for (int i = 0; i < 3; i++) {
-    PetscBool time, place;
+    PetscBool time, position;
 
     load->density[i] = density[i];
-    PetscCall(SbFormulaUses(density[i], &time, &place));
+    PetscCall(SbFormulaUses(density[i], &time, &position));
     if (time) steady = PETSC_FALSE;
   }
   PetscCall(PetscMalloc1(ncorner * nitem, &load->corner));

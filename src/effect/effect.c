@@ -93,14 +93,14 @@ PetscErrorCode SbEffectDestroy(SbEffect *effect)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbContactPointsAdd(SbContactPoints *list, const SbContactPoint *place)
+PetscErrorCode SbContactPointsAdd(SbContactPoints *list, const SbContactPoint *point)
 {
   PetscFunctionBeginUser;
   if (list->n == list->size) {
     list->size = PetscMax(64, 2 * list->size);
-    PetscCall(PetscRealloc((size_t)list->size * sizeof(SbContactPoint), &list->place));
+    PetscCall(PetscRealloc((size_t)list->size * sizeof(SbContactPoint), &list->point));
   }
-  list->place[list->n++] = *place;
+  list->point[list->n++] = *point;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -118,17 +118,17 @@ PetscErrorCode SbEffectMarkPrescribed(SbEffect e, PetscInt nset, SbSet set[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbEffectFormulas(const SbScope *scope, const char *key, PetscInt n, PetscBool place,
+PetscErrorCode SbEffectFormulas(const SbScope *scope, const char *key, PetscInt n, PetscBool position,
                                 SbFormula formulas[], PetscBool *steady)
 {
   PetscFunctionBeginUser;
   PetscCall(SbOptionFormulas(scope, key, formulas));
   for (PetscInt i = 0; i < n; i++) {
-    PetscBool uses_time, uses_place;
+    PetscBool uses_time, uses_position;
 
-    PetscCall(SbFormulaUses(formulas[i], &uses_time, &uses_place));
+    PetscCall(SbFormulaUses(formulas[i], &uses_time, &uses_position));
     if (uses_time) *steady = PETSC_FALSE;
-    if (uses_place && !place) {
+    if (uses_position && !position) {
       char option[3 * SB_NAME_MAX];
 
       PetscCall(SbOptionName(scope, key, sizeof(option), option));

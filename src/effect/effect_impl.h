@@ -12,14 +12,14 @@
   Input:
     scope, key - as for SbOptionFormulas(); the row of the key says how many formulas there are (n)
     n          - how many the caller expects, 1..3
-    place      - whether the formulas may use x, y, z
+    position      - whether the formulas may use x, y, z
   Output:
     formulas[n] - the caller destroys each
     steady      - cleared when a formula uses t, untouched otherwise
 
   Errors: PETSC_ERR_USER_INPUT when a formula uses x, y or z and may not.
 */
-PetscErrorCode SbEffectFormulas(const SbScope *scope, const char *key, PetscInt n, PetscBool place,
+PetscErrorCode SbEffectFormulas(const SbScope *scope, const char *key, PetscInt n, PetscBool position,
                                 SbFormula formulas[], PetscBool *steady);
 
 /* The sets named by the option -effect_<name>_on, as read by SbEffectReadOn(). */
@@ -88,17 +88,17 @@ typedef struct {
 /*
   SbPrescribedSetUp - claims `components` (bits 0..2) of the nodes of the named sets. Collective; release with SbPrescribedFree().
 
-  Errors: PETSC_ERR_USER_INPUT when earlier effects already hold all of them.
+  Errors: PETSC_ERR_USER_INPUT when earlier effects have all of them already.
 */
-PetscErrorCode SbPrescribedSetUp(SbPrescribed *hold, SbSpace space, const SbEffectOn *on, int components);
+PetscErrorCode SbPrescribedSetUp(SbPrescribed *p, SbSpace space, const SbEffectOn *on, int components);
 /* Writes value[n][3] (NULL: zero), m, into space->fixed_value. Not collective; after SbSpaceFixDone(). */
-PetscErrorCode SbPrescribedSetValues(SbPrescribed *hold, SbSpace space, const PetscReal value[]);
-/* force[3] = sum over the owned held unknowns of the residual: what holds the body, acting on it, N. Not collective. */
-void SbPrescribedReaction(const SbPrescribed *hold, const PetscReal residual[], PetscReal force[3]);
-PetscErrorCode SbPrescribedFree(SbPrescribed *hold);
+PetscErrorCode SbPrescribedSetValues(SbPrescribed *p, SbSpace space, const PetscReal value[]);
+/* force[3] = sum over the owned prescribed unknowns of the residual: the reaction, acting on the body, N. Not collective. */
+void SbPrescribedReaction(const SbPrescribed *p, const PetscReal residual[], PetscReal force[3]);
+PetscErrorCode SbPrescribedFree(SbPrescribed *p);
 /* Bits of the choice "x|y|z|xy|yz|xz|xyz", by its position. */
 int SbPrescribedComponents(PetscInt choice);
 #define SB_COMPONENT_CHOICES "x|y|z|xy|yz|xz|xyz"
 
 /* Appends one. Not collective. */
-PetscErrorCode SbContactPointsAdd(SbContactPoints *list, const SbContactPoint *place);
+PetscErrorCode SbContactPointsAdd(SbContactPoints *list, const SbContactPoint *point);

@@ -16,7 +16,7 @@ typedef struct {
   SbEffectOn on;
   int components; /* bits 0..2 */
   SbPrescribed prescribed;
-} Support;
+} Fixed;
 
 static const SbOption rows[] = {
   {"on", SB_OPTION_NAMES, 1, "", NULL, "",
@@ -24,9 +24,9 @@ static const SbOption rows[] = {
   {"components", SB_OPTION_CHOICE, 1, "", "xyz", SB_COMPONENT_CHOICES, "directions that are constrained"},
 };
 
-static PetscErrorCode options_support(SbEffect e, const SbScope *scope)
+static PetscErrorCode options_fixed(SbEffect e, const SbScope *scope)
 {
-  Support *s = (Support *)e->data;
+  Fixed *s = (Fixed *)e->data;
   PetscInt choice;
 
   PetscFunctionBeginUser;
@@ -37,18 +37,18 @@ static PetscErrorCode options_support(SbEffect e, const SbScope *scope)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode setup_support(SbEffect e, SbSpace space)
+static PetscErrorCode setup_fixed(SbEffect e, SbSpace space)
 {
-  Support *s = (Support *)e->data;
+  Fixed *s = (Fixed *)e->data;
 
   PetscFunctionBeginUser;
   PetscCall(SbPrescribedSetUp(&s->prescribed, space, &s->on, s->components));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode prescribe_support(SbEffect e, SbSpace space, PetscReal t)
+static PetscErrorCode prescribe_fixed(SbEffect e, SbSpace space, PetscReal t)
 {
-  Support *s = (Support *)e->data;
+  Fixed *s = (Fixed *)e->data;
 
   PetscFunctionBeginUser;
   (void)t;
@@ -56,10 +56,10 @@ static PetscErrorCode prescribe_support(SbEffect e, SbSpace space, PetscReal t)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode history_support(SbEffect e, SbSpace space, const SbStage *stage,
-                                      const PetscReal residual[], PetscReal values[])
+static PetscErrorCode history_fixed(SbEffect e, SbSpace space, const SbStage *stage,
+                                    const PetscReal residual[], PetscReal values[])
 {
-  const Support *s = (const Support *)e->data;
+  const Fixed *s = (const Fixed *)e->data;
 
   PetscFunctionBeginUser;
   (void)space;
@@ -68,9 +68,9 @@ static PetscErrorCode history_support(SbEffect e, SbSpace space, const SbStage *
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode destroy_support(SbEffect e)
+static PetscErrorCode destroy_fixed(SbEffect e)
 {
-  Support *s = (Support *)e->data;
+  Fixed *s = (Fixed *)e->data;
 
   PetscFunctionBeginUser;
   PetscCall(SbEffectFreeOn(&s->on));
@@ -79,19 +79,19 @@ static PetscErrorCode destroy_support(SbEffect e)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode create_support(SbEffect e)
+static PetscErrorCode create_fixed(SbEffect e)
 {
   static const char *const columns[] = {"reaction_x", "reaction_y", "reaction_z"};
-  Support *s;
+  Fixed *s;
 
   PetscFunctionBeginUser;
   PetscCall(PetscNew(&s));
   e->data = s;
-  e->ops.setfromoptions = options_support;
-  e->ops.setup = setup_support;
-  e->ops.prescribe = prescribe_support;
-  e->ops.history = history_support;
-  e->ops.destroy = destroy_support;
+  e->ops.setfromoptions = options_fixed;
+  e->ops.setup = setup_fixed;
+  e->ops.prescribe = prescribe_fixed;
+  e->ops.history = history_fixed;
+  e->ops.destroy = destroy_fixed;
   e->column = columns;
   e->ncolumn = PETSC_STATIC_ARRAY_LENGTH(columns);
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -100,6 +100,6 @@ static PetscErrorCode create_support(SbEffect e)
 PetscErrorCode SbEffectRegister_Fixed(void)
 {
   PetscFunctionBeginUser;
-  PetscCall(SbEffectRegister("fixed", create_support, PETSC_STATIC_ARRAY_LENGTH(rows), rows));
+  PetscCall(SbEffectRegister("fixed", create_fixed, PETSC_STATIC_ARRAY_LENGTH(rows), rows));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

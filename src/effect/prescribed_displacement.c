@@ -6,7 +6,7 @@
 
     u(X, t) = d(t, X) + sin(theta) k x r + 2 sin^2(theta/2) k x (k x r).
 
-  X being a vertex, or with CR and DG the centroid of a triangle. Written this way nothing cancels at small angles. Reaction: force of the drive on the body (prescribed.c has the
+  X being a vertex, or with CR and DG the centroid of a triangle. Written this way nothing cancels at small angles. Reaction: force of the effect on the body (prescribed.c has the
   sign); torque: moment of that force about the axis at rest, taken with the current positions.
 */
 #include "effect_impl.h"
@@ -17,8 +17,8 @@ typedef struct {
   SbFormula displacement[3], angle;
   PetscReal point[3], axis[3]; /* m; unit vector */
   SbPrescribed prescribed;
-  PetscReal *value; /* [hold.n][3] m */
-} Drive;
+  PetscReal *value; /* [p.n][3] m */
+} PrescribedDisplacement;
 
 static const SbOption rows[] = {
   {"on", SB_OPTION_NAMES, 1, "", NULL, "",
@@ -32,9 +32,9 @@ static const SbOption rows[] = {
   {"axis_point", SB_OPTION_REALS, 3, "m", "0,0,0", "", "a point on the axis of rotation"},
 };
 
-static PetscErrorCode options_drive(SbEffect e, const SbScope *scope)
+static PetscErrorCode options_displacement(SbEffect e, const SbScope *scope)
 {
-  Drive *d = (Drive *)e->data;
+  PrescribedDisplacement *d = (PrescribedDisplacement *)e->data;
   PetscInt choice;
   PetscBool move, turn;
   PetscReal length = 0;
@@ -62,9 +62,9 @@ static PetscErrorCode options_drive(SbEffect e, const SbScope *scope)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode setup_drive(SbEffect e, SbSpace space)
+static PetscErrorCode setup_displacement(SbEffect e, SbSpace space)
 {
-  Drive *d = (Drive *)e->data;
+  PrescribedDisplacement *d = (PrescribedDisplacement *)e->data;
 
   PetscFunctionBeginUser;
   PetscCall(SbPrescribedSetUp(&d->prescribed, space, &d->on, d->components));
@@ -79,9 +79,9 @@ static inline void cross(const PetscReal a[3], const PetscReal b[3], PetscReal c
   c[2] = a[0] * b[1] - a[1] * b[0];
 }
 
-static PetscErrorCode prescribe_drive(SbEffect e, SbSpace space, PetscReal t)
+static PetscErrorCode prescribe_displacement(SbEffect e, SbSpace space, PetscReal t)
 {
-  Drive *d = (Drive *)e->data;
+  PrescribedDisplacement *d = (PrescribedDisplacement *)e->data;
   const PetscReal theta = SbFormulaEval(d->angle, t, NULL) * PETSC_PI / 180;
   const PetscReal half = PetscSinReal(theta / 2);
 
@@ -102,10 +102,10 @@ static PetscErrorCode prescribe_drive(SbEffect e, SbSpace space, PetscReal t)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode history_drive(SbEffect e, SbSpace space, const SbStage *stage,
-                                    const PetscReal residual[], PetscReal values[])
+static PetscErrorCode history_displacement(SbEffect e, SbSpace space, const SbStage *stage,
+                                           const PetscReal residual[], PetscReal values[])
 {
-  const Drive *d = (const Drive *)e->data;
+  const PrescribedDisplacement *d = (const PrescribedDisplacement *)e->data;
 
   PetscFunctionBeginUser;
   SbPrescribedReaction(&d->prescribed, residual, values);
@@ -124,9 +124,9 @@ static PetscErrorCode history_drive(SbEffect e, SbSpace space, const SbStage *st
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode destroy_drive(SbEffect e)
+static PetscErrorCode destroy_displacement(SbEffect e)
 {
-  Drive *d = (Drive *)e->data;
+  PrescribedDisplacement *d = (PrescribedDisplacement *)e->data;
 
   PetscFunctionBeginUser;
   PetscCall(SbEffectFreeOn(&d->on));
@@ -138,19 +138,19 @@ static PetscErrorCode destroy_drive(SbEffect e)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode create_drive(SbEffect e)
+static PetscErrorCode create_displacement(SbEffect e)
 {
   static const char *const columns[] = {"reaction_x", "reaction_y", "reaction_z", "torque"};
-  Drive *d;
+  PrescribedDisplacement *d;
 
   PetscFunctionBeginUser;
   PetscCall(PetscNew(&d));
   e->data = d;
-  e->ops.setfromoptions = options_drive;
-  e->ops.setup = setup_drive;
-  e->ops.prescribe = prescribe_drive;
-  e->ops.history = history_drive;
-  e->ops.destroy = destroy_drive;
+  e->ops.setfromoptions = options_displacement;
+  e->ops.setup = setup_displacement;
+  e->ops.prescribe = prescribe_displacement;
+  e->ops.history = history_displacement;
+  e->ops.destroy = destroy_displacement;
   e->column = columns;
   e->ncolumn = PETSC_STATIC_ARRAY_LENGTH(columns);
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -159,6 +159,7 @@ static PetscErrorCode create_drive(SbEffect e)
 PetscErrorCode SbEffectRegister_PrescribedDisplacement(void)
 {
   PetscFunctionBeginUser;
-  PetscCall(SbEffectRegister("prescribed_displacement", create_drive, PETSC_STATIC_ARRAY_LENGTH(rows), rows));
+  PetscCall(
+    SbEffectRegister("prescribed_displacement", create_displacement, PETSC_STATIC_ARRAY_LENGTH(rows), rows));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

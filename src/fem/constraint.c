@@ -1,5 +1,5 @@
 /*
-  Rows that join nodes anywhere: what contact between bodies needs. G u = c exactly, S u = s by springs.
+  Constraints that join nodes anywhere: what contact between bodies needs. G u = c exactly, S u = s by springs.
 
   Solves run in the null space of G (Gould, Hribar, Nocedal 2001, On the solution of equality constrained quadratic programming
   problems arising in optimization): with D a diagonal, one number per node, about the inverse of K's,
@@ -7,24 +7,25 @@
     P = I - D G^T (G D G^T)^-1 G,   A = P^T (K + S^T k S) P,   M_A^-1 = P M^-1 P^T
 
   D makes the projection blind to units and to stiffness: a hard body's node moves less than a soft one's. Every preconditioner M
-  of K serves, and neither the matrix nor M are renewed when rows come and go. What the rows exert is the least-squares
-  multiplier lambda = (G D G^T)^-1 G D r of the residual r. Rows that say the same twice (two surfaces whose vertices meet) leave
-  P right; constraint_select.c lets most of them rest.
+  of K serves, and neither the matrix nor M are renewed when constraints come and go. What the constraints exert is the least-squares
+  multiplier lambda = (G D G^T)^-1 G D r of the residual r. Constraints that repeat others (two surfaces whose vertices meet) leave
+  P right; constraint_select.c leaves most of them out.
 
-  G D G^T has the rows of all ranks, which are few, and is factored on each of them.
+  G D G^T has the constraints of all ranks, which are few, and is factored on each of them.
 
-  A row may push along other coefficients F than those of its sum: what slides with friction mu is pushed along n - mu d, d the
+  A constraint may push along other coefficients F than those of its sum: what slides with friction mu is pushed along n - mu d, d the
   direction of the slip. Then P = I - D F^T (G D F^T)^-1 G, forces are projected by I - F^T (G D F^T)^-1 G D, springs give F^T k G,
   and A is not symmetric.
 
-  Where an effect asks for it, the saddle-point system itself is solved in the place of A: saddle_factor.c, saddle.c.
+  Where an effect asks for it, the saddle-point system itself is solved instead of A: saddle_factor.c, saddle.c.
 
   Nodes that are prescribed or constrained (nodal_constraint.c) have no say: their columns are cleared or projected.
 */
 #include "fem_impl.h"
 #include "sbconstraint.h"
 
-#define NOTHING 1e-20 /* of the largest on that diagonal: rows below it have no free node but for rounding */
+#define NOTHING \
+  1e-20 /* of the largest on that diagonal: constraints below it have no free node but for rounding */
 
 PetscErrorCode SbSpaceCreateConstraints(SbSpace s, PetscBool external, PetscBool nonsymmetric)
 {
@@ -51,7 +52,7 @@ PetscBool SbSpaceHasNonsymmetricConstraints(SbSpace s)
   return (PetscBool)(s->constraints && s->constraints->nonsymmetric);
 }
 
-static PetscErrorCode destroy_rows(Rows *r)
+static PetscErrorCode destroy_matrix(SbConstraintMatrix *r)
 {
   PetscFunctionBeginUser;
   PetscCall(MatDestroy(&r->full));
@@ -69,8 +70,8 @@ static PetscErrorCode destroy_rows(Rows *r)
 static PetscErrorCode destroy_matrices(SbConstraints c)
 {
   PetscFunctionBeginUser;
-  PetscCall(destroy_rows(&c->exact));
-  PetscCall(destroy_rows(&c->spring));
+  PetscCall(destroy_matrix(&c->exact));
+  PetscCall(destroy_matrix(&c->spring));
   PetscCall(VecDestroy(&c->k));
   PetscCall(VecDestroy(&c->constants));
   PetscCall(MatDestroy(&c->DFt));
@@ -79,9 +80,9 @@ static PetscErrorCode destroy_matrices(SbConstraints c)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbConstraintsDestroy(SbConstraints *couple)
+PetscErrorCode SbConstraintsDestroy(SbConstraints *constraints)
 {
-  SbConstraints c = *couple;
+  SbConstraints c = *constraints;
 
   PetscFunctionBeginUser;
   if (!c) PetscFunctionReturn(PETSC_SUCCESS);
@@ -100,12 +101,12 @@ PetscErrorCode SbConstraintsDestroy(SbConstraints *couple)
   PetscCall(PetscFree(c->gnode));
   PetscCall(PetscFree(c->coef));
   PetscCall(PetscFree(c->along));
-  PetscCall(PetscFree7(c->value, c->stiffness, c->constant, c->place, c->force, c->sum, c->id));
-  PetscCall(PetscFree(*couple));
+  PetscCall(PetscFree7(c->value, c->stiffness, c->constant, c->position, c->force, c->sum, c->id));
+  PetscCall(PetscFree(*constraints));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* ------------------------------------------------------------------ rows */
+/* ------------------------------------------------------------------ constraints */
 
 void SbSpaceClearConstraints(SbSpace s)
 {
@@ -121,11 +122,11 @@ static PetscErrorCode make_room(SbConstraints c, PetscInt more)
   if (c->n == c->size) {
     const PetscInt size = PetscMax(64, 2 * c->size);
     PetscReal *value, *stiffness, *constant, *force, *sum;
-    PetscInt *place, *id;
+    PetscInt *position, *id;
     PetscBool *rests;
 
-    PetscCall(PetscMalloc7(size, &value, size, &stiffness, size, &constant, size, &place, size, &force, size,
-                           &sum, size, &id));
+    PetscCall(PetscMalloc7(size, &value, size, &stiffness, size, &constant, size, &position, size, &force,
+                           size, &sum, size, &id));
     PetscCall(PetscArraycpy(value, c->value, c->n));
     PetscCall(PetscArraycpy(stiffness, c->stiffness, c->n));
     PetscCall(PetscArraycpy(constant, c->constant, c->n));
@@ -134,11 +135,11 @@ static PetscErrorCode make_room(SbConstraints c, PetscInt more)
     PetscCall(PetscArraycpy(id, c->id, c->n));
     PetscCall(PetscMalloc1(size, &rests));
     PetscCall(PetscFree(c->redundant));
-    PetscCall(PetscFree7(c->value, c->stiffness, c->constant, c->place, c->force, c->sum, c->id));
+    PetscCall(PetscFree7(c->value, c->stiffness, c->constant, c->position, c->force, c->sum, c->id));
     c->value = value;
     c->stiffness = stiffness;
     c->constant = constant;
-    c->place = place;
+    c->position = position;
     c->id = id;
     c->redundant = rests;
     c->force = force;
@@ -157,7 +158,7 @@ static PetscErrorCode make_room(SbConstraints c, PetscInt more)
 
 PetscErrorCode SbSpaceAddPenaltyConstraint(SbSpace s, PetscInt n, const PetscInt gnode[],
                                            const PetscReal coef[], const PetscReal push[], PetscReal value,
-                                           PetscReal stiffness, PetscReal constant, PetscInt *row)
+                                           PetscReal stiffness, PetscReal constant, PetscInt *constraint)
 {
   SbConstraints c = s->constraints;
 
@@ -175,23 +176,23 @@ PetscErrorCode SbSpaceAddPenaltyConstraint(SbSpace s, PetscInt n, const PetscInt
   c->id[c->n] = 0;
   c->nentry += n;
   c->start[c->n + 1] = c->nentry;
-  *row = c->n++;
+  *constraint = c->n++;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode SbSpaceAddConstraint(SbSpace s, PetscInt id, PetscInt n, const PetscInt gnode[],
                                     const PetscReal coef[], const PetscReal push[], PetscReal value,
-                                    PetscInt *row)
+                                    PetscInt *constraint)
 {
   PetscFunctionBeginUser;
-  PetscCall(SbSpaceAddPenaltyConstraint(s, n, gnode, coef, push, value, -1., 0., row));
-  s->constraints->id[*row] = id;
+  PetscCall(SbSpaceAddPenaltyConstraint(s, n, gnode, coef, push, value, -1., 0., constraint));
+  s->constraints->id[*constraint] = id;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-void SbSpaceSetConstraintExternal(SbSpace s, PetscInt row)
+void SbSpaceSetConstraintExternal(SbSpace s, PetscInt constraint)
 {
-  s->constraints->id[row] = -1;
+  s->constraints->id[constraint] = -1;
 }
 
 static inline PetscBool of_kind(SbConstraints c, PetscInt i, PetscBool exact)
@@ -199,8 +200,8 @@ static inline PetscBool of_kind(SbConstraints c, PetscInt i, PetscBool exact)
   return (PetscBool)((c->stiffness[i] < 0.) == exact && !c->redundant[i]);
 }
 
-/* The rows of one kind as a matrix, with the coefficients coef[][3]. */
-static PetscErrorCode create_matrix(SbSpace s, PetscBool exact, const Rows *r, PetscInt widest,
+/* The constraints of one kind as a matrix, with the coefficients coef[][3]. */
+static PetscErrorCode create_matrix(SbSpace s, PetscBool exact, const SbConstraintMatrix *r, PetscInt widest,
                                     const PetscReal coef[], Mat *A)
 {
   SbConstraints c = s->constraints;
@@ -213,7 +214,7 @@ static PetscErrorCode create_matrix(SbSpace s, PetscBool exact, const Rows *r, P
   for (PetscInt i = 0; i < c->n; i++) {
     if (!of_kind(c, i, exact)) continue;
     for (PetscInt e = c->start[i]; e < c->start[i + 1]; e++) {
-      const PetscInt row = first + c->place[i], g = 3 * c->gnode[e], column[3] = {g, g + 1, g + 2};
+      const PetscInt row = first + c->position[i], g = 3 * c->gnode[e], column[3] = {g, g + 1, g + 2};
 
       PetscCall(MatSetValues(*A, 1, &row, 3, column, coef + 3 * e, ADD_VALUES));
     }
@@ -223,8 +224,8 @@ static PetscErrorCode create_matrix(SbSpace s, PetscBool exact, const Rows *r, P
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The rows of one kind; c->tilted is alike on all ranks. */
-static PetscErrorCode create_rows(SbSpace s, PetscBool exact, Rows *r)
+/* The constraints of one kind; c->tilted is alike on all ranks. */
+static PetscErrorCode create_kind(SbSpace s, PetscBool exact, SbConstraintMatrix *r)
 {
   SbConstraints c = s->constraints;
   PetscInt widest = 1;
@@ -235,7 +236,7 @@ static PetscErrorCode create_rows(SbSpace s, PetscBool exact, Rows *r)
   for (PetscInt i = 0; i < c->n; i++) {
     if (!of_kind(c, i, exact)) continue;
     widest = PetscMax(widest, 3 * (c->start[i + 1] - c->start[i]));
-    c->place[i] = r->n++;
+    c->position[i] = r->n++;
   }
   PetscCallMPI(MPI_Allreduce(&r->n, &r->N, 1, MPIU_INT, MPI_SUM, s->comm));
   if (!r->N) PetscFunctionReturn(PETSC_SUCCESS);
@@ -252,7 +253,7 @@ static PetscErrorCode create_rows(SbSpace s, PetscBool exact, Rows *r)
   PetscCall(VecDuplicate(r->value, &r->step));
   PetscCall(VecGetArrayWrite(r->value, &value));
   for (PetscInt i = 0; i < c->n; i++) {
-    if (of_kind(c, i, exact)) value[c->place[i]] = c->value[i];
+    if (of_kind(c, i, exact)) value[c->position[i]] = c->value[i];
   }
   PetscCall(VecRestoreArrayWrite(r->value, &value));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -281,7 +282,7 @@ static PetscErrorCode create_projector(SbSpace s, Mat *H)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Clears what prescribed unknowns and constrained directions (I - Q in H, NULL: none) would say in a matrix of rows. */
+/* Clears what prescribed unknowns and constrained directions (I - Q in H, NULL: none) would say in a matrix of constraints. */
 static PetscErrorCode create_free(SbSpace s, Mat full, Mat H, Mat *free)
 {
   PetscFunctionBeginUser;
@@ -293,7 +294,7 @@ static PetscErrorCode create_free(SbSpace s, Mat full, Mat H, Mat *free)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode free_rows(SbSpace s, Rows *r)
+static PetscErrorCode create_free_parts(SbSpace s, SbConstraintMatrix *r)
 {
   Mat H = NULL;
 
@@ -356,7 +357,7 @@ static PetscErrorCode weigh_nodes(SbSpace s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Keeps the factorisation solvable: rows that depend on others. Rows without a free direction can do nothing and rest. */
+/* Keeps the factorisation solvable: constraints that depend on others. Constraints without a free direction can do nothing and are redundant. */
 static PetscErrorCode regularise(SbConstraints c)
 {
   PetscReal largest;
@@ -370,10 +371,10 @@ static PetscErrorCode regularise(SbConstraints c)
   PetscCall(VecGetArray(d, &x));
   for (PetscInt i = 0; i < c->n; i++) {
     if (!of_kind(c, i, PETSC_TRUE)) continue;
-    if (x[c->place[i]] > NOTHING * largest)
-      x[c->place[i]] *= 1. + SB_CONSTRAINT_REGULARIZATION;
+    if (x[c->position[i]] > NOTHING * largest)
+      x[c->position[i]] *= 1. + SB_CONSTRAINT_REGULARIZATION;
     else {
-      x[c->place[i]] = largest > 0. ? largest : 1.;
+      x[c->position[i]] = largest > 0. ? largest : 1.;
       c->redundant[i] = PETSC_TRUE;
     }
   }
@@ -384,8 +385,8 @@ static PetscErrorCode regularise(SbConstraints c)
 }
 
 /*
-  A body that only rows hold makes K singular, which no factorisation takes. In a static run the matrix gets s_i times the squares
-  of the rows' coefficients on its diagonal, s_i the size of the node's block; the operator takes it away again, so that only M
+  A body that only constraints support makes K singular, which no factorisation takes. In a static run the matrix gets s_i times the squares
+  of the constraints' coefficients on its diagonal, s_i the size of the node's block; the operator takes it away again, so that only M
   knows of it.
 */
 static PetscErrorCode find_anchors(SbSpace s)
@@ -461,8 +462,8 @@ static PetscErrorCode create_springs(SbConstraints c)
   PetscCall(VecGetArray(c->constants, &constant));
   for (PetscInt i = 0; i < c->n; i++) {
     if (c->stiffness[i] < 0.) continue;
-    k[c->place[i]] = c->stiffness[i];
-    constant[c->place[i]] = c->constant[i];
+    k[c->position[i]] = c->stiffness[i];
+    constant[c->position[i]] = c->constant[i];
   }
   PetscCall(VecRestoreArray(c->k, &k));
   PetscCall(VecRestoreArray(c->constants, &constant));
@@ -489,10 +490,10 @@ PetscErrorCode SbSpaceAssembleConstraints(SbSpace s)
   PetscCall(create_vectors(s));
   PetscCall(SbConstraintsFindRedundant(s));
   PetscCall(find_anchors(s));
-  PetscCall(create_rows(s, PETSC_TRUE, &c->exact));
-  PetscCall(create_rows(s, PETSC_FALSE, &c->spring));
-  PetscCall(free_rows(s, &c->exact));
-  PetscCall(free_rows(s, &c->spring));
+  PetscCall(create_kind(s, PETSC_TRUE, &c->exact));
+  PetscCall(create_kind(s, PETSC_FALSE, &c->spring));
+  PetscCall(create_free_parts(s, &c->exact));
+  PetscCall(create_free_parts(s, &c->spring));
   PetscCall(create_gram(s));
   PetscCall(create_springs(c));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -591,7 +592,7 @@ PetscErrorCode SbConstraintsResidual(SbSpace s, Vec U, PetscBool constrain, Vec 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Values of a kind's rows for the effect that made them. */
+/* Values of a kind's constraints for the effect that made them. */
 static PetscErrorCode hand_out(SbConstraints c, PetscBool exact, Vec from, PetscReal to[])
 {
   const PetscScalar *x;
@@ -599,7 +600,7 @@ static PetscErrorCode hand_out(SbConstraints c, PetscBool exact, Vec from, Petsc
   PetscFunctionBeginUser;
   PetscCall(VecGetArrayRead(from, &x));
   for (PetscInt i = 0; i < c->n; i++) {
-    if (of_kind(c, i, exact)) to[i] = x[c->place[i]];
+    if (of_kind(c, i, exact)) to[i] = x[c->position[i]];
   }
   PetscCall(VecRestoreArrayRead(from, &x));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -628,8 +629,8 @@ PetscErrorCode SbSpaceComputeConstraintForces(SbSpace s, Vec U, Vec R)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* R += what the rows of negative ids push free unknowns with, those of one kind. */
-static PetscErrorCode add_reaction(SbConstraints c, PetscBool exact, const Rows *r, Vec R)
+/* R += what the constraints of negative ids push free unknowns with, those of one kind. */
+static PetscErrorCode add_reaction(SbConstraints c, PetscBool exact, const SbConstraintMatrix *r, Vec R)
 {
   PetscScalar *x;
 
@@ -638,7 +639,7 @@ static PetscErrorCode add_reaction(SbConstraints c, PetscBool exact, const Rows 
   PetscCall(VecCopy(r->force, r->work));
   PetscCall(VecGetArray(r->work, &x));
   for (PetscInt i = 0; i < c->n; i++) {
-    if (of_kind(c, i, exact) && c->id[i] >= 0) x[c->place[i]] = 0.;
+    if (of_kind(c, i, exact) && c->id[i] >= 0) x[c->position[i]] = 0.;
   }
   PetscCall(VecRestoreArray(r->work, &x));
   PetscCall(MatMultTransposeAdd(r->push_free, r->work, R, R));
@@ -666,25 +667,25 @@ PetscErrorCode SbSpaceAddConstraintForces(SbSpace s, Vec U, Vec F)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscBool SbSpaceIsConstraintRedundant(SbSpace s, PetscInt row)
+PetscBool SbSpaceIsConstraintRedundant(SbSpace s, PetscInt constraint)
 {
-  return s->constraints->redundant[row];
+  return s->constraints->redundant[constraint];
 }
 
-void SbSpaceGetConstraint(SbSpace s, PetscInt row, PetscReal *force, PetscReal *sum)
+void SbSpaceGetConstraint(SbSpace s, PetscInt constraint, PetscReal *force, PetscReal *sum)
 {
-  *force = s->constraints->force[row];
-  *sum = s->constraints->sum[row];
+  *force = s->constraints->force[constraint];
+  *sum = s->constraints->sum[constraint];
 }
 
-void SbSpaceGetConstraintForce(SbSpace s, PetscInt row, PetscInt n, PetscReal direction[3],
+void SbSpaceGetConstraintForce(SbSpace s, PetscInt constraint, PetscInt n, PetscReal direction[3],
                                PetscReal force[3])
 {
   const SbConstraints c = s->constraints;
 
   for (PetscInt k = 0; k < 3; k++) direction[k] = 0.;
-  for (PetscInt k = 3 * c->start[row]; k < 3 * (c->start[row] + n); k++) {
+  for (PetscInt k = 3 * c->start[constraint]; k < 3 * (c->start[constraint] + n); k++) {
     direction[k % 3] += c->coef[k];
-    force[k % 3] += c->force[row] * c->along[k];
+    force[k % 3] += c->force[constraint] * c->along[k];
   }
 }

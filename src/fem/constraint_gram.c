@@ -1,5 +1,5 @@
 /*
-  The direct solver for the rows of constraint.c and constraint_velocity.c: their Gram matrix has the rows of all ranks, which are few, and is
+  The direct solver for the constraints of constraint.c and constraint_velocity.c: their Gram matrix has the constraints of all ranks, which are few, and is
   factored on each of them.
 */
 #include "fem_impl.h"

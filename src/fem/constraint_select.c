@@ -1,9 +1,9 @@
 /*
-  Which exact constraints are worth having. Two surfaces that examine each other say nearly the same thing twice: a vertex on a vertex gives two
-  rows of the same nodes, with normals a few degrees apart. Together they would demand a motion across the normals, which nothing
-  means, and make G D G^T as good as singular. So a row that is, but for a small part, a combination of earlier ones nearby rests.
+  Which exact constraints are worth having. Two surfaces that examine each other give nearly the same constraint twice: a vertex on a vertex gives two
+  constraints of the same nodes, with normals a few degrees apart. Together they would demand a motion across the normals, which nothing
+  means, and make G D G^T as good as singular. So a constraint that is, but for a small part, a combination of earlier ones nearby is redundant.
 
-  Rows of all ranks are examined in the order of their identities, so that no partition changes the choice. A row is compared with
+  Constraints of all ranks are examined in the order of their identities, so that no partition changes the choice. A constraint is compared with
   those accepted before it that share a node with it: a few, whose Gram matrix is factored for it. (Rank-revealing Cholesky
   factorisation, kept local.)
 */
@@ -11,12 +11,12 @@
 #include "sbconstraint.h"
 
 #define DEPENDS \
-  0.05 /* squared part of a row outside the span of its neighbours; below it the row rests: normals within 13 degrees */
+  0.05 /* squared part of a constraint outside the span of its neighbours; below it the constraint is redundant: normals within 13 degrees */
 #define SAID \
-  1e-4 /* the same for a row that holds a node on something that is no body: two of a node may stand at a small angle */
+  1e-4 /* the same for a constraint of a node to something that is no body: two of a node may stand at a small angle */
 #define NEAR 48 /* neighbours that are examined */
 
-/* Rows of all ranks, alike on each. */
+/* Constraints of all ranks, alike on each. */
 typedef struct {
   PetscInt n;
   PetscInt *id, *start, *node; /* [n], [n+1], [start[n]] nodes as 0..nnode-1 */
@@ -24,16 +24,16 @@ typedef struct {
   PetscInt first;              /* of this rank */
   PetscInt nnode;
   PetscInt *head, *next,
-    *row; /* accepted rows by node: entry e of a row is e, next[e] the following one at its node */
+    *row; /* accepted constraints by node: entry e of a row is e, next[e] the following one at its node */
 } All;
 
 /*
-  Takes from the rows what prescribed and constrained directions would say: along a symmetry plane a row of friction may be left with a
-  sliver of the direction that the normal's row has whole. sorted: global numbers of the nodes.
+  Takes from the constraints what prescribed and constrained directions would say: along a symmetry plane a constraint of friction may be left with a
+  sliver of the direction that the normal's constraint has whole. sorted: global numbers of the nodes.
 */
-static PetscErrorCode clear_held(SbSpace s, const PetscInt sorted[], All *a)
+static PetscErrorCode project_constrained(SbSpace s, const PetscInt sorted[], All *a)
 {
-  const PetscBool held = SbNodalConstraintsExist(s);
+  const PetscBool constrained = SbNodalConstraintsExist(s);
   PetscReal *free;
   PetscMPIInt n;
 
@@ -44,7 +44,7 @@ static PetscErrorCode clear_held(SbSpace s, const PetscInt sorted[], All *a)
   for (PetscInt i = 0; i < a->nnode; i++) {
     const PetscInt node = sorted[i] - s->gnode_start;
     const PetscReal *Q =
-      held && node >= 0 && node < s->nnode_owned ? SbNodalConstraintsProjector(s, node) : NULL;
+      constrained && node >= 0 && node < s->nnode_owned ? SbNodalConstraintsProjector(s, node) : NULL;
 
     for (PetscInt k = 0; k < 9 && node >= 0 && node < s->nnode_owned; k++) {
       if (!(s->fixed[node] & (1 << (k % 3)))) free[9 * i + k] = (k % 4 ? 0. : 1.) - (Q ? Q[k] : 0.);
@@ -84,7 +84,7 @@ static PetscErrorCode gather(MPI_Comm comm, MPI_Datatype type, size_t size, Pets
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode gather_rows(SbSpace s, All *a)
+static PetscErrorCode gather_constraints(SbSpace s, All *a)
 {
   SbConstraints c = s->constraints;
   PetscInt n = 0, nentry = 0, total, *id, *length, *node, *sorted, *lengths;
@@ -117,7 +117,7 @@ static PetscErrorCode gather_rows(SbSpace s, All *a)
   a->nnode = total;
   PetscCall(PetscSortRemoveDupsInt(&a->nnode, sorted));
   for (PetscInt e = 0; e < total; e++) PetscCall(PetscFindInt(a->node[e], a->nnode, sorted, &a->node[e]));
-  PetscCall(clear_held(s, sorted, a));
+  PetscCall(project_constrained(s, sorted, a));
   PetscCall(PetscFree(sorted));
   PetscCall(PetscMalloc3(a->nnode, &a->head, total, &a->next, total, &a->row));
   for (PetscInt i = 0; i < a->nnode; i++) a->head[i] = -1;
@@ -140,7 +140,7 @@ static PetscReal product(const All *a, PetscInt i, PetscInt j)
   return sum;
 }
 
-/* Accepted rows that share a node with row i. */
+/* Accepted constraints that share a node with constraint i. */
 static PetscInt neighbours(const All *a, PetscInt i, PetscInt near[NEAR])
 {
   PetscInt n = 0;
@@ -156,7 +156,7 @@ static PetscInt neighbours(const All *a, PetscInt i, PetscInt near[NEAR])
   return n;
 }
 
-/* Squared part of row i outside the span of its accepted neighbours, relative; by the Cholesky factor of their Gram matrix. */
+/* Squared part of constraint i outside the span of its accepted neighbours, relative; by the Cholesky factor of their Gram matrix. */
 static PetscReal outside(const All *a, PetscInt i)
 {
   const PetscReal full = product(a, i, i);
@@ -177,7 +177,7 @@ static PetscReal outside(const All *a, PetscInt i)
   return full > 0. ? rest / full : 0.;
 }
 
-/* Rows of the same identity are of one point, so of one rank: there in the order in which they were written. */
+/* Constraints of the same identity are of one point, so of one rank: there in the order in which they were written. */
 static void sort_equals(const All *a, PetscInt order[])
 {
   for (PetscInt q = 1; q < a->n; q++) {
@@ -198,7 +198,7 @@ PetscErrorCode SbConstraintsFindRedundant(SbSpace s)
   All a;
 
   PetscFunctionBeginUser;
-  PetscCall(gather_rows(s, &a));
+  PetscCall(gather_constraints(s, &a));
   c->passes = 2;
   PetscCall(PetscMalloc2(a.n, &order, a.n, &rests));
   for (PetscInt i = 0; i < a.n; i++) order[i] = i;

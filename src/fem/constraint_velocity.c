@@ -1,23 +1,24 @@
 /*
   Velocities that go with what is constrained: after a step of Newmark, what stays in touch must not move along its normals.
 
-  With G the rows of what touches, w the speeds that obstacles have along them and M the lumped mass
+  With G the constraints of what touches, w the speeds that obstacles have along them and M the lumped mass
 
     v <- v + M^-1 G^T mu,   G M^-1 G^T mu = w - G v:
 
   the nearest velocity in the norm of the mass, so that the kinetic energy falls (w = 0) and momentum stays between bodies (Laursen and
   Love, "Improved implicit integrators for transient impact problems", IJNME 53, 2002, correct velocities in this way). Held nodes
-  come first, each with its own directions; rows then have no say along these.
+  come first, each with its own directions; constraints then have no say along these.
 
-  Not for rows that push along other coefficients than their own (friction).
+  Not for constraints that push along other coefficients than their own (friction).
 */
 #include "fem_impl.h"
 #include "sbconstraint.h"
 
-#define PASSES 2      /* of the projection: the factorisation is of a slightly larger matrix */
-#define NOTHING 1e-20 /* of the largest on the diagonal: rows below it have no free node but for rounding */
+#define PASSES 2 /* of the projection: the factorisation is of a slightly larger matrix */
+#define NOTHING \
+  1e-20 /* of the largest on the diagonal: constraints below it have no free node but for rounding */
 
-PetscErrorCode SbSpaceSetConstraintVelocity(SbSpace s, PetscInt row, PetscReal rate)
+PetscErrorCode SbSpaceSetConstraintVelocity(SbSpace s, PetscInt constraint, PetscReal rate)
 {
   SbConstraints c = s->constraints;
 
@@ -27,7 +28,7 @@ PetscErrorCode SbSpaceSetConstraintVelocity(SbSpace s, PetscInt row, PetscReal r
     PetscCall(PetscArrayzero(c->rate + c->nrate, c->size - c->nrate));
     c->nrate = c->size;
   }
-  c->rate[row] = rate;
+  c->rate[constraint] = rate;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -70,13 +71,13 @@ static PetscErrorCode get_rates(SbConstraints c, Vec rate)
   PetscCall(VecZeroEntries(rate));
   PetscCall(VecGetArray(rate, &x));
   for (PetscInt i = 0; i < c->n && c->nrate; i++) {
-    if (c->stiffness[i] < 0. && !c->redundant[i]) x[c->place[i]] = c->rate[i];
+    if (c->stiffness[i] < 0. && !c->redundant[i]) x[c->position[i]] = c->rate[i];
   }
   PetscCall(VecRestoreArray(rate, &x));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Adds the mean forces of the impulses mu, N s, over a step to those of the rows. */
+/* Adds the mean forces of the impulses mu, N s, over a step to those of the constraints. */
 static PetscErrorCode add_forces(SbConstraints c, PetscReal dt, Vec mu)
 {
   const PetscScalar *x;
@@ -85,7 +86,7 @@ static PetscErrorCode add_forces(SbConstraints c, PetscReal dt, Vec mu)
   PetscCall(VecAXPY(c->exact.force, 1. / dt, mu));
   PetscCall(VecGetArrayRead(mu, &x));
   for (PetscInt i = 0; i < c->n; i++) {
-    if (c->stiffness[i] < 0. && !c->redundant[i]) c->force[i] += x[c->place[i]] / dt;
+    if (c->stiffness[i] < 0. && !c->redundant[i]) c->force[i] += x[c->position[i]] / dt;
   }
   PetscCall(VecRestoreArrayRead(mu, &x));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -75,7 +75,7 @@ PetscBool SbNodalConstraintsExist(SbSpace space);
 const PetscReal *SbNodalConstraintsProjector(SbSpace space, PetscInt node);
 /* constraint.c: adds what makes an assembled matrix regular. Not collective. */
 PetscErrorCode SbConstraintsRegularize(SbSpace space, const SbValues *x);
-PetscErrorCode SbConstraintsDestroy(SbConstraints *couple);
+PetscErrorCode SbConstraintsDestroy(SbConstraints *constraints);
 
 /* Gives a BAIJ or SBAIJ matrix of the space the fast product of product.c. Collective. */
 PetscErrorCode SbProductAttach(SbSpace space, SbMatrixKind kind, Mat A);

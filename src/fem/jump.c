@@ -112,13 +112,13 @@ static PetscErrorCode find_faces(SbSpace s, const PetscInt region_of[], PetscInt
     if (s->element[b]->nodes_per[0]) continue;
     for (PetscInt i = 0; i < 4 * s->mesh->ncell; i++) {
       Face *face = &(*faces)[n];
-      const PetscBool held = (PetscBool)(s->dirichlet_node && s->dirichlet_node[i] >= 0);
+      const PetscBool supported = (PetscBool)(s->dirichlet_node && s->dirichlet_node[i] >= 0);
       PetscInt node[8], f = 0;
       PetscBool owned = PETSC_FALSE;
 
-      if (s->mesh->cell_body[i / 4] != b || (!held && s->neighbour[i] < i / 4)) continue;
-      while (!held && f < 3 && s->neighbour[4 * s->neighbour[i] + f] != i / 4) f++;
-      *face = (Face){{i / 4, held ? SUPPORT : s->neighbour[i]}, {i % 4, f}, region_of[i / 4]};
+      if (s->mesh->cell_body[i / 4] != b || (!supported && s->neighbour[i] < i / 4)) continue;
+      while (!supported && f < 3 && s->neighbour[4 * s->neighbour[i] + f] != i / 4) f++;
+      *face = (Face){{i / 4, supported ? SUPPORT : s->neighbour[i]}, {i % 4, f}, region_of[i / 4]};
       face_nodes(s, face, node);
       for (int k = 0; k < 8; k++) owned = (PetscBool)(owned || node[k] < s->nnode_owned);
       n += owned;

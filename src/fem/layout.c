@@ -5,12 +5,12 @@
   node per face, DG four per cell, on its faces; node a of a cell lies opposite vertex a. A rank owns all nodes of its DG cells
   and, of the CR faces between it and another rank, about every second one.
 
-  A boundary face of a DG cell that an effect holds in all directions has one more node, its support, which the effect
+  A boundary face of a DG cell that an effect prescribes in all directions has one more node, its support, which the effect
   prescribes. To the cell it is what a neighbour of infinite stiffness would be: the mean of the two sides is the support's
   displacement, and the face terms (jump.c) tie the cell to it. What the cell does to it is the reaction.
 
   Owned nodes are numbered in the order of the cells. Each rank knows the numbers of its own ones; two broadcasts over the
-  cells tell the others: after the first a cell has the numbers that belong to the rank of its neighbour, the second brings
+  cells inform the others: after the first a cell has the numbers that belong to the rank of its neighbour, the second brings
   complete cells to the ghosts, also on faces whose other side is not on this rank.
 */
 #include "fem_impl.h"
@@ -44,19 +44,20 @@ static PetscInt number_face(SbSpace s, const PetscInt node[], PetscInt cell, Pet
   return (*n)++;
 }
 
-/* Sets that an effect holds; none when no body ties its faces to supports. */
-static uint64_t held_sets(SbSpace s)
+/* Sets that an effect prescribes; none when no body ties its faces to supports. */
+static uint64_t prescribed_sets(SbSpace s)
 {
-  uint64_t held = 0;
+  uint64_t prescribed = 0;
   PetscBool weak = PETSC_FALSE;
 
   for (PetscInt b = 0; b < s->mesh->nbody; b++) weak = (PetscBool)(weak || s->element[b]->weak);
-  for (PetscInt k = 0; weak && k < s->mesh->nset; k++) held |= s->mesh->set[k].prescribed ? SB_SET_BIT(k) : 0;
-  return held;
+  for (PetscInt k = 0; weak && k < s->mesh->nset; k++)
+    prescribed |= s->mesh->set[k].prescribed ? SB_SET_BIT(k) : 0;
+  return prescribed;
 }
 
 /* Owned nodes from zero on: node[ncell][4] and, for faces in these sets, s->support[ncell][4]; UNKNOWN elsewhere. */
-static PetscErrorCode number_owned(SbSpace s, uint64_t held, PetscInt node[])
+static PetscErrorCode number_owned(SbSpace s, uint64_t prescribed, PetscInt node[])
 {
   SbMesh mesh = s->mesh;
   PetscInt *at, n = 0;
@@ -75,7 +76,7 @@ static PetscErrorCode number_owned(SbSpace s, uint64_t held, PetscInt node[])
         const uint64_t sets = mesh->face_set[4 * c + a];
 
         node[4 * c + a] = n++;
-        if (SbSpaceCellElement(s, c)->weak && (sets & SB_ON_BOUNDARY) && (sets & held))
+        if (SbSpaceCellElement(s, c)->weak && (sets & SB_ON_BOUNDARY) && (sets & prescribed))
           s->dirichlet_node[4 * c + a] = n++;
       } else if (per[2]) {
         node[4 * c + a] = number_face(s, node, c, a, &n);
@@ -183,7 +184,7 @@ static uint64_t face_sets(SbMesh mesh, PetscInt cell, PetscInt face)
   return own | common;
 }
 
-/* A support lies where the node of its face lies, and takes over its sets: what holds the face holds the support. */
+/* A support lies where the node of its face lies, and takes over its sets: what prescribes the face prescribes the support. */
 static void describe_supports(SbSpace s)
 {
   for (PetscInt i = 0; i < 4 * s->mesh->ncell; i++) {
@@ -253,16 +254,16 @@ static PetscErrorCode layout_vertices(SbSpace s)
 static PetscErrorCode layout_faces(SbSpace s)
 {
   SbMesh mesh = s->mesh;
-  const uint64_t held = held_sets(s);
+  const uint64_t prescribed = prescribed_sets(s);
 
   PetscFunctionBeginUser;
   PetscCall(SbMeshNeighbours(mesh, &s->neighbour));
   PetscCall(PetscMalloc1(4 * (size_t)mesh->ncell, &s->cell_node));
-  if (held) {
+  if (prescribed) {
     PetscCall(PetscMalloc1(4 * (size_t)mesh->ncell, &s->dirichlet_node));
     for (PetscInt i = 0; i < 4 * mesh->ncell; i++) s->dirichlet_node[i] = UNKNOWN;
   }
-  PetscCall(number_owned(s, held, s->cell_node));
+  PetscCall(number_owned(s, prescribed, s->cell_node));
   PetscCallMPI(MPI_Scan(&s->nnode_owned, &s->gnode_start, 1, MPIU_INT, MPI_SUM, s->comm));
   PetscCallMPI(MPI_Allreduce(&s->nnode_owned, &s->Nnode, 1, MPIU_INT, MPI_SUM, s->comm));
   s->gnode_start -= s->nnode_owned;

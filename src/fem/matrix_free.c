@@ -353,9 +353,9 @@ PetscErrorCode SbMatrixFreeAddRows(Mat A, PetscInt n, const PetscInt node[], con
           const PetscInt i = corner[a * SB_BATCH + l], k = wanted[i];
 
           if (k < 0) continue;
-          const PetscInt place = p->offset[(16 * (size_t)b + (size_t)q) * SB_BATCH + (size_t)l];
+          const PetscInt position = p->offset[(16 * (size_t)b + (size_t)q) * SB_BATCH + (size_t)l];
           const PetscInt at =
-            ia[k] + (place >= 0 ? place - p->di[i] : p->di[i + 1] - p->di[i] + ~place - p->oi[i]);
+            ia[k] + (position >= 0 ? position - p->di[i] : p->di[i + 1] - p->di[i] + ~position - p->oi[i]);
 
           for (int e = 0; e < 9; e++) block[9 * at + e] += K[pair][a <= c ? e : 3 * (e % 3) + e / 3][l];
         }

@@ -16,14 +16,14 @@
 #include "sbconstraint.h"
 #include "sbkernel.h"
 
-struct _p_SbHeld {
+struct _p_SbNodalConstraints {
   PetscInt *count;   /* [nnode_owned] directions */
   PetscReal *normal; /* [nnode_owned][3][3] directions as given, without prescribed components */
   PetscReal *d;      /* [nnode_owned][3] m */
   PetscReal *rate;   /* [nnode_owned][3] speeds along the directions, m/s */
   PetscReal *Q;      /* [nnode][9] */
   PetscInt ntotal;   /* constrained nodes of all ranks */
-  Vec row;           /* a row of Q of every node, to tell the others */
+  Vec row;           /* a row of Q of every node, for the other ranks */
 };
 
 PetscErrorCode SbSpaceCreateNodalConstraints(SbSpace s)
@@ -202,7 +202,7 @@ void SbNodalConstraintsVelocity(SbSpace s, PetscReal v[])
   }
 }
 
-/* B <- (I - Qi) B (I - Qj), rows rs apart, columns cs; Q NULL: not held. */
+/* B <- (I - Qi) B (I - Qj), rows rs apart, columns cs; Q NULL: not constrained. */
 static void project_block(const PetscReal *Qi, const PetscReal *Qj, size_t rs, size_t cs, PetscScalar *v)
 {
   PetscReal B[9], X[9];
@@ -223,7 +223,7 @@ static void project_block(const PetscReal *Qi, const PetscReal *Qj, size_t rs, s
   }
 }
 
-static PetscBool is_held(const PetscReal Q[9])
+static PetscBool is_constrained(const PetscReal Q[9])
 {
   return (PetscBool)(Q[0] + Q[4] + Q[8] > 0.5);
 }
@@ -234,14 +234,14 @@ void SbNodalConstraintsProjectMatrix(SbSpace s, const SbValues *x)
   const SbPlan p = s->plan;
 
   for (PetscInt i = 0; h->ntotal && i < s->nnode_owned; i++) {
-    const PetscReal *Qi = is_held(h->Q + 9 * i) ? h->Q + 9 * i : NULL;
+    const PetscReal *Qi = is_constrained(h->Q + 9 * i) ? h->Q + 9 * i : NULL;
 
     for (int q = 0; q < (x->value[1] ? 2 : 1); q++) {
       const PetscInt *ptr = q ? p->oi : p->di, *col = q ? p->oj : p->dj;
       const PetscInt first = x->kind == SB_MATRIX_SBAIJ ? p->diagonal[i] : ptr[i];
 
       for (PetscInt k = first; k < ptr[i + 1]; k++) {
-        const PetscReal *Qj = is_held(h->Q + 9 * col[k]) ? h->Q + 9 * col[k] : NULL;
+        const PetscReal *Qj = is_constrained(h->Q + 9 * col[k]) ? h->Q + 9 * col[k] : NULL;
         PetscScalar *v;
         size_t rs, cs;
 

@@ -2,7 +2,7 @@
   The assembly plan: the graph of node blocks and, for each cell, where its blocks lie in it.
 
   Built in one sweep over nodes: the cells (and with CR and DG the faces) around an owned node give the columns of its row;
-  while they are at hand, the places of the blocks of that row are written into the cells' tables. The face terms are constant:
+  while they are at hand, the positions of the blocks of that row are written into the cells' tables. The face terms are constant:
   they are summed here once, and every assembly begins with them. There is no search. Measured at 200k tets this
   takes a small part of what DMCreateMatrix takes for the same graph (`make bench`, row matrix_setup).
 */
@@ -10,7 +10,7 @@
 
 /*
   Groups of nodes that are all coupled, in lanes: the cells' (width nodes each) and the faces' (eight), node a of lane l of
-  batch b at SB_BATCH (nodes b + a) + l. A slot is such a place.
+  batch b at SB_BATCH (nodes b + a) + l. A slot is such a position.
 */
 typedef struct {
   const PetscInt *node;
@@ -21,7 +21,7 @@ typedef struct {
   PetscInt *offset; /* [nbatch][nodes^2][SB_BATCH] to be filled; NULL: not wanted */
 } Groups;
 
-/* Padding lanes count as the group that they repeat: its columns are marked once more, and they get its places. */
+/* Padding lanes count as the group that they repeat: its columns are marked once more, and they get its positions. */
 static PetscErrorCode invert_groups(SbSpace s, Groups *g)
 {
   const PetscInt n = g->nodes * SB_BATCH * g->nbatch;
@@ -99,12 +99,12 @@ static PetscErrorCode plan_glue(SbSpace s, const Groups *faces, SbPlan p)
   PetscCall(PetscCalloc2(p->di[s->nnode_owned], &p->face_term[0], p->oi[s->nnode_owned], &p->face_term[1]));
   for (PetscInt b = 0; b < faces->nbatch; b++) {
     for (PetscInt l = 0; l < SB_BATCH; l++) {
-      const PetscInt *place = faces->offset + (size_t)b * 64 * SB_BATCH + l;
+      const PetscInt *position = faces->offset + (size_t)b * 64 * SB_BATCH + l;
       PetscReal K[8][8];
 
       SbJumpMatrix(s, b, l, K);
       for (int k = 0; k < 64; k++) {
-        const PetscInt at = place[SB_BATCH * k];
+        const PetscInt at = position[SB_BATCH * k];
 
         if (at != SB_NOT_OWNED) p->face_term[at < 0][at < 0 ? ~at : at] += K[k / 8][k % 8];
       }
@@ -116,22 +116,22 @@ static PetscErrorCode plan_glue(SbSpace s, const Groups *faces, SbPlan p)
 static PetscErrorCode create_groups(SbSpace s, const PetscInt node[], PetscInt nodes, PetscInt nbatch,
                                     Groups *g)
 {
-  const size_t nplace = (size_t)nbatch * (size_t)(nodes * nodes) * SB_BATCH;
+  const size_t npoint = (size_t)nbatch * (size_t)(nodes * nodes) * SB_BATCH;
 
   PetscFunctionBeginUser;
   g->node = node;
   g->nodes = nodes;
   g->nbatch = nbatch;
   PetscCall(invert_groups(s, g));
-  PetscCall(PetscMalloc1(nplace, &g->offset));
-  for (size_t k = 0; k < nplace; k++) g->offset[k] = SB_NOT_OWNED;
+  PetscCall(PetscMalloc1(npoint, &g->offset));
+  for (size_t k = 0; k < npoint; k++) g->offset[k] = SB_NOT_OWNED;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode SbPlanCreate(SbSpace s, SbPlan *plan)
 {
   const PetscInt nrow = s->nnode_owned, ngroup = s->jump ? 2 : 1;
-  PetscInt *seen, *place, *column, widest = 1, capacity = nrow;
+  PetscInt *seen, *position, *column, widest = 1, capacity = nrow;
   Groups group[2];
   SbPlan p;
 
@@ -153,7 +153,7 @@ PetscErrorCode SbPlanCreate(SbSpace s, SbPlan *plan)
     widest = PetscMax(widest, most);
     capacity += most - 1;
   }
-  PetscCall(PetscMalloc3(s->nnode, &seen, s->nnode, &place, widest, &column));
+  PetscCall(PetscMalloc3(s->nnode, &seen, s->nnode, &position, widest, &column));
   PetscCall(PetscMalloc4(nrow + 1, &p->di, capacity, &p->dj, nrow + 1, &p->oi, capacity, &p->oj));
   PetscCall(PetscMalloc1(nrow, &p->diagonal));
   for (PetscInt i = 0; i < s->nnode; i++) seen[i] = -1;
@@ -186,17 +186,17 @@ PetscErrorCode SbPlanCreate(SbSpace s, SbPlan *plan)
     // the row of the graph: owned columns in the diagonal part, ghosts in the other one
     for (PetscInt k = 0; k < n; k++) {
       if (column[k] < nrow) {
-        place[column[k]] = nd;
+        position[column[k]] = nd;
         p->dj[nd++] = column[k];
       } else {
-        place[column[k]] = ~no;
+        position[column[k]] = ~no;
         p->oj[no++] = column[k];
       }
     }
-    p->diagonal[i] = place[i];
+    p->diagonal[i] = position[i];
     p->di[i + 1] = nd;
     p->oi[i + 1] = no;
-    // while the places of the row are known, the groups around take those of their blocks
+    // while the positions of the row are known, the groups around take those of their blocks
     for (PetscInt k = 0; k < ngroup; k++) {
       const Groups *g = &group[k];
 
@@ -204,11 +204,11 @@ PetscErrorCode SbPlanCreate(SbSpace s, SbPlan *plan)
         const PetscInt *node = slot_group(g, g->slot[at]), lane = g->slot[at] % SB_BATCH;
         PetscInt *offset = g->offset + g->nodes * (size_t)(g->slot[at] - lane) + lane;
 
-        for (PetscInt b = 0; b < g->nodes * SB_BATCH; b += SB_BATCH) offset[b] = place[node[b]];
+        for (PetscInt b = 0; b < g->nodes * SB_BATCH; b += SB_BATCH) offset[b] = position[node[b]];
       }
     }
   }
-  // the places of the cells are kept, those of the faces only until their constant terms are summed
+  // the positions of the cells are kept, those of the faces only until their constant terms are summed
   p->offset = group[0].offset;
   if (s->jump) {
     PetscCall(plan_glue(s, &group[1], p));
@@ -218,7 +218,7 @@ PetscErrorCode SbPlanCreate(SbSpace s, SbPlan *plan)
     PetscCall(PetscFree(group[k].start));
     PetscCall(PetscFree(group[k].slot));
   }
-  PetscCall(PetscFree3(seen, place, column));
+  PetscCall(PetscFree3(seen, position, column));
   // where assembly first touches each row, so that it is cleared while in the cache
   PetscCall(plan_fresh(s, p));
   *plan = p;
@@ -243,7 +243,7 @@ PetscErrorCode SbPlanDestroy(SbPlan *plan)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* First upper block of each row and the ten places of each cell, for the symmetric storage of one rank. */
+/* First upper block of each row and the ten positions of each cell, for the symmetric storage of one rank. */
 static PetscErrorCode plan_upper(SbSpace s, SbPlan p)
 {
   const PetscInt nrow = s->nnode_owned;
@@ -405,7 +405,7 @@ PetscErrorCode SbAttachModes(Mat A, PetscErrorCode (*fill)(PetscInt mode, PetscS
     PetscCall(VecGetArray(mode[kept], &v));
     PetscCall(fill(m, v, ctx));
     PetscCall(VecRestoreArray(mode[kept], &v));
-    /* orthonormal, as MatNullSpaceCreate() demands; what vanishes on fully held bodies drops out */
+    /* orthonormal, as MatNullSpaceCreate() demands; what vanishes on fully prescribed bodies drops out */
     PetscCall(VecNormalize(mode[kept], &norm));
     for (PetscInt k = 0; k < kept; k++) {
       PetscCall(VecDot(mode[kept], mode[k], &dot));

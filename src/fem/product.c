@@ -10,7 +10,7 @@
 
   petsc/private/petscimpl.h: asking a matrix whether its values have changed has no public call.
 
-  Measured at 200,000 tets on one rank: 0.9 ms in the place of 1.4 (SBAIJ) and 1.7 (BAIJ); in cache half the time.
+  Measured at 200,000 tets on one rank: 0.9 ms instead of 1.4 (SBAIJ) and 1.7 (BAIJ); in cache half the time.
 */
 #include "fem_impl.h"
 #include "sbfour.h"

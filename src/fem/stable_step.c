@@ -47,7 +47,7 @@ static void multiply_stiffness(SbSpace s, const PetscReal x[], PetscReal f[])
 }
 
 /* Zero on prescribed unknowns; returns x.M x of the owned ones. */
-static PetscReal hold_and_square(SbSpace s, PetscReal x[])
+static PetscReal clear_fixed_and_square(SbSpace s, PetscReal x[])
 {
   PetscReal sum = 0.;
 
@@ -91,7 +91,7 @@ static PetscErrorCode highest_frequency(SbSpace s, PetscReal *w)
   PetscCall(start(s, f));
   *w = 0.;
   for (int step = 0; step <= POWER_STEPS; step++) {
-    square = hold_and_square(s, f);
+    square = clear_fixed_and_square(s, f);
     PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &square, 1, MPIU_REAL, MPI_SUM, s->comm));
     if (square <= 0.) break;
     /* x had length one: the growth of |y| is w^2 */

@@ -1,7 +1,7 @@
 /*
   The tangent A = shift_a M + shift_v C + shift_k K(u), written straight into the value arrays of the matrix.
 
-  K is summed from the cells' blocks (sbelement.h) at the places that the plan knows (plan.c); C = alpha M + beta K per
+  K is summed from the cells' blocks (sbelement.h) at the positions that the plan knows (plan.c); C = alpha M + beta K per
   region; the lumped M is added to the diagonal blocks. Cells are taken in batches: the kernel works across the lanes, and the
   blocks of all lanes are added to the matrix (insert.c), whose rows are cleared on the way.
 

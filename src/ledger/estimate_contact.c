@@ -1,5 +1,5 @@
 /*
-  What contact left open. A force on a place that is not closed would do the work force times gap if it were: half of it (forces grow from zero)
+  What contact left open. A force on a point whose gap is not closed would do the work force times gap if it were: half of it (forces grow from zero)
   bounds the energy of the error from above, but a body that springs let down as a whole is not strained by that.
 
   Springs, then, are examined closer. With F what they exert, one more step of Uzawa's iteration, (K + springs) delta = F, moves the body to
@@ -62,12 +62,12 @@ PetscErrorCode SbEstimateContact(SbLedger l, const SbStep *step, PetscReal *erro
   SbContactPoints list = {0};
 
   PetscFunctionBeginUser;
-  /* half the force times gap of all places, J */
+  /* half the force times gap of all points, J */
   energy = 0.;
   PetscCall(SbModelContactPoints(m, step->t, step->U, step->R, &list));
   for (PetscInt i = 0; i < list.n; i++)
-    energy += 0.5 * PetscAbsReal(list.place[i].gap * SbDot3(list.place[i].force, list.place[i].normal));
-  PetscCall(PetscFree(list.place));
+    energy += 0.5 * PetscAbsReal(list.point[i].gap * SbDot3(list.point[i].force, list.point[i].normal));
+  PetscCall(PetscFree(list.point));
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &energy, 1, MPIU_REAL, MPI_SUM, m->comm));
   for (PetscInt e = 0; e < m->nbegin_step; e++) springs = (PetscBool)(springs || m->begin_step[e]->springs);
   if (springs && !m->dynamic && energy > 0.) {

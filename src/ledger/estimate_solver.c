@@ -1,6 +1,6 @@
 /*
   What the solves of a step left: with F the residual of its equations at the solution and J their tangent, the correction that is missing is
-  delta = J^-1 F, and the energy of the error 1/2 delta . F (of state: J holds inertia, too). One more solve, to a tenth, tells it: a
+  delta = J^-1 F, and the energy of the error 1/2 delta . F (of state: J holds inertia, too). One more solve, to a tenth, gives it: a
   fraction of the iterations of the step.
 
   With one linear solve per step that is the linear solver's; with Newton's method, whose iteration ends by its own tolerance and whose linear solves are as

@@ -6,18 +6,18 @@
 
     off_T = 1/2 int_T (P* - P_h) : C^-1 : (P* - P_h),     C^-1: |dev s|^2 / (2 mu) + tr(s)^2 / (9 K),   s = sym(R^T (P* - P_h)),
 
-  K = lambda + 2/3 mu, R the rotation in F (Zienkiewicz and Zhu 1992; for CR and DG with averages in the place of fits: Carstensen and Funken,
+  K = lambda + 2/3 mu, R the rotation in F (Zienkiewicz and Zhu 1992; for CR and DG with averages instead of fits: Carstensen and Funken,
   Math. Comp. 70, 2001). In this norm the estimate stays bounded as nu -> 1/2. For CR and DG this is all. It needs neither loads
   nor inertia, which P_h has in it.
 
   Stiffness. The answer of P1 is too stiff, near nu = 1/2 by any factor (locking): then P_h is wrong as a whole, and what recovery takes out of it
-  is a part of a small energy only. But P* tells how much too stiff. Let a be the energy of P_h in the norm above and b the remainder of
+  is a part of a small energy only. But P* shows how much too stiff. Let a be the energy of P_h in the norm above and b the remainder of
   it without what the mesh has added, a - b the part that is not smooth. Among the multiples s u_h of the answer, under the same loads, the one that is best
   when only the smooth part resists, s^2 b - 2 s a -> min, has s = a / b, and its potential lies below that of u_h by
 
     |e|^2 = s a - a = (a - b) a / b:
 
-  one step of Galerkin's method in a space of one dimension. With prescribed displacements in the place of loads u_h cannot be
+  one step of Galerkin's method in a space of one dimension. With prescribed displacements instead of loads u_h cannot be
   scaled and |e|^2 = a - b; in between, with the part theta of the work that is done by loads,
 
     |e|^2 = (a - b) (1 + theta (a / b - 1)),     theta = 1 - sum R . (u - m) / (2 a), at least 0 and at most 1,

@@ -28,8 +28,8 @@ PetscErrorCode SbMassForm(SbLedger l, Vec D, PetscReal *form)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Where the matrix of the last solve is J = shift_a M + K, one product tells it. */
-static PetscBool matrix_tells(const SbRun run)
+/* Whether the matrix of the last solve is J = shift_a M + K: then one product gives the form. */
+static PetscBool has_matrix(const SbRun run)
 {
   return (PetscBool)(run->J && run->ts && run->shift_a > 0. && !run->damped &&
                      !run->solver_used->matrix_free && !run->model->space->consistent_mass);
@@ -69,7 +69,7 @@ PetscErrorCode SbStiffnessForm(SbLedger l, PetscReal t, Vec U, Vec D, PetscReal 
   *form = 0.;
   PetscCall(SbProbeLength(l, D, &length));
   if (!(length > 0.)) PetscFunctionReturn(PETSC_SUCCESS);
-  if (matrix_tells(l->run)) {
+  if (has_matrix(l->run)) {
     PetscCall(form_by_matrix(l, D, form));
     PetscFunctionReturn(PETSC_SUCCESS);
   }

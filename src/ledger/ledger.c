@@ -21,7 +21,7 @@ static const SbOption rows[] = {
    "number whose error is estimated, too: of the node nearest to ledger_at, of the support of a set, of all "
    "bodies"},
   {"ledger_at", SB_OPTION_REALS, 3, "m", "0,0,0", "(-inf, inf)",
-   "rest place of ledger_quantity displacement"},
+   "rest position of ledger_quantity displacement"},
   {"ledger_direction", SB_OPTION_REALS, 3, "", "0,0,1", "(-inf, inf)",
    "direction of ledger_quantity displacement and reaction; its length does not matter"},
   {"ledger_on", SB_OPTION_STRING, 1, "", "", "", "set whose prescribed nodes make ledger_quantity reaction"},
@@ -86,7 +86,7 @@ static PetscErrorCode end(SbLedger l)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode look(SbRun run, const SbSolvedStep *step, void *ctx, PetscBool *again)
+static PetscErrorCode examine_step(SbRun run, const SbSolvedStep *step, void *ctx, PetscBool *again)
 {
   SbLedger l = (SbLedger)ctx;
 
@@ -304,7 +304,7 @@ PetscErrorCode SbLedgerAttach(SbLedger l)
   PetscCall(end(l));
   run->want_energies = PETSC_TRUE;
   if (run->model->nbegin_step || l->quantity.kind == SB_QUANTITY_REACTION) run->want_residual = PETSC_TRUE;
-  run->post_solve.fn = look;
+  run->post_solve.fn = examine_step;
   run->post_solve.ctx = l;
   run->cell_error = cell_error;
   PetscCall(SbRunAddMonitor(run, monitor, l, NULL));

@@ -17,7 +17,7 @@ typedef struct {
   PetscReal at[3], direction[3];
   char on[SB_NAME_MAX];
   PetscInt node;                /* displacement: the nearest owned node, -1: on another rank */
-  PetscReal x[3];               /* its rest place, on all ranks, m */
+  PetscReal x[3];               /* its rest position, on all ranks, m */
   uint64_t set;                 /* reaction: bit of the set */
   Vec weight;                   /* reaction: the direction on its prescribed unknowns */
   PetscReal value, least, most; /* now, and over the run */

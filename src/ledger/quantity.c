@@ -71,7 +71,7 @@ PetscErrorCode SbQuantityAttach(SbLedger l)
   const SbSpace s = m->space;
   SbQuantity *q = &l->quantity;
   PetscScalar *w;
-  PetscInt held = 0;
+  PetscInt nprescribed = 0;
 
   PetscFunctionBeginUser;
   if (q->kind == SB_QUANTITY_NONE || q->kind == SB_QUANTITY_VOLUME) PetscFunctionReturn(PETSC_SUCCESS);
@@ -89,12 +89,12 @@ PetscErrorCode SbQuantityAttach(SbLedger l)
                              : (PetscBool)(i == q->node);
 
       if (on) w[3 * i + k] = q->direction[k];
-      held += on;
+      nprescribed += on;
     }
   }
   PetscCall(VecRestoreArray(q->weight, &w));
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &held, 1, MPIU_INT, MPI_SUM, m->comm));
-  PetscCheck(held > 0, m->comm, PETSC_ERR_USER_INPUT,
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &nprescribed, 1, MPIU_INT, MPI_SUM, m->comm));
+  PetscCheck(nprescribed > 0, m->comm, PETSC_ERR_USER_INPUT,
              "-ledger_on '%s': no effect prescribes displacements on a set of that name, so there is no "
              "reaction; name a set of a "
              "support or drive",

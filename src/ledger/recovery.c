@@ -6,7 +6,7 @@
 
     sum_c |p(X_c) - P_c|^2 + r |grad p|^2,   r = 0.05 sum_c |X_c - X_v|^2,
 
-  over the cells c around v, X_c their centroids. r decides where there are too few cells to tell a slope, at corners and edges
+  over the cells c around v, X_c their centroids. r decides where there are too few cells for a slope, at corners and edges
   of a body; constants are recovered whatever it is. Only cells of one material are fitted together, because the stress jumps where the
   material does: a vertex has one value for each material around it, at most `nlayer`. Bodies have no vertices in common.
 

@@ -133,7 +133,7 @@ static void say_largest(SbLedger l, const SbLedgerSeconds *s, Words *w)
   const SbRun run = l->run;
 
   if (!(error_of(l, most) > 0.)) {
-    say(w, "No error was found that could be told from zero. ");
+    say(w, "No error was found that could be distinguished from zero. ");
     return;
   }
   say(w, "Of an error of %.2g %%, ", (double)(100. * together(l) / PetscSqrtReal(l->stored)));

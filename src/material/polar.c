@@ -8,7 +8,7 @@
   and rotations by any angle need no special case; only a small gap is hard, and there the answer itself is ill-conditioned.
 
   Fast path, all lanes at once and without branches, after Higham and Noferini ("An algorithm to compute the polar
-  decomposition of a 3x3 matrix", 2016), with the adjugate in the place of a factorisation:
+  decomposition of a 3x3 matrix", 2016), with the adjugate instead of a factorisation:
     1. lambda is the largest root of  p(x) = x^4 - 2 a x^2 - 8 d x + a^2 - 4 b,  a = |F|^2, d = det F, b = |cof F|^2. All
        four roots are real: Laguerre's method falls monotonically onto it from the upper bound sqrt(3 a), in the end with
        order three. For F = I the bound is the root.

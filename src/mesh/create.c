@@ -53,7 +53,7 @@ PetscErrorCode SbMeshCreate(MPI_Comm comm, PetscInt nbody, SbBody body[], PetscI
   SbMesh m;
   SbScope scope;
   SbMergedMesh merged;
-  SbPiece piece;
+  SbLocalMesh local;
   PetscInt partitioner, reading;
   PetscBool full, all = PETSC_FALSE;
 
@@ -76,8 +76,8 @@ PetscErrorCode SbMeshCreate(MPI_Comm comm, PetscInt nbody, SbBody body[], PetscI
   m->set = set;
   PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_MESH_DISTRIBUTE], 0, 0, 0, 0));
   for (PetscInt b = 0; b < nbody; b++) all = (PetscBool)(all || body[b].face_nodes);
-  PetscCall(SbDistribute(comm, (SbPartitioner)partitioner, all, &merged, &piece));
-  PetscCall(SbMeshNumber(m, &piece));
+  PetscCall(SbDistribute(comm, (SbPartitioner)partitioner, all, &merged, &local));
+  PetscCall(SbMeshNumber(m, &local));
   PetscCall(PetscLogEventEnd(SbEvents[SB_EVENT_MESH_DISTRIBUTE], 0, 0, 0, 0));
   *mesh = m;
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -15,7 +15,7 @@
 typedef struct {
   PetscBool owned; /* they are known; alike on all ranks, also on those without cells */
   PetscInt ncell, nvert;
-  PetscInt *cell;       /* [ncell][4] places in vertex[] */
+  PetscInt *cell;       /* [ncell][4] positions in vertex[] */
   SbCellData *data;     /* [ncell] */
   SbVertexData *vertex; /* [nvert] */
   PetscMPIInt *owner;   /* [nvert] */
@@ -31,17 +31,18 @@ static PetscErrorCode cells_destroy(Cells *c)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* For each rank the vertices of the cells that go there, in the order of their first cell: at[n][4] is the place of a cell's vertices in the list of its rank. */
+/* For each rank the vertices of the cells that go there, in the order of their first cell: at[n][4] is the position of a cell's vertices in the list of its rank. */
 static PetscErrorCode list_vertices(const Cells *from, const SbRoute *route, const PetscInt which[],
                                     const PetscMPIInt dest[], PetscInt at[], PetscInt *nlist, PetscInt **list,
                                     PetscMPIInt **to)
 {
-  PetscInt *order, *place, *count, n = 0;
+  PetscInt *order, *position, *count, n = 0;
   PetscMPIInt *mark;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscMalloc4(route->nsend, &order, from->nvert, &place, route->size, &count, from->nvert, &mark));
-  for (PetscInt i = 0; i < route->nsend; i++) order[route->place[i]] = i;
+  PetscCall(
+    PetscMalloc4(route->nsend, &order, from->nvert, &position, route->size, &count, from->nvert, &mark));
+  for (PetscInt i = 0; i < route->nsend; i++) order[route->position[i]] = i;
   for (int pass = 0; pass < 2; pass++) {
     for (PetscInt v = 0; v < from->nvert; v++) mark[v] = -1;
     for (PetscMPIInt r = 0; r < route->size; r++) count[r] = 0;
@@ -52,20 +53,20 @@ static PetscErrorCode list_vertices(const Cells *from, const SbRoute *route, con
       for (int a = 0; a < 4; a++) {
         if (mark[v[a]] != dest[i]) {
           mark[v[a]] = dest[i];
-          place[v[a]] = count[dest[i]]++;
+          position[v[a]] = count[dest[i]]++;
           if (pass) {
             (*list)[n] = v[a];
             (*to)[n] = dest[i];
           }
           n++;
         }
-        at[4 * (size_t)i + a] = place[v[a]];
+        at[4 * (size_t)i + a] = position[v[a]];
       }
     }
     if (!pass) PetscCall(PetscMalloc2(n, list, n, to));
   }
   *nlist = n;
-  PetscCall(PetscFree4(order, place, count, mark));
+  PetscCall(PetscFree4(order, position, count, mark));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -81,7 +82,7 @@ static PetscErrorCode send_cells(const Cells *from, const SbRoute *route, const 
 
   PetscFunctionBeginUser;
   PetscCall(PetscMemzero(to, sizeof(*to)));
-  /* cells as places in the list of vertices of their rank */
+  /* cells as positions in the list of vertices of their rank */
   PetscCall(PetscMalloc1(4 * (size_t)route->nsend, &at));
   PetscCall(list_vertices(from, route, which, dest, at, &nlist, &list, &list_dest));
   PetscCall(SbRouteCreate(route->comm, nlist, list_dest, &vertices));
@@ -134,34 +135,34 @@ static PetscErrorCode ascending(PetscInt n, const PetscInt number[], PetscInt or
 }
 
 /* Owned cells and their vertices by original number; a vertex that came from several ranks becomes one. */
-static PetscErrorCode keep_owned(Cells *c, SbPiece *piece)
+static PetscErrorCode keep_owned(Cells *c, SbLocalMesh *local)
 {
-  PetscInt *number, *order, *place, n = 0;
+  PetscInt *number, *order, *position, n = 0;
 
   PetscFunctionBeginUser;
   PetscCall(PetscMalloc3(PetscMax(c->nvert, c->ncell), &number, PetscMax(c->nvert, c->ncell), &order,
-                         c->nvert, &place));
+                         c->nvert, &position));
   for (PetscInt v = 0; v < c->nvert; v++) number[v] = c->vertex[v].orig;
   PetscCall(ascending(c->nvert, number, order));
-  PetscCall(PetscMalloc1(c->nvert, &piece->vertex));
+  PetscCall(PetscMalloc1(c->nvert, &local->vertex));
   for (PetscInt i = 0; i < c->nvert; i++) {
     const SbVertexData *v = &c->vertex[order[i]];
 
-    if (!n || piece->vertex[n - 1].orig != v->orig) piece->vertex[n++] = *v;
-    place[order[i]] = n - 1;
+    if (!n || local->vertex[n - 1].orig != v->orig) local->vertex[n++] = *v;
+    position[order[i]] = n - 1;
   }
-  piece->nvert = piece->nvert_cells = n;
+  local->nvert = local->nvert_cells = n;
   PetscCall(PetscFree(c->vertex));
   for (PetscInt k = 0; k < c->ncell; k++) number[k] = c->data[k].orig;
   PetscCall(ascending(c->ncell, number, order));
-  PetscCall(PetscMalloc1(4 * (size_t)c->ncell, &piece->cell));
-  PetscCall(PetscMalloc1(c->ncell, &piece->data));
+  PetscCall(PetscMalloc1(4 * (size_t)c->ncell, &local->cell));
+  PetscCall(PetscMalloc1(c->ncell, &local->data));
   for (PetscInt k = 0; k < c->ncell; k++) {
-    piece->data[k] = c->data[order[k]];
-    for (int a = 0; a < 4; a++) piece->cell[4 * (size_t)k + a] = place[c->cell[4 * (size_t)order[k] + a]];
+    local->data[k] = c->data[order[k]];
+    for (int a = 0; a < 4; a++) local->cell[4 * (size_t)k + a] = position[c->cell[4 * (size_t)order[k] + a]];
   }
-  piece->ncell = piece->ncell_owned = c->ncell;
-  PetscCall(PetscFree3(number, order, place));
+  local->ncell = local->ncell_owned = c->ncell;
+  PetscCall(PetscFree3(number, order, position));
   PetscCall(cells_destroy(c));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -179,10 +180,10 @@ typedef struct {
   PetscInt *pair; /* {original number, rank} of all of them, ascending */
 } Border;
 
-/* Vertices that other ranks have, too, with these ranks: told by the directory. */
-static PetscErrorCode border_create(MPI_Comm comm, PetscInt Nvert, const SbPiece *piece, Border *border)
+/* Vertices that other ranks have, too, with these ranks: from the directory. */
+static PetscErrorCode border_create(MPI_Comm comm, PetscInt Nvert, const SbLocalMesh *local, Border *border)
 {
-  const PetscInt n = piece->nvert_cells;
+  const PetscInt n = local->nvert_cells;
   PetscInt *orig, *got, *start, *holder, *pair, block, first, npair = 0;
   PetscMPIInt *dest, *pair_dest, rank, size;
   SbRoute there, back;
@@ -194,7 +195,7 @@ static PetscErrorCode border_create(MPI_Comm comm, PetscInt Nvert, const SbPiece
   first = rank * block;
   PetscCall(PetscMalloc2(n, &orig, n, &dest));
   for (PetscInt v = 0; v < n; v++) {
-    orig[v] = piece->vertex[v].orig;
+    orig[v] = local->vertex[v].orig;
     dest[v] = (PetscMPIInt)(orig[v] / block);
   }
   PetscCall(SbRouteCreate(comm, n, dest, &there));
@@ -211,7 +212,7 @@ static PetscErrorCode border_create(MPI_Comm comm, PetscInt Nvert, const SbPiece
   }
   PetscCall(SbRouteDestroy(&there));
   PetscCall(PetscFree(got));
-  /* each of them is told all of them */
+  /* each of them gets all of them */
   for (PetscInt v = 0; v < block; v++) {
     const PetscInt m = start[v + 1] - start[v];
 
@@ -243,7 +244,7 @@ static PetscErrorCode border_create(MPI_Comm comm, PetscInt Nvert, const SbPiece
       border->vert[k].n++;
       continue;
     }
-    while (piece->vertex[v].orig != border->pair[2 * i]) v++;
+    while (local->vertex[v].orig != border->pair[2 * i]) v++;
     border->vert[++k] = (Shared){v, border->pair[2 * i], 1, border->pair + 2 * i + 1, 0};
   }
   PetscCall(SbRouteDestroy(&back));
@@ -271,12 +272,13 @@ static int compare_shared(const void *a, const void *b)
 }
 
 /* Vertices of the same ranks go to them in equal runs along the longest side of their box. */
-static PetscErrorCode choose_owners(const SbPiece *piece, Border *border, PetscMPIInt me, PetscMPIInt owner[])
+static PetscErrorCode choose_owners(const SbLocalMesh *local, Border *border, PetscMPIInt me,
+                                    PetscMPIInt owner[])
 {
   PetscInt n;
 
   PetscFunctionBeginUser;
-  for (PetscInt v = 0; v < piece->nvert_cells; v++) owner[v] = me;
+  for (PetscInt v = 0; v < local->nvert_cells; v++) owner[v] = me;
   qsort(border->vert, (size_t)border->n, sizeof(Shared), compare_shared);
   for (PetscInt i = 0; i < border->n; i += n) {
     Shared *s = border->vert + i;
@@ -285,14 +287,14 @@ static PetscErrorCode choose_owners(const SbPiece *piece, Border *border, PetscM
 
     for (n = 1; i + n < border->n && !compare_ranks(s, s + n);) n++;
     for (int d = 0; d < 3; d++) {
-      low[d] = high[d] = piece->vertex[s[0].vert].x[d];
+      low[d] = high[d] = local->vertex[s[0].vert].x[d];
       for (PetscInt k = 1; k < n; k++) {
-        low[d] = PetscMin(low[d], piece->vertex[s[k].vert].x[d]);
-        high[d] = PetscMax(high[d], piece->vertex[s[k].vert].x[d]);
+        low[d] = PetscMin(low[d], local->vertex[s[k].vert].x[d]);
+        high[d] = PetscMax(high[d], local->vertex[s[k].vert].x[d]);
       }
       if (high[d] - low[d] > high[axis] - low[axis]) axis = d;
     }
-    for (PetscInt k = 0; k < n; k++) s[k].along = piece->vertex[s[k].vert].x[axis];
+    for (PetscInt k = 0; k < n; k++) s[k].along = local->vertex[s[k].vert].x[axis];
     qsort(s, (size_t)n, sizeof(Shared), compare_shared);
     for (PetscInt k = 0; k < n; k++)
       owner[s[k].vert] = (PetscMPIInt)s[k].rank[2 * ((PetscInt64)k * s[k].n / n)];
@@ -303,26 +305,27 @@ static PetscErrorCode choose_owners(const SbPiece *piece, Border *border, PetscM
 /* ------------------------------------------------------------------ ghosts */
 
 /* Which owned cells are copied to which ranks. */
-static PetscErrorCode list_copies(const SbPiece *piece, const Border *border, PetscBool all, PetscMPIInt me,
-                                  PetscMPIInt size, PetscInt *ncopy, PetscInt **copied, PetscMPIInt **dest)
+static PetscErrorCode list_copies(const SbLocalMesh *local, const Border *border, PetscBool all,
+                                  PetscMPIInt me, PetscMPIInt size, PetscInt *ncopy, PetscInt **copied,
+                                  PetscMPIInt **dest)
 {
   PetscInt *shared, *mark, n = 0;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscMalloc2(piece->nvert_cells, &shared, size, &mark));
-  for (PetscInt v = 0; v < piece->nvert_cells; v++) shared[v] = -1;
+  PetscCall(PetscMalloc2(local->nvert_cells, &shared, size, &mark));
+  for (PetscInt v = 0; v < local->nvert_cells; v++) shared[v] = -1;
   for (PetscInt i = 0; i < border->n; i++) shared[border->vert[i].vert] = i;
   for (int pass = 0; pass < 2; pass++) {
     for (PetscMPIInt r = 0; r < size; r++) mark[r] = -1;
     n = 0;
-    for (PetscInt c = 0; c < piece->ncell_owned; c++) {
+    for (PetscInt c = 0; c < local->ncell_owned; c++) {
       mark[me] = c;
       for (int a = 0; a < 4; a++) {
-        const PetscInt v = piece->cell[4 * (size_t)c + a];
+        const PetscInt v = local->cell[4 * (size_t)c + a];
         const Shared *s = shared[v] < 0 ? NULL : border->vert + shared[v];
 
         for (PetscInt k = 0; s && k < (all ? s->n : 1); k++) {
-          const PetscMPIInt r = all ? (PetscMPIInt)s->rank[2 * k] : piece->owner[v];
+          const PetscMPIInt r = all ? (PetscMPIInt)s->rank[2 * k] : local->owner[v];
 
           if (mark[r] == c) continue;
           mark[r] = c;
@@ -345,40 +348,41 @@ static PetscErrorCode list_copies(const SbPiece *piece, const Border *border, Pe
 }
 
 /* Appends the ghosts and those of their vertices that are new here. */
-static PetscErrorCode append_ghosts(const Cells *g, SbPiece *piece)
+static PetscErrorCode append_ghosts(const Cells *g, SbLocalMesh *local)
 {
-  PetscInt *orig, *number, *order, *place, n = piece->nvert;
+  PetscInt *orig, *number, *order, *position, n = local->nvert;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscMalloc4(piece->nvert_cells, &orig, g->nvert, &number, g->nvert, &order, g->nvert, &place));
-  for (PetscInt v = 0; v < piece->nvert_cells; v++) orig[v] = piece->vertex[v].orig;
+  PetscCall(
+    PetscMalloc4(local->nvert_cells, &orig, g->nvert, &number, g->nvert, &order, g->nvert, &position));
+  for (PetscInt v = 0; v < local->nvert_cells; v++) orig[v] = local->vertex[v].orig;
   for (PetscInt v = 0; v < g->nvert; v++) number[v] = g->vertex[v].orig;
   PetscCall(ascending(g->nvert, number, order));
-  PetscCall(PetscRealloc((size_t)(n + g->nvert) * sizeof(SbVertexData), &piece->vertex));
-  PetscCall(PetscRealloc((size_t)(n + g->nvert) * sizeof(PetscMPIInt), &piece->owner));
+  PetscCall(PetscRealloc((size_t)(n + g->nvert) * sizeof(SbVertexData), &local->vertex));
+  PetscCall(PetscRealloc((size_t)(n + g->nvert) * sizeof(PetscMPIInt), &local->owner));
   for (PetscInt i = 0; i < g->nvert; i++) {
     const PetscInt v = order[i];
 
-    PetscCall(PetscFindInt(number[v], piece->nvert_cells, orig, &place[v]));
-    if (place[v] >= 0) continue;
-    if (n == piece->nvert_cells || piece->vertex[n - 1].orig != number[v]) {
-      piece->vertex[n] = g->vertex[v];
-      piece->owner[n++] = g->owner[v];
+    PetscCall(PetscFindInt(number[v], local->nvert_cells, orig, &position[v]));
+    if (position[v] >= 0) continue;
+    if (n == local->nvert_cells || local->vertex[n - 1].orig != number[v]) {
+      local->vertex[n] = g->vertex[v];
+      local->owner[n++] = g->owner[v];
     }
-    place[v] = n - 1;
+    position[v] = n - 1;
   }
-  piece->nvert = n;
-  n = piece->ncell;
-  piece->ncell += g->ncell;
-  PetscCall(PetscRealloc(4 * (size_t)piece->ncell * sizeof(PetscInt), &piece->cell));
-  PetscCall(PetscRealloc((size_t)piece->ncell * sizeof(SbCellData), &piece->data));
-  PetscCall(PetscArraycpy(piece->data + n, g->data, g->ncell));
-  for (PetscInt i = 0; i < 4 * g->ncell; i++) piece->cell[4 * (size_t)n + i] = place[g->cell[i]];
-  PetscCall(PetscFree4(orig, number, order, place));
+  local->nvert = n;
+  n = local->ncell;
+  local->ncell += g->ncell;
+  PetscCall(PetscRealloc(4 * (size_t)local->ncell * sizeof(PetscInt), &local->cell));
+  PetscCall(PetscRealloc((size_t)local->ncell * sizeof(SbCellData), &local->data));
+  PetscCall(PetscArraycpy(local->data + n, g->data, g->ncell));
+  for (PetscInt i = 0; i < 4 * g->ncell; i++) local->cell[4 * (size_t)n + i] = position[g->cell[i]];
+  PetscCall(PetscFree4(orig, number, order, position));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode add_ghosts(MPI_Comm comm, PetscInt Nvert, PetscBool all, SbPiece *piece)
+static PetscErrorCode add_ghosts(MPI_Comm comm, PetscInt Nvert, PetscBool all, SbLocalMesh *local)
 {
   PetscMPIInt rank, size, *dest;
   PetscInt n = 0;
@@ -388,24 +392,25 @@ static PetscErrorCode add_ghosts(MPI_Comm comm, PetscInt Nvert, PetscBool all, S
   PetscFunctionBeginUser;
   PetscCallMPI(MPI_Comm_rank(comm, &rank));
   PetscCallMPI(MPI_Comm_size(comm, &size));
-  PetscCall(border_create(comm, Nvert, piece, &border));
-  PetscCall(choose_owners(piece, &border, rank, piece->owner));
-  PetscCall(list_copies(piece, &border, all, rank, size, &n, &piece->copied, &dest));
+  PetscCall(border_create(comm, Nvert, local, &border));
+  PetscCall(choose_owners(local, &border, rank, local->owner));
+  PetscCall(list_copies(local, &border, all, rank, size, &n, &local->copied, &dest));
   PetscCall(PetscFree(border.vert));
   PetscCall(PetscFree(border.pair));
-  PetscCall(SbRouteCreate(comm, n, dest, &piece->ghost));
+  PetscCall(SbRouteCreate(comm, n, dest, &local->ghost));
   own =
-    (Cells){PETSC_TRUE, piece->ncell, piece->nvert, piece->cell, piece->data, piece->vertex, piece->owner};
-  PetscCall(send_cells(&own, &piece->ghost, piece->copied, dest, &ghost));
+    (Cells){PETSC_TRUE, local->ncell, local->nvert, local->cell, local->data, local->vertex, local->owner};
+  PetscCall(send_cells(&own, &local->ghost, local->copied, dest, &ghost));
   PetscCall(PetscFree(dest));
-  PetscCall(append_ghosts(&ghost, piece));
+  PetscCall(append_ghosts(&ghost, local));
   PetscCall(cells_destroy(&ghost));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* ------------------------------------------------------------------ all of it */
 
-PetscErrorCode SbDistribute(MPI_Comm comm, SbPartitioner type, PetscBool all, SbMergedMesh *w, SbPiece *piece)
+PetscErrorCode SbDistribute(MPI_Comm comm, SbPartitioner type, PetscBool all, SbMergedMesh *w,
+                            SbLocalMesh *local)
 {
   const PetscInt Nvert = w->Nvert;
   PetscMPIInt size, *part;
@@ -413,20 +418,20 @@ PetscErrorCode SbDistribute(MPI_Comm comm, SbPartitioner type, PetscBool all, Sb
   Cells from, owned;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscMemzero(piece, sizeof(*piece)));
+  PetscCall(PetscMemzero(local, sizeof(*local)));
   PetscCallMPI(MPI_Comm_size(comm, &size));
   from = (Cells){PETSC_FALSE, w->ncell, w->nvert, w->cell, w->data, w->vertex, NULL};
   if (size == 1) {
     w->cell = NULL;
     w->data = NULL;
     w->vertex = NULL;
-    *piece = (SbPiece){.ncell_owned = from.ncell,
-                       .ncell = from.ncell,
-                       .nvert = from.nvert,
-                       .nvert_cells = from.nvert,
-                       .cell = from.cell,
-                       .data = from.data,
-                       .vertex = from.vertex};
+    *local = (SbLocalMesh){.ncell_owned = from.ncell,
+                           .ncell = from.ncell,
+                           .nvert = from.nvert,
+                           .nvert_cells = from.nvert,
+                           .cell = from.cell,
+                           .data = from.data,
+                           .vertex = from.vertex};
   } else {
     PetscCall(PetscMalloc1(w->ncell, &part));
     PetscCall(SbPartition(comm, type, w, part));
@@ -438,8 +443,8 @@ PetscErrorCode SbDistribute(MPI_Comm comm, SbPartitioner type, PetscBool all, Sb
     PetscCall(PetscFree(part));
   }
   PetscCall(SbMergedMeshDestroy(w));
-  if (size > 1) PetscCall(keep_owned(&owned, piece));
-  PetscCall(PetscCalloc1(piece->nvert, &piece->owner));
-  if (size > 1) PetscCall(add_ghosts(comm, Nvert, all, piece));
+  if (size > 1) PetscCall(keep_owned(&owned, local));
+  PetscCall(PetscCalloc1(local->nvert, &local->owner));
+  if (size > 1) PetscCall(add_ghosts(comm, Nvert, all, local));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

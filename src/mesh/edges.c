@@ -2,7 +2,7 @@
   edges.c - edges: pairs of vertices that a tet, triangle or line joins, each once.
 
   The edges of every item go into the bucket of their lower vertex (a counting sort); each bucket is sorted, equal neighbours
-  in it are one edge. The number of an edge is its place in the list.
+  in it are one edge. The number of an edge is its position in the list.
 */
 #include <stdlib.h>
 #include "mesh_impl.h"

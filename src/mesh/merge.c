@@ -1,5 +1,5 @@
 /*
-  merge.c - all bodies in one piece: read, placed, checked, marked by sets, numbered one after the other.
+  merge.c - all bodies in one mesh: read, placed, checked, marked by sets, numbered one after the other.
 
   Rank 0 reads a body alone, unless its file has slabs: then every rank reads one (slab.c). When a rank fails alone, its message is caught, sent to
   the others, and raised by all of them, so that nobody waits for a rank that is gone.

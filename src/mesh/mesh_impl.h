@@ -1,5 +1,5 @@
 /*
-  mesh_impl.h - what the files of src/mesh/ share: edges and shapes of a body, its sets, all bodies in one piece.
+  mesh_impl.h - what the files of src/mesh/ share: edges and shapes of a body, its sets, all bodies in one mesh.
 
   A body lives on rank 0 until distribute.c hands the pieces to their ranks.
 */
@@ -83,7 +83,7 @@ PetscErrorCode SbSetsCheck(PetscInt nbody, const SbBody body[], const SbImport i
 typedef struct {
   MPI_Comm comm;
   PetscInt nsend, nrecv;
-  PetscInt *place; /* [nsend] of a record among those that leave, by rank */
+  PetscInt *position; /* [nsend] of a record among those that leave, by rank */
   PetscMPIInt size, *scount, *sfirst, *rcount,
     *rfirst; /* [size] records to and from each rank, and the first of them */
 } SbRoute;
@@ -112,14 +112,14 @@ typedef struct {
 } SbCellData;
 
 /*
-  All bodies in one piece, before it is cut into parts: some cells on each rank, with all their vertices. A vertex of cells on several ranks is on each of
+  All bodies in one mesh, before it is cut into parts: some cells on each rank, with all their vertices. A vertex of cells on several ranks is on each of
   them with the same data.
 */
 typedef struct {
   PetscInt Nvert, Ncell; /* on all ranks together */
   PetscInt nvert, ncell;
   SbVertexData *vertex; /* [nvert] ascending original numbers */
-  PetscInt *cell;       /* [ncell][4] places in vertex[] */
+  PetscInt *cell;       /* [ncell][4] positions in vertex[] */
   SbCellData *data;     /* [ncell] */
   PetscInt *
     neighbour; /* [ncell][4] cell across the face, -1 on the boundary, ncell + k: the cell remote[k] of another rank */
@@ -161,19 +161,19 @@ PetscErrorCode SbPartition(MPI_Comm comm, SbPartitioner type, const SbMergedMesh
 /* What a rank has of the mesh before it is numbered: owned cells by original number, then ghost ones; vertices of owned cells by original number, then the others. */
 typedef struct {
   PetscInt ncell_owned, ncell, nvert;
-  PetscInt *cell;       /* [ncell][4] places in vertex[] */
+  PetscInt *cell;       /* [ncell][4] positions in vertex[] */
   SbCellData *data;     /* [ncell] */
   SbVertexData *vertex; /* [nvert] */
   PetscMPIInt *owner;   /* [nvert] */
   SbRoute ghost;        /* copies of owned cells to other ranks, on several ranks */
   PetscInt *copied;     /* [ghost.nsend] the cell that is copied */
   PetscInt nvert_cells; /* vertices of owned cells */
-} SbPiece;
+} SbLocalMesh;
 
 /* Hands the whole out to the ranks and destroys it. `all`: ghosts are all cells that share a vertex with an owned cell, else those with an owned vertex. Collective. */
 PetscErrorCode SbDistribute(MPI_Comm comm, SbPartitioner type, PetscBool all, SbMergedMesh *merged,
-                            SbPiece *piece);
-/* Own local numbering: fills the arrays and counts of the mesh and destroys the piece. Collective. */
-PetscErrorCode SbMeshNumber(SbMesh mesh, SbPiece *piece);
+                            SbLocalMesh *local);
+/* Own local numbering: fills the arrays and counts of the mesh and destroys the local mesh. Collective. */
+PetscErrorCode SbMeshNumber(SbMesh mesh, SbLocalMesh *local);
 /* Reverse Cuthill-McKee order: order[i] is the vertex that gets number i. A cell's vertex may be -1: it takes no part. */
 PetscErrorCode SbOrderRCM(PetscInt nvert, PetscInt ncell, const PetscInt cell[], PetscInt order[]);

@@ -7,11 +7,11 @@
 */
 #include "mesh_impl.h"
 
-/* The piece and the way to the own numbers. */
+/* The local mesh and the way to the own numbers. */
 typedef struct {
-  const SbPiece *p;
+  const SbLocalMesh *p;
   PetscMPIInt rank, size;
-  PetscInt *local;  /* [nvert] own number of a vertex of the piece */
+  PetscInt *local;  /* [nvert] own number of a vertex of the local mesh */
   PetscInt *global; /* [nvert] */
 } Work;
 
@@ -20,7 +20,7 @@ typedef struct {
 /* Own numbers of owned vertices; global numbers of them. */
 static PetscErrorCode number_owned(Work *w, SbMesh mesh)
 {
-  const SbPiece *p = w->p;
+  const SbLocalMesh *p = w->p;
   PetscInt *compact, *back, *cell, *order, n = 0, mine[2], sum[2] = {0, 0};
 
   PetscFunctionBeginUser;
@@ -54,7 +54,7 @@ static PetscErrorCode number_owned(Work *w, SbMesh mesh)
 /* Ghosts: their owners know them by their original numbers. */
 static PetscErrorCode number_ghosts(Work *w, SbMesh mesh)
 {
-  const SbPiece *p = w->p;
+  const SbLocalMesh *p = w->p;
   PetscInt *ghost, *key, *orig, *got, n = 0;
   PetscMPIInt *dest;
   SbRoute route;
@@ -127,7 +127,7 @@ static PetscErrorCode sort_by_key(PetscInt n, const PetscInt from[], PetscInt nk
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The inclusion of its body that a cell belongs to: 0 for the bulk, else one more than its place in the list. */
+/* The inclusion of its body that a cell belongs to: 0 for the bulk, else one more than its position in the list. */
 static PetscInt inclusion_of(SbMesh mesh, const SbCellData *cell)
 {
   const SbBody *body = &mesh->body[cell->body];
@@ -138,10 +138,10 @@ static PetscInt inclusion_of(SbMesh mesh, const SbCellData *cell)
   return 0;
 }
 
-/* The cells of the piece in the order of their own numbers. */
+/* The cells of the local mesh in the order of their own numbers. */
 static PetscErrorCode order_cells(const Work *w, SbMesh mesh, PetscInt order[])
 {
-  const SbPiece *p = w->p;
+  const SbLocalMesh *p = w->p;
   PetscInt *key, *all, *some;
 
   PetscFunctionBeginUser;
@@ -164,7 +164,7 @@ static PetscErrorCode order_cells(const Work *w, SbMesh mesh, PetscInt order[])
 /* From owned cells to their copies on other ranks. */
 static PetscErrorCode link_cells(const Work *w, SbMesh mesh, const PetscInt order[])
 {
-  const SbPiece *p = w->p;
+  const SbLocalMesh *p = w->p;
   const PetscInt nghost = p->ncell - p->ncell_owned;
   PetscInt *number, *sent, *got, *leaf;
   PetscSFNode *remote;
@@ -222,24 +222,24 @@ static PetscErrorCode fill_cells(const Work *w, SbMesh mesh)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbMeshNumber(SbMesh mesh, SbPiece *piece)
+PetscErrorCode SbMeshNumber(SbMesh mesh, SbLocalMesh *local)
 {
-  Work w = {.p = piece};
+  Work w = {.p = local};
 
   PetscFunctionBeginUser;
   PetscCallMPI(MPI_Comm_rank(mesh->comm, &w.rank));
   PetscCallMPI(MPI_Comm_size(mesh->comm, &w.size));
-  PetscCall(PetscMalloc2(piece->nvert, &w.local, piece->nvert, &w.global));
+  PetscCall(PetscMalloc2(local->nvert, &w.local, local->nvert, &w.global));
   PetscCall(number_owned(&w, mesh));
   PetscCall(number_ghosts(&w, mesh));
   PetscCall(fill_vertices(&w, mesh));
-  PetscCall(PetscFree(piece->vertex));
+  PetscCall(PetscFree(local->vertex));
   PetscCall(fill_cells(&w, mesh));
   PetscCall(PetscFree2(w.local, w.global));
-  PetscCall(PetscFree(piece->cell));
-  PetscCall(PetscFree(piece->data));
-  PetscCall(PetscFree(piece->owner));
-  PetscCall(PetscFree(piece->copied));
-  if (w.size > 1) PetscCall(SbRouteDestroy(&piece->ghost));
+  PetscCall(PetscFree(local->cell));
+  PetscCall(PetscFree(local->data));
+  PetscCall(PetscFree(local->owner));
+  PetscCall(PetscFree(local->copied));
+  if (w.size > 1) PetscCall(SbRouteDestroy(&local->ghost));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

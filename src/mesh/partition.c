@@ -47,7 +47,7 @@ static inline void centre(const SbMergedMesh *w, PetscInt c, PetscReal x[3])
     x[i] = w->vertex[v[0]].x[i] + w->vertex[v[1]].x[i] + w->vertex[v[2]].x[i] + w->vertex[v[3]].x[i];
 }
 
-/* Reorders x[n][3] so that the k-th smallest along an axis stands at its place, smaller ones before it. */
+/* Reorders x[n][3] so that the k-th smallest along an axis stands at its position, smaller ones before it. */
 static void select_kth(PetscInt n, PetscReal (*x)[3], int axis, PetscInt k)
 {
   PetscInt low = 0, high = n - 1;
@@ -171,14 +171,14 @@ static PetscErrorCode call_metis(PetscInt ncell, const PetscInt orig[], const Pe
 {
   idx_t n = (idx_t)ncell, ncon = 1, np = (idx_t)nparts, cut, options[METIS_NOPTIONS], k = 0;
   idx_t *start, *adj, *result;
-  PetscInt *place;
+  PetscInt *position;
   int status;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscMalloc4(ncell + 1, &start, 4 * (size_t)ncell, &adj, ncell, &result, ncell, &place));
-  for (PetscInt c = 0; c < ncell; c++) place[orig[c]] = c;
+  PetscCall(PetscMalloc4(ncell + 1, &start, 4 * (size_t)ncell, &adj, ncell, &result, ncell, &position));
+  for (PetscInt c = 0; c < ncell; c++) position[orig[c]] = c;
   for (PetscInt c = 0; c < ncell; c++) {
-    const PetscInt *other = across + 4 * (size_t)place[c];
+    const PetscInt *other = across + 4 * (size_t)position[c];
 
     start[c] = k;
     for (int f = 0; f < 4; f++)
@@ -190,7 +190,7 @@ static PetscErrorCode call_metis(PetscInt ncell, const PetscInt orig[], const Pe
   status =
     METIS_PartGraphKway(&n, &ncon, start, adj, NULL, NULL, NULL, &np, NULL, NULL, options, &cut, result);
   for (PetscInt c = 0; c < ncell; c++) part[c] = (PetscInt)result[orig[c]];
-  PetscCall(PetscFree4(start, adj, result, place));
+  PetscCall(PetscFree4(start, adj, result, position));
   PetscCheck(status == METIS_OK, PETSC_COMM_SELF, PETSC_ERR_LIB, "METIS_PartGraphKway() failed with %d",
              status);
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -33,14 +33,14 @@ PetscErrorCode SbRouteCreate(MPI_Comm comm, PetscInt n, const PetscMPIInt dest[]
   route->nsend = n;
   PetscCallMPI(MPI_Comm_size(comm, &route->size));
   PetscCall(PetscCalloc5(route->size, &route->scount, route->size, &route->sfirst, route->size,
-                         &route->rcount, route->size, &route->rfirst, n, &route->place));
+                         &route->rcount, route->size, &route->rfirst, n, &route->position));
   for (PetscInt i = 0; i < n; i++) route->scount[dest[i]]++;
   PetscCallMPI(MPI_Alltoall(route->scount, 1, MPI_INT, route->rcount, 1, MPI_INT, comm));
   PetscCall(first_of_each(route->size, route->scount, route->sfirst, &n));
   PetscCall(first_of_each(route->size, route->rcount, route->rfirst, &route->nrecv));
   PetscCall(PetscMalloc1(route->size, &next));
   PetscCall(PetscArraycpy(next, route->sfirst, route->size));
-  for (PetscInt i = 0; i < n; i++) route->place[i] = next[dest[i]]++;
+  for (PetscInt i = 0; i < n; i++) route->position[i] = next[dest[i]]++;
   PetscCall(PetscFree(next));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -48,7 +48,7 @@ PetscErrorCode SbRouteCreate(MPI_Comm comm, PetscInt n, const PetscMPIInt dest[]
 PetscErrorCode SbRouteDestroy(SbRoute *route)
 {
   PetscFunctionBeginUser;
-  PetscCall(PetscFree5(route->scount, route->sfirst, route->rcount, route->rfirst, route->place));
+  PetscCall(PetscFree5(route->scount, route->sfirst, route->rcount, route->rfirst, route->position));
   PetscCall(PetscMemzero(route, sizeof(*route)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -74,7 +74,7 @@ PetscErrorCode SbRouteSend(const SbRoute *route, size_t unit, const void *record
   PetscFunctionBeginUser;
   PetscCall(PetscMalloc(unit * (size_t)route->nsend, &out));
   for (PetscInt i = 0; i < route->nsend; i++)
-    memcpy(out + unit * (size_t)route->place[i], (const char *)record + unit * (size_t)i, unit);
+    memcpy(out + unit * (size_t)route->position[i], (const char *)record + unit * (size_t)i, unit);
   PetscCall(PetscMalloc(unit * (size_t)route->nrecv, &in));
   PetscCall(exchange(route, unit, PETSC_FALSE, out, in));
   PetscCall(PetscFree(out));
@@ -90,7 +90,7 @@ PetscErrorCode SbRouteReply(const SbRoute *route, size_t unit, const void *answe
   PetscCall(PetscMalloc(unit * (size_t)route->nsend, &in));
   PetscCall(exchange(route, unit, PETSC_TRUE, answer, in));
   for (PetscInt i = 0; i < route->nsend; i++)
-    memcpy((char *)result + unit * (size_t)i, in + unit * (size_t)route->place[i], unit);
+    memcpy((char *)result + unit * (size_t)i, in + unit * (size_t)route->position[i], unit);
   PetscCall(PetscFree(in));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

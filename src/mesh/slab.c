@@ -1,7 +1,7 @@
 /*
   slab.c - one body read by all ranks: each has a block of the file's tets and keeps a block of its vertices.
 
-  The keeper of a vertex is asked for its place, and knows which ranks' tets use it; there vertices that no tet uses are found, and
+  The keeper of a vertex is asked for its position, and knows which ranks' tets use it; there vertices that no tet uses are found, and
   what belongs to a vertex on several ranks is joined. A face between tets of two ranks is matched by the keeper of its lowest
   vertex, and so are the edges of the surface. A triangle of a group goes to the keeper of its lowest vertex, and from there to all ranks that use it: one of them has
   the tet. The parts that tets hang together in on each rank are joined on rank 0, along vertices that several ranks use.
@@ -25,7 +25,7 @@ typedef struct {
   uint64_t *mask;    /* [nkept] sets */
   SbRoute vert;      /* vertices of this rank's tets, to their keepers */
   PetscInt *used;    /* [im->nvert] their numbers in the file, ascending */
-  PetscInt *asked;   /* [vert.nrecv] place of each among those that are kept */
+  PetscInt *asked;   /* [vert.nrecv] position of each among those that are kept */
   PetscInt *start;   /* [nkept + 1] */
   PetscMPIInt *user; /* [start[nkept]] ranks that use a vertex, ascending */
   PetscBool *shared; /* [im->nvert] other ranks use it, too */
@@ -164,7 +164,7 @@ static PetscErrorCode ask_keepers(Slab *s)
 typedef struct {
   PetscInt vert[3], cell; /* ascending; `cell` as SbPart.remote numbers it */
   int64_t number;         /* of the tet in the file */
-  PetscInt at;            /* place among those received */
+  PetscInt at;            /* position among those received */
 } Face;
 typedef struct {
   PetscInt rank, cell;

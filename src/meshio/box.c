@@ -113,9 +113,9 @@ static PetscErrorCode add_cell(const Box *box, const PetscInt at[3], SbImport *i
 
     for (int a = 0; a < 4; a++) {
       const int corner = ways[w][a] ^ mirror;
-      const int place = odd ^ (w >= 3) && a >= 2 ? 5 - a : a; /* swaps the last two */
+      const int position = odd ^ (w >= 3) && a >= 2 ? 5 - a : a; /* swaps the last two */
 
-      vert[place] = vertex(box, at[0] + (corner & 1), at[1] + (corner >> 1 & 1), at[2] + (corner >> 2));
+      vert[position] = vertex(box, at[0] + (corner & 1), at[1] + (corner >> 1 & 1), at[2] + (corner >> 2));
     }
     PetscCall(SbImportAddItem(im, 3, vert, 0, im->item[3].n + 1));
   }

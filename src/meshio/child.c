@@ -22,7 +22,7 @@ typedef struct {
   PetscInt nvert, n[4], ngroup, ntags, nmember; /* nmember: entries of tags_group */
 } Header;
 
-/* The arrays of a body by their place and size in bytes: alike for who sends and who receives. */
+/* The arrays of a body by their position and size in bytes: alike for who sends and who receives. */
 typedef struct {
   void **array;
   size_t bytes;
@@ -102,7 +102,7 @@ static void child(FILE *file, SbChildWork work, void *ctx, const SbImport *like)
 
 /* ------------------------------------------------------------------ the parent */
 
-/* The arrays, in place of those that `im` has. */
+/* The arrays, instead of those that `im` has. */
 static PetscErrorCode take_body(FILE *file, const Header *h, SbImport *im, PetscBool *complete)
 {
   Part part[NPART];

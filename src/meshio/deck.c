@@ -133,7 +133,7 @@ static PetscErrorCode find_range(SbDeck *d, const SbDeckSet *set, const SbDeckRa
   const int64_t n = all ? numbers->n : length;
 
   PetscFunctionBeginUser;
-  /* sets that name each other can tell of far more members than a file of this size has use for */
+  /* sets that name each other can name far more members than a file of this size has use for */
   im->scan.token = r->at;
   d->nlooked += n;
   if (d->nlooked > 64 * (int64_t)(im->scan.end - im->scan.data))

@@ -34,7 +34,7 @@ static PetscErrorCode rotation(const SbBody *body, PetscReal R[3][3])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode place(const SbBody *body, SbImport *im)
+static PetscErrorCode transform_body(const SbBody *body, SbImport *im)
 {
   PetscReal R[3][3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
   char scale[SB_OPTION_NAME_MAX], translate[SB_OPTION_NAME_MAX];
@@ -141,7 +141,7 @@ PetscErrorCode SbImportRead(const SbBody *body, SbImport *im)
   PetscCall(begin(body, im));
   PetscCall(read(body->mesh, im));
   PetscCall(SbImportForget(im));
-  PetscCall(place(body, im));
+  PetscCall(transform_body(body, im));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -162,6 +162,6 @@ PetscErrorCode SbImportSlab(const SbBody *body, PetscInt k, PetscInt n, SbImport
   PetscCall(begin(body, im));
   PetscCall(SbImportSlab_H5(body->mesh, k, n, im, rows));
   PetscCall(SbImportForget(im));
-  PetscCall(place(body, im));
+  PetscCall(transform_body(body, im));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -90,7 +90,7 @@ static PetscErrorCode read_names(Gmsh *g)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Physical groups of one entity. A minus sign tells gmsh the orientation; it means nothing here. */
+/* Physical groups of one entity. A minus sign is gmsh's sign of the orientation; it means nothing here. */
 static PetscErrorCode read_entity_groups(Gmsh *g, int dim, PetscInt *tags)
 {
   int64_t n, tag;
@@ -238,7 +238,7 @@ static PetscErrorCode read_element(Gmsh *g, int type, int64_t number, PetscInt t
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Elements of one type: as text one, whose line tells type and number of tags; in binary as many as their header says. */
+/* Elements of one type: as text one, whose line has the type and the number of tags; in binary as many as their header says. */
 static PetscErrorCode read_elements_22_run(Gmsh *g, int64_t left, int64_t *nread)
 {
   SbScan *s = &g->im->scan;

@@ -3,7 +3,7 @@
 
   Both hold /mesh/x and /mesh/cells. Own meshes have groups; in a run's output /mesh/body says which body a tet belongs to,
   and the bodies become groups of tets. When each tet of the output has points of its own (-output_discontinuous),
-  /mesh/vertices tells which of them are one vertex: positions are averaged there. With a step, its displacement is added.
+  /mesh/vertices says which of them are one vertex: positions are averaged there. With a step, its displacement is added.
 
   An .xmf names the .h5 that its mesh is in.
 
@@ -135,7 +135,7 @@ static PetscErrorCode open_array(const File *f, Array *a)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The rows of an open array, checked; what is out of range is named with its place. */
+/* The rows of an open array, checked; what is out of range is named with its position. */
 static PetscErrorCode read_values(const File *f, const Array *a, void *values)
 {
   const hid_t whole = a->bound >= 0 && sizeof(PetscInt) == 4 ? H5T_NATIVE_INT32 : H5T_NATIVE_INT64;

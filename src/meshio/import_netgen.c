@@ -201,7 +201,7 @@ PetscErrorCode SbImportRead_Netgen(const char *path, SbImport *im)
     SB_SCAN_ERROR(s, "there is no section 'points'; the file is truncated or damaged");
   PetscCall(read_points(im));
   if (find_section(s, "volumeelements")) PetscCall(read_elements(im, &vol_volume));
-  /* Netgen writes the word with an ending that tells what else stands at the end of the lines */
+  /* Netgen writes the word with an ending that names what else stands at the end of the lines */
   if (find_section(s, "surfaceelements") || find_section(s, "surfaceelementsgi") ||
       find_section(s, "surfaceelementsuv"))
     PetscCall(read_elements(im, &vol_surface));

@@ -45,7 +45,7 @@ static PetscErrorCode read_mark(SbScan *s, const char *what, int64_t *mark)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The number of point v, which it must have, and its place. */
+/* The number of point v, which it must have, and its position. */
 static PetscErrorCode read_point(SbImport *im, PetscInt v, int64_t number)
 {
   SbScan *s = &im->scan;
@@ -159,7 +159,7 @@ PetscErrorCode SbImportRead_TetGen(const char *path, SbImport *im)
     (void)snprintf(name, sizeof(name), "%.*s%s", (int)stem, path, files[f].ending);
     if (f > 1) PetscCall(PetscTestFile(name, 'r', &exists));
     if (!exists) continue;
-    /* messages name this file in place of what the scenario says */
+    /* messages name this file instead of what the scenario says */
     PetscCall(SbImportScratch(im, sizeof(im->where) + 8, &where));
     (void)snprintf(where, sizeof(im->where) + 8, "%.*s%s", lead, im->where, name);
     PetscCall(SbScanClose(&im->scan));

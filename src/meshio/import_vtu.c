@@ -13,7 +13,7 @@
 #include <zlib.h>
 #include "vtk_grid.h"
 
-enum { ZLIB_RATIO = 1032 }; /* no compressed byte tells of more */
+enum { ZLIB_RATIO = 1032 }; /* no compressed byte stands for more */
 
 typedef struct {
   SbScan *scan;
@@ -295,7 +295,7 @@ static PetscErrorCode read_array(Vtu *v, const char *open, const char *close, in
   room = (size_t)(b.end - b.at) / (size_t)type.size;
   if ((uint64_t)n > (v->zlib ? ZLIB_RATIO : 1) * (uint64_t)room)
     SB_SCAN_ERROR(v->scan,
-                  "array '%s' should hold %lld numbers, which is more than the rest of the file can tell",
+                  "array '%s' should hold %lld numbers, which is more than the rest of the file can contain",
                   name, (long long)n);
   PetscCall(SbImportScratch(v->im, (size_t)n * sizeof(**value), value));
   PetscCall(read_binary(v, &b, name, type, (size_t)n, *value));

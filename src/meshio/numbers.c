@@ -1,5 +1,5 @@
 /*
-  numbers.c - from the numbers that a file gives to its nodes or elements to their places in memory.
+  numbers.c - from the numbers that a file gives to its nodes or elements to their indices in memory.
 
   A table when the numbers are dense, else pairs sorted by number.
 */

@@ -63,17 +63,17 @@ PetscErrorCode SbScanClose(SbScan *s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-const char *SbScanPlace(const SbScan *s, char place[64])
+const char *SbScanPosition(const SbScan *s, char position[64])
 {
   size_t line = 1;
 
   if (s->bytes) {
-    (void)snprintf(place, 64, "byte %zu", (size_t)(s->token - s->data) + 1);
-    return place;
+    (void)snprintf(position, 64, "byte %zu", (size_t)(s->token - s->data) + 1);
+    return position;
   }
   for (const char *p = s->data; p < s->token; p++) line += *p == '\n';
-  (void)snprintf(place, 64, "line %zu", line);
-  return place;
+  (void)snprintf(position, 64, "line %zu", line);
+  return position;
 }
 
 static inline void skip_blanks(SbScan *s)

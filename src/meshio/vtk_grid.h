@@ -13,7 +13,7 @@ typedef struct {
   int size;  /* bytes */
 } SbVtkType;
 
-/* All numbers as double: exact for every place of a node. Arrays are those of the reader, see SbImportScratch(). */
+/* All numbers as double: exact for every position of a node. Arrays are those of the reader, see SbImportScratch(). */
 typedef struct {
   PetscInt ncell;
   int64_t nconnect;
@@ -31,7 +31,7 @@ typedef struct {
   SbVtkGridFill - the cells of a grid as items of a body whose vertices are there; arrays of whole numbers become groups. Not collective.
 
   The array of regions (CellEntityIds, gmsh:physical, medit:ref, region, ...; or the only one) gives the groups volume_N, surface_N,
-  ...; each other one NAME_volume_N, ... Errors of a cell name the place import->scan.token.
+  ...; each other one NAME_volume_N, ... Errors of a cell name the position import->scan.token.
 */
 PetscErrorCode SbVtkGridFill(SbVtkGrid *grid, SbImport *im);
 /* n numbers of this type from bytes, which are of the other byte order when `swap`. */

@@ -1,5 +1,5 @@
 /*
-  write.c - meshes as files: read and written by their names. A file is written beside its place and renamed when it is whole.
+  write.c - meshes as files: read and written by their names. A file is written beside its target and renamed when it is whole.
 */
 #include <errno.h>
 #include <strings.h>

@@ -3,8 +3,8 @@
 */
 #include "model_impl.h"
 
-/* All effects write what they hold. */
-static PetscErrorCode write_holds(SbModel m)
+/* The constraints of all effects, assembled. */
+static PetscErrorCode assemble_constraints(SbModel m)
 {
   SbSpace s = m->space;
 
@@ -18,12 +18,12 @@ static PetscErrorCode write_holds(SbModel m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The same, and the displacement goes there. */
-static PetscErrorCode hold(SbModel m, PetscReal t, Vec U)
+/* The same, and U is moved to where they hold. */
+static PetscErrorCode constrain(SbModel m, PetscReal t, Vec U)
 {
   PetscFunctionBeginUser;
   if (!m->nassemble_constraints) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(write_holds(m));
+  PetscCall(assemble_constraints(m));
   PetscCall(SbModelPrescribe(m, t, U));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -31,7 +31,7 @@ static PetscErrorCode hold(SbModel m, PetscReal t, Vec U)
 PetscErrorCode SbModelContactResume(SbModel m)
 {
   PetscFunctionBeginUser;
-  if (m->nassemble_constraints) PetscCall(write_holds(m));
+  if (m->nassemble_constraints) PetscCall(assemble_constraints(m));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -52,7 +52,7 @@ PetscErrorCode SbModelContactBeginStep(SbModel m, PetscReal t, PetscReal dt, Vec
   if (m->nrestitution) PetscCall(SbSpaceRestoreLocalRead(m->space, V0, &v0));
   PetscCall(SbSpaceRestoreLocalRead(m->space, U, &u));
   PetscCall(SbSpaceRestoreLocalRead(m->space, U0, &u0));
-  PetscCall(hold(m, t + dt, U));
+  PetscCall(constrain(m, t + dt, U));
   PetscCall(PetscLogEventEnd(SbEvents[SB_EVENT_CONTACT], 0, 0, 0, 0));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -74,8 +74,8 @@ PetscErrorCode SbModelContactUpdateActiveSet(SbModel m, PetscReal t, Vec U, Vec 
   PetscCall(SbSpaceRestoreLocalRead(m->space, U, &u));
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, again, 1, SB_MPI_BOOL, MPI_LOR, m->comm));
   if (m->nrestitution && !*again && !m->space->rough) PetscCall(SbModelRestitutionUpdate(m, U, again));
-  /* a look changes normals and weights: rows that are solved again are those of the last search */
-  if (*again || m->space->rough) PetscCall(hold(m, t, U));
+  /* a look changes normals and weights: constraints that are solved again are those of the last search */
+  if (*again || m->space->rough) PetscCall(constrain(m, t, U));
   PetscCall(PetscLogEventEnd(SbEvents[SB_EVENT_CONTACT], 0, 0, 0, 0));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -173,7 +173,7 @@ PetscErrorCode SbModelContactPoints(SbModel m, PetscReal t, Vec U, Vec R, SbCont
 
     if (!m->effect[e]->ops.contact_points) continue;
     SbEffectCall(m->effect[e], contact_points, m->space, &stage, r, list);
-    for (PetscInt i = before; i < list->n; i++) list->place[i].effect = e;
+    for (PetscInt i = before; i < list->n; i++) list->point[i].effect = e;
   }
   PetscCall(SbSpaceRestoreLocalRead(m->space, R, &r));
   PetscCall(SbSpaceRestoreLocalRead(m->space, U, &stage.u));

@@ -2,7 +2,7 @@
   Restitution: what two things that meet within a step have left of their speed, and that a step gains no energy by it.
 
   Newton's law in Moreau's form (Moreau 1988; Jean, "The non-smooth contact dynamics method", CMAME 177, 1999) for the normal velocity of
-  a point of a body relative to an obstacle or to its place on another body: v+ + e v- >= 0, force >= 0, and one of them zero, for what would
+  a point of a body relative to an obstacle or to its position on another body: v+ + e v- >= 0, force >= 0, and one of them zero, for what would
   be behind the other at the end of the step, with the velocity v- or by what the solves find. v- is the velocity when the step begins.
   Implicit Euler has v+ = (gap1 - gap0) / h: the pair is constrained at
 

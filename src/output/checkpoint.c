@@ -2,7 +2,7 @@
   Checkpoints: the state of a run in one HDF5 file, from which it goes on as if it had not stopped.
 
   Displacement, velocity and acceleration (the integrator's own) of all nodes in original order and double precision, the step, its time,
-  the next step's length, works and losses so far, and what effects remember (checkpoint_effects.c). A file is written beside its place, flushed and renamed; the newest ones
+  the next step's length, works and losses so far, and what effects remember (checkpoint_effects.c). A file is written beside its target, flushed and renamed; the newest ones
   are kept. What makes it fit a run: a hash of the mesh (every coordinate and cell by its original number), and the text of
   the options that decide the mechanics. A checksum over the three vectors detects a file that was damaged later (mesh.c says what both sums are of).
 */
@@ -153,7 +153,7 @@ static PetscErrorCode write_checkpoint(SbRun run, SbOutput out, const SbStep *st
   uint64_t checksum;
 
   PetscFunctionBeginUser;
-  /* a file beside its place, with room for all of it: a full disk shows before anything is written */
+  /* a file beside its target, with room for all of it: a full disk shows before anything is written */
   (void)snprintf(name, sizeof(name), "checkpoint_%06" PetscInt_FMT ".h5", step->step);
   PetscCall(SbOutputPath(out, name, sizeof(path), path));
   PetscCall(SbOutputPath(out, "checkpoint.tmp", sizeof(tmp), tmp));

@@ -28,7 +28,7 @@ static void arrays_of(SbMemoryMesh *g, const PetscInt count[3], Array a[NARRAY])
   a[5] = (Array){"triangle_sets", count[2], 1, H5T_STD_U64LE, H5T_NATIVE_UINT64, g->tri_set};
 }
 
-/* Sum of places and values, so that damage is seen. */
+/* Sum of positions and values, so that damage is seen. */
 static uint64_t sum_of(const SbMemoryMesh *g)
 {
   uint64_t sum = SALT;

@@ -1,15 +1,15 @@
 /*
-  The places where contact pushes bodies, as points with normals, gaps and forces: -output_contacts.
+  The points where contact pushes bodies, with normals, gaps and forces: -output_contacts.
 
-  Each frame of fields.h5 then has a group `contacts` with one dataset per quantity and one row per place, in an order that no partition
+  Each frame of fields.h5 then has a group `contacts` with one dataset per quantity and one row per point, in an order that no partition
   changes. Their number differs from frame to frame, so they have an index of their own, contacts.xmf.
 
-  A place is sent to the rank that has its share of the numbers of points and edges, and sorted there: by the number that it begins
+  A point is sent to the rank that has its share of the numbers of points and edges, and sorted there: by the number that it begins
   with, then by effect, kind, and the number of the other side.
 */
 #include "output_impl.h"
 
-/* A place as it travels: what it is sorted by, then the quantities. Whole numbers are exact in a double. */
+/* A point as it travels: what it is sorted by, then the quantities. Whole numbers are exact in a double. */
 enum {
   FIRST,
   EFFECT,
@@ -25,14 +25,14 @@ enum {
   DRAG,
   RECORD = DRAG + 3
 };
-#define ROW (-1) /* the number of the row itself: VTK wants to be told that each point is a cell */
+#define ROW (-1) /* the number of the row itself: VTK needs a cell for each point */
 
 static const struct {
   const char *name, *unit;
   int ncomp, from;
   PetscBool whole;
 } table[] = {
-  // SbXdmfAddPoints() wants numbers and places first
+  // SbXdmfAddPoints() wants numbers and coordinates first
   {"point", "1", 1, ROW, PETSC_TRUE},          {"x", "m", 3, X, PETSC_FALSE},
   {"effect", "1", 1, EFFECT, PETSC_TRUE},      {"body", "1", 1, BODY, PETSC_TRUE},
   {"other", "1", 1, OTHER, PETSC_TRUE},        {"normal", "1", 3, NORMAL, PETSC_FALSE},
@@ -45,7 +45,7 @@ struct _p_SbContacts {
   SbContactPoints list;        /* of this rank */
   PetscInt nsend, nrecord;     /* rooms */
   PetscReal *send, *record;    /* [nsend][RECORD] by rank; [nrecord][RECORD] of this rank's share, sorted */
-  PetscMPIInt *count, *offset; /* [2 size] places to each rank, then from each */
+  PetscMPIInt *count, *offset; /* [2 size] points to each rank, then from each */
   SbOrder share;               /* which rows are this rank's; it has no star forest */
   void *column;                /* [nrecord][3] of one quantity, as in the file */
   MPI_Datatype type;           /* of a record */
@@ -96,19 +96,19 @@ static PetscErrorCode make_room(PetscInt n, PetscInt *size, PetscReal **records)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Puts the places of this rank into c->send, those for lower ranks first; c->count and c->offset of what is sent. */
+/* Puts the points of this rank into c->send, those for lower ranks first; c->count and c->offset of what is sent. */
 static PetscErrorCode sort_by_rank(SbContacts c, PetscMPIInt size)
 {
   PetscInt bound = 0;
 
   PetscFunctionBeginUser;
   PetscCall(make_room(c->list.n, &c->nsend, &c->send));
-  for (PetscInt i = 0; i < c->list.n; i++) bound = PetscMax(bound, c->list.place[i].id[1]);
+  for (PetscInt i = 0; i < c->list.n; i++) bound = PetscMax(bound, c->list.point[i].id[1]);
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &bound, 1, MPIU_INT, MPI_MAX, c->share.comm));
   PetscCall(PetscArrayzero(c->count, size));
   for (int pass = 0; pass < 2; pass++) {
     for (PetscInt i = 0; i < c->list.n; i++) {
-      const SbContactPoint *p = &c->list.place[i];
+      const SbContactPoint *p = &c->list.point[i];
       const PetscInt to = (PetscInt)((PetscInt64)p->id[1] * size / ((PetscInt64)bound + 1));
 
       if (!pass)
@@ -129,7 +129,7 @@ PetscErrorCode SbContactsFind(SbRun run, SbOutput out, const SbStep *step, Petsc
 
   PetscFunctionBeginUser;
   *bytes = 0;
-  if (!out->places) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!out->contact_points) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCheck(step->R, PETSC_COMM_SELF, PETSC_ERR_PLIB,
              "The residual was asked for but not given to the monitors");
   PetscCall(PetscLogEventBegin(out->event.contacts, 0, 0, 0, 0));
@@ -183,7 +183,7 @@ PetscErrorCode SbContactsWrite(SbOutput out, SbH5 *h, hid_t frame)
   hid_t group;
 
   PetscFunctionBeginUser;
-  if (!out->places) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!out->contact_points) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscLogEventBegin(out->event.contacts, 0, 0, 0, 0));
   PetscCall(SbH5GroupCreate(h, (unsigned)NTABLE, 14, &group));
   PetscCall(SbH5PutInt(h, group, "count", c->share.N));
@@ -224,7 +224,7 @@ PetscErrorCode SbContactsRead(hid_t frame, PetscInt *n, PetscInt *bytes)
 
 PetscInt SbContactsCount(SbOutput out)
 {
-  return out->places ? out->contacts->share.N : -1;
+  return out->contact_points ? out->contacts->share.N : -1;
 }
 
 PetscErrorCode SbContactsList(SbOutput out, PetscReal time, const char *frame, PetscInt n, PetscInt bytes)
@@ -267,11 +267,11 @@ PetscErrorCode SbContactsCreate(SbRun run, SbOutput out)
   char path[PETSC_MAX_PATH_LEN];
 
   PetscFunctionBeginUser;
-  // After a restart frames that are kept may have places, which stay in the index.
-  if (!out->places && !out->restarted) PetscFunctionReturn(PETSC_SUCCESS);
+  // After a restart frames that are kept may have contact points, which stay in the index.
+  if (!out->contact_points && !out->restarted) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscNew(&c));
   out->contacts = c;
-  if (out->places) run->want_residual = PETSC_TRUE;
+  if (out->contact_points) run->want_residual = PETSC_TRUE;
   c->share.comm = out->comm;
   c->share.each = 1;
   PetscCall(PetscMalloc2(2 * (size_t)out->size, &c->count, 2 * (size_t)out->size, &c->offset));
@@ -293,7 +293,7 @@ PetscErrorCode SbContactsDestroy(SbOutput out)
   PetscCall(SbXdmfDestroy(&c->xdmf));
   PetscCallMPI(MPI_Type_free(&c->type));
   PetscCall(PetscFree2(c->count, c->offset));
-  PetscCall(PetscFree(c->list.place));
+  PetscCall(PetscFree(c->list.point));
   PetscCall(PetscFree(c->send));
   PetscCall(PetscFree(c->record));
   PetscCall(PetscFree(c->column));

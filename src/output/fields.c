@@ -90,13 +90,13 @@ static PetscErrorCode cell_state(SbRun run, const SbStep *step, SbOutput *out)
 
 static PetscErrorCode stress(SbRun run, const SbStep *step, PetscReal *values)
 {
-  static const int place[6] = {0, 3, 5, 1, 4, 2}; // from xx yy zz xy yz xz to xx xy xz yy yz zz
+  static const int position[6] = {0, 3, 5, 1, 4, 2}; // from xx yy zz xy yz xz to xx xy xz yy yz zz
   SbOutput out;
 
   PetscFunctionBeginUser;
   PetscCall(cell_state(run, step, &out));
   for (PetscInt c = 0; c < run->model->mesh->ncell_owned; c++) {
-    for (int k = 0; k < 6; k++) values[6 * c + k] = out->sigma[6 * c + place[k]];
+    for (int k = 0; k < 6; k++) values[6 * c + k] = out->sigma[6 * c + position[k]];
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -202,7 +202,7 @@ static const SbField table[] = {
   {"reaction", "N", 3, VERTEX, VARIES, ALWAYS, "force of a support on the body", reaction},
   {"contact_force", "N", 3, VERTEX, VARIES, ALWAYS, "force of contact on the body", contact_force},
   {"contact_gap", "m", 3, VERTEX, VARIES, ALWAYS,
-   "from the nearest place of what it may touch, along the normal there; 0: nothing near", contact_gap},
+   "from the nearest point of what it may touch, along the normal there; 0: nothing near", contact_gap},
   {"stress", "Pa", 6, CELL, VARIES, ALWAYS, "Cauchy stress", stress},
   {"von_mises", "Pa", 1, CELL, VARIES, ALWAYS, "von Mises stress", von_mises},
   {"pressure", "Pa", 1, CELL, VARIES, ALWAYS, "pressure of the law, -lambda times its change of volume",

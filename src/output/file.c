@@ -1,6 +1,6 @@
 /*
-  Plain files: written whole beside their place and renamed into it, so that a reader, or a kill, never meets half a file;
-  space reserved before a file is touched; failures of one rank told by all.
+  Plain files: written whole beside their target and renamed into it, so that a reader, or a kill, never meets half a file;
+  space reserved before a file is touched; failures of one rank reported by all.
 */
 #include <errno.h>
 #include <fcntl.h>
@@ -62,7 +62,7 @@ PetscErrorCode SbFileReserve(MPI_Comm comm, const char *path, PetscInt64 bytes)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-void SbFileReplace(const char *path, int npiece, const SbPiece piece[], size_t nmessage, char message[])
+void SbFileReplace(const char *path, int nchunk, const SbChunk chunk[], size_t nmessage, char message[])
 {
   char tmp[PETSC_MAX_PATH_LEN + 8];
   FILE *file;
@@ -70,12 +70,12 @@ void SbFileReplace(const char *path, int npiece, const SbPiece piece[], size_t n
   int bad = 1;
 
   (void)snprintf(tmp, sizeof(tmp), "%s.tmp", path);
-  for (int i = 0; i < npiece; i++) size += piece[i].size;
+  for (int i = 0; i < nchunk; i++) size += chunk[i].size;
   errno = 0;
   file = fopen(tmp, "w");
   if (file) {
-    for (int i = 0; i < npiece; i++)
-      written += piece[i].size ? fwrite(piece[i].text, 1, piece[i].size, file) : 0;
+    for (int i = 0; i < nchunk; i++)
+      written += chunk[i].size ? fwrite(chunk[i].text, 1, chunk[i].size, file) : 0;
     bad = fclose(file) || written != size || rename(tmp, path);
   }
   if (!bad) return;

@@ -1,7 +1,7 @@
 /*
   fields.h5: one group per frame, one dataset per field, written by all ranks together in original order.
 
-  With -output_discontinuous point 4 c + a is corner a of cell c, and /mesh/vertices tells which vertices coincide.
+  With -output_discontinuous point 4 c + a is corner a of cell c, and /mesh/vertices says which vertices coincide.
 
   A frame is invisible until it is complete (h5.c says how), and then enters fields.xmf. After a restart in the same folder
   the frames up to the restart stay and later ones are taken out; their space in the file is used again.
@@ -16,7 +16,7 @@ typedef struct {
   PetscInt nfield;
   const SbField *field[SB_FIELD_MAX];
   PetscInt bytes[SB_FIELD_MAX];
-  PetscInt nplace, place_bytes; /* of contact; -1: it was not asked for */
+  PetscInt npoint, point_bytes; /* of contact; -1: it was not asked for */
   PetscInt mesh;                /* step behind which its mesh was made, 0: the first one */
 } SbFrame;
 
@@ -184,10 +184,10 @@ static PetscErrorCode write_field(SbRun run, SbOutput out, const SbStep *step, c
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Bytes that a frame can take, with its metadata and those of places of contact. */
-static PetscInt64 frame_bytes(const SbOutput out, PetscInt64 places)
+/* Bytes that a frame can take, with its metadata and those of contact points. */
+static PetscInt64 frame_bytes(const SbOutput out, PetscInt64 contact_bytes)
 {
-  PetscInt64 bytes = 65536 + places;
+  PetscInt64 bytes = 65536 + contact_bytes;
 
   for (PetscInt i = 0; i < out->nfield; i++) {
     const SbField *f = out->field[i];
@@ -230,15 +230,15 @@ static PetscErrorCode write_frame(SbRun run, SbOutput out, const SbStep *step)
   SbFrames fr = out->frames;
   const SbField *field[SB_FIELD_MAX];
   PetscInt bytes[SB_FIELD_MAX], n = 0;
-  PetscInt64 places;
+  PetscInt64 contact_bytes;
   char path[48], message[SB_MESSAGE_MAX] = "";
   /* on a path by arc length the load factor comes and goes, and viewers want times that rise */
   const PetscReal time = run->path ? (PetscReal)step->step : step->t;
   hid_t group;
 
   PetscFunctionBeginUser;
-  PetscCall(SbContactsFind(run, out, step, &places));
-  PetscCall(SbH5Reserve(&fr->h5, frame_bytes(out, places)));
+  PetscCall(SbContactsFind(run, out, step, &contact_bytes));
+  PetscCall(SbH5Reserve(&fr->h5, frame_bytes(out, contact_bytes)));
   PetscCall(SbH5GroupCreate(&fr->h5, (unsigned)out->nfield + 1, 14, &group));
   PetscCall(SbH5PutReal(&fr->h5, group, "time", time));
   if (run->path) PetscCall(SbH5PutReal(&fr->h5, group, "load_factor", step->t));
@@ -324,7 +324,7 @@ static PetscErrorCode read_frame(hid_t hundred, const char *name, SbFrame *frame
       (void)H5Dclose(dataset);
     }
   }
-  PetscCall(SbContactsRead(group, &frame->nplace, &frame->place_bytes));
+  PetscCall(SbContactsRead(group, &frame->npoint, &frame->point_bytes));
   (void)H5Gclose(group);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -453,7 +453,7 @@ static PetscErrorCode resume(SbRun run, SbOutput out, const char *path, PetscBoo
     if (!i || frames[i].mesh != frames[i - 1].mesh) PetscCall(index_mesh(fr, frames[i].mesh));
     PetscCall(SbXdmfAdd(fr->xdmf, frames[i].time, frames[i].group, frames[i].nfield, frames[i].field,
                         frames[i].bytes));
-    PetscCall(SbContactsList(out, frames[i].time, frames[i].group, frames[i].nplace, frames[i].place_bytes));
+    PetscCall(SbContactsList(out, frames[i].time, frames[i].group, frames[i].npoint, frames[i].point_bytes));
   }
   if (fr->xdmf && (!fr->nframe || frames[fr->nframe - 1].mesh != fr->mesh))
     PetscCall(index_mesh(fr, fr->mesh));
@@ -566,7 +566,7 @@ PetscErrorCode SbFramesReattach(SbRun run, SbOutput out)
   if (!out->frames) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(free_work(out->frames));
   PetscCall(allocate(run, out));
-  if (out->places) run->want_residual = PETSC_TRUE;
+  if (out->contact_points) run->want_residual = PETSC_TRUE;
   out->frames->mesh = run->step0;
   PetscCall(write_mesh(run, out));
   PetscCall(SbH5Flush(&out->frames->h5));

@@ -2,12 +2,12 @@
   HDF5 through MPI-IO, laid out so that a kill at any moment leaves every completed frame readable.
 
   HDF5 changes its metadata in place, and an index that is half written is not readable. Here nothing that a reader of
-  the finished part follows is ever written in more than one piece:
-  - A frame is written as a group without a name: new objects at new places, to which nothing points yet. It is flushed,
+  the finished part follows is ever written by more than one call:
+  - A frame is written as a group without a name: new objects at new positions, to which nothing points yet. It is flushed,
     all ranks meet, and only then does it get its name in the group of its hundred.
   - Such a group keeps its links in its own object header, in the old format (no checksum), with room for all of them from
     the start: at most 4096 bytes, aligned to 4096 bytes. Naming a frame is one write within one page.
-  - The superblock (96 bytes) is one write within one page, too. It tells where the file ends, and a file that ends earlier
+  - The superblock (96 bytes) is one write within one page, too. It says where the file ends, and a file that ends earlier
     counts as truncated: SbFileReserve() makes the file longer than a frame will need before the frame begins.
 
   Reference: HDF5 File Format Specification Version 3.0, sections II.A (superblock version 0), IV.A.1.a (object header
@@ -19,7 +19,7 @@
 
 /*
   After a failed write HDF5 1.10 cannot be closed: it frees the file, keeps its identifier, and crashes when MPI_Finalize()
-  makes it end. The error has been told by then; the remainder of the program's end is skipped.
+  makes it end. The error has been reported by then; the remainder of the program's end is skipped.
 */
 static int leave_at_once(MPI_Comm comm, int key, void *attribute, void *state)
 {

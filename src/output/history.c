@@ -1,5 +1,5 @@
 /*
-  history.csv: one row of scalars per step, each written to the file at once and in one piece.
+  history.csv: one row of scalars per step, each written to the file at once and by one call.
 
   First line: names. Second line: units behind a '#', so that pandas and numpy skip it with comment='#'. Numbers have 17
   digits: what is read back is what was computed. `total` is kinetic + strain - load_work - prescribed_work, which stays what it
@@ -219,7 +219,7 @@ static PetscErrorCode monitor(SbRun run, const SbStep *step, void *ctx)
   PetscCallMPI(MPI_Allreduce(h->mine, h->sum, n, MPIU_REAL, MPI_SUM, out->comm));
   if (h->sum[h->nextra] > 0.) PetscCall(SbAgree(out->comm, PETSC_ERR_FILE_WRITE, h->message));
 
-  /* the row, as text, in one piece */
+  /* the row, as text, for one call */
   h->last_step = step->step;
   if (h->fd >= 0) {
     PetscCall(put_row(h, step, run));
@@ -238,7 +238,7 @@ static PetscErrorCode keep_rows(SbHistory h, PetscInt step0, PetscBool *kept, si
 {
   char *text, *line, *end;
   size_t size;
-  SbPiece piece;
+  SbChunk chunk;
 
   PetscFunctionBeginUser;
   *kept = PETSC_FALSE;
@@ -251,9 +251,9 @@ static PetscErrorCode keep_rows(SbHistory h, PetscInt step0, PetscBool *kept, si
       if (step > step0) break;
       h->last_step = (PetscInt)step;
     }
-    piece.text = text;
-    piece.size = (size_t)(line - text);
-    SbFileReplace(h->path, 1, &piece, nmessage, message);
+    chunk.text = text;
+    chunk.size = (size_t)(line - text);
+    SbFileReplace(h->path, 1, &chunk, nmessage, message);
     *kept = PETSC_TRUE;
   }
   PetscCall(PetscFree(text));

@@ -1,5 +1,5 @@
 /*
-  What of the output belongs to the mesh: original orders, numbers of nodes, and one number that tells it from other meshes. All of it is forgotten and made again
+  What of the output belongs to the mesh: original orders, numbers of nodes, and one number that distinguishes it from other meshes. All of it is forgotten and made again
   when a body is re-meshed.
 
   The mesh's number is a sum of mixed 64-bit words (the finaliser of splitmix64; Steele, Lea and Flood 2014), which does not depend on the order of its entities.
@@ -14,14 +14,14 @@ static uint64_t mix(uint64_t x)
   return x ^ (x >> 31);
 }
 
-/* A number at a place. Zero has one sign here. */
-uint64_t SbMixReal(uint64_t place, PetscReal value)
+/* A number at a position. Zero has one sign here. */
+uint64_t SbMixReal(uint64_t position, PetscReal value)
 {
   uint64_t bits;
 
   value += 0.;
   memcpy(&bits, &value, sizeof(bits));
-  return mix(place ^ mix(bits));
+  return mix(position ^ mix(bits));
 }
 
 PetscErrorCode SbOutputOrder(SbRun run, SbOutput out)
@@ -32,7 +32,7 @@ PetscErrorCode SbOutputOrder(SbRun run, SbOutput out)
 
   PetscFunctionBeginUser;
   if (out->ordered) PetscFunctionReturn(PETSC_SUCCESS);
-  /* the places of vertices, cells and nodes in a file, whatever the partition */
+  /* the positions of vertices, cells and nodes in a file, whatever the partition */
   PetscCall(SbOrderCreate(out->comm, mesh->Nvert, mesh->nvert_owned, mesh->vert_orig, &out->vertex));
   PetscCall(SbOrderCreate(out->comm, mesh->Ncell, mesh->ncell_owned, mesh->cell_orig, &out->cell));
   if (space->faces) {

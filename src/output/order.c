@@ -2,10 +2,10 @@
   Original order: vertices, cells and nodes by their number in the scenario, whatever the partition.
 
   Rank r of p holds the slice of numbers [N r / p, N (r + 1) / p) (PETSc's usual layout). A star forest connects each owned
-  entity (a leaf) with its place in a slice (a root); it is built once and moves any number of components at once.
+  entity (a leaf) with its position in a slice (a root); it is built once and moves any number of components at once.
 
   Numbers of nodes at faces have gaps. They are closed once, when an order is made: every number that is taken marks its
-  place among all possible ones, and counting the marks from the lowest rank on gives the new numbers.
+  position among all possible ones, and counting the marks from the lowest rank on gives the new numbers.
 */
 #include "output_impl.h"
 

@@ -22,7 +22,7 @@ static const SbOption rows[] = {
   {"output_discontinuous", SB_OPTION_BOOL, 1, "", "false", "",
    "each tet in fields.h5 has four points of its own: cr and dg as they are, else averaged around vertices"},
   {"output_contacts", SB_OPTION_BOOL, 1, "", "false", "",
-   "contacts.xmf: the places where contact pushes in each frame, with normals, gaps and forces"},
+   "contacts.xmf: the points where contact pushes in each frame, with normals, gaps and forces"},
   {"output_history", SB_OPTION_BOOL, 1, "", "true", "", "write history.csv"},
   {"output_history_every", SB_OPTION_INT, 1, "", "1", "[1, inf)", "steps between rows of history.csv"},
   {"checkpoint_every_time", SB_OPTION_REAL, 1, "s", "0", "[0, inf)",
@@ -39,7 +39,7 @@ static const SbOption rows[] = {
 
 static const SbOption probe_rows[] = {
   {"at", SB_OPTION_REALS, 3, "m", NULL, "(-inf, inf)",
-   "place of the probe in the rest state, as placed; the nearest vertex is taken"},
+   "position of the probe in the rest state, as placed; the nearest vertex is taken"},
 };
 
 PetscErrorCode SbOutputRegister(void)
@@ -144,9 +144,9 @@ static PetscErrorCode read_options(SbOutput out, PetscBool dynamic)
   PetscCall(SbOptionChoice(&scope, "output_precision", &precision));
   out->precise = precision ? PETSC_TRUE : PETSC_FALSE;
   PetscCall(SbOptionBool(&scope, "output_discontinuous", &out->discontinuous));
-  PetscCall(SbOptionBool(&scope, "output_contacts", &out->places));
+  PetscCall(SbOptionBool(&scope, "output_contacts", &out->contact_points));
   PetscCheck(
-    !out->places || out->nfield, out->comm, PETSC_ERR_USER_INPUT,
+    !out->contact_points || out->nfield, out->comm, PETSC_ERR_USER_INPUT,
     "-output_contacts yes needs frames, but -output_fields is none: give -output_fields body at least");
   PetscCall(SbOptionBool(&scope, "output_history", &out->history));
   PetscCall(SbOptionInt(&scope, "output_history_every", &out->history_every));
@@ -155,7 +155,7 @@ static PetscErrorCode read_options(SbOutput out, PetscBool dynamic)
   PetscCall(SbOptionInt(&scope, "checkpoint_keep", &out->checkpoint_keep));
   PetscCall(SbOptionString(&scope, "restart", sizeof(out->restart), out->restart));
 
-  /* places that history.csv follows */
+  /* positions that history.csv follows */
   PetscCall(SbOptionNames(&scope, "probes", &out->nprobe, &names));
   PetscCall(PetscCalloc1(out->nprobe, &out->probe));
   for (PetscInt p = 0; p < out->nprobe; p++) {
@@ -275,7 +275,7 @@ PetscErrorCode SbOutputAttach(SbRun run)
   SbOutput out = (SbOutput)run->output;
   char *scenario = NULL, path[PETSC_MAX_PATH_LEN], message[SB_MESSAGE_MAX] = "";
   size_t size = 0;
-  SbPiece piece;
+  SbChunk chunk;
 
   PetscFunctionBeginUser;
   PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_OUTPUT], 0, 0, 0, 0));
@@ -284,7 +284,7 @@ PetscErrorCode SbOutputAttach(SbRun run)
   if (out->nfield) PetscCall(SbLogNamed("Out", "fields", &out->event.fields));
   for (PetscInt i = 0; i < out->nfield; i++)
     PetscCall(SbLogNamed("Field", out->field[i]->name, &out->field_event[i]));
-  if (out->places) PetscCall(SbLogNamed("Out", "contacts", &out->event.contacts));
+  if (out->contact_points) PetscCall(SbLogNamed("Out", "contacts", &out->event.contacts));
   if (out->history) PetscCall(SbLogNamed("Out", "history", &out->event.history));
   if (out->history && out->nprobe) PetscCall(SbLogNamed("Out", "probes", &out->event.probes));
   if (out->checkpoint_every > 0. || out->checkpoint_every_steps)
@@ -299,10 +299,10 @@ PetscErrorCode SbOutputAttach(SbRun run)
   if (!out->rank) PetscCall(SbFolderClear(out, run->step0));
 
   /* the complete scenario, and what runs, beside the results */
-  piece.text = scenario;
-  piece.size = size;
+  chunk.text = scenario;
+  chunk.size = size;
   PetscCall(SbOutputPath(out, "scenario.opts", sizeof(path), path));
-  if (!out->rank) SbFileReplace(path, 1, &piece, sizeof(message), message);
+  if (!out->rank) SbFileReplace(path, 1, &chunk, sizeof(message), message);
   free(scenario);
   PetscCall(SbAgree(out->comm, PETSC_ERR_FILE_WRITE, message));
 

@@ -29,7 +29,7 @@ PetscErrorCode SbOrderCreate(MPI_Comm comm, PetscInt N, PetscInt nowned, const P
 /* The same for numbers key[nowned] in [0, bound) with gaps, which are closed: N is how many there are. Collective. */
 PetscErrorCode SbOrderCreateSparse(MPI_Comm comm, PetscInt bound, PetscInt nowned, const PetscInt key[],
                                    SbOrder *order);
-/* An order of `each` entities in the place of every one of `order`: a cell's corners for a cell. Destroy both. */
+/* An order of `each` entities instead of every one of `order`: a cell's corners for a cell. Destroy both. */
 PetscErrorCode SbOrderRepeat(const SbOrder *order, PetscInt each, SbOrder *repeated);
 PetscErrorCode SbOrderDestroy(SbOrder *order);
 /* slice[n][ncomp] from owned[nowned][ncomp], and back. Collective. */
@@ -45,7 +45,7 @@ typedef struct {
   hid_t file;       /* negative when closed */
   PetscInt64 bytes; /* of what is being written, for messages */
   PetscBool failed; /* a write failed, and all ranks know */
-  char reason[160]; /* why a write failed on this rank; the next flush tells the others */
+  char reason[160]; /* why a write failed on this rank; the next flush reports it to the others */
   char path[PETSC_MAX_PATH_LEN];
 } SbH5;
 
@@ -91,9 +91,9 @@ PetscErrorCode SbAgree(MPI_Comm comm, PetscErrorCode code, const char *message);
 typedef struct {
   const char *text;
   size_t size;
-} SbPiece;
+} SbChunk;
 /* path.tmp is written and takes the place of path in one step. Rank 0 calls; `message` becomes the error, if any. */
-void SbFileReplace(const char *path, int npiece, const SbPiece piece[], size_t nmessage, char message[]);
+void SbFileReplace(const char *path, int nchunk, const SbChunk chunk[], size_t nmessage, char message[]);
 /* The whole file; NULL when it cannot be read. One rank. PetscFree. */
 PetscErrorCode SbFileRead(const char *path, char **text, size_t *size);
 
@@ -132,9 +132,9 @@ struct _p_SbOutput {
   const SbField *field[SB_FIELD_MAX];
   PetscReal every; /* s between frames; 0: every_steps counts */
   PetscInt every_steps;
-  PetscBool precise;       /* double instead of float */
-  PetscBool discontinuous; /* each cell has four points of its own */
-  PetscBool places;        /* where contact pushes, in each frame */
+  PetscBool precise;        /* double instead of float */
+  PetscBool discontinuous;  /* each cell has four points of its own */
+  PetscBool contact_points; /* where contact pushes, in each frame */
   PetscBool history;
   PetscInt history_every;
   PetscReal checkpoint_every; /* s of simulated time; 0: off */
@@ -215,15 +215,15 @@ PetscErrorCode SbFramesDestroy(SbOutput out);
 /* contacts.c; without -output_contacts they only keep, after a restart, what is in the index. */
 PetscErrorCode SbContactsCreate(SbRun run, SbOutput out);
 PetscErrorCode SbContactsDestroy(SbOutput out);
-/* The places after a step, on the ranks that write them; bytes: what they take in a frame. Collective. */
+/* The points of contact after a step, on the ranks that write them; bytes: what they take in a frame. Collective. */
 PetscErrorCode SbContactsFind(SbRun run, SbOutput out, const SbStep *step, PetscInt64 *bytes);
 /* Those as a group of the frame. Collective. */
 PetscErrorCode SbContactsWrite(SbOutput out, SbH5 *h, hid_t frame);
-/* How many places a frame has, -1: it was written without; bytes of their numbers. Not collective. */
+/* How many points a frame has, -1: it was written without; bytes of their numbers. Not collective. */
 PetscErrorCode SbContactsRead(hid_t frame, PetscInt *n, PetscInt *bytes);
 /* How many the last SbContactsFind() found on all ranks, -1 without the option. */
 PetscInt SbContactsCount(SbOutput out);
-/* Adds a frame of n places to the index, at the path of its group; rank 0. The next brings it to disk, or removes it. */
+/* Adds a frame of n points to the index, at the path of its group; rank 0. The next brings it to disk, or removes it. */
 PetscErrorCode SbContactsList(SbOutput out, PetscReal time, const char *frame, PetscInt n, PetscInt bytes);
 void SbContactsIndex(SbOutput out, size_t nmessage, char message[]);
 PetscErrorCode SbContactsRemoveIndex(SbOutput out);
@@ -231,7 +231,7 @@ PetscErrorCode SbHistoryAttach(SbRun run, SbOutput out);
 PetscErrorCode SbHistoryReattach(SbRun run, SbOutput out);
 PetscErrorCode SbHistoryDestroy(SbOutput out);
 PetscErrorCode SbProbesFind(SbRun run, SbOutput out);
-/* In a checkpoint of a run that was re-meshed: the places that they follow. Collective. */
+/* In a checkpoint of a run that was re-meshed: the positions that they follow. Collective. */
 PetscErrorCode SbProbesWrite(SbRun run, SbOutput out, SbH5 *h);
 PetscErrorCode SbProbesRead(SbRun run, SbOutput out, SbH5 *h);
 /* Value of a vector, local with ghosts, at a probe of this rank; zero on others. */
@@ -248,8 +248,8 @@ PetscErrorCode SbCheckpointReadEffects(SbRun run, SbH5 *h, SbRecords records[], 
 /* Hands them to the effects, for the state of the run at time t. Collective. */
 PetscErrorCode SbCheckpointLoadEffects(SbRun run, PetscReal t, const SbRecords records[]);
 PetscErrorCode SbCheckpointFreeEffects(SbRun run, SbRecords records[]);
-/* A number at a place, as 64 mixed bits. */
-uint64_t SbMixReal(uint64_t place, PetscReal value);
+/* A number at a position, as 64 mixed bits. */
+uint64_t SbMixReal(uint64_t position, PetscReal value);
 
 /* checkpoint_mesh.c: the meshes of bodies that were re-meshed, as they are in memory. Writes them; sum is raised by their checksum. Collective. */
 PetscErrorCode SbCheckpointWriteMeshes(SbRun run, SbH5 *h, uint64_t *sum);
@@ -285,7 +285,7 @@ typedef struct {
   int ncomp, bytes;
   PetscBool whole;
 } SbXdmfValues;
-/* Adds a frame of n points: values[0] are their numbers, values[1] their places, the others attributes; `nowhere`: where to put
+/* Adds a frame of n points: values[0] are their numbers, values[1] their positions, the others attributes; `nowhere`: where to put
    a point without force when n is 0, m. */
 PetscErrorCode SbXdmfAddPoints(SbXdmf x, PetscReal time, const char *group, PetscInt n,
                                const PetscReal nowhere[3], PetscInt nvalues, const SbXdmfValues values[]);

@@ -3,14 +3,14 @@
   for in the rest state; of equally near ones, at that with the smallest original number. It shows what vertex fields show
   there: the unknown of P1, the mean of the cells around it for CR and DG.
 
-  It follows the material that is there. When its body is re-meshed and the vertex is gone, it shows what the tet has that holds the place at
-  rest: sum_a w_a u_a with the weights of its corners. Checkpoints carry the place (SbProbesWrite).
+  It follows the material that is there. When its body is re-meshed and the vertex is gone, it shows what the tet has that holds the position at
+  rest: sum_a w_a u_a with the weights of its corners. Checkpoints carry the position (SbProbesWrite).
 */
 #include <math.h>
 #include "output_impl.h"
 #include "sbtet.h"
 
-#define NNUMBER 4 /* of a probe in a checkpoint: the place, the body */
+#define NNUMBER 4 /* of a probe in a checkpoint: the position, the body */
 
 /* The nearest vertex that this rank owns, of a body unless that is -1: squared distance, local number (-1 when it owns none). */
 static void nearest_owned(const SbMesh mesh, PetscInt body, const PetscReal at[3], PetscReal *best,
@@ -64,7 +64,7 @@ static PetscReal deepest_owned(const SbMesh mesh, const SbProbe *probe, PetscInt
   return best;
 }
 
-/* Another mesh: the vertex at the place that it followed, or the tet around it. */
+/* Another mesh: the vertex at the position that it followed, or the tet around it. */
 static PetscErrorCode find_again(const SbMesh mesh, SbOutput out, SbProbe *probe)
 {
   PetscReal mine, best;
@@ -80,11 +80,12 @@ static PetscErrorCode find_again(const SbMesh mesh, SbOutput out, SbProbe *probe
   mine = deepest_owned(mesh, probe, &probe->cell, probe->weight);
   PetscCall(agree(out, mine, probe->cell < 0 ? 0 : mesh->cell_orig[probe->cell], &probe->cell, &tet, &best));
   if (best > 1e-6)
-    PetscCall(SbWarning(out->comm,
-                        "probe '%s': no tet of the re-meshed body holds its place any more; it follows the "
-                        "nearest one, from %.2g of "
-                        "its size outside",
-                        probe->name, (double)best));
+    PetscCall(
+      SbWarning(out->comm,
+                "probe '%s': no tet of the re-meshed body holds its position any more; it follows the "
+                "nearest one, from %.2g of "
+                "its size outside",
+                probe->name, (double)best));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -1,5 +1,5 @@
 /*
-  The line that tells how far a run is: rewritten in place on a terminal, else a plain line now and then.
+  The line of progress of a run: rewritten in place on a terminal, else a plain line now and then.
 
   Open MPI gives its ranks a pseudo-terminal whatever its own output is, so under it the launcher's output decides.
 */
@@ -72,7 +72,7 @@ static PetscErrorCode monitor(SbRun run, const SbStep *step, void *ctx)
 
   PetscFunctionBeginUser;
   if (p->titled && step->step == run->step0)
-    PetscFunctionReturn(PETSC_SUCCESS); /* it was told before a re-meshing */
+    PetscFunctionReturn(PETSC_SUCCESS); /* it was printed before a re-meshing */
   if (!p->titled) {
     p->titled = PETSC_TRUE;
     p->t_start = step->t;

@@ -138,8 +138,8 @@ static PetscErrorCode print_output(SbOutput out)
     char where[64] = "a tet";
 
     if (probe->original >= 0) (void)snprintf(where, sizeof(where), "vertex %lld", (long long)probe->original);
-    PetscCall(entry("probe", "%s at %s (%g, %g, %g) m, %.3g m from the place asked for", probe->name, where,
-                    (double)probe->x[0], (double)probe->x[1], (double)probe->x[2],
+    PetscCall(entry("probe", "%s at %s (%g, %g, %g) m, %.3g m from the position asked for", probe->name,
+                    where, (double)probe->x[0], (double)probe->x[1], (double)probe->x[2],
                     (double)PetscSqrtReal(PetscSqr(probe->x[0] - probe->at[0]) +
                                           PetscSqr(probe->x[1] - probe->at[1]) +
                                           PetscSqr(probe->x[2] - probe->at[2]))));
@@ -175,27 +175,27 @@ PetscErrorCode SbReportHeader(SbRun run)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbReportRemeshed(SbRun run, const SbRemeshed *told)
+PetscErrorCode SbReportRemeshed(SbRun run, const SbRemeshed *event)
 {
   SbOutput out = (SbOutput)run->output;
-  const PetscReal change = told->energy[1] - told->energy[0];
+  const PetscReal change = event->energy[1] - event->energy[0];
 
   PetscFunctionBeginUser;
   if (!out) PetscFunctionReturn(PETSC_SUCCESS);
   if (out->nremeshed == out->remeshed_size) {
     out->remeshed_size = PetscMax(8, 2 * out->remeshed_size);
-    PetscCall(PetscRealloc((size_t)out->remeshed_size * sizeof(*told), &out->remeshed));
+    PetscCall(PetscRealloc((size_t)out->remeshed_size * sizeof(*event), &out->remeshed));
   }
-  out->remeshed[out->nremeshed++] = *told;
+  out->remeshed[out->nremeshed++] = *event;
   if (out->quiet) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(SbProgressEnd(out));
   PetscCall(
     PetscPrintf(out->comm,
                 "body '%s' is re-meshed after step %" PetscInt_FMT ", t = %g%s: worst quality %.3g -> %.3g, "
                 "%" PetscInt_FMT " -> %" PetscInt_FMT " tets, energy %+.3g J (%+.2g %%)\n",
-                told->body, told->step, (double)told->t, run->model->dynamic ? " s" : "",
-                (double)told->quality[0], (double)told->quality[1], told->tets[0], told->tets[1],
-                (double)change, (double)(told->energy[0] > 0. ? 100. * change / told->energy[0] : 0.)));
+                event->body, event->step, (double)event->t, run->model->dynamic ? " s" : "",
+                (double)event->quality[0], (double)event->quality[1], event->tets[0], event->tets[1],
+                (double)change, (double)(event->energy[0] > 0. ? 100. * change / event->energy[0] : 0.)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -194,7 +194,7 @@ static PetscErrorCode write_json(SbRun run, SbOutput out, const char *status, co
   char host[256] = "", path[PETSC_MAX_PATH_LEN], *text = NULL;
   size_t size = 0;
   FILE *f = open_memstream(&text, &size);
-  SbPiece piece;
+  SbChunk chunk;
 
   PetscFunctionBeginUser;
   PetscCheck(f, PETSC_COMM_SELF, PETSC_ERR_MEM, "No memory for run.json");
@@ -214,8 +214,8 @@ static PetscErrorCode write_json(SbRun run, SbOutput out, const char *status, co
   (void)fprintf(f, "  \"status\": \"%s\"\n}\n", status);
   (void)fclose(f);
   PetscCall(SbOutputPath(out, "run.json", sizeof(path), path));
-  piece = (SbPiece){text, size};
-  SbFileReplace(path, 1, &piece, nmessage, message);
+  chunk = (SbChunk){text, size};
+  SbFileReplace(path, 1, &chunk, nmessage, message);
   free(text);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

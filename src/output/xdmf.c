@@ -3,7 +3,7 @@
 
   Only the part of XDMF that vtkXdmfReader and vtkXdmf3Reader both read rightly: one temporal collection of uniform grids,
   every array named by its full path in the HDF5 file, no references, no hyperslabs. The text of all frames so far is kept,
-  so that the file is whole after every frame: it is written beside its place and renamed.
+  so that the file is whole after every frame: it is written beside its target and renamed.
 
   Points are a mesh of one vertex per cell, said explicitly: without that vtkXdmf3Reader finds no cells. Neither reader takes a
   grid without points (vtkXdmf3Reader ends with a signal); a frame without any has a single one, which belongs to nobody.
@@ -118,16 +118,16 @@ static PetscErrorCode append_text(SbXdmf x, size_t n, const char *text)
 
 static PetscErrorCode append(SbXdmf x, const char *format, ...)
 {
-  char piece[2048];
+  char chunk[2048];
   size_t n;
   va_list args;
 
   PetscFunctionBeginUser;
   va_start(args, format);
-  n = (size_t)vsnprintf(piece, sizeof(piece), format, args);
+  n = (size_t)vsnprintf(chunk, sizeof(chunk), format, args);
   va_end(args);
-  PetscCheck(n < sizeof(piece), PETSC_COMM_SELF, PETSC_ERR_PLIB, "A piece of %s has %zu letters", x->path, n);
-  PetscCall(append_text(x, n, piece));
+  PetscCheck(n < sizeof(chunk), PETSC_COMM_SELF, PETSC_ERR_PLIB, "A chunk of %s has %zu letters", x->path, n);
+  PetscCall(append_text(x, n, chunk));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -212,7 +212,7 @@ void SbXdmfWrite(SbXdmf x, size_t nmessage, char message[])
   static const char head[] = "<?xml version=\"1.0\" ?>\n<Xdmf Version=\"3.0\">\n<Domain>\n"
                              "<Grid Name=\"frames\" GridType=\"Collection\" CollectionType=\"Temporal\">\n";
   static const char tail[] = "</Grid>\n</Domain>\n</Xdmf>\n";
-  const SbPiece pieces[3] = {{head, sizeof(head) - 1}, {x->text, x->size}, {tail, sizeof(tail) - 1}};
+  const SbChunk chunks[3] = {{head, sizeof(head) - 1}, {x->text, x->size}, {tail, sizeof(tail) - 1}};
 
-  SbFileReplace(x->path, 3, pieces, nmessage, message);
+  SbFileReplace(x->path, 3, chunks, nmessage, message);
 }

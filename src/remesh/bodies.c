@@ -1,7 +1,7 @@
 /*
   On rank 0: from a scene and its state to the same scene with other meshes for some of its bodies.
 
-  The vectors are functions of the place at rest, linear in each tet: what a new node gets is the value there (body.c says where that is). A node
+  The vectors are functions of the position at rest, linear in each tet: what a new node gets is the value there (body.c says where that is). A node
   on the surface has its triangle, or its vertex, in the old mesh too, and gets what is there to the last bit. A DG cell takes the value from its own
   side of a face.
 
@@ -11,7 +11,7 @@
 #include "remesh_impl.h"
 
 #define INWARDS \
-  1e-6 /* part of the way from a face to the middle of its DG cell, to tell on which side that is */
+  1e-6 /* part of the way from a face to the middle of its DG cell, to decide on which side that is */
 
 /* A triangle by its vertices in ascending order, and where it is: 4 cell + face. */
 typedef struct {
@@ -104,7 +104,7 @@ static PetscErrorCode open_work(SbModel m, const SbGathered *g, PetscInt b, Work
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The place 4 cell + face of a triangle of the new mesh on the old surface, -1: it is inside. */
+/* The position 4 cell + face of a triangle of the new mesh on the old surface, -1: it is inside. */
 static PetscInt old_slot(const Work *w, PetscInt slot)
 {
   Side side = side_of(w->mesh.cell, slot);
@@ -277,7 +277,7 @@ static const PetscReal *old_value(const Work *w, PetscInt cell, PetscInt k)
   return w->g->value + ((size_t)(w->cell0 + cell) * (size_t)w->g->width + (size_t)k) * (size_t)w->each;
 }
 
-/* The old fields at a place at rest, as the tet has them that holds `near`. */
+/* The old fields at a position at rest, as the tet has them that holds `near`. */
 static void interpolate_old(const Work *w, const PetscReal X[3], const PetscReal near[3], PetscReal value[])
 {
   PetscReal weight[4];
@@ -337,22 +337,22 @@ static void rename_node(SbRenamed *r, PetscInt from, PetscInt to)
 }
 
 /* Nodes of the body's surface: vertices, or faces and their supports. vert1, cell1: first ones of the body in the next scene. */
-static void rename_surface(const Work *w, PetscBool made, PetscInt vert1, PetscInt cell1,
+static void rename_surface(const Work *w, PetscBool remeshed, PetscInt vert1, PetscInt cell1,
                            const SbGathered *next, SbRenamed *r)
 {
   const PetscInt N = w->g->nvert, C = w->g->ncell, N1 = next->nvert, C1 = next->ncell;
-  const PetscInt ncell = made ? w->mesh.ncell : w->ncell;
+  const PetscInt ncell = remeshed ? w->mesh.ncell : w->ncell;
 
   if (w->element->nodes_per[0]) {
-    const PetscInt n = made ? w->mesh.nkept : w->g->vert0[w->body + 1] - w->vert0;
+    const PetscInt n = remeshed ? w->mesh.nkept : w->g->vert0[w->body + 1] - w->vert0;
 
-    for (PetscInt v = 0; v < n; v++) rename_node(r, w->vert0 + (made ? w->mesh.kept[v] : v), vert1 + v);
+    for (PetscInt v = 0; v < n; v++) rename_node(r, w->vert0 + (remeshed ? w->mesh.kept[v] : v), vert1 + v);
     return;
   }
   for (PetscInt i = 0; i < 4 * ncell; i++) {
     PetscInt slot = i;
 
-    if (made)
+    if (remeshed)
       slot = old_slot(w, i);
     else if (!(w->g->cell_set[5 * (w->cell0 + i / 4) + 1 + i % 4] & SB_ON_BOUNDARY))
       slot = -1;
@@ -368,40 +368,40 @@ static void rename_surface(const Work *w, PetscBool made, PetscInt vert1, PetscI
 static PetscErrorCode keep_message(MPI_Comm comm, int line, const char *function, const char *file,
                                    PetscErrorCode code, PetscErrorType kind, const char *text, void *ctx)
 {
-  SbMade *made = (SbMade *)ctx;
+  SbRemeshOutcome *outcome = (SbRemeshOutcome *)ctx;
 
   if (kind == PETSC_ERROR_INITIAL)
-    (void)snprintf(made->message, sizeof(made->message), "%s", text ? text : "no reason was given");
+    (void)snprintf(outcome->message, sizeof(outcome->message), "%s", text ? text : "no reason was given");
   if (code != PETSC_ERR_USER && code != PETSC_ERR_USER_INPUT && code != PETSC_ERR_FILE_UNEXPECTED)
     (void)PetscTraceBackErrorHandler(comm, line, function, file, code, kind, text, NULL);
   return code;
 }
 
 /* Meshes one body again; what it cannot do goes to the message. */
-static PetscErrorCode try_body(Work *w, const SbRemeshing *how, SbMade *made, PetscBool *done)
+static PetscErrorCode try_body(Work *w, const SbRemeshing *how, SbRemeshOutcome *outcome, PetscBool *done)
 {
   PetscErrorCode ierr;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscPushErrorHandler(keep_message, made));
+  PetscCall(PetscPushErrorHandler(keep_message, outcome));
   ierr = make_mesh(w, how);
   PetscCall(PetscPopErrorHandler());
   *done = (PetscBool)!ierr;
   if (ierr) PetscCall(SbNewMeshDestroy(&w->mesh));
-  made->nvert[0] = w->g->vert0[w->body + 1] - w->vert0;
-  made->ncell[0] = w->ncell;
-  made->nvert[1] = *done ? w->mesh.nvert : made->nvert[0];
-  made->ncell[1] = *done ? w->mesh.ncell : w->ncell;
-  made->nmoved = w->mesh.nmoved;
-  made->quality = w->mesh.quality;
+  outcome->nvert[0] = w->g->vert0[w->body + 1] - w->vert0;
+  outcome->ncell[0] = w->ncell;
+  outcome->nvert[1] = *done ? w->mesh.nvert : outcome->nvert[0];
+  outcome->ncell[1] = *done ? w->mesh.ncell : w->ncell;
+  outcome->nmoved = w->mesh.nmoved;
+  outcome->quality = w->mesh.quality;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Mesh, values and names of one body. */
-static PetscErrorCode finish_body(const Work *w, PetscBool done, PetscInt step, SbRemade *remade)
+static PetscErrorCode finish_body(const Work *w, PetscBool done, PetscInt step, SbRemeshResult *result)
 {
-  SbGathered *next = &remade->next;
-  SbMemoryMesh **in_memory = &remade->in_memory[w->body];
+  SbGathered *next = &result->next;
+  SbMemoryMesh **in_memory = &result->in_memory[w->body];
   const SbBody *body = &w->model->body[w->body];
   const size_t each = (size_t)next->width * (size_t)w->each;
   PetscReal *value = next->value + each * (size_t)next->cell0[w->body];
@@ -422,31 +422,31 @@ static PetscErrorCode finish_body(const Work *w, PetscBool done, PetscInt step, 
       (*in_memory)->bound = body->in_memory->bound;
     }
   }
-  rename_surface(w, done, next->vert0[w->body], next->cell0[w->body], next, &remade->renamed);
+  rename_surface(w, done, next->vert0[w->body], next->cell0[w->body], next, &result->renamed);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbRemadeCreate(PetscInt nbody, SbRemade *r)
+PetscErrorCode SbRemeshResultCreate(PetscInt nbody, SbRemeshResult *r)
 {
   PetscFunctionBeginUser;
   PetscCall(PetscMemzero(r, sizeof(*r)));
   r->nbody = nbody;
-  PetscCall(PetscCalloc3(nbody, &r->in_memory, nbody, &r->made, nbody, &r->done));
+  PetscCall(PetscCalloc3(nbody, &r->in_memory, nbody, &r->outcome, nbody, &r->done));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbRemadeDestroy(SbRemade *r)
+PetscErrorCode SbRemeshResultDestroy(SbRemeshResult *r)
 {
   PetscFunctionBeginUser;
   for (PetscInt b = 0; b < r->nbody; b++) PetscCall(SbMemoryMeshDestroy(&r->in_memory[b]));
-  PetscCall(PetscFree3(r->in_memory, r->made, r->done));
+  PetscCall(PetscFree3(r->in_memory, r->outcome, r->done));
   PetscCall(SbGatheredDestroy(&r->next));
   PetscCall(PetscFree2(r->renamed.from, r->renamed.to));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode SbRemeshBodies(SbModel m, const SbGathered *g, const PetscBool due[], PetscInt step,
-                              const SbRemeshing *how, SbRemade *r)
+                              const SbRemeshing *how, SbRemeshResult *r)
 {
   PetscInt room = 0;
   Work *work;
@@ -457,8 +457,8 @@ PetscErrorCode SbRemeshBodies(SbModel m, const SbGathered *g, const PetscBool du
     const PetscInt nvert = g->vert0[b + 1] - g->vert0[b];
 
     PetscCall(open_work(m, g, b, &work[b]));
-    r->made[b] = (SbMade){{nvert, nvert}, {work[b].ncell, work[b].ncell}, 0, 0., ""};
-    if (due[b]) PetscCall(try_body(&work[b], how, &r->made[b], &r->done[b]));
+    r->outcome[b] = (SbRemeshOutcome){{nvert, nvert}, {work[b].ncell, work[b].ncell}, 0, 0., ""};
+    if (due[b]) PetscCall(try_body(&work[b], how, &r->outcome[b], &r->done[b]));
     room += nvert + 2 * work[b].nside;
   }
   // counts of the next meshes, and room for their values
@@ -467,8 +467,8 @@ PetscErrorCode SbRemeshBodies(SbModel m, const SbGathered *g, const PetscBool du
   r->next.width = g->width;
   PetscCall(PetscCalloc2(g->nbody + 1, &r->next.vert0, g->nbody + 1, &r->next.cell0));
   for (PetscInt b = 0; b < g->nbody; b++) {
-    r->next.vert0[b + 1] = r->next.vert0[b] + r->made[b].nvert[1];
-    r->next.cell0[b + 1] = r->next.cell0[b] + r->made[b].ncell[1];
+    r->next.vert0[b + 1] = r->next.vert0[b] + r->outcome[b].nvert[1];
+    r->next.cell0[b + 1] = r->next.cell0[b] + r->outcome[b].ncell[1];
   }
   r->next.nvert = r->next.vert0[g->nbody];
   r->next.ncell = r->next.cell0[g->nbody];

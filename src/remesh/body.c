@@ -4,10 +4,10 @@
   The hull stays: every triangle of the surface, and every one between regions that must stay apart, with its vertices. What it encloses is filled
   again, in the shape that the body has now or at rest. A new vertex y in the shape of now lies in a tet of the old mesh with the weights w,
   y = sum w_a x_a; its rest position is X = sum w_a X_a: the material that is there. So the volume at rest is the same,
-  and the motion from X to x that the old mesh has is only examined in other places.
+  and the motion from X to x that the old mesh has is only examined in other positions.
 
   Between these the motion is not linear, so a new tet may be inverted at rest although it is none now. Such tets, and those
-  that are too flat, are repaired by moving their inner vertices through the material, towards the middle of their neighbours: to the place of a few on the
+  that are too flat, are repaired by moving their inner vertices through the material, towards the middle of their neighbours: to the position of a few on the
   way where the worst tet around is best, until all are good or nothing helps. A tet between four vertices of a side that was flat at rest and bulges
   now has no volume at rest, and no inner vertex: an inner edge of it gets one in its middle, with all tets around, which then moves
   inwards.
@@ -195,7 +195,7 @@ static PetscReal worst_around(const SbNewMesh *m, const Stars *s, PetscInt v)
   return worst;
 }
 
-/* Tries places on the way to the middle of the neighbours at rest; says whether one was better. */
+/* Tries positions on the way to the middle of the neighbours at rest; says whether one was better. */
 static PetscBool move_vertex(const SbOldMesh *old, SbLocator rest, const Stars *s, PetscInt v, SbNewMesh *m)
 {
   PetscReal middle[3] = {0, 0, 0}, X[3], best_X[3], best_x[3], best = worst_around(m, s, v), part = 1;

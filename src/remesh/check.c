@@ -4,7 +4,7 @@
   A tet is examined where its corners are now; of CR and DG these are the means of the cells around, as vertex fields have them.
 
   Velocities on another mesh have other momenta, by as much as the mesh is wrong. With p = M v, the six rigid velocities w_k (three translations,
-  three rotations about the origin at the places of now) and D, which leaves out what is prescribed, the momenta are w_k . p, and v + sum_l c_l D w_l
+  three rotations about the origin at the positions of now) and D, which leaves out what is prescribed, the momenta are w_k . p, and v + sum_l c_l D w_l
   has those that are wanted when
 
     sum_l (w_k . M D w_l) c_l = wanted_k - w_k . M v.

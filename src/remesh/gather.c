@@ -1,7 +1,7 @@
 /*
   A scene with its state from all ranks to rank 0, and back.
 
-  A star forest joins the cells of each rank (leaves) with their places on rank 0 (roots), by their original numbers. With a cell travel its vertices, its
+  A star forest joins the cells of each rank (leaves) with their positions on rank 0 (roots), by their original numbers. With a cell travel its vertices, its
   sets, and the values of the vectors at its nodes: so every element is carried alike, and a node that several cells share
   comes with each of them.
 */

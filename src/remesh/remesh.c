@@ -51,7 +51,7 @@ static const SbOption rows[] = {
    "edges of new tets inside, in mean edges of the body's surface, which stays"},
 };
 static const SbOption body_rows[] = {
-  {"remesh_quality", SB_OPTION_REAL, 1, "", "", "[0, 1)", "of this body, in place of -remesh_quality"},
+  {"remesh_quality", SB_OPTION_REAL, 1, "", "", "[0, 1)", "of this body, instead of -remesh_quality"},
 };
 
 PetscErrorCode SbRemeshRegister(void)
@@ -323,58 +323,58 @@ static PetscReal distance(const PetscReal a[3], const PetscReal b[3])
 
 /* ------------------------------------------------------------------ a re-meshing from beginning to end */
 
-/* What rank 0 has made; all ranks know the messages, numbers and names. any: some body has a new mesh. */
-static PetscErrorCode make_meshes(SbRemesh r, SbRun run, SbRemade *remade, PetscBool *any)
+/* What rank 0 has outcome; all ranks know the messages, numbers and names. any: some body has a new mesh. */
+static PetscErrorCode make_meshes(SbRemesh r, SbRun run, SbRemeshResult *result, PetscBool *any)
 {
   const SbModel m = run->model;
-  SbRenamed *renamed = &remade->renamed;
+  SbRenamed *renamed = &result->renamed;
   SbGathered g;
   PetscMPIInt rank;
 
   PetscFunctionBeginUser;
   PetscCallMPI(MPI_Comm_rank(m->comm, &rank));
   PetscCall(SbGather(run, &g));
-  if (!rank) PetscCall(SbRemeshBodies(m, &g, r->due, run->step_now, &r->how, remade));
-  remade->next.nbody = g.nbody;
-  remade->next.nfield = g.nfield;
-  remade->next.width = g.width;
+  if (!rank) PetscCall(SbRemeshBodies(m, &g, r->due, run->step_now, &r->how, result));
+  result->next.nbody = g.nbody;
+  result->next.nfield = g.nfield;
+  result->next.width = g.width;
   PetscCall(SbGatheredDestroy(&g));
   PetscCallMPI(
-    MPI_Bcast(remade->made, (int)((size_t)m->nbody * sizeof(*remade->made)), MPI_BYTE, 0, m->comm));
-  PetscCallMPI(MPI_Bcast(remade->done, (PetscMPIInt)m->nbody, SB_MPI_BOOL, 0, m->comm));
+    MPI_Bcast(result->outcome, (int)((size_t)m->nbody * sizeof(*result->outcome)), MPI_BYTE, 0, m->comm));
+  PetscCallMPI(MPI_Bcast(result->done, (PetscMPIInt)m->nbody, SB_MPI_BOOL, 0, m->comm));
   PetscCallMPI(MPI_Bcast(&renamed->n, 1, MPIU_INT, 0, m->comm));
   if (rank) PetscCall(PetscMalloc2(renamed->n, &renamed->from, renamed->n, &renamed->to));
   PetscCallMPI(MPI_Bcast(renamed->from, (PetscMPIInt)renamed->n, MPIU_INT, 0, m->comm));
   PetscCallMPI(MPI_Bcast(renamed->to, (PetscMPIInt)renamed->n, MPIU_INT, 0, m->comm));
   *any = PETSC_FALSE;
   for (PetscInt b = 0; b < m->nbody; b++) {
-    *any = (PetscBool)(*any || remade->done[b]);
-    if (r->due[b] && !remade->done[b])
+    *any = (PetscBool)(*any || result->done[b]);
+    if (r->due[b] && !result->done[b])
       PetscCall(SbWarning(m->comm, "body '%s' keeps its mesh after step %" PetscInt_FMT ": %s",
-                          m->body[b].name, run->step_now, remade->made[b].message));
+                          m->body[b].name, run->step_now, result->outcome[b].message));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode report(SbRemesh r, const Scene *s, const SbRemade *remade, const SbEnergies e[2],
+static PetscErrorCode report(SbRemesh r, const Scene *s, const SbRemeshResult *result, const SbEnergies e[2],
                              PetscReal speed)
 {
-  const SbMade *made = remade->made;
+  const SbRemeshOutcome *outcome = result->outcome;
 
   PetscFunctionBeginUser;
   for (PetscInt b = 0; b < r->nbody; b++) {
     SbRemeshed entry = {.step = s->run->step_now, .t = s->run->t_now};
 
-    if (!remade->done[b]) continue;
+    if (!result->done[b]) continue;
     PetscCall(PetscStrncpy(entry.body, s->model->body[b].name, sizeof(entry.body)));
     for (int i = 0; i < 2; i++) {
-      entry.tets[i] = made[b].ncell[i];
-      entry.vertices[i] = made[b].nvert[i];
+      entry.tets[i] = outcome[b].ncell[i];
+      entry.vertices[i] = outcome[b].nvert[i];
       entry.energy[i] = e[i].kinetic + e[i].strain;
     }
     entry.quality[0] = r->worst[b];
-    entry.quality[1] = made[b].quality;
-    entry.moved = made[b].nmoved;
+    entry.quality[1] = outcome[b].quality;
+    entry.moved = outcome[b].nmoved;
     entry.speed = speed;
     entry.shift = distance(e[0].centre, e[1].centre);
     PetscCall(SbReportRemeshed(s->run, &entry));
@@ -383,7 +383,7 @@ static PetscErrorCode report(SbRemesh r, const Scene *s, const SbRemade *remade,
 }
 
 /* The new scene, or the message why it cannot be made: then the old one goes on. */
-static PetscErrorCode replace(SbRemesh r, Scene *old, SbRemade *remade)
+static PetscErrorCode replace(SbRemesh r, Scene *old, SbRemeshResult *result)
 {
   Scene s = {NULL, NULL, NULL};
   SbEnergies e[2];
@@ -398,7 +398,7 @@ static PetscErrorCode replace(SbRemesh r, Scene *old, SbRemade *remade)
   PetscCall(SbRunCreate(s.model, &s.run));
   PetscCall(PetscStrncpy(s.run->solver_choice, old->run->solver, sizeof(s.run->solver_choice)));
   PetscCall(SbLedgerSetFromOptions(s.run, &s.ledger));
-  PetscCall(hand_meshes(s.model, remade->in_memory));
+  PetscCall(hand_meshes(s.model, result->in_memory));
   PetscCall(SbModelSetUp(s.model));
   PetscCall(SbSceneValidate(s.model));
   PetscCall(SbRunSetUp(s.run));
@@ -406,22 +406,22 @@ static PetscErrorCode replace(SbRemesh r, Scene *old, SbRemade *remade)
   // the state goes from the old scene to the new one
   run = s.run;
   PetscCall(SbRunContinue(old->run, run));
-  PetscCall(SbScatter(&remade->next, run));
+  PetscCall(SbScatter(&result->next, run));
   PetscCall(SbModelPrescribe(s.model, run->t_now, run->U));
   // keeps the bodies' momenta, and their rates where the integrator carries accelerations
   if (run->V) {
     PetscCall(PetscCalloc1(old->model->nbody, &momenta));
     PetscCall(SbBodyMomenta(old->model, before->U, before->V, momenta));
     PetscCall(
-      SbBodySetMomenta(run->model, run->U, run->V, remade->done, (const PetscReal(*)[6])momenta, &speed));
+      SbBodySetMomenta(run->model, run->U, run->V, result->done, (const PetscReal(*)[6])momenta, &speed));
     if (run->A) {
       PetscCall(SbBodyMomenta(old->model, before->U, before->A, momenta));
       PetscCall(
-        SbBodySetMomenta(run->model, run->U, run->A, remade->done, (const PetscReal(*)[6])momenta, &rate));
+        SbBodySetMomenta(run->model, run->U, run->A, result->done, (const PetscReal(*)[6])momenta, &rate));
     }
     PetscCall(PetscFree(momenta));
   }
-  PetscCall(SbEffectsHandOver(old->run, run, &remade->renamed));
+  PetscCall(SbEffectsHandOver(old->run, run, &result->renamed));
   PetscCall(SbRunRestartAcceleration(run));
   // energy, mass and momentum of both states: the difference is the loss by remeshing
   PetscCall(PetscMemzero(e, 2 * sizeof(*e)));
@@ -434,7 +434,7 @@ static PetscErrorCode replace(SbRemesh r, Scene *old, SbRemade *remade)
   if (s.ledger) PetscCall(SbLedgerContinue(old->ledger, s.ledger));
   PetscCall(SbRemeshAttach(r, s.run));
   if (old->run->output) PetscCall(SbOutputReattach(old->run, s.run));
-  PetscCall(report(r, &s, remade, e, speed));
+  PetscCall(report(r, &s, result, e, speed));
   PetscCall(SbLedgerDestroy(&old->ledger));
   PetscCall(SbRunDestroy(&old->run));
   PetscCall(SbModelDestroy(&old->model));
@@ -445,29 +445,29 @@ static PetscErrorCode replace(SbRemesh r, Scene *old, SbRemade *remade)
 /* any: some body has a new mesh. */
 static PetscErrorCode apply(SbRemesh r, Scene *scene, PetscBool *any)
 {
-  SbRemade remade;
-  const SbMade *made;
+  SbRemeshResult result;
+  const SbRemeshOutcome *outcome;
   const PetscBool *done;
 
   PetscFunctionBeginUser;
   PetscCall(PetscLogStagePush(SbStageSetup));
   PetscCall(PetscLogEventBegin(r->event, 0, 0, 0, 0));
-  PetscCall(SbRemadeCreate(scene->model->nbody, &remade));
-  PetscCall(make_meshes(r, scene->run, &remade, any));
+  PetscCall(SbRemeshResultCreate(scene->model->nbody, &result));
+  PetscCall(make_meshes(r, scene->run, &result, any));
   // quality and step from which a body may be remeshed again
-  made = remade.made;
-  done = remade.done;
+  outcome = result.outcome;
+  done = result.done;
   for (PetscInt b = 0; b < r->nbody; b++) {
-    const PetscReal reached = done[b] ? made[b].quality : r->worst[b];
+    const PetscReal reached = done[b] ? outcome[b].quality : r->worst[b];
 
     if (!r->due[b]) continue;
     if (reached > 0.) r->bound[b] = PetscMin(r->asked[b], AGAIN * reached);
     r->rest[b] = done[b] && reached > 0. ? 0 : PetscMax(1, 2 * r->rest[b]);
     r->from[b] = scene->run->step_now + r->rest[b];
-    if (remade.in_memory[b] && done[b]) remade.in_memory[b]->bound = r->bound[b];
+    if (result.in_memory[b] && done[b]) result.in_memory[b]->bound = r->bound[b];
   }
-  if (*any) PetscCall(replace(r, scene, &remade));
-  PetscCall(SbRemadeDestroy(&remade));
+  if (*any) PetscCall(replace(r, scene, &result));
+  PetscCall(SbRemeshResultDestroy(&result));
   PetscCall(PetscLogEventEnd(r->event, 0, 0, 0, 0));
   PetscCall(PetscLogStagePop());
   // without a new mesh the time loop resumes at the current step

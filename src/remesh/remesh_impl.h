@@ -61,7 +61,7 @@ PetscErrorCode SbRemeshBody(const char *where, const SbOldMesh *old, const SbRem
 PetscErrorCode SbNewMeshDestroy(SbNewMesh *mesh);
 
 /*
-  bodies.c - rank 0: the bodies with due[b] are remeshed, what comes of it is a SbRemade.
+  bodies.c - rank 0: the bodies with due[b] are remeshed, what comes of it is a SbRemeshResult.
 
   Not collective. message: why a body could not be re-meshed, "" when it was or was not due; it keeps its mesh then.
 */
@@ -70,20 +70,21 @@ typedef struct {
   PetscInt nmoved;
   PetscReal quality; /* of the worst tet after it */
   char message[512];
-} SbMade;
+} SbRemeshOutcome;
 typedef struct {
   PetscInt nbody;
   SbMemoryMesh **
     in_memory; /* [nbody] meshes of all bodies, also of those that stay as they are; rank 0, NULL elsewhere and when somebody has taken it */
-  SbMade *made;      /* [nbody] */
-  PetscBool *done;   /* [nbody] has a new mesh */
+  SbRemeshOutcome *outcome; /* [nbody] */
+  PetscBool *done;          /* [nbody] has a new mesh */
   SbGathered next;   /* the same scene with the state looked up there; X, vert_set and so on are left out */
   SbRenamed renamed; /* nodes of the surfaces of all bodies */
-} SbRemade;
-PetscErrorCode SbRemadeCreate(PetscInt nbody, SbRemade *remade); /* empty. SbRemadeDestroy() */
-PetscErrorCode SbRemadeDestroy(SbRemade *remade);
+} SbRemeshResult;
+PetscErrorCode SbRemeshResultCreate(PetscInt nbody,
+                                    SbRemeshResult *result); /* empty. SbRemeshResultDestroy() */
+PetscErrorCode SbRemeshResultDestroy(SbRemeshResult *result);
 PetscErrorCode SbRemeshBodies(SbModel model, const SbGathered *g, const PetscBool due[], PetscInt step,
-                              const SbRemeshing *how, SbRemade *remade);
+                              const SbRemeshing *how, SbRemeshResult *result);
 
 /*
   check.c - qualities and momenta.

@@ -96,14 +96,14 @@ static PetscErrorCode check_mesh_file(MPI_Comm comm, const SbBody *body)
 
 PetscErrorCode SbSceneCheck(SbModel model)
 {
-  PetscBool held = model->dynamic;
+  PetscBool constrained = model->dynamic;
 
   PetscFunctionBeginUser;
   for (PetscInt i = 0; i < model->nbody; i++)
     if (!is_generated(model->body[i].mesh)) PetscCall(check_mesh_file(model->comm, &model->body[i]));
-  for (PetscInt e = 0; e < model->neffect && !held; e++)
-    held = (PetscBool)(model->effect[e]->ops.prescribe != NULL);
-  PetscCheck(held, PETSC_COMM_SELF, PETSC_ERR_USER,
+  for (PetscInt e = 0; e < model->neffect && !constrained; e++)
+    constrained = (PetscBool)(model->effect[e]->ops.prescribe != NULL);
+  PetscCheck(constrained, PETSC_COMM_SELF, PETSC_ERR_USER,
              "-time static: nothing holds the bodies, so there is no unique equilibrium; name an effect of "
              "type fixed or prescribed_displacement");
   PetscFunctionReturn(PETSC_SUCCESS);

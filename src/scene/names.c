@@ -1,7 +1,7 @@
 /*
   names.c - lists of names that a scenario gives.
 
-  Names of bodies, sets and effects become parts of option names: -body_<name>_young. PETSc does not tell upper from lower
+  Names of bodies, sets and effects become parts of option names: -body_<name>_young. PETSc does not distinguish upper from lower
   case there, so neither may names. It also takes `-body_young` for a missing `-body_1_young`; a part of a name that is
   only digits would silently read another one's options and is refused.
 */

@@ -54,7 +54,7 @@ static PetscErrorCode list_members(SbCoarse c)
 }
 
 /* Places relative to the centre in units of the radius. */
-static void find_places(SbCoarse c)
+static void find_positions(SbCoarse c)
 {
   SbSpace s = c->space;
 
@@ -250,7 +250,7 @@ static PetscErrorCode create_matrix(SbCoarse c)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The numbers and places of the nodes on every rank that knows them. */
+/* The numbers and positions of the nodes on every rank that knows them. */
 static PetscErrorCode share_aggregates(SbCoarse c)
 {
   SbSpace s = c->space;
@@ -309,7 +309,7 @@ PetscErrorCode SbCoarseCreate(SbSpace s, PetscInt wanted, PetscBool spread, SbCo
   c->first -= c->n;
   PetscCall(list_members(c));
   PetscCall(PetscMalloc1(4 * c->n, &c->centre));
-  find_places(c);
+  find_positions(c);
   PetscCall(PetscMalloc1(36 * c->n, &c->null));
   for (PetscInt a = 0; a < c->n; a++) PetscCall(find_vanishing(c, a, c->null + 36 * a));
   PetscCall(share_aggregates(c));

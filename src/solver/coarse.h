@@ -13,7 +13,7 @@
 PetscErrorCode SbAggregate(SbSpace space, PetscInt wanted, PetscInt *n, PetscInt agg[]);
 
 /*
-  The coarse space: columns Z of six modes per aggregate, u(x) = t + w x d with d the place relative to the aggregate's centre
+  The coarse space: columns Z of six modes per aggregate, u(x) = t + w x d with d the position relative to the aggregate's centre
   in units of its radius; zero on prescribed unknowns. E = Z^T A Z is gathered and factored by every rank, or its rows stay with
   their ranks and a cycle of multigrid stands for E^-1.
 */
@@ -23,7 +23,7 @@ struct _p_SbCoarse {
   PetscInt n, first, N;   /* aggregates of this rank, number of its first one, all of them */
   PetscInt *agg;          /* [nnode] aggregate by global number, -1 for fully prescribed nodes */
   PetscReal *d;           /* [nnode][3] */
-  PetscReal *centre;      /* [n][4] place, m, and radius, m; 0 for a single node */
+  PetscReal *centre;      /* [n][4] position, m, and radius, m; 0 for a single node */
   PetscBool spread;       /* E stays with its ranks; what is [N], [nblock] and [size] below is NULL then */
   PetscReal *weight;      /* [N] 1 / nodes in the aggregate */
   PetscReal *null;        /* [n][36] projector onto the modes that vanish (single nodes, nodes on a line) */

@@ -13,7 +13,7 @@
 /*
   Unknowns of the last level, which one rank factors, and of a rank on those before it. Bar of 332,000 tets on 64 ranks: 35 iterations
   and 114 messages of a rank in each; with PETSc's 50 and 50 43 and 290. Coarsening by the square of the graph, PETSc's default on the
-  first level, takes 50 iterations in the place of 38 on 16 ranks.
+  first level, takes 50 iterations instead of 38 on 16 ranks.
 */
 #define LAST_LEVEL 600
 #define PER_RANK 300

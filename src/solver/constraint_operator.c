@@ -1,5 +1,5 @@
 /*
-  What solves see of the rows of constraint.c: the operator A = P^T (K + S^T k S) P, and M_A^-1 = P M^-1 P^T around any preconditioner M.
+  What solves see of the constraints of constraint.c: the operator A = P^T (K + S^T k S) P, and M_A^-1 = P M^-1 P^T around any preconditioner M.
 
   With SB_SADDLE_DIRECT the part of M is taken by the solution of the saddle-point system, which is A's inverse in the null space: one
   iteration and what rounding asks for. Where nothing touches, M itself is used.
@@ -12,7 +12,7 @@ PetscErrorCode SbConstraintsMultiply(SbConstraints c, Vec x, Vec y)
 {
   PetscFunctionBeginUser;
   PetscCall(MatMult(c->K, x, y));
-  if (c->added && c->w[0]) { /* before the first rows there is neither */
+  if (c->added && c->w[0]) { /* before the first constraints there is neither */
     PetscCall(VecPointwiseMult(c->w[0], c->added, x));
     PetscCall(VecAXPY(y, -1., c->w[0]));
   }
@@ -81,7 +81,7 @@ PetscErrorCode SbConstraintsSetMatrix(SbSpace s, Mat K)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-#define NAME "null space of rows"
+#define NAME "null space of constraints"
 
 typedef struct {
   SbSpace space;

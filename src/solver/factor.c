@@ -20,10 +20,10 @@
 #include <petscblaslapack.h>
 
 typedef struct {
-  PetscInt first, ncol; /* first place, nodes across */
+  PetscInt first, ncol; /* first position, nodes across */
   PetscInt group;
   PetscInt nrow;       /* nodes below */
-  const PetscInt *row; /* [nrow] their places, borrowed from the elimination */
+  const PetscInt *row; /* [nrow] their positions, borrowed from the elimination */
   size_t offset;       /* of the inverted diagonal block in word[]; the rows below follow it */
 } Panel;
 
@@ -114,7 +114,7 @@ void SbFactorSize(SbFactor f, PetscInt64 *entries, PetscInt64 *bytes)
 
 /* Work space of a factorisation. */
 typedef struct {
-  PetscInt *position;        /* [n] index in the current front of a place */
+  PetscInt *position;        /* [n] index in the current front of a position */
   PetscScalar *front;        /* [tallest^2] column-major, lower triangle */
   PetscScalar **update;      /* [nsuper] what a group hands to its parent; NULL when taken */
   PetscInt *child, *sibling; /* [nsuper] lists of children */
@@ -130,7 +130,7 @@ static void add_entries(SbFactor f, PetscInt g, const PetscInt ia[], const Petsc
     const PetscInt node = e->order[j], column = 3 * (j - e->first[g]);
 
     for (PetscInt k = ia[node]; k < ia[node + 1]; k++) {
-      const PetscInt i = e->place[ja[k]];
+      const PetscInt i = e->inverse[ja[k]];
 
       if (i < j) continue;
       for (PetscInt a = 0; a < 3; a++) {

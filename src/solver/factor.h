@@ -12,12 +12,12 @@ typedef struct _p_SbFactor *SbFactor;
 /* What ordering and symbolic elimination leave: nodes in order of elimination, columns in groups with equal rows. */
 typedef struct {
   PetscInt n, nfree; /* nodes; those that are eliminated */
-  PetscInt *order;   /* [n] node at each place; places nfree.. are the kept nodes in their own order */
-  PetscInt *place;   /* [n] inverse of order */
+  PetscInt *order;   /* [n] node at each position; positions nfree.. are the kept nodes in their own order */
+  PetscInt *inverse; /* [n] inverse of order */
   PetscInt nsuper;
-  PetscInt *first;  /* [nsuper+1] first place (column) of each group */
+  PetscInt *first;  /* [nsuper+1] first position (column) of each group */
   PetscInt *start;  /* [nsuper+1] offsets into list */
-  PetscInt *list;   /* places of each group's rows: its columns, then the rows below, ascending */
+  PetscInt *list;   /* positions of each group's rows: its columns, then the rows below, ascending */
   PetscInt *parent; /* [nsuper] group that takes the update, -1: only kept nodes are below, or none */
 } SbElimination;
 

@@ -40,7 +40,7 @@ static PetscErrorCode dissect(PetscInt n, const PetscInt ia[], const PetscInt ja
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* parent[] of the elimination tree of the free nodes, by places; ancestor[] is work space. */
+/* parent[] of the elimination tree of the free nodes, by positions; ancestor[] is work space. */
 static void elimination_tree(const SbElimination *e, const PetscInt ia[], const PetscInt ja[],
                              PetscInt parent[], PetscInt ancestor[])
 {
@@ -49,7 +49,7 @@ static void elimination_tree(const SbElimination *e, const PetscInt ia[], const 
 
     parent[j] = ancestor[j] = -1;
     for (PetscInt k = ia[node]; k < ia[node + 1]; k++) {
-      PetscInt i = e->place[ja[k]];
+      PetscInt i = e->inverse[ja[k]];
 
       while (i >= 0 && i < j) {
         const PetscInt next = ancestor[i];
@@ -62,7 +62,7 @@ static void elimination_tree(const SbElimination *e, const PetscInt ia[], const 
   }
 }
 
-/* Renumbers the places so that every subtree is consecutive and ends with its root. parent[] follows. */
+/* Renumbers the positions so that every subtree is consecutive and ends with its root. parent[] follows. */
 static PetscErrorCode postorder(SbElimination *e, PetscInt parent[])
 {
   const PetscInt n = e->nfree;
@@ -97,7 +97,7 @@ static PetscErrorCode postorder(SbElimination *e, PetscInt parent[])
     e->order[fresh[j]] = old[j];
     parent[fresh[j]] = next[j] < 0 ? -1 : fresh[next[j]];
   }
-  for (PetscInt j = 0; j < n; j++) e->place[e->order[j]] = j;
+  for (PetscInt j = 0; j < n; j++) e->inverse[e->order[j]] = j;
   PetscCall(PetscFree5(head, next, stack, fresh, old));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -105,7 +105,7 @@ static PetscErrorCode postorder(SbElimination *e, PetscInt parent[])
 /* One group of columns while groups are being found: a stack of these, the last one being open. */
 typedef struct {
   PetscInt first, ncol, nrow; /* first column, columns, rows below them */
-  PetscInt *row;              /* [nrow] places, ascending; owned */
+  PetscInt *row;              /* [nrow] positions, ascending; owned */
   PetscReal zeros;            /* blocks of the lower triangle that are zero */
 } Group;
 
@@ -157,7 +157,7 @@ static PetscInt column_structure(const SbElimination *e, PetscInt j, const Petsc
 
   mark[j] = j;
   for (PetscInt k = ia[node]; k < ia[node + 1]; k++) {
-    const PetscInt i = e->place[ja[k]];
+    const PetscInt i = e->inverse[ja[k]];
 
     if (i > j && mark[i] != j) {
       mark[i] = j;
@@ -258,10 +258,10 @@ PetscErrorCode SbEliminationCreate(PetscInt n, PetscInt nkeep, const PetscInt ia
   PetscFunctionBeginUser;
   e->n = n;
   e->nfree = n - nkeep;
-  PetscCall(PetscMalloc2(n, &e->order, n, &e->place));
+  PetscCall(PetscMalloc2(n, &e->order, n, &e->inverse));
   PetscCall(dissect(e->nfree, ia, ja, e->order));
   for (PetscInt k = e->nfree; k < n; k++) e->order[k] = k;
-  for (PetscInt k = 0; k < n; k++) e->place[e->order[k]] = k;
+  for (PetscInt k = 0; k < n; k++) e->inverse[e->order[k]] = k;
   PetscCall(PetscMalloc2(e->nfree, &parent, e->nfree, &ancestor));
   elimination_tree(e, ia, ja, parent, ancestor);
   PetscCall(postorder(e, parent));
@@ -276,7 +276,7 @@ PetscErrorCode SbEliminationCreate(PetscInt n, PetscInt nkeep, const PetscInt ia
 PetscErrorCode SbEliminationDestroy(SbElimination *e)
 {
   PetscFunctionBeginUser;
-  PetscCall(PetscFree2(e->order, e->place));
+  PetscCall(PetscFree2(e->order, e->inverse));
   PetscCall(PetscFree4(e->first, e->start, e->list, e->parent));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -127,7 +127,7 @@ static PetscErrorCode factor_columns(MPI_Comm comm, PetscInt n, PetscInt nblock,
       PetscCallBLAS("LAPACKpotrf", LAPACKpotrf_("L", &nc, corner, &ld, &info));
       below = ld - (PetscBLASInt)c - nc;
       if (info)
-        corner[0] = -1.; /* tells the others */
+        corner[0] = -1.; /* a sign for the others */
       else if (below)
         PetscCallBLAS("BLAStrsm",
                       BLAStrsm_("R", "L", "T", "N", &below, &nc, &one, corner, &ld, corner + nc, &ld));

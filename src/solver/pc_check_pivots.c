@@ -64,7 +64,7 @@ static PetscErrorCode guarded_setup(PC pc)
     PetscCall(PetscInfo(pc, "CHOLMOD: a pivot is not positive\n"));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
-  PetscCall(error); /* what else went wrong is told as ever, but for its trace */
+  PetscCall(error); /* what else went wrong is reported as ever, but for its trace */
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

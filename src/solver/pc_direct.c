@@ -81,7 +81,7 @@ PetscErrorCode SbPCDirectSet(PC pc, const char *package, PetscBool symmetric)
   if (mumps) PetscCall(set_if_silent(prefix, "mat_mumps_icntl_13", "1"));
   if (mumps) PetscCall(set_if_silent(prefix, "mat_mumps_icntl_14", "100"));
   if (umfpack) PetscCall(set_if_silent(prefix, "mat_umfpack_ordering", "METIS"));
-  /* for small matrices CHOLMOD's own choice is L D L^T, which takes indefinite ones without a word; a failure is told by the solver's reason */
+  /* for small matrices CHOLMOD's own choice is L D L^T, which takes indefinite ones without a word; a failure shows in the solver's reason */
   if (!mumps && !umfpack) {
     PetscCall(set_if_silent(prefix, "mat_cholmod_factor", "supernodal"));
     PetscCall(set_if_silent(prefix, "mat_cholmod_print", "0"));

@@ -11,7 +11,7 @@
   product is P1's own matrix, which is assembled from the same blocks. A vertex of a face with a prescribed unknown is constrained.
   A DG cell that touches this rank's cells with a vertex only may have neighbours that are not here; its strain is that of its own
   nodes there, so that in a strained body the P1 matrix is slightly nonsymmetric at the border of ranks. GMRES does not mind.
-  Springs of effects are in P1's matrix as the Galerkin product has them: they may be all that holds a body.
+  Springs of effects are in P1's matrix as the Galerkin product has them: they may be all that supports a body.
   P1 by algebraic multigrid. Hiptmair and Xu (2007), Nodal auxiliary space preconditioning; Brenner (2003), Poincare-Friedrichs
   inequalities for piecewise H1 functions.
 */
@@ -29,7 +29,7 @@
 
 /* ------------------------------------------------------------------ spaces */
 
-/* Elements of a level: P1 everywhere, or CR in the place of DG. */
+/* Elements of a level: P1 everywhere, or CR instead of DG. */
 static PetscErrorCode create_elements(SbSpace s, PetscBool p1, SbElement **element)
 {
   PetscFunctionBeginUser;

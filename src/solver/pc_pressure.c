@@ -28,7 +28,7 @@
 #include <petsc/private/kspimpl.h>
 
 #define NAME "pressure"
-#define RESTART 120 /* vectors that GMRES keeps at most: 80 cost 97 iterations in place of 81 on 64 ranks */
+#define RESTART 120 /* vectors that GMRES keeps at most: 80 cost 97 iterations instead of 81 on 64 ranks */
 #define LARGEST_WEIGHT 1e4 /* lambda / mu in the norm of GMRES */
 #define MARGIN 0.3         /* how far below the target GMRES aims */
 #define TIGHTER 0.03       /* times that after a correction that did not help */

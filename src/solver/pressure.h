@@ -6,7 +6,7 @@
 #include "sbassembly.h"
 
 /*
-  Up to three spaces of one mesh: the space itself; the same with CR in the place of DG, when some body is DG; and P1 for every body.
+  Up to three spaces of one mesh: the space itself; the same with CR instead of DG, when some body is DG; and P1 for every body.
   The tangent without its volumetric part is assembled in each.
 */
 typedef struct _p_SbLevels *SbLevels;

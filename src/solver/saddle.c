@@ -7,8 +7,8 @@
   MINRES (Paige and Saunders 1975) with the block-diagonal preconditioner of Murphy, Golub and Wathen (A note on preconditioning for
   indefinite linear systems, 2000), their Schur complement G K^-1 G^T replaced by that of D, about the inverse of K's diagonal, which
   the projection has factored already (constraint.c); M is the preconditioner of K that the run has chosen. The factor a is small: the
-  eigenvalues that belong to the rows then lie in two groups far from the others, at +- 1 / sqrt(a), and the others are those of the
-  null space. A joint of two bars, cg_pbjacobi: 598 iterations with a = 1, 231 with 0.1, 91 with 1e-3, 122 with 1e-6, where rounding tells;
+  eigenvalues that belong to the constraints then lie in two groups far from the others, at +- 1 / sqrt(a), and the others are those of the
+  null space. A joint of two bars, cg_pbjacobi: 598 iterations with a = 1, 231 with 0.1, 91 with 1e-3, 122 with 1e-6, where rounding shows;
   in the null space itself 46. FGMRES where something is not symmetric (friction; an M for Richardson's method), and from the moment on when it
   shows that M is not definite.
 
@@ -38,12 +38,12 @@ typedef struct {
   KSP plain;     /* the run's own method */
   PetscBool minres;
   PetscReal loss;   /* how much less the residual fell in the last round than its norm */
-  PetscInt version; /* of the rows that the following are for */
+  PetscInt version; /* of the constraints that the following are for */
   KSP inner;        /* NULL: none yet */
   Mat S;
   Vec b, x; /* displacements and multipliers of this rank */
   PetscReal
-    scale;      /* on the rows, N/m: their residuals are forces then, and their multipliers displacements */
+    scale; /* on the constraints, N/m: their residuals are forces then, and their multipliers displacements */
   Vec from, to; /* displacements */
 } Saddle;
 
@@ -158,7 +158,7 @@ static PetscErrorCode find_scale(SbConstraints c, PetscReal *scale)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The inner solver for the rows as they are. */
+/* The inner solver for the constraints as they are. */
 static PetscErrorCode update(Saddle *d)
 {
   const SbSpace s = d->space;

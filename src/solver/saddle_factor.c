@@ -4,11 +4,11 @@
     [ K + F^T k S   F^T        ] [ z ]   [ r ]
     [ G            -e diag(B)  ] [ m ] = [ 0 ],    B = G D F^T
 
-  It is regular where K is not: a body that only rows hold needs no anchors (constraint.c). e is tiny: with it rows that depend on others
+  It is regular where K is not: a body that only constraints support needs no anchors (constraint.c). e is tiny: with it constraints that depend on others
   share their force instead of making the matrix singular. What e leaves of G z is projected away by the caller.
 
   The matrix is indefinite, and symmetric but for friction: LDL^T or LU of MUMPS, or LU of UMFPACK on one of the ranks (pc_direct.c). Springs stand in it, although
-  they join nodes that K's graph does not. Made again when K or the rows have changed, and only then.
+  they join nodes that K's graph does not. Made again when K or the constraints have changed, and only then.
 */
 #include "solver_impl.h"
 #include "sbconstraint.h"
@@ -19,10 +19,10 @@
   30000 /* unknowns up to which a factorisation per solve is chosen; see docs/reports/contact.md */
 #define DIRECT_DYNAMIC 1000
 
-struct _p_SbFactored {
+struct _p_SbSaddleFactor {
   PC pc;
   Vec b, x;                 /* displacements and multipliers of this rank */
-  PetscInt version, matrix; /* of the rows and of K */
+  PetscInt version, matrix; /* of the constraints and of K */
   PetscBool ok;
 };
 
@@ -171,7 +171,7 @@ static PetscErrorCode factor(SbSpace s, SbSaddleFactor f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A factorisation of K as it is now with the rows as they are. */
+/* A factorisation of K as it is now with the constraints as they are. */
 static PetscErrorCode update(SbSpace s)
 {
   SbConstraints c = s->constraints;

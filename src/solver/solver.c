@@ -5,7 +5,7 @@
   A -pc_type of the user's that is not the row's own takes the row's place: `by_type` says which matrix it works on. The method is CG
   then, or what -ksp_type says. SbSolverFinish() refuses what cannot work, before anything is computed.
 
-  Convergence is judged by the true residual wherever the method can tell it: the preconditioned norm can be off by orders of magnitude for nearly
+  Convergence is judged by the true residual wherever the method computes it: the preconditioned norm can be off by orders of magnitude for nearly
   incompressible bodies. Gauss-Seidel and SOR are wrapped in a PCCOMPOSITE of one: Richardson hands its whole loop to a bare
   PCSOR, which does the largest number of sweeps without examining the residual. A solve that does not reach its tolerance fails; the
   next row of a list is then tried on the same system (time/solver_list.c), and only after the last one is the step cut or the run stopped.

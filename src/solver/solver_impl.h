@@ -19,7 +19,7 @@ PetscErrorCode SbKSPCheckNorm(KSP ksp);
 */
 PetscErrorCode SbKSPCheckTrueResidual(KSP ksp, PetscBool direct, PetscBool alone);
 
-/* The true residual decides, unless the user chose a norm or a side, or the type of ksp cannot tell it. After KSPSetType(). Not collective. */
+/* The true residual decides, unless the user chose a norm or a side, or the type of ksp does not compute it. After KSPSetType(). Not collective. */
 PetscErrorCode SbKSPPreferTrueResidual(KSP ksp);
 
 /* The method that such a ksp takes where nothing touches; ksp itself when it is another one. Borrowed. Not collective. */
@@ -50,7 +50,7 @@ PetscErrorCode SbKSPSetForceTolerance(KSP ksp);
 */
 PetscErrorCode SbPCConstrainedCreate(SbSpace space, PC pc, PC *inner);
 
-/* negative: pivots below zero of a factorisation that is done, -1 where it does not tell: L D L^T of MUMPS does. Collective. */
+/* negative: pivots below zero of a factorisation that is done, -1 where it is unknown: L D L^T of MUMPS counts them. Collective. */
 PetscErrorCode SbPCDirectCountNegative(PC pc, PetscInt *negative);
 
 /* The package of such a factorisation that is gathered on one rank, NULL for any other pc. Not collective. */
@@ -72,7 +72,7 @@ PetscErrorCode SbPCPressureCreate(SbSpace space, PC pc);
   Output: ok, false when the matrix could not be factored; z is not a number then.
 */
 PetscErrorCode SbSaddleFactorSolve(SbSpace space, Vec r, Vec z, PetscBool *ok);
-/* Negative eigenvalues of K + F^T k G in the null space of the constraints, from that factorisation; -1: it does not tell. Collective. */
+/* Negative eigenvalues of K + F^T k G in the null space of the constraints, from that factorisation; -1: it is unknown. Collective. */
 PetscErrorCode SbSaddleFactorCountNegative(SbSpace space, PetscInt *negative);
 
 /* -reproducible: runs on the same number of ranks have the same bits. Not collective. */

@@ -1,7 +1,7 @@
 /*
   Which norm a solve is judged by, and what examines its answer.
 
-  The true residual is preferred wherever the method can tell it and the user does not choose a norm; a method that cannot (minres) has its own.
+  The true residual is preferred wherever the method computes it and the user does not choose a norm; a method that cannot (minres) has its own.
 
   A direct solver's answer is examined: |b - A x| is computed once more after the solve.
 
@@ -20,7 +20,7 @@
 
 #define AT_MOST 1e-2 /* of the right-hand side, where no more than that is asked for */
 
-static PetscErrorCode look(KSP ksp, Vec b, Vec x, void *ctx)
+static PetscErrorCode check_residual(KSP ksp, Vec b, Vec x, void *ctx)
 {
   PetscReal size, residual;
   PetscBool single;
@@ -59,7 +59,7 @@ PetscErrorCode SbKSPCheckTrueResidual(KSP ksp, PetscBool direct, PetscBool alone
   /* a Newton step looks better than a comparison of norms that differ by orders of magnitude */
   if (single || (direct && norm == KSP_NORM_UNPRECONDITIONED) ||
       (alone && (norm == KSP_NORM_PRECONDITIONED || norm == KSP_NORM_NATURAL)))
-    PetscCall(KSPSetPostSolve(ksp, look, NULL));
+    PetscCall(KSPSetPostSolve(ksp, check_residual, NULL));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -99,7 +99,7 @@ PetscErrorCode SbKSPSetForceTolerance(KSP ksp)
 }
 
 /* How well the method of ksp supports a norm with the side that the user may have set; 0: not at all. */
-static PetscInt support(KSP ksp, KSPNormType norm)
+static PetscInt norm_support(KSP ksp, KSPNormType norm)
 {
   PetscInt best = 0;
 
@@ -117,7 +117,7 @@ PetscErrorCode SbKSPPreferTrueResidual(KSP ksp)
   PetscFunctionBeginUser;
   PetscCall(PetscOptionsHasName(NULL, NULL, "-ksp_norm_type", &norm));
   PetscCall(PetscOptionsHasName(NULL, NULL, "-ksp_pc_side", &side));
-  if (!norm && !side && support(ksp, KSP_NORM_UNPRECONDITIONED))
+  if (!norm && !side && norm_support(ksp, KSP_NORM_UNPRECONDITIONED))
     PetscCall(KSPSetNormType(ksp, KSP_NORM_UNPRECONDITIONED));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -131,7 +131,7 @@ PetscErrorCode SbKSPCheckNorm(KSP ksp)
 
   PetscFunctionBeginUser;
   for (KSPNormType norm = KSP_NORM_NONE; norm < KSP_NORM_MAX; norm++) {
-    if (!support(ksp, norm)) continue;
+    if (!norm_support(ksp, norm)) continue;
     any += asked == KSP_NORM_DEFAULT || asked == norm;
     PetscCall(PetscStrlcat(norms, norms[0] ? ", " : "", sizeof(norms)));
     PetscCall(PetscStrlcat(norms, KSPNormTypes[norm], sizeof(norms)));

@@ -1,7 +1,7 @@
 /*
   clean.c - small defects of a surface: vertices that differ by rounding, doubles, triangles without area, open edges.
 
-  Repaired, counted and reported: vertices within a tolerance of each other become one (chains of such pairs as a whole, at the place of the
+  Repaired, counted and reported: vertices within a tolerance of each other become one (chains of such pairs as a whole, at the position of the
   first), a triangle that thereby has a corner twice is left out, so is one that is given twice. Two triangles back to
   back are one wall. A triangle whose corners lie on a line is taken into its neighbour at the longest edge, which is cut in two at
   the corner between: the shape stays what it was. Refused: open edges.
@@ -136,7 +136,7 @@ PetscErrorCode SbSurfaceMergeVertices(SbTriangleFile *f, PetscReal tolerance, Sb
     const PetscReal d2 = distance2(t, v, first[v]);
 
     moved2 = PetscMax(moved2, d2);
-    m->nwelded += d2 > 0; /* those at one place are nothing to speak of */
+    m->nwelded += d2 > 0; /* those at one position are nothing to speak of */
   }
   for (PetscInt i = 0; i < t->ntri; i++) {
     PetscInt *v = t->tri + 3 * i;

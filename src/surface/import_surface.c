@@ -15,7 +15,7 @@ static const SbOption rows[] = {
   {"tet_surface", SB_OPTION_CHOICE, 1, "", "auto", "auto|keep|remesh",
    "whether the triangles of the surface stay: auto keeps them when their mean edge is within a factor of "
    "1.5 of tet_size"},
-  {"tet_angle", SB_OPTION_REAL, 1, "degrees", "40", "(0, 180)",
+  {"tet_feature_angle", SB_OPTION_REAL, 1, "degrees", "40", "(0, 180)",
    "edges where the surface turns by more are kept when it is remeshed"},
   {"tetrahedralizer", SB_OPTION_CHOICE, 1, "", "auto", "auto|gmsh|tetgen",
    "who makes tets from a surface: auto tries gmsh, then tetgen"},
@@ -51,7 +51,7 @@ PetscErrorCode SbTetOptionsRead(const SbScope *scope, const char *mesh, SbTetOpt
   if (!SbMeshFileIsSurface(mesh)) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(SbOptionReal(scope, "tet_size", &o->size));
   PetscCall(SbOptionChoice(scope, "tet_surface", &surface));
-  PetscCall(SbOptionReal(scope, "tet_angle", &o->angle));
+  PetscCall(SbOptionReal(scope, "tet_feature_angle", &o->angle));
   PetscCall(SbOptionChoice(scope, "tetrahedralizer", &backend));
   PetscCall(SbOptionReal(scope, "tet_seconds", &o->seconds));
   PetscCall(SbOptionReal(scope, "merge_tolerance", &o->merge_tolerance));

@@ -4,7 +4,7 @@
   Every triangle has two sides, 2 f in front and 2 f + 1 behind. At an edge the triangles are sorted by their angle around it; what faces
   each other between two that follow is one space, so these sides are joined. The joined sides are shells: one with a positive volume is the
   outer limit of a region, one with a negative volume is a surface seen from the space around it. Which region that space is, the winding
-  number tells (sum of solid angles, van Oosterom and Strackee 1983): the smallest positive shell around it.
+  number decides (sum of solid angles, van Oosterom and Strackee 1983): the smallest positive shell around it.
 
   What is material: with a sense of turning (.stl, .obj, .off, .ply), triangles are first turned to the side of their neighbours, the
   majority of a surface wins; a surface turned outwards holds material, also within another one (a region of its own), one turned
@@ -67,7 +67,7 @@ static PetscInt number_heaps(PetscInt n, PetscInt up[])
 
 /* ------------------------------------------------------------------ turned alike */
 
-/* Walks over one piece: sense[f] tells whether f is turned as the first one (1) or the other way (-1). */
+/* Walks over one piece: sense[f] says whether f is turned as the first one (1) or the other way (-1). */
 static PetscErrorCode walk_piece(const Space *s, PetscInt first, const PetscInt across[], int sense[],
                                  PetscInt stack[], PetscInt *n)
 {

@@ -62,7 +62,7 @@ static double now(void)
   return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
 }
 
-/* In the child: never returns. 127 tells that there is no such program. */
+/* In the child: never returns. 127 says that there is no such program. */
 static void become_tetgen(const char *folder, const char *flags)
 {
   sigset_t none;

@@ -79,7 +79,7 @@ typedef struct {
 } SbTriangleEdge;
 /* edge[3 ntri], sorted: those with one key are one edge. */
 PetscErrorCode SbTrianglesEdges(const SbTriangles *triangles, SbTriangleEdge edge[]);
-/* How many triangles there are at the edge that begins at place i of n. */
+/* How many triangles there are at the edge that begins at position i of n. */
 PetscInt SbTrianglesAtEdge(PetscInt n, const SbTriangleEdge edge[], PetscInt i);
 /* Twice the area of a triangle, m^2, its longest edge squared and the sum of its edges. */
 PetscReal SbTriangleMeasure(const SbTriangles *triangles, PetscInt f, PetscReal *longest2, PetscReal *around);

@@ -1,7 +1,7 @@
 /*
   triangles_ply.c - surfaces from .ply files (Stanford polygon format 1.0): text, and binary of both byte orders.
 
-  The header tells which properties an element has, in which order and of which types. Of `vertex` x, y and z are taken, of `face` the
+  The header lists which properties an element has, in which order and of which types. Of `vertex` x, y and z are taken, of `face` the
   list vertex_indices (or vertex_index); everything else is walked over. Triangle strips are refused.
 */
 #include <stdlib.h>

@@ -166,7 +166,7 @@ static PetscInt corners_of(const Loops *l, PetscInt k)
   return l->start[k + 1] - l->start[k];
 }
 
-/* Area seen along the normal of the whole facet; the sign tells how the loop is walked. */
+/* Area seen along the normal of the whole facet; the sign is the sense of the loop. */
 static PetscReal loop_area(const Loops *l, PetscInt k)
 {
   Polygon one = {.x = l->p.x};
@@ -221,7 +221,7 @@ static PetscBool meets_edge(const Polygon *p, PetscInt a, PetscInt b, PetscInt n
   return PETSC_FALSE;
 }
 
-/* The shortest free way from a corner of the polygon (place *i) to one of loop k (place *j). */
+/* The shortest free way from a corner of the polygon (position *i) to one of loop k (position *j). */
 static PetscBool find_bridge(const Loops *l, PetscInt k, PetscInt n, const PetscInt left[], PetscInt *i,
                              PetscInt *j)
 {

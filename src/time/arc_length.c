@@ -19,7 +19,7 @@
   difference of residuals, too. It is exact for loads that are proportional to lambda; with moving supports and formulas of t, which is
   lambda, the step of the difference is small. The last step is solved at lambda = 1.
 
-  K has negative eigenvalues behind limit loads. Where its factorisation tells their number, one that changes while the load does not turn is a
+  K has negative eigenvalues behind limit loads. Where its factorisation counts them, one that changes while the load does not turn is a
   bifurcation: another branch begins there, which is not searched for. Not handled: contact, re-meshing.
 */
 #include "sbsolver.h"
@@ -265,7 +265,7 @@ static PetscErrorCode attempt(Path *p, PetscReal from, PetscReal l, PetscReal si
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* v at U, where the residual is zero but for the tolerance, in `begin`; a bifurcation on the way there is told. */
+/* v at U, where the residual is zero but for the tolerance, in `begin`; a bifurcation on the way there is reported. */
 static PetscErrorCode begin_step(Path *p, PetscReal *sign, PetscBool *ok)
 {
   const SbRun run = p->run;

@@ -19,7 +19,7 @@ typedef struct {
   PetscReal atol, rtol, stol, linear_rtol, linear_atol, dtol;
   PetscInt max_it, max_f, linear_max;
   KSP ksp;
-  PetscBool single; /* one linear solve in the place of Newton */
+  PetscBool single; /* one linear solve instead of Newton */
 } Aim;
 
 /* Absolute tolerances for solves of a step whose first residual is `size`, N; 0: those of the user. least: what can be had, N. */
@@ -43,7 +43,7 @@ PetscErrorCode SbRunSolveContact(SbRun run, const SbAttempt *step, SNESConverged
   const SNES snes = run->snes;
   const PetscReal t = step->t, dt = step->dt;
   const Vec U0 = step->U0, U = step->U;
-  PetscBool again = PETSC_TRUE, rough, held;
+  PetscBool again = PETSC_TRUE, rough, constrained;
   PetscReal size, least = 0;
   Aim aim;
 
@@ -59,11 +59,11 @@ PetscErrorCode SbRunSolveContact(SbRun run, const SbAttempt *step, SNESConverged
 
   /* a first guess of who touches */
   PetscCall(SbModelContactBeginStep(m, t, dt, U0, run->V, U));
-  held = SbSpaceIsConstrained(m->space);
-  rough = (PetscBool)(held && m->dynamic);
+  constrained = SbSpaceIsConstrained(m->space);
+  rough = (PetscBool)(constrained && m->dynamic);
   /* the matrix holds what was constrained before */
   if (m->space->nodal || !m->dynamic) run->tangent_known = PETSC_FALSE;
-  if (held) {
+  if (constrained) {
     /* a body at rest has no residual but for rounding: then contact and supports carry all there is */
     PetscCall((*step->residual)(step->ctx, U, run->R));
     PetscCall(VecNorm(run->R, NORM_2, &least));
@@ -74,7 +74,7 @@ PetscErrorCode SbRunSolveContact(SbRun run, const SbAttempt *step, SNESConverged
   PetscCall(SNESComputeFunction(snes, U, run->R));
   PetscCall(VecNorm(run->R, NORM_2, &size));
   if (PetscIsInfOrNanReal(size)) size = 0;
-  if (held) PetscCall(set_aim(snes, &aim, size, least, rough)); /* if not, as without contact */
+  if (constrained) PetscCall(set_aim(snes, &aim, size, least, rough)); /* if not, as without contact */
   PetscCall(SbSolverUpdateSymmetry(aim.ksp, m->space));
   PetscCall((*step->solve)(step->ctx, U, reason));
 
@@ -103,7 +103,7 @@ PetscErrorCode SbRunSolveContact(SbRun run, const SbAttempt *step, SNESConverged
   }
   PetscCall(set_aim(snes, &aim, 0, 0, PETSC_FALSE));
 
-  /* a solve that failed may leave the tangent of a wild state, from whose diagonal rows take their weights: the next attempt has that of the start again */
+  /* a solve that failed may leave the tangent of a wild state, from whose diagonal constraints take their weights: the next attempt has that of the start again */
   if (*reason < 0 && run->model->space->constraints) {
     Mat A, P;
 

@@ -5,8 +5,8 @@
 #include "sbsolver.h"
 #include "time_impl.h"
 
-/* True when J still holds the tangent for these shifts. */
-static PetscBool tangent_holds(SbRun run, PetscReal shift_v, PetscReal shift_a)
+/* True when J is still the tangent for these shifts. */
+static PetscBool tangent_is_current(SbRun run, PetscReal shift_v, PetscReal shift_a)
 {
   const PetscReal tiny = 1e-10;
 
@@ -19,7 +19,7 @@ static PetscErrorCode form_tangent(SbRun run, PetscReal t, PetscReal shift_v, Pe
                                    Mat P)
 {
   PetscFunctionBeginUser;
-  if (tangent_holds(run, shift_v, shift_a)) PetscFunctionReturn(PETSC_SUCCESS);
+  if (tangent_is_current(run, shift_v, shift_a)) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(SbModelTangent(run->model, t, shift_v, shift_a, 1., U, V, P));
   /* a preconditioner that turns with the nodes asks for the displacement that the matrix belongs to */
   if (run->solver_used->precondition)

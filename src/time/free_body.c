@@ -14,7 +14,7 @@
 
 #define ALLOWED 1e-13 /* part of its square that a motion may lose by rounding */
 #define FREE 1e-13    /* of the cells' stiffness: rounding of sums over the nodes leaves 1e-15 */
-#define FAR 1e6       /* times its size: a body that went so far in a static run was not held */
+#define FAR 1e6       /* times its size: a body that went so far in a static run was not constrained */
 
 /* ------------------------------------------------------------------ parts */
 
@@ -121,7 +121,7 @@ typedef struct {
 } Part;
 
 /* Where a node is, for the tangent: linear laws know the rest state only. */
-static inline PetscReal place(SbSpace s, const PetscScalar u[], PetscInt k)
+static inline PetscReal coordinate(SbSpace s, const PetscScalar u[], PetscInt k)
 {
   return s->node_x[k] + (s->linear ? 0. : u[k]);
 }
@@ -130,7 +130,7 @@ static inline PetscReal place(SbSpace s, const PetscScalar u[], PetscInt k)
 static PetscErrorCode measure(SbRun run, const PetscInt label[], Part *part)
 {
   SbSpace s = run->model->space;
-  PetscReal sum[6] = {0.}; /* nodes, places, squares, body */
+  PetscReal sum[6] = {0.}; /* nodes, coordinates, squares, body */
   const PetscScalar *u;
 
   PetscFunctionBeginUser;
@@ -138,14 +138,14 @@ static PetscErrorCode measure(SbRun run, const PetscInt label[], Part *part)
   for (PetscInt i = 0; i < s->nnode_owned; i++) {
     if (label[i] != part->label) continue;
     sum[0] += 1.;
-    for (PetscInt c = 0; c < 3; c++) sum[1 + c] += place(s, u, 3 * i + c);
+    for (PetscInt c = 0; c < 3; c++) sum[1 + c] += coordinate(s, u, 3 * i + c);
     sum[5] += s->node_body[i];
   }
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, sum, 6, MPIU_REAL, MPI_SUM, s->comm));
   for (int c = 0; c < 3; c++) part->centre[c] = sum[1 + c] / sum[0];
   for (PetscInt i = 0; i < s->nnode_owned; i++) {
     if (label[i] != part->label) continue;
-    for (PetscInt c = 0; c < 3; c++) sum[4] += PetscSqr(place(s, u, 3 * i + c) - part->centre[c]);
+    for (PetscInt c = 0; c < 3; c++) sum[4] += PetscSqr(coordinate(s, u, 3 * i + c) - part->centre[c]);
   }
   PetscCall(VecRestoreArrayRead(run->U, &u));
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &sum[4], 1, MPIU_REAL, MPI_SUM, s->comm));
@@ -170,7 +170,7 @@ static PetscErrorCode create_motion(SbRun run, const PetscInt label[], const Par
     PetscReal r[3];
 
     if (label[i] != part->label) continue;
-    for (PetscInt c = 0; c < 3; c++) r[c] = (place(s, u, 3 * i + c) - part->centre[c]) / part->size;
+    for (PetscInt c = 0; c < 3; c++) r[c] = (coordinate(s, u, 3 * i + c) - part->centre[c]) / part->size;
     if (k < 3)
       to[3 * i + k] = 1.;
     else {
@@ -347,7 +347,7 @@ static PetscErrorCode say_more(SbRun run, const PetscInt label[], const Part *pa
                                size_t size, char text[])
 {
   SbSpace s = run->model->space;
-  PetscInt held[2] = {0, 0};
+  PetscInt nfixed[2] = {0, 0};
   char more[128];
 
   PetscFunctionBeginUser;
@@ -363,14 +363,14 @@ static PetscErrorCode say_more(SbRun run, const PetscInt label[], const Part *pa
     PetscCall(PetscStrlcat(text, more, size));
   }
   for (PetscInt k = 0; k < s->nfixed; k++) {
-    if (s->fixed_node[k] < s->nnode_owned && label[s->fixed_node[k]] == part->label) held[0]++;
+    if (s->fixed_node[k] < s->nnode_owned && label[s->fixed_node[k]] == part->label) nfixed[0]++;
   }
-  PetscCallMPI(MPI_Allreduce(&held[0], &held[1], 1, MPIU_INT, MPI_SUM, s->comm));
-  if (held[1] && held[1] <= 2 && !s->element[part->body]->nodes_per[0]) {
+  PetscCallMPI(MPI_Allreduce(&nfixed[0], &nfixed[1], 1, MPIU_INT, MPI_SUM, s->comm));
+  if (nfixed[1] && nfixed[1] <= 2 && !s->element[part->body]->nodes_per[0]) {
     PetscCall(PetscSNPrintf(more, sizeof(more),
                             "; %s is constrained at the centres of facets, here of %" PetscInt_FMT
                             ": three that are not in line hold it",
-                            s->element[part->body]->name, held[1]));
+                            s->element[part->body]->name, nfixed[1]));
     PetscCall(PetscStrlcat(text, more, size));
   }
   PetscFunctionReturn(PETSC_SUCCESS);

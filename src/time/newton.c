@@ -33,7 +33,7 @@
 /* What a solve keeps from iteration to iteration. */
 typedef struct {
   SbRun run;
-  Vec W, G;        /* trial place and its residual */
+  Vec W, G;        /* trial iterate and its residual */
   Vec start, step; /* where provisional steps began; the first of them led to start - step */
   PetscReal least; /* rounding of the strain energy of a body that has turned: E V to the last digit, J */
   PetscInt provisional;  /* how many there were since */
@@ -41,23 +41,23 @@ typedef struct {
   PetscReal first, rise; /* change of E over it, and over all since, J */
 } Newton;
 
-/* The potential at a place, as far as lengths of steps ask. */
+/* The potential at an iterate, as far as lengths of steps ask. */
 typedef struct {
   PetscReal norm; /* of the residual, N */
   PetscReal psi;  /* strain energy, J */
   PetscReal rest; /* slope of all but strain along the step, J */
   PetscInt ninverted;
-} Place;
+} Iterate;
 
-/* Everything about the place X, whose residual is F, for a step along -Y. */
-static PetscErrorCode look_at_place(Newton *n, Vec X, Vec F, Vec Y, Place *at)
+/* Everything about the iterate X, whose residual is F, for a step along -Y. */
+static PetscErrorCode evaluate_at(Newton *n, Vec X, Vec F, Vec Y, Iterate *at)
 {
   const SbRun run = n->run;
   const PetscReal part = run->stage ? run->stage_part : 1.;
   PetscReal slope, elastic;
 
   PetscFunctionBeginUser;
-  *at = (Place){0};
+  *at = (Iterate){0};
   PetscCall(VecNorm(F, NORM_2, &at->norm));
   if (PetscIsInfOrNanReal(at->norm)) PetscFunctionReturn(PETSC_SUCCESS);
   /* forces are those of a stage between the start of the step and X, divided by its part of the step */
@@ -70,7 +70,7 @@ static PetscErrorCode look_at_place(Newton *n, Vec X, Vec F, Vec Y, Place *at)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Solves for Y, X - Y being the next place, and for the slope of E along -Y. */
+/* Solves for Y, X - Y being the next iterate, and for the slope of E along -Y. */
 static PetscErrorCode find_direction(SNES snes, PetscBool *filtered, PetscReal *slope)
 {
   Newton *n = (Newton *)snes->data;
@@ -144,18 +144,18 @@ static PetscErrorCode search(SNES snes, PetscReal slope, PetscReal *s)
   const Vec X = snes->vec_sol, F = snes->vec_func, Y = snes->vec_sol_update;
   PetscBool enough, provisional, better, plain = PETSC_FALSE;
   PetscReal change, noise, total, goal;
-  Place from, to;
+  Iterate from, to;
 
   PetscFunctionBeginUser;
   *s = 1.;
-  PetscCall(look_at_place(n, X, F, Y, &from));
+  PetscCall(evaluate_at(n, X, F, Y, &from));
   for (;;) {
     /* how E changes */
     change = PETSC_INFINITY;
     noise = 0.;
     PetscCall(VecWAXPY(n->W, -*s, Y, X));
     PetscCall(SNESComputeFunction(snes, n->W, n->G));
-    PetscCall(look_at_place(n, n->W, n->G, Y, &to));
+    PetscCall(evaluate_at(n, n->W, n->G, Y, &to));
     if (!PetscIsInfOrNanReal(to.norm)) {
       change = to.psi - from.psi + 0.5 * *s * (from.rest + to.rest);
       noise = n->least + ROUNDING * (PetscAbsReal(to.psi) + PetscAbsReal(from.psi) +
@@ -167,7 +167,7 @@ static PetscErrorCode search(SNES snes, PetscReal slope, PetscReal *s)
       "iteration %" PetscInt_FMT ": %g of the step changes E by %g J (slope %g J), residual %g -> %g N\n",
       snes->iter, (double)*s, (double)change, (double)slope, (double)from.norm, (double)to.norm));
 
-    /* enough; where it is too little to tell, or the step goes up at once, as forces without a potential may make it, the residual has to */
+    /* enough; where it is too little to decide, or the step goes up at once, as forces without a potential may make it, the residual has to */
     total = n->provisional ? n->rise + change : change;
     goal = DECREASE * (n->provisional ? n->slope : *s * slope);
     enough = (PetscBool)(slope < 0. && total <= goal);
@@ -181,7 +181,7 @@ static PetscErrorCode search(SNES snes, PetscReal slope, PetscReal *s)
     if (n->provisional) {
       PetscCall(solve_accurately(snes, &slope, &better));
       if (better) {
-        PetscCall(look_at_place(n, X, F, Y, &from));
+        PetscCall(evaluate_at(n, X, F, Y, &from));
         continue;
       }
     }
@@ -191,7 +191,7 @@ static PetscErrorCode search(SNES snes, PetscReal slope, PetscReal *s)
       PetscCall(VecCopy(n->start, X));
       PetscCall(VecCopy(n->step, Y));
       PetscCall(SNESComputeFunction(snes, X, F));
-      PetscCall(look_at_place(n, X, F, Y, &from));
+      PetscCall(evaluate_at(n, X, F, Y, &from));
       slope = n->slope;
       change = n->first;
       n->provisional = 0;
@@ -204,7 +204,7 @@ static PetscErrorCode search(SNES snes, PetscReal slope, PetscReal *s)
     }
   }
 
-  /* the new place; where provisional steps began is kept until E has fallen below */
+  /* the new iterate; where provisional steps began is kept until E has fallen below */
   if (enough)
     n->provisional = 0;
   else if (!n->provisional++) {

@@ -23,7 +23,7 @@ static const SbOption rows[] = {
    "time integrator, or static equilibrium"},
   {"ts_dt", SB_OPTION_REAL, 1, "s", "0.01", "(0, inf)",
    "length of a time step (the first one with -ts_adapt_type basic); explicit integrators take 0.9 of the "
-   "stable step unless told"},
+   "stable step unless given"},
   {"ts_max_time", SB_OPTION_REAL, 1, "s", "1", "(0, inf)", "end of the simulated time"},
   {"time_spectral_radius", SB_OPTION_REAL, 1, "", "0.5", "[0, 1]",
    "genalpha: amplitude that is left of the highest frequencies per step; 1 keeps all, 0 removes them at "
@@ -509,7 +509,7 @@ PetscErrorCode SbRunSetUp(SbRun run)
   PetscCall(PetscStrncpy(run->solver, run->solver_used->name, sizeof(run->solver)));
   PetscCall(check_contact(run, explicit));
 
-  /* how rows with multipliers are solved, and what is said of it */
+  /* how constraints with multipliers are solved, and what is said of it */
   if (run->saddle) {
     PetscCall(
       SbSaddleChoose(s, run->model->dynamic, run->saddle_choice, &run->saddle_used, reason, sizeof(reason)));
@@ -517,7 +517,7 @@ PetscErrorCode SbRunSetUp(SbRun run)
     PetscCall(PetscStrlcat(run->solver_reason, reason, sizeof(run->solver_reason)));
   }
 
-  /* the matrix, and what solves see of it when rows join nodes */
+  /* the matrix, and what solves see of it when constraints join nodes */
   if (!explicit) {
     PetscCall(SbSolverCreateOperator(m->space, run->solver_used, &run->J));
     if (m->space->constraints)

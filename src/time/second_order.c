@@ -7,7 +7,7 @@
       F(t0 + alpha_f h, u0 + alpha_f s, v0 + alpha_f (v1 - v0), a0 + alpha_m (a1 - a0)) = 0
     Newmark: alpha_m = alpha_f = 1
     implicit Euler: v1 = s / h, a1 = (v1 - v0) / h (it is not a Newmark method)
-  Newmark with contact: a0 is the acceleration without it, newmark_contact.c tells the rest
+  Newmark with contact: a0 is the acceleration without it, newmark_contact.c describes the rest
   and, with a0 = M^-1 (f(t0, u0, v0)),
     explicit Euler: u1 = u0 + h v0, v1 = v0 + h a0;  symplectic Euler: v1 = v0 + h a0, u1 = u0 + h v1.
 

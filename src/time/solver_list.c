@@ -14,8 +14,8 @@
 #include "time_impl.h"
 #include <petsc/private/kspimpl.h>
 
-#define RATIO 1e4    /* of Young's moduli: more is told */
-#define NU_HARD 0.45 /* Poisson's ratio from which on it is told */
+#define RATIO 1e4    /* of Young's moduli: a larger one is named as a cause */
+#define NU_HARD 0.45 /* Poisson's ratio from which on it is named as a cause */
 
 typedef struct _p_SbSolverList *SbSolverList;
 struct _p_SbSolverList {
@@ -41,8 +41,8 @@ static PetscErrorCode attach(SbSolverList l, KSP ksp)
 }
 
 /* Why the solver failed, into text and behind l->failures: "DIVERGED_ITS of cg after 5000 iterations, ...". memory: a factorisation lacked it. */
-static PetscErrorCode tell_failure(SbSolverList l, KSP ksp, Vec b, Vec x, char text[], size_t size,
-                                   PetscBool *memory)
+static PetscErrorCode describe_failure(SbSolverList l, KSP ksp, Vec b, Vec x, char text[], size_t size,
+                                       PetscBool *memory)
 {
   const char *reason = KSPConvergedReasons[ksp->reason];
   PetscReal load, residual;
@@ -127,7 +127,7 @@ static PetscErrorCode replace(SbSolverList l, KSP ksp, const SbSolverPreset *nex
   PetscCall(KSPSetConvergenceTest(ksp, KSPConvergedDefault, test, KSPConvergedDefaultDestroy));
   PetscCall(KSPSetInitialGuessNonzero(ksp, PETSC_FALSE));
 
-  /* the operator that `next` works on, in the place of the run's */
+  /* the operator that `next` works on, instead of the run's */
   if (old->create || next->create || old->matrix != next->matrix) {
     SbSpace s = run->model->space;
 
@@ -197,7 +197,7 @@ static PetscErrorCode after_solve(KSP ksp, Vec b, Vec x, void *ctx)
   }
   /* Newton's method filters the tangent and comes back */
   if (run->model->space->tentative) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(tell_failure(l, ksp, b, x, text, sizeof(text), &memory));
+  PetscCall(describe_failure(l, ksp, b, x, text, sizeof(text), &memory));
   /* an incomplete factorisation within it may have broken down */
   PetscCall(SbPCConstrainedGetInner(ksp->pc, &pc));
   /* MINRES blames the matrix for a preconditioner that is not definite, or does not notice */
@@ -249,7 +249,7 @@ PetscErrorCode SbSolverListDestroy(SbRun run)
 }
 
 /* What of the bodies makes systems hard, as far as it is known: "; nu is up to 0.4999". */
-static PetscErrorCode tell_causes(SbRun run, char text[], size_t size)
+static PetscErrorCode describe_causes(SbRun run, char text[], size_t size)
 {
   const SbModel m = run->model;
   PetscReal nu = 0., soft = PETSC_MAX_REAL, stiff = 0.;
@@ -295,7 +295,7 @@ PetscErrorCode SbSolverListExplain(SbRun run, size_t size, char text[])
   char causes[256];
 
   PetscFunctionBeginUser;
-  PetscCall(tell_causes(run, causes, sizeof(causes)));
+  PetscCall(describe_causes(run, causes, sizeof(causes)));
   if (l->own)
     PetscCall(PetscSNPrintf(text, size, "linear solver: %s%s", l->failures, causes));
   else {

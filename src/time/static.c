@@ -4,7 +4,7 @@
   last equilibrium; each step that succeeds doubles it again.
 
   Towards a limit load lambda* displacements go like sqrt(lambda* - lambda), and steps become shorter without end. Below
-  -static_min_increment the run stops; how much faster displacements grow with the load than in the first step tells a limit load from
+  -static_min_increment the run stops; how much faster displacements grow with the load than in the first step distinguishes a limit load from
   other failures. A shortened step without an iteration (a change of load below rounding) is no sign that steps may be longer.
 */
 #include "time_impl.h"
@@ -55,8 +55,8 @@ static PetscErrorCode predict(void *ctx)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Looks for a body that nothing holds; *found, and the run's reason to stop says so. */
-static PetscErrorCode look_for_free_body(SbRun run, PetscReal factor, PetscBool *found)
+/* Finds a body that nothing holds; *found, and the run's reason to stop says so. */
+static PetscErrorCode find_free_body(SbRun run, PetscReal factor, PetscBool *found)
 {
   PetscInt body;
   char motion[256];
@@ -86,7 +86,7 @@ static PetscErrorCode complete(void *ctx, SNESConvergedReason reason, SbSolvedSt
   if (!*ok) {
     char why[512] = "use more -static_steps";
 
-    PetscCall(look_for_free_body(l->run, l->factor, &found));
+    PetscCall(find_free_body(l->run, l->factor, &found));
     if (!found) {
       if (reason == SNES_DIVERGED_LINEAR_SOLVE) PetscCall(SbSolverListExplain(l->run, sizeof(why), why));
       PetscCall(
@@ -96,7 +96,7 @@ static PetscErrorCode complete(void *ctx, SNESConvergedReason reason, SbSolvedSt
 
   /* loads in balance leave a singular system with a solution, and a solver may find it with any rigid motion on top */
   if (*ok && !l->run->steps_total && !l->run->model->nbegin_step && l->run->newton_step) {
-    PetscCall(look_for_free_body(l->run, l->factor, &found));
+    PetscCall(find_free_body(l->run, l->factor, &found));
     if (found) *ok = PETSC_FALSE;
   }
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -36,7 +36,7 @@ PetscErrorCode SbRunAttempt(SbRun run, const SbAttempt *a, PetscBool *ok)
     /* the state at the end, or why there is none */
     PetscCall((*a->complete)(a->ctx, reason, &step, ok));
 
-    /* who examines solutions may ask for a better one, the solver having been told what is wanted */
+    /* who examines solutions may ask for a better one, after the solver knows what is wanted */
     again = PETSC_FALSE;
     if (*ok && run->post_solve.fn && solves < SB_LOOKS)
       PetscCall((*run->post_solve.fn)(run, &step, run->post_solve.ctx, &again));

@@ -210,7 +210,7 @@ static PetscErrorCode check_words(const SbToolLine *line, const SbToolCommand **
   PetscCheck(size == 1, PETSC_COMM_WORLD, PETSC_ERR_USER, "runs on one process, not on %d; leave out mpirun",
              (int)size);
   PetscCheck(line->nword, PETSC_COMM_SELF, PETSC_ERR_USER,
-             "no command is given; supple-mesh -help lists them, supple-mesh info FILE tells about a mesh");
+             "no command is given; supple-mesh -help lists them, supple-mesh info FILE describes a mesh");
   PetscCall(find_command(line->word[0], command));
   nfile = line->nword - 1;
   PetscCheck(nfile == (*command)->nfile, PETSC_COMM_SELF, PETSC_ERR_USER,

@@ -1,5 +1,5 @@
 /*
-  progress.c - a line on standard error that tells how far something long is: rewritten in place on a terminal, else a plain
+  progress.c - a line of progress on standard error: rewritten in place on a terminal, else a plain
   line now and then. What takes less than a second says nothing.
 */
 #include <unistd.h>

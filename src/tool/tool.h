@@ -20,7 +20,7 @@ typedef struct _SbTool {
   SbMeshFormat format;            /* -format */
   char view[PETSC_MAX_PATH_LEN];  /* -view; "" for no picture */
   PetscBool quiet;
-  PetscLogDouble start, last; /* wall time of the phase that is told about, and when it was told last, s */
+  PetscLogDouble start, last; /* wall time of the phase that is reported, and of the last report, s */
   PetscBool terminal, open;   /* standard error is a terminal; a line is being rewritten there */
   const char *phase;          /* "reading liver.msh" */
 } SbTool;

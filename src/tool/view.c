@@ -15,7 +15,7 @@ extern char **environ;
 
 static PetscErrorCode find_render(size_t size, char path[])
 {
-  static const char *const places[] = {"../scripts/render", "../share/supple/scripts/render"};
+  static const char *const folders[] = {"../scripts/render", "../share/supple/scripts/render"};
   char program[PETSC_MAX_PATH_LEN];
   const ssize_t n = readlink("/proc/self/exe", program, sizeof(program) - 1);
   char *slash;
@@ -24,13 +24,13 @@ static PetscErrorCode find_render(size_t size, char path[])
   program[n > 0 ? n : 0] = 0;
   slash = strrchr(program, '/');
   if (slash) *slash = 0;
-  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(places); i++) {
-    (void)snprintf(path, size, "%s/%s", program, places[i]);
+  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(folders); i++) {
+    (void)snprintf(path, size, "%s/%s", program, folders[i]);
     if (!access(path, X_OK)) PetscFunctionReturn(PETSC_SUCCESS);
   }
   SETERRQ(PETSC_COMM_SELF, PETSC_ERR_FILE_OPEN,
-          "-view needs scripts/render of supple, which is in neither %s/%s nor %s/%s", program, places[0],
-          program, places[1]);
+          "-view needs scripts/render of supple, which is in neither %s/%s nor %s/%s", program, folders[0],
+          program, folders[1]);
 }
 
 /* Runs the script; its messages go to standard error. */

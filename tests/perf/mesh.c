@@ -6,7 +6,7 @@
 
   Seconds are elapsed ones, and as NAME_cpu those that the busiest rank has computed for (also while it waits for messages).
 
-  read: the file to arrays on rank 0; read_and_check: and what a run checks, all bodies in one piece; distribute: partition and
+  read: the file to arrays on rank 0; read_and_check: and what a run checks, all bodies in one local; distribute: partition and
   migration; number: own numbering. Memory is the largest resident size within a phase (VmHWM, set back before it), of rank 0
   and of the largest other rank, less what the process had at its start. One run per process: pages that were freed stay.
 */
@@ -87,7 +87,7 @@ static PetscErrorCode measure(SbBody *body, SbReading reading)
   Phase p;
   SbMergedMesh whole;
   SbMesh mesh;
-  SbPiece piece;
+  SbLocalMesh local;
 
   PetscFunctionBeginUser;
   PetscCall(PetscMemzero(&p, sizeof(p)));
@@ -105,10 +105,10 @@ static PetscErrorCode measure(SbBody *body, SbReading reading)
   mesh->nbody = 1;
   mesh->body = body;
   phase_begin(&p);
-  PetscCall(SbDistribute(PETSC_COMM_WORLD, SB_PARTITION_AUTO, PETSC_FALSE, &whole, &piece));
+  PetscCall(SbDistribute(PETSC_COMM_WORLD, SB_PARTITION_AUTO, PETSC_FALSE, &whole, &local));
   PetscCall(phase_end(&p, "distribute"));
   phase_begin(&p);
-  PetscCall(SbMeshNumber(mesh, &piece));
+  PetscCall(SbMeshNumber(mesh, &local));
   PetscCall(phase_end(&p, "number"));
   PetscCall(perf_sample("peak_rank0", "MiB", p.most[0]));
   PetscCall(perf_sample("peak_others", "MiB", p.most[1]));

@@ -134,9 +134,9 @@ static PetscErrorCode test_open_failure(void)
   SB_CHECK(!ok && h.file < 0, "a file that is not there was opened");
   if (!rank) {
     char message[SB_MESSAGE_MAX] = "";
-    const SbPiece piece = {"no HDF5", 7};
+    const SbChunk chunk = {"no HDF5", 7};
 
-    SbFileReplace(path, 1, &piece, sizeof(message), message);
+    SbFileReplace(path, 1, &chunk, sizeof(message), message);
     SB_CHECK(!message[0], "%s", message);
   }
   PetscCallMPI(MPI_Barrier(PETSC_COMM_WORLD));
@@ -148,22 +148,22 @@ static PetscErrorCode test_open_failure(void)
 static PetscErrorCode test_files(void)
 {
   char path[PETSC_MAX_PATH_LEN], *text, message[SB_MESSAGE_MAX] = "";
-  const SbPiece pieces[3] = {{"one ", 4}, {NULL, 0}, {"two", 3}};
+  const SbChunk chunks[3] = {{"one ", 4}, {NULL, 0}, {"two", 3}};
   PetscMPIInt rank;
   size_t size;
 
   PetscFunctionBeginUser;
   PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
   if (!rank) {
-    SbFormat(sizeof(path), path, "%s/pieces.txt", dir);
-    SbFileReplace(path, 3, pieces, sizeof(message), message);
+    SbFormat(sizeof(path), path, "%s/chunks.txt", dir);
+    SbFileReplace(path, 3, chunks, sizeof(message), message);
     PetscCall(SbFileRead(path, &text, &size));
     SB_CHECK(!message[0] && size == 7 && text && !strcmp(text, "one two"), "read '%s', %s", text ? text : "",
              message);
     PetscCall(PetscFree(text));
-    SB_CHECK(!fixture_exists(dir, "pieces.txt.tmp"), "the temporary file is left");
+    SB_CHECK(!fixture_exists(dir, "chunks.txt.tmp"), "the temporary file is left");
     SbFormat(sizeof(path), path, "%s/no/folder", dir);
-    SbFileReplace(path, 3, pieces, sizeof(message), message);
+    SbFileReplace(path, 3, chunks, sizeof(message), message);
     SB_CHECK(strstr(message, "cannot write 7 bytes to ") && strstr(message, "No such file or directory"),
              "message '%s'", message);
     PetscCall(SbFileRead(path, &text, &size));

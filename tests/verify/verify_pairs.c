@@ -43,7 +43,7 @@ static PetscErrorCode sum_places(SbRun run, PetscReal t, Watch *w, PetscReal for
   n[0] = n[1] = 0;
   PetscCall(SbModelContactPoints(run->model, t, run->U, run->reaction, &list));
   for (PetscInt i = 0; i < list.n; i++) {
-    const SbContactPoint *p = &list.place[i];
+    const SbContactPoint *p = &list.point[i];
     const PetscReal push = SbDot3(p->force, p->normal);
 
     SB_CHECK_NEAR(SbDot3(p->normal, p->normal), 1, 1e-9, "length of a normal");
@@ -53,7 +53,7 @@ static PetscErrorCode sum_places(SbRun run, PetscReal t, Watch *w, PetscReal for
     for (int k = 0; k < 3; k++)
       force[p->effect][p->body[0]][p->body[1] < 0 ? BODIES : p->body[1]][k] += p->force[k];
   }
-  PetscCall(PetscFree(list.place));
+  PetscCall(PetscFree(list.point));
   PetscCallMPI(
     MPI_Allreduce(MPI_IN_PLACE, force, 2 * BODIES * (BODIES + 1) * 3, MPIU_REAL, MPI_SUM, run->model->comm));
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, n, 2, MPIU_REAL, MPI_SUM, run->model->comm));

@@ -22,7 +22,7 @@
 /* Two scenes: the second one is the first on other meshes. */
 typedef struct {
   TestScene a, b;
-  SbMade made[2];
+  SbRemeshOutcome outcome[2];
 } Pair;
 
 static void linear(const PetscReal x[3], PetscReal u[3])
@@ -44,34 +44,34 @@ static PetscErrorCode make_second(Pair *p, SbMesher mesher)
 {
   const SbRemeshing how = {.mesher = mesher, .size = 1., .quality = 1e-3};
   const PetscBool due[2] = {PETSC_TRUE, PETSC_FALSE};
-  SbRemade remade;
+  SbRemeshResult result;
   SbGathered g;
   PetscMPIInt rank;
 
   PetscFunctionBeginUser;
   PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
   PetscCall(SbGather(p->a.run, &g));
-  PetscCall(SbRemadeCreate(2, &remade));
-  if (!rank) PetscCall(SbRemeshBodies(p->a.model, &g, due, 1, &how, &remade));
-  PetscCall(PetscArraycpy(p->made, remade.made, 2));
-  remade.next.nfield = g.nfield;
-  remade.next.width = g.width;
-  PetscCallMPI(MPI_Bcast(p->made, (int)sizeof(p->made), MPI_BYTE, 0, PETSC_COMM_WORLD));
+  PetscCall(SbRemeshResultCreate(2, &result));
+  if (!rank) PetscCall(SbRemeshBodies(p->a.model, &g, due, 1, &how, &result));
+  PetscCall(PetscArraycpy(p->outcome, result.outcome, 2));
+  result.next.nfield = g.nfield;
+  result.next.width = g.width;
+  PetscCallMPI(MPI_Bcast(p->outcome, (int)sizeof(p->outcome), MPI_BYTE, 0, PETSC_COMM_WORLD));
   PetscCall(SbSceneCreate(PETSC_COMM_WORLD, &p->b.model));
   PetscCall(SbRunCreate(p->b.model, &p->b.run));
   for (int b = 0; b < 2; b++) {
-    if (rank) PetscCall(SbMemoryMeshCreate(0, 0, 0, &remade.in_memory[b]));
-    if (rank && b == 0) remade.in_memory[b]->mass = g.mass[0];
-    p->b.model->body[b].in_memory = remade.in_memory[b];
-    remade.in_memory[b] = NULL;
+    if (rank) PetscCall(SbMemoryMeshCreate(0, 0, 0, &result.in_memory[b]));
+    if (rank && b == 0) result.in_memory[b]->mass = g.mass[0];
+    p->b.model->body[b].in_memory = result.in_memory[b];
+    result.in_memory[b] = NULL;
   }
   PetscCall(SbModelSetUp(p->b.model));
   PetscCall(SbMeshValidate(p->b.model->mesh));
   PetscCall(SbSpaceValidate(p->b.model->space));
   PetscCall(SbRunSetUp(p->b.run));
-  PetscCall(SbScatter(&remade.next, p->b.run));
+  PetscCall(SbScatter(&result.next, p->b.run));
   PetscCall(SbGatheredDestroy(&g));
-  PetscCall(SbRemadeDestroy(&remade));
+  PetscCall(SbRemeshResultDestroy(&result));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -117,7 +117,7 @@ static PetscErrorCode check_linear(const char *element)
   PetscCall(test_fill(p.a.model, curved, p.a.run->V));
   PetscCall(test_fill(p.a.model, linear, p.a.run->A));
   PetscCall(make_second(&p, fixture_cone));
-  SB_CHECK(!p.made[0].message[0], "%s: %s", element, p.made[0].message);
+  SB_CHECK(!p.outcome[0].message[0], "%s: %s", element, p.outcome[0].message);
   SB_CHECK(p.b.model->body[0].ncell == 80 && p.a.model->body[0].ncell == 96, "%s: %d tets, then %d", element,
            (int)p.a.model->body[0].ncell, (int)p.b.model->body[0].ncell);
   PetscCall(difference(p.b.model, linear, p.b.run->U, &worst));
@@ -238,7 +238,7 @@ static PetscErrorCode energy_change(int n, PetscReal *part)
   PetscCall(test_scene_open(text, &p.a));
   PetscCall(test_fill(p.a.model, curved, p.a.run->U));
   PetscCall(make_second(&p, SbMesherDefault));
-  SB_CHECK(!p.made[0].message[0], "%d cells: %s", n, p.made[0].message);
+  SB_CHECK(!p.outcome[0].message[0], "%d cells: %s", n, p.outcome[0].message);
   PetscCall(SbModelEnergies(p.a.model, p.a.run->U, p.a.run->V, &e[0]));
   PetscCall(SbModelEnergies(p.b.model, p.b.run->U, p.b.run->V, &e[1]));
   *part = PetscAbsReal(e[1].strain - e[0].strain) / e[0].strain;

@@ -89,38 +89,38 @@ static PetscErrorCode put_in_order(SbEffect e, PetscBool collision, Records *all
 }
 
 /* The second scene is the first one with body a remeshed by the program's own mesher. */
-static PetscErrorCode hand_over(TestScene *a, TestScene *b, SbRemade *remade)
+static PetscErrorCode hand_over(TestScene *a, TestScene *b, SbRemeshResult *result)
 {
   const SbRemeshing how = {.mesher = SbMesherDefault, .size = 1., .quality = 1e-3};
   const PetscBool due[2] = {PETSC_TRUE, PETSC_FALSE};
-  SbRenamed *renamed = &remade->renamed;
+  SbRenamed *renamed = &result->renamed;
   SbGathered g;
   PetscMPIInt rank;
 
   PetscFunctionBeginUser;
   PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
   PetscCall(SbGather(a->run, &g));
-  PetscCall(SbRemadeCreate(a->model->nbody, remade));
-  if (!rank) PetscCall(SbRemeshBodies(a->model, &g, due, 1, &how, remade));
-  if (!rank) SB_CHECK(remade->done[0], "%s", remade->made[0].message);
+  PetscCall(SbRemeshResultCreate(a->model->nbody, result));
+  if (!rank) PetscCall(SbRemeshBodies(a->model, &g, due, 1, &how, result));
+  if (!rank) SB_CHECK(result->done[0], "%s", result->outcome[0].message);
   PetscCallMPI(MPI_Bcast(&renamed->n, 1, MPIU_INT, 0, PETSC_COMM_WORLD));
   if (rank) PetscCall(PetscMalloc2(renamed->n, &renamed->from, renamed->n, &renamed->to));
   PetscCallMPI(MPI_Bcast(renamed->from, (PetscMPIInt)renamed->n, MPIU_INT, 0, PETSC_COMM_WORLD));
   PetscCallMPI(MPI_Bcast(renamed->to, (PetscMPIInt)renamed->n, MPIU_INT, 0, PETSC_COMM_WORLD));
-  remade->next.nfield = g.nfield;
-  remade->next.width = g.width;
+  result->next.nfield = g.nfield;
+  result->next.width = g.width;
   PetscCall(SbSceneCreate(PETSC_COMM_WORLD, &b->model));
   PetscCall(SbRunCreate(b->model, &b->run));
   for (PetscInt k = 0; k < a->model->nbody; k++) {
-    if (rank) PetscCall(SbMemoryMeshCreate(0, 0, 0, &remade->in_memory[k]));
-    if (rank && !k) remade->in_memory[0]->mass = g.mass[0];
-    b->model->body[k].in_memory = remade->in_memory[k];
-    remade->in_memory[k] = NULL;
+    if (rank) PetscCall(SbMemoryMeshCreate(0, 0, 0, &result->in_memory[k]));
+    if (rank && !k) result->in_memory[0]->mass = g.mass[0];
+    b->model->body[k].in_memory = result->in_memory[k];
+    result->in_memory[k] = NULL;
   }
   PetscCall(SbModelSetUp(b->model));
   PetscCall(SbRunSetUp(b->run));
   PetscCall(SbRunContinue(a->run, b->run));
-  PetscCall(SbScatter(&remade->next, b->run));
+  PetscCall(SbScatter(&result->next, b->run));
   PetscCall(SbEffectsHandOver(a->run, b->run, renamed));
   PetscCall(SbGatheredDestroy(&g));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -130,7 +130,7 @@ static PetscErrorCode hand_over(TestScene *a, TestScene *b, SbRemade *remade)
 static PetscErrorCode check_touch(const char *scene, PetscBool collision)
 {
   TestScene a, b = {NULL, NULL, NULL, NULL};
-  SbRemade remade;
+  SbRemeshResult result;
   Records before, after;
   PetscReal worst = 0., scale = 0.;
   PetscInt last, named;
@@ -141,12 +141,12 @@ static PetscErrorCode check_touch(const char *scene, PetscBool collision)
   PetscCall(test_scene_solve(&a));
   last = a.model->neffect - 1;
   e = a.model->effect[last];
-  PetscCall(hand_over(&a, &b, &remade));
+  PetscCall(hand_over(&a, &b, &result));
   PetscCall(gather(e, a.model->space, &before));
   PetscCall(put_in_order(e, collision, &before));
   named = before.n;
   PetscCall(
-    (*e->ops.rename)(e, remade.renamed.n, remade.renamed.from, remade.renamed.to, &before.n, before.r));
+    (*e->ops.rename)(e, result.renamed.n, result.renamed.from, result.renamed.to, &before.n, before.r));
   PetscCall(put_in_order(e, collision, &before));
   PetscCall(gather(b.model->effect[last], b.model->space, &after));
   PetscCall(put_in_order(e, collision, &after));
@@ -162,7 +162,7 @@ static PetscErrorCode check_touch(const char *scene, PetscBool collision)
            (double)worst, (double)scale);
   PetscCall(PetscFree(before.r));
   PetscCall(PetscFree(after.r));
-  PetscCall(SbRemadeDestroy(&remade));
+  PetscCall(SbRemeshResultDestroy(&result));
   PetscCall(test_scene_close(&a));
   PetscCall(test_scene_close(&b));
   PetscFunctionReturn(PETSC_SUCCESS);
