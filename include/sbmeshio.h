@@ -159,6 +159,8 @@ PetscErrorCode SbImportSlab(const SbBody *body, PetscInt k, PetscInt n, SbImport
 const char *SbImportOption(const SbImport *import, const char *key, char name[SB_OPTION_NAME_MAX]);
 /* A .msh of any version, by the program's own reader or by the gmsh library. */
 PetscErrorCode SbImportRead_Msh(const char *path, SbImport *body);
+/* TetGen's files; path: one of them, or what they have in common. */
+PetscErrorCode SbImportRead_TetGen(const char *path, SbImport *body);
 /* Room for n vertices. */
 PetscErrorCode SbImportSetVertices(SbImport *import, PetscInt n);
 /* Appends a simplex; vert[dim + 1]. */

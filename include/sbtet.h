@@ -32,6 +32,8 @@ PetscInt SbFacesFind(const SbFaces *faces, const PetscInt vert[3], PetscInt slot
 
 /* ------------------------------------------------------------------ check.c, quality.c */
 
+/* Leaves out vertices that no tet uses, and items with such a one; counts them in nunused and nlost. */
+PetscErrorCode SbImportDropUnused(SbImport *import);
 /* Drops unused vertices, turns cells, refuses what would make the physics wrong; builds the faces. */
 PetscErrorCode SbImportCheck(SbImport *import, SbFaces *faces);
 /* How many tets have a dihedral angle below this, and the smallest of all, degrees. */

@@ -36,7 +36,7 @@ static PetscErrorCode renumber_items(SbItems *item, int dim, const PetscInt map[
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode drop_unused(SbImport *im)
+PetscErrorCode SbImportDropUnused(SbImport *im)
 {
   PetscInt *map, nused = 0, ndropped;
 
@@ -227,7 +227,7 @@ PetscErrorCode SbImportCheck(SbImport *im, SbFaces *faces)
   PetscInt slots[2];
 
   PetscFunctionBeginUser;
-  PetscCall(drop_unused(im));
+  PetscCall(SbImportDropUnused(im));
   PetscCall(SbImportOrient(im, SbImportLargest(im)));
   PetscCall(SbFacesCreate(im->nvert, im->item[3].n, im->item[3].vert, faces));
   PetscCall(SbImportCheckFaces(im, faces));

@@ -21,8 +21,6 @@ PetscErrorCode SbScanInt8(SbScan *scan, const char *what, int64_t *value);
 typedef PetscErrorCode (*SbReader)(const char *text, SbImport *body);
 PetscErrorCode SbImportRead_Gmsh(const char *path, SbImport *body);
 PetscErrorCode SbImportRead_Nastran(const char *path, SbImport *body);
-PetscErrorCode SbImportRead_TetGen(const char *path,
-                                   SbImport *body); /* one of the files, or what they have in common */
 PetscErrorCode SbImportRead_Netgen(const char *path, SbImport *body); /* .vol */
 PetscErrorCode SbImportRead_NetgenNeutral(const char *path, SbImport *body);
 PetscErrorCode SbImportRead_Medit(const char *path, SbImport *body);

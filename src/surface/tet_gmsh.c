@@ -7,6 +7,7 @@
   within its entities. The tets are made by its Delaunay method and improved by its own optimisers, and by Netgen's where it has it.
 */
 #include "sbgmsh.h"
+#include "sbtet.h"
 #include "tet_backends.h"
 
 enum { TRIANGLE = 2, TET = 4 }; /* gmsh's numbers of element types */
@@ -144,7 +145,7 @@ static PetscErrorCode set_sizes(const SbGmsh *g, const SbTetJob *job)
 
 /* ------------------------------------------------------------------ out of the model */
 
-/* Items of one entity; their corners are tags of nodes as yet. */
+/* Items of one entity; their corners are tags of nodes, from 0. */
 static PetscErrorCode take_items(const SbGmsh *g, int dim, int entity, PetscInt tags, SbImport *im)
 {
   size_t *tag, ntag, *node, nnode;
@@ -154,7 +155,7 @@ static PetscErrorCode take_items(const SbGmsh *g, int dim, int entity, PetscInt 
   for (size_t i = 0; i < ntag; i++) {
     PetscInt vert[4] = {0, 0, 0, 0};
 
-    for (int k = 0; k <= dim; k++) vert[k] = (PetscInt)node[i * (size_t)(dim + 1) + (size_t)k];
+    for (int k = 0; k <= dim; k++) vert[k] = (PetscInt)node[i * (size_t)(dim + 1) + (size_t)k] - 1;
     PetscCall(SbImportAddItem(im, dim, vert, tags, (int64_t)i + 1));
   }
   g->Free(tag);
@@ -163,32 +164,18 @@ static PetscErrorCode take_items(const SbGmsh *g, int dim, int entity, PetscInt 
 }
 
 /* Vertices in the order of their tags, so that those of a kept surface are the first ones; left out: the old surface's. */
-static PetscErrorCode take_nodes(const SbGmsh *g, PetscInt nkept, SbImport *im)
+static PetscErrorCode take_nodes(const SbGmsh *g, SbImport *im)
 {
   size_t *tag, ntag, nx, nparameter, most = 0;
   double *x, *parameter;
-  PetscInt *map, n = 0;
 
   PetscFunctionBeginUser;
   SB_GMSH(g, ModelMeshGetNodes, &tag, &ntag, &x, &nx, &parameter, &nparameter, -1, -1, 0, 0);
   for (size_t i = 0; i < ntag; i++) most = PetscMax(most, tag[i]);
   PetscCheck(most < PETSC_MAX_INT / 8, PETSC_COMM_SELF, PETSC_ERR_FILE_UNEXPECTED, "too many nodes");
-  PetscCall(PetscCalloc1(most + 1, &map));
-  for (PetscInt v = 1; v <= nkept; v++) map[v] = 1;
-  for (int d = 2; d < 4; d++) {
-    for (PetscInt i = 0; i < (d + 1) * im->item[d].n; i++) map[im->item[d].vert[i]] = 1;
-  }
-  for (size_t v = 0; v <= most; v++) map[v] = map[v] ? ++n : 0;
-  PetscCall(SbImportSetVertices(im, n));
-  for (size_t i = 0; i < ntag; i++) {
-    const PetscInt v = map[tag[i]] - 1;
-
-    if (v >= 0) PetscCall(PetscArraycpy(im->x + 3 * v, x + 3 * i, 3));
-  }
-  for (int d = 2; d < 4; d++) {
-    for (PetscInt i = 0; i < (d + 1) * im->item[d].n; i++) im->item[d].vert[i] = map[im->item[d].vert[i]] - 1;
-  }
-  PetscCall(PetscFree(map));
+  PetscCall(SbImportSetVertices(im, (PetscInt)most));
+  for (size_t i = 0; i < ntag; i++) PetscCall(PetscArraycpy(im->x + 3 * (tag[i] - 1), x + 3 * i, 3));
+  PetscCall(SbImportDropUnused(im));
   g->Free(tag);
   g->Free(x);
   g->Free(parameter);
@@ -220,7 +207,7 @@ static PetscErrorCode work(const SbGmsh *g, void *ctx, SbImport *im)
   for (PetscInt r = 0; r < s->nregion; r++) PetscCall(take_items(g, 3, (int)r + 1, r, im));
   PetscCheck(im->item[3].n, PETSC_COMM_SELF, PETSC_ERR_FILE_UNEXPECTED, "no tets were made");
   for (PetscInt k = 0; k < m.npiece; k++) PetscCall(take_items(g, 2, m.piece[k].tag, 0, im));
-  PetscCall(take_nodes(g, m.job->remesh ? 0 : s->nvert, im));
+  PetscCall(take_nodes(g, im));
   PetscCall(PetscFree(m.piece));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

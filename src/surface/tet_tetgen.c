@@ -1,8 +1,8 @@
 /*
   tet_tetgen.c - tets by the program tetgen (Hang Si 2015), called as a process in a folder of its own that is removed afterwards.
 
-  Every triangle of the surface is a facet with its number as marker. The program gives back tets and facets; the regions are found here: a
-  tet at a facet lies in the region on that side of its triangle, and the others follow from tet to tet without crossing a facet. What
+  Every triangle of the surface is a facet with its number as marker. The program gives back facets, and tets with a number for each part of space
+  that facets bound (-A). Which region that is follows from the tets at facets: they lie in the region on that side of its triangle. What
   lies in no region, a cavity, is left out. So neither points in holes nor points in regions are needed.
 
   Kept, the surface stays as it is (-Y). Else tetgen may split its triangles, where the size asks for it; it cannot make it coarser.
@@ -24,7 +24,7 @@
 #include "sbtet.h"
 #include "tet_backends.h"
 
-#define UNKNOWN (-2) /* region of a tet that is not found yet */
+#define UNKNOWN (-2) /* region of a part of space that is not found yet */
 #define PATH_LENGTH (PETSC_MAX_PATH_LEN + 300)
 
 /* ------------------------------------------------------------------ the folder */
@@ -137,79 +137,13 @@ static PetscErrorCode run_tetgen(const char *folder, const char *flags, const Sb
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* ------------------------------------------------------------------ what it wrote */
-
-/* Calls take() with each line of numbers of a file of tetgen: a count, then the number of the item and its values. */
-static PetscErrorCode read_items(const char *folder, const char *name, int n,
-                                 PetscErrorCode (*take)(SbScan *, SbImport *), SbImport *im)
-{
-  char path[PATH_LENGTH];
-  SbScan scan;
-  int64_t count, number;
-  PetscErrorCode ierr;
-
-  PetscFunctionBeginUser;
-  (void)snprintf(path, sizeof(path), "%s/%s", folder, name);
-  ierr = SbScanOpen(name, path, &scan);
-  if (!ierr) ierr = SbScanText(&scan, "count", &count);
-  if (!ierr) ierr = SbScanRoom(&scan, "items", count, 2 * n, 1);
-  if (!ierr) ierr = SbScanEndOfLine(&scan);
-  if (!ierr && n == 3) ierr = SbImportSetVertices(im, (PetscInt)count);
-  if (!ierr && n == 3) im->nvert = 0;
-  for (int64_t i = 0; !ierr && i < count; i++) {
-    ierr = SbScanText(&scan, "number of an item", &number);
-    if (!ierr) ierr = (*take)(&scan, im);
-    if (!ierr) ierr = SbScanEndOfLine(&scan);
-  }
-  PetscCall(SbScanClose(&scan));
-  PetscFunctionReturn(ierr);
-}
-
-static PetscErrorCode take_vertex(SbScan *s, SbImport *im)
-{
-  PetscFunctionBeginUser;
-  for (int k = 0; k < 3; k++) PetscCall(SbScanReal(s, "coordinate", 0, &im->x[3 * im->nvert + k]));
-  im->nvert++;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode take_corners(SbScan *s, int n, const SbImport *im, PetscInt vert[])
-{
-  int64_t v;
-
-  PetscFunctionBeginUser;
-  for (int k = 0; k < n; k++) {
-    PetscCall(SbScanText(s, "corner", &v));
-    if (v < 1 || v > im->nvert) SB_SCAN_ERROR(s, "vertex %lld is not there", (long long)v);
-    vert[k] = (PetscInt)v - 1;
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode take_tet(SbScan *s, SbImport *im)
-{
-  PetscInt vert[4];
-
-  PetscFunctionBeginUser;
-  PetscCall(take_corners(s, 4, im, vert));
-  PetscCall(SbImportAddItem(im, 3, vert, UNKNOWN, im->item[3].n + 1));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* The marker is the number of the triangle that the facet lies on. */
-static PetscErrorCode take_facet(SbScan *s, SbImport *im)
-{
-  PetscInt vert[3];
-  int64_t marker;
-
-  PetscFunctionBeginUser;
-  PetscCall(take_corners(s, 3, im, vert));
-  PetscCall(SbScanText(s, "marker of a facet", &marker));
-  PetscCall(SbImportAddItem(im, 2, vert, (PetscInt)marker - 1, marker));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* ------------------------------------------------------------------ regions */
+
+/* The number behind a tag set of TetGen's files: the marker of a facet, the attribute of a tet. */
+static PetscInt mark_of(const SbImport *im, PetscInt tags)
+{
+  return (PetscInt)im->group[im->tags_group[im->tags_start[tags]]].tag;
+}
 
 /* Whether the point lies in front of a triangle of the surface (0) or behind it (1). */
 static int side_of(const SbSurface *s, PetscInt f, const PetscReal x[3])
@@ -225,101 +159,55 @@ static int side_of(const SbSurface *s, PetscInt f, const PetscReal x[3])
   return SbDot3(n, w) < 0;
 }
 
-/* Tets at facets; blocked[slot]: a facet is there. */
-static PetscErrorCode seed_regions(const SbSurface *s, const SbFaces *faces, SbImport *im,
-                                   PetscBool blocked[])
+/* The region of each tag set of tets, from the tets at facets; facets get the number of their triangle as tags. */
+static PetscErrorCode match_regions(const SbSurface *s, const SbFaces *faces, SbImport *im, PetscInt region[])
 {
-  const SbItems *tri = &im->item[2];
+  SbItems *tri = &im->item[2];
 
   PetscFunctionBeginUser;
+  for (PetscInt t = 0; t < im->ntags; t++) region[t] = UNKNOWN;
   for (PetscInt i = 0; i < tri->n; i++) {
-    const PetscInt f = tri->tags[i];
+    const PetscInt f = mark_of(im, tri->tags[i]) - 1;
     PetscInt slots[2];
     const PetscInt n = SbFacesFind(faces, tri->vert + 3 * i, slots);
 
     PetscCheck(f >= 0 && f < s->ntri, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
                "facet %" PetscInt_FMT " lies on no triangle of the surface", i + 1);
+    tri->tags[i] = f;
     for (PetscInt k = 0; k < n; k++) {
-      const PetscInt tet = slots[k] / 4, opposite = im->item[3].vert[slots[k]];
-      const PetscInt region = s->side[2 * f + side_of(s, f, im->x + 3 * opposite)];
+      PetscInt *known = &region[im->item[3].tags[slots[k] / 4]];
+      const PetscInt side = s->side[2 * f + side_of(s, f, im->x + 3 * im->item[3].vert[slots[k]])];
 
-      blocked[slots[k]] = PETSC_TRUE;
-      PetscCheck(im->item[3].tags[tet] == UNKNOWN || im->item[3].tags[tet] == region, PETSC_COMM_SELF,
-                 PETSC_ERR_USER_INPUT, "a tet lies in two regions");
-      im->item[3].tags[tet] = region;
+      PetscCheck(*known == UNKNOWN || *known == side, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
+                 "a part between facets lies in two regions");
+      *known = side;
     }
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode spread_regions(const SbFaces *faces, const PetscBool blocked[], SbItems *tet)
-{
-  PetscInt *stack, n = 0;
-
-  PetscFunctionBeginUser;
-  PetscCall(PetscMalloc1(tet->n, &stack));
-  for (PetscInt c = 0; c < tet->n; c++) {
-    if (tet->tags[c] != UNKNOWN) stack[n++] = c;
-  }
-  while (n) {
-    const PetscInt c = stack[--n];
-
-    for (PetscInt k = 4 * c; k < 4 * c + 4; k++) {
-      const PetscInt d = faces->neighbour[k];
-
-      if (d < 0 || blocked[k] || tet->tags[d] != UNKNOWN) continue;
-      tet->tags[d] = tet->tags[c];
-      stack[n++] = d;
-    }
-  }
-  PetscCall(PetscFree(stack));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Leaves out tets of no region, and vertices that only they used. */
-static PetscErrorCode drop_cavities(PetscInt nkept, SbImport *im)
-{
-  SbItems *tet = &im->item[3];
-  PetscInt *map, n = 0;
-
-  PetscFunctionBeginUser;
-  for (PetscInt c = 0; c < tet->n; c++) {
-    if (tet->tags[c] < 0) continue;
-    PetscCall(PetscArraymove(tet->vert + 4 * n, tet->vert + 4 * c, 4));
-    tet->tags[n++] = tet->tags[c];
-  }
-  tet->n = n;
-  n = 0;
-  PetscCall(PetscCalloc1(im->nvert, &map));
-  for (PetscInt i = 0; i < 4 * tet->n; i++) map[tet->vert[i]] = 1;
-  for (PetscInt i = 0; i < 3 * im->item[2].n; i++) map[im->item[2].vert[i]] = 1;
-  for (PetscInt v = 0; v < im->nvert; v++) {
-    if (!map[v] && v >= nkept) continue;
-    PetscCall(PetscArraymove(im->x + 3 * n, im->x + 3 * v, 3));
-    map[v] = n++;
-  }
-  im->nvert = n;
-  for (PetscInt i = 0; i < 4 * tet->n; i++) tet->vert[i] = map[tet->vert[i]];
-  for (PetscInt i = 0; i < 3 * im->item[2].n; i++) im->item[2].vert[i] = map[im->item[2].vert[i]];
-  PetscCall(PetscFree(map));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
+/* Tets get the number of their region as tags; those of no region, a cavity, are left out. */
 static PetscErrorCode find_regions(const SbTetJob *job, SbImport *im)
 {
+  SbItems *tet = &im->item[3];
   SbFaces faces;
-  PetscBool *blocked;
+  PetscInt *region, n = 0;
   PetscErrorCode ierr;
 
   PetscFunctionBeginUser;
-  PetscCall(SbFacesCreate(im->nvert, im->item[3].n, im->item[3].vert, &faces));
-  PetscCall(PetscCalloc1(4 * (size_t)im->item[3].n, &blocked));
-  ierr = seed_regions(job->surface, &faces, im, blocked);
-  if (!ierr) ierr = spread_regions(&faces, blocked, &im->item[3]);
-  PetscCall(PetscFree(blocked));
+  PetscCall(SbFacesCreate(im->nvert, tet->n, tet->vert, &faces));
+  PetscCall(PetscMalloc1(im->ntags, &region));
+  ierr = match_regions(job->surface, &faces, im, region);
+  for (PetscInt c = 0; !ierr && c < tet->n; c++) {
+    if (region[tet->tags[c]] < 0) continue;
+    PetscCall(PetscArraymove(tet->vert + 4 * n, tet->vert + 4 * c, 4));
+    tet->tags[n++] = region[tet->tags[c]];
+  }
+  tet->n = n;
+  PetscCall(PetscFree(region));
   PetscCall(SbFacesDestroy(&faces));
   PetscCall(ierr);
-  PetscCall(drop_cavities(job->remesh ? 0 : job->surface->nvert, im));
+  PetscCall(SbImportDropUnused(im));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -328,18 +216,20 @@ static PetscErrorCode find_regions(const SbTetJob *job, SbImport *im)
 static PetscErrorCode work_in(const char *folder, const SbTetJob *job, SbImport *im)
 {
   const PetscReal volume = job->size * job->size * job->size / (6 * PETSC_SQRT2);
-  char flags[96];
+  char flags[96], path[PATH_LENGTH];
   const SbSurface *s = job->surface;
+  PetscInt none;
 
   PetscFunctionBeginUser;
   PetscCall(write_surface(folder, job->surface));
   /* Tets of the wanted size have this volume on average, so some must be allowed to be larger. */
-  (void)snprintf(flags, sizeof(flags), "-p%sMQq1.4/10a%.6f", job->remesh && job->size < job->edge ? "" : "Y",
+  (void)snprintf(flags, sizeof(flags), "-p%sMQAq1.4/10a%.6f", job->remesh && job->size < job->edge ? "" : "Y",
                  (double)(1.8 * volume));
   PetscCall(run_tetgen(folder, flags, job));
-  PetscCall(read_items(folder, "s.1.node", 3, take_vertex, im));
-  PetscCall(read_items(folder, "s.1.ele", 4, take_tet, im));
-  PetscCall(read_items(folder, "s.1.face", 2, take_facet, im));
+  (void)snprintf(path, sizeof(path), "%s/s.1", folder);
+  PetscCall(SbImportTagSet(im, 0, NULL, &none));
+  PetscCall(SbImportRead_TetGen(path, im));
+  im->item[0].n = im->item[1].n = 0; /* points and edges with markers */
   // coordinates come back as text: a kept surface gets its exact ones again
   if (!job->remesh) {
     PetscCheck(im->nvert >= s->nvert, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
