@@ -56,6 +56,12 @@ static inline void SbBoxGrow(PetscReal reach, PetscReal box[6])
   }
 }
 
+/* Length of the diagonal of a box that is not empty. */
+static inline PetscReal SbBoxDiagonal(const PetscReal box[6])
+{
+  return PetscSqrtReal(PetscSqr(box[3] - box[0]) + PetscSqr(box[4] - box[1]) + PetscSqr(box[5] - box[2]));
+}
+
 /* Whether two boxes are nearer than `grown` in every coordinate. Empty ones never are. */
 static inline PetscBool SbBoxesWithin(const PetscReal a[6], const PetscReal b[6], PetscReal grown)
 {
@@ -299,6 +305,15 @@ static inline PetscInt SbUnionRoot(PetscInt up[], PetscInt v)
   return v;
 }
 
+/* Joins the trees of a and b below the lower root; false when they were one. */
+static inline PetscBool SbUnionJoin(PetscInt up[], PetscInt a, PetscInt b)
+{
+  a = SbUnionRoot(up, a);
+  b = SbUnionRoot(up, b);
+  up[PetscMax(a, b)] = PetscMin(a, b);
+  return (PetscBool)(a != b);
+}
+
 /*
   SbWeld - points that are one: those within `tolerance` of each other, m; 0: at the same place. Not collective.
 
@@ -306,6 +321,8 @@ static inline PetscInt SbUnionRoot(PetscInt up[], PetscInt v)
   another. Output: map[n], the first point of those that each point is one with.
 */
 PetscErrorCode SbWeld(PetscInt n, const PetscReal x[], PetscReal tolerance, PetscBool chains, PetscInt map[]);
+/* Leaves out points that none of used[nused] names, and renumbers these. The order stays. */
+PetscErrorCode SbDropUnusedPoints(PetscInt *n, PetscReal x[], PetscInt nused, PetscInt used[]);
 
 /* Six times the signed volume of a tet, m^3. */
 PetscReal SbTetDeterminant(const PetscReal x[], const PetscInt vert[4]);

@@ -1,5 +1,5 @@
 /*
-  weld.c - points that are one: those within a tolerance of each other.
+  weld.c - points that are one: those within a tolerance of each other; points that nothing uses.
 */
 #include "sbgeometry.h"
 
@@ -26,16 +26,32 @@ PetscErrorCode SbWeld(PetscInt n, const PetscReal x[], PetscReal tolerance, Pets
       const PetscReal r[3] = {box[v][0] - box[w][0], box[v][1] - box[w][1], box[v][2] - box[w][2]};
 
       if (w >= v || SbDot3(r, r) > tolerance * tolerance) continue;
-      if (chains) {
-        const PetscInt a = SbUnionRoot(map, v), b = SbUnionRoot(map, w);
-
-        map[PetscMax(a, b)] = PetscMin(a, b);
-      } else if (map[w] == w)
+      if (chains)
+        (void)SbUnionJoin(map, v, w);
+      else if (map[w] == w)
         map[v] = PetscMin(map[v], w);
     }
   }
   for (PetscInt v = 0; v < n; v++) map[v] = SbUnionRoot(map, v);
   PetscCall(SbBoxTreeDestroy(&tree));
   PetscCall(PetscFree(box));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbDropUnusedPoints(PetscInt *n, PetscReal x[], PetscInt nused, PetscInt used[])
+{
+  PetscInt *map, kept = 0;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscCalloc1(*n, &map));
+  for (PetscInt i = 0; i < nused; i++) map[used[i]] = 1;
+  for (PetscInt v = 0; v < *n; v++) {
+    if (!map[v]) continue;
+    PetscCall(PetscArraymove(x + 3 * kept, x + 3 * v, 3));
+    map[v] = kept++;
+  }
+  *n = kept;
+  for (PetscInt i = 0; i < nused; i++) used[i] = map[used[i]];
+  PetscCall(PetscFree(map));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -83,18 +83,9 @@ void SbImportJoin(const SbImport *im, PetscInt parent[], PetscInt *npart)
   for (PetscInt v = 0; v < im->nvert; v++) parent[v] = v;
   *npart = im->nvert;
   for (PetscInt c = 0; c < im->item[3].n; c++) {
-    PetscInt root = im->item[3].vert[4 * c];
+    const PetscInt *v = im->item[3].vert + 4 * c;
 
-    for (; parent[root] != root; root = parent[root]) parent[root] = parent[parent[root]];
-    for (int i = 1; i < 4; i++) {
-      PetscInt other = im->item[3].vert[4 * c + i];
-
-      for (; parent[other] != other; other = parent[other]) parent[other] = parent[parent[other]];
-      if (other == root) continue;
-      parent[PetscMax(root, other)] = PetscMin(root, other);
-      root = PetscMin(root, other);
-      (*npart)--;
-    }
+    for (int i = 1; i < 4; i++) *npart -= SbUnionJoin(parent, v[0], v[i]);
   }
   /* a parent is lower than its child */
   for (PetscInt v = 0; v < im->nvert; v++) parent[v] = parent[parent[v]];

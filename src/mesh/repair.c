@@ -15,16 +15,16 @@
 /* Lets items use the first of the vertices that lie together. Those left over are unused from then on. */
 static PetscErrorCode weld(SbImport *im, PetscReal tolerance, SbRepair *done)
 {
-  PetscReal box[6], diagonal2 = 0;
+  PetscReal box[6], diagonal;
   PetscInt *map;
 
   PetscFunctionBeginUser;
   if (!im->nvert) PetscFunctionReturn(PETSC_SUCCESS);
   SbBoxClear(box);
   for (PetscInt v = 0; v < im->nvert; v++) SbBoxAdd(box, im->x + 3 * v);
-  for (int k = 0; k < 3; k++) diagonal2 += PetscSqr(box[3 + k] - box[k]);
-  done->merge_tolerance = tolerance < 0 ? 1e-9 * PetscSqrtReal(diagonal2) : tolerance;
-  if (done->merge_tolerance == 0 || !(diagonal2 > 0)) PetscFunctionReturn(PETSC_SUCCESS);
+  diagonal = SbBoxDiagonal(box);
+  done->merge_tolerance = tolerance < 0 ? 1e-9 * diagonal : tolerance;
+  if (done->merge_tolerance == 0 || !(diagonal > 0)) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscMalloc1(im->nvert, &map));
   PetscCall(SbWeld(im->nvert, im->x, done->merge_tolerance, PETSC_FALSE, map));
   for (PetscInt v = 0; v < im->nvert; v++) done->nwelded += map[v] != v;

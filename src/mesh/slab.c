@@ -343,15 +343,7 @@ static PetscErrorCode join_parts(const Slab *s, PetscInt N, PetscInt npair, cons
   *npart = N;
   PetscCall(PetscMalloc1(s->rank ? 0 : N, &parent));
   for (PetscInt p = 0; p < N && !s->rank; p++) parent[p] = p;
-  for (PetscInt i = 0; i < route.nrecv; i++) {
-    PetscInt a = got[2 * i], b = got[2 * i + 1];
-
-    for (; parent[a] != a; a = parent[a]) parent[a] = parent[parent[a]];
-    for (; parent[b] != b; b = parent[b]) parent[b] = parent[parent[b]];
-    if (a == b) continue;
-    parent[PetscMax(a, b)] = PetscMin(a, b);
-    (*npart)--;
-  }
+  for (PetscInt i = 0; i < route.nrecv; i++) *npart -= SbUnionJoin(parent, got[2 * i], got[2 * i + 1]);
   PetscCall(PetscFree(parent));
   PetscCall(PetscFree(got));
   PetscCall(SbRouteDestroy(&route));

@@ -150,7 +150,7 @@ PetscErrorCode SbSurfaceMergeVertices(SbTriangleFile *f, PetscReal tolerance, Sb
   PetscCall(keep_triangles(f, keep));
   PetscCall(drop_doubled(f, keep, m));
   PetscCall(PetscFree2(first, keep));
-  PetscCall(SbTrianglesDropUnused(t));
+  PetscCall(SbDropUnusedPoints(&t->nvert, t->x, 3 * t->ntri, t->tri));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

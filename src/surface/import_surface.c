@@ -131,22 +131,18 @@ static PetscErrorCode weld_tolerance(const SbTriangleFile *f, PetscReal given, P
                                      PetscReal *edge)
 {
   const SbTriangles *t = f->t;
-  PetscReal lo[3], hi[3], around, longest2, sum = 0, d2 = 0;
+  PetscReal box[6], around, longest2, sum = 0;
   char option[SB_OPTION_NAME_MAX];
 
   PetscFunctionBeginUser;
-  for (int k = 0; k < 3; k++) lo[k] = hi[k] = t->x[k];
-  for (PetscInt i = 0; i < 3 * t->nvert; i++) {
-    lo[i % 3] = PetscMin(lo[i % 3], t->x[i]);
-    hi[i % 3] = PetscMax(hi[i % 3], t->x[i]);
-  }
-  for (int k = 0; k < 3; k++) d2 += (hi[k] - lo[k]) * (hi[k] - lo[k]);
+  SbBoxClear(box);
+  for (PetscInt v = 0; v < t->nvert; v++) SbBoxAdd(box, t->x + 3 * v);
   for (PetscInt i = 0; i < t->ntri; i++) {
     (void)SbTriangleMeasure(t, i, &longest2, &around);
     sum += around / (3 * (PetscReal)t->ntri);
   }
   *edge = sum;
-  *tolerance = given >= 0 ? given : WELD * PetscSqrtReal(d2);
+  *tolerance = given >= 0 ? given : WELD * SbBoxDiagonal(box);
   PetscCheck(
     given < 0.5 * sum, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
     "%s: %s %g m would join corners of one triangle: the mean edge is %.3g m; give less than half of it",
@@ -167,7 +163,7 @@ static PetscErrorCode make_surface(const char *path, const SbImport *im, SbTrian
   PetscCheck(f->t->ntri, PETSC_COMM_SELF, PETSC_ERR_FILE_UNEXPECTED,
              "%s: holds no triangles; give a closed surface of triangles, or a mesh of tetrahedra", f->where);
   PetscCall(scale_file(im->scale, f));
-  PetscCall(SbTrianglesDropUnused(f->t));
+  PetscCall(SbDropUnusedPoints(&f->t->nvert, f->t->x, 3 * f->t->ntri, f->t->tri));
   PetscCall(weld_tolerance(f, im->tet.merge_tolerance, &tolerance, &edge));
   PetscCall(SbSurfaceMergeVertices(f, tolerance, &repairs));
   PetscCheck(f->t->ntri, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
@@ -204,7 +200,7 @@ static PetscErrorCode take_boundary(const SbTriangleFile *f, const SbSurface *s,
     for (int k = 0; k < 3; k++) v[k] = s->tri[3 * i + (front ? 2 - k : k)];
     f->number[t->ntri++] = s->number[i];
   }
-  PetscCall(SbTrianglesDropUnused(t));
+  PetscCall(SbDropUnusedPoints(&t->nvert, t->x, 3 * t->ntri, t->tri));
   for (PetscInt i = 0; i < t->ntri; i++) {
     t->volume += SbTetVolumeTo(t, i, t->x);
     (void)SbTriangleMeasure(t, i, &longest2, &around);

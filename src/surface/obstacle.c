@@ -17,7 +17,7 @@ static PetscErrorCode read_file(const char *path, PetscReal scale, const PetscRe
   PetscCall((*read)(path, f));
   PetscCheck(t->ntri, PETSC_COMM_SELF, PETSC_ERR_FILE_UNEXPECTED,
              "%s: holds no triangles; give a closed surface of triangles, or a mesh of tetrahedra", f->where);
-  PetscCall(SbTrianglesDropUnused(t));
+  PetscCall(SbDropUnusedPoints(&t->nvert, t->x, 3 * t->ntri, t->tri));
   for (PetscInt i = 0; i < 3 * t->nvert; i++) {
     t->x[i] = scale * t->x[i] + at[i % 3];
     PetscCheck(isfinite(t->x[i]), PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,

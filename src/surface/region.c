@@ -47,13 +47,6 @@ typedef struct {
   Surface *surfaces;
 } Space;
 
-static void join(PetscInt up[], PetscInt a, PetscInt b)
-{
-  a = SbUnionRoot(up, a);
-  b = SbUnionRoot(up, b);
-  up[PetscMax(a, b)] = PetscMin(a, b);
-}
-
 /* Numbers heaps in the order of their first members, in place. */
 static PetscInt number_heaps(PetscInt n, PetscInt up[])
 {
@@ -215,7 +208,8 @@ static PetscErrorCode join_at_edge(const SbTriangles *t, PetscInt n, const SbTri
   else
     for (PetscInt i = 0; i < n; i++) spoke[i].slot = edge[i].slot;
   for (PetscInt i = 0; i < n; i++)
-    join(up, facing(t, spoke[i].slot, p, PETSC_TRUE), facing(t, spoke[(i + 1) % n].slot, p, PETSC_FALSE));
+    (void)SbUnionJoin(up, facing(t, spoke[i].slot, p, PETSC_TRUE),
+                      facing(t, spoke[(i + 1) % n].slot, p, PETSC_FALSE));
   if (n > 8) PetscCall(PetscFree(spoke));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -230,7 +224,8 @@ static PetscErrorCode find_shells(Space *s)
   for (PetscInt i = 0, m; i < n; i += m) {
     m = SbTrianglesAtEdge(n, s->edge, i);
     PetscCall(join_at_edge(s->t, m, s->edge + i, s->shell));
-    for (PetscInt k = 1; k < m; k++) join(s->surface, s->edge[i].slot / 3, s->edge[i + k].slot / 3);
+    for (PetscInt k = 1; k < m; k++)
+      (void)SbUnionJoin(s->surface, s->edge[i].slot / 3, s->edge[i + k].slot / 3);
   }
   s->nshell = number_heaps(2 * s->t->ntri, s->shell);
   s->nsurface = number_heaps(s->t->ntri, s->surface);
@@ -431,12 +426,11 @@ static PetscErrorCode name_regions(const Space *s, SbSurface *out)
 static PetscErrorCode fill_surface(const Space *s, PetscInt nregion, SbSurface *out)
 {
   const SbTriangles *t = s->t;
-  PetscInt n = 0, nvert = 0, *map;
+  PetscInt n = 0;
 
   PetscFunctionBeginUser;
   PetscCall(SbSurfaceCreate(t->nvert, t->ntri, nregion, out));
-  PetscCall(PetscMalloc1(t->nvert, &map));
-  for (PetscInt v = 0; v < t->nvert; v++) map[v] = -1;
+  PetscCall(PetscArraycpy(out->x, t->x, 3 * (size_t)t->nvert));
   for (PetscInt f = 0; f < t->ntri; f++) {
     const PetscInt front = s->shells[s->shell[2 * f]].region, back = s->shells[s->shell[2 * f + 1]].region;
 
@@ -445,21 +439,13 @@ static PetscErrorCode fill_surface(const Space *s, PetscInt nregion, SbSurface *
       continue;
     }
     PetscCall(PetscArraycpy(out->tri + 3 * n, t->tri + 3 * f, 3));
-    for (int k = 0; k < 3; k++) map[t->tri[3 * f + k]] = 0;
     out->side[2 * n] = front;
     out->side[2 * n + 1] = back;
     out->tags[n] = s->f->tags ? s->f->tags[f] : 0;
     out->number[n++] = s->f->number[f];
   }
-  for (PetscInt v = 0; v < t->nvert; v++) {
-    if (map[v] < 0) continue;
-    PetscCall(PetscArraycpy(out->x + 3 * nvert, t->x + 3 * v, 3));
-    map[v] = nvert++;
-  }
-  for (PetscInt i = 0; i < 3 * n; i++) out->tri[i] = map[out->tri[i]];
   out->ntri = n;
-  out->nvert = nvert;
-  PetscCall(PetscFree(map));
+  PetscCall(SbDropUnusedPoints(&out->nvert, out->x, 3 * n, out->tri));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -56,8 +56,6 @@ PetscErrorCode SbTrianglesGroups(SbTriangleFile *file, PetscInt n, const char *c
 /* Reads with the file in memory; also after an error it is closed. */
 PetscErrorCode SbTrianglesScan(const char *path, PetscErrorCode (*read)(SbScan *, SbTriangleFile *),
                                SbTriangleFile *file);
-/* Leaves out vertices without a triangle. */
-PetscErrorCode SbTrianglesDropUnused(SbTriangles *triangles);
 /* The reader of a file by its name; NULL: of no known kind. */
 typedef PetscErrorCode (*SbTriangleReader)(const char *path, SbTriangleFile *file);
 SbTriangleReader SbTrianglesReader(const char *path);

@@ -60,22 +60,3 @@ PetscErrorCode SbTrianglesGroups(SbTriangleFile *f, PetscInt n, const char *cons
   PetscCall(SbImportTagSet(f->groups, n, group, &f->now));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
-
-/* They would only widen the box. */
-PetscErrorCode SbTrianglesDropUnused(SbTriangles *t)
-{
-  PetscInt *map, n = 0;
-
-  PetscFunctionBeginUser;
-  PetscCall(PetscCalloc1(t->nvert, &map));
-  for (PetscInt i = 0; i < 3 * t->ntri; i++) map[t->tri[i]] = 1;
-  for (PetscInt v = 0; v < t->nvert; v++) {
-    if (!map[v]) continue;
-    PetscCall(PetscArraymove(t->x + 3 * n, t->x + 3 * v, 3));
-    map[v] = n++;
-  }
-  t->nvert = n;
-  for (PetscInt i = 0; i < 3 * t->ntri; i++) t->tri[i] = map[t->tri[i]];
-  PetscCall(PetscFree(map));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}

@@ -3,7 +3,7 @@
 
   Groups, where they are wanted: the solids of an STL text (solid_1, ... without a name), the objects (o) and groups (g) of an OBJ file.
 
-  STL lists triangles with three corners each; corners with equal coordinates, bit by bit, are one vertex. The normals in the file are
+  STL lists triangles with three corners each, which become common vertices when near vertices are joined (clean.c). The normals in the file are
   not used: the order of the corners gives the side. It is binary when its size is what its count of triangles says (80 bytes, the count,
   50 bytes per triangle), whatever its first word is, or when it is larger and there is a byte 0 near its beginning, which text has not:
   what follows the triangles is left out with a warning. Words of the text may be in capitals, and `end solid` be two of them. OBJ: the lines v, f, o and g; OFF: the plain kind. Faces with more
@@ -15,50 +15,6 @@
 #include "triangles.h"
 
 /* ------------------------------------------------------------------ STL */
-
-typedef struct {
-  PetscReal x[3];
-  PetscInt corner;
-} Corner;
-
-static int compare_corners(const void *a, const void *b)
-{
-  const Corner *p = (const Corner *)a, *q = (const Corner *)b;
-
-  for (int i = 0; i < 3; i++) {
-    if (p->x[i] != q->x[i]) return p->x[i] < q->x[i] ? -1 : 1;
-  }
-  return (p->corner > q->corner) - (p->corner < q->corner);
-}
-
-/* Triangles with three corners of their own get common vertices. */
-static PetscErrorCode join_corners(SbTriangles *t)
-{
-  const PetscInt n = t->nvert;
-  PetscInt nvert = 0;
-  Corner *corner;
-
-  PetscFunctionBeginUser;
-  if (!n) PetscFunctionReturn(PETSC_SUCCESS); /* what is empty is refused later; qsort() wants an array */
-  PetscCall(PetscMalloc1(n, &corner));
-  for (PetscInt i = 0; i < n; i++) {
-    for (int k = 0; k < 3; k++) corner[i].x[k] = t->x[3 * i + k] + 0.; /* no negative zero */
-    corner[i].corner = i;
-  }
-  qsort(corner, (size_t)n, sizeof(*corner), compare_corners);
-  for (PetscInt i = 0; i < n; i++) {
-    const PetscReal *x = corner[i].x;
-
-    if (!i || x[0] != corner[i - 1].x[0] || x[1] != corner[i - 1].x[1] || x[2] != corner[i - 1].x[2]) {
-      for (int k = 0; k < 3; k++) t->x[3 * nvert + k] = x[k];
-      nvert++;
-    }
-    t->tri[corner[i].corner] = nvert - 1;
-  }
-  t->nvert = nvert;
-  PetscCall(PetscFree(corner));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
 
 static uint32_t little(const char *p)
 {
@@ -201,7 +157,6 @@ static PetscErrorCode stl_file(SbScan *s, SbTriangleFile *f)
     PetscCall(stl_binary(s, n, f));
   } else
     PetscCall(stl_text(s, f));
-  PetscCall(join_corners(f->t));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

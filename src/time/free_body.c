@@ -9,6 +9,7 @@
 
   Not found: parts that are free only together, tied to each other by contact; one that is constrained by springs whose stiffness is rounding beside that of its cells.
 */
+#include "sbgeometry.h"
 #include "time_impl.h"
 #include <petscblaslapack.h>
 
@@ -17,19 +18,6 @@
 #define FAR 1e6       /* times its size: a body that went so far in a static run was not constrained */
 
 /* ------------------------------------------------------------------ parts */
-
-static PetscInt root_of(PetscInt parent[], PetscInt i)
-{
-  for (; parent[i] != i; i = parent[i]) parent[i] = parent[parent[i]];
-  return i;
-}
-
-static void join(PetscInt parent[], PetscInt i, PetscInt j)
-{
-  const PetscInt a = root_of(parent, i), b = root_of(parent, j);
-
-  parent[PetscMax(a, b)] = PetscMin(a, b);
-}
 
 /* label[nnode_owned]: the lowest global number of a node's part. Collective; the caller frees it. */
 static PetscErrorCode label_parts(SbSpace s, PetscInt **label)
@@ -44,15 +32,16 @@ static PetscErrorCode label_parts(SbSpace s, PetscInt **label)
   PetscCall(PetscMalloc2(s->nnode, &parent, s->nnode, &lowest));
   for (PetscInt i = 0; i < s->nnode; i++) parent[i] = i;
   for (PetscInt k = 0; k < 4 * s->mesh->ncell; k++) {
-    join(parent, s->cell_node[k - k % 4], s->cell_node[k]);
-    if (s->dirichlet_node && s->dirichlet_node[k] >= 0) join(parent, s->cell_node[k], s->dirichlet_node[k]);
+    (void)SbUnionJoin(parent, s->cell_node[k - k % 4], s->cell_node[k]);
+    if (s->dirichlet_node && s->dirichlet_node[k] >= 0)
+      (void)SbUnionJoin(parent, s->cell_node[k], s->dirichlet_node[k]);
   }
   /* cells of dg have nodes of their own: the faces join them */
   for (PetscInt b = 0; s->width > 4 && b < s->nbatch; b++) {
     for (PetscInt k = 0; k < 4 * SB_BATCH; k++) {
       if (k % SB_BATCH < s->batch_n[b])
-        join(parent, s->batch_node[4 * SB_BATCH * b + k],
-             s->batch_clique[8 * SB_BATCH * b + 4 * SB_BATCH + k]);
+        (void)SbUnionJoin(parent, s->batch_node[4 * SB_BATCH * b + k],
+                          s->batch_clique[8 * SB_BATCH * b + 4 * SB_BATCH + k]);
     }
   }
   for (PetscInt i = 0; i < s->nnode; i++) lowest[i] = s->gnode[i];
@@ -61,16 +50,16 @@ static PetscErrorCode label_parts(SbSpace s, PetscInt **label)
   while (changed) {
     changed = PETSC_FALSE;
     for (PetscInt i = 0; i < s->nnode; i++) {
-      const PetscInt root = root_of(parent, i);
+      const PetscInt root = SbUnionRoot(parent, i);
 
       lowest[root] = PetscMin(lowest[root], lowest[i]);
     }
     PetscCall(VecGetArray(v, &own));
-    for (PetscInt i = 0; i < s->nnode_owned; i++) own[3 * i] = (PetscReal)lowest[root_of(parent, i)];
+    for (PetscInt i = 0; i < s->nnode_owned; i++) own[3 * i] = (PetscReal)lowest[SbUnionRoot(parent, i)];
     PetscCall(VecRestoreArray(v, &own));
     PetscCall(SbSpaceGetLocalRead(s, v, &all));
     for (PetscInt i = 0; i < s->nnode; i++) {
-      const PetscInt other = (PetscInt)all[3 * i], root = root_of(parent, i);
+      const PetscInt other = (PetscInt)all[3 * i], root = SbUnionRoot(parent, i);
 
       changed = (PetscBool)(changed || other < lowest[root]);
       lowest[i] = PetscMin(lowest[root], other);
@@ -79,7 +68,7 @@ static PetscErrorCode label_parts(SbSpace s, PetscInt **label)
     PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &changed, 1, SB_MPI_BOOL, MPI_LOR, s->comm));
   }
   PetscCall(PetscMalloc1(s->nnode_owned, label));
-  for (PetscInt i = 0; i < s->nnode_owned; i++) (*label)[i] = lowest[root_of(parent, i)];
+  for (PetscInt i = 0; i < s->nnode_owned; i++) (*label)[i] = lowest[SbUnionRoot(parent, i)];
   PetscCall(VecDestroy(&v));
   PetscCall(PetscFree2(parent, lowest));
   PetscFunctionReturn(PETSC_SUCCESS);
