@@ -321,6 +321,8 @@ static inline PetscBool SbUnionJoin(PetscInt up[], PetscInt a, PetscInt b)
   another. Output: map[n], the first point of those that each point is one with.
 */
 PetscErrorCode SbWeld(PetscInt n, const PetscReal x[], PetscReal tolerance, PetscBool chains, PetscInt map[]);
+/* Numbers the trees in the order of their roots, in place: up[n] is the tree of each; returns how many there are. */
+PetscInt SbUnionNumber(PetscInt n, PetscInt up[]);
 /* Leaves out points that none of used[nused] names, and renumbers these. The order stays. */
 PetscErrorCode SbDropUnusedPoints(PetscInt *n, PetscReal x[], PetscInt nused, PetscInt used[]);
 

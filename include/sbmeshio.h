@@ -155,8 +155,8 @@ PetscErrorCode SbImportSlabs(const SbBody *body, PetscInt *ncell);
 */
 PetscErrorCode SbImportSlab(const SbBody *body, PetscInt k, PetscInt n, SbImport *import, SbSlabRows *rows);
 /* How the user writes an option of this body, for messages: "-body_liver_tet_size"; in supple-mesh "-size". */
-#define SB_OPTION_NAME_MAX (SB_NAME_MAX + 32)
-const char *SbImportOption(const SbImport *import, const char *key, char name[SB_OPTION_NAME_MAX]);
+#define SB_IMPORT_OPTION_MAX (SB_NAME_MAX + 32)
+const char *SbImportOption(const SbImport *import, const char *key, char name[SB_IMPORT_OPTION_MAX]);
 /* A .msh of any version, by the program's own reader or by the gmsh library. */
 PetscErrorCode SbImportRead_Msh(const char *path, SbImport *body);
 /* TetGen's files; path: one of them, or what they have in common. */

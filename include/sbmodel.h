@@ -104,6 +104,8 @@ PetscErrorCode SbModelContactForce(SbModel model, PetscReal t, Vec U, Vec R, Vec
 PetscErrorCode SbModelContactPoints(SbModel model, PetscReal t, Vec U, Vec R, SbContactPoints *list);
 /* Initial velocities of bodies (translation and spin). */
 PetscErrorCode SbModelInitialState(SbModel model, Vec U, Vec V);
+/* Centre of mass, m, and mass, kg, of each body, centre[nbody][4]: at rest with U NULL, else now. Collective. */
+PetscErrorCode SbModelCentres(SbModel model, Vec U, PetscReal centre[][4]);
 /* Instantaneous part of the energies (kinetic, strain, momenta, ...). V may be NULL. Collective. */
 PetscErrorCode SbModelEnergies(SbModel model, Vec U, Vec V, SbEnergies *e);
 /*

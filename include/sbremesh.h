@@ -3,31 +3,24 @@
 */
 #pragma once
 #include "sbledger.h"
+#include "sbsurface.h"
 
 /*
   Re-meshing of one body (src/remesh/body.c), on rank 0. Not collective.
 
-  A hull is the surface of a body and what parts its regions inside. A mesher fills it with tets: their first vertices are those of the hull, unchanged and
+  A hull is the surface of a body and what parts its regions inside; its tags are all 0. A mesher fills it with tets: their first vertices are those of the hull, unchanged and
   in order, its triangles are faces of tets. x and cell (positively oriented) are allocated here; the caller frees. An error is
   one line that says why it did not work.
 */
-typedef struct {
-  PetscInt nvert, ntri, nregion;
-  PetscReal *x;  /* [nvert][3] m */
-  PetscInt *tri; /* [ntri][3] */
-  PetscInt *
-    side; /* [ntri][2] region on the side from which the corners are seen counter-clockwise, and behind; -1: nothing */
-  PetscReal edge; /* mean edge, m */
-} SbHull;
 typedef struct {
   PetscInt nvert, ncell;
   PetscReal *x;   /* [nvert][3] m */
   PetscInt *cell; /* [ncell][4] */
 } SbTets;
-typedef PetscErrorCode (*SbMesher)(const char *where, const SbHull *hull, PetscReal size, void *ctx,
+typedef PetscErrorCode (*SbMesher)(const char *where, const SbSurface *hull, PetscReal size, void *ctx,
                                    SbTets *tets);
 /* The program's own: SbTetrahedralize(). */
-PetscErrorCode SbMesherDefault(const char *where, const SbHull *hull, PetscReal size, void *ctx,
+PetscErrorCode SbMesherDefault(const char *where, const SbSurface *hull, PetscReal size, void *ctx,
                                SbTets *tets);
 
 /*

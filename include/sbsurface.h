@@ -20,6 +20,8 @@ typedef struct {
 
 PetscErrorCode SbSurfaceCreate(PetscInt nvert, PetscInt ntri, PetscInt nregion, SbSurface *surface);
 PetscErrorCode SbSurfaceDestroy(SbSurface *surface);
+/* Volume of each region, volume[nregion], NULL: not wanted; returns the mean edge of the triangles. */
+PetscReal SbSurfaceMeasure(const SbSurface *surface, PetscReal volume[]);
 
 /*
   SbTetrahedralize - fills regions with tets of about one size. Not collective.

@@ -5,7 +5,7 @@
 #include "scene.h"
 
 /* Fills what can be seen whole from its middle. ctx: NULL, or an int that counts the calls. */
-static inline PetscErrorCode fixture_cone(const char *where, const SbHull *hull, PetscReal size, void *ctx,
+static inline PetscErrorCode fixture_cone(const char *where, const SbSurface *hull, PetscReal size, void *ctx,
                                           SbTets *tets)
 {
   PetscFunctionBeginUser;
@@ -28,8 +28,8 @@ static inline PetscErrorCode fixture_cone(const char *where, const SbHull *hull,
 }
 
 /* One that cannot. */
-static inline PetscErrorCode fixture_refuse(const char *where, const SbHull *hull, PetscReal size, void *ctx,
-                                            SbTets *tets)
+static inline PetscErrorCode fixture_refuse(const char *where, const SbSurface *hull, PetscReal size,
+                                            void *ctx, SbTets *tets)
 {
   PetscFunctionBeginUser;
   (void)hull;

@@ -38,6 +38,16 @@ PetscErrorCode SbWeld(PetscInt n, const PetscReal x[], PetscReal tolerance, Pets
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscInt SbUnionNumber(PetscInt n, PetscInt up[])
+{
+  PetscInt count = 0;
+
+  for (PetscInt i = 0; i < n; i++) up[i] = SbUnionRoot(up, i);
+  // a root comes before the others of its tree, and then holds its number
+  for (PetscInt i = 0; i < n; i++) up[i] = up[i] == i ? count++ : up[up[i]];
+  return count;
+}
+
 PetscErrorCode SbDropUnusedPoints(PetscInt *n, PetscReal x[], PetscInt nused, PetscInt used[])
 {
   PetscInt *map, kept = 0;

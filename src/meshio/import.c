@@ -37,7 +37,7 @@ static PetscErrorCode rotation(const SbBody *body, PetscReal R[3][3])
 static PetscErrorCode transform_body(const SbBody *body, SbImport *im)
 {
   PetscReal R[3][3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
-  char scale[SB_OPTION_NAME_MAX], translate[SB_OPTION_NAME_MAX];
+  char scale[SB_IMPORT_OPTION_MAX], translate[SB_IMPORT_OPTION_MAX];
 
   PetscFunctionBeginUser;
   if (body->rotate[3] != 0) PetscCall(rotation(body, R));

@@ -352,7 +352,7 @@ PetscErrorCode SbImportRead_Abaqus(const char *path, SbImport *im)
   Abaqus a = {
     .scan = s,
     .deck = {.im = im, .compare = strcasecmp, .cure = "supple reads one part", .unique = PETSC_TRUE}};
-  char word[WORD], rotate[SB_OPTION_NAME_MAX], translate[SB_OPTION_NAME_MAX];
+  char word[WORD], rotate[SB_IMPORT_OPTION_MAX], translate[SB_IMPORT_OPTION_MAX];
   PetscBool in_instance = PETSC_FALSE;
   int npart = 0;
 

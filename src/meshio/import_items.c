@@ -294,12 +294,12 @@ PetscErrorCode SbImportJoinGroups(SbImport *im)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-const char *SbImportOption(const SbImport *im, const char *key, char name[SB_OPTION_NAME_MAX])
+const char *SbImportOption(const SbImport *im, const char *key, char name[SB_IMPORT_OPTION_MAX])
 {
   if (im->body[0])
-    (void)snprintf(name, SB_OPTION_NAME_MAX, "-body_%s_%s", im->body, key);
+    (void)snprintf(name, SB_IMPORT_OPTION_MAX, "-body_%s_%s", im->body, key);
   else
-    (void)snprintf(name, SB_OPTION_NAME_MAX, "-%s", strncmp(key, "tet_", 4) ? key : key + 4);
+    (void)snprintf(name, SB_IMPORT_OPTION_MAX, "-%s", strncmp(key, "tet_", 4) ? key : key + 4);
   return name;
 }
 

@@ -329,19 +329,8 @@ PetscErrorCode SbModelInitialState(SbModel m, Vec U, Vec V)
   PetscCall(VecZeroEntries(U));
   PetscCall(SbModelPrescribe(m, 0., U));
   if (!V) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(PetscCalloc1(m->nbody, &centre));
-
-  /* mass and first moment of each body, summed over ranks: its centre of mass at rest */
-  for (PetscInt i = 0; i < s->nnode_owned; i++) {
-    PetscReal *c = centre[m->space->node_body[i]];
-
-    c[3] += s->node_mass[i];
-    for (PetscInt k = 0; k < 3; k++) c[k] += s->node_mass[i] * s->node_x[3 * i + k];
-  }
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, centre, (PetscMPIInt)(4 * m->nbody), MPIU_REAL, MPI_SUM, m->comm));
-  for (PetscInt b = 0; b < m->nbody; b++) {
-    for (PetscInt k = 0; k < 3; k++) centre[b][k] /= centre[b][3];
-  }
+  PetscCall(PetscMalloc1(m->nbody, &centre));
+  PetscCall(SbModelCentres(m, NULL, centre));
   PetscCall(VecGetArray(V, &v));
   for (PetscInt i = 0; i < s->nnode_owned; i++) {
     const SbBody *body = &m->body[m->space->node_body[i]];

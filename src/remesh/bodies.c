@@ -13,30 +13,6 @@
 #define INWARDS \
   1e-6 /* part of the way from a face to the middle of its DG cell, to decide on which side that is */
 
-/* A triangle by its vertices in ascending order, and where it is: 4 cell + face. */
-typedef struct {
-  PetscInt vert[3], slot;
-} Side;
-
-static int by_vertices(const void *a, const void *b)
-{
-  const Side *p = (const Side *)a, *q = (const Side *)b;
-
-  for (int k = 0; k < 3; k++) {
-    if (p->vert[k] != q->vert[k]) return p->vert[k] < q->vert[k] ? -1 : 1;
-  }
-  return 0;
-}
-
-static Side side_of(const PetscInt cell[], PetscInt slot)
-{
-  const PetscInt *v = cell + 4 * (slot / 4), f = slot % 4;
-  Side side = {{v[(f + 1) % 4], v[(f + 2) % 4], v[(f + 3) % 4]}, slot};
-
-  (void)PetscSortInt(3, side.vert);
-  return side;
-}
-
 /* One body on its way from the old mesh to the new one. Vertices and tets count from the body's first. */
 typedef struct {
   SbModel model;
@@ -46,9 +22,9 @@ typedef struct {
   PetscInt each;  /* numbers of a node: 3 nfield */
   PetscInt *cell; /* [ncell][4] old tets */
   PetscInt *at;   /* [nvert] a corner 4 cell + a of each old vertex */
-  PetscInt nside;
-  Side *side; /* [nside] of the old surface, in order */
+  SbFaces faces;  /* of the old tets */
   SbLocator rest;
+  PetscBool done; /* there is a new mesh */
   SbNewMesh mesh;
   uint64_t groups;     /* bits of sets that are groups */
   uint64_t inclusions; /* and of those that are inclusions of the body */
@@ -91,32 +67,31 @@ static PetscErrorCode open_work(SbModel m, const SbGathered *g, PetscInt b, Work
   for (PetscInt i = 0; i < 4 * w->ncell; i++) {
     w->cell[i] = g->cell[4 * w->cell0 + i] - w->vert0;
     w->at[w->cell[i]] = i;
-    w->nside += g->cell_set[5 * (w->cell0 + i / 4) + 1 + i % 4] & SB_ON_BOUNDARY ? 1 : 0;
   }
-  PetscCall(PetscMalloc1(w->nside, &w->side));
-  w->nside = 0;
-  for (PetscInt i = 0; i < 4 * w->ncell; i++) {
-    if (g->cell_set[5 * (w->cell0 + i / 4) + 1 + i % 4] & SB_ON_BOUNDARY)
-      w->side[w->nside++] = side_of(w->cell, i);
-  }
-  qsort(w->side, (size_t)w->nside, sizeof(Side), by_vertices);
+  PetscCall(SbFacesCreate(nvert, w->ncell, w->cell, &w->faces));
   PetscCall(SbLocatorCreate(w->ncell, w->cell, g->X + 3 * w->vert0, &w->rest));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The position 4 cell + face of a triangle of the new mesh on the old surface, -1: it is inside. */
+/* The sets of the face `slot` = 4 cell + face of the old mesh. */
+static uint64_t face_set(const Work *w, PetscInt slot)
+{
+  return w->g->cell_set[5 * (w->cell0 + slot / 4) + 1 + slot % 4];
+}
+
+/* The face of the old surface that a face of the next mesh is, -1: it is inside. */
 static PetscInt old_slot(const Work *w, PetscInt slot)
 {
-  Side side = side_of(w->mesh.cell, slot);
-  const Side *found;
+  const PetscInt *v = w->mesh.cell + 4 * (slot / 4);
+  PetscInt vert[3], slots[2];
 
+  if (!w->done) return face_set(w, slot) & SB_ON_BOUNDARY ? slot : -1;
   for (int k = 0; k < 3; k++) {
-    if (side.vert[k] >= w->mesh.nkept) return -1;
-    side.vert[k] = w->mesh.kept[side.vert[k]];
+    vert[k] = v[SbFaceVertex[slot % 4][k]];
+    if (vert[k] >= w->mesh.nkept) return -1;
+    vert[k] = w->mesh.kept[vert[k]];
   }
-  (void)PetscSortInt(3, side.vert);
-  found = (const Side *)bsearch(&side, w->side, (size_t)w->nside, sizeof(Side), by_vertices);
-  return found ? found->slot : -1;
+  return SbFacesFind(&w->faces, vert, slots) == 1 ? slots[0] : -1;
 }
 
 /* ------------------------------------------------------------------ the mesh */
@@ -158,11 +133,9 @@ static PetscErrorCode check_sets(const Work *w)
   PetscCall(PetscCalloc1(nvert, &volume));
   PetscCall(PetscCalloc1(nvert, &surface));
   for (PetscInt i = 0; i < 4 * w->ncell; i++) {
-    const uint64_t *set = g->cell_set + 5 * (w->cell0 + i / 4);
-
-    volume[w->cell[i]] |= set[0];
-    if (!(set[1 + i % 4] & SB_ON_BOUNDARY)) {
-      lost |= set[1 + i % 4] & w->groups;
+    volume[w->cell[i]] |= g->cell_set[5 * (w->cell0 + i / 4)];
+    if (!(face_set(w, i) & SB_ON_BOUNDARY)) {
+      lost |= face_set(w, i) & w->groups;
     } else {
       for (int k = 1; k < 4; k++) surface[w->cell[4 * (i / 4) + (i % 4 + k) % 4]] = PETSC_TRUE;
     }
@@ -189,7 +162,8 @@ static PetscErrorCode make_mesh(Work *w, const SbRemeshing *how)
                    .ncell = w->ncell,
                    .X = g->X + 3 * w->vert0,
                    .x = g->x + 3 * w->vert0,
-                   .cell = w->cell};
+                   .cell = w->cell,
+                   .faces = &w->faces};
 
   PetscFunctionBeginUser;
   PetscCall(check_sets(w));
@@ -203,18 +177,18 @@ static PetscErrorCode make_mesh(Work *w, const SbRemeshing *how)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Triangles of the new surface in groups: counted, or written. */
-static PetscInt list_triangles(const Work *w, SbMemoryMesh *in_memory)
+/* Triangles in groups, of an old mesh also inside: counted, or written. */
+static PetscInt list_triangles(const Work *w, PetscInt ncell, const PetscInt cell[], SbMemoryMesh *in_memory)
 {
   PetscInt n = 0;
 
-  for (PetscInt i = 0; i < 4 * w->mesh.ncell; i++) {
-    const PetscInt slot = old_slot(w, i);
-    const uint64_t bits = slot < 0 ? 0 : w->g->cell_set[5 * (w->cell0 + slot / 4) + 1 + slot % 4] & w->groups;
+  for (PetscInt i = 0; i < 4 * ncell; i++) {
+    const PetscInt slot = w->done ? old_slot(w, i) : i;
+    const uint64_t bits = slot < 0 ? 0 : face_set(w, slot) & w->groups;
 
     if (!bits) continue;
     if (in_memory) {
-      for (int k = 0; k < 3; k++) in_memory->tri[3 * n + k] = w->mesh.cell[4 * (i / 4) + (i % 4 + 1 + k) % 4];
+      for (int k = 0; k < 3; k++) in_memory->tri[3 * n + k] = cell[4 * (i / 4) + (i % 4 + 1 + k) % 4];
       in_memory->tri_set[n] = bits;
     }
     n++;
@@ -222,50 +196,26 @@ static PetscInt list_triangles(const Work *w, SbMemoryMesh *in_memory)
   return n;
 }
 
-static PetscErrorCode give_new(const Work *w, SbMemoryMesh **in_memory)
-{
-  const SbNewMesh *m = &w->mesh;
-  SbMemoryMesh *p;
-
-  PetscFunctionBeginUser;
-  PetscCall(SbMemoryMeshCreate(m->nvert, m->ncell, list_triangles(w, NULL), in_memory));
-  p = *in_memory;
-  PetscCall(PetscArraycpy(p->x, m->X, 3 * (size_t)m->nvert));
-  PetscCall(PetscArraycpy(p->cell, m->cell, 4 * (size_t)m->ncell));
-  (void)list_triangles(w, p);
-  for (PetscInt v = 0; v < m->nkept; v++) p->vert_set[v] = w->g->vert_set[w->vert0 + m->kept[v]] & w->groups;
-  for (PetscInt c = 0; c < m->ncell; c++) {
-    p->cell_set[c] = w->g->cell_set[5 * (w->cell0 + m->within[c])] & (w->groups | w->inclusions);
-    for (int a = 0; a < 4; a++) p->vert_set[m->cell[4 * c + a]] |= p->cell_set[c] & w->groups;
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* The old mesh as it is. */
-static PetscErrorCode give_old(const Work *w, SbMemoryMesh **in_memory)
+/* The new mesh, or the old one as it is. */
+static PetscErrorCode give_mesh(const Work *w, SbMemoryMesh **in_memory)
 {
   const SbGathered *g = w->g;
-  const PetscInt nvert = g->vert0[w->body + 1] - w->vert0;
-  PetscInt ntri = 0;
+  const SbNewMesh *m = &w->mesh;
+  const PetscInt nold = g->vert0[w->body + 1] - w->vert0, ncell = w->done ? m->ncell : w->ncell,
+                 nvert = w->done ? m->nvert : nold, *cell = w->done ? m->cell : w->cell;
   SbMemoryMesh *p;
 
   PetscFunctionBeginUser;
-  for (PetscInt i = 0; i < 4 * w->ncell; i++)
-    ntri += g->cell_set[5 * (w->cell0 + i / 4) + 1 + i % 4] & w->groups ? 1 : 0;
-  PetscCall(SbMemoryMeshCreate(nvert, w->ncell, ntri, in_memory));
+  PetscCall(SbMemoryMeshCreate(nvert, ncell, list_triangles(w, ncell, cell, NULL), in_memory));
   p = *in_memory;
-  PetscCall(PetscArraycpy(p->x, g->X + 3 * w->vert0, 3 * (size_t)nvert));
-  PetscCall(PetscArraycpy(p->cell, w->cell, 4 * (size_t)w->ncell));
-  for (PetscInt v = 0; v < nvert; v++) p->vert_set[v] = g->vert_set[w->vert0 + v] & w->groups;
-  for (PetscInt c = 0; c < w->ncell; c++)
-    p->cell_set[c] = g->cell_set[5 * (w->cell0 + c)] & (w->groups | w->inclusions);
-  ntri = 0;
-  for (PetscInt i = 0; i < 4 * w->ncell; i++) {
-    const uint64_t bits = g->cell_set[5 * (w->cell0 + i / 4) + 1 + i % 4] & w->groups;
-
-    if (!bits) continue;
-    for (int k = 0; k < 3; k++) p->tri[3 * ntri + k] = w->cell[4 * (i / 4) + (i % 4 + 1 + k) % 4];
-    p->tri_set[ntri++] = bits;
+  PetscCall(PetscArraycpy(p->x, w->done ? m->X : g->X + 3 * w->vert0, 3 * (size_t)nvert));
+  PetscCall(PetscArraycpy(p->cell, cell, 4 * (size_t)ncell));
+  (void)list_triangles(w, ncell, cell, p);
+  for (PetscInt v = 0; v < (w->done ? m->nkept : nold); v++)
+    p->vert_set[v] = g->vert_set[w->vert0 + (w->done ? m->kept[v] : v)] & w->groups;
+  for (PetscInt c = 0; c < ncell; c++) {
+    p->cell_set[c] = g->cell_set[5 * (w->cell0 + (w->done ? m->within[c] : c))] & (w->groups | w->inclusions);
+    for (int a = 0; a < 4; a++) p->vert_set[cell[4 * c + a]] |= p->cell_set[c] & w->groups;
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -311,12 +261,14 @@ static void new_values(const Work *w, PetscInt c, PetscReal value[])
     if (!from && w->element->nodes_per[0])
       for (int k = 0; k < 3; k++) X[k] = w->mesh.X[3 * v + k];
     else if (!from) {
-      const Side side = side_of(w->mesh.cell, 4 * c + a);
-      const PetscReal *at = w->mesh.X, *apex = at + 3 * w->mesh.cell[4 * c + a];
+      const PetscReal *at = w->mesh.X, *apex = at + 3 * v;
+      PetscInt face[3];
 
       // the middle of the face, bitwise the same from both cells, and a point slightly inside
+      for (int k = 0; k < 3; k++) face[k] = w->mesh.cell[4 * c + SbFaceVertex[a][k]];
+      (void)PetscSortInt(3, face);
       for (int k = 0; k < 3; k++) {
-        X[k] = (at[3 * side.vert[0] + k] + at[3 * side.vert[1] + k] + at[3 * side.vert[2] + k]) / 3.;
+        X[k] = (at[3 * face[0] + k] + at[3 * face[1] + k] + at[3 * face[2] + k]) / 3.;
         inside[k] = X[k] + INWARDS * 0.25 * (apex[k] - X[k]);
       }
     }
@@ -337,25 +289,21 @@ static void rename_node(SbRenamed *r, PetscInt from, PetscInt to)
 }
 
 /* Nodes of the body's surface: vertices, or faces and their supports. vert1, cell1: first ones of the body in the next scene. */
-static void rename_surface(const Work *w, PetscBool remeshed, PetscInt vert1, PetscInt cell1,
-                           const SbGathered *next, SbRenamed *r)
+static void rename_surface(const Work *w, PetscInt vert1, PetscInt cell1, const SbGathered *next,
+                           SbRenamed *r)
 {
   const PetscInt N = w->g->nvert, C = w->g->ncell, N1 = next->nvert, C1 = next->ncell;
-  const PetscInt ncell = remeshed ? w->mesh.ncell : w->ncell;
+  const PetscInt ncell = w->done ? w->mesh.ncell : w->ncell;
 
   if (w->element->nodes_per[0]) {
-    const PetscInt n = remeshed ? w->mesh.nkept : w->g->vert0[w->body + 1] - w->vert0;
+    const PetscInt n = w->done ? w->mesh.nkept : w->g->vert0[w->body + 1] - w->vert0;
 
-    for (PetscInt v = 0; v < n; v++) rename_node(r, w->vert0 + (remeshed ? w->mesh.kept[v] : v), vert1 + v);
+    for (PetscInt v = 0; v < n; v++) rename_node(r, w->vert0 + (w->done ? w->mesh.kept[v] : v), vert1 + v);
     return;
   }
   for (PetscInt i = 0; i < 4 * ncell; i++) {
-    PetscInt slot = i;
+    const PetscInt slot = old_slot(w, i);
 
-    if (remeshed)
-      slot = old_slot(w, i);
-    else if (!(w->g->cell_set[5 * (w->cell0 + i / 4) + 1 + i % 4] & SB_ON_BOUNDARY))
-      slot = -1;
     if (slot < 0) continue;
     rename_node(r, N + 4 * (w->cell0 + slot / 4) + slot % 4, N1 + 4 * (cell1 + i / 4) + i % 4);
     rename_node(r, N + 4 * (C + w->cell0 + slot / 4) + slot % 4, N1 + 4 * (C1 + cell1 + i / 4) + i % 4);
@@ -378,7 +326,7 @@ static PetscErrorCode keep_message(MPI_Comm comm, int line, const char *function
 }
 
 /* Meshes one body again; what it cannot do goes to the message. */
-static PetscErrorCode try_body(Work *w, const SbRemeshing *how, SbRemeshOutcome *outcome, PetscBool *done)
+static PetscErrorCode try_body(Work *w, const SbRemeshing *how, SbRemeshOutcome *outcome)
 {
   PetscErrorCode ierr;
 
@@ -386,19 +334,19 @@ static PetscErrorCode try_body(Work *w, const SbRemeshing *how, SbRemeshOutcome 
   PetscCall(PetscPushErrorHandler(keep_message, outcome));
   ierr = make_mesh(w, how);
   PetscCall(PetscPopErrorHandler());
-  *done = (PetscBool)!ierr;
+  w->done = (PetscBool)!ierr;
   if (ierr) PetscCall(SbNewMeshDestroy(&w->mesh));
   outcome->nvert[0] = w->g->vert0[w->body + 1] - w->vert0;
   outcome->ncell[0] = w->ncell;
-  outcome->nvert[1] = *done ? w->mesh.nvert : outcome->nvert[0];
-  outcome->ncell[1] = *done ? w->mesh.ncell : w->ncell;
+  outcome->nvert[1] = w->done ? w->mesh.nvert : outcome->nvert[0];
+  outcome->ncell[1] = w->done ? w->mesh.ncell : w->ncell;
   outcome->nmoved = w->mesh.nmoved;
   outcome->quality = w->mesh.quality;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Mesh, values and names of one body. */
-static PetscErrorCode finish_body(const Work *w, PetscBool done, PetscInt step, SbRemeshResult *result)
+static PetscErrorCode finish_body(const Work *w, PetscInt step, SbRemeshResult *result)
 {
   SbGathered *next = &result->next;
   SbMemoryMesh **in_memory = &result->in_memory[w->body];
@@ -407,14 +355,13 @@ static PetscErrorCode finish_body(const Work *w, PetscBool done, PetscInt step, 
   PetscReal *value = next->value + each * (size_t)next->cell0[w->body];
 
   PetscFunctionBeginUser;
-  if (done) {
-    PetscCall(give_new(w, in_memory));
+  PetscCall(give_mesh(w, in_memory));
+  if (w->done) {
     for (PetscInt c = 0; c < w->mesh.ncell; c++) new_values(w, c, value + each * (size_t)c);
     (*in_memory)->step = step;
     (*in_memory)->mass = w->g->mass[w->body];
     (*in_memory)->bound = w->mesh.quality; /* the caller makes a bound of it */
   } else {
-    PetscCall(give_old(w, in_memory));
     PetscCall(PetscArraycpy(value, w->g->value + each * (size_t)w->cell0, each * (size_t)w->ncell));
     if (body->in_memory) {
       (*in_memory)->step = body->in_memory->step;
@@ -422,7 +369,7 @@ static PetscErrorCode finish_body(const Work *w, PetscBool done, PetscInt step, 
       (*in_memory)->bound = body->in_memory->bound;
     }
   }
-  rename_surface(w, done, next->vert0[w->body], next->cell0[w->body], next, &result->renamed);
+  rename_surface(w, next->vert0[w->body], next->cell0[w->body], next, &result->renamed);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -458,8 +405,9 @@ PetscErrorCode SbRemeshBodies(SbModel m, const SbGathered *g, const PetscBool du
 
     PetscCall(open_work(m, g, b, &work[b]));
     r->outcome[b] = (SbRemeshOutcome){{nvert, nvert}, {work[b].ncell, work[b].ncell}, 0, 0., ""};
-    if (due[b]) PetscCall(try_body(&work[b], how, &r->outcome[b], &r->done[b]));
-    room += nvert + 2 * work[b].nside;
+    if (due[b]) PetscCall(try_body(&work[b], how, &r->outcome[b]));
+    r->done[b] = work[b].done;
+    room += nvert + 2 * work[b].faces.nboundary;
   }
   // counts of the next meshes, and room for their values
   r->next.nbody = g->nbody;
@@ -476,12 +424,12 @@ PetscErrorCode SbRemeshBodies(SbModel m, const SbGathered *g, const PetscBool du
     PetscMalloc1((size_t)(r->next.width * r->next.nfield * 3) * (size_t)r->next.ncell, &r->next.value));
   PetscCall(PetscMalloc2(room, &r->renamed.from, room, &r->renamed.to));
   for (PetscInt b = 0; b < m->nbody; b++) {
-    PetscCall(finish_body(&work[b], r->done[b], step, r));
+    PetscCall(finish_body(&work[b], step, r));
     PetscCall(SbNewMeshDestroy(&work[b].mesh));
     PetscCall(SbLocatorDestroy(&work[b].rest));
     PetscCall(PetscFree(work[b].cell));
     PetscCall(PetscFree(work[b].at));
-    PetscCall(PetscFree(work[b].side));
+    PetscCall(SbFacesDestroy(&work[b].faces));
   }
   PetscCall(PetscSortIntWithArray(r->renamed.n, r->renamed.from, r->renamed.to));
   PetscCall(PetscFree(work));

@@ -21,96 +21,53 @@
 
 /* ------------------------------------------------------------------ the hull */
 
-/* Parts of the body that hang together by faces between tets of one number: component[ncell]. */
-static PetscErrorCode find_regions(const SbOldMesh *old, const SbFaces *faces, PetscInt *n,
-                                   PetscInt component[])
+/* Parts of the body that hang together by faces between tets of one number: component[ncell], how many. */
+static PetscInt find_regions(const SbOldMesh *old, PetscInt component[])
 {
-  PetscInt *stack, top;
+  for (PetscInt c = 0; c < old->ncell; c++) component[c] = c;
+  for (PetscInt s = 0; s < 4 * old->ncell; s++) {
+    const PetscInt other = old->faces->neighbour[s];
 
-  PetscFunctionBeginUser;
-  PetscCall(PetscMalloc1(old->ncell, &stack));
-  for (PetscInt c = 0; c < old->ncell; c++) component[c] = -1;
-  *n = 0;
-  for (PetscInt first = 0; first < old->ncell; first++) {
-    if (component[first] >= 0) continue;
-    component[first] = *n;
-    stack[0] = first;
-    for (top = 1; top;) {
-      const PetscInt c = stack[--top];
-
-      for (int f = 0; f < 4; f++) {
-        const PetscInt other = faces->neighbour[4 * c + f];
-
-        if (other < 0 || component[other] >= 0 || old->region[other] != old->region[c]) continue;
-        component[other] = *n;
-        stack[top++] = other;
-      }
-    }
-    (*n)++;
+    if (other >= 0 && old->region[other] == old->region[s / 4]) (void)SbUnionJoin(component, other, s / 4);
   }
-  PetscCall(PetscFree(stack));
-  PetscFunctionReturn(PETSC_SUCCESS);
+  return SbUnionNumber(old->ncell, component);
 }
 
 /* Whether the hull has face f of tet c: each triangle once. */
-static PetscBool in_hull(const SbFaces *faces, const PetscInt component[], PetscInt c, int f)
+static PetscBool in_hull(const SbOldMesh *old, const PetscInt component[], PetscInt c, int f)
 {
-  const PetscInt other = faces->neighbour[4 * c + f];
+  const PetscInt other = old->faces->neighbour[4 * c + f];
 
   return (PetscBool)(other < 0 || (c < other && component[other] != component[c]));
 }
 
-/* Triangles and vertices of the hull, these in the order of the old mesh: kept[hull->nvert]. */
-static PetscErrorCode fill_hull(const SbOldMesh *old, const SbFaces *faces, const PetscInt component[],
-                                const PetscReal x[], SbHull *hull, PetscInt **kept)
+/* The hull in the shape x; its vertices in the order of the old mesh: kept[hull->nvert]. */
+static PetscErrorCode create_hull(const SbOldMesh *old, const PetscReal x[], SbSurface *hull, PetscInt **kept)
 {
-  PetscInt *number, n = 0;
-  PetscReal sum = 0;
+  PetscInt *component, nregion, ntri = 0, n = 0, nkept;
 
   PetscFunctionBeginUser;
-  for (PetscInt s = 0; s < 4 * old->ncell; s++) hull->ntri += in_hull(faces, component, s / 4, s % 4);
-  PetscCall(PetscMalloc1(3 * (size_t)hull->ntri, &hull->tri));
-  PetscCall(PetscMalloc1(2 * (size_t)hull->ntri, &hull->side));
-  PetscCall(PetscCalloc1(old->nvert, &number));
+  PetscCall(PetscMalloc1(old->ncell, &component));
+  nregion = find_regions(old, component);
+  for (PetscInt s = 0; s < 4 * old->ncell; s++) ntri += in_hull(old, component, s / 4, s % 4);
+  PetscCall(SbSurfaceCreate(old->nvert, ntri, nregion, hull));
   for (PetscInt s = 0; s < 4 * old->ncell; s++) {
-    const PetscInt other = faces->neighbour[s];
+    const PetscInt other = old->faces->neighbour[s];
 
-    if (!in_hull(faces, component, s / 4, s % 4)) continue;
-    for (int k = 0; k < 3; k++) {
-      hull->tri[3 * n + k] = old->cell[4 * (s / 4) + SbFaceVertex[s % 4][k]];
-      number[hull->tri[3 * n + k]] = 1;
-    }
+    if (!in_hull(old, component, s / 4, s % 4)) continue;
+    for (int k = 0; k < 3; k++) hull->tri[3 * n + k] = old->cell[4 * (s / 4) + SbFaceVertex[s % 4][k]];
     hull->side[2 * n] = other < 0 ? -1 : component[other];
-    hull->side[2 * n++ + 1] = component[s / 4];
+    hull->side[2 * n + 1] = component[s / 4];
+    hull->number[n] = n + 1;
+    n++;
   }
-  for (PetscInt v = 0; v < old->nvert; v++) hull->nvert += number[v];
-  PetscCall(PetscMalloc1(3 * (size_t)hull->nvert, &hull->x));
-  PetscCall(PetscMalloc1(hull->nvert, kept));
-  n = 0;
-  for (PetscInt v = 0; v < old->nvert; v++) {
-    if (!number[v]) continue;
-    PetscCall(PetscArraycpy(hull->x + 3 * n, x + 3 * v, 3));
-    (*kept)[n] = v;
-    number[v] = n++;
-  }
-  for (PetscInt i = 0; i < 3 * hull->ntri; i++) hull->tri[i] = number[hull->tri[i]];
-  // mean edge length
-  for (PetscInt i = 0; i < 3 * hull->ntri; i++) {
-    const PetscReal *p = hull->x + 3 * hull->tri[i], *q = hull->x + 3 * hull->tri[i % 3 == 2 ? i - 2 : i + 1];
-
-    sum += PetscSqrtReal(PetscSqr(p[0] - q[0]) + PetscSqr(p[1] - q[1]) + PetscSqr(p[2] - q[2]));
-  }
-  hull->edge = sum / (3 * (PetscReal)hull->ntri);
-  PetscCall(PetscFree(number));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode free_hull(SbHull *hull)
-{
-  PetscFunctionBeginUser;
-  PetscCall(PetscFree(hull->x));
-  PetscCall(PetscFree(hull->tri));
-  PetscCall(PetscFree(hull->side));
+  PetscCall(PetscFree(component));
+  nkept = 3 * ntri;
+  PetscCall(PetscMalloc1(nkept, kept));
+  PetscCall(PetscArraycpy(*kept, hull->tri, nkept));
+  PetscCall(PetscSortRemoveDupsInt(&nkept, *kept));
+  PetscCall(PetscArraycpy(hull->x, x, 3 * (size_t)old->nvert));
+  PetscCall(SbDropUnusedPoints(&hull->nvert, hull->x, 3 * ntri, hull->tri));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -281,7 +238,7 @@ static int by_key(const void *a, const void *b)
 }
 
 /* The longest edge of a tet, now, that is not of the hull; false when there is none. */
-static PetscBool inner_edge(const SbHull *hull, const uint64_t edge[], const SbNewMesh *m, PetscInt c,
+static PetscBool inner_edge(const SbSurface *hull, const uint64_t edge[], const SbNewMesh *m, PetscInt c,
                             PetscInt ends[2])
 {
   PetscReal longest = -1;
@@ -340,7 +297,7 @@ static PetscErrorCode split_edge(const SbOldMesh *old, SbLocator rest, const Pet
 }
 
 /* Vertices are moved, and edges of tets that have none to move are split, until all tets are good enough or nothing helps. */
-static PetscErrorCode repair_tets(const SbOldMesh *old, const SbRemeshing *how, const SbHull *hull,
+static PetscErrorCode repair_tets(const SbOldMesh *old, const SbRemeshing *how, const SbSurface *hull,
                                   SbLocator rest, SbNewMesh *m)
 {
   PetscBool split = PETSC_TRUE;
@@ -409,25 +366,17 @@ static PetscErrorCode check_quality(const SbOldMesh *old, const SbRemeshing *how
 
 /* ------------------------------------------------------------------ from beginning to end */
 
-static PetscErrorCode remesh(const char *where, const SbOldMesh *old, const SbRemeshing *how, SbHull *hull,
+static PetscErrorCode remesh(const char *where, const SbOldMesh *old, const SbRemeshing *how, SbSurface *hull,
                              SbLocator *rest, SbNewMesh *m)
 {
   SbTets tets = {0};
   PetscBool *used, all = PETSC_TRUE;
-  SbFaces faces;
-  PetscInt *component;
 
   PetscFunctionBeginUser;
   // the hull: outer surface and interfaces between regions
-  PetscCall(PetscMemzero(hull, sizeof(*hull)));
-  PetscCall(SbFacesCreate(old->nvert, old->ncell, old->cell, &faces));
-  PetscCall(PetscMalloc1(old->ncell, &component));
-  PetscCall(find_regions(old, &faces, &hull->nregion, component));
-  PetscCall(fill_hull(old, &faces, component, how->rest ? old->X : old->x, hull, &m->kept));
-  PetscCall(PetscFree(component));
-  PetscCall(SbFacesDestroy(&faces));
+  PetscCall(create_hull(old, how->rest ? old->X : old->x, hull, &m->kept));
   m->nkept = hull->nvert;
-  PetscCall((*how->mesher)(where, hull, how->size * hull->edge, how->ctx, &tets));
+  PetscCall((*how->mesher)(where, hull, how->size * SbSurfaceMeasure(hull, NULL), how->ctx, &tets));
   m->nvert = tets.nvert;
   m->ncell = tets.ncell;
   m->x = tets.x;
@@ -461,14 +410,14 @@ static PetscErrorCode remesh(const char *where, const SbOldMesh *old, const SbRe
 
 PetscErrorCode SbRemeshBody(const char *where, const SbOldMesh *old, const SbRemeshing *how, SbNewMesh *m)
 {
-  SbHull hull = {0};
+  SbSurface hull = {0};
   SbLocator rest = NULL;
   PetscErrorCode ierr;
 
   PetscFunctionBeginUser;
   PetscCall(PetscMemzero(m, sizeof(*m)));
   ierr = remesh(where, old, how, &hull, &rest, m);
-  PetscCall(free_hull(&hull));
+  PetscCall(SbSurfaceDestroy(&hull));
   PetscCall(SbLocatorDestroy(&rest));
   if (ierr) PetscCall(SbNewMeshDestroy(m));
   PetscCall(ierr);

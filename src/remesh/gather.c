@@ -108,49 +108,12 @@ static PetscErrorCode gather_values(SbRun run, PetscBool root, PetscSF sf, SbGat
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Where vertices are now: P1 has them; of CR and DG the mean of the cells around, weighted with their volumes. */
-static PetscErrorCode current_positions(SbModel m, SbGathered *g)
-{
-  const PetscInt step = g->nfield * 3;
-  PetscReal *weight;
-
-  PetscFunctionBeginUser;
-  PetscCall(PetscCalloc1(g->nvert, &weight));
-  PetscCall(PetscArrayzero(g->x, 3 * (size_t)g->nvert));
-  for (PetscInt b = 0; b < g->nbody; b++) {
-    const SbElement e = m->element[b];
-
-    for (PetscInt c = g->cell0[b]; c < g->cell0[b + 1]; c++) {
-      const PetscReal *u = g->value + (size_t)c * (size_t)(g->width * step);
-      PetscReal x[4][3], gradient[3][3], V;
-
-      for (int i = 0; i < 12; i++) x[i / 3][i % 3] = g->X[3 * g->cell[4 * c + i / 3] + i % 3];
-      e->ops.tabulate((const PetscReal(*)[3])x, gradient, &V);
-      for (int v = 0; v < 4; v++) {
-        const PetscInt vertex = g->cell[4 * c + v];
-
-        if (e->nodes_per[0]) {
-          for (int k = 0; k < 3; k++) g->x[3 * vertex + k] = u[v * step + k];
-          weight[vertex] = 1;
-          continue;
-        }
-        for (int a = 0; a < 4; a++) {
-          for (int k = 0; k < 3; k++) g->x[3 * vertex + k] += V * e->ops.vertex[v][a] * u[a * step + k];
-        }
-        weight[vertex] += V;
-      }
-    }
-  }
-  for (PetscInt i = 0; i < 3 * g->nvert; i++) g->x[i] = g->X[i] + g->x[i] / weight[i / 3];
-  PetscCall(PetscFree(weight));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode SbGather(SbRun run, SbGathered *g)
 {
   const SbModel m = run->model;
   const SbMesh mesh = m->mesh;
   PetscMPIInt rank, supports = m->space->dirichlet_node ? 1 : 0;
+  PetscReal(*centre)[4], *now;
   Vec vec[3];
   PetscSF sf;
 
@@ -170,9 +133,10 @@ PetscErrorCode SbGather(SbRun run, SbGathered *g)
     g->cell0[b + 1] = g->cell0[b] + m->body[b].ncell;
   }
   // masses of the bodies
-  for (PetscInt i = 0; i < m->space->nnode_owned; i++)
-    g->mass[m->space->node_body[i]] += m->space->node_mass[i];
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, g->mass, (PetscMPIInt)m->nbody, MPIU_REAL, MPI_SUM, m->comm));
+  PetscCall(PetscMalloc1(m->nbody, &centre));
+  PetscCall(SbModelCentres(m, NULL, centre));
+  for (PetscInt b = 0; b < m->nbody; b++) g->mass[b] = centre[b][3];
+  PetscCall(PetscFree(centre));
   // vertices and their sets to rank 0
   if (!rank) {
     PetscCall(PetscMalloc1(3 * (size_t)g->nvert, &g->X));
@@ -180,14 +144,17 @@ PetscErrorCode SbGather(SbRun run, SbGathered *g)
     PetscCall(PetscMalloc1(g->nvert, &g->vert_set));
   }
   PetscCall(forest(mesh->comm, mesh->Nvert, mesh->nvert_owned, mesh->vert_orig, &sf));
+  PetscCall(PetscMalloc1(3 * (size_t)mesh->nvert, &now));
+  PetscCall(SbCornerPositions(m->space, run->U, now));
   PetscCall(collect(sf, 3, MPIU_REAL, mesh->x, g->X));
+  PetscCall(collect(sf, 3, MPIU_REAL, now, g->x));
+  PetscCall(PetscFree(now));
   PetscCall(collect(sf, 1, MPI_UINT64_T, mesh->vert_set, g->vert_set));
   PetscCall(PetscSFDestroy(&sf));
   PetscCall(forest(m->comm, mesh->Ncell, mesh->ncell_owned, mesh->cell_orig, &sf));
   PetscCall(gather_cells(mesh, (PetscBool)!rank, sf, g));
   PetscCall(gather_values(run, (PetscBool)!rank, sf, g));
   PetscCall(PetscSFDestroy(&sf));
-  if (!rank) PetscCall(current_positions(m, g));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

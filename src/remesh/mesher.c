@@ -13,11 +13,11 @@
 #define AHEAD 0.3 /* of a step: with one half, round numbers would lie where rounding is not sure */
 
 /* One attempt. step: coordinates are rounded to multiples of it, m; 0: they stay as they are. */
-static PetscErrorCode fill(const char *where, const SbHull *hull, PetscReal size, PetscReal step,
+static PetscErrorCode fill(const char *where, const SbSurface *hull, PetscReal size, PetscReal step,
                            SbImport *im)
 {
   SbTetOptions options;
-  SbSurface body_surface;
+  SbSurface rounded = *hull;
   PetscErrorCode ierr;
   PetscInt none;
 
@@ -28,26 +28,20 @@ static PetscErrorCode fill(const char *where, const SbHull *hull, PetscReal size
   PetscCall(SbTetDefaults(&options));
   options.size = step > 0 ? step * PetscMax(1, PetscFloorReal(size / step)) : size;
   options.surface = SB_TET_KEEP;
-  // the hull as a surface of its own
-  PetscCall(SbSurfaceCreate(hull->nvert, hull->ntri, hull->nregion, &body_surface));
-  PetscCall(PetscArraycpy(body_surface.x, hull->x, 3 * (size_t)hull->nvert));
-  PetscCall(PetscArraycpy(body_surface.tri, hull->tri, 3 * (size_t)hull->ntri));
-  PetscCall(PetscArraycpy(body_surface.side, hull->side, 2 * (size_t)hull->ntri));
-  PetscCall(PetscArrayzero(body_surface.tags, hull->ntri));
-  PetscCall(PetscArrayzero(body_surface.region_tags, hull->nregion));
-  for (PetscInt t = 0; t < hull->ntri; t++) body_surface.number[t] = t + 1;
-  for (PetscInt i = 0; i < 3 * hull->nvert && step > 0; i++)
-    body_surface.x[i] = step * PetscFloorReal(body_surface.x[i] / step + AHEAD);
-  ierr = SbTetrahedralize(where, &body_surface, &options, im);
-  PetscCall(SbSurfaceDestroy(&body_surface));
+  PetscCall(PetscMalloc1(3 * (size_t)hull->nvert, &rounded.x));
+  for (PetscInt i = 0; i < 3 * hull->nvert; i++)
+    rounded.x[i] = step > 0 ? step * PetscFloorReal(hull->x[i] / step + AHEAD) : hull->x[i];
+  ierr = SbTetrahedralize(where, &rounded, &options, im);
+  PetscCall(PetscFree(rounded.x));
   if (ierr) PetscCall(SbImportDestroy(im));
   PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbMesherDefault(const char *where, const SbHull *hull, PetscReal size, void *ctx, SbTets *tets)
+PetscErrorCode SbMesherDefault(const char *where, const SbSurface *hull, PetscReal size, void *ctx,
+                               SbTets *tets)
 {
-  const PetscReal step = PetscPowReal(2, PetscFloorReal(PetscLog2Real(hull->edge)) - BITS);
+  const PetscReal step = PetscPowReal(2, PetscFloorReal(PetscLog2Real(SbSurfaceMeasure(hull, NULL))) - BITS);
   SbImport im;
   PetscErrorCode ierr;
 

@@ -45,6 +45,7 @@ typedef struct {
   const PetscReal *X, *x; /* [nvert][3] at rest, now; m */
   const PetscInt *cell;   /* [ncell][4] */
   const PetscInt *region; /* [ncell] tets of different numbers stay apart */
+  const SbFaces *faces;   /* of cell */
 } SbOldMesh;
 /* Another one of the same body; arrays owned, SbNewMeshDestroy(). */
 typedef struct {
@@ -89,6 +90,8 @@ PetscErrorCode SbRemeshBodies(SbModel model, const SbGathered *g, const PetscBoo
 /*
   check.c - qualities and momenta.
 */
+/* Where the vertices of owned cells are now, x[nvert][3], m: of CR and DG the means around them. Collective. */
+PetscErrorCode SbCornerPositions(SbSpace space, Vec U, PetscReal x[]);
 /* worst[nbody]: quality of the worst tet of each body that is named, else 1. Collective. */
 PetscErrorCode SbBodyQualities(SbModel model, Vec U, const PetscBool named[], PetscReal worst[]);
 /* Momentum and angular momentum about the origin of each body, [nbody][6], SI. Collective. */

@@ -288,7 +288,7 @@ static PetscErrorCode refuse_open(const SbTriangleFile *f, PetscInt n, const Pet
   const PetscReal *a = t->x + 3 * t->tri[slot[0]],
                   *b = t->x + 3 * t->tri[slot[0] % 3 == 2 ? slot[0] - 2 : slot[0] + 1];
   const PetscReal need = partner_distance(t, n, slot);
-  char option[SB_OPTION_NAME_MAX], what[256] = "close the holes (meshlab: close holes; blender: fill)";
+  char option[SB_IMPORT_OPTION_MAX], what[256] = "close the holes (meshlab: close holes; blender: fill)";
 
   PetscFunctionBeginUser;
   if (need > 0 && f->groups)

@@ -108,7 +108,7 @@ static PetscErrorCode write_repairs(const SbTriangles *t, const SbSurfaceRepairs
 /* To metres, and nothing that is not a number. */
 static PetscErrorCode scale_file(PetscReal scale, SbTriangleFile *f)
 {
-  char option[SB_OPTION_NAME_MAX];
+  char option[SB_IMPORT_OPTION_MAX];
 
   PetscFunctionBeginUser;
   for (PetscInt i = 0; i < 3 * f->t->nvert; i++) {
@@ -132,7 +132,7 @@ static PetscErrorCode weld_tolerance(const SbTriangleFile *f, PetscReal given, P
 {
   const SbTriangles *t = f->t;
   PetscReal box[6], around, longest2, sum = 0;
-  char option[SB_OPTION_NAME_MAX];
+  char option[SB_IMPORT_OPTION_MAX];
 
   PetscFunctionBeginUser;
   SbBoxClear(box);
@@ -155,7 +155,7 @@ static PetscErrorCode make_surface(const char *path, const SbImport *im, SbTrian
 {
   SbSurfaceRepairs repairs;
   PetscReal tolerance, edge;
-  char option[SB_OPTION_NAME_MAX];
+  char option[SB_IMPORT_OPTION_MAX];
 
   PetscFunctionBeginUser;
   PetscCall(PetscMemzero(&repairs, sizeof(repairs)));

@@ -47,17 +47,6 @@ typedef struct {
   Surface *surfaces;
 } Space;
 
-/* Numbers heaps in the order of their first members, in place. */
-static PetscInt number_heaps(PetscInt n, PetscInt up[])
-{
-  PetscInt count = 0;
-
-  for (PetscInt i = 0; i < n; i++) up[i] = SbUnionRoot(up, i);
-  for (PetscInt i = 0; i < n; i++)
-    up[i] = up[i] == i ? count++ : up[up[i]]; /* the root comes first and has its number */
-  return count;
-}
-
 /* ------------------------------------------------------------------ turned alike */
 
 /* Walks over one piece: sense[f] says whether f is turned as the first one (1) or the other way (-1). */
@@ -227,8 +216,8 @@ static PetscErrorCode find_shells(Space *s)
     for (PetscInt k = 1; k < m; k++)
       (void)SbUnionJoin(s->surface, s->edge[i].slot / 3, s->edge[i + k].slot / 3);
   }
-  s->nshell = number_heaps(2 * s->t->ntri, s->shell);
-  s->nsurface = number_heaps(s->t->ntri, s->surface);
+  s->nshell = SbUnionNumber(2 * s->t->ntri, s->shell);
+  s->nsurface = SbUnionNumber(s->t->ntri, s->surface);
   PetscCheck(s->nsurface <= PARTS_MAX, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
              "%s: the surface consists of %" PetscInt_FMT
              " parts; supple takes up to %d: remove the specks around it "

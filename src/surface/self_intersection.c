@@ -149,7 +149,7 @@ PetscErrorCode SbSurfaceUntangle(SbTriangleFile *f, PetscReal reach, SbSurfaceRe
   SbTriangles *t = f->t;
   Search search, left;
   PetscInt ncrossing = 0;
-  char why[192] = "", option[SB_OPTION_NAME_MAX];
+  char why[192] = "", option[SB_IMPORT_OPTION_MAX];
   PetscErrorCode ierr = PETSC_SUCCESS;
 
   PetscFunctionBeginUser;

@@ -6,8 +6,6 @@
 #include "sbsurface.h"
 #include "triangles.h"
 
-/* Volume of each region, volume[nregion]; returns the mean edge of the triangles. */
-PetscReal SbSurfaceMeasure(const SbSurface *surface, PetscReal volume[]);
 /*
   SbSurfaceRead - a surface from a file, repaired and checked, with its regions; groups and im->note are those of the body `im`. Not collective.
 

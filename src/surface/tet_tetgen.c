@@ -115,7 +115,7 @@ static PetscErrorCode run_tetgen(const char *folder, const char *flags, const Sb
   const double end = now() + job->options.seconds;
   const pid_t pid = fork();
   int status = 0, pause = 1;
-  char option[SB_OPTION_NAME_MAX];
+  char option[SB_IMPORT_OPTION_MAX];
 
   PetscFunctionBeginUser;
   if (!pid) become_tetgen(folder, flags);

@@ -50,12 +50,12 @@ PetscReal SbSurfaceMeasure(const SbSurface *s, PetscReal volume[])
   const SbTriangles t = {.nvert = s->nvert, .ntri = s->ntri, .x = s->x, .tri = s->tri};
   PetscReal sum = 0, longest2, around;
 
-  for (PetscInt r = 0; r < s->nregion; r++) volume[r] = 0;
+  for (PetscInt r = 0; volume && r < s->nregion; r++) volume[r] = 0;
   for (PetscInt f = 0; f < s->ntri; f++) {
     const PetscReal cone = SbTetVolumeTo(&t, f, s->x);
 
-    if (s->side[2 * f] >= 0) volume[s->side[2 * f]] -= cone;
-    if (s->side[2 * f + 1] >= 0) volume[s->side[2 * f + 1]] += cone;
+    if (volume && s->side[2 * f] >= 0) volume[s->side[2 * f]] -= cone;
+    if (volume && s->side[2 * f + 1] >= 0) volume[s->side[2 * f + 1]] += cone;
     (void)SbTriangleMeasure(&t, f, &longest2, &around);
     sum += around;
   }
@@ -233,7 +233,7 @@ static PetscErrorCode prepare(const char *where, const SbSurface *s, const SbTet
                               const SbImport *body, SbTetJob *job)
 {
   PetscReal *volume, edge, all = 0;
-  char option[SB_OPTION_NAME_MAX];
+  char option[SB_IMPORT_OPTION_MAX];
 
   PetscFunctionBeginUser;
   PetscCheck(s->ntri > 3 && s->nregion > 0, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
@@ -300,7 +300,7 @@ PetscErrorCode SbTetrahedralize(const char *where, const SbSurface *s, const SbT
   SbSurface scaled;
   PetscReal factor;
   PetscBool done = PETSC_FALSE;
-  char reasons[640] = "", size_option[SB_OPTION_NAME_MAX], surface_option[SB_OPTION_NAME_MAX];
+  char reasons[640] = "", size_option[SB_IMPORT_OPTION_MAX], surface_option[SB_IMPORT_OPTION_MAX];
   int exponent;
   PetscErrorCode ierr;
 

@@ -308,19 +308,13 @@ static PetscErrorCode largest_body(SbModel m, PetscReal *size)
   PetscReal(*middle)[4], far = 0.;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscCalloc1(m->nbody, &middle));
-  for (PetscInt i = 0; i < s->nnode_owned; i++) {
-    PetscReal *c = middle[m->space->node_body[i]];
-
-    for (PetscInt k = 0; k < 3; k++) c[k] += s->node_mass[i] * s->node_x[3 * i + k];
-    c[3] += s->node_mass[i];
-  }
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, middle, (PetscMPIInt)(4 * m->nbody), MPIU_REAL, MPI_SUM, m->comm));
+  PetscCall(PetscMalloc1(m->nbody, &middle));
+  PetscCall(SbModelCentres(m, NULL, middle));
   for (PetscInt i = 0; i < s->nnode_owned; i++) {
     const PetscReal *c = middle[m->space->node_body[i]];
     PetscReal square = 0.;
 
-    for (PetscInt k = 0; k < 3; k++) square += PetscSqr(s->node_x[3 * i + k] - c[k] / c[3]);
+    for (PetscInt k = 0; k < 3; k++) square += PetscSqr(s->node_x[3 * i + k] - c[k]);
     far = PetscMax(far, square);
   }
   PetscCall(PetscFree(middle));

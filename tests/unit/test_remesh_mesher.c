@@ -25,13 +25,12 @@ static PetscInt number_of(const PetscInt at[3])
 }
 
 /* A box whose sides have N x N squares of two triangles; vertices are moved by up to twice `bits`. */
-static PetscErrorCode make_hull(const PetscReal size[3], PetscReal bits, SbHull *hull)
+static PetscErrorCode make_hull(const PetscReal size[3], PetscReal bits, SbSurface *hull)
 {
   PetscInt at[3], n = 0;
 
   PetscFunctionBeginUser;
-  *hull = (SbHull){.nvert = NVERT, .ntri = NTRI, .nregion = 1, .edge = 1. / N};
-  PetscCall(PetscMalloc3(3 * NVERT, &hull->x, 3 * NTRI, &hull->tri, 2 * NTRI, &hull->side));
+  PetscCall(SbSurfaceCreate(NVERT, NTRI, 1, hull));
   for (at[2] = 0; at[2] <= N; at[2]++) {
     for (at[1] = 0; at[1] <= N; at[1]++) {
       for (at[0] = 0; at[0] <= N; at[0]++) {
@@ -66,7 +65,7 @@ static PetscErrorCode make_hull(const PetscReal size[3], PetscReal bits, SbHull 
 
 static PetscErrorCode fill(const PetscReal size[3], PetscReal bits, PetscReal *volume, SbTets *tets)
 {
-  SbHull hull;
+  SbSurface hull;
 
   PetscFunctionBeginUser;
   PetscCall(make_hull(size, bits, &hull));
@@ -81,7 +80,7 @@ static PetscErrorCode fill(const PetscReal size[3], PetscReal bits, PetscReal *v
   for (int i = 0; i < 3 * NVERT; i++)
     SB_CHECK(PetscAbsReal(tets->x[i] - hull.x[i]) < 1e-3, "coordinate %d of the hull is %g, was %g", i,
              (double)tets->x[i], (double)hull.x[i]);
-  PetscCall(PetscFree3(hull.x, hull.tri, hull.side));
+  PetscCall(SbSurfaceDestroy(&hull));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
