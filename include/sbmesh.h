@@ -188,3 +188,19 @@ PetscErrorCode SbMemoryMeshDestroy(SbMemoryMesh **in_memory);
   Errors: PETSC_ERR_USER_INPUT, one line that names option, text and the right form.
 */
 PetscErrorCode SbSetParse(const char *option, const char *text, SbSet *set);
+
+/* ------------------------------------------------------------------ route.c: records to other ranks */
+
+typedef struct {
+  MPI_Comm comm;
+  PetscInt nsend, nrecv;
+  PetscInt *position; /* [nsend] of a record among those that leave, by rank */
+  PetscMPIInt size, *scount, *sfirst, *rcount,
+    *rfirst; /* [size] records to and from each rank, and the first of them */
+} SbRoute;
+
+/* Prepares n records to go to ranks dest[n]; their order among those for one rank stays. Collective. */
+PetscErrorCode SbRouteCreate(MPI_Comm comm, PetscInt n, const PetscMPIInt dest[], SbRoute *route);
+PetscErrorCode SbRouteDestroy(SbRoute *route);
+/* Sends records of `unit` bytes, record[nsend]; received[nrecv] by rank, PetscFree(). Collective. */
+PetscErrorCode SbRouteSend(const SbRoute *route, size_t unit, const void *record, void *received);

@@ -27,7 +27,8 @@
 #include "sbtime.h"
 
 /* A named field. compute() fills this rank's owned entities (points or cells, in the mesh's local order). */
-typedef struct {
+typedef struct SbField SbField;
+struct SbField {
   const char *name; /* "von_mises" */
   const char *unit;
   PetscInt ncomp; /* 1 scalar, 3 vector, 6 symmetric tensor: xx xy xz yy yz zz, the Tensor6 order of XDMF */
@@ -36,9 +37,12 @@ typedef struct {
   PetscBool constant; /* whole numbers, written once with the mesh */
   PetscBool dynamic;  /* does not exist in a static run */
   const char *help;
-  PetscErrorCode (*compute)(SbRun run, const SbStep *step,
+  PetscErrorCode (*compute)(const SbField *field, SbRun run, const SbStep *step,
                             PetscReal *values); /* NULL: `sets`, several arrays */
-} SbField;
+  /* what some compute() need: */
+  size_t from; /* where in the step or the output the quantity is */
+  void (*of_stress)(const PetscReal sigma[6], PetscReal value[]); /* value[ncomp] from xx yy zz xy yz xz */
+};
 
 PetscErrorCode SbOutputRegister(void); /* option rows */
 

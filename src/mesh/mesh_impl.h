@@ -78,21 +78,8 @@ PetscErrorCode SbMemoryMeshMark(const SbBody *body, const SbFaces *faces, SbMask
 PetscErrorCode SbSetsCheck(PetscInt nbody, const SbBody body[], const SbImport import[], PetscInt nset,
                            const SbSet set[]);
 
-/* ------------------------------------------------------------------ route.c: records to other ranks, and answers back */
+/* ------------------------------------------------------------------ route.c: see sbmesh.h */
 
-typedef struct {
-  MPI_Comm comm;
-  PetscInt nsend, nrecv;
-  PetscInt *position; /* [nsend] of a record among those that leave, by rank */
-  PetscMPIInt size, *scount, *sfirst, *rcount,
-    *rfirst; /* [size] records to and from each rank, and the first of them */
-} SbRoute;
-
-/* Prepares n records to go to ranks dest[n]; their order among those for one rank stays. Collective. */
-PetscErrorCode SbRouteCreate(MPI_Comm comm, PetscInt n, const PetscMPIInt dest[], SbRoute *route);
-PetscErrorCode SbRouteDestroy(SbRoute *route);
-/* Sends records of `unit` bytes, record[nsend]; received[nrecv] by rank, PetscFree(). Collective. */
-PetscErrorCode SbRouteSend(const SbRoute *route, size_t unit, const void *record, void *received);
 /* Brings answer[nrecv] back to who sent the records: result[nsend], room of the caller. Collective. */
 PetscErrorCode SbRouteReply(const SbRoute *route, size_t unit, const void *answer, void *result);
 /* The rank that sent record i of those received. */

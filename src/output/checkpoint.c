@@ -37,23 +37,40 @@ static void parts_of(SbRun run, Part part[NPART])
   part[PATH] = (Part){"path", run->path};
 }
 
-/* Running totals, by name. */
+/* When the file was written, and how the run goes on. */
+typedef struct {
+  PetscReal t, next, dt, t_end, paused;
+} Times;
+
+/* The numbers, by name. Optional ones are zero where they are missing: those of re-meshing, and of a pause. */
 typedef struct {
   const char *name;
   PetscReal *value;
-} Total;
+  PetscBool optional;
+} Number;
 
-#define NTOTAL 6
-static void totals_of(SbRun run, Total total[NTOTAL])
+#define NNUMBER 14
+static void numbers_of(SbRun run, Times *times, Number number[NNUMBER])
 {
   SbEnergies *e = &run->energies;
+  const Number all[NNUMBER] = {
+    {"time", &times->t, PETSC_FALSE},
+    {"dt_next", &times->next, PETSC_FALSE},
+    {"dt", &times->dt, PETSC_FALSE},
+    {"t_end", &times->t_end, PETSC_FALSE},
+    {"load_work", &e->load_work, PETSC_FALSE},
+    {"prescribed_work", &e->prescribed_work, PETSC_FALSE},
+    {"damping_loss", &e->damping_loss, PETSC_FALSE},
+    {"integrator_loss", &e->integrator_loss, PETSC_FALSE},
+    {"energy_start", &run->energy_start, PETSC_FALSE},
+    {"load_factor", &run->model->load, PETSC_FALSE},
+    {"remesh_loss", &e->remesh_loss, PETSC_TRUE},
+    {"remesh_mass", &e->remesh_mass, PETSC_TRUE},
+    {"remesh_momentum", &e->remesh_momentum, PETSC_TRUE},
+    {"paused_after", &times->paused, PETSC_TRUE},
+  };
 
-  total[0] = (Total){"load_work", &e->load_work};
-  total[1] = (Total){"prescribed_work", &e->prescribed_work};
-  total[2] = (Total){"damping_loss", &e->damping_loss};
-  total[3] = (Total){"integrator_loss", &e->integrator_loss};
-  total[4] = (Total){"energy_start", &run->energy_start};
-  total[5] = (Total){"load_factor", &run->model->load};
+  memcpy(number, all, sizeof(all));
 }
 
 static PetscErrorCode checksum_of(const SbOrder *order, uint64_t salt, const PetscReal slice[], uint64_t *sum)
@@ -99,43 +116,24 @@ static PetscErrorCode write_vectors(SbRun run, SbOutput out, SbH5 *h, uint64_t *
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Totals of re-meshing, which are there only behind one. */
-#define NREMESH 3
-static const char *const remesh_names[NREMESH] = {"remesh_loss", "remesh_mass", "remesh_momentum"};
-static PetscReal *remesh_total(SbRun run, int k)
-{
-  SbEnergies *e = &run->energies;
-
-  return k == 0 ? &e->remesh_loss : k == 1 ? &e->remesh_mass : &e->remesh_momentum;
-}
-
 static PetscErrorCode write_numbers(SbRun run, SbOutput out, const SbStep *step, SbH5 *h, uint64_t checksum)
 {
-  Total total[NTOTAL];
-  PetscReal dt = run->dt;
+  Times times = {step->t, run->dt, run->dt, run->t_end, run->paused ? run->after.dt : 0.};
+  Number number[NNUMBER];
 
   PetscFunctionBeginUser;
-  /* works and losses so far */
-  if (run->ts) PetscCall(TSGetTimeStep(run->ts, &dt));
-  totals_of(run, total);
-  for (int i = 0; i < NTOTAL; i++) PetscCall(SbH5PutReal(h, h->file, total[i].name, *total[i].value));
-
-  for (int k = 0; k < NREMESH; k++)
-    if (*remesh_total(run, k) != 0.)
-      PetscCall(SbH5PutReal(h, h->file, remesh_names[k], *remesh_total(run, k)));
+  /* where in time it is, works and losses so far */
+  if (run->ts) PetscCall(TSGetTimeStep(run->ts, &times.next));
+  numbers_of(run, &times, number);
+  for (int i = 0; i < NNUMBER; i++)
+    if (!number[i].optional || *number[i].value != 0.)
+      PetscCall(SbH5PutReal(h, h->file, number[i].name, *number[i].value));
+  PetscCall(SbH5PutInt(h, h->file, "step", step->step));
 
   /* errors that the ledger has added up, and the material points that probes follow */
   for (PetscInt i = 0; i < run->ncarried; i++)
     PetscCall(SbH5PutReal(h, h->file, run->carried[i].name, *run->carried[i].value));
   PetscCall(SbProbesWrite(run, out, h));
-
-  /* where in time it is, and how long the next step would be */
-  if (run->paused) PetscCall(SbH5PutReal(h, h->file, "paused_after", run->after.dt));
-  PetscCall(SbH5PutReal(h, h->file, "time", step->t));
-  PetscCall(SbH5PutReal(h, h->file, "dt_next", dt));
-  PetscCall(SbH5PutReal(h, h->file, "dt", run->dt));
-  PetscCall(SbH5PutReal(h, h->file, "t_end", run->t_end));
-  PetscCall(SbH5PutInt(h, h->file, "step", step->step));
 
   /* by what a restart knows that the file fits the run and is whole */
   PetscCall(SbH5PutInt(h, h->file, "mesh_hash", (int64_t)out->mesh_hash));
@@ -292,29 +290,27 @@ static PetscErrorCode read_vectors(SbRun run, SbOutput out, SbH5 *h, uint64_t *a
 static PetscErrorCode load(SbRun run, SbOutput out, const char *path, PetscBool *ok)
 {
   SbH5 h;
-  Total total[NTOTAL];
+  Times times;
+  Number number[NNUMBER];
   int64_t step, mesh_hash, checksum = 0, format;
   uint64_t sum = 0;
   SbRecords *records;
-  PetscReal t, next, dt, t_end, values[NTOTAL], remeshed[NREMESH] = {0.}, paused = 0.;
-  PetscBool there[NREMESH] = {PETSC_TRUE, PETSC_TRUE, PETSC_TRUE}, pauses = PETSC_TRUE;
+  PetscReal values[NNUMBER] = {0.};
 
   PetscFunctionBeginUser;
   PetscCall(SbH5Open(out->comm, path, PETSC_FALSE, &h, ok));
   if (!*ok) PetscFunctionReturn(PETSC_SUCCESS);
-  /* numbers; those of re-meshing and of a pause are not in every file */
   PetscCall(SbH5GetInt(h.file, "format", &format, ok));
   PetscCall(SbH5GetInt(h.file, "step", &step, ok));
   PetscCall(SbH5GetInt(h.file, "mesh_hash", &mesh_hash, ok));
   PetscCall(SbH5GetInt(h.file, "checksum", &checksum, ok));
-  PetscCall(SbH5GetReal(h.file, "time", &t, ok));
-  PetscCall(SbH5GetReal(h.file, "dt_next", &next, ok));
-  PetscCall(SbH5GetReal(h.file, "dt", &dt, ok));
-  PetscCall(SbH5GetReal(h.file, "t_end", &t_end, ok));
-  totals_of(run, total);
-  for (int i = 0; i < NTOTAL; i++) PetscCall(SbH5GetReal(h.file, total[i].name, &values[i], ok));
-  for (int k = 0; k < NREMESH; k++) PetscCall(SbH5GetReal(h.file, remesh_names[k], &remeshed[k], &there[k]));
-  PetscCall(SbH5GetReal(h.file, "paused_after", &paused, &pauses));
+  numbers_of(run, &times, number);
+  for (int i = 0; i < NNUMBER; i++) {
+    PetscBool there = PETSC_TRUE;
+
+    PetscCall(SbH5GetReal(h.file, number[i].name, &values[i], &there));
+    if (!there && !number[i].optional) *ok = PETSC_FALSE;
+  }
   if (*ok && format != FORMAT) *ok = PETSC_FALSE;
 
   /* the state, and whether it is what was written for such a run */
@@ -325,9 +321,10 @@ static PetscErrorCode load(SbRun run, SbOutput out, const char *path, PetscBool 
   if (*ok) PetscCall(SbCheckpointSumMeshes(run, &h, &sum, ok));
   if (sum != (uint64_t)checksum) *ok = PETSC_FALSE;
 
-  /* the next step is that of the uninterrupted run, which may be a short one before t_end; with another fixed step or end the run takes its own */
-  if (*ok && run->ts && (!run->fixed_step || (dt == run->dt && t_end == run->t_end)))
-    PetscCall(TSSetTimeStep(run->ts, next));
+  /* the numbers; the next step is that of the uninterrupted run, which may be a short one before t_end; with another fixed step or end the run takes its own */
+  for (int i = 0; i < NNUMBER && *ok; i++) *number[i].value = values[i];
+  if (*ok && run->ts && (!run->fixed_step || (times.dt == run->dt && times.t_end == run->t_end)))
+    PetscCall(TSSetTimeStep(run->ts, times.next));
 
   /* errors that the ledger has added up: all or none, as a run without -ledger writes none */
   if (*ok && run->ncarried) {
@@ -347,15 +344,13 @@ static PetscErrorCode load(SbRun run, SbOutput out, const char *path, PetscBool 
   PetscCall(SbH5Close(&h));
 
   /* effects take up what they remember, and the run stands where the file was written */
-  if (*ok) PetscCall(SbCheckpointLoadEffects(run, t, records));
+  if (*ok) PetscCall(SbCheckpointLoadEffects(run, times.t, records));
   PetscCall(SbCheckpointFreeEffects(run, records));
   PetscCall(PetscFree(records));
   if (!*ok) PetscFunctionReturn(PETSC_SUCCESS);
-  for (int i = 0; i < NTOTAL; i++) *total[i].value = values[i];
-  for (int k = 0; k < NREMESH; k++) *remesh_total(run, k) = remeshed[k];
-  run->after.dt = paused;
+  run->after.dt = times.paused;
   run->step0 = (PetscInt)step;
-  run->t0 = t;
+  run->t0 = times.t;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

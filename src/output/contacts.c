@@ -42,16 +42,13 @@ static const struct {
 #define NTABLE ((int)PETSC_STATIC_ARRAY_LENGTH(table))
 
 struct _p_SbContacts {
-  SbContactPoints list;        /* of this rank */
-  PetscInt nsend, nrecord;     /* rooms */
-  PetscReal *send, *record;    /* [nsend][RECORD] by rank; [nrecord][RECORD] of this rank's share, sorted */
-  PetscMPIInt *count, *offset; /* [2 size] points to each rank, then from each */
-  SbOrder share;               /* which rows are this rank's; it has no star forest */
-  void *column;                /* [nrecord][3] of one quantity, as in the file */
-  MPI_Datatype type;           /* of a record */
-  SbXdmf xdmf;                 /* rank 0 only */
-  PetscBool listed;            /* it has a frame */
-  PetscReal nowhere[3];        /* a vertex of the mesh, m */
+  SbContactPoints list; /* of this rank */
+  PetscReal *record;    /* [share.n][RECORD] of this rank's share, sorted */
+  SbOrder share;        /* which rows are this rank's; it has no star forest */
+  void *column;         /* [share.n][3] of one quantity, as in the file */
+  SbXdmf xdmf;          /* rank 0 only */
+  PetscBool listed;     /* it has a frame */
+  PetscReal nowhere[3]; /* a vertex of the mesh, m */
 };
 
 /* ------------------------------------------------------------------ to the ranks that write them */
@@ -86,46 +83,37 @@ static int by_keys(const void *a, const void *b)
   return 0;
 }
 
-static PetscErrorCode make_room(PetscInt n, PetscInt *size, PetscReal **records)
-{
-  PetscFunctionBeginUser;
-  if (n <= *size) PetscFunctionReturn(PETSC_SUCCESS);
-  *size = PetscMax(64, 2 * n);
-  PetscCall(PetscFree(*records));
-  PetscCall(PetscMalloc1(RECORD * (size_t)*size, records));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Puts the points of this rank into c->send, those for lower ranks first; c->count and c->offset of what is sent. */
-static PetscErrorCode sort_by_rank(SbContacts c, PetscMPIInt size)
+/* The contact points of this rank to the ranks that have their share of the numbers of points and edges; those that came, sorted. */
+static PetscErrorCode share_points(SbContacts c, PetscMPIInt size)
 {
   PetscInt bound = 0;
+  PetscMPIInt *dest;
+  PetscReal *mine;
+  SbRoute route;
 
   PetscFunctionBeginUser;
-  PetscCall(make_room(c->list.n, &c->nsend, &c->send));
   for (PetscInt i = 0; i < c->list.n; i++) bound = PetscMax(bound, c->list.point[i].id[1]);
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &bound, 1, MPIU_INT, MPI_MAX, c->share.comm));
-  PetscCall(PetscArrayzero(c->count, size));
-  for (int pass = 0; pass < 2; pass++) {
-    for (PetscInt i = 0; i < c->list.n; i++) {
-      const SbContactPoint *p = &c->list.point[i];
-      const PetscInt to = (PetscInt)((PetscInt64)p->id[1] * size / ((PetscInt64)bound + 1));
+  PetscCall(PetscMalloc2(c->list.n, &dest, RECORD * (size_t)c->list.n, &mine));
+  for (PetscInt i = 0; i < c->list.n; i++) {
+    const SbContactPoint *p = &c->list.point[i];
 
-      if (!pass)
-        c->count[to]++;
-      else
-        fill(p, c->send + RECORD * (size_t)c->offset[to]++);
-    }
-    // Filling has moved every offset to the next one.
-    for (PetscMPIInt r = 0, at = 0; r < size; at += c->count[r++]) c->offset[r] = at;
+    dest[i] = (PetscMPIInt)((PetscInt64)p->id[1] * size / ((PetscInt64)bound + 1));
+    fill(p, mine + RECORD * (size_t)i);
   }
+  PetscCall(PetscFree(c->record));
+  PetscCall(SbRouteCreate(c->share.comm, c->list.n, dest, &route));
+  PetscCall(SbRouteSend(&route, RECORD * sizeof(PetscReal), mine, &c->record));
+  c->share.n = route.nrecv;
+  PetscCall(SbRouteDestroy(&route));
+  PetscCall(PetscFree2(dest, mine));
+  if (c->share.n) qsort(c->record, (size_t)c->share.n, RECORD * sizeof(PetscReal), by_keys);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode SbContactsFind(SbRun run, SbOutput out, const SbStep *step, PetscInt64 *bytes)
 {
   SbContacts c = out->contacts;
-  PetscInt n = 0;
 
   PetscFunctionBeginUser;
   *bytes = 0;
@@ -135,21 +123,12 @@ PetscErrorCode SbContactsFind(SbRun run, SbOutput out, const SbStep *step, Petsc
   PetscCall(PetscLogEventBegin(out->event.contacts, 0, 0, 0, 0));
   c->list.n = 0;
   PetscCall(SbModelContactPoints(run->model, step->t, step->U, step->R, &c->list));
-  PetscCall(sort_by_rank(c, out->size));
-  PetscCallMPI(MPI_Alltoall(c->count, 1, MPI_INT, c->count + out->size, 1, MPI_INT, out->comm));
-  for (PetscMPIInt r = out->size; r < 2 * out->size; n += c->count[r++]) c->offset[r] = (PetscMPIInt)n;
-  if (n > c->nrecord) {
-    PetscCall(make_room(n, &c->nrecord, &c->record));
-    PetscCall(PetscFree(c->column));
-    PetscCall(PetscMalloc(3 * sizeof(double) * (size_t)c->nrecord, &c->column));
-  }
-  PetscCallMPI(MPI_Alltoallv(c->send, c->count, c->offset, c->type, c->record, c->count + out->size,
-                             c->offset + out->size, c->type, out->comm));
-  if (n) qsort(c->record, (size_t)n, RECORD * sizeof(PetscReal), by_keys);
-  c->share.n = n;
-  PetscCallMPI(MPI_Scan(&n, &c->share.start, 1, MPIU_INT, MPI_SUM, out->comm));
-  c->share.start -= n;
-  PetscCallMPI(MPI_Allreduce(&n, &c->share.N, 1, MPIU_INT, MPI_SUM, out->comm));
+  PetscCall(share_points(c, out->size));
+  PetscCall(PetscFree(c->column));
+  PetscCall(PetscMalloc(3 * sizeof(double) * (size_t)c->share.n, &c->column));
+  PetscCallMPI(MPI_Scan(&c->share.n, &c->share.start, 1, MPIU_INT, MPI_SUM, out->comm));
+  c->share.start -= c->share.n;
+  PetscCallMPI(MPI_Allreduce(&c->share.n, &c->share.N, 1, MPIU_INT, MPI_SUM, out->comm));
   *bytes = (PetscInt64)c->share.N * RECORD * (PetscInt64)sizeof(double) + NTABLE * 8192;
   PetscCall(PetscLogEventEnd(out->event.contacts, 0, 0, 0, 0));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -274,9 +253,6 @@ PetscErrorCode SbContactsCreate(SbRun run, SbOutput out)
   if (out->contact_points) run->want_residual = PETSC_TRUE;
   c->share.comm = out->comm;
   c->share.each = 1;
-  PetscCall(PetscMalloc2(2 * (size_t)out->size, &c->count, 2 * (size_t)out->size, &c->offset));
-  PetscCallMPI(MPI_Type_contiguous(RECORD, MPIU_REAL, &c->type));
-  PetscCallMPI(MPI_Type_commit(&c->type));
   if (out->rank) PetscFunctionReturn(PETSC_SUCCESS);
   for (int k = 0; k < 3 && mesh->nvert; k++) c->nowhere[k] = mesh->x[k];
   PetscCall(SbOutputPath(out, "contacts.xmf", sizeof(path), path));
@@ -291,10 +267,7 @@ PetscErrorCode SbContactsDestroy(SbOutput out)
   PetscFunctionBeginUser;
   if (!c) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(SbXdmfDestroy(&c->xdmf));
-  PetscCallMPI(MPI_Type_free(&c->type));
-  PetscCall(PetscFree2(c->count, c->offset));
   PetscCall(PetscFree(c->list.point));
-  PetscCall(PetscFree(c->send));
   PetscCall(PetscFree(c->record));
   PetscCall(PetscFree(c->column));
   PetscCall(PetscFree(out->contacts));

@@ -10,45 +10,37 @@
   `pressure` is the law's -lambda theta with theta its measure of the change of volume (SbMaterialOps.pressure). The two
   differ by 2/3 mu theta for small strains, and for nu near 0.5 hardly.
 */
+#include <stddef.h>
 #include "output_impl.h"
 
 /* ------------------------------------------------------------------ per vertex */
 
-static PetscErrorCode displacement(SbRun run, const SbStep *step, PetscReal *values)
+/* A vector of the step. */
+static PetscErrorCode vector(const SbField *f, SbRun run, const SbStep *step, PetscReal *values)
 {
+  const Vec *x = (const Vec *)((const char *)step + f->from);
+
   PetscFunctionBeginUser;
-  PetscCall(SbPointsValues(run, (SbOutput)run->output, step->U, values));
+  PetscCall(SbPointsValues(run, (SbOutput)run->output, *x, values));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode velocity(SbRun run, const SbStep *step, PetscReal *values)
+static PetscErrorCode reaction(const SbField *f, SbRun run, const SbStep *step, PetscReal *values)
 {
   PetscFunctionBeginUser;
-  PetscCall(SbPointsValues(run, (SbOutput)run->output, step->V, values));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode acceleration(SbRun run, const SbStep *step, PetscReal *values)
-{
-  PetscFunctionBeginUser;
-  PetscCall(SbPointsValues(run, (SbOutput)run->output, step->A, values));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode reaction(SbRun run, const SbStep *step, PetscReal *values)
-{
-  PetscFunctionBeginUser;
+  (void)f;
   PetscCheck(step->R, PETSC_COMM_SELF, PETSC_ERR_PLIB,
              "The residual was asked for but not given to the monitors");
   PetscCall(SbPointsForces(run, (SbOutput)run->output, PETSC_TRUE, step->R, values));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode contact_force(SbRun run, const SbStep *step, PetscReal *values)
+static PetscErrorCode contact_force(const SbField *f, SbRun run, const SbStep *step, PetscReal *values)
 {
   Vec F;
 
   PetscFunctionBeginUser;
+  (void)f;
   PetscCheck(step->R, PETSC_COMM_SELF, PETSC_ERR_PLIB,
              "The residual was asked for but not given to the monitors");
   PetscCall(VecDuplicate(step->U, &F));
@@ -58,11 +50,12 @@ static PetscErrorCode contact_force(SbRun run, const SbStep *step, PetscReal *va
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode contact_gap(SbRun run, const SbStep *step, PetscReal *values)
+static PetscErrorCode contact_gap(const SbField *f, SbRun run, const SbStep *step, PetscReal *values)
 {
   Vec G;
 
   PetscFunctionBeginUser;
+  (void)f;
   PetscCall(VecDuplicate(step->U, &G));
   PetscCall(SbModelContactGap(run->model, step->t, step->U, G));
   PetscCall(SbPointsValues(run, (SbOutput)run->output, G, values));
@@ -72,114 +65,86 @@ static PetscErrorCode contact_gap(SbRun run, const SbStep *step, PetscReal *valu
 
 /* ------------------------------------------------------------------ per cell */
 
-static PetscErrorCode cell_state(SbRun run, const SbStep *step, SbOutput *out)
+/* A quantity of the cells' state, which is computed once per frame: six numbers per cell of stress, one of the others. */
+static PetscErrorCode cell_state(const SbField *f, SbRun run, const SbStep *step, const PetscReal **array)
 {
   SbOutput o = (SbOutput)run->output;
   const PetscReal *u;
 
   PetscFunctionBeginUser;
-  *out = o;
-  if (o->state_valid) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(SbSpaceGetLocalRead(run->model->space, step->U, &u));
-  if (o->sigma || o->J || o->psi) PetscCall(SbSpaceCellState(run->model->space, u, o->sigma, o->J, o->psi));
-  if (o->pressure) PetscCall(SbSpaceCellPressure(run->model->space, u, o->pressure));
-  PetscCall(SbSpaceRestoreLocalRead(run->model->space, step->U, &u));
-  o->state_valid = PETSC_TRUE;
+  if (!o->state_valid) {
+    PetscCall(SbSpaceGetLocalRead(run->model->space, step->U, &u));
+    if (o->sigma || o->J || o->psi) PetscCall(SbSpaceCellState(run->model->space, u, o->sigma, o->J, o->psi));
+    if (o->pressure) PetscCall(SbSpaceCellPressure(run->model->space, u, o->pressure));
+    PetscCall(SbSpaceRestoreLocalRead(run->model->space, step->U, &u));
+    o->state_valid = PETSC_TRUE;
+  }
+  *array = *(PetscReal **)((char *)o + f->from);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode stress(SbRun run, const SbStep *step, PetscReal *values)
+static PetscErrorCode scalar(const SbField *f, SbRun run, const SbStep *step, PetscReal *values)
+{
+  const PetscReal *state = NULL;
+
+  PetscFunctionBeginUser;
+  PetscCall(cell_state(f, run, step, &state));
+  PetscCall(PetscArraycpy(values, state, run->model->mesh->ncell_owned));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static void stress(const PetscReal s[6], PetscReal value[])
 {
   static const int position[6] = {0, 3, 5, 1, 4, 2}; // from xx yy zz xy yz xz to xx xy xz yy yz zz
-  SbOutput out;
+
+  for (int k = 0; k < 6; k++) value[k] = s[position[k]];
+}
+
+static void von_mises(const PetscReal s[6], PetscReal value[])
+{
+  const PetscReal a = s[0] - s[1], b = s[1] - s[2], d = s[2] - s[0];
+
+  value[0] = PetscSqrtReal(.5 * (a * a + b * b + d * d) + 3. * (s[3] * s[3] + s[4] * s[4] + s[5] * s[5]));
+}
+
+static void mean_pressure(const PetscReal s[6], PetscReal value[])
+{
+  value[0] = -(s[0] + s[1] + s[2]) / 3.;
+}
+
+/* What f->of_stress makes of the Cauchy stress. */
+static PetscErrorCode of_stress(const SbField *f, SbRun run, const SbStep *step, PetscReal *values)
+{
+  const PetscReal *sigma = NULL;
 
   PetscFunctionBeginUser;
-  PetscCall(cell_state(run, step, &out));
-  for (PetscInt c = 0; c < run->model->mesh->ncell_owned; c++) {
-    for (int k = 0; k < 6; k++) values[6 * c + k] = out->sigma[6 * c + position[k]];
-  }
+  PetscCall(cell_state(f, run, step, &sigma));
+  for (PetscInt c = 0; c < run->model->mesh->ncell_owned; c++)
+    (*f->of_stress)(sigma + 6 * c, values + f->ncomp * c);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode von_mises(SbRun run, const SbStep *step, PetscReal *values)
-{
-  SbOutput out;
-
-  PetscFunctionBeginUser;
-  PetscCall(cell_state(run, step, &out));
-  for (PetscInt c = 0; c < run->model->mesh->ncell_owned; c++) {
-    const PetscReal *s = out->sigma + 6 * c;
-    const PetscReal a = s[0] - s[1], b = s[1] - s[2], d = s[2] - s[0];
-
-    values[c] = PetscSqrtReal(.5 * (a * a + b * b + d * d) + 3. * (s[3] * s[3] + s[4] * s[4] + s[5] * s[5]));
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode pressure(SbRun run, const SbStep *step, PetscReal *values)
-{
-  SbOutput out;
-
-  PetscFunctionBeginUser;
-  PetscCall(cell_state(run, step, &out));
-  PetscCall(PetscArraycpy(values, out->pressure, run->model->mesh->ncell_owned));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode mean_pressure(SbRun run, const SbStep *step, PetscReal *values)
-{
-  SbOutput out;
-
-  PetscFunctionBeginUser;
-  PetscCall(cell_state(run, step, &out));
-  for (PetscInt c = 0; c < run->model->mesh->ncell_owned; c++) {
-    const PetscReal *s = out->sigma + 6 * c;
-
-    values[c] = -(s[0] + s[1] + s[2]) / 3.;
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode jacobian(SbRun run, const SbStep *step, PetscReal *values)
-{
-  SbOutput out;
-
-  PetscFunctionBeginUser;
-  PetscCall(cell_state(run, step, &out));
-  PetscCall(PetscArraycpy(values, out->J, run->model->mesh->ncell_owned));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode energy_density(SbRun run, const SbStep *step, PetscReal *values)
-{
-  SbOutput out;
-
-  PetscFunctionBeginUser;
-  PetscCall(cell_state(run, step, &out));
-  PetscCall(PetscArraycpy(values, out->psi, run->model->mesh->ncell_owned));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode space_error(SbRun run, const SbStep *step, PetscReal *values)
+static PetscErrorCode space_error(const SbField *f, SbRun run, const SbStep *step, PetscReal *values)
 {
   PetscFunctionBeginUser;
+  (void)f;
   PetscCall((*run->cell_error)(run, step, values));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode body_number(SbRun run, const SbStep *step, PetscReal *values)
+static PetscErrorCode body_number(const SbField *f, SbRun run, const SbStep *step, PetscReal *values)
 {
   PetscFunctionBeginUser;
-  (void)step;
+  (void)f, (void)step;
   for (PetscInt c = 0; c < run->model->mesh->ncell_owned; c++)
     values[c] = (PetscReal)run->model->mesh->cell_body[c];
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode rank_number(SbRun run, const SbStep *step, PetscReal *values)
+static PetscErrorCode rank_number(const SbField *f, SbRun run, const SbStep *step, PetscReal *values)
 {
   PetscFunctionBeginUser;
-  (void)step;
+  (void)f, (void)step;
   for (PetscInt c = 0; c < run->model->mesh->ncell_owned; c++)
     values[c] = (PetscReal)((SbOutput)run->output)->rank;
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -193,30 +158,34 @@ static PetscErrorCode rank_number(SbRun run, const SbStep *step, PetscReal *valu
 #define CONSTANT PETSC_TRUE
 #define ALWAYS PETSC_FALSE
 #define DYNAMIC PETSC_TRUE
+#define STEP(member) .from = offsetof(SbStep, member)
+#define STATE(member) .from = offsetof(struct _p_SbOutput, member)
 
 static const SbField table[] = {
-  {"displacement", "m", 3, VERTEX, VARIES, ALWAYS, "displacement from the rest state", displacement},
-  {"velocity", "m/s", 3, VERTEX, VARIES, DYNAMIC, "velocity", velocity},
-  {"acceleration", "m/s^2", 3, VERTEX, VARIES, DYNAMIC, "acceleration, state of the integrator",
-   acceleration},
-  {"reaction", "N", 3, VERTEX, VARIES, ALWAYS, "force of a support on the body", reaction},
-  {"contact_force", "N", 3, VERTEX, VARIES, ALWAYS, "force of contact on the body", contact_force},
+  {"displacement", "m", 3, VERTEX, VARIES, ALWAYS, "displacement from the rest state", vector, STEP(U)},
+  {"velocity", "m/s", 3, VERTEX, VARIES, DYNAMIC, "velocity", vector, STEP(V)},
+  {"acceleration", "m/s^2", 3, VERTEX, VARIES, DYNAMIC, "acceleration, state of the integrator", vector,
+   STEP(A)},
+  {"reaction", "N", 3, VERTEX, VARIES, ALWAYS, "force of a support on the body", .compute = reaction},
+  {"contact_force", "N", 3, VERTEX, VARIES, ALWAYS, "force of contact on the body", .compute = contact_force},
   {"contact_gap", "m", 3, VERTEX, VARIES, ALWAYS,
-   "from the nearest point of what it may touch, along the normal there; 0: nothing near", contact_gap},
-  {"stress", "Pa", 6, CELL, VARIES, ALWAYS, "Cauchy stress", stress},
-  {"von_mises", "Pa", 1, CELL, VARIES, ALWAYS, "von Mises stress", von_mises},
+   "from the nearest point of what it may touch, along the normal there; 0: nothing near",
+   .compute = contact_gap},
+  {"stress", "Pa", 6, CELL, VARIES, ALWAYS, "Cauchy stress", of_stress, STATE(sigma), stress},
+  {"von_mises", "Pa", 1, CELL, VARIES, ALWAYS, "von Mises stress", of_stress, STATE(sigma), von_mises},
   {"pressure", "Pa", 1, CELL, VARIES, ALWAYS, "pressure of the law, -lambda times its change of volume",
-   pressure},
+   scalar, STATE(pressure)},
   {"mean_pressure", "Pa", 1, CELL, VARIES, ALWAYS, "minus a third of the trace of the Cauchy stress",
-   mean_pressure},
-  {"J", "1", 1, CELL, VARIES, ALWAYS, "volume ratio det F", jacobian},
-  {"energy_density", "J/m^3", 1, CELL, VARIES, ALWAYS, "strain energy per rest volume", energy_density},
+   of_stress, STATE(sigma), mean_pressure},
+  {"J", "1", 1, CELL, VARIES, ALWAYS, "volume ratio det F", scalar, STATE(J)},
+  {"energy_density", "J/m^3", 1, CELL, VARIES, ALWAYS, "strain energy per rest volume", scalar, STATE(psi)},
   {"space_error", "J/m^3", 1, CELL, VARIES, ALWAYS,
-   "energy of the estimated error of the mesh per rest volume; needs -ledger", space_error},
-  {"body", "1", 1, CELL, CONSTANT, ALWAYS, "number of the body, always written", body_number},
-  {"rank", "1", 1, CELL, CONSTANT, ALWAYS, "MPI rank that owns the cell", rank_number},
+   "energy of the estimated error of the mesh per rest volume; needs -ledger", .compute = space_error},
+  {"body", "1", 1, CELL, CONSTANT, ALWAYS, "number of the body, always written", .compute = body_number},
+  {"rank", "1", 1, CELL, CONSTANT, ALWAYS, "MPI rank that owns the cell", .compute = rank_number},
   {"sets", "1", 1, CELL, CONSTANT, ALWAYS,
-   "sets and groups that the scenario names: arrays set_NAME of points, tets_NAME of cells, 1 inside", NULL},
+   "sets and groups that the scenario names: arrays set_NAME of points, tets_NAME of cells, 1 inside",
+   .compute = NULL},
 };
 
 PetscErrorCode SbFieldGetAll(PetscInt *n, const SbField **fields)
@@ -259,11 +228,11 @@ PetscErrorCode SbFieldPrepare(SbRun run, SbOutput out)
 
     PetscCheck(f->compute != space_error || run->cell_error, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
                "-output_fields space_error needs its estimate: give -ledger yes, too");
-    if ((f->compute == stress || f->compute == von_mises || f->compute == mean_pressure) && !out->sigma)
-      PetscCall(PetscMalloc1(6 * n, &out->sigma));
-    if (f->compute == jacobian && !out->J) PetscCall(PetscMalloc1(n, &out->J));
-    if (f->compute == energy_density && !out->psi) PetscCall(PetscMalloc1(n, &out->psi));
-    if (f->compute == pressure && !out->pressure) PetscCall(PetscMalloc1(n, &out->pressure));
+    if (f->compute == scalar || f->compute == of_stress) {
+      PetscReal **state = (PetscReal **)((char *)out + f->from);
+
+      if (!*state) PetscCall(PetscMalloc1((f->compute == of_stress ? 6 * n : n), state));
+    }
     if (!f->cell) PetscCall(SbPointsPrepare(run, out));
     if (f->compute == reaction || f->compute == contact_force) {
       run->want_residual = PETSC_TRUE;

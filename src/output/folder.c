@@ -105,22 +105,6 @@ PetscErrorCode SbCheckpointPrune(SbOutput out, PetscInt step, PetscInt keep)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode checkpoint_files(SbOutput out, SbFileFn fn, void *ctx)
-{
-  struct dirent **names;
-  const int n = list_checkpoints(out->dir, &names);
-  char path[PETSC_MAX_PATH_LEN];
-  struct stat info;
-
-  PetscFunctionBeginUser;
-  for (int i = 0; i < n; i++) {
-    PetscCall(SbOutputPath(out, names[i]->d_name, sizeof(path), path));
-    if (!stat(path, &info)) PetscCall(fn(names[i]->d_name, (PetscInt64)info.st_size, ctx));
-  }
-  free_names(n, names);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode SbCheckpointFind(SbOutput out, const char *file, int k, size_t size, char path[])
 {
   PetscFunctionBeginUser;
@@ -148,14 +132,16 @@ PetscErrorCode SbCheckpointFind(SbOutput out, const char *file, int k, size_t si
 
 PetscErrorCode SbFolderClear(SbOutput out, PetscInt step0)
 {
-  static const char *const leftovers[] = {"fields.xmf.tmp",    "contacts.xmf.tmp", "history.csv.tmp",
-                                          "scenario.opts.tmp", "run.json.tmp",     "checkpoint.tmp"};
-  char path[PETSC_MAX_PATH_LEN];
+  char name[SB_FILE_MAX], path[PETSC_MAX_PATH_LEN];
   PetscBool found = PETSC_FALSE;
 
   PetscFunctionBeginUser;
-  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(leftovers); i++) {
-    PetscCall(SbOutputPath(out, leftovers[i], sizeof(path), path));
+  /* what was not whole when a run ended */
+  PetscCall(SbOutputPath(out, "checkpoint.tmp", sizeof(path), path));
+  (void)unlink(path);
+  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(ours); i++) {
+    (void)snprintf(name, sizeof(name), "%s.tmp", ours[i]);
+    PetscCall(SbOutputPath(out, name, sizeof(path), path));
     (void)unlink(path);
   }
   // Checkpoints of what is computed again would be the latest ones.
@@ -172,14 +158,19 @@ PetscErrorCode SbFolderClear(SbOutput out, PetscInt step0)
 
 PetscErrorCode SbOutputFiles(SbOutput out, SbFileFn fn, void *ctx)
 {
-  char path[PETSC_MAX_PATH_LEN];
-  struct stat info;
+  enum { NOURS = PETSC_STATIC_ARRAY_LENGTH(ours) };
+  struct dirent **checkpoint;
+  const int n = list_checkpoints(out->dir, &checkpoint);
 
   PetscFunctionBeginUser;
-  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(ours); i++) {
-    PetscCall(SbOutputPath(out, ours[i], sizeof(path), path));
-    if (!stat(path, &info)) PetscCall(fn(ours[i], (PetscInt64)info.st_size, ctx));
+  for (int i = 0; i < NOURS + n; i++) {
+    const char *name = i < NOURS ? ours[i] : checkpoint[i - NOURS]->d_name;
+    char path[PETSC_MAX_PATH_LEN];
+    struct stat info;
+
+    PetscCall(SbOutputPath(out, name, sizeof(path), path));
+    if (!stat(path, &info)) PetscCall(fn(name, (PetscInt64)info.st_size, ctx));
   }
-  PetscCall(checkpoint_files(out, fn, ctx));
+  free_names(n, checkpoint);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

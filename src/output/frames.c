@@ -144,7 +144,7 @@ static PetscErrorCode write_mesh(SbRun run, SbOutput out)
     if (!out->field[i]->constant) continue;
     PetscCall(PetscLogEventBegin(out->field_event[i], 0, 0, 0, 0));
     if (out->field[i]->compute) {
-      PetscCall(out->field[i]->compute(run, NULL, fr->owned));
+      PetscCall(out->field[i]->compute(out->field[i], run, NULL, fr->owned));
       PetscCall(write_whole(fr, group, out->field[i]->name, &out->cell, 1));
     } else {
       /* one array per set */
@@ -169,7 +169,7 @@ static PetscErrorCode write_field(SbRun run, SbOutput out, const SbStep *step, c
   const PetscInt n = order->n * f->ncomp;
 
   PetscFunctionBeginUser;
-  PetscCall(f->compute(run, step, fr->owned));
+  PetscCall(f->compute(f, run, step, fr->owned));
   PetscCall(SbOrderGather(order, f->ncomp, fr->owned, fr->slice));
   if (out->precise) {
     PetscCall(SbH5WriteSlice(&fr->h5, group, f->name, f->unit, order, f->ncomp, H5T_IEEE_F64LE,

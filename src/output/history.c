@@ -11,6 +11,7 @@
 #include <errno.h>
 #include <fcntl.h>
 #include <stdarg.h>
+#include <stddef.h>
 #include <sys/stat.h>
 #include <unistd.h>
 #include "output_impl.h"
@@ -27,37 +28,41 @@ struct _p_SbHistory {
   char message[SB_MESSAGE_MAX]; /* why it failed; empty when it did not */
 };
 
-static const char *const names[] = {"step",
-                                    "time",
-                                    "dt",
-                                    "kinetic",
-                                    "strain",
-                                    "load_work",
-                                    "prescribed_work",
-                                    "damping_loss",
-                                    "integrator_loss",
-                                    "total",
-                                    "momentum_x",
-                                    "momentum_y",
-                                    "momentum_z",
-                                    "angular_x",
-                                    "angular_y",
-                                    "angular_z",
-                                    "centre_x",
-                                    "centre_y",
-                                    "centre_z",
-                                    "volume",
-                                    "min_J",
-                                    "inverted",
-                                    "max_speed",
-                                    "max_displacement",
-                                    "newton",
-                                    "linear",
-                                    "rejected"};
-static const char *const units[] = {"1",        "s",        "s", "J",      "J",      "J",      "J",
-                                    "J",        "J",        "J", "kg m/s", "kg m/s", "kg m/s", "kg m^2/s",
-                                    "kg m^2/s", "kg m^2/s", "m", "m",      "m",      "m^3",    "1",
-                                    "1",        "m/s",      "m", "1",      "1",      "1"};
+/* The columns of every run: where in the step each is; `total` is the sum of others. */
+static const struct {
+  const char *name, *unit;
+  enum { REAL, COUNT, TOTAL } kind;
+  size_t from;
+} columns[] = {
+#define AT(member) offsetof(SbStep, member)
+  {"step", "1", COUNT, AT(step)},
+  {"time", "s", REAL, AT(t)},
+  {"dt", "s", REAL, AT(dt)},
+  {"kinetic", "J", REAL, AT(energies.kinetic)},
+  {"strain", "J", REAL, AT(energies.strain)},
+  {"load_work", "J", REAL, AT(energies.load_work)},
+  {"prescribed_work", "J", REAL, AT(energies.prescribed_work)},
+  {"damping_loss", "J", REAL, AT(energies.damping_loss)},
+  {"integrator_loss", "J", REAL, AT(energies.integrator_loss)},
+  {"total", "J", TOTAL, 0},
+  {"momentum_x", "kg m/s", REAL, AT(energies.momentum[0])},
+  {"momentum_y", "kg m/s", REAL, AT(energies.momentum[1])},
+  {"momentum_z", "kg m/s", REAL, AT(energies.momentum[2])},
+  {"angular_x", "kg m^2/s", REAL, AT(energies.angular[0])},
+  {"angular_y", "kg m^2/s", REAL, AT(energies.angular[1])},
+  {"angular_z", "kg m^2/s", REAL, AT(energies.angular[2])},
+  {"centre_x", "m", REAL, AT(energies.centre[0])},
+  {"centre_y", "m", REAL, AT(energies.centre[1])},
+  {"centre_z", "m", REAL, AT(energies.centre[2])},
+  {"volume", "m^3", REAL, AT(energies.volume)},
+  {"min_J", "1", REAL, AT(energies.min_J)},
+  {"inverted", "1", COUNT, AT(energies.ninverted)},
+  {"max_speed", "m/s", REAL, AT(energies.max_speed)},
+  {"max_displacement", "m", REAL, AT(energies.max_displacement)},
+  {"newton", "1", COUNT, AT(newton)},
+  {"linear", "1", COUNT, AT(linear)},
+  {"rejected", "1", COUNT, AT(rejected)},
+};
 
 /* ------------------------------------------------------------------ text */
 
@@ -80,8 +85,8 @@ static PetscErrorCode put_header(SbRun run, SbOutput out, SbHistory h)
 {
   PetscFunctionBeginUser;
   h->size = 0;
-  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(names); i++)
-    PetscCall(put(h, "%s%s", i ? "," : "", names[i]));
+  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(columns); i++)
+    PetscCall(put(h, "%s%s", i ? "," : "", columns[i].name));
   for (PetscInt e = 0; e < run->model->nhistory; e++) {
     const SbEffect effect = run->model->history[e];
 
@@ -93,8 +98,8 @@ static PetscErrorCode put_header(SbRun run, SbOutput out, SbHistory h)
   }
   for (PetscInt c = 0; c < run->ncolumn; c++) PetscCall(put(h, ",%s", run->column[c].name));
   PetscCall(put(h, "\n#"));
-  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(units); i++)
-    PetscCall(put(h, "%s%s", i ? "," : "", units[i]));
+  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(columns); i++)
+    PetscCall(put(h, "%s%s", i ? "," : "", columns[i].unit));
   for (PetscInt e = 0; e < run->model->nhistory; e++) {
     for (PetscInt c = 0; c < run->model->history[e]->ncolumn; c++) PetscCall(put(h, ",SI"));
   }
@@ -139,33 +144,19 @@ static PetscErrorCode effect_columns(SbRun run, const SbStep *step, PetscReal *v
 static PetscErrorCode put_row(SbHistory h, const SbStep *step, SbRun run)
 {
   const SbEnergies *e = &step->energies;
-  const PetscReal x[] = {e->kinetic,
-                         e->strain,
-                         e->load_work,
-                         e->prescribed_work,
-                         e->damping_loss,
-                         e->integrator_loss,
-                         e->kinetic + e->strain - e->load_work - e->prescribed_work,
-                         e->momentum[0],
-                         e->momentum[1],
-                         e->momentum[2],
-                         e->angular[0],
-                         e->angular[1],
-                         e->angular[2],
-                         e->centre[0],
-                         e->centre[1],
-                         e->centre[2],
-                         e->volume,
-                         e->min_J};
 
   PetscFunctionBeginUser;
   h->size = 0;
-  PetscCall(put(h, "%" PetscInt_FMT ",%.17g,%.17g", step->step, (double)step->t, (double)step->dt));
-  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(x); i++) PetscCall(put(h, ",%.17g", (double)x[i]));
-  PetscCall(put(h, ",%" PetscInt_FMT ",%.17g,%.17g", e->ninverted, (double)e->max_speed,
-                (double)e->max_displacement));
-  PetscCall(put(h, ",%" PetscInt_FMT ",%" PetscInt_FMT ",%" PetscInt_FMT, step->newton, step->linear,
-                step->rejected));
+  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(columns); i++) {
+    const char *value = (const char *)step + columns[i].from, *comma = i ? "," : "";
+
+    if (columns[i].kind == COUNT)
+      PetscCall(put(h, "%s%" PetscInt_FMT, comma, *(const PetscInt *)value));
+    else if (columns[i].kind == REAL)
+      PetscCall(put(h, "%s%.17g", comma, (double)*(const PetscReal *)value));
+    else
+      PetscCall(put(h, ",%.17g", (double)(e->kinetic + e->strain - e->load_work - e->prescribed_work)));
+  }
   for (PetscInt i = 0; i < h->nextra; i++) PetscCall(put(h, ",%.17g", (double)h->sum[i]));
   for (PetscInt i = 0; i < run->ncolumn; i++) PetscCall(put(h, ",%.17g", (double)*run->column[i].value));
   PetscCall(put(h, "\n"));
@@ -306,7 +297,7 @@ PetscErrorCode SbHistoryAttach(SbRun run, SbOutput out)
   h->nextra += 3 * out->nprobe;
   PetscCall(PetscMalloc2(h->nextra + 1, &h->mine, h->nextra + 1, &h->sum));
   h->capacity =
-    2 * (PETSC_STATIC_ARRAY_LENGTH(names) + (size_t)(h->nextra + run->ncolumn)) * (2 * SB_NAME_MAX) + 256;
+    2 * (PETSC_STATIC_ARRAY_LENGTH(columns) + (size_t)(h->nextra + run->ncolumn)) * (2 * SB_NAME_MAX) + 256;
   PetscCall(PetscMalloc1(h->capacity, &h->row));
   PetscCall(SbOutputPath(out, "history.csv", sizeof(h->path), h->path));
   if (!out->rank) PetscCall(open_file(run, out, sizeof(message), message));
