@@ -115,6 +115,13 @@ PetscErrorCode SbOptionsReset(void); /* forgets what was read and registered; at
    among the names is passed over: PetscFunctionListGet() counts its closing one. */
 PetscErrorCode SbNearestNames(const char *word, PetscInt n, const char *const names[], size_t size,
                               char text[]);
+/* What to say of a word that is none of these names: "p1, cr, dg; did you mean cr?". */
+PetscErrorCode SbNamesAdvise(const char *word, PetscInt n, const char *const names[], size_t size,
+                             char text[]);
+/* The same for the types in a list. */
+PetscErrorCode SbListAdvise(PetscFunctionList list, const char *word, size_t size, char text[]);
+/* Whether a word begins with one of these, "ksp_ pc_ snes_", in capitals or not. */
+PetscBool SbBeginsWith(const char *word, const char *beginnings);
 
 /* ------------------------------------------------------------------ errors and warnings */
 

@@ -5,6 +5,7 @@
   Damerau, Communications of the ACM 7, 1964). Case does not count, as in PETSc.
 */
 #include <ctype.h>
+#include <stdlib.h>
 #include "option.h"
 
 #define WORD_MAX SB_OPTION_NAME_MAX
@@ -51,4 +52,54 @@ PetscErrorCode SbNearestNames(const char *word, PetscInt n, const char *const na
     PetscCall(PetscStrlcat(text, names[i], size));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbNamesAdvise(const char *word, PetscInt n, const char *const names[], size_t size,
+                             char text[])
+{
+  char near[256];
+
+  PetscFunctionBeginUser;
+  text[0] = 0;
+  for (PetscInt i = 0; i < n; i++) {
+    PetscCall(PetscStrlcat(text, i ? ", " : "", size));
+    PetscCall(PetscStrlcat(text, names[i], size));
+  }
+  PetscCall(SbNearestNames(word, n, names, sizeof(near), near));
+  if (!near[0]) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscStrlcat(text, "; did you mean ", size));
+  PetscCall(PetscStrlcat(text, near, size));
+  PetscCall(PetscStrlcat(text, "?", size));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static int compare_texts(const void *a, const void *b)
+{
+  return strcmp(*(const char *const *)a, *(const char *const *)b);
+}
+
+PetscErrorCode SbListAdvise(PetscFunctionList list, const char *word, size_t size, char text[])
+{
+  const char **names;
+  int n;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscFunctionListGet(list, &names, &n));
+  while (n && !names[n - 1])
+    n--; /* PETSc 3.18 counts the closing NULL; newer releases have no order of their own */
+  qsort(names, (size_t)n, sizeof(*names), compare_texts);
+  PetscCall(SbNamesAdvise(word, n, names, size, text));
+  PetscCall(PetscFree(names));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscBool SbBeginsWith(const char *word, const char *beginnings)
+{
+  size_t n;
+
+  for (const char *p = beginnings; *p; p += n + strspn(p + n, " ")) {
+    n = strcspn(p, " ");
+    if (!strncasecmp(word, p, n)) return PETSC_TRUE;
+  }
+  return PETSC_FALSE;
 }

@@ -232,44 +232,31 @@ PetscErrorCode SbOptionNames(const SbScope *scope, const char *key, PetscInt *n,
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Names out of "a|b|c", for the search of near ones. */
-static PetscErrorCode nearest_choice(const char *range, const char *word, size_t size, char text[])
-{
-  PetscInt n = count_pieces(range, '|');
-  char(*words)[SB_NAME_MAX];
-  const char **list;
-
-  PetscFunctionBeginUser;
-  PetscCall(PetscCalloc2(n, &words, n, &list));
-  for (PetscInt i = 0; i < n; i++) {
-    (void)next_piece(&range, '|', SB_NAME_MAX, words[i]);
-    list[i] = words[i];
-  }
-  PetscCall(SbNearestNames(word, n, list, size, text));
-  PetscCall(PetscFree2(words, list));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode SbOptionChoice(const SbScope *scope, const char *key, PetscInt *index)
 {
   const SbOptionRecord *r;
-  const char *range;
-  char word[SB_NAME_MAX], near[2 * SB_NAME_MAX];
-  PetscInt n;
+  const char *range, **list;
+  char(*words)[SB_NAME_MAX], near[2 * SB_NAME_MAX];
+  PetscInt n, found = -1;
 
   PetscFunctionBeginUser;
   PetscCall(text_of(scope, key, SB_OPTION_CHOICE, &r));
   if (is_absent(r)) PetscFunctionReturn(PETSC_SUCCESS);
   range = r->row->range;
   n = count_pieces(range, '|');
+  PetscCall(PetscCalloc2(n, &words, n, &list));
   for (PetscInt i = 0; i < n; i++) {
-    if (!next_piece(&range, '|', sizeof(word), word) || strcmp(word, r->text)) continue;
-    *index = i;
-    PetscFunctionReturn(PETSC_SUCCESS);
+    (void)next_piece(&range, '|', SB_NAME_MAX, words[i]);
+    list[i] = words[i];
+    if (!strcmp(words[i], r->text)) found = i;
   }
-  PetscCall(nearest_choice(r->row->range, r->text, sizeof(near), near));
-  SETERRQ(PETSC_COMM_SELF, PETSC_ERR_USER, "%s %s is not one of %s%s%s%s: %s", r->name, r->text,
-          r->row->range, near[0] ? " (did you mean " : "", near, near[0] ? "?)" : "", r->row->help);
+  PetscCall(SbNearestNames(r->text, n, list, sizeof(near), near));
+  PetscCall(PetscFree2(words, list));
+  PetscCheck(found >= 0, PETSC_COMM_SELF, PETSC_ERR_USER, "%s %s is not one of %s%s%s%s: %s", r->name,
+             r->text, r->row->range, near[0] ? " (did you mean " : "", near, near[0] ? "?)" : "",
+             r->row->help);
+  *index = found;
+  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode SbOptionFormulas(const SbScope *scope, const char *key, SbFormula formulas[])
@@ -305,39 +292,21 @@ PetscErrorCode SbOptionCheckEarly(const SbScope *scope, const char *key)
   PetscReal x[SB_OPTION_COUNT_MAX];
   PetscInt n;
   PetscBool b;
-  char text[PETSC_MAX_PATH_LEN], (*names)[SB_NAME_MAX];
-  SbFormula f[SB_OPTION_COUNT_MAX];
+  char text[PETSC_MAX_PATH_LEN], (*names)[SB_NAME_MAX] = NULL;
+  SbFormula f[SB_OPTION_COUNT_MAX] = {NULL};
 
   PetscFunctionBeginUser;
   PetscCheck(row, PETSC_COMM_SELF, PETSC_ERR_PLIB, "No row for key '%s' of class '%s', type '%s'", key,
              scope->klass, scope->type);
-  switch (row->kind) {
-  case SB_OPTION_BOOL:
-    PetscCall(SbOptionBool(scope, key, &b));
-    break;
-  case SB_OPTION_INT:
-    PetscCall(SbOptionInt(scope, key, &n));
-    break;
-  case SB_OPTION_REAL:
-    PetscCall(SbOptionReal(scope, key, x));
-    break;
-  case SB_OPTION_REALS:
-    PetscCall(SbOptionReals(scope, key, x));
-    break;
-  case SB_OPTION_STRING:
-    PetscCall(SbOptionString(scope, key, sizeof(text), text));
-    break;
-  case SB_OPTION_NAMES:
-    PetscCall(SbOptionNames(scope, key, &n, &names));
-    PetscCall(PetscFree(names));
-    break;
-  case SB_OPTION_CHOICE:
-    PetscCall(SbOptionChoice(scope, key, &n));
-    break;
-  case SB_OPTION_FORMULA:
-    PetscCall(SbOptionFormulas(scope, key, f));
-    for (PetscInt i = 0; i < row->count; i++) PetscCall(SbFormulaDestroy(&f[i]));
-    break;
-  }
+  if (row->kind == SB_OPTION_BOOL) PetscCall(SbOptionBool(scope, key, &b));
+  if (row->kind == SB_OPTION_INT) PetscCall(SbOptionInt(scope, key, &n));
+  if (row->kind == SB_OPTION_REAL) PetscCall(SbOptionReal(scope, key, x));
+  if (row->kind == SB_OPTION_REALS) PetscCall(SbOptionReals(scope, key, x));
+  if (row->kind == SB_OPTION_STRING) PetscCall(SbOptionString(scope, key, sizeof(text), text));
+  if (row->kind == SB_OPTION_NAMES) PetscCall(SbOptionNames(scope, key, &n, &names));
+  if (row->kind == SB_OPTION_CHOICE) PetscCall(SbOptionChoice(scope, key, &n));
+  if (row->kind == SB_OPTION_FORMULA) PetscCall(SbOptionFormulas(scope, key, f));
+  PetscCall(PetscFree(names));
+  for (int i = 0; i < SB_OPTION_COUNT_MAX; i++) PetscCall(SbFormulaDestroy(&f[i]));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -31,31 +31,6 @@ PetscErrorCode SbEffectRegister(const char *type, PetscErrorCode (*create)(SbEff
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Ends the run: no such type. */
-static PetscErrorCode unknown_type(const char *name, const char *type)
-{
-  const char **types;
-  int n;
-  char near[512];
-
-  PetscFunctionBeginUser;
-  // PETSc counts a closing NULL.
-  PetscCall(PetscFunctionListGet(SbEffectList, &types, &n));
-  while (n && !types[n - 1]) n--;
-  PetscCall(SbNearestNames(type, n, types, sizeof(near), near));
-  // Nothing near: list them all.
-  if (!near[0]) {
-    for (int i = 0; i < n; i++) {
-      if (i) PetscCall(PetscStrlcat(near, i + 1 < n ? ", " : " or ", sizeof(near)));
-      PetscCall(PetscStrlcat(near, types[i], sizeof(near)));
-    }
-  }
-  PetscCall(PetscFree(types));
-  SETERRQ(PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
-          "effect %s: there is no effect of type \"%s\"; did you mean %s? Set -effect_%s_type", name, type,
-          near, name);
-}
-
 PetscErrorCode SbEffectCreate(const char *name, SbEffect *effect)
 {
   PetscErrorCode (*create)(SbEffect) = NULL;
@@ -69,7 +44,14 @@ PetscErrorCode SbEffectCreate(const char *name, SbEffect *effect)
   PetscCall(SbOptionString(&scope, "type", sizeof(type), type));
   if (!type[0]) PetscCall(PetscStrncpy(type, name, sizeof(type)));
   PetscCall(PetscFunctionListFind(SbEffectList, type, &create));
-  if (!create) PetscCall(unknown_type(name, type));
+  if (!create) {
+    char all[512];
+
+    PetscCall(SbListAdvise(SbEffectList, type, sizeof(all), all));
+    SETERRQ(PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
+            "effect %s: there is no effect of type \"%s\"; set -effect_%s_type to one of %s", name, type,
+            name, all);
+  }
 
   PetscCall(PetscNew(&e));
   *effect = e;

@@ -68,16 +68,9 @@ PetscErrorCode SbElementCreate(const char *name, const SbScope *body, SbElement 
   PetscFunctionBeginUser;
   PetscCall(PetscFunctionListFind(SbElementList, name, &create));
   if (!create) {
-    const char **names;
-    int n;
-    char all[256] = "";
+    char all[256];
 
-    PetscCall(PetscFunctionListGet(SbElementList, &names, &n));
-    for (int k = 0; k < n && names[k]; k++) {
-      PetscCall(PetscStrlcat(all, k ? ", " : "", sizeof(all)));
-      PetscCall(PetscStrlcat(all, names[k], sizeof(all)));
-    }
-    PetscCall(PetscFree(names));
+    PetscCall(SbListAdvise(SbElementList, name, sizeof(all), all));
     SETERRQ(PETSC_COMM_SELF, PETSC_ERR_USER, "there is no element \"%s\": choose one of %s", name, all);
   }
   PetscCall(PetscNew(&e));

@@ -28,22 +28,14 @@ PetscErrorCode SbMaterialRegister(const char *law, PetscErrorCode (*create)(SbMa
 /* The constructor of a law, or an error that lists the laws there are; `where` names what asked for it. */
 static PetscErrorCode find_law(const char *law, const char *where, PetscErrorCode (**create)(SbMaterial))
 {
-  const char **names;
-  int n;
-  char near[256], all[256] = "";
+  char all[256];
 
   PetscFunctionBeginUser;
   PetscCall(PetscFunctionListFind(SbMaterialList, law, create));
   if (*create) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(PetscFunctionListGet(SbMaterialList, &names, &n));
-  PetscCall(SbNearestNames(law, n, names, sizeof(near), near));
-  for (int k = 0; k < n && names[k]; k++) {
-    PetscCall(PetscStrlcat(all, k ? ", " : "", sizeof(all)));
-    PetscCall(PetscStrlcat(all, names[k], sizeof(all)));
-  }
-  PetscCall(PetscFree(names));
-  SETERRQ(PETSC_COMM_SELF, PETSC_ERR_USER, "%s: there is no material law \"%s\"%s%s; the laws are %s", where,
-          law, near[0] ? "; did you mean " : "", near, all);
+  PetscCall(SbListAdvise(SbMaterialList, law, sizeof(all), all));
+  SETERRQ(PETSC_COMM_SELF, PETSC_ERR_USER, "%s: there is no material law \"%s\"; the laws are %s", where, law,
+          all);
 }
 
 static PetscErrorCode create_law(const char *law, PetscErrorCode (*create)(SbMaterial), PetscReal E,

@@ -30,20 +30,13 @@ enum { NSHAPE = (int)PETSC_STATIC_ARRAY_LENGTH(shapes) };
 static PetscErrorCode unknown_shape(const char *option, const char *text)
 {
   const char *names[NSHAPE];
-  char all[256] = "", near[128], word[64];
+  char all[512], word[64];
 
   PetscFunctionBeginUser;
-  for (int i = 0; i < NSHAPE; i++) {
-    names[i] = shapes[i].name;
-    PetscCall(PetscStrlcat(all, i ? ", " : "", sizeof(all)));
-    PetscCall(PetscStrlcat(all, names[i], sizeof(all)));
-  }
-  PetscCall(PetscStrncpy(word, text, sizeof(word)));
-  if (strchr(word, ':')) *strchr(word, ':') = 0;
-  PetscCall(SbNearestNames(word, NSHAPE, names, sizeof(near), near));
-  SETERRQ(PETSC_COMM_SELF, PETSC_ERR_USER_INPUT, "%s '%s': a set begins with one of %s%s%s%s", option, text,
-          all, near[0] ? "; did you mean " : "", near, near[0] ? "?" : "");
-  PetscFunctionReturn(PETSC_SUCCESS);
+  for (int i = 0; i < NSHAPE; i++) names[i] = shapes[i].name;
+  (void)snprintf(word, sizeof(word), "%.*s", (int)strcspn(text, ":"), text);
+  PetscCall(SbNamesAdvise(word, NSHAPE, names, sizeof(all), all));
+  SETERRQ(PETSC_COMM_SELF, PETSC_ERR_USER_INPUT, "%s '%s': a set begins with one of %s", option, text, all);
 }
 
 /* Numbers separated by commas; -1 when there is anything else. */

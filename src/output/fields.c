@@ -200,22 +200,18 @@ PetscErrorCode SbFieldFind(const char *name, const SbField **field)
 {
   const PetscInt n = (PetscInt)PETSC_STATIC_ARRAY_LENGTH(table);
   const char *names[PETSC_STATIC_ARRAY_LENGTH(table)];
-  char near[256], all[512] = "";
+  char all[512];
 
   PetscFunctionBeginUser;
   for (PetscInt i = 0; i < n; i++) {
-    if (!strcmp(table[i].name, name)) {
-      *field = &table[i];
-      PetscFunctionReturn(PETSC_SUCCESS);
-    }
     names[i] = table[i].name;
-    PetscCall(PetscStrlcat(all, i ? ", " : "", sizeof(all)));
-    PetscCall(PetscStrlcat(all, names[i], sizeof(all)));
+    if (strcmp(table[i].name, name)) continue;
+    *field = &table[i];
+    PetscFunctionReturn(PETSC_SUCCESS);
   }
-  PetscCall(SbNearestNames(name, n, names, sizeof(near), near));
-  SETERRQ(PETSC_COMM_SELF, PETSC_ERR_USER,
-          "-output_fields: there is no field '%s'%s%s%s; fields are %s, or none", name,
-          near[0] ? ", did you mean " : "", near, near[0] ? "?" : "", all);
+  PetscCall(SbNamesAdvise(name, n, names, sizeof(all), all));
+  SETERRQ(PETSC_COMM_SELF, PETSC_ERR_USER, "-output_fields: there is no field '%s'; fields are none, %s",
+          name, all);
 }
 
 PetscErrorCode SbFieldPrepare(SbRun run, SbOutput out)

@@ -52,49 +52,21 @@ PetscErrorCode SbSceneRegister(void)
 
 /* ------------------------------------------------------------------ bodies */
 
-static int compare_names(const void *a, const void *b)
-{
-  return strcmp(*(const char *const *)a, *(const char *const *)b);
-}
-
-/* "corotated, linear, ..." and the near ones, for messages. */
-static PetscErrorCode describe_list(PetscFunctionList list, const char *word, size_t size, char all[],
-                                    char near[])
-{
-  const char **names;
-  int n;
-
-  PetscFunctionBeginUser;
-  PetscCall(PetscFunctionListGet(list, &names, &n));
-  /* PETSc 3.18 counts the closing NULL; newer releases have no order of their own */
-  while (n && !names[n - 1]) n--;
-  qsort(names, (size_t)n, sizeof(*names), compare_names);
-  all[0] = 0;
-  for (int i = 0; i < n; i++) {
-    PetscCall(PetscStrlcat(all, i ? ", " : "", size));
-    PetscCall(PetscStrlcat(all, names[i], size));
-  }
-  PetscCall(SbNearestNames(word, n, names, size, near));
-  PetscCall(PetscFree(names));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* Reads a word that must be a name in a list of types. */
 static PetscErrorCode read_type(const SbScope *scope, const char *key, PetscFunctionList list,
                                 char word[SB_NAME_MAX])
 {
-  char option[3 * SB_NAME_MAX], all[512], near[512];
+  char option[3 * SB_NAME_MAX], all[512];
   void (*constructor)(void) = NULL;
 
   PetscFunctionBeginUser;
   PetscCall(SbOptionName(scope, key, sizeof(option), option));
   PetscCall(SbOptionString(scope, key, SB_NAME_MAX, word));
-  PetscCall(describe_list(list, word, sizeof(all), all, near));
-  PetscCheck(word[0], PETSC_COMM_SELF, PETSC_ERR_USER, "%s must be given: one of %s", option, all);
   PetscCall(PetscFunctionListFind(list, word, &constructor));
-  PetscCheck(constructor, PETSC_COMM_SELF, PETSC_ERR_USER, "%s %s is not one of %s%s%s%s", option, word, all,
-             near[0] ? "; did you mean " : "", near, near[0] ? "?" : "");
-  PetscFunctionReturn(PETSC_SUCCESS);
+  if (constructor) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(SbListAdvise(list, word, sizeof(all), all));
+  PetscCheck(word[0], PETSC_COMM_SELF, PETSC_ERR_USER, "%s must be given: one of %s", option, all);
+  SETERRQ(PETSC_COMM_SELF, PETSC_ERR_USER, "%s %s is not one of %s", option, word, all);
 }
 
 static PetscErrorCode read_body(SbModel model, PetscInt i)

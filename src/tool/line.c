@@ -142,22 +142,9 @@ PetscErrorCode SbToolCommandLine(int *argc, char *argv[], SbToolLine *line)
 /* Options of PETSc that make sense here. */
 static PetscBool is_petsc(const char *name)
 {
-  static const char *const names[] = {"log_",
-                                      "malloc",
-                                      "options_",
-                                      "info",
-                                      "on_error_",
-                                      "error_",
-                                      "memory",
-                                      "fp_trap",
-                                      "no_signal_handler",
-                                      "start_in_debugger",
-                                      "skip_petscrc",
-                                      "citations"};
-
-  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(names); i++)
-    if (!strncasecmp(name, names[i], strlen(names[i]))) return PETSC_TRUE;
-  return PETSC_FALSE;
+  return SbBeginsWith(
+    name, "log_ malloc options_ info on_error_ error_ memory fp_trap no_signal_handler start_in_debugger "
+          "skip_petscrc citations");
 }
 
 static PetscErrorCode check_option(const char *name, const char *command)
@@ -182,22 +169,16 @@ static PetscErrorCode check_option(const char *name, const char *command)
 static PetscErrorCode find_command(const char *word, const SbToolCommand **command)
 {
   const char *list[16];
-  char all[256] = "", near[64];
+  char all[256];
   PetscInt n = 0;
 
   PetscFunctionBeginUser;
-  for (const SbToolCommand *c = SbToolCommands; c->name; c++) {
-    if (!strcmp(c->name, word)) {
-      *command = c;
-      PetscFunctionReturn(PETSC_SUCCESS);
-    }
-    list[n++] = c->name;
-    PetscCall(PetscStrlcat(all, n > 1 ? ", " : "", sizeof(all)));
-    PetscCall(PetscStrlcat(all, c->name, sizeof(all)));
+  for (*command = SbToolCommands; (*command)->name; (*command)++) {
+    if (!strcmp((*command)->name, word)) PetscFunctionReturn(PETSC_SUCCESS);
+    list[n++] = (*command)->name;
   }
-  PetscCall(SbNearestNames(word, n, list, sizeof(near), near));
-  SETERRQ(PETSC_COMM_SELF, PETSC_ERR_USER, "'%s' is no command; the commands are %s%s%s%s", word, all,
-          near[0] ? "; did you mean " : "", near, near[0] ? "?" : "");
+  PetscCall(SbNamesAdvise(word, n, list, sizeof(all), all));
+  SETERRQ(PETSC_COMM_SELF, PETSC_ERR_USER, "'%s' is no command; the commands are %s", word, all);
 }
 
 static PetscErrorCode check_words(const SbToolLine *line, const SbToolCommand **command)
