@@ -209,3 +209,75 @@ static inline void deform(Fixture *x, PetscReal amplitude)
     x->u[3 * i + 2] = amplitude * (0.25 * X[0] * X[0] - 0.15 * X[2] + 0.1 * X[1] * X[0]);
   }
 }
+
+/* A scene of one body on all ranks, and the same on each rank alone. */
+typedef struct {
+  Fixture all, alone;
+} FixturePair;
+
+static inline PetscErrorCode fixture_pair_create(PetscInt nbody, PetscInt nset, const char *const sets[][2],
+                                                 FixturePair *p)
+{
+  PetscFunctionBeginUser;
+  PetscCall(fixture_create(PETSC_COMM_WORLD, nbody, "box:1,1,1:2", nset, sets, &p->all));
+  PetscCall(fixture_create(PETSC_COMM_SELF, nbody, "box:1,1,1:2", nset, sets, &p->alone));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static inline PetscErrorCode fixture_pair_destroy(FixturePair *p)
+{
+  PetscFunctionBeginUser;
+  PetscCall(fixture_destroy(&p->all));
+  PetscCall(fixture_destroy(&p->alone));
+  PetscCall(PetscOptionsClear(NULL));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* A load and what it sums to. Its options stay set for the cases behind it. */
+typedef struct {
+  const char *name, *options;
+  PetscBool steady;
+  PetscReal t, scale; /* s; size of the contributions, N */
+  PetscReal F[3], M[3];
+  PetscReal amplitude; /* of the displacement at which it acts: a dead load does not follow it */
+} LoadCase;
+
+/* Dead loads: linear, steady or not, their force and moment, the same at each node on any number of ranks; also after other times. */
+static inline PetscErrorCode check_loads(FixturePair *p, size_t n, const LoadCase cases[])
+{
+  PetscFunctionBeginUser;
+  for (const LoadCase *c = cases; c < cases + n; c++) {
+    SbEffect e, alone;
+
+    PetscCall(effect_create(&p->all, c->name, c->options, &e));
+    PetscCall(effect_create(&p->alone, c->name, "", &alone));
+    SB_CHECK(e->linear && e->steady == c->steady && !e->ops.tangent, "%s: linear %d, steady %d", c->options,
+             e->linear, e->steady);
+    PetscCall(effect_force(&p->all, e, c->t + 0.25));
+    PetscCall(effect_force(&p->all, e, c->t));
+    PetscCall(effect_force(&p->alone, alone, c->t));
+    PetscCall(check_resultant(&p->all, c->F, c->M, c->scale, c->options));
+    PetscCall(check_serial(&p->all, &p->alone, c->scale, c->options));
+    if (c->amplitude > 0) {
+      deform(&p->all, c->amplitude);
+      PetscCall(effect_force(&p->all, e, c->t));
+      PetscCall(check_serial(&p->all, &p->alone, c->scale, "dead load"));
+      deform(&p->all, 0);
+    }
+    PetscCall(SbEffectDestroy(&e));
+    PetscCall(SbEffectDestroy(&alone));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* An effect that its options or its sets refuse. */
+static inline PetscErrorCode check_refused(Fixture *x, const char *name, const char *options,
+                                           const char *names)
+{
+  SbEffect e;
+
+  PetscFunctionBeginUser;
+  SB_CHECK_ERROR(effect_create(x, name, options, &e), PETSC_ERR_USER_INPUT, names);
+  PetscCall(SbEffectDestroy(&e));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

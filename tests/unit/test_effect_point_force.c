@@ -41,50 +41,36 @@ static PetscErrorCode check_work(Fixture *x, const PetscReal X[3], const PetscRe
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+#define LIFT "-effect_lift_type point_force -effect_lift_on tip,top -effect_lift_vector 9;-18;27"
+#define POKE \
+  "-effect_poke_type point_force -effect_poke_on tip -effect_poke_vector 0;3*t;0 -effect_poke_time t"
+
+static const LoadCase cases[] = {
+  /* the nodes of the top are symmetric about (.5, .5, 1) */
+  {"lift", LIFT, PETSC_TRUE, 0, 30, {9, -18, 27}, {0.5 * 27 + 18, 9 - 0.5 * 27, -9 - 4.5}, 0},
+  {"poke", POKE, PETSC_FALSE, 2, 12, {0, 12, 0}, {-12, 0, 12}, 0}};
+
 static PetscErrorCode check_element(const char *element, PetscBool held)
 {
-  // 9 nodes on the top, symmetric about (.5, .5, 1).
-  const PetscReal F[3] = {9, -18, 27}, M[3] = {0.5 * 27 + 18, 9 - 0.5 * 27, -9 - 4.5};
-  const PetscReal G[3] = {0, 12, 0}, N[3] = {-12, 0, 12};
-  Fixture x, serial;
-  SbEffect e, es;
-  PetscBool p1;
+  FixturePair p;
+  Fixture *x = &p.all;
+  SbEffect lift;
 
   PetscFunctionBeginUser;
   fixture_use(element, element, held);
-  PetscCall(PetscStrcmp(element, "p1", &p1));
-  PetscCall(fixture_create(PETSC_COMM_WORLD, 1, "box:1,1,1:2", PETSC_STATIC_ARRAY_LENGTH(sets), sets, &x));
-  PetscCall(
-    fixture_create(PETSC_COMM_SELF, 1, "box:1,1,1:2", PETSC_STATIC_ARRAY_LENGTH(sets), sets, &serial));
-  PetscCall(effect_create(
-    &x, "lift", "-effect_lift_type point_force -effect_lift_on tip,top -effect_lift_vector 9;-18;27", &e));
-  PetscCall(effect_create(&serial, "lift", "", &es));
-  SB_CHECK(e->linear && e->steady, "constant");
-  PetscCall(effect_force(&x, e, 0));
-  PetscCall(effect_force(&serial, es, 0));
-  PetscCall(check_resultant(&x, F, M, 30, "force on the nodes of the top"));
-  PetscCall(check_serial(&x, &serial, 30, "parallel and serial force at a node"));
-  for (PetscInt i = 0; p1 && i < x.space->nnode_owned; i++) {
-    SB_CHECK_NEAR(x.f[3 * i + 2], x.space->node_x[3 * i + 2] > 1 - 1e-9 ? 3 : 0, 1e-14, "share of a node");
-  }
-  PetscCall(SbEffectDestroy(&e));
-  PetscCall(SbEffectDestroy(&es));
-
-  PetscCall(effect_create(
-    &x, "poke",
-    "-effect_poke_type point_force -effect_poke_on tip -effect_poke_vector 0;3*t;0 -effect_poke_time t", &e));
-  SB_CHECK(!e->steady, "changes with time");
-  PetscCall(effect_force(&x, e, 2));
-  PetscCall(check_resultant(&x, G, N, 12, "force on one vertex"));
-  PetscCall(check_work(&x, (const PetscReal[3]){1, 1, 1}, G));
-  PetscCall(SbEffectDestroy(&e));
-  SB_CHECK_ERROR(
-    effect_create(&x, "bad", "-effect_bad_type point_force -effect_bad_on tip -effect_bad_vector 0;x;0", &e),
-    PETSC_ERR_USER_INPUT, "-effect_bad_vector");
-  PetscCall(SbEffectDestroy(&e));
-  PetscCall(fixture_destroy(&x));
-  PetscCall(fixture_destroy(&serial));
-  PetscCall(PetscOptionsClear(NULL));
+  PetscCall(fixture_pair_create(1, PETSC_STATIC_ARRAY_LENGTH(sets), sets, &p));
+  PetscCall(check_loads(&p, PETSC_STATIC_ARRAY_LENGTH(cases), cases));
+  PetscCall(check_work(x, (const PetscReal[3]){1, 1, 1}, cases[1].F)); /* of the force of the last case */
+  // With nodes at vertices each of the nine has the same share.
+  PetscCall(effect_create(x, "lift", LIFT, &lift));
+  PetscCall(effect_force(x, lift, 0));
+  for (PetscInt i = 0; !strcmp(element, "p1") && i < x->space->nnode_owned; i++)
+    SB_CHECK_NEAR(x->f[3 * i + 2], x->space->node_x[3 * i + 2] > 1 - 1e-9 ? 3 : 0, 1e-14, "share of a node");
+  PetscCall(SbEffectDestroy(&lift));
+  PetscCall(check_refused(x, "bad",
+                          "-effect_bad_type point_force -effect_bad_on tip -effect_bad_vector 0;x;0",
+                          "-effect_bad_vector"));
+  PetscCall(fixture_pair_destroy(&p));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
