@@ -1,9 +1,10 @@
 /*
-  mesh_test.h - what the tests of the mesh layer share: bodies and sets in one line.
+  mesh_test.h - what the tests of the mesh layer share: bodies and sets in one line, meshes read and checked as a run does.
 */
 #pragma once
-#include "../../src/meshio/meshio_impl.h"
-#include "../../src/mesh/mesh_impl.h"
+#include <sbmeshfile.h>
+#include <sbmeshio.h>
+#include <sbtet.h>
 #include "../test.h"
 
 /* A body of this name and mesh, neither scaled nor moved. */
@@ -26,4 +27,31 @@ static inline PetscErrorCode test_set(const char *name, const char *text, SbSet 
   (void)snprintf(set->name, sizeof(set->name), "%s", name);
   PetscCall(SbSetParse("-set", text, set));
   PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* A mesh as a run reads and checks it. */
+typedef struct {
+  SbImport im;
+  SbMeshFacts facts;
+} TestMesh;
+
+static inline PetscErrorCode test_mesh_read(SbBody body, TestMesh *m)
+{
+  PetscFunctionBeginUser;
+  memset(m, 0, sizeof(*m));
+  PetscCall(SbImportRead(&body, &m->im));
+  PetscCall(SbMeshFileMeasure(&m->im, &m->facts));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Reads, checks, frees, also after an error, which it returns. */
+static inline PetscErrorCode test_mesh_use(const char *path)
+{
+  TestMesh m;
+  PetscErrorCode ierr;
+
+  PetscFunctionBeginUser;
+  ierr = test_mesh_read(test_body("b", path), &m);
+  PetscCall(SbImportDestroy(&m.im));
+  PetscFunctionReturn(ierr);
 }

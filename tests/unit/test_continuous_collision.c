@@ -3,7 +3,6 @@
   Passages of moving points through moving triangles: against the signs of many small steps, and cubics that degenerate.
 */
 #include "detect_fixture.h"
-#include "../../src/contact/detect.h"
 
 #define STEPS 4000
 

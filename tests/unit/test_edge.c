@@ -3,7 +3,6 @@
   Edges: made from facets, which are sharp; distances of segments; pairs of edges of tetrahedra against their nearest features by brute force,
   apart, in each other and gone through; motions of two edges against many small steps; what degenerates.
 */
-#include "../../src/contact/detect.h"
 #include "detect_fixture.h"
 
 /* ------------------------------------------------------------------ from facets */

@@ -1,5 +1,6 @@
 // The mesh of a scene on any number of ranks: every piece agrees with the whole, errors reach all ranks.
 // @ranks 1 2 3 4
+#include "../../src/mesh/mesh_impl.h"
 #include "mesh_test.h"
 
 #define DATA "tests/data/"

@@ -4,38 +4,13 @@
 
 #define DATA "tests/data/"
 
-typedef struct {
-  SbImport im;
-  SbFaces faces;
-  SbBody body;
-} Checked;
-
-static PetscErrorCode check_mesh(SbBody body, Checked *m)
-{
-  PetscFunctionBeginUser;
-  memset(m, 0, sizeof(*m));
-  m->body = body;
-  PetscCall(SbImportRead(&m->body, &m->im));
-  PetscCall(SbImportCheck(&m->im, &m->faces));
-  PetscCall(SbImportQuality(&m->im, &m->faces, &m->body));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode free_mesh(Checked *m)
-{
-  PetscFunctionBeginUser;
-  PetscCall(SbImportDestroy(&m->im));
-  PetscCall(SbFacesDestroy(&m->faces));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* What is repaired and what is only counted. */
 static PetscErrorCode test_repairs(void)
 {
-  Checked m;
+  TestMesh m;
 
   PetscFunctionBeginUser;
-  PetscCall(check_mesh(test_body("b", DATA "odd.msh"), &m));
+  PetscCall(test_mesh_read(test_body("b", DATA "odd.msh"), &m));
   SB_CHECK(m.im.nunused == 2 && m.im.nvert == 8, "%d unused vertices, %d left", (int)m.im.nunused,
            (int)m.im.nvert);
   SB_CHECK(m.im.vert_number[0] == 1 && m.im.vert_number[4] == 60, "numbers of the vertices that stay");
@@ -44,19 +19,19 @@ static PetscErrorCode test_repairs(void)
   SB_CHECK(m.im.nlost == 2, "%d triangles beside the tets", (int)m.im.nlost);
   SB_CHECK(m.im.item[0].n == 0 && m.im.item[2].n == 2, "%d points and %d triangles left", (int)m.im.item[0].n,
            (int)m.im.item[2].n);
-  for (PetscInt c = 0; c < 2; c++)
-    SB_CHECK_NEAR(SbTetDeterminant(m.im.x, m.im.item[3].vert + 4 * c), 1, 0, "determinant");
-  SB_CHECK(m.body.npart == 2, "%d parts", (int)m.body.npart);
-  SB_CHECK(!strcmp(m.body.note, "unused vertices left out: 2, inverted tets turned: 1, parts that share no "
-                                "vertex: 2, triangles of groups that are no face of a "
-                                "tet: 2"),
-           "'%s'", m.body.note);
-  PetscCall(free_mesh(&m));
-  PetscCall(check_mesh(test_body("b", DATA "odd_edge.msh"), &m));
-  SB_CHECK(m.im.npinched == 1 && m.body.npart == 1, "%d edges with more than two facets, %d parts",
-           (int)m.im.npinched, (int)m.body.npart);
-  SB_CHECK(m.body.nfacet == 8, "%d facets", (int)m.body.nfacet);
-  PetscCall(free_mesh(&m));
+  SB_CHECK_NEAR(m.facts.body.volume, 2. / 6, 1e-15, "volume of two tets, one of which was turned");
+  SB_CHECK(m.facts.body.npart == 2, "%d parts", (int)m.facts.body.npart);
+  SB_CHECK(!strcmp(m.facts.body.note,
+                   "unused vertices left out: 2, inverted tets turned: 1, parts that share no "
+                   "vertex: 2, triangles of groups that are no face of a "
+                   "tet: 2"),
+           "'%s'", m.facts.body.note);
+  PetscCall(SbImportDestroy(&m.im));
+  PetscCall(test_mesh_read(test_body("b", DATA "odd_edge.msh"), &m));
+  SB_CHECK(m.im.npinched == 1 && m.facts.body.npart == 1, "%d edges with more than two facets, %d parts",
+           (int)m.im.npinched, (int)m.facts.body.npart);
+  SB_CHECK(m.facts.body.nfacet == 8, "%d facets", (int)m.facts.body.nfacet);
+  PetscCall(SbImportDestroy(&m.im));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -71,72 +46,69 @@ static PetscErrorCode test_refusals(void)
     {"bad_twins.msh", "1|2"},
     {"bad_three.msh", "1|2|3"},
   };
-  Checked m;
+  TestMesh m;
   SbBody body;
   char path[256];
 
   PetscFunctionBeginUser;
   for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(bad); i++) {
     (void)snprintf(path, sizeof(path), DATA "%s", bad[i].file);
-    SB_CHECK_ERROR(check_mesh(test_body("b", path), &m), PETSC_ERR_USER_INPUT, bad[i].words);
-    PetscCall(free_mesh(&m));
+    SB_CHECK_ERROR(test_mesh_read(test_body("b", path), &m), PETSC_ERR_USER_INPUT, bad[i].words);
+    PetscCall(SbImportDestroy(&m.im));
   }
   /* Moved so far away that a tet drowns in the rounding of its coordinates. */
   body = test_body("b", "box:1e-6,1e-6,1e-6:1");
   body.translate[0] = 1e9;
-  SB_CHECK_ERROR(check_mesh(body, &m), PETSC_ERR_USER_INPUT, "body 'b'|box:1e-6,1e-6,1e-6|tetrahedron 1");
-  PetscCall(free_mesh(&m));
+  SB_CHECK_ERROR(test_mesh_read(body, &m), PETSC_ERR_USER_INPUT, "body 'b'|box:1e-6,1e-6,1e-6|tetrahedron 1");
+  PetscCall(SbImportDestroy(&m.im));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Sizes from a nanometre to a thousand kilometres and a mirrored body are fine; shape does not depend on size. */
 static PetscErrorCode test_scales(void)
 {
-  Checked m;
+  TestMesh m;
   SbBody body = test_body("b", "box:1,1,1:2");
 
   PetscFunctionBeginUser;
   for (int e = -9; e <= 6; e += 3) {
     body.scale = PetscPowRealInt(10, e);
-    PetscCall(check_mesh(body, &m));
-    SB_CHECK_NEAR(m.body.volume / PetscPowRealInt(10, 3 * e), 1, 1e-13, "volume of the scaled cube");
-    SB_CHECK_NEAR(m.body.min_dihedral, 45, 1e-10, "smallest dihedral angle");
-    PetscCall(free_mesh(&m));
+    PetscCall(test_mesh_read(body, &m));
+    SB_CHECK_NEAR(m.facts.body.volume / PetscPowRealInt(10, 3 * e), 1, 1e-13, "volume of the scaled cube");
+    SB_CHECK_NEAR(m.facts.body.min_dihedral, 45, 1e-10, "smallest dihedral angle");
+    PetscCall(SbImportDestroy(&m.im));
   }
   body.scale = -1;
-  PetscCall(check_mesh(body, &m));
+  PetscCall(test_mesh_read(body, &m));
   SB_CHECK(m.im.nreoriented == 48, "%d tets turned in a mirrored cube", (int)m.im.nreoriented);
-  SB_CHECK_NEAR(m.body.volume, 1, 1e-14, "volume of the mirrored cube");
-  SB_CHECK(m.body.bbox[0] == -1 && m.body.bbox[3] == 0, "extent from %g to %g", (double)m.body.bbox[0],
-           (double)m.body.bbox[3]);
-  PetscCall(free_mesh(&m));
+  SB_CHECK_NEAR(m.facts.body.volume, 1, 1e-14, "volume of the mirrored cube");
+  SB_CHECK(m.facts.body.bbox[0] == -1 && m.facts.body.bbox[3] == 0, "extent from %g to %g",
+           (double)m.facts.body.bbox[0], (double)m.facts.body.bbox[3]);
+  PetscCall(SbImportDestroy(&m.im));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Known shapes: the regular tet (70.53 degrees, ratio 1), the corner of a cube, a sliver of height h over a square. */
 static PetscErrorCode test_shape(const PetscReal x[12], PetscReal dihedral, PetscReal ratio)
 {
-  SbImport im;
-  SbFaces faces;
-  SbBody body = test_body("b", "");
+  TestMesh m;
+  const SbBody *body = &m.facts.body;
   PetscReal worst = 0;
 
   PetscFunctionBeginUser;
-  memset(&im, 0, sizeof(im));
-  PetscCall(SbImportSetVertices(&im, 4));
-  PetscCall(PetscArraycpy(im.x, x, 12));
-  PetscCall(SbImportAddItem(&im, 3, (PetscInt[]){0, 1, 2, 3}, 0, 1));
-  PetscCall(SbImportCheck(&im, &faces));
-  PetscCall(SbImportQuality(&im, &faces, &body));
-  SB_CHECK_NEAR(body.min_dihedral, dihedral, 1e-9 * dihedral,
+  memset(&m, 0, sizeof(m));
+  PetscCall(SbImportSetVertices(&m.im, 4));
+  PetscCall(PetscArraycpy(m.im.x, x, 12));
+  PetscCall(SbImportAddItem(&m.im, 3, (PetscInt[]){0, 1, 2, 3}, 0, 1));
+  PetscCall(SbMeshFileMeasure(&m.im, &m.facts));
+  SB_CHECK_NEAR(body->min_dihedral, dihedral, 1e-9 * dihedral,
                 "smallest dihedral angle"); /* acos near 1 costs digits */
-  SB_CHECK_NEAR(body.max_radius_ratio, ratio, 1e-9 * ratio, "radius ratio");
+  SB_CHECK_NEAR(body->max_radius_ratio, ratio, 1e-9 * ratio, "radius ratio");
   for (int i = 0; i < 3; i++)
     worst = PetscMax(
-      worst, PetscAbsReal(body.bbox[i] - PetscMin(PetscMin(x[i], x[3 + i]), PetscMin(x[6 + i], x[9 + i]))));
+      worst, PetscAbsReal(body->bbox[i] - PetscMin(PetscMin(x[i], x[3 + i]), PetscMin(x[6 + i], x[9 + i]))));
   SB_CHECK(worst == 0, "extent wrong by %g", (double)worst);
-  PetscCall(SbImportDestroy(&im));
-  PetscCall(SbFacesDestroy(&faces));
+  PetscCall(SbImportDestroy(&m.im));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

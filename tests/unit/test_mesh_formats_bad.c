@@ -20,21 +20,11 @@ static void write_text(const char *name, const char *text)
 static PetscErrorCode use_mesh(const char *name)
 {
   char path[128];
-  SbBody body;
-  SbImport im;
-  SbFaces faces;
-  PetscErrorCode ierr;
 
   PetscFunctionBeginUser;
   (void)snprintf(path, sizeof(path), "%s/%s", folder, name);
-  body = test_body("b", path);
-  memset(&im, 0, sizeof(im));
-  memset(&faces, 0, sizeof(faces));
-  ierr = SbImportRead(&body, &im);
-  if (!ierr) ierr = SbImportCheck(&im, &faces);
-  PetscCall(SbImportDestroy(&im));
-  PetscCall(SbFacesDestroy(&faces));
-  PetscFunctionReturn(ierr);
+  PetscCall(test_mesh_use(path));
+  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 typedef struct {

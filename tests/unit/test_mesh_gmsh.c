@@ -16,22 +16,6 @@ static PetscErrorCode read_mesh(const char *path, SbImport *im)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Reads, checks, frees. */
-static PetscErrorCode use_mesh(const char *path)
-{
-  SbImport im;
-  SbFaces faces;
-  PetscErrorCode ierr;
-
-  PetscFunctionBeginUser;
-  memset(&faces, 0, sizeof(faces));
-  ierr = read_mesh(path, &im);
-  if (!ierr) ierr = SbImportCheck(&im, &faces);
-  PetscCall(SbImportDestroy(&im));
-  PetscCall(SbFacesDestroy(&faces));
-  PetscFunctionReturn(ierr);
-}
-
 /* Items of one dimension that belong to a group; with all their groups, joined by blanks. */
 static PetscInt count_in_group(const SbImport *im, int dim, const char *name)
 {
@@ -174,9 +158,9 @@ static PetscErrorCode test_damage(void)
   PetscFunctionBeginUser;
   for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(bad); i++) {
     (void)snprintf(path, sizeof(path), DATA "%s", bad[i].file);
-    SB_CHECK_ERROR(use_mesh(path), PETSC_ERR_FILE_UNEXPECTED, bad[i].words);
+    SB_CHECK_ERROR(test_mesh_use(path), PETSC_ERR_FILE_UNEXPECTED, bad[i].words);
   }
-  SB_CHECK_ERROR(use_mesh(DATA "none.msh"), PETSC_ERR_FILE_OPEN, "body 'b'|tests/data/none.msh");
+  SB_CHECK_ERROR(test_mesh_use(DATA "none.msh"), PETSC_ERR_FILE_OPEN, "body 'b'|tests/data/none.msh");
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -200,7 +184,7 @@ static PetscErrorCode test_cut(const char *whole_path, size_t step)
     file = fopen(path, "wb");
     fwrite(data, 1, n, file);
     fclose(file);
-    ierr = use_mesh(path);
+    ierr = test_mesh_use(path);
     SB_CHECK(ierr, "%s cut to %zu of %zu bytes was accepted", whole_path, n, size);
   }
   PetscCall(PetscPopErrorHandler());

@@ -1,5 +1,6 @@
 // Reverse Cuthill-McKee order: a permutation, narrow where the body is slender, parts one after the other.
 // @ranks 1
+#include "../../src/mesh/mesh_impl.h"
 #include "mesh_test.h"
 
 static PetscErrorCode read_box(const char *text, SbImport *im)

@@ -1,5 +1,6 @@
 // The cut of a mesh into parts: balance and length of the border, few cells, and the exchange of records.
 // @ranks 1 2 3 4
+#include "../../src/mesh/mesh_impl.h"
 #include "mesh_test.h"
 
 /* A box on rank 0, cut; the most cells of a part, their sum over all parts, and faces between parts. */

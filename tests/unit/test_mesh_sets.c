@@ -1,5 +1,6 @@
 // Named sets: their text, what they hold, what is said when they hold nothing.
 // @ranks 1
+#include "../../src/mesh/mesh_impl.h"
 #include "mesh_test.h"
 
 #define DATA "tests/data/"

@@ -1,5 +1,6 @@
 // A mesh read in slabs by all ranks is, number by number, the one that rank 0 reads: vertices, tets, sets, parts, notes, errors.
 // @ranks 1 2 3 4
+#include "../../src/mesh/mesh_impl.h"
 #include "mesh_same.h"
 
 #define DATA "tests/data/"

@@ -1,5 +1,6 @@
 // Meshes that were written are read again as they were: all formats, groups that overlap, orientation, order.
 // @ranks 1
+#include "../../src/meshio/meshio_impl.h"
 #include "mesh_same.h"
 
 #define DATA "tests/data/"

@@ -4,7 +4,6 @@
   stars with their normals, edges and corners, self-contact, thin plates that are hit fast.
 */
 #include "detect_fixture.h"
-#include "../../src/contact/detect.h"
 
 static const PetscReal axes[6][3] = {{1, 0, 0}, {-1, 0, 0}, {0, 1, 0}, {0, -1, 0}, {0, 0, 1}, {0, 0, -1}};
 

@@ -4,7 +4,6 @@
   force that it takes is the residual's, axes as directions do what a support does, and no partition changes it.
 */
 #include "../scene.h"
-#include "../../src/fem/fem_impl.h"
 
 #define SCENE                                                                                             \
   "-bodies a -body_a_mesh box:1,0.5,0.4:3 -body_a_material linear -body_a_young 1e3 -body_a_poisson 0.3 " \

@@ -1,6 +1,5 @@
 // @ranks 1 3
 /* Rotations of nodes: exact for a body turned as a whole by any angle, the local turn in a bent bar, I for linear laws. */
-#include "../../src/solver/rotated.h"
 #include "../scene.h"
 
 static const char *const bar =
