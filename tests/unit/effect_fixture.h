@@ -271,8 +271,8 @@ static inline PetscErrorCode check_loads(FixturePair *p, size_t n, const LoadCas
 }
 
 /* An effect that its options or its sets refuse. */
-static inline PetscErrorCode check_refused(Fixture *x, const char *name, const char *options,
-                                           const char *names)
+static inline PetscErrorCode check_effect_refused(Fixture *x, const char *name, const char *options,
+                                                  const char *names)
 {
   SbEffect e;
 

@@ -52,9 +52,9 @@ int main(int argc, char **argv)
     for (PetscInt i = 0; i < x->space->nnode; i++) {
       if (x->space->node_x[3 * i + 2] > 0.75) SB_CHECK(x->f[3 * i + 2] == 0, "force outside the set");
     }
-    PetscCall(check_refused(&p.all, "flat",
-                            "-effect_flat_type body_force -effect_flat_on shell -effect_flat_density 0;0;8",
-                            "-effect_flat_on|set shell|9 vertices"));
+    PetscCall(check_effect_refused(
+      &p.all, "flat", "-effect_flat_type body_force -effect_flat_on shell -effect_flat_density 0;0;8",
+      "-effect_flat_on|set shell|9 vertices"));
     PetscCall(fixture_pair_destroy(&p));
   }
   SB_TEST_END();

@@ -67,9 +67,9 @@ static PetscErrorCode check_element(const char *element, PetscBool held)
   for (PetscInt i = 0; !strcmp(element, "p1") && i < x->space->nnode_owned; i++)
     SB_CHECK_NEAR(x->f[3 * i + 2], x->space->node_x[3 * i + 2] > 1 - 1e-9 ? 3 : 0, 1e-14, "share of a node");
   PetscCall(SbEffectDestroy(&lift));
-  PetscCall(check_refused(x, "bad",
-                          "-effect_bad_type point_force -effect_bad_on tip -effect_bad_vector 0;x;0",
-                          "-effect_bad_vector"));
+  PetscCall(check_effect_refused(x, "bad",
+                                 "-effect_bad_type point_force -effect_bad_on tip -effect_bad_vector 0;x;0",
+                                 "-effect_bad_vector"));
   PetscCall(fixture_pair_destroy(&p));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -50,9 +50,9 @@ int main(int argc, char **argv)
                 (PetscBool)(k == 3)); /* a face with a support bears loads as any other */
     PetscCall(fixture_pair_create(1, PETSC_STATIC_ARRAY_LENGTH(sets), sets, &p));
     PetscCall(check_loads(&p, PETSC_STATIC_ARRAY_LENGTH(cases), cases));
-    PetscCall(check_refused(&p.all, "dot",
-                            "-effect_dot_type traction -effect_dot_on tip -effect_dot_total 0,0,1",
-                            "-effect_dot_on|set tip|1 vertices|0 boundary|0 tetrahedra"));
+    PetscCall(check_effect_refused(&p.all, "dot",
+                                   "-effect_dot_type traction -effect_dot_on tip -effect_dot_total 0,0,1",
+                                   "-effect_dot_on|set tip|1 vertices|0 boundary|0 tetrahedra"));
     PetscCall(fixture_pair_destroy(&p));
   }
   SB_TEST_END();

@@ -10,12 +10,15 @@ typedef struct {
 
 static PetscErrorCode make_box(const char *text, Box *box)
 {
+  SbMeshFacts facts;
+
   PetscFunctionBeginUser;
   memset(box, 0, sizeof(*box));
   box->body = test_body("b", text);
   PetscCall(SbImportRead(&box->body, &box->im));
-  PetscCall(SbImportCheck(&box->im, &box->faces));
-  PetscCall(SbImportQuality(&box->im, &box->faces, &box->body));
+  PetscCall(SbMeshFileMeasure(&box->im, &facts));
+  box->body = facts.body;
+  PetscCall(SbFacesCreate(box->im.nvert, box->im.item[3].n, box->im.item[3].vert, &box->faces));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -1,5 +1,6 @@
 // Refinement: eight children that fill their parent, groups and orientation carried over, shapes that stay; edges once each.
 // @ranks 1
+#include "../../src/mesh/mesh_impl.h"
 #include "mesh_same.h"
 
 /* Vertices, edges, faces and cells of a ball: v - e + f - c = 1. */

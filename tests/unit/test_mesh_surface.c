@@ -11,7 +11,7 @@ static PetscErrorCode import(const char *extension, PetscBool binary, const Test
                              const SbTetOptions *options, SbImport *im, SbBody *body, PetscBool *here)
 {
   char path[512];
-  SbFaces faces;
+  SbMeshFacts facts;
 
   PetscFunctionBeginUser;
   PetscCall(test_file_write(extension, binary, s, text, path));
@@ -24,9 +24,8 @@ static PetscErrorCode import(const char *extension, PetscBool binary, const Test
     else
       PetscCall(SbTetDefaults(&body->tet));
     PetscCall(SbImportRead(body, im));
-    PetscCall(SbImportCheck(im, &faces));
-    PetscCall(SbImportQuality(im, &faces, body));
-    PetscCall(SbFacesDestroy(&faces));
+    PetscCall(SbMeshFileMeasure(im, &facts));
+    *body = facts.body;
   }
   PetscCallMPI(MPI_Barrier(PETSC_COMM_WORLD));
   PetscCall(test_file_remove(path));

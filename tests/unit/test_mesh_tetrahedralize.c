@@ -93,8 +93,8 @@ static PetscErrorCode check_sizes(void)
   PetscCall(make_skin(&t, t.ntri, &s));
   for (int k = 0; k < 3; k++) {
     SbImport im;
-    SbBody body = test_body("b", "sphere");
-    SbFaces faces;
+    SbMeshFacts facts;
+    const SbBody *body = &facts.body;
     PetscReal volume;
     PetscInt none;
 
@@ -109,12 +109,10 @@ static PetscErrorCode check_sizes(void)
     per[k] = (PetscReal)im.item[3].n * sizes[k] * sizes[k] * sizes[k];
     SB_CHECK(per[k] > 3 * PETSC_SQRT2 * volume && per[k] < 12 * PETSC_SQRT2 * volume, "size %g: %d tets",
              (double)sizes[k], (int)im.item[3].n);
-    PetscCall(SbImportCheck(&im, &faces));
-    PetscCall(SbImportQuality(&im, &faces, &body));
-    SB_CHECK(body.min_dihedral > 8, "size %g: smallest dihedral angle %g", (double)sizes[k],
-             (double)body.min_dihedral);
-    SB_CHECK(strstr(body.note, "surface remeshed"), "'%s'", body.note);
-    PetscCall(SbFacesDestroy(&faces));
+    PetscCall(SbMeshFileMeasure(&im, &facts));
+    SB_CHECK(body->min_dihedral > 8, "size %g: smallest dihedral angle %g", (double)sizes[k],
+             (double)body->min_dihedral);
+    SB_CHECK(strstr(body->note, "surface remeshed"), "'%s'", body->note);
     PetscCall(SbImportDestroy(&im));
   }
   for (int k = 1; k < 3; k++)
