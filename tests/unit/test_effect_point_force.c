@@ -15,8 +15,11 @@ static PetscErrorCode check_work(Fixture *x, const PetscReal X[3], const PetscRe
 
   PetscFunctionBeginUser;
   // Numbers without order, the same on every number of ranks.
-  for (PetscInt i = 0; i < 3 * s->nnode_owned; i++)
-    sum[4] += x->f[i] * PetscSinReal((PetscReal)(i % 3 + 1) * (PetscReal)s->node_orig[i / 3]);
+  for (PetscInt i = 0; i < 3 * s->nnode_owned; i++) {
+    const PetscInt number = s->node_orig[i / 3];
+
+    sum[4] += x->f[i] * PetscSinReal((PetscReal)(i % 3 + 1) * (PetscReal)number);
+  }
   for (PetscInt cell = 0; cell < x->mesh->ncell_owned; cell++) {
     const PetscReal volume = 1.0 / 48; // all tets of the box are alike
 

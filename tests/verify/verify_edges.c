@@ -26,15 +26,7 @@ static PetscErrorCode open_on(MPI_Comm comm, TestScene *t, const char *format, .
   va_start(args, format);
   PetscCall(PetscVSNPrintf(text, sizeof(text), format, NULL, args));
   va_end(args);
-  PetscCall(PetscOptionsClear(NULL));
-  PetscCall(SbOptionsReset());
-  PetscCall(SbRegisterAll());
-  PetscCall(PetscOptionsInsertString(NULL, text));
-  PetscCall(SbSceneCreate(comm, &t->model));
-  PetscCall(test_scene_run(t));
-  PetscCall(SbOptionsCheck());
-  PetscCall(SbModelSetUp(t->model));
-  PetscCall(SbRunSetUp(t->run));
+  PetscCall(test_scene_open_on(comm, NULL, text, t));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -378,7 +370,8 @@ static PetscErrorCode write_ring(char path[512])
 
     fprintf(f, "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n%d\n", 4 * SEGMENTS);
     for (int i = 0; i < 4 * SEGMENTS; i++) {
-      const PetscReal angle = 2 * PETSC_PI * (i / 4 - 0.5) / SEGMENTS, r = RADIUS + corner[i % 4][0];
+      const int section = i / 4;
+      const PetscReal angle = 2 * PETSC_PI * (section - 0.5) / SEGMENTS, r = RADIUS + corner[i % 4][0];
 
       fprintf(f, "%d %.17g %.17g %.17g\n", i + 1, (double)(r * PetscCosReal(angle)),
               (double)(r * PetscSinReal(angle)), (double)corner[i % 4][1]);
