@@ -216,10 +216,12 @@ typedef struct {
   PetscInt *order;   /* [4 start[1]] box at each place of level 0, -1: none */
   PetscReal (*group)[6][4]; /* [start[nlevel]] lower and upper corners of the four boxes or groups in it, m */
   PetscReal hull[6];        /* of all, m */
+  PetscReal size;           /* of all hulls over that of the boxes, when the order was made */
+  PetscInt built;           /* how often the order was made */
 } SbBoxTree;
 PetscErrorCode SbBoxTreeCreate(PetscInt n, const PetscReal (*box)[6], SbBoxTree *tree);
 PetscErrorCode SbBoxTreeDestroy(SbBoxTree *tree);
-/* The same boxes elsewhere: keeps the order, O(n). box[n][6], m. */
+/* The same boxes elsewhere, O(n); where that has made the groups half as large again against their boxes, they are ordered anew. box[n][6], m. */
 PetscErrorCode SbBoxTreeRefit(SbBoxTree *tree, const PetscReal (*box)[6]);
 
 /*

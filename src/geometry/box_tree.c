@@ -4,11 +4,14 @@
   The boxes are ordered so that neighbours follow each other: the range is halved again and again at the median of the middles along the longer
   axis, always at a multiple of the number of boxes below a child. Four boxes in this order form a group, four groups one of the next level; each
   group holds the hulls of its four children side by side, so that one look tests them all, and nothing but the order has to be stored.
-  When boxes move, the order stays and the hulls are made anew.
+  When boxes move, the order stays and the hulls are made anew; when these have grown too much, as where bodies go different ways, so is the order.
 
   Walks are kept by the caller and give what they find piece by piece: nothing is allocated, and what is found need not fit into memory.
 */
 #include "sbgeometry.h"
+
+#define WORSE \
+  1.5 /* of the size of all hulls against that of the boxes: so much more than in a new tree makes a new one */
 
 /* ------------------------------------------------------------------ making a tree */
 
@@ -80,9 +83,19 @@ static void order_items(Item item[], PetscInt n, PetscInt below)
   order_items(item + left, n - left, below);
 }
 
-PetscErrorCode SbBoxTreeRefit(SbBoxTree *tree, const PetscReal (*box)[6])
+/* Size of a box: the sum of its edges; none of an empty one. */
+static inline PetscReal size_of(const PetscReal box[6])
 {
-  PetscFunctionBeginUser;
+  const PetscReal size = box[3] - box[0] + (box[4] - box[1]) + (box[5] - box[2]);
+
+  return size > 0 ? size : 0;
+}
+
+/* The hulls of all groups; returns the size of all over that of the boxes. */
+static PetscReal fill(SbBoxTree *tree, const PetscReal (*box)[6])
+{
+  PetscReal groups = 0, boxes = 0;
+
   SbBoxClear(tree->hull);
   for (int level = 0; level < tree->nlevel; level++) {
     const PetscInt first = tree->start[level], n = tree->start[level + 1] - first;
@@ -91,35 +104,57 @@ PetscErrorCode SbBoxTreeRefit(SbBoxTree *tree, const PetscReal (*box)[6])
       PetscReal hull[6];
 
       SbBoxClear(hull);
-      if (level == 0) {
-        for (int l = 0; l < 4; l++) {
-          const PetscInt i = tree->order[4 * g + l];
+      for (int l = 0; l < 4; l++) {
+        const PetscInt i = level == 0 ? tree->order[4 * g + l] : -1;
+        PetscReal child[6];
 
-          for (int k = 0; k < 6 && i >= 0; k++) tree->group[g][k][l] = box[i][k];
-          if (i >= 0) SbBoxMerge(hull, box[i]);
-        }
-      } else {
-        for (int l = 0; l < 4; l++) {
-          PetscReal child[6];
-
-          for (int k = 0; k < 6; k++) child[k] = tree->group[first + g][k][l];
-          SbBoxMerge(hull, child);
-        }
+        for (int k = 0; k < 6 && i >= 0; k++) tree->group[g][k][l] = box[i][k];
+        for (int k = 0; k < 6; k++) child[k] = tree->group[first + g][k][l];
+        SbBoxMerge(hull, child);
+        if (level == 0) boxes += size_of(child);
       }
-      if (level + 1 == tree->nlevel)
-        (void)PetscArraycpy(tree->hull, hull, 6);
-      else {
-        for (int k = 0; k < 6; k++) tree->group[tree->start[level + 1] + g / 4][k][g % 4] = hull[k];
+      groups += size_of(hull);
+      for (int k = 0; k < 6; k++) {
+        if (level + 1 == tree->nlevel)
+          tree->hull[k] = hull[k];
+        else
+          tree->group[tree->start[level + 1] + g / 4][k][g % 4] = hull[k];
       }
     }
   }
+  return groups / PetscMax(boxes + size_of(tree->hull), PETSC_SMALL * PETSC_SMALL);
+}
+
+static PetscErrorCode build(SbBoxTree *tree, const PetscReal (*box)[6])
+{
+  PetscInt below = 1;
+  Item *item;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscMalloc1(tree->n, &item));
+  for (PetscInt i = 0; i < tree->n; i++) {
+    for (int k = 0; k < 3; k++) item[i].middle[k] = 0.5 * box[i][k] + 0.5 * box[i][3 + k];
+    item[i].box = i;
+  }
+  while (below <= tree->n / 4) below *= 4;
+  order_items(item, tree->n, below);
+  for (PetscInt i = 0; i < tree->n; i++) tree->order[i] = item[i].box;
+  PetscCall(PetscFree(item));
+  tree->size = fill(tree, box);
+  tree->built++;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbBoxTreeRefit(SbBoxTree *tree, const PetscReal (*box)[6])
+{
+  PetscFunctionBeginUser;
+  if (tree->n && fill(tree, box) > WORSE * tree->size) PetscCall(build(tree, box));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode SbBoxTreeCreate(PetscInt n, const PetscReal (*box)[6], SbBoxTree *tree)
 {
-  PetscInt ngroup, below = 1;
-  Item *item;
+  PetscInt ngroup;
 
   PetscFunctionBeginUser;
   PetscCall(PetscMemzero(tree, sizeof(*tree)));
@@ -132,21 +167,14 @@ PetscErrorCode SbBoxTreeCreate(PetscInt n, const PetscReal (*box)[6], SbBoxTree 
     tree->nlevel++;
   }
   PetscCall(PetscMalloc2(4 * (size_t)tree->start[1], &tree->order, tree->start[tree->nlevel], &tree->group));
-  PetscCall(PetscMalloc1(n, &item));
-  for (PetscInt i = 0; i < n; i++) {
-    for (int k = 0; k < 3; k++) item[i].middle[k] = 0.5 * box[i][k] + 0.5 * box[i][3 + k];
-    item[i].box = i;
-  }
-  while (below <= n / 4) below *= 4;
-  order_items(item, n, below);
-  for (PetscInt i = 0; i < 4 * tree->start[1]; i++) tree->order[i] = i < n ? item[i].box : -1;
-  PetscCall(PetscFree(item));
+  for (PetscInt i = n; i < 4 * tree->start[1]; i++) tree->order[i] = -1;
+  // places without a child are empty
   for (PetscInt g = 0; g < tree->start[tree->nlevel]; g++) {
     for (int k = 0; k < 6; k++) {
       for (int l = 0; l < 4; l++) tree->group[g][k][l] = k < 3 ? PETSC_MAX_REAL : -PETSC_MAX_REAL;
     }
   }
-  PetscCall(SbBoxTreeRefit(tree, box));
+  PetscCall(build(tree, box));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -161,6 +161,39 @@ static PetscErrorCode check_trees(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A cloud that moves, turns and grows keeps its order; one whose halves go different ways is ordered anew, once. */
+static PetscErrorCode check_refit(void)
+{
+  static PetscReal box[MOST][6], moved[MOST][6];
+  const PetscReal(*b)[6] = (const PetscReal(*)[6])moved;
+  SbBoxTree tree;
+
+  PetscFunctionBeginUser;
+  make_boxes(0, MOST, box);
+  PetscCall(SbBoxTreeCreate(MOST, (const PetscReal(*)[6])box, &tree));
+  for (int step = 0; step < 20; step++) {
+    for (PetscInt i = 0; i < MOST; i++) {
+      for (int k = 0; k < 6; k++)
+        moved[i][k] = (1 + 0.5 * step) * (step % 2 ? box[i][k]
+                                          : k < 3  ? -box[i][k + 3]
+                                                   : -box[i][k - 3]) +
+                      10 * step;
+    }
+    PetscCall(SbBoxTreeRefit(&tree, b));
+  }
+  SB_CHECK(tree.built == 1, "the tree was made %d times", (int)tree.built);
+  for (int step = 0; step < 20; step++) {
+    for (PetscInt i = 0; i < MOST; i++) {
+      for (int k = 0; k < 6; k++) moved[i][k] = box[i][k] + (k % 3 == 0 && i % 2 ? step : 0);
+    }
+    PetscCall(SbBoxTreeRefit(&tree, b));
+    check_query(&tree, MOST, b);
+  }
+  SB_CHECK(tree.built > 1 && tree.built < 5, "the tree was made %d times", (int)tree.built);
+  PetscCall(SbBoxTreeDestroy(&tree));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Points in clusters, on chains and at the same place, far from the origin too; against all pairs, gone over again and again for chains. */
 static PetscErrorCode check_weld(void)
 {
@@ -216,6 +249,7 @@ int main(int argc, char **argv)
 {
   SB_TEST_BEGIN(argc, argv);
   PetscCall(check_trees());
+  PetscCall(check_refit());
   PetscCall(check_weld());
   SB_TEST_END();
 }
