@@ -94,17 +94,17 @@ static inline PetscReal SbDetectRange(const SbDetectScene *s)
   return PetscMax(s->reach, s->deep);
 }
 
-typedef enum { SB_DETECT_HASH, SB_DETECT_BVH, SB_DETECT_BRUTE } SbDetectKind;
+typedef enum { SB_DETECT_TREE, SB_DETECT_BRUTE } SbDetectKind;
 typedef struct {
   PetscInt64 candidates; /* pairs of point and facet that were examined */
   PetscInt found;
-  PetscInt64 memory; /* bytes constrained by the search structure */
+  PetscInt64 memory; /* bytes of the tree */
   PetscInt rebuilt;  /* how often it was rebuilt, of all calls so far */
-  char text[256];    /* what the detector says of itself: cell size, table, tree */
+  char text[256];    /* what the detector says of itself */
 } SbDetectStats;
 
 typedef struct _p_SbDetector *SbDetector;
-/* Not collective. What each kind does is described in its file in src/contact. */
+/* A tree over the boxes of facets, or all boxes. Not collective. */
 PetscErrorCode SbDetectorCreate(SbDetectKind kind, SbDetector *detector);
 PetscErrorCode SbDetectorDestroy(SbDetector *detector);
 /*

@@ -1,29 +1,22 @@
 /*
-  detect.c - contact detection on one rank: boxes of facets and points, candidates by a kind of detector, then near.c.
+  detect.c - contact detection on one rank: boxes of facets and points, candidates by a tree of boxes or by trial of all, then near.c.
 
   A box holds its facet at the end and, when the motion is examined, at the start of the step, and so everything in between: corners
   move on straight lines. Two that come within the reach, or cross, have boxes that meet.
 */
 #include "detect.h"
 
-static PetscErrorCode (*const constructors[])(SbDetector) = {
-  [SB_DETECT_HASH] = SbDetectorCreate_Hash,
-  [SB_DETECT_BVH] = SbDetectorCreate_BVH,
-  [SB_DETECT_BRUTE] = SbDetectorCreate_Brute,
-};
-
 PetscErrorCode SbDetectorCreate(SbDetectKind kind, SbDetector *detector)
 {
   SbDetector d;
 
   PetscFunctionBeginUser;
-  PetscCheck((size_t)kind < PETSC_STATIC_ARRAY_LENGTH(constructors) && constructors[kind], PETSC_COMM_SELF,
-             PETSC_ERR_ARG_OUTOFRANGE, "there is no contact detector of kind %d", (int)kind);
+  PetscCheck(kind == SB_DETECT_TREE || kind == SB_DETECT_BRUTE, PETSC_COMM_SELF, PETSC_ERR_ARG_OUTOFRANGE,
+             "there is no contact detector of kind %d", (int)kind);
   PetscCall(PetscNew(&d));
   *detector = d;
   d->nfacet = -1;
   d->kind = kind;
-  PetscCall(constructors[kind](d));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -33,7 +26,7 @@ PetscErrorCode SbDetectorDestroy(SbDetector *detector)
 
   PetscFunctionBeginUser;
   if (!d) PetscFunctionReturn(PETSC_SUCCESS);
-  if (d->ops.destroy) PetscCall(d->ops.destroy(d));
+  PetscCall(SbBoxTreeDestroy(&d->tree));
   PetscCall(PetscFree(d->facet_box));
   PetscCall(PetscFree2(d->point_box, d->start));
   PetscCall(PetscFree(d->candidate));
@@ -42,18 +35,6 @@ PetscErrorCode SbDetectorDestroy(SbDetector *detector)
   PetscCall(PetscFree(d->hit));
   PetscCall(PetscFree(d->near));
   PetscCall(PetscFree(*detector));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode SbCandidatesReserve(SbDetector d, PetscInt64 n)
-{
-  PetscInt size;
-
-  PetscFunctionBeginUser;
-  if (n <= d->candidate_size) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(PetscIntCast(PetscMin(n + n / 2 + 64, PetscMax(n, (PetscInt64)PETSC_MAX_INT)), &size));
-  PetscCall(PetscRealloc(sizeof(*d->candidate) * (size_t)size, &d->candidate));
-  d->candidate_size = size;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -115,11 +96,63 @@ PetscErrorCode SbDetectBegin(SbDetector d, const SbDetectScene *s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbDetectCandidates(SbDetector d, const SbDetectScene *s)
+/* One more candidate, if the scene wants the pair. */
+static inline PetscErrorCode add_candidate(SbDetector d, const SbDetectScene *s, PetscInt point,
+                                           PetscInt facet, PetscInt *n)
 {
   PetscFunctionBeginUser;
+  if (!s->self && s->point_part[point] == s->facet_part[facet]) PetscFunctionReturn(PETSC_SUCCESS);
+  if (*n == d->candidate_size) {
+    PetscCall(PetscIntCast((PetscInt64)*n + *n / 2 + 64, &d->candidate_size));
+    PetscCall(PetscRealloc(sizeof(*d->candidate) * (size_t)d->candidate_size, &d->candidate));
+  }
+  d->candidate[(*n)++] = facet;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbDetectCandidates(SbDetector d, const SbDetectScene *s)
+{
+  const PetscReal(*box)[6] = (const PetscReal(*)[6])d->facet_box;
+  const PetscInt built = d->tree.built;
+  PetscInt n = 0;
+
+  PetscFunctionBeginUser;
   PetscCall(SbDetectRingsUpdate(d, s));
-  PetscCall(d->ops.search(d, s));
+  if (d->kind == SB_DETECT_BRUTE) {
+    for (PetscInt i = 0; i < s->npoint; i++) {
+      d->start[i] = n;
+      for (PetscInt f = 0; f < s->nfacet; f++) {
+        if (SbBoxesOverlap(d->point_box + 6 * i, box[f])) PetscCall(add_candidate(d, s, i, f, &n));
+      }
+    }
+    d->start[s->npoint] = n;
+    (void)snprintf(d->stats.text, sizeof(d->stats.text),
+                   "brute force, %" PetscInt_FMT " x %" PetscInt_FMT " boxes", s->npoint, s->nfacet);
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+
+  // the order of the tree is kept while the facets are the same
+  if (d->same_facets && d->tree.n == s->nfacet) {
+    PetscCall(SbBoxTreeRefit(&d->tree, box));
+    d->stats.rebuilt += d->tree.built - built;
+  } else {
+    PetscCall(SbBoxTreeDestroy(&d->tree));
+    PetscCall(SbBoxTreeCreate(s->nfacet, box, &d->tree));
+    d->stats.rebuilt++;
+  }
+  for (PetscInt i = 0, f; i < s->npoint; i++) {
+    SbBoxQuery query;
+
+    d->start[i] = n;
+    for (SbBoxQueryBegin(&d->tree, d->point_box + 6 * i, &query); SbBoxQueryNext(&query, &f);)
+      PetscCall(add_candidate(d, s, i, f, &n));
+  }
+  d->start[s->npoint] = n;
+  d->stats.memory = (PetscInt64)((size_t)d->tree.start[d->tree.nlevel] * sizeof(*d->tree.group) +
+                                 4 * (size_t)d->tree.start[1] * sizeof(*d->tree.order));
+  (void)snprintf(d->stats.text, sizeof(d->stats.text),
+                 "tree of %" PetscInt_FMT " groups of boxes in %d levels, made %" PetscInt_FMT " times",
+                 d->tree.start[d->tree.nlevel], d->tree.nlevel, d->stats.rebuilt);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -401,7 +401,6 @@ static void look_closely(Look *look, PetscInt n, const PetscInt candidate[], Pet
     PetscReal d2;
 
     prefetch_facets(s, candidate + j, left - j);
-    if (!SbDetectPairWanted(s, look->point, f)) continue;
     (*looked)++;
     corners(s, s->x, f, x);
     h->place = SbTriangleClosestPoint(look->p, x, h->weight, &d2);

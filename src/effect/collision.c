@@ -22,7 +22,6 @@
   or much coarser partner wants both.
 */
 #include "collision.h"
-#include "sbbvh.h"
 
 #define TOGGLES 3    /* how often a row may come within a step before it stays */
 #define SLOW 25      /* solves of a step, after which the tolerance of multipliers is raised, twice */
@@ -38,10 +37,8 @@ static const SbOption rows[] = {
   {"time_of_impact", SB_OPTION_CHOICE, 1, "", "no", "no|yes",
    "a step in which points begin to touch is taken as it is, or repeated up to the moment of the first "
    "touch"},
-  {"detection", SB_OPTION_CHOICE, 1, "", "hash", "hash|bvh|brute",
-   "spatial hash, hierarchy of bounding volumes, or every pair: the same contacts"},
-  {"bvh_volume", SB_OPTION_CHOICE, 1, "", "box", "box|dop14",
-   "what bounds a node of the tree of bvh: a box or 14 planes"},
+  {"detection", SB_OPTION_CHOICE, 1, "", "tree", "tree|brute",
+   "a tree of boxes, or every pair: the same contacts"},
   {"passes", SB_OPTION_CHOICE, 1, "", "two", "one|two",
    "points of the finer of two surfaces search for the other one, or both do"},
   {"self", SB_OPTION_BOOL, 1, "", "no", "", "bodies may meet themselves"},
@@ -108,17 +105,6 @@ static PetscErrorCode options_collision(SbEffect e, const SbScope *scope)
   if (!c->cut) e->ops.time_of_impact = NULL;
   PetscCall(SbOptionChoice(scope, "detection", &choice));
   PetscCall(SbDetectorCreate((SbDetectKind)choice, &c->detector));
-  if (choice == SB_DETECT_BVH) {
-    PetscCall(SbOptionChoice(scope, "bvh_volume", &choice));
-    PetscCall(SbBvhSet(c->detector, choice ? 14 : 6));
-  } else {
-    PetscBool given;
-
-    PetscCall(SbOptionGiven(scope, "bvh_volume", &given));
-    PetscCheck(!given, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
-               "-effect_%s_bvh_volume is for -effect_%s_detection bvh: give that, or leave it out", e->name,
-               e->name);
-  }
   PetscCall(SbOptionChoice(scope, "passes", &choice));
   c->both = (PetscBool)(choice == 1);
   PetscCall(SbOptionBool(scope, "self", &c->self));

@@ -1,5 +1,5 @@
 /*
-  Speed of contact detection: detect -facets 10000 -detectors hash,brute -rounds 5 [-motion] [-shuffled]
+  Speed of contact detection: detect -facets 10000 -detectors tree,brute -rounds 5 [-motion] [-shuffled]
 
   Two wavy sheets of squares cut in two lie in each other, a hundred facets to a wave whatever their number, so that each point has the same
   surroundings. The sheets shift a little from call to call. Printed are microseconds per point of a call, `sample NAME us VALUE`, the
@@ -17,7 +17,7 @@
 static const struct {
   const char *name;
   SbDetectKind kind;
-} kinds[] = {{"hash", SB_DETECT_HASH}, {"bvh", SB_DETECT_BVH}, {"brute", SB_DETECT_BRUTE}};
+} kinds[] = {{"tree", SB_DETECT_TREE}, {"brute", SB_DETECT_BRUTE}};
 
 /* Both sheets: corners are points. */
 typedef struct {
@@ -187,7 +187,7 @@ static PetscErrorCode measure(Sheets *s, const char *names, PetscInt rounds)
 
 int main(int argc, char **argv)
 {
-  char names[64] = "hash";
+  char names[64] = "tree";
   PetscInt facets = 10000, rounds = 6;
   PetscBool motion = PETSC_FALSE, shuffled = PETSC_FALSE;
   Sheets sheets;

@@ -1,5 +1,5 @@
 /*
-  What contact between bodies costs in steps that have it: press -scene press|heap -cells 6 -detection hash [-friction 0.3] [-steps 10]
+  What contact between bodies costs in steps that have it: press -scene press|heap -cells 6 -detection tree [-friction 0.3] [-steps 10]
 
   press: a block is driven by 6 % into a larger one that stands still, meshes apart, no friction: most of the points of one surface
   touch all the time. heap: eight boxes, each turned a little, in two layers, fall by 2 mm on a floor and onto each other, with friction.
@@ -125,7 +125,7 @@ static PetscErrorCode heap_scene(PetscInt cells, size_t size, char text[])
 
 int main(int argc, char **argv)
 {
-  char scene[16] = "press", detection[16] = "hash", text[2 * PERF_TEXT], more[256];
+  char scene[16] = "press", detection[16] = "tree", text[2 * PERF_TEXT], more[256];
   PetscInt cells = 6, steps = 10;
   PetscReal friction = 0;
   Watch w = {0};

@@ -32,8 +32,6 @@ static PetscErrorCode check_refused(void)
     {"-effect_meet_response glue", "-effect_meet_response glue|projected", PETSC_ERR_USER},
     {"-effect_meet_passes none", "-effect_meet_passes none|two", PETSC_ERR_USER},
     {"-effect_meet_detection eyes", "-effect_meet_detection eyes|brute", PETSC_ERR_USER},
-    {"-effect_meet_bvh_volume dop14", "-effect_meet_bvh_volume|-effect_meet_detection bvh",
-     PETSC_ERR_USER_INPUT},
     {"-effect_meet_friction -1", "-effect_meet_friction", PETSC_ERR_USER},
     {"-effect_meet_friction 0.2 -effect_meet_friction_kinetic 0.3",
      "-effect_meet_friction_kinetic 0.3|-effect_meet_friction 0.2", PETSC_ERR_USER_INPUT},
@@ -585,9 +583,7 @@ int main(int argc, char **argv)
   PetscCall(check_rows(CROSS("p1", "dg"), ""));
   PetscCall(check_gaps(PAIR("cr", "dg"), "", 0));
   PetscCall(check_gaps(CROSS("p1", "cr"), "", 3));
-  PetscCall(check_gaps(CROSS("p1", "cr"), "-effect_meet_detection bvh", 3));
-  PetscCall(check_gaps(PAIR("p1", "p1"), "-effect_meet_detection bvh -effect_meet_bvh_volume box", 0));
-  PetscCall(check_gaps(PAIR("p1", "p1"), "-effect_meet_detection bvh -effect_meet_bvh_volume dop14", 0));
+  PetscCall(check_gaps(CROSS("p1", "cr"), "-effect_meet_detection brute", 3));
   PetscCall(check_sides());
   PetscCall(check_far());
   PetscCall(check_patience());

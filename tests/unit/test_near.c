@@ -642,7 +642,7 @@ static PetscErrorCode check_stack(SbDetector d, World *w)
 int main(int argc, char **argv)
 {
   const PetscReal z[3] = {0, 0, 1}, none[3] = {0, 0, 0};
-  const SbDetectKind kinds[] = {SB_DETECT_HASH, SB_DETECT_BVH, SB_DETECT_BRUTE};
+  const SbDetectKind kinds[] = {SB_DETECT_TREE, SB_DETECT_BRUTE};
   unsigned state = 8;
   SbDetector d;
   SbPose pose;

@@ -126,7 +126,7 @@ static PetscErrorCode test_contacts(const char *options, PetscReal noisy)
   PetscFunctionBeginUser;
   for (int k = 0; k < 2; k++) {
     PetscCall(open_on(k ? PETSC_COMM_SELF : PETSC_COMM_WORLD, options, 0, &x[k]));
-    PetscCall(SbDetectorCreate(SB_DETECT_HASH, &detector[k]));
+    PetscCall(SbDetectorCreate(SB_DETECT_TREE, &detector[k]));
   }
   for (int step = 0; step < 12; step++) {
     const PetscBool jump = (PetscBool)(step % 4 == 3), self = (PetscBool)(step >= 8);
@@ -181,7 +181,7 @@ static PetscErrorCode test_ring(const char *element)
                           SETS "-bodies a" BODY("a", "%s", "box:2,0.2,0.1:24,3,2", "0,0,0"), element));
   for (int k = 0; k < 2; k++) {
     PetscCall(open_on(k ? PETSC_COMM_SELF : PETSC_COMM_WORLD, options, 0, &x[k]));
-    PetscCall(SbDetectorCreate(SB_DETECT_HASH, &detector[k]));
+    PetscCall(SbDetectorCreate(SB_DETECT_TREE, &detector[k]));
     bend(&x[k], 0.2, x[k].u);
   }
   for (int step = 0; step < 8; step++) {

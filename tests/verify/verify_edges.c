@@ -500,7 +500,7 @@ int main(int argc, char **argv)
   PetscCallMPI(MPI_Comm_size(PETSC_COMM_WORLD, &size));
   PetscCall(check_bars("", 1e-3));
   if (size == 1) {
-    PetscCall(check_bars(" -effect_meet_friction 0.3 -effect_meet_detection bvh", 1e-3));
+    PetscCall(check_bars(" -effect_meet_friction 0.3 -effect_meet_detection brute", 1e-3));
     PetscCall(check_bars(" -effect_meet_response augmented", 1e-3));
     PetscCall(check_bars(" -body_a_element cr -body_b_element dg -ts_max_time 2", 1e-2));
   }

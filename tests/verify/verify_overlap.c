@@ -280,13 +280,13 @@ static PetscErrorCode check_begins(const char *name, const char *options, PetscB
 int main(int argc, char **argv)
 {
   SB_TEST_BEGIN(argc, argv);
-  PetscCall(check("p1", "hash", DEPTH, ""));
+  PetscCall(check("p1", "tree", DEPTH, ""));
   PetscCall(
     check("p1", "brute", 0.07,
           "-body_b_mesh box:0.06,0.06,0.06:2 -body_b_translate 0.06,0.02,0.03 -body_b_rotate 1,2,3,5"));
-  PetscCall(check("p1", "bvh", DEPTH, "-effect_meet_self yes"));
-  PetscCall(check("cr", "hash", DEPTH, ""));
-  PetscCall(check("p1", "hash", SIZE + 0.001, ""));
+  PetscCall(check("p1", "brute", DEPTH, "-effect_meet_self yes"));
+  PetscCall(check("cr", "tree", DEPTH, ""));
+  PetscCall(check("p1", "tree", SIZE + 0.001, ""));
   PetscCall(check_finger("p1"));
   PetscCall(check_finger("dg"));
   PetscCall(check_ring("p1"));
