@@ -165,7 +165,7 @@ for n in 1 2; do
   "${mpi[@]}" $n "$supple" inside.opts -progress no -body_small_translate 0.39,-0.05,-0.05 -output_dir in >told.txt
   check "the summary on $n has no search" grep -qE '^effect +meet: [1-9][0-9]* searches of surfaces, [1-9].* pairs of point and' told.txt
   grep -A3 '^effect  ' told.txt | tr -s ' \n' ' ' >"told$n.txt"
-  check "the summary on $n has no table" grep -qE 'hash, cells of [0-9.]+ m, [1-9][0-9]* entries in [1-9][0-9]* slots' "told$n.txt"
+  check "the summary on $n has no tree" grep -qE 'tree of [1-9][0-9]* groups of boxes in [1-9][0-9]* levels' "told$n.txt"
 done
 "$supple" inside.opts -progress no -body_small_translate 5,0,0 -output_dir in >told.txt
 check "bodies that are apart were looked at" grep -q 'meet: no bodies came near each other' told.txt
