@@ -243,7 +243,7 @@ PetscErrorCode SbPlanDestroy(SbPlan *plan)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* First upper block of each row and the ten positions of each cell, for the symmetric storage of one rank. */
+/* For SBAIJ on one rank: the first upper block of each row, and where in the upper triangle the ten blocks of each cell go. */
 static PetscErrorCode plan_upper(SbSpace s, SbPlan p)
 {
   const PetscInt nrow = s->nnode_owned;
@@ -252,8 +252,12 @@ static PetscErrorCode plan_upper(SbSpace s, SbPlan p)
   if (p->upper) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscMalloc1(nrow + 1, &p->ui));
   PetscCall(PetscMalloc1((size_t)s->nbatch * 10 * SB_BATCH, &p->upper));
+
+  /* a row has the blocks from its diagonal on */
   p->ui[0] = 0;
   for (PetscInt i = 0; i < nrow; i++) p->ui[i + 1] = p->ui[i] + p->di[i + 1] - p->diagonal[i];
+
+  /* a pair of nodes goes to the row of the lower one; ~u: its block is to be transposed */
   for (PetscInt b = 0; b < s->nbatch; b++) {
     const PetscInt *node = s->batch_node + 4 * SB_BATCH * b,
                    *offset = p->offset + (size_t)b * (size_t)(s->width * s->width) * SB_BATCH;
@@ -285,8 +289,8 @@ static PetscInt widest_row(SbSpace s, SbPlan p)
 }
 
 /*
-  The diagonal part of AIJ. Told that rows come sorted and complete, it copies them as they are: six times faster at 200k
-  tets than block by block.
+  Pattern of the diagonal part of AIJ, three scalar rows at a time. With MAT_SORTED_FULL (rows come sorted and complete) PETSc copies
+  them as they are: six times faster at 200,000 tets than block by block.
 */
 static PetscErrorCode fill_diagonal_aij(SbSpace s, SbPlan p, Mat A)
 {
@@ -314,7 +318,7 @@ static PetscErrorCode fill_diagonal_aij(SbSpace s, SbPlan p, Mat A)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Inserts zero blocks row by row: afterwards the matrix has its pattern and is assembled. */
+/* Pattern of a matrix: zero blocks are inserted row by row, and the matrix is assembled. */
 static PetscErrorCode fill_pattern(SbSpace s, SbPlan p, Mat A, SbMatrixKind kind)
 {
   const PetscInt *first = kind == SB_MATRIX_AIJ ? p->di + 1 : kind == SB_MATRIX_SBAIJ ? p->diagonal : p->di;
@@ -323,6 +327,7 @@ static PetscErrorCode fill_pattern(SbSpace s, SbPlan p, Mat A, SbMatrixKind kind
   PetscScalar *zeros;
 
   PetscFunctionBeginUser;
+  /* AIJ has its diagonal part by scalar rows; the blocks inserted below are those of its off-diagonal part */
   if (kind == SB_MATRIX_AIJ) PetscCall(fill_diagonal_aij(s, p, A));
   PetscCall(PetscMalloc1(widest, &column));
   PetscCall(PetscCalloc1(9 * widest, &zeros));
@@ -341,7 +346,7 @@ static PetscErrorCode fill_pattern(SbSpace s, SbPlan p, Mat A, SbMatrixKind kind
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Remembers which blocks the prescribed unknowns touch. */
+/* Lists the blocks that have a prescribed unknown in their row or column, to be cleared after each assembly. */
 static PetscErrorCode plan_fixed(SbSpace s, SbPlan p)
 {
   PetscInt n = 0;
@@ -349,6 +354,7 @@ static PetscErrorCode plan_fixed(SbSpace s, SbPlan p)
   PetscFunctionBeginUser;
   PetscCall(PetscFree3(p->fix_block, p->fix_row, p->fix_mask));
   p->nfix = 0;
+  /* counted in the first pass, listed in the second */
   for (PetscInt pass = 0; pass < 2; pass++) {
     n = 0;
     for (PetscInt i = 0; i < s->nnode_owned; i++) {
@@ -401,11 +407,13 @@ PetscErrorCode SbAttachModes(Mat A, PetscErrorCode (*fill)(PetscInt mode, PetscS
     PetscScalar *v, dot;
     PetscReal norm;
 
+    /* the mode as a vector of the matrix */
     PetscCall(MatCreateVecs(A, &mode[kept], NULL));
     PetscCall(VecGetArray(mode[kept], &v));
     PetscCall(fill(m, v, ctx));
     PetscCall(VecRestoreArray(mode[kept], &v));
-    /* orthonormal, as MatNullSpaceCreate() demands; what vanishes on fully prescribed bodies drops out */
+
+    /* orthonormal to the earlier ones, as MatNullSpaceCreate() demands; modes that vanish by this or by prescribed unknowns are left out */
     PetscCall(VecNormalize(mode[kept], &norm));
     for (PetscInt k = 0; k < kept; k++) {
       PetscCall(VecDot(mode[kept], mode[k], &dot));
@@ -424,7 +432,7 @@ PetscErrorCode SbAttachModes(Mat A, PetscErrorCode (*fill)(PetscInt mode, PetscS
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A mode at the nodes, zero on prescribed unknowns. */
+/* A rigid mode of each body at its nodes, zero on prescribed unknowns. */
 static PetscErrorCode fill_rigid_mode(PetscInt m, PetscScalar v[], const void *ctx)
 {
   const struct _p_SbSpace *s = ctx;
@@ -451,10 +459,14 @@ PetscErrorCode SbSpaceCreateMatrix(SbSpace s, SbMatrixKind kind, Mat *A)
   PetscCallMPI(MPI_Comm_size(s->comm, &size));
   PetscCheck(kind != SB_MATRIX_SBAIJ || size == 1, s->comm, PETSC_ERR_SUP,
              "Symmetric block storage is for one rank: there is no public access to its parallel parts");
+
+  /* what the plan needs for this kind of storage and these prescribed unknowns */
   if (!s->plan) PetscCall(SbPlanCreate(s, &s->plan));
   p = s->plan;
   PetscCall(plan_fixed(s, p));
   if (kind == SB_MATRIX_SBAIJ) PetscCall(plan_upper(s, p));
+
+  /* a matrix of the type, with exact preallocation and the whole pattern */
   PetscCall(PetscMalloc3(s->nnode_owned, &dnnz, s->nnode_owned, &onnz, s->nnode_owned, &unnz));
   for (PetscInt i = 0; i < s->nnode_owned; i++) {
     dnnz[i] = p->di[i + 1] - p->di[i];
@@ -471,6 +483,8 @@ PetscErrorCode SbSpaceCreateMatrix(SbSpace s, SbMatrixKind kind, Mat *A)
   PetscCall(MatSetOption(*A, MAT_NEW_NONZERO_LOCATION_ERR, PETSC_TRUE));
   PetscCall(MatSetOption(*A, MAT_SYMMETRIC, PETSC_TRUE));
   PetscCall(MatSetOption(*A, MAT_SYMMETRY_ETERNAL, PETSC_TRUE));
+
+  /* AIJ is for multigrid, which needs the rigid modes; block storages get the fast product */
   if (kind == SB_MATRIX_AIJ)
     PetscCall(SbAttachModes(*A, fill_rigid_mode, s));
   else

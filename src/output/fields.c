@@ -1,14 +1,15 @@
 /*
   The fields that a run can write: one table, a name, a unit and a function each.
 
-  Vertex fields are made from the vectors by points.c. Cell fields come from one evaluation of the cells' state per frame,
-  shared by all of them. von Mises: sqrt(3/2 s:s), s the deviator of the Cauchy stress. Reaction: force of the support on
-  the body, that is the residual without constraints at prescribed unknowns. Contact force: what obstacles and other bodies push with;
-  contact gap: along the normal, so that a vertex less its gap is the point of contact.
+  Vertex fields are interpolated from the vectors by points.c. Cell fields share one evaluation of the cells' state per frame.
 
-  Two pressures, both positive in compression: `mean_pressure` is -tr(sigma)/3 of the Cauchy stress, as it is measured;
-  `pressure` is the law's -lambda theta with theta its measure of the change of volume (SbMaterialOps.pressure). The two
-  differ by 2/3 mu theta for small strains, and for nu near 0.5 hardly.
+  von Mises stress:  sqrt(3/2 s:s), s the deviator of the Cauchy stress
+  reaction:          residual without constraints at prescribed unknowns, the force of the support on the body
+  contact force:     of obstacles and other bodies on the body
+  contact gap:       along the normal: a vertex minus gap times normal is the point of contact
+  mean pressure:     -tr(sigma)/3 of the Cauchy stress, positive in compression
+  pressure:          the law's -lambda theta with theta its measure of the change of volume (SbMaterialOps.pressure). The two
+                     pressures differ by 2/3 mu theta for small strains, little for nu near 0.5.
 */
 #include <stddef.h>
 #include "output_impl.h"
@@ -224,11 +225,13 @@ PetscErrorCode SbFieldPrepare(SbRun run, SbOutput out)
 
     PetscCheck(f->compute != space_error || run->cell_error, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
                "-output_fields space_error needs its estimate: give -ledger yes, too");
+    /* the array of the cells' state that this field needs */
     if (f->compute == scalar || f->compute == of_stress) {
       PetscReal **state = (PetscReal **)((char *)out + f->from);
 
       if (!*state) PetscCall(PetscMalloc1((f->compute == of_stress ? 6 * n : n), state));
     }
+    /* weights of nodes at vertices; forces also need the residual of each step */
     if (!f->cell) PetscCall(SbPointsPrepare(run, out));
     if (f->compute == reaction || f->compute == contact_force) {
       run->want_residual = PETSC_TRUE;

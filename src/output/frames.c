@@ -3,8 +3,8 @@
 
   With -output_discontinuous point 4 c + a is corner a of cell c, and /mesh/vertices says which vertices coincide.
 
-  A frame is invisible until it is complete (h5.c says how), and then enters fields.xmf. After a restart in the same folder
-  the frames up to the restart stay and later ones are taken out; their space in the file is used again.
+  A frame gets its name in the file when it is complete (h5.c), and is then listed in the index fields.xmf. After a restart in
+  the same folder frames up to the restart stay, later ones are removed and their space in the file is used again.
 */
 #include <ctype.h>
 #include "output_impl.h"
@@ -58,7 +58,7 @@ static PetscErrorCode write_whole(SbFrames fr, hid_t where, const char *name, co
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Places of the points, and which four make a cell. */
+/* Coordinates of the points and the four points of each cell. */
 static PetscErrorCode write_points(SbRun run, SbOutput out, hid_t group)
 {
   SbFrames fr = out->frames;
@@ -66,6 +66,7 @@ static PetscErrorCode write_points(SbRun run, SbOutput out, hid_t group)
   const PetscReal *x = mesh->x;
 
   PetscFunctionBeginUser;
+  /* x: the vertices, or the corners of each cell */
   if (out->discontinuous) {
     for (PetscInt i = 0; i < 12 * mesh->ncell_owned; i++)
       fr->owned[i] = mesh->x[3 * mesh->cell[i / 3] + i % 3];
@@ -74,6 +75,8 @@ static PetscErrorCode write_points(SbRun run, SbOutput out, hid_t group)
   PetscCall(SbOrderGather(&out->point, 3, x, fr->slice));
   PetscCall(
     SbH5WriteSlice(&fr->h5, group, "x", "m", &out->point, 3, H5T_IEEE_F64LE, H5T_NATIVE_DOUBLE, fr->slice));
+
+  /* the vertices of each cell, and where points are corners the numbers of these */
   for (PetscInt i = 0; i < 4 * mesh->ncell_owned; i++)
     fr->owned[i] = (PetscReal)mesh->vert_orig[mesh->cell[i]];
   PetscCall(write_whole(fr, group, out->discontinuous ? "vertices" : "cells", &out->cell, 4));
@@ -85,7 +88,7 @@ static PetscErrorCode write_points(SbRun run, SbOutput out, hid_t group)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* "set_fat_tissue": letters that a path or XML takes for its own become underscores. */
+/* "set_fat_tissue": letters with a meaning in paths or XML become underscores. */
 static void array_of_set(const char *prefix, const char *set, size_t size, char name[])
 {
   SbFormat(size, name, "%s_%s", prefix, set);
@@ -104,7 +107,7 @@ static PetscErrorCode write_set(SbRun run, SbOutput out, PetscInt k, hid_t group
   PetscFunctionBeginUser;
   array_of_set("set", mesh->set[k].name, sizeof(name), name);
   if (H5Lexists(group, name, H5P_DEFAULT) > 0)
-    PetscFunctionReturn(PETSC_SUCCESS); /* fat tissue, fat_tissue */
+    PetscFunctionReturn(PETSC_SUCCESS); /* another set has this name: "fat tissue" and "fat_tissue" */
   for (PetscInt i = 0; i < npoint; i++)
     fr->owned[i] = (mesh->vert_set[out->discontinuous ? mesh->cell[i] : i] & SB_SET_BIT(k)) != 0;
   PetscCall(write_whole(fr, group, name, &out->point, 1));
@@ -125,8 +128,10 @@ static PetscErrorCode write_mesh(SbRun run, SbOutput out)
 
   PetscFunctionBeginUser;
   mesh_name(fr->mesh, sizeof(name), name);
-  // A run that was taken up before a re-meshing comes to it again.
+  /* a run that was restarted before a re-meshing repeats it: its mesh is replaced */
   if (H5Lexists(fr->h5.file, name, H5P_DEFAULT) > 0) (void)H5Ldelete(fr->h5.file, name, H5P_DEFAULT);
+
+  /* room on disk for all of it, then points and cells */
   PetscCall(SbH5Reserve(&fr->h5, (PetscInt64)out->point.N * 24 + (PetscInt64)out->cell.N * 40 + 65536));
   PetscCall(SbH5GroupCreate(&fr->h5, 8, 8, &group));
   PetscCall(SbH5PutInt(&fr->h5, group, "hash", (int64_t)out->mesh_hash));
@@ -140,6 +145,8 @@ static PetscErrorCode write_mesh(SbRun run, SbOutput out)
   PetscCall(SbH5PutText(&fr->h5, group, "bodies", names));
   PetscCall(PetscFree(names));
   PetscCall(write_points(run, out, group));
+
+  /* fields that do not change in a run: numbers of bodies and ranks, sets */
   for (PetscInt i = 0; i < out->nfield; i++) {
     if (!out->field[i]->constant) continue;
     PetscCall(PetscLogEventBegin(out->field_event[i], 0, 0, 0, 0));
@@ -147,13 +154,15 @@ static PetscErrorCode write_mesh(SbRun run, SbOutput out)
       PetscCall(out->field[i]->compute(out->field[i], run, NULL, fr->owned));
       PetscCall(write_whole(fr, group, out->field[i]->name, &out->cell, 1));
     } else {
-      /* one array per set */
+      /* sets: one array each */
       PetscCall(SbH5Reserve(&fr->h5, (PetscInt64)run->model->mesh->nset *
                                        (4 * ((PetscInt64)out->point.N + out->cell.N) + 8192)));
       for (PetscInt k = 0; k < run->model->mesh->nset; k++) PetscCall(write_set(run, out, k, group));
     }
     PetscCall(PetscLogEventEnd(out->field_event[i], 0, 0, 0, 0));
   }
+
+  /* the complete mesh gets its name */
   PetscCall(SbH5GroupLink(&fr->h5, group, fr->h5.file, name));
   (void)H5Gclose(group);
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -161,7 +170,7 @@ static PetscErrorCode write_mesh(SbRun run, SbOutput out)
 
 /* ------------------------------------------------------------------ a frame */
 
-/* One field of the frame. */
+/* One field of the frame, in the order and precision of the file. */
 static PetscErrorCode write_field(SbRun run, SbOutput out, const SbStep *step, const SbField *f, hid_t group)
 {
   SbFrames fr = out->frames;
@@ -197,7 +206,7 @@ static PetscInt64 frame_bytes(const SbOutput out, PetscInt64 contact_bytes)
   return bytes;
 }
 
-/* Names the finished frame; a full hundred begins the next one, which is itself finished before it gets its name. */
+/* Links the complete frame into the file, in a group of at most a hundred; a new group is complete before it is linked itself. */
 static PetscErrorCode commit(SbOutput out, hid_t group, PetscInt step, size_t size, char path[])
 {
   SbFrames fr = out->frames;
@@ -206,6 +215,7 @@ static PetscErrorCode commit(SbOutput out, hid_t group, PetscInt step, size_t si
   PetscFunctionBeginUser;
   (void)snprintf(name, sizeof(name), "%06" PetscInt_FMT, step);
   if (fr->node >= 0 && fr->nlink < SB_H5_NODE_LINKS) {
+    /* all data on disk before the link */
     PetscCall(SbH5Flush(&fr->h5));
     PetscCall(SbH5GroupLink(&fr->h5, group, fr->node, name));
     (void)snprintf(hundred, sizeof(hundred), "%04" PetscInt_FMT, fr->nnode - 1);
@@ -232,18 +242,23 @@ static PetscErrorCode write_frame(SbRun run, SbOutput out, const SbStep *step)
   PetscInt bytes[SB_FIELD_MAX], n = 0;
   PetscInt64 contact_bytes;
   char path[48], message[SB_MESSAGE_MAX] = "";
-  /* on a path by arc length the load factor comes and goes, and viewers want times that rise */
+  /* along an arc length the load factor may fall, while viewers expect times that rise: the step is the time */
   const PetscReal time = run->path ? (PetscReal)step->step : step->t;
   hid_t group;
 
   PetscFunctionBeginUser;
+  /* room on disk for the whole frame, so that a full disk shows before anything is written */
   PetscCall(SbContactsFind(run, out, step, &contact_bytes));
   PetscCall(SbH5Reserve(&fr->h5, frame_bytes(out, contact_bytes)));
+
+  /* a group that has no name yet, with its time */
   PetscCall(SbH5GroupCreate(&fr->h5, (unsigned)out->nfield + 1, 14, &group));
   PetscCall(SbH5PutReal(&fr->h5, group, "time", time));
   if (run->path) PetscCall(SbH5PutReal(&fr->h5, group, "load_factor", step->t));
   PetscCall(SbH5PutInt(&fr->h5, group, "step", step->step));
   if (fr->mesh) PetscCall(SbH5PutInt(&fr->h5, group, "mesh", fr->mesh));
+
+  /* the fields, and the points of contact */
   out->state_valid = PETSC_FALSE;
   for (PetscInt i = 0; i < out->nfield; i++) {
     if (out->field[i]->constant) continue;
@@ -254,6 +269,8 @@ static PetscErrorCode write_frame(SbRun run, SbOutput out, const SbStep *step)
     field[n++] = out->field[i];
   }
   PetscCall(SbContactsWrite(out, &fr->h5, group));
+
+  /* the frame gets its name, and then its entry in the index */
   PetscCall(commit(out, group, step->step, sizeof(path), path));
   (void)H5Gclose(group);
   fr->last_step = step->step;
@@ -275,12 +292,13 @@ static PetscErrorCode monitor(SbRun run, const SbStep *step, void *ctx)
   PetscBool due;
 
   PetscFunctionBeginUser;
+  /* frames at intervals of time or of steps, at the start and at the end */
   if (out->every > 0.)
     due = SbOutputDue(out->every, step->t, step->dt);
   else
     due = (PetscBool)(step->step % out->every_steps == 0);
   if (!first && !due && !step->last) PetscFunctionReturn(PETSC_SUCCESS);
-  // After a restart the first frame may be there already.
+  /* after a restart the first frame may be in the file */
   if (out->frames->last_step >= step->step) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscLogStagePush(SbStageOutput));
   PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_OUTPUT], 0, 0, 0, 0));
@@ -293,7 +311,7 @@ static PetscErrorCode monitor(SbRun run, const SbStep *step, void *ctx)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* ------------------------------------------------------------------ going on after a restart */
+/* ------------------------------------------------------------------ restart */
 
 /* Step, time and fields of the frame `name` in an open hundred; ok is false when it is not one of ours. */
 static PetscErrorCode read_frame(hid_t hundred, const char *name, SbFrame *frame, PetscBool *ok)
@@ -342,7 +360,7 @@ static PetscBool link_name(hid_t group, PetscInt i, size_t size, char name[])
                                         H5P_DEFAULT) > 0);
 }
 
-/* Visits every frame of the file: those up to step0 are appended to `frames`, later ones are taken out when `drop`. */
+/* Visits every frame of the file: those up to step0 are appended to `frames`, later ones are removed when `drop`. */
 static PetscErrorCode scan(SbFrames fr, PetscInt step0, PetscBool drop, PetscInt *nframe, SbFrame frames[])
 {
   PetscFunctionBeginUser;
@@ -353,7 +371,7 @@ static PetscErrorCode scan(SbFrames fr, PetscInt step0, PetscBool drop, PetscInt
     const hid_t hundred =
       link_name(fr->top, h, sizeof(name), name) ? H5Gopen2(fr->top, name, H5P_DEFAULT) : -1;
 
-    // Backwards, because taking out a link moves those after it.
+    /* backwards: removing a link moves those after it */
     for (PetscInt i = hundred < 0 ? -1 : count_links(hundred) - 1; i >= 0; i--) {
       PetscBool ok;
       SbFrame found;
@@ -395,7 +413,7 @@ static PetscErrorCode mesh_hash(hid_t file, PetscInt step, int64_t *hash, PetscB
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The mesh of this run in an open file: that of its last re-meshing, or the first one. ok is false when it is another one. */
+/* The mesh of this run in an open file: that of its last re-meshing, or the first one. ok: the file has this mesh. */
 static PetscErrorCode find_mesh(SbRun run, SbOutput out, hid_t file, PetscInt *step, PetscBool *ok)
 {
   int64_t hash = 0;
@@ -411,7 +429,7 @@ static PetscErrorCode find_mesh(SbRun run, SbOutput out, hid_t file, PetscInt *s
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The index of frames that come next is of this mesh of the file. Rank 0. */
+/* Entries of the index that follow refer to this mesh of the file. Rank 0. */
 static PetscErrorCode index_mesh(SbFrames fr, PetscInt step)
 {
   char name[32];
@@ -425,7 +443,7 @@ static PetscErrorCode index_mesh(SbFrames fr, PetscInt step)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Opens what an earlier part of this run wrote; ok is false when there is nothing that fits. */
+/* Opens the file of the run that is continued; ok is false when there is none, or one of another mesh. */
 static PetscErrorCode resume(SbRun run, SbOutput out, const char *path, PetscBool *ok)
 {
   SbFrames fr = out->frames;
@@ -433,6 +451,7 @@ static PetscErrorCode resume(SbRun run, SbOutput out, const char *path, PetscBoo
   char message[SB_MESSAGE_MAX] = "";
 
   PetscFunctionBeginUser;
+  /* the file must have this mesh and frames */
   PetscCall(SbH5Open(out->comm, path, PETSC_TRUE, &fr->h5, ok));
   if (!*ok) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(find_mesh(run, out, fr->h5.file, &fr->mesh, ok));
@@ -443,12 +462,15 @@ static PetscErrorCode resume(SbRun run, SbOutput out, const char *path, PetscBoo
     PetscCall(SbH5Close(&fr->h5));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
+
+  /* its frames up to the restart, by step */
   PetscCall(scan(fr, run->step0, PETSC_FALSE, &fr->nframe, NULL));
   PetscCall(PetscMalloc1(fr->nframe, &frames));
   PetscCall(scan(fr, run->step0, PETSC_FALSE, &fr->nframe, frames));
   qsort(frames, (size_t)fr->nframe, sizeof(*frames), by_step);
   if (fr->nframe) fr->last_step = frames[fr->nframe - 1].step;
-  // The index first, so that it never names a frame that is gone.
+
+  /* the index first, so that it never lists a frame that is removed */
   for (PetscInt i = 0; fr->xdmf && i < fr->nframe; i++) {
     if (!i || frames[i].mesh != frames[i - 1].mesh) PetscCall(index_mesh(fr, frames[i].mesh));
     PetscCall(SbXdmfAdd(fr->xdmf, frames[i].time, frames[i].group, frames[i].nfield, frames[i].field,
@@ -461,6 +483,8 @@ static PetscErrorCode resume(SbRun run, SbOutput out, const char *path, PetscBoo
   if (fr->xdmf && !message[0]) SbContactsIndex(out, sizeof(message), message);
   PetscCall(PetscFree(frames));
   PetscCall(SbAgree(out->comm, PETSC_ERR_FILE_WRITE, message));
+
+  /* then later frames are removed */
   PetscCall(scan(fr, run->step0, PETSC_TRUE, &fr->nframe, NULL));
   PetscCall(SbH5Flush(&fr->h5));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -483,7 +507,7 @@ PetscErrorCode SbFramesCheck(SbRun run, SbOutput out)
                         H5Lexists(h.file, "mesh/vertices", H5P_DEFAULT) > 0);
   PetscCall(find_mesh(run, out, h.file, &step, &ok));
   PetscCall(SbH5Close(&h));
-  // Frames of another mesh are replaced.
+  /* a file of another mesh is replaced, one of this mesh continued */
   PetscCheck(
     !ok || corners == out->discontinuous, out->comm, PETSC_ERR_USER_INPUT,
     "-output_discontinuous is %s, but the frames in %s were written with %s: go on with the same, or give "
@@ -492,9 +516,9 @@ PetscErrorCode SbFramesCheck(SbRun run, SbOutput out)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* ------------------------------------------------------------------ from beginning to end */
+/* ------------------------------------------------------------------ life */
 
-/* What depends on the mesh. */
+/* Work arrays, whose sizes are those of the mesh. */
 static PetscErrorCode allocate(SbRun run, SbOutput out)
 {
   SbFrames fr = out->frames;
@@ -542,7 +566,7 @@ PetscErrorCode SbFramesAttach(SbRun run, SbOutput out)
   PetscCall(SbOutputPath(out, "fields.h5", sizeof(path), path));
   if (out->restarted) PetscCall(resume(run, out, path, &resumed));
 
-  /* else a new file with the mesh, and no index: one without its frames would mislead */
+  /* else a new file with the mesh, without an index until it has a frame */
   if (!resumed) {
     SbFrames fr = out->frames;
 
@@ -564,6 +588,7 @@ PetscErrorCode SbFramesReattach(SbRun run, SbOutput out)
 {
   PetscFunctionBeginUser;
   if (!out->frames) PetscFunctionReturn(PETSC_SUCCESS);
+  /* work arrays and monitor for the new mesh, which is written beside the earlier ones */
   PetscCall(free_work(out->frames));
   PetscCall(allocate(run, out));
   if (out->contact_points) run->want_residual = PETSC_TRUE;

@@ -1,13 +1,16 @@
 /*
-  Why a static solve failed: whether some part of a body can move as a rigid one without any force. More load steps do not help then.
+  Free rigid motions: whether a part of a body can move rigidly without any force, which makes a static problem singular. Shorter load
+  steps do not help then.
 
-  Part: nodes that cells join. Of its six rigid motions Z, what supports and contact take away is B = Z - P Z, P the projection onto what is allowed
-  (SbSpaceProjectAdmissible()). With x such that B^T B x = l Z^T Z x the motion Z x is allowed when l is zero but for rounding: nothing of it is prescribed. That is geometry,
-  whatever the stiffness. For those that are allowed, A the operator of the last solve and D the diagonal of its matrix, the smallest eigenvalue of
-  (P Z x)^T A (P Z x) against that with D is the stiffness of the softest as a part of a cell's. Zero but for rounding: nothing resists it, no
-  spring, no friction and no stress.
+  A part is a set of nodes that are connected by cells, Z its six rigid motions, P the projection onto admissible displacements
+  (SbSpaceProjectAdmissible()). Two eigenvalue problems of size six decide:
 
-  Not found: parts that are free only together, tied to each other by contact; one that is constrained by springs whose stiffness is rounding beside that of its cells.
+  1. (Z - P Z)^T (Z - P Z) x = l Z^T Z x. The motion Z x is admissible where l is zero but for rounding: geometry alone, no stiffness.
+  2. (P Z x)^T A (P Z x) y = l (P Z x)^T D (P Z x) y of the admissible motions, A the operator of the last solve, D the diagonal of its
+     matrix. Where l is zero but for rounding neither springs nor friction nor stress resist: the motion is free.
+
+  Not found: parts that are free only together, joined by contact; a part on springs whose stiffness is rounding beside that of its
+  cells.
 */
 #include "sbgeometry.h"
 #include "time_impl.h"
@@ -17,7 +20,7 @@
 #define FREE 1e-13    /* of the cells' stiffness: rounding of sums over the nodes leaves 1e-15 */
 #define FAR 1e6       /* times its size: a body that went so far in a static run was not constrained */
 
-/* ------------------------------------------------------------------ parts */
+/* ------------------------------------------------------------------ connected parts */
 
 /* label[nnode_owned]: the lowest global number of a node's part. Collective; the caller frees it. */
 static PetscErrorCode label_parts(SbSpace s, PetscInt **label)
@@ -29,6 +32,7 @@ static PetscErrorCode label_parts(SbSpace s, PetscInt **label)
   Vec v;
 
   PetscFunctionBeginUser;
+  /* union of the nodes of each local cell, with their supports */
   PetscCall(PetscMalloc2(s->nnode, &parent, s->nnode, &lowest));
   for (PetscInt i = 0; i < s->nnode; i++) parent[i] = i;
   for (PetscInt k = 0; k < 4 * s->mesh->ncell; k++) {
@@ -36,7 +40,7 @@ static PetscErrorCode label_parts(SbSpace s, PetscInt **label)
     if (s->dirichlet_node && s->dirichlet_node[k] >= 0)
       (void)SbUnionJoin(parent, s->cell_node[k], s->dirichlet_node[k]);
   }
-  /* cells of dg have nodes of their own: the faces join them */
+  /* cells of dg have nodes of their own: they are joined across faces */
   for (PetscInt b = 0; s->width > 4 && b < s->nbatch; b++) {
     for (PetscInt k = 0; k < 4 * SB_BATCH; k++) {
       if (k % SB_BATCH < s->batch_n[b])
@@ -44,8 +48,9 @@ static PetscErrorCode label_parts(SbSpace s, PetscInt **label)
                           s->batch_clique[8 * SB_BATCH * b + 4 * SB_BATCH + k]);
     }
   }
+
+  /* the lowest number of a part that several ranks share: exchanged with the owners until it does not change */
   for (PetscInt i = 0; i < s->nnode; i++) lowest[i] = s->gnode[i];
-  /* parts that several ranks share: what the owners know spreads until nothing changes */
   PetscCall(SbSpaceCreateVec(s, &v));
   while (changed) {
     changed = PETSC_FALSE;
@@ -99,17 +104,17 @@ static PetscErrorCode list_parts(SbSpace s, const PetscInt label[], PetscInt *np
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* ------------------------------------------------------------------ motions */
+/* ------------------------------------------------------------------ rigid motions */
 
-/* A part and what of its motions is free. */
+/* A part and its free motions. */
 typedef struct {
   PetscInt label, body;
   PetscReal centre[3], size; /* of its nodes, m */
-  PetscInt nfree;            /* motions that nothing resists */
+  PetscInt nfree;            /* free motions */
   PetscReal motion[6]; /* one of them: along the axes, m, and about axes through the centre, rad times size */
 } Part;
 
-/* Where a node is, for the tangent: linear laws know the rest state only. */
+/* Coordinate of a node in the state of the tangent: the rest state with linear laws. */
 static inline PetscReal coordinate(SbSpace s, const PetscScalar u[], PetscInt k)
 {
   return s->node_x[k] + (s->linear ? 0. : u[k]);
@@ -143,18 +148,18 @@ static PetscErrorCode measure(SbRun run, const PetscInt label[], Part *part)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Motion k = 0..2: along an axis, 3..5: about one through the centre; z: what of it is allowed. */
-static PetscErrorCode create_motion(SbRun run, const PetscInt label[], const Part *part, PetscInt k,
-                                    Vec *whole, Vec *z)
+/* Motion k = 0..2: along an axis, 3..5: about one through the centre; z: its admissible part. */
+static PetscErrorCode create_motion(SbRun run, const PetscInt label[], const Part *part, PetscInt k, Vec *Z,
+                                    Vec *z)
 {
   SbSpace s = run->model->space;
   const PetscScalar *u;
   PetscScalar *to;
 
   PetscFunctionBeginUser;
-  PetscCall(SbSpaceCreateVec(s, whole));
+  PetscCall(SbSpaceCreateVec(s, Z));
   PetscCall(VecGetArrayRead(run->U, &u));
-  PetscCall(VecGetArray(*whole, &to));
+  PetscCall(VecGetArray(*Z, &to));
   for (PetscInt i = 0; i < s->nnode_owned; i++) {
     PetscReal r[3];
 
@@ -167,10 +172,10 @@ static PetscErrorCode create_motion(SbRun run, const PetscInt label[], const Par
       to[3 * i + (k + 2) % 3] = r[(k + 1) % 3];
     }
   }
-  PetscCall(VecRestoreArray(*whole, &to));
+  PetscCall(VecRestoreArray(*Z, &to));
   PetscCall(VecRestoreArrayRead(run->U, &u));
-  PetscCall(VecDuplicate(*whole, z));
-  PetscCall(VecCopy(*whole, *z));
+  PetscCall(VecDuplicate(*Z, z));
+  PetscCall(VecCopy(*Z, *z));
   PetscCall(SbSpaceProjectAdmissible(s, *z));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -188,19 +193,19 @@ static PetscErrorCode eigen(PetscInt n, PetscReal E[36], PetscReal M[36], PetscR
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Motions of a part that supports and contact allow: *n of them, shares of the six in the columns of x. */
-static PetscErrorCode allowed(Vec whole[6], Vec z[6], PetscInt *n, PetscReal x[36])
+/* Admissible motions of a part (problem 1): *n of them, coefficients of the six in the columns of x. Z becomes Z - P Z. */
+static PetscErrorCode find_admissible(Vec Z[6], Vec z[6], PetscInt *n, PetscReal x[36])
 {
   PetscReal M[36], value[6];
   PetscBool ok;
 
   PetscFunctionBeginUser;
   for (int j = 0; j < 6; j++) {
-    for (int i = 0; i <= j; i++) PetscCall(VecDot(whole[i], whole[j], &M[6 * j + i]));
+    for (int i = 0; i <= j; i++) PetscCall(VecDot(Z[i], Z[j], &M[6 * j + i]));
   }
-  for (int k = 0; k < 6; k++) PetscCall(VecAXPY(whole[k], -1., z[k]));
+  for (int k = 0; k < 6; k++) PetscCall(VecAXPY(Z[k], -1., z[k]));
   for (int j = 0; j < 6; j++) {
-    for (int i = 0; i <= j; i++) PetscCall(VecDot(whole[i], whole[j], &x[6 * j + i]));
+    for (int i = 0; i <= j; i++) PetscCall(VecDot(Z[i], Z[j], &x[6 * j + i]));
   }
   PetscCall(eigen(6, x, M, value, &ok));
   for (*n = 0; ok && *n < 6 && value[*n] <= ALLOWED; ++*n) {
@@ -208,20 +213,23 @@ static PetscErrorCode allowed(Vec whole[6], Vec z[6], PetscInt *n, PetscReal x[3
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Those of the n allowed motions x that have no stiffness: part->nfree, and one of them. */
-static PetscErrorCode resisted(SbRun run, Vec d, Vec z[6], PetscInt n, const PetscReal x[36], Part *part)
+/* Free ones among the n admissible motions x (problem 2): part->nfree, and one of them. */
+static PetscErrorCode find_free(SbRun run, Vec d, Vec z[6], PetscInt n, const PetscReal x[36], Part *part)
 {
   PetscReal E[36], M[36], value[6];
   PetscBool ok;
   Vec y[6], w;
 
   PetscFunctionBeginUser;
+  /* y = P Z x */
   PetscCall(VecDuplicate(d, &w));
   for (PetscInt j = 0; j < n; j++) {
     PetscCall(VecDuplicate(d, &y[j]));
     PetscCall(VecZeroEntries(y[j]));
     PetscCall(VecMAXPY(y[j], 6, x + 6 * j, z));
   }
+
+  /* M = y^T D y, E = y^T A y */
   for (PetscInt j = 0; j < n; j++) {
     PetscCall(VecPointwiseMult(w, d, y[j]));
     for (PetscInt i = 0; i <= j; i++) PetscCall(VecDot(y[i], w, &M[6 * j + i]));
@@ -234,6 +242,8 @@ static PetscErrorCode resisted(SbRun run, Vec d, Vec z[6], PetscInt n, const Pet
   PetscCall(PetscInfo(NULL,
                       "part of body %s: softest of %" PetscInt_FMT " motions %g of the cells' stiffness\n",
                       run->model->body[part->body].name, n, ok ? (double)value[0] : -1.));
+
+  /* the softest one in terms of the six */
   for (int c = 0; c < 6 && part->nfree; c++) {
     part->motion[c] = 0.;
     for (PetscInt i = 0; i < n; i++) part->motion[c] += E[i] * x[6 * i + c];
@@ -243,8 +253,8 @@ static PetscErrorCode resisted(SbRun run, Vec d, Vec z[6], PetscInt n, const Pet
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Of several motions that are free, one along or about an axis says most: the first such one, if there is any. */
-static PetscErrorCode plain_motion(SbRun run, Vec d, Vec lost[6], Vec z[6], Part *part)
+/* With several free motions a message is plainest with one along or about an axis: the first such one, if any. lost: Z - P Z. */
+static PetscErrorCode choose_axis(SbRun run, Vec d, Vec lost[6], Vec z[6], Part *part)
 {
   PetscReal off, on, stiffness, size;
   Vec w;
@@ -267,28 +277,28 @@ static PetscErrorCode plain_motion(SbRun run, Vec d, Vec lost[6], Vec z[6], Part
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* What is free of a part. */
+/* The free motions of a part. */
 static PetscErrorCode examine(SbRun run, const PetscInt label[], Vec d, Part *part)
 {
   PetscReal x[36];
   PetscInt n = 0;
-  Vec whole[6], z[6];
+  Vec Z[6], z[6];
 
   PetscFunctionBeginUser;
   part->nfree = 0;
   PetscCall(measure(run, label, part));
-  for (PetscInt k = 0; k < 6; k++) PetscCall(create_motion(run, label, part, k, &whole[k], &z[k]));
-  PetscCall(allowed(whole, z, &n, x)); /* whole is then what is lost */
-  if (n) PetscCall(resisted(run, d, z, n, x, part));
-  if (part->nfree > 1) PetscCall(plain_motion(run, d, whole, z, part));
+  for (PetscInt k = 0; k < 6; k++) PetscCall(create_motion(run, label, part, k, &Z[k], &z[k]));
+  PetscCall(find_admissible(Z, z, &n, x));
+  if (n) PetscCall(find_free(run, d, z, n, x, part));
+  if (part->nfree > 1) PetscCall(choose_axis(run, d, Z, z, part));
   for (int k = 0; k < 6; k++) {
-    PetscCall(VecDestroy(&whole[k]));
+    PetscCall(VecDestroy(&Z[k]));
     PetscCall(VecDestroy(&z[k]));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* ------------------------------------------------------------------ words */
+/* ------------------------------------------------------------------ message */
 
 /* e: the direction of v with its largest component positive, small ones zero. */
 static void direction(const PetscReal v[3], PetscReal e[3])
@@ -305,7 +315,7 @@ static void direction(const PetscReal v[3], PetscReal e[3])
 }
 
 /* "moving along (1, 0, 0)", or "turning about the axis along (0, 0, 1) through (x, y, z)". */
-static PetscErrorCode say_motion(const Part *part, size_t size, char text[])
+static PetscErrorCode describe_motion(const Part *part, size_t size, char text[])
 {
   const PetscReal *t = part->motion, *w = part->motion + 3, w2 = w[0] * w[0] + w[1] * w[1] + w[2] * w[2],
                   t2 = t[0] * t[0] + t[1] * t[1] + t[2] * t[2];
@@ -331,9 +341,9 @@ static PetscErrorCode say_motion(const Part *part, size_t size, char text[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* What more there is to say: a part among several, further motions, an element whose nodes are the centres of facets. */
-static PetscErrorCode say_more(SbRun run, const PetscInt label[], const Part *part, PetscInt nbrother,
-                               size_t size, char text[])
+/* Appends further free motions, which of several parts it is, and a hint for elements with nodes at centres of facets. */
+static PetscErrorCode describe_part(SbRun run, const PetscInt label[], const Part *part, PetscInt nbrother,
+                                    size_t size, char text[])
 {
   SbSpace s = run->model->space;
   PetscInt nfixed[2] = {0, 0};
@@ -351,6 +361,7 @@ static PetscErrorCode say_more(SbRun run, const PetscInt label[], const Part *pa
                             (double)part->centre[0], (double)part->centre[1], (double)part->centre[2]));
     PetscCall(PetscStrlcat(text, more, size));
   }
+  /* one or two constrained facets of cr or dg leave rotations free */
   for (PetscInt k = 0; k < s->nfixed; k++) {
     if (s->fixed_node[k] < s->nnode_owned && label[s->fixed_node[k]] == part->label) nfixed[0]++;
   }
@@ -376,6 +387,8 @@ PetscErrorCode SbRunFreeBody(SbRun run, PetscInt *body, size_t size, char motion
   *body = -1;
   PetscCall(MatHasOperation(run->J, MATOP_GET_DIAGONAL, &diagonal));
   if (!diagonal) PetscFunctionReturn(PETSC_SUCCESS); /* -solver realtime, which is for dynamic runs */
+
+  /* the first part with a free motion */
   PetscCall(SbSpaceCreateVec(run->model->space, &d));
   PetscCall(MatGetDiagonal(run->J, d));
   PetscCall(VecAbs(d));
@@ -386,6 +399,8 @@ PetscErrorCode SbRunFreeBody(SbRun run, PetscInt *body, size_t size, char motion
     PetscCall(examine(run, label, d, &part));
     if (part.nfree) *body = part.body;
   }
+
+  /* its description, with the number of parts of that body */
   if (*body >= 0) {
     for (PetscInt k = 0; k < npart; k++) {
       Part other = {.label = list[k]};
@@ -393,8 +408,8 @@ PetscErrorCode SbRunFreeBody(SbRun run, PetscInt *body, size_t size, char motion
       PetscCall(measure(run, label, &other));
       nbrother += other.body == *body;
     }
-    PetscCall(say_motion(&part, size, motion));
-    PetscCall(say_more(run, label, &part, nbrother, size, motion));
+    PetscCall(describe_motion(&part, size, motion));
+    PetscCall(describe_part(run, label, &part, nbrother, size, motion));
   }
   PetscCall(PetscFree(label));
   PetscCall(PetscFree(list));

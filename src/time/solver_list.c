@@ -1,14 +1,15 @@
 /*
-  What happens when a linear solve fails: the next solver of a list (SbSolverNextFallback()) is tried on the same system, that is the same
-  Newton iteration and right-hand side, and stays for the rest of the run. A step is cut after the last one only.
+  Fallback solvers: after a linear solve that fails, the next solver of a list (SbSolverNextFallback()) solves the same system, in the same
+  Newton iteration, and stays for the rest of the run. Only when the last one fails is the step cut.
 
-  It hangs behind KSPSolve() as its post-solve callback. The KSP stays the same object, so that whoever holds it keeps it; it gets another type, preconditioner
-  and, where the next solver works on another kind of matrix, another operator, assembled at Newton's iterate.
+  The fallback is the post-solve callback of the KSP. The KSP remains the same object, with another type, another preconditioner and, where
+  the next solver needs another kind of matrix, another operator, assembled at Newton's iterate.
 
-  Not replaced: what the user chose by -ksp_type or -pc_type; solves by a factorisation of the saddle-point system of contact, and those along an arc length; a
-  static system in which a body has been shown to be free (free_body.c), which no solver solves; one with an exact tangent that Newton's method will filter (newton.c).
+  Not replaced: solvers that the user chose by -ksp_type or -pc_type; factorisations of the saddle-point system of contact; solves along
+  an arc length; static systems with a free rigid motion (free_body.c), which are singular; exact tangents that Newton's method will filter
+  (newton.c).
 
-  petsc/private/kspimpl.h: the reason of a solve, its iterations and the callback that is there already have no public access.
+  petsc/private/kspimpl.h: the reason and the iterations of a solve and the callback that was set before have no public access.
 */
 #include "sbsolver.h"
 #include "time_impl.h"
@@ -20,11 +21,11 @@
 typedef struct _p_SbSolverList *SbSolverList;
 struct _p_SbSolverList {
   SbRun run;
-  PetscBool own;                                   /* the solver is one of ours, which may be replaced */
-  uint32_t tried;                                  /* rows of the table that failed */
-  PetscErrorCode (*before)(KSP, Vec, Vec, void *); /* the callback that was there; NULL: none */
+  PetscBool own;  /* the solver is of the table, not the user's: it may be replaced */
+  uint32_t tried; /* rows of the table that failed */
+  PetscErrorCode (*before)(KSP, Vec, Vec, void *); /* the callback that was set before; NULL: none */
   void *before_ctx;
-  PetscBool again; /* within a solve that another solver does once more */
+  PetscBool again; /* within the solve of a fallback */
   char failures[384];
 };
 
@@ -40,7 +41,7 @@ static PetscErrorCode attach(SbSolverList l, KSP ksp)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Why the solver failed, into text and behind l->failures: "DIVERGED_ITS of cg after 5000 iterations, ...". memory: a factorisation lacked it. */
+/* Describes the failure in text and appends it to l->failures: "DIVERGED_ITS of cg after 5000 iterations, ...". memory: out of it. */
 static PetscErrorCode describe_failure(SbSolverList l, KSP ksp, Vec b, Vec x, char text[], size_t size,
                                        PetscBool *memory)
 {
@@ -78,7 +79,7 @@ static PetscErrorCode describe_failure(SbSolverList l, KSP ksp, Vec b, Vec x, ch
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Whether another solver may do better: *is. */
+/* Whether the solver may be replaced, and another one can succeed: *is. */
 static PetscErrorCode may_replace(SbSolverList l, KSP ksp, Vec b, PetscBool *is)
 {
   SbRun run = l->run;
@@ -90,6 +91,7 @@ static PetscErrorCode may_replace(SbSolverList l, KSP ksp, Vec b, PetscBool *is)
 
   PetscFunctionBeginUser;
   *is = PETSC_FALSE;
+  /* a solver of the table, in Newton's method, with a finite right-hand side */
   PetscCall(PetscObjectTypeCompareAny((PetscObject)run->snes, &newton, SB_SNES_NEWTON, SNESNEWTONLS,
                                       SNESKSPONLY, ""));
   PetscCall(SNESGetSolution(run->snes, &X));
@@ -97,12 +99,14 @@ static PetscErrorCode may_replace(SbSolverList l, KSP ksp, Vec b, PetscBool *is)
   if (!l->own || !newton || !X || factored) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(VecNorm(b, NORM_2, &size));
   if (PetscIsInfOrNanReal(size)) PetscFunctionReturn(PETSC_SUCCESS);
+
+  /* a static system with a free motion is singular for every solver */
   if (!run->model->dynamic) PetscCall(SbRunFreeBody(run, &body, sizeof(motion), motion));
   *is = (PetscBool)(body < 0);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Makes of the run's KSP the solver `next`, with the tangent of Newton's iterate. */
+/* Turns the run's KSP into the solver `next`, with the tangent at Newton's iterate. */
 static PetscErrorCode replace(SbSolverList l, KSP ksp, const SbSolverPreset *next)
 {
   PetscErrorCode (*jacobian)(SNES, Vec, Mat, Mat, void *);
@@ -115,6 +119,7 @@ static PetscErrorCode replace(SbSolverList l, KSP ksp, const SbSolverPreset *nex
   PC pc;
 
   PetscFunctionBeginUser;
+  /* the options of the old solver go, and what it left in the KSP but its tolerances */
   PetscCall(KSPGetTolerances(ksp, &rtol, &atol, NULL, NULL));
   PetscCall(SbSolverClear(old));
   PetscCall(KSPReset(ksp));
@@ -127,7 +132,7 @@ static PetscErrorCode replace(SbSolverList l, KSP ksp, const SbSolverPreset *nex
   PetscCall(KSPSetConvergenceTest(ksp, KSPConvergedDefault, test, KSPConvergedDefaultDestroy));
   PetscCall(KSPSetInitialGuessNonzero(ksp, PETSC_FALSE));
 
-  /* the operator that `next` works on, instead of the run's */
+  /* another operator where `next` needs another kind of matrix */
   if (old->create || next->create || old->matrix != next->matrix) {
     SbSpace s = run->model->space;
 
@@ -135,13 +140,15 @@ static PetscErrorCode replace(SbSolverList l, KSP ksp, const SbSolverPreset *nex
     PetscCall(SbSolverCreateOperator(s, next, &run->J));
     if (s->constraints)
       PetscCall(SbConstraintsSetMatrix(s, run->J));
-    else if (!run->nonsymmetric.U) { /* that one multiplies by run->J, whichever it is */
+    else if (!run->nonsymmetric.U) { /* the nonsymmetric operator multiplies by run->J in any case */
       PetscCall(MatDestroy(&run->operator));
       PetscCall(PetscObjectReference((PetscObject)run->J));
       run->operator= run->J;
     }
     PetscCall(SNESSetJacobian(run->snes, run->operator, run->J, NULL, NULL));
   }
+
+  /* the options of the new one, set up as at the start of a run */
   run->solver_used = next;
   PetscCall(PetscStrncpy(run->solver, next->name, sizeof(run->solver)));
   PetscCall(SbSolverSetUp(run->snes, run->model->space, next));
@@ -149,7 +156,8 @@ static PetscErrorCode replace(SbSolverList l, KSP ksp, const SbSolverPreset *nex
   PetscCall(SbSolverFinish(run->snes, run->model->space, next, run->J));
   PetscCall(KSPSetTolerances(ksp, rtol, atol, PETSC_DEFAULT, PETSC_DEFAULT));
   PetscCall(attach(l, ksp));
-  /* the tangent may be kept from one step to the next: not this one */
+
+  /* the tangent at Newton's iterate; one that was kept from an earlier step is of the old matrix */
   run->tangent_known = PETSC_FALSE;
   PetscCall(SNESGetSolution(run->snes, &X));
   PetscCall(SNESGetJacobian(run->snes, NULL, NULL, &jacobian, &ctx));
@@ -159,7 +167,7 @@ static PetscErrorCode replace(SbSolverList l, KSP ksp, const SbSolverPreset *nex
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The same system once more; iterations of both count. */
+/* Solves the same system again; the iterations of both solves are counted. */
 static PetscErrorCode solve_again(SbSolverList l, KSP ksp, Vec b, Vec x)
 {
   const PetscInt its = ksp->its;
@@ -168,7 +176,7 @@ static PetscErrorCode solve_again(SbSolverList l, KSP ksp, Vec b, Vec x)
 
   PetscFunctionBeginUser;
   PetscCall(VecZeroEntries(x));
-  /* the tolerance of this Newton step is set already */
+  /* the relative tolerance of this Newton step stays as it is (Eisenstat and Walker) */
   PetscCall(SNESKSPGetUseEW(l->run->snes, &forcing));
   PetscCall(SNESKSPSetUseEW(l->run->snes, PETSC_FALSE));
   l->again = PETSC_TRUE;
@@ -190,17 +198,19 @@ static PetscErrorCode after_solve(KSP ksp, Vec b, Vec x, void *ctx)
   PC pc;
 
   PetscFunctionBeginUser;
+  /* the callback that was set before may judge the solve as failed */
   if (l->before) PetscCall((*l->before)(ksp, b, x, l->before_ctx));
   if (ksp->reason > 0) {
     if (!l->again) l->failures[0] = 0;
     PetscFunctionReturn(PETSC_SUCCESS);
   }
-  /* Newton's method filters the tangent and comes back */
+  /* Newton's method will filter the tangent and solve again */
   if (run->model->space->tentative) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(describe_failure(l, ksp, b, x, text, sizeof(text), &memory));
-  /* an incomplete factorisation within it may have broken down */
+
+  /* first a simpler form of the same preconditioner, if it has one: its incomplete factorisation may have broken down */
   PetscCall(SbPCConstrainedGetInner(ksp->pc, &pc));
-  /* MINRES blames the matrix for a preconditioner that is not definite, or does not notice */
+  /* MINRES reports an indefinite matrix, or none of it, where the preconditioner is indefinite */
   reason = ksp->reason;
   PetscCall(PetscObjectTypeCompare((PetscObject)ksp, KSPMINRES, &minres));
   if (minres && (reason == KSP_DIVERGED_INDEFINITE_MAT || reason == KSP_DIVERGED_ITS))
@@ -210,6 +220,8 @@ static PetscErrorCode after_solve(KSP ksp, Vec b, Vec x, void *ctx)
     PetscCall(solve_again(l, ksp, b, x));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
+
+  /* then the next solver of the list, with a warning */
   PetscCall(may_replace(l, ksp, b, &may));
   if (!may) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(SbSolverNextFallback(run->model->space, ksp->reason, memory, &l->tried, &next));
@@ -234,7 +246,8 @@ PetscErrorCode SbSolverListCreate(SbRun run)
   PetscCall(PetscOptionsHasName(NULL, NULL, "-ksp_type", &given));
   l->own = (PetscBool)!given;
   PetscCall(PetscOptionsHasName(NULL, NULL, "-pc_type", &given));
-  l->own = (PetscBool)(l->own && !given && !run->arc.on); /* the arc length needs its inertia */
+  l->own =
+    (PetscBool)(l->own && !given && !run->arc.on); /* the arc length needs the inertia of its factorisation */
   PetscCall(SNESGetKSP(run->snes, &ksp));
   PetscCall(attach(l, ksp));
   run->solver_list = l;
@@ -248,7 +261,7 @@ PetscErrorCode SbSolverListDestroy(SbRun run)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* What of the bodies makes systems hard, as far as it is known: "; nu is up to 0.4999". */
+/* Properties of the bodies that are known to make systems ill-conditioned: "; nu is up to 0.4999". */
 static PetscErrorCode describe_causes(SbRun run, char text[], size_t size)
 {
   const SbModel m = run->model;
