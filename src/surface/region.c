@@ -1,15 +1,15 @@
 /*
-  region.c - the regions that closed surfaces cut space into, also where more than two triangles meet at an edge.
+  region.c - regions: the parts of space that closed surfaces separate, also where more than two triangles meet at an edge.
 
-  Every triangle has two sides, 2 f in front and 2 f + 1 behind. At an edge the triangles are sorted by their angle around it; what faces
-  each other between two that follow is one space, so these sides are joined. The joined sides are shells: one with a positive volume is the
-  outer limit of a region, one with a negative volume is a surface seen from the space around it. Which region that space is, the winding
+  Every triangle has two sides, 2 f in front and 2 f + 1 behind. Around an edge triangles are sorted by angle; the two sides that face each
+  other between neighbours belong to one region and are joined. A set of joined sides is a shell: one with a positive volume is the
+  outer boundary of a region, one with a negative volume is a surface seen from the region around it. Which region that is, the winding
   number decides (sum of solid angles, van Oosterom and Strackee 1983): the smallest positive shell around it.
 
-  What is material: with a sense of turning (.stl, .obj, .off, .ply), triangles are first turned to the side of their neighbours, the
-  majority of a surface wins; a surface turned outwards holds material, also within another one (a region of its own), one turned
-  inwards within material is a cavity, one turned inwards in the open is turned. Where more than two triangles meet at an
-  edge of a surface, and without a sense of turning (.poly, .smesh), whatever is enclosed is material, but for the holes that the file names.
+  Material. In formats with oriented triangles (.stl, .obj, .off, .ply) the triangles of a surface are first oriented alike, as the majority
+  is. A surface with outward normals encloses material, also within another one (a region of its own); one with inward normals within
+  material is a cavity; one with inward normals that is in no other is reversed. Where more than two triangles meet at an edge of a
+  surface, and in formats without orientation (.poly, .smesh), every region is material but for the holes that the file names.
 */
 #include <stdlib.h>
 #include "sbkernel.h"
@@ -47,11 +47,11 @@ typedef struct {
   Surface *surfaces;
 } Space;
 
-/* ------------------------------------------------------------------ turned alike */
+/* ------------------------------------------------------------------ orientation */
 
-/* Walks over one piece: sense[f] says whether f is turned as the first one (1) or the other way (-1). */
-static PetscErrorCode walk_piece(const Space *s, PetscInt first, const PetscInt across[], int sense[],
-                                 PetscInt stack[], PetscInt *n)
+/* Visits what is connected to triangle `first`: sense[f] is 1 where f is oriented as the first one, else -1. */
+static PetscErrorCode visit_connected(const Space *s, PetscInt first, const PetscInt across[], int sense[],
+                                      PetscInt stack[], PetscInt *n)
 {
   const SbTriangles *t = s->t;
   PetscInt done = 0;
@@ -70,7 +70,7 @@ static PetscErrorCode walk_piece(const Space *s, PetscInt first, const PetscInt 
       if (g < 0) continue;
       same = t->tri[across[k]] != t->tri[k]
                ? 1
-               : -1; /* neighbours turned alike walk along their edge in opposite directions */
+               : -1; /* neighbours that are oriented alike have their edge in opposite directions */
       if (!sense[g]) {
         sense[g] = same * sense[f];
         stack[(*n)++] = g;
@@ -86,8 +86,8 @@ static PetscErrorCode walk_piece(const Space *s, PetscInt first, const PetscInt 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Turns the minority of each piece that hangs together by edges of two triangles. */
-static PetscErrorCode turn_pieces(Space *s, const PetscInt across[], int sense[], PetscInt stack[])
+/* Reverses the minority of each set of triangles that are connected by edges of two. */
+static PetscErrorCode reverse_minority(Space *s, const PetscInt across[], int sense[], PetscInt stack[])
 {
   PetscFunctionBeginUser;
   for (PetscInt f = 0; f < s->t->ntri; f++) {
@@ -95,7 +95,7 @@ static PetscErrorCode turn_pieces(Space *s, const PetscInt across[], int sense[]
     int wrong;
 
     if (sense[f]) continue;
-    PetscCall(walk_piece(s, f, across, sense, stack, &n));
+    PetscCall(visit_connected(s, f, across, sense, stack, &n));
     for (PetscInt i = 0; i < n; i++) nother += sense[stack[i]] < 0;
     wrong = 2 * nother > n ? 1 : -1;
     for (PetscInt i = 0; i < n; i++) {
@@ -112,7 +112,8 @@ static PetscErrorCode turn_pieces(Space *s, const PetscInt across[], int sense[]
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode turn_alike(Space *s)
+/* Orients the triangles of each surface alike, for formats with orientation. */
+static PetscErrorCode orient_alike(Space *s)
 {
   PetscInt *across, *stack;
   int *sense;
@@ -128,10 +129,10 @@ static PetscErrorCode turn_alike(Space *s)
     m = SbTrianglesAtEdge(n, s->edge, i);
     for (PetscInt k = 0; k < m; k++) across[s->edge[i + k].slot] = m == 2 ? s->edge[i + 1 - k].slot : -1;
   }
-  ierr = turn_pieces(s, across, sense, stack);
+  ierr = reverse_minority(s, across, sense, stack);
   PetscCall(PetscFree3(across, stack, sense));
   PetscCall(ierr);
-  PetscCall(SbTrianglesEdges(s->t, s->edge)); /* slots have changed */
+  PetscCall(SbTrianglesEdges(s->t, s->edge)); /* corners have changed their order */
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -183,7 +184,7 @@ static void sort_spokes(const SbTriangles *t, PetscInt p, PetscInt q, PetscInt n
   qsort(spoke, (size_t)n, sizeof(*spoke), compare_spokes);
 }
 
-/* Joins what faces each other around one edge. */
+/* Joins the sides that face each other around one edge. */
 static PetscErrorCode join_at_edge(const SbTriangles *t, PetscInt n, const SbTriangleEdge edge[],
                                    PetscInt up[])
 {
@@ -203,6 +204,7 @@ static PetscErrorCode join_at_edge(const SbTriangles *t, PetscInt n, const SbTri
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Shells from sides that face each other, surfaces from triangles that share an edge. */
 static PetscErrorCode find_shells(Space *s)
 {
   const PetscInt n = 3 * s->t->ntri;
@@ -262,6 +264,7 @@ static PetscErrorCode measure_shells(Space *s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Every shell encloses a volume, and every surface has one shell towards the outside. */
 static PetscErrorCode check_shells(Space *s)
 {
   PetscFunctionBeginUser;
@@ -286,7 +289,7 @@ static PetscErrorCode check_shells(Space *s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* ------------------------------------------------------------------ what lies in what */
+/* ------------------------------------------------------------------ nesting */
 
 /* The smallest positive shell around a point, not of the surface `except`; OUTSIDE when there is none. */
 static PetscInt shell_around(const Space *s, const PetscReal o[3], PetscInt except)
@@ -314,7 +317,7 @@ static PetscBool turned_outwards(const Space *s, PetscInt k)
   return (PetscBool)(s->shell[2 * s->surfaces[k].first] == s->surfaces[k].outer);
 }
 
-/* How deep a surface lies: 0 in the open. */
+/* How many surfaces are around a surface. */
 static PetscInt depth_of(const Space *s, PetscInt k)
 {
   PetscInt depth = 0;
@@ -323,13 +326,14 @@ static PetscInt depth_of(const Space *s, PetscInt k)
   return depth;
 }
 
-/* Cavities of surfaces with a sense of turning. A heap that is inverted in the open is taken turned as a whole. */
+/* Cavities, for formats with orientation. Surfaces within an outermost one with inward normals are taken as reversed with it. */
 static PetscErrorCode empty_cavities(Space *s)
 {
   PetscInt deepest = 0;
 
   PetscFunctionBeginUser;
   if (s->f->sheets) PetscFunctionReturn(PETSC_SUCCESS);
+  /* from the outside to the inside: whether the region around a surface is material is known then */
   for (PetscInt k = 0; k < s->nsurface; k++) deepest = PetscMax(deepest, depth_of(s, k));
   for (PetscInt depth = 0; depth <= deepest; depth++) {
     for (PetscInt k = 0; k < s->nsurface; k++) {
@@ -356,7 +360,7 @@ static PetscErrorCode empty_cavities(Space *s)
 static PetscErrorCode groups_of_shell(const Space *s, PetscInt shell, PetscInt *n, PetscInt group[16])
 {
   const SbImport *im = s->f->groups;
-  PetscInt last = -1; /* sets repeat: examined once */
+  PetscInt last = -1; /* the tag set of the triangle before, which has been examined */
 
   PetscFunctionBeginUser;
   *n = -1;
@@ -443,8 +447,9 @@ static PetscErrorCode find_regions(Space *s, SbSurface *out)
   PetscInt n;
 
   PetscFunctionBeginUser;
+  /* orientation, shells and their volumes */
   PetscCall(SbTrianglesEdges(s->t, s->edge));
-  PetscCall(turn_alike(s));
+  PetscCall(orient_alike(s));
   PetscCall(find_shells(s));
   PetscCall(measure_shells(s));
   PetscCall(check_shells(s));
