@@ -91,20 +91,20 @@ PetscErrorCode SbSolverCreateOperator(SbSpace space, const SbSolverPreset *prese
 
 /*
   SbPCCoarseCreate - makes pc a two-level preconditioner for CG: incomplete Cholesky on each rank, and a coarse space of some
-  hundred aggregates of nodes with six rigid-body modes each, factored on every rank; on many ranks some thousand, with multigrid.
+  hundred aggregates of nodes with six rigid-body modes each, factored on one rank; on many ranks some thousand, with multigrid.
 
   Collective. The operator is a BAIJ or SBAIJ matrix of the space, symmetric; the space is borrowed. The aggregates are found
   at the first set-up, the coarse operator is renewed whenever the matrix has changed. Symmetric and positive definite when the
   operator is; an operator that is not fails the solve (KSP_DIVERGED_PC_FAILED). Where the incomplete factorisation breaks
   down, the diagonal takes its place with a warning.
-  Options read: -pc_coarse_aggregates (0: by size), -pc_coarse_redundant (largest number of aggregates that every rank factors;
+  Options read: -pc_coarse_aggregates (0: by size), -pc_coarse_gathered (largest number of aggregates that one rank factors;
   -1: by size), -pc_coarse_pc_ and -pc_coarse_mg_ (multigrid), -fine_pc_ (fine level). Errors: PETSC_ERR_USER for a negative number.
 */
 PetscErrorCode SbPCCoarseCreate(SbSpace space, PC pc);
 /* After a solve that ended with `reason`: the diagonal for the incomplete factorisation. changed: false for other preconditioners
    and failures, or when that is done already. Collective. */
 PetscErrorCode SbPCCoarseFallBack(PC pc, KSPConvergedReason reason, PetscBool *changed);
-/* Aggregates of all ranks, those that this rank solves for (all of them when it factors the whole), set-ups so far, whether the diagonal is
+/* Aggregates of all ranks, those that this rank solves for (all of them when it factors for all), set-ups so far, whether the diagonal is
    the fine level. Outputs may be NULL. Not collective. */
 PetscErrorCode SbPCCoarseGetStats(PC pc, PetscInt *naggregate, PetscInt *nsolved, PetscInt *nsetup,
                                   PetscBool *simple);

@@ -1,7 +1,6 @@
 /*
   The coarse space of the two-level preconditioner: modes of the aggregates, which rank knows what of them, and the two maps
-  between nodes and modes. While E is small, an application gathers 6 N numbers on every rank, and each solves for itself; else its
-  rows stay with the ranks (coarse_levels.c).
+  between nodes and modes.
 
   Modes that vanish, as the rotations of an aggregate of one node, are found once from the Gram matrix sum Z_i^T Z_i: its
   eigenvectors with eigenvalues near zero. They are all that can make E = Z^T A Z singular (coarse_operator.c).
@@ -132,7 +131,7 @@ static PetscErrorCode find_pattern(SbCoarse c)
         for (PetscInt e = 0; e < nd + no; e++) {
           const PetscInt b = c->agg[e < nd ? p->dj[p->di[i] + e] : p->oj[p->oi[i] + e - nd]];
 
-          if (b < (c->spread ? 0 : c->first + a) || mark[b - lowest] == a) continue;
+          if (b < 0 || mark[b - lowest] == a) continue;
           mark[b - lowest] = a;
           if (pass) c->column[nz] = b;
           nz++;
@@ -145,108 +144,6 @@ static PetscErrorCode find_pattern(SbCoarse c)
   c->start[c->n] = nz;
   PetscCall(PetscCalloc1(36 * nz, &c->value));
   PetscCall(PetscFree(mark));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* How a coarse vector is put together from the ranks' parts. */
-static PetscErrorCode plan_parts(SbCoarse c)
-{
-  PetscMPIInt size, mine, sum = 0;
-
-  PetscFunctionBeginUser;
-  PetscCallMPI(MPI_Comm_size(c->space->comm, &size));
-  PetscCall(PetscMPIIntCast(6 * c->n + 1, &mine));
-  PetscCall(PetscMalloc5(size, &c->npart, size, &c->part, size + 1, &c->part_start, mine, &c->send,
-                         6 * c->N + size, &c->receive));
-  PetscCallMPI(MPI_Allgather(&mine, 1, MPI_INT, c->npart, 1, MPI_INT, c->space->comm));
-  c->part_start[0] = 0;
-  for (PetscMPIInt r = 0; r < size; r++) {
-    c->part[r] = sum;
-    sum += c->npart[r];
-    c->part_start[r + 1] = c->part_start[r] + (c->npart[r] - 1) / 6;
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* How E is put together from the ranks' blocks. */
-static PetscErrorCode plan_blocks(SbCoarse c)
-{
-  PetscMPIInt size, mine, sum = 0;
-
-  PetscFunctionBeginUser;
-  PetscCallMPI(MPI_Comm_size(c->space->comm, &size));
-  PetscCall(PetscMPIIntCast(36 * c->start[c->n], &mine));
-  PetscCall(PetscMalloc2(size, &c->nvalue, size, &c->at));
-  PetscCallMPI(MPI_Allgather(&mine, 1, MPI_INT, c->nvalue, 1, MPI_INT, c->space->comm));
-  for (PetscMPIInt r = 0; r < size; r++) {
-    c->at[r] = sum;
-    sum += c->nvalue[r];
-  }
-  c->nblock = sum / 36;
-  c->all = c->value;
-  if (size > 1) PetscCall(PetscMalloc1(sum, &c->all));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* The blocks of all ranks: number of blocks in each row of blocks, and their columns. */
-static PetscErrorCode gather_pattern(SbCoarse c, PetscInt start[], PetscInt column[])
-{
-  MPI_Comm comm = c->space->comm;
-  PetscMPIInt size, *count, *offset;
-  PetscInt *length;
-
-  PetscFunctionBeginUser;
-  PetscCallMPI(MPI_Comm_size(comm, &size));
-  PetscCall(PetscMalloc3(c->n, &length, size, &count, size, &offset));
-  for (PetscInt a = 0; a < c->n; a++) length[a] = c->start[a + 1] - c->start[a];
-  for (PetscMPIInt r = 0; r < size; r++) {
-    count[r] = c->npart[r] / 6;
-    offset[r] = (PetscMPIInt)c->part_start[r];
-  }
-  start[0] = 0;
-  PetscCallMPI(MPI_Allgatherv(length, (PetscMPIInt)c->n, MPIU_INT, start + 1, count, offset, MPIU_INT, comm));
-  for (PetscInt a = 0; a < c->N; a++) start[a + 1] += start[a];
-  for (PetscMPIInt r = 0; r < size; r++) {
-    count[r] = c->nvalue[r] / 36;
-    offset[r] = c->at[r] / 36;
-  }
-  PetscCallMPI(
-    MPI_Allgatherv(c->column, (PetscMPIInt)c->start[c->n], MPIU_INT, column, count, offset, MPIU_INT, comm));
-  PetscCall(PetscFree3(length, count, offset));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* E as a matrix of PETSc, its values in c->av, and the symbolic part of its factor. */
-static PetscErrorCode create_matrix(SbCoarse c)
-{
-  PetscInt *start, *column, nz = 0;
-  PetscBool has;
-
-  PetscFunctionBeginUser;
-  PetscCall(PetscMalloc2(c->N + 1, &start, c->nblock, &column));
-  PetscCall(gather_pattern(c, start, column));
-  PetscCall(PetscMalloc3(6 * c->N + 1, &c->ai, 36 * c->nblock, &c->aj, 36 * c->nblock, &c->av));
-  PetscCall(PetscArrayzero(c->av, 36 * c->nblock));
-  for (PetscInt row = 0; row < 6 * c->N; row++) {
-    c->ai[row] = nz;
-    for (PetscInt k = start[row / 6]; k < start[row / 6 + 1]; k++) {
-      for (PetscInt q = column[k] == row / 6 ? row % 6 : 0; q < 6; q++) c->aj[nz++] = 6 * column[k] + q;
-    }
-  }
-  c->ai[6 * c->N] = nz;
-  PetscCall(PetscFree2(start, column));
-  PetscCall(MatCreateSeqSBAIJWithArrays(PETSC_COMM_SELF, 1, 6 * c->N, 6 * c->N, c->ai, c->aj, c->av, &c->E));
-  PetscCall(MatSetOption(c->E, MAT_SYMMETRIC, PETSC_TRUE));
-  PetscCall(MatCreateVecs(c->E, &c->c, &c->y));
-  PetscCall(MatGetFactorAvailable(c->E, MATSOLVERCHOLMOD, MAT_FACTOR_CHOLESKY, &has));
-  PetscCall(MatGetFactor(c->E, has ? MATSOLVERCHOLMOD : MATSOLVERMUMPS, MAT_FACTOR_CHOLESKY, &c->factor));
-  /* groups of columns always: CHOLMOD's other way is L D L^T, which takes indefinite matrices without a word */
-  PetscCall(MatSetOptionsPrefix(c->factor, "pc_coarse_"));
-  if (has) {
-    PetscCall(PetscOptionsSetValue(NULL, "-pc_coarse_mat_cholmod_factor", "supernodal"));
-    PetscCall(PetscOptionsSetValue(NULL, "-pc_coarse_mat_cholmod_print", "0"));
-  }
-  PetscCall(MatCholeskyFactorSymbolic(c->factor, c->E, NULL, NULL));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -264,28 +161,6 @@ static PetscErrorCode share_aggregates(SbCoarse c)
   PetscCall(update_ghosts(s, c->d));
   for (PetscInt i = 0; i < s->nnode; i++) c->agg[i] = (PetscInt)number[3 * i];
   PetscCall(PetscFree(number));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* 1 / nodes in an aggregate, for all of them. */
-static PetscErrorCode gather_weights(SbCoarse c)
-{
-  PetscReal *weight;
-  PetscMPIInt size, *count, *offset;
-
-  PetscFunctionBeginUser;
-  PetscCallMPI(MPI_Comm_size(c->space->comm, &size));
-  PetscCall(PetscMalloc3(c->n, &weight, size, &count, size, &offset));
-  for (PetscInt a = 0; a < c->n; a++)
-    weight[a] = 1. / (PetscReal)(c->member_start[a + 1] - c->member_start[a]);
-  for (PetscMPIInt r = 0; r < size; r++) {
-    count[r] = c->npart[r] / 6;
-    offset[r] = (PetscMPIInt)c->part_start[r];
-  }
-  PetscCall(PetscMalloc1(c->N, &c->weight));
-  PetscCallMPI(MPI_Allgatherv(weight, (PetscMPIInt)c->n, MPIU_REAL, c->weight, count, offset, MPIU_REAL,
-                              c->space->comm));
-  PetscCall(PetscFree3(weight, count, offset));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -314,14 +189,7 @@ PetscErrorCode SbCoarseCreate(SbSpace s, PetscInt wanted, PetscBool spread, SbCo
   for (PetscInt a = 0; a < c->n; a++) PetscCall(find_vanishing(c, a, c->null + 36 * a));
   PetscCall(share_aggregates(c));
   PetscCall(find_pattern(c));
-  if (spread && c->N)
-    PetscCall(SbCoarseCreateLevels(c));
-  else if (c->N) {
-    PetscCall(plan_parts(c));
-    PetscCall(gather_weights(c));
-    PetscCall(plan_blocks(c));
-    PetscCall(create_matrix(c));
-  }
+  if (c->N) PetscCall(SbCoarseCreateSolver(c));
   *coarse = c;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -332,21 +200,15 @@ PetscErrorCode SbCoarseDestroy(SbCoarse *coarse)
 
   PetscFunctionBeginUser;
   if (!c) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(PCDestroy(&c->levels));
-  PetscCall(MatDestroy(&c->factor));
+  PetscCall(PCDestroy(&c->solver));
   PetscCall(MatDestroy(&c->E));
   PetscCall(VecDestroy(&c->c));
   PetscCall(VecDestroy(&c->y));
-  PetscCall(PetscFree3(c->ai, c->aj, c->av));
-  if (c->all != c->value) PetscCall(PetscFree(c->all));
   PetscCall(PetscFree(c->value));
   PetscCall(PetscFree(c->column));
   PetscCall(PetscFree(c->start));
-  PetscCall(PetscFree2(c->nvalue, c->at));
-  PetscCall(PetscFree5(c->npart, c->part, c->part_start, c->send, c->receive));
   PetscCall(PetscFree2(c->member_start, c->member));
   PetscCall(PetscFree(c->null));
-  PetscCall(PetscFree(c->weight));
   PetscCall(PetscFree(c->centre));
   PetscCall(PetscFree(c->d));
   PetscCall(PetscFree(c->agg));
@@ -356,15 +218,18 @@ PetscErrorCode SbCoarseDestroy(SbCoarse *coarse)
 
 /* ------------------------------------------------------------------ application */
 
-/* m[n][6] = Z^T r of this rank's aggregates; norm2: square of r on them. */
-static PetscErrorCode restrict_own(SbCoarse c, Vec R, PetscReal m[], PetscReal *norm2)
+PetscErrorCode SbCoarseRestrict(SbCoarse c, Vec R, PetscReal *share)
 {
   SbSpace s = c->space;
+  PetscReal norm2[2] = {0., 0.}; /* of c, weighted, and of r on the aggregates */
   const PetscScalar *r;
+  PetscScalar *m;
 
   PetscFunctionBeginUser;
-  *norm2 = 0.;
-  PetscCall(PetscArrayzero(m, 6 * c->n));
+  *share = c->N ? 1. : 0.;
+  if (!c->N) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(VecZeroEntries(c->c));
+  PetscCall(VecGetArray(c->c, &m));
   PetscCall(VecGetArrayRead(R, &r));
   for (PetscInt i = 0; i < s->nnode_owned; i++) {
     PetscReal f[3];
@@ -372,47 +237,19 @@ static PetscErrorCode restrict_own(SbCoarse c, Vec R, PetscReal m[], PetscReal *
     if (c->agg[i] < 0) continue;
     for (int q = 0; q < 3; q++) {
       f[q] = s->fixed[i] & (1 << q) ? 0. : r[3 * i + q];
-      *norm2 += f[q] * f[q];
+      norm2[1] += f[q] * f[q];
     }
     SbCoarseAddMoments(c->d + 3 * i, f, m + 6 * (c->agg[i] - c->first));
   }
+  for (PetscInt a = 0; a < c->n; a++) {
+    for (int q = 0; q < 6; q++)
+      norm2[0] += PetscSqr(m[6 * a + q]) / (PetscReal)(c->member_start[a + 1] - c->member_start[a]);
+  }
   PetscCall(VecRestoreArrayRead(R, &r));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode SbCoarseRestrict(SbCoarse c, Vec R, PetscReal *share)
-{
-  SbSpace s = c->space;
-  PetscReal norm2, c2 = 0.;
-  PetscScalar *all;
-  PetscMPIInt size;
-
-  PetscFunctionBeginUser;
-  *share = 0.;
-  if (!c->N) PetscFunctionReturn(PETSC_SUCCESS);
-  if (c->spread) {
-    *share = 1.;
-    PetscCall(VecGetArrayWrite(c->c, &all));
-    PetscCall(restrict_own(c, R, all, &norm2));
-    PetscCall(VecRestoreArrayWrite(c->c, &all));
-    PetscFunctionReturn(PETSC_SUCCESS);
-  }
-  PetscCallMPI(MPI_Comm_size(s->comm, &size));
-  PetscCall(restrict_own(c, R, c->send, &norm2));
-  c->send[6 * c->n] = norm2;
-  PetscCallMPI(MPI_Allgatherv(c->send, 6 * (PetscMPIInt)c->n + 1, MPIU_REAL, c->receive, c->npart, c->part,
-                              MPIU_REAL, s->comm));
-  PetscCall(VecGetArrayWrite(c->c, &all));
-  norm2 = 0.;
-  for (PetscMPIInt p = 0; p < size; p++) {
-    const PetscReal *from = c->receive + c->part[p];
-
-    PetscCall(PetscArraycpy(all + 6 * c->part_start[p], from, c->npart[p] - 1));
-    norm2 += from[c->npart[p] - 1];
-  }
-  for (PetscInt k = 0; k < 6 * c->N; k++) c2 += all[k] * all[k] * c->weight[k / 6];
-  PetscCall(VecRestoreArrayWrite(c->c, &all));
-  *share = norm2 > 0. ? PetscSqrtReal(c2 / norm2) : 0.;
+  PetscCall(VecRestoreArray(c->c, &m));
+  if (c->spread) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, norm2, 2, MPIU_REAL, MPI_SUM, s->comm));
+  *share = norm2[1] > 0. ? PetscSqrtReal(norm2[0] / norm2[1]) : 0.;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -424,17 +261,14 @@ PetscErrorCode SbCoarseAdd(SbCoarse c, Vec Z)
 
   PetscFunctionBeginUser;
   if (!c->N) PetscFunctionReturn(PETSC_SUCCESS);
-  if (c->spread)
-    PetscCall(PCApply(c->levels, c->c, c->y));
-  else
-    PetscCall(MatSolve(c->factor, c->c, c->y));
+  PetscCall(PCApply(c->solver, c->c, c->y));
   PetscCall(VecGetArrayRead(c->y, &y));
   PetscCall(VecGetArray(Z, &z));
   for (PetscInt i = 0; i < s->nnode_owned; i++) {
     PetscReal u[3];
 
     if (c->agg[i] < 0) continue;
-    SbCoarseMotion(c->d + 3 * i, y + 6 * (c->agg[i] - (c->spread ? c->first : 0)), u);
+    SbCoarseMotion(c->d + 3 * i, y + 6 * (c->agg[i] - c->first), u);
     for (int q = 0; q < 3; q++) z[3 * i + q] += s->fixed[i] & (1 << q) ? 0. : u[q];
   }
   PetscCall(VecRestoreArray(Z, &z));

@@ -14,36 +14,25 @@ PetscErrorCode SbAggregate(SbSpace space, PetscInt wanted, PetscInt *n, PetscInt
 
 /*
   The coarse space: columns Z of six modes per aggregate, u(x) = t + w x d with d the position relative to the aggregate's centre
-  in units of its radius; zero on prescribed unknowns. E = Z^T A Z is gathered and factored by every rank, or its rows stay with
-  their ranks and a cycle of multigrid stands for E^-1.
+  in units of its radius; zero on prescribed unknowns. The rows of E = Z^T A Z stay with their ranks; one rank factors it,
+  or a cycle of multigrid stands for E^-1.
 */
 typedef struct _p_SbCoarse *SbCoarse;
 struct _p_SbCoarse {
   SbSpace space;
-  PetscInt n, first, N;   /* aggregates of this rank, number of its first one, all of them */
-  PetscInt *agg;          /* [nnode] aggregate by global number, -1 for fully prescribed nodes */
-  PetscReal *d;           /* [nnode][3] */
-  PetscReal *centre;      /* [n][4] position, m, and radius, m; 0 for a single node */
-  PetscBool spread;       /* E stays with its ranks; what is [N], [nblock] and [size] below is NULL then */
-  PetscReal *weight;      /* [N] 1 / nodes in the aggregate */
-  PetscReal *null;        /* [n][36] projector onto the modes that vanish (single nodes, nodes on a line) */
-  PetscInt *member_start; /* [n+1] */
-  PetscInt *member;       /* own nodes by aggregate */
-  PetscInt *start,
-    *column; /* [n+1] blocks of own rows: the aggregate itself, then higher ones ascending; all others when spread */
-  PetscReal *value;          /* [start[n]][36], row-major, N/m */
-  PetscInt nblock;           /* blocks of all ranks */
-  PetscReal *all;            /* [nblock][36]; `value` on one rank */
-  PetscMPIInt *nvalue, *at;  /* [size] numbers in `value` of each rank and their offsets in `all` */
-  PetscMPIInt *npart, *part; /* [size] numbers of each rank in a gathered coarse vector, and offsets */
-  PetscInt *part_start;      /* [size+1] first aggregate of each rank */
-  PetscReal *send,
-    *receive;        /* the coarse vector of this rank and of all, each with the squared norm behind it */
-  PetscInt *ai, *aj; /* E by rows of its upper triangle */
-  PetscScalar *av;
-  Mat E, factor;
-  PC levels; /* multigrid on a spread E */
-  Vec c, y;  /* [6 N] on each rank, or spread */
+  PetscInt n, first, N;     /* aggregates of this rank, number of its first one, all of them */
+  PetscInt *agg;            /* [nnode] aggregate by global number, -1 for fully prescribed nodes */
+  PetscReal *d;             /* [nnode][3] */
+  PetscReal *centre;        /* [n][4] position, m, and radius, m; 0 for a single node */
+  PetscBool spread;         /* multigrid stands for E^-1, else one rank factors E */
+  PetscReal *null;          /* [n][36] projector onto the modes that vanish (single nodes, nodes on a line) */
+  PetscInt *member_start;   /* [n+1] */
+  PetscInt *member;         /* own nodes by aggregate */
+  PetscInt *start, *column; /* [n+1] blocks of own rows: the aggregate itself, then all others ascending */
+  PetscReal *value;         /* [start[n]][36], row-major, N/m */
+  Mat E;                    /* rows of own aggregates */
+  PC solver;                /* its factorisation, or multigrid */
+  Vec c, y;
   PetscBool ok;
 };
 
@@ -57,10 +46,10 @@ PetscErrorCode SbCoarseSetUp(SbCoarse coarse, Mat A);
 PetscErrorCode SbCoarseRestrict(SbCoarse coarse, Vec r, PetscReal *share);
 /* z += Z E^-1 c with the c of the last SbCoarseRestrict(). Collective. */
 PetscErrorCode SbCoarseAdd(SbCoarse coarse, Vec z);
-/* A spread E with its multigrid, once (coarse_levels.c). Collective. */
-PetscErrorCode SbCoarseCreateLevels(SbCoarse coarse);
+/* E without values, and what solves with it, once (coarse_solver.c). Collective. */
+PetscErrorCode SbCoarseCreateSolver(SbCoarse coarse);
 /* Brings the blocks in coarse->value into them. Collective. */
-PetscErrorCode SbCoarseSetUpLevels(SbCoarse coarse);
+PetscErrorCode SbCoarseSetUpSolver(SbCoarse coarse);
 
 /* Z^T f of one node, added: force and torque. */
 SB_INLINE void SbCoarseAddMoments(const PetscReal d[3], const PetscReal f[3], PetscReal m[6])

@@ -2,9 +2,8 @@
   The operator on the coarse space, E = Z^T A Z: its blocks by direct loops over the block rows of A, its factor.
 
   For a node i and an aggregate b among its neighbours, W_ib = sum_j A_ij Z_j over the neighbours in b, 3x6; then
-  E_ab += Z_i^T W_ib with a the aggregate of i. Each rank makes the upper blocks of its own aggregates' rows; all ranks
-  gather the blocks (0.7 MB for 300 aggregates) and factor E each for itself. CHOLMOD factors; MUMPS where PETSc has no CHOLMOD.
-  When E is spread, a rank makes its rows whole and nothing is gathered.
+  E_ab += Z_i^T W_ib with a the aggregate of i. Each rank makes the rows of its own aggregates; where A has
+  only blocks above the diagonal, those of E below it are their transposes.
 
   Modes that vanish make E singular, but decoupled: they get the mean diagonal of their block, and multiply zeros.
 */
@@ -92,15 +91,14 @@ static inline PetscReal *sum_of(RowSums *row, PetscInt b)
 static void sum_row(SbCoarse c, const Blocks *x, PetscInt i, RowSums *row)
 {
   const SbPlan p = c->space->plan;
-  const PetscInt own = c->agg[i], lowest = c->spread ? 0 : own,
-                 first = x->symmetric ? p->diagonal[i] : p->di[i];
+  const PetscInt first = x->symmetric ? p->diagonal[i] : p->di[i];
   const PetscScalar *K = x->value[0] + 9 * (size_t)(x->symmetric ? p->ui[i] : p->di[i]);
 
   row->n = 0;
   for (PetscInt k = first; k < p->di[i + 1]; k++, K += 9) {
     const PetscInt j = p->dj[k], b = c->agg[j];
 
-    if (b < 0 || (!x->symmetric && b < lowest)) continue;
+    if (b < 0) continue;
     if (j == i) {
       PetscScalar D[9];
 
@@ -112,7 +110,7 @@ static void sum_row(SbCoarse c, const Blocks *x, PetscInt i, RowSums *row)
   for (PetscInt k = p->oi[i]; k < p->oi[i + 1]; k++) {
     const PetscInt j = p->oj[k], b = c->agg[j];
 
-    if (b >= lowest) add_column(x->value[1] + 9 * (size_t)k, 1., c->d + 3 * j, sum_of(row, b));
+    if (b >= 0) add_column(x->value[1] + 9 * (size_t)k, 1., c->d + 3 * j, sum_of(row, b));
   }
 }
 
@@ -126,13 +124,13 @@ static inline PetscReal *block_of(SbCoarse c, PetscInt a, PetscInt b)
 }
 
 /* E_ab += Z_i^T W_ib for the aggregates b around node i. With symmetric storage blocks below the diagonal are transposed. */
-static void add_row(SbCoarse c, PetscInt i, const RowSums *row)
+static void add_row(SbCoarse c, PetscBool symmetric, PetscInt i, const RowSums *row)
 {
   const PetscInt a = c->agg[i];
 
   for (PetscInt k = 0; k < row->n; k++) {
     const PetscInt b = row->b[k];
-    const PetscBool below = (PetscBool)(b < a && !c->spread);
+    const PetscBool below = (PetscBool)(symmetric && b < a);
     PetscReal *E = below ? block_of(c, b, a) : block_of(c, a, b);
 
     for (int q = 0; q < 6; q++) {
@@ -145,8 +143,8 @@ static void add_row(SbCoarse c, PetscInt i, const RowSums *row)
   }
 }
 
-/* Diagonal blocks: symmetric, with their vanishing modes filled. */
-static void finish_diagonal(SbCoarse c, PetscBool symmetric)
+/* Diagonal blocks: symmetric, with their vanishing modes filled; those below them from those above where A has only these. */
+static void complete(SbCoarse c, PetscBool symmetric)
 {
   for (PetscInt a = 0; a < c->n; a++) {
     PetscReal *E = c->value + 36 * c->start[a], trace = 0.;
@@ -157,6 +155,11 @@ static void finish_diagonal(SbCoarse c, PetscBool symmetric)
       trace += E[7 * i];
     }
     for (int e = 0; e < 36; e++) E[e] += trace / 6. * c->null[36 * a + e];
+    for (PetscInt k = c->start[a] + 1; symmetric && k < c->start[a + 1] && c->column[k] < a; k++) {
+      const PetscReal *above = block_of(c, c->column[k], a);
+
+      for (int e = 0; e < 36; e++) c->value[36 * k + e] = above[6 * (e % 6) + e / 6];
+    }
   }
 }
 
@@ -176,72 +179,20 @@ static PetscErrorCode assemble(SbCoarse c, Mat A)
   for (PetscInt i = 0; i < c->space->nnode_owned; i++) {
     if (c->agg[i] < 0) continue;
     sum_row(c, &x, i, &row);
-    add_row(c, i, &row);
+    add_row(c, x.symmetric, i, &row);
   }
   PetscCall(return_blocks(A, &x));
-  finish_diagonal(c, x.symmetric);
+  complete(c, x.symmetric);
   PetscCall(PetscFree2(row.b, row.W));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/*
-  CHOLMOD reports a matrix that is not positive definite by raising an error of PETSc, which is caught here; MUMPS by counting negative
-  pivots. Values that are not numbers are searched for first: they would pass.
-*/
-static PetscErrorCode factor(SbCoarse c)
-{
-  PetscErrorCode ierr;
-  MatFactorError failed = MAT_FACTOR_NOERROR;
-  MatSolverType type;
-  PetscBool mumps;
-  PetscReal sum = 0.;
-  PetscInt negative = 0;
-
-  PetscFunctionBeginUser;
-  c->ok = PETSC_FALSE;
-  for (PetscInt k = 0; k < c->ai[6 * c->N]; k++) sum += PetscAbsScalar(c->av[k]);
-  if (PetscIsInfOrNanReal(sum)) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(PetscPushErrorHandler(PetscReturnErrorHandler, NULL));
-  ierr = MatCholeskyFactorNumeric(c->factor, c->E, NULL);
-  PetscCall(PetscPopErrorHandler());
-  if (ierr == PETSC_ERR_MAT_CH_ZRPVT) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(ierr);
-  PetscCall(MatFactorGetError(c->factor, &failed));
-  PetscCall(MatFactorGetSolverType(c->factor, &type));
-  PetscCall(PetscStrcmp(type, MATSOLVERMUMPS, &mumps));
-  if (mumps && !failed) PetscCall(MatGetInertia(c->factor, &negative, NULL, NULL));
-  c->ok = (PetscBool)(!failed && !negative);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode SbCoarseSetUp(SbCoarse c, Mat A)
 {
-  PetscInt nz = 0, block = 0;
-
   PetscFunctionBeginUser;
   c->ok = PETSC_TRUE;
   if (!c->N) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(assemble(c, A));
-  if (c->spread) {
-    PetscCall(SbCoarseSetUpLevels(c));
-    PetscFunctionReturn(PETSC_SUCCESS);
-  }
-  if (c->all != c->value) {
-    PetscCallMPI(MPI_Allgatherv(c->value, 36 * (PetscMPIInt)c->start[c->n], MPIU_REAL, c->all, c->nvalue,
-                                c->at, MPIU_REAL, c->space->comm));
-  }
-  /* the blocks of a row of blocks lie behind each other: its six rows are dealt out in turn */
-  for (PetscInt a = 0; a < c->N; a++) {
-    PetscInt nblock = 1;
-
-    for (PetscInt k = c->ai[6 * a] + 6; k < c->ai[6 * a + 1]; k += 6) nblock++;
-    for (PetscInt r = 0; r < 6; r++) {
-      for (PetscInt k = 0; k < nblock; k++) {
-        for (PetscInt q = k ? 0 : r; q < 6; q++) c->av[nz++] = c->all[36 * (block + k) + 6 * r + q];
-      }
-    }
-    block += nblock;
-  }
-  PetscCall(factor(c));
+  PetscCall(SbCoarseSetUpSolver(c));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -11,9 +11,9 @@
   is left is their A-DEF2, with one product by A and one coarse solve for each application. That is examined each time; a
   residual with a part in the span of Z gets the whole.
 
-  While E is small beside a rank's own part, every rank factors it: few aggregates are best. On many ranks that would soon be most
+  While E is small beside a rank's own part, one rank factors it for all: few aggregates are best. On many ranks that would soon be most
   of the work, and the incomplete factorisation, which ends at the border of a rank, is weaker. E stays with its ranks then, a
-  cycle of multigrid C stands for E^-1 (coarse_levels.c), and there are more aggregates, of NODES_PER_SPREAD nodes each. Q = Z C Z^T corrects
+  cycle of multigrid C stands for E^-1 (coarse_solver.c), and there are more aggregates, of NODES_PER_SPREAD nodes each. Q = Z C Z^T corrects
   only in part, so that the whole is always taken, with what the correction leaves corrected once more:
 
       P^-1 = 2 Q - Q A Q + (1 - Q A) M (1 - A Q),   symmetric, and positive definite as C has no eigenvalue of C E above 2.
@@ -38,7 +38,7 @@
 #define IN_SPAN \
   1e-5 /* share of the residual in the span of Z that rounding may leave; below it the right factor is 1 */
 
-/* Aggregates that every rank factors: one for so many nodes of a rank, within these bounds. */
+/* Aggregates that one rank factors: one for so many nodes of a rank, within these bounds. */
 #define NODES_PER_FACTORED 10
 #define LEAST_FACTORED 50
 #define MOST_FACTORED 1000
@@ -48,7 +48,7 @@ typedef struct {
   SbSpace space;
   SbCoarse coarse;
   PetscInt wanted;  /* aggregates, 0: by size */
-  PetscInt limit;   /* of the aggregates that every rank factors, -1: by size */
+  PetscInt limit;   /* of the aggregates that one rank factors, -1: by size */
   PC fine;          /* of this rank alone, unless it is the diagonal */
   PetscBool simple; /* the diagonal as fine level */
   Vec s, w, t;
@@ -171,7 +171,7 @@ static PetscErrorCode PCSetUp_Coarse(PC pc)
   PetscCall(SbCoarseSetUp(p->coarse, A));
   p->nsetup++;
   PetscCall(PetscInfo(pc, "%" PetscInt_FMT " aggregates, %s%s\n", p->coarse->N,
-                      p->coarse->spread ? "spread over the ranks" : "factored by each rank",
+                      p->coarse->spread ? "spread over the ranks" : "factored by one of them",
                       p->coarse->ok ? "" : ": the coarse operator is not positive definite"));
   PetscCall(PCSetFailedReason(pc, ok && p->coarse->ok ? PC_NOERROR : PC_FACTOR_NUMERIC_ZEROPIVOT));
   PetscCall(PetscLogEventEnd(SbEvents[SB_EVENT_SOLVER_SETUP], pc, 0, 0, 0));
@@ -277,7 +277,7 @@ static PetscErrorCode PCView_Coarse(PC pc, PetscViewer viewer)
   if (p->coarse)
     PetscCall(PetscViewerASCIIPrintf(
       viewer, "  %" PetscInt_FMT " aggregates with six rigid-body modes each, %s; fine level:\n",
-      p->coarse->N, p->coarse->spread ? "spread over the ranks" : "factored by each rank"));
+      p->coarse->N, p->coarse->spread ? "spread over the ranks" : "factored by one of them"));
   if (p->fine && p->simple) PetscCall(PCView(p->fine, viewer));
   if (p->fine && !p->simple) {
     PetscCall(PetscViewerGetSubViewer(viewer, PETSC_COMM_SELF, &own));
@@ -315,14 +315,14 @@ PetscErrorCode SbPCCoarseCreate(SbSpace s, PC pc)
   PetscCall(PCGetOptionsPrefix(pc, &prefix));
   p->limit = -1;
   PetscCall(PetscOptionsGetInt(NULL, prefix, "-pc_coarse_aggregates", &p->wanted, NULL));
-  PetscCall(PetscOptionsGetInt(NULL, prefix, "-pc_coarse_redundant", &p->limit, NULL));
+  PetscCall(PetscOptionsGetInt(NULL, prefix, "-pc_coarse_gathered", &p->limit, NULL));
   PetscCheck(p->wanted >= 0, s->comm, PETSC_ERR_USER,
              "-pc_coarse_aggregates %" PetscInt_FMT
              " is negative: give a number of aggregates, or 0 to choose by size",
              p->wanted);
   PetscCheck(p->limit >= -1, s->comm, PETSC_ERR_USER,
-             "-pc_coarse_redundant %" PetscInt_FMT
-             " is below -1: give the largest number of aggregates that every rank factors, 0 for "
+             "-pc_coarse_gathered %" PetscInt_FMT
+             " is below -1: give the largest number of aggregates that one rank factors, 0 for "
              "none, or -1 to choose by size",
              p->limit);
   PetscCall(PCSetType(pc, PCSHELL));
@@ -374,13 +374,15 @@ PetscErrorCode SbPCCoarseFallBack(PC pc, KSPConvergedReason reason, PetscBool *c
 PetscErrorCode SbPCCoarseGetStats(PC pc, PetscInt *naggregate, PetscInt *nsolved, PetscInt *nsetup,
                                   PetscBool *simple)
 {
+  PetscMPIInt rank;
   TwoLevel *p;
 
   PetscFunctionBeginUser;
   PetscCall(context_of(pc, &p));
   PetscCheck(p, PetscObjectComm((PetscObject)pc), PETSC_ERR_ARG_WRONG, "Not a two-level preconditioner");
+  PetscCallMPI(MPI_Comm_rank(p->space->comm, &rank));
   if (naggregate) *naggregate = p->coarse ? p->coarse->N : 0;
-  if (nsolved) *nsolved = !p->coarse ? 0 : p->coarse->spread ? p->coarse->n : p->coarse->N;
+  if (nsolved) *nsolved = !p->coarse ? 0 : p->coarse->spread ? p->coarse->n : rank ? 0 : p->coarse->N;
   if (nsetup) *nsetup = p->nsetup;
   if (simple) *simple = p->simple;
   PetscFunctionReturn(PETSC_SUCCESS);

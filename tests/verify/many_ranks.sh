@@ -5,4 +5,4 @@
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 scripts/many_ranks --build "${SB_BUILD:-build}" --tets 1000 --ranks 4,8 --growth 1.2 --aggregates 50
-scripts/many_ranks --build "${SB_BUILD:-build}" --tets 1000 --ranks 4,8 --cases p1 --growth 1.2 --aggregates 25 --more "-pc_coarse_redundant 0"
+scripts/many_ranks --build "${SB_BUILD:-build}" --tets 1000 --ranks 4,8 --cases p1 --growth 1.2 --aggregates 25 --more "-pc_coarse_gathered 0"

@@ -1,6 +1,8 @@
 /*
-  The coarse operator of many aggregates: its rows stay with their ranks, and a V-cycle of PETSc's algebraic multigrid stands
-  for E^-1. A rank's work for it is bounded by its own aggregates.
+  What solves with the coarse operator, the rows of which are where their aggregates are.
+
+  A few hundred aggregates: one rank has the whole and factors it for all (pc_direct.c). Many: a V-cycle of PETSc's algebraic multigrid
+  stands for E^-1, so that a rank's work for it is bounded by its own aggregates.
 
   E is a matrix of blocks of six whose near null space is known exactly: a rigid motion t + w x (x - x_b) of the body is on an aggregate
   with centre x_a and radius r the six numbers t + w x (x_a - x_b) and r w. Smoothed aggregation coarsens on (Vanek, Mandel, Brezina 1996,
@@ -9,6 +11,7 @@
   positive definite.
 */
 #include "coarse.h"
+#include "solver_impl.h"
 
 /*
   Unknowns of the last level, which one rank factors, and of a rank on those before it. Bar of 332,000 tets on 64 ranks: 35 iterations
@@ -47,9 +50,10 @@ static PetscErrorCode set_default(const char *name, const char *value)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbCoarseCreateLevels(SbCoarse c)
+PetscErrorCode SbCoarseCreateSolver(SbCoarse c)
 {
   PetscInt *own, *foreign;
+  const char *package;
 
   PetscFunctionBeginUser;
   PetscCall(PetscCalloc2(6 * c->n, &own, 6 * c->n, &foreign));
@@ -69,22 +73,30 @@ PetscErrorCode SbCoarseCreateLevels(SbCoarse c)
   PetscCall(PetscFree2(own, foreign));
   PetscCall(MatSetOption(c->E, MAT_SPD, PETSC_TRUE));
   PetscCall(MatCreateVecs(c->E, &c->c, &c->y));
-  PetscCall(SbAttachModes(c->E, fill_mode, c));
-  PetscCall(PCCreate(c->space->comm, &c->levels));
-  PetscCall(PCSetOptionsPrefix(c->levels, "pc_coarse_"));
-  PetscCall(PCSetType(c->levels, PCGAMG));
-  PetscCall(PCGAMGSetReuseInterpolation(c->levels, PETSC_TRUE));
-  PetscCall(PCGAMGSetCoarseEqLim(c->levels, LAST_LEVEL));
-  PetscCall(PCGAMGSetProcEqLim(c->levels, PER_RANK));
-  PetscCall(set_default("-pc_coarse_pc_gamg_aggressive_coarsening", "0"));
-  PetscCall(set_default("-pc_coarse_mg_levels_pc_type", "pbjacobi"));
-  PetscCall(PCSetFromOptions(c->levels));
+  PetscCall(PCCreate(c->space->comm, &c->solver));
+  PetscCall(PCSetOptionsPrefix(c->solver, "pc_coarse_"));
+  PetscCall(SbDirectPackage(c->space->comm, 6 * c->N, PETSC_TRUE, &package));
+  if (!package) c->spread = PETSC_TRUE;
+  if (!c->spread)
+    PetscCall(SbPCDirectSet(c->solver, package, PETSC_TRUE));
+  else {
+    PetscCall(SbAttachModes(c->E, fill_mode, c));
+    PetscCall(PCSetType(c->solver, PCGAMG));
+    PetscCall(PCGAMGSetReuseInterpolation(c->solver, PETSC_TRUE));
+    PetscCall(PCGAMGSetCoarseEqLim(c->solver, LAST_LEVEL));
+    PetscCall(PCGAMGSetProcEqLim(c->solver, PER_RANK));
+    PetscCall(set_default("-pc_coarse_pc_gamg_aggressive_coarsening", "0"));
+    PetscCall(set_default("-pc_coarse_mg_levels_pc_type", "pbjacobi"));
+  }
+  PetscCall(PCSetFromOptions(c->solver));
+  PetscCall(SbPCCheckPivots(c->solver));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbCoarseSetUpLevels(SbCoarse c)
+PetscErrorCode SbCoarseSetUpSolver(SbCoarse c)
 {
   PCFailedReason reason;
+  PetscInt negative;
   PetscReal least = PETSC_MAX_REAL;
 
   PetscFunctionBeginUser;
@@ -107,9 +119,10 @@ PetscErrorCode SbCoarseSetUpLevels(SbCoarse c)
   PetscCall(MatAssemblyBegin(c->E, MAT_FINAL_ASSEMBLY));
   PetscCall(MatAssemblyEnd(c->E, MAT_FINAL_ASSEMBLY));
   if (!c->ok) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(PCSetOperators(c->levels, c->E, c->E));
-  PetscCall(PCSetUp(c->levels));
-  PetscCall(PCGetFailedReason(c->levels, &reason));
-  c->ok = (PetscBool)(reason == PC_NOERROR);
+  PetscCall(PCSetOperators(c->solver, c->E, c->E));
+  PetscCall(PCSetUp(c->solver));
+  PetscCall(PCGetFailedReason(c->solver, &reason));
+  PetscCall(SbPCDirectCountNegative(c->solver, &negative));
+  c->ok = (PetscBool)(reason == PC_NOERROR && negative <= 0);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
