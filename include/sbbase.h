@@ -1,5 +1,5 @@
 /*
-  sbbase.h - layer 0: options described by tables, formulas of time and position, log events, bounded strings.
+  sbbase.h - layer 0: options described by tables, errors and warnings, formulas of time and position.
 */
 #pragma once
 #include <petsc.h>
@@ -203,44 +203,3 @@ PetscErrorCode SbFormulaUses(SbFormula formula, PetscBool *time, PetscBool *posi
 PetscErrorCode SbFormulaDestroy(SbFormula *formula);
 /* Reads an option of kind SB_OPTION_FORMULA: `count` formulas as in the row; destroy each. */
 PetscErrorCode SbOptionFormulas(const SbScope *scope, const char *key, SbFormula formulas[]);
-
-/* ------------------------------------------------------------------ log events */
-
-/* One event per phase that can take one percent of a run; registered by SbLogInitialize(). */
-typedef enum {
-  SB_EVENT_MESH_READ,
-  SB_EVENT_MESH_DISTRIBUTE,
-  SB_EVENT_SPACE_SETUP,
-  SB_EVENT_MATRIX_SETUP,
-  SB_EVENT_RESIDUAL,
-  SB_EVENT_TANGENT,
-  SB_EVENT_ENERGY,
-  SB_EVENT_EFFECTS,
-  SB_EVENT_CONTACT,
-  SB_EVENT_SEARCH,  /* within it: points against facets, on all ranks */
-  SB_EVENT_INSIDE,  /* within it: points against tets */
-  SB_EVENT_PROJECT, /* within solves: into the null space of the contact constraints */
-  SB_EVENT_SOLVER_SETUP,
-  SB_EVENT_OUTPUT,
-  SB_EVENT_CHECKPOINT,
-  SB_EVENT_COUNT
-} SbEvent;
-extern PetscLogEvent SbEvents[SB_EVENT_COUNT];
-extern PetscLogStage SbStageSetup, SbStageSolve, SbStageOutput;
-PetscErrorCode SbLogInitialize(void);
-/*
-  SbLogNamed - the log event of something that a scene names: "SbEff_gravity", made when it is first asked for. What no scene of the
-  process has named has none.
-
-  Not collective, but to be called alike on all ranks: PETSc identifies events by their order.
-
-  Input:
-    kind, name - "Eff" (effects), "Mat" (laws), "Elem" (elements), "Field" (fields of fields.h5), "Out" (other output), "Est" (estimates), "Mesh" (re-meshing), and the name
-                 in the scenario
-  Output:
-    event      - of all that have this name
-*/
-PetscErrorCode SbLogNamed(const char *kind, const char *name, PetscLogEvent *event);
-/* Adds the seconds of an event of ours, or of the one with a name (0: there is none), in all stages, on this rank. Not collective. */
-PetscErrorCode SbLogSeconds(PetscLogEvent event, PetscReal *seconds);
-PetscErrorCode SbLogSecondsNamed(const char *name, PetscReal *seconds);

@@ -9,6 +9,7 @@
 */
 #include <signal.h>
 #include "sb.h"
+#include "sblog.h"
 
 /* What there is of a simulation; re-meshing replaces the first three. */
 typedef struct {

@@ -8,6 +8,7 @@
 #pragma once
 #include "../src/base/option.h"
 #include "scene.h"
+#include <sblog.h>
 
 #define PART_TEXT 4096 /* longest scenario */
 #define PART_STEPS "8" /* of every run */

@@ -6,6 +6,7 @@
   objects.
 */
 #include "sbbase.h"
+#include "sblog.h"
 
 PetscLogEvent SbEvents[SB_EVENT_COUNT];
 PetscLogStage SbStageSetup, SbStageSolve, SbStageOutput;

@@ -5,6 +5,7 @@
   move on straight lines. Two that come within the reach, or cross, have boxes that meet.
 */
 #include "detect.h"
+#include "sblog.h"
 
 PetscErrorCode SbDetectorCreate(SbDetectKind kind, SbDetector *detector)
 {

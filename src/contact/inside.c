@@ -12,6 +12,7 @@
 */
 #include "sbgeometry.h"
 #include "surface_impl.h"
+#include "sblog.h"
 
 #define ON 1e-6   /* of a barycentric coordinate, and of a tet's box: so near a face a point lies on it */
 #define FLAT 1e-9 /* six times the volume over the cubed longest edge, below which nothing is in a tet */

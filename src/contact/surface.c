@@ -13,6 +13,7 @@
   Facets of other ranks, which follow the own ones, are the work of halo.c; edges that of surface_edges.c.
 */
 #include "surface_impl.h"
+#include "sblog.h"
 
 void SbContactSurfacePosition(SbSpace space, PetscInt at, const PetscReal u[], PetscReal x[3])
 {

@@ -5,6 +5,7 @@
   reads its options. Everything that needs the mesh waits for its setup operation.
 */
 #include "effect_impl.h"
+#include "sblog.h"
 
 PetscFunctionList SbEffectList = NULL;
 

@@ -2,6 +2,7 @@
   Creation of elements by name, and their options.
 */
 #include "element_impl.h"
+#include "sblog.h"
 
 PetscFunctionList SbElementList = NULL;
 

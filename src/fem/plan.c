@@ -7,6 +7,7 @@
   takes a small part of what DMCreateMatrix takes for the same graph (`make bench`, row matrix_setup).
 */
 #include "fem_impl.h"
+#include "sblog.h"
 
 /*
   Groups of nodes that are all coupled, in lanes: the cells' (width nodes each) and the faces' (eight), node a of lane l of

@@ -6,6 +6,7 @@
 */
 #include "fem_impl.h"
 #include "sbkernel.h"
+#include "sblog.h"
 
 static void add_region_force(SbSpace s, const SbRegion *region, const SbStage *stage, PetscReal f[])
 {

@@ -11,6 +11,7 @@
 */
 #include "sbfem.h"
 #include "fem_impl.h"
+#include "sblog.h"
 
 static const SbOption rows[] = {
   {"mass", SB_OPTION_CHOICE, 1, "", "lumped", "lumped|consistent",

@@ -13,6 +13,7 @@
 */
 #include "fem_impl.h"
 #include "sbkernel.h"
+#include "sblog.h"
 #include <petsc/private/petscimpl.h>
 
 #define ASSEMBLY "SbAssembly"

@@ -8,6 +8,7 @@
  the same steps. A step that was not examined loses what the last one lost; with -accuracy the integrator's loss of each is known.
 */
 #include "ledger_impl.h"
+#include "sblog.h"
 
 #define SHARE 0.08    /* of the work may go into estimates */
 #define SPACE_WORK 6. /* residuals that the estimate of space costs */

@@ -6,6 +6,7 @@
   call what the run calls.
 */
 #include "ledger_impl.h"
+#include "sblog.h"
 
 PetscErrorCode SbLedgerGetSeconds(SbLedger l, SbLedgerSeconds *s)
 {

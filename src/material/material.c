@@ -4,6 +4,7 @@
   Lame parameters: mu = E / (2 (1 + nu)), lambda = E nu / ((1 + nu) (1 - 2 nu)).
 */
 #include "material_impl.h"
+#include "sblog.h"
 
 PetscFunctionList SbMaterialList = NULL;
 

@@ -1,6 +1,7 @@
 /* create.c - the mesh of a scene, from files to numbered pieces on all ranks. */
 #include "mesh_impl.h"
 #include "sbsurface.h"
+#include "sblog.h"
 
 static const SbOption rows[] = {
   {"mesh_partitioner", SB_OPTION_CHOICE, 1, "", "auto", "auto|metis|bisection",

@@ -2,6 +2,7 @@
   Contact around the solves of a step: who touches, what is constrained, whether that was right.
 */
 #include "model_impl.h"
+#include "sblog.h"
 
 /* The constraints of all effects, assembled. */
 static PetscErrorCode assemble_constraints(SbModel m)

@@ -6,6 +6,7 @@
   With the consistent mass the kinetic energy and the momenta use it too; the centre of mass is the same for both.
 */
 #include "sbmodel.h"
+#include "sblog.h"
 
 typedef enum {
   KINETIC,

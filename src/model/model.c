@@ -5,6 +5,7 @@
   ones. In a static run there is no M and no C, and loads and prescribed displacements are multiplied by the load factor.
 */
 #include "sbmodel.h"
+#include "sblog.h"
 
 PetscErrorCode SbModelDestroy(SbModel *model)
 {

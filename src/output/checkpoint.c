@@ -9,6 +9,7 @@
 #include <errno.h>
 #include <unistd.h>
 #include "output_impl.h"
+#include "sblog.h"
 
 #define FORMAT 1
 

@@ -8,6 +8,7 @@
 */
 #include <ctype.h>
 #include "output_impl.h"
+#include "sblog.h"
 
 typedef struct {
   PetscReal time;

@@ -15,6 +15,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 #include "output_impl.h"
+#include "sblog.h"
 
 struct _p_SbHistory {
   int fd; /* rank 0; -1 elsewhere */

@@ -4,6 +4,7 @@
 #include <signal.h>
 #include <time.h>
 #include "output_impl.h"
+#include "sblog.h"
 
 static const SbOption rows[] = {
   {"output_dir", SB_OPTION_STRING, 1, "", "", "",

@@ -7,6 +7,7 @@
 #include <sys/resource.h>
 #include <time.h>
 #include "output_impl.h"
+#include "sblog.h"
 
 PetscReal SbCpuSeconds(void)
 {

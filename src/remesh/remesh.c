@@ -12,6 +12,7 @@
 */
 #include "remesh_impl.h"
 #include "sbscene.h"
+#include "sblog.h"
 
 #define AGAIN 0.5          /* of the quality that was reached: below it a body may be re-meshed again */
 #define QUALITY_LEAST 1e-3 /* of new tets at rest and now, below which vertices are moved */

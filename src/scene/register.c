@@ -4,6 +4,7 @@
 */
 #include "sbremesh.h"
 #include "scene_impl.h"
+#include "sblog.h"
 
 PetscErrorCode SbRegisterAll(void)
 {

@@ -7,6 +7,7 @@
 #include "solver_impl.h"
 #include "sbconstraint.h"
 #include "sbsolver.h"
+#include "sblog.h"
 
 PetscErrorCode SbConstraintsMultiply(SbConstraints c, Vec x, Vec y)
 {

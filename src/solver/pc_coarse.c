@@ -32,6 +32,7 @@
 #include "coarse.h"
 #include "sbassembly.h"
 #include "sbsolver.h"
+#include "sblog.h"
 
 #define NAME "two-level"
 #define NU_ICC 0.4 /* up to this Poisson's ratio the incomplete factorisation is tried */

@@ -25,6 +25,7 @@
 #include "solver_impl.h"
 #include "pressure.h"
 #include "sbsolver.h"
+#include "sblog.h"
 #include <petsc/private/kspimpl.h>
 
 #define NAME "pressure"

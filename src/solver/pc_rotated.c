@@ -14,6 +14,7 @@
 */
 #include "sbsolver.h"
 #include "rotated.h"
+#include "sblog.h"
 
 #define WORSE_FACTOR 4 /* renew when a solve takes this many times the iterations right after factoring */
 #define WORSE_PLUS 16  /* and this many more */

@@ -10,6 +10,7 @@
 */
 #include "../verify/contact.h"
 #include "perf.h"
+#include <sblog.h>
 
 static const SbEvent parts[] = {SB_EVENT_SEARCH, SB_EVENT_CONTACT, SB_EVENT_PROJECT};
 enum { SEARCH, CONTACT, PROJECT, PARTS };

@@ -8,6 +8,7 @@
   first matrix of a space: a second one of the same kind (SBAIJ, on several ranks BAIJ) shows what it took.
 */
 #include "perf.h"
+#include <sblog.h>
 
 /* Seconds of an event so far on this rank. */
 static double event_seconds(SbEvent e)

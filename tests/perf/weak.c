@@ -9,6 +9,7 @@
   memory of a rank from its start on, and that of rank 0, which hands out the mesh.
 */
 #include "perf.h"
+#include <sblog.h>
 #include <sbsolver.h>
 
 typedef struct {

@@ -10,6 +10,7 @@
 */
 #pragma once
 #include "test.h"
+#include <sblog.h>
 #include <sbeffect.h>
 
 typedef struct {

@@ -5,6 +5,7 @@
 // @ranks 1 3
 #include "../scene.h"
 #include "effect_fixture.h"
+#include <sblog.h>
 
 #define FLOOR "-effect_floor_type contact -effect_floor_obstacle plane:0,0,1,0.01 "
 

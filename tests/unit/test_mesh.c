@@ -2,6 +2,7 @@
 // @ranks 1 2 3 4
 #include "../../src/mesh/mesh_impl.h"
 #include "mesh_test.h"
+#include <sblog.h>
 
 #define DATA "tests/data/"
 

@@ -14,6 +14,7 @@
 */
 #include "../../src/fem/fem_impl.h"
 #include "verify.h"
+#include <sblog.h>
 
 /* A type that nobody names. Its constructor must not be called. */
 static int storms;
