@@ -179,3 +179,9 @@ PetscErrorCode SbImportTagSet(SbImport *import, PetscInt n, PetscInt groups[], P
 /* Notes that an item belongs to a group; SbImportJoinGroups() gives every item the groups noted for it, beside those that it has. */
 PetscErrorCode SbImportAddMember(SbImport *import, PetscInt dim, PetscInt item, PetscInt group);
 PetscErrorCode SbImportJoinGroups(SbImport *import);
+
+/* ------------------------------------------------------------------ write_h5.c: indices of HDF5 files for ParaView */
+
+/* An array [n] or [n][ncomp] of type "Int" or "Float" as a DataItem of XDMF; file and path in it by a printf format. */
+void SbXdmfArray(FILE *file, PetscInt64 n, int ncomp, const char *type, int bytes, const char *format, ...)
+  PETSC_ATTRIBUTE_FORMAT(6, 7);

@@ -12,6 +12,7 @@
   Written and read by one rank in one piece, without compression: reading takes what the disk takes.
 */
 #include <errno.h>
+#include <stdarg.h>
 #include <hdf5.h>
 #include "meshio_impl.h"
 
@@ -126,6 +127,21 @@ PetscErrorCode SbWrite_H5(const SbImport *im, const char *path)
 
 /* ------------------------------------------------------------------ for ParaView */
 
+void SbXdmfArray(FILE *file, PetscInt64 n, int ncomp, const char *type, int bytes, const char *format, ...)
+{
+  char components[16] = "";
+  va_list args;
+
+  if (ncomp > 1) (void)snprintf(components, sizeof(components), " %d", ncomp);
+  (void)fprintf(
+    file, "<DataItem Dimensions=\"%" PetscInt64_FMT "%s\" NumberType=\"%s\" Precision=\"%d\" Format=\"HDF\">",
+    n, components, type, bytes);
+  va_start(args, format);
+  (void)vfprintf(file, format, args);
+  va_end(args);
+  (void)fputs("</DataItem>", file);
+}
+
 /* One grid: the simplices of a dimension, coloured by tag set. */
 static void write_grid(FILE *file, const SbImport *im, int dim, const char *h5)
 {
@@ -133,22 +149,19 @@ static void write_grid(FILE *file, const SbImport *im, int dim, const char *h5)
   static const char *const kind[4] = {"Polyvertex\" NodesPerElement=\"1", "Polyline\" NodesPerElement=\"2",
                                       "Triangle", "Tetrahedron"};
   static const char *const name[4] = {"point", "line", "triangle", "cell"};
-  const long long n = im->item[dim].n, nvert = im->nvert;
+  const PetscInt n = im->item[dim].n;
 
-  (void)fprintf(file, "<Grid Name=\"%s\" GridType=\"Uniform\">\n", grid[dim]);
-  (void)fprintf(file,
-                "<Topology TopologyType=\"%s\" NumberOfElements=\"%lld\"><DataItem Dimensions=\"%lld %d\" "
-                "NumberType=\"Int\" Precision=\"4\" Format=\"HDF\">%s:/mesh/%ss</DataItem></Topology>\n",
-                kind[dim], n, n, dim + 1, h5, name[dim]);
-  (void)fprintf(file,
-                "<Geometry GeometryType=\"XYZ\"><DataItem Dimensions=\"%lld 3\" NumberType=\"Float\" "
-                "Precision=\"8\" Format=\"HDF\">%s:/mesh/x</DataItem></Geometry>\n",
-                nvert, h5);
-  (void)fprintf(file,
-                "<Attribute Name=\"tag_set\" AttributeType=\"Scalar\" Center=\"Cell\"><DataItem "
-                "Dimensions=\"%lld\" NumberType=\"Int\" Precision=\"4\" "
-                "Format=\"HDF\">%s:/mesh/%s_tags</DataItem></Attribute>\n</Grid>\n",
-                n, h5, name[dim]);
+  (void)fprintf(
+    file,
+    "<Grid Name=\"%s\" GridType=\"Uniform\">\n<Topology TopologyType=\"%s\" NumberOfElements=\"%" PetscInt_FMT
+    "\">",
+    grid[dim], kind[dim], n);
+  SbXdmfArray(file, n, dim + 1, "Int", 4, "%s:/mesh/%ss", h5, name[dim]);
+  (void)fputs("</Topology>\n<Geometry GeometryType=\"XYZ\">", file);
+  SbXdmfArray(file, im->nvert, 3, "Float", 8, "%s:/mesh/x", h5);
+  (void)fputs("</Geometry>\n<Attribute Name=\"tag_set\" AttributeType=\"Scalar\" Center=\"Cell\">", file);
+  SbXdmfArray(file, n, 1, "Int", 4, "%s:/mesh/%s_tags", h5, name[dim]);
+  (void)fputs("</Attribute>\n</Grid>\n", file);
 }
 
 PetscErrorCode SbWrite_Xdmf(const SbImport *im, const char *path, const char *h5)
