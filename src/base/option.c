@@ -12,14 +12,8 @@ SbOptionTable SbTheOptions;
 /* Makes room for one more element of an array of `size` bytes each; doubles, so that growth is cheap. */
 static PetscErrorCode grow(PetscInt n, size_t size, void *array)
 {
-  void *old = *(void **)array, *fresh;
-
   PetscFunctionBeginUser;
-  if (n && (n & (n - 1))) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(PetscMalloc(PetscMax(2 * (size_t)n, 1) * size, &fresh));
-  if (n) PetscCall(PetscMemcpy(fresh, old, (size_t)n * size));
-  PetscCall(PetscFree(old));
-  *(void **)array = fresh;
+  if (!(n & (n - 1))) PetscCall(PetscRealloc(PetscMax(2 * (size_t)n, 1) * size, (void **)array));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

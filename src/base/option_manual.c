@@ -21,38 +21,17 @@ static const char *const first_options[][3] = {
 /* What the value looks like: "3 numbers", "euler_implicit|newmark". */
 static PetscErrorCode describe_value(const SbOption *row, size_t size, char text[])
 {
-  const char *many = row->count > 1 ? "s" : "";
+  static const char *const kinds[] = {
+    [SB_OPTION_BOOL] = "true or false", [SB_OPTION_INT] = "whole number",
+    [SB_OPTION_REAL] = "number",        [SB_OPTION_REALS] = "number",
+    [SB_OPTION_STRING] = "text",        [SB_OPTION_NAMES] = "names with commas",
+    [SB_OPTION_CHOICE] = "one of",      [SB_OPTION_FORMULA] = "formula"};
+  const char *with = row->kind == SB_OPTION_REALS ? " with commas" : row->count > 1 ? " with semicolons" : "";
   char number[16] = "";
 
   PetscFunctionBeginUser;
   if (row->count > 1) PetscCall(PetscSNPrintf(number, sizeof(number), "%" PetscInt_FMT " ", row->count));
-  switch (row->kind) {
-  case SB_OPTION_BOOL:
-    PetscCall(PetscSNPrintf(text, size, "true or false"));
-    break;
-  case SB_OPTION_INT:
-    PetscCall(PetscSNPrintf(text, size, "whole number"));
-    break;
-  case SB_OPTION_REAL:
-    PetscCall(PetscSNPrintf(text, size, "number"));
-    break;
-  case SB_OPTION_REALS:
-    PetscCall(PetscSNPrintf(text, size, "%snumber%s with commas", number, many));
-    break;
-  case SB_OPTION_STRING:
-    PetscCall(PetscSNPrintf(text, size, "text"));
-    break;
-  case SB_OPTION_NAMES:
-    PetscCall(PetscSNPrintf(text, size, "names with commas"));
-    break;
-  case SB_OPTION_CHOICE:
-    PetscCall(PetscSNPrintf(text, size, "one of"));
-    break;
-  case SB_OPTION_FORMULA:
-    PetscCall(
-      PetscSNPrintf(text, size, "%sformula%s%s", number, many, row->count > 1 ? " with semicolons" : ""));
-    break;
-  }
+  PetscCall(PetscSNPrintf(text, size, "%s%s%s%s", number, kinds[row->kind], row->count > 1 ? "s" : "", with));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
