@@ -123,6 +123,7 @@ typedef struct _p_SbMesh *SbMesh;
 struct _p_SbMesh {
   MPI_Comm comm;
   PetscSF cell_sf; /* from owned cells to their ghost copies, as these arrays number them; NULL on one rank */
+  PetscSF vert_sf; /* the same for vertices; NULL until somebody needs it */
   PetscInt nbody;
   SbBody *body; /* [nbody] borrowed: the model owns the bodies */
   PetscInt nset;
@@ -170,7 +171,9 @@ PetscErrorCode SbMeshDestroy(SbMesh *mesh);
 */
 PetscErrorCode SbMeshNeighbours(SbMesh mesh, PetscInt **neighbour);
 /* Brings the n numbers of each owned cell to its ghost copies: value[ncell][n]. Collective. */
-PetscErrorCode SbMeshBroadcastCells(SbMesh mesh, PetscInt n, PetscInt value[]);
+PetscErrorCode SbMeshBroadcastCells(SbMesh mesh, PetscInt n, MPI_Datatype type, void *value);
+/* The same for vertices, value[nvert][n]. */
+PetscErrorCode SbMeshBroadcastVertices(SbMesh mesh, PetscInt n, MPI_Datatype type, void *value);
 PetscErrorCode SbMeshValidate(SbMesh mesh); /* ordering, ranges, ownership, sums; for -validate and tests */
 PetscErrorCode SbMeshRegister(void);        /* rows of the option table, the METIS partitioner */
 /* Defaults of SbTetOptions; what -body_<name>_tet_... says when the mesh is a surface. Not collective. */

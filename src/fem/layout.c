@@ -271,10 +271,10 @@ static PetscErrorCode layout_faces(SbSpace s)
     if (s->cell_node[i] != UNKNOWN) s->cell_node[i] += s->gnode_start;
     if (s->dirichlet_node && s->dirichlet_node[i] != UNKNOWN) s->dirichlet_node[i] += s->gnode_start;
   }
-  PetscCall(SbMeshBroadcastCells(mesh, 4, s->cell_node));
+  PetscCall(SbMeshBroadcastCells(mesh, 4, MPIU_INT, s->cell_node));
   PetscCall(complete_owned(s, s->cell_node));
-  PetscCall(SbMeshBroadcastCells(mesh, 4, s->cell_node));
-  if (s->dirichlet_node) PetscCall(SbMeshBroadcastCells(mesh, 4, s->dirichlet_node));
+  PetscCall(SbMeshBroadcastCells(mesh, 4, MPIU_INT, s->cell_node));
+  if (s->dirichlet_node) PetscCall(SbMeshBroadcastCells(mesh, 4, MPIU_INT, s->dirichlet_node));
   PetscCall(localise(s));
   PetscCall(describe_nodes(s));
   PetscFunctionReturn(PETSC_SUCCESS);

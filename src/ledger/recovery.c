@@ -23,60 +23,7 @@ struct _p_SbRecovery {
   PetscInt *slot;    /* [ncell][4] where the value for a corner of a cell is: nlayer vertex + layer */
   PetscReal *weight; /* [ncell][4] of a cell's P in the value for a corner; 0 where the vertex is not owned */
   PetscReal *value;  /* [nvert nlayer][9] */
-  PetscSF cell, vert; /* from owned ones to their ghosts; NULL on one rank */
 };
-
-/* Brings n numbers of each owned item to its ghosts. */
-static PetscErrorCode update_ghosts(PetscSF sf, PetscInt n, MPI_Datatype unit, void *array)
-{
-  MPI_Datatype type;
-
-  PetscFunctionBeginUser;
-  if (!sf) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCallMPI(MPI_Type_contiguous((PetscMPIInt)n, unit, &type));
-  PetscCallMPI(MPI_Type_commit(&type));
-  PetscCall(PetscSFBcastBegin(sf, type, array, array, MPI_REPLACE));
-  PetscCall(PetscSFBcastEnd(sf, type, array, array, MPI_REPLACE));
-  PetscCallMPI(MPI_Type_free(&type));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* global[n]: numbers, those of owned items following each other from rank to rank. */
-static PetscErrorCode create_link(MPI_Comm comm, PetscInt nowned, PetscInt n, const PetscInt global[],
-                                  PetscSF *sf)
-{
-  PetscLayout layout;
-  PetscInt *leaf;
-
-  PetscFunctionBeginUser;
-  PetscCall(PetscMalloc1(n - nowned, &leaf));
-  for (PetscInt i = nowned; i < n; i++) leaf[i - nowned] = i;
-  PetscCall(PetscLayoutCreateFromSizes(comm, nowned, PETSC_DECIDE, 1, &layout));
-  PetscCall(PetscSFCreate(comm, sf));
-  PetscCall(PetscSFSetGraphLayout(*sf, layout, n - nowned, leaf, PETSC_COPY_VALUES, global + nowned));
-  PetscCall(PetscLayoutDestroy(&layout));
-  PetscCall(PetscFree(leaf));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode create_links(SbRecovery r)
-{
-  SbMesh mesh = r->mesh;
-  PetscInt *number, first = 0;
-  PetscMPIInt size;
-
-  PetscFunctionBeginUser;
-  PetscCallMPI(MPI_Comm_size(mesh->comm, &size));
-  if (size == 1) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(create_link(mesh->comm, mesh->nvert_owned, mesh->nvert, mesh->gvert, &r->vert));
-  PetscCallMPI(MPI_Exscan(&mesh->ncell_owned, &first, 1, MPIU_INT, MPI_SUM, mesh->comm));
-  PetscCall(PetscMalloc1(mesh->ncell, &number));
-  for (PetscInt c = 0; c < mesh->ncell_owned; c++) number[c] = first + c;
-  PetscCall(SbMeshBroadcastCells(mesh, 1, number));
-  PetscCall(create_link(mesh->comm, mesh->ncell_owned, mesh->ncell, number, &r->cell));
-  PetscCall(PetscFree(number));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
 
 /* Different materials of the cells around a vertex, ascending, in found[]: how many. */
 static PetscErrorCode list_materials(SbMesh mesh, PetscInt n, const PetscInt at[], PetscInt found[],
@@ -119,7 +66,7 @@ static PetscErrorCode create_slots(SbRecovery r)
     PetscCall(list_materials(mesh, start[v + 1] - start[v], at + start[v], found, &n));
     PetscCall(PetscArraycpy(material + r->nlayer * v, found, n));
   }
-  PetscCall(update_ghosts(r->vert, r->nlayer, MPIU_INT, material));
+  PetscCall(SbMeshBroadcastVertices(mesh, r->nlayer, MPIU_INT, material));
   PetscCall(PetscMalloc1(4 * (size_t)mesh->ncell, &r->slot));
   for (PetscInt i = 0; i < 4 * mesh->ncell; i++) {
     r->slot[i] = r->nlayer * mesh->cell[i];
@@ -200,7 +147,6 @@ PetscErrorCode SbRecoveryCreate(SbMesh mesh, SbRecovery *recovery)
   PetscFunctionBeginUser;
   PetscCall(PetscNew(&r));
   r->mesh = mesh;
-  PetscCall(create_links(r));
   PetscCall(create_slots(r));
   PetscCall(create_weights(r));
   PetscCall(PetscMalloc1(9 * (size_t)r->nlayer * mesh->nvert, &r->value));
@@ -214,8 +160,6 @@ PetscErrorCode SbRecoveryDestroy(SbRecovery *recovery)
 
   PetscFunctionBeginUser;
   if (!r) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(PetscSFDestroy(&r->cell));
-  PetscCall(PetscSFDestroy(&r->vert));
   PetscCall(PetscFree(r->slot));
   PetscCall(PetscFree(r->weight));
   PetscCall(PetscFree(r->value));
@@ -228,7 +172,7 @@ PetscErrorCode SbRecoveryApply(SbRecovery r, PetscReal P[])
   SbMesh mesh = r->mesh;
 
   PetscFunctionBeginUser;
-  PetscCall(update_ghosts(r->cell, 9, MPIU_REAL, P));
+  PetscCall(SbMeshBroadcastCells(mesh, 9, MPIU_REAL, P));
   PetscCall(PetscArrayzero(r->value, 9 * (size_t)r->nlayer * mesh->nvert));
   for (PetscInt i = 0; i < 4 * mesh->ncell; i++) {
     const PetscReal *from = P + 9 * (i / 4), weight = r->weight[i];
@@ -236,7 +180,7 @@ PetscErrorCode SbRecoveryApply(SbRecovery r, PetscReal P[])
 
     for (int k = 0; k < 9; k++) value[k] += weight * from[k];
   }
-  PetscCall(update_ghosts(r->vert, 9 * r->nlayer, MPIU_REAL, r->value));
+  PetscCall(SbMeshBroadcastVertices(mesh, 9 * r->nlayer, MPIU_REAL, r->value));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

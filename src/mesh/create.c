@@ -91,6 +91,7 @@ PetscErrorCode SbMeshDestroy(SbMesh *mesh)
   PetscFunctionBeginUser;
   if (!m) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscSFDestroy(&m->cell_sf));
+  PetscCall(PetscSFDestroy(&m->vert_sf));
   PetscCall(PetscFree(m->gvert));
   PetscCall(PetscFree(m->vert_orig));
   PetscCall(PetscFree(m->vert_body));

@@ -128,34 +128,22 @@ static PetscErrorCode check_sums(SbMesh m)
 /* Ghost vertices carry what their owners have. */
 static PetscErrorCode check_ghosts(SbMesh m)
 {
-  PetscSF sf;
-  PetscLayout layout;
   PetscReal *x;
   PetscInt *orig;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscLayoutCreate(m->comm, &layout));
-  PetscCall(PetscLayoutSetLocalSize(layout, m->nvert_owned));
-  PetscCall(PetscLayoutSetUp(layout));
-  PetscCall(PetscSFCreate(m->comm, &sf));
-  PetscCall(PetscSFSetGraphLayout(sf, layout, m->nvert, NULL, PETSC_OWN_POINTER, m->gvert));
   PetscCall(PetscMalloc2(3 * (size_t)m->nvert, &x, m->nvert, &orig));
-  PetscCall(PetscSFBcastBegin(sf, MPIU_INT, m->vert_orig, orig, MPI_REPLACE));
-  PetscCall(PetscSFBcastEnd(sf, MPIU_INT, m->vert_orig, orig, MPI_REPLACE));
-  for (PetscInt v = 0; v < m->nvert; v++)
+  PetscCall(PetscArraycpy(x, m->x, 3 * (size_t)m->nvert_owned));
+  PetscCall(PetscArraycpy(orig, m->vert_orig, m->nvert_owned));
+  PetscCall(SbMeshBroadcastVertices(m, 3, MPIU_REAL, x));
+  PetscCall(SbMeshBroadcastVertices(m, 1, MPIU_INT, orig));
+  for (PetscInt v = 0; v < m->nvert; v++) {
     CHECK(orig[v] == m->vert_orig[v], "Ghost vertex %" PetscInt_FMT " differs from its owner's", v);
-  for (int i = 0; i < 3; i++) {
-    PetscReal *mine = x + m->nvert;
-
-    for (PetscInt v = 0; v < m->nvert_owned; v++) mine[v] = m->x[3 * v + i];
-    PetscCall(PetscSFBcastBegin(sf, MPIU_REAL, mine, x, MPI_REPLACE));
-    PetscCall(PetscSFBcastEnd(sf, MPIU_REAL, mine, x, MPI_REPLACE));
-    for (PetscInt v = 0; v < m->nvert; v++)
-      CHECK(x[v] == m->x[3 * v + i], "Ghost vertex %" PetscInt_FMT " lies elsewhere than its owner's", v);
+    for (int i = 0; i < 3; i++)
+      CHECK(x[3 * v + i] == m->x[3 * v + i], "Ghost vertex %" PetscInt_FMT " lies elsewhere than its owner's",
+            v);
   }
   PetscCall(PetscFree2(x, orig));
-  PetscCall(PetscSFDestroy(&sf));
-  PetscCall(PetscLayoutDestroy(&layout));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -343,7 +343,7 @@ static PetscErrorCode create_cell_vector(SbMesh mesh, Vec *p)
   first -= mesh->ncell_owned;
   PetscCall(PetscMalloc1(mesh->ncell, &number));
   for (PetscInt c = 0; c < mesh->ncell_owned; c++) number[c] = first + c;
-  PetscCall(SbMeshBroadcastCells(mesh, 1, number));
+  PetscCall(SbMeshBroadcastCells(mesh, 1, MPIU_INT, number));
   PetscCall(VecCreateGhost(mesh->comm, mesh->ncell_owned, PETSC_DECIDE, mesh->ncell - mesh->ncell_owned,
                            number + mesh->ncell_owned, p));
   PetscCall(PetscFree(number));
