@@ -22,6 +22,8 @@ typedef struct {
   SbTriangles *t;
   PetscInt vert_size, tri_size; /* allocated */
   int64_t *number;              /* [ntri] of the face in the file, from 1; owned by who reads */
+  PetscInt ncorner, corner_size;
+  PetscInt *corner; /* [ncorner] of the face that is being read */
   /* for bodies alone */
   SbImport *groups; /* gets the groups of the triangles; NULL: nobody wants them, tags stays NULL */
   PetscInt now;     /* tag set of the triangles that come next */
@@ -41,6 +43,9 @@ PetscErrorCode SbTrianglesRead_Gmsh(const char *path, SbTriangleFile *file);
 /* Appends a vertex, or a triangle of vertices that are there. */
 PetscErrorCode SbTrianglesAddVertex(SbTriangleFile *file, const PetscReal x[3]);
 PetscErrorCode SbTrianglesAdd(SbTriangleFile *file, PetscInt a, PetscInt b, PetscInt c, int64_t number);
+/* Adds corner v, from 0, to the face `number` that is being read, and the face when it has all. Errors: a vertex that is not there; fewer than three. */
+PetscErrorCode SbTrianglesAddCorner(SbScan *scan, int64_t number, int64_t v, SbTriangleFile *file);
+PetscErrorCode SbTrianglesAddFace(SbScan *scan, int64_t number, SbTriangleFile *file);
 /* Appends a polygon, convex or not, as triangles between its corners; vert[n] from 0. An error names what was scanned last. */
 PetscErrorCode SbTrianglesAddPolygon(SbScan *scan, PetscInt n, const PetscInt vert[], int64_t number,
                                      SbTriangleFile *file);

@@ -39,8 +39,6 @@ typedef struct {
   PetscBool binary, swap;
   int nelement;
   Element element[ELEMENTS_MAX];
-  PetscInt *vert; /* corners of a face */
-  PetscInt size;
 } Ply;
 
 /* ------------------------------------------------------------------ header */
@@ -216,20 +214,14 @@ static PetscErrorCode read_face(Ply *p, const Property *q, int64_t number)
 
   PetscFunctionBeginUser;
   PetscCall(read_count(p, q, &n));
-  if (n < 3)
-    SB_SCAN_ERROR(p->s, "face %lld has %lld corners; it needs three", (long long)number, (long long)n);
-  if (n > p->size) {
-    p->size = (PetscInt)PetscMax(16, 2 * n);
-    PetscCall(PetscRealloc((size_t)p->size * sizeof(*p->vert), &p->vert));
-  }
   for (int64_t k = 0; k < n; k++) {
     PetscCall(read_value(p, q->type, "vertex of a face", &value));
     if (!(value >= 0 && value < (double)p->f->t->nvert))
       SB_SCAN_ERROR(p->s, "face %lld uses a vertex that is not there (%g, from 0, of %lld)",
                     (long long)number, value, (long long)p->f->t->nvert);
-    p->vert[k] = (PetscInt)value;
+    PetscCall(SbTrianglesAddCorner(p->s, number, (int64_t)value, p->f));
   }
-  PetscCall(SbTrianglesAddPolygon(p->s, (PetscInt)n, p->vert, number, p->f));
+  PetscCall(SbTrianglesAddFace(p->s, number, p->f));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -301,7 +293,6 @@ static PetscErrorCode ply_file(SbScan *s, SbTriangleFile *f)
   p->s = s;
   p->f = f;
   ierr = read_all(p);
-  PetscCall(PetscFree(p->vert));
   PetscCall(PetscFree(p));
   PetscFunctionReturn(ierr);
 }

@@ -152,6 +152,31 @@ PetscErrorCode SbTrianglesAddPolygon(SbScan *s, PetscInt n, const PetscInt vert[
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscErrorCode SbTrianglesAddCorner(SbScan *s, int64_t number, int64_t v, SbTriangleFile *f)
+{
+  PetscFunctionBeginUser;
+  if (v < 0 || v >= f->t->nvert)
+    SB_SCAN_ERROR(s, "face %lld uses a vertex that is not there (%lld of %lld)", (long long)number,
+                  (long long)v + 1, (long long)f->t->nvert);
+  if (f->ncorner == f->corner_size) {
+    f->corner_size = PetscMax(16, 2 * f->corner_size);
+    PetscCall(PetscRealloc((size_t)f->corner_size * sizeof(*f->corner), &f->corner));
+  }
+  f->corner[f->ncorner++] = (PetscInt)v;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbTrianglesAddFace(SbScan *s, int64_t number, SbTriangleFile *f)
+{
+  const PetscInt n = f->ncorner;
+
+  PetscFunctionBeginUser;
+  f->ncorner = 0;
+  if (n < 3) SB_SCAN_ERROR(s, "face %lld has %lld corners; it needs three", (long long)number, (long long)n);
+  PetscCall(SbTrianglesAddPolygon(s, n, f->corner, number, f));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* ------------------------------------------------------------------ polygons within each other */
 
 typedef struct {

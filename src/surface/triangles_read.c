@@ -162,27 +162,6 @@ static PetscErrorCode stl_file(SbScan *s, SbTriangleFile *f)
 
 /* ------------------------------------------------------------------ OBJ and OFF */
 
-/* Of one face. */
-typedef struct {
-  PetscInt n, size;
-  PetscInt *vert;
-} Corners;
-
-/* Appends a corner to those of a face; v from 0. */
-static PetscErrorCode add_corner(SbScan *s, const SbTriangleFile *f, int64_t number, int64_t v, Corners *c)
-{
-  PetscFunctionBeginUser;
-  if (v < 0 || v >= f->t->nvert)
-    SB_SCAN_ERROR(s, "face %lld uses a vertex that is not there (%lld of %lld)", (long long)number,
-                  (long long)v + 1, (long long)f->t->nvert);
-  if (c->n == c->size) {
-    c->size = PetscMax(16, 2 * c->size);
-    PetscCall(PetscRealloc((size_t)c->size * sizeof(*c->vert), &c->vert));
-  }
-  c->vert[c->n++] = (PetscInt)v;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 static PetscErrorCode add_vertex(SbScan *s, SbTriangleFile *f)
 {
   PetscReal x[3];
@@ -194,10 +173,10 @@ static PetscErrorCode add_vertex(SbScan *s, SbTriangleFile *f)
 }
 
 /* The rest of a line f: numbers from 1, or from the last vertex back when negative; what follows a slash is not read. */
-static PetscErrorCode obj_face(SbScan *s, int64_t number, Corners *c, SbTriangleFile *f)
+static PetscErrorCode obj_face(SbScan *s, int64_t number, SbTriangleFile *f)
 {
   PetscFunctionBeginUser;
-  for (c->n = 0;;) {
+  for (;;) {
     char *after;
     long long v;
 
@@ -208,11 +187,9 @@ static PetscErrorCode obj_face(SbScan *s, int64_t number, Corners *c, SbTriangle
     if (after == s->at || v == 0 || (*after && !strchr("/ \t\r\n", *after)))
       SB_SCAN_ERROR(s, "expected the number of a vertex, not zero");
     for (s->at = after; s->at < s->end && !strchr(" \t\r\n", *s->at);) s->at++;
-    PetscCall(add_corner(s, f, number, v > 0 ? v - 1 : f->t->nvert + v, c));
+    PetscCall(SbTrianglesAddCorner(s, number, v > 0 ? v - 1 : f->t->nvert + v, f));
   }
-  if (c->n < 3)
-    SB_SCAN_ERROR(s, "face %lld has %lld corners; it needs three", (long long)number, (long long)c->n);
-  PetscCall(SbTrianglesAddPolygon(s, c->n, c->vert, number, f));
+  PetscCall(SbTrianglesAddFace(s, number, f));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -248,7 +225,7 @@ static PetscErrorCode obj_names(SbScan *s, PetscBool object, ObjNames *names, Sb
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode obj_lines(SbScan *s, Corners *c, SbTriangleFile *f)
+static PetscErrorCode obj_file(SbScan *s, SbTriangleFile *f)
 {
   int64_t nface = 0;
   ObjNames names;
@@ -260,23 +237,12 @@ static PetscErrorCode obj_lines(SbScan *s, Corners *c, SbTriangleFile *f)
     PetscCall(SbScanWord(s, sizeof(word), word));
     if (!word[0]) break;
     if (!strcmp(word, "v")) PetscCall(add_vertex(s, f));
-    if (!strcmp(word, "f")) PetscCall(obj_face(s, ++nface, c, f));
+    if (!strcmp(word, "f")) PetscCall(obj_face(s, ++nface, f));
     if (!strcmp(word, "g") || !strcmp(word, "o"))
       PetscCall(obj_names(s, (PetscBool)(word[0] == 'o'), &names, f));
     PetscCall(SbScanEndOfLine(s));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode obj_file(SbScan *s, SbTriangleFile *f)
-{
-  Corners corners = {0, 0, NULL};
-  PetscErrorCode ierr;
-
-  PetscFunctionBeginUser;
-  ierr = obj_lines(s, &corners, f);
-  PetscCall(PetscFree(corners.vert));
-  PetscFunctionReturn(ierr);
 }
 
 /* To the next number, over lines that begin with #. */
@@ -291,7 +257,7 @@ static PetscErrorCode off_next(SbScan *s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode off_lines(SbScan *s, Corners *c, SbTriangleFile *f)
+static PetscErrorCode off_file(SbScan *s, SbTriangleFile *f)
 {
   int64_t count[3];
   char word[16];
@@ -317,27 +283,14 @@ static PetscErrorCode off_lines(SbScan *s, Corners *c, SbTriangleFile *f)
 
     PetscCall(off_next(s));
     PetscCall(SbScanText(s, "number of corners of a face", &n));
-    if (n < 3) SB_SCAN_ERROR(s, "face %lld has %lld corners; it needs three", (long long)i + 1, (long long)n);
-    c->n = 0;
     for (int64_t k = 0; k < n; k++) {
       PetscCall(SbScanText(s, "vertex of a face", &v));
-      PetscCall(add_corner(s, f, i + 1, v, c));
+      PetscCall(SbTrianglesAddCorner(s, i + 1, v, f));
     }
-    PetscCall(SbTrianglesAddPolygon(s, c->n, c->vert, i + 1, f));
+    PetscCall(SbTrianglesAddFace(s, i + 1, f));
     PetscCall(SbScanEndOfLine(s)); /* colours */
   }
   PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode off_file(SbScan *s, SbTriangleFile *f)
-{
-  Corners corners = {0, 0, NULL};
-  PetscErrorCode ierr;
-
-  PetscFunctionBeginUser;
-  ierr = off_lines(s, &corners, f);
-  PetscCall(PetscFree(corners.vert));
-  PetscFunctionReturn(ierr);
 }
 
 /* ------------------------------------------------------------------ files */
@@ -352,6 +305,7 @@ PetscErrorCode SbTrianglesScan(const char *path, PetscErrorCode (*read)(SbScan *
   ierr = SbScanOpen(f->where, path, &scan);
   if (!ierr) ierr = (*read)(&scan, f);
   PetscCall(SbScanClose(&scan));
+  PetscCall(PetscFree(f->corner));
   PetscFunctionReturn(ierr);
 }
 
