@@ -39,6 +39,8 @@ PetscErrorCode SbObstacleSetUp(SbObstacle obstacle, MPI_Comm comm, const char *o
 */
 PetscReal SbObstacleDistance(SbObstacle obstacle, const PetscReal x[3], PetscReal normal[3]);
 
+/* Obstacles that vertices alone meet: a half-space, as a point of its surface and the tip of the unit normal there; a bowl, as its centre. */
+typedef enum { SB_SIDE_NONE, SB_SIDE_PLANE, SB_SIDE_BOWL } SbObstacleSide;
 /* A rigid motion: x = c + R (X - c) + d. */
 typedef struct {
   PetscReal R[9], c[3], d[3];

@@ -6,6 +6,7 @@
 */
 #pragma once
 #include "sbfem.h"
+#include "sbsolver.h"
 
 typedef struct _p_SbEffect *SbEffect;
 
@@ -69,6 +70,25 @@ typedef struct {
      direction x[nnode][3], m; must be right on owned nodes without communication; not with constraints between nodes */
   PetscErrorCode (*nonsymmetric)(SbEffect e, SbSpace space, const SbStage *stage, const PetscReal x[],
                                  PetscReal y[]);
+  /*
+    Guarded contact (-effect_NAME_response barrier), whose energy belongs to the potential that Newton's method lowers (src/time/newton.c). Collective.
+
+    begin_guarded - a step from t to t + dt begins with the local displacements u0; when the run begins they may be changed (moved), ghosts too, where surfaces
+                    touch. What moves by order is where it is at t: `progress` 0.
+    advance       - it is where its way from t to t + dt has the part `progress` behind it, 0..1. Not collective.
+    safe          - `part` of the way from the local displacements u0 to u1, and from the present progress to `progress`, that can be gone, for the pairs of this
+                    rank; nactive: pairs of this rank that push each other at u0.
+    potential     - energy at the local displacements u, this rank's part, J; f[nnode][3] += its gradient on owned nodes, N.
+    hessian       - adds the blocks of a positive semi-definite approximation of its second derivative at u.
+  */
+  PetscErrorCode (*begin_guarded)(SbEffect e, SbSpace space, PetscReal t, PetscReal dt, PetscReal u0[],
+                                  PetscBool *moved);
+  PetscErrorCode (*advance)(SbEffect e, PetscReal progress);
+  PetscErrorCode (*safe)(SbEffect e, SbSpace space, const PetscReal u0[], const PetscReal u1[],
+                         PetscReal progress, PetscReal *part, PetscInt *nactive);
+  PetscErrorCode (*potential)(SbEffect e, SbSpace space, const PetscReal u[], PetscReal *energy,
+                              PetscReal f[]);
+  PetscErrorCode (*hessian)(SbEffect e, SbSpace space, const PetscReal u[], SbBlocks *blocks);
   /* after a step was accepted */
   PetscErrorCode (*accept)(SbEffect e, SbSpace space, const SbStage *stage);
   /* for checkpoints: what the effect takes from step to step beyond displacement and velocity, as records of `nstate` numbers each, in

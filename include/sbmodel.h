@@ -43,9 +43,9 @@ struct _p_SbModel {
   SbEffect *effect;
   /* one list per operation, holding only the effects that implement it */
   PetscInt nprescribe, nprestep, nforce, ntangent, nnonsymmetric, naccept, nhistory, nbegin_step,
-    nassemble_constraints, nupdate_active_set, ntime_of_impact, nrestitution;
+    nassemble_constraints, nupdate_active_set, ntime_of_impact, nrestitution, npotential;
   SbEffect *prescribe, *prestep, *begin_step, *assemble_constraints, *update_active_set, *force, *tangent,
-    *nonsymmetric, *accept, *history, *time_of_impact, *restitution;
+    *nonsymmetric, *accept, *history, *time_of_impact, *restitution, *potential;
   struct {
     Vec U0, V0;     /* state when the step began; borrowed */
     PetscReal dt;   /* length of the step, s */
@@ -102,6 +102,17 @@ PetscErrorCode SbModelContactGap(SbModel model, PetscReal t, Vec U, Vec G);
 PetscErrorCode SbModelContactForce(SbModel model, PetscReal t, Vec U, Vec R, Vec F);
 /* Appends the points of this rank where contact pushes bodies, after the same step. Collective. */
 PetscErrorCode SbModelContactPoints(SbModel model, PetscReal t, Vec U, Vec R, SbContactPoints *list);
+/*
+  Guarded contact, where model->npotential > 0; operations of the same names in sbeffect.h. Collective.
+
+  Begin: a step begins with U0, which is changed when the run begins with touching surfaces. Safe: part of the way from X to X - Y that can be gone, of all ranks, and
+  pairs that push each other now.
+*/
+PetscErrorCode SbModelGuardBegin(SbModel model, PetscReal t, PetscReal dt, Vec U0);
+PetscErrorCode SbModelGuardAdvance(SbModel model, PetscReal progress);
+PetscErrorCode SbModelGuardSafe(SbModel model, Vec X, Vec Y, PetscReal progress, PetscReal *part,
+                                PetscInt *nactive);
+PetscErrorCode SbModelGuardHessian(SbModel model, Vec U, SbBlocks *blocks);
 /* Initial velocities of bodies (translation and spin). */
 PetscErrorCode SbModelInitialState(SbModel model, Vec U, Vec V);
 /* Centre of mass, m, and mass, kg, of each body, centre[nbody][4]: at rest with U NULL, else now. Collective. */
@@ -109,7 +120,7 @@ PetscErrorCode SbModelCentres(SbModel model, Vec U, PetscReal centre[][4]);
 /* Instantaneous part of the energies (kinetic, strain, momenta, ...). V may be NULL. Collective. */
 PetscErrorCode SbModelEnergies(SbModel model, Vec U, Vec V, SbEnergies *e);
 /*
-  SbModelStrainEnergyAlong - strain energy at U, J, its slope against D, d psi(U - s D)/ds at s = 0, J, and how many tets are inverted there.
+  SbModelStrainEnergyAlong - strain energy at U with that of guarded contact, J, its slope against D, d psi(U - s D)/ds at s = 0, J, and how many tets are inverted there.
 
   Collective. D: [nnode][3] m, of any length.
 */

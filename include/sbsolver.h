@@ -151,3 +151,25 @@ PetscErrorCode SbPCRotatedGetWork(PC pc, PetscInt64 *interior, PetscInt64 *inter
 PetscErrorCode SbConstraintsCreateOperator(SbSpace space, Mat K, PetscBool singular, SbSaddle saddle, Mat *A);
 /* Another matrix instead of K; borrowed. Not collective. */
 PetscErrorCode SbConstraintsSetMatrix(SbSpace space, Mat K);
+
+/* ------------------------------------------------------------------ contact_system.c: a tangent with blocks between any nodes */
+
+/* 3x3 blocks between owned nodes and any nodes; start with {0}, released with SbBlocksFree(). Several of one place are added. */
+typedef struct {
+  PetscInt n, size;
+  PetscInt (*node)[2];   /* [n] owned local node, global node */
+  PetscReal (*block)[9]; /* [n] row-major, N/m */
+} SbBlocks;
+PetscErrorCode SbBlocksAdd(SbBlocks *blocks, PetscInt row, PetscInt column, const PetscReal block[9]);
+PetscErrorCode SbBlocksFree(SbBlocks *blocks);
+typedef struct _p_SbContactSystem *SbContactSystem;
+PetscErrorCode SbContactSystemCreate(SbSpace space, SbContactSystem *system);
+PetscErrorCode SbContactSystemDestroy(SbContactSystem *system);
+/*
+  SbContactSystemSolve - Y = (K + blocks)^-1 F. The places of the blocks may be others each time.
+
+  Collective. Input: K, the tangent of the space, prescribed unknowns replaced; blocks, symmetric when those of all ranks are taken together, none for prescribed unknowns;
+  fresh, K or blocks are others than in the last call. Output: reason, negative where the matrix is not positive definite; iterations.
+*/
+PetscErrorCode SbContactSystemSolve(SbContactSystem system, Mat K, const SbBlocks *blocks, PetscBool fresh,
+                                    Vec F, Vec Y, KSPConvergedReason *reason, PetscInt *iterations);

@@ -5,9 +5,11 @@
   (capsule), a solid box or a solid cylinder (r = 0; inside them the nearest side counts). A bowl is a sphere inverted.
   What a closed mesh encloses is in src/geometry/signed_distance.c.
 */
-#include "sbcontact.h"
+#include "obstacle.h"
 #include "sbgeometry.h"
 #include "sbtriangles.h"
+
+#define SIDES 96 /* of a cylinder as triangles */
 
 typedef enum { PLANE, SPHERE, BOX, CAPSULE, CYLINDER, BOWL, MESH } Shape;
 
@@ -245,6 +247,89 @@ PetscReal SbObstacleDistance(SbObstacle o, const PetscReal x[3], PetscReal n[3])
   default:
     return from_cylinder(p, x, n);
   }
+}
+
+/* A closed cylinder as triangles: fans at both ends, a band between them. Its vertices lie on it. */
+static PetscErrorCode cylinder_surface(const PetscReal p[7], SbObstacleSurface *s)
+{
+  PetscReal a[3], e[3], f[3];
+
+  PetscFunctionBeginUser;
+  for (int i = 0; i < 3; i++) a[i] = p[3 + i] - p[i];
+  (void)unit(a, a, a);
+  across(a, e);
+  SbCross(a, e, f);
+  s->nvertex = 2 * SIDES + 2;
+  s->ntriangle = 4 * SIDES;
+  PetscCall(PetscMalloc2(3 * s->nvertex, &s->x, 3 * s->ntriangle, &s->triangle));
+  for (PetscInt k = 0; k < 2 * SIDES; k++) {
+    const PetscReal angle = 2 * PETSC_PI * (PetscReal)(k % SIDES) / SIDES;
+
+    for (int i = 0; i < 3; i++)
+      s->x[3 * k + i] =
+        p[3 * (k / SIDES) + i] + p[6] * (PetscCosReal(angle) * e[i] + PetscSinReal(angle) * f[i]);
+  }
+  for (int i = 0; i < 6; i++) s->x[6 * SIDES + i] = p[i];
+  for (PetscInt k = 0; k < SIDES; k++) {
+    const PetscInt l = (k + 1) % SIDES;
+    const PetscInt t[12] = {k, l, SIDES + l,     k,         SIDES + l, SIDES + k, 2 * SIDES,
+                            l, k, 2 * SIDES + 1, SIDES + k, SIDES + l};
+
+    PetscCall(PetscArraycpy(s->triangle + 12 * k, t, 12));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbObstacleGetSurface(SbObstacle o, SbObstacleSurface *s)
+{
+  static const PetscInt box[36] = {0, 2, 1, 1, 2, 3, 4, 5, 6, 5, 7, 6, 0, 1, 4, 1, 5, 4,
+                                   2, 6, 3, 3, 6, 7, 0, 4, 2, 2, 4, 6, 1, 3, 5, 3, 7, 5};
+  const SbTriangles *t;
+
+  PetscFunctionBeginUser;
+  *s = (SbObstacleSurface){0};
+  switch (o->shape) {
+  case CYLINDER:
+    PetscCall(cylinder_surface(o->p, s));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  case MESH:
+    t = &o->surface;
+    s->nvertex = t->nvert;
+    s->ntriangle = t->ntri;
+    PetscCall(PetscMalloc2(3 * t->nvert, &s->x, 3 * t->ntri, &s->triangle));
+    PetscCall(PetscArraycpy(s->x, t->x, 3 * t->nvert));
+    PetscCall(PetscArraycpy(s->triangle, t->tri, 3 * t->ntri));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  case BOX:
+    s->nvertex = 8;
+    s->ntriangle = 12;
+    break;
+  default:
+    s->nvertex = o->shape == PLANE || o->shape == CAPSULE ? 2 : 1;
+  }
+  PetscCall(PetscMalloc2(3 * s->nvertex, &s->x, 3 * s->ntriangle, &s->triangle));
+  PetscCall(PetscArraycpy(s->triangle, box, 3 * s->ntriangle));
+  for (PetscInt k = 0; k < 3 * s->nvertex; k++) {
+    const PetscInt v = k / 3, i = k % 3;
+
+    if (o->shape == BOX)
+      s->x[k] = o->p[3 * ((v >> i) & 1) + i];
+    else if (o->shape == PLANE)
+      s->x[k] = (o->p[3] + (PetscReal)v) * o->p[i];
+    else
+      s->x[k] = o->p[k];
+  }
+  if (o->shape == SPHERE || o->shape == BOWL) s->radius = o->p[3];
+  if (o->shape == CAPSULE) s->radius = o->p[6];
+  s->side = o->shape == PLANE ? SB_SIDE_PLANE : o->shape == BOWL ? SB_SIDE_BOWL : SB_SIDE_NONE;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbObstacleFreeSurface(SbObstacleSurface *s)
+{
+  PetscFunctionBeginUser;
+  PetscCall(PetscFree2(s->x, s->triangle));
+  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 void SbPoseSet(const PetscReal axis[3], PetscReal angle, const PetscReal c[3], const PetscReal d[3],

@@ -21,6 +21,7 @@
   With one surface searching for the other (`passes one`), the finer one looks: rows then are not more than the surface can take. A thin
   or much coarser partner wants both.
 */
+#include "barrier.h"
 #include "collision.h"
 
 #define TOGGLES 3    /* how often a row may come within a step before it stays */
@@ -30,10 +31,10 @@
 
 static const SbOption rows[] = {
   {"on", SB_OPTION_NAMES, 1, "", "boundary", "", "sets whose surfaces may meet"},
-  {"response", SB_OPTION_CHOICE, 1, "", "projected", "projected|multiplier|augmented|penalty",
+  {"response", SB_OPTION_CHOICE, 1, "", "projected", "projected|multiplier|augmented|penalty|barrier",
    "exact constraints, the solve in their null space or with their multipliers as unknowns; multipliers "
-   "raised on "
-   "springs; springs"},
+   "raised on springs; springs; an energy that never lets surfaces touch"},
+  SB_BARRIER_OPTIONS,
   {"time_of_impact", SB_OPTION_CHOICE, 1, "", "no", "no|yes",
    "a step in which points begin to touch is taken as it is, or repeated up to the moment of the first "
    "touch"},
@@ -98,6 +99,14 @@ static PetscErrorCode options_collision(SbEffect e, const SbScope *scope)
   PetscCall(SbOptionChoice(scope, "response", &choice));
   c->response = (Response)choice;
   e->saddle = (PetscBool)(c->response == MULTIPLIER);
+  if (choice == BARRIER) {
+    SbBarrierScene scene = {.on = &c->on};
+
+    PetscCall(SbOptionBool(scope, "self", &scene.self));
+    PetscCall(SbOptionReal(scope, "friction", &scene.friction));
+    PetscCall(SbBarrierCreate(e, scope, &scene));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
   c->friction.exact = exact(c->response);
   e->springs = (PetscBool)!exact(c->response);
   PetscCall(SbOptionChoice(scope, "time_of_impact", &choice));

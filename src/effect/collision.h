@@ -13,7 +13,7 @@
 #define TOLERANCE 1e-7 /* of the size of the bodies: largest penetration that counts as touching */
 #define NODES SB_FRICTION_NODES
 
-typedef enum { PROJECTED, MULTIPLIER, AUGMENTED, PENALTY } Response;
+typedef enum { PROJECTED, MULTIPLIER, AUGMENTED, PENALTY, BARRIER } Response;
 
 /* Whether rows that touch hold exactly. */
 static inline PetscBool exact(Response response)

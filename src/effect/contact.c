@@ -23,6 +23,7 @@
   What bounces is described in contact_rebound.c, what happens where facets of a mesh meet in
   contact_facets.c, forces and what is reported of them are in contact_force.c.
 */
+#include "barrier.h"
 #include "contact.h"
 
 #define TOGGLES 3    /* how often a node may come within a step before it stays */
@@ -41,9 +42,10 @@ static const SbOption rows[] = {
   {"obstacle_scale", SB_OPTION_REAL, 1, "", "1", "(0, inf)",
    "mesh: factor on the coordinates of the file; 0.001 for a file in mm"},
   {"obstacle_at", SB_OPTION_REALS, 3, "m", "0,0,0", "(-inf, inf)", "mesh: shift of the scaled mesh"},
-  {"response", SB_OPTION_CHOICE, 1, "", "projected", "projected|multiplier|augmented|penalty",
+  {"response", SB_OPTION_CHOICE, 1, "", "projected", "projected|multiplier|augmented|penalty|barrier",
    "hold touching nodes on the obstacle, or with the forces as unknowns of the solve; multipliers raised on "
-   "springs; springs"},
+   "springs; springs; an energy that never lets surfaces touch"},
+  SB_BARRIER_OPTIONS,
   {"time_of_impact", SB_OPTION_CHOICE, 1, "", "no", "no|yes",
    "a step in which nodes begin to touch is taken as it is, or repeated up to the first time of impact"},
   {"friction", SB_OPTION_REAL, 1, "", "0", "[0, inf)", "Coulomb's coefficient for sticking"},
@@ -103,6 +105,38 @@ static PetscErrorCode read_obstacle(SbEffect e, const SbScope *scope)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+static PetscErrorCode setup_obstacle(SbEffect e, SbSpace space, void *data)
+{
+  Contact *c = (Contact *)data;
+  char option[3 * SB_NAME_MAX];
+
+  PetscFunctionBeginUser;
+  (void)snprintf(option, sizeof(option), "-effect_%s_obstacle", e->name);
+  PetscCall(SbObstacleSetUp(c->obstacle, space->comm, option, c->scale, c->at, sizeof(e->note), e->note));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static void pose_of(const void *data, PetscReal t, SbPose *pose)
+{
+  SbContactPose((const Contact *)data, t, pose);
+}
+
+/* With the response `barrier` another file does the work. */
+static PetscErrorCode create_barrier(SbEffect e, const SbScope *scope)
+{
+  Contact *c = (Contact *)e->data;
+  SbBarrierScene scene = {.on = &c->on,
+                          .obstacle = c->obstacle,
+                          .pose = pose_of,
+                          .friction = c->friction.mu,
+                          .setup_obstacle = setup_obstacle};
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscArraycpy(scene.centre, c->point, 3));
+  PetscCall(SbBarrierCreate(e, scope, &scene));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 static PetscErrorCode options_contact(SbEffect e, const SbScope *scope)
 {
   Contact *c = (Contact *)e->data;
@@ -125,6 +159,11 @@ static PetscErrorCode options_contact(SbEffect e, const SbScope *scope)
              "-effect_%s_friction_kinetic %g is above -effect_%s_friction %g: a slipping node would stop and "
              "go at once",
              e->name, (double)c->friction.mu_kinetic, e->name, (double)c->friction.mu);
+  if (c->response == BARRIER) {
+    PetscCall(read_path(e, scope));
+    PetscCall(create_barrier(e, scope));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
   PetscCall(SbOptionReal(scope, "stiffness", &c->stiffness));
   PetscCall(SbOptionReal(scope, "damping", &c->damping));
   PetscCheck(c->damping <= 0 || c->response == PENALTY, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,

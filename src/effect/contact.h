@@ -10,7 +10,7 @@
 
 #define TOLERANCE 1e-7 /* of the size of the bodies: largest penetration that counts as touching */
 
-typedef enum { PROJECTED, MULTIPLIER, AUGMENTED, PENALTY } Response;
+typedef enum { PROJECTED, MULTIPLIER, AUGMENTED, PENALTY, BARRIER } Response;
 
 /* A node of the surface that this rank owns. */
 typedef struct {

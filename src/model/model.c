@@ -23,6 +23,7 @@ PetscErrorCode SbModelDestroy(SbModel *model)
   PetscCall(PetscFree(m->update_active_set));
   PetscCall(PetscFree(m->time_of_impact));
   PetscCall(PetscFree(m->restitution));
+  PetscCall(PetscFree(m->potential));
   PetscCall(PetscFree(m->tangent));
   PetscCall(PetscFree(m->nonsymmetric));
   PetscCall(PetscFree(m->accept));
@@ -126,6 +127,7 @@ PetscErrorCode SbModelSetUp(SbModel m)
   SORT_INTO_LIST(m, update_active_set);
   SORT_INTO_LIST(m, time_of_impact);
   SORT_INTO_LIST(m, restitution);
+  SORT_INTO_LIST(m, potential);
   SORT_INTO_LIST(m, force);
   SORT_INTO_LIST(m, tangent);
   SORT_INTO_LIST(m, nonsymmetric);

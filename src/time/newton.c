@@ -24,11 +24,17 @@
 #include "sbsolver.h"
 #include "time_impl.h"
 
-#define DECREASE 1e-4  /* c above */
-#define SHORTEST 1e-7  /* of a step, before the search gives up */
-#define ROUNDING 1e-11 /* of the terms that E's change is the difference of */
-#define ACCURATE 1e-6  /* relative tolerance of a linear solve whose step has to come back */
-#define PROVISIONAL 1  /* steps that may follow each other while E is above where they began */
+#define DECREASE 1e-4   /* c above */
+#define SHORTEST 1e-7   /* of a step, before the search gives up */
+#define ROUNDING 1e-11  /* of the terms that E's change is the difference of */
+#define ACCURATE 1e-6   /* relative tolerance of a linear solve whose step has to come back */
+#define APPROACHES 50   /* steps in which what moves by order has to arrive */
+#define DIFFERENCE 1e-7 /* of that motion, for its derivative */
+#define SETTLED \
+  1e-3 /* of the smallest body's size per second: a step of a time step that is short enough, where surfaces push each other */
+#define STICKING 1e-2       /* of that, with friction, whose forces follow from as small speeds */
+#define SETTLED_STATIC 1e-6 /* of that size: the same in a static run */
+#define PROVISIONAL 1       /* steps that may follow each other while E is above where they began */
 
 /* What a solve keeps from iteration to iteration. */
 typedef struct {
@@ -36,9 +42,12 @@ typedef struct {
   Vec W, G;        /* trial iterate and its residual */
   Vec start, step; /* where provisional steps began; the first of them led to start - step */
   PetscReal least; /* rounding of the strain energy of a body that has turned: E V to the last digit, J */
-  PetscInt provisional;  /* how many there were since */
-  PetscReal slope;       /* of E at `start` along that step, J */
-  PetscReal first, rise; /* change of E over it, and over all since, J */
+  PetscInt provisional;   /* how many there were since */
+  PetscReal slope;        /* of E at `start` along that step, J */
+  PetscReal first, rise;  /* change of E over it, and over all since, J */
+  SbContactSystem system; /* guarded contact: NULL before surfaces have pushed each other */
+  SbBlocks blocks;        /* its second derivative, when the last direction was solved for */
+  PetscInt nblock;        /* of all ranks */
 } Newton;
 
 /* The potential at an iterate, as far as lengths of steps ask. */
@@ -70,6 +79,33 @@ static PetscErrorCode evaluate_at(Newton *n, Vec X, Vec F, Vec Y, Iterate *at)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Solves K Y = F, K with the second derivative of guarded contact where surfaces push each other. */
+static PetscErrorCode solve_linear(SNES snes, KSPConvergedReason *reason)
+{
+  Newton *n = (Newton *)snes->data;
+  const SbModel m = n->run->model;
+  PetscInt iterations;
+
+  PetscFunctionBeginUser;
+  n->blocks.n = n->nblock = 0;
+  if (m->npotential) {
+    PetscCall(SbModelGuardHessian(m, snes->vec_sol, &n->blocks));
+    PetscCallMPI(MPI_Allreduce(&n->blocks.n, &n->nblock, 1, MPIU_INT, MPI_SUM, m->comm));
+  }
+  if (n->nblock) {
+    if (!n->system) PetscCall(SbContactSystemCreate(m->space, &n->system));
+    PetscCall(SbContactSystemSolve(n->system, snes->jacobian_pre, &n->blocks, PETSC_TRUE, snes->vec_func,
+                                   snes->vec_sol_update, reason, &iterations));
+  } else {
+    PetscCall(KSPSetOperators(snes->ksp, snes->jacobian, snes->jacobian_pre));
+    PetscCall(KSPSolve(snes->ksp, snes->vec_func, snes->vec_sol_update));
+    PetscCall(KSPGetIterationNumber(snes->ksp, &iterations));
+    PetscCall(KSPGetConvergedReason(snes->ksp, reason));
+  }
+  snes->linear_its += iterations;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Solves for Y, X - Y being the next iterate, and for the slope of E along -Y. */
 static PetscErrorCode find_direction(SNES snes, PetscBool *filtered, PetscReal *slope)
 {
@@ -77,23 +113,20 @@ static PetscErrorCode find_direction(SNES snes, PetscBool *filtered, PetscReal *
   const Vec X = snes->vec_sol, F = snes->vec_func, Y = snes->vec_sol_update;
   const SbModel m = n->run->model;
   KSPConvergedReason reason;
-  PetscInt iterations, negative;
+  PetscInt negative;
 
   PetscFunctionBeginUser;
   for (;;) {
     PetscCall(SbModelFilterTangent(m, *filtered));
     PetscCall(SNESComputeJacobian(snes, X, snes->jacobian, snes->jacobian_pre));
-    PetscCall(KSPSetOperators(snes->ksp, snes->jacobian, snes->jacobian_pre));
-    PetscCall(KSPSolve(snes->ksp, F, Y));
-    PetscCall(KSPGetIterationNumber(snes->ksp, &iterations));
-    PetscCall(KSPGetConvergedReason(snes->ksp, &reason));
-    snes->linear_its += iterations;
+    PetscCall(solve_linear(snes, &reason));
     PetscCall(VecDot(F, Y, slope));
     *slope = -*slope;
     if (*filtered || !m->may_filter) break;
     /* L D L^T factors what is not definite without a word, and p may go down on the way to a saddle point */
     negative = -1;
-    if (reason > 0 && *slope < 0.) PetscCall(SbSolverCountNegativeEigenvalues(snes, m->space, &negative));
+    if (reason > 0 && *slope < 0. && !n->nblock)
+      PetscCall(SbSolverCountNegativeEigenvalues(snes, m->space, &negative));
     if (reason > 0 && *slope < 0. && negative <= 0) break;
     PetscCall(PetscInfo(snes,
                         "iteration %" PetscInt_FMT
@@ -137,17 +170,17 @@ static PetscErrorCode solve_accurately(SNES snes, PetscReal *slope, PetscBool *b
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Goes from X along -Y, E having the slope `slope` there, to the next X and F; s: how far, as part of Y. */
+/* Goes from X along -Y, E having the slope `slope` there, to the next X and F; s: how far, as part of Y, in: at most. */
 static PetscErrorCode search(SNES snes, PetscReal slope, PetscReal *s)
 {
   Newton *n = (Newton *)snes->data;
   const Vec X = snes->vec_sol, F = snes->vec_func, Y = snes->vec_sol_update;
-  PetscBool enough, provisional, better, plain = PETSC_FALSE;
+  PetscBool enough, provisional, better,
+    plain = (PetscBool)(n->nblock > 0 || *s < 1.); /* a barrier is nothing to come back from */
   PetscReal change, noise, total, goal;
   Iterate from, to;
 
   PetscFunctionBeginUser;
-  *s = 1.;
   PetscCall(evaluate_at(n, X, F, Y, &from));
   for (;;) {
     /* how E changes */
@@ -221,18 +254,141 @@ static PetscErrorCode search(SNES snes, PetscReal slope, PetscReal *s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The prescribed part of X - start, 0 elsewhere. */
+static PetscErrorCode prescribed_way(SbSpace s, Vec X, Vec start, Vec D)
+{
+  PetscScalar *d;
+
+  PetscFunctionBeginUser;
+  PetscCall(VecWAXPY(D, -1., start, X));
+  PetscCall(VecGetArray(D, &d));
+  for (PetscInt i = 0; i < 3 * s->nnode_owned; i++) {
+    if (!(s->fixed[i / 3] & (1 << (i % 3)))) d[i] = 0.;
+  }
+  PetscCall(VecRestoreArray(D, &d));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/*
+  Guarded contact: from the start of the step to a first X at which all that moves by order, prescribed unknowns and obstacles, is where it belongs.
+
+  The guess of the integrator serves where its motion is free and ends so. Else free unknowns begin at the start of the step. Where what moves by order would go through something, Newton's
+  steps take it along: their system has the derivative of the residual by that motion on its right-hand side, so that what is pushed gives way.
+*/
+static PetscErrorCode approach(SNES snes)
+{
+  Newton *n = (Newton *)snes->data;
+  const SbModel m = n->run->model;
+  const Vec X = snes->vec_sol, F = snes->vec_func, Y = snes->vec_sol_update, start = n->run->guard_start,
+            D = n->step;
+  PetscReal part, progress = 0., slope, unused[2];
+  PetscInt nactive, inverted, before;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbModelGuardAdvance(m, 0.));
+  PetscCall(VecWAXPY(Y, -1., X, start));
+  PetscCall(SbModelGuardSafe(m, start, Y, 1., &part, &nactive));
+  if (part == 1. && !nactive) {
+    PetscCall(SbModelGuardAdvance(m, 1.));
+    PetscCall(VecZeroEntries(Y));
+    PetscCall(SbModelGuardSafe(m, X, Y, 1., &part, &nactive));
+    if (!nactive) PetscFunctionReturn(PETSC_SUCCESS);
+    PetscCall(SbModelGuardAdvance(m, 0.));
+  }
+  PetscCall(prescribed_way(m->space, X, start, D));
+  PetscCall(VecCopy(start, X));
+  for (int round = 0; round < APPROACHES; round++) {
+    PetscBool filtered = PETSC_FALSE;
+    PetscReal s;
+
+    /* all the rest at once */
+    PetscCall(VecCopy(D, Y));
+    PetscCall(VecScale(Y, progress - 1.));
+    PetscCall(SbModelGuardSafe(m, X, Y, 1., &part, &nactive));
+    if (part == 1.) {
+      PetscCall(VecAXPY(X, -1., Y));
+      PetscCall(SbModelGuardAdvance(m, 1.));
+      PetscFunctionReturn(PETSC_SUCCESS);
+    }
+
+    /* as far as it goes when bodies give way */
+    PetscCall(SNESComputeFunction(snes, X, F));
+    PetscCall(VecWAXPY(n->W, DIFFERENCE, D, X));
+    PetscCall(SbModelGuardAdvance(m, progress + DIFFERENCE));
+    PetscCall(SNESComputeFunction(snes, n->W, n->G));
+    PetscCall(SbModelGuardAdvance(m, progress));
+    PetscCall(VecAXPY(n->G, -1., F));
+    PetscCall(VecAXPY(F, (1. - progress) / DIFFERENCE, n->G));
+    PetscCall(find_direction(snes, &filtered, &slope));
+    if (snes->reason) PetscFunctionReturn(PETSC_SUCCESS);
+    PetscCall(VecAXPY(Y, progress - 1., D));
+    PetscCall(SbModelGuardSafe(m, X, Y, 1., &s, &nactive));
+    PetscCall(SbModelStrainEnergyAlong(m, X, Y, &unused[0], &unused[1], &before));
+    for (;; s *= 0.5) {
+      PetscCall(VecWAXPY(n->W, -s, Y, X));
+      PetscCall(SbModelGuardAdvance(m, progress + s * (1. - progress)));
+      PetscCall(SbModelStrainEnergyAlong(m, n->W, Y, &unused[0], &unused[1], &inverted));
+      if (s < SHORTEST || (inverted <= before && !PetscIsInfOrNanReal(unused[0]))) break;
+    }
+    PetscCall(PetscInfo(snes, "approach %d: %g of the rest of the way, of which %g was done\n", round,
+                        (double)s, (double)progress));
+    snes->iter++;
+    if (s < SHORTEST) break;
+    PetscCall(VecCopy(n->W, X));
+    progress = s == 1. ? 1. : progress + s * (1. - progress);
+    if (progress == 1.) PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  snes->reason = SNES_DIVERGED_LINE_SEARCH;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Whether the step along s Y was the last one; by its length where surfaces push each other: residuals are those of stiff gaps there. */
+static PetscErrorCode converged(SNES snes, PetscReal s)
+{
+  Newton *n = (Newton *)snes->data;
+  const SbRun run = n->run;
+  PetscReal longest, size = PETSC_MAX_REAL,
+                     part = run->model->dynamic ? SETTLED * run->guard_dt : SETTLED_STATIC;
+
+  PetscFunctionBeginUser;
+  if (!n->nblock) {
+    PetscCall(SbSNESConverged(snes, snes->iter, snes->xnorm, snes->ynorm, snes->norm));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  for (PetscInt b = 0; b < run->model->nbody; b++) {
+    const PetscReal *box = run->model->body[b].bbox,
+                    r[3] = {box[3] - box[0], box[4] - box[1], box[5] - box[2]};
+
+    size = PetscMin(size, PetscSqrtReal(SbDot3(r, r)));
+  }
+  for (PetscInt e = 0; e < run->model->npotential; e++) {
+    if (run->model->potential[e]->springs && run->model->dynamic) {
+      part *= STICKING;
+      break;
+    }
+  }
+  PetscCall(VecNorm(snes->vec_sol_update, NORM_INFINITY, &longest));
+  if (s == 1. && longest <= part * size) snes->reason = SNES_CONVERGED_SNORM_RELATIVE;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 static PetscErrorCode SNESSolve_Newton(SNES snes)
 {
   Newton *n = (Newton *)snes->data;
   const Vec X = snes->vec_sol, F = snes->vec_func, Y = snes->vec_sol_update;
+  const PetscBool guarded = (PetscBool)(n->run->model->npotential > 0);
   PetscBool filtered = PETSC_FALSE;
   PetscReal slope = 0., s = 1.;
+  PetscInt nactive;
 
   PetscFunctionBeginUser;
   /* where it begins */
   snes->reason = SNES_CONVERGED_ITERATING;
   snes->iter = 0;
   n->provisional = 0;
+  n->nblock = 0;
+  if (guarded) PetscCall(approach(snes));
+  if (snes->reason) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(SNESComputeFunction(snes, X, F));
   PetscCall(VecNorm(F, NORM_2, &snes->norm));
   PetscCall(SNESLogConvergenceHistory(snes, snes->norm, 0));
@@ -244,6 +400,8 @@ static PetscErrorCode SNESSolve_Newton(SNES snes)
 
     /* where to, and how far */
     PetscCall(find_direction(snes, &filtered, &slope));
+    s = 1.;
+    if (guarded && !snes->reason) PetscCall(SbModelGuardSafe(n->run->model, X, Y, 1., &s, &nactive));
     if (!snes->reason) PetscCall(search(snes, slope, &s));
     if (snes->reason) break;
     if (s == 1.) filtered = PETSC_FALSE;
@@ -254,7 +412,7 @@ static PetscErrorCode SNESSolve_Newton(SNES snes)
     PetscCall(VecNorm(Y, NORM_2, &snes->ynorm));
     snes->ynorm *= s;
     PetscCall(SNESLogConvergenceHistory(snes, snes->norm, snes->linear_its - linear));
-    PetscCall(SbSNESConverged(snes, snes->iter, snes->xnorm, snes->ynorm, snes->norm));
+    PetscCall(converged(snes, s));
     PetscCall(SNESMonitor(snes, snes->iter, snes->norm));
     if (!snes->reason && snes->iter >= snes->max_its) snes->reason = SNES_DIVERGED_MAX_IT;
   }
@@ -283,6 +441,8 @@ static PetscErrorCode SNESReset_Newton(SNES snes)
   PetscCall(VecDestroy(&n->G));
   PetscCall(VecDestroy(&n->start));
   PetscCall(VecDestroy(&n->step));
+  PetscCall(SbContactSystemDestroy(&n->system));
+  PetscCall(SbBlocksFree(&n->blocks));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

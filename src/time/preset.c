@@ -436,6 +436,22 @@ static PetscErrorCode check_newmark(SbRun run)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* What guarded contact needs: a potential, our own Newton method, and no other contact, which knows of no guard. */
+static PetscErrorCode check_guarded(SbRun run)
+{
+  const SbModel m = run->model;
+  const char *name = m->potential[0]->name;
+
+  PetscFunctionBeginUser;
+  PetscCheck(run->preset == SB_TIME_EULER_IMPLICIT || run->preset == SB_TIME_STATIC, m->comm,
+             PETSC_ERR_USER_INPUT, "-effect_%s_response barrier needs -time euler_implicit or static", name);
+  PetscCheck(!m->nbegin_step, m->comm, PETSC_ERR_USER_INPUT,
+             "-effect_%s_response barrier and -effect_%s_response of another kind do not go together: give "
+             "both the same",
+             name, m->begin_step[0]->name);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* What contact needs: several solves in a step, and a matrix that can be projected. */
 static PetscErrorCode check_contact(SbRun run, PetscBool explicit)
 {
@@ -444,6 +460,7 @@ static PetscErrorCode check_contact(SbRun run, PetscBool explicit)
   PetscBool split;
 
   PetscFunctionBeginUser;
+  if (m->npotential) PetscCall(check_guarded(run));
   if (!m->nbegin_step) PetscFunctionReturn(PETSC_SUCCESS);
   name = m->begin_step[0]->name;
   PetscCheck(

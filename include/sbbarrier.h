@@ -1,0 +1,104 @@
+/*
+  sbbarrier.h - layer 3: surfaces that are kept apart. Vertices, edges and triangles of bodies and of an obstacle, their pairs, how far they may move, and the
+  barrier between them.
+
+  Every rank holds the whole surface; a vertex of a body is a weighted mean of nodes, so elements make no difference here. A rank
+  evaluates every pair that touches one of its own nodes: forces on them are complete without communication, and summed in an order that no partition changes.
+*/
+#pragma once
+#include "sbcontact.h"
+#include "sbgeometry.h"
+
+typedef struct _p_SbContactMesh *SbContactMesh;
+struct _p_SbContactMesh {
+  SbSpace space;                  /* borrowed */
+  PetscInt nvertex, nbody_vertex; /* those of bodies come first, then those of the obstacle */
+  PetscInt ntriangle, nbody_triangle, nedge;
+  PetscInt *start,
+    *gnode;          /* [nbody_vertex+1], [start[nbody_vertex]] nodes of a vertex, global numbers ascending */
+  PetscInt *node;    /* [start[nbody_vertex]] the same as local nodes, -1: not known here */
+  PetscReal *weight; /* [start[nbody_vertex]] */
+  uint8_t *
+    fixed; /* [start[nbody_vertex]] bit c: component c of the node is prescribed; SbContactMeshMarkDriven() */
+  PetscInt *part;              /* [nvertex] body, nbody: the obstacle */
+  PetscInt *id;                /* [nbody_vertex] number in the mesh that no partition changes */
+  uint8_t *mine;               /* [nvertex] some node is owned here */
+  uint8_t *own;                /* [nvertex] this rank speaks for it: one rank does; the obstacle's: rank 0 */
+  uint8_t *driven;             /* [nvertex] its motion is prescribed in all directions */
+  PetscInt *triangle;          /* [ntriangle][3] counter-clockwise seen from outside */
+  PetscInt *edge;              /* [nedge][2] */
+  PetscReal *X;                /* [nvertex][3] at rest, m; obstacle: its rest frame */
+  PetscReal *area, *edge_area; /* [nvertex], [nedge] a third of the triangles around, at rest, m^2 */
+  PetscReal radius;            /* of the obstacle's vertices and edges (sphere, capsule), m */
+  SbObstacleSide side;         /* what vertices alone meet, kept as vertices of the obstacle */
+  PetscReal shortest;          /* edge of the bodies at rest, m */
+  PetscReal size;              /* of the smallest body, diagonal, m */
+  /* of SbContactMeshMove() */
+  PetscInt nlocal, *local;    /* own vertices of bodies */
+  PetscMPIInt *count, *first; /* [ranks] */
+  PetscInt *order;            /* [nbody_vertex] vertex of each received one */
+  PetscReal *buffer;          /* [2][nbody_vertex][3] */
+};
+
+/*
+  SbContactMeshCreate - the surface of the facets of SbEffectFacets() and of an obstacle (NULL: none), which is set up.
+
+  Collective; the caller destroys it. Prescribed unknowns of effects that are set up later are not known yet: SbContactMeshMarkDriven().
+*/
+PetscErrorCode SbContactMeshCreate(SbSpace space, PetscInt n, const SbFacet facet[], SbObstacle obstacle,
+                                   SbContactMesh *mesh);
+PetscErrorCode SbContactMeshDestroy(SbContactMesh *mesh);
+PetscErrorCode SbContactMeshMarkDriven(SbContactMesh mesh);
+/* x[nvertex][3] of vertices from local displacements u (ghosts up to date) and the obstacle's pose (NULL without one), m. Collective. */
+PetscErrorCode SbContactMeshMove(SbContactMesh mesh, const PetscReal u[], const SbPose *pose, PetscReal x[]);
+
+/* Two features: vertex 0 and triangle 1 to 3; edges 0 1 and 2 3; or vertex 0 and the side of the obstacle. */
+typedef struct {
+  PetscBool side;
+  SbPairKind kind; /* SB_PAIR_VERTEX_TRIANGLE or SB_PAIR_EDGE_EDGE */
+  PetscInt v[4];   /* vertices of the mesh */
+  PetscReal area;  /* m^2 */
+} SbContactPair;
+
+/* Search and its results; x0 and x1 below are arrays of SbContactMeshMove(). */
+typedef struct _p_SbContactPairs *SbContactPairs;
+struct _p_SbContactPairs {
+  SbContactMesh mesh;     /* borrowed */
+  PetscBool self, others; /* bodies meet themselves, and each other */
+  PetscReal reach;        /* pairs nearer than this are found, m */
+  PetscReal margin;       /* by which boxes are grown, m */
+  PetscReal *box; /* [nvertex][6] within which vertices may move before pairs are searched for again */
+  PetscBool known;
+  PetscInt n, size;
+  SbContactPair *pair; /* [n] all that touch nodes of this rank, by kind, then by numbers */
+  PetscInt nsearch;
+};
+PetscErrorCode SbContactPairsCreate(SbContactMesh mesh, PetscBool self, PetscBool others, PetscReal reach,
+                                    SbContactPairs *pairs);
+PetscErrorCode SbContactPairsDestroy(SbContactPairs *pairs);
+/* All pairs that come within the reach on the straight way from x0 to x1, and more. Not collective. */
+PetscErrorCode SbContactPairsFind(SbContactPairs pairs, const PetscReal x0[], const PetscReal x1[]);
+/* The gap, m: the distance less the radius of a rounded obstacle; nearest places and direction in `distance`. Not collective. */
+PetscReal SbContactPairGap(SbContactMesh mesh, const SbContactPair *pair, const PetscReal x[],
+                           SbDistance *distance);
+/* The part of the straight way from x0 to x1, 0..1, that no pair of this rank touches before; pairs at a distance keep a tenth of it. Not collective. */
+PetscErrorCode SbContactPairsSafe(SbContactPairs pairs, const PetscReal x0[], const PetscReal x1[],
+                                  PetscReal *part, PetscInt *worst);
+/*
+  SbContactMeshCrossings - edges that go through triangles of another part, or of the same one (self), at x.
+
+  Collective. Output: n of all ranks; where: vertex numbers (edge, triangle) of the first one, undefined without any. It knows nothing of pairs and motions.
+*/
+PetscErrorCode SbContactMeshCrossings(SbContactMesh mesh, PetscBool self, const PetscReal x[], PetscInt *n,
+                                      PetscInt where[5]);
+
+/* Energy of a gap d, J, and its first two derivatives by d: barrier of the width w (m), pressure k (Pa) and area (m^2); 0 from w on, infinite at 0. */
+void SbBarrier(PetscReal d, PetscReal w, PetscReal k, PetscReal area, PetscReal b[3]);
+/*
+  SbBarrierPair - energy, gradient and Hessian of the barrier of a pair at x, by the motion of its four vertices. Edges that are nearly parallel count less.
+
+  Not collective. Input: gap > 0 and distance of SbContactPairGap(). Output: energy, J; gradient[12], N; H[12][12], row-major, its positive part, N/m (NULL: not wanted).
+*/
+void SbBarrierPair(SbContactMesh mesh, const SbContactPair *pair, PetscReal gap, const SbDistance *distance,
+                   const PetscReal x[], PetscReal width, PetscReal pressure, PetscReal *energy,
+                   PetscReal gradient[12], PetscReal H[144]);

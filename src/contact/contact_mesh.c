@@ -1,0 +1,404 @@
+/*
+  contact_mesh.c - the surfaces of bodies and of an obstacle as vertices, edges and triangles, whole on every rank.
+
+  A vertex of a body follows its nodes: with P1 the one that it is; with CR and DG, whose displacement jumps from cell to cell, the mean over the cells
+  behind the facets around it, so that the surface is closed and linear fields are reproduced. The rank that owns the vertex in the
+  mesh knows all facets around it (the overlap), makes its list of nodes and moves it; positions are gathered by all ranks, 24 bytes per
+  vertex of the surface. Numbers follow the original ones of the mesh: nothing below depends on the partition.
+
+  The obstacle: a sphere is a vertex, a capsule an edge, with a radius. Box, cylinder and mesh are triangles. A half-space and a bowl are everything on one side,
+  met by vertices alone; they are kept as two vertices, a point and the tip of the normal there, or as the centre.
+*/
+#include "obstacle.h"
+#include "sbbarrier.h"
+
+/* What all ranks have, one after the other; n and total count items of the type. The caller frees `all`. */
+static PetscErrorCode gather(MPI_Comm comm, PetscInt n, MPI_Datatype type, size_t size, const void *mine,
+                             PetscInt *total, void *all)
+{
+  PetscMPIInt ranks, *count, *first, mine_n;
+  char *to;
+
+  PetscFunctionBeginUser;
+  PetscCallMPI(MPI_Comm_size(comm, &ranks));
+  PetscCall(PetscMPIIntCast(n, &mine_n));
+  PetscCall(PetscMalloc2(ranks, &count, ranks + 1, &first));
+  PetscCallMPI(MPI_Allgather(&mine_n, 1, MPI_INT, count, 1, MPI_INT, comm));
+  first[0] = 0;
+  for (PetscMPIInt r = 0; r < ranks; r++) first[r + 1] = first[r] + count[r];
+  *total = first[ranks];
+  PetscCall(PetscMalloc1((size_t)*total * size + 1, &to));
+  PetscCallMPI(MPI_Allgatherv(mine, mine_n, type, to, count, first, type, comm));
+  *(void **)all = to;
+  PetscCall(PetscFree2(count, first));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Nodes and weights of the own vertices, ascending; records of 3 + 2 count numbers: id, part, count, nodes, and weights apart. */
+static PetscErrorCode list_own(SbContactMesh m, PetscInt n, const SbFacet facet[], PetscInt *nnumber,
+                               PetscInt **number, PetscInt *nreal, PetscReal **real)
+{
+  const SbSpace s = m->space;
+  const SbMesh mesh = s->mesh;
+  PetscInt *slot, *start, *ring, nown = 0, *id, *at;
+  PetscInt size = 0;
+
+  PetscFunctionBeginUser;
+  /* facets around each own vertex */
+  PetscCall(PetscMalloc1(mesh->nvert_owned, &slot));
+  for (PetscInt v = 0; v < mesh->nvert_owned; v++) slot[v] = -1;
+  for (PetscInt i = 0; i < 3 * n; i++) {
+    const PetscInt v = facet[i / 3].vertex[i % 3];
+
+    if (v < mesh->nvert_owned && slot[v] < 0) slot[v] = nown++;
+  }
+  PetscCall(PetscCalloc1(nown + 2, &start));
+  PetscCall(PetscMalloc1(3 * n, &ring));
+  for (PetscInt i = 0; i < 3 * n; i++) {
+    const PetscInt v = facet[i / 3].vertex[i % 3];
+
+    if (v < mesh->nvert_owned) start[slot[v] + 2]++;
+  }
+  for (PetscInt k = 0; k < nown; k++) start[k + 2] += start[k + 1];
+  for (PetscInt i = 0; i < 3 * n; i++) {
+    const PetscInt v = facet[i / 3].vertex[i % 3];
+
+    if (v < mesh->nvert_owned) ring[start[slot[v] + 1]++] = i;
+  }
+
+  /* in the order of their numbers */
+  PetscCall(PetscMalloc2(nown, &id, nown, &at));
+  for (PetscInt v = 0; v < mesh->nvert_owned; v++) {
+    if (slot[v] < 0) continue;
+    id[slot[v]] = mesh->vert_orig[v];
+    at[slot[v]] = v;
+  }
+  PetscCall(PetscSortIntWithArray(nown, id, at));
+  for (PetscInt k = 0; k < nown; k++) size += 3 + 4 * (start[slot[at[k]] + 1] - start[slot[at[k]]]);
+  m->nlocal = nown;
+  PetscCall(PetscMalloc1(size, number));
+  PetscCall(PetscMalloc1(size, real));
+  *nnumber = *nreal = 0;
+  for (PetscInt k = 0; k < nown; k++) {
+    const PetscInt v = at[k], first = start[slot[v]], last = start[slot[v] + 1];
+    PetscInt *record = *number + *nnumber, *node = record + 3, nnode = 0;
+    PetscReal *weight = *real + *nreal, area = 0.;
+
+    record[0] = id[k];
+    record[1] = mesh->vert_body[v];
+    for (PetscInt i = first; i < last; i++) {
+      const SbFacet *f = &facet[ring[i] / 3];
+      const PetscReal *w = SbSpaceCellElement(s, f->cell)->ops.vertex[f->corner[ring[i] % 3]];
+
+      area += f->area / 3.;
+      for (int a = 0; a < 4; a++) {
+        const PetscInt g = s->gnode[s->cell_node[4 * f->cell + a]];
+        PetscInt j = 0;
+
+        if (w[a] == 0.) continue;
+        while (j < nnode && node[j] != g) j++;
+        if (j == nnode) {
+          node[nnode] = g;
+          weight[4 + nnode++] = 0.;
+        }
+        weight[4 + j] += w[a] / (PetscReal)(last - first);
+      }
+    }
+    record[2] = nnode;
+    PetscCall(PetscSortIntWithScalarArray(nnode, node, weight + 4));
+    for (int i = 0; i < 3; i++) weight[i] = mesh->x[3 * v + i];
+    weight[3] = area;
+    *nnumber += 3 + nnode;
+    *nreal += 4 + nnode;
+  }
+  PetscCall(PetscFree2(id, at));
+  PetscCall(PetscFree(ring));
+  PetscCall(PetscFree(start));
+  PetscCall(PetscFree(slot));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The local node of a global number, -1: this rank does not know it. */
+static PetscInt local_node(SbSpace s, PetscInt g)
+{
+  PetscInt at;
+
+  if (g >= s->gnode_start && g < s->gnode_start + s->nnode_owned) return g - s->gnode_start;
+  if (PetscFindInt(g, s->nnode - s->nnode_owned, s->gnode + s->nnode_owned, &at)) return -1;
+  return at < 0 ? -1 : s->nnode_owned + at;
+}
+
+/* Puts the vertices of all ranks in the order of their numbers; behind them there is room for `nobstacle` of the obstacle. */
+static PetscErrorCode make_vertices(SbContactMesh m, PetscInt n, const SbFacet facet[], PetscInt nobstacle)
+{
+  const SbSpace s = m->space;
+  PetscInt nnumber = 0, nreal = 0, *number, *all, Nnumber, Nreal, nv = 0, *id, *arrival;
+  PetscReal *real, *values;
+  PetscMPIInt ranks, rank, nlocal;
+
+  PetscFunctionBeginUser;
+  PetscCallMPI(MPI_Comm_size(s->comm, &ranks));
+  PetscCallMPI(MPI_Comm_rank(s->comm, &rank));
+  PetscCall(list_own(m, n, facet, &nnumber, &number, &nreal, &real));
+  PetscCall(gather(s->comm, nnumber, MPIU_INT, sizeof(PetscInt), number, &Nnumber, &all));
+  PetscCall(gather(s->comm, nreal, MPIU_REAL, sizeof(PetscReal), real, &Nreal, &values));
+  PetscCall(PetscFree(number));
+  PetscCall(PetscFree(real));
+
+  /* how many vertices each rank moves */
+  PetscCall(PetscMPIIntCast(3 * m->nlocal, &nlocal));
+  PetscCall(PetscMalloc2(ranks, &m->count, ranks, &m->first));
+  PetscCallMPI(MPI_Allgather(&nlocal, 1, MPI_INT, m->count, 1, MPI_INT, s->comm));
+  m->first[0] = 0;
+  for (PetscMPIInt r = 1; r < ranks; r++) m->first[r] = m->first[r - 1] + m->count[r - 1];
+
+  /* the order of numbers: vertex order[k] arrives as number k */
+  for (PetscInt i = 0; i < Nnumber; i += 3 + all[i + 2]) nv++;
+  m->nbody_vertex = nv;
+  m->nvertex = nv + nobstacle;
+  PetscCall(PetscMalloc2(nv, &id, nv, &arrival));
+  for (PetscInt i = 0, k = 0; i < Nnumber; i += 3 + all[i + 2], k++) {
+    id[k] = all[i];
+    arrival[k] = k;
+  }
+  PetscCall(PetscSortIntWithArray(nv, id, arrival));
+  PetscCall(PetscMalloc1(nv, &m->order));
+  for (PetscInt v = 0; v < nv; v++) m->order[arrival[v]] = v;
+  PetscCall(PetscFree2(id, arrival));
+
+  /* their records in that order */
+  PetscCall(PetscCalloc1(nv + 1, &m->start));
+  for (PetscInt i = 0, k = 0; i < Nnumber; i += 3 + all[i + 2], k++) m->start[m->order[k] + 1] = all[i + 2];
+  for (PetscInt v = 0; v < nv; v++) m->start[v + 1] += m->start[v];
+  PetscCall(PetscMalloc4(m->start[nv], &m->gnode, m->start[nv], &m->node, m->start[nv], &m->weight,
+                         m->start[nv], &m->fixed));
+  PetscCall(PetscMalloc4(m->nvertex, &m->part, nv, &m->id, 3 * m->nvertex, &m->X, m->nvertex, &m->area));
+  PetscCall(PetscCalloc3(m->nvertex, &m->mine, m->nvertex, &m->own, m->nvertex, &m->driven));
+  for (PetscInt i = 0, j = 0, k = 0; i < Nnumber; i += 3 + all[i + 2], k++) {
+    const PetscInt v = m->order[k], count = all[i + 2];
+
+    m->id[v] = all[i];
+    m->part[v] = all[i + 1];
+    PetscCall(PetscArraycpy(m->gnode + m->start[v], all + i + 3, count));
+    PetscCall(PetscArraycpy(m->X + 3 * v, values + j, 3));
+    m->area[v] = values[j + 3];
+    PetscCall(PetscArraycpy(m->weight + m->start[v], values + j + 4, count));
+    j += 4 + count;
+    for (PetscInt e = m->start[v]; e < m->start[v + 1]; e++) {
+      m->node[e] = local_node(s, m->gnode[e]);
+      if (m->node[e] >= 0 && m->node[e] < s->nnode_owned) m->mine[v] = 1;
+    }
+  }
+  PetscCall(PetscFree(all));
+  PetscCall(PetscFree(values));
+  PetscCall(PetscMalloc2(m->nlocal, &m->local, 6 * nv, &m->buffer));
+  for (PetscInt k = 0; k < m->nlocal; k++) {
+    m->local[k] = m->order[m->first[rank] / 3 + k];
+    m->own[m->local[k]] = m->mine[m->local[k]] = 1;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static int compare_triangles(const void *a, const void *b)
+{
+  const PetscInt i = ((const PetscInt *)a)[0], j = ((const PetscInt *)b)[0];
+
+  return (i > j) - (i < j);
+}
+
+/* The triangles of all ranks, in the order of numbers that no partition changes. */
+static PetscErrorCode make_triangles(SbContactMesh m, PetscInt n, const SbFacet facet[], PetscInt nobstacle)
+{
+  const SbSpace s = m->space;
+  PetscInt(*mine)[4], *all, nmine = 0, total;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscMalloc1(n, &mine));
+  for (PetscInt i = 0; i < n; i++) {
+    if (facet[i].cell >= s->mesh->ncell_owned) continue;
+    mine[nmine][0] = 4 * s->mesh->cell_orig[facet[i].cell] + facet[i].face;
+    for (int k = 0; k < 3; k++) mine[nmine][1 + k] = s->mesh->vert_orig[facet[i].vertex[k]];
+    nmine++;
+  }
+  PetscCall(gather(s->comm, 4 * nmine, MPIU_INT, sizeof(PetscInt), mine, &total, &all));
+  PetscCall(PetscFree(mine));
+  qsort(all, (size_t)(total / 4), 4 * sizeof(PetscInt), compare_triangles);
+  m->nbody_triangle = total / 4;
+  m->ntriangle = m->nbody_triangle + nobstacle;
+  PetscCall(PetscMalloc1(3 * m->ntriangle, &m->triangle));
+  for (PetscInt i = 0; i < 3 * m->nbody_triangle; i++) {
+    PetscInt v;
+
+    PetscCall(PetscFindInt(all[4 * (i / 3) + 1 + i % 3], m->nbody_vertex, m->id, &v));
+    m->triangle[i] = v;
+  }
+  PetscCall(PetscFree(all));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscReal triangle_area(const PetscReal X[], const PetscInt v[3])
+{
+  PetscReal a[3], b[3], c[3];
+
+  for (int i = 0; i < 3; i++) {
+    a[i] = X[3 * v[1] + i] - X[3 * v[0] + i];
+    b[i] = X[3 * v[2] + i] - X[3 * v[0] + i];
+  }
+  SbCross(a, b, c);
+  return 0.5 * PetscSqrtReal(SbDot3(c, c));
+}
+
+static int compare_edges(const void *a, const void *b)
+{
+  const PetscInt *i = (const PetscInt *)a, *j = (const PetscInt *)b;
+
+  if (i[0] != j[0]) return (i[0] > j[0]) - (i[0] < j[0]);
+  if (i[1] != j[1]) return (i[1] > j[1]) - (i[1] < j[1]);
+  return (i[2] > j[2]) - (i[2] < j[2]);
+}
+
+/* The edges of all triangles, each once, its area a third of that of the triangles around; `lone`: the obstacle is an edge of its own. */
+static PetscErrorCode make_edges(SbContactMesh m, PetscBool lone)
+{
+  PetscInt(*side)[3];
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscMalloc1(3 * m->ntriangle, &side));
+  for (PetscInt i = 0; i < 3 * m->ntriangle; i++) {
+    const PetscInt a = m->triangle[i], b = m->triangle[3 * (i / 3) + (i + 1) % 3];
+
+    side[i][0] = PetscMin(a, b);
+    side[i][1] = PetscMax(a, b);
+    side[i][2] = i / 3;
+  }
+  qsort(side, (size_t)(3 * m->ntriangle), sizeof(*side), compare_edges);
+  PetscCall(PetscMalloc2(6 * m->ntriangle + 2, &m->edge, 3 * m->ntriangle + 1, &m->edge_area));
+  for (PetscInt i = 0; i < 3 * m->ntriangle; i++) {
+    const PetscReal area = triangle_area(m->X, m->triangle + 3 * side[i][2]) / 3.;
+
+    if (i && side[i][0] == side[i - 1][0] && side[i][1] == side[i - 1][1])
+      m->edge_area[m->nedge - 1] += area;
+    else {
+      m->edge[2 * m->nedge] = side[i][0];
+      m->edge[2 * m->nedge + 1] = side[i][1];
+      m->edge_area[m->nedge++] = area;
+    }
+  }
+  PetscCall(PetscFree(side));
+  if (lone) {
+    m->edge[2 * m->nedge] = m->nbody_vertex;
+    m->edge[2 * m->nedge + 1] = m->nbody_vertex + 1;
+    m->edge_area[m->nedge++] = 0.;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbContactMeshCreate(SbSpace s, PetscInt n, const SbFacet facet[], SbObstacle obstacle,
+                                   SbContactMesh *mesh)
+{
+  SbObstacleSurface o = {0};
+  SbContactMesh m;
+  PetscMPIInt rank;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscNew(&m));
+  *mesh = m;
+  m->space = s;
+  PetscCallMPI(MPI_Comm_rank(s->comm, &rank));
+
+  /* vertices and triangles of the bodies, then of the obstacle, for which rank 0 speaks */
+  if (obstacle) PetscCall(SbObstacleGetSurface(obstacle, &o));
+  m->side = o.side;
+  m->radius = o.radius;
+  PetscCall(make_vertices(m, n, facet, o.nvertex));
+  PetscCall(make_triangles(m, n, facet, o.ntriangle));
+  PetscCall(PetscArraycpy(m->X + 3 * m->nbody_vertex, o.x, 3 * o.nvertex));
+  for (PetscInt i = 0; i < 3 * o.ntriangle; i++)
+    m->triangle[3 * m->nbody_triangle + i] = m->nbody_vertex + o.triangle[i];
+  for (PetscInt v = m->nbody_vertex; v < m->nvertex; v++) {
+    m->part[v] = s->mesh->nbody;
+    m->area[v] = 0.;
+    m->own[v] = (uint8_t)!rank;
+    m->driven[v] = 1;
+  }
+  PetscCall(SbObstacleFreeSurface(&o));
+  PetscCall(make_edges(m, (PetscBool)(o.radius > 0. && o.nvertex == 2)));
+
+  /* shortest edge of the bodies, size of the smallest one */
+  m->shortest = PETSC_MAX_REAL;
+  for (PetscInt e = 0; e < m->nedge && m->edge[2 * e] < m->nbody_vertex; e++) {
+    PetscReal r[3];
+
+    for (int i = 0; i < 3; i++) r[i] = m->X[3 * m->edge[2 * e] + i] - m->X[3 * m->edge[2 * e + 1] + i];
+    m->shortest = PetscMin(m->shortest, PetscSqrtReal(SbDot3(r, r)));
+  }
+  m->size = PETSC_MAX_REAL;
+  for (PetscInt b = 0; b < s->mesh->nbody; b++) {
+    const PetscReal *box = s->mesh->body[b].bbox, r[3] = {box[3] - box[0], box[4] - box[1], box[5] - box[2]};
+
+    m->size = PetscMin(m->size, PetscSqrtReal(SbDot3(r, r)));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbContactMeshMarkDriven(SbContactMesh m)
+{
+  const SbSpace s = m->space;
+  const PetscInt n = m->start[m->nbody_vertex];
+
+  PetscFunctionBeginUser;
+  for (PetscInt j = 0; j < n; j++)
+    m->fixed[j] = (uint8_t)(m->node[j] >= 0 && m->node[j] < s->nnode_owned ? s->fixed[m->node[j]] : 0);
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, m->fixed, (PetscMPIInt)n, MPI_UINT8_T, MPI_MAX, s->comm));
+  for (PetscInt v = 0; v < m->nbody_vertex; v++) {
+    m->driven[v] = 1;
+    for (PetscInt j = m->start[v]; j < m->start[v + 1]; j++) {
+      if ((m->fixed[j] & 7) != 7) m->driven[v] = 0;
+    }
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbContactMeshMove(SbContactMesh m, const PetscReal u[], const SbPose *pose, PetscReal x[])
+{
+  PetscReal *mine = m->buffer, *all = m->buffer + 3 * m->nlocal;
+
+  PetscFunctionBeginUser;
+  for (PetscInt k = 0; k < m->nlocal; k++) {
+    const PetscInt v = m->local[k];
+
+    for (int i = 0; i < 3; i++) mine[3 * k + i] = m->X[3 * v + i];
+    for (PetscInt e = m->start[v]; e < m->start[v + 1]; e++) {
+      for (int i = 0; i < 3; i++) mine[3 * k + i] += m->weight[e] * u[3 * m->node[e] + i];
+    }
+  }
+  if (m->nlocal == m->nbody_vertex)
+    all = mine;
+  else
+    PetscCallMPI(MPI_Allgatherv(mine, (PetscMPIInt)(3 * m->nlocal), MPIU_REAL, all, m->count, m->first,
+                                MPIU_REAL, m->space->comm));
+  for (PetscInt k = 0; k < m->nbody_vertex; k++) {
+    for (int i = 0; i < 3; i++) x[3 * m->order[k] + i] = all[3 * k + i];
+  }
+  for (PetscInt v = m->nbody_vertex; v < m->nvertex && pose; v++) SbPoseApply(pose, m->X + 3 * v, x + 3 * v);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbContactMeshDestroy(SbContactMesh *mesh)
+{
+  SbContactMesh m = *mesh;
+
+  PetscFunctionBeginUser;
+  if (!m) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscFree(m->start));
+  PetscCall(PetscFree4(m->gnode, m->node, m->weight, m->fixed));
+  PetscCall(PetscFree4(m->part, m->id, m->X, m->area));
+  PetscCall(PetscFree3(m->mine, m->own, m->driven));
+  PetscCall(PetscFree(m->triangle));
+  PetscCall(PetscFree2(m->edge, m->edge_area));
+  PetscCall(PetscFree2(m->count, m->first));
+  PetscCall(PetscFree(m->order));
+  PetscCall(PetscFree2(m->local, m->buffer));
+  PetscCall(PetscFree(*mesh));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

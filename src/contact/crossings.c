@@ -1,0 +1,104 @@
+/*
+  crossings.c - whether surfaces are in each other: edges that go through triangles. It shares nothing with the search for pairs but the tree of boxes.
+
+  An edge goes through a triangle where its ends are on different sides of the plane and the line passes the three sides the same way round; signs of volumes of tets tell. Volumes
+  below rounding count as neither.
+*/
+#include "sbbarrier.h"
+
+#define ROUNDING 64 /* in units of eps of the products that a volume is made of */
+
+typedef struct {
+  SbContactMesh mesh;
+  const PetscReal *x;
+  PetscBool self;
+  PetscInt edge, n, where[5];
+} Search;
+
+/* Sign of the volume of a tet, 0 within rounding. */
+static int side_of(const PetscReal *a, const PetscReal *b, const PetscReal *c, const PetscReal *d)
+{
+  PetscReal p[3], q[3], r[3], n[3], volume, size = 0.;
+
+  for (int i = 0; i < 3; i++) {
+    p[i] = b[i] - a[i];
+    q[i] = c[i] - a[i];
+    r[i] = d[i] - a[i];
+  }
+  SbCross(p, q, n);
+  volume = SbDot3(n, r);
+  for (int i = 0; i < 3; i++)
+    size += (PetscAbsReal(p[(i + 1) % 3] * q[(i + 2) % 3]) + PetscAbsReal(p[(i + 2) % 3] * q[(i + 1) % 3])) *
+            PetscAbsReal(r[i]);
+  if (PetscAbsReal(volume) <= ROUNDING * PETSC_MACHINE_EPSILON * size) return 0;
+  return volume > 0. ? 1 : -1;
+}
+
+/* Counts the edge that is searched for where it goes through a triangle. */
+static void test_triangle(Search *s, PetscInt t)
+{
+  const SbContactMesh m = s->mesh;
+  const PetscInt *e = m->edge + 2 * s->edge, *v = m->triangle + 3 * t;
+  const PetscReal *a = s->x + 3 * e[0], *b = s->x + 3 * e[1], *p = s->x + 3 * v[0], *q = s->x + 3 * v[1],
+                  *r = s->x + 3 * v[2];
+  int around;
+
+  if (m->part[e[0]] == m->part[v[0]] && (!s->self || e[0] >= m->nbody_vertex)) return;
+  for (int k = 0; k < 6; k++) {
+    if (e[k / 3] == v[k % 3]) return;
+  }
+  if (m->driven[e[0]] && m->driven[e[1]] && m->driven[v[0]] && m->driven[v[1]] && m->driven[v[2]]) return;
+  if (side_of(p, q, r, a) * side_of(p, q, r, b) >= 0) return;
+  around = side_of(a, b, p, q);
+  if (!around || side_of(a, b, q, r) != around || side_of(a, b, r, p) != around) return;
+  if (!s->n++) {
+    for (int k = 0; k < 5; k++) s->where[k] = k < 2 ? e[k] : v[k - 2];
+  }
+}
+
+PetscErrorCode SbContactMeshCrossings(SbContactMesh m, PetscBool self, const PetscReal x[], PetscInt *n,
+                                      PetscInt where[5])
+{
+  Search s = {.mesh = m, .x = x, .self = self};
+  PetscReal(*box)[6];
+  PetscMPIInt rank, ranks, first;
+  SbBoxQuery query;
+  SbBoxTree tree;
+  PetscInt hit;
+
+  PetscFunctionBeginUser;
+  PetscCallMPI(MPI_Comm_rank(m->space->comm, &rank));
+  PetscCallMPI(MPI_Comm_size(m->space->comm, &ranks));
+  PetscCall(PetscMalloc1(m->ntriangle, &box));
+  for (PetscInt t = 0; t < m->ntriangle; t++) SbTriangleBox(x, m->triangle + 3 * t, box[t]);
+  PetscCall(SbBoxTreeCreate(m->ntriangle, (const PetscReal(*)[6])box, &tree));
+  for (PetscInt e = rank; e < m->nedge; e += ranks) {
+    PetscReal around[6];
+
+    s.edge = e;
+    SbBoxClear(around);
+    for (int k = 0; k < 2; k++) SbBoxAdd(around, x + 3 * m->edge[2 * e + k]);
+    for (SbBoxQueryBegin(&tree, around, &query); SbBoxQueryNext(&query, &hit);) test_triangle(&s, hit);
+  }
+  PetscCall(SbBoxTreeDestroy(&tree));
+  PetscCall(PetscFree(box));
+
+  /* the half-space and the bowl: vertices behind */
+  for (PetscInt v = rank; v < m->nbody_vertex && m->side != SB_SIDE_NONE; v += ranks) {
+    const SbContactPair pair = {.side = PETSC_TRUE, .v = {v, m->nbody_vertex, m->nvertex - 1, v}};
+    SbDistance d;
+
+    if (m->driven[v] || SbContactPairGap(m, &pair, x, &d) >= 0.) continue;
+    if (!s.n++) {
+      for (int k = 0; k < 5; k++) s.where[k] = k < 2 ? v : m->nbody_vertex;
+    }
+  }
+
+  /* the first one of the lowest rank that has any */
+  first = s.n ? rank : ranks;
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &first, 1, MPI_INT, MPI_MIN, m->space->comm));
+  PetscCallMPI(MPI_Allreduce(&s.n, n, 1, MPIU_INT, MPI_SUM, m->space->comm));
+  for (int k = 0; k < 5; k++) where[k] = s.where[k];
+  if (first < ranks) PetscCallMPI(MPI_Bcast(where, 5, MPIU_INT, first, m->space->comm));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

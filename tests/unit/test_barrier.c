@@ -1,0 +1,122 @@
+// @ranks 1
+/* The barrier of a pair: its derivatives by differences, with the radius of an obstacle, for parallel edges, a half-space and a bowl. */
+#include <sbbarrier.h>
+#include "pair_reference.h"
+
+#define NRANDOM 4000
+
+static const PetscReal width = 0.5, pressure = 3.;
+
+/* b and its derivatives: positive, falling, convex; nothing from the width on, infinite at zero. */
+static void check_function(void)
+{
+  PetscReal b[3], c[3], d[3];
+
+  for (int i = 1; i < 100; i++) {
+    const PetscReal gap = 0.01 * i * width, step = 1e-6 * gap;
+
+    SbBarrier(gap, width, pressure, 2., b);
+    SbBarrier(gap - step, width, pressure, 2., c);
+    SbBarrier(gap + step, width, pressure, 2., d);
+    SB_CHECK(b[0] > 0. && b[1] < 0. && b[2] > 0., "signs at %g of the width: %g %g %g", 0.01 * i, b[0], b[1],
+             b[2]);
+    SB_CHECK_NEAR((d[0] - c[0]) / (2. * step), b[1], 1e-7 * (PetscAbsReal(b[1]) + pressure), "slope");
+    SB_CHECK_NEAR((d[1] - c[1]) / (2. * step), b[2], 1e-7 * (PetscAbsReal(b[2]) + pressure / width),
+                  "curvature");
+  }
+  SbBarrier(width, width, pressure, 2., b);
+  SB_CHECK(b[0] == 0. && b[1] == 0. && b[2] == 0., "at the width: %g %g %g", b[0], b[1], b[2]);
+  SbBarrier(0., width, pressure, 2., b);
+  SB_CHECK(b[0] >= PETSC_INFINITY, "where surfaces touch: %g", b[0]);
+}
+
+static PetscReal energy_at(SbContactMesh m, const SbContactPair *pair, const PetscReal x[],
+                           PetscReal gradient[])
+{
+  PetscReal energy, gap;
+  SbDistance distance;
+
+  gap = SbContactPairGap(m, pair, x, &distance);
+  if (gap <= 0.) return PETSC_INFINITY;
+  SbBarrierPair(m, pair, gap, &distance, x, width, pressure, &energy, gradient, NULL);
+  return energy;
+}
+
+/* Gradient and clamped Hessian against central differences, by the motion of the first nv vertices, which are those of bodies. */
+static void check_pair(SbContactMesh m, const SbContactPair *pair, PetscReal x[12], int nv, PetscInt *tried)
+{
+  const PetscReal step = 1e-6;
+  PetscReal energy, gap, gradient[12], H[144], reference[144] = {0.}, largest = 0., worst = 0.;
+  SbDistance distance;
+
+  gap = SbContactPairGap(m, pair, x, &distance);
+  if (gap <= 0.02 || gap >= width) return;
+  SbBarrierPair(m, pair, gap, &distance, x, width, pressure, &energy, gradient, H);
+  for (int k = 0; k < 3 * nv; k++) {
+    PetscReal side[2], g[2][12];
+
+    for (int s = 0; s < 2; s++) {
+      x[k] += s ? 2. * step : -step;
+      side[s] = energy_at(m, pair, x, g[s]);
+    }
+    x[k] -= step;
+    SB_CHECK_NEAR((side[1] - side[0]) / (2. * step), gradient[k],
+                  2e-4 * (pressure + PetscAbsReal(gradient[k])), "gradient");
+    for (int l = 0; l < 3 * nv; l++) reference[12 * k + l] = (g[1][l] - g[0][l]) / (2. * step);
+  }
+
+  /* the feature may change within the differences: there they are not symmetric or large, and the pair is passed over */
+  for (int k = 0; k < 144; k++) {
+    largest = PetscMax(largest, PetscAbsReal(reference[k]));
+    worst = PetscMax(worst, PetscAbsReal(reference[k] - reference[12 * (k % 12) + k / 12]));
+  }
+  if (worst > 1e-4 * largest) return;
+  SbSymmetricClamp(12, reference);
+  for (int k = 0; k < 3 * nv; k++) {
+    for (int l = 0; l < 3 * nv; l++)
+      SB_CHECK_NEAR(H[12 * k + l], reference[12 * k + l], 2e-3 * largest + 1e-6,
+                    "second derivative, positive part");
+  }
+  (*tried)++;
+}
+
+int main(int argc, char **argv)
+{
+  SB_TEST_BEGIN(argc, argv);
+  PetscReal x[12], X[12];
+  struct _p_SbContactMesh mesh = {.nbody_vertex = 4, .nvertex = 4, .X = X};
+  SbContactPair pair = {.kind = SB_PAIR_VERTEX_TRIANGLE, .v = {0, 1, 2, 3}, .area = 0.7};
+  PetscInt tried[5] = {0};
+
+  check_function();
+  for (int i = 0; i < NRANDOM; i++) {
+    for (int k = 0; k < 12; k++) X[k] = x[k] = pair_random();
+    pair.side = PETSC_FALSE;
+    mesh.side = SB_SIDE_NONE;
+    mesh.radius = 0.;
+    mesh.nbody_vertex = 4;
+    pair.kind = SB_PAIR_VERTEX_TRIANGLE;
+    check_pair(&mesh, &pair, x, 4, &tried[0]);
+    pair.kind = SB_PAIR_EDGE_EDGE;
+    check_pair(&mesh, &pair, x, 4, &tried[1]);
+
+    /* nearly parallel ones, a little apart */
+    for (int k = 0; k < 3; k++) {
+      x[6 + k] = x[k] + 0.1 * pair_random() + (k == 2 ? 0.2 : 0.);
+      x[9 + k] = x[6 + k] + x[3 + k] - x[k] + 0.01 * pair_random();
+    }
+    check_pair(&mesh, &pair, x, 4, &tried[2]);
+
+    /* a half-space and a bowl: only the first vertex moves */
+    pair.side = PETSC_TRUE;
+    mesh.nbody_vertex = 1;
+    mesh.side = SB_SIDE_PLANE;
+    for (int k = 0; k < 3; k++) x[6 + k] = x[3 + k] + (k == 2);
+    check_pair(&mesh, &pair, x, 1, &tried[3]);
+    mesh.side = SB_SIDE_BOWL;
+    mesh.radius = 1.;
+    check_pair(&mesh, &pair, x, 1, &tried[4]);
+  }
+  for (int k = 0; k < 5; k++) SB_CHECK(tried[k] > 100, "%d pairs of kind %d examined", (int)tried[k], k);
+  SB_TEST_END();
+}
