@@ -271,7 +271,7 @@ static PetscErrorCode make_edges(SbContactMesh m, PetscBool lone)
     side[i][1] = PetscMax(a, b);
     side[i][2] = i / 3;
   }
-  qsort(side, (size_t)(3 * m->ntriangle), sizeof(*side), compare_edges);
+  qsort(side, 3 * (size_t)m->ntriangle, sizeof(*side), compare_edges);
   PetscCall(PetscMalloc2(6 * m->ntriangle + 2, &m->edge, 3 * m->ntriangle + 1, &m->edge_area));
   for (PetscInt i = 0; i < 3 * m->ntriangle; i++) {
     const PetscReal area = triangle_area(m->X, m->triangle + 3 * side[i][2]) / 3.;

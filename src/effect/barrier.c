@@ -717,7 +717,7 @@ static PetscErrorCode summary_barrier(SbEffect e, SbSpace s, size_t size, char t
   if (most)
     (void)snprintf(text, size,
                    "%" PetscInt_FMT " pairs at most on a rank, smallest gap %.3g m of a width of %.3g m, "
-                                    "shortest safe part of an iteration %.2g",
+                   "shortest safe part of an iteration %.2g",
                    most, (double)value[0], (double)b->w[0], (double)value[1]);
   else
     (void)snprintf(text, size, "nothing came nearer than %.3g m", (double)b->w[0]);

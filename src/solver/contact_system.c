@@ -25,7 +25,8 @@ PetscErrorCode SbBlocksAdd(SbBlocks *b, PetscInt row, PetscInt column, const Pet
   }
   b->node[b->n][0] = row;
   b->node[b->n][1] = column;
-  PetscCall(PetscArraycpy(b->block[b->n++], block, 9));
+  PetscCall(PetscArraycpy(b->block[b->n], block, 9));
+  b->n++;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
