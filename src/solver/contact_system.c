@@ -1,18 +1,39 @@
 /*
   contact_system.c - linear systems of bodies that touch: the tangent and blocks between nodes that share no cell.
 
-  The places of the blocks change from iteration to iteration, those of the tangent never do. So both are merged row by row into one matrix, which is
-  made anew each time, and factored.
+  Both are one matrix of 3x3 blocks, whose pattern grows where contact needs it; what contact has not used for KEEP solves is dropped when it grows
+  the next time. So most iterations bring values only: the factor's elimination and the coarse space stay.
+
+  Small systems, and those where contact has a large share of the nodes, are factored on one rank (block_solver.c). Others are solved by CG with the coarse space of
+  contact_coarse.c, to a tolerance of FORCING in the norm of the preconditioner; where CG takes too long, they are factored, too. A matrix that is not
+  positive definite fails: in the factor, or by a direction of CG with negative curvature. With -pc_type or -contact_pc_type, PETSc's preconditioner of that name takes the place of
+  both; -ksp_type and -contact_ksp_type name another method than CG.
 */
-#include "sbassembly.h"
+#include "contact_coarse.h"
 #include "sbsolver.h"
+
+#define KEEP 20         /* solves for which a place without values stays */
+#define SMALL 5000      /* unknowns that are factored */
+#define SHARE (1. / 3.) /* of nodes of contact, above which all are */
+#define FORCING 1e-3    /* of the preconditioned residual */
+#define MOST 300        /* iterations */
 
 struct _p_SbContactSystem {
   SbSpace space;
+  SbContactRows rows;
+  PetscInt *all;          /* [nnode_owned] their numbers */
+  PetscInt *ka, *kj;      /* of the tangent: [n+1], [ka[n]] global nodes */
+  PetscInt *place;        /* [ka[n]] of its blocks in the rows */
+  PetscInt *used;         /* [rows.ia[n]] solve in which contact used the place last; -1: the tangent's */
+  PetscInt *last;         /* [n] solve in which contact used the row last, -1: never */
+  PetscInt nsolve, nnode; /* nodes of contact, of all ranks */
+  PetscReal *tangent;     /* [ka[n]][9] */
+  PetscBool factored, fresh[2]; /* by the choice made; matrix and factor do not have the values yet */
+  PetscBool foreign[2];         /* pattern is other than theirs */
+  char method[32], type[32];    /* of the user's */
+  SbBlockSolver factor;
   KSP ksp;
   Mat A;
-  PetscInt *all;     /* [nnode_owned] their numbers */
-  PetscInt *ia, *ja; /* of the tangent */
 };
 
 PetscErrorCode SbBlocksAdd(SbBlocks *b, PetscInt row, PetscInt column, const PetscReal block[9])
@@ -41,120 +62,264 @@ PetscErrorCode SbBlocksFree(SbBlocks *b)
 
 PetscErrorCode SbContactSystemCreate(SbSpace s, SbContactSystem *system)
 {
+  const PetscInt n = s->nnode_owned;
   SbContactSystem c;
 
   PetscFunctionBeginUser;
   PetscCall(PetscNew(&c));
   *system = c;
   c->space = s;
+  c->rows.n = n;
+  PetscCall(PetscMalloc3(n, &c->all, n + 1, &c->ka, n, &c->last));
+  for (PetscInt i = 0; i < n; i++) {
+    c->all[i] = i;
+    c->last[i] = -1;
+  }
+  PetscCall(SbSpaceGetRows(s, NULL, n, c->all, c->ka, NULL, NULL));
+  PetscCall(PetscMalloc3(c->ka[n], &c->kj, c->ka[n], &c->place, 9 * (size_t)c->ka[n], &c->tangent));
+  PetscCall(SbSpaceGetRows(s, NULL, n, c->all, c->ka, c->kj, NULL));
+  for (PetscInt k = 0; k < c->ka[n]; k++) c->kj[k] = s->gnode[c->kj[k]];
+  PetscCall(PetscCalloc2(n + 1, &c->rows.ia, n, &c->rows.contact));
+  PetscCall(PetscOptionsGetString(NULL, NULL, "-ksp_type", c->method, sizeof(c->method), NULL));
+  PetscCall(PetscOptionsGetString(NULL, NULL, "-contact_ksp_type", c->method, sizeof(c->method), NULL));
+  PetscCall(PetscOptionsGetString(NULL, NULL, "-pc_type", c->type, sizeof(c->type), NULL));
+  PetscCall(PetscOptionsGetString(NULL, NULL, "-contact_pc_type", c->type, sizeof(c->type), NULL));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* What does not change: where the tangent has its blocks. */
-static PetscErrorCode set_up(SbContactSystem c)
-{
-  const SbSpace s = c->space;
+/* ------------------------------------------------------------------ the matrix */
 
-  PetscFunctionBeginUser;
-  PetscCall(PetscMalloc2(s->nnode_owned, &c->all, s->nnode_owned + 1, &c->ia));
-  for (PetscInt i = 0; i < s->nnode_owned; i++) c->all[i] = i;
-  PetscCall(SbSpaceGetRows(s, NULL, s->nnode_owned, c->all, c->ia, NULL, NULL));
-  PetscCall(PetscMalloc1(c->ia[s->nnode_owned], &c->ja));
-  PetscCall(SbSpaceGetRows(s, NULL, s->nnode_owned, c->all, c->ia, c->ja, NULL));
-  for (PetscInt k = 0; k < c->ia[s->nnode_owned]; k++) c->ja[k] = s->gnode[c->ja[k]];
-  PetscFunctionReturn(PETSC_SUCCESS);
+/* The place of column g in row r, -1: none. */
+static PetscInt find_place(const SbContactRows *rows, PetscInt r, PetscInt g)
+{
+  PetscInt low = rows->ia[r], high = rows->ia[r + 1];
+
+  while (low < high) {
+    const PetscInt mid = low + (high - low) / 2;
+
+    if (rows->ja[mid] == g) return mid;
+    if (rows->ja[mid] < g)
+      low = mid + 1;
+    else
+      high = mid;
+  }
+  return -1;
 }
 
-/* A factorisation for c->A; a new one each time, as one that gathers the matrix on a rank (PCTELESCOPE) cannot be given another. */
-static PetscErrorCode create_solver(SbContactSystem c)
+/* A pattern with room for the blocks; nodes of contact are marked. */
+static PetscErrorCode make_pattern(SbContactSystem c, const SbBlocks *b)
 {
-  const SbSpace s = c->space;
-  const char *package;
-  PC pc;
+  const PetscInt n = c->rows.n;
+  PetscInt *first, *order, *ia, *ja, *used, most = 0, nz = 0, *column, *stamp;
+  const SbContactRows old = c->rows;
 
   PetscFunctionBeginUser;
-  PetscCall(KSPDestroy(&c->ksp));
-  PetscCall(KSPCreate(s->comm, &c->ksp));
-  PetscCall(KSPSetOptionsPrefix(c->ksp, "contact_"));
-  PetscCall(KSPSetType(c->ksp, KSPPREONLY));
-  PetscCall(KSPGetPC(c->ksp, &pc));
-  PetscCall(SbDirectPackage(s->comm, 3 * s->Nnode, PETSC_TRUE, &package));
-  PetscCheck(package, s->comm, PETSC_ERR_USER,
-             "Contact with -effect_NAME_response barrier needs a factorisation: build PETSc with SuiteSparse "
-             "or MUMPS");
-  PetscCall(SbPCDirectSet(pc, package, PETSC_TRUE));
-  PetscCall(KSPSetOperators(c->ksp, c->A, c->A));
-  PetscCall(KSPSetFromOptions(c->ksp));
-  PetscCall(SbPCCheckPivots(pc));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* The matrix of both, rows in ascending columns. */
-static PetscErrorCode merge(SbContactSystem c, Mat K, const SbBlocks *b)
-{
-  const SbSpace s = c->space;
-  const PetscInt n = s->nnode_owned;
-  PetscInt *first, *order, *i, *j, *slot, *column, *from, most = 0, nnz = 0;
-  PetscReal *value;
-  PetscScalar *a;
-
-  PetscFunctionBeginUser;
-  PetscCall(PetscMalloc1(9 * (size_t)c->ia[n], &value));
-  PetscCall(SbSpaceGetRows(s, K, n, c->all, c->ia, NULL, value));
-
   /* blocks by rows */
   PetscCall(PetscCalloc1(n + 2, &first));
   PetscCall(PetscMalloc1(b->n, &order));
   for (PetscInt k = 0; k < b->n; k++) first[b->node[k][0] + 2]++;
   for (PetscInt r = 0; r < n; r++) first[r + 2] += first[r + 1];
   for (PetscInt k = 0; k < b->n; k++) order[first[b->node[k][0] + 1]++] = k;
-  for (PetscInt r = 0; r < n; r++) most = PetscMax(most, c->ia[r + 1] - c->ia[r] + first[r + 1] - first[r]);
+  for (PetscInt r = 0; r < n; r++)
+    most = PetscMax(most, c->ka[r + 1] - c->ka[r] + first[r + 1] - first[r] + old.ia[r + 1] - old.ia[r]);
 
-  /* each row: its columns in order, every entry of the tangent and of the blocks added at its place */
-  PetscCall(PetscMalloc3(most, &slot, most, &column, most, &from));
-  PetscCall(PetscMalloc1(3 * n + 1, &i));
-  PetscCall(PetscMalloc1(9 * (size_t)(c->ia[n] + b->n), &j));
-  PetscCall(PetscCalloc1(9 * (size_t)(c->ia[n] + b->n), &a));
-  i[0] = 0;
+  /* each row: columns of the tangent, of the old pattern as far as they are used, of the blocks */
+  PetscCall(PetscMalloc2(most, &column, most, &stamp));
+  PetscCall(PetscMalloc1(n + 1, &ia));
+  PetscCall(PetscMalloc2(c->ka[n] + b->n + old.ia[n], &ja, c->ka[n] + b->n + old.ia[n], &used));
+  ia[0] = 0;
   for (PetscInt r = 0; r < n; r++) {
-    const PetscInt own = c->ia[r + 1] - c->ia[r], more = first[r + 1] - first[r];
-    PetscInt ncolumn = 0;
+    PetscInt m = 0;
 
-    for (PetscInt k = 0; k < own + more; k++) {
-      column[k] = k < own ? c->ja[c->ia[r] + k] : b->node[order[first[r] + k - own]][1];
-      from[k] = k;
+    for (PetscInt k = c->ka[r]; k < c->ka[r + 1]; k++, m++) {
+      column[m] = c->kj[k];
+      stamp[m] = -1;
     }
-    PetscCall(PetscSortIntWithArray(own + more, column, from));
-    for (PetscInt k = 0; k < own + more; k++) {
-      if (!k || column[k] != column[k - 1]) column[ncolumn++] = column[k];
-      slot[k] = ncolumn - 1;
+    for (PetscInt k = old.ia[r]; k < old.ia[r + 1]; k++) {
+      if (c->used[k] < 0 || c->used[k] + KEEP < c->nsolve) continue;
+      column[m] = old.ja[k];
+      stamp[m++] = c->used[k];
     }
-    for (int p = 0; p < 3; p++) {
-      for (PetscInt k = 0; k < 3 * ncolumn; k++) j[nnz + 3 * ncolumn * p + k] = 3 * column[k / 3] + k % 3;
-      i[3 * r + p + 1] = nnz + 3 * ncolumn * (p + 1);
+    for (PetscInt k = first[r]; k < first[r + 1]; k++, m++) {
+      column[m] = b->node[order[k]][1];
+      stamp[m] = c->nsolve;
     }
-    for (PetscInt k = 0; k < own + more; k++) {
-      const PetscReal *block =
-        from[k] < own ? value + 9 * (size_t)(c->ia[r] + from[k]) : b->block[order[first[r] + from[k] - own]];
-
-      for (int p = 0; p < 9; p++) a[nnz + 3 * ncolumn * (p / 3) + 3 * slot[k] + p % 3] += block[p];
+    PetscCall(PetscSortIntWithArray(m, column, stamp));
+    for (PetscInt k = 0; k < m; k++) {
+      if (!k || column[k] != column[k - 1]) {
+        ja[nz] = column[k];
+        used[nz++] = stamp[k];
+      } else
+        used[nz - 1] = used[nz - 1] < 0 || stamp[k] < 0 ? -1 : PetscMax(used[nz - 1], stamp[k]);
     }
-    nnz += 9 * ncolumn;
+    ia[r + 1] = nz;
+    c->rows.contact[r] =
+      (uint8_t)(c->space->fixed[r] != 7 && c->last[r] >= 0 && c->last[r] + KEEP >= c->nsolve);
   }
-  PetscCall(MatDestroy(&c->A));
-  PetscCall(MatCreate(s->comm, &c->A));
-  PetscCall(MatSetSizes(c->A, 3 * n, 3 * n, 3 * s->Nnode, 3 * s->Nnode));
-  PetscCall(MatSetType(c->A, MATAIJ));
-  PetscCall(MatSeqAIJSetPreallocationCSR(c->A, i, j, a));
-  PetscCall(MatMPIAIJSetPreallocationCSR(c->A, i, j, a));
-  PetscCall(MatSetOption(c->A, MAT_SYMMETRIC, PETSC_TRUE));
-  PetscCall(PetscFree(a));
-  PetscCall(PetscFree(j));
-  PetscCall(PetscFree(i));
-  PetscCall(PetscFree3(slot, column, from));
+  PetscCall(PetscFree2(column, stamp));
   PetscCall(PetscFree(order));
   PetscCall(PetscFree(first));
-  PetscCall(PetscFree(value));
+  PetscCall(PetscFree2(c->rows.ja, c->used));
+  PetscCall(PetscFree(c->rows.value));
+  PetscCall(PetscArraycpy(c->rows.ia, ia, n + 1));
+  PetscCall(PetscFree(ia));
+  c->rows.ja = ja;
+  c->used = used;
+  PetscCall(PetscMalloc1(9 * (size_t)nz, &c->rows.value));
+  for (PetscInt r = 0; r < n; r++) {
+    for (PetscInt k = c->ka[r]; k < c->ka[r + 1]; k++) c->place[k] = find_place(&c->rows, r, c->kj[k]);
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The values of both. */
+static PetscErrorCode merge(SbContactSystem c, Mat K, const SbBlocks *b)
+{
+  SbContactRows *rows = &c->rows;
+  PetscBool missing = (PetscBool)!rows->value;
+  PetscInt nnode = 0, *place;
+
+  PetscFunctionBeginUser;
+  c->nsolve++;
+  PetscCall(PetscMalloc1(b->n, &place));
+  for (PetscInt k = 0; k < b->n; k++) {
+    c->last[b->node[k][0]] = c->nsolve;
+    if (c->space->fixed[b->node[k][0]] != 7 && !rows->contact[b->node[k][0]]) missing = PETSC_TRUE;
+    place[k] = missing ? -1 : find_place(rows, b->node[k][0], b->node[k][1]);
+    if (place[k] < 0) missing = PETSC_TRUE;
+  }
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &missing, 1, SB_MPI_BOOL, MPI_LOR, c->space->comm));
+  if (missing) {
+    PetscCall(make_pattern(c, b));
+    for (PetscInt k = 0; k < b->n; k++) place[k] = find_place(rows, b->node[k][0], b->node[k][1]);
+    for (PetscInt i = 0; i < rows->n; i++) nnode += rows->contact[i];
+    PetscCallMPI(MPI_Allreduce(&nnode, &c->nnode, 1, MPIU_INT, MPI_SUM, c->space->comm));
+    c->foreign[0] = c->foreign[1] = PETSC_TRUE;
+  }
+  PetscCall(SbSpaceGetRows(c->space, K, rows->n, c->all, c->ka, NULL, c->tangent));
+  PetscCall(PetscArrayzero(rows->value, 9 * (size_t)rows->ia[rows->n]));
+  for (PetscInt k = 0; k < c->ka[rows->n]; k++)
+    PetscCall(PetscArraycpy(rows->value + 9 * (size_t)c->place[k], c->tangent + 9 * (size_t)k, 9));
+  for (PetscInt k = 0; k < b->n; k++) {
+    PetscReal *to = rows->value + 9 * (size_t)place[k];
+
+    if (c->used[place[k]] >= 0) c->used[place[k]] = c->nsolve;
+    for (int e = 0; e < 9; e++) to[e] += b->block[k][e];
+  }
+  PetscCall(PetscFree(place));
+  c->fresh[0] = c->fresh[1] = PETSC_TRUE;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Values of the rows in the parts of the matrix, whose blocks are stored by columns. */
+static PetscErrorCode fill_matrix(SbContactSystem c)
+{
+  const SbContactRows *rows = &c->rows;
+  const PetscInt first = c->space->gnode_start;
+  Mat part[2] = {c->A, NULL};
+  PetscScalar *to[2] = {NULL, NULL};
+  PetscBool parallel;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscObjectTypeCompare((PetscObject)c->A, MATMPIBAIJ, &parallel));
+  if (parallel) PetscCall(MatMPIBAIJGetSeqBAIJ(c->A, &part[0], &part[1], NULL));
+  for (int k = 0; k < 2 && part[k]; k++) PetscCall(MatSeqBAIJGetArray(part[k], &to[k]));
+  for (PetscInt k = 0; k < rows->ia[rows->n]; k++) {
+    const int q = rows->ja[k] < first || rows->ja[k] >= first + rows->n;
+
+    for (int e = 0; e < 9; e++) to[q][3 * (e % 3) + e / 3] = rows->value[9 * (size_t)k + (size_t)e];
+    to[q] += 9;
+  }
+  for (int k = 0; k < 2 && part[k]; k++) PetscCall(MatSeqBAIJRestoreArray(part[k], &to[k]));
+  PetscCall(MatAssemblyBegin(c->A, MAT_FINAL_ASSEMBLY));
+  PetscCall(MatAssemblyEnd(c->A, MAT_FINAL_ASSEMBLY));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ solutions */
+
+/* PETSc's matrix, and CG or what the user wants in its place. */
+static PetscErrorCode set_up_iteration(SbContactSystem c)
+{
+  const SbSpace s = c->space;
+  const SbContactRows *rows = &c->rows;
+  PetscBool own = (PetscBool)!c->type[0];
+  Mat P;
+  PC pc;
+
+  PetscFunctionBeginUser;
+  if (c->foreign[0]) {
+    PetscCall(MatDestroy(&c->A));
+    PetscCall(MatCreate(s->comm, &c->A));
+    PetscCall(MatSetSizes(c->A, 3 * rows->n, 3 * rows->n, 3 * s->Nnode, 3 * s->Nnode));
+    PetscCall(MatSetBlockSize(c->A, 3));
+    PetscCall(MatSetType(c->A, MATBAIJ));
+    PetscCall(MatSeqBAIJSetPreallocationCSR(c->A, 3, rows->ia, rows->ja, NULL));
+    PetscCall(MatMPIBAIJSetPreallocationCSR(c->A, 3, rows->ia, rows->ja, NULL));
+  }
+  PetscCall(fill_matrix(c));
+  if (!c->ksp) {
+    PetscCall(KSPCreate(s->comm, &c->ksp));
+    PetscCall(KSPSetOptionsPrefix(c->ksp, "contact_"));
+    PetscCall(KSPSetType(c->ksp, c->method[0] ? c->method : KSPCG));
+    PetscCall(KSPSetTolerances(c->ksp, FORCING, PETSC_DEFAULT, 1e10, MOST));
+    PetscCall(KSPGetPC(c->ksp, &pc));
+    if (own) {
+      PetscCall(SbPCContactCreate(s, rows, pc));
+      PetscCall(KSPSetInitialGuessNonzero(c->ksp, PETSC_TRUE));
+    } else
+      PetscCall(PCSetType(pc, c->type));
+    PetscCall(KSPSetFromOptions(c->ksp));
+  }
+  P = c->A;
+  if (!own) { /* what most of PETSc's preconditioners take */
+    PetscCall(MatConvert(c->A, MATAIJ, MAT_INITIAL_MATRIX, &P));
+    PetscCall(MatSetOption(P, MAT_SYMMETRIC, PETSC_TRUE));
+  }
+  PetscCall(KSPSetOperators(c->ksp, P, P));
+  if (!own) PetscCall(MatDestroy(&P));
+  PetscCall(KSPGetPC(c->ksp, &pc));
+  if (own) PetscCall(SbPCContactUpdate(pc, c->foreign[0]));
+  c->foreign[0] = c->fresh[0] = PETSC_FALSE;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode iterate(SbContactSystem c, Vec F, Vec Y, KSPConvergedReason *reason,
+                              PetscInt *iterations)
+{
+  PC pc;
+
+  PetscFunctionBeginUser;
+  if (c->fresh[0]) PetscCall(set_up_iteration(c));
+  PetscCall(KSPGetPC(c->ksp, &pc));
+  PetscCall(KSPSetUp(c->ksp));
+  if (!c->type[0]) PetscCall(SbPCContactGuess(pc, F, Y));
+  PetscCall(KSPSolve(c->ksp, F, Y));
+  PetscCall(KSPGetConvergedReason(c->ksp, reason));
+  PetscCall(KSPGetIterationNumber(c->ksp, iterations));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode factor(SbContactSystem c, Vec F, Vec Y, KSPConvergedReason *reason)
+{
+  const SbContactRows *rows = &c->rows;
+  const PetscScalar *f;
+  PetscScalar *y;
+  PetscBool ok = PETSC_TRUE;
+
+  PetscFunctionBeginUser;
+  if (!c->factor) PetscCall(SbBlockSolverCreate(c->space->comm, &c->factor));
+  if (c->fresh[1])
+    PetscCall(SbBlockSolverSetUp(c->factor, rows->n, rows->ia, rows->ja, rows->value, c->foreign[1], &ok));
+  if (c->fresh[1]) c->foreign[1] = PETSC_FALSE;
+  c->fresh[1] = (PetscBool)!ok;
+  *reason = ok ? KSP_CONVERGED_ITS : KSP_DIVERGED_PC_FAILED;
+  if (!ok) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(VecGetArrayRead(F, &f));
+  PetscCall(VecGetArray(Y, &y));
+  PetscCall(SbBlockSolverSolve(c->factor, f, y));
+  PetscCall(VecRestoreArray(Y, &y));
+  PetscCall(VecRestoreArrayRead(F, &f));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -162,14 +327,17 @@ PetscErrorCode SbContactSystemSolve(SbContactSystem c, Mat K, const SbBlocks *bl
                                     Vec Y, KSPConvergedReason *reason, PetscInt *iterations)
 {
   PetscFunctionBeginUser;
-  if (!c->ja) PetscCall(set_up(c));
-  if (fresh || !c->A) {
-    PetscCall(merge(c, K, blocks));
-    PetscCall(create_solver(c));
+  if (fresh || !c->rows.value) PetscCall(merge(c, K, blocks));
+  c->factored =
+    (PetscBool)(3 * c->space->Nnode <= SMALL || (PetscReal)c->nnode > SHARE * (PetscReal)c->space->Nnode);
+  if (c->type[0]) c->factored = (PetscBool)(!strcmp(c->type, PCCHOLESKY) || !strcmp(c->type, PCLU));
+  *iterations = 0;
+  *reason = KSP_DIVERGED_ITS;
+  if (!c->factored) PetscCall(iterate(c, F, Y, reason, iterations));
+  if (c->factored || (*reason == KSP_DIVERGED_ITS && !c->type[0])) {
+    PetscCall(factor(c, F, Y, reason));
+    ++*iterations;
   }
-  PetscCall(KSPSolve(c->ksp, F, Y));
-  PetscCall(KSPGetConvergedReason(c->ksp, reason));
-  PetscCall(KSPGetIterationNumber(c->ksp, iterations));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -181,8 +349,12 @@ PetscErrorCode SbContactSystemDestroy(SbContactSystem *system)
   if (!c) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(KSPDestroy(&c->ksp));
   PetscCall(MatDestroy(&c->A));
-  PetscCall(PetscFree2(c->all, c->ia));
-  PetscCall(PetscFree(c->ja));
+  PetscCall(SbBlockSolverDestroy(&c->factor));
+  PetscCall(PetscFree3(c->all, c->ka, c->last));
+  PetscCall(PetscFree3(c->kj, c->place, c->tangent));
+  PetscCall(PetscFree2(c->rows.ia, c->rows.contact));
+  PetscCall(PetscFree2(c->rows.ja, c->used));
+  PetscCall(PetscFree(c->rows.value));
   PetscCall(PetscFree(*system));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -36,6 +36,9 @@ struct _p_SbFactor {
   float *scale;  /* [3 nfree][2] of each column, in the diagonal block and below */
   float *w;      /* [3 n] right-hand side and solution in order of elimination */
   float *below;  /* [tallest] rows below a panel */
+  /* kept as it is */
+  size_t *column;     /* [nsuper+1] where the columns of a group are in L; NULL: it is not */
+  PetscScalar *L, *y; /* their fronts, column-major; [3 n + tallest] solution, rows below a group */
 };
 
 static PetscErrorCode cut_panels(SbFactor f)
@@ -74,7 +77,7 @@ PetscErrorCode SbFactorCreate(PetscInt n, PetscInt nkeep, const PetscInt ia[], c
 
   PetscFunctionBeginUser;
   PetscCall(PetscNew(&f));
-  PetscCall(SbEliminationCreate(n, nkeep, ia, ja, &f->e));
+  PetscCall(SbEliminationCreate(n, nkeep, ia, ja, NULL, &f->e));
   PetscCall(cut_panels(f));
   /* reading may run ahead of the last panel */
   PetscCall(allocate_pages(sizeof(*f->word) * (f->nword + 4096), &f->word));
@@ -85,12 +88,42 @@ PetscErrorCode SbFactorCreate(PetscInt n, PetscInt nkeep, const PetscInt ia[], c
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscErrorCode SbFactorCreateExact(PetscInt n, const PetscInt ia[], const PetscInt ja[],
+                                   const PetscInt order[], SbFactor *factor)
+{
+  const SbElimination *e;
+  SbFactor f;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscNew(&f));
+  PetscCall(SbEliminationCreate(n, 0, ia, ja, order, &f->e));
+  e = &f->e;
+  PetscCall(PetscMalloc1(e->nsuper + 1, &f->column));
+  f->column[0] = 0;
+  for (PetscInt g = 0; g < e->nsuper; g++) {
+    const PetscInt ncol = 3 * (e->first[g + 1] - e->first[g]), nall = 3 * (e->start[g + 1] - e->start[g]);
+
+    f->column[g + 1] = f->column[g] + (size_t)ncol * (size_t)nall;
+    f->tallest = PetscMax(f->tallest, nall);
+  }
+  PetscCall(PetscMalloc2(f->column[e->nsuper], &f->L, 3 * n + f->tallest, &f->y));
+  *factor = f;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+const PetscInt *SbFactorOrder(SbFactor f)
+{
+  return f->e.order;
+}
+
 PetscErrorCode SbFactorDestroy(SbFactor *f)
 {
   PetscFunctionBeginUser;
   if (!*f) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(SbEliminationDestroy(&(*f)->e));
   PetscCall(PetscFree((*f)->panel));
+  PetscCall(PetscFree((*f)->column));
+  PetscCall(PetscFree2((*f)->L, (*f)->y));
   free((*f)->word);
   free((*f)->scale);
   free((*f)->w);
@@ -102,12 +135,16 @@ PetscErrorCode SbFactorDestroy(SbFactor *f)
 void SbFactorSize(SbFactor f, PetscInt64 *entries, PetscInt64 *bytes)
 {
   *entries = 0;
+  *bytes = (PetscInt64)(sizeof(*f->word) * f->nword);
+  if (f->column) {
+    *entries = (PetscInt64)f->column[f->e.nsuper];
+    *bytes = (PetscInt64)sizeof(*f->L) * *entries;
+  }
   for (PetscInt q = 0; q < f->npanel; q++) {
     const PetscInt64 ncol = 3 * f->panel[q].ncol;
 
     *entries += ncol * (ncol + 1) / 2 + ncol * 3 * f->panel[q].nrow;
   }
-  *bytes = (PetscInt64)(sizeof(*f->word) * f->nword);
 }
 
 /* ------------------------------------------------------------------ numeric factorisation */
@@ -233,7 +270,8 @@ PetscErrorCode SbFactorNumeric(SbFactor f, const PetscInt ia[], const PetscInt j
   for (PetscInt g = 0; g < e->nsuper && *ok; g++) {
     PetscCall(eliminate(f, g, ia, ja, block, &work, ok));
     if (!*ok) break;
-    // its factored columns are rounded into its panels: diagonal blocks inverted, rows below as they are
+    // its factored columns are kept, or rounded into its panels: diagonal blocks inverted, rows below as they are
+    if (f->column) PetscCall(PetscArraycpy(f->L + f->column[g], work.front, f->column[g + 1] - f->column[g]));
     for (; q < f->npanel && f->panel[q].group == g; q++) {
       const Panel *p = &f->panel[q];
       const size_t m = 3 * (size_t)p->ncol, ld = 3 * (size_t)(e->start[g + 1] - e->start[g]);
@@ -355,4 +393,44 @@ void SbFactorBackward(SbFactor f, const float kept[], float x[])
   for (PetscInt i = 0; i < e->n; i++) {
     for (PetscInt c = 0; c < 3; c++) x[3 * e->order[i] + c] = f->w[3 * i + c];
   }
+}
+
+PetscErrorCode SbFactorSolve(SbFactor f, const PetscReal b[], PetscReal x[])
+{
+  const SbElimination *e = &f->e;
+  const PetscScalar one = 1., minus = -1., zero = 0.;
+  const PetscBLASInt unit = 1;
+  PetscScalar *y = f->y, *below = f->y + 3 * e->n;
+
+  PetscFunctionBeginUser;
+  for (PetscInt i = 0; i < 3 * e->n; i++) y[i] = b[3 * e->order[i / 3] + i % 3];
+  // L, from the first group to the last, then its transpose the other way
+  for (PetscInt step = 0; step < 2 * e->nsuper; step++) {
+    const PetscBool back = (PetscBool)(step >= e->nsuper);
+    const PetscInt g = back ? 2 * e->nsuper - 1 - step : step, *row = e->list + e->start[g];
+    const PetscInt ncol = e->first[g + 1] - e->first[g], nall = e->start[g + 1] - e->start[g];
+    const PetscScalar *L = f->L + f->column[g];
+    PetscBLASInt n, m, ld;
+
+    PetscCall(PetscBLASIntCast(3 * ncol, &n));
+    PetscCall(PetscBLASIntCast(3 * (nall - ncol), &m));
+    PetscCall(PetscBLASIntCast(3 * nall, &ld));
+    if (back) {
+      for (PetscInt k = 0; k < m; k++) below[k] = y[3 * row[ncol + k / 3] + k % 3];
+      if (m)
+        PetscCallBLAS("BLASgemv", BLASgemv_("T", &m, &n, &minus, L + n, &ld, below, &unit, &one,
+                                            y + 3 * e->first[g], &unit));
+      PetscCallBLAS("BLAStrsm",
+                    BLAStrsm_("L", "L", "T", "N", &n, &unit, &one, L, &ld, y + 3 * e->first[g], &n));
+    } else {
+      PetscCallBLAS("BLAStrsm",
+                    BLAStrsm_("L", "L", "N", "N", &n, &unit, &one, L, &ld, y + 3 * e->first[g], &n));
+      if (m)
+        PetscCallBLAS("BLASgemv", BLASgemv_("N", &m, &n, &one, L + n, &ld, y + 3 * e->first[g], &unit, &zero,
+                                            below, &unit));
+      for (PetscInt k = 0; k < m; k++) y[3 * row[ncol + k / 3] + k % 3] -= below[k];
+    }
+  }
+  for (PetscInt i = 0; i < 3 * e->n; i++) x[3 * e->order[i / 3] + i % 3] = y[i];
+  PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -1,5 +1,5 @@
 /*
-  factor.h - sparse Cholesky factor of a matrix of 3x3 blocks, kept in 16-bit integers: for preconditioners only.
+  factor.h - sparse Cholesky factor of a matrix of 3x3 blocks, kept in 16-bit integers for preconditioners, or as it is.
 
   The last `nkeep` nodes are not eliminated: their Schur complement is handed out, which is what joins the factors of
   several ranks (pc_rotated.c).
@@ -25,15 +25,21 @@ typedef struct {
   SbEliminationCreate - nested dissection by METIS, elimination tree, groups of columns.
 
   Not collective. Input: n nodes; nkeep; ia[n-nkeep+1], ja: columns of the rows of the eliminated nodes (a symmetric graph;
-  the node itself may be among them). Output: owned by the caller, freed by SbEliminationDestroy().
+  the node itself may be among them); order[n-nkeep], an order to take instead, NULL: METIS finds one. Output: owned by the
+  caller, freed by SbEliminationDestroy().
 */
 PetscErrorCode SbEliminationCreate(PetscInt n, PetscInt nkeep, const PetscInt ia[], const PetscInt ja[],
-                                   SbElimination *e);
+                                   const PetscInt order[], SbElimination *e);
 PetscErrorCode SbEliminationDestroy(SbElimination *e);
 
 /* SbFactorCreate - everything that depends on the graph only (arguments as above). Not collective. */
 PetscErrorCode SbFactorCreate(PetscInt n, PetscInt nkeep, const PetscInt ia[], const PetscInt ja[],
                               SbFactor *f);
+/* The same with nkeep = 0 for a factor that is kept as it is: SbFactorSolve(). order: as above. Not collective. */
+PetscErrorCode SbFactorCreateExact(PetscInt n, const PetscInt ia[], const PetscInt ja[],
+                                   const PetscInt order[], SbFactor *f);
+/* The order of elimination, borrowed: [n] node at each position. */
+const PetscInt *SbFactorOrder(SbFactor f);
 /*
   SbFactorNumeric - factors new values.
 
@@ -53,6 +59,8 @@ PetscErrorCode SbFactorNumeric(SbFactor f, const PetscInt ia[], const PetscInt j
 */
 void SbFactorForward(SbFactor f, const float b[], float kept[]);
 void SbFactorBackward(SbFactor f, const float kept[], float x[]);
+/* A x = b with a factor of SbFactorCreateExact(); b and x [n][3] may be the same. Not collective. */
+PetscErrorCode SbFactorSolve(SbFactor f, const PetscReal b[], PetscReal x[]);
 /* Entries of the factor, and bytes that one pass reads. */
 void SbFactorSize(SbFactor f, PetscInt64 *entries, PetscInt64 *bytes);
 PetscErrorCode SbFactorDestroy(SbFactor *f);

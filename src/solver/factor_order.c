@@ -250,7 +250,7 @@ static PetscErrorCode store_groups(SbElimination *e, PetscInt ngroup, Group grou
 }
 
 PetscErrorCode SbEliminationCreate(PetscInt n, PetscInt nkeep, const PetscInt ia[], const PetscInt ja[],
-                                   SbElimination *e)
+                                   const PetscInt order[], SbElimination *e)
 {
   PetscInt *parent, *ancestor, ngroup = 0;
   Group *group;
@@ -259,7 +259,10 @@ PetscErrorCode SbEliminationCreate(PetscInt n, PetscInt nkeep, const PetscInt ia
   e->n = n;
   e->nfree = n - nkeep;
   PetscCall(PetscMalloc2(n, &e->order, n, &e->inverse));
-  PetscCall(dissect(e->nfree, ia, ja, e->order));
+  if (order)
+    PetscCall(PetscArraycpy(e->order, order, e->nfree));
+  else
+    PetscCall(dissect(e->nfree, ia, ja, e->order));
   for (PetscInt k = e->nfree; k < n; k++) e->order[k] = k;
   for (PetscInt k = 0; k < n; k++) e->inverse[e->order[k]] = k;
   PetscCall(PetscMalloc2(e->nfree, &parent, e->nfree, &ancestor));

@@ -126,6 +126,26 @@ static PetscErrorCode check_solve(const Problem *p, PetscRandom random, const ch
   }
   SB_CHECK(error < 2e-4 * size, "%s: error %g of %g", name, (double)error, (double)size);
   PetscCall(SbFactorDestroy(&f));
+
+  /* kept as it is: to rounding, in its own order and in a given one, in place */
+  for (int given = 0; given < 2 && !m; given++) {
+    PetscInt *order;
+    PetscReal *z;
+
+    PetscCall(PetscMalloc2(p->n, &order, n, &z));
+    for (PetscInt i = 0; i < p->n; i++) order[i] = p->n - 1 - i;
+    PetscCall(SbFactorCreateExact(p->n, p->ia, p->ja, given ? order : NULL, &f));
+    PetscCall(SbFactorNumeric(f, p->ia, p->ja, p->block, NULL, &ok));
+    SB_CHECK(ok, "%s: not positive definite when kept as it is", name);
+    for (PetscInt i = 0; i < n; i++) {
+      z[i] = 0.;
+      for (PetscInt j = 0; j < n; j++) z[i] += p->dense[i * n + j] * x[j];
+    }
+    PetscCall(SbFactorSolve(f, z, z));
+    for (PetscInt i = 0; i < n; i++) SB_CHECK_NEAR(z[i], x[i], 1e-9 * size, name);
+    PetscCall(SbFactorDestroy(&f));
+    PetscCall(PetscFree2(order, z));
+  }
   PetscCall(PetscFree(kept));
   PetscCall(PetscFree4(schur, x, b, y));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -1,0 +1,148 @@
+/*
+  A matrix of 3x3 blocks that rank 0 factors for all (factor.c): its rows go there, and each right-hand side; solutions come back.
+
+  The order of elimination is kept when the pattern grows by a little, as that of contact does from iteration to iteration: METIS is asked for
+  a new one only when the factor has become larger than WORSE times that of its last one.
+*/
+#include "block_solver.h"
+
+#define WORSE 1.25
+
+struct _p_SbBlockSolver {
+  MPI_Comm comm;
+  PetscMPIInt rank, size;
+  PetscInt n, N; /* block rows of this rank; rank 0: of all */
+  MPI_Datatype triple, block;
+  PetscMPIInt *row_count, *row_first, *entry_count, *entry_first; /* [size] */
+  PetscInt *ia, *ja;                                              /* rank 0: pattern of all rows */
+  PetscReal *value, *x; /* rank 0, several ranks: blocks of all rows; right-hand side and solution */
+  SbFactor factor;
+  PetscInt64 dissected; /* entries of the factor when METIS ordered it */
+};
+
+PetscErrorCode SbBlockSolverCreate(MPI_Comm comm, SbBlockSolver *solver)
+{
+  SbBlockSolver b;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscNew(&b));
+  *solver = b;
+  b->comm = comm;
+  PetscCallMPI(MPI_Comm_size(comm, &b->size));
+  PetscCallMPI(MPI_Comm_rank(comm, &b->rank));
+  PetscCallMPI(MPI_Type_contiguous(3, MPIU_REAL, &b->triple));
+  PetscCallMPI(MPI_Type_commit(&b->triple));
+  PetscCallMPI(MPI_Type_contiguous(9, MPIU_REAL, &b->block));
+  PetscCallMPI(MPI_Type_commit(&b->block));
+  PetscCall(PetscCalloc4(b->size, &b->row_count, b->size, &b->row_first, b->size, &b->entry_count, b->size,
+                         &b->entry_first));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbBlockSolverDestroy(SbBlockSolver *solver)
+{
+  SbBlockSolver b = *solver;
+
+  PetscFunctionBeginUser;
+  if (!b) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCallMPI(MPI_Type_free(&b->triple));
+  PetscCallMPI(MPI_Type_free(&b->block));
+  PetscCall(SbFactorDestroy(&b->factor));
+  PetscCall(PetscFree4(b->row_count, b->row_first, b->entry_count, b->entry_first));
+  PetscCall(PetscFree2(b->ia, b->ja));
+  PetscCall(PetscFree2(b->value, b->x));
+  PetscCall(PetscFree(*solver));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Counts of all ranks, and where each begins; returns the sum. */
+static PetscInt sum_counts(PetscMPIInt size, const PetscMPIInt count[], PetscMPIInt first[])
+{
+  PetscInt sum = 0;
+
+  for (PetscMPIInt r = 0; r < size; r++) {
+    first[r] = (PetscMPIInt)sum;
+    sum += count[r];
+  }
+  return sum;
+}
+
+/* The pattern of all rows on rank 0, and its elimination. */
+static PetscErrorCode set_up_pattern(SbBlockSolver b, PetscInt n, const PetscInt ia[], const PetscInt ja[])
+{
+  const PetscBool root = (PetscBool)!b->rank;
+  PetscMPIInt rows, entries;
+  PetscInt nentry, before = b->N, *length = NULL, *order = NULL;
+  PetscInt64 size = 0, bytes;
+
+  PetscFunctionBeginUser;
+  b->n = n;
+  PetscCall(PetscMPIIntCast(n, &rows));
+  PetscCall(PetscMPIIntCast(ia[n], &entries));
+  PetscCallMPI(MPI_Gather(&rows, 1, MPI_INT, b->row_count, 1, MPI_INT, 0, b->comm));
+  PetscCallMPI(MPI_Gather(&entries, 1, MPI_INT, b->entry_count, 1, MPI_INT, 0, b->comm));
+  PetscCall(PetscFree2(b->ia, b->ja));
+  PetscCall(PetscFree2(b->value, b->x));
+  b->N = sum_counts(b->size, b->row_count, b->row_first);
+  nentry = sum_counts(b->size, b->entry_count, b->entry_first);
+  PetscCall(PetscMalloc2(b->N + 1, &b->ia, nentry, &b->ja));
+  if (b->size > 1)
+    PetscCall(PetscMalloc2(root ? 9 * (size_t)nentry : 0, &b->value, root ? 3 * (size_t)b->N : 0, &b->x));
+  PetscCall(PetscMalloc1(n, &length));
+  for (PetscInt i = 0; i < n; i++) length[i] = ia[i + 1] - ia[i];
+  PetscCallMPI(
+    MPI_Gatherv(length, rows, MPIU_INT, b->ia + 1, b->row_count, b->row_first, MPIU_INT, 0, b->comm));
+  PetscCallMPI(
+    MPI_Gatherv(ja, entries, MPIU_INT, b->ja, b->entry_count, b->entry_first, MPIU_INT, 0, b->comm));
+  PetscCall(PetscFree(length));
+  if (!root) PetscFunctionReturn(PETSC_SUCCESS);
+  b->ia[0] = 0;
+  for (PetscInt i = 0; i < b->N; i++) b->ia[i + 1] += b->ia[i];
+
+  /* the old order while it serves */
+  if (b->factor && before == b->N) {
+    PetscCall(PetscMalloc1(b->N, &order));
+    PetscCall(PetscArraycpy(order, SbFactorOrder(b->factor), b->N));
+  }
+  PetscCall(SbFactorDestroy(&b->factor));
+  if (order) {
+    PetscCall(SbFactorCreateExact(b->N, b->ia, b->ja, order, &b->factor));
+    PetscCall(PetscFree(order));
+    SbFactorSize(b->factor, &size, &bytes);
+    if ((PetscReal)size > WORSE * (PetscReal)b->dissected) PetscCall(SbFactorDestroy(&b->factor));
+  }
+  if (!b->factor) {
+    PetscCall(SbFactorCreateExact(b->N, b->ia, b->ja, NULL, &b->factor));
+    SbFactorSize(b->factor, &b->dissected, &bytes);
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbBlockSolverSetUp(SbBlockSolver b, PetscInt n, const PetscInt ia[], const PetscInt ja[],
+                                  const PetscReal block[], PetscBool changed, PetscBool *ok)
+{
+  PetscFunctionBeginUser;
+  if (changed) PetscCall(set_up_pattern(b, n, ia, ja));
+  if (b->size > 1)
+    PetscCallMPI(MPI_Gatherv(block, (PetscMPIInt)ia[n], b->block, b->value, b->entry_count, b->entry_first,
+                             b->block, 0, b->comm));
+  *ok = PETSC_TRUE;
+  if (!b->rank) PetscCall(SbFactorNumeric(b->factor, b->ia, b->ja, b->size > 1 ? b->value : block, NULL, ok));
+  PetscCallMPI(MPI_Bcast(ok, 1, SB_MPI_BOOL, 0, b->comm));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbBlockSolverSolve(SbBlockSolver b, const PetscReal r[], PetscReal x[])
+{
+  PetscFunctionBeginUser;
+  if (b->size == 1) {
+    PetscCall(SbFactorSolve(b->factor, r, x));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  PetscCallMPI(
+    MPI_Gatherv(r, (PetscMPIInt)b->n, b->triple, b->x, b->row_count, b->row_first, b->triple, 0, b->comm));
+  if (!b->rank) PetscCall(SbFactorSolve(b->factor, b->x, b->x));
+  PetscCallMPI(
+    MPI_Scatterv(b->x, b->row_count, b->row_first, b->triple, x, (PetscMPIInt)b->n, b->triple, 0, b->comm));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

@@ -1,0 +1,645 @@
+/*
+  Two-level preconditioner for K + C, the tangent of bodies and the stiffness of their contact, which may be a million times larger.
+
+      P^-1 = Q + (1 - Q A) M (1 - A Q),   Q = Z E^-1 Z^T,   E = Z^T A Z,   A = K + C
+
+  Z has the unknowns of the nodes of contact themselves, and six rigid-body modes for each aggregate of the other nodes: what contact makes stiff is
+  solved exactly, in one coarse space with what is slow. Either alone takes five to twenty times the iterations. M is Chebyshev's iteration of
+  DEGREE with the blocks D on the diagonal. D^-1 A has no eigenvalue above four, the nodes of a cell or of a pair (Wathen, "Realistic eigenvalue
+  bounds for the Galerkin mass matrix", 1987, whose argument holds for sums of any semi-definite matrices of cells), so nothing is estimated, and nothing depends
+  on the number of ranks. After a guess that makes Z^T r zero it stays so, and the right factor is 1, as in pc_coarse.c.
+
+  E consists of 3x3 blocks: one row for a node of contact, two for an aggregate, translation and rotation. One rank factors it (block_solver.c). Modes that vanish
+  on what is left of an aggregate get the mean diagonal, as in coarse_operator.c.
+*/
+#include "coarse.h"
+#include "contact_coarse.h"
+#include "solver_impl.h"
+#include <petscblaslapack.h>
+
+#define NODES 60       /* of an aggregate */
+#define LARGEST 4.     /* eigenvalue of D^-1 A */
+#define RANGE 8.       /* eigenvalues that the smoother reduces, largest over smallest */
+#define DEGREE 2       /* of the smoother */
+#define IN_SPAN 1e-5   /* share of the residual in the span of Z that rounding may leave */
+#define VANISHING 1e-8 /* squared size of a mode over that of the largest one of its aggregate */
+
+typedef struct {
+  SbSpace space;
+  const SbContactRows *rows;
+  PetscInt nagg, *body; /* aggregates; [n] that of each own node, -1: fully prescribed */
+  PetscBool stale[2];   /* values, pattern */
+  PetscBool ok;
+  /* of the pattern */
+  PetscInt n, nghost, *ghost,
+    *column; /* own nodes; other nodes of the rows, global, ascending; [ia[n]] columns as own nodes or n + ghost */
+  VecScatter scatter;
+  Vec local;            /* [nghost][3] */
+  PetscInt *unit;       /* [n+nghost] first block row of the node in E, global; -1: none */
+  uint8_t *single;      /* [n+nghost] it has one, else two */
+  PetscReal *d;         /* [n+nghost][3] position in its aggregate, in units of the radius */
+  PetscInt nrow, first; /* own block rows of E, number of the first one */
+  PetscInt *ia, *ja;    /* E */
+  PetscReal *value;     /* [ia[nrow]][9] */
+  PetscInt *slot;       /* [rows->ia[n]] place of the block's column in the row of E */
+  PetscReal *null;      /* [nagg][36] projector onto the modes that vanish */
+  PetscInt *row_of;     /* [nagg] first own row in E, -1: no node is left */
+  PetscReal *weight;    /* [nrow] one over the nodes of the row's unit */
+  SbBlockSolver solver;
+  PetscReal *inverse; /* [n][9] of the blocks on the diagonal */
+  PetscReal *c;       /* [nrow][3] */
+  Vec p, s, t, w;
+} Contact;
+
+/* ------------------------------------------------------------------ set-up of the pattern */
+
+static PetscErrorCode free_pattern(Contact *p)
+{
+  PetscFunctionBeginUser;
+  PetscCall(PetscFree2(p->ghost, p->column));
+  PetscCall(VecScatterDestroy(&p->scatter));
+  PetscCall(VecDestroy(&p->local));
+  PetscCall(PetscFree3(p->unit, p->single, p->d));
+  PetscCall(PetscFree2(p->ia, p->slot));
+  PetscCall(PetscFree2(p->ja, p->value));
+  PetscCall(PetscFree2(p->null, p->row_of));
+  PetscCall(PetscFree3(p->inverse, p->c, p->weight));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Columns in local numbers, and what brings values of other ranks' nodes. */
+static PetscErrorCode find_ghosts(Contact *p)
+{
+  const SbContactRows *r = p->rows;
+  const PetscInt first = p->space->gnode_start, nnz = r->ia[r->n];
+  PetscInt *all, n = 0;
+  IS is;
+
+  PetscFunctionBeginUser;
+  p->n = r->n;
+  PetscCall(PetscMalloc1(nnz, &all));
+  for (PetscInt k = 0; k < nnz; k++) {
+    if (r->ja[k] < first || r->ja[k] >= first + r->n) all[n++] = r->ja[k];
+  }
+  PetscCall(PetscSortRemoveDupsInt(&n, all));
+  p->nghost = n;
+  PetscCall(PetscMalloc2(n, &p->ghost, nnz, &p->column));
+  PetscCall(PetscArraycpy(p->ghost, all, n));
+  PetscCall(PetscFree(all));
+  for (PetscInt k = 0; k < nnz; k++) {
+    if (r->ja[k] >= first && r->ja[k] < first + r->n)
+      p->column[k] = r->ja[k] - first;
+    else {
+      PetscCall(PetscFindInt(r->ja[k], n, p->ghost, &p->column[k]));
+      p->column[k] += r->n;
+    }
+  }
+  PetscCall(ISCreateBlock(PETSC_COMM_SELF, 3, n, p->ghost, PETSC_USE_POINTER, &is));
+  PetscCall(VecCreateSeq(PETSC_COMM_SELF, 3 * n, &p->local));
+  PetscCall(VecScatterCreate(p->s, is, p->local, NULL, &p->scatter));
+  PetscCall(ISDestroy(&is));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* x[n+nghost][3]: the ghosts' from their owners. */
+static PetscErrorCode update_ghosts(Contact *p, PetscReal x[])
+{
+  const PetscScalar *ghost;
+  PetscScalar *own;
+
+  PetscFunctionBeginUser;
+  PetscCall(VecGetArray(p->s, &own));
+  PetscCall(PetscArraycpy(own, x, 3 * p->n));
+  PetscCall(VecRestoreArray(p->s, &own));
+  PetscCall(VecScatterBegin(p->scatter, p->s, p->local, INSERT_VALUES, SCATTER_FORWARD));
+  PetscCall(VecScatterEnd(p->scatter, p->s, p->local, INSERT_VALUES, SCATTER_FORWARD));
+  PetscCall(VecGetArrayRead(p->local, &ghost));
+  PetscCall(PetscArraycpy(x + 3 * p->n, ghost, 3 * p->nghost));
+  PetscCall(VecRestoreArrayRead(p->local, &ghost));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Rows of E for nodes of contact and for aggregates; where nodes are in these, and which modes vanish. */
+static PetscErrorCode find_units(Contact *p)
+{
+  const SbSpace s = p->space;
+  const SbContactRows *r = p->rows;
+  const PetscInt n = p->n;
+  PetscReal *centre, *share;
+  PetscInt *count, total;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscMalloc3(n + p->nghost, &p->unit, n + p->nghost, &p->single, 3 * (n + p->nghost), &p->d));
+  PetscCall(PetscCalloc2(36 * p->nagg, &p->null, p->nagg, &p->row_of));
+  PetscCall(PetscCalloc2(4 * p->nagg, &centre, p->nagg, &count));
+
+  /* centre and radius of what is left of each aggregate */
+  for (PetscInt i = 0; i < n; i++) {
+    if (p->body[i] < 0 || r->contact[i]) continue;
+    for (int k = 0; k < 3; k++) centre[4 * p->body[i] + k] += s->node_x[3 * i + k];
+    count[p->body[i]]++;
+  }
+  for (PetscInt a = 0; a < p->nagg; a++) {
+    for (int k = 0; k < 3; k++) centre[4 * a + k] /= (PetscReal)PetscMax(1, count[a]);
+  }
+  for (PetscInt i = 0; i < n; i++) {
+    for (int k = 0; k < 3; k++) {
+      p->d[3 * i + k] = p->body[i] < 0 ? 0. : s->node_x[3 * i + k] - centre[4 * p->body[i] + k];
+      if (p->body[i] >= 0 && !r->contact[i])
+        centre[4 * p->body[i] + 3] += PetscSqr(p->d[3 * i + k]) / (PetscReal)count[p->body[i]];
+    }
+  }
+
+  /* rows */
+  p->nrow = 0;
+  for (PetscInt i = 0; i < n; i++) {
+    p->single[i] = r->contact[i];
+    p->unit[i] = -1;
+    if (r->contact[i]) p->unit[i] = p->nrow++;
+  }
+  for (PetscInt a = 0; a < p->nagg; a++) {
+    p->row_of[a] = count[a] ? p->nrow : -1;
+    if (count[a]) p->nrow += 2;
+  }
+  PetscCallMPI(MPI_Scan(&p->nrow, &p->first, 1, MPIU_INT, MPI_SUM, s->comm));
+  p->first -= p->nrow;
+  PetscCall(PetscMalloc3(9 * n, &p->inverse, 3 * p->nrow, &p->c, p->nrow, &p->weight));
+  for (PetscInt k = 0; k < p->nrow; k++) p->weight[k] = 1.;
+  for (PetscInt i = 0; i < n; i++) {
+    const PetscInt a = p->body[i];
+
+    if (a >= 0 && !r->contact[i]) {
+      const PetscReal radius = PetscSqrtReal(centre[4 * a + 3]);
+
+      p->unit[i] = p->row_of[a];
+      p->weight[p->unit[i]] = p->weight[p->unit[i] + 1] = 1. / (PetscReal)count[a];
+      for (int k = 0; k < 3; k++) p->d[3 * i + k] = count[a] > 1 ? p->d[3 * i + k] / radius : 0.;
+    }
+    if (p->unit[i] >= 0) p->unit[i] += p->first;
+  }
+
+  /* modes that vanish: eigenvectors of the Gram matrix */
+  for (PetscInt i = 0; i < n; i++) {
+    if (p->unit[i] < 0 || p->single[i]) continue;
+    for (int m = 0; m < 6; m++) {
+      PetscReal unit[6] = {0.}, u[3];
+
+      unit[m] = 1.;
+      SbCoarseMotion(p->d + 3 * i, unit, u);
+      for (int q = 0; q < 3; q++) u[q] = s->fixed[i] & (1 << q) ? 0. : u[q];
+      SbCoarseAddMoments(p->d + 3 * i, u, p->null + 36 * p->body[i] + 6 * m);
+    }
+  }
+  for (PetscInt a = 0; a < p->nagg; a++) {
+    PetscReal gram[36], eigen[6], work[64], *projector = p->null + 36 * a;
+    PetscBLASInt six = 6, nwork = 64, info;
+
+    if (!count[a]) continue;
+    PetscCall(PetscArraycpy(gram, projector, 36));
+    PetscCallBLAS("LAPACKsyev", LAPACKsyev_("V", "U", &six, gram, &six, eigen, work, &nwork, &info));
+    PetscCheck(!info, PETSC_COMM_SELF, PETSC_ERR_LIB, "LAPACK syev failed with %d", (int)info);
+    PetscCall(PetscArrayzero(projector, 36));
+    for (int v = 0; v < 6 && eigen[v] <= VANISHING * eigen[5]; v++) {
+      for (int e = 0; e < 36; e++) projector[e] += gram[6 * v + e / 6] * gram[6 * v + e % 6];
+    }
+  }
+  PetscCall(PetscFree2(centre, count));
+
+  /* the same of ghosts */
+  PetscCall(PetscMalloc1(3 * (n + p->nghost), &share));
+  for (PetscInt i = 0; i < n; i++) {
+    share[3 * i] = (PetscReal)p->unit[i];
+    share[3 * i + 1] = (PetscReal)p->single[i];
+    share[3 * i + 2] = 0.;
+  }
+  PetscCall(update_ghosts(p, share));
+  PetscCall(update_ghosts(p, p->d));
+  for (PetscInt i = n; i < n + p->nghost; i++) {
+    p->unit[i] = (PetscInt)share[3 * i];
+    p->single[i] = share[3 * i + 1] != 0.;
+  }
+  PetscCall(PetscFree(share));
+  PetscCallMPI(MPI_Allreduce(&p->nrow, &total, 1, MPIU_INT, MPI_SUM, s->comm));
+  p->ok = (PetscBool)(total > 0);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The pattern of E, and where blocks of A go in it. */
+static PetscErrorCode find_pattern(Contact *p)
+{
+  const SbContactRows *r = p->rows;
+  PetscInt *start, *member, *mark, *place, lowest = PETSC_MAX_INT, highest = 0, nz = 0;
+
+  PetscFunctionBeginUser;
+  /* own nodes by their unit */
+  PetscCall(PetscCalloc1(p->nrow + 2, &start));
+  PetscCall(PetscMalloc1(p->n, &member));
+  for (PetscInt i = 0; i < p->n; i++) {
+    if (p->unit[i] >= 0) start[p->unit[i] - p->first + 2]++;
+  }
+  for (PetscInt u = 0; u < p->nrow; u++) start[u + 2] += start[u + 1];
+  for (PetscInt i = 0; i < p->n; i++) {
+    if (p->unit[i] >= 0) member[start[p->unit[i] - p->first + 1]++] = i;
+  }
+  for (PetscInt i = 0; i < p->n + p->nghost; i++) {
+    if (p->unit[i] < 0) continue;
+    lowest = PetscMin(lowest, p->unit[i]);
+    highest = PetscMax(highest, p->unit[i] + 1);
+  }
+  if (lowest > highest) lowest = highest;
+  PetscCall(PetscMalloc2(highest - lowest, &mark, highest - lowest, &place));
+  PetscCall(PetscMalloc2(p->nrow + 1, &p->ia, r->ia[p->n], &p->slot));
+
+  /* once to count, once to fill */
+  for (int pass = 0; pass < 2; pass++) {
+    for (PetscInt b = 0; b < highest - lowest; b++) mark[b] = -1;
+    nz = 0;
+    for (PetscInt u = 0; u < p->nrow; u++) {
+      PetscInt length = 0;
+
+      p->ia[u] = nz;
+      for (PetscInt m = start[u]; m < start[u + 1]; m++) {
+        for (PetscInt k = r->ia[member[m]]; k < r->ia[member[m] + 1]; k++) {
+          const PetscInt j = p->column[k], b = p->unit[j] - lowest;
+
+          p->slot[k] = -1;
+          if (p->unit[j] < 0) continue;
+          if (mark[b] != u) {
+            mark[b] = u;
+            place[b] = length;
+            for (int q = 0; q < (p->single[j] ? 1 : 2); q++, length++) {
+              if (pass) p->ja[nz + length] = p->unit[j] + q;
+            }
+          }
+          p->slot[k] = place[b];
+        }
+      }
+      nz += length;
+      /* the second row of an aggregate, which has no members of its own in the list */
+      if (start[u + 1] > start[u] && !p->single[member[start[u]]]) {
+        p->ia[u + 1] = nz;
+        for (PetscInt q = 0; q < length && pass; q++) p->ja[nz + q] = p->ja[nz - length + q];
+        nz += length;
+        u++;
+      }
+    }
+    p->ia[p->nrow] = nz;
+    if (!pass) PetscCall(PetscMalloc2(nz, &p->ja, 9 * (size_t)nz, &p->value));
+  }
+  PetscCall(PetscFree2(mark, place));
+  PetscCall(PetscFree(member));
+  PetscCall(PetscFree(start));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ set-up of the values */
+
+/* The inverse of a symmetric positive definite 3x3 block; false where it is none. */
+static PetscBool invert(const PetscReal A[9], PetscReal B[9])
+{
+  const PetscReal a = A[0], b = 0.5 * (A[1] + A[3]), c = 0.5 * (A[2] + A[6]), d = A[4],
+                  e = 0.5 * (A[5] + A[7]), f = A[8];
+  const PetscReal m0 = d * f - e * e, m1 = c * e - b * f, m2 = b * e - c * d, det = a * m0 + b * m1 + c * m2;
+
+  if (!(a > 0. && a * d - b * b > 0. && det > 0.)) return PETSC_FALSE;
+  B[0] = m0 / det;
+  B[1] = B[3] = m1 / det;
+  B[2] = B[6] = m2 / det;
+  B[4] = (a * f - c * c) / det;
+  B[5] = B[7] = (b * c - a * e) / det;
+  B[8] = (a * d - b * b) / det;
+  return PETSC_TRUE;
+}
+
+/* E += Z_i^T A_ij Z_j for a block of A. */
+static inline void add_block(const Contact *p, PetscInt i, PetscInt j, const PetscReal A[9], PetscReal *to[2])
+{
+  const PetscReal *d = p->d + 3 * j, *x = p->d + 3 * i;
+  PetscReal T[18];
+
+  /* columns: as they are, and their moments */
+  for (int q = 0; q < 3; q++) {
+    const PetscReal *a = A + 3 * q;
+
+    for (int c = 0; c < 3; c++) T[3 * q + c] = a[c];
+    T[9 + 3 * q] = a[2] * d[1] - a[1] * d[2];
+    T[9 + 3 * q + 1] = a[0] * d[2] - a[2] * d[0];
+    T[9 + 3 * q + 2] = a[1] * d[0] - a[0] * d[1];
+  }
+  for (int half = 0; half < (p->single[j] ? 1 : 2); half++) {
+    const PetscReal *B = T + 9 * half;
+
+    for (int e = 0; e < 9; e++) to[0][9 * half + e] += B[e];
+    if (p->single[i]) continue;
+    for (int c = 0; c < 3; c++) {
+      to[1][9 * half + c] += x[1] * B[6 + c] - x[2] * B[3 + c];
+      to[1][9 * half + 3 + c] += x[2] * B[c] - x[0] * B[6 + c];
+      to[1][9 * half + 6 + c] += x[0] * B[3 + c] - x[1] * B[c];
+    }
+  }
+}
+
+/* E, and the inverse blocks on the diagonal of A. */
+static PetscErrorCode set_values(Contact *p, PetscBool *ok)
+{
+  const SbSpace s = p->space;
+  const SbContactRows *r = p->rows;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscArrayzero(p->value, 9 * (size_t)p->ia[p->nrow]));
+  for (PetscInt i = 0; i < p->n; i++) {
+    for (PetscInt k = r->ia[i]; k < r->ia[i + 1]; k++) {
+      const PetscInt j = p->column[k];
+      const PetscReal *A = r->value + 9 * k;
+      PetscReal D[9], *to[2];
+
+      if (j == i) {
+        if (!invert(A, p->inverse + 9 * i)) *ok = PETSC_FALSE;
+        /* prescribed unknowns of an aggregate have only their diagonal, which is not in the span of Z */
+        for (int e = 0; e < 9 && !p->single[i]; e++) D[e] = s->fixed[i] & (1 << (e / 3)) ? 0. : A[e];
+        if (!p->single[i]) A = D;
+      }
+      if (p->unit[i] < 0 || p->slot[k] < 0) continue;
+      for (int q = 0; q < (p->single[i] ? 1 : 2); q++)
+        to[q] = p->value + 9 * (size_t)(p->ia[p->unit[i] - p->first + q] + p->slot[k]);
+      add_block(p, i, j, A, to);
+    }
+  }
+
+  /* modes that vanish: the mean diagonal */
+  for (PetscInt a = 0; a < p->nagg; a++) {
+    const PetscInt row = p->row_of[a];
+    PetscReal trace = 0., *block[2] = {NULL, NULL};
+
+    if (row < 0) continue;
+    for (int q = 0; q < 2; q++) {
+      for (PetscInt k = p->ia[row + q]; k < p->ia[row + q + 1] && !block[q]; k++) {
+        if (p->ja[k] == p->first + row) block[q] = p->value + 9 * (size_t)k;
+      }
+      for (int e = 0; e < 3; e++) trace += block[q][9 * q + 4 * e];
+    }
+    for (int e = 0; e < 36; e++)
+      block[e / 18][9 * (e % 6 / 3) + 3 * (e / 6 % 3) + e % 3] += trace / 6. * p->null[36 * a + e];
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode PCSetUp_Contact(PC pc)
+{
+  PetscBool ok = PETSC_TRUE, positive;
+  Contact *p;
+  Mat A;
+
+  PetscFunctionBeginUser;
+  PetscCall(PCShellGetContext(pc, &p));
+  if (!p->stale[0]) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!p->s) {
+    PetscCall(PCGetOperators(pc, NULL, &A));
+    PetscCall(MatCreateVecs(A, &p->p, &p->s));
+    PetscCall(VecDuplicate(p->s, &p->t));
+    PetscCall(VecDuplicate(p->s, &p->w));
+  }
+  if (p->stale[1]) {
+    PetscCall(free_pattern(p));
+    PetscCall(find_ghosts(p));
+    PetscCall(find_units(p));
+    PetscCall(find_pattern(p));
+  }
+  PetscCall(set_values(p, &ok));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &ok, 1, SB_MPI_BOOL, MPI_LAND, p->space->comm));
+  PetscCall(SbBlockSolverSetUp(p->solver, p->nrow, p->ia, p->ja, p->value, p->stale[1], &positive));
+  p->stale[0] = p->stale[1] = PETSC_FALSE;
+  p->ok = (PetscBool)(ok && positive);
+  PetscCall(PCSetFailedReason(pc, p->ok ? PC_NOERROR : PC_FACTOR_NUMERIC_ZEROPIVOT));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ application */
+
+/* c = Z^T r; share: |c|, weighted so that it is |r| for an r of translations of aggregates, over |r|. */
+static PetscErrorCode restrict_to(Contact *p, Vec R, PetscReal *share)
+{
+  PetscReal norm2[2] = {0., 0.};
+  const PetscScalar *r;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscArrayzero(p->c, 3 * p->nrow));
+  PetscCall(VecGetArrayRead(R, &r));
+  for (PetscInt i = 0; i < p->n; i++) {
+    const PetscInt row = p->unit[i] - p->first;
+    PetscReal f[3], m[6] = {0.};
+
+    if (p->unit[i] < 0) continue;
+    for (int q = 0; q < 3; q++) {
+      f[q] = !p->single[i] && p->space->fixed[i] & (1 << q) ? 0. : r[3 * i + q];
+      norm2[1] += f[q] * f[q];
+    }
+    SbCoarseAddMoments(p->d + 3 * i, f, m);
+    for (int q = 0; q < (p->single[i] ? 3 : 6); q++) p->c[3 * row + q] += m[q];
+  }
+  for (PetscInt k = 0; k < 3 * p->nrow; k++) norm2[0] += PetscSqr(p->c[k]) * p->weight[k / 3];
+  PetscCall(VecRestoreArrayRead(R, &r));
+  if (!share) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, norm2, 2, MPIU_REAL, MPI_SUM, p->space->comm));
+  *share = norm2[1] > 0. ? PetscSqrtReal(norm2[0] / norm2[1]) : 0.;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* z += Z E^-1 c. */
+static PetscErrorCode add_coarse(Contact *p, Vec Z)
+{
+  PetscScalar *z;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbBlockSolverSolve(p->solver, p->c, p->c));
+  PetscCall(VecGetArray(Z, &z));
+  for (PetscInt i = 0; i < p->n; i++) {
+    const PetscReal *y = p->c + 3 * (p->unit[i] - p->first);
+    PetscReal u[3];
+
+    if (p->unit[i] < 0) continue;
+    if (p->single[i]) {
+      for (int q = 0; q < 3; q++) z[3 * i + q] += y[q];
+      continue;
+    }
+    SbCoarseMotion(p->d + 3 * i, y, u);
+    for (int q = 0; q < 3; q++) z[3 * i + q] += p->space->fixed[i] & (1 << q) ? 0. : u[q];
+  }
+  PetscCall(VecRestoreArray(Z, &z));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* p = factor p + other D^-1 (r - t), z = z + p; t NULL: 0, and the first step. */
+static PetscErrorCode advance(Contact *p, PetscReal factor, PetscReal other, Vec R, Vec T, Vec Z)
+{
+  const PetscScalar *r, *t = NULL;
+  PetscScalar *q, *z;
+
+  PetscFunctionBeginUser;
+  PetscCall(VecGetArrayRead(R, &r));
+  if (T) PetscCall(VecGetArrayRead(T, &t));
+  PetscCall(VecGetArray(p->p, &q));
+  PetscCall(VecGetArray(Z, &z));
+  for (PetscInt i = 0; i < p->n; i++) {
+    const PetscReal *B = p->inverse + 9 * i;
+    PetscReal f[3];
+
+    for (int k = 0; k < 3; k++) f[k] = t ? r[3 * i + k] - t[3 * i + k] : r[3 * i + k];
+    for (int k = 0; k < 3; k++) {
+      const PetscReal step = B[3 * k] * f[0] + B[3 * k + 1] * f[1] + B[3 * k + 2] * f[2];
+
+      q[3 * i + k] = t ? factor * q[3 * i + k] + other * step : other * step;
+      z[3 * i + k] = t ? z[3 * i + k] + q[3 * i + k] : q[3 * i + k];
+    }
+  }
+  PetscCall(VecRestoreArray(Z, &z));
+  PetscCall(VecRestoreArray(p->p, &q));
+  if (T) PetscCall(VecRestoreArrayRead(T, &t));
+  PetscCall(VecRestoreArrayRead(R, &r));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* z = M r (Saad, Iterative Methods for Sparse Linear Systems, 2003, algorithm 12.1). */
+static PetscErrorCode smooth(Contact *p, Mat A, Vec r, Vec z)
+{
+  const PetscReal middle = 0.5 * LARGEST * (1. + 1. / RANGE), half = 0.5 * LARGEST * (1. - 1. / RANGE);
+  PetscReal rho = half / middle;
+
+  PetscFunctionBeginUser;
+  PetscCall(advance(p, 0., 1. / middle, r, NULL, z));
+  for (int k = 1; k < DEGREE; k++) {
+    const PetscReal next = 1. / (2. * middle / half - rho);
+
+    PetscCall(MatMult(A, z, p->t));
+    PetscCall(advance(p, next * rho, 2. * next / half, r, p->t, z));
+    rho = next;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode PCApply_Contact(PC pc, Vec r, Vec z)
+{
+  PetscReal share;
+  PetscBool whole;
+  Contact *p;
+  Vec s = r;
+  Mat A;
+
+  PetscFunctionBeginUser;
+  PetscCall(PCShellGetContext(pc, &p));
+  PetscCall(PCGetOperators(pc, NULL, &A));
+  PetscCall(restrict_to(p, r, &share));
+  whole = (PetscBool)(share > IN_SPAN);
+  if (whole) { /* z = Q r, s = r - A z */
+    s = p->s;
+    PetscCall(VecZeroEntries(z));
+    PetscCall(add_coarse(p, z));
+    PetscCall(MatMult(A, z, s));
+    PetscCall(VecAYPX(s, -1., r));
+  }
+  /* w = M s + Q (s - A M s) */
+  PetscCall(smooth(p, A, s, p->w));
+  PetscCall(MatMult(A, p->w, p->t));
+  PetscCall(VecAYPX(p->t, -1., s));
+  PetscCall(restrict_to(p, p->t, NULL));
+  PetscCall(add_coarse(p, p->w));
+  if (whole)
+    PetscCall(VecAXPY(z, 1., p->w));
+  else
+    PetscCall(VecCopy(p->w, z));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbPCContactGuess(PC pc, Vec F, Vec X)
+{
+  Contact *p;
+
+  PetscFunctionBeginUser;
+  PetscCall(PCShellGetContext(pc, &p));
+  PetscCall(VecZeroEntries(X));
+  if (!p->ok) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(restrict_to(p, F, NULL));
+  PetscCall(add_coarse(p, X));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ life */
+
+static PetscErrorCode PCDestroy_Contact(PC pc)
+{
+  Contact *p;
+
+  PetscFunctionBeginUser;
+  PetscCall(PCShellGetContext(pc, &p));
+  PetscCall(free_pattern(p));
+  PetscCall(PetscFree(p->body));
+  PetscCall(SbBlockSolverDestroy(&p->solver));
+  PetscCall(VecDestroy(&p->p));
+  PetscCall(VecDestroy(&p->s));
+  PetscCall(VecDestroy(&p->t));
+  PetscCall(VecDestroy(&p->w));
+  PetscCall(PetscFree(p));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode PCView_Contact(PC pc, PetscViewer viewer)
+{
+  PetscInt naggregate, ncontact;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbPCContactGetSize(pc, &naggregate, &ncontact));
+  PetscCall(PetscViewerASCIIPrintf(
+    viewer,
+    "  %" PetscInt_FMT " aggregates with six rigid-body modes each, and %" PetscInt_FMT " nodes of contact\n",
+    naggregate, ncontact));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbPCContactCreate(SbSpace s, const SbContactRows *rows, PC pc)
+{
+  Contact *p;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscNew(&p));
+  p->space = s;
+  p->rows = rows;
+  p->stale[0] = p->stale[1] = PETSC_TRUE;
+  PetscCall(PetscMalloc1(s->nnode_owned, &p->body));
+  PetscCall(SbAggregate(s, (s->nnode_owned + NODES - 1) / NODES, &p->nagg, p->body));
+  PetscCall(SbBlockSolverCreate(s->comm, &p->solver));
+  PetscCall(PCSetType(pc, PCSHELL));
+  PetscCall(PCShellSetContext(pc, p));
+  PetscCall(PCShellSetName(pc, "two-level with contact"));
+  PetscCall(PCShellSetSetUp(pc, PCSetUp_Contact));
+  PetscCall(PCShellSetApply(pc, PCApply_Contact));
+  PetscCall(PCShellSetView(pc, PCView_Contact));
+  PetscCall(PCShellSetDestroy(pc, PCDestroy_Contact));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbPCContactUpdate(PC pc, PetscBool changed)
+{
+  Contact *p;
+
+  PetscFunctionBeginUser;
+  PetscCall(PCShellGetContext(pc, &p));
+  p->stale[0] = PETSC_TRUE;
+  p->stale[1] = (PetscBool)(p->stale[1] || changed);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbPCContactGetSize(PC pc, PetscInt *naggregate, PetscInt *ncontact)
+{
+  PetscInt count[2];
+  Contact *p;
+
+  PetscFunctionBeginUser;
+  PetscCall(PCShellGetContext(pc, &p));
+  count[0] = p->nagg;
+  count[1] = 0;
+  for (PetscInt i = 0; i < p->rows->n; i++) count[1] += p->rows->contact[i];
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, count, 2, MPIU_INT, MPI_SUM, p->space->comm));
+  *naggregate = count[0];
+  *ncontact = count[1];
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
