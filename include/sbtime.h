@@ -106,8 +106,9 @@ struct _p_SbRun {
     free_body; /* static, without contact: nothing holds some body, and shorter load steps do not help */
   PetscBool tangent_known; /* J holds the tangent for shift_v, shift_a */
   PetscReal shift_v, shift_a;
-  PetscBool saddle;       /* some effect asks for multipliers as unknowns */
-  PetscInt saddle_choice; /* -saddle_solver: 0 by size, 1 direct, 2 iterative */
+  PetscBool saddle;        /* some effect asks for multipliers as unknowns */
+  PetscInt saddle_choice;  /* -saddle_solver: 0 by size, 1 direct, 2 iterative */
+  PetscInt contact_choice; /* -contact_solver: likewise */
   SbSaddle saddle_used;
   char solver_choice[SB_NAME_MAX]; /* as the scenario says: "auto" or a name */
   const struct _SbSolverPreset *solver_used;

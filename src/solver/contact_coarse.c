@@ -5,9 +5,9 @@
 
   Z has the unknowns of the nodes of contact themselves, and six rigid-body modes for each aggregate of the other nodes: what contact makes stiff is
   solved exactly, in one coarse space with what is slow. Either alone takes five to twenty times the iterations. M is Chebyshev's iteration of
-  DEGREE with the blocks D on the diagonal. D^-1 A has no eigenvalue above four, the nodes of a cell or of a pair (Wathen, "Realistic eigenvalue
+  DEGREE with the blocks D on the diagonal, on the nodes without contact, where A is K. There D^-1 A has no eigenvalue above four, the nodes of a cell (Wathen, "Realistic eigenvalue
   bounds for the Galerkin mass matrix", 1987, whose argument holds for sums of any semi-definite matrices of cells), so nothing is estimated, and nothing depends
-  on the number of ranks. After a guess that makes Z^T r zero it stays so, and the right factor is 1, as in pc_coarse.c.
+  on the number of ranks or on what contact makes stiff. After a guess that makes Z^T r zero it stays so, and the right factor is 1, as in pc_coarse.c.
 
   E consists of 3x3 blocks: one row for a node of contact, two for an aggregate, translation and rotation. One rank factors it (block_solver.c). Modes that vanish
   on what is left of an aggregate get the mean diagonal, as in coarse_operator.c.
@@ -17,12 +17,13 @@
 #include "solver_impl.h"
 #include <petscblaslapack.h>
 
-#define NODES 60       /* of an aggregate */
-#define LARGEST 4.     /* eigenvalue of D^-1 A */
-#define RANGE 8.       /* eigenvalues that the smoother reduces, largest over smallest */
-#define DEGREE 2       /* of the smoother */
-#define IN_SPAN 1e-5   /* share of the residual in the span of Z that rounding may leave */
-#define VANISHING 1e-8 /* squared size of a mode over that of the largest one of its aggregate */
+#define NODES 60         /* of an aggregate */
+#define LARGEST 4.       /* eigenvalue of D^-1 A: nodes of a cell */
+#define LARGEST_FACES 8. /* with terms at faces, which join the nodes of two cells */
+#define RANGE 8.         /* eigenvalues that the smoother reduces, largest over smallest */
+#define DEGREE 2         /* of the smoother */
+#define IN_SPAN 1e-5     /* share of the residual in the span of Z that rounding may leave */
+#define VANISHING 1e-8   /* squared size of a mode over that of the largest one of its aggregate */
 
 typedef struct {
   SbSpace space;
@@ -46,7 +47,7 @@ typedef struct {
   PetscInt *row_of;     /* [nagg] first own row in E, -1: no node is left */
   PetscReal *weight;    /* [nrow] one over the nodes of the row's unit */
   SbBlockSolver solver;
-  PetscReal *inverse; /* [n][9] of the blocks on the diagonal */
+  PetscReal *inverse; /* [n][9] of the blocks on the diagonal; zero at nodes of contact */
   PetscReal *c;       /* [nrow][3] */
   Vec p, s, t, w;
 } Contact;
@@ -354,7 +355,10 @@ static PetscErrorCode set_values(Contact *p, PetscBool *ok)
       PetscReal D[9], *to[2];
 
       if (j == i) {
-        if (!invert(A, p->inverse + 9 * i)) *ok = PETSC_FALSE;
+        if (p->single[i])
+          PetscCall(PetscArrayzero(p->inverse + 9 * i, 9));
+        else if (!invert(A, p->inverse + 9 * i))
+          *ok = PETSC_FALSE;
         /* prescribed unknowns of an aggregate have only their diagonal, which is not in the span of Z */
         for (int e = 0; e < 9 && !p->single[i]; e++) D[e] = s->fixed[i] & (1 << (e / 3)) ? 0. : A[e];
         if (!p->single[i]) A = D;
@@ -502,7 +506,8 @@ static PetscErrorCode advance(Contact *p, PetscReal factor, PetscReal other, Vec
 /* z = M r (Saad, Iterative Methods for Sparse Linear Systems, 2003, algorithm 12.1). */
 static PetscErrorCode smooth(Contact *p, Mat A, Vec r, Vec z)
 {
-  const PetscReal middle = 0.5 * LARGEST * (1. + 1. / RANGE), half = 0.5 * LARGEST * (1. - 1. / RANGE);
+  const PetscReal largest = p->space->plan->face_term[0] ? LARGEST_FACES : LARGEST,
+                  middle = 0.5 * largest * (1. + 1. / RANGE), half = 0.5 * largest * (1. - 1. / RANGE);
   PetscReal rho = half / middle;
 
   PetscFunctionBeginUser;

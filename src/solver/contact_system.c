@@ -20,17 +20,18 @@
 
 struct _p_SbContactSystem {
   SbSpace space;
+  PetscInt choice; /* 0 by size, 1 factored, 2 by iterations */
   SbContactRows rows;
-  PetscInt *all;          /* [nnode_owned] their numbers */
-  PetscInt *ka, *kj;      /* of the tangent: [n+1], [ka[n]] global nodes */
-  PetscInt *place;        /* [ka[n]] of its blocks in the rows */
-  PetscInt *used;         /* [rows.ia[n]] solve in which contact used the place last; -1: the tangent's */
-  PetscInt *last;         /* [n] solve in which contact used the row last, -1: never */
-  PetscInt nsolve, nnode; /* nodes of contact, of all ranks */
-  PetscReal *tangent;     /* [ka[n]][9] */
-  PetscBool factored, fresh[2]; /* by the choice made; matrix and factor do not have the values yet */
-  PetscBool foreign[2];         /* pattern is other than theirs */
-  char method[32], type[32];    /* of the user's */
+  PetscInt *all;             /* [nnode_owned] their numbers */
+  PetscInt *ka, *kj;         /* of the tangent: [n+1], [ka[n]] global nodes */
+  PetscInt *place;           /* [ka[n]] of its blocks in the rows */
+  PetscInt *used;            /* [rows.ia[n]] solve in which contact used the place last; -1: the tangent's */
+  PetscInt *last;            /* [n] solve in which contact used the row last, -1: never */
+  PetscInt nsolve, nnode;    /* nodes of contact, of all ranks */
+  PetscReal *tangent;        /* [ka[n]][9] */
+  PetscBool fresh[2];        /* matrix and factor do not have the values yet */
+  PetscBool foreign[2];      /* pattern is other than theirs */
+  char method[32], type[32]; /* of the user's */
   SbBlockSolver factor;
   KSP ksp;
   Mat A;
@@ -60,7 +61,18 @@ PetscErrorCode SbBlocksFree(SbBlocks *b)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbContactSystemCreate(SbSpace s, SbContactSystem *system)
+/* The user's method, unless NULL, and preconditioner, where there are any; both have room for 32 characters. */
+static PetscErrorCode user_types(char method[], char type[])
+{
+  static const char *const options[] = {"-ksp_type", "-contact_ksp_type", "-pc_type", "-contact_pc_type"};
+
+  PetscFunctionBeginUser;
+  for (int k = method ? 0 : 2; k < 4; k++)
+    PetscCall(PetscOptionsGetString(NULL, NULL, options[k], k < 2 ? method : type, 32, NULL));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbContactSystemCreate(SbSpace s, PetscInt choice, SbContactSystem *system)
 {
   const PetscInt n = s->nnode_owned;
   SbContactSystem c;
@@ -69,6 +81,7 @@ PetscErrorCode SbContactSystemCreate(SbSpace s, SbContactSystem *system)
   PetscCall(PetscNew(&c));
   *system = c;
   c->space = s;
+  c->choice = choice;
   c->rows.n = n;
   PetscCall(PetscMalloc3(n, &c->all, n + 1, &c->ka, n, &c->last));
   for (PetscInt i = 0; i < n; i++) {
@@ -80,10 +93,31 @@ PetscErrorCode SbContactSystemCreate(SbSpace s, SbContactSystem *system)
   PetscCall(SbSpaceGetRows(s, NULL, n, c->all, c->ka, c->kj, NULL));
   for (PetscInt k = 0; k < c->ka[n]; k++) c->kj[k] = s->gnode[c->kj[k]];
   PetscCall(PetscCalloc2(n + 1, &c->rows.ia, n, &c->rows.contact));
-  PetscCall(PetscOptionsGetString(NULL, NULL, "-ksp_type", c->method, sizeof(c->method), NULL));
-  PetscCall(PetscOptionsGetString(NULL, NULL, "-contact_ksp_type", c->method, sizeof(c->method), NULL));
-  PetscCall(PetscOptionsGetString(NULL, NULL, "-pc_type", c->type, sizeof(c->type), NULL));
-  PetscCall(PetscOptionsGetString(NULL, NULL, "-contact_pc_type", c->type, sizeof(c->type), NULL));
+  PetscCall(user_types(c->method, c->type));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Whether it is factored when so many nodes touch. */
+static PetscBool is_factored(SbSpace s, PetscInt choice, const char type[], PetscInt nnode)
+{
+  if (type[0]) return (PetscBool)(!strcmp(type, PCCHOLESKY) || !strcmp(type, PCLU));
+  if (choice) return (PetscBool)(choice == 1);
+  return (PetscBool)(3 * s->Nnode <= SMALL || (PetscReal)nnode > SHARE * (PetscReal)s->Nnode);
+}
+
+PetscErrorCode SbContactSystemDescribe(SbSpace s, PetscInt choice, char text[], size_t size)
+{
+  char type[32] = "";
+
+  PetscFunctionBeginUser;
+  PetscCall(user_types(NULL, type));
+  if (is_factored(s, choice, type, 0))
+    PetscCall(PetscSNPrintf(text, size, "contact by a factorisation"));
+  else if (type[0])
+    PetscCall(PetscSNPrintf(text, size, "contact with %s", type));
+  else
+    PetscCall(PetscSNPrintf(text, size, "contact by CG in two levels%s",
+                            choice ? "" : ", factored where a third of the nodes touches"));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -326,15 +360,15 @@ static PetscErrorCode factor(SbContactSystem c, Vec F, Vec Y, KSPConvergedReason
 PetscErrorCode SbContactSystemSolve(SbContactSystem c, Mat K, const SbBlocks *blocks, PetscBool fresh, Vec F,
                                     Vec Y, KSPConvergedReason *reason, PetscInt *iterations)
 {
+  PetscBool factored;
+
   PetscFunctionBeginUser;
   if (fresh || !c->rows.value) PetscCall(merge(c, K, blocks));
-  c->factored =
-    (PetscBool)(3 * c->space->Nnode <= SMALL || (PetscReal)c->nnode > SHARE * (PetscReal)c->space->Nnode);
-  if (c->type[0]) c->factored = (PetscBool)(!strcmp(c->type, PCCHOLESKY) || !strcmp(c->type, PCLU));
+  factored = is_factored(c->space, c->choice, c->type, c->nnode);
   *iterations = 0;
   *reason = KSP_DIVERGED_ITS;
-  if (!c->factored) PetscCall(iterate(c, F, Y, reason, iterations));
-  if (c->factored || (*reason == KSP_DIVERGED_ITS && !c->type[0])) {
+  if (!factored) PetscCall(iterate(c, F, Y, reason, iterations));
+  if (factored || (*reason == KSP_DIVERGED_ITS && !c->type[0])) {
     PetscCall(factor(c, F, Y, reason));
     ++*iterations;
   }

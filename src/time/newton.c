@@ -93,7 +93,7 @@ static PetscErrorCode solve_linear(SNES snes, KSPConvergedReason *reason)
     PetscCallMPI(MPI_Allreduce(&n->blocks.n, &n->nblock, 1, MPIU_INT, MPI_SUM, m->comm));
   }
   if (n->nblock) {
-    if (!n->system) PetscCall(SbContactSystemCreate(m->space, &n->system));
+    if (!n->system) PetscCall(SbContactSystemCreate(m->space, n->run->contact_choice, &n->system));
     PetscCall(SbContactSystemSolve(n->system, snes->jacobian_pre, &n->blocks, PETSC_TRUE, snes->vec_func,
                                    snes->vec_sol_update, reason, &iterations));
   } else {

@@ -44,6 +44,10 @@ static const SbOption rows[] = {
    "how effects with response multiplier solve for displacements and multipliers: by a factorisation of "
    "both, or by "
    "MINRES with the preconditioner of the solver; auto goes by size"},
+  {"contact_solver", SB_OPTION_CHOICE, 1, "", "auto", "auto|direct|iterative",
+   "how systems with response barrier are solved: by a factorisation, or by CG with a coarse space of what "
+   "touches; auto goes by size and "
+   "by the share of nodes that touch"},
   {"static_steps", SB_OPTION_INT, 1, "", "1", "[1, 1000000]",
    "static: equal load steps from zero to full load"},
   {"static_min_increment", SB_OPTION_REAL, 1, "", "1e-4", "(0, 1]",
@@ -103,6 +107,7 @@ PetscErrorCode SbRunCreate(SbModel model, SbRun *run)
   SbRun r;
   SbScope scope;
   PetscInt preset, predictor, inverted, control;
+  PetscBool guarded = PETSC_FALSE;
 
   PetscFunctionBeginUser;
   PetscCall(PetscNew(&r));
@@ -147,6 +152,9 @@ PetscErrorCode SbRunCreate(SbModel model, SbRun *run)
   for (PetscInt e = 0; e < model->neffect; e++)
     r->saddle = (PetscBool)(r->saddle || model->effect[e]->saddle);
   if (r->saddle) PetscCall(SbOptionChoice(&scope, "saddle_solver", &r->saddle_choice));
+  for (PetscInt e = 0; e < model->neffect; e++)
+    guarded = (PetscBool)(guarded || model->effect[e]->ops.hessian);
+  if (guarded) PetscCall(SbOptionChoice(&scope, "contact_solver", &r->contact_choice));
   PetscCall(SbSolverSetFromOptions(r->solver_choice, sizeof(r->solver_choice)));
   if (r->arc.on) PetscCall(read_arc_length(r, &scope));
   *run = r;
@@ -520,7 +528,12 @@ PetscErrorCode SbRunSetUp(SbRun run)
   PetscCall(PetscStrncpy(run->solver, run->solver_used->name, sizeof(run->solver)));
   PetscCall(check_contact(run, explicit));
 
-  /* how constraints with multipliers are solved, and what is said of it */
+  /* how systems of contact are solved, and what is said of it */
+  if (m->npotential) {
+    PetscCall(SbContactSystemDescribe(s, run->contact_choice, reason, sizeof(reason)));
+    PetscCall(PetscStrlcat(run->solver_reason, "; ", sizeof(run->solver_reason)));
+    PetscCall(PetscStrlcat(run->solver_reason, reason, sizeof(run->solver_reason)));
+  }
   if (run->saddle) {
     PetscCall(
       SbSaddleChoose(s, run->model->dynamic, run->saddle_choice, &run->saddle_used, reason, sizeof(reason)));
