@@ -67,10 +67,12 @@ struct _p_SbContactPairs {
   PetscBool self, others; /* bodies meet themselves, and each other */
   PetscReal reach;        /* pairs nearer than this are found, m */
   PetscReal margin;       /* by which boxes are grown, m */
-  PetscReal *box; /* [nvertex][6] within which vertices may move before pairs are searched for again */
+  PetscReal *box;     /* [nvertex][6] within which vertices may move before pairs are searched for again */
+  PetscReal *shorter; /* [nvertex][3] end of a motion that was halved */
+  struct SbContactFeatures *features; /* [6] vertices, triangles and edges, each of this rank and of others */
   PetscBool known;
   PetscInt n, size;
-  SbContactPair *pair; /* [n] all that touch nodes of this rank, by kind, then by numbers */
+  SbContactPair *pair; /* [n] all that touch nodes of this rank, in no order */
   PetscInt nsearch;
 };
 PetscErrorCode SbContactPairsCreate(SbContactMesh mesh, PetscBool self, PetscBool others, PetscReal reach,
@@ -81,6 +83,28 @@ PetscErrorCode SbContactPairsFind(SbContactPairs pairs, const PetscReal x0[], co
 /* The gap, m: the distance less the radius of a rounded obstacle; nearest places and direction in `distance`. Not collective. */
 PetscReal SbContactPairGap(SbContactMesh mesh, const SbContactPair *pair, const PetscReal x[],
                            SbDistance *distance);
+/* Whether the boxes of both features on the straight way from x0 to x1 are farther apart than `distance`, m; false for the side of an obstacle. */
+static inline PetscBool SbContactPairApart(SbContactMesh mesh, const SbContactPair *pair,
+                                           const PetscReal x0[], const PetscReal x1[], PetscReal distance)
+{
+  const int split = pair->kind == SB_PAIR_EDGE_EDGE ? 2 : 1;
+  const PetscReal reach =
+    distance + (pair->v[0] >= mesh->nbody_vertex || pair->v[2] >= mesh->nbody_vertex ? mesh->radius : 0.);
+
+  for (int k = 0; k < 3 && !pair->side; k++) {
+    PetscReal low[2] = {PETSC_MAX_REAL, PETSC_MAX_REAL}, high[2] = {PETSC_MIN_REAL, PETSC_MIN_REAL};
+
+    for (int a = 0; a < 4; a++) {
+      const PetscReal p = x0[3 * pair->v[a] + k], q = x1[3 * pair->v[a] + k];
+      const int side = a >= split;
+
+      low[side] = PetscMin(low[side], PetscMin(p, q));
+      high[side] = PetscMax(high[side], PetscMax(p, q));
+    }
+    if (low[0] > high[1] + reach || low[1] > high[0] + reach) return PETSC_TRUE;
+  }
+  return PETSC_FALSE;
+}
 /* The part of the straight way from x0 to x1, 0..1, that no pair of this rank touches before; pairs at a distance keep a tenth of it. Not collective. */
 PetscErrorCode SbContactPairsSafe(SbContactPairs pairs, const PetscReal x0[], const PetscReal x1[],
                                   PetscReal *part, PetscInt *worst);

@@ -2,8 +2,8 @@
   contact_pairs.c - which features of the surfaces may meet, how near they are, and how far they may go.
 
   Search. Each vertex has a box around its motion, grown by a margin; those of edges and triangles hold the boxes of their vertices. Trees of
-  boxes give all pairs of a vertex and a triangle, and of two edges, whose boxes are within the reach. They stay valid while every vertex stays in its box: iterations that move
-  little, and most do, search for nothing.
+  boxes, which are refitted, give all pairs of a vertex and a triangle, and of two edges, whose boxes are within the reach. They stay valid while every vertex stays in its box: iterations that move
+  little, and most do, search for nothing. A motion that meets too many features for that is halved: the rest has to wait for another iteration.
 
   Safe part of a motion. Additive continuous collision detection (Li, Kaufman and Jiang, "Codimensional incremental potential contact", ACM TOG 40(4), 2021,
   section 5; src/geometry/ccd.c) leaves a tenth of each gap. A half-space and a bowl have roots of quadratic polynomials.
@@ -49,12 +49,25 @@ PetscReal SbContactPairGap(SbContactMesh m, const SbContactPair *pair, const Pet
 
 /* ------------------------------------------------------------------ search */
 
-typedef struct {
-  SbContactPairs pairs;
-  PetscInt item;    /* that the pairs below are of */
-  PetscBool vertex; /* item is a vertex, and triangles are met; else a triangle, and vertices other[] are */
-  const PetscInt *other;
-} Query;
+#define MARGIN 0.1 /* of the mean edge, by which boxes are grown at least */
+#define CROWD 200  /* pairs for each vertex, and for CROWD_LEAST more, beyond which a motion is halved */
+#define CROWD_LEAST 1000
+#define CHUNK 256 /* pairs of boxes at once */
+
+/* Features of one kind that touch nodes of this rank, or do not, with a tree over their boxes. */
+enum { VERTEX, TRIANGLE, EDGE };
+struct SbContactFeatures {
+  PetscInt n, *item;   /* [n] numbers in the mesh */
+  PetscReal (*box)[6]; /* [n] */
+  SbBoxTree tree;
+};
+
+/* Vertices of feature i; `own` is room for one. */
+static inline const PetscInt *vertices_of(SbContactMesh m, int kind, PetscInt i, PetscInt *own)
+{
+  *own = i;
+  return kind == VERTEX ? own : kind == TRIANGLE ? m->triangle + 3 * i : m->edge + 2 * i;
+}
 
 static PetscErrorCode add_pair(SbContactPairs p, const SbContactPair *pair)
 {
@@ -77,16 +90,14 @@ static inline PetscBool wanted(SbContactPairs p, PetscInt a, PetscInt b)
                                               : p->self && a < m->nbody_vertex);
 }
 
-static PetscErrorCode add_vertex_triangle(const Query *from, PetscInt met)
+static PetscErrorCode add_vertex_triangle(SbContactPairs p, PetscInt v, PetscInt t)
 {
-  const SbContactPairs p = from->pairs;
   const SbContactMesh m = p->mesh;
-  const PetscInt v = from->vertex ? from->item : from->other[met],
-                 *tri = m->triangle + 3 * (from->vertex ? met : from->item);
+  const PetscInt *tri = m->triangle + 3 * t;
   SbContactPair pair = {.kind = SB_PAIR_VERTEX_TRIANGLE, .v = {v, tri[0], tri[1], tri[2]}};
 
   PetscFunctionBeginUser;
-  if (v == tri[0] || v == tri[1] || v == tri[2] || !wanted(p, v, tri[0])) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!wanted(p, v, tri[0]) || v == tri[0] || v == tri[1] || v == tri[2]) PetscFunctionReturn(PETSC_SUCCESS);
   if (m->driven[v] && m->driven[tri[0]] && m->driven[tri[1]] && m->driven[tri[2]])
     PetscFunctionReturn(PETSC_SUCCESS);
   if (v < m->nbody_vertex)
@@ -97,19 +108,14 @@ static PetscErrorCode add_vertex_triangle(const Query *from, PetscInt met)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode add_edge_edge(const Query *from, PetscInt f)
+static PetscErrorCode add_edge_edge(SbContactPairs p, PetscInt e, PetscInt f)
 {
-  const SbContactPairs p = from->pairs;
   const SbContactMesh m = p->mesh;
-  const PetscInt e = from->item, low = PetscMin(e, f), high = PetscMax(e, f), *a = m->edge + 2 * low,
-                 *b = m->edge + 2 * high;
+  const PetscInt low = PetscMin(e, f), high = PetscMax(e, f), *a = m->edge + 2 * low, *b = m->edge + 2 * high;
   SbContactPair pair = {.kind = SB_PAIR_EDGE_EDGE, .v = {a[0], a[1], b[0], b[1]}};
 
   PetscFunctionBeginUser;
-  /* once, by the lower one where both are of this rank */
-  if (f <= e && (f == e || m->mine[m->edge[2 * f]] || m->mine[m->edge[2 * f + 1]]))
-    PetscFunctionReturn(PETSC_SUCCESS);
-  if (a[0] == b[0] || a[0] == b[1] || a[1] == b[0] || a[1] == b[1] || !wanted(p, a[0], b[0]))
+  if (!wanted(p, a[0], b[0]) || a[0] == b[0] || a[0] == b[1] || a[1] == b[0] || a[1] == b[1])
     PetscFunctionReturn(PETSC_SUCCESS);
   if (m->driven[a[0]] && m->driven[a[1]] && m->driven[b[0]] && m->driven[b[1]])
     PetscFunctionReturn(PETSC_SUCCESS);
@@ -121,17 +127,50 @@ static PetscErrorCode add_edge_edge(const Query *from, PetscInt f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbContactPairsCreate(SbContactMesh mesh, PetscBool self, PetscBool others, PetscReal reach,
+PetscErrorCode SbContactPairsCreate(SbContactMesh m, PetscBool self, PetscBool others, PetscReal reach,
                                     SbContactPairs *pairs)
 {
+  const PetscInt count[] = {m->side == SB_SIDE_NONE ? m->nvertex : m->nbody_vertex, m->ntriangle, m->nedge};
+  PetscReal length = 0.;
+  PetscInt n = 0;
+  SbContactPairs p;
+
   PetscFunctionBeginUser;
-  PetscCall(PetscNew(pairs));
-  (*pairs)->mesh = mesh;
-  (*pairs)->self = self;
-  (*pairs)->others = others;
-  (*pairs)->reach = reach;
-  (*pairs)->margin = 2. * reach;
-  PetscCall(PetscMalloc1(6 * mesh->nvertex, &(*pairs)->box));
+  PetscCall(PetscNew(&p));
+  *pairs = p;
+  p->mesh = m;
+  p->self = self;
+  p->others = others;
+  p->reach = reach;
+  for (; n < m->nedge && m->edge[2 * n] < m->nbody_vertex; n++) {
+    PetscReal r[3];
+
+    for (int i = 0; i < 3; i++) r[i] = m->X[3 * m->edge[2 * n] + i] - m->X[3 * m->edge[2 * n + 1] + i];
+    length += PetscSqrtReal(SbDot3(r, r));
+  }
+  p->margin = PetscMax(2. * reach, MARGIN * length / (PetscReal)PetscMax(1, n));
+  PetscCall(PetscMalloc2(6 * m->nvertex, &p->box, 3 * m->nvertex, &p->shorter));
+
+  /* features by kind, those of this rank first */
+  PetscCall(PetscCalloc1(6, &p->features));
+  for (int k = 0; k < 6; k++) {
+    struct SbContactFeatures *f = &p->features[k];
+
+    for (int pass = 0; pass < 2; pass++) {
+      f->n = 0;
+      for (PetscInt i = 0; i < count[k / 2]; i++) {
+        PetscInt own, size = k / 2 == VERTEX ? 1 : k / 2 == TRIANGLE ? 3 : 2;
+        const PetscInt *v = vertices_of(m, k / 2, i, &own);
+        PetscBool mine = PETSC_FALSE;
+
+        for (PetscInt a = 0; a < size; a++) mine = (PetscBool)(mine || m->mine[v[a]]);
+        if (mine != (PetscBool)(k % 2 == 0)) continue;
+        if (pass) f->item[f->n] = i;
+        f->n++;
+      }
+      if (!pass) PetscCall(PetscMalloc2(f->n, &f->item, f->n, &f->box));
+    }
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -139,7 +178,14 @@ PetscErrorCode SbContactPairsDestroy(SbContactPairs *pairs)
 {
   PetscFunctionBeginUser;
   if (!*pairs) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(PetscFree((*pairs)->box));
+  for (int k = 0; k < 6; k++) {
+    struct SbContactFeatures *f = &(*pairs)->features[k];
+
+    PetscCall(SbBoxTreeDestroy(&f->tree));
+    PetscCall(PetscFree2(f->item, f->box));
+  }
+  PetscCall(PetscFree((*pairs)->features));
+  PetscCall(PetscFree2((*pairs)->box, (*pairs)->shorter));
   PetscCall(PetscFree((*pairs)->pair));
   PetscCall(PetscFree(*pairs));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -148,109 +194,92 @@ PetscErrorCode SbContactPairsDestroy(SbContactPairs *pairs)
 /* Whether all vertices stay where the pairs were searched for. */
 static PetscBool still_within(SbContactPairs p, const PetscReal x0[], const PetscReal x1[])
 {
-  for (PetscInt k = 0; k < 3 * p->mesh->nvertex; k++) {
-    const PetscReal *box = p->box + 6 * (k / 3) + k % 3;
+  for (PetscInt v = 0; v < p->mesh->nvertex; v++) {
+    const PetscReal *box = p->box + 6 * v, *a = x0 + 3 * v, *b = x1 + 3 * v;
 
-    if (!(x0[k] >= box[0] && x0[k] <= box[3] && x1[k] >= box[0] && x1[k] <= box[3])) return PETSC_FALSE;
+    if (!((a[0] >= box[0]) & (a[0] <= box[3]) & (a[1] >= box[1]) & (a[1] <= box[4]) & (a[2] >= box[2]) &
+          (a[2] <= box[5]) & (b[0] >= box[0]) & (b[0] <= box[3]) & (b[1] >= box[1]) & (b[1] <= box[4]) &
+          (b[2] >= box[2]) & (b[2] <= box[5])))
+      return PETSC_FALSE;
   }
   return PETSC_TRUE;
 }
 
-/* Boxes of n features of `size` vertices each, grown by half the reach. */
-static PetscErrorCode make_boxes(SbContactPairs p, PetscInt n, PetscInt size, const PetscInt vertex[],
-                                 PetscReal (**box)[6])
+/* Boxes of the features around those of their vertices, grown by half the reach, and the tree over them. */
+static PetscErrorCode update_features(SbContactPairs p, int k)
 {
-  PetscFunctionBeginUser;
-  PetscCall(PetscMalloc1(n, box));
-  for (PetscInt i = 0; i < n; i++) {
-    const PetscReal grown =
-      0.5 * p->reach + (vertex[size * i] < p->mesh->nbody_vertex ? 0. : p->mesh->radius);
+  const SbContactMesh m = p->mesh;
+  struct SbContactFeatures *f = &p->features[k];
+  const PetscInt size = k / 2 == VERTEX ? 1 : k / 2 == TRIANGLE ? 3 : 2;
 
-    SbBoxClear((*box)[i]);
-    for (PetscInt k = 0; k < size; k++) SbBoxMerge((*box)[i], p->box + 6 * vertex[size * i + k]);
-    for (int k = 0; k < 3; k++) {
-      (*box)[i][k] -= grown;
-      (*box)[i][3 + k] += grown;
+  PetscFunctionBeginUser;
+  for (PetscInt i = 0; i < f->n; i++) {
+    PetscInt own;
+    const PetscInt *v = vertices_of(m, k / 2, f->item[i], &own);
+    const PetscReal grown = 0.5 * p->reach + (v[0] < m->nbody_vertex ? 0. : m->radius);
+
+    for (int c = 0; c < 6; c++) f->box[i][c] = p->box[6 * v[0] + c];
+    for (PetscInt a = 1; a < size; a++) SbBoxMerge(f->box[i], p->box + 6 * v[a]);
+    for (int c = 0; c < 3; c++) {
+      f->box[i][c] -= grown;
+      f->box[i][3 + c] += grown;
     }
   }
+  if (p->nsearch == 1)
+    PetscCall(SbBoxTreeCreate(f->n, (const PetscReal(*)[6])f->box, &f->tree));
+  else
+    PetscCall(SbBoxTreeRefit(&f->tree, (const PetscReal(*)[6])f->box));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbContactPairsFind(SbContactPairs p, const PetscReal x0[], const PetscReal x1[])
+/* SbContactPairsFind(); full: there are more than `most`, some are missing. */
+static PetscErrorCode find_pairs(SbContactPairs p, const PetscReal x0[], const PetscReal x1[], PetscInt most,
+                                 PetscBool *full)
 {
+  /* this rank's features among themselves, and with those of others */
+  static const int meeting[5][2] = {{2 * VERTEX, 2 * TRIANGLE},
+                                    {2 * VERTEX, 2 * TRIANGLE + 1},
+                                    {2 * VERTEX + 1, 2 * TRIANGLE},
+                                    {2 * EDGE, 2 * EDGE},
+                                    {2 * EDGE, 2 * EDGE + 1}};
   const SbContactMesh m = p->mesh;
-  PetscReal(*vertex)[6], (*edge)[6], (*triangle)[6];
-  PetscInt *every, *other, nother = 0;
-  Query from = {.pairs = p};
-  PetscInt met;
-  SbBoxQuery query;
-  SbBoxTree tree;
+  PetscInt found[2 * CHUNK];
 
   PetscFunctionBeginUser;
+  *full = PETSC_FALSE;
   if (p->known && still_within(p, x0, x1)) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_CONTACT], 0, 0, 0, 0));
+  PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_SEARCH], 0, 0, 0, 0));
   p->known = PETSC_TRUE;
   p->nsearch++;
   p->n = 0;
   for (PetscInt v = 0; v < m->nvertex; v++) {
     PetscReal *box = p->box + 6 * v;
 
-    SbBoxClear(box);
-    SbBoxAdd(box, x0 + 3 * v);
-    SbBoxAdd(box, x1 + 3 * v);
     for (int k = 0; k < 3; k++) {
-      box[k] -= p->margin;
-      box[3 + k] += p->margin;
+      box[k] = PetscMin(x0[3 * v + k], x1[3 * v + k]) - p->margin;
+      box[3 + k] = PetscMax(x0[3 * v + k], x1[3 * v + k]) + p->margin;
     }
   }
-  PetscCall(PetscMalloc1(m->nvertex, &every));
-  for (PetscInt v = 0; v < m->nvertex; v++) every[v] = v;
-  PetscCall(make_boxes(p, m->nvertex, 1, every, &vertex));
-  PetscCall(make_boxes(p, m->ntriangle, 3, m->triangle, &triangle));
-  PetscCall(make_boxes(p, m->nedge, 2, m->edge, &edge));
-  PetscCall(PetscFree(every));
+  for (int k = 0; k < 6; k++) PetscCall(update_features(p, k));
 
-  /* vertices of this rank and all triangles */
-  PetscCall(SbBoxTreeCreate(m->ntriangle, (const PetscReal(*)[6])triangle, &tree));
-  from.vertex = PETSC_TRUE;
-  for (PetscInt v = 0; v < m->nbody_vertex; v++) {
-    from.item = v;
-    if (!m->mine[v]) continue;
-    for (SbBoxQueryBegin(&tree, vertex[v], &query); SbBoxQueryNext(&query, &met);)
-      PetscCall(add_vertex_triangle(&from, met));
-  }
-  PetscCall(SbBoxTreeDestroy(&tree));
+  for (int q = 0; q < 5 && !*full; q++) {
+    const struct SbContactFeatures *a = &p->features[meeting[q][0]], *b = &p->features[meeting[q][1]];
+    SbBoxPairs walk;
+    PetscInt n;
 
-  /* other vertices, those of other ranks and of the obstacle, and triangles of this rank */
-  PetscCall(PetscMalloc1(m->nvertex, &other));
-  for (PetscInt v = 0; v < (m->side == SB_SIDE_NONE ? m->nvertex : m->nbody_vertex); v++) {
-    if (m->mine[v]) continue;
-    PetscCall(PetscArraycpy(vertex[nother], vertex[v], 6));
-    other[nother++] = v;
-  }
-  from.vertex = PETSC_FALSE;
-  from.other = other;
-  PetscCall(SbBoxTreeCreate(nother, (const PetscReal(*)[6])vertex, &tree));
-  for (PetscInt t = 0; t < m->nbody_triangle && nother; t++) {
-    const PetscInt *v = m->triangle + 3 * t;
+    SbBoxPairsBegin(&a->tree, &b->tree, 0., &walk);
+    while (!*full && (n = SbBoxPairsNext(&walk, CHUNK, found)) > 0) {
+      for (PetscInt k = 0; k < n; k++) {
+        const PetscInt i = a->item[found[2 * k]], j = b->item[found[2 * k + 1]];
 
-    from.item = t;
-    if (!m->mine[v[0]] && !m->mine[v[1]] && !m->mine[v[2]]) continue;
-    for (SbBoxQueryBegin(&tree, triangle[t], &query); SbBoxQueryNext(&query, &met);)
-      PetscCall(add_vertex_triangle(&from, met));
+        if (q < 3)
+          PetscCall(add_vertex_triangle(p, i, j));
+        else
+          PetscCall(add_edge_edge(p, i, j));
+      }
+      *full = (PetscBool)(p->n > most);
+    }
   }
-  PetscCall(SbBoxTreeDestroy(&tree));
-  PetscCall(PetscFree(other));
-
-  /* edges of this rank and all edges */
-  PetscCall(SbBoxTreeCreate(m->nedge, (const PetscReal(*)[6])edge, &tree));
-  for (PetscInt e = 0; e < m->nedge; e++) {
-    from.item = e;
-    if (!m->mine[m->edge[2 * e]] && !m->mine[m->edge[2 * e + 1]]) continue;
-    for (SbBoxQueryBegin(&tree, edge[e], &query); SbBoxQueryNext(&query, &met);)
-      PetscCall(add_edge_edge(&from, met));
-  }
-  PetscCall(SbBoxTreeDestroy(&tree));
 
   /* a half-space or a bowl: vertices whose boxes come near */
   for (PetscInt v = 0; v < m->nbody_vertex && m->side != SB_SIDE_NONE; v++) {
@@ -267,10 +296,17 @@ PetscErrorCode SbContactPairsFind(SbContactPairs p, const PetscReal x0[], const 
       PetscMin(SbContactPairGap(m, &pair, x0, &g), SbContactPairGap(m, &pair, x1, &g)) - PetscSqrtReal(way);
     if (away < p->reach + 4. * p->margin) PetscCall(add_pair(p, &pair));
   }
-  PetscCall(PetscFree(vertex));
-  PetscCall(PetscFree(triangle));
-  PetscCall(PetscFree(edge));
-  PetscCall(PetscLogEventEnd(SbEvents[SB_EVENT_CONTACT], 0, 0, 0, 0));
+  if (*full) p->known = PETSC_FALSE;
+  PetscCall(PetscLogEventEnd(SbEvents[SB_EVENT_SEARCH], 0, 0, 0, 0));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbContactPairsFind(SbContactPairs p, const PetscReal x0[], const PetscReal x1[])
+{
+  PetscBool full;
+
+  PetscFunctionBeginUser;
+  PetscCall(find_pairs(p, x0, x1, PETSC_MAX_INT, &full));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -324,9 +360,20 @@ PetscErrorCode SbContactPairsSafe(SbContactPairs p, const PetscReal x0[], const 
                                   PetscReal *part, PetscInt *worst)
 {
   const SbContactMesh m = p->mesh;
+  const PetscInt most = PetscMin(CROWD * (PetscInt64)(m->nvertex + CROWD_LEAST), PETSC_MAX_INT / 2);
+  PetscReal whole = 1.;
+  PetscBool full;
 
   PetscFunctionBeginUser;
-  PetscCall(SbContactPairsFind(p, x0, x1));
+  /* as much of the way as there is room for its pairs */
+  PetscCall(find_pairs(p, x0, x1, most, &full));
+  while (full) {
+    whole *= 0.5;
+    for (PetscInt k = 0; k < 3 * m->nvertex; k++) p->shorter[k] = x0[k] + 0.5 * (x1[k] - x0[k]);
+    x1 = p->shorter;
+    PetscCall(find_pairs(p, x0, x1, whole > PETSC_SQRT_MACHINE_EPSILON ? most : PETSC_MAX_INT, &full));
+  }
+
   *part = 1.;
   *worst = -1;
   for (PetscInt i = 0; i < p->n; i++) {
@@ -334,11 +381,13 @@ PetscErrorCode SbContactPairsSafe(SbContactPairs p, const PetscReal x0[], const 
     PetscReal t;
 
     if (!m->own[pair->v[0]] && !(pair->v[0] >= m->nbody_vertex && m->own[pair->v[1]])) continue;
+    if (SbContactPairApart(m, pair, x0, x1, p->reach)) continue;
     t = safe_part(m, pair, x0, x1);
     if (t < *part) {
       *part = t;
       *worst = i;
     }
   }
+  *part *= whole;
   PetscFunctionReturn(PETSC_SUCCESS);
 }

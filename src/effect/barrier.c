@@ -163,6 +163,7 @@ static PetscErrorCode look(Barrier *b, const PetscReal u[])
   for (PetscInt i = 0; i < b->pairs->n; i++) {
     Active a = {.pair = i};
 
+    if (SbContactPairApart(b->mesh, &b->pairs->pair[i], b->x, b->x, b->w[0])) continue;
     a.gap = SbContactPairGap(b->mesh, &b->pairs->pair[i], b->x, &a.at);
     if (a.gap >= width_of(b, &b->pairs->pair[i])) continue;
     if (b->nactive == b->size) {
@@ -516,17 +517,18 @@ static PetscErrorCode safe_barrier(SbEffect e, SbSpace s, const PetscReal u0[], 
                                    PetscReal progress, PetscReal *part, PetscInt *nactive)
 {
   Barrier *b = (Barrier *)e->data;
-  PetscInt worst;
+  PetscInt worst, nsearch;
 
   PetscFunctionBeginUser;
   (void)s;
   PetscCall(look(b, u0));
+  nsearch = b->pairs->nsearch;
   *nactive = b->nactive;
   PetscCall(SbContactMeshMove(b->mesh, u1, NULL, b->other));
   place_obstacle(b, progress, b->other);
-  /* pairs that were found for the way are others than those of its start */
   PetscCall(SbContactPairsSafe(b->pairs, b->x, b->other, part, &worst));
-  b->known = PETSC_FALSE;
+  /* pairs that were found for the way are others than those of its start */
+  if (b->pairs->nsearch != nsearch) b->known = PETSC_FALSE;
   b->shortest = PetscMin(b->shortest, *part);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
