@@ -176,8 +176,8 @@ PetscReal SbSpaceGetNodalConstraintForce(SbSpace space, PetscInt node, PetscInt 
   the exact constraints, or find their multipliers as unknowns. nonsymmetric: constraints may push along other coefficients than those of their sums; then
   solves are not symmetric.
 */
-/* How solves treat the exact constraints: in their null space, or as [K F^T; G 0] by a factorisation or by iterations. */
-typedef enum { SB_SADDLE_NONE, SB_SADDLE_DIRECT, SB_SADDLE_ITERATIVE } SbSaddle;
+/* How solves treat the exact constraints: in their null space, or as [K F^T; G 0] by a factorisation. */
+typedef enum { SB_SADDLE_NONE, SB_SADDLE_DIRECT } SbSaddle;
 /* external: constraints may join nodes to something that is no body (those of a negative id), whose forces are reactions. Alike on all ranks. */
 PetscErrorCode SbSpaceCreateConstraints(SbSpace space, PetscBool external, PetscBool nonsymmetric);
 /* Whether there may be such constraints. Not collective. */

@@ -17,7 +17,7 @@
   direction of the slip. Then P = I - D F^T (G D F^T)^-1 G, forces are projected by I - F^T (G D F^T)^-1 G D, springs give F^T k G,
   and A is not symmetric.
 
-  Where an effect asks for it, the saddle-point system itself is solved instead of A: saddle_factor.c, saddle.c.
+  Where an effect asks for it, the saddle-point system itself is factored instead of A: saddle_factor.c.
 
   Nodes that are prescribed or constrained (nodal_constraint.c) have no say: their columns are cleared or projected.
 */

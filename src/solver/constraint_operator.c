@@ -9,7 +9,8 @@
 #include "sbsolver.h"
 #include "sblog.h"
 
-PetscErrorCode SbConstraintsMultiply(SbConstraints c, Vec x, Vec y)
+/* y = (K + F^T k G) x, what was added to K taken away. */
+static PetscErrorCode multiply_stiffness(SbConstraints c, Vec x, Vec y)
 {
   PetscFunctionBeginUser;
   PetscCall(MatMult(c->K, x, y));
@@ -51,7 +52,7 @@ static PetscErrorCode multiply(Mat A, Vec x, Vec y)
 
   PetscFunctionBeginUser;
   PetscCall(MatShellGetContext(A, &s));
-  PetscCall(SbConstraintsMultiply(s->constraints, x, y));
+  PetscCall(multiply_stiffness(s->constraints, x, y));
   PetscCall(project_force(s->constraints, y));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

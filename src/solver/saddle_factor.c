@@ -38,11 +38,11 @@ PetscErrorCode SbSaddleChoose(SbSpace s, PetscBool dynamic, PetscInt choice, SbS
              "-saddle_solver direct needs MUMPS or SuiteSparse, and this PETSc was built without both: use "
              "-saddle_solver iterative");
   if (!choice) choice = package && unknowns <= (dynamic ? DIRECT_DYNAMIC : DIRECT_STATIC) ? 1 : 2;
-  *saddle = choice == 1 ? SB_SADDLE_DIRECT : SB_SADDLE_ITERATIVE;
+  *saddle = choice == 1 ? SB_SADDLE_DIRECT : SB_SADDLE_NONE;
   if (choice == 1)
     PetscCall(PetscSNPrintf(reason, size, "multipliers of contact directly, by %s", package));
   else
-    PetscCall(PetscSNPrintf(reason, size, "multipliers of contact by iterations with it"));
+    PetscCall(PetscSNPrintf(reason, size, "constraints of contact by their null space"));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -685,7 +685,6 @@ PetscErrorCode SbSolverFinish(SNES snes, SbSpace s, const SbSolverPreset *preset
   if (s->constraints && s->constraints->saddle == SB_SADDLE_DIRECT) direct = PETSC_TRUE;
   PetscCall(SbKSPCheckTrueResidual(ksp, direct, single));
   if (s->constraints || s->nodal) PetscCall(SbKSPSetForceTolerance(ksp));
-  if (s->constraints && s->constraints->saddle == SB_SADDLE_ITERATIVE) PetscCall(SbKSPSaddleSet(s, ksp));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -700,7 +699,6 @@ PetscErrorCode SbSolverDescribe(SNES snes, SbSpace s, size_t size, char text[])
 
   PetscFunctionBeginUser;
   PetscCall(SNESGetKSP(snes, &ksp));
-  PetscCall(SbKSPSaddleGetPlain(ksp, &ksp));
   PetscCall(KSPGetType(ksp, &method));
   if (s->constraints && s->constraints->general) method = s->constraints->method;
   PetscCall(KSPGetPC(ksp, &pc));

@@ -5,9 +5,6 @@
 #include "sbsolver.h"
 #include "sbconstraint.h"
 
-/* y = (K + F^T k G) x, what was added to K taken away. Collective. */
-PetscErrorCode SbConstraintsMultiply(SbConstraints c, Vec x, Vec y);
-
 /* Errors: PETSC_ERR_USER for a norm or side that the type of ksp does not have. After KSPSetFromOptions(). Not collective. */
 PetscErrorCode SbKSPCheckNorm(KSP ksp);
 
@@ -21,18 +18,6 @@ PetscErrorCode SbKSPCheckTrueResidual(KSP ksp, PetscBool direct, PetscBool alone
 
 /* The true residual decides, unless the user chose a norm or a side, or the type of ksp does not compute it. After KSPSetType(). Not collective. */
 PetscErrorCode SbKSPPreferTrueResidual(KSP ksp);
-
-/* The method that such a ksp takes where nothing touches; ksp itself when it is another one. Borrowed. Not collective. */
-PetscErrorCode SbKSPSaddleGetPlain(KSP ksp, KSP *plain);
-
-/*
-  SbKSPSaddleSet - makes ksp, as its options have made it, a solver of the saddle-point system by iterations (saddle.c).
-
-  Collective; after KSPSetFromOptions(). Its operator is that of SbConstraintsCreateOperator(), its preconditioner one of SbPCConstrainedCreate().
-  Tolerances are about the residual in the null space, as without it. Options read: -saddle_ksp_ (minres, or fgmres where the
-  preconditioner is not symmetric and definite).
-*/
-PetscErrorCode SbKSPSaddleSet(SbSpace space, KSP ksp);
 
 /*
   SbKSPSetForceTolerance - makes the absolute tolerance of ksp one of the true residual, N, whatever norm it is judged by.

@@ -42,8 +42,7 @@ static const SbOption rows[] = {
    "not help"},
   {"saddle_solver", SB_OPTION_CHOICE, 1, "", "auto", "auto|direct|iterative",
    "how effects with response multiplier solve for displacements and multipliers: by a factorisation of "
-   "both, or by "
-   "MINRES with the preconditioner of the solver; auto goes by size"},
+   "both, or by the solver in the null space of the constraints; auto goes by size"},
   {"contact_solver", SB_OPTION_CHOICE, 1, "", "auto", "auto|direct|iterative",
    "how systems with response barrier are solved: by a factorisation, or by CG with a coarse space of what "
    "touches; auto goes by size and "

@@ -3,7 +3,7 @@
   Response `multiplier` against `projected`: the same nonlinear problem by another linear solve, so the same answer to what contact
   settles to.
 
-    stack      a block on a block, no friction: displacements, by factorisation and by iterations of three solvers
+    stack      a block on a block, no friction: displacements, by factorisation and by three solvers in the null space
     pressed    a body that only contact carries, between two obstacles that stand still: its matrix alone is singular
     corner     obstacles, one and two at a node, beside a plane of symmetry: rows that depend on others
     shear      friction between blocks: displacements to what friction is settled to
