@@ -177,4 +177,3 @@ PetscErrorCode SbEffectRegister_Fixed(void);
 PetscErrorCode SbEffectRegister_PrescribedDisplacement(void);
 PetscErrorCode SbEffectRegister_Damping(void);
 PetscErrorCode SbEffectRegister_Contact(void);
-PetscErrorCode SbEffectRegister_Collision(void);

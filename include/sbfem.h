@@ -75,6 +75,7 @@ struct _p_SbSpace {
   SbJump jump;     /* NULL without face nodes */
   SbNodalConstraints nodal;  /* NULL unless an effect may constrain nodes along directions of their own */
   SbConstraints constraints; /* NULL unless an effect may join nodes by constraints */
+  PetscBool coupled;         /* an effect may couple nodes that share no cell, in an assembled tangent */
   SbLane *batch_g;           /* [nbatch][9] basis gradients of nodes 1..3, 1/m; 64-byte aligned */
   SbLane *batch_V;           /* [nbatch] volumes, m^3; 0 in padding; 64-byte aligned */
   void *batch_memory;        /* what batch_g and batch_V live in */

@@ -72,6 +72,7 @@ static PetscErrorCode setup_barrier(SbEffect e, SbSpace s)
 
   PetscFunctionBeginUser;
   if (b->scene.setup_obstacle) PetscCall((*b->scene.setup_obstacle)(e, s, b->data));
+  s->coupled = PETSC_TRUE;
   PetscCall(SbEffectFacets(s, b->scene.on, &n, &facet));
   PetscCall(SbContactMeshCreate(s, n, facet, b->scene.obstacle, &b->mesh));
   PetscCall(PetscFree(facet));

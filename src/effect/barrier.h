@@ -1,5 +1,5 @@
 /*
-  barrier.h - the response `barrier` of contact and collision (barrier.c).
+  barrier.h - the response `barrier` of contact (barrier.c).
 */
 #pragma once
 #include "sbbarrier.h"
@@ -15,25 +15,5 @@ typedef struct {
   PetscReal friction;
   PetscErrorCode (*setup_obstacle)(SbEffect e, SbSpace space, void *data);
 } SbBarrierScene;
-#define SB_BARRIER_OPTIONS                                                                                   \
-  {"barrier_width",                                                                                          \
-   SB_OPTION_REAL,                                                                                           \
-   1,                                                                                                        \
-   "m",                                                                                                      \
-   "0",                                                                                                      \
-   "[0, inf)",                                                                                               \
-   "response barrier: gap below which surfaces push each other; 0: a thousandth of the smallest body, at "   \
-   "most half of its shortest edge"},                                                                        \
-    {"barrier_pressure",                                                                                     \
-     SB_OPTION_REAL,                                                                                         \
-     1,                                                                                                      \
-     "Pa",                                                                                                   \
-     "0",                                                                                                    \
-     "[0, inf)",                                                                                             \
-     "response barrier: scale of the pressure; 0: a tenth of Young's modulus of the softer side"},           \
-  {                                                                                                          \
-    "verify", SB_OPTION_BOOL, 1, "", "no", "",                                                               \
-      "response barrier: after each step, edges that go through triangles are searched for, and end the run" \
-  }
 /* Takes the effect over; e->data goes on as the type's own, behind it. Not collective. */
 PetscErrorCode SbBarrierCreate(SbEffect e, const SbScope *scope, const SbBarrierScene *scene);

@@ -21,7 +21,6 @@
   With one surface searching for the other (`passes one`), the finer one looks: rows then are not more than the surface can take. A thin
   or much coarser partner wants both.
 */
-#include "barrier.h"
 #include "collision.h"
 
 #define TOGGLES 3    /* how often a row may come within a step before it stays */
@@ -29,112 +28,32 @@
 #define EDGE_PAIRS 8 /* of one edge, that have identities of their own */
 #define PULLING 1e-6 /* of the largest contact force: what a row must pull with to leave */
 
-static const SbOption rows[] = {
-  {"on", SB_OPTION_NAMES, 1, "", "boundary", "", "sets whose surfaces may meet"},
-  {"response", SB_OPTION_CHOICE, 1, "", "projected", "projected|multiplier|augmented|penalty|barrier",
-   "exact constraints, the solve in their null space or with their multipliers as unknowns; multipliers "
-   "raised on springs; springs; an energy that never lets surfaces touch"},
-  SB_BARRIER_OPTIONS,
-  {"time_of_impact", SB_OPTION_CHOICE, 1, "", "no", "no|yes",
-   "a step in which points begin to touch is taken as it is, or repeated up to the moment of the first "
-   "touch"},
-  {"detection", SB_OPTION_CHOICE, 1, "", "tree", "tree|brute",
-   "a tree of boxes, or every pair: the same contacts"},
-  {"passes", SB_OPTION_CHOICE, 1, "", "two", "one|two",
-   "points of the finer of two surfaces search for the other one, or both do"},
-  {"self", SB_OPTION_BOOL, 1, "", "no", "", "bodies may meet themselves"},
-  {"friction", SB_OPTION_REAL, 1, "", "0", "[0, inf)", "Coulomb's coefficient for sticking"},
-  {"friction_kinetic", SB_OPTION_REAL, 1, "", "-1", "[-1, inf)",
-   "Coulomb's coefficient for slipping; negative: that for sticking"},
-  {"stiffness", SB_OPTION_REAL, 1, "", "20", "(0, inf)",
-   "springs of penalty, augmented and friction: factor on (lambda + 2 mu) area / height of the cell behind"},
-  {"damping", SB_OPTION_REAL, 1, "s", "0", "[0, inf)",
-   "response penalty: a damper beside each spring, its constant being stiffness times this time; it acts on "
-   "what is behind "
-   "and never pulls"},
-  {"search_radius", SB_OPTION_REAL, 1, "m", "0", "[0, inf)",
-   "how far points search for surfaces; what is deeper is found when a run begins or as points in tets; 0: "
-   "half the mean edge"},
-  {"restitution", SB_OPTION_REAL, 1, "", "0", "[0, 1]",
-   "part of their relative speed with which surfaces leave each other; needs -time euler_implicit, and "
-   "bodies "
-   "that are stiff within a step to bounce as a whole"},
-  {"separation_steps", SB_OPTION_REAL, 1, "steps", "30", "[1, inf)",
-   "bodies that overlap before they meet are parted slowly: to 1/e of the depth in so many steps; 1: at "
-   "once"},
-  {"pairs", SB_OPTION_BOOL, 1, "", "no", "",
-   "columns in history.csv for each pair of bodies: force on the second by the first, contacts"},
-};
-
-static PetscErrorCode read_restitution(SbEffect e, const SbScope *scope)
+PetscErrorCode SbContactOptions_Collision(SbEffect e, const SbScope *scope, const SbContactOptions *o)
 {
   Collision *c = (Collision *)e->data;
-
-  PetscFunctionBeginUser;
-  PetscCall(SbOptionReal(scope, "restitution", &c->bounce.e));
-  e->euler = (PetscBool)(c->bounce.e > 0);
-  if (!e->euler) {
-    e->ops.restitution = NULL;
-    PetscFunctionReturn(PETSC_SUCCESS);
-  }
-  PetscCheck(exact(c->response), PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
-             "-effect_%s_restitution %g needs -effect_%s_response projected or multiplier", e->name,
-             (double)c->bounce.e, e->name);
-  PetscCheck(!c->cut, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
-             "-effect_%s_restitution %g and -effect_%s_time_of_impact yes do not go together: what is let go "
-             "within a step "
-             "never arrives at its end; leave one of them out",
-             e->name, (double)c->bounce.e, e->name);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode options_collision(SbEffect e, const SbScope *scope)
-{
-  Collision *c = (Collision *)e->data;
-  PetscReal recovery;
   PetscInt choice;
 
   PetscFunctionBeginUser;
   PetscCall(SbEffectReadOn(scope, &c->on));
-  PetscCall(SbOptionChoice(scope, "response", &choice));
-  c->response = (Response)choice;
-  e->saddle = (PetscBool)(c->response == MULTIPLIER);
-  if (choice == BARRIER) {
-    SbBarrierScene scene = {.on = &c->on};
+  PetscCall(SbOptionBool(scope, "self", &c->self));
+  c->response = o->response;
+  c->friction = o->friction;
+  if (c->response == BARRIER) {
+    const SbBarrierScene scene = {.on = &c->on, .self = c->self, .friction = c->friction.mu};
 
-    PetscCall(SbOptionBool(scope, "self", &scene.self));
-    PetscCall(SbOptionReal(scope, "friction", &scene.friction));
     PetscCall(SbBarrierCreate(e, scope, &scene));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
-  c->friction.exact = exact(c->response);
-  e->springs = (PetscBool)!exact(c->response);
-  PetscCall(SbOptionChoice(scope, "time_of_impact", &choice));
-  c->cut = (PetscBool)(choice == 1);
-  if (!c->cut) e->ops.time_of_impact = NULL;
+  c->cut = o->cut;
+  c->stiffness = o->stiffness;
+  c->damping = o->damping;
+  c->bounce.e = o->restitution;
+  SbOverlapSet(&c->overlap, o->separation_steps);
   PetscCall(SbOptionChoice(scope, "detection", &choice));
   PetscCall(SbDetectorCreate((SbDetectKind)choice, &c->detector));
   PetscCall(SbOptionChoice(scope, "passes", &choice));
   c->both = (PetscBool)(choice == 1);
-  PetscCall(SbOptionBool(scope, "self", &c->self));
-  PetscCall(SbOptionReal(scope, "friction", &c->friction.mu));
-  if (c->friction.mu > 0) e->springs = PETSC_TRUE;
-  PetscCall(SbOptionReal(scope, "friction_kinetic", &c->friction.mu_kinetic));
-  if (c->friction.mu_kinetic < 0) c->friction.mu_kinetic = c->friction.mu;
-  PetscCheck(
-    c->friction.mu_kinetic <= c->friction.mu, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
-    "-effect_%s_friction_kinetic %g is above -effect_%s_friction %g: a slipping point would stop and "
-    "go at once",
-    e->name, (double)c->friction.mu_kinetic, e->name, (double)c->friction.mu);
-  PetscCall(SbOptionReal(scope, "stiffness", &c->stiffness));
-  PetscCall(SbOptionReal(scope, "damping", &c->damping));
-  PetscCheck(c->damping <= 0 || c->response == PENALTY, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
-             "-effect_%s_damping %g s is for springs that give: it needs -effect_%s_response penalty",
-             e->name, (double)c->damping, e->name);
   PetscCall(SbOptionReal(scope, "search_radius", &c->reach));
-  PetscCall(read_restitution(e, scope));
-  PetscCall(SbOptionReal(scope, "separation_steps", &recovery));
-  SbOverlapSet(&c->overlap, recovery);
   PetscCall(SbOptionBool(scope, "pairs", &c->pairs.wanted));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -585,7 +504,7 @@ static PetscErrorCode destroy_collision(SbEffect e)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode create_collision(SbEffect e)
+PetscErrorCode SbContactCreate_Collision(SbEffect e)
 {
   static const char *const columns[] = {"contacts",       "penetration", "penetration_mean", "normal_force",
                                         "friction_force", "work",        "friction_loss"};
@@ -595,7 +514,6 @@ static PetscErrorCode create_collision(SbEffect e)
   PetscCall(PetscNew(&c));
   e->data = c;
   e->steady = PETSC_FALSE; /* a load factor does not make bodies pass through each other */
-  e->ops.setfromoptions = options_collision;
   e->ops.setup = setup_collision;
   e->ops.begin_step = touch_collision;
   e->ops.assemble_constraints = hold_collision;
@@ -615,12 +533,5 @@ static PetscErrorCode create_collision(SbEffect e)
   e->ops.destroy = destroy_collision;
   e->column = columns;
   e->ncolumn = PETSC_STATIC_ARRAY_LENGTH(columns);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode SbEffectRegister_Collision(void)
-{
-  PetscFunctionBeginUser;
-  PetscCall(SbEffectRegister("collision", create_collision, PETSC_STATIC_ARRAY_LENGTH(rows), rows));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -2,23 +2,17 @@
   collision.h - pairs of a point and a surface near it, and of two edges: what collision.c and collision_look.c share.
 */
 #pragma once
-#include "friction.h"
-#include "rebound.h"
-#include "overlap.h"
+#include "contact.h"
 #include "sbdetect.h"
-#include "effect_impl.h"
 
 #define FEW_LOOKS 3    /* how often normal and weights of a row are taken again within a step in any case */
 #define LOOKS 8        /* and how often while its gap is not closed */
 #define TOLERANCE 1e-7 /* of the size of the bodies: largest penetration that counts as touching */
 #define NODES SB_FRICTION_NODES
 
-typedef enum { PROJECTED, MULTIPLIER, AUGMENTED, PENALTY, BARRIER } Response;
-
-/* Whether rows that touch hold exactly. */
-static inline PetscBool exact(Response response)
+static inline PetscBool exact(SbResponse response)
 {
-  return (PetscBool)(response == PROJECTED || response == MULTIPLIER);
+  return SbResponseIsExact(response);
 }
 
 /*
@@ -66,7 +60,7 @@ typedef struct {
   SbEffectOn on;
   SbContactSurface surface;
   SbDetector detector;
-  Response response;
+  SbResponse response;
   PetscBool self, both;
   SbFriction friction;
   PetscReal stiffness, reach;

@@ -8,7 +8,7 @@
 
   Elsewhere (ridges, and where nodes are constrained by rows) normals of facets are averaged from search to search, and after many of them the plane is kept.
 */
-#include "contact.h"
+#include "contact_node.h"
 
 #define VALLEY 2 /* flips of a held node between facets in a step, after which it may be constrained on two */
 #define AVERAGED 4  /* flips after which normals are averaged */

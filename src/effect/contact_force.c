@@ -2,7 +2,7 @@
   contact_force.c - where the obstacle is, and what it pushes nodes with: forces and their derivatives, the end of a step, history. The
   method is described in contact.c.
 */
-#include "contact.h"
+#include "contact_node.h"
 
 /* ------------------------------------------------------------------ geometry */
 

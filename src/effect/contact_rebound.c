@@ -2,7 +2,7 @@
   contact_rebound.c - velocities at a rigid obstacle: restitution of nodes that meet it, whose law and what it does to the energy are described in
   src/model/restitution.c, and how fast it moves where it holds nodes.
 */
-#include "contact.h"
+#include "contact_node.h"
 
 #define INSTANT 1e-3 /* of a step: over so much of its end the obstacle's speed is taken */
 

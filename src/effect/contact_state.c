@@ -4,7 +4,7 @@
   A record is a node by its original number: whether it touches and did so, what it is constrained at and along, multiplier, gap, and its
   friction. With that the rows of the last solve can be written again, and the next step begins as if the run had not stopped.
 */
-#include "contact.h"
+#include "contact_node.h"
 
 /* Record and node, in the order of SB_CONTACT_STATE. */
 static void write_record(const Touch *touch, PetscInt number, PetscReal r[])

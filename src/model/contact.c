@@ -127,8 +127,8 @@ PetscErrorCode SbModelContactGap(SbModel m, PetscReal t, Vec U, Vec G)
   PetscCall(SbSpaceGetLocalWrite(m->space, G, &normal));
   PetscCall(PetscArrayzero(normal, 3 * m->space->nnode));
   for (PetscInt i = 0; i < m->space->nnode; i++) gap[i] = PETSC_MAX_REAL;
-  for (PetscInt e = 0; e < m->nbegin_step; e++) {
-    if (m->begin_step[e]->ops.gap) SbEffectCall(m->begin_step[e], gap, m->space, &stage, gap, normal);
+  for (PetscInt e = 0; e < m->neffect; e++) {
+    if (m->effect[e]->ops.gap) SbEffectCall(m->effect[e], gap, m->space, &stage, gap, normal);
   }
   for (PetscInt i = 0; i < m->space->nnode; i++) {
     for (PetscInt k = 0; k < 3 && gap[i] < PETSC_MAX_REAL; k++) normal[3 * i + k] *= gap[i];
@@ -150,9 +150,8 @@ PetscErrorCode SbModelContactForce(SbModel m, PetscReal t, Vec U, Vec R, Vec F)
   PetscCall(SbSpaceGetLocalRead(m->space, R, &r));
   PetscCall(SbSpaceGetLocalWrite(m->space, F, &f));
   PetscCall(PetscArrayzero(f, 3 * m->space->nnode));
-  for (PetscInt e = 0; e < m->nbegin_step; e++) {
-    if (m->begin_step[e]->ops.contact_force)
-      SbEffectCall(m->begin_step[e], contact_force, m->space, &stage, r, f);
+  for (PetscInt e = 0; e < m->neffect; e++) {
+    if (m->effect[e]->ops.contact_force) SbEffectCall(m->effect[e], contact_force, m->space, &stage, r, f);
   }
   PetscCall(SbSpaceRestoreLocalWrite(m->space, F, &f));
   PetscCall(SbSpaceRestoreLocalRead(m->space, R, &r));

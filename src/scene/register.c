@@ -37,6 +37,5 @@ PetscErrorCode SbRegisterAll(void)
   PetscCall(SbEffectRegister_PrescribedDisplacement());
   PetscCall(SbEffectRegister_Damping());
   PetscCall(SbEffectRegister_Contact());
-  PetscCall(SbEffectRegister_Collision());
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -327,7 +327,7 @@ PetscErrorCode SbSolverChoose(SbSpace s, PetscBool dynamic, PetscBool linear, Pe
                             " unknowns, nu up to %g, %.2g %% of the tets slivers (angles below %g "
                             "degrees): a factorisation, iterations hardly get there",
                             unknowns, (double)hard.nu, 100. * (double)hard.sliver_part, SB_SLIVER));
-  } else if (s->faces && !s->nodal && !s->constraints &&
+  } else if (s->faces && !s->nodal && !s->constraints && !s->coupled &&
              (hard.face_nu > NU_PRESSURE || (!hard.slivers && (!dynamic || hard.dg)))) {
     /* docs/reports/solver_choice.md; 24k tets of CR, dynamic, CPU s of this and cg_two_level at nu 0.3 12 and 7, at 0.45 15 and 11, at 0.49 17 and 17 */
     name = "pressure";

@@ -320,12 +320,12 @@ static PetscErrorCode explain(SbRun run, PetscReal factor, PetscReal l)
 PetscErrorCode SbArcLengthCheck(SbRun run)
 {
   const SbModel m = run->model;
-  const char *name = m->nbegin_step ? m->begin_step[0]->name : "";
+  const char *name = m->nbegin_step ? m->begin_step[0]->name : m->npotential ? m->potential[0]->name : "";
   PetscBool cg, cholmod;
   KSP ksp;
 
   PetscFunctionBeginUser;
-  PetscCheck(!m->nbegin_step, m->comm, PETSC_ERR_USER_INPUT,
+  PetscCheck(!m->nbegin_step && !m->npotential, m->comm, PETSC_ERR_USER_INPUT,
              "-static_control arc_length does not know contact (effect %s): use -static_control load, or a "
              "dynamic run "
              "with damping",

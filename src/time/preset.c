@@ -448,6 +448,7 @@ static PetscErrorCode check_guarded(SbRun run)
 {
   const SbModel m = run->model;
   const char *name = m->potential[0]->name;
+  PetscBool split;
 
   PetscFunctionBeginUser;
   PetscCheck(run->preset == SB_TIME_EULER_IMPLICIT || run->preset == SB_TIME_STATIC, m->comm,
@@ -456,6 +457,11 @@ static PetscErrorCode check_guarded(SbRun run)
              "-effect_%s_response barrier and -effect_%s_response of another kind do not go together: give "
              "both the same",
              name, m->begin_step[0]->name);
+  PetscCall(PetscStrcmp(run->solver, "pressure", &split));
+  PetscCheck(!run->solver_used->matrix_free && !split, m->comm, PETSC_ERR_USER_INPUT,
+             "-solver %s has no matrix of everything, to which the effect %s could add: use -solver auto or "
+             "cg_two_level",
+             run->solver, name);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

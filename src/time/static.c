@@ -64,11 +64,12 @@ static PetscErrorCode find_free_body(SbRun run, PetscReal factor, PetscBool *fou
   PetscFunctionBeginUser;
   PetscCall(SbRunFreeBody(run, &body, sizeof(motion), motion));
   *found = (PetscBool)(body >= 0);
-  run->free_body = (PetscBool)(*found && !run->model->nbegin_step);
+  run->free_body = (PetscBool)(*found && !run->model->nbegin_step && !run->model->npotential);
   if (*found)
-    PetscCall(SbRunFail(run, "load factor %g: nothing holds the body %s against %s; hold it by a support%s",
-                        (double)factor, run->model->body[body].name, motion,
-                        run->model->nbegin_step ? ", or let it come to rest in a dynamic run" : ""));
+    PetscCall(SbRunFail(
+      run, "load factor %g: nothing holds the body %s against %s; hold it by a support%s", (double)factor,
+      run->model->body[body].name, motion,
+      run->model->nbegin_step || run->model->npotential ? ", or let it come to rest in a dynamic run" : ""));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -95,7 +96,8 @@ static PetscErrorCode complete(void *ctx, SNESConvergedReason reason, SbSolvedSt
   }
 
   /* loads in balance leave a singular system with a solution, and a solver may find it with any rigid motion on top */
-  if (*ok && !l->run->steps_total && !l->run->model->nbegin_step && l->run->newton_step) {
+  if (*ok && !l->run->steps_total && !l->run->model->nbegin_step && !l->run->model->npotential &&
+      l->run->newton_step) {
     PetscCall(find_free_body(l->run, l->factor, &found));
     if (found) *ok = PETSC_FALSE;
   }

@@ -8,8 +8,9 @@
 #define FLESH(body, young, density)                                                                          \
   "-body_" body "_material neohookean -body_" body "_young " young " -body_" body "_poisson 0.3 -body_" body \
   "_density " density " "
-#define FLOOR "-effect_floor_type contact -effect_floor_obstacle plane:0,0,1,0 "
-#define MEET "-effect_meet_type collision "
+#define FLOOR \
+  "-effect_floor_type contact -effect_floor_response projected -effect_floor_obstacle plane:0,0,1,0 "
+#define MEET "-effect_meet_type contact -effect_meet_response projected "
 
 /* A block of 64 g flies onto a plate of a tenth of its thickness; waves have 1000 m/s. */
 #define PLATE(element)                                                                                     \
@@ -35,7 +36,8 @@
     .name = "squeeze." element, .seconds = 600,                                                           \
     .what = "squeezed to 20 % between plates and let go, " element,                                       \
     .options = "-bodies a -body_a_mesh box:0.1,0.1,0.1:" mesh " -body_a_element " element " " FLESH(      \
-      "a", "1e4", "1000") "-effects top,floor -effect_top_type contact -effect_top_obstacle "             \
+      "a", "1e4", "1000") "-effects top,floor -effect_top_type contact -effect_top_response projected "   \
+                          "-effect_top_obstacle "                                                         \
                           "plane:0,0,-1,-0.1 -effect_top_displacement 0;0;-0.08*min(t,max(0,2-t)) " FLOOR \
                           "-ts_dt 0.02 -ts_max_time 4 -snes_rtol 1e-9",                                   \
     .jitter = 1e-5, .limits = {                                                                           \
@@ -157,6 +159,7 @@ const HardCase HardCasesContact[] = {
    .what = "a block begins half in the floor",
    .options = "-bodies a -body_a_mesh box:0.1,0.1,0.1:3 " FLESH(
      "a", "1e5", "1000") "-effects damping,floor -effect_damping_beta 0.01 -effect_floor_type contact "
+                         "-effect_floor_response projected "
                          "-effect_floor_obstacle plane:0,0,1,0.05 -ts_dt 0.004 -ts_max_time 0.6",
    .jitter = 1e-3,
    .quick = 1,

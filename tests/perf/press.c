@@ -117,10 +117,11 @@ static PetscErrorCode heap_scene(PetscInt cells, size_t size, char text[])
                             name, 0.09 * x + 0.02 * z, 0.09 * y + 0.015 * z, 0.002 + 0.064 * z));
     PetscCall(add_body(name, mesh, where, size, text));
   }
-  PetscCall(PetscStrlcat(text,
-                         " -effects gravity,floor,meet -effect_floor_type contact "
-                         "-effect_floor_obstacle plane:0,0,1,0 -effect_floor_friction 0.3 -ts_dt 0.004",
-                         size));
+  PetscCall(
+    PetscStrlcat(text,
+                 " -effects gravity,floor,meet -effect_floor_type contact -effect_floor_response projected "
+                 "-effect_floor_obstacle plane:0,0,1,0 -effect_floor_friction 0.3 -ts_dt 0.004",
+                 size));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -145,7 +146,8 @@ int main(int argc, char **argv)
   else
     PetscCall(press_scene(cells, steps, sizeof(text), text));
   PetscCall(PetscSNPrintf(more, sizeof(more),
-                          " -effect_meet_type collision -effect_meet_detection %s -effect_meet_friction %g "
+                          " -effect_meet_type contact -effect_meet_response projected -effect_meet_detection "
+                          "%s -effect_meet_friction %g "
                           "-time euler_implicit -ts_max_steps %d -ts_max_time 100",
                           detection, (double)friction, (int)steps));
   PetscCall(PetscStrlcat(text, more, sizeof(text)));

@@ -92,7 +92,7 @@ arc="-bodies a -body_a_mesh box:1,1,1:1 -body_a_material stvk -body_a_young 1 -b
   error 1 "-static_control arc_length|-body_a_tangent" $arc -body_a_tangent exact_spd
   error 1 "-static_control arc_length|-solver cholmod" $arc -solver cholmod
   error 2 "-static_control arc_length|-solver cg_gamg" $arc -solver cg_gamg
-  error 1 "-static_control arc_length|effect floor" $arc -effects hold,push,floor -effect_floor_type contact \
+  error 1 "-static_control arc_length|effect floor" $arc -effects hold,push,floor -effect_floor_type contact -effect_floor_response projected \
     -effect_floor_on zmax -effect_floor_obstacle plane:0,0,1,-1
   error 1 "-static_control arc_length|-remesh_" $arc -remesh_times 0.5
 }
@@ -150,7 +150,7 @@ cat >inside.opts <<'END'
 -body_big_translate -0.5,-0.5,-0.5
 -body_small_translate -0.05,-0.05,-0.05
 -effects meet
--effect_meet_type collision
+-effect_meet_type contact -effect_meet_response projected
 -ts_dt 1e-3
 -ts_max_time 1e-3
 END

@@ -75,7 +75,7 @@ CASES = [
     ("O5", "error", "bar.opts -output_fields displacment", ["-output_fields", "displacment", "displacement"]),
     ("O6", "error", "bar.opts -accuracy 0.1 -time_budget 1", ["-accuracy", "-time_budget"]),
     ("O6", "error", f"{ARC} -body_a_tangent exact_spd", ["-static_control", "-body_a_tangent"]),
-    ("O6", "error", "bar.opts -effects floor -effect_floor_type contact -effect_floor_obstacle plane:0,0,1,-1 -time euler_explicit -ts_dt 1e-5",
+    ("O6", "error", "bar.opts -effects floor -effect_floor_type contact -effect_floor_response projected -effect_floor_obstacle plane:0,0,1,-1 -time euler_explicit -ts_dt 1e-5",
      ["floor", "-time"]),
     ("O7", "warning", "bar.opts -static_steps 3", ["-static_steps"]),
     ("O7", "warning", "bar.opts -ksp_rtoll 1e-3", ["-ksp_rtoll", "1e-3"]),
@@ -93,7 +93,7 @@ CASES = [
     ("M1", "error", f"cube.opts -body_a_mesh {DATA}/bad_twins.msh {HELD}", ["bad_twins.msh", " 1 ", " 2 "]),
     ("M2", "error", f"cube.opts -body_a_mesh lid.stl {HELD}", ["lid.stl", " 3 ", " 1 ", "(1, 0, 0)"]),
     ("M3", "error", f"cube.opts -body_a_mesh {DATA}/bead.obj -body_a_tet_size 1e-7 {HELD}", ["bead.obj", "1e-07 m", "tet_size"]),
-    ("M4", "warning", "bar.opts -effects gravity,stop -effect_stop_type contact -effect_stop_obstacle mesh:inwards.off", ["inwards.off"]),
+    ("M4", "warning", "bar.opts -effects gravity,stop -effect_stop_type contact -effect_stop_response projected -effect_stop_obstacle mesh:inwards.off", ["inwards.off"]),
     ("M5", "error", f"cube.opts -body_a_mesh {DATA}/two_cubes_41.msh -body_a_scale 1.7e308 {HELD}", ["two_cubes_41.msh", "-body_a_scale", "1.7e+308"]),
     ("M6", "warning", f"cube.opts -body_a_mesh box:0.1,0.1,0.1:3 -remesh_quality 0.99 -static_steps 2 {HELD}", ["'a'", " 1:"]),
     ("S1", "error", "bar.opts -set_left_at plane:1,0,0,9", ["'left'", "0.4"]),
@@ -103,7 +103,7 @@ CASES = [
      "-effect_hold_components z", [" a ", "(1.00, 0.00, 0.00)"]),
     ("S3", "error", "bar.opts -effects hold,again -effect_again_type fixed -effect_again_on left", ["-effect_again_on"]),
     ("S4", "error", "cube.opts -bodies a,b -body_a_mesh box:1,1,1:9 -body_b_mesh box:0.1,0.1,0.1:1 -body_b_translate 0.45,0.45,0.45 -body_b_material linear "
-     "-body_b_young 1e5 -body_b_poisson 0.3 -effects meet -effect_meet_type collision -time euler_implicit -ts_dt 1e-3 -ts_max_time 1e-3",
+     "-body_b_young 1e5 -body_b_poisson 0.3 -effects meet -effect_meet_type contact -effect_meet_response projected -time euler_implicit -ts_dt 1e-3 -ts_max_time 1e-3",
      ["body b", "body a", "-body_b_translate"]),
     ("R1", "error", "bar.opts -effect_pull_vector 0;0;1e9 -snes_max_it 2 -time_max_halvings 2", ["0.0025 s"]),
     ("R2", "error", "-bodies a -body_a_mesh box:1,1,1:2 -body_a_material stvk -body_a_young 1 -body_a_poisson 0 -effects low,press,x,y -effect_low_type fixed "

@@ -8,7 +8,8 @@
 #include "sbconstraint.h"
 #include "surface_fixture.h"
 
-#define MEET " -effects meet -effect_meet_type collision -ts_dt 0.01 -ts_max_time 0.02 "
+#define MEET \
+  " -effects meet -effect_meet_type contact -effect_meet_response projected -ts_dt 0.01 -ts_max_time 0.02 "
 #define APART "-bodies a,b" BODY("a", "p1", "box:1,1,1:1", "0,0,0") BODY("b", "p1", "box:1,1,1:1", "4,0,0")
 
 /* ------------------------------------------------------------------ refused */
@@ -448,7 +449,7 @@ static PetscErrorCode check_attempts(const char *response)
             "-effect_side_type fixed -effect_side_on side -effect_side_components xy "                    \
             "-effect_hold_type fixed -effect_hold_on low -effect_push_type prescribed_displacement "      \
             "-effect_push_on top "                                                                        \
-            "-effect_push_displacement 0;0;-0.001 -effect_meet_type collision"
+            "-effect_push_displacement 0;0;-0.001 -effect_meet_type contact -effect_meet_response projected"
 
 enum { CONTACTS, DEEPEST, MEAN, NORMAL, FRICTION, WORK, LOSS, HOLD, PUSH, NVALUE };
 
@@ -533,7 +534,8 @@ static PetscErrorCode check_gap_field(void)
   PetscCall(open_meeting(
     "-bodies a,b -body_a_mesh box:0.1,0.1,0.05:2 -body_b_mesh box:0.06,0.06,0.05:2 -body_b_translate "
     "0.02,0.02,0.06" LAW("a", "p1") LAW("b", "p1"),
-    " -effects meet,floor -effect_floor_type contact -effect_floor_on b -effect_floor_obstacle "
+    " -effects meet,floor -effect_floor_type contact -effect_floor_response projected -effect_floor_on b "
+    "-effect_floor_obstacle "
     "plane:0,0,1,-1",
     &x));
   for (PetscInt i = 0; i < x.s->nnode; i++) x.u[3 * i + 2] = x.s->node_body[i] == 1 ? -down : 0;

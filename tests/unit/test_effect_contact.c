@@ -7,7 +7,8 @@
 #include "effect_fixture.h"
 #include <sblog.h>
 
-#define FLOOR "-effect_floor_type contact -effect_floor_obstacle plane:0,0,1,0.01 "
+#define FLOOR \
+  "-effect_floor_type contact -effect_floor_response projected -effect_floor_obstacle plane:0,0,1,0.01 "
 
 static const char *const hull[][2] = {{"boundary", "boundary"}};
 
@@ -19,9 +20,8 @@ static PetscErrorCode check_options(void)
     const char *options, *names;
     PetscErrorCode code;
   } refused[] = {
-    {"-effect_floor_type contact", "-effect_floor_obstacle", PETSC_ERR_USER},
-    {"-effect_floor_type contact -effect_floor_obstacle ball:1,2,3,4", "-effect_floor_obstacle ball:1,2,3,4",
-     PETSC_ERR_USER_INPUT},
+    {"-effect_floor_type contact -effect_floor_response projected -effect_floor_obstacle ball:1,2,3,4",
+     "-effect_floor_obstacle ball:1,2,3,4", PETSC_ERR_USER_INPUT},
     {FLOOR "-effect_floor_response glue", "-effect_floor_response glue|projected", PETSC_ERR_USER},
     {FLOOR "-effect_floor_friction -1", "-effect_floor_friction -1", PETSC_ERR_USER},
     {FLOOR "-effect_floor_friction 0.2 -effect_floor_friction_kinetic 0.3",
@@ -344,7 +344,8 @@ static PetscErrorCode check_refused(void)
   for (size_t k = 0; k < PETSC_STATIC_ARRAY_LENGTH(cases); k++) {
     char options[2048];
 
-    PetscCall(PetscSNPrintf(options, sizeof(options), BLOCK "-effects gravity,floor %s" FLOOR, cases[k][0]));
+    PetscCall(
+      PetscSNPrintf(options, sizeof(options), BLOCK "-effects gravity,floor " FLOOR "%s", cases[k][0]));
     SB_CHECK_ERROR(open_only(options), PETSC_ERR_USER_INPUT, cases[k][1]);
   }
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -343,7 +343,8 @@ static PetscErrorCode test_springs(void)
       "-body_b_material linear -body_a_young 1e5 -body_b_young 1e5 -body_a_density 1000 "
       "-body_b_density 1000 -effects gravity,x,y,floor -effect_x_type fixed -effect_x_on xmin "
       "-effect_x_components x -effect_y_type fixed -effect_y_on ymin -effect_y_components y "
-      "-effect_floor_type contact -effect_floor_on zmin -effect_floor_obstacle %s "
+      "-effect_floor_type contact -effect_floor_response projected -effect_floor_on zmin "
+      "-effect_floor_obstacle %s "
       "-effect_floor_response penalty " STATIC,
       element[k % 2], floor[k / 2]));
     PetscCall(test_solution(options, 65, 1e-5)); /* nonlinear: Newton ends at 1e-8 of the force */

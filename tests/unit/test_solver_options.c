@@ -24,7 +24,7 @@
     LAW("b") "-sets bottom,top -set_bottom_at plane:0,0,1,0 -set_top_at "                            \
              "plane:0,0,1,0.1 -effects hold,push,meet -effect_hold_type "                            \
              "fixed -effect_hold_on bottom -effect_push_type prescribed_displacement "               \
-             "-effect_push_on top -effect_meet_type collision "
+             "-effect_push_on top -effect_meet_type contact -effect_meet_response projected "
 #define PRESS "-time static -effect_push_displacement 0.0005*t;0.0001*t;-0.002*t "
 #define DRAG STEPS "-effect_push_displacement 0.1*t;0;-0.1*t "
 
@@ -45,7 +45,8 @@ static const Case cases[] = {
   {"dynamic, cr", DYNAMIC "-body_a_element cr ", NO_ROWS, PETSC_FALSE},
   {"dynamic, dg", DYNAMIC "-body_a_element dg ", NO_ROWS, PETSC_FALSE},
   {"obstacle",
-   BAR "-effects gravity,floor -effect_floor_type contact -effect_floor_on zmin -effect_floor_obstacle "
+   BAR "-effects gravity,floor -effect_floor_type contact -effect_floor_response projected -effect_floor_on "
+       "zmin -effect_floor_obstacle "
        "plane:0,0,1,0 " STEPS,
    NO_ROWS, PETSC_FALSE},
   {"static rows", PAIR PRESS, ROWS, PETSC_FALSE},

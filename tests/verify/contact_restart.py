@@ -15,7 +15,7 @@ import subprocess
 
 BOX = "-body_{0}_material {1} -body_{0}_young {2} -body_{0}_poisson 0.3 -body_{0}_density 1000 "
 TOOL = ("-bodies a -body_a_mesh box:0.1,0.06,0.04:3 " + BOX.format("a", "corotated", "2e4") + "-effects bed,tool "
-        "-effect_bed_type fixed -effect_bed_on zmin -effect_tool_type contact -effect_tool_on zmax -effect_tool_friction 0.2 "
+        "-effect_bed_type fixed -effect_bed_on zmin -effect_tool_type contact -effect_tool_response projected -effect_tool_on zmax -effect_tool_friction 0.2 "
         "-effect_tool_obstacle capsule:0.04,0.031,0.055,0.04,0.031,0.155,0.015 "
         "-effect_tool_displacement 0.02*ramp(t/0.2-0.5);0;-0.008*ramp(t/0.1) -effect_tool_angle 20*t "
         "-effect_tool_axis_point 0.04,0.031,0.05 -ts_dt 0.02 -ts_max_time {end} -effect_tool_response ")
@@ -23,16 +23,16 @@ BLOCKS = ("-bodies a,b -body_a_mesh box:0.2,0.1,0.05:2 -body_b_mesh box:0.08,0.0
           + BOX.format("a", "linear", "1e5") + BOX.format("b", "linear", "2e5") + "-sets bottom,top "
           "-set_bottom_at plane:0,0,1,0 -set_top_at plane:0,0,1,0.1 -effects hold,push,meet -effect_hold_type fixed "
           "-effect_hold_on bottom -effect_push_type prescribed_displacement -effect_push_on top "
-          "-effect_push_displacement 0.003*ramp(t/0.1-0.5);0;-0.002*ramp(t/0.05) -effect_meet_type collision "
+          "-effect_push_displacement 0.003*ramp(t/0.1-0.5);0;-0.002*ramp(t/0.05) -effect_meet_type contact -effect_meet_response projected "
           "-effect_meet_friction 0.4 -effect_meet_passes one -ts_dt 0.01 -ts_max_time {end} -effect_meet_response ")
 # 1 mm in the floor when it begins; the friction is that of a slope
 DEEP = ("-bodies a -body_a_mesh box:0.1,0.1,0.05:2 " + BOX.format("a", "corotated", "1e5") + "-effects gravity,floor "
-        "-effect_gravity_vector 1,0,-9 -effect_floor_type contact -effect_floor_obstacle plane:0,0,1,0.001 "
+        "-effect_gravity_vector 1,0,-9 -effect_floor_type contact -effect_floor_response projected -effect_floor_obstacle plane:0,0,1,0.001 "
         "-effect_floor_friction 0.3 -ts_dt 0.005 -ts_max_time {end} -effect_floor_response ")
 # a block on its corner hits a floor at 100 m/s, nodes at faces; half of it is squeezed when the checkpoint is written
 CORNER = ("-bodies a -body_a_mesh box:0.04,0.04,0.04:2 -body_a_element cr -body_a_rotate 1,-1,0,54.7356 "
           "-body_a_translate 0,0,0 -body_a_velocity 3,0,-100 " + BOX.format("a", "neohookean", "1e9")
-          + "-effects floor -effect_floor_type contact -effect_floor_obstacle plane:0,0,1,0 "
+          + "-effects floor -effect_floor_type contact -effect_floor_response projected -effect_floor_obstacle plane:0,0,1,0 "
           "-effect_floor_friction 0.2 -ts_dt 1e-5 -ts_max_time {end} -effect_floor_response ")
 COMMON = ("-time euler_implicit -snes_rtol 1e-12 -ksp_rtol 1e-12 -quiet -output_fields none -checkpoint_keep 1 "
           "-checkpoint_every_steps 10 ")

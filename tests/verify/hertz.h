@@ -111,7 +111,8 @@ static inline PetscErrorCode open_pair(const Pair *p, const Case *c, PetscReal d
     "-effect_y_components y -effect_low_type prescribed_displacement -effect_low_on ax,ay,az "
     "-effect_low_displacement %s "
     "-effect_high_type prescribed_displacement -effect_high_on bx,by,bz -effect_high_displacement %s "
-    "-effect_meet_type collision -effect_meet_on meet -effect_meet_response %s -effect_meet_passes %s",
+    "-effect_meet_type contact -effect_meet_response projected -effect_meet_on meet -effect_meet_response %s "
+    "-effect_meet_passes %s",
     path[0], path[1], c->element, c->element, (double)p->young[0], (double)p->young[1], POISSON, POISSON,
     (double)(3 * d), far[0], far[1], c->response, c->sides));
   PetscCall(test_scene_open(text, t));

@@ -158,12 +158,13 @@ static inline PetscErrorCode pour(PetscInt n, PetscReal end, PetscReal radius, P
   PetscFunctionBeginUser;
   PetscCall(PetscMalloc1(size, &text));
   PetscCall(pour_bodies(n, size, text));
-  PetscCall(PetscSNPrintf(
-    effects, sizeof(effects),
-    " -effects gravity,bowl,meet -effect_bowl_type contact -effect_bowl_obstacle bowl:0,0,%g,%g "
-    "-effect_meet_type collision -time euler_implicit -ts_dt 0.004 -ts_max_time %g "
-    "-snes_rtol 1e-9 -ksp_rtol 1e-8",
-    (double)bowl[2], (double)radius, (double)end));
+  PetscCall(PetscSNPrintf(effects, sizeof(effects),
+                          " -effects gravity,bowl,meet -effect_bowl_type contact -effect_bowl_response "
+                          "projected -effect_bowl_obstacle bowl:0,0,%g,%g "
+                          "-effect_meet_type contact -effect_meet_response projected -time euler_implicit "
+                          "-ts_dt 0.004 -ts_max_time %g "
+                          "-snes_rtol 1e-9 -ksp_rtol 1e-8",
+                          (double)bowl[2], (double)radius, (double)end));
   PetscCall(PetscStrlcat(text, effects, size));
   PetscCall(test_scene_open(text, &t));
   PetscCall(PetscFree(text));

@@ -111,17 +111,18 @@ static PetscErrorCode check(const char *element, const char *response, const cha
   TestScene t;
 
   PetscFunctionBeginUser;
-  PetscCall(verify_open(&t,
-                        "-bodies a,b -body_a_mesh box:0.1,0.1,0.1:2 -body_b_mesh box:0.1,0.08,0.1:3 "
-                        "-body_b_translate 0.112,0.03,0.02 "
-                        "-body_b_rotate 1,2,3,20 -body_a_material corotated -body_a_young 2e4 "
-                        "-body_a_poisson 0.3 -body_a_element %s "
-                        "-body_b_material corotated -body_b_young 2e4 -body_b_poisson 0.3 -body_b_element %s "
-                        "-body_a_velocity 0.8,0,0 "
-                        "-body_b_velocity -1,0,0 -effects meet -effect_meet_type collision "
-                        "-effect_meet_response %s -effect_meet_passes %s "
-                        "-time euler_implicit -ts_dt %g -ts_max_time 0.1 -ksp_rtol 1e-11 -snes_rtol 1e-12",
-                        element, element, response, sides, (double)dt));
+  PetscCall(verify_open(
+    &t,
+    "-bodies a,b -body_a_mesh box:0.1,0.1,0.1:2 -body_b_mesh box:0.1,0.08,0.1:3 "
+    "-body_b_translate 0.112,0.03,0.02 "
+    "-body_b_rotate 1,2,3,20 -body_a_material corotated -body_a_young 2e4 "
+    "-body_a_poisson 0.3 -body_a_element %s "
+    "-body_b_material corotated -body_b_young 2e4 -body_b_poisson 0.3 -body_b_element %s "
+    "-body_a_velocity 0.8,0,0 "
+    "-body_b_velocity -1,0,0 -effects meet -effect_meet_type contact -effect_meet_response projected "
+    "-effect_meet_response %s -effect_meet_passes %s "
+    "-time euler_implicit -ts_dt %g -ts_max_time 0.1 -ksp_rtol 1e-11 -snes_rtol 1e-12",
+    element, element, response, sides, (double)dt));
   t.run->want_energies = PETSC_TRUE;
   PetscCall(SbRunAddMonitor(t.run, watch, &w, NULL));
   PetscCall(verify_solve(&t, "angular"));

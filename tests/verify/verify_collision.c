@@ -56,7 +56,8 @@ static PetscErrorCode check_stack(const char *element, const char *response, con
                              "-effect_x_on x0 -effect_x_components x -effect_y_type fixed -effect_y_on y0 "
                              "-effect_y_components y -effect_z_type fixed -effect_z_on bottom "
                              "-effect_z_components z -effect_load_type traction -effect_load_on top "
-                             "-effect_load_vector 0;0;%g -effect_meet_type collision -effect_meet_response "
+                             "-effect_load_vector 0;0;%g -effect_meet_type contact -effect_meet_response "
+                             "projected -effect_meet_response "
                              "%s -effect_meet_passes %s -effect_meet_stiffness 100",
     upper, element, element, -LOAD, response, sides));
   PetscCall(record_solve(&t, &r));
@@ -91,7 +92,8 @@ static PetscErrorCode check_bars(const char *element)
       VERIFY_BODY("b", "box:1,0.05,0.05:1", "linear", "1e5",
                   "0") "-bodies a,b -body_b_translate 1.002,0,0 -body_a_element %s -body_b_element %s "
                        "-body_a_velocity %g,0,0 -body_b_velocity %g,0,0 -effects meet -effect_meet_type "
-                       "collision -time euler_implicit -ts_dt 0.0005 -ts_max_time 0.25 -ksp_rtol 1e-10",
+                       "contact -effect_meet_response projected -time euler_implicit -ts_dt 0.0005 "
+                       "-ts_max_time 0.25 -ksp_rtol 1e-10",
     element, element, SPEED, -SPEED));
   record_span(&r, "meet_contacts", 0, &first, &last);
   VERIFY_NEAR(first, 0.01, 0.002, "first touch, s");
@@ -118,7 +120,8 @@ static PetscErrorCode check_momentum(const char *element, const char *response, 
       "b", "box:0.1,0.08,0.1:3", "corotated", "2e4",
       "0.3") "-bodies a,b -body_b_translate 0.11,0.03,0.02 -body_b_rotate 1,2,3,20 -body_a_element %s "
              "-body_b_element %s -body_a_velocity 0.8,0,0 -body_b_velocity -1,0,0 -effects meet "
-             "-effect_meet_type collision -effect_meet_response %s -effect_meet_friction %g -time "
+             "-effect_meet_type contact -effect_meet_response projected -effect_meet_response %s "
+             "-effect_meet_friction %g -time "
              "euler_implicit -ts_dt 0.001 -ts_max_time 0.1 -ksp_rtol 1e-11 -snes_rtol 1e-11",
     element, element, response, (double)friction));
   record_span(&r, "meet_contacts", 0, &first, &last);
@@ -154,7 +157,8 @@ static PetscErrorCode press(const char *response, PetscReal stiffness, Press *p)
       "0.3") "-bodies a,b -body_b_translate 0.06,0.02,0.05 -sets bottom,top -set_bottom_at plane:0,0,1,0 "
              "-set_top_at plane:0,0,1,0.1 -time static -static_steps 4 -effects hold,push,meet "
              "-effect_hold_type fixed -effect_hold_on bottom -effect_push_type prescribed_displacement "
-             "-effect_push_on top -effect_push_displacement 0.0005*t;0;-0.002*t -effect_meet_type collision "
+             "-effect_push_on top -effect_push_displacement 0.0005*t;0;-0.002*t -effect_meet_type contact "
+             "-effect_meet_response projected "
              "-effect_meet_response %s -effect_meet_stiffness %g -effect_meet_friction 0.4 -ksp_rtol 1e-10 "
              "-snes_rtol 1e-10",
     response, (double)stiffness));
@@ -206,7 +210,8 @@ static PetscErrorCode check_slope(PetscReal mu, PetscReal tolerance)
                          "0.3") "-bodies a,b -body_b_translate 0.02,0.021,0.05 -sets bottom -set_bottom_at "
                                 "plane:0,0,1,0 -time euler_implicit -ts_dt 0.002 -ts_max_time %g -effects "
                                 "gravity,hold,meet -effect_gravity_vector %g,0,%g -effect_hold_type fixed "
-                                "-effect_hold_on bottom -effect_meet_type collision -effect_meet_friction %g",
+                                "-effect_hold_on bottom -effect_meet_type contact -effect_meet_response "
+                                "projected -effect_meet_friction %g",
                        (double)end, (double)(0.5 * c), (double)-c, (double)mu));
   VERIFY_NEAR(record_last(&r, "b_vx"), rigid, tolerance, "speed, m/s");
   PetscCall(record_free(&r));

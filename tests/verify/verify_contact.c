@@ -37,7 +37,8 @@ static PetscErrorCode check_press(const char *element, const char *response, Pet
       "0.3") "-bodies a -body_a_element %s -time static -ksp_rtol 1e-12 -snes_rtol 1e-12 -effects "
              "x,y,load,floor -effect_x_type fixed -effect_x_on xmin -effect_x_components x -effect_y_type "
              "fixed -effect_y_on ymin -effect_y_components y -effect_load_type traction -effect_load_on zmax "
-             "-effect_load_vector 0;0;%g -effect_floor_type contact -effect_floor_on zmin "
+             "-effect_load_vector 0;0;%g -effect_floor_type contact -effect_floor_response projected "
+             "-effect_floor_on zmin "
              "-effect_floor_obstacle plane:0,0,1,0.001 -effect_floor_response %s -effect_floor_stiffness %g",
     element, -LOAD, response, (double)stiffness));
   PetscCall(record_solve(&t, &r));
@@ -73,6 +74,7 @@ static PetscErrorCode check_fall(const char *element, const char *response)
     VERIFY_BODY("a", "box:0.1,0.1,0.1:2", "corotated", "1e4",
                 "0.3") "-bodies a -body_a_rotate 1,2,0,20 -body_a_translate 0,0,0.05 -body_a_velocity "
                        "0,0,-0.5 -body_a_element %s -effects gravity,floor -effect_floor_type contact "
+                       "-effect_floor_response projected "
                        "-effect_floor_obstacle plane:0,0,1,0 -effect_floor_response %s -time euler_implicit "
                        "-ts_dt 0.005 -ts_max_time 0.25 -snes_rtol 1e-11 -ksp_rtol 1e-10",
     element, response));
@@ -102,7 +104,8 @@ static PetscErrorCode check_incline(const char *element, const char *response, P
     VERIFY_BODY(
       "a", "box:0.1,0.1,0.05:3", "corotated", "1e6",
       "0.3") "-bodies a -body_a_element %s -effects gravity,floor -effect_gravity_vector %.15g,0,%.15g "
-             "-effect_floor_type contact -effect_floor_obstacle plane:0,0,1,0 -effect_floor_friction %g "
+             "-effect_floor_type contact -effect_floor_response projected -effect_floor_obstacle "
+             "plane:0,0,1,0 -effect_floor_friction %g "
              "-effect_floor_response %s -time euler_implicit -ts_dt 0.01 -ts_max_time 0.6",
     element, (double)(0.5 * normal), (double)-normal, (double)mu, response));
   for (PetscInt i = r.n - 1; i >= 0;
@@ -145,7 +148,8 @@ static PetscErrorCode check_held(const char *response)
       "a", "box:0.1,0.1,0.05:2", "linear", "1e5",
       "0.3") "-bodies a -effects gravity,side,load,floor -effect_side_type fixed -effect_side_on xmin "
              "-effect_side_components y -effect_load_type traction -effect_load_on xmax -effect_load_vector "
-             "100;0;0 -effect_floor_type contact -effect_floor_on zmin -effect_floor_obstacle "
+             "100;0;0 -effect_floor_type contact -effect_floor_response projected -effect_floor_on zmin "
+             "-effect_floor_obstacle "
              "plane:0,0,1,1e-5 -effect_floor_friction 0.3 -effect_floor_response %s -time static",
     response));
   VERIFY_NEAR(record_last(&r, "floor_force_x"), -load, 1e-5 * load, "friction against the load, N");
@@ -170,7 +174,8 @@ static PetscErrorCode check_corner(const char *response)
       "a", "box:0.1,0.1,0.1:2", "corotated", "1e5",
       "0.3") "-bodies a -effects gravity,floor,wall -effect_gravity_vector %g,%g,%g -effect_floor_type "
              "contact -effect_floor_obstacle plane:0,0,1,0 -effect_floor_friction %g -effect_floor_response "
-             "%s -effect_wall_type contact -effect_wall_obstacle plane:1,0,0,0 -effect_wall_friction %g "
+             "%s -effect_wall_type contact -effect_wall_response projected -effect_wall_obstacle "
+             "plane:1,0,0,0 -effect_wall_friction %g "
              "-effect_wall_response %s -time euler_implicit -ts_dt 0.01 -ts_max_time %g",
     (double)push[0], (double)push[1], (double)push[2], (double)mu, response, (double)mu, response,
     (double)end));
@@ -201,7 +206,8 @@ static PetscErrorCode indent(const char *response, const char *more, PetscInt mo
     &r,
     VERIFY_BODY("a", "box:0.1,0.06,0.04:4", "corotated", "2e4",
                 "0.4") "-bodies a -effects bed,tool -effect_bed_type fixed -effect_bed_on zmin "
-                       "-effect_tool_type contact -effect_tool_on zmax -effect_tool_obstacle "
+                       "-effect_tool_type contact -effect_tool_response projected -effect_tool_on zmax "
+                       "-effect_tool_obstacle "
                        "capsule:0.05,0.031,0.055,0.05,0.031,0.155,0.015 -effect_tool_displacement "
                        "0.02*ramp(t/0.2-1);0;-0.01*ramp(t/0.2) -effect_tool_response %s "
                        "-effect_tool_friction 0.3 -time euler_implicit -ts_dt %g -ts_max_time 0.4 %s",
@@ -326,9 +332,10 @@ static PetscErrorCode check_bounds(void)
 
   PetscFunctionBeginUser;
   verify_case("bounds");
-  PetscCall(verify_open(
-    &t, BEAM "-effects gravity,clamp,floor -effect_floor_type contact -effect_floor_obstacle plane:0,0,1,%g",
-    (double)floor));
+  PetscCall(verify_open(&t,
+                        BEAM "-effects gravity,clamp,floor -effect_floor_type contact -effect_floor_response "
+                             "projected -effect_floor_obstacle plane:0,0,1,%g",
+                        (double)floor));
   PetscCall(record_solve(&t, &r));
   PetscCall(
     verify_open(&free, BEAM "-effects gravity,clamp -solver sor" /* scalar storage, which SNESVI needs */));
@@ -396,6 +403,7 @@ static PetscErrorCode check_hertz(PetscInt cells, PetscReal tolerance)
     "1e-10 -effects x,y,far,ball -effect_x_type fixed -effect_x_on x0 -effect_x_components x -effect_y_type "
     "fixed -effect_y_on y0 -effect_y_components y -effect_far_type prescribed_displacement -effect_far_on "
     "x1,y1,z1 -effect_far_displacement x*%s;y*%s;%.15g*(%.15g/%s+z^2/%s^3) -effect_ball_type contact "
+    "-effect_ball_response projected "
     "-effect_ball_on top -effect_ball_obstacle sphere:0,0,%.15g,1",
     path, (double)E, (double)nu, sideways, sideways, (double)(-P * (1 + nu) / (2 * PETSC_PI * E)),
     (double)(2 * (1 - nu)), r, r, (double)(1 - d)));

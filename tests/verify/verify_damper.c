@@ -56,14 +56,16 @@ static PetscErrorCode check(const char *what, const char *scene, PetscReal tau, 
 
 int main(int argc, char **argv)
 {
-  static const char *const plane =
-    "a -effects meet -effect_meet_type contact -effect_meet_obstacle plane:0,0,1,-1e-4";
-  static const char *const rows = "a -effects meet -effect_meet_type contact -effect_meet_obstacle "
-                                  "plane:0,0,1,-1e-4 -effect_meet_friction 0.3";
+  static const char *const plane = "a -effects meet -effect_meet_type contact -effect_meet_response "
+                                   "projected -effect_meet_obstacle plane:0,0,1,-1e-4";
+  static const char *const rows =
+    "a -effects meet -effect_meet_type contact -effect_meet_response projected -effect_meet_obstacle "
+    "plane:0,0,1,-1e-4 -effect_meet_friction 0.3";
   static const char *const block =
     "a,b -body_b_mesh box:0.1,0.1,0.05:1 -body_b_translate -0.025,-0.027,-0.0501 -body_b_material linear "
     "-body_b_young 1e9 -body_b_poisson 0.3 -body_b_density 1000 -sets low -set_low_at plane:0,0,1,-0.0501 "
-    "-effects hold,meet -effect_hold_type fixed -effect_hold_on low -effect_meet_type collision "
+    "-effects hold,meet -effect_hold_type fixed -effect_hold_on low -effect_meet_type contact "
+    "-effect_meet_response projected "
     "-effect_meet_passes one";
 
   PetscReal k;

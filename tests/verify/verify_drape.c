@@ -44,18 +44,18 @@ static PetscErrorCode check_drape(PetscBool rigid, PetscInt cells, PetscInt thic
   verify_case("drape, %s, %d cells thick", rigid ? "obstacle" : "body", (int)thick);
   PetscCall(contact_ball_write(4, RADIUS, path));
   if (rigid)
-    PetscCall(
-      PetscSNPrintf(how, sizeof(how),
-                    "-bodies cloth -effects gravity,ball -effect_ball_type contact -effect_ball_friction 0.3 "
-                    "-effect_ball_obstacle sphere:0,0,%g,%g",
-                    -RADIUS, RADIUS));
+    PetscCall(PetscSNPrintf(how, sizeof(how),
+                            "-bodies cloth -effects gravity,ball -effect_ball_type contact "
+                            "-effect_ball_response projected -effect_ball_friction 0.3 "
+                            "-effect_ball_obstacle sphere:0,0,%g,%g",
+                            -RADIUS, RADIUS));
   else
     PetscCall(PetscSNPrintf(
       how, sizeof(how),
       "-bodies cloth,ball -body_ball_mesh %s -body_ball_translate 0,0,%g -body_ball_material corotated "
       "-body_ball_young 2e5 -body_ball_poisson 0.3 -sets foot -set_foot_at halfspace:0,0,1,%g "
       "-effects gravity,foot,meet -effect_foot_type fixed -effect_foot_on foot "
-      "-effect_meet_type collision",
+      "-effect_meet_type contact -effect_meet_response projected",
       path, -RADIUS, -1.6 * RADIUS));
   PetscCall(verify_open(
     &t,

@@ -223,7 +223,8 @@ static PetscErrorCode watch(SbRun run, const SbStep *step, void *ctx)
   "-set_b0_at plane:0,1,0,-0.105 -set_b1_at plane:0,1,0,0.105 -effect_a0_type fixed -effect_a0_on a0 "   \
   "-effect_a1_type fixed -effect_a1_on a1 -effect_b0_type fixed -effect_b0_on b0 -effect_b0_components " \
   "xy "                                                                                                  \
-  "-effect_b1_type fixed -effect_b1_on b1 -effect_b1_components xy -effect_meet_type collision "
+  "-effect_b1_type fixed -effect_b1_on b1 -effect_b1_components xy -effect_meet_type contact "           \
+  "-effect_meet_response projected "
 #define BARS                                                                                       \
   "-bodies a,b -body_a_mesh box:0.21,0.03,0.03:7,1,1 -body_a_rotate 1,0,0,45 -body_b_mesh "        \
   "box:0.03,0.21,0.03:1,7,1 -body_b_rotate 0,1,0,-45 -body_b_translate 0.105,-0.105,0.0434264 "    \
@@ -330,7 +331,8 @@ static PetscErrorCode check_box(const char *what, const char *turn, PetscReal mo
     "-effect_x0_on x0 "
     "-effect_x1_type fixed -effect_x1_on x1 -effect_y0_type fixed -effect_y0_on y0 -effect_y1_type "
     "fixed "
-    "-effect_y1_on y1 -effect_meet_type collision -time euler_implicit -ts_dt 0.001 -ts_max_time 0.03",
+    "-effect_y1_on y1 -effect_meet_type contact -effect_meet_response projected -time euler_implicit -ts_dt "
+    "0.001 -ts_max_time 0.03",
     turn));
   PetscCall(SbRunAddMonitor(t.run, watch, &seen, NULL));
   PetscCall(verify_solve(&t, what));
@@ -472,8 +474,8 @@ static PetscErrorCode check_rings(PetscReal most)
     "-effect_hold_type fixed -effect_hold_on far -effect_pull_type prescribed_displacement -effect_pull_on "
     "end "
     "-effect_pull_displacement "
-    "0.08*ramp(t/0.4);0;0 -effect_meet_type collision -time euler_implicit -ts_dt 0.01 -ts_max_time 0.5" LAWS(
-      "1e5"),
+    "0.08*ramp(t/0.4);0;0 -effect_meet_type contact -effect_meet_response projected -time euler_implicit "
+    "-ts_dt 0.01 -ts_max_time 0.5" LAWS("1e5"),
     path, path, (double)away, (double)(-away - 0.09)));
   PetscCall(SbRunAddMonitor(t.run, watch_rings, &seen, NULL));
   PetscCall(verify_solve(&t, "rings"));

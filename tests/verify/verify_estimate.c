@@ -463,7 +463,8 @@ static PetscErrorCode check_sphere(void)
     "-set_x0_at plane:1,0,0,0 -set_y0_at plane:0,1,0,0 -set_z1_at plane:0,0,1,-1 -set_top_at plane:0,0,1,0 "
     "-time static -ksp_rtol 1e-9 -effects x,y,z,ball -effect_x_type fixed -effect_x_on x0 "
     "-effect_x_components x -effect_y_type fixed -effect_y_on y0 -effect_y_components y "
-    "-effect_z_type fixed -effect_z_on z1 -effect_ball_type contact -effect_ball_on top "
+    "-effect_z_type fixed -effect_z_on z1 -effect_ball_type contact -effect_ball_response projected "
+    "-effect_ball_on top "
     "-effect_ball_obstacle sphere:0,0,0.99,1",
     {1, 1, 1},
     {1., 1., 1.},

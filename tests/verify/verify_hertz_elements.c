@@ -42,7 +42,8 @@ static PetscErrorCode check_plane(const char *element, PetscInt cells, PetscReal
                         "-effect_x_components x "
                         "-effect_y_type fixed -effect_y_on y0 -effect_y_components y -effect_high_type "
                         "prescribed_displacement -effect_high_on bx,by,bz "
-                        "-effect_high_displacement %s -effect_floor_type contact -effect_floor_on meet "
+                        "-effect_high_displacement %s -effect_floor_type contact -effect_floor_response "
+                        "projected -effect_floor_on meet "
                         "-effect_floor_obstacle plane:0,0,1,0",
                         path, element, (double)young, POISSON, (double)(3 * d), far));
   t.run->want_residual = PETSC_TRUE;

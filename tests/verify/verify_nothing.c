@@ -175,9 +175,9 @@ static PetscErrorCode check_contact(void)
   Trace named;
 
   PetscFunctionBeginUser;
-  PetscCall(run(FREE
-                "-body_a_material corotated -time euler_implicit -effects floor -effect_floor_type contact "
-                "-effect_floor_obstacle plane:0,0,1,-9",
+  PetscCall(run(FREE "-body_a_material corotated -time euler_implicit -effects floor -effect_floor_type "
+                     "contact -effect_floor_response projected "
+                     "-effect_floor_obstacle plane:0,0,1,-9",
                 PETSC_FALSE, &named));
   SB_CHECK(named.events[SB_EVENT_CONTACT] > 0, "contact is named and was never begun");
   PetscCall(destroy(&named));

@@ -110,7 +110,8 @@ static PetscErrorCode check(const char *element, const char *detection, PetscRea
     "-bodies a,b -body_a_mesh box:0.1,0.1,0.1:3 -body_b_mesh box:0.1,0.1,0.1:2 -body_b_translate %g,0,0 %s "
     "-body_a_material corotated -body_a_young 1e5 -body_a_poisson 0.3 -body_a_element %s "
     "-body_b_material corotated -body_b_young 1e5 -body_b_poisson 0.3 -body_b_element %s "
-    "-effects meet -effect_meet_type collision -effect_meet_detection %s -effect_meet_separation_steps %d "
+    "-effects meet -effect_meet_type contact -effect_meet_response projected -effect_meet_detection %s "
+    "-effect_meet_separation_steps %d "
     "-time euler_implicit -ts_dt %g -ts_max_time 0.48 -snes_rtol 1e-9",
     (double)shift, turn, element, element, detection, STEPS, STEP));
   t.run->want_energies = PETSC_TRUE;
@@ -201,7 +202,8 @@ static PetscErrorCode check_finger(const char *element)
                 "-body_b_mesh box:0.1,0.1,0.2:4,4,8 -body_a_material corotated -body_a_young 1e5 "
                 "-body_a_poisson 0.3 -body_b_material corotated -body_b_young 1e5 -body_b_poisson 0.3 "
                 "-body_a_element %s -body_b_element %s "
-                "-effects meet -effect_meet_type collision -effect_meet_search_radius 0.005 -ts_dt 1e-3",
+                "-effects meet -effect_meet_type contact -effect_meet_response projected "
+                "-effect_meet_search_radius 0.005 -ts_dt 1e-3",
                 element, element));
   PetscCall(PetscCalloc1(3 * t.run->model->space->nnode, &u));
   PetscCall(look_for_ways(t.run->model, u, up, &w));
@@ -228,12 +230,12 @@ static PetscErrorCode check_ring(const char *element)
   Ways w;
 
   PetscFunctionBeginUser;
-  PetscCall(verify_open(
-    &t,
-    "-bodies a -body_a_mesh box:2,0.2,0.1:40,4,2 -body_a_material corotated "
-    "-body_a_young 1e5 -body_a_poisson 0.3 -body_a_element %s -effects meet "
-    "-effect_meet_type collision -effect_meet_self yes -effect_meet_search_radius 0.02 -ts_dt 1e-3",
-    element));
+  PetscCall(verify_open(&t,
+                        "-bodies a -body_a_mesh box:2,0.2,0.1:40,4,2 -body_a_material corotated "
+                        "-body_a_young 1e5 -body_a_poisson 0.3 -body_a_element %s -effects meet "
+                        "-effect_meet_type contact -effect_meet_response projected -effect_meet_self yes "
+                        "-effect_meet_search_radius 0.02 -ts_dt 1e-3",
+                        element));
   space = t.run->model->space;
   PetscCall(PetscCalloc1(3 * space->nnode, &u));
   for (PetscInt i = 0; i < space->nnode; i++) {
@@ -266,7 +268,7 @@ static PetscErrorCode check_begins(const char *name, const char *options, PetscB
   PetscCall(verify_open(&t,
                         "-bodies a,b -body_a_material corotated -body_a_young 1e5 -body_a_poisson 0.3 "
                         "-body_b_material corotated -body_b_young 1e5 -body_b_poisson 0.3 -effects meet "
-                        "-effect_meet_type collision -ts_dt 1e-3 %s",
+                        "-effect_meet_type contact -effect_meet_response projected -ts_dt 1e-3 %s",
                         options));
   PetscCall(PetscCalloc1(3 * t.run->model->space->nnode, &u));
   PetscCall(look_for_ways(t.run->model, u, (const PetscReal[3]){0, 0, 0}, &w));

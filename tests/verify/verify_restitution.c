@@ -13,7 +13,7 @@
 
 #define TIGHT "-time euler_implicit -snes_rtol 1e-11 -ksp_rtol 1e-11"
 #define STIFF(b, mesh) VERIFY_BODY(b, mesh, "corotated", "1e9", "0.3")
-#define MEET "-effect_meet_type collision -effect_meet_restitution %g "
+#define MEET "-effect_meet_type contact -effect_meet_response projected -effect_meet_restitution %g "
 
 /* The bodies meet; bounds of what a step gains, of the energy, and of the change of momentum in a step, of the sum of its components. */
 static void check_meeting(const Record *r, PetscReal energy, PetscReal gain, PetscReal momentum)
@@ -77,7 +77,8 @@ static PetscErrorCode check_tower(void)
     TIGHT STIFF("a", "box:0.1,0.1,0.1:2") STIFF(
       "b", "box:0.08,0.08,0.08:2") "-bodies a,b -body_a_translate 0,0,0.0021 -body_a_velocity 0,0,-1 "
                                    "-body_b_translate 0.01,0.01,0.1024 -body_b_velocity 0,0,-1 -effects "
-                                   "gravity,floor,meet -effect_floor_type contact -effect_floor_obstacle "
+                                   "gravity,floor,meet -effect_floor_type contact -effect_floor_response "
+                                   "projected -effect_floor_obstacle "
                                    "plane:0,0,1,0 -effect_floor_restitution 1 " MEET
                                    "-ts_dt 0.001 -ts_max_time 0.03",
     1.));

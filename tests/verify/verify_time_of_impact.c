@@ -23,11 +23,14 @@ typedef struct {
   "-bodies a%s -body_a_mesh box:1,0.05,0.05:1 -body_a_material linear -body_a_young 1e5 -body_a_poisson 0 " \
   "-body_a_density 1000 -body_a_velocity %g,0,0 -body_a_translate %.15g,0,0 -ts_dt %g -ts_max_time %g "     \
   "-ksp_rtol 1e-10 -snes_rtol 1e-10 -effects "
-#define WALL "wall -effect_wall_type contact -effect_wall_on xmin -effect_wall_obstacle plane:1,0,0,0 "
-#define MEET                                                                                         \
-  "hold,meet -effect_meet_type collision -effect_meet_passes one -body_b_mesh box:0.05,0.15,0.15:1 " \
-  "-body_b_translate -0.05,-0.04,-0.06 "                                                             \
-  "-body_b_material linear -body_b_young 1e9 -body_b_poisson 0 -body_b_density 1000 -sets far "      \
+#define WALL                                                                             \
+  "wall -effect_wall_type contact -effect_wall_response projected -effect_wall_on xmin " \
+  "-effect_wall_obstacle plane:1,0,0,0 "
+#define MEET                                                                                     \
+  "hold,meet -effect_meet_type contact -effect_meet_response projected -effect_meet_passes one " \
+  "-body_b_mesh box:0.05,0.15,0.15:1 "                                                           \
+  "-body_b_translate -0.05,-0.04,-0.06 "                                                         \
+  "-body_b_material linear -body_b_young 1e9 -body_b_poisson 0 -body_b_density 1000 -sets far "  \
   "-set_far_at plane:1,0,0,-0.05 -effect_hold_type fixed -effect_hold_on far "
 
 /* A bar that is `phase` steps before the wall at the start. */

@@ -1,0 +1,587 @@
+/*
+  contact_node.c - nodes of the surface against a rigid obstacle, still or on a given path, with Coulomb friction.
+
+  A node at x has the gap g = signed distance from the obstacle where it is at that time, and the normal n there. Nodes are
+  those that carry the surface: vertices of P1, centroids of boundary faces of CR and DG (there g is the mean gap of the face).
+
+  Response `projected`: touching nodes are constrained on the obstacle (src/fem/nodal_constraint.c): n . u is prescribed, and the force that this
+  takes is the multiplier lambda. After each solve a pulling one leaves, a penetrated node enters, the normal is taken again on a
+  curved obstacle, and the solve is repeated until nothing changes (Kikuchi and Oden 1988; Hueeber and Wohlmuth 2005). A node that
+  has left and come back several times within a step stays: the loop ends. `multiplier`: the same with rows n . u = c (src/fem/constraint.c),
+  whose forces are unknowns of the solves.
+
+  Response `penalty`: springs, N = k <-g>, with k from the stiffness of the cell behind. `augmented`: the penalty with a multiplier,
+  N = <lambda - k g>, which is raised after each solve until the penetration is within the tolerance (Simo and Laursen 1992).
+
+  Friction (friction.c) is solved for with N. It needs rows: with it all responses write their nodes as such, `projected` exact ones in whose
+  null space the solves run, `penalty` and `augmented` springs, linear while normals and who touches stay, which is examined after each
+  solve. A node sticks to the place of the obstacle where it was when the step began, and moves with it.
+
+  Overlap that is there when a step begins is not thrown out at once: a node may stay behind the obstacle by that depth, which falls to
+  1/e in `recovery` steps. With springs that is the depth beyond what they give. A static run closes it at once.
+
+  What bounces is described in contact_rebound.c, what happens where facets of a mesh meet in
+  contact_facets.c, forces and what is reported of them are in contact_force.c.
+*/
+#include "contact_node.h"
+
+#define TOGGLES 3    /* how often a node may come within a step before it stays */
+#define PULLING 1e-6 /* of the largest contact force: what a node must pull with to leave */
+#define SETTLED 1e-4 /* of the largest contact force: what that of a spring may be off */
+
+/* Identities of the rows: normals of all obstacles before what holds nodes across them. */
+#define NORMALS (PETSC_MIN_INT / 2)
+
+static PetscErrorCode read_path(SbEffect e, const SbScope *scope)
+{
+  Contact *c = (Contact *)e->data;
+  PetscBool steady = PETSC_TRUE;
+  PetscReal length;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbEffectFormulas(scope, "displacement", 3, PETSC_FALSE, c->displacement, &steady));
+  PetscCall(SbEffectFormulas(scope, "angle", 1, PETSC_FALSE, &c->angle, &steady));
+  PetscCall(SbOptionReals(scope, "axis", c->axis));
+  PetscCall(SbOptionReals(scope, "axis_point", c->point));
+  length = PetscSqrtReal(SbDot3(c->axis, c->axis));
+  PetscCheck(length > 0, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT, "-effect_%s_axis: 0,0,0 is no direction",
+             e->name);
+  for (int i = 0; i < 3; i++) c->axis[i] /= length;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode read_obstacle(SbEffect e, const SbScope *scope)
+{
+  Contact *c = (Contact *)e->data;
+  char option[3 * SB_NAME_MAX], text[PETSC_MAX_PATH_LEN];
+
+  PetscFunctionBeginUser;
+  PetscCall(SbOptionName(scope, "obstacle", sizeof(option), option));
+  PetscCall(SbOptionString(scope, "obstacle", sizeof(text), text));
+  PetscCall(SbObstacleCreate(option, text, &c->obstacle));
+  c->facets = SbObstacleIsMesh(c->obstacle);
+  if (!c->facets) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(SbOptionReal(scope, "obstacle_scale", &c->scale));
+  PetscCall(SbOptionReals(scope, "obstacle_at", c->at));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode setup_obstacle(SbEffect e, SbSpace space, void *data)
+{
+  Contact *c = (Contact *)data;
+  char option[3 * SB_NAME_MAX], note[192] = "";
+  const size_t said = strlen(e->note);
+
+  PetscFunctionBeginUser;
+  (void)snprintf(option, sizeof(option), "-effect_%s_obstacle", e->name);
+  PetscCall(SbObstacleSetUp(c->obstacle, space->comm, option, c->scale, c->at, sizeof(note), note));
+  if (note[0]) (void)snprintf(e->note + said, sizeof(e->note) - said, "%s%s", said ? "; " : "", note);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static void pose_of(const void *data, PetscReal t, SbPose *pose)
+{
+  SbContactPose((const Contact *)data, t, pose);
+}
+
+/* With the response `barrier` another file does the work. */
+static PetscErrorCode create_barrier(SbEffect e, const SbScope *scope)
+{
+  Contact *c = (Contact *)e->data;
+  SbBarrierScene scene = {.on = &c->on,
+                          .obstacle = c->obstacle,
+                          .pose = pose_of,
+                          .friction = c->friction.mu,
+                          .setup_obstacle = setup_obstacle};
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscArraycpy(scene.centre, c->point, 3));
+  PetscCall(SbBarrierCreate(e, scope, &scene));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbContactOptions_Node(SbEffect e, const SbScope *scope, const SbContactOptions *o)
+{
+  Contact *c = (Contact *)e->data;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbEffectReadOn(scope, &c->on));
+  PetscCall(read_obstacle(e, scope));
+  PetscCall(read_path(e, scope));
+  c->response = o->response;
+  c->friction = o->friction;
+  if (c->response == BARRIER) {
+    PetscCall(create_barrier(e, scope));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  c->cut = o->cut;
+  c->stiffness = o->stiffness;
+  c->damping = o->damping;
+  c->bounce.e = o->restitution;
+  SbOverlapSet(&c->overlap, o->separation_steps);
+  c->rows = (PetscBool)(c->response == MULTIPLIER || c->friction.mu > 0);
+  if (exact(c) || c->rows) {
+    e->ops.force = NULL;
+    e->ops.tangent = NULL;
+  } else {
+    e->ops.assemble_constraints = NULL;
+    e->linear = PETSC_FALSE;
+    if (c->response == PENALTY && !c->cut) e->ops.update_active_set = NULL;
+  }
+  if (c->rows) e->ops.contact_force = NULL; /* they push without it */
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Adds a facet's share of area and stiffness to one of its nodes; slot[] holds the place of owned nodes, -1: none yet. */
+static void add_share(SbSpace space, const SbFacet *facet, PetscInt a, PetscReal share, PetscInt slot[],
+                      Contact *c)
+{
+  const PetscInt node = space->cell_node[4 * facet->cell + a];
+  const SbMaterial m = space->material[space->mesh->cell_material[facet->cell]];
+  Touch *touch;
+
+  if (node >= space->nnode_owned) return;
+  if (slot[node] < 0) {
+    slot[node] = c->n++;
+    c->touch[slot[node]] = (Touch){.node = node, .cell = facet->cell, .a = a};
+  }
+  touch = &c->touch[slot[node]];
+  touch->k += c->stiffness * SbMaterialWaveModulus(m) * share / facet->height;
+  touch->stiff = touch->k;
+}
+
+static PetscErrorCode setup_contact(SbEffect e, SbSpace space)
+{
+  Contact *c = (Contact *)e->data;
+  PetscReal box[6] = {0};
+  SbFacet *facet;
+  PetscInt n, *slot;
+
+  PetscFunctionBeginUser;
+  PetscCall(setup_obstacle(e, space, c));
+  PetscCheck(c->damping <= 0 || e->dynamic, space->comm, PETSC_ERR_USER_INPUT,
+             "-effect_%s_damping %g s: a static run has no speed to damp; leave it out", e->name,
+             (double)c->damping);
+  if (!e->dynamic) c->overlap.recovery = 0;
+  PetscCall(SbEffectFacets(space, &c->on, &n, &facet));
+  PetscCall(PetscMalloc1(3 * n, &c->touch));
+  PetscCall(PetscMalloc1(space->nnode, &slot));
+  for (PetscInt i = 0; i < space->nnode; i++) slot[i] = -1;
+  for (PetscInt i = 0; i < n; i++) {
+    if (SbSpaceCellElement(space, facet[i].cell)->nodes_per[0]) {
+      for (int k = 0; k < 3; k++) add_share(space, &facet[i], facet[i].corner[k], facet[i].area / 3, slot, c);
+    } else
+      add_share(space, &facet[i], facet[i].face, facet[i].area, slot, c);
+  }
+  PetscCall(PetscFree(slot));
+  PetscCall(PetscFree(facet));
+  for (PetscInt b = 0; b < space->mesh->nbody; b++) {
+    for (int k = 0; k < 3; k++)
+      box[k] = PetscMax(box[k], space->mesh->body[b].bbox[3 + k] - space->mesh->body[b].bbox[k]);
+  }
+  c->size = PetscSqrtReal(SbDot3(box, box));
+  if (c->rows)
+    PetscCall(SbSpaceCreateConstraints(space, PETSC_TRUE, (PetscBool)(c->friction.mu > 0)));
+  else if (exact(c))
+    PetscCall(SbSpaceCreateNodalConstraints(space));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ who touches */
+
+/* Gap of the node at x beyond what it is constrained at, with its normal and the value of n . u that puts it there. */
+static PetscReal look(const Contact *c, SbSpace space, const PetscReal x[3], Touch *touch)
+{
+  const PetscReal *X = space->node_x + 3 * touch->node;
+  PetscReal n[3], at[3], gap;
+
+  touch->undecided = PETSC_FALSE;
+  if (SbContactKept(touch)) return SbDot3(touch->n, x) - SbDot3(touch->n, X) - touch->value;
+  gap = SbContactGap(c, &c->to, x, n);
+  if (touch->on && touch->valley) {
+    SbContactValley(c, space, x, gap, n, touch);
+    return gap - touch->rest;
+  }
+  for (int i = 0; i < 3; i++) at[i] = x[i] - gap * n[i] - X[i]; /* from the rest position to the surface */
+  if (!c->facets || !touch->on || !SbContactFlip(c, X, x, gap, n, touch)) {
+    for (int i = 0; i < 3; i++) touch->n[i] = n[i];
+    touch->value = SbDot3(n, at) + touch->rest;
+  }
+  for (int i = 0; i < 3 && !touch->on; i++) touch->surface[i] = n[i];
+  return gap - touch->rest;
+}
+
+/* Gap that a node is constrained at which was at x0 when the step began. */
+static PetscReal rest_of(const Contact *c, const SbPose *from, const Touch *touch, const PetscReal x0[3])
+{
+  PetscReal n[3];
+  /* what touches springs is behind by what they give; projected it is where it was constrained */
+  const PetscReal depth = touch->was && !exact(c) ? -touch->kept : -SbContactGap(c, from, x0, n);
+
+  return depth > TOLERANCE * c->size ? -c->overlap.left * depth : 0;
+}
+
+/* The damper of a step of implicit Euler is a stiffer spring and a constant force: k damping (g - g0) / dt, g0 < 0 the gap at its start. */
+static void set_damper(const Contact *c, const SbPose *from, PetscReal dt, const PetscReal x0[3],
+                       Touch *touch)
+{
+  PetscReal n[3];
+
+  touch->stiff = touch->k;
+  if (c->damping <= 0 || dt <= 0) return;
+  touch->stiff += touch->k * c->damping / dt;
+  touch->before = touch->k * c->damping / dt * PetscMin(0, SbContactGap(c, from, x0, n) - touch->rest);
+}
+
+/* A node is behind the obstacle: from now on it is constrained. */
+static void enter(const Contact *c, SbSpace space, Touch *touch)
+{
+  if (!touch->on && c->friction.mu > 0) {
+    const SbFrictionPair p = pair_of(space, touch);
+
+    SbFrictionEnter(&c->friction, &p, -touch->gap);
+  }
+  touch->on = PETSC_TRUE;
+  if (c->bounce.e > 0) SbContactHit(c, touch);
+}
+
+/* A node that was apart and is behind the obstacle now, by a motion that did not know of it: when it came. */
+static void watch_arrival(Contact *c, const Touch *touch)
+{
+  const PetscReal small = TOLERANCE * c->size;
+
+  if (!c->cut || touch->was || touch->gap0 <= small || touch->gap >= -small) return;
+  c->arrival = PetscMin(c->arrival, touch->gap0 / (touch->gap0 - touch->gap));
+}
+
+static PetscErrorCode arrive_contact(SbEffect e, PetscReal *part)
+{
+  Contact *c = (Contact *)e->data;
+
+  PetscFunctionBeginUser;
+  *part = c->arrival;
+  for (PetscInt i = 0; c->arrival < 1 && i < c->n; i++) { /* what arrived has pressed for a whole step */
+    if (!c->touch[i].was) c->touch[i].lambda = 0;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The place on the obstacle where a node was when the step began, x0, moves with it: there the node sticks. One that arrives in this
+   step sticks to where it was at its start. */
+static void start_friction(const Contact *c, SbSpace space, const SbPose *from, const PetscReal x0[3],
+                           Touch *touch)
+{
+  const PetscReal *X = space->node_x + 3 * touch->node;
+  PetscReal at[3], x1[3];
+
+  SbPoseInvert(from, x0, at);
+  SbPoseApply(&c->to, at, x1);
+  for (int k = 0; k < 3; k++) {
+    touch->start[k] = x1[k] - X[k];
+    touch->grip.stretch[k] = SbDot3(c->to.R + 3 * k, touch->stretch);
+  }
+  touch->rests = PETSC_FALSE;
+  SbFrictionBegin(&touch->grip, touch->on);
+}
+
+static PetscErrorCode touch_contact(SbEffect e, SbSpace space, PetscReal t, PetscReal dt,
+                                    const PetscReal u0[], const PetscReal v0[], const PetscReal u[])
+{
+  Contact *c = (Contact *)e->data;
+  SbPose from;
+
+  PetscFunctionBeginUser;
+  SbContactPose(c, t, &from);
+  SbContactPose(c, t + dt, &c->to);
+  c->friction.updates = 0;
+  c->first = PETSC_TRUE;
+  c->arrival = 1;
+  SbRestitutionBegin(&c->bounce, dt);
+  SbOverlapBegin(&c->overlap, dt);
+  for (PetscInt i = 0; i < c->n; i++) {
+    Touch *touch = &c->touch[i];
+    PetscReal x0[3], x[3], n[3];
+    PetscBool comes;
+
+    touch->toggles = touch->flips = 0;
+    touch->valley = PETSC_FALSE;
+    /* an attempt that was cut begins as it did; one that failed goes on with what it has found to touch */
+    if (c->cut || c->bounce.e > 0) touch->on = touch->was;
+    touch->idle = (PetscBool)(c->cut && !touch->was && !exact(c));
+    place(space, touch->node, u, x);
+    place(space, touch->node, u0, x0);
+    if (c->cut) touch->gap0 = SbContactGap(c, &from, x0, n);
+    touch->rest = rest_of(c, &from, touch, x0);
+    comes =
+      (PetscBool)(c->bounce.e > 0 && SbContactComes(c, &from, x0, v0 ? v0 + 3 * touch->node : NULL, touch));
+    if (c->friction.mu > 0) start_friction(c, space, &from, x0, touch);
+    set_damper(c, &from, dt, x0, touch);
+    touch->gap = look(c, space, x, touch);
+    watch_arrival(c, touch);
+    for (int k = 0; k < 3; k++) touch->now[k] = u[3 * touch->node + k];
+    if ((touch->gap < 0 || comes) && exact(c)) enter(c, space, touch);
+    if (!c->rows || exact(c)) continue;
+    if (spring(touch, touch->gap) > 0)
+      enter(c, space, touch);
+    else
+      touch->on = PETSC_FALSE;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The rows of a node that touches. */
+static PetscErrorCode hold_rows(const Contact *c, SbSpace space, Touch *touch)
+{
+  const PetscInt id = space->node_orig[touch->node];
+  const SbFrictionPair p = pair_of(space, touch);
+  PetscBool oblique = PETSC_FALSE;
+  PetscReal push[3];
+
+  PetscFunctionBeginUser;
+  if (c->friction.mu > 0) SbFrictionDirection(&c->friction, &p, push, &oblique);
+  if (exact(c))
+    PetscCall(SbSpaceAddConstraint(space, NORMALS - 1 - id, 1, p.node, touch->n, oblique ? push : NULL,
+                                   touch->value, &touch->along));
+  else {
+    PetscCall(SbSpaceAddPenaltyConstraint(space, 1, p.node, touch->n, oblique ? push : NULL, touch->value,
+                                          touch->stiff, touch->lambda + touch->before, &touch->along));
+    SbSpaceSetConstraintExternal(space, touch->along);
+  }
+  if (c->friction.mu > 0) PetscCall(SbFrictionHold(&c->friction, space, &p, -2 - 2 * id));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode hold_contact(SbEffect e, SbSpace space)
+{
+  Contact *c = (Contact *)e->data;
+
+  PetscFunctionBeginUser;
+  for (PetscInt i = 0; i < c->n; i++) {
+    Touch *touch = &c->touch[i];
+
+    touch->along = touch->other_along = touch->grip.slide[0] = touch->grip.slide[1] = -1;
+    if (!touch->on) continue;
+    if (c->rows)
+      PetscCall(hold_rows(c, space, touch));
+    else
+      touch->along = SbSpaceAddNodalConstraint(space, touch->node, touch->n, touch->value);
+    if (touch->valley)
+      touch->other_along = SbSpaceAddNodalConstraint(space, touch->node, touch->other, touch->other_value);
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* What a solve made of the rows of a node, at the displacement u; f: their normal force, N. */
+static void read_rows(const Contact *c, SbSpace space, const PetscReal u[3], Touch *touch, PetscReal f[3])
+{
+  const SbFrictionPair p = pair_of(space, touch);
+  PetscReal force, along;
+
+  touch->rests = PETSC_FALSE;
+  for (int k = 0; k < 3; k++) f[k] = 0;
+  for (int k = 0; k < 3; k++) touch->now[k] = u[k];
+  if (touch->along < 0) return;
+  SbSpaceGetConstraint(space, touch->along, &force, &along);
+  touch->rests = SbSpaceIsConstraintRedundant(space, touch->along);
+  if (touch->rests) {
+    touch->along = -1;
+    force = 0;
+  }
+  for (int k = 0; k < 3; k++) f[k] = force * touch->n[k];
+  if (c->friction.mu <= 0) return;
+  SbFrictionRead(&c->friction, space, &p, force, along);
+  for (int k = 0; k < 3; k++) touch->now[k] = u[k];
+}
+
+/* Gap and multiplier of every node after a solve; the largest multiplier of all ranks. */
+static PetscErrorCode measure(const Contact *c, SbSpace space, const PetscReal u[], const PetscReal r[],
+                              PetscReal *largest)
+{
+  PetscFunctionBeginUser;
+  *largest = 0;
+  for (PetscInt i = 0; i < c->n; i++) {
+    Touch *touch = &c->touch[i];
+    const PetscInt node = touch->node;
+    PetscReal x[3], f[3] = {0}, force;
+
+    if (c->rows) read_rows(c, space, u + 3 * node, touch, f);
+    if (exact(c)) touch->lambda = SbContactMultiplier(c, space, touch, r + 3 * node);
+    if (touch->valley)
+      touch->other_lambda = touch->other_along < 0
+                              ? 0
+                              : SbSpaceGetNodalConstraintForce(space, node, touch->other_along, r + 3 * node);
+    place(space, node, u, x);
+    touch->gap = look(c, space, x, touch);
+    *largest = PetscMax(*largest, SbContactForce(c, touch));
+    if (exact(c) || !c->rows) continue;
+    force = touch->on && touch->toggles >= TOGGLES ? pull(touch, touch->gap) : SbContactForce(c, touch);
+    for (int k = 0; k < 3; k++) f[k] -= force * touch->n[k];
+    touch->wrong = PetscSqrtReal(SbDot3(f, f));
+  }
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, largest, 1, MPIU_REAL, MPI_MAX, space->comm));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Whether a node is constrained, or not, as it should be; changes it if not. */
+static PetscBool settle_held(const Contact *c, SbSpace space, PetscReal largest, Touch *touch)
+{
+  if (!touch->on) {
+    if (touch->gap >= -TOLERANCE * c->size) return PETSC_TRUE;
+    enter(c, space, touch);
+    touch->toggles++;
+    return PETSC_FALSE;
+  }
+  if (touch->along < 0) return PETSC_TRUE;
+  if (touch->lambda < -PULLING * largest && touch->toggles < TOGGLES) {
+    touch->on = touch->valley = PETSC_FALSE;
+    touch->lambda = 0;
+    return PETSC_FALSE;
+  }
+  touch->lambda = PetscMax(0, touch->lambda);
+  if (touch->undecided) return PETSC_FALSE;
+  return (PetscBool)(PetscAbsReal(touch->gap) <= TOLERANCE * c->size);
+}
+
+/* Whether a spring pushes with what its place asks for, and for `augmented`, whose multiplier is raised, until the remainder of the penetration
+   does not matter. */
+static PetscBool settle_spring(const Contact *c, SbSpace space, PetscReal largest, Touch *touch)
+{
+  const PetscReal force = spring(touch, touch->gap);
+  PetscBool right = PETSC_TRUE;
+
+  if (c->rows) {
+    if (!touch->on && force > 0) {
+      enter(c, space, touch);
+      touch->toggles++;
+    } else if (force <= 0 && touch->toggles < TOGGLES)
+      touch->on = PETSC_FALSE;
+    right = (PetscBool)(touch->wrong <= SETTLED * largest);
+  }
+  if (c->response == PENALTY) return right;
+  if (force > 0 ? PetscAbsReal(touch->gap) <= TOLERANCE * c->size : touch->lambda <= 0) return right;
+  touch->lambda = force;
+  return PETSC_FALSE;
+}
+
+/* Springs that have stayed as rows and pull when all else is settled: they go, a few times. */
+static PetscErrorCode let_go(const Contact *c, SbSpace space, PetscReal largest, PetscBool *changed)
+{
+  PetscBool wait = *changed;
+
+  PetscFunctionBeginUser;
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &wait, 1, SB_MPI_BOOL, MPI_LOR, space->comm));
+  for (PetscInt i = 0; !wait && i < c->n; i++) {
+    Touch *touch = &c->touch[i];
+
+    if (!touch->on || touch->toggles >= 2 * TOGGLES || pull(touch, touch->gap) >= -PULLING * largest)
+      continue;
+    touch->on = PETSC_FALSE;
+    *changed = PETSC_TRUE;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Which nodes stick and which slide from now on. */
+static void settle_friction(Contact *c, SbSpace space, PetscReal largest, PetscBool *changed)
+{
+  PetscReal worst = 0;
+
+  for (PetscInt i = 0; i < c->n; i++) {
+    Touch *touch = &c->touch[i];
+    const SbFrictionPair p = pair_of(space, touch);
+    PetscReal error;
+
+    if (!touch->on || touch->along < 0) continue;
+    error = SbFrictionSettle(&c->friction, &p, SbContactForce(c, touch));
+    worst = PetscMax(worst, error);
+  }
+  SbFrictionJudge(&c->friction, worst, largest, changed);
+}
+
+/* After the first solve of a step: who arrives in it; springs of all nodes from now on. Whether one of these pushes. */
+static PetscBool wake(Contact *c)
+{
+  PetscBool pushes = PETSC_FALSE;
+
+  for (PetscInt i = 0; i < c->n; i++) {
+    Touch *touch = &c->touch[i];
+
+    if (!touch->on || !exact(c)) watch_arrival(c, touch);
+    if (touch->idle && touch->gap < 0) pushes = PETSC_TRUE;
+    touch->idle = PETSC_FALSE;
+  }
+  return pushes;
+}
+
+static PetscErrorCode settle_contact(SbEffect e, SbSpace space, const PetscReal u[], const PetscReal r[],
+                                     PetscBool *changed)
+{
+  Contact *c = (Contact *)e->data;
+  PetscReal largest;
+  PetscBool mine = PETSC_FALSE;
+
+  PetscFunctionBeginUser;
+  PetscCall(measure(c, space, u, r, &largest));
+  if (c->first && c->cut && wake(c)) mine = PETSC_TRUE;
+  c->first = PETSC_FALSE;
+  for (PetscInt i = 0; i < c->n; i++) {
+    Touch *touch = &c->touch[i];
+    const PetscBool right =
+      exact(c) ? settle_held(c, space, largest, touch) : settle_spring(c, space, largest, touch);
+
+    if (!right) mine = PETSC_TRUE;
+  }
+  if (c->friction.mu > 0) settle_friction(c, space, largest, &mine);
+  if (c->rows && !exact(c)) PetscCall(let_go(c, space, largest, &mine));
+  if (mine) *changed = PETSC_TRUE;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode destroy_contact(SbEffect e)
+{
+  Contact *c = (Contact *)e->data;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbEffectFreeOn(&c->on));
+  PetscCall(SbObstacleDestroy(&c->obstacle));
+  for (int i = 0; i < 3; i++) PetscCall(SbFormulaDestroy(&c->displacement[i]));
+  PetscCall(SbFormulaDestroy(&c->angle));
+  PetscCall(PetscFree(c->touch));
+  PetscCall(PetscFree(e->data));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbContactCreate_Node(SbEffect e)
+{
+  static const char *const columns[] = {"force_x",  "force_y",  "force_z",  "torque_x",
+                                        "torque_y", "torque_z", "contacts", "penetration"};
+  Contact *c;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscNew(&c));
+  e->data = c;
+  e->steady = PETSC_FALSE; /* a load factor does not make an obstacle softer */
+  e->ops.setup = setup_contact;
+  e->ops.begin_step = touch_contact;
+  e->ops.assemble_constraints = hold_contact;
+  e->ops.update_active_set = settle_contact;
+  e->ops.time_of_impact = arrive_contact;
+  e->ops.restitution = SbEffectRestitution_Contact;
+  e->ops.scale_restitution = SbEffectScaleRestitution_Contact;
+  e->ops.target_velocity = SbEffectTargetVelocity_Contact;
+  e->ops.force = SbEffectForce_Contact;
+  e->ops.tangent = SbEffectTangent_Contact;
+  e->ops.accept = SbEffectAccept_Contact;
+  e->ops.contact_force = SbEffectContactForce_Contact;
+  e->ops.gap = SbEffectGap_Contact;
+  e->ops.contact_points = SbEffectContactPoints_Contact;
+  e->ops.history = SbEffectHistory_Contact;
+  e->ops.save = SbEffectSave_Contact;
+  e->ops.load = SbEffectLoad_Contact;
+  e->ops.rename = SbEffectRename_Contact;
+  e->nstate = SB_CONTACT_STATE;
+  e->ops.destroy = destroy_contact;
+  e->column = columns;
+  e->ncolumn = PETSC_STATIC_ARRAY_LENGTH(columns);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
