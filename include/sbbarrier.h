@@ -121,8 +121,8 @@ void SbBarrier(PetscReal d, PetscReal w, PetscReal k, PetscReal area, PetscReal 
 /*
   SbBarrierPair - energy, gradient and Hessian of the barrier of a pair at x, by the motion of its four vertices. Edges that are nearly parallel count less.
 
-  Not collective. Input: gap > 0 and distance of SbContactPairGap(). Output: energy, J; gradient[12], N; H[12][12], row-major, its positive part, N/m (NULL: not wanted).
+  Not collective. Input: gap > 0 and distance of SbContactPairGap(). Output: energy, J; gradient[12], N; H[12][12], row-major, with `clamp` its positive part, N/m (NULL: not wanted).
 */
 void SbBarrierPair(SbContactMesh mesh, const SbContactPair *pair, PetscReal gap, const SbDistance *distance,
                    const PetscReal x[], PetscReal width, PetscReal pressure, PetscReal *energy,
-                   PetscReal gradient[12], PetscReal H[144]);
+                   PetscReal gradient[12], PetscBool clamp, PetscReal H[144]);

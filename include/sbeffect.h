@@ -79,7 +79,7 @@ typedef struct {
     safe          - `part` of the way from the local displacements u0 to u1, and from the present progress to `progress`, that can be gone, for the pairs of this
                     rank; nactive: pairs of this rank that push each other at u0.
     potential     - energy at the local displacements u, this rank's part, J; f[nnode][3] += its gradient on owned nodes, N.
-    hessian       - adds the blocks of a positive semi-definite approximation of its second derivative at u.
+    hessian       - adds the blocks of its second derivative at u, with `clamp` of the positive part of that of each pair.
   */
   PetscErrorCode (*begin_guarded)(SbEffect e, SbSpace space, PetscReal t, PetscReal dt, PetscReal u0[],
                                   PetscBool *moved);
@@ -88,7 +88,8 @@ typedef struct {
                          PetscReal progress, PetscReal *part, PetscInt *nactive);
   PetscErrorCode (*potential)(SbEffect e, SbSpace space, const PetscReal u[], PetscReal *energy,
                               PetscReal f[]);
-  PetscErrorCode (*hessian)(SbEffect e, SbSpace space, const PetscReal u[], SbBlocks *blocks);
+  PetscErrorCode (*hessian)(SbEffect e, SbSpace space, const PetscReal u[], PetscBool clamp,
+                            SbBlocks *blocks);
   /* after a step was accepted */
   PetscErrorCode (*accept)(SbEffect e, SbSpace space, const SbStage *stage);
   /* for checkpoints: what the effect takes from step to step beyond displacement and velocity, as records of `nstate` numbers each, in

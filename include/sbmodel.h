@@ -112,7 +112,7 @@ PetscErrorCode SbModelGuardBegin(SbModel model, PetscReal t, PetscReal dt, Vec U
 PetscErrorCode SbModelGuardAdvance(SbModel model, PetscReal progress);
 PetscErrorCode SbModelGuardSafe(SbModel model, Vec X, Vec Y, PetscReal progress, PetscReal *part,
                                 PetscInt *nactive);
-PetscErrorCode SbModelGuardHessian(SbModel model, Vec U, SbBlocks *blocks);
+PetscErrorCode SbModelGuardHessian(SbModel model, Vec U, PetscBool clamp, SbBlocks *blocks);
 /* Initial velocities of bodies (translation and spin). */
 PetscErrorCode SbModelInitialState(SbModel model, Vec U, Vec V);
 /* Centre of mass, m, and mass, kg, of each body, centre[nbody][4]: at rest with U NULL, else now. Collective. */

@@ -30,7 +30,7 @@ void SbBarrier(PetscReal d, PetscReal w, PetscReal k, PetscReal area, PetscReal 
 
 void SbBarrierPair(SbContactMesh m, const SbContactPair *pair, PetscReal gap, const SbDistance *g,
                    const PetscReal x[], PetscReal width, PetscReal pressure, PetscReal *energy,
-                   PetscReal gradient[12], PetscReal H[144])
+                   PetscReal gradient[12], PetscBool clamp, PetscReal H[144])
 {
   PetscReal b[3], at[12], grad[12], C[144], e = 1.;
 
@@ -72,13 +72,13 @@ void SbBarrierPair(SbContactMesh m, const SbContactPair *pair, PetscReal gap, co
   if (H) {
     const PetscReal factor[2] = {e * b[2], e * b[1]};
 
-    SbDistanceHessian(at, g, factor, (PetscBool)(e == 1.), H);
+    SbDistanceHessian(at, g, factor, (PetscBool)(clamp && e == 1.), H);
     if (e < 1.) {
       for (int i = 0; i < 12; i++) {
         for (int j = 0; j < 12; j++)
           H[12 * i + j] += b[0] * C[12 * i + j] + b[1] * (grad[i] * gradient[j] + gradient[i] * grad[j]);
       }
-      SbSymmetricClamp(12, H);
+      if (clamp) SbSymmetricClamp(12, H);
     }
   }
   for (int k = 0; k < 12; k++) gradient[k] = e * b[1] * gradient[k] + (e < 1. ? b[0] * grad[k] : 0.);

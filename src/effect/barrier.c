@@ -231,7 +231,7 @@ static PetscReal add_gradient(const Barrier *b, PetscReal sign, PetscReal f[])
     const SbContactPair *pair = &b->pairs->pair[a->pair];
 
     SbBarrierPair(b->mesh, pair, a->gap, &a->at, b->x, width_of(b, pair), pressure_of(b, pair), &energy,
-                  gradient, NULL);
+                  gradient, PETSC_FALSE, NULL);
     spread(b, pair, sign, gradient, f);
     if (counts(b, pair)) sum += energy;
   }
@@ -298,7 +298,8 @@ static PetscErrorCode spread_blocks(const Barrier *b, const SbContactPair *pair,
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode hessian_barrier(SbEffect e, SbSpace s, const PetscReal u[], SbBlocks *blocks)
+static PetscErrorCode hessian_barrier(SbEffect e, SbSpace s, const PetscReal u[], PetscBool clamp,
+                                      SbBlocks *blocks)
 {
   Barrier *b = (Barrier *)e->data;
   PetscReal energy, gradient[12], H[144];
@@ -311,7 +312,7 @@ static PetscErrorCode hessian_barrier(SbEffect e, SbSpace s, const PetscReal u[]
     const SbContactPair *pair = &b->pairs->pair[a->pair];
 
     SbBarrierPair(b->mesh, pair, a->gap, &a->at, b->x, width_of(b, pair), pressure_of(b, pair), &energy,
-                  gradient, H);
+                  gradient, clamp, H);
     PetscCall(spread_blocks(b, pair, H, blocks));
   }
 
@@ -492,7 +493,7 @@ static PetscErrorCode begin_barrier(SbEffect e, SbSpace s, PetscReal t, PetscRea
     Rub rub = {.pair = *pair};
 
     SbBarrierPair(m, pair, a->gap, &a->at, b->x, width_of(b, pair), pressure_of(b, pair), &energy, gradient,
-                  NULL);
+                  PETSC_FALSE, NULL);
     for (int k = 0; k < 4; k++) {
       rub.weight[k] = a->at.weight[k];
       f -= a->at.weight[k] * SbDot3(gradient + 3 * k, a->at.n);
@@ -600,7 +601,7 @@ static PetscErrorCode history_barrier(SbEffect e, SbSpace s, const SbStage *stag
     if (!at) continue;
     if (a)
       SbBarrierPair(m, pair, a->gap, &a->at, b->x, width_of(b, pair), pressure_of(b, pair), &energy, gradient,
-                    NULL);
+                    PETSC_FALSE, NULL);
     else
       (void)rub_pair(b, &b->rub[i - b->nactive], gradient);
     for (int k = 0; k < (pair->side ? 1 : 4); k++) {
@@ -642,7 +643,7 @@ static PetscErrorCode points_barrier(SbEffect e, SbSpace s, const SbStage *stage
 
     if (!counts(b, pair)) continue;
     SbBarrierPair(m, pair, a->gap, &a->at, b->x, width_of(b, pair), pressure_of(b, pair), &energy, gradient,
-                  NULL);
+                  PETSC_FALSE, NULL);
     for (int k = 0; k < 3; k++) p.id[k] = pair->v[k];
     p.body[0] = turned ? second : first;
     p.body[1] = turned ? -1 : second == s->mesh->nbody ? -1 : second;

@@ -68,13 +68,14 @@ PetscErrorCode SbModelGuardSafe(SbModel m, Vec X, Vec Y, PetscReal progress, Pet
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbModelGuardHessian(SbModel m, Vec U, SbBlocks *blocks)
+PetscErrorCode SbModelGuardHessian(SbModel m, Vec U, PetscBool clamp, SbBlocks *blocks)
 {
   const PetscReal *u;
 
   PetscFunctionBeginUser;
   PetscCall(SbSpaceGetLocalRead(m->space, U, &u));
-  for (PetscInt e = 0; e < m->npotential; e++) SbEffectCall(m->potential[e], hessian, m->space, u, blocks);
+  for (PetscInt e = 0; e < m->npotential; e++)
+    SbEffectCall(m->potential[e], hessian, m->space, u, clamp, blocks);
   PetscCall(SbSpaceRestoreLocalRead(m->space, U, &u));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

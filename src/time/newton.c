@@ -34,6 +34,7 @@
   1e-3 /* of the smallest body's size per second: a step of a time step that is short enough, where surfaces push each other */
 #define STICKING 1e-2       /* of that, with friction, whose forces follow from as small speeds */
 #define SETTLED_STATIC 1e-6 /* of that size: the same in a static run */
+#define NEAR 100            /* times these: contact's second derivative as it is, not its positive part */
 #define PROVISIONAL 1       /* steps that may follow each other while E is above where they began */
 
 /* What a solve keeps from iteration to iteration. */
@@ -48,6 +49,7 @@ typedef struct {
   SbContactSystem system; /* guarded contact: NULL before surfaces have pushed each other */
   SbBlocks blocks;        /* its second derivative, when the last direction was solved for */
   PetscInt nblock;        /* of all ranks */
+  PetscBool near;         /* the solution is near: contact's second derivative is taken as it is */
 } Newton;
 
 /* The potential at an iterate, as far as lengths of steps ask. */
@@ -89,7 +91,7 @@ static PetscErrorCode solve_linear(SNES snes, KSPConvergedReason *reason)
   PetscFunctionBeginUser;
   n->blocks.n = n->nblock = 0;
   if (m->npotential) {
-    PetscCall(SbModelGuardHessian(m, snes->vec_sol, &n->blocks));
+    PetscCall(SbModelGuardHessian(m, snes->vec_sol, (PetscBool)!n->near, &n->blocks));
     PetscCallMPI(MPI_Allreduce(&n->blocks.n, &n->nblock, 1, MPIU_INT, MPI_SUM, m->comm));
   }
   if (n->nblock) {
@@ -122,6 +124,10 @@ static PetscErrorCode find_direction(SNES snes, PetscBool *filtered, PetscReal *
     PetscCall(solve_linear(snes, &reason));
     PetscCall(VecDot(F, Y, slope));
     *slope = -*slope;
+    if (n->near && n->nblock && (reason < 0 || *slope >= 0.)) {
+      n->near = PETSC_FALSE;
+      continue;
+    }
     if (*filtered || !m->may_filter) break;
     /* L D L^T factors what is not definite without a word, and p may go down on the way to a saddle point */
     negative = -1;
@@ -369,6 +375,7 @@ static PetscErrorCode converged(SNES snes, PetscReal s)
   }
   PetscCall(VecNorm(snes->vec_sol_update, NORM_INFINITY, &longest));
   if (s == 1. && longest <= part * size) snes->reason = SNES_CONVERGED_SNORM_RELATIVE;
+  n->near = (PetscBool)(s == 1. && longest <= NEAR * part * size);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -387,6 +394,7 @@ static PetscErrorCode SNESSolve_Newton(SNES snes)
   snes->iter = 0;
   n->provisional = 0;
   n->nblock = 0;
+  n->near = PETSC_FALSE;
   if (guarded) PetscCall(approach(snes));
   if (snes->reason) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(SNESComputeFunction(snes, X, F));

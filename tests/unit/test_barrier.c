@@ -38,7 +38,7 @@ static PetscReal energy_at(SbContactMesh m, const SbContactPair *pair, const Pet
 
   gap = SbContactPairGap(m, pair, x, &distance);
   if (gap <= 0.) return PETSC_INFINITY;
-  SbBarrierPair(m, pair, gap, &distance, x, width, pressure, &energy, gradient, NULL);
+  SbBarrierPair(m, pair, gap, &distance, x, width, pressure, &energy, gradient, PETSC_FALSE, NULL);
   return energy;
 }
 
@@ -51,7 +51,7 @@ static void check_pair(SbContactMesh m, const SbContactPair *pair, PetscReal x[1
 
   gap = SbContactPairGap(m, pair, x, &distance);
   if (gap <= 0.02 || gap >= width) return;
-  SbBarrierPair(m, pair, gap, &distance, x, width, pressure, &energy, gradient, H);
+  SbBarrierPair(m, pair, gap, &distance, x, width, pressure, &energy, gradient, PETSC_TRUE, H);
   for (int k = 0; k < 3 * nv; k++) {
     PetscReal side[2], g[2][12];
 
