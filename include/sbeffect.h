@@ -90,6 +90,8 @@ typedef struct {
                               PetscReal f[]);
   PetscErrorCode (*hessian)(SbEffect e, SbSpace space, const PetscReal u[], PetscBool clamp,
                             SbBlocks *blocks);
+  /* of guarded contact: what it did to the bodies in the last accepted step, J; this rank's. Not collective. */
+  PetscErrorCode (*work)(SbEffect e, PetscReal *work);
   /* after a step was accepted */
   PetscErrorCode (*accept)(SbEffect e, SbSpace space, const SbStage *stage);
   /* for checkpoints: what the effect takes from step to step beyond displacement and velocity, as records of `nstate` numbers each, in

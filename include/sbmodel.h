@@ -112,6 +112,8 @@ PetscErrorCode SbModelGuardBegin(SbModel model, PetscReal t, PetscReal dt, Vec U
 PetscErrorCode SbModelGuardAdvance(SbModel model, PetscReal progress);
 PetscErrorCode SbModelGuardSafe(SbModel model, Vec X, Vec Y, PetscReal progress, PetscReal *part,
                                 PetscInt *nactive);
+/* Of the last accepted step: what contact did to the bodies, J, and its forces taken out of those of SbModelLoads() at U, F, N. */
+PetscErrorCode SbModelGuardWork(SbModel model, Vec U, PetscReal *work, Vec F);
 PetscErrorCode SbModelGuardHessian(SbModel model, Vec U, PetscBool clamp, SbBlocks *blocks);
 /* Initial velocities of bodies (translation and spin). */
 PetscErrorCode SbModelInitialState(SbModel model, Vec U, Vec V);

@@ -15,51 +15,15 @@
 
   Touching starts. Surfaces that touch when a run begins are moved apart, by less than the width; those that are in each other end the run.
 */
-#include "barrier.h"
+#include "barrier_impl.h"
 
-#define WIDTH 1e-3       /* of the size of the smallest body: default of w */
+#define WIDTH \
+  1.7e-3 /* of the edge of a cube of the smallest body's volume: default of w; thin bodies get less than long ones */
 #define PRESSURE 0.1     /* of Young's modulus of the softer side */
 #define SLIP 1e-3        /* of the size of the smallest body per second: speed below which friction sticks */
 #define SLIP_STATIC 1e-5 /* of the size: the same in a static run, as a length */
 #define APART 0.5        /* of w: how far touching surfaces are moved apart at the start */
 #define PASSES 200       /* over all pairs for that */
-
-/* A pair below its width, at the places that the effect knows. */
-typedef struct {
-  PetscInt pair;
-  PetscReal gap; /* m */
-  SbDistance at;
-} Active;
-
-/* A pair that friction acts on in this step. */
-typedef struct {
-  SbContactPair pair;
-  PetscReal weight[4], n[3], force; /* mu N, N */
-} Rub;
-
-typedef struct {
-  SbBarrierScene scene;
-  void *data; /* of the type */
-  PetscErrorCode (*destroy)(SbEffect e);
-  SbContactMesh mesh;
-  SbContactPairs pairs;
-  PetscReal width, pressure; /* as given; 0: by body */
-  PetscReal *w, *k;          /* [nbody+1] of each body, m, Pa; the obstacle's: none smaller */
-  PetscBool verify, begun;
-  PetscReal *x, *u;        /* [nvertex][3] places, m; [nnode_owned][3] displacement that they belong to */
-  PetscReal *start;        /* [nvertex][3] when the step began */
-  PetscReal *from, *to;    /* [obstacle's vertices][3] at the start and the end of the step */
-  PetscReal progress, now; /* how far on that way it is; at which x was made */
-  PetscReal *other;        /* [nvertex][3] where a motion leads */
-  PetscBool known;         /* x and active are up to date for u and progress */
-  PetscInt nactive, size;
-  Active *active;
-  PetscInt nrub, rub_size;
-  Rub *rub;
-  PetscReal slip;            /* e of friction, m */
-  PetscReal least, shortest; /* smallest gap and shortest safe part of the run */
-  PetscInt most;             /* pairs */
-} Barrier;
 
 /* ------------------------------------------------------------------ set-up */
 
@@ -68,6 +32,7 @@ static PetscErrorCode setup_barrier(SbEffect e, SbSpace s)
   Barrier *b = (Barrier *)e->data;
   const PetscInt nbody = s->mesh->nbody;
   SbFacet *facet;
+  PetscReal cube = PETSC_MAX_REAL;
   PetscInt n;
 
   PetscFunctionBeginUser;
@@ -76,12 +41,29 @@ static PetscErrorCode setup_barrier(SbEffect e, SbSpace s)
   PetscCall(SbEffectFacets(s, b->scene.on, &n, &facet));
   PetscCall(SbContactMeshCreate(s, n, facet, b->scene.obstacle, &b->mesh));
   PetscCall(PetscFree(facet));
+  if (!b->scene.obstacle) {
+    PetscBool *takes_part;
+    PetscInt nskin = 0;
+
+    PetscCall(PetscCalloc1(nbody, &takes_part));
+    for (PetscInt v = 0; v < b->mesh->nbody_vertex; v++) takes_part[b->mesh->part[v]] = PETSC_TRUE;
+    for (PetscInt i = 0; i < nbody; i++) nskin += takes_part[i];
+    PetscCheck(
+      nskin > 1 || b->scene.self, s->comm, PETSC_ERR_USER_INPUT,
+      "The effect %s has only one body to examine: give -effect_%s_self yes for a body that may meet "
+      "itself, more sets with -effect_%s_on, or -effect_%s_obstacle",
+      e->name, e->name, e->name, e->name);
+    b->columns.wanted = b->scene.pairs;
+    PetscCall(SbPairsSetUp(e, s->mesh, takes_part, b->scene.self, &b->columns));
+    PetscCall(PetscFree(takes_part));
+  }
 
   /* width and pressure of each body */
+  for (PetscInt i = 0; i < nbody; i++) cube = PetscMin(cube, PetscCbrtReal(s->mesh->body[i].volume));
   PetscCall(PetscMalloc2(nbody + 1, &b->w, nbody + 1, &b->k));
   b->w[nbody] = b->k[nbody] = PETSC_MAX_REAL;
   for (PetscInt i = 0; i < nbody; i++) {
-    b->w[i] = b->width > 0. ? b->width : PetscMin(WIDTH * b->mesh->size, 0.5 * b->mesh->shortest);
+    b->w[i] = b->width > 0. ? b->width : PetscMin(WIDTH * cube, 0.5 * b->mesh->shortest);
     b->k[i] = b->pressure > 0. ? b->pressure : PRESSURE * s->material[i]->E;
   }
   PetscCheck(b->w[0] <= b->mesh->shortest, s->comm, PETSC_ERR_USER_INPUT,
@@ -110,26 +92,6 @@ static void place_obstacle(const Barrier *b, PetscReal progress, PetscReal x[])
                           : b->from[k - first] + progress * (b->to[k - first] - b->from[k - first]);
 }
 
-static inline PetscReal width_of(const Barrier *b, const SbContactPair *pair)
-{
-  const PetscInt *part = b->mesh->part;
-
-  return PetscMin(b->w[part[pair->v[0]]], b->w[part[pair->v[pair->side ? 1 : 2]]]);
-}
-
-static inline PetscReal pressure_of(const Barrier *b, const SbContactPair *pair)
-{
-  const PetscInt *part = b->mesh->part;
-
-  return PetscMin(b->k[part[pair->v[0]]], b->k[part[pair->v[pair->side ? 1 : 2]]]);
-}
-
-/* Whether this rank counts the pair. */
-static inline PetscBool counts(const Barrier *b, const SbContactPair *pair)
-{
-  return (PetscBool)b->mesh->own[pair->v[pair->v[0] < b->mesh->nbody_vertex ? 0 : 1]];
-}
-
 static int compare_active(const void *x, const void *y, void *ctx)
 {
   const SbContactPair *pair = ((const Barrier *)ctx)->pairs->pair, *p = &pair[((const Active *)x)->pair],
@@ -144,7 +106,7 @@ static int compare_active(const void *x, const void *y, void *ctx)
 }
 
 /* The places at the local displacements u, and the pairs below their width, in the order of their numbers. Collective. */
-static PetscErrorCode look(Barrier *b, const PetscReal u[])
+PetscErrorCode SbBarrierLook(Barrier *b, const PetscReal u[])
 {
   const PetscInt n = 3 * b->mesh->space->nnode_owned;
   PetscBool same;
@@ -180,12 +142,12 @@ static PetscErrorCode look(Barrier *b, const PetscReal u[])
 /* ------------------------------------------------------------------ forces */
 
 /* The tangential slip of a pair since the step began, m. */
-static PetscReal slip_of(const Barrier *b, const Rub *rub, PetscReal u[3])
+PetscReal SbBarrierSlip(const Barrier *b, const Rub *rub, PetscReal u[3])
 {
   PetscReal normal = 0.;
 
   for (int i = 0; i < 3; i++) {
-    u[i] = 0.;
+    u[i] = -b->progress * rub->carry[i];
     for (int k = 0; k < 4; k++)
       u[i] += rub->weight[k] * (b->x[3 * rub->pair.v[k] + i] - b->start[3 * rub->pair.v[k] + i]);
     normal += u[i] * rub->n[i];
@@ -195,13 +157,27 @@ static PetscReal slip_of(const Barrier *b, const Rub *rub, PetscReal u[3])
 }
 
 /* Energy of friction, J, its gradient by the pair's vertices, N. */
-static PetscReal rub_pair(const Barrier *b, const Rub *rub, PetscReal gradient[12])
+PetscReal SbBarrierRub(const Barrier *b, const Rub *rub, PetscReal gradient[12])
 {
   PetscReal u[3];
-  const PetscReal y = slip_of(b, rub, u), e = b->slip, slope = y < e ? 2. / e - y / (e * e) : 1. / y;
+  const PetscReal y = SbBarrierSlip(b, rub, u), e = b->slip, slope = SbBarrierSlope(b, y);
 
   for (int k = 0; k < 12; k++) gradient[k] = rub->force * slope * rub->weight[k / 3] * u[k % 3];
   return rub->force * (y < e ? y * y / e - y * y * y / (3. * e * e) + e / 3. : y);
+}
+
+PetscReal SbBarrierPush(const Barrier *b, const Active *a, PetscReal *energy, PetscReal gradient[12])
+{
+  const SbContactPair *pair = &b->pairs->pair[a->pair];
+  PetscReal force = 0., w2 = 0.;
+
+  SbBarrierPair(b->mesh, pair, a->gap, &a->at, b->x, width_of(b, pair), pressure_of(b, pair), energy,
+                gradient, PETSC_FALSE, NULL);
+  for (int k = 0; k < 4; k++) {
+    force -= a->at.weight[k] * SbDot3(gradient + 3 * k, a->at.n);
+    w2 += PetscSqr(a->at.weight[k]);
+  }
+  return PetscMax(0., force / w2);
 }
 
 /* f += sign times the force with which each of the pair's vertices pushes its owned nodes. */
@@ -222,7 +198,7 @@ static void spread(const Barrier *b, const SbContactPair *pair, PetscReal sign, 
 }
 
 /* f += sign times the gradient of all energies at the places known, N; their sum over the pairs that this rank counts, J. */
-static PetscReal add_gradient(const Barrier *b, PetscReal sign, PetscReal f[])
+PetscReal SbBarrierGradient(const Barrier *b, PetscReal sign, PetscReal f[])
 {
   PetscReal sum = 0., energy, gradient[12];
 
@@ -230,13 +206,12 @@ static PetscReal add_gradient(const Barrier *b, PetscReal sign, PetscReal f[])
     const Active *a = &b->active[i];
     const SbContactPair *pair = &b->pairs->pair[a->pair];
 
-    SbBarrierPair(b->mesh, pair, a->gap, &a->at, b->x, width_of(b, pair), pressure_of(b, pair), &energy,
-                  gradient, PETSC_FALSE, NULL);
+    (void)SbBarrierPush(b, a, &energy, gradient);
     spread(b, pair, sign, gradient, f);
     if (counts(b, pair)) sum += energy;
   }
   for (PetscInt i = 0; i < b->nrub; i++) {
-    energy = rub_pair(b, &b->rub[i], gradient);
+    energy = SbBarrierRub(b, &b->rub[i], gradient);
     spread(b, &b->rub[i].pair, sign, gradient, f);
     if (counts(b, &b->rub[i].pair)) sum += energy;
   }
@@ -250,8 +225,8 @@ static PetscErrorCode force_barrier(SbEffect e, SbSpace s, const SbStage *stage,
   PetscFunctionBeginUser;
   (void)s;
   if (!b->begun) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(look(b, stage->u));
-  (void)add_gradient(b, -1., f);
+  PetscCall(SbBarrierLook(b, stage->u));
+  (void)SbBarrierGradient(b, -1., f);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -264,8 +239,8 @@ static PetscErrorCode potential_barrier(SbEffect e, SbSpace s, const PetscReal u
   (void)s;
   *energy = 0.;
   if (!b->begun) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(look(b, u));
-  *energy = add_gradient(b, 1., f);
+  PetscCall(SbBarrierLook(b, u));
+  *energy = SbBarrierGradient(b, 1., f);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -306,7 +281,7 @@ static PetscErrorCode hessian_barrier(SbEffect e, SbSpace s, const PetscReal u[]
 
   PetscFunctionBeginUser;
   (void)s;
-  PetscCall(look(b, u));
+  PetscCall(SbBarrierLook(b, u));
   for (PetscInt i = 0; i < b->nactive; i++) {
     const Active *a = &b->active[i];
     const SbContactPair *pair = &b->pairs->pair[a->pair];
@@ -320,7 +295,7 @@ static PetscErrorCode hessian_barrier(SbEffect e, SbSpace s, const PetscReal u[]
   for (PetscInt i = 0; i < b->nrub; i++) {
     const Rub *rub = &b->rub[i];
     PetscReal d[3], T[9];
-    const PetscReal y = slip_of(b, rub, d), w = b->slip, slope = y < w ? 2. / w - y / (w * w) : 1. / y,
+    const PetscReal y = SbBarrierSlip(b, rub, d), w = b->slip, slope = SbBarrierSlope(b, y),
                     curve = y < w ? 2. / w - 2. * y / (w * w) : 0.;
 
     for (int k = 0; k < 9; k++) {
@@ -452,18 +427,87 @@ static PetscErrorCode part_touching(SbEffect e, SbSpace s, PetscReal u[], PetscB
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* What the forces of obstacles do over their way in this step, N m: those of gaps, and those of friction. */
+static void obstacle_works(const Barrier *b, PetscReal *gaps, PetscReal *friction)
+{
+  const SbContactMesh m = b->mesh;
+
+  *gaps = *friction = 0.;
+  for (PetscInt i = 0; b->scene.obstacle && i < b->nactive + b->nrub; i++) {
+    const Active *a = i < b->nactive ? &b->active[i] : NULL;
+    const SbContactPair *pair = a ? &b->pairs->pair[a->pair] : &b->rub[i - b->nactive].pair;
+    PetscReal energy, gradient[12];
+
+    if (!counts(b, pair)) continue;
+    if (a)
+      (void)SbBarrierPush(b, a, &energy, gradient);
+    else
+      (void)SbBarrierRub(b, &b->rub[i - b->nactive], gradient);
+    for (int k = 0; k < 4; k++) {
+      const PetscInt v = 3 * (pair->v[k] - m->nbody_vertex);
+      const PetscReal *g = gradient + 3 * k;
+
+      if (v < 0) continue;
+      for (int j = 0; j < 3; j++) *(a ? gaps : friction) += g[j] * (b->to[v + j] - b->from[v + j]);
+    }
+    /* and where it turns under what slips */
+    if (!a) {
+      const Rub *rub = &b->rub[i - b->nactive];
+      PetscReal u[3];
+      const PetscReal y = SbBarrierSlip(b, rub, u), slope = SbBarrierSlope(b, y);
+
+      *friction -= rub->force * slope * SbDot3(u, rub->carry);
+    }
+  }
+}
+
+/* Energy of the gaps at the places known, J; this rank's. */
+static PetscReal gap_energy(const Barrier *b)
+{
+  PetscReal sum = 0., energy, gradient[12];
+
+  for (PetscInt i = 0; i < b->nactive; i++) {
+    if (!counts(b, &b->pairs->pair[b->active[i].pair])) continue;
+    (void)SbBarrierPush(b, &b->active[i], &energy, gradient);
+    sum += energy;
+  }
+  return sum;
+}
+
+/* How far the point of the obstacle that a pair rubs on moves in the step, beyond what its vertices say. */
+static void carry_along(const Barrier *b, const SbPose pose[2], const Active *a, Rub *rub)
+{
+  const SbContactMesh m = b->mesh;
+  const PetscInt *v = b->pairs->pair[a->pair].v;
+  PetscReal X[3], at[3] = {0}, to[3], sign = 0.;
+
+  for (int k = 0; k < 4; k++) {
+    if (v[k] >= m->nbody_vertex || rub->weight[k] == 0.) continue;
+    sign = rub->weight[k] > 0. ? 1. : -1.;
+    for (int i = 0; i < 3; i++) at[i] += PetscAbsReal(rub->weight[k]) * b->x[3 * v[k] + i];
+  }
+  for (int i = 0; i < 3; i++) at[i] -= sign * a->gap * rub->n[i];
+  SbPoseInvert(&pose[0], at, X);
+  SbPoseApply(&pose[1], X, to);
+  for (int i = 0; i < 3; i++) rub->carry[i] = sign * (to[i] - at[i]);
+  for (int k = 0; k < 4; k++) {
+    const PetscInt o = 3 * (v[k] - m->nbody_vertex);
+
+    for (int i = 0; i < 3 && o >= 0; i++) rub->carry[i] += rub->weight[k] * (b->to[o + i] - b->from[o + i]);
+  }
+}
+
 static PetscErrorCode begin_barrier(SbEffect e, SbSpace s, PetscReal t, PetscReal dt, PetscReal u0[],
                                     PetscBool *moved)
 {
   Barrier *b = (Barrier *)e->data;
   const SbContactMesh m = b->mesh;
-  PetscReal side = PETSC_MAX_REAL;
+  PetscReal least = PETSC_MAX_REAL, unused;
+  SbPose pose[2];
 
   PetscFunctionBeginUser;
   *moved = PETSC_FALSE;
   if (b->scene.obstacle) {
-    SbPose pose[2];
-
     (*b->scene.pose)(b->data, t, &pose[0]);
     (*b->scene.pose)(b->data, t + dt, &pose[1]);
     for (PetscInt v = m->nbody_vertex; v < m->nvertex; v++) {
@@ -478,34 +522,26 @@ static PetscErrorCode begin_barrier(SbEffect e, SbSpace s, PetscReal t, PetscRea
   }
   b->begun = PETSC_TRUE;
   b->nrub = 0;
-  PetscCall(look(b, u0));
+  PetscCall(SbBarrierLook(b, u0));
   PetscCall(PetscArraycpy(b->start, b->x, 3 * m->nvertex));
-  for (PetscInt i = 0; i < b->nactive; i++) side = PetscMin(side, b->active[i].gap);
-  PetscCheck(side > 0., PETSC_COMM_SELF, PETSC_ERR_PLIB,
-             "The effect %s: a gap of %g m at the start of a step", e->name, (double)side);
+  for (PetscInt i = 0; i < b->nactive; i++) least = PetscMin(least, b->active[i].gap);
+  PetscCheck(least > 0., PETSC_COMM_SELF, PETSC_ERR_PLIB,
+             "The effect %s: a gap of %g m at the start of a step", e->name, (double)least);
+  b->energy = gap_energy(b);
+  obstacle_works(b, &b->obstacle_power, &unused);
 
   /* friction with the forces of the start */
   b->slip = dt > 0. && e->dynamic ? SLIP * m->size * dt : SLIP_STATIC * m->size;
   for (PetscInt i = 0; b->scene.friction > 0. && i < b->nactive; i++) {
     const Active *a = &b->active[i];
     const SbContactPair *pair = &b->pairs->pair[a->pair];
-    PetscReal energy, gradient[12], f = 0.;
+    PetscReal energy, gradient[12];
     Rub rub = {.pair = *pair};
 
-    SbBarrierPair(m, pair, a->gap, &a->at, b->x, width_of(b, pair), pressure_of(b, pair), &energy, gradient,
-                  PETSC_FALSE, NULL);
-    for (int k = 0; k < 4; k++) {
-      rub.weight[k] = a->at.weight[k];
-      f -= a->at.weight[k] * SbDot3(gradient + 3 * k, a->at.n);
-    }
-    for (int k = 0, n = 0; k < 4; k++) n += a->at.weight[k] != 0.;
-    for (int k = 0; k < 3; k++) rub.n[k] = a->at.n[k];
-    {
-      PetscReal w2 = 0.;
-
-      for (int k = 0; k < 4; k++) w2 += PetscSqr(a->at.weight[k]);
-      rub.force = b->scene.friction * PetscMax(0., f / w2);
-    }
+    rub.force = b->scene.friction * SbBarrierPush(b, a, &energy, gradient);
+    PetscCall(PetscArraycpy(rub.weight, a->at.weight, 4));
+    PetscCall(PetscArraycpy(rub.n, a->at.n, 3));
+    if (b->scene.obstacle) carry_along(b, pose, a, &rub);
     if (b->nrub == b->rub_size) {
       b->rub_size = PetscMax(64, 2 * b->rub_size);
       PetscCall(PetscRealloc((size_t)b->rub_size * sizeof(*b->rub), &b->rub));
@@ -523,7 +559,7 @@ static PetscErrorCode safe_barrier(SbEffect e, SbSpace s, const PetscReal u0[], 
 
   PetscFunctionBeginUser;
   (void)s;
-  PetscCall(look(b, u0));
+  PetscCall(SbBarrierLook(b, u0));
   nsearch = b->pairs->nsearch;
   *nactive = b->nactive;
   PetscCall(SbContactMeshMove(b->mesh, u1, NULL, b->other));
@@ -547,10 +583,26 @@ static PetscErrorCode advance_barrier(SbEffect e, PetscReal progress)
 static PetscErrorCode accept_barrier(SbEffect e, SbSpace s, const SbStage *stage)
 {
   Barrier *b = (Barrier *)e->data;
+  PetscReal before, power, friction, lost = 0.;
   PetscInt n, where[5];
 
   PetscFunctionBeginUser;
-  PetscCall(look(b, stage->u));
+  PetscCall(SbBarrierLook(b, stage->u));
+  /* what contact has done in the step */
+  before = b->energy;
+  b->energy = gap_energy(b);
+  obstacle_works(b, &power, &friction);
+  for (PetscInt i = 0; i < b->nrub; i++) {
+    PetscReal u[3];
+
+    if (!counts(b, &b->rub[i].pair)) continue;
+    lost += b->rub[i].force * PetscSqr(SbBarrierSlip(b, &b->rub[i], u)) *
+            SbBarrierSlope(b, SbBarrierSlip(b, &b->rub[i], u));
+  }
+  b->step_work = before - b->energy + 0.5 * (b->obstacle_power + power) + friction - lost;
+  b->work += b->step_work;
+  b->friction_loss += lost;
+
   for (PetscInt i = 0; i < b->nactive; i++) b->least = PetscMin(b->least, b->active[i].gap);
   b->most = PetscMax(b->most, b->nactive);
   if (!b->verify) PetscFunctionReturn(PETSC_SUCCESS);
@@ -562,169 +614,55 @@ static PetscErrorCode accept_barrier(SbEffect e, SbSpace s, const SbStage *stage
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* ------------------------------------------------------------------ output */
-
-/* The force on each vertex of a pair, N: barrier and friction of the pairs known. */
-static PetscErrorCode contact_force_barrier(SbEffect e, SbSpace s, const SbStage *stage, const PetscReal r[],
-                                            PetscReal f[])
+static PetscErrorCode work_barrier(SbEffect e, PetscReal *work)
 {
   PetscFunctionBeginUser;
-  (void)r;
-  PetscCall(force_barrier(e, s, stage, f));
+  *work = ((const Barrier *)e->data)->step_work;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode history_barrier(SbEffect e, SbSpace s, const SbStage *stage, const PetscReal r[],
-                                      PetscReal values[])
+/* Forces follow from the places; what goes on are sums. */
+static PetscErrorCode save_barrier(SbEffect e, SbSpace s, PetscInt *n, PetscReal **records)
+{
+  const Barrier *b = (const Barrier *)e->data;
+
+  PetscFunctionBeginUser;
+  (void)s;
+  *n = 1;
+  PetscCall(PetscMalloc1(2, records));
+  (*records)[0] = b->work;
+  (*records)[1] = b->friction_loss;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode load_barrier(SbEffect e, SbSpace s, PetscReal t, const PetscReal u[], PetscInt n,
+                                   const PetscReal records[])
 {
   Barrier *b = (Barrier *)e->data;
-  const SbContactMesh m = b->mesh;
-  const PetscInt at = b->scene.obstacle ? 6 : 0;
-  PetscReal least = PETSC_MAX_REAL, gradient[12];
   PetscMPIInt rank;
-  SbPose pose;
 
   PetscFunctionBeginUser;
-  (void)r;
-  for (PetscInt k = 0; k < e->ncolumn; k++) values[k] = 0.;
-  if (!b->begun) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(look(b, stage->u));
-  if (b->scene.obstacle) (*b->scene.pose)(b->data, stage->t, &pose);
-  for (PetscInt i = 0; i < b->nactive + b->nrub; i++) {
-    const Active *a = i < b->nactive ? &b->active[i] : NULL;
-    const SbContactPair *pair = a ? &b->pairs->pair[a->pair] : &b->rub[i - b->nactive].pair;
-    PetscReal energy;
-
-    if (a) least = PetscMin(least, a->gap);
-    if (!counts(b, pair)) continue;
-    if (a) values[at]++;
-    if (!at) continue;
-    if (a)
-      SbBarrierPair(m, pair, a->gap, &a->at, b->x, width_of(b, pair), pressure_of(b, pair), &energy, gradient,
-                    PETSC_FALSE, NULL);
-    else
-      (void)rub_pair(b, &b->rub[i - b->nactive], gradient);
-    for (int k = 0; k < (pair->side ? 1 : 4); k++) {
-      PetscReal arm[3], moment[3];
-
-      if (pair->v[k] >= m->nbody_vertex) continue;
-      for (int j = 0; j < 3; j++) arm[j] = b->x[3 * pair->v[k] + j] - b->scene.centre[j] - pose.d[j];
-      SbCross(arm, gradient + 3 * k, moment);
-      for (int j = 0; j < 3; j++) {
-        values[j] -= gradient[3 * k + j];
-        values[3 + j] -= moment[j];
-      }
-    }
-  }
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &least, 1, MPIU_REAL, MPI_MIN, s->comm));
+  (void)t;
+  (void)u;
   PetscCallMPI(MPI_Comm_rank(s->comm, &rank));
-  if (!rank) values[at + 2] = least < PETSC_MAX_REAL ? least : 0.;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode points_barrier(SbEffect e, SbSpace s, const SbStage *stage, const PetscReal r[],
-                                     SbContactPoints *list)
-{
-  Barrier *b = (Barrier *)e->data;
-  const SbContactMesh m = b->mesh;
-
-  PetscFunctionBeginUser;
-  (void)r;
-  if (!b->begun) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(look(b, stage->u));
-  for (PetscInt i = 0; i < b->nactive; i++) {
-    const Active *a = &b->active[i];
-    const SbContactPair *pair = &b->pairs->pair[a->pair];
-    const int split = pair->kind == SB_PAIR_EDGE_EDGE && !pair->side ? 2 : 1;
-    const PetscInt first = m->part[pair->v[0]], second = m->part[pair->v[pair->side ? 1 : 2]];
-    const PetscBool turned = (PetscBool)(first == s->mesh->nbody);
-    SbContactPoint p = {.gap = a->gap};
-    PetscReal energy, gradient[12], force = 0., w2 = 0.;
-
-    if (!counts(b, pair)) continue;
-    SbBarrierPair(m, pair, a->gap, &a->at, b->x, width_of(b, pair), pressure_of(b, pair), &energy, gradient,
-                  PETSC_FALSE, NULL);
-    for (int k = 0; k < 3; k++) p.id[k] = pair->v[k];
-    p.body[0] = turned ? second : first;
-    p.body[1] = turned ? -1 : second == s->mesh->nbody ? -1 : second;
-    for (int k = 0; k < 4; k++) {
-      force -= a->at.weight[k] * SbDot3(gradient + 3 * k, a->at.n);
-      w2 += PetscSqr(a->at.weight[k]);
-      for (int j = 0; j < 3 && (turned ? k >= split : k < split); j++)
-        p.x[j] += PetscAbsReal(a->at.weight[k]) * b->x[3 * pair->v[k] + j];
-    }
-    for (int j = 0; j < 3; j++) {
-      p.normal[j] = turned ? -a->at.n[j] : a->at.n[j];
-      p.force[j] = force / w2 * p.normal[j];
-    }
-
-    /* what friction does there */
-    for (PetscInt k = 0; k < b->nrub; k++) {
-      const Rub *rub = &b->rub[k];
-      PetscReal u[3];
-      PetscBool same;
-
-      PetscCall(PetscArraycmp(rub->pair.v, pair->v, 4, &same));
-      if (!same || rub->pair.kind != pair->kind || rub->pair.side != pair->side) continue;
-      {
-        const PetscReal y = slip_of(b, rub, u),
-                        slope = y < b->slip ? 2. / b->slip - y / PetscSqr(b->slip) : 1. / y;
-
-        for (int j = 0; j < 3; j++) p.force[j] -= (turned ? -1. : 1.) * rub->force * slope * u[j];
-      }
-      break;
-    }
-    PetscCall(SbContactPointsAdd(list, &p));
+  b->work = b->friction_loss = 0.;
+  for (PetscInt i = 0; !rank && i < n; i++) {
+    b->work += records[2 * i];
+    b->friction_loss += records[2 * i + 1];
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode gap_barrier(SbEffect e, SbSpace s, const SbStage *stage, PetscReal gap[],
-                                  PetscReal normal[])
+static PetscErrorCode rename_barrier(SbEffect e, PetscInt nnode, const PetscInt from[], const PetscInt to[],
+                                     PetscInt *n, PetscReal records[])
 {
-  Barrier *b = (Barrier *)e->data;
-  const SbContactMesh m = b->mesh;
-
   PetscFunctionBeginUser;
-  if (!b->begun) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(look(b, stage->u));
-  for (PetscInt i = 0; i < b->nactive; i++) {
-    const Active *a = &b->active[i];
-    const SbContactPair *pair = &b->pairs->pair[a->pair];
-
-    for (int k = 0; k < (pair->side ? 1 : 4); k++) {
-      const PetscInt v = pair->v[k];
-
-      if (v >= m->nbody_vertex || a->at.weight[k] == 0.) continue;
-      for (PetscInt j = m->start[v]; j < m->start[v + 1]; j++) {
-        const PetscInt node = m->node[j];
-
-        if (node < 0 || node >= s->nnode_owned || a->gap >= gap[node]) continue;
-        gap[node] = a->gap;
-        for (int i3 = 0; i3 < 3; i3++)
-          normal[3 * node + i3] = (a->at.weight[k] > 0. ? 1. : -1.) * a->at.n[i3];
-      }
-    }
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode summary_barrier(SbEffect e, SbSpace s, size_t size, char text[])
-{
-  Barrier *b = (Barrier *)e->data;
-  PetscReal value[2] = {b->least, b->shortest};
-  PetscInt most = b->most;
-
-  PetscFunctionBeginUser;
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, value, 2, MPIU_REAL, MPI_MIN, s->comm));
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &most, 1, MPIU_INT, MPI_MAX, s->comm));
-  if (most)
-    (void)snprintf(text, size,
-                   "%" PetscInt_FMT " pairs at most on a rank, smallest gap %.3g m of a width of %.3g m, "
-                   "shortest safe part of an iteration %.2g",
-                   most, (double)value[0], (double)b->w[0], (double)value[1]);
-  else
-    (void)snprintf(text, size, "nothing came nearer than %.3g m", (double)b->w[0]);
+  (void)e;
+  (void)nnode;
+  (void)from;
+  (void)to;
+  (void)n;
+  (void)records;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -738,6 +676,7 @@ static PetscErrorCode destroy_barrier(SbEffect e)
   PetscCall(PetscFree2(b->w, b->k));
   PetscCall(PetscFree3(b->x, b->start, b->other));
   PetscCall(PetscFree3(b->u, b->from, b->to));
+  PetscCall(SbPairsFree(&b->columns));
   PetscCall(PetscFree(b->active));
   PetscCall(PetscFree(b->rub));
   e->data = b->data;
@@ -748,8 +687,13 @@ static PetscErrorCode destroy_barrier(SbEffect e)
 
 PetscErrorCode SbBarrierCreate(SbEffect e, const SbScope *scope, const SbBarrierScene *scene)
 {
-  static const char *const columns[] = {"force_x",  "force_y",  "force_z",     "torque_x", "torque_y",
-                                        "torque_z", "contacts", "penetration", "gap"};
+  static const char *const obstacle[] = {"force_x",  "force_y",  "force_z",      "torque_x",
+                                         "torque_y", "torque_z", "contacts",     "penetration",
+                                         "gap",      "energy",   "friction_loss"},
+                           *const bodies[] = {
+                             "contacts",       "penetration", "penetration_mean", "normal_force",
+                             "friction_force", "work",        "friction_loss",    "gap",
+                             "energy"};
   Barrier *b;
 
   PetscFunctionBeginUser;
@@ -770,17 +714,21 @@ PetscErrorCode SbBarrierCreate(SbEffect e, const SbScope *scope, const SbBarrier
                          .potential = potential_barrier,
                          .hessian = hessian_barrier,
                          .accept = accept_barrier,
-                         .contact_force = contact_force_barrier,
-                         .gap = gap_barrier,
-                         .contact_points = points_barrier,
-                         .history = history_barrier,
-                         .summary = summary_barrier,
+                         .work = work_barrier,
+                         .save = save_barrier,
+                         .load = load_barrier,
+                         .rename = rename_barrier,
+                         .contact_force = SbEffectContactForce_Barrier,
+                         .gap = SbEffectGap_Barrier,
+                         .contact_points = SbEffectContactPoints_Barrier,
+                         .history = SbEffectHistory_Barrier,
+                         .summary = SbEffectSummary_Barrier,
                          .destroy = destroy_barrier};
   e->linear = e->steady = PETSC_FALSE;
   e->saddle = PETSC_FALSE;
   e->springs = (PetscBool)(scene->friction > 0.);
-  e->nstate = 0;
-  e->column = scene->obstacle ? columns : columns + 6;
-  e->ncolumn = scene->obstacle ? 9 : 3;
+  e->nstate = 2;
+  e->column = scene->obstacle ? obstacle : bodies;
+  e->ncolumn = scene->obstacle ? PETSC_STATIC_ARRAY_LENGTH(obstacle) : PETSC_STATIC_ARRAY_LENGTH(bodies);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -39,8 +39,9 @@ PetscErrorCode SbContactOptions_Collision(SbEffect e, const SbScope *scope, cons
   c->response = o->response;
   c->friction = o->friction;
   if (c->response == BARRIER) {
-    const SbBarrierScene scene = {.on = &c->on, .self = c->self, .friction = c->friction.mu};
+    SbBarrierScene scene = {.on = &c->on, .self = c->self, .friction = c->friction.mu};
 
+    PetscCall(SbOptionBool(scope, "pairs", &scene.pairs));
     PetscCall(SbBarrierCreate(e, scope, &scene));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
@@ -129,6 +130,7 @@ static PetscErrorCode setup_collision(SbEffect e, SbSpace space)
   Collision *c = (Collision *)e->data;
   SbFacet *facet;
   PetscInt n, nskin;
+  PetscBool *takes_part;
 
   PetscFunctionBeginUser;
   PetscCall(SbEffectFacets(space, &c->on, &n, &facet));
@@ -143,7 +145,10 @@ static PetscErrorCode setup_collision(SbEffect e, SbSpace space)
              "The effect %s has only one body to examine: give -effect_%s_self yes for a body that may meet "
              "itself, or more sets with -effect_%s_on",
              e->name, e->name, e->name);
-  PetscCall(SbPairsSetUp(e, space->mesh));
+  PetscCall(PetscMalloc1(space->mesh->nbody, &takes_part));
+  for (PetscInt b = 0; b < space->mesh->nbody; b++) takes_part[b] = (PetscBool)(c->edge[b] > 0);
+  PetscCall(SbPairsSetUp(e, space->mesh, takes_part, c->self, &c->pairs));
+  PetscCall(PetscFree(takes_part));
   PetscCall(PetscMalloc1(3 * space->nnode, &c->u0));
   if (c->bounce.e > 0) PetscCall(PetscMalloc1(3 * space->nnode, &c->flight));
   PetscCheck(c->damping <= 0 || e->dynamic, space->comm, PETSC_ERR_USER_INPUT,
@@ -427,7 +432,7 @@ static PetscErrorCode history_collision(SbEffect e, SbSpace space, const SbStage
   }
   values[5] = c->work;
   values[6] = c->friction.loss;
-  SbPairsHistory(c, space, values);
+  SbCollisionPairsHistory(c, space, values);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -46,16 +46,6 @@ typedef struct {
   SbFrictionState grip;       /* friction */
 } Hit;
 
-/* Columns of the history for each pair of bodies (collision_pairs.c). */
-typedef struct {
-  PetscBool wanted;
-  PetscInt fixed, nskin;         /* columns of the effect before them; bodies that have a surface here */
-  PetscInt *slot;                /* [nbody] number among these bodies, or -1 */
-  PetscInt *place;               /* [nskin][nskin] first column of a pair, the lower body first */
-  const char **column;           /* [ncolumn] all of the effect */
-  char (*text)[3 * SB_NAME_MAX]; /* names of the columns behind the fixed ones */
-} SbPairs;
-
 typedef struct {
   SbEffectOn on;
   SbContactSurface surface;
@@ -194,11 +184,8 @@ PetscErrorCode SbEffectLoad_Collision(SbEffect e, SbSpace space, PetscReal t, co
 PetscErrorCode SbEffectRename_Collision(SbEffect e, PetscInt nnode, const PetscInt from[],
                                         const PetscInt to[], PetscInt *n, PetscReal records[]);
 
-/* collision_pairs.c: names the columns, when they are wanted, behind those of e. Not collective. */
-PetscErrorCode SbPairsSetUp(SbEffect e, SbMesh mesh);
-/* values += this rank's part of these columns; values are those of the whole effect. Not collective. */
-void SbPairsHistory(const Collision *c, SbSpace space, PetscReal values[]);
-PetscErrorCode SbPairsFree(SbPairs *pairs);
+/* collision_pairs.c: values += this rank's part of the columns of pairs. Not collective. */
+void SbCollisionPairsHistory(const Collision *c, SbSpace space, PetscReal values[]);
 /* Operation of the effect (sbeffect.h). */
 PetscErrorCode SbEffectContactPoints_Collision(SbEffect e, SbSpace space, const SbStage *stage,
                                                const PetscReal residual[], SbContactPoints *list);

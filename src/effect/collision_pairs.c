@@ -37,30 +37,9 @@ static PetscBool force_of(SbSpace space, const Hit *hit, PetscReal normal[3], Pe
 
 /* ------------------------------------------------------------------ history */
 
-/* Bodies with a surface here; how many pairs they make. */
-static PetscErrorCode find_pairs(SbEffect e, SbMesh mesh, PetscInt *npair)
-{
-  Collision *c = (Collision *)e->data;
-  SbPairs *p = &c->pairs;
-  PetscInt64 n;
-
-  PetscFunctionBeginUser;
-  PetscCall(PetscMalloc1(mesh->nbody, &p->slot));
-  for (PetscInt b = 0; b < mesh->nbody; b++) p->slot[b] = c->edge[b] > 0 ? p->nskin++ : -1;
-  n = (PetscInt64)p->nskin * (p->nskin - 1) / 2 + (c->self ? p->nskin : 0);
-  PetscCheck(n <= PAIRS, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
-             "-effect_%s_pairs yes: the %" PetscInt_FMT " bodies of -effect_%s_on make %" PetscInt64_FMT
-             " pairs, more than the %d that history.csv may have columns for: name fewer sets, or use "
-             "-output_contacts yes",
-             e->name, p->nskin, e->name, n, PAIRS);
-  *npair = (PetscInt)n;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* The columns of two bodies, or of one with itself, behind the n that there are. */
-static PetscErrorCode name_columns(SbEffect e, const char a[], const char b[], PetscInt *n)
+static PetscErrorCode name_columns(SbEffect e, SbPairs *p, const char a[], const char b[], PetscInt *n)
 {
-  SbPairs *p = &((Collision *)e->data)->pairs;
   const PetscBool apart = (PetscBool)(a != b);
 
   PetscFunctionBeginUser;
@@ -78,25 +57,31 @@ static PetscErrorCode name_columns(SbEffect e, const char a[], const char b[], P
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbPairsSetUp(SbEffect e, SbMesh mesh)
+PetscErrorCode SbPairsSetUp(SbEffect e, SbMesh mesh, const PetscBool takes_part[], PetscBool self, SbPairs *p)
 {
-  Collision *c = (Collision *)e->data;
-  SbPairs *p = &c->pairs;
-  PetscInt npair, n;
+  PetscInt64 npair;
+  PetscInt n;
 
   PetscFunctionBeginUser;
   if (!p->wanted) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(find_pairs(e, mesh, &npair));
+  PetscCall(PetscMalloc1(mesh->nbody, &p->slot));
+  for (PetscInt b = 0; b < mesh->nbody; b++) p->slot[b] = takes_part[b] ? p->nskin++ : -1;
+  npair = (PetscInt64)p->nskin * (p->nskin - 1) / 2 + (self ? p->nskin : 0);
+  PetscCheck(npair <= PAIRS, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
+             "-effect_%s_pairs yes: the %" PetscInt_FMT " bodies of -effect_%s_on make %" PetscInt64_FMT
+             " pairs, more than the %d that history.csv may have columns for: name fewer sets, or use "
+             "-output_contacts yes",
+             e->name, p->nskin, e->name, npair, PAIRS);
   n = p->fixed = e->ncolumn;
-  PetscCall(PetscMalloc1(n + APART * npair, &p->column));
+  PetscCall(PetscMalloc1(n + APART * (PetscInt)npair, &p->column));
   PetscCall(PetscMalloc1(APART * npair, &p->text));
   PetscCall(PetscMalloc1(p->nskin * p->nskin, &p->place));
   PetscCall(PetscArraycpy(p->column, e->column, n));
   for (PetscInt a = 0; a < mesh->nbody; a++) {
     for (PetscInt b = a; b < mesh->nbody; b++) {
-      if (p->slot[a] < 0 || p->slot[b] < 0 || (a == b && !c->self)) continue;
+      if (p->slot[a] < 0 || p->slot[b] < 0 || (a == b && !self)) continue;
       p->place[p->nskin * p->slot[a] + p->slot[b]] = n;
-      PetscCall(name_columns(e, mesh->body[a].name, mesh->body[b].name, &n));
+      PetscCall(name_columns(e, p, mesh->body[a].name, mesh->body[b].name, &n));
     }
   }
   e->column = p->column;
@@ -104,26 +89,32 @@ PetscErrorCode SbPairsSetUp(SbEffect e, SbMesh mesh)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-void SbPairsHistory(const Collision *c, SbSpace space, PetscReal values[])
+void SbPairsAdd(const SbPairs *p, PetscInt first, PetscInt second, PetscReal normal_force,
+                const PetscReal force[3], PetscReal values[])
 {
-  const SbPairs *p = &c->pairs;
+  const PetscInt low = PetscMin(first, second), high = PetscMax(first, second);
+  PetscReal *at;
 
   if (!p->wanted) return;
-  for (PetscInt i = 0; i < c->nhit; i++) {
-    const Hit *hit = &c->hit[i];
-    const PetscInt mine = SbCollisionFirst(c, hit), low = PetscMin(mine, hit->body),
-                   high = PetscMax(mine, hit->body);
-    PetscReal *at = values + p->place[p->nskin * p->slot[low] + p->slot[high]], normal[3], force[3];
-    const PetscBool counts = (PetscBool)(hit->on && SbCollisionForce(c, hit) > 0);
+  at = values + p->place[p->nskin * p->slot[low] + p->slot[high]];
+  if (low == high) {
+    at[0] += normal_force;
+    at[1] += normal_force > 0.;
+    return;
+  }
+  for (int k = 0; k < 3; k++) at[k] += first == high ? force[k] : -force[k];
+  at[3] += normal_force > 0.;
+}
 
-    if (low == high) {
-      at[0] += counts ? SbCollisionForce(c, hit) : 0;
-      at[1] += counts;
-      continue;
-    }
-    at[3] += counts;
-    if (!force_of(space, hit, normal, force)) continue;
-    for (int k = 0; k < 3; k++) at[k] += mine == high ? force[k] : -force[k];
+void SbCollisionPairsHistory(const Collision *c, SbSpace space, PetscReal values[])
+{
+  for (PetscInt i = 0; c->pairs.wanted && i < c->nhit; i++) {
+    const Hit *hit = &c->hit[i];
+    PetscReal normal[3], force[3];
+
+    (void)force_of(space, hit, normal, force);
+    SbPairsAdd(&c->pairs, SbCollisionFirst(c, hit), hit->body,
+               hit->on ? PetscMax(0., SbCollisionForce(c, hit)) : 0., force, values);
   }
 }
 

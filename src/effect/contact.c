@@ -34,7 +34,8 @@ static const SbOption rows[] = {
    "penalty: springs; barrier: an "
    "energy that never lets surfaces touch"},
   {"barrier_width", SB_OPTION_REAL, 1, "m", "0", "[0, inf)",
-   "response barrier: gap below which surfaces push each other; 0: a thousandth of the smallest body, at "
+   "response barrier: gap below which surfaces push each other; 0: 0.0017 of the edge of a cube with the "
+   "volume of the smallest body, at "
    "most half of its shortest edge"},
   {"barrier_pressure", SB_OPTION_REAL, 1, "Pa", "0", "[0, inf)",
    "response barrier: scale of the pressure; 0: a tenth of Young's modulus of the softer side"},

@@ -79,3 +79,28 @@ PetscErrorCode SbModelGuardHessian(SbModel m, Vec U, PetscBool clamp, SbBlocks *
   PetscCall(SbSpaceRestoreLocalRead(m->space, U, &u));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
+
+PetscErrorCode SbModelGuardWork(SbModel m, Vec U, PetscReal *work, Vec F)
+{
+  const PetscReal *u;
+  PetscReal *f, unused;
+  PetscScalar *out;
+
+  PetscFunctionBeginUser;
+  *work = 0.;
+  PetscCall(PetscCalloc1(3 * m->space->nnode, &f));
+  PetscCall(SbSpaceGetLocalRead(m->space, U, &u));
+  for (PetscInt e = 0; e < m->npotential; e++) {
+    PetscReal mine;
+
+    SbEffectCall(m->potential[e], potential, m->space, u, &unused, f);
+    SbEffectCall(m->potential[e], work, &mine);
+    *work += mine;
+  }
+  PetscCall(SbSpaceRestoreLocalRead(m->space, U, &u));
+  PetscCall(VecGetArray(F, &out));
+  for (PetscInt i = 0; i < 3 * m->space->nnode_owned; i++) out[i] += f[i];
+  PetscCall(VecRestoreArray(F, &out));
+  PetscCall(PetscFree(f));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

@@ -1,7 +1,8 @@
 /*
   The account of energies. With R the residual without constraints (the reaction on prescribed unknowns) and f the loads, a step from 0 to 1
   does the work (f0 + f1)/2 . (u1 - u0) by the loads (exact for constant loads: minus the change of their potential),
-  (R0 + R1)/2 . (u1 - u0) by moving supports, and loses (p0 + p1)/2 h with p = v . C v to damping. What is missing then
+  (R0 + R1)/2 . (u1 - u0) by moving supports, and loses (p0 + p1)/2 h with p = v . C v to damping. What contact by barrier does it
+  knows itself (src/effect/barrier.c): the energy of its gaps may change by much within a step. What is missing then
   between start and now was taken (or, negative, given) by the integrator.
 */
 #include "time_impl.h"
@@ -73,7 +74,7 @@ PetscErrorCode SbRunAccount(SbRun run, PetscReal t, PetscReal dt, PetscBool firs
 {
   SbModel m = run->model;
   SbEnergies *e = &run->energies;
-  PetscReal sums[2] = {0., 0.}, power = 0.;
+  PetscReal sums[2] = {0., 0.}, power = 0., contact = 0.;
   Vec loads, reaction;
 
   PetscFunctionBeginUser;
@@ -81,10 +82,12 @@ PetscErrorCode SbRunAccount(SbRun run, PetscReal t, PetscReal dt, PetscBool firs
   PetscCall(VecDuplicate(run->U, &loads));
   PetscCall(VecDuplicate(run->U, &reaction));
   PetscCall(SbModelLoads(m, t, run->U, run->V, loads));
+  if (m->npotential) PetscCall(SbModelGuardWork(m, run->U, &contact, loads));
   PetscCall(SbRunReactions(run, t, reaction));
   if (run->damped) PetscCall(SbModelDampingPower(m, run->U, run->V, &power));
   if (!first) {
     PetscCall(works(run, loads, reaction, sums));
+    sums[0] += 2. * contact;
     PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, sums, 2, MPIU_REAL, MPI_SUM, m->comm));
     e->load_work += 0.5 * sums[0];
     e->prescribed_work += 0.5 * sums[1];

@@ -1,0 +1,96 @@
+/*
+  barrier_impl.h - the response `barrier`: what barrier.c and barrier_output.c share.
+*/
+#pragma once
+#include "barrier.h"
+
+/* A pair below its width, at the places that the effect knows. */
+typedef struct {
+  PetscInt pair;
+  PetscReal gap; /* m */
+  SbDistance at;
+} Active;
+
+/* A pair that friction acts on in this step. */
+typedef struct {
+  SbContactPair pair;
+  PetscReal weight[4], n[3], force; /* mu N, N */
+  PetscReal carry
+    [3]; /* by which the obstacle's point there moves on in the step beyond its vertices: rotation, m; with the sign of its weights */
+} Rub;
+
+typedef struct {
+  SbBarrierScene scene;
+  void *data; /* of the type */
+  PetscErrorCode (*destroy)(SbEffect e);
+  SbContactMesh mesh;
+  SbContactPairs pairs;
+  PetscReal width, pressure; /* as given; 0: by body */
+  PetscReal *w, *k;          /* [nbody+1] of each body, m, Pa; the obstacle's: none smaller */
+  PetscBool verify, begun;
+  PetscReal *x, *u;        /* [nvertex][3] places, m; [nnode_owned][3] displacement that they belong to */
+  PetscReal *start;        /* [nvertex][3] when the step began */
+  PetscReal *from, *to;    /* [obstacle's vertices][3] at the start and the end of the step */
+  PetscReal progress, now; /* how far on that way it is; at which x was made */
+  PetscReal *other;        /* [nvertex][3] where a motion leads */
+  PetscBool known;         /* x and active are up to date for u and progress */
+  PetscInt nactive, size;
+  Active *active;
+  PetscInt nrub, rub_size;
+  Rub *rub;
+  PetscReal slip;            /* e of friction, m */
+  PetscReal least, shortest; /* smallest gap and shortest safe part of the run */
+  PetscInt most;             /* pairs */
+  SbPairs columns;
+  PetscReal energy; /* of the gaps, when the step began, then when it ended, J; this rank's, as all below */
+  PetscReal obstacle_power; /* by the obstacle over its way in this step with the forces at its start, J */
+  PetscReal step_work;      /* on the bodies in the last step, J */
+  PetscReal work, friction_loss; /* since the start, J */
+} Barrier;
+
+static inline PetscReal width_of(const Barrier *b, const SbContactPair *pair)
+{
+  const PetscInt *part = b->mesh->part;
+
+  return PetscMin(b->w[part[pair->v[0]]], b->w[part[pair->v[pair->side ? 1 : 2]]]);
+}
+
+static inline PetscReal pressure_of(const Barrier *b, const SbContactPair *pair)
+{
+  const PetscInt *part = b->mesh->part;
+
+  return PetscMin(b->k[part[pair->v[0]]], b->k[part[pair->v[pair->side ? 1 : 2]]]);
+}
+
+/* Whether this rank counts the pair. */
+static inline PetscBool counts(const Barrier *b, const SbContactPair *pair)
+{
+  return (PetscBool)b->mesh->own[pair->v[pair->v[0] < b->mesh->nbody_vertex ? 0 : 1]];
+}
+
+/* The places at the local displacements u, and the pairs below their width, in the order of their numbers. Collective. */
+PetscErrorCode SbBarrierLook(Barrier *b, const PetscReal u[]);
+/* Normal force of a pair, N, its energy, J, and the gradient of that by the pair's vertices, N. */
+PetscReal SbBarrierPush(const Barrier *b, const Active *a, PetscReal *energy, PetscReal gradient[12]);
+/* Tangential slip u of a pair since the step began, m; its length. */
+PetscReal SbBarrierSlip(const Barrier *b, const Rub *rub, PetscReal u[3]);
+/* f0'/y of the slip y, 1/m. */
+static inline PetscReal SbBarrierSlope(const Barrier *b, PetscReal y)
+{
+  return y < b->slip ? 2. / b->slip - y / PetscSqr(b->slip) : 1. / y;
+}
+/* Energy of friction, J, its gradient by the pair's vertices, N. */
+PetscReal SbBarrierRub(const Barrier *b, const Rub *rub, PetscReal gradient[12]);
+/* f += sign times the gradient of all energies at the places known, N; their sum over the pairs that this rank counts, J. */
+PetscReal SbBarrierGradient(const Barrier *b, PetscReal sign, PetscReal f[]);
+
+/* Operations of the effect (sbeffect.h). */
+PetscErrorCode SbEffectContactForce_Barrier(SbEffect e, SbSpace s, const SbStage *stage, const PetscReal r[],
+                                            PetscReal f[]);
+PetscErrorCode SbEffectHistory_Barrier(SbEffect e, SbSpace s, const SbStage *stage, const PetscReal r[],
+                                       PetscReal values[]);
+PetscErrorCode SbEffectContactPoints_Barrier(SbEffect e, SbSpace s, const SbStage *stage, const PetscReal r[],
+                                             SbContactPoints *list);
+PetscErrorCode SbEffectGap_Barrier(SbEffect e, SbSpace s, const SbStage *stage, PetscReal gap[],
+                                   PetscReal normal[]);
+PetscErrorCode SbEffectSummary_Barrier(SbEffect e, SbSpace s, size_t size, char text[]);

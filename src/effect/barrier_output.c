@@ -1,0 +1,215 @@
+/*
+  barrier_output.c - what the response `barrier` says of itself: forces, points, gaps, history, summary.
+*/
+#include "barrier_impl.h"
+
+PetscErrorCode SbEffectContactForce_Barrier(SbEffect e, SbSpace s, const SbStage *stage, const PetscReal r[],
+                                            PetscReal f[])
+{
+  Barrier *b = (Barrier *)e->data;
+
+  PetscFunctionBeginUser;
+  (void)s;
+  (void)r;
+  if (!b->begun) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(SbBarrierLook(b, stage->u));
+  (void)SbBarrierGradient(b, -1., f);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* values += force and torque of the obstacle on the bodies, by the gradient of a pair's energy. */
+static void add_force(const Barrier *b, const SbPose *pose, const SbContactPair *pair,
+                      const PetscReal gradient[12], PetscReal values[6])
+{
+  for (int k = 0; k < (pair->side ? 1 : 4); k++) {
+    PetscReal arm[3], moment[3];
+
+    if (pair->v[k] >= b->mesh->nbody_vertex) continue;
+    for (int j = 0; j < 3; j++) arm[j] = b->x[3 * pair->v[k] + j] - b->scene.centre[j] - pose->d[j];
+    SbCross(arm, gradient + 3 * k, moment);
+    for (int j = 0; j < 3; j++) {
+      values[j] -= gradient[3 * k + j];
+      values[3 + j] -= moment[j];
+    }
+  }
+}
+
+/* The bodies of a pair, and the force on the first one by the gradient of its energy, N. */
+static void force_between(const Barrier *b, const SbContactPair *pair, const PetscReal gradient[12],
+                          PetscInt body[2], PetscReal force[3])
+{
+  const int split = pair->kind == SB_PAIR_EDGE_EDGE ? 2 : 1;
+
+  body[0] = b->mesh->part[pair->v[0]];
+  body[1] = b->mesh->part[pair->v[2]];
+  for (int j = 0; j < 3; j++) {
+    force[j] = 0.;
+    for (int k = 0; k < split; k++) force[j] -= gradient[3 * k + j];
+  }
+}
+
+PetscErrorCode SbEffectHistory_Barrier(SbEffect e, SbSpace s, const SbStage *stage, const PetscReal r[],
+                                       PetscReal values[])
+{
+  Barrier *b = (Barrier *)e->data;
+  PetscReal least = PETSC_MAX_REAL, gradient[12], energy, force[3], *v = values;
+  PetscInt body[2];
+  PetscMPIInt rank;
+  SbPose pose;
+
+  PetscFunctionBeginUser;
+  (void)r;
+  PetscCall(PetscArrayzero(values, e->ncolumn));
+  if (!b->begun) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(SbBarrierLook(b, stage->u));
+  for (PetscInt i = 0; i < b->nactive; i++) least = PetscMin(least, b->active[i].gap);
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &least, 1, MPIU_REAL, MPI_MIN, s->comm));
+  if (least == PETSC_MAX_REAL) least = 0.;
+  PetscCallMPI(MPI_Comm_rank(s->comm, &rank));
+
+  /* an obstacle: force, torque, contacts, penetration, gap, energy, friction_loss */
+  if (b->scene.obstacle) {
+    (*b->scene.pose)(b->data, stage->t, &pose);
+    for (PetscInt i = 0; i < b->nactive; i++) {
+      const SbContactPair *pair = &b->pairs->pair[b->active[i].pair];
+
+      if (!counts(b, pair)) continue;
+      (void)SbBarrierPush(b, &b->active[i], &energy, gradient);
+      add_force(b, &pose, pair, gradient, v);
+      v[6]++;
+      v[9] += energy;
+    }
+    for (PetscInt i = 0; i < b->nrub; i++) {
+      if (!counts(b, &b->rub[i].pair)) continue;
+      (void)SbBarrierRub(b, &b->rub[i], gradient);
+      add_force(b, &pose, &b->rub[i].pair, gradient, v);
+    }
+    if (!rank) v[8] = least;
+    v[10] = b->friction_loss;
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+
+  /* bodies: contacts, penetration, its mean, normal force, friction force, work, friction_loss, gap, energy, pairs */
+  for (PetscInt i = 0; i < b->nactive; i++) {
+    const SbContactPair *pair = &b->pairs->pair[b->active[i].pair];
+    PetscReal normal;
+
+    if (!counts(b, pair)) continue;
+    normal = SbBarrierPush(b, &b->active[i], &energy, gradient);
+    v[0]++;
+    v[3] += normal;
+    v[8] += energy;
+    force_between(b, pair, gradient, body, force);
+    SbPairsAdd(&b->columns, body[0], body[1], normal, force, values);
+  }
+  for (PetscInt i = 0; i < b->nrub; i++) {
+    if (!counts(b, &b->rub[i].pair)) continue;
+    (void)SbBarrierRub(b, &b->rub[i], gradient);
+    force_between(b, &b->rub[i].pair, gradient, body, force);
+    v[4] += PetscSqrtReal(SbDot3(force, force));
+    SbPairsAdd(&b->columns, body[0], body[1], 0., force, values);
+  }
+  v[5] = b->work;
+  v[6] = b->friction_loss;
+  if (!rank) v[7] = least;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbEffectContactPoints_Barrier(SbEffect e, SbSpace s, const SbStage *stage, const PetscReal r[],
+                                             SbContactPoints *list)
+{
+  Barrier *b = (Barrier *)e->data;
+  const SbContactMesh m = b->mesh;
+
+  PetscFunctionBeginUser;
+  (void)r;
+  if (!b->begun) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(SbBarrierLook(b, stage->u));
+  for (PetscInt i = 0; i < b->nactive; i++) {
+    const Active *a = &b->active[i];
+    const SbContactPair *pair = &b->pairs->pair[a->pair];
+    const int split = pair->kind == SB_PAIR_EDGE_EDGE && !pair->side ? 2 : 1;
+    const PetscInt first = m->part[pair->v[0]], second = m->part[pair->v[pair->side ? 1 : 2]];
+    const PetscBool turned = (PetscBool)(first == s->mesh->nbody);
+    SbContactPoint p = {.gap = a->gap};
+    PetscReal energy, gradient[12], force;
+
+    if (!counts(b, pair)) continue;
+    force = SbBarrierPush(b, a, &energy, gradient);
+    for (int k = 0; k < 3; k++) p.id[k] = pair->v[k];
+    p.body[0] = turned ? second : first;
+    p.body[1] = turned ? -1 : second == s->mesh->nbody ? -1 : second;
+    for (int k = 0; k < 4; k++) {
+      for (int j = 0; j < 3 && (turned ? k >= split : k < split); j++)
+        p.x[j] += PetscAbsReal(a->at.weight[k]) * b->x[3 * pair->v[k] + j];
+    }
+    for (int j = 0; j < 3; j++) {
+      p.normal[j] = turned ? -a->at.n[j] : a->at.n[j];
+      p.force[j] = force * p.normal[j];
+    }
+
+    /* what friction does there */
+    for (PetscInt k = 0; k < b->nrub; k++) {
+      const Rub *rub = &b->rub[k];
+      PetscReal u[3], slope;
+      PetscBool same;
+
+      PetscCall(PetscArraycmp(rub->pair.v, pair->v, 4, &same));
+      if (!same || rub->pair.kind != pair->kind || rub->pair.side != pair->side) continue;
+      slope = SbBarrierSlope(b, SbBarrierSlip(b, rub, u));
+      for (int j = 0; j < 3; j++) p.force[j] -= (turned ? -1. : 1.) * rub->force * slope * u[j];
+      break;
+    }
+    PetscCall(SbContactPointsAdd(list, &p));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbEffectGap_Barrier(SbEffect e, SbSpace s, const SbStage *stage, PetscReal gap[],
+                                   PetscReal normal[])
+{
+  Barrier *b = (Barrier *)e->data;
+  const SbContactMesh m = b->mesh;
+
+  PetscFunctionBeginUser;
+  if (!b->begun) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(SbBarrierLook(b, stage->u));
+  for (PetscInt i = 0; i < b->nactive; i++) {
+    const Active *a = &b->active[i];
+    const SbContactPair *pair = &b->pairs->pair[a->pair];
+
+    for (int k = 0; k < (pair->side ? 1 : 4); k++) {
+      const PetscInt v = pair->v[k];
+
+      if (v >= m->nbody_vertex || a->at.weight[k] == 0.) continue;
+      for (PetscInt j = m->start[v]; j < m->start[v + 1]; j++) {
+        const PetscInt node = m->node[j];
+
+        if (node < 0 || node >= s->nnode_owned || a->gap >= gap[node]) continue;
+        gap[node] = a->gap;
+        for (int i3 = 0; i3 < 3; i3++)
+          normal[3 * node + i3] = (a->at.weight[k] > 0. ? 1. : -1.) * a->at.n[i3];
+      }
+    }
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbEffectSummary_Barrier(SbEffect e, SbSpace s, size_t size, char text[])
+{
+  Barrier *b = (Barrier *)e->data;
+  PetscReal value[2] = {b->least, b->shortest};
+  PetscInt most = b->most;
+
+  PetscFunctionBeginUser;
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, value, 2, MPIU_REAL, MPI_MIN, s->comm));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &most, 1, MPIU_INT, MPI_MAX, s->comm));
+  if (most)
+    (void)snprintf(text, size,
+                   "%" PetscInt_FMT " pairs at most on a rank, smallest gap %.3g m of a width of %.3g m, "
+                   "shortest safe part of an iteration %.2g",
+                   most, (double)value[0], (double)b->w[0], (double)value[1]);
+  else
+    (void)snprintf(text, size, "nothing came nearer than %.3g m", (double)b->w[0]);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
