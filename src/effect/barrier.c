@@ -80,235 +80,6 @@ static PetscErrorCode setup_barrier(SbEffect e, SbSpace s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* ------------------------------------------------------------------ where things are */
-
-/* Places of the obstacle's vertices after the part `progress` of its way. */
-static void place_obstacle(const Barrier *b, PetscReal progress, PetscReal x[])
-{
-  const PetscInt first = 3 * b->mesh->nbody_vertex;
-
-  for (PetscInt k = first; k < 3 * b->mesh->nvertex; k++)
-    x[k] = progress == 1. ? b->to[k - first]
-                          : b->from[k - first] + progress * (b->to[k - first] - b->from[k - first]);
-}
-
-static int compare_active(const void *x, const void *y, void *ctx)
-{
-  const SbContactPair *pair = ((const Barrier *)ctx)->pairs->pair, *p = &pair[((const Active *)x)->pair],
-                      *q = &pair[((const Active *)y)->pair];
-
-  if (p->side != q->side) return p->side ? 1 : -1;
-  if (p->kind != q->kind) return p->kind < q->kind ? -1 : 1;
-  for (int k = 0; k < 4; k++) {
-    if (p->v[k] != q->v[k]) return p->v[k] < q->v[k] ? -1 : 1;
-  }
-  return 0;
-}
-
-/* The places at the local displacements u, and the pairs below their width, in the order of their numbers. Collective. */
-PetscErrorCode SbBarrierLook(Barrier *b, const PetscReal u[])
-{
-  const PetscInt n = 3 * b->mesh->space->nnode_owned;
-  PetscBool same;
-
-  PetscFunctionBeginUser;
-  PetscCall(PetscArraycmp(u, b->u, b->known ? n : 0, &same));
-  same = (PetscBool)(b->known && same && b->now == b->progress);
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &same, 1, SB_MPI_BOOL, MPI_LAND, b->mesh->space->comm));
-  if (same) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(PetscArraycpy(b->u, u, n));
-  b->now = b->progress;
-  b->known = PETSC_TRUE;
-  PetscCall(SbContactMeshMove(b->mesh, u, NULL, b->x));
-  place_obstacle(b, b->progress, b->x);
-  PetscCall(SbContactPairsFind(b->pairs, b->x, b->x));
-  b->nactive = 0;
-  for (PetscInt i = 0; i < b->pairs->n; i++) {
-    Active a = {.pair = i};
-
-    if (SbContactPairApart(b->mesh, &b->pairs->pair[i], b->x, b->x, b->w[0])) continue;
-    a.gap = SbContactPairGap(b->mesh, &b->pairs->pair[i], b->x, &a.at);
-    if (a.gap >= width_of(b, &b->pairs->pair[i])) continue;
-    if (b->nactive == b->size) {
-      b->size = PetscMax(64, 2 * b->size);
-      PetscCall(PetscRealloc((size_t)b->size * sizeof(*b->active), &b->active));
-    }
-    b->active[b->nactive++] = a;
-  }
-  if (b->nactive > 1) PetscCall(PetscTimSort(b->nactive, b->active, sizeof(*b->active), compare_active, b));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* ------------------------------------------------------------------ forces */
-
-/* The tangential slip of a pair since the step began, m. */
-PetscReal SbBarrierSlip(const Barrier *b, const Rub *rub, PetscReal u[3])
-{
-  PetscReal normal = 0.;
-
-  for (int i = 0; i < 3; i++) {
-    u[i] = -b->progress * rub->carry[i];
-    for (int k = 0; k < 4; k++)
-      u[i] += rub->weight[k] * (b->x[3 * rub->pair.v[k] + i] - b->start[3 * rub->pair.v[k] + i]);
-    normal += u[i] * rub->n[i];
-  }
-  for (int i = 0; i < 3; i++) u[i] -= normal * rub->n[i];
-  return PetscSqrtReal(SbDot3(u, u));
-}
-
-/* Energy of friction, J, its gradient by the pair's vertices, N. */
-PetscReal SbBarrierRub(const Barrier *b, const Rub *rub, PetscReal gradient[12])
-{
-  PetscReal u[3];
-  const PetscReal y = SbBarrierSlip(b, rub, u), e = b->slip, slope = SbBarrierSlope(b, y);
-
-  for (int k = 0; k < 12; k++) gradient[k] = rub->force * slope * rub->weight[k / 3] * u[k % 3];
-  return rub->force * (y < e ? y * y / e - y * y * y / (3. * e * e) + e / 3. : y);
-}
-
-PetscReal SbBarrierPush(const Barrier *b, const Active *a, PetscReal *energy, PetscReal gradient[12])
-{
-  const SbContactPair *pair = &b->pairs->pair[a->pair];
-  PetscReal force = 0., w2 = 0.;
-
-  SbBarrierPair(b->mesh, pair, a->gap, &a->at, b->x, width_of(b, pair), pressure_of(b, pair), energy,
-                gradient, PETSC_FALSE, NULL);
-  for (int k = 0; k < 4; k++) {
-    force -= a->at.weight[k] * SbDot3(gradient + 3 * k, a->at.n);
-    w2 += PetscSqr(a->at.weight[k]);
-  }
-  return PetscMax(0., force / w2);
-}
-
-/* f += sign times the force with which each of the pair's vertices pushes its owned nodes. */
-static void spread(const Barrier *b, const SbContactPair *pair, PetscReal sign, const PetscReal gradient[12],
-                   PetscReal f[])
-{
-  const SbContactMesh m = b->mesh;
-
-  for (int k = 0; k < (pair->side ? 1 : 4); k++) {
-    const PetscInt v = pair->v[k];
-
-    if (v >= m->nbody_vertex) continue;
-    for (PetscInt j = m->start[v]; j < m->start[v + 1]; j++) {
-      if (m->node[j] < 0 || m->node[j] >= m->space->nnode_owned) continue;
-      for (int i = 0; i < 3; i++) f[3 * m->node[j] + i] += sign * m->weight[j] * gradient[3 * k + i];
-    }
-  }
-}
-
-/* f += sign times the gradient of all energies at the places known, N; their sum over the pairs that this rank counts, J. */
-PetscReal SbBarrierGradient(const Barrier *b, PetscReal sign, PetscReal f[])
-{
-  PetscReal sum = 0., energy, gradient[12];
-
-  for (PetscInt i = 0; i < b->nactive; i++) {
-    const Active *a = &b->active[i];
-    const SbContactPair *pair = &b->pairs->pair[a->pair];
-
-    (void)SbBarrierPush(b, a, &energy, gradient);
-    spread(b, pair, sign, gradient, f);
-    if (counts(b, pair)) sum += energy;
-  }
-  for (PetscInt i = 0; i < b->nrub; i++) {
-    energy = SbBarrierRub(b, &b->rub[i], gradient);
-    spread(b, &b->rub[i].pair, sign, gradient, f);
-    if (counts(b, &b->rub[i].pair)) sum += energy;
-  }
-  return sum;
-}
-
-static PetscErrorCode force_barrier(SbEffect e, SbSpace s, const SbStage *stage, PetscReal f[])
-{
-  Barrier *b = (Barrier *)e->data;
-
-  PetscFunctionBeginUser;
-  (void)s;
-  if (!b->begun) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(SbBarrierLook(b, stage->u));
-  (void)SbBarrierGradient(b, -1., f);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode potential_barrier(SbEffect e, SbSpace s, const PetscReal u[], PetscReal *energy,
-                                        PetscReal f[])
-{
-  Barrier *b = (Barrier *)e->data;
-
-  PetscFunctionBeginUser;
-  (void)s;
-  *energy = 0.;
-  if (!b->begun) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(SbBarrierLook(b, u));
-  *energy = SbBarrierGradient(b, 1., f);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* blocks += H of a pair between owned nodes and all nodes of its vertices; none at prescribed unknowns. */
-static PetscErrorCode spread_blocks(const Barrier *b, const SbContactPair *pair, const PetscReal H[144],
-                                    SbBlocks *blocks)
-{
-  const SbContactMesh m = b->mesh;
-  const int n = pair->side ? 1 : 4;
-
-  PetscFunctionBeginUser;
-  for (int p = 0; p < n; p++) {
-    if (pair->v[p] >= m->nbody_vertex || !m->mine[pair->v[p]]) continue;
-    for (PetscInt j = m->start[pair->v[p]]; j < m->start[pair->v[p] + 1]; j++) {
-      if (m->node[j] < 0 || m->node[j] >= m->space->nnode_owned) continue;
-      for (int q = 0; q < n; q++) {
-        if (pair->v[q] >= m->nbody_vertex) continue;
-        for (PetscInt l = m->start[pair->v[q]]; l < m->start[pair->v[q] + 1]; l++) {
-          PetscReal block[9];
-
-          for (int i = 0; i < 9; i++)
-            block[i] = (m->fixed[j] >> (i / 3) & 1) || (m->fixed[l] >> (i % 3) & 1)
-                         ? 0.
-                         : m->weight[j] * m->weight[l] * H[12 * (3 * p + i / 3) + 3 * q + i % 3];
-          PetscCall(SbBlocksAdd(blocks, m->node[j], m->gnode[l], block));
-        }
-      }
-    }
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode hessian_barrier(SbEffect e, SbSpace s, const PetscReal u[], PetscBool clamp,
-                                      SbBlocks *blocks)
-{
-  Barrier *b = (Barrier *)e->data;
-  PetscReal energy, gradient[12], H[144];
-
-  PetscFunctionBeginUser;
-  (void)s;
-  PetscCall(SbBarrierLook(b, u));
-  for (PetscInt i = 0; i < b->nactive; i++) {
-    const Active *a = &b->active[i];
-    const SbContactPair *pair = &b->pairs->pair[a->pair];
-
-    SbBarrierPair(b->mesh, pair, a->gap, &a->at, b->x, width_of(b, pair), pressure_of(b, pair), &energy,
-                  gradient, clamp, H);
-    PetscCall(spread_blocks(b, pair, H, blocks));
-  }
-
-  /* friction: mu N (f0'/u (I - n n - u u/u^2) + f0'' u u/u^2) */
-  for (PetscInt i = 0; i < b->nrub; i++) {
-    const Rub *rub = &b->rub[i];
-    PetscReal d[3], T[9];
-    const PetscReal y = SbBarrierSlip(b, rub, d), w = b->slip, slope = SbBarrierSlope(b, y),
-                    curve = y < w ? 2. / w - 2. * y / (w * w) : 0.;
-
-    for (int k = 0; k < 9; k++) {
-      T[k] = slope * ((k % 4 ? 0. : 1.) - rub->n[k / 3] * rub->n[k % 3]);
-      if (y > 0.) T[k] += (curve - slope) * d[k / 3] * d[k % 3] / (y * y);
-    }
-    for (int k = 0; k < 144; k++)
-      H[k] = rub->force * rub->weight[k / 36] * rub->weight[k % 12 / 3] * T[3 * (k / 12 % 3) + k % 3];
-    PetscCall(spread_blocks(b, &rub->pair, H, blocks));
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* ------------------------------------------------------------------ a step */
 
 /* Unit outward normals of all vertices at rest of the step, by area. */
@@ -351,7 +122,7 @@ static PetscErrorCode part_touching(SbEffect e, SbSpace s, PetscReal u[], PetscB
     PetscInt n = 0;
 
     PetscCall(SbContactMeshMove(m, u, NULL, b->x));
-    place_obstacle(b, 0., b->x);
+    SbBarrierPlaceObstacle(b, 0., b->x);
     PetscCall(vertex_normals(b, b->x, normal));
     PetscCall(SbContactPairsFind(b->pairs, b->x, b->x));
     PetscCall(PetscArrayzero(push, 3 * m->nvertex));
@@ -409,7 +180,7 @@ static PetscErrorCode part_touching(SbEffect e, SbSpace s, PetscReal u[], PetscB
 
   /* surfaces in each other cannot be parted so */
   PetscCall(SbContactMeshMove(m, u, NULL, b->x));
-  place_obstacle(b, 0., b->x);
+  SbBarrierPlaceObstacle(b, 0., b->x);
   PetscCall(SbContactMeshCrossings(m, b->scene.self, b->x, &crossings, where));
   b->known = PETSC_FALSE;
   if (crossings) {
@@ -563,7 +334,7 @@ static PetscErrorCode safe_barrier(SbEffect e, SbSpace s, const PetscReal u0[], 
   nsearch = b->pairs->nsearch;
   *nactive = b->nactive;
   PetscCall(SbContactMeshMove(b->mesh, u1, NULL, b->other));
-  place_obstacle(b, progress, b->other);
+  SbBarrierPlaceObstacle(b, progress, b->other);
   PetscCall(SbContactPairsSafe(b->pairs, b->x, b->other, part, &worst));
   /* pairs that were found for the way are others than those of its start */
   if (b->pairs->nsearch != nsearch) b->known = PETSC_FALSE;
@@ -707,12 +478,12 @@ PetscErrorCode SbBarrierCreate(SbEffect e, const SbScope *scope, const SbBarrier
   e->data = b;
   e->ops = (SbEffectOps){.setfromoptions = e->ops.setfromoptions,
                          .setup = setup_barrier,
-                         .force = force_barrier,
+                         .force = SbEffectForce_Barrier,
                          .begin_guarded = begin_barrier,
                          .safe = safe_barrier,
                          .advance = advance_barrier,
-                         .potential = potential_barrier,
-                         .hessian = hessian_barrier,
+                         .potential = SbEffectPotential_Barrier,
+                         .hessian = SbEffectHessian_Barrier,
                          .accept = accept_barrier,
                          .work = work_barrier,
                          .save = save_barrier,

@@ -1,5 +1,5 @@
 /*
-  barrier_impl.h - the response `barrier`: what barrier.c and barrier_output.c share.
+  barrier_impl.h - the response `barrier`: what barrier.c, barrier_forces.c and barrier_output.c share.
 */
 #pragma once
 #include "barrier.h"
@@ -84,7 +84,15 @@ PetscReal SbBarrierRub(const Barrier *b, const Rub *rub, PetscReal gradient[12])
 /* f += sign times the gradient of all energies at the places known, N; their sum over the pairs that this rank counts, J. */
 PetscReal SbBarrierGradient(const Barrier *b, PetscReal sign, PetscReal f[]);
 
+/* Places of the obstacle's vertices after the part `progress` of its way, into x[nvertex][3]. */
+void SbBarrierPlaceObstacle(const Barrier *b, PetscReal progress, PetscReal x[]);
+
 /* Operations of the effect (sbeffect.h). */
+PetscErrorCode SbEffectForce_Barrier(SbEffect e, SbSpace s, const SbStage *stage, PetscReal f[]);
+PetscErrorCode SbEffectPotential_Barrier(SbEffect e, SbSpace s, const PetscReal u[], PetscReal *energy,
+                                         PetscReal f[]);
+PetscErrorCode SbEffectHessian_Barrier(SbEffect e, SbSpace s, const PetscReal u[], PetscBool clamp,
+                                       SbBlocks *blocks);
 PetscErrorCode SbEffectContactForce_Barrier(SbEffect e, SbSpace s, const SbStage *stage, const PetscReal r[],
                                             PetscReal f[]);
 PetscErrorCode SbEffectHistory_Barrier(SbEffect e, SbSpace s, const SbStage *stage, const PetscReal r[],

@@ -150,7 +150,8 @@ cat >inside.opts <<'END'
 -body_big_translate -0.5,-0.5,-0.5
 -body_small_translate -0.05,-0.05,-0.05
 -effects meet
--effect_meet_type contact -effect_meet_response projected
+-effect_meet_type contact
+-effect_meet_response projected
 -ts_dt 1e-3
 -ts_max_time 1e-3
 END

@@ -25,7 +25,8 @@ cat >bodies.opts <<'END'
 -effect_push_type prescribed_displacement
 -effect_push_on top
 -effect_push_displacement 0.1*t;0;-0.1*t
--effect_meet_type contact -effect_meet_response projected
+-effect_meet_type contact
+-effect_meet_response projected
 -effect_meet_friction 0.1
 -ts_dt 0.01
 -ts_max_time 0.03
