@@ -34,7 +34,7 @@ static inline PetscErrorCode contact_problem_open(PetscInt cells, const char *el
     "-body_high_translate 0.021,0.018,0.06005 -body_low_material linear -body_low_young 1e5 "
     "-body_low_poisson 0.4 -body_low_density 1000 -body_high_material linear -body_high_young 1e5 "
     "-body_high_poisson 0.4 -body_high_density 1000 -body_low_element %s -body_high_element %s "
-    "-effects hold,meet -effect_hold_type fixed -effect_hold_on low.zmin -effect_meet_type collision "
+    "-effects hold,meet -effect_hold_type fixed -effect_hold_on low.zmin -effect_meet_type contact "
     "-effect_meet_response barrier -effect_meet_barrier_width 1e-4 -time euler_implicit -ts_dt %g %s",
     (int)PetscMax(1, cells * 4 / 5), (int)cells, element, element, (double)h, more));
   PetscCall(test_scene_open(text, &p->scene));
@@ -44,7 +44,7 @@ static inline PetscErrorCode contact_problem_open(PetscInt cells, const char *el
   PetscCall(SbSpaceCreateMatrix(s, size == 1 ? SB_MATRIX_SBAIJ : SB_MATRIX_BAIJ, &p->K));
   PetscCall(SbSpaceCreateVec(s, &zero));
   PetscCall(SbModelGuardBegin(p->scene.model, 0., h, zero));
-  PetscCall(SbModelGuardHessian(p->scene.model, zero, &p->blocks));
+  PetscCall(SbModelGuardHessian(p->scene.model, zero, PETSC_TRUE, &p->blocks));
   PetscCall(SbSpaceGetLocalRead(s, zero, &u));
   stage.u = u;
   PetscCall(SbSpaceAssembleTangent(s, &stage, p->K));
