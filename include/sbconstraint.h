@@ -63,7 +63,5 @@ struct _p_SbConstraints {
 
 /* x <- P x. Collective. */
 PetscErrorCode SbConstraintsProject(SbConstraints c, Vec x);
-/* step = (G D F^T)^-1 work, vectors of c->exact. Collective. */
-PetscErrorCode SbConstraintsSolveGram(SbConstraints c);
 /* r <- r - F^T lambda, what constraints cannot take; lambda into c->exact.force, N. Collective. */
 PetscErrorCode SbConstraintsProjectForce(SbConstraints c, Vec r);

@@ -500,7 +500,7 @@ PetscErrorCode SbSpaceAssembleConstraints(SbSpace s)
 }
 
 /* y = (G D F^T)^-1 w, but for SB_CONSTRAINT_REGULARIZATION; every use is repeated with what the first left. */
-PetscErrorCode SbConstraintsSolveGram(SbConstraints c)
+static PetscErrorCode solve_gram(SbConstraints c)
 {
   PetscFunctionBeginUser;
   PetscCall(KSPSolve(c->solver, c->exact.work, c->exact.step));
@@ -513,7 +513,7 @@ PetscErrorCode SbConstraintsProject(SbConstraints c, Vec x)
   for (int pass = 0; c->exact.N && pass < c->passes; pass++) {
     PetscCall(MatMult(c->exact.free, x, c->exact.work));
     PetscCall(VecScale(c->exact.work, -1.));
-    PetscCall(SbConstraintsSolveGram(c));
+    PetscCall(solve_gram(c));
     PetscCall(MatMultAdd(c->DFt, c->exact.step, x, x));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -531,7 +531,7 @@ PetscErrorCode SbConstraintsProjectForce(SbConstraints c, Vec r)
     PetscCall(VecPointwiseMult(c->w[2], c->d, r));
     PetscCall(MatMult(c->exact.free, c->w[2], c->exact.work));
     PetscCall(VecScale(c->exact.work, -1.));
-    PetscCall(SbConstraintsSolveGram(c));
+    PetscCall(solve_gram(c));
     PetscCall(MatMultTransposeAdd(c->exact.push_free, c->exact.step, r, r));
     PetscCall(VecAXPY(c->exact.force, -1., c->exact.step));
   }
@@ -546,7 +546,7 @@ PetscErrorCode SbConstraintsPrescribe(SbSpace s, Vec U)
   for (int pass = 0; c->exact.N && pass < c->passes; pass++) {
     PetscCall(MatMult(c->exact.full, U, c->exact.work));
     PetscCall(VecAYPX(c->exact.work, -1., c->exact.value));
-    PetscCall(SbConstraintsSolveGram(c));
+    PetscCall(solve_gram(c));
     PetscCall(MatMultAdd(c->DFt, c->exact.step, U, U));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
