@@ -10,6 +10,10 @@
 
 typedef struct _p_SbEffect *SbEffect;
 
+/* What Newton's method takes for the second derivative of the energy of contact: itself; the positive part of each pair's; that with parabolas that touch the energy
+   of friction from above in the place of it, which has a kink where a slip turns round. */
+typedef enum { SB_HESSIAN_EXACT, SB_HESSIAN_CLAMPED, SB_HESSIAN_ABOVE } SbContactHessian;
+
 /* A point where something pushes a body. */
 typedef struct {
   PetscInt id[3];      /* numbers that name it among those of its effect, the same for any partition */
@@ -79,7 +83,7 @@ typedef struct {
     safe          - `part` of the way from the local displacements u0 to u1, and from the present progress to `progress`, that can be gone, for the pairs of this
                     rank; nactive: pairs of this rank that push each other at u0.
     potential     - energy at the local displacements u, this rank's part, J; f[nnode][3] += its gradient on owned nodes, N.
-    hessian       - adds the blocks of its second derivative at u, with `clamp` of the positive part of that of each pair.
+    hessian       - adds the blocks of its second derivative at u, or of what stands for it (SbContactHessian).
   */
   PetscErrorCode (*begin_guarded)(SbEffect e, SbSpace space, PetscReal t, PetscReal dt, PetscReal u0[],
                                   PetscBool *moved);
@@ -88,7 +92,7 @@ typedef struct {
                          PetscReal progress, PetscReal *part, PetscInt *nactive);
   PetscErrorCode (*potential)(SbEffect e, SbSpace space, const PetscReal u[], PetscReal *energy,
                               PetscReal f[]);
-  PetscErrorCode (*hessian)(SbEffect e, SbSpace space, const PetscReal u[], PetscBool clamp,
+  PetscErrorCode (*hessian)(SbEffect e, SbSpace space, const PetscReal u[], SbContactHessian kind,
                             SbBlocks *blocks);
   /* of guarded contact: what it did to the bodies in the last accepted step, J; this rank's. Not collective. */
   PetscErrorCode (*work)(SbEffect e, PetscReal *work);

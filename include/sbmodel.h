@@ -114,7 +114,7 @@ PetscErrorCode SbModelGuardSafe(SbModel model, Vec X, Vec Y, PetscReal progress,
                                 PetscInt *nactive);
 /* Of the last accepted step: what contact did to the bodies, J, and its forces taken out of those of SbModelLoads() at U, F, N. */
 PetscErrorCode SbModelGuardWork(SbModel model, Vec U, PetscReal *work, Vec F);
-PetscErrorCode SbModelGuardHessian(SbModel model, Vec U, PetscBool clamp, SbBlocks *blocks);
+PetscErrorCode SbModelGuardHessian(SbModel model, Vec U, SbContactHessian kind, SbBlocks *blocks);
 /* Initial velocities of bodies (translation and spin). */
 PetscErrorCode SbModelInitialState(SbModel model, Vec U, Vec V);
 /* Centre of mass, m, and mass, kg, of each body, centre[nbody][4]: at rest with U NULL, else now. Collective. */

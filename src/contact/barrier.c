@@ -68,7 +68,7 @@ void SbBarrierPair(SbContactMesh m, const SbContactPair *pair, PetscReal gap, co
   }
   *energy = e * b[0];
 
-  /* e b'' dd dd + e b' d2d + b d2e + b' (de dd + dd de), its positive part */
+  /* e b'' dd dd + e b' d2d + b d2e + b' (de dd + dd de), or its positive part */
   if (H) {
     const PetscReal factor[2] = {e * b[2], e * b[1]};
 

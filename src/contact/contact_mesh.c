@@ -362,8 +362,10 @@ PetscErrorCode SbContactMeshMarkDriven(SbContactMesh m)
 PetscErrorCode SbContactMeshMove(SbContactMesh m, const PetscReal u[], const SbPose *pose, PetscReal x[])
 {
   PetscReal *mine = m->buffer, *all = m->buffer + 3 * m->nlocal;
+  PetscMPIInt ranks;
 
   PetscFunctionBeginUser;
+  PetscCallMPI(MPI_Comm_size(m->space->comm, &ranks));
   for (PetscInt k = 0; k < m->nlocal; k++) {
     const PetscInt v = m->local[k];
 
@@ -372,7 +374,7 @@ PetscErrorCode SbContactMeshMove(SbContactMesh m, const PetscReal u[], const SbP
       for (int i = 0; i < 3; i++) mine[3 * k + i] += m->weight[e] * u[3 * m->node[e] + i];
     }
   }
-  if (m->nlocal == m->nbody_vertex)
+  if (ranks == 1)
     all = mine;
   else
     PetscCallMPI(MPI_Allgatherv(mine, (PetscMPIInt)(3 * m->nlocal), MPIU_REAL, all, m->count, m->first,

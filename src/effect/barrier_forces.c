@@ -196,7 +196,7 @@ static PetscErrorCode spread_blocks(const Barrier *b, const SbContactPair *pair,
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbEffectHessian_Barrier(SbEffect e, SbSpace s, const PetscReal u[], PetscBool clamp,
+PetscErrorCode SbEffectHessian_Barrier(SbEffect e, SbSpace s, const PetscReal u[], SbContactHessian kind,
                                        SbBlocks *blocks)
 {
   Barrier *b = (Barrier *)e->data;
@@ -210,16 +210,18 @@ PetscErrorCode SbEffectHessian_Barrier(SbEffect e, SbSpace s, const PetscReal u[
     const SbContactPair *pair = &b->pairs->pair[a->pair];
 
     SbBarrierPair(b->mesh, pair, a->gap, &a->at, b->x, width_of(b, pair), pressure_of(b, pair), &energy,
-                  gradient, clamp, H);
+                  gradient, (PetscBool)(kind != SB_HESSIAN_EXACT), H);
     PetscCall(spread_blocks(b, pair, H, blocks));
   }
 
-  /* friction: mu N (f0'/u (I - n n - u u/u^2) + f0'' u u/u^2) */
+  /* friction: mu N (f0'/u (I - n n - u u/u^2) + f0'' u u/u^2); the parabola that touches f0 from above has f0'/u in the place of f0'' */
   for (PetscInt i = 0; i < b->nrub; i++) {
     const Rub *rub = &b->rub[i];
     PetscReal d[3], T[9];
     const PetscReal y = SbBarrierSlip(b, rub, d), w = b->slip, slope = SbBarrierSlope(b, y),
-                    curve = y < w ? 2. / w - 2. * y / (w * w) : 0.;
+                    curve = kind == SB_HESSIAN_ABOVE ? slope
+                            : y < w                  ? 2. / w - 2. * y / (w * w)
+                                                     : 0.;
 
     for (int k = 0; k < 9; k++) {
       T[k] = slope * ((k % 4 ? 0. : 1.) - rub->n[k / 3] * rub->n[k % 3]);

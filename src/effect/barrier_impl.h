@@ -91,7 +91,7 @@ void SbBarrierPlaceObstacle(const Barrier *b, PetscReal progress, PetscReal x[])
 PetscErrorCode SbEffectForce_Barrier(SbEffect e, SbSpace s, const SbStage *stage, PetscReal f[]);
 PetscErrorCode SbEffectPotential_Barrier(SbEffect e, SbSpace s, const PetscReal u[], PetscReal *energy,
                                          PetscReal f[]);
-PetscErrorCode SbEffectHessian_Barrier(SbEffect e, SbSpace s, const PetscReal u[], PetscBool clamp,
+PetscErrorCode SbEffectHessian_Barrier(SbEffect e, SbSpace s, const PetscReal u[], SbContactHessian kind,
                                        SbBlocks *blocks);
 PetscErrorCode SbEffectContactForce_Barrier(SbEffect e, SbSpace s, const SbStage *stage, const PetscReal r[],
                                             PetscReal f[]);

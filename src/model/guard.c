@@ -68,14 +68,14 @@ PetscErrorCode SbModelGuardSafe(SbModel m, Vec X, Vec Y, PetscReal progress, Pet
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbModelGuardHessian(SbModel m, Vec U, PetscBool clamp, SbBlocks *blocks)
+PetscErrorCode SbModelGuardHessian(SbModel m, Vec U, SbContactHessian kind, SbBlocks *blocks)
 {
   const PetscReal *u;
 
   PetscFunctionBeginUser;
   PetscCall(SbSpaceGetLocalRead(m->space, U, &u));
   for (PetscInt e = 0; e < m->npotential; e++)
-    SbEffectCall(m->potential[e], hessian, m->space, u, clamp, blocks);
+    SbEffectCall(m->potential[e], hessian, m->space, u, kind, blocks);
   PetscCall(SbSpaceRestoreLocalRead(m->space, U, &u));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

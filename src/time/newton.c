@@ -19,6 +19,10 @@
 
   Tangent. With -body_NAME_tangent auto it is the exact one. When the linear solver meets a direction of negative curvature or counts negative pivots, or p goes up, the eigenvalues of
   the cells are raised to zero and the system is solved once more (Longva et al. 2023, "Pitfalls of projection"); after a full step the exact one is tried again.
+
+  Where surfaces push each other, the second derivative of contact is the positive part of each pair's, and the exact one after a full step, as near the end only that converges
+  faster than linearly. When energy cut the last step, that of friction is bounded from above. A tangent that is not definite is shifted by a multiple of the mass, as small a one as will do (Nocedal and Wright,
+  algorithm 3.3), before cells are filtered: in a collapse nearly all cells have a negative eigenvalue, though their sum has but a few, and filtered ones make steps of a hundredth.
 */
 #include <petsc/private/snesimpl.h> /* PETSc has no public way to write a SNESType */
 #include "sbsolver.h"
@@ -34,8 +38,11 @@
   1e-3 /* of the smallest body's size per second: a step of a time step that is short enough, where surfaces push each other */
 #define STICKING 1e-2       /* of that, with friction, whose forces follow from as small speeds */
 #define SETTLED_STATIC 1e-6 /* of that size: the same in a static run */
-#define NEAR 100            /* times these: contact's second derivative as it is, not its positive part */
-#define PROVISIONAL 1       /* steps that may follow each other while E is above where they began */
+#define SHIFT 0.1           /* of the shift by inertia: the least one of a tangent that is not definite */
+#define SHIFT_STIFF 1e-4    /* the same, of the mean stiffness by mass */
+#define SHIFTS 8            /* so often by SHIFT_MORE before cells are filtered */
+#define SHIFT_MORE 4.
+#define PROVISIONAL 1 /* steps that may follow each other while E is above where they began */
 
 /* What a solve keeps from iteration to iteration. */
 typedef struct {
@@ -49,7 +56,8 @@ typedef struct {
   SbContactSystem system; /* guarded contact: NULL before surfaces have pushed each other */
   SbBlocks blocks;        /* its second derivative, when the last direction was solved for */
   PetscInt nblock;        /* of all ranks */
-  PetscBool near;         /* the solution is near: contact's second derivative is taken as it is */
+  SbContactHessian kind;
+  PetscReal shift; /* of the last direction: times the mass added to the tangent, 1/s^2 */
 } Newton;
 
 /* The potential at an iterate, as far as lengths of steps ask. */
@@ -81,7 +89,7 @@ static PetscErrorCode evaluate_at(Newton *n, Vec X, Vec F, Vec Y, Iterate *at)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Solves K Y = F, K with the second derivative of guarded contact where surfaces push each other. */
+/* Solves K Y = F, K with the second derivative of guarded contact, or what stands for it, where surfaces push each other. */
 static PetscErrorCode solve_linear(SNES snes, KSPConvergedReason *reason)
 {
   Newton *n = (Newton *)snes->data;
@@ -91,7 +99,7 @@ static PetscErrorCode solve_linear(SNES snes, KSPConvergedReason *reason)
   PetscFunctionBeginUser;
   n->blocks.n = n->nblock = 0;
   if (m->npotential) {
-    PetscCall(SbModelGuardHessian(m, snes->vec_sol, (PetscBool)!n->near, &n->blocks));
+    PetscCall(SbModelGuardHessian(m, snes->vec_sol, n->kind, &n->blocks));
     PetscCallMPI(MPI_Allreduce(&n->blocks.n, &n->nblock, 1, MPIU_INT, MPI_SUM, m->comm));
   }
   if (n->nblock) {
@@ -108,6 +116,39 @@ static PetscErrorCode solve_linear(SNES snes, KSPConvergedReason *reason)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The least shift of the tangent, 1/s^2. */
+static PetscErrorCode least_shift(SNES snes, PetscReal *shift)
+{
+  Newton *n = (Newton *)snes->data;
+  const SbSpace s = n->run->model->space;
+  PetscScalar stiff;
+  PetscReal mass = 0.;
+
+  PetscFunctionBeginUser;
+  PetscCall(MatGetDiagonal(snes->jacobian_pre, n->G));
+  PetscCall(VecSum(n->G, &stiff));
+  for (PetscInt i = 0; i < s->nnode_owned; i++) mass += 3. * s->node_mass[i];
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &mass, 1, MPIU_REAL, MPI_SUM, s->comm));
+  *shift = SHIFT_STIFF * PetscRealPart(stiff) / mass;
+  if (n->run->model->dynamic) *shift = PetscMax(*shift, SHIFT / PetscSqr(n->run->guard_dt));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Adds the mass times the shift to the tangent. */
+static PetscErrorCode add_shift(SNES snes, PetscReal shift)
+{
+  Newton *n = (Newton *)snes->data;
+  const SbSpace s = n->run->model->space;
+  PetscScalar *d;
+
+  PetscFunctionBeginUser;
+  PetscCall(VecGetArray(n->G, &d));
+  for (PetscInt i = 0; i < 3 * s->nnode_owned; i++) d[i] = shift * s->node_mass[i / 3];
+  PetscCall(VecRestoreArray(n->G, &d));
+  PetscCall(MatDiagonalSet(snes->jacobian_pre, n->G, ADD_VALUES));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Solves for Y, X - Y being the next iterate, and for the slope of E along -Y. */
 static PetscErrorCode find_direction(SNES snes, PetscBool *filtered, PetscReal *slope)
 {
@@ -115,19 +156,31 @@ static PetscErrorCode find_direction(SNES snes, PetscBool *filtered, PetscReal *
   const Vec X = snes->vec_sol, F = snes->vec_func, Y = snes->vec_sol_update;
   const SbModel m = n->run->model;
   KSPConvergedReason reason;
-  PetscInt negative;
+  PetscReal shift = n->shift / SHIFT_MORE, least = 0.;
+  PetscInt negative, shifts = 0;
 
   PetscFunctionBeginUser;
+  n->shift = 0.;
   for (;;) {
     PetscCall(SbModelFilterTangent(m, *filtered));
     PetscCall(SNESComputeJacobian(snes, X, snes->jacobian, snes->jacobian_pre));
+    if (shift > 0.) {
+      if (least == 0.) PetscCall(least_shift(snes, &least));
+      if (shift < least) shift = shifts ? least : 0.;
+      if (shift > 0.) PetscCall(add_shift(snes, shift));
+    }
     PetscCall(solve_linear(snes, &reason));
     PetscCall(VecDot(F, Y, slope));
     *slope = -*slope;
-    if (n->near && n->nblock && (reason < 0 || *slope >= 0.)) {
-      n->near = PETSC_FALSE;
+    if (n->nblock && n->kind == SB_HESSIAN_EXACT && (reason < 0 || *slope >= 0.)) {
+      n->kind = SB_HESSIAN_CLAMPED;
       continue;
     }
+    if (n->nblock && m->may_filter && !*filtered && (reason < 0 || *slope >= 0.) && shifts++ < SHIFTS) {
+      shift = shift > 0. ? SHIFT_MORE * shift : 1e-300;
+      continue;
+    }
+    n->shift = shift;
     if (*filtered || !m->may_filter) break;
     /* L D L^T factors what is not definite without a word, and p may go down on the way to a saddle point */
     negative = -1;
@@ -375,7 +428,6 @@ static PetscErrorCode converged(SNES snes, PetscReal s)
   }
   PetscCall(VecNorm(snes->vec_sol_update, NORM_INFINITY, &longest));
   if (s == 1. && longest <= part * size) snes->reason = SNES_CONVERGED_SNORM_RELATIVE;
-  n->near = (PetscBool)(s == 1. && longest <= NEAR * part * size);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -385,7 +437,7 @@ static PetscErrorCode SNESSolve_Newton(SNES snes)
   const Vec X = snes->vec_sol, F = snes->vec_func, Y = snes->vec_sol_update;
   const PetscBool guarded = (PetscBool)(n->run->model->npotential > 0);
   PetscBool filtered = PETSC_FALSE;
-  PetscReal slope = 0., s = 1.;
+  PetscReal slope = 0., s = 1., safe;
   PetscInt nactive;
 
   PetscFunctionBeginUser;
@@ -394,7 +446,8 @@ static PetscErrorCode SNESSolve_Newton(SNES snes)
   snes->iter = 0;
   n->provisional = 0;
   n->nblock = 0;
-  n->near = PETSC_FALSE;
+  n->kind = SB_HESSIAN_CLAMPED;
+  n->shift = 0.;
   if (guarded) PetscCall(approach(snes));
   if (snes->reason) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(SNESComputeFunction(snes, X, F));
@@ -410,9 +463,11 @@ static PetscErrorCode SNESSolve_Newton(SNES snes)
     PetscCall(find_direction(snes, &filtered, &slope));
     s = 1.;
     if (guarded && !snes->reason) PetscCall(SbModelGuardSafe(n->run->model, X, Y, 1., &s, &nactive));
+    safe = s;
     if (!snes->reason) PetscCall(search(snes, slope, &s));
     if (snes->reason) break;
     if (s == 1.) filtered = PETSC_FALSE;
+    n->kind = s < safe ? SB_HESSIAN_ABOVE : s < 1. ? SB_HESSIAN_CLAMPED : SB_HESSIAN_EXACT;
 
     /* whether that is near enough */
     snes->iter++;

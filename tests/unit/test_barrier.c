@@ -42,16 +42,17 @@ static PetscReal energy_at(SbContactMesh m, const SbContactPair *pair, const Pet
   return energy;
 }
 
-/* Gradient and clamped Hessian against central differences, by the motion of the first nv vertices, which are those of bodies. */
+/* Gradient, Hessian and clamped Hessian against central differences, by the motion of the first nv vertices, which are those of bodies. */
 static void check_pair(SbContactMesh m, const SbContactPair *pair, PetscReal x[12], int nv, PetscInt *tried)
 {
   const PetscReal step = 1e-6;
-  PetscReal energy, gap, gradient[12], H[144], reference[144] = {0.}, largest = 0., worst = 0.;
+  PetscReal energy, gap, gradient[12], H[2][144], reference[144] = {0.}, largest = 0., worst = 0.;
   SbDistance distance;
 
   gap = SbContactPairGap(m, pair, x, &distance);
   if (gap <= 0.02 || gap >= width) return;
-  SbBarrierPair(m, pair, gap, &distance, x, width, pressure, &energy, gradient, PETSC_TRUE, H);
+  for (int clamp = 0; clamp < 2; clamp++)
+    SbBarrierPair(m, pair, gap, &distance, x, width, pressure, &energy, gradient, (PetscBool)clamp, H[clamp]);
   for (int k = 0; k < 3 * nv; k++) {
     PetscReal side[2], g[2][12];
 
@@ -71,11 +72,13 @@ static void check_pair(SbContactMesh m, const SbContactPair *pair, PetscReal x[1
     worst = PetscMax(worst, PetscAbsReal(reference[k] - reference[12 * (k % 12) + k / 12]));
   }
   if (worst > 1e-4 * largest) return;
-  SbSymmetricClamp(12, reference);
-  for (int k = 0; k < 3 * nv; k++) {
-    for (int l = 0; l < 3 * nv; l++)
-      SB_CHECK_NEAR(H[12 * k + l], reference[12 * k + l], 2e-3 * largest + 1e-6,
-                    "second derivative, positive part");
+  for (int clamp = 0; clamp < 2; clamp++) {
+    if (clamp) SbSymmetricClamp(12, reference);
+    for (int k = 0; k < 3 * nv; k++) {
+      for (int l = 0; l < 3 * nv; l++)
+        SB_CHECK_NEAR(H[clamp][12 * k + l], reference[12 * k + l], 2e-3 * largest + 1e-6,
+                      "second derivative, or its positive part");
+    }
   }
   (*tried)++;
 }
