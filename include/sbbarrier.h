@@ -115,6 +115,13 @@ PetscErrorCode SbContactPairsSafe(SbContactPairs pairs, const PetscReal x0[], co
 */
 PetscErrorCode SbContactMeshCrossings(SbContactMesh mesh, PetscBool self, const PetscReal x[], PetscInt *n,
                                       PetscInt where[5]);
+/*
+  SbContactMeshContained - whether the middle of a tet of body[0] at rest is within the surface of body[1] at x: bodies of which no edge goes through the other.
+
+  Collective. It takes every triangle for every body: for the start of a run.
+*/
+PetscErrorCode SbContactMeshContained(SbContactMesh mesh, const PetscReal x[], PetscInt body[2],
+                                      PetscBool *found);
 
 /* Energy of a gap d, J, and its first two derivatives by d: barrier of the width w (m), pressure k (Pa) and area (m^2); 0 from w on, infinite at 0. */
 void SbBarrier(PetscReal d, PetscReal w, PetscReal k, PetscReal area, PetscReal b[3]);

@@ -43,6 +43,8 @@ static void test_triangle(Search *s, PetscInt t)
                   *r = s->x + 3 * v[2];
   int around;
 
+  /* with an obstacle bodies are not each other's business */
+  if (m->nvertex > m->nbody_vertex && e[0] < m->nbody_vertex && v[0] < m->nbody_vertex) return;
   if (m->part[e[0]] == m->part[v[0]] && (!s->self || e[0] >= m->nbody_vertex)) return;
   for (int k = 0; k < 6; k++) {
     if (e[k / 3] == v[k % 3]) return;
@@ -100,5 +102,71 @@ PetscErrorCode SbContactMeshCrossings(SbContactMesh m, PetscBool self, const Pet
   PetscCallMPI(MPI_Allreduce(&s.n, n, 1, MPIU_INT, MPI_SUM, m->space->comm));
   for (int k = 0; k < 5; k++) where[k] = s.where[k];
   if (first < ranks) PetscCallMPI(MPI_Bcast(where, 5, MPIU_INT, first, m->space->comm));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Solid angle of a triangle seen from p, as a part of the whole sphere (van Oosterom and Strackee 1983). */
+static PetscReal solid_angle(const PetscReal p[3], const PetscReal *a, const PetscReal *b, const PetscReal *c)
+{
+  PetscReal r[3][3], l[3], n[3];
+
+  for (int i = 0; i < 3; i++) {
+    r[0][i] = a[i] - p[i];
+    r[1][i] = b[i] - p[i];
+    r[2][i] = c[i] - p[i];
+  }
+  for (int k = 0; k < 3; k++) l[k] = PetscSqrtReal(SbDot3(r[k], r[k]));
+  SbCross(r[1], r[2], n);
+  return atan2(SbDot3(r[0], n), l[0] * l[1] * l[2] + SbDot3(r[0], r[1]) * l[2] + SbDot3(r[1], r[2]) * l[0] +
+                                  SbDot3(r[2], r[0]) * l[1]) /
+         (2. * PETSC_PI);
+}
+
+PetscErrorCode SbContactMeshContained(SbContactMesh m, const PetscReal x[], PetscInt body[2],
+                                      PetscBool *found)
+{
+  const SbMesh mesh = m->space->mesh;
+  const PetscInt nbody = mesh->nbody;
+  PetscReal *point, *winding;
+  PetscMPIInt rank, *speaks;
+
+  PetscFunctionBeginUser;
+  *found = PETSC_FALSE;
+  PetscCallMPI(MPI_Comm_rank(m->space->comm, &rank));
+  PetscCall(PetscMalloc1(nbody, &speaks));
+  PetscCall(PetscCalloc2(3 * nbody, &point, nbody * nbody, &winding));
+
+  /* the middle of a tet of each body, of the lowest rank that has one */
+  for (PetscInt b = 0; b < nbody; b++) speaks[b] = PETSC_MPI_INT_MAX;
+  for (PetscInt c = 0; c < mesh->ncell_owned; c++) speaks[mesh->cell_body[c]] = rank;
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, speaks, (PetscMPIInt)nbody, MPI_INT, MPI_MIN, m->space->comm));
+  for (PetscInt c = 0; c < mesh->ncell_owned; c++) {
+    const PetscInt b = mesh->cell_body[c];
+
+    if (speaks[b] != rank) continue;
+    speaks[b] = PETSC_MPI_INT_MAX;
+    for (int k = 0; k < 12; k++)
+      point[3 * b + k % 3] += 0.25 * mesh->x[3 * mesh->cell[4 * c + k / 3] + k % 3];
+  }
+  PetscCallMPI(
+    MPI_Allreduce(MPI_IN_PLACE, point, (PetscMPIInt)(3 * nbody), MPIU_REAL, MPI_SUM, m->space->comm));
+
+  /* how often each surface goes around it */
+  for (PetscInt t = 0; t < m->nbody_triangle; t++) {
+    const PetscInt *v = m->triangle + 3 * t, to = m->part[v[0]];
+
+    for (PetscInt b = 0; b < nbody; b++) {
+      if (b != to)
+        winding[nbody * b + to] += solid_angle(point + 3 * b, x + 3 * v[0], x + 3 * v[1], x + 3 * v[2]);
+    }
+  }
+  for (PetscInt k = 0; k < nbody * nbody && !*found; k++) {
+    if (PetscAbsReal(winding[k]) < 0.5) continue;
+    *found = PETSC_TRUE;
+    body[0] = k / nbody;
+    body[1] = k % nbody;
+  }
+  PetscCall(PetscFree2(point, winding));
+  PetscCall(PetscFree(speaks));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

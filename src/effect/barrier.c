@@ -22,25 +22,65 @@
 #define PRESSURE 0.1     /* of Young's modulus of the softer side */
 #define SLIP 1e-3        /* of the size of the smallest body per second: speed below which friction sticks */
 #define SLIP_STATIC 1e-5 /* of the size: the same in a static run, as a length */
+#define DEEP 1e-3        /* of the size of the smallest body: overlap with an obstacle that counts as such */
 #define APART 0.5        /* of w: how far touching surfaces are moved apart at the start */
 #define PASSES 200       /* over all pairs for that */
 
 /* ------------------------------------------------------------------ set-up */
 
+/* The surfaces, when they are asked for first. */
+static PetscErrorCode make_surfaces(SbEffect e, SbSpace s)
+{
+  Barrier *b = (Barrier *)e->data;
+  SbFacet *facet;
+  PetscInt n;
+
+  PetscFunctionBeginUser;
+  if (b->mesh) PetscFunctionReturn(PETSC_SUCCESS);
+  if (b->scene.setup_obstacle) PetscCall((*b->scene.setup_obstacle)(e, s, b->data));
+  PetscCall(SbEffectFacets(s, b->scene.on, &n, &facet));
+  PetscCall(SbContactMeshCreate(s, n, facet, b->scene.obstacle, &b->mesh));
+  PetscCall(PetscFree(facet));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Edges of bodies that go through triangles, and vertices that are deep in an obstacle, before anything has moved. */
+static PetscErrorCode overlaps_barrier(SbEffect e, SbSpace s, PetscBool *found)
+{
+  Barrier *b = (Barrier *)e->data;
+  SbContactMesh m;
+  PetscReal *x;
+  PetscInt crossings, where[5];
+  SbPose pose;
+
+  PetscFunctionBeginUser;
+  PetscCall(make_surfaces(e, s));
+  m = b->mesh;
+  PetscCall(PetscMalloc1(3 * m->nvertex, &x));
+  PetscCall(PetscArraycpy(x, m->X, 3 * m->nvertex));
+  if (b->scene.obstacle) (*b->scene.pose)(b->data, 0., &pose);
+  for (PetscInt v = m->nbody_vertex; v < m->nvertex; v++) SbPoseApply(&pose, m->X + 3 * v, x + 3 * v);
+  PetscCall(SbContactMeshCrossings(m, b->scene.self, x, &crossings, where));
+  *found = (PetscBool)(crossings > 0);
+  for (PetscInt v = 0; v < (b->scene.obstacle ? m->nbody_vertex : 0); v++) {
+    PetscReal X[3], n[3];
+
+    SbPoseInvert(&pose, x + 3 * v, X);
+    if (SbObstacleDistance(b->scene.obstacle, X, n) < -DEEP * m->size) *found = PETSC_TRUE;
+  }
+  PetscCall(PetscFree(x));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 static PetscErrorCode setup_barrier(SbEffect e, SbSpace s)
 {
   Barrier *b = (Barrier *)e->data;
   const PetscInt nbody = s->mesh->nbody;
-  SbFacet *facet;
   PetscReal cube = PETSC_MAX_REAL;
-  PetscInt n;
 
   PetscFunctionBeginUser;
-  if (b->scene.setup_obstacle) PetscCall((*b->scene.setup_obstacle)(e, s, b->data));
+  PetscCall(make_surfaces(e, s));
   s->coupled = PETSC_TRUE;
-  PetscCall(SbEffectFacets(s, b->scene.on, &n, &facet));
-  PetscCall(SbContactMeshCreate(s, n, facet, b->scene.obstacle, &b->mesh));
-  PetscCall(PetscFree(facet));
   if (!b->scene.obstacle) {
     PetscBool *takes_part;
     PetscInt nskin = 0;
@@ -194,6 +234,17 @@ static PetscErrorCode part_touching(SbEffect e, SbSpace s, PetscReal u[], PetscB
             two < s->mesh->nbody ? s->mesh->body[two].name : "the obstacle", crossings,
             (double)b->x[3 * where[0]], (double)b->x[3 * where[0] + 1], (double)b->x[3 * where[0] + 2],
             e->name);
+  }
+  if (!b->scene.obstacle) {
+    PetscBool contained;
+    PetscInt body[2];
+
+    PetscCall(SbContactMeshContained(m, b->x, body, &contained));
+    PetscCheck(
+      !contained, s->comm, PETSC_ERR_USER_INPUT,
+      "The effect %s: %s is inside %s when the run begins, or in the same place; move one of them by "
+      "-body_%s_translate",
+      e->name, s->mesh->body[body[0]].name, s->mesh->body[body[1]].name, s->mesh->body[body[0]].name);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -478,6 +529,7 @@ PetscErrorCode SbBarrierCreate(SbEffect e, const SbScope *scope, const SbBarrier
   e->data = b;
   e->ops = (SbEffectOps){.setfromoptions = e->ops.setfromoptions,
                          .setup = setup_barrier,
+                         .overlaps = overlaps_barrier,
                          .force = SbEffectForce_Barrier,
                          .begin_guarded = begin_barrier,
                          .safe = safe_barrier,

@@ -195,29 +195,57 @@ static PetscErrorCode read_common(SbEffect e, const SbScope *scope, SbContactOpt
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode options_contact(SbEffect e, const SbScope *scope)
+/* The effect with this response; why: it was not asked for, NULL: it was. */
+static PetscErrorCode respond(SbEffect e, const SbScope *scope, SbResponse response, const char *why)
 {
-  SbContactOptions o = {.response = AUTO};
-  const char *why = NULL;
+  SbContactOptions o = {.response = response};
   char text[PETSC_MAX_PATH_LEN];
 
   PetscFunctionBeginUser;
   PetscCall(SbOptionString(scope, "obstacle", sizeof(text), text));
-  PetscCall(choose(e, &o.response, &why));
   PetscCall(read_common(e, scope, &o));
   if (why)
-    (void)snprintf(e->note, sizeof(e->note), "response %s: %s",
-                   o.response == BARRIER ? "barrier" : "projected", why);
-
-  /* what it touches says who does the work */
+    (void)snprintf(e->note, sizeof(e->note), "response %s: %s", response == BARRIER ? "barrier" : "projected",
+                   why);
+  e->linear = PETSC_TRUE;
   e->steady = PETSC_FALSE; /* a load factor does not make an obstacle softer */
   PetscCall(text[0] ? SbContactCreate_Node(e) : SbContactCreate_Collision(e));
-  e->saddle = (PetscBool)(o.response == MULTIPLIER);
+  e->saddle = (PetscBool)(response == MULTIPLIER);
   e->euler = (PetscBool)(o.restitution > 0);
-  e->springs = (PetscBool)(!SbResponseIsExact(o.response) || o.friction.mu > 0);
+  e->springs = (PetscBool)(!SbResponseIsExact(response) || o.friction.mu > 0);
   if (!o.cut) e->ops.time_of_impact = NULL;
   if (!e->euler) e->ops.restitution = NULL;
   PetscCall(text[0] ? SbContactOptions_Node(e, scope, &o) : SbContactOptions_Collision(e, scope, &o));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Bodies that are in each other when the run begins are parted by `projected`. */
+static PetscErrorCode fall_back(SbEffect e)
+{
+  SbScope scope;
+
+  PetscFunctionBeginUser;
+  PetscCall((*e->ops.destroy)(e));
+  e->ops = (SbEffectOps){0};
+  PetscCall(SbScopeSet(&scope, "effect", "contact", e->name));
+  PetscCall(respond(e, &scope, PROJECTED, "what is in each other when the run begins is parted slowly"));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode options_contact(SbEffect e, const SbScope *scope)
+{
+  SbResponse response;
+  const char *why = NULL;
+
+  PetscFunctionBeginUser;
+  PetscCall(choose(e, &response, &why));
+  PetscCall(respond(e, scope, response, why));
+  if (response == BARRIER) {
+    if (why)
+      e->ops.fall_back = fall_back;
+    else
+      e->ops.overlaps = NULL;
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -97,6 +97,24 @@ static PetscErrorCode match_mass(SbModel m, PetscInt b)
     }                                                                       \
   } while (0)
 
+/* Effects whose response was not asked for take another one together, where the first one cannot part what is in each other. */
+static PetscErrorCode choose_responses(SbModel m)
+{
+  PetscBool any = PETSC_FALSE;
+
+  PetscFunctionBeginUser;
+  for (PetscInt e = 0; e < m->neffect; e++) {
+    PetscBool found = PETSC_FALSE;
+
+    if (m->effect[e]->ops.overlaps) SbEffectCall(m->effect[e], overlaps, m->space, &found);
+    any = (PetscBool)(any || found);
+  }
+  for (PetscInt e = 0; any && e < m->neffect; e++) {
+    if (m->effect[e]->ops.fall_back) PetscCall((*m->effect[e]->ops.fall_back)(m->effect[e]));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode SbModelSetUp(SbModel m)
 {
   PetscReal mass = 0.;
@@ -114,6 +132,7 @@ PetscErrorCode SbModelSetUp(SbModel m)
   PetscCall(SbSpaceCreate(m->mesh, m->material, m->element, &m->space));
   m->load = 1.;
   m->linear = m->space->linear;
+  PetscCall(choose_responses(m));
   for (PetscInt e = 0; e < m->neffect; e++) {
     m->effect[e]->dynamic = m->dynamic;
     if (m->effect[e]->ops.setup) SbEffectCall(m->effect[e], setup, m->space);

@@ -118,6 +118,11 @@ static PetscErrorCode put_settings(FILE *f, SbRun run)
     (void)fprintf(f, "%s", e ? ", " : "");
     put_string(f, run->model->effect[e]->name);
   }
+  (void)fprintf(f, "],\n  \"effect_notes\": [");
+  for (PetscInt e = 0; e < run->model->neffect; e++) {
+    (void)fprintf(f, "%s", e ? ", " : "");
+    put_string(f, run->model->effect[e]->note);
+  }
   (void)fprintf(f, "],\n");
   PetscCall(PetscOptionsGetAll(NULL, &options));
   put_text(f, "options", options);

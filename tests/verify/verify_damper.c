@@ -43,7 +43,7 @@ static PetscErrorCode check(const char *what, const char *scene, PetscReal tau, 
                        "-time euler_implicit -ts_dt %g -ts_max_time 0.06 -snes_rtol 1e-10 -bodies %s",
     YOUNG, -SPEED, FACTOR, (double)tau, STEP, scene));
   if (tau == 0)
-    *k = PetscSqr(record_max(&r, strstr(scene, "collision") ? "meet_normal_force" : "meet_force_z") / SPEED) /
+    *k = PetscSqr(record_max(&r, strstr(scene, "obstacle") ? "meet_force_z" : "meet_normal_force") / SPEED) /
          MASS;
   verify_show("springs, N/m", *k);
   speed = PetscSqrtReal(2 * record_last(&r, "kinetic") / MASS);
@@ -56,16 +56,14 @@ static PetscErrorCode check(const char *what, const char *scene, PetscReal tau, 
 
 int main(int argc, char **argv)
 {
-  static const char *const plane = "a -effects meet -effect_meet_type contact -effect_meet_response "
-                                   "projected -effect_meet_obstacle plane:0,0,1,-1e-4";
-  static const char *const rows =
-    "a -effects meet -effect_meet_type contact -effect_meet_response projected -effect_meet_obstacle "
-    "plane:0,0,1,-1e-4 -effect_meet_friction 0.3";
+  static const char *const plane = "a -effects meet -effect_meet_type contact "
+                                   "-effect_meet_obstacle plane:0,0,1,-1e-4";
+  static const char *const rows = "a -effects meet -effect_meet_type contact -effect_meet_obstacle "
+                                  "plane:0,0,1,-1e-4 -effect_meet_friction 0.3";
   static const char *const block =
     "a,b -body_b_mesh box:0.1,0.1,0.05:1 -body_b_translate -0.025,-0.027,-0.0501 -body_b_material linear "
     "-body_b_young 1e9 -body_b_poisson 0.3 -body_b_density 1000 -sets low -set_low_at plane:0,0,1,-0.0501 "
     "-effects hold,meet -effect_hold_type fixed -effect_hold_on low -effect_meet_type contact "
-    "-effect_meet_response projected "
     "-effect_meet_passes one";
 
   PetscReal k;
