@@ -155,7 +155,7 @@ static PetscErrorCode estimate_state(SbLedger l, const SbStep *step)
   }
   l->error[SB_ERROR_SPACE] =
     m->dynamic ? PetscMax(l->error[SB_ERROR_SPACE], PetscSqrtReal(sum)) : PetscSqrtReal(sum);
-  if (m->nbegin_step && step->R) PetscCall(SbEstimateContact(l, step, &contact));
+  if ((m->nbegin_step || m->npotential) && step->R) PetscCall(SbEstimateContact(l, step, &contact));
   l->error[SB_ERROR_CONTACT] = m->dynamic ? PetscMax(l->error[SB_ERROR_CONTACT], contact) : contact;
   l->own_work += SPACE_WORK;
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -304,7 +304,8 @@ PetscErrorCode SbLedgerAttach(SbLedger l)
   PetscCall(carry(l));
   PetscCall(end(l));
   run->want_energies = PETSC_TRUE;
-  if (run->model->nbegin_step || l->quantity.kind == SB_QUANTITY_REACTION) run->want_residual = PETSC_TRUE;
+  if (run->model->nbegin_step || run->model->npotential || l->quantity.kind == SB_QUANTITY_REACTION)
+    run->want_residual = PETSC_TRUE;
   run->post_solve.fn = examine_step;
   run->post_solve.ctx = l;
   run->cell_error = cell_error;

@@ -167,7 +167,7 @@ static PetscErrorCode springs(void)
     "-effect_tool_on zmax "
     "-time static -ksp_rtol 1e-10 ";
   static const char ball[] = "-effect_hold_on zmin -effect_tool_obstacle sphere:0.05,0.05,0.087,0.04";
-  static const char *const stiffness[] = {"20", "5"};
+  static const char *const stiffness[] = {"20", "5"}, *const width[] = {"2e-4", "1e-3"};
 
   PetscFunctionBeginUser;
   for (int i = 0; i < 2; i++) {
@@ -178,6 +178,10 @@ static PetscErrorCode springs(void)
                             stiffness[i]));
     PetscCall(compare("springs under a ball", "contact", SB_ERROR_CONTACT, scene, coarse,
                       "-effect_tool_response projected", 0.3, 3));
+    PetscCall(PetscSNPrintf(coarse, sizeof(coarse),
+                            "-effect_tool_response barrier -effect_tool_barrier_width %s", width[i]));
+    PetscCall(compare("gaps of a barrier under a ball", "contact", SB_ERROR_CONTACT, scene, coarse,
+                      "-effect_tool_response barrier -effect_tool_barrier_width 4e-6", 0.3, 3));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
