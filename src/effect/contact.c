@@ -136,7 +136,7 @@ static PetscErrorCode choose(SbEffect e, SbResponse *response, const char **why)
   PetscCall(SbOptionExists(&scope, "effects", &exists));
   if (exists) PetscCall(SbOptionNames(&scope, "effects", &n, &names));
   for (PetscInt i = 0; i < n; i++) {
-    PetscBool contact, more;
+    PetscBool contact = PETSC_FALSE, more = PETSC_FALSE;
 
     PetscCall(is_contact(names[i], &contact));
     if (!contact) continue;
