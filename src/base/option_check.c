@@ -31,11 +31,10 @@ static PetscBool looks_like_petsc(const char *name)
   return SbBeginsWith(
     name,
     "ksp_ pc_ snes_ ts_ mat_ vec_ dm_ is_ sub_ mg_ fieldsplit_ asm_ log_ malloc options_ petsc on_error_ "
-    "memory_ fp_trap start_in_debugger stop_for_debugger debugger_ citations no_signal_handler info "
-    "viewer_ draw_ display nox saws objects_ checkstack get_total_flops skip_petscrc error_output_ "
-    "shared_tmp not_shared_tmp tmp partition sf_ history python blas_ omp_ use_gpu device cuda hip "
-    "event_ help version redundant_ est esteig gamg_ hypre ml_ superlu sbaij inner_ coarse_ saddle_ "
-    "telescope_ levels_ prefix_");
+    "memory_ fp_trap start_in_debugger stop_for_debugger debugger_ citations no_signal_handler info viewer_ "
+    "draw_ display nox saws objects_ checkstack get_total_flops skip_petscrc error_output_ shared_tmp "
+    "not_shared_tmp tmp partition sf_ history python blas_ omp_ use_gpu device cuda hip event_ help version "
+    "redundant_ est esteig gamg_ hypre ml_ superlu sbaij inner_ coarse_ saddle_ telescope_ levels_ prefix_");
 }
 
 /* The class whose prefix a name begins with; NULL when there is none. */
@@ -311,9 +310,8 @@ PetscErrorCode SbOptionsCheck(void)
 /* Options that PETSc reads in PetscFinalize() only. */
 static PetscBool is_read_at_end(const char *name)
 {
-  return SbBeginsWith(
-    name, "citations get_total_flops log_ malloc_ memory_view mpidump no_signal_handler nox objects_dump "
-          "options_left options_view saw_options x_virtual");
+  return SbBeginsWith(name, "citations get_total_flops log_ malloc_ memory_view mpidump no_signal_handler "
+                            "nox objects_dump options_left options_view saw_options x_virtual");
 }
 
 PetscErrorCode SbOptionsUnused(MPI_Comm comm, PetscInt *n)

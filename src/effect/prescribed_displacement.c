@@ -46,10 +46,10 @@ static PetscErrorCode options_displacement(SbEffect e, const SbScope *scope)
   if (d->components == 7) e->prescribed = &d->on;
   PetscCall(SbOptionGiven(scope, "displacement", &move));
   PetscCall(SbOptionGiven(scope, "angle", &turn));
-  PetscCheck(move || turn, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
-             "effect %s: give -effect_%s_displacement (m, three formulas) or -effect_%s_angle (degrees, one "
-             "formula)",
-             e->name, e->name, e->name);
+  PetscCheck(
+    move || turn, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
+    "effect %s: give -effect_%s_displacement (m, three formulas) or -effect_%s_angle (degrees, one formula)",
+    e->name, e->name, e->name);
   PetscCall(SbEffectFormulas(scope, "displacement", 3, PETSC_TRUE, d->displacement, &e->steady));
   PetscCall(SbEffectFormulas(scope, "angle", 1, PETSC_FALSE, &d->angle, &e->steady));
   PetscCall(SbOptionReals(scope, "axis", d->axis));

@@ -125,8 +125,8 @@ static PetscErrorCode check_nodes(SbSpace space, const SbEffectOn *on, uint64_t 
     PetscCall(PetscFree(count));
     SETERRQ(space->comm, PETSC_ERR_USER_INPUT,
             "%s selects %" PetscInt_FMT
-            " vertices of body %s but none of its triangles, where element %s has its "
-            "nodes: take a set that contains whole triangles, such as a thicker plane or box",
+            " vertices of body %s but none of its triangles, where element %s has its nodes: take a set that "
+            "contains whole triangles, such as a thicker plane or box",
             on->option, nvert, mesh->body[b].name, space->element[b]->name);
   }
   PetscCall(PetscFree(count));

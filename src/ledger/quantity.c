@@ -96,8 +96,7 @@ PetscErrorCode SbQuantityAttach(SbLedger l)
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &nprescribed, 1, MPIU_INT, MPI_SUM, m->comm));
   PetscCheck(nprescribed > 0, m->comm, PETSC_ERR_USER_INPUT,
              "-ledger_on '%s': no effect prescribes displacements on a set of that name, so there is no "
-             "reaction; name a set of a "
-             "support or drive",
+             "reaction; name a set of a support or drive",
              q->on);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -109,11 +108,11 @@ PetscErrorCode SbQuantityContinue(SbLedger from, SbLedger to)
 
   PetscFunctionBeginUser;
   if (to->quantity.kind == SB_QUANTITY_DISPLACEMENT && d > 0.)
-    PetscCall(SbWarning(to->run->model->comm,
-                        "-ledger_at: the node at (%g, %g, %g) m is gone with a mesh; from now on the nearest "
-                        "one, %.3g m from it, stands for it. Vertices of "
-                        "the surface stay: choose one of them",
-                        (double)a[0], (double)a[1], (double)a[2], (double)d));
+    PetscCall(
+      SbWarning(to->run->model->comm,
+                "-ledger_at: the node at (%g, %g, %g) m is gone with a mesh; from now on the nearest one, "
+                "%.3g m from it, stands for it. Vertices of the surface stay: choose one of them",
+                (double)a[0], (double)a[1], (double)a[2], (double)d));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -9,8 +9,7 @@ static const SbOption rows[] = {
    "auto: METIS up to 50,000 tets"},
   {"mesh_reading", SB_OPTION_CHOICE, 1, "", "auto", "auto|rank0|slabs",
    "who reads an .h5 mesh of supple-mesh on several ranks: rank 0 all of it, or every rank a slab, so that "
-   "its memory falls with "
-   "the ranks; auto: slabs from 50,000 tets on. Other meshes are read by rank 0"},
+   "its memory falls with the ranks; auto: slabs from 50,000 tets on. Other meshes are read by rank 0"},
   {"mesh_report", SB_OPTION_BOOL, 1, "", "false", "",
    "print one line per body with the size, shape and groups of its mesh"},
 };
@@ -35,9 +34,8 @@ static PetscErrorCode report(MPI_Comm comm, PetscInt nbody, const SbBody body[],
     if (full)
       PetscCall(PetscPrintf(comm,
                             "body '%s': %" PetscInt_FMT " tets, %" PetscInt_FMT " vertices, %" PetscInt_FMT
-                            " boundary facets, volume %.6g m^3, "
-                            "from (%.4g, %.4g, %.4g) to (%.4g, %.4g, %.4g) m, smallest dihedral angle %.3g "
-                            "degrees, largest radius ratio %.3g%s%s\n",
+                            " boundary facets, volume %.6g m^3, from (%.4g, %.4g, %.4g) to (%.4g, %.4g, "
+                            "%.4g) m, smallest dihedral angle %.3g degrees, largest radius ratio %.3g%s%s\n",
                             p->name, p->ncell, p->nvert, p->nfacet, (double)p->volume, (double)p->bbox[0],
                             (double)p->bbox[1], (double)p->bbox[2], (double)p->bbox[3], (double)p->bbox[4],
                             (double)p->bbox[5], (double)p->min_dihedral, (double)p->max_radius_ratio,

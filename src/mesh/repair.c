@@ -197,11 +197,10 @@ PetscErrorCode SbMeshFileRepair(SbImport *im, PetscReal tolerance, SbRepair *don
     PetscCall(drop_repeats(im, d, &ndropped));
   }
   PetscCall(drop_flat(im, done));
-  PetscCheck(
-    im->item[3].n, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
-    "%s: nothing is left: every tetrahedron is flat or uses a vertex twice; check -merge_tolerance and the "
-    "scale of the file",
-    im->where);
+  PetscCheck(im->item[3].n, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
+             "%s: nothing is left: every tetrahedron is flat or uses a vertex twice; check -merge_tolerance "
+             "and the scale of the file",
+             im->where);
   turned = im->nreoriented;
   ierr = SbImportCheck(im, &faces);
   done->nturned = im->nreoriented - turned;

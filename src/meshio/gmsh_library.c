@@ -51,11 +51,10 @@ static PetscErrorCode load(const char *where, void **library, int *minor)
     error = dlerror();
     if (error && !strstr(error, name)) (void)snprintf(why, sizeof(why), "; %s", error);
   }
-  SETERRQ(
-    PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
-    "%s: needs the gmsh library (libgmsh.so.4.%d or later), which cannot be loaded; install the package "
-    "gmsh (Debian, Ubuntu), which brings it, or add its folder to LD_LIBRARY_PATH%s",
-    where, OLDEST, why);
+  SETERRQ(PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
+          "%s: needs the gmsh library (libgmsh.so.4.%d or later), which cannot be loaded; install the "
+          "package gmsh (Debian, Ubuntu), which brings it, or add its folder to LD_LIBRARY_PATH%s",
+          where, OLDEST, why);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -45,8 +45,7 @@ PetscErrorCode SbImportCheckTypes(const SbImport *im)
     const char *advice =
       strstr(SbGmshTypes[t].name, "tetra")
         ? "supple needs 4-node ones (gmsh: Mesh.ElementOrder = 1)"
-        : "supple simulates tetrahedra only: split them (gmsh: Mesh.SubdivisionAlgorithm = 0, "
-          "Recombine off)";
+        : "supple simulates tetrahedra only: split them (gmsh: Mesh.SubdivisionAlgorithm = 0, Recombine off)";
 
     PetscCheck(t == SB_GMSH_TET || SbGmshTypes[t].dim < 3 || !im->count[t], PETSC_COMM_SELF,
                PETSC_ERR_FILE_UNEXPECTED, "%s: holds %lld %s; %s", im->where, (long long)im->count[t],

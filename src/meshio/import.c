@@ -105,11 +105,10 @@ static PetscErrorCode find_reader(const SbBody *body, SbReader *read)
   if (*read) PetscFunctionReturn(PETSC_SUCCESS);
   (void)snprintf(node, sizeof(node), "%s.node", body->mesh);
   PetscCall(PetscTestFile(node, 'r', &tetgen));
-  PetscCheck(
-    tetgen, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
-    "%s%s%smesh '%s' is of no known kind; give a file that ends in %s (or the name of TetGen's files "
-    "without an ending), or box:lx,ly,lz:n",
-    body->name[0] ? "body '" : "", body->name, body->name[0] ? "': " : "", body->mesh, known);
+  PetscCheck(tetgen, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
+             "%s%s%smesh '%s' is of no known kind; give a file that ends in %s (or the name of TetGen's "
+             "files without an ending), or box:lx,ly,lz:n",
+             body->name[0] ? "body '" : "", body->name, body->name[0] ? "': " : "", body->mesh, known);
   *read = SbImportRead_TetGen;
   PetscFunctionReturn(PETSC_SUCCESS);
 }

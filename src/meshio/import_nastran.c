@@ -276,11 +276,10 @@ static PetscErrorCode read_grid(Nastran *b)
   PetscCall(next_label(b, "number of a node", &label));
   PetscCall(next_number(b, "coordinate system of a node", 0, &system));
   if (system)
-    SB_SCAN_ERROR(
-      b->scan,
-      "node %lld is given in coordinate system %lld; write all nodes in the basic one (field 3 of "
-      "GRID empty or 0)",
-      (long long)label, (long long)system);
+    SB_SCAN_ERROR(b->scan,
+                  "node %lld is given in coordinate system %lld; write all nodes in the basic one (field 3 "
+                  "of GRID empty or 0)",
+                  (long long)label, (long long)system);
   PetscCall(SbDeckAddNode(&b->deck, label, &x));
   for (int i = 0; i < 3; i++) PetscCall(next_real(b, label, &x[i]));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -176,11 +176,10 @@ static PetscErrorCode cell_type(SbScan *s, const SbVtkGrid *grid, PetscInt c, in
     *type = cells[i].gmsh;
     PetscFunctionReturn(PETSC_SUCCESS);
   }
-  SB_SCAN_ERROR(
-    s,
-    "cell %lld is of VTK's type %g; supple simulates tetrahedra (type 10), with points, lines and "
-    "triangles for groups",
-    (long long)c, vtk);
+  SB_SCAN_ERROR(s,
+                "cell %lld is of VTK's type %g; supple simulates tetrahedra (type 10), with points, lines "
+                "and triangles for groups",
+                (long long)c, vtk);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

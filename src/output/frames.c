@@ -509,11 +509,10 @@ PetscErrorCode SbFramesCheck(SbRun run, SbOutput out)
   PetscCall(find_mesh(run, out, h.file, &step, &ok));
   PetscCall(SbH5Close(&h));
   /* a file of another mesh is replaced, one of this mesh continued */
-  PetscCheck(
-    !ok || corners == out->discontinuous, out->comm, PETSC_ERR_USER_INPUT,
-    "-output_discontinuous is %s, but the frames in %s were written with %s: go on with the same, or give "
-    "another -output_dir",
-    out->discontinuous ? "true" : "false", path, corners ? "true" : "false");
+  PetscCheck(!ok || corners == out->discontinuous, out->comm, PETSC_ERR_USER_INPUT,
+             "-output_discontinuous is %s, but the frames in %s were written with %s: go on with the same, "
+             "or give another -output_dir",
+             out->discontinuous ? "true" : "false", path, corners ? "true" : "false");
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -11,10 +11,8 @@ static const SbOption rows[] = {
    "folder of the results; empty: out/<name of the scenario file>"},
   {"output_fields", SB_OPTION_NAMES, 1, "", "displacement,velocity,von_mises", "",
    "fields in fields.h5: displacement, velocity, acceleration, reaction, contact_force, contact_gap, stress, "
-   "von_mises, "
-   "pressure, "
-   "mean_pressure, J, energy_density, space_error, rank; sets: where the sets and groups are that the "
-   "scenario names; none: no such file"},
+   "von_mises, pressure, mean_pressure, J, energy_density, space_error, rank; sets: where the sets and "
+   "groups are that the scenario names; none: no such file"},
   {"output_every", SB_OPTION_REAL, 1, "s", "0", "[0, inf)",
    "simulated time between frames of fields.h5; 0: output_every_steps counts"},
   {"output_every_steps", SB_OPTION_INT, 1, "", "1", "[1, inf)",

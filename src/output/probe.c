@@ -80,12 +80,10 @@ static PetscErrorCode find_again(const SbMesh mesh, SbOutput out, SbProbe *probe
   mine = deepest_owned(mesh, probe, &probe->cell, probe->weight);
   PetscCall(agree(out, mine, probe->cell < 0 ? 0 : mesh->cell_orig[probe->cell], &probe->cell, &tet, &best));
   if (best > 1e-6)
-    PetscCall(
-      SbWarning(out->comm,
-                "probe '%s': no tet of the re-meshed body holds its position any more; it follows the "
-                "nearest one, from %.2g of "
-                "its size outside",
-                probe->name, (double)best));
+    PetscCall(SbWarning(out->comm,
+                        "probe '%s': no tet of the re-meshed body holds its position any more; it follows "
+                        "the nearest one, from %.2g of its size outside",
+                        probe->name, (double)best));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

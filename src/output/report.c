@@ -189,13 +189,14 @@ PetscErrorCode SbReportRemeshed(SbRun run, const SbRemeshed *event)
   out->remeshed[out->nremeshed++] = *event;
   if (out->quiet) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(SbProgressEnd(out));
-  PetscCall(
-    PetscPrintf(out->comm,
-                "body '%s' is re-meshed after step %" PetscInt_FMT ", t = %g%s: worst quality %.3g -> %.3g, "
-                "%" PetscInt_FMT " -> %" PetscInt_FMT " tets, energy %+.3g J (%+.2g %%)\n",
-                event->body, event->step, (double)event->t, run->model->dynamic ? " s" : "",
-                (double)event->quality[0], (double)event->quality[1], event->tets[0], event->tets[1],
-                (double)change, (double)(event->energy[0] > 0. ? 100. * change / event->energy[0] : 0.)));
+  PetscCall(PetscPrintf(out->comm,
+                        "body '%s' is re-meshed after step %" PetscInt_FMT
+                        ", t = %g%s: worst quality %.3g -> %.3g, %" PetscInt_FMT " -> %" PetscInt_FMT
+                        " tets, energy %+.3g J (%+.2g %%)\n",
+                        event->body, event->step, (double)event->t, run->model->dynamic ? " s" : "",
+                        (double)event->quality[0], (double)event->quality[1], event->tets[0], event->tets[1],
+                        (double)change,
+                        (double)(event->energy[0] > 0. ? 100. * change / event->energy[0] : 0.)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -265,9 +266,9 @@ PetscErrorCode SbReportSummary(SbRun run)
   if (run->want_energies && run->energies.ninverted)
     PetscCall(SbWarning(run->model->comm,
                         "%" PetscInt_FMT
-                        " tetrahedra are inverted or flat at the end (det F down to %g): what "
-                        "they show is no deformation of a body. Smaller steps or loads may avoid it; laws "
-                        "differ in how they come back, see docs/reference/guarantees.md",
+                        " tetrahedra are inverted or flat at the end (det F down to %g): what they show is "
+                        "no deformation of a body. Smaller steps or loads may avoid it; laws differ in how "
+                        "they come back, see docs/reference/guarantees.md",
                         run->energies.ninverted, (double)run->energies.min_J));
   if (out->quiet) PetscFunctionReturn(PETSC_SUCCESS);
   if (!out->rank) PetscCall(print_phases(run, &phases));

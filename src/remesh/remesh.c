@@ -38,9 +38,7 @@ struct _p_SbRemesh {
 static const SbOption rows[] = {
   {"remesh_quality", SB_OPTION_REAL, 1, "", "0", "[0, 1)",
    "a body is re-meshed when the shape 3 r/R of a tet falls below this (1: regular, 0: flat, negative: "
-   "inside "
-   "out); "
-   "0: never for that"},
+   "inside out); 0: never for that"},
   {"remesh_times", SB_OPTION_NAMES, 1, "s", "", "",
    "times at which bodies are re-meshed, with commas between them"},
   {"remesh_failed", SB_OPTION_BOOL, 1, "", "false", "",
@@ -245,9 +243,9 @@ static PetscErrorCode check_after_failure(SbRemesh r, SbRun run, PetscBool *agai
   if (!r->failed || !run->stop_reason[0] || run->step_now <= r->tried) PetscFunctionReturn(PETSC_SUCCESS);
   r->tried = run->step_now;
   if (!run->step_now) {
-    PetscCall(SbWarning(run->model->comm,
-                        "-remesh_failed: the first step failed, with the bodies as they were "
-                        "given: none is re-meshed, their meshes, loads or steps must change"));
+    PetscCall(
+      SbWarning(run->model->comm, "-remesh_failed: the first step failed, with the bodies as they were "
+                                  "given: none is re-meshed, their meshes, loads or steps must change"));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   PetscCall(SbBodyQualities(run->model, run->U, r->named, r->worst));

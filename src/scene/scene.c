@@ -15,9 +15,8 @@ static const SbOption run_rows[] = {
 static const SbOption body_rows[] = {
   {"mesh", SB_OPTION_STRING, 1, "", NULL, "",
    "mesh of tetrahedra: a file (.msh .mesh .vtk .vtu .unv .inp .bdf .ele .vol .h5 and others: "
-   "docs/reference/meshes.md), "
-   "a closed surface to fill (.stl .obj .off .ply .poly .smesh), or box:lx,ly,lz:n, or "
-   "box:lx,ly,lz:nx,ny,nz (m, cells)"},
+   "docs/reference/meshes.md), a closed surface to fill (.stl .obj .off .ply .poly .smesh), or "
+   "box:lx,ly,lz:n, or box:lx,ly,lz:nx,ny,nz (m, cells)"},
   {"mesh_step", SB_OPTION_INT, 1, "", "0", "[-1, inf)",
    "when the mesh is a run's output (fields.h5): the step whose positions are taken; 0: at rest, -1: the "
    "last"},

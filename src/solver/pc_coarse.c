@@ -141,8 +141,8 @@ static PetscErrorCode simplify(TwoLevel *p)
   PetscCall(PCDestroy(&p->fine));
   PetscCall(
     SbWarning(p->space->comm,
-              "the incomplete factorisation is not positive definite (very flat tets, or nu near 1/2): "
-              "going on with the diagonal in its place, which is slower; -solver cg_gamg may be faster"));
+              "the incomplete factorisation is not positive definite (very flat tets, or nu near 1/2): going "
+              "on with the diagonal in its place, which is slower; -solver cg_gamg may be faster"));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -322,9 +322,8 @@ PetscErrorCode SbPCCoarseCreate(SbSpace s, PC pc)
              " is negative: give a number of aggregates, or 0 to choose by size",
              p->wanted);
   PetscCheck(p->limit >= -1, s->comm, PETSC_ERR_USER,
-             "-pc_coarse_gathered %" PetscInt_FMT
-             " is below -1: give the largest number of aggregates that one rank factors, 0 for "
-             "none, or -1 to choose by size",
+             "-pc_coarse_gathered %" PetscInt_FMT " is below -1: give the largest number of aggregates that "
+                                                  "one rank factors, 0 for none, or -1 to choose by size",
              p->limit);
   PetscCall(PCSetType(pc, PCSHELL));
   PetscCall(PCShellSetContext(pc, p));

@@ -121,15 +121,12 @@ static const SbSolverPreset by_type[] = {
 static const SbOption rows[] = {
   {"solver", SB_OPTION_CHOICE, 1, "", "auto",
    "auto|direct|cg|cg_jacobi|cg_pbjacobi|cg_icc|cg_ssor|cg_two_level|cg_gamg|cg_hypre|gauss_seidel|sor|"
-   "cholmod|"
-   "umfpack|mumps|rotated|realtime|pressure",
+   "cholmod|umfpack|mumps|rotated|realtime|pressure",
    "linear solver; auto chooses by size, ranks and material and says why, direct takes the fastest "
-   "factorisation "
-   "that this PETSc has for the problem. PETSc's -ksp_ and -pc_ options refine it"},
+   "factorisation that this PETSc has for the problem. PETSc's -ksp_ and -pc_ options refine it"},
   {"reproducible", SB_OPTION_BOOL, 1, "", "false", "",
    "every run on the same number of ranks has the same bits: several ranks factor on one of them, and never "
-   "by MUMPS or SuperLU_DIST, "
-   "which add in the order in which messages come"},
+   "by MUMPS or SuperLU_DIST, which add in the order in which messages come"},
 };
 
 PetscErrorCode SbSolverRegister(void)
@@ -324,17 +321,18 @@ PetscErrorCode SbSolverChoose(SbSpace s, PetscBool dynamic, PetscBool linear, Pe
     name = package;
     PetscCall(PetscSNPrintf(reason, size,
                             "%" PetscInt_FMT
-                            " unknowns, nu up to %g, %.2g %% of the tets slivers (angles below %g "
-                            "degrees): a factorisation, iterations hardly get there",
+                            " unknowns, nu up to %g, %.2g %% of the tets slivers (angles below %g degrees): "
+                            "a factorisation, iterations hardly get there",
                             unknowns, (double)hard.nu, 100. * (double)hard.sliver_part, SB_SLIVER));
   } else if (s->faces && !s->nodal && !s->constraints && !s->coupled &&
              (hard.face_nu > NU_PRESSURE || (!hard.slivers && (!dynamic || hard.dg)))) {
     /* docs/reports/solver_choice.md; 24k tets of CR, dynamic, CPU s of this and cg_two_level at nu 0.3 12 and 7, at 0.45 15 and 11, at 0.49 17 and 17 */
     name = "pressure";
-    PetscCall(PetscSNPrintf(reason, size,
-                            "%s, %" PetscInt_FMT " unknowns of cr or dg, nu up to %g: iterations that grow "
-                            "neither towards 1/2 nor with the mesh",
-                            dynamic ? "dynamic" : "static", unknowns, (double)hard.face_nu));
+    PetscCall(PetscSNPrintf(
+      reason, size,
+      "%s, %" PetscInt_FMT
+      " unknowns of cr or dg, nu up to %g: iterations that grow neither towards 1/2 nor with the mesh",
+      dynamic ? "dynamic" : "static", unknowns, (double)hard.face_nu));
   } else {
     /* 192k tets, CPU s of one rank. Static: 0.36 (cg_gamg 1.7, cg_icc 1.4), at nu 0.45 0.7 (2.3), at 0.499 4.2 (18); dynamic, h = 0.01 s: 0.22 (1.7, 0.40) */
     name = "cg_two_level";
@@ -596,8 +594,7 @@ static PetscErrorCode check_factor(PC pc, Mat A)
   PetscCall(PetscObjectTypeCompareAny((PetscObject)pc, &distributed, PCLU, PCCHOLESKY, ""));
   PetscCheck(!reproducible || size == 1 || !distributed, PetscObjectComm((PetscObject)pc), PETSC_ERR_USER,
              "-reproducible: a factorisation on %d ranks has other last digits in each run; choose -solver "
-             "direct, which "
-             "factors on one of them",
+             "direct, which factors on one of them",
              (int)size);
   for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(of); i++) {
     PetscCall(PetscObjectTypeCompare((PetscObject)pc, of[i].type, &is));
@@ -624,8 +621,7 @@ static PetscErrorCode check_method(SbSpace s, KSP ksp, PC pc, const SbSolverPres
   PetscCall(PetscObjectTypeCompare((PetscObject)ksp, KSPMINRES, &minres));
   PetscCheck(!minres || preset->precondition != SbPCRotatedCreate, s->comm, PETSC_ERR_USER,
              "-ksp_type minres does not converge with the single precision of -solver %s: choose -ksp_type "
-             "cg, or another "
-             "-solver",
+             "cg, or another -solver",
              preset->name);
   PetscCall(PetscObjectTypeCompare((PetscObject)ksp, KSPPREONLY, &single));
   PetscCall(
@@ -639,13 +635,11 @@ static PetscErrorCode check_method(SbSpace s, KSP ksp, PC pc, const SbSolverPres
   PetscCall(PCGetType(pc, &type));
   PetscCheck(*direct || parts, s->comm, PETSC_ERR_USER,
              "-ksp_type preonly takes the preconditioner for the inverse, which %s %s is not: choose "
-             "-pc_type cholesky "
-             "or lu, or a -ksp_type that iterates (cg, minres, gmres)",
+             "-pc_type cholesky or lu, or a -ksp_type that iterates (cg, minres, gmres)",
              strcmp(type, PCSHELL) ? "-pc_type" : "-solver", strcmp(type, PCSHELL) ? type : preset->name);
-  PetscCheck(
-    !s->constraints || s->constraints->saddle == SB_SADDLE_DIRECT, s->comm, PETSC_ERR_USER,
-    "-ksp_type preonly does not hold the contact constraints, which join nodes beside the matrix: choose "
-    "-ksp_type cg or fgmres");
+  PetscCheck(!s->constraints || s->constraints->saddle == SB_SADDLE_DIRECT, s->comm, PETSC_ERR_USER,
+             "-ksp_type preonly does not hold the contact constraints, which join nodes beside the matrix: "
+             "choose -ksp_type cg or fgmres");
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -731,8 +725,7 @@ PetscErrorCode SbSolverChooseIndefinite(MPI_Comm comm, size_t size, char choice[
   PetscCall(SbHasPackage("umfpack", &umfpack));
   PetscCheck(mumps || umfpack, comm, PETSC_ERR_USER,
              "-static_control arc_length factors indefinite matrices, which takes MUMPS or UMFPACK, and this "
-             "PETSc has "
-             "neither: choose another -solver");
+             "PETSc has neither: choose another -solver");
   PetscCallMPI(MPI_Comm_size(comm, &nrank));
   PetscCall(SbSolverReproducible(&reproducible));
   if (reproducible && nrank > 1 && umfpack) mumps = PETSC_FALSE;

@@ -292,14 +292,14 @@ static PetscErrorCode refuse_open(const SbTriangleFile *f, PetscInt n, const Pet
 
   PetscFunctionBeginUser;
   if (need > 0 && f->groups)
-    (void)snprintf(what, sizeof(what),
-                   "every open edge has a partner within %.3g m: %s %.2g joins them, if that is "
-                   "rounding and not shape",
-                   (double)need, SbImportOption(f->groups, "merge_tolerance", option), (double)(1.1 * need));
+    (void)snprintf(
+      what, sizeof(what),
+      "every open edge has a partner within %.3g m: %s %.2g joins them, if that is rounding and not shape",
+      (double)need, SbImportOption(f->groups, "merge_tolerance", option), (double)(1.1 * need));
   SETERRQ(PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
           "%s: the surface is open: %" PetscInt_FMT
-          " edges have a triangle on one side only, the first is that of "
-          "triangle %lld from (%.6g, %.6g, %.6g) to (%.6g, %.6g, %.6g) m; %s",
+          " edges have a triangle on one side only, the first is that of triangle %lld from (%.6g, %.6g, "
+          "%.6g) to (%.6g, %.6g, %.6g) m; %s",
           f->where, n, (long long)f->number[slot[0] / 3], (double)a[0], (double)a[1], (double)a[2],
           (double)b[0], (double)b[1], (double)b[2], what);
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -166,10 +166,10 @@ static PetscErrorCode make_surface(const char *path, const SbImport *im, SbTrian
   PetscCall(SbDropUnusedPoints(&f->t->nvert, f->t->x, 3 * f->t->ntri, f->t->tri));
   PetscCall(weld_tolerance(f, im->tet.merge_tolerance, &tolerance, &edge));
   PetscCall(SbSurfaceMergeVertices(f, tolerance, &repairs));
-  PetscCheck(f->t->ntri, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
-             "%s: no triangle is left when vertices within %g m are one; give a smaller %s, or "
-             "check the scale",
-             f->where, (double)tolerance, SbImportOption(im, "merge_tolerance", option));
+  PetscCheck(
+    f->t->ntri, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
+    "%s: no triangle is left when vertices within %g m are one; give a smaller %s, or check the scale",
+    f->where, (double)tolerance, SbImportOption(im, "merge_tolerance", option));
   PetscCall(SbSurfaceRepairTriangles(f, &repairs));
   PetscCall(SbSurfaceUntangle(f, im->tet.untangle >= 0 ? im->tet.untangle : 0.5 * edge, &repairs));
   PetscCall(SbSurfaceFindRegions(f, &repairs, s));

@@ -77,8 +77,7 @@ static PetscErrorCode visit_connected(const Space *s, PetscInt first, const Pets
       } else if (sense[g] != same * sense[f]) {
         SETERRQ(PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
                 "%s: the surface has one side only (a Moebius strip or Klein bottle) around triangles %lld "
-                "and %lld; it "
-                "encloses nothing, cut it there",
+                "and %lld; it encloses nothing, cut it there",
                 s->f->where, (long long)s->f->number[f], (long long)s->f->number[g]);
       }
     }
@@ -222,8 +221,7 @@ static PetscErrorCode find_shells(Space *s)
   s->nsurface = SbUnionNumber(s->t->ntri, s->surface);
   PetscCheck(s->nsurface <= PARTS_MAX, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
              "%s: the surface consists of %" PetscInt_FMT
-             " parts; supple takes up to %d: remove the specks around it "
-             "(meshlab: remove isolated pieces)",
+             " parts; supple takes up to %d: remove the specks around it (meshlab: remove isolated pieces)",
              s->f->where, s->nsurface, PARTS_MAX);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

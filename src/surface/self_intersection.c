@@ -62,8 +62,8 @@ static PetscErrorCode name_pairs(const SbTriangleFile *f, const Search *s, const
   }
   SETERRQ(PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
           "%s: the surface cuts or touches itself at %" PetscInt_FMT
-          " pair%s of triangles: %s%s, near (%.6g, "
-          "%.6g, %.6g) m; %s; join the parts into one (meshlab, blender: boolean union), or move them apart",
+          " pair%s of triangles: %s%s, near (%.6g, %.6g, %.6g) m; %s; join the parts into one (meshlab, "
+          "blender: boolean union), or move them apart",
           f->where, s->n, s->n == 1 ? "" : "s", text, s->n > NAMED ? ", ..." : "", (double)x[0], (double)x[1],
           (double)x[2], why);
   PetscFunctionReturn(PETSC_SUCCESS);

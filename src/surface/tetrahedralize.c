@@ -267,8 +267,7 @@ static PetscErrorCode prepare(const char *where, const SbSurface *s, const SbTet
   /* A tet of edge h has the volume h^3 / (6 sqrt(2)); a mesh has some ten percent more tets. */
   job->expected = 6 * PETSC_SQRT2 * all / (job->size * job->size * job->size);
   PetscCheck(job->expected < SB_TET_MOST, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
-             "%s: a size of %g m makes about %.2g tets out of %.4g m^3; give a size of at least %.3g m "
-             "(%s)",
+             "%s: a size of %g m makes about %.2g tets out of %.4g m^3; give a size of at least %.3g m (%s)",
              where, (double)job->size, (double)job->expected, (double)all,
              (double)(job->size * PetscPowReal(job->expected / SB_TET_MOST, 1. / 3)),
              SbImportOption(body, "tet_size", option));
@@ -319,8 +318,8 @@ PetscErrorCode SbTetrahedralize(const char *where, const SbSurface *s, const SbT
   PetscCall(PetscFree(scaled.x));
   PetscCall(ierr);
   PetscCheck(done, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
-             "%s: no tets could be made of the surface. %s. Try another %s, %s "
-             "keep or remesh, or repair the surface where it is thinner than its triangles",
+             "%s: no tets could be made of the surface. %s. Try another %s, %s keep or remesh, or repair the "
+             "surface where it is thinner than its triangles",
              where, reasons, SbImportOption(body, "tet_size", size_option),
              SbImportOption(body, "tet_surface", surface_option));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -309,11 +309,10 @@ static PetscErrorCode explain(SbRun run, PetscReal factor, PetscReal l)
     PetscCall(SbRunFail(run, "load factor %g: nothing holds the body %s against %s; hold it by a support",
                         (double)factor, run->model->body[body].name, motion));
   else
-    PetscCall(SbRunFail(
-      run,
-      "the path reached the load factor %.7g, and no step of %.1e of the first one's length was found to "
-      "go on: %s",
-      (double)factor, (double)(2. * l / run->arc.first), why));
+    PetscCall(SbRunFail(run,
+                        "the path reached the load factor %.7g, and no step of %.1e of the first one's "
+                        "length was found to go on: %s",
+                        (double)factor, (double)(2. * l / run->arc.first), why));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -327,17 +326,15 @@ PetscErrorCode SbArcLengthCheck(SbRun run)
   PetscFunctionBeginUser;
   PetscCheck(!m->nbegin_step && !m->npotential, m->comm, PETSC_ERR_USER_INPUT,
              "-static_control arc_length does not know contact (effect %s): use -static_control load, or a "
-             "dynamic run "
-             "with damping",
+             "dynamic run with damping",
              name);
   PetscCall(SNESGetKSP(run->snes, &ksp));
   PetscCall(PetscObjectTypeCompare((PetscObject)ksp, KSPCG, &cg));
   PetscCall(PetscStrcmp(run->solver, "cholmod", &cholmod));
-  PetscCheck(
-    !cg && !cholmod, m->comm, PETSC_ERR_USER_INPUT,
-    "-static_control arc_length meets indefinite matrices, which -solver %s does not take: leave -solver to "
-    "auto, or give mumps or umfpack",
-    run->solver);
+  PetscCheck(!cg && !cholmod, m->comm, PETSC_ERR_USER_INPUT,
+             "-static_control arc_length meets indefinite matrices, which -solver %s does not take: leave "
+             "-solver to auto, or give mumps or umfpack",
+             run->solver);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -35,11 +35,12 @@ PetscErrorCode SbRunRejectInverted(SbRun run, PetscReal t, PetscReal dt, const V
   if (n[1] <= n[0]) PetscFunctionReturn(PETSC_SUCCESS);
   *ok = PETSC_FALSE;
   run->rejected_inverted = PETSC_TRUE;
-  PetscCall(SbRunFail(
-    run,
-    "%s %g to %g would invert %" PetscInt_FMT " more tet%s (smallest det F %.3g, before it %.3g), which "
-    "-time_inverted reject; re-mesh the body before that (-remesh_quality), or give it a finer mesh",
-    run->ts ? "the step from t, s =" : "the step from the load factor", (double)t, (double)(t + dt),
-    n[1] - n[0], n[1] - n[0] == 1 ? "" : "s", (double)least[1], (double)least[0]));
+  PetscCall(SbRunFail(run,
+                      "%s %g to %g would invert %" PetscInt_FMT
+                      " more tet%s (smallest det F %.3g, before it %.3g), which -time_inverted reject; "
+                      "re-mesh the body before that (-remesh_quality), or give it a finer mesh",
+                      run->ts ? "the step from t, s =" : "the step from the load factor", (double)t,
+                      (double)(t + dt), n[1] - n[0], n[1] - n[0] == 1 ? "" : "s", (double)least[1],
+                      (double)least[0]));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -37,26 +37,22 @@ static const SbOption rows[] = {
   {"time_max_halvings", SB_OPTION_INT, 1, "", "10", "[0, 60]",
    "how often a step that fails is halved before the run stops"},
   {"time_inverted", SB_OPTION_CHOICE, 1, "", "accept", "accept|reject",
-   "a step that inverts tets (det F <= 0): taken, and they are counted; or halved and tried again, "
-   "and the run stops when that does "
-   "not help"},
+   "a step that inverts tets (det F <= 0): taken, and they are counted; or halved and tried again, and the "
+   "run stops when that does not help"},
   {"saddle_solver", SB_OPTION_CHOICE, 1, "", "auto", "auto|direct|iterative",
    "how effects with response multiplier solve for displacements and multipliers: by a factorisation of "
    "both, or by the solver in the null space of the constraints; auto goes by size"},
   {"contact_solver", SB_OPTION_CHOICE, 1, "", "auto", "auto|direct|iterative",
    "how systems with response barrier are solved: by a factorisation, or by CG with a coarse space of what "
-   "touches; auto goes by size and "
-   "by the share of nodes that touch"},
+   "touches; auto goes by size and by the share of nodes that touch"},
   {"static_steps", SB_OPTION_INT, 1, "", "1", "[1, 1000000]",
    "static: equal load steps from zero to full load"},
   {"static_min_increment", SB_OPTION_REAL, 1, "", "1e-4", "(0, 1]",
    "static: smallest load increment, as a part of a load step; where equilibrium asks for a shorter one the "
-   "run "
-   "stops, and says whether a limit load is likely"},
+   "run stops, and says whether a limit load is likely"},
   {"static_control", SB_OPTION_CHOICE, 1, "", "load", "load|arc_length",
    "static: what a step prescribes, the load factor or the length of the path of equilibria, which goes past "
-   "limit loads; "
-   "ends where the load factor reaches 1"},
+   "limit loads; ends where the load factor reaches 1"},
   {"static_max_steps", SB_OPTION_INT, 1, "", "1000", "[1, inf)",
    "arc_length: steps after which the run ends"},
   {"static_max_displacement", SB_OPTION_REAL, 1, "m", "0", "[0, inf)",
@@ -425,11 +421,10 @@ static PetscErrorCode check_newmark(SbRun run)
   const SbModel m = run->model;
 
   PetscFunctionBeginUser;
-  PetscCheck(
-    run->newmark[0] == 0.25 && run->newmark[1] == 0.5, m->comm, PETSC_ERR_USER_INPUT,
-    "-time newmark with the effect %s needs -time_newmark_beta 0.25 and -time_newmark_gamma 0.5, not "
-    "%g and %g: else impacts may gain energy",
-    m->begin_step[0]->name, (double)run->newmark[0], (double)run->newmark[1]);
+  PetscCheck(run->newmark[0] == 0.25 && run->newmark[1] == 0.5, m->comm, PETSC_ERR_USER_INPUT,
+             "-time newmark with the effect %s needs -time_newmark_beta 0.25 and -time_newmark_gamma 0.5, "
+             "not %g and %g: else impacts may gain energy",
+             m->begin_step[0]->name, (double)run->newmark[0], (double)run->newmark[1]);
   PetscCheck(!m->space->consistent_mass, m->comm, PETSC_ERR_USER_INPUT,
              "-time newmark with the effect %s needs -mass lumped: velocities of what touches are put right "
              "node by node",
@@ -437,8 +432,8 @@ static PetscErrorCode check_newmark(SbRun run)
   for (PetscInt e = 0; e < m->nbegin_step; e++)
     PetscCheck(
       !m->begin_step[e]->springs, m->comm, PETSC_ERR_USER_INPUT,
-      "-time newmark gains energy by springs and friction of the effect %s: give "
-      "-effect_%s_response projected or multiplier and no friction, or use euler_implicit or genalpha",
+      "-time newmark gains energy by springs and friction of the effect %s: give -effect_%s_response "
+      "projected or multiplier and no friction, or use euler_implicit or genalpha",
       m->begin_step[e]->name, m->begin_step[e]->name);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -492,8 +487,7 @@ static PetscErrorCode check_contact(SbRun run, PetscBool explicit)
              m->ntime_of_impact ? m->time_of_impact[0]->name : name);
   PetscCheck(run->preset != SB_TIME_GENALPHA || !m->ntime_of_impact, m->comm, PETSC_ERR_USER_INPUT,
              "-time genalpha gains energy with -effect_%s_time_of_impact yes: it takes the acceleration of a "
-             "short step, in "
-             "which nodes are stopped, into a long one; use euler_implicit",
+             "short step, in which nodes are stopped, into a long one; use euler_implicit",
              m->ntime_of_impact ? m->time_of_impact[0]->name : name);
   PetscCall(PetscStrcmp(run->solver, "pressure", &split));
   PetscCheck(!run->solver_used->matrix_free && (!split || !m->nassemble_constraints), m->comm,
@@ -580,10 +574,9 @@ PetscErrorCode SbRunSetUp(SbRun run)
       warped = (PetscBool)(warped || s->region[r].material->tangent == SB_TANGENT_WARPED);
     PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &warped, 1, SB_MPI_BOOL, MPI_LOR, s->comm));
     if (single && warped)
-      PetscCall(SbWarning(s->comm,
-                          "-snes_type ksponly with -time_predictor velocity and a warped tangent may "
-                          "gain energy without bound: give -body_<name>_tangent exact_spd, or leave "
-                          "the predictor out"));
+      PetscCall(SbWarning(
+        s->comm, "-snes_type ksponly with -time_predictor velocity and a warped tangent may gain energy "
+                 "without bound: give -body_<name>_tangent exact_spd, or leave the predictor out"));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }

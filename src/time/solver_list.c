@@ -313,11 +313,10 @@ PetscErrorCode SbSolverListExplain(SbRun run, size_t size, char text[])
     PetscCall(PetscSNPrintf(text, size, "linear solver: %s%s", l->failures, causes));
   else {
     PetscCall(SbSolverNextFallback(run->model->space, KSP_DIVERGED_ITS, PETSC_FALSE, &tried, &next));
-    PetscCall(
-      PetscSNPrintf(text, size,
-                    "linear solver: %s%s; it is the one of -ksp_type and -pc_type, which are not replaced: "
-                    "leave them out%s%s",
-                    l->failures, causes, next ? ", or take -solver " : "", next ? next->name : ""));
+    PetscCall(PetscSNPrintf(text, size,
+                            "linear solver: %s%s; it is the one of -ksp_type and -pc_type, which are not "
+                            "replaced: leave them out%s%s",
+                            l->failures, causes, next ? ", or take -solver " : "", next ? next->name : ""));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -147,12 +147,11 @@ PetscErrorCode SbStaticSolve(SbRun run)
       /* steps have become too short: how far the load has got, and what is likely in the way */
       PetscCall(PetscStrncpy(why, run->stop_reason, sizeof(why)));
       if (run->softening > LIMIT)
-        PetscCall(SbRunFail(
-          run,
-          "the load factor reached %.7g of 1, and no equilibrium was found %.1e further on: a limit "
-          "load is likely, as displacements grow %.0f times as fast with the load as at first; "
-          "-static_control arc_length goes past it",
-          (double)factor, (double)(2. * length), (double)run->softening));
+        PetscCall(SbRunFail(run,
+                            "the load factor reached %.7g of 1, and no equilibrium was found %.1e further "
+                            "on: a limit load is likely, as displacements grow %.0f times as fast with the "
+                            "load as at first; -static_control arc_length goes past it",
+                            (double)factor, (double)(2. * length), (double)run->softening));
       else if (factor > 0.)
         PetscCall(SbRunFail(run, "the load factor reached %.7g of 1; %s", (double)factor, why));
       break;

@@ -131,11 +131,10 @@ PetscErrorCode SbToolRun(SbTool *tool)
 
   PetscFunctionBeginUser;
   while (strcmp(command->name, tool->command)) command++;
-  PetscCheck(
-    command->run != tet || SbMeshFileIsSurface(tool->in), PETSC_COMM_SELF, PETSC_ERR_USER,
-    "%s: is no surface that tet can fill, by its name; give a closed surface of triangles (.stl, .obj, "
-    ".off, .ply, ...); supple-mesh info says what a mesh of tets holds",
-    tool->in);
+  PetscCheck(command->run != tet || SbMeshFileIsSurface(tool->in), PETSC_COMM_SELF, PETSC_ERR_USER,
+             "%s: is no surface that tet can fill, by its name; give a closed surface of triangles (.stl, "
+             ".obj, .off, .ply, ...); supple-mesh info says what a mesh of tets holds",
+             tool->in);
   PetscCall(read_mesh(tool, &mesh));
   ierr = command->run(tool, mesh);
   if (!ierr && tool->view[0]) ierr = SbToolView(tool, mesh);

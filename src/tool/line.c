@@ -60,9 +60,8 @@ PetscErrorCode SbToolHelp(void)
   for (const SbToolCommand *c = SbToolCommands; c->name; c++)
     PetscCall(PetscPrintf(PETSC_COMM_WORLD, "  supple-mesh %-8s%-12s %s\n", c->name, c->files, c->help));
   PetscCall(
-    PetscPrintf(PETSC_COMM_WORLD,
-                "\nFILE: whatever -body_<name>_mesh takes, also box:lx,ly,lz:n. OUT: .msh (gmsh), or .h5 "
-                "(supple's own, with an .xmf for ParaView).\n\nOptions\n"));
+    PetscPrintf(PETSC_COMM_WORLD, "\nFILE: whatever -body_<name>_mesh takes, also box:lx,ly,lz:n. OUT: .msh "
+                                  "(gmsh), or .h5 (supple's own, with an .xmf for ParaView).\n\nOptions\n"));
   for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(rows); i++) {
     const SbOption *r = &rows[i];
 
@@ -142,9 +141,8 @@ PetscErrorCode SbToolCommandLine(int *argc, char *argv[], SbToolLine *line)
 /* Options of PETSc that make sense here. */
 static PetscBool is_petsc(const char *name)
 {
-  return SbBeginsWith(
-    name, "log_ malloc options_ info on_error_ error_ memory fp_trap no_signal_handler start_in_debugger "
-          "skip_petscrc citations");
+  return SbBeginsWith(name, "log_ malloc options_ info on_error_ error_ memory fp_trap no_signal_handler "
+                            "start_in_debugger skip_petscrc citations");
 }
 
 static PetscErrorCode check_option(const char *name, const char *command)
