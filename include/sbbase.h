@@ -169,6 +169,23 @@ PetscErrorCode SbCaughtRaise(MPI_Comm comm, const SbCaughtError *caught);
 /* One line `supple: warning: ...` on stderr by rank 0 of comm; a printf format without newline. Collective. */
 PetscErrorCode SbWarning(MPI_Comm comm, const char *format, ...) PETSC_ATTRIBUTE_FORMAT(2, 3);
 
+/* ------------------------------------------------------------------ arrays */
+
+/*
+  SbGroupByKey - positions 0..n-1 by their keys: those with key k are item[start[k]..start[k + 1]), ascending.
+
+  Not collective. Positions with a key below 0 or from nkey on take no part. Output: start[nkey + 1], item[start[nkey]]; the caller frees both.
+*/
+PetscErrorCode SbGroupByKey(PetscInt n, const PetscInt key[], PetscInt nkey, PetscInt **start,
+                            PetscInt **item);
+/*
+  SbGatherAll - one array on all ranks, of those of all ranks in their order.
+
+  Collective. Input: mine[n]. Output: total; all, address of a pointer to the array, which the caller frees; before (or NULL), entries of lower ranks.
+*/
+PetscErrorCode SbGatherAll(MPI_Comm comm, MPI_Datatype type, PetscInt n, const void *mine, PetscInt *total,
+                           void *all, PetscInt *before);
+
 /* ------------------------------------------------------------------ memory */
 
 /* From here on arrays of 32 MiB and more are given back to the system when they are freed. After PetscInitialize(). */

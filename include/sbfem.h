@@ -112,6 +112,8 @@ PetscErrorCode SbSpaceRestoreLocalRead(SbSpace space, Vec v, const PetscReal **a
 /* Lends the local array of `v` for writing; values in ghost entries are ignored afterwards. Not collective. */
 PetscErrorCode SbSpaceGetLocalWrite(SbSpace space, Vec v, PetscReal **array);
 PetscErrorCode SbSpaceRestoreLocalWrite(SbSpace space, Vec v, PetscReal **array);
+/* Brings x[nnode][3] of owned nodes to the ghosts of other ranks. Collective. */
+PetscErrorCode SbSpaceUpdateGhosts(SbSpace space, PetscReal x[]);
 
 /* f[nnode][3] += internal force (stress divergence and beta K v), N. Right on owned nodes. Not collective. */
 PetscErrorCode SbSpaceAddInternalForce(SbSpace space, const SbStage *stage, PetscReal f[]);

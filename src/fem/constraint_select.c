@@ -62,28 +62,6 @@ static PetscErrorCode project_constrained(SbSpace s, const PetscInt sorted[], Al
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* One array from the arrays of all ranks. */
-static PetscErrorCode gather(MPI_Comm comm, MPI_Datatype type, size_t size, PetscInt n, const void *mine,
-                             PetscInt *total, void **all, PetscInt *first)
-{
-  PetscMPIInt nrank, rank, count, *counts, *offsets;
-
-  PetscFunctionBeginUser;
-  PetscCallMPI(MPI_Comm_size(comm, &nrank));
-  PetscCallMPI(MPI_Comm_rank(comm, &rank));
-  PetscCall(PetscMalloc2(nrank, &counts, nrank, &offsets));
-  PetscCall(PetscMPIIntCast(n, &count));
-  PetscCallMPI(MPI_Allgather(&count, 1, MPI_INT, counts, 1, MPI_INT, comm));
-  offsets[0] = 0;
-  for (PetscMPIInt r = 1; r < nrank; r++) offsets[r] = offsets[r - 1] + counts[r - 1];
-  *total = offsets[nrank - 1] + counts[nrank - 1];
-  if (first) *first = offsets[rank];
-  PetscCall(PetscMalloc((size_t)*total * size, all));
-  PetscCallMPI(MPI_Allgatherv(mine, count, type, *all, counts, offsets, type, comm));
-  PetscCall(PetscFree2(counts, offsets));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 static PetscErrorCode gather_constraints(SbSpace s, All *a)
 {
   SbConstraints c = s->constraints;
@@ -101,11 +79,10 @@ static PetscErrorCode gather_constraints(SbSpace s, All *a)
       for (int k = 0; k < 3; k++) coef[3 * nentry + k] = c->coef[3 * e + k];
     }
   }
-  PetscCall(gather(s->comm, MPIU_INT, sizeof(PetscInt), n, id, &a->n, (void **)&a->id, &a->first));
-  PetscCall(gather(s->comm, MPIU_INT, sizeof(PetscInt), n, length, &total, (void **)&lengths, NULL));
-  PetscCall(gather(s->comm, MPIU_INT, sizeof(PetscInt), nentry, node, &total, (void **)&a->node, NULL));
-  PetscCall(
-    gather(s->comm, MPIU_REAL, sizeof(PetscReal), 3 * nentry, coef, &nentry, (void **)&a->coef, NULL));
+  PetscCall(SbGatherAll(s->comm, MPIU_INT, n, id, &a->n, &a->id, &a->first));
+  PetscCall(SbGatherAll(s->comm, MPIU_INT, n, length, &total, &lengths, NULL));
+  PetscCall(SbGatherAll(s->comm, MPIU_INT, nentry, node, &total, &a->node, NULL));
+  PetscCall(SbGatherAll(s->comm, MPIU_REAL, 3 * nentry, coef, &nentry, &a->coef, NULL));
   PetscCall(PetscFree4(id, length, node, coef));
   PetscCall(PetscMalloc1(a->n + 1, &a->start));
   a->start[0] = 0;

@@ -17,30 +17,9 @@ typedef struct {
   const PetscInt *node;
   PetscInt nodes; /* in a group */
   PetscInt nbatch;
-  PetscInt *start,
-    *slot;          /* [nnode_owned+2] slots at which each owned node stands, one for each group around it */
-  PetscInt *offset; /* [nbatch][nodes^2][SB_BATCH] to be filled; NULL: not wanted */
+  PetscInt *start, *slot; /* slots at which each owned node stands, one for each group around it */
+  PetscInt *offset;       /* [nbatch][nodes^2][SB_BATCH] to be filled; NULL: not wanted */
 } Groups;
-
-/* Padding lanes count as the group that they repeat: its columns are marked once more, and they get its positions. */
-static PetscErrorCode invert_groups(SbSpace s, Groups *g)
-{
-  const PetscInt n = g->nodes * SB_BATCH * g->nbatch;
-  PetscInt *next;
-
-  PetscFunctionBeginUser;
-  PetscCall(PetscCalloc1(s->nnode_owned + 2, &g->start));
-  for (PetscInt k = 0; k < n; k++) {
-    if (g->node[k] < s->nnode_owned) g->start[g->node[k] + 2]++;
-  }
-  for (PetscInt i = 1; i <= s->nnode_owned; i++) g->start[i + 1] += g->start[i];
-  PetscCall(PetscMalloc1(g->start[s->nnode_owned + 1], &g->slot));
-  next = g->start + 1;
-  for (PetscInt k = 0; k < n; k++) {
-    if (g->node[k] < s->nnode_owned) g->slot[next[g->node[k]]++] = k;
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
 
 /* Node 0 of the group that has a node at a slot; its node b follows SB_BATCH b behind. */
 static inline const PetscInt *slot_group(const Groups *g, PetscInt slot)
@@ -123,7 +102,8 @@ static PetscErrorCode create_groups(SbSpace s, const PetscInt node[], PetscInt n
   g->node = node;
   g->nodes = nodes;
   g->nbatch = nbatch;
-  PetscCall(invert_groups(s, g));
+  /* padding lanes count as the group that they repeat: its columns are marked once more, and they get its positions */
+  PetscCall(SbGroupByKey(nodes * SB_BATCH * nbatch, node, s->nnode_owned, &g->start, &g->slot));
   PetscCall(PetscMalloc1(npoint, &g->offset));
   for (size_t k = 0; k < npoint; k++) g->offset[k] = SB_NOT_OWNED;
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -71,3 +71,22 @@ PetscErrorCode SbSpaceRestoreLocalWrite(SbSpace s, Vec v, PetscReal **array)
   PetscCall(VecRestoreArray(v, array));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
+
+PetscErrorCode SbSpaceUpdateGhosts(SbSpace s, PetscReal x[])
+{
+  const PetscReal *all;
+  PetscScalar *own;
+  Vec v;
+
+  PetscFunctionBeginUser;
+  if (!s->ghosted) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(SbSpaceCreateVec(s, &v));
+  PetscCall(VecGetArrayWrite(v, &own));
+  PetscCall(PetscArraycpy(own, x, 3 * s->nnode_owned));
+  PetscCall(VecRestoreArrayWrite(v, &own));
+  PetscCall(SbSpaceGetLocalRead(s, v, &all));
+  PetscCall(PetscArraycpy(x, all, 3 * s->nnode));
+  PetscCall(SbSpaceRestoreLocalRead(s, v, &all));
+  PetscCall(VecDestroy(&v));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

@@ -44,11 +44,7 @@ static PetscErrorCode create_slots(SbRecovery r)
 
   PetscFunctionBeginUser;
   /* cells around each vertex: corners 4 c + a, at[start[v]..start[v + 1]) */
-  PetscCall(PetscCalloc1(mesh->nvert + 2, &start));
-  PetscCall(PetscMalloc1(4 * (size_t)mesh->ncell, &at));
-  for (PetscInt i = 0; i < 4 * mesh->ncell; i++) start[mesh->cell[i] + 2]++;
-  for (PetscInt v = 0; v < mesh->nvert; v++) start[v + 2] += start[v + 1];
-  for (PetscInt i = 0; i < 4 * mesh->ncell; i++) at[start[mesh->cell[i] + 1]++] = i;
+  PetscCall(SbGroupByKey(4 * mesh->ncell, mesh->cell, mesh->nvert, &start, &at));
   for (PetscInt v = 0; v < mesh->nvert_owned; v++) longest = PetscMax(longest, start[v + 1] - start[v]);
   PetscCall(PetscMalloc1(longest, &found));
   for (PetscInt v = 0; v < mesh->nvert_owned; v++) {

@@ -202,14 +202,9 @@ static PetscErrorCode border_create(MPI_Comm comm, PetscInt Nvert, const SbLocal
   PetscCall(SbRouteSend(&there, sizeof(PetscInt), orig, &got));
   PetscCall(PetscFree2(orig, dest));
   /* ranks of each vertex of the block, ascending */
-  PetscCall(PetscCalloc1(block + 2, &start));
-  PetscCall(PetscMalloc1(there.nrecv, &holder));
-  for (PetscInt i = 0; i < there.nrecv; i++) start[got[i] - first + 2]++;
-  for (PetscInt v = 0; v < block; v++) start[v + 2] += start[v + 1];
-  for (PetscMPIInt r = 0; r < size; r++) {
-    for (PetscInt i = there.rfirst[r]; i < there.rfirst[r] + there.rcount[r]; i++)
-      holder[start[got[i] - first + 1]++] = r;
-  }
+  for (PetscInt i = 0; i < there.nrecv; i++) got[i] -= first;
+  PetscCall(SbGroupByKey(there.nrecv, got, block, &start, &holder));
+  for (PetscInt i = 0; i < there.nrecv; i++) holder[i] = SbRouteSource(&there, holder[i]);
   PetscCall(SbRouteDestroy(&there));
   PetscCall(PetscFree(got));
   /* each of them gets all of them */

@@ -112,21 +112,6 @@ static PetscErrorCode fill_vertices(const Work *w, SbMesh mesh)
 
 /* ------------------------------------------------------------------ cells */
 
-/* Stable counting sort of the entries of `from` by key[entry] in [0, nkey). */
-static PetscErrorCode sort_by_key(PetscInt n, const PetscInt from[], PetscInt nkey, const PetscInt key[],
-                                  PetscInt to[])
-{
-  PetscInt *next;
-
-  PetscFunctionBeginUser;
-  PetscCall(PetscCalloc1(nkey + 1, &next));
-  for (PetscInt i = 0; i < n; i++) next[key[from[i]] + 1]++;
-  for (PetscInt k = 0; k < nkey; k++) next[k + 1] += next[k];
-  for (PetscInt i = 0; i < n; i++) to[next[key[from[i]]]++] = from[i];
-  PetscCall(PetscFree(next));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* The inclusion of its body that a cell belongs to: 0 for the bulk, else one more than its position in the list. */
 static PetscInt inclusion_of(SbMesh mesh, const SbCellData *cell)
 {
@@ -142,22 +127,29 @@ static PetscInt inclusion_of(SbMesh mesh, const SbCellData *cell)
 static PetscErrorCode order_cells(const Work *w, SbMesh mesh, PetscInt order[])
 {
   const SbLocalMesh *p = w->p;
-  PetscInt *key, *all, *some;
+  PetscInt *key, *some, *at, *start;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscMalloc3(p->ncell, &key, p->ncell, &all, p->ncell, &some));
+  PetscCall(PetscMalloc1(p->ncell, &key));
   for (PetscInt c = 0; c < p->ncell; c++) {
     const PetscInt *v = p->cell + 4 * (size_t)c;
 
     key[c] = PetscMin(PetscMin(w->local[v[0]], w->local[v[1]]), PetscMin(w->local[v[2]], w->local[v[3]]));
-    all[c] = c;
   }
-  PetscCall(sort_by_key(p->ncell, all, mesh->nvert, key, some));
-  for (PetscInt c = 0; c < p->ncell; c++)
-    key[c] = (SB_INCLUSION_MAX + 1) * (p->data[c].body + (c < p->ncell_owned ? 0 : mesh->nbody)) +
+  PetscCall(SbGroupByKey(p->ncell, key, mesh->nvert, &start, &some));
+  PetscCall(PetscFree(start));
+  for (PetscInt i = 0; i < p->ncell; i++) {
+    const PetscInt c = some[i];
+
+    key[i] = (SB_INCLUSION_MAX + 1) * (p->data[c].body + (c < p->ncell_owned ? 0 : mesh->nbody)) +
              inclusion_of(mesh, &p->data[c]);
-  PetscCall(sort_by_key(p->ncell, some, 2 * (SB_INCLUSION_MAX + 1) * mesh->nbody, key, order));
-  PetscCall(PetscFree3(key, all, some));
+  }
+  PetscCall(SbGroupByKey(p->ncell, key, 2 * (SB_INCLUSION_MAX + 1) * mesh->nbody, &start, &at));
+  for (PetscInt i = 0; i < p->ncell; i++) order[i] = some[at[i]];
+  PetscCall(PetscFree(key));
+  PetscCall(PetscFree(some));
+  PetscCall(PetscFree(at));
+  PetscCall(PetscFree(start));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

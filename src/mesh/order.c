@@ -10,36 +10,12 @@
 
 typedef struct {
   const PetscInt *cell; /* [ncell][4] vertices, -1 where one takes no part */
-  PetscInt *start;      /* [nvert + 2] into incident */
-  PetscInt *incident;   /* cells of each vertex */
+  PetscInt *start;      /* [nvert + 1] into incident */
+  PetscInt *incident;   /* corners 4 cell + a at each vertex */
   PetscInt *vert_mark;  /* [nvert] number of the search that came by last */
   PetscInt *cell_mark;  /* [ncell] */
   PetscInt search;
 } Graph;
-
-static PetscErrorCode graph_create(PetscInt nvert, PetscInt ncell, const PetscInt cell[], Graph *g)
-{
-  PetscInt n = 0;
-
-  PetscFunctionBeginUser;
-  g->cell = cell;
-  g->search = 0;
-  PetscCall(PetscCalloc1(nvert + 2, &g->start));
-  PetscCall(PetscCalloc1(nvert, &g->vert_mark));
-  PetscCall(PetscCalloc1(ncell, &g->cell_mark));
-  /* Counted two places ahead, so that filling leaves start[v] at the first cell of vertex v. */
-  for (PetscInt i = 0; i < 4 * ncell; i++) {
-    if (cell[i] < 0) continue;
-    g->start[cell[i] + 2]++;
-    n++;
-  }
-  for (PetscInt v = 0; v < nvert; v++) g->start[v + 2] += g->start[v + 1];
-  PetscCall(PetscMalloc1(n, &g->incident));
-  for (PetscInt i = 0; i < 4 * ncell; i++) {
-    if (cell[i] >= 0) g->incident[g->start[cell[i] + 1]++] = i / 4;
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
 
 static inline PetscInt degree(const Graph *g, PetscInt v)
 {
@@ -52,7 +28,7 @@ static PetscInt append_neighbours(Graph *g, PetscInt v, PetscInt queue[], PetscI
   const PetscInt begin = n;
 
   for (PetscInt i = g->start[v]; i < g->start[v + 1]; i++) {
-    const PetscInt c = g->incident[i];
+    const PetscInt c = g->incident[i] / 4;
 
     if (g->cell_mark[c] == g->search) continue;
     g->cell_mark[c] = g->search;
@@ -91,10 +67,12 @@ static PetscInt search(Graph *g, PetscInt root, PetscInt queue[], PetscInt *last
 
 PetscErrorCode SbOrderRCM(PetscInt nvert, PetscInt ncell, const PetscInt cell[], PetscInt order[])
 {
-  Graph g;
+  Graph g = {.cell = cell};
 
   PetscFunctionBeginUser;
-  PetscCall(graph_create(nvert, ncell, cell, &g));
+  PetscCall(SbGroupByKey(4 * ncell, cell, nvert, &g.start, &g.incident));
+  PetscCall(PetscCalloc1(nvert, &g.vert_mark));
+  PetscCall(PetscCalloc1(ncell, &g.cell_mark));
   for (PetscInt v = 0, done = 0; v < nvert; v++) {
     PetscInt n, last, root;
 

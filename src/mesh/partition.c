@@ -137,24 +137,16 @@ static PetscErrorCode tree_create(MPI_Comm comm, const SbMergedMesh *w, PetscInt
   const PetscInt64 wanted = PetscMax((PetscInt64)SAMPLE * k, SAMPLES);
   const uint64_t bound = wanted >= w->Ncell ? UINT64_MAX : UINT64_MAX / (uint64_t)w->Ncell * (uint64_t)wanted;
   PetscReal(*mine)[3], (*all)[3];
-  PetscMPIInt n = 0, total = 0, *count, *first, size;
+  PetscInt n = 0, total;
 
   PetscFunctionBeginUser;
-  PetscCallMPI(MPI_Comm_size(comm, &size));
-  for (PetscInt c = 0; c < w->ncell; c++) n += 3 * (mix((uint64_t)w->data[c].orig) <= bound);
-  PetscCall(PetscMalloc3(n / 3, &mine, size, &count, size, &first));
+  for (PetscInt c = 0; c < w->ncell; c++) n += mix((uint64_t)w->data[c].orig) <= bound;
+  PetscCall(PetscMalloc1(n, &mine));
   n = 0;
   for (PetscInt c = 0; c < w->ncell; c++)
     if (mix((uint64_t)w->data[c].orig) <= bound) centre(w, c, mine[n++]);
-  n *= 3;
-  PetscCallMPI(MPI_Allgather(&n, 1, MPI_INT, count, 1, MPI_INT, comm));
-  for (PetscMPIInt r = 0; r < size; r++) {
-    first[r] = total;
-    total += count[r];
-  }
-  PetscCall(PetscMalloc1(PetscMax(total / 3, 1), &all));
-  PetscCallMPI(MPI_Allgatherv(mine, n, MPIU_REAL, all, count, first, MPIU_REAL, comm));
-  PetscCall(PetscFree3(mine, count, first));
+  PetscCall(SbGatherAll(comm, MPIU_REAL, 3 * n, mine, &total, &all, NULL));
+  PetscCall(PetscFree(mine));
   PetscCall(PetscMalloc1(2 * (size_t)k, &t->node));
   t->nnode = 1;
   t->nleaf = 0;

@@ -27,7 +27,7 @@ typedef struct {
   PetscInt *used;    /* [im->nvert] their numbers in the file, ascending */
   PetscInt *asked;   /* [vert.nrecv] position of each among those that are kept */
   PetscInt *start;   /* [nkept + 1] */
-  PetscMPIInt *user; /* [start[nkept]] ranks that use a vertex, ascending */
+  PetscInt *user;    /* [start[nkept]] ranks that use a vertex, ascending */
   PetscBool *shared; /* [im->nvert] other ranks use it, too */
 } Slab;
 
@@ -101,14 +101,8 @@ static PetscErrorCode list_users(Slab *s)
 
   PetscFunctionBeginUser;
   for (PetscInt i = 0; i < s->vert.nrecv; i++) s->asked[i] -= s->rows.first;
-  PetscCall(PetscCalloc1(s->nkept + 2, &s->start));
-  PetscCall(PetscMalloc1(s->vert.nrecv, &s->user));
-  for (PetscInt i = 0; i < s->vert.nrecv; i++) s->start[s->asked[i] + 2]++;
-  for (PetscInt v = 0; v < s->nkept; v++) s->start[v + 2] += s->start[v + 1];
-  for (PetscMPIInt r = 0; r < s->size; r++) {
-    for (PetscInt i = s->vert.rfirst[r]; i < s->vert.rfirst[r] + s->vert.rcount[r]; i++)
-      s->user[s->start[s->asked[i] + 1]++] = r;
-  }
+  PetscCall(SbGroupByKey(s->vert.nrecv, s->asked, s->nkept, &s->start, &s->user));
+  for (PetscInt i = 0; i < s->vert.nrecv; i++) s->user[i] = SbRouteSource(&s->vert, s->user[i]);
   for (PetscInt v = 0; v < s->nkept; v++) n += s->start[v + 1] > s->start[v];
   PetscCallMPI(MPI_Scan(&n, &before, 1, MPIU_INT, MPI_SUM, s->comm));
   before -= n;
@@ -503,7 +497,7 @@ static PetscErrorCode find_triangles(Slab *s)
         if (pass) {
           out[n] = got[i];
           from[n] = i;
-          dest[n] = s->user[k];
+          dest[n] = (PetscMPIInt)s->user[k];
         }
         n++;
       }

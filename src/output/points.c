@@ -27,21 +27,9 @@ static PetscErrorCode find_around(SbMesh mesh, SbPoints p)
   PetscInt *key;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscCalloc1(mesh->nvert_owned + 1, &p->start));
-  for (PetscInt i = 0; i < 4 * mesh->ncell; i++) {
-    if (mesh->cell[i] < mesh->nvert_owned) p->start[mesh->cell[i] + 1]++;
-  }
-  for (PetscInt v = 0; v < mesh->nvert_owned; v++) p->start[v + 1] += p->start[v];
-  PetscCall(PetscMalloc1(p->start[mesh->nvert_owned], &p->corner));
+  PetscCall(SbGroupByKey(4 * mesh->ncell, mesh->cell, mesh->nvert_owned, &p->start, &p->corner));
   PetscCall(PetscMalloc1(p->start[mesh->nvert_owned], &key));
-  for (PetscInt i = 0; i < 4 * mesh->ncell; i++) {
-    if (mesh->cell[i] >= mesh->nvert_owned) continue;
-    key[p->start[mesh->cell[i]]] = mesh->cell_orig[i / 4];
-    p->corner[p->start[mesh->cell[i]]++] = i;
-  }
-  // Filling has moved every start to the next one.
-  for (PetscInt v = mesh->nvert_owned; v > 0; v--) p->start[v] = p->start[v - 1];
-  p->start[0] = 0;
+  for (PetscInt i = 0; i < p->start[mesh->nvert_owned]; i++) key[i] = mesh->cell_orig[p->corner[i] / 4];
   for (PetscInt v = 0; v < mesh->nvert_owned; v++)
     PetscCall(
       PetscSortIntWithArray(p->start[v + 1] - p->start[v], key + p->start[v], p->corner + p->start[v]));
@@ -70,21 +58,16 @@ PetscErrorCode SbPointsPrepare(SbRun run, SbOutput out)
 PetscErrorCode SbPointsPrepareForces(SbRun run, SbOutput out)
 {
   const SbSpace s = run->model->space;
-  const PetscReal *all;
   PetscReal *count;
-  Vec v;
 
   PetscFunctionBeginUser;
   if (out->points->valence) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(SbSpaceCreateVec(s, &v));
-  PetscCall(SbSpaceGetLocalWrite(s, v, &count));
+  PetscCall(PetscCalloc1(3 * s->nnode, &count));
   for (PetscInt i = 0; i < 4 * s->mesh->ncell; i++) count[3 * s->cell_node[i]] += 1.;
-  PetscCall(SbSpaceRestoreLocalWrite(s, v, &count));
-  PetscCall(SbSpaceGetLocalRead(s, v, &all));
+  PetscCall(SbSpaceUpdateGhosts(s, count));
   PetscCall(PetscMalloc1(s->nnode, &out->points->valence));
-  for (PetscInt i = 0; i < s->nnode; i++) out->points->valence[i] = all[3 * i];
-  PetscCall(SbSpaceRestoreLocalRead(s, v, &all));
-  PetscCall(VecDestroy(&v));
+  for (PetscInt i = 0; i < s->nnode; i++) out->points->valence[i] = count[3 * i];
+  PetscCall(PetscFree(count));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

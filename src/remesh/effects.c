@@ -8,21 +8,13 @@
 /* The records of all ranks, on all of them. */
 static PetscErrorCode gather_records(SbEffect e, SbSpace space, PetscInt *n, PetscReal **records)
 {
-  PetscMPIInt size, mine, *count, *offset, total = 0;
   PetscReal *own;
-  PetscInt nown;
+  PetscInt nown, total;
 
   PetscFunctionBeginUser;
-  PetscCallMPI(MPI_Comm_size(space->comm, &size));
   SbEffectCall(e, save, space, &nown, &own);
-  PetscCall(PetscMPIIntCast(nown * e->nstate, &mine));
-  PetscCall(PetscMalloc2(size, &count, size, &offset));
-  PetscCallMPI(MPI_Allgather(&mine, 1, MPI_INT, count, 1, MPI_INT, space->comm));
-  for (PetscMPIInt r = 0; r < size; total += count[r++]) offset[r] = total;
-  PetscCall(PetscMalloc1(total, records));
-  PetscCallMPI(MPI_Allgatherv(own, mine, MPIU_REAL, *records, count, offset, MPIU_REAL, space->comm));
+  PetscCall(SbGatherAll(space->comm, MPIU_REAL, nown * e->nstate, own, &total, records, NULL));
   *n = e->nstate ? total / e->nstate : 0;
-  PetscCall(PetscFree2(count, offset));
   PetscCall(PetscFree(own));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

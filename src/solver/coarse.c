@@ -12,46 +12,6 @@
 
 /* ------------------------------------------------------------------ set-up, once */
 
-/* Brings three numbers per node to the ghosts. */
-static PetscErrorCode update_ghosts(SbSpace s, PetscReal x[])
-{
-  const PetscReal *all;
-  PetscScalar *own;
-  Vec v;
-
-  PetscFunctionBeginUser;
-  PetscCall(SbSpaceCreateVec(s, &v));
-  PetscCall(VecGetArray(v, &own));
-  PetscCall(PetscArraycpy(own, x, 3 * s->nnode_owned));
-  PetscCall(VecRestoreArray(v, &own));
-  PetscCall(SbSpaceGetLocalRead(s, v, &all));
-  PetscCall(PetscArraycpy(x, all, 3 * s->nnode));
-  PetscCall(SbSpaceRestoreLocalRead(s, v, &all));
-  PetscCall(VecDestroy(&v));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Own nodes by aggregate; agg still counts from 0 on this rank. */
-static PetscErrorCode list_members(SbCoarse c)
-{
-  const PetscInt nnode = c->space->nnode_owned;
-  PetscInt *next;
-
-  PetscFunctionBeginUser;
-  PetscCall(PetscMalloc2(c->n + 1, &c->member_start, nnode, &c->member));
-  PetscCall(PetscCalloc1(c->n + 1, &next));
-  for (PetscInt i = 0; i < nnode; i++) {
-    if (c->agg[i] >= 0) next[c->agg[i] + 1]++;
-  }
-  for (PetscInt a = 0; a < c->n; a++) next[a + 1] += next[a];
-  PetscCall(PetscArraycpy(c->member_start, next, c->n + 1));
-  for (PetscInt i = 0; i < nnode; i++) {
-    if (c->agg[i] >= 0) c->member[next[c->agg[i]]++] = i;
-  }
-  PetscCall(PetscFree(next));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* Places relative to the centre in units of the radius. */
 static void find_positions(SbCoarse c)
 {
@@ -157,8 +117,8 @@ static PetscErrorCode share_aggregates(SbCoarse c)
   PetscCall(PetscCalloc1(3 * s->nnode, &number));
   for (PetscInt i = 0; i < s->nnode_owned; i++)
     number[3 * i] = c->agg[i] < 0 ? -1. : (PetscReal)(c->first + c->agg[i]);
-  PetscCall(update_ghosts(s, number));
-  PetscCall(update_ghosts(s, c->d));
+  PetscCall(SbSpaceUpdateGhosts(s, number));
+  PetscCall(SbSpaceUpdateGhosts(s, c->d));
   for (PetscInt i = 0; i < s->nnode; i++) c->agg[i] = (PetscInt)number[3 * i];
   PetscCall(PetscFree(number));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -182,7 +142,8 @@ PetscErrorCode SbCoarseCreate(SbSpace s, PetscInt wanted, PetscBool spread, SbCo
   PetscCallMPI(MPI_Allreduce(&c->n, &c->N, 1, MPIU_INT, MPI_SUM, s->comm));
   PetscCallMPI(MPI_Scan(&c->n, &c->first, 1, MPIU_INT, MPI_SUM, s->comm));
   c->first -= c->n;
-  PetscCall(list_members(c));
+  /* own nodes by aggregate: agg still counts from 0 on this rank */
+  PetscCall(SbGroupByKey(s->nnode_owned, c->agg, c->n, &c->member_start, &c->member));
   PetscCall(PetscMalloc1(4 * c->n, &c->centre));
   find_positions(c);
   PetscCall(PetscMalloc1(36 * c->n, &c->null));
@@ -207,7 +168,8 @@ PetscErrorCode SbCoarseDestroy(SbCoarse *coarse)
   PetscCall(PetscFree(c->value));
   PetscCall(PetscFree(c->column));
   PetscCall(PetscFree(c->start));
-  PetscCall(PetscFree2(c->member_start, c->member));
+  PetscCall(PetscFree(c->member_start));
+  PetscCall(PetscFree(c->member));
   PetscCall(PetscFree(c->null));
   PetscCall(PetscFree(c->centre));
   PetscCall(PetscFree(c->d));

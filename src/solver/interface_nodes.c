@@ -30,12 +30,10 @@ typedef struct {
 static PetscErrorCode gather_edges(SbSpace s, Cut *cut)
 {
   const SbPlan p = s->plan;
-  PetscInt *mine;
-  PetscMPIInt size, count = 0, *counts, *offsets;
+  PetscInt *mine, count = 0;
 
   PetscFunctionBeginUser;
-  PetscCallMPI(MPI_Comm_size(s->comm, &size));
-  PetscCall(PetscMalloc3(2 * p->oi[s->nnode_owned], &mine, size, &counts, size + 1, &offsets));
+  PetscCall(PetscMalloc1(2 * p->oi[s->nnode_owned], &mine));
   for (PetscInt i = 0; i < s->nnode_owned; i++) {
     for (PetscInt k = p->oi[i]; k < p->oi[i + 1] && s->fixed[i] != 7; k++) {
       const PetscInt j = p->oj[k];
@@ -45,13 +43,9 @@ static PetscErrorCode gather_edges(SbSpace s, Cut *cut)
       mine[count++] = s->gnode[i];
     }
   }
-  PetscCallMPI(MPI_Allgather(&count, 1, MPI_INT, counts, 1, MPI_INT, s->comm));
-  offsets[0] = 0;
-  for (PetscMPIInt r = 0; r < size; r++) offsets[r + 1] = offsets[r] + counts[r];
-  cut->nedge = offsets[size] / 2;
-  PetscCall(PetscMalloc1(2 * cut->nedge, &cut->edge));
-  PetscCallMPI(MPI_Allgatherv(mine, count, MPIU_INT, cut->edge, counts, offsets, MPIU_INT, s->comm));
-  PetscCall(PetscFree3(mine, counts, offsets));
+  PetscCall(SbGatherAll(s->comm, MPIU_INT, count, mine, &cut->nedge, &cut->edge, NULL));
+  cut->nedge /= 2;
+  PetscCall(PetscFree(mine));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -59,35 +53,25 @@ static PetscErrorCode gather_edges(SbSpace s, Cut *cut)
 static PetscErrorCode make_graph(Cut *cut, const PetscInt start[])
 {
   PetscMPIInt r = 0;
-  PetscInt *next;
 
   PetscFunctionBeginUser;
   cut->nnode = 2 * cut->nedge;
   PetscCall(PetscMalloc1(cut->nnode, &cut->node));
   PetscCall(PetscArraycpy(cut->node, cut->edge, cut->nnode));
   PetscCall(PetscSortRemoveDupsInt(&cut->nnode, cut->node));
-  PetscCall(PetscMalloc4(cut->nnode, &cut->rank, cut->nnode + 1, &cut->ia, 2 * cut->nedge, &cut->ja,
-                         cut->nnode, &cut->chosen));
-  PetscCall(PetscMalloc1(cut->nnode, &next));
+  PetscCall(PetscMalloc2(cut->nnode, &cut->rank, cut->nnode, &cut->chosen));
   PetscCall(PetscMalloc4(cut->nnode, &cut->mate, cut->nnode, &cut->from, cut->nnode, &cut->seen, cut->nnode,
                          &cut->queue));
-  PetscCall(PetscArrayzero(cut->ia, cut->nnode + 1));
   for (PetscInt k = 0; k < cut->nnode; k++) {
     while (cut->node[k] >= start[r + 1]) r++;
     cut->rank[k] = r;
     cut->chosen[k] = PETSC_FALSE;
     cut->seen[k] = -1;
   }
-  for (PetscInt e = 0; e < 2 * cut->nedge; e++) {
+  for (PetscInt e = 0; e < 2 * cut->nedge; e++)
     PetscCall(PetscFindInt(cut->edge[e], cut->nnode, cut->node, &cut->edge[e]));
-    cut->ia[cut->edge[e] + 1]++;
-  }
-  for (PetscInt k = 0; k < cut->nnode; k++) {
-    next[k] = cut->ia[k];
-    cut->ia[k + 1] += cut->ia[k];
-  }
-  for (PetscInt e = 0; e < 2 * cut->nedge; e++) cut->ja[next[cut->edge[e]]++] = cut->edge[e ^ 1];
-  PetscCall(PetscFree(next));
+  PetscCall(SbGroupByKey(2 * cut->nedge, cut->edge, cut->nnode, &cut->ia, &cut->ja));
+  for (PetscInt e = 0; e < 2 * cut->nedge; e++) cut->ja[e] = cut->edge[cut->ja[e] ^ 1];
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -192,7 +176,9 @@ PetscErrorCode SbInterfaceChooseNodes(SbSpace s, PetscInt index[], PetscInt *nmi
   PetscCall(PetscFree2(start, left));
   PetscCall(PetscFree(cut.edge));
   PetscCall(PetscFree(cut.node));
-  PetscCall(PetscFree4(cut.rank, cut.ia, cut.ja, cut.chosen));
+  PetscCall(PetscFree(cut.ia));
+  PetscCall(PetscFree(cut.ja));
+  PetscCall(PetscFree2(cut.rank, cut.chosen));
   PetscCall(PetscFree4(cut.mate, cut.from, cut.seen, cut.queue));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

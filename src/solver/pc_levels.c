@@ -43,35 +43,14 @@ static PetscErrorCode create_elements(SbSpace s, PetscBool p1, SbElement **eleme
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Marks of owned nodes of `to` are brought to the other ranks, and the nodes prescribed. */
-static PetscErrorCode fix_marked(SbSpace to, const uint8_t mark[])
-{
-  PetscScalar *v;
-  const PetscReal *x;
-  Vec V;
-
-  PetscFunctionBeginUser;
-  PetscCall(SbSpaceCreateVec(to, &V));
-  PetscCall(VecGetArray(V, &v));
-  for (PetscInt i = 0; i < to->nnode_owned; i++) v[3 * i] = mark[i];
-  PetscCall(VecRestoreArray(V, &v));
-  PetscCall(SbSpaceGetLocalRead(to, V, &x));
-  for (PetscInt i = 0; i < to->nnode; i++) {
-    if (x[3 * i] > 0.) PetscCall(SbSpaceFix(to, i, (int)x[3 * i]));
-  }
-  PetscCall(SbSpaceRestoreLocalRead(to, V, &x));
-  PetscCall(VecDestroy(&V));
-  PetscCall(SbSpaceFixDone(to));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* What is prescribed in `from` is so in `to`: at the same node, or at every vertex of the face. A support holds its face. */
 static PetscErrorCode fix_like(SbSpace from, SbSpace to)
 {
   uint8_t *mark;
+  PetscReal *shared;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscCalloc1(to->nnode, &mark));
+  PetscCall(PetscCalloc2(to->nnode, &mark, 3 * to->nnode, &shared));
   for (PetscInt i = 0; i < 4 * from->mesh->ncell; i++) {
     const PetscInt *node = to->cell_node + 4 * (i / 4), a = i % 4,
                    support = from->dirichlet_node ? from->dirichlet_node[i] : -1;
@@ -83,8 +62,14 @@ static PetscErrorCode fix_like(SbSpace from, SbSpace to)
     } else
       mark[node[a]] |= fixed;
   }
-  PetscCall(fix_marked(to, mark));
-  PetscCall(PetscFree(mark));
+  /* owners know all cells of their nodes: the other ranks hear it from them */
+  for (PetscInt i = 0; i < to->nnode_owned; i++) shared[3 * i] = mark[i];
+  PetscCall(SbSpaceUpdateGhosts(to, shared));
+  for (PetscInt i = 0; i < to->nnode; i++) {
+    if (shared[3 * i] > 0.) PetscCall(SbSpaceFix(to, i, (int)shared[3 * i]));
+  }
+  PetscCall(SbSpaceFixDone(to));
+  PetscCall(PetscFree2(mark, shared));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -27,9 +27,7 @@ static PetscErrorCode label_parts(SbSpace s, PetscInt **label)
 {
   PetscInt *parent, *lowest;
   PetscBool changed = PETSC_TRUE;
-  PetscScalar *own;
-  const PetscReal *all;
-  Vec v;
+  PetscReal *all;
 
   PetscFunctionBeginUser;
   /* union of the nodes of each local cell, with their supports */
@@ -51,7 +49,7 @@ static PetscErrorCode label_parts(SbSpace s, PetscInt **label)
 
   /* the lowest number of a part that several ranks share: exchanged with the owners until it does not change */
   for (PetscInt i = 0; i < s->nnode; i++) lowest[i] = s->gnode[i];
-  PetscCall(SbSpaceCreateVec(s, &v));
+  PetscCall(PetscCalloc1(3 * s->nnode, &all));
   while (changed) {
     changed = PETSC_FALSE;
     for (PetscInt i = 0; i < s->nnode; i++) {
@@ -59,22 +57,19 @@ static PetscErrorCode label_parts(SbSpace s, PetscInt **label)
 
       lowest[root] = PetscMin(lowest[root], lowest[i]);
     }
-    PetscCall(VecGetArray(v, &own));
-    for (PetscInt i = 0; i < s->nnode_owned; i++) own[3 * i] = (PetscReal)lowest[SbUnionRoot(parent, i)];
-    PetscCall(VecRestoreArray(v, &own));
-    PetscCall(SbSpaceGetLocalRead(s, v, &all));
+    for (PetscInt i = 0; i < s->nnode_owned; i++) all[3 * i] = (PetscReal)lowest[SbUnionRoot(parent, i)];
+    PetscCall(SbSpaceUpdateGhosts(s, all));
     for (PetscInt i = 0; i < s->nnode; i++) {
       const PetscInt other = (PetscInt)all[3 * i], root = SbUnionRoot(parent, i);
 
       changed = (PetscBool)(changed || other < lowest[root]);
       lowest[i] = PetscMin(lowest[root], other);
     }
-    PetscCall(SbSpaceRestoreLocalRead(s, v, &all));
     PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &changed, 1, SB_MPI_BOOL, MPI_LOR, s->comm));
   }
   PetscCall(PetscMalloc1(s->nnode_owned, label));
   for (PetscInt i = 0; i < s->nnode_owned; i++) (*label)[i] = lowest[SbUnionRoot(parent, i)];
-  PetscCall(VecDestroy(&v));
+  PetscCall(PetscFree(all));
   PetscCall(PetscFree2(parent, lowest));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -82,25 +77,16 @@ static PetscErrorCode label_parts(SbSpace s, PetscInt **label)
 /* The labels of all parts, ascending, alike on all ranks. The caller frees them. */
 static PetscErrorCode list_parts(SbSpace s, const PetscInt label[], PetscInt *npart, PetscInt **part)
 {
-  PetscMPIInt size, mine = 0, sum = 0, *count, *start;
-  PetscInt *own;
+  PetscInt *own, mine = 0;
 
   PetscFunctionBeginUser;
-  PetscCallMPI(MPI_Comm_size(s->comm, &size));
-  PetscCall(PetscMalloc3(s->nnode_owned, &own, size, &count, size, &start));
+  PetscCall(PetscMalloc1(s->nnode_owned, &own));
   for (PetscInt i = 0; i < s->nnode_owned; i++) {
     if (label[i] == s->gnode[i]) own[mine++] = label[i];
   }
-  PetscCallMPI(MPI_Allgather(&mine, 1, MPI_INT, count, 1, MPI_INT, s->comm));
-  for (PetscMPIInt r = 0; r < size; r++) {
-    start[r] = sum;
-    sum += count[r];
-  }
-  PetscCall(PetscMalloc1(sum, part));
-  PetscCallMPI(MPI_Allgatherv(own, mine, MPIU_INT, *part, count, start, MPIU_INT, s->comm));
-  PetscCall(PetscSortInt(sum, *part));
-  *npart = sum;
-  PetscCall(PetscFree3(own, count, start));
+  PetscCall(SbGatherAll(s->comm, MPIU_INT, mine, own, npart, part, NULL));
+  PetscCall(PetscSortInt(*npart, *part));
+  PetscCall(PetscFree(own));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

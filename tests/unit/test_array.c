@@ -1,0 +1,46 @@
+// @ranks 1 3 4
+/* Positions grouped by key, against a search for each key; arrays of all ranks put together. */
+#include "test.h"
+
+int main(int argc, char **argv)
+{
+  enum { N = 50, NKEY = 7 };
+  PetscInt key[N], *start, *item, mine[3], total, *all, before, at = 0;
+  PetscMPIInt rank, size;
+
+  SB_TEST_BEGIN(argc, argv);
+  PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
+  PetscCallMPI(MPI_Comm_size(PETSC_COMM_WORLD, &size));
+
+  /* keys from -1 to NKEY: the lowest and the highest take no part, key 3 is nobody's */
+  for (PetscInt i = 0; i < N; i++) key[i] = i * i % 9 == 4 ? 4 : i * i % 9 - 1;
+  PetscCall(SbGroupByKey(N, key, NKEY, &start, &item));
+  for (PetscInt k = 0; k < NKEY; k++) {
+    SB_CHECK(start[k] == at, "key %d starts at %d", (int)k, (int)start[k]);
+    for (PetscInt i = 0; i < N; i++) {
+      if (key[i] != k) continue;
+      SB_CHECK(item[at] == i, "place %d holds %d", (int)at, (int)item[at]);
+      at++;
+    }
+  }
+  SB_CHECK(start[NKEY] == at && at < N, "%d positions", (int)start[NKEY]);
+  PetscCall(PetscFree(start));
+  PetscCall(PetscFree(item));
+  PetscCall(SbGroupByKey(0, NULL, 0, &start, &item));
+  SB_CHECK(start[0] == 0, "nothing");
+  PetscCall(PetscFree(start));
+  PetscCall(PetscFree(item));
+
+  /* rank r has r % 3 numbers */
+  for (PetscInt i = 0; i < rank % 3; i++) mine[i] = 10 * rank + i;
+  PetscCall(SbGatherAll(PETSC_COMM_WORLD, MPIU_INT, rank % 3, mine, &total, &all, &before));
+  at = 0;
+  for (PetscMPIInt r = 0; r < size; r++) {
+    if (r == rank) SB_CHECK(before == at, "%d entries before", (int)before);
+    for (PetscInt i = 0; i < r % 3; i++, at++)
+      SB_CHECK(all[at] == 10 * r + i, "entry %d is %d", (int)at, (int)all[at]);
+  }
+  SB_CHECK(total == at, "%d entries", (int)total);
+  PetscCall(PetscFree(all));
+  SB_TEST_END();
+}
