@@ -51,10 +51,11 @@ struct _p_SbModel {
     PetscReal dt;   /* length of the step, s */
     PetscReal left; /* of the coefficients of restitution in this step */
     int reductions;
-  } bounce;             /* src/model/restitution.c; only with effects that bounce */
-  PetscBool linear;     /* laws and effects: the tangent depends on the shifts only */
-  PetscBool may_filter; /* some law has the tangent auto */
-  PetscReal mass;       /* kg */
+  } bounce;              /* src/model/restitution.c; only with effects that bounce */
+  PetscBool linear;      /* laws and effects: the tangent depends on the shifts only */
+  PetscBool may_filter;  /* some law has the tangent auto */
+  PetscBool guard_apart; /* residuals that are solved leave guarded contact out: SbModelGuardGradient() */
+  PetscReal mass;        /* kg */
   PetscBool dynamic;
   PetscReal
     load; /* load factor: 1, in a static run 0..1; multiplies loads and prescribed displacements without t in their formulas */
@@ -114,6 +115,9 @@ PetscErrorCode SbModelGuardSafe(SbModel model, Vec X, Vec Y, PetscReal progress,
                                 PetscInt *nactive);
 /* Of the last accepted step: what contact did to the bodies, J, and its forces taken out of those of SbModelLoads() at U, F, N. */
 PetscErrorCode SbModelGuardWork(SbModel model, Vec U, PetscReal *work, Vec F);
+/* F += scale times the gradient of the energy at U, N; free_only: not at prescribed unknowns. energy of all ranks, J (NULL: not wanted). */
+PetscErrorCode SbModelGuardGradient(SbModel model, Vec U, PetscReal scale, PetscBool free_only,
+                                    PetscReal *energy, Vec F);
 PetscErrorCode SbModelGuardHessian(SbModel model, Vec U, SbContactHessian kind, SbBlocks *blocks);
 /* Initial velocities of bodies (translation and spin). */
 PetscErrorCode SbModelInitialState(SbModel model, Vec U, Vec V);
@@ -122,7 +126,7 @@ PetscErrorCode SbModelCentres(SbModel model, Vec U, PetscReal centre[][4]);
 /* Instantaneous part of the energies (kinetic, strain, momenta, ...). V may be NULL. Collective. */
 PetscErrorCode SbModelEnergies(SbModel model, Vec U, Vec V, SbEnergies *e);
 /*
-  SbModelStrainEnergyAlong - strain energy at U with that of guarded contact, J, its slope against D, d psi(U - s D)/ds at s = 0, J, and how many tets are inverted there.
+  SbModelStrainEnergyAlong - strain energy at U, J, its slope against D, d psi(U - s D)/ds at s = 0, J, and how many tets are inverted there.
 
   Collective. D: [nnode][3] m, of any length.
 */

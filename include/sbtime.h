@@ -76,10 +76,11 @@ struct _p_SbRun {
       y; /* displacement that J belongs to; what is multiplied, and the result; NULL where J lacks nothing */
     PetscReal t; /* J's time or load factor */
   } nonsymmetric;
-  Vec U, V, A;        /* A: acceleration of the last step, state of the integrator */
-  Vec R;              /* residual for contact; NULL without */
-  Vec guard_start;    /* guarded contact: displacement when the attempt at a step began; borrowed */
-  PetscReal guard_dt; /* its length, s */
+  Vec U, V, A;            /* A: acceleration of the last step, state of the integrator */
+  Vec R;                  /* residual for contact; NULL without */
+  Vec guard_start;        /* guarded contact: displacement when the attempt at a step began; borrowed */
+  PetscReal guard_dt;     /* its length, s */
+  PetscReal guard_weight; /* of its forces at the end of a step in the residual that is solved */
   Vec stage,
     stage_start; /* where the integrator evaluates forces, stage_start + stage_part (X - stage_start), in a solve for X; NULL: at X */
   PetscReal stage_part;

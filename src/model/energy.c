@@ -140,12 +140,6 @@ PetscErrorCode SbModelStrainEnergyAlong(SbModel m, Vec U, Vec D, PetscReal *psi,
   PetscCall(SbSpaceGetLocalRead(s, U, &stage.u));
   PetscCall(SbSpaceStrainEnergy(s, stage.u, &sum[0], &minJ, &n, &volume));
   PetscCall(SbSpaceAddInternalForce(s, &stage, f));
-  for (PetscInt e = 0; e < m->npotential; e++) {
-    PetscReal energy;
-
-    SbEffectCall(m->potential[e], potential, s, stage.u, &energy, f);
-    sum[0] += energy;
-  }
   PetscCall(SbSpaceRestoreLocalRead(s, U, &stage.u));
   PetscCall(VecGetArrayRead(D, &d));
   sum[1] = 0.;

@@ -80,27 +80,44 @@ PetscErrorCode SbModelGuardHessian(SbModel m, Vec U, SbContactHessian kind, SbBl
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbModelGuardWork(SbModel m, Vec U, PetscReal *work, Vec F)
+PetscErrorCode SbModelGuardGradient(SbModel m, Vec U, PetscReal scale, PetscBool free_only, PetscReal *energy,
+                                    Vec F)
 {
+  const SbSpace s = m->space;
   const PetscReal *u;
-  PetscReal *f, unused;
+  PetscReal *f, sum = 0.;
   PetscScalar *out;
 
   PetscFunctionBeginUser;
-  *work = 0.;
-  PetscCall(PetscCalloc1(3 * m->space->nnode, &f));
-  PetscCall(SbSpaceGetLocalRead(m->space, U, &u));
+  PetscCall(PetscCalloc1(3 * s->nnode, &f));
+  PetscCall(SbSpaceGetLocalRead(s, U, &u));
   for (PetscInt e = 0; e < m->npotential; e++) {
     PetscReal mine;
 
-    SbEffectCall(m->potential[e], potential, m->space, u, &unused, f);
+    SbEffectCall(m->potential[e], potential, s, u, &mine, f);
+    sum += mine;
+  }
+  PetscCall(SbSpaceRestoreLocalRead(s, U, &u));
+  PetscCall(VecGetArray(F, &out));
+  for (PetscInt i = 0; i < 3 * s->nnode_owned; i++) {
+    if (!free_only || !(s->fixed[i / 3] & (1 << (i % 3)))) out[i] += scale * f[i];
+  }
+  PetscCall(VecRestoreArray(F, &out));
+  PetscCall(PetscFree(f));
+  if (energy) PetscCallMPI(MPI_Allreduce(&sum, energy, 1, MPIU_REAL, MPI_SUM, m->comm));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbModelGuardWork(SbModel m, Vec U, PetscReal *work, Vec F)
+{
+  PetscFunctionBeginUser;
+  *work = 0.;
+  PetscCall(SbModelGuardGradient(m, U, 1., PETSC_FALSE, NULL, F));
+  for (PetscInt e = 0; e < m->npotential; e++) {
+    PetscReal mine;
+
     SbEffectCall(m->potential[e], work, &mine);
     *work += mine;
   }
-  PetscCall(SbSpaceRestoreLocalRead(m->space, U, &u));
-  PetscCall(VecGetArray(F, &out));
-  for (PetscInt i = 0; i < 3 * m->space->nnode_owned; i++) out[i] += f[i];
-  PetscCall(VecRestoreArray(F, &out));
-  PetscCall(PetscFree(f));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -188,8 +188,9 @@ static inline PetscReal load_factor(SbModel m, SbEffect e)
   return e->steady ? m->load : 1.;
 }
 
-/* f = sign * f_ext. */
-static PetscErrorCode external_forces(SbModel m, const SbStage *stage, PetscReal sign, PetscReal f[])
+/* f = sign * f_ext; apart: without guarded contact. */
+static PetscErrorCode external_forces(SbModel m, const SbStage *stage, PetscBool apart, PetscReal sign,
+                                      PetscReal f[])
 {
   const PetscInt n = 3 * m->space->nnode;
 
@@ -205,7 +206,8 @@ static PetscErrorCode external_forces(SbModel m, const SbStage *stage, PetscReal
     for (PetscInt i = 0; i < n; i++) f[i] *= m->load;
   }
   for (PetscInt e = 0; e < m->nforce; e++) {
-    if (!m->force[e]->steady) SbEffectCall(m->force[e], force, m->space, stage, f);
+    if (!m->force[e]->steady && !(apart && m->force[e]->ops.potential))
+      SbEffectCall(m->force[e], force, m->space, stage, f);
   }
   if (sign != 1.) {
     for (PetscInt i = 0; i < n; i++) f[i] *= sign;
@@ -234,7 +236,7 @@ PetscErrorCode SbModelResidual(SbModel m, PetscReal t, Vec U, Vec V, Vec A, Pets
   PetscFunctionBeginUser;
   PetscCall(stage_begin(m, t, U, V, A, &stage));
   PetscCall(SbSpaceGetLocalWrite(m->space, F, &f));
-  PetscCall(external_forces(m, &stage, -1., f));
+  PetscCall(external_forces(m, &stage, (PetscBool)(constrain && m->guard_apart), -1., f));
   PetscCall(SbSpaceAddInternalForce(m->space, &stage, f));
   if (A || V) PetscCall(SbSpaceAddInertia(m->space, &stage, f));
   if (constrain) constrain_residual(m->space, f);
@@ -253,7 +255,7 @@ PetscErrorCode SbModelLoads(SbModel m, PetscReal t, Vec U, Vec V, Vec F)
   PetscFunctionBeginUser;
   PetscCall(stage_begin(m, t, U, V, NULL, &stage));
   PetscCall(SbSpaceGetLocalWrite(m->space, F, &f));
-  PetscCall(external_forces(m, &stage, 1., f));
+  PetscCall(external_forces(m, &stage, PETSC_FALSE, 1., f));
   PetscCall(SbSpaceRestoreLocalWrite(m->space, F, &f));
   PetscCall(stage_end(m, U, V, NULL, &stage));
   PetscFunctionReturn(PETSC_SUCCESS);

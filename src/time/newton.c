@@ -48,6 +48,7 @@
 typedef struct {
   SbRun run;
   Vec W, G;        /* trial iterate and its residual */
+  Vec contact;     /* guarded contact: its forces */
   Vec start, step; /* where provisional steps began; the first of them led to start - step */
   PetscReal least; /* rounding of the strain energy of a body that has turned: E V to the last digit, J */
   PetscInt provisional;   /* how many there were since */
@@ -86,6 +87,16 @@ static PetscErrorCode evaluate_at(Newton *n, Vec X, Vec F, Vec Y, Iterate *at)
   PetscCall(VecDot(F, Y, &slope));
   at->psi /= PetscSqr(part);
   at->rest = -slope - elastic / part;
+  /* that of contact is at X */
+  if (run->model->npotential) {
+    PetscReal energy, along;
+
+    PetscCall(VecZeroEntries(n->contact));
+    PetscCall(SbModelGuardGradient(run->model, X, run->guard_weight, PETSC_TRUE, &energy, n->contact));
+    PetscCall(VecDot(n->contact, Y, &along));
+    at->psi += run->guard_weight * energy;
+    at->rest += along;
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -100,6 +111,9 @@ static PetscErrorCode solve_linear(SNES snes, KSPConvergedReason *reason)
   n->blocks.n = n->nblock = 0;
   if (m->npotential) {
     PetscCall(SbModelGuardHessian(m, snes->vec_sol, n->kind, &n->blocks));
+    for (PetscInt k = 0; k < n->blocks.n; k++) {
+      for (int i = 0; i < 9; i++) n->blocks.block[k][i] *= n->run->guard_weight;
+    }
     PetscCallMPI(MPI_Allreduce(&n->blocks.n, &n->nblock, 1, MPIU_INT, MPI_SUM, m->comm));
   }
   if (n->nblock) {
@@ -492,6 +506,7 @@ static PetscErrorCode SNESSetUp_Newton(SNES snes)
   PetscCall(VecDuplicate(snes->vec_sol, &n->G));
   PetscCall(VecDuplicate(snes->vec_sol, &n->start));
   PetscCall(VecDuplicate(snes->vec_sol, &n->step));
+  if (n->run->model->npotential) PetscCall(VecDuplicate(snes->vec_sol, &n->contact));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -504,6 +519,7 @@ static PetscErrorCode SNESReset_Newton(SNES snes)
   PetscCall(VecDestroy(&n->G));
   PetscCall(VecDestroy(&n->start));
   PetscCall(VecDestroy(&n->step));
+  PetscCall(VecDestroy(&n->contact));
   PetscCall(SbContactSystemDestroy(&n->system));
   PetscCall(SbBlocksFree(&n->blocks));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -106,6 +106,7 @@ PetscErrorCode SbRunCreate(SbModel model, SbRun *run)
 
   PetscFunctionBeginUser;
   PetscCall(PetscNew(&r));
+  r->guard_weight = 1.;
   r->model = model;
   PetscCall(SbScopeSet(&scope, "", "", ""));
   PetscCall(SbOptionChoice(&scope, "time", &preset));
@@ -167,6 +168,7 @@ static void method_settings(SbRun run, SbMethodSettings *set)
                        .gamma = 0.5,
                        .velocity_predictor = run->velocity_predictor,
                        .impulses = (PetscBool)(run->preset == SB_TIME_NEWMARK && run->model->nbegin_step),
+                       .separate = (PetscBool)(run->preset == SB_TIME_NEWMARK && run->model->npotential),
                        .max_halvings = run->max_halvings};
   if (run->preset == SB_TIME_NEWMARK) {
     set->method = SB_METHOD_GENERALIZED_ALPHA;
@@ -390,6 +392,9 @@ static PetscErrorCode set_up_ts(SbRun run)
   PetscCall(TSGetAdapt(run->ts, &adapt));
   PetscCall(PetscObjectTypeCompare((PetscObject)adapt, TSADAPTNONE, &run->fixed_step));
   method_settings(run, &settings);
+  run->model->guard_apart = (PetscBool)(m->npotential && run->preset != SB_TIME_EULER_IMPLICIT);
+  if (run->model->guard_apart)
+    run->guard_weight = settings.separate ? 0.5 / settings.beta : 1. / settings.alpha_f;
   if (run->preset != SB_TIME_ALPHA2) PetscCall(SbSecondOrderSet(run->ts, run, &settings));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -446,8 +451,14 @@ static PetscErrorCode check_guarded(SbRun run)
   PetscBool split;
 
   PetscFunctionBeginUser;
-  PetscCheck(run->preset == SB_TIME_EULER_IMPLICIT || run->preset == SB_TIME_STATIC, m->comm,
-             PETSC_ERR_USER_INPUT, "-effect_%s_response barrier needs -time euler_implicit or static", name);
+  PetscCheck(run->preset == SB_TIME_EULER_IMPLICIT || run->preset == SB_TIME_STATIC ||
+               run->preset == SB_TIME_NEWMARK || run->preset == SB_TIME_GENALPHA,
+             m->comm, PETSC_ERR_USER_INPUT,
+             "-effect_%s_response barrier needs -time euler_implicit, newmark, genalpha or static", name);
+  PetscCheck(run->preset == SB_TIME_EULER_IMPLICIT || run->preset == SB_TIME_STATIC ||
+               !m->space->consistent_mass,
+             m->comm, PETSC_ERR_USER_INPUT,
+             "-effect_%s_response barrier with -time newmark or genalpha needs -mass lumped", name);
   PetscCheck(!m->nbegin_step, m->comm, PETSC_ERR_USER_INPUT,
              "-effect_%s_response barrier and -effect_%s_response of another kind do not go together: give "
              "both the same",

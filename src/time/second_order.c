@@ -8,6 +8,11 @@
     Newmark: alpha_m = alpha_f = 1
     implicit Euler: v1 = s / h, a1 = (v1 - v0) / h (it is not a Newmark method)
   Newmark with contact: a0 is the acceleration without it, newmark_contact.c describes the rest
+  Guarded contact: its force f = -dB/du is that of the end of the step, the only place that no surface has passed on the way to; generalized-alpha adds it there. Newmark
+  would take it from both ends and gain energy; there it is implicit (Kane, Repetto, Ortiz and Marsden 1999), with a the acceleration without contact, which is what is kept:
+    u1 = u0 + h v0 + h^2 ((1/2 - beta) a0 + beta a1) + h^2/2 M^-1 f,  v1 = v0 + h ((1 - gamma) a0 + gamma a1) + h M^-1 f
+  Its formula for a1 then gives a1 + M^-1 f / (2 beta), the residual that is solved has -f / (2 beta), and damping has the velocity 2 (u1 - u0) / h - v0. The impulse h f adds the motion
+  that f does work for over u1 - u0, and as B is convex that is at most what B loses: contact takes energy, never gives it.
   and, with a0 = M^-1 (f(t0, u0, v0)),
     explicit Euler: u1 = u0 + h v0, v1 = v0 + h a0;  symplectic Euler: v1 = v0 + h a0, u1 = u0 + h v1.
 
@@ -59,7 +64,10 @@ static PetscErrorCode end_state(TS ts, Vec X)
     PetscCall(VecWAXPY(so->A1, -1., so->X0, X));
     PetscCall(VecAXPBYPCZ(so->A1, -1. / (beta * h), 1. - 0.5 / beta, 1. / (beta * h * h), so->V0, A0));
     PetscCall(VecCopy(so->V0, so->V1));
-    PetscCall(VecAXPBYPCZ(so->V1, h * (1. - gamma), h * gamma, 1., A0, so->A1));
+    if (so->set.separate)
+      PetscCall(VecAXPBYPCZ(so->V1, 2. / h, -2. / h, -1., X, so->X0));
+    else
+      PetscCall(VecAXPBYPCZ(so->V1, h * (1. - gamma), h * gamma, 1., A0, so->A1));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -101,6 +109,8 @@ static PetscErrorCode SNESTSFormFunction_SecondOrder(SNES snes, Vec X, Vec F, TS
   PetscCall(stage_state(ts, X, &t, &U, &V, &A));
   PetscCall(TSComputeI2Function(ts, t, U, V, A, F));
   if (so->set.alpha_f != 1.) PetscCall(VecScale(F, 1. / so->set.alpha_f));
+  if (so->run->model->guard_apart)
+    PetscCall(SbModelGuardGradient(so->run->model, X, so->run->guard_weight, PETSC_TRUE, NULL, F));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -115,7 +125,7 @@ static PetscErrorCode SNESTSFormJacobian_SecondOrder(SNES snes, Vec X, Mat J, Ma
   (void)snes;
   PetscCall(stage_state(ts, X, &t, &U, &V, &A));
   if (so->set.method == SB_METHOD_GENERALIZED_ALPHA) {
-    shift_v = so->set.gamma / (so->set.beta * h);
+    shift_v = so->set.separate ? 2. / h : so->set.gamma / (so->set.beta * h);
     shift_a = so->set.alpha_m / (so->set.alpha_f * so->set.beta * h * h);
   }
   PetscCall(TSComputeI2Jacobian(ts, t, U, V, A, shift_v, shift_a, J, P));
@@ -194,6 +204,28 @@ static SbSolvedStep solved_step(TS ts)
                         so->V1,    so->A1,        (PetscBool)!is_explicit(so)};
 }
 
+/* Guarded contact: the velocity has its impulse, the acceleration is without it. */
+static PetscErrorCode separate_contact(TS ts)
+{
+  SecondOrder *so = (SecondOrder *)ts->data;
+  const SbSpace s = so->run->model->space;
+  const PetscReal h = ts->time_step;
+  PetscScalar *push;
+
+  PetscFunctionBeginUser;
+  PetscCall(VecZeroEntries(so->work));
+  PetscCall(SbModelGuardGradient(so->run->model, so->X1, -1., PETSC_TRUE, NULL, so->work));
+  PetscCall(VecGetArray(so->work, &push));
+  for (PetscInt i = 0; i < 3 * s->nnode_owned; i++)
+    push[i] = s->node_mass[i / 3] > 0. ? push[i] / s->node_mass[i / 3] : 0.;
+  PetscCall(VecRestoreArray(so->work, &push));
+  PetscCall(VecAXPY(so->A1, -0.5 / so->set.beta, so->work));
+  PetscCall(VecWAXPY(so->V1, h, so->work, so->V0));
+  PetscCall(VecAXPY(so->V1, h * (1. - so->set.gamma), so->run->A));
+  PetscCall(VecAXPY(so->V1, h * so->set.gamma, so->A1));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Velocity and acceleration of the end. */
 static PetscErrorCode complete(void *ctx, SNESConvergedReason reason, SbSolvedStep *step, PetscBool *ok)
 {
@@ -205,6 +237,7 @@ static PetscErrorCode complete(void *ctx, SNESConvergedReason reason, SbSolvedSt
   if (!is_explicit(so)) PetscCall(end_state(ts, so->X1));
   PetscCall(VecNorm(is_explicit(so) ? so->A1 : so->V1, NORM_INFINITY, &size));
   *ok = (PetscBool)(reason > 0 && !PetscIsInfOrNanReal(size));
+  if (*ok && so->set.separate) PetscCall(separate_contact(ts));
   if (*ok && so->set.impulses)
     PetscCall(
       SbNewmarkContact(so->run, ts->ptime + ts->time_step, ts->time_step, so->X1, so->V1, so->A1, so->own1));

@@ -23,6 +23,7 @@ typedef struct {
   PetscReal alpha_m, alpha_f, beta, gamma; /* generalized-alpha; fraction of the new state, as in TSALPHA2 */
   PetscBool velocity_predictor;            /* Newton starts from u + h v instead of u */
   PetscBool impulses;                      /* Newmark with contact: newmark_contact.c */
+  PetscBool separate;                      /* Newmark with guarded contact: the acceleration is without it */
   PetscInt max_halvings;                   /* how often a step is halved before the run stops */
 } SbMethodSettings;
 
