@@ -2,6 +2,7 @@
   sbmeshio.h - layer 1: a body on rank 0 as its reader delivers it, and what reading a file takes. Not collective throughout.
 */
 #pragma once
+#include <sys/types.h>
 #include "sbmeshfile.h"
 
 #define SB_GROUP_MAX (2 * SB_NAME_MAX) /* longest name of a physical group, with the terminating zero */
@@ -161,6 +162,10 @@ const char *SbImportOption(const SbImport *import, const char *key, char name[SB
 PetscErrorCode SbImportRead_Msh(const char *path, SbImport *body);
 /* TetGen's files; path: one of them, or what they have in common. */
 PetscErrorCode SbImportRead_TetGen(const char *path, SbImport *body);
+
+/* In a forked child of `parent`: nothing of the parent's is left in the way, handlers, masks, terminal; it dies with it, and after so many seconds by SIGALRM,
+   which holds for a program that it becomes. */
+void SbChildIsolate(pid_t parent, PetscReal seconds);
 /* Room for n vertices. */
 PetscErrorCode SbImportSetVertices(SbImport *import, PetscInt n);
 /* Appends a simplex; vert[dim + 1]. */

@@ -101,7 +101,13 @@ PetscErrorCode SbConstraintsDestroy(SbConstraints *constraints)
   PetscCall(PetscFree(c->gnode));
   PetscCall(PetscFree(c->coef));
   PetscCall(PetscFree(c->along));
-  PetscCall(PetscFree7(c->value, c->stiffness, c->constant, c->position, c->force, c->sum, c->id));
+  PetscCall(PetscFree(c->value));
+  PetscCall(PetscFree(c->stiffness));
+  PetscCall(PetscFree(c->constant));
+  PetscCall(PetscFree(c->position));
+  PetscCall(PetscFree(c->force));
+  PetscCall(PetscFree(c->sum));
+  PetscCall(PetscFree(c->id));
   PetscCall(PetscFree(*constraints));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -121,29 +127,14 @@ static PetscErrorCode make_room(SbConstraints c, PetscInt more)
   PetscFunctionBeginUser;
   if (c->n == c->size) {
     const PetscInt size = PetscMax(64, 2 * c->size);
-    PetscReal *value, *stiffness, *constant, *force, *sum;
-    PetscInt *position, *id;
-    PetscBool *rests;
+    void *const numbers[] = {&c->value, &c->stiffness, &c->constant, &c->force, &c->sum};
+    void *const whole[] = {&c->position, &c->id};
 
-    PetscCall(PetscMalloc7(size, &value, size, &stiffness, size, &constant, size, &position, size, &force,
-                           size, &sum, size, &id));
-    PetscCall(PetscArraycpy(value, c->value, c->n));
-    PetscCall(PetscArraycpy(stiffness, c->stiffness, c->n));
-    PetscCall(PetscArraycpy(constant, c->constant, c->n));
-    PetscCall(PetscArraycpy(force, c->force, c->n));
-    PetscCall(PetscArraycpy(sum, c->sum, c->n));
-    PetscCall(PetscArraycpy(id, c->id, c->n));
-    PetscCall(PetscMalloc1(size, &rests));
-    PetscCall(PetscFree(c->redundant));
-    PetscCall(PetscFree7(c->value, c->stiffness, c->constant, c->position, c->force, c->sum, c->id));
-    c->value = value;
-    c->stiffness = stiffness;
-    c->constant = constant;
-    c->position = position;
-    c->id = id;
-    c->redundant = rests;
-    c->force = force;
-    c->sum = sum;
+    for (size_t k = 0; k < PETSC_STATIC_ARRAY_LENGTH(numbers); k++)
+      PetscCall(PetscRealloc((size_t)size * sizeof(PetscReal), (void **)numbers[k]));
+    for (size_t k = 0; k < PETSC_STATIC_ARRAY_LENGTH(whole); k++)
+      PetscCall(PetscRealloc((size_t)size * sizeof(PetscInt), (void **)whole[k]));
+    PetscCall(PetscRealloc((size_t)size * sizeof(PetscBool), &c->redundant));
     c->size = size;
     PetscCall(PetscRealloc((size_t)(size + 1) * sizeof(PetscInt), &c->start));
   }

@@ -47,37 +47,6 @@ static inline void centre(const SbMergedMesh *w, PetscInt c, PetscReal x[3])
     x[i] = w->vertex[v[0]].x[i] + w->vertex[v[1]].x[i] + w->vertex[v[2]].x[i] + w->vertex[v[3]].x[i];
 }
 
-/* Reorders x[n][3] so that the k-th smallest along an axis stands at its position, smaller ones before it. */
-static void select_kth(PetscInt n, PetscReal (*x)[3], int axis, PetscInt k)
-{
-  PetscInt low = 0, high = n - 1;
-
-  while (low < high) {
-    const PetscReal pivot = x[low + (high - low) / 2][axis];
-    PetscInt i = low, j = high;
-
-    while (i <= j) {
-      while (x[i][axis] < pivot) i++;
-      while (x[j][axis] > pivot) j--;
-      if (i > j) break;
-      for (int d = 0; d < 3; d++) {
-        const PetscReal keep = x[i][d];
-
-        x[i][d] = x[j][d];
-        x[j][d] = keep;
-      }
-      i++;
-      j--;
-    }
-    if (k <= j)
-      high = j;
-    else if (k >= i)
-      low = i;
-    else
-      return;
-  }
-}
-
 /* Puts the samples below the cut first. What lies on it goes up, as tets will, and not by the order of the samples; when nothing is below it, it is raised. */
 static PetscInt split_at(PetscInt n, PetscReal (*x)[3], int axis, PetscReal middle, PetscReal *cut)
 {
@@ -103,16 +72,17 @@ static PetscInt split_at(PetscInt n, PetscReal (*x)[3], int axis, PetscReal midd
 }
 
 /* Splits the samples x[n] into k leaves below a node. */
-static void split(Tree *t, PetscInt at, PetscInt n, PetscReal (*x)[3], PetscInt k)
+static PetscErrorCode split(Tree *t, PetscInt at, PetscInt n, PetscReal (*x)[3], PetscInt k)
 {
-  PetscReal low[3] = {0, 0, 0}, high[3] = {0, 0, 0};
+  PetscReal *along, low[3] = {0, 0, 0}, high[3] = {0, 0, 0};
   PetscReal cut;
   PetscInt below, half = k / 2;
   int axis = 0;
 
+  PetscFunctionBeginUser;
   if (k == 1 || n < 2) {
     t->node[at] = (Node){-1, 0, t->nleaf++};
-    return;
+    PetscFunctionReturn(PETSC_SUCCESS);
   }
   for (PetscInt i = 0; i < n; i++) {
     for (int d = 0; d < 3; d++) {
@@ -123,12 +93,16 @@ static void split(Tree *t, PetscInt at, PetscInt n, PetscReal (*x)[3], PetscInt 
   for (int d = 1; d < 3; d++)
     if (high[d] - low[d] > high[axis] - low[axis]) axis = d;
   below = (PetscInt)((PetscInt64)n * half / k);
-  select_kth(n, x, axis, below);
-  below = split_at(n, x, axis, x[below][axis], &cut);
+  PetscCall(PetscMalloc1(n, &along));
+  for (PetscInt i = 0; i < n; i++) along[i] = x[i][axis];
+  PetscCall(PetscRealSortSemiOrdered(n, along));
+  below = split_at(n, x, axis, along[below], &cut);
+  PetscCall(PetscFree(along));
   t->node[at] = (Node){axis, cut, t->nnode};
   t->nnode += 2;
-  split(t, t->node[at].next, below, x, half);
-  split(t, t->node[at].next + 1, n - below, x + below, k - half);
+  PetscCall(split(t, t->node[at].next, below, x, half));
+  PetscCall(split(t, t->node[at].next + 1, n - below, x + below, k - half));
+  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* A tree with k leaves. Collective. */
@@ -150,7 +124,7 @@ static PetscErrorCode tree_create(MPI_Comm comm, const SbMergedMesh *w, PetscInt
   PetscCall(PetscMalloc1(2 * (size_t)k, &t->node));
   t->nnode = 1;
   t->nleaf = 0;
-  split(t, 0, total / 3, all, k);
+  PetscCall(split(t, 0, total / 3, all, k));
   PetscCall(PetscFree(all));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -49,8 +49,7 @@ static void list_parts(SbImport *im, const Header *h, Part part[NPART])
 
 /* ------------------------------------------------------------------ the child */
 
-/* Nothing of the parent's is left in the way: handlers, masks, terminal. After so many seconds SIGALRM ends it. */
-static void isolate(pid_t parent, PetscReal seconds)
+void SbChildIsolate(pid_t parent, PetscReal seconds)
 {
   const PetscReal most = PetscMin(seconds, 1e9), whole = PetscFloorReal(most);
   const struct itimerval end = {.it_value = {(time_t)whole, 1 + (suseconds_t)(999998 * (most - whole))}};
@@ -143,7 +142,7 @@ PetscErrorCode SbChildRun(const char *who, const char *doing, PetscReal seconds,
              im->where, strerror(errno));
   pid = fork();
   if (!pid) {
-    isolate(self, seconds);
+    SbChildIsolate(self, seconds);
     child(file, work, ctx, im);
   }
   while (pid > 0 && waitpid(pid, &status, 0) < 0 && errno == EINTR) {

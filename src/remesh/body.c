@@ -198,13 +198,8 @@ static PetscErrorCode move_vertices(const SbOldMesh *old, const SbRemeshing *how
 
   PetscFunctionBeginUser;
   // tets around each vertex
-  PetscCall(PetscCalloc1(m->nvert + 1, &stars.start));
-  PetscCall(PetscMalloc1(4 * (size_t)m->ncell, &stars.cells));
-  for (PetscInt i = 0; i < 4 * m->ncell; i++) stars.start[m->cell[i] + 1]++;
-  for (PetscInt v = 0; v < m->nvert; v++) stars.start[v + 1] += stars.start[v];
-  for (PetscInt i = 0; i < 4 * m->ncell; i++) stars.cells[stars.start[m->cell[i]]++] = i / 4;
-  for (PetscInt v = m->nvert; v > 0; v--) stars.start[v] = stars.start[v - 1];
-  stars.start[0] = 0;
+  PetscCall(SbGroupByKey(4 * m->ncell, m->cell, m->nvert, &stars.start, &stars.cells));
+  for (PetscInt i = 0; i < 4 * m->ncell; i++) stars.cells[i] /= 4;
   PetscCall(PetscCalloc1(m->nvert, &moved));
   for (int sweep = 0; sweep < SWEEPS && better; sweep++) {
     better = PETSC_FALSE;

@@ -9,17 +9,12 @@
 */
 #include <dirent.h>
 #include <errno.h>
-#include <poll.h>
 #include <signal.h>
 #include <stdlib.h>
 #include <sys/stat.h>
 #include <sys/wait.h>
-#include <time.h>
 #include <unistd.h>
 #include <fcntl.h>
-#ifdef __linux__
-  #include <sys/prctl.h>
-#endif
 #include "sbkernel.h"
 #include "sbtet.h"
 #include "tet_backends.h"
@@ -54,30 +49,15 @@ static PetscErrorCode write_surface(const char *folder, const SbSurface *s)
 
 /* ------------------------------------------------------------------ the process */
 
-static double now(void)
-{
-  struct timespec t;
-
-  (void)clock_gettime(CLOCK_MONOTONIC, &t);
-  return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
-}
-
 /* In the child: never returns. 127 says that there is no such program. */
-static void become_tetgen(const char *folder, const char *flags)
+static void become_tetgen(pid_t parent, const char *folder, const char *flags, const SbTetJob *job)
 {
-  sigset_t none;
   int log;
 
-#ifdef __linux__
-  (void)prctl(PR_SET_PDEATHSIG, SIGKILL);
-#endif
-  for (int s = 1; s < 32; s++) (void)signal(s, SIG_DFL);
-  (void)sigemptyset(&none);
-  (void)sigprocmask(SIG_SETMASK, &none, NULL);
+  SbChildIsolate(parent, job->options.seconds);
   if (chdir(folder)) _exit(126);
   log = open("log", O_WRONLY | O_CREAT | O_TRUNC, 0600);
   if (log < 0 || dup2(log, 1) < 0 || dup2(log, 2) < 0) _exit(126);
-  (void)close(0);
   execlp("tetgen", "tetgen", flags, "s.smesh", (char *)NULL);
   _exit(127);
 }
@@ -112,27 +92,18 @@ static PetscErrorCode check_end(const char *folder, int status)
 
 static PetscErrorCode run_tetgen(const char *folder, const char *flags, const SbTetJob *job)
 {
-  const double end = now() + job->options.seconds;
-  const pid_t pid = fork();
-  int status = 0, pause = 1;
+  const pid_t self = getpid(), pid = fork();
+  int status = 0;
   char option[SB_IMPORT_OPTION_MAX];
 
   PetscFunctionBeginUser;
-  if (!pid) become_tetgen(folder, flags);
+  if (!pid) become_tetgen(self, folder, flags, job);
   PetscCheck(pid > 0, PETSC_COMM_SELF, PETSC_ERR_SYS, "no process for tetgen (%s)", strerror(errno));
-  for (;;) {
-    const pid_t done = waitpid(pid, &status, WNOHANG);
-
-    if (done == pid) break;
-    if (now() > end || (done < 0 && errno != EINTR)) {
-      (void)kill(pid, SIGKILL);
-      (void)waitpid(pid, &status, 0);
-      SETERRQ(PETSC_COMM_SELF, PETSC_ERR_USER_INPUT, "it was not done after %g s (%s)",
-              (double)job->options.seconds, SbImportOption(job->body, "tet_seconds", option));
-    }
-    (void)poll(NULL, 0, pause);
-    pause = PetscMin(2 * pause, 50);
+  while (waitpid(pid, &status, 0) < 0 && errno == EINTR) {
   }
+  PetscCheck(!WIFSIGNALED(status) || WTERMSIG(status) != SIGALRM, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
+             "it was not done after %g s (%s)", (double)job->options.seconds,
+             SbImportOption(job->body, "tet_seconds", option));
   PetscCall(check_end(folder, status));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

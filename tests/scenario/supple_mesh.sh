@@ -119,6 +119,12 @@ check "strain energy $(strain coarse) from .h5, $(strain gmsh) from .msh" test "
 check "strain energy on one rank $(strain fine), on two $(strain fine2)" close "$(strain fine)" "$(strain fine2)" 1e-5
 check "strain energy falls when refined: $(strain coarse), $(strain fine)" awk -v a="$(strain coarse)" -v b="$(strain fine)" 'BEGIN { exit !(b > a) }'
 
+# a program tetgen that hangs is ended
+mkdir -p hangs
+printf '#!/bin/sh\nexec sleep 100\n' >hangs/tetgen
+chmod +x hangs/tetgen
+PATH=$PWD/hangs:$PATH refuses "tetgen|0.5 s|-seconds" tet "$data/bead.obj" never.msh -tetrahedralizer tetgen -seconds 0.5
+
 # a run's output is a mesh: at rest the one that went in, at its end the deformed one
 ok info coarse/fields.h5
 says " it 48 tets, 2 m^3 (number 1)"
