@@ -23,8 +23,7 @@
 /* Below its end a plane, or a block, into which it turns. */
 #define PART_FLOOR                                                                                    \
   "-effects floor -effect_floor_type contact -effect_floor_response projected -effect_floor_on skin " \
-  "-effect_floor_obstacle "                                                                           \
-  "plane:0,0,1,-1e-4 "
+  "-effect_floor_obstacle plane:0,0,1,-1e-4 "
 #define PART_BLOCK                                                                            \
   "-bodies bar,block -body_block_mesh box:0.1,0.1,0.1:4 -body_block_translate 0.3,0,-0.1001 " \
   "-body_block_material corotated -body_block_young 5e4 -body_block_poisson 0.4 "
@@ -55,9 +54,7 @@ static const Part parts[] = {
   {"effect", "fixed", "-effects clamp -effect_clamp_type fixed -effect_clamp_on end", NULL, NULL, PETSC_TRUE},
   {"effect", "prescribed_displacement",
    "-effects turn -effect_turn_type prescribed_displacement -effect_turn_on end -effect_turn_angle 100*t "
-   "-effect_turn_axis "
-   "1,0,0 "
-   "-effect_turn_axis_point 0,0.05,0.05",
+   "-effect_turn_axis 1,0,0 -effect_turn_axis_point 0,0.05,0.05",
    NULL, NULL, PETSC_TRUE},
   {"effect", "damping",
    "-effects thick -effect_thick_type damping -effect_thick_on bar -effect_thick_alpha 1 "

@@ -7,9 +7,8 @@
 
 #define BEAM                                                                                             \
   "-bodies a -body_a_mesh box:0.3,0.1,0.1:2 -body_a_young 1e5 -body_a_poisson 0.3 -body_a_density 1000 " \
-  "-effects "                                                                                            \
-  "clamp,gravity -effect_clamp_type fixed -effect_clamp_on xmin -body_a_material corotated -ts_dt 0.02 " \
-  "-ts_max_time 0.4 "
+  "-effects clamp,gravity -effect_clamp_type fixed -effect_clamp_on xmin -body_a_material corotated "    \
+  "-ts_dt 0.02 -ts_max_time 0.4 "
 
 /* Calls until the next failure, and how many failures there are still to be. */
 typedef struct {
@@ -115,22 +114,21 @@ static PetscErrorCode newton_fails_often(HardRun *r)
   {                                                                                                          \
     .name = "free." ELEMENT "." LAW, .what = "static under its weight without a support, " ELEMENT ", " LAW, \
     .options =                                                                                               \
-      "-bodies a -body_a_mesh box:0.3,0.1,0.1:2 -body_a_young 1e5 -body_a_poisson 0.3 -body_a_density "      \
-      "1000 -effects gravity -time static -ksp_max_it 300 -body_a_element " ELEMENT                          \
-      " -body_a_material " LAW,                                                                              \
+      "-bodies a -body_a_mesh box:0.3,0.1,0.1:2 -body_a_young 1e5 -body_a_poisson 0.3 -body_a_density 1000 " \
+      "-effects gravity -time static -ksp_max_it 300 -body_a_element " ELEMENT " -body_a_material " LAW,     \
     .stops = "nothing holds the body a against", .quick = QUICK                                              \
   }
 
-#define PULLED(ELEMENT, LAW, QUICK)                                                                     \
-  {                                                                                                     \
-    .name = "pulled." ELEMENT "." LAW,                                                                  \
-    .what = "static, pulled at both ends without a support, " ELEMENT ", " LAW,                         \
-    .options =                                                                                          \
-      "-bodies a -body_a_mesh box:0.3,0.1,0.1:2 -body_a_young 1e5 -body_a_poisson 0.3 -body_a_density " \
-      "1000 -effects left,right -effect_left_type traction -effect_left_on xmin -effect_left_vector "   \
-      "-1000;0;0 -effect_right_type traction -effect_right_on xmax -effect_right_vector 1000;0;0 "      \
-      "-time static -body_a_element " ELEMENT " -body_a_material " LAW,                                 \
-    .stops = "nothing holds the body a against", .quick = QUICK                                         \
+#define PULLED(ELEMENT, LAW, QUICK)                                                                          \
+  {                                                                                                          \
+    .name = "pulled." ELEMENT "." LAW,                                                                       \
+    .what = "static, pulled at both ends without a support, " ELEMENT ", " LAW,                              \
+    .options =                                                                                               \
+      "-bodies a -body_a_mesh box:0.3,0.1,0.1:2 -body_a_young 1e5 -body_a_poisson 0.3 -body_a_density 1000 " \
+      "-effects left,right -effect_left_type traction -effect_left_on xmin -effect_left_vector -1000;0;0 "   \
+      "-effect_right_type traction -effect_right_on xmax -effect_right_vector 1000;0;0 -time static "        \
+      "-body_a_element " ELEMENT " -body_a_material " LAW,                                                   \
+    .stops = "nothing holds the body a against", .quick = QUICK                                              \
   }
 
 const HardCase HardCasesSolver[] = {

@@ -7,8 +7,7 @@
 
 #define CUBE                                                                                             \
   "-bodies a -body_a_mesh box:0.1,0.1,0.1:2 -body_a_young 5e4 -body_a_poisson 0.3 -body_a_density 1000 " \
-  "-effects "                                                                                            \
-  "clamp,gravity -effect_clamp_type fixed -effect_clamp_on zmin -body_a_velocity 1,0,0.5 "
+  "-effects clamp,gravity -effect_clamp_type fixed -effect_clamp_on zmin -body_a_velocity 1,0,0.5 "
 #define TIGHT "-ksp_rtol 1e-14 -snes_rtol 1e-14 "
 
 #define COARSE(ELEMENT, TIME, LAW, QUICK)                                                               \
@@ -26,16 +25,15 @@
   }
 
 /* Vertices are thrown apart in the end, and the run says why. */
-#define BEYOND(TIME)                                                                                    \
-  {                                                                                                     \
-    .name = "beyond." TIME, .what = "five times the stable step of " TIME,                              \
-    .options =                                                                                          \
-      "-bodies a -body_a_mesh box:0.1,0.1,0.1:2 -body_a_young 5e4 -body_a_poisson 0.3 -body_a_density " \
-      "1000 -body_a_material corotated -body_a_angular_velocity 1,0,0 -ts_dt 0.02 -ts_max_time 20 "     \
-      "-time " TIME,                                                                                    \
-    .quick = 1, .stops = "beyond the stable one", .limits = {                                           \
-      {HARD_STEPS, '<', 900}                                                                            \
-    }                                                                                                   \
+#define BEYOND(TIME)                                                                                         \
+  {                                                                                                          \
+    .name = "beyond." TIME, .what = "five times the stable step of " TIME,                                   \
+    .options =                                                                                               \
+      "-bodies a -body_a_mesh box:0.1,0.1,0.1:2 -body_a_young 5e4 -body_a_poisson 0.3 -body_a_density 1000 " \
+      "-body_a_material corotated -body_a_angular_velocity 1,0,0 -ts_dt 0.02 -ts_max_time 20 -time " TIME,   \
+    .quick = 1, .stops = "beyond the stable one", .limits = {                                                \
+      {HARD_STEPS, '<', 900}                                                                                 \
+    }                                                                                                        \
   }
 
 const HardCase HardCasesTime[] = {

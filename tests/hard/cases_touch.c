@@ -30,8 +30,7 @@
   "-bodies a,b " BLOCK("a", "3", "0,0,0", "0,0,0", "1e5")                                                   \
     BLOCK("b", "2", "0.02,0.01,0.102", "0.2,0,-0.5",                                                        \
           "1e5") "-effects gravity,floor,meet -effect_floor_type contact -effect_floor_response projected " \
-                 "-effect_floor_obstacle plane:0,0,1,0 "                                                    \
-                 "-effect_floor_friction 0.4 "                                                              \
+                 "-effect_floor_obstacle plane:0,0,1,0 -effect_floor_friction 0.4 "                         \
                  "-effect_meet_type contact -effect_meet_response projected -effect_meet_friction 0.2 "     \
                  "-ts_dt 0.005 -ts_max_time 0.3 " response
 #define RESPONSE_LIMITS(depth)                                                                            \
@@ -44,17 +43,14 @@
   }
 
 /* Length L in all of it, waves as fast as the times are long: the same solution but for L. */
-#define SCALE(L, near, at, dt, end)                                                                   \
-  "-bodies a,b -body_a_mesh box:" L "," L "," L ":3 -body_b_mesh box:" L "," L "," L                  \
-  ":2 -body_b_translate " near "," near "," at                                                        \
-  " -body_a_material neohookean -body_a_young 1e5 -body_a_poisson 0.3 -body_a_density 1000 "          \
-  "-body_b_material neohookean "                                                                      \
-  "-body_b_young 1e5 -body_b_poisson 0.3 -body_b_density 1000 -body_b_velocity 0.2,0,-1 -effects "    \
-  "floor,meet "                                                                                       \
-  "-effect_floor_type contact -effect_floor_response projected -effect_floor_obstacle plane:0,0,1,0 " \
-  "-effect_meet_type contact -effect_meet_response projected "                                        \
-  "-effect_meet_friction 0.3 "                                                                        \
-  "-ts_dt " dt " -ts_max_time " end
+#define SCALE(L, near, at, dt, end)                                                                          \
+  "-bodies a,b -body_a_mesh box:" L "," L "," L ":3 -body_b_mesh box:" L "," L "," L                         \
+  ":2 -body_b_translate " near "," near "," at                                                               \
+  " -body_a_material neohookean -body_a_young 1e5 -body_a_poisson 0.3 -body_a_density 1000 "                 \
+  "-body_b_material neohookean -body_b_young 1e5 -body_b_poisson 0.3 -body_b_density 1000 -body_b_velocity " \
+  "0.2,0,-1 -effects floor,meet -effect_floor_type contact -effect_floor_response projected "                \
+  "-effect_floor_obstacle plane:0,0,1,0 -effect_meet_type contact -effect_meet_response projected "          \
+  "-effect_meet_friction 0.3 -ts_dt " dt " -ts_max_time " end
 #define SCALE_LIMITS                                                                                     \
   {                                                                                                      \
     {HARD_EXCESS, '<', 1e-6}, {HARD_MIN_J, '>', 0.5}, {HARD_VOLUME, '<', 0.05}, {HARD_DEPTH, '<', 0.02}, \
@@ -65,15 +61,12 @@
   }
 
 /* A fine body under a coarse one: 169 places of the fine surface push on the four vertices of a face of the coarse one. */
-#define HUNDRED(response, friction)                                                                          \
-  "-bodies a,b -body_a_mesh box:0.1,0.1,0.02:12,12,1 -body_b_mesh box:0.1,0.1,0.1:1 -body_b_translate "      \
-  "0,0,0.0201 "                                                                                              \
-  "-body_a_material neohookean -body_a_young 1e5 -body_a_poisson 0.3 -body_a_density 1000 -body_b_material " \
-  "neohookean "                                                                                              \
-  "-body_b_young 1e5 -body_b_poisson 0.3 -body_b_density 1000 -effects gravity,floor,meet "                  \
-  "-effect_floor_type contact -effect_floor_response projected "                                             \
-  "-effect_floor_obstacle plane:0,0,1,0 -effect_floor_friction 0.3 -effect_meet_type contact "               \
-  "-effect_meet_response projected "                                                                         \
+#define HUNDRED(response, friction)                                                                        \
+  "-bodies a,b -body_a_mesh box:0.1,0.1,0.02:12,12,1 -body_b_mesh box:0.1,0.1,0.1:1 -body_b_translate "    \
+  "0,0,0.0201 -body_a_material neohookean -body_a_young 1e5 -body_a_poisson 0.3 -body_a_density 1000 "     \
+  "-body_b_material neohookean -body_b_young 1e5 -body_b_poisson 0.3 -body_b_density 1000 -effects "       \
+  "gravity,floor,meet -effect_floor_type contact -effect_floor_response projected -effect_floor_obstacle " \
+  "plane:0,0,1,0 -effect_floor_friction 0.3 -effect_meet_type contact -effect_meet_response projected "    \
   "-effect_meet_response " response " -effect_meet_friction " friction " -ts_dt 0.005 -ts_max_time 0.03"
 #define HUNDRED_LIMITS                                                                                  \
   {                                                                                                     \
@@ -88,9 +81,8 @@
 #define SADDLE                                                                                      \
   "-bodies a -body_a_mesh box:0.12,0.024,0.01:16,4,1 -body_a_material corotated -body_a_young 2e4 " \
   "-body_a_poisson 0.4 -body_a_density 1000 -effects gravity,ends,tool -effect_ends_type fixed "    \
-  "-effect_ends_on xmin,xmax "                                                                      \
-  "-effect_tool_type contact -effect_tool_response projected -effect_tool_obstacle mesh:%s "        \
-  "-effect_tool_obstacle_at 0.06,0.012,-0.004 "                                                     \
+  "-effect_ends_on xmin,xmax -effect_tool_type contact -effect_tool_response projected "            \
+  "-effect_tool_obstacle mesh:%s -effect_tool_obstacle_at 0.06,0.012,-0.004 "                       \
   "-effect_tool_displacement 0;0;0.02*ramp(t/0.4) -ts_dt 0.02 -ts_max_time 0.6"
 /* A block with a rigid plate in it whose middle plane has a layer of its nodes: both separation directions are as long. */
 #define MIDDLE                                                                           \

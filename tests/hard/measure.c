@@ -141,14 +141,13 @@ PetscErrorCode HardMeasureStep(SbRun run, const SbStep *step, void *ctx)
   r->value[HARD_LINEAR] = PetscMax(r->value[HARD_LINEAR], (PetscReal)step->linear);
   r->value[HARD_STEPS] = (PetscReal)step->step;
   if (r->verbose)
-    PetscCall(PetscPrintf(PETSC_COMM_WORLD,
-                          "    %" PetscInt_FMT
-                          " t %g kinetic %.4g strain %.4g missing %.3g min J %.4g inverted "
-                          "%" PetscInt_FMT " displacement %.3g newton %" PetscInt_FMT " linear %" PetscInt_FMT
-                          " rejected %" PetscInt_FMT "\n",
-                          step->step, (double)step->t, (double)e->kinetic, (double)e->strain,
-                          (double)e->integrator_loss, (double)e->min_J, e->ninverted,
-                          (double)e->max_displacement, step->newton, step->linear, step->rejected));
+    PetscCall(PetscPrintf(
+      PETSC_COMM_WORLD,
+      "    %" PetscInt_FMT " t %g kinetic %.4g strain %.4g missing %.3g min J %.4g inverted %" PetscInt_FMT
+      " displacement %.3g newton %" PetscInt_FMT " linear %" PetscInt_FMT " rejected %" PetscInt_FMT "\n",
+      step->step, (double)step->t, (double)e->kinetic, (double)e->strain, (double)e->integrator_loss,
+      (double)e->min_J, e->ninverted, (double)e->max_displacement, step->newton, step->linear,
+      step->rejected));
   if (r->c->look) PetscCall((*r->c->look)(r, step));
   (void)run;
   PetscFunctionReturn(PETSC_SUCCESS);

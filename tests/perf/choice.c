@@ -71,13 +71,12 @@ int main(int argc, char **argv)
     PetscCall(PetscFinalize());
     return 0;
   }
-  PetscCall(
-    PetscSNPrintf(text, sizeof(text),
-                  "-bodies a -body_a_mesh %s -body_a_element %s -body_a_material linear "
-                  "-body_a_young 1e6 -body_a_poisson %.17g -body_a_density 1000 -sets held "
-                  "-set_held_at plane:1,0,0,0 -effects gravity,clamp -effect_gravity_vector 0,0,-9.81 "
-                  "-effect_clamp_type fixed -effect_clamp_on held -time static %s",
-                  path, element, (double)nu, with));
+  PetscCall(PetscSNPrintf(
+    text, sizeof(text),
+    "-bodies a -body_a_mesh %s -body_a_element %s -body_a_material linear -body_a_young 1e6 "
+    "-body_a_poisson %.17g -body_a_density 1000 -sets held -set_held_at plane:1,0,0,0 -effects gravity,clamp "
+    "-effect_gravity_vector 0,0,-9.81 -effect_clamp_type fixed -effect_clamp_on held -time static %s",
+    path, element, (double)nu, with));
   PetscCall(perf_read(text, &scene));
   PetscCall(SbModelSetUp(scene.model));
   PetscCall(test_file_remove(path));

@@ -99,14 +99,13 @@ static inline PetscErrorCode perf_argument(const char *name, size_t size, char v
 static inline PetscErrorCode perf_bar(const char *mesh, const char *more, char text[PERF_TEXT])
 {
   PetscFunctionBeginUser;
-  PetscCall(PetscSNPrintf(text, PERF_TEXT,
-                          "-bodies bar -body_bar_mesh %s -body_bar_material corotated -body_bar_young 5e4 "
-                          "-body_bar_poisson 0.4 -body_bar_density 1000 -body_bar_tangent warped -sets end "
-                          "-set_end_at plane:1,0,0,0 "
-                          "-effects gravity,clamp -effect_gravity_vector 0,0,-9.81 -effect_clamp_type fixed "
-                          "-effect_clamp_on end -time euler_implicit -ts_dt 0.0166666666666666667 "
-                          "-snes_type ksponly -ksp_rtol 1e-4 %s",
-                          mesh, more));
+  PetscCall(PetscSNPrintf(
+    text, PERF_TEXT,
+    "-bodies bar -body_bar_mesh %s -body_bar_material corotated -body_bar_young 5e4 -body_bar_poisson 0.4 "
+    "-body_bar_density 1000 -body_bar_tangent warped -sets end -set_end_at plane:1,0,0,0 "
+    "-effects gravity,clamp -effect_gravity_vector 0,0,-9.81 -effect_clamp_type fixed -effect_clamp_on end "
+    "-time euler_implicit -ts_dt 0.0166666666666666667 -snes_type ksponly -ksp_rtol 1e-4 %s",
+    mesh, more));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

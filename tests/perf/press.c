@@ -74,11 +74,10 @@ static PetscErrorCode add_body(const char *name, const char *mesh, const char *w
   char body[512];
 
   PetscFunctionBeginUser;
-  PetscCall(
-    PetscSNPrintf(body, sizeof(body),
-                  " -body_%s_mesh %s -body_%s_material corotated -body_%s_young 3e4 -body_%s_poisson 0.4 "
-                  "-body_%s_density 1000 -body_%s_%s",
-                  name, mesh, name, name, name, name, name, where));
+  PetscCall(PetscSNPrintf(body, sizeof(body),
+                          " -body_%s_mesh %s -body_%s_material corotated -body_%s_young 3e4 "
+                          "-body_%s_poisson 0.4 -body_%s_density 1000 -body_%s_%s",
+                          name, mesh, name, name, name, name, name, where));
   PetscCall(PetscStrlcat(text, body, size));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -145,11 +144,11 @@ int main(int argc, char **argv)
     PetscCall(heap_scene(cells, sizeof(text), text));
   else
     PetscCall(press_scene(cells, steps, sizeof(text), text));
-  PetscCall(PetscSNPrintf(more, sizeof(more),
-                          " -effect_meet_type contact -effect_meet_response projected -effect_meet_detection "
-                          "%s -effect_meet_friction %g "
-                          "-time euler_implicit -ts_max_steps %d -ts_max_time 100",
-                          detection, (double)friction, (int)steps));
+  PetscCall(
+    PetscSNPrintf(more, sizeof(more),
+                  " -effect_meet_type contact -effect_meet_response projected -effect_meet_detection %s "
+                  "-effect_meet_friction %g -time euler_implicit -ts_max_steps %d -ts_max_time 100",
+                  detection, (double)friction, (int)steps));
   PetscCall(PetscStrlcat(text, more, sizeof(text)));
   PetscCall(perf_open(text, &t));
   t.run->want_energies = PETSC_TRUE;

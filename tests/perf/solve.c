@@ -20,13 +20,12 @@ int main(int argc, char **argv)
     PerfClock start, used;
     TestScene t;
 
-    PetscCall(
-      PetscSNPrintf(text, sizeof(text),
-                    "-bodies bar -body_bar_mesh %s -body_bar_material linear -body_bar_young 5e5 "
-                    "-body_bar_poisson 0.3 -sets end -set_end_at plane:1,0,0,0 -effects gravity,clamp "
-                    "-effect_gravity_vector 0,0,-9.81 -effect_clamp_type fixed -effect_clamp_on end "
-                    "-time static -ksp_rtol 1e-8 -solver %s",
-                    mesh, solver));
+    PetscCall(PetscSNPrintf(
+      text, sizeof(text),
+      "-bodies bar -body_bar_mesh %s -body_bar_material linear -body_bar_young 5e5 -body_bar_poisson 0.3 "
+      "-sets end -set_end_at plane:1,0,0,0 -effects gravity,clamp -effect_gravity_vector 0,0,-9.81 "
+      "-effect_clamp_type fixed -effect_clamp_on end -time static -ksp_rtol 1e-8 -solver %s",
+      mesh, solver));
     PetscCall(perf_open(text, &t));
     start = perf_start();
     PetscCall(SbRunSolve(t.run));

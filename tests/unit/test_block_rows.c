@@ -5,11 +5,9 @@
 
 static const char *const scene =
   "-bodies a -body_a_mesh box:1,0.5,0.4:4,3,2 -body_a_material corotated -body_a_tangent warped "
-  "-body_a_young 1e3 -body_a_poisson "
-  "0.3 -body_a_density 10 "
-  "-sets left,low -set_left_at plane:1,0,0,0 -set_low_at plane:0,0,1,0 -effects clamp,slide "
-  "-effect_clamp_type fixed "
-  "-effect_clamp_on left -effect_slide_type fixed -effect_slide_on low -effect_slide_components z";
+  "-body_a_young 1e3 -body_a_poisson 0.3 -body_a_density 10 -sets left,low -set_left_at plane:1,0,0,0 "
+  "-set_low_at plane:0,0,1,0 -effects clamp,slide -effect_clamp_type fixed -effect_clamp_on left "
+  "-effect_slide_type fixed -effect_slide_on low -effect_slide_components z";
 
 static void wave(const PetscReal x[3], PetscReal v[3])
 {

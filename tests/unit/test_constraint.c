@@ -17,9 +17,8 @@
   "-body_a_density 100 " REST
 #define HALVES                                                                                           \
   "-bodies a,b -body_a_mesh box:0.5,0.5,0.5:2 -body_b_mesh box:0.5,0.5,0.5:2 -body_b_translate 0.5,0,0 " \
-  "-body_a_material linear -body_a_young 1e4 -body_a_poisson 0.3 -body_a_density 100 -body_b_material "  \
-  "linear -body_b_young 1e4 -body_b_poisson 0.3 "                                                        \
-  "-body_b_density 100 " REST
+  "-body_a_material linear -body_a_young 1e4 -body_a_poisson 0.3 -body_a_density 100 "                   \
+  "-body_b_material linear -body_b_young 1e4 -body_b_poisson 0.3 -body_b_density 100 " REST
 
 typedef struct {
   PetscReal x[3], body, gnode;

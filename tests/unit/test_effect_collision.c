@@ -438,18 +438,17 @@ static PetscErrorCode check_attempts(const char *response)
 #define LAW(name, element)                                                                          \
   " -body_" name "_material linear -body_" name "_young 1e5 -body_" name "_poisson 0.3 -body_" name \
   "_element " element
-#define PRESS                                                                                             \
-  "-bodies a,b,c -body_a_mesh box:0.2,0.2,0.05:1 -body_b_mesh box:0.12,0.1,0.05:2 -body_b_translate "     \
-  "0.03,0.04,0.05 -body_c_mesh box:0.08,0.06,0.05:1 -body_c_translate 0.05,0.06,0.1" LAW("a", "cr")       \
-    LAW("b", "p1") LAW(                                                                                   \
-      "c",                                                                                                \
-      "dg") " -sets low,top,side -set_side_at plane:1,0,0,0.03 -set_low_at plane:0,0,1,0 -set_top_at "    \
-            "plane:0,0,1,0.15 "                                                                           \
-            "-time static -static_steps 1 -ksp_rtol 1e-12 -snes_rtol 1e-11 -effects hold,push,side,meet " \
-            "-effect_side_type fixed -effect_side_on side -effect_side_components xy "                    \
-            "-effect_hold_type fixed -effect_hold_on low -effect_push_type prescribed_displacement "      \
-            "-effect_push_on top "                                                                        \
-            "-effect_push_displacement 0;0;-0.001 -effect_meet_type contact -effect_meet_response projected"
+#define PRESS                                                                                               \
+  "-bodies a,b,c -body_a_mesh box:0.2,0.2,0.05:1 -body_b_mesh box:0.12,0.1,0.05:2 -body_b_translate "       \
+  "0.03,0.04,0.05 -body_c_mesh box:0.08,0.06,0.05:1 -body_c_translate 0.05,0.06,0.1" LAW("a", "cr")         \
+    LAW("b", "p1") LAW(                                                                                     \
+      "c", "dg") " -sets low,top,side -set_side_at plane:1,0,0,0.03 -set_low_at plane:0,0,1,0 -set_top_at " \
+                 "plane:0,0,1,0.15 -time static -static_steps 1 -ksp_rtol 1e-12 -snes_rtol 1e-11 "          \
+                 "-effects hold,push,side,meet -effect_side_type fixed -effect_side_on side "               \
+                 "-effect_side_components xy -effect_hold_type fixed -effect_hold_on low "                  \
+                 "-effect_push_type prescribed_displacement -effect_push_on top "                           \
+                 "-effect_push_displacement 0;0;-0.001 -effect_meet_type contact "                          \
+                 "-effect_meet_response projected"
 
 enum { CONTACTS, DEEPEST, MEAN, NORMAL, FRICTION, WORK, LOSS, HOLD, PUSH, NVALUE };
 
@@ -531,13 +530,11 @@ static PetscErrorCode check_gap_field(void)
   Vec U, G;
 
   PetscFunctionBeginUser;
-  PetscCall(open_meeting(
-    "-bodies a,b -body_a_mesh box:0.1,0.1,0.05:2 -body_b_mesh box:0.06,0.06,0.05:2 -body_b_translate "
-    "0.02,0.02,0.06" LAW("a", "p1") LAW("b", "p1"),
-    " -effects meet,floor -effect_floor_type contact -effect_floor_response projected -effect_floor_on b "
-    "-effect_floor_obstacle "
-    "plane:0,0,1,-1",
-    &x));
+  PetscCall(open_meeting("-bodies a,b -body_a_mesh box:0.1,0.1,0.05:2 -body_b_mesh box:0.06,0.06,0.05:2 "
+                         "-body_b_translate 0.02,0.02,0.06" LAW("a", "p1") LAW("b", "p1"),
+                         " -effects meet,floor -effect_floor_type contact -effect_floor_response projected "
+                         "-effect_floor_on b -effect_floor_obstacle plane:0,0,1,-1",
+                         &x));
   for (PetscInt i = 0; i < x.s->nnode; i++) x.u[3 * i + 2] = x.s->node_body[i] == 1 ? -down : 0;
   PetscCall(attempt(&x));
   PetscCall(SbSpaceCreateVec(x.s, &U));

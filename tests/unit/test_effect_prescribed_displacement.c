@@ -104,15 +104,14 @@ static PetscErrorCode check_element(const char *element, PetscBool held)
   if (file) fprintf(file, "# t x\n0 0\n2, 3\n");
   PetscCall(test_file_close(file));
   PetscCall(fixture_create(PETSC_COMM_WORLD, 1, "box:1,1,1:2", PETSC_STATIC_ARRAY_LENGTH(sets), sets, &x));
-  PetscCall(effect_create(&x, "twist",
-                          "-effect_twist_type prescribed_displacement -effect_twist_on top "
-                          "-effect_twist_angle 90*t -effect_twist_axis 0,0,2 "
-                          "-effect_twist_axis_point 1,0,0 -effect_twist_displacement 0;0;t/2",
-                          &twist));
+  PetscCall(effect_create(
+    &x, "twist",
+    "-effect_twist_type prescribed_displacement -effect_twist_on top -effect_twist_angle 90*t "
+    "-effect_twist_axis 0,0,2 -effect_twist_axis_point 1,0,0 -effect_twist_displacement 0;0;t/2",
+    &twist));
   PetscCall(PetscSNPrintf(options, sizeof(options),
                           "-effect_pull_type prescribed_displacement -effect_pull_on bottom "
-                          "-effect_pull_components xz -effect_pull_displacement "
-                          "table:%s;0;t*x*y",
+                          "-effect_pull_components xz -effect_pull_displacement table:%s;0;t*x*y",
                           table));
   PetscCall(effect_create(&x, "pull", options, &pull));
   PetscCall(SbSpaceFixDone(x.space));

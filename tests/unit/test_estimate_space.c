@@ -143,13 +143,13 @@ static PetscErrorCode check_materials(const char *element)
   char text[1024];
 
   PetscFunctionBeginUser;
-  PetscCall(PetscSNPrintf(text, sizeof(text),
-                          "-bodies a -body_a_mesh box:1,1,1:4 -body_a_element %s -body_a_material linear "
-                          "-body_a_young 1e3 -body_a_poisson 0 -body_a_density 1 -body_a_inclusions far "
-                          "-sets far -set_far_at box:0.5,0,0,1,1,1 -inclusion_far_material linear "
-                          "-inclusion_far_young %g -inclusion_far_poisson 0 -inclusion_far_density 1 "
-                          "-time static",
-                          element, 1e3 * FAR));
+  PetscCall(
+    PetscSNPrintf(text, sizeof(text),
+                  "-bodies a -body_a_mesh box:1,1,1:4 -body_a_element %s -body_a_material linear "
+                  "-body_a_young 1e3 -body_a_poisson 0 -body_a_density 1 -body_a_inclusions far -sets far "
+                  "-set_far_at box:0.5,0,0,1,1,1 -inclusion_far_material linear -inclusion_far_young %g "
+                  "-inclusion_far_poisson 0 -inclusion_far_density 1 -time static",
+                  element, 1e3 * FAR));
   PetscCall(open_scene(PETSC_COMM_WORLD, text, &m));
   for (int k = 0; k < 2; k++) {
     PetscCall(estimate(m, k ? jump_field : two_field, &est));
@@ -175,16 +175,13 @@ static PetscErrorCode many_bodies(MPI_Comm comm, PetscReal value[3 * NVALUE])
   PetscCall(open_scene(
     comm,
     "-bodies a,b,c -body_a_mesh box:1,1,1:4 -body_b_mesh box:1,1,1:3 -body_c_mesh box:1,1,1:2 "
-    "-body_b_element cr "
-    "-body_c_element dg -body_b_translate 2,0,0 -body_c_translate 4,0,0 -body_a_material linear "
-    "-body_b_material corotated -body_c_material linear -body_a_young 1e3 -body_b_young 1e3 -body_c_young "
-    "1e3 "
-    "-body_a_poisson 0.48 -body_b_poisson 0.4 -body_c_poisson 0.3 -body_a_density 1 -body_b_density 1 "
-    "-body_c_density 1 -body_a_inclusions far -sets far -set_far_at box:0.5,0,0,1,1,1 "
-    "-inclusion_far_material linear -inclusion_far_young 5e3 -inclusion_far_poisson 0.3 "
-    "-inclusion_far_density 1 "
-    "-effects hold,weight -effect_hold_type fixed -effect_hold_on zmin -effect_weight_type gravity "
-    "-effect_weight_vector 0,0,-9.81 -time static",
+    "-body_b_element cr -body_c_element dg -body_b_translate 2,0,0 -body_c_translate 4,0,0 "
+    "-body_a_material linear -body_b_material corotated -body_c_material linear -body_a_young 1e3 "
+    "-body_b_young 1e3 -body_c_young 1e3 -body_a_poisson 0.48 -body_b_poisson 0.4 -body_c_poisson 0.3 "
+    "-body_a_density 1 -body_b_density 1 -body_c_density 1 -body_a_inclusions far -sets far "
+    "-set_far_at box:0.5,0,0,1,1,1 -inclusion_far_material linear -inclusion_far_young 5e3 "
+    "-inclusion_far_poisson 0.3 -inclusion_far_density 1 -effects hold,weight -effect_hold_type fixed "
+    "-effect_hold_on zmin -effect_weight_type gravity -effect_weight_vector 0,0,-9.81 -time static",
     &m));
   PetscCall(estimate(m, wavy_field, &est));
   for (PetscInt c = 0; c < m->mesh->ncell_owned; c++) sum[m->mesh->cell_body[c]] += est->cell2[c];

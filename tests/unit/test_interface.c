@@ -5,12 +5,11 @@
 #include "../scene.h"
 #include <petscblaslapack.h>
 
-static const char *const scene = "-bodies a,b -body_a_mesh box:1,0.5,0.4:6,3,3 -body_a_material linear "
-                                 "-body_a_young 1e3 -body_a_poisson 0.3 -body_a_density 10 "
-                                 "-body_b_mesh box:0.3,0.5,0.4:2 -body_b_translate 0,0,2 -body_b_material "
-                                 "linear -body_b_young 2e3 -body_b_poisson 0.4 "
-                                 "-body_b_density 7 -sets low -set_low_at plane:0,0,1,0 -effects clamp "
-                                 "-effect_clamp_type fixed -effect_clamp_on low";
+static const char *const scene =
+  "-bodies a,b -body_a_mesh box:1,0.5,0.4:6,3,3 -body_a_material linear -body_a_young 1e3 "
+  "-body_a_poisson 0.3 -body_a_density 10 -body_b_mesh box:0.3,0.5,0.4:2 -body_b_translate 0,0,2 "
+  "-body_b_material linear -body_b_young 2e3 -body_b_poisson 0.4 -body_b_density 7 -sets low "
+  "-set_low_at plane:0,0,1,0 -effects clamp -effect_clamp_type fixed -effect_clamp_on low";
 
 static PetscErrorCode check_structure(SbSpace s, SbInterface f, PetscInt *mine)
 {

@@ -4,14 +4,11 @@
 
 static const char *const scene =
   "-bodies a,b -body_a_mesh box:1,0.5,0.4:4,3,2 -body_a_material corotated -body_a_tangent warped "
-  "-body_a_young 1e3 -body_a_poisson 0.3 -body_a_density 10 "
-  "-body_b_mesh box:0.3,0.5,0.4:2 -body_b_translate 0,0,2 -body_b_material %s "
-  "-body_b_young 2e3 -body_b_poisson 0.4 "
-  "-body_b_density 7 -sets left,low -set_left_at plane:1,0,0,0 -set_low_at "
-  "plane:0,0,1,0 -effects clamp,slide,damping "
-  "-effect_clamp_type fixed -effect_clamp_on left -effect_slide_type "
-  "fixed -effect_slide_on low -effect_slide_components z "
-  "-effect_damping_alpha 0.3 -effect_damping_beta 0.02 %s";
+  "-body_a_young 1e3 -body_a_poisson 0.3 -body_a_density 10 -body_b_mesh box:0.3,0.5,0.4:2 "
+  "-body_b_translate 0,0,2 -body_b_material %s -body_b_young 2e3 -body_b_poisson 0.4 -body_b_density 7 "
+  "-sets left,low -set_left_at plane:1,0,0,0 -set_low_at plane:0,0,1,0 -effects clamp,slide,damping "
+  "-effect_clamp_type fixed -effect_clamp_on left -effect_slide_type fixed -effect_slide_on low "
+  "-effect_slide_components z -effect_damping_alpha 0.3 -effect_damping_beta 0.02 %s";
 
 static void wave(const PetscReal x[3], PetscReal v[3])
 {

@@ -21,10 +21,8 @@ static PetscErrorCode test_repairs(void)
            (int)m.im.item[2].n);
   SB_CHECK_NEAR(m.facts.body.volume, 2. / 6, 1e-15, "volume of two tets, one of which was turned");
   SB_CHECK(m.facts.body.npart == 2, "%d parts", (int)m.facts.body.npart);
-  SB_CHECK(!strcmp(m.facts.body.note,
-                   "unused vertices left out: 2, inverted tets turned: 1, parts that share no "
-                   "vertex: 2, triangles of groups that are no face of a "
-                   "tet: 2"),
+  SB_CHECK(!strcmp(m.facts.body.note, "unused vertices left out: 2, inverted tets turned: 1, parts that "
+                                      "share no vertex: 2, triangles of groups that are no face of a tet: 2"),
            "'%s'", m.facts.body.note);
   PetscCall(SbImportDestroy(&m.im));
   PetscCall(test_mesh_read(test_body("b", DATA "odd_edge.msh"), &m));

@@ -200,8 +200,7 @@ static PetscErrorCode test_vtu(void)
     {VTU("", "<DataArray type=\"Float32\" NumberOfComponents=\"3\" format=\"appended\" offset=\"0\"/>", TET),
      "line 5|0"},
     {"<VTKFile type=\"UnstructuredGrid\"><Piece NumberOfPoints=\"4\" NumberOfCells=\"1\"></Piece><Piece "
-     "NumberOfPoints=\"4\" "
-     "NumberOfCells=\"1\"></Piece></VTKFile>",
+     "NumberOfPoints=\"4\" NumberOfCells=\"1\"></Piece></VTKFile>",
      "u.vtu|line 1"},
     {"<VTKFile type=\"UnstructuredGrid\"><Piece NumberOfPoints=\"-4\" NumberOfCells=\"1\"></Piece></VTKFile>",
      "u.vtu|line 1|NumberOfPoints|'-4'"},

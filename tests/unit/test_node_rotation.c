@@ -2,9 +2,8 @@
 /* Rotations of nodes: exact for a body turned as a whole by any angle, the local turn in a bent bar, I for linear laws. */
 #include "../scene.h"
 
-static const char *const bar =
-  "-bodies bar -body_bar_mesh box:0.4,0.1,0.1:16,4,4 -body_bar_material %s -body_bar_young 5e4 "
-  "-body_bar_poisson 0.4 -body_bar_density 1000";
+static const char *const bar = "-bodies bar -body_bar_mesh box:0.4,0.1,0.1:16,4,4 -body_bar_material %s "
+                               "-body_bar_young 5e4 -body_bar_poisson 0.4 -body_bar_density 1000";
 
 static PetscReal angle; /* rad */
 

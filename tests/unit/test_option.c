@@ -124,10 +124,9 @@ static PetscErrorCode test_refused_words(void)
   SbFormula f[3];
 
   PetscFunctionBeginUser;
-  PetscCall(begin(
-    "-verbose perhaps -repeat 2.5 -integrator newmrk -body_liver_tags a,,b -body_liver_pull 1;2 -bodies "
-    "-body_liver_mesh long_name.msh",
-    &database));
+  PetscCall(begin("-verbose perhaps -repeat 2.5 -integrator newmrk -body_liver_tags a,,b "
+                  "-body_liver_pull 1;2 -bodies -body_liver_mesh long_name.msh",
+                  &database));
   SB_CHECK_ERROR(SbOptionBool(&run_scope, "verbose", &b), PETSC_ERR_USER, "-verbose perhaps");
   SB_CHECK_ERROR(SbOptionInt(&run_scope, "repeat", &n), PETSC_ERR_USER, "-repeat 2.5");
   SB_CHECK_ERROR(SbOptionChoice(&run_scope, "integrator", &n), PETSC_ERR_USER, "-integrator newmrk|newmark");

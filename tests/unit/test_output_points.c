@@ -5,11 +5,10 @@
 
 #define ELASTIC(b) \
   " -body_" b "_material linear -body_" b "_young 1000 -body_" b "_poisson 0.25 -body_" b "_density 10"
-#define BODIES                                                                                             \
-  "-bodies a,b,c -body_a_mesh box:0.4,0.1,0.2:4,1,2 -body_b_mesh box:0.3,0.2,0.2:3,2,2 -body_b_translate " \
-  "0,0.2,0 "                                                                                               \
-  "-body_c_mesh box:0.2,0.2,0.2:2,2,2 -body_c_translate 0,0.5,0 -body_a_element p1 -body_b_element cr "    \
-  "-body_c_element dg -sets left -set_left_at plane:1,0,0,0 -effects hold -effect_hold_type fixed "        \
+#define BODIES                                                                                               \
+  "-bodies a,b,c -body_a_mesh box:0.4,0.1,0.2:4,1,2 -body_b_mesh box:0.3,0.2,0.2:3,2,2 -body_b_translate "   \
+  "0,0.2,0 -body_c_mesh box:0.2,0.2,0.2:2,2,2 -body_c_translate 0,0.5,0 -body_a_element p1 -body_b_element " \
+  "cr -body_c_element dg -sets left -set_left_at plane:1,0,0,0 -effects hold -effect_hold_type fixed "       \
   "-effect_hold_on left" ELASTIC("a") ELASTIC("b") ELASTIC("c")
 #define FIELDS \
   " -output_fields displacement,velocity,acceleration,reaction,J,pressure -output_precision double"

@@ -302,11 +302,11 @@ static PetscErrorCode test_scenes(void)
   PetscFunctionBeginUser;
   /* large displacements, a load with a tangent of its own */
   PetscCall(test_solution(
-    "-bodies one " BODY("one", "box:0.3,0.1,0.1:2", "neohookean", "dg",
-                        "-body_one_poisson 0.499 ") "-effects gravity,clamp,push -effect_clamp_type fixed "
-                                                    "-effect_clamp_on xmin -effect_push_type pressure "
-                                                    "-effect_push_on zmax -effect_push_value 200 "
-                                                    "-body_one_young 5e5 -static_steps 3 " STATIC,
+    "-bodies one " BODY(
+      "one", "box:0.3,0.1,0.1:2", "neohookean", "dg",
+      "-body_one_poisson 0.499 ") "-effects gravity,clamp,push -effect_clamp_type fixed -effect_clamp_on "
+                                  "xmin -effect_push_type pressure -effect_push_on zmax "
+                                  "-effect_push_value 200 -body_one_young 5e5 -static_steps 3 " STATIC,
     80, 1e-5));
   PetscCall(test_solution("-bodies one " BODY("one", "box:0.3,0.1,0.1:2", "corotated", "cr",
                                               "-body_one_poisson 0.4999 -body_one_tangent exact ")
@@ -340,11 +340,10 @@ static PetscErrorCode test_springs(void)
       options, sizeof(options),
       "-bodies a,b -body_a_mesh box:0.1,0.1,0.05:3 -body_b_mesh box:0.1,0.1,0.05:2 -body_a_element %s "
       "-body_b_element p1 -body_a_poisson 0.499 -body_b_poisson 0.3 -body_a_material linear "
-      "-body_b_material linear -body_a_young 1e5 -body_b_young 1e5 -body_a_density 1000 "
-      "-body_b_density 1000 -effects gravity,x,y,floor -effect_x_type fixed -effect_x_on xmin "
-      "-effect_x_components x -effect_y_type fixed -effect_y_on ymin -effect_y_components y "
-      "-effect_floor_type contact -effect_floor_response projected -effect_floor_on zmin "
-      "-effect_floor_obstacle %s "
+      "-body_b_material linear -body_a_young 1e5 -body_b_young 1e5 -body_a_density 1000 -body_b_density 1000 "
+      "-effects gravity,x,y,floor -effect_x_type fixed -effect_x_on xmin -effect_x_components x "
+      "-effect_y_type fixed -effect_y_on ymin -effect_y_components y -effect_floor_type contact "
+      "-effect_floor_response projected -effect_floor_on zmin -effect_floor_obstacle %s "
       "-effect_floor_response penalty " STATIC,
       element[k % 2], floor[k / 2]));
     PetscCall(test_solution(options, 65, 1e-5)); /* nonlinear: Newton ends at 1e-8 of the force */

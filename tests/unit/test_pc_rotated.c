@@ -206,9 +206,8 @@ static PetscErrorCode check_indefinite(void)
 /* What an application reads is shared: all ranks together read little more than one does alone, and none much more than its part. */
 static PetscErrorCode check_work(PetscMPIInt size)
 {
-  const char *options =
-    "-bodies bar -body_bar_mesh box:0.4,0.1,0.1:24,7,7 -body_bar_material linear -body_bar_young 5e4 "
-    "-body_bar_poisson 0.4 -body_bar_density 1000";
+  const char *options = "-bodies bar -body_bar_mesh box:0.4,0.1,0.1:24,7,7 -body_bar_material linear "
+                        "-body_bar_young 5e4 -body_bar_poisson 0.4 -body_bar_density 1000";
   PetscInt64 interior, face, alone = 0, work, all, most;
   PetscInt nface;
 

@@ -12,14 +12,12 @@
 static const char two_bodies[] =
   "-bodies liver,big_stone -body_liver_mesh box:1,1,1:2" LAW
   " -body_liver_rotate 1,0,0,90 -body_liver_translate 0,0,2 -body_liver_scale 0.1 "
-  "-body_liver_angular_velocity 0,0,3"
-  " -body_big_stone_mesh box:1,1,1:3 -body_big_stone_material linear -body_big_stone_young 1e6"
-  " -body_big_stone_poisson 0.2 -body_big_stone_density 2500 -body_big_stone_velocity 1,2,3"
-  " -sets left,tip -set_left_at plane:2,0,0,1 -set_tip_at sphere:1,1,1,0.5"
-  " -effects gravity,hold,press,damp -effect_gravity_vector 0,0,-1"
-  " -effect_hold_type fixed -effect_hold_on left,big_stone,liver.xmin"
-  " -effect_press_type pressure -effect_press_on boundary,left,zmax -effect_press_value 100*t"
-  " -effect_damp_type damping -effect_damp_on all -effect_damp_alpha 0.1";
+  "-body_liver_angular_velocity 0,0,3 -body_big_stone_mesh box:1,1,1:3 -body_big_stone_material linear "
+  "-body_big_stone_young 1e6 -body_big_stone_poisson 0.2 -body_big_stone_density 2500 "
+  "-body_big_stone_velocity 1,2,3 -sets left,tip -set_left_at plane:2,0,0,1 -set_tip_at sphere:1,1,1,0.5 "
+  "-effects gravity,hold,press,damp -effect_gravity_vector 0,0,-1 -effect_hold_type fixed "
+  "-effect_hold_on left,big_stone,liver.xmin -effect_press_type pressure -effect_press_on boundary,left,zmax "
+  "-effect_press_value 100*t -effect_damp_type damping -effect_damp_on all -effect_damp_alpha 0.1";
 
 static PetscErrorCode begin(const char *options, PetscOptions *database)
 {

@@ -69,11 +69,11 @@ static PetscErrorCode check_slivers(void)
   PetscFunctionBeginUser;
   PetscCall(slivers_write(&s, path, &made));
   for (int dg = 0; dg < 2; dg++) {
-    PetscCall(PetscSNPrintf(
-      text, sizeof(text),
-      BAR "-body_a_mesh %s -effect_clamp_on held -sets held -set_held_at "
-          "plane:1,0,0,0 -time static -body_a_material linear -body_a_poisson 0.4999 -body_a_element %s",
-      path, dg ? "dg" : "cr"));
+    PetscCall(PetscSNPrintf(text, sizeof(text),
+                            BAR
+                            "-body_a_mesh %s -effect_clamp_on held -sets held -set_held_at plane:1,0,0,0 "
+                            "-time static -body_a_material linear -body_a_poisson 0.4999 -body_a_element %s",
+                            path, dg ? "dg" : "cr"));
     PetscCall(check_replaced(text, "pressure", "-ksp_max_it 20", 1e-4));
   }
   PetscCall(test_scene_open(text, &t));
@@ -91,11 +91,10 @@ static PetscErrorCode choose(const char *path, const char *solver, const char *b
   TestScene t;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscSNPrintf(
-    text, sizeof(text),
-    BAR "-body_a_mesh %s -effect_clamp_on held -sets held -set_held_at plane:1,0,0,0 -time static "
-        "-body_a_material linear %s -solver %s",
-    path, body, solver));
+  PetscCall(PetscSNPrintf(text, sizeof(text),
+                          BAR "-body_a_mesh %s -effect_clamp_on held -sets held -set_held_at plane:1,0,0,0 "
+                              "-time static -body_a_material linear %s -solver %s",
+                          path, body, solver));
   PetscCall(test_scene_open(text, &t));
   PetscCall(PetscStrncpy(name, t.run->solver, SB_NAME_MAX));
   PetscCall(test_scene_close(&t));
@@ -165,15 +164,14 @@ int main(int argc, char **argv)
   /* nodes constrained by an obstacle, and contact constraints between bodies */
   PetscCall(
     check_replaced(BAR "-body_a_material corotated -ts_dt 0.02 -ts_max_time 0.2 -effects gravity,clamp,floor "
-                       "-effect_floor_type contact -effect_floor_response projected -effect_floor_on "
-                       "boundary -effect_floor_obstacle "
-                       "plane:0,0,1,-0.01 -ksp_rtol 1e-10",
+                       "-effect_floor_type contact -effect_floor_response projected "
+                       "-effect_floor_on boundary -effect_floor_obstacle plane:0,0,1,-0.01 -ksp_rtol 1e-10",
                    "cg", "-ksp_max_it 5", 1e-4));
   PetscCall(check_replaced(
-    BAR "-body_a_material corotated -bodies a,b -body_b_mesh box:0.1,0.1,0.1:2 "
-        "-body_b_translate 0.2,0,0.102 -body_b_young 1e5 -body_b_poisson 0.3 -body_b_density "
-        "1000 -body_b_material corotated -effect_clamp_on a.xmin -ts_dt 0.02 -ts_max_time 0.1 -effects "
-        "gravity,clamp,meet -effect_meet_type contact -effect_meet_response projected -ksp_rtol 1e-10",
+    BAR "-body_a_material corotated -bodies a,b -body_b_mesh box:0.1,0.1,0.1:2 -body_b_translate 0.2,0,0.102 "
+        "-body_b_young 1e5 -body_b_poisson 0.3 -body_b_density 1000 -body_b_material corotated "
+        "-effect_clamp_on a.xmin -ts_dt 0.02 -ts_max_time 0.1 -effects gravity,clamp,meet "
+        "-effect_meet_type contact -effect_meet_response projected -ksp_rtol 1e-10",
     "cg", "-ksp_max_it 20", 1e-4));
   PetscCall(check_slivers());
   PetscCall(check_choice());

@@ -18,13 +18,13 @@
 #define STATIC BAR "-effects gravity,clamp " HELD "-time static "
 #define STEPS "-ts_dt 0.01 -ts_max_time 0.02 "
 #define DYNAMIC BAR "-effects gravity,clamp " HELD STEPS
-#define PAIR                                                                                         \
-  "-bodies a,b -body_a_mesh box:0.2,0.1,0.05:1 -body_b_mesh box:0.08,0.06,0.05:1 -body_b_translate " \
-  "0.06,0.021,0.05 " LAW("a")                                                                        \
-    LAW("b") "-sets bottom,top -set_bottom_at plane:0,0,1,0 -set_top_at "                            \
-             "plane:0,0,1,0.1 -effects hold,push,meet -effect_hold_type "                            \
-             "fixed -effect_hold_on bottom -effect_push_type prescribed_displacement "               \
-             "-effect_push_on top -effect_meet_type contact -effect_meet_response projected "
+#define PAIR                                                                                            \
+  "-bodies a,b -body_a_mesh box:0.2,0.1,0.05:1 -body_b_mesh box:0.08,0.06,0.05:1 -body_b_translate "    \
+  "0.06,0.021,0.05 " LAW("a")                                                                           \
+    LAW("b") "-sets bottom,top -set_bottom_at plane:0,0,1,0 -set_top_at plane:0,0,1,0.1 -effects "      \
+             "hold,push,meet -effect_hold_type fixed -effect_hold_on bottom "                           \
+             "-effect_push_type prescribed_displacement -effect_push_on top -effect_meet_type contact " \
+             "-effect_meet_response projected "
 #define PRESS "-time static -effect_push_displacement 0.0005*t;0.0001*t;-0.002*t "
 #define DRAG STEPS "-effect_push_displacement 0.1*t;0;-0.1*t "
 
@@ -45,9 +45,8 @@ static const Case cases[] = {
   {"dynamic, cr", DYNAMIC "-body_a_element cr ", NO_ROWS, PETSC_FALSE},
   {"dynamic, dg", DYNAMIC "-body_a_element dg ", NO_ROWS, PETSC_FALSE},
   {"obstacle",
-   BAR "-effects gravity,floor -effect_floor_type contact -effect_floor_response projected -effect_floor_on "
-       "zmin -effect_floor_obstacle "
-       "plane:0,0,1,0 " STEPS,
+   BAR "-effects gravity,floor -effect_floor_type contact -effect_floor_response projected "
+       "-effect_floor_on zmin -effect_floor_obstacle plane:0,0,1,0 " STEPS,
    NO_ROWS, PETSC_FALSE},
   {"static rows", PAIR PRESS, ROWS, PETSC_FALSE},
   {"dynamic rows", PAIR DRAG, ROWS, PETSC_TRUE},

@@ -7,12 +7,10 @@
 
 static const char *const scene_text =
   "-bodies a,b -body_a_mesh box:1,0.5,0.4:3 -body_a_material %s -body_a_young 1e3 -body_a_poisson 0.3 "
-  "-body_a_density 10 "
-  "-body_b_mesh box:0.3,0.5,0.4:2 -body_b_translate 0,0,2 -body_b_material %s -body_b_young 2e3 "
-  "-body_b_poisson 0.4 -body_b_density 7 "
-  "-sets left -set_left_at plane:1,0,0,0 -effects clamp,damping -effect_clamp_type fixed -effect_clamp_on "
-  "left "
-  "-effect_damping_alpha 0.3 -effect_damping_beta 0.02 -mass %s %s";
+  "-body_a_density 10 -body_b_mesh box:0.3,0.5,0.4:2 -body_b_translate 0,0,2 -body_b_material %s "
+  "-body_b_young 2e3 -body_b_poisson 0.4 -body_b_density 7 -sets left -set_left_at plane:1,0,0,0 "
+  "-effects clamp,damping -effect_clamp_type fixed -effect_clamp_on left -effect_damping_alpha 0.3 "
+  "-effect_damping_beta 0.02 -mass %s %s";
 
 static void wave(const PetscReal x[3], PetscReal v[3])
 {

@@ -38,13 +38,12 @@ static PetscErrorCode check_oscillator(const char *law, PetscReal stiffer, Petsc
   char text[1024];
 
   PetscFunctionBeginUser;
-  PetscCall(
-    PetscSNPrintf(text, sizeof(text),
-                  "-bodies a -body_a_mesh tests/data/one_tet.msh -body_a_material %s -body_a_young %g "
-                  "-body_a_poisson %g -body_a_density %g -sets base -set_base_at plane:0,0,1,0 -effects "
-                  "hold,damping -effect_hold_type fixed -effect_hold_on base -effect_damping_alpha %g "
-                  "-effect_damping_beta %g -time euler_symplectic %s",
-                  law, (double)E, (double)nu, (double)rho, (double)alpha, (double)beta, more));
+  PetscCall(PetscSNPrintf(
+    text, sizeof(text),
+    "-bodies a -body_a_mesh tests/data/one_tet.msh -body_a_material %s -body_a_young %g -body_a_poisson %g "
+    "-body_a_density %g -sets base -set_base_at plane:0,0,1,0 -effects hold,damping -effect_hold_type fixed "
+    "-effect_hold_on base -effect_damping_alpha %g -effect_damping_beta %g -time euler_symplectic %s",
+    law, (double)E, (double)nu, (double)rho, (double)alpha, (double)beta, more));
   PetscCall(test_scene_open(text, &t));
   PetscCall(SbSpaceStableStep(t.model->space, &dt));
   SB_CHECK_NEAR(dt, 2. * (PetscSqrtReal(1. + zeta * zeta) - zeta) / w, 1e-12 * dt,
@@ -62,11 +61,10 @@ static PetscErrorCode energy_ratio(const char *body, PetscReal factor, PetscReal
   char text[1024];
 
   PetscFunctionBeginUser;
-  PetscCall(PetscSNPrintf(
-    text, sizeof(text),
-    "-bodies a %s -body_a_material linear -body_a_young 1e5 -body_a_density 1000 -body_a_velocity "
-    "1,2,3 -body_a_angular_velocity 1,2,3 -time euler_symplectic",
-    body));
+  PetscCall(PetscSNPrintf(text, sizeof(text),
+                          "-bodies a %s -body_a_material linear -body_a_young 1e5 -body_a_density 1000 "
+                          "-body_a_velocity 1,2,3 -body_a_angular_velocity 1,2,3 -time euler_symplectic",
+                          body));
   PetscCall(test_scene_open(text, &t));
   PetscCall(SbSpaceStableStep(t.model->space, &dt));
   PetscCall(test_scene_close(&t));
@@ -106,11 +104,11 @@ int main(int argc, char **argv)
   PetscCall(check_oscillator("doubled", 2., 0., 0., "", 0.25));
   /* the bound of the consistent mass: 1/5 of the lumped one, here 1/20 of the tet */
   PetscCall(check_oscillator("linear", 1., 0., 0., "-mass consistent", 0.05));
-  PetscCall(check_body("-body_a_mesh box:0.2,0.1,0.1:1 -body_a_poisson 0.3 -effects clamp -effect_clamp_type "
-                       "fixed -effect_clamp_on xmin"));
+  PetscCall(check_body("-body_a_mesh box:0.2,0.1,0.1:1 -body_a_poisson 0.3 -effects clamp "
+                       "-effect_clamp_type fixed -effect_clamp_on xmin"));
   PetscCall(check_body("-body_a_mesh box:1,1,1:4 -body_a_poisson 0 -effects clamp -effect_clamp_type fixed "
                        "-effect_clamp_on xmin"));
-  PetscCall(check_body("-body_a_mesh box:1,1,1:4 -body_a_poisson 0.49 -effects clamp -effect_clamp_type "
-                       "fixed -effect_clamp_on xmin"));
+  PetscCall(check_body("-body_a_mesh box:1,1,1:4 -body_a_poisson 0.49 -effects clamp "
+                       "-effect_clamp_type fixed -effect_clamp_on xmin"));
   SB_TEST_END();
 }

@@ -101,18 +101,16 @@ static inline PetscErrorCode open_pair(const Pair *p, const Case *c, PetscReal d
   PetscCall(PetscSNPrintf(
     text, sizeof(text),
     "-bodies a,b -body_a_mesh %s -body_b_mesh %s -body_a_element %s -body_b_element %s "
-    "-body_a_material linear -body_b_material linear "
-    "-body_a_young %g -body_b_young %g -body_a_poisson %g -body_b_poisson %g "
-    "-sets x0,y0,meet,ax,ay,az,bx,by,bz -set_x0_at plane:1,0,0,0 -set_y0_at plane:0,1,0,0 "
+    "-body_a_material linear -body_b_material linear -body_a_young %g -body_b_young %g -body_a_poisson %g "
+    "-body_b_poisson %g -sets x0,y0,meet,ax,ay,az,bx,by,bz -set_x0_at plane:1,0,0,0 -set_y0_at plane:0,1,0,0 "
     "-set_meet_at plane:0,0,1,0,%g -set_ax_at box:1,0,-1,1,1,0 -set_ay_at box:0,1,-1,1,1,0 "
     "-set_az_at plane:0,0,1,-1 -set_bx_at box:1,0,0.01,1,1,1 -set_by_at box:0,1,0.01,1,1,1 "
     "-set_bz_at plane:0,0,1,1 -time static -ksp_rtol 1e-8 -solver cg_two_level -effects x,y,low,high,meet "
     "-effect_x_type fixed -effect_x_on x0 -effect_x_components x -effect_y_type fixed -effect_y_on y0 "
     "-effect_y_components y -effect_low_type prescribed_displacement -effect_low_on ax,ay,az "
-    "-effect_low_displacement %s "
-    "-effect_high_type prescribed_displacement -effect_high_on bx,by,bz -effect_high_displacement %s "
-    "-effect_meet_type contact -effect_meet_response projected -effect_meet_on meet -effect_meet_response %s "
-    "-effect_meet_passes %s",
+    "-effect_low_displacement %s -effect_high_type prescribed_displacement -effect_high_on bx,by,bz "
+    "-effect_high_displacement %s -effect_meet_type contact -effect_meet_response projected "
+    "-effect_meet_on meet -effect_meet_response %s -effect_meet_passes %s",
     path[0], path[1], c->element, c->element, (double)p->young[0], (double)p->young[1], POISSON, POISSON,
     (double)(3 * d), far[0], far[1], c->response, c->sides));
   PetscCall(test_scene_open(text, t));
@@ -166,13 +164,12 @@ static inline PetscErrorCode hertz(const Pair *p, const Case *c, PetscReal *forc
   PetscCall(verify_solve(&t, p->name));
   PetscCall(read_forces(t.run, values, &reaction));
   *force = -4 * reaction / P;
-  PetscCall(PetscPrintf(
-    PETSC_COMM_WORLD,
-    "  %s, %s, %s, passes %s, %d^3 cells, d = %.3e m: %g points touch, force %.4f (history %.4f) of the "
-    "formula's, penetration %.1e d, %d solves\n",
-    p->name, c->element, c->response, c->sides, (int)c->cells, (double)d, (double)values[CONTACTS],
-    (double)*force, (double)(4 * values[NORMAL] / P), (double)(values[DEEPEST] / d),
-    (int)t.run->newton_total));
+  PetscCall(PetscPrintf(PETSC_COMM_WORLD,
+                        "  %s, %s, %s, passes %s, %d^3 cells, d = %.3e m: %g points touch, force %.4f "
+                        "(history %.4f) of the formula's, penetration %.1e d, %d solves\n",
+                        p->name, c->element, c->response, c->sides, (int)c->cells, (double)d,
+                        (double)values[CONTACTS], (double)*force, (double)(4 * values[NORMAL] / P),
+                        (double)(values[DEEPEST] / d), (int)t.run->newton_total));
   SB_CHECK_NEAR(4 * values[NORMAL] / P, *force, c->honest * *force,
                 "force in the history against the one that acts");
   SB_CHECK(values[DEEPEST] < 0.01 * d, "penetration %g m of %g m", (double)values[DEEPEST], (double)d);

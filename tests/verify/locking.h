@@ -80,12 +80,12 @@ static inline PetscErrorCode locking_bar(PetscInt n, PetscReal nu, const char *m
   PetscFunctionBeginUser;
   PetscCall(
     verify_distorted_box((const PetscInt[3]){4 * n, n, n}, (const PetscReal[3]){0.4, 0.1, 0.1}, mesh));
-  PetscCall(PetscSNPrintf(scene, sizeof(scene),
-                          "-bodies a -body_a_mesh %s -body_a_material linear -body_a_young 5e4 "
-                          "-body_a_poisson %.17g -body_a_density 1000 -sets root -set_root_at plane:1,0,0,0 "
-                          "-effects clamp,gravity -effect_clamp_type fixed -effect_clamp_on root "
-                          "-effect_gravity_vector 0,0,-9.81 -time static",
-                          mesh, (double)nu));
+  PetscCall(PetscSNPrintf(
+    scene, sizeof(scene),
+    "-bodies a -body_a_mesh %s -body_a_material linear -body_a_young 5e4 -body_a_poisson %.17g "
+    "-body_a_density 1000 -sets root -set_root_at plane:1,0,0,0 -effects clamp,gravity "
+    "-effect_clamp_type fixed -effect_clamp_on root -effect_gravity_vector 0,0,-9.81 -time static",
+    mesh, (double)nu));
   PetscCall(locking_run(scene, more, &t, cost));
   PetscCall(verify_value_at(t.model, t.run->U, end, u));
   PetscCall(SbModelEnergies(t.model, t.run->U, NULL, &e));
@@ -110,8 +110,8 @@ static inline PetscErrorCode locking_cook(const char *mesh, PetscReal nu, const 
     scene, sizeof(scene),
     "-bodies a -body_a_mesh %s -body_a_material linear -body_a_young 1 -body_a_poisson %.17g "
     "-body_a_density 1 -effects hold,plane,pull -effect_hold_type fixed -effect_hold_on left "
-    "-effect_plane_type fixed -effect_plane_on all -effect_plane_components z "
-    "-effect_pull_type traction -effect_pull_on right -effect_pull_vector 0;1/16;0 -time static",
+    "-effect_plane_type fixed -effect_plane_on all -effect_plane_components z -effect_pull_type traction "
+    "-effect_pull_on right -effect_pull_vector 0;1/16;0 -time static",
     mesh, (double)nu));
   PetscCall(locking_run(scene, more, &t, cost));
   for (int k = 0; k < 2; k++) {
@@ -276,13 +276,13 @@ static inline PetscErrorCode locking_swing(PetscInt n, PetscReal nu, const char 
   char scene[VERIFY_TEXT];
 
   PetscFunctionBeginUser;
-  PetscCall(PetscSNPrintf(scene, sizeof(scene),
-                          "-bodies a -body_a_mesh box:0.4,0.1,0.1:%d -body_a_material corotated "
-                          "-body_a_young 1e5 -body_a_poisson %.17g -body_a_density 1000 "
-                          "-effects gravity,clamp -effect_gravity_vector 0,0,-9.81 -effect_clamp_type fixed "
-                          "-effect_clamp_on xmin -time genalpha -time_spectral_radius 0.8 -ts_dt 0.01 "
-                          "-ts_max_time 0.3",
-                          (int)n, (double)nu));
+  PetscCall(PetscSNPrintf(
+    scene, sizeof(scene),
+    "-bodies a -body_a_mesh box:0.4,0.1,0.1:%d -body_a_material corotated -body_a_young 1e5 "
+    "-body_a_poisson %.17g -body_a_density 1000 -effects gravity,clamp -effect_gravity_vector 0,0,-9.81 "
+    "-effect_clamp_type fixed -effect_clamp_on xmin -time genalpha -time_spectral_radius 0.8 -ts_dt 0.01 "
+    "-ts_max_time 0.3",
+    (int)n, (double)nu));
   PetscCall(locking_run(scene, more, &t, cost));
   PetscCall(verify_value_at(t.model, t.run->U, end, value));
   PetscCall(SbModelEnergies(t.model, t.run->U, t.run->V, &e));
@@ -305,9 +305,8 @@ static inline PetscErrorCode locking_twist(PetscInt n, PetscReal nu, const char 
   PetscCall(
     PetscSNPrintf(scene, sizeof(scene),
                   "-bodies a -body_a_mesh box:0.4,0.1,0.1:%d -body_a_material neohookean -body_a_young 1e5 "
-                  "-body_a_poisson %.17g -body_a_density 1000 -effects held,turned "
-                  "-effect_held_type fixed -effect_held_on xmin -effect_turned_type prescribed_displacement "
-                  "-effect_turned_on xmax "
+                  "-body_a_poisson %.17g -body_a_density 1000 -effects held,turned -effect_held_type fixed "
+                  "-effect_held_on xmin -effect_turned_type prescribed_displacement -effect_turned_on xmax "
                   "-effect_turned_axis 1,0,0 -effect_turned_axis_point 0,0.05,0.05 -effect_turned_angle 90*t "
                   "-time static -static_steps 16 -ksp_max_it 20",
                   (int)n, (double)nu));

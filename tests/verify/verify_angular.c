@@ -114,24 +114,21 @@ static PetscErrorCode check(const char *element, const char *response, const cha
   PetscCall(verify_open(
     &t,
     "-bodies a,b -body_a_mesh box:0.1,0.1,0.1:2 -body_b_mesh box:0.1,0.08,0.1:3 "
-    "-body_b_translate 0.112,0.03,0.02 "
-    "-body_b_rotate 1,2,3,20 -body_a_material corotated -body_a_young 2e4 "
-    "-body_a_poisson 0.3 -body_a_element %s "
-    "-body_b_material corotated -body_b_young 2e4 -body_b_poisson 0.3 -body_b_element %s "
-    "-body_a_velocity 0.8,0,0 "
-    "-body_b_velocity -1,0,0 -effects meet -effect_meet_type contact -effect_meet_response projected "
-    "-effect_meet_response %s -effect_meet_passes %s "
-    "-time euler_implicit -ts_dt %g -ts_max_time 0.1 -ksp_rtol 1e-11 -snes_rtol 1e-12",
+    "-body_b_translate 0.112,0.03,0.02 -body_b_rotate 1,2,3,20 -body_a_material corotated -body_a_young 2e4 "
+    "-body_a_poisson 0.3 -body_a_element %s -body_b_material corotated -body_b_young 2e4 -body_b_poisson 0.3 "
+    "-body_b_element %s -body_a_velocity 0.8,0,0 -body_b_velocity -1,0,0 -effects meet "
+    "-effect_meet_type contact -effect_meet_response projected -effect_meet_response %s "
+    "-effect_meet_passes %s -time euler_implicit -ts_dt %g -ts_max_time 0.1 -ksp_rtol 1e-11 -snes_rtol 1e-12",
     element, element, response, sides, (double)dt));
   t.run->want_energies = PETSC_TRUE;
   PetscCall(SbRunAddMonitor(t.run, watch, &w, NULL));
   PetscCall(verify_solve(&t, "angular"));
-  PetscCall(PetscPrintf(PETSC_COMM_WORLD,
-                        "  %s, %s, passes %s, steps of %g ms: bodies turned each other by %.3e kg m^2/s, off "
-                        "in a step by %.1e, torque of all "
-                        "contacts %.1e, without it %.1e, %g pairs, momentum %.1e\n",
-                        element, response, sides, (double)(1000 * dt), (double)w.most, (double)w.missing,
-                        (double)w.torque, (double)w.rest, (double)w.contacts, (double)w.momentum));
+  PetscCall(
+    PetscPrintf(PETSC_COMM_WORLD,
+                "  %s, %s, passes %s, steps of %g ms: bodies turned each other by %.3e kg m^2/s, off in a "
+                "step by %.1e, torque of all contacts %.1e, without it %.1e, %g pairs, momentum %.1e\n",
+                element, response, sides, (double)(1000 * dt), (double)w.most, (double)w.missing,
+                (double)w.torque, (double)w.rest, (double)w.contacts, (double)w.momentum));
   SB_CHECK(w.contacts > 3 && w.most > 1e-4, "%s: the blocks do not meet", element);
   SB_CHECK(w.rest < 1e-10 * w.most,
            "%s, %s: angular momentum changed by %g kg m^2/s that no contact explains", element, response,

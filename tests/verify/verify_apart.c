@@ -49,11 +49,9 @@ static PetscErrorCode check_named(const char *element, const char *time, const c
   static const char *const effects[4] = {
     "-effects gravity", "-effects gravity,meet -effect_meet_type contact -effect_meet_response projected",
     "-effects gravity,floor -effect_floor_type contact -effect_floor_response projected "
-    "-effect_floor_obstacle plane:0,0,1,-5 "
-    "-effect_floor_friction 0.3",
+    "-effect_floor_obstacle plane:0,0,1,-5 -effect_floor_friction 0.3",
     "-effects gravity,meet,floor -effect_meet_type contact -effect_meet_response projected "
-    "-effect_floor_type contact -effect_floor_response projected "
-    "-effect_floor_obstacle sphere:0,0,-9,1"};
+    "-effect_floor_type contact -effect_floor_response projected -effect_floor_obstacle sphere:0,0,-9,1"};
   PetscReal *value[4];
   PetscInt n = 0;
   char text[VERIFY_TEXT];

@@ -60,14 +60,14 @@ static PetscErrorCode hanging_error(PetscInt n, PetscReal *error)
   char text[VERIFY_TEXT];
 
   PetscFunctionBeginUser;
-  PetscCall(
-    PetscSNPrintf(text, sizeof(text),
-                  "-bodies a -time static -body_a_mesh box:0.3,0.3,1:%d -body_a_translate -0.1,-0.2,0 "
-                  "-body_a_material linear -body_a_young %g -body_a_poisson %g -body_a_density 1000 "
-                  "-effects gravity,top -effect_top_type prescribed_displacement -effect_top_on zmax "
-                  "-effect_top_displacement %.17g*x;%.17g*y;%.17g*(x^2+y^2)",
-                  (int)n, HANG_E, HANG_NU, -HANG_NU * HANG_W / HANG_E, -HANG_NU * HANG_W / HANG_E,
-                  0.5 * HANG_NU * HANG_W / HANG_E));
+  PetscCall(PetscSNPrintf(
+    text, sizeof(text),
+    "-bodies a -time static -body_a_mesh box:0.3,0.3,1:%d -body_a_translate -0.1,-0.2,0 "
+    "-body_a_material linear -body_a_young %g -body_a_poisson %g -body_a_density 1000 -effects gravity,top "
+    "-effect_top_type prescribed_displacement -effect_top_on zmax "
+    "-effect_top_displacement %.17g*x;%.17g*y;%.17g*(x^2+y^2)",
+    (int)n, HANG_E, HANG_NU, -HANG_NU * HANG_W / HANG_E, -HANG_NU * HANG_W / HANG_E,
+    0.5 * HANG_NU * HANG_W / HANG_E));
   PetscCall(test_scene_open(text, &t));
   PetscCall(verify_solve(&t, "hanging bar"));
   PetscCall(VecDuplicate(t.run->U, &U));
@@ -126,11 +126,10 @@ static PetscErrorCode check_shear(void)
     w[k] = bar.u[2] / exact;
   }
   limit = verify_extrapolate(w[1], w[2], 2.);
-  PetscCall(
-    PetscPrintf(PETSC_COMM_WORLD,
-                "  cantilever with end load, n 4, 8, 16: %.5f %.5f %.5f of Timoshenko's %.6g m, extrapolated "
-                "%.5f\n",
-                (double)w[0], (double)w[1], (double)w[2], (double)exact, (double)limit));
+  PetscCall(PetscPrintf(
+    PETSC_COMM_WORLD,
+    "  cantilever with end load, n 4, 8, 16: %.5f %.5f %.5f of Timoshenko's %.6g m, extrapolated %.5f\n",
+    (double)w[0], (double)w[1], (double)w[2], (double)exact, (double)limit));
   SB_CHECK_NEAR(PetscLog2Real((1. - w[1]) / (1. - w[2])), 2., 0.15, "order of the end deflection");
   /* the clamp keeps the end plane, which beam theory does not: about (h/L)^3 / 10 */
   SB_CHECK_NEAR(limit, 1., 2e-3, "extrapolated deflection / Timoshenko");
@@ -150,9 +149,8 @@ static PetscErrorCode check_weight(void)
 
     PetscCall(PetscSNPrintf(
       text, sizeof(text),
-      "-body_a_mesh box:0.4,0.1,0.1:%d -body_a_material linear -body_a_young 5e4 "
-      "-body_a_poisson 0.3 -body_a_density 1000 -effects gravity,clamp -effect_clamp_type fixed "
-      "-effect_clamp_on xmin",
+      "-body_a_mesh box:0.4,0.1,0.1:%d -body_a_material linear -body_a_young 5e4 -body_a_poisson 0.3 "
+      "-body_a_density 1000 -effects gravity,clamp -effect_clamp_type fixed -effect_clamp_on xmin",
       4 << k));
     PetscCall(solve(text, &bar));
     u[k] = bar.u[2];
@@ -188,8 +186,8 @@ static PetscErrorCode check_elastica(const char *law, PetscReal alpha, PetscReal
 
     PetscCall(PetscSNPrintf(text, sizeof(text),
                             "-body_a_mesh box:1,0.02,0.05:%d,1,%d -body_a_material %s -body_a_tangent exact "
-                            "-body_a_young %g -body_a_poisson 0 -body_a_density 1 "
-                            "" PLANE " -effect_end_vector 0;0;%.17g",
+                            "-body_a_young %g -body_a_poisson 0 -body_a_density 1 " PLANE
+                            " -effect_end_vector 0;0;%.17g",
                             20 * n, n, law, (double)E, (double)(alpha * E * h * h / 12.)));
     PetscCall(solve(text, &bar));
     x[k] = -bar.u[0];
@@ -197,12 +195,11 @@ static PetscErrorCode check_elastica(const char *law, PetscReal alpha, PetscReal
   }
   limit[0] = verify_extrapolate(x[0], x[1], 2.);
   limit[1] = verify_extrapolate(z[0], z[1], 2.);
-  PetscCall(
-    PetscPrintf(PETSC_COMM_WORLD,
-                "  elastica, %s, alpha %g: shortening n 8, 16: %.5f %.5f, extrapolated %.5f (exact %.5f), "
-                "deflection %.5f %.5f, %.5f (%.5f)\n",
-                law, (double)alpha, (double)x[0], (double)x[1], (double)limit[0], (double)shortening,
-                (double)z[0], (double)z[1], (double)limit[1], (double)deflection));
+  PetscCall(PetscPrintf(PETSC_COMM_WORLD,
+                        "  elastica, %s, alpha %g: shortening n 8, 16: %.5f %.5f, extrapolated %.5f (exact "
+                        "%.5f), deflection %.5f %.5f, %.5f (%.5f)\n",
+                        law, (double)alpha, (double)x[0], (double)x[1], (double)limit[0], (double)shortening,
+                        (double)z[0], (double)z[1], (double)limit[1], (double)deflection));
   /* 1 % of the length: what two meshes leave after extrapolation, and the slenderness */
   SB_CHECK_NEAR(limit[0], shortening, 0.01 * deflection, "shortening");
   SB_CHECK_NEAR(limit[1], deflection, 0.01 * deflection, "deflection");

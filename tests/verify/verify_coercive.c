@@ -128,11 +128,10 @@ static PetscErrorCode check_case(Shape shape, const char *path, const Case *c, P
   char text[VERIFY_TEXT];
 
   PetscFunctionBeginUser;
-  PetscCall(
-    PetscSNPrintf(text, sizeof(text),
-                  "-bodies a -body_a_mesh %s -body_a_element %s -body_a_material %s -body_a_young 1e5 "
-                  "-body_a_poisson %.17g -body_a_density 1 -solver cg_jacobi %s",
-                  path, c->element, c->law, (double)c->nu, c->gammas));
+  PetscCall(PetscSNPrintf(text, sizeof(text),
+                          "-bodies a -body_a_mesh %s -body_a_element %s -body_a_material %s "
+                          "-body_a_young 1e5 -body_a_poisson %.17g -body_a_density 1 -solver cg_jacobi %s",
+                          path, c->element, c->law, (double)c->nu, c->gammas));
   PetscCall(test_scene_open(text, &t));
   PetscCall(turn(&t, c->angle));
   PetscCall(spectrum(&t, &n, &w));
@@ -173,12 +172,11 @@ static PetscErrorCode pressed(const char *element, const char *law, PetscReal ra
   char text[VERIFY_TEXT];
 
   PetscFunctionBeginUser;
-  PetscCall(PetscSNPrintf(
-    text, sizeof(text),
-    "-bodies a -body_a_mesh box:1,1,1:2 -body_a_element %s -body_a_material %s -body_a_tangent exact "
-    "-body_a_young 1e5 -body_a_poisson 0.499 -body_a_density 1 -solver cg_jacobi -effects hold "
-    "-effect_hold_type fixed -effect_hold_on boundary",
-    element, law));
+  PetscCall(PetscSNPrintf(text, sizeof(text),
+                          "-bodies a -body_a_mesh box:1,1,1:2 -body_a_element %s -body_a_material %s "
+                          "-body_a_tangent exact -body_a_young 1e5 -body_a_poisson 0.499 -body_a_density 1 "
+                          "-solver cg_jacobi -effects hold -effect_hold_type fixed -effect_hold_on boundary",
+                          element, law));
   PetscCall(test_scene_open(text, &t));
   m = t.model->material[0];
   eps = ratio * m->ops.shear_modulus(m) / (3. * m->ops.bulk_modulus(m));

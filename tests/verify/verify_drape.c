@@ -50,20 +50,19 @@ static PetscErrorCode check_drape(PetscBool rigid, PetscInt cells, PetscInt thic
                             "-effect_ball_obstacle sphere:0,0,%g,%g",
                             -RADIUS, RADIUS));
   else
-    PetscCall(PetscSNPrintf(
-      how, sizeof(how),
-      "-bodies cloth,ball -body_ball_mesh %s -body_ball_translate 0,0,%g -body_ball_material corotated "
-      "-body_ball_young 2e5 -body_ball_poisson 0.3 -sets foot -set_foot_at halfspace:0,0,1,%g "
-      "-effects gravity,foot,meet -effect_foot_type fixed -effect_foot_on foot "
-      "-effect_meet_type contact -effect_meet_response projected",
-      path, -RADIUS, -1.6 * RADIUS));
-  PetscCall(verify_open(
-    &t,
-    "%s -body_cloth_mesh box:%g,%g,%g:%d,%d,%d -body_cloth_translate %g,%g,%g -body_cloth_material corotated "
-    "-body_cloth_young 5e3 -body_cloth_poisson 0.3 -time euler_implicit -ts_dt 0.004 -ts_max_time 0.4 "
-    "-snes_rtol 1e-9 "
-    "-ksp_rtol 1e-8",
-    how, SIDE, SIDE, THICK, (int)cells, (int)cells, (int)thick, -0.5 * SIDE, -0.5 * SIDE, DROP));
+    PetscCall(
+      PetscSNPrintf(how, sizeof(how),
+                    "-bodies cloth,ball -body_ball_mesh %s -body_ball_translate 0,0,%g "
+                    "-body_ball_material corotated -body_ball_young 2e5 -body_ball_poisson 0.3 -sets foot "
+                    "-set_foot_at halfspace:0,0,1,%g -effects gravity,foot,meet -effect_foot_type fixed "
+                    "-effect_foot_on foot -effect_meet_type contact -effect_meet_response projected",
+                    path, -RADIUS, -1.6 * RADIUS));
+  PetscCall(verify_open(&t,
+                        "%s -body_cloth_mesh box:%g,%g,%g:%d,%d,%d -body_cloth_translate %g,%g,%g "
+                        "-body_cloth_material corotated -body_cloth_young 5e3 -body_cloth_poisson 0.3 "
+                        "-time euler_implicit -ts_dt 0.004 -ts_max_time 0.4 -snes_rtol 1e-9 -ksp_rtol 1e-8",
+                        how, SIDE, SIDE, THICK, (int)cells, (int)cells, (int)thick, -0.5 * SIDE, -0.5 * SIDE,
+                        DROP));
   if (!rigid) PetscCall(SbRunAddMonitor(t.run, pour_watch, &inside, NULL));
   PetscCall(record_solve(&t, &r));
   PetscCall(lowered(&t, depth));

@@ -214,23 +214,23 @@ static PetscErrorCode watch(SbRun run, const SbStep *step, void *ctx)
 
 /* ------------------------------------------------------------------ bars */
 
-#define LAWS(young)                                                                              \
-  " -body_a_material corotated -body_a_young " young " -body_a_poisson 0.3 -body_a_density 1000" \
-  " -body_b_material corotated -body_b_young " young " -body_b_poisson 0.3 -body_b_density 1000 "
+#define LAWS(young)                                                                           \
+  " -body_a_material corotated -body_a_young " young                                          \
+  " -body_a_poisson 0.3 -body_a_density 1000 -body_b_material corotated -body_b_young " young \
+  " -body_b_poisson 0.3 -body_b_density 1000 "
 /* The ends of the lower bar are constrained, those of the upper one guided. */
-#define ENDS                                                                                             \
-  "-sets skin,a0,a1,b0,b1 -set_skin_at boundary -set_a0_at plane:1,0,0,0 -set_a1_at plane:1,0,0,0.21 "   \
-  "-set_b0_at plane:0,1,0,-0.105 -set_b1_at plane:0,1,0,0.105 -effect_a0_type fixed -effect_a0_on a0 "   \
-  "-effect_a1_type fixed -effect_a1_on a1 -effect_b0_type fixed -effect_b0_on b0 -effect_b0_components " \
-  "xy "                                                                                                  \
-  "-effect_b1_type fixed -effect_b1_on b1 -effect_b1_components xy -effect_meet_type contact "           \
+#define ENDS                                                                                                \
+  "-sets skin,a0,a1,b0,b1 -set_skin_at boundary -set_a0_at plane:1,0,0,0 -set_a1_at plane:1,0,0,0.21 "      \
+  "-set_b0_at plane:0,1,0,-0.105 -set_b1_at plane:0,1,0,0.105 -effect_a0_type fixed -effect_a0_on a0 "      \
+  "-effect_a1_type fixed -effect_a1_on a1 -effect_b0_type fixed -effect_b0_on b0 -effect_b0_components xy " \
+  "-effect_b1_type fixed -effect_b1_on b1 -effect_b1_components xy -effect_meet_type contact "              \
   "-effect_meet_response projected "
-#define BARS                                                                                       \
-  "-bodies a,b -body_a_mesh box:0.21,0.03,0.03:7,1,1 -body_a_rotate 1,0,0,45 -body_b_mesh "        \
-  "box:0.03,0.21,0.03:1,7,1 -body_b_rotate 0,1,0,-45 -body_b_translate 0.105,-0.105,0.0434264 "    \
-  "-effects gravity,a0,a1,b0,b1,meet,calm -effect_gravity_type gravity -effect_calm_type damping " \
-  "-effect_calm_beta 0.02 -effect_calm_alpha 5 -time euler_implicit -ts_dt 0.01 -ts_max_time 0.5 " \
-  "-ksp_rtol 1e-10 -snes_rtol 1e-8 " LAWS("1e5") ENDS
+#define BARS                                                                                                \
+  "-bodies a,b -body_a_mesh box:0.21,0.03,0.03:7,1,1 -body_a_rotate 1,0,0,45 -body_b_mesh "                 \
+  "box:0.03,0.21,0.03:1,7,1 -body_b_rotate 0,1,0,-45 -body_b_translate 0.105,-0.105,0.0434264 -effects "    \
+  "gravity,a0,a1,b0,b1,meet,calm -effect_gravity_type gravity -effect_calm_type damping -effect_calm_beta " \
+  "0.02 -effect_calm_alpha 5 -time euler_implicit -ts_dt 0.01 -ts_max_time 0.5 -ksp_rtol 1e-10 -snes_rtol " \
+  "1e-8 " LAWS("1e5") ENDS
 
 /* On the ranks of comm; the last depth, force and displacement of the middle of the upper bar. */
 static PetscErrorCode lay_bars(MPI_Comm comm, const char *more, Seen *seen, PetscReal values[NVALUE],
@@ -288,20 +288,18 @@ static PetscErrorCode check_fast(void)
   TestScene t;
 
   PetscFunctionBeginUser;
-  PetscCall(
-    open_on(PETSC_COMM_WORLD, &t,
-            "-bodies a,b -body_a_mesh box:0.21,0.006,0.006:7,1,1 -body_a_rotate 1,0,0,45 -body_b_mesh "
-            "box:0.006,0.21,0.006:1,7,1 -body_b_rotate 0,1,0,-45 -body_b_translate 0.105,-0.105,0.0105 "
-            "-body_b_velocity 0,0,-5 -effects a0,a1,b0,b1,meet -time euler_implicit -ts_dt 0.004 "
-            "-ts_max_time 0.04 " LAWS("1e7") ENDS));
+  PetscCall(open_on(PETSC_COMM_WORLD, &t,
+                    "-bodies a,b -body_a_mesh box:0.21,0.006,0.006:7,1,1 -body_a_rotate 1,0,0,45 "
+                    "-body_b_mesh box:0.006,0.21,0.006:1,7,1 -body_b_rotate 0,1,0,-45 -body_b_translate "
+                    "0.105,-0.105,0.0105 -body_b_velocity 0,0,-5 -effects a0,a1,b0,b1,meet -time "
+                    "euler_implicit -ts_dt 0.004 -ts_max_time 0.04 " LAWS("1e7") ENDS));
   PetscCall(SbRunAddMonitor(t.run, watch, &seen, NULL));
   PetscCall(verify_solve(&t, "fast bars"));
-  PetscCall(PetscPrintf(
-    PETSC_COMM_WORLD,
-    "  fast bars: in touch in %d of %d steps, force up to %.3g N, depth %.1e m (history %.1e), middle at "
-    "least %.4f m over the other\n",
-    (int)seen.touching, (int)seen.steps, (double)seen.force, (double)seen.depth, (double)seen.deepest,
-    (double)seen.above));
+  PetscCall(PetscPrintf(PETSC_COMM_WORLD,
+                        "  fast bars: in touch in %d of %d steps, force up to %.3g N, depth %.1e m (history "
+                        "%.1e), middle at least %.4f m over the other\n",
+                        (int)seen.touching, (int)seen.steps, (double)seen.force, (double)seen.depth,
+                        (double)seen.deepest, (double)seen.above));
   SB_CHECK(seen.touching > 0 && seen.force > 0.1, "the bars do not meet");
   SB_CHECK(seen.depth < 1e-5, "the bars are %g m in each other", (double)seen.depth);
   SB_CHECK(seen.above > 0, "the bars went through each other by %g m", (double)-seen.above);
@@ -320,28 +318,22 @@ static PetscErrorCode check_box(const char *what, const char *turn, PetscReal mo
   PetscCall(open_on(
     PETSC_COMM_WORLD, &t,
     "-bodies plate,cube -body_plate_mesh box:0.2,0.2,0.006:10,10,1 -body_plate_material corotated "
-    "-body_plate_young 1e6 "
-    "-body_plate_poisson 0.3 -body_plate_density 1000 -body_cube_mesh box:0.04,0.04,0.04:2 "
-    "-body_cube_material "
-    "corotated -body_cube_young 1e6 -body_cube_poisson 0.3 -body_cube_density 1000 %s -body_cube_velocity "
-    "0,0,-5 "
-    "-sets skin,x0,x1,y0,y1 -set_skin_at boundary -set_x0_at plane:1,0,0,0 -set_x1_at plane:1,0,0,0.2 "
-    "-set_y0_at "
-    "plane:0,1,0,0 -set_y1_at plane:0,1,0,0.2 -effects x0,x1,y0,y1,meet -effect_x0_type fixed "
-    "-effect_x0_on x0 "
-    "-effect_x1_type fixed -effect_x1_on x1 -effect_y0_type fixed -effect_y0_on y0 -effect_y1_type "
-    "fixed "
-    "-effect_y1_on y1 -effect_meet_type contact -effect_meet_response projected -time euler_implicit -ts_dt "
-    "0.001 -ts_max_time 0.03",
+    "-body_plate_young 1e6 -body_plate_poisson 0.3 -body_plate_density 1000 "
+    "-body_cube_mesh box:0.04,0.04,0.04:2 -body_cube_material corotated -body_cube_young 1e6 "
+    "-body_cube_poisson 0.3 -body_cube_density 1000 %s -body_cube_velocity 0,0,-5 -sets skin,x0,x1,y0,y1 "
+    "-set_skin_at boundary -set_x0_at plane:1,0,0,0 -set_x1_at plane:1,0,0,0.2 -set_y0_at plane:0,1,0,0 "
+    "-set_y1_at plane:0,1,0,0.2 -effects x0,x1,y0,y1,meet -effect_x0_type fixed -effect_x0_on x0 "
+    "-effect_x1_type fixed -effect_x1_on x1 -effect_y0_type fixed -effect_y0_on y0 -effect_y1_type fixed "
+    "-effect_y1_on y1 -effect_meet_type contact -effect_meet_response projected -time euler_implicit "
+    "-ts_dt 0.001 -ts_max_time 0.03",
     turn));
   PetscCall(SbRunAddMonitor(t.run, watch, &seen, NULL));
   PetscCall(verify_solve(&t, what));
-  PetscCall(PetscPrintf(
-    PETSC_COMM_WORLD,
-    "  box, %s: in touch in %d of %d steps, force up to %.3g N, depth %.1e m (history %.1e), middle at "
-    "least %.3f m over the plate\n",
-    what, (int)seen.touching, (int)seen.steps, (double)seen.force, (double)seen.depth, (double)seen.deepest,
-    (double)seen.above));
+  PetscCall(PetscPrintf(PETSC_COMM_WORLD,
+                        "  box, %s: in touch in %d of %d steps, force up to %.3g N, depth %.1e m (history "
+                        "%.1e), middle at least %.3f m over the plate\n",
+                        what, (int)seen.touching, (int)seen.steps, (double)seen.force, (double)seen.depth,
+                        (double)seen.deepest, (double)seen.above));
   SB_CHECK(seen.touching > 3 && seen.force > 1, "%s: the box does not hit the plate", what);
   SB_CHECK(seen.depth < most, "%s: the box is %g m in the plate", what, (double)seen.depth);
   SB_CHECK_NEAR(seen.deepest, seen.depth, 1e-4, "the depth that the history says");
@@ -465,18 +457,15 @@ static PetscErrorCode check_rings(PetscReal most)
 
   PetscFunctionBeginUser;
   PetscCall(write_ring(path));
-  PetscCall(open_on(
-    PETSC_COMM_WORLD, &t,
-    "-bodies a,b -body_a_mesh %s -body_b_mesh %s -body_b_rotate 1,0,0,90 -body_b_translate %.15g,0,0 -sets "
-    "skin,far,end "
-    "-set_skin_at boundary -set_far_at halfspace:1,0,0,-0.09 -set_end_at halfspace:-1,0,0,%.15g -effects "
-    "hold,pull,meet "
-    "-effect_hold_type fixed -effect_hold_on far -effect_pull_type prescribed_displacement -effect_pull_on "
-    "end "
-    "-effect_pull_displacement "
-    "0.08*ramp(t/0.4);0;0 -effect_meet_type contact -effect_meet_response projected -time euler_implicit "
-    "-ts_dt 0.01 -ts_max_time 0.5" LAWS("1e5"),
-    path, path, (double)away, (double)(-away - 0.09)));
+  PetscCall(
+    open_on(PETSC_COMM_WORLD, &t,
+            "-bodies a,b -body_a_mesh %s -body_b_mesh %s -body_b_rotate 1,0,0,90 -body_b_translate %.15g,0,0 "
+            "-sets skin,far,end -set_skin_at boundary -set_far_at halfspace:1,0,0,-0.09 -set_end_at "
+            "halfspace:-1,0,0,%.15g -effects hold,pull,meet -effect_hold_type fixed -effect_hold_on far "
+            "-effect_pull_type prescribed_displacement -effect_pull_on end -effect_pull_displacement "
+            "0.08*ramp(t/0.4);0;0 -effect_meet_type contact -effect_meet_response projected -time "
+            "euler_implicit -ts_dt 0.01 -ts_max_time 0.5" LAWS("1e5"),
+            path, path, (double)away, (double)(-away - 0.09)));
   PetscCall(SbRunAddMonitor(t.run, watch_rings, &seen, NULL));
   PetscCall(verify_solve(&t, "rings"));
   PetscCall(PetscPrintf(

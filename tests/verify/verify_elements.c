@@ -67,12 +67,12 @@ static PetscErrorCode bar(int kind, PetscInt n, PetscReal *strain)
   TestScene t;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscSNPrintf(
-    text, sizeof(text),
-    "-bodies a -body_a_mesh box:0.2,0.1,0.1:%d" BODY "%s -body_a_material linear -effects gravity,clamp,pull "
-    "-effect_clamp_type fixed -effect_clamp_on xmin -effect_pull_type traction -effect_pull_on xmax "
-    "-effect_pull_total 0,3,6 -time static -solver direct" EXACT,
-    (int)n, kinds[kind][1]));
+  PetscCall(PetscSNPrintf(text, sizeof(text),
+                          "-bodies a -body_a_mesh box:0.2,0.1,0.1:%d" BODY
+                          "%s -body_a_material linear -effects gravity,clamp,pull -effect_clamp_type fixed "
+                          "-effect_clamp_on xmin -effect_pull_type traction -effect_pull_on xmax "
+                          "-effect_pull_total 0,3,6 -time static -solver direct" EXACT,
+                          (int)n, kinds[kind][1]));
   PetscCall(test_scene_open(text, &t));
   PetscCall(verify_solve(&t, kinds[kind][0]));
   PetscCall(reaction(&t, 0, sum));
@@ -119,9 +119,10 @@ static PetscErrorCode check_drive(int kind)
   PetscCall(PetscSNPrintf(
     text, sizeof(text),
     "-bodies a -body_a_mesh box:0.2,0.1,0.1:2" BODY
-    "%s -body_a_material corotated -effects hand -effect_hand_type prescribed_displacement -effect_hand_on "
-    "xmin,xmax -effect_hand_angle 40*t -effect_hand_axis 1,2,3 -effect_hand_axis_point "
-    "0.1,0,0 -effect_hand_displacement t;0;0.5*t -time static -static_steps 4 -solver direct" EXACT,
+    "%s -body_a_material corotated -effects hand -effect_hand_type prescribed_displacement "
+    "-effect_hand_on xmin,xmax -effect_hand_angle 40*t -effect_hand_axis 1,2,3 "
+    "-effect_hand_axis_point 0.1,0,0 -effect_hand_displacement t;0;0.5*t -time static -static_steps 4 "
+    "-solver direct" EXACT,
     kinds[kind][1]));
   PetscCall(test_scene_open(text, &t));
   PetscCall(verify_solve(&t, kinds[kind][0]));
@@ -164,17 +165,14 @@ static PetscErrorCode check_mixed(void)
   PetscFunctionBeginUser;
   PetscCall(PetscSNPrintf(
     text, sizeof(text),
-    "-bodies a,b,c -body_a_mesh box:0.2,0.1,0.1:2 -body_b_mesh box:0.1,0.2,0.1:2 -body_c_mesh "
-    "box:0.1,0.1,0.2:2 "
-    "-body_a_material linear -body_b_material corotated -body_c_material neohookean -body_b_element cr "
-    "-body_c_element dg -body_b_translate 1,0,0 -body_c_translate 2,0,0" BODY
+    "-bodies a,b,c -body_a_mesh box:0.2,0.1,0.1:2 -body_b_mesh box:0.1,0.2,0.1:2 "
+    "-body_c_mesh box:0.1,0.1,0.2:2 -body_a_material linear -body_b_material corotated "
+    "-body_c_material neohookean -body_b_element cr -body_c_element dg -body_b_translate 1,0,0 "
+    "-body_c_translate 2,0,0" BODY
     "-body_b_young 2e5 -body_c_young 1e5 -body_b_poisson 0.3 -body_c_poisson 0.45 -body_b_density 500 "
     "-body_c_density 250 -sets low,tip -set_low_at plane:0,0,1,0 -effects gravity,stand,poke "
-    "-effect_stand_type "
-    "fixed "
-    "-effect_stand_on low -effect_poke_type point_force -effect_poke_on tip -effect_poke_vector "
-    "0.01;0.02;0.03 "
-    "-time static -solver direct" EXACT));
+    "-effect_stand_type fixed -effect_stand_on low -effect_poke_type point_force -effect_poke_on tip "
+    "-effect_poke_vector 0.01;0.02;0.03 -time static -solver direct" EXACT));
   PetscCall(PetscStrlcat(text, " -set_tip_at box:-1,-1,0.09,3,1,1", sizeof(text)));
   PetscCall(test_scene_open(text, &t));
   PetscCall(verify_solve(&t, "three bodies"));
@@ -224,12 +222,11 @@ static PetscErrorCode check_flight(int kind, const char *mass)
   TestScene t;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscSNPrintf(
-    text, sizeof(text),
-    "-bodies a -body_a_mesh box:0.2,0.1,0.1:4" BODY
-    "%s -body_a_material corotated -body_a_velocity 1,2,3 -body_a_angular_velocity 3,0,0 -mass %s -time "
-    "euler_symplectic -ts_max_time 0.01",
-    kinds[kind][1], mass));
+  PetscCall(PetscSNPrintf(text, sizeof(text),
+                          "-bodies a -body_a_mesh box:0.2,0.1,0.1:4" BODY
+                          "%s -body_a_material corotated -body_a_velocity 1,2,3 "
+                          "-body_a_angular_velocity 3,0,0 -mass %s -time euler_symplectic -ts_max_time 0.01",
+                          kinds[kind][1], mass));
   PetscCall(test_scene_open(text, &t));
   PetscCall(SbRunAddMonitor(t.run, watch_flight, &f, NULL));
   PetscCall(verify_solve(&t, kinds[kind][0]));
@@ -254,12 +251,11 @@ static PetscErrorCode swing(int kind, const char *time, PetscReal energy[2])
   TestScene t;
 
   PetscFunctionBeginUser;
-  PetscCall(
-    PetscSNPrintf(text, sizeof(text),
-                  "-bodies a -body_a_mesh box:0.2,0.1,0.1:2" BODY
-                  "%s -body_a_material linear -body_a_velocity 0,0,0.1 -effects clamp -effect_clamp_type "
-                  "fixed -effect_clamp_on xmin -ts_max_time 0.02 %s",
-                  kinds[kind][1], time));
+  PetscCall(PetscSNPrintf(text, sizeof(text),
+                          "-bodies a -body_a_mesh box:0.2,0.1,0.1:2" BODY
+                          "%s -body_a_material linear -body_a_velocity 0,0,0.1 -effects clamp "
+                          "-effect_clamp_type fixed -effect_clamp_on xmin -ts_max_time 0.02 %s",
+                          kinds[kind][1], time));
   PetscCall(test_scene_open(text, &t));
   PetscCall(SbModelEnergies(t.model, t.run->U, t.run->V, &e));
   energy[0] = e.kinetic + e.strain;
@@ -299,8 +295,8 @@ static PetscErrorCode check_pressure(int kind)
   PetscCall(PetscSNPrintf(text, sizeof(text),
                           "-bodies a -body_a_mesh box:0.2,0.1,0.1:2" BODY
                           "%s -body_a_material neohookean -body_a_angular_velocity 0,0,20 -effects sea "
-                          "-effect_sea_type pressure -effect_sea_on boundary -effect_sea_value 2e4 -time "
-                          "euler_implicit -ts_dt 5e-3 -ts_max_time 0.05 -solver direct" EXACT,
+                          "-effect_sea_type pressure -effect_sea_on boundary -effect_sea_value 2e4 "
+                          "-time euler_implicit -ts_dt 5e-3 -ts_max_time 0.05 -solver direct" EXACT,
                           kinds[kind][1]));
   PetscCall(test_scene_open(text, &t));
   PetscCall(verify_solve(&t, kinds[kind][0]));

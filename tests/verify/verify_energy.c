@@ -42,13 +42,12 @@ static PetscErrorCode check_drift(const char *element, PetscInt steps)
   double begin = MPI_Wtime();
 
   PetscFunctionBeginUser;
-  PetscCall(
-    PetscSNPrintf(text, sizeof(text),
-                  "-bodies a -body_a_mesh box:0.2,0.1,0.1:1" BODY
-                  "-body_a_element %s -body_a_material linear -body_a_velocity "
-                  "0.1,0,0.3 -effects clamp -effect_clamp_type fixed -effect_clamp_on xmin -time newmark "
-                  "-ts_dt 0.003 -ts_max_time %.17g" TIGHT,
-                  element, 0.003 * (double)steps));
+  PetscCall(PetscSNPrintf(
+    text, sizeof(text),
+    "-bodies a -body_a_mesh box:0.2,0.1,0.1:1" BODY
+    "-body_a_element %s -body_a_material linear -body_a_velocity 0.1,0,0.3 -effects clamp "
+    "-effect_clamp_type fixed -effect_clamp_on xmin -time newmark -ts_dt 0.003 -ts_max_time %.17g" TIGHT,
+    element, 0.003 * (double)steps));
   PetscCall(test_scene_open(text, &t));
   PetscCall(SbRunAddMonitor(t.run, watch_drift, &d, NULL));
   PetscCall(verify_solve(&t, "drift"));
@@ -103,12 +102,13 @@ static PetscErrorCode check_decay(const char *element, PetscReal h)
   char text[VERIFY_TEXT];
 
   PetscFunctionBeginUser;
-  PetscCall(PetscSNPrintf(text, sizeof(text),
-                          "-bodies a -body_a_mesh box:0.2,0.1,0.1:2" BODY
-                          "-body_a_element %s -body_a_material linear -body_a_velocity "
-                          "0.1,0,0.3 -effects clamp -effect_clamp_type fixed -effect_clamp_on xmin -time "
-                          "euler_implicit -ts_dt %.17g -ts_max_time %.17g" TIGHT,
-                          element, (double)h, (double)(100. * h)));
+  PetscCall(
+    PetscSNPrintf(text, sizeof(text),
+                  "-bodies a -body_a_mesh box:0.2,0.1,0.1:2" BODY
+                  "-body_a_element %s -body_a_material linear -body_a_velocity 0.1,0,0.3 -effects clamp "
+                  "-effect_clamp_type fixed -effect_clamp_on xmin -time euler_implicit -ts_dt %.17g "
+                  "-ts_max_time %.17g" TIGHT,
+                  element, (double)h, (double)(100. * h)));
   PetscCall(test_scene_open(text, &t));
   t.run->want_energies = PETSC_TRUE;
   PetscCall(SbRunAddMonitor(t.run, watch_decay, &d, NULL));
@@ -143,8 +143,8 @@ static PetscErrorCode missing(const char *preset, const char *element, const cha
     "-bodies a -body_a_mesh box:0.2,0.1,0.1:2" BODY
     "-body_a_element %s -body_a_material %s -effects gravity,damping,hand,wind -effect_damping_alpha 1 "
     "-effect_damping_beta 0.002 -effect_hand_type prescribed_displacement -effect_hand_on xmin "
-    "-effect_hand_displacement 0.05*sin(6*t)^2;0;0.03*t^2 -effect_wind_type traction "
-    "-effect_wind_on xmax -effect_wind_vector 0;500*t;0 -time %s -ts_dt %.17g -ts_max_time 0.5" TIGHT,
+    "-effect_hand_displacement 0.05*sin(6*t)^2;0;0.03*t^2 -effect_wind_type traction -effect_wind_on xmax "
+    "-effect_wind_vector 0;500*t;0 -time %s -ts_dt %.17g -ts_max_time 0.5" TIGHT,
     element, law, preset, (double)h));
   PetscCall(test_scene_open(text, &t));
   t.run->want_energies = PETSC_TRUE;
@@ -152,12 +152,11 @@ static PetscErrorCode missing(const char *preset, const char *element, const cha
   e = &t.run->energies;
   *loss =
     e->integrator_loss / (PetscAbsReal(e->load_work) + PetscAbsReal(e->prescribed_work) + e->damping_loss);
-  PetscCall(PetscPrintf(
-    PETSC_COMM_WORLD,
-    "  account of %s, %s %s, h %g s: loads %.4f J, drive %.4f J, damping %.4f J, kinetic %.4f J, strain %.4f "
-    "J; missing %.1e of that\n",
-    preset, element, law, (double)h, (double)e->load_work, (double)e->prescribed_work,
-    (double)e->damping_loss, (double)e->kinetic, (double)e->strain, (double)*loss));
+  PetscCall(PetscPrintf(PETSC_COMM_WORLD,
+                        "  account of %s, %s %s, h %g s: loads %.4f J, drive %.4f J, damping %.4f J, kinetic "
+                        "%.4f J, strain %.4f J; missing %.1e of that\n",
+                        preset, element, law, (double)h, (double)e->load_work, (double)e->prescribed_work,
+                        (double)e->damping_loss, (double)e->kinetic, (double)e->strain, (double)*loss));
   PetscCall(test_scene_close(&t));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -187,13 +186,11 @@ static PetscErrorCode fly(const char *preset, const char *element, const char *l
   char text[VERIFY_TEXT];
 
   PetscFunctionBeginUser;
-  PetscCall(PetscSNPrintf(
-    text, sizeof(text),
-    "-bodies a -body_a_mesh box:0.3,0.2,0.1:1" BODY
-    "-body_a_element %s -body_a_material %s -body_a_velocity 0.3,-0.2,0.1 -body_a_angular_velocity "
-    "1,2,6 -time %s -ts_dt %.17g "
-    "-ts_max_time 0.1" TIGHT,
-    element, law, preset, (double)h));
+  PetscCall(PetscSNPrintf(text, sizeof(text),
+                          "-bodies a -body_a_mesh box:0.3,0.2,0.1:1" BODY
+                          "-body_a_element %s -body_a_material %s -body_a_velocity 0.3,-0.2,0.1 "
+                          "-body_a_angular_velocity 1,2,6 -time %s -ts_dt %.17g -ts_max_time 0.1" TIGHT,
+                          element, law, preset, (double)h));
   PetscCall(test_scene_open(text, &t));
   PetscCall(SbModelEnergies(t.model, t.run->U, t.run->V, &before));
   PetscCall(verify_solve(&t, preset));
@@ -219,12 +216,11 @@ static PetscErrorCode check_flight(const char *preset, const char *element, cons
   PetscFunctionBeginUser;
   PetscCall(fly(preset, element, law, h, coarse));
   PetscCall(fly(preset, element, law, 0.5 * h, fine));
-  PetscCall(PetscPrintf(
-    PETSC_COMM_WORLD,
-    "  free flight, %-16s %s %-10s h %g, %g s: momentum changes by %.1e %.1e, angular momentum by %.1e "
-    "%.1e\n",
-    preset, element, law, (double)h, (double)(0.5 * h), (double)coarse[0], (double)fine[0], (double)coarse[1],
-    (double)fine[1]));
+  PetscCall(PetscPrintf(PETSC_COMM_WORLD,
+                        "  free flight, %-16s %s %-10s h %g, %g s: momentum changes by %.1e %.1e, angular "
+                        "momentum by %.1e %.1e\n",
+                        preset, element, law, (double)h, (double)(0.5 * h), (double)coarse[0],
+                        (double)fine[0], (double)coarse[1], (double)fine[1]));
   SB_CHECK(coarse[0] < 1e-12 && fine[0] < 1e-12, "%s, %s, %s: momentum changes by %g and %g", preset, element,
            law, (double)coarse[0], (double)fine[0]);
   if (!order)

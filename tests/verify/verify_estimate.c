@@ -282,14 +282,14 @@ static PetscErrorCode check_shell(const char *element, PetscReal nu)
   char scene[VERIFY_TEXT];
 
   PetscFunctionBeginUser;
-  PetscCall(PetscSNPrintf(
-    scene, sizeof(scene),
-    "-bodies a -body_a_material linear -body_a_young 1 -body_a_poisson %.17g -body_a_density 1 "
-    "-effects x,y,z,push -effect_x_type fixed -effect_x_on x0 -effect_x_components x "
-    "-effect_y_type fixed -effect_y_on y0 -effect_y_components y -effect_z_type fixed -effect_z_on z0 "
-    "-effect_z_components z -effect_push_type pressure -effect_push_on inside -effect_push_value 1 "
-    "-effect_push_follower no -time static -solver direct",
-    (double)nu));
+  PetscCall(
+    PetscSNPrintf(scene, sizeof(scene),
+                  "-bodies a -body_a_material linear -body_a_young 1 -body_a_poisson %.17g -body_a_density 1 "
+                  "-effects x,y,z,push -effect_x_type fixed -effect_x_on x0 -effect_x_components x "
+                  "-effect_y_type fixed -effect_y_on y0 -effect_y_components y -effect_z_type fixed "
+                  "-effect_z_on z0 -effect_z_components z -effect_push_type pressure -effect_push_on inside "
+                  "-effect_push_value 1 -effect_push_follower no -time static -solver direct",
+                  (double)nu));
   PetscCall(check_exact(&c, scene, "meshes/shell.msh", exact_shell));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -302,13 +302,13 @@ static PetscErrorCode check_wave(const char *element, PetscInt n)
   PetscFunctionBeginUser;
   PetscCall(
     verify_distorted_box((const PetscInt[3]){4 * n, n, n}, (const PetscReal[3]){1., 0.25, 0.25}, mesh));
-  PetscCall(check_exact(
-    &c,
-    "-bodies a -body_a_material linear -body_a_young 1 -body_a_poisson 0 -body_a_density 1 -sets root "
-    "-set_root_at plane:1,0,0,0 -effects hold,load -effect_hold_type fixed -effect_hold_on root "
-    "-effect_load_type body_force -effect_load_density (pi/2)^2*sin(pi/2*x);0;0 -time newmark -ts_dt 0.1 "
-    "-ts_max_time 2 -ksp_rtol 1e-10",
-    mesh, exact_wave));
+  PetscCall(check_exact(&c,
+                        "-bodies a -body_a_material linear -body_a_young 1 -body_a_poisson 0 "
+                        "-body_a_density 1 -sets root -set_root_at plane:1,0,0,0 -effects hold,load "
+                        "-effect_hold_type fixed -effect_hold_on root -effect_load_type body_force "
+                        "-effect_load_density (pi/2)^2*sin(pi/2*x);0;0 -time newmark -ts_dt 0.1 "
+                        "-ts_max_time 2 -ksp_rtol 1e-10",
+                        mesh, exact_wave));
   PetscCall(test_file_remove(mesh));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -323,9 +323,10 @@ typedef struct {
   VerifyMap map;
 } Problem;
 
-#define BAR                                                                                               \
-  "-bodies a -body_a_young 5e4 -body_a_density 1000 -sets root -set_root_at plane:1,0,0,0 -effects hold," \
-  "weight -effect_hold_type fixed -effect_hold_on root -effect_weight_type gravity -time static "
+#define BAR                                                                                        \
+  "-bodies a -body_a_young 5e4 -body_a_density 1000 -sets root -set_root_at plane:1,0,0,0 "        \
+  "-effects hold,weight -effect_hold_type fixed -effect_hold_on root -effect_weight_type gravity " \
+  "-time static "
 #define WEIGHT "-effect_weight_vector 0,0,-9.81 "
 
 static PetscErrorCode open_problem(const Problem *p, const Case *c, TestScene *t)
@@ -400,10 +401,9 @@ static PetscErrorCode check_bars(void)
     "bar", BAR WEIGHT "-body_a_material linear -solver direct", {4, 1, 1}, {0.4, 0.1, 0.1}, NULL};
   static const Problem two = {
     "two",
-    BAR WEIGHT
-    "-body_a_material linear -body_a_inclusions far -set_far_at box:0,0,0.05,0.4,0.1,0.1 -sets root,far "
-    "-inclusion_far_material linear -inclusion_far_young 2e6 -inclusion_far_poisson 0.3 "
-    "-inclusion_far_density 1000 -solver direct",
+    BAR WEIGHT "-body_a_material linear -body_a_inclusions far -set_far_at box:0,0,0.05,0.4,0.1,0.1 "
+               "-sets root,far -inclusion_far_material linear -inclusion_far_young 2e6 "
+               "-inclusion_far_poisson 0.3 -inclusion_far_density 1000 -solver direct",
     {4, 1, 1},
     {0.4, 0.1, 0.1},
     straight_map};
@@ -462,9 +462,8 @@ static PetscErrorCode check_sphere(void)
     "-bodies a -body_a_material linear -body_a_young 1e5 -body_a_density 1 -sets x0,y0,z1,top "
     "-set_x0_at plane:1,0,0,0 -set_y0_at plane:0,1,0,0 -set_z1_at plane:0,0,1,-1 -set_top_at plane:0,0,1,0 "
     "-time static -ksp_rtol 1e-9 -effects x,y,z,ball -effect_x_type fixed -effect_x_on x0 "
-    "-effect_x_components x -effect_y_type fixed -effect_y_on y0 -effect_y_components y "
-    "-effect_z_type fixed -effect_z_on z1 -effect_ball_type contact -effect_ball_response projected "
-    "-effect_ball_on top "
+    "-effect_x_components x -effect_y_type fixed -effect_y_on y0 -effect_y_components y -effect_z_type fixed "
+    "-effect_z_on z1 -effect_ball_type contact -effect_ball_response projected -effect_ball_on top "
     "-effect_ball_obstacle sphere:0,0,0.99,1",
     {1, 1, 1},
     {1., 1., 1.},

@@ -178,11 +178,10 @@ int main(int argc, char **argv)
   limit[0] = verify_aitken(f);
   limit[1] = verify_aitken(u);
   limit[2] = verify_aitken(at);
-  PetscCall(PetscPrintf(
-    PETSC_COMM_WORLD,
-    "  lowest frequency, extrapolated %.5f Hz (reference 0.68846)\n  sudden gravity, extrapolated "
-    "%.4f m at %.4f s (reference -1.5696 m at 0.7203 s)\n",
-    (double)limit[0], (double)limit[1], (double)limit[2]));
+  PetscCall(PetscPrintf(PETSC_COMM_WORLD,
+                        "  lowest frequency, extrapolated %.5f Hz (reference 0.68846)\n  sudden gravity, "
+                        "extrapolated %.4f m at %.4f s (reference -1.5696 m at 0.7203 s)\n",
+                        (double)limit[0], (double)limit[1], (double)limit[2]));
   SB_CHECK_NEAR(limit[0], 0.68846, 3e-3 * 0.68846, "extrapolated frequency");
   /* the minimum is flat, and small waves of high modes, which each mesh has in other places, decide where it is */
   SB_CHECK_NEAR(limit[1], -1.5696, 1e-2 * 1.5696, "extrapolated first minimum");

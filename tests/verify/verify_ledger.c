@@ -163,9 +163,7 @@ static PetscErrorCode springs(void)
   static const char block[] =
     "-bodies block -body_block_mesh box:0.1,0.1,0.05:4 -body_block_material linear -body_block_young 1e5 "
     "-body_block_poisson 0.3 -effects hold,tool -effect_hold_type fixed -effect_tool_type contact "
-    "-effect_tool_response projected "
-    "-effect_tool_on zmax "
-    "-time static -ksp_rtol 1e-10 ";
+    "-effect_tool_response projected -effect_tool_on zmax -time static -ksp_rtol 1e-10 ";
   static const char ball[] = "-effect_hold_on zmin -effect_tool_obstacle sphere:0.05,0.05,0.087,0.04";
   static const char *const stiffness[] = {"20", "5"}, *const width[] = {"2e-4", "1e-3"};
 

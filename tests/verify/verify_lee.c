@@ -85,26 +85,24 @@ static PetscErrorCode solve(PetscInt ny, Frame *f)
   PetscCall(verify_open(
     &t,
     "-bodies a -body_a_mesh %s -body_a_element cr -body_a_material stvk -body_a_young 720 -body_a_poisson 0 "
-    "-body_a_density 1 "
-    "-sets foot,end,point -set_foot_at sphere:%.17g,0,%.17g,%.17g -set_end_at sphere:120,%.17g,%.17g,%.17g "
-    "-set_point_at box:23.5,119.5,-1,24.5,120.5,0.001 -effects foot,end,plane,load -effect_foot_type fixed "
-    "-effect_foot_on foot -effect_end_type fixed -effect_end_on end -effect_plane_type fixed "
-    "-effect_plane_on all "
-    "-effect_plane_components z -effect_load_type point_force -effect_load_on point -effect_load_vector "
-    "0;%.17g;0 "
-    "-time static -static_control arc_length -static_steps 20 -static_longest_step 4 -static_max_steps 300",
+    "-body_a_density 1 -sets foot,end,point -set_foot_at sphere:%.17g,0,%.17g,%.17g "
+    "-set_end_at sphere:120,%.17g,%.17g,%.17g -set_point_at box:23.5,119.5,-1,24.5,120.5,0.001 "
+    "-effects foot,end,plane,load -effect_foot_type fixed -effect_foot_on foot -effect_end_type fixed "
+    "-effect_end_on end -effect_plane_type fixed -effect_plane_on all -effect_plane_components z "
+    "-effect_load_type point_force -effect_load_on point -effect_load_vector 0;%.17g;0 -time static "
+    "-static_control arc_length -static_steps 20 -static_longest_step 4 -static_max_steps 300",
     mesh, (double)(sign[0] * sixth), (double)(2. * sixth), (double)(0.8 * width),
     (double)(LENGTH + sign[1] * sixth), (double)(2. * sixth), (double)(0.8 * width),
     (double)(-f->full * width / WIDTH)));
   PetscCall(test_file_remove(mesh));
   PetscCall(SbRunAddMonitor(t.run, watch, f, NULL));
   PetscCall(verify_solve(&t, "frame"));
-  PetscCall(PetscPrintf(
-    PETSC_COMM_WORLD,
-    "  %d cells through the depth: %d steps, %d rejected, %d Newton iterations; load %.5f, %.5f; way down "
-    "%.4f, %.4f\n",
-    (int)ny, (int)t.run->steps_total, (int)t.run->rejected_total, (int)t.run->newton_total,
-    (double)f->load[0], (double)f->load[1], (double)f->turn[0], (double)f->turn[1]));
+  PetscCall(PetscPrintf(PETSC_COMM_WORLD,
+                        "  %d cells through the depth: %d steps, %d rejected, %d Newton iterations; load "
+                        "%.5f, %.5f; way down %.4f, %.4f\n",
+                        (int)ny, (int)t.run->steps_total, (int)t.run->rejected_total,
+                        (int)t.run->newton_total, (double)f->load[0], (double)f->load[1], (double)f->turn[0],
+                        (double)f->turn[1]));
   SB_CHECK(t.run->t_now == 1., "the path ended at the load factor %g", (double)t.run->t_now);
   SB_CHECK(f->nload == 2 && f->nturn == 2, "%d extrema of the load, %d of the way down", (int)f->nload,
            (int)f->nturn);

@@ -13,8 +13,7 @@
 #define CUBE                                                                                              \
   "-bodies a -body_a_mesh box:1,1,1:2 -body_a_material stvk -body_a_young 1 -body_a_poisson 0 "           \
   "-body_a_density 1 -effects x,y,z,press -effect_x_type fixed -effect_x_on xmin -effect_x_components x " \
-  "-effect_y_type fixed -effect_y_on ymin -effect_y_components y -effect_z_type fixed -effect_z_on "      \
-  "zmin "                                                                                                 \
+  "-effect_y_type fixed -effect_y_on ymin -effect_y_components y -effect_z_type fixed -effect_z_on zmin " \
   "-effect_z_components z -effect_press_on zmax -time static "
 #define DEAD "-effect_press_type traction -effect_press_vector 0;0;%.17g "
 

@@ -33,13 +33,12 @@ static PetscErrorCode bend(PetscReal poisson, PetscInt steps, const char *extra,
   TestScene t;
 
   PetscFunctionBeginUser;
-  PetscCall(
-    verify_open(&t,
-                "-bodies bar -body_bar_mesh box:0.4,0.1,0.1:2 -body_bar_element cr -body_bar_material "
-                "neohookean -body_bar_young 5e5 -body_bar_poisson %g -body_bar_density 1000 -effects "
-                "gravity,clamp -effect_gravity_vector 0,0,-9.81 -effect_clamp_type fixed "
-                "-effect_clamp_on xmin -time static -static_steps %d %s",
-                (double)poisson, (int)steps, extra));
+  PetscCall(verify_open(&t,
+                        "-bodies bar -body_bar_mesh box:0.4,0.1,0.1:2 -body_bar_element cr "
+                        "-body_bar_material neohookean -body_bar_young 5e5 -body_bar_poisson %g "
+                        "-body_bar_density 1000 -effects gravity,clamp -effect_gravity_vector 0,0,-9.81 "
+                        "-effect_clamp_type fixed -effect_clamp_on xmin -time static -static_steps %d %s",
+                        (double)poisson, (int)steps, extra));
   *o = (Outcome){0};
   t.run->want_energies = PETSC_TRUE;
   PetscCall(SNESMonitorSet(t.run->snes, keep, o, NULL));
@@ -100,12 +99,12 @@ static PetscErrorCode check_come_back(void)
 
   PetscFunctionBeginUser;
   for (int k = 0; k < 2; k++) {
-    PetscCall(verify_open(&t,
-                          "-bodies a -body_a_mesh box:0.3,0.1,0.1:1 -body_a_element dg -body_a_material "
-                          "corotated -body_a_young 1e6 -body_a_poisson 0.499999 -body_a_density 1000 "
-                          "-effects clamp,gravity -effect_clamp_type fixed -effect_clamp_on xmin -ts_dt "
-                          "0.02 -ts_max_time 0.04 -solver %s",
-                          k ? "pressure" : "direct"));
+    PetscCall(
+      verify_open(&t,
+                  "-bodies a -body_a_mesh box:0.3,0.1,0.1:1 -body_a_element dg -body_a_material corotated "
+                  "-body_a_young 1e6 -body_a_poisson 0.499999 -body_a_density 1000 -effects clamp,gravity "
+                  "-effect_clamp_type fixed -effect_clamp_on xmin -ts_dt 0.02 -ts_max_time 0.04 -solver %s",
+                  k ? "pressure" : "direct"));
     PetscCall(verify_solve(&t, "come back"));
     iterations[k] = t.run->newton_total;
     SB_CHECK(t.run->rejected_total == 0, "%d rejected steps", (int)t.run->rejected_total);

@@ -58,19 +58,19 @@ static PetscErrorCode check_order(const char *element, const char *law, const ch
   PetscCall(PetscSNPrintf(
     text, sizeof(text),
     BAR CLAMP
-    "-body_a_element %s -body_a_material %s -body_a_tangent %s -effects gravity,clamp,air -effect_air_type "
-    "pressure -effect_air_on boundary -effect_air_value 2000 %s -time static " TIGHT,
+    "-body_a_element %s -body_a_material %s -body_a_tangent %s -effects gravity,clamp,air "
+    "-effect_air_type pressure -effect_air_on boundary -effect_air_value 2000 %s -time static " TIGHT,
     element, law, tangent, strcmp(element, "p1") ? "-effect_air_follower false -body_a_young 1e6" : ""));
   PetscCall(test_scene_open(text, &t));
   PetscCall(verify_solve(&t, law));
   PetscCall(test_value_at(t.model, t.run->U, end, at));
   for (int k = 0; k < 2; k++) PetscCall(one_step(&t, t.run->U, k ? 1e-4 : 1e-3, &error[k]));
   order = PetscLog10Real(error[0] / error[1]);
-  PetscCall(PetscPrintf(
-    PETSC_COMM_WORLD,
-    "  %s %-10s %-9s: %2d iterations to the answer; a disturbance of 1e-3, 1e-4 becomes %.1e, %.1e: order "
-    "%.2f\n",
-    element, law, tangent, (int)t.run->newton_total, (double)error[0], (double)error[1], (double)order));
+  PetscCall(PetscPrintf(PETSC_COMM_WORLD,
+                        "  %s %-10s %-9s: %2d iterations to the answer; a disturbance of 1e-3, 1e-4 becomes "
+                        "%.1e, %.1e: order %.2f\n",
+                        element, law, tangent, (int)t.run->newton_total, (double)error[0], (double)error[1],
+                        (double)order));
   SB_CHECK_NEAR(order, expected, 0.1, "order of Newton's method");
   PetscCall(test_scene_close(&t));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -128,11 +128,11 @@ static PetscErrorCode follow(const char *element, const char *law, int steps, Pe
   *path = (Path){.n = 0};
   PetscCall(PetscSNPrintf(
     text, sizeof(text),
-    BAR CLAMP
-    "-body_a_element %s -body_a_material %s -effects gravity,clamp,air,push -effect_gravity_vector 0,0,%g "
-    "-effect_air_type pressure -effect_air_on zmax -effect_air_value %g -effect_push_type "
-    "prescribed_displacement -effect_push_on xmax -effect_push_components y -effect_push_displacement 0;%g;0 "
-    "-time static -static_steps %d %s " TIGHT,
+    BAR CLAMP "-body_a_element %s -body_a_material %s -effects gravity,clamp,air,push "
+              "-effect_gravity_vector 0,0,%g -effect_air_type pressure -effect_air_on zmax "
+              "-effect_air_value %g -effect_push_type prescribed_displacement -effect_push_on xmax "
+              "-effect_push_components y -effect_push_displacement 0;%g;0 -time static "
+              "-static_steps %d %s " TIGHT,
     element, law, -9.81 * (double)load, 100. * (double)load, 0.1 * (double)load, steps,
     strcmp(element, "p1") ? "-body_a_young 1e6" : ""));
   PetscCall(test_scene_open(text, &t));
@@ -237,8 +237,8 @@ static PetscErrorCode check_adaptive(const char *preset)
   PetscCall(swing("-body_a_material corotated -time newmark -ts_dt 0.0005 -ts_max_time 0.4 " TIGHT, &fine));
   for (int k = 0; k < 3; k++) {
     PetscCall(PetscSNPrintf(text, sizeof(text),
-                            "-body_a_material corotated -time %s -ts_dt 0.01 -ts_max_time 0.4 -ts_adapt_type "
-                            "basic -ts_atol %g " TIGHT,
+                            "-body_a_material corotated -time %s -ts_dt 0.01 -ts_max_time 0.4 "
+                            "-ts_adapt_type basic -ts_atol %g " TIGHT,
                             preset, PetscPowRealInt(10., -4 - k)));
     PetscCall(swing(text, &r));
     SB_CHECK(!r.reason[0], "%s", r.reason);
@@ -272,22 +272,21 @@ static PetscErrorCode check_cuts(void)
   PetscCall(
     swing("-body_a_material neohookean -body_a_tangent exact -time newmark -ts_dt 0.0005 -ts_max_time 0.2 ",
           &whole));
-  PetscCall(swing("-body_a_material neohookean -body_a_tangent exact -time newmark -ts_dt 0.05 -ts_max_time "
-                  "0.2 -snes_max_it 3 " TIGHT,
+  PetscCall(swing("-body_a_material neohookean -body_a_tangent exact -time newmark -ts_dt 0.05 "
+                  "-ts_max_time 0.2 -snes_max_it 3 " TIGHT,
                   &cut));
-  PetscCall(PetscPrintf(
-    PETSC_COMM_WORLD,
-    "  3 iterations allowed: %d steps of %.5f to %.5f s, %d attempts rejected; end %.5f m, %.5f m with "
-    "short steps\n",
-    (int)cut.steps, (double)cut.shortest, (double)cut.longest, (int)cut.rejected, (double)cut.u[2],
-    (double)whole.u[2]));
+  PetscCall(PetscPrintf(PETSC_COMM_WORLD,
+                        "  3 iterations allowed: %d steps of %.5f to %.5f s, %d attempts rejected; end %.5f "
+                        "m, %.5f m with short steps\n",
+                        (int)cut.steps, (double)cut.shortest, (double)cut.longest, (int)cut.rejected,
+                        (double)cut.u[2], (double)whole.u[2]));
   SB_CHECK(!cut.reason[0], "%s", cut.reason);
   SB_CHECK(cut.rejected > 0 && cut.shortest < 0.05, "no step was cut");
   SB_CHECK(cut.longest > 1.9 * cut.shortest, "steps do not grow again");
   SB_CHECK_NEAR(cut.t, 0.2, 1e-12, "end of a run with cut steps");
   SB_CHECK_NEAR(cut.u[2], whole.u[2], 0.03 * PetscAbsReal(whole.u[2]), "end of the bar");
-  PetscCall(swing("-body_a_material neohookean -body_a_tangent exact -time newmark -ts_dt 0.05 -ts_max_time "
-                  "0.2 -snes_max_it 1 -time_max_halvings 2 " TIGHT,
+  PetscCall(swing("-body_a_material neohookean -body_a_tangent exact -time newmark -ts_dt 0.05 "
+                  "-ts_max_time 0.2 -snes_max_it 1 -time_max_halvings 2 " TIGHT,
                   &stopped));
   PetscCall(PetscPrintf(PETSC_COMM_WORLD, "  1 iteration, 2 cuts allowed: stops at %g s: %s\n",
                         (double)stopped.t, stopped.reason));
@@ -353,9 +352,8 @@ int main(int argc, char **argv)
     check_silent("-body_a_material corotated -time static -solver cg_jacobi -ksp_type cg -ksp_max_it 1"));
   PetscCall(check_silent("-body_a_material linear -time newmark -ts_dt 0.1 -ts_max_time 1 -solver cg_jacobi "
                          "-ksp_type cg -ksp_max_it 1"));
-  PetscCall(check_silent(
-    "-body_a_material corotated -time euler_implicit -ts_dt 0.1 -ts_max_time 1 -snes_type ksponly -solver "
-    "cg_jacobi -ksp_type cg -ksp_max_it 1"));
+  PetscCall(check_silent("-body_a_material corotated -time euler_implicit -ts_dt 0.1 -ts_max_time 1 "
+                         "-snes_type ksponly -solver cg_jacobi -ksp_type cg -ksp_max_it 1"));
   PetscCall(check_one_solve());
   SB_TEST_END();
 }

@@ -104,8 +104,7 @@ static PetscErrorCode destroy(Trace *trace)
 
 #define FREE                                                                                             \
   "-bodies a -body_a_mesh box:0.3,0.2,0.1:2 -body_a_young 1e5 -body_a_poisson 0.3 -body_a_density 1000 " \
-  "-body_a_velocity "                                                                                    \
-  "0.3,-0.2,0.1 -body_a_angular_velocity 1,2,6 -ts_dt 0.01 -ts_max_time 0.2 "
+  "-body_a_velocity 0.3,-0.2,0.1 -body_a_angular_velocity 1,2,6 -ts_dt 0.01 -ts_max_time 0.2 "
 
 /* A free body with and without a type that is not named. */
 static PetscErrorCode check_unnamed(const char *law, const char *time)
@@ -175,8 +174,8 @@ static PetscErrorCode check_contact(void)
   Trace named;
 
   PetscFunctionBeginUser;
-  PetscCall(run(FREE "-body_a_material corotated -time euler_implicit -effects floor -effect_floor_type "
-                     "contact -effect_floor_response projected "
+  PetscCall(run(FREE "-body_a_material corotated -time euler_implicit -effects floor "
+                     "-effect_floor_type contact -effect_floor_response projected "
                      "-effect_floor_obstacle plane:0,0,1,-9",
                 PETSC_FALSE, &named));
   SB_CHECK(named.events[SB_EVENT_CONTACT] > 0, "contact is named and was never begun");
@@ -189,10 +188,10 @@ static PetscErrorCode check_static(void)
   Trace trace;
 
   PetscFunctionBeginUser;
-  PetscCall(run(
-    "-bodies a -body_a_mesh box:0.3,0.2,0.1:2 -body_a_material linear -body_a_young 1e5 -body_a_poisson 0.3 "
-    "-body_a_density 1000 -effects clamp -effect_clamp_type fixed -effect_clamp_on xmin -time static",
-    PETSC_FALSE, &trace));
+  PetscCall(run("-bodies a -body_a_mesh box:0.3,0.2,0.1:2 -body_a_material linear -body_a_young 1e5 "
+                "-body_a_poisson 0.3 -body_a_density 1000 -effects clamp -effect_clamp_type fixed "
+                "-effect_clamp_on xmin -time static",
+                PETSC_FALSE, &trace));
   SB_CHECK(trace.events[SB_EVENT_EFFECTS] == 0, "a support is no force: effects were begun %d times",
            (int)trace.events[SB_EVENT_EFFECTS]);
   PetscCall(destroy(&trace));
@@ -237,12 +236,12 @@ static PetscErrorCode check_elements(const char *law, const char *other)
   SB_CHECK(!memcmp(plain.u, named.u, sizeof(PetscReal) * 3 * (size_t)plain.n) &&
              !memcmp(plain.v, named.v, sizeof(PetscReal) * 3 * (size_t)plain.n),
            "%s: the trajectory changes when the element is named", law);
-  PetscCall(
-    PetscSNPrintf(text, sizeof(text),
-                  FREE "-body_a_material %s -time euler_symplectic -ts_dt 0.0005 -bodies a,b -body_b_mesh "
-                       "box:0.1,0.1,0.1:1 -body_b_translate 0,0,9 -body_b_material linear -body_b_young 1e3 "
-                       "-body_b_poisson 0.3 -body_b_density 1000 -body_b_element %s",
-                  law, other));
+  PetscCall(PetscSNPrintf(text, sizeof(text),
+                          FREE
+                          "-body_a_material %s -time euler_symplectic -ts_dt 0.0005 -bodies a,b "
+                          "-body_b_mesh box:0.1,0.1,0.1:1 -body_b_translate 0,0,9 -body_b_material linear "
+                          "-body_b_young 1e3 -body_b_poisson 0.3 -body_b_density 1000 -body_b_element %s",
+                          law, other));
   PetscCall(run(text, PETSC_FALSE, &beside));
   PetscCall(PetscPrintf(PETSC_COMM_WORLD,
                         "  %-10s beside %s: the p1 body moves as alone, but for %.1e and %.1e\n", law, other,

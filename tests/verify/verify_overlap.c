@@ -109,10 +109,9 @@ static PetscErrorCode check(const char *element, const char *detection, PetscRea
     &t,
     "-bodies a,b -body_a_mesh box:0.1,0.1,0.1:3 -body_b_mesh box:0.1,0.1,0.1:2 -body_b_translate %g,0,0 %s "
     "-body_a_material corotated -body_a_young 1e5 -body_a_poisson 0.3 -body_a_element %s "
-    "-body_b_material corotated -body_b_young 1e5 -body_b_poisson 0.3 -body_b_element %s "
-    "-effects meet -effect_meet_type contact -effect_meet_response projected -effect_meet_detection %s "
-    "-effect_meet_separation_steps %d "
-    "-time euler_implicit -ts_dt %g -ts_max_time 0.48 -snes_rtol 1e-9",
+    "-body_b_material corotated -body_b_young 1e5 -body_b_poisson 0.3 -body_b_element %s -effects meet "
+    "-effect_meet_type contact -effect_meet_response projected -effect_meet_detection %s "
+    "-effect_meet_separation_steps %d -time euler_implicit -ts_dt %g -ts_max_time 0.48 -snes_rtol 1e-9",
     (double)shift, turn, element, element, detection, STEPS, STEP));
   t.run->want_energies = PETSC_TRUE;
   PetscCall(SbRunAddMonitor(t.run, watch, &o, NULL));
@@ -196,22 +195,21 @@ static PetscErrorCode check_finger(const char *element)
   Ways w;
 
   PetscFunctionBeginUser;
-  PetscCall(
-    verify_open(&t,
-                "-bodies a,b -body_a_mesh box:0.02,0.02,0.2:2,2,20 -body_a_translate 0.041,0.0392,0.1 "
-                "-body_b_mesh box:0.1,0.1,0.2:4,4,8 -body_a_material corotated -body_a_young 1e5 "
-                "-body_a_poisson 0.3 -body_b_material corotated -body_b_young 1e5 -body_b_poisson 0.3 "
-                "-body_a_element %s -body_b_element %s "
-                "-effects meet -effect_meet_type contact -effect_meet_response projected "
-                "-effect_meet_search_radius 0.005 -ts_dt 1e-3",
-                element, element));
+  PetscCall(verify_open(
+    &t,
+    "-bodies a,b -body_a_mesh box:0.02,0.02,0.2:2,2,20 -body_a_translate 0.041,0.0392,0.1 "
+    "-body_b_mesh box:0.1,0.1,0.2:4,4,8 -body_a_material corotated -body_a_young 1e5 -body_a_poisson 0.3 "
+    "-body_b_material corotated -body_b_young 1e5 -body_b_poisson 0.3 -body_a_element %s -body_b_element %s "
+    "-effects meet -effect_meet_type contact -effect_meet_response projected "
+    "-effect_meet_search_radius 0.005 -ts_dt 1e-3",
+    element, element));
   PetscCall(PetscCalloc1(3 * t.run->model->space->nnode, &u));
   PetscCall(look_for_ways(t.run->model, u, up, &w));
-  PetscCall(PetscPrintf(
-    PETSC_COMM_WORLD,
-    "  finger, %s: %d points inside, %d with a separation direction, %d seen along it, deepest %g m, "
-    "cosine %.3f\n",
-    element, (int)w.inside, (int)w.led, (int)w.behind, (double)w.deepest, (double)w.least));
+  PetscCall(PetscPrintf(PETSC_COMM_WORLD,
+                        "  finger, %s: %d points inside, %d with a separation direction, %d seen along it, "
+                        "deepest %g m, cosine %.3f\n",
+                        element, (int)w.inside, (int)w.led, (int)w.behind, (double)w.deepest,
+                        (double)w.least));
   SB_CHECK(w.inside > 80 && w.led == w.inside && w.behind == w.inside, "%d inside, %d led, %d seen",
            (int)w.inside, (int)w.led, (int)w.behind);
   SB_CHECK(w.least > 0.9 && w.deepest > 0.095 && w.deepest < 0.11, "deepest %g m, cosine %g",
@@ -230,12 +228,12 @@ static PetscErrorCode check_ring(const char *element)
   Ways w;
 
   PetscFunctionBeginUser;
-  PetscCall(verify_open(&t,
-                        "-bodies a -body_a_mesh box:2,0.2,0.1:40,4,2 -body_a_material corotated "
-                        "-body_a_young 1e5 -body_a_poisson 0.3 -body_a_element %s -effects meet "
-                        "-effect_meet_type contact -effect_meet_response projected -effect_meet_self yes "
-                        "-effect_meet_search_radius 0.02 -ts_dt 1e-3",
-                        element));
+  PetscCall(verify_open(
+    &t,
+    "-bodies a -body_a_mesh box:2,0.2,0.1:40,4,2 -body_a_material corotated -body_a_young 1e5 "
+    "-body_a_poisson 0.3 -body_a_element %s -effects meet -effect_meet_type contact "
+    "-effect_meet_response projected -effect_meet_self yes -effect_meet_search_radius 0.02 -ts_dt 1e-3",
+    element));
   space = t.run->model->space;
   PetscCall(PetscCalloc1(3 * space->nnode, &u));
   for (PetscInt i = 0; i < space->nnode; i++) {
@@ -298,11 +296,11 @@ int main(int argc, char **argv)
                          "-sets high,low -set_high_at plane:0,0,1,1 -set_low_at plane:0,0,1,0.6 "
                          "-effect_meet_on high,low",
                          PETSC_FALSE));
-  PetscCall(check_begins("a little in each other, tops only",
-                         "-body_a_mesh box:1,1,1:4 -body_b_mesh box:1,1,0.6:4,4,3 "
-                         "-body_b_translate 0.9999,0.1,0 -sets high,low -set_high_at plane:0,0,1,1 "
-                         "-set_low_at plane:0,0,1,0.6 -effect_meet_on high,low",
-                         PETSC_TRUE));
+  PetscCall(check_begins(
+    "a little in each other, tops only",
+    "-body_a_mesh box:1,1,1:4 -body_b_mesh box:1,1,0.6:4,4,3 -body_b_translate 0.9999,0.1,0 -sets high,low "
+    "-set_high_at plane:0,0,1,1 -set_low_at plane:0,0,1,0.6 -effect_meet_on high,low",
+    PETSC_TRUE));
   PetscCall(
     check_begins("a coarse tip, which does not look",
                  "-body_a_mesh box:1,1,1:12 -body_b_mesh box:1,1,1:1 -body_b_rotate 1,-1,0,54.7356 "

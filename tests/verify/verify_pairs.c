@@ -15,16 +15,14 @@
 #define LAW(name)                                                                                      \
   " -body_" name "_material corotated -body_" name "_young 3e4 -body_" name "_poisson 0.3 -body_" name \
   "_density 1000 "
-#define HEAP                                                                                            \
-  "-bodies low,left,top -body_low_mesh box:0.08,0.08,0.04:2 -body_left_mesh box:0.04,0.07,0.04:2 "      \
-  "-body_left_rotate 1,1,0,8 -body_left_translate 0.01,0.01,0.046 -body_top_mesh box:0.06,0.05,0.03:2 " \
-  "-body_top_rotate 0,1,0.3,12 -body_top_translate 0.02,0.02,0.1 -body_low_velocity 0,0,1.5 "           \
-  "-body_top_velocity 0,0,-1.5 -body_left_velocity 0.2,0,0" LAW("low") LAW("left")                      \
-    LAW("top") "-effects meet,floor -effect_floor_type contact -effect_floor_response projected "       \
-               "-effect_floor_obstacle plane:0,0,1,-0.01 "                                              \
-               "-effect_floor_on low -effect_floor_friction 0.3 -effect_meet_type contact "             \
-               "-effect_meet_response projected "                                                       \
-               "-effect_meet_pairs yes "                                                                \
+#define HEAP                                                                                               \
+  "-bodies low,left,top -body_low_mesh box:0.08,0.08,0.04:2 -body_left_mesh box:0.04,0.07,0.04:2 "         \
+  "-body_left_rotate 1,1,0,8 -body_left_translate 0.01,0.01,0.046 -body_top_mesh box:0.06,0.05,0.03:2 "    \
+  "-body_top_rotate 0,1,0.3,12 -body_top_translate 0.02,0.02,0.1 -body_low_velocity 0,0,1.5 "              \
+  "-body_top_velocity 0,0,-1.5 -body_left_velocity 0.2,0,0" LAW("low") LAW("left")                         \
+    LAW("top") "-effects meet,floor -effect_floor_type contact -effect_floor_response projected "          \
+               "-effect_floor_obstacle plane:0,0,1,-0.01 -effect_floor_on low -effect_floor_friction 0.3 " \
+               "-effect_meet_type contact -effect_meet_response projected -effect_meet_pairs yes "         \
                "-time euler_implicit -ts_dt 0.002 -ts_max_time 0.02 -snes_rtol 1e-9 -ksp_rtol 1e-8 "
 
 typedef struct {
@@ -182,19 +180,15 @@ static PetscErrorCode check_fold(void)
 
   PetscFunctionBeginUser;
   PetscCall(verify_mesh_write(n, hairpin, NULL, path));
-  PetscCall(
-    verify_open(&t,
-                "-bodies a -body_a_mesh %s" LAW(
-                  "a") "-sets low,high -set_low_at box:-1,-1,-1,0.03,1,0.01 "
-                       "-set_high_at box:-1,-1,0.03,0.002,1,1 -effects hold,press,meet -effect_hold_type "
-                       "fixed -effect_hold_on low "
-                       "-effect_press_type prescribed_displacement -effect_press_on high "
-                       "-effect_press_displacement 0;0;-0.4*t "
-                       "-effect_meet_type contact -effect_meet_response projected -effect_meet_self yes "
-                       "-effect_meet_pairs yes -time "
-                       "euler_implicit -ts_dt "
-                       "0.005 -ts_max_time 0.09",
-                path));
+  PetscCall(verify_open(
+    &t,
+    "-bodies a -body_a_mesh %s" LAW(
+      "a") "-sets low,high -set_low_at box:-1,-1,-1,0.03,1,0.01 -set_high_at box:-1,-1,0.03,0.002,1,1 "
+           "-effects hold,press,meet -effect_hold_type fixed -effect_hold_on low "
+           "-effect_press_type prescribed_displacement -effect_press_on high "
+           "-effect_press_displacement 0;0;-0.4*t -effect_meet_type contact -effect_meet_response projected "
+           "-effect_meet_self yes -effect_meet_pairs yes -time euler_implicit -ts_dt 0.005 -ts_max_time 0.09",
+    path));
   t.run->want_energies = PETSC_TRUE;
   PetscCall(SbRunAddMonitor(t.run, watch_fold, most, NULL));
   PetscCall(verify_solve(&t, "fold"));

@@ -229,9 +229,8 @@ static PetscErrorCode check_patch(const Patch *p, const char *law, PetscReal nu,
   PetscCall(load_options(pulled, F, P, loads, sizeof(loads)));
   PetscCall(PetscSNPrintf(
     text, sizeof(text),
-    "-bodies a -body_a_mesh %s -body_a_element %s -body_a_material %s -body_a_young %g "
-    "-body_a_poisson %g -body_a_density 1 -time static -ksp_rtol 1e-13 -snes_rtol 1e-13 "
-    "-snes_atol 0 -snes_stol 1e-13 %s %s %s",
+    "-bodies a -body_a_mesh %s -body_a_element %s -body_a_material %s -body_a_young %g -body_a_poisson %g "
+    "-body_a_density 1 -time static -ksp_rtol 1e-13 -snes_rtol 1e-13 -snes_atol 0 -snes_stol 1e-13 %s %s %s",
     p->path, p->element, law, (double)E, (double)nu, !strcmp(law, "corotated") ? "-body_a_tangent exact" : "",
     !strcmp(p->element, "p1") ? "" : "-solver direct", loads));
   PetscCall(test_scene_open(text, &t));

@@ -271,11 +271,10 @@ static PetscErrorCode check_run(const char *more, const char *element, PetscBool
   char text[2048];
 
   PetscFunctionBeginUser;
-  PetscCall(PetscSNPrintf(
-    text, sizeof(text),
-    TWO "-body_a_element %s -body_a_angular_velocity 0,3,1 -body_a_velocity 1,0,0 -remesh_times 0.02,0.03 "
-        "-remesh_bodies a %s",
-    element, more));
+  PetscCall(PetscSNPrintf(text, sizeof(text),
+                          TWO "-body_a_element %s -body_a_angular_velocity 0,3,1 -body_a_velocity 1,0,0 "
+                              "-remesh_times 0.02,0.03 -remesh_bodies a %s",
+                          element, more));
   PetscCall(test_scene_open(text, &s));
   s.run->want_energies = PETSC_TRUE;
   PetscCall(SbRemeshSetMesher(s.remesh, fixture_cone, &calls));
@@ -378,8 +377,8 @@ int main(int argc, char **argv)
   PetscCall(check_momenta("-mass consistent"));
   PetscCall(check_momenta("-body_a_element cr"));
   PetscCall(check_momenta("-body_a_element dg -mass consistent"));
-  PetscCall(check_momenta("-sets end -set_end_at plane:1,0,0,0 -effects hold -effect_hold_type fixed "
-                          "-effect_hold_on end"));
+  PetscCall(check_momenta(
+    "-sets end -set_end_at plane:1,0,0,0 -effects hold -effect_hold_type fixed -effect_hold_on end"));
   PetscCall(check_run(EULER, "p1", PETSC_FALSE));
   PetscCall(check_run(EULER, "cr", PETSC_FALSE));
   PetscCall(check_run(EULER, "dg", PETSC_FALSE));

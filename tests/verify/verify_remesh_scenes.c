@@ -15,22 +15,19 @@
 #define STUFF(b)                                                                                \
   " -body_" #b "_material neohookean -body_" #b "_young 2e4 -body_" #b "_poisson 0.3 -body_" #b \
   "_density 1000 "
-#define FLOOR                                                                                              \
-  "-bodies a -body_a_mesh box:0.2,0.15,0.1:4,3,2 -body_a_translate 0,0,0.002" STUFF(                       \
-    a) "-body_a_velocity 0.5,0,-0.3 -effects weight,floor -effect_weight_type gravity -effect_floor_type " \
-       "contact "                                                                                          \
-       "-effect_floor_obstacle plane:0,0,1,0 -ts_dt 0.005 "
+#define FLOOR                                                                           \
+  "-bodies a -body_a_mesh box:0.2,0.15,0.1:4,3,2 -body_a_translate 0,0,0.002" STUFF(    \
+    a) "-body_a_velocity 0.5,0,-0.3 -effects weight,floor -effect_weight_type gravity " \
+       "-effect_floor_type contact -effect_floor_obstacle plane:0,0,1,0 -ts_dt 0.005 "
 #define PAIR                                                                                             \
   "-bodies a,b -body_a_mesh box:0.2,0.2,0.2:3,3,3 -body_b_mesh box:0.2,0.2,0.2:4,4,4 "                   \
   "-body_b_translate 0.202,0.03,0.02" STUFF(a)                                                           \
     STUFF(b) "-body_a_velocity 0.5,0,0 -body_b_velocity -0.5,0,0 -effects hit -effect_hit_type contact " \
-             "-effect_hit_response projected "                                                           \
-             "-ts_dt 0.005 "
-#define BEAM                                                                                               \
-  "-bodies a -body_a_mesh box:0.4,0.1,0.1:6,2,2" STUFF(                                                    \
-    a) "-sets end -set_end_at plane:1,0,0,0 -effects hold,weight -effect_hold_type fixed -effect_hold_on " \
-       "end "                                                                                              \
-       "-effect_weight_type gravity "
+             "-effect_hit_response projected -ts_dt 0.005 "
+#define BEAM                                                                               \
+  "-bodies a -body_a_mesh box:0.4,0.1,0.1:6,2,2" STUFF(                                    \
+    a) "-sets end -set_end_at plane:1,0,0,0 -effects hold,weight -effect_hold_type fixed " \
+       "-effect_hold_on end -effect_weight_type gravity "
 
 /* ------------------------------------------------------------------ who touches */
 
@@ -269,10 +266,10 @@ static PetscErrorCode check_inclusion(const char *more)
   PetscCall(PetscSNPrintf(
     text, sizeof(text),
     "-bodies a -body_a_mesh box:0.2,0.2,0.2:5,5,5" STUFF(
-      a) "-body_a_angular_velocity 0,3,1 -sets core -set_core_at sphere:0.1,0.1,0.1,0.075 -body_a_inclusions "
-         "core "
-         "-inclusion_core_material neohookean -inclusion_core_young 1e5 -inclusion_core_poisson 0.3 "
-         "-inclusion_core_density 3000 -ts_dt 0.01 -ts_max_time 0.03 -remesh_times 0.01,0.02 %s",
+      a) "-body_a_angular_velocity 0,3,1 -sets core -set_core_at sphere:0.1,0.1,0.1,0.075 "
+         "-body_a_inclusions core -inclusion_core_material neohookean -inclusion_core_young 1e5 "
+         "-inclusion_core_poisson 0.3 -inclusion_core_density 3000 -ts_dt 0.01 -ts_max_time 0.03 "
+         "-remesh_times 0.01,0.02 %s",
     more));
   PetscCall(test_scene_open(text, &s));
   PetscCall(masses(s.model, before));
@@ -369,14 +366,13 @@ static PetscErrorCode check_failed(const char *iterations, PetscBool first)
   int calls = 0;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscSNPrintf(
-    text, sizeof(text),
-    "-bodies a -body_a_mesh box:0.1,0.1,0.1:3,3,3" STUFF(
-      a) "-effects knead "
-         "-effect_knead_type prescribed_displacement -effect_knead_on boundary -effect_knead_displacement "
-         "0.1*sin(60*t^3*y)*z;-0.6*t^3*(y-0.05);-0.6*t^3*z -time static -static_steps 10 "
-         "-time_max_halvings 0 -remesh_failed -snes_max_it %s",
-    iterations));
+  PetscCall(
+    PetscSNPrintf(text, sizeof(text),
+                  "-bodies a -body_a_mesh box:0.1,0.1,0.1:3,3,3" STUFF(
+                    a) "-effects knead -effect_knead_type prescribed_displacement -effect_knead_on boundary "
+                       "-effect_knead_displacement 0.1*sin(60*t^3*y)*z;-0.6*t^3*(y-0.05);-0.6*t^3*z "
+                       "-time static -static_steps 10 -time_max_halvings 0 -remesh_failed -snes_max_it %s",
+                  iterations));
   PetscCall(test_scene_open(text, &s));
   PetscCall(SbRemeshSetMesher(s.remesh, fixture_cone, &calls));
   PetscCall(test_scene_solve(&s));

@@ -78,9 +78,8 @@ static PetscErrorCode check_tower(void)
       "b", "box:0.08,0.08,0.08:2") "-bodies a,b -body_a_translate 0,0,0.0021 -body_a_velocity 0,0,-1 "
                                    "-body_b_translate 0.01,0.01,0.1024 -body_b_velocity 0,0,-1 -effects "
                                    "gravity,floor,meet -effect_floor_type contact -effect_floor_response "
-                                   "projected -effect_floor_obstacle "
-                                   "plane:0,0,1,0 -effect_floor_restitution 1 " MEET
-                                   "-ts_dt 0.001 -ts_max_time 0.03",
+                                   "projected -effect_floor_obstacle plane:0,0,1,0 -effect_floor_restitution "
+                                   "1 " MEET "-ts_dt 0.001 -ts_max_time 0.03",
     1.));
   VERIFY_MORE(record_last(&r, "b_vz"), 0.5, "speed of the upper block, m/s");
   check_meeting(&r, record_at(&r, "kinetic", 0), 1e-9, 0);

@@ -69,14 +69,14 @@ static PetscErrorCode compare(const char *name, const char *scene, PetscInt n, c
 
 /* ------------------------------------------------------------------ bodies */
 
-#define STACK                                                                                        \
-  "-bodies a,b -body_a_mesh box:0.2,0.1,0.05:2 -body_b_mesh box:0.08,0.06,0.05:3 -body_b_translate " \
-  "0.06,0.021,0.05 " LAW("a")                                                                        \
-    LAW("b") "-sets bottom,top -set_bottom_at plane:0,0,1,0 -set_top_at "                            \
-             "plane:0,0,1,0.1 -time static -effects hold,push,meet "                                 \
-             "-effect_hold_type fixed -effect_hold_on bottom -effect_push_type "                     \
-             "prescribed_displacement -effect_push_on top -effect_push_displacement "                \
-             "0.0005*t;0.0001*t;-0.002*t -effect_meet_type contact -effect_meet_response projected "
+#define STACK                                                                                          \
+  "-bodies a,b -body_a_mesh box:0.2,0.1,0.05:2 -body_b_mesh box:0.08,0.06,0.05:3 -body_b_translate "   \
+  "0.06,0.021,0.05 " LAW("a")                                                                          \
+    LAW("b") "-sets bottom,top -set_bottom_at plane:0,0,1,0 -set_top_at plane:0,0,1,0.1 -time static " \
+             "-effects hold,push,meet -effect_hold_type fixed -effect_hold_on bottom "                 \
+             "-effect_push_type prescribed_displacement -effect_push_on top "                          \
+             "-effect_push_displacement 0.0005*t;0.0001*t;-0.002*t -effect_meet_type contact "         \
+             "-effect_meet_response projected "
 
 static PetscErrorCode check_stack(PetscInt n)
 {
@@ -110,15 +110,12 @@ static PetscErrorCode check_shear(PetscInt n)
 /* ------------------------------------------------------------------ obstacles */
 
 /* A block on a floor, under another one and beside planes of symmetry: nothing but contact holds it in z. */
-#define PRESSED                                                                               \
-  "-bodies a -body_a_mesh box:0.1,0.1,0.05:3 " LAW(                                           \
-    "a") "-time static -effects x,y,floor,roof "                                              \
-         "-effect_x_type fixed -effect_x_on xmin "                                            \
-         "-effect_x_components x -effect_y_type fixed "                                       \
-         "-effect_y_on ymin -effect_y_components y "                                          \
-         "-effect_floor_type contact -effect_floor_response projected -effect_floor_on zmin " \
-         "-effect_floor_obstacle plane:0,0,1,0.0005 "                                         \
-         "-effect_roof_type contact -effect_roof_response projected -effect_roof_on zmax "    \
+#define PRESSED                                                                                              \
+  "-bodies a -body_a_mesh box:0.1,0.1,0.05:3 " LAW(                                                          \
+    "a") "-time static -effects x,y,floor,roof -effect_x_type fixed -effect_x_on xmin -effect_x_components " \
+         "x -effect_y_type fixed -effect_y_on ymin -effect_y_components y -effect_floor_type contact "       \
+         "-effect_floor_response projected -effect_floor_on zmin -effect_floor_obstacle plane:0,0,1,0.0005 " \
+         "-effect_roof_type contact -effect_roof_response projected -effect_roof_on zmax "                   \
          "-effect_roof_obstacle sphere:0.05,0.04,0.148,0.1 "
 #define BOTH(response) "-effect_floor_response " response " -effect_roof_response " response " "
 
@@ -137,21 +134,18 @@ static PetscErrorCode check_pressed(PetscInt n)
 }
 
 /* A wedge of two planes at a small angle under the same nodes, the same plane twice, and a wall that supported nodes cannot leave. */
-#define CORNER                                                                                   \
-  "-bodies a -body_a_mesh box:0.1,0.1,0.05:3 " LAW(                                              \
-    "a") "-time static -effects x,gravity,top,floor,tilted,"                                     \
-         "again,wall -effect_x_type fixed -effect_x_on xmin "                                    \
-         "-effect_x_components x -effect_gravity_vector "                                        \
-         "0,-20,-9.81 -effect_top_type prescribed_displacement -effect_top_on "                  \
-         "zmax -effect_top_displacement 0;0.0004*t;-0.001*t "                                    \
-         "-effect_floor_type contact -effect_floor_response projected -effect_floor_on zmin "    \
-         "-effect_floor_obstacle plane:0,0,1,0 "                                                 \
-         "-effect_again_type contact -effect_again_response projected -effect_again_on zmin "    \
-         "-effect_again_obstacle plane:0,0,1,0 "                                                 \
-         "-effect_tilted_type contact -effect_tilted_response projected -effect_tilted_on zmin " \
-         "-effect_tilted_obstacle plane:0,0.05,1,0.003 "                                         \
-         "-effect_wall_type contact -effect_wall_response projected -effect_wall_on xmin "       \
-         "-effect_wall_obstacle plane:1,0,0,0 "
+#define CORNER                                                                                            \
+  "-bodies a -body_a_mesh box:0.1,0.1,0.05:3 " LAW(                                                       \
+    "a") "-time static -effects x,gravity,top,floor,tilted,again,wall -effect_x_type fixed -effect_x_on " \
+         "xmin -effect_x_components x -effect_gravity_vector 0,-20,-9.81 "                                \
+         "-effect_top_type prescribed_displacement -effect_top_on zmax "                                  \
+         "-effect_top_displacement 0;0.0004*t;-0.001*t -effect_floor_type contact "                       \
+         "-effect_floor_response projected -effect_floor_on zmin -effect_floor_obstacle plane:0,0,1,0 "   \
+         "-effect_again_type contact -effect_again_response projected -effect_again_on zmin "             \
+         "-effect_again_obstacle plane:0,0,1,0 -effect_tilted_type contact "                              \
+         "-effect_tilted_response projected -effect_tilted_on zmin "                                      \
+         "-effect_tilted_obstacle plane:0,0.05,1,0.003 -effect_wall_type contact "                        \
+         "-effect_wall_response projected -effect_wall_on xmin -effect_wall_obstacle plane:1,0,0,0 "
 #define FOUR(response)                                                   \
   "-effect_floor_response " response " -effect_again_response " response \
   " -effect_tilted_response " response " -effect_wall_response " response " "
@@ -167,11 +161,11 @@ static PetscErrorCode check_corner(void)
 }
 
 /* A ball that is pressed into a clamped block and drawn along, without friction. */
-#define DRIVE                                                                                                \
-  "-bodies a -body_a_mesh box:0.1,0.06,0.04:3 -body_a_material corotated -body_a_young 2e4 -body_a_poisson " \
-  "0.4 -body_a_density 1000 -effects bed,tool -effect_bed_type fixed -effect_bed_on zmin "                   \
-  "-effect_tool_type contact -effect_tool_response projected -effect_tool_on zmax -effect_tool_obstacle "    \
-  "sphere:0.05,0.031,0.07,0.03 "                                                                             \
+#define DRIVE                                                                                              \
+  "-bodies a -body_a_mesh box:0.1,0.06,0.04:3 -body_a_material corotated -body_a_young 2e4 "               \
+  "-body_a_poisson 0.4 -body_a_density 1000 -effects bed,tool -effect_bed_type fixed -effect_bed_on zmin " \
+  "-effect_tool_type contact -effect_tool_response projected -effect_tool_on zmax "                        \
+  "-effect_tool_obstacle sphere:0.05,0.031,0.07,0.03 "                                                     \
   "-effect_tool_displacement 0.01*ramp(t/0.1-1);0;-0.008*ramp(t/0.1) -ts_dt 0.02 -ts_max_time 0.16 "
 
 static PetscErrorCode check_drive(void)

@@ -101,20 +101,19 @@ static PetscErrorCode check_toggle(PetscInt nx, PetscInt ny, PetscReal *error, P
     "-body_a_poisson 0 -body_a_density 1 -sets far,middle -set_far_at plane:1,0,0,0 "
     "-set_middle_at plane:1,0,0,%.17g -effects clamp,symmetry,plane,load -effect_clamp_type fixed "
     "-effect_clamp_on far -effect_symmetry_type fixed -effect_symmetry_on middle "
-    "-effect_symmetry_components x -effect_plane_type fixed -effect_plane_on all "
-    "-effect_plane_components z -effect_load_type traction -effect_load_on middle "
-    "-effect_load_total 0,%.17g,0 -time static -static_control arc_length -static_steps 5 "
-    "-static_longest_step 1",
+    "-effect_symmetry_components x -effect_plane_type fixed -effect_plane_on all -effect_plane_components z "
+    "-effect_load_type traction -effect_load_on middle -effect_load_total 0,%.17g,0 -time static "
+    "-static_control arc_length -static_steps 5 -static_longest_step 1",
     mesh, YOUNG, SPAN, (double)(-0.5 * g.full * SPAN / (double)nx / WIDTH)));
   PetscCall(test_file_remove(mesh));
   PetscCall(SbRunAddMonitor(t.run, watch, &g, NULL));
   PetscCall(verify_solve(&t, "toggle"));
-  PetscCall(PetscPrintf(
-    PETSC_COMM_WORLD,
-    "  %d x %d cells: %d steps, %d rejected, %d Newton iterations; load %.4f lb, then %.4f lb, "
-    "%.1f lb at %.4f in; error %.3f lb\n",
-    (int)nx, (int)ny, (int)t.run->steps_total, (int)t.run->rejected_total, (int)t.run->newton_total,
-    (double)g.top, (double)g.bottom, (double)g.last[1], (double)g.last[0], (double)g.error));
+  PetscCall(PetscPrintf(PETSC_COMM_WORLD,
+                        "  %d x %d cells: %d steps, %d rejected, %d Newton iterations; load %.4f lb, then "
+                        "%.4f lb, %.1f lb at %.4f in; error %.3f lb\n",
+                        (int)nx, (int)ny, (int)t.run->steps_total, (int)t.run->rejected_total,
+                        (int)t.run->newton_total, (double)g.top, (double)g.bottom, (double)g.last[1],
+                        (double)g.last[0], (double)g.error));
   SB_CHECK(g.last[1] == g.full, "the load ended at %g lb", (double)g.last[1]);
   SB_CHECK(g.bottom < g.top - 1., "the load fell from %g to %g lb", (double)g.top, (double)g.bottom);
   SB_CHECK(t.run->bifurcations == 0, "bifurcation");

@@ -72,11 +72,11 @@ static PetscErrorCode check_turned(const char *element, const char *law)
   char text[VERIFY_TEXT];
 
   PetscFunctionBeginUser;
-  PetscCall(PetscSNPrintf(
-    text, sizeof(text),
-    "-bodies a -body_a_mesh box:1,0.8,0.6:3 -body_a_translate -0.3,-0.2,-0.1 -body_a_element %s "
-    "-body_a_material %s -body_a_young %g -body_a_poisson 0.4 -body_a_density 1000",
-    element, law, (double)E));
+  PetscCall(PetscSNPrintf(text, sizeof(text),
+                          "-bodies a -body_a_mesh box:1,0.8,0.6:3 -body_a_translate -0.3,-0.2,-0.1 "
+                          "-body_a_element %s -body_a_material %s -body_a_young %g -body_a_poisson 0.4 "
+                          "-body_a_density 1000",
+                          element, law, (double)E));
   PetscCall(test_scene_open(text, &t));
   PetscCall(VecDuplicate(t.run->U, &F));
   for (int k = 1; k <= 24; k++) {
@@ -157,8 +157,8 @@ static PetscErrorCode check_spin(const char *element, const char *law, PetscReal
   PetscFunctionBeginUser;
   PetscCall(PetscSNPrintf(
     text, sizeof(text),
-    "-bodies a -body_a_mesh box:0.3,0.1,0.1:2 -body_a_translate -0.15,-0.05,-0.05 "
-    "-body_a_element %s -body_a_material %s -body_a_young %g -body_a_poisson 0.3 -body_a_density 1000 "
+    "-bodies a -body_a_mesh box:0.3,0.1,0.1:2 -body_a_translate -0.15,-0.05,-0.05 -body_a_element %s "
+    "-body_a_material %s -body_a_young %g -body_a_poisson 0.3 -body_a_density 1000 "
     "-body_a_angular_velocity 0,0,%.17g -time euler_implicit -ts_dt %.17g -ts_max_time %.17g "
     "-snes_rtol 1e-10",
     element, law, (double)E, (double)w0, (double)h, (double)(h * (PetscReal)steps)));
@@ -167,11 +167,11 @@ static PetscErrorCode check_spin(const char *element, const char *law, PetscReal
   PetscCall(nearest_node(t.model, right, s.right));
   PetscCall(SbRunAddMonitor(t.run, watch_spin, &s, NULL));
   PetscCall(verify_solve(&t, "spin"));
-  PetscCall(PetscPrintf(
-    PETSC_COMM_WORLD,
-    "  spin, implicit Euler, %s %s, E %g, w0 h %g: turns of %d steps within %.1e of the recurrence; end %.5f "
-    "rad/s, law %.5f\n",
-    element, law, (double)E, (double)(w0 * h), (int)steps, (double)s.worst, (double)(s.d / h), (double)wt));
+  PetscCall(PetscPrintf(PETSC_COMM_WORLD,
+                        "  spin, implicit Euler, %s %s, E %g, w0 h %g: turns of %d steps within %.1e of the "
+                        "recurrence; end %.5f rad/s, law %.5f\n",
+                        element, law, (double)E, (double)(w0 * h), (int)steps, (double)s.worst,
+                        (double)(s.d / h), (double)wt));
   SB_CHECK(t.run->steps_total == steps, "%d steps were taken", (int)t.run->steps_total);
   SB_CHECK(s.worst <= tolerance, "%s, %s, E %g: turns are off by %g", element, law, (double)E,
            (double)s.worst);
@@ -194,10 +194,9 @@ static PetscErrorCode check_rod(const char *element, const char *law)
   PetscCall(
     PetscSNPrintf(text, sizeof(text),
                   "-bodies a -body_a_mesh box:1,0.05,0.05:20,2,2 -body_a_translate -0.5,-0.025,-0.025 "
-                  "-body_a_element %s -body_a_material %s -body_a_young %g -body_a_poisson 0 -body_a_density "
-                  "%g -body_a_angular_velocity 0,0,%g "
-                  "-effects damping -effect_damping_beta 0.01 -time newmark -ts_dt 0.002 -ts_max_time 0.4 "
-                  "-snes_rtol 1e-9",
+                  "-body_a_element %s -body_a_material %s -body_a_young %g -body_a_poisson 0 "
+                  "-body_a_density %g -body_a_angular_velocity 0,0,%g -effects damping "
+                  "-effect_damping_beta 0.01 -time newmark -ts_dt 0.002 -ts_max_time 0.4 -snes_rtol 1e-9",
                   element, law, (double)E, (double)rho, (double)w));
   PetscCall(test_scene_open(text, &t));
   PetscCall(nearest_node(t.model, left, left));

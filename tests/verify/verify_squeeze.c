@@ -65,16 +65,13 @@ static PetscErrorCode check_squeeze(const char *element, PetscInt cells, PetscRe
   PetscCall(verify_mesh_write(n, cushion, NULL, path));
   PetscCall(verify_open(
     &t,
-    "-bodies a -body_a_mesh %s -body_a_element %s -body_a_material neohookean "
-    "-body_a_young %g -body_a_poisson %g "
-    "-sets x0,y0 -set_x0_at plane:1,0,0,0 -set_y0_at plane:0,1,0,0 -effects x,y,top,bottom -effect_x_type "
-    "fixed "
-    "-effect_x_on x0 -effect_x_components x -effect_y_type fixed -effect_y_on y0 -effect_y_components y "
-    "-effect_top_type contact -effect_top_response projected -effect_top_obstacle plane:0,0,-1,%g "
-    "-effect_top_displacement 0;0;%g*t "
+    "-bodies a -body_a_mesh %s -body_a_element %s -body_a_material neohookean -body_a_young %g "
+    "-body_a_poisson %g -sets x0,y0 -set_x0_at plane:1,0,0,0 -set_y0_at plane:0,1,0,0 "
+    "-effects x,y,top,bottom -effect_x_type fixed -effect_x_on x0 -effect_x_components x "
+    "-effect_y_type fixed -effect_y_on y0 -effect_y_components y -effect_top_type contact "
+    "-effect_top_response projected -effect_top_obstacle plane:0,0,-1,%g -effect_top_displacement 0;0;%g*t "
     "-effect_bottom_type contact -effect_bottom_response projected -effect_bottom_obstacle plane:0,0,1,%g "
-    "-effect_bottom_displacement 0;0;%g*t "
-    "-time static -static_steps %d -snes_rtol 1e-8 -ksp_rtol 1e-8",
+    "-effect_bottom_displacement 0;0;%g*t -time static -static_steps %d -snes_rtol 1e-8 -ksp_rtol 1e-8",
     path, element, (double)young, (double)poisson, -RADIUS, -0.5 * RADIUS, -RADIUS, 0.5 * RADIUS, STEPS));
   PetscCall(record_solve(&t, &r));
   PetscCall(stress_trace(&t, &trace));

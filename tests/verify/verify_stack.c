@@ -122,9 +122,8 @@ static PetscErrorCode check_stack(const char *sides, PetscReal friction, PetscRe
     verify_open(&t,
                 "%s %s -effect_floor_type contact -effect_floor_response projected -effect_floor_on b0 "
                 "-effect_floor_obstacle plane:0,0,1,0 -effect_floor_friction %g -effect_meet_type contact "
-                "-effect_meet_response projected "
-                "-effect_meet_passes %s -effect_meet_friction %g -time euler_implicit -ts_dt 0.01 "
-                "-ts_max_time %g -snes_rtol 1e-10 -ksp_rtol 1e-9",
+                "-effect_meet_response projected -effect_meet_passes %s -effect_meet_friction %g "
+                "-time euler_implicit -ts_dt 0.01 -ts_max_time %g -snes_rtol 1e-10 -ksp_rtol 1e-9",
                 bodies, friction > 0 ? "-effects gravity,floor,meet" : GUIDED, (double)friction, sides,
                 (double)friction, (double)end));
   PetscCall(SbRunAddMonitor(t.run, keep, &at, NULL));

@@ -43,11 +43,10 @@ static PetscErrorCode solve(const char *what, const PetscInt n[3], VerifyMap map
 
   PetscFunctionBeginUser;
   PetscCall(verify_mesh_write(n, map, NULL, mesh));
-  PetscCall(
-    PetscSNPrintf(text, sizeof(text),
-                  "-bodies a -body_a_mesh %s -time static -effect_plane_type fixed -effect_plane_on all "
-                  "-effect_plane_components z %s",
-                  mesh, options));
+  PetscCall(PetscSNPrintf(text, sizeof(text),
+                          "-bodies a -body_a_mesh %s -time static -effect_plane_type fixed "
+                          "-effect_plane_on all -effect_plane_components z %s",
+                          mesh, options));
   PetscCall(test_scene_open(text, &t));
   PetscCall(test_file_remove(mesh));
   PetscCall(verify_solve(&t, what));
@@ -74,8 +73,7 @@ static PetscErrorCode check_csm(const char *what, PetscReal mu, PetscReal ux, Pe
                     "-body_a_material stvk -body_a_tangent exact -body_a_young %.17g -body_a_poisson 0.4 "
                     "-body_a_density 1000 -sets front,back -set_front_at sphere:0.2,0.2,0,0.05 "
                     "-set_back_at sphere:0.2,0.2,%.17g,0.05 -effects root,plane,gravity "
-                    "-effect_root_type fixed -effect_root_on front,back -effect_gravity_vector 0,-2,0 "
-                    " ",
+                    "-effect_root_type fixed -effect_root_on front,back -effect_gravity_vector 0,-2,0  ",
                     (double)(2.8 * mu), thickness));
     PetscCall(solve(what, n, beam, text, tip, u[k]));
   }

@@ -31,14 +31,13 @@ static PetscErrorCode oscillate(const char *options, PetscInt n, PetscReal h, Pe
   char text[2048];
 
   PetscFunctionBeginUser;
-  PetscCall(PetscSNPrintf(text, sizeof(text),
-                          "-bodies a -body_a_mesh tests/data/one_tet.msh -body_a_material linear "
-                          "-body_a_young %g -body_a_poisson %g -body_a_density %g "
-                          "-body_a_velocity 0,0,%g -sets base -set_base_at plane:0,0,1,0 -effects "
-                          "hold,damping -effect_hold_type fixed -effect_hold_on base "
-                          "-ts_dt %.17g -ts_max_time %.17g -ksp_rtol 1e-14 -solver cg_jacobi %s",
-                          (double)young, (double)nu, (double)rho, (double)v0, (double)h, (double)(h * n),
-                          options));
+  PetscCall(
+    PetscSNPrintf(text, sizeof(text),
+                  "-bodies a -body_a_mesh tests/data/one_tet.msh -body_a_material linear -body_a_young %g "
+                  "-body_a_poisson %g -body_a_density %g -body_a_velocity 0,0,%g -sets base "
+                  "-set_base_at plane:0,0,1,0 -effects hold,damping -effect_hold_type fixed "
+                  "-effect_hold_on base -ts_dt %.17g -ts_max_time %.17g -ksp_rtol 1e-14 -solver cg_jacobi %s",
+                  (double)young, (double)nu, (double)rho, (double)v0, (double)h, (double)(h * n), options));
   PetscCall(test_scene_open(text, &t));
   PetscCall(SbRunSolve(t.run));
   SB_CHECK(!t.run->stop_reason[0] && t.run->steps_total == n, "%s: %s", options, t.run->stop_reason);
@@ -116,12 +115,12 @@ static PetscErrorCode check_free_fall(const char *element, const char *preset, P
   PetscReal value[3];
 
   PetscFunctionBeginUser;
-  PetscCall(
-    PetscSNPrintf(text, sizeof(text),
-                  "-bodies a -body_a_mesh box:0.2,0.1,0.1:2 -body_a_element %s "
-                  "-body_a_material corotated -body_a_young 1e4 -body_a_poisson 0.3 -body_a_density 1000 "
-                  "-effects gravity -time %s -ts_dt 0.01 -ts_max_time 0.5 -snes_rtol 1e-10",
-                  element, preset));
+  PetscCall(PetscSNPrintf(text, sizeof(text),
+                          "-bodies a -body_a_mesh box:0.2,0.1,0.1:2 -body_a_element %s "
+                          "-body_a_material corotated -body_a_young 1e4 -body_a_poisson 0.3 "
+                          "-body_a_density 1000 -effects gravity -time %s -ts_dt 0.01 -ts_max_time 0.5 "
+                          "-snes_rtol 1e-10",
+                          element, preset));
   PetscCall(test_scene_open(text, &t));
   PetscCall(SbRunSolve(t.run));
   SB_CHECK(t.run->steps_total == 50, "%s: %" PetscInt_FMT " steps instead of 50", preset, t.run->steps_total);

@@ -26,12 +26,11 @@ typedef struct {
 #define WALL                                                                             \
   "wall -effect_wall_type contact -effect_wall_response projected -effect_wall_on xmin " \
   "-effect_wall_obstacle plane:1,0,0,0 "
-#define MEET                                                                                     \
-  "hold,meet -effect_meet_type contact -effect_meet_response projected -effect_meet_passes one " \
-  "-body_b_mesh box:0.05,0.15,0.15:1 "                                                           \
-  "-body_b_translate -0.05,-0.04,-0.06 "                                                         \
-  "-body_b_material linear -body_b_young 1e9 -body_b_poisson 0 -body_b_density 1000 -sets far "  \
-  "-set_far_at plane:1,0,0,-0.05 -effect_hold_type fixed -effect_hold_on far "
+#define MEET                                                                                          \
+  "hold,meet -effect_meet_type contact -effect_meet_response projected -effect_meet_passes one "      \
+  "-body_b_mesh box:0.05,0.15,0.15:1 -body_b_translate -0.05,-0.04,-0.06 -body_b_material linear "    \
+  "-body_b_young 1e9 -body_b_poisson 0 -body_b_density 1000 -sets far -set_far_at plane:1,0,0,-0.05 " \
+  "-effect_hold_type fixed -effect_hold_on far "
 
 /* A bar that is `phase` steps before the wall at the start. */
 static PetscErrorCode fly(const char *effects, const char *more, PetscReal phase, PetscReal dt, PetscReal end,
@@ -82,12 +81,11 @@ static PetscErrorCode measure(const char *effects, const char *more, PetscReal d
     e->off += b.off;
     SB_CHECK(b.gain < 1e-12, "%s: a step gains %g J", more, (double)b.gain);
   }
-  PetscCall(
-    PetscPrintf(PETSC_COMM_WORLD,
-                "  %-50s dt %5.2g s: first touch off by %.3f steps, duration by %.2f ms, speed after by "
-                "%.4f; %d solves, %d steps\n",
-                more, (double)dt, (double)(e->first / dt), (double)(1e3 * e->duration), (double)e->velocity,
-                (int)e->solves, (int)e->steps));
+  PetscCall(PetscPrintf(PETSC_COMM_WORLD,
+                        "  %-50s dt %5.2g s: first touch off by %.3f steps, duration by %.2f ms, speed after "
+                        "by %.4f; %d solves, %d steps\n",
+                        more, (double)dt, (double)(e->first / dt), (double)(1e3 * e->duration),
+                        (double)e->velocity, (int)e->solves, (int)e->steps));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

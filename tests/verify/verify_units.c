@@ -46,20 +46,20 @@ static PetscErrorCode scenario(const char *element, const char *law, const char 
   verify_apply(R, (const PetscReal[3]){0.5, 0.2, 0.}, v);
   verify_apply(R, (const PetscReal[3]){1., 2., 4.}, spin);
   text[0] = 0;
-  PetscCall(add(text,
-                "-bodies bar%s -body_bar_mesh box:%.17g,%.17g,%.17g:2 -body_bar_element %s "
-                "-body_bar_material %s -body_bar_young %.17g "
-                "-body_bar_poisson 0.4 -body_bar_density %.17g -body_bar_rotate 1,2,3,%.17g",
-                strstr(time, "static") ? "" : ",block", 0.4 * m, 0.1 * m, 0.1 * m, element, law, E * pa,
-                1e3 * rho, q->angle * 180. / PETSC_PI));
+  PetscCall(
+    add(text,
+        "-bodies bar%s -body_bar_mesh box:%.17g,%.17g,%.17g:2 -body_bar_element %s -body_bar_material %s "
+        "-body_bar_young %.17g -body_bar_poisson 0.4 -body_bar_density %.17g -body_bar_rotate 1,2,3,%.17g",
+        strstr(time, "static") ? "" : ",block", 0.4 * m, 0.1 * m, 0.1 * m, element, law, E * pa, 1e3 * rho,
+        q->angle * 180. / PETSC_PI));
   if (!strstr(time, "static")) {
     PetscReal at[3];
 
     verify_apply(R, (const PetscReal[3]){0., 0.3, 0.1}, at);
     PetscCall(add(text,
                   " -body_block_mesh box:%.17g,%.17g,%.17g:1 -body_block_element %s -body_block_material %s "
-                  "-body_block_young %.17g "
-                  "-body_block_poisson 0.3 -body_block_density %.17g -body_block_rotate 1,2,3,%.17g",
+                  "-body_block_young %.17g -body_block_poisson 0.3 -body_block_density %.17g "
+                  "-body_block_rotate 1,2,3,%.17g",
                   0.2 * m, 0.1 * m, 0.1 * m, element, law, 2e5 * pa, 5e2 * rho, q->angle * 180. / PETSC_PI));
     PetscCall(add(text,
                   " -body_block_translate %.17g,%.17g,%.17g -body_block_velocity %.17g,%.17g,%.17g "
@@ -70,14 +70,13 @@ static PetscErrorCode scenario(const char *element, const char *law, const char 
                   1e-3 * s, seconds * s));
     if (strstr(time, "euler_symplectic") == NULL) PetscCall(add(text, " -ts_dt %.17g", 0.01 * s));
   }
-  PetscCall(
-    add(text,
-        " -effects clamp,gravity,pull,air%s -effect_clamp_type fixed -effect_clamp_on bar.xmin "
-        "-effect_gravity_vector %.17g,%.17g,%.17g -effect_pull_type traction -effect_pull_on bar.xmax "
-        "-effect_pull_vector %.17g;%.17g;%.17g -effect_air_type pressure -effect_air_on bar.zmax "
-        "-effect_air_value %.17g %s",
-        strstr(time, "static") ? "" : ",damping", g[0] * m / (s * s), g[1] * m / (s * s), g[2] * m / (s * s),
-        pull[0] * pa, pull[1] * pa, pull[2] * pa, 100. * pa, time));
+  PetscCall(add(text,
+                " -effects clamp,gravity,pull,air%s -effect_clamp_type fixed -effect_clamp_on bar.xmin "
+                "-effect_gravity_vector %.17g,%.17g,%.17g -effect_pull_type traction "
+                "-effect_pull_on bar.xmax -effect_pull_vector %.17g;%.17g;%.17g -effect_air_type pressure "
+                "-effect_air_on bar.zmax -effect_air_value %.17g %s",
+                strstr(time, "static") ? "" : ",damping", g[0] * m / (s * s), g[1] * m / (s * s),
+                g[2] * m / (s * s), pull[0] * pa, pull[1] * pa, pull[2] * pa, 100. * pa, time));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
