@@ -7,14 +7,15 @@
 /* A row of the solver table: a matrix type and PETSc options that are set where the user is silent. */
 typedef struct _SbSolverPreset {
   const char *name;
-  SbMatrixKind matrix;   /* on several ranks SBAIJ becomes BAIJ */
-  PetscBool matrix_free; /* a matrix-free operator instead of the matrix */
-  const char *options;   /* "-ksp_type cg -pc_type gamg ..." */
-  const char *package;   /* of PETSc's that the row needs; NULL: none */
+  SbMatrixKind matrix;                             /* on several ranks SBAIJ becomes BAIJ */
+  const char *options;                             /* "-ksp_type cg -pc_type gamg ..." */
+  const char *package;                             /* of PETSc's that the row needs; NULL: none */
+  PetscBool direct;                                /* a factorisation by that package */
+  PetscBool matrix_free;                           /* a matrix-free operator instead of the matrix */
+  PetscErrorCode (*create)(SbSpace space, Mat *K); /* an operator of our own; NULL: the matrix */
   PetscErrorCode (*precondition)(SbSpace space,
                                  PC pc); /* a preconditioner of our own; NULL: by the options */
   const char *help;
-  PetscErrorCode (*create)(SbSpace space, Mat *K); /* an operator of our own; NULL: the matrix */
 } SbSolverPreset;
 
 PetscErrorCode SbSolverRegister(void);

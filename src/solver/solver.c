@@ -41,81 +41,60 @@ static PetscErrorCode create_frames(SbSpace s, Mat *A)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode factor_cholmod(SbSpace s, PC pc)
-{
-  (void)s;
-  return SbPCDirectSet(pc, MATSOLVERCHOLMOD, PETSC_TRUE);
-}
-
-static PetscErrorCode factor_umfpack(SbSpace s, PC pc)
-{
-  (void)s;
-  return SbPCDirectSet(pc, MATSOLVERUMFPACK, PETSC_TRUE);
-}
-
-static PetscErrorCode factor_mumps(SbSpace s, PC pc)
-{
-  (void)s;
-  return SbPCDirectSet(pc, MATSOLVERMUMPS, PETSC_TRUE);
-}
-
 static const SbSolverPreset presets[] = {
-  {"cg", SB_MATRIX_BAIJ, PETSC_FALSE, "-ksp_type cg -pc_type none", NULL, NULL,
-   "conjugate gradients without preconditioner", NULL},
-  {"cg_jacobi", SB_MATRIX_BAIJ, PETSC_FALSE, "-ksp_type cg -pc_type jacobi", NULL, NULL,
-   "CG, diagonal preconditioner", NULL},
-  {"cg_pbjacobi", SB_MATRIX_BAIJ, PETSC_FALSE, "-ksp_type cg -pc_type pbjacobi", NULL, NULL,
-   "CG, 3x3 diagonal blocks", NULL},
-  {"cg_icc", SB_MATRIX_SBAIJ, PETSC_FALSE,
-   "-ksp_type cg -pc_type bjacobi -sub_pc_type icc -sub_pc_factor_shift_type positive_definite", NULL, NULL,
-   "CG, incomplete Cholesky on each rank", NULL},
-  {"cg_ssor", SB_MATRIX_AIJ, PETSC_FALSE, "-ksp_type cg -pc_type sor -pc_sor_local_symmetric", NULL, NULL,
-   "CG, symmetric Gauss-Seidel on each rank", NULL},
-  {"cg_two_level", SB_MATRIX_SBAIJ, PETSC_FALSE, "-ksp_type cg", NULL, SbPCCoarseCreate,
-   "CG, incomplete Cholesky on each rank and the rigid-body modes of some hundred aggregates of nodes", NULL},
-  {"cg_gamg", SB_MATRIX_AIJ, PETSC_FALSE, "-ksp_type cg -pc_type gamg", NULL, NULL,
-   "CG, algebraic multigrid with the rigid-body modes of each body", NULL},
-  {"cg_hypre", SB_MATRIX_AIJ, PETSC_FALSE,
-   "-ksp_type cg -pc_type hypre -pc_hypre_type boomeramg -pc_hypre_boomeramg_strong_threshold 0.5", "hypre",
-   NULL, "CG, BoomerAMG of hypre", NULL},
-  {"gauss_seidel", SB_MATRIX_AIJ, PETSC_FALSE,
+  {"cg", SB_MATRIX_BAIJ, "-ksp_type cg -pc_type none", .help = "conjugate gradients without preconditioner"},
+  {"cg_jacobi", SB_MATRIX_BAIJ, "-ksp_type cg -pc_type jacobi", .help = "CG, diagonal preconditioner"},
+  {"cg_pbjacobi", SB_MATRIX_BAIJ, "-ksp_type cg -pc_type pbjacobi", .help = "CG, 3x3 diagonal blocks"},
+  {"cg_icc", SB_MATRIX_SBAIJ,
+   "-ksp_type cg -pc_type bjacobi -sub_pc_type icc -sub_pc_factor_shift_type positive_definite",
+   .help = "CG, incomplete Cholesky on each rank"},
+  {"cg_ssor", SB_MATRIX_AIJ, "-ksp_type cg -pc_type sor -pc_sor_local_symmetric",
+   .help = "CG, symmetric Gauss-Seidel on each rank"},
+  {"cg_two_level", SB_MATRIX_SBAIJ, "-ksp_type cg", .precondition = SbPCCoarseCreate,
+   .help =
+     "CG, incomplete Cholesky on each rank and the rigid-body modes of some hundred aggregates of nodes"},
+  {"cg_gamg", SB_MATRIX_AIJ, "-ksp_type cg -pc_type gamg",
+   .help = "CG, algebraic multigrid with the rigid-body modes of each body"},
+  {"cg_hypre", SB_MATRIX_AIJ,
+   "-ksp_type cg -pc_type hypre -pc_hypre_type boomeramg -pc_hypre_boomeramg_strong_threshold 0.5",
+   .package = "hypre", .help = "CG, BoomerAMG of hypre"},
+  {"gauss_seidel", SB_MATRIX_AIJ,
    "-ksp_type richardson -pc_type composite -pc_composite_pcs sor -sub_0_pc_sor_omega 1 -ksp_max_it 100000",
-   NULL, NULL, "Gauss-Seidel iteration (between ranks: block Jacobi)", NULL},
-  {"sor", SB_MATRIX_AIJ, PETSC_FALSE,
+   .help = "Gauss-Seidel iteration (between ranks: block Jacobi)"},
+  {"sor", SB_MATRIX_AIJ,
    "-ksp_type richardson -pc_type composite -pc_composite_pcs sor -sub_0_pc_sor_omega 1.6 -ksp_max_it 100000",
-   NULL, NULL, "successive over-relaxation, omega 1.6 (between ranks: block Jacobi)", NULL},
-  {"cholmod", SB_MATRIX_AIJ, PETSC_FALSE, "-ksp_type cg", "cholmod", factor_cholmod,
-   "sparse Cholesky of SuiteSparse, on one of the ranks", NULL},
-  {"umfpack", SB_MATRIX_AIJ, PETSC_FALSE, "-ksp_type fgmres", "umfpack", factor_umfpack,
-   "sparse LU of SuiteSparse, on one of the ranks: takes indefinite tangents", NULL},
-  {"mumps", SB_MATRIX_AIJ, PETSC_FALSE, "-ksp_type fgmres", "mumps", factor_mumps,
-   "sparse factorisation of MUMPS on all ranks: takes indefinite tangents", NULL},
-  {"rotated", SB_MATRIX_BAIJ, PETSC_FALSE, "-ksp_type cg", NULL, SbPCRotatedCreate,
-   "CG, one factorisation that turns with the nodes and is seldom renewed: dynamic runs of up to about 100k "
-   "tets",
-   NULL},
-  {"realtime", SB_MATRIX_BAIJ, PETSC_TRUE, "-ksp_type cg -ksp_initial_guess_nonzero", NULL, SbPCRotatedCreate,
-   "the same without a matrix, warm-started: linear, or corotated with -body_<name>_tangent warped; fastest "
-   "with -snes_type ksponly and -ksp_rtol 1e-4",
-   create_frames},
-  {"pressure", SB_MATRIX_BAIJ, PETSC_FALSE, "-ksp_type richardson -ksp_max_it 300", NULL, SbPCPressureCreate,
-   "GMRES with the pressures of the cells as unknowns and multigrid on P1: CR and DG bodies at any Poisson's "
-   "ratio",
-   SbPressureOperatorCreate},
+   .help = "successive over-relaxation, omega 1.6 (between ranks: block Jacobi)"},
+  {"cholmod", SB_MATRIX_AIJ, "-ksp_type cg", .package = MATSOLVERCHOLMOD, .direct = PETSC_TRUE,
+   .help = "sparse Cholesky of SuiteSparse, on one of the ranks"},
+  {"umfpack", SB_MATRIX_AIJ, "-ksp_type fgmres", .package = MATSOLVERUMFPACK, .direct = PETSC_TRUE,
+   .help = "sparse LU of SuiteSparse, on one of the ranks: takes indefinite tangents"},
+  {"mumps", SB_MATRIX_AIJ, "-ksp_type fgmres", .package = MATSOLVERMUMPS, .direct = PETSC_TRUE,
+   .help = "sparse factorisation of MUMPS on all ranks: takes indefinite tangents"},
+  {"rotated", SB_MATRIX_BAIJ, "-ksp_type cg", .precondition = SbPCRotatedCreate,
+   .help = "CG, one factorisation that turns with the nodes and is seldom renewed: dynamic runs of up to "
+           "about 100k tets"},
+  {"realtime", SB_MATRIX_BAIJ, "-ksp_type cg -ksp_initial_guess_nonzero", .matrix_free = PETSC_TRUE,
+   .create = create_frames, .precondition = SbPCRotatedCreate,
+   .help = "the same without a matrix, warm-started: linear, or corotated with -body_<name>_tangent warped; "
+           "fastest with -snes_type ksponly and -ksp_rtol 1e-4"},
+  {"pressure", SB_MATRIX_BAIJ, "-ksp_type richardson -ksp_max_it 300", .create = SbPressureOperatorCreate,
+   .precondition = SbPCPressureCreate,
+   .help = "GMRES with the pressures of the cells as unknowns and multigrid on P1: CR and DG bodies at any "
+           "Poisson's ratio"},
 };
 
 /* Preconditioners that the user names by -pc_type: what they work on, and what goes with them. The last row: all others. */
 static const SbSolverPreset by_type[] = {
-  {PCNONE, SB_MATRIX_BAIJ, PETSC_FALSE, "-ksp_type cg -pc_type none", NULL, NULL, NULL, NULL},
-  {PCJACOBI, SB_MATRIX_BAIJ, PETSC_FALSE, "-ksp_type cg -pc_type jacobi", NULL, NULL, NULL, NULL},
-  {PCPBJACOBI, SB_MATRIX_BAIJ, PETSC_FALSE, "-ksp_type cg -pc_type pbjacobi", NULL, NULL, NULL, NULL},
-  {PCICC, SB_MATRIX_SBAIJ, PETSC_FALSE, "-ksp_type cg -pc_type icc", NULL, NULL, NULL, NULL},
-  {PCBJACOBI, SB_MATRIX_AIJ, PETSC_FALSE,
-   "-ksp_type cg -pc_type bjacobi -sub_pc_factor_shift_type positive_definite", NULL, NULL, NULL, NULL},
-  {PCSOR, SB_MATRIX_AIJ, PETSC_FALSE, "-ksp_type cg -pc_type sor -pc_sor_local_symmetric", NULL, NULL, NULL,
-   NULL},
-  {PCHYPRE, SB_MATRIX_AIJ, PETSC_FALSE, "-ksp_type cg -pc_type hypre", "hypre", NULL, NULL, NULL},
-  {"", SB_MATRIX_AIJ, PETSC_FALSE, "-ksp_type cg", NULL, NULL, NULL, NULL},
+  {.name = PCNONE, .matrix = SB_MATRIX_BAIJ, .options = "-ksp_type cg -pc_type none"},
+  {.name = PCJACOBI, .matrix = SB_MATRIX_BAIJ, .options = "-ksp_type cg -pc_type jacobi"},
+  {.name = PCPBJACOBI, .matrix = SB_MATRIX_BAIJ, .options = "-ksp_type cg -pc_type pbjacobi"},
+  {.name = PCICC, .matrix = SB_MATRIX_SBAIJ, .options = "-ksp_type cg -pc_type icc"},
+  {.name = PCBJACOBI,
+   .matrix = SB_MATRIX_AIJ,
+   .options = "-ksp_type cg -pc_type bjacobi -sub_pc_factor_shift_type positive_definite"},
+  {.name = PCSOR, .matrix = SB_MATRIX_AIJ, .options = "-ksp_type cg -pc_type sor -pc_sor_local_symmetric"},
+  {.name = PCHYPRE, .matrix = SB_MATRIX_AIJ, .options = "-ksp_type cg -pc_type hypre", .package = "hypre"},
+  {.name = "", .matrix = SB_MATRIX_AIJ, .options = "-ksp_type cg"},
 };
 
 static const SbOption rows[] = {
@@ -185,12 +164,6 @@ static PetscErrorCode preset_value(const SbSolverPreset *preset, const char *nam
     PetscCall(PetscStrncpy(value, at, PetscMin(size, strcspn(at, " ") + 1)));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscBool is_direct(const SbSolverPreset *preset)
-{
-  return (PetscBool)(preset->precondition == factor_cholmod || preset->precondition == factor_umfpack ||
-                     preset->precondition == factor_mumps);
 }
 
 /* What of the bodies makes systems hard. */
@@ -411,7 +384,7 @@ PetscErrorCode SbSolverNextFallback(SbSpace s, KSPConvergedReason reason, PetscB
     /* multigrid on displacements of nodes at faces takes thousands of iterations near 1/2 */
     if (!strcmp(others[k].name, "cg_gamg") && hard.face_nu > NU_PRESSURE) continue;
     /* what a factorisation finds singular no iteration solves */
-    if (is_direct(failed) && !memory && !direct) continue;
+    if (failed->direct && !memory && !direct) continue;
     PetscCall(find_other(s, others[k].name, indefinite, *tried, preset));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -540,6 +513,7 @@ PetscErrorCode SbSolverSetUp(SNES snes, SbSpace s, const SbSolverPreset *preset)
   if (type[0]) PetscCall(PCSetType(pc, type));
   PetscCall(insert_options(preset->options));
   if (!strcmp(type, PCLU) || !strcmp(type, PCCHOLESKY)) PetscCall(choose_package(s, pc, type));
+  if (preset->direct) PetscCall(SbPCDirectSet(pc, preset->package, PETSC_TRUE));
   if (preset->precondition) PetscCall(preset->precondition(s, pc));
   PetscCall(SbKSPPreferTrueResidual(ksp));
   PetscFunctionReturn(PETSC_SUCCESS);
