@@ -17,8 +17,8 @@
 */
 #include "barrier_impl.h"
 
-#define WIDTH \
-  1.7e-3 /* of the edge of a cube of the smallest body's volume: default of w; thin bodies get less than long ones */
+#define WIDTH 1e-3       /* of the size of the smallest body: default of w */
+#define WIDTH_CUBE 3e-3  /* at most so much of the edge of a cube of its volume, as thin bodies are long */
 #define PRESSURE 0.1     /* of Young's modulus of the softer side */
 #define SLIP 1e-3        /* of the size of the smallest body per second: speed below which friction sticks */
 #define SLIP_STATIC 1e-5 /* of the size: the same in a static run, as a length */
@@ -103,7 +103,9 @@ static PetscErrorCode setup_barrier(SbEffect e, SbSpace s)
   PetscCall(PetscMalloc2(nbody + 1, &b->w, nbody + 1, &b->k));
   b->w[nbody] = b->k[nbody] = PETSC_MAX_REAL;
   for (PetscInt i = 0; i < nbody; i++) {
-    b->w[i] = b->width > 0. ? b->width : PetscMin(WIDTH * cube, 0.5 * b->mesh->shortest);
+    b->w[i] = b->width > 0.
+                ? b->width
+                : PetscMin(PetscMin(WIDTH * b->mesh->size, WIDTH_CUBE * cube), 0.5 * b->mesh->shortest);
     b->k[i] = b->pressure > 0. ? b->pressure : PRESSURE * s->material[i]->E;
   }
   PetscCheck(b->w[0] <= b->mesh->shortest, s->comm, PETSC_ERR_USER_INPUT,

@@ -34,9 +34,9 @@ static const SbOption rows[] = {
    "penalty: springs; barrier: an "
    "energy that never lets surfaces touch"},
   {"barrier_width", SB_OPTION_REAL, 1, "m", "0", "[0, inf)",
-   "response barrier: gap below which surfaces push each other; 0: 0.0017 of the edge of a cube with the "
-   "volume of the smallest body, at "
-   "most half of its shortest edge"},
+   "response barrier: gap below which surfaces push each other; 0: a thousandth of the diagonal of the "
+   "smallest body, at most 0.003 of the "
+   "edge of a cube of its volume and half of its shortest edge"},
   {"barrier_pressure", SB_OPTION_REAL, 1, "Pa", "0", "[0, inf)",
    "response barrier: scale of the pressure; 0: a tenth of Young's modulus of the softer side"},
   {"verify", SB_OPTION_BOOL, 1, "", "no", "",

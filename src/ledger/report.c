@@ -127,8 +127,7 @@ static void say_largest(SbLedger l, const SbLedgerSeconds *s, Words *w)
     "the time step is the largest source of error: half of it takes steps of %.3g s",
     "Newton's method stops too early: half of its error takes a smaller -snes_rtol",
     "the linear solver is the largest source of error: half of it takes a smaller -ksp_rtol",
-    "contact is the largest source of error: a smaller -effect_..._barrier_width halves the gaps, "
-    "-effect_..._response projected closes them",
+    "contact is the largest source of error: a smaller -effect_..._barrier_width, or response projected",
     "rounding is the largest source of error: only other units or a smaller range of stiffnesses helps"};
   const int most = largest(l);
   const SbRun run = l->run;
