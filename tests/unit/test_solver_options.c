@@ -51,8 +51,6 @@ static const Case cases[] = {
   {"static rows", PAIR PRESS, ROWS, PETSC_FALSE},
   {"dynamic rows", PAIR DRAG, ROWS, PETSC_TRUE},
   {"rows that slide", PAIR DRAG "-effect_meet_friction 0.1 ", ROWS, PETSC_FALSE},
-  {"multipliers, iterative", PAIR PRESS "-effect_meet_response multiplier -saddle_solver iterative ", ROWS,
-   PETSC_FALSE},
   {"multipliers, direct", PAIR PRESS "-effect_meet_response multiplier -saddle_solver direct ", FACTORED,
    PETSC_FALSE},
 };

@@ -86,24 +86,22 @@ static PetscErrorCode check_stack(PetscInt n)
     "-effect_meet_response multiplier -saddle_solver direct -solver direct",
     "-effect_meet_response multiplier -saddle_solver iterative -solver cg_icc",
     "-effect_meet_response multiplier -saddle_solver iterative -solver cg_gamg",
-    "-effect_meet_response multiplier -saddle_solver iterative -solver direct",
-    "-effect_meet_response multiplier -saddle_solver direct -solver cg_pbjacobi"};
+    "-effect_meet_response multiplier -saddle_solver iterative -solver direct"};
 
   PetscFunctionBeginUser;
   PetscCall(compare("stack", STACK EXACT, n, more, SETTLED));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode check_shear(PetscInt n)
+static PetscErrorCode check_shear(void)
 {
   static const char *const more[] = {"-effect_meet_response projected",
-                                     "-effect_meet_response multiplier -saddle_solver direct",
-                                     "-effect_meet_response multiplier -saddle_solver iterative"};
+                                     "-effect_meet_response multiplier -saddle_solver direct"};
 
   PetscFunctionBeginUser;
   PetscCall(compare("shear",
                     STACK EXACT "-effect_meet_friction 0.3 -effect_meet_passes one -effect_meet_stiffness 2",
-                    n, more, SETTLED));
+                    2, more, SETTLED));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -208,7 +206,7 @@ int main(int argc, char **argv)
   PetscCall(check_stack(size > 1 ? 3 : 6));
   PetscCall(check_pressed(size > 1 ? 4 : 6));
   PetscCall(check_corner());
-  PetscCall(check_shear(size > 1 ? 2 : 3));
+  PetscCall(check_shear());
   PetscCall(check_limit());
   if (size == 1) PetscCall(check_drive());
   SB_TEST_END();
