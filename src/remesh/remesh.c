@@ -243,9 +243,9 @@ static PetscErrorCode check_after_failure(SbRemesh r, SbRun run, PetscBool *agai
   if (!r->failed || !run->stop_reason[0] || run->step_now <= r->tried) PetscFunctionReturn(PETSC_SUCCESS);
   r->tried = run->step_now;
   if (!run->step_now) {
-    PetscCall(
-      SbWarning(run->model->comm, "-remesh_failed: the first step failed, with the bodies as they were "
-                                  "given: none is re-meshed, their meshes, loads or steps must change"));
+    PetscCall(SbWarning(run->model->comm,
+                        "-remesh_failed: the first step failed, with the bodies as they were "
+                        "given: none is re-meshed, their meshes, loads or steps must change"));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   PetscCall(SbBodyQualities(run->model, run->U, r->named, r->worst));

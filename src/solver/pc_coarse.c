@@ -323,7 +323,7 @@ PetscErrorCode SbPCCoarseCreate(SbSpace s, PC pc)
              p->wanted);
   PetscCheck(p->limit >= -1, s->comm, PETSC_ERR_USER,
              "-pc_coarse_gathered %" PetscInt_FMT " is below -1: give the largest number of aggregates that "
-                                                  "one rank factors, 0 for none, or -1 to choose by size",
+             "one rank factors, 0 for none, or -1 to choose by size",
              p->limit);
   PetscCall(PCSetType(pc, PCSHELL));
   PetscCall(PCShellSetContext(pc, p));

@@ -245,7 +245,7 @@ static PetscErrorCode complete(void *ctx, SNESConvergedReason reason, SbSolvedSt
   if (!*ok && is_explicit(so))
     PetscCall(SbRunFail(so->run,
                         "step %" PetscInt_FMT " at t = %g s: the explicit solution is not finite; its step "
-                                              "of %g s is beyond the stable one (see the header)",
+                        "of %g s is beyond the stable one (see the header)",
                         ts->steps + 1, (double)ts->ptime, (double)ts->time_step));
   else if (!*ok && reason != SNES_CONVERGED_ITERATING) {
     char why[512] = "";

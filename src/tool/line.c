@@ -59,9 +59,9 @@ PetscErrorCode SbToolHelp(void)
                         "supple-mesh %s - examines, converts and repairs meshes for supple\n\n", SB_VERSION));
   for (const SbToolCommand *c = SbToolCommands; c->name; c++)
     PetscCall(PetscPrintf(PETSC_COMM_WORLD, "  supple-mesh %-8s%-12s %s\n", c->name, c->files, c->help));
-  PetscCall(
-    PetscPrintf(PETSC_COMM_WORLD, "\nFILE: whatever -body_<name>_mesh takes, also box:lx,ly,lz:n. OUT: .msh "
-                                  "(gmsh), or .h5 (supple's own, with an .xmf for ParaView).\n\nOptions\n"));
+  PetscCall(PetscPrintf(PETSC_COMM_WORLD,
+                        "\nFILE: whatever -body_<name>_mesh takes, also box:lx,ly,lz:n. OUT: .msh "
+                        "(gmsh), or .h5 (supple's own, with an .xmf for ParaView).\n\nOptions\n"));
   for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(rows); i++) {
     const SbOption *r = &rows[i];
 
