@@ -147,7 +147,7 @@ PetscErrorCode SbEffectLoad_Collision(SbEffect e, SbSpace space, PetscReal t, co
     else
       c->past[c->npast++] = read_record(r, of->first + of->at[place]);
   }
-  qsort(c->past, (size_t)c->npast, sizeof(Hit), by_pair);
+  if (c->npast) qsort(c->past, (size_t)c->npast, sizeof(Hit), by_pair);
   for (int k = 0; k < 2; k++) PetscCall(PetscFree2(names[k].id, names[k].at));
   PetscCall(PetscArraycpy(c->u0, u, 3 * space->nnode));
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, sums, 2, MPIU_REAL, MPI_MAX, space->comm));

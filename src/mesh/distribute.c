@@ -274,7 +274,7 @@ static PetscErrorCode choose_owners(const SbLocalMesh *local, Border *border, Pe
 
   PetscFunctionBeginUser;
   for (PetscInt v = 0; v < local->nvert_cells; v++) owner[v] = me;
-  qsort(border->vert, (size_t)border->n, sizeof(Shared), compare_shared);
+  if (border->n) qsort(border->vert, (size_t)border->n, sizeof(Shared), compare_shared);
   for (PetscInt i = 0; i < border->n; i += n) {
     Shared *s = border->vert + i;
     PetscReal low[3], high[3];

@@ -260,6 +260,7 @@ PetscErrorCode SbSetsMark(const SbImport *im, const SbFaces *faces, PetscInt nbo
 
 void SbSetsCount(PetscInt nvert, PetscInt ncell, const SbMasks *m, PetscInt nset, PetscInt count[][3])
 {
+  if (!nset) return;
   for (PetscInt v = 0; v < nvert; v++) count_bits(m->vert[v], nset, &count[0][0]);
   for (PetscInt c = 0; c < ncell; c++) count_bits(m->cell[c], nset, &count[0][2]);
   for (PetscInt s = 0; s < 4 * ncell; s++) {

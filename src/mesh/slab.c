@@ -184,7 +184,7 @@ static PetscErrorCode match_faces(const Slab *s, const SbRoute *route, Face face
     face[i].at = i;
     across[i] = (Across){-1, -1, 0};
   }
-  qsort(face, (size_t)route->nrecv, sizeof(*face), compare_faces);
+  if (route->nrecv) qsort(face, (size_t)route->nrecv, sizeof(*face), compare_faces);
   for (PetscInt i = 0; i < route->nrecv; i += m) {
     const Face *f = face + i;
 
@@ -309,7 +309,7 @@ static PetscErrorCode count_pinched(Slab *s)
   PetscCall(SbRouteCreate(s->comm, n, dest, &route));
   PetscCall(SbRouteSend(&route, 2 * sizeof(PetscInt), edge, &got));
   PetscCall(PetscFree2(edge, dest));
-  qsort(got, (size_t)route.nrecv, 2 * sizeof(PetscInt), compare_pairs);
+  if (route.nrecv) qsort(got, (size_t)route.nrecv, 2 * sizeof(PetscInt), compare_pairs);
   for (PetscInt i = 0; i < route.nrecv; i += m) {
     for (m = 1; i + m < route.nrecv && !compare_pairs(got + 2 * i, got + 2 * (i + m));) m++;
     s->im->npinched += m > 2;
@@ -374,7 +374,7 @@ static PetscErrorCode count_parts(const Slab *s, PetscInt *npart)
     *other = got[i];
   }
   PetscCall(PetscFree(got));
-  qsort(pair, (size_t)npair, 2 * sizeof(PetscInt), compare_pairs);
+  if (npair) qsort(pair, (size_t)npair, 2 * sizeof(PetscInt), compare_pairs);
   for (PetscInt i = 0; i < npair; i++) {
     if (kept && !compare_pairs(pair + 2 * i, pair + 2 * (kept - 1))) continue;
     PetscCall(PetscArraymove(pair + 2 * kept, pair + 2 * i, 2));

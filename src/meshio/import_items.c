@@ -278,7 +278,7 @@ PetscErrorCode SbImportJoinGroups(SbImport *im)
 
   PetscFunctionBeginUser;
   if (!im->nmember.n) PetscFunctionReturn(PETSC_SUCCESS);
-  qsort(im->member, (size_t)im->nmember.n, sizeof(*m), compare_members);
+  if (im->nmember.n) qsort(im->member, (size_t)im->nmember.n, sizeof(*m), compare_members);
   PetscCall(SbImportScratch(im, (size_t)(im->nmember.n + im->ngroup) * sizeof(*group), &group));
   end = im->member + im->nmember.n;
   for (m = im->member; m < end;) {

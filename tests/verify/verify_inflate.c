@@ -14,7 +14,12 @@
 
   mu/2 at rest, and up to a third stiffer when stretched. Both are computed: the quadrature is checked with the classical energy.
 
-    pressure   of the closed form at the stretch that the run has reached, against the one applied; on two meshes and in the limit
+    pressure   of the closed form at the stretch that the run has reached, against the one applied: within 1 % on one mesh of 1,920 tets, and
+               nearing it with the mesh
+
+  A facet of CR is as large as the middle of its tet says, h/4 behind the wall, where the hoop stretch is less than at the wall: the force of a pressure
+  that follows is too small by some h/2 dln(l)/dR, 4 % of it for h = A/11 and l = 1.5. Layers are therefore thinner towards the inner wall, by GROWTH
+  each on the fine mesh; the coarse one has half as many.
     iterations are bounded, with CHOLMOD, which fails where the tangent is indefinite, and with MUMPS, which only counts negative pivots
     order      a disturbance of the answer falls with its square in one iteration of Newton's method
 */
@@ -22,6 +27,7 @@
 
 #define NU 0.499
 #define STRETCH 1.5
+#define GROWTH 1.3 /* of the thickness from layer to layer */
 #define WALLS "-set_x0_at plane:1,0,0,0 -set_y0_at plane:0,1,0,0 -set_z0_at plane:0,0,1,0 "
 
 /* (dW/dl) / (l^k - 1) by dW/dI1 with mu = 1; I1 - 3 >= 0 has a double zero at l = 1. */
@@ -63,13 +69,21 @@ static void check_quadrature(void)
                 1e-9, "cylinder, classical energy");
 }
 
+/* Radius of the surface below a layer of so many in all; the fine mesh has ten. */
+static PetscReal radius(PetscInt layer, PetscInt nlayer)
+{
+  const PetscReal growth = PetscPowReal(GROWTH, 10. / (PetscReal)nlayer);
+
+  return 1. + (PetscPowReal(growth, (PetscReal)layer) - 1.) / (PetscPowReal(growth, (PetscReal)nlayer) - 1.);
+}
+
 /*
-  An eighth of the sphere: n layers of n^2 triangles of an octahedron's face each, whose prisms are cut into three tets along the diagonals to the
+  An eighth of the sphere: nlayer layers of n^2 triangles of an octahedron's face each, whose prisms are cut into three tets along the diagonals to the
   vertex of the higher number. Collective.
 */
-static PetscErrorCode write_sphere(PetscInt n, char path[512])
+static PetscErrorCode write_sphere(PetscInt n, PetscInt nlayer, char path[512])
 {
-  const PetscInt nlayer = (n + 1) * (n + 2) / 2;
+  const PetscInt per_layer = (n + 1) * (n + 2) / 2;
   FILE *f;
 
   PetscFunctionBeginUser;
@@ -78,9 +92,9 @@ static PetscErrorCode write_sphere(PetscInt n, char path[512])
     PetscInt count = 0;
 
     /* vertex (i, j) of a layer has the number of those before it: rows j of n + 1 - j vertices */
-    fprintf(f, "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n%d\n", (int)((n + 1) * nlayer));
-    for (PetscInt layer = 0; layer <= n; layer++) {
-      const PetscReal r = PetscPowReal(2., (PetscReal)layer / (PetscReal)n);
+    fprintf(f, "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n%d\n", (int)((nlayer + 1) * per_layer));
+    for (PetscInt layer = 0; layer <= nlayer; layer++) {
+      const PetscReal r = radius(layer, nlayer);
 
       for (PetscInt j = 0; j <= n; j++) {
         for (PetscInt i = 0; i + j <= n; i++) {
@@ -93,10 +107,10 @@ static PetscErrorCode write_sphere(PetscInt n, char path[512])
         }
       }
     }
-    fprintf(f, "$EndNodes\n$Elements\n%d\n", (int)(3 * n * n * n));
+    fprintf(f, "$EndNodes\n$Elements\n%d\n", (int)(3 * n * n * nlayer));
     count = 0;
-    for (PetscInt layer = 0; layer < n; layer++) {
-      PetscInt row = layer * nlayer;
+    for (PetscInt layer = 0; layer < nlayer; layer++) {
+      PetscInt row = layer * per_layer;
 
       for (PetscInt j = 0; j < n; row += n + 1 - j, j++) {
         for (PetscInt c = 0; c < 2 * (n - j) - 1; c++) {
@@ -107,7 +121,7 @@ static PetscErrorCode write_sphere(PetscInt n, char path[512])
           for (PetscInt k = 0; k < 3; k++) {
             PetscInt v[4];
 
-            for (PetscInt m = 0; m < 4; m++) v[m] = m <= 2 - k ? low[m] : low[m - 1] + nlayer;
+            for (PetscInt m = 0; m < 4; m++) v[m] = m <= 2 - k ? low[m] : low[m - 1] + per_layer;
             if (way != k % 2) {
               const PetscInt first = v[0];
 
@@ -125,10 +139,10 @@ static PetscErrorCode write_sphere(PetscInt n, char path[512])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A quarter of a ring, one layer in z; narrower cells towards the inside. */
+/* A quarter of a ring, one layer in z. */
 static void ring(const PetscInt n[3], const PetscInt at[3], PetscReal x[3], void *ctx)
 {
-  const PetscReal r = PetscPowReal(2., x[0]), angle = 0.5 * PETSC_PI * x[1];
+  const PetscReal r = radius(at[0], n[0]), angle = 0.5 * PETSC_PI * x[1];
 
   (void)ctx;
   x[0] = at[1] == n[1] ? 0. : r * PetscCosReal(angle);
@@ -229,7 +243,7 @@ static PetscErrorCode check(PetscInt k, const char *mesh, const char *more, cons
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* On two meshes: the error, first order as that of the face terms of CR, vanishes in the limit. */
+/* On two meshes. */
 static PetscErrorCode check_body(PetscInt k, const char *more)
 {
   PetscReal error[2], again;
@@ -238,22 +252,20 @@ static PetscErrorCode check_body(PetscInt k, const char *more)
   PetscFunctionBeginUser;
   PetscCall(SbHasPackage("mumps", &mumps));
   for (PetscInt i = 0; i < 2; i++) {
-    const PetscInt n = i ? 8 : 4;
+    const PetscInt n = i ? 8 : 4, nlayer = i ? 10 : 5;
     char mesh[512];
 
     if (k == 3)
-      PetscCall(write_sphere(n, mesh));
+      PetscCall(write_sphere(n, nlayer, mesh));
     else
-      PetscCall(verify_mesh_write((const PetscInt[3]){n, n + n / 2, 1}, ring, NULL, mesh));
+      PetscCall(verify_mesh_write((const PetscInt[3]){nlayer, n + n / 2, 1}, ring, NULL, mesh));
     PetscCall(check(k, mesh, more, "direct", &error[i]));
     if (mumps && !i) PetscCall(check(k, mesh, more, "mumps", &again));
     PetscCall(test_file_remove(mesh));
   }
-  PetscCall(PetscPrintf(PETSC_COMM_WORLD, "  limit: %+.2f %%\n",
-                        (double)(100. * verify_extrapolate(error[0], error[1], 1.))));
-  SB_CHECK_NEAR(error[1], 0., 0.05, "pressure of the closed form, on the fine mesh");
-  SB_CHECK_NEAR(verify_extrapolate(error[0], error[1], 1.), 0., 0.01,
-                "pressure of the closed form, in the limit");
+  SB_CHECK_NEAR(error[1], 0., 0.01, "pressure of the closed form");
+  SB_CHECK(PetscAbsReal(error[1]) < 0.6 * PetscAbsReal(error[0]), "errors %g and %g", (double)error[0],
+           (double)error[1]);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
