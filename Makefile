@@ -187,20 +187,42 @@ accuracy: deps ## error against time for every choice, measured into docs/report
 	@scripts/venv
 	@.venv/bin/python scripts/accuracy --build $(BUILD) $(if $(QUICK),--quick)
 
-docs: bin/supple ## docs/options.md from the option table, and all documents as a site: build/site/index.html
-	bin/supple -options_markdown docs/options.md
+docs: bin/supple bin/supple-mesh ## docs/options.md from the option table, and all documents as a site: build/site/index.html
+	@scripts/manual markdown
 	@scripts/venv
 	@.venv/bin/mkdocs build --strict --quiet --site-dir $(BUILD)/site
 	@echo "open $(BUILD)/site/index.html"
 
-install: bin/supple bin/supple-mesh $(MESHES) ## programs, scenarios and documents to PREFIX=/usr/local (DESTDIR= in front)
-	install -d $(DESTDIR)$(PREFIX)/bin $(DESTDIR)$(PREFIX)/share/supple/scenarios $(DESTDIR)$(PREFIX)/share/supple/meshes $(DESTDIR)$(PREFIX)/share/supple/scripts $(DESTDIR)$(PREFIX)/share/doc/supple
-	install -m 755 bin/supple bin/supple-mesh $(DESTDIR)$(PREFIX)/bin
-	install -m 755 scripts/render scripts/venv $(DESTDIR)$(PREFIX)/share/supple/scripts
-	install -m 644 scenarios/*.opts $(DESTDIR)$(PREFIX)/share/supple/scenarios
-	install -m 644 meshes/*.geo $(MESHES) $(DESTDIR)$(PREFIX)/share/supple/meshes
-	install -m 644 README.md CHANGELOG.md LICENSE $(DESTDIR)$(PREFIX)/share/doc/supple
-	cp -r docs $(DESTDIR)$(PREFIX)/share/doc/supple
+manual: bin/supple bin/supple-mesh ## man pages and completion of shells from the option table: build/share
+	@scripts/manual man -o $(BUILD)/share
+	@scripts/manual completion -o $(BUILD)/share
+
+# ---- what is installed and handed on
+TO        = $(DESTDIR)$(PREFIX)
+SHARE     = $(TO)/share/supple
+COMPLETE  = $(TO)/share/bash-completion/completions
+GIVEN    := $(if $(shell command -v gmsh),$(MESHES))
+install: bin/supple bin/supple-mesh manual $(GIVEN) ## programs, man pages, completion, scenarios, documents to PREFIX=/usr/local (DESTDIR= in front); meshes where gmsh is there
+	install -d $(TO)/bin $(TO)/share/man/man1 $(COMPLETE) $(TO)/share/zsh/site-functions $(SHARE)/scenarios $(SHARE)/meshes $(SHARE)/scripts $(TO)/share/doc/supple
+	install -m 755 bin/supple bin/supple-mesh $(TO)/bin
+	install -m 644 $(BUILD)/share/supple.1 $(BUILD)/share/supple-mesh.1 $(TO)/share/man/man1
+	install -m 644 $(BUILD)/share/supple $(COMPLETE)
+	ln -sf supple $(COMPLETE)/supple-mesh
+	install -m 644 $(BUILD)/share/_supple $(TO)/share/zsh/site-functions
+	install -m 755 scripts/render scripts/venv $(SHARE)/scripts
+	install -m 644 scenarios/*.opts $(SHARE)/scenarios
+	install -m 644 meshes/*.geo $(GIVEN) $(SHARE)/meshes
+	install -m 644 README.md CHANGELOG.md LICENSE CITATION.cff $(TO)/share/doc/supple
+	cp -r docs $(TO)/share/doc/supple
+
+dist: ## build/supple-VERSION.tar.gz of the last commit, and its checksum
+	@scripts/package dist
+
+deb: ## a Debian package of the last commit: build/deb/*.deb, examined by lintian (about 8 minutes of processor time)
+	@scripts/package deb
+
+packaging: ## the linters of what hands supple on: package of Debian, container file, recipes, CITATION.cff
+	@scripts/check-packaging
 
 clean: ## remove what was built and meshed; results in out/ stay
 	rm -rf build build-* bin meshes/*.msh
@@ -209,7 +231,7 @@ help: ## this list
 	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/  make \1|\2/p' Makefile | awk -F'|' '{ printf "%-20s%s\n", $$1, $$2 }'
 	@echo "settings: T=name (tests)  QUICK=1 (bench, solvers, accuracy)  DEBUG=1  WERROR=1  V=1 (show commands)  CC=  OPT=  CFLAGS=  BUILD=  JOBS=  PREFIX=  DESTDIR=  PETSC_DIR= PETSC_ARCH="
 
-.PHONY: all tests deps demo pictures check check-long check-hard stability lint sanitize memcheck bench locking solvers accuracy docs install fuzz clean help FORCE
+.PHONY: all tests deps demo pictures check check-long check-hard stability lint sanitize memcheck bench locking solvers accuracy docs manual install dist deb packaging fuzz clean help FORCE
 .SECONDARY:
 .DELETE_ON_ERROR:
 -include $(wildcard $(BUILD)/src/*.d $(BUILD)/src/*/*.d $(BUILD)/tests/*/*.d)

@@ -106,7 +106,9 @@ PetscErrorCode SbOptionsView(PetscViewer viewer);
   options, or a word in their names and texts. Errors: PETSC_ERR_USER for a word that no option holds.
 */
 PetscErrorCode SbOptionsHelp(MPI_Comm comm, const char *topic);
-PetscErrorCode SbOptionsMarkdown(MPI_Comm comm, const char *file); /* docs/options.md, from the table */
+/* The table for programs (scripts/manual): tabs between the columns class, type, option, kind, count, unit, required (yes, no), default, range and
+   meaning, whose names are the first line. Collective; rank 0 writes to a file, or to standard output when file is "-". */
+PetscErrorCode SbOptionsTable(MPI_Comm comm, const char *file);
 /* ASCII viewer on a file, or on standard output when file is "" or "-"; that it cannot be written is an error on every rank. Collective. */
 PetscErrorCode SbViewerOpen(MPI_Comm comm, const char *file, PetscViewer *viewer);
 PetscErrorCode SbOptionsReset(void); /* forgets what was read and registered; at exit and in tests */

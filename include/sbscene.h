@@ -11,7 +11,7 @@ typedef struct {
   char topic[SB_NAME_MAX];            /* of -help; "" without one */
   PetscBool view;                     /* -scenario_view */
   char view_file[PETSC_MAX_PATH_LEN]; /* "" for standard output */
-  char markdown[PETSC_MAX_PATH_LEN];  /* -options_markdown FILE; "" when not asked for */
+  char table[PETSC_MAX_PATH_LEN];     /* -options_table FILE; "" when not asked for */
   char scenario
     [PETSC_MAX_PATH_LEN]; /* first word of the command line when it is no option; for PetscInitialize() */
   PetscInt nfile;
@@ -23,7 +23,7 @@ typedef struct {
   SbCommandLine - takes what is for the program itself out of the command line. Collective; after MPI_Init(), before
   PetscInitialize().
 
-  Taken out: -help [TOPIC], -version, -scenario_view [FILE], -options_markdown FILE; `-help petsc` becomes PETSc's own -help. Nothing at
+  Taken out: -help [TOPIC], -version, -scenario_view [FILE], -options_table FILE; `-help petsc` becomes PETSc's own -help. Nothing at
   all is a request for help, and nothing to run. A first word that is no option names the scenario; it stays, for PetscGetArgs(), and PETSc passes over it. A word that
   belongs to no option and an option file that cannot be read (rank 0 looks) are described in command->problem, because
   PETSc cannot report an error before PetscInitialize(); an -options_file that cannot be read is taken out.

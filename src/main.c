@@ -84,14 +84,14 @@ static PetscErrorCode supple(int argc, char *argv[])
   if (bare)
     PetscCall(SbOptionsHelp(PETSC_COMM_WORLD, "")); /* and then the error that there is nothing to run */
 
-  /* -help, -version, -options_markdown: answers, and nothing is simulated */
+  /* -help, -version, -options_table: answers, and nothing is simulated */
   if (command.help) {
     PetscCall(SbOptionsHelp(PETSC_COMM_WORLD, command.topic));
   } else if (command.version) {
     PetscCall(PetscGetVersion(petsc, sizeof(petsc)));
     PetscCall(PetscPrintf(PETSC_COMM_WORLD, "supple %s\n%s\n", SB_VERSION, petsc));
-  } else if (command.markdown[0]) {
-    PetscCall(SbOptionsMarkdown(PETSC_COMM_WORLD, command.markdown));
+  } else if (command.table[0]) {
+    PetscCall(SbOptionsTable(PETSC_COMM_WORLD, command.table));
   } else {
     /* what options say, checked: nothing is computed yet */
     PetscCall(SbSceneCreate(PETSC_COMM_WORLD, &scene.model));

@@ -1,5 +1,5 @@
 /*
-  option_manual.c - the reference manual from the table of options: for the terminal (-help TOPIC) and as docs/options.md.
+  option_manual.c - the reference manual from the table of options: for the terminal (-help TOPIC) and, for scripts/manual, as a table (-options_table).
 
   Blocks come by class, the run and the bodies first: what every instance of the class has, then each type. A topic is a class (body), a
   type (pressure), the first word of options (solver), or any word in their names and texts.
@@ -55,58 +55,34 @@ static PetscErrorCode help_row(PetscViewer viewer, const SbOptionBlock *block, c
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Text of a table cell: a bar would end the cell. */
-static PetscErrorCode print_cell(PetscViewer viewer, const char *text, PetscBool code)
+/* One line of the table for programs; its columns are those of SbOptionsTable(). */
+static PetscErrorCode table_row(PetscViewer viewer, const SbOptionBlock *block, const SbOption *row)
 {
-  char escaped[1024];
-  size_t n = 0;
-
-  PetscFunctionBeginUser;
-  for (; *text && n + 3 < sizeof(escaped); text++) {
-    if (*text == '|' || (!code && (*text == '<' || *text == '*' || *text == '_'))) escaped[n++] = '\\';
-    escaped[n++] = *text;
-  }
-  escaped[n] = 0;
-  PetscCall(PetscViewerASCIIPrintf(viewer, code && n ? " `%s` |" : " %s |", escaped));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode markdown_row(PetscViewer viewer, const SbOptionBlock *block, const SbOption *row)
-{
-  char name[SB_OPTION_NAME_MAX], value[64];
+  static const char *const kinds[] = {
+    [SB_OPTION_BOOL] = "bool",     [SB_OPTION_INT] = "int",        [SB_OPTION_REAL] = "real",
+    [SB_OPTION_REALS] = "real",    [SB_OPTION_STRING] = "text",    [SB_OPTION_NAMES] = "names",
+    [SB_OPTION_CHOICE] = "choice", [SB_OPTION_FORMULA] = "formula"};
+  char name[SB_OPTION_NAME_MAX];
 
   PetscFunctionBeginUser;
   PetscCall(SbOptionManualName(block, row, sizeof(name), name));
-  PetscCall(describe_value(row, sizeof(value), value));
-  PetscCall(PetscViewerASCIIPrintf(viewer, "|"));
-  PetscCall(print_cell(viewer, name, PETSC_TRUE));
-  PetscCall(print_cell(viewer, value, PETSC_FALSE));
-  PetscCall(print_cell(viewer, row->unit, PETSC_FALSE));
-  if (row->preset)
-    PetscCall(print_cell(viewer, row->preset, PETSC_TRUE));
-  else
-    PetscCall(print_cell(viewer, "required", PETSC_FALSE));
-  PetscCall(print_cell(viewer, row->range, PETSC_TRUE));
-  PetscCall(print_cell(viewer, row->help, PETSC_FALSE));
-  PetscCall(PetscViewerASCIIPrintf(viewer, "\n"));
+  PetscCall(PetscViewerASCIIPrintf(viewer, "%s\t%s\t%s\t%s\t%" PetscInt_FMT "\t%s\t%s\t%s\t%s\t%s\n",
+                                   block->klass, block->type, name, kinds[row->kind], row->count, row->unit,
+                                   row->preset ? "no" : "yes", row->preset ? row->preset : "", row->range,
+                                   row->help));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Headline of a block: "The run", "Every body", "body: corotated". */
-static PetscErrorCode headline(PetscViewer viewer, const SbOptionBlock *block, PetscBool markdown)
+static PetscErrorCode headline(PetscViewer viewer, const SbOptionBlock *block)
 {
-  const char *mark = markdown ? "## " : "";
-
   PetscFunctionBeginUser;
   if (!block->klass[0])
-    PetscCall(PetscViewerASCIIPrintf(viewer, "\n%sThe run\n", mark));
+    PetscCall(PetscViewerASCIIPrintf(viewer, "\nThe run\n"));
   else if (!block->type[0])
-    PetscCall(PetscViewerASCIIPrintf(viewer, "\n%sEvery %s\n", mark, block->klass));
+    PetscCall(PetscViewerASCIIPrintf(viewer, "\nEvery %s\n", block->klass));
   else
-    PetscCall(PetscViewerASCIIPrintf(viewer, "\n%s%s: %s\n", mark, block->klass, block->type));
-  if (markdown)
-    PetscCall(PetscViewerASCIIPrintf(
-      viewer, "\n| option | value | unit | default | range | meaning |\n|---|---|---|---|---|---|\n"));
+    PetscCall(PetscViewerASCIIPrintf(viewer, "\n%s: %s\n", block->klass, block->type));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -136,7 +112,7 @@ static PetscErrorCode answers(const SbOptionBlock *block, const SbOption *row, c
 
 /* The options of a class and type that answer the topic at least so well, under one headline; *n += how many. */
 static PetscErrorCode print_type(PetscViewer viewer, const SbOptionBlock *first, const char *topic, int least,
-                                 PetscBool markdown, PetscInt *n)
+                                 PetscBool table, PetscInt *n)
 {
   PetscInt printed = 0;
   int how = 0;
@@ -147,9 +123,9 @@ static PetscErrorCode print_type(PetscViewer viewer, const SbOptionBlock *first,
     for (PetscInt i = 0; i < b->n; i++) {
       PetscCall(answers(b, &b->rows[i], topic, &how));
       if (how < least) continue;
-      if (!printed++) PetscCall(headline(viewer, first, markdown));
-      if (markdown)
-        PetscCall(markdown_row(viewer, b, &b->rows[i]));
+      if (!printed++ && !table) PetscCall(headline(viewer, first));
+      if (table)
+        PetscCall(table_row(viewer, b, &b->rows[i]));
       else
         PetscCall(help_row(viewer, b, &b->rows[i]));
     }
@@ -168,7 +144,7 @@ static PetscBool is_first(PetscInt i, PetscBool by_type)
 }
 
 /* All options that answer the topic at least so well; n: how many. */
-static PetscErrorCode print_manual(PetscViewer viewer, const char *topic, int least, PetscBool markdown,
+static PetscErrorCode print_manual(PetscViewer viewer, const char *topic, int least, PetscBool table,
                                    PetscInt *n)
 {
   static const char *const order[] = {"", "body", "effect"}; /* then as they were registered */
@@ -188,7 +164,7 @@ static PetscErrorCode print_manual(PetscViewer viewer, const char *topic, int le
         const SbOptionBlock *b = &SbTheOptions.block[j];
 
         if (!strcmp(b->klass, klass) && (b->type[0] != 0) == typed && b->n && is_first(j, PETSC_TRUE))
-          PetscCall(print_type(viewer, b, topic, least, markdown, n));
+          PetscCall(print_type(viewer, b, topic, least, table, n));
       }
     }
   }
@@ -276,20 +252,15 @@ PetscErrorCode SbOptionsHelp(MPI_Comm comm, const char *topic)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbOptionsMarkdown(MPI_Comm comm, const char *file)
+PetscErrorCode SbOptionsTable(MPI_Comm comm, const char *file)
 {
   PetscViewer viewer;
   PetscInt n;
 
   PetscFunctionBeginUser;
   PetscCall(SbViewerOpen(comm, file, &viewer));
-  PetscCall(
-    PetscViewerASCIIPrintf(viewer,
-                           "# Options of supple %s\n\nMade by `supple -options_markdown docs/options.md` "
-                           "from the table in the source; `supple -help all` prints the same.\n",
-                           SB_VERSION));
   PetscCall(PetscViewerASCIIPrintf(
-    viewer, "SI units. The last value given wins. Options of PETSc can be given as well.\n"));
+    viewer, "class\ttype\toption\tkind\tcount\tunit\trequired\tdefault\trange\tmeaning\n"));
   PetscCall(print_manual(viewer, "", 0, PETSC_TRUE, &n));
   PetscCall(PetscViewerDestroy(&viewer));
   PetscFunctionReturn(PETSC_SUCCESS);

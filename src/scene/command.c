@@ -21,8 +21,10 @@ static const SbOption rows[] = {
   {"scenario_view", SB_OPTION_STRING, 1, "", "", "",
    "checks the scenario, writes it with every default filled in to this file (standard output without one), "
    "and ends"},
-  {"options_markdown", SB_OPTION_STRING, 1, "", "", "",
-   "writes this list as Markdown to a file, and nothing else"},
+  {"options_table", SB_OPTION_STRING, 1, "", "", "",
+   "writes this list for programs to a file (standard output without one), one option per line with tabs "
+   "between "
+   "its columns, and nothing else"},
 };
 
 PetscErrorCode SbCommandRegister(void)
@@ -95,8 +97,8 @@ static PetscBool take_option(const char *name, const char *value, SbCommand *com
     (void)snprintf(command->view_file, sizeof(command->view_file), "%s", value ? value : "");
     return PETSC_FALSE;
   }
-  if (is_one_of(name, "-options_markdown", "--options_markdown")) {
-    (void)snprintf(command->markdown, sizeof(command->markdown), "%s", value ? value : "-");
+  if (is_one_of(name, "-options_table", "--options_table")) {
+    (void)snprintf(command->table, sizeof(command->table), "%s", value ? value : "-");
     return PETSC_FALSE;
   }
   if (is_one_of(name, "-options_file", "-options_file_yaml") && value) {

@@ -182,6 +182,5 @@ check "-help all is shorter than the table" test "$("$supple" -help all | grep -
 error 1 "-help nonsense" -help nonsense
 check "nothing at all prints no usage" grep -q 'supple SCENARIO.opts' <<<"$("$supple" 2>nothing.txt)"
 check "nothing at all is no error" grep -q '^supple: error: -bodies' nothing.txt
-"$supple" -options_markdown options.md && check "-options_markdown" grep -qF -- "-ts_dt" options.md
 
 finish

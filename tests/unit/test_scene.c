@@ -260,7 +260,7 @@ static PetscErrorCode test_command(void)
     "-flag",  "-vector",  "0,",     "0,", "-help", "petsc",    "-options_file",  "/nonexistent/a.yml",
     NULL};
   const char *const expected[] = {"supple", "nix.opts", "-ts_dt", "-1", "-flag", "-vector", "0,", "-help"};
-  char *only[] = {"supple", "-options_markdown", NULL};
+  char *only[] = {"supple", "-options_table", NULL};
   int argc = 16;
   SbCommand command;
 
@@ -271,12 +271,12 @@ static PetscErrorCode test_command(void)
     SB_CHECK(!strcmp(argv[i], expected[i]), "word %d is %s", i, argv[i]);
   SB_CHECK(command.help && command.version && command.view && !strcmp(command.view_file, "v.opts"),
            "requests");
-  SB_CHECK(!command.scenario[0] && !command.markdown[0], "scenario '%s'", command.scenario);
+  SB_CHECK(!command.scenario[0] && !command.table[0], "scenario '%s'", command.scenario);
   SB_CHECK(!strcmp(command.problem, "cannot read the option file nix.opts: No such file or directory"), "%s",
            command.problem);
   argc = 2;
   PetscCall(SbCommandLine(&argc, only, &command));
-  SB_CHECK(argc == 1 && !strcmp(command.markdown, "-") && !command.problem[0], "-options_markdown alone");
+  SB_CHECK(argc == 1 && !strcmp(command.table, "-") && !command.problem[0], "-options_table alone");
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
