@@ -61,10 +61,10 @@ _supple_files() {
 # What may stand as the value of an option: OPTION KIND VALUES
 _supple_value() {
   local cur=$2
-  case $1:$3 in
-    *:bool) compgen -W 'true false' -- "$cur" ;;
-    *:choice) compgen -W "$(printf '%s' "$4" | tr ',' ' ')" -- "$cur" ;;
-    *_mesh:* | *_obstacle:* | *file:* | *_load:* | -restart:* | -view:*) _supple_files "$cur" | sort -u ;;
+  case $1:$3:$4 in
+    *:bool:*) compgen -W 'true false' -- "$cur" ;;
+    *:*:?*) compgen -W "$(printf '%s' "$4" | tr ',' ' ')" -- "$cur" ;;
+    *_mesh:text: | *_obstacle:* | *file:* | -restart:* | -view:*) _supple_files "$cur" | sort -u ;;
     *_dir:*) compgen -d -- "$cur" | sed 's,$,/,' ;;
   esac
 }

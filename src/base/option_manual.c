@@ -44,8 +44,7 @@ static PetscErrorCode help_row(PetscViewer viewer, const SbOptionBlock *block, c
   PetscCall(describe_value(row, sizeof(value), value));
   PetscCall(PetscViewerASCIIPrintf(viewer, "  %s: %s", name, value));
   if (row->range[0])
-    PetscCall(
-      PetscViewerASCIIPrintf(viewer, "%s %s", row->kind == SB_OPTION_CHOICE ? "" : " in", row->range));
+    PetscCall(PetscViewerASCIIPrintf(viewer, "%s %s", strchr("[(", row->range[0]) ? " in" : "", row->range));
   if (row->unit[0]) PetscCall(PetscViewerASCIIPrintf(viewer, " %s", row->unit));
   if (!row->preset)
     PetscCall(PetscViewerASCIIPrintf(viewer, ", required"));

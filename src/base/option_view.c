@@ -45,8 +45,7 @@ static PetscErrorCode print_record(PetscViewer viewer, const SbOptionRecord *r, 
                                    help && row->help[help - 1] == '.' ? help - 1 : help, row->help));
   if (row->unit[0]) PetscCall(PetscViewerASCIIPrintf(viewer, ", %s", row->unit));
   if (row->range[0])
-    PetscCall(
-      PetscViewerASCIIPrintf(viewer, ", %s%s", row->kind == SB_OPTION_CHOICE ? "" : "in ", row->range));
+    PetscCall(PetscViewerASCIIPrintf(viewer, ", %s%s", strchr("[(", row->range[0]) ? "in " : "", row->range));
   PetscCall(PetscViewerASCIIPrintf(viewer, "\n"));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -3,6 +3,9 @@
 */
 #include "scene_impl.h"
 
+/* Those of material/register.c, for the manual. */
+#define LAWS "linear|corotated|stvk|neohookean"
+
 static const SbOption run_rows[] = {
   {"bodies", SB_OPTION_NAMES, 1, "", NULL, "", "names of the bodies, with commas between them"},
   {"sets", SB_OPTION_NAMES, 1, "", "", "",
@@ -25,10 +28,9 @@ static const SbOption body_rows[] = {
   {"rotate", SB_OPTION_REALS, 4, "", "0,0,1,0", "(-inf, inf)",
    "axis x,y,z and angle in degrees, before translation"},
   {"translate", SB_OPTION_REALS, 3, "m", "0,0,0", "(-inf, inf)", "shift of the scaled and rotated mesh"},
-  {"element", SB_OPTION_STRING, 1, "", "p1", "",
-   "finite element: p1; cr or dg, which do not lock when poisson is near 0.5"},
-  {"material", SB_OPTION_STRING, 1, "", "", "",
-   "material law, required: linear, corotated, stvk or neohookean"},
+  {"element", SB_OPTION_STRING, 1, "", "p1", "p1|cr|dg",
+   "finite element; cr and dg do not lock when poisson is near 0.5"},
+  {"material", SB_OPTION_STRING, 1, "", "", LAWS, "material law, required"},
   {"inclusions", SB_OPTION_NAMES, 1, "", "", "",
    "sets or volume groups whose tetrahedra have a material of their own, -inclusion_<name>_..."},
   {"velocity", SB_OPTION_REALS, 3, "m/s", "0,0,0", "(-inf, inf)",
@@ -37,7 +39,7 @@ static const SbOption body_rows[] = {
    "angular velocity about the centre of mass at the start"},
 };
 static const SbOption inclusion_rows[] = {
-  {"material", SB_OPTION_STRING, 1, "", "", "", "material law, required"},
+  {"material", SB_OPTION_STRING, 1, "", "", LAWS, "material law, required"},
 };
 
 PetscErrorCode SbSceneRegister(void)
