@@ -107,12 +107,13 @@ PetscErrorCode SbModelContactPoints(SbModel model, PetscReal t, Vec U, Vec R, Sb
   Guarded contact, where model->npotential > 0; operations of the same names in sbeffect.h. Collective.
 
   Begin: a step begins with U0, which is changed when the run begins with touching surfaces. Safe: part of the way from X to X - Y that can be gone, of all ranks, and
-  pairs that push each other now.
+  pairs that push each other now. Lag: X solves the step with the friction of before; again: it wants one more solve.
 */
 PetscErrorCode SbModelGuardBegin(SbModel model, PetscReal t, PetscReal dt, Vec U0);
 PetscErrorCode SbModelGuardAdvance(SbModel model, PetscReal progress);
 PetscErrorCode SbModelGuardSafe(SbModel model, Vec X, Vec Y, PetscReal progress, PetscReal *part,
                                 PetscInt *nactive);
+PetscErrorCode SbModelGuardLag(SbModel model, Vec X, PetscBool *again);
 /* Of the last accepted step: what contact did to the bodies, J, and its forces taken out of those of SbModelLoads() at U, F, N. */
 PetscErrorCode SbModelGuardWork(SbModel model, Vec U, PetscReal *work, Vec F);
 /* F += scale times the gradient of the energy at U, N; free_only: not at prescribed unknowns. energy of all ranks, J (NULL: not wanted). */

@@ -13,6 +13,9 @@
 
     f0 = u^2/e - u^3/(3 e^2) + e/3,   f0' = 2 u/e - u^2/e^2   for u < e;   f0 = u, f0' = 1   beyond.
 
+  In a static run, or when asked for, a solution gives its normal forces and places to the next solve of the same step, until friction changes by less than a tolerance
+  (barrier_friction.c). By how much it still would is reported.
+
   Touching starts. Surfaces that touch when a run begins are moved apart, by less than the width; those that are in each other end the run.
 */
 #include "barrier_impl.h"
@@ -22,6 +25,7 @@
 #define PRESSURE 0.1     /* of Young's modulus of the softer side */
 #define SLIP 1e-3        /* of the size of the smallest body per second: speed below which friction sticks */
 #define SLIP_STATIC 1e-5 /* of the size: the same in a static run, as a length */
+#define LAGS 100         /* solves of a load step with the friction of the one before */
 #define DEEP 1e-3        /* of the size of the smallest body: overlap with an obstacle that counts as such */
 #define APART 0.5        /* of w: how far touching surfaces are moved apart at the start */
 #define PASSES 200       /* over all pairs for that */
@@ -298,45 +302,21 @@ static PetscReal gap_energy(const Barrier *b)
   return sum;
 }
 
-/* How far the point of the obstacle that a pair rubs on moves in the step, beyond what its vertices say. */
-static void carry_along(const Barrier *b, const SbPose pose[2], const Active *a, Rub *rub)
-{
-  const SbContactMesh m = b->mesh;
-  const PetscInt *v = b->pairs->pair[a->pair].v;
-  PetscReal X[3], at[3] = {0}, to[3], sign = 0.;
-
-  for (int k = 0; k < 4; k++) {
-    if (v[k] >= m->nbody_vertex || rub->weight[k] == 0.) continue;
-    sign = rub->weight[k] > 0. ? 1. : -1.;
-    for (int i = 0; i < 3; i++) at[i] += PetscAbsReal(rub->weight[k]) * b->x[3 * v[k] + i];
-  }
-  for (int i = 0; i < 3; i++) at[i] -= sign * a->gap * rub->n[i];
-  SbPoseInvert(&pose[0], at, X);
-  SbPoseApply(&pose[1], X, to);
-  for (int i = 0; i < 3; i++) rub->carry[i] = sign * (to[i] - at[i]);
-  for (int k = 0; k < 4; k++) {
-    const PetscInt o = 3 * (v[k] - m->nbody_vertex);
-
-    for (int i = 0; i < 3 && o >= 0; i++) rub->carry[i] += rub->weight[k] * (b->to[o + i] - b->from[o + i]);
-  }
-}
-
 static PetscErrorCode begin_barrier(SbEffect e, SbSpace s, PetscReal t, PetscReal dt, PetscReal u0[],
                                     PetscBool *moved)
 {
   Barrier *b = (Barrier *)e->data;
   const SbContactMesh m = b->mesh;
   PetscReal least = PETSC_MAX_REAL, unused;
-  SbPose pose[2];
 
   PetscFunctionBeginUser;
   *moved = PETSC_FALSE;
   if (b->scene.obstacle) {
-    (*b->scene.pose)(b->data, t, &pose[0]);
-    (*b->scene.pose)(b->data, t + dt, &pose[1]);
+    (*b->scene.pose)(b->data, t, &b->pose[0]);
+    (*b->scene.pose)(b->data, t + dt, &b->pose[1]);
     for (PetscInt v = m->nbody_vertex; v < m->nvertex; v++) {
-      SbPoseApply(&pose[0], m->X + 3 * v, b->from + 3 * (v - m->nbody_vertex));
-      SbPoseApply(&pose[1], m->X + 3 * v, b->to + 3 * (v - m->nbody_vertex));
+      SbPoseApply(&b->pose[0], m->X + 3 * v, b->from + 3 * (v - m->nbody_vertex));
+      SbPoseApply(&b->pose[1], m->X + 3 * v, b->to + 3 * (v - m->nbody_vertex));
     }
   }
   b->progress = 0.;
@@ -356,22 +336,26 @@ static PetscErrorCode begin_barrier(SbEffect e, SbSpace s, PetscReal t, PetscRea
 
   /* friction with the forces of the start */
   b->slip = dt > 0. && e->dynamic ? SLIP * m->size * dt : SLIP_STATIC * m->size;
-  for (PetscInt i = 0; b->scene.friction > 0. && i < b->nactive; i++) {
-    const Active *a = &b->active[i];
-    const SbContactPair *pair = &b->pairs->pair[a->pair];
-    PetscReal energy, gradient[12];
-    Rub rub = {.pair = *pair};
+  b->nlag = 0;
+  b->lag = 0.;
+  PetscCall(SbBarrierFindFriction(b, PETSC_FALSE));
+  SbBarrierSwapFriction(b);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
 
-    rub.force = b->scene.friction * SbBarrierPush(b, a, &energy, gradient);
-    PetscCall(PetscArraycpy(rub.weight, a->at.weight, 4));
-    PetscCall(PetscArraycpy(rub.n, a->at.n, 3));
-    if (b->scene.obstacle) carry_along(b, pose, a, &rub);
-    if (b->nrub == b->rub_size) {
-      b->rub_size = PetscMax(64, 2 * b->rub_size);
-      PetscCall(PetscRealloc((size_t)b->rub_size * sizeof(*b->rub), &b->rub));
-    }
-    b->rub[b->nrub++] = rub;
-  }
+/* Friction has the forces and directions of a solution from now on, as often as it may and what it lags behind by is too much. */
+static PetscErrorCode lag_barrier(SbEffect e, SbSpace s, const PetscReal u[], PetscBool *again)
+{
+  Barrier *b = (Barrier *)e->data;
+
+  PetscFunctionBeginUser;
+  (void)s;
+  *again = PETSC_FALSE;
+  if (b->scene.friction <= 0. || ++b->nlag >= b->lags) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(SbBarrierLook(b, u));
+  PetscCall(SbBarrierLag(b));
+  *again = (PetscBool)(b->lag > b->lag_tolerance);
+  if (*again) SbBarrierSwapFriction(b);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -426,6 +410,9 @@ static PetscErrorCode accept_barrier(SbEffect e, SbSpace s, const SbStage *stage
   b->step_work = before - b->energy + 0.5 * (b->obstacle_power + power) + friction - lost;
   b->work += b->step_work;
   b->friction_loss += lost;
+
+  if (b->scene.friction > 0.) PetscCall(SbBarrierLag(b));
+  b->most_lag = PetscMax(b->most_lag, b->lag);
 
   for (PetscInt i = 0; i < b->nactive; i++) b->least = PetscMin(b->least, b->active[i].gap);
   b->most = PetscMax(b->most, b->nactive);
@@ -503,6 +490,7 @@ static PetscErrorCode destroy_barrier(SbEffect e)
   PetscCall(SbPairsFree(&b->columns));
   PetscCall(PetscFree(b->active));
   PetscCall(PetscFree(b->rub));
+  PetscCall(PetscFree(b->next));
   e->data = b->data;
   PetscCall((*b->destroy)(e));
   PetscCall(PetscFree(b));
@@ -511,13 +499,14 @@ static PetscErrorCode destroy_barrier(SbEffect e)
 
 PetscErrorCode SbBarrierCreate(SbEffect e, const SbScope *scope, const SbBarrierScene *scene)
 {
-  static const char *const obstacle[] = {"force_x",  "force_y",  "force_z",      "torque_x",
-                                         "torque_y", "torque_z", "contacts",     "penetration",
-                                         "gap",      "energy",   "friction_loss"},
+  static const char *const obstacle[] = {"force_x",  "force_y",  "force_z",       "torque_x",
+                                         "torque_y", "torque_z", "contacts",      "penetration",
+                                         "gap",      "energy",   "friction_loss", "friction_lag"},
                            *const bodies[] = {
                              "contacts",       "penetration", "penetration_mean", "normal_force",
                              "friction_force", "work",        "friction_loss",    "gap",
-                             "energy"};
+                             "energy",         "friction_lag"};
+  PetscInt lags;
   Barrier *b;
 
   PetscFunctionBeginUser;
@@ -528,6 +517,9 @@ PetscErrorCode SbBarrierCreate(SbEffect e, const SbScope *scope, const SbBarrier
   PetscCall(SbOptionReal(scope, "barrier_width", &b->width));
   PetscCall(SbOptionReal(scope, "barrier_pressure", &b->pressure));
   PetscCall(SbOptionBool(scope, "verify", &b->verify));
+  PetscCall(SbOptionInt(scope, "friction_solves", &lags));
+  b->lags = lags > 0 ? lags : e->dynamic ? 1 : LAGS;
+  PetscCall(SbOptionReal(scope, "friction_tolerance", &b->lag_tolerance));
   e->data = b;
   e->ops = (SbEffectOps){.setfromoptions = e->ops.setfromoptions,
                          .setup = setup_barrier,
@@ -536,6 +528,7 @@ PetscErrorCode SbBarrierCreate(SbEffect e, const SbScope *scope, const SbBarrier
                          .begin_guarded = begin_barrier,
                          .safe = safe_barrier,
                          .advance = advance_barrier,
+                         .lag = lag_barrier,
                          .potential = SbEffectPotential_Barrier,
                          .hessian = SbEffectHessian_Barrier,
                          .accept = accept_barrier,

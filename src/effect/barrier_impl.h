@@ -38,9 +38,16 @@ typedef struct {
   Active *active;
   PetscInt nrub, rub_size;
   Rub *rub;
-  PetscReal slip;            /* e of friction, m */
-  PetscReal least, shortest; /* smallest gap and shortest safe part of the run */
-  PetscInt most;             /* pairs */
+  PetscInt nnext, next_size; /* the same with the places and forces at the end of the step */
+  Rub *next;
+  SbPose pose[2]; /* of the obstacle at the start and the end of the step */
+  PetscInt lags,
+    nlag; /* solves of a step, at most, each with the friction of the one before; those of this step */
+  PetscReal lag_tolerance, lag; /* of what is left then; what it is, a part of mu N of all pairs */
+  PetscReal most_lag;           /* of the run */
+  PetscReal slip;               /* e of friction, m */
+  PetscReal least, shortest;    /* smallest gap and shortest safe part of the run */
+  PetscInt most;                /* pairs */
   SbPairs columns;
   PetscReal energy; /* of the gaps, when the step began, then when it ended, J; this rank's, as all below */
   PetscReal obstacle_power; /* by the obstacle over its way in this step with the forces at its start, J */
@@ -79,6 +86,12 @@ static inline PetscReal SbBarrierSlope(const Barrier *b, PetscReal y)
 {
   return y < b->slip ? 2. / b->slip - y / PetscSqr(b->slip) : 1. / y;
 }
+/* Normal forces and directions at the places known, those of the end of the step (`end`) or its start, into `next`. */
+PetscErrorCode SbBarrierFindFriction(Barrier *b, PetscBool end);
+/* What is in `next` counts, and the other way round. */
+void SbBarrierSwapFriction(Barrier *b);
+/* By what friction would change with the normal forces and directions at the end of the step, which are found, as part of mu N: `lag`. Collective. */
+PetscErrorCode SbBarrierLag(Barrier *b);
 /* Energy of friction, J, its gradient by the pair's vertices, N. */
 PetscReal SbBarrierRub(const Barrier *b, const Rub *rub, PetscReal gradient[12]);
 /* f += sign times the gradient of all energies at the places known, N; their sum over the pairs that this rank counts, J. */

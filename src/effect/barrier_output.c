@@ -67,7 +67,7 @@ PetscErrorCode SbEffectHistory_Barrier(SbEffect e, SbSpace s, const SbStage *sta
   if (least == PETSC_MAX_REAL) least = 0.;
   PetscCallMPI(MPI_Comm_rank(s->comm, &rank));
 
-  /* an obstacle: force, torque, contacts, penetration, gap, energy, friction_loss */
+  /* an obstacle: force, torque, contacts, penetration, gap, energy, friction_loss, friction_lag */
   if (b->scene.obstacle) {
     (*b->scene.pose)(b->data, stage->t, &pose);
     for (PetscInt i = 0; i < b->nactive; i++) {
@@ -86,10 +86,11 @@ PetscErrorCode SbEffectHistory_Barrier(SbEffect e, SbSpace s, const SbStage *sta
     }
     if (!rank) v[8] = least;
     v[10] = b->friction_loss;
+    if (!rank) v[11] = b->lag;
     PetscFunctionReturn(PETSC_SUCCESS);
   }
 
-  /* bodies: contacts, penetration, its mean, normal force, friction force, work, friction_loss, gap, energy, pairs */
+  /* bodies: contacts, penetration, its mean, normal force, friction force, work, friction_loss, gap, energy, friction_lag, pairs */
   for (PetscInt i = 0; i < b->nactive; i++) {
     const SbContactPair *pair = &b->pairs->pair[b->active[i].pair];
     PetscReal normal;
@@ -111,7 +112,10 @@ PetscErrorCode SbEffectHistory_Barrier(SbEffect e, SbSpace s, const SbStage *sta
   }
   v[5] = b->work;
   v[6] = b->friction_loss;
-  if (!rank) v[7] = least;
+  if (!rank) {
+    v[7] = least;
+    v[9] = b->lag;
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -200,15 +204,19 @@ PetscErrorCode SbEffectSummary_Barrier(SbEffect e, SbSpace s, size_t size, char 
   Barrier *b = (Barrier *)e->data;
   PetscReal value[2] = {b->least, b->shortest};
   PetscInt most = b->most;
+  char friction[96] = "";
 
   PetscFunctionBeginUser;
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, value, 2, MPIU_REAL, MPI_MIN, s->comm));
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &most, 1, MPIU_INT, MPI_MAX, s->comm));
+  if (b->scene.friction > 0.)
+    (void)snprintf(friction, sizeof(friction),
+                   ", friction lagged behind normal forces by at most %.2g of itself", (double)b->most_lag);
   if (most)
     (void)snprintf(text, size,
                    "%" PetscInt_FMT " pairs at most on a rank, smallest gap %.3g m of a width of %.3g m, "
-                   "shortest safe part of an iteration %.2g",
-                   most, (double)value[0], (double)b->w[0], (double)value[1]);
+                   "shortest safe part of an iteration %.2g%s",
+                   most, (double)value[0], (double)b->w[0], (double)value[1], friction);
   else
     (void)snprintf(text, size, "nothing came nearer than %.3g m", (double)b->w[0]);
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -68,6 +68,23 @@ PetscErrorCode SbModelGuardSafe(SbModel m, Vec X, Vec Y, PetscReal progress, Pet
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscErrorCode SbModelGuardLag(SbModel m, Vec X, PetscBool *again)
+{
+  const PetscReal *u;
+
+  PetscFunctionBeginUser;
+  *again = PETSC_FALSE;
+  PetscCall(SbSpaceGetLocalRead(m->space, X, &u));
+  for (PetscInt e = 0; e < m->npotential; e++) {
+    PetscBool mine;
+
+    SbEffectCall(m->potential[e], lag, m->space, u, &mine);
+    *again = (PetscBool)(*again || mine);
+  }
+  PetscCall(SbSpaceRestoreLocalRead(m->space, X, &u));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode SbModelGuardHessian(SbModel m, Vec U, SbContactHessian kind, SbBlocks *blocks)
 {
   const PetscReal *u;

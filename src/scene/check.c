@@ -102,7 +102,8 @@ PetscErrorCode SbSceneCheck(SbModel model)
   for (PetscInt i = 0; i < model->nbody; i++)
     if (!is_generated(model->body[i].mesh)) PetscCall(check_mesh_file(model->comm, &model->body[i]));
   for (PetscInt e = 0; e < model->neffect && !constrained; e++)
-    constrained = (PetscBool)(model->effect[e]->ops.prescribe != NULL);
+    constrained = (PetscBool)(model->effect[e]->ops.prescribe ||
+                              (model->effect[e]->ops.potential && model->effect[e]->springs));
   PetscCheck(constrained, PETSC_COMM_SELF, PETSC_ERR_USER,
              "-time static: nothing holds the bodies, so there is no unique equilibrium; name an effect of "
              "type fixed or prescribed_displacement");

@@ -38,6 +38,7 @@
   1e-3 /* of the smallest body's size per second: a step of a time step that is short enough, where surfaces push each other */
 #define STICKING 1e-2       /* of that, with friction, whose forces follow from as small speeds */
 #define SETTLED_STATIC 1e-6 /* of that size: the same in a static run */
+#define EARLY 10            /* iterations in which friction follows normal forces at once */
 #define SHIFT 0.1           /* of the shift by inertia: the least one of a tangent that is not definite */
 #define SHIFT_STIFF 1e-4    /* the same, of the mean stiffness by mass */
 #define SHIFTS 8            /* so often by SHIFT_MORE before cells are filtered */
@@ -435,7 +436,7 @@ static PetscErrorCode converged(SNES snes, PetscReal s)
     size = PetscMin(size, PetscSqrtReal(SbDot3(r, r)));
   }
   for (PetscInt e = 0; e < run->model->npotential; e++) {
-    if (run->model->potential[e]->springs && run->model->dynamic) {
+    if (run->model->potential[e]->springs) {
       part *= STICKING;
       break;
     }
@@ -452,7 +453,7 @@ static PetscErrorCode SNESSolve_Newton(SNES snes)
   const PetscBool guarded = (PetscBool)(n->run->model->npotential > 0);
   PetscBool filtered = PETSC_FALSE;
   PetscReal slope = 0., s = 1., safe;
-  PetscInt nactive;
+  PetscInt nactive, first = 0;
 
   PetscFunctionBeginUser;
   /* where it begins */
@@ -491,7 +492,19 @@ static PetscErrorCode SNESSolve_Newton(SNES snes)
     PetscCall(SNESLogConvergenceHistory(snes, snes->norm, snes->linear_its - linear));
     PetscCall(converged(snes, s));
     PetscCall(SNESMonitor(snes, snes->iter, snes->norm));
-    if (!snes->reason && snes->iter >= snes->max_its) snes->reason = SNES_DIVERGED_MAX_IT;
+    if (!snes->reason && snes->iter >= first + snes->max_its) snes->reason = SNES_DIVERGED_MAX_IT;
+
+    /* friction with the normal forces of this iterate, where its lag is iterated: at once while loads arrive, then when it has settled */
+    if (guarded && (snes->reason > 0 || (!snes->reason && snes->iter <= EARLY))) {
+      PetscBool again;
+
+      PetscCall(SbModelGuardLag(n->run->model, X, &again));
+      if (!again) continue;
+      snes->reason = SNES_CONVERGED_ITERATING;
+      first = snes->iter;
+      PetscCall(SNESComputeFunction(snes, X, F));
+      PetscCall(VecNorm(F, NORM_2, &snes->norm));
+    }
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }

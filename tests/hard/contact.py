@@ -3,7 +3,8 @@
   contact.py -list                     names, ranks, whether there is a short run, seconds, what is hard, with tabs between (as tests/hard/hard -list)
   contact.py -case NAME [-ranks N] [-runs N] [-more "OPTIONS"]
       runs a case, by default on one rank; -runs: its short run. SB_SUPPLE, SB_MPI and SB_OUT as tests/run sets them.
-  contact.py -table LOGS               the table of docs/reports/contact.md from the logs of tests/run, which have lines `contact|...`
+  contact.py -table LOGS [-into docs/reports/contact.md]
+      the table of the suite from the logs of tests/run, build/test-logs, which have lines `contact|...`: printed, or written into the report.
 
 Every case: it ends where it should; no edge goes through a triangle, in no accepted state by the program's own test (-effect_NAME_verify) and in no frame
 that is examined by contact_crossings.py; nothing is behind an obstacle; kinetic, strain and contact energy never exceed those of the start and the work done; no tet inverts (neo-Hookean);
@@ -17,6 +18,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import h5py
 import numpy as np
 
 import contact_crossings
@@ -505,8 +507,12 @@ def run(name, ranks, short, more):
             found.append(f"{what}: {value:g}, not {relation} {bound:g}")
     if not short:
         found += [text for check in scene.checks if (text := check(h))]
-    print(f"contact|{name}|{ranks}|{steps}|{'yes' if not result.returncode else 'no'}|{len(seen)}|{np.median(newton):g}|{newton.max():g}"
-          f"|{h['rejected'].sum():g}|{cpu:.1f}")
+    gaps = np.concatenate([h[f"{e}_gap"] for e in scene.effects if f"{e}_gap" in h])
+    with h5py.File(out / "fields.h5") as f:
+        tets = len(f["mesh/cells"])
+    ended = "yes" if not result.returncode else f"at {h['time'][-1]:g} s of {end:g}"
+    print(f"contact|{name}|{ranks}|{tets}|{steps}|{ended}|{len(seen)}|{np.median(newton):g}|{newton.max():g}"
+          f"|{h['rejected'].sum():g}|{gaps[gaps > 0].min(initial=np.inf):.1e}|{max(made, 0) + 0.0:.0e}|{cpu:.1f}|{1e6 * cpu / steps / tets:.1f}")
     return found, h
 
 
@@ -517,11 +523,21 @@ def table(folder):
             if line.startswith("contact|"):
                 _, name, ranks, *rest = line.split("|")
                 rows.setdefault(name, {})[int(ranks)] = rest
-    print("| scene | what | ranks | steps | end | crossings | iterations, median and most | rejected | CPU s |\n|---|---|---|---|---|---|---|---|---|")
+    lines = ["| scene | what | tets | ranks | steps | end | crossed frames | iterations, median and most | rejected | smallest gap, m | energy made | CPU s | ms |",
+             "|---|---|---|---|---|---|---|---|---|---|---|---|---|"]
     for name, c in CASES.items():
-        for ranks, (steps, end, crossed, median, most, rejected, cpu) in sorted(rows.get(name, {}).items()):
+        for ranks, (tets, steps, end, crossed, median, most, *rest) in sorted(rows.get(name, {}).items()):
             first = ranks == min(rows[name])
-            print(f"| {'`' + name + '`' if first else ''} | {c['what'] if first else ''} | {ranks} | {steps} | {end} | {crossed} | {median}, {most} | {rejected} | {cpu} |")
+            lines.append(f"| {'`' + name + '`' if first else ''} | {c['what'] if first else ''} | {tets if first else ''} | {ranks} | {steps} | {end} | {crossed} | {median}, {most} | " +
+                         " | ".join(rest) + " |")
+    return lines
+
+
+def report(folder, path):
+    """Writes the table between the marks of a report."""
+    text, first, last = path.read_text(), "<!-- table of the suite: -->\n", "<!-- its end -->\n"
+    before, rest = text.split(first)
+    path.write_text(before + first + "\n".join(table(folder)) + "\n" + last + rest.split(last)[1])
 
 
 def main():
@@ -532,13 +548,17 @@ def main():
     parser.add_argument("-runs", help="the short run")
     parser.add_argument("-more", default="")
     parser.add_argument("-table")
+    parser.add_argument("-into", type=Path)
     options = parser.parse_args()
     if options.list:
         for name, c in CASES.items():
             print(name, ",".join(map(str, c["ranks"])), int(c["short"] is not None), c["seconds"], c["what"], sep="\t")
         return 0
     if options.table:
-        table(options.table)
+        if options.into:
+            report(options.table, options.into)
+        else:
+            print("\n".join(table(options.table)))
         return 0
     if options.case not in CASES:
         sys.exit(f"contact.py: no case '{options.case}': -list names them")

@@ -1,0 +1,89 @@
+/*
+  barrier_friction.c - which pairs of the response `barrier` rub on each other, with which normal forces and in which directions; by how much friction lags behind these.
+
+  Both are those of a state before the solution: of the start of the step, or of the solve before. A solution x with the friction F(x; lag) would have F(x; x). By how
+  much it lags behind is told as sum |F(x; x) - F(x; lag)| over the nodes, of the sum of mu N over the pairs: what normal forces, places and directions of slip have
+  changed by. Fixed-point iterations, a solve each, end where that is small; Li et al. (2020, section 5.7) do the same. They converge where friction changes normal forces by less than itself.
+*/
+#include "barrier_impl.h"
+
+/* How far the point of the obstacle that a pair rubs on moves in the step, beyond what its vertices say. */
+static void carry_along(const Barrier *b, PetscBool end, const Active *a, Rub *rub)
+{
+  const SbContactMesh m = b->mesh;
+  const PetscInt *v = b->pairs->pair[a->pair].v;
+  PetscReal X[3], at[3] = {0}, other[3], sign = 0.;
+
+  for (int k = 0; k < 4; k++) {
+    if (v[k] >= m->nbody_vertex || rub->weight[k] == 0.) continue;
+    sign = rub->weight[k] > 0. ? 1. : -1.;
+    for (int i = 0; i < 3; i++) at[i] += PetscAbsReal(rub->weight[k]) * b->x[3 * v[k] + i];
+  }
+  for (int i = 0; i < 3; i++) at[i] -= sign * a->gap * rub->n[i];
+  SbPoseInvert(&b->pose[end], at, X);
+  SbPoseApply(&b->pose[!end], X, other);
+  for (int i = 0; i < 3; i++) rub->carry[i] = sign * (end ? at[i] - other[i] : other[i] - at[i]);
+  for (int k = 0; k < 4; k++) {
+    const PetscInt o = 3 * (v[k] - m->nbody_vertex);
+
+    for (int i = 0; i < 3 && o >= 0; i++) rub->carry[i] += rub->weight[k] * (b->to[o + i] - b->from[o + i]);
+  }
+}
+
+PetscErrorCode SbBarrierFindFriction(Barrier *b, PetscBool end)
+{
+  PetscFunctionBeginUser;
+  b->nnext = 0;
+  for (PetscInt i = 0; b->scene.friction > 0. && i < b->nactive; i++) {
+    const Active *a = &b->active[i];
+    const SbContactPair *pair = &b->pairs->pair[a->pair];
+    PetscReal energy, gradient[12];
+    Rub rub = {.pair = *pair};
+
+    rub.force = b->scene.friction * SbBarrierPush(b, a, &energy, gradient);
+    PetscCall(PetscArraycpy(rub.weight, a->at.weight, 4));
+    PetscCall(PetscArraycpy(rub.n, a->at.n, 3));
+    if (b->scene.obstacle) carry_along(b, end, a, &rub);
+    if (b->nnext == b->next_size) {
+      b->next_size = PetscMax(64, 2 * b->next_size);
+      PetscCall(PetscRealloc((size_t)b->next_size * sizeof(*b->next), &b->next));
+    }
+    b->next[b->nnext++] = rub;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+void SbBarrierSwapFriction(Barrier *b)
+{
+  const PetscInt n = b->nrub, size = b->rub_size;
+  Rub *rub = b->rub;
+
+  b->nrub = b->nnext;
+  b->rub_size = b->next_size;
+  b->rub = b->next;
+  b->nnext = n;
+  b->next_size = size;
+  b->next = rub;
+}
+
+PetscErrorCode SbBarrierLag(Barrier *b)
+{
+  const SbSpace s = b->mesh->space;
+  PetscReal *f, sum[2] = {0.};
+
+  PetscFunctionBeginUser;
+  PetscCall(SbBarrierFindFriction(b, PETSC_TRUE));
+
+  /* the forces of gaps cancel */
+  PetscCall(PetscCalloc1(3 * s->nnode, &f));
+  (void)SbBarrierGradient(b, 1., f);
+  SbBarrierSwapFriction(b);
+  (void)SbBarrierGradient(b, -1., f);
+  SbBarrierSwapFriction(b);
+  for (PetscInt i = 0; i < s->nnode_owned; i++) sum[0] += PetscSqrtReal(SbDot3(f + 3 * i, f + 3 * i));
+  for (PetscInt i = 0; i < b->nnext; i++) sum[1] += counts(b, &b->next[i].pair) ? b->next[i].force : 0.;
+  PetscCall(PetscFree(f));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, sum, 2, MPIU_REAL, MPI_SUM, s->comm));
+  b->lag = sum[1] > 0. ? sum[0] / sum[1] : 0.;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
