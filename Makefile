@@ -114,7 +114,7 @@ demo: deps ## install what is missing, build, run scenarios/demo.opts on 2 ranks
 	@scripts/mpi 2 bin/supple scenarios/demo.opts
 	@scripts/render out/demo
 	@scripts/render out/demo --animate out/demo/animation.gif
-	@echo "open out/demo/fields.xmf in ParaView; out/demo/picture.png and animation.gif show the run"
+	@echo "open out/demo/fields.vtkhdf in ParaView (5.12 or newer; older: fields.xmf); out/demo/picture.png and animation.gif show the run"
 
 pictures: deps ## run the scenarios of contact on 1 rank and draw them: docs/pictures/*.png and out/*/animation.gif (1 to 2 minutes)
 	$(AGAIN) bin/supple meshes/lobe.msh meshes/hook.msh

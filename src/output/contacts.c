@@ -2,7 +2,7 @@
   The points where contact pushes bodies, with normals, gaps and forces: -output_contacts.
 
   Each frame of fields.h5 then has a group `contacts` with one dataset per quantity and one row per point, in an order that no partition
-  changes. Their number differs from frame to frame, so they have an index of their own, contacts.xmf.
+  changes. Their number differs from frame to frame, so they have indices of their own, contacts.xmf and contacts.vtkhdf.
 
   A point is sent to the rank that has its share of the numbers of points and edges, and sorted there: by the number that it begins
   with, then by effect, kind, and the number of the other side.
@@ -46,7 +46,8 @@ struct _p_SbContacts {
   PetscReal *record;    /* [share.n][RECORD] of this rank's share, sorted */
   SbOrder share;        /* which rows are this rank's; it has no star forest */
   void *column;         /* [share.n][3] of one quantity, as in the file */
-  SbXdmf xdmf;          /* rank 0 only */
+  SbXdmf xdmf;          /* rank 0 only, as the next one */
+  SbVtkhdf vtkhdf;
   PetscBool listed;     /* it has a frame */
   PetscReal nowhere[3]; /* a vertex of the mesh, m */
 };
@@ -219,21 +220,26 @@ PetscErrorCode SbContactsList(SbOutput out, PetscReal time, const char *frame, P
       .name = table[k].name, .ncomp = table[k].ncomp, .bytes = (int)bytes, .whole = table[k].whole};
   (void)snprintf(group, sizeof(group), "%s/contacts", frame);
   PetscCall(SbXdmfAddPoints(c->xdmf, time, group, n, c->nowhere, NTABLE, values));
+  PetscCall(SbVtkhdfAddPoints(c->vtkhdf, time, group, n, NTABLE, values));
   c->listed = PETSC_TRUE;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-void SbContactsIndex(SbOutput out, size_t nmessage, char message[])
+void SbContactsIndex(SbOutput out, PetscBool last, size_t nmessage, char message[])
 {
   const SbContacts c = out->contacts;
 
-  if (c && c->xdmf && c->listed) SbXdmfWrite(c->xdmf, nmessage, message);
+  if (!c || !c->xdmf || !c->listed) return;
+  SbXdmfWrite(c->xdmf, nmessage, message);
+  if (!message[0]) SbVtkhdfWrite(c->vtkhdf, last, nmessage, message);
 }
 
 PetscErrorCode SbContactsRemoveIndex(SbOutput out)
 {
   PetscFunctionBeginUser;
-  if (out->contacts && out->contacts->xdmf) PetscCall(SbXdmfRemove(out->contacts->xdmf));
+  if (!out->contacts || !out->contacts->xdmf) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(SbXdmfRemove(out->contacts->xdmf));
+  PetscCall(SbVtkhdfRemove(out->contacts->vtkhdf));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -257,6 +263,8 @@ PetscErrorCode SbContactsCreate(SbRun run, SbOutput out)
   for (int k = 0; k < 3 && mesh->nvert; k++) c->nowhere[k] = mesh->x[k];
   PetscCall(SbOutputPath(out, "contacts.xmf", sizeof(path), path));
   PetscCall(SbXdmfCreate(path, &c->xdmf));
+  PetscCall(SbOutputPath(out, "contacts.vtkhdf", sizeof(path), path));
+  PetscCall(SbVtkhdfCreate(path, PETSC_TRUE, &c->vtkhdf));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -267,6 +275,7 @@ PetscErrorCode SbContactsDestroy(SbOutput out)
   PetscFunctionBeginUser;
   if (!c) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(SbXdmfDestroy(&c->xdmf));
+  PetscCall(SbVtkhdfDestroy(&c->vtkhdf));
   PetscCall(PetscFree(c->list.point));
   PetscCall(PetscFree(c->record));
   PetscCall(PetscFree(c->column));

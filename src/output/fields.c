@@ -26,6 +26,18 @@ static PetscErrorCode vector(const SbField *f, SbRun run, const SbStep *step, Pe
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+static PetscErrorCode position(const SbField *f, SbRun run, const SbStep *step, PetscReal *values)
+{
+  SbOutput out = (SbOutput)run->output;
+  const SbMesh mesh = run->model->mesh;
+
+  PetscFunctionBeginUser;
+  PetscCall(vector(f, run, step, values));
+  for (PetscInt i = 0; i < 3 * out->point.nowned; i++)
+    values[i] += mesh->x[3 * (out->discontinuous ? mesh->cell[i / 3] : i / 3) + i % 3];
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 static PetscErrorCode reaction(const SbField *f, SbRun run, const SbStep *step, PetscReal *values)
 {
   PetscFunctionBeginUser;
@@ -164,6 +176,8 @@ static PetscErrorCode rank_number(const SbField *f, SbRun run, const SbStep *ste
 
 static const SbField table[] = {
   {"displacement", "m", 3, VERTEX, VARIES, ALWAYS, "displacement from the rest state", vector, STEP(U)},
+  {"position", "m", 3, VERTEX, VARIES, ALWAYS, "where the vertices are; fields.vtkhdf shows the bodies there",
+   position, STEP(U)},
   {"velocity", "m/s", 3, VERTEX, VARIES, DYNAMIC, "velocity", vector, STEP(V)},
   {"acceleration", "m/s^2", 3, VERTEX, VARIES, DYNAMIC, "acceleration, state of the integrator", vector,
    STEP(A)},

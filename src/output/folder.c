@@ -10,8 +10,9 @@
 #include <unistd.h>
 #include "output_impl.h"
 
-static const char *const ours[] = {"fields.h5",     "fields.xmf", "contacts.xmf", "history.csv",
-                                   "scenario.opts", "run.json",   "ledger.csv"};
+static const char *const ours[] = {"fields.h5",     "fields.xmf",      "fields.vtkhdf",
+                                   "contacts.xmf",  "contacts.vtkhdf", "history.csv",
+                                   "scenario.opts", "run.json",        "ledger.csv"};
 
 PetscErrorCode SbOutputPath(SbOutput out, const char *name, size_t size, char path[])
 {

@@ -3,7 +3,7 @@
 
   With -output_discontinuous point 4 c + a is corner a of cell c, and /mesh/vertices says which vertices coincide.
 
-  A frame gets its name in the file when it is complete (h5.c), and is then listed in the index fields.xmf. After a restart in
+  A frame gets its name in the file when it is complete (h5.c), and is then listed in the indices fields.xmf and fields.vtkhdf. After a restart in
   the same folder frames up to the restart stay, later ones are removed and their space in the file is used again.
 */
 #include <ctype.h>
@@ -28,8 +28,9 @@ struct _p_SbFrames {
   PetscInt nnode, nlink; /* hundreds so far; links in the current one */
   PetscInt last_step;    /* of the last frame in the file, or -1 */
   PetscInt nframe;
-  PetscInt mesh;            /* of frames that are written, as in SbFrame */
-  SbXdmf xdmf;              /* rank 0 only */
+  PetscInt mesh; /* of frames that are written, as in SbFrame */
+  SbXdmf xdmf;   /* rank 0 only, as the next one */
+  SbVtkhdf vtkhdf;
   PetscReal *owned, *slice; /* work: six numbers per cell or three per point */
   void *packed;             /* slice in the type of the file; NULL when that is double */
 };
@@ -236,6 +237,14 @@ static PetscErrorCode commit(SbOutput out, hid_t group, PetscInt step, size_t si
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* What viewers open, with all frames so far. Rank 0. */
+static void write_indices(SbOutput out, PetscBool last, size_t nmessage, char message[])
+{
+  SbXdmfWrite(out->frames->xdmf, nmessage, message);
+  if (!message[0]) SbVtkhdfWrite(out->frames->vtkhdf, last, nmessage, message);
+  if (!message[0]) SbContactsIndex(out, last, nmessage, message);
+}
+
 static PetscErrorCode write_frame(SbRun run, SbOutput out, const SbStep *step)
 {
   SbFrames fr = out->frames;
@@ -278,9 +287,9 @@ static PetscErrorCode write_frame(SbRun run, SbOutput out, const SbStep *step)
   fr->nframe++;
   if (fr->xdmf) {
     PetscCall(SbXdmfAdd(fr->xdmf, time, path, n, field, bytes));
+    PetscCall(SbVtkhdfAdd(fr->vtkhdf, time, path, n, field, bytes));
     PetscCall(SbContactsList(out, time, path, SbContactsCount(out), out->precise ? 8 : 4));
-    SbXdmfWrite(fr->xdmf, sizeof(message), message);
-    if (!message[0]) SbContactsIndex(out, sizeof(message), message);
+    write_indices(out, step->last, sizeof(message), message);
   }
   PetscCall(SbAgree(out->comm, PETSC_ERR_FILE_WRITE, message));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -440,6 +449,7 @@ static PetscErrorCode index_mesh(SbFrames fr, PetscInt step)
   mesh_name(step, sizeof(name), name);
   mesh = H5Gopen2(fr->h5.file, name, H5P_DEFAULT);
   PetscCall(SbXdmfSetMesh(fr->xdmf, mesh, name));
+  PetscCall(SbVtkhdfSetMesh(fr->vtkhdf, mesh, name));
   if (mesh >= 0) (void)H5Gclose(mesh);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -476,12 +486,13 @@ static PetscErrorCode resume(SbRun run, SbOutput out, const char *path, PetscBoo
     if (!i || frames[i].mesh != frames[i - 1].mesh) PetscCall(index_mesh(fr, frames[i].mesh));
     PetscCall(SbXdmfAdd(fr->xdmf, frames[i].time, frames[i].group, frames[i].nfield, frames[i].field,
                         frames[i].bytes));
+    PetscCall(SbVtkhdfAdd(fr->vtkhdf, frames[i].time, frames[i].group, frames[i].nfield, frames[i].field,
+                          frames[i].bytes));
     PetscCall(SbContactsList(out, frames[i].time, frames[i].group, frames[i].npoint, frames[i].point_bytes));
   }
   if (fr->xdmf && (!fr->nframe || frames[fr->nframe - 1].mesh != fr->mesh))
     PetscCall(index_mesh(fr, fr->mesh));
-  if (fr->xdmf) SbXdmfWrite(fr->xdmf, sizeof(message), message);
-  if (fr->xdmf && !message[0]) SbContactsIndex(out, sizeof(message), message);
+  if (fr->xdmf) write_indices(out, PETSC_TRUE, sizeof(message), message);
   PetscCall(PetscFree(frames));
   PetscCall(SbAgree(out->comm, PETSC_ERR_FILE_WRITE, message));
 
@@ -561,6 +572,8 @@ PetscErrorCode SbFramesAttach(SbRun run, SbOutput out)
   if (!out->rank) {
     PetscCall(SbOutputPath(out, "fields.xmf", sizeof(path), path));
     PetscCall(SbXdmfCreate(path, &out->frames->xdmf));
+    PetscCall(SbOutputPath(out, "fields.vtkhdf", sizeof(path), path));
+    PetscCall(SbVtkhdfCreate(path, PETSC_FALSE, &out->frames->vtkhdf));
   }
   PetscCall(SbContactsCreate(run, out));
   PetscCall(SbOutputPath(out, "fields.h5", sizeof(path), path));
@@ -571,6 +584,7 @@ PetscErrorCode SbFramesAttach(SbRun run, SbOutput out)
     SbFrames fr = out->frames;
 
     if (fr->xdmf) PetscCall(SbXdmfRemove(fr->xdmf));
+    if (fr->xdmf) PetscCall(SbVtkhdfRemove(fr->vtkhdf));
     PetscCall(SbContactsRemoveIndex(out));
     PetscCall(SbH5Create(out->comm, path, &fr->h5));
     PetscCall(SbH5PutText(&fr->h5, fr->h5.file, "program", "supple " SB_VERSION));
@@ -619,6 +633,7 @@ PetscErrorCode SbFramesDestroy(SbOutput out)
   PetscCall(SbFramesClose(out));
   PetscCall(SbContactsDestroy(out));
   PetscCall(SbXdmfDestroy(&out->frames->xdmf));
+  PetscCall(SbVtkhdfDestroy(&out->frames->vtkhdf));
   PetscCall(free_work(out->frames));
   PetscCall(PetscFree(out->frames));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -9,8 +9,9 @@
 static const SbOption rows[] = {
   {"output_dir", SB_OPTION_STRING, 1, "", "", "",
    "folder of the results; empty: out/<name of the scenario file>"},
-  {"output_fields", SB_OPTION_NAMES, 1, "", "displacement,velocity,von_mises", "",
-   "fields in fields.h5: displacement, velocity, acceleration, reaction, contact_force, contact_gap, stress, "
+  {"output_fields", SB_OPTION_NAMES, 1, "", "position,displacement,velocity,von_mises", "",
+   "fields in fields.h5: position, displacement, velocity, acceleration, reaction, contact_force, "
+   "contact_gap, stress, "
    "von_mises, pressure, mean_pressure, J, energy_density, space_error, rank; sets: where the sets and "
    "groups are that the scenario names; none: no such file"},
   {"output_every", SB_OPTION_REAL, 1, "s", "0", "[0, inf)",

@@ -225,7 +225,7 @@ PetscErrorCode SbContactsRead(hid_t frame, PetscInt *n, PetscInt *bytes);
 PetscInt SbContactsCount(SbOutput out);
 /* Adds a frame of n points to the index, at the path of its group; rank 0. The next brings it to disk, or removes it. */
 PetscErrorCode SbContactsList(SbOutput out, PetscReal time, const char *frame, PetscInt n, PetscInt bytes);
-void SbContactsIndex(SbOutput out, size_t nmessage, char message[]);
+void SbContactsIndex(SbOutput out, PetscBool last, size_t nmessage, char message[]);
 PetscErrorCode SbContactsRemoveIndex(SbOutput out);
 PetscErrorCode SbHistoryAttach(SbRun run, SbOutput out);
 PetscErrorCode SbHistoryReattach(SbRun run, SbOutput out);
@@ -291,6 +291,19 @@ PetscErrorCode SbXdmfAddPoints(SbXdmf x, PetscReal time, const char *group, Pets
                                const PetscReal nowhere[3], PetscInt nvalues, const SbXdmfValues values[]);
 /* Replaces the file; `message` becomes the error, if any. */
 void SbXdmfWrite(SbXdmf x, size_t nmessage, char message[]);
+
+/* vtkhdf.c: the same in VTK's own format, of tets or of contact points; functions as above. Rank 0. */
+typedef struct _p_SbVtkhdf *SbVtkhdf;
+PetscErrorCode SbVtkhdfCreate(const char *path, PetscBool points, SbVtkhdf *v);
+PetscErrorCode SbVtkhdfSetMesh(SbVtkhdf v, hid_t mesh, const char *group);
+PetscErrorCode SbVtkhdfDestroy(SbVtkhdf *v);
+PetscErrorCode SbVtkhdfRemove(SbVtkhdf v);
+PetscErrorCode SbVtkhdfAdd(SbVtkhdf v, PetscReal time, const char *group, PetscInt n,
+                           const SbField *const field[], const PetscInt bytes[]);
+PetscErrorCode SbVtkhdfAddPoints(SbVtkhdf v, PetscReal time, const char *group, PetscInt n, PetscInt nvalues,
+                                 const SbXdmfValues values[]);
+/* Replaces the file when enough frames have come since, or these are the last ones. */
+void SbVtkhdfWrite(SbVtkhdf v, PetscBool last, size_t nmessage, char message[]);
 
 /* phases.c: where the time went, from the log events. */
 #define SB_PHASE_COUNT 10

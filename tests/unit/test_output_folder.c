@@ -59,7 +59,7 @@ static PetscErrorCode test_scenario(void)
   PetscCall(test_scene_open_in(dir, BOX EULER "-output_every 0.5 -probes p -probe_p_at 1,2,3", &scene));
   PetscCall(fixture_read(dir, "scenario.opts", &text));
   SB_CHECK(strstr(text, "-output_every 0.5 "), "a given option is missing");
-  SB_CHECK(strstr(text, "-output_fields displacement,velocity,von_mises "), "a default is missing");
+  SB_CHECK(strstr(text, "-output_fields position,displacement,velocity,von_mises "), "a default is missing");
   SB_CHECK(strstr(text, "-probe_p_at 1,2,3 "), "the probe is missing");
   PetscCall(PetscFree(text));
   PetscCall(test_scene_close(&scene));
@@ -92,7 +92,7 @@ static PetscErrorCode test_fields(void)
   // a static run has no velocity
   PetscCall(test_scene_open_in(dir, HELD " -time static -quiet", &scene));
   out = (SbOutput)scene.run->output;
-  SB_CHECK(out->nfield == 3 && !strcmp(out->field[1]->name, "von_mises"), "a static run has %d fields",
+  SB_CHECK(out->nfield == 4 && !strcmp(out->field[2]->name, "von_mises"), "a static run has %d fields",
            (int)out->nfield);
   PetscCall(test_scene_close(&scene));
   PetscFunctionReturn(PETSC_SUCCESS);

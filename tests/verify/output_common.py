@@ -32,7 +32,7 @@ SCENARIO = """
 -ts_dt 0.01
 -ts_max_time 0.2
 -ksp_rtol 1e-10
--output_fields displacement,velocity,acceleration,stress,von_mises,J,energy_density,reaction
+-output_fields position,displacement,velocity,acceleration,stress,von_mises,J,energy_density,reaction
 """
 
 
@@ -101,6 +101,60 @@ def check_frames(folder):
             if numpy.abs(f[group]["displacement"][()]).max() > 1 or (time > 0 and not numpy.any(f[group]["stress"][()])):
                 sys.exit(f"{folder}: {group} holds wrong numbers")
     return len(listed)
+
+
+def vtkhdf(path):
+    """(time, data set) of each step of a .vtkhdf file, as VTK reads it; opened from another folder than the file's."""
+    from vtkmodules.vtkCommonExecutionModel import vtkStreamingDemandDrivenPipeline
+    from vtkmodules.vtkIOHDF import vtkHDFReader
+
+    reader = vtkHDFReader()
+    reader.SetFileName(str(path))
+    reader.UpdateInformation()
+    for time in reader.GetOutputInformation(0).Get(vtkStreamingDemandDrivenPipeline.TIME_STEPS()):
+        reader.UpdateTimeStep(time)
+        data = reader.GetOutputDataObject(0)
+        data = data.GetPartition(0) if data.IsA("vtkPartitionedDataSet") else data
+        copy = data.NewInstance()
+        copy.ShallowCopy(data)
+        yield time, copy
+
+
+def check_vtkhdf(folder):
+    """fields.vtkhdf against fields.h5: times, points where the bodies are, cells, and every array of each frame. Returns the meshes and
+    names that were compared. `folder` below OUT."""
+    from vtkmodules.util.numpy_support import vtk_to_numpy
+
+    path, meshes, names = OUT / folder / "fields.vtkhdf", set(), set()
+    with h5py.File(path, "r") as f:
+        arrays = [f["VTKHDF/Points"], f["VTKHDF/Connectivity"], *f["VTKHDF/PointData"].values(), *f["VTKHDF/CellData"].values()]
+        copied = [data.name for data in arrays if not data.is_virtual]
+    if copied:
+        sys.exit(f"{path} holds copies: {copied}")
+    steps, listed = list(vtkhdf(path)), frames(folder)
+    if [time for time, _ in steps] != [time for time, _ in listed]:
+        sys.exit(f"{path}: times {[time for time, _ in steps]}, in the other index {listed}")
+    with h5py.File(OUT / folder / "fields.h5", "r") as f:
+        for (_, grid), (_, group) in zip(steps, listed):
+            frame = f[group]
+            mesh = f[f"mesh_{frame.attrs['mesh']:06d}" if "mesh" in frame.attrs else "mesh"]
+            meshes.add(mesh.name)
+            expected = {"points": frame["position"] if "position" in frame else mesh["x"], "cells": mesh["cells"]}
+            expected |= {name: data for name, data in frame.items() if isinstance(data, h5py.Dataset) and name != "position"}
+            expected |= {name: data for name, data in mesh.items() if name not in ("x", "cells", "vertices")}
+            found = {"points": grid.GetPoints().GetData(), "cells": grid.GetCells().GetConnectivityArray()}
+            for data in (grid.GetPointData(), grid.GetCellData()):
+                found |= {data.GetArrayName(k): data.GetArray(k) for k in range(data.GetNumberOfArrays())}
+            if found.keys() != expected.keys() or {grid.GetCellType(c) for c in range(grid.GetNumberOfCells())} != {10}:
+                sys.exit(f"{path}, {group}: arrays {sorted(found)}, expected {sorted(expected)}")
+            for name, data in expected.items():
+                values, data = vtk_to_numpy(found[name]), data[()]
+                if data.ndim == 2 and data.shape[1] == 6:
+                    data = data[:, [0, 3, 5, 1, 4, 2]]  # the order of VTK
+                if not numpy.array_equal(values, data.ravel() if name == "cells" else data):
+                    sys.exit(f"{path}, {group}: {name} is not what fields.h5 has")
+            names |= expected.keys()
+    return meshes, names
 
 
 def history(folder):

@@ -1,4 +1,4 @@
-"""contacts.xmf: the places of contact as VTK reads them, frame by frame, against fields.h5 and the pairs in history.csv; a frame
+"""contacts.xmf and contacts.vtkhdf: the places of contact as VTK reads them, frame by frame, against fields.h5 and the pairs in history.csv; a frame
 without any; going on after a restart, with the places and without; what is refused.
 """
 import os
@@ -12,7 +12,7 @@ from vtkmodules.util.numpy_support import vtk_to_numpy
 from vtkmodules.vtkCommonExecutionModel import vtkStreamingDemandDrivenPipeline
 from vtkmodules.vtkIOXdmf2 import vtkXdmfReader
 
-from output_common import MPI, OUT, SUPPLE, frames, history
+from output_common import MPI, OUT, SUPPLE, frames, history, vtkhdf
 
 PAIRS = os.path.abspath("tests/scenario/pairs.opts")
 EMPTY = {"force": 0, "normal": 0, "gap": 0, "normal_force": 0, "friction_force": 0, "body": -1, "other": -1, "effect": -1}
@@ -62,6 +62,16 @@ def check_reader(folder):
             check(numpy.array_equal(values, data[name]) if count else (values == none).all(), f"t = {time}: {name}")
         if count:
             check(numpy.array_equal(vtk_to_numpy(grid.GetPoints().GetData()), data["x"]), f"t = {time}: places")
+    # the same in contacts.vtkhdf, which has no point where there is none
+    steps = list(vtkhdf(OUT / folder / "contacts.vtkhdf"))
+    check([time for time, _ in steps] == list(times), f"contacts.vtkhdf: times {[time for time, _ in steps]}")
+    for (time, grid), (_, group) in zip(steps, listed):
+        count, data = places(folder, group)
+        check(grid.IsA("vtkPolyData") and grid.GetNumberOfPoints() == grid.GetNumberOfVerts() == count, f"t = {time}: {count} places")
+        check(all(grid.GetCell(c).GetPointId(0) == c for c in range(count)), f"t = {time}: vertices")
+        for name in EMPTY if count else ():
+            check(numpy.array_equal(vtk_to_numpy(grid.GetPointData().GetArray(name)), data[name]), f"contacts.vtkhdf, t = {time}: {name}")
+        check(not count or numpy.array_equal(vtk_to_numpy(grid.GetPoints().GetData()), data["x"]), f"contacts.vtkhdf, t = {time}: places")
     check(places(folder, listed[0][1])[0] == 0 and count > 20, f"the first frame has places, or the last one only {count}")
 
 

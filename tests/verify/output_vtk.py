@@ -1,4 +1,4 @@
-"""fields.xmf as VTK reads it: frames, times, names, values; and the same datasets on 1, 2, 3 and 4 ranks; by element, and
+"""fields.xmf and fields.vtkhdf as VTK reads them: frames, times, names, values; and the same datasets on 1, 2, 3 and 4 ranks; by element, and
 with points of its own for each cell.
 
 
@@ -14,9 +14,9 @@ from vtkmodules.util.numpy_support import vtk_to_numpy
 from vtkmodules.vtkCommonExecutionModel import vtkStreamingDemandDrivenPipeline
 from vtkmodules.vtkIOXdmf2 import vtkXdmfReader
 
-from output_common import ELEMENTS, OUT, check_frames, frames, history, run
+from output_common import ELEMENTS, OUT, check_frames, check_vtkhdf, frames, history, run
 
-VECTORS = ["displacement", "velocity", "acceleration", "reaction"]
+VECTORS = ["position", "displacement", "velocity", "acceleration", "reaction"]
 CELLS = {"stress": 6, "von_mises": 1, "J": 1, "energy_density": 1}
 PRESSURES = {"pressure": 1, "mean_pressure": 1}
 
@@ -126,6 +126,7 @@ def check_elements():
             check_ranks(folders, 1e-9)
             for make in readers():
                 check_reader(make, folders[2], str(OUT / folders[2] / "fields.xmf"), vertices=False, fields=CELLS | PRESSURES)
+            check_vtkhdf(folders[2])
         check_corners(f"{element}1", f"{element}-corners1")
 
 
@@ -173,7 +174,12 @@ def main():
         os.chdir(OUT / "float")
         check_reader(make, "float", "./fields.xmf")
         os.chdir(here)
+    check(check_vtkhdf("float")[1] >= {"points", "cells", "displacement", "stress", "body"}, "arrays of fields.vtkhdf")
     check_elements()
+    # without the field position: the rest shape, with the sets
+    still = ["-quiet", "-output_fields", "displacement,sets,rank", "-sets", "left,half", "-set_half_at", "halfspace:1,0,0,0.2"]
+    run(2, "still", *still, "-ts_max_time", "0.04")
+    check(check_vtkhdf("still")[1] >= {"points", "set_half", "tets_half", "rank"}, "sets in fields.vtkhdf")
     run(2, "p1-corners", "-quiet", "-output_discontinuous", "-ts_max_time", "0.04")
     check_reader(vtkXdmfReader, "p1-corners", str(OUT / "p1-corners" / "fields.xmf"))
 

@@ -11,9 +11,11 @@ from pathlib import Path
 import h5py
 import numpy
 
+import output_common
+
 SUPPLE = os.environ.get("SB_SUPPLE", "bin/supple")
 MPI = shlex.split(os.environ.get("SB_MPI", "scripts/mpi"))
-OUT = Path(os.environ.get("SB_OUT", "build/test-out/remesh")).resolve()
+OUT = output_common.OUT
 
 
 def run(ranks, folder, *more):
@@ -41,6 +43,9 @@ def check_frames(folder):
             if len(f[frame]["displacement"]) != len(f[mesh]["x"]) or len(f[frame]["von_mises"]) != len(f[mesh]["cells"]):
                 sys.exit(f"{folder}: {frame} does not fit {mesh}")
             meshes.add((mesh, f[frame].attrs["step"] > 6))
+    found, _ = output_common.check_vtkhdf(folder)
+    if found != {"/mesh", "/mesh_000006"}:
+        sys.exit(f"{folder}: meshes {found} in fields.vtkhdf")
     if meshes != {("/mesh", False), ("/mesh_000006", True)}:
         sys.exit(f"{folder}: meshes {meshes}")
 

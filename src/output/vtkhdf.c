@@ -1,0 +1,461 @@
+/*
+  fields.vtkhdf, and contacts.vtkhdf: an index of fields.h5 in VTK's own format, which ParaView, VTK and PyVista open without choosing a reader.
+
+  Every array is a virtual dataset: a list of places in fields.h5, so that nothing is stored twice. Bodies are an UnstructuredGrid with one part per
+  mesh (there are several in a run that was re-meshed); steps name the part that they show and where their values begin. Their points are the field
+  `position`, so that bodies move; frames without it show the rest shape. Contact points are PolyData, one part per frame.
+
+  The file is made in memory and replaced as a whole. Its size and time grow with the number of frames, so it is made again after each of the first
+  frames, later when their number has grown by a quarter, and at the end of the run.
+
+  Reference: VTKHDF file format, version 2.0 (docs.vtk.org, "VTK File Formats"): Steps of UnstructuredGrid and PolyData. Symmetric tensors
+  have the order xx yy zz xy yz xz there.
+*/
+#include <unistd.h>
+#include "output_impl.h"
+
+/* A run of values in fields.h5: rows of one dataset, in one frame or one mesh. */
+typedef struct {
+  PetscInt block; /* number of the frame; of the part for what does not change with time */
+  char path[96];  /* of the dataset */
+} Piece;
+
+typedef struct {
+  char name[SB_NAME_MAX + 8];
+  int ncomp, bytes;
+  PetscBool whole, cell, constant; /* whole numbers; per cell; one piece per part, else per frame */
+  PetscInt npiece, size;
+  Piece *piece; /* [npiece], the blocks rise */
+} Array;
+
+typedef struct {
+  PetscInt npoint, ncell;
+  char group[64];
+} Part;
+
+typedef struct {
+  PetscReal time; /* s */
+  PetscInt part;
+} Frame;
+
+struct _p_SbVtkhdf {
+  char path[PETSC_MAX_PATH_LEN];
+  PetscBool points; /* PolyData of contact points, else an UnstructuredGrid of tets */
+  PetscInt npart, part_size, nframe, frame_size, narray, array_size;
+  Part *part;
+  Frame *frame;
+  Array *array;
+  PetscInt nwritten; /* frames that the file on disk has */
+};
+
+PetscErrorCode SbVtkhdfCreate(const char *path, PetscBool points, SbVtkhdf *v)
+{
+  PetscFunctionBeginUser;
+  PetscCall(PetscNew(v));
+  PetscCall(PetscStrncpy((*v)->path, path, sizeof((*v)->path)));
+  (*v)->points = points;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbVtkhdfDestroy(SbVtkhdf *v)
+{
+  PetscFunctionBeginUser;
+  if (!*v) PetscFunctionReturn(PETSC_SUCCESS);
+  for (PetscInt i = 0; i < (*v)->narray; i++) PetscCall(PetscFree((*v)->array[i].piece));
+  PetscCall(PetscFree((*v)->array));
+  PetscCall(PetscFree((*v)->part));
+  PetscCall(PetscFree((*v)->frame));
+  PetscCall(PetscFree(*v));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbVtkhdfRemove(SbVtkhdf v)
+{
+  PetscFunctionBeginUser;
+  (void)unlink(v->path);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ the list of what there is */
+
+/* Room for one more of `n` items. */
+static PetscErrorCode grow(PetscInt n, size_t each, PetscInt *size, void *items)
+{
+  PetscFunctionBeginUser;
+  if (n < *size) PetscFunctionReturn(PETSC_SUCCESS);
+  *size = PetscMax(16, 2 * *size);
+  PetscCall(PetscRealloc((size_t)*size * each, (void **)items));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* One more piece of the array of this name, which is made when it is new: group/dataset of fields.h5. */
+static PetscErrorCode add_piece(SbVtkhdf v, const Array *like, PetscInt block, const char *group,
+                                const char *dataset)
+{
+  Array *a = NULL;
+
+  PetscFunctionBeginUser;
+  for (PetscInt i = 0; i < v->narray && !a; i++)
+    if (!strcmp(v->array[i].name, like->name)) a = &v->array[i];
+  if (!a) {
+    PetscCall(grow(v->narray, sizeof(Array), &v->array_size, &v->array));
+    a = &v->array[v->narray++];
+    *a = *like;
+  }
+  a->bytes = PetscMax(a->bytes, like->bytes); // after a restart with another precision
+  PetscCall(grow(a->npiece, sizeof(Piece), &a->size, &a->piece));
+  a->piece[a->npiece].block = block;
+  SbFormat(sizeof(a->piece->path), a->piece[a->npiece++].path, "%s/%s", group, dataset);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+typedef struct {
+  SbVtkhdf v;
+  const char *group;
+  PetscErrorCode ierr;
+} List;
+
+/* An array that belongs to the mesh; `vertices` is ours alone. */
+static herr_t list_array(hid_t where, const char *name, const H5L_info_t *info, void *ctx)
+{
+  List *l = (List *)ctx;
+  Array a = {.ncomp = 1, .bytes = 4, .whole = PETSC_TRUE, .cell = PETSC_TRUE, .constant = PETSC_TRUE};
+
+  (void)where, (void)info;
+  if (!strcmp(name, "vertices") || !strcmp(name, "x")) return 0;
+  SbFormat(sizeof(a.name), a.name, "%s", name);
+  a.cell = (PetscBool)(strncmp(name, "set_", 4) != 0);
+  if (!strcmp(name, "cells")) a.ncomp = 4;
+  l->ierr = add_piece(l->v, &a, l->v->npart, l->group, name);
+  return l->ierr ? -1 : 0;
+}
+
+static PetscErrorCode add_part(SbVtkhdf v, PetscInt npoint, PetscInt ncell, const char *group)
+{
+  PetscFunctionBeginUser;
+  PetscCall(grow(v->npart, sizeof(Part), &v->part_size, &v->part));
+  v->part[v->npart] = (Part){.npoint = npoint, .ncell = ncell};
+  SbFormat(sizeof(v->part->group), v->part[v->npart++].group, "%s", group);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbVtkhdfSetMesh(SbVtkhdf v, hid_t mesh, const char *group)
+{
+  List list = {.v = v, .group = group, .ierr = PETSC_SUCCESS};
+
+  PetscFunctionBeginUser;
+  if (mesh >= 0) (void)H5Literate(mesh, H5_INDEX_NAME, H5_ITER_INC, NULL, list_array, &list);
+  PetscCall(list.ierr);
+  PetscCall(add_part(v, (PetscInt)SbH5Rows(mesh, "x"), (PetscInt)SbH5Rows(mesh, "cells"), group));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode add_frame(SbVtkhdf v, PetscReal time)
+{
+  PetscFunctionBeginUser;
+  PetscCall(grow(v->nframe, sizeof(Frame), &v->frame_size, &v->frame));
+  v->frame[v->nframe++] = (Frame){.time = time, .part = v->npart - 1};
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbVtkhdfAdd(SbVtkhdf v, PetscReal time, const char *group, PetscInt n,
+                           const SbField *const field[], const PetscInt bytes[])
+{
+  Array points = {.name = "Points", .ncomp = 3, .bytes = 8};
+  PetscBool moved = PETSC_FALSE;
+
+  PetscFunctionBeginUser;
+  for (PetscInt i = 0; i < n; i++) {
+    Array a = {.ncomp = (int)field[i]->ncomp, .bytes = (int)bytes[i], .cell = field[i]->cell};
+
+    SbFormat(sizeof(a.name), a.name, "%s", field[i]->name);
+    if (!strcmp(a.name, "position")) {
+      points.bytes = (int)bytes[i];
+      moved = PETSC_TRUE;
+    } else {
+      PetscCall(add_piece(v, &a, v->nframe, group, a.name));
+    }
+  }
+  PetscCall(
+    add_piece(v, &points, v->nframe, moved ? group : v->part[v->npart - 1].group, moved ? "position" : "x"));
+  PetscCall(add_frame(v, time));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbVtkhdfAddPoints(SbVtkhdf v, PetscReal time, const char *group, PetscInt n, PetscInt nvalues,
+                                 const SbXdmfValues values[])
+{
+  PetscFunctionBeginUser;
+  for (PetscInt k = 1; k < nvalues; k++) {
+    Array a = {
+      .ncomp = values[k].ncomp, .bytes = values[k].whole ? 4 : values[k].bytes, .whole = values[k].whole};
+
+    SbFormat(sizeof(a.name), a.name, "%s", k == 1 ? "Points" : values[k].name);
+    PetscCall(add_piece(v, &a, v->nframe, group, values[k].name));
+  }
+  PetscCall(add_part(v, n, n, group));
+  PetscCall(add_frame(v, time));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ the file */
+
+/* Rows of an array in a frame, or in a part for what does not change with time. */
+static PetscInt rows_of(SbVtkhdf v, const Array *a, PetscInt block)
+{
+  const Part *p = &v->part[a->constant ? block : v->frame[block].part];
+
+  return a->cell ? p->ncell : p->npoint;
+}
+
+/* The virtual dataset of an array as `name`: all frames or parts one behind the other; of the corners of cells as one list. */
+static void write_array(SbVtkhdf v, hid_t where, const char *name, const Array *a, PetscBool *ok)
+{
+  static const hsize_t to_vtk[6] = {0, 3, 5, 1, 4, 2}; // column in fields.h5 of each of xx yy zz xy yz xz
+  const hid_t type = a->whole ? H5T_STD_I32LE : a->bytes == 8 ? H5T_IEEE_F64LE : H5T_IEEE_F32LE;
+  const hid_t list = H5Pcreate(H5P_DATASET_CREATE);
+  const PetscInt nblock = a->constant ? v->npart : v->nframe;
+  const int columns = a->ncomp == 6 ? 6 : 1; // that are placed one by one
+  const hsize_t ncomp = (hsize_t)a->ncomp, each = ncomp == 4 ? 4 : 1;
+  const double nothing = a->whole ? 0. : NAN;
+  hsize_t total[2] = {0, ncomp}, at = 0;
+  hid_t space, dataset;
+
+  /* its size, and the value where a frame or a part has none */
+  for (PetscInt b = 0; b < nblock; b++) total[0] += each * (hsize_t)rows_of(v, a, b);
+  space = H5Screate_simple(ncomp > 1 && each == 1 ? 2 : 1, total, NULL);
+  (void)H5Pset_obj_track_times(list, 0);
+  (void)H5Pset_fill_value(list, H5T_NATIVE_DOUBLE, &nothing);
+
+  /* its pieces */
+  for (PetscInt b = 0, i = 0; b < nblock; b++) {
+    const hsize_t n = (hsize_t)rows_of(v, a, b), extent[2] = {n, ncomp};
+
+    if (i < a->npiece && a->piece[i].block == b) {
+      const hid_t source = H5Screate_simple(ncomp > 1 ? 2 : 1, extent, NULL);
+
+      for (int k = 0; k < columns && n; k++) {
+        const hsize_t width = columns > 1 ? 1 : ncomp, from[2] = {0, columns > 1 ? to_vtk[k] : 0};
+        const hsize_t to[2] = {at, (hsize_t)k}, take[2] = {n, width}, put[2] = {each * n, width};
+
+        (void)H5Sselect_hyperslab(source, H5S_SELECT_SET, from, NULL, take, NULL);
+        (void)H5Sselect_hyperslab(space, H5S_SELECT_SET, to, NULL, put, NULL);
+        if (H5Pset_virtual(list, space, "fields.h5", a->piece[i].path, source) < 0) *ok = PETSC_FALSE;
+      }
+      (void)H5Sclose(source);
+      i++;
+    }
+    at += each * n;
+  }
+  (void)H5Sselect_all(space);
+  dataset = H5Dcreate2(where, name, type, space, H5P_DEFAULT, list, H5P_DEFAULT);
+  if (dataset < 0) *ok = PETSC_FALSE;
+  if (dataset >= 0) (void)H5Dclose(dataset);
+  (void)H5Sclose(space);
+  (void)H5Pclose(list);
+}
+
+/* A dataset [n], or [n][m] when m > 0, of numbers in memory; packed when they are many. Without values: those of VTK_TETRA. */
+static void write_numbers(hid_t where, const char *name, PetscInt n, PetscInt m, hid_t memtype,
+                          const void *values, PetscBool *ok)
+{
+  const hsize_t size[2] = {(hsize_t)n, (hsize_t)m}, chunk[1] = {(hsize_t)PetscMin(n, 1 << 16)};
+  const hid_t space = H5Screate_simple(m ? 2 : 1, size, NULL), list = H5Pcreate(H5P_DATASET_CREATE);
+  const hid_t type = !values ? H5T_STD_U8LE : memtype == H5T_NATIVE_DOUBLE ? H5T_IEEE_F64LE : H5T_STD_I64LE;
+  const uint8_t tetra = 10;
+  hid_t dataset;
+
+  (void)H5Pset_obj_track_times(list, 0);
+  if (!values) {
+    (void)H5Pset_fill_value(list, H5T_NATIVE_UINT8, &tetra);
+  } else if (!m && n > 1024 && H5Zfilter_avail(H5Z_FILTER_DEFLATE) > 0) {
+    (void)H5Pset_chunk(list, 1, chunk);
+    (void)H5Pset_shuffle(list);
+    (void)H5Pset_deflate(list, 1);
+  }
+  dataset = H5Dcreate2(where, name, type, space, H5P_DEFAULT, list, H5P_DEFAULT);
+  if (dataset < 0 || (values && H5Dwrite(dataset, memtype, H5S_ALL, H5S_ALL, H5P_DEFAULT, values) < 0))
+    *ok = PETSC_FALSE;
+  if (dataset >= 0) (void)H5Dclose(dataset);
+  (void)H5Pclose(list);
+  (void)H5Sclose(space);
+}
+
+/* Cells: their numbers in each part, where their corners begin, and the corners. */
+static void write_cells(SbVtkhdf v, hid_t root, int64_t *work, PetscBool *ok)
+{
+  static const char *const kind[4] = {"Vertices", "Lines", "Polygons", "Strips"};
+  PetscInt n = 0, ncell = 0, most = 0;
+
+  for (PetscInt p = 0; p < v->npart; p++) {
+    ncell += v->part[p].ncell;
+    most = PetscMax(most, v->part[p].ncell);
+  }
+  if (!v->points) {
+    for (PetscInt p = 0; p < v->npart; p++) work[p] = v->part[p].ncell;
+    write_numbers(root, "NumberOfCells", v->npart, 0, H5T_NATIVE_INT64, work, ok);
+    for (PetscInt p = 0; p < v->npart; p++) work[p] *= 4;
+    write_numbers(root, "NumberOfConnectivityIds", v->npart, 0, H5T_NATIVE_INT64, work, ok);
+    write_numbers(root, "Types", ncell, 0, H5T_NATIVE_UINT8, NULL, ok);
+    for (PetscInt p = 0; p < v->npart; p++)
+      for (PetscInt c = 0; c <= v->part[p].ncell; c++) work[n++] = 4 * (int64_t)c;
+    write_numbers(root, "Offsets", n, 0, H5T_NATIVE_INT64, work, ok);
+    return;
+  }
+
+  /* one vertex per point: all frames share the numbers 0, 1, 2, ... */
+  for (int k = 0; k < 4; k++) {
+    const hid_t group = H5Gcreate2(root, kind[k], H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT);
+
+    for (PetscInt p = 0; p < v->npart; p++) work[p] = k ? 0 : v->part[p].ncell;
+    write_numbers(group, "NumberOfCells", v->npart, 0, H5T_NATIVE_INT64, work, ok);
+    write_numbers(group, "NumberOfConnectivityIds", v->npart, 0, H5T_NATIVE_INT64, work, ok);
+    for (PetscInt c = 0; c <= most; c++) work[c] = c;
+    write_numbers(group, "Connectivity", k ? 0 : most, 0, H5T_NATIVE_INT64, work, ok);
+    write_numbers(group, "Offsets", k ? 1 : most + 1, 0, H5T_NATIVE_INT64, work, ok);
+    (void)H5Gclose(group);
+  }
+}
+
+/* Times of the frames, the part that each of them shows, and where its points, cells and arrays begin. */
+static void write_steps(SbVtkhdf v, hid_t root, int64_t *work, PetscBool *ok)
+{
+  const hid_t group = H5Gcreate2(root, "Steps", H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT);
+  const hid_t space = H5Screate(H5S_SCALAR);
+  const hid_t count = H5Acreate2(group, "NSteps", H5T_STD_I64LE, space, H5P_DEFAULT, H5P_DEFAULT);
+  const PetscInt kinds = v->points ? 4 : 1;
+  const int64_t n = v->nframe;
+  double *times = (double *)work;
+  hid_t where[2]; /* of arrays at points, of cells */
+
+  if (H5Awrite(count, H5T_NATIVE_INT64, &n) < 0) *ok = PETSC_FALSE;
+  (void)H5Aclose(count);
+  (void)H5Sclose(space);
+  for (PetscInt f = 0; f < v->nframe; f++) times[f] = v->frame[f].time;
+  write_numbers(group, "Values", v->nframe, 0, H5T_NATIVE_DOUBLE, times, ok);
+  for (PetscInt f = 0; f < v->nframe; f++) work[f] = 1;
+  write_numbers(group, "NumberOfParts", v->nframe, 0, H5T_NATIVE_INT64, work, ok);
+  for (PetscInt f = 0; f < v->nframe; f++) work[f] = v->frame[f].part;
+  write_numbers(group, "PartOffsets", v->nframe, 0, H5T_NATIVE_INT64, work, ok);
+
+  /* cells are those of the part; contact points share theirs */
+  for (int corners = 0; corners < 2; corners++) {
+    for (PetscInt i = 0; i < kinds * v->nframe; i++) {
+      work[i] = 0;
+      for (PetscInt p = 0; !v->points && p < v->frame[i].part; p++)
+        work[i] += (corners ? 4 : 1) * (int64_t)v->part[p].ncell;
+    }
+    write_numbers(group, corners ? "ConnectivityIdOffsets" : "CellOffsets", v->nframe, kinds,
+                  H5T_NATIVE_INT64, work, ok);
+  }
+
+  /* arrays, one frame or one part behind the other */
+  where[0] = H5Gcreate2(group, "PointDataOffsets", H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT);
+  where[1] = H5Gcreate2(group, "CellDataOffsets", H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT);
+  for (PetscInt i = 0; i < v->narray; i++) {
+    const Array *a = &v->array[i];
+    int64_t at = 0;
+
+    if (!strcmp(a->name, "cells")) continue;
+    for (PetscInt f = 0; f < v->nframe; f++) {
+      if (a->constant) {
+        at = 0;
+        for (PetscInt p = 0; p < v->frame[f].part; p++) at += rows_of(v, a, p);
+      }
+      work[f] = at;
+      if (!a->constant) at += rows_of(v, a, f);
+    }
+    if (!strcmp(a->name, "Points"))
+      write_numbers(group, "PointOffsets", v->nframe, 0, H5T_NATIVE_INT64, work, ok);
+    else
+      write_numbers(where[a->cell], a->name, v->nframe, 0, H5T_NATIVE_INT64, work, ok);
+  }
+  (void)H5Gclose(where[0]);
+  (void)H5Gclose(where[1]);
+  (void)H5Gclose(group);
+}
+
+/* The whole file, open in memory. */
+static void write_file(SbVtkhdf v, hid_t file, int64_t *work, PetscBool *ok)
+{
+  const hid_t root = H5Gcreate2(file, "VTKHDF", H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT);
+  const hid_t type = H5Tcopy(H5T_C_S1), scalar = H5Screate(H5S_SCALAR);
+  const char *kind = v->points ? "PolyData" : "UnstructuredGrid";
+  const hsize_t two = 2;
+  const int64_t version[2] = {2, 0};
+  const hid_t pair = H5Screate_simple(1, &two, NULL);
+  hid_t attribute, data[2];
+
+  /* what it is */
+  (void)H5Tset_size(type, strlen(kind));
+  (void)H5Tset_strpad(type, H5T_STR_NULLPAD);
+  attribute = H5Acreate2(root, "Version", H5T_STD_I64LE, pair, H5P_DEFAULT, H5P_DEFAULT);
+  if (H5Awrite(attribute, H5T_NATIVE_INT64, version) < 0) *ok = PETSC_FALSE;
+  (void)H5Aclose(attribute);
+  attribute = H5Acreate2(root, "Type", type, scalar, H5P_DEFAULT, H5P_DEFAULT);
+  if (H5Awrite(attribute, type, kind) < 0) *ok = PETSC_FALSE;
+  (void)H5Aclose(attribute);
+  (void)H5Tclose(type);
+  (void)H5Sclose(scalar);
+  (void)H5Sclose(pair);
+
+  /* parts, cells, arrays, steps */
+  for (PetscInt p = 0; p < v->npart; p++) work[p] = v->part[p].npoint;
+  write_numbers(root, "NumberOfPoints", v->npart, 0, H5T_NATIVE_INT64, work, ok);
+  write_cells(v, root, work, ok);
+  data[0] = H5Gcreate2(root, "PointData", H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT);
+  data[1] = H5Gcreate2(root, "CellData", H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT);
+  for (PetscInt i = 0; i < v->narray; i++) {
+    const Array *a = &v->array[i];
+
+    if (!strcmp(a->name, "Points"))
+      write_array(v, root, "Points", a, ok);
+    else if (!strcmp(a->name, "cells"))
+      write_array(v, root, "Connectivity", a, ok);
+    else
+      write_array(v, data[a->cell], a->name, a, ok);
+  }
+  write_steps(v, root, work, ok);
+  (void)H5Gclose(data[0]);
+  (void)H5Gclose(data[1]);
+  (void)H5Gclose(root);
+}
+
+void SbVtkhdfWrite(SbVtkhdf v, PetscBool last, size_t nmessage, char message[])
+{
+  const hid_t list = H5Pcreate(H5P_FILE_ACCESS);
+  size_t nwork = 4 * (size_t)v->nframe + (size_t)v->npart + 1;
+  PetscBool ok = PETSC_TRUE;
+  int64_t *work;
+  SbChunk image = {NULL, 0};
+  void *text = NULL;
+  hid_t file;
+
+  if (v->nframe == v->nwritten || (!last && v->nframe > 20 && 4 * (v->nframe - v->nwritten) < v->nwritten)) {
+    (void)H5Pclose(list);
+    return;
+  }
+  for (PetscInt p = 0; p < v->npart; p++) nwork += (size_t)v->part[p].ncell + 1;
+  work = (int64_t *)malloc(nwork * sizeof(*work));
+
+  /* made in memory, then replaced in one step */
+  (void)H5Pset_fapl_core(list, 1 << 16, 0);
+  file = work ? H5Fcreate(v->path, H5F_ACC_TRUNC, H5P_DEFAULT, list) : -1;
+  if (file >= 0) {
+    write_file(v, file, work, &ok);
+    (void)H5Fflush(file, H5F_SCOPE_GLOBAL);
+    image.size = (size_t)PetscMax(H5Fget_file_image(file, NULL, 0), 0);
+    text = malloc(image.size + 1);
+    image.text = (const char *)text;
+    ok = (PetscBool)(ok && text && H5Fget_file_image(file, text, image.size) == (ssize_t)image.size);
+    (void)H5Fclose(file);
+  }
+  if (file < 0 || !ok)
+    SbFormat(nmessage, message, "cannot write %s: HDF5 fails to make it in memory", v->path);
+  else
+    SbFileReplace(v->path, 1, &image, nmessage, message);
+  v->nwritten = v->nframe;
+  free(text);
+  free(work);
+  (void)H5Pclose(list);
+}
