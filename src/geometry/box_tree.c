@@ -1,17 +1,18 @@
 /*
-  box_tree.c - which of many boxes meet a given one, or those of another tree, or each other, and which is nearest: a tree with four children to a node.
+  box_tree.c - which of many boxes meet a given one, or those of another tree, or each other, and which is nearest: a bounding
+  volume hierarchy of axis-aligned boxes with four children per node.
 
   The boxes are ordered so that neighbours follow each other: the range is halved again and again at the median of the middles along the longer
   axis, always at a multiple of the number of boxes below a child. Four boxes in this order form a group, four groups one of the next level; each
-  group holds the hulls of its four children side by side, so that one look tests them all, and nothing but the order has to be stored.
-  When boxes move, the order stays and the hulls are made anew; when these have grown too much, as where bodies go different ways, so is the order.
+  group holds the bounding boxes (hulls) of its four children side by side, so that they are tested together, and nothing but the order has to be stored.
+  When boxes move, the tree is refitted: the order stays, the hulls are made anew. When these have grown too much, as where bodies go different ways, it is rebuilt.
 
-  Walks are kept by the caller and give what they find piece by piece: nothing is allocated, and what is found need not fit into memory.
+  Traversals keep their stack with the caller and return what they find piece by piece: nothing is allocated, and what is found need not fit into memory.
 */
 #include "sbgeometry.h"
 
 #define WORSE \
-  1.5 /* of the size of all hulls against that of the boxes: so much more than in a new tree makes a new one */
+  1.5 /* size of all hulls against that of the boxes, over the same in a new tree: beyond this the tree is rebuilt */
 
 /* ------------------------------------------------------------------ making a tree */
 
@@ -34,7 +35,7 @@ static inline void swap(Item *a, Item *b)
   *b = keep;
 }
 
-/* Brings the m first along the axis to the front (Hoare, "Algorithm 65: Find", 1961, with the median of three as pivot). */
+/* Quickselect: brings the m first along the axis to the front (Hoare, "Algorithm 65: Find", 1961, with the median of three as pivot). */
 static void select_first(Item item[], PetscInt n, PetscInt m, int axis)
 {
   PetscInt low = 0, high = n - 1;
@@ -44,6 +45,7 @@ static void select_first(Item item[], PetscInt n, PetscInt m, int axis)
     PetscInt i = low, j = high;
     Item pivot;
 
+    // the median of three, then all smaller ones to its left
     if (before(&item[centre], &item[low], axis)) swap(&item[centre], &item[low]);
     if (before(&item[high], &item[low], axis)) swap(&item[high], &item[low]);
     if (before(&item[high], &item[centre], axis)) swap(&item[high], &item[centre]);
@@ -53,6 +55,7 @@ static void select_first(Item item[], PetscInt n, PetscInt m, int axis)
       while (before(&pivot, &item[j], axis)) j--;
       if (i <= j) swap(&item[i++], &item[j--]);
     }
+    // the m-th is on one side, or in place
     if (m <= j)
       high = j;
     else if (m >= i)
@@ -62,22 +65,25 @@ static void select_first(Item item[], PetscInt n, PetscInt m, int axis)
   }
 }
 
-/* Orders n boxes that `below` go into each child of their node. */
+/* Orders n boxes, of which `below` go into each child of their node, by halving along the longer axis. */
 static void order_items(Item item[], PetscInt n, PetscInt below)
 {
   PetscReal box[6];
   PetscInt nchild, left;
   int axis = 0;
 
+  // the left half takes whole children
   while (below >= n) below /= 4;
   if (below == 0) return;
   nchild = (n + below - 1) / below;
   left = (nchild + 1) / 2 * below;
+  // the longest axis of the box of all middles
   SbBoxClear(box);
   for (PetscInt i = 0; i < n; i++) SbBoxAdd(box, item[i].middle);
   for (int k = 1; k < 3; k++) {
     if (box[3 + k] - box[k] > box[3 + axis] - box[axis]) axis = k;
   }
+  // split there, and go on with the halves
   select_first(item, n, left, axis);
   order_items(item, left, below);
   order_items(item + left, n - left, below);
@@ -91,7 +97,7 @@ static inline PetscReal size_of(const PetscReal box[6])
   return size > 0 ? size : 0;
 }
 
-/* The hulls of all groups; returns the size of all over that of the boxes. */
+/* Refits: the hulls of all groups, level by level from the boxes up; returns the size of all over that of the boxes. */
 static PetscReal fill(SbBoxTree *tree, const PetscReal (*box)[6])
 {
   PetscReal groups = 0, boxes = 0;
@@ -103,6 +109,7 @@ static PetscReal fill(SbBoxTree *tree, const PetscReal (*box)[6])
     for (PetscInt g = 0; g < n; g++) {
       PetscReal hull[6];
 
+      // the hull of the four children; those of the lowest level are the boxes
       SbBoxClear(hull);
       for (int l = 0; l < 4; l++) {
         const PetscInt i = level == 0 ? tree->order[4 * g + l] : -1;
@@ -114,6 +121,7 @@ static PetscReal fill(SbBoxTree *tree, const PetscReal (*box)[6])
         if (level == 0) boxes += size_of(child);
       }
       groups += size_of(hull);
+      // it is a child of the next level, or that of the tree
       for (int k = 0; k < 6; k++) {
         if (level + 1 == tree->nlevel)
           tree->hull[k] = hull[k];
@@ -125,6 +133,7 @@ static PetscReal fill(SbBoxTree *tree, const PetscReal (*box)[6])
   return groups / PetscMax(boxes + size_of(tree->hull), PETSC_SMALL * PETSC_SMALL);
 }
 
+/* A new order of the boxes from their middles, and the hulls. */
 static PetscErrorCode build(SbBoxTree *tree, const PetscReal (*box)[6])
 {
   PetscInt below = 1;
@@ -161,6 +170,7 @@ PetscErrorCode SbBoxTreeCreate(PetscInt n, const PetscReal (*box)[6], SbBoxTree 
   tree->n = n;
   SbBoxClear(tree->hull);
   if (!n) PetscFunctionReturn(PETSC_SUCCESS);
+  // groups of each level: a quarter of those below, up to one
   for (ngroup = n; ngroup > 1 || !tree->nlevel;) {
     ngroup = (ngroup + 3) / 4;
     tree->start[tree->nlevel + 1] = tree->start[tree->nlevel] + ngroup;
@@ -186,7 +196,7 @@ PetscErrorCode SbBoxTreeDestroy(SbBoxTree *tree)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* ------------------------------------------------------------------ walks */
+/* ------------------------------------------------------------------ traversals */
 
 /* Bit l: child l of the group meets the box. */
 static inline unsigned meeting(const PetscReal (*group)[4], const PetscReal box[6])
@@ -200,6 +210,7 @@ static inline unsigned meeting(const PetscReal (*group)[4], const PetscReal box[
   return mask;
 }
 
+/* The hull of child l, grown on all sides. */
 static inline void grow(PetscReal (*group)[4], int l, PetscReal grown, PetscReal box[6])
 {
   for (int k = 0; k < 3; k++) {
@@ -222,6 +233,7 @@ PetscBool SbBoxQueryNext(SbBoxQuery *query, PetscInt *i)
 {
   const SbBoxTree *tree = query->tree;
 
+  // down the stack to a lowest group that meets the box
   while (!query->hits) {
     PetscInt level, g;
     unsigned mask;
@@ -242,6 +254,7 @@ PetscBool SbBoxQueryNext(SbBoxQuery *query, PetscInt *i)
       query->stack[query->depth++][1] = 4 * g + l;
     }
   }
+  // its children that do, one per call
   for (int l = 0; l < 4; l++) {
     if (!(query->hits >> l & 1)) continue;
     query->hits &= ~(1U << l);
@@ -273,13 +286,14 @@ PetscBool SbBoxNearestNext(SbBoxNearest *nearest, PetscInt *i)
     PetscReal d2[4] = {0, 0, 0, 0};
     int n = 0;
 
+    // farther than the limit, which the caller lowers; or a box
     if (!(top.d2 <= nearest->limit2)) continue;
     if (top.level < 0) {
       *i = tree->order[top.index];
       return PETSC_TRUE;
     }
     group = (const PetscReal(*)[4])tree->group[tree->start[top.level] + top.index];
-    // children that are near enough, the nearest last, so that it is taken first; the hull of none is infinitely far
+    // squared distances of the children; an empty one is infinitely far
     for (int k = 0; k < 3; k++) {
       for (int l = 0; l < 4; l++) {
         const PetscReal above = group[k][l] - nearest->box[3 + k], below = nearest->box[k] - group[3 + k][l];
@@ -288,6 +302,7 @@ PetscBool SbBoxNearestNext(SbBoxNearest *nearest, PetscInt *i)
         d2[l] += off > 0 ? off * off : 0;
       }
     }
+    // those within the limit go onto the stack, the nearest last, so that it is taken first
     for (int l = 0; l < 4; l++) {
       int at = n;
 
@@ -344,6 +359,7 @@ PetscInt SbBoxPairsNext(SbBoxPairs *pairs, PetscInt room, PetscInt pair[])
       }
       continue;
     }
+    // groups of one level: each child of the first against all four of the second, in a tree against itself each pair once
     for (int i = 3; i >= 0; i--) {
       unsigned mask;
 

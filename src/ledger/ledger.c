@@ -19,7 +19,8 @@ static const SbOption rows[] = {
   {"ledger_every", SB_OPTION_INT, 1, "", "0", "[0, inf)",
    "steps between estimates of the error of the mesh, for the columns of history.csv; 0: at the end alone"},
   {"ledger_quantity", SB_OPTION_CHOICE, 1, "", "none", "none|displacement|reaction|volume",
-   "number whose error is estimated, too: of the node nearest to ledger_at, of the support of a set, of all "
+   "number whose error is estimated, too: of the node nearest to ledger_at, of the prescribed nodes of "
+   "ledger_on, of all "
    "bodies"},
   {"ledger_at", SB_OPTION_REALS, 3, "m", "0,0,0", "(-inf, inf)",
    "rest position of ledger_quantity displacement"},
@@ -161,12 +162,6 @@ static PetscErrorCode estimate_state(SbLedger l, const SbStep *step)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* In units of a residual: a tangent is three, an iteration with its preconditioner two. */
-static PetscReal work_of(const SbRun run, const SbStep *step)
-{
-  return run->snes ? 4. * (PetscReal)step->newton + 2. * (PetscReal)step->linear + 1. : 1.;
-}
-
 static PetscErrorCode monitor(SbRun run, const SbStep *step, void *ctx)
 {
   SbLedger l = (SbLedger)ctx;
@@ -176,7 +171,8 @@ static PetscErrorCode monitor(SbRun run, const SbStep *step, void *ctx)
 
   PetscFunctionBeginUser;
   l->stored = run->model->dynamic ? PetscMax(l->stored, energy) : energy;
-  l->work += work_of(run, step);
+  // in units of a residual: a tangent is three, an iteration with its preconditioner two
+  l->work += run->snes ? 4. * (PetscReal)step->newton + 2. * (PetscReal)step->linear + 1. : 1.;
 
   /*
     Errors of a static run are those of the last solve. In a dynamic one losses of the integrator add up. What linear solves leave is rough and

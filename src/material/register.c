@@ -4,19 +4,19 @@
 #include "material_impl.h"
 
 static const SbOption body_rows[] = {
-  {"young", SB_OPTION_REAL, 1, "Pa", NULL, "(0, inf)", "Young's modulus."},
+  {"young", SB_OPTION_REAL, 1, "Pa", NULL, "(0, inf)", "Young's modulus"},
   {"poisson", SB_OPTION_REAL, 1, "", NULL, "(-1, 0.5)",
-   "Poisson's ratio; soft tissue is near 0.5, where p1 elements lock."},
-  {"density", SB_OPTION_REAL, 1, "kg/m^3", "1000", "(0, inf)", "Mass per rest volume."},
+   "Poisson's ratio; soft tissue is near 0.5, where p1 elements lock"},
+  {"density", SB_OPTION_REAL, 1, "kg/m^3", "1000", "(0, inf)", "mass per rest volume"},
 };
 static const SbOption corotated_rows[] = {
   {"tangent", SB_OPTION_CHOICE, 1, "", "auto", "auto|warped|exact|exact_spd",
-   "Stiffness: Hooke's turned with the cell (positive definite), the exact derivative, or that without "
-   "negative eigenvalues."},
+   "stiffness: Hooke's turned with the cell (positive definite), the exact derivative, or that without "
+   "negative eigenvalues"},
 };
 static const SbOption exact_rows[] = {
   {"tangent", SB_OPTION_CHOICE, 1, "", "auto", "auto|exact|exact_spd",
-   "Stiffness: the exact derivative of the force, or that without negative eigenvalues (for CG)."},
+   "stiffness: the exact derivative of the force, or that without negative eigenvalues (for CG)"},
 };
 
 PetscErrorCode SbMaterialRegisterAll(void)

@@ -78,16 +78,6 @@ static PetscErrorCode read_elements(SbImport *im, int type)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* To the next word that is no number. */
-static void skip_numbers(SbScan *s)
-{
-  for (;;) {
-    SbScanNext(s, '#');
-    if (s->at >= s->end || isalpha((unsigned char)*s->at)) break;
-    while (s->at < s->end && !isspace((unsigned char)*s->at)) s->at++;
-  }
-}
-
 PetscErrorCode SbImportRead_Medit(const char *path, SbImport *im)
 {
   SbScan *s = &im->scan;
@@ -101,7 +91,10 @@ PetscErrorCode SbImportRead_Medit(const char *path, SbImport *im)
   if (strcmp(word, "MeshVersionFormatted"))
     SB_SCAN_ERROR(s, "expected 'MeshVersionFormatted', found '%s'; this is no text file of Medit", word);
   for (;;) {
-    skip_numbers(s);
+    // sections that are not of use: on to the next word that is no number
+    for (SbScanNext(s, '#'); s->at < s->end && !isalpha((unsigned char)*s->at); SbScanNext(s, '#')) {
+      while (s->at < s->end && !isspace((unsigned char)*s->at)) s->at++;
+    }
     PetscCall(SbScanWord(s, sizeof(word), word));
     if (!word[0])
       SB_SCAN_ERROR(

@@ -43,15 +43,6 @@ void SbMeshFileCount(const SbImport *im, PetscInt *nvert, PetscInt n[4])
 
 /* ------------------------------------------------------------------ writing */
 
-/* mesh.h5 -> mesh.xmf */
-static void index_name(const char *path, size_t size, char name[])
-{
-  const char *dot = strrchr(path, '.'), *slash = strrchr(path, '/');
-  const int stem = dot && dot > (slash ? slash : path) ? (int)(dot - path) : (int)strlen(path);
-
-  (void)snprintf(name, size, "%.*s.xmf", stem, path);
-}
-
 static PetscErrorCode move_to(const char *from, const char *to)
 {
   PetscFunctionBeginUser;
@@ -88,7 +79,10 @@ PetscErrorCode SbMeshFileWrite(const SbImport *im, const char *path, SbMeshForma
   PetscCall(ierr);
   PetscCall(move_to(part, path));
   if (format != SB_MESH_H5) PetscFunctionReturn(PETSC_SUCCESS);
-  index_name(path, sizeof(index), index);
+  // mesh.h5 -> mesh.xmf, for ParaView
+  dot = strrchr(path, '.');
+  (void)snprintf(index, sizeof(index), "%.*s.xmf",
+                 (int)(dot && !strchr(dot, '/') ? dot - path : (ptrdiff_t)strlen(path)), path);
   (void)snprintf(part, sizeof(part), "%s.part", index);
   ierr = SbWrite_Xdmf(im, part, path);
   if (ierr) (void)unlink(part);

@@ -30,22 +30,6 @@ typedef struct {
   uint64_t inclusions; /* and of those that are inclusions of the body */
 } Work;
 
-static uint64_t groups_of(SbModel m)
-{
-  uint64_t bits = 0;
-
-  for (PetscInt k = 0; k < m->nset; k++) bits |= m->set[k].shape == SB_SET_GROUP ? SB_SET_BIT(k) : 0;
-  return bits;
-}
-
-static uint64_t inclusions_of(const SbBody *body)
-{
-  uint64_t bits = 0;
-
-  for (PetscInt k = 0; k < body->ninclusion; k++) bits |= SB_SET_BIT(body->inclusion[k].set);
-  return bits;
-}
-
 static PetscErrorCode open_work(SbModel m, const SbGathered *g, PetscInt b, Work *w)
 {
   const PetscInt nvert = g->vert0[b + 1] - g->vert0[b];
@@ -60,8 +44,9 @@ static PetscErrorCode open_work(SbModel m, const SbGathered *g, PetscInt b, Work
   w->ncell = g->cell0[b + 1] - g->cell0[b];
   w->element = m->element[b];
   w->each = 3 * g->nfield;
-  w->groups = groups_of(m);
-  w->inclusions = inclusions_of(&m->body[b]);
+  for (PetscInt k = 0; k < m->nset; k++) w->groups |= m->set[k].shape == SB_SET_GROUP ? SB_SET_BIT(k) : 0;
+  for (PetscInt k = 0; k < m->body[b].ninclusion; k++)
+    w->inclusions |= SB_SET_BIT(m->body[b].inclusion[k].set);
   PetscCall(PetscMalloc1(4 * (size_t)w->ncell, &w->cell));
   PetscCall(PetscMalloc1(nvert, &w->at));
   for (PetscInt i = 0; i < 4 * w->ncell; i++) {

@@ -37,12 +37,6 @@ static PetscErrorCode near_files(const char *path, size_t size, char text[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A mesh that is made by the program itself: word, colon, description. */
-static PetscBool is_generated(const char *mesh)
-{
-  return (PetscBool)!strncmp(mesh, "box:", 4);
-}
-
 /* The file, or the points of a mesh of TetGen whose files are named without their endings; sets errno. */
 static PetscBool mesh_is_there(const char *mesh)
 {
@@ -100,7 +94,7 @@ PetscErrorCode SbSceneCheck(SbModel model)
 
   PetscFunctionBeginUser;
   for (PetscInt i = 0; i < model->nbody; i++)
-    if (!is_generated(model->body[i].mesh)) PetscCall(check_mesh_file(model->comm, &model->body[i]));
+    if (strncmp(model->body[i].mesh, "box:", 4)) PetscCall(check_mesh_file(model->comm, &model->body[i]));
   for (PetscInt e = 0; e < model->neffect && !constrained; e++)
     constrained = (PetscBool)(model->effect[e]->ops.prescribe ||
                               (model->effect[e]->ops.potential && model->effect[e]->springs));

@@ -42,17 +42,6 @@ static PetscErrorCode lend_blocks(Mat A, Blocks *x)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode return_blocks(Mat A, Blocks *x)
-{
-  PetscFunctionBeginUser;
-  if (x->symmetric)
-    PetscCall(SbMatRestoreRead(A, MatSeqSBAIJRestoreArray, &x->value[0]));
-  else
-    PetscCall(SbMatRestoreRead(x->part[0], MatSeqBAIJRestoreArray, &x->value[0]));
-  if (x->part[1]) PetscCall(SbMatRestoreRead(x->part[1], MatSeqBAIJRestoreArray, &x->value[1]));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* W[3][6] += factor K Z_j; K by columns. */
 static inline void add_column(const PetscScalar K[9], PetscReal factor, const PetscReal d[3], PetscReal W[18])
 {
@@ -181,7 +170,11 @@ static PetscErrorCode assemble(SbCoarse c, Mat A)
     sum_row(c, &x, i, &row);
     add_row(c, x.symmetric, i, &row);
   }
-  PetscCall(return_blocks(A, &x));
+  if (x.symmetric)
+    PetscCall(SbMatRestoreRead(A, MatSeqSBAIJRestoreArray, &x.value[0]));
+  else
+    PetscCall(SbMatRestoreRead(x.part[0], MatSeqBAIJRestoreArray, &x.value[0]));
+  if (x.part[1]) PetscCall(SbMatRestoreRead(x.part[1], MatSeqBAIJRestoreArray, &x.value[1]));
   complete(c, x.symmetric);
   PetscCall(PetscFree2(row.b, row.W));
   PetscFunctionReturn(PETSC_SUCCESS);

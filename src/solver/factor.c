@@ -2,15 +2,15 @@
   Multifrontal Cholesky factorisation of a matrix of 3x3 blocks (Duff and Reid 1983; Liu, "The multifrontal method for
   sparse matrix solution", 1992), and solves that read as few bytes as possible.
 
-  Each group of columns (factor_order.c) has a dense front: its entries of A and the updates of its children. LAPACK factors
-  the leading block, BLAS forms the update for the parent. Updates that reach kept nodes only go to the Schur complement.
+  Each supernode, a group of columns with one pattern (factor_order.c), has a dense front: its entries of A and the updates of its children. LAPACK factors
+  the leading block, BLAS forms the update for the parent. Updates of the roots reach kept nodes only, and go to the Schur complement of these.
 
   A solve touches every entry of L twice and does little with it: it is as fast as the memory. Entries are therefore
   kept as 16-bit integers times a scale per column: the rounding, 1.5e-5 of the largest entry of a column, does not change
   the iterations of a preconditioned solver, and 2 bytes instead of 8 per entry make it three to four times faster. Two
   entries share a 32-bit word, so that reading them takes little more than a conversion: shifted up, the word is the
   lower one; as it is, it is the upper one, the lower one being a fraction that was taken into account in rounding.
-  Columns of a group are cut into panels of at most PANEL nodes, whose diagonal block is stored inverted; the rows below lie
+  Columns of a supernode are cut into panels of at most PANEL nodes, whose diagonal block is stored inverted; the rows below lie
   in blocks of ROWS, each [column][row], so that both passes read memory in order.
 
   Not handled: indefinite matrices (reported), refinement.
@@ -21,10 +21,10 @@
 
 typedef struct {
   PetscInt first, ncol; /* first position, nodes across */
-  PetscInt group;
-  PetscInt nrow;       /* nodes below */
-  const PetscInt *row; /* [nrow] their positions, borrowed from the elimination */
-  size_t offset;       /* of the inverted diagonal block in word[]; the rows below follow it */
+  PetscInt group;       /* its supernode */
+  PetscInt nrow;        /* nodes below */
+  const PetscInt *row;  /* [nrow] their positions, borrowed from the elimination */
+  size_t offset;        /* of the inverted diagonal block in word[]; the rows below follow it */
 } Panel;
 
 struct _p_SbFactor {
@@ -36,17 +36,18 @@ struct _p_SbFactor {
   float *scale;  /* [3 nfree][2] of each column, in the diagonal block and below */
   float *w;      /* [3 n] right-hand side and solution in order of elimination */
   float *below;  /* [tallest] rows below a panel */
-  /* kept as it is */
-  size_t *column;     /* [nsuper+1] where the columns of a group are in L; NULL: it is not */
-  PetscScalar *L, *y; /* their fronts, column-major; [3 n + tallest] solution, rows below a group */
+  /* in double precision, in place of the panels */
+  size_t *column;     /* [nsuper+1] where the columns of a supernode are in L; NULL: L is in panels */
+  PetscScalar *L, *y; /* their fronts, column-major; [3 n + tallest] solution, rows below a supernode */
 };
 
+/* The panels of all supernodes, and where each one is stored. */
 static PetscErrorCode cut_panels(SbFactor f)
 {
   const SbElimination *e = &f->e;
 
   PetscFunctionBeginUser;
-  // how many: a group is cut evenly into panels of at most PANEL nodes
+  // how many: a supernode is cut evenly into panels of at most PANEL nodes
   for (PetscInt g = 0; g < e->nsuper; g++) f->npanel += (e->first[g + 1] - e->first[g] + PANEL - 1) / PANEL;
   PetscCall(PetscMalloc1(f->npanel, &f->panel));
   f->npanel = 0;
@@ -76,10 +77,11 @@ PetscErrorCode SbFactorCreate(PetscInt n, PetscInt nkeep, const PetscInt ia[], c
   SbFactor f;
 
   PetscFunctionBeginUser;
+  // order of elimination and pattern of L
   PetscCall(PetscNew(&f));
   PetscCall(SbEliminationCreate(n, nkeep, ia, ja, NULL, &f->e));
   PetscCall(cut_panels(f));
-  /* reading may run ahead of the last panel */
+  // storage of the panels, which reading may run ahead of, and of a solve
   PetscCall(allocate_pages(sizeof(*f->word) * (f->nword + 4096), &f->word));
   PetscCall(allocate_pages(sizeof(float) * 6 * (size_t)f->e.nfree, &f->scale));
   PetscCall(allocate_pages(sizeof(float) * (3 * (size_t)n + WIDTH), &f->w));
@@ -95,9 +97,11 @@ PetscErrorCode SbFactorCreateExact(PetscInt n, const PetscInt ia[], const PetscI
   SbFactor f;
 
   PetscFunctionBeginUser;
+  // order of elimination, by default the one given
   PetscCall(PetscNew(&f));
   PetscCall(SbEliminationCreate(n, 0, ia, ja, order, &f->e));
   e = &f->e;
+  // the columns of the supernodes follow each other
   PetscCall(PetscMalloc1(e->nsuper + 1, &f->column));
   f->column[0] = 0;
   for (PetscInt g = 0; g < e->nsuper; g++) {
@@ -153,11 +157,11 @@ void SbFactorSize(SbFactor f, PetscInt64 *entries, PetscInt64 *bytes)
 typedef struct {
   PetscInt *position;        /* [n] index in the current front of a position */
   PetscScalar *front;        /* [tallest^2] column-major, lower triangle */
-  PetscScalar **update;      /* [nsuper] what a group hands to its parent; NULL when taken */
-  PetscInt *child, *sibling; /* [nsuper] lists of children */
+  PetscScalar **update;      /* [nsuper] of each supernode for its parent; NULL when taken */
+  PetscInt *child, *sibling; /* [nsuper] lists of children in the assembly tree */
 } Work;
 
-/* Entries of A in the columns of group g. Row-major block (node, neighbour) is column-major block (neighbour, node). */
+/* Adds the entries of A in the columns of supernode g to its front. Row-major block (node, neighbour) is column-major block (neighbour, node). */
 static void add_entries(SbFactor f, PetscInt g, const PetscInt ia[], const PetscInt ja[],
                         const PetscReal block[], const Work *work, PetscInt ld)
 {
@@ -179,7 +183,7 @@ static void add_entries(SbFactor f, PetscInt g, const PetscInt ia[], const Petsc
   }
 }
 
-/* Adds the update of group c to a lower triangle; at[k] is the node index there of the k-th row of c. */
+/* Extend-add: the update of a supernode joins a lower triangle; at[k] is the node index there of its k-th row. */
 static void add_update(const PetscScalar *update, PetscInt nrow, const PetscInt at[], PetscScalar *to,
                        PetscInt ld)
 {
@@ -223,7 +227,7 @@ static PetscErrorCode factor_front(PetscScalar *front, PetscInt size, PetscInt n
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* One group: gather its front, factor it, hand on its update. */
+/* One supernode: assembles its front, factors it, keeps its update for the parent. */
 static PetscErrorCode eliminate(SbFactor f, PetscInt g, const PetscInt ia[], const PetscInt ja[],
                                 const PetscReal block[], Work *work, PetscBool *ok)
 {
@@ -232,11 +236,11 @@ static PetscErrorCode eliminate(SbFactor f, PetscInt g, const PetscInt ia[], con
   const PetscInt *list = e->list + e->start[g], nrow = nall - ncol;
 
   PetscFunctionBeginUser;
-  // the front begins with the entries of A in the columns of the group
+  // the front begins with the entries of A in the columns of the supernode
   for (PetscInt k = 0; k < nall; k++) work->position[list[k]] = k;
   PetscCall(PetscArrayzero(work->front, 9 * (size_t)nall * (size_t)nall));
   add_entries(f, g, ia, ja, block, work, 3 * nall);
-  // the updates of the children join it and are given up
+  // the updates of the children join it and are freed
   for (PetscInt c = work->child[g]; c >= 0; c = work->sibling[c]) {
     const PetscInt below = e->start[c] + e->first[c + 1] - e->first[c], n = e->start[c + 1] - below;
     PetscInt *at;
@@ -247,7 +251,7 @@ static PetscErrorCode eliminate(SbFactor f, PetscInt g, const PetscInt ia[], con
     PetscCall(PetscFree(at));
     PetscCall(PetscFree(work->update[c]));
   }
-  // the columns of the group are factored; what is left is the update for its parent
+  // the columns of the supernode are factored; what is left is the update for its parent
   if (nrow) PetscCall(PetscMalloc1(9 * (size_t)nrow * (size_t)nrow, &work->update[g]));
   PetscCall(factor_front(work->front, 3 * nall, 3 * ncol, work->update[g], ok));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -261,11 +265,12 @@ PetscErrorCode SbFactorNumeric(SbFactor f, const PetscInt ia[], const PetscInt j
   Work work;
 
   PetscFunctionBeginUser;
+  // room for the largest front, and the lists of children
   PetscCall(PetscMalloc2(e->n, &work.position, (size_t)f->tallest * (size_t)f->tallest, &work.front));
   PetscCall(PetscMalloc2(e->nsuper, &work.child, e->nsuper, &work.sibling));
   PetscCall(PetscCalloc1(e->nsuper, &work.update));
   for (PetscInt g = 0; g < e->nsuper; g++) work.child[g] = -1;
-  // groups come after all their children
+  // postorder: supernodes come after all their children
   *ok = PETSC_TRUE;
   for (PetscInt g = 0; g < e->nsuper && *ok; g++) {
     PetscCall(eliminate(f, g, ia, ja, block, &work, ok));
@@ -377,6 +382,7 @@ void SbFactorForward(SbFactor f, const float b[], float kept[])
 {
   const SbElimination *e = &f->e;
 
+  // into the order of elimination; what reaches the kept nodes is handed out
   for (PetscInt i = 0; i < e->n; i++) {
     for (PetscInt c = 0; c < 3; c++) f->w[3 * i + c] = b[3 * e->order[i] + c];
   }
@@ -388,6 +394,7 @@ void SbFactorBackward(SbFactor f, const float kept[], float x[])
 {
   const SbElimination *e = &f->e;
 
+  // from the values at the kept nodes back to all others, and into the order of the caller
   for (PetscInt i = 3 * e->nfree; i < 3 * e->n; i++) f->w[i] = kept[i - 3 * e->nfree];
   backward(f);
   for (PetscInt i = 0; i < e->n; i++) {
@@ -403,8 +410,9 @@ PetscErrorCode SbFactorSolve(SbFactor f, const PetscReal b[], PetscReal x[])
   PetscScalar *y = f->y, *below = f->y + 3 * e->n;
 
   PetscFunctionBeginUser;
+  // into the order of elimination
   for (PetscInt i = 0; i < 3 * e->n; i++) y[i] = b[3 * e->order[i / 3] + i % 3];
-  // L, from the first group to the last, then its transpose the other way
+  // L y = b from the first supernode to the last, then L^T x = y from the last to the first
   for (PetscInt step = 0; step < 2 * e->nsuper; step++) {
     const PetscBool back = (PetscBool)(step >= e->nsuper);
     const PetscInt g = back ? 2 * e->nsuper - 1 - step : step, *row = e->list + e->start[g];
@@ -431,6 +439,7 @@ PetscErrorCode SbFactorSolve(SbFactor f, const PetscReal b[], PetscReal x[])
       for (PetscInt k = 0; k < m; k++) y[3 * row[ncol + k / 3] + k % 3] -= below[k];
     }
   }
+  // back into the order of the caller
   for (PetscInt i = 0; i < 3 * e->n; i++) x[3 * e->order[i / 3] + i % 3] = y[i];
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -217,19 +217,6 @@ static PetscErrorCode factor_operator(Rotated *p, Mat A, PetscBool *ok)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The turn of each node since the factorisation. */
-static void find_turn(Rotated *p)
-{
-  SbSpace s = p->space;
-
-  for (PetscInt i = 0; i < s->nnode_owned; i++) {
-    PetscReal Q[9] = {1., 0., 0., 0., 1., 0., 0., 0., 1.};
-
-    if (!s->fixed[i]) SbMatMulTranspose(p->turn + 9 * i, p->turn0 + 9 * i, Q);
-    for (int k = 0; k < 9; k++) p->Q[9 * i + k] = (float)Q[k];
-  }
-}
-
 static PetscErrorCode PCSetUp_Rotated(PC pc)
 {
   const SbLane *cells;
@@ -252,7 +239,13 @@ static PetscErrorCode PCSetUp_Rotated(PC pc)
     PetscCall(PetscInfo(pc, "factorisation %" PetscInt_FMT "%s\n", p->nfactor,
                         ok ? "" : " failed: not positive definite"));
   }
-  find_turn(p);
+  // the rotation of each node since the factorisation
+  for (PetscInt i = 0; i < p->space->nnode_owned; i++) {
+    PetscReal Q[9] = {1., 0., 0., 0., 1., 0., 0., 0., 1.};
+
+    if (!p->space->fixed[i]) SbMatMulTranspose(p->turn + 9 * i, p->turn0 + 9 * i, Q);
+    for (int k = 0; k < 9; k++) p->Q[9 * i + k] = (float)Q[k];
+  }
   PetscCall(SbExactNodesSetUp(&p->exact, p->space, A, p->spread,
                               p->nfactor && p->fresh >= 0 ? p->limit : PETSC_MAX_REAL));
   PetscCall(PCSetFailedReason(pc, ok ? PC_NOERROR : PC_FACTOR_NUMERIC_ZEROPIVOT));

@@ -1,6 +1,9 @@
 /*
   region.c - regions: the parts of space that closed surfaces separate, also where more than two triangles meet at an edge.
 
+  In this order: triangles are oriented alike, sides that see each other are joined to shells, shells are measured and checked, surfaces are
+  nested by winding numbers, cavities and holes are emptied, what is left is numbered and named.
+
   Every triangle has two sides, 2 f in front and 2 f + 1 behind. Around an edge triangles are sorted by angle; the two sides that face each
   other between neighbours belong to one region and are joined. A set of joined sides is a shell: one with a positive volume is the
   outer boundary of a region, one with a negative volume is a surface seen from the region around it. Which region that is, the winding
@@ -57,6 +60,7 @@ static PetscErrorCode visit_connected(const Space *s, PetscInt first, const Pets
   PetscInt done = 0;
 
   PetscFunctionBeginUser;
+  // breadth first; stack[0 .. n) is what was reached
   *n = 0;
   stack[(*n)++] = first;
   sense[first] = 1;
@@ -68,9 +72,8 @@ static PetscErrorCode visit_connected(const Space *s, PetscInt first, const Pets
       int same;
 
       if (g < 0) continue;
-      same = t->tri[across[k]] != t->tri[k]
-               ? 1
-               : -1; /* neighbours that are oriented alike have their edge in opposite directions */
+      // neighbours that are oriented alike have their edge in opposite directions
+      same = t->tri[across[k]] != t->tri[k] ? 1 : -1;
       if (!sense[g]) {
         sense[g] = same * sense[f];
         stack[(*n)++] = g;
@@ -95,13 +98,13 @@ static PetscErrorCode reverse_minority(Space *s, const PetscInt across[], int se
 
     if (sense[f]) continue;
     PetscCall(visit_connected(s, f, across, sense, stack, &n));
+    // what is fewer: those like the first one, or the others
     for (PetscInt i = 0; i < n; i++) nother += sense[stack[i]] < 0;
     wrong = 2 * nother > n ? 1 : -1;
     for (PetscInt i = 0; i < n; i++) {
       PetscInt keep;
 
       if (sense[stack[i]] != wrong) continue;
-      // reverses the corners' order
       keep = s->t->tri[3 * stack[i] + 1];
       s->t->tri[3 * stack[i] + 1] = s->t->tri[3 * stack[i] + 2];
       s->t->tri[3 * stack[i] + 2] = keep;
@@ -137,9 +140,10 @@ static PetscErrorCode orient_alike(Space *s)
 
 /* ------------------------------------------------------------------ shells */
 
+/* A triangle at an edge, seen along the edge. */
 typedef struct {
-  PetscReal angle;
-  PetscInt slot;
+  PetscReal angle; /* about the edge, from the first triangle on, rad */
+  PetscInt slot;   /* of the edge in the triangle */
 } Spoke;
 
 static int compare_spokes(const void *a, const void *b)
@@ -191,11 +195,13 @@ static PetscErrorCode join_at_edge(const SbTriangles *t, PetscInt n, const SbTri
   Spoke few[8], *spoke = few;
 
   PetscFunctionBeginUser;
+  // the triangles in the order of their angles
   if (n > 8) PetscCall(PetscMalloc1(n, &spoke));
   if (n > 2)
     sort_spokes(t, p, q, n, edge, spoke);
   else
     for (PetscInt i = 0; i < n; i++) spoke[i].slot = edge[i].slot;
+  // each with the next one
   for (PetscInt i = 0; i < n; i++)
     (void)SbUnionJoin(up, facing(t, spoke[i].slot, p, PETSC_TRUE),
                       facing(t, spoke[(i + 1) % n].slot, p, PETSC_FALSE));
@@ -209,6 +215,7 @@ static PetscErrorCode find_shells(Space *s)
   const PetscInt n = 3 * s->t->ntri;
 
   PetscFunctionBeginUser;
+  // union-find over sides and over triangles, edge by edge
   for (PetscInt i = 0; i < 2 * s->t->ntri; i++) s->shell[i] = i;
   for (PetscInt f = 0; f < s->t->ntri; f++) s->surface[f] = f;
   for (PetscInt i = 0, m; i < n; i += m) {
@@ -217,6 +224,7 @@ static PetscErrorCode find_shells(Space *s)
     for (PetscInt k = 1; k < m; k++)
       (void)SbUnionJoin(s->surface, s->edge[i].slot / 3, s->edge[i + k].slot / 3);
   }
+  // numbers from 0 on
   s->nshell = SbUnionNumber(2 * s->t->ntri, s->shell);
   s->nsurface = SbUnionNumber(s->t->ntri, s->surface);
   PetscCheck(s->nsurface <= PARTS_MAX, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
@@ -233,6 +241,7 @@ static PetscErrorCode measure_shells(Space *s)
   PetscReal longest2, around;
 
   PetscFunctionBeginUser;
+  // sums over the sides; volumes from a corner of the shell, so that a surface far from the origin loses no digits
   PetscCall(PetscCalloc1(s->nshell, &s->shells));
   PetscCall(PetscCalloc1(s->nsurface, &s->surfaces));
   for (PetscInt k = 0; k < s->nshell; k++) s->shells[k].first = -1;
@@ -255,6 +264,7 @@ static PetscErrorCode measure_shells(Space *s)
     p->area += 0.5 * SbTriangleMeasure(t, i / 2, &longest2, &around);
     if (s->surfaces[s->surface[i / 2]].first < 0) s->surfaces[s->surface[i / 2]].first = i / 2;
   }
+  // surfaces with an edge of more than two triangles
   for (PetscInt i = 0, m; i < 3 * t->ntri; i += m) {
     m = SbTrianglesAtEdge(3 * t->ntri, s->edge, i);
     if (m > 2) s->surfaces[s->surface[s->edge[i].slot / 3]].branched = PETSC_TRUE;
@@ -299,6 +309,7 @@ static PetscInt shell_around(const Space *s, const PetscReal o[3], PetscInt exce
     PetscReal around = 0;
     PetscBool within = (PetscBool)(p->volume > 0 && p->surface != except);
 
+    // by the boxes, then by the winding number
     for (int i = 0; i < 3; i++) within = (PetscBool)(within && o[i] >= p->box[i] && o[i] <= p->box[3 + i]);
     if (!within || (best >= 0 && s->shells[best].volume <= p->volume)) continue;
     for (PetscInt i = 0; i < 2 * s->t->ntri; i++) {
@@ -338,10 +349,12 @@ static PetscErrorCode empty_cavities(Space *s)
       PetscInt top = k;
       PetscBool outwards, cavity;
 
+      // inwards, as the outermost surface around it says, and in material: a cavity
       if (depth_of(s, k) != depth || s->surfaces[k].branched) continue;
       while (s->surfaces[top].parent != OUTSIDE) top = s->shells[s->surfaces[top].parent].surface;
       outwards = (PetscBool)(turned_outwards(s, k) == (turned_outwards(s, top) || s->surfaces[top].branched));
       cavity = (PetscBool)(depth > 0 && !outwards && !s->shells[s->surfaces[k].parent].empty);
+      // counted, and what is reversed is noted
       s->t->turned = (PetscBool)(s->t->turned || (!turned_outwards(s, k) && !cavity));
       s->m->ncavity += cavity;
       for (PetscInt i = 0; cavity && i < s->nshell; i++) {
@@ -368,6 +381,7 @@ static PetscErrorCode groups_of_shell(const Space *s, PetscInt shell, PetscInt *
 
     if (s->shell[i] != shell || set == last) continue;
     last = set;
+    // those of the first triangle, less what the others have not
     if (*n < 0) {
       *n = PetscMin(end - start, 16);
       for (PetscInt k = 0; k < *n; k++) group[k] = im->tags_group[start + k];
@@ -440,6 +454,7 @@ static PetscErrorCode fill_surface(const Space *s, PetscInt nregion, SbSurface *
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* All of it, in the order of the head of this file. */
 static PetscErrorCode find_regions(Space *s, SbSurface *out)
 {
   PetscInt n;

@@ -110,12 +110,6 @@ static PetscErrorCode run_tetgen(const char *folder, const char *flags, const Sb
 
 /* ------------------------------------------------------------------ regions */
 
-/* The number behind a tag set of TetGen's files: the marker of a facet, the attribute of a tet. */
-static PetscInt mark_of(const SbImport *im, PetscInt tags)
-{
-  return (PetscInt)im->group[im->tags_group[im->tags_start[tags]]].tag;
-}
-
 /* Whether the point lies in front of a triangle of the surface (0) or behind it (1). */
 static int side_of(const SbSurface *s, PetscInt f, const PetscReal x[3])
 {
@@ -138,7 +132,8 @@ static PetscErrorCode match_regions(const SbSurface *s, const SbFaces *faces, Sb
   PetscFunctionBeginUser;
   for (PetscInt t = 0; t < im->ntags; t++) region[t] = UNKNOWN;
   for (PetscInt i = 0; i < tri->n; i++) {
-    const PetscInt f = mark_of(im, tri->tags[i]) - 1;
+    // TetGen hands on the marker of the facet: the number of the triangle of the surface, from 1 on
+    const PetscInt f = (PetscInt)im->group[im->tags_group[im->tags_start[tri->tags[i]]]].tag - 1;
     PetscInt slots[2];
     const PetscInt n = SbFacesFind(faces, tri->vert + 3 * i, slots);
 
