@@ -141,6 +141,9 @@ void SbErrorSetProgram(const char *name);
 void SbErrorSetFile(const char *file);
 /* An error line at the end of a run whose calls all succeeded: a solver gave up, the output is complete. A printf format. */
 void SbErrorPost(const char *format, ...) PETSC_ATTRIBUTE_FORMAT(1, 2);
+#define SB_EXIT_STOPPED 75 /* exit code of a run that was asked to stop and can go on: EX_TEMPFAIL of sysexits.h */
+/* What is posted is no error, but that the run was asked to stop: the line says so, and the exit code is SB_EXIT_STOPPED. */
+void SbErrorSetStopped(void);
 /* What one rank does when the run fails, before the error line: with PETSc as it was left, no communication. NULL: nothing. */
 void SbErrorSetFailureHandler(void (*failure_handler)(const char *message, void *ctx), void *ctx);
 /*

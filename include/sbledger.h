@@ -4,7 +4,7 @@
   Errors are in the norm of the energy: the square of an error is its energy, J, as a displacement that strains the bodies and a velocity that they
   have; relative is the root of its share of the largest energy, kinetic and strain, that the run has had (of the strain energy in a static run).
 
-  The ledger examines each step that was solved (SbRun.post_solve) and is a monitor besides. Without -ledger, -accuracy or -time_budget there is none:
+  The ledger examines each step that was solved (SbRun.post_solve) and is a monitor besides. Without -ledger, -accuracy or -step_time_budget there is none:
   no vector, no callback, no column. With -ledger alone it changes no result.
 
   Order of calls: SbLedgerRegister(), SbRunCreate(), SbLedgerSetFromOptions(), SbModelSetUp(), SbRunSetUp(), SbLedgerAttach(),
@@ -29,9 +29,9 @@ typedef struct _p_SbLedger *SbLedger;
 PetscErrorCode SbLedgerRegister(void); /* option rows */
 
 /*
-  SbLedgerSetFromOptions - reads -ledger, -ledger_every, -ledger_quantity, -ledger_at, -ledger_on, -ledger_direction, -accuracy, -time_budget. Collective.
+  SbLedgerSetFromOptions - reads -ledger, -ledger_every, -ledger_quantity, -ledger_at, -ledger_on, -ledger_direction, -accuracy, -step_time_budget. Collective.
 
-  Output: ledger, NULL when none of them asks for one. Errors (PETSC_ERR_USER_INPUT): both -accuracy and -time_budget; -time alpha2.
+  Output: ledger, NULL when none of them asks for one. Errors (PETSC_ERR_USER_INPUT): both -accuracy and -step_time_budget; -time alpha2.
 */
 PetscErrorCode SbLedgerSetFromOptions(SbRun run, SbLedger *ledger);
 /* After SbRunSetUp() and before SbOutputAttach(), whose history gets its columns. NULL: nothing. Collective. */

@@ -28,6 +28,7 @@ typedef struct {
   PetscInt rejected;       /* rejected attempts, this step */
   PetscReal wall;          /* seconds since the time loop began */
   PetscBool last;
+  PetscBool again; /* it was seen before, and turned out to be the last one: the next one was given up */
 } SbStep;
 
 typedef struct _p_SbRun *SbRun;
@@ -140,7 +141,16 @@ struct _p_SbRun {
       dt; /* length of the step that was asked about last; of a restart, when the run had paused there; else 0 */
     void *ctx;
   } after;
-  PetscBool paused; /* SbRunSolve() came back because of that; nothing has ended */
+  struct {
+    PetscBool listens;                      /* somebody may ask the run to stop */
+    PetscReal wall_time, grace;             /* s; 0: no such limit; that a step has after a signal */
+    PetscReal begun;                        /* MPI_Wtime() when options were read */
+    PetscReal step_begun;                   /* likewise of the step */
+    PetscReal longest_step, longest_output; /* s, of late; of what monitors write after a step */
+  } stop;
+  PetscBool stopped; /* the run ends because it was asked to, and can go on; stop_reason says who */
+  SbStep seen;       /* what monitors saw last */
+  PetscBool paused;  /* SbRunSolve() came back because of that; nothing has ended */
   PetscInt ncolumn;
   const SbColumn *column; /* [ncolumn] of history.csv; borrowed */
   PetscInt ncarried;
@@ -183,6 +193,8 @@ PetscErrorCode SbRunCreate(SbModel model,
 PetscErrorCode
 SbRunSetUp(SbRun run); /* after SbModelSetUp(): vectors, matrix, solver, integrator. Collective */
 PetscErrorCode SbRunAddMonitor(SbRun run, SbMonitorFn fn, void *ctx, PetscErrorCode (*destroy)(void *));
+/* From now on SIGTERM, SIGINT and SIGUSR1 end the run after its step: SbRun.stopped. A second SIGINT ends the process. Of one run at a time. */
+PetscErrorCode SbRunCatchSignals(SbRun run);
 /* After SbRunSetUp(). */
 PetscErrorCode SbRunSetPause(SbRun run, SbPauseFn fn, void *ctx);
 /*

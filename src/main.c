@@ -41,6 +41,7 @@ static PetscErrorCode simulate(Scene *s)
   PetscCall(SbLedgerAttach(s->ledger));
   PetscCall(SbRemeshAttach(s->remesh, s->run));
   PetscCall(SbOutputAttach(s->run));
+  PetscCall(SbRunCatchSignals(s->run));
   PetscCall(PetscLogStagePop());
 
   /* the run, from header to summary */
@@ -50,6 +51,7 @@ static PetscErrorCode simulate(Scene *s)
   PetscCall(SbOutputFile(s->run, "ledger.csv", sizeof(file), file, &quiet));
   PetscCall(SbLedgerReport(s->ledger, file, quiet));
   SbErrorSetFailureHandler(NULL, NULL);
+  if (s->run->stopped) SbErrorSetStopped();
   if (s->run->stop_reason[0]) SbErrorPost("%s", s->run->stop_reason);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -19,13 +19,14 @@ static struct {
   MPI_Comm comm;       /* ours alone, so that nothing else can be pending on it */
   PetscBool pending;   /* a user error is on its way up, or was posted */
   PetscBool posted;    /* by SbErrorPost(): the run counts as failed */
+  int code;            /* with which the program then ends */
   PetscBool trace;     /* -error_trace */
   char message[2048];  /* of the last error */
   char file[256];      /* option files, for messages about YAML */
   const char *program; /* begins every line */
   void (*failure_handler)(const char *message, void *ctx); /* called by the rank that speaks for the run */
   void *farewell_ctx;
-} state = {.comm = MPI_COMM_NULL, .program = "supple"};
+} state = {.comm = MPI_COMM_NULL, .program = "supple", .code = 1};
 
 /* PETSc's functions that read options; their messages do not always name the option. */
 static PetscBool of_options(const char *function)
@@ -68,6 +69,7 @@ static PetscErrorCode handler(MPI_Comm comm, int line, const char *function, con
   if (p == PETSC_ERROR_INITIAL) {
     const PetscBool yaml = is_yaml_error(function);
 
+    state.code = 1;
     state.pending = is_user_error(n, function);
     (void)snprintf(state.message, sizeof(state.message), "%s%s%s", yaml ? state.file : "",
                    yaml && state.file[0] ? ": " : "", mess ? mess : "unknown error");
@@ -112,6 +114,11 @@ void SbErrorPost(const char *format, ...)
   state.pending = state.posted = PETSC_TRUE;
 }
 
+void SbErrorSetStopped(void)
+{
+  state.code = SB_EXIT_STOPPED;
+}
+
 void SbErrorSetFailureHandler(void (*failure_handler)(const char *message, void *ctx), void *ctx)
 {
   state.failure_handler = failure_handler;
@@ -123,7 +130,8 @@ static void speak(void)
 {
   if (state.failure_handler) (*state.failure_handler)(state.message, state.farewell_ctx);
   (void)fflush(stdout);
-  (void)fprintf(stderr, "%s: error: %s\n", state.program, state.message);
+  (void)fprintf(stderr, "%s: %s: %s\n", state.program, state.code == SB_EXIT_STOPPED ? "stopped" : "error",
+                state.message);
   (void)fflush(stderr);
 }
 
@@ -133,7 +141,7 @@ int SbErrorFinish(PetscErrorCode ierr)
     SPEAKER, /* the lowest rank with a user error, else the lowest one that failed */
     FAILED
   };
-  const int failed = ierr || state.posted ? 1 : 0;
+  const int failed = ierr ? 1 : state.posted ? state.code : 0;
   int mine[2], all[2], done = 0;
   PetscMPIInt rank, size;
   MPI_Request request;

@@ -1,10 +1,10 @@
 /*
-  The two adaptive tolerances: -accuracy sets what decides the error from the error that is asked for, -time_budget from the seconds that a step may take.
+  The two adaptive tolerances: -accuracy sets what decides the error from the error that is asked for, -step_time_budget from the seconds that a step may take.
 
   -accuracy e: steps are as long as the integrator's loss allows, which is shared out over the run (TSAdapt, error per unit of time), and the
   solves leave a tenth of e, which the estimate of each step holds them to. The mesh is as it is.
 
-  -time_budget s: the time step is yours. Solves are looser when a step took longer than s, and tighter when it took less than half of it. What they do
+  -step_time_budget s: the time step is yours. Solves are looser when a step took longer than s, and tighter when it took less than half of it. What they do
   depends on the machine, and no two runs are the same.
 
   A tolerance that the user gave (-snes_rtol, -ksp_rtol, -ts_adapt_type) stays.
@@ -25,10 +25,10 @@ PetscErrorCode SbAdaptiveToleranceSetFromOptions(SbLedger l)
   PetscFunctionBeginUser;
   PetscCheck(
     l->accuracy == 0. || l->budget == 0., PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
-    "-accuracy %g and -time_budget %g s: what one of them sets the other would change; give one of them",
+    "-accuracy %g and -step_time_budget %g s: what one of them sets the other would change; give one of them",
     (double)l->accuracy, (double)l->budget);
   PetscCheck(l->budget == 0. || l->run->model->dynamic, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
-             "-time_budget %g s is about time steps, and -time static has none: give -accuracy",
+             "-step_time_budget %g s is about time steps, and -time static has none: give -accuracy",
              (double)l->budget);
   if (l->accuracy > 0. && l->run->model->dynamic) {
     PetscCall(PetscOptionsHasName(NULL, NULL, "-ts_adapt_type", &given));

@@ -30,7 +30,7 @@ static const SbOption rows[] = {
   {"accuracy", SB_OPTION_REAL, 1, "", "0", "[0, 1)",
    "relative error in the norm of the energy that the run aims at: sets steps and tolerances; 0: they are "
    "yours"},
-  {"time_budget", SB_OPTION_REAL, 1, "s", "0", "[0, inf)",
+  {"step_time_budget", SB_OPTION_REAL, 1, "s", "0", "[0, inf)",
    "wall time that a step may take: tolerances are as tight as it allows; 0: no limit"},
 };
 
@@ -53,7 +53,7 @@ PetscErrorCode SbLedgerSetFromOptions(SbRun run, SbLedger *ledger)
   PetscCall(SbScopeSet(&scope, "", "", ""));
   PetscCall(SbOptionBool(&scope, "ledger", &named));
   PetscCall(SbOptionReal(&scope, "accuracy", &accuracy));
-  PetscCall(SbOptionReal(&scope, "time_budget", &budget));
+  PetscCall(SbOptionReal(&scope, "step_time_budget", &budget));
   if (!named && accuracy == 0. && budget == 0.) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCheck(
     run->preset != SB_TIME_ALPHA2, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
@@ -170,6 +170,7 @@ static PetscErrorCode monitor(SbRun run, const SbStep *step, void *ctx)
   PetscReal scale;
 
   PetscFunctionBeginUser;
+  if (step->again) PetscFunctionReturn(PETSC_SUCCESS);
   l->stored = run->model->dynamic ? PetscMax(l->stored, energy) : energy;
   // in units of a residual: a tangent is three, an iteration with its preconditioner two
   l->work += run->snes ? 4. * (PetscReal)step->newton + 2. * (PetscReal)step->linear + 1. : 1.;

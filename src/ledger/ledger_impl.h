@@ -68,7 +68,7 @@ struct _p_SbLedger {
   PetscBool may_tune;             /* tolerances are the program's */
   PetscReal rtol;                 /* that the solves aim at */
   PetscInt repeats;               /* solves that were repeated for their accuracy */
-  PetscInt nstep, nkept;          /* of -time_budget: steps, and those that took no longer */
+  PetscInt nstep, nkept;          /* of -step_time_budget: steps, and those that took no longer */
   PetscReal wall, longest, total; /* at the last step; s */
 };
 

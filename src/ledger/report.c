@@ -190,7 +190,7 @@ static void say_dial(SbLedger l, Words *w)
   }
   if (l->budget > 0. && l->nstep) {
     say(w,
-        "-time_budget %.3g s: %" PetscInt_FMT " of %" PetscInt_FMT
+        "-step_time_budget %.3g s: %" PetscInt_FMT " of %" PetscInt_FMT
         " steps kept it, mean %.3g s, longest %.3g s; solves to %.1e. ",
         (double)l->budget, l->nkept, l->nstep, (double)(l->total / (PetscReal)l->nstep), (double)l->longest,
         (double)l->rtol);

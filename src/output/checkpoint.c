@@ -183,16 +183,19 @@ static PetscErrorCode write_checkpoint(SbRun run, SbOutput out, const SbStep *st
 static PetscErrorCode monitor(SbRun run, const SbStep *step, void *ctx)
 {
   SbOutput out = (SbOutput)ctx;
-  PetscBool due = step->last;
+  const PetscBool asked = (PetscBool)(out->checkpoint_every > 0. || out->checkpoint_every_steps);
+  PetscBool due = (PetscBool)(run->stopped || (step->last && asked));
 
   PetscFunctionBeginUser;
-  /* whether this step is to be kept: by time, by number, or as the last one */
+  /* whether this step is to be kept: by time, by number, as the last one, or to go on from */
   if (step->step == run->step0) PetscFunctionReturn(PETSC_SUCCESS);
   if (out->checkpoint_every > 0.)
     due = (PetscBool)(due || SbOutputDue(out->checkpoint_every, step->t, step->dt));
   if (out->checkpoint_every_steps) due = (PetscBool)(due || step->step % out->checkpoint_every_steps == 0);
   if (!due) PetscFunctionReturn(PETSC_SUCCESS);
 
+  PetscCall(SbOutputOrder(run, out));
+  PetscCall(SbLogNamed("Out", "checkpoint", &out->event.checkpoint));
   PetscCall(PetscLogStagePush(SbStageOutput));
   PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_CHECKPOINT], 0, 0, 0, 0));
   PetscCall(PetscLogEventBegin(out->event.checkpoint, 0, 0, 0, 0));
@@ -206,10 +209,11 @@ static PetscErrorCode monitor(SbRun run, const SbStep *step, void *ctx)
 PetscErrorCode SbCheckpointAttach(SbRun run, SbOutput out)
 {
   PetscFunctionBeginUser;
-  if (out->checkpoint_every <= 0. && !out->checkpoint_every_steps) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(SbOutputOrder(run, out));
-  // Works and losses are part of the state.
-  run->want_energies = PETSC_TRUE;
+  // Works and losses are part of the state. A run that is asked to stop writes one, too, with what it knows of them.
+  if (out->checkpoint_every > 0. || out->checkpoint_every_steps) {
+    PetscCall(SbOutputOrder(run, out));
+    run->want_energies = PETSC_TRUE;
+  }
   PetscCall(SbRunAddMonitor(run, monitor, out, NULL));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

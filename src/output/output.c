@@ -31,7 +31,9 @@ static const SbOption rows[] = {
    "steps between checkpoints; 0: none by steps"},
   {"checkpoint_keep", SB_OPTION_INT, 1, "", "2", "[1, inf)", "checkpoints kept, the newest ones"},
   {"restart", SB_OPTION_STRING, 1, "", "", "",
-   "checkpoint to go on from, or latest: the newest one in output_dir; empty: start from the beginning"},
+   "checkpoint to go on from, or latest: the newest one in output_dir, or auto: that one if there is any; "
+   "empty: start from "
+   "the beginning"},
   {"probes", SB_OPTION_NAMES, 1, "", "", "", "names of points whose displacement history.csv follows"},
   {"progress", SB_OPTION_BOOL, 1, "", "true", "", "print a line on the progress of the run"},
   {"quiet", SB_OPTION_BOOL, 1, "", "false", "", "print errors and warnings only"},
@@ -265,6 +267,12 @@ PetscErrorCode SbOutputSetFromOptions(SbRun run)
   (void)signal(SIGXFSZ, SIG_IGN);
   if (!out->rank) PetscCall(SbFolderMake(out, sizeof(message), message));
   PetscCall(SbAgree(out->comm, PETSC_ERR_FILE_OPEN, message));
+  if (!strcmp(out->restart, "auto")) {
+    char path[PETSC_MAX_PATH_LEN];
+
+    PetscCall(SbCheckpointFind(out, "latest", 0, sizeof(path), path));
+    PetscCall(PetscStrncpy(out->restart, path[0] ? "latest" : "", sizeof(out->restart)));
+  }
   // The closing table needs the log events.
   PetscCall(PetscLogDefaultBegin());
   PetscFunctionReturn(PETSC_SUCCESS);

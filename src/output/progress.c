@@ -71,8 +71,8 @@ static PetscErrorCode monitor(SbRun run, const SbStep *step, void *ctx)
   char line[160];
 
   PetscFunctionBeginUser;
-  if (p->titled && step->step == run->step0)
-    PetscFunctionReturn(PETSC_SUCCESS); /* it was printed before a re-meshing */
+  /* it was printed before a re-meshing, or is the last one after all */
+  if ((p->titled && step->step == run->step0) || step->again) PetscFunctionReturn(PETSC_SUCCESS);
   if (!p->titled) {
     p->titled = PETSC_TRUE;
     p->t_start = step->t;

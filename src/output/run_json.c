@@ -216,6 +216,7 @@ static PetscErrorCode write_json(SbRun run, SbOutput out, const char *status, co
   put_remeshed(f, out);
   if (phases) PetscCall(put_costs(f, run, out, phases));
   put_text(f, "reason", reason);
+  if (run->stopped) put_text(f, "go_on", run->seen.step > run->step0 ? "-restart latest" : "-restart auto");
   (void)fprintf(f, "  \"status\": \"%s\"\n}\n", status);
   (void)fclose(f);
   PetscCall(SbOutputPath(out, "run.json", sizeof(path), path));

@@ -240,7 +240,8 @@ static PetscErrorCode check_after_failure(SbRemesh r, SbRun run, PetscBool *agai
 
   PetscFunctionBeginUser;
   *again = PETSC_FALSE;
-  if (!r->failed || !run->stop_reason[0] || run->step_now <= r->tried) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!r->failed || !run->stop_reason[0] || run->stopped || run->step_now <= r->tried)
+    PetscFunctionReturn(PETSC_SUCCESS);
   r->tried = run->step_now;
   if (!run->step_now) {
     PetscCall(SbWarning(run->model->comm,

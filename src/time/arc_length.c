@@ -385,6 +385,10 @@ PetscErrorCode SbArcLengthSolve(SbRun run)
       run->rejected_step++;
       run->rejected_total++;
       run->tangent_known = PETSC_FALSE;
+      if (run->stopped) {
+        PetscCall(SbRunStepAccepted(run, step, factor, 0., PETSC_TRUE));
+        break;
+      }
       l *= 0.5;
       if (++cuts <= run->max_halvings && l >= run->min_increment * run->arc.first) continue;
       break;
@@ -420,11 +424,13 @@ PetscErrorCode SbArcLengthSolve(SbRun run)
                           "the path ended after -static_max_steps %" PetscInt_FMT ", at the load factor %g",
                           run->arc.steps, (double)p.factor));
     }
+    if (!last) PetscCall(SbRunStopAsked(run, step + 1, p.factor, PETSC_FALSE));
+    last = (PetscBool)(last || run->stopped);
     PetscCall(SbRunStepAccepted(run, ++step, p.factor, p.factor - factor, last));
     run->newton_step = run->linear_step = run->rejected_step = 0;
     factor = p.factor;
   }
-  if (run->stop_reason[0]) PetscCall(explain(run, factor, l));
+  if (run->stop_reason[0] && !run->stopped) PetscCall(explain(run, factor, l));
   PetscCall(destroy(&p));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -43,7 +43,7 @@ PetscErrorCode SbRunSolveContact(SbRun run, const SbAttempt *step, SNESConverged
   const SNES snes = run->snes;
   const PetscReal t = step->t, dt = step->dt;
   const Vec U0 = step->U0, U = step->U;
-  PetscBool again = PETSC_TRUE, rough, constrained;
+  PetscBool again = PETSC_TRUE, given_up, rough, constrained;
   PetscReal size, least = 0;
   Aim aim;
 
@@ -93,7 +93,8 @@ PetscErrorCode SbRunSolveContact(SbRun run, const SbAttempt *step, SNESConverged
     if ((!again && !rough) || !*reason) break;
     if (!again || round == ROUGH_ROUNDS) rough = PETSC_FALSE;
     if (m->space->nodal || !m->dynamic) run->tangent_known = PETSC_FALSE;
-    if (round == SB_CONTACT_ROUNDS) {
+    PetscCall(SbRunGiveUp(run, &given_up));
+    if (given_up || round == SB_CONTACT_ROUNDS) {
       *reason = SNES_DIVERGED_MAX_IT;
       break;
     }

@@ -6,7 +6,7 @@
 */
 #include "time_impl.h"
 
-static PetscErrorCode after_step(TS ts)
+PetscErrorCode SbRunAfterStep(TS ts)
 {
   TSConvergedReason reason;
   PetscReal t, before;
@@ -21,8 +21,9 @@ static PetscErrorCode after_step(TS ts)
   PetscCall(TSGetStepNumber(ts, &step));
   PetscCall(TSGetPrevTime(ts, &before));
   run->after.dt = t - before;
-  PetscCall((*run->after.fn)(run, step, t, t - before, run->after.ctx, &run->paused));
-  if (run->paused) PetscCall(TSSetConvergedReason(ts, TS_CONVERGED_USER));
+  if (run->after.fn) PetscCall((*run->after.fn)(run, step, t, t - before, run->after.ctx, &run->paused));
+  PetscCall(SbRunStopAsked(run, step, t, PETSC_FALSE));
+  if (run->paused || run->stopped) PetscCall(TSSetConvergedReason(ts, TS_CONVERGED_USER));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -31,9 +32,6 @@ PetscErrorCode SbRunSetPause(SbRun run, SbPauseFn fn, void *ctx)
   PetscFunctionBeginUser;
   run->after.fn = fn;
   run->after.ctx = ctx;
-  if (!run->ts) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(TSSetApplicationContext(run->ts, run));
-  PetscCall(TSSetPostStep(run->ts, after_step));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -57,6 +55,7 @@ PetscErrorCode SbRunContinue(SbRun from, SbRun to)
   to->rejected_total = from->rejected_total;
   to->steps_total = from->steps_total;
   to->wall_start = from->wall_start;
+  to->stop = from->stop;
 
   /* fixed steps have their nominal length again, also where the last one was cut */
   if (!is_explicit(to) || from->dt_given) to->dt = from->dt;

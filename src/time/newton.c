@@ -473,6 +473,13 @@ static PetscErrorCode SNESSolve_Newton(SNES snes)
 
   while (!snes->reason) {
     const PetscInt linear = snes->linear_its;
+    PetscBool given_up;
+
+    PetscCall(SbRunGiveUp(n->run, &given_up));
+    if (given_up) {
+      snes->reason = SNES_DIVERGED_MAX_IT;
+      break;
+    }
 
     /* where to, and how far */
     PetscCall(find_direction(snes, &filtered, &slope));

@@ -39,6 +39,14 @@ static const SbOption rows[] = {
   {"time_inverted", SB_OPTION_CHOICE, 1, "", "accept", "accept|reject",
    "a step that inverts tets (det F <= 0): taken, and they are counted; or halved and tried again, and the "
    "run stops when that does not help"},
+  {"wall_time", SB_OPTION_STRING, 1, "", "", "",
+   "h:mm:ss (or d-hh:mm:ss) after which the program has to have ended: the run stops in time for a "
+   "checkpoint, with exit code "
+   "75, and goes on with -restart latest; empty: no limit"},
+  {"stop_grace", SB_OPTION_REAL, 1, "s", "10", "[0, inf)",
+   "after a signal to stop (SIGTERM, SIGINT, SIGUSR1): seconds that the step has to end; then it is given "
+   "up, and the run ends "
+   "with the step before"},
   {"saddle_solver", SB_OPTION_CHOICE, 1, "", "auto", "auto|direct|iterative",
    "how effects with response multiplier solve for displacements and multipliers: by a factorisation of "
    "both, or by the solver in the null space of the constraints; auto goes by size"},
@@ -139,6 +147,7 @@ PetscErrorCode SbRunCreate(SbModel model, SbRun *run)
     PetscCall(SbOptionReal(&scope, "time_newmark_beta", &r->newmark[0]));
     PetscCall(SbOptionReal(&scope, "time_newmark_gamma", &r->newmark[1]));
   }
+  PetscCall(SbRunReadStop(r, &scope));
   PetscCall(SbOptionInt(&scope, "time_max_halvings", &r->max_halvings));
   PetscCall(SbOptionChoice(&scope, "time_inverted", &inverted));
   r->reject_inverted = (PetscBool)(inverted == 1);
@@ -389,6 +398,8 @@ static PetscErrorCode set_up_ts(SbRun run)
   PetscCall(TSSetMaxTime(run->ts, run->t_end));
   PetscCall(TSSetTimeStep(run->ts, run->dt));
   PetscCall(TSMonitorSet(run->ts, step_accepted, run, NULL));
+  PetscCall(TSSetApplicationContext(run->ts, run));
+  PetscCall(TSSetPostStep(run->ts, SbRunAfterStep));
   PetscCall(TSGetAdapt(run->ts, &adapt));
   PetscCall(PetscObjectTypeCompare((PetscObject)adapt, TSADAPTNONE, &run->fixed_step));
   method_settings(run, &settings);
@@ -609,6 +620,7 @@ PetscErrorCode SbRunSolve(SbRun run)
   PetscFunctionBeginUser;
   if (run->wall_start == 0.) run->wall_start = MPI_Wtime();
   run->paused = PETSC_FALSE;
+  run->seen.U = NULL;
   if (run->ts) {
     PetscCall(TSSetStepNumber(run->ts, run->step0));
     PetscCall(TSSetTime(run->ts, run->t0));

@@ -363,7 +363,8 @@ static PetscErrorCode TSStep_SecondOrder(TS ts)
     ts->reject++;
     so->run->rejected_total++;
     so->good = 0;
-    if (is_explicit(so) || ++cuts > so->set.max_halvings || SbRunTooShort(so->run, next)) {
+    if (is_explicit(so) || so->run->stopped || ++cuts > so->set.max_halvings ||
+        SbRunTooShort(so->run, next)) {
       ts->reason = TS_DIVERGED_STEP_REJECTED;
       break;
     }

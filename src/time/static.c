@@ -84,7 +84,7 @@ static PetscErrorCode complete(void *ctx, SNESConvergedReason reason, SbSolvedSt
   *ok = (PetscBool)(reason > 0 && !far);
 
   /* why the solve failed */
-  if (!*ok) {
+  if (!*ok && !l->run->stopped) {
     char why[512] = "use more -static_steps";
 
     PetscCall(find_free_body(l->run, l->factor, &found));
@@ -141,7 +141,8 @@ PetscErrorCode SbStaticSolve(SbRun run)
       run->rejected_total++;
       length *= 0.5;
       run->tangent_known = PETSC_FALSE;
-      if (run->free_body) break;
+      if (run->stopped) PetscCall(SbRunStepAccepted(run, step, factor, 0., PETSC_TRUE));
+      if (run->free_body || run->stopped) break;
       if (++cuts <= run->max_halvings && length >= least && !SbRunTooShort(run, length)) continue;
 
       /* steps have become too short: how far the load has got, and what is likely in the way */
@@ -170,10 +171,11 @@ PetscErrorCode SbStaticSolve(SbRun run)
     run->after.dt = next - factor;
     if (run->after.fn && next < 1.)
       PetscCall((*run->after.fn)(run, step + 1, next, next - factor, run->after.ctx, &run->paused));
+    if (next < 1.) PetscCall(SbRunStopAsked(run, step + 1, next, PETSC_FALSE));
     PetscCall(SbRunStepAccepted(run, ++step, next, next - factor, (PetscBool)(next >= 1.)));
     if (run->newton_step) cuts = 0;
     run->newton_step = run->linear_step = run->rejected_step = 0;
-    if (run->paused) break;
+    if (run->paused || run->stopped) break;
 
     /* and the next one may be longer again */
     factor = next;

@@ -55,12 +55,25 @@ PetscErrorCode SbRunAttempt(SbRun run, const SbAttempt *a, PetscBool *ok)
 PetscErrorCode SbRunStepAccepted(SbRun run, PetscInt step, PetscReal t, PetscReal dt, PetscBool last)
 {
   const PetscBool first = (PetscBool)(step == run->step0);
+  const PetscReal begun = MPI_Wtime();
   const SbModel m = run->model;
   SbStage stage = {.t = t, .dt = dt, .step = step, .shift_k = 1.};
-  SbStep now = {
-    .step = step, .t = t, .dt = dt, .t_end = run->t_end, .U = run->U, .V = run->V, .A = run->A, .last = last};
+  SbStep now = {.step = step, .t = t, .dt = dt, .t_end = run->t_end, .U = run->U, .V = run->V, .A = run->A};
 
   PetscFunctionBeginUser;
+  /* a step that was seen already: there was no other after it */
+  if (run->seen.U && run->seen.step == step) {
+    if (!run->stopped || first) PetscFunctionReturn(PETSC_SUCCESS);
+    now = run->seen;
+    now.last = now.again = PETSC_TRUE;
+    for (PetscInt k = 0; k < run->nmonitor; k++)
+      PetscCall(run->monitor[k].fn(run, &now, run->monitor[k].ctx));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  now.last = (PetscBool)(last || run->stopped);
+  if (!first)
+    run->stop.longest_step = PetscMax(SB_FORGET * run->stop.longest_step, begun - run->stop.step_begun);
+
   /* effects keep their history */
   run->step_now = step;
   run->t_now = t;
@@ -92,5 +105,8 @@ PetscErrorCode SbRunStepAccepted(SbRun run, PetscInt step, PetscReal t, PetscRea
   run->linear_total += now.linear;
   run->steps_total += !first;
   for (PetscInt k = 0; k < run->nmonitor; k++) PetscCall(run->monitor[k].fn(run, &now, run->monitor[k].ctx));
+  run->seen = now;
+  run->stop.step_begun = MPI_Wtime();
+  run->stop.longest_output = PetscMax(run->stop.longest_output, run->stop.step_begun - begun);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

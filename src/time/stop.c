@@ -1,14 +1,37 @@
 /*
-  Why a run ends before its end: the reason that it gives, and when steps are no longer worth halving.
+  Why a run ends before its end: the reason that it gives, when steps are no longer worth halving, and who asks it to stop.
+
+  A signal (SIGTERM, SIGINT, SIGUSR1 on any rank) or the end of -wall_time lets the step that is being solved end; monitors see that step as the last one, so
+  that a checkpoint and the last frame are written. A step that takes longer than -stop_grace, or would take longer than what is left of -wall_time, is given up
+  between two iterations of Newton's method, and the run ends with the step before. All ranks decide alike: by one reduction after each step and each iteration.
 */
+#include <signal.h>
 #include <stdarg.h>
+#include <stdio.h>
+#include <time.h>
+#include <unistd.h>
 #include "time_impl.h"
+
+#define WALL_TIME 1000      /* as the number of a signal */
+#define RESERVE_PART 0.05   /* of -wall_time, for the last files, */
+#define RESERVE_LONGEST 60. /* but no more than so many s; twice what files have taken so far comes on top */
+#define STEP_FACTOR 1.5     /* the next step may take so many times as long as the longest of late */
+#define AGAIN 0.5           /* s, within which a second SIGINT comes from the same key */
+
+/* What a signal leaves: of the process, as signals are. */
+static struct {
+  volatile sig_atomic_t signal; /* the first one; 0: none */
+  volatile double since;        /* s, when it came */
+  int speak;                    /* this rank says that it came */
+} asked;
 
 PetscErrorCode SbRunFail(SbRun run, const char *format, ...)
 {
   va_list args;
 
   PetscFunctionBeginUser;
+  /* what fails because it is given up has no reason of its own */
+  if (run->stopped && run->stop_reason[0]) PetscFunctionReturn(PETSC_SUCCESS);
   va_start(args, format);
   PetscCall(PetscVSNPrintf(run->stop_reason, sizeof(run->stop_reason), format, NULL, args));
   va_end(args);
@@ -20,4 +43,132 @@ PetscBool SbRunTooShort(SbRun run, PetscReal dt)
 {
   return (PetscBool)(run->rejected_inverted &&
                      dt < 0.999 * PetscPowReal(0.5, (PetscReal)run->max_halvings) * run->dt);
+}
+
+/* ------------------------------------------------------------------ who asks */
+
+static double seconds(void)
+{
+  struct timespec now;
+
+  (void)clock_gettime(CLOCK_MONOTONIC, &now);
+  return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
+}
+
+/* Calls only what a handler may call. */
+static void note_signal(int number)
+{
+  static const char text[] =
+    "\nsupple: a signal asks to stop: the step is being finished (a second Ctrl-C ends at once)\n";
+
+  if (asked.signal) {
+    if (number == SIGINT && seconds() > asked.since + AGAIN) _exit(128 + SIGINT);
+    return;
+  }
+  asked.since = seconds();
+  asked.signal = number;
+  if (asked.speak && write(STDERR_FILENO, text, sizeof(text) - 1) < 0) asked.speak = 0;
+}
+
+PetscErrorCode SbRunCatchSignals(SbRun run)
+{
+  static const int signals[] = {SIGTERM, SIGINT, SIGUSR1};
+  struct sigaction action = {.sa_handler = note_signal, .sa_flags = SA_RESTART};
+  PetscMPIInt rank;
+
+  PetscFunctionBeginUser;
+  PetscCallMPI(MPI_Comm_rank(run->model->comm, &rank));
+  asked.speak = !rank;
+  (void)sigemptyset(&action.sa_mask);
+  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(signals); i++) (void)sigaction(signals[i], &action, NULL);
+  run->stop.listens = PETSC_TRUE;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Seconds of "h:mm:ss" or "d-hh:mm:ss", as batch systems write them; negative: it is neither. */
+static PetscReal duration(const char *text)
+{
+  int day = 0, hour, minute, second, end = 0;
+
+  if ((sscanf(text, "%d-%d:%2d:%2d%n", &day, &hour, &minute, &second, &end) != 4 || text[end]) &&
+      (day = 0, sscanf(text, "%d:%2d:%2d%n", &hour, &minute, &second, &end) != 3 || text[end]))
+    return -1.;
+  if (day < 0 || hour < 0 || minute < 0 || minute > 59 || second < 0 || second > 59) return -1.;
+  return 86400. * day + 3600. * hour + 60. * minute + second;
+}
+
+PetscErrorCode SbRunReadStop(SbRun run, const SbScope *scope)
+{
+  char text[SB_NAME_MAX];
+
+  PetscFunctionBeginUser;
+  run->stop.begun = MPI_Wtime();
+  PetscCall(SbOptionReal(scope, "stop_grace", &run->stop.grace));
+  PetscCall(SbOptionString(scope, "wall_time", sizeof(text), text));
+  if (!text[0]) PetscFunctionReturn(PETSC_SUCCESS);
+  run->stop.wall_time = duration(text);
+  run->stop.listens = PETSC_TRUE;
+  PetscCheck(run->stop.wall_time > 0., PETSC_COMM_SELF, PETSC_ERR_USER,
+             "-wall_time %s is no duration: give hours:minutes:seconds, 1:30:00, or "
+             "days-hours:minutes:seconds, 2-00:00:00",
+             text);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ when the run ends for it */
+
+/* The signal, or WALL_TIME, for which the run is to end, the same on all ranks; 0: none. within: a step is being solved. */
+static PetscErrorCode find_reason(SbRun run, PetscBool within, int *reason)
+{
+  const double now = MPI_Wtime();
+  PetscMPIInt rank, size;
+
+  PetscFunctionBeginUser;
+  PetscCallMPI(MPI_Comm_rank(run->model->comm, &rank));
+  PetscCallMPI(MPI_Comm_size(run->model->comm, &size));
+  *reason = asked.signal && (!within || seconds() > asked.since + run->stop.grace) ? asked.signal : 0;
+  if (run->stop.wall_time > 0. && !rank) {
+    const PetscReal reserve =
+      PetscMin(RESERVE_LONGEST, RESERVE_PART * run->stop.wall_time) + 2. * run->stop.longest_output;
+    const PetscReal next = within ? 0. : STEP_FACTOR * run->stop.longest_step;
+
+    if (now - run->stop.begun + reserve + next >= run->stop.wall_time) *reason = WALL_TIME;
+  }
+  if (size > 1) PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, reason, 1, MPI_INT, MPI_MAX, run->model->comm));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbRunStopAsked(SbRun run, PetscInt step, PetscReal t, PetscBool within)
+{
+  const char *who = "the end of -wall_time is near";
+  char signal_name[32];
+  int reason;
+
+  PetscFunctionBeginUser;
+  if (!run->stop.listens || run->stopped) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(find_reason(run, within, &reason));
+  if (!reason) PetscFunctionReturn(PETSC_SUCCESS);
+  if (reason != WALL_TIME) {
+    PetscCall(PetscSNPrintf(signal_name, sizeof(signal_name), "SIG%s",
+                            reason == SIGTERM  ? "TERM"
+                            : reason == SIGINT ? "INT"
+                                               : "USR1"));
+    who = signal_name;
+  }
+  run->stopped = PETSC_TRUE;
+  run->paused = PETSC_FALSE;
+  run->stop_reason[0] = 0;
+  PetscCall(SbRunFail(run, "%s%s, after step %" PetscInt_FMT " at %s %g%s; it goes on with -restart %s", who,
+                      within ? ", and the next step is given up" : "", step,
+                      run->model->dynamic ? "t =" : "load factor", (double)t, run->model->dynamic ? " s" : "",
+                      step > run->step0 ? "latest" : "auto"));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbRunGiveUp(SbRun run, PetscBool *given_up)
+{
+  PetscFunctionBeginUser;
+  PetscCall(SbRunStopAsked(run, run->step_now, run->t_now, PETSC_TRUE));
+  *given_up = run->stopped;
+  PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -6,7 +6,8 @@
   250 /* solves of one step before contact counts as failed; response augmented may take more than 100 */
 #define SB_TIME_OF_IMPACT_LEAST \
   0.05 /* of a step: where points come into contact nearer to one of its ends, it is not cut at their arrival */
-#define SB_LOOKS 4 /* so often may a step be solved again for who examines it */
+#define SB_FORGET 0.9 /* the longest step of late counts less with every step */
+#define SB_LOOKS 4    /* so often may a step be solved again for who examines it */
 #include "sbtime.h"
 
 #define SB_TS_SECOND_ORDER "sb_second_order"
@@ -49,12 +50,20 @@ PetscErrorCode SbRunAttempt(SbRun run, const SbAttempt *attempt, PetscBool *ok);
 PetscErrorCode SbRunStepAccepted(SbRun run, PetscInt step, PetscReal t, PetscReal dt,
                                  PetscBool last); /* after it was accepted; also once at the start */
 #define SB_NEWTON_ITERATIONS 100
+/* continue.c: the post-step function of the TS. */
+PetscErrorCode SbRunAfterStep(TS ts);
 /* newton.c: Newton's method as a minimisation, a SNESType. Run: the one whose steps snes solves, borrowed; after the type is set. */
 #define SB_SNES_NEWTON "newton"
 PetscErrorCode SbNewtonRegister(void);
 PetscErrorCode SbNewtonSetRun(SNES snes, SbRun run);
 
 /* stop.c: the reason that a run gives when it ends early. */
+/* Options -wall_time and -stop_grace. */
+PetscErrorCode SbRunReadStop(SbRun run, const SbScope *scope);
+/* After a step that ended at t (within: while the next one is solved): whether the run is to end there, in run->stopped. Collective. */
+PetscErrorCode SbRunStopAsked(SbRun run, PetscInt step, PetscReal t, PetscBool within);
+/* While a step is solved: whether it is to be given up. Collective. */
+PetscErrorCode SbRunGiveUp(SbRun run, PetscBool *given_up);
 PetscErrorCode SbRunFail(SbRun run, const char *format, ...) __attribute__((format(printf, 2, 3)));
 /* Whether the last step was refused by inverted.c, and one of this length is not worth trying. */
 PetscBool SbRunTooShort(SbRun run, PetscReal dt);

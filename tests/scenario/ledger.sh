@@ -80,14 +80,14 @@ check "-accuracy 0.5 says nothing" grep -q -- '-accuracy 0.5 was' coarse.txt
 "$supple" swing.opts -accuracy 0.01 -output_dir fine >fine.txt 2>&1
 check "-accuracy 0.01 on two cells" grep -q 'NOT met' fine.txt
 check "no mesh size" grep -q 'too coarse for it: tets of about' <<<"$(tr '\n' ' ' <fine.txt)"
-"$supple" swing.opts -time_budget 100 -output_dir slow >slow.txt 2>&1
+"$supple" swing.opts -step_time_budget 100 -output_dir slow >slow.txt 2>&1
 check "100 s for a step" grep -q '10 of 10 steps kept it' <<<"$(tr '\n' ' ' <slow.txt)"
-"$supple" swing.opts -time_budget 1e-7 -output_dir fast >fast.txt 2>&1
+"$supple" swing.opts -step_time_budget 1e-7 -output_dir fast >fast.txt 2>&1
 check "0.1 us for a step" grep -q 'It is too small for this mesh' <<<"$(tr '\n' ' ' <fast.txt)"
 
 # what is refused
-error 1 "-accuracy 0.1|-time_budget 0.03 s" swing.opts -accuracy 0.1 -time_budget 0.03
-error 2 "-time_budget 0.03 s|-time static|-accuracy" bar.opts -time_budget 0.03
+error 1 "-accuracy 0.1|-step_time_budget 0.03 s" swing.opts -accuracy 0.1 -step_time_budget 0.03
+error 2 "-step_time_budget 0.03 s|-time static|-accuracy" bar.opts -step_time_budget 0.03
 error 1 "-ledger|-time alpha2|-time genalpha" swing.opts -time alpha2 -ledger yes
 error 1 "-output_fields space_error|-ledger yes" bar.opts -output_fields space_error
 error 2 "-ledger_on 'floor'" bar.opts -ledger yes -ledger_quantity reaction -ledger_on floor

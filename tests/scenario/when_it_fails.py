@@ -73,7 +73,7 @@ CASES = [
     ("O5", "error", "bar.opts -effect_pull_on xmx", ["'xmx'", "xmax"]),
     ("O5", "error", "bar.opts -body_bar_material corotatd", ["-body_bar_material", "corotatd", "corotated"]),
     ("O5", "error", "bar.opts -output_fields displacment", ["-output_fields", "displacment", "displacement"]),
-    ("O6", "error", "bar.opts -accuracy 0.1 -time_budget 1", ["-accuracy", "-time_budget"]),
+    ("O6", "error", "bar.opts -accuracy 0.1 -step_time_budget 1", ["-accuracy", "-step_time_budget"]),
     ("O6", "error", f"{ARC} -body_a_tangent exact_spd", ["-static_control", "-body_a_tangent"]),
     ("O6", "error", "bar.opts -effects floor -effect_floor_type contact -effect_floor_response projected -effect_floor_obstacle plane:0,0,1,-1 -time euler_explicit -ts_dt 1e-5",
      ["floor", "-time"]),
