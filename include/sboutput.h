@@ -61,10 +61,16 @@ PetscErrorCode SbOutputSetFromOptions(SbRun run);
 /*
   SbOutputAttach - attaches the monitors asked for and, with -restart, loads the checkpoint. Collective.
 
-  After SbRunSetUp(). Replaces the files that an earlier run left in the folder (only those named above; a line says so),
-  or continues them after a restart; writes scenario.opts and run.json with the status "running".
+  After SbRunSetUp(). Moves the files that an earlier run left in the folder (only those named above) into its folder before_DATE, and says so; with
+  -output_overwrite yes replaces them; or continues them after a restart; writes scenario.opts and run.json with the status "running".
 */
 PetscErrorCode SbOutputAttach(SbRun run);
+
+/*
+  SbOutputLock - the folder is this run's until its output is destroyed or its process ends. Collective; after SbOutputSetFromOptions().
+  Errors: PETSC_ERR_FILE_OPEN with process and host of the run that has it.
+*/
+PetscErrorCode SbOutputLock(SbRun run);
 
 /*
   SbOutputRestoreMeshes - with -restart from a checkpoint of a run that was re-meshed: the bodies' meshes (SbBody.given). Collective; between

@@ -34,6 +34,7 @@ static PetscErrorCode simulate(Scene *s)
   SbErrorSetFailureHandler(report_failure, s);
   /* set-up: meshes of a restart, space, integrator, who looks on */
   PetscCall(PetscLogStagePush(SbStageSetup));
+  PetscCall(SbOutputLock(s->run));
   PetscCall(SbOutputRestoreMeshes(s->run));
   PetscCall(SbModelSetUp(s->model));
   PetscCall(SbSceneValidate(s->model));

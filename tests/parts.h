@@ -110,6 +110,7 @@ static const struct {
   {"progress", "progress"},
   {"quiet", "progress"},
   {"output_dir", ""},
+  {"output_overwrite", ""},
 };
 
 /* The families, and how their log events begin; NULL: none of their own. */

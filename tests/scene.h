@@ -32,7 +32,10 @@ static inline PetscErrorCode test_scene_open_on(MPI_Comm comm, const char *dir, 
   PetscCall(SbOptionsReset());
   PetscCall(SbRegisterAll());
   PetscCall(PetscOptionsInsertString(NULL, options));
-  if (dir) PetscCall(PetscOptionsSetValue(NULL, "-output_dir", dir));
+  if (dir) {
+    PetscCall(PetscOptionsSetValue(NULL, "-output_dir", dir));
+    PetscCall(PetscOptionsSetValue(NULL, "-output_overwrite", "yes"));
+  }
   PetscCall(SbSceneCreate(comm, &scene->model));
   PetscCall(test_scene_run(scene));
   if (dir) PetscCall(SbOutputSetFromOptions(scene->run));

@@ -1,12 +1,16 @@
 /*
-  The folder of the results: made and tried before anything is computed; what an earlier run left there under our names is removed when the run is about to start, and
-  files with other names are never touched. Checkpoints are found by the number in their names.
+  The folder of the results: made, tried and locked before anything is computed; what an earlier run left there under our names is moved aside when the run is about to
+  start, and files with other names are never touched. Checkpoints are found by the number in their names.
+
+  The lock is one of the file system (fcntl) on a file that names host and process: it goes with its process, however that ends, and holds between hosts where the file
+  system has such locks. Where it has none, folders are not locked.
 */
 #include <ctype.h>
 #include <dirent.h>
 #include <errno.h>
 #include <fcntl.h>
 #include <sys/stat.h>
+#include <time.h>
 #include <unistd.h>
 #include "output_impl.h"
 
@@ -52,6 +56,64 @@ PetscErrorCode SbFolderMake(SbOutput out, size_t nmessage, char message[])
     SbFormat(nmessage, message, "-output_dir %s cannot be written: %s; give another folder", out->dir,
              strerror(error));
   }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+#define LOCK ".supple_running"
+
+/* The lock file open and locked, or why not; rank 0. A file that its owner removed meanwhile is no lock. */
+static PetscErrorCode lock_folder(SbOutput out, size_t nmessage, char message[])
+{
+  struct flock all = {.l_type = F_WRLCK, .l_whence = SEEK_SET};
+  char path[PETSC_MAX_PATH_LEN], text[512] = "", host[256] = "";
+  struct stat mine, there;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbOutputPath(out, LOCK, sizeof(path), path));
+  for (PetscBool again = PETSC_TRUE; again;) {
+    out->lock = open(path, O_RDWR | O_CREAT | O_CLOEXEC, 0666);
+    if (out->lock < 0) PetscFunctionReturn(PETSC_SUCCESS);
+    if (fcntl(out->lock, F_SETLK, &all)) {
+      const ssize_t n = errno == EACCES || errno == EAGAIN ? read(out->lock, text, sizeof(text) - 1) : -1;
+
+      (void)close(out->lock);
+      out->lock = -1;
+      if (n >= 0)
+        SbFormat(nmessage, message,
+                 "-output_dir %s is in use by another run%s%s: wait for its end, or give another folder",
+                 out->dir, n ? ", " : "", text);
+      PetscFunctionReturn(PETSC_SUCCESS);
+    }
+    again = (PetscBool)(fstat(out->lock, &mine) || stat(path, &there) || mine.st_ino != there.st_ino);
+    if (again) (void)close(out->lock);
+  }
+  (void)gethostname(host, sizeof(host) - 1);
+  SbFormat(sizeof(text), text, "process %ld on %s since %s", (long)getpid(), host, out->started);
+  if (!ftruncate(out->lock, 0)) (void)!write(out->lock, text, strlen(text));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbOutputLock(SbRun run)
+{
+  const SbOutput out = (SbOutput)run->output;
+  char message[SB_MESSAGE_MAX] = "";
+
+  PetscFunctionBeginUser;
+  if (!out->rank) PetscCall(lock_folder(out, sizeof(message), message));
+  PetscCall(SbAgree(out->comm, PETSC_ERR_FILE_OPEN, message));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbFolderUnlock(SbOutput out)
+{
+  char path[PETSC_MAX_PATH_LEN];
+
+  PetscFunctionBeginUser;
+  if (out->lock < 0) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(SbOutputPath(out, LOCK, sizeof(path), path));
+  (void)unlink(path);
+  (void)close(out->lock);
+  out->lock = -1;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -131,10 +193,68 @@ PetscErrorCode SbCheckpointFind(SbOutput out, const char *file, int k, size_t si
 
 /* ------------------------------------------------------------------ all of it */
 
+/* Moves one file into the folder `ctx` beside it. */
+static PetscErrorCode move_aside(const char *name, PetscInt64 bytes, void *ctx)
+{
+  const char *aside = (const char *)ctx;
+  char from[PETSC_MAX_PATH_LEN], to[PETSC_MAX_PATH_LEN];
+
+  PetscFunctionBeginUser;
+  (void)bytes;
+  SbFormat(sizeof(from), from, "%.*s/%s", (int)(strrchr(aside, '/') - aside), aside, name);
+  SbFormat(sizeof(to), to, "%s/%s", aside, name);
+  PetscCheck(!rename(from, to), PETSC_COMM_SELF, PETSC_ERR_FILE_WRITE, "cannot move %s to %s: %s", from, to,
+             strerror(errno));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode count_file(const char *name, PetscInt64 bytes, void *ctx)
+{
+  PetscFunctionBeginUser;
+  (void)name;
+  (void)bytes;
+  ++*(PetscInt *)ctx;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* What an earlier run left goes into a folder named by when it ended. */
+static PetscErrorCode keep_earlier(SbOutput out)
+{
+  char path[PETSC_MAX_PATH_LEN], name[SB_FILE_MAX], date[32];
+  struct stat info;
+  struct tm local;
+  PetscInt n = 0;
+  int made = -1;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbOutputFiles(out, count_file, &n));
+  if (!n) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(SbOutputPath(out, "run.json", sizeof(path), path));
+  if (stat(path, &info)) info.st_mtime = time(NULL);
+  (void)strftime(date, sizeof(date), "%Y-%m-%d_%H-%M-%S", localtime_r(&info.st_mtime, &local));
+  for (int k = 1; k < 1000 && made; k++) {
+    if (k == 1)
+      SbFormat(sizeof(name), name, "before_%s", date);
+    else
+      SbFormat(sizeof(name), name, "before_%s_%d", date, k);
+    PetscCall(SbOutputPath(out, name, sizeof(path), path));
+    made = mkdir(path, 0777);
+    if (made && errno != EEXIST) break;
+  }
+  PetscCheck(
+    !made, PETSC_COMM_SELF, PETSC_ERR_FILE_WRITE,
+    "cannot make the folder %s for the results of an earlier run: %s; -output_overwrite yes replaces "
+    "them",
+    path, strerror(errno));
+  PetscCall(SbOutputFiles(out, move_aside, path));
+  if (!out->quiet)
+    PetscCall(PetscPrintf(PETSC_COMM_SELF, "%s: results of an earlier run are kept in %s\n", out->dir, name));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode SbFolderClear(SbOutput out, PetscInt step0)
 {
   char name[SB_FILE_MAX], path[PETSC_MAX_PATH_LEN];
-  PetscBool found = PETSC_FALSE;
 
   PetscFunctionBeginUser;
   /* what was not whole when a run ended */
@@ -145,15 +265,15 @@ PetscErrorCode SbFolderClear(SbOutput out, PetscInt step0)
     PetscCall(SbOutputPath(out, name, sizeof(path), path));
     (void)unlink(path);
   }
+  if (!out->restarted && !out->overwrite) PetscCall(keep_earlier(out));
+
   // Checkpoints of what is computed again would be the latest ones.
   PetscCall(SbCheckpointPrune(out, out->restarted ? step0 : -1, PETSC_MAX_INT));
   if (out->restarted) PetscFunctionReturn(PETSC_SUCCESS);
   for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(ours); i++) {
     PetscCall(SbOutputPath(out, ours[i], sizeof(path), path));
-    if (!unlink(path)) found = PETSC_TRUE;
+    (void)unlink(path);
   }
-  if (found && !out->quiet)
-    PetscCall(PetscPrintf(PETSC_COMM_SELF, "%s: results of an earlier run are replaced\n", out->dir));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

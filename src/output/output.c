@@ -9,6 +9,8 @@
 static const SbOption rows[] = {
   {"output_dir", SB_OPTION_STRING, 1, "", "", "",
    "folder of the results; empty: out/<name of the scenario file>"},
+  {"output_overwrite", SB_OPTION_BOOL, 1, "", "false", "",
+   "results of an earlier run in the folder are replaced; else they are moved into its folder before_DATE"},
   {"output_fields", SB_OPTION_NAMES, 1, "", "position,displacement,velocity,von_mises", "",
    "fields in fields.h5: position, displacement, velocity, acceleration, reaction, contact_force, "
    "contact_gap, stress, "
@@ -139,6 +141,8 @@ static PetscErrorCode read_options(SbOutput out, PetscBool dynamic)
                      dot && dot > base ? (int)(dot - base) : (int)strlen(base), base);
   }
 
+  PetscCall(SbOptionBool(&scope, "output_overwrite", &out->overwrite));
+
   /* what is written into it, and how often */
   PetscCall(read_fields(out, &scope, dynamic));
   PetscCall(SbOptionReal(&scope, "output_every", &out->every));
@@ -241,6 +245,7 @@ static PetscErrorCode destroy(SbRun run)
   PetscCall(PetscFree(out->probe));
   PetscCall(PetscFree(out->identity));
   PetscCall(PetscFree(out->remeshed));
+  PetscCall(SbFolderUnlock(out));
   PetscCall(PetscFree(run->output));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -256,6 +261,7 @@ PetscErrorCode SbOutputSetFromOptions(SbRun run)
   PetscCall(PetscNew(&out));
   run->output = out;
   run->output_destroy = destroy;
+  out->lock = -1;
   out->comm = run->model->comm;
   PetscCallMPI(MPI_Comm_rank(out->comm, &out->rank));
   PetscCallMPI(MPI_Comm_size(out->comm, &out->size));

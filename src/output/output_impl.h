@@ -140,6 +140,8 @@ struct _p_SbOutput {
   PetscReal checkpoint_every; /* s of simulated time; 0: off */
   PetscInt checkpoint_every_steps, checkpoint_keep;
   PetscBool progress, quiet;
+  PetscBool overwrite; /* results of an earlier run may go */
+  int lock;            /* file descriptor of the folder's lock, -1: none */
   PetscInt nprobe;
   SbProbe *probe; /* [nprobe] */
 
@@ -175,7 +177,9 @@ struct _p_SbOutput {
 
 /* folder.c: the folder with its parents is made, and tried by writing into it; why it cannot be is in message. Rank 0. */
 PetscErrorCode SbFolderMake(SbOutput out, size_t nmessage, char message[]);
-/* Removes what an earlier run left under our names, after a restart only checkpoints of later steps; says so. Rank 0. */
+/* Gives up the lock of SbOutputLock(), if there is one. */
+PetscErrorCode SbFolderUnlock(SbOutput out);
+/* Moves what an earlier run left under our names into a folder of its own (overwrite: removes it), after a restart only removes checkpoints of later steps. Rank 0. */
 PetscErrorCode SbFolderClear(SbOutput out, PetscInt step0);
 /* Path of a file of the run's folder. */
 PetscErrorCode SbOutputPath(SbOutput out, const char *name, size_t size, char path[]);

@@ -54,6 +54,7 @@ static inline PetscErrorCode fixture_open_given(const char *dir, const char *opt
   PetscCall(SbRegisterAll());
   PetscCall(PetscOptionsInsertString(NULL, options));
   PetscCall(PetscOptionsSetValue(NULL, "-output_dir", dir));
+  PetscCall(PetscOptionsSetValue(NULL, "-output_overwrite", "yes"));
   PetscCall(SbSceneCreate(PETSC_COMM_WORLD, &scene->model));
   PetscCall(test_scene_run(scene));
   PetscCall(SbOutputSetFromOptions(scene->run));

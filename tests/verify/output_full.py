@@ -8,6 +8,7 @@ import os
 import re
 import resource
 import shutil
+import socket
 import subprocess
 import sys
 import time
@@ -59,14 +60,18 @@ def check_unwritable():
 
 
 def check_default_folder():
-    """Without -output_dir: out/<scenario>; the second run says that it replaces the first, and leaves other files."""
+    """Without -output_dir: out/<scenario>; the results of a first run are moved aside by a second and replaced by a third, other files stay."""
     path = scenario().resolve()
     shutil.rmtree(OUT / "out", ignore_errors=True)
     args = [*MPI, "1", SUPPLE, str(path), "-ts_max_time", "0.01"]
-    for again in (False, True):
-        text = subprocess.run(args, cwd=OUT, capture_output=True, text=True, check=True).stdout
-        if ("results of an earlier run are replaced" in text) != again:
-            sys.exit(f"replaced results: {text}")
+    for kept, more in ((0, []), (1, []), (1, ["-output_overwrite", "yes"]), (2, [])):
+        text = subprocess.run([*args, *more], cwd=OUT, capture_output=True, text=True, check=True).stdout
+        aside = sorted((OUT / "out" / "bar").glob("before_*"))
+        if len(aside) != kept or ("results of an earlier run are kept" in text) != (kept > 0 and not more):
+            sys.exit(f"{aside}: {text}")
+        for folder in aside:
+            if json.loads((folder / "run.json").read_text())["status"] != "completed" or not (folder / "fields.h5").exists():
+                sys.exit(f"{folder} is not the result of a run")
         (OUT / "out" / "bar" / "notes.txt").write_text("mine")
     told = json.loads((OUT / "out" / "bar" / "run.json").read_text())
     if told["status"] != "completed" or told["steps"] != 1 or "fields.h5" not in [f["name"] for f in told["files"]]:
@@ -75,8 +80,25 @@ def check_default_folder():
         sys.exit("a file that is not ours is gone")
 
 
+def check_lock():
+    """A second run into a folder in use is refused with the first one's process; when that is gone, even by a kill, it is not."""
+    shutil.rmtree(OUT / "lock", ignore_errors=True)
+    process = subprocess.Popen(command(1, "lock", "-ts_max_time", "1000", "-quiet"), stdout=subprocess.DEVNULL)
+    while not (OUT / "lock" / "history.csv").exists() and process.poll() is None:
+        time.sleep(0.02)
+    text = run(2, "lock", "-ts_max_time", "0.01", fails=True)
+    if f"lock is in use by another run, process {process.pid} on {socket.gethostname()} since 20" not in text:
+        sys.exit(f"the folder of a run that goes on: {text}")
+    process.kill()
+    process.wait()
+    run(2, "lock", "-ts_max_time", "0.01")
+    if list((OUT / "lock").glob(".supple*")):
+        sys.exit("a lock is left behind")
+
+
 def main():
     scenario()
+    check_lock()
     for ranks in (1, 2):
         check_full(ranks, f"fields{ranks}", "fields.h5", 4)
         check_full(ranks, f"history{ranks}", "history.csv", 1, "-output_every", "1000")
