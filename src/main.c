@@ -41,8 +41,8 @@ static PetscErrorCode simulate(Scene *s)
   PetscCall(SbRunSetUp(s->run));
   PetscCall(SbLedgerAttach(s->ledger));
   PetscCall(SbRemeshAttach(s->remesh, s->run));
-  PetscCall(SbOutputAttach(s->run));
   PetscCall(SbRunCatchSignals(s->run));
+  PetscCall(SbOutputAttach(s->run));
   PetscCall(PetscLogStagePop());
 
   /* the run, from header to summary */

@@ -208,9 +208,12 @@ static PetscErrorCode monitor(SbRun run, const SbStep *step, void *ctx)
 
 PetscErrorCode SbCheckpointAttach(SbRun run, SbOutput out)
 {
+  const PetscBool asked = (PetscBool)(out->checkpoint_every > 0. || out->checkpoint_every_steps);
+
   PetscFunctionBeginUser;
-  // Works and losses are part of the state. A run that is asked to stop writes one, too, with what it knows of them.
-  if (out->checkpoint_every > 0. || out->checkpoint_every_steps) {
+  // A run that is asked to stop writes one, too, with what it knows of works and losses, which are part of the state.
+  if (!asked && !run->stop.listens) PetscFunctionReturn(PETSC_SUCCESS);
+  if (asked) {
     PetscCall(SbOutputOrder(run, out));
     run->want_energies = PETSC_TRUE;
   }
