@@ -2,10 +2,12 @@
 
 """
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
 
+import imageio_ffmpeg
 import matplotlib
 import numpy
 from PIL import Image
@@ -72,6 +74,46 @@ def check_open_obstacles():
               f"{name} reaches from {columns.min()} to {columns.max()}, down to {rows.max()}")
 
 
+def box_of(path, panels, panel):
+    """Width and height in pixels of what is drawn in one of several views."""
+    left, body = body_pixels(path, 230)
+    width = left.shape[1] // panels
+    rows, columns = numpy.nonzero(body[:, panel * width:(panel + 1) * width])
+    return columns.max() - columns.min() + 1, rows.max() - rows.min() + 1
+
+
+def check_views(folder):
+    """Three views of the bar at rest, 0.4 x 0.1 x 0.1 m; the same lying along y with gravity along -y, as scans with y up have it, looks the same."""
+    render(folder, "--frame", "0", "--views", "front,right,top", "--field", "displacement", "--range", "0", "1", "-o", OUT / "views.png")
+    for panel, ratio in enumerate((4, 1, 4)):
+        width, height = box_of(OUT / "views.png", 3, panel)
+        check(abs(width / height / ratio - 1) < 0.3, f"view {panel}: {width} x {height} pixels, expected {ratio} to 1")
+    # tight: the longest side fills its panel but for a margin
+    check(box_of(OUT / "views.png", 3, 0)[0] > 0.85 * 970 / 3, f"the bar is {box_of(OUT / 'views.png', 3, 0)[0]} pixels wide")
+    turned = ["-body_bar_rotate", "1,0,0,-90", "-effect_gravity_vector", "0,-9.81,0"]
+    run(1, "yup", "-ts_max_time", "0.1", "-quiet", "-output_fields", "displacement,von_mises", *turned)
+    run(1, "zup", "-ts_max_time", "0.1", "-quiet", "-output_fields", "displacement,von_mises")
+    boxes = []
+    for name in ("zup", "yup"):
+        render(OUT / name, "--views", "front", "-o", OUT / f"{name}.png")
+        boxes.append(box_of(OUT / f"{name}.png", 1, 0))
+    check(numpy.abs(numpy.subtract(*boxes)).max() <= 6, f"z up and y up: {boxes}")
+    check(boxes[0][1] > 0.2 * boxes[0][0], f"the bar does not sag in the picture: {boxes}")
+    # from a place of one's own
+    render(OUT / "zup", "--frame", "0", "--camera", "1,0,0", "--up", "0,1,0", "--field", "displacement", "--range", "0", "1", "-o", OUT / "own.png")
+    width, height = box_of(OUT / "own.png", 1, 0)
+    check(abs(width / height - 1) < 0.1, f"along the bar: {width} x {height} pixels")
+
+
+def check_scale(folder):
+    """The scale leaves out what few points have, and says so; both signs get a scale that is symmetric."""
+    told = render(folder, "-o", OUT / "scale.png")
+    check("scale 0 to " in told, told)
+    check("% of the surface beyond it (max " in render(folder, "--range", "0", "100", "-o", OUT / "scale.png"), "what is beyond the scale")
+    ends = re.search(r"scale (\S+) to (\S+)", render(folder, "--field", "stress_xx", "-o", OUT / "scale.png")).groups()
+    check(float(ends[0]) == -float(ends[1]) < 0, f"scale of both signs: {ends}")
+
+
 def main():
     check_obstacles()
     check_open_obstacles()
@@ -103,6 +145,11 @@ def main():
 
     render(folder, "--animate", OUT / "bar.gif", "--size", "300x200", "--fps", "50")
     check(Image.open(OUT / "bar.gif").n_frames == 6, f"{Image.open(OUT / 'bar.gif').n_frames} pictures for 0.1 s at 50 a second")
+    render(folder, "--animate", OUT / "bar.mp4", "--size", "300x200", "--fps", "50")
+    film = list(imageio_ffmpeg.read_frames(str(OUT / "bar.mp4")))
+    check(film[0]["size"] == (300, 200) and len(film) == 7, f"{len(film) - 1} pictures in the .mp4")
+    check_views(folder)
+    check_scale(folder)
     render(folder, "--animate", OUT / "bar.png", "--size", "300x200", "--fps", "50", "--field", "displacement_z")
     check(len(list(OUT.glob("bar_0*.png"))) == 6, "the sequence of pictures")
 

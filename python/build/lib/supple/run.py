@@ -1,0 +1,274 @@
+"""The folder of a run, read: meshes, frames, fields, history, settings."""
+import json
+from functools import cached_property
+from pathlib import Path
+
+import h5py
+import numpy
+
+TENSOR = ("xx", "xy", "xz", "yy", "yz", "zz")  # order of six components in fields.h5
+FACES = ((1, 2, 3), (0, 3, 2), (0, 1, 3), (0, 2, 1))  # of a tet, counter-clockwise seen from outside
+
+
+class RunError(Exception):
+    """A folder or file is not what it should be, a name is unknown, or a run failed; the message says which."""
+
+
+class Surface:
+    """The boundary of tets: the faces, by their vertices, that belong to one tet only.
+
+    points     [n], numbers of the mesh's points that are on it
+    triangles  [m][3], into `points`, counter-clockwise seen from outside
+    owner      [m], the tet behind each triangle
+    """
+
+    def __init__(self, cells, vertices):
+        faces = numpy.concatenate([cells[:, c] for c in FACES]).astype(numpy.int64)
+        owner = numpy.tile(numpy.arange(len(cells)), 4)
+        nvert = vertices.max() + 1
+        low, middle, high = numpy.sort(numpy.concatenate([vertices[:, c] for c in FACES]).astype(numpy.int64), axis=1).T
+        _, first, count = numpy.unique((low * nvert + middle) * nvert + high, return_index=True, return_counts=True)
+        once = first[count == 1]
+        self.owner = owner[once]
+        self.points, triangles = numpy.unique(faces[once], return_inverse=True)
+        self.triangles = triangles.reshape(-1, 3)
+        self.cells, self.vertices, self.nvert = cells, vertices, nvert
+        self.vertex = numpy.zeros(cells.max() + 1, dtype=numpy.int64)  # of each point
+        self.vertex[cells.ravel()] = vertices.ravel()
+        self.share = numpy.bincount(vertices.ravel(), minlength=nvert)
+
+    def is_per_cell(self, values):
+        return len(values) == len(self.cells)
+
+    def at_points(self, values):
+        """Values [n] at the surface's points of scalars per point or per cell; those of cells are averaged around each vertex."""
+        if self.is_per_cell(values):
+            sums = numpy.zeros(self.nvert)
+            for a in range(4):
+                sums += numpy.bincount(self.vertices[:, a], weights=values, minlength=self.nvert)
+            values = (sums / numpy.maximum(self.share, 1))[self.vertex]
+        return values[self.points]
+
+
+class Mesh:
+    """The bodies' mesh at rest: x [npoint][3] m, cells [ncell][4] points, vertices [ncell][4] (which tell what points coincide where each
+    cell has its own), body [ncell] number of the body, `arrays` the names of what else there is (sets, ranks)."""
+
+    def __init__(self, group):
+        self.group = group
+        self.x, self.cells, self.body = group["x"][()], group["cells"][()], group["body"][()]
+        self.vertices = group["vertices"][()] if "vertices" in group else self.cells
+        self.arrays = [name for name in group if name not in ("x", "cells", "vertices")]
+
+    @cached_property
+    def surface(self):
+        return Surface(self.cells, self.vertices)
+
+    def surface_of(self, body):
+        """The surface of one body, by its number."""
+        own = self.body == body
+        return Surface(self.cells[own], self.vertices[own])
+
+
+class Run:
+    """What a run wrote into its folder; one that is going on may be read, and again with refresh().
+
+    Frames are numbered from 0, negative ones from the end. A frame's arrays have the lengths of mesh(k), which changes where
+    bodies were re-meshed.
+    """
+
+    def __init__(self, folder):
+        self.folder = Path(folder)
+        self.file = None
+        self.refresh()
+
+    def __repr__(self):
+        return f"<Run {self.folder}: {len(self)} frames, {self.info.get('status', 'no run.json')}>"
+
+    def __len__(self):
+        return len(self.frames)
+
+    def refresh(self):
+        """Reads again what there is."""
+        for name in ("history", "units", "info", "scenario"):
+            self.__dict__.pop(name, None)
+        if self.file:
+            self.file.close()
+        self.file, self.frames, self.meshes = None, [], {}
+        path = self.folder / "fields.h5"
+        if not path.exists():
+            if not (self.folder / "run.json").exists():
+                raise RunError(f"{path} does not exist; is {self.folder} the folder of a run with -output_fields?")
+            return  # a run without fields
+        try:
+            self.file = h5py.File(path, "r", locking=False)
+            self.frames = [group for hundred in self.file["/step"].values() for group in hundred.values()]
+            self.frames.sort(key=lambda group: group.attrs["step"])
+            self.first_mesh = self.file["/mesh"]
+        except (OSError, KeyError) as e:
+            raise RunError(f"{path} is not a results file of supple: {e}") from None
+
+    def close(self):
+        if self.file:
+            self.file.close()
+        self.file, self.frames, self.meshes = None, [], {}
+
+    # ---------------------------------------------------------------- frames
+
+    @property
+    def times(self):
+        """[nframe] s; the load factor of a static run."""
+        return numpy.array([group.attrs["time"] for group in self.frames])
+
+    @property
+    def steps(self):
+        return numpy.array([group.attrs["step"] for group in self.frames])
+
+    def frame(self, k):
+        if not -len(self.frames) <= k < len(self.frames):
+            raise RunError(f"there is no frame {k}; the run has {len(self.frames)}")
+        return self.frames[k]
+
+    def mesh(self, k=0):
+        """The Mesh of a frame."""
+        number = int(self.frame(k).attrs.get("mesh", 0)) if self.frames else 0
+        if number not in self.meshes:
+            self.meshes[number] = Mesh(self.file[f"/mesh_{number:06d}" if number else "/mesh"])
+        return self.meshes[number]
+
+    @property
+    def bodies(self):
+        """Names, in the order of their numbers."""
+        names = self.first_mesh.attrs.get("bodies", b"body")
+        return (names.decode() if isinstance(names, bytes) else str(names)).split(",")
+
+    def positions(self, k):
+        """Of the points [npoint][3] m in a frame; at rest where it has neither displacement nor position."""
+        group, mesh = self.frame(k), self.mesh(k)
+        if "displacement" in group:
+            return mesh.x + group["displacement"][()]
+        return group["position"][()].astype(float) if "position" in group else mesh.x
+
+    def fields(self, k=-1):
+        """Names of a frame's fields, and of what belongs to its mesh."""
+        return [name for name, data in self.frame(k).items() if isinstance(data, h5py.Dataset)] + self.mesh(k).arrays
+
+    def data(self, name, k=-1):
+        """The dataset of a field, with its attribute `unit`."""
+        if name not in self.fields(k):
+            raise RunError(f"the run has no field '{name}'; it has {', '.join(self.fields(k))}")
+        return self.frame(k)[name] if name in self.frame(k) else self.mesh(k).group[name]
+
+    def field(self, name, k=-1):
+        """A field as it is stored: [n] or [n][3] or [n][6] (xx xy xz yy yz zz), per point or per cell."""
+        return self.data(name, k)[()]
+
+    def values(self, name, k=-1):
+        """One number per point or cell, and the unit: a scalar, the length of a vector, or a component: velocity_x, stress_xy."""
+        stem, _, letters = name.rpartition("_")
+        component = None
+        if name not in self.fields(k) and stem in self.fields(k) and self.data(stem, k).ndim == 2:
+            letters_of = TENSOR if self.data(stem, k).shape[1] == 6 else ("x", "y", "z")
+            if letters in letters_of:
+                name, component = stem, letters_of.index(letters)
+        data = self.data(name, k)
+        values = numpy.asarray(data[()], dtype=float)
+        unit = data.attrs.get("unit", b"")
+        unit = unit.decode() if isinstance(unit, bytes) else str(unit)
+        if component is not None:
+            values = values[:, component]
+        elif values.ndim == 2 and values.shape[1] == 3:
+            values = numpy.linalg.norm(values, axis=1)
+        elif values.ndim == 2:
+            raise RunError(f"{name} is a tensor; name a component, {name}_xx, or von_mises")
+        return values, unit
+
+    # ---------------------------------------------------------------- tables and settings
+
+    def read_history(self):
+        path = self.folder / "history.csv"
+        if not path.exists():
+            raise RunError(f"{path} does not exist: the run was made with -output_history no, or has not begun")
+        lines = path.read_text().splitlines()
+        names, units = lines[0].split(","), lines[1].lstrip("#").split(",")
+        rows = [tuple(map(float, words)) for words in (line.split(",") for line in lines[2:]) if len(words) == len(names)]
+        return numpy.array(rows, dtype=[(name, float) for name in names]), dict(zip(names, units))
+
+    @cached_property
+    def history(self):
+        """history.csv as a structured array: history["strain"] is a column, history[-1] the last row; pandas.DataFrame() takes it."""
+        return self.read_history()[0]
+
+    @cached_property
+    def units(self):
+        """Unit of each column of the history."""
+        return self.read_history()[1]
+
+    @cached_property
+    def info(self):
+        """run.json."""
+        path = self.folder / "run.json"
+        return json.loads(path.read_text()) if path.exists() else {}
+
+    @cached_property
+    def scenario(self):
+        """Options of scenario.opts, name without dash -> text."""
+        path, found = self.folder / "scenario.opts", {}
+        for line in path.read_text().splitlines() if path.exists() else []:
+            words = line.split("#")[0].split(None, 1)
+            if words and words[0].startswith("-"):
+                found[words[0][1:]] = words[1].strip().strip('"') if len(words) > 1 else ""
+        return found
+
+    @property
+    def is_static(self):
+        return self.scenario.get("time") == "static"
+
+    def up(self):
+        """Unit vector [3] against gravity; None where the scenario has none."""
+        for name in self.scenario.get("effects", "").split(","):
+            if self.scenario.get(f"effect_{name}_type") or name != "gravity":
+                if self.scenario.get(f"effect_{name}_type") != "gravity":
+                    continue
+            try:
+                g = numpy.array([float(x) for x in self.scenario[f"effect_{name}_vector"].split(",")])
+            except (KeyError, ValueError):
+                continue
+            if g.shape == (3,) and numpy.linalg.norm(g) > 0:
+                return -g / numpy.linalg.norm(g)
+        return None
+
+    # ---------------------------------------------------------------- other libraries
+
+    def to_meshio(self, k=-1):
+        """A meshio.Mesh of a frame: points where they are, fields per point and per cell."""
+        import meshio
+
+        mesh, names = self.mesh(k), self.fields(k)
+        fields = {name: self.field(name, k) for name in names}
+        on_cells = {name: [values] for name, values in fields.items() if len(values) == len(mesh.cells)}
+        return meshio.Mesh(self.positions(k), [("tetra", mesh.cells)], cell_data=on_cells,
+                           point_data={name: values for name, values in fields.items() if name not in on_cells})
+
+    def to_pyvista(self, k=-1):
+        """A pyvista.UnstructuredGrid of a frame, likewise."""
+        import pyvista
+
+        return pyvista.from_meshio(self.to_meshio(k))
+
+
+def colour_range(samples):
+    """Ends (low, high) of a scale of colours for arrays of values: a few singular spots, at edges and supports, do not decide it."""
+    values = numpy.concatenate(samples)
+    values = values[numpy.isfinite(values)]
+    if len(values) == 0:
+        return 0.0, 1.0
+    low, high = numpy.percentile(values, [0.7, 99.3])
+    if low >= 0 and low < 0.3 * high:
+        low = 0.0
+    elif low < 0 < high:
+        low, high = -max(high, -low), max(high, -low)
+    if high - low <= 1e-12 * max(abs(high), abs(low)):
+        middle = (high + low) / 2
+        return (middle - 0.5 * abs(middle), middle + 0.5 * abs(middle)) if middle else (0.0, 1.0)
+    return low, high

@@ -1,0 +1,89 @@
+"""scripts/export: what the files hold, read back: points, triangles, colours and fields of each body and frame, and where obstacles are.
+
+"""
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy
+import trimesh
+from pxr import Usd, UsdGeom
+
+from output_common import OUT, run
+
+sys.path.insert(0, str(Path("python").resolve()))
+import supple
+
+BALL = ["-effects", "gravity,hold,ball", "-effect_ball_type", "contact", "-effect_ball_obstacle", "sphere:0.2,0.05,-0.3,0.06",
+        "-effect_ball_displacement", "0;0;-2*t"]
+
+
+def check(condition, text):
+    if not condition:
+        sys.exit(text)
+
+
+def export(*args, fails=False):
+    done = subprocess.run([sys.executable, "scripts/export", *map(str, args)], capture_output=True, text=True)
+    check((done.returncode != 0) == fails, f"export {args}: exit code {done.returncode}\n{done.stdout}{done.stderr}")
+    check(not fails or "Traceback" not in done.stderr, done.stderr)
+    return done.stdout + done.stderr
+
+
+def check_files(it, folder):
+    """One file per frame: both surfaces with their places, in the axes of the format."""
+    surface = it.mesh().surface
+    x = it.positions(-1)[surface.points]
+    for form, ending in (("obj", ".obj"), ("ply", ".ply"), ("gltf", ".glb")):
+        export(folder, "--to", form, "-o", OUT / form)
+        files = sorted(OUT.glob(f"{form}_*{ending}"))
+        check(len(files) == len(it), f"{form}: {len(files)} files for {len(it)} frames")
+        found = trimesh.load(files[-1], process=False)
+        whole = found.to_mesh() if isinstance(found, trimesh.Scene) else found
+        expected = x if form != "gltf" else numpy.stack([x[:, 0], x[:, 2], -x[:, 1]], axis=1)  # y is up there
+        near = numpy.array([numpy.abs(whole.vertices - p).max(axis=1).min() for p in expected])
+        check(near.max() < 1e-6, f"{form}: a point of the bar is {near.max()} m off")
+        check(len(whole.faces) > len(surface.triangles) and abs(whole.area - 0.045 - area_of(x, surface)) < 2e-3, f"{form}: area {whole.area}")
+    ply = trimesh.load(sorted(OUT.glob("ply_*.ply"))[-1], process=False)
+    values = surface.at_points(it.values("von_mises")[0])
+    told = ply.metadata["_ply_raw"]["vertex"]["data"]["von_mises"]
+    check(numpy.allclose(told[: len(values)].ravel(), values, rtol=1e-6), "the field in the .ply")
+    colours = ply.visual.vertex_colors[: len(values)].astype(int)
+    # viridis: the largest stress is yellow, the least violet
+    check(colours[values.argmax()][0] > 200 > 120 > colours[values.argmin()][0], f"colours {colours[values.argmax()]}, {colours[values.argmin()]}")
+
+
+def area_of(x, surface):
+    corners = x[surface.triangles]
+    return numpy.linalg.norm(numpy.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1).sum() / 2
+
+
+def check_usd(it, folder):
+    """One file with all frames, at the run's own pace."""
+    export(folder, "--to", "usd", "-o", OUT / "all", "--field", "displacement")
+    stage = Usd.Stage.Open(str(OUT / "all.usdc"))
+    check(UsdGeom.GetStageUpAxis(stage) == "Z" and UsdGeom.GetStageMetersPerUnit(stage) == 1, "axes of the .usdc")
+    check(abs(stage.GetEndTimeCode() / stage.GetTimeCodesPerSecond() - it.times[-1]) < 1e-9, f"the film lasts {stage.GetEndTimeCode()} frames")
+    bar, ball = (UsdGeom.Mesh.Get(stage, f"/run/{name}") for name in ("bar", "ball"))
+    points = it.mesh().surface.points
+    for k in (0, len(it) - 1):
+        x = numpy.array(bar.GetPointsAttr().Get(k))
+        check(numpy.abs(x - it.positions(k)[points]).max() < 1e-6, f"points of frame {k}")
+        u = numpy.array(UsdGeom.PrimvarsAPI(bar).GetPrimvar("displacement").Get(k))
+        check(numpy.allclose(u, it.values("displacement", k)[0][points], atol=1e-7), f"field of frame {k}")
+        centre = ball.ComputeLocalToWorldTransform(k).Transform(numpy.array(ball.GetPointsAttr().Get()).mean(axis=0).tolist())
+        check(numpy.allclose(centre, [0.2, 0.05, -0.3 - 2 * it.times[k]], atol=1e-6), f"the ball is at {centre} in frame {k}")
+    check(len(bar.GetFaceVertexCountsAttr().Get()) == len(it.mesh().surface.triangles), "triangles")
+
+
+def main():
+    run(1, "run", "-ts_max_time", "0.04", "-quiet", "-time", "euler_implicit", *BALL)
+    it = supple.Run(OUT / "run")
+    check_files(it, OUT / "run")
+    check_usd(it, OUT / "run")
+    check("there is no frame 99" in export(OUT / "run", "--to", "ply", "--frame", 99, fails=True), "unknown frame")
+    check("--to usd" in export(OUT / "run", "--to", "alembic", fails=True), "what to do instead of Alembic")
+
+
+if __name__ == "__main__":
+    main()
