@@ -44,6 +44,34 @@ static inline PetscErrorCode test_mesh_read(SbBody body, TestMesh *m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Reads a file; SbImportDestroy(). */
+static inline PetscErrorCode test_import(const char *path, SbImport *im)
+{
+  const SbBody body = test_body("b", path);
+
+  PetscFunctionBeginUser;
+  memset(im, 0, sizeof(*im));
+  PetscCall(SbImportRead(&body, im));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Whether a tag set has the group; items of one dimension that belong to it. */
+static inline PetscBool test_in_group(const SbImport *im, PetscInt tags, const char *name)
+{
+  for (PetscInt t = im->tags_start[tags]; t < im->tags_start[tags + 1]; t++) {
+    if (!strcmp(im->group[im->tags_group[t]].name, name)) return PETSC_TRUE;
+  }
+  return PETSC_FALSE;
+}
+
+static inline PetscInt test_count(const SbImport *im, int dim, const char *name)
+{
+  PetscInt n = 0;
+
+  for (PetscInt i = 0; i < im->item[dim].n; i++) n += test_in_group(im, im->item[dim].tags[i], name);
+  return n;
+}
+
 /* Reads, checks, frees, also after an error, which it returns. */
 static inline PetscErrorCode test_mesh_use(const char *path)
 {

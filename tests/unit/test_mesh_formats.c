@@ -7,16 +7,6 @@
 
 #define DATA "tests/data/"
 
-static PetscErrorCode read_mesh(const char *path, SbImport *im)
-{
-  const SbBody body = test_body("b", path);
-
-  PetscFunctionBeginUser;
-  memset(im, 0, sizeof(*im));
-  PetscCall(SbImportRead(&body, im));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* ------------------------------------------------------------------ items of a group, in numbers of the reference */
 
 typedef struct {
@@ -26,14 +16,6 @@ typedef struct {
 static int compare_rows(const void *a, const void *b)
 {
   return memcmp(a, b, sizeof(Row));
-}
-
-static PetscBool in_group(const SbImport *im, PetscInt tags, const char *name)
-{
-  for (PetscInt t = im->tags_start[tags]; t < im->tags_start[tags + 1]; t++) {
-    if (!strcmp(im->group[im->tags_group[t]].name, name)) return PETSC_TRUE;
-  }
-  return PETSC_FALSE;
 }
 
 /* The items of one dimension in a group (NULL: all), their vertices replaced by map[] and sorted, and they themselves sorted. */
@@ -46,7 +28,7 @@ static PetscErrorCode list_items(const SbImport *im, const PetscInt map[], int d
   for (PetscInt i = 0; i < im->item[dim].n; i++) {
     PetscInt *v = (*rows)[*n].v;
 
-    if (name && !in_group(im, im->item[dim].tags[i], name)) continue;
+    if (name && !test_in_group(im, im->item[dim].tags[i], name)) continue;
     for (int k = 0; k <= dim; k++) {
       const PetscInt vert = im->item[dim].vert[(dim + 1) * i + k];
 
@@ -108,7 +90,7 @@ static PetscErrorCode test_file(const char *path, const SbImport *reference, con
   PetscInt *map;
 
   PetscFunctionBeginUser;
-  PetscCall(read_mesh(path, &im));
+  PetscCall(test_import(path, &im));
   SB_CHECK(im.nvert == reference->nvert, "%s: %d vertices", path, (int)im.nvert);
   PetscCall(PetscMalloc1(im.nvert, &map));
   PetscCall(map_vertices(path, &im, reference, map));
@@ -128,7 +110,7 @@ static PetscErrorCode test_numbers(void)
   SbImport im;
 
   PetscFunctionBeginUser;
-  PetscCall(read_mesh(DATA "two_cubes.vtk", &im));
+  PetscCall(test_import(DATA "two_cubes.vtk", &im));
   for (PetscInt g = 0; g < im.ngroup; g++) {
     const char *number = strrchr(im.group[g].name, '_');
 
@@ -197,9 +179,9 @@ static int mark_of(const SbImport *im, int dim, PetscInt i)
 {
   const PetscInt tags = im->item[dim].tags[i];
 
-  if (dim == 3) return in_group(im, tags, "left") ? 1 : 2;
-  if (in_group(im, tags, "wall")) return 3;
-  return in_group(im, tags, "inner") ? 5 : dim == 2 ? 9 : 0;
+  if (dim == 3) return test_in_group(im, tags, "left") ? 1 : 2;
+  if (test_in_group(im, tags, "wall")) return 3;
+  return test_in_group(im, tags, "inner") ? 5 : dim == 2 ? 9 : 0;
 }
 
 static void write_vert(FILE *file, const SbImport *im, int dim, PetscInt i, int first)
@@ -413,7 +395,7 @@ static PetscErrorCode test_nastran(const SbImport *reference, const char *folder
   (void)snprintf(path, sizeof(path), "%s/deck.Bdf", folder);
   PetscCall(write_nastran(path, reference));
   PetscCall(test_file(path, reference, deck));
-  PetscCall(read_mesh(path, &im));
+  PetscCall(test_import(path, &im));
   SB_CHECK(im.item[0].n == 1, "%d points for three sets of one node", (int)im.item[0].n);
   PetscCall(SbImportDestroy(&im));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -460,7 +442,7 @@ static PetscInt count_items(const SbImport *im, int dim, const char *name)
 {
   PetscInt n = 0;
 
-  for (PetscInt i = 0; i < im->item[dim].n; i++) n += in_group(im, im->item[dim].tags[i], name);
+  for (PetscInt i = 0; i < im->item[dim].n; i++) n += test_in_group(im, im->item[dim].tags[i], name);
   return n;
 }
 
@@ -472,7 +454,7 @@ static PetscErrorCode test_tetgen(void)
   PetscInt sides = 0;
 
   PetscFunctionBeginUser;
-  PetscCall(read_mesh(DATA "tetgen.ele", &im));
+  PetscCall(test_import(DATA "tetgen.ele", &im));
   SB_CHECK(im.nvert == 26 && im.item[3].n == 36, "%d vertices, %d tets", (int)im.nvert, (int)im.item[3].n);
   SB_CHECK(count_items(&im, 3, "volume_7") == 36, "%d tets in region 7",
            (int)count_items(&im, 3, "volume_7"));
@@ -483,7 +465,7 @@ static PetscErrorCode test_tetgen(void)
     (void)snprintf(name, sizeof(name), "surface_%d", side);
     SB_CHECK(count_items(&im, 2, name) > 0, "no face on side %d", side);
     for (PetscInt i = 0; i < im.item[2].n; i++) {
-      if (!in_group(&im, im.item[2].tags[i], name)) continue;
+      if (!test_in_group(&im, im.item[2].tags[i], name)) continue;
       sides++;
       for (int k = 0; k < 3; k++)
         SB_CHECK_NEAR(im.x[3 * im.item[2].vert[3 * i + k] + axis], at, 1e-12, "coordinate on its side");
@@ -503,8 +485,8 @@ static PetscErrorCode test_netgen(void)
   PetscInt outer = 0;
 
   PetscFunctionBeginUser;
-  PetscCall(read_mesh(DATA "netgen.vol", &vol));
-  PetscCall(read_mesh(DATA "netgen.neu", &neu));
+  PetscCall(test_import(DATA "netgen.vol", &vol));
+  PetscCall(test_import(DATA "netgen.neu", &neu));
   SB_CHECK(vol.nvert == 12 && vol.item[3].n == 12, "%d vertices, %d tets", (int)vol.nvert,
            (int)vol.item[3].n);
   SB_CHECK(count_items(&vol, 3, "left") == 6 && count_items(&vol, 3, "right") == 6, "%d and %d tets",
@@ -514,7 +496,7 @@ static PetscErrorCode test_netgen(void)
     PetscReal middle = 0;
 
     for (int k = 0; k < 4; k++) middle += vol.x[3 * vol.item[3].vert[4 * i + k]] / 4;
-    SB_CHECK(in_group(&vol, vol.item[3].tags[i], middle < 1 ? "left" : "right"), "tet %d at %g", (int)i,
+    SB_CHECK(test_in_group(&vol, vol.item[3].tags[i], middle < 1 ? "left" : "right"), "tet %d at %g", (int)i,
              (double)middle);
   }
   SB_CHECK(neu.nvert == 12 && neu.item[3].n == 12, "%d vertices, %d tets", (int)neu.nvert,
@@ -536,7 +518,7 @@ int main(int argc, char **argv)
 
   SB_TEST_BEGIN(argc, argv);
   SB_CHECK(mkdtemp(folder), "no folder %s", folder);
-  PetscCall(read_mesh(DATA "two_cubes_41.msh", &reference));
+  PetscCall(test_import(DATA "two_cubes_41.msh", &reference));
   PetscCall(test_foreign(&reference));
   PetscCall(test_written(&reference, folder));
   PetscCall(test_nastran(&reference, folder));

@@ -6,29 +6,13 @@
 
 #define DATA "tests/data/"
 
-static PetscErrorCode read_mesh(const char *path, SbImport *im)
-{
-  const SbBody body = test_body("b", path);
-
-  PetscFunctionBeginUser;
-  memset(im, 0, sizeof(*im));
-  PetscCall(SbImportRead(&body, im));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Items of one dimension that belong to a group; with all their groups, joined by blanks. */
-static PetscInt count_in_group(const SbImport *im, int dim, const char *name)
-{
-  PetscInt n = 0;
-
-  for (PetscInt i = 0; i < im->item[dim].n; i++) {
-    const PetscInt tags = im->item[dim].tags[i];
-
-    for (PetscInt t = im->tags_start[tags]; t < im->tags_start[tags + 1]; t++)
-      n += !strcmp(im->group[im->tags_group[t]].name, name);
-  }
-  return n;
-}
+/* The groups of two_cubes, as gmsh writes them: items of each. */
+static const struct {
+  int dim;
+  const char *group;
+  PetscInt n;
+} cubes[] = {{3, "left", 24}, {3, "all", 48},       {2, "wall", 4}, {2, "both ends", 8},
+             {2, "inner", 4}, {2, "surface_77", 4}, {1, "edge", 1}, {0, "corner", 1}};
 
 /* Two adjoining unit cubes: 24 tets each, 4 triangles on each side (two_cubes.geo). */
 static PetscErrorCode test_variant(const char *path)
@@ -37,25 +21,15 @@ static PetscErrorCode test_variant(const char *path)
   PetscReal difference = 0;
 
   PetscFunctionBeginUser;
-  PetscCall(read_mesh(path, &im));
-  PetscCall(read_mesh(DATA "two_cubes_41.msh", &reference));
+  PetscCall(test_import(path, &im));
+  PetscCall(test_import(DATA "two_cubes_41.msh", &reference));
   SB_CHECK(im.nvert == 23, "%s: %d vertices", path, (int)im.nvert);
   SB_CHECK(im.item[3].n == 48, "%s: %d tets", path, (int)im.item[3].n);
-  SB_CHECK(count_in_group(&im, 3, "left") == 24, "%s: %d tets left", path,
-           (int)count_in_group(&im, 3, "left"));
-  SB_CHECK(count_in_group(&im, 3, "all") == 48, "%s: %d tets in all", path,
-           (int)count_in_group(&im, 3, "all"));
-  SB_CHECK(count_in_group(&im, 2, "wall") == 4, "%s: %d facets in the wall", path,
-           (int)count_in_group(&im, 2, "wall"));
-  SB_CHECK(count_in_group(&im, 2, "both ends") == 8, "%s: %d facets in both ends", path,
-           (int)count_in_group(&im, 2, "both ends"));
-  SB_CHECK(count_in_group(&im, 2, "inner") == 4, "%s: %d inner facets", path,
-           (int)count_in_group(&im, 2, "inner"));
-  SB_CHECK(count_in_group(&im, 2, "surface_77") == 4, "%s: %d facets without a name", path,
-           (int)count_in_group(&im, 2, "surface_77"));
-  SB_CHECK(count_in_group(&im, 1, "edge") == 1, "%s: %d edges", path, (int)count_in_group(&im, 1, "edge"));
-  SB_CHECK(count_in_group(&im, 0, "corner") == 1, "%s: %d corners", path,
-           (int)count_in_group(&im, 0, "corner"));
+  for (size_t k = 0; k < PETSC_STATIC_ARRAY_LENGTH(cubes); k++) {
+    const PetscInt n = test_count(&im, cubes[k].dim, cubes[k].group);
+
+    SB_CHECK(n == cubes[k].n, "%s: %d of dimension %d in '%s'", path, (int)n, cubes[k].dim, cubes[k].group);
+  }
   for (PetscInt i = 0; i < 3 * im.nvert && im.nvert == reference.nvert; i++)
     difference = PetscMax(difference, PetscAbsReal(im.x[i] - reference.x[i]));
   SB_CHECK(difference == 0, "%s: coordinates differ by %g", path, (double)difference);
@@ -102,7 +76,7 @@ static PetscErrorCode test_other_byte_order(void)
   }
   fprintf(file, "\n$EndElements\n");
   fclose(file);
-  PetscCall(read_mesh(path, &im));
+  PetscCall(test_import(path, &im));
   (void)unlink(path);
   SB_CHECK(im.nvert == 4 && im.item[3].n == 1, "%d vertices, %d tets", (int)im.nvert, (int)im.item[3].n);
   SB_CHECK(im.x[3] == 1 && im.x[11] == 1, "coordinates %g %g", (double)im.x[3], (double)im.x[11]);
@@ -116,10 +90,10 @@ static PetscErrorCode test_odd(void)
   SbImport im;
 
   PetscFunctionBeginUser;
-  PetscCall(read_mesh(DATA "odd.msh", &im));
+  PetscCall(test_import(DATA "odd.msh", &im));
   SB_CHECK(im.nvert == 10 && im.item[3].n == 2, "%d vertices, %d tets", (int)im.nvert, (int)im.item[3].n);
   SB_CHECK(im.item[3].vert[1] == 2, "node 1000000000002 became vertex %d", (int)im.item[3].vert[1]);
-  SB_CHECK(count_in_group(&im, 2, "skin") == 3 && count_in_group(&im, 3, "flesh") == 2,
+  SB_CHECK(test_count(&im, 2, "skin") == 3 && test_count(&im, 3, "flesh") == 2,
            "groups of a file with names");
   PetscCall(SbImportDestroy(&im));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -56,20 +56,6 @@ static PetscErrorCode mesh_cube(const SbGmsh *gmsh, void *ctx, SbImport *result)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Items of one dimension that belong to a group. */
-static PetscInt count_in(const SbImport *im, int dim, const char *name)
-{
-  PetscInt n = 0;
-
-  for (PetscInt i = 0; i < im->item[dim].n; i++) {
-    const PetscInt tags = im->item[dim].tags[i];
-
-    for (PetscInt t = im->tags_start[tags]; t < im->tags_start[tags + 1]; t++)
-      n += !strcmp(im->group[im->tags_group[t]].name, name);
-  }
-  return n;
-}
-
 static PetscErrorCode test_cube(void)
 {
   SbImport im;
@@ -81,8 +67,8 @@ static PetscErrorCode test_cube(void)
   (void)snprintf(im.where, sizeof(im.where), "body 'b': cube");
   PetscCall(run("made tetrahedra", 60, mesh_cube, &size, &im));
   SB_CHECK(im.item[3].n >= 6 && im.nvert >= 8, "%d tets, %d vertices", (int)im.item[3].n, (int)im.nvert);
-  SB_CHECK(im.ngroup == 2 && count_in(&im, 3, "volume_1") == im.item[3].n &&
-             count_in(&im, 2, "surface_1") == 12,
+  SB_CHECK(im.ngroup == 2 && test_count(&im, 3, "volume_1") == im.item[3].n &&
+             test_count(&im, 2, "surface_1") == 12,
            "%d groups", (int)im.ngroup);
   for (PetscInt c = 1; c < im.item[3].n; c++)
     SB_CHECK(im.item[3].number[c] > im.item[3].number[c - 1], "tets are not in the order of their numbers");

@@ -3,16 +3,6 @@
 #include "../../src/mesh/mesh_impl.h"
 #include "mesh_test.h"
 
-static PetscErrorCode read_box(const char *text, SbImport *im)
-{
-  const SbBody body = test_body("b", text);
-
-  PetscFunctionBeginUser;
-  memset(im, 0, sizeof(*im));
-  PetscCall(SbImportRead(&body, im));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* Largest difference of the numbers of two vertices of one cell. */
 static PetscErrorCode bandwidth(PetscInt nvert, PetscInt ncell, const PetscInt cell[], PetscInt *width)
 {
@@ -48,11 +38,11 @@ int main(int argc, char **argv)
 
   SB_TEST_BEGIN(argc, argv);
   /* A bar of 3 x 3 x 40 vertices, numbered across: levels start at a corner and slant, within three layers of 9 vertices. */
-  PetscCall(read_box("box:2,2,39:2,2,39", &im));
+  PetscCall(test_import("box:2,2,39:2,2,39", &im));
   PetscCall(bandwidth(im.nvert, im.item[3].n, im.item[3].vert, &width));
   SB_CHECK(width <= 3 * 9, "bandwidth %d of the upright bar", (int)width);
   PetscCall(SbImportDestroy(&im));
-  PetscCall(read_box("box:39,2,2:39,2,2", &im)); /* as given, the bandwidth is 161 */
+  PetscCall(test_import("box:39,2,2:39,2,2", &im)); /* as given, the bandwidth is 161 */
   PetscCall(bandwidth(im.nvert, im.item[3].n, im.item[3].vert, &width));
   SB_CHECK(width <= 3 * 9, "bandwidth %d of the lying bar", (int)width);
   /* Vertices that take no part: the far half of the bar. */
