@@ -178,8 +178,10 @@ PetscErrorCode SbOptionUsersGet(PetscInt *n, SbOptionUser **users)
   PetscFunctionBeginUser;
   *n = 0;
   *users = NULL;
+  // those that nobody has read
   PetscCall(PetscOptionsLeftGet(NULL, &nleft, &names, &values));
   for (PetscInt i = 0; i < nleft; i++) PetscCall(add_user(n, users, names[i], values[i]));
+  // those that were read: a name, then words up to the next name of either kind
   PetscCall(PetscOptionsGetAll(NULL, &all));
   token = strtok_r(all, " ", &rest);
   while (token) {

@@ -84,6 +84,7 @@ SbTriangleFeature SbTriangleClosestPoint(const PetscReal p[3], const PetscReal *
   PetscReal ab[3], ac[3], r[3], d[6], area[3];
   SbTriangleFeature place;
 
+  // products of both edges at corner 0 with the vectors from each corner to p; areas of the three parts
   subtract(x[1], x[0], ab);
   subtract(x[2], x[0], ac);
   for (int k = 0; k < 3; k++) {
@@ -94,6 +95,7 @@ SbTriangleFeature SbTriangleClosestPoint(const PetscReal p[3], const PetscReal *
   area[2] = d[0] * d[3] - d[2] * d[1];
   area[1] = d[4] * d[1] - d[0] * d[5];
   area[0] = d[2] * d[5] - d[4] * d[3];
+  // Voronoi regions of the corners, of the edges, then the inside
   if (d[0] <= 0 && d[1] <= 0)
     place = put(SB_FEATURE_CORNER_0, 1, 0, 0, w);
   else if (d[2] >= 0 && d[3] <= d[2])

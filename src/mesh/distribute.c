@@ -307,9 +307,11 @@ static PetscErrorCode list_copies(const SbLocalMesh *local, const Border *border
   PetscInt *shared, *mark, n = 0;
 
   PetscFunctionBeginUser;
+  // where each vertex stands in the border
   PetscCall(PetscMalloc2(local->nvert_cells, &shared, size, &mark));
   for (PetscInt v = 0; v < local->nvert_cells; v++) shared[v] = -1;
   for (PetscInt i = 0; i < border->n; i++) shared[border->vert[i].vert] = i;
+  // counted, then listed: a cell goes to each rank that shares or owns one of its vertices, once
   for (int pass = 0; pass < 2; pass++) {
     for (PetscMPIInt r = 0; r < size; r++) mark[r] = -1;
     n = 0;
@@ -416,6 +418,7 @@ PetscErrorCode SbDistribute(MPI_Comm comm, SbPartitioner type, PetscBool all, Sb
   PetscCall(PetscMemzero(local, sizeof(*local)));
   PetscCallMPI(MPI_Comm_size(comm, &size));
   from = (Cells){PETSC_FALSE, w->ncell, w->nvert, w->cell, w->data, w->vertex, NULL};
+  // one rank takes the arrays as they are
   if (size == 1) {
     w->cell = NULL;
     w->data = NULL;
@@ -428,6 +431,7 @@ PetscErrorCode SbDistribute(MPI_Comm comm, SbPartitioner type, PetscBool all, Sb
                            .data = from.data,
                            .vertex = from.vertex};
   } else {
+    // several cut the mesh, and each cell goes to its owner
     PetscCall(PetscMalloc1(w->ncell, &part));
     PetscCall(SbPartition(comm, type, w, part));
     PetscCall(PetscFree(w->neighbour));
@@ -437,6 +441,7 @@ PetscErrorCode SbDistribute(MPI_Comm comm, SbPartitioner type, PetscBool all, Sb
     PetscCall(SbRouteDestroy(&route));
     PetscCall(PetscFree(part));
   }
+  // owners of the vertices, and a layer of ghosts
   PetscCall(SbMergedMeshDestroy(w));
   if (size > 1) PetscCall(keep_owned(&owned, local));
   PetscCall(PetscCalloc1(local->nvert, &local->owner));

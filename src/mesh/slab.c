@@ -124,12 +124,14 @@ static PetscErrorCode ask_keepers(Slab *s)
   Answer *answer, *result;
 
   PetscFunctionBeginUser;
+  // the keepers learn who uses their vertices
   PetscCall(PetscMalloc1(im->nvert, &dest));
   for (PetscInt v = 0; v < im->nvert; v++) dest[v] = keeper(s, s->used[v]);
   PetscCall(SbRouteCreate(s->comm, im->nvert, dest, &s->vert));
   PetscCall(PetscFree(dest));
   PetscCall(SbRouteSend(&s->vert, sizeof(PetscInt), s->used, &s->asked));
   PetscCall(list_users(s));
+  // they answer with place, number and how many ranks use it
   PetscCall(PetscMalloc2(s->vert.nrecv, &answer, im->nvert, &result));
   for (PetscInt i = 0; i < s->vert.nrecv; i++) {
     const PetscInt v = s->asked[i];
@@ -140,6 +142,7 @@ static PetscErrorCode ask_keepers(Slab *s)
   }
   PetscCall(SbRouteReply(&s->vert, sizeof(Answer), answer, result));
   PetscCall(PetscFree(s->x));
+  // which are the vertices of this rank
   PetscCall(SbImportSetVertices(im, im->nvert));
   PetscCall(PetscMalloc1(im->nvert, &s->part->orig));
   PetscCall(PetscMalloc1(im->nvert, &s->shared));
@@ -240,6 +243,7 @@ static PetscErrorCode join_faces(Slab *s, PetscInt before)
   Across *across, *result;
 
   PetscFunctionBeginUser;
+  // counted, then listed: faces with three shared vertices, at the keeper of their lowest one
   for (int pass = 0; pass < 2; pass++) {
     if (pass) PetscCall(PetscMalloc3(n, &face, n, &slot, n, &dest));
     n = 0;
@@ -264,12 +268,14 @@ static PetscErrorCode join_faces(Slab *s, PetscInt before)
       n++;
     }
   }
+  // the keepers match them, and say what lies across
   PetscCall(SbRouteCreate(s->comm, n, dest, &route));
   PetscCall(SbRouteSend(&route, sizeof(Face), face, &got));
   PetscCall(PetscMalloc2(route.nrecv, &across, n, &result));
   SB_CATCH(&caught, match_faces(s, &route, got, across));
   PetscCall(SbRouteReply(&route, sizeof(Across), across, result));
   if (!caught.code) SB_CATCH(&caught, link_faces(s, n, slot, result));
+  // an error of any rank is one of all
   PetscCall(PetscFree(got));
   PetscCall(PetscFree2(across, result));
   PetscCall(PetscFree3(face, slot, dest));
@@ -398,6 +404,7 @@ static PetscErrorCode mark_items(Slab *s, const uint64_t bits[])
   PetscBool *there, *is;
 
   PetscFunctionBeginUser;
+  // the vertices of all items, and who keeps them
   for (int d = 0; d < 3; d++) n += (d + 1) * im->item[d].n;
   PetscCall(PetscMalloc4(n, &vert, n, &dest, n, &mark, n, &there));
   n = 0;
@@ -408,12 +415,14 @@ static PetscErrorCode mark_items(Slab *s, const uint64_t bits[])
       n++;
     }
   }
+  // the keepers say which of them a tet uses
   PetscCall(SbRouteCreate(s->comm, n, dest, &route));
   PetscCall(SbRouteSend(&route, sizeof(PetscInt), vert, &got));
   PetscCall(PetscMalloc1(route.nrecv, &is));
   for (PetscInt i = 0; i < route.nrecv; i++) is[i] = (PetscBool)(s->number[got[i] - s->rows.first] >= 0);
   PetscCall(SbRouteReply(&route, sizeof(PetscBool), is, there));
   PetscCall(PetscFree(is));
+  // items with all their vertices mark these by their tag sets; triangles stay, points and lines go
   n = 0;
   for (int d = 0; d < 3; d++) {
     SbItems *item = &im->item[d];
@@ -431,6 +440,7 @@ static PetscErrorCode mark_items(Slab *s, const uint64_t bits[])
     if (d == 2) im->nlost += item->n - kept;
     item->n = d == 2 ? kept : 0;
   }
+  // the marks of all ranks come together at the keepers
   PetscCall(SbRouteSend(&route, sizeof(uint64_t), mark, &got_mark));
   for (PetscInt i = 0; i < route.nrecv; i++) s->mask[got[i] - s->rows.first] |= got_mark[i];
   PetscCall(PetscFree(got));

@@ -91,6 +91,7 @@ static PetscErrorCode check_sums(SbMesh m)
   PetscReal volume = 0, volumes = 0, rest = 0;
 
   PetscFunctionBeginUser;
+  // sums over what this rank owns
   mine[VERT] = (uint64_t)m->nvert_owned;
   mine[CELL] = (uint64_t)m->ncell_owned;
   for (PetscInt v = 0; v < m->nvert_owned; v++) mine[VERT_MIX] += mix(m->vert_orig[v]);
@@ -103,6 +104,7 @@ static PetscErrorCode check_sums(SbMesh m)
   }
   PetscCallMPI(MPI_Allreduce(mine, all, NSUM, MPI_UINT64_T, MPI_SUM, m->comm));
   PetscCallMPI(MPI_Allreduce(&volume, &volumes, 1, MPIU_REAL, MPI_SUM, m->comm));
+  // what they must be: every vertex and cell once
   expected[VERT] = (uint64_t)m->Nvert;
   expected[CELL] = (uint64_t)m->Ncell;
   expected[PAIR] = 4 * (uint64_t)m->Ncell;
@@ -112,6 +114,7 @@ static PetscErrorCode check_sums(SbMesh m)
     expected[FACET] += (uint64_t)m->body[b].nfacet;
     rest += m->body[b].volume;
   }
+  // compared; volumes to rounding
   for (int i = 0; i < NSUM; i++) {
     static const char *const what[NSUM] = {
       "owned vertices",          "owned cells",           "cells around owned vertices",

@@ -361,6 +361,7 @@ PetscErrorCode SbImportRead_Abaqus(const char *path, SbImport *im)
   while (next_line(&a)) {
     const char *line = s->at;
 
+    // data lines of keywords that are passed over; behind *INSTANCE they move it
     if (*line != '*') {
       if (in_instance)
         SB_SCAN_ERROR(s,
@@ -369,6 +370,7 @@ PetscErrorCode SbImportRead_Abaqus(const char *path, SbImport *im)
       leave_line(&a);
       continue;
     }
+    // keywords that make a mesh
     (void)next_word(&a, word);
     if (!strcasecmp(word, "*NODE"))
       PetscCall(read_nodes(&a, line));
@@ -379,6 +381,7 @@ PetscErrorCode SbImportRead_Abaqus(const char *path, SbImport *im)
     else if (!strcasecmp(word, "*SURFACE"))
       PetscCall(read_surface(&a, line));
     else {
+      // keywords that another file or a second part hides behind
       s->token = line;
       if (!strcasecmp(word, "*INCLUDE"))
         SB_SCAN_ERROR(s, "*INCLUDE: another file holds a part of the mesh; write it in one file");
@@ -388,6 +391,7 @@ PetscErrorCode SbImportRead_Abaqus(const char *path, SbImport *im)
       leave_line(&a);
     }
   }
+  // elements and sets find their nodes; sides of elements become triangles
   s->token = s->end;
   if (!a.deck.nnode.n) SB_SCAN_ERROR(s, "there is no *NODE in it; this is no input file of Abaqus");
   PetscCall(SbDeckBuild(&a.deck));

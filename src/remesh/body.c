@@ -328,6 +328,7 @@ static PetscErrorCode check_quality(const SbOldMesh *old, const SbRemeshing *how
   PetscReal worst = 1;
 
   PetscFunctionBeginUser;
+  // the new tets, at rest and now
   m->quality = 1;
   for (PetscInt c = 0; c < m->ncell; c++) {
     const PetscReal quality = shape_at(m, m->x, c);
@@ -336,6 +337,7 @@ static PetscErrorCode check_quality(const SbOldMesh *old, const SbRemeshing *how
     now += !(quality > 0);
     m->quality = PetscMin(m->quality, quality);
   }
+  // the old ones now
   for (PetscInt c = 0; c < old->ncell; c++) {
     PetscReal x[4][3], quality;
 
@@ -344,6 +346,7 @@ static PetscErrorCode check_quality(const SbOldMesh *old, const SbRemeshing *how
     before += !(quality > 0);
     worst = PetscMin(worst, quality);
   }
+  // no worse than before, and better where that was asked for
   PetscCheck(!at_rest, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
              "%" PetscInt_FMT " of %" PetscInt_FMT
              " new tetrahedra would be inverted or flat at rest: the deformation differs too much from one "

@@ -56,6 +56,7 @@ PetscErrorCode SbCoarseCreateSolver(SbCoarse c)
   const char *package;
 
   PetscFunctionBeginUser;
+  // entries of each row on this rank and on others
   PetscCall(PetscCalloc2(6 * c->n, &own, 6 * c->n, &foreign));
   for (PetscInt a = 0; a < c->n; a++) {
     for (PetscInt k = c->start[a]; k < c->start[a + 1]; k++) {
@@ -64,6 +65,7 @@ PetscErrorCode SbCoarseCreateSolver(SbCoarse c)
       for (PetscInt row = 6 * a; row < 6 * a + 6; row++) (here ? own : foreign)[row] += 6;
     }
   }
+  // the matrix E, of 6x6 blocks
   PetscCall(MatCreate(c->space->comm, &c->E));
   PetscCall(MatSetSizes(c->E, 6 * c->n, 6 * c->n, PETSC_DETERMINE, PETSC_DETERMINE));
   PetscCall(MatSetBlockSize(c->E, 6));
@@ -73,6 +75,7 @@ PetscErrorCode SbCoarseCreateSolver(SbCoarse c)
   PetscCall(PetscFree2(own, foreign));
   PetscCall(MatSetOption(c->E, MAT_SPD, PETSC_TRUE));
   PetscCall(MatCreateVecs(c->E, &c->c, &c->y));
+  // its solver: a factorisation where this PETSc has one for the size, else algebraic multigrid with rigid motions
   PetscCall(PCCreate(c->space->comm, &c->solver));
   PetscCall(PCSetOptionsPrefix(c->solver, "pc_coarse_"));
   PetscCall(SbDirectPackage(c->space->comm, 6 * c->N, PETSC_TRUE, &package));

@@ -70,13 +70,15 @@ static PetscErrorCode postorder(SbElimination *e, PetscInt parent[])
 
   PetscFunctionBeginUser;
   PetscCall(PetscMalloc5(n + 1, &head, n, &next, n + 1, &stack, n, &fresh, n, &old));
+  // lists of children; head[n] lists the roots
   for (PetscInt j = 0; j <= n; j++) head[j] = -1;
-  for (PetscInt j = n - 1; j >= 0; j--) { /* head[n] lists the roots */
+  for (PetscInt j = n - 1; j >= 0; j--) {
     const PetscInt p = parent[j] < 0 ? n : parent[j];
 
     next[j] = head[p];
     head[p] = j;
   }
+  // depth first: a number for each node after its children
   stack[0] = n;
   for (top = 0; top >= 0;) {
     const PetscInt j = stack[top], child = head[j];
@@ -89,6 +91,7 @@ static PetscErrorCode postorder(SbElimination *e, PetscInt parent[])
       top--;
     }
   }
+  // order, parents and inverse by the new numbers
   for (PetscInt j = 0; j < n; j++) {
     old[j] = e->order[j];
     next[j] = parent[j];

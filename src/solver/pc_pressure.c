@@ -170,23 +170,27 @@ static PetscErrorCode PCApply_Pressure(PC pc, Vec r, Vec z)
   Mat A, K;
 
   PetscFunctionBeginUser;
+  // a relative tolerance from the aim for the whole solve and the residual that is left
   PetscCall(PCShellGetContext(pc, &s));
   n = 3 * s->space->nnode_owned;
   PetscCall(PCGetOperators(pc, &A, &K));
   PetscCall(VecNorm(r, NORM_2, &norm));
   rtol = A == K ? PetscMin(0.5, PetscMax(1e-10, s->margin * s->target / norm)) : OF_PART;
+  // the right-hand side, with no part of pressures
   PetscCall(VecZeroEntries(s->b));
   PetscCall(VecGetArray(s->b, &to));
   PetscCall(VecGetArrayRead(r, &from));
   PetscCall(PetscArraycpy(to, from, n));
   PetscCall(VecRestoreArrayRead(r, &from));
   PetscCall(VecRestoreArray(s->b, &to));
+  // the solve; what it needs counts against the limit
   PetscCall(KSPSetTolerances(s->inner, rtol, 0., PETSC_DEFAULT, PetscMax(1, s->limit - s->its)));
   PetscCall(KSPSolve(s->inner, s->b, s->x));
   PetscCall(KSPGetIterationNumber(s->inner, &its));
   PetscCall(KSPGetConvergedReason(s->inner, &reason));
   s->its += its;
   if (reason < 0 && reason != KSP_DIVERGED_ITS) PetscCall(PCSetFailedReason(pc, PC_SUBPC_ERROR));
+  // its displacements
   PetscCall(VecGetArrayRead(s->x, &from));
   PetscCall(VecGetArray(z, &to));
   PetscCall(PetscArraycpy(to, from, n));

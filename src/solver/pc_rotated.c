@@ -56,6 +56,7 @@ static PetscErrorCode number_nodes(Rotated *p)
   PetscInt nz = 0, ninterior;
 
   PetscFunctionBeginUser;
+  // free nodes of the interior first
   PetscCall(PetscMalloc2(s->nnode, &p->node, s->nnode, &p->local));
   for (PetscInt i = 0; i < s->nnode; i++) p->local[i] = -1;
   for (PetscInt i = 0; i < s->nnode_owned; i++) {
@@ -64,6 +65,7 @@ static PetscErrorCode number_nodes(Rotated *p)
     p->node[p->n++] = i;
     nz += plan->di[i + 1] - plan->di[i] + plan->oi[i + 1] - plan->oi[i];
   }
+  // then those of the interface, which are kept
   ninterior = p->n;
   for (PetscInt i = 0; i < s->nnode; i++) {
     if (p->face->index[i] < 0) continue;
@@ -71,6 +73,7 @@ static PetscErrorCode number_nodes(Rotated *p)
     p->node[p->n++] = i;
   }
   p->nkeep = p->n - ninterior;
+  // rows of the interior: neighbours that are numbered
   PetscCall(PetscMalloc2(ninterior + 1, &p->ia, nz, &p->ja));
   p->ia[0] = nz = 0;
   for (PetscInt k = 0; k < ninterior; k++) {
@@ -274,10 +277,12 @@ static PetscErrorCode apply_factor(Rotated *p, const float r[], float z[])
   const PetscInt ninterior = p->n - p->nkeep;
 
   PetscFunctionBeginUser;
+  // Q^T r in the interior, and forward substitution
   for (PetscInt k = 0; k < ninterior; k++) turn_back(p->Q + 9 * p->node[k], r + 3 * p->node[k], p->b + 3 * k);
   PetscCall(PetscArrayzero(p->b + 3 * ninterior, 3 * p->nkeep));
   SbFactorForward(p->factor, p->b, p->kept);
   if (f->n) {
+    // the interface: its own right-hand side and what the interior leaves there
     PetscCall(PetscArrayzero(p->edge, 3 * f->n));
     for (PetscInt k = 0; k < f->nmine; k++) {
       const PetscInt i = f->mine[k];
@@ -290,6 +295,7 @@ static PetscErrorCode apply_factor(Rotated *p, const float r[], float z[])
     for (PetscInt k = 0; k < 3 * p->nkeep; k++)
       p->kept[k] = p->edge[3 * f->index[p->node[ninterior + k / 3]] + k % 3];
   }
+  // backward substitution, and Q
   SbFactorBackward(p->factor, p->kept, p->x);
   for (PetscInt k = 0; k < ninterior; k++)
     turn_forth(p->Q + 9 * p->node[k], p->x + 3 * k, z + 3 * p->node[k]);
@@ -298,6 +304,7 @@ static PetscErrorCode apply_factor(Rotated *p, const float r[], float z[])
 
     turn_forth(p->Q + 9 * i, p->edge + 3 * f->index[i], z + 3 * i);
   }
+  // prescribed nodes have a diagonal of their own
   for (PetscInt k = 0; k < s->nfixed && s->fixed_node[k] < s->nnode_owned; k++) {
     const PetscInt i = s->fixed_node[k];
 

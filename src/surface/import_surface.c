@@ -185,6 +185,7 @@ static PetscErrorCode take_boundary(const SbTriangleFile *f, const SbSurface *s,
   PetscReal longest2, around;
 
   PetscFunctionBeginUser;
+  // triangles with material on both sides are walls, which an obstacle has no use for
   PetscCall(PetscArraycpy(t->x, s->x, 3 * (size_t)s->nvert));
   t->nvert = s->nvert;
   t->ntri = 0;
@@ -201,11 +202,13 @@ static PetscErrorCode take_boundary(const SbTriangleFile *f, const SbSurface *s,
     f->number[t->ntri++] = s->number[i];
   }
   PetscCall(SbDropUnusedPoints(&t->nvert, t->x, 3 * t->ntri, t->tri));
+  // volume and mean edge
   for (PetscInt i = 0; i < t->ntri; i++) {
     t->volume += SbTetVolumeTo(t, i, t->x);
     (void)SbTriangleMeasure(t, i, &longest2, &around);
     t->edge += around / (3 * (PetscReal)t->ntri);
   }
+  // neighbours across each edge; one of more than two triangles is refused
   PetscCall(PetscMalloc1(3 * (size_t)t->ntri, &t->across));
   PetscCall(PetscMalloc1(3 * (size_t)t->ntri, &edge));
   PetscCall(SbTrianglesEdges(t, edge));

@@ -97,6 +97,7 @@ static PetscErrorCode read_header(Ply *p)
   PetscBool format = PETSC_FALSE;
 
   PetscFunctionBeginUser;
+  // the first line, then one keyword per line
   PetscCall(SbScanWord(p->s, sizeof(word), word));
   if (strcmp(word, "ply")) SB_SCAN_ERROR(p->s, "expected 'ply', found '%s'; it is no PLY file", word);
   for (;;) {
@@ -107,6 +108,7 @@ static PetscErrorCode read_header(Ply *p)
                     "the file ends where 'end_header' is expected; it is truncated, write or copy it again");
     if (!strcmp(word, "end_header")) break;
     if (!strcmp(word, "format")) {
+      // text, or binary in the order of bytes of this machine or the other one
       const uint16_t one = 1;
       const PetscBool little = (PetscBool)(*(const unsigned char *)&one == 1);
 
@@ -117,6 +119,7 @@ static PetscErrorCode read_header(Ply *p)
       p->swap = (PetscBool)(p->binary && little != (PetscBool)!strcmp(word, "binary_little_endian"));
       format = PETSC_TRUE;
     } else if (!strcmp(word, "element")) {
+      // a kind of element, whose properties follow
       Element *e;
 
       if (p->nelement == ELEMENTS_MAX)
