@@ -86,6 +86,7 @@ typedef struct {
     advance       - it is where its way from t to t + dt has the part `progress` behind it, 0..1. Not collective.
     safe          - `part` of the way from the local displacements u0 to u1, and from the present progress to `progress`, that can be gone, for the pairs of this
                     rank; nactive: pairs of this rank that push each other at u0.
+    nearest       - the smallest gap of the places that were examined last, m, and what is there, in words; PETSC_MAX_REAL and "" without one.
     lag           - a solve of the step ended at the local displacements u: friction, whose normal forces and directions are those of before, may take those of u;
                     again: it did, and the step wants one more solve.
     potential     - energy at the local displacements u, this rank's part, J; f[nnode][3] += its gradient on owned nodes, N.
@@ -96,6 +97,7 @@ typedef struct {
   PetscErrorCode (*advance)(SbEffect e, PetscReal progress);
   PetscErrorCode (*safe)(SbEffect e, SbSpace space, const PetscReal u0[], const PetscReal u1[],
                          PetscReal progress, PetscReal *part, PetscInt *nactive);
+  PetscErrorCode (*nearest)(SbEffect e, SbSpace space, PetscReal *gap, size_t size, char text[]);
   PetscErrorCode (*lag)(SbEffect e, SbSpace space, const PetscReal u[], PetscBool *again);
   PetscErrorCode (*potential)(SbEffect e, SbSpace space, const PetscReal u[], PetscReal *energy,
                               PetscReal f[]);

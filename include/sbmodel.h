@@ -113,6 +113,8 @@ PetscErrorCode SbModelGuardBegin(SbModel model, PetscReal t, PetscReal dt, Vec U
 PetscErrorCode SbModelGuardAdvance(SbModel model, PetscReal progress);
 PetscErrorCode SbModelGuardSafe(SbModel model, Vec X, Vec Y, PetscReal progress, PetscReal *part,
                                 PetscInt *nactive);
+/* What was nearest to each other in the last attempt at a step, in words, for who says why it failed. */
+PetscErrorCode SbModelGuardNearest(SbModel model, size_t size, char text[]);
 PetscErrorCode SbModelGuardLag(SbModel model, Vec X, PetscBool *again);
 /* Of the last accepted step: what contact did to the bodies, J, and its forces taken out of those of SbModelLoads() at U, F, N. */
 PetscErrorCode SbModelGuardWork(SbModel model, Vec U, PetscReal *work, Vec F);

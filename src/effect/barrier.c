@@ -351,7 +351,8 @@ static PetscErrorCode lag_barrier(SbEffect e, SbSpace s, const PetscReal u[], Pe
   PetscFunctionBeginUser;
   (void)s;
   *again = PETSC_FALSE;
-  if (b->scene.friction <= 0. || ++b->nlag >= b->lags) PetscFunctionReturn(PETSC_SUCCESS);
+  if (b->scene.friction <= 0. || ++b->nlag >= (b->lags ? b->lags : e->dynamic ? 1 : LAGS))
+    PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(SbBarrierLook(b, u));
   PetscCall(SbBarrierLag(b));
   *again = (PetscBool)(b->lag > b->lag_tolerance);
@@ -506,7 +507,6 @@ PetscErrorCode SbBarrierCreate(SbEffect e, const SbScope *scope, const SbBarrier
                              "contacts",       "penetration", "penetration_mean", "normal_force",
                              "friction_force", "work",        "friction_loss",    "gap",
                              "energy",         "friction_lag"};
-  PetscInt lags;
   Barrier *b;
 
   PetscFunctionBeginUser;
@@ -517,8 +517,7 @@ PetscErrorCode SbBarrierCreate(SbEffect e, const SbScope *scope, const SbBarrier
   PetscCall(SbOptionReal(scope, "barrier_width", &b->width));
   PetscCall(SbOptionReal(scope, "barrier_pressure", &b->pressure));
   PetscCall(SbOptionBool(scope, "verify", &b->verify));
-  PetscCall(SbOptionInt(scope, "friction_solves", &lags));
-  b->lags = lags > 0 ? lags : e->dynamic ? 1 : LAGS;
+  PetscCall(SbOptionInt(scope, "friction_solves", &b->lags));
   PetscCall(SbOptionReal(scope, "friction_tolerance", &b->lag_tolerance));
   e->data = b;
   e->ops = (SbEffectOps){.setfromoptions = e->ops.setfromoptions,
@@ -529,6 +528,7 @@ PetscErrorCode SbBarrierCreate(SbEffect e, const SbScope *scope, const SbBarrier
                          .safe = safe_barrier,
                          .advance = advance_barrier,
                          .lag = lag_barrier,
+                         .nearest = SbEffectNearest_Barrier,
                          .potential = SbEffectPotential_Barrier,
                          .hessian = SbEffectHessian_Barrier,
                          .accept = accept_barrier,

@@ -115,3 +115,4 @@ PetscErrorCode SbEffectContactPoints_Barrier(SbEffect e, SbSpace s, const SbStag
 PetscErrorCode SbEffectGap_Barrier(SbEffect e, SbSpace s, const SbStage *stage, PetscReal gap[],
                                    PetscReal normal[]);
 PetscErrorCode SbEffectSummary_Barrier(SbEffect e, SbSpace s, size_t size, char text[]);
+PetscErrorCode SbEffectNearest_Barrier(SbEffect e, SbSpace s, PetscReal *gap, size_t size, char text[]);

@@ -221,3 +221,40 @@ PetscErrorCode SbEffectSummary_Barrier(SbEffect e, SbSpace s, size_t size, char 
     (void)snprintf(text, size, "nothing came nearer than %.3g m", (double)b->w[0]);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
+
+PetscErrorCode SbEffectNearest_Barrier(SbEffect e, SbSpace s, PetscReal *gap, size_t size, char text[])
+{
+  const Barrier *b = (const Barrier *)e->data;
+  const PetscReal *x = b->x;
+  const Active *least = NULL;
+  struct {
+    double gap;
+    int rank;
+  } mine, first;
+  PetscMPIInt rank;
+
+  PetscFunctionBeginUser;
+  PetscCallMPI(MPI_Comm_rank(s->comm, &rank));
+  for (PetscInt i = 0; i < b->nactive; i++) {
+    if (!least || b->active[i].gap < least->gap) least = &b->active[i];
+  }
+  mine.gap = least ? (double)least->gap : PETSC_MAX_REAL;
+  mine.rank = rank;
+  PetscCallMPI(MPI_Allreduce(&mine, &first, 1, MPI_DOUBLE_INT, MPI_MINLOC, s->comm));
+  *gap = first.gap;
+  text[0] = 0;
+  if (first.gap == PETSC_MAX_REAL) PetscFunctionReturn(PETSC_SUCCESS);
+  if (rank == first.rank) {
+    const SbContactPair *pair = &b->pairs->pair[least->pair];
+    const PetscInt part[2] = {b->mesh->part[pair->v[0]], b->mesh->part[pair->v[pair->side ? 1 : 2]]};
+    const char *name[2];
+
+    for (int k = 0; k < 2; k++)
+      name[k] = part[k] < s->mesh->nbody ? s->mesh->body[part[k]].name : "the obstacle";
+    PetscCall(PetscSNPrintf(text, size, "effect %s: %s and %s are %.2g m apart at (%.4g, %.4g, %.4g) m",
+                            e->name, name[0], name[1], first.gap, (double)x[3 * pair->v[0]],
+                            (double)x[3 * pair->v[0] + 1], (double)x[3 * pair->v[0] + 2]));
+  }
+  PetscCallMPI(MPI_Bcast(text, (PetscMPIInt)size, MPI_CHAR, first.rank, s->comm));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

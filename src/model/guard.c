@@ -68,6 +68,24 @@ PetscErrorCode SbModelGuardSafe(SbModel m, Vec X, Vec Y, PetscReal progress, Pet
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscErrorCode SbModelGuardNearest(SbModel m, size_t size, char text[])
+{
+  PetscReal least = PETSC_MAX_REAL;
+  char mine[256];
+
+  PetscFunctionBeginUser;
+  text[0] = 0;
+  for (PetscInt e = 0; e < m->npotential; e++) {
+    PetscReal gap;
+
+    SbEffectCall(m->potential[e], nearest, m->space, &gap, sizeof(mine), mine);
+    if (gap >= least) continue;
+    least = gap;
+    PetscCall(PetscStrncpy(text, mine, size));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode SbModelGuardLag(SbModel m, Vec X, PetscBool *again)
 {
   const PetscReal *u;

@@ -13,7 +13,7 @@
   is rounding, near the solution, the residual decides.
 
   Provisional steps. In bending and rotation the first full step stretches what it should turn, and E rises a long way that the next step comes back
-  from; a search that never lets E rise creeps where full steps need five. So a full step that turns no tet inverted may raise E,
+  from; a search that never lets E rise creeps where full steps need five. So a full step that turns no tet inverted and comes to no barrier may raise E,
   and the next one has to bring it below where it was, with an accurate linear solve where a loose one is not enough, or the search starts again from there (watchdog technique: Chamberlain et al. 1982; Nocedal
   and Wright, section 15.6).
 
@@ -67,6 +67,7 @@ typedef struct {
   PetscReal norm; /* of the residual, N */
   PetscReal psi;  /* strain energy, J */
   PetscReal rest; /* slope of all but strain along the step, J */
+  PetscReal gaps; /* energy of guarded contact, J: part of psi */
   PetscInt ninverted;
 } Iterate;
 
@@ -95,7 +96,8 @@ static PetscErrorCode evaluate_at(Newton *n, Vec X, Vec F, Vec Y, Iterate *at)
     PetscCall(VecZeroEntries(n->contact));
     PetscCall(SbModelGuardGradient(run->model, X, run->guard_weight, PETSC_TRUE, &energy, n->contact));
     PetscCall(VecDot(n->contact, Y, &along));
-    at->psi += run->guard_weight * energy;
+    at->gaps = run->guard_weight * energy;
+    at->psi += at->gaps;
     at->rest += along;
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -248,10 +250,12 @@ static PetscErrorCode solve_accurately(SNES snes, PetscReal *slope, PetscBool *b
 static PetscErrorCode search(SNES snes, PetscReal slope, PetscReal *s)
 {
   Newton *n = (Newton *)snes->data;
+  const SbModel m = n->run->model;
   const Vec X = snes->vec_sol, F = snes->vec_func, Y = snes->vec_sol_update;
   PetscBool enough, provisional, better,
     plain = (PetscBool)(n->nblock > 0 || *s < 1.); /* a barrier is nothing to come back from */
   PetscReal change, noise, total, goal;
+  PetscInt nactive;
   Iterate from, to;
 
   PetscFunctionBeginUser;
@@ -280,14 +284,17 @@ static PetscErrorCode search(SNES snes, PetscReal slope, PetscReal *s)
     enough = (PetscBool)(slope < 0. && total <= goal);
     if (slope >= 0. || total <= noise)
       enough = (PetscBool)(enough || to.norm <= (1. - DECREASE * *s) * from.norm);
-    provisional = (PetscBool)(!enough && !plain && slope < 0. && n->provisional < PROVISIONAL &&
-                              change < PETSC_INFINITY && to.ninverted <= from.ninverted);
+    provisional =
+      (PetscBool)(!enough && !plain && slope < 0. && n->provisional < PROVISIONAL &&
+                  change < PETSC_INFINITY && to.ninverted <= from.ninverted && to.gaps <= from.gaps);
     if (enough || provisional) break;
 
     /* to come back from far above takes more than a loose solve: what it leaves may be more than E has to fall by */
     if (n->provisional) {
       PetscCall(solve_accurately(snes, &slope, &better));
       if (better) {
+        if (m->npotential)
+          PetscCall(SbModelGuardSafe(m, X, Y, 1., s, &nactive)); /* another way than before */
         PetscCall(evaluate_at(n, X, F, Y, &from));
         continue;
       }
@@ -302,6 +309,7 @@ static PetscErrorCode search(SNES snes, PetscReal slope, PetscReal *s)
       slope = n->slope;
       change = n->first;
       n->provisional = 0;
+      *s = 1.; /* the first one was whole; surfaces may have shortened the one from there */
     }
     plain = PETSC_TRUE;
     *s *= PetscMax(0.1, PetscMin(0.5, -slope * *s / (2. * (change - slope * *s))));
@@ -442,6 +450,9 @@ static PetscErrorCode converged(SNES snes, PetscReal s)
     }
   }
   PetscCall(VecNorm(snes->vec_sol_update, NORM_INFINITY, &longest));
+  PetscCall(PetscInfo(snes,
+                      "iteration %" PetscInt_FMT ": the longest step is %g m, of %g m for the last one\n",
+                      snes->iter, (double)longest, (double)(part * size)));
   if (s == 1. && longest <= part * size) snes->reason = SNES_CONVERGED_SNORM_RELATIVE;
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -250,7 +250,10 @@ static PetscErrorCode complete(void *ctx, SNESConvergedReason reason, SbSolvedSt
   else if (!*ok && reason != SNES_CONVERGED_ITERATING) {
     char why[512] = "";
 
-    if (reason == SNES_DIVERGED_LINEAR_SOLVE) PetscCall(SbSolverListExplain(so->run, sizeof(why), why));
+    if (reason == SNES_DIVERGED_LINEAR_SOLVE)
+      PetscCall(SbSolverListExplain(so->run, sizeof(why), why));
+    else
+      PetscCall(SbModelGuardNearest(so->run->model, sizeof(why), why));
     PetscCall(SbRunFail(so->run, "step %" PetscInt_FMT " at t = %g s with a length of %g s: %s%s%s",
                         ts->steps + 1, (double)ts->ptime, (double)ts->time_step,
                         reason > 0 ? "the solution is not finite" : SNESConvergedReasons[reason],

@@ -89,9 +89,12 @@ static PetscErrorCode complete(void *ctx, SNESConvergedReason reason, SbSolvedSt
 
     PetscCall(find_free_body(l->run, l->factor, &found));
     if (!found) {
+      char near[256];
+
       if (reason == SNES_DIVERGED_LINEAR_SOLVE) PetscCall(SbSolverListExplain(l->run, sizeof(why), why));
-      PetscCall(
-        SbRunFail(l->run, "load factor %g: %s; %s", (double)l->factor, SNESConvergedReasons[reason], why));
+      PetscCall(SbModelGuardNearest(l->run->model, sizeof(near), near));
+      PetscCall(SbRunFail(l->run, "load factor %g: %s; %s%s%s", (double)l->factor,
+                          SNESConvergedReasons[reason], why, near[0] ? "; " : "", near));
     }
   }
 

@@ -49,6 +49,9 @@ PetscErrorCode SbRunAttempt(SbRun run, const SbAttempt *a, PetscBool *ok)
 
   /* a step that turns tets inverted is refused where that was asked for */
   PetscCall(SbRunRejectInverted(run, a->t, a->dt, (Vec[2]){a->U0, a->U}, ok));
+
+  /* what moves by order is where it was when the step began, if the run ends there */
+  if (!*ok && run->model->npotential) PetscCall(SbModelGuardAdvance(run->model, 0.));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
