@@ -513,7 +513,7 @@ def run(name, ranks, short, more):
         tets = len(f["mesh/cells"])
     ended = "yes" if not result.returncode else f"at {h['time'][-1]:g} s of {end:g}"
     print(f"contact|{name}|{ranks}|{tets}|{steps}|{ended}|{len(seen)}|{np.median(newton):g}|{newton.max():g}"
-          f"|{h['rejected'].sum():g}|{gaps[gaps > 0].min(initial=np.inf):.1e}|{max(made, 0) + 0.0:.0e}|{cpu:.1f}|{1e6 * cpu / steps / tets:.1f}")
+          f"|{h['rejected'].sum():g}|{f'{gaps[gaps > 0].min():.1e}' if (gaps > 0).any() else '-'}|{max(made, 0) + 0.0:.0e}|{cpu:.1f}|{1e6 * cpu / steps / tets:.1f}")
     return found, h
 
 
