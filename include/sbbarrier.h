@@ -8,6 +8,7 @@
 #pragma once
 #include "sbcontact.h"
 #include "sbgeometry.h"
+#include "sbsolver.h"
 
 typedef struct _p_SbContactMesh *SbContactMesh;
 struct _p_SbContactMesh {
@@ -133,3 +134,18 @@ void SbBarrier(PetscReal d, PetscReal w, PetscReal k, PetscReal area, PetscReal 
 void SbBarrierPair(SbContactMesh mesh, const SbContactPair *pair, PetscReal gap, const SbDistance *distance,
                    const PetscReal x[], PetscReal width, PetscReal pressure, PetscReal *energy,
                    PetscReal gradient[12], PetscBool clamp, PetscReal H[144]);
+
+/* Second derivatives by the motion of pairs of surface vertices, a symmetric matrix; start with {0}. */
+typedef struct {
+  PetscInt n, size;
+  PetscInt (*v)[2];      /* [n] vertices, the lower number first */
+  PetscReal (*block)[9]; /* [n] row-major, N/m */
+  PetscInt nslot, *slot; /* [nslot] number of a pair by its hash, -1: free; a power of two */
+} SbContactBlocks;
+PetscErrorCode SbContactBlocksClear(SbContactBlocks *blocks);
+PetscErrorCode SbContactBlocksFree(SbContactBlocks *blocks);
+/* Adds the 3x3 block of vertices v and w of bodies, whose rows are `ld` numbers apart, and its transpose for w and v. */
+PetscErrorCode SbContactBlocksAdd(SbContactBlocks *blocks, PetscInt v, PetscInt w, const PetscReal H[],
+                                  PetscInt ld);
+/* Adds their blocks between own nodes and all nodes of the vertices, zero at prescribed components, each place once. Not collective. */
+PetscErrorCode SbContactBlocksSpread(SbContactMesh mesh, const SbContactBlocks *blocks, SbBlocks *nodes);

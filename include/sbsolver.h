@@ -155,13 +155,14 @@ PetscErrorCode SbConstraintsSetMatrix(SbSpace space, Mat K);
 
 /* ------------------------------------------------------------------ contact_system.c: a tangent with blocks between any nodes */
 
-/* 3x3 blocks between owned nodes and any nodes; start with {0}, released with SbBlocksFree(). Several of one place are added. */
+/* 3x3 blocks between owned nodes and any nodes, best row by row; start with {0}, released with SbBlocksFree(). Several of one place are added. */
 typedef struct {
   PetscInt n, size;
   PetscInt (*node)[2];   /* [n] owned local node, global node */
   PetscReal (*block)[9]; /* [n] row-major, N/m */
 } SbBlocks;
-PetscErrorCode SbBlocksAdd(SbBlocks *blocks, PetscInt row, PetscInt column, const PetscReal block[9]);
+/* Room for `more` blocks behind the n that there are. */
+PetscErrorCode SbBlocksReserve(SbBlocks *blocks, PetscInt more);
 PetscErrorCode SbBlocksFree(SbBlocks *blocks);
 typedef struct _p_SbContactSystem *SbContactSystem;
 /* choice: 0 by size, 1 factored, 2 by iterations. Not collective. Options read: -ksp_type, -pc_type, -contact_ksp_, -contact_pc_. */

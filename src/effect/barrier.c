@@ -492,6 +492,7 @@ static PetscErrorCode destroy_barrier(SbEffect e)
   PetscCall(PetscFree(b->active));
   PetscCall(PetscFree(b->rub));
   PetscCall(PetscFree(b->next));
+  PetscCall(SbContactBlocksFree(&b->blocks));
   e->data = b->data;
   PetscCall((*b->destroy)(e));
   PetscCall(PetscFree(b));

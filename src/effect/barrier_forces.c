@@ -167,30 +167,22 @@ PetscErrorCode SbEffectPotential_Barrier(SbEffect e, SbSpace s, const PetscReal 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* blocks += H of a pair between owned nodes and all nodes of its vertices; none at prescribed unknowns. */
-static PetscErrorCode spread_blocks(const Barrier *b, const SbContactPair *pair, const PetscReal H[144],
-                                    SbBlocks *blocks)
+/* Sums up H of a pair by its vertices, as far as one of two has nodes here; weight: H is that of their weighted sum, 3x3 (NULL: of all four). */
+static PetscErrorCode add_blocks(Barrier *b, const SbContactPair *pair, const PetscReal weight[4],
+                                 const PetscReal H[])
 {
   const SbContactMesh m = b->mesh;
   const int n = pair->side ? 1 : 4;
 
   PetscFunctionBeginUser;
   for (int p = 0; p < n; p++) {
-    if (pair->v[p] >= m->nbody_vertex || !m->mine[pair->v[p]]) continue;
-    for (PetscInt j = m->start[pair->v[p]]; j < m->start[pair->v[p] + 1]; j++) {
-      if (m->node[j] < 0 || m->node[j] >= m->space->nnode_owned) continue;
-      for (int q = 0; q < n; q++) {
-        if (pair->v[q] >= m->nbody_vertex) continue;
-        for (PetscInt l = m->start[pair->v[q]]; l < m->start[pair->v[q] + 1]; l++) {
-          PetscReal block[9];
+    for (int q = p; q < n; q++) {
+      const PetscInt v = pair->v[p], w = pair->v[q];
+      PetscReal block[9];
 
-          for (int i = 0; i < 9; i++)
-            block[i] = (m->fixed[j] >> (i / 3) & 1) || (m->fixed[l] >> (i % 3) & 1)
-                         ? 0.
-                         : m->weight[j] * m->weight[l] * H[12 * (3 * p + i / 3) + 3 * q + i % 3];
-          PetscCall(SbBlocksAdd(blocks, m->node[j], m->gnode[l], block));
-        }
-      }
+      if (v >= m->nbody_vertex || w >= m->nbody_vertex || !(m->mine[v] | m->mine[w])) continue;
+      for (int k = 0; weight && k < 9; k++) block[k] = weight[p] * weight[q] * H[k];
+      PetscCall(SbContactBlocksAdd(&b->blocks, v, w, weight ? block : H + 36 * p + 3 * q, weight ? 3 : 12));
     }
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -205,13 +197,14 @@ PetscErrorCode SbEffectHessian_Barrier(SbEffect e, SbSpace s, const PetscReal u[
   PetscFunctionBeginUser;
   (void)s;
   PetscCall(SbBarrierLook(b, u));
+  PetscCall(SbContactBlocksClear(&b->blocks));
   for (PetscInt i = 0; i < b->nactive; i++) {
     const Active *a = &b->active[i];
     const SbContactPair *pair = &b->pairs->pair[a->pair];
 
     SbBarrierPair(b->mesh, pair, a->gap, &a->at, b->x, width_of(b, pair), pressure_of(b, pair), &energy,
                   gradient, (PetscBool)(kind != SB_HESSIAN_EXACT), H);
-    PetscCall(spread_blocks(b, pair, H, blocks));
+    PetscCall(add_blocks(b, pair, NULL, H));
   }
 
   /* friction: mu N (f0'/u (I - n n - u u/u^2) + f0'' u u/u^2); the parabola that touches f0 from above has f0'/u in the place of f0'' */
@@ -226,10 +219,10 @@ PetscErrorCode SbEffectHessian_Barrier(SbEffect e, SbSpace s, const PetscReal u[
     for (int k = 0; k < 9; k++) {
       T[k] = slope * ((k % 4 ? 0. : 1.) - rub->n[k / 3] * rub->n[k % 3]);
       if (y > 0.) T[k] += (curve - slope) * d[k / 3] * d[k % 3] / (y * y);
+      T[k] *= rub->force;
     }
-    for (int k = 0; k < 144; k++)
-      H[k] = rub->force * rub->weight[k / 36] * rub->weight[k % 12 / 3] * T[3 * (k / 12 % 3) + k % 3];
-    PetscCall(spread_blocks(b, &rub->pair, H, blocks));
+    PetscCall(add_blocks(b, &rub->pair, rub->weight, T));
   }
+  PetscCall(SbContactBlocksSpread(b->mesh, &b->blocks, blocks));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

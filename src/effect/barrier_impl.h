@@ -38,6 +38,7 @@ typedef struct {
   Active *active;
   PetscInt nrub, rub_size;
   Rub *rub;
+  SbContactBlocks blocks;    /* of the last second derivative */
   PetscInt nnext, next_size; /* the same with the places and forces at the end of the step */
   Rub *next;
   SbPose pose[2]; /* of the obstacle at the start and the end of the step */

@@ -206,7 +206,7 @@ static void point_derivatives(const PetscReal x[], const SbDistance *s, PetscRea
   }
 }
 
-void SbSymmetricClamp(int n, PetscReal A[])
+static inline void clamp_eigenvalues(const int n, PetscReal A[])
 {
   PetscReal V[SB_CLAMP_MAX * SB_CLAMP_MAX], D[SB_CLAMP_MAX * SB_CLAMP_MAX], size = 0;
   PetscBool negative = PETSC_FALSE;
@@ -263,6 +263,11 @@ void SbSymmetricClamp(int n, PetscReal A[])
   }
 }
 
+void SbSymmetricClamp(int n, PetscReal A[])
+{
+  clamp_eigenvalues(n, A);
+}
+
 void SbDistanceHessian(const PetscReal x[], const SbDistance *s, const PetscReal factor[2], PetscBool clamp,
                        PetscReal H[])
 {
@@ -310,29 +315,31 @@ void SbDistanceHessian(const PetscReal x[], const SbDistance *s, const PetscReal
     K[24] *= bend[1] * bend[1] / ee;
     K[18] *= bend[0] * bend[0] / ee;
   }
-  if (clamp) SbSymmetricClamp(5, K);
+  if (clamp) clamp_eigenvalues(5, K);
 
-  // back to the vertices
+  // back to the vertices: blocks in the frame of n and m, turned; vertices of no weight do not take part
   for (int i = 0; i < 4; i++) {
-    for (int j = 0; j < 4; j++) {
-      PetscReal nn = 0, nm[2] = {0, 0}, mn[2] = {0, 0};
+    for (int j = i; j < 4; j++) {
+      const PetscReal f = w[i] * w[j] / (size * size);
+      PetscReal G[3][3] = {{0}}, R[3][3];
+      const PetscBool part = (PetscBool)(s->mask >> i & s->mask >> j & 1);
 
-      for (int k = 0; k < 3; k++) {
-        for (int l = 0; l < 3; l++) nn += K[5 * k + l] * h[k][i] * h[l][j];
+      for (int k = 0; k < 3 && part; k++) {
+        for (int l = 0; l < 3; l++) G[0][0] += K[5 * k + l] * h[k][i] * h[l][j];
         for (int l = 0; l < 2; l++) {
-          nm[l] += K[5 * k + 3 + l] * h[k][i] * w[j] / size;
-          mn[l] += K[5 * k + 3 + l] * h[k][j] * w[i] / size;
+          G[0][1 + l] += K[5 * k + 3 + l] * h[k][i] * w[j] / size;
+          G[1 + l][0] += K[5 * k + 3 + l] * h[k][j] * w[i] / size;
         }
+      }
+      for (int k = 0; k < 4 && part; k++) G[1 + k / 2][1 + k % 2] = f * K[5 * (3 + k / 2) + 3 + k % 2];
+      for (int p = 0; p < 3; p++) {
+        for (int q = 0; q < 3; q++) R[p][q] = n[p] * G[0][q] + m[0][p] * G[1][q] + m[1][p] * G[2][q];
       }
       for (int p = 0; p < 3; p++) {
         for (int q = 0; q < 3; q++) {
-          const PetscReal f = w[i] * w[j] / (size * size);
+          const PetscReal value = R[p][0] * n[q] + R[p][1] * m[0][q] + R[p][2] * m[1][q];
 
-          H[12 * (3 * i + p) + 3 * j + q] =
-            nn * n[p] * n[q] + n[p] * (nm[0] * m[0][q] + nm[1] * m[1][q]) +
-            n[q] * (mn[0] * m[0][p] + mn[1] * m[1][p]) +
-            f * (K[18] * m[0][p] * m[0][q] + K[19] * (m[0][p] * m[1][q] + m[1][p] * m[0][q]) +
-                 K[24] * m[1][p] * m[1][q]);
+          H[12 * (3 * i + p) + 3 * j + q] = H[12 * (3 * j + q) + 3 * i + p] = value;
         }
       }
     }

@@ -27,6 +27,7 @@ struct _p_SbContactSystem {
   PetscInt *place;           /* [ka[n]] of its blocks in the rows */
   PetscInt *used;            /* [rows.ia[n]] solve in which contact used the place last; -1: the tangent's */
   PetscInt *last;            /* [n] solve in which contact used the row last, -1: never */
+  PetscInt *where;           /* [Nnode] place of a column in the row that was marked last */
   PetscInt nsolve, nnode;    /* nodes of contact, of all ranks */
   PetscReal *tangent;        /* [ka[n]][9] */
   PetscBool fresh[2];        /* matrix and factor do not have the values yet */
@@ -37,18 +38,13 @@ struct _p_SbContactSystem {
   Mat A;
 };
 
-PetscErrorCode SbBlocksAdd(SbBlocks *b, PetscInt row, PetscInt column, const PetscReal block[9])
+PetscErrorCode SbBlocksReserve(SbBlocks *b, PetscInt more)
 {
   PetscFunctionBeginUser;
-  if (b->n == b->size) {
-    b->size = PetscMax(1024, 2 * b->size);
-    PetscCall(PetscRealloc((size_t)b->size * sizeof(*b->node), &b->node));
-    PetscCall(PetscRealloc((size_t)b->size * sizeof(*b->block), &b->block));
-  }
-  b->node[b->n][0] = row;
-  b->node[b->n][1] = column;
-  PetscCall(PetscArraycpy(b->block[b->n], block, 9));
-  b->n++;
+  if (b->n + more <= b->size) PetscFunctionReturn(PETSC_SUCCESS);
+  b->size = PetscMax(2 * b->size, b->n + more);
+  PetscCall(PetscRealloc((size_t)b->size * sizeof(*b->node), &b->node));
+  PetscCall(PetscRealloc((size_t)b->size * sizeof(*b->block), &b->block));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -84,6 +80,7 @@ PetscErrorCode SbContactSystemCreate(SbSpace s, PetscInt choice, SbContactSystem
   c->choice = choice;
   c->rows.n = n;
   PetscCall(PetscMalloc3(n, &c->all, n + 1, &c->ka, n, &c->last));
+  PetscCall(PetscCalloc1(s->Nnode, &c->where));
   for (PetscInt i = 0; i < n; i++) {
     c->all[i] = i;
     c->last[i] = -1;
@@ -123,21 +120,18 @@ PetscErrorCode SbContactSystemDescribe(SbSpace s, PetscInt choice, char text[], 
 
 /* ------------------------------------------------------------------ the matrix */
 
-/* The place of column g in row r, -1: none. */
-static PetscInt find_place(const SbContactRows *rows, PetscInt r, PetscInt g)
+/* Notes where the columns of row r are, for place_of(). */
+static inline void mark_row(SbContactSystem c, PetscInt r)
 {
-  PetscInt low = rows->ia[r], high = rows->ia[r + 1];
+  for (PetscInt k = c->rows.ia[r]; k < c->rows.ia[r + 1]; k++) c->where[c->rows.ja[k]] = k;
+}
 
-  while (low < high) {
-    const PetscInt mid = low + (high - low) / 2;
+/* The place of column g in row r, which was marked last; -1: none. */
+static inline PetscInt place_of(SbContactSystem c, PetscInt r, PetscInt g)
+{
+  const PetscInt k = c->where[g];
 
-    if (rows->ja[mid] == g) return mid;
-    if (rows->ja[mid] < g)
-      low = mid + 1;
-    else
-      high = mid;
-  }
-  return -1;
+  return k >= c->rows.ia[r] && k < c->rows.ia[r + 1] && c->rows.ja[k] == g ? k : -1;
 }
 
 /* A pattern with room for the blocks; nodes of contact are marked. */
@@ -201,9 +195,23 @@ static PetscErrorCode make_pattern(SbContactSystem c, const SbBlocks *b)
   c->used = used;
   PetscCall(PetscMalloc1(9 * (size_t)nz, &c->rows.value));
   for (PetscInt r = 0; r < n; r++) {
-    for (PetscInt k = c->ka[r]; k < c->ka[r + 1]; k++) c->place[k] = find_place(&c->rows, r, c->kj[k]);
+    mark_row(c, r);
+    for (PetscInt k = c->ka[r]; k < c->ka[r + 1]; k++) c->place[k] = place_of(c, r, c->kj[k]);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Places of the blocks, place[n]; false: some have none yet. */
+static PetscBool find_places(SbContactSystem c, const SbBlocks *b, PetscInt place[])
+{
+  PetscBool all = PETSC_TRUE;
+
+  for (PetscInt k = 0; k < b->n; k++) {
+    if (!k || b->node[k][0] != b->node[k - 1][0]) mark_row(c, b->node[k][0]);
+    place[k] = place_of(c, b->node[k][0], b->node[k][1]);
+    all = (PetscBool)(all && place[k] >= 0);
+  }
+  return all;
 }
 
 /* The values of both. */
@@ -217,23 +225,25 @@ static PetscErrorCode merge(SbContactSystem c, Mat K, const SbBlocks *b)
   c->nsolve++;
   PetscCall(PetscMalloc1(b->n, &place));
   for (PetscInt k = 0; k < b->n; k++) {
-    c->last[b->node[k][0]] = c->nsolve;
-    if (c->space->fixed[b->node[k][0]] != 7 && !rows->contact[b->node[k][0]]) missing = PETSC_TRUE;
-    place[k] = missing ? -1 : find_place(rows, b->node[k][0], b->node[k][1]);
-    if (place[k] < 0) missing = PETSC_TRUE;
+    const PetscInt r = b->node[k][0];
+
+    c->last[r] = c->nsolve;
+    missing = (PetscBool)(missing || (c->space->fixed[r] != 7 && !rows->contact[r]));
   }
+  if (!missing) missing = (PetscBool)!find_places(c, b, place);
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &missing, 1, SB_MPI_BOOL, MPI_LOR, c->space->comm));
   if (missing) {
     PetscCall(make_pattern(c, b));
-    for (PetscInt k = 0; k < b->n; k++) place[k] = find_place(rows, b->node[k][0], b->node[k][1]);
+    (void)find_places(c, b, place);
     for (PetscInt i = 0; i < rows->n; i++) nnode += rows->contact[i];
     PetscCallMPI(MPI_Allreduce(&nnode, &c->nnode, 1, MPIU_INT, MPI_SUM, c->space->comm));
     c->foreign[0] = c->foreign[1] = PETSC_TRUE;
   }
   PetscCall(SbSpaceGetRows(c->space, K, rows->n, c->all, c->ka, NULL, c->tangent));
   PetscCall(PetscArrayzero(rows->value, 9 * (size_t)rows->ia[rows->n]));
-  for (PetscInt k = 0; k < c->ka[rows->n]; k++)
-    PetscCall(PetscArraycpy(rows->value + 9 * (size_t)c->place[k], c->tangent + 9 * (size_t)k, 9));
+  for (PetscInt k = 0; k < c->ka[rows->n]; k++) {
+    for (int e = 0; e < 9; e++) rows->value[9 * (size_t)c->place[k] + e] = c->tangent[9 * (size_t)k + e];
+  }
   for (PetscInt k = 0; k < b->n; k++) {
     PetscReal *to = rows->value + 9 * (size_t)place[k];
 
@@ -385,6 +395,7 @@ PetscErrorCode SbContactSystemDestroy(SbContactSystem *system)
   PetscCall(MatDestroy(&c->A));
   PetscCall(SbBlockSolverDestroy(&c->factor));
   PetscCall(PetscFree3(c->all, c->ka, c->last));
+  PetscCall(PetscFree(c->where));
   PetscCall(PetscFree3(c->kj, c->place, c->tangent));
   PetscCall(PetscFree2(c->rows.ia, c->rows.contact));
   PetscCall(PetscFree2(c->rows.ja, c->used));
