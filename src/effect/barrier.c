@@ -123,8 +123,6 @@ static PetscErrorCode setup_barrier(SbEffect e, SbSpace s)
                          3 * (b->mesh->nvertex - b->mesh->nbody_vertex), &b->to));
   b->least = PETSC_MAX_REAL;
   b->shortest = 1.;
-  if (b->lags < 1)
-    b->lags = e->dynamic ? 1 : LAGS; /* what a run is, is not known before its effects are set up */
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
