@@ -16,9 +16,10 @@ typedef struct _p_SbPlan {
   PetscInt *
     offset; /* [nbatch][width^2][SB_BATCH] block (a, b) at width a + b: k in the diagonal part, ~k in the off-diagonal
                              part, SB_NOT_OWNED when row a is another rank's; padding lanes have those of the first */
-  PetscInt *ui; /* [nnode_owned+1] first upper block of each row, for SBAIJ; NULL otherwise */
+  PetscInt *ui;   /* [nnode_owned+1] first upper block of each row, for SBAIJ; NULL otherwise */
+  PetscInt npair; /* of blocks of a cell in upper: 10, or SB_PAIRS with a P2 body */
   PetscInt *
-    upper; /* [nbatch][10][SB_BATCH] block index in the upper triangle of pair p, ~k when it is to be transposed */
+    upper; /* [nbatch][npair][SB_BATCH] block index in the upper triangle of pair p, ~k when it is to be transposed */
   PetscInt *fresh_start; /* [nbatch+1] into fresh */
   PetscInt *fresh;       /* [nnode_owned] rows in the order in which the batches reach them first */
   PetscReal *face_term
@@ -62,10 +63,10 @@ typedef struct {
 /* Makes the functions of sbfem.h assemble A so. The table is borrowed and lives as long as A. Collective. */
 PetscErrorCode SbMatrixSetAssembly(Mat A, const SbAssembly *assembly);
 
-/* u[3 a + i][lane] of a batch from a local array [nnode][3]. */
-static inline void sb_gather(const PetscInt node[4 * SB_BATCH], const PetscReal x[], SbLane u[12])
+/* u[3 a + i][lane] of n nodes of a batch from a local array [nnode][3]. */
+SB_INLINE void sb_gather_nodes(int n, const PetscInt node[], const PetscReal x[], SbLane u[])
 {
-  for (int a = 0; a < 4; a++) {
+  for (int a = 0; a < n; a++) {
     for (int l = 0; l < SB_BATCH; l++) {
       const PetscReal *p = x + 3 * node[a * SB_BATCH + l];
 
@@ -74,6 +75,11 @@ static inline void sb_gather(const PetscInt node[4 * SB_BATCH], const PetscReal 
       u[3 * a + 2][l] = p[2];
     }
   }
+}
+
+static inline void sb_gather(const PetscInt node[4 * SB_BATCH], const PetscReal x[], SbLane u[12])
+{
+  sb_gather_nodes(4, node, x, u);
 }
 
 /* Longest side of a box: what a rotation of unit size is relative to. */
@@ -103,7 +109,7 @@ static inline void sb_gather_strain(SbSpace s, const SbRegion *region, PetscInt 
   if (region->broken) {
     SbLane p[12];
 
-    sb_gather(s->batch_clique + (8 * b + 4) * SB_BATCH, x, p);
+    sb_gather(s->batch_clique + (s->width * b + 4) * SB_BATCH, x, p);
     for (int k = 0; k < 12; k++) {
       for (int l = 0; l < SB_BATCH; l++)
         u[k][l] = p[k][l] + s->batch_weight[4 * b + k / 3][l] * (u[k][l] - p[k][l]);
@@ -111,11 +117,11 @@ static inline void sb_gather_strain(SbSpace s, const SbRegion *region, PetscInt 
   }
 }
 
-/* f[nnode][3] += the first n lanes of a batch's nodal vectors. */
-static inline void sb_scatter_add(const PetscInt node[4 * SB_BATCH], PetscInt n, const SbLane fe[12],
-                                  PetscReal f[])
+/* f[nnode][3] += the first n lanes of a batch's vectors at nnode nodes. */
+SB_INLINE void sb_scatter_nodes(int nnode, const PetscInt node[], PetscInt n, const SbLane fe[],
+                                PetscReal f[])
 {
-  for (int a = 0; a < 4; a++) {
+  for (int a = 0; a < nnode; a++) {
     for (PetscInt l = 0; l < n; l++) {
       PetscReal *p = f + 3 * node[a * SB_BATCH + l];
 
@@ -124,6 +130,12 @@ static inline void sb_scatter_add(const PetscInt node[4 * SB_BATCH], PetscInt n,
       p[2] += fe[3 * a + 2][l];
     }
   }
+}
+
+static inline void sb_scatter_add(const PetscInt node[4 * SB_BATCH], PetscInt n, const SbLane fe[12],
+                                  PetscReal f[])
+{
+  sb_scatter_nodes(4, node, n, fe, f);
 }
 
 /* The transpose of sb_gather_strain(): forces on the means go to the two nodes by their weights. */
@@ -141,7 +153,7 @@ static inline void sb_scatter_strain(SbSpace s, const SbRegion *region, PetscInt
         fe[k][l] = own;
       }
     }
-    sb_scatter_add(s->batch_clique + (8 * b + 4) * SB_BATCH, s->batch_n[b], (const SbLane *)p, f);
+    sb_scatter_add(s->batch_clique + (s->width * b + 4) * SB_BATCH, s->batch_n[b], (const SbLane *)p, f);
   }
   sb_scatter_add(s->batch_node + 4 * SB_BATCH * b, s->batch_n[b], (const SbLane *)fe, f);
 }

@@ -7,14 +7,23 @@
 #pragma once
 #include "sbmaterial.h"
 
-/* Pairs (a, b) with a <= b in the order of the ten blocks of a symmetric cell matrix. */
-static const int SbPairA[10] = {0, 0, 0, 0, 1, 1, 1, 2, 2, 3};
-static const int SbPairB[10] = {0, 1, 2, 3, 1, 2, 3, 2, 3, 3};
+#define SB_CELL_NODES 10 /* of a cell at most: P2 has them at its vertices, then at its edges */
+#define SB_PAIRS 55
+/* Pairs (a, b) with a <= b in the order of the blocks of a symmetric cell matrix: ten with four nodes, P2 has all. */
+static const int SbPairA[SB_PAIRS] = {0, 0, 0, 0, 1, 1, 1, 2, 2, 3, 0, 1, 2, 3, 4, 0, 1, 2, 3,
+                                      4, 5, 0, 1, 2, 3, 4, 5, 6, 0, 1, 2, 3, 4, 5, 6, 7, 0, 1,
+                                      2, 3, 4, 5, 6, 7, 8, 0, 1, 2, 3, 4, 5, 6, 7, 8, 9};
+static const int SbPairB[SB_PAIRS] = {0, 1, 2, 3, 1, 2, 3, 2, 3, 3, 4, 4, 4, 4, 4, 5, 5, 5, 5,
+                                      5, 5, 6, 6, 6, 6, 6, 6, 6, 7, 7, 7, 7, 7, 7, 7, 7, 8, 8,
+                                      8, 8, 8, 8, 8, 8, 8, 9, 9, 9, 9, 9, 9, 9, 9, 9, 9};
+/* Vertices of the edges of a cell: P2's node 4 + e is at the middle of edge e. */
+static const int SbTetEdge[6][2] = {{0, 1}, {0, 2}, {0, 3}, {1, 2}, {1, 3}, {2, 3}};
 
 /*
-  SbElement - what distinguishes one element from another. All are linear in a cell and have four nodes there: P1 at the vertices, CR
-  and DG at the centroids of the faces, node a opposite vertex a. CR shares a node between the two cells of a face; in DG each
-  cell has its own. They differ in `tabulate`, in the mass, and in the face terms (src/fem/jump.c).
+  SbElement - what distinguishes one element from another. P1, CR and DG are linear in a cell and have four nodes there: P1 at the
+  vertices, CR and DG at the centroids of the faces, node a opposite vertex a. CR shares a node between the two cells of a face; in DG
+  each cell has its own. They differ in `tabulate`, in the mass, and in the face terms (src/fem/jump.c). P2 is quadratic: it has six
+  more nodes at the edges, and is a P1 cell at each of its points (src/element/p2.c).
 */
 typedef struct _p_SbElement *SbElement;
 typedef struct {
@@ -23,7 +32,8 @@ typedef struct {
      gives gradients that are not finite: the mesh refuses it before. */
   void (*tabulate)(const PetscReal x[4][3], PetscReal g[3][3], PetscReal *V);
   /* mass of a cell / (density V): lumped share of each node, and consistent M_aa, M_ab */
-  PetscReal mass_lumped, mass_diagonal, mass_coupling; /* P1: 1/4, 1/10, 1/20 */
+  PetscReal mass_lumped, mass_diagonal, mass_coupling; /* P1: 1/4, 1/10, 1/20; P2: SbQuadraticMass() */
+  PetscReal mass_lumped_edge;                          /* P2: of a node at an edge */
   PetscReal vertex[4]
                   [4]; /* value of basis function a at vertex v of the cell: vertex[v][a]. P1: the identity */
 } SbElementOps;
@@ -33,6 +43,7 @@ struct _p_SbElement {
   PetscInt nodes_per[4]; /* nodes per vertex, edge, face, cell. P1: 1,0,0,0; CR: 0,0,1,0; DG: 0,0,0,4 */
   PetscReal gamma0;      /* DG: factor on the penalty of mean jumps */
   PetscReal gamma1;      /* CR and DG: factor on the penalty of jumps */
+  PetscBool mean_volume; /* P2: the volumetric part of the energy is that of the mean of the cell */
   PetscBool weak; /* DG: a prescribed boundary face gets a node of its own, to which the cell is tied */
   SbElementOps ops;
 };
@@ -72,3 +83,23 @@ void SbCellBlocksSpin(const SbLane g[9], const SbLane V, PetscReal lambda, Petsc
                       const SbLane W[9], SbLane K[10][9]);
 /* The same for a full tangent C, symmetric in the pairs: K_ab,ik = V C_(ij)(kl) grad phi_a,j grad phi_b,l. */
 void SbCellBlocksGeneral(const SbLane g[9], const SbLane V, const SbLane C[81], SbLane K[10][9]);
+
+/* ------------------------------------------------------------------ P2, src/element/p2.c */
+
+/* Points by their barycentric coordinates, with their parts of the volume. */
+typedef struct {
+  int n;
+  PetscReal L[5][4], weight[5];
+} SbPointRule;
+extern const SbPointRule SbRuleQuadratic; /* degree 2: where stresses are taken */
+extern const SbPointRule SbRuleCubic;     /* degree 3 */
+/* u[12] at the vertices of the P1 cell that has the gradient of U[30] at L. And the transpose: F[30] += what f[12] on that cell is. */
+void SbQuadraticAt(const PetscReal L[4], const SbLane U[30], SbLane u[12]);
+void SbQuadraticAdd(const PetscReal L[4], const SbLane f[12], SbLane F[30]);
+/* K[p] for p = 0..54 from the ten blocks of P1 at the four points of SbRuleQuadratic. */
+void SbQuadraticBlocks(const SbLane B[4][10][9], SbLane K[SB_PAIRS][9]);
+/* K += weight d^2(det F)/du^2 at L; g as for P1, F there. */
+void SbQuadraticAddJacobian(const PetscReal L[4], const SbLane g[9], const SbLane F[9], const SbLane weight,
+                            SbLane K[SB_PAIRS][9]);
+/* Consistent mass M_ab of a cell / (density V), a, b = 0..9. */
+PetscReal SbQuadraticMass(int a, int b);

@@ -26,7 +26,10 @@ typedef struct {
   PetscInt cstart, cend; /* local cells */
   PetscInt bstart, bend; /* batches; the last one may be partly filled */
   PetscBool owned;
-  PetscBool broken; /* DG: strains come from the means of the two sides of each face */
+  PetscBool broken;    /* DG: strains come from the means of the two sides of each face */
+  PetscBool quadratic; /* P2: each point of SbRuleQuadratic has a strain of its own */
+  SbMaterial
+    pointwise; /* P2: the law at the points, which has no volumetric part where that is of the mean of the cell; borrowed */
   PetscReal alpha,
     beta; /* Rayleigh damping C = alpha M + beta K, 1/s and s; 0 unless an effect set them at set-up */
 } SbRegion;
@@ -46,15 +49,19 @@ struct _p_SbSpace {
   PetscInt Nnode, nnode_owned, nnode;
   PetscInt gnode_start;
   PetscInt *gnode;     /* [nnode] global node numbers; owned first, ghosts ascending */
-  PetscInt *cell_node; /* [ncell][4] local nodes */
-  PetscReal *node_x;   /* [nnode][3] rest position of each node, m */
+  PetscInt *cell_node; /* [ncell][4] local nodes; of P2 those at the vertices */
+  PetscInt
+    *edge_node;      /* [ncell][6] local nodes of P2 cells at their edges, -1: none; NULL without a P2 body */
+  PetscReal *node_x; /* [nnode][3] rest position of each node, m */
   PetscInt *
     node_orig; /* [nnode] number that no partition changes, right on owned nodes: vert_orig of a vertex, Nvert +
-                          4 cell_orig + a of node a of a cell, the lower of the two that share it; 4 Ncell more for its support */
+                          4 cell_orig + a of node a of a cell, the lower of the two that share it; 4 Ncell more for its support; Nvert + 8 Ncell + 6 cell_orig
+                          + e of edge e, the lowest of those that share it */
   PetscInt *node_body; /* [nnode] */
   uint64_t *
     node_set; /* [nnode] SB_SET_BIT(k) when constrained with set k: a face with a support is constrained there */
-  PetscBool faces;     /* some body has its nodes at faces; if not, nodes are the mesh's vertices */
+  PetscBool faces;     /* some body has its nodes at faces */
+  PetscBool vertices;  /* all have them at vertices only: nodes are the mesh's vertices */
   PetscInt *neighbour; /* [ncell][4] local cell across each face, -1: none; NULL without face nodes */
   PetscInt *
     dirichlet_node; /* [ncell][4] node without mass that a prescribed boundary face of a DG cell is tied to, -1: none; NULL without any */
@@ -66,13 +73,14 @@ struct _p_SbSpace {
   PetscInt *batch_cell; /* [nbatch] first local cell */
   PetscInt *batch_n;    /* [nbatch] cells in it, 1..SB_BATCH */
   PetscInt *batch_node; /* [nbatch][4][SB_BATCH] local nodes (padding repeats the first cell) */
-  PetscInt width;       /* nodes that the stress of a cell acts on: 4, or 8 with a DG body */
+  PetscInt
+    width; /* nodes that the stress of a cell acts on, at most: 4, 8 with a DG body, 10 with a P2 body */
   PetscInt *
-    batch_clique; /* [nbatch][width][SB_BATCH] these nodes: the four of batch_node, then those across the faces
-                                (again its own where there is no other); batch_node itself when width is 4 */
-  SbLane
-    *batch_weight; /* [nbatch][4] weight of a cell's own node in the mean of the two; NULL when width is 4 */
-  SbJump jump;     /* NULL without face nodes */
+    batch_clique; /* [nbatch][width][SB_BATCH] these nodes: the four of batch_node, then those across the faces, or those of P2
+                                at the edges (again its own where there is no other); batch_node itself when width is 4 */
+  SbLane *
+    batch_weight; /* [nbatch][4] weight of a cell's own node in the mean of the two; NULL without a DG body */
+  SbJump jump;    /* NULL without face nodes */
   SbNodalConstraints nodal;  /* NULL unless an effect may constrain nodes along directions of their own */
   SbConstraints constraints; /* NULL unless an effect may join nodes by constraints */
   PetscBool coupled;         /* an effect may couple nodes that share no cell, in an assembled tangent */
@@ -80,6 +88,8 @@ struct _p_SbSpace {
   SbLane *batch_V;           /* [nbatch] volumes, m^3; 0 in padding; 64-byte aligned */
   void *batch_memory;        /* what batch_g and batch_V live in */
   PetscReal *node_mass;      /* [nnode] lumped mass, kg, complete on owned nodes */
+  PetscReal *
+    node_share; /* [nnode] integral of density times phi_a, kg, likewise; node_mass itself without a P2 body */
   PetscBool consistent_mass; /* -mass consistent */
   PetscBool
     tentative; /* the tangent in use may be indefinite, and a solve that fails is repeated with a definite one: no reason to change the solver */
@@ -127,7 +137,7 @@ PetscErrorCode SbSpaceCreateMatrix(SbSpace space, SbMatrixKind kind, Mat *A);
 PetscErrorCode SbSpaceAssembleTangent(SbSpace space, const SbStage *stage, Mat A);
 /* Replaces rows and columns of prescribed unknowns by a scaled identity and closes the assembly. */
 PetscErrorCode SbSpaceFinishTangent(SbSpace space, Mat A);
-/* Between the two: A += a 3x3 block (row-major, N/m) for two nodes a, b = 0..3 of a local cell. Not collective. */
+/* Between the two: A += a 3x3 block (row-major, N/m) for two nodes a, b of a local cell, as SbSpaceCellNode() numbers them. Not collective. */
 PetscErrorCode SbSpaceAddCellBlock(SbSpace space, Mat A, PetscInt cell, PetscInt a, PetscInt b,
                                    const PetscReal block[9]);
 /* The same for a spring from node a to something rigid, which may be all that supports a body: it reaches the coarse spaces of
@@ -268,6 +278,11 @@ typedef struct {
 static inline SbElement SbSpaceCellElement(SbSpace space, PetscInt cell)
 {
   return space->element[space->mesh->cell_body[cell]];
+}
+/* Node a = 0..9 of a P2 cell, 0..3 of another one. */
+static inline PetscInt SbSpaceCellNode(SbSpace space, PetscInt cell, PetscInt a)
+{
+  return a < 4 ? space->cell_node[4 * cell + a] : space->edge_node[6 * cell + a - 4];
 }
 /* All local boundary facets (of owned and ghost cells) in set k of the mesh. Allocated here; PetscFree. */
 PetscErrorCode SbSpaceGetSetFacets(SbSpace space, PetscInt k, PetscInt *n, SbFacet **facets);

@@ -54,6 +54,10 @@ typedef struct {
   /* D = d theta/dF (pressure, above): the tangent holds lambda D D^T, and nothing else of it grows with lambda but the stress.
      At rest D = I. With a frame or a spin D is their R. */
   void (*volumetric)(const struct _p_SbMaterial *m, const SbLane F[9], SbLane D[9]);
+  /* C += p d^2 theta/dF^2 (C as in tangent), for the derivative of a pressure p (Pa, tension) that does not come from F alone; with the
+     filtered tangent only where that is not negative. NULL: it vanishes, or it is in W of spin, which is proportional to lambda theta -
+     2 mu. */
+  void (*curvature)(const struct _p_SbMaterial *m, const SbLane F[9], const SbLane p, SbLane C[81]);
   PetscErrorCode (*destroy)(SbMaterial m);
 } SbMaterialOps;
 
@@ -66,7 +70,10 @@ struct _p_SbMaterial {
   PetscBool linear;    /* stress is linear in F: K is constant */
   PetscBool symmetric; /* always true for hyperelastic laws */
   PetscBool adaptive;  /* -body_NAME_tangent auto: the solver of a step chooses between the two exact ones */
+  PetscBool
+    jacobian; /* theta is J - 1, cubic in the displacement; of the other laws it is at most quadratic */
   SbTangentKind tangent; /* what ops.frame or ops.tangent hands out */
+  SbMaterial shear;      /* SbMaterialGetShear(); NULL until it is asked for; owned */
   void *data;
 };
 
@@ -92,6 +99,9 @@ PetscErrorCode SbMaterialCreateElastic(const char *law, PetscReal E, PetscReal n
                                        SbMaterial *m);
 /* Chooses the tangent. Error: PETSC_ERR_USER when the law does not have it. */
 PetscErrorCode SbMaterialSetTangent(SbMaterial m, SbTangentKind kind);
+/* The same law without its volumetric part, psi_mu (SbMaterialOps.pressure): lambda = 0. Its tangent follows that of m, which owns it. Not
+   collective. */
+PetscErrorCode SbMaterialGetShear(SbMaterial m, SbMaterial *shear);
 PetscErrorCode SbMaterialDestroy(SbMaterial *m);
 /* Modulus of the fastest wave at rest, rho c^2 = lambda + 2 mu, Pa: the stiffest answer to a change of one length. */
 SB_INLINE PetscReal SbMaterialWaveModulus(const struct _p_SbMaterial *m)

@@ -61,12 +61,13 @@ typedef struct {
                                          n cells along the shortest side; groups xmin xmax ymin ymax zmin zmax */
   PetscInt
     mesh_step; /* of a file that a run wrote: the step whose positions are the mesh; 0 at rest, -1 the last */
-  PetscReal scale;               /* factor on the file's coordinates, first */
-  PetscReal rotate[4];           /* axis (need not be normed) and angle in degrees, second */
-  PetscReal translate[3];        /* m, third */
-  SbTetOptions tet;              /* for a mesh that is a surface; m */
-  char element[SB_NAME_MAX];     /* p1, cr, dg */
-  PetscBool face_nodes;          /* the element has its nodes at faces: every cell of the overlap is needed */
+  PetscReal scale;           /* factor on the file's coordinates, first */
+  PetscReal rotate[4];       /* axis (need not be normed) and angle in degrees, second */
+  PetscReal translate[3];    /* m, third */
+  SbTetOptions tet;          /* for a mesh that is a surface; m */
+  char element[SB_NAME_MAX]; /* p1, p2, cr, dg */
+  PetscBool
+    other_nodes; /* the element has nodes elsewhere than at vertices: every cell of the overlap is needed */
   char material[SB_NAME_MAX];    /* linear | corotated | stvk | neohookean */
   PetscReal density;             /* kg/m^3 */
   PetscReal velocity[3];         /* initial velocity of the centre of mass, m/s */
@@ -116,7 +117,7 @@ typedef struct {
 
 /*
   SbMesh - this rank's part of the mesh. Own numbering: vertices and cells owned by this rank first, then the ghosts
-  that touch them: every cell with an owned vertex is here. With nodes at faces every cell that shares a vertex with an owned
+  that touch them: every cell with an owned vertex is here. With nodes at faces or edges every cell that shares a vertex with an owned
   cell is here; else no ghost cell without an owned vertex. Constant after creation.
 */
 typedef struct _p_SbMesh *SbMesh;
@@ -170,6 +171,12 @@ PetscErrorCode SbMeshDestroy(SbMesh *mesh);
   Not collective. Output: neighbour[ncell][4], -1 on the boundary and where the other cell is not on this rank; PetscFree().
 */
 PetscErrorCode SbMeshNeighbours(SbMesh mesh, PetscInt **neighbour);
+/*
+  SbMeshEdges - edges of the local cells, each once.
+
+  Not collective. Output: nedge; edge[ncell][6] number of each edge of a cell, between vertices 01 02 03 12 13 23; PetscFree().
+*/
+PetscErrorCode SbMeshEdges(SbMesh mesh, PetscInt *nedge, PetscInt **edge);
 /* Brings the n numbers of each owned cell to its ghost copies: value[ncell][n]. Collective. */
 PetscErrorCode SbMeshBroadcastCells(SbMesh mesh, PetscInt n, MPI_Datatype type, void *value);
 /* The same for vertices, value[nvert][n]. */

@@ -63,6 +63,7 @@ static const Part parts[] = {
   {"effect", "contact", PART_FLOOR "-effects floor,contact -effect_contact_response projected", PART_BLOCK,
    NULL, PETSC_FALSE}, /* implicit only; with an obstacle and between bodies */
   {"element", "p1", "", NULL, NULL, PETSC_FALSE},
+  {"element", "p2", "-body_bar_element p2", PART_ELEMENT, NULL, PETSC_TRUE},
   {"element", "cr", "-body_bar_element cr", PART_ELEMENT, NULL, PETSC_TRUE},
   {"element", "dg", "-body_bar_element dg", PART_ELEMENT, NULL, PETSC_TRUE},
   {"material", "linear", "-body_bar_material linear", NULL, NULL, PETSC_TRUE},

@@ -1,12 +1,13 @@
 /*
-  deadload.c - a force per volume or area integrated against linear basis functions.
+  deadload.c - a force per volume or area integrated against the basis functions.
 
   f_a = integral of psi_a q(X, t) over each cell (or facet), at the rest position. With the barycentric coordinates b_c
   of the corners c one loop serves tetrahedra and triangles:
 
     l_c += |T| sum_k w_k b_kc q(sum_d b_kd X_d, t),   f_a = sum_c psi_a(X_c) l_c,
 
-  psi_a the basis of the element, of which b_c are the combinations (for P1 they are the same).
+  psi_a the basis of the element, of which b_c are the combinations (for P1 they are the same). P2's own basis b_c (2 b_c - 1), 4 b_c b_d is
+  integrated as it is, with one function for each corner and each edge between corners.
 
   Rules, both with positive weights, inner points and degree 5, hence exact for q of degree 4: 14 points on
   the tetrahedron (Walkington, "Quadrature on simplices of arbitrary dimension", 2000), 7 points on the
@@ -21,7 +22,8 @@
 struct _p_SbDeadLoad {
   PetscInt ncorner, nitem;
   PetscInt *corner; /* [nitem][ncorner] 4 cell + vertex of the cell; NULL once a steady load was integrated */
-  PetscInt *slot;   /* [nitem][4] index into node of the cell's nodes, -1: not touched; NULL likewise */
+  PetscInt nslot;   /* nodes of a cell, at most: 4, or 10 with a P2 body */
+  PetscInt *slot;   /* [nitem][nslot] index into node of the cell's nodes, -1: not touched; NULL likewise */
   SbSpace space;    /* borrowed */
   PetscInt n, nowned;
   PetscInt *node;       /* [n] local nodes, ascending, so owned ones first */
@@ -83,19 +85,18 @@ static PetscReal simplex_measure(PetscInt ncorner, const PetscReal *const x[4])
   return PetscAbsReal(n[0] * e[2][0] + n[1] * e[2][1] + n[2] * e[2][2]) / 6;
 }
 
-/* l[ncorner][3] of one item: what its barycentric coordinates receive. */
-static void integrate_item(SbDeadLoad load, PetscReal t, PetscInt npoint, PetscReal (*const b)[4],
-                           const PetscReal w[], const PetscInt corner[], PetscReal l[4][3])
+/* l of one item: what its barycentric coordinates receive, [ncorner]; quadratic: its nodes of P2, [10], as the cell numbers them. */
+static void integrate_item(SbDeadLoad load, PetscReal t, PetscBool quadratic, PetscInt npoint,
+                           PetscReal (*const b)[4], const PetscReal w[], const PetscInt corner[],
+                           PetscReal l[SB_CELL_NODES][3])
 {
   const PetscInt nc = load->ncorner;
   const SbMesh mesh = load->space->mesh;
   const PetscReal *x[4];
   PetscReal measure;
 
-  for (PetscInt c = 0; c < nc; c++) {
-    x[c] = &mesh->x[3 * mesh->cell[corner[c]]];
-    for (int i = 0; i < 3; i++) l[c][i] = 0;
-  }
+  for (int k = 0; k < 3 * SB_CELL_NODES; k++) l[k / 3][k % 3] = 0;
+  for (PetscInt c = 0; c < nc; c++) x[c] = &mesh->x[3 * mesh->cell[corner[c]]];
   measure = simplex_measure(nc, x);
   for (PetscInt k = 0; k < npoint; k++) {
     PetscReal p[3] = {0, 0, 0}, q[3];
@@ -104,8 +105,19 @@ static void integrate_item(SbDeadLoad load, PetscReal t, PetscInt npoint, PetscR
       for (int i = 0; i < 3; i++) p[i] += b[k][c] * x[c][i];
     }
     for (int i = 0; i < 3; i++) q[i] = measure * w[k] * SbFormulaEval(load->density[i], t, p);
-    for (PetscInt c = 0; c < nc; c++) {
+    for (PetscInt c = 0; c < nc && !quadratic; c++) {
       for (int i = 0; i < 3; i++) l[c][i] += b[k][c] * q[i];
+    }
+    if (quadratic) {
+      PetscReal L[4] = {0, 0, 0, 0};
+
+      for (PetscInt c = 0; c < nc; c++) L[corner[c] % 4] = b[k][c];
+      for (int a = 0; a < SB_CELL_NODES; a++) {
+        const PetscReal phi =
+          a < 4 ? L[a] * (2 * L[a] - 1) : 4 * L[SbTetEdge[a - 4][0]] * L[SbTetEdge[a - 4][1]];
+
+        for (int i = 0; i < 3; i++) l[a][i] += phi * q[i];
+      }
     }
   }
 }
@@ -120,14 +132,17 @@ static void integrate(SbDeadLoad load, PetscReal t)
   for (PetscInt i = 0; i < 3 * load->n; i++) load->value[i] = 0;
   for (PetscInt item = 0; item < load->nitem; item++) {
     const PetscInt *corner = &load->corner[nc * item];
-    const SbElementOps *e = &SbSpaceCellElement(load->space, corner[0] / 4)->ops;
-    PetscReal l[4][3];
+    const SbElement element = SbSpaceCellElement(load->space, corner[0] / 4);
+    const SbElementOps *e = &element->ops;
+    const PetscBool quadratic = (PetscBool)(element->nodes_per[1] > 0);
+    PetscReal l[SB_CELL_NODES][3];
 
-    integrate_item(load, t, npoint, b, w, corner, l);
-    for (PetscInt a = 0; a < 4; a++) {
-      const PetscInt slot = load->slot[4 * item + a];
+    integrate_item(load, t, quadratic, npoint, b, w, corner, l);
+    for (PetscInt a = 0; a < load->nslot; a++) {
+      const PetscInt slot = load->slot[load->nslot * item + a];
 
-      for (PetscInt c = 0; slot >= 0 && c < nc; c++) {
+      for (int i = 0; quadratic && slot >= 0 && i < 3; i++) load->value[3 * slot + i] += l[a][i];
+      for (PetscInt c = 0; !quadratic && slot >= 0 && c < nc; c++) {
         for (int i = 0; i < 3; i++) load->value[3 * slot + i] += e->vertex[corner[c] % 4][a] * l[c][i];
       }
     }
@@ -143,15 +158,21 @@ static PetscErrorCode find_nodes(SbDeadLoad load)
 
   PetscFunctionBeginUser;
   PetscCall(PetscCalloc1(space->nnode, &at));
-  PetscCall(PetscMalloc1(4 * load->nitem, &load->slot));
-  for (PetscInt k = 0; k < 4 * load->nitem; k++) {
-    const PetscInt *corner = &load->corner[load->ncorner * (k / 4)];
-    const SbElementOps *e = &SbSpaceCellElement(space, corner[0] / 4)->ops;
+  load->nslot = space->edge_node ? SB_CELL_NODES : 4;
+  PetscCall(PetscMalloc1(load->nslot * load->nitem, &load->slot));
+  for (PetscInt k = 0; k < load->nslot * load->nitem; k++) {
+    const PetscInt *corner = &load->corner[load->ncorner * (k / load->nslot)], cell = corner[0] / 4,
+                   a = k % load->nslot;
+    const SbElement element = SbSpaceCellElement(space, cell);
+    int ends = 0;
 
     load->slot[k] = -1;
     for (PetscInt c = 0; c < load->ncorner; c++) {
-      if (e->vertex[corner[c] % 4][k % 4] != 0) load->slot[k] = space->cell_node[corner[0] / 4 * 4 + k % 4];
+      if (a < 4 && element->ops.vertex[corner[c] % 4][a] != 0)
+        load->slot[k] = SbSpaceCellNode(space, cell, a);
+      if (a >= 4) ends += corner[c] % 4 == SbTetEdge[a - 4][0] || corner[c] % 4 == SbTetEdge[a - 4][1];
     }
+    if (ends == 2 && element->nodes_per[1]) load->slot[k] = SbSpaceCellNode(space, cell, a);
     if (load->slot[k] >= 0) at[load->slot[k]] = 1;
   }
   for (PetscInt i = 0; i < space->nnode; i++) load->n += at[i];
@@ -163,7 +184,7 @@ static PetscErrorCode find_nodes(SbDeadLoad load)
     load->node[load->n++] = i;
     if (i < space->nnode_owned) load->nowned = load->n;
   }
-  for (PetscInt k = 0; k < 4 * load->nitem; k++) {
+  for (PetscInt k = 0; k < load->nslot * load->nitem; k++) {
     if (load->slot[k] >= 0) load->slot[k] = at[load->slot[k]];
   }
   PetscCall(PetscFree(at));

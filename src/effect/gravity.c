@@ -1,8 +1,8 @@
 /*
   gravity.c - a uniform acceleration field on all bodies.
 
-  f_a = s(t) m_a g with the lumped mass m_a of each node. For linear elements a row of the consistent mass
-  matrix sums to m_a, so M g is the same vector for both kinds of mass.
+  f_a = s(t) m_a g, with the mass matrix of the run, so that a body falls without strain. For linear elements a row of the consistent mass
+  matrix sums to the lumped mass m_a of the node. For P2 it does not: static runs, and those with the consistent mass, have its row sums.
 */
 #include "effect_impl.h"
 
@@ -30,11 +30,12 @@ static PetscErrorCode force_gravity(SbEffect e, SbSpace space, const SbStage *st
 {
   const Gravity *gravity = (const Gravity *)e->data;
   const PetscReal s = SbFormulaEval(gravity->time, stage->t, NULL);
+  const PetscReal *mass = space->consistent_mass || !e->dynamic ? space->node_share : space->node_mass;
   const PetscReal g[3] = {s * gravity->g[0], s * gravity->g[1], s * gravity->g[2]};
 
   PetscFunctionBeginUser;
   for (PetscInt i = 0; i < space->nnode_owned; i++) {
-    for (int c = 0; c < 3; c++) f[3 * i + c] += space->node_mass[i] * g[c];
+    for (int c = 0; c < 3; c++) f[3 * i + c] += mass[i] * g[c];
   }
   PetscCall(PetscLogFlops(6.0 * (PetscLogDouble)space->nnode_owned));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -25,6 +25,12 @@
   exactly, facet by facet, dN = sum_b w_b x c_b, and the matrix preconditions. With contact the symmetric part stays in the matrix, for want
   of a method for both.
 
+  A facet of P2 has six nodes and is curved once it moves. With X, Y its derivatives along two of its barycentric coordinates, and phi_a its basis,
+
+    f_a = -p int phi_a X x Y,   symmetric part of -df_a/dx_b: p/2 int (phi_a phi_b,Y - phi_b phi_a,Y) [X]x - (phi_a phi_b,X - phi_b phi_a,X) [Y]x,
+
+  integrated by a rule of degree 5 (polynomials of degree 4).
+
   With follower = no the pressure acts on the rest area and normal, as small-strain theory has it; then there
   is no tangent.
 */
@@ -133,6 +139,140 @@ static inline void add_to_corners(SbSpace space, const SbFacet *facet, PetscReal
   }
 }
 
+static inline PetscBool quadratic(SbSpace space, const SbFacet *facet)
+{
+  return (PetscBool)(SbSpaceCellElement(space, facet->cell)->nodes_per[1] > 0);
+}
+
+/* Radon's rule: where a facet of P2 is integrated, with values and derivatives of its basis. */
+#define NPOINT 7
+typedef struct {
+  PetscReal weight;              /* times half, the area of the triangle of the coordinates */
+  PetscReal phi[6], along[2][6]; /* at the corners, then between corners 01, 12, 20 */
+} FacetPoint;
+
+static void facet_points(FacetPoint point[NPOINT])
+{
+  const PetscReal s = PetscSqrtReal(15.0), a[2] = {(6 - s) / 21, (6 + s) / 21},
+                  w[2] = {(155 - s) / 2400, (155 + s) / 2400};
+
+  for (int n = 0; n < NPOINT; n++) {
+    PetscReal L[3] = {1. / 3, 1. / 3, 1. / 3};
+    FacetPoint *p = &point[n];
+
+    p->weight = n < 6 ? w[n / 3] : 9. / 80;
+    for (int c = 0; n < 6 && c < 3; c++) L[c] = c == n % 3 ? 1 - 2 * a[n / 3] : a[n / 3];
+    for (int c = 0; c < 3; c++) {
+      const int d = (c + 1) % 3;
+
+      p->phi[c] = L[c] * (2 * L[c] - 1);
+      p->phi[3 + c] = 4 * L[c] * L[d];
+      /* along the edges from corner 0 to 1, and to 2 */
+      for (int k = 0; k < 2; k++) {
+        const PetscReal dc = c == 0 ? -1 : c == k + 1, dd = d == 0 ? -1 : d == k + 1;
+
+        p->along[k][c] = (4 * L[c] - 1) * dc;
+        p->along[k][3 + c] = 4 * (L[c] * dd + L[d] * dc);
+      }
+    }
+  }
+}
+
+/* The nodes of a P2 facet in their cell, and the derivatives X, Y at a point. */
+static void facet_nodes(const SbFacet *facet, int node[6])
+{
+  for (int c = 0; c < 3; c++) {
+    const int a = (int)facet->corner[c], b = (int)facet->corner[(c + 1) % 3];
+
+    node[c] = a;
+    node[3 + c] = 4;
+    for (int e = 0; e < 6; e++) {
+      if (SbTetEdge[e][0] == PetscMin(a, b) && SbTetEdge[e][1] == PetscMax(a, b)) node[3 + c] = 4 + e;
+    }
+  }
+}
+
+static void facet_sides(SbSpace space, const SbFacet *facet, const int node[6], const FacetPoint *point,
+                        const PetscReal u[], PetscReal side[2][3])
+{
+  for (int k = 0; k < 6; k++) side[k / 3][k % 3] = 0;
+  for (int a = 0; a < 6; a++) {
+    const PetscInt n = SbSpaceCellNode(space, facet->cell, node[a]);
+
+    for (int i = 0; i < 3; i++) {
+      const PetscReal x = space->node_x[3 * n + i] + (u ? u[3 * n + i] : 0);
+
+      side[0][i] += point->along[0][a] * x;
+      side[1][i] += point->along[1][a] * x;
+    }
+  }
+}
+
+/* f -= p phi_a X x Y */
+static void add_quadratic(SbSpace space, const SbFacet *facet, const FacetPoint point[NPOINT],
+                          const PetscReal u[], PetscReal p, PetscReal f[])
+{
+  int node[6];
+
+  facet_nodes(facet, node);
+  for (int q = 0; q < NPOINT; q++) {
+    PetscReal side[2][3], N[3];
+
+    facet_sides(space, facet, node, &point[q], u, side);
+    SbCross(side[0], side[1], N);
+    for (int a = 0; a < 6; a++) {
+      const PetscInt n = SbSpaceCellNode(space, facet->cell, node[a]);
+
+      for (int i = 0; i < 3; i++) f[3 * n + i] -= p * point[q].weight * point[q].phi[a] * N[i];
+    }
+  }
+}
+
+/* [c]x */
+static inline void cross_block(const PetscReal c[3], PetscReal block[9])
+{
+  block[0] = block[4] = block[8] = 0;
+  block[1] = -c[2];
+  block[2] = c[1];
+  block[3] = c[2];
+  block[5] = -c[0];
+  block[6] = -c[1];
+  block[7] = c[0];
+}
+
+static PetscErrorCode add_quadratic_tangent(SbSpace space, const SbFacet *facet,
+                                            const FacetPoint point[NPOINT], const PetscReal u[], PetscReal p,
+                                            Mat A)
+{
+  PetscReal c[6][6][3] = {{{0}}}, block[9];
+  int node[6];
+
+  PetscFunctionBeginUser;
+  facet_nodes(facet, node);
+  for (int q = 0; q < NPOINT; q++) {
+    const FacetPoint *at = &point[q];
+    PetscReal side[2][3];
+
+    facet_sides(space, facet, node, at, u, side);
+    for (int a = 0; a < 6; a++) {
+      for (int b = 0; b < 6; b++) {
+        const PetscReal y = at->phi[a] * at->along[1][b] - at->phi[b] * at->along[1][a],
+                        x = at->phi[a] * at->along[0][b] - at->phi[b] * at->along[0][a];
+
+        for (int i = 0; i < 3; i++) c[a][b][i] += 0.5 * p * at->weight * (y * side[0][i] - x * side[1][i]);
+      }
+    }
+  }
+  for (int a = 0; a < 6; a++) {
+    for (int b = 0; b < 6; b++) {
+      if (a == b) continue;
+      cross_block(c[a][b], block);
+      PetscCall(SbSpaceAddCellBlock(space, A, facet->cell, node[a], node[b], block));
+    }
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Whether it meets no other facet at its edges, and its tangent is applied beside the matrix. */
 static inline PetscBool apart(SbSpace space, const SbFacet *facet)
 {
@@ -144,8 +284,10 @@ static PetscErrorCode force_pressure(SbEffect e, SbSpace space, const SbStage *s
   const Pressure *load = (const Pressure *)e->data;
   const PetscReal p = SbFormulaEval(load->value, stage->t, NULL) * SbFormulaEval(load->time, stage->t, NULL);
   const PetscReal *u = load->follower ? stage->u : NULL;
+  FacetPoint point[NPOINT];
 
   PetscFunctionBeginUser;
+  facet_points(point);
   for (PetscInt b = 0; b < space->mesh->nbody; b++) {
     if (load->whole[b]) SbSpaceAddVolumeForce(space, b, u, -p, f);
   }
@@ -153,6 +295,10 @@ static PetscErrorCode force_pressure(SbEffect e, SbSpace space, const SbStage *s
     const SbFacet *facet = &load->facet[k];
     PetscReal x[3][3], d[3], b[3], N[3];
 
+    if (quadratic(space, facet)) {
+      add_quadratic(space, facet, point, u, p, f);
+      continue;
+    }
     corners(space, facet, u, x);
     for (int i = 0; i < 3; i++) {
       d[i] = x[1][i] - x[0][i];
@@ -181,13 +327,7 @@ static void facet_block(const SbElementOps *e, const SbFacet *facet, PetscReal p
       for (int i = 0; k != l && i < 3; i++) d[i] -= weight * p / 12 * (c[l][i] - c[k][i]);
     }
   }
-  block[0] = block[4] = block[8] = 0;
-  block[1] = -d[2];
-  block[2] = d[1];
-  block[3] = d[2];
-  block[5] = -d[0];
-  block[6] = -d[1];
-  block[7] = d[0];
+  cross_block(d, block);
 }
 
 static PetscErrorCode tangent_pressure(SbEffect e, SbSpace space, const SbStage *stage, Mat A)
@@ -195,8 +335,10 @@ static PetscErrorCode tangent_pressure(SbEffect e, SbSpace space, const SbStage 
   const Pressure *load = (const Pressure *)e->data;
   const PetscReal p =
     stage->shift_k * SbFormulaEval(load->value, stage->t, NULL) * SbFormulaEval(load->time, stage->t, NULL);
+  FacetPoint point[NPOINT];
 
   PetscFunctionBeginUser;
+  facet_points(point);
   if (p == 0) PetscFunctionReturn(PETSC_SUCCESS);
   for (PetscInt b = 0; b < space->mesh->nbody; b++) {
     if (load->whole[b]) PetscCall(SbSpaceAddVolumeTangent(space, b, stage->u, p, A));
@@ -207,6 +349,10 @@ static PetscErrorCode tangent_pressure(SbEffect e, SbSpace space, const SbStage 
     PetscReal x[3][3], c[3][3], block[9];
 
     if (apart(space, facet)) continue;
+    if (quadratic(space, facet)) {
+      PetscCall(add_quadratic_tangent(space, facet, point, stage->u, p, A));
+      continue;
+    }
     corners(space, facet, stage->u, x);
     for (int b = 0; b < 3; b++) {
       for (int i = 0; i < 3; i++) c[b][i] = x[(b + 1) % 3][i] - x[(b + 2) % 3][i];

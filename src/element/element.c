@@ -25,6 +25,12 @@ static PetscErrorCode destroy_list(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+static const SbOption p2_rows[] = {
+  {"volume", SB_OPTION_CHOICE, 1, "", "mean", "mean|pointwise",
+   "energy of a change of volume: of its mean over a tet, or at each point like the rest, which locks when "
+   "poisson is near 0.5"},
+};
+
 PetscErrorCode SbElementRegister(const char *name, PetscErrorCode (*create)(SbElement), PetscInt nrows,
                                  const SbOption rows[])
 {
@@ -39,6 +45,7 @@ PetscErrorCode SbElementRegisterAll(void)
 {
   PetscFunctionBeginUser;
   PetscCall(SbElementRegister("p1", SbElementCreate_P1, 0, NULL));
+  PetscCall(SbElementRegister("p2", SbElementCreate_P2, PETSC_STATIC_ARRAY_LENGTH(p2_rows), p2_rows));
   PetscCall(SbElementRegister("cr", SbElementCreate_CR, PETSC_STATIC_ARRAY_LENGTH(cr_rows), cr_rows));
   PetscCall(SbElementRegister("dg", SbElementCreate_DG, PETSC_STATIC_ARRAY_LENGTH(dg_rows), dg_rows));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -52,6 +59,12 @@ static PetscErrorCode read_options(const SbScope *body, SbElement e)
   PetscCall(SbScopeSet(&scope, "body", e->name, body->instance));
   if (e->gamma0 > 0.) PetscCall(SbOptionReal(&scope, "gamma0", &e->gamma0));
   if (e->gamma1 > 0.) PetscCall(SbOptionReal(&scope, "gamma1", &e->gamma1));
+  if (e->mean_volume) {
+    PetscInt pointwise;
+
+    PetscCall(SbOptionChoice(&scope, "volume", &pointwise));
+    e->mean_volume = (PetscBool)!pointwise;
+  }
   if (e->weak) {
     PetscInt strong;
 

@@ -10,27 +10,33 @@ PetscErrorCode SbSpaceCellPiola(SbSpace s, const PetscReal x[], PetscReal P[], P
   PetscFunctionBeginUser;
   for (PetscInt r = 0; r < s->nregion; r++) {
     const SbRegion *region = &s->region[r];
-    const SbMaterial m = region->material;
 
     for (PetscInt b = region->bstart; region->owned && b < region->bend; b++) {
-      SbLane u[12], F[9], stress[9], rotation[9], energy;
+      SbLane F[4][9], stress[4][9], energy[4], rotation[9];
+      const PetscInt n = SbBatchState(s, region, b, x, F, stress, energy, NULL);
 
-      sb_gather_strain(s, region, b, x, u);
-      SbCellGradient(s->batch_g + 9 * b, (const SbLane *)u, F);
-      m->ops.stress(m, (const SbLane *)F, stress);
-      m->ops.energy(m, (const SbLane *)F, energy);
-      if (R && m->linear) {
+      /* means over the points */
+      for (PetscInt q = 1; q < n; q++) {
+        for (int l = 0; l < SB_BATCH; l++) {
+          for (int k = 0; k < 9; k++) {
+            F[0][k][l] += (F[q][k][l] - F[0][k][l]) / (PetscReal)(q + 1);
+            stress[0][k][l] += (stress[q][k][l] - stress[0][k][l]) / (PetscReal)(q + 1);
+          }
+          energy[0][l] += (energy[q][l] - energy[0][l]) / (PetscReal)(q + 1);
+        }
+      }
+      if (R && region->material->linear) {
         for (int k = 0; k < 9; k++) {
           for (int l = 0; l < SB_BATCH; l++) rotation[k][l] = k % 4 == 0;
         }
       } else if (R)
-        SbPolar((const SbLane *)F, rotation);
+        SbPolar((const SbLane *)F[0], rotation);
       for (int l = 0; l < s->batch_n[b]; l++) {
         const PetscInt c = s->batch_cell[b] + l;
 
-        SbLaneGet(9, (const SbLane *)stress, l, P + 9 * c);
+        SbLaneGet(9, (const SbLane *)stress[0], l, P + 9 * c);
         if (R) SbLaneGet(9, (const SbLane *)rotation, l, R + 9 * c);
-        psi[c] = energy[l];
+        psi[c] = energy[0][l];
       }
     }
   }

@@ -14,12 +14,13 @@ PetscErrorCode SbSpaceCellPressure(SbSpace s, const PetscReal x[], PetscReal pre
     const SbRegion *region = &s->region[r];
 
     for (PetscInt b = region->bstart; region->owned && b < region->bend; b++) {
-      SbLane u[12], F[9], p;
+      SbLane F[4][9], p[4];
+      const PetscInt n = SbBatchState(s, region, b, x, F, NULL, NULL, p);
 
-      sb_gather_strain(s, region, b, x, u);
-      SbCellGradient(s->batch_g + 9 * b, (const SbLane *)u, F);
-      region->material->ops.pressure(region->material, (const SbLane *)F, p);
-      PetscCall(PetscArraycpy(pressure + s->batch_cell[b], p, s->batch_n[b]));
+      for (PetscInt l = 0; l < s->batch_n[b]; l++) {
+        pressure[s->batch_cell[b] + l] = 0.;
+        for (PetscInt q = 0; q < n; q++) pressure[s->batch_cell[b] + l] += p[q][l] / (PetscReal)n;
+      }
     }
   }
   PetscFunctionReturn(PETSC_SUCCESS);

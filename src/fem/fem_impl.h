@@ -60,8 +60,29 @@ static inline PetscScalar *sb_block(const SbValues *x, SbPlan p, PetscInt row, P
 
 /* Clears the rows that batch b reaches first, or fills them with the face terms; call it for every batch in turn, each before SbInsertBatch(). */
 void SbInsertClear(SbSpace space, const SbValues *x, PetscInt b);
+/*
+  quadratic.c: P2 cells. Not collective. The nodes of a batch [10][SB_BATCH].
+*/
+static inline const PetscInt *sb_quadratic_nodes(SbSpace s, PetscInt b)
+{
+  return s->batch_clique + (size_t)(b * s->width) * SB_BATCH;
+}
+/* F (rate: without the identity) at the points of SbRuleQuadratic. */
+void SbQuadraticGradients(const SbLane g[9], const SbLane U[30], PetscBool rate, SbLane F[4][9]);
+/*
+  The volumetric part of the energy, V lambda/2 (mean of theta)^2: pressure = lambda times the mean (Pa, tension), b[30] = V d mean/du (m^2; NULL: not
+  wanted). F at the points of SbRuleQuadratic.
+*/
+void SbQuadraticVolume(const struct _p_SbMaterial *m, const SbLane g[9], const SbLane V, const SbLane U[30],
+                       const SbLane F[4][9], SbLane pressure, SbLane b[30]);
+/* What a law says at the points of a cell: one, for P2 four. Returns their number. P (Pa), psi (J/m^3), pressure (Pa, compression) may be NULL. */
+PetscInt SbBatchState(SbSpace space, const SbRegion *region, PetscInt b, const PetscReal x[], SbLane F[4][9],
+                      SbLane P[4][9], SbLane psi[4], SbLane pressure[4]);
+
 /* Adds the ten blocks of each cell of batch b; K is 32-byte aligned. */
 void SbInsertBatch(SbSpace space, const SbValues *x, PetscInt b, const SbLane K[10][9]);
+/* The 55 blocks of P2 cells. */
+void SbInsertQuadratic(SbSpace space, const SbValues *x, PetscInt b, const SbLane K[SB_PAIRS][9]);
 /* The same for DG cells, whose blocks stand between the means of their faces. */
 void SbInsertBroken(SbSpace space, const SbValues *x, PetscInt b, const SbLane K[10][9]);
 

@@ -1,5 +1,5 @@
 /*
-  From lanes to the matrix: the ten blocks of a batch of cells, added at their positions in the value arrays.
+  From lanes to the matrix: the blocks of a batch of cells, ten or, for P2, 55, added at their positions in the value arrays.
 
   The kernel leaves the blocks with the lanes side by side, K[pair][entry][lane]; BAIJ and SBAIJ keep the nine entries of a
   block together, by columns. So the entries of four lanes are transposed in registers, and each block is added as two
@@ -69,19 +69,20 @@ static inline void add_block(SbSpace s, const SbValues *x, PetscInt row, PetscIn
 }
 
 /* Any storage, any rank: the cell in lane l of batch b, block by block. */
-static void insert_cell(SbSpace s, const SbValues *x, PetscInt b, PetscInt l, const SbLane K[10][9])
+static void insert_cell(SbSpace s, const SbValues *x, PetscInt b, PetscInt l, int npair, const SbLane K[][9])
 {
-  const PetscInt w = s->width, *node = s->cell_node + 4 * (s->batch_cell[b] + l);
+  const PetscInt w = s->width, *node = s->batch_clique + (size_t)(b * w) * SB_BATCH + l;
   const PetscInt *offset = s->plan->offset + (size_t)(b * w * w) * SB_BATCH + l;
 
-  for (int p = 0; p < 10; p++) {
+  for (int p = 0; p < npair; p++) {
     PetscReal k[9];
 
     SbLaneGet(9, K[p], (int)l, k);
     for (int turn = 0; turn < (SbPairA[p] == SbPairB[p] ? 1 : 2); turn++) {
       const int row = turn ? SbPairB[p] : SbPairA[p], column = turn ? SbPairA[p] : SbPairB[p];
 
-      add_block(s, x, node[row], node[column], offset[SB_BATCH * (w * row + column)], 1., (PetscBool)turn, k);
+      add_block(s, x, node[SB_BATCH * row], node[SB_BATCH * column], offset[SB_BATCH * (w * row + column)],
+                1., (PetscBool)turn, k);
     }
   }
 }
@@ -89,8 +90,8 @@ static void insert_cell(SbSpace s, const SbValues *x, PetscInt b, PetscInt l, co
 /* Each block between means is spread over the own nodes and those across the faces. */
 static void insert_broken_cell(SbSpace s, const SbValues *x, PetscInt b, PetscInt l, const SbLane K[10][9])
 {
-  const PetscInt *node = s->batch_clique + (size_t)b * 8 * SB_BATCH + l;
-  const PetscInt *offset = s->plan->offset + (size_t)b * 64 * SB_BATCH + l;
+  const PetscInt w = s->width, *node = s->batch_clique + (size_t)(b * w) * SB_BATCH + l;
+  const PetscInt *offset = s->plan->offset + (size_t)(b * w * w) * SB_BATCH + l;
   PetscReal weight[8];
 
   for (int a = 0; a < 4; a++) {
@@ -108,7 +109,7 @@ static void insert_broken_cell(SbSpace s, const SbValues *x, PetscInt b, PetscIn
       const PetscReal factor = weight[row] * weight[column];
 
       if (factor != 0.)
-        add_block(s, x, node[SB_BATCH * row], node[SB_BATCH * column], offset[SB_BATCH * (8 * row + column)],
+        add_block(s, x, node[SB_BATCH * row], node[SB_BATCH * column], offset[SB_BATCH * (w * row + column)],
                   factor, (PetscBool)turn, k);
     }
   }
@@ -156,10 +157,10 @@ SB_INLINE void add_blocks(const Four k[9], const PetscInt position[4], PetscBool
 }
 
 /* Padding lanes have volume zero and add nothing to the blocks of the first. */
-SB_INLINE void insert_both(const SbLane K[10][9], const PetscInt offset[], PetscInt width, PetscBool edge,
-                           PetscScalar *const value[2])
+SB_INLINE void insert_both(int npair, const SbLane K[][9], const PetscInt offset[], PetscInt width,
+                           PetscBool edge, PetscScalar *const value[2])
 {
-  for (int p = 0; p < 10; p++) {
+  for (int p = 0; p < npair; p++) {
     const PetscInt ab = width * SbPairA[p] + SbPairB[p], ba = width * SbPairB[p] + SbPairA[p];
 
     for (int h = 0; h < SB_BATCH; h += 4) {
@@ -177,21 +178,27 @@ SB_INLINE void insert_both(const SbLane K[10][9], const PetscInt offset[], Petsc
 SB_KERNEL static void insert_baij(const SbLane K[restrict 10][9], const PetscInt offset[restrict],
                                   PetscInt width, PetscScalar *const value[2])
 {
-  insert_both(K, offset, width, PETSC_FALSE, value);
+  insert_both(10, K, offset, width, PETSC_FALSE, value);
 }
 
 /* Batches that touch nodes of another rank. */
 SB_KERNEL static void insert_baij_edge(const SbLane K[restrict 10][9], const PetscInt offset[restrict],
                                        PetscInt width, PetscScalar *const value[2])
 {
-  insert_both(K, offset, width, PETSC_TRUE, value);
+  insert_both(10, K, offset, width, PETSC_TRUE, value);
+}
+
+SB_KERNEL static void insert_baij_quadratic(const SbLane K[restrict SB_PAIRS][9],
+                                            const PetscInt offset[restrict], PetscScalar *const value[2])
+{
+  insert_both(SB_PAIRS, K, offset, SB_CELL_NODES, PETSC_TRUE, value);
 }
 
 /* The stored block is K_ab, or K_ba = K_ab^T when that lies in the row of the lower node. */
-SB_KERNEL static void insert_sbaij(const SbLane K[restrict 10][9],
-                                   const PetscInt upper[restrict 10 * SB_BATCH], PetscScalar *const value[2])
+SB_INLINE void insert_upper(int npair, const SbLane K[restrict][9], const PetscInt upper[restrict],
+                            PetscScalar *const value[2])
 {
-  for (int p = 0; p < 10; p++) {
+  for (int p = 0; p < npair; p++) {
     for (int h = 0; h < SB_BATCH; h += 4) {
       PetscInt position[4];
       Mask turn;
@@ -213,6 +220,18 @@ SB_KERNEL static void insert_sbaij(const SbLane K[restrict 10][9],
   }
 }
 
+SB_KERNEL static void insert_sbaij(const SbLane K[restrict 10][9], const PetscInt upper[restrict],
+                                   PetscScalar *const value[2])
+{
+  insert_upper(10, K, upper, value);
+}
+
+SB_KERNEL static void insert_sbaij_quadratic(const SbLane K[restrict SB_PAIRS][9],
+                                             const PetscInt upper[restrict], PetscScalar *const value[2])
+{
+  insert_upper(SB_PAIRS, K, upper, value);
+}
+
 static PetscBool all_owned(SbSpace s, const PetscInt node[4 * SB_BATCH])
 {
   PetscInt last = 0;
@@ -227,14 +246,31 @@ static PetscBool insert_fast(SbSpace s, const SbValues *x, PetscInt b, const SbL
 
   if (x->kind == SB_MATRIX_AIJ) return PETSC_FALSE;
   if (x->kind == SB_MATRIX_SBAIJ)
-    insert_sbaij(K, s->plan->upper + (size_t)b * 10 * SB_BATCH, x->value);
+    insert_sbaij(K, s->plan->upper + (size_t)(b * s->plan->npair) * SB_BATCH, x->value);
   else if (all_owned(s, s->batch_node + 4 * SB_BATCH * b))
     insert_baij(K, offset, s->width, x->value);
   else
     insert_baij_edge(K, offset, s->width, x->value);
   return PETSC_TRUE;
 }
+
+static PetscBool insert_fast_quadratic(SbSpace s, const SbValues *x, PetscInt b, const SbLane K[SB_PAIRS][9])
+{
+  const PetscInt w = s->width;
+
+  if (x->kind == SB_MATRIX_AIJ) return PETSC_FALSE;
+  if (x->kind == SB_MATRIX_SBAIJ)
+    insert_sbaij_quadratic(K, s->plan->upper + (size_t)(b * SB_PAIRS) * SB_BATCH, x->value);
+  else
+    insert_baij_quadratic(K, s->plan->offset + (size_t)(b * w * w) * SB_BATCH, x->value);
+  return PETSC_TRUE;
+}
 #else
+static PetscBool insert_fast_quadratic(SbSpace s, const SbValues *x, PetscInt b, const SbLane K[SB_PAIRS][9])
+{
+  (void)s, (void)x, (void)b, (void)K;
+  return PETSC_FALSE;
+}
 static PetscBool insert_fast(SbSpace s, const SbValues *x, PetscInt b, const SbLane K[10][9])
 {
   (void)s, (void)x, (void)b, (void)K;
@@ -245,7 +281,13 @@ static PetscBool insert_fast(SbSpace s, const SbValues *x, PetscInt b, const SbL
 void SbInsertBatch(SbSpace s, const SbValues *x, PetscInt b, const SbLane K[10][9])
 {
   if (insert_fast(s, x, b, K)) return;
-  for (PetscInt l = 0; l < s->batch_n[b]; l++) insert_cell(s, x, b, l, K);
+  for (PetscInt l = 0; l < s->batch_n[b]; l++) insert_cell(s, x, b, l, 10, K);
+}
+
+void SbInsertQuadratic(SbSpace s, const SbValues *x, PetscInt b, const SbLane K[SB_PAIRS][9])
+{
+  if (insert_fast_quadratic(s, x, b, K)) return;
+  for (PetscInt l = 0; l < s->batch_n[b]; l++) insert_cell(s, x, b, l, SB_PAIRS, K);
 }
 
 void SbInsertBroken(SbSpace s, const SbValues *x, PetscInt b, const SbLane K[10][9])

@@ -1,7 +1,8 @@
 /*
   Which nodes there are, who owns them, and which four belong to each cell.
 
-  P1 has its nodes at the vertices: when every body is P1, nodes are the mesh's vertices and nothing is done here. CR has one
+  P1 has its nodes at the vertices: when every body is P1, nodes are the mesh's vertices and nothing is done here. P2 has more at the
+  edges, of the rank that owns one certain cell around the edge: all ranks with a cell there have all of them, and choose alike. CR has one
   node per face, DG four per cell, on its faces; node a of a cell lies opposite vertex a. A rank owns all nodes of its DG cells
   and, of the CR faces between it and another rank, about every second one.
 
@@ -56,8 +57,47 @@ static uint64_t prescribed_sets(SbSpace s)
   return prescribed;
 }
 
+/* The edges of the local cells: which they are, who numbers them. */
+typedef struct {
+  PetscInt n, *edge; /* [ncell][6] numbers of edges */
+  PetscInt *first;   /* [n] lowest original number of the P2 cells around it */
+  PetscBool *own;    /* [n] this rank numbers its node */
+  PetscInt *at;      /* [n] the node, UNKNOWN */
+} Edges;
+
+/* Of every other edge the lowest of its cells decides, of the rest the highest. */
+static PetscErrorCode find_edges(SbSpace s, Edges *edges)
+{
+  SbMesh mesh = s->mesh;
+  PetscInt *last;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbMeshEdges(mesh, &edges->n, &edges->edge));
+  PetscCall(PetscMalloc3(edges->n, &edges->first, edges->n, &edges->own, edges->n, &edges->at));
+  PetscCall(PetscMalloc1(edges->n, &last));
+  for (PetscInt e = 0; e < edges->n; e++) {
+    edges->at[e] = last[e] = UNKNOWN;
+    edges->first[e] = PETSC_MAX_INT;
+    edges->own[e] = PETSC_FALSE;
+  }
+  for (PetscInt i = 0; i < 6 * mesh->ncell; i++) {
+    const PetscInt e = edges->edge[i], orig = mesh->cell_orig[i / 6];
+
+    edges->first[e] = PetscMin(edges->first[e], orig);
+    last[e] = PetscMax(last[e], orig);
+  }
+  for (PetscInt i = 0; i < 6 * mesh->ncell_owned; i++) {
+    const PetscInt e = edges->edge[i];
+
+    if (mesh->cell_orig[i / 6] == ((edges->first[e] + last[e]) % 2 ? edges->first[e] : last[e]))
+      edges->own[e] = PETSC_TRUE;
+  }
+  PetscCall(PetscFree(last));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Owned nodes from zero on: node[ncell][4] and, for faces in these sets, s->support[ncell][4]; UNKNOWN elsewhere. */
-static PetscErrorCode number_owned(SbSpace s, uint64_t prescribed, PetscInt node[])
+static PetscErrorCode number_owned(SbSpace s, uint64_t prescribed, Edges *edges, PetscInt node[])
 {
   SbMesh mesh = s->mesh;
   PetscInt *at, n = 0;
@@ -66,6 +106,7 @@ static PetscErrorCode number_owned(SbSpace s, uint64_t prescribed, PetscInt node
   PetscCall(PetscMalloc1(mesh->nvert, &at));
   for (PetscInt v = 0; v < mesh->nvert; v++) at[v] = UNKNOWN;
   for (PetscInt i = 0; i < 4 * mesh->ncell; i++) node[i] = UNKNOWN;
+  for (PetscInt i = 0; s->edge_node && i < 6 * mesh->ncell; i++) s->edge_node[i] = UNKNOWN;
   for (PetscInt c = 0; c < mesh->ncell_owned; c++) {
     const PetscInt *per = SbSpaceCellElement(s, c)->nodes_per;
 
@@ -85,6 +126,12 @@ static PetscErrorCode number_owned(SbSpace s, uint64_t prescribed, PetscInt node
         node[4 * c + a] = at[v];
       }
     }
+    for (PetscInt i = 6 * c; per[1] && i < 6 * (c + 1); i++) {
+      const PetscInt e = edges->edge[i];
+
+      if (edges->own[e] && edges->at[e] == UNKNOWN) edges->at[e] = n++;
+      s->edge_node[i] = edges->at[e];
+    }
   }
   s->nnode_owned = n;
   PetscCall(PetscFree(at));
@@ -92,7 +139,7 @@ static PetscErrorCode number_owned(SbSpace s, uint64_t prescribed, PetscInt node
 }
 
 /* After the first broadcast: owned cells get what their ghost neighbours know. */
-static PetscErrorCode complete_owned(SbSpace s, PetscInt node[])
+static PetscErrorCode complete_owned(SbSpace s, Edges *edges, PetscInt node[])
 {
   SbMesh mesh = s->mesh;
   PetscInt *at;
@@ -116,13 +163,22 @@ static PetscErrorCode complete_owned(SbSpace s, PetscInt node[])
                (int)(i % 4), (int)(i / 4));
   }
   PetscCall(PetscFree(at));
+  for (PetscInt i = 0; s->edge_node && i < 6 * mesh->ncell; i++) {
+    if (s->edge_node[i] != UNKNOWN) edges->at[edges->edge[i]] = s->edge_node[i];
+  }
+  for (PetscInt i = 0; s->edge_node && i < 6 * mesh->ncell_owned; i++) {
+    if (!SbSpaceCellElement(s, i / 6)->nodes_per[1]) continue;
+    s->edge_node[i] = edges->at[edges->edge[i]];
+    PetscCheck(s->edge_node[i] != UNKNOWN, PETSC_COMM_SELF, PETSC_ERR_PLIB,
+               "No rank has numbered the node at edge %d of cell %d", (int)(i % 6), (int)(i / 6));
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Adds the numbers that are another rank's to a list. */
-static void add_ghosts(SbSpace s, const PetscInt number[], PetscInt *nghost, PetscInt ghost[])
+static void add_ghosts(SbSpace s, PetscInt n, const PetscInt number[], PetscInt *nghost, PetscInt ghost[])
 {
-  for (PetscInt i = 0; i < 4 * s->mesh->ncell; i++) {
+  for (PetscInt i = 0; i < n; i++) {
     const PetscInt own = number[i] - s->gnode_start;
 
     if (number[i] != UNKNOWN && (own < 0 || own >= s->nnode_owned)) ghost[(*nghost)++] = number[i];
@@ -130,10 +186,10 @@ static void add_ghosts(SbSpace s, const PetscInt number[], PetscInt *nghost, Pet
 }
 
 /* From global numbers to local ones: owned nodes, then ghosts by global number. */
-static PetscErrorCode make_local(SbSpace s, PetscInt number[])
+static PetscErrorCode make_local(SbSpace s, PetscInt n, PetscInt number[])
 {
   PetscFunctionBeginUser;
-  for (PetscInt i = 0; i < 4 * s->mesh->ncell; i++) {
+  for (PetscInt i = 0; i < n; i++) {
     const PetscInt own = number[i] - s->gnode_start;
     PetscInt at;
 
@@ -148,23 +204,26 @@ static PetscErrorCode make_local(SbSpace s, PetscInt number[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Ghosts, and local numbers in s->cell_node and s->support. */
+/* Ghosts, and local numbers in s->cell_node, s->edge_node and s->dirichlet_node. */
 static PetscErrorCode localise(SbSpace s)
 {
+  const PetscInt four = 4 * s->mesh->ncell, six = 6 * s->mesh->ncell;
   PetscInt *ghost, nghost = 0;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscMalloc1(8 * (size_t)s->mesh->ncell, &ghost));
-  add_ghosts(s, s->cell_node, &nghost, ghost);
-  if (s->dirichlet_node) add_ghosts(s, s->dirichlet_node, &nghost, ghost);
+  PetscCall(PetscMalloc1(14 * (size_t)s->mesh->ncell, &ghost));
+  add_ghosts(s, four, s->cell_node, &nghost, ghost);
+  if (s->edge_node) add_ghosts(s, six, s->edge_node, &nghost, ghost);
+  if (s->dirichlet_node) add_ghosts(s, four, s->dirichlet_node, &nghost, ghost);
   PetscCall(PetscSortRemoveDupsInt(&nghost, ghost));
   s->nnode = s->nnode_owned + nghost;
   PetscCall(PetscMalloc1(s->nnode, &s->gnode));
   for (PetscInt i = 0; i < s->nnode_owned; i++) s->gnode[i] = s->gnode_start + i;
   PetscCall(PetscArraycpy(s->gnode + s->nnode_owned, ghost, nghost));
   PetscCall(PetscFree(ghost));
-  PetscCall(make_local(s, s->cell_node));
-  if (s->dirichlet_node) PetscCall(make_local(s, s->dirichlet_node));
+  PetscCall(make_local(s, four, s->cell_node));
+  if (s->edge_node) PetscCall(make_local(s, six, s->edge_node));
+  if (s->dirichlet_node) PetscCall(make_local(s, four, s->dirichlet_node));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -199,8 +258,55 @@ static void describe_supports(SbSpace s)
   }
 }
 
+/*
+  Place, body and sets of the nodes at edges. A set that is a shape holds an edge with both its vertices, as does a group without triangles
+  and tets; other groups hold the edges of what they hold, so that no edge through a thin body is in the group of its surface. Owned cells
+  know all cells around their edges, and tell the ghosts.
+*/
+static PetscErrorCode describe_edges(SbSpace s, const Edges *edges)
+{
+  SbMesh mesh = s->mesh;
+  uint64_t *set, *cell_set, by_items = 0;
+
+  PetscFunctionBeginUser;
+  for (PetscInt i = 0; i < 4 * mesh->ncell; i++) by_items |= mesh->face_set[i] | mesh->cell_set[i / 4];
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &by_items, 1, MPI_UINT64_T, MPI_BOR, s->comm));
+  for (PetscInt k = 0; k < mesh->nset; k++) {
+    const SbSetShape shape = mesh->set[k].shape;
+
+    if (shape != SB_SET_GROUP && shape != SB_SET_BODY && shape != SB_SET_BOUNDARY) by_items &= ~SB_SET_BIT(k);
+  }
+  PetscCall(PetscCalloc1(edges->n, &set));
+  for (PetscInt i = 0; i < 6 * mesh->ncell; i++) {
+    const PetscInt c = i / 6, a = SbTetEdge[i % 6][0], b = SbTetEdge[i % 6][1];
+    uint64_t items = mesh->cell_set[c];
+
+    for (PetscInt f = 0; f < 4; f++) items |= f != a && f != b ? mesh->face_set[4 * c + f] : 0;
+    set[edges->edge[i]] |= (items & by_items) | (mesh->vert_set[mesh->cell[4 * c + a]] &
+                                                 mesh->vert_set[mesh->cell[4 * c + b]] & ~by_items);
+  }
+  PetscCall(PetscMalloc1(6 * (size_t)mesh->ncell, &cell_set));
+  for (PetscInt i = 0; i < 6 * mesh->ncell; i++) cell_set[i] = set[edges->edge[i]] & ~SB_ON_BOUNDARY;
+  PetscCall(SbMeshBroadcastCells(mesh, 6, MPI_UINT64_T, cell_set));
+  for (PetscInt i = 0; i < 6 * mesh->ncell; i++) {
+    const PetscInt node = s->edge_node[i], *v = mesh->cell + 4 * (i / 6);
+
+    if (node == UNKNOWN) continue;
+    s->node_body[node] = mesh->cell_body[i / 6];
+    s->node_set[node] = cell_set[i];
+    s->node_orig[node] =
+      PetscMin(s->node_orig[node], mesh->Nvert + 8 * mesh->Ncell + 6 * mesh->cell_orig[i / 6] + i % 6);
+    for (int k = 0; k < 3; k++)
+      s->node_x[3 * node + k] =
+        0.5 * (mesh->x[3 * v[SbTetEdge[i % 6][0]] + k] + mesh->x[3 * v[SbTetEdge[i % 6][1]] + k]);
+  }
+  PetscCall(PetscFree(set));
+  PetscCall(PetscFree(cell_set));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Place, body and sets of every node. */
-static PetscErrorCode describe_nodes(SbSpace s)
+static PetscErrorCode describe_nodes(SbSpace s, const Edges *edges)
 {
   SbMesh mesh = s->mesh;
 
@@ -225,6 +331,7 @@ static PetscErrorCode describe_nodes(SbSpace s)
       for (int k = 0; k < 3; k++) x[k] = (mesh->x[3 * a + k] + mesh->x[3 * b + k] + mesh->x[3 * c + k]) / 3.;
     }
   }
+  if (s->edge_node) PetscCall(describe_edges(s, edges));
   if (s->dirichlet_node) describe_supports(s);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -251,19 +358,24 @@ static PetscErrorCode layout_vertices(SbSpace s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode layout_faces(SbSpace s)
+static PetscErrorCode layout_others(SbSpace s, PetscBool quadratic)
 {
   SbMesh mesh = s->mesh;
   const uint64_t prescribed = prescribed_sets(s);
+  Edges edges = {0};
 
   PetscFunctionBeginUser;
-  PetscCall(SbMeshNeighbours(mesh, &s->neighbour));
+  if (s->faces) PetscCall(SbMeshNeighbours(mesh, &s->neighbour));
+  if (quadratic) {
+    PetscCall(find_edges(s, &edges));
+    PetscCall(PetscMalloc1(6 * (size_t)mesh->ncell, &s->edge_node));
+  }
   PetscCall(PetscMalloc1(4 * (size_t)mesh->ncell, &s->cell_node));
   if (prescribed) {
     PetscCall(PetscMalloc1(4 * (size_t)mesh->ncell, &s->dirichlet_node));
     for (PetscInt i = 0; i < 4 * mesh->ncell; i++) s->dirichlet_node[i] = UNKNOWN;
   }
-  PetscCall(number_owned(s, prescribed, s->cell_node));
+  PetscCall(number_owned(s, prescribed, &edges, s->cell_node));
   PetscCallMPI(MPI_Scan(&s->nnode_owned, &s->gnode_start, 1, MPIU_INT, MPI_SUM, s->comm));
   PetscCallMPI(MPI_Allreduce(&s->nnode_owned, &s->Nnode, 1, MPIU_INT, MPI_SUM, s->comm));
   s->gnode_start -= s->nnode_owned;
@@ -271,25 +383,36 @@ static PetscErrorCode layout_faces(SbSpace s)
     if (s->cell_node[i] != UNKNOWN) s->cell_node[i] += s->gnode_start;
     if (s->dirichlet_node && s->dirichlet_node[i] != UNKNOWN) s->dirichlet_node[i] += s->gnode_start;
   }
-  PetscCall(SbMeshBroadcastCells(mesh, 4, MPIU_INT, s->cell_node));
-  PetscCall(complete_owned(s, s->cell_node));
-  PetscCall(SbMeshBroadcastCells(mesh, 4, MPIU_INT, s->cell_node));
+  for (PetscInt i = 0; quadratic && i < 6 * mesh->ncell_owned; i++) {
+    if (s->edge_node[i] != UNKNOWN) s->edge_node[i] += s->gnode_start;
+  }
+  for (int round = 0; round < 2; round++) {
+    if (round) PetscCall(complete_owned(s, &edges, s->cell_node));
+    PetscCall(SbMeshBroadcastCells(mesh, 4, MPIU_INT, s->cell_node));
+    if (quadratic) PetscCall(SbMeshBroadcastCells(mesh, 6, MPIU_INT, s->edge_node));
+  }
   if (s->dirichlet_node) PetscCall(SbMeshBroadcastCells(mesh, 4, MPIU_INT, s->dirichlet_node));
   PetscCall(localise(s));
-  PetscCall(describe_nodes(s));
+  PetscCall(describe_nodes(s, &edges));
+  PetscCall(PetscFree(edges.edge));
+  PetscCall(PetscFree3(edges.first, edges.own, edges.at));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode SbLayoutNodes(SbSpace s)
 {
+  PetscBool quadratic = PETSC_FALSE;
+
   PetscFunctionBeginUser;
   for (PetscInt b = 0; b < s->mesh->nbody; b++) {
     if (!s->element[b]->nodes_per[0]) s->faces = PETSC_TRUE;
+    if (s->element[b]->nodes_per[1]) quadratic = PETSC_TRUE;
   }
-  if (s->faces)
-    PetscCall(layout_faces(s));
-  else
+  s->vertices = (PetscBool)(!s->faces && !quadratic);
+  if (s->vertices)
     PetscCall(layout_vertices(s));
+  else
+    PetscCall(layout_others(s, quadratic));
   PetscCall(PetscCalloc1(s->nnode, &s->fixed));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -300,7 +423,8 @@ PetscErrorCode SbLayoutDestroy(SbSpace s)
   PetscCall(PetscFree(s->gnode));
   PetscCall(PetscFree(s->cell_node));
   PetscCall(PetscFree(s->node_x));
-  if (s->faces) PetscCall(PetscFree3(s->node_body, s->node_set, s->node_orig));
+  PetscCall(PetscFree(s->edge_node));
+  if (!s->vertices) PetscCall(PetscFree3(s->node_body, s->node_set, s->node_orig));
   PetscCall(PetscFree(s->neighbour));
   PetscCall(PetscFree(s->dirichlet_node));
   PetscCall(PetscFree(s->fixed));
@@ -331,14 +455,27 @@ static void across(SbSpace s, const PetscReal stiffness[], PetscInt cell, PetscI
 PetscErrorCode SbLayoutCliques(SbSpace s)
 {
   PetscReal *stiffness;
+  PetscBool broken = PETSC_FALSE;
 
   PetscFunctionBeginUser;
-  s->width = 4;
+  s->width = s->edge_node ? SB_CELL_NODES : 4;
   s->batch_clique = s->batch_node;
   for (PetscInt b = 0; b < s->mesh->nbody; b++) {
-    if (s->element[b]->nodes_per[3]) s->width = 8;
+    if (!s->element[b]->nodes_per[3]) continue;
+    broken = PETSC_TRUE;
+    s->width = PetscMax(8, s->width);
   }
   if (s->width == 4) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscMalloc1(s->nbatch * s->width * SB_BATCH, &s->batch_clique));
+  for (PetscInt k = 0; k < s->width * SB_BATCH * s->nbatch; k++) {
+    const PetscInt b = k / (s->width * SB_BATCH), a = k / SB_BATCH % s->width, l = k % SB_BATCH,
+                   cell = s->batch_cell[b] + (l < s->batch_n[b] ? l : 0);
+
+    s->batch_clique[k] = s->edge_node && a >= 4 && s->edge_node[6 * cell] != UNKNOWN
+                           ? s->edge_node[6 * cell + a - 4]
+                           : s->cell_node[4 * cell + a % 4];
+  }
+  if (!broken) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscMalloc1(s->mesh->ncell, &stiffness));
   for (PetscInt r = 0; r < s->nregion; r++) {
     const SbRegion *region = &s->region[r];
@@ -349,16 +486,15 @@ PetscErrorCode SbLayoutCliques(SbSpace s)
         stiffness[s->batch_cell[b] + l] = modulus / s->batch_V[b][l];
     }
   }
-  PetscCall(PetscMalloc2(s->nbatch * 8 * SB_BATCH, &s->batch_clique, s->nbatch * 4, &s->batch_weight));
+  PetscCall(PetscMalloc1(s->nbatch * 4, &s->batch_weight));
   for (PetscInt k = 0; k < 4 * SB_BATCH * s->nbatch; k++) {
     const PetscInt b = k / (4 * SB_BATCH), a = k / SB_BATCH % 4, l = k % SB_BATCH,
                    cell = s->batch_cell[b] + (l < s->batch_n[b] ? l : 0);
-    PetscInt *node = s->batch_clique + 8 * SB_BATCH * b + SB_BATCH * a + l;
 
-    node[0] = node[4 * SB_BATCH] = s->batch_node[k];
     s->batch_weight[4 * b + a][l] = 1.;
     if (SbSpaceCellElement(s, cell)->nodes_per[3])
-      across(s, stiffness, cell, a, &node[4 * SB_BATCH], &s->batch_weight[4 * b + a][l]);
+      across(s, stiffness, cell, a, &s->batch_clique[(s->width * b + 4 + a) * SB_BATCH + l],
+             &s->batch_weight[4 * b + a][l]);
   }
   PetscCall(PetscFree(stiffness));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -234,7 +234,7 @@ static PetscErrorCode assemble(Mat A, const SbStage *stage)
 PetscErrorCode SbSpaceAllowsMatrixFree(SbSpace s, PetscBool *has)
 {
   PetscFunctionBeginUser;
-  *has = (PetscBool)!s->consistent_mass;
+  *has = (PetscBool)(!s->consistent_mass && !s->edge_node);
   for (PetscInt r = 0; r < s->nregion; r++)
     *has = (PetscBool)(*has && (s->region[r].material->linear || s->region[r].material->ops.frame));
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, has, 1, SB_MPI_BOOL, MPI_LAND, s->comm));
@@ -253,7 +253,7 @@ PetscErrorCode SbSpaceCreateMatrixFree(SbSpace s, Mat *A)
   PetscFunctionBeginUser;
   PetscCall(SbSpaceAllowsMatrixFree(s, &has));
   PetscCheck(has, s->comm, PETSC_ERR_SUP,
-             "The tangent of this law, or the consistent mass, needs an assembled matrix");
+             "The tangent of this law, element p2, or the consistent mass, needs an assembled matrix");
   if (!s->plan) PetscCall(SbPlanCreate(s, &s->plan));
   PetscCall(PetscNew(&o));
   o->space = s;

@@ -31,17 +31,23 @@ void SbSpaceCellRotations(SbSpace s, const PetscReal x[], SbLane R[])
   }
 }
 
+/* Nodes that have part in the rotation of their cell. */
+static inline PetscInt batch_nodes(SbSpace s, PetscInt b)
+{
+  return s->edge_node && s->edge_node[6 * s->batch_cell[b]] >= 0 ? SB_CELL_NODES : 4;
+}
+
 /* sum[nnode][9] += V R of every cell at its nodes. */
 static void sum_rotations(SbSpace s, const SbLane R[], PetscReal sum[])
 {
   for (PetscInt b = 0; b < s->nbatch; b++) {
-    const PetscInt *node = s->batch_node + 4 * SB_BATCH * b;
+    const PetscInt n = batch_nodes(s, b), *node = s->batch_clique + s->width * SB_BATCH * b;
 
     for (PetscInt l = 0; l < s->batch_n[b]; l++) {
       PetscReal VR[9];
 
       for (int k = 0; k < 9; k++) VR[k] = s->batch_V[b][l] * R[9 * b + k][l];
-      for (int a = 0; a < 4; a++) {
+      for (PetscInt a = 0; a < n; a++) {
         PetscReal *to = sum + 9 * node[a * SB_BATCH + l];
 
         for (int k = 0; k < 9; k++) to[k] += VR[k];
@@ -54,13 +60,13 @@ static void find_spread(SbSpace s, const SbLane R[], const PetscReal node_R[], P
 {
   for (PetscInt i = 0; i < s->nnode_owned; i++) spread[i] = 0.;
   for (PetscInt b = 0; b < s->nbatch; b++) {
-    const PetscInt *node = s->batch_node + 4 * SB_BATCH * b;
+    const PetscInt n = batch_nodes(s, b), *node = s->batch_clique + s->width * SB_BATCH * b;
 
     for (PetscInt l = 0; l < s->batch_n[b]; l++) {
       PetscReal r[9];
 
       for (int k = 0; k < 9; k++) r[k] = R[9 * b + k][l];
-      for (int a = 0; a < 4; a++) {
+      for (PetscInt a = 0; a < n; a++) {
         const PetscInt i = node[a * SB_BATCH + l];
 
         /* |R - Q|^2 = 6 - 2 R : Q for rotations */

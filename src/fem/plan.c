@@ -224,7 +224,7 @@ PetscErrorCode SbPlanDestroy(SbPlan *plan)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* For SBAIJ on one rank: the first upper block of each row, and where in the upper triangle the ten blocks of each cell go. */
+/* For SBAIJ on one rank: the first upper block of each row, and where in the upper triangle the blocks of each cell go. */
 static PetscErrorCode plan_upper(SbSpace s, SbPlan p)
 {
   const PetscInt nrow = s->nnode_owned;
@@ -232,7 +232,8 @@ static PetscErrorCode plan_upper(SbSpace s, SbPlan p)
   PetscFunctionBeginUser;
   if (p->upper) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscMalloc1(nrow + 1, &p->ui));
-  PetscCall(PetscMalloc1((size_t)s->nbatch * 10 * SB_BATCH, &p->upper));
+  p->npair = s->edge_node ? SB_PAIRS : 10;
+  PetscCall(PetscMalloc1((size_t)s->nbatch * (size_t)p->npair * SB_BATCH, &p->upper));
 
   /* a row has the blocks from its diagonal on */
   p->ui[0] = 0;
@@ -240,11 +241,11 @@ static PetscErrorCode plan_upper(SbSpace s, SbPlan p)
 
   /* a pair of nodes goes to the row of the lower one; ~u: its block is to be transposed */
   for (PetscInt b = 0; b < s->nbatch; b++) {
-    const PetscInt *node = s->batch_node + 4 * SB_BATCH * b,
+    const PetscInt *node = s->batch_clique + s->width * SB_BATCH * b,
                    *offset = p->offset + (size_t)b * (size_t)(s->width * s->width) * SB_BATCH;
-    PetscInt *upper = p->upper + (size_t)b * 10 * SB_BATCH;
+    PetscInt *upper = p->upper + (size_t)(b * p->npair) * SB_BATCH;
 
-    for (PetscInt q = 0; q < 10; q++) {
+    for (PetscInt q = 0; q < p->npair; q++) {
       for (PetscInt l = 0; l < SB_BATCH; l++) {
         const PetscInt na = node[SB_BATCH * SbPairA[q] + l], nb = node[SB_BATCH * SbPairB[q] + l],
                        row = PetscMin(na, nb);

@@ -35,13 +35,73 @@ static void add_region_force(SbSpace s, const SbRegion *region, const SbStage *s
   }
 }
 
+/*
+  P2. Each point has a quarter of the volume; the volumetric part is that of the mean of the cell. Damping alike: mu (H + R H^T R) at the points, lambda times the
+  mean of R : H.
+*/
+static void add_quadratic_force(SbSpace s, const SbRegion *region, const SbStage *stage, PetscReal f[])
+{
+  const SbMaterial m = region->pointwise;
+  const PetscReal beta = stage->v ? region->beta : 0.,
+                  lambda = region->material->ops.volumetric_modulus(region->material);
+  const PetscBool mean = (PetscBool)(m != region->material);
+
+  for (PetscInt b = region->bstart; b < region->bend; b++) {
+    const SbLane *g = s->batch_g + 9 * b;
+    SbLane U[30], F[4][9], H[4][9], P[9], dP[9], R[9], W, fe[12], f10[30] = {{0}}, b10[30], p;
+
+    sb_gather_nodes(10, sb_quadratic_nodes(s, b), stage->u, U);
+    SbQuadraticGradients(g, (const SbLane *)U, PETSC_FALSE, F);
+    if (mean) {
+      SbQuadraticVolume(region->material, g, s->batch_V[b], (const SbLane *)U, (const SbLane(*)[9])F, p, b10);
+      for (int k = 0; k < 30; k++) {
+        for (int l = 0; l < SB_BATCH; l++) f10[k][l] = p[l] * b10[k][l];
+      }
+    }
+    if (beta != 0.) {
+      sb_gather_nodes(10, sb_quadratic_nodes(s, b), stage->v, U);
+      SbQuadraticGradients(g, (const SbLane *)U, PETSC_TRUE, H);
+      for (int l = 0; l < SB_BATCH; l++) p[l] = 0.;
+      for (int q = 0; q < 4 && mean; q++) {
+        if (m->linear)
+          m->ops.frame(m, (const SbLane *)F[q], R);
+        else
+          SbPolar((const SbLane *)F[q], R);
+        for (int k = 0; k < 9; k++) {
+          for (int l = 0; l < SB_BATCH; l++) p[l] += 0.25 * beta * lambda * R[k][l] * H[q][k][l];
+        }
+      }
+    }
+    for (int l = 0; l < SB_BATCH; l++) W[l] = 0.25 * s->batch_V[b][l];
+    for (int q = 0; q < 4; q++) {
+      m->ops.stress(m, (const SbLane *)F[q], P);
+      if (beta != 0.) {
+        SbMaterialDampingStress(m, (const SbLane *)F[q], (const SbLane *)H[q], dP);
+        if (mean && m->linear)
+          m->ops.frame(m, (const SbLane *)F[q], R);
+        else if (mean)
+          SbPolar((const SbLane *)F[q], R);
+        for (int k = 0; k < 9; k++) {
+          for (int l = 0; l < SB_BATCH; l++) P[k][l] += beta * dP[k][l] + (mean ? p[l] * R[k][l] : 0.);
+        }
+      }
+      SbCellForce(g, W, (const SbLane *)P, fe);
+      SbQuadraticAdd(SbRuleQuadratic.L[q], (const SbLane *)fe, f10);
+    }
+    sb_scatter_nodes(10, sb_quadratic_nodes(s, b), s->batch_n[b], (const SbLane *)f10, f);
+  }
+}
+
 PetscErrorCode SbSpaceAddInternalForce(SbSpace s, const SbStage *stage, PetscReal f[])
 {
   PetscFunctionBeginUser;
   PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_RESIDUAL], 0, 0, 0, 0));
   for (PetscInt r = 0; r < s->nregion; r++) {
     PetscCall(PetscLogEventBegin(s->region[r].material->event, 0, 0, 0, 0));
-    add_region_force(s, &s->region[r], stage, f);
+    if (s->region[r].quadratic)
+      add_quadratic_force(s, &s->region[r], stage, f);
+    else
+      add_region_force(s, &s->region[r], stage, f);
     PetscCall(PetscLogEventEnd(s->region[r].material->event, 0, 0, 0, 0));
   }
   if (s->jump) {
@@ -86,17 +146,43 @@ static void add_consistent_inertia(SbSpace s, const SbRegion *region, const SbSt
   }
 }
 
+static void add_quadratic_inertia(SbSpace s, const SbRegion *region, const SbStage *stage, PetscReal f[])
+{
+  const PetscReal alpha = stage->v ? region->alpha : 0.;
+  PetscReal mass[SB_CELL_NODES][SB_CELL_NODES];
+
+  for (int k = 0; k < 100; k++)
+    mass[k / 10][k % 10] = region->material->density * SbQuadraticMass(k / 10, k % 10);
+  for (PetscInt b = region->bstart; b < region->bend; b++) {
+    SbLane w[30] = {{0}}, v[30], fe[30] = {{0}};
+
+    if (stage->a) sb_gather_nodes(10, sb_quadratic_nodes(s, b), stage->a, w);
+    if (alpha != 0.) sb_gather_nodes(10, sb_quadratic_nodes(s, b), stage->v, v);
+    for (int k = 0; alpha != 0. && k < 30; k++) {
+      for (int l = 0; l < SB_BATCH; l++) w[k][l] += alpha * v[k][l];
+    }
+    for (int k = 0; k < 300; k++) {
+      for (int l = 0; l < SB_BATCH; l++)
+        fe[k / 30 * 3 + k % 3][l] += mass[k / 30][k / 3 % 10] * s->batch_V[b][l] * w[k % 30][l];
+    }
+    sb_scatter_nodes(10, sb_quadratic_nodes(s, b), s->batch_n[b], (const SbLane *)fe, f);
+  }
+}
+
 /* Mass-proportional damping of a region with the lumped mass. */
 static void add_lumped_damping(SbSpace s, const SbRegion *region, const PetscReal v[], PetscReal f[])
 {
-  const PetscReal share = region->alpha * region->material->density * region->element->ops.mass_lumped;
+  const PetscReal damping = region->alpha * region->material->density,
+                  share = damping * region->element->ops.mass_lumped,
+                  edge = damping * region->element->ops.mass_lumped_edge;
 
   for (PetscInt b = region->bstart; b < region->bend; b++) {
     for (PetscInt l = 0; l < s->batch_n[b]; l++) {
-      for (PetscInt a = 0; a < 4; a++) {
-        const PetscInt node = s->batch_node[(4 * b + a) * SB_BATCH + l];
+      for (PetscInt a = 0; a < (region->quadratic ? 10 : 4); a++) {
+        const PetscInt node = s->batch_clique[(s->width * b + a) * SB_BATCH + l];
 
-        for (PetscInt i = 0; i < 3; i++) f[3 * node + i] += share * s->batch_V[b][l] * v[3 * node + i];
+        for (PetscInt i = 0; i < 3; i++)
+          f[3 * node + i] += (a < 4 ? share : edge) * s->batch_V[b][l] * v[3 * node + i];
       }
     }
   }
@@ -106,7 +192,12 @@ PetscErrorCode SbSpaceAddInertia(SbSpace s, const SbStage *stage, PetscReal f[])
 {
   PetscFunctionBeginUser;
   if (s->consistent_mass) {
-    for (PetscInt r = 0; r < s->nregion; r++) add_consistent_inertia(s, &s->region[r], stage, f);
+    for (PetscInt r = 0; r < s->nregion; r++) {
+      if (s->region[r].quadratic)
+        add_quadratic_inertia(s, &s->region[r], stage, f);
+      else
+        add_consistent_inertia(s, &s->region[r], stage, f);
+    }
   } else {
     for (PetscInt i = 0; stage->a && i < 3 * s->nnode_owned; i++) f[i] += s->node_mass[i / 3] * stage->a[i];
     for (PetscInt r = 0; stage->v && r < s->nregion; r++) {
@@ -142,33 +233,58 @@ PetscErrorCode SbSpaceCellState(SbSpace s, const PetscReal x[], PetscReal sigma[
   PetscFunctionBeginUser;
   for (PetscInt r = 0; r < s->nregion; r++) {
     const SbRegion *region = &s->region[r];
-    const SbMaterial m = region->material;
 
     for (PetscInt b = region->bstart; region->owned && b < region->bend; b++) {
-      SbLane u[12], F[9], P[9], energy;
+      SbLane F[4][9], P[4][9], energy[4];
+      const PetscInt n = SbBatchState(s, region, b, x, F, sigma ? P : NULL, psi ? energy : NULL, NULL);
 
-      sb_gather_strain(s, region, b, x, u);
-      SbCellGradient(s->batch_g + 9 * b, (const SbLane *)u, F);
-      if (sigma) m->ops.stress(m, (const SbLane *)F, P);
-      if (psi) m->ops.energy(m, (const SbLane *)F, energy);
+      /* means over the points */
       for (PetscInt l = 0; l < s->batch_n[b]; l++) {
         const PetscInt c = s->batch_cell[b] + l;
-        const PetscReal det = lane_det((const SbLane *)F, l);
+        const PetscReal part = 1. / (PetscReal)n;
 
-        if (J) J[c] = det;
-        if (psi) psi[c] = energy[l];
-        if (!sigma) continue;
-        /* small strain has one stress: P itself */
-        if (m->linear) {
-          const int entry[6] = {0, 4, 8, 1, 5, 2};
+        if (J) J[c] = 0.;
+        if (psi) psi[c] = 0.;
+        for (int k = 0; sigma && k < 6; k++) sigma[6 * c + k] = 0.;
+        for (PetscInt q = 0; q < n; q++) {
+          const PetscReal det = lane_det((const SbLane *)F[q], l);
+          PetscReal stress[6];
 
-          for (int k = 0; k < 6; k++) sigma[6 * c + k] = P[entry[k]][l];
-        } else
-          cauchy((const SbLane *)P, (const SbLane *)F, l, det, sigma + 6 * c);
+          if (J) J[c] += part * det;
+          if (psi) psi[c] += part * energy[q][l];
+          if (!sigma) continue;
+          /* small strain has one stress: P itself */
+          if (region->material->linear) {
+            const int entry[6] = {0, 4, 8, 1, 5, 2};
+
+            for (int k = 0; k < 6; k++) stress[k] = P[q][entry[k]][l];
+          } else
+            cauchy((const SbLane *)P[q], (const SbLane *)F[q], l, det, stress);
+          for (int k = 0; k < 6; k++) sigma[6 * c + k] += part * stress[k];
+        }
       }
     }
   }
   PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Exact volumes of the cells of a P2 batch, and the least det F at the points of the rule for them. */
+static void quadratic_volume(SbSpace s, PetscInt b, const PetscReal x[], SbLane volume, SbLane least)
+{
+  SbLane U[30], u[12], F[9];
+
+  sb_gather_nodes(10, sb_quadratic_nodes(s, b), x, U);
+  for (int q = 0; q < SbRuleCubic.n; q++) {
+    SbQuadraticAt(SbRuleCubic.L[q], (const SbLane *)U, u);
+    SbCellGradient(s->batch_g + 9 * b, (const SbLane *)u, F);
+    for (int l = 0; l < SB_BATCH; l++) {
+      const PetscReal det = lane_det((const SbLane *)F, l),
+                      part = SbRuleCubic.weight[q] * s->batch_V[b][l] * det;
+
+      volume[l] = q ? volume[l] + part : part;
+      least[l] = q ? PetscMin(least[l], det) : det;
+    }
+  }
 }
 
 PetscErrorCode SbSpaceStrainEnergy(SbSpace s, const PetscReal x[], PetscReal *energy, PetscReal *minJ,
@@ -181,25 +297,46 @@ PetscErrorCode SbSpaceStrainEnergy(SbSpace s, const PetscReal x[], PetscReal *en
   *ninverted = 0;
   for (PetscInt r = 0; r < s->nregion; r++) {
     const SbRegion *region = &s->region[r];
-    const SbMaterial m = region->material;
 
     for (PetscInt b = region->bstart; region->owned && b < region->bend; b++) {
-      SbLane u[12], F[9], psi;
+      SbLane F[4][9], psi[4], exact = {0}, lowest;
+      const PetscInt n = SbBatchState(s, region, b, x, F, NULL, psi, NULL);
 
-      sb_gather_strain(s, region, b, x, u);
-      SbCellGradient(s->batch_g + 9 * b, (const SbLane *)u, F);
-      m->ops.energy(m, (const SbLane *)F, psi);
+      if (region->quadratic) quadratic_volume(s, b, x, exact, lowest);
       for (PetscInt l = 0; l < s->batch_n[b]; l++) {
-        const PetscReal det = lane_det((const SbLane *)F, l);
+        PetscReal least = region->quadratic ? lowest[l] : PETSC_MAX_REAL;
 
-        *energy += s->batch_V[b][l] * psi[l];
-        *volume += s->batch_V[b][l] * det;
-        *minJ = PetscMin(*minJ, det);
-        *ninverted += det <= 0.;
+        for (PetscInt q = 0; q < n; q++) {
+          const PetscReal det = lane_det((const SbLane *)F[q], l), part = s->batch_V[b][l] / (PetscReal)n;
+
+          *energy += part * psi[q][l];
+          *volume += region->quadratic ? 0. : part * det;
+          least = PetscMin(least, det);
+        }
+        *volume += exact[l];
+        *minJ = PetscMin(*minJ, least);
+        *ninverted += least <= 0.;
       }
     }
   }
   if (s->jump) *energy += SbJumpEnergy(s, x, SB_JUMP_STIFFNESS);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The power of a P2 region's damping: its force times the velocity. */
+static PetscErrorCode quadratic_power(SbSpace s, const SbRegion *region, const PetscReal x[],
+                                      const PetscReal v[], PetscReal *power)
+{
+  const SbStage damped = {.u = x, .v = v}, still = {.u = x};
+  PetscReal *f;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscCalloc1(6 * s->nnode, &f));
+  add_quadratic_force(s, region, &damped, f);
+  add_quadratic_force(s, region, &still, f + 3 * s->nnode);
+  add_lumped_damping(s, region, v, f);
+  for (PetscInt i = 0; i < 3 * s->nnode; i++) *power += v[i] * (f[i] - f[3 * s->nnode + i]);
+  PetscCall(PetscFree(f));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -212,6 +349,10 @@ PetscErrorCode SbSpaceDampingPower(SbSpace s, const PetscReal x[], const PetscRe
     const SbMaterial m = region->material;
 
     if (!region->owned || (region->alpha == 0. && region->beta == 0.)) continue;
+    if (region->quadratic) {
+      PetscCall(quadratic_power(s, region, x, v, power));
+      continue;
+    }
     for (PetscInt b = region->bstart; b < region->bend; b++) {
       SbLane u[12], F[9], H[9], dP[9];
 

@@ -53,6 +53,11 @@ static PetscErrorCode find_regions(SbSpace s, const SbMaterial material[], const
       r->cstart = c;
       r->owned = (PetscBool)(c < mesh->ncell_owned);
       r->broken = (PetscBool)(element[body]->nodes_per[3] > 0);
+      r->quadratic = (PetscBool)(element[body]->nodes_per[1] > 0);
+      r->pointwise = material[m];
+      if (r->quadratic && element[body]->mean_volume &&
+          material[m]->ops.volumetric_modulus(material[m]) != 0.)
+        PetscCall(SbMaterialGetShear(material[m], &r->pointwise));
       r->bstart = s->nbatch;
     }
     s->region[s->nregion - 1].cend = c + 1;
@@ -105,6 +110,8 @@ static PetscErrorCode lump_mass(SbSpace s)
 {
   PetscFunctionBeginUser;
   PetscCall(PetscCalloc1(s->nnode, &s->node_mass));
+  s->node_share = s->node_mass;
+  if (s->edge_node) PetscCall(PetscCalloc1(s->nnode, &s->node_share));
   for (PetscInt r = 0; r < s->nregion; r++) {
     const SbRegion *region = &s->region[r];
     const PetscReal share = region->material->density * region->element->ops.mass_lumped;
@@ -113,6 +120,16 @@ static PetscErrorCode lump_mass(SbSpace s)
       for (PetscInt l = 0; l < s->batch_n[b]; l++) {
         for (PetscInt a = 0; a < 4; a++)
           s->node_mass[s->batch_node[(4 * b + a) * SB_BATCH + l]] += share * s->batch_V[b][l];
+        for (PetscInt a = 0; s->edge_node && a < (region->quadratic ? SB_CELL_NODES : 4); a++) {
+          const PetscInt node = s->batch_clique[(s->width * b + a) * SB_BATCH + l];
+          const PetscReal mass = region->material->density * s->batch_V[b][l];
+
+          if (a >= 4) s->node_mass[node] += region->element->ops.mass_lumped_edge * mass;
+          s->node_share[node] += (!region->quadratic ? region->element->ops.mass_lumped
+                                  : a < 4            ? -0.05
+                                                     : 0.2) *
+                                 mass;
+        }
       }
     }
   }
@@ -178,12 +195,14 @@ PetscErrorCode SbSpaceDestroy(SbSpace *space)
   PetscCall(SbConstraintsDestroy(&s->constraints));
   PetscCall(SbJumpDestroy(&s->jump));
   PetscCall(SbLayoutDestroy(s));
-  if (s->width > 4) PetscCall(PetscFree2(s->batch_clique, s->batch_weight));
+  if (s->width > 4) PetscCall(PetscFree(s->batch_clique));
+  PetscCall(PetscFree(s->batch_weight));
   PetscCall(PetscFree(s->region));
   PetscCall(PetscFree(s->batch_cell));
   PetscCall(PetscFree(s->batch_n));
   PetscCall(PetscFree(s->batch_node));
   PetscCall(PetscFree(s->batch_memory));
+  if (s->node_share != s->node_mass) PetscCall(PetscFree(s->node_share));
   PetscCall(PetscFree(s->node_mass));
   PetscCall(PetscFree(s->fixed_node));
   PetscCall(PetscFree(s->fixed_value));

@@ -91,11 +91,12 @@ PetscErrorCode SbValuesEnd(SbValues *x)
 
 /* What one evaluation multiplies with in a region. */
 typedef struct {
-  PetscReal stiffness; /* on dP/dF */
-  PetscReal damping;   /* on Hooke's tensor turned by R (sbmaterial.h, SbMaterialDampingStress) */
-  PetscReal inertia;   /* on the consistent mass */
-  PetscReal lambda;    /* volumetric modulus of the law, Pa */
-  PetscReal mu;        /* shear modulus of the law, Pa */
+  PetscReal stiffness;    /* on dP/dF */
+  PetscReal damping;      /* on Hooke's tensor turned by R (sbmaterial.h, SbMaterialDampingStress) */
+  PetscReal inertia;      /* on the consistent mass */
+  PetscReal lambda;       /* volumetric modulus of the law, Pa */
+  PetscReal mu;           /* shear modulus of the law, Pa */
+  const SbLane *pressure; /* that a law without lambda is under, Pa, tension; NULL: its own */
 } Factors;
 
 static void add_consistent_mass(const SbElementOps *e, PetscReal inertia, const SbLane V, SbLane K[10][9])
@@ -142,6 +143,7 @@ static void general_blocks(const SbMaterial m, const SbLane *g, const SbLane V, 
     split->factor = x->stiffness;
     remove_volumetric(x->lambda, (const SbLane *)split->D, C);
   }
+  if (x->pressure && m->ops.curvature) m->ops.curvature(m, F, *x->pressure, C);
   scaled_volumes(V, x->stiffness, W);
   SbCellBlocksGeneral(g, W, (const SbLane *)C, K);
   if (x->damping != 0.) {
@@ -164,6 +166,13 @@ static void spin_blocks(const SbMaterial m, const SbLane *g, const SbLane V, con
   SbLane R[9], T[9], W;
 
   m->ops.spin(m, F, R, T);
+  /* T is proportional to pressure - 2 mu; a filtered one keeps to what is not negative */
+  for (int l = 0; x->pressure && l < SB_BATCH; l++) {
+    const PetscReal p =
+      m->tangent == SB_TANGENT_EXACT_SPD ? PetscMax(0., (*x->pressure)[l]) : (*x->pressure)[l];
+
+    for (int k = 0; k < 9; k++) T[k][l] *= 1. - p / (2. * x->mu);
+  }
   for (int k = 0; x->damping != 0. && k < 9; k++) {
     const PetscReal rest = k % 4 ? 0. : x->damping * x->mu;
 
@@ -192,25 +201,100 @@ static void isotropic_blocks(const SbMaterial m, const SbLane *g, const SbLane V
   }
 }
 
-/* Blocks of one batch, without mass; `split` NULL: whole. */
+/* Blocks of a law at F, without mass; `split` NULL: whole. */
+static void law_blocks(const SbMaterial m, const SbLane *g, const SbLane V, const Factors *x,
+                       const SbLane F[9], Split *split, SbLane K[10][9])
+{
+  SbLane R[9];
+
+  if (m->linear || m->ops.frame) {
+    m->ops.frame(m, F, R);
+    isotropic_blocks(m, g, V, x, (const SbLane *)R, split, K);
+  } else if (m->ops.spin && x->stiffness != 0.)
+    spin_blocks(m, g, V, x, F, split, K);
+  else
+    general_blocks(m, g, V, x, F, split, K);
+}
+
+/* The same of one batch. */
 static void batch_blocks(SbSpace s, const SbRegion *region, const PetscReal displacement[], const Factors *x,
                          PetscInt b, Split *split, SbLane K[10][9])
 {
   const SbMaterial m = region->material;
   const SbLane *g = s->batch_g + 9 * b, *V = s->batch_V + b;
-  SbLane u[12], F[9], R[9];
+  SbLane u[12], F[9];
 
   if (!m->linear) {
     sb_gather_strain(s, region, b, displacement, u);
     SbCellGradient(g, (const SbLane *)u, F);
   }
-  if (m->linear || m->ops.frame) {
-    m->ops.frame(m, (const SbLane *)F, R);
-    isotropic_blocks(m, g, *V, x, (const SbLane *)R, split, K);
-  } else if (m->ops.spin && x->stiffness != 0.)
-    spin_blocks(m, g, *V, x, (const SbLane *)F, split, K);
+  law_blocks(m, g, *V, x, (const SbLane *)F, split, K);
+}
+
+/* K_ab += factor b_a b_b^T */
+SB_KERNEL static void add_dyad(const SbLane factor, const SbLane b[restrict 30],
+                               SbLane K[restrict SB_PAIRS][9])
+{
+  for (int p = 0; p < SB_PAIRS; p++) {
+    for (int e = 0; e < 9; e++) {
+      const PetscReal *x = b[3 * SbPairA[p] + e / 3], *y = b[3 * SbPairB[p] + e % 3];
+
+      for (int l = 0; l < SB_BATCH; l++) K[p][e][l] += factor[l] * (x[l] * y[l]);
+    }
+  }
+}
+
+/*
+  A P2 batch (quadratic.c). The law at the points, with the curvature of theta under the mean pressure; then lambda/V b b^T, b = V dm/du, and,
+  where theta is J - 1, V lambda m d^2 m/du^2, which a filtered tangent goes without. Damping has R in the place of D in b.
+*/
+static void quadratic_blocks(SbSpace s, const SbRegion *region, const PetscReal displacement[],
+                             const Factors *x, PetscInt batch, SbLane K[SB_PAIRS][9])
+{
+  const SbMaterial m = region->material, law = region->pointwise;
+  const SbLane *g = s->batch_g + 9 * batch, *V = s->batch_V + batch;
+  const PetscBool mean = (PetscBool)(law != m), one_D = (PetscBool)(m->linear || m->ops.frame || m->ops.spin);
+  SbLane U[30], F[4][9], B[4][10][9] __attribute__((aligned(64))), quarter, p, factor, b[30];
+  Factors at = *x;
+
+  if (m->linear)
+    memset(U, 0, sizeof(U));
   else
-    general_blocks(m, g, *V, x, (const SbLane *)F, split, K);
+    sb_gather_nodes(10, sb_quadratic_nodes(s, batch), displacement, U);
+  SbQuadraticGradients(g, (const SbLane *)U, PETSC_FALSE, F);
+  if (mean) {
+    SbQuadraticVolume(m, g, *V, (const SbLane *)U, (const SbLane(*)[9])F, p, b);
+    at.lambda = 0.;
+    at.pressure = &p;
+  }
+  scaled_volumes(*V, 0.25, quarter);
+  for (int q = 0; q < 4; q++) law_blocks(law, g, quarter, &at, (const SbLane *)F[q], NULL, B[q]);
+  SbQuadraticBlocks((const SbLane(*)[10][9])B, K);
+  if (!mean) return;
+  for (int l = 0; l < SB_BATCH; l++)
+    factor[l] = (*V)[l] > 0. ? x->lambda * (x->stiffness + (one_D ? x->damping : 0.)) / (*V)[l] : 0.;
+  add_dyad(factor, (const SbLane *)b, K);
+  if (m->jacobian && law->tangent != SB_TANGENT_EXACT_SPD) {
+    for (int q = 0; q < SbRuleCubic.n; q++) {
+      SbLane u[12], here[9];
+
+      SbQuadraticAt(SbRuleCubic.L[q], (const SbLane *)U, u);
+      SbCellGradient(g, (const SbLane *)u, here);
+      for (int l = 0; l < SB_BATCH; l++) factor[l] = x->stiffness * SbRuleCubic.weight[q] * (*V)[l] * p[l];
+      SbQuadraticAddJacobian(SbRuleCubic.L[q], g, (const SbLane *)here, factor, K);
+    }
+  }
+  if (one_D || x->damping == 0.) return;
+  memset(b, 0, sizeof(b));
+  for (int q = 0; q < 4; q++) {
+    SbLane R[9], f[12];
+
+    SbPolar((const SbLane *)F[q], R);
+    SbCellForce(g, quarter, (const SbLane *)R, f);
+    SbQuadraticAdd(SbRuleQuadratic.L[q], (const SbLane *)f, b);
+  }
+  for (int l = 0; l < SB_BATCH; l++) factor[l] = (*V)[l] > 0. ? x->lambda * x->damping / (*V)[l] : 0.;
+  add_dyad(factor, (const SbLane *)b, K);
 }
 
 /* b_a = V D grad psi_a and the moduli of a batch. */
@@ -292,6 +376,21 @@ static void fill_region(SbSpace s, PetscInt r, const SbStage *stage, PetscInt nf
   const PetscBool faces = (PetscBool)!region->element->nodes_per[0];
   Split kept, *split = out && faces && factors.lambda > 0. ? &kept : NULL;
 
+  for (PetscInt b = region->bstart; region->quadratic && b < region->bend; b++) {
+    SbLane K[SB_PAIRS][9] __attribute__((aligned(64)));
+
+    quadratic_blocks(s, region, stage->u, &factors, b, K);
+    for (int p = 0; factors.inertia != 0. && p < SB_PAIRS; p++) {
+      const PetscReal share = factors.inertia * SbQuadraticMass(SbPairA[p], SbPairB[p]);
+
+      for (int k = 0; k < 3 * SB_BATCH; k++)
+        K[p][4 * (k / SB_BATCH)][k % SB_BATCH] += share * s->batch_V[b][k % SB_BATCH];
+    }
+    SbInsertClear(s, &fill[0].x, b);
+    SbInsertQuadratic(s, &fill[0].x, b, (const SbLane(*)[9])K);
+  }
+  if (region->quadratic) return;
+
   for (PetscInt b = region->bstart; b < region->bend; b++) {
     SbLane K[10][9] __attribute__((aligned(64)));
 
@@ -329,15 +428,16 @@ static void add_lumped_mass(SbSpace s, const SbStage *stage, const SbValues *x)
   for (PetscInt i = 0; i < s->nnode_owned; i++) add_to_diagonal(s, x, i, stage->shift_a * s->node_mass[i]);
   for (PetscInt r = 0; r < s->nregion; r++) {
     const SbRegion *region = &s->region[r];
-    const PetscReal factor =
-      stage->shift_v * region->alpha * region->material->density * region->element->ops.mass_lumped;
+    const SbElementOps *e = &region->element->ops;
+    const PetscReal factor = stage->shift_v * region->alpha * region->material->density;
 
     for (PetscInt b = region->bstart; factor != 0. && b < region->bend; b++) {
       for (PetscInt l = 0; l < s->batch_n[b]; l++) {
-        for (PetscInt a = 0; a < 4; a++) {
-          const PetscInt node = s->batch_node[(4 * b + a) * SB_BATCH + l];
+        for (PetscInt a = 0; a < (region->quadratic ? 10 : 4); a++) {
+          const PetscInt node = s->batch_clique[(s->width * b + a) * SB_BATCH + l];
+          const PetscReal share = factor * (a < 4 ? e->mass_lumped : e->mass_lumped_edge);
 
-          if (node < s->nnode_owned) add_to_diagonal(s, x, node, factor * s->batch_V[b][l]);
+          if (node < s->nnode_owned) add_to_diagonal(s, x, node, share * s->batch_V[b][l]);
         }
       }
     }
@@ -388,7 +488,7 @@ PetscErrorCode SbSpaceAssembleTangent(SbSpace s, const SbStage *stage, Mat A)
 PetscErrorCode SbSpaceAddCellBlock(SbSpace s, Mat A, PetscInt cell, PetscInt a, PetscInt b,
                                    const PetscReal block[9])
 {
-  const PetscInt row = s->cell_node[4 * cell + a], column = s->cell_node[4 * cell + b],
+  const PetscInt row = SbSpaceCellNode(s, cell, a), column = SbSpaceCellNode(s, cell, b),
                  k = s->plan->offset[SbPlanCellOffset(s, cell) + (size_t)(SB_BATCH * (s->width * a + b))];
   SbValues x;
   size_t rs, cs;
@@ -415,7 +515,7 @@ PetscErrorCode SbSpaceAddSpring(SbSpace s, Mat A, PetscInt cell, PetscInt a, con
   PetscCall(SbSpaceAddCellBlock(s, A, cell, a, a, block));
   PetscCall(get_assembly(A, &own));
   if (own && own->add_spring)
-    PetscCall((own->add_spring)(A, s->cell_node[4 * cell + a], s->block_scale, block));
+    PetscCall((own->add_spring)(A, SbSpaceCellNode(s, cell, a), s->block_scale, block));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -97,8 +97,20 @@ PetscErrorCode SbMaterialDestroy(SbMaterial *m)
 {
   PetscFunctionBeginUser;
   if (!*m) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(SbMaterialDestroy(&(*m)->shear));
   if ((*m)->ops.destroy) PetscCall(((*m)->ops.destroy)(*m));
   PetscCall(PetscFree(*m));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbMaterialGetShear(SbMaterial m, SbMaterial *shear)
+{
+  PetscFunctionBeginUser;
+  if (!m->shear) {
+    PetscCall(SbMaterialCreateElastic(m->law, 2 * m->ops.shear_modulus(m), 0., m->density, &m->shear));
+    PetscCall(SbMaterialSetTangent(m->shear, m->tangent));
+  }
+  *shear = m->shear;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -111,6 +123,7 @@ PetscErrorCode SbMaterialSetTangent(SbMaterial m, SbTangentKind kind)
     PetscCheck(kind == m->tangent, PETSC_COMM_SELF, PETSC_ERR_USER,
                "material law %s has one tangent only: do not choose one", m->law);
   }
+  if (m->shear) PetscCall(SbMaterialSetTangent(m->shear, kind));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -166,6 +166,7 @@ PetscErrorCode SbMaterialCreate_NeoHookean(SbMaterial m)
   m->ops.pressure = pressure_neohookean;
   m->ops.tangent = tangent_neohookean;
   m->ops.volumetric = volumetric_neohookean;
+  m->jacobian = PETSC_TRUE;
   m->symmetric = PETSC_TRUE;
   m->tangent = SB_TANGENT_EXACT;
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -130,6 +130,17 @@ static void volumetric_stvk(const struct _p_SbMaterial *m, const SbLane F[9], Sb
   memcpy(D, F, 9 * sizeof(SbLane));
 }
 
+/* d^2 theta/dF^2 is the identity. */
+static void curvature_stvk(const struct _p_SbMaterial *m, const SbLane F[9], const SbLane p, SbLane C[81])
+{
+  const PetscBool filter = (PetscBool)(m->tangent == SB_TANGENT_EXACT_SPD);
+
+  (void)F;
+  for (int k = 0; k < 9; k++) {
+    for (int l = 0; l < SB_BATCH; l++) C[10 * k][l] += filter && p[l] < 0. ? 0. : p[l];
+  }
+}
+
 PetscErrorCode SbMaterialCreate_StVK(SbMaterial m)
 {
   PetscFunctionBeginUser;
@@ -141,6 +152,7 @@ PetscErrorCode SbMaterialCreate_StVK(SbMaterial m)
   m->ops.pressure = pressure_stvk;
   m->ops.tangent = tangent_stvk;
   m->ops.volumetric = volumetric_stvk;
+  m->ops.curvature = curvature_stvk;
   m->symmetric = PETSC_TRUE;
   m->tangent = SB_TANGENT_EXACT;
   PetscFunctionReturn(PETSC_SUCCESS);

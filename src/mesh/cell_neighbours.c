@@ -1,5 +1,6 @@
 /*
-  cell_neighbours.c - what elements with nodes at faces need of the mesh: who is across a face, and numbers of ghost cells.
+  cell_neighbours.c - what elements with nodes at faces or edges need of the mesh: who is across a face, which cells share an edge, and
+  numbers of ghost cells.
 */
 #include "mesh_impl.h"
 
@@ -12,6 +13,38 @@ PetscErrorCode SbMeshNeighbours(SbMesh mesh, PetscInt **neighbour)
   *neighbour = faces.neighbour;
   faces.neighbour = NULL;
   PetscCall(SbFacesDestroy(&faces));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The edges go into the bucket of their lower vertex (a counting sort); in it those with the same higher vertex are one. */
+PetscErrorCode SbMeshEdges(SbMesh mesh, PetscInt *nedge, PetscInt **edge)
+{
+  static const int vertex[6][2] = {{0, 1}, {0, 2}, {0, 3}, {1, 2}, {1, 3}, {2, 3}};
+  const PetscInt n = 6 * mesh->ncell;
+  PetscInt *low, *high, *start, *item;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscMalloc2(n, &low, n, &high));
+  PetscCall(PetscMalloc1(n, edge));
+  for (PetscInt i = 0; i < n; i++) {
+    const PetscInt *v = mesh->cell + 4 * (i / 6), a = v[vertex[i % 6][0]], b = v[vertex[i % 6][1]];
+
+    low[i] = PetscMin(a, b);
+    high[i] = PetscMax(a, b);
+  }
+  PetscCall(SbGroupByKey(n, low, mesh->nvert, &start, &item));
+  *nedge = 0;
+  for (PetscInt v = 0; v < mesh->nvert; v++) {
+    for (PetscInt i = start[v]; i < start[v + 1]; i++) {
+      PetscInt j = start[v];
+
+      while (high[item[j]] != high[item[i]]) j++;
+      (*edge)[item[i]] = j < i ? (*edge)[item[j]] : (*nedge)++;
+    }
+  }
+  PetscCall(PetscFree2(low, high));
+  PetscCall(PetscFree(start));
+  PetscCall(PetscFree(item));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

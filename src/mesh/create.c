@@ -74,7 +74,7 @@ PetscErrorCode SbMeshCreate(MPI_Comm comm, PetscInt nbody, SbBody body[], PetscI
   m->nset = nset;
   m->set = set;
   PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_MESH_DISTRIBUTE], 0, 0, 0, 0));
-  for (PetscInt b = 0; b < nbody; b++) all = (PetscBool)(all || body[b].face_nodes);
+  for (PetscInt b = 0; b < nbody; b++) all = (PetscBool)(all || body[b].other_nodes);
   PetscCall(SbDistribute(comm, (SbPartitioner)partitioner, all, &merged, &local));
   PetscCall(SbMeshNumber(m, &local));
   PetscCall(PetscLogEventEnd(SbEvents[SB_EVENT_MESH_DISTRIBUTE], 0, 0, 0, 0));

@@ -49,7 +49,7 @@ static PetscErrorCode check_cells(SbMesh m)
   PetscBool all = PETSC_FALSE;
 
   PetscFunctionBeginUser;
-  for (PetscInt b = 0; b < m->nbody; b++) all = (PetscBool)(all || m->body[b].face_nodes);
+  for (PetscInt b = 0; b < m->nbody; b++) all = (PetscBool)(all || m->body[b].other_nodes);
   CHECK(0 <= m->ncell_owned && m->ncell_owned <= m->ncell && m->ncell <= m->Ncell, "Bad numbers of cells");
   for (PetscInt c = 0; c < m->ncell; c++) {
     const PetscInt *v = m->cell + 4 * c;

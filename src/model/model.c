@@ -120,7 +120,11 @@ PetscErrorCode SbModelSetUp(SbModel m)
   PetscReal mass = 0.;
 
   PetscFunctionBeginUser;
-  for (PetscInt b = 0; b < m->nbody; b++) m->body[b].face_nodes = (PetscBool)!m->element[b]->nodes_per[0];
+  for (PetscInt b = 0; b < m->nbody; b++) {
+    const PetscInt *per = m->element[b]->nodes_per;
+
+    m->body[b].other_nodes = (PetscBool)(!per[0] || per[1]);
+  }
   PetscCall(SbMeshCreate(m->comm, m->nbody, m->body, m->nset, m->set, &m->mesh));
   if (m->nmaterial > m->nbody) PetscCall(check_inclusions(m));
   for (PetscInt b = 0; b < m->nbody; b++) {
@@ -132,6 +136,15 @@ PetscErrorCode SbModelSetUp(SbModel m)
   PetscCall(SbSpaceCreate(m->mesh, m->material, m->element, &m->space));
   m->load = 1.;
   m->linear = m->space->linear;
+  for (PetscInt e = 0; m->space->edge_node && e < m->neffect; e++) {
+    const SbEffectOps *ops = &m->effect[e]->ops;
+
+    PetscCheck(!ops->overlaps && !ops->assemble_constraints && !ops->begin_guarded, m->comm,
+               PETSC_ERR_USER_INPUT,
+               "effect %s: contact is not there yet for scenes with a body of element p2: choose "
+               "-body_<name>_element p1, cr or dg",
+               m->effect[e]->name);
+  }
   PetscCall(choose_responses(m));
   for (PetscInt e = 0; e < m->neffect; e++) {
     m->effect[e]->dynamic = m->dynamic;

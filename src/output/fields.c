@@ -249,7 +249,7 @@ PetscErrorCode SbFieldPrepare(SbRun run, SbOutput out)
     if (!f->cell) PetscCall(SbPointsPrepare(run, out));
     if (f->compute == reaction || f->compute == contact_force) {
       run->want_residual = PETSC_TRUE;
-      if (run->model->space->faces || out->discontinuous) PetscCall(SbPointsPrepareForces(run, out));
+      if (!run->model->space->vertices || out->discontinuous) PetscCall(SbPointsPrepareForces(run, out));
     }
   }
   PetscFunctionReturn(PETSC_SUCCESS);

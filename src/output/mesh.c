@@ -35,9 +35,9 @@ PetscErrorCode SbOutputOrder(SbRun run, SbOutput out)
   /* the positions of vertices, cells and nodes in a file, whatever the partition */
   PetscCall(SbOrderCreate(out->comm, mesh->Nvert, mesh->nvert_owned, mesh->vert_orig, &out->vertex));
   PetscCall(SbOrderCreate(out->comm, mesh->Ncell, mesh->ncell_owned, mesh->cell_orig, &out->cell));
-  if (space->faces) {
-    PetscCall(SbOrderCreateSparse(out->comm, mesh->Nvert + 8 * mesh->Ncell, space->nnode_owned,
-                                  space->node_orig, &out->node));
+  if (!space->vertices) {
+    PetscCall(SbOrderCreateSparse(out->comm, mesh->Nvert + (space->edge_node ? 14 : 8) * mesh->Ncell,
+                                  space->nnode_owned, space->node_orig, &out->node));
   } else {
     PetscCall(SbOrderRepeat(&out->vertex, 1, &out->node));
   }

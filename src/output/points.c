@@ -8,7 +8,7 @@
 
   A nodal force of CR or DG acts at the centroid of a face. One third of it goes to each vertex of the face, which keeps its
   resultant and its moment. Where a node belongs to several cells and these have points of their own, each has an equal part.
-  What a DG cell does to the support of a face is a force of that face, too.
+  Half of a force at an edge of P2 goes to each of its ends. What a DG cell does to the support of a face is a force of that face, too.
 */
 #include "output_impl.h"
 
@@ -44,7 +44,7 @@ PetscErrorCode SbPointsPrepare(SbRun run, SbOutput out)
   PetscFunctionBeginUser;
   if (out->points) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscNew(&out->points));
-  if (!s->faces) PetscFunctionReturn(PETSC_SUCCESS);
+  if (s->vertices) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(find_around(s->mesh, out->points));
 
   /* weights of the means over cells */
@@ -64,6 +64,9 @@ PetscErrorCode SbPointsPrepareForces(SbRun run, SbOutput out)
   if (out->points->valence) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscCalloc1(3 * s->nnode, &count));
   for (PetscInt i = 0; i < 4 * s->mesh->ncell; i++) count[3 * s->cell_node[i]] += 1.;
+  for (PetscInt i = 0; s->edge_node && i < 6 * s->mesh->ncell; i++) {
+    if (s->edge_node[i] >= 0) count[3 * s->edge_node[i]] += 1.;
+  }
   PetscCall(SbSpaceUpdateGhosts(s, count));
   PetscCall(PetscMalloc1(s->nnode, &out->points->valence));
   for (PetscInt i = 0; i < s->nnode; i++) out->points->valence[i] = count[3 * i];
@@ -104,9 +107,9 @@ static void corner_value(SbSpace s, PetscInt corner, const PetscReal x[], PetscR
 /* The node at an owned vertex, or -1 where the body has its nodes at faces. */
 static PetscInt vertex_node(SbSpace s, SbPoints p, PetscInt vertex)
 {
-  const PetscInt corner = s->faces ? p->corner[p->start[vertex]] : 0;
+  const PetscInt corner = s->vertices ? 0 : p->corner[p->start[vertex]];
 
-  if (!s->faces) return vertex;
+  if (s->vertices) return vertex;
   return SbSpaceCellElement(s, corner / 4)->nodes_per[0] ? s->cell_node[corner] : -1;
 }
 
@@ -140,7 +143,7 @@ PetscErrorCode SbPointsValues(SbRun run, SbOutput out, Vec x, PetscReal values[]
   const PetscReal *array;
 
   PetscFunctionBeginUser;
-  if (!s->faces && !out->discontinuous) {
+  if (s->vertices && !out->discontinuous) {
     PetscCall(VecGetArrayRead(x, &array));
     PetscCall(PetscArraycpy(values, array, 3 * s->mesh->nvert_owned));
     PetscCall(VecRestoreArrayRead(x, &array));
@@ -181,6 +184,12 @@ static void add_corner_force(const Forces *f, const PetscReal valence[], PetscIn
 
   if (SbSpaceCellElement(s, corner / 4)->nodes_per[0]) {
     add_force(f, node[corner % 4], 1. / valence[node[corner % 4]], value);
+    for (int e = 0; s->edge_node && e < 6; e++) {
+      const PetscInt at = s->edge_node[6 * (corner / 4) + e];
+
+      if (at >= 0 && (SbTetEdge[e][0] == corner % 4 || SbTetEdge[e][1] == corner % 4))
+        add_force(f, at, 0.5 / valence[at], value);
+    }
   } else {
     // node a lies opposite vertex a: this corner belongs to the faces of the others
     for (int a = 0; a < 4; a++) {
@@ -204,7 +213,9 @@ PetscErrorCode SbPointsForces(SbRun run, SbOutput out, PetscBool prescribed, Vec
   PetscCall(PetscArrayzero(values, 3 * n));
   PetscCall(SbSpaceGetLocalRead(s, R, &f.r));
   for (PetscInt i = 0; i < n; i++) {
-    const PetscInt node = out->discontinuous ? -1 : vertex_node(s, p, i);
+    const PetscInt corner = s->vertices || out->discontinuous ? 0 : p->corner[p->start[i]];
+    const PetscBool edges = (PetscBool)(s->edge_node && s->edge_node[6 * (corner / 4)] >= 0);
+    const PetscInt node = out->discontinuous || edges ? -1 : vertex_node(s, p, i);
 
     if (out->discontinuous) {
       add_corner_force(&f, p->valence, i, values + 3 * i);

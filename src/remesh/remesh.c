@@ -183,6 +183,12 @@ PetscErrorCode SbRemeshSetFromOptions(SbModel m, SbRemesh *remesh)
   r->how.quality = QUALITY_LEAST;
   r->how.mesher = SbMesherDefault;
   if (!any && !r->ntime && !r->failed) PetscCall(SbRemeshDestroy(remesh));
+  for (PetscInt b = 0; *remesh && b < m->nbody; b++) {
+    PetscCheck(
+      !m->element[b]->nodes_per[1], PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
+      "re-meshing (-remesh_...) is not there yet for element p2, which body %s has: choose p1, cr or dg",
+      m->body[b].name);
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -28,8 +28,9 @@ static const SbOption body_rows[] = {
   {"rotate", SB_OPTION_REALS, 4, "", "0,0,1,0", "(-inf, inf)",
    "axis x,y,z and angle in degrees, before translation"},
   {"translate", SB_OPTION_REALS, 3, "m", "0,0,0", "(-inf, inf)", "shift of the scaled and rotated mesh"},
-  {"element", SB_OPTION_STRING, 1, "", "p1", "p1|cr|dg",
-   "finite element; cr and dg do not lock when poisson is near 0.5"},
+  {"element", SB_OPTION_STRING, 1, "", "p1", "p1|p2|cr|dg",
+   "finite element; p2, cr and dg do not lock when poisson is near 0.5, p2 is the most accurate where the "
+   "solution is smooth"},
   {"material", SB_OPTION_STRING, 1, "", "", LAWS, "material law, required"},
   {"inclusions", SB_OPTION_NAMES, 1, "", "", "",
    "sets or volume groups whose tetrahedra have a material of their own, -inclusion_<name>_..."},

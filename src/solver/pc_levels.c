@@ -105,7 +105,7 @@ static PetscErrorCode find_means(SbLevels v)
   }
   for (PetscInt b = 0; b < s->nbatch; b++) {
     for (PetscInt k = 0; k < 4 * SB_BATCH; k++) {
-      const PetscInt *node = s->batch_clique + (size_t)b * 8 * SB_BATCH + k;
+      const PetscInt *node = s->batch_clique + (size_t)(b * s->width) * SB_BATCH + k;
 
       v->weight[node[0]] = s->batch_weight[4 * b + k / SB_BATCH][k % SB_BATCH];
       if (node[4 * SB_BATCH] != node[0]) v->across[node[0]] = node[4 * SB_BATCH];

@@ -209,7 +209,7 @@ static void add_squares(SbPressureOperator op, PetscReal y[])
 
           y[3 * node + k % 3] += square * PetscSqr(weight);
           if (region->broken)
-            y[3 * s->batch_clique[(8 * b + 4 + k / 3) * SB_BATCH + l] + k % 3] +=
+            y[3 * s->batch_clique[(s->width * b + 4 + k / 3) * SB_BATCH + l] + k % 3] +=
               square * PetscSqr(1. - weight);
         }
       }
@@ -373,9 +373,10 @@ PetscErrorCode SbPressureOperatorCreate(SbSpace s, Mat *K)
   SbPressureOperator op;
 
   PetscFunctionBeginUser;
-  PetscCheck(s->faces, s->comm, PETSC_ERR_USER,
-             "-solver pressure is for bodies with -body_<name>_element cr or dg, and there are none: choose "
-             "auto, or cg_two_level");
+  PetscCheck(
+    s->faces && !s->edge_node, s->comm, PETSC_ERR_USER,
+    "-solver pressure is for bodies with -body_<name>_element cr or dg, %s: choose auto, or cg_two_level",
+    s->faces ? "and some have p2" : "and there are none");
   PetscCall(PetscNew(&op));
   op->space = s;
   PetscCall(SbLevelsCreate(s, &op->levels));

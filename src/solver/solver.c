@@ -35,7 +35,8 @@ static PetscErrorCode create_frames(SbSpace s, Mat *A)
   PetscFunctionBeginUser;
   PetscCall(SbSpaceAllowsMatrixFree(s, &frames));
   PetscCheck(frames, s->comm, PETSC_ERR_USER,
-             "-solver realtime is for -mass lumped and the materials linear, and corotated with "
+             "-solver realtime is for -mass lumped, the elements p1, cr and dg, and the materials linear, "
+             "and corotated with "
              "-body_<name>_tangent warped: choose these, or -solver rotated");
   PetscCall(SbSpaceCreateMatrixFree(s, A));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -297,7 +298,7 @@ PetscErrorCode SbSolverChoose(SbSpace s, PetscBool dynamic, PetscBool linear, Pe
                             " unknowns, nu up to %g, %.2g %% of the tets slivers (angles below %g degrees): "
                             "a factorisation, iterations hardly get there",
                             unknowns, (double)hard.nu, 100. * (double)hard.sliver_part, SB_SLIVER));
-  } else if (s->faces && !s->nodal && !s->constraints && !s->coupled &&
+  } else if (s->faces && !s->edge_node && !s->nodal && !s->constraints && !s->coupled &&
              (hard.face_nu > NU_PRESSURE || (!hard.slivers && (!dynamic || hard.dg)))) {
     /* docs/reports/solver_choice.md; 24k tets of CR, dynamic, CPU s of this and cg_two_level at nu 0.3 12 and 7, at 0.45 15 and 11, at 0.49 17 and 17 */
     name = "pressure";
@@ -359,7 +360,8 @@ static PetscErrorCode find_other(SbSpace s, const char *name, PetscBool indefini
     if (*preset && tried & 1U << (*preset - presets)) *preset = NULL;
   }
   if (*preset && tried & 1U << (*preset - presets)) *preset = NULL;
-  if (*preset && (*preset)->create && (!s->faces || s->nodal || s->constraints)) *preset = NULL;
+  if (*preset && (*preset)->create && (!s->faces || s->edge_node || s->nodal || s->constraints))
+    *preset = NULL;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -38,12 +38,15 @@ static PetscErrorCode label_parts(SbSpace s, PetscInt **label)
     if (s->dirichlet_node && s->dirichlet_node[k] >= 0)
       (void)SbUnionJoin(parent, s->cell_node[k], s->dirichlet_node[k]);
   }
-  /* cells of dg have nodes of their own: they are joined across faces */
-  for (PetscInt b = 0; s->width > 4 && b < s->nbatch; b++) {
+  /* cells of dg have nodes of their own: they are joined across faces; those of P2 at edges follow */
+  for (PetscInt i = 0; s->edge_node && i < 6 * s->mesh->ncell; i++) {
+    if (s->edge_node[i] >= 0) (void)SbUnionJoin(parent, s->cell_node[4 * (i / 6)], s->edge_node[i]);
+  }
+  for (PetscInt b = 0; s->batch_weight && b < s->nbatch; b++) {
     for (PetscInt k = 0; k < 4 * SB_BATCH; k++) {
       if (k % SB_BATCH < s->batch_n[b])
         (void)SbUnionJoin(parent, s->batch_node[4 * SB_BATCH * b + k],
-                          s->batch_clique[8 * SB_BATCH * b + 4 * SB_BATCH + k]);
+                          s->batch_clique[(s->width * b + 4) * SB_BATCH + k]);
     }
   }
 

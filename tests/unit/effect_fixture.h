@@ -88,7 +88,7 @@ static inline PetscErrorCode fixture_create(MPI_Comm comm, PetscInt nbody, const
     PetscCall(SbScopeSet(&scope, "body", "linear", names[b]));
     PetscCall(SbMaterialCreate("linear", &scope, &x->material[b]));
     PetscCall(SbElementCreate(body->element, NULL, &x->element[b]));
-    body->face_nodes = (PetscBool)!x->element[b]->nodes_per[0];
+    body->other_nodes = (PetscBool)(!x->element[b]->nodes_per[0] || x->element[b]->nodes_per[1]);
   }
   for (PetscInt k = 0; k < nset; k++) {
     PetscCall(SbSetParse(sets[k][0], sets[k][1], &x->set[k]));
@@ -187,7 +187,7 @@ static inline PetscErrorCode check_serial(const Fixture *parallel, const Fixture
   PetscInt *where;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscMalloc1(serial->mesh->Nvert + 8 * serial->mesh->Ncell, &where));
+  PetscCall(PetscMalloc1(serial->mesh->Nvert + 14 * serial->mesh->Ncell, &where));
   for (PetscInt i = 0; i < serial->space->nnode; i++) where[serial->space->node_orig[i]] = i;
   for (PetscInt i = 0; i < parallel->space->nnode_owned; i++) {
     const PetscInt j = where[parallel->space->node_orig[i]];

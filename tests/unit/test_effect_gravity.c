@@ -22,11 +22,12 @@ static const LoadCase cases[] = {
 
 int main(int argc, char **argv)
 {
-  static const char *const elements[][2] = {{"p1", "p1"}, {"cr", "cr"}, {"dg", "p1"}, {"cr", "dg"}};
+  static const char *const elements[][2] = {
+    {"p1", "p1"}, {"cr", "cr"}, {"dg", "p1"}, {"cr", "dg"}, {"p2", "cr"}};
 
   SB_TEST_BEGIN(argc, argv);
   PetscCall(fixture_register());
-  for (int k = 0; k < 4; k++) {
+  for (int k = 0; k < 5; k++) {
     FixturePair p;
 
     fixture_use(elements[k][0], elements[k][1], PETSC_FALSE);

@@ -39,11 +39,11 @@ static const LoadCase cases[] = {
 
 int main(int argc, char **argv)
 {
-  static const char *const elements[] = {"p1", "cr", "dg", "dg"};
+  static const char *const elements[] = {"p1", "cr", "dg", "dg", "p2"};
 
   SB_TEST_BEGIN(argc, argv);
   PetscCall(fixture_register());
-  for (int k = 0; k < 4; k++) {
+  for (int k = 0; k < 5; k++) {
     FixturePair p;
 
     fixture_use(elements[k], elements[k],

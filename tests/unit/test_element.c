@@ -184,7 +184,7 @@ int main(int argc, char **argv)
 
   SB_TEST_BEGIN(argc, argv);
   PetscCall(SbElementRegisterAll());
-  SB_CHECK_ERROR(SbElementCreate("p2", NULL, &e), PETSC_ERR_USER, "\"p2\"");
+  SB_CHECK_ERROR(SbElementCreate("p4", NULL, &e), PETSC_ERR_USER, "\"p4\"");
   PetscCall(PetscRandomCreate(PETSC_COMM_SELF, &random));
   PetscCall(PetscRandomSetSeed(random, 99));
   PetscCall(PetscRandomSeed(random));

@@ -1,6 +1,6 @@
 // @ranks 1 2 3 4
 /*
-  Which nodes a space has: P1 at vertices, CR one per face, DG four per cell and one for each held face, also side by side in
+  Which nodes a space has: P1 at vertices, P2 at vertices and edges, CR one per face, DG four per cell and one for each held face, also side by side in
   one space. Their number, their places, what they are shared by, and that all of it is the same on one rank and on several.
 */
 #include "../scene.h"
@@ -19,6 +19,8 @@ static const char *const scenes[] = {
   "-bodies a" BODY("a", "cr", "0") SETS,
   "-bodies a" BODY("a", "dg", "0") SETS,
   "-bodies a,b,c,d" BODY("a", "dg", "0") BODY("b", "p1", "1") BODY("c", "cr", "2") BODY("d", "dg", "3") SETS,
+  "-bodies a" BODY("a", "p2", "0") SETS,
+  "-bodies a,b,c,d" BODY("a", "dg", "0") BODY("b", "p2", "1") BODY("c", "p1", "2") BODY("d", "cr", "3") SETS,
 };
 
 static PetscErrorCode open_on(MPI_Comm comm, const char *options, SbModel *m)
@@ -43,7 +45,8 @@ static PetscInt expected_nodes(SbModel m)
     const SbBody *body = &m->mesh->body[b];
     const PetscInt *per = m->space->element[b]->nodes_per;
 
-    /* each inner face is one of two cells */
+    /* each inner face is one of two cells; a box has vertices - edges + faces - cells = 1 */
+    if (per[1]) n += body->nvert + (4 * body->ncell + body->nfacet) / 2 - body->ncell - 1;
     n += per[0] ? body->nvert : per[3] ? 4 * body->ncell : (4 * body->ncell + body->nfacet) / 2;
     /* the first body stands on the plane that is constrained: 3 x 3 squares of two triangles */
     if (b == 0 && per[3]) n += 18;
@@ -68,6 +71,16 @@ static void check_cells(SbModel m)
 
       for (PetscInt a = 0; a < 4; a++) sum += (a == i % 4) == (per[0] > 0) ? mesh->x[3 * v[a] + k] : 0.;
       SB_CHECK_NEAR(s->node_x[3 * node + k], per[0] ? sum : sum / 3., 1e-15, "place of a node");
+    }
+    for (PetscInt e = 0; per[1] && i % 4 == 0 && e < 6; e++) {
+      const PetscInt at = SbSpaceCellNode(s, i / 4, 4 + e);
+
+      SB_CHECK(at >= 0 && at < s->nnode && s->node_body[at] == mesh->cell_body[i / 4], "node %d at an edge",
+               (int)at);
+      for (int k = 0; k < 3; k++)
+        SB_CHECK_NEAR(s->node_x[3 * at + k],
+                      0.5 * (mesh->x[3 * v[SbTetEdge[e][0]] + k] + mesh->x[3 * v[SbTetEdge[e][1]] + k]),
+                      1e-15, "place of a node at an edge");
     }
     if (other < 0 || per[0]) continue;
     PetscInt same = 0;
@@ -101,7 +114,7 @@ static PetscErrorCode describe(SbModel m, PetscInt n, PetscReal **table)
 /* Every node has one owner, and the space of all ranks has the nodes of the space of one. */
 static PetscErrorCode compare(SbModel m, SbModel alone)
 {
-  const PetscInt n = m->mesh->Nvert + 8 * m->mesh->Ncell;
+  const PetscInt n = m->mesh->Nvert + 14 * m->mesh->Ncell;
   PetscReal *one, *all, mass = 0.;
   PetscInt count = 0, fixed = 0, in_set = 0;
 

@@ -103,7 +103,7 @@ static PetscErrorCode test_scene(const char *partitioner, PetscBool face_nodes)
   PetscCall(PetscOptionsSetValue(NULL, "-mesh_partitioner", partitioner));
   PetscCall(make_scene(body, set));
   PetscCall(make_scene(body_again, set_again));
-  body[0].face_nodes = face_nodes;
+  body[0].other_nodes = face_nodes;
   PetscCall(SbMeshCreate(PETSC_COMM_WORLD, 3, body, NSET, set, &mesh));
   PetscCall(SbMeshValidate(mesh));
   PetscCall(SbMergedMeshCreate(PETSC_COMM_SELF, SB_READING_AUTO, 3, body_again, NSET, set_again, &whole));

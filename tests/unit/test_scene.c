@@ -196,7 +196,7 @@ static PetscErrorCode test_values(void)
   PetscCall(refused("-bodies liver", "-body_liver_mesh"));
   PetscCall(refused("-bodies liver -body_liver_mesh box:1,1,1:2", "-body_liver_material"));
   PetscCall(refused(LIVER " -body_liver_material corotate", "-body_liver_material corotate|corotated"));
-  PetscCall(refused(LIVER " -body_liver_element p2", "-body_liver_element p2|p1"));
+  PetscCall(refused(LIVER " -body_liver_element p7", "-body_liver_element p7|p1"));
   PetscCall(refused(LIVER " -body_liver_scale 0", "-body_liver_scale 0|(0, inf)"));
   PetscCall(refused(LIVER " -body_liver_rotate 0,0,0,10", "-body_liver_rotate|0,0,0"));
   PetscCall(refused(LIVER " -body_liver_young -1", "-body_liver_young -1 Pa|(0, inf) Pa"));

@@ -243,16 +243,19 @@ int main(int argc, char **argv)
   PetscCall(check_decay("p1", 0.05));
   PetscCall(check_decay("cr", 0.002));
   PetscCall(check_decay("dg", 0.002));
+  PetscCall(check_decay("p2", 0.002));
   PetscCall(check_account("newmark", "p1", "corotated", 2, 1e-3));
   PetscCall(check_account("euler_implicit", "p1", "corotated", 1, 0.1));
   PetscCall(check_account("newmark", "cr", "corotated", 2, 1e-3));
   PetscCall(check_account("newmark", "dg", "corotated", 2, 1e-3));
+  PetscCall(check_account("newmark", "p2", "corotated", 2, 1e-3));
   PetscCall(check_flight("euler_implicit", "p1", "corotated", 2e-3, 1));
   PetscCall(check_flight("newmark", "p1", "corotated", 2e-3, 2));
   PetscCall(check_flight("genalpha", "p1", "stvk", 2e-3, 2));
   PetscCall(check_flight("euler_symplectic", "p1", "corotated", 2e-4, 0));
   PetscCall(check_flight("newmark", "cr", "corotated", 2e-3, 2));
   PetscCall(check_flight("newmark", "dg", "corotated", 2e-3, 2));
+  PetscCall(check_flight("newmark", "p2", "corotated", 2e-3, 2));
   if (size > 1) SB_TEST_END(); /* laws and short steps do not know of ranks */
   PetscCall(check_flight("newmark", "p1", "neohookean", 2e-3, 2));
   PetscCall(check_flight("genalpha", "p1", "linear", 2e-3, -1));

@@ -3,7 +3,7 @@
   The patch test (MacNeal and Harder, "A proposed standard set of problems to test finite element accuracy", 1985): a body
   that is constrained on its boundary, or pulled there, as a homogeneous deformation x = F X asks for must take it inside too, on
   any mesh. Small strains with the displacement of that paper, and a large strain with every law: the stress is compared
-  with the law's formula, which is written down here once more. The linear system is solved directly. The same for CR and DG:
+  with the law's formula, which is written down here once more. The linear system is solved directly. The same for P2, CR and DG:
   their nodes on the boundary are moved or pulled, and those inside, among them all jumps, must follow.
 
   Tolerances: displacements 1e-10 of the largest; 1e-9 with CR and DG at nu = 0.4999, whose many unknowns inside feel the
@@ -282,14 +282,14 @@ static PetscErrorCode check_mesh(const Patch *p)
 
 int main(int argc, char **argv)
 {
-  static const char *const elements[] = {"p1", "cr", "dg"};
+  static const char *const elements[] = {"p1", "cr", "dg", "p2"};
   Patch p;
 
   SB_TEST_BEGIN(argc, argv);
   for (p.shape = REGULAR; p.shape <= SLIVERS; p.shape++) {
     PetscCall(write_mesh(p.shape, p.shape == SLIVERS ? 5 : 3, p.path));
-    for (int e = 0; e < 3; e++) {
-      /* CR and DG: one mesh without slivers is enough */
+    for (int e = 0; e < 4; e++) {
+      /* the others: one mesh without slivers is enough */
       if (e > 0 && p.shape == REGULAR) continue;
       p.element = elements[e];
       PetscCall(check_mesh(&p));

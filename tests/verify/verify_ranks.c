@@ -180,5 +180,6 @@ int main(int argc, char **argv)
                   "-effect_clamp_on bar.xmin -mass consistent -time euler_symplectic -ts_max_time 0.05"));
   PetscCall(check_element("cr", "p1"));
   PetscCall(check_element("dg", "cr"));
+  PetscCall(check_element("p2", "dg"));
   SB_TEST_END();
 }

@@ -226,11 +226,11 @@ static PetscErrorCode check_rod(const char *element, const char *law)
 
 int main(int argc, char **argv)
 {
-  static const char *const elements[] = {"p1", "cr", "dg"}, *const laws[] = {"corotated", "stvk",
-                                                                             "neohookean", "linear"};
+  static const char *const elements[] = {"p1", "cr", "dg", "p2"}, *const laws[] = {"corotated", "stvk",
+                                                                                   "neohookean", "linear"};
 
   SB_TEST_BEGIN(argc, argv);
-  for (int e = 0; e < 3; e++) {
+  for (int e = 0; e < 4; e++) {
     for (int law = 0; law < 4; law++) PetscCall(check_turned(elements[e], laws[law]));
     PetscCall(check_spin(elements[e], "corotated", 1e9, 10., 0.01, 1e-6, 0.02));
   }

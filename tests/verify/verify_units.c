@@ -152,6 +152,9 @@ int main(int argc, char **argv)
   PetscCall(check("p1", "stvk", "-time genalpha -snes_rtol 1e-8", 0.3));
   PetscCall(check("p1", "corotated", "-time newmark -ts_adapt_type basic -snes_rtol 1e-8", 0.3));
   PetscCall(check("p1", "neohookean", "-time euler_symplectic", 0.1));
+  PetscCall(check("p2", "neohookean", "-time static -solver direct -snes_rtol 1e-10", 0.));
+  PetscCall(check("p2", "corotated", "-time newmark -snes_rtol 1e-10 -solver direct", 0.05));
+  PetscCall(check("p2", "stvk", "-time euler_symplectic", 0.002));
   PetscCall(check("cr", "neohookean", "-time static -solver direct -snes_rtol 1e-10", 0.));
   PetscCall(check("dg", "neohookean", "-time static -solver direct -snes_rtol 1e-10", 0.));
   PetscCall(check("cr", "corotated", "-time newmark -snes_rtol 1e-10 -solver direct", 0.05));
