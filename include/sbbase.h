@@ -11,6 +11,8 @@
 #define SB_NAME_MAX 64         /* longest name of a body, set or effect, with the terminating zero */
 #define SB_OPTION_COUNT_MAX 16 /* most numbers or formulas in one option */
 
+#define SB_OPTION_DEFAULT "default" /* -body_default_<key> is what bodies take that are not given a <key> */
+
 /* ------------------------------------------------------------------ options */
 
 typedef enum {
@@ -56,7 +58,7 @@ PetscErrorCode SbOptionsRegister(const char *klass, const char *type, PetscInt n
 PetscErrorCode SbScopeSet(SbScope *scope, const char *klass, const char *type, const char *instance);
 
 /*
-  Readers: value given by the user, or else the preset of the row. Each value read is remembered with its text (for
+  Readers: value given by the user for the instance, for what it is a copy of (SbOptionsInherit()), or, of bodies, for all of them by -body_default_<key>; or else the preset of the row. Each value read is remembered with its text (for
   SbOptionsView() and SbOptionsCheck()). Errors (PETSC_ERR_USER, one line that names the full option, value, range, unit):
   unreadable text, value out of range, missing required option. Reading a key without a row is a programming error.
 */
@@ -69,6 +71,8 @@ PetscErrorCode SbOptionNames(const SbScope *scope, const char *key, PetscInt *n,
                              char (**names)[SB_NAME_MAX]); /* PetscFree */
 PetscErrorCode SbOptionChoice(const SbScope *scope, const char *key,
                               PetscInt *index); /* position in `range` */
+/* From now on -<klass>_<instance>_<key> that is not given is -<klass>_<from>_<key>, and one record with it: `instance` is a copy of `from`. Not collective. */
+PetscErrorCode SbOptionsInherit(const char *klass, const char *instance, const char *from);
 PetscErrorCode SbOptionGiven(const SbScope *scope, const char *key, PetscBool *given); /* by the user */
 
 /* Reads and checks a value that is asked for only later, when much has been computed already. */
@@ -139,9 +143,12 @@ void SbErrorSetTrace(
 void SbErrorSetProgram(const char *name);
 /* The option file that PETSc is about to read: PETSc's messages about YAML do not name it. */
 void SbErrorSetFile(const char *file);
+/* Where the YAML file that PETSc has just refused goes wrong, as "line 6: ..." in the message of that error. Not collective. */
+void SbErrorFindYamlLine(void);
 /* An error line at the end of a run whose calls all succeeded: a solver gave up, the output is complete. A printf format. */
 void SbErrorPost(const char *format, ...) PETSC_ATTRIBUTE_FORMAT(1, 2);
-#define SB_EXIT_STOPPED 75 /* exit code of a run that was asked to stop and can go on: EX_TEMPFAIL of sysexits.h */
+#define SB_EXIT_STOPPED \
+  75 /* exit code of a run that was asked to stop and can go on: EX_TEMPFAIL of sysexits.h */
 /* What is posted is no error, but that the run was asked to stop: the line says so, and the exit code is SB_EXIT_STOPPED. */
 void SbErrorSetStopped(void);
 /* What one rank does when the run fails, before the error line: with PETSc as it was left, no communication. NULL: nothing. */

@@ -135,12 +135,13 @@ struct _p_SbEffect {
   char type[SB_NAME_MAX];
   SbEffectOps ops;
   PetscLogEvent
-    event;           /* SbEff_<type>, around every operation of the table from `setup` to `contact_points` */
-  PetscBool linear;  /* force does not depend on u: the tangent stays constant. Default PETSC_TRUE */
-  PetscBool steady;  /* no formula uses t: a static run multiplies the effect by the load factor */
-  PetscBool dynamic; /* the run has inertia; known from set-up on */
-  PetscBool saddle;  /* its constraints are to be solved with their multipliers as unknowns */
-  PetscBool euler;   /* made for implicit Euler only. Default PETSC_FALSE */
+    event;          /* SbEff_<type>, around every operation of the table from `setup` to `contact_points` */
+  PetscBool linear; /* force does not depend on u: the tangent stays constant. Default PETSC_TRUE */
+  PetscBool steady; /* no formula uses t: a static run multiplies the effect by the load factor */
+  PetscReal from, until; /* s (or load factor): it acts at times t with from < t <= until; all by default */
+  PetscBool dynamic;     /* the run has inertia; known from set-up on */
+  PetscBool saddle;      /* its constraints are to be solved with their multipliers as unknowns */
+  PetscBool euler;       /* made for implicit Euler only. Default PETSC_FALSE */
   PetscBool
     springs; /* of contact: it pushes with springs or friction, not with constraints alone. Default PETSC_FALSE */
   const struct SbEffectOn_ *prescribed; /* the sets whose nodes it prescribes in all directions; NULL: none */
@@ -152,6 +153,9 @@ struct _p_SbEffect {
   void *data;
 };
 
+/* Whether it acts at a time, or from that time on; ends of steps may be off by rounding. Not collective. */
+PetscBool SbEffectActs(SbEffect e, PetscReal t);
+PetscBool SbEffectActsAfter(SbEffect e, PetscReal t);
 /* Calls an operation that the effect has, within its log event: SbEffectCall(e, force, space, stage, f). */
 #define SbEffectCall(e, op, ...)                             \
   do {                                                       \

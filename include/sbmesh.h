@@ -56,6 +56,8 @@ typedef struct {
 /* A body as the scenario gives it. Data, no methods. */
 typedef struct {
   char name[SB_NAME_MAX];
+  char copy_of
+    [SB_NAME_MAX]; /* the body of the scenario that this is one of the copies of (-body_<name>_copies); else "" */
   char mesh
     [PETSC_MAX_PATH_LEN]; /* file, or box:lx,ly,lz:n or box:lx,ly,lz:nx,ny,nz, from the origin to (lx, ly, lz);
                                          n cells along the shortest side; groups xmin xmax ymin ymax zmin zmax */

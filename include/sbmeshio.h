@@ -139,6 +139,9 @@ struct _p_SbImport {
 /* Chooses the reader by the name of the mesh, reads, transforms. Not collective. */
 PetscErrorCode SbImportRead(const SbBody *body, SbImport *import);
 PetscErrorCode SbImportDestroy(SbImport *import);
+/* The same of a body that may be one of many copies: `before`, the body before it or NULL, and `shared`, zeroed at first, in which the mesh of its file is kept for
+   the next one; destroy it. */
+PetscErrorCode SbImportReadCopy(const SbBody *body, const SbBody *before, SbImport *shared, SbImport *import);
 /* Which rows of the arrays of an .h5 mesh a slab has: from first, in blocks of `block`, N in the file. */
 typedef struct {
   PetscInt N, block, first;

@@ -26,6 +26,15 @@ typedef struct {
   PetscInt ninverted;         /* cells with det F <= 0 */
 } SbEnergies;
 
+/* How a body begins. */
+typedef struct {
+  SbFormula displacement[3],
+    velocity
+      [3]; /* m, m/s, of the place at rest; owned. Velocities that are numbers are those of the body, and NULL here */
+  PetscBool moved;                /* displacements are given */
+  char state[PETSC_MAX_PATH_LEN]; /* run whose state it takes; "": none */
+} SbStart;
+
 typedef struct _p_SbModel *SbModel;
 struct _p_SbModel {
   MPI_Comm comm;
@@ -37,6 +46,8 @@ struct _p_SbModel {
   SbMaterial *material;           /* [nmaterial] one per body, then those of inclusions */
   char (*inclusion)[SB_NAME_MAX]; /* [nmaterial - nbody] names of the inclusions */
   SbElement *element;             /* [nbody] */
+  SbStart *start;                 /* [nbody] NULL: at rest, with the bodies' velocities */
+  PetscReal t_begin; /* s, when it is set up; 0, or that of a scene that is made again while a run goes on */
   SbMesh mesh;
   SbSpace space;
   PetscInt neffect;
@@ -122,7 +133,7 @@ PetscErrorCode SbModelGuardWork(SbModel model, Vec U, PetscReal *work, Vec F);
 PetscErrorCode SbModelGuardGradient(SbModel model, Vec U, PetscReal scale, PetscBool free_only,
                                     PetscReal *energy, Vec F);
 PetscErrorCode SbModelGuardHessian(SbModel model, Vec U, SbContactHessian kind, SbBlocks *blocks);
-/* Initial velocities of bodies (translation and spin). */
+/* Initial displacements and velocities of bodies, with spin. Collective. */
 PetscErrorCode SbModelInitialState(SbModel model, Vec U, Vec V);
 /* Centre of mass, m, and mass, kg, of each body, centre[nbody][4]: at rest with U NULL, else now. Collective. */
 PetscErrorCode SbModelCentres(SbModel model, Vec U, PetscReal centre[][4]);

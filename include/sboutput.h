@@ -73,6 +73,12 @@ PetscErrorCode SbOutputAttach(SbRun run);
 PetscErrorCode SbOutputLock(SbRun run);
 
 /*
+  SbOutputTakeState - displacement and velocity of bodies with -body_<name>_state, from frames of other runs. Collective; after SbRunSetUp(), before SbOutputAttach().
+  Errors: PETSC_ERR_FILE_OPEN, PETSC_ERR_FILE_UNEXPECTED for a run, step or body that is not there.
+*/
+PetscErrorCode SbOutputTakeState(SbRun run);
+
+/*
   SbOutputRestoreMeshes - with -restart from a checkpoint of a run that was re-meshed: the bodies' meshes (SbBody.given). Collective; between
   SbOutputSetFromOptions() and SbModelSetUp(). Does nothing without -restart; a file that cannot be read is left to SbOutputAttach().
 */

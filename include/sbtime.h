@@ -88,6 +88,8 @@ struct _p_SbRun {
   PetscBool dt_given, velocity_predictor, fixed_step, damped;
   PetscBool reject_inverted, rejected_inverted; /* steps that invert tets; the last attempt was such a one */
   PetscBool may_end_at_impact;                  /* this attempt may end where points come into contact */
+  PetscInt contact_round;                       /* solves of this step for who touches, 0: without contact */
+  PetscBool shortened;                          /* it was said that steps had to be much shorter */
   PetscReal time_of_impact;                     /* the part of the step at which it did, 1: it did not */
   PetscReal spectral_radius, newmark[2];        /* newmark: beta, gamma */
   PetscInt max_halvings, static_steps;

@@ -39,6 +39,7 @@ static PetscErrorCode simulate(Scene *s)
   PetscCall(SbModelSetUp(s->model));
   PetscCall(SbSceneValidate(s->model));
   PetscCall(SbRunSetUp(s->run));
+  PetscCall(SbOutputTakeState(s->run));
   PetscCall(SbLedgerAttach(s->ledger));
   PetscCall(SbRemeshAttach(s->remesh, s->run));
   PetscCall(SbRunCatchSignals(s->run));
@@ -62,6 +63,7 @@ static PetscErrorCode supple(int argc, char *argv[])
   SbCommand command;
   static Scene scene; /* an error that ends the program asks for it */
   const PetscBool bare = (PetscBool)(argc < 2);
+  PetscErrorCode ierr;
   PetscBool left;
   PetscInt unused;
   char petsc[256];
@@ -70,7 +72,9 @@ static PetscErrorCode supple(int argc, char *argv[])
   /* the libraries, and how errors reach the user */
   PetscCall(SbErrorHandlerInstall());
   PetscCall(SbCommandLine(&argc, argv, &command));
-  PetscCall(PetscInitialize(&argc, &argv, command.scenario[0] ? command.scenario : NULL, NULL));
+  ierr = PetscInitialize(&argc, &argv, command.scenario[0] ? command.scenario : NULL, NULL);
+  if (ierr) SbErrorFindYamlLine();
+  PetscCall(ierr);
   SbMemoryReturnLarge();
   (void)SbThreadsSetOne();
   (void)signal(SIGPIPE, SIG_IGN); /* a terminal that is gone must not end a run that writes files */

@@ -71,8 +71,11 @@ static PetscErrorCode handler(MPI_Comm comm, int line, const char *function, con
 
     state.code = 1;
     state.pending = is_user_error(n, function);
-    (void)snprintf(state.message, sizeof(state.message), "%s%s%s", yaml ? state.file : "",
-                   yaml && state.file[0] ? ": " : "", mess ? mess : "unknown error");
+    (void)snprintf(state.message, sizeof(state.message), "%s%s%s%s", yaml ? state.file : "",
+                   yaml && state.file[0] ? ": " : "", mess ? mess : "unknown error",
+                   mess && !strncmp(mess, "Unknown first token", 19)
+                     ? ": an option begins with a dash, and a comment with #"
+                     : "");
   }
   if (state.pending && !state.trace) return n;
   /* PETSC_COMM_SELF: PETSc's handler puts the other ranks of a larger communicator to sleep and ends them with code 0 */
@@ -102,6 +105,50 @@ void SbErrorSetFile(const char *file)
   const size_t n = strlen(state.file);
 
   (void)snprintf(state.file + n, sizeof(state.file) - n, "%s%s", n ? ", " : "", file);
+}
+
+/* Whether PETSc reads the first n lines of a text; *end: where they end. */
+static PetscBool reads_lines(char text[], PetscInt n, char **end)
+{
+  PetscOptions trial;
+  PetscErrorCode ierr;
+  char kept;
+
+  *end = text;
+  for (PetscInt i = 0; i < n && **end; i++) *end += strcspn(*end, "\n") + (strchr(*end, '\n') != NULL);
+  kept = **end;
+  **end = 0;
+  ierr = PetscOptionsCreate(&trial);
+  if (!ierr) ierr = PetscOptionsInsertStringYAML(trial, text);
+  (void)PetscOptionsDestroy(&trial);
+  **end = kept;
+  return (PetscBool)!ierr;
+}
+
+/* The first line from which on no beginning of the file can be read. */
+void SbErrorFindYamlLine(void)
+{
+  char text[1 << 16], *end, message[sizeof(state.message)];
+  const char *dot = strrchr(state.file, '.');
+  FILE *f = dot && (!strcmp(dot, ".yml") || !strcmp(dot, ".yaml")) ? fopen(state.file, "r") : NULL;
+  PetscInt n = 0;
+  size_t size;
+
+  if (!f || !strstr(state.message, "YAML")) {
+    if (f) (void)fclose(f);
+    return;
+  }
+  size = fread(text, 1, sizeof(text) - 1, f);
+  text[size] = 0;
+  (void)fclose(f);
+  for (const char *c = text; *c; c++) n += *c == '\n' || !c[1];
+  memcpy(message, state.message, sizeof(message));
+  while (n > 1 && !reads_lines(text, n - 1, &end)) n--;
+  (void)reads_lines(text, n - 1, &end);
+  (void)snprintf(state.message, sizeof(state.message), "%.1900s, line %d: '%.*s'%s", message, (int)n,
+                 (int)PetscMin(strcspn(end, "\n"), 60), end,
+                 memchr(end, '\t', strcspn(end, "\n")) ? "; YAML takes blanks, no tabs"
+                                                       : "; compare its indentation, colons and quotes");
 }
 
 void SbErrorPost(const char *format, ...)

@@ -134,15 +134,61 @@ PetscErrorCode SbOptionExists(const SbScope *scope, const char *key, PetscBool *
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbOptionGiven(const SbScope *scope, const char *key, PetscBool *given)
+PetscErrorCode SbOptionsInherit(const char *klass, const char *instance, const char *from)
+{
+  PetscFunctionBeginUser;
+  for (PetscInt i = 0; i < SbTheOptions.ninherit; i++) {
+    const SbScope *known = &SbTheOptions.inherit[i];
+
+    if (!strcmp(known->klass, klass) && !strcmp(known->instance, instance))
+      PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  PetscCall(free_at_end());
+  PetscCall(grow(SbTheOptions.ninherit, sizeof(*SbTheOptions.inherit), &SbTheOptions.inherit));
+  PetscCall(SbScopeSet(&SbTheOptions.inherit[SbTheOptions.ninherit++], klass, from, instance));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbOptionFindValue(const SbScope *scope, const char *key, SbScope *where, const char **value,
+                                 PetscBool *given)
 {
   char name[SB_OPTION_NAME_MAX];
+  const char *unused;
+  PetscBool there;
+  SbScope all;
+
+  PetscFunctionBeginUser;
+  /* the instance's own, or that of the one which it is a copy of */
+  *where = *scope;
+  PetscCall(SbOptionName(where, key, sizeof(name), name));
+  PetscCall(PetscOptionsFindPair(NULL, NULL, name, value, given));
+  for (PetscInt i = 0; i < SbTheOptions.ninherit && !*given; i++) {
+    const SbScope *copy = &SbTheOptions.inherit[i];
+
+    if (strcmp(copy->klass, scope->klass) || strcasecmp(copy->instance, scope->instance)) continue;
+    PetscCall(PetscStrncpy(where->instance, copy->type, sizeof(where->instance)));
+    PetscCall(SbOptionName(where, key, sizeof(name), name));
+    PetscCall(PetscOptionsFindPair(NULL, NULL, name, value, given));
+    break;
+  }
+
+  /* or that of all bodies, which counts as read also where it is not needed */
+  if (strcmp(scope->klass, "body")) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(SbScopeSet(&all, "body", "", SB_OPTION_DEFAULT));
+  PetscCall(SbOptionName(&all, key, sizeof(name), name));
+  PetscCall(PetscOptionsFindPair(NULL, NULL, name, *given ? &unused : value, *given ? &there : given));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbOptionGiven(const SbScope *scope, const char *key, PetscBool *given)
+{
+  const char *value;
+  SbScope where;
 
   PetscFunctionBeginUser;
   PetscCheck(SbOptionFind(scope, key), PETSC_COMM_SELF, PETSC_ERR_PLIB,
              "No row for key '%s' of class '%s', type '%s'", key, scope->klass, scope->type);
-  PetscCall(SbOptionName(scope, key, sizeof(name), name));
-  PetscCall(PetscOptionsFindPair(NULL, NULL, name, NULL, given));
+  PetscCall(SbOptionFindValue(scope, key, &where, &value, given));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -288,6 +334,7 @@ PetscErrorCode SbOptionsReset(void)
   PetscCall(PetscFree(SbTheOptions.block));
   for (PetscInt i = 0; i < SbTheOptions.nlisted; i++) PetscCall(PetscFree(SbTheOptions.listed[i]));
   PetscCall(PetscFree(SbTheOptions.listed));
+  PetscCall(PetscFree(SbTheOptions.inherit));
   PetscCall(SbOptionUsersFree(&SbTheOptions.nuser, &SbTheOptions.user));
   PetscCall(PetscMemzero(&SbTheOptions, sizeof(SbTheOptions)));
   SbTheOptions.at_end = registered;

@@ -36,6 +36,8 @@ typedef struct {
   SbOptionRecord *record; /* [nrecord] in the order of the first reading */
   PetscBool remembered;   /* SbOptionsRemember() filled `user` */
   SbOptionUser *user;     /* [nuser] */
+  PetscInt ninherit;
+  SbScope *inherit; /* [ninherit] `instance` of `klass` takes what it is not given from the instance `type` */
   PetscInt nlisted;
   char **listed; /* [nlisted] names in the lists of the scenario files, with repeats; owned */
 } SbOptionTable;
@@ -43,6 +45,9 @@ extern SbOptionTable SbTheOptions; /* the registry of options */
 
 /* The row of a key in a scope; NULL when there is none. */
 const SbOption *SbOptionFind(const SbScope *scope, const char *key);
+/* The text of an option, given for the instance or for what it inherits from, and the scope under which it is recorded: its own, or that of what it is a copy of. */
+PetscErrorCode SbOptionFindValue(const SbScope *scope, const char *key, SbScope *where, const char **value,
+                                 PetscBool *given);
 /* The record of an option, by its full name; made when there is none yet. Lent. */
 PetscErrorCode SbOptionFindRecord(const SbScope *scope, const SbOption *row, SbOptionRecord **record);
 /* The error that a required option is missing; names the option of the user's that looks like a slip of it, if there is one. */

@@ -65,19 +65,21 @@ static PetscErrorCode near_options(const char *dashed, size_t size, char text[])
 
   PetscFunctionBeginUser;
   for (PetscInt i = 0; i < SbTheOptions.nblock; i++)
-    room += SbTheOptions.block[i].n * (SbTheOptions.block[i].klass[0] ? SbTheOptions.nlisted : 1);
+    room += SbTheOptions.block[i].n * (SbTheOptions.block[i].klass[0] ? SbTheOptions.nlisted + 1 : 1);
   PetscCall(PetscMalloc2(room, &list, room, &names));
   for (PetscInt i = 0; i < SbTheOptions.nrecord; i++) list[n++] = SbTheOptions.record[i].name;
   for (PetscInt i = 0; i < SbTheOptions.nblock; i++) {
     const SbOptionBlock *block = &SbTheOptions.block[i];
-    const PetscInt instances = block->klass[0] ? SbTheOptions.nlisted : 1;
+    const PetscInt instances =
+      block->klass[0] ? SbTheOptions.nlisted + !strcmp(block->klass, "body") : 1; /* for all bodies, too */
 
     for (PetscInt j = 0; j < block->n * instances; j++) {
       const char *key = block->rows[j % block->n].key;
 
       if (block->klass[0])
-        PetscCall(PetscSNPrintf(names[n], SB_OPTION_NAME_MAX, "-%s_%s_%s", block->klass,
-                                SbTheOptions.listed[j / block->n], key));
+        PetscCall(PetscSNPrintf(
+          names[n], SB_OPTION_NAME_MAX, "-%s_%s_%s", block->klass,
+          j / block->n < SbTheOptions.nlisted ? SbTheOptions.listed[j / block->n] : SB_OPTION_DEFAULT, key));
       else
         PetscCall(PetscSNPrintf(names[n], SB_OPTION_NAME_MAX, "-%s", key));
       if (is_recorded(names[n] + 1)) continue;
@@ -144,6 +146,15 @@ static PetscBool has_type(const char *klass, const char *instance, size_t n, con
   return PETSC_FALSE;
 }
 
+/* Whether an option of a class, from behind its prefix on, is one for all bodies: "default_young". */
+static PetscBool is_for_all(const char *klass, const char *instance)
+{
+  const size_t n = strlen(SB_OPTION_DEFAULT);
+
+  return (PetscBool)(!strcmp(klass, "body") && !strncasecmp(instance, SB_OPTION_DEFAULT, n) &&
+                     instance[n] == '_');
+}
+
 /* What is to be said of an option that nobody read. */
 typedef enum {
   NOT_OURS,
@@ -163,6 +174,16 @@ static PetscErrorCode verdict_of_class(const char *klass, const char *name, size
 
   PetscFunctionBeginUser;
   *verdict = WRONG;
+  if (is_for_all(klass, instance)) {
+    key = instance + strlen(SB_OPTION_DEFAULT) + 1;
+    for (PetscInt i = 0; i < SbTheOptions.nblock; i++) {
+      for (PetscInt j = 0; !strcmp(SbTheOptions.block[i].klass, klass) && j < SbTheOptions.block[i].n; j++)
+        if (!strcasecmp(SbTheOptions.block[i].rows[j].key, key)) *verdict = UNUSED;
+    }
+    PetscCall(
+      PetscSNPrintf(text, size, "no body takes it, as each has one of its own or is of another type"));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
   if (!n) PetscFunctionReturn(PETSC_SUCCESS);
   key = instance + n + 1;
   for (PetscInt i = 0; i < SbTheOptions.nblock; i++) {

@@ -35,6 +35,18 @@ static PetscInt count_pieces(const char *text, char separator)
   return n;
 }
 
+/* What stands between the formulas of a text: semicolons, or the commas outside parentheses, as in other vectors; those become semicolons. */
+static void commas_to_semicolons(char text[])
+{
+  int depth = 0;
+
+  if (strchr(text, ';')) return;
+  for (char *c = text; *c; c++) {
+    depth += (*c == '(') - (*c == ')');
+    if (*c == ',' && !depth) *c = ';';
+  }
+}
+
 /* Takes the next piece off *text. */
 static PetscBool next_piece(const char **text, char separator, size_t size, char piece[])
 {
@@ -91,14 +103,17 @@ static PetscErrorCode text_of(const SbScope *scope, const char *key, SbOptionKin
   const SbOption *row = SbOptionFind(scope, key);
   SbOptionRecord *r = NULL;
   const char *value = NULL;
+  SbScope where;
+  PetscBool given;
 
   PetscFunctionBeginUser;
   PetscCheck(row, PETSC_COMM_SELF, PETSC_ERR_PLIB, "No row for key '%s' of class '%s', type '%s'", key,
              scope->klass, scope->type);
-  PetscCall(SbOptionFindRecord(scope, row, &r));
+  PetscCall(SbOptionFindValue(scope, key, &where, &value, &given));
+  PetscCall(SbOptionFindRecord(&where, row, &r));
   PetscCheck(row->kind == kind, PETSC_COMM_SELF, PETSC_ERR_PLIB, "Option %s has kind %d, asked for as %d",
              r->name, (int)row->kind, (int)kind);
-  PetscCall(PetscOptionsFindPair(NULL, NULL, r->name, &value, &r->given));
+  r->given = given;
   if (r->given && !value && row->kind == SB_OPTION_BOOL) value = "true";
   PetscCheck(!r->given || value, PETSC_COMM_SELF, PETSC_ERR_USER, "%s has no value: %s%s", r->name, row->help,
              row->kind == SB_OPTION_FORMULA ? "; write -x as 0-x, or PETSc takes it for an option" : "");
@@ -270,10 +285,12 @@ PetscErrorCode SbOptionFormulas(const SbScope *scope, const char *key, SbFormula
   count = r->row->count;
   for (PetscInt i = 0; i < count; i++) formulas[i] = NULL;
   if (is_absent(r)) PetscFunctionReturn(PETSC_SUCCESS);
+  if (count > 1) commas_to_semicolons(r->text);
   n = count_pieces(r->text, ';');
   PetscCheck(n == count, PETSC_COMM_SELF, PETSC_ERR_USER,
              "%s %s has %" PetscInt_FMT " formula%s, needs %" PetscInt_FMT "%s: %s", r->name, r->text, n,
-             n == 1 ? "" : "s", count, count == 1 ? "" : " with semicolons between them", r->row->help);
+             n == 1 ? "" : "s", count, count == 1 ? "" : " with semicolons or commas between them",
+             r->row->help);
   text = r->text;
   for (PetscInt i = 0; i < n; i++) {
     char piece[PETSC_MAX_PATH_LEN];

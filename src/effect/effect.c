@@ -11,6 +11,10 @@ PetscFunctionList SbEffectList = NULL;
 
 static const SbOption common_rows[] = {
   {"type", SB_OPTION_STRING, 1, "", "", "", "what the effect is; by default its own name says so"},
+  {"from", SB_OPTION_REAL, 1, "s", "", "(-inf, inf)",
+   "time from which the effect acts, for loads and supports (in a static run: the load factor)"},
+  {"until", SB_OPTION_REAL, 1, "s", "", "(-inf, inf)",
+   "time until which the effect acts; a support lets go at the end of the step that gets there"},
 };
 
 static PetscErrorCode forget_types(void)
@@ -64,7 +68,39 @@ PetscErrorCode SbEffectCreate(const char *name, SbEffect *effect)
   PetscCall((*create)(e));
   PetscCall(SbScopeSet(&scope, "effect", type, name));
   if (e->ops.setfromoptions) PetscCall((*e->ops.setfromoptions)(e, &scope));
+
+  /* when it acts: what comes and goes are loads and supports */
+  e->from = PETSC_MIN_REAL;
+  e->until = PETSC_MAX_REAL;
+  PetscCall(SbOptionReal(&scope, "from", &e->from));
+  PetscCall(SbOptionReal(&scope, "until", &e->until));
+  if (e->from == PETSC_MIN_REAL && e->until == PETSC_MAX_REAL) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCheck(e->from < e->until, PETSC_COMM_SELF, PETSC_ERR_USER,
+             "-effect_%s_from %g s is not before -effect_%s_until %g s", name, (double)e->from, name,
+             (double)e->until);
+  PetscCheck(
+    (e->ops.force || e->ops.prescribe) && !e->ops.begin_step && !e->ops.hessian, PETSC_COMM_SELF,
+    PETSC_ERR_USER,
+    "-effect_%s_from and _until are for loads, fixed and prescribed_displacement: effects of type %s "
+    "act all the time",
+    name, type);
   PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+#define ROUNDING 1e-9 /* of a time: by so much ends of steps may be off */
+
+PetscBool SbEffectActs(SbEffect e, PetscReal t)
+{
+  const PetscReal slack = ROUNDING * PetscAbsReal(t);
+
+  return (PetscBool)(t > e->from + slack && t <= e->until + slack);
+}
+
+PetscBool SbEffectActsAfter(SbEffect e, PetscReal t)
+{
+  const PetscReal slack = ROUNDING * PetscAbsReal(t);
+
+  return (PetscBool)(t >= e->from - slack && t < e->until - slack);
 }
 
 PetscErrorCode SbEffectDestroy(SbEffect *effect)

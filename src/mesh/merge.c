@@ -13,7 +13,7 @@
 #define FEW 50000 /* tets that rank 0 reads alone: it takes 0.02 s */
 
 static PetscErrorCode prepare(PetscInt nbody, SbBody body[], PetscInt b, PetscInt nset, SbSet set[],
-                              SbImport *im, SbPart *part)
+                              SbImport *shared, SbImport *im, SbPart *part)
 {
   PetscInt *count;
 
@@ -21,7 +21,7 @@ static PetscErrorCode prepare(PetscInt nbody, SbBody body[], PetscInt b, PetscIn
   if (body[b].in_memory)
     PetscCall(SbImportMemoryMesh(&body[b], im));
   else
-    PetscCall(SbImportRead(&body[b], im));
+    PetscCall(SbImportReadCopy(&body[b], b ? &body[b - 1] : NULL, shared, im));
   PetscCall(SbImportCheck(im, &part->faces));
   PetscCall(SbImportQuality(im, &part->faces, &body[b]));
   PetscCall(PetscCalloc1(im->nvert, &part->masks.vert));
@@ -173,7 +173,8 @@ static PetscErrorCode check_all(PetscInt nbody, const SbBody body[], const SbImp
 }
 
 static PetscErrorCode build(MPI_Comm comm, const PetscBool slabs[], PetscInt nbody, SbBody body[],
-                            PetscInt nset, SbSet set[], SbImport im[], SbPart part[], SbMergedMesh *w)
+                            PetscInt nset, SbSet set[], SbImport *shared, SbImport im[], SbPart part[],
+                            SbMergedMesh *w)
 {
   SbCaughtError caught = {0, ""};
   PetscMPIInt rank;
@@ -185,7 +186,7 @@ static PetscErrorCode build(MPI_Comm comm, const PetscBool slabs[], PetscInt nbo
     if (slabs[b]) {
       PetscCall(SbSlabPrepare(comm, w->ncell, nbody, body, b, nset, set, &im[b], &part[b]));
     } else {
-      if (!rank) SB_CATCH(&caught, prepare(nbody, body, b, nset, set, &im[b], &part[b]));
+      if (!rank) SB_CATCH(&caught, prepare(nbody, body, b, nset, set, shared, &im[b], &part[b]));
       PetscCall(SbCaughtRaise(comm, &caught));
     }
     w->ncell += im[b].item[3].n;
@@ -206,7 +207,7 @@ static PetscErrorCode build(MPI_Comm comm, const PetscBool slabs[], PetscInt nbo
 PetscErrorCode SbMergedMeshCreate(MPI_Comm comm, SbReading reading, PetscInt nbody, SbBody body[],
                                   PetscInt nset, SbSet set[], SbMergedMesh *w)
 {
-  SbImport *im;
+  SbImport *im, shared = {0};
   SbPart *part;
   PetscBool *slabs;
   PetscErrorCode ierr;
@@ -215,7 +216,8 @@ PetscErrorCode SbMergedMeshCreate(MPI_Comm comm, SbReading reading, PetscInt nbo
   PetscCall(PetscMemzero(w, sizeof(*w)));
   PetscCall(PetscCalloc3(nbody, &im, nbody, &part, nbody, &slabs));
   PetscCall(find_slabs(comm, reading, nbody, body, slabs));
-  ierr = build(comm, slabs, nbody, body, nset, set, im, part, w);
+  ierr = build(comm, slabs, nbody, body, nset, set, &shared, im, part, w);
+  PetscCall(SbImportDestroy(&shared));
   for (PetscInt b = 0; b < nbody; b++) {
     PetscCall(SbImportDestroy(&im[b]));
     PetscCall(SbFacesDestroy(&part[b].faces));

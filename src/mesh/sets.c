@@ -183,7 +183,8 @@ static PetscErrorCode mark_shapes(const SbImport *im, const SbFaces *faces, cons
 
   PetscFunctionBeginUser;
   for (PetscInt k = 0; k < nset; k++) {
-    if (set[k].shape == SB_SET_BODY && !strcmp(set[k].group, body->name))
+    if (set[k].shape == SB_SET_BODY &&
+        (!strcmp(set[k].group, body->name) || (body->copy_of[0] && !strcmp(set[k].group, body->copy_of))))
       all |= SB_SET_BIT(k);
     else if (set[k].shape == SB_SET_BOUNDARY)
       hull |= SB_SET_BIT(k);

@@ -131,6 +131,72 @@ static PetscErrorCode begin(const SbBody *body, SbImport *im)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Arrays of their own for what is read of a file; before it is placed. */
+static PetscErrorCode copy_import(const SbImport *from, SbImport *to)
+{
+#define COPY(array, n)                                     \
+  do {                                                     \
+    if (!from->array) break;                               \
+    PetscCall(PetscMalloc1((size_t)(n), &to->array));      \
+    PetscCall(PetscArraycpy(to->array, from->array, (n))); \
+  } while (0)
+  char where[sizeof(to->where)], body[sizeof(to->body)];
+
+  PetscFunctionBeginUser;
+  memcpy(where, to->where, sizeof(where));
+  memcpy(body, to->body, sizeof(body));
+  PetscCall(PetscFree(to->tags_start));
+  PetscCall(PetscFree(to->tags_group));
+  *to = *from;
+  memcpy(to->where, where, sizeof(where));
+  memcpy(to->body, body, sizeof(body));
+  COPY(x, 3 * from->nvert);
+  COPY(vert_number, from->nvert);
+  for (int d = 0; d < 4; d++) {
+    COPY(item[d].vert, (d + 1) * from->item[d].n);
+    COPY(item[d].tags, from->item[d].n);
+    COPY(item[d].number, from->item[d].n);
+    to->item[d].capacity = from->item[d].n;
+  }
+  to->capacity[0] = from->ngroup;
+  to->capacity[1] = from->ntags + 1;
+  to->capacity[2] = from->tags_start[from->ntags];
+  COPY(group, to->capacity[0]);
+  COPY(tags_start, to->capacity[1]);
+  COPY(tags_group, to->capacity[2]);
+  to->slot = NULL;
+  to->nslot = 0;
+  PetscFunctionReturn(PETSC_SUCCESS);
+#undef COPY
+}
+
+PetscErrorCode SbImportReadCopy(const SbBody *body, const SbBody *before, SbImport *shared, SbImport *im)
+{
+  const PetscBool copy = (PetscBool)(body->copy_of[0] && strncmp(body->mesh, "box:", 4));
+  SbReader read;
+
+  PetscFunctionBeginUser;
+  if (!copy) {
+    PetscCall(SbImportRead(body, im));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+
+  /* the first copy reads the file, and its mesh is kept as it was there until another file comes */
+  if (!shared->x || !before || strcmp(before->copy_of, body->copy_of) || strcmp(before->mesh, body->mesh) ||
+      before->mesh_step != body->mesh_step || memcmp(&before->tet, &body->tet, sizeof(body->tet)) ||
+      before->scale != body->scale) {
+    PetscCall(SbImportDestroy(shared));
+    PetscCall(find_reader(body, &read));
+    PetscCall(begin(body, shared));
+    PetscCall(read(body->mesh, shared));
+    PetscCall(SbImportForget(shared));
+  }
+  PetscCall(begin(body, im));
+  PetscCall(copy_import(shared, im));
+  PetscCall(transform_body(body, im));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode SbImportRead(const SbBody *body, SbImport *im)
 {
   SbReader read;

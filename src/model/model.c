@@ -32,6 +32,13 @@ PetscErrorCode SbModelDestroy(SbModel *model)
   PetscCall(SbMeshDestroy(&m->mesh));
   for (PetscInt k = 0; k < m->nmaterial; k++) PetscCall(SbMaterialDestroy(&m->material[k]));
   for (PetscInt b = 0; m->element && b < m->nbody; b++) PetscCall(SbElementDestroy(&m->element[b]));
+  for (PetscInt b = 0; m->start && b < m->nbody; b++) {
+    for (int k = 0; k < 3; k++) {
+      PetscCall(SbFormulaDestroy(&m->start[b].displacement[k]));
+      PetscCall(SbFormulaDestroy(&m->start[b].velocity[k]));
+    }
+  }
+  PetscCall(PetscFree(m->start));
   PetscCall(PetscFree(m->inclusion));
   PetscCall(PetscFree(m->material));
   PetscCall(PetscFree(m->element));
@@ -132,6 +139,15 @@ PetscErrorCode SbModelSetUp(SbModel m)
   }
   for (PetscInt k = 0; k < m->nmaterial; k++)
     m->may_filter = (PetscBool)(m->may_filter || m->material[k]->adaptive);
+  /* supports that do not act now are none */
+  for (PetscInt e = 0; e < m->neffect; e++) {
+    SbEffect effect = m->effect[e];
+
+    if (!effect->ops.prescribe || SbEffectActsAfter(effect, m->t_begin)) continue;
+    effect->ops.setup = NULL;
+    effect->ops.prescribe = NULL;
+    effect->prescribed = NULL;
+  }
   for (PetscInt e = 0; e < m->neffect; e++) PetscCall(SbEffectMarkPrescribed(m->effect[e], m->nset, m->set));
   PetscCall(SbSpaceCreate(m->mesh, m->material, m->element, &m->space));
   m->load = 1.;
@@ -213,13 +229,14 @@ static PetscErrorCode external_forces(SbModel m, const SbStage *stage, PetscBool
   PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_EFFECTS], 0, 0, 0, 0));
   /* the steady ones first: they share their factor */
   for (PetscInt e = 0; e < m->nforce; e++) {
-    if (m->force[e]->steady) SbEffectCall(m->force[e], force, m->space, stage, f);
+    if (m->force[e]->steady && SbEffectActs(m->force[e], stage->t))
+      SbEffectCall(m->force[e], force, m->space, stage, f);
   }
   if (m->load != 1.) {
     for (PetscInt i = 0; i < n; i++) f[i] *= m->load;
   }
   for (PetscInt e = 0; e < m->nforce; e++) {
-    if (!m->force[e]->steady && !(apart && m->force[e]->ops.potential))
+    if (!m->force[e]->steady && !(apart && m->force[e]->ops.potential) && SbEffectActs(m->force[e], stage->t))
       SbEffectCall(m->force[e], force, m->space, stage, f);
   }
   if (sign != 1.) {
@@ -286,6 +303,7 @@ PetscErrorCode SbModelTangent(SbModel m, PetscReal t, PetscReal shift_v, PetscRe
   stage.shift_k = shift_k;
   PetscCall(SbSpaceAssembleTangent(m->space, &stage, A));
   for (PetscInt e = 0; e < m->ntangent; e++) {
+    if (!SbEffectActs(m->tangent[e], t)) continue;
     m->space->block_scale = load_factor(m, m->tangent[e]);
     SbEffectCall(m->tangent[e], tangent, m->space, &stage, A);
   }
@@ -306,6 +324,7 @@ PetscErrorCode SbModelNonsymmetric(SbModel m, PetscReal t, Vec U, Vec X, Vec Y)
   PetscCall(SbSpaceGetLocalWrite(m->space, Y, &y));
   PetscCall(PetscArrayzero(y, 3 * m->space->nnode));
   for (PetscInt e = 0; e < m->nnonsymmetric; e++) {
+    if (!SbEffectActs(m->nonsymmetric[e], t)) continue;
     stage.shift_k = load_factor(m, m->nonsymmetric[e]);
     SbEffectCall(m->nonsymmetric[e], nonsymmetric, m->space, &stage, x, y);
   }
@@ -364,6 +383,14 @@ PetscErrorCode SbModelInitialState(SbModel m, Vec U, Vec V)
 
   PetscFunctionBeginUser;
   PetscCall(VecZeroEntries(U));
+  PetscCall(VecGetArray(U, &v));
+  for (PetscInt i = 0; m->start && i < s->nnode_owned; i++) {
+    const SbStart *start = &m->start[s->node_body[i]];
+
+    for (int k = 0; start->moved && k < 3; k++)
+      v[3 * i + k] = SbFormulaEval(start->displacement[k], 0., s->node_x + 3 * i);
+  }
+  PetscCall(VecRestoreArray(U, &v));
   PetscCall(SbModelPrescribe(m, 0., U));
   if (!V) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscMalloc1(m->nbody, &centre));
@@ -371,6 +398,7 @@ PetscErrorCode SbModelInitialState(SbModel m, Vec U, Vec V)
   PetscCall(VecGetArray(V, &v));
   for (PetscInt i = 0; i < s->nnode_owned; i++) {
     const SbBody *body = &m->body[m->space->node_body[i]];
+    const SbStart *start = m->start ? &m->start[s->node_body[i]] : NULL;
     const PetscReal *w = body->angular_velocity;
     PetscReal r[3];
 
@@ -378,7 +406,10 @@ PetscErrorCode SbModelInitialState(SbModel m, Vec U, Vec V)
     for (PetscInt k = 0; k < 3; k++) {
       const PetscInt k1 = (k + 1) % 3, k2 = (k + 2) % 3;
 
-      v[3 * i + k] = s->fixed[i] & (1 << k) ? 0. : body->velocity[k] + w[k1] * r[k2] - w[k2] * r[k1];
+      v[3 * i + k] = body->velocity[k] + w[k1] * r[k2] - w[k2] * r[k1];
+      if (start && start->velocity[k])
+        v[3 * i + k] += SbFormulaEval(start->velocity[k], 0., s->node_x + 3 * i);
+      if (s->fixed[i] & (1 << k)) v[3 * i + k] = 0.;
     }
   }
   PetscCall(VecRestoreArray(V, &v));

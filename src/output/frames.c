@@ -600,16 +600,22 @@ PetscErrorCode SbFramesAttach(SbRun run, SbOutput out)
 
 PetscErrorCode SbFramesReattach(SbRun run, SbOutput out)
 {
+  int64_t hash;
+  PetscBool same;
+
   PetscFunctionBeginUser;
   if (!out->frames) PetscFunctionReturn(PETSC_SUCCESS);
   /* work arrays and monitor for the new mesh, which is written beside the earlier ones */
   PetscCall(free_work(out->frames));
   PetscCall(allocate(run, out));
   if (out->contact_points) run->want_residual = PETSC_TRUE;
-  out->frames->mesh = run->step0;
-  PetscCall(write_mesh(run, out));
-  PetscCall(SbH5Flush(&out->frames->h5));
-  if (out->frames->xdmf) PetscCall(index_mesh(out->frames, out->frames->mesh));
+  PetscCall(mesh_hash(out->frames->h5.file, out->frames->mesh, &hash, &same));
+  if (!same || (uint64_t)hash != out->mesh_hash) {
+    out->frames->mesh = run->step0;
+    PetscCall(write_mesh(run, out));
+    PetscCall(SbH5Flush(&out->frames->h5));
+    if (out->frames->xdmf) PetscCall(index_mesh(out->frames, out->frames->mesh));
+  }
   PetscCall(SbRunAddMonitor(run, monitor, out, NULL));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -81,6 +81,19 @@ static PetscErrorCode put(SbHistory h, const char *format, ...)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The unit of a column of an effect, by its name. */
+static const char *unit_of(const char *column)
+{
+  static const struct {
+    const char *word, *unit;
+  } units[] = {{"torque", "N m"}, {"force", "N"}, {"reaction", "N"}, {"penetration", "m"},
+               {"gap", "m"},      {"work", "J"},  {"energy", "J"},   {"loss", "J"}};
+
+  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(units); i++)
+    if (strstr(column, units[i].word)) return units[i].unit;
+  return "1";
+}
+
 /* The two lines at the top. */
 static PetscErrorCode put_header(SbRun run, SbOutput out, SbHistory h)
 {
@@ -102,7 +115,9 @@ static PetscErrorCode put_header(SbRun run, SbOutput out, SbHistory h)
   for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(columns); i++)
     PetscCall(put(h, "%s%s", i ? "," : "", columns[i].unit));
   for (PetscInt e = 0; e < run->model->nhistory; e++) {
-    for (PetscInt c = 0; c < run->model->history[e]->ncolumn; c++) PetscCall(put(h, ",SI"));
+    const SbEffect effect = run->model->history[e];
+
+    for (PetscInt c = 0; c < effect->ncolumn; c++) PetscCall(put(h, ",%s", unit_of(effect->column[c])));
   }
   for (PetscInt p = 0; p < 3 * out->nprobe; p++) PetscCall(put(h, ",m"));
   for (PetscInt c = 0; c < run->ncolumn; c++) PetscCall(put(h, ",%s", run->column[c].unit));

@@ -17,7 +17,10 @@ struct _p_SbProgress {
   PetscReal last; /* wall time of the last line, s since the time loop began */
   PetscReal t_start;
   PetscInt newton, linear, steps; /* since the last line */
+  PetscReal within;               /* MPI_Wtime() of the last line within a step */
 };
+
+#define LONG 5. /* s, after which a step that goes on says so, and again */
 
 static PetscBool is_terminal(void)
 {
@@ -96,6 +99,60 @@ static PetscErrorCode monitor(SbRun run, const SbStep *step, void *ctx)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A line within a step that takes long. Rank 0. */
+static PetscErrorCode say_within(SbRun run, const char *what, PetscInt iteration, PetscReal residual)
+{
+  const SbOutput out = (SbOutput)run->output;
+  const PetscReal now = MPI_Wtime(), begun = run->stop.step_begun;
+  PetscReal dt = run->dt;
+  char contact[32] = "";
+
+  PetscFunctionBeginUser;
+  if (begun == 0. || now - begun < LONG || now - out->line->within < LONG) PetscFunctionReturn(PETSC_SUCCESS);
+  out->line->within = now;
+  if (run->ts) PetscCall(TSGetTimeStep(run->ts, &dt));
+  if (run->model->nbegin_step)
+    (void)snprintf(contact, sizeof(contact), ", contact round %" PetscInt_FMT, run->contact_round);
+  PetscCall(SbProgressEnd(out));
+  PetscCall(PetscFPrintf(PETSC_COMM_SELF, PETSC_STDOUT,
+                         "  step %" PetscInt_FMT " has taken %.0f s: %s iteration %" PetscInt_FMT
+                         ", residual %.2e N%s, length %.3g%s\n",
+                         run->step_now + 1, (double)(now - begun), what, iteration, (double)residual, contact,
+                         (double)dt, run->model->dynamic ? " s" : ""));
+  (void)fflush(PETSC_STDOUT);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode within_newton(SNES snes, PetscInt iteration, PetscReal residual, void *run)
+{
+  PetscFunctionBeginUser;
+  (void)snes;
+  PetscCall(say_within((SbRun)run, "Newton", iteration, residual));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode within_linear(KSP ksp, PetscInt iteration, PetscReal residual, void *run)
+{
+  PetscFunctionBeginUser;
+  (void)ksp;
+  if (iteration % 10 == 0) PetscCall(say_within((SbRun)run, "linear", iteration, residual));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* On rank 0: monitors of the run, and of its solvers. */
+static PetscErrorCode attach(SbRun run, SbOutput out)
+{
+  KSP ksp;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbRunAddMonitor(run, monitor, out->line, NULL));
+  if (!run->snes) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(SNESGetKSP(run->snes, &ksp));
+  PetscCall(SNESMonitorSet(run->snes, within_newton, run, NULL));
+  PetscCall(KSPMonitorSet(ksp, within_linear, run, NULL));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode SbProgressAttach(SbRun run, SbOutput out)
 {
   PetscFunctionBeginUser;
@@ -105,7 +162,7 @@ PetscErrorCode SbProgressAttach(SbRun run, SbOutput out)
   PetscCall(PetscNew(&out->line));
   out->line->terminal = is_terminal();
   out->line->event = out->event.progress;
-  PetscCall(SbRunAddMonitor(run, monitor, out->line, NULL));
+  PetscCall(attach(run, out));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -114,7 +171,7 @@ PetscErrorCode SbProgressReattach(SbRun run, SbOutput out)
   PetscFunctionBeginUser;
   if (!out->progress || out->quiet) PetscFunctionReturn(PETSC_SUCCESS);
   run->want_energies = PETSC_TRUE;
-  if (out->line) PetscCall(SbRunAddMonitor(run, monitor, out->line, NULL));
+  if (out->line) PetscCall(attach(run, out));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

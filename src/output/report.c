@@ -36,8 +36,23 @@ static PetscErrorCode entry(const char *title, const char *format, ...)
 
 /* ------------------------------------------------------------------ before the run */
 
+/* "liver", or for the first of its copies "50 x ball"; false for the others. */
+static PetscBool line_of_body(SbModel m, PetscInt b, size_t size, char name[])
+{
+  const SbBody *body = &m->body[b];
+  PetscInt n = 1;
+
+  (void)snprintf(name, size, "%s", body->name);
+  if (!body->copy_of[0]) return PETSC_TRUE;
+  if (b && !strcmp(body[-1].copy_of, body->copy_of)) return PETSC_FALSE;
+  while (b + n < m->nbody && !strcmp(body[n].copy_of, body->copy_of)) n++;
+  (void)snprintf(name, size, "%" PetscInt_FMT " x %s", n, body->copy_of);
+  return PETSC_TRUE;
+}
+
 static PetscErrorCode print_bodies(SbModel m, SbOutput out)
 {
+  char name[2 * SB_NAME_MAX];
   PetscInt tets = 0, nodes = 0;
 
   PetscFunctionBeginUser;
@@ -45,15 +60,15 @@ static PetscErrorCode print_bodies(SbModel m, SbOutput out)
                          "element", "tets", "nodes", "unknowns", "min angle deg", "radius ratio"));
   for (PetscInt b = 0; b < m->nbody; b++) {
     const SbBody *body = &m->body[b];
-
     const PetscInt n = out->body_nodes[b];
 
-    PetscCall(PetscFPrintf(
-      PETSC_COMM_SELF, PETSC_STDOUT,
-      "%-15.15s %-7.7s %8" PetscInt_FMT " %9" PetscInt_FMT " %9" PetscInt_FMT " %13.1f %12.2f\n", body->name,
-      body->element, body->ncell, n, 3 * n, (double)body->min_dihedral, (double)body->max_radius_ratio));
     tets += body->ncell;
     nodes += n;
+    if (!line_of_body(m, b, sizeof(name), name)) continue;
+    PetscCall(PetscFPrintf(
+      PETSC_COMM_SELF, PETSC_STDOUT,
+      "%-15.15s %-7.7s %8" PetscInt_FMT " %9" PetscInt_FMT " %9" PetscInt_FMT " %13.1f %12.2f\n", name,
+      body->element, body->ncell, n, 3 * n, (double)body->min_dihedral, (double)body->max_radius_ratio));
   }
   if (m->nbody > 1)
     PetscCall(PetscFPrintf(PETSC_COMM_SELF, PETSC_STDOUT,
@@ -65,8 +80,9 @@ static PetscErrorCode print_bodies(SbModel m, SbOutput out)
     const SbBody *body = &m->body[b];
     const SbMaterial material = m->material[b];
 
+    if (!line_of_body(m, b, sizeof(name), name)) continue;
     PetscCall(PetscFPrintf(PETSC_COMM_SELF, PETSC_STDOUT, "%-15.15s %-12.12s %11.4g %9.6g %14.6g %12.5g\n",
-                           body->name, material->law, (double)material->E, (double)material->nu,
+                           name, material->law, (double)material->E, (double)material->nu,
                            (double)material->density, (double)(material->density * body->volume)));
   }
   PetscCall(PetscFPrintf(PETSC_COMM_SELF, PETSC_STDOUT, "\n"));

@@ -28,9 +28,14 @@ struct _p_SbRemesh {
   PetscInt *from;   /* [nbody] step from which its quality counts again */
   PetscInt *rest;   /* [nbody] steps that it was left alone after the last attempt without success */
   PetscInt ntime;
-  PetscReal *time;  /* [ntime] s */
-  PetscBool failed; /* also when a step fails */
-  PetscInt tried;   /* the step after which that was tried last, -1: never */
+  PetscReal *time; /* [ntime] s */
+  PetscInt nchange;
+  PetscReal
+    *change; /* [nchange] s, when supports come or go: then the scene is made again on the same meshes */
+  PetscBool meshes;  /* bodies may be re-meshed; else it is here for supports alone */
+  PetscBool changes; /* supports come or go now */
+  PetscBool failed;  /* also when a step fails */
+  PetscInt tried;    /* the step after which that was tried last, -1: never */
   SbRemeshing how;
   SbColumn *column; /* those of the ledger and remesh_loss */
 };
@@ -154,9 +159,24 @@ static PetscErrorCode is_named(SbModel m, const SbScope *scope, PetscBool *named
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* When supports come and go after the start. */
+static PetscErrorCode find_changes(SbRemesh r, SbModel m)
+{
+  PetscFunctionBeginUser;
+  PetscCall(PetscMalloc1(2 * m->neffect, &r->change));
+  for (PetscInt e = 0; e < m->neffect; e++) {
+    const SbEffect effect = m->effect[e];
+
+    if (!effect->ops.prescribe) continue;
+    if (effect->from > 0.) r->change[r->nchange++] = effect->from;
+    if (effect->until > 0. && effect->until < PETSC_MAX_REAL) r->change[r->nchange++] = effect->until;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode SbRemeshSetFromOptions(SbModel m, SbRemesh *remesh)
 {
-  PetscBool named, any = PETSC_FALSE;
+  PetscBool named, any = PETSC_FALSE, comes = PETSC_FALSE;
   PetscInt from;
   SbScope scope;
   SbRemesh r;
@@ -165,7 +185,10 @@ PetscErrorCode SbRemeshSetFromOptions(SbModel m, SbRemesh *remesh)
   *remesh = NULL;
   PetscCall(SbScopeSet(&scope, "", "", ""));
   PetscCall(is_named(m, &scope, &named));
-  if (!named) PetscFunctionReturn(PETSC_SUCCESS);
+  for (PetscInt e = 0; e < m->neffect; e++)
+    comes = (PetscBool)(comes || (m->effect[e]->ops.prescribe &&
+                                  (m->effect[e]->from > 0. || m->effect[e]->until < PETSC_MAX_REAL)));
+  if (!named && !comes) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscNew(&r));
   *remesh = r;
   PetscCall(SbLogNamed("Mesh", "remesh", &r->event));
@@ -173,6 +196,15 @@ PetscErrorCode SbRemeshSetFromOptions(SbModel m, SbRemesh *remesh)
   r->tried = -1;
   PetscCall(PetscCalloc7(m->nbody, &r->named, m->nbody, &r->due, m->nbody, &r->asked, m->nbody, &r->bound,
                          m->nbody, &r->worst, m->nbody, &r->from, m->nbody, &r->rest));
+  PetscCall(find_changes(r, m));
+  for (PetscInt b = 0; b < m->nbody; b++) {
+    PetscCheck(!m->element[b]->nodes_per[1], PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
+               "%s not there yet for element p2, which body %s has: choose p1, cr or dg",
+               named ? "re-meshing (-remesh_...) is"
+                     : "supports that come or go (-effect_..._from, _until) are",
+               m->body[b].name);
+  }
+  if (!named) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(read_names(r, m, &scope));
   PetscCall(read_bounds(r, m, &scope, &any));
   PetscCall(read_times(r, &scope));
@@ -182,13 +214,8 @@ PetscErrorCode SbRemeshSetFromOptions(SbModel m, SbRemesh *remesh)
   r->how.rest = (PetscBool)(from == 1);
   r->how.quality = QUALITY_LEAST;
   r->how.mesher = SbMesherDefault;
-  if (!any && !r->ntime && !r->failed) PetscCall(SbRemeshDestroy(remesh));
-  for (PetscInt b = 0; *remesh && b < m->nbody; b++) {
-    PetscCheck(
-      !m->element[b]->nodes_per[1], PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
-      "re-meshing (-remesh_...) is not there yet for element p2, which body %s has: choose p1, cr or dg",
-      m->body[b].name);
-  }
+  r->meshes = (PetscBool)(any || r->ntime || r->failed);
+  if (!r->meshes && !r->nchange) PetscCall(SbRemeshDestroy(remesh));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -208,6 +235,7 @@ PetscErrorCode SbRemeshDestroy(SbRemesh *remesh)
   if (!r) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscFree7(r->named, r->due, r->asked, r->bound, r->worst, r->from, r->rest));
   PetscCall(PetscFree(r->time));
+  PetscCall(PetscFree(r->change));
   PetscCall(PetscFree(r->column));
   PetscCall(PetscFree(*remesh));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -227,6 +255,14 @@ static PetscErrorCode check_quality(SbRun run, PetscInt step, PetscReal t, Petsc
   *pause = PETSC_FALSE;
   for (PetscInt i = 0; i < r->ntime; i++)
     time = (PetscBool)(time || (r->time[i] > t - dt + ahead && r->time[i] <= t + ahead));
+  r->changes = PETSC_FALSE;
+  for (PetscInt i = 0; i < r->nchange; i++)
+    r->changes = (PetscBool)(r->changes || (r->change[i] > t - dt + ahead && r->change[i] <= t + ahead));
+  *pause = r->changes;
+  if (!r->meshes) {
+    PetscCall(PetscLogEventEnd(r->event, 0, 0, 0, 0));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
   r->how.better = (PetscBool)!time;
   PetscCall(SbBodyQualities(run->model, run->U, r->named, r->worst));
   for (PetscInt b = 0; b < r->nbody; b++) {
@@ -272,6 +308,8 @@ PetscErrorCode SbRemeshAttach(SbRemesh r, SbRun run)
 {
   PetscFunctionBeginUser;
   if (!r) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(SbRunSetPause(run, check_quality, r));
+  if (!r->meshes) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscFree(r->column));
   PetscCall(PetscMalloc1(run->ncolumn + 3, &r->column));
   PetscCall(PetscArraycpy(r->column, run->column, run->ncolumn));
@@ -285,7 +323,6 @@ PetscErrorCode SbRemeshAttach(SbRemesh r, SbRun run)
 
     if (in_memory && in_memory->bound > 0.) r->bound[b] = PetscMin(r->bound[b], in_memory->bound);
   }
-  PetscCall(SbRunSetPause(run, check_quality, r));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -405,6 +442,7 @@ static PetscErrorCode replace(SbRemesh r, Scene *old, SbRemeshResult *result)
   PetscCall(PetscStrncpy(s.run->solver_choice, old->run->solver, sizeof(s.run->solver_choice)));
   PetscCall(SbLedgerSetFromOptions(s.run, &s.ledger));
   PetscCall(hand_meshes(s.model, result->in_memory));
+  s.model->t_begin = old->run->t_now;
   PetscCall(SbModelSetUp(s.model));
   PetscCall(SbSceneValidate(s.model));
   PetscCall(SbRunSetUp(s.run));
@@ -472,6 +510,8 @@ static PetscErrorCode apply(SbRemesh r, Scene *scene, PetscBool *any)
     r->from[b] = scene->run->step_now + r->rest[b];
     if (result.in_memory[b] && done[b]) result.in_memory[b]->bound = r->bound[b];
   }
+  *any = (PetscBool)(*any || r->changes);
+  r->changes = PETSC_FALSE;
   if (*any) PetscCall(replace(r, scene, &result));
   PetscCall(SbRemeshResultDestroy(&result));
   PetscCall(PetscLogEventEnd(r->event, 0, 0, 0, 0));
@@ -501,6 +541,13 @@ PetscErrorCode SbRemeshSolve(SbRemesh r, SbModel *model, SbRun *run, SbLedger *l
     first->t_now = first->t0;
     PetscCall(check_quality(first, first->step0, first->t0, first->after.dt, r, &again));
     if (again) PetscCall(apply(r, &scene, &any));
+  } else if (r && first->step0 && r->nchange) {
+    // the scene was made as at the start of the first run
+    first->step_now = first->step0;
+    first->t_now = first->t0;
+    PetscCall(check_quality(first, first->step0, first->t0, first->t0, r, &again));
+    for (PetscInt b = 0; b < r->nbody; b++) r->due[b] = PETSC_FALSE;
+    if (r->changes) PetscCall(apply(r, &scene, &any));
   }
   do {
     PetscCall(SbRunSolve(scene.run));

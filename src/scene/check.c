@@ -98,6 +98,10 @@ PetscErrorCode SbSceneCheck(SbModel model)
   for (PetscInt e = 0; e < model->neffect && !constrained; e++)
     constrained = (PetscBool)(model->effect[e]->ops.prescribe ||
                               (model->effect[e]->ops.potential && model->effect[e]->springs));
+  for (PetscInt i = 0; i < model->nbody; i++)
+    PetscCheck(model->dynamic || (!model->start[i].moved && !model->start[i].state[0]), PETSC_COMM_SELF,
+               PETSC_ERR_USER, "-body_%s_%s is for dynamic runs: -time static begins without loads, at rest",
+               model->body[i].name, model->start[i].moved ? "displacement" : "state");
   PetscCheck(constrained, PETSC_COMM_SELF, PETSC_ERR_USER,
              "-time static: nothing holds the bodies, so there is no unique equilibrium; name an effect of "
              "type fixed or prescribed_displacement");

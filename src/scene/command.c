@@ -132,9 +132,10 @@ PetscErrorCode SbCommandLine(int *argc, char *argv[], SbCommand *command)
       if (readable(argv[1], command))
         (void)snprintf(command->scenario, sizeof(command->scenario), "%s", argv[1]);
     } else if (!command->problem[0]) {
-      (void)snprintf(
-        command->problem, sizeof(command->problem),
-        "the word '%s' in the command line belongs to no option (a value with blanks needs quotes)", argv[i]);
+      (void)snprintf(command->problem, sizeof(command->problem),
+                     "the word '%s' in the command line belongs to no option (an option begins with a dash, "
+                     "a value with blanks needs quotes)",
+                     argv[i]);
     }
     i += words;
   }

@@ -42,6 +42,8 @@ static PetscErrorCode names_problem(const char *what, PetscInt n, char (*names)[
   for (PetscInt i = 0; i < n && !text[0]; i++) {
     const char *problem = name_problem(names[i]);
 
+    if (!strcmp(what, "body") && !strcasecmp(names[i], SB_OPTION_DEFAULT))
+      problem = "stands for all bodies in -body_default_young and the like";
     if (problem) PetscCall(PetscSNPrintf(text, size, "the name '%s' %s", names[i], problem));
     for (PetscInt j = 0; j < i && !text[0]; j++) {
       const char *hint = strcmp(names[i], names[j]) ? " (upper and lower case count as one)" : "";

@@ -28,14 +28,26 @@ static const SbOption body_rows[] = {
   {"rotate", SB_OPTION_REALS, 4, "", "0,0,1,0", "(-inf, inf)",
    "axis x,y,z and angle in degrees, before translation"},
   {"translate", SB_OPTION_REALS, 3, "m", "0,0,0", "(-inf, inf)", "shift of the scaled and rotated mesh"},
+  {"copies", SB_OPTION_STRING, 1, "", "", "",
+   "bodies NAME1, NAME2, ... instead of this one, which share its options: a file with a line x y z [ax ay "
+   "az degrees [scale "
+   "[vx vy vz]]] for each, or grid:nx,ny,nz,dx,dy,dz (m); scale and rotation come first, and shifts and "
+   "velocities add up; "
+   "empty: one body"},
   {"element", SB_OPTION_STRING, 1, "", "p1", "p1|p2|cr|dg",
    "finite element; p2, cr and dg do not lock when poisson is near 0.5, p2 is the most accurate where the "
    "solution is smooth"},
   {"material", SB_OPTION_STRING, 1, "", "", LAWS, "material law, required"},
   {"inclusions", SB_OPTION_NAMES, 1, "", "", "",
    "sets or volume groups whose tetrahedra have a material of their own, -inclusion_<name>_..."},
-  {"velocity", SB_OPTION_REALS, 3, "m/s", "0,0,0", "(-inf, inf)",
-   "velocity of the centre of mass at the start"},
+  {"displacement", SB_OPTION_FORMULA, 3, "m", "0,0,0", "",
+   "displacement at the start: numbers or formulas of the place x, y, z at rest"},
+  {"state", SB_OPTION_STRING, 1, "", "", "",
+   "RUN or RUN,STEP: displacement and velocity at the start are those of this body in the results of another "
+   "run (its folder or fields.h5; the last step "
+   "without one), which may have another mesh, element, material, integrator and other effects"},
+  {"velocity", SB_OPTION_FORMULA, 3, "m/s", "0,0,0", "",
+   "velocity at the start: numbers or formulas of the place x, y, z at rest"},
   {"angular_velocity", SB_OPTION_REALS, 3, "rad/s", "0,0,0", "(-inf, inf)",
    "angular velocity about the centre of mass at the start"},
 };
@@ -71,6 +83,23 @@ static PetscErrorCode read_type(const SbScope *scope, const char *key, PetscFunc
   SETERRQ(PETSC_COMM_SELF, PETSC_ERR_USER, "%s %s is not one of %s", option, word, all);
 }
 
+/* A vector of formulas of the place. */
+static PetscErrorCode read_start(const SbScope *scope, const char *key, SbFormula formula[3])
+{
+  char option[3 * SB_NAME_MAX];
+  PetscBool time, place;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbOptionFormulas(scope, key, formula));
+  PetscCall(SbOptionName(scope, key, sizeof(option), option));
+  for (int k = 0; k < 3; k++) {
+    PetscCall(SbFormulaUses(formula[k], &time, &place));
+    PetscCheck(!time, PETSC_COMM_SELF, PETSC_ERR_USER,
+               "%s: what a body begins with may use the place x, y, z only, not t", option);
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 static PetscErrorCode read_body(SbModel model, PetscInt i)
 {
   SbBody *body = &model->body[i];
@@ -96,7 +125,22 @@ static PetscErrorCode read_body(SbModel model, PetscInt i)
   PetscCall(SbElementCreate(body->element, &scope, &model->element[i]));
   PetscCall(SbMaterialCreate(body->material, &scope, &model->material[i]));
   body->density = model->material[i]->density;
-  PetscCall(SbOptionReals(&scope, "velocity", body->velocity));
+  PetscCall(read_start(&scope, "displacement", model->start[i].displacement));
+  PetscCall(read_start(&scope, "velocity", model->start[i].velocity));
+  for (int k = 0; k < 3; k++) {
+    PetscBool time, place;
+
+    /* numbers are the body's own */
+    PetscCall(SbFormulaUses(model->start[i].velocity[k], &time, &place));
+    if (place) continue;
+    body->velocity[k] = SbFormulaEval(model->start[i].velocity[k], 0., NULL);
+    PetscCall(SbFormulaDestroy(&model->start[i].velocity[k]));
+  }
+  PetscCall(SbOptionGiven(&scope, "displacement", &model->start[i].moved));
+  PetscCall(SbOptionString(&scope, "state", sizeof(model->start[i].state), model->start[i].state));
+  PetscCheck(!model->start[i].state[0] || !model->start[i].moved, PETSC_COMM_SELF, PETSC_ERR_USER,
+             "-body_%s_state and -body_%s_displacement both say where the body begins: give one of them",
+             body->name, body->name);
   PetscCall(SbOptionReals(&scope, "angular_velocity", body->angular_velocity));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -131,18 +175,45 @@ static PetscErrorCode read_inclusions(SbModel model, PetscInt i)
 static PetscErrorCode read_bodies(SbModel model)
 {
   char(*names)[SB_NAME_MAX];
+  PetscInt n, nbody = 0, *ncopy;
+  SbPlacement **copy;
 
   PetscFunctionBeginUser;
-  PetscCall(SbSceneReadNames("bodies", "body", &model->nbody, &names));
-  PetscCheck(model->nbody, PETSC_COMM_SELF, PETSC_ERR_USER, "-bodies names no body; at least one is needed");
-  PetscCall(PetscCalloc1(model->nbody, &model->body));
-  PetscCall(PetscCalloc1(model->nbody, &model->material));
-  PetscCall(PetscCalloc1(model->nbody, &model->element));
-  for (PetscInt i = 0; i < model->nbody; i++)
-    PetscCall(PetscStrncpy(model->body[i].name, names[i], SB_NAME_MAX));
+  /* names, and the copies of each */
+  PetscCall(SbSceneReadNames("bodies", "body", &n, &names));
+  PetscCheck(n, PETSC_COMM_SELF, PETSC_ERR_USER, "-bodies names no body; at least one is needed");
+  PetscCall(PetscCalloc2(n, &ncopy, n, &copy));
+  for (PetscInt i = 0; i < n; i++) {
+    PetscCall(SbSceneReadCopies(model->comm, names[i], &ncopy[i], &copy[i]));
+    nbody += PetscMax(ncopy[i], 1);
+  }
+  PetscCall(PetscCalloc1(nbody, &model->body));
+  PetscCall(PetscCalloc1(nbody, &model->material));
+  PetscCall(PetscCalloc1(nbody, &model->element));
+  PetscCall(PetscCalloc1(nbody, &model->start));
+  model->nmaterial = model->nbody = nbody;
+
+  /* each body with its options, those of a copy with its place */
+  for (PetscInt i = 0, b = 0; i < n; i++) {
+    for (PetscInt k = 0; k < PetscMax(ncopy[i], 1); k++, b++) {
+      SbBody *body = &model->body[b];
+
+      PetscCall(PetscStrncpy(body->name, names[i], SB_NAME_MAX));
+      if (ncopy[i]) {
+        PetscCall(PetscStrncpy(body->copy_of, names[i], SB_NAME_MAX));
+        PetscCall(PetscSNPrintf(body->name, SB_NAME_MAX, "%s%" PetscInt_FMT, names[i], k + 1));
+        PetscCall(SbOptionsInherit("body", body->name, body->copy_of));
+      }
+      for (PetscInt j = 0; j < b; j++)
+        PetscCheck(strcasecmp(model->body[j].name, body->name), PETSC_COMM_SELF, PETSC_ERR_USER,
+                   "-bodies: two bodies are named '%s', which copies are too; rename one", body->name);
+      PetscCall(read_body(model, b));
+      if (ncopy[i]) SbPlacementAdd(&copy[i][k], body);
+    }
+    PetscCall(PetscFree(copy[i]));
+  }
+  PetscCall(PetscFree2(ncopy, copy));
   PetscCall(PetscFree(names));
-  model->nmaterial = model->nbody;
-  for (PetscInt i = 0; i < model->nbody; i++) PetscCall(read_body(model, i));
   for (PetscInt i = 0; i < model->nbody; i++) PetscCall(read_inclusions(model, i));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

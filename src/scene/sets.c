@@ -20,10 +20,11 @@ PetscErrorCode SbSetsRegister(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A body of this name, or the first copy of it. */
 static PetscInt find_body(SbModel model, const char *name)
 {
   for (PetscInt i = 0; i < model->nbody; i++)
-    if (!strcmp(model->body[i].name, name)) return i;
+    if (!strcmp(model->body[i].name, name) || !strcmp(model->body[i].copy_of, name)) return i;
   return -1;
 }
 

@@ -80,6 +80,7 @@ PetscErrorCode SbRunSolveContact(SbRun run, const SbAttempt *step, SNESConverged
 
   /* examined, and solved again until the guess was right */
   for (PetscInt round = 1; *reason > 0; round++) {
+    run->contact_round = round;
     PetscCall((*step->residual)(step->ctx, U, run->R));
     m->space->rough = rough;
     PetscCall(SbModelContactUpdateActiveSet(m, t + dt, U, run->R, &again));

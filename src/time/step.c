@@ -6,6 +6,8 @@
 */
 #include "time_impl.h"
 
+#define SHORT 0.13 /* of the length asked for: three halvings */
+
 PetscErrorCode SbRunStepBegin(SbRun run, PetscReal t, PetscReal dt)
 {
   SbModel m = run->model;
@@ -52,6 +54,17 @@ PetscErrorCode SbRunAttempt(SbRun run, const SbAttempt *a, PetscBool *ok)
 
   /* what moves by order is where it was when the step began, if the run ends there */
   if (!*ok && run->model->npotential) PetscCall(SbModelGuardAdvance(run->model, 0.));
+
+  /* steps that become much shorter than asked for are slow, and a sign of trouble */
+  if (!*ok && run->stop_reason[0] && !run->stopped && !run->shortened && a->dt <= SHORT * run->dt) {
+    run->shortened = PETSC_TRUE;
+    PetscCall(SbWarning(
+      run->model->comm,
+      "steps had to be halved to %.2g of their length, and more: %s. It goes on; if it gets slow, try %s, or "
+      "loads and motions that begin gently (docs/guides/when_it_fails.md)",
+      (double)(a->dt / run->dt), run->stop_reason,
+      run->model->dynamic ? "a shorter -ts_dt from the start" : "more -static_steps"));
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -76,6 +89,8 @@ PetscErrorCode SbRunStepAccepted(SbRun run, PetscInt step, PetscReal t, PetscRea
   now.last = (PetscBool)(last || run->stopped);
   if (!first)
     run->stop.longest_step = PetscMax(SB_FORGET * run->stop.longest_step, begun - run->stop.step_begun);
+
+  if (dt > 0.9 * run->dt) run->shortened = PETSC_FALSE;
 
   /* effects keep their history */
   run->step_now = step;

@@ -183,4 +183,18 @@ error 1 "-help nonsense" -help nonsense
 check "nothing at all prints no usage" grep -q 'supple SCENARIO.opts' <<<"$("$supple" 2>nothing.txt)"
 check "nothing at all is no error" grep -q '^supple: error: -bodies' nothing.txt
 
+# where a file goes wrong: the line of YAML, an option without its dash; the launcher without a number of ranks
+printf 'bodies: bar\nbody:\n  bar:\n    mesh: box:0.4,0.1,0.1:6,2,2\n    material: linear\n   young: 5e4\n' >indent.yml
+error 2 "indent.yml|line 6|young: 5e4" indent.yml
+printf 'bodies: bar\nbody:\n\tbar: {mesh: "box:1,1,1:1"}\n' >tab.yml
+error 1 "tab.yml|line 3|tab" tab.yml
+printf -- '-bodies bar\nbody_bar_young 3\n' >dash.opts
+error 1 "dash.opts|line 2|body_bar_young|dash" dash.opts
+for ranks in 0 bin/supple -2 ""; do
+  "$top/scripts/mpi" "$ranks" "$supple" -version >out.txt 2>err.txt
+  code=$?
+  check "scripts/mpi '$ranks': exit code $code" test "$code" -ne 0
+  check "scripts/mpi '$ranks': $(cat err.txt)" grep -q "'$ranks' is no number of ranks" err.txt
+done
+
 finish

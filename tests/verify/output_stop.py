@@ -3,9 +3,11 @@
 SIGTERM on one rank of two, SIGUSR1 on the launcher, SIGINT on a run alone, and -wall_time: each ends with code 75, run.json says "stopped" and how
 to go on, and with -restart the last row of history.csv is that of a run that nobody stopped. A step that takes longer than
 -stop_grace is given up. A second SIGINT ends at once.
+A step that takes long says how far it is.
 """
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -108,6 +110,20 @@ def main():
             break
     else:
         sys.exit("no step was given up in eight runs")
+
+    # a step that takes more than five seconds (most of them asleep) says how far it is
+    args = [word for word in command(1, "long", *SLOW, *LONG_STEPS) if word != "-quiet"]
+    process = subprocess.Popen(args, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
+    while not (OUT / "long" / "history.csv").exists() or (OUT / "long" / "history.csv").read_text().count("\n") < 4:
+        time.sleep(0.02)
+    process.send_signal(signal.SIGSTOP)
+    time.sleep(6)
+    process.send_signal(signal.SIGCONT)
+    time.sleep(0.5)
+    process.send_signal(signal.SIGTERM)
+    text = process.communicate()[0]
+    if not re.search(r"step \d+ has taken \d+ s: (Newton|linear) iteration \d+, residual \S+ N, length 0.01 s", text):
+        sys.exit(f"no line within a long step: {text}")
 
     # a second Ctrl-C
     process = start(1, "twice", *LONG_STEPS, "-stop_grace", "1000", "-body_bar_mesh", "box:0.4,0.1,0.1:40,10,10", rows=1)

@@ -1,0 +1,241 @@
+/*
+  A body begins where another run has brought it: -body_<name>_state RUN[,STEP].
+
+  Displacement and velocity are those of a frame of that run's fields.h5, evaluated at the nodes of this run: u(X) = sum_a w_a u_a with the weights of the tet that holds the place X at
+  rest there, or of the nearest one. So element, mesh, material, effects and integrator may be others; where nodes are the vertices of that run, values are those of the file. Every rank
+  reads the body's part of the file.
+*/
+#include <sys/stat.h>
+#include "output_impl.h"
+#include "sbgeometry.h"
+
+#define OUTSIDE 0.05 /* of the body's diagonal: a node farther from the other run's body is worth a warning */
+
+/* The body of another run. */
+typedef struct {
+  char path[PETSC_MAX_PATH_LEN];
+  hid_t file, frame, mesh;
+  PetscInt npoint, ncell;
+  PetscReal *x, *u, *v; /* [npoint][3] at rest, m; displacement, m; velocity, m/s, NULL: the frame has none */
+  PetscInt *cell;       /* [ncell][4] those of the body */
+} Other;
+
+static PetscInt count_links(hid_t group)
+{
+  H5G_info_t info;
+
+  return H5Gget_info(group, &info) < 0 ? 0 : (PetscInt)info.nlinks;
+}
+
+/* The frame of a step, or the last one for step < 0; negative: there is none. Frames lie in groups of hundreds, named by their steps. */
+static hid_t open_frame(hid_t file, long step)
+{
+  const hid_t top = H5Gopen2(file, "step", H5P_DEFAULT);
+  hid_t found = -1;
+  long best = -1;
+
+  for (PetscInt h = 0; top >= 0 && h < count_links(top); h++) {
+    char name[32], frame[32];
+    hid_t hundred;
+
+    if (H5Lget_name_by_idx(top, ".", H5_INDEX_NAME, H5_ITER_INC, (hsize_t)h, name, sizeof(name),
+                           H5P_DEFAULT) < 0)
+      continue;
+    hundred = H5Gopen2(top, name, H5P_DEFAULT);
+    for (PetscInt i = 0; i < count_links(hundred); i++) {
+      long number;
+
+      (void)H5Lget_name_by_idx(hundred, ".", H5_INDEX_NAME, H5_ITER_INC, (hsize_t)i, frame, sizeof(frame),
+                               H5P_DEFAULT);
+      number = strtol(frame, NULL, 10);
+      if (step < 0 ? number <= best : number != step) continue;
+      if (found >= 0) (void)H5Gclose(found);
+      found = H5Gopen2(hundred, frame, H5P_DEFAULT);
+      best = number;
+    }
+    (void)H5Gclose(hundred);
+  }
+  if (top >= 0) (void)H5Gclose(top);
+  return found;
+}
+
+/* A whole dataset as numbers of `type`, [n] or [n][ncomp]; NULL when it is not there. PetscFree. */
+static PetscErrorCode read_all(hid_t where, const char *name, hid_t type, size_t size, PetscInt ncomp,
+                               PetscInt *n, void *array)
+{
+  const PetscInt64 rows = H5Lexists(where, name, H5P_DEFAULT) > 0 ? SbH5Rows(where, name) : 0;
+  hid_t dataset;
+
+  PetscFunctionBeginUser;
+  *(void **)array = NULL;
+  *n = (PetscInt)rows;
+  if (!rows) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscMalloc((size_t)rows * (size_t)ncomp * size, (void **)array));
+  dataset = H5Dopen2(where, name, H5P_DEFAULT);
+  if (H5Sget_simple_extent_npoints(H5Dget_space(dataset)) != rows * ncomp ||
+      H5Dread(dataset, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, *(void **)array) < 0)
+    PetscCall(PetscFree(*(void **)array));
+  (void)H5Dclose(dataset);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Which number a body of this name, or of what it is a copy of, has there; one body is the one. -1: none. */
+static PetscInt find_body(hid_t mesh, const SbBody *body)
+{
+  const hid_t attribute = H5Aexists(mesh, "bodies") > 0 ? H5Aopen(mesh, "bodies", H5P_DEFAULT) : -1,
+              type = attribute >= 0 ? H5Aget_type(attribute) : -1;
+  PetscInt found = -1, n = 0;
+  char *names, *rest;
+
+  if (type < 0) return 0;
+  names = (char *)calloc(H5Tget_size(type) + 1, 1);
+  rest = names;
+  (void)H5Aread(attribute, type, names);
+  for (char *name = strsep(&rest, ","); name; name = strsep(&rest, ",")) {
+    if (!strcmp(name, body->name) || (found < 0 && !strcmp(name, body->copy_of))) found = n;
+    n++;
+  }
+  free(names);
+  (void)H5Tclose(type);
+  (void)H5Aclose(attribute);
+  return found < 0 && n == 1 ? 0 : found;
+}
+
+static PetscErrorCode read_other(const char *option, const char *text, const SbBody *body, Other *o)
+{
+  char name[32] = "mesh", *comma;
+  struct stat info;
+  long step = -1;
+  PetscInt which, n, nu, *cell_body;
+  int64_t mesh = 0;
+  PetscBool ok = PETSC_TRUE;
+
+  PetscFunctionBeginUser;
+  /* RUN[,STEP]: a folder or its fields.h5 */
+  PetscCall(PetscStrncpy(o->path, text, sizeof(o->path)));
+  comma = strrchr(o->path, ',');
+  if (comma && comma[1] && !comma[1 + strspn(comma + 1, "0123456789")]) {
+    step = strtol(comma + 1, NULL, 10);
+    *comma = 0;
+  }
+  if (!stat(o->path, &info) && S_ISDIR(info.st_mode))
+    PetscCall(PetscStrlcat(o->path, "/fields.h5", sizeof(o->path)));
+  o->file = stat(o->path, &info) ? -1 : H5Fopen(o->path, H5F_ACC_RDONLY, H5P_DEFAULT);
+  PetscCheck(o->file >= 0, PETSC_COMM_SELF, PETSC_ERR_FILE_OPEN,
+             "%s %s: there is no %s; give the folder of a run that wrote fields, displacement among them",
+             option, text, o->path);
+  o->frame = open_frame(o->file, step);
+  PetscCheck(o->frame >= 0, PETSC_COMM_SELF, PETSC_ERR_FILE_UNEXPECTED, "%s %s: %s has no frame%s", option,
+             text, o->path, step < 0 ? "" : " of this step");
+
+  /* the mesh of that frame, which may be one of a re-meshing */
+  if (H5Aexists(o->frame, "mesh") > 0) PetscCall(SbH5GetInt(o->frame, "mesh", &mesh, &ok));
+  if (mesh) (void)snprintf(name, sizeof(name), "mesh_%06ld", (long)mesh);
+  o->mesh = H5Gopen2(o->file, name, H5P_DEFAULT);
+  which = o->mesh < 0 ? -1 : find_body(o->mesh, body);
+  PetscCheck(which >= 0, PETSC_COMM_SELF, PETSC_ERR_FILE_UNEXPECTED, "%s %s: %s has no body '%s'", option,
+             text, o->path, body->name);
+  PetscCall(read_all(o->mesh, "x", H5T_NATIVE_DOUBLE, sizeof(double), 3, &o->npoint, &o->x));
+  PetscCall(read_all(o->mesh, "cells", sizeof(PetscInt) == 8 ? H5T_NATIVE_INT64 : H5T_NATIVE_INT32,
+                     sizeof(PetscInt), 4, &o->ncell, &o->cell));
+  PetscCall(read_all(o->mesh, "body", sizeof(PetscInt) == 8 ? H5T_NATIVE_INT64 : H5T_NATIVE_INT32,
+                     sizeof(PetscInt), 1, &n, &cell_body));
+  PetscCall(read_all(o->frame, "displacement", H5T_NATIVE_DOUBLE, sizeof(double), 3, &nu, &o->u));
+  PetscCall(read_all(o->frame, "velocity", H5T_NATIVE_DOUBLE, sizeof(double), 3, &n, &o->v));
+  PetscCheck(o->x && o->cell && o->u && nu == o->npoint, PETSC_COMM_SELF, PETSC_ERR_FILE_UNEXPECTED,
+             "%s %s: %s has no whole mesh with displacements; -output_fields displacement,velocity there",
+             option, text, o->path);
+
+  /* its tets of that body */
+  n = 0;
+  for (PetscInt c = 0; c < o->ncell; c++) {
+    if (cell_body && cell_body[c] != which) continue;
+    PetscCall(PetscArraymove(o->cell + 4 * n, o->cell + 4 * c, 4));
+    n++;
+  }
+  o->ncell = n;
+  PetscCall(PetscFree(cell_body));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode close_other(Other *o)
+{
+  PetscFunctionBeginUser;
+  PetscCall(PetscFree(o->x));
+  PetscCall(PetscFree(o->u));
+  PetscCall(PetscFree(o->v));
+  PetscCall(PetscFree(o->cell));
+  if (o->mesh >= 0) (void)H5Gclose(o->mesh);
+  if (o->frame >= 0) (void)H5Gclose(o->frame);
+  if (o->file >= 0) (void)H5Fclose(o->file);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Values at the nodes of body b. */
+static PetscErrorCode take_over(SbRun run, const char *option, PetscInt b, Other *o)
+{
+  const SbSpace s = run->model->space;
+  const PetscReal *box = run->model->body[b].bbox;
+  const PetscReal size[3] = {box[3] - box[0], box[4] - box[1], box[5] - box[2]};
+  PetscReal far = 0., diagonal = PetscSqrtReal(PetscSqr(size[0]) + PetscSqr(size[1]) + PetscSqr(size[2]));
+  SbLocator locator;
+  PetscScalar *u, *v;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbLocatorCreate(o->ncell, o->cell, o->x, &locator));
+  PetscCall(VecGetArray(run->U, &u));
+  PetscCall(VecGetArray(run->V, &v));
+  for (PetscInt i = 0; i < s->nnode_owned; i++) {
+    PetscReal weight[4];
+    PetscInt cell;
+
+    if (s->node_body[i] != b) continue;
+    far = PetscMax(far, SbLocatorFind(locator, s->node_x + 3 * i, &cell, weight));
+    for (int k = 0; k < 3; k++) {
+      u[3 * i + k] = v[3 * i + k] = 0.;
+      for (int a = 0; a < 4; a++) {
+        u[3 * i + k] += weight[a] * o->u[3 * o->cell[4 * cell + a] + k];
+        if (o->v) v[3 * i + k] += weight[a] * o->v[3 * o->cell[4 * cell + a] + k];
+      }
+      if (s->fixed[i] & (1 << k)) v[3 * i + k] = 0.;
+    }
+  }
+  PetscCall(VecRestoreArray(run->U, &u));
+  PetscCall(VecRestoreArray(run->V, &v));
+  PetscCall(SbLocatorDestroy(&locator));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &far, 1, MPIU_REAL, MPI_MAX, run->model->comm));
+  if (far > OUTSIDE * diagonal)
+    PetscCall(SbWarning(run->model->comm,
+                        "%s: nodes are up to %g m outside of the body in %s, and take the values of the "
+                        "nearest place: is it the same body, at the same place?",
+                        option, (double)far, o->path));
+  if (!o->v)
+    PetscCall(
+      SbWarning(run->model->comm, "%s: %s has no velocity, the body begins at rest", option, o->path));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbOutputTakeState(SbRun run)
+{
+  const SbModel m = run->model;
+  const SbOutput out = (SbOutput)run->output;
+  PetscBool any = PETSC_FALSE;
+
+  PetscFunctionBeginUser;
+  if (out->restart[0]) PetscFunctionReturn(PETSC_SUCCESS); /* the checkpoint has the state */
+  for (PetscInt b = 0; b < m->nbody; b++) {
+    Other o = {.file = -1, .frame = -1, .mesh = -1};
+    SbCaughtError caught = {0, ""};
+    char option[2 * SB_NAME_MAX];
+
+    if (!m->start[b].state[0]) continue;
+    any = PETSC_TRUE;
+    PetscCall(PetscSNPrintf(option, sizeof(option), "-body_%s_state", m->body[b].name));
+    SB_CATCH(&caught, read_other(option, m->start[b].state, &m->body[b], &o));
+    if (!caught.code) PetscCall(take_over(run, option, b, &o));
+    PetscCall(close_other(&o));
+    PetscCall(SbCaughtRaise(m->comm, &caught));
+  }
+  if (any) PetscCall(SbModelPrescribe(m, 0., run->U));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
