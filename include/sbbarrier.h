@@ -72,6 +72,8 @@ struct _p_SbContactPairs {
   PetscReal *shorter; /* [nvertex][3] end of a motion that was halved */
   struct SbContactFeatures *features; /* [6] vertices, triangles and edges, each of this rank and of others */
   PetscBool known;
+  const uint8_t
+    *near; /* [nvertex] borrowed; features that both have such vertices are not guarded; NULL: all are */
   PetscInt n, size;
   SbContactPair *pair; /* [n] all that touch nodes of this rank, in no order */
   PetscInt nsearch;
@@ -79,6 +81,8 @@ struct _p_SbContactPairs {
 PetscErrorCode SbContactPairsCreate(SbContactMesh mesh, PetscBool self, PetscBool others, PetscReal reach,
                                     SbContactPairs *pairs);
 PetscErrorCode SbContactPairsDestroy(SbContactPairs *pairs);
+/* Vertices inside with triangles near there, edges of what crosses with each other are no pairs from now on, by SbContactOverlap.near (borrowed); NULL: all may be. Not collective. */
+PetscErrorCode SbContactPairsExempt(SbContactPairs pairs, const uint8_t near[]);
 /* All pairs that come within the reach on the straight way from x0 to x1, and more. Not collective. */
 PetscErrorCode SbContactPairsFind(SbContactPairs pairs, const PetscReal x0[], const PetscReal x1[]);
 /* The gap, m: the distance less the radius of a rounded obstacle; nearest places and direction in `distance`. Not collective. */
@@ -109,13 +113,38 @@ static inline PetscBool SbContactPairApart(SbContactMesh mesh, const SbContactPa
 /* The part of the straight way from x0 to x1, 0..1, that no pair of this rank touches before; pairs at a distance keep a tenth of it. Not collective. */
 PetscErrorCode SbContactPairsSafe(SbContactPairs pairs, const PetscReal x0[], const PetscReal x1[],
                                   PetscReal *part, PetscInt *worst);
+/* What all ranks have, one after the other; n and total count items of the type, `size` bytes each. Collective; the caller frees `all`. */
+PetscErrorCode SbContactGather(MPI_Comm comm, PetscInt n, MPI_Datatype type, size_t size, const void *mine,
+                               PetscInt *total, void *all);
 /*
   SbContactMeshCrossings - edges that go through triangles of another part, or of the same one (self), at x.
 
-  Collective. Output: n of all ranks; where: vertex numbers (edge, triangle) of the first one, undefined without any. It knows nothing of pairs and motions.
+  Collective. Output, of all ranks on each: hit[n][2], edge and triangle, ascending; the caller frees it. It knows nothing of pairs and motions.
 */
 PetscErrorCode SbContactMeshCrossings(SbContactMesh mesh, PetscBool self, const PetscReal x[], PetscInt *n,
-                                      PetscInt where[5]);
+                                      PetscInt **hit);
+
+/* A vertex, or the middle of what is inside of an edge, that is in something: `normal` leads out of that over `depth`, to the point -sum of the weights from `first` on. */
+typedef struct {
+  PetscInt n, v[5];
+  PetscReal weight[5]; /* sum 0, n . sum weight x = -depth; for a round obstacle less its radius */
+  PetscReal normal[3], depth, area;
+} SbContactInside;
+/* A vertex is inside; its edges or triangles go through something; it is next to these. */
+enum { SB_OVERLAP_AROUND = 1, SB_OVERLAP_CROSSED, SB_OVERLAP_INSIDE };
+/* Start with {0}. The same on every rank. */
+typedef struct {
+  PetscInt ncrossing; /* edges that go through triangles, or features behind a round or one-sided obstacle */
+  PetscInt part[2];   /* of the first of them: body, or nbody for the obstacle */
+  PetscReal place[3], deepest; /* where that is; deepest point inside, m */
+  PetscInt n, size;
+  SbContactInside *point; /* [n] those that know the way out */
+  uint8_t *near;          /* [nvertex] SB_OVERLAP_INSIDE, _CROSSED, _AROUND or 0 */
+} SbContactOverlap;
+/* What is in something else at x; `inside`: something is, also when no edge says so. Collective; release with SbContactOverlapFree(). */
+PetscErrorCode SbContactOverlapFind(SbContactMesh mesh, PetscBool self, const PetscReal x[], PetscBool inside,
+                                    SbContactOverlap *overlap);
+PetscErrorCode SbContactOverlapFree(SbContactOverlap *overlap);
 /*
   SbContactMeshContained - whether the middle of a tet of body[0] at rest is within the surface of body[1] at x: bodies of which no edge goes through the other.
 

@@ -33,10 +33,6 @@ typedef struct {
 typedef struct {
   /* reads -effect_<name>_...; scope = {"effect", <type>, <name>}; called once, by SbEffectCreate() */
   PetscErrorCode (*setfromoptions)(SbEffect e, const SbScope *scope);
-  /* before the set-up of any effect, of a response that was not asked for: whether things that it cannot part are in each other when the run begins; then all
-     such effects take another one by fall_back(). Collective. */
-  PetscErrorCode (*overlaps)(SbEffect e, SbSpace space, PetscBool *found);
-  PetscErrorCode (*fall_back)(SbEffect e);
   /* finds its nodes, facets, cells; marks prescribed unknowns by SbSpaceFix(). Collective. */
   PetscErrorCode (*setup)(SbEffect e, SbSpace space);
   /* writes prescribed displacements at time t into space->fixed_value (rows from SbSpaceFixedIndex()). Not collective. */

@@ -12,9 +12,8 @@
 #include "obstacle.h"
 #include "sbbarrier.h"
 
-/* What all ranks have, one after the other; n and total count items of the type. The caller frees `all`. */
-static PetscErrorCode gather(MPI_Comm comm, PetscInt n, MPI_Datatype type, size_t size, const void *mine,
-                             PetscInt *total, void *all)
+PetscErrorCode SbContactGather(MPI_Comm comm, PetscInt n, MPI_Datatype type, size_t size, const void *mine,
+                               PetscInt *total, void *all)
 {
   PetscMPIInt ranks, *count, *first, mine_n;
   char *to;
@@ -140,8 +139,8 @@ static PetscErrorCode make_vertices(SbContactMesh m, PetscInt n, const SbFacet f
   PetscCallMPI(MPI_Comm_size(s->comm, &ranks));
   PetscCallMPI(MPI_Comm_rank(s->comm, &rank));
   PetscCall(list_own(m, n, facet, &nnumber, &number, &nreal, &real));
-  PetscCall(gather(s->comm, nnumber, MPIU_INT, sizeof(PetscInt), number, &Nnumber, &all));
-  PetscCall(gather(s->comm, nreal, MPIU_REAL, sizeof(PetscReal), real, &Nreal, &values));
+  PetscCall(SbContactGather(s->comm, nnumber, MPIU_INT, sizeof(PetscInt), number, &Nnumber, &all));
+  PetscCall(SbContactGather(s->comm, nreal, MPIU_REAL, sizeof(PetscReal), real, &Nreal, &values));
   PetscCall(PetscFree(number));
   PetscCall(PetscFree(real));
 
@@ -220,7 +219,7 @@ static PetscErrorCode make_triangles(SbContactMesh m, PetscInt n, const SbFacet 
     for (int k = 0; k < 3; k++) mine[nmine][1 + k] = s->mesh->vert_orig[facet[i].vertex[k]];
     nmine++;
   }
-  PetscCall(gather(s->comm, 4 * nmine, MPIU_INT, sizeof(PetscInt), mine, &total, &all));
+  PetscCall(SbContactGather(s->comm, 4 * nmine, MPIU_INT, sizeof(PetscInt), mine, &total, &all));
   PetscCall(PetscFree(mine));
   qsort(all, (size_t)(total / 4), 4 * sizeof(PetscInt), compare_triangles);
   m->nbody_triangle = total / 4;

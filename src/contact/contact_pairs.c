@@ -90,6 +90,18 @@ static inline PetscBool wanted(SbContactPairs p, PetscInt a, PetscInt b)
                                               : p->self && a < m->nbody_vertex);
 }
 
+/* Whether features with these vertices, the first `split` on one side, are in each other or next to what is, and one of them in the midst of it. */
+static inline PetscBool overlaps(SbContactPairs p, const PetscInt v[4], int split)
+{
+  int near[2] = {0, 0};
+
+  if (!p->near) return PETSC_FALSE;
+  for (int k = 0; k < 4; k++) near[k >= split] = PetscMax(near[k >= split], p->near[v[k]]);
+  if (!near[0] || !near[1]) return PETSC_FALSE;
+  return (PetscBool)(split == 1 ? near[0] == SB_OVERLAP_INSIDE
+                                : PetscMax(near[0], near[1]) >= SB_OVERLAP_CROSSED);
+}
+
 static PetscErrorCode add_vertex_triangle(SbContactPairs p, PetscInt v, PetscInt t)
 {
   const SbContactMesh m = p->mesh;
@@ -104,7 +116,7 @@ static PetscErrorCode add_vertex_triangle(SbContactPairs p, PetscInt v, PetscInt
     pair.area = m->area[v];
   else
     pair.area = (m->area[tri[0]] + m->area[tri[1]] + m->area[tri[2]]) / 3.;
-  PetscCall(add_pair(p, &pair));
+  if (!overlaps(p, pair.v, 1)) PetscCall(add_pair(p, &pair));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -123,7 +135,7 @@ static PetscErrorCode add_edge_edge(SbContactPairs p, PetscInt e, PetscInt f)
     pair.area = m->edge_area[low];
   else
     pair.area = 0.5 * (m->edge_area[low] + m->edge_area[high]);
-  PetscCall(add_pair(p, &pair));
+  if (!overlaps(p, pair.v, 2)) PetscCall(add_pair(p, &pair));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -171,6 +183,14 @@ PetscErrorCode SbContactPairsCreate(SbContactMesh m, PetscBool self, PetscBool o
       if (!pass) PetscCall(PetscMalloc2(f->n, &f->item, f->n, &f->box));
     }
   }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbContactPairsExempt(SbContactPairs p, const uint8_t near[])
+{
+  PetscFunctionBeginUser;
+  if (p->near || near) p->known = PETSC_FALSE;
+  p->near = near;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -288,7 +308,7 @@ static PetscErrorCode find_pairs(SbContactPairs p, const PetscReal x0[], const P
     PetscReal way = 0., away;
     SbDistance g;
 
-    if (!m->mine[v] || m->driven[v]) continue;
+    if (!m->mine[v] || m->driven[v] || (p->near && p->near[v] == SB_OVERLAP_INSIDE)) continue;
     for (int i = 0; i < 3; i++)
       way +=
         PetscSqr(x1[3 * v + i] - x0[3 * v + i] - x1[3 * m->nbody_vertex + i] + x0[3 * m->nbody_vertex + i]);

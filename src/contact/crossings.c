@@ -12,7 +12,7 @@ typedef struct {
   SbContactMesh mesh;
   const PetscReal *x;
   PetscBool self;
-  PetscInt edge, n, where[5];
+  PetscInt edge, n, size, *hit; /* [n][2] edge and triangle */
 } Search;
 
 /* Sign of the volume of a tet, 0 within rounding. */
@@ -34,8 +34,8 @@ static int side_of(const PetscReal *a, const PetscReal *b, const PetscReal *c, c
   return volume > 0. ? 1 : -1;
 }
 
-/* Counts the edge that is searched for where it goes through a triangle. */
-static void test_triangle(Search *s, PetscInt t)
+/* Whether the edge that is searched for goes through a triangle. */
+static PetscBool goes_through(const Search *s, PetscInt t)
 {
   const SbContactMesh m = s->mesh;
   const PetscInt *e = m->edge + 2 * s->edge, *v = m->triangle + 3 * t;
@@ -44,26 +44,32 @@ static void test_triangle(Search *s, PetscInt t)
   int around;
 
   /* with an obstacle bodies are not each other's business */
-  if (m->nvertex > m->nbody_vertex && e[0] < m->nbody_vertex && v[0] < m->nbody_vertex) return;
-  if (m->part[e[0]] == m->part[v[0]] && (!s->self || e[0] >= m->nbody_vertex)) return;
+  if (m->nvertex > m->nbody_vertex && e[0] < m->nbody_vertex && v[0] < m->nbody_vertex) return PETSC_FALSE;
+  if (m->part[e[0]] == m->part[v[0]] && (!s->self || e[0] >= m->nbody_vertex)) return PETSC_FALSE;
   for (int k = 0; k < 6; k++) {
-    if (e[k / 3] == v[k % 3]) return;
+    if (e[k / 3] == v[k % 3]) return PETSC_FALSE;
   }
-  if (m->driven[e[0]] && m->driven[e[1]] && m->driven[v[0]] && m->driven[v[1]] && m->driven[v[2]]) return;
-  if (side_of(p, q, r, a) * side_of(p, q, r, b) >= 0) return;
+  if (m->driven[e[0]] && m->driven[e[1]] && m->driven[v[0]] && m->driven[v[1]] && m->driven[v[2]])
+    return PETSC_FALSE;
+  if (side_of(p, q, r, a) * side_of(p, q, r, b) >= 0) return PETSC_FALSE;
   around = side_of(a, b, p, q);
-  if (!around || side_of(a, b, q, r) != around || side_of(a, b, r, p) != around) return;
-  if (!s->n++) {
-    for (int k = 0; k < 5; k++) s->where[k] = k < 2 ? e[k] : v[k - 2];
-  }
+  return (PetscBool)(around && side_of(a, b, q, r) == around && side_of(a, b, r, p) == around);
+}
+
+static int compare_hits(const void *a, const void *b)
+{
+  const PetscInt *i = (const PetscInt *)a, *j = (const PetscInt *)b;
+
+  if (i[0] != j[0]) return (i[0] > j[0]) - (i[0] < j[0]);
+  return (i[1] > j[1]) - (i[1] < j[1]);
 }
 
 PetscErrorCode SbContactMeshCrossings(SbContactMesh m, PetscBool self, const PetscReal x[], PetscInt *n,
-                                      PetscInt where[5])
+                                      PetscInt **hits)
 {
   Search s = {.mesh = m, .x = x, .self = self};
   PetscReal(*box)[6];
-  PetscMPIInt rank, ranks, first;
+  PetscMPIInt rank, ranks;
   SbBoxQuery query;
   SbBoxTree tree;
   PetscInt hit;
@@ -80,28 +86,24 @@ PetscErrorCode SbContactMeshCrossings(SbContactMesh m, PetscBool self, const Pet
     s.edge = e;
     SbBoxClear(around);
     for (int k = 0; k < 2; k++) SbBoxAdd(around, x + 3 * m->edge[2 * e + k]);
-    for (SbBoxQueryBegin(&tree, around, &query); SbBoxQueryNext(&query, &hit);) test_triangle(&s, hit);
+    for (SbBoxQueryBegin(&tree, around, &query); SbBoxQueryNext(&query, &hit);) {
+      if (!goes_through(&s, hit)) continue;
+      if (s.n == s.size) {
+        s.size = PetscMax(64, 2 * s.size);
+        PetscCall(PetscRealloc(2 * (size_t)s.size * sizeof(*s.hit), &s.hit));
+      }
+      s.hit[2 * s.n] = e;
+      s.hit[2 * s.n++ + 1] = hit;
+    }
   }
   PetscCall(SbBoxTreeDestroy(&tree));
   PetscCall(PetscFree(box));
 
-  /* the half-space and the bowl: vertices behind */
-  for (PetscInt v = rank; v < m->nbody_vertex && m->side != SB_SIDE_NONE; v += ranks) {
-    const SbContactPair pair = {.side = PETSC_TRUE, .v = {v, m->nbody_vertex, m->nvertex - 1, v}};
-    SbDistance d;
-
-    if (m->driven[v] || SbContactPairGap(m, &pair, x, &d) >= 0.) continue;
-    if (!s.n++) {
-      for (int k = 0; k < 5; k++) s.where[k] = k < 2 ? v : m->nbody_vertex;
-    }
-  }
-
-  /* the first one of the lowest rank that has any */
-  first = s.n ? rank : ranks;
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &first, 1, MPI_INT, MPI_MIN, m->space->comm));
-  PetscCallMPI(MPI_Allreduce(&s.n, n, 1, MPIU_INT, MPI_SUM, m->space->comm));
-  for (int k = 0; k < 5; k++) where[k] = s.where[k];
-  if (first < ranks) PetscCallMPI(MPI_Bcast(where, 5, MPIU_INT, first, m->space->comm));
+  /* those of all ranks */
+  PetscCall(SbContactGather(m->space->comm, 2 * s.n, MPIU_INT, sizeof(PetscInt), s.hit, n, hits));
+  PetscCall(PetscFree(s.hit));
+  *n /= 2;
+  qsort(*hits, (size_t)*n, 2 * sizeof(PetscInt), compare_hits);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

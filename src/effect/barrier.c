@@ -16,7 +16,7 @@
   In a static run, or when asked for, a solution gives its normal forces and places to the next solve of the same step, until friction changes by less than a tolerance
   (barrier_friction.c). By how much it still would is reported.
 
-  Touching starts. Surfaces that touch when a run begins are moved apart, by less than the width; those that are in each other end the run.
+  Starts. Surfaces that touch when a run begins are moved apart, by less than the width; those that are in each other are parted by springs (barrier_springs.c).
 */
 #include "barrier_impl.h"
 
@@ -26,7 +26,7 @@
 #define SLIP 1e-3        /* of the size of the smallest body per second: speed below which friction sticks */
 #define SLIP_STATIC 1e-5 /* of the size: the same in a static run, as a length */
 #define LAGS 100         /* solves of a load step with the friction of the one before */
-#define DEEP 1e-3        /* of the size of the smallest body: overlap with an obstacle that counts as such */
+#define HALF 0.5         /* of what springs were to part: where they reach less, they get stiffer */
 #define APART 0.5        /* of w: how far touching surfaces are moved apart at the start */
 #define PASSES 200       /* over all pairs for that */
 
@@ -45,34 +45,6 @@ static PetscErrorCode make_surfaces(SbEffect e, SbSpace s)
   PetscCall(SbEffectFacets(s, b->scene.on, &n, &facet));
   PetscCall(SbContactMeshCreate(s, n, facet, b->scene.obstacle, &b->mesh));
   PetscCall(PetscFree(facet));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Edges of bodies that go through triangles, and vertices that are deep in an obstacle, before anything has moved. */
-static PetscErrorCode overlaps_barrier(SbEffect e, SbSpace s, PetscBool *found)
-{
-  Barrier *b = (Barrier *)e->data;
-  SbContactMesh m;
-  PetscReal *x;
-  PetscInt crossings, where[5];
-  SbPose pose;
-
-  PetscFunctionBeginUser;
-  PetscCall(make_surfaces(e, s));
-  m = b->mesh;
-  PetscCall(PetscMalloc1(3 * m->nvertex, &x));
-  PetscCall(PetscArraycpy(x, m->X, 3 * m->nvertex));
-  if (b->scene.obstacle) (*b->scene.pose)(b->data, 0., &pose);
-  for (PetscInt v = m->nbody_vertex; v < m->nvertex; v++) SbPoseApply(&pose, m->X + 3 * v, x + 3 * v);
-  PetscCall(SbContactMeshCrossings(m, b->scene.self, x, &crossings, where));
-  *found = (PetscBool)(crossings > 0);
-  for (PetscInt v = 0; v < (b->scene.obstacle ? m->nbody_vertex : 0); v++) {
-    PetscReal X[3], n[3];
-
-    SbPoseInvert(&pose, x + 3 * v, X);
-    if (SbObstacleDistance(b->scene.obstacle, X, n) < -DEEP * m->size) *found = PETSC_TRUE;
-  }
-  PetscCall(PetscFree(x));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -122,7 +94,7 @@ static PetscErrorCode setup_barrier(SbEffect e, SbSpace s)
   PetscCall(PetscMalloc3(3 * s->nnode_owned, &b->u, 3 * (b->mesh->nvertex - b->mesh->nbody_vertex), &b->from,
                          3 * (b->mesh->nvertex - b->mesh->nbody_vertex), &b->to));
   b->least = PETSC_MAX_REAL;
-  b->shortest = 1.;
+  b->shortest = b->stiffer = 1.;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -159,7 +131,7 @@ static PetscErrorCode part_touching(SbEffect e, SbSpace s, PetscReal u[], PetscB
   const SbContactMesh m = b->mesh;
   const PetscReal tiny = 1e-9 * m->size;
   PetscReal *push, *normal;
-  PetscInt *count, crossings, where[5];
+  PetscInt *count;
 
   PetscFunctionBeginUser;
   *moved = PETSC_FALSE;
@@ -224,34 +196,7 @@ static PetscErrorCode part_touching(SbEffect e, SbSpace s, PetscReal u[], PetscB
   }
   PetscCall(PetscFree3(push, normal, count));
 
-  /* surfaces in each other cannot be parted so */
-  PetscCall(SbContactMeshMove(m, u, NULL, b->x));
-  SbBarrierPlaceObstacle(b, 0., b->x);
-  PetscCall(SbContactMeshCrossings(m, b->scene.self, b->x, &crossings, where));
   b->known = PETSC_FALSE;
-  if (crossings) {
-    const PetscInt one = m->part[where[0]], two = m->part[where[2]];
-
-    SETERRQ(s->comm, PETSC_ERR_USER_INPUT,
-            "The effect %s: %s and %s are in each other when the run begins: %" PetscInt_FMT
-            " edges go through triangles, one at (%g, %g, %g) m; move them apart, or take "
-            "-effect_%s_response projected, which parts them slowly",
-            e->name, one < s->mesh->nbody ? s->mesh->body[one].name : "the obstacle",
-            two < s->mesh->nbody ? s->mesh->body[two].name : "the obstacle", crossings,
-            (double)b->x[3 * where[0]], (double)b->x[3 * where[0] + 1], (double)b->x[3 * where[0] + 2],
-            e->name);
-  }
-  if (!b->scene.obstacle) {
-    PetscBool contained;
-    PetscInt body[2];
-
-    PetscCall(SbContactMeshContained(m, b->x, body, &contained));
-    PetscCheck(
-      !contained, s->comm, PETSC_ERR_USER_INPUT,
-      "The effect %s: %s is inside %s when the run begins, or in the same place; move one of them by "
-      "-body_%s_translate",
-      e->name, s->mesh->body[body[0]].name, s->mesh->body[body[1]].name, s->mesh->body[body[0]].name);
-  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -320,12 +265,18 @@ static PetscErrorCode begin_barrier(SbEffect e, SbSpace s, PetscReal t, PetscRea
     }
   }
   b->progress = 0.;
-  if (!b->begun) {
-    PetscCall(SbContactMeshMarkDriven(m));
-    if (t == 0.) PetscCall(part_touching(e, s, u0, moved)); /* not when it goes on from a checkpoint */
+  b->nrub = b->nspring = 0;
+  if (!b->begun) PetscCall(SbContactMeshMarkDriven(m));
+  if (!b->begun || b->overlapping) {
+    PetscCall(SbContactMeshMove(m, u0, NULL, b->x));
+    SbBarrierPlaceObstacle(b, 0., b->x);
+    PetscCall(SbBarrierPart(e, s, dt, (PetscBool)(!b->begun && t == 0.)));
+  }
+  if (!b->begun && t == 0.) { /* not when it goes on from a checkpoint */
+    PetscCall(part_touching(e, s, u0, moved));
+    if (*moved) PetscCall(SbBarrierPart(e, s, dt, PETSC_FALSE));
   }
   b->begun = PETSC_TRUE;
-  b->nrub = 0;
   PetscCall(SbBarrierLook(b, u0));
   PetscCall(PetscArraycpy(b->start, b->x, 3 * m->nvertex));
   for (PetscInt i = 0; i < b->nactive; i++) least = PetscMin(least, b->active[i].gap);
@@ -343,17 +294,23 @@ static PetscErrorCode begin_barrier(SbEffect e, SbSpace s, PetscReal t, PetscRea
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Friction has the forces and directions of a solution from now on, as often as it may and what it lags behind by is too much. */
+/* What follows a solution: friction has its forces and directions from now on, as often as it may and what it lags behind by is too much. */
 static PetscErrorCode lag_barrier(SbEffect e, SbSpace s, const PetscReal u[], PetscBool *again)
 {
   Barrier *b = (Barrier *)e->data;
 
   PetscFunctionBeginUser;
-  (void)s;
   *again = PETSC_FALSE;
-  if (b->scene.friction <= 0. || ++b->nlag >= (b->lags ? b->lags : e->dynamic ? 1 : LAGS))
-    PetscFunctionReturn(PETSC_SUCCESS);
+  if (b->scene.friction <= 0. && (e->dynamic || !b->overlapping)) PetscFunctionReturn(PETSC_SUCCESS);
+  if (++b->nlag >= (b->lags ? b->lags : e->dynamic ? 1 : LAGS)) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(SbBarrierLook(b, u));
+
+  /* in a static run what overlaps is parted within the step */
+  if (b->overlapping && !e->dynamic) {
+    PetscCall(SbBarrierPart(e, s, 0., PETSC_FALSE));
+    *again = PETSC_TRUE;
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
   PetscCall(SbBarrierLag(b));
   *again = (PetscBool)(b->lag > b->lag_tolerance);
   if (*again) SbBarrierSwapFriction(b);
@@ -392,8 +349,8 @@ static PetscErrorCode advance_barrier(SbEffect e, PetscReal progress)
 static PetscErrorCode accept_barrier(SbEffect e, SbSpace s, const SbStage *stage)
 {
   Barrier *b = (Barrier *)e->data;
-  PetscReal before, power, friction, lost = 0.;
-  PetscInt n, where[5];
+  const SbContactMesh m = b->mesh;
+  PetscReal before, power, friction, lost = 0., pushed = 0., gained = 0., asked = 0.;
 
   PetscFunctionBeginUser;
   PetscCall(SbBarrierLook(b, stage->u));
@@ -408,21 +365,32 @@ static PetscErrorCode accept_barrier(SbEffect e, SbSpace s, const SbStage *stage
     lost += b->rub[i].force * PetscSqr(SbBarrierSlip(b, &b->rub[i], u)) *
             SbBarrierSlope(b, SbBarrierSlip(b, &b->rub[i], u));
   }
-  b->step_work = before - b->energy + 0.5 * (b->obstacle_power + power) + friction - lost;
+  for (PetscInt i = 0; i < b->nspring; i++) {
+    const Spring *spring = &b->spring[i];
+    PetscReal push[15];
+
+    const PetscReal way = SbBarrierSpringPlace(b, spring) - spring->start;
+
+    if (m->own[spring->v[0]]) pushed += SbBarrierSpring(b, spring, push) * way;
+    gained += PetscMin(way, spring->goal - spring->start);
+    asked += spring->goal - spring->start;
+  }
+  b->step_work = before - b->energy + 0.5 * (b->obstacle_power + power) + friction - lost + pushed;
   b->work += b->step_work;
   b->friction_loss += lost;
+  if (asked > 0.) b->stiffer = gained < HALF * asked ? 2. * b->stiffer : PetscMax(1., 0.5 * b->stiffer);
 
   if (b->scene.friction > 0.) PetscCall(SbBarrierLag(b));
   b->most_lag = PetscMax(b->most_lag, b->lag);
 
   for (PetscInt i = 0; i < b->nactive; i++) b->least = PetscMin(b->least, b->active[i].gap);
   b->most = PetscMax(b->most, b->nactive);
-  if (!b->verify) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(SbContactMeshCrossings(b->mesh, b->scene.self, b->x, &n, where));
-  PetscCheck(!n, s->comm, PETSC_ERR_PLIB,
+  if (!b->verify || b->overlapping) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(SbContactOverlapFind(b->mesh, b->scene.self, b->x, PETSC_FALSE, &b->overlap));
+  PetscCheck(!b->overlap.ncrossing, s->comm, PETSC_ERR_PLIB,
              "The effect %s: at t = %g s %" PetscInt_FMT " edges go through triangles, one at (%g, %g, %g) m",
-             e->name, (double)stage->t, n, (double)b->x[3 * where[0]], (double)b->x[3 * where[0] + 1],
-             (double)b->x[3 * where[0] + 2]);
+             e->name, (double)stage->t, b->overlap.ncrossing, (double)b->overlap.place[0],
+             (double)b->overlap.place[1], (double)b->overlap.place[2]);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -438,12 +406,15 @@ static PetscErrorCode save_barrier(SbEffect e, SbSpace s, PetscInt *n, PetscReal
 {
   const Barrier *b = (const Barrier *)e->data;
 
+  PetscMPIInt rank;
+
   PetscFunctionBeginUser;
-  (void)s;
+  PetscCallMPI(MPI_Comm_rank(s->comm, &rank));
   *n = 1;
-  PetscCall(PetscMalloc1(2, records));
+  PetscCall(PetscMalloc1(3, records));
   (*records)[0] = b->work;
   (*records)[1] = b->friction_loss;
+  (*records)[2] = rank ? 0. : b->stiffer;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -457,10 +428,12 @@ static PetscErrorCode load_barrier(SbEffect e, SbSpace s, PetscReal t, const Pet
   (void)t;
   (void)u;
   PetscCallMPI(MPI_Comm_rank(s->comm, &rank));
-  b->work = b->friction_loss = 0.;
-  for (PetscInt i = 0; !rank && i < n; i++) {
-    b->work += records[2 * i];
-    b->friction_loss += records[2 * i + 1];
+  b->work = b->friction_loss = b->stiffer = 0.;
+  for (PetscInt i = 0; i < n; i++) {
+    b->stiffer += records[3 * i + 2];
+    if (rank) continue;
+    b->work += records[3 * i];
+    b->friction_loss += records[3 * i + 1];
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -493,6 +466,8 @@ static PetscErrorCode destroy_barrier(SbEffect e)
   PetscCall(PetscFree(b->rub));
   PetscCall(PetscFree(b->next));
   PetscCall(SbContactBlocksFree(&b->blocks));
+  PetscCall(PetscFree(b->spring));
+  PetscCall(SbContactOverlapFree(&b->overlap));
   e->data = b->data;
   PetscCall((*b->destroy)(e));
   PetscCall(PetscFree(b));
@@ -503,11 +478,13 @@ PetscErrorCode SbBarrierCreate(SbEffect e, const SbScope *scope, const SbBarrier
 {
   static const char *const obstacle[] = {"force_x",  "force_y",  "force_z",       "torque_x",
                                          "torque_y", "torque_z", "contacts",      "penetration",
-                                         "gap",      "energy",   "friction_loss", "friction_lag"},
+                                         "gap",      "energy",   "friction_loss", "friction_lag",
+                                         "unguarded"},
                            *const bodies[] = {
-                             "contacts",       "penetration", "penetration_mean", "normal_force",
-                             "friction_force", "work",        "friction_loss",    "gap",
-                             "energy",         "friction_lag"};
+                             "contacts",       "penetration",  "penetration_mean", "normal_force",
+                             "friction_force", "work",         "friction_loss",    "gap",
+                             "energy",         "friction_lag", "unguarded"};
+  PetscReal steps;
   Barrier *b;
 
   PetscFunctionBeginUser;
@@ -520,10 +497,11 @@ PetscErrorCode SbBarrierCreate(SbEffect e, const SbScope *scope, const SbBarrier
   PetscCall(SbOptionBool(scope, "verify", &b->verify));
   PetscCall(SbOptionInt(scope, "friction_solves", &b->lags));
   PetscCall(SbOptionReal(scope, "friction_tolerance", &b->lag_tolerance));
+  PetscCall(SbOptionReal(scope, "separation_steps", &steps));
+  SbOverlapSet(&b->parting, steps);
   e->data = b;
   e->ops = (SbEffectOps){.setfromoptions = e->ops.setfromoptions,
                          .setup = setup_barrier,
-                         .overlaps = overlaps_barrier,
                          .force = SbEffectForce_Barrier,
                          .begin_guarded = begin_barrier,
                          .safe = safe_barrier,
@@ -546,7 +524,7 @@ PetscErrorCode SbBarrierCreate(SbEffect e, const SbScope *scope, const SbBarrier
   e->linear = e->steady = PETSC_FALSE;
   e->saddle = PETSC_FALSE;
   e->springs = (PetscBool)(scene->friction > 0.);
-  e->nstate = 2;
+  e->nstate = 3;
   e->column = scene->obstacle ? obstacle : bodies;
   e->ncolumn = scene->obstacle ? PETSC_STATIC_ARRAY_LENGTH(obstacle) : PETSC_STATIC_ARRAY_LENGTH(bodies);
   PetscFunctionReturn(PETSC_SUCCESS);

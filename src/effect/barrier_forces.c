@@ -103,14 +103,14 @@ PetscReal SbBarrierPush(const Barrier *b, const Active *a, PetscReal *energy, Pe
   return PetscMax(0., force / w2);
 }
 
-/* f += sign times the force with which each of the pair's vertices pushes its owned nodes. */
-static void spread(const Barrier *b, const SbContactPair *pair, PetscReal sign, const PetscReal gradient[12],
-                   PetscReal f[])
+/* f += sign times the force with which each of n vertices pushes its owned nodes. */
+static void spread(const Barrier *b, PetscInt n, const PetscInt vertex[], PetscReal sign,
+                   const PetscReal gradient[], PetscReal f[])
 {
   const SbContactMesh m = b->mesh;
 
-  for (int k = 0; k < (pair->side ? 1 : 4); k++) {
-    const PetscInt v = pair->v[k];
+  for (PetscInt k = 0; k < n; k++) {
+    const PetscInt v = vertex[k];
 
     if (v >= m->nbody_vertex) continue;
     for (PetscInt j = m->start[v]; j < m->start[v + 1]; j++) {
@@ -130,13 +130,21 @@ PetscReal SbBarrierGradient(const Barrier *b, PetscReal sign, PetscReal f[])
     const SbContactPair *pair = &b->pairs->pair[a->pair];
 
     (void)SbBarrierPush(b, a, &energy, gradient);
-    spread(b, pair, sign, gradient, f);
+    spread(b, pair->side ? 1 : 4, pair->v, sign, gradient, f);
     if (counts(b, pair)) sum += energy;
   }
   for (PetscInt i = 0; i < b->nrub; i++) {
     energy = SbBarrierRub(b, &b->rub[i], gradient);
-    spread(b, &b->rub[i].pair, sign, gradient, f);
+    spread(b, b->rub[i].pair.side ? 1 : 4, b->rub[i].pair.v, sign, gradient, f);
     if (counts(b, &b->rub[i].pair)) sum += energy;
+  }
+  for (PetscInt i = 0; i < b->nspring; i++) {
+    const Spring *spring = &b->spring[i];
+    PetscReal push[15];
+    const PetscReal force = SbBarrierSpring(b, spring, push);
+
+    spread(b, spring->n, spring->v, sign, push, f);
+    if (b->mesh->own[spring->v[0]]) sum += 0.5 * force * (spring->goal - SbBarrierSpringPlace(b, spring));
   }
   return sum;
 }
@@ -171,7 +179,6 @@ PetscErrorCode SbEffectPotential_Barrier(SbEffect e, SbSpace s, const PetscReal 
 static PetscErrorCode add_blocks(Barrier *b, const SbContactPair *pair, const PetscReal weight[4],
                                  const PetscReal H[])
 {
-  const SbContactMesh m = b->mesh;
   const int n = pair->side ? 1 : 4;
 
   PetscFunctionBeginUser;
@@ -222,6 +229,25 @@ PetscErrorCode SbEffectHessian_Barrier(SbEffect e, SbSpace s, const PetscReal u[
       T[k] *= rub->force;
     }
     PetscCall(add_blocks(b, &rub->pair, rub->weight, T));
+  }
+
+  /* springs that push */
+  for (PetscInt i = 0; i < b->nspring; i++) {
+    const Spring *spring = &b->spring[i];
+
+    if (SbBarrierSpringPlace(b, spring) >= spring->goal) continue;
+    for (PetscInt k = 0; k < spring->n * spring->n; k++) {
+      const PetscInt p = k / spring->n, q = k % spring->n, v = spring->v[p], w = spring->v[q];
+      PetscReal B[9];
+
+      if (q < p || v >= b->mesh->nbody_vertex || w >= b->mesh->nbody_vertex ||
+          !(b->mesh->mine[v] | b->mesh->mine[w]))
+        continue;
+      for (int j = 0; j < 9; j++)
+        B[j] = spring->stiffness * spring->weight[p] * spring->weight[q] * spring->normal[j / 3] *
+               spring->normal[j % 3];
+      PetscCall(SbContactBlocksAdd(&b->blocks, v, w, B, 3));
+    }
   }
   PetscCall(SbContactBlocksSpread(b->mesh, &b->blocks, blocks));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -3,6 +3,7 @@
 */
 #pragma once
 #include "barrier.h"
+#include "overlap.h"
 
 /* A pair below its width, at the places that the effect knows. */
 typedef struct {
@@ -18,6 +19,14 @@ typedef struct {
   PetscReal carry
     [3]; /* by which the obstacle's point there moves on in the step beyond its vertices: rotation, m; with the sign of its weights */
 } Rub;
+
+/* What pushes one way along a direction in this step: what overlaps, or bounces. */
+typedef struct {
+  PetscInt n, v[5];
+  PetscReal weight[5], normal[3];
+  PetscReal goal, stiffness; /* of normal . sum weight x, m; N/m */
+  PetscReal start, depth;    /* that sum and the overlap when the step began, m */
+} Spring;
 
 typedef struct {
   SbBarrierScene scene;
@@ -44,11 +53,17 @@ typedef struct {
   SbPose pose[2]; /* of the obstacle at the start and the end of the step */
   PetscInt lags,
     nlag; /* solves of a step, at most, each with the friction of the one before; those of this step */
-  PetscReal lag_tolerance, lag; /* of what is left then; what it is, a part of mu N of all pairs */
-  PetscReal most_lag;           /* of the run */
-  PetscReal slip;               /* e of friction, m */
-  PetscReal least, shortest;    /* smallest gap and shortest safe part of the run */
-  PetscInt most;                /* pairs */
+  PetscReal lag_tolerance, lag;     /* of what is left then; what it is, a part of mu N of all pairs */
+  PetscReal most_lag;               /* of the run */
+  PetscReal slip;                   /* e of friction, m */
+  PetscBool overlapping, announced; /* things are in each other; that was said */
+  SbContactOverlap overlap;
+  SbOverlap parting;
+  PetscReal stiffer;             /* of springs, by what they reached in the last steps */
+  PetscInt nspring, spring_size; /* all of them on every rank */
+  Spring *spring;
+  PetscReal least, shortest; /* smallest gap and shortest safe part of the run */
+  PetscInt most;             /* pairs */
   SbPairs columns;
   PetscReal energy; /* of the gaps, when the step began, then when it ended, J; this rank's, as all below */
   PetscReal obstacle_power; /* by the obstacle over its way in this step with the forces at its start, J */
@@ -95,6 +110,25 @@ void SbBarrierSwapFriction(Barrier *b);
 PetscErrorCode SbBarrierLag(Barrier *b);
 /* Energy of friction, J, its gradient by the pair's vertices, N. */
 PetscReal SbBarrierRub(const Barrier *b, const Rub *rub, PetscReal gradient[12]);
+/* Finds what is in each other at the places known, and the springs that part it in a step of length dt, s; `first` of a run: errors where they cannot. Collective. */
+PetscErrorCode SbBarrierPart(SbEffect e, SbSpace space, PetscReal dt, PetscBool first);
+/* normal . sum weight x of a spring at the places known, m. */
+static inline PetscReal SbBarrierSpringPlace(const Barrier *b, const Spring *spring)
+{
+  PetscReal g = 0.;
+
+  for (PetscInt k = 0; k < spring->n; k++)
+    g += spring->weight[k] * SbDot3(spring->normal, b->x + 3 * spring->v[k]);
+  return g;
+}
+/* Its force, N, and the gradient of its energy by its vertices, N. */
+static inline PetscReal SbBarrierSpring(const Barrier *b, const Spring *spring, PetscReal gradient[15])
+{
+  const PetscReal force = PetscMax(0., spring->stiffness * (spring->goal - SbBarrierSpringPlace(b, spring)));
+
+  for (int k = 0; k < 15; k++) gradient[k] = -force * spring->weight[k / 3] * spring->normal[k % 3];
+  return force;
+}
 /* f += sign times the gradient of all energies at the places known, N; their sum over the pairs that this rank counts, J. */
 PetscReal SbBarrierGradient(const Barrier *b, PetscReal sign, PetscReal f[]);
 

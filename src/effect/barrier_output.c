@@ -17,15 +17,15 @@ PetscErrorCode SbEffectContactForce_Barrier(SbEffect e, SbSpace s, const SbStage
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* values += force and torque of the obstacle on the bodies, by the gradient of a pair's energy. */
-static void add_force(const Barrier *b, const SbPose *pose, const SbContactPair *pair,
-                      const PetscReal gradient[12], PetscReal values[6])
+/* values += force and torque of the obstacle on the bodies, by the gradient of an energy by n vertices. */
+static void add_force(const Barrier *b, const SbPose *pose, PetscInt n, const PetscInt v[],
+                      const PetscReal gradient[], PetscReal values[6])
 {
-  for (int k = 0; k < (pair->side ? 1 : 4); k++) {
+  for (PetscInt k = 0; k < n; k++) {
     PetscReal arm[3], moment[3];
 
-    if (pair->v[k] >= b->mesh->nbody_vertex) continue;
-    for (int j = 0; j < 3; j++) arm[j] = b->x[3 * pair->v[k] + j] - b->scene.centre[j] - pose->d[j];
+    if (v[k] >= b->mesh->nbody_vertex) continue;
+    for (int j = 0; j < 3; j++) arm[j] = b->x[3 * v[k] + j] - b->scene.centre[j] - pose->d[j];
     SbCross(arm, gradient + 3 * k, moment);
     for (int j = 0; j < 3; j++) {
       values[j] -= gradient[3 * k + j];
@@ -48,11 +48,22 @@ static void force_between(const Barrier *b, const SbContactPair *pair, const Pet
   }
 }
 
+/* How deep what overlapped when the step began is now, m. */
+static PetscReal deepest_of(const Barrier *b)
+{
+  PetscReal deepest = 0.;
+
+  for (PetscInt i = 0; i < b->nspring; i++)
+    deepest =
+      PetscMax(deepest, b->spring[i].depth + b->spring[i].start - SbBarrierSpringPlace(b, &b->spring[i]));
+  return deepest;
+}
+
 PetscErrorCode SbEffectHistory_Barrier(SbEffect e, SbSpace s, const SbStage *stage, const PetscReal r[],
                                        PetscReal values[])
 {
   Barrier *b = (Barrier *)e->data;
-  PetscReal least = PETSC_MAX_REAL, gradient[12], energy, force[3], *v = values;
+  PetscReal least = PETSC_MAX_REAL, gradient[12], push[15], energy, force[3], *v = values;
   PetscInt body[2];
   PetscMPIInt rank;
   SbPose pose;
@@ -67,7 +78,7 @@ PetscErrorCode SbEffectHistory_Barrier(SbEffect e, SbSpace s, const SbStage *sta
   if (least == PETSC_MAX_REAL) least = 0.;
   PetscCallMPI(MPI_Comm_rank(s->comm, &rank));
 
-  /* an obstacle: force, torque, contacts, penetration, gap, energy, friction_loss, friction_lag */
+  /* an obstacle: force, torque, contacts, penetration, gap, energy, friction_loss, friction_lag, unguarded */
   if (b->scene.obstacle) {
     (*b->scene.pose)(b->data, stage->t, &pose);
     for (PetscInt i = 0; i < b->nactive; i++) {
@@ -75,22 +86,35 @@ PetscErrorCode SbEffectHistory_Barrier(SbEffect e, SbSpace s, const SbStage *sta
 
       if (!counts(b, pair)) continue;
       (void)SbBarrierPush(b, &b->active[i], &energy, gradient);
-      add_force(b, &pose, pair, gradient, v);
+      add_force(b, &pose, pair->side ? 1 : 4, pair->v, gradient, v);
       v[6]++;
       v[9] += energy;
     }
     for (PetscInt i = 0; i < b->nrub; i++) {
-      if (!counts(b, &b->rub[i].pair)) continue;
+      const SbContactPair *pair = &b->rub[i].pair;
+
+      if (!counts(b, pair)) continue;
       (void)SbBarrierRub(b, &b->rub[i], gradient);
-      add_force(b, &pose, &b->rub[i].pair, gradient, v);
+      add_force(b, &pose, pair->side ? 1 : 4, pair->v, gradient, v);
     }
-    if (!rank) v[8] = least;
+    for (PetscInt i = 0; i < b->nspring; i++) {
+      const Spring *spring = &b->spring[i];
+
+      if (!b->mesh->own[spring->v[0]]) continue;
+      v[6] += SbBarrierSpring(b, spring, push) > 0.;
+      add_force(b, &pose, spring->n, spring->v, push, v);
+    }
     v[10] = b->friction_loss;
-    if (!rank) v[11] = b->lag;
+    if (!rank) {
+      v[7] = deepest_of(b);
+      v[8] = least;
+      v[11] = b->lag;
+      v[12] = b->overlapping ? (PetscReal)b->overlap.ncrossing : 0.;
+    }
     PetscFunctionReturn(PETSC_SUCCESS);
   }
 
-  /* bodies: contacts, penetration, its mean, normal force, friction force, work, friction_loss, gap, energy, friction_lag, pairs */
+  /* bodies: contacts, penetration, its mean, normal force, friction force, work, friction_loss, gap, energy, friction_lag, unguarded, pairs */
   for (PetscInt i = 0; i < b->nactive; i++) {
     const SbContactPair *pair = &b->pairs->pair[b->active[i].pair];
     PetscReal normal;
@@ -110,11 +134,26 @@ PetscErrorCode SbEffectHistory_Barrier(SbEffect e, SbSpace s, const SbStage *sta
     v[4] += PetscSqrtReal(SbDot3(force, force));
     SbPairsAdd(&b->columns, body[0], body[1], 0., force, values);
   }
+  for (PetscInt i = 0; i < b->nspring; i++) {
+    const Spring *spring = &b->spring[i];
+    PetscReal normal;
+
+    if (!b->mesh->own[spring->v[0]]) continue;
+    normal = SbBarrierSpring(b, spring, push);
+    body[0] = b->mesh->part[spring->v[0]];
+    body[1] = b->mesh->part[spring->v[spring->n - 1]];
+    for (int j = 0; j < 3; j++) force[j] = normal * spring->normal[j];
+    v[0] += normal > 0.;
+    v[3] += normal;
+    SbPairsAdd(&b->columns, body[0], body[1], normal, force, values);
+  }
+  if (!rank) v[1] = deepest_of(b);
   v[5] = b->work;
   v[6] = b->friction_loss;
   if (!rank) {
     v[7] = least;
     v[9] = b->lag;
+    v[10] = b->overlapping ? (PetscReal)b->overlap.ncrossing : 0.;
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -163,6 +202,30 @@ PetscErrorCode SbEffectContactPoints_Barrier(SbEffect e, SbSpace s, const SbStag
       slope = SbBarrierSlope(b, SbBarrierSlip(b, rub, u));
       for (int j = 0; j < 3; j++) p.force[j] -= (turned ? -1. : 1.) * rub->force * slope * u[j];
       break;
+    }
+    PetscCall(SbContactPointsAdd(list, &p));
+  }
+
+  /* what parts overlap */
+  for (PetscInt i = 0; i < b->nspring; i++) {
+    const Spring *spring = &b->spring[i];
+    const PetscInt first = m->part[spring->v[0]], second = m->part[spring->v[spring->n - 1]];
+    SbContactPoint p = {.id = {-1 - i, spring->v[0], spring->v[spring->n - 1]}};
+    PetscReal push[15], force, sum = 0.;
+
+    if (!m->own[spring->v[0]]) continue;
+    force = SbBarrierSpring(b, spring, push);
+    p.body[0] = first;
+    p.body[1] = second == s->mesh->nbody ? -1 : second;
+    p.gap = SbBarrierSpringPlace(b, spring) - spring->start - spring->depth;
+    for (PetscInt k = 0; k < spring->n && spring->weight[k] > 0.; k++) {
+      sum += spring->weight[k];
+      for (int j = 0; j < 3; j++) p.x[j] += spring->weight[k] * b->x[3 * spring->v[k] + j];
+    }
+    for (int j = 0; j < 3; j++) {
+      p.x[j] /= sum;
+      p.normal[j] = spring->normal[j];
+      p.force[j] = force * spring->normal[j];
     }
     PetscCall(SbContactPointsAdd(list, &p));
   }

@@ -62,7 +62,7 @@ static const SbOption rows[] = {
    "touch; not with barrier"},
   {"separation_steps", SB_OPTION_REAL, 1, "steps", "30", "[1, inf)",
    "what overlaps before it meets is parted slowly: to 1/e of the depth in so many steps; 1, and in static "
-   "runs with an obstacle: at once; not with barrier"},
+   "runs: at once"},
   {"detection", SB_OPTION_CHOICE, 1, "", "tree", "tree|brute",
    "between bodies: a tree of boxes, or every pair: the same contacts; not with barrier"},
   {"passes", SB_OPTION_CHOICE, 1, "", "two", "one|two",
@@ -77,8 +77,8 @@ static const SbOption rows[] = {
 };
 
 /* Options that ask for another response than `barrier`. */
-static const char *const exact_only[] = {"restitution", "time_of_impact",   "damping",
-                                         "stiffness",   "friction_kinetic", "separation_steps"};
+static const char *const exact_only[] = {"restitution", "time_of_impact", "damping", "stiffness",
+                                         "friction_kinetic"};
 
 /* Whether what an effect touches is half-spaces and bowls, and whether it has options that `barrier` has not; its own response. */
 static PetscErrorCode examine(const char *name, SbResponse *response, PetscBool *vertices, PetscBool *others)
@@ -225,19 +225,6 @@ static PetscErrorCode respond(SbEffect e, const SbScope *scope, SbResponse respo
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Bodies that are in each other when the run begins are parted by `projected`. */
-static PetscErrorCode fall_back(SbEffect e)
-{
-  SbScope scope;
-
-  PetscFunctionBeginUser;
-  PetscCall((*e->ops.destroy)(e));
-  e->ops = (SbEffectOps){0};
-  PetscCall(SbScopeSet(&scope, "effect", "contact", e->name));
-  PetscCall(respond(e, &scope, PROJECTED, "what is in each other when the run begins is parted slowly"));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 static PetscErrorCode options_contact(SbEffect e, const SbScope *scope)
 {
   SbResponse response;
@@ -246,12 +233,6 @@ static PetscErrorCode options_contact(SbEffect e, const SbScope *scope)
   PetscFunctionBeginUser;
   PetscCall(choose(e, &response, &why));
   PetscCall(respond(e, scope, response, why));
-  if (response == BARRIER) {
-    if (why)
-      e->ops.fall_back = fall_back;
-    else
-      e->ops.overlaps = NULL;
-  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -104,24 +104,6 @@ static PetscErrorCode match_mass(SbModel m, PetscInt b)
     }                                                                       \
   } while (0)
 
-/* Effects whose response was not asked for take another one together, where the first one cannot part what is in each other. */
-static PetscErrorCode choose_responses(SbModel m)
-{
-  PetscBool any = PETSC_FALSE;
-
-  PetscFunctionBeginUser;
-  for (PetscInt e = 0; e < m->neffect; e++) {
-    PetscBool found = PETSC_FALSE;
-
-    if (m->effect[e]->ops.overlaps) SbEffectCall(m->effect[e], overlaps, m->space, &found);
-    any = (PetscBool)(any || found);
-  }
-  for (PetscInt e = 0; any && e < m->neffect; e++) {
-    if (m->effect[e]->ops.fall_back) PetscCall((*m->effect[e]->ops.fall_back)(m->effect[e]));
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode SbModelSetUp(SbModel m)
 {
   PetscReal mass = 0.;
@@ -155,13 +137,11 @@ PetscErrorCode SbModelSetUp(SbModel m)
   for (PetscInt e = 0; m->space->edge_node && e < m->neffect; e++) {
     const SbEffectOps *ops = &m->effect[e]->ops;
 
-    PetscCheck(!ops->overlaps && !ops->assemble_constraints && !ops->begin_guarded, m->comm,
-               PETSC_ERR_USER_INPUT,
+    PetscCheck(!ops->assemble_constraints && !ops->begin_guarded, m->comm, PETSC_ERR_USER_INPUT,
                "effect %s: contact is not there yet for scenes with a body of element p2: choose "
                "-body_<name>_element p1, cr or dg",
                m->effect[e]->name);
   }
-  PetscCall(choose_responses(m));
   for (PetscInt e = 0; e < m->neffect; e++) {
     m->effect[e]->dynamic = m->dynamic;
     if (m->effect[e]->ops.setup) SbEffectCall(m->effect[e], setup, m->space);

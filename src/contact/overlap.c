@@ -1,0 +1,479 @@
+/*
+  overlap.c - what is in something else when it should not be: where, how deep, and which way out.
+
+  Between surfaces of triangles, edges that go through a triangle (crossings.c) say which of their ends is inside and the normal there. From these vertices the way out and the depth along it spread over the
+  edges that go through nothing, so that neighbours leave to the same side (Heidelberger, Teschner, Keiser, Mueller and Gross, "Consistent penetration depth estimation for deformable
+  collision response", VMV 2004). An edge that goes in and out again is inside with its middle alone. The way out ends at the triangle that it goes through from the back.
+
+  Of a half-space and a bowl a vertex is behind; of a ball and a capsule features are nearer to the middle than the radius: these know their way out.
+
+  Everything is done alike by every rank.
+*/
+#include "sbbarrier.h"
+#include "sbgeometry.h"
+
+#define CANCEL 1e-3 /* of their sum: what is left of ways that oppose each other is none */
+#define TINY 1e-12  /* of the bodies' size: a vertex that is nearer to a surface is not told from it */
+#define AGAINST 0.1 /* cosine to the normal of its own surface, beyond which a way out is one */
+#define JITTER \
+  1e-7 /* of that size: by which vertices are moved, so that none lies in a triangle or on an edge */
+#define FAR \
+  4. /* times its depth: farther than this a way out is not followed, but the nearest place is taken */
+
+/* What is known of vertices while ways spread. */
+typedef struct {
+  const PetscReal *x;
+  PetscInt *in;           /* [nvertex] the part that it is in, -1: none */
+  PetscReal *way;         /* [nvertex][3] sum of weighted ways, then the way */
+  PetscReal *depth;       /* [nvertex] sum of weighted depths, then the depth, m */
+  PetscReal *sum;         /* [nvertex] of weights, m^-2 */
+  PetscInt *layer;        /* [nvertex] in which its way was found, from 1; 0: none */
+  PetscInt *start, *edge; /* [nvertex+1], edges of each vertex */
+  uint8_t *through;       /* [nedge] goes through a triangle */
+} Ways;
+
+static PetscErrorCode add_point(SbContactOverlap *o, const SbContactInside *point)
+{
+  PetscFunctionBeginUser;
+  if (o->n == o->size) {
+    o->size = PetscMax(64, 2 * o->size);
+    PetscCall(PetscRealloc((size_t)o->size * sizeof(*o->point), &o->point));
+  }
+  o->point[o->n++] = *point;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Adds a way n out of `part` over the depth d to what is known of vertex v, with a weight. */
+static void suggest(Ways *w, PetscInt v, PetscInt part, PetscReal weight, const PetscReal n[3], PetscReal d)
+{
+  if (w->in[v] < 0) w->in[v] = part;
+  if (w->in[v] != part) return;
+  for (int i = 0; i < 3; i++) w->way[3 * v + i] += weight * n[i];
+  w->depth[v] += weight * d;
+  w->sum[v] += weight;
+}
+
+/* Makes ways and depths of what was added up; a vertex whose ways cancel has none. */
+static void settle(Ways *w, PetscInt v)
+{
+  const PetscReal length = PetscSqrtReal(SbDot3(w->way + 3 * v, w->way + 3 * v));
+
+  for (int i = 0; i < 3; i++)
+    w->way[3 * v + i] = length > CANCEL * w->sum[v] ? w->way[3 * v + i] / length : 0.;
+  w->depth[v] /= w->sum[v];
+}
+
+/* Place on edge e where it goes through triangle t, as part of the edge; unit normal of the triangle; side of the edge's first end, m. */
+static PetscReal pierce(SbContactMesh m, const PetscReal x[], PetscInt e, PetscInt t, PetscReal n[3],
+                        PetscReal *first)
+{
+  const PetscInt *v = m->triangle + 3 * t, *ends = m->edge + 2 * e;
+  PetscReal p[3], q[3], length, side[2];
+
+  for (int i = 0; i < 3; i++) {
+    p[i] = x[3 * v[1] + i] - x[3 * v[0] + i];
+    q[i] = x[3 * v[2] + i] - x[3 * v[0] + i];
+  }
+  SbCross(p, q, n);
+  length = PetscSqrtReal(SbDot3(n, n));
+  for (int i = 0; i < 3; i++) n[i] /= length;
+  for (int k = 0; k < 2; k++) {
+    for (int i = 0; i < 3; i++) p[i] = x[3 * ends[k] + i] - x[3 * v[0] + i];
+    side[k] = SbDot3(n, p);
+  }
+  *first = side[0];
+  return side[0] / (side[0] - side[1]);
+}
+
+/* The point inside leaves along its way through a triangle of the part that it is in: that becomes the other side. */
+static PetscErrorCode find_way_out(SbContactMesh m, const PetscReal x[], const SbBoxTree *tree, PetscInt part,
+                                   PetscReal depth, const PetscReal p[3], SbContactInside *point,
+                                   PetscBool *found)
+{
+  PetscReal box[6], goal[3], nearest = PETSC_MAX_REAL, best[3] = {0};
+  PetscInt t, exit = -1;
+  SbBoxQuery query;
+
+  PetscFunctionBeginUser;
+  SbBoxClear(box);
+  SbBoxAdd(box, p);
+  for (int i = 0; i < 3; i++) goal[i] = p[i] + FAR * depth * point->normal[i];
+  SbBoxAdd(box, goal);
+  for (SbBoxQueryBegin(tree, box, &query); SbBoxQueryNext(&query, &t);) {
+    const PetscInt *v = m->triangle + 3 * t;
+    const PetscReal *const at[3] = {x + 3 * v[0], x + 3 * v[1], x + 3 * v[2]};
+    PetscReal weight[3], length;
+    PetscBool out, own = PETSC_FALSE;
+
+    if (m->part[v[0]] != part) continue;
+    for (int k = 0; k < 6; k++) own = (PetscBool)(own || (k / 3 < point->n && point->v[k / 3] == v[k % 3]));
+    if (own || !SbRayTriangle(p, point->normal, at, &length, weight, &out) || !out || length >= nearest)
+      continue;
+    nearest = length;
+    exit = t;
+    PetscCall(PetscArraycpy(best, weight, 3));
+  }
+
+  /* none: where the surface is nearest to the end of the way */
+  if (exit < 0) {
+    SbBoxNearest near;
+    PetscReal point_box[6];
+
+    for (int i = 0; i < 3; i++) goal[i] = p[i] + depth * point->normal[i];
+    SbBoxClear(point_box);
+    SbBoxAdd(point_box, goal);
+    for (SbBoxNearestBegin(tree, point_box, PETSC_MAX_REAL, &near); SbBoxNearestNext(&near, &t);) {
+      const PetscInt *v = m->triangle + 3 * t;
+      const PetscReal *const at[3] = {x + 3 * v[0], x + 3 * v[1], x + 3 * v[2]};
+      PetscReal weight[3], d2;
+      PetscBool own = PETSC_FALSE;
+
+      if (m->part[v[0]] != part) continue;
+      for (int k = 0; k < 6; k++) own = (PetscBool)(own || (k / 3 < point->n && point->v[k / 3] == v[k % 3]));
+      if (own) continue;
+      (void)SbTriangleClosestPoint(goal, at, weight, &d2);
+      if (d2 >= near.limit2) continue;
+      near.limit2 = d2;
+      exit = t;
+      PetscCall(PetscArraycpy(best, weight, 3));
+    }
+  }
+  *found = (PetscBool)(exit >= 0);
+  if (!*found) PetscFunctionReturn(PETSC_SUCCESS);
+  if (nearest == PETSC_MAX_REAL) { /* straight there */
+    PetscReal way[3], length;
+
+    for (int i = 0; i < 3; i++) {
+      way[i] = -p[i];
+      for (int k = 0; k < 3; k++) way[i] += best[k] * x[3 * m->triangle[3 * exit + k] + i];
+    }
+    length = PetscSqrtReal(SbDot3(way, way));
+    *found = (PetscBool)(length > TINY * m->size && SbDot3(way, point->normal) > 0.);
+    if (!*found) PetscFunctionReturn(PETSC_SUCCESS);
+    for (int i = 0; i < 3; i++) point->normal[i] = way[i] / length;
+  }
+  point->depth = 0.;
+  if (point->v[0] >= m->nbody_vertex) point->area = 0.; /* of the obstacle: the body's area counts */
+  for (int k = 0; k < 3; k++) {
+    const PetscInt v = m->triangle[3 * exit + k];
+
+    if (point->v[0] >= m->nbody_vertex) point->area += m->area[v] / 3.;
+    for (int i = 0; i < 3; i++) point->depth += best[k] * point->normal[i] * (x[3 * v + i] - p[i]);
+    point->v[point->n] = v;
+    point->weight[point->n++] = -best[k];
+  }
+  *found = (PetscBool)(point->depth > 0.);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Outward normals of the vertices, by area. */
+static void add_normals(SbContactMesh m, const PetscReal x[], PetscReal normal[])
+{
+  for (PetscInt t = 0; t < m->ntriangle; t++) {
+    const PetscInt *v = m->triangle + 3 * t;
+    PetscReal p[3], q[3], n[3];
+
+    for (int i = 0; i < 3; i++) {
+      p[i] = x[3 * v[1] + i] - x[3 * v[0] + i];
+      q[i] = x[3 * v[2] + i] - x[3 * v[0] + i];
+    }
+    SbCross(p, q, n);
+    for (int k = 0; k < 9; k++) normal[3 * v[k / 3] + k % 3] += n[k % 3];
+  }
+  for (PetscInt v = 0; v < m->nvertex; v++) {
+    const PetscReal length = PetscSqrtReal(SbDot3(normal + 3 * v, normal + 3 * v));
+
+    for (int i = 0; i < 3 && length > 0.; i++) normal[3 * v + i] /= length;
+  }
+}
+
+/* Whether a point's own surface looks against its way out; along others neighbours leave, or nothing is in the way. */
+static PetscBool leads(const PetscReal normal[], const SbContactInside *p)
+{
+  PetscReal n[3] = {0.};
+
+  for (PetscInt k = 0; k < p->n && p->weight[k] > 0.; k++) {
+    for (int i = 0; i < 3; i++) n[i] += p->weight[k] * normal[3 * p->v[k] + i];
+  }
+  return (PetscBool)(SbDot3(n, p->normal) < -AGAINST * PetscSqrtReal(SbDot3(n, n)));
+}
+
+/* Edges of each vertex. */
+static PetscErrorCode list_edges(SbContactMesh m, Ways *w)
+{
+  PetscFunctionBeginUser;
+  PetscCall(PetscCalloc1(m->nvertex + 2, &w->start));
+  PetscCall(PetscMalloc1(2 * m->nedge, &w->edge));
+  for (PetscInt k = 0; k < 2 * m->nedge; k++) w->start[m->edge[k] + 2]++;
+  for (PetscInt v = 0; v < m->nvertex; v++) w->start[v + 2] += w->start[v + 1];
+  for (PetscInt k = 0; k < 2 * m->nedge; k++) w->edge[w->start[m->edge[k] + 1]++] = k / 2;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Ways go on from the first layer, the n vertices of list[], layer by layer over edges that go through nothing. */
+static PetscErrorCode spread_ways(SbContactMesh m, Ways *w, PetscInt n, PetscInt list[])
+{
+  PetscFunctionBeginUser;
+  for (PetscInt first = 0, last = n, layer = 1; first < last; first = last, last = n, layer++) {
+    for (PetscInt k = first; k < last; k++) settle(w, list[k]);
+    for (PetscInt k = first; k < last; k++) {
+      const PetscInt v = list[k];
+
+      for (PetscInt j = w->start[v]; j < w->start[v + 1]; j++) {
+        const PetscInt *e = m->edge + 2 * w->edge[j], to = e[0] == v ? e[1] : e[0];
+        PetscReal r[3];
+
+        if (w->through[w->edge[j]] || (w->layer[to] && w->layer[to] <= layer)) continue;
+        if (!w->layer[to]) {
+          w->layer[to] = layer + 1;
+          list[n++] = to;
+        }
+        for (int i = 0; i < 3; i++) r[i] = w->x[3 * v + i] - w->x[3 * to + i];
+        suggest(w, to, w->in[v], 1. / SbDot3(r, r), w->way + 3 * v, SbDot3(r, w->way + 3 * v) + w->depth[v]);
+      }
+    }
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Points inside surfaces of triangles, by the crossings hit[n][2] of edges and triangles, sorted by edges. */
+static PetscErrorCode look_inside(SbContactMesh m, const PetscReal x[], PetscInt n, const PetscInt hit[],
+                                  SbContactOverlap *o)
+{
+  Ways w = {.x = x};
+  PetscInt *list, nlist = 0, nleading = 0;
+  PetscReal(*box)[6], *normals;
+  uint8_t *paired;
+  SbBoxTree tree;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscMalloc2(m->nvertex, &w.in, m->nvertex, &list));
+  PetscCall(PetscCalloc5(3 * m->nvertex, &w.way, m->nvertex, &w.depth, m->nvertex, &w.sum, m->nvertex,
+                         &w.layer, m->nedge, &w.through));
+  PetscCall(PetscCalloc2(n, &paired, 3 * m->nvertex, &normals));
+  add_normals(m, x, normals);
+  for (PetscInt v = 0; v < m->nvertex; v++) w.in[v] = -1;
+  PetscCall(list_edges(m, &w));
+  PetscCall(PetscMalloc1(m->ntriangle, &box));
+  for (PetscInt t = 0; t < m->ntriangle; t++) SbTriangleBox(x, m->triangle + 3 * t, box[t]);
+  PetscCall(SbBoxTreeCreate(m->ntriangle, (const PetscReal(*)[6])box, &tree));
+  PetscCall(PetscFree(box));
+
+  for (PetscInt i = 0; i < n; i++) {
+    const PetscInt e = hit[2 * i], part = m->part[m->triangle[3 * hit[2 * i + 1]]], *ends = m->edge + 2 * e;
+    PetscReal normal[3], other[3], first, p[3];
+    const PetscReal s = pierce(m, x, e, hit[2 * i + 1], normal, &first);
+    PetscInt j = i + 1;
+
+    w.through[e] = 1;
+    for (int k = 0; k < 2; k++) o->near[ends[k]] = SB_OVERLAP_CROSSED;
+    for (int k = 0; k < 3; k++) o->near[m->triangle[3 * hit[2 * i + 1] + k]] = SB_OVERLAP_CROSSED;
+    if (paired[i]) continue;
+
+    /* it goes out of the same part again: the middle between both places is inside */
+    while (j < n && hit[2 * j] == e && (paired[j] || m->part[m->triangle[3 * hit[2 * j + 1]]] != part)) j++;
+    if (j < n && hit[2 * j] == e) {
+      PetscReal unused, length, chord = 0.;
+      const PetscReal s2 = pierce(m, x, e, hit[2 * j + 1], other, &unused), at = 0.5 * (s + s2);
+      SbContactInside point = {
+        .n = 2, .v = {ends[0], ends[1]}, .weight = {1. - at, at}, .area = m->edge_area[e]};
+      PetscBool found;
+
+      paired[j] = 1;
+      for (int k = 0; k < 3; k++) {
+        point.normal[k] = normal[k] + other[k];
+        p[k] = (1. - at) * x[3 * ends[0] + k] + at * x[3 * ends[1] + k];
+        chord += PetscSqr((s2 - s) * (x[3 * ends[1] + k] - x[3 * ends[0] + k]));
+      }
+      length = PetscSqrtReal(SbDot3(point.normal, point.normal));
+      if (length <= CANCEL) continue;
+      for (int k = 0; k < 3; k++) point.normal[k] /= length;
+      PetscCall(find_way_out(m, x, &tree, part, PetscSqrtReal(chord), p, &point, &found));
+      if (found) PetscCall(add_point(o, &point));
+      continue;
+    }
+
+    /* or one of its ends is inside */
+    {
+      const PetscInt v = ends[first < 0. ? 0 : 1];
+
+      for (int k = 0; k < 3; k++)
+        p[k] = (1. - s) * x[3 * ends[0] + k] + s * x[3 * ends[1] + k] - x[3 * v + k];
+      if (!w.layer[v]) {
+        w.layer[v] = 1;
+        list[nlist++] = v;
+      }
+      suggest(&w, v, part, 1. / PetscMax(SbDot3(p, p), PetscSqr(TINY * m->size)), normal, SbDot3(p, normal));
+    }
+  }
+  PetscCall(spread_ways(m, &w, nlist, list));
+
+  for (PetscInt v = 0; v < m->nvertex; v++) {
+    SbContactInside point = {.n = 1, .v = {v}, .weight = {1.}, .area = m->area[v]};
+    PetscBool found;
+
+    if (!w.layer[v]) continue;
+    o->near[v] = SB_OVERLAP_INSIDE;
+    if (SbDot3(w.way + 3 * v, w.way + 3 * v) == 0. || w.depth[v] <= 0.) continue;
+    PetscCall(PetscArraycpy(point.normal, w.way + 3 * v, 3));
+    PetscCall(find_way_out(m, x, &tree, w.in[v], w.depth[v], x + 3 * v, &point, &found));
+    if (found) PetscCall(add_point(o, &point));
+  }
+  /* those that lead, where any does */
+  for (PetscInt i = 0; i < o->n; i++) {
+    if (leads(normals, &o->point[i])) o->point[nleading++] = o->point[i];
+  }
+  if (nleading) o->n = nleading;
+
+  PetscCall(SbBoxTreeDestroy(&tree));
+  PetscCall(PetscFree2(w.in, list));
+  PetscCall(PetscFree5(w.way, w.depth, w.sum, w.layer, w.through));
+  PetscCall(PetscFree2(paired, normals));
+  PetscCall(PetscFree(w.start));
+  PetscCall(PetscFree(w.edge));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* A pair of a feature and an obstacle that is round or all on one side, where it is behind. */
+static PetscErrorCode add_behind(SbContactMesh m, const PetscReal x[], const SbContactPair *pair,
+                                 SbContactOverlap *o)
+{
+  SbContactInside point = {.n = 0, .area = pair->area};
+  PetscBool driven = PETSC_TRUE;
+  SbDistance d;
+  const PetscReal gap = SbContactPairGap(m, pair, x, &d);
+  const PetscReal sign = pair->v[0] >= m->nbody_vertex ? -1. : 1.;
+
+  PetscFunctionBeginUser;
+  for (int k = 0; k < 4; k++) driven = (PetscBool)(driven && m->driven[pair->v[k]]);
+  if (gap >= 0. || driven || SbDot3(d.n, d.n) == 0.) PetscFunctionReturn(PETSC_SUCCESS);
+  for (int pass = 0; pass < 2; pass++) { /* the body's vertices first */
+    for (int k = 0; k < 4; k++) {
+      if (d.weight[k] == 0. || (pair->v[k] < m->nbody_vertex) != !pass) continue;
+      o->near[pair->v[k]] = SB_OVERLAP_INSIDE;
+      point.v[point.n] = pair->v[k];
+      point.weight[point.n++] = sign * d.weight[k];
+    }
+  }
+  for (int k = 0; k < 3; k++) point.normal[k] = sign * d.n[k];
+  point.depth = -gap;
+  PetscCall(add_point(o, &point));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode look_behind(SbContactMesh m, const PetscReal x[], SbContactOverlap *o)
+{
+  const PetscInt first = m->nbody_vertex;
+
+  PetscFunctionBeginUser;
+  for (PetscInt v = 0; v < first && m->side != SB_SIDE_NONE; v++) {
+    const SbContactPair pair = {.side = PETSC_TRUE, .v = {v, first, m->nvertex - 1, v}, .area = m->area[v]};
+
+    PetscCall(add_behind(m, x, &pair, o));
+  }
+  if (m->side != SB_SIDE_NONE || m->radius <= 0.) PetscFunctionReturn(PETSC_SUCCESS);
+  for (PetscInt t = 0; t < m->nbody_triangle; t++) {
+    const PetscInt *v = m->triangle + 3 * t;
+
+    for (PetscInt k = first; k < m->nvertex; k++) {
+      const SbContactPair pair = {.kind = SB_PAIR_VERTEX_TRIANGLE,
+                                  .v = {k, v[0], v[1], v[2]},
+                                  .area = (m->area[v[0]] + m->area[v[1]] + m->area[v[2]]) / 3.};
+
+      PetscCall(add_behind(m, x, &pair, o));
+    }
+  }
+  for (PetscInt e = 0; m->nvertex - first == 2 && e < m->nedge - 1; e++) {
+    const SbContactPair pair = {.kind = SB_PAIR_EDGE_EDGE,
+                                .v = {m->edge[2 * e], m->edge[2 * e + 1], first, first + 1},
+                                .area = m->edge_area[e]};
+
+    PetscCall(add_behind(m, x, &pair, o));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Places where no vertex lies in a triangle, no edge on another: moved by JITTER, each alike in every run. */
+static PetscErrorCode jitter(SbContactMesh m, const PetscReal x[], PetscReal **moved)
+{
+  PetscFunctionBeginUser;
+  PetscCall(PetscMalloc1(3 * m->nvertex, moved));
+  for (PetscInt k = 0; k < 3 * m->nvertex; k++) {
+    uint32_t h = (uint32_t)(k + 1) * 2654435761u;
+
+    h = (h ^ (h >> 15)) * 2246822519u;
+    h = (h ^ (h >> 13)) * 3266489917u;
+    (*moved)[k] = x[k] + JITTER * m->size * (2. * ((PetscReal)(h ^ (h >> 16)) / 4294967296.) - 1.);
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbContactOverlapFind(SbContactMesh m, PetscBool self, const PetscReal x[], PetscBool inside,
+                                    SbContactOverlap *o)
+{
+  PetscInt n, *hit;
+  uint8_t *around;
+
+  PetscFunctionBeginUser;
+  o->n = 0;
+  if (!o->near) PetscCall(PetscMalloc1(m->nvertex, &o->near));
+  PetscCall(PetscArrayzero(o->near, m->nvertex));
+  PetscCall(SbContactMeshCrossings(m, self, x, &n, &hit));
+
+  /* what lies on something exactly is on neither side of it: ways would spread past it */
+  if (n || inside) {
+    PetscInt nmoved, *other;
+    PetscReal *moved;
+
+    PetscCall(jitter(m, x, &moved));
+    PetscCall(SbContactMeshCrossings(m, self, moved, &nmoved, &other));
+    if (nmoved)
+      PetscCall(look_inside(m, moved, nmoved, other, o));
+    else if (n)
+      PetscCall(look_inside(m, x, n, hit, o));
+    PetscCall(PetscFree(moved));
+    if (nmoved) {
+      PetscCall(PetscFree(hit));
+      n = nmoved;
+      hit = other;
+    } else
+      PetscCall(PetscFree(other));
+  }
+  o->ncrossing = n;
+  PetscCall(look_behind(m, x, o));
+  if (!n) o->ncrossing = o->n;
+  if (!o->ncrossing) {
+    PetscCall(PetscFree(hit));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+
+  /* the first place, and the deepest one */
+  o->part[0] = m->part[n ? m->edge[2 * hit[0]] : o->point[0].v[0]];
+  o->part[1] = n ? m->part[m->triangle[3 * hit[1]]] : m->space->mesh->nbody;
+  PetscCall(PetscArraycpy(o->place, x + 3 * (n ? m->edge[2 * hit[0]] : o->point[0].v[0]), 3));
+  PetscCall(PetscFree(hit));
+  o->deepest = 0.;
+  for (PetscInt i = 0; i < o->n; i++) o->deepest = PetscMax(o->deepest, o->point[i].depth);
+
+  /* what is next to it may get in while it leaves */
+  PetscCall(PetscMalloc1(m->nvertex, &around));
+  PetscCall(PetscArraycpy(around, o->near, m->nvertex));
+  for (PetscInt e = 0; e < m->nedge; e++) {
+    const PetscInt *v = m->edge + 2 * e;
+
+    for (int k = 0; k < 2; k++) {
+      if (o->near[v[k]] && !o->near[v[1 - k]]) around[v[1 - k]] = SB_OVERLAP_AROUND;
+    }
+  }
+  PetscCall(PetscFree(o->near));
+  o->near = around;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbContactOverlapFree(SbContactOverlap *o)
+{
+  PetscFunctionBeginUser;
+  PetscCall(PetscFree(o->point));
+  PetscCall(PetscFree(o->near));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

@@ -1,0 +1,112 @@
+/*
+  barrier_springs.c - what is in each other when a run begins is parted, and what bounces leaves: by springs that push along fixed directions.
+
+  A spring has the energy k/2 (g - goal)^2 while g = n . sum weight x is below its goal. It is of one step: the next one finds out anew what is in what.
+
+  Overlap. Each point inside (src/contact/overlap.c) is to be out by a part of its depth when the step ends: what is left after -effect_X_separation_steps steps is 1/e of it; never less than the
+  width of the barrier is asked for, and in a static run all. Where springs reach less than half of that they get stiffer. Pairs of features there are no pairs of the barrier, and not guarded, until nothing is in anything.
+*/
+#include "barrier_impl.h"
+
+#define STIFF 10. /* in a static run, of the stiffness of the barrier: what springs push should arrive */
+#define SAME 1e-5 /* of the bodies' size: depth below which a body that is inside another is in its place */
+
+static PetscErrorCode add_spring(Barrier *b, const Spring *spring)
+{
+  PetscFunctionBeginUser;
+  if (b->nspring == b->spring_size) {
+    b->spring_size = PetscMax(64, 2 * b->spring_size);
+    PetscCall(PetscRealloc((size_t)b->spring_size * sizeof(*b->spring), &b->spring));
+  }
+  b->spring[b->nspring++] = *spring;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Pairs without a gap to speak of, as where a vertex lies in a triangle, are none either while things overlap. */
+static PetscErrorCode exempt_nearest(Barrier *b)
+{
+  const SbContactMesh m = b->mesh;
+  uint8_t *near = b->overlap.near;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbContactPairsFind(b->pairs, b->x, b->x));
+  for (PetscInt i = 0; i < b->pairs->n; i++) {
+    const SbContactPair *pair = &b->pairs->pair[i];
+    SbDistance d;
+
+    if (SbContactPairGap(m, pair, b->x, &d) > SAME * m->size) continue;
+    for (int k = 0; k < 4; k++) near[pair->v[k]] = SB_OVERLAP_INSIDE;
+  }
+  PetscCallMPI(
+    MPI_Allreduce(MPI_IN_PLACE, near, (PetscMPIInt)m->nvertex, MPI_UINT8_T, MPI_MAX, m->space->comm));
+  PetscCall(SbContactPairsExempt(b->pairs, near));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Says once what is in what. */
+static PetscErrorCode announce(SbEffect e, const SbSpace s, const SbContactOverlap *o)
+{
+  const char *name[2];
+
+  PetscFunctionBeginUser;
+  for (int k = 0; k < 2; k++)
+    name[k] = o->part[k] < s->mesh->nbody ? s->mesh->body[o->part[k]].name : "the obstacle";
+  PetscCheck(
+    o->n > 0, s->comm, PETSC_ERR_USER_INPUT,
+    "The effect %s: %s and %s are in each other at (%g, %g, %g) m, and no way leads out of it: %" PetscInt_FMT
+    " edges go through triangles; move one of them by -body_NAME_translate",
+    e->name, name[0], name[1], (double)o->place[0], (double)o->place[1], (double)o->place[2], o->ncrossing);
+  PetscCall(SbWarning(
+    s->comm,
+    "The effect %s: %s and %s are in each other at (%g, %g, %g) m when the run begins; %" PetscInt_FMT
+    " points are up to %g m deep. They are parted (-effect_%s_separation_steps); until then they are not "
+    "kept from going through each other there",
+    e->name, name[0], name[1], (double)o->place[0], (double)o->place[1], (double)o->place[2], o->n,
+    (double)o->deepest, e->name));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbBarrierPart(SbEffect e, SbSpace s, PetscReal dt, PetscBool first)
+{
+  Barrier *b = (Barrier *)e->data;
+  SbContactOverlap *o = &b->overlap;
+  const PetscBool before = b->overlapping;
+  PetscBool inside = PETSC_FALSE;
+  PetscInt body[2] = {0, 0};
+
+  PetscFunctionBeginUser;
+  b->nspring = 0;
+  if (first && !b->scene.obstacle) PetscCall(SbContactMeshContained(b->mesh, b->x, body, &inside));
+  PetscCall(SbContactOverlapFind(b->mesh, b->scene.self, b->x, inside, o));
+  PetscCheck(!inside || (o->n && o->deepest > SAME * b->mesh->size), s->comm, PETSC_ERR_USER_INPUT,
+             "The effect %s: %s is inside %s when the run begins, or in the same place; move one of them by "
+             "-body_%s_translate",
+             e->name, s->mesh->body[body[0]].name, s->mesh->body[body[1]].name, s->mesh->body[body[0]].name);
+  b->overlapping = (PetscBool)(o->ncrossing > 0);
+  PetscCall(SbContactPairsExempt(b->pairs, b->overlapping ? o->near : NULL));
+  b->known = PETSC_FALSE;
+  if (!b->overlapping) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(exempt_nearest(b));
+  if (!before && !b->announced) PetscCall(announce(e, s, o));
+  b->announced = PETSC_TRUE;
+
+  if (e->dynamic) SbOverlapBegin(&b->parting, dt);
+  for (PetscInt i = 0; i < o->n; i++) {
+    const SbContactInside *p = &o->point[i];
+    const PetscInt one = b->mesh->part[p->v[0]], two = b->mesh->part[p->v[p->n - 1]];
+    const PetscReal w = PetscMin(b->w[one], b->w[two]), k = PetscMin(b->k[one], b->k[two]),
+                    all = p->depth + 0.5 * w;
+    Spring spring = {.n = p->n, .stiffness = b->stiffer * k * p->area / w};
+
+    if (!e->dynamic) spring.stiffness *= STIFF;
+    PetscCall(PetscArraycpy(spring.v, p->v, 5));
+    PetscCall(PetscArraycpy(spring.weight, p->weight, 5));
+    PetscCall(PetscArraycpy(spring.normal, p->normal, 3));
+    spring.depth = p->depth;
+    spring.start = SbBarrierSpringPlace(b, &spring);
+    spring.goal =
+      spring.start + (e->dynamic ? PetscMin(all, PetscMax(w, all * (1. - b->parting.left))) : all);
+    PetscCall(add_spring(b, &spring));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
