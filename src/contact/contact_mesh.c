@@ -73,7 +73,7 @@ static PetscErrorCode list_own(SbContactMesh m, PetscInt n, const SbFacet facet[
     at[slot[v]] = v;
   }
   PetscCall(PetscSortIntWithArray(nown, id, at));
-  for (PetscInt k = 0; k < nown; k++) size += 3 + 4 * (start[slot[at[k]] + 1] - start[slot[at[k]]]);
+  for (PetscInt k = 0; k < nown; k++) size += 4 + 4 * (start[slot[at[k]] + 1] - start[slot[at[k]]]);
   m->nlocal = nown;
   PetscCall(PetscMalloc1(size, number));
   PetscCall(PetscMalloc1(size, real));

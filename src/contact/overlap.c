@@ -23,6 +23,7 @@
 /* What is known of vertices while ways spread. */
 typedef struct {
   const PetscReal *x;
+  PetscReal *normal;      /* [nvertex][3] outward, unit vectors */
   PetscInt *in;           /* [nvertex] the part that it is in, -1: none */
   PetscReal *way;         /* [nvertex][3] sum of weighted ways, then the way */
   PetscReal *depth;       /* [nvertex] sum of weighted depths, then the depth, m */
@@ -43,14 +44,16 @@ static PetscErrorCode add_point(SbContactOverlap *o, const SbContactInside *poin
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Adds a way n out of `part` over the depth d to what is known of vertex v, with a weight. */
-static void suggest(Ways *w, PetscInt v, PetscInt part, PetscReal weight, const PetscReal n[3], PetscReal d)
+/* Adds a way n out of `part` over the depth d to what is known of vertex v, with a weight; not where the own surface looks that way: its neighbours leave there. Returns whether it did. */
+static PetscBool suggest(Ways *w, PetscInt v, PetscInt part, PetscReal weight, const PetscReal n[3],
+                         PetscReal d)
 {
-  if (w->in[v] < 0) w->in[v] = part;
-  if (w->in[v] != part) return;
+  if ((w->layer[v] && w->in[v] != part) || SbDot3(w->normal + 3 * v, n) > AGAINST) return PETSC_FALSE;
+  w->in[v] = part;
   for (int i = 0; i < 3; i++) w->way[3 * v + i] += weight * n[i];
   w->depth[v] += weight * d;
   w->sum[v] += weight;
+  return PETSC_TRUE;
 }
 
 /* Makes ways and depths of what was added up; a vertex whose ways cancel has none. */
@@ -224,16 +227,36 @@ static PetscErrorCode spread_ways(SbContactMesh m, Ways *w, PetscInt n, PetscInt
         PetscReal r[3];
 
         if (w->through[w->edge[j]] || (w->layer[to] && w->layer[to] <= layer)) continue;
-        if (!w->layer[to]) {
-          w->layer[to] = layer + 1;
-          list[n++] = to;
-        }
         for (int i = 0; i < 3; i++) r[i] = w->x[3 * v + i] - w->x[3 * to + i];
-        suggest(w, to, w->in[v], 1. / SbDot3(r, r), w->way + 3 * v, SbDot3(r, w->way + 3 * v) + w->depth[v]);
+        if (!suggest(w, to, w->in[v], 1. / SbDot3(r, r), w->way + 3 * v,
+                     SbDot3(r, w->way + 3 * v) + w->depth[v]) ||
+            w->layer[to])
+          continue;
+        w->layer[to] = layer + 1;
+        list[n++] = to;
       }
     }
   }
   PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* What an edge that goes through nothing leads to from inside is inside, too. list: room for all vertices. */
+static void mark_inside(SbContactMesh m, const Ways *w, PetscInt list[], uint8_t near[])
+{
+  PetscInt n = 0;
+
+  for (PetscInt v = 0; v < m->nvertex; v++) {
+    if (near[v] == SB_OVERLAP_INSIDE) list[n++] = v;
+  }
+  for (PetscInt k = 0; k < n; k++) {
+    for (PetscInt j = w->start[list[k]]; j < w->start[list[k] + 1]; j++) {
+      const PetscInt *e = m->edge + 2 * w->edge[j], to = e[0] == list[k] ? e[1] : e[0];
+
+      if (w->through[w->edge[j]] || near[to] == SB_OVERLAP_INSIDE) continue;
+      near[to] = SB_OVERLAP_INSIDE;
+      list[n++] = to;
+    }
+  }
 }
 
 /* Points inside surfaces of triangles, by the crossings hit[n][2] of edges and triangles, sorted by edges. */
@@ -242,7 +265,7 @@ static PetscErrorCode look_inside(SbContactMesh m, const PetscReal x[], PetscInt
 {
   Ways w = {.x = x};
   PetscInt *list, nlist = 0, nleading = 0;
-  PetscReal(*box)[6], *normals;
+  PetscReal(*box)[6];
   uint8_t *paired;
   SbBoxTree tree;
 
@@ -250,8 +273,8 @@ static PetscErrorCode look_inside(SbContactMesh m, const PetscReal x[], PetscInt
   PetscCall(PetscMalloc2(m->nvertex, &w.in, m->nvertex, &list));
   PetscCall(PetscCalloc5(3 * m->nvertex, &w.way, m->nvertex, &w.depth, m->nvertex, &w.sum, m->nvertex,
                          &w.layer, m->nedge, &w.through));
-  PetscCall(PetscCalloc2(n, &paired, 3 * m->nvertex, &normals));
-  add_normals(m, x, normals);
+  PetscCall(PetscCalloc2(n, &paired, 3 * m->nvertex, &w.normal));
+  add_normals(m, x, w.normal);
   for (PetscInt v = 0; v < m->nvertex; v++) w.in[v] = -1;
   PetscCall(list_edges(m, &w));
   PetscCall(PetscMalloc1(m->ntriangle, &box));
@@ -266,8 +289,12 @@ static PetscErrorCode look_inside(SbContactMesh m, const PetscReal x[], PetscInt
     PetscInt j = i + 1;
 
     w.through[e] = 1;
-    for (int k = 0; k < 2; k++) o->near[ends[k]] = SB_OVERLAP_CROSSED;
-    for (int k = 0; k < 3; k++) o->near[m->triangle[3 * hit[2 * i + 1] + k]] = SB_OVERLAP_CROSSED;
+    for (int k = 0; k < 2; k++) o->near[ends[k]] = PetscMax(o->near[ends[k]], SB_OVERLAP_CROSSED);
+    for (int k = 0; k < 3; k++) {
+      const PetscInt v = m->triangle[3 * hit[2 * i + 1] + k];
+
+      o->near[v] = PetscMax(o->near[v], SB_OVERLAP_CROSSED);
+    }
     if (paired[i]) continue;
 
     /* it goes out of the same part again: the middle between both places is inside */
@@ -299,11 +326,13 @@ static PetscErrorCode look_inside(SbContactMesh m, const PetscReal x[], PetscInt
 
       for (int k = 0; k < 3; k++)
         p[k] = (1. - s) * x[3 * ends[0] + k] + s * x[3 * ends[1] + k] - x[3 * v + k];
-      if (!w.layer[v]) {
+      if (suggest(&w, v, part, 1. / PetscMax(SbDot3(p, p), PetscSqr(TINY * m->size)), normal,
+                  SbDot3(p, normal)) &&
+          !w.layer[v]) {
         w.layer[v] = 1;
         list[nlist++] = v;
       }
-      suggest(&w, v, part, 1. / PetscMax(SbDot3(p, p), PetscSqr(TINY * m->size)), normal, SbDot3(p, normal));
+      o->near[v] = SB_OVERLAP_INSIDE;
     }
   }
   PetscCall(spread_ways(m, &w, nlist, list));
@@ -313,22 +342,23 @@ static PetscErrorCode look_inside(SbContactMesh m, const PetscReal x[], PetscInt
     PetscBool found;
 
     if (!w.layer[v]) continue;
-    o->near[v] = SB_OVERLAP_INSIDE;
     if (SbDot3(w.way + 3 * v, w.way + 3 * v) == 0. || w.depth[v] <= 0.) continue;
     PetscCall(PetscArraycpy(point.normal, w.way + 3 * v, 3));
     PetscCall(find_way_out(m, x, &tree, w.in[v], w.depth[v], x + 3 * v, &point, &found));
     if (found) PetscCall(add_point(o, &point));
   }
+  mark_inside(m, &w, list, o->near);
+
   /* those that lead, where any does */
   for (PetscInt i = 0; i < o->n; i++) {
-    if (leads(normals, &o->point[i])) o->point[nleading++] = o->point[i];
+    if (leads(w.normal, &o->point[i])) o->point[nleading++] = o->point[i];
   }
   if (nleading) o->n = nleading;
 
   PetscCall(SbBoxTreeDestroy(&tree));
   PetscCall(PetscFree2(w.in, list));
   PetscCall(PetscFree5(w.way, w.depth, w.sum, w.layer, w.through));
-  PetscCall(PetscFree2(paired, normals));
+  PetscCall(PetscFree2(paired, w.normal));
   PetscCall(PetscFree(w.start));
   PetscCall(PetscFree(w.edge));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -98,8 +98,8 @@ static inline PetscErrorCode contact_body_forces(SbRun run, PetscReal t, PetscRe
 }
 
 /*
-  The history of a run: a row per step, the start included, of named columns: t, dt, kinetic, strain, energy (both and the
-  potential of gravity g along -z), momentum_x, angular_x, centre_x, volume, min_J, speed, BODY_vx (of its centre), EFFECT_COLUMN of the
+  The history of a run: a row per step, the start included, of named columns: t, dt, kinetic, strain, energy (both, the
+  potential of gravity g along -z, and what the gaps of barriers hold), momentum_x, angular_x, centre_x, volume, min_J, speed, BODY_vx (of its centre), EFFECT_COLUMN of the
   effects of contact, missing (largest component of the change of momentum in the step that weight and the forces of obstacles do not
   explain, kg m/s), and, when asked for, net (likewise of the sum of contact forces on all bodies) and push (on the first), N.
 */
@@ -224,6 +224,7 @@ static inline PetscErrorCode record_step(SbRun run, const SbStep *step, void *ct
   const SbModel m = run->model;
   const SbEnergies *e = &step->energies;
   PetscReal force[3] = {0, 0, -m->mass * r->g}, missing = 0, sum[3 * CONTACT_BODIES], mass[CONTACT_BODIES];
+  PetscReal energy = e->kinetic + e->strain + m->mass * r->g * e->centre[2];
 
   PetscFunctionBeginUser;
   r->at = 0;
@@ -231,7 +232,6 @@ static inline PetscErrorCode record_step(SbRun run, const SbStep *step, void *ct
   PetscCall(record_put(r, "dt", "", "", step->dt));
   PetscCall(record_put(r, "kinetic", "", "", e->kinetic));
   PetscCall(record_put(r, "strain", "", "", e->strain));
-  PetscCall(record_put(r, "energy", "", "", e->kinetic + e->strain + m->mass * r->g * e->centre[2]));
   for (int k = 0; k < 3; k++) PetscCall(record_put(r, "momentum_", xyz[k], "", e->momentum[k]));
   for (int k = 0; k < 3; k++) PetscCall(record_put(r, "angular_", xyz[k], "", e->angular[k]));
   for (int k = 0; k < 3; k++) PetscCall(record_put(r, "centre_", xyz[k], "", e->centre[k]));
@@ -245,19 +245,21 @@ static inline PetscErrorCode record_step(SbRun run, const SbStep *step, void *ct
     for (PetscInt i = 0; i < 3 * m->nbody; i++)
       PetscCall(record_put(r, m->body[i / 3].name, "_v", xyz[i % 3], sum[i] / mass[i / 3]));
   }
-  // The columns of contact; the forces of obstacles among them.
+  // The columns of contact; the forces of obstacles and the energy of gaps among them.
   for (PetscInt i = 0; i < m->neffect; i++) {
     const SbEffect f = m->effect[i];
     PetscReal value[64] = {0};
 
-    if (!f->ops.begin_step) continue;
+    if (!f->ops.begin_step && !f->ops.potential) continue;
     if (run->reaction) PetscCall(contact_columns(run, step->t, run->reaction, f, value));
     for (PetscInt c = 0; c < f->ncolumn; c++) {
       PetscCall(record_put(r, f->name, "_", f->column[c], value[c]));
+      if (!strcmp(f->column[c], "energy")) energy += value[c];
       for (int k = 0; k < 3; k++)
         force[k] += !strncmp(f->column[c], "force_", 6) && f->column[c][6] == xyz[k][0] ? value[c] : 0;
     }
   }
+  PetscCall(record_put(r, "energy", "", "", energy));
   if (!r->n) {
     r->mass = m->mass;
     r->lowest = PETSC_MAX_REAL;
@@ -266,7 +268,7 @@ static inline PetscErrorCode record_step(SbRun run, const SbStep *step, void *ct
     PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &r->lowest, 1, MPIU_REAL, MPI_MIN, m->comm));
   }
   for (int k = 0; k < 3 && r->n; k++) {
-    const PetscReal before = r->value[(r->n - 1) * r->ncolumn + 5 + k]; // momentum_x and the two behind it
+    const PetscReal before = r->value[(r->n - 1) * r->ncolumn + 4 + k]; // momentum_x and the two behind it
 
     missing = PetscMax(missing, PetscAbsReal(e->momentum[k] - before - step->dt * force[k]));
   }
