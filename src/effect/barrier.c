@@ -26,6 +26,7 @@
 #define SLIP 1e-3        /* of the size of the smallest body per second: speed below which friction sticks */
 #define SLIP_STATIC 1e-5 /* of the size: the same in a static run, as a length */
 #define LAGS 100         /* solves of a load step with the friction of the one before */
+#define PARTINGS 20      /* solves of a load step in which things are parted */
 #define HALF 0.5         /* of what springs were to part: where they reach less, they get stiffer */
 #define APART 0.5        /* of w: how far touching surfaces are moved apart at the start */
 #define PASSES 200       /* over all pairs for that */
@@ -306,7 +307,7 @@ static PetscErrorCode lag_barrier(SbEffect e, SbSpace s, const PetscReal u[], Pe
   PetscCall(SbBarrierLook(b, u));
 
   /* in a static run what overlaps is parted within the step */
-  if (b->overlapping && !e->dynamic) {
+  if (b->overlapping && !e->dynamic && b->nlag < PARTINGS) {
     PetscCall(SbBarrierPart(e, s, 0., PETSC_FALSE));
     *again = PETSC_TRUE;
     PetscFunctionReturn(PETSC_SUCCESS);

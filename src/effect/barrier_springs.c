@@ -9,7 +9,7 @@
 #include "barrier_impl.h"
 
 #define STIFF 10. /* in a static run, of the stiffness of the barrier: what springs push should arrive */
-#define SAME 1e-5 /* of the bodies' size: depth below which a body that is inside another is in its place */
+#define SAME 1e-5 /* of the bodies' size: within this they are in the same place, and a gap is none */
 
 static PetscErrorCode add_spring(Barrier *b, const Spring *spring)
 {
@@ -66,6 +66,45 @@ static PetscErrorCode announce(SbEffect e, const SbSpace s, const SbContactOverl
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Whether two bodies have the same extent: in the same place all their points are on each other's surface, and no way leads out. */
+static PetscBool same_place(const Barrier *b, const PetscInt body[2])
+{
+  const SbContactMesh m = b->mesh;
+  PetscReal box[2][6], most = 0.;
+
+  for (int k = 0; k < 2; k++) {
+    SbBoxClear(box[k]);
+    for (PetscInt v = 0; v < m->nbody_vertex; v++) {
+      if (m->part[v] == body[k]) SbBoxAdd(box[k], b->x + 3 * v);
+    }
+  }
+  for (int i = 0; i < 6; i++) most = PetscMax(most, PetscAbsReal(box[0][i] - box[1][i]));
+  return (PetscBool)(most < SAME * m->size);
+}
+
+/* A body that is in the obstacle without an edge through its surface has no way out. x: places of the start. */
+static PetscErrorCode check_obstacle(SbEffect e, SbSpace s, PetscReal t)
+{
+  const Barrier *b = (const Barrier *)e->data;
+  const SbContactMesh m = b->mesh;
+  SbPose pose;
+
+  PetscFunctionBeginUser;
+  (*b->scene.pose)(b->data, t, &pose);
+  for (PetscInt v = 0; v < m->nbody_vertex; v++) {
+    PetscReal X[3], n[3];
+
+    SbPoseInvert(&pose, b->x + 3 * v, X);
+    PetscCheck(m->driven[v] || SbObstacleDistance(b->scene.obstacle, X, n) > -SAME * m->size, s->comm,
+               PETSC_ERR_USER_INPUT,
+               "The effect %s: %s is inside the obstacle when the run begins, at (%g, %g, %g) m; move it by "
+               "-body_%s_translate",
+               e->name, s->mesh->body[m->part[v]].name, (double)b->x[3 * v], (double)b->x[3 * v + 1],
+               (double)b->x[3 * v + 2], s->mesh->body[m->part[v]].name);
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode SbBarrierPart(SbEffect e, SbSpace s, PetscReal dt, PetscBool first)
 {
   Barrier *b = (Barrier *)e->data;
@@ -78,11 +117,12 @@ PetscErrorCode SbBarrierPart(SbEffect e, SbSpace s, PetscReal dt, PetscBool firs
   b->nspring = 0;
   if (first && !b->scene.obstacle) PetscCall(SbContactMeshContained(b->mesh, b->x, body, &inside));
   PetscCall(SbContactOverlapFind(b->mesh, b->scene.self, b->x, inside, o));
-  PetscCheck(!inside || (o->n && o->deepest > SAME * b->mesh->size), s->comm, PETSC_ERR_USER_INPUT,
+  PetscCheck(!inside || (o->n && !same_place(b, body)), s->comm, PETSC_ERR_USER_INPUT,
              "The effect %s: %s is inside %s when the run begins, or in the same place; move one of them by "
              "-body_%s_translate",
              e->name, s->mesh->body[body[0]].name, s->mesh->body[body[1]].name, s->mesh->body[body[0]].name);
   b->overlapping = (PetscBool)(o->ncrossing > 0);
+  if (first && b->scene.obstacle && !b->overlapping) PetscCall(check_obstacle(e, s, 0.));
   PetscCall(SbContactPairsExempt(b->pairs, b->overlapping ? o->near : NULL));
   b->known = PETSC_FALSE;
   if (!b->overlapping) PetscFunctionReturn(PETSC_SUCCESS);
