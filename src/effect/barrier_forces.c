@@ -179,6 +179,7 @@ PetscErrorCode SbEffectPotential_Barrier(SbEffect e, SbSpace s, const PetscReal 
 static PetscErrorCode add_blocks(Barrier *b, const SbContactPair *pair, const PetscReal weight[4],
                                  const PetscReal H[])
 {
+  const SbContactMesh m = b->mesh;
   const int n = pair->side ? 1 : 4;
 
   PetscFunctionBeginUser;
