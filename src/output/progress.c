@@ -99,7 +99,7 @@ static PetscErrorCode monitor(SbRun run, const SbStep *step, void *ctx)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A line within a step that takes long. Rank 0. */
+/* A line within a step that takes long, by rank 0. Not collective. */
 static PetscErrorCode say_within(SbRun run, const char *what, PetscInt iteration, PetscReal residual)
 {
   const SbOutput out = (SbOutput)run->output;
@@ -108,7 +108,8 @@ static PetscErrorCode say_within(SbRun run, const char *what, PetscInt iteration
   char contact[32] = "";
 
   PetscFunctionBeginUser;
-  if (begun == 0. || now - begun < LONG || now - out->line->within < LONG) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!out->line || begun == 0. || now - begun < LONG || now - out->line->within < LONG)
+    PetscFunctionReturn(PETSC_SUCCESS);
   out->line->within = now;
   if (run->ts) PetscCall(TSGetTimeStep(run->ts, &dt));
   if (run->model->nbegin_step)
@@ -139,13 +140,13 @@ static PetscErrorCode within_linear(KSP ksp, PetscInt iteration, PetscReal resid
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* On rank 0: monitors of the run, and of its solvers. */
+/* Monitors of the run on rank 0, and of its solvers on all: a solver with one computes norms that it does not without. */
 static PetscErrorCode attach(SbRun run, SbOutput out)
 {
   KSP ksp;
 
   PetscFunctionBeginUser;
-  PetscCall(SbRunAddMonitor(run, monitor, out->line, NULL));
+  if (out->line) PetscCall(SbRunAddMonitor(run, monitor, out->line, NULL));
   if (!run->snes) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(SNESGetKSP(run->snes, &ksp));
   PetscCall(SNESMonitorSet(run->snes, within_newton, run, NULL));
@@ -158,10 +159,11 @@ PetscErrorCode SbProgressAttach(SbRun run, SbOutput out)
   PetscFunctionBeginUser;
   if (!out->progress || out->quiet) PetscFunctionReturn(PETSC_SUCCESS);
   run->want_energies = PETSC_TRUE;
-  if (out->rank) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(PetscNew(&out->line));
-  out->line->terminal = is_terminal();
-  out->line->event = out->event.progress;
+  if (!out->rank) {
+    PetscCall(PetscNew(&out->line));
+    out->line->terminal = is_terminal();
+    out->line->event = out->event.progress;
+  }
   PetscCall(attach(run, out));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -171,7 +173,7 @@ PetscErrorCode SbProgressReattach(SbRun run, SbOutput out)
   PetscFunctionBeginUser;
   if (!out->progress || out->quiet) PetscFunctionReturn(PETSC_SUCCESS);
   run->want_energies = PETSC_TRUE;
-  if (out->line) PetscCall(attach(run, out));
+  PetscCall(attach(run, out));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
