@@ -268,7 +268,7 @@ static PetscErrorCode begin_barrier(SbEffect e, SbSpace s, PetscReal t, PetscRea
   b->progress = 0.;
   b->nrub = b->nspring = 0;
   if (!b->begun) PetscCall(SbContactMeshMarkDriven(m));
-  if (!b->begun || b->overlapping) {
+  if (!b->begun || b->overlapping || b->parted) {
     PetscCall(SbContactMeshMove(m, u0, NULL, b->x));
     SbBarrierPlaceObstacle(b, 0., b->x);
     PetscCall(SbBarrierPart(e, s, dt, (PetscBool)(!b->begun && t == 0.)));
@@ -309,7 +309,7 @@ static PetscErrorCode lag_barrier(SbEffect e, SbSpace s, const PetscReal u[], Pe
   /* in a static run what overlaps is parted within the step */
   if (b->overlapping && !e->dynamic && b->nlag < PARTINGS) {
     PetscCall(SbBarrierPart(e, s, 0., PETSC_FALSE));
-    *again = PETSC_TRUE;
+    b->parted = *again = PETSC_TRUE;
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   PetscCall(SbBarrierLag(b));
@@ -379,6 +379,7 @@ static PetscErrorCode accept_barrier(SbEffect e, SbSpace s, const SbStage *stage
   b->step_work = before - b->energy + 0.5 * (b->obstacle_power + power) + friction - lost + pushed;
   b->work += b->step_work;
   b->friction_loss += lost;
+  b->parted = PETSC_FALSE;
   if (asked > 0.) b->stiffer = gained < HALF * asked ? 2. * b->stiffer : PetscMax(1., 0.5 * b->stiffer);
 
   if (b->scene.friction > 0.) PetscCall(SbBarrierLag(b));

@@ -57,6 +57,7 @@ typedef struct {
   PetscReal most_lag;               /* of the run */
   PetscReal slip;                   /* e of friction, m */
   PetscBool overlapping, announced; /* things are in each other; that was said */
+  PetscBool parted;                 /* they were when this load step began */
   SbContactOverlap overlap;
   SbOverlap parting;
   PetscReal stiffer;             /* of springs, by what they reached in the last steps */

@@ -181,10 +181,12 @@ PetscErrorCode SbImportReadCopy(const SbBody *body, const SbBody *before, SbImpo
     PetscFunctionReturn(PETSC_SUCCESS);
   }
 
-  /* the first copy reads the file, and its mesh is kept as it was there until another file comes */
+  /* the first copy reads the file, and its mesh is kept as it was there until another file comes; bodies are zero before they are filled, padding too */
+  // NOLINTBEGIN(bugprone-suspicious-memory-comparison)
   if (!shared->x || !before || strcmp(before->copy_of, body->copy_of) || strcmp(before->mesh, body->mesh) ||
       before->mesh_step != body->mesh_step || memcmp(&before->tet, &body->tet, sizeof(body->tet)) ||
       before->scale != body->scale) {
+    // NOLINTEND(bugprone-suspicious-memory-comparison)
     PetscCall(SbImportDestroy(shared));
     PetscCall(find_reader(body, &read));
     PetscCall(begin(body, shared));

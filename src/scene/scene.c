@@ -172,17 +172,14 @@ static PetscErrorCode read_inclusions(SbModel model, PetscInt i)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode read_bodies(SbModel model)
+/* The n bodies of these names, each as often as there are copies of it; copy[i]: [ncopy[i]], the caller's. */
+static PetscErrorCode read_named_bodies(SbModel model, PetscInt n, const char (*names)[SB_NAME_MAX],
+                                        PetscInt ncopy[], SbPlacement *copy[])
 {
-  char(*names)[SB_NAME_MAX];
-  PetscInt n, nbody = 0, *ncopy;
-  SbPlacement **copy;
+  PetscInt nbody = 0;
 
   PetscFunctionBeginUser;
-  /* names, and the copies of each */
-  PetscCall(SbSceneReadNames("bodies", "body", &n, &names));
   PetscCheck(n, PETSC_COMM_SELF, PETSC_ERR_USER, "-bodies names no body; at least one is needed");
-  PetscCall(PetscCalloc2(n, &ncopy, n, &copy));
   for (PetscInt i = 0; i < n; i++) {
     PetscCall(SbSceneReadCopies(model->comm, names[i], &ncopy[i], &copy[i]));
     nbody += PetscMax(ncopy[i], 1);
@@ -210,12 +207,26 @@ static PetscErrorCode read_bodies(SbModel model)
       PetscCall(read_body(model, b));
       if (ncopy[i]) SbPlacementAdd(&copy[i][k], body);
     }
-    PetscCall(PetscFree(copy[i]));
   }
-  PetscCall(PetscFree2(ncopy, copy));
-  PetscCall(PetscFree(names));
   for (PetscInt i = 0; i < model->nbody; i++) PetscCall(read_inclusions(model, i));
   PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode read_bodies(SbModel model)
+{
+  char(*names)[SB_NAME_MAX];
+  PetscInt n, *ncopy;
+  SbPlacement **copy;
+  PetscErrorCode ierr;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbSceneReadNames("bodies", "body", &n, &names));
+  PetscCall(PetscCalloc2(n, &ncopy, n, &copy));
+  ierr = read_named_bodies(model, n, (const char(*)[SB_NAME_MAX])names, ncopy, copy);
+  for (PetscInt i = 0; i < n; i++) PetscCall(PetscFree(copy[i]));
+  PetscCall(PetscFree2(ncopy, copy));
+  PetscCall(PetscFree(names));
+  PetscFunctionReturn(ierr);
 }
 
 /* ------------------------------------------------------------------ the whole scene */

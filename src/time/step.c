@@ -25,13 +25,15 @@ PetscErrorCode SbRunAttempt(SbRun run, const SbAttempt *a, PetscBool *ok)
   PetscFunctionBeginUser;
   /* effects move to the end of the step */
   PetscCall(SbRunStepBegin(run, a->t, a->dt));
-  if (run->model->npotential) {
-    PetscCall(SbModelGuardBegin(run->model, a->t, a->dt, a->U0));
-    run->guard_start = a->U0;
-    run->guard_dt = a->dt;
-  }
   for (int solves = 0; again; solves++) {
     SbSolvedStep step;
+
+    /* guarded contact begins where the step does */
+    if (run->model->npotential) {
+      PetscCall(SbModelGuardBegin(run->model, a->t, a->dt, a->U0));
+      run->guard_start = a->U0;
+      run->guard_dt = a->dt;
+    }
 
     /* a first guess, and the solution from there; with contact, as often as finding out what touches takes */
     PetscCall((*a->predict)(a->ctx));

@@ -9,6 +9,7 @@ fail() { check "$1" false; }
 
 # last NAME FOLDER COLUMN VALUE TOLERANCE: of the last row of a history
 last() {
+  # shellcheck disable=SC2016 # awk's own
   check "$1: $3 in $2 is not $4" awk -F, -v column="$3" -v value="$4" -v tolerance="$5" '
     NR == 1 { for (i = 1; i <= NF; i++) if ($i == column) c = i }
     END { d = $c - value; exit !c || d > tolerance || -d > tolerance }' "$2/history.csv"
@@ -79,8 +80,11 @@ for n in 1 2; do
     check "no warning that the run has no velocity" grep -q "no velocity" state.txt
   done
 done
+# shellcheck disable=SC2086
 error 2 "-body_bar_state nowhere" defaults.opts $bar -body_bar_state nowhere
+# shellcheck disable=SC2086
 error 1 "-body_bar_state loaded,7|frame" defaults.opts $bar -body_bar_state loaded,7
+# shellcheck disable=SC2086
 error 1 "-body_bar_state|static" defaults.opts $bar -effects hold -effect_hold_type fixed -effect_hold_on xmin -time static -body_bar_state loaded
 
 # let go at 0.02 s: free fall from there; a load that is there for 0.02 s of the time gives its impulse

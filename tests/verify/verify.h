@@ -83,10 +83,10 @@ static inline PetscErrorCode verify_mesh_write(const PetscInt n[3], VerifyMap ma
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* How many numbers SbSpace.node_orig draws from: vertices; with nodes at faces also four of each cell and their supports. */
+/* How many numbers SbSpace.node_orig draws from: vertices; with nodes at faces or edges also four of each cell, their supports, and six. */
 static inline PetscInt verify_numbers(SbModel m)
 {
-  return m->mesh->Nvert + (m->space->faces ? 8 * m->mesh->Ncell : 0);
+  return m->mesh->Nvert + (m->space->faces || m->space->edge_node ? 14 * m->mesh->Ncell : 0);
 }
 
 /*

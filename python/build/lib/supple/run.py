@@ -106,6 +106,7 @@ class Run:
             self.frames.sort(key=lambda group: group.attrs["step"])
             self.first_mesh = self.file["/mesh"]
         except (OSError, KeyError) as e:
+            self.close()  # HDF5 would go on reading what it had
             raise RunError(f"{path} is not a results file of supple: {e}") from None
 
     def close(self):

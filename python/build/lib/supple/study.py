@@ -13,7 +13,7 @@ import numpy
 
 from .run import Run, RunError
 
-TOP = Path(__file__).resolve().parents[2]  # of the checkout, where the package is used from there
+TOP = Path(__file__).resolve().parents[2]  # of the checkout, or of what make install laid down
 
 
 def program():
