@@ -31,6 +31,7 @@
 #define DECREASE 1e-4   /* c above */
 #define SHORTEST 1e-7   /* of a step, before the search gives up */
 #define ROUNDING 1e-11  /* of the terms that E's change is the difference of */
+#define NOTHING 1e-6    /* of E's rounding: what a step promises to lower E by at its solution */
 #define ACCURATE 1e-6   /* relative tolerance of a linear solve whose step has to come back */
 #define APPROACHES 50   /* steps in which what moves by order has to arrive */
 #define DIFFERENCE 1e-7 /* of that motion, for its derivative */
@@ -284,6 +285,8 @@ static PetscErrorCode search(SNES snes, PetscReal slope, PetscReal *s)
     enough = (PetscBool)(slope < 0. && total <= goal);
     if (slope >= 0. || total <= noise)
       enough = (PetscBool)(enough || to.norm <= (1. - DECREASE * *s) * from.norm);
+    /* at the solution, where residuals are rounding as well, the step is as good as none */
+    if (slope < 0. && total <= noise) enough = (PetscBool)(enough || -slope <= NOTHING * noise);
     provisional =
       (PetscBool)(!enough && !plain && slope < 0. && n->provisional < PROVISIONAL &&
                   change < PETSC_INFINITY && to.ninverted <= from.ninverted && to.gaps <= from.gaps);
