@@ -113,17 +113,6 @@ static inline PetscBool SbContactPairApart(SbContactMesh mesh, const SbContactPa
 /* The part of the straight way from x0 to x1, 0..1, that no pair of this rank touches before; pairs at a distance keep a tenth of it. Not collective. */
 PetscErrorCode SbContactPairsSafe(SbContactPairs pairs, const PetscReal x0[], const PetscReal x1[],
                                   PetscReal *part, PetscInt *worst);
-/* What all ranks have, one after the other; n and total count items of the type, `size` bytes each. Collective; the caller frees `all`. */
-PetscErrorCode SbContactGather(MPI_Comm comm, PetscInt n, MPI_Datatype type, size_t size, const void *mine,
-                               PetscInt *total, void *all);
-/*
-  SbContactMeshCrossings - edges that go through triangles of another part, or of the same one (self), at x.
-
-  Collective. Output, of all ranks on each: hit[n][2], edge and triangle, ascending; the caller frees it. It knows nothing of pairs and motions.
-*/
-PetscErrorCode SbContactMeshCrossings(SbContactMesh mesh, PetscBool self, const PetscReal x[], PetscInt *n,
-                                      PetscInt **hit);
-
 /* A vertex, or the middle of what is inside of an edge, that is in something: `normal` leads out of that over `depth`, to the point -sum of the weights from `first` on. */
 typedef struct {
   PetscInt n, v[5];

@@ -9,8 +9,8 @@
   The obstacle: a sphere is a vertex, a capsule an edge, with a radius. Box, cylinder and mesh are triangles. A half-space and a bowl are everything on one side,
   met by vertices alone; they are kept as two vertices, a point and the tip of the normal there, or as the centre.
 */
+#include "contact_mesh.h"
 #include "obstacle.h"
-#include "sbbarrier.h"
 
 PetscErrorCode SbContactGather(MPI_Comm comm, PetscInt n, MPI_Datatype type, size_t size, const void *mine,
                                PetscInt *total, void *all)

@@ -4,7 +4,7 @@
   An edge goes through a triangle where its ends are on different sides of the plane and the line passes the three sides the same way round; signs of volumes of tets tell. Volumes
   below rounding count as neither.
 */
-#include "sbbarrier.h"
+#include "contact_mesh.h"
 
 #define ROUNDING 64 /* in units of eps of the products that a volume is made of */
 

@@ -9,7 +9,7 @@
 
   Everything is done alike by every rank.
 */
-#include "sbbarrier.h"
+#include "contact_mesh.h"
 #include "sbgeometry.h"
 
 #define CANCEL 1e-3 /* of their sum: what is left of ways that oppose each other is none */
