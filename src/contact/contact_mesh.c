@@ -2,7 +2,8 @@
   contact_mesh.c - the surfaces of bodies and of an obstacle as vertices, edges and triangles, whole on every rank.
 
   A vertex of a body follows its nodes: with P1 the one that it is; with CR and DG, whose displacement jumps from cell to cell, the mean over the cells
-  behind the facets around it, so that the surface is closed and linear fields are reproduced. The rank that owns the vertex in the
+  behind the facets around it, so that the surface is closed and linear fields are reproduced. A facet of P2 is four flat triangles over its six nodes: its corners and
+  the middles of its sides are vertices. The rank that owns the vertex in the
   mesh knows all facets around it (the overlap), makes its list of nodes and moves it; positions are gathered by all ranks, 24 bytes per
   vertex of the surface. Numbers follow the original ones of the mesh: nothing below depends on the partition.
 
@@ -33,44 +34,72 @@ PetscErrorCode SbContactGather(MPI_Comm comm, PetscInt n, MPI_Datatype type, siz
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Points of a facet: its three corners; with P2 the middles of its sides too, 3 + k between the corners k and k + 1. */
+static inline PetscInt npoint_of(SbSpace s, const SbFacet *f)
+{
+  return s->edge_node && s->edge_node[6 * f->cell] >= 0 ? 6 : 3;
+}
+
+/* The local node of P2 in the middle of side k of a facet. */
+static PetscInt middle_of(SbSpace s, const SbFacet *f, PetscInt k)
+{
+  const int a = f->corner[k], b = f->corner[(k + 1) % 3];
+  int e = 0;
+
+  while (SbTetEdge[e][0] != PetscMin(a, b) || SbTetEdge[e][1] != PetscMax(a, b)) e++;
+  return s->edge_node[6 * f->cell + e];
+}
+
+/* Own points are numbered vertices first, then nodes in the middle of sides; -1: another rank's, or none. */
+static PetscInt own_point(SbSpace s, const SbFacet *f, PetscInt k)
+{
+  PetscInt node;
+
+  if (k < 3) return f->vertex[k] < s->mesh->nvert_owned ? f->vertex[k] : -1;
+  if (k >= npoint_of(s, f)) return -1;
+  node = middle_of(s, f, k - 3);
+  return node < s->nnode_owned ? s->mesh->nvert_owned + node : -1;
+}
+
 /* Nodes and weights of the own vertices, ascending; records of 3 + 2 count numbers: id, part, count, nodes, and weights apart. */
 static PetscErrorCode list_own(SbContactMesh m, PetscInt n, const SbFacet facet[], PetscInt *nnumber,
                                PetscInt **number, PetscInt *nreal, PetscReal **real)
 {
   const SbSpace s = m->space;
   const SbMesh mesh = s->mesh;
+  const PetscInt npoint = mesh->nvert_owned + (s->edge_node ? s->nnode_owned : 0);
   PetscInt *slot, *start, *ring, nown = 0, *id, *at;
   PetscInt size = 0;
 
   PetscFunctionBeginUser;
-  /* facets around each own vertex */
-  PetscCall(PetscMalloc1(mesh->nvert_owned, &slot));
-  for (PetscInt v = 0; v < mesh->nvert_owned; v++) slot[v] = -1;
-  for (PetscInt i = 0; i < 3 * n; i++) {
-    const PetscInt v = facet[i / 3].vertex[i % 3];
+  /* facets around each own point: number 6 facet + point */
+  PetscCall(PetscMalloc1(npoint, &slot));
+  for (PetscInt p = 0; p < npoint; p++) slot[p] = -1;
+  for (PetscInt i = 0; i < 6 * n; i++) {
+    const PetscInt p = own_point(s, &facet[i / 6], i % 6);
 
-    if (v < mesh->nvert_owned && slot[v] < 0) slot[v] = nown++;
+    if (p >= 0 && slot[p] < 0) slot[p] = nown++;
   }
   PetscCall(PetscCalloc1(nown + 2, &start));
-  PetscCall(PetscMalloc1(3 * n, &ring));
-  for (PetscInt i = 0; i < 3 * n; i++) {
-    const PetscInt v = facet[i / 3].vertex[i % 3];
+  PetscCall(PetscMalloc1(6 * n, &ring));
+  for (PetscInt i = 0; i < 6 * n; i++) {
+    const PetscInt p = own_point(s, &facet[i / 6], i % 6);
 
-    if (v < mesh->nvert_owned) start[slot[v] + 2]++;
+    if (p >= 0) start[slot[p] + 2]++;
   }
   for (PetscInt k = 0; k < nown; k++) start[k + 2] += start[k + 1];
-  for (PetscInt i = 0; i < 3 * n; i++) {
-    const PetscInt v = facet[i / 3].vertex[i % 3];
+  for (PetscInt i = 0; i < 6 * n; i++) {
+    const PetscInt p = own_point(s, &facet[i / 6], i % 6);
 
-    if (v < mesh->nvert_owned) ring[start[slot[v] + 1]++] = i;
+    if (p >= 0) ring[start[slot[p] + 1]++] = i;
   }
 
   /* in the order of their numbers */
   PetscCall(PetscMalloc2(nown, &id, nown, &at));
-  for (PetscInt v = 0; v < mesh->nvert_owned; v++) {
-    if (slot[v] < 0) continue;
-    id[slot[v]] = mesh->vert_orig[v];
-    at[slot[v]] = v;
+  for (PetscInt p = 0; p < npoint; p++) {
+    if (slot[p] < 0) continue;
+    id[slot[p]] = p < mesh->nvert_owned ? mesh->vert_orig[p] : s->node_orig[p - mesh->nvert_owned];
+    at[slot[p]] = p;
   }
   PetscCall(PetscSortIntWithArray(nown, id, at));
   for (PetscInt k = 0; k < nown; k++) size += 4 + 4 * (start[slot[at[k]] + 1] - start[slot[at[k]]]);
@@ -79,17 +108,22 @@ static PetscErrorCode list_own(SbContactMesh m, PetscInt n, const SbFacet facet[
   PetscCall(PetscMalloc1(size, real));
   *nnumber = *nreal = 0;
   for (PetscInt k = 0; k < nown; k++) {
-    const PetscInt v = at[k], first = start[slot[v]], last = start[slot[v] + 1];
+    const PetscInt p = at[k], middle = p - mesh->nvert_owned, first = start[slot[p]],
+                   last = start[slot[p] + 1];
+    const PetscReal *X = middle < 0 ? mesh->x + 3 * p : s->node_x + 3 * middle;
     PetscInt *record = *number + *nnumber, *node = record + 3, nnode = 0;
     PetscReal *weight = *real + *nreal, area = 0.;
 
     record[0] = id[k];
-    record[1] = mesh->vert_body[v];
+    record[1] = middle < 0 ? mesh->vert_body[p] : s->node_body[middle];
     for (PetscInt i = first; i < last; i++) {
-      const SbFacet *f = &facet[ring[i] / 3];
-      const PetscReal *w = SbSpaceCellElement(s, f->cell)->ops.vertex[f->corner[ring[i] % 3]];
+      const SbFacet *f = &facet[ring[i] / 6];
+      const PetscReal *w;
 
-      area += f->area / 3.;
+      /* a third of each triangle around: a facet is one, with P2 four */
+      area += f->area / (npoint_of(s, f) == 3 ? 3. : middle < 0 ? 12. : 4.);
+      if (middle >= 0) continue;
+      w = SbSpaceCellElement(s, f->cell)->ops.vertex[f->corner[ring[i] % 6]];
       for (int a = 0; a < 4; a++) {
         const PetscInt g = s->gnode[s->cell_node[4 * f->cell + a]];
         PetscInt j = 0;
@@ -103,9 +137,13 @@ static PetscErrorCode list_own(SbContactMesh m, PetscInt n, const SbFacet facet[
         weight[4 + j] += w[a] / (PetscReal)(last - first);
       }
     }
+    if (middle >= 0) {
+      node[nnode] = s->gnode[middle];
+      weight[4 + nnode++] = 1.;
+    }
     record[2] = nnode;
     PetscCall(PetscSortIntWithScalarArray(nnode, node, weight + 4));
-    for (int i = 0; i < 3; i++) weight[i] = mesh->x[3 * v + i];
+    for (int i = 0; i < 3; i++) weight[i] = X[i];
     weight[3] = area;
     *nnumber += 3 + nnode;
     *nreal += 4 + nnode;
@@ -205,32 +243,58 @@ static int compare_triangles(const void *a, const void *b)
   return (i > j) - (i < j);
 }
 
-/* The triangles of all ranks, in the order of numbers that no partition changes. */
+/*
+  The triangles of all ranks, in the order of numbers that no partition changes: a facet is one, with P2 four. Corners go by the number of the vertex, or, in the middle of a
+  side, by that of its node.
+*/
 static PetscErrorCode make_triangles(SbContactMesh m, PetscInt n, const SbFacet facet[], PetscInt nobstacle)
 {
+  static const int part[5][3] = {{0, 3, 5}, {3, 1, 4}, {5, 4, 2}, {3, 4, 5}, {0, 1, 2}};
   const SbSpace s = m->space;
-  PetscInt(*mine)[4], *all, nmine = 0, total;
+  PetscInt(*mine)[4], *all, nmine = 0, total, nmiddle = 0, *gnode, *vertex;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscMalloc1(n, &mine));
+  PetscCall(PetscMalloc1(4 * n, &mine));
   for (PetscInt i = 0; i < n; i++) {
+    const PetscBool six = (PetscBool)(npoint_of(s, &facet[i]) == 6);
+
     if (facet[i].cell >= s->mesh->ncell_owned) continue;
-    mine[nmine][0] = 4 * s->mesh->cell_orig[facet[i].cell] + facet[i].face;
-    for (int k = 0; k < 3; k++) mine[nmine][1 + k] = s->mesh->vert_orig[facet[i].vertex[k]];
-    nmine++;
+    for (int q = six ? 0 : 4; q < (six ? 4 : 5); q++, nmine++) {
+      mine[nmine][0] = 16 * s->mesh->cell_orig[facet[i].cell] + 4 * facet[i].face + q % 4;
+      for (int k = 0; k < 3; k++) {
+        const int p = part[q][k];
+
+        mine[nmine][1 + k] =
+          p < 3 ? s->mesh->vert_orig[facet[i].vertex[p]] : -1 - s->gnode[middle_of(s, &facet[i], p - 3)];
+      }
+    }
   }
   PetscCall(SbContactGather(s->comm, 4 * nmine, MPIU_INT, sizeof(PetscInt), mine, &total, &all));
   PetscCall(PetscFree(mine));
   qsort(all, (size_t)(total / 4), 4 * sizeof(PetscInt), compare_triangles);
+
+  /* vertices by their nodes, where they are in the middle of sides */
+  PetscCall(PetscMalloc2(m->nbody_vertex, &gnode, m->nbody_vertex, &vertex));
+  for (PetscInt v = 0; v < m->nbody_vertex; v++) {
+    if (m->id[v] < s->mesh->Nvert) continue;
+    gnode[nmiddle] = m->gnode[m->start[v]];
+    vertex[nmiddle++] = v;
+  }
+  PetscCall(PetscSortIntWithArray(nmiddle, gnode, vertex));
   m->nbody_triangle = total / 4;
   m->ntriangle = m->nbody_triangle + nobstacle;
   PetscCall(PetscMalloc1(3 * m->ntriangle, &m->triangle));
   for (PetscInt i = 0; i < 3 * m->nbody_triangle; i++) {
-    PetscInt v;
+    const PetscInt corner = all[4 * (i / 3) + 1 + i % 3];
+    PetscInt at;
 
-    PetscCall(PetscFindInt(all[4 * (i / 3) + 1 + i % 3], m->nbody_vertex, m->id, &v));
-    m->triangle[i] = v;
+    if (corner >= 0)
+      PetscCall(PetscFindInt(corner, m->nbody_vertex, m->id, &at));
+    else
+      PetscCall(PetscFindInt(-1 - corner, nmiddle, gnode, &at));
+    m->triangle[i] = corner >= 0 ? at : vertex[at];
   }
+  PetscCall(PetscFree2(gnode, vertex));
   PetscCall(PetscFree(all));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

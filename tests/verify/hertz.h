@@ -14,7 +14,7 @@
 #pragma once
 #include "contact.h"
 
-enum { CONTACTS, DEEPEST, MEAN, NORMAL, FRICTION, WORK, LOSS, NVALUE };
+enum { CONTACTS, DEEPEST, MEAN, NORMAL, FRICTION, WORK, LOSS, NVALUE = 16 };
 
 #define SIZE 1.0 /* of the blocks, m */
 #define POISSON 0.3
@@ -52,8 +52,8 @@ typedef struct {
 
 typedef struct {
   PetscInt cells;
-  const char *response, *sides;
-  PetscReal a;      /* radius of contact, m */
+  const char *response, *sides; /* sides: NULL with the response barrier, whose width is a hundredth of d */
+  PetscReal a;                  /* radius of contact, m */
   PetscReal honest; /* how far the force in the history may be from the one that acts, as a part of it */
   const char *element;
 } Case;
@@ -109,10 +109,13 @@ static inline PetscErrorCode open_pair(const Pair *p, const Case *c, PetscReal d
     "-effect_x_type fixed -effect_x_on x0 -effect_x_components x -effect_y_type fixed -effect_y_on y0 "
     "-effect_y_components y -effect_low_type prescribed_displacement -effect_low_on ax,ay,az "
     "-effect_low_displacement %s -effect_high_type prescribed_displacement -effect_high_on bx,by,bz "
-    "-effect_high_displacement %s -effect_meet_type contact -effect_meet_response projected "
-    "-effect_meet_on meet -effect_meet_response %s -effect_meet_passes %s",
+    "-effect_high_displacement %s -effect_meet_type contact -effect_meet_on meet -effect_meet_response %s ",
     path[0], path[1], c->element, c->element, (double)p->young[0], (double)p->young[1], POISSON, POISSON,
-    (double)(3 * d), far[0], far[1], c->response, c->sides));
+    (double)(3 * d), far[0], far[1], c->response));
+  PetscCall(PetscSNPrintf(far[0], sizeof(far[0]),
+                          c->sides ? "-effect_meet_passes %s" : "-effect_meet_barrier_width %s%.9g",
+                          c->sides ? c->sides : "", (double)(0.01 * d)));
+  PetscCall(PetscStrlcat(text, far[0], sizeof(text)));
   PetscCall(test_scene_open(text, t));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -134,7 +137,7 @@ static inline PetscErrorCode read_forces(SbRun run, PetscReal values[NVALUE], Pe
   for (PetscInt i = 0; i < m->neffect; i++) {
     SbEffect e = m->effect[i];
 
-    if (e->ops.begin_step) PetscCall((*e->ops.history)(e, m->space, &stage, r, values));
+    if (!strcmp(e->name, "meet")) PetscCall((*e->ops.history)(e, m->space, &stage, r, values));
     if (!strcmp(e->name, "high")) PetscCall((*e->ops.history)(e, m->space, &stage, r, pull));
   }
   PetscCall(SbSpaceRestoreLocalRead(m->space, run->U, &stage.u));
@@ -167,8 +170,8 @@ static inline PetscErrorCode hertz(const Pair *p, const Case *c, PetscReal *forc
   PetscCall(PetscPrintf(PETSC_COMM_WORLD,
                         "  %s, %s, %s, passes %s, %d^3 cells, d = %.3e m: %g points touch, force %.4f "
                         "(history %.4f) of the formula's, penetration %.1e d, %d solves\n",
-                        p->name, c->element, c->response, c->sides, (int)c->cells, (double)d,
-                        (double)values[CONTACTS], (double)*force, (double)(4 * values[NORMAL] / P),
+                        p->name, c->element, c->response, c->sides ? c->sides : "none", (int)c->cells,
+                        (double)d, (double)values[CONTACTS], (double)*force, (double)(4 * values[NORMAL] / P),
                         (double)(values[DEEPEST] / d), (int)t.run->newton_total));
   SB_CHECK_NEAR(4 * values[NORMAL] / P, *force, c->honest * *force,
                 "force in the history against the one that acts");
