@@ -30,6 +30,18 @@ typedef struct {
   SbContactPoint *point; /* [n] */
 } SbContactPoints;
 
+/* Two bodies that touch when a run begins, or nearly do. */
+typedef struct {
+  PetscInt body[2];  /* nbody: an obstacle */
+  PetscReal n[3];    /* unit, from the second to the first */
+  PetscReal gap, to; /* the distance along n, and the one that they are to have, m */
+} SbTouch;
+/* Start with {0}; release with PetscFree(list->touch). */
+typedef struct {
+  PetscInt n, size;
+  SbTouch *touch; /* [n] */
+} SbTouches;
+
 typedef struct {
   /* reads -effect_<name>_...; scope = {"effect", <type>, <name>}; called once, by SbEffectCreate() */
   PetscErrorCode (*setfromoptions)(SbEffect e, const SbScope *scope);
@@ -77,6 +89,8 @@ typedef struct {
   /*
     Guarded contact (-effect_NAME_response barrier), whose energy belongs to the potential that Newton's method lowers (src/time/newton.c). Collective.
 
+    touching      - before the first step of a run, from t to t + dt: adds what has a gap at the local displacements u that is too small, or not much larger, of this
+                    rank. first: it was that step, alike on all ranks; else nothing was done.
     begin_guarded - a step from t to t + dt begins with the local displacements u0; when the run begins they may be changed (moved), ghosts too, where surfaces
                     touch. What moves by order is where it is at t: `progress` 0.
     advance       - it is where its way from t to t + dt has the part `progress` behind it, 0..1. Not collective.
@@ -88,6 +102,8 @@ typedef struct {
     potential     - energy at the local displacements u, this rank's part, J; f[nnode][3] += its gradient on owned nodes, N.
     hessian       - adds the blocks of its second derivative at u, or of what stands for it (SbContactHessian).
   */
+  PetscErrorCode (*touching)(SbEffect e, SbSpace space, PetscReal t, PetscReal dt, const PetscReal u[],
+                             PetscBool *first, SbTouches *list);
   PetscErrorCode (*begin_guarded)(SbEffect e, SbSpace space, PetscReal t, PetscReal dt, PetscReal u0[],
                                   PetscBool *moved);
   PetscErrorCode (*advance)(SbEffect e, PetscReal progress);
@@ -142,6 +158,7 @@ struct _p_SbEffect {
     springs; /* of contact: it pushes with springs or friction, not with constraints alone. Default PETSC_FALSE */
   const struct SbEffectOn_ *prescribed; /* the sets whose nodes it prescribes in all directions; NULL: none */
   PetscInt nstate;                      /* numbers in a record of save() */
+  PetscReal width;                      /* of guarded contact: the smallest gap below which it pushes, m */
   PetscInt ncolumn;                     /* history columns, known after set-up */
   const char *const
     *column;      /* [ncolumn] "force_x", ...; written as <name>_<column>; owned by the type or by `data` */

@@ -16,7 +16,7 @@
   In a static run, or when asked for, a solution gives its normal forces and places to the next solve of the same step, until friction changes by less than a tolerance
   (barrier_friction.c). By how much it still would is reported.
 
-  Starts. Surfaces that touch when a run begins are moved apart, by less than the width; those that are in each other are parted by springs (barrier_springs.c).
+  Starts. Bodies that touch when a run begins are moved apart as they are (src/model/guard.c), by the width or, in a static run, half of it; what cannot be parted so, by its vertices. Those that are in each other are parted by springs (barrier_springs.c).
 */
 #include "barrier_impl.h"
 
@@ -28,7 +28,8 @@
 #define LAGS 100         /* solves of a load step with the friction of the one before */
 #define PARTINGS 20      /* solves of a load step in which things are parted */
 #define HALF 0.5         /* of what springs were to part: where they reach less, they get stiffer */
-#define APART 0.5        /* of w: how far touching surfaces are moved apart at the start */
+#define APART 0.5        /* of w: how far surfaces that touch are moved apart at the start where bodies cannot move, and in static runs */
+#define NEARBY 5.        /* of w: gaps that bodies may come to when they are moved apart */
 #define PASSES 200       /* over all pairs for that */
 
 /* ------------------------------------------------------------------ set-up */
@@ -78,11 +79,12 @@ static PetscErrorCode setup_barrier(SbEffect e, SbSpace s)
   /* width and pressure of each body */
   for (PetscInt i = 0; i < nbody; i++) cube = PetscMin(cube, PetscCbrtReal(s->mesh->body[i].volume));
   PetscCall(PetscMalloc2(nbody + 1, &b->w, nbody + 1, &b->k));
-  b->w[nbody] = b->k[nbody] = PETSC_MAX_REAL;
+  b->w[nbody] = b->k[nbody] = e->width = PETSC_MAX_REAL;
   for (PetscInt i = 0; i < nbody; i++) {
     b->w[i] = b->width > 0.
                 ? b->width
                 : PetscMin(PetscMin(WIDTH * b->mesh->size, WIDTH_CUBE * cube), 0.5 * b->mesh->shortest);
+    e->width = PetscMin(e->width, b->w[i]);
     b->k[i] = b->pressure > 0. ? b->pressure : PRESSURE * s->material[i]->E;
   }
   PetscCheck(b->w[0] <= b->mesh->shortest, s->comm, PETSC_ERR_USER_INPUT,
@@ -119,6 +121,89 @@ static PetscErrorCode vertex_normals(const Barrier *b, const PetscReal x[], Pets
     SbCross(p, q, n);
     for (int k = 0; k < 9; k++) normal[3 * v[k / 3] + k % 3] += n[k % 3];
   }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Places of the obstacle's vertices when a step from t to t + dt begins, and when it ends. */
+static void find_path(Barrier *b, PetscReal t, PetscReal dt)
+{
+  const SbContactMesh m = b->mesh;
+
+  if (!b->scene.obstacle) return;
+  (*b->scene.pose)(b->data, t, &b->pose[0]);
+  (*b->scene.pose)(b->data, t + dt, &b->pose[1]);
+  for (PetscInt v = m->nbody_vertex; v < m->nvertex; v++) {
+    SbPoseApply(&b->pose[0], m->X + 3 * v, b->from + 3 * (v - m->nbody_vertex));
+    SbPoseApply(&b->pose[1], m->X + 3 * v, b->to + 3 * (v - m->nbody_vertex));
+  }
+}
+
+/*
+  The direction in which bodies of a pair at distance zero part: the normal of the triangle, or that of both edges, where surfaces face each other. n: from the second side to the first; false: it
+  has none, other pairs tell.
+*/
+static PetscBool facing(const Barrier *b, const SbContactPair *pair, const PetscReal normal[], PetscReal n[3])
+{
+  const PetscReal *x[4];
+  PetscReal p[3], q[3], length, outward[2] = {0., 0.};
+  const PetscBool edges = (PetscBool)(pair->kind == SB_PAIR_EDGE_EDGE);
+
+  for (int k = 0; k < 4; k++) x[k] = b->x + 3 * pair->v[k];
+  for (int i = 0; i < 3; i++) {
+    p[i] = edges ? x[1][i] - x[0][i] : x[2][i] - x[1][i];
+    q[i] = x[3][i] - x[edges ? 2 : 1][i];
+  }
+  SbCross(p, q, n);
+  length = PetscSqrtReal(SbDot3(n, n));
+  if (length <= 1e-3 * PetscSqrtReal(SbDot3(p, p) * SbDot3(q, q))) return PETSC_FALSE;
+  for (int k = 0; k < 4; k++) outward[k >= (edges ? 2 : 1)] += SbDot3(n, normal + 3 * pair->v[k]) / length;
+  if (edges && outward[1] < 0.) length = -length;
+  for (int i = 0; i < 3; i++) n[i] /= length;
+  for (int k = 0; k < 2 && length < 0.; k++) outward[k] = -outward[k];
+  return (PetscBool)(outward[0] < 0. && outward[1] > 0.);
+}
+
+static PetscErrorCode touching_barrier(SbEffect e, SbSpace s, PetscReal t, PetscReal dt, const PetscReal u[],
+                                       PetscBool *first, SbTouches *list)
+{
+  Barrier *b = (Barrier *)e->data;
+  const SbContactMesh m = b->mesh;
+  const PetscReal tiny = 1e-9 * m->size;
+  PetscReal *normal;
+
+  PetscFunctionBeginUser;
+  *first = (PetscBool)(!b->begun && t == 0.); /* not when it goes on from a checkpoint */
+  if (!*first) PetscFunctionReturn(PETSC_SUCCESS);
+  find_path(b, t, dt);
+  PetscCall(SbContactMeshMarkDriven(m));
+  PetscCall(SbContactMeshMove(m, u, NULL, b->x));
+  SbBarrierPlaceObstacle(b, 0., b->x);
+  PetscCall(SbBarrierPart(e, s, dt, (PetscBool)!b->looked));
+  b->looked = PETSC_TRUE;
+  PetscCall(PetscMalloc1(3 * m->nvertex, &normal));
+  PetscCall(vertex_normals(b, b->x, normal));
+  PetscCall(SbContactPairsFind(b->pairs, b->x, b->x));
+  for (PetscInt i = 0; i < b->pairs->n; i++) {
+    const SbContactPair *pair = &b->pairs->pair[i];
+    const PetscInt one = m->part[pair->v[0]],
+                   two = m->part[pair->v[pair->kind == SB_PAIR_EDGE_EDGE ? 2 : 1]];
+    SbTouch touch = {.body = {one, two}, .to = (e->dynamic ? 1. : APART) * width_of(b, pair)};
+    SbDistance d;
+
+    if (one == two || !counts(b, pair)) continue;
+    if (SbContactPairApart(m, pair, b->x, b->x, NEARBY * touch.to)) continue;
+    touch.gap = SbContactPairGap(m, pair, b->x, &d);
+    if (touch.gap > NEARBY * touch.to) continue;
+    for (int k = 0; k < 3; k++) touch.n[k] = d.n[k];
+    if (!pair->side && d.d < tiny && !facing(b, pair, normal, touch.n)) continue;
+    if (list->n == list->size) {
+      list->size = PetscMax(256, 2 * list->size);
+      PetscCall(PetscRealloc((size_t)list->size * sizeof(*list->touch), &list->touch));
+    }
+    list->touch[list->n++] = touch;
+  }
+  PetscCall(PetscFree(normal));
+  b->known = PETSC_FALSE;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -257,21 +342,14 @@ static PetscErrorCode begin_barrier(SbEffect e, SbSpace s, PetscReal t, PetscRea
 
   PetscFunctionBeginUser;
   *moved = PETSC_FALSE;
-  if (b->scene.obstacle) {
-    (*b->scene.pose)(b->data, t, &b->pose[0]);
-    (*b->scene.pose)(b->data, t + dt, &b->pose[1]);
-    for (PetscInt v = m->nbody_vertex; v < m->nvertex; v++) {
-      SbPoseApply(&b->pose[0], m->X + 3 * v, b->from + 3 * (v - m->nbody_vertex));
-      SbPoseApply(&b->pose[1], m->X + 3 * v, b->to + 3 * (v - m->nbody_vertex));
-    }
-  }
+  find_path(b, t, dt);
   b->progress = 0.;
   b->nrub = b->nspring = 0;
   if (!b->begun) PetscCall(SbContactMeshMarkDriven(m));
   if (!b->begun || b->overlapping || b->parted) {
     PetscCall(SbContactMeshMove(m, u0, NULL, b->x));
     SbBarrierPlaceObstacle(b, 0., b->x);
-    PetscCall(SbBarrierPart(e, s, dt, (PetscBool)(!b->begun && t == 0.)));
+    PetscCall(SbBarrierPart(e, s, dt, (PetscBool)(!b->begun && !b->looked && t == 0.)));
   }
   if (!b->begun && t == 0.) { /* not when it goes on from a checkpoint */
     PetscCall(part_touching(e, s, u0, moved));
@@ -505,6 +583,7 @@ PetscErrorCode SbBarrierCreate(SbEffect e, const SbScope *scope, const SbBarrier
   e->ops = (SbEffectOps){.setfromoptions = e->ops.setfromoptions,
                          .setup = setup_barrier,
                          .force = SbEffectForce_Barrier,
+                         .touching = touching_barrier,
                          .begin_guarded = begin_barrier,
                          .safe = safe_barrier,
                          .advance = advance_barrier,

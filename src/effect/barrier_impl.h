@@ -36,7 +36,7 @@ typedef struct {
   SbContactPairs pairs;
   PetscReal width, pressure; /* as given; 0: by body */
   PetscReal *w, *k;          /* [nbody+1] of each body, m, Pa; the obstacle's: none smaller */
-  PetscBool verify, begun;
+  PetscBool verify, begun, looked; /* the run has begun; what is in each other was looked for */
   PetscReal *x, *u;        /* [nvertex][3] places, m; [nnode_owned][3] displacement that they belong to */
   PetscReal *start;        /* [nvertex][3] when the step began */
   PetscReal *from, *to;    /* [obstacle's vertices][3] at the start and the end of the step */

@@ -10,6 +10,7 @@
 
 #define STIFF 10. /* in a static run, of the stiffness of the barrier: what springs push should arrive */
 #define SAME 1e-5 /* of the bodies' size: within this they are in the same place, and a gap is none */
+#define ROUNDING 1e-9 /* of that size: what is no deeper touches, when a run begins */
 
 static PetscErrorCode add_spring(Barrier *b, const Spring *spring)
 {
@@ -121,7 +122,8 @@ PetscErrorCode SbBarrierPart(SbEffect e, SbSpace s, PetscReal dt, PetscBool firs
              "The effect %s: %s is inside %s when the run begins, or in the same place; move one of them by "
              "-body_%s_translate",
              e->name, s->mesh->body[body[0]].name, s->mesh->body[body[1]].name, s->mesh->body[body[0]].name);
-  b->overlapping = (PetscBool)(o->ncrossing > 0);
+  b->overlapping =
+    (PetscBool)(o->ncrossing > 0 && (!first || !o->n || o->deepest > ROUNDING * b->mesh->size));
   if (first && b->scene.obstacle && !b->overlapping) PetscCall(check_obstacle(e, s, 0.));
   PetscCall(SbContactPairsExempt(b->pairs, b->overlapping ? o->near : NULL));
   b->known = PETSC_FALSE;

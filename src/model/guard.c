@@ -3,6 +3,149 @@
 */
 #include "sbmodel.h"
 
+#define ROUNDS 20   /* of motions of bodies that touch */
+#define SWEEPS 1000 /* over what touches, in each */
+#define FAR 2.      /* of the gap they are to have: how far a round moves bodies at most */
+#define CLOSE 0.9   /* of that gap: nearer is touching */
+#define MISSED 1e-3 /* of it: by which a sweep may leave it smaller */
+
+static int by_value(const void *a, const void *b)
+{
+  const PetscReal *p = (const PetscReal *)a, *q = (const PetscReal *)b;
+
+  for (int i = 0; i < 7; i++) {
+    if (p[i] != q[i]) return p[i] < q[i] ? -1 : 1;
+  }
+  return 0;
+}
+
+/* What touches on any rank, the same on all and in an order that no partition changes: bodies, direction, gap and the one to have. */
+static PetscErrorCode gather_touches(MPI_Comm comm, const SbTouches *mine, PetscInt *n, PetscReal (**all)[7])
+{
+  PetscMPIInt ranks, count, *counts, *first;
+  PetscReal(*own)[7];
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscMalloc1(mine->n + 1, &own));
+  for (PetscInt i = 0; i < mine->n; i++) {
+    const SbTouch *t = &mine->touch[i];
+
+    for (int k = 0; k < 2; k++) own[i][k] = (PetscReal)t->body[k];
+    for (int k = 0; k < 3; k++) own[i][2 + k] = t->n[k];
+    own[i][5] = t->gap;
+    own[i][6] = t->to;
+  }
+  PetscCallMPI(MPI_Comm_size(comm, &ranks));
+  PetscCall(PetscMalloc2(ranks, &counts, ranks + 1, &first));
+  PetscCall(PetscMPIIntCast(7 * mine->n, &count));
+  PetscCallMPI(MPI_Allgather(&count, 1, MPI_INT, counts, 1, MPI_INT, comm));
+  first[0] = 0;
+  for (PetscMPIInt r = 0; r < ranks; r++) first[r + 1] = first[r] + counts[r];
+  *n = first[ranks] / 7;
+  PetscCall(PetscMalloc1(*n + 1, all));
+  PetscCallMPI(MPI_Allgatherv(own, count, MPIU_REAL, *all, counts, first, MPIU_REAL, comm));
+  qsort(*all, (size_t)*n, sizeof(**all), by_value);
+  PetscCall(PetscFree2(counts, first));
+  PetscCall(PetscFree(own));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/*
+  Motions of bodies after which what touches has the gaps it is to have, as far as prescribed components let them: each touch in turn moves both bodies of it
+  along its direction, again and again. None is longer than a few gaps; within those all that is near was told. way[nbody + 1][3], m; moved: there is something to do.
+*/
+static void find_ways(PetscInt n, PetscReal (*touch)[7], PetscInt nbody, const uint8_t fixed[],
+                      PetscReal way[], PetscBool *moved)
+{
+  PetscReal longest = 0., most = PETSC_MAX_REAL, scale;
+
+  *moved = PETSC_FALSE;
+  for (PetscInt k = 0; k < 3 * (nbody + 1); k++) way[k] = 0.;
+  for (PetscInt i = 0; i < n; i++) {
+    PetscBool mobile = PETSC_FALSE;
+
+    for (int k = 0; k < 6; k++)
+      mobile = (PetscBool)(mobile || (!(fixed[(PetscInt)touch[i][k / 3]] >> (k % 3) & 1) &&
+                                      PetscAbsReal(touch[i][2 + k % 3]) > MISSED));
+    *moved = (PetscBool)(*moved || (mobile && touch[i][5] < CLOSE * touch[i][6]));
+    most = PetscMin(most, FAR * touch[i][6]);
+  }
+  for (int sweep = 0; *moved && sweep < SWEEPS; sweep++) {
+    PetscReal worst = 0.;
+
+    for (PetscInt i = 0; i < n; i++) {
+      const PetscReal *t = touch[i], *direction = t + 2;
+      PetscReal gap = t[5], sum = 0.;
+
+      for (int k = 0; k < 6; k++) {
+        const PetscInt b = (PetscInt)t[k / 3];
+
+        gap += (k < 3 ? 1. : -1.) * direction[k % 3] * way[3 * b + k % 3];
+        if (!(fixed[b] >> (k % 3) & 1)) sum += PetscSqr(direction[k % 3]);
+      }
+      if (gap >= t[6] || sum < MISSED) continue;
+      worst = PetscMax(worst, (t[6] - gap) / t[6]);
+      for (int k = 0; k < 6; k++) {
+        const PetscInt b = (PetscInt)t[k / 3];
+
+        if (!(fixed[b] >> (k % 3) & 1))
+          way[3 * b + k % 3] += (k < 3 ? 1. : -1.) * (t[6] - gap) / sum * direction[k % 3];
+      }
+    }
+    if (worst < MISSED) break;
+  }
+
+  /* not too far at once */
+  for (PetscInt b = 0; b <= nbody; b++)
+    longest = PetscMax(longest, PetscSqrtReal(SbDot3(way + 3 * b, way + 3 * b)));
+  scale = longest > most ? most / longest : 1.;
+  for (PetscInt k = 0; k < 3 * (nbody + 1); k++) way[k] *= scale;
+}
+
+/*
+  Bodies that touch each other or an obstacle when a run begins are moved apart as they are, without strain, to where nothing pushes them in a dynamic run. What that
+  does not part, effects part by their vertices. u: local displacements, written.
+*/
+static PetscErrorCode move_apart(SbModel m, PetscReal t, PetscReal dt, PetscReal u[], PetscBool *moved)
+{
+  const SbSpace s = m->space;
+  const PetscInt nbody = s->mesh->nbody;
+  uint8_t *fixed;
+  PetscReal *way;
+  PetscBool go_on = PETSC_TRUE;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscCalloc2(nbody + 1, &fixed, 3 * (nbody + 1), &way));
+  for (int round = 0; go_on && round < ROUNDS; round++) {
+    SbTouches list = {0};
+    PetscReal(*touch)[7];
+    PetscInt n;
+
+    go_on = PETSC_FALSE;
+    for (PetscInt e = 0; e < m->npotential; e++) {
+      PetscBool first;
+
+      SbEffectCall(m->potential[e], touching, s, t, dt, u, &first, &list);
+      go_on = (PetscBool)(go_on || first);
+    }
+    if (!go_on) break;
+    if (!round) {
+      for (PetscInt i = 0; i < s->nnode_owned; i++) fixed[s->node_body[i]] |= s->fixed[i];
+      fixed[nbody] = 7;
+      PetscCallMPI(
+        MPI_Allreduce(MPI_IN_PLACE, fixed, (PetscMPIInt)(nbody + 1), MPI_UINT8_T, MPI_BOR, m->comm));
+    }
+    PetscCall(gather_touches(m->comm, &list, &n, &touch));
+    PetscCall(PetscFree(list.touch));
+    find_ways(n, touch, nbody, fixed, way, &go_on);
+    PetscCall(PetscFree(touch));
+    for (PetscInt i = 0; go_on && i < 3 * s->nnode; i++) u[i] += way[3 * s->node_body[i / 3] + i % 3];
+    *moved = (PetscBool)(*moved || go_on);
+  }
+  PetscCall(PetscFree2(fixed, way));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode SbModelGuardBegin(SbModel m, PetscReal t, PetscReal dt, Vec U0)
 {
   PetscReal *u;
@@ -14,6 +157,7 @@ PetscErrorCode SbModelGuardBegin(SbModel m, PetscReal t, PetscReal dt, Vec U0)
   PetscCall(VecDuplicate(U0, &local));
   PetscCall(VecCopy(U0, local));
   PetscCall(SbSpaceGetLocalRead(m->space, local, (const PetscReal **)&u));
+  PetscCall(move_apart(m, t, dt, u, &moved));
   for (PetscInt e = 0; e < m->npotential; e++) {
     PetscBool mine;
 

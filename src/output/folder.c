@@ -61,6 +61,15 @@ PetscErrorCode SbFolderMake(SbOutput out, size_t nmessage, char message[])
 
 #define LOCK ".supple_running"
 
+/* Lock file of this process, for runs that an error ends; empty: none. */
+static char locked[PETSC_MAX_PATH_LEN];
+
+static void remove_lock(void)
+{
+  if (locked[0]) (void)unlink(locked);
+  locked[0] = 0;
+}
+
 /* The lock file open and locked, or why not; rank 0. A file that its owner removed meanwhile is no lock. */
 static PetscErrorCode lock_folder(SbOutput out, size_t nmessage, char message[])
 {
@@ -90,6 +99,13 @@ static PetscErrorCode lock_folder(SbOutput out, size_t nmessage, char message[])
   (void)gethostname(host, sizeof(host) - 1);
   SbFormat(sizeof(text), text, "process %ld on %s since %s", (long)getpid(), host, out->started);
   if (!ftruncate(out->lock, 0)) (void)!write(out->lock, text, strlen(text));
+
+  /* an error ends the process where it stands, and would leave the file */
+  static PetscBool registered = PETSC_FALSE;
+
+  if (!registered) (void)atexit(remove_lock);
+  registered = PETSC_TRUE;
+  PetscCall(PetscStrncpy(locked, path, sizeof(locked)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -106,12 +122,9 @@ PetscErrorCode SbOutputLock(SbRun run)
 
 PetscErrorCode SbFolderUnlock(SbOutput out)
 {
-  char path[PETSC_MAX_PATH_LEN];
-
   PetscFunctionBeginUser;
   if (out->lock < 0) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(SbOutputPath(out, LOCK, sizeof(path), path));
-  (void)unlink(path);
+  remove_lock();
   (void)close(out->lock);
   out->lock = -1;
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -39,6 +39,7 @@
   1e-3 /* of the smallest body's size per second: a step of a time step that is short enough, where surfaces push each other */
 #define STICKING 1e-2       /* of that, with friction, whose forces follow from as small speeds */
 #define SETTLED_STATIC 1e-6 /* of that size: the same in a static run */
+#define SETTLED_GAP 1e-2    /* of the width below which surfaces push each other: how much the last step may change gaps */
 #define EARLY 10            /* iterations in which friction follows normal forces at once */
 #define SHIFT 0.1           /* of the shift by inertia: the least one of a tangent that is not definite */
 #define SHIFT_STIFF 1e-4    /* the same, of the mean stiffness by mass */
@@ -432,7 +433,7 @@ static PetscErrorCode converged(SNES snes, PetscReal s)
 {
   Newton *n = (Newton *)snes->data;
   const SbRun run = n->run;
-  PetscReal longest, size = PETSC_MAX_REAL,
+  PetscReal longest, size = PETSC_MAX_REAL, width = PETSC_MAX_REAL,
                      part = run->model->dynamic ? SETTLED * run->guard_dt : SETTLED_STATIC;
 
   PetscFunctionBeginUser;
@@ -452,6 +453,9 @@ static PetscErrorCode converged(SNES snes, PetscReal s)
       break;
     }
   }
+  for (PetscInt e = 0; e < run->model->npotential; e++)
+    width = PetscMin(width, run->model->potential[e]->width);
+  size = PetscMin(size, SETTLED_GAP * width / part);
   PetscCall(VecNorm(snes->vec_sol_update, NORM_INFINITY, &longest));
   PetscCall(PetscInfo(snes,
                       "iteration %" PetscInt_FMT ": the longest step is %g m, of %g m for the last one\n",
@@ -604,6 +608,9 @@ PetscErrorCode SbNewtonSetRun(SNES snes, SbRun run)
     for (PetscInt b = 0; b < m->nbody; b++)
       n->least += 4. * PETSC_MACHINE_EPSILON * m->material[b]->E * m->body[b].volume;
   }
+  PetscCheck(ours || !m->npotential, m->comm, PETSC_ERR_USER_INPUT,
+             "-snes_type %s does not keep surfaces apart: with contact of response barrier leave it out",
+             ((PetscObject)snes)->type_name);
   PetscCall(SbModelFilterTangent(m, (PetscBool)!ours));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -28,10 +28,11 @@ LONG_STEPS = ["-ksp_rtol", "0.9", "-snes_max_it", "100000", "-snes_rtol", "1e-12
 
 
 def start(ranks, folder, *more, rows=10):
-    """A run that has written so many rows."""
+    """A run that has written so many rows. Ctrl-C reaches it also where this test runs in the background, which ignores it."""
     (OUT / folder).mkdir(parents=True, exist_ok=True)
     with open(OUT / folder / "errors.txt", "w") as errors:
-        process = subprocess.Popen(command(ranks, folder, *SLOW, *more), stdout=subprocess.DEVNULL, stderr=errors)
+        process = subprocess.Popen(command(ranks, folder, *SLOW, *more), stdout=subprocess.DEVNULL, stderr=errors,
+                                   preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL))
     path = OUT / folder / "history.csv"
     while (not path.exists() or path.read_text().count("\n") < rows + 2) and process.poll() is None:
         time.sleep(0.02)
