@@ -153,6 +153,8 @@ void SbErrorPost(const char *format, ...) PETSC_ATTRIBUTE_FORMAT(1, 2);
 void SbErrorSetStopped(void);
 /* What one rank does when the run fails, before the error line: with PETSc as it was left, no communication. NULL: nothing. */
 void SbErrorSetFailureHandler(void (*failure_handler)(const char *message, void *ctx), void *ctx);
+/* What SbErrorFinish() calls first on this rank, with or without an error: files that must not stay. NULL: nothing. */
+void SbErrorAtEnd(void (*fn)(void));
 /*
   SbErrorFinish - last call of main() on every rank: `supple: error: ...` on stderr, once for the run; then MPI_Finalize(),
   or MPI_Abort() when other ranks do not arrive within a few seconds. Returns the exit code, non-zero on all ranks when

@@ -89,7 +89,7 @@ typedef struct {
   /*
     Guarded contact (-effect_NAME_response barrier), whose energy belongs to the potential that Newton's method lowers (src/time/newton.c). Collective.
 
-    touching      - before the first step of a run, from t to t + dt: adds what has a gap at the local displacements u that is too small, or not much larger, of this
+    touching      - a run begins at t, its first step has the length dt: adds what has a gap at the local displacements u that is too small, or not much larger, of this
                     rank. first: it was that step, alike on all ranks; else nothing was done.
     begin_guarded - a step from t to t + dt begins with the local displacements u0; when the run begins they may be changed (moved), ghosts too, where surfaces
                     touch. What moves by order is where it is at t: `progress` 0.

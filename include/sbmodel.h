@@ -117,9 +117,11 @@ PetscErrorCode SbModelContactPoints(SbModel model, PetscReal t, Vec U, Vec R, Sb
 /*
   Guarded contact, where model->npotential > 0; operations of the same names in sbeffect.h. Collective.
 
-  Begin: a step begins with U0, which is changed when the run begins with touching surfaces. Safe: part of the way from X to X - Y that can be gone, of all ranks, and
+  Start: a run begins with U, dt being the length of its first step; bodies that touch are moved apart whole. Begin: a step begins with U0, which is changed when the run begins
+  with surfaces that still touch. Safe: part of the way from X to X - Y that can be gone, of all ranks, and
   pairs that push each other now. Lag: X solves the step with the friction of before; again: it wants one more solve.
 */
+PetscErrorCode SbModelGuardStart(SbModel model, PetscReal t, PetscReal dt, Vec U);
 PetscErrorCode SbModelGuardBegin(SbModel model, PetscReal t, PetscReal dt, Vec U0);
 PetscErrorCode SbModelGuardAdvance(SbModel model, PetscReal progress);
 PetscErrorCode SbModelGuardSafe(SbModel model, Vec X, Vec Y, PetscReal progress, PetscReal *part,

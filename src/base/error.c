@@ -26,6 +26,7 @@ static struct {
   const char *program; /* begins every line */
   void (*failure_handler)(const char *message, void *ctx); /* called by the rank that speaks for the run */
   void *farewell_ctx;
+  void (*at_end)(void);
 } state = {.comm = MPI_COMM_NULL, .program = "supple", .code = 1};
 
 /* PETSc's functions that read options; their messages do not always name the option. */
@@ -172,6 +173,11 @@ void SbErrorSetFailureHandler(void (*failure_handler)(const char *message, void 
   state.farewell_ctx = ctx;
 }
 
+void SbErrorAtEnd(void (*fn)(void))
+{
+  state.at_end = fn;
+}
+
 /* What the run has to say, by one rank. */
 static void speak(void)
 {
@@ -194,6 +200,7 @@ int SbErrorFinish(PetscErrorCode ierr)
   MPI_Request request;
   double end;
 
+  if (state.at_end) (*state.at_end)();
   (void)MPI_Comm_rank(state.comm, &rank);
   (void)MPI_Comm_size(state.comm, &size);
   mine[SPEAKER] = -rank - (state.pending ? 0 : size) - (failed ? 0 : 2 * size);

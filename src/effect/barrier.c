@@ -28,7 +28,7 @@
 #define LAGS 100         /* solves of a load step with the friction of the one before */
 #define PARTINGS 20      /* solves of a load step in which things are parted */
 #define HALF 0.5         /* of what springs were to part: where they reach less, they get stiffer */
-#define APART 0.5        /* of w: how far surfaces that touch are moved apart at the start where bodies cannot move, and in static runs */
+#define APART 0.5        /* of w: gap at the start where bodies cannot move apart by w, and in static runs */
 #define NEARBY 5.        /* of w: gaps that bodies may come to when they are moved apart */
 #define PASSES 200       /* over all pairs for that */
 
@@ -185,8 +185,7 @@ static PetscErrorCode touching_barrier(SbEffect e, SbSpace s, PetscReal t, Petsc
   PetscCall(SbContactPairsFind(b->pairs, b->x, b->x));
   for (PetscInt i = 0; i < b->pairs->n; i++) {
     const SbContactPair *pair = &b->pairs->pair[i];
-    const PetscInt one = m->part[pair->v[0]],
-                   two = m->part[pair->v[pair->kind == SB_PAIR_EDGE_EDGE ? 2 : 1]];
+    const PetscInt one = m->part[pair->v[0]], two = m->part[pair->v[pair->kind == SB_PAIR_EDGE_EDGE ? 2 : 1]];
     SbTouch touch = {.body = {one, two}, .to = (e->dynamic ? 1. : APART) * width_of(b, pair)};
     SbDistance d;
 

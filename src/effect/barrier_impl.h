@@ -34,8 +34,8 @@ typedef struct {
   PetscErrorCode (*destroy)(SbEffect e);
   SbContactMesh mesh;
   SbContactPairs pairs;
-  PetscReal width, pressure; /* as given; 0: by body */
-  PetscReal *w, *k;          /* [nbody+1] of each body, m, Pa; the obstacle's: none smaller */
+  PetscReal width, pressure;       /* as given; 0: by body */
+  PetscReal *w, *k;                /* [nbody+1] of each body, m, Pa; the obstacle's: none smaller */
   PetscBool verify, begun, looked; /* the run has begun; what is in each other was looked for */
   PetscReal *x, *u;        /* [nvertex][3] places, m; [nnode_owned][3] displacement that they belong to */
   PetscReal *start;        /* [nvertex][3] when the step began */

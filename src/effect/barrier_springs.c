@@ -8,8 +8,8 @@
 */
 #include "barrier_impl.h"
 
-#define STIFF 10. /* in a static run, of the stiffness of the barrier: what springs push should arrive */
-#define SAME 1e-5 /* of the bodies' size: within this they are in the same place, and a gap is none */
+#define STIFF 10.     /* in a static run, of the stiffness of the barrier: what springs push should arrive */
+#define SAME 1e-5     /* of the bodies' size: within this they are in the same place, and a gap is none */
 #define ROUNDING 1e-9 /* of that size: what is no deeper touches, when a run begins */
 
 static PetscErrorCode add_spring(Barrier *b, const Spring *spring)

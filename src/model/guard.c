@@ -146,33 +146,59 @@ static PetscErrorCode move_apart(SbModel m, PetscReal t, PetscReal dt, PetscReal
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbModelGuardBegin(SbModel m, PetscReal t, PetscReal dt, Vec U0)
+/* A copy of U with ghosts that may be written; what was written goes back into U. */
+static PetscErrorCode open_state(SbModel m, Vec U, Vec *local, PetscReal **u)
 {
-  PetscReal *u;
+  PetscFunctionBeginUser;
+  PetscCall(VecDuplicate(U, local));
+  PetscCall(VecCopy(U, *local));
+  PetscCall(SbSpaceGetLocalRead(m->space, *local, (const PetscReal **)u));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode close_state(SbModel m, Vec U, PetscBool moved, Vec *local, PetscReal **u)
+{
+  PetscScalar *own;
+
+  PetscFunctionBeginUser;
+  if (moved) {
+    PetscCall(VecGetArray(U, &own));
+    PetscCall(PetscArraycpy(own, *u, 3 * m->space->nnode_owned));
+    PetscCall(VecRestoreArray(U, &own));
+  }
+  PetscCall(SbSpaceRestoreLocalRead(m->space, *local, (const PetscReal **)u));
+  PetscCall(VecDestroy(local));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbModelGuardStart(SbModel m, PetscReal t, PetscReal dt, Vec U)
+{
   PetscBool moved = PETSC_FALSE;
+  PetscReal *u;
   Vec local;
 
   PetscFunctionBeginUser;
-  /* a copy with ghosts that may be written */
-  PetscCall(VecDuplicate(U0, &local));
-  PetscCall(VecCopy(U0, local));
-  PetscCall(SbSpaceGetLocalRead(m->space, local, (const PetscReal **)&u));
+  PetscCall(open_state(m, U, &local, &u));
   PetscCall(move_apart(m, t, dt, u, &moved));
+  PetscCall(close_state(m, U, moved, &local, &u));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbModelGuardBegin(SbModel m, PetscReal t, PetscReal dt, Vec U0)
+{
+  PetscBool moved = PETSC_FALSE;
+  PetscReal *u;
+  Vec local;
+
+  PetscFunctionBeginUser;
+  PetscCall(open_state(m, U0, &local, &u));
   for (PetscInt e = 0; e < m->npotential; e++) {
     PetscBool mine;
 
     SbEffectCall(m->potential[e], begin_guarded, m->space, t, dt, u, &mine);
     moved = (PetscBool)(moved || mine);
   }
-  if (moved) {
-    PetscScalar *u0;
-
-    PetscCall(VecGetArray(U0, &u0));
-    PetscCall(PetscArraycpy(u0, u, 3 * m->space->nnode_owned));
-    PetscCall(VecRestoreArray(U0, &u0));
-  }
-  PetscCall(SbSpaceRestoreLocalRead(m->space, local, (const PetscReal **)&u));
-  PetscCall(VecDestroy(&local));
+  PetscCall(close_state(m, U0, moved, &local, &u));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -39,11 +39,12 @@
   1e-3 /* of the smallest body's size per second: a step of a time step that is short enough, where surfaces push each other */
 #define STICKING 1e-2       /* of that, with friction, whose forces follow from as small speeds */
 #define SETTLED_STATIC 1e-6 /* of that size: the same in a static run */
-#define SETTLED_GAP 1e-2    /* of the width below which surfaces push each other: how much the last step may change gaps */
-#define EARLY 10            /* iterations in which friction follows normal forces at once */
-#define SHIFT 0.1           /* of the shift by inertia: the least one of a tangent that is not definite */
-#define SHIFT_STIFF 1e-4    /* the same, of the mean stiffness by mass */
-#define SHIFTS 8            /* so often by SHIFT_MORE before cells are filtered */
+#define SETTLED_GAP \
+  1e-2 /* of the width below which surfaces push each other: how much the last step may change gaps */
+#define EARLY 10         /* iterations in which friction follows normal forces at once */
+#define SHIFT 0.1        /* of the shift by inertia: the least one of a tangent that is not definite */
+#define SHIFT_STIFF 1e-4 /* the same, of the mean stiffness by mass */
+#define SHIFTS 8         /* so often by SHIFT_MORE before cells are filtered */
 #define SHIFT_MORE 4.
 #define PROVISIONAL 1 /* steps that may follow each other while E is above where they began */
 

@@ -621,6 +621,7 @@ PetscErrorCode SbRunSolve(SbRun run)
   if (run->wall_start == 0.) run->wall_start = MPI_Wtime();
   run->paused = PETSC_FALSE;
   run->seen.U = NULL;
+  if (run->model->npotential) PetscCall(SbModelGuardStart(run->model, run->t0, run->dt, run->U));
   if (run->ts) {
     PetscCall(TSSetStepNumber(run->ts, run->step0));
     PetscCall(TSSetTime(run->ts, run->t0));

@@ -127,7 +127,7 @@ def main():
         sys.exit(f"no line within a long step: {text}")
 
     # a second Ctrl-C
-    process = start(1, "twice", *LONG_STEPS, "-stop_grace", "1000", "-body_bar_mesh", "box:0.4,0.1,0.1:40,10,10", rows=1)
+    process = start(1, "twice", *LONG_STEPS, "-stop_grace", "1000", "-body_bar_mesh", "box:0.4,0.1,0.1:80,20,20", rows=1)
     process.send_signal(signal.SIGINT)
     time.sleep(1)
     process.send_signal(signal.SIGINT)
