@@ -93,6 +93,7 @@ typedef struct {
                     rank. first: it was that step, alike on all ranks; else nothing was done.
     begin_guarded - a step from t to t + dt begins with the local displacements u0; when the run begins they may be changed (moved), ghosts too, where surfaces
                     touch. What moves by order is where it is at t: `progress` 0.
+    meet          - after begin_guarded, for effects with restitution: what bounces in the step, by the local displacements u0 and velocities v0 at its start.
     advance       - it is where its way from t to t + dt has the part `progress` behind it, 0..1. Not collective.
     safe          - `part` of the way from the local displacements u0 to u1, and from the present progress to `progress`, that can be gone, for the pairs of this
                     rank; nactive: pairs of this rank that push each other at u0.
@@ -106,6 +107,7 @@ typedef struct {
                              PetscBool *first, SbTouches *list);
   PetscErrorCode (*begin_guarded)(SbEffect e, SbSpace space, PetscReal t, PetscReal dt, PetscReal u0[],
                                   PetscBool *moved);
+  PetscErrorCode (*meet)(SbEffect e, SbSpace space, PetscReal dt, const PetscReal u0[], const PetscReal v0[]);
   PetscErrorCode (*advance)(SbEffect e, PetscReal progress);
   PetscErrorCode (*safe)(SbEffect e, SbSpace space, const PetscReal u0[], const PetscReal u1[],
                          PetscReal progress, PetscReal *part, PetscInt *nactive);

@@ -119,16 +119,16 @@ PetscErrorCode SbModelContactPoints(SbModel model, PetscReal t, Vec U, Vec R, Sb
 
   Start: a run begins with U, dt being the length of its first step; bodies that touch are moved apart whole. Begin: a step begins with U0, which is changed when the run begins
   with surfaces that still touch. Safe: part of the way from X to X - Y that can be gone, of all ranks, and
-  pairs that push each other now. Lag: X solves the step with the friction of before; again: it wants one more solve.
+  pairs that push each other now. Lag: X is an iterate of the step, or (solved) its solution, with the friction of before and what bounces; again: it wants more of them. V0: velocities when the step begins, NULL without.
 */
 PetscErrorCode SbModelGuardStart(SbModel model, PetscReal t, PetscReal dt, Vec U);
-PetscErrorCode SbModelGuardBegin(SbModel model, PetscReal t, PetscReal dt, Vec U0);
+PetscErrorCode SbModelGuardBegin(SbModel model, PetscReal t, PetscReal dt, Vec U0, Vec V0);
 PetscErrorCode SbModelGuardAdvance(SbModel model, PetscReal progress);
 PetscErrorCode SbModelGuardSafe(SbModel model, Vec X, Vec Y, PetscReal progress, PetscReal *part,
                                 PetscInt *nactive);
 /* What was nearest to each other in the last attempt at a step, in words, for who says why it failed. */
 PetscErrorCode SbModelGuardNearest(SbModel model, size_t size, char text[]);
-PetscErrorCode SbModelGuardLag(SbModel model, Vec X, PetscBool *again);
+PetscErrorCode SbModelGuardLag(SbModel model, Vec X, PetscBool solved, PetscBool *again);
 /* Of the last accepted step: what contact did to the bodies, J, and its forces taken out of those of SbModelLoads() at U, F, N. */
 PetscErrorCode SbModelGuardWork(SbModel model, Vec U, PetscReal *work, Vec F);
 /* F += scale times the gradient of the energy at U, N; free_only: not at prescribed unknowns. energy of all ranks, J (NULL: not wanted). */

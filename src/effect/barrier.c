@@ -343,7 +343,7 @@ static PetscErrorCode begin_barrier(SbEffect e, SbSpace s, PetscReal t, PetscRea
   *moved = PETSC_FALSE;
   find_path(b, t, dt);
   b->progress = 0.;
-  b->nrub = b->nspring = 0;
+  b->nrub = b->nspring = b->nbounce = 0;
   if (!b->begun) PetscCall(SbContactMeshMarkDriven(m));
   if (!b->begun || b->overlapping || b->parted) {
     PetscCall(SbContactMeshMove(m, u0, NULL, b->x));
@@ -450,6 +450,7 @@ static PetscErrorCode accept_barrier(SbEffect e, SbSpace s, const SbStage *stage
     const PetscReal way = SbBarrierSpringPlace(b, spring) - spring->start;
 
     if (m->own[spring->v[0]]) pushed += SbBarrierSpring(b, spring, push) * way;
+    if (i >= b->nspring - b->nbounce) continue;
     gained += PetscMin(way, spring->goal - spring->start);
     asked += spring->goal - spring->start;
   }
@@ -569,6 +570,7 @@ PetscErrorCode SbBarrierCreate(SbEffect e, const SbScope *scope, const SbBarrier
   PetscFunctionBeginUser;
   PetscCall(PetscNew(&b));
   b->scene = *scene;
+  b->bounce.e = scene->restitution;
   b->data = e->data;
   b->destroy = e->ops.destroy;
   PetscCall(SbOptionReal(scope, "barrier_width", &b->width));
@@ -579,28 +581,32 @@ PetscErrorCode SbBarrierCreate(SbEffect e, const SbScope *scope, const SbBarrier
   PetscCall(SbOptionReal(scope, "separation_steps", &steps));
   SbOverlapSet(&b->parting, steps);
   e->data = b;
-  e->ops = (SbEffectOps){.setfromoptions = e->ops.setfromoptions,
-                         .setup = setup_barrier,
-                         .force = SbEffectForce_Barrier,
-                         .touching = touching_barrier,
-                         .begin_guarded = begin_barrier,
-                         .safe = safe_barrier,
-                         .advance = advance_barrier,
-                         .lag = lag_barrier,
-                         .nearest = SbEffectNearest_Barrier,
-                         .potential = SbEffectPotential_Barrier,
-                         .hessian = SbEffectHessian_Barrier,
-                         .accept = accept_barrier,
-                         .work = work_barrier,
-                         .save = save_barrier,
-                         .load = load_barrier,
-                         .rename = rename_barrier,
-                         .contact_force = SbEffectContactForce_Barrier,
-                         .gap = SbEffectGap_Barrier,
-                         .contact_points = SbEffectContactPoints_Barrier,
-                         .history = SbEffectHistory_Barrier,
-                         .summary = SbEffectSummary_Barrier,
-                         .destroy = destroy_barrier};
+  e->ops =
+    (SbEffectOps){.setfromoptions = e->ops.setfromoptions,
+                  .setup = setup_barrier,
+                  .force = SbEffectForce_Barrier,
+                  .touching = touching_barrier,
+                  .begin_guarded = begin_barrier,
+                  .safe = safe_barrier,
+                  .advance = advance_barrier,
+                  .lag = lag_barrier,
+                  .nearest = SbEffectNearest_Barrier,
+                  .meet = scene->restitution > 0. ? SbEffectMeet_Barrier : NULL,
+                  .restitution = scene->restitution > 0. ? SbEffectRestitution_Barrier : NULL,
+                  .scale_restitution = scene->restitution > 0. ? SbEffectScaleRestitution_Barrier : NULL,
+                  .potential = SbEffectPotential_Barrier,
+                  .hessian = SbEffectHessian_Barrier,
+                  .accept = accept_barrier,
+                  .work = work_barrier,
+                  .save = save_barrier,
+                  .load = load_barrier,
+                  .rename = rename_barrier,
+                  .contact_force = SbEffectContactForce_Barrier,
+                  .gap = SbEffectGap_Barrier,
+                  .contact_points = SbEffectContactPoints_Barrier,
+                  .history = SbEffectHistory_Barrier,
+                  .summary = SbEffectSummary_Barrier,
+                  .destroy = destroy_barrier};
   e->linear = e->steady = PETSC_FALSE;
   e->saddle = PETSC_FALSE;
   e->springs = (PetscBool)(scene->friction > 0.);

@@ -29,7 +29,7 @@ typedef struct {
   void (*pose)(const void *data, PetscReal t, SbPose *pose); /* of the obstacle */
   PetscReal centre[3]; /* about which torques are, with the obstacle, m */
   PetscBool self;
-  PetscReal friction;
+  PetscReal friction, restitution;
   PetscBool pairs; /* columns for each pair of bodies */
   PetscErrorCode (*setup_obstacle)(SbEffect e, SbSpace space, void *data);
 } SbBarrierScene;

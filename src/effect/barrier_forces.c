@@ -236,7 +236,7 @@ PetscErrorCode SbEffectHessian_Barrier(SbEffect e, SbSpace s, const PetscReal u[
   for (PetscInt i = 0; i < b->nspring; i++) {
     const Spring *spring = &b->spring[i];
 
-    if (SbBarrierSpringPlace(b, spring) >= spring->goal) continue;
+    if (!spring->held && SbBarrierSpringPlace(b, spring) >= spring->goal) continue;
     for (PetscInt k = 0; k < spring->n * spring->n; k++) {
       const PetscInt p = k / spring->n, q = k % spring->n, v = spring->v[p], w = spring->v[q];
       PetscReal B[9];

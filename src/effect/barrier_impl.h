@@ -4,6 +4,7 @@
 #pragma once
 #include "barrier.h"
 #include "overlap.h"
+#include "rebound.h"
 
 /* A pair below its width, at the places that the effect knows. */
 typedef struct {
@@ -26,6 +27,8 @@ typedef struct {
   PetscReal weight[5], normal[3];
   PetscReal goal, stiffness; /* of normal . sum weight x, m; N/m */
   PetscReal start, depth;    /* that sum and the overlap when the step began, m */
+  PetscBool held;            /* it may pull, too: it pushed when its goal was changed */
+  PetscReal arrives;         /* speed of approach of what bounces, m/s */
 } Spring;
 
 typedef struct {
@@ -61,8 +64,10 @@ typedef struct {
   SbContactOverlap overlap;
   SbOverlap parting;
   PetscReal stiffer;             /* of springs, by what they reached in the last steps */
-  PetscInt nspring, spring_size; /* all of them on every rank */
+  PetscInt nspring, spring_size; /* those of overlap on every rank, */
+  PetscInt nbounce;              /* then these, of pairs of this rank, that bounce */
   Spring *spring;
+  SbRestitution bounce;
   PetscReal least, shortest; /* smallest gap and shortest safe part of the run */
   PetscInt most;             /* pairs */
   SbPairs columns;
@@ -125,7 +130,8 @@ static inline PetscReal SbBarrierSpringPlace(const Barrier *b, const Spring *spr
 /* Its force, N, and the gradient of its energy by its vertices, N. */
 static inline PetscReal SbBarrierSpring(const Barrier *b, const Spring *spring, PetscReal gradient[15])
 {
-  const PetscReal force = PetscMax(0., spring->stiffness * (spring->goal - SbBarrierSpringPlace(b, spring)));
+  const PetscReal all = spring->stiffness * (spring->goal - SbBarrierSpringPlace(b, spring)),
+                  force = spring->held ? all : PetscMax(0., all);
 
   for (int k = 0; k < 15; k++) gradient[k] = -force * spring->weight[k / 3] * spring->normal[k % 3];
   return force;
@@ -136,7 +142,14 @@ PetscReal SbBarrierGradient(const Barrier *b, PetscReal sign, PetscReal f[]);
 /* Places of the obstacle's vertices after the part `progress` of its way, into x[nvertex][3]. */
 void SbBarrierPlaceObstacle(const Barrier *b, PetscReal progress, PetscReal x[]);
 
+/* Appends a spring of this step. Not collective. */
+PetscErrorCode SbBarrierAddSpring(Barrier *b, const Spring *spring);
+
 /* Operations of the effect (sbeffect.h). */
+PetscErrorCode SbEffectMeet_Barrier(SbEffect e, SbSpace s, PetscReal dt, const PetscReal u0[],
+                                    const PetscReal v0[]);
+PetscErrorCode SbEffectRestitution_Barrier(SbEffect e, PetscReal *work);
+PetscErrorCode SbEffectScaleRestitution_Barrier(SbEffect e, PetscReal share);
 PetscErrorCode SbEffectForce_Barrier(SbEffect e, SbSpace s, const SbStage *stage, PetscReal f[]);
 PetscErrorCode SbEffectPotential_Barrier(SbEffect e, SbSpace s, const PetscReal u[], PetscReal *energy,
                                          PetscReal f[]);

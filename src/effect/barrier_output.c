@@ -217,7 +217,8 @@ PetscErrorCode SbEffectContactPoints_Barrier(SbEffect e, SbSpace s, const SbStag
     force = SbBarrierSpring(b, spring, push);
     p.body[0] = first;
     p.body[1] = second == s->mesh->nbody ? -1 : second;
-    p.gap = SbBarrierSpringPlace(b, spring) - spring->start - spring->depth;
+    p.gap = SbBarrierSpringPlace(b, spring);
+    if (i < b->nspring - b->nbounce) p.gap -= spring->start + spring->depth;
     for (PetscInt k = 0; k < spring->n && spring->weight[k] > 0.; k++) {
       sum += spring->weight[k];
       for (int j = 0; j < 3; j++) p.x[j] += spring->weight[k] * b->x[3 * spring->v[k] + j];

@@ -12,7 +12,7 @@
 #define SAME 1e-5     /* of the bodies' size: within this they are in the same place, and a gap is none */
 #define ROUNDING 1e-9 /* of that size: what is no deeper touches, when a run begins */
 
-static PetscErrorCode add_spring(Barrier *b, const Spring *spring)
+PetscErrorCode SbBarrierAddSpring(Barrier *b, const Spring *spring)
 {
   PetscFunctionBeginUser;
   if (b->nspring == b->spring_size) {
@@ -148,7 +148,7 @@ PetscErrorCode SbBarrierPart(SbEffect e, SbSpace s, PetscReal dt, PetscBool firs
     spring.start = SbBarrierSpringPlace(b, &spring);
     spring.goal =
       spring.start + (e->dynamic ? PetscMin(all, PetscMax(w, all * (1. - b->parting.left))) : all);
-    PetscCall(add_spring(b, &spring));
+    PetscCall(SbBarrierAddSpring(b, &spring));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }

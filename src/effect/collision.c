@@ -39,7 +39,7 @@ PetscErrorCode SbContactOptions_Collision(SbEffect e, const SbScope *scope, cons
   c->response = o->response;
   c->friction = o->friction;
   if (c->response == BARRIER) {
-    SbBarrierScene scene = {.on = &c->on, .self = c->self, .friction = c->friction.mu};
+    SbBarrierScene scene = {.on = &c->on, .self = c->self, .friction = c->friction.mu, .restitution = o->restitution};
 
     PetscCall(SbOptionBool(scope, "pairs", &scene.pairs));
     PetscCall(SbBarrierCreate(e, scope, &scene));

@@ -56,7 +56,7 @@ static const SbOption rows[] = {
    "what is behind and never pulls"},
   {"restitution", SB_OPTION_REAL, 1, "", "0", "[0, 1]",
    "part of their relative speed with which surfaces leave what they hit; needs -time euler_implicit, and "
-   "bodies that are stiff within a step to bounce as a whole; projected and multiplier"},
+   "bodies that are stiff within a step to bounce as a whole; projected, multiplier and barrier"},
   {"time_of_impact", SB_OPTION_CHOICE, 1, "", "no", "no|yes",
    "a step in which points begin to touch is taken as it is, or repeated up to the moment of the first "
    "touch; not with barrier"},
@@ -174,6 +174,7 @@ static PetscErrorCode read_common(SbEffect e, const SbScope *scope, SbContactOpt
   PetscFunctionBeginUser;
   PetscCall(SbOptionReal(scope, "friction", &o->friction.mu));
   o->friction.mu_kinetic = o->friction.mu;
+  PetscCall(SbOptionReal(scope, "restitution", &o->restitution));
   if (o->response == BARRIER) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(SbOptionReal(scope, "friction_kinetic", &o->friction.mu_kinetic));
   if (o->friction.mu_kinetic < 0) o->friction.mu_kinetic = o->friction.mu;
@@ -189,9 +190,8 @@ static PetscErrorCode read_common(SbEffect e, const SbScope *scope, SbContactOpt
   PetscCheck(o->damping <= 0 || o->response == PENALTY, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
              "-effect_%s_damping %g s is for springs that give: it needs -effect_%s_response penalty",
              e->name, (double)o->damping, e->name);
-  PetscCall(SbOptionReal(scope, "restitution", &o->restitution));
   PetscCheck(o->restitution <= 0 || SbResponseIsExact(o->response), PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
-             "-effect_%s_restitution %g needs -effect_%s_response projected or multiplier", e->name,
+             "-effect_%s_restitution %g needs -effect_%s_response projected, multiplier or barrier", e->name,
              (double)o->restitution, e->name);
   PetscCheck(o->restitution <= 0 || !o->cut, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
              "-effect_%s_restitution %g and -effect_%s_time_of_impact yes do not go together: what is let go "

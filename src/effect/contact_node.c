@@ -85,13 +85,14 @@ static void pose_of(const void *data, PetscReal t, SbPose *pose)
 }
 
 /* With the response `barrier` another file does the work. */
-static PetscErrorCode create_barrier(SbEffect e, const SbScope *scope)
+static PetscErrorCode create_barrier(SbEffect e, const SbScope *scope, PetscReal restitution)
 {
   Contact *c = (Contact *)e->data;
   SbBarrierScene scene = {.on = &c->on,
                           .obstacle = c->obstacle,
                           .pose = pose_of,
                           .friction = c->friction.mu,
+                          .restitution = restitution,
                           .setup_obstacle = setup_obstacle};
 
   PetscFunctionBeginUser;
@@ -111,7 +112,7 @@ PetscErrorCode SbContactOptions_Node(SbEffect e, const SbScope *scope, const SbC
   c->response = o->response;
   c->friction = o->friction;
   if (c->response == BARRIER) {
-    PetscCall(create_barrier(e, scope));
+    PetscCall(create_barrier(e, scope, o->restitution));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   c->cut = o->cut;

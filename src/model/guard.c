@@ -1,7 +1,7 @@
 /*
   Guarded contact as Newton's method sees it: all effects that have it together.
 */
-#include "sbmodel.h"
+#include "model_impl.h"
 
 #define ROUNDS 20   /* of motions of bodies that touch */
 #define SWEEPS 1000 /* over what touches, in each */
@@ -184,7 +184,7 @@ PetscErrorCode SbModelGuardStart(SbModel m, PetscReal t, PetscReal dt, Vec U)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbModelGuardBegin(SbModel m, PetscReal t, PetscReal dt, Vec U0)
+PetscErrorCode SbModelGuardBegin(SbModel m, PetscReal t, PetscReal dt, Vec U0, Vec V0)
 {
   PetscBool moved = PETSC_FALSE;
   PetscReal *u;
@@ -199,6 +199,20 @@ PetscErrorCode SbModelGuardBegin(SbModel m, PetscReal t, PetscReal dt, Vec U0)
     moved = (PetscBool)(moved || mine);
   }
   PetscCall(close_state(m, U0, moved, &local, &u));
+
+  /* what bounces in this step */
+  if (m->nrestitution && V0) {
+    const PetscReal *u0, *v0;
+
+    PetscCall(SbModelRestitutionBegin(m, dt, U0, V0));
+    PetscCall(SbSpaceGetLocalRead(m->space, U0, &u0));
+    PetscCall(SbSpaceGetLocalRead(m->space, V0, &v0));
+    for (PetscInt e = 0; e < m->npotential; e++) {
+      if (m->potential[e]->ops.meet) SbEffectCall(m->potential[e], meet, m->space, dt, u0, v0);
+    }
+    PetscCall(SbSpaceRestoreLocalRead(m->space, V0, &v0));
+    PetscCall(SbSpaceRestoreLocalRead(m->space, U0, &u0));
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -256,7 +270,7 @@ PetscErrorCode SbModelGuardNearest(SbModel m, size_t size, char text[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbModelGuardLag(SbModel m, Vec X, PetscBool *again)
+PetscErrorCode SbModelGuardLag(SbModel m, Vec X, PetscBool solved, PetscBool *again)
 {
   const PetscReal *u;
 
@@ -270,6 +284,7 @@ PetscErrorCode SbModelGuardLag(SbModel m, Vec X, PetscBool *again)
     *again = (PetscBool)(*again || mine);
   }
   PetscCall(SbSpaceRestoreLocalRead(m->space, X, &u));
+  if (m->nrestitution && solved && !*again) PetscCall(SbModelRestitutionUpdate(m, X, again));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -524,7 +524,7 @@ static PetscErrorCode SNESSolve_Newton(SNES snes)
     if (guarded && (snes->reason > 0 || (!snes->reason && snes->iter <= EARLY))) {
       PetscBool again;
 
-      PetscCall(SbModelGuardLag(n->run->model, X, &again));
+      PetscCall(SbModelGuardLag(n->run->model, X, (PetscBool)(snes->reason > 0), &again));
       if (!again) continue;
       snes->reason = SNES_CONVERGED_ITERATING;
       first = snes->iter;

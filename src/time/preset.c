@@ -470,6 +470,11 @@ static PetscErrorCode check_guarded(SbRun run)
                !m->space->consistent_mass,
              m->comm, PETSC_ERR_USER_INPUT,
              "-effect_%s_response barrier with -time newmark or genalpha needs -mass lumped", name);
+  for (PetscInt e = 0; e < m->npotential; e++)
+    PetscCheck(!m->potential[e]->euler || run->preset == SB_TIME_EULER_IMPLICIT, m->comm,
+               PETSC_ERR_USER_INPUT,
+               "-effect_%s_restitution needs -time euler_implicit, whose velocities are those of a step",
+               m->potential[e]->name);
   PetscCheck(!m->nbegin_step, m->comm, PETSC_ERR_USER_INPUT,
              "-effect_%s_response barrier and -effect_%s_response of another kind do not go together: give "
              "both the same",

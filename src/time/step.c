@@ -30,7 +30,7 @@ PetscErrorCode SbRunAttempt(SbRun run, const SbAttempt *a, PetscBool *ok)
 
     /* guarded contact begins where the step does */
     if (run->model->npotential) {
-      PetscCall(SbModelGuardBegin(run->model, a->t, a->dt, a->U0));
+      PetscCall(SbModelGuardBegin(run->model, a->t, a->dt, a->U0, run->V));
       run->guard_start = a->U0;
       run->guard_dt = a->dt;
     }

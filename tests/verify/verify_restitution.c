@@ -96,7 +96,7 @@ static PetscErrorCode check_oblique(const char *response, PetscReal friction, Pe
   PetscCall(record_run(
     &r,
     TIGHT STIFF("a", "box:0.1,0.1,0.1:2") STIFF(
-      "b", "box:0.1,0.08,0.1:3") "-bodies a,b -body_b_translate 0.11,0.03,0.02 -body_b_rotate 1,2,3,20 "
+      "b", "box:0.1,0.08,0.1:3") "-bodies a,b -body_b_translate 0.13,0.03,0.02 -body_b_rotate 1,2,3,20 "
                                  "-body_a_velocity 0.8,0,0 -body_b_velocity -1,0.2,0 -effects meet " MEET
                                  "-effect_meet_response %s -effect_meet_friction %g -ts_dt 0.001 "
                                  "-ts_max_time 0.05",
@@ -179,10 +179,18 @@ int main(int argc, char **argv)
   PetscCall(check_pair("blocks, multiplier",
                        "-body_b_mesh box:0.1,0.1,0.1:3 -body_b_density 5000 -effect_meet_response multiplier",
                        0.6));
+  PetscCall(check_pair("blocks, barrier",
+                       "-body_b_mesh box:0.1,0.1,0.1:3 -body_b_density 5000 -effect_meet_response barrier",
+                       0.6));
+  PetscCall(check_pair(
+    "blocks, barrier, CR",
+    "-body_b_density 3000 -body_a_element cr -body_b_element cr -effect_meet_response barrier", 0.3));
+  PetscCall(check_pair("blocks, barrier, e = 1", "-effect_meet_response barrier", 1));
   PetscCall(check_pair("blocks, one side", "-body_b_density 5000 -effect_meet_passes one", 1));
   PetscCall(check_pair("blocks, CR", "-body_b_density 3000 -body_a_element cr -body_b_element cr", 0.3));
   PetscCall(check_balls());
   PetscCall(check_tower());
+  PetscCall(check_oblique("barrier", 0, 1));
   PetscCall(check_oblique("projected", 0, 1));
   PetscCall(check_oblique("projected", 0.3, 0.7));
   if (size > 1) SB_TEST_END(); /* many solves of small systems: on one rank only */
