@@ -50,17 +50,54 @@ static PetscErrorCode gather_touches(MPI_Comm comm, const SbTouches *mine, Petsc
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* How far the sides of a touch are apart after the motions of both bodies, m. */
+static PetscReal gap_after(const PetscReal touch[7], const PetscReal way[])
+{
+  const PetscReal *one = way + 3 * (PetscInt)touch[0], *two = way + 3 * (PetscInt)touch[1];
+
+  return touch[5] + SbDot3(touch + 2, one) - SbDot3(touch + 2, two);
+}
+
+/* Each touch in turn moves both of its bodies along its direction, again and again, but for fixed components: way[nbody + 1][3], m. */
+static void sweep_touches(PetscInt n, PetscReal (*touch)[7], PetscInt nbody, const uint8_t fixed[],
+                          PetscReal way[])
+{
+  PetscReal worst = 1.;
+
+  for (PetscInt k = 0; k < 3 * (nbody + 1); k++) way[k] = 0.;
+  for (int sweep = 0; sweep < SWEEPS && worst > MISSED; sweep++) {
+    worst = 0.;
+    for (PetscInt i = 0; i < n; i++) {
+      const PetscReal *direction = touch[i] + 2, missing = touch[i][6] - gap_after(touch[i], way);
+      PetscReal sum = 0.;
+
+      for (int k = 0; k < 6; k++) {
+        if (!(fixed[(PetscInt)touch[i][k / 3]] >> (k % 3) & 1)) sum += PetscSqr(direction[k % 3]);
+      }
+      if (missing <= 0. || sum < MISSED) continue;
+      worst = PetscMax(worst, missing / touch[i][6]);
+      for (int k = 0; k < 6; k++) {
+        const PetscInt b = (PetscInt)touch[i][k / 3];
+
+        if (!(fixed[b] >> (k % 3) & 1))
+          way[3 * b + k % 3] += (k < 3 ? 1. : -1.) * missing / sum * direction[k % 3];
+      }
+    }
+  }
+}
+
 /*
-  Motions of bodies after which what touches has the gaps it is to have, as far as prescribed components let them: each touch in turn moves both bodies of it
-  along its direction, again and again. None is longer than a few gaps; within those all that is near was told. way[nbody + 1][3], m; moved: there is something to do.
+  Motions of bodies after which what touches has the gaps it is to have, as far as prescribed components let them. Bodies between others that leave no room for that
+  stay. None is longer than a few gaps; within those all that is near was told. fixed[nbody + 1]: bit c, the component is prescribed or, from now on, stays;
+  way[nbody + 1][3], m; moved: there is something to do.
 */
-static void find_ways(PetscInt n, PetscReal (*touch)[7], PetscInt nbody, const uint8_t fixed[],
-                      PetscReal way[], PetscBool *moved)
+static void find_ways(PetscInt n, PetscReal (*touch)[7], PetscInt nbody, uint8_t fixed[], PetscReal way[],
+                      PetscBool *moved)
 {
   PetscReal longest = 0., most = PETSC_MAX_REAL, scale;
+  PetscBool again = PETSC_FALSE;
 
   *moved = PETSC_FALSE;
-  for (PetscInt k = 0; k < 3 * (nbody + 1); k++) way[k] = 0.;
   for (PetscInt i = 0; i < n; i++) {
     PetscBool mobile = PETSC_FALSE;
 
@@ -70,34 +107,28 @@ static void find_ways(PetscInt n, PetscReal (*touch)[7], PetscInt nbody, const u
     *moved = (PetscBool)(*moved || (mobile && touch[i][5] < CLOSE * touch[i][6]));
     most = PetscMin(most, FAR * touch[i][6]);
   }
-  for (int sweep = 0; *moved && sweep < SWEEPS; sweep++) {
-    PetscReal worst = 0.;
+  if (!*moved) return;
 
+  /* nothing may come nearer than it was: bodies for which it would have no room */
+  do {
+    again = PETSC_FALSE;
+    sweep_touches(n, touch, nbody, fixed, way);
     for (PetscInt i = 0; i < n; i++) {
-      const PetscReal *t = touch[i], *direction = t + 2;
-      PetscReal gap = t[5], sum = 0.;
+      if (gap_after(touch[i], way) >= PetscMin(touch[i][5], touch[i][6]) - MISSED * touch[i][6]) continue;
+      for (int k = 0; k < 2; k++) {
+        const PetscInt b = (PetscInt)touch[i][k];
 
-      for (int k = 0; k < 6; k++) {
-        const PetscInt b = (PetscInt)t[k / 3];
-
-        gap += (k < 3 ? 1. : -1.) * direction[k % 3] * way[3 * b + k % 3];
-        if (!(fixed[b] >> (k % 3) & 1)) sum += PetscSqr(direction[k % 3]);
-      }
-      if (gap >= t[6] || sum < MISSED) continue;
-      worst = PetscMax(worst, (t[6] - gap) / t[6]);
-      for (int k = 0; k < 6; k++) {
-        const PetscInt b = (PetscInt)t[k / 3];
-
-        if (!(fixed[b] >> (k % 3) & 1))
-          way[3 * b + k % 3] += (k < 3 ? 1. : -1.) * (t[6] - gap) / sum * direction[k % 3];
+        again = (PetscBool)(again || fixed[b] != 7);
+        fixed[b] = 7;
       }
     }
-    if (worst < MISSED) break;
-  }
+  } while (again);
 
   /* not too far at once */
+  *moved = PETSC_FALSE;
   for (PetscInt b = 0; b <= nbody; b++)
     longest = PetscMax(longest, PetscSqrtReal(SbDot3(way + 3 * b, way + 3 * b)));
+  *moved = (PetscBool)(longest > MISSED * most);
   scale = longest > most ? most / longest : 1.;
   for (PetscInt k = 0; k < 3 * (nbody + 1); k++) way[k] *= scale;
 }
@@ -119,7 +150,7 @@ static PetscErrorCode move_apart(SbModel m, PetscReal t, PetscReal dt, PetscReal
   for (int round = 0; go_on && round < ROUNDS; round++) {
     SbTouches list = {0};
     PetscReal(*touch)[7];
-    PetscInt n;
+    PetscInt n = 0;
 
     go_on = PETSC_FALSE;
     for (PetscInt e = 0; e < m->npotential; e++) {
