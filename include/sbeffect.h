@@ -98,7 +98,7 @@ typedef struct {
     safe          - `part` of the way from the local displacements u0 to u1, and from the present progress to `progress`, that can be gone, for the pairs of this
                     rank; nactive: pairs of this rank that push each other at u0.
     nearest       - the smallest gap of the places that were examined last, m, and what is there, in words; PETSC_MAX_REAL and "" without one.
-    lag           - a solve of the step ended at the local displacements u: friction, whose normal forces and directions are those of before, may take those of u;
+    lag           - a solve of the step ended (solved), or is, at the local displacements u: friction, whose normal forces and directions are those of before, may take those of u;
                     again: it did, and the step wants one more solve.
     potential     - energy at the local displacements u, this rank's part, J; f[nnode][3] += its gradient on owned nodes, N.
     hessian       - adds the blocks of its second derivative at u, or of what stands for it (SbContactHessian).
@@ -112,7 +112,7 @@ typedef struct {
   PetscErrorCode (*safe)(SbEffect e, SbSpace space, const PetscReal u0[], const PetscReal u1[],
                          PetscReal progress, PetscReal *part, PetscInt *nactive);
   PetscErrorCode (*nearest)(SbEffect e, SbSpace space, PetscReal *gap, size_t size, char text[]);
-  PetscErrorCode (*lag)(SbEffect e, SbSpace space, const PetscReal u[], PetscBool *again);
+  PetscErrorCode (*lag)(SbEffect e, SbSpace space, const PetscReal u[], PetscBool solved, PetscBool *again);
   PetscErrorCode (*potential)(SbEffect e, SbSpace space, const PetscReal u[], PetscReal *energy,
                               PetscReal f[]);
   PetscErrorCode (*hessian)(SbEffect e, SbSpace space, const PetscReal u[], SbContactHessian kind,

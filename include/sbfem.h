@@ -222,10 +222,6 @@ PetscErrorCode SbSpaceAddConstraintReactions(SbSpace space, Vec R);
 PetscBool SbSpaceIsConstraintRedundant(SbSpace space, PetscInt constraint);
 /* What SbSpaceComputeConstraintForces() found: force (N, positive: it raises the sum) and sum_k coef_k . u_k (m). Not collective. */
 void SbSpaceGetConstraint(SbSpace space, PetscInt constraint, PetscReal *force, PetscReal *sum);
-/* Of the first n nodes of a constraint: the sum of its coefficients, and force += what it pushes them with, N, as SbSpaceComputeConstraintForces() has found
-   it. Not collective. */
-void SbSpaceGetConstraintForce(SbSpace space, PetscInt constraint, PetscInt n, PetscReal direction[3],
-                               PetscReal force[3]);
 /* F += what all constraints exert at the displacement U, as SbSpaceComputeConstraintForces() has found it. Collective. */
 PetscErrorCode SbSpaceAddConstraintForces(SbSpace space, Vec U, Vec F);
 /* U <- nearest displacement on which the exact constraints hold. Collective. */

@@ -92,27 +92,6 @@ SbTriangleFeature SbTriangleClosestPoint(const PetscReal p[3], const PetscReal *
                                          PetscReal weight[3], PetscReal *d2);
 
 /*
-  SbCCDPointTriangle - whether a point goes through a triangle from its front to its back and stays behind it.
-
-  Not collective. Point and corners move on straight lines. Input: p0[3], p1[3], point at the start and end of the step; x0[k][3], x1[k][3],
-  corners, m; slack, a start behind the triangle by no more than this is in front of it; rest, an end behind it by no more than this does not count, m.
-  Output: time, of the step, in [0, 1]; behind, the start was behind it.
-*/
-PetscBool SbCCDPointTriangle(const PetscReal p0[3], const PetscReal p1[3], const PetscReal *const x0[3],
-                             const PetscReal *const x1[3], const PetscReal tolerance[2], PetscReal *time,
-                             PetscBool *behind);
-
-/*
-  SbCCDEdgeEdge - whether an edge goes through another one from its front to its back and stays behind it.
-
-  Not collective. In front is where (e[0] - f[0]) . (e x f) is positive, e and f from the first to the second end; with the ends of
-  one edge exchanged it is the other side. Input: ends at the start and end of the step, m. The rest as for SbCCDPointTriangle().
-*/
-PetscBool SbCCDEdgeEdge(const PetscReal *const e0[2], const PetscReal *const e1[2],
-                        const PetscReal *const f0[2], const PetscReal *const f1[2],
-                        const PetscReal tolerance[2], PetscReal *time, PetscBool *behind);
-
-/*
   SbRayTriangle - where the half-line p + t way meets a triangle.
 
   Not collective. Output: t >= 0, in lengths of way; weight[3] of the corners; out, whether it leads from the back to the front.

@@ -16,7 +16,6 @@ typedef enum {
   SB_EVENT_EFFECTS,
   SB_EVENT_CONTACT,
   SB_EVENT_SEARCH,  /* within it: points against facets, on all ranks */
-  SB_EVENT_INSIDE,  /* within it: points against tets */
   SB_EVENT_PROJECT, /* within solves: into the null space of the contact constraints */
   SB_EVENT_SOLVER_SETUP,
   SB_EVENT_OUTPUT,

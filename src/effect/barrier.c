@@ -24,13 +24,16 @@
 #define WIDTH_CUBE 3e-3  /* at most so much of the edge of a cube of its volume, as thin bodies are long */
 #define PRESSURE 0.1     /* of Young's modulus of the softer side */
 #define SLIP 1e-3        /* of the size of the smallest body per second: speed below which friction sticks */
+#define SLIP_LEAST 1e-7  /* of the size: the slip of a time step is not smaller */
 #define SLIP_STATIC 1e-5 /* of the size: the same in a static run, as a length */
 #define LAGS 100         /* solves of a load step with the friction of the one before */
-#define PARTINGS 20      /* solves of a load step in which things are parted */
-#define HALF 0.5         /* of what springs were to part: where they reach less, they get stiffer */
-#define APART 0.5        /* of w: gap at the start where bodies cannot move apart by w, and in static runs */
-#define NEARBY 5.        /* of w: gaps that bodies may come to when they are moved apart */
-#define PASSES 200       /* over all pairs for that */
+#define MUCH \
+  0.5 /* of mu N: friction that lags behind by more is solved for once more in a time step, as where contact begins */
+#define PARTINGS 20 /* solves of a load step in which things are parted */
+#define HALF 0.5    /* of what springs were to part: where they reach less, they get stiffer */
+#define APART 0.5   /* of w: gap at the start where bodies cannot move apart by w, and in static runs */
+#define NEARBY 5.   /* of w: gaps that bodies may come to when they are moved apart */
+#define PASSES 200  /* over all pairs for that */
 
 /* ------------------------------------------------------------------ set-up */
 
@@ -364,7 +367,7 @@ static PetscErrorCode begin_barrier(SbEffect e, SbSpace s, PetscReal t, PetscRea
   obstacle_works(b, &b->obstacle_power, &unused);
 
   /* friction with the forces of the start */
-  b->slip = dt > 0. && e->dynamic ? SLIP * m->size * dt : SLIP_STATIC * m->size;
+  b->slip = dt > 0. && e->dynamic ? PetscMax(SLIP * dt, SLIP_LEAST) * m->size : SLIP_STATIC * m->size;
   b->nlag = 0;
   b->lag = 0.;
   PetscCall(SbBarrierFindFriction(b, PETSC_FALSE));
@@ -373,14 +376,16 @@ static PetscErrorCode begin_barrier(SbEffect e, SbSpace s, PetscReal t, PetscRea
 }
 
 /* What follows a solution: friction has its forces and directions from now on, as often as it may and what it lags behind by is too much. */
-static PetscErrorCode lag_barrier(SbEffect e, SbSpace s, const PetscReal u[], PetscBool *again)
+static PetscErrorCode lag_barrier(SbEffect e, SbSpace s, const PetscReal u[], PetscBool solved,
+                                  PetscBool *again)
 {
   Barrier *b = (Barrier *)e->data;
 
   PetscFunctionBeginUser;
   *again = PETSC_FALSE;
   if (b->scene.friction <= 0. && (e->dynamic || !b->overlapping)) PetscFunctionReturn(PETSC_SUCCESS);
-  if (++b->nlag >= (b->lags ? b->lags : e->dynamic ? 1 : LAGS)) PetscFunctionReturn(PETSC_SUCCESS);
+  if (e->dynamic && !b->lags && !solved) PetscFunctionReturn(PETSC_SUCCESS);
+  if (++b->nlag >= (b->lags ? b->lags : e->dynamic ? 2 : LAGS)) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(SbBarrierLook(b, u));
 
   /* in a static run what overlaps is parted within the step */
@@ -390,7 +395,7 @@ static PetscErrorCode lag_barrier(SbEffect e, SbSpace s, const PetscReal u[], Pe
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   PetscCall(SbBarrierLag(b));
-  *again = (PetscBool)(b->lag > b->lag_tolerance);
+  *again = (PetscBool)(b->lag > (e->dynamic && !b->lags ? MUCH : b->lag_tolerance));
   if (*again) SbBarrierSwapFriction(b);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

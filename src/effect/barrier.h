@@ -5,7 +5,7 @@
 #include "sbbarrier.h"
 #include "effect_impl.h"
 
-/* Columns of the history for each pair of bodies (collision_pairs.c). */
+/* Columns of the history for each pair of bodies (pair_columns.c). */
 typedef struct {
   PetscBool wanted;
   PetscInt fixed, nskin;         /* columns of the effect before them; bodies that have a surface here */

@@ -158,53 +158,91 @@ PetscErrorCode SbEffectHistory_Barrier(SbEffect e, SbSpace s, const SbStage *sta
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A point of the list for a pair at its nearest places: where it is on the body that is pushed, normal and gap. */
+static SbContactPoint point_of(const Barrier *b, const SbContactPair *pair, const PetscReal weight[4],
+                               const PetscReal n[3], PetscReal gap)
+{
+  const SbContactMesh m = b->mesh;
+  const PetscInt nbody = m->space->mesh->nbody, first = m->part[pair->v[0]],
+                 second = m->part[pair->v[pair->side ? 1 : 2]];
+  const PetscBool turned = (PetscBool)(first == nbody);
+  const int split = pair->kind == SB_PAIR_EDGE_EDGE && !pair->side ? 2 : 1;
+  SbContactPoint p = {.gap = gap};
+
+  for (int k = 0; k < 3; k++) p.id[k] = pair->v[k];
+  p.body[0] = turned ? second : first;
+  p.body[1] = turned || second == nbody ? -1 : second;
+  for (int k = 0; k < 4; k++) {
+    for (int j = 0; j < 3 && (turned ? k >= split : k < split); j++)
+      p.x[j] += PetscAbsReal(weight[k]) * b->x[3 * pair->v[k] + j];
+  }
+  for (int j = 0; j < 3; j++) p.normal[j] = turned ? -n[j] : n[j];
+  return p;
+}
+
+/* p.force -= the gradient of an energy by the vertices of the side that is pushed. */
+static void push_point(const Barrier *b, const SbContactPair *pair, const PetscReal gradient[12],
+                       SbContactPoint *p)
+{
+  const PetscBool turned = (PetscBool)(pair->v[0] >= b->mesh->nbody_vertex);
+  const int split = pair->kind == SB_PAIR_EDGE_EDGE && !pair->side ? 2 : 1;
+
+  for (int k = 0; k < (pair->side ? 1 : 4); k++) {
+    for (int j = 0; j < 3 && (turned ? k >= split : k < split); j++) p->force[j] -= gradient[3 * k + j];
+  }
+}
+
 PetscErrorCode SbEffectContactPoints_Barrier(SbEffect e, SbSpace s, const SbStage *stage, const PetscReal r[],
                                              SbContactPoints *list)
 {
   Barrier *b = (Barrier *)e->data;
   const SbContactMesh m = b->mesh;
+  PetscReal energy, gradient[12];
+  PetscBool *told;
 
   PetscFunctionBeginUser;
   (void)r;
   if (!b->begun) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(SbBarrierLook(b, stage->u));
+  PetscCall(PetscCalloc1(b->nrub, &told));
   for (PetscInt i = 0; i < b->nactive; i++) {
     const Active *a = &b->active[i];
     const SbContactPair *pair = &b->pairs->pair[a->pair];
-    const int split = pair->kind == SB_PAIR_EDGE_EDGE && !pair->side ? 2 : 1;
-    const PetscInt first = m->part[pair->v[0]], second = m->part[pair->v[pair->side ? 1 : 2]];
-    const PetscBool turned = (PetscBool)(first == s->mesh->nbody);
-    SbContactPoint p = {.gap = a->gap};
-    PetscReal energy, gradient[12], force;
+    SbContactPoint p;
 
     if (!counts(b, pair)) continue;
-    force = SbBarrierPush(b, a, &energy, gradient);
-    for (int k = 0; k < 3; k++) p.id[k] = pair->v[k];
-    p.body[0] = turned ? second : first;
-    p.body[1] = turned ? -1 : second == s->mesh->nbody ? -1 : second;
-    for (int k = 0; k < 4; k++) {
-      for (int j = 0; j < 3 && (turned ? k >= split : k < split); j++)
-        p.x[j] += PetscAbsReal(a->at.weight[k]) * b->x[3 * pair->v[k] + j];
-    }
-    for (int j = 0; j < 3; j++) {
-      p.normal[j] = turned ? -a->at.n[j] : a->at.n[j];
-      p.force[j] = force * p.normal[j];
-    }
+    p = point_of(b, pair, a->at.weight, a->at.n, a->gap);
+    (void)SbBarrierPush(b, a, &energy, gradient);
+    push_point(b, pair, gradient, &p);
 
     /* what friction does there */
     for (PetscInt k = 0; k < b->nrub; k++) {
       const Rub *rub = &b->rub[k];
-      PetscReal u[3], slope;
       PetscBool same;
 
       PetscCall(PetscArraycmp(rub->pair.v, pair->v, 4, &same));
       if (!same || rub->pair.kind != pair->kind || rub->pair.side != pair->side) continue;
-      slope = SbBarrierSlope(b, SbBarrierSlip(b, rub, u));
-      for (int j = 0; j < 3; j++) p.force[j] -= (turned ? -1. : 1.) * rub->force * slope * u[j];
+      (void)SbBarrierRub(b, rub, gradient);
+      push_point(b, pair, gradient, &p);
+      told[k] = PETSC_TRUE;
       break;
     }
     PetscCall(SbContactPointsAdd(list, &p));
   }
+
+  /* and where pairs were near enough when the step began only */
+  for (PetscInt k = 0; k < b->nrub; k++) {
+    const Rub *rub = &b->rub[k];
+    SbContactPoint p;
+    SbDistance d;
+
+    if (told[k] || !counts(b, &rub->pair)) continue;
+    p = point_of(b, &rub->pair, rub->weight, rub->n, SbContactPairGap(m, &rub->pair, b->x, &d));
+    (void)SbBarrierRub(b, rub, gradient);
+    push_point(b, &rub->pair, gradient, &p);
+    PetscCall(SbContactPointsAdd(list, &p));
+  }
+  PetscCall(PetscFree(told));
 
   /* what parts overlap */
   for (PetscInt i = 0; i < b->nspring; i++) {

@@ -118,10 +118,11 @@ PetscErrorCode SbBarrierPart(SbEffect e, SbSpace s, PetscReal dt, PetscBool firs
   b->nspring = 0;
   if (first && !b->scene.obstacle) PetscCall(SbContactMeshContained(b->mesh, b->x, body, &inside));
   PetscCall(SbContactOverlapFind(b->mesh, b->scene.self, b->x, inside, o));
-  PetscCheck(!inside || (o->n && !same_place(b, body)), s->comm, PETSC_ERR_USER_INPUT,
-             "The effect %s: %s is inside %s when the run begins, or in the same place; move one of them by "
-             "-body_%s_translate",
-             e->name, s->mesh->body[body[0]].name, s->mesh->body[body[1]].name, s->mesh->body[body[0]].name);
+  PetscCheck(
+    !inside || (o->n && !same_place(b, body)), s->comm, PETSC_ERR_USER_INPUT,
+    "The effect %s: body %s is inside body %s when the run begins, or in the same place; move one of them by "
+    "-body_%s_translate",
+    e->name, s->mesh->body[body[0]].name, s->mesh->body[body[1]].name, s->mesh->body[body[0]].name);
   b->overlapping =
     (PetscBool)(o->ncrossing > 0 && (!first || !o->n || o->deepest > ROUNDING * b->mesh->size));
   if (first && b->scene.obstacle && !b->overlapping) PetscCall(check_obstacle(e, s, 0.));

@@ -1,10 +1,11 @@
 /*
   contact.c - the effect `contact`: its options, and which response a scene gets.
 
-  With an obstacle the surfaces that it is given meet that, without they meet each other, and themselves where that is asked for.
+  Without an obstacle the bodies of the sets meet each other, and themselves where that is asked for: by `barrier`, which lets nothing through. With an obstacle the surfaces that it is given meet
+  that, by `barrier` or by responses of nodes against it (contact_node.c).
 
-  Response `auto`. All effects of a scene answer alike, as Newton's method has one potential and one set of constraints. `projected` is exact, and safe where the
-  surface is out of the obstacle whenever its vertices are: half-spaces and bowls. Everything else can cut through edges and faces, or be passed within a step: there
+  Response `auto`. All effects of a scene answer alike, as Newton's method has one potential and one set of constraints: where bodies meet each other it is `barrier`. `projected` is exact, and
+  safe where the surface is out of the obstacle whenever its vertices are: half-spaces and bowls. Everything else can cut through edges and faces, or be passed within a step: there
   it is `barrier`, unless the scene asks for what only the others have.
 */
 #include "contact.h"
@@ -29,7 +30,7 @@ static const SbOption rows[] = {
   {"friction", SB_OPTION_REAL, 1, "", "0", "[0, inf)", "Coulomb's coefficient for sticking"},
   {"response", SB_OPTION_CHOICE, 1, "", "auto", "auto|projected|multiplier|augmented|penalty|barrier",
    "auto: projected where only half-spaces and bowls are touched or options ask for it, else barrier; "
-   "projected: exact constraints, the solve "
+   "between bodies always barrier; projected: exact constraints, the solve "
    "in their null space; multiplier: with the forces as unknowns; augmented: multipliers raised on springs; "
    "penalty: springs; barrier: an "
    "energy that never lets surfaces touch"},
@@ -63,42 +64,45 @@ static const SbOption rows[] = {
   {"separation_steps", SB_OPTION_REAL, 1, "steps", "30", "[1, inf)",
    "what overlaps before it meets is parted slowly: to 1/e of the depth in so many steps; 1, and in static "
    "runs: at once"},
-  {"detection", SB_OPTION_CHOICE, 1, "", "tree", "tree|brute",
-   "between bodies: a tree of boxes, or every pair: the same contacts; not with barrier"},
-  {"passes", SB_OPTION_CHOICE, 1, "", "two", "one|two",
-   "between bodies: points of the finer of two surfaces search for the other one, or both do; not with "
-   "barrier"},
-  {"search_radius", SB_OPTION_REAL, 1, "m", "0", "[0, inf)",
-   "between bodies: how far points search for surfaces; what is deeper is found when a run begins or as "
-   "points in tets; 0: half the mean edge; not with barrier"},
   {"pairs", SB_OPTION_BOOL, 1, "", "no", "",
    "between bodies: columns in history.csv for each pair of bodies: force on the second by the first, "
    "contacts"},
 };
 
-/* Options that ask for another response than `barrier`. */
+static const char *const names_of_responses[] = {"auto",      "projected", "multiplier",
+                                                 "augmented", "penalty",   "barrier"};
+/* Options that bodies that meet each other have not. */
+static const char *const obstacles_only[] = {"time_of_impact", "damping", "stiffness", "friction_kinetic"};
+/* Options that ask for another response than `barrier` against an obstacle. */
 static const char *const exact_only[] = {"restitution", "time_of_impact", "damping", "stiffness",
                                          "friction_kinetic"};
 
-/* Whether what an effect touches is half-spaces and bowls, and whether it has options that `barrier` has not; its own response. */
-static PetscErrorCode examine(const char *name, SbResponse *response, PetscBool *vertices, PetscBool *others)
+/* What decides on the response of an effect, its own one among it. */
+typedef struct {
+  SbResponse response;
+  PetscBool bodies, vertices,
+    others; /* bodies meet each other; half-spaces and bowls are touched; it has options that `barrier` has not */
+} Needs;
+
+static PetscErrorCode examine(const char *name, Needs *needs)
 {
   SbScope scope;
   PetscInt choice;
   char text[PETSC_MAX_PATH_LEN];
 
   PetscFunctionBeginUser;
+  *needs = (Needs){0};
   PetscCall(SbScopeSet(&scope, "effect", "contact", name));
   PetscCall(SbOptionChoice(&scope, "response", &choice));
-  *response = (SbResponse)choice;
+  needs->response = (SbResponse)choice;
   PetscCall(SbOptionString(&scope, "obstacle", sizeof(text), text));
-  *vertices = (PetscBool)(!strncmp(text, "plane", 5) || !strncmp(text, "bowl", 4));
-  *others = PETSC_FALSE;
-  for (size_t k = 0; k < PETSC_STATIC_ARRAY_LENGTH(exact_only); k++) {
+  needs->bodies = (PetscBool)!text[0];
+  needs->vertices = (PetscBool)(!strncmp(text, "plane", 5) || !strncmp(text, "bowl", 4));
+  for (size_t k = 0; text[0] && k < PETSC_STATIC_ARRAY_LENGTH(exact_only); k++) {
     PetscBool given;
 
     PetscCall(SbOptionGiven(&scope, exact_only[k], &given));
-    *others = (PetscBool)(*others || given);
+    needs->others = (PetscBool)(needs->others || given);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -116,19 +120,25 @@ static PetscErrorCode is_contact(const char *name, PetscBool *is)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The response of an effect that leaves the choice: that of the others where one is given, else by what is touched. Output: why. */
+/* The response of an effect; why: the effect leaves the choice, NULL: it does not. */
 static PetscErrorCode choose(SbEffect e, SbResponse *response, const char **why)
 {
-  SbResponse given;
-  PetscBool vertices, others, only_vertices, exists, guarded = PETSC_TRUE;
+  PetscBool exists, guarded = PETSC_TRUE;
   PetscInt n = 0, method;
   char(*names)[SB_NAME_MAX] = NULL;
+  SbResponse other = AUTO;
   SbScope scope;
+  Needs needs;
 
   PetscFunctionBeginUser;
-  PetscCall(examine(e->name, response, &only_vertices, &others));
+  PetscCall(examine(e->name, &needs));
+  *response = needs.response;
+  PetscCheck(
+    !needs.bodies || *response == AUTO || *response == BARRIER, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
+    "-effect_%s_response %s is for obstacles: bodies meet each other by barrier; leave it out, or give "
+    "-effect_%s_obstacle",
+    e->name, names_of_responses[*response], e->name);
   if (*response != AUTO) PetscFunctionReturn(PETSC_SUCCESS);
-  *why = "";
 
   /* the integrator, where the program has one */
   PetscCall(SbScopeSet(&scope, "", "", ""));
@@ -142,24 +152,30 @@ static PetscErrorCode choose(SbEffect e, SbResponse *response, const char **why)
   PetscCall(SbOptionExists(&scope, "effects", &exists));
   if (exists) PetscCall(SbOptionNames(&scope, "effects", &n, &names));
   for (PetscInt i = 0; i < n; i++) {
-    PetscBool contact = PETSC_FALSE, more = PETSC_FALSE;
+    PetscBool contact = PETSC_FALSE;
+    Needs more;
 
     PetscCall(is_contact(names[i], &contact));
     if (!contact) continue;
-    PetscCall(examine(names[i], &given, &vertices, &more));
-    if (given != AUTO) {
-      *response = given == BARRIER ? BARRIER : PROJECTED;
-      *why = "as another effect has it";
-    }
-    only_vertices = (PetscBool)(only_vertices && vertices);
-    others = (PetscBool)(others || more);
+    PetscCall(examine(names[i], &more));
+    if (more.response != AUTO) other = more.response;
+    needs.bodies = (PetscBool)(needs.bodies || more.bodies);
+    needs.vertices = (PetscBool)(needs.vertices && more.vertices);
+    needs.others = (PetscBool)(needs.others || more.others);
   }
   PetscCall(PetscFree(names));
-  if (*response != AUTO) PetscFunctionReturn(PETSC_SUCCESS);
 
-  if (!guarded || others || only_vertices) {
+  if (needs.bodies) {
+    *response = BARRIER;
+    *why = "bodies meet each other";
+  } else if (other != AUTO) {
+    *response = other == BARRIER ? BARRIER : PROJECTED;
+    *why = "as another effect has it";
+  } else if (!guarded || needs.others || needs.vertices) {
     *response = PROJECTED;
-    *why = !guarded ? "-time" : others ? "an option that barrier has not" : "half-spaces and bowls only";
+    *why = !guarded       ? "-time"
+           : needs.others ? "an option that barrier has not"
+                          : "half-spaces and bowls only";
   } else {
     *response = BARRIER;
     *why = "surfaces, edges and corners meet";
@@ -201,38 +217,68 @@ static PetscErrorCode read_common(SbEffect e, const SbScope *scope, SbContactOpt
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The effect with this response; why: it was not asked for, NULL: it was. */
-static PetscErrorCode respond(SbEffect e, const SbScope *scope, SbResponse response, const char *why)
+/* Bodies that meet each other. */
+typedef struct {
+  SbEffectOn on;
+} Bodies;
+
+static PetscErrorCode destroy_bodies(SbEffect e)
 {
-  SbContactOptions o = {.response = response};
-  char text[PETSC_MAX_PATH_LEN];
+  PetscFunctionBeginUser;
+  PetscCall(SbEffectFreeOn(&((Bodies *)e->data)->on));
+  PetscCall(PetscFree(e->data));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode create_bodies(SbEffect e, const SbScope *scope, const SbContactOptions *o)
+{
+  SbBarrierScene scene = {.friction = o->friction.mu, .restitution = o->restitution};
+  Bodies *b;
 
   PetscFunctionBeginUser;
-  PetscCall(SbOptionString(scope, "obstacle", sizeof(text), text));
-  PetscCall(read_common(e, scope, &o));
-  if (why)
-    (void)snprintf(e->note, sizeof(e->note), "response %s: %s", response == BARRIER ? "barrier" : "projected",
-                   why);
-  e->linear = PETSC_TRUE;
-  e->steady = PETSC_FALSE; /* a load factor does not make an obstacle softer */
-  PetscCall(text[0] ? SbContactCreate_Node(e) : SbContactCreate_Collision(e));
-  e->saddle = (PetscBool)(response == MULTIPLIER);
-  e->euler = (PetscBool)(o.restitution > 0);
-  e->springs = (PetscBool)(!SbResponseIsExact(response) || o.friction.mu > 0);
-  if (!o.cut) e->ops.time_of_impact = NULL;
-  if (!e->euler) e->ops.restitution = NULL;
-  PetscCall(text[0] ? SbContactOptions_Node(e, scope, &o) : SbContactOptions_Collision(e, scope, &o));
+  for (size_t k = 0; k < PETSC_STATIC_ARRAY_LENGTH(obstacles_only); k++) {
+    PetscBool given;
+
+    PetscCall(SbOptionGiven(scope, obstacles_only[k], &given));
+    PetscCheck(!given, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
+               "-effect_%s_%s is for responses to obstacles: bodies meet each other by barrier; leave it out",
+               e->name, obstacles_only[k]);
+  }
+  PetscCall(PetscNew(&b));
+  e->data = b;
+  e->ops.destroy = destroy_bodies;
+  PetscCall(SbEffectReadOn(scope, &b->on));
+  scene.on = &b->on;
+  PetscCall(SbOptionBool(scope, "self", &scene.self));
+  PetscCall(SbOptionBool(scope, "pairs", &scene.pairs));
+  PetscCall(SbBarrierCreate(e, scope, &scene));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 static PetscErrorCode options_contact(SbEffect e, const SbScope *scope)
 {
-  SbResponse response;
+  SbContactOptions o = {0};
   const char *why = NULL;
+  char text[PETSC_MAX_PATH_LEN];
 
   PetscFunctionBeginUser;
-  PetscCall(choose(e, &response, &why));
-  PetscCall(respond(e, scope, response, why));
+  PetscCall(choose(e, &o.response, &why));
+  PetscCall(SbOptionString(scope, "obstacle", sizeof(text), text));
+  PetscCall(read_common(e, scope, &o));
+  if (why) (void)snprintf(e->note, sizeof(e->note), "response %s: %s", names_of_responses[o.response], why);
+  e->linear = PETSC_TRUE;
+  e->steady = PETSC_FALSE; /* a load factor does not make an obstacle softer */
+  e->euler = (PetscBool)(o.restitution > 0);
+  if (!text[0]) {
+    PetscCall(create_bodies(e, scope, &o));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  PetscCall(SbContactCreate_Node(e));
+  e->saddle = (PetscBool)(o.response == MULTIPLIER);
+  e->springs = (PetscBool)(!SbResponseIsExact(o.response) || o.friction.mu > 0);
+  if (!o.cut) e->ops.time_of_impact = NULL;
+  if (!e->euler) e->ops.restitution = NULL;
+  PetscCall(SbContactOptions_Node(e, scope, &o));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

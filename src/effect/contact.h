@@ -15,7 +15,7 @@ static inline PetscBool SbResponseIsExact(SbResponse response)
   return (PetscBool)(response == PROJECTED || response == MULTIPLIER);
 }
 
-/* Options that contact with obstacles and between bodies have in common. */
+/* Options of all responses. */
 typedef struct {
   SbResponse response; /* not AUTO */
   PetscBool cut;       /* steps end where points come into contact */
@@ -23,8 +23,6 @@ typedef struct {
   PetscReal stiffness, damping, restitution, separation_steps;
 } SbContactOptions;
 
-/* Nodes against an obstacle (contact_node.c), surfaces of bodies against each other (collision.c): the table of operations, then the options of their own. Not collective. */
+/* Nodes against an obstacle (contact_node.c): the table of operations, then the options of its own. Not collective. */
 PetscErrorCode SbContactCreate_Node(SbEffect e);
 PetscErrorCode SbContactOptions_Node(SbEffect e, const SbScope *scope, const SbContactOptions *o);
-PetscErrorCode SbContactCreate_Collision(SbEffect e);
-PetscErrorCode SbContactOptions_Collision(SbEffect e, const SbScope *scope, const SbContactOptions *o);

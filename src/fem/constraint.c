@@ -668,15 +668,3 @@ void SbSpaceGetConstraint(SbSpace s, PetscInt constraint, PetscReal *force, Pets
   *force = s->constraints->force[constraint];
   *sum = s->constraints->sum[constraint];
 }
-
-void SbSpaceGetConstraintForce(SbSpace s, PetscInt constraint, PetscInt n, PetscReal direction[3],
-                               PetscReal force[3])
-{
-  const SbConstraints c = s->constraints;
-
-  for (PetscInt k = 0; k < 3; k++) direction[k] = 0.;
-  for (PetscInt k = 3 * c->start[constraint]; k < 3 * (c->start[constraint] + n); k++) {
-    direction[k % 3] += c->coef[k];
-    force[k % 3] += c->force[constraint] * c->along[k];
-  }
-}

@@ -311,7 +311,7 @@ PetscErrorCode SbModelGuardLag(SbModel m, Vec X, PetscBool solved, PetscBool *ag
   for (PetscInt e = 0; e < m->npotential; e++) {
     PetscBool mine;
 
-    SbEffectCall(m->potential[e], lag, m->space, u, &mine);
+    SbEffectCall(m->potential[e], lag, m->space, u, solved, &mine);
     *again = (PetscBool)(*again || mine);
   }
   PetscCall(SbSpaceRestoreLocalRead(m->space, X, &u));

@@ -39,6 +39,8 @@
   1e-3 /* of the smallest body's size per second: a step of a time step that is short enough, where surfaces push each other */
 #define STICKING 1e-2       /* of that, with friction, whose forces follow from as small speeds */
 #define SETTLED_STATIC 1e-6 /* of that size: the same in a static run */
+#define SETTLED_LEAST \
+  1e-8 /* of that size: no step of a whole time step need be shorter, however short these are */
 #define SETTLED_GAP \
   1e-2 /* of the width below which surfaces push each other: how much the last step may change gaps */
 #define EARLY 10         /* iterations in which friction follows normal forces at once */
@@ -456,6 +458,7 @@ static PetscErrorCode converged(SNES snes, PetscReal s)
   }
   for (PetscInt e = 0; e < run->model->npotential; e++)
     width = PetscMin(width, run->model->potential[e]->width);
+  if (run->model->dynamic) part = PetscMax(part, SETTLED_LEAST * run->guard_dt / run->dt);
   size = PetscMin(size, SETTLED_GAP * width / part);
   PetscCall(VecNorm(snes->vec_sol_update, NORM_INFINITY, &longest));
   PetscCall(PetscInfo(snes,

@@ -1,6 +1,6 @@
 /*
   cases_touch.c - contact that is hard to decide: what touches in a point or a line or says the same many times, who touches wants to cycle, normals
-  that jump, solves that fail; and the same contact by all responses, in the size of a cell and of a mountain.
+  that jump, solves that fail; and the same contact in the size of a cell and of a mountain.
 */
 #include "hard.h"
 #include <unistd.h>
@@ -12,10 +12,10 @@
   "_density 1000 -body_" body "_young " law " "
 
 /* Two blocks of the same mesh, the upper one at a place where surfaces just touch, and coming down obliquely. */
-#define JUST(place)                                                                                          \
-  "-bodies a,b " BLOCK("a", "2", "0,0,0", "0,0,0", "1e5") BLOCK(                                             \
-    "b", "2", place, "-0.3,-0.2,-1", "1e5") "-effects meet -effect_meet_type contact -effect_meet_response " \
-                                            "projected -ts_dt 0.002 -ts_max_time 0.1 -snes_rtol 1e-9"
+#define JUST(place)                                       \
+  "-bodies a,b " BLOCK("a", "2", "0,0,0", "0,0,0", "1e5") \
+    BLOCK("b", "2", place, "-0.3,-0.2,-1",                \
+          "1e5") "-effects meet -effect_meet_type contact -ts_dt 0.002 -ts_max_time 0.1 -snes_rtol 1e-9"
 #define JUST_LIMITS                                                                                          \
   {                                                                                                          \
     {HARD_EXCESS, '<', 1e-6}, {HARD_MOMENTUM, '<', 1e-6}, {HARD_ANGULAR, '<', 0.05}, {HARD_MIN_J, '>', 0.5}, \
@@ -26,20 +26,20 @@
   }
 
 /* A block falls onto another one that stands on the floor and slides over it. */
-#define RESPONSE(response)                                                                                  \
-  "-bodies a,b " BLOCK("a", "3", "0,0,0", "0,0,0", "1e5")                                                   \
-    BLOCK("b", "2", "0.02,0.01,0.102", "0.2,0,-0.5",                                                        \
-          "1e5") "-effects gravity,floor,meet -effect_floor_type contact -effect_floor_response projected " \
-                 "-effect_floor_obstacle plane:0,0,1,0 -effect_floor_friction 0.4 "                         \
-                 "-effect_meet_type contact -effect_meet_response projected -effect_meet_friction 0.2 "     \
-                 "-ts_dt 0.005 -ts_max_time 0.3 " response
-#define RESPONSE_LIMITS(depth)                                                                            \
-  {                                                                                                       \
-    {HARD_EXCESS, '<', 1e-3}, {HARD_MIN_J, '>', 0.5}, {HARD_VOLUME, '<', 0.05}, {HARD_DEPTH, '<', depth}, \
-      {HARD_SPEED, '<', 0.5}, {HARD_NEWTON, '<', 500},                                                    \
-    {                                                                                                     \
-      HARD_REJECTED, '<', 5                                                                               \
-    }                                                                                                     \
+#define SLIDES                                                                      \
+  "-bodies a,b " BLOCK("a", "3", "0,0,0", "0,0,0", "1e5")                           \
+    BLOCK("b", "2", "0.02,0.01,0.102", "0.2,0,-0.5",                                \
+          "1e5") "-effects gravity,floor,meet -effect_floor_type contact "          \
+                 "-effect_floor_obstacle plane:0,0,1,0 -effect_floor_friction 0.4 " \
+                 "-effect_meet_type contact -effect_meet_friction 0.2 "             \
+                 "-ts_dt 0.005 -ts_max_time 0.3"
+#define SLIDES_LIMITS                                                                                    \
+  {                                                                                                      \
+    {HARD_EXCESS, '<', 1e-3}, {HARD_MIN_J, '>', 0.5}, {HARD_VOLUME, '<', 0.05}, {HARD_DEPTH, '<', 0.01}, \
+      {HARD_SPEED, '<', 0.5}, {HARD_NEWTON, '<', 500},                                                   \
+    {                                                                                                    \
+      HARD_REJECTED, '<', 5                                                                              \
+    }                                                                                                    \
   }
 
 /* Length L in all of it, waves as fast as the times are long: the same solution but for L. */
@@ -48,8 +48,8 @@
   ":2 -body_b_translate " near "," near "," at                                                               \
   " -body_a_material neohookean -body_a_young 1e5 -body_a_poisson 0.3 -body_a_density 1000 "                 \
   "-body_b_material neohookean -body_b_young 1e5 -body_b_poisson 0.3 -body_b_density 1000 -body_b_velocity " \
-  "0.2,0,-1 -effects floor,meet -effect_floor_type contact -effect_floor_response projected "                \
-  "-effect_floor_obstacle plane:0,0,1,0 -effect_meet_type contact -effect_meet_response projected "          \
+  "0.2,0,-1 -effects floor,meet -effect_floor_type contact "                                                 \
+  "-effect_floor_obstacle plane:0,0,1,0 -effect_meet_type contact "                                          \
   "-effect_meet_friction 0.3 -ts_dt " dt " -ts_max_time " end
 #define SCALE_LIMITS                                                                                     \
   {                                                                                                      \
@@ -61,13 +61,13 @@
   }
 
 /* A fine body under a coarse one: 169 places of the fine surface push on the four vertices of a face of the coarse one. */
-#define HUNDRED(response, friction)                                                                        \
-  "-bodies a,b -body_a_mesh box:0.1,0.1,0.02:12,12,1 -body_b_mesh box:0.1,0.1,0.1:1 -body_b_translate "    \
-  "0,0,0.0201 -body_a_material neohookean -body_a_young 1e5 -body_a_poisson 0.3 -body_a_density 1000 "     \
-  "-body_b_material neohookean -body_b_young 1e5 -body_b_poisson 0.3 -body_b_density 1000 -effects "       \
-  "gravity,floor,meet -effect_floor_type contact -effect_floor_response projected -effect_floor_obstacle " \
-  "plane:0,0,1,0 -effect_floor_friction 0.3 -effect_meet_type contact -effect_meet_response projected "    \
-  "-effect_meet_response " response " -effect_meet_friction " friction " -ts_dt 0.005 -ts_max_time 0.03"
+#define HUNDRED(friction)                                                                               \
+  "-bodies a,b -body_a_mesh box:0.1,0.1,0.02:12,12,1 -body_b_mesh box:0.1,0.1,0.1:1 -body_b_translate " \
+  "0,0,0.0201 -body_a_material neohookean -body_a_young 1e5 -body_a_poisson 0.3 -body_a_density 1000 "  \
+  "-body_b_material neohookean -body_b_young 1e5 -body_b_poisson 0.3 -body_b_density 1000 -effects "    \
+  "gravity,floor,meet -effect_floor_type contact -effect_floor_obstacle "                               \
+  "plane:0,0,1,0 -effect_floor_friction 0.3 -effect_meet_type contact "                                 \
+  "-effect_meet_friction " friction " -ts_dt 0.005 -ts_max_time 0.03"
 #define HUNDRED_LIMITS                                                                                  \
   {                                                                                                     \
     {HARD_EXCESS, '<', 1e-6}, {HARD_MIN_J, '>', 0.9}, {HARD_DEPTH, '<', 3e-3}, {HARD_NEWTON, '<', 300}, \
@@ -176,57 +176,29 @@ const HardCase HardCasesTouch[] = {
    .jitter = 1e-10,
    .quick = 1,
    .limits = JUST_LIMITS},
-  {.name = "hundred.projected",
+  {.name = "hundred.smooth",
    .seconds = 600,
-   .what = "a hundred contacts on one vertex, projected",
-   .options = HUNDRED("projected", "0"),
+   .what = "a hundred contacts on one vertex",
+   .options = HUNDRED("0"),
    .look = count_pairs,
    .runs = 1,
    .quick = 1,
-   .limits = HUNDRED_LIMITS},
-  {.name = "hundred.multiplier",
-   .seconds = 600,
-   .what = "a hundred contacts on one vertex, multiplier",
-   .options = HUNDRED("multiplier", "0"),
-   .look = count_pairs,
-   .runs = 1,
    .limits = HUNDRED_LIMITS},
   {.name = "hundred.friction",
    .seconds = 600,
    .what = "a hundred contacts on one vertex, friction",
-   .options = HUNDRED("projected", "0.3"),
+   .options = HUNDRED("0.3"),
    .look = count_pairs,
    .runs = 1,
    .limits = HUNDRED_LIMITS},
-  {.name = "response.projected",
+  {.name = "slides",
    .seconds = 600,
-   .what = "falls and slides: projected",
-   .options = RESPONSE(""),
+   .what = "falls on another block and slides over it",
+   .options = SLIDES,
    .jitter = 1e-5,
    .jitter_speed = 1e-3,
    .quick = 1,
-   .limits = RESPONSE_LIMITS(0.01)},
-  {.name = "response.multiplier",
-   .seconds = 600,
-   .what = "falls and slides: multiplier",
-   .options = RESPONSE("-effect_floor_response multiplier -effect_meet_response multiplier"),
-   .jitter = 1e-5,
-   .jitter_speed = 1e-3,
-   .limits = RESPONSE_LIMITS(0.01)},
-  {.name = "response.augmented",
-   .seconds = 600,
-   .what = "falls and slides: augmented",
-   .options = RESPONSE("-effect_floor_response augmented -effect_meet_response augmented"),
-   .jitter = 1e-5,
-   .jitter_speed = 1e-3,
-   .limits = RESPONSE_LIMITS(0.01)},
-  {.name = "response.penalty",
-   .seconds = 600,
-   .what = "falls and slides: penalty",
-   .options = RESPONSE("-effect_floor_response penalty -effect_meet_response penalty"),
-   .jitter = 1e-5,
-   .jitter_speed = 1e-3,
-   .limits = RESPONSE_LIMITS(0.05)},
+   .limits = SLIDES_LIMITS},
   {.name = "scale.micro",
    .seconds = 600,
    .what = "contact in a micrometre",

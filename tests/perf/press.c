@@ -1,19 +1,17 @@
 /*
-  What contact between bodies costs in steps that have it: press -scene press|heap -cells 6 -detection tree [-friction 0.3] [-steps 10]
+  What contact between bodies costs in steps that have it: press -scene press|heap -cells 6 [-friction 0.3] [-steps 10]
 
   press: a block is driven by 6 % into a larger one that stands still, meshes apart, no friction: most of the points of one surface
   touch all the time. heap: eight boxes, each turned a little, in two layers, fall by 2 mm on a floor and onto each other, with friction.
 
-  For each step in which something touches, but the first: milliseconds of the step and its parts, of the slowest rank. search: where
-  surfaces and points are now, between ranks too, and points against facets; the search for pairs of edges is not in it. contact: all else
-  around solves, rows and the decisions about them. project: the rows within the linear solves. Work of the monitor is not counted.
+  For each step in which something touches, but the first: milliseconds of the step and of the search for pairs, of the slowest rank. Work of the monitor is not counted.
 */
 #include "../verify/contact.h"
 #include "perf.h"
 #include <sblog.h>
 
-static const SbEvent parts[] = {SB_EVENT_SEARCH, SB_EVENT_CONTACT, SB_EVENT_PROJECT};
-enum { SEARCH, CONTACT, PROJECT, PARTS };
+static const SbEvent parts[] = {SB_EVENT_SEARCH};
+enum { SEARCH, PARTS };
 
 typedef struct {
   double from, part[PARTS]; /* s: begin of the step, events until then */
@@ -49,14 +47,11 @@ static PetscErrorCode watch(SbRun run, const SbStep *step, void *ctx)
     PetscCall(seconds(parts[i], &w->part[i]));
     took[i] = w->part[i] - before;
   }
-  took[CONTACT] -= took[SEARCH];
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, took, PARTS + 1, MPI_DOUBLE, MPI_MAX, PETSC_COMM_WORLD));
   PetscCall(contact_column(run, step->t, "meet", "contacts", &contacts));
   if (step->step > 1 && contacts > 0) {
     PetscCall(perf_sample("step", "ms", 1e3 * took[PARTS]));
     PetscCall(perf_sample("search", "ms", 1e3 * took[SEARCH]));
-    PetscCall(perf_sample("contact", "ms", 1e3 * took[CONTACT]));
-    PetscCall(perf_sample("project", "ms", 1e3 * took[PROJECT]));
     PetscCall(perf_sample("contacts", "1", (double)contacts));
     PetscCall(perf_sample("newton", "1", (double)step->newton));
     PetscCall(perf_sample("iterations", "1", (double)step->linear));
@@ -116,17 +111,16 @@ static PetscErrorCode heap_scene(PetscInt cells, size_t size, char text[])
                             name, 0.09 * x + 0.02 * z, 0.09 * y + 0.015 * z, 0.002 + 0.064 * z));
     PetscCall(add_body(name, mesh, where, size, text));
   }
-  PetscCall(
-    PetscStrlcat(text,
-                 " -effects gravity,floor,meet -effect_floor_type contact -effect_floor_response projected "
-                 "-effect_floor_obstacle plane:0,0,1,0 -effect_floor_friction 0.3 -ts_dt 0.004",
-                 size));
+  PetscCall(PetscStrlcat(text,
+                         " -effects gravity,floor,meet -effect_floor_type contact "
+                         "-effect_floor_obstacle plane:0,0,1,0 -effect_floor_friction 0.3 -ts_dt 0.004",
+                         size));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 int main(int argc, char **argv)
 {
-  char scene[16] = "press", detection[16] = "tree", text[2 * PERF_TEXT], more[256];
+  char scene[16] = "press", text[2 * PERF_TEXT], more[256];
   PetscInt cells = 6, steps = 10;
   PetscReal friction = 0;
   Watch w = {0};
@@ -136,7 +130,6 @@ int main(int argc, char **argv)
   PetscCall(PetscInitialize(&argc, &argv, NULL, NULL));
   PetscCall(PetscLogDefaultBegin());
   PetscCall(perf_argument("-scene", sizeof(scene), scene));
-  PetscCall(perf_argument("-detection", sizeof(detection), detection));
   PetscCall(PetscOptionsGetInt(NULL, NULL, "-cells", &cells, NULL));
   PetscCall(PetscOptionsGetInt(NULL, NULL, "-steps", &steps, NULL));
   PetscCall(PetscOptionsGetReal(NULL, NULL, "-friction", &friction, NULL));
@@ -144,11 +137,10 @@ int main(int argc, char **argv)
     PetscCall(heap_scene(cells, sizeof(text), text));
   else
     PetscCall(press_scene(cells, steps, sizeof(text), text));
-  PetscCall(
-    PetscSNPrintf(more, sizeof(more),
-                  " -effect_meet_type contact -effect_meet_response projected -effect_meet_detection %s "
-                  "-effect_meet_friction %g -time euler_implicit -ts_max_steps %d -ts_max_time 100",
-                  detection, (double)friction, (int)steps));
+  PetscCall(PetscSNPrintf(more, sizeof(more),
+                          " -effect_meet_type contact "
+                          "-effect_meet_friction %g -time euler_implicit -ts_max_steps %d -ts_max_time 100",
+                          (double)friction, (int)steps));
   PetscCall(PetscStrlcat(text, more, sizeof(text)));
   PetscCall(perf_open(text, &t));
   t.run->want_energies = PETSC_TRUE;

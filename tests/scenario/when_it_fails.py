@@ -103,7 +103,7 @@ CASES = [
      "-effect_hold_components z", [" a ", "(1.00, 0.00, 0.00)"]),
     ("S3", "error", "bar.opts -effects hold,again -effect_again_type fixed -effect_again_on left", ["-effect_again_on"]),
     ("S4", "error", "cube.opts -bodies a,b -body_a_mesh box:1,1,1:9 -body_b_mesh box:0.1,0.1,0.1:1 -body_b_translate 0.45,0.45,0.45 -body_b_material linear "
-     "-body_b_young 1e5 -body_b_poisson 0.3 -effects meet -effect_meet_type contact -effect_meet_response projected -time euler_implicit -ts_dt 1e-3 -ts_max_time 1e-3",
+     "-body_b_young 1e5 -body_b_poisson 0.3 -effects meet -effect_meet_type contact -time euler_implicit -ts_dt 1e-3 -ts_max_time 1e-3",
      ["body b", "body a", "-body_b_translate"]),
     ("R1", "error", "bar.opts -effect_pull_vector 0;0;1e9 -snes_max_it 2 -time_max_halvings 2", ["0.0025 s"]),
     ("R2", "error", "-bodies a -body_a_mesh box:1,1,1:2 -body_a_material stvk -body_a_young 1 -body_a_poisson 0 -effects low,press,x,y -effect_low_type fixed "

@@ -43,7 +43,7 @@ static inline void bend(const PetscInt n[3], const PetscInt at[3], PetscReal x[3
   x[2] = b->side * (depth + (1 - depth / SIZE) * cap);
 }
 
-/* Two bodies, and how their contact is computed. */
+/* Two bodies. The width of their barrier is a hundredth of d. */
 typedef struct {
   const char *name;
   PetscReal young[2];  /* below, above, Pa */
@@ -52,8 +52,7 @@ typedef struct {
 
 typedef struct {
   PetscInt cells;
-  const char *response, *sides; /* sides: NULL with the response barrier, whose width is a hundredth of d */
-  PetscReal a;                  /* radius of contact, m */
+  PetscReal a;      /* radius of contact, m */
   PetscReal honest; /* how far the force in the history may be from the one that acts, as a part of it */
   const char *element;
 } Case;
@@ -109,13 +108,10 @@ static inline PetscErrorCode open_pair(const Pair *p, const Case *c, PetscReal d
     "-effect_x_type fixed -effect_x_on x0 -effect_x_components x -effect_y_type fixed -effect_y_on y0 "
     "-effect_y_components y -effect_low_type prescribed_displacement -effect_low_on ax,ay,az "
     "-effect_low_displacement %s -effect_high_type prescribed_displacement -effect_high_on bx,by,bz "
-    "-effect_high_displacement %s -effect_meet_type contact -effect_meet_on meet -effect_meet_response %s ",
+    "-effect_high_displacement %s -effect_meet_type contact -effect_meet_on meet -effect_meet_barrier_width "
+    "%.9g ",
     path[0], path[1], c->element, c->element, (double)p->young[0], (double)p->young[1], POISSON, POISSON,
-    (double)(3 * d), far[0], far[1], c->response));
-  PetscCall(PetscSNPrintf(far[0], sizeof(far[0]),
-                          c->sides ? "-effect_meet_passes %s" : "-effect_meet_barrier_width %s%.9g",
-                          c->sides ? c->sides : "", (double)(0.01 * d)));
-  PetscCall(PetscStrlcat(text, far[0], sizeof(text)));
+    (double)(3 * d), far[0], far[1], (double)(0.01 * d)));
   PetscCall(test_scene_open(text, t));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -148,9 +144,7 @@ static inline PetscErrorCode read_forces(SbRun run, PetscReal values[NVALUE], Pe
 }
 
 /*
-  Force of a case, taken from the far face of the upper body, as a part of the formula's. The force in the history must be the same;
-  exact constraints of both sides are more than the surfaces can take, and some of those that stay to end the loop pull, which
-  normal_force leaves out.
+  Force of a case, taken from the far face of the upper body, as a part of the formula's. The force in the history must be the same.
 */
 static inline PetscErrorCode hertz(const Pair *p, const Case *c, PetscReal *force)
 {
@@ -168,11 +162,11 @@ static inline PetscErrorCode hertz(const Pair *p, const Case *c, PetscReal *forc
   PetscCall(read_forces(t.run, values, &reaction));
   *force = -4 * reaction / P;
   PetscCall(PetscPrintf(PETSC_COMM_WORLD,
-                        "  %s, %s, %s, passes %s, %d^3 cells, d = %.3e m: %g points touch, force %.4f "
+                        "  %s, %s, %d^3 cells, d = %.3e m: %g points touch, force %.4f "
                         "(history %.4f) of the formula's, penetration %.1e d, %d solves\n",
-                        p->name, c->element, c->response, c->sides ? c->sides : "none", (int)c->cells,
-                        (double)d, (double)values[CONTACTS], (double)*force, (double)(4 * values[NORMAL] / P),
-                        (double)(values[DEEPEST] / d), (int)t.run->newton_total));
+                        p->name, c->element, (int)c->cells, (double)d, (double)values[CONTACTS],
+                        (double)*force, (double)(4 * values[NORMAL] / P), (double)(values[DEEPEST] / d),
+                        (int)t.run->newton_total));
   SB_CHECK_NEAR(4 * values[NORMAL] / P, *force, c->honest * *force,
                 "force in the history against the one that acts");
   SB_CHECK(values[DEEPEST] < 0.01 * d, "penetration %g m of %g m", (double)values[DEEPEST], (double)d);

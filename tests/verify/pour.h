@@ -6,7 +6,7 @@
   another body; centres end inside the bowl, and what came to rest below is carried.
 */
 #pragma once
-#include "../../src/effect/collision.h"
+#include "../../src/effect/barrier_impl.h"
 #include "contact.h"
 
 #define POUR_G 9.81
@@ -82,14 +82,13 @@ static inline PetscErrorCode pour_furthest(TestScene *t, const PetscReal bowl[3]
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Depth of a point in a convex body, behind the facets [from, to) of a scene, m; negative outside. */
-static inline PetscReal pour_depth(const SbDetectScene *s, const PetscInt from[], PetscInt n,
-                                   const PetscReal p[3])
+/* Depth of a point in a convex body, behind n triangles of it, m; negative outside. */
+static inline PetscReal pour_depth(const Barrier *s, const PetscInt from[], PetscInt n, const PetscReal p[3])
 {
   PetscReal depth = PETSC_MAX_REAL;
 
   for (PetscInt i = 0; i < n && depth > 0; i++) {
-    const PetscInt *v = s->facet + 3 * from[i];
+    const PetscInt *v = s->mesh->triangle + 3 * from[i];
     PetscReal a[3], b[3], r[3], normal[3];
 
     for (int k = 0; k < 3; k++) {
@@ -104,26 +103,28 @@ static inline PetscReal pour_depth(const SbDetectScene *s, const PetscInt from[]
 }
 
 /*
-  How deep bodies are in each other without asking the detector: places along all edges of all facets against the facets of every other
+  How deep bodies are in each other without asking for pairs: places along all edges of all facets against the facets of every other
   body, which is convex but for its strain. On one rank.
 */
 static inline PetscErrorCode pour_inside(SbModel m, PetscReal *inside)
 {
-  const SbDetectScene *s = &((Collision *)contact_effect(m, "meet")->data)->surface->scene;
+  const Barrier *s = (const Barrier *)contact_effect(m, "meet")->data;
   PetscInt *list[CONTACT_BODIES], n[CONTACT_BODIES] = {0};
 
   PetscFunctionBeginUser;
-  for (PetscInt b = 0; b < m->nbody; b++) PetscCall(PetscMalloc1(s->nfacet, &list[b]));
-  for (PetscInt f = 0; f < s->nfacet; f++) list[s->facet_part[f]][n[s->facet_part[f]]++] = f;
-  for (PetscInt f = 0; f < s->nfacet; f++) {
+  for (PetscInt b = 0; b < m->nbody; b++) PetscCall(PetscMalloc1(s->mesh->ntriangle, &list[b]));
+  for (PetscInt f = 0; f < s->mesh->ntriangle; f++)
+    list[s->mesh->part[s->mesh->triangle[3 * f]]][n[s->mesh->part[s->mesh->triangle[3 * f]]]++] = f;
+  for (PetscInt f = 0; f < s->mesh->ntriangle; f++) {
     for (int q = 0; q < 3 * 8; q++) {
-      const PetscInt a = s->facet[3 * f + q / 8], b = s->facet[3 * f + (q / 8 + 1) % 3];
+      const PetscInt a = s->mesh->triangle[3 * f + q / 8], b = s->mesh->triangle[3 * f + (q / 8 + 1) % 3];
       PetscReal p[3];
 
       for (int k = 0; k < 3; k++)
         p[k] = s->x[3 * a + k] + (PetscReal)(q % 8) / 8 * (s->x[3 * b + k] - s->x[3 * a + k]);
       for (PetscInt o = 0; o < m->nbody; o++) {
-        if (o != s->facet_part[f]) *inside = PetscMax(*inside, pour_depth(s, list[o], n[o], p));
+        if (o != s->mesh->part[s->mesh->triangle[3 * f]])
+          *inside = PetscMax(*inside, pour_depth(s, list[o], n[o], p));
       }
     }
   }
@@ -157,12 +158,11 @@ static inline PetscErrorCode pour(PetscInt n, PetscReal end, PetscReal radius, P
   PetscFunctionBeginUser;
   PetscCall(PetscMalloc1(size, &text));
   PetscCall(pour_bodies(n, size, text));
-  PetscCall(PetscSNPrintf(
-    effects, sizeof(effects),
-    " -effects gravity,bowl,meet -effect_bowl_type contact -effect_bowl_response projected "
-    "-effect_bowl_obstacle bowl:0,0,%g,%g -effect_meet_type contact -effect_meet_response projected "
-    "-time euler_implicit -ts_dt 0.004 -ts_max_time %g -snes_rtol 1e-9 -ksp_rtol 1e-8",
-    (double)bowl[2], (double)radius, (double)end));
+  PetscCall(PetscSNPrintf(effects, sizeof(effects),
+                          " -effects gravity,bowl,meet -effect_bowl_type contact "
+                          "-effect_bowl_obstacle bowl:0,0,%g,%g -effect_meet_type contact "
+                          "-time euler_implicit -ts_dt 0.004 -ts_max_time %g -snes_rtol 1e-9 -ksp_rtol 1e-8",
+                          (double)bowl[2], (double)radius, (double)end));
   PetscCall(PetscStrlcat(text, effects, size));
   PetscCall(test_scene_open(text, &t));
   PetscCall(PetscFree(text));

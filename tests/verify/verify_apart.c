@@ -46,12 +46,12 @@ static PetscErrorCode motion(const char *options, Record *r, PetscInt *n, PetscR
 static PetscErrorCode check_named(const char *element, const char *time, const char *solver,
                                   PetscReal tolerance)
 {
-  static const char *const effects[4] = {
-    "-effects gravity", "-effects gravity,meet -effect_meet_type contact -effect_meet_response projected",
-    "-effects gravity,floor -effect_floor_type contact -effect_floor_response projected "
-    "-effect_floor_obstacle plane:0,0,1,-5 -effect_floor_friction 0.3",
-    "-effects gravity,meet,floor -effect_meet_type contact -effect_meet_response projected "
-    "-effect_floor_type contact -effect_floor_response projected -effect_floor_obstacle sphere:0,0,-9,1"};
+  static const char *const effects[4] = {"-effects gravity",
+                                         "-effects gravity,meet -effect_meet_type contact ",
+                                         "-effects gravity,floor -effect_floor_type contact "
+                                         "-effect_floor_obstacle plane:0,0,1,-5 -effect_floor_friction 0.3",
+                                         "-effects gravity,meet,floor -effect_meet_type contact "
+                                         "-effect_floor_type contact -effect_floor_obstacle sphere:0,0,-9,1"};
   PetscReal *value[4];
   PetscInt n = 0;
   char text[VERIFY_TEXT];
@@ -100,7 +100,7 @@ static PetscErrorCode check_beside(const char *solver, PetscReal tolerance)
                           "-bodies a,b,c " BODY("a", "p1", "0,0,0", "0,3,9")
                             BODY("b", "p1", "0.3,0,0", "2,0,-5") BODY("c", "p1", "0.43,0.03,0", "0,0,4") TIME
                           "-body_c_velocity -1,0,0 -effects meet -effect_meet_type contact "
-                          "-effect_meet_response projected -snes_rtol 1e-11 -ksp_rtol 1e-10",
+                          "-snes_rtol 1e-11 -ksp_rtol 1e-10",
                           "euler_implicit", solver));
   PetscCall(motion(text, &r, &all, &beside));
   verify_case("beside, %s", solver);

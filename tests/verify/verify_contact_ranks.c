@@ -17,7 +17,7 @@ typedef struct {
   Record r;
 } Motion;
 
-static PetscErrorCode solve(MPI_Comm comm, const char *sides, Motion *motion)
+static PetscErrorCode solve(MPI_Comm comm, Motion *motion)
 {
   TestScene t;
   char text[VERIFY_TEXT];
@@ -31,11 +31,11 @@ static PetscErrorCode solve(MPI_Comm comm, const char *sides, Motion *motion)
     "-body_high_mesh box:0.08,0.08,0.06:2 -body_high_material corotated -body_high_young 3e4 "
     "-body_high_poisson 0.3 -body_high_translate 0.03,0.013,0.075 -body_high_rotate 1,1,0,10 "
     "-body_high_velocity 0.3,0,-0.6 -effects gravity,floor,ball,meet -effect_floor_type contact "
-    "-effect_floor_response projected -effect_floor_obstacle plane:0,0,1,0 -effect_ball_type contact "
-    "-effect_ball_response projected -effect_ball_on high -effect_ball_obstacle sphere:0.17,0.05,0.07,0.04 "
-    "-effect_meet_type contact -effect_meet_response projected -effect_meet_passes %s -time euler_implicit "
+    "-effect_floor_obstacle plane:0,0,1,0 -effect_ball_type contact "
+    "-effect_ball_on high -effect_ball_obstacle sphere:0.17,0.05,0.07,0.04 "
+    "-effect_meet_type contact -time euler_implicit "
     "-ts_dt 0.003 -ts_max_time %g -snes_rtol 1e-11 -ksp_rtol 1e-10",
-    sides, 0.003 * STEPS));
+    0.003 * STEPS));
   PetscCall(test_scene_open_on(comm, NULL, text, &t));
   PetscCall(record_solve(&t, &motion->r));
   motion->n = verify_numbers(t.model);
@@ -45,16 +45,15 @@ static PetscErrorCode solve(MPI_Comm comm, const char *sides, Motion *motion)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode check(const char *sides, PetscReal tolerance)
+static PetscErrorCode check(PetscReal tolerance)
 {
   static const char *const contacts[3] = {"floor_contacts", "ball_contacts", "meet_contacts"};
   Motion m[2]; /* alone, together */
   PetscReal force[2][STEPS + 1] = {{0}};
 
   PetscFunctionBeginUser;
-  verify_case("passes %s", sides);
   for (int k = 0; k < 2; k++) {
-    PetscCall(solve(k ? PETSC_COMM_WORLD : PETSC_COMM_SELF, sides, &m[k]));
+    PetscCall(solve(k ? PETSC_COMM_WORLD : PETSC_COMM_SELF, &m[k]));
     VERIFY_NEAR(m[k].r.steps, STEPS, 0, "steps");
     for (PetscInt i = 0; i < m[k].r.n && i <= STEPS; i++)
       force[k][i] = record_at(&m[k].r, "floor_force_z", i);
@@ -80,11 +79,7 @@ static PetscErrorCode check(const char *sides, PetscReal tolerance)
 
 int main(int argc, char **argv)
 {
-  PetscMPIInt size;
-
   SB_TEST_BEGIN(argc, argv);
-  PetscCallMPI(MPI_Comm_size(PETSC_COMM_WORLD, &size));
-  PetscCall(check("two", 1e-7));
-  if (size == 2) PetscCall(check("one", 1e-7));
+  PetscCall(check(1e-7));
   SB_TEST_END();
 }

@@ -8,7 +8,7 @@
 /* CR and DG, whose points are the centroids of faces: their meshes are coarser, with about as many unknowns. */
 static PetscErrorCode check_element(const Pair *p, const char *element, PetscInt cells, PetscReal tolerance)
 {
-  const Case c = {cells, "projected", "one", 0.12, 1e-3, element};
+  const Case c = {cells, 0.12, 1e-3, element};
   PetscReal force;
 
   PetscFunctionBeginUser;

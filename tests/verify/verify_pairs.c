@@ -2,7 +2,7 @@
 /*
   What pairs of bodies do to each other: columns of the history for each pair, and places of contact.
 
-    heap    three bodies fly into each other above a floor, with each response and with friction: in every step the columns of a body's
+    heap    three bodies fly into each other above a floor, with friction and without: in every step the columns of a body's
             pairs sum to the net force of contact on it, places sum to the columns, and there are as many as are counted
     fold    a hairpin is pressed together: its pair with itself has all contacts and the whole normal force
     refused more pairs than the history takes; names of bodies that make two columns alike
@@ -20,9 +20,9 @@
   "-body_left_rotate 1,1,0,8 -body_left_translate 0.01,0.01,0.046 -body_top_mesh box:0.06,0.05,0.03:2 "    \
   "-body_top_rotate 0,1,0.3,12 -body_top_translate 0.02,0.02,0.1 -body_low_velocity 0,0,1.5 "              \
   "-body_top_velocity 0,0,-1.5 -body_left_velocity 0.2,0,0" LAW("low") LAW("left")                         \
-    LAW("top") "-effects meet,floor -effect_floor_type contact -effect_floor_response projected "          \
+    LAW("top") "-effects meet,floor -effect_floor_type contact "                                           \
                "-effect_floor_obstacle plane:0,0,1,-0.01 -effect_floor_on low -effect_floor_friction 0.3 " \
-               "-effect_meet_type contact -effect_meet_response projected -effect_meet_pairs yes "         \
+               "-effect_meet_type contact -effect_meet_pairs yes "                                         \
                "-time euler_implicit -ts_dt 0.002 -ts_max_time 0.02 -snes_rtol 1e-9 -ksp_rtol 1e-8 "
 
 typedef struct {
@@ -44,10 +44,9 @@ static PetscErrorCode sum_places(SbRun run, PetscReal t, Watch *w, PetscReal for
   PetscCall(SbModelContactPoints(run->model, t, run->U, run->reaction, &list));
   for (PetscInt i = 0; i < list.n; i++) {
     const SbContactPoint *p = &list.point[i];
-    const PetscReal push = SbDot3(p->force, p->normal);
 
     SB_CHECK_NEAR(SbDot3(p->normal, p->normal), 1, 1e-9, "length of a normal");
-    n[p->effect] += push > 0;
+    n[p->effect] += SbDot3(p->force, p->force) > 0;
     w->places++;
     w->edges += p->effect == 0 && p->id[0];
     for (int k = 0; k < 3; k++)
@@ -183,11 +182,12 @@ static PetscErrorCode check_fold(void)
   PetscCall(verify_open(
     &t,
     "-bodies a -body_a_mesh %s" LAW(
-      "a") "-sets low,high -set_low_at box:-1,-1,-1,0.03,1,0.01 -set_high_at box:-1,-1,0.03,0.002,1,1 "
+      "a") "-sets low,high -set_low_at box:-1,-1,-1,0.03,1,0.01 -set_high_at box:-1,-1,0.043,0.002,1,1 "
            "-effects hold,press,meet -effect_hold_type fixed -effect_hold_on low "
            "-effect_press_type prescribed_displacement -effect_press_on high "
-           "-effect_press_displacement 0;0;-0.4*t -effect_meet_type contact -effect_meet_response projected "
-           "-effect_meet_self yes -effect_meet_pairs yes -time euler_implicit -ts_dt 0.005 -ts_max_time 0.09",
+           "-effect_press_displacement 0;0;-0.4*t -effect_meet_type contact "
+           "-effect_meet_self yes -effect_meet_pairs yes -time euler_implicit -ts_dt 0.005 -ts_max_time "
+           "0.085",
     path));
   t.run->want_energies = PETSC_TRUE;
   PetscCall(SbRunAddMonitor(t.run, watch_fold, most, NULL));
@@ -221,10 +221,8 @@ static PetscErrorCode try_bodies(int n, const char *const name[], const char *mo
                             name[b], name[b], 2 * b, name[b], name[b], name[b]));
     PetscCall(PetscStrlcat(text, one, sizeof(text)));
   }
-  PetscCall(PetscStrlcat(
-    text,
-    " -effects meet -effect_meet_type contact -effect_meet_response projected -ts_dt 0.01 -ts_max_time 0.02 ",
-    sizeof(text)));
+  PetscCall(PetscStrlcat(text, " -effects meet -effect_meet_type contact -ts_dt 0.01 -ts_max_time 0.02 ",
+                         sizeof(text)));
   PetscCall(PetscStrlcat(text, more, sizeof(text)));
   if (names)
     SB_CHECK_ERROR(test_scene_open(text, &t), PETSC_ERR_USER_INPUT, names);
@@ -253,10 +251,8 @@ int main(int argc, char **argv)
 {
   SB_TEST_BEGIN(argc, argv);
   PetscCall(check_heap(" -effect_meet_friction 0.3"));
-  PetscCall(check_heap(" -effect_meet_response multiplier -saddle_solver iterative"));
-  PetscCall(check_heap(" -effect_meet_response augmented -effect_meet_friction 0.3"));
-  PetscCall(
-    check_heap(" -effect_meet_response penalty -effect_floor_response penalty -body_left_element cr"));
+  PetscCall(check_heap(""));
+  PetscCall(check_heap(" -body_left_element cr"));
   PetscCall(check_fold());
   PetscCall(check_refused());
   SB_TEST_END();

@@ -3,10 +3,8 @@
   Response `multiplier` against `projected`: the same nonlinear problem by another linear solve, so the same answer to what contact
   settles to.
 
-    stack      a block on a block, no friction: displacements, by factorisation and by three solvers in the null space
     pressed    a body that only contact carries, between two obstacles that stand still: its matrix alone is singular
     corner     obstacles, one and two at a node, beside a plane of symmetry: rows that depend on others
-    shear      friction between blocks: displacements to what friction is settled to
     drive      a moving obstacle: its work and its force in the account of energies
     limit      a limit of iterations that is reached is a failed solve
 */
@@ -66,44 +64,6 @@ static PetscErrorCode compare(const char *name, const char *scene, PetscInt n, c
   "_density 1000 "
 #define SETTLED 1e-8 /* of the displacements; they agree to 5e-10 */
 #define EXACT "-ksp_rtol 1e-12 -snes_rtol 1e-11 "
-
-/* ------------------------------------------------------------------ bodies */
-
-#define STACK                                                                                          \
-  "-bodies a,b -body_a_mesh box:0.2,0.1,0.05:2 -body_b_mesh box:0.08,0.06,0.05:3 -body_b_translate "   \
-  "0.06,0.021,0.05 " LAW("a")                                                                          \
-    LAW("b") "-sets bottom,top -set_bottom_at plane:0,0,1,0 -set_top_at plane:0,0,1,0.1 -time static " \
-             "-effects hold,push,meet -effect_hold_type fixed -effect_hold_on bottom "                 \
-             "-effect_push_type prescribed_displacement -effect_push_on top "                          \
-             "-effect_push_displacement 0.0005*t;0.0001*t;-0.002*t -effect_meet_type contact "         \
-             "-effect_meet_response projected "
-
-static PetscErrorCode check_stack(PetscInt n)
-{
-  static const char *const more[] = {
-    "-effect_meet_response projected",
-    "-effect_meet_response multiplier -saddle_solver direct -solver cg_pbjacobi",
-    "-effect_meet_response multiplier -saddle_solver direct -solver direct",
-    "-effect_meet_response multiplier -saddle_solver iterative -solver cg_icc",
-    "-effect_meet_response multiplier -saddle_solver iterative -solver cg_gamg",
-    "-effect_meet_response multiplier -saddle_solver iterative -solver direct"};
-
-  PetscFunctionBeginUser;
-  PetscCall(compare("stack", STACK EXACT, n, more, SETTLED));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode check_shear(void)
-{
-  static const char *const more[] = {"-effect_meet_response projected",
-                                     "-effect_meet_response multiplier -saddle_solver direct"};
-
-  PetscFunctionBeginUser;
-  PetscCall(compare("shear",
-                    STACK EXACT "-effect_meet_friction 0.3 -effect_meet_passes one -effect_meet_stiffness 2",
-                    2, more, SETTLED));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
 
 /* ------------------------------------------------------------------ obstacles */
 
@@ -187,8 +147,8 @@ static PetscErrorCode check_limit(void)
   TestScene t;
 
   PetscFunctionBeginUser;
-  PetscCall(test_scene_open(STACK "-effect_meet_response multiplier -saddle_solver iterative -solver cg_icc "
-                                  "-ksp_max_it 5 -time_max_halvings 1",
+  PetscCall(test_scene_open(PRESSED BOTH("multiplier") "-saddle_solver iterative -solver cg_icc "
+                                                       "-ksp_max_it 5 -time_max_halvings 1",
                             &t));
   PetscCall(SbRunSolve(t.run));
   SB_CHECK(strstr(t.run->stop_reason, "DIVERGED_ITS"), "five iterations: \"%s\"", t.run->stop_reason);
@@ -203,10 +163,8 @@ int main(int argc, char **argv)
   SB_TEST_BEGIN(argc, argv);
   PetscCallMPI(MPI_Comm_size(PETSC_COMM_WORLD, &size));
   /* many solves of small systems: on several ranks what differs there */
-  PetscCall(check_stack(size > 1 ? 3 : 6));
   PetscCall(check_pressed(size > 1 ? 4 : 6));
   PetscCall(check_corner());
-  PetscCall(check_shear());
   PetscCall(check_limit());
   if (size == 1) PetscCall(check_drive());
   SB_TEST_END();

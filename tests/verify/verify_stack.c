@@ -8,10 +8,6 @@
     smooth   without friction, a quarter of the stack between its planes of symmetry: standing free, it would slide apart at the
              least push, as a real one would
     rough    with friction 0.5, blocks turned and off the centre
-
-  What is left of the motion is a trembling in the place: a point between two facets of a bent surface rests on one of them in one step and
-  on the other in the next. Rows that others imply, of points with `passes two` and of edges, are not looked after, which lets some in by
-  a few 1e-4 of the size.
 */
 #include "contact.h"
 
@@ -105,8 +101,8 @@ static PetscErrorCode check_forces(SbRun run, PetscReal t, PetscReal *vertical, 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Bounds: of the speed at the end, m/s; of penetrations, as a part of the size. */
-static PetscErrorCode check_stack(const char *sides, PetscReal friction, PetscReal slow, PetscReal depth)
+/* Bounds: of the speed at the end, m/s. */
+static PetscErrorCode check_stack(PetscReal friction, PetscReal slow)
 {
   const PetscReal end = friction > 0 ? 0.8 : 1, size = 0.12;
   Since at = {.since = 0.8 * end};
@@ -116,15 +112,15 @@ static PetscErrorCode check_stack(const char *sides, PetscReal friction, PetscRe
   TestScene t;
 
   PetscFunctionBeginUser;
-  verify_case("stack, passes %s, friction %g", sides, (double)friction);
+  verify_case("stack, friction %g", (double)friction);
   PetscCall(write_blocks((PetscBool)(friction > 0), sizeof(bodies), bodies));
   PetscCall(
     verify_open(&t,
-                "%s %s -effect_floor_type contact -effect_floor_response projected -effect_floor_on b0 "
+                "%s %s -effect_floor_type contact -effect_floor_on b0 "
                 "-effect_floor_obstacle plane:0,0,1,0 -effect_floor_friction %g -effect_meet_type contact "
-                "-effect_meet_response projected -effect_meet_passes %s -effect_meet_friction %g "
+                "-effect_meet_friction %g "
                 "-time euler_implicit -ts_dt 0.01 -ts_max_time %g -snes_rtol 1e-10 -ksp_rtol 1e-9",
-                bodies, friction > 0 ? "-effects gravity,floor,meet" : GUIDED, (double)friction, sides,
+                bodies, friction > 0 ? "-effects gravity,floor,meet" : GUIDED, (double)friction,
                 (double)friction, (double)end));
   PetscCall(SbRunAddMonitor(t.run, keep, &at, NULL));
   PetscCall(record_solve(&t, &r));
@@ -137,12 +133,13 @@ static PetscErrorCode check_stack(const char *sides, PetscReal friction, PetscRe
   VERIFY_LESS(vertical, 1e-3, "force of an interface against the weight above, off by");
   if (friction > 0) VERIFY_LESS(sideways, 1e-3, "force on a block sideways, of its weight");
   VERIFY_NEAR(record_last(&r, "floor_force_z") / weight, 1, 1e-3, "force of the floor against the weight");
-  VERIFY_NEAR(record_last(&r, "meet_normal_force") / sum, 1, 1e-3,
+  VERIFY_NEAR(record_last(&r, "meet_normal_force") / sum, 1, 2e-3,
               "normal forces in the history against the weights");
   VERIFY_LESS(record_last(&r, "speed"), slow, "fastest node, m/s");
-  VERIFY_LESS(drift, 1e-5 * size, "motion at rest, m");
+  /* what sticks creeps with less than 1e-3 of the size per second */
+  VERIFY_LESS(drift, (friction > 0 ? 1e-4 : 1e-5) * size, "motion at rest, m");
   VERIFY_LESS(record_max(&r, "floor_penetration"), 1e-6 * size, "behind the floor, m");
-  VERIFY_LESS(record_max(&r, "meet_penetration"), depth * size, "in each other, m");
+  VERIFY_NEAR(record_max(&r, "meet_penetration"), 0, 0, "in each other, m");
   SB_CHECK(record_starts(&r, "floor_contacts") >= 1, "the blocks did not fall");
   VERIFY_MORE(record_max(&r, "meet_contacts"), 20, "pairs");
   VERIFY_MORE(record_max(&r, "floor_force_z"), 1.2 * weight, "largest force of the floor, N");
@@ -159,9 +156,8 @@ int main(int argc, char **argv)
 
   SB_TEST_BEGIN(argc, argv);
   PetscCallMPI(MPI_Comm_size(PETSC_COMM_WORLD, &size));
-  PetscCall(check_stack("two", 0, 5e-4, 1e-4));
+  PetscCall(check_stack(0, 5e-4));
   if (size > 1) SB_TEST_END(); /* many solves of a small system: on one rank only */
-  PetscCall(check_stack("one", 0, 5e-4, 1e-6));
-  PetscCall(check_stack("one", 0.5, 1e-4, 5e-4));
+  PetscCall(check_stack(0.5, 1e-4));
   SB_TEST_END();
 }

@@ -1,10 +1,7 @@
 /*
-  collision_pairs.c - what each pair of bodies does to each other, for the history, and where, for the frames.
-
-  Forces are read from the rows of the last solve, in their directions and with their friction: summed over the pairs of a body they
-  are what contact moves it with, to rounding. A row that others say already has no force; theirs has it.
+  pair_columns.c - columns of the history for each pair of bodies: what they do to each other.
 */
-#include "collision.h"
+#include "barrier.h"
 
 #define PAIRS 200 /* that the history may have columns for */
 
@@ -12,30 +9,6 @@ static const char *const apart_names[] = {"force_x", "force_y", "force_z", "cont
 static const char *const self_names[] = {"normal_force", "contacts"};
 #define APART 4 /* columns of two bodies */
 #define SELF 2  /* and of one with itself, whose net force is zero */
-
-PetscInt SbCollisionFirst(const Collision *c, const Hit *hit)
-{
-  const SbDetectScene *s = &c->surface->scene;
-
-  return SbCollisionOfEdges(c, hit) ? s->edges->part[hit->point - s->npoint] : s->point_part[hit->point];
-}
-
-/* Force on that body, N, and the normal that the last solve had. False when there is none. */
-static PetscBool force_of(SbSpace space, const Hit *hit, PetscReal normal[3], PetscReal force[3])
-{
-  PetscReal across[3];
-
-  force[0] = force[1] = force[2] = 0;
-  if (!hit->on || hit->row < 0) return PETSC_FALSE;
-  SbSpaceGetConstraintForce(space, hit->row, hit->held, normal, force);
-  for (int q = 0; q < 2; q++) {
-    if (hit->grip.slide[q] >= 0)
-      SbSpaceGetConstraintForce(space, hit->grip.slide[q], hit->held, across, force);
-  }
-  return (PetscBool)(SbDot3(force, force) > 0);
-}
-
-/* ------------------------------------------------------------------ history */
 
 /* The columns of two bodies, or of one with itself, behind the n that there are. */
 static PetscErrorCode name_columns(SbEffect e, SbPairs *p, const char a[], const char b[], PetscInt *n)
@@ -106,18 +79,6 @@ void SbPairsAdd(const SbPairs *p, PetscInt first, PetscInt second, PetscReal nor
   at[3] += normal_force > 0.;
 }
 
-void SbCollisionPairsHistory(const Collision *c, SbSpace space, PetscReal values[])
-{
-  for (PetscInt i = 0; c->pairs.wanted && i < c->nhit; i++) {
-    const Hit *hit = &c->hit[i];
-    PetscReal normal[3], force[3];
-
-    (void)force_of(space, hit, normal, force);
-    SbPairsAdd(&c->pairs, SbCollisionFirst(c, hit), hit->body,
-               hit->on ? PetscMax(0., SbCollisionForce(c, hit)) : 0., force, values);
-  }
-}
-
 PetscErrorCode SbPairsFree(SbPairs *p)
 {
   PetscFunctionBeginUser;
@@ -125,48 +86,5 @@ PetscErrorCode SbPairsFree(SbPairs *p)
   PetscCall(PetscFree(p->place));
   PetscCall(PetscFree(p->column));
   PetscCall(PetscFree(p->text));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* ------------------------------------------------------------------ places */
-
-/* Where a pair is on its first body, m; numbers that name it: kind, that of the point or edge, that of the other body or edge. */
-static void place_of(const Collision *c, const Hit *hit, SbContactPoint *place)
-{
-  const SbDetectScene *s = &c->surface->scene;
-  const PetscBool edges = SbCollisionOfEdges(c, hit);
-  const PetscInt own = edges ? hit->point - s->npoint : hit->point;
-
-  place->id[0] = edges;
-  place->id[1] = edges ? s->edges->id[own] : s->point_id[own];
-  place->id[2] = hit->part;
-  for (int k = 0; k < 3; k++) {
-    if (!edges)
-      place->x[k] = s->p[3 * own + k];
-    else
-      place->x[k] = (1 - hit->at) * s->x[3 * s->edges->corner[4 * own] + k] +
-                    hit->at * s->x[3 * s->edges->corner[4 * own + 1] + k];
-  }
-}
-
-PetscErrorCode SbEffectContactPoints_Collision(SbEffect e, SbSpace space, const SbStage *stage,
-                                               const PetscReal residual[], SbContactPoints *list)
-{
-  const Collision *c = (const Collision *)e->data;
-
-  PetscFunctionBeginUser;
-  (void)stage;
-  (void)residual;
-  for (PetscInt i = 0; i < c->nhit; i++) {
-    const Hit *hit = &c->hit[i];
-    SbContactPoint place;
-
-    if (!force_of(space, hit, place.normal, place.force)) continue;
-    place_of(c, hit, &place);
-    place.body[0] = SbCollisionFirst(c, hit);
-    place.body[1] = hit->body;
-    place.gap = hit->gap;
-    PetscCall(SbContactPointsAdd(list, &place));
-  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
