@@ -2,11 +2,12 @@
   crossings.c - whether surfaces are in each other: edges that go through triangles. It shares nothing with the search for pairs but the tree of boxes.
 
   An edge goes through a triangle where its ends are on different sides of the plane and the line passes the three sides the same way round; signs of volumes of tets tell. Volumes
-  below rounding count as neither.
+  below rounding, that of the coordinates too, count as neither: bodies that touch are not in each other.
 */
 #include "contact_mesh.h"
 
-#define ROUNDING 64 /* in units of eps of the products that a volume is made of */
+#define ROUNDING \
+  64 /* in units of eps of the products that a volume is made of, with the coordinates for its height */
 
 typedef struct {
   SbContactMesh mesh;
@@ -18,18 +19,19 @@ typedef struct {
 /* Sign of the volume of a tet, 0 within rounding. */
 static int side_of(const PetscReal *a, const PetscReal *b, const PetscReal *c, const PetscReal *d)
 {
-  PetscReal p[3], q[3], r[3], n[3], volume, size = 0.;
+  PetscReal p[3], q[3], r[3], n[3], volume, size = 0., far = 0.;
 
   for (int i = 0; i < 3; i++) {
     p[i] = b[i] - a[i];
     q[i] = c[i] - a[i];
     r[i] = d[i] - a[i];
+    far = PetscMax(far, PetscMax(PetscAbsReal(a[i]), PetscAbsReal(d[i])));
   }
   SbCross(p, q, n);
   volume = SbDot3(n, r);
   for (int i = 0; i < 3; i++)
     size += (PetscAbsReal(p[(i + 1) % 3] * q[(i + 2) % 3]) + PetscAbsReal(p[(i + 2) % 3] * q[(i + 1) % 3])) *
-            PetscAbsReal(r[i]);
+            (PetscAbsReal(r[i]) + far);
   if (PetscAbsReal(volume) <= ROUNDING * PETSC_MACHINE_EPSILON * size) return 0;
   return volume > 0. ? 1 : -1;
 }
