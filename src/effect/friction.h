@@ -1,5 +1,5 @@
 /*
-  friction.h - Coulomb friction of a pair that touches, whatever its rows join: a node and an obstacle (contact), or two surfaces (collision).
+  friction.h - Coulomb friction of a node and an obstacle that touch, with exact responses and springs.
 */
 #pragma once
 #include "sbfem.h"

@@ -31,7 +31,7 @@ static PetscErrorCode open_on(MPI_Comm comm, TestScene *t, const char *format, .
 }
 
 /* History columns of the effect of contact, on every rank. */
-static PetscErrorCode collision_values(SbRun run, PetscReal values[NVALUE])
+static PetscErrorCode contact_values(SbRun run, PetscReal values[NVALUE])
 {
   SbModel m = run->model;
   SbStage stage = {.shift_k = 1};
@@ -201,7 +201,7 @@ static PetscErrorCode watch(SbRun run, const SbStep *step, void *ctx)
   SbEnergies e;
 
   PetscFunctionBeginUser;
-  PetscCall(collision_values(run, values));
+  PetscCall(contact_values(run, values));
   if (!run->model->space->faces) PetscCall(depth_of(run->model, step->U, &depth)); /* vertices are nodes */
   PetscCall(height_over(run->model, step->U, seen->at, &height));
   PetscCall(SbModelEnergies(run->model, step->U, step->V, &e));
@@ -247,7 +247,7 @@ static PetscErrorCode lay_bars(MPI_Comm comm, const char *more, Seen *seen, Pets
   PetscCall(open_on(comm, &t, BARS "%s", more));
   PetscCall(SbRunAddMonitor(t.run, watch, seen, NULL));
   PetscCall(verify_solve(&t, "bars"));
-  PetscCall(collision_values(t.run, values));
+  PetscCall(contact_values(t.run, values));
   PetscCall(test_value_at(t.model, t.run->U, middle, u));
   PetscCall(test_scene_close(&t));
   PetscFunctionReturn(PETSC_SUCCESS);
