@@ -15,7 +15,7 @@ typedef enum {
   SB_EVENT_ENERGY,
   SB_EVENT_EFFECTS,
   SB_EVENT_CONTACT,
-  SB_EVENT_SEARCH,  /* within it: points against facets, on all ranks */
+  SB_EVENT_SEARCH,  /* for pairs of vertices, edges and triangles that may meet */
   SB_EVENT_PROJECT, /* within solves: into the null space of the contact constraints */
   SB_EVENT_SOLVER_SETUP,
   SB_EVENT_OUTPUT,

@@ -4,9 +4,6 @@
 #pragma once
 #include "sbbarrier.h"
 
-/* What all ranks have, one after the other; n and total count items of the type, `size` bytes each. Collective; the caller frees `all`. */
-PetscErrorCode SbContactGather(MPI_Comm comm, PetscInt n, MPI_Datatype type, size_t size, const void *mine,
-                               PetscInt *total, void *all);
 /*
   SbContactMeshCrossings - edges that go through triangles of another part, or of the same one (self), at x.
 

@@ -25,7 +25,8 @@ static int side_of(const PetscReal *a, const PetscReal *b, const PetscReal *c, c
     p[i] = b[i] - a[i];
     q[i] = c[i] - a[i];
     r[i] = d[i] - a[i];
-    far = PetscMax(far, PetscMax(PetscAbsReal(a[i]), PetscAbsReal(d[i])));
+    far = PetscMax(far, PetscMax(PetscMax(PetscAbsReal(a[i]), PetscAbsReal(b[i])),
+                                 PetscMax(PetscAbsReal(c[i]), PetscAbsReal(d[i]))));
   }
   SbCross(p, q, n);
   volume = SbDot3(n, r);

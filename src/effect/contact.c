@@ -44,7 +44,8 @@ static const SbOption rows[] = {
    "response barrier: after each step, edges that go through triangles are searched for, and end the run"},
   {"friction_solves", SB_OPTION_INT, 1, "", "0", "[0, inf)",
    "response barrier: solves of a step, at most, each with the normal forces and directions that friction "
-   "had at the end of the one before; 0: one, in static runs 100"},
+   "had at the end of the one before; 0: one, two where friction changes by more than half, in static runs "
+   "100"},
   {"friction_tolerance", SB_OPTION_REAL, 1, "", "1e-3", "(0, inf)",
    "response barrier: with more solves than one, change of friction in the last one, as part of Coulomb's "
    "limit"},

@@ -2,6 +2,7 @@
   Guarded contact as Newton's method sees it: all effects that have it together.
 */
 #include "model_impl.h"
+#include "sbbarrier.h"
 
 #define ROUNDS 20   /* of motions of bodies that touch */
 #define SWEEPS 1000 /* over what touches, in each */
@@ -22,7 +23,6 @@ static int by_value(const void *a, const void *b)
 /* What touches on any rank, the same on all and in an order that no partition changes: bodies, direction, gap and the one to have. */
 static PetscErrorCode gather_touches(MPI_Comm comm, const SbTouches *mine, PetscInt *n, PetscReal (**all)[7])
 {
-  PetscMPIInt ranks, count, *counts, *first;
   PetscReal(*own)[7];
 
   PetscFunctionBeginUser;
@@ -35,17 +35,9 @@ static PetscErrorCode gather_touches(MPI_Comm comm, const SbTouches *mine, Petsc
     own[i][5] = t->gap;
     own[i][6] = t->to;
   }
-  PetscCallMPI(MPI_Comm_size(comm, &ranks));
-  PetscCall(PetscMalloc2(ranks, &counts, ranks + 1, &first));
-  PetscCall(PetscMPIIntCast(7 * mine->n, &count));
-  PetscCallMPI(MPI_Allgather(&count, 1, MPI_INT, counts, 1, MPI_INT, comm));
-  first[0] = 0;
-  for (PetscMPIInt r = 0; r < ranks; r++) first[r + 1] = first[r] + counts[r];
-  *n = first[ranks] / 7;
-  PetscCall(PetscMalloc1(*n + 1, all));
-  PetscCallMPI(MPI_Allgatherv(own, count, MPIU_REAL, *all, counts, first, MPIU_REAL, comm));
+  PetscCall(SbContactGather(comm, 7 * mine->n, MPIU_REAL, sizeof(PetscReal), own, n, all));
+  *n /= 7;
   qsort(*all, (size_t)*n, sizeof(**all), by_value);
-  PetscCall(PetscFree2(counts, first));
   PetscCall(PetscFree(own));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -95,7 +87,7 @@ static void find_ways(PetscInt n, PetscReal (*touch)[7], PetscInt nbody, uint8_t
                       PetscBool *moved)
 {
   PetscReal longest = 0., most = PETSC_MAX_REAL, scale;
-  PetscBool again = PETSC_FALSE;
+  PetscBool again;
 
   *moved = PETSC_FALSE;
   for (PetscInt i = 0; i < n; i++) {
@@ -125,7 +117,6 @@ static void find_ways(PetscInt n, PetscReal (*touch)[7], PetscInt nbody, uint8_t
   } while (again);
 
   /* not too far at once */
-  *moved = PETSC_FALSE;
   for (PetscInt b = 0; b <= nbody; b++)
     longest = PetscMax(longest, PetscSqrtReal(SbDot3(way + 3 * b, way + 3 * b)));
   *moved = (PetscBool)(longest > MISSED * most);

@@ -106,6 +106,7 @@ static PetscErrorCode check(const Case *c, const char *more, PetscReal exact, co
   } else {
     SB_CHECK(!code && !stop[0], "%s, %s: code %d, %s%s", c->name, more, (int)code, sb_test_text, stop);
     if (!code && !stop[0] && exact > 0.)
+      /* where surfaces push each other Newton's method ends by the length of its step */
       SB_CHECK(PetscAbsReal(x - exact) <= (strcmp(c->name, "pairs") ? 1e-4 : 1e-3) * exact,
                "%s, %s: %.10g, not %.10g", c->name, more, (double)x, (double)exact);
   }

@@ -144,7 +144,8 @@ static inline PetscErrorCode read_forces(SbRun run, PetscReal values[NVALUE], Pe
 }
 
 /*
-  Force of a case, taken from the far face of the upper body, as a part of the formula's. The force in the history must be the same.
+  Force of a case, taken from the far face of the upper body, as a part of the formula's. The force in the history, a sum over pairs of which those of
+  edges lean a little, must be the same but for that.
 */
 static inline PetscErrorCode hertz(const Pair *p, const Case *c, PetscReal *force)
 {

@@ -55,7 +55,7 @@ static PetscErrorCode check_drape(PetscBool rigid, PetscInt cells, PetscInt thic
                     "-bodies cloth,ball -body_ball_mesh %s -body_ball_translate 0,0,%g "
                     "-body_ball_material corotated -body_ball_young 2e5 -body_ball_poisson 0.3 -sets foot "
                     "-set_foot_at halfspace:0,0,1,%g -effects gravity,foot,meet -effect_foot_type fixed "
-                    "-effect_foot_on foot -effect_meet_type contact ",
+                    "-effect_foot_on foot -effect_meet_type contact",
                     path, -RADIUS, -1.6 * RADIUS));
   PetscCall(verify_open(&t,
                         "%s -body_cloth_mesh box:%g,%g,%g:%d,%d,%d -body_cloth_translate %g,%g,%g "

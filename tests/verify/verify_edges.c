@@ -226,8 +226,7 @@ static PetscErrorCode watch(SbRun run, const SbStep *step, void *ctx)
   "-sets skin,a0,a1,b0,b1 -set_skin_at boundary -set_a0_at plane:1,0,0,0 -set_a1_at plane:1,0,0,0.21 "      \
   "-set_b0_at plane:0,1,0,-0.105 -set_b1_at plane:0,1,0,0.105 -effect_a0_type fixed -effect_a0_on a0 "      \
   "-effect_a1_type fixed -effect_a1_on a1 -effect_b0_type fixed -effect_b0_on b0 -effect_b0_components xy " \
-  "-effect_b1_type fixed -effect_b1_on b1 -effect_b1_components xy -effect_meet_type contact "              \
-  ""
+  "-effect_b1_type fixed -effect_b1_on b1 -effect_b1_components xy -effect_meet_type contact "
 #define BARS                                                                                                \
   "-bodies a,b -body_a_mesh box:0.21,0.03,0.03:7,1,1 -body_a_rotate 1,0,0,45 -body_b_mesh "                 \
   "box:0.03,0.21,0.03:1,7,1 -body_b_rotate 0,1,0,-45 -body_b_translate 0.105,-0.105,0.0434264 -effects "    \

@@ -5,10 +5,11 @@
 */
 #include "hertz.h"
 
-/* CR and DG, whose points are the centroids of faces: their meshes are coarser, with about as many unknowns. */
+/* CR and DG, whose points are the centroids of faces: their meshes are coarser, with about as many unknowns. The gap of the barrier adds
+   up to 1.5 % to the force. */
 static PetscErrorCode check_element(const Pair *p, const char *element, PetscInt cells, PetscReal tolerance)
 {
-  const Case c = {cells, 0.12, 1e-3, element};
+  const Case c = {cells, 0.12, 5e-3, element};
   PetscReal force;
 
   PetscFunctionBeginUser;
@@ -65,9 +66,9 @@ int main(int argc, char **argv)
   static const Pair spheres = {"two spheres", {1e5, 1e5}, {2 * RADIUS, 2 * RADIUS}};
 
   SB_TEST_BEGIN(argc, argv);
-  PetscCall(check_element(&sphere, "cr", 10, 0.03));
-  PetscCall(check_element(&sphere, "dg", 10, 0.03));
-  PetscCall(check_element(&spheres, "cr", 10, 0.03));
+  PetscCall(check_element(&sphere, "cr", 10, 0.04));
+  PetscCall(check_element(&sphere, "dg", 10, 0.04));
+  PetscCall(check_element(&spheres, "cr", 10, 0.04));
   PetscCall(check_plane("p1", CELLS, 0.03));
   PetscCall(check_plane("cr", 10, 0.03));
   PetscCall(check_plane("dg", 10, 0.03));
