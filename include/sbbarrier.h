@@ -53,10 +53,6 @@ PetscErrorCode SbContactMeshMarkDriven(SbContactMesh mesh);
 /* x[nvertex][3] of vertices from local displacements u (ghosts up to date) and the obstacle's pose (NULL without one), m. Collective. */
 PetscErrorCode SbContactMeshMove(SbContactMesh mesh, const PetscReal u[], const SbPose *pose, PetscReal x[]);
 
-/* What all ranks have, one after the other; n and total count items of the type, `size` bytes each. Collective; the caller frees `all`. */
-PetscErrorCode SbContactGather(MPI_Comm comm, PetscInt n, MPI_Datatype type, size_t size, const void *mine,
-                               PetscInt *total, void *all);
-
 /* Two features: vertex 0 and triangle 1 to 3; edges 0 1 and 2 3; or vertex 0 and the side of the obstacle. */
 typedef struct {
   PetscBool side;

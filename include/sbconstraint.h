@@ -24,7 +24,6 @@ typedef struct _p_SbSaddleFactor *SbSaddleFactor; /* saddle_factor.c */
 
 struct _p_SbConstraints {
   SbSaddle saddle;          /* how solves find the multipliers */
-  PetscBool external;       /* constraints may tie nodes to something that is no body */
   PetscInt version, matrix; /* raised when the constraints change, and when K does */
   SbSaddleFactor factored;  /* NULL before the first solve with SB_SADDLE_DIRECT */
   PetscErrorCode (*destroy_factored)(SbSaddleFactor *); /* by who made it */

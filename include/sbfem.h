@@ -182,7 +182,7 @@ void SbNodalConstraintsVelocity(SbSpace space, PetscReal v[]);
 PetscReal SbSpaceGetNodalConstraintForce(SbSpace space, PetscInt node, PetscInt k, const PetscReal r[3]);
 
 /*
-  Constraints that join nodes of any rank (contact between bodies, src/fem/constraint.c): sum_k coef_k . u_k = value, exactly or by a spring.
+  Constraints that join nodes of any rank (contact with obstacles by friction and springs, src/fem/constraint.c): sum_k coef_k . u_k = value, exactly or by a spring.
 
   SbSpaceCreateConstraints() during set-up of an effect that may need them. Then, as often as they change: SbSpaceClearConstraints(), constraints on
   any rank, SbSpaceAssembleConstraints() (collective). SbModelPrescribe(), residuals and solves follow: solves run in the null space of
@@ -191,17 +191,14 @@ PetscReal SbSpaceGetNodalConstraintForce(SbSpace space, PetscInt node, PetscInt 
 */
 /* How solves treat the exact constraints: in their null space, or as [K F^T; G 0] by a factorisation. */
 typedef enum { SB_SADDLE_NONE, SB_SADDLE_DIRECT } SbSaddle;
-/* external: constraints may join nodes to something that is no body (those of a negative id), whose forces are reactions. Alike on all ranks. */
-PetscErrorCode SbSpaceCreateConstraints(SbSpace space, PetscBool external, PetscBool nonsymmetric);
-/* Whether there may be such constraints. Not collective. */
-PetscBool SbSpaceHasExternalConstraints(SbSpace space);
+/* Alike on all ranks. */
+PetscErrorCode SbSpaceCreateConstraints(SbSpace space, PetscBool nonsymmetric);
 /* Whether solves of this space are not symmetric. Not collective. */
 PetscBool SbSpaceHasNonsymmetricConstraints(SbSpace space);
 /* Not collective. */
 void SbSpaceClearConstraints(SbSpace space);
-/* gnode[n]: global numbers of nodes; coef[n][3] of the sum; push[n][3] of the force, NULL: the same; value in m; id: constraints that say nearly
-   what those of lower ids say rest, so that no partition changes which; negative: of a node and something that is no body, which rest only
-   if they are fully said by others. Output: constraint, its number on this rank. Not collective. */
+/* gnode[n]: global numbers of nodes; coef[n][3] of the sum; push[n][3] of the force, NULL: the same; value in m; id: constraints that say
+   what those of lower ids say rest, so that no partition changes which. Output: constraint, its number on this rank. Not collective. */
 PetscErrorCode SbSpaceAddConstraint(SbSpace space, PetscInt id, PetscInt n, const PetscInt gnode[],
                                     const PetscReal coef[], const PetscReal push[], PetscReal value,
                                     PetscInt *constraint);
@@ -209,14 +206,12 @@ PetscErrorCode SbSpaceAddConstraint(SbSpace space, PetscInt id, PetscInt n, cons
 PetscErrorCode SbSpaceAddPenaltyConstraint(SbSpace space, PetscInt n, const PetscInt gnode[],
                                            const PetscReal coef[], const PetscReal push[], PetscReal value,
                                            PetscReal stiffness, PetscReal constant, PetscInt *constraint);
-/* The spring joins nodes to something that is no body: its force is a reaction. Not collective. */
-void SbSpaceSetConstraintExternal(SbSpace space, PetscInt constraint);
 /* Makes matrices of the constraints; without constraints on any rank it exchanges no more than their number. Collective. */
 PetscErrorCode SbSpaceAssembleConstraints(SbSpace space);
 /* What constraints exert and where they are, for the displacement U and its residual R without constraints (N). R <- R less the
    forces of the exact constraints: what is left is for supports and obstacles. Collective. */
 PetscErrorCode SbSpaceComputeConstraintForces(SbSpace space, Vec U, Vec R);
-/* R += what constraints of negative ids push free unknowns with, N, after SbSpaceComputeConstraintForces(). Collective. */
+/* R += what constraints push free unknowns with, N, after SbSpaceComputeConstraintForces(). Collective. */
 PetscErrorCode SbSpaceAddConstraintReactions(SbSpace space, Vec R);
 /* Whether an exact constraint rests: others say it, or it has no free direction. It has no force, and its sum is not looked after. */
 PetscBool SbSpaceIsConstraintRedundant(SbSpace space, PetscInt constraint);

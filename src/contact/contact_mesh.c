@@ -13,27 +13,6 @@
 #include "contact_mesh.h"
 #include "obstacle.h"
 
-PetscErrorCode SbContactGather(MPI_Comm comm, PetscInt n, MPI_Datatype type, size_t size, const void *mine,
-                               PetscInt *total, void *all)
-{
-  PetscMPIInt ranks, *count, *first, mine_n;
-  char *to;
-
-  PetscFunctionBeginUser;
-  PetscCallMPI(MPI_Comm_size(comm, &ranks));
-  PetscCall(PetscMPIIntCast(n, &mine_n));
-  PetscCall(PetscMalloc2(ranks, &count, ranks + 1, &first));
-  PetscCallMPI(MPI_Allgather(&mine_n, 1, MPI_INT, count, 1, MPI_INT, comm));
-  first[0] = 0;
-  for (PetscMPIInt r = 0; r < ranks; r++) first[r + 1] = first[r] + count[r];
-  *total = first[ranks];
-  PetscCall(PetscMalloc1((size_t)*total * size + 1, &to));
-  PetscCallMPI(MPI_Allgatherv(mine, mine_n, type, to, count, first, type, comm));
-  *(void **)all = to;
-  PetscCall(PetscFree2(count, first));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* Points of a facet: its three corners; with P2 the middles of its sides too, 3 + k between the corners k and k + 1. */
 static inline PetscInt npoint_of(SbSpace s, const SbFacet *f)
 {
@@ -177,8 +156,8 @@ static PetscErrorCode make_vertices(SbContactMesh m, PetscInt n, const SbFacet f
   PetscCallMPI(MPI_Comm_size(s->comm, &ranks));
   PetscCallMPI(MPI_Comm_rank(s->comm, &rank));
   PetscCall(list_own(m, n, facet, &nnumber, &number, &nreal, &real));
-  PetscCall(SbContactGather(s->comm, nnumber, MPIU_INT, sizeof(PetscInt), number, &Nnumber, &all));
-  PetscCall(SbContactGather(s->comm, nreal, MPIU_REAL, sizeof(PetscReal), real, &Nreal, &values));
+  PetscCall(SbGatherAll(s->comm, MPIU_INT, nnumber, number, &Nnumber, &all, NULL));
+  PetscCall(SbGatherAll(s->comm, MPIU_REAL, nreal, real, &Nreal, &values, NULL));
   PetscCall(PetscFree(number));
   PetscCall(PetscFree(real));
 
@@ -269,9 +248,9 @@ static PetscErrorCode make_triangles(SbContactMesh m, PetscInt n, const SbFacet 
       }
     }
   }
-  PetscCall(SbContactGather(s->comm, 4 * nmine, MPIU_INT, sizeof(PetscInt), mine, &total, &all));
+  PetscCall(SbGatherAll(s->comm, MPIU_INT, 4 * nmine, mine, &total, &all, NULL));
   PetscCall(PetscFree(mine));
-  qsort(all, (size_t)(total / 4), 4 * sizeof(PetscInt), compare_triangles);
+  if (total) qsort(all, (size_t)(total / 4), 4 * sizeof(PetscInt), compare_triangles);
 
   /* vertices by their nodes, where they are in the middle of sides */
   PetscCall(PetscMalloc2(m->nbody_vertex, &gnode, m->nbody_vertex, &vertex));

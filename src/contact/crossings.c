@@ -103,10 +103,10 @@ PetscErrorCode SbContactMeshCrossings(SbContactMesh m, PetscBool self, const Pet
   PetscCall(PetscFree(box));
 
   /* those of all ranks */
-  PetscCall(SbContactGather(m->space->comm, 2 * s.n, MPIU_INT, sizeof(PetscInt), s.hit, n, hits));
+  PetscCall(SbGatherAll(m->space->comm, MPIU_INT, 2 * s.n, s.hit, n, hits, NULL));
   PetscCall(PetscFree(s.hit));
   *n /= 2;
-  qsort(*hits, (size_t)*n, 2 * sizeof(PetscInt), compare_hits);
+  if (*n) qsort(*hits, (size_t)*n, 2 * sizeof(PetscInt), compare_hits);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -182,7 +182,7 @@ static PetscErrorCode setup_contact(SbEffect e, SbSpace space)
   }
   c->size = PetscSqrtReal(SbDot3(box, box));
   if (c->rows)
-    PetscCall(SbSpaceCreateConstraints(space, PETSC_TRUE, (PetscBool)(c->friction.mu > 0)));
+    PetscCall(SbSpaceCreateConstraints(space, (PetscBool)(c->friction.mu > 0)));
   else if (exact(c))
     PetscCall(SbSpaceCreateNodalConstraints(space));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -341,13 +341,11 @@ static PetscErrorCode hold_rows(const Contact *c, SbSpace space, Touch *touch)
   PetscFunctionBeginUser;
   if (c->friction.mu > 0) SbFrictionDirection(&c->friction, &p, push, &oblique);
   if (exact(c))
-    PetscCall(SbSpaceAddConstraint(space, NORMALS - 1 - id, 1, p.node, touch->n, oblique ? push : NULL,
+    PetscCall(SbSpaceAddConstraint(space, NORMALS - 1 - id, 1, &p.node, touch->n, oblique ? push : NULL,
                                    touch->value, &touch->along));
-  else {
-    PetscCall(SbSpaceAddPenaltyConstraint(space, 1, p.node, touch->n, oblique ? push : NULL, touch->value,
+  else
+    PetscCall(SbSpaceAddPenaltyConstraint(space, 1, &p.node, touch->n, oblique ? push : NULL, touch->value,
                                           touch->stiff, touch->lambda + touch->before, &touch->along));
-    SbSpaceSetConstraintExternal(space, touch->along);
-  }
   if (c->friction.mu > 0) PetscCall(SbFrictionHold(&c->friction, space, &p, -2 - 2 * id));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -103,17 +103,12 @@ static inline PetscReal SbContactForce(const Contact *c, const Touch *touch)
 /* A node as friction sees it; held by rows. */
 static inline SbFrictionPair pair_of(SbSpace space, Touch *touch)
 {
-  static const PetscReal one = 1;
-
-  return (SbFrictionPair){.n = 1,
-                          .node = &space->gnode[touch->node],
-                          .weight = &one,
+  return (SbFrictionPair){.node = space->gnode[touch->node],
                           .normal = touch->n,
                           .start = touch->start,
                           .now = touch->now,
                           .k = touch->k,
                           .rests = touch->rests,
-                          .outer = PETSC_TRUE,
                           .fixed = space->fixed[touch->node],
                           .grip = &touch->grip};
 }

@@ -121,7 +121,6 @@ void SbFrictionDirection(const SbFriction *f, const SbFrictionPair *p, PetscReal
 PetscErrorCode SbFrictionHold(const SbFriction *f, SbSpace space, const SbFrictionPair *p, PetscInt id)
 {
   SbFrictionState *g = p->grip;
-  PetscReal coef[3 * SB_FRICTION_NODES];
 
   PetscFunctionBeginUser;
   if (p->rests) PetscFunctionReturn(PETSC_SUCCESS);
@@ -133,18 +132,15 @@ PetscErrorCode SbFrictionHold(const SbFriction *f, SbSpace space, const SbFricti
     const PetscReal *t = g->tangent[q], rest = SbDot3(t, p->start) - SbDot3(t, g->stretch);
     PetscReal stiffness = p->k;
 
-    for (PetscInt k = 0; k < 3 * p->n; k++) coef[k] = p->weight[k / 3] * t[k % 3];
     if (!g->slides && !springs(f, g) && !careful(g)) { /* normals of all pairs come first */
-      PetscCall(SbSpaceAddConstraint(space, id + q, p->n, p->node, coef, NULL, rest, &g->slide[q]));
+      PetscCall(SbSpaceAddConstraint(space, id + q, 1, &p->node, t, NULL, rest, &g->slide[q]));
       continue;
     }
     if (careful(g))
       stiffness = g->turning;
     else if (g->slides)
       stiffness = q ? g->turning : 0;
-    PetscCall(
-      SbSpaceAddPenaltyConstraint(space, p->n, p->node, coef, NULL, rest, stiffness, 0, &g->slide[q]));
-    if (p->outer) SbSpaceSetConstraintExternal(space, g->slide[q]);
+    PetscCall(SbSpaceAddPenaltyConstraint(space, 1, &p->node, t, NULL, rest, stiffness, 0, &g->slide[q]));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -167,8 +163,7 @@ void SbFrictionRead(const SbFriction *f, SbSpace space, const SbFrictionPair *p,
     if (SbSpaceIsConstraintRedundant(space, g->slide[q])) { /* others hold it there */
       force = 0;
       at = SbDot3(g->tangent[q], p->start) - SbDot3(g->tangent[q], g->stretch);
-      if (p->outer && !p->rests)
-        g->crowded = PETSC_TRUE; /* its error in settle() is that of a spring without force */
+      if (!p->rests) g->crowded = PETSC_TRUE; /* its error in settle() is that of a spring without force */
     }
     for (int k = 0; k < 3; k++) {
       g->drag[k] += force * g->tangent[q][k];

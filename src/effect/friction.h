@@ -4,9 +4,6 @@
 #pragma once
 #include "sbfem.h"
 
-#define SB_FRICTION_NODES \
-  8 /* of a row, at most: of two cells; with a point one, and those of the facet's cell */
-
 /* Coefficients of an effect, and how its friction settles in a step. */
 typedef struct {
   PetscReal mu, mu_kinetic;
@@ -33,16 +30,13 @@ typedef struct {
 
 /* A pair as friction sees it for the length of a call; all borrowed. */
 typedef struct {
-  PetscInt n;
-  const PetscInt *node;    /* [n] global numbers of the row's nodes */
-  const PetscReal *weight; /* [n] of the relative displacement w */
+  PetscInt node;           /* its global number */
   const PetscReal *normal; /* [3] */
-  const PetscReal *start;  /* [3] w from which it slips in this step, m */
-  PetscReal *now;          /* [3] w of the last solve, m */
+  const PetscReal *start;  /* [3] displacement from which it slips in this step, m */
+  PetscReal *now;          /* [3] displacement of the last solve, m */
   PetscReal k;             /* stiffness of springs, N/m */
   PetscBool rests;         /* other rows say what its normal's row does */
-  PetscBool outer;         /* on something that is no body: its forces are reactions */
-  uint8_t fixed;           /* bit c: component c of its only node is prescribed */
+  uint8_t fixed;           /* bit c: component c of the node is prescribed */
   SbFrictionState *grip;
 } SbFrictionPair;
 

@@ -1,14 +1,14 @@
 /*
-  Constraints that join nodes anywhere: what contact between bodies needs. G u = c exactly, S u = s by springs.
+  Constraints on nodes anywhere: what contact with obstacles needs where it has friction or springs. G u = c exactly, S u = s by springs.
 
   Solves run in the null space of G (Gould, Hribar, Nocedal 2001, On the solution of equality constrained quadratic programming
   problems arising in optimization): with D a diagonal, one number per node, about the inverse of K's,
 
     P = I - D G^T (G D G^T)^-1 G,   A = P^T (K + S^T k S) P,   M_A^-1 = P M^-1 P^T
 
-  D makes the projection blind to units and to stiffness: a hard body's node moves less than a soft one's. Every preconditioner M
+  D makes the projection blind to units and to stiffness. Every preconditioner M
   of K serves, and neither the matrix nor M are renewed when constraints come and go. What the constraints exert is the least-squares
-  multiplier lambda = (G D G^T)^-1 G D r of the residual r. Constraints that repeat others (two surfaces whose vertices meet) leave
+  multiplier lambda = (G D G^T)^-1 G D r of the residual r. Constraints that repeat others (a node in the corner of two obstacles) leave
   P right; constraint_select.c leaves most of them out.
 
   G D G^T has the constraints of all ranks, which are few, and is factored on each of them.
@@ -27,7 +27,7 @@
 #define NOTHING \
   1e-20 /* of the largest on that diagonal: constraints below it have no free node but for rounding */
 
-PetscErrorCode SbSpaceCreateConstraints(SbSpace s, PetscBool external, PetscBool nonsymmetric)
+PetscErrorCode SbSpaceCreateConstraints(SbSpace s, PetscBool nonsymmetric)
 {
   SbConstraints c = s->constraints;
 
@@ -37,14 +37,8 @@ PetscErrorCode SbSpaceCreateConstraints(SbSpace s, PetscBool external, PetscBool
     PetscCall(PetscCalloc1(1, &c->start));
     s->constraints = c;
   }
-  c->external = (PetscBool)(c->external || external);
   c->nonsymmetric = (PetscBool)(c->nonsymmetric || nonsymmetric);
   PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscBool SbSpaceHasExternalConstraints(SbSpace s)
-{
-  return (PetscBool)(s->constraints && s->constraints->external);
 }
 
 PetscBool SbSpaceHasNonsymmetricConstraints(SbSpace s)
@@ -179,11 +173,6 @@ PetscErrorCode SbSpaceAddConstraint(SbSpace s, PetscInt id, PetscInt n, const Pe
   PetscCall(SbSpaceAddPenaltyConstraint(s, n, gnode, coef, push, value, -1., 0., constraint));
   s->constraints->id[*constraint] = id;
   PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-void SbSpaceSetConstraintExternal(SbSpace s, PetscInt constraint)
-{
-  s->constraints->id[constraint] = -1;
 }
 
 static inline PetscBool of_kind(SbConstraints c, PetscInt i, PetscBool exact)
@@ -620,28 +609,13 @@ PetscErrorCode SbSpaceComputeConstraintForces(SbSpace s, Vec U, Vec R)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* R += what the constraints of negative ids push free unknowns with, those of one kind. */
-static PetscErrorCode add_reaction(SbConstraints c, PetscBool exact, const SbConstraintMatrix *r, Vec R)
-{
-  PetscScalar *x;
-
-  PetscFunctionBeginUser;
-  if (!r->N) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(VecCopy(r->force, r->work));
-  PetscCall(VecGetArray(r->work, &x));
-  for (PetscInt i = 0; i < c->n; i++) {
-    if (of_kind(c, i, exact) && c->id[i] >= 0) x[c->position[i]] = 0.;
-  }
-  PetscCall(VecRestoreArray(r->work, &x));
-  PetscCall(MatMultTransposeAdd(r->push_free, r->work, R, R));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode SbSpaceAddConstraintReactions(SbSpace s, Vec R)
 {
+  SbConstraints c = s->constraints;
+
   PetscFunctionBeginUser;
-  PetscCall(add_reaction(s->constraints, PETSC_TRUE, &s->constraints->exact, R));
-  PetscCall(add_reaction(s->constraints, PETSC_FALSE, &s->constraints->spring, R));
+  if (c->exact.N) PetscCall(MatMultTransposeAdd(c->exact.push_free, c->exact.force, R, R));
+  if (c->spring.N) PetscCall(MatMultTransposeAdd(c->spring.push_free, c->spring.force, R, R));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -1,7 +1,6 @@
 /*
-  Which exact constraints are worth having. Two surfaces that examine each other give nearly the same constraint twice: a vertex on a vertex gives two
-  constraints of the same nodes, with normals a few degrees apart. Together they would demand a motion across the normals, which nothing
-  means, and make G D G^T as good as singular. So a constraint that is, but for a small part, a combination of earlier ones nearby is redundant.
+  Which exact constraints are worth having. A node in the corner of two obstacles that sticks to both has its place said twice, which makes
+  G D G^T as good as singular. So a constraint that is, but for a small part, a combination of earlier ones nearby is redundant.
 
   Constraints of all ranks are examined in the order of their identities, so that no partition changes the choice. A constraint is compared with
   those accepted before it that share a node with it: a few, whose Gram matrix is factored for it. (Rank-revealing Cholesky
@@ -10,11 +9,10 @@
 #include "fem_impl.h"
 #include "sbconstraint.h"
 
-#define DEPENDS \
-  0.05 /* squared part of a constraint outside the span of its neighbours; below it the constraint is redundant: normals within 13 degrees */
 #define SAID \
-  1e-4 /* the same for a constraint of a node to something that is no body: two of a node may stand at a small angle */
-#define NEAR 48 /* neighbours that are examined */
+  1e-4 /* squared part of a constraint outside the span of its neighbours; below it the constraint is redundant */
+#define NEARLY 0.05 /* below it the projection is repeated once more: normals within 13 degrees */
+#define NEAR 48     /* neighbours that are examined */
 
 /* Constraints of all ranks, alike on each. */
 typedef struct {
@@ -185,8 +183,8 @@ PetscErrorCode SbConstraintsFindRedundant(SbSpace s)
     const PetscInt i = order[q];
     const PetscReal part = outside(&a, i);
 
-    rests[i] = (PetscBool)(part < (a.id[i] < 0 ? SAID : DEPENDS));
-    if (!rests[i] && part < DEPENDS) c->passes = 4;
+    rests[i] = (PetscBool)(part < SAID);
+    if (!rests[i] && part < NEARLY) c->passes = 4;
     for (PetscInt e = a.start[i]; !rests[i] && e < a.start[i + 1]; e++) {
       a.next[e] = a.head[a.node[e]];
       a.head[a.node[e]] = e;

@@ -2,7 +2,6 @@
   Guarded contact as Newton's method sees it: all effects that have it together.
 */
 #include "model_impl.h"
-#include "sbbarrier.h"
 
 #define ROUNDS 20   /* of motions of bodies that touch */
 #define SWEEPS 1000 /* over what touches, in each */
@@ -35,9 +34,9 @@ static PetscErrorCode gather_touches(MPI_Comm comm, const SbTouches *mine, Petsc
     own[i][5] = t->gap;
     own[i][6] = t->to;
   }
-  PetscCall(SbContactGather(comm, 7 * mine->n, MPIU_REAL, sizeof(PetscReal), own, n, all));
+  PetscCall(SbGatherAll(comm, MPIU_REAL, 7 * mine->n, own, n, all, NULL));
   *n /= 7;
-  qsort(*all, (size_t)*n, sizeof(**all), by_value);
+  if (*n) qsort(*all, (size_t)*n, sizeof(**all), by_value);
   PetscCall(PetscFree(own));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

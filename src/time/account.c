@@ -19,7 +19,7 @@ PetscErrorCode SbRunReactions(SbRun run, PetscReal t, Vec R)
     SbNodalConstraintsReaction(run->model->space, r);
     PetscCall(VecRestoreArray(R, &r));
   }
-  if (SbSpaceHasExternalConstraints(run->model->space)) {
+  if (run->model->space->constraints) {
     /* only what is on prescribed unknowns, and what contact has exerted */
     if (!run->model->space->nodal) {
       PetscScalar *r;
@@ -39,7 +39,7 @@ PetscErrorCode SbRunReactions(SbRun run, PetscReal t, Vec R)
 static PetscErrorCode works(SbRun run, Vec loads, Vec reaction, PetscReal sums[2])
 {
   SbSpace s = run->model->space;
-  const PetscBool obstacles = (PetscBool)(s->nodal || SbSpaceHasExternalConstraints(s));
+  const PetscBool obstacles = (PetscBool)(s->nodal || s->constraints);
   const PetscScalar *u, *u0, *f, *f0, *r, *r0;
 
   PetscFunctionBeginUser;

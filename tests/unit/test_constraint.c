@@ -108,7 +108,7 @@ static PetscErrorCode open_halves(const char *solver, SbSaddle saddle, TestScene
   t->run->saddle = (PetscBool)(saddle != SB_SADDLE_NONE);
   t->run->saddle_choice = (PetscInt)saddle;
   PetscCall(SbModelSetUp(t->model));
-  PetscCall(SbSpaceCreateConstraints(t->model->space, PETSC_FALSE, PETSC_FALSE));
+  PetscCall(SbSpaceCreateConstraints(t->model->space, PETSC_FALSE));
   PetscCall(SbRunSetUp(t->run));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -60,7 +60,7 @@ static PetscErrorCode check_options(void)
   PetscCall(fixture_create(PETSC_COMM_WORLD, 1, "box:1,1,1:2", 1, hull, &x));
   PetscCall(effect_create(&x, "floor", FLOOR "-effect_floor_response multiplier", &e));
   SB_CHECK(e->linear && e->saddle && !e->ops.tangent && e->ops.assemble_constraints && !x.space->nodal &&
-             x.space->constraints && SbSpaceHasExternalConstraints(x.space),
+             x.space->constraints,
            "multiplier, without friction");
   PetscCall(SbEffectDestroy(&e));
   PetscCall(PetscOptionsClear(NULL));
@@ -75,8 +75,7 @@ static PetscErrorCode check_options(void)
   PetscCall(PetscOptionsClear(NULL));
   PetscCall(effect_create(&x, "floor", FLOOR "-effect_floor_friction 0.2", &e));
   SB_CHECK(e->linear && !e->ops.tangent && e->ops.assemble_constraints && !x.space->nodal &&
-             x.space->constraints && SbSpaceHasExternalConstraints(x.space) &&
-             SbSpaceHasNonsymmetricConstraints(x.space),
+             x.space->constraints && SbSpaceHasNonsymmetricConstraints(x.space),
            "friction has rows");
   PetscCall(SbEffectDestroy(&e));
   PetscCall(PetscOptionsClear(NULL));

@@ -30,8 +30,8 @@ LONG_STEPS = ["-ksp_rtol", "0.9", "-snes_max_it", "100000", "-snes_rtol", "1e-12
 def start(ranks, folder, *more, rows=10):
     """A run that has written so many rows. Ctrl-C reaches it also where this test runs in the background, which ignores it."""
     (OUT / folder).mkdir(parents=True, exist_ok=True)
-    with open(OUT / folder / "errors.txt", "w") as errors:
-        process = subprocess.Popen(command(ranks, folder, *SLOW, *more), stdout=subprocess.DEVNULL, stderr=errors,
+    with open(OUT / folder / "output.txt", "w") as output, open(OUT / folder / "errors.txt", "w") as errors:
+        process = subprocess.Popen(command(ranks, folder, *SLOW, *more), stdout=output, stderr=errors,
                                    preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL))
     path = OUT / folder / "history.csv"
     while (not path.exists() or path.read_text().count("\n") < rows + 2) and process.poll() is None:
@@ -68,21 +68,6 @@ def check_same(folder, ranks, step):
         worst = numpy.abs(rows[:, names.index(name)] - column).max() / numpy.abs(column).max()
         if not worst < 1e-6:
             sys.exit(f"{folder}: {name} differs by {worst:.2g} from the run that was not stopped")
-
-
-def sleep_within_a_step():
-    """What a run prints that sleeps six seconds in one of its steps."""
-    args = [word for word in command(1, "long", *SLOW, *LONG_STEPS, "-body_bar_mesh", "box:0.4,0.1,0.1:40,10,10") if word != "-quiet"]
-    (OUT / "long" / "history.csv").unlink(missing_ok=True)
-    process = subprocess.Popen(args, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
-    while not (OUT / "long" / "history.csv").exists() or (OUT / "long" / "history.csv").read_text().count("\n") < 3:
-        time.sleep(0.02)
-    process.send_signal(signal.SIGSTOP)
-    time.sleep(6)
-    process.send_signal(signal.SIGCONT)
-    time.sleep(0.5)
-    process.send_signal(signal.SIGTERM)
-    return process.communicate()[0]
 
 
 def main():
@@ -128,8 +113,15 @@ def main():
         sys.exit("no step was given up in eight runs")
 
     # a step that takes more than five seconds (most of them asleep) says how far it is, unless it slept in its last iteration
-    for _ in range(6):
-        text = sleep_within_a_step()
+    for k in range(6):
+        process = start(1, f"long{k}", *LONG_STEPS, "-quiet", "no", "-body_bar_mesh", "box:0.4,0.1,0.1:40,10,10", rows=1)
+        process.send_signal(signal.SIGSTOP)
+        time.sleep(6)
+        process.send_signal(signal.SIGCONT)
+        time.sleep(0.5)
+        process.send_signal(signal.SIGTERM)
+        process.wait()
+        text = (OUT / f"long{k}" / "output.txt").read_text()
         if re.search(r"step \d+ has taken \d+ s: (Newton|linear) iteration \d+, residual \S+ N, length 0.01 s", text):
             break
     else:
