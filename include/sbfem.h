@@ -244,9 +244,9 @@ PetscErrorCode SbSpaceCellPiola(SbSpace space, const PetscReal u[], PetscReal P[
                                 PetscReal psi[]);
 /* Per owned cell: the law's pressure -lambda theta, Pa (SbMaterialOps.pressure). Not collective. */
 PetscErrorCode SbSpaceCellPressure(SbSpace space, const PetscReal u[], PetscReal pressure[]);
-/* Owned cells: strain energy (J), smallest det F, number with det F <= 0, current volume (m^3). Local: reduce them. */
-PetscErrorCode SbSpaceStrainEnergy(SbSpace space, const PetscReal u[], PetscReal *energy, PetscReal *minJ,
-                                   PetscInt *ninverted, PetscReal *volume);
+/* Owned cells: strain energy (J; added to body[nbody] by bodies, too, unless that is NULL), smallest det F, number with det F <= 0, current volume (m^3). Local: reduce them. */
+PetscErrorCode SbSpaceStrainEnergy(SbSpace space, const PetscReal u[], PetscReal body[], PetscReal *energy,
+                                   PetscReal *minJ, PetscInt *ninverted, PetscReal *volume);
 /* v . C v of owned cells, W. Local: reduce it. */
 PetscErrorCode SbSpaceDampingPower(SbSpace space, const PetscReal u[], const PetscReal v[], PetscReal *power);
 /* Largest stable step of an explicit run at rest, with its damping, s; a few percent too large at most. Collective, after

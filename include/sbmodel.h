@@ -139,6 +139,9 @@ PetscErrorCode SbModelGuardHessian(SbModel model, Vec U, SbContactHessian kind, 
 PetscErrorCode SbModelInitialState(SbModel model, Vec U, Vec V);
 /* Centre of mass, m, and mass, kg, of each body, centre[nbody][4]: at rest with U NULL, else now. Collective. */
 PetscErrorCode SbModelCentres(SbModel model, Vec U, PetscReal centre[][4]);
+/* This rank's part of a body's kinetic and strain energy, J, momentum, kg m/s, and sum of mass times position, kg m; added to sum[nbody]. V may be NULL. Collective. */
+#define SB_BODY_SUMS 8
+PetscErrorCode SbModelBodySums(SbModel model, Vec U, Vec V, PetscReal sum[][SB_BODY_SUMS]);
 /* Instantaneous part of the energies (kinetic, strain, momenta, ...). V may be NULL. Collective. */
 PetscErrorCode SbModelEnergies(SbModel model, Vec U, Vec V, SbEnergies *e);
 /*

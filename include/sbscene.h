@@ -58,5 +58,7 @@ PetscErrorCode SbSceneCreate(MPI_Comm comm, SbModel *model);
 */
 PetscErrorCode SbSceneCheck(SbModel model);
 
+/* Warns of bodies from files that are so large that their files may be in mm. Collective; after SbModelSetUp(). */
+PetscErrorCode SbSceneCheckSizes(SbModel model);
 /* With -validate: the invariants of mesh and space (ordering, ranges, ownership, sums). Collective; after SbModelSetUp(). */
 PetscErrorCode SbSceneValidate(SbModel model);

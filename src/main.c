@@ -37,6 +37,7 @@ static PetscErrorCode simulate(Scene *s)
   PetscCall(SbOutputLock(s->run));
   PetscCall(SbOutputRestoreMeshes(s->run));
   PetscCall(SbModelSetUp(s->model));
+  PetscCall(SbSceneCheckSizes(s->model));
   PetscCall(SbSceneValidate(s->model));
   PetscCall(SbRunSetUp(s->run));
   PetscCall(SbOutputTakeState(s->run));

@@ -99,6 +99,7 @@ static const struct {
   {"output_contacts", "contacts"},
   {"output_history", "history"},
   {"output_history_every", "history"},
+  {"output_history_bodies", "history"},
   {"probes", "probes"},
   {"checkpoint_every_time", "checkpoint"},
   {"checkpoint_every_steps", "checkpoint"},

@@ -16,7 +16,7 @@ PetscErrorCode SbJumpDestroy(SbJump *jump);
 /* f[nnode][3] += (factor) K_F x; right on owned nodes. x[nnode][3] with ghosts. */
 void SbJumpAdd(SbSpace space, const PetscReal x[], SbJumpFactor factor, PetscReal f[]);
 /* 1/2 x . (factor) K_F x, this rank's part. */
-PetscReal SbJumpEnergy(SbSpace space, const PetscReal x[], SbJumpFactor factor);
+PetscReal SbJumpEnergy(SbSpace space, const PetscReal x[], SbJumpFactor factor, PetscReal body[]);
 /* node[nbatch][8][SB_BATCH] of the faces, borrowed; returns nbatch. */
 PetscInt SbJumpCliques(SbSpace space, const PetscInt **node);
 /* The matrix of the face in lane l of batch b, times the 3x3 identity; zero in padding. */

@@ -266,13 +266,13 @@ void SbJumpAdd(SbSpace s, const PetscReal x[], SbJumpFactor factor, PetscReal f[
   }
 }
 
-PetscReal SbJumpEnergy(SbSpace s, const PetscReal x[], SbJumpFactor factor)
+PetscReal SbJumpEnergy(SbSpace s, const PetscReal x[], SbJumpFactor factor, PetscReal body[])
 {
   const SbJump j = s->jump;
   PetscReal energy = 0.;
 
   for (PetscInt b = 0; b < j->nbatch; b++) {
-    const PetscReal scale = factor == SB_JUMP_STIFFNESS ? 1. : s->region[j->region[b]].beta;
+    const PetscReal scale = factor == SB_JUMP_STIFFNESS ? 1. : s->region[j->region[b]].beta, before = energy;
 
     for (int l = 0; l < j->n[b] && scale != 0.; l++) {
       PetscReal J[9], sum[3], squares = 0.;
@@ -282,6 +282,7 @@ PetscReal SbJumpEnergy(SbSpace s, const PetscReal x[], SbJumpFactor factor)
       energy += 0.5 * scale * j->share[b][l] *
                 (j->c1[b][l] * squares + (j->c1[b][l] + j->c0[b][l]) * SbDot3(sum, sum));
     }
+    if (body) body[s->region[j->region[b]].body] += energy - before;
   }
   return energy;
 }

@@ -287,8 +287,8 @@ static void quadratic_volume(SbSpace s, PetscInt b, const PetscReal x[], SbLane 
   }
 }
 
-PetscErrorCode SbSpaceStrainEnergy(SbSpace s, const PetscReal x[], PetscReal *energy, PetscReal *minJ,
-                                   PetscInt *ninverted, PetscReal *volume)
+PetscErrorCode SbSpaceStrainEnergy(SbSpace s, const PetscReal x[], PetscReal body[], PetscReal *energy,
+                                   PetscReal *minJ, PetscInt *ninverted, PetscReal *volume)
 {
   PetscFunctionBeginUser;
   *energy = 0.;
@@ -297,6 +297,7 @@ PetscErrorCode SbSpaceStrainEnergy(SbSpace s, const PetscReal x[], PetscReal *en
   *ninverted = 0;
   for (PetscInt r = 0; r < s->nregion; r++) {
     const SbRegion *region = &s->region[r];
+    const PetscReal before = *energy;
 
     for (PetscInt b = region->bstart; region->owned && b < region->bend; b++) {
       SbLane F[4][9], psi[4], exact = {0}, lowest;
@@ -318,8 +319,9 @@ PetscErrorCode SbSpaceStrainEnergy(SbSpace s, const PetscReal x[], PetscReal *en
         *ninverted += least <= 0.;
       }
     }
+    if (body) body[region->body] += *energy - before;
   }
-  if (s->jump) *energy += SbJumpEnergy(s, x, SB_JUMP_STIFFNESS);
+  if (s->jump) *energy += SbJumpEnergy(s, x, SB_JUMP_STIFFNESS, body);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -372,6 +374,6 @@ PetscErrorCode SbSpaceDampingPower(SbSpace s, const PetscReal x[], const PetscRe
       }
     }
   }
-  if (s->jump) *power += 2. * SbJumpEnergy(s, v, SB_JUMP_DAMPING);
+  if (s->jump) *power += 2. * SbJumpEnergy(s, v, SB_JUMP_DAMPING, NULL);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -19,6 +19,20 @@ typedef enum {
   NSUM = CENTRE + 3
 } Sum;
 
+/* M v with the run's mass matrix, [nnode][3], right on owned nodes; v holds ghosts. PetscFree. */
+static PetscErrorCode nodal_momenta(SbSpace s, const PetscReal v[], PetscReal **p)
+{
+  const SbStage stage = {.a = v}; /* no v: inertia alone, without mass-proportional damping */
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscCalloc1(3 * s->nnode, p));
+  if (s->consistent_mass)
+    PetscCall(SbSpaceAddInertia(s, &stage, *p));
+  else
+    for (PetscInt i = 0; i < 3 * s->nnode_owned; i++) (*p)[i] = s->node_mass[i / 3] * v[i];
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode SbModelEnergies(SbModel m, Vec U, Vec V, SbEnergies *e)
 {
   SbSpace s = m->space;
@@ -30,20 +44,12 @@ PetscErrorCode SbModelEnergies(SbModel m, Vec U, Vec V, SbEnergies *e)
   PetscFunctionBeginUser;
   PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_ENERGY], 0, 0, 0, 0));
   PetscCall(SbSpaceGetLocalRead(s, U, &u));
-  PetscCall(SbSpaceStrainEnergy(s, u, &sum[STRAIN], &extreme[2], &ninverted, &sum[VOLUME]));
+  PetscCall(SbSpaceStrainEnergy(s, u, NULL, &sum[STRAIN], &extreme[2], &ninverted, &sum[VOLUME]));
   sum[INVERTED] = (PetscReal)ninverted;
   extreme[2] = -extreme[2];
   if (V) {
     PetscCall(SbSpaceGetLocalRead(s, V, &v));
-    PetscCall(PetscCalloc1(3 * s->nnode, &p));
-    /* p = M v with the run's mass matrix, [nnode][3]; v holds ghosts */
-    if (s->consistent_mass) {
-      const SbStage stage = {.a = v}; /* no v: inertia alone, without mass-proportional damping */
-
-      PetscCall(SbSpaceAddInertia(s, &stage, p));
-    } else {
-      for (PetscInt i = 0; i < 3 * s->nnode_owned; i++) p[i] = s->node_mass[i / 3] * v[i];
-    }
+    PetscCall(nodal_momenta(s, v, &p));
   }
   for (PetscInt i = 0; i < s->nnode_owned; i++) {
     PetscReal x[3], v2 = 0., u2 = 0.;
@@ -82,6 +88,34 @@ PetscErrorCode SbModelEnergies(SbModel m, Vec U, Vec V, SbEnergies *e)
     e->centre[k] = sum[CENTRE + k] / m->mass;
   }
   PetscCall(PetscLogEventEnd(SbEvents[SB_EVENT_ENERGY], 0, 0, 0, 0));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbModelBodySums(SbModel m, Vec U, Vec V, PetscReal sum[][SB_BODY_SUMS])
+{
+  const SbSpace s = m->space;
+  const PetscReal *u, *v;
+  PetscReal *p, *strain, unused[3];
+  PetscInt n;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbSpaceGetLocalRead(s, U, &u));
+  PetscCall(PetscCalloc1(m->nbody, &strain));
+  PetscCall(SbSpaceStrainEnergy(s, u, strain, &unused[0], &unused[1], &n, &unused[2]));
+  for (PetscInt b = 0; b < m->nbody; b++) sum[b][1] += strain[b];
+  PetscCall(PetscFree(strain));
+  for (PetscInt i = 0; i < 3 * s->nnode_owned; i++)
+    sum[s->node_body[i / 3]][5 + i % 3] += s->node_mass[i / 3] * (s->node_x[i] + u[i]);
+  PetscCall(SbSpaceRestoreLocalRead(s, U, &u));
+  if (!V) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(SbSpaceGetLocalRead(s, V, &v));
+  PetscCall(nodal_momenta(s, v, &p));
+  for (PetscInt i = 0; i < 3 * s->nnode_owned; i++) {
+    sum[s->node_body[i / 3]][0] += 0.5 * v[i] * p[i];
+    sum[s->node_body[i / 3]][2 + i % 3] += p[i];
+  }
+  PetscCall(SbSpaceRestoreLocalRead(s, V, &v));
+  PetscCall(PetscFree(p));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -138,7 +172,7 @@ PetscErrorCode SbModelStrainEnergyAlong(SbModel m, Vec U, Vec D, PetscReal *psi,
   PetscFunctionBeginUser;
   PetscCall(PetscCalloc1(3 * s->nnode, &f));
   PetscCall(SbSpaceGetLocalRead(s, U, &stage.u));
-  PetscCall(SbSpaceStrainEnergy(s, stage.u, &sum[0], &minJ, &n, &volume));
+  PetscCall(SbSpaceStrainEnergy(s, stage.u, NULL, &sum[0], &minJ, &n, &volume));
   PetscCall(SbSpaceAddInternalForce(s, &stage, f));
   PetscCall(SbSpaceRestoreLocalRead(s, U, &stage.u));
   PetscCall(VecGetArrayRead(D, &d));

@@ -51,8 +51,8 @@ static PetscErrorCode convexity(SbModel m, Vec U, PetscReal *C)
   PetscCall(PetscCalloc1(3 * s->nnode, &f));
   PetscCall(SbSpaceGetLocalRead(s, m->bounce.U0, &u0));
   PetscCall(SbSpaceGetLocalRead(s, U, &stage.u));
-  PetscCall(SbSpaceStrainEnergy(s, u0, &strain[0], &unused[0], &inverted, &unused[1]));
-  PetscCall(SbSpaceStrainEnergy(s, stage.u, &strain[1], &unused[0], &inverted, &unused[1]));
+  PetscCall(SbSpaceStrainEnergy(s, u0, NULL, &strain[0], &unused[0], &inverted, &unused[1]));
+  PetscCall(SbSpaceStrainEnergy(s, stage.u, NULL, &strain[1], &unused[0], &inverted, &unused[1]));
   PetscCall(SbSpaceAddInternalForce(s, &stage, f));
   for (PetscInt i = 0; i < 3 * s->nnode_owned; i++) work += f[i] * (stage.u[i] - u0[i]);
   PetscCall(SbSpaceRestoreLocalRead(s, U, &stage.u));

@@ -211,7 +211,7 @@ PetscErrorCode SbFieldGetAll(PetscInt *n, const SbField **fields)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbFieldFind(const char *name, const SbField **field)
+PetscErrorCode SbFieldFind(const char *option, const char *name, const SbField **field)
 {
   const PetscInt n = (PetscInt)PETSC_STATIC_ARRAY_LENGTH(table);
   const char *names[PETSC_STATIC_ARRAY_LENGTH(table)];
@@ -225,32 +225,53 @@ PetscErrorCode SbFieldFind(const char *name, const SbField **field)
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   PetscCall(SbNamesAdvise(name, n, names, sizeof(all), all));
-  SETERRQ(PETSC_COMM_SELF, PETSC_ERR_USER, "-output_fields: there is no field '%s'; fields are none, %s",
-          name, all);
+  SETERRQ(PETSC_COMM_SELF, PETSC_ERR_USER, "%s: there is no field '%s'; fields are none, %s", option, name,
+          all);
 }
 
-PetscErrorCode SbFieldPrepare(SbRun run, SbOutput out)
+PetscBool SbFieldIsProbed(const SbField *f)
+{
+  return (PetscBool)(f->compute == vector || f->compute == position || f->compute == scalar ||
+                     f->compute == of_stress);
+}
+
+PetscErrorCode SbFieldAddCell(const SbField *f, SbRun run, const SbStep *step, PetscInt n,
+                              const PetscInt cell[], const PetscReal weight[], PetscReal value[])
+{
+  const PetscReal *state = NULL;
+
+  PetscFunctionBeginUser;
+  PetscCall(cell_state(f, run, step, &state));
+  for (PetscInt i = 0; i < n; i++) {
+    PetscReal here[6] = {0.};
+
+    if (f->of_stress)
+      (*f->of_stress)(state + 6 * cell[i], here);
+    else
+      here[0] = state[cell[i]];
+    for (PetscInt k = 0; k < f->ncomp; k++) value[k] += weight[i] * here[k];
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbFieldPrepare(SbRun run, SbOutput out, const SbField *f)
 {
   const PetscInt n = run->model->mesh->ncell_owned;
 
   PetscFunctionBeginUser;
-  for (PetscInt i = 0; i < out->nfield; i++) {
-    const SbField *f = out->field[i];
+  PetscCheck(f->compute != space_error || run->cell_error, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
+             "-output_fields space_error needs its estimate: give -ledger yes, too");
+  /* the array of the cells' state that this field needs */
+  if (f->compute == scalar || f->compute == of_stress) {
+    PetscReal **state = (PetscReal **)((char *)out + f->from);
 
-    PetscCheck(f->compute != space_error || run->cell_error, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
-               "-output_fields space_error needs its estimate: give -ledger yes, too");
-    /* the array of the cells' state that this field needs */
-    if (f->compute == scalar || f->compute == of_stress) {
-      PetscReal **state = (PetscReal **)((char *)out + f->from);
-
-      if (!*state) PetscCall(PetscMalloc1((f->compute == of_stress ? 6 * n : n), state));
-    }
-    /* weights of nodes at vertices; forces also need the residual of each step */
-    if (!f->cell) PetscCall(SbPointsPrepare(run, out));
-    if (f->compute == reaction || f->compute == contact_force) {
-      run->want_residual = PETSC_TRUE;
-      if (!run->model->space->vertices || out->discontinuous) PetscCall(SbPointsPrepareForces(run, out));
-    }
+    if (!*state) PetscCall(PetscMalloc1((f->compute == of_stress ? 6 * n : n), state));
+  }
+  /* weights of nodes at vertices; forces also need the residual of each step */
+  if (!f->cell) PetscCall(SbPointsPrepare(run, out));
+  if (f->compute == reaction || f->compute == contact_force) {
+    run->want_residual = PETSC_TRUE;
+    if (!run->model->space->vertices || out->discontinuous) PetscCall(SbPointsPrepareForces(run, out));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -540,7 +540,7 @@ static PetscErrorCode allocate(SbRun run, SbOutput out)
   PetscCall(PetscMalloc1(nowned, &fr->owned));
   PetscCall(PetscMalloc1(nslice, &fr->slice));
   if (!out->precise) PetscCall(PetscMalloc((size_t)nslice * sizeof(float), &fr->packed));
-  PetscCall(SbFieldPrepare(run, out));
+  for (PetscInt i = 0; i < out->nfield; i++) PetscCall(SbFieldPrepare(run, out, out->field[i]));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

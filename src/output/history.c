@@ -5,7 +5,7 @@
   digits: what is read back is what was computed. `total` is kinetic + strain - load_work - prescribed_work, which stays what it
   was at the start as long as nothing is dissipated.
 
-  The sums that effects and probes need travel in one reduction per row; with them the news that the row before could not be
+  The sums that effects, probes and bodies need travel in one reduction per row; with them the news that the row before could not be
   written. Such a row is taken back.
 */
 #include <errno.h>
@@ -23,7 +23,10 @@ struct _p_SbHistory {
   char *row; /* text of a row or of the header */
   size_t size, capacity;
   PetscInt last_step; /* of the last row in the file, or -1 */
-  PetscInt nextra;    /* columns of effects and probes */
+  PetscInt nprobe;    /* columns of probes */
+  PetscInt nextra;    /* columns of effects, probes and bodies */
+  PetscReal (
+    *mass)[4]; /* [nbody] centre at rest, m, and mass, kg, of each body; NULL without columns of bodies */
   PetscReal *mine,
     *sum; /* [nextra + 1] this rank's part, all ranks' sum; the last one: the row before failed */
   char message[SB_MESSAGE_MAX]; /* why it failed; empty when it did not */
@@ -65,6 +68,13 @@ static const struct {
   {"rejected", "1", COUNT, AT(rejected)},
 };
 
+/* The columns of a body with -output_history_bodies, in the order of SbModelBodySums(). */
+static const struct {
+  const char *name, *unit;
+} body_columns[SB_BODY_SUMS] = {{"kinetic", "J"},         {"strain", "J"},          {"momentum_x", "kg m/s"},
+                                {"momentum_y", "kg m/s"}, {"momentum_z", "kg m/s"}, {"centre_x", "m"},
+                                {"centre_y", "m"},        {"centre_z", "m"}};
+
 /* ------------------------------------------------------------------ text */
 
 /* The buffer holds any row: it is allocated for the number of columns. */
@@ -97,6 +107,10 @@ static const char *unit_of(const char *column)
 /* The two lines at the top. */
 static PetscErrorCode put_header(SbRun run, SbOutput out, SbHistory h)
 {
+  const PetscInt nbody = out->history_bodies ? run->model->nbody : 0;
+  char name[3 * SB_NAME_MAX];
+  const char *unit;
+
   PetscFunctionBeginUser;
   h->size = 0;
   for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(columns); i++)
@@ -107,8 +121,13 @@ static PetscErrorCode put_header(SbRun run, SbOutput out, SbHistory h)
     for (PetscInt c = 0; c < effect->ncolumn; c++)
       PetscCall(put(h, ",%s_%s", effect->name, effect->column[c]));
   }
-  for (PetscInt p = 0; p < out->nprobe; p++) {
-    for (int c = 0; c < 3; c++) PetscCall(put(h, ",%s_u%c", out->probe[p].name, 'x' + c));
+  for (PetscInt i = 0; i < h->nprobe; i++) {
+    PetscCall(SbProbesColumn(out, i, sizeof(name), name, &unit));
+    PetscCall(put(h, ",%s", name));
+  }
+  for (PetscInt b = 0; b < nbody; b++) {
+    for (int c = 0; c < SB_BODY_SUMS; c++)
+      PetscCall(put(h, ",%s_%s", run->model->body[b].name, body_columns[c].name));
   }
   for (PetscInt c = 0; c < run->ncolumn; c++) PetscCall(put(h, ",%s", run->column[c].name));
   PetscCall(put(h, "\n#"));
@@ -119,7 +138,13 @@ static PetscErrorCode put_header(SbRun run, SbOutput out, SbHistory h)
 
     for (PetscInt c = 0; c < effect->ncolumn; c++) PetscCall(put(h, ",%s", unit_of(effect->column[c])));
   }
-  for (PetscInt p = 0; p < 3 * out->nprobe; p++) PetscCall(put(h, ",m"));
+  for (PetscInt i = 0; i < h->nprobe; i++) {
+    PetscCall(SbProbesColumn(out, i, sizeof(name), name, &unit));
+    PetscCall(put(h, ",%s", unit));
+  }
+  for (PetscInt b = 0; b < nbody; b++) {
+    for (int c = 0; c < SB_BODY_SUMS; c++) PetscCall(put(h, ",%s", body_columns[c].unit));
+  }
   for (PetscInt c = 0; c < run->ncolumn; c++) PetscCall(put(h, ",%s", run->column[c].unit));
   PetscCall(put(h, "\n"));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -197,6 +222,7 @@ static PetscErrorCode monitor(SbRun run, const SbStep *step, void *ctx)
   SbOutput out = (SbOutput)ctx;
   SbHistory h = out->hist;
   const PetscBool first = (PetscBool)(step->step == run->step0);
+  const PetscInt nbody = out->history_bodies ? run->model->nbody : 0;
   PetscMPIInt n;
 
   PetscFunctionBeginUser;
@@ -205,26 +231,25 @@ static PetscErrorCode monitor(SbRun run, const SbStep *step, void *ctx)
   PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_OUTPUT], 0, 0, 0, 0));
   PetscCall(PetscLogEventBegin(out->event.history, 0, 0, 0, 0));
 
-  /* this rank's part of the columns of effects and probes */
+  /* this rank's part of the columns of effects, probes and bodies */
   PetscCall(PetscArrayzero(h->mine, h->nextra + 1));
   if (run->model->nhistory) PetscCall(effect_columns(run, step, h->mine));
-
   if (out->nprobe) {
-    const PetscReal *u;
-
     PetscCall(PetscLogEventBegin(out->event.probes, 0, 0, 0, 0));
-    PetscCall(SbSpaceGetLocalRead(run->model->space, step->U, &u));
-    for (PetscInt p = 0; p < out->nprobe; p++)
-      SbProbeValue(run, out, &out->probe[p], u, h->mine + h->nextra - 3 * (out->nprobe - p));
-    PetscCall(SbSpaceRestoreLocalRead(run->model->space, step->U, &u));
+    PetscCall(SbProbesAdd(run, out, step, h->mine + h->nextra - nbody * SB_BODY_SUMS - h->nprobe));
     PetscCall(PetscLogEventEnd(out->event.probes, 0, 0, 0, 0));
   }
+  if (nbody)
+    PetscCall(SbModelBodySums(run->model, step->U, step->V,
+                              (PetscReal(*)[SB_BODY_SUMS])(h->mine + h->nextra - nbody * SB_BODY_SUMS)));
 
   /* sums of all ranks; the run ends when the row before could not be written */
   h->mine[h->nextra] = h->message[0] ? 1. : 0.;
   PetscCall(PetscMPIIntCast(h->nextra + 1, &n));
   PetscCallMPI(MPI_Allreduce(h->mine, h->sum, n, MPIU_REAL, MPI_SUM, out->comm));
   if (h->sum[h->nextra] > 0.) PetscCall(SbAgree(out->comm, PETSC_ERR_FILE_WRITE, h->message));
+  for (PetscInt b = 0; b < nbody; b++) // centres are means
+    for (int k = 1; k <= 3; k++) h->sum[h->nextra - (nbody - b - 1) * SB_BODY_SUMS - k] /= h->mass[b][3];
 
   /* the row, as text, for one call */
   h->last_step = step->step;
@@ -296,6 +321,21 @@ static PetscErrorCode open_file(SbRun run, SbOutput out, size_t nmessage, char m
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* From now on rows are those of this run. */
+static PetscErrorCode attach(SbRun run, SbOutput out)
+{
+  PetscFunctionBeginUser;
+  PetscCall(SbProbesFind(run, out));
+  if (out->history_bodies) {
+    if (!out->hist->mass) PetscCall(PetscMalloc1(run->model->nbody, &out->hist->mass));
+    PetscCall(SbModelCentres(run->model, NULL, out->hist->mass));
+  }
+  run->want_energies = PETSC_TRUE;
+  if (run->model->nhistory) run->want_residual = PETSC_TRUE;
+  PetscCall(SbRunAddMonitor(run, monitor, out, NULL));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode SbHistoryAttach(SbRun run, SbOutput out)
 {
   const SbModel model = run->model;
@@ -304,35 +344,29 @@ PetscErrorCode SbHistoryAttach(SbRun run, SbOutput out)
 
   PetscFunctionBeginUser;
   if (!out->history) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(SbProbesFind(run, out));
   PetscCall(PetscNew(&out->hist));
   h = out->hist;
   h->fd = -1;
   h->last_step = -1;
   for (PetscInt e = 0; e < model->nhistory; e++) h->nextra += model->history[e]->ncolumn;
-  h->nextra += 3 * out->nprobe;
+  h->nprobe = SbProbesCount(out);
+  h->nextra += h->nprobe + (out->history_bodies ? SB_BODY_SUMS * model->nbody : 0);
   PetscCall(PetscMalloc2(h->nextra + 1, &h->mine, h->nextra + 1, &h->sum));
   h->capacity =
-    2 * (PETSC_STATIC_ARRAY_LENGTH(columns) + (size_t)(h->nextra + run->ncolumn)) * (2 * SB_NAME_MAX) + 256;
+    2 * (PETSC_STATIC_ARRAY_LENGTH(columns) + (size_t)(h->nextra + run->ncolumn)) * (3 * SB_NAME_MAX) + 256;
   PetscCall(PetscMalloc1(h->capacity, &h->row));
   PetscCall(SbOutputPath(out, "history.csv", sizeof(h->path), h->path));
   if (!out->rank) PetscCall(open_file(run, out, sizeof(message), message));
   PetscCall(SbAgree(out->comm, PETSC_ERR_FILE_WRITE, message));
   PetscCallMPI(MPI_Bcast(&h->last_step, 1, MPIU_INT, 0, out->comm));
-  run->want_energies = PETSC_TRUE;
-  if (model->nhistory) run->want_residual = PETSC_TRUE;
-  PetscCall(SbRunAddMonitor(run, monitor, out, NULL));
+  PetscCall(attach(run, out));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode SbHistoryReattach(SbRun run, SbOutput out)
 {
   PetscFunctionBeginUser;
-  if (!out->hist) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(SbProbesFind(run, out));
-  run->want_energies = PETSC_TRUE;
-  if (run->model->nhistory) run->want_residual = PETSC_TRUE;
-  PetscCall(SbRunAddMonitor(run, monitor, out, NULL));
+  if (out->hist) PetscCall(attach(run, out));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -344,6 +378,7 @@ PetscErrorCode SbHistoryDestroy(SbOutput out)
   if (!h) PetscFunctionReturn(PETSC_SUCCESS);
   if (h->fd >= 0) (void)close(h->fd);
   PetscCall(PetscFree2(h->mine, h->sum));
+  PetscCall(PetscFree(h->mass));
   PetscCall(PetscFree(h->row));
   PetscCall(PetscFree(out->hist));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -26,6 +26,8 @@ static const SbOption rows[] = {
   {"output_contacts", SB_OPTION_BOOL, 1, "", "false", "",
    "contacts.xmf: the points where contact pushes in each frame, with normals, gaps and forces"},
   {"output_history", SB_OPTION_BOOL, 1, "", "true", "", "write history.csv"},
+  {"output_history_bodies", SB_OPTION_BOOL, 1, "", "false", "",
+   "history.csv has energies, momentum and centre of mass of each body, too"},
   {"output_history_every", SB_OPTION_INT, 1, "", "1", "[1, inf)", "steps between rows of history.csv"},
   {"checkpoint_every_time", SB_OPTION_REAL, 1, "s", "0", "[0, inf)",
    "simulated time between checkpoints; 0: none by time"},
@@ -36,21 +38,17 @@ static const SbOption rows[] = {
    "checkpoint to go on from, or latest: the newest one in output_dir, or auto: that one if there is any; "
    "empty: start from "
    "the beginning"},
-  {"probes", SB_OPTION_NAMES, 1, "", "", "", "names of points whose displacement history.csv follows"},
+  {"probes", SB_OPTION_NAMES, 1, "", "", "",
+   "names of points, surfaces and volumes whose displacement or other fields history.csv follows"},
   {"progress", SB_OPTION_BOOL, 1, "", "true", "", "print a line on the progress of the run"},
   {"quiet", SB_OPTION_BOOL, 1, "", "false", "", "print errors and warnings only"},
-};
-
-static const SbOption probe_rows[] = {
-  {"at", SB_OPTION_REALS, 3, "m", NULL, "(-inf, inf)",
-   "position of the probe in the rest state, as placed; the nearest vertex is taken"},
 };
 
 PetscErrorCode SbOutputRegister(void)
 {
   PetscFunctionBeginUser;
   PetscCall(SbOptionsRegister("", "", (PetscInt)PETSC_STATIC_ARRAY_LENGTH(rows), rows));
-  PetscCall(SbOptionsRegister("probe", "", (PetscInt)PETSC_STATIC_ARRAY_LENGTH(probe_rows), probe_rows));
+  PetscCall(SbProbesRegister());
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -102,7 +100,7 @@ static PetscErrorCode read_fields(SbOutput out, const SbScope *scope, PetscBool 
     PetscBool twice = PETSC_FALSE;
 
     if (n == 1 && !strcmp(names[i], "none")) break;
-    PetscCall(SbFieldFind(names[i], &f));
+    PetscCall(SbFieldFind("-output_fields", names[i], &f));
     for (PetscInt k = 0; k < out->nfield; k++) twice = (PetscBool)(twice || out->field[k] == f);
     if (!twice && (dynamic || !f->dynamic)) out->field[out->nfield++] = f;
   }
@@ -111,7 +109,7 @@ static PetscErrorCode read_fields(SbOutput out, const SbScope *scope, PetscBool 
     const SbField *body;
     PetscBool there = PETSC_FALSE;
 
-    PetscCall(SbFieldFind("body", &body));
+    PetscCall(SbFieldFind("-output_fields", "body", &body));
     for (PetscInt k = 0; k < out->nfield; k++) there = (PetscBool)(there || out->field[k] == body);
     if (!there) out->field[out->nfield++] = body;
   }
@@ -121,7 +119,6 @@ static PetscErrorCode read_fields(SbOutput out, const SbScope *scope, PetscBool 
 static PetscErrorCode read_options(SbOutput out, PetscBool dynamic)
 {
   SbScope scope;
-  char(*names)[SB_NAME_MAX];
   PetscInt precision;
 
   PetscFunctionBeginUser;
@@ -155,23 +152,14 @@ static PetscErrorCode read_options(SbOutput out, PetscBool dynamic)
     !out->contact_points || out->nfield, out->comm, PETSC_ERR_USER_INPUT,
     "-output_contacts yes needs frames, but -output_fields is none: give -output_fields body at least");
   PetscCall(SbOptionBool(&scope, "output_history", &out->history));
+  PetscCall(SbOptionBool(&scope, "output_history_bodies", &out->history_bodies));
   PetscCall(SbOptionInt(&scope, "output_history_every", &out->history_every));
   PetscCall(SbOptionReal(&scope, "checkpoint_every_time", &out->checkpoint_every));
   PetscCall(SbOptionInt(&scope, "checkpoint_every_steps", &out->checkpoint_every_steps));
   PetscCall(SbOptionInt(&scope, "checkpoint_keep", &out->checkpoint_keep));
   PetscCall(SbOptionString(&scope, "restart", sizeof(out->restart), out->restart));
 
-  /* positions that history.csv follows */
-  PetscCall(SbOptionNames(&scope, "probes", &out->nprobe, &names));
-  PetscCall(PetscCalloc1(out->nprobe, &out->probe));
-  for (PetscInt p = 0; p < out->nprobe; p++) {
-    SbScope at;
-
-    PetscCall(PetscStrncpy(out->probe[p].name, names[p], SB_NAME_MAX));
-    PetscCall(SbScopeSet(&at, "probe", "", names[p]));
-    PetscCall(SbOptionReals(&at, "at", out->probe[p].at));
-  }
-  PetscCall(PetscFree(names));
+  PetscCall(SbProbesSetFromOptions(out, &scope, dynamic));
 
   /* what the screen shows */
   PetscCall(SbOptionBool(&scope, "progress", &out->progress));
@@ -242,7 +230,7 @@ static PetscErrorCode destroy(SbRun run)
   PetscCall(SbHistoryDestroy(out));
   PetscCall(SbProgressDestroy(out));
   PetscCall(SbOutputForgetMesh(out));
-  PetscCall(PetscFree(out->probe));
+  PetscCall(SbProbesDestroy(out));
   PetscCall(PetscFree(out->identity));
   PetscCall(PetscFree(out->remeshed));
   PetscCall(SbFolderUnlock(out));

@@ -99,16 +99,22 @@ PetscErrorCode SbFileRead(const char *path, char **text, size_t *size);
 
 /* ------------------------------------------------------------------ state */
 
+typedef enum { SB_PROBE_POINT, SB_PROBE_FACETS, SB_PROBE_TETS } SbProbeKind;
 typedef struct {
   char name[SB_NAME_MAX];
   PetscReal at[3]; /* asked for, m */
   PetscReal x[3];  /* the material point that it follows: the nearest vertex of the first mesh, at rest, m */
   PetscBool found; /* x and body are known */
   PetscInt body;   /* that x belongs to */
-  PetscInt original;   /* number of that vertex, -1: it is gone */
-  PetscInt local;      /* owned local vertex at x, or -1: on the other ranks, and where there is none */
-  PetscInt cell;       /* without a vertex at x: the owned cell that holds it, or -1 on the other ranks */
-  PetscReal weight[4]; /* of its corners */
+  PetscInt original; /* number of that vertex, -1: it is gone */
+  PetscInt local;    /* owned local vertex at x, or -1: on the other ranks, and where there is none */
+  SbProbeKind kind;
+  char set[SB_NAME_MAX]; /* of a mean over facets or tets */
+  PetscInt nfield;
+  const SbField *field[SB_FIELD_MAX];
+  PetscInt nnode, ncell; /* this rank's parts of sums over nodes (without a vertex at x) and over tets */
+  PetscInt *node, *cell;
+  PetscReal *weight, *cell_weight;
 } SbProbe;
 
 typedef struct _p_SbFrames *SbFrames;     /* frames.c */
@@ -135,7 +141,7 @@ struct _p_SbOutput {
   PetscBool precise;        /* double instead of float */
   PetscBool discontinuous;  /* each cell has four points of its own */
   PetscBool contact_points; /* where contact pushes, in each frame */
-  PetscBool history;
+  PetscBool history, history_bodies;
   PetscInt history_every;
   PetscReal checkpoint_every; /* s of simulated time; 0: off */
   PetscInt checkpoint_every_steps, checkpoint_keep;
@@ -193,8 +199,15 @@ PetscErrorCode SbOutputOrder(SbRun run, SbOutput out);
 PetscErrorCode SbOutputForgetMesh(SbOutput out);
 PetscErrorCode SbOutputCountNodes(SbSpace space, SbOutput out); /* collective */
 
-PetscErrorCode SbFieldFind(const char *name, const SbField **field);
-PetscErrorCode SbFieldPrepare(SbRun run, SbOutput out); /* storage for the cell quantities */
+/* option: for messages */
+PetscErrorCode SbFieldFind(const char *option, const char *name, const SbField **field);
+PetscErrorCode SbFieldPrepare(SbRun run, SbOutput out,
+                              const SbField *field); /* storage for the quantities of cells that it needs */
+/* value[ncomp] += weight times the field in an owned cell; PetscErrorCode for fields of cells that are made of their state. Collective where state_valid is false. */
+PetscErrorCode SbFieldAddCell(const SbField *field, SbRun run, const SbStep *step, PetscInt n,
+                              const PetscInt cell[], const PetscReal weight[], PetscReal value[]);
+/* Whether probes can show it: a vector of the step, or a quantity of the cells' state. */
+PetscBool SbFieldIsProbed(const SbField *field);
 
 /* points.c: vectors at the points of vertex fields. The first two before the others. */
 PetscErrorCode SbPointsPrepare(SbRun run, SbOutput out);       /* not collective */
@@ -205,8 +218,6 @@ PetscErrorCode SbPointsValues(SbRun run, SbOutput out, Vec x, PetscReal values[]
 /* The same for forces at nodes, or at their prescribed unknowns only: resultant and moment of the nodal forces are kept. Collective. */
 PetscErrorCode SbPointsForces(SbRun run, SbOutput out, PetscBool prescribed, Vec R, PetscReal values[]);
 /* The value at an owned vertex of a local array x[nnode][3] with ghosts, as vertex fields have it. */
-/* At a corner 4 cell + a of a cell, as the cell has it. */
-void SbPointsCorner(SbRun run, PetscInt corner, const PetscReal x[], PetscReal value[3]);
 void SbPointsVertex(SbRun run, SbOutput out, PetscInt vertex, const PetscReal x[], PetscReal value[3]);
 
 /* Before the folder is touched: refuses to go on with frames that have other points. Collective. */
@@ -234,12 +245,18 @@ PetscErrorCode SbContactsRemoveIndex(SbOutput out);
 PetscErrorCode SbHistoryAttach(SbRun run, SbOutput out);
 PetscErrorCode SbHistoryReattach(SbRun run, SbOutput out);
 PetscErrorCode SbHistoryDestroy(SbOutput out);
+PetscErrorCode SbProbesRegister(void);
+PetscErrorCode SbProbesSetFromOptions(SbOutput out, const SbScope *scope, PetscBool dynamic);
+PetscErrorCode SbProbesDestroy(SbOutput out);
 PetscErrorCode SbProbesFind(SbRun run, SbOutput out);
+/* Their columns of history.csv: how many, and name and unit of one. */
+PetscInt SbProbesCount(SbOutput out);
+PetscErrorCode SbProbesColumn(SbOutput out, PetscInt column, size_t size, char name[], const char **unit);
 /* In a checkpoint of a run that was re-meshed: the positions that they follow. Collective. */
 PetscErrorCode SbProbesWrite(SbRun run, SbOutput out, SbH5 *h);
 PetscErrorCode SbProbesRead(SbRun run, SbOutput out, SbH5 *h);
-/* Value of a vector, local with ghosts, at a probe of this rank; zero on others. */
-void SbProbeValue(SbRun run, SbOutput out, const SbProbe *probe, const PetscReal u[], PetscReal value[3]);
+/* values[SbProbesCount()] += this rank's part of the columns of all probes. Collective. */
+PetscErrorCode SbProbesAdd(SbRun run, SbOutput out, const SbStep *step, PetscReal values[]);
 /* checkpoint_effects.c: records of an effect's state, of all ranks, as a file has them. */
 typedef struct {
   PetscInt n;

@@ -132,11 +132,6 @@ void SbPointsVertex(SbRun run, SbOutput out, PetscInt vertex, const PetscReal x[
   for (int k = 0; k < 3; k++) value[k] /= V;
 }
 
-void SbPointsCorner(SbRun run, PetscInt corner, const PetscReal x[], PetscReal value[3])
-{
-  corner_value(run->model->space, corner, x, value);
-}
-
 PetscErrorCode SbPointsValues(SbRun run, SbOutput out, Vec x, PetscReal values[])
 {
   const SbSpace s = run->model->space;

@@ -1,16 +1,159 @@
 /*
-  Probes: points of the bodies whose displacement the history follows. Each sits at the vertex nearest to the point asked
-  for in the rest state; of equally near ones, at that with the smallest original number. It shows what vertex fields show
-  there: the unknown of P1, the mean of the cells around it for CR and DG.
+  Probes: what history.csv follows at a point, or as a mean over facets or tets. Each is a list of nodes with weights for vectors,
+  sum_i w_i x_i, and one of tets with weights for what tets have.
 
-  It follows the material that is there. When its body is re-meshed and the vertex is gone, it shows what the tet has that holds the position at
-  rest: sum_a w_a u_a with the weights of its corners. Checkpoints carry the position (SbProbesWrite).
+  At a point: the vertex nearest to it in the rest state; of equally near ones that with the smallest original number. Vectors are what vertex fields show there: the
+  unknown of P1 and P2, the mean of the cells around it for CR and DG; quantities of tets are means over the tets around it, by volume. On a set: the mean over its boundary facets,
+  by area at rest; in a set: over its tets, by volume at rest. Both integrate the basis functions, so they are exact for each element; a facet has what its tet has.
+
+  A probe at a point follows the material that is there. When its body is re-meshed and the vertex is gone, it shows what the tet has that holds the position at
+  rest. Checkpoints carry the position (SbProbesWrite).
 */
 #include <math.h>
+#include <stddef.h>
 #include "output_impl.h"
 #include "sbtet.h"
 
 #define NNUMBER 4 /* of a probe in a checkpoint: the position, the body */
+
+static const SbOption rows[] = {
+  {"at", SB_OPTION_REALS, 3, "m", NULL, "(-inf, inf)",
+   "position of the probe in the rest state, as placed; the nearest vertex is taken"},
+  {"on", SB_OPTION_STRING, 1, "", "", "",
+   "instead of a position: mean over the boundary facets of this set (of -sets, a physical group, a body, "
+   "boundary), by area at rest"},
+  {"in", SB_OPTION_STRING, 1, "", "", "",
+   "instead of a position: mean over the tetrahedra of this set, by volume at rest"},
+  {"fields", SB_OPTION_NAMES, 1, "", "displacement", "",
+   "what history.csv follows there: displacement, position, velocity, acceleration, stress, von_mises, "
+   "pressure, mean_pressure, J, "
+   "energy_density; of a tet's quantities the mean over the tets around the vertex, or behind the facets"},
+};
+
+PetscErrorCode SbProbesRegister(void)
+{
+  PetscFunctionBeginUser;
+  PetscCall(SbOptionsRegister("probe", "", (PetscInt)PETSC_STATIC_ARRAY_LENGTH(rows), rows));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Where a probe is and what it follows. */
+static PetscErrorCode read_probe(SbProbe *probe, PetscBool dynamic)
+{
+  SbScope scope;
+  PetscBool given[3];
+  char(*names)[SB_NAME_MAX], option[2 * SB_NAME_MAX];
+  PetscInt n;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbScopeSet(&scope, "probe", "", probe->name));
+  PetscCall(SbOptionGiven(&scope, "at", &given[SB_PROBE_POINT]));
+  PetscCall(SbOptionGiven(&scope, "on", &given[SB_PROBE_FACETS]));
+  PetscCall(SbOptionGiven(&scope, "in", &given[SB_PROBE_TETS]));
+  PetscCheck(given[0] + given[1] + given[2] == 1, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
+             "-probe_%s_at, _on, _in: give one of them, the position of a vertex, or a set over whose facets "
+             "or tets the mean is taken",
+             probe->name);
+  probe->kind = given[SB_PROBE_FACETS] ? SB_PROBE_FACETS
+                : given[SB_PROBE_TETS] ? SB_PROBE_TETS
+                                       : SB_PROBE_POINT;
+  if (probe->kind == SB_PROBE_POINT)
+    PetscCall(SbOptionReals(&scope, "at", probe->at));
+  else
+    PetscCall(
+      SbOptionString(&scope, probe->kind == SB_PROBE_FACETS ? "on" : "in", sizeof(probe->set), probe->set));
+
+  /* the fields */
+  PetscCall(SbOptionName(&scope, "fields", sizeof(option), option));
+  PetscCall(SbOptionNames(&scope, "fields", &n, &names));
+  PetscCheck(n > 0 && n <= SB_FIELD_MAX, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
+             "%s: %" PetscInt_FMT " fields; 1 to %d are possible", option, n, SB_FIELD_MAX);
+  for (PetscInt i = 0; i < n; i++) {
+    const SbField *f;
+
+    PetscCall(SbFieldFind(option, names[i], &f));
+    PetscCheck(
+      SbFieldIsProbed(f), PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
+      "%s: probes do not follow '%s'; forces of supports and of contact have columns of their effects",
+      option, names[i]);
+    PetscCheck(dynamic || !f->dynamic, PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT, "%s: a static run has no '%s'",
+               option, names[i]);
+    probe->field[probe->nfield++] = f;
+  }
+  PetscCall(PetscFree(names));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbProbesSetFromOptions(SbOutput out, const SbScope *scope, PetscBool dynamic)
+{
+  char(*names)[SB_NAME_MAX];
+
+  PetscFunctionBeginUser;
+  PetscCall(SbOptionNames(scope, "probes", &out->nprobe, &names));
+  PetscCall(PetscCalloc1(out->nprobe, &out->probe));
+  for (PetscInt p = 0; p < out->nprobe; p++) {
+    PetscCall(PetscStrncpy(out->probe[p].name, names[p], SB_NAME_MAX));
+    PetscCall(read_probe(&out->probe[p], dynamic));
+  }
+  PetscCall(PetscFree(names));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode forget_sums(SbProbe *probe)
+{
+  PetscFunctionBeginUser;
+  probe->nnode = probe->ncell = 0;
+  PetscCall(PetscFree2(probe->node, probe->weight));
+  PetscCall(PetscFree2(probe->cell, probe->cell_weight));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbProbesDestroy(SbOutput out)
+{
+  PetscFunctionBeginUser;
+  for (PetscInt p = 0; p < out->nprobe; p++) PetscCall(forget_sums(&out->probe[p]));
+  PetscCall(PetscFree(out->probe));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ columns */
+
+PetscInt SbProbesCount(SbOutput out)
+{
+  PetscInt n = 0;
+
+  for (PetscInt p = 0; p < out->nprobe; p++)
+    for (PetscInt i = 0; i < out->probe[p].nfield; i++) n += out->probe[p].field[i]->ncomp;
+  return n;
+}
+
+PetscErrorCode SbProbesColumn(SbOutput out, PetscInt c, size_t size, char name[], const char **unit)
+{
+  static const char *const tensor[] = {"xx", "xy", "xz", "yy", "yz", "zz"}, *const axis[] = {"x", "y", "z"};
+  const SbProbe *probe = out->probe;
+  const SbField *f = probe->field[0];
+
+  PetscFunctionBeginUser;
+  for (PetscInt i = 1; c >= f->ncomp; i++) {
+    c -= f->ncomp;
+    if (i == probe->nfield) {
+      probe++;
+      i = 0;
+    }
+    f = probe->field[i];
+  }
+  *unit = f->unit;
+  if (f->ncomp == 1)
+    PetscCall(PetscSNPrintf(name, size, "%s_%s", probe->name, f->name));
+  else if (!strcmp(f->name, "displacement"))
+    PetscCall(PetscSNPrintf(name, size, "%s_u%s", probe->name, axis[c]));
+  else
+    PetscCall(
+      PetscSNPrintf(name, size, "%s_%s_%s", probe->name, f->name, f->ncomp == 3 ? axis[c] : tensor[c]));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* ------------------------------------------------------------------ where they are */
 
 /* The nearest vertex that this rank owns, of a body unless that is -1: squared distance, local number (-1 when it owns none). */
 static void nearest_owned(const SbMesh mesh, PetscInt body, const PetscReal at[3], PetscReal *best,
@@ -64,26 +207,130 @@ static PetscReal deepest_owned(const SbMesh mesh, const SbProbe *probe, PetscInt
   return best;
 }
 
-/* Another mesh: the vertex at the position that it followed, or the tet around it. */
-static PetscErrorCode find_again(const SbMesh mesh, SbOutput out, SbProbe *probe)
+/* Adds the nodes of a cell: L weights of its corners, Q those of the nodes of P2. */
+static void add_nodes(const SbSpace s, SbProbe *probe, PetscInt cell, const PetscReal L[4],
+                      const PetscReal Q[SB_CELL_NODES])
 {
-  PetscReal mine, best;
-  PetscInt tet;
+  const SbElement e = SbSpaceCellElement(s, cell);
+  const PetscBool quadratic = (PetscBool)(e->nodes_per[1] > 0);
+
+  for (PetscInt a = 0; a < (quadratic ? SB_CELL_NODES : 4); a++) {
+    PetscReal w = quadratic ? Q[a] : 0.;
+
+    for (int c = 0; c < 4 && !quadratic; c++) w += e->ops.vertex[c][a] * L[c];
+    probe->node[probe->nnode] = SbSpaceCellNode(s, cell, a);
+    probe->weight[probe->nnode++] = w;
+  }
+}
+
+/* The sums of a probe that is a mean over the boundary facets, or the tets, of its set; tets count with their owners. */
+static PetscErrorCode sum_set(SbRun run, SbProbe *probe)
+{
+  const SbSpace s = run->model->space;
+  const SbMesh mesh = s->mesh;
+  PetscReal total = 0.;
+  SbFacet *facet = NULL;
+  PetscInt k, n = 0;
+  char option[2 * SB_NAME_MAX];
 
   PetscFunctionBeginUser;
-  probe->cell = -1;
+  PetscCall(PetscSNPrintf(option, sizeof(option), "-probe_%s_%s", probe->name,
+                          probe->kind == SB_PROBE_FACETS ? "on" : "in"));
+  PetscCall(SbSpaceFindSet(s, probe->set, option, &k));
+  if (probe->kind == SB_PROBE_FACETS)
+    PetscCall(SbSpaceGetSetFacets(s, k, &n, &facet));
+  else
+    n = mesh->ncell_owned;
+  PetscCall(PetscMalloc2(SB_CELL_NODES * n, &probe->node, SB_CELL_NODES * n, &probe->weight));
+  PetscCall(PetscMalloc2(n, &probe->cell, n, &probe->cell_weight));
+  for (PetscInt i = 0; i < n; i++) {
+    const PetscInt cell = facet ? facet[i].cell : i;
+    PetscReal L[4] = {0., 0., 0., 0.}, Q[SB_CELL_NODES] = {0.}, measure = 0.;
+
+    if (cell >= mesh->ncell_owned || (!facet && !(mesh->cell_set[cell] & SB_SET_BIT(k)))) continue;
+    /* integrals of the basis functions: over a facet of P2 they are those of its edges alone */
+    if (facet) {
+      measure = facet[i].area;
+      for (int c = 0; c < 3; c++) L[facet[i].corner[c]] = measure / 3.;
+      for (int e = 0; e < 6; e++)
+        Q[4 + e] = SbTetEdge[e][0] == facet[i].face || SbTetEdge[e][1] == facet[i].face ? 0. : measure / 3.;
+    } else {
+      measure = SbTetDeterminant(mesh->x, mesh->cell + 4 * cell) / 6.;
+      for (int c = 0; c < 4; c++) L[c] = measure / 4.;
+      for (int a = 0; a < SB_CELL_NODES; a++) Q[a] = measure * (a < 4 ? -0.05 : 0.2);
+    }
+    add_nodes(s, probe, cell, L, Q);
+    probe->cell[probe->ncell] = cell;
+    probe->cell_weight[probe->ncell++] = measure;
+    total += measure;
+  }
+  PetscCall(PetscFree(facet));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &total, 1, MPIU_REAL, MPI_SUM, s->comm));
+  PetscCheck(total > 0., s->comm, PETSC_ERR_USER_INPUT, "%s %s: the set has no %s", option, probe->set,
+             probe->kind == SB_PROBE_FACETS ? "boundary facets; a mean over tets is asked for by _in"
+                                            : "tetrahedra; a mean over facets is asked for by _on");
+  for (PetscInt i = 0; i < probe->nnode; i++) probe->weight[i] /= total;
+  for (PetscInt i = 0; i < probe->ncell; i++) probe->cell_weight[i] /= total;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The tets around the vertex of a probe, by volume; the lowest numbers first. */
+static PetscErrorCode sum_around(const SbMesh mesh, SbProbe *probe)
+{
+  PetscInt vertex = probe->local < 0 ? -1 : mesh->gvert[probe->local], n = 0;
+  PetscReal total = 0.;
+
+  PetscFunctionBeginUser;
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &vertex, 1, MPIU_INT, MPI_MAX, mesh->comm));
+  for (int pass = 0; pass < 2; pass++) {
+    for (PetscInt i = 0; i < 4 * mesh->ncell_owned; i++) {
+      if (mesh->gvert[mesh->cell[i]] != vertex) continue;
+      if (!pass) {
+        n++;
+        continue;
+      }
+      probe->cell[probe->ncell] = i / 4;
+      probe->cell_weight[probe->ncell] = SbTetDeterminant(mesh->x, mesh->cell + 4 * (i / 4)) / 6.;
+      total += probe->cell_weight[probe->ncell++];
+    }
+    if (!pass) PetscCall(PetscMalloc2(n, &probe->cell, n, &probe->cell_weight));
+  }
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &total, 1, MPIU_REAL, MPI_SUM, mesh->comm));
+  for (PetscInt i = 0; i < n; i++) probe->cell_weight[i] /= total;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Another mesh: the vertex at the position that it followed, or the tet around it. */
+static PetscErrorCode find_again(const SbSpace s, SbOutput out, SbProbe *probe)
+{
+  const SbMesh mesh = s->mesh;
+  PetscReal mine, best, L[4] = {0., 0., 0., 0.}, Q[SB_CELL_NODES];
+  PetscInt cell, tet;
+
+  PetscFunctionBeginUser;
   nearest_owned(mesh, probe->body, probe->x, &mine, &probe->local);
   PetscCall(agree(out, mine, probe->local < 0 ? 0 : mesh->vert_orig[probe->local], &probe->local,
                   &probe->original, &best));
   if (best == 0.) PetscFunctionReturn(PETSC_SUCCESS);
   probe->local = probe->original = -1;
-  mine = deepest_owned(mesh, probe, &probe->cell, probe->weight);
-  PetscCall(agree(out, mine, probe->cell < 0 ? 0 : mesh->cell_orig[probe->cell], &probe->cell, &tet, &best));
+  mine = deepest_owned(mesh, probe, &cell, L);
+  PetscCall(agree(out, mine, cell < 0 ? 0 : mesh->cell_orig[cell], &cell, &tet, &best));
   if (best > 1e-6)
     PetscCall(SbWarning(out->comm,
                         "probe '%s': no tet of the re-meshed body holds its position any more; it follows "
                         "the nearest one, from %.2g of its size outside",
                         probe->name, (double)best));
+
+  /* the basis functions there */
+  PetscCall(PetscMalloc2(SB_CELL_NODES, &probe->node, SB_CELL_NODES, &probe->weight));
+  PetscCall(PetscMalloc2(1, &probe->cell, 1, &probe->cell_weight));
+  if (cell < 0) PetscFunctionReturn(PETSC_SUCCESS);
+  for (int a = 0; a < 4; a++) Q[a] = L[a] * (2. * L[a] - 1.);
+  for (int e = 0; e < 6; e++) Q[4 + e] = 4. * L[SbTetEdge[e][0]] * L[SbTetEdge[e][1]];
+  add_nodes(s, probe, cell, L, Q);
+  probe->ncell = 1;
+  probe->cell[0] = cell;
+  probe->cell_weight[0] = 1.;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -94,7 +341,6 @@ static PetscErrorCode find_first(const SbMesh mesh, SbOutput out, SbProbe *probe
   PetscInt body = -1;
 
   PetscFunctionBeginUser;
-  probe->cell = -1;
   nearest_owned(mesh, -1, probe->at, &mine, &probe->local);
   PetscCall(agree(out, mine, probe->local < 0 ? 0 : mesh->vert_orig[probe->local], &probe->local,
                   &probe->original, &best));
@@ -110,28 +356,75 @@ static PetscErrorCode find_first(const SbMesh mesh, SbOutput out, SbProbe *probe
 
 PetscErrorCode SbProbesFind(SbRun run, SbOutput out)
 {
-  const SbMesh mesh = run->model->mesh;
+  const SbSpace s = run->model->space;
 
   PetscFunctionBeginUser;
   if (out->nprobe) PetscCall(SbPointsPrepare(run, out));
   for (PetscInt p = 0; p < out->nprobe; p++) {
-    if (out->probe[p].found)
-      PetscCall(find_again(mesh, out, &out->probe[p]));
+    SbProbe *probe = &out->probe[p];
+    PetscBool cells = PETSC_FALSE;
+
+    PetscCall(forget_sums(probe));
+    for (PetscInt i = 0; i < probe->nfield; i++) {
+      PetscCall(SbFieldPrepare(run, out, probe->field[i]));
+      cells = (PetscBool)(cells || probe->field[i]->cell);
+    }
+    probe->local = -1;
+    if (probe->kind != SB_PROBE_POINT)
+      PetscCall(sum_set(run, probe));
+    else if (probe->found)
+      PetscCall(find_again(s, out, probe));
     else
-      PetscCall(find_first(mesh, out, &out->probe[p]));
+      PetscCall(find_first(s->mesh, out, probe));
+    if (cells && probe->kind == SB_PROBE_POINT && probe->original >= 0) PetscCall(sum_around(s->mesh, probe));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-void SbProbeValue(SbRun run, SbOutput out, const SbProbe *probe, const PetscReal u[], PetscReal value[3])
-{
-  if (probe->local >= 0) SbPointsVertex(run, out, probe->local, u, value);
-  for (int a = 0; a < 4 && probe->cell >= 0; a++) {
-    PetscReal corner[3];
+/* ------------------------------------------------------------------ values */
 
-    SbPointsCorner(run, 4 * probe->cell + a, u, corner);
-    for (int k = 0; k < 3; k++) value[k] += probe->weight[a] * corner[k];
+PetscErrorCode SbProbesAdd(SbRun run, SbOutput out, const SbStep *step, PetscReal values[])
+{
+  const SbSpace s = run->model->space;
+  const Vec vector[3] = {step->U, step->V, step->A};
+  const PetscReal *x[3] = {NULL, NULL, NULL};
+
+  PetscFunctionBeginUser;
+  /* quantities of tets */
+  out->state_valid = PETSC_FALSE;
+  for (PetscInt p = 0, c = 0; p < out->nprobe; p++) {
+    const SbProbe *probe = &out->probe[p];
+
+    for (PetscInt i = 0; i < probe->nfield; c += probe->field[i++]->ncomp)
+      if (probe->field[i]->cell)
+        PetscCall(SbFieldAddCell(probe->field[i], run, step, probe->ncell, probe->cell, probe->cell_weight,
+                                 values + c));
   }
+
+  /* vectors: at the vertex, or over the nodes; positions are displacements and where that is at rest */
+  for (int i = 0; i < 3; i++)
+    if (vector[i]) PetscCall(SbSpaceGetLocalRead(s, vector[i], &x[i]));
+  for (PetscInt p = 0; p < out->nprobe; p++) {
+    const SbProbe *probe = &out->probe[p];
+
+    for (PetscInt i = 0; i < probe->nfield; values += probe->field[i++]->ncomp) {
+      const size_t from = probe->field[i]->from;
+      const PetscReal *here = x[from == offsetof(SbStep, V) ? 1 : from == offsetof(SbStep, A) ? 2 : 0];
+      const PetscBool position = (PetscBool)!strcmp(probe->field[i]->name, "position");
+
+      if (probe->field[i]->cell) continue;
+      if (probe->local >= 0) SbPointsVertex(run, out, probe->local, here, values);
+      for (int k = 0; k < 3; k++) {
+        if (position && probe->local >= 0) values[k] += probe->x[k];
+        for (PetscInt a = 0; a < probe->nnode; a++)
+          values[k] += probe->weight[a] *
+                       (here[3 * probe->node[a] + k] + (position ? s->node_x[3 * probe->node[a] + k] : 0.));
+      }
+    }
+  }
+  for (int i = 0; i < 3; i++)
+    if (vector[i]) PetscCall(SbSpaceRestoreLocalRead(s, vector[i], &x[i]));
+  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* ------------------------------------------------------------------ in checkpoints */
@@ -154,7 +447,7 @@ PetscErrorCode SbProbesWrite(SbRun run, SbOutput out, SbH5 *h)
   for (PetscInt p = 0; p < out->nprobe; p++) {
     const SbProbe *probe = &out->probe[p];
 
-    for (int k = 0; k < NNUMBER && probe->found; k++) {
+    for (int k = 0; k < NNUMBER && probe->found && probe->kind == SB_PROBE_POINT; k++) {
       PetscCall(number_name(probe, k, sizeof(name), name));
       PetscCall(SbH5PutReal(h, h->file, name, k < 3 ? probe->x[k] : (PetscReal)probe->body));
     }

@@ -153,6 +153,11 @@ static PetscErrorCode print_output(SbOutput out)
     const SbProbe *probe = &out->probe[p];
     char where[64] = "a tet";
 
+    if (probe->kind != SB_PROBE_POINT) {
+      PetscCall(entry("probe", "%s: mean over the %s of '%s'", probe->name,
+                      probe->kind == SB_PROBE_FACETS ? "facets" : "tets", probe->set));
+      continue;
+    }
     if (probe->original >= 0) (void)snprintf(where, sizeof(where), "vertex %lld", (long long)probe->original);
     PetscCall(entry("probe", "%s at %s (%g, %g, %g) m, %.3g m from the position asked for", probe->name,
                     where, (double)probe->x[0], (double)probe->x[1], (double)probe->x[2],

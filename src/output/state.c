@@ -1,9 +1,9 @@
 /*
-  A body begins where another run has brought it: -body_<name>_state RUN[,STEP].
+  A body begins where another run has brought it: -body_<name>_state RUN[,STEP] or CHECKPOINT.
 
   Displacement and velocity are those of a frame of that run's fields.h5, evaluated at the nodes of this run: u(X) = sum_a w_a u_a with the weights of the tet that holds the place X at
   rest there, or of the nearest one. So element, mesh, material, effects and integrator may be others; where nodes are the vertices of that run, values are those of the file. Every rank
-  reads the body's part of the file.
+  reads the body's part of the file. A checkpoint has no mesh, but all digits of all unknowns: it serves scenes with the same meshes and elements, whatever else is different there.
 */
 #include <sys/stat.h>
 #include "output_impl.h"
@@ -215,11 +215,80 @@ static PetscErrorCode take_over(SbRun run, const char *option, PetscInt b, Other
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The unknowns of body b from a checkpoint of the same bodies; is: the file is one. Collective. */
+static PetscErrorCode take_checkpoint(SbRun run, const char *option, PetscInt b, const char *path,
+                                      PetscBool *is)
+{
+  const SbOutput out = (SbOutput)run->output;
+  const SbSpace s = run->model->space;
+  const Vec target[2] = {run->U, run->V};
+  struct stat info;
+  SbH5 h;
+  int64_t hash = 0;
+  PetscBool ok = PETSC_TRUE;
+  PetscReal *slice, *owned;
+  char *options;
+
+  PetscFunctionBeginUser;
+  *is = (PetscBool)(!stat(path, &info) && S_ISREG(info.st_mode));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, is, 1, MPIU_BOOL, MPI_LAND, out->comm));
+  if (!*is) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(SbH5Open(out->comm, path, PETSC_FALSE, &h, is));
+  if (!*is) PetscFunctionReturn(PETSC_SUCCESS);
+  *is = (PetscBool)(H5Lexists(h.file, "u", H5P_DEFAULT) > 0);
+  if (!*is) {
+    PetscCall(SbH5Close(&h));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+
+  /* its bodies have the meshes and elements of these */
+  PetscCall(SbOutputCountNodes(s, out));
+  PetscCall(SbOutputOrder(run, out));
+  PetscCall(SbH5GetInt(h.file, "mesh_hash", &hash, &ok));
+  ok = (PetscBool)(ok && (uint64_t)hash == out->mesh_hash);
+  if (ok) PetscCall(SbH5ReadText(&h, "options", &options, &ok));
+  for (PetscInt i = 0; ok && i < run->model->nbody; i++) {
+    char line[3 * SB_NAME_MAX];
+    const SbBody *body = &run->model->body[i];
+
+    SbFormat(sizeof(line), line, "-body_%s_element %s\n", body->copy_of[0] ? body->copy_of : body->name,
+             body->element);
+    ok = (PetscBool)(strstr(options, line) != NULL);
+  }
+  if (hash == (int64_t)out->mesh_hash) PetscCall(PetscFree(options));
+
+  /* displacement and velocity of its nodes */
+  PetscCall(PetscMalloc2(3 * out->node.n, &slice, 3 * s->nnode_owned, &owned));
+  for (int k = 0; k < 2 && ok; k++) {
+    PetscScalar *x;
+
+    if (H5Lexists(h.file, k ? "v" : "u", H5P_DEFAULT) <= 0) {
+      PetscCall(SbWarning(out->comm, "%s: %s has no velocity, the body begins at rest", option, path));
+      continue;
+    }
+    PetscCall(SbH5ReadSlice(&h, k ? "v" : "u", &out->node, 3, slice, &ok));
+    if (!ok) break;
+    PetscCall(SbOrderScatter(&out->node, 3, slice, owned));
+    PetscCall(VecGetArray(target[k], &x));
+    for (PetscInt i = 0; i < 3 * s->nnode_owned; i++)
+      if (s->node_body[i / 3] == b) x[i] = k && s->fixed[i / 3] & (1 << i % 3) ? 0. : owned[i];
+    PetscCall(VecRestoreArray(target[k], &x));
+  }
+  PetscCall(PetscFree2(slice, owned));
+  PetscCall(SbH5Close(&h));
+  PetscCheck(ok, out->comm, PETSC_ERR_USER_INPUT,
+             "%s %s: this checkpoint is damaged, or of other bodies, meshes or elements; give the folder of "
+             "its run, whose frames serve any "
+             "mesh and element",
+             option, path);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode SbOutputTakeState(SbRun run)
 {
   const SbModel m = run->model;
   const SbOutput out = (SbOutput)run->output;
-  PetscBool any = PETSC_FALSE;
+  PetscBool any = PETSC_FALSE, checkpoint;
 
   PetscFunctionBeginUser;
   if (out->restart[0]) PetscFunctionReturn(PETSC_SUCCESS); /* the checkpoint has the state */
@@ -231,6 +300,8 @@ PetscErrorCode SbOutputTakeState(SbRun run)
     if (!m->start[b].state[0]) continue;
     any = PETSC_TRUE;
     PetscCall(PetscSNPrintf(option, sizeof(option), "-body_%s_state", m->body[b].name));
+    PetscCall(take_checkpoint(run, option, b, m->start[b].state, &checkpoint));
+    if (checkpoint) continue;
     SB_CATCH(&caught, read_other(option, m->start[b].state, &m->body[b], &o));
     if (!caught.code) PetscCall(take_over(run, option, b, &o));
     PetscCall(close_other(&o));

@@ -10,6 +10,8 @@
 #include "scene_impl.h"
 
 #define NAMES_MAX 1000 /* entries of a folder that are compared */
+#define LARGE 2.       /* m; files of larger soft bodies are mostly in mm */
+#define LIGHT 10.      /* kg/m^3; no soft body in SI units has less */
 
 /* Names in the folder of `path` that are near its own, with the folder; "" when there are none. Rank 0 only. */
 static PetscErrorCode near_files(const char *path, size_t size, char text[])
@@ -105,5 +107,30 @@ PetscErrorCode SbSceneCheck(SbModel model)
   PetscCheck(constrained, PETSC_COMM_SELF, PETSC_ERR_USER,
              "-time static: nothing holds the bodies, so there is no unique equilibrium; name an effect of "
              "type fixed or prescribed_displacement");
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbSceneCheckSizes(SbModel model)
+{
+  PetscFunctionBeginUser;
+  for (PetscInt i = 0; i < model->nbody; i++) {
+    const SbBody *body = &model->body[i];
+    const PetscReal length = PetscMax(PetscMax(body->bbox[3] - body->bbox[0], body->bbox[4] - body->bbox[1]),
+                                      body->bbox[5] - body->bbox[2]);
+    SbScope scope;
+    PetscBool given;
+
+    /* a box is as large as it was asked for; densities below are those of other units, t/mm^3 or g/cm^3 */
+    if (length < LARGE || body->density < LIGHT || !strncmp(body->mesh, "box:", 4)) continue;
+    if (i && body->copy_of[0] && !strcmp(body->copy_of, model->body[i - 1].copy_of)) continue;
+    PetscCall(SbScopeSet(&scope, "body", "", body->copy_of[0] ? body->copy_of : body->name));
+    PetscCall(SbOptionGiven(&scope, "scale", &given));
+    if (!given)
+      PetscCall(SbWarning(model->comm,
+                          "body '%s' is %.3g m long: if its file is in mm, give -body_%s_scale 0.001 (in cm: "
+                          "0.01); if it is in m, "
+                          "-body_%s_scale 1 says so",
+                          body->name, (double)length, scope.instance, scope.instance));
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }

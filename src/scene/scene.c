@@ -45,7 +45,8 @@ static const SbOption body_rows[] = {
   {"state", SB_OPTION_STRING, 1, "", "", "",
    "RUN or RUN,STEP: displacement and velocity at the start are those of this body in the results of another "
    "run (its folder or fields.h5; the last step "
-   "without one), which may have another mesh, element, material, integrator and other effects"},
+   "without one), which may have another mesh, element, material, integrator and other effects; or of a "
+   "checkpoint of a run with the same bodies, meshes and elements"},
   {"velocity", SB_OPTION_FORMULA, 3, "m/s", "0,0,0", "",
    "velocity at the start: numbers or formulas of the place x, y, z at rest"},
   {"angular_velocity", SB_OPTION_REALS, 3, "rad/s", "0,0,0", "(-inf, inf)",

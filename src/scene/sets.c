@@ -1,7 +1,7 @@
 /*
-  sets.c - the named sets of a scene: those that -sets defines by a shape, and those that effects name without more ado.
+  sets.c - the named sets of a scene: those that -sets defines by a shape, and those that effects and probes name without more ado.
 
-  An effect says in its option `on` where it acts, a body in `inclusions` which of its tets are of another material. A name there that -sets does not define means, in this order: the body
+  An effect says in its option `on` where it acts, a probe in `on` or `in` over what it takes a mean, a body in `inclusions` which of its tets are of another material. A name there that -sets does not define means, in this order: the body
   of that name, `all` bodies, the whole `boundary`, the physical group of that name. All such names are collected before
   the mesh is made, because it marks every set while it reads the bodies.
 */
@@ -99,6 +99,7 @@ static PetscErrorCode names_of_effect(const SbEffect effect, PetscInt *n, char (
 PetscErrorCode SbSceneReadSets(SbModel model)
 {
   char(*names)[SB_NAME_MAX];
+  SbScope scope;
   PetscInt n, room;
 
   PetscFunctionBeginUser;
@@ -117,6 +118,17 @@ PetscErrorCode SbSceneReadSets(SbModel model)
     for (PetscInt i = 0; i < n && model->nset <= SB_SET_MAX; i++) PetscCall(use_name(model, names[i]));
     PetscCall(PetscFree(names));
   }
+  /* those over which probes take means */
+  PetscCall(SbScopeSet(&scope, "", "", ""));
+  PetscCall(SbOptionNames(&scope, "probes", &n, &names));
+  for (PetscInt i = 0; i < 2 * n && model->nset <= SB_SET_MAX; i++) {
+    char name[SB_NAME_MAX];
+
+    PetscCall(SbScopeSet(&scope, "probe", "", names[i / 2]));
+    PetscCall(SbOptionString(&scope, i % 2 ? "in" : "on", sizeof(name), name));
+    if (name[0]) PetscCall(use_name(model, name));
+  }
+  PetscCall(PetscFree(names));
   for (PetscInt b = 0; b < model->nbody; b++) {
     SbBody *body = &model->body[b];
 
@@ -129,7 +141,7 @@ PetscErrorCode SbSceneReadSets(SbModel model)
   }
   PetscCheck(model->nset <= SB_SET_MAX, PETSC_COMM_SELF, PETSC_ERR_USER,
              "the scenario uses more than %d sets (%" PetscInt_FMT
-             " in -sets, the others named by effects and inclusions); join some of them",
+             " in -sets, the others named by effects, probes and inclusions); join some of them",
              SB_SET_MAX, room);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

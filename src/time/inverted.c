@@ -16,7 +16,7 @@ static PetscErrorCode count_inverted(SbRun run, Vec U, PetscInt *n, PetscReal *l
 
   PetscFunctionBeginUser;
   PetscCall(SbSpaceGetLocalRead(s, U, &u));
-  PetscCall(SbSpaceStrainEnergy(s, u, &energy, least, n, &volume));
+  PetscCall(SbSpaceStrainEnergy(s, u, NULL, &energy, least, n, &volume));
   PetscCall(SbSpaceRestoreLocalRead(s, U, &u));
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, n, 1, MPIU_INT, MPI_SUM, run->model->comm));
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, least, 1, MPIU_REAL, MPI_MIN, run->model->comm));

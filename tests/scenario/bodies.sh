@@ -80,6 +80,35 @@ for n in 1 2; do
     check "no warning that the run has no velocity" grep -q "no velocity" state.txt
   done
 done
+
+# from a checkpoint, to its last digit on another number of ranks, with another law, integrator and effects; not with other elements or meshes
+# shellcheck disable=SC2086
+"${mpi[@]}" 2 "$supple" defaults.opts $bar -body_bar_velocity "0,3*(x-0.2),0" -checkpoint_every_steps 3 -output_dir swung || fail "a run with checkpoints"
+for n in 1 3; do
+  # shellcheck disable=SC2086
+  "${mpi[@]}" $n "$supple" defaults.opts $bar -body_bar_state swung/checkpoint_000003.h5 -time newmark -effects g -effect_g_type gravity -body_bar_poisson 0.2 \
+    -ts_max_time 1e-6 -ts_dt 1e-6 -output_dir start -output_overwrite yes || fail "a state of a checkpoint"
+  for column in kinetic momentum_y angular_z centre_y max_displacement; do
+    # shellcheck disable=SC2016
+    check "a state of a checkpoint, $column: $(row0 $column)" awk -F, -v value="$(row0 $column)" -v column=$column '
+      NR == 1 { for (i = 1; i <= NF; i++) if ($i == column) c = i } $1 == 3 { d = value - $c; exit d > 1e-13 || d < -1e-13 }' swung/history.csv
+  done
+done
+# shellcheck disable=SC2086
+error 1 "-body_bar_state|swung/checkpoint_000003.h5" defaults.opts $bar -body_bar_state swung/checkpoint_000003.h5 -body_bar_element p2
+# shellcheck disable=SC2086
+error 1 "-body_bar_state|swung/checkpoint_000003.h5" defaults.opts $bar -body_bar_state swung/checkpoint_000003.h5 -body_bar_mesh box:0.4,0.1,0.1:4,1,2
+
+# sizes that look like mm: a warning, but not where the scale is given, or densities are not those of SI
+for size in "100 1000 1" "100 1000 0 -body_a_scale 1" "100 1e-9 0" "0.1 1000 0"; do
+  # shellcheck disable=SC2086
+  set -- $size
+  printf 'v 0 0 0\nv %s 0 0\nv 0 %s 0\nv 0 0 %s\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n' "$1" "$1" "$1" >tet.obj
+  # shellcheck disable=SC2086
+  "$supple" defaults.opts -bodies a -body_a_mesh tet.obj -body_a_density "$2" ${4:+$4 $5} -output_dir sizes -output_overwrite yes >sizes.txt 2>&1 || fail "size $size: $(cat sizes.txt)"
+  check "size $size: $(cat sizes.txt)" test "$(grep -c -- '-body_a_scale 0.001' sizes.txt)" = "$3"
+done
+
 # shellcheck disable=SC2086
 error 2 "-body_bar_state nowhere" defaults.opts $bar -body_bar_state nowhere
 # shellcheck disable=SC2086

@@ -150,7 +150,7 @@ static PetscErrorCode formula(SbModel m, const PetscReal u[], PetscReal *energy)
 static PetscErrorCode energy_of(SbSpace s, const PetscReal u[], SbJumpFactor factor, PetscReal *energy)
 {
   PetscFunctionBeginUser;
-  *energy = SbJumpEnergy(s, u, factor);
+  *energy = SbJumpEnergy(s, u, factor, NULL);
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, energy, 1, MPIU_REAL, MPI_SUM, s->comm));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -76,13 +76,14 @@ static PetscErrorCode test_fields(void)
   PetscFunctionBeginUser;
   PetscCall(SbFieldGetAll(&n, &fields));
   for (PetscInt i = 0; i < n; i++) {
-    PetscCall(SbFieldFind(fields[i].name, &found));
+    PetscCall(SbFieldFind("-output_fields", fields[i].name, &found));
     SB_CHECK(found == &fields[i], "field %s is not found by its name", fields[i].name);
     /* `sets` are several arrays, which another function writes */
     SB_CHECK((fields[i].compute || !strcmp(fields[i].name, "sets")) && fields[i].unit[0] && fields[i].help[0],
              "field %s is not complete", fields[i].name);
   }
-  SB_CHECK_ERROR(SbFieldFind("von_mizes", &found), PETSC_ERR_USER, "-output_fields|'von_mizes'|von_mises");
+  SB_CHECK_ERROR(SbFieldFind("-output_fields", "von_mizes", &found), PETSC_ERR_USER,
+                 "-output_fields|'von_mizes'|von_mises");
   PetscCall(test_scene_open_in(dir, BOX EULER "-output_fields J,J,stress", &scene));
   out = (SbOutput)scene.run->output;
   SB_CHECK(out->nfield == 3 && !strcmp(out->field[2]->name, "body"), "a field named twice: %d fields",
