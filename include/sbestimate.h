@@ -12,7 +12,7 @@
   P the first Piola-Kirchhoff stress that the continuum would have under the loads, inertia and prescribed displacements of the moment, P_h that
   of the element, C Hooke's tensor of lambda and mu turned by the rotation of the cell (the strain energy norm of the linear law).
   The same unit as strain energy: sqrt(body2 / strain) is the relative error. For CR and DG it is the error inside of the cells, the energy
-  of the jumps at faces apart.
+  of the jumps at faces apart; for P2 that of the deviator and of the mean pressure of each cell.
 */
 typedef struct _p_SbSpaceEstimate *SbSpaceEstimate;
 struct _p_SbSpaceEstimate {
@@ -23,10 +23,11 @@ struct _p_SbSpaceEstimate {
   PetscReal *
     factor; /* [nbody] cell2 and body2 over the square of what recovery alone gives, 1 but for bodies of P1 */
   struct _p_SbRecovery *recovery;
-  PetscReal *P;   /* [ncell][9] stresses, Pa */
-  PetscReal *R;   /* [ncell_owned][9] rotations; NULL when every law is linear */
-  PetscReal *psi; /* [ncell_owned] energy densities, J/m^3 */
-  Vec residual;   /* NULL without a body of P1 */
+  PetscReal *P;                 /* [ncell][9] stresses, Pa */
+  struct SbPointStress *stress; /* [ncell] those of P2, NULL without a body of it */
+  PetscReal *R;                 /* [ncell_owned][9] rotations; NULL when every law is linear */
+  PetscReal *psi;               /* [ncell_owned] energy densities, J/m^3 */
+  Vec residual;                 /* NULL without a body of P1 */
 };
 /* Patches and links between ranks, once. Collective. The model is borrowed, the caller destroys the estimate. */
 PetscErrorCode SbSpaceEstimateCreate(SbModel model, SbSpaceEstimate *est);

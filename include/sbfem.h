@@ -239,9 +239,10 @@ PetscBool SbSpaceIsConstrained(SbSpace space);
 PetscErrorCode SbSpaceCellState(SbSpace space, const PetscReal u[], PetscReal sigma[], PetscReal J[],
                                 PetscReal psi[]);
 /* Per owned cell: first Piola-Kirchhoff stress P[9] (Pa), rotation R[9] in F (the identity for the linear law; may be NULL), energy
-   density psi (J/m^3, rest). Not collective. */
+   density psi (J/m^3, rest); of P2, whose stresses are means over the points of SbRuleQuadratic, P there as well, point[ncell][4][9]
+   (may be NULL). Not collective. */
 PetscErrorCode SbSpaceCellPiola(SbSpace space, const PetscReal u[], PetscReal P[], PetscReal R[],
-                                PetscReal psi[]);
+                                PetscReal psi[], PetscReal point[]);
 /* Per owned cell: the law's pressure -lambda theta, Pa (SbMaterialOps.pressure). Not collective. */
 PetscErrorCode SbSpaceCellPressure(SbSpace space, const PetscReal u[], PetscReal pressure[]);
 /* Owned cells: strain energy (J; added to body[nbody] by bodies, too, unless that is NULL), smallest det F, number with det F <= 0, current volume (m^3). Local: reduce them. */

@@ -1,11 +1,12 @@
 /*
   The stress of each cell in the frame of the rest state, with the rotation that turns it into the cell's own. For DG F is that of the means of
-  the two sides.
+  the two sides. P2 has one stress at each point: then that of a cell is their mean.
 */
 #include "fem_impl.h"
 #include "sbkernel.h"
 
-PetscErrorCode SbSpaceCellPiola(SbSpace s, const PetscReal x[], PetscReal P[], PetscReal R[], PetscReal psi[])
+PetscErrorCode SbSpaceCellPiola(SbSpace s, const PetscReal x[], PetscReal P[], PetscReal R[], PetscReal psi[],
+                                PetscReal point[])
 {
   PetscFunctionBeginUser;
   for (PetscInt r = 0; r < s->nregion; r++) {
@@ -14,6 +15,9 @@ PetscErrorCode SbSpaceCellPiola(SbSpace s, const PetscReal x[], PetscReal P[], P
     for (PetscInt b = region->bstart; region->owned && b < region->bend; b++) {
       SbLane F[4][9], stress[4][9], energy[4], rotation[9];
       const PetscInt n = SbBatchState(s, region, b, x, F, stress, energy, NULL);
+
+      for (PetscInt i = 0; point && region->quadratic && i < n * s->batch_n[b]; i++)
+        SbLaneGet(9, (const SbLane *)stress[i % n], (int)(i / n), point + 9 * (n * s->batch_cell[b] + i));
 
       /* means over the points */
       for (PetscInt q = 1; q < n; q++) {

@@ -30,6 +30,12 @@
 
   This is done for each body of P1, and the factor is the same in all its cells.
 
+  P2. Deviators of P_h are linear in a cell, with the values at its points, and P* is quadratic; of the pressure, constant in a cell, its mean counts:
+
+    off_T = 1/(4 mu) int_T |dev (s* - s_h)|^2 + V/(2 K) (mean p* - p_h)^2.
+
+  Displacements are as accurate as these, one order better than the pressure in between. The element does not lock, and this is all.
+
   Limits. The norm is that of Hooke's law in the cell's own frame: for strains of order one it is not the tangent's. theta takes
   supports that turn by large angles for ones that do work, and the force of one body on another for a support: a locked body is
   estimated too low then. Where a mesh is too coarse to show the shape of the answer nothing here knows it.
@@ -58,18 +64,30 @@ typedef enum {
   NSUM = WORK + 3
 } Sum;
 
+/* P1 is the element that may be too stiff by any factor. */
+static inline PetscBool is_stiff(SbModel model, PetscInt body)
+{
+  return (PetscBool)(model->element[body]->nodes_per[0] && !model->element[body]->nodes_per[1]);
+}
+
 PetscErrorCode SbSpaceEstimateCreate(SbModel model, SbSpaceEstimate *estimate)
 {
   const PetscInt n = model->mesh->ncell_owned;
-  PetscBool stiff = PETSC_FALSE;
+  PetscBool stiff = PETSC_FALSE, any = PETSC_FALSE, *quadratic;
   SbSpaceEstimate est;
 
   PetscFunctionBeginUser;
   PetscCall(PetscNew(&est));
   est->model = model;
-  for (PetscInt b = 0; b < model->nbody; b++)
-    stiff = (PetscBool)(stiff || model->element[b]->nodes_per[0] > 0);
-  PetscCall(SbRecoveryCreate(model->mesh, &est->recovery));
+  PetscCall(PetscMalloc1(model->nbody, &quadratic));
+  for (PetscInt b = 0; b < model->nbody; b++) stiff = (PetscBool)(stiff || is_stiff(model, b));
+  for (PetscInt b = 0; b < model->nbody; b++) {
+    quadratic[b] = (PetscBool)(model->element[b]->nodes_per[1] > 0);
+    any = (PetscBool)(any || quadratic[b]);
+  }
+  PetscCall(SbRecoveryCreate(model->mesh, quadratic, &est->recovery));
+  PetscCall(PetscFree(quadratic));
+  if (any) PetscCall(PetscMalloc1(model->mesh->ncell, &est->stress));
   PetscCall(PetscCalloc1(n, &est->cell2));
   PetscCall(PetscCalloc3(model->nbody, &est->body2, model->nbody, &est->strain, model->nbody, &est->factor));
   PetscCall(PetscMalloc1(9 * (size_t)model->mesh->ncell, &est->P));
@@ -90,6 +108,7 @@ PetscErrorCode SbSpaceEstimateDestroy(SbSpaceEstimate *estimate)
   PetscCall(PetscFree(est->cell2));
   PetscCall(PetscFree3(est->body2, est->strain, est->factor));
   PetscCall(PetscFree(est->P));
+  PetscCall(PetscFree(est->stress));
   PetscCall(PetscFree(est->R));
   PetscCall(PetscFree(est->psi));
   PetscCall(VecDestroy(&est->residual));
@@ -172,6 +191,39 @@ static PetscReal add_cell(SbSpaceEstimate est, PetscInt c, PetscReal G, PetscRea
   return squares[0] + squares[1];
 }
 
+/* off_T of an owned cell of P2 by the values at its ten nodes: SbQuadraticMass() integrates products of what is quadratic. */
+static PetscReal quadratic_off(SbSpaceEstimate est, PetscInt c, PetscReal G, PetscReal K)
+{
+  const PetscReal *R = est->R ? est->R + 9 * c : NULL, V = cell_volume(est->model->mesh, c);
+  const PetscReal near = SbRuleQuadratic.L[0][0], far = SbRuleQuadratic.L[0][1];
+  const SbPointStress *at = est->stress + c;
+  PetscReal off[SB_CELL_NODES][6], pressure = 0., square = 0.;
+
+  for (int a = 0; a < SB_CELL_NODES; a++) {
+    const int i = a < 4 ? a : SbTetEdge[a - 4][0], j = a < 4 ? a : SbTetEdge[a - 4][1];
+    PetscReal P[9], mean;
+
+    pressure += (a < 4 ? -0.05 : 0.2) * SbRecoveryNode(est->recovery, c, a, P);
+    for (int k = 0; k < 9; k++) {
+      const PetscReal sum = at->P[0][k] + at->P[1][k] + at->P[2][k] + at->P[3][k];
+
+      P[k] -= (0.5 * (at->P[i][k] + at->P[j][k]) - far * sum) / (near - far);
+    }
+    turn(R, P, off[a]);
+    mean = (off[a][0] + off[a][1] + off[a][2]) / 3.;
+    for (int k = 0; k < 3; k++) off[a][k] -= mean;
+  }
+  for (int a = 0; a < SB_CELL_NODES; a++) {
+    for (int b = 0; b < SB_CELL_NODES; b++) {
+      PetscReal product = 0.;
+
+      for (int k = 0; k < 6; k++) product += (k < 3 ? 1. : 2.) * off[a][k] * off[b][k];
+      square += SbQuadraticMass(a, b) * product;
+    }
+  }
+  return V / (4. * G) * square + V / (2. * K) * PetscSqr(pressure - at->pressure);
+}
+
 /* Adds what theta is made of: the forces of supports and contact on each body of P1 and how its nodes have moved there. */
 static PetscErrorCode add_reactions(SbSpaceEstimate est, PetscReal t, Vec U, Vec V, Vec A,
                                     PetscReal (*sum)[NSUM])
@@ -220,12 +272,22 @@ PetscErrorCode SbSpaceEstimateCompute(SbSpaceEstimate est, PetscReal t, Vec U, V
 {
   SbModel model = est->model;
   const PetscReal *u;
-  PetscReal(*sum)[NSUM], *G, *K;
+  PetscReal(*sum)[NSUM], *G, *K, *point = NULL;
 
   PetscFunctionBeginUser;
+  if (est->stress) PetscCall(PetscCalloc1(36 * (size_t)model->mesh->ncell, &point));
   PetscCall(SbSpaceGetLocalRead(model->space, U, &u));
-  PetscCall(SbSpaceCellPiola(model->space, u, est->P, est->R, est->psi));
+  PetscCall(SbSpaceCellPiola(model->space, u, est->P, est->R, est->psi, point));
   PetscCall(SbSpaceRestoreLocalRead(model->space, U, &u));
+  for (PetscInt c = 0; point && c < model->mesh->ncell_owned; c++) {
+    PetscReal s[6];
+
+    turn(est->R ? est->R + 9 * c : NULL, est->P + 9 * c, s);
+    memcpy(est->stress[c].P, point + 36 * c, sizeof(est->stress[c].P));
+    est->stress[c].pressure = (s[0] + s[1] + s[2]) / 3.;
+  }
+  PetscCall(PetscFree(point));
+  if (est->stress) PetscCall(SbRecoveryApplyQuadratic(est->recovery, est->stress));
   PetscCall(SbRecoveryApply(est->recovery, est->P));
 
   /* sums over the cells of each body, with the moduli of each law asked for once */
@@ -236,9 +298,14 @@ PetscErrorCode SbSpaceEstimateCompute(SbSpaceEstimate est, PetscReal t, Vec U, V
     K[k] = model->material[k]->ops.bulk_modulus(model->material[k]);
   }
   for (PetscInt c = 0; c < model->mesh->ncell_owned; c++) {
-    const PetscInt k = model->mesh->cell_material[c];
+    const PetscInt k = model->mesh->cell_material[c], body = model->mesh->cell_body[c];
 
-    est->cell2[c] = add_cell(est, c, G[k], K[k], sum[model->mesh->cell_body[c]]);
+    if (model->element[body]->nodes_per[1]) {
+      est->cell2[c] = quadratic_off(est, c, G[k], K[k]);
+      sum[body][SHEAR_OFF] += est->cell2[c];
+      sum[body][STRAIN] += cell_volume(model->mesh, c) * est->psi[c];
+    } else
+      est->cell2[c] = add_cell(est, c, G[k], K[k], sum[body]);
   }
   PetscCall(PetscFree2(G, K));
   if (est->residual) PetscCall(add_reactions(est, t, U, V, A, sum));
@@ -250,7 +317,7 @@ PetscErrorCode SbSpaceEstimateCompute(SbSpaceEstimate est, PetscReal t, Vec U, V
     const PetscReal off = sum[b][SHEAR_OFF] + sum[b][PRESSURE_OFF];
 
     est->strain[b] = sum[b][STRAIN];
-    est->body2[b] = model->element[b]->nodes_per[0] > 0 ? stiff_error(sum[b]) : off;
+    est->body2[b] = is_stiff(model, b) ? stiff_error(sum[b]) : off;
     est->factor[b] = off > 0. ? est->body2[b] / off : 1.;
   }
   for (PetscInt c = 0; c < model->mesh->ncell_owned; c++)

@@ -280,9 +280,6 @@ PetscErrorCode SbLedgerAttach(SbLedger l)
   PetscFunctionBeginUser;
   if (!l) PetscFunctionReturn(PETSC_SUCCESS);
   run = l->run;
-  PetscCheck(
-    !run->model->space->edge_node, run->model->comm, PETSC_ERR_USER_INPUT,
-    "-ledger: the error of element p2 cannot be estimated yet: choose -body_<name>_element p1, cr or dg");
   PetscCall(begin(l));
   PetscCall(SbSpaceEstimateCreate(run->model, &l->space));
   PetscCall(PetscCalloc1(run->model->nbody, &l->space_error));

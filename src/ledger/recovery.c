@@ -11,11 +11,20 @@
   material does: a vertex has one value for each material around it, at most `nlayer`. Bodies have no vertices in common.
 
   p(X_v) is a fixed sum of the P_c, of which the weights are kept. An owned vertex has all its cells on the rank, so ghosts are needed only of the P_c, before, and of the values, after.
+
+  For P2 p has degree two and is fitted to the stresses at the four points of each cell; another such polynomial to the mean pressures of the cells, by
+  its own means there: of the pressure an element with one per cell knows no more. Slopes of the pressure and second derivatives are kept small like slopes above. The recovered
+  stress is quadratic in a cell, with p(X_v) at its vertices and, in the middle of an edge, the mean of what the polynomials of its two ends have there.
 */
 #include "recovery.h"
+#include "sbelement.h"
 #include "sbkernel.h"
 
-#define RIDGE 0.05 /* r above, as a part of the sum of squares of distances */
+#define RIDGE 0.05        /* r above, as a part of the sum of squares of distances */
+#define RIDGE_SLOPE 0.01  /* of slopes of the pressure, as a part of the number of cells */
+#define RIDGE_SECOND 1e-3 /* of second derivatives, likewise */
+#define NFIT 10           /* monomials of degree two and less */
+#define NVALUE 10         /* that are fitted: nine of P, the pressure */
 
 struct _p_SbRecovery {
   SbMesh mesh;       /* borrowed */
@@ -23,6 +32,14 @@ struct _p_SbRecovery {
   PetscInt *slot;    /* [ncell][4] where the value for a corner of a cell is: nlayer vertex + layer */
   PetscReal *weight; /* [ncell][4] of a cell's P in the value for a corner; 0 where the vertex is not owned */
   PetscReal *value;  /* [nvert nlayer][9] */
+  /* of P2, NULL without a body of it */
+  PetscBool *quadratic; /* [nbody] */
+  PetscReal (
+    *factor)[2][NFIT * NFIT]; /* [nvert_owned nlayer] Cholesky factors of the sums for P and pressure */
+  struct Fit {
+    PetscReal c[NFIT][NVALUE]; /* coefficients of the monomials of (X - X_v) / size */
+    PetscReal size;            /* m */
+  } * fit;                     /* [nvert nlayer] */
 };
 
 /* Different materials of the cells around a vertex, ascending, in found[]: how many. */
@@ -136,7 +153,181 @@ static PetscErrorCode create_weights(SbRecovery r)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbRecoveryCreate(SbMesh mesh, SbRecovery *recovery)
+/* ------------------------------------------------------------------ degree two */
+
+static inline PetscBool is_quadratic(SbRecovery r, PetscInt cell)
+{
+  return r->quadratic[r->mesh->cell_body[cell]];
+}
+
+static void monomials_of(const PetscReal d[3], PetscReal size, PetscReal p[NFIT])
+{
+  const PetscReal x = d[0] / size, y = d[1] / size, z = d[2] / size;
+  const PetscReal all[NFIT] = {1., x, y, z, x * x, y * y, z * z, x * y, y * z, z * x};
+
+  memcpy(p, all, sizeof(all));
+}
+
+/* Monomials at the points of a cell seen from its corner a, and their means over the cell, which the rule has exactly. */
+static void point_monomials(SbMesh mesh, PetscInt cell, int a, PetscReal size, PetscReal p[5][NFIT])
+{
+  const PetscInt *v = mesh->cell + 4 * cell;
+
+  for (int k = 0; k < NFIT; k++) p[4][k] = 0.;
+  for (int q = 0; q < 4; q++) {
+    PetscReal d[3];
+
+    for (int k = 0; k < 3; k++) {
+      d[k] = -mesh->x[3 * v[a] + k];
+      for (int b = 0; b < 4; b++) d[k] += SbRuleQuadratic.L[q][b] * mesh->x[3 * v[b] + k];
+    }
+    monomials_of(d, size, p[q]);
+    for (int k = 0; k < NFIT; k++) p[4][k] += 0.25 * p[q][k];
+  }
+}
+
+/* A <- L of A = L L^T, lower triangle. */
+static void factorise(PetscReal A[NFIT * NFIT])
+{
+  for (int i = 0; i < NFIT; i++) {
+    for (int j = 0; j <= i; j++) {
+      PetscReal sum = A[NFIT * i + j];
+
+      for (int k = 0; k < j; k++) sum -= A[NFIT * i + k] * A[NFIT * j + k];
+      A[NFIT * i + j] = i == j ? PetscSqrtReal(sum) : sum / A[NFIT * j + j];
+    }
+  }
+}
+
+/* Columns first..last-1 of b <- A^-1 b. */
+static void solve_columns(const PetscReal L[NFIT * NFIT], int first, int last, PetscReal b[NFIT][NVALUE])
+{
+  for (int i = 0; i < NFIT; i++) {
+    for (int k = 0; k < i; k++) {
+      for (int v = first; v < last; v++) b[i][v] -= L[NFIT * i + k] * b[k][v];
+    }
+    for (int v = first; v < last; v++) b[i][v] /= L[NFIT * i + i];
+  }
+  for (int i = NFIT - 1; i >= 0; i--) {
+    for (int k = i + 1; k < NFIT; k++) {
+      for (int v = first; v < last; v++) b[i][v] -= L[NFIT * k + i] * b[k][v];
+    }
+    for (int v = first; v < last; v++) b[i][v] /= L[NFIT * i + i];
+  }
+}
+
+static PetscErrorCode create_quadratic(SbRecovery r, const PetscBool quadratic[])
+{
+  SbMesh mesh = r->mesh;
+  const PetscInt n = r->nlayer * mesh->nvert_owned;
+  PetscBool any = PETSC_FALSE;
+  PetscInt *ncell;
+
+  PetscFunctionBeginUser;
+  for (PetscInt b = 0; b < mesh->nbody; b++) any = (PetscBool)(any || quadratic[b]);
+  if (!any) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscMalloc1(mesh->nbody, &r->quadratic));
+  PetscCall(PetscArraycpy(r->quadratic, quadratic, mesh->nbody));
+  PetscCall(PetscCalloc1(r->nlayer * mesh->nvert, &r->fit));
+  PetscCall(PetscCalloc1(n, &r->factor));
+
+  // root of the mean square of the distances of centroids
+  PetscCall(PetscCalloc1(n, &ncell));
+  for (PetscInt i = 0; i < 4 * mesh->ncell; i++) {
+    PetscReal p[4];
+
+    if (mesh->cell[i] >= mesh->nvert_owned || !is_quadratic(r, i / 4)) continue;
+    monomials(mesh, i / 4, (int)(i % 4), p);
+    r->fit[r->slot[i]].size += SbDot3(p + 1, p + 1);
+    ncell[r->slot[i]]++;
+  }
+  for (PetscInt k = 0; k < n; k++) {
+    if (ncell[k]) r->fit[k].size = PetscSqrtReal(r->fit[k].size / (PetscReal)ncell[k]);
+  }
+
+  // sums of products of monomials
+  for (PetscInt i = 0; i < 4 * mesh->ncell; i++) {
+    const PetscInt slot = r->slot[i];
+    PetscReal p[5][NFIT];
+
+    if (mesh->cell[i] >= mesh->nvert_owned || !is_quadratic(r, i / 4)) continue;
+    point_monomials(mesh, i / 4, (int)(i % 4), r->fit[slot].size, p);
+    for (int q = 0; q < 5; q++) {
+      for (int k = 0; k < NFIT * NFIT; k++) r->factor[slot][q == 4][k] += p[q][k / NFIT] * p[q][k % NFIT];
+    }
+  }
+  for (PetscInt s = 0; s < n; s++) {
+    if (!ncell[s]) continue;
+    for (int which = 0; which < 2; which++) {
+      PetscReal *A = r->factor[s][which];
+
+      for (int k = 1; k < NFIT; k++)
+        A[(NFIT + 1) * k] += (k >= 4 ? RIDGE_SECOND : which ? RIDGE_SLOPE : 1e-12) * A[0];
+      factorise(A);
+    }
+  }
+  PetscCall(PetscFree(ncell));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbRecoveryApplyQuadratic(SbRecovery r, SbPointStress stress[])
+{
+  SbMesh mesh = r->mesh;
+  const PetscInt n = r->nlayer * mesh->nvert_owned;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbMeshBroadcastCells(mesh, sizeof(*stress) / sizeof(PetscReal), MPIU_REAL, stress));
+  for (PetscInt s = 0; s < n; s++) memset(r->fit[s].c, 0, sizeof(r->fit[s].c));
+  for (PetscInt i = 0; i < 4 * mesh->ncell; i++) {
+    struct Fit *fit = r->fit + r->slot[i];
+    PetscReal p[5][NFIT];
+
+    if (mesh->cell[i] >= mesh->nvert_owned || !is_quadratic(r, i / 4)) continue;
+    point_monomials(mesh, i / 4, (int)(i % 4), fit->size, p);
+    for (int m = 0; m < NFIT; m++) {
+      for (int q = 0; q < 4; q++) {
+        for (int k = 0; k < 9; k++) fit->c[m][k] += p[q][m] * stress[i / 4].P[q][k];
+      }
+      fit->c[m][9] += p[4][m] * stress[i / 4].pressure;
+    }
+  }
+  for (PetscInt s = 0; s < n; s++) {
+    if (!(r->fit[s].size > 0.)) continue;
+    solve_columns(r->factor[s][0], 0, 9, r->fit[s].c);
+    solve_columns(r->factor[s][1], 9, NVALUE, r->fit[s].c);
+  }
+  PetscCall(
+    SbMeshBroadcastVertices(mesh, r->nlayer * (sizeof(*r->fit) / sizeof(PetscReal)), MPIU_REAL, r->fit));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscReal SbRecoveryNode(SbRecovery r, PetscInt cell, int a, PetscReal P[9])
+{
+  const PetscInt *v = r->mesh->cell + 4 * cell, *slot = r->slot + 4 * cell;
+  PetscReal value[NVALUE] = {0.};
+
+  if (a < 4) {
+    memcpy(P, r->fit[slot[a]].c[0], 9 * sizeof(*P));
+    return r->fit[slot[a]].c[0][9];
+  }
+  for (int end = 0; end < 2; end++) {
+    const int from = SbTetEdge[a - 4][end], to = SbTetEdge[a - 4][1 - end];
+    const struct Fit *fit = r->fit + slot[from];
+    PetscReal d[3], p[NFIT];
+
+    for (int k = 0; k < 3; k++) d[k] = 0.5 * (r->mesh->x[3 * v[to] + k] - r->mesh->x[3 * v[from] + k]);
+    monomials_of(d, fit->size, p);
+    for (int m = 0; m < NFIT; m++) {
+      for (int k = 0; k < NVALUE; k++) value[k] += 0.5 * p[m] * fit->c[m][k];
+    }
+  }
+  memcpy(P, value, 9 * sizeof(*P));
+  return value[9];
+}
+
+/* ------------------------------------------------------------------ */
+
+PetscErrorCode SbRecoveryCreate(SbMesh mesh, const PetscBool quadratic[], SbRecovery *recovery)
 {
   SbRecovery r;
 
@@ -146,6 +337,7 @@ PetscErrorCode SbRecoveryCreate(SbMesh mesh, SbRecovery *recovery)
   PetscCall(create_slots(r));
   PetscCall(create_weights(r));
   PetscCall(PetscMalloc1(9 * (size_t)r->nlayer * mesh->nvert, &r->value));
+  PetscCall(create_quadratic(r, quadratic));
   *recovery = r;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -159,6 +351,9 @@ PetscErrorCode SbRecoveryDestroy(SbRecovery *recovery)
   PetscCall(PetscFree(r->slot));
   PetscCall(PetscFree(r->weight));
   PetscCall(PetscFree(r->value));
+  PetscCall(PetscFree(r->quadratic));
+  PetscCall(PetscFree(r->factor));
+  PetscCall(PetscFree(r->fit));
   PetscCall(PetscFree(*recovery));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

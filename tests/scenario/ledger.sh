@@ -48,6 +48,14 @@ for n in 1 2 3; do
 done
 check "the error of the mesh, $(column led1/ledger.csv space 4)" near "$(column led1/ledger.csv space 4)" 0.45 0.3
 check "columns of the history" grep -q 'error_space,error_time,error_nonlinear,error_linear,error_contact,error_rounding$' <<<"$(head -n 1 led1/history.csv)"
+check "no advice of p2" grep -q 'body_bar_element p2' out1.txt
+for n in 1 3; do
+  "${mpi[@]}" $n "$supple" bar.opts -body_bar_element p2 -ledger yes -output_dir "quadratic$n" >"quadratic$n.txt" 2>&1
+  check "p2, $n ranks: exit code $?" test $? = 0
+  check "p2, $n ranks: space differs" near "$(column quadratic$n/ledger.csv space 4)" "$(column quadratic1/ledger.csv space 4)" 1e-6
+done
+check "p2 is more accurate" awk -v a="$(column quadratic1/ledger.csv space 4)" -v b="$(column led1/ledger.csv space 4)" 'BEGIN { exit !(a < 0.4 * b) }'
+check "p2 is advised to p2" test -z "$(grep 'body_bar_element p2 gives' quadratic1.txt)"
 "$supple" bar.opts -output_dir plain >plain.txt 2>&1
 check "without -ledger there is one" test ! -e plain/ledger.csv
 check "columns without -ledger" test -z "$(head -n 1 plain/history.csv | grep error_)"

@@ -165,16 +165,18 @@ static PetscErrorCode check_materials(const char *element)
 
 /* Bodies of all elements, one with an inclusion, loads and supports: n values of each body in order. */
 #define NVALUE 3
-static PetscErrorCode many_bodies(MPI_Comm comm, PetscReal value[3 * NVALUE])
+static PetscErrorCode many_bodies(MPI_Comm comm, PetscReal value[4 * NVALUE])
 {
   SbSpaceEstimate est;
-  PetscReal sum[3] = {0., 0., 0.};
+  PetscReal sum[4] = {0., 0., 0., 0.};
   SbModel m;
 
   PetscFunctionBeginUser;
   PetscCall(open_scene(
     comm,
-    "-bodies a,b,c -body_a_mesh box:1,1,1:4 -body_b_mesh box:1,1,1:3 -body_c_mesh box:1,1,1:2 "
+    "-bodies a,b,c,d -body_d_mesh box:1,1,1:2 -body_d_element p2 -body_d_translate 6,0,0 -body_d_material "
+    "neohookean -body_d_young 1e3 -body_d_poisson 0.49 -body_d_density 1 -body_a_mesh box:1,1,1:4 "
+    "-body_b_mesh box:1,1,1:3 -body_c_mesh box:1,1,1:2 "
     "-body_b_element cr -body_c_element dg -body_b_translate 2,0,0 -body_c_translate 4,0,0 "
     "-body_a_material linear -body_b_material corotated -body_c_material linear -body_a_young 1e3 "
     "-body_b_young 1e3 -body_c_young 1e3 -body_a_poisson 0.48 -body_b_poisson 0.4 -body_c_poisson 0.3 "
@@ -185,15 +187,15 @@ static PetscErrorCode many_bodies(MPI_Comm comm, PetscReal value[3 * NVALUE])
     &m));
   PetscCall(estimate(m, wavy_field, &est));
   for (PetscInt c = 0; c < m->mesh->ncell_owned; c++) sum[m->mesh->cell_body[c]] += est->cell2[c];
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, sum, 3, MPIU_REAL, MPI_SUM, comm));
-  for (int b = 0; b < 3; b++) {
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, sum, 4, MPIU_REAL, MPI_SUM, comm));
+  for (int b = 0; b < 4; b++) {
     value[NVALUE * b] = est->body2[b];
     value[NVALUE * b + 1] = est->strain[b];
     value[NVALUE * b + 2] = est->factor[b];
     SB_CHECK_NEAR(sum[b] / est->body2[b], 1., 1e-12, "sum over the cells of a body");
   }
   SB_CHECK(est->factor[0] > 1.001, "factor of P1 %g", (double)est->factor[0]);
-  SB_CHECK(est->factor[1] == 1. && est->factor[2] == 1., "factors of CR and DG");
+  SB_CHECK(est->factor[1] == 1. && est->factor[2] == 1. && est->factor[3] == 1., "factors of CR, DG and P2");
   PetscCall(SbSpaceEstimateDestroy(&est));
   PetscCall(SbModelDestroy(&m));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -201,23 +203,23 @@ static PetscErrorCode many_bodies(MPI_Comm comm, PetscReal value[3 * NVALUE])
 
 static PetscErrorCode check_ranks(void)
 {
-  PetscReal alone[3 * NVALUE], together[3 * NVALUE];
+  PetscReal alone[4 * NVALUE], together[4 * NVALUE];
 
   PetscFunctionBeginUser;
   PetscCall(many_bodies(PETSC_COMM_SELF, alone));
   PetscCall(many_bodies(PETSC_COMM_WORLD, together));
-  for (int k = 0; k < 3 * NVALUE; k++)
+  for (int k = 0; k < 4 * NVALUE; k++)
     SB_CHECK_NEAR(together[k] / alone[k], 1., 1e-11, "value on all ranks over that on one");
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 int main(int argc, char **argv)
 {
-  static const char *const elements[] = {"p1", "cr", "dg"};
+  static const char *const elements[] = {"p1", "cr", "dg", "p2"};
   static const char *const laws[] = {"linear", "corotated", "stvk", "neohookean"};
 
   SB_TEST_BEGIN(argc, argv);
-  for (int e = 0; e < 3; e++) {
+  for (int e = 0; e < 4; e++) {
     for (int l = 0; l < 4; l++) PetscCall(check_patch(elements[e], laws[l]));
     PetscCall(check_materials(elements[e]));
   }

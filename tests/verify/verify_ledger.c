@@ -92,6 +92,8 @@ static PetscErrorCode steps(void)
      "-time euler_implicit -ts_dt 0.002", "-time newmark -ts_dt 0.000125", 0.5, 2},
     {"Newmark, corotated", "-body_bar_material corotated", "-time newmark -ts_dt 0.008",
      "-time newmark -ts_dt 0.00025", 0.5, 2},
+    {"Newmark, P2", "-body_bar_mesh box:0.4,0.1,0.1:1 -body_bar_element p2 -solver direct",
+     "-time newmark -ts_dt 0.008", "-time newmark -ts_dt 0.00025", 0.5, 2},
   };
 
   PetscMPIInt size;
@@ -140,6 +142,8 @@ static PetscErrorCode solves(void)
     {"CG to 1e-3, implicit Euler", "linear", SB_ERROR_LINEAR,
      "-body_bar_material linear -time euler_implicit -ts_dt 0.01 -ts_max_time 0.4", "-ksp_rtol 1e-3",
      "-ksp_rtol 1e-12"},
+    {"CG to 1e-3, P2", "linear", SB_ERROR_LINEAR,
+     "-body_bar_material linear -body_bar_element p2 -time static", "-ksp_rtol 1e-3", "-ksp_rtol 1e-13"},
   };
 
   PetscMPIInt size;
