@@ -1,8 +1,8 @@
 /*
   On rank 0: from a scene and its state to the same scene with other meshes for some of its bodies.
 
-  The vectors are functions of the position at rest, linear in each tet: what a new node gets is the value there (body.c says where that is). A node
-  on the surface has its triangle, or its vertex, in the old mesh too, and gets what is there to the last bit. A DG cell takes the value from its own
+  The vectors are functions of the position at rest, linear in each tet, quadratic in those of P2: what a new node gets is the value there (body.c says where that is). A node
+  on the surface has its triangle, its vertex, or its edge, in the old mesh too, and gets what is there to the last bit. A DG cell takes the value from its own
   side of a face.
 
   Sets that are groups of a file go with the tets that they hold, by the old tet in the middle of the new one; on the surface with its triangles
@@ -12,6 +12,50 @@
 
 #define INWARDS \
   1e-6 /* part of the way from a face to the middle of its DG cell, to decide on which side that is */
+
+/* Edges of tets by their vertices, each once, with the first place 6 cell + e that it has. */
+typedef struct {
+  PetscInt vert[2], at;
+} Edge;
+
+static int by_vertices(const void *a, const void *b)
+{
+  const Edge *p = (const Edge *)a, *q = (const Edge *)b;
+
+  for (int k = 0; k < 2; k++) {
+    if (p->vert[k] != q->vert[k]) return p->vert[k] < q->vert[k] ? -1 : 1;
+  }
+  return 0;
+}
+
+static int by_place(const void *a, const void *b)
+{
+  const int order = by_vertices(a, b);
+
+  return order ? order : (((const Edge *)a)->at > ((const Edge *)b)->at) * 2 - 1;
+}
+
+static Edge edge_of(const PetscInt v[], PetscInt at)
+{
+  const PetscInt i = v[SbTetEdge[at % 6][0]], j = v[SbTetEdge[at % 6][1]];
+
+  return (Edge){{PetscMin(i, j), PetscMax(i, j)}, at};
+}
+
+static PetscErrorCode list_edges(PetscInt ncell, const PetscInt cell[], PetscInt *n, Edge **edge)
+{
+  PetscInt all = 6 * ncell;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscMalloc1(all, edge));
+  for (PetscInt i = 0; i < all; i++) (*edge)[i] = edge_of(cell + 4 * (i / 6), i);
+  qsort(*edge, (size_t)all, sizeof(**edge), by_place);
+  *n = 0;
+  for (PetscInt i = 0; i < all; i++) {
+    if (!i || by_vertices(&(*edge)[i], &(*edge)[*n - 1])) (*edge)[(*n)++] = (*edge)[i];
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
 
 /* One body on its way from the old mesh to the new one. Vertices and tets count from the body's first. */
 typedef struct {
@@ -23,6 +67,8 @@ typedef struct {
   PetscInt *cell; /* [ncell][4] old tets */
   PetscInt *at;   /* [nvert] a corner 4 cell + a of each old vertex */
   SbFaces faces;  /* of the old tets */
+  Edge *edge;     /* [nedge] of the old tets of P2, ascending */
+  PetscInt nedge;
   SbLocator rest;
   PetscBool done; /* there is a new mesh */
   SbNewMesh mesh;
@@ -53,6 +99,7 @@ static PetscErrorCode open_work(SbModel m, const SbGathered *g, PetscInt b, Work
     w->cell[i] = g->cell[4 * w->cell0 + i] - w->vert0;
     w->at[w->cell[i]] = i;
   }
+  if (w->element->nodes_per[1]) PetscCall(list_edges(w->ncell, w->cell, &w->nedge, &w->edge));
   PetscCall(SbFacesCreate(nvert, w->ncell, w->cell, &w->faces));
   PetscCall(SbLocatorCreate(w->ncell, w->cell, g->X + 3 * w->vert0, &w->rest));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -212,6 +259,23 @@ static const PetscReal *old_value(const Work *w, PetscInt cell, PetscInt k)
   return w->g->value + ((size_t)(w->cell0 + cell) * (size_t)w->g->width + (size_t)k) * (size_t)w->each;
 }
 
+/* The first place of the old edge that an edge of the next mesh is, -1: it is another one. */
+static PetscInt old_edge(const Work *w, const PetscInt vert[2])
+{
+  Edge key = {{vert[0], vert[1]}, 0}, *found;
+
+  if (w->done) {
+    if (vert[1] >= w->mesh.nkept) return -1;
+    for (int k = 0; k < 2; k++) key.vert[k] = w->mesh.kept[vert[k]];
+    if (key.vert[0] > key.vert[1]) {
+      key.vert[0] = w->mesh.kept[vert[1]];
+      key.vert[1] = w->mesh.kept[vert[0]];
+    }
+  }
+  found = (Edge *)bsearch(&key, w->edge, (size_t)w->nedge, sizeof(key), by_vertices);
+  return found ? found->at : -1;
+}
+
 /* The old fields at a position at rest, as the tet has them that holds `near`. */
 static void interpolate_old(const Work *w, const PetscReal X[3], const PetscReal near[3], PetscReal value[])
 {
@@ -221,11 +285,14 @@ static void interpolate_old(const Work *w, const PetscReal X[3], const PetscReal
   (void)SbLocatorFind(w->rest, near, &cell, weight);
   if (near != X) SbTetBarycentric(w->g->X + 3 * w->vert0, w->cell + 4 * cell, X, weight);
   for (PetscInt k = 0; k < w->each; k++) value[k] = 0.;
-  for (int a = 0; a < 4; a++) {
-    const PetscReal *from = old_value(w, cell, a);
+  for (int a = 0; a < (w->edge ? SB_CELL_NODES : 4); a++) {
+    const PetscReal *from = old_value(w, cell, a < 4 ? a : SB_EDGES + a - 4);
     PetscReal psi = 0.;
 
-    for (int v = 0; v < 4; v++) psi += weight[v] * w->element->ops.vertex[v][a];
+    if (w->edge)
+      psi = a < 4 ? weight[a] * (2. * weight[a] - 1.)
+                  : 4. * weight[SbTetEdge[a - 4][0]] * weight[SbTetEdge[a - 4][1]];
+    for (int v = 0; v < 4 && !w->edge; v++) psi += weight[v] * w->element->ops.vertex[v][a];
     for (PetscInt k = 0; k < w->each; k++) value[k] += psi * from[k];
   }
 }
@@ -259,8 +326,19 @@ static void new_values(const Work *w, PetscInt c, PetscReal value[])
     }
     if (!from) interpolate_old(w, X, w->element->nodes_per[3] ? inside : X, to);
     for (PetscInt k = 0; k < w->each && from; k++) to[k] = from[k];
-    for (PetscInt k = 0; k < w->each && w->g->width == 8; k++)
+    for (PetscInt k = 0; k < w->each && w->g->width >= 8; k++)
       support[k] = slot < 0 ? PETSC_MAX_REAL : old_value(w, slot / 4, 4 + slot % 4)[k];
+  }
+  for (PetscInt e = 0; e < w->g->width - SB_EDGES; e++) {
+    const Edge edge = edge_of(w->mesh.cell + 4 * c, 6 * c + e);
+    const PetscInt at = w->edge ? old_edge(w, edge.vert) : -1;
+    PetscReal *to = value + (SB_EDGES + e) * w->each, X[3];
+
+    for (int k = 0; k < 3; k++)
+      X[k] = 0.5 * (w->mesh.X[3 * edge.vert[0] + k] + w->mesh.X[3 * edge.vert[1] + k]);
+    for (PetscInt k = 0; k < w->each; k++)
+      to[k] = at < 0 ? PETSC_MAX_REAL : old_value(w, at / 6, SB_EDGES + at % 6)[k];
+    if (w->edge && at < 0) interpolate_old(w, X, X, to);
   }
 }
 
@@ -273,18 +351,28 @@ static void rename_node(SbRenamed *r, PetscInt from, PetscInt to)
   r->to[r->n++] = to;
 }
 
-/* Nodes of the body's surface: vertices, or faces and their supports. vert1, cell1: first ones of the body in the next scene. */
-static void rename_surface(const Work *w, PetscInt vert1, PetscInt cell1, const SbGathered *next,
-                           SbRenamed *r)
+/* Nodes of the body's surface: vertices and, of P2, edges that there were; or faces and their supports. vert1, cell1: first ones of the body in the next scene. */
+static PetscErrorCode rename_surface(const Work *w, PetscInt vert1, PetscInt cell1, const SbGathered *next,
+                                     SbRenamed *r)
 {
   const PetscInt N = w->g->nvert, C = w->g->ncell, N1 = next->nvert, C1 = next->ncell;
   const PetscInt ncell = w->done ? w->mesh.ncell : w->ncell;
+  PetscInt nedge = 0;
+  Edge *edge = NULL;
 
+  PetscFunctionBeginUser;
+  if (w->edge) PetscCall(list_edges(ncell, w->done ? w->mesh.cell : w->cell, &nedge, &edge));
+  for (PetscInt i = 0; i < nedge; i++) {
+    const PetscInt at = old_edge(w, edge[i].vert);
+
+    if (at >= 0) rename_node(r, N + 8 * C + 6 * w->cell0 + at, N1 + 8 * C1 + 6 * cell1 + edge[i].at);
+  }
+  PetscCall(PetscFree(edge));
   if (w->element->nodes_per[0]) {
     const PetscInt n = w->done ? w->mesh.nkept : w->g->vert0[w->body + 1] - w->vert0;
 
     for (PetscInt v = 0; v < n; v++) rename_node(r, w->vert0 + (w->done ? w->mesh.kept[v] : v), vert1 + v);
-    return;
+    PetscFunctionReturn(PETSC_SUCCESS);
   }
   for (PetscInt i = 0; i < 4 * ncell; i++) {
     const PetscInt slot = old_slot(w, i);
@@ -293,6 +381,7 @@ static void rename_surface(const Work *w, PetscInt vert1, PetscInt cell1, const 
     rename_node(r, N + 4 * (w->cell0 + slot / 4) + slot % 4, N1 + 4 * (cell1 + i / 4) + i % 4);
     rename_node(r, N + 4 * (C + w->cell0 + slot / 4) + slot % 4, N1 + 4 * (C1 + cell1 + i / 4) + i % 4);
   }
+  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* ------------------------------------------------------------------ all bodies */
@@ -354,7 +443,7 @@ static PetscErrorCode finish_body(const Work *w, PetscInt step, SbRemeshResult *
       (*in_memory)->bound = body->in_memory->bound;
     }
   }
-  rename_surface(w, next->vert0[w->body], next->cell0[w->body], next, &result->renamed);
+  PetscCall(rename_surface(w, next->vert0[w->body], next->cell0[w->body], next, &result->renamed));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -392,7 +481,7 @@ PetscErrorCode SbRemeshBodies(SbModel m, const SbGathered *g, const PetscBool du
     r->outcome[b] = (SbRemeshOutcome){{nvert, nvert}, {work[b].ncell, work[b].ncell}, 0, 0., ""};
     if (due[b]) PetscCall(try_body(&work[b], how, &r->outcome[b]));
     r->done[b] = work[b].done;
-    room += nvert + 2 * work[b].faces.nboundary;
+    room += nvert + 2 * work[b].faces.nboundary + work[b].nedge;
   }
   // counts of the next meshes, and room for their values
   r->next.nbody = g->nbody;
@@ -414,6 +503,7 @@ PetscErrorCode SbRemeshBodies(SbModel m, const SbGathered *g, const PetscBool du
     PetscCall(SbLocatorDestroy(&work[b].rest));
     PetscCall(PetscFree(work[b].cell));
     PetscCall(PetscFree(work[b].at));
+    PetscCall(PetscFree(work[b].edge));
     PetscCall(SbFacesDestroy(&work[b].faces));
   }
   PetscCall(PetscSortIntWithArray(r->renamed.n, r->renamed.from, r->renamed.to));

@@ -78,7 +78,9 @@ static PetscInt vectors_of(SbRun run, Vec vec[3])
 
 static PetscInt node_at(SbSpace s, PetscInt cell, PetscInt k)
 {
-  return k < 4 ? s->cell_node[4 * cell + k] : s->dirichlet_node ? s->dirichlet_node[4 * cell + k - 4] : -1;
+  if (k < 4) return s->cell_node[4 * cell + k];
+  if (k < SB_EDGES) return s->dirichlet_node ? s->dirichlet_node[4 * cell + k - 4] : -1;
+  return s->edge_node[6 * cell + k - SB_EDGES];
 }
 
 static PetscErrorCode gather_values(SbRun run, PetscBool root, PetscSF sf, SbGathered *g)
@@ -125,7 +127,7 @@ PetscErrorCode SbGather(SbRun run, SbGathered *g)
   g->nvert = mesh->Nvert;
   g->ncell = mesh->Ncell;
   g->nfield = vectors_of(run, vec);
-  g->width = supports ? 8 : 4;
+  g->width = m->space->edge_node ? SB_EDGES + 6 : supports ? 8 : 4;
   PetscCall(PetscCalloc2(m->nbody + 1, &g->vert0, m->nbody + 1, &g->cell0));
   PetscCall(PetscCalloc1(m->nbody, &g->mass));
   for (PetscInt b = 0; b < m->nbody; b++) {

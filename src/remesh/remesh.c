@@ -197,13 +197,6 @@ PetscErrorCode SbRemeshSetFromOptions(SbModel m, SbRemesh *remesh)
   PetscCall(PetscCalloc7(m->nbody, &r->named, m->nbody, &r->due, m->nbody, &r->asked, m->nbody, &r->bound,
                          m->nbody, &r->worst, m->nbody, &r->from, m->nbody, &r->rest));
   PetscCall(find_changes(r, m));
-  for (PetscInt b = 0; b < m->nbody; b++) {
-    PetscCheck(!m->element[b]->nodes_per[1], PETSC_COMM_WORLD, PETSC_ERR_USER_INPUT,
-               "%s not there yet for element p2, which body %s has: choose p1, cr or dg",
-               named ? "re-meshing (-remesh_...) is"
-                     : "supports that come or go (-effect_..._from, _until) are",
-               m->body[b].name);
-  }
   if (!named) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(read_names(r, m, &scope));
   PetscCall(read_bounds(r, m, &scope, &any));

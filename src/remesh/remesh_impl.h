@@ -8,8 +8,9 @@
 /* All bodies in original order, and up to three vectors of the run. Arrays are on rank 0 alone, NULL elsewhere. */
 typedef struct {
   PetscInt nbody, nvert, ncell;
-  PetscInt nfield;         /* vectors: U, V, A, as far as the run has them */
-  PetscInt width;          /* 4: the nodes of a cell; 8: and the supports of its faces */
+  PetscInt nfield; /* vectors: U, V, A, as far as the run has them */
+  PetscInt
+    width; /* 4: the nodes of a cell; 8: and the supports of its faces; 14: and, of P2, its nodes at edges */
   PetscInt *vert0, *cell0; /* [nbody + 1] first vertex and cell of each body; on all ranks */
   PetscReal *mass;         /* [nbody] kg; on all ranks */
   PetscReal *X, *x;        /* [nvert][3] at rest; now, of CR and DG the means around vertices; m */
@@ -17,7 +18,8 @@ typedef struct {
   PetscInt *cell;          /* [ncell][4] vertices */
   PetscInt *cell_material; /* [ncell] */
   uint64_t *cell_set;      /* [ncell][5] of the cell, of its faces */
-  PetscReal *value;        /* [ncell][width][nfield][3]; SI; supports: PETSC_MAX_REAL where there is none */
+  PetscReal *value; /* [ncell][width][nfield][3]; SI; PETSC_MAX_REAL where there is no support, no node */
+#define SB_EDGES 8  /* where the nodes at edges begin */
 } SbGathered;
 PetscErrorCode SbGather(SbRun run, SbGathered *g); /* collective; SbGatheredDestroy() */
 PetscErrorCode SbGatheredDestroy(SbGathered *g);
