@@ -232,5 +232,17 @@ PetscReal SbFormulaEval(SbFormula formula, PetscReal t,
                         const PetscReal x[3]); /* x may be NULL when the formula does not use it */
 PetscErrorCode SbFormulaUses(SbFormula formula, PetscBool *time, PetscBool *position);
 PetscErrorCode SbFormulaDestroy(SbFormula *formula);
+/*
+  Live formulas (src/base/live.c): places that somebody moves while a run goes on, where an option of an effect with three formulas is the word `live`.
+
+  Create: the three formulas of an option; destroy each. SetUp: the file with the places, the largest speed, m/s, and how many simulated seconds may pass per second, 0: any; before the first step. Place: of
+  number i = 0 .. SbLiveCount() - 1 at time t of the present step, m, and the name of its effect; SetPlace puts it there. Advance: a step that ended at t was accepted, from now on they go to where the file says. Collective.
+*/
+PetscErrorCode SbLiveCreate(const char *where, SbFormula formula[3]);
+PetscErrorCode SbLiveSetUp(const char *file, PetscReal speed, PetscReal pace);
+PetscInt SbLiveCount(void);
+const char *SbLivePlace(PetscInt i, PetscReal t, PetscReal place[3]);
+void SbLiveSetPlace(PetscInt i, PetscReal t, const PetscReal place[3]);
+PetscErrorCode SbLiveAdvance(MPI_Comm comm, PetscReal t);
 /* Reads an option of kind SB_OPTION_FORMULA: `count` formulas as in the row; destroy each. */
 PetscErrorCode SbOptionFormulas(const SbScope *scope, const char *key, SbFormula formulas[]);

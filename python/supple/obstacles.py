@@ -8,7 +8,10 @@ from .run import FACES
 
 
 def formula(text, t):
-    """Value of one of the scenario's formulas of time."""
+    """Value of one of the scenario's formulas of time, or of the table that it names."""
+    if text.startswith("table:"):
+        rows = [line.split("#")[0].replace(",", " ").replace(";", " ").split() for line in Path(text[6:]).read_text().splitlines()]
+        return float(numpy.interp(t, *numpy.array([row for row in rows if row], dtype=float).T))
     names = {name: getattr(math, name) for name in "sin cos tan asin acos atan atan2 exp log sqrt floor tanh pi".split()}
     names |= {"abs": abs, "min": min, "max": max, "t": t, "step": lambda a: float(a >= 0), "clamp": lambda a, low, high: min(max(a, low), high)}
     names["ramp"] = lambda a: min(max(a, 0.0), 1.0)
@@ -65,12 +68,12 @@ def turned(profile, axes, spokes=48):
 class Obstacle:
     """A rigid obstacle: its surface at rest, x [n][3] m and triangles [m][3], and where it is at a time.
 
-    Of a plane a piece below the places `reached` [k][3] is made, of a bowl the part deeper than half its radius; `up` is a unit vector.
+    Where `displacement` is live, the history of the run says where it was. Of a plane a piece below the places `reached` [k][3] is made, of a bowl the part deeper than half its radius; `up` is a unit vector.
     """
 
-    def __init__(self, scenario, name, reached, up):
-        self.name = name
-        self.option = lambda key, default: scenario.get(f"effect_{name}_{key}", default)
+    def __init__(self, run, name, reached, up):
+        self.name, self.run = name, run
+        self.option = lambda key, default: run.scenario.get(f"effect_{name}_{key}", default)
         self.kind, _, words = self.option("obstacle", "").partition(":")
         self.x = self.triangles = None
         self.open = self.kind == "bowl"
@@ -124,6 +127,14 @@ class Obstacle:
             x, self.triangles = numpy.array(surface.vertices), numpy.array(surface.faces)
         self.x = float(self.option("obstacle_scale", "1")) * x + [float(a) for a in self.option("obstacle_at", "0,0,0").split(",")]
 
+    def shift(self, t):
+        """[3] m at time t, s."""
+        text = self.option("displacement", "0;0;0")
+        if text == "live":
+            table = self.run.history
+            return [numpy.interp(t, table["time"], table[f"{self.name}_live_{k}"]) if len(table) else 0.0 for k in "xyz"]
+        return [formula(one, t) for one in text.split(";")]
+
     def pose(self, t):
         """[4][4]: turned about its axis, then shifted (m); x at time t (s) is pose @ (x, 1)."""
         centre, axis = ([float(x) for x in self.option(*given).split(",")] for given in (("axis_point", "0,0,0"), ("axis", "0,0,1")))
@@ -132,7 +143,7 @@ class Obstacle:
         cross = numpy.array([[0, -a[2], a[1]], [a[2], 0, -a[0]], [-a[1], a[0], 0]])
         pose = numpy.eye(4)
         pose[:3, :3] += math.sin(angle) * cross + (1 - math.cos(angle)) * cross @ cross
-        pose[:3, 3] = centre - pose[:3, :3] @ centre + [formula(text, t) for text in self.option("displacement", "0;0;0").split(";")]
+        pose[:3, 3] = centre - pose[:3, :3] @ centre + self.shift(t)
         return pose
 
     def positions(self, t):
@@ -151,7 +162,7 @@ def obstacles(run):
             continue
         mine = [names.index(word) for word in run.scenario.get(f"effect_{effect}_on", "").split(",") if word in names] or range(len(names))
         reached = numpy.concatenate([run.positions(k)[numpy.unique(run.mesh(k).cells[numpy.isin(run.mesh(k).body, list(mine))])] for k in way])
-        obstacle = Obstacle(run.scenario, effect, reached, numpy.array([0.0, 0.0, 1.0]) if up is None else up)
+        obstacle = Obstacle(run, effect, reached, numpy.array([0.0, 0.0, 1.0]) if up is None else up)
         if obstacle.x is not None:
             found.append(obstacle)
     return found

@@ -308,6 +308,7 @@ PetscErrorCode SbFormulaDestroy(SbFormula *formula)
 {
   PetscFunctionBeginUser;
   if (!*formula) PetscFunctionReturn(PETSC_SUCCESS);
+  SbLiveForget(*formula);
   PetscCall(PetscFree((*formula)->step));
   PetscCall(PetscFree((*formula)->time));
   PetscCall(PetscFree((*formula)->value));

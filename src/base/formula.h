@@ -35,5 +35,7 @@ struct _p_SbFormula {
 
 /* Reads a two-column file on rank 0 and gives it to all. Collective. Errors name option, file and line. */
 PetscErrorCode SbFormulaReadTable(MPI_Comm comm, const char *file, const char *where, SbFormula formula);
+/* A live formula is destroyed (live.c). */
+void SbLiveForget(SbFormula formula);
 /* Linear in between, constant outside. */
 PetscReal SbFormulaEvalTable(const struct _p_SbFormula *formula, PetscReal t);

@@ -285,6 +285,11 @@ PetscErrorCode SbOptionFormulas(const SbScope *scope, const char *key, SbFormula
   count = r->row->count;
   for (PetscInt i = 0; i < count; i++) formulas[i] = NULL;
   if (is_absent(r)) PetscFunctionReturn(PETSC_SUCCESS);
+  if (count == 3 && !strcmp(r->text, "live") && !strcmp(scope->klass, "effect") &&
+      !strcmp(key, "displacement")) {
+    PetscCall(SbLiveCreate(r->name, formulas));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
   if (count > 1) commas_to_semicolons(r->text);
   n = count_pieces(r->text, ';');
   PetscCheck(n == count, PETSC_COMM_SELF, PETSC_ERR_USER,

@@ -136,6 +136,18 @@ static PetscErrorCode write_numbers(SbRun run, SbOutput out, const SbStep *step,
     PetscCall(SbH5PutReal(h, h->file, run->carried[i].name, *run->carried[i].value));
   PetscCall(SbProbesWrite(run, out, h));
 
+  /* where effects are that are moved by hand */
+  for (PetscInt i = 0; i < SbLiveCount(); i++) {
+    PetscReal place[3];
+    const char *effect = SbLivePlace(i, step->t, place);
+    char name[2 * SB_NAME_MAX];
+
+    for (int k = 0; k < 3; k++) {
+      SbFormat(sizeof(name), name, "live_%s_%c", effect, 'x' + k);
+      PetscCall(SbH5PutReal(h, h->file, name, place[k]));
+    }
+  }
+
   /* by what a restart knows that the file fits the run and is whole */
   PetscCall(SbH5PutInt(h, h->file, "mesh_hash", (int64_t)out->mesh_hash));
   PetscCall(SbH5PutInt(h, h->file, "checksum", (int64_t)checksum));
@@ -349,6 +361,17 @@ static PetscErrorCode load(SbRun run, SbOutput out, const char *path, PetscBool 
         out->comm, "%s has no errors, as it was written without -ledger: they count from there", h.path));
   }
   if (*ok) PetscCall(SbProbesRead(run, out, &h));
+  for (PetscInt i = 0; *ok && i < SbLiveCount(); i++) {
+    PetscReal place[3];
+    const char *effect = SbLivePlace(i, times.t, place);
+    char name[2 * SB_NAME_MAX];
+
+    for (int k = 0; k < 3; k++) {
+      SbFormat(sizeof(name), name, "live_%s_%c", effect, 'x' + k);
+      PetscCall(SbH5GetReal(h.file, name, &place[k], ok));
+    }
+    if (*ok) SbLiveSetPlace(i, times.t, place);
+  }
   PetscCall(SbH5Close(&h));
 
   /* effects take up what they remember, and the run stands where the file was written */

@@ -161,6 +161,17 @@ static PetscErrorCode read_options(SbOutput out, PetscBool dynamic)
 
   PetscCall(SbProbesSetFromOptions(out, &scope, dynamic));
 
+  /* the file in which others say where effects are to go */
+  if (SbLiveCount()) {
+    char path[PETSC_MAX_PATH_LEN];
+    PetscReal speed, pace;
+
+    PetscCall(SbOptionReal(&scope, "live_speed", &speed));
+    PetscCall(SbOptionReal(&scope, "live_pace", &pace));
+    PetscCall(SbOutputPath(out, "live.txt", sizeof(path), path));
+    PetscCall(SbLiveSetUp(path, speed, pace));
+  }
+
   /* what the screen shows */
   PetscCall(SbOptionBool(&scope, "progress", &out->progress));
   PetscCall(SbOptionBool(&scope, "quiet", &out->quiet));

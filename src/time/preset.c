@@ -39,6 +39,11 @@ static const SbOption rows[] = {
   {"time_inverted", SB_OPTION_CHOICE, 1, "", "accept", "accept|reject",
    "a step that inverts tets (det F <= 0): taken, and they are counted; or halved and tried again, and the "
    "run stops when that does not help"},
+  {"live_speed", SB_OPTION_REAL, 1, "m/s", "0.2", "(0, inf)",
+   "-effect_<name>_displacement live: how fast the effect goes, at most, to the place that live.txt in "
+   "output_dir names (lines `NAME x y z`, m)"},
+  {"live_pace", SB_OPTION_REAL, 1, "", "1", "[0, inf)",
+   "live: simulated seconds per second, at most; a run that is faster waits; 0: no limit"},
   {"wall_time", SB_OPTION_STRING, 1, "", "", "",
    "h:mm:ss (or d-hh:mm:ss) after which the program has to have ended: the run stops in time for a "
    "checkpoint, with exit code "
@@ -543,6 +548,8 @@ PetscErrorCode SbRunSetUp(SbRun run)
     PetscCall(SbSpaceCreateVec(m->space, &run->V));
     if (run->preset != SB_TIME_ALPHA2) PetscCall(SbSpaceCreateVec(m->space, &run->A));
   }
+  PetscCheck(m->dynamic || !SbLiveCount(), m->comm, PETSC_ERR_USER_INPUT,
+             "-effect_..._displacement live: what is moved by hand needs a time: -time static has none");
   if (!m->dynamic) m->load = run->t0; /* a static run begins without loads and prescribed displacements */
   PetscCall(SbModelInitialState(m, run->U, run->V));
   if (run->arc.on) {

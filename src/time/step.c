@@ -126,6 +126,7 @@ PetscErrorCode SbRunStepAccepted(SbRun run, PetscInt step, PetscReal t, PetscRea
   run->steps_total += !first;
   for (PetscInt k = 0; k < run->nmonitor; k++) PetscCall(run->monitor[k].fn(run, &now, run->monitor[k].ctx));
   run->seen = now;
+  if (SbLiveCount()) PetscCall(SbLiveAdvance(m->comm, t));
   run->stop.step_begun = MPI_Wtime();
   run->stop.longest_output = PetscMax(run->stop.longest_output, run->stop.step_begun - begun);
   PetscFunctionReturn(PETSC_SUCCESS);

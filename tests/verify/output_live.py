@@ -1,5 +1,4 @@
-"""scripts/live without a screen: a run that it starts, one on two ranks that it attaches to, pause and the next frame, the picture.
-
+"""scripts/live without a screen: a run that it starts, one on two ranks that it attaches to, pause and the next frame, the picture; an instrument that keys and mouse press into tissue.
 """
 import argparse
 import importlib.machinery
@@ -13,7 +12,7 @@ from pathlib import Path
 import numpy
 from PIL import Image
 
-from output_common import OUT, command, run, scenario
+from output_common import MPI, OUT, SUPPLE, command, run, scenario
 
 LIVE = str(Path("scripts/live").resolve())
 
@@ -43,15 +42,54 @@ def wait(condition, text):
         time.sleep(0.05)
 
 
-def check_keys():
-    """A long run on two ranks is paused: no more frames come; the next one can be looked at; then it goes on."""
+def load_module():
     loader = importlib.machinery.SourceFileLoader("live", LIVE)
     module = importlib.util.module_from_spec(importlib.util.spec_from_loader("live", loader))
     loader.exec_module(module)
+    return module
+
+
+def check_move():
+    """The arrow key presses the instrument into the tissue, the mouse takes it away again: the force in the history, the obstacle in the picture, the places in both."""
+    module = load_module()
+    more = ("-effect_tool_displacement", "live", "-body_tissue_mesh", "box:0.1,0.06,0.04:3", "-ts_dt", "0.05", "-ts_max_time", "1000", "-output_every", "0", "-live_pace", "0", "-quiet")
+    process = subprocess.Popen([*MPI, "2", SUPPLE, str(Path("scenarios/indent.opts").resolve()), "-output_dir", str(OUT / "moved"), *more], start_new_session=True)
+    try:
+        wait((OUT / "moved" / "run.json").exists, "the run does not begin")
+        window = module.Window(OUT / "moved", process, argparse.Namespace(field="von_mises", plot="tool_force_z", picture=None, move="tool"))
+        window.window.SetOffScreenRendering(1)
+
+        def force():
+            return (window.run.history["tool_force_z"].tolist() or [0.0])[-1]
+
+        wait(window.update, "no frame comes")
+        window.picture(OUT / "before.png")
+        window.renderer.GetActiveCamera().SetViewUp(0, 0, 1)
+        for _ in range(3):
+            window.key("Down")
+        wait(lambda: window.update() and force() < -0.05, "nothing is pressed")
+        window.picture(OUT / "pressed.png")
+        seen = window.obstacles[0][0].positions(window.run.times[window.shown]).mean(axis=0) - window.obstacles[0][0].x.mean(axis=0)
+        check(seen[2] < -1e-3 and window.place[2] < -5e-3, f"the tool is drawn at {seen}, and wanted at {window.place}")
+        parts = [numpy.asarray(Image.open(OUT / name).convert("RGB")).astype(int)[:, 330:] for name in ("before.png", "pressed.png")]
+        check((numpy.abs(parts[0] - parts[1]).max(axis=2) > 30).mean() > 0.01, "the picture is the same")
+        window.drag((500, 300))
+        window.drag((500, 600))
+        window.drag(None)
+        check(window.place[2] > 0.02, f"the mouse has moved the tool to {window.place}")
+        wait(lambda: window.update() and force() == 0, "the tool is not taken away")
+    finally:
+        module.send(process, module.signal.SIGKILL)
+        process.wait()
+
+
+def check_keys():
+    """A long run on two ranks is paused: no more frames come; the next one can be looked at; then it goes on."""
+    module = load_module()
     process = subprocess.Popen(command(2, "long", "-quiet", "-ts_max_time", "1000"), start_new_session=True)
     try:
         wait((OUT / "long" / "run.json").exists, "the run does not begin")
-        window = module.Window(OUT / "long", process, argparse.Namespace(field="von_mises", plot="strain", picture=None))
+        window = module.Window(OUT / "long", process, argparse.Namespace(field="von_mises", plot="strain", picture=None, move=None))
         window.window.SetOffScreenRendering(1)
         wait(window.update, "no frame comes")
         wait(lambda: window.update() and window.shown > 3, "frames do not follow each other")
@@ -87,6 +125,7 @@ def main():
     check("no column 'strian'" in live(OUT / "done", "--plot", "strian", "--picture", OUT / "no.png", fails=True), "unknown column")
     check("neither a scenario" in live(OUT / "nothing.opts", fails=True), "neither scenario nor folder")
     check_keys()
+    check_move()
 
 
 if __name__ == "__main__":
