@@ -21,7 +21,7 @@ static const SbOption rows[] = {
    "mesh: factor on the coordinates of the file; 0.001 for a file in mm"},
   {"obstacle_at", SB_OPTION_REALS, 3, "m", "0,0,0", "(-inf, inf)", "mesh: shift of the scaled mesh"},
   {"displacement", SB_OPTION_FORMULA, 3, "m", "0;0;0", "",
-   "path of the obstacle, three formulas of the time t"},
+   "path of the obstacle, three formulas of the time t; live: as live.txt says while the run goes on"},
   {"angle", SB_OPTION_FORMULA, 1, "degree", "0", "",
    "rotation of the obstacle about the axis, a formula of t"},
   {"axis", SB_OPTION_REALS, 3, "", "0,0,1", "", "direction of the axis of rotation; right-handed"},

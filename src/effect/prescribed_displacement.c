@@ -25,7 +25,7 @@ static const SbOption rows[] = {
    "sets whose nodes are moved: vertices, with cr and dg the means over triangles"},
   {"components", SB_OPTION_CHOICE, 1, "", "xyz", SB_COMPONENT_CHOICES, "directions that are prescribed"},
   {"displacement", SB_OPTION_FORMULA, 3, "m", "0;0;0", "",
-   "translation, three formulas of t, x, y, z (rest position)"},
+   "translation, three formulas of t, x, y, z (rest position); live: as live.txt says while the run goes on"},
   {"angle", SB_OPTION_FORMULA, 1, "degree", "0", "",
    "angle of rotation about the axis, a formula of the time t"},
   {"axis", SB_OPTION_REALS, 3, "", "0,0,1", "", "direction of the axis of rotation; right-handed"},
