@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy
 import trimesh
+from alembic3d import Abc, AbcGeom
 from pxr import Usd, UsdGeom
 
 from output_common import OUT, run
@@ -76,13 +77,33 @@ def check_usd(it, folder):
     check(len(bar.GetFaceVertexCountsAttr().Get()) == len(it.mesh().surface.triangles), "triangles")
 
 
+def check_alembic(it, folder):
+    """The same in Alembic's axes, y up: points, field, colours, the ball, at the run's own pace."""
+    export(folder, "--to", "alembic", "-o", OUT / "all", "--field", "displacement")
+    top = Abc.IArchive(str(OUT / "all.abc")).getTop()
+    bar, ball = (AbcGeom.IPolyMesh(top, name).getSchema() for name in ("bar", "ball"))
+    surface = it.mesh().surface
+    check(bar.getNumSamples() == len(it), f"{bar.getNumSamples()} samples for {len(it)} frames")
+    for k in (0, len(it) - 1):
+        at = Abc.ISampleSelector(k)
+        check(abs(bar.getTimeSampling().getSampleTime(k) - it.times[k]) < 1e-9, "times of the samples")
+        x, expected = numpy.array([[p.x, p.y, p.z] for p in bar.getValue(at).getPositions()]), it.positions(k)[surface.points]
+        check(numpy.abs(x - expected[:, [0, 2, 1]] * [1, 1, -1]).max() < 1e-6, f"points of frame {k}")
+        middle = numpy.array([[p.x, p.y, p.z] for p in ball.getValue(at).getPositions()]).mean(axis=0)
+        check(numpy.allclose(middle, [0.2, -0.3 - 2 * it.times[k], -0.05], atol=1e-3), f"the ball is at {middle} in frame {k}")
+        u = numpy.array(list(AbcGeom.IFloatGeomParam(bar.getArbGeomParams(), "displacement").getExpandedValue(at).getVals()))
+        check(numpy.allclose(u, it.values("displacement", k)[0][surface.points], atol=1e-7), f"field of frame {k}")
+    faces = numpy.array(list(bar.getValue(Abc.ISampleSelector(0)).getFaceIndices())).reshape(-1, 3)
+    check((faces == surface.triangles[:, ::-1]).all(), "triangles")
+
+
 def main():
     run(1, "run", "-ts_max_time", "0.04", "-quiet", "-time", "euler_implicit", *BALL)
     it = supple.Run(OUT / "run")
     check_files(it, OUT / "run")
     check_usd(it, OUT / "run")
     check("there is no frame 99" in export(OUT / "run", "--to", "ply", "--frame", 99, fails=True), "unknown frame")
-    check("--to usd" in export(OUT / "run", "--to", "alembic", fails=True), "what to do instead of Alembic")
+    check_alembic(it, OUT / "run")
 
 
 if __name__ == "__main__":
