@@ -15,6 +15,7 @@
   fields.h5
     /mesh/x        [npoint][3] double, rest position, m; points are the vertices, or 4 c + a for corner a of cell c
     /mesh/cells    [ncell][4] int32, point numbers, positively oriented
+    /mesh/cells10  [ncell][10] int32, likewise the corners and the middles of the edges 01 12 02 03 13 23; only with -output_quadratic
     /mesh/vertices [ncell][4] int32, vertex numbers; only with -output_discontinuous
     /mesh_000123   the same for the mesh that bodies have after a re-meshing behind step 123; frames of it have the attribute `mesh` (123)
     /mesh/body     [ncell] int32, number of the body; /mesh/rank likewise when asked for

@@ -96,6 +96,7 @@ static const struct {
   {"output_every_steps", "fields"},
   {"output_precision", "fields"},
   {"output_discontinuous", "fields"},
+  {"output_quadratic", "fields"},
   {"output_contacts", "contacts"},
   {"output_history", "history"},
   {"output_history_every", "history"},

@@ -30,11 +30,12 @@ static PetscErrorCode position(const SbField *f, SbRun run, const SbStep *step, 
 {
   SbOutput out = (SbOutput)run->output;
   const SbMesh mesh = run->model->mesh;
+  const PetscReal *x = out->quadratic ? run->model->space->node_x : mesh->x;
 
   PetscFunctionBeginUser;
   PetscCall(vector(f, run, step, values));
   for (PetscInt i = 0; i < 3 * out->point.nowned; i++)
-    values[i] += mesh->x[3 * (out->discontinuous ? mesh->cell[i / 3] : i / 3) + i % 3];
+    values[i] += x[3 * (out->discontinuous ? mesh->cell[i / 3] : i / 3) + i % 3];
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

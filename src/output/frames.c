@@ -1,7 +1,7 @@
 /*
   fields.h5: one group per frame, one dataset per field, written by all ranks together in original order.
 
-  With -output_discontinuous point 4 c + a is corner a of cell c, and /mesh/vertices says which vertices coincide.
+  With -output_quadratic points are nodes, the vertices first, and /mesh/cells10 has the ten of each cell. With -output_discontinuous point 4 c + a is corner a of cell c, and /mesh/vertices says which vertices coincide.
 
   A frame gets its name in the file when it is complete (h5.c), and is then listed in the indices fields.xmf and fields.vtkhdf. After a restart in
   the same folder frames up to the restart stay, later ones are removed and their space in the file is used again.
@@ -60,15 +60,41 @@ static PetscErrorCode write_whole(SbFrames fr, hid_t where, const char *name, co
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The ten points of each cell in the order of VTK: corners, then the edges 01 12 02 03 13 23. */
+static PetscErrorCode write_quadratic_cells(SbRun run, SbOutput out, hid_t group)
+{
+  static const int edge[6] = {0, 3, 1, 2, 4, 5}; /* as SbTetEdge counts them */
+  SbFrames fr = out->frames;
+  const SbSpace s = run->model->space;
+  PetscReal *number, *owned;
+
+  PetscFunctionBeginUser;
+  /* numbers of the nodes in the file, also of ghosts */
+  PetscCall(PetscCalloc1(3 * s->nnode, &number));
+  PetscCall(PetscMalloc1(s->nnode_owned, &owned));
+  for (PetscInt i = 0; i < out->point.n; i++) fr->slice[i] = (PetscReal)(out->point.start + i);
+  PetscCall(SbOrderScatter(&out->point, 1, fr->slice, owned));
+  for (PetscInt i = 0; i < s->nnode_owned; i++) number[3 * i] = owned[i];
+  PetscCall(SbSpaceUpdateGhosts(s, number));
+  for (PetscInt c = 0; c < s->mesh->ncell_owned; c++) {
+    for (int a = 0; a < SB_CELL_NODES; a++)
+      fr->owned[SB_CELL_NODES * c + a] = number[3 * SbSpaceCellNode(s, c, a < 4 ? a : 4 + edge[a - 4])];
+  }
+  PetscCall(PetscFree(number));
+  PetscCall(PetscFree(owned));
+  PetscCall(write_whole(fr, group, "cells10", &out->cell, SB_CELL_NODES));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Coordinates of the points and the four points of each cell. */
 static PetscErrorCode write_points(SbRun run, SbOutput out, hid_t group)
 {
   SbFrames fr = out->frames;
   const SbMesh mesh = run->model->mesh;
-  const PetscReal *x = mesh->x;
+  const PetscReal *x = out->quadratic ? run->model->space->node_x : mesh->x;
 
   PetscFunctionBeginUser;
-  /* x: the vertices, or the corners of each cell */
+  /* x: the vertices, or the corners of each cell, or vertices and then edges */
   if (out->discontinuous) {
     for (PetscInt i = 0; i < 12 * mesh->ncell_owned; i++)
       fr->owned[i] = mesh->x[3 * mesh->cell[i / 3] + i % 3];
@@ -82,6 +108,7 @@ static PetscErrorCode write_points(SbRun run, SbOutput out, hid_t group)
   for (PetscInt i = 0; i < 4 * mesh->ncell_owned; i++)
     fr->owned[i] = (PetscReal)mesh->vert_orig[mesh->cell[i]];
   PetscCall(write_whole(fr, group, out->discontinuous ? "vertices" : "cells", &out->cell, 4));
+  if (out->quadratic) PetscCall(write_quadratic_cells(run, out, group));
   if (!out->discontinuous) PetscFunctionReturn(PETSC_SUCCESS);
   for (PetscInt c = 0; c < mesh->ncell_owned; c++) {
     for (PetscInt a = 0; a < 4; a++) fr->owned[4 * c + a] = (PetscReal)(4 * mesh->cell_orig[c] + a);
@@ -103,15 +130,15 @@ static PetscErrorCode write_set(SbRun run, SbOutput out, PetscInt k, hid_t group
 {
   SbFrames fr = out->frames;
   const SbMesh mesh = run->model->mesh;
-  const PetscInt npoint = out->discontinuous ? 4 * mesh->ncell_owned : mesh->nvert_owned;
+  const uint64_t *set = out->quadratic ? run->model->space->node_set : mesh->vert_set;
   char name[SB_NAME_MAX + 8];
 
   PetscFunctionBeginUser;
   array_of_set("set", mesh->set[k].name, sizeof(name), name);
   if (H5Lexists(group, name, H5P_DEFAULT) > 0)
     PetscFunctionReturn(PETSC_SUCCESS); /* another set has this name: "fat tissue" and "fat_tissue" */
-  for (PetscInt i = 0; i < npoint; i++)
-    fr->owned[i] = (mesh->vert_set[out->discontinuous ? mesh->cell[i] : i] & SB_SET_BIT(k)) != 0;
+  for (PetscInt i = 0; i < out->point.nowned; i++)
+    fr->owned[i] = (set[out->discontinuous ? mesh->cell[i] : i] & SB_SET_BIT(k)) != 0;
   PetscCall(write_whole(fr, group, name, &out->point, 1));
   if (!mesh->set[k].ncell) PetscFunctionReturn(PETSC_SUCCESS);
   array_of_set("tets", mesh->set[k].name, sizeof(name), name);
@@ -134,7 +161,8 @@ static PetscErrorCode write_mesh(SbRun run, SbOutput out)
   if (H5Lexists(fr->h5.file, name, H5P_DEFAULT) > 0) (void)H5Ldelete(fr->h5.file, name, H5P_DEFAULT);
 
   /* room on disk for all of it, then points and cells */
-  PetscCall(SbH5Reserve(&fr->h5, (PetscInt64)out->point.N * 24 + (PetscInt64)out->cell.N * 40 + 65536));
+  PetscCall(SbH5Reserve(&fr->h5, (PetscInt64)out->point.N * 24 +
+                                   (PetscInt64)out->cell.N * (out->quadratic ? 80 : 40) + 65536));
   PetscCall(SbH5GroupCreate(&fr->h5, 8, 8, &group));
   PetscCall(SbH5PutInt(&fr->h5, group, "hash", (int64_t)out->mesh_hash));
 
@@ -507,7 +535,7 @@ PetscErrorCode SbFramesCheck(SbRun run, SbOutput out)
   SbH5 h;
   char path[PETSC_MAX_PATH_LEN];
   PetscInt step;
-  PetscBool ok, corners;
+  PetscBool ok, corners, edges;
 
   PetscFunctionBeginUser;
   if (!out->nfield) PetscFunctionReturn(PETSC_SUCCESS);
@@ -517,6 +545,8 @@ PetscErrorCode SbFramesCheck(SbRun run, SbOutput out)
   if (!ok) PetscFunctionReturn(PETSC_SUCCESS);
   corners = (PetscBool)(H5Lexists(h.file, "mesh", H5P_DEFAULT) > 0 &&
                         H5Lexists(h.file, "mesh/vertices", H5P_DEFAULT) > 0);
+  edges = (PetscBool)(H5Lexists(h.file, "mesh", H5P_DEFAULT) > 0 &&
+                      H5Lexists(h.file, "mesh/cells10", H5P_DEFAULT) > 0);
   PetscCall(find_mesh(run, out, h.file, &step, &ok));
   PetscCall(SbH5Close(&h));
   /* a file of another mesh is replaced, one of this mesh continued */
@@ -524,6 +554,11 @@ PetscErrorCode SbFramesCheck(SbRun run, SbOutput out)
              "-output_discontinuous is %s, but the frames in %s were written with %s: go on with the same, "
              "or give another -output_dir",
              out->discontinuous ? "true" : "false", path, corners ? "true" : "false");
+  PetscCheck(
+    !ok || edges == out->quadratic, out->comm, PETSC_ERR_USER_INPUT,
+    "-output_quadratic is %s, but the frames in %s were written with %s: go on with the same, or give "
+    "another -output_dir",
+    out->quadratic ? "true" : "false", path, edges ? "true" : "false");
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -533,8 +568,9 @@ PetscErrorCode SbFramesCheck(SbRun run, SbOutput out)
 static PetscErrorCode allocate(SbRun run, SbOutput out)
 {
   SbFrames fr = out->frames;
-  const PetscInt nowned = PetscMax(3 * out->point.nowned, 6 * out->cell.nowned);
-  const PetscInt nslice = PetscMax(3 * out->point.n, 6 * out->cell.n);
+  const PetscInt most = out->quadratic ? SB_CELL_NODES : 6; /* numbers of a cell */
+  const PetscInt nowned = PetscMax(3 * out->point.nowned, most * out->cell.nowned);
+  const PetscInt nslice = PetscMax(3 * out->point.n, most * out->cell.n);
 
   PetscFunctionBeginUser;
   PetscCall(PetscMalloc1(nowned, &fr->owned));

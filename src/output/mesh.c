@@ -43,6 +43,8 @@ PetscErrorCode SbOutputOrder(SbRun run, SbOutput out)
   }
   if (out->discontinuous)
     PetscCall(SbOrderRepeat(&out->cell, 4, &out->point));
+  else if (out->quadratic)
+    PetscCall(SbOrderRepeat(&out->node, 1, &out->point));
   else
     PetscCall(SbOrderRepeat(&out->vertex, 1, &out->point));
 

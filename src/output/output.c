@@ -23,6 +23,8 @@ static const SbOption rows[] = {
   {"output_precision", SB_OPTION_CHOICE, 1, "", "float", "float|double", "numbers in fields.h5"},
   {"output_discontinuous", SB_OPTION_BOOL, 1, "", "false", "",
    "each tet in fields.h5 has four points of its own: cr and dg as they are, else averaged around vertices"},
+  {"output_quadratic", SB_OPTION_BOOL, 1, "", "false", "",
+   "bodies of p2: fields.h5 has all their nodes, and viewers show quadratic tets; else the vertices"},
   {"output_contacts", SB_OPTION_BOOL, 1, "", "false", "",
    "contacts.xmf: the points where contact pushes in each frame, with normals, gaps and forces"},
   {"output_history", SB_OPTION_BOOL, 1, "", "true", "", "write history.csv"},
@@ -116,7 +118,7 @@ static PetscErrorCode read_fields(SbOutput out, const SbScope *scope, PetscBool 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode read_options(SbOutput out, PetscBool dynamic)
+static PetscErrorCode read_options(SbOutput out, SbModel model)
 {
   SbScope scope;
   PetscInt precision;
@@ -141,12 +143,19 @@ static PetscErrorCode read_options(SbOutput out, PetscBool dynamic)
   PetscCall(SbOptionBool(&scope, "output_overwrite", &out->overwrite));
 
   /* what is written into it, and how often */
-  PetscCall(read_fields(out, &scope, dynamic));
+  PetscCall(read_fields(out, &scope, model->dynamic));
   PetscCall(SbOptionReal(&scope, "output_every", &out->every));
   PetscCall(SbOptionInt(&scope, "output_every_steps", &out->every_steps));
   PetscCall(SbOptionChoice(&scope, "output_precision", &precision));
   out->precise = precision ? PETSC_TRUE : PETSC_FALSE;
   PetscCall(SbOptionBool(&scope, "output_discontinuous", &out->discontinuous));
+  PetscCall(SbOptionBool(&scope, "output_quadratic", &out->quadratic));
+  PetscCheck(!out->quadratic || !out->discontinuous, out->comm, PETSC_ERR_USER_INPUT,
+             "-output_quadratic yes and -output_discontinuous yes: give one of them");
+  for (PetscInt b = 0; out->quadratic && b < model->nbody; b++)
+    PetscCheck(!strcmp(model->body[b].element, "p2"), out->comm, PETSC_ERR_USER_INPUT,
+               "-output_quadratic yes: all bodies must be of element p2, but '%s' is of %s",
+               model->body[b].name, model->body[b].element);
   PetscCall(SbOptionBool(&scope, "output_contacts", &out->contact_points));
   PetscCheck(
     !out->contact_points || out->nfield, out->comm, PETSC_ERR_USER_INPUT,
@@ -159,7 +168,7 @@ static PetscErrorCode read_options(SbOutput out, PetscBool dynamic)
   PetscCall(SbOptionInt(&scope, "checkpoint_keep", &out->checkpoint_keep));
   PetscCall(SbOptionString(&scope, "restart", sizeof(out->restart), out->restart));
 
-  PetscCall(SbProbesSetFromOptions(out, &scope, dynamic));
+  PetscCall(SbProbesSetFromOptions(out, &scope, model->dynamic));
 
   /* the file in which others say where effects are to go */
   if (SbLiveCount()) {
@@ -267,7 +276,7 @@ PetscErrorCode SbOutputSetFromOptions(SbRun run)
   PetscCall(PetscTime(&out->wall_start));
   out->cpu_start = SbCpuSeconds();
   (void)strftime(out->started, sizeof(out->started), "%Y-%m-%dT%H:%M:%S%z", localtime_r(&now, &local));
-  PetscCall(read_options(out, run->model->dynamic));
+  PetscCall(read_options(out, run->model));
   // A limit on the size of files is met as a failed write, with its message, not as a signal.
   (void)signal(SIGXFSZ, SIG_IGN);
   if (!out->rank) PetscCall(SbFolderMake(out, sizeof(message), message));

@@ -140,6 +140,7 @@ struct _p_SbOutput {
   PetscInt every_steps;
   PetscBool precise;        /* double instead of float */
   PetscBool discontinuous;  /* each cell has four points of its own */
+  PetscBool quadratic;      /* points are the nodes of P2, cells have ten */
   PetscBool contact_points; /* where contact pushes, in each frame */
   PetscBool history, history_bodies;
   PetscInt history_every;
@@ -156,8 +157,9 @@ struct _p_SbOutput {
     PetscLogEvent fields, contacts, history, probes, checkpoint, progress;
   } event; /* SbOut_<name>, of those that the scenario asks for */
   SbOrder vertex, cell;
-  SbOrder node;  /* the unknowns: that of the vertices when no body has its nodes at faces */
-  SbOrder point; /* of vertex fields: vertices, or 4 cell + a of the corners of cells when discontinuous */
+  SbOrder node; /* the unknowns: that of the vertices when no body has its nodes at faces */
+  SbOrder
+    point; /* of vertex fields: vertices, 4 cell + a of the corners of cells when discontinuous, or nodes when quadratic */
   PetscBool ordered;    /* the four exist */
   PetscBool attached;   /* run.json exists */
   PetscInt *body_nodes; /* [nbody] nodes of each body, supports of faces among them */

@@ -138,9 +138,9 @@ PetscErrorCode SbPointsValues(SbRun run, SbOutput out, Vec x, PetscReal values[]
   const PetscReal *array;
 
   PetscFunctionBeginUser;
-  if (s->vertices && !out->discontinuous) {
+  if (out->quadratic || (s->vertices && !out->discontinuous)) {
     PetscCall(VecGetArrayRead(x, &array));
-    PetscCall(PetscArraycpy(values, array, 3 * s->mesh->nvert_owned));
+    PetscCall(PetscArraycpy(values, array, 3 * out->point.nowned));
     PetscCall(VecRestoreArrayRead(x, &array));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
@@ -201,16 +201,16 @@ PetscErrorCode SbPointsForces(SbRun run, SbOutput out, PetscBool prescribed, Vec
 {
   const SbSpace s = run->model->space;
   const SbPoints p = out->points;
-  const PetscInt n = out->discontinuous ? 4 * s->mesh->ncell_owned : s->mesh->nvert_owned;
+  const PetscInt n = out->point.nowned;
   Forces f = {.s = s, .prescribed = prescribed};
 
   PetscFunctionBeginUser;
   PetscCall(PetscArrayzero(values, 3 * n));
   PetscCall(SbSpaceGetLocalRead(s, R, &f.r));
   for (PetscInt i = 0; i < n; i++) {
-    const PetscInt corner = s->vertices || out->discontinuous ? 0 : p->corner[p->start[i]];
+    const PetscInt corner = s->vertices || out->discontinuous || out->quadratic ? 0 : p->corner[p->start[i]];
     const PetscBool edges = (PetscBool)(s->edge_node && s->edge_node[6 * (corner / 4)] >= 0);
-    const PetscInt node = out->discontinuous || edges ? -1 : vertex_node(s, p, i);
+    const PetscInt node = out->quadratic ? i : out->discontinuous || edges ? -1 : vertex_node(s, p, i);
 
     if (out->discontinuous) {
       add_corner_force(&f, p->valence, i, values + 3 * i);

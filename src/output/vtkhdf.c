@@ -41,6 +41,7 @@ typedef struct {
 struct _p_SbVtkhdf {
   char path[PETSC_MAX_PATH_LEN];
   PetscBool points; /* PolyData of contact points, else an UnstructuredGrid of tets */
+  PetscInt corners; /* of a tet: 4, or 10 nodes of a quadratic one */
   PetscInt npart, part_size, nframe, frame_size, narray, array_size;
   Part *part;
   Frame *frame;
@@ -122,10 +123,11 @@ static herr_t list_array(hid_t where, const char *name, const H5L_info_t *info, 
   Array a = {.ncomp = 1, .bytes = 4, .whole = PETSC_TRUE, .cell = PETSC_TRUE, .constant = PETSC_TRUE};
 
   (void)where, (void)info;
-  if (!strcmp(name, "vertices") || !strcmp(name, "x")) return 0;
-  SbFormat(sizeof(a.name), a.name, "%s", name);
+  if (!strcmp(name, "vertices") || !strcmp(name, "x") || (!strcmp(name, "cells") && l->v->corners > 4))
+    return 0;
+  SbFormat(sizeof(a.name), a.name, "%s", !strcmp(name, "cells10") ? "cells" : name);
   a.cell = (PetscBool)(strncmp(name, "set_", 4) != 0);
-  if (!strcmp(name, "cells")) a.ncomp = 4;
+  if (!strcmp(a.name, "cells")) a.ncomp = (int)l->v->corners;
   l->ierr = add_piece(l->v, &a, l->v->npart, l->group, name);
   return l->ierr ? -1 : 0;
 }
@@ -144,6 +146,7 @@ PetscErrorCode SbVtkhdfSetMesh(SbVtkhdf v, hid_t mesh, const char *group)
   List list = {.v = v, .group = group, .ierr = PETSC_SUCCESS};
 
   PetscFunctionBeginUser;
+  v->corners = mesh >= 0 && H5Lexists(mesh, "cells10", H5P_DEFAULT) > 0 ? 10 : 4;
   if (mesh >= 0) (void)H5Literate(mesh, H5_INDEX_NAME, H5_ITER_INC, NULL, list_array, &list);
   PetscCall(list.ierr);
   PetscCall(add_part(v, (PetscInt)SbH5Rows(mesh, "x"), (PetscInt)SbH5Rows(mesh, "cells"), group));
@@ -216,7 +219,7 @@ static void write_array(SbVtkhdf v, hid_t where, const char *name, const Array *
   const hid_t list = H5Pcreate(H5P_DATASET_CREATE);
   const PetscInt nblock = a->constant ? v->npart : v->nframe;
   const int columns = a->ncomp == 6 ? 6 : 1; // that are placed one by one
-  const hsize_t ncomp = (hsize_t)a->ncomp, each = ncomp == 4 ? 4 : 1;
+  const hsize_t ncomp = (hsize_t)a->ncomp, each = ncomp == 4 || ncomp == 10 ? ncomp : 1;
   const double nothing = a->whole ? 0. : NAN;
   hsize_t total[2] = {0, ncomp}, at = 0;
   hid_t space, dataset;
@@ -255,26 +258,26 @@ static void write_array(SbVtkhdf v, hid_t where, const char *name, const Array *
   (void)H5Pclose(list);
 }
 
-/* A dataset [n], or [n][m] when m > 0, of numbers in memory; packed when they are many. Without values: those of VTK_TETRA. */
+/* A dataset [n], or [n][m] when m > 0, of numbers in memory; packed when they are many. Of bytes there is one, which all of them are. */
 static void write_numbers(hid_t where, const char *name, PetscInt n, PetscInt m, hid_t memtype,
                           const void *values, PetscBool *ok)
 {
   const hsize_t size[2] = {(hsize_t)n, (hsize_t)m}, chunk[1] = {(hsize_t)PetscMin(n, 1 << 16)};
   const hid_t space = H5Screate_simple(m ? 2 : 1, size, NULL), list = H5Pcreate(H5P_DATASET_CREATE);
-  const hid_t type = !values ? H5T_STD_U8LE : memtype == H5T_NATIVE_DOUBLE ? H5T_IEEE_F64LE : H5T_STD_I64LE;
-  const uint8_t tetra = 10;
+  const PetscBool same = (PetscBool)(memtype == H5T_NATIVE_UINT8);
+  const hid_t type = same ? H5T_STD_U8LE : memtype == H5T_NATIVE_DOUBLE ? H5T_IEEE_F64LE : H5T_STD_I64LE;
   hid_t dataset;
 
   (void)H5Pset_obj_track_times(list, 0);
-  if (!values) {
-    (void)H5Pset_fill_value(list, H5T_NATIVE_UINT8, &tetra);
+  if (same) {
+    (void)H5Pset_fill_value(list, memtype, values);
   } else if (!m && n > 1024 && H5Zfilter_avail(H5Z_FILTER_DEFLATE) > 0) {
     (void)H5Pset_chunk(list, 1, chunk);
     (void)H5Pset_shuffle(list);
     (void)H5Pset_deflate(list, 1);
   }
   dataset = H5Dcreate2(where, name, type, space, H5P_DEFAULT, list, H5P_DEFAULT);
-  if (dataset < 0 || (values && H5Dwrite(dataset, memtype, H5S_ALL, H5S_ALL, H5P_DEFAULT, values) < 0))
+  if (dataset < 0 || (!same && H5Dwrite(dataset, memtype, H5S_ALL, H5S_ALL, H5P_DEFAULT, values) < 0))
     *ok = PETSC_FALSE;
   if (dataset >= 0) (void)H5Dclose(dataset);
   (void)H5Pclose(list);
@@ -285,6 +288,7 @@ static void write_numbers(hid_t where, const char *name, PetscInt n, PetscInt m,
 static void write_cells(SbVtkhdf v, hid_t root, int64_t *work, PetscBool *ok)
 {
   static const char *const kind[4] = {"Vertices", "Lines", "Polygons", "Strips"};
+  const uint8_t linear = 10, quadratic = 24; /* VTK's numbers of tets */
   PetscInt n = 0, ncell = 0, most = 0;
 
   for (PetscInt p = 0; p < v->npart; p++) {
@@ -294,11 +298,11 @@ static void write_cells(SbVtkhdf v, hid_t root, int64_t *work, PetscBool *ok)
   if (!v->points) {
     for (PetscInt p = 0; p < v->npart; p++) work[p] = v->part[p].ncell;
     write_numbers(root, "NumberOfCells", v->npart, 0, H5T_NATIVE_INT64, work, ok);
-    for (PetscInt p = 0; p < v->npart; p++) work[p] *= 4;
+    for (PetscInt p = 0; p < v->npart; p++) work[p] *= v->corners;
     write_numbers(root, "NumberOfConnectivityIds", v->npart, 0, H5T_NATIVE_INT64, work, ok);
-    write_numbers(root, "Types", ncell, 0, H5T_NATIVE_UINT8, NULL, ok);
+    write_numbers(root, "Types", ncell, 0, H5T_NATIVE_UINT8, v->corners > 4 ? &quadratic : &linear, ok);
     for (PetscInt p = 0; p < v->npart; p++)
-      for (PetscInt c = 0; c <= v->part[p].ncell; c++) work[n++] = 4 * (int64_t)c;
+      for (PetscInt c = 0; c <= v->part[p].ncell; c++) work[n++] = v->corners * (int64_t)c;
     write_numbers(root, "Offsets", n, 0, H5T_NATIVE_INT64, work, ok);
     return;
   }
@@ -343,7 +347,7 @@ static void write_steps(SbVtkhdf v, hid_t root, int64_t *work, PetscBool *ok)
     for (PetscInt i = 0; i < kinds * v->nframe; i++) {
       work[i] = 0;
       for (PetscInt p = 0; !v->points && p < v->frame[i].part; p++)
-        work[i] += (corners ? 4 : 1) * (int64_t)v->part[p].ncell;
+        work[i] += (corners ? v->corners : 1) * (int64_t)v->part[p].ncell;
     }
     write_numbers(group, corners ? "ConnectivityIdOffsets" : "CellOffsets", v->nframe, kinds,
                   H5T_NATIVE_INT64, work, ok);

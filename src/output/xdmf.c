@@ -79,6 +79,7 @@ PetscErrorCode SbXdmfSetMesh(SbXdmf xdmf, hid_t mesh, const char *group)
 {
   size_t size;
   List list = {.xdmf = xdmf, .group = group};
+  const PetscBool quadratic = (PetscBool)(mesh >= 0 && H5Lexists(mesh, "cells10", H5P_DEFAULT) > 0);
 
   PetscFunctionBeginUser;
   xdmf->npoint = (PetscInt)SbH5Rows(mesh, "x");
@@ -86,9 +87,10 @@ PetscErrorCode SbXdmfSetMesh(SbXdmf xdmf, hid_t mesh, const char *group)
   free(xdmf->mesh);
   list.file = open_memstream(&xdmf->mesh, &size);
   PetscCheck(list.file, PETSC_COMM_SELF, PETSC_ERR_MEM, "No memory for %s", xdmf->path);
-  (void)fprintf(list.file, "<Topology TopologyType=\"Tetrahedron\" NumberOfElements=\"%" PetscInt_FMT "\">",
-                xdmf->ncell);
-  SbXdmfArray(list.file, xdmf->ncell, 4, "Int", 4, "fields.h5:/%s/cells", group);
+  (void)fprintf(list.file, "<Topology TopologyType=\"%s\" NumberOfElements=\"%" PetscInt_FMT "\">",
+                quadratic ? "Tetrahedron_10" : "Tetrahedron", xdmf->ncell);
+  SbXdmfArray(list.file, xdmf->ncell, quadratic ? 10 : 4, "Int", 4, "fields.h5:/%s/cells%s", group,
+              quadratic ? "10" : "");
   (void)fputs("</Topology>\n<Geometry GeometryType=\"XYZ\">", list.file);
   SbXdmfArray(list.file, xdmf->npoint, 3, "Float", 8, "fields.h5:/%s/x", group);
   (void)fputs("</Geometry>\n", list.file);
