@@ -29,15 +29,6 @@ static struct {
   void (*at_end)(void);
 } state = {.comm = MPI_COMM_NULL, .program = "supple", .code = 1};
 
-/* PETSc's functions that read options; their messages do not always name the option. */
-static PetscBool of_options(const char *function)
-{
-  return (PetscBool)(function && (!strncmp(function, "PetscOptionsInsert", 18) ||
-                                  !strncmp(function, "PetscOptionsStringTo", 20) ||
-                                  !strncmp(function, "PetscOptionsSetValue", 20) ||
-                                  !strcmp(function, "PetscParseLayerYAML")));
-}
-
 static PetscBool is_user_error(PetscErrorCode n, const char *function)
 {
   switch ((int)n) {
@@ -53,13 +44,10 @@ static PetscBool is_user_error(PetscErrorCode n, const char *function)
   }
   /* PETSc reads its options and option files itself, under other codes */
   return (PetscBool)(n == PETSC_ERR_ARG_UNKNOWN_TYPE || n == PETSC_ERR_MISSING_FACTOR ||
-                     of_options(function));
-}
-
-/* PETSc says what is wrong with a YAML file, but not with which one. */
-static PetscBool is_yaml_error(const char *function)
-{
-  return (PetscBool)(function && (strstr(function, "YAML") != NULL));
+                     (function && (!strncmp(function, "PetscOptionsInsert", 18) ||
+                                   !strncmp(function, "PetscOptionsStringTo", 20) ||
+                                   !strncmp(function, "PetscOptionsSetValue", 20) ||
+                                   !strcmp(function, "PetscParseLayerYAML"))));
 }
 
 static PetscErrorCode handler(MPI_Comm comm, int line, const char *function, const char *file,
@@ -68,7 +56,7 @@ static PetscErrorCode handler(MPI_Comm comm, int line, const char *function, con
   (void)comm;
   (void)ctx;
   if (p == PETSC_ERROR_INITIAL) {
-    const PetscBool yaml = is_yaml_error(function);
+    const PetscBool yaml = (PetscBool)(function && strstr(function, "YAML"));
 
     state.code = 1;
     state.pending = is_user_error(n, function);

@@ -163,31 +163,6 @@ static PetscErrorCode word(Parser *p)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode primary(Parser *p)
-{
-  unsigned char c;
-
-  PetscFunctionBeginUser;
-  skip_blanks(p);
-  c = (unsigned char)*p->next;
-  if (isdigit(c) || (c == '.' && isdigit((unsigned char)p->next[1]))) {
-    char *end;
-    const PetscReal number = strtod(p->next, &end);
-
-    p->next = end;
-    PetscCall(emit(p, SB_OP_NUMBER, 0, number, 1));
-  } else if (isalpha(c)) {
-    PetscCall(word(p));
-  } else if (c == '(') {
-    p->next++;
-    PetscCall(expression(p));
-    PetscCall(expect(p, ')'));
-  } else {
-    PetscCall(complain(p, p->next, c ? "expected a number, a name or '('" : "the formula ends too early"));
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 static PetscErrorCode unary(Parser *p)
 {
   PetscFunctionBeginUser;
@@ -200,7 +175,26 @@ static PetscErrorCode unary(Parser *p)
     PetscCall(unary(p));
     if (minus) PetscCall(emit(p, SB_OP_NEG, 0, 0, 0));
   } else {
-    PetscCall(primary(p));
+    unsigned char c;
+
+    // a number, a name or what stands in parentheses
+    skip_blanks(p);
+    c = (unsigned char)*p->next;
+    if (isdigit(c) || (c == '.' && isdigit((unsigned char)p->next[1]))) {
+      char *end;
+      const PetscReal number = strtod(p->next, &end);
+
+      p->next = end;
+      PetscCall(emit(p, SB_OP_NUMBER, 0, number, 1));
+    } else if (isalpha(c)) {
+      PetscCall(word(p));
+    } else if (c == '(') {
+      p->next++;
+      PetscCall(expression(p));
+      PetscCall(expect(p, ')'));
+    } else {
+      PetscCall(complain(p, p->next, c ? "expected a number, a name or '('" : "the formula ends too early"));
+    }
     skip_blanks(p);
     if (*p->next == '^') {
       p->next++;

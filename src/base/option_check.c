@@ -328,13 +328,6 @@ PetscErrorCode SbOptionsCheck(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Options that PETSc reads in PetscFinalize() only. */
-static PetscBool is_read_at_end(const char *name)
-{
-  return SbBeginsWith(name, "citations get_total_flops log_ malloc_ memory_view mpidump no_signal_handler "
-                            "nox objects_dump options_left options_view saw_options x_virtual");
-}
-
 PetscErrorCode SbOptionsUnused(MPI_Comm comm, PetscInt *n)
 {
   PetscInt nleft;
@@ -348,7 +341,11 @@ PetscErrorCode SbOptionsUnused(MPI_Comm comm, PetscInt *n)
 
     for (PetscInt j = 0; j < SbTheOptions.nuser && !users; j++)
       users = (PetscBool)!strcasecmp(SbTheOptions.user[j].name, names[i]);
-    if (!users || is_read_at_end(names[i]) || class_of(names[i]) || program_row(names[i])) continue;
+    if (!users ||
+        SbBeginsWith(names[i], "citations get_total_flops log_ malloc_ memory_view mpidump no_signal_handler "
+                               "nox objects_dump options_left options_view saw_options x_virtual") ||
+        class_of(names[i]) || program_row(names[i]))
+      continue;
     PetscCall(SbWarning(comm, "nobody read the option -%s%s%s", names[i], values[i] ? " " : "",
                         values[i] ? values[i] : ""));
     (*n)++;

@@ -18,30 +18,23 @@ static const char *const first_options[][3] = {
   {"", "", "ts_max_time"}, {"", "", "solver"},      {"", "", "output_dir"},
 };
 
-/* What the value looks like: "3 numbers", "euler_implicit|newmark". */
-static PetscErrorCode describe_value(const SbOption *row, size_t size, char text[])
+static PetscErrorCode help_row(PetscViewer viewer, const SbOptionBlock *block, const SbOption *row)
 {
+  char name[SB_OPTION_NAME_MAX], value[64], number[16] = "";
   static const char *const kinds[] = {
     [SB_OPTION_BOOL] = "true or false", [SB_OPTION_INT] = "whole number",
     [SB_OPTION_REAL] = "number",        [SB_OPTION_REALS] = "number",
     [SB_OPTION_STRING] = "text",        [SB_OPTION_NAMES] = "names with commas",
     [SB_OPTION_CHOICE] = "one of",      [SB_OPTION_FORMULA] = "formula"};
-  const char *with = row->kind == SB_OPTION_REALS ? " with commas" : row->count > 1 ? " with semicolons" : "";
-  char number[16] = "";
-
-  PetscFunctionBeginUser;
-  if (row->count > 1) PetscCall(PetscSNPrintf(number, sizeof(number), "%" PetscInt_FMT " ", row->count));
-  PetscCall(PetscSNPrintf(text, size, "%s%s%s%s", number, kinds[row->kind], row->count > 1 ? "s" : "", with));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode help_row(PetscViewer viewer, const SbOptionBlock *block, const SbOption *row)
-{
-  char name[SB_OPTION_NAME_MAX], value[64];
+  const char *with;
 
   PetscFunctionBeginUser;
   PetscCall(SbOptionManualName(block, row, sizeof(name), name));
-  PetscCall(describe_value(row, sizeof(value), value));
+  // what the value looks like: "3 numbers", "euler_implicit|newmark"
+  with = row->kind == SB_OPTION_REALS ? " with commas" : row->count > 1 ? " with semicolons" : "";
+  if (row->count > 1) PetscCall(PetscSNPrintf(number, sizeof(number), "%" PetscInt_FMT " ", row->count));
+  PetscCall(PetscSNPrintf(value, sizeof(value), "%s%s%s%s", number, kinds[row->kind],
+                          row->count > 1 ? "s" : "", with));
   PetscCall(PetscViewerASCIIPrintf(viewer, "  %s: %s", name, value));
   if (row->range[0])
     PetscCall(PetscViewerASCIIPrintf(viewer, "%s %s", strchr("[(", row->range[0]) ? " in" : "", row->range));
@@ -51,37 +44,6 @@ static PetscErrorCode help_row(PetscViewer viewer, const SbOptionBlock *block, c
   else if (row->preset[0])
     PetscCall(PetscViewerASCIIPrintf(viewer, ", default %s", row->preset));
   PetscCall(PetscViewerASCIIPrintf(viewer, "\n      %s\n", row->help));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* One line of the table for programs; its columns are those of SbOptionsTable(). */
-static PetscErrorCode table_row(PetscViewer viewer, const SbOptionBlock *block, const SbOption *row)
-{
-  static const char *const kinds[] = {
-    [SB_OPTION_BOOL] = "bool",     [SB_OPTION_INT] = "int",        [SB_OPTION_REAL] = "real",
-    [SB_OPTION_REALS] = "real",    [SB_OPTION_STRING] = "text",    [SB_OPTION_NAMES] = "names",
-    [SB_OPTION_CHOICE] = "choice", [SB_OPTION_FORMULA] = "formula"};
-  char name[SB_OPTION_NAME_MAX];
-
-  PetscFunctionBeginUser;
-  PetscCall(SbOptionManualName(block, row, sizeof(name), name));
-  PetscCall(PetscViewerASCIIPrintf(viewer, "%s\t%s\t%s\t%s\t%" PetscInt_FMT "\t%s\t%s\t%s\t%s\t%s\n",
-                                   block->klass, block->type, name, kinds[row->kind], row->count, row->unit,
-                                   row->preset ? "no" : "yes", row->preset ? row->preset : "", row->range,
-                                   row->help));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Headline of a block: "The run", "Every body", "body: corotated". */
-static PetscErrorCode headline(PetscViewer viewer, const SbOptionBlock *block)
-{
-  PetscFunctionBeginUser;
-  if (!block->klass[0])
-    PetscCall(PetscViewerASCIIPrintf(viewer, "\nThe run\n"));
-  else if (!block->type[0])
-    PetscCall(PetscViewerASCIIPrintf(viewer, "\nEvery %s\n", block->klass));
-  else
-    PetscCall(PetscViewerASCIIPrintf(viewer, "\n%s: %s\n", block->klass, block->type));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -122,10 +84,29 @@ static PetscErrorCode print_type(PetscViewer viewer, const SbOptionBlock *first,
     for (PetscInt i = 0; i < b->n; i++) {
       PetscCall(answers(b, &b->rows[i], topic, &how));
       if (how < least) continue;
-      if (!printed++ && !table) PetscCall(headline(viewer, first));
-      if (table)
-        PetscCall(table_row(viewer, b, &b->rows[i]));
-      else
+      // headline of a block: "The run", "Every body", "body: corotated"
+      if (!printed++ && !table) {
+        if (!first->klass[0])
+          PetscCall(PetscViewerASCIIPrintf(viewer, "\nThe run\n"));
+        else if (!first->type[0])
+          PetscCall(PetscViewerASCIIPrintf(viewer, "\nEvery %s\n", first->klass));
+        else
+          PetscCall(PetscViewerASCIIPrintf(viewer, "\n%s: %s\n", first->klass, first->type));
+      }
+      // one line of the table for programs; its columns are those of SbOptionsTable()
+      if (table) {
+        static const char *const kinds[] = {
+          [SB_OPTION_BOOL] = "bool",     [SB_OPTION_INT] = "int",        [SB_OPTION_REAL] = "real",
+          [SB_OPTION_REALS] = "real",    [SB_OPTION_STRING] = "text",    [SB_OPTION_NAMES] = "names",
+          [SB_OPTION_CHOICE] = "choice", [SB_OPTION_FORMULA] = "formula"};
+        char name[SB_OPTION_NAME_MAX];
+
+        PetscCall(SbOptionManualName(b, &b->rows[i], sizeof(name), name));
+        PetscCall(PetscViewerASCIIPrintf(
+          viewer, "%s\t%s\t%s\t%s\t%" PetscInt_FMT "\t%s\t%s\t%s\t%s\t%s\n", b->klass, b->type, name,
+          kinds[b->rows[i].kind], b->rows[i].count, b->rows[i].unit, b->rows[i].preset ? "no" : "yes",
+          b->rows[i].preset ? b->rows[i].preset : "", b->rows[i].range, b->rows[i].help));
+      } else
         PetscCall(help_row(viewer, b, &b->rows[i]));
     }
   }
@@ -206,32 +187,6 @@ static PetscErrorCode print_topics(PetscViewer viewer)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* How to run it, what a first scenario needs, and where the rest is. */
-static PetscErrorCode print_usage(PetscViewer viewer)
-{
-  PetscFunctionBeginUser;
-  PetscCall(PetscViewerASCIIPrintf(viewer, "supple %s - soft bodies by finite elements on PETSc\n\n%s",
-                                   SB_VERSION, USAGE));
-  PetscCall(PetscViewerASCIIPrintf(
-    viewer,
-    "  supple -help [TOPIC]\n\nSI units. The last value given wins. Scenarios to start from: scenarios/\n\n"
-    "A first scene\n"));
-  for (size_t k = 0; k < PETSC_STATIC_ARRAY_LENGTH(first_options); k++) {
-    const char *const *o = first_options[k];
-
-    for (PetscInt i = 0; i < SbTheOptions.nblock; i++) {
-      const SbOptionBlock *b = &SbTheOptions.block[i];
-      const SbOption *row = NULL;
-
-      if (strcmp(b->klass, o[0]) || strcmp(b->type, o[1])) continue;
-      for (PetscInt r = 0; r < b->n && !row; r++) row = strcmp(b->rows[r].key, o[2]) ? NULL : &b->rows[r];
-      if (row) PetscCall(help_row(viewer, b, row));
-    }
-  }
-  PetscCall(print_topics(viewer));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode SbOptionsHelp(MPI_Comm comm, const char *topic)
 {
   const PetscBool all = (PetscBool)!strcasecmp(topic, "all");
@@ -240,7 +195,28 @@ PetscErrorCode SbOptionsHelp(MPI_Comm comm, const char *topic)
 
   PetscFunctionBeginUser;
   PetscCall(SbViewerOpen(comm, "", &viewer));
-  if (!topic[0] || all) PetscCall(print_usage(viewer));
+  // how to run it, what a first scenario needs, and where the rest is
+  if (!topic[0] || all) {
+    PetscCall(PetscViewerASCIIPrintf(viewer, "supple %s - soft bodies by finite elements on PETSc\n\n%s",
+                                     SB_VERSION, USAGE));
+    PetscCall(PetscViewerASCIIPrintf(
+      viewer,
+      "  supple -help [TOPIC]\n\nSI units. The last value given wins. Scenarios to start from: scenarios/\n\n"
+      "A first scene\n"));
+    for (size_t k = 0; k < PETSC_STATIC_ARRAY_LENGTH(first_options); k++) {
+      const char *const *o = first_options[k];
+
+      for (PetscInt i = 0; i < SbTheOptions.nblock; i++) {
+        const SbOptionBlock *b = &SbTheOptions.block[i];
+        const SbOption *row = NULL;
+
+        if (strcmp(b->klass, o[0]) || strcmp(b->type, o[1])) continue;
+        for (PetscInt r = 0; r < b->n && !row; r++) row = strcmp(b->rows[r].key, o[2]) ? NULL : &b->rows[r];
+        if (row) PetscCall(help_row(viewer, b, row));
+      }
+    }
+    PetscCall(print_topics(viewer));
+  }
   if (all) PetscCall(print_manual(viewer, "", 0, PETSC_FALSE, &n));
   /* the best kind of answer that there is */
   for (int least = 3; topic[0] && !n && least > 0; least--)

@@ -35,18 +35,6 @@ static PetscInt count_pieces(const char *text, char separator)
   return n;
 }
 
-/* What stands between the formulas of a text: semicolons, or the commas outside parentheses, as in other vectors; those become semicolons. */
-static void commas_to_semicolons(char text[])
-{
-  int depth = 0;
-
-  if (strchr(text, ';')) return;
-  for (char *c = text; *c; c++) {
-    depth += (*c == '(') - (*c == ')');
-    if (*c == ',' && !depth) *c = ';';
-  }
-}
-
 /* Takes the next piece off *text. */
 static PetscBool next_piece(const char **text, char separator, size_t size, char piece[])
 {
@@ -290,7 +278,15 @@ PetscErrorCode SbOptionFormulas(const SbScope *scope, const char *key, SbFormula
     PetscCall(SbLiveCreate(r->name, formulas));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
-  if (count > 1) commas_to_semicolons(r->text);
+  // between formulas stand semicolons or, as in other vectors, commas outside parentheses; those become semicolons
+  if (count > 1 && !strchr(r->text, ';')) {
+    int depth = 0;
+
+    for (char *c = r->text; *c; c++) {
+      depth += (*c == '(') - (*c == ')');
+      if (*c == ',' && !depth) *c = ';';
+    }
+  }
   n = count_pieces(r->text, ';');
   PetscCheck(n == count, PETSC_COMM_SELF, PETSC_ERR_USER,
              "%s %s has %" PetscInt_FMT " formula%s, needs %" PetscInt_FMT "%s: %s", r->name, r->text, n,

@@ -14,28 +14,6 @@
 
 /* ------------------------------------------------------------------ unused vertices */
 
-/* Renumbers the vertices of items; drops items that use a vertex which is gone. */
-static PetscErrorCode renumber_items(SbItems *item, int dim, const PetscInt map[], PetscInt *ndropped)
-{
-  PetscInt kept = 0;
-
-  PetscFunctionBeginUser;
-  for (PetscInt i = 0; i < item->n; i++) {
-    const PetscInt *from = item->vert + (dim + 1) * i;
-    PetscInt *to = item->vert + (dim + 1) * kept;
-    PetscBool gone = PETSC_FALSE;
-
-    for (int k = 0; k <= dim; k++) gone = (PetscBool)(gone || map[from[k]] < 0);
-    if (gone) continue;
-    for (int k = 0; k <= dim; k++) to[k] = map[from[k]];
-    item->tags[kept] = item->tags[i];
-    item->number[kept++] = item->number[i];
-  }
-  *ndropped = item->n - kept;
-  item->n = kept;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode SbImportDropUnused(SbImport *im)
 {
   PetscInt *map, nused = 0, ndropped;
@@ -52,7 +30,22 @@ PetscErrorCode SbImportDropUnused(SbImport *im)
       im->vert_number[map[v]] = im->vert_number[v];
     }
     for (int d = 0; d < 4; d++) {
-      PetscCall(renumber_items(&im->item[d], d, map, &ndropped));
+      PetscInt kept = 0;
+
+      // items have the new numbers; those that use a vertex which is gone are dropped
+      for (PetscInt i = 0; i < im->item[d].n; i++) {
+        const PetscInt *from = im->item[d].vert + (d + 1) * i;
+        PetscInt *to = im->item[d].vert + (d + 1) * kept;
+        PetscBool gone = PETSC_FALSE;
+
+        for (int k = 0; k <= d; k++) gone = (PetscBool)(gone || map[from[k]] < 0);
+        if (gone) continue;
+        for (int k = 0; k <= d; k++) to[k] = map[from[k]];
+        im->item[d].tags[kept] = im->item[d].tags[i];
+        im->item[d].number[kept++] = im->item[d].number[i];
+      }
+      ndropped = im->item[d].n - kept;
+      im->item[d].n = kept;
       if (d == 2) im->nlost += ndropped;
     }
     im->nvert = nused;
@@ -195,13 +188,20 @@ static int compare_edges(const void *a, const void *b)
   return (p > q) - (p < q);
 }
 
-/* On a closed surface two facets meet at every edge. */
-static PetscErrorCode count_pinched(SbImport *im, const SbFaces *faces)
+PetscErrorCode SbImportCheck(SbImport *im, SbFaces *faces)
 {
+  PetscInt slots[2], n = 0;
   uint64_t *edge;
-  PetscInt n = 0;
 
   PetscFunctionBeginUser;
+  PetscCall(SbImportDropUnused(im));
+  PetscCall(SbImportOrient(im, SbImportLargest(im)));
+  PetscCall(SbFacesCreate(im->nvert, im->item[3].n, im->item[3].vert, faces));
+  PetscCall(SbImportCheckFaces(im, faces));
+  // triangles of groups that are no face of a tet
+  for (PetscInt t = 0; t < im->item[2].n; t++)
+    im->nlost += !SbFacesFind(faces, im->item[2].vert + 3 * t, slots);
+  // on a closed surface two facets meet at every edge
   PetscCall(PetscMalloc1(3 * faces->nboundary, &edge));
   for (PetscInt s = 0; s < 4 * faces->ncell; s++) {
     if (faces->neighbour[s] >= 0) continue;
@@ -219,21 +219,5 @@ static PetscErrorCode count_pinched(SbImport *im, const SbFaces *faces)
     im->npinched += m > 2;
   }
   PetscCall(PetscFree(edge));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode SbImportCheck(SbImport *im, SbFaces *faces)
-{
-  PetscInt slots[2];
-
-  PetscFunctionBeginUser;
-  PetscCall(SbImportDropUnused(im));
-  PetscCall(SbImportOrient(im, SbImportLargest(im)));
-  PetscCall(SbFacesCreate(im->nvert, im->item[3].n, im->item[3].vert, faces));
-  PetscCall(SbImportCheckFaces(im, faces));
-  // triangles of groups that are no face of a tet
-  for (PetscInt t = 0; t < im->item[2].n; t++)
-    im->nlost += !SbFacesFind(faces, im->item[2].vert + 3 * t, slots);
-  PetscCall(count_pinched(im, faces));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

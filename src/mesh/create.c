@@ -24,28 +24,6 @@ PetscErrorCode SbMeshRegister(void)
 
 /* ------------------------------------------------------------------ the mesh */
 
-/* Repairs and oddities always, the rest on request. */
-static PetscErrorCode report(MPI_Comm comm, PetscInt nbody, const SbBody body[], PetscBool full)
-{
-  PetscFunctionBeginUser;
-  for (PetscInt b = 0; b < nbody; b++) {
-    const SbBody *p = &body[b];
-
-    if (full)
-      PetscCall(PetscPrintf(comm,
-                            "body '%s': %" PetscInt_FMT " tets, %" PetscInt_FMT " vertices, %" PetscInt_FMT
-                            " boundary facets, volume %.6g m^3, from (%.4g, %.4g, %.4g) to (%.4g, %.4g, "
-                            "%.4g) m, smallest dihedral angle %.3g degrees, largest radius ratio %.3g%s%s\n",
-                            p->name, p->ncell, p->nvert, p->nfacet, (double)p->volume, (double)p->bbox[0],
-                            (double)p->bbox[1], (double)p->bbox[2], (double)p->bbox[3], (double)p->bbox[4],
-                            (double)p->bbox[5], (double)p->min_dihedral, (double)p->max_radius_ratio,
-                            p->note[0] ? "; " : "", p->note));
-    else if (p->note[0] && !p->in_memory)
-      PetscCall(PetscPrintf(comm, "body '%s': %s: %s\n", p->name, p->mesh, p->note));
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode SbMeshCreate(MPI_Comm comm, PetscInt nbody, SbBody body[], PetscInt nset, SbSet set[],
                             SbMesh *mesh)
 {
@@ -66,7 +44,22 @@ PetscErrorCode SbMeshCreate(MPI_Comm comm, PetscInt nbody, SbBody body[], PetscI
   PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_MESH_READ], 0, 0, 0, 0));
   PetscCall(SbMergedMeshCreate(comm, (SbReading)reading, nbody, body, nset, set, &merged));
   PetscCall(PetscLogEventEnd(SbEvents[SB_EVENT_MESH_READ], 0, 0, 0, 0));
-  PetscCall(report(comm, nbody, body, full));
+  // repairs and oddities always, the rest on request
+  for (PetscInt b = 0; b < nbody; b++) {
+    const SbBody *p = &body[b];
+
+    if (full)
+      PetscCall(PetscPrintf(comm,
+                            "body '%s': %" PetscInt_FMT " tets, %" PetscInt_FMT " vertices, %" PetscInt_FMT
+                            " boundary facets, volume %.6g m^3, from (%.4g, %.4g, %.4g) to (%.4g, %.4g, "
+                            "%.4g) m, smallest dihedral angle %.3g degrees, largest radius ratio %.3g%s%s\n",
+                            p->name, p->ncell, p->nvert, p->nfacet, (double)p->volume, (double)p->bbox[0],
+                            (double)p->bbox[1], (double)p->bbox[2], (double)p->bbox[3], (double)p->bbox[4],
+                            (double)p->bbox[5], (double)p->min_dihedral, (double)p->max_radius_ratio,
+                            p->note[0] ? "; " : "", p->note));
+    else if (p->note[0] && !p->in_memory)
+      PetscCall(PetscPrintf(comm, "body '%s': %s: %s\n", p->name, p->mesh, p->note));
+  }
   PetscCall(PetscNew(&m));
   m->comm = comm;
   m->nbody = nbody;

@@ -379,31 +379,6 @@ static PetscErrorCode append_ghosts(const Cells *g, SbLocalMesh *local)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode add_ghosts(MPI_Comm comm, PetscInt Nvert, PetscBool all, SbLocalMesh *local)
-{
-  PetscMPIInt rank, size, *dest;
-  PetscInt n = 0;
-  Border border;
-  Cells own, ghost;
-
-  PetscFunctionBeginUser;
-  PetscCallMPI(MPI_Comm_rank(comm, &rank));
-  PetscCallMPI(MPI_Comm_size(comm, &size));
-  PetscCall(border_create(comm, Nvert, local, &border));
-  PetscCall(choose_owners(local, &border, rank, local->owner));
-  PetscCall(list_copies(local, &border, all, rank, size, &n, &local->copied, &dest));
-  PetscCall(PetscFree(border.vert));
-  PetscCall(PetscFree(border.pair));
-  PetscCall(SbRouteCreate(comm, n, dest, &local->ghost));
-  own =
-    (Cells){PETSC_TRUE, local->ncell, local->nvert, local->cell, local->data, local->vertex, local->owner};
-  PetscCall(send_cells(&own, &local->ghost, local->copied, dest, &ghost));
-  PetscCall(PetscFree(dest));
-  PetscCall(append_ghosts(&ghost, local));
-  PetscCall(cells_destroy(&ghost));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* ------------------------------------------------------------------ all of it */
 
 PetscErrorCode SbDistribute(MPI_Comm comm, SbPartitioner type, PetscBool all, SbMergedMesh *w,
@@ -445,6 +420,26 @@ PetscErrorCode SbDistribute(MPI_Comm comm, SbPartitioner type, PetscBool all, Sb
   PetscCall(SbMergedMeshDestroy(w));
   if (size > 1) PetscCall(keep_owned(&owned, local));
   PetscCall(PetscCalloc1(local->nvert, &local->owner));
-  if (size > 1) PetscCall(add_ghosts(comm, Nvert, all, local));
+  // ghosts: who owns the vertices at the borders, which cells are sent to whom
+  if (size > 1) {
+    PetscMPIInt rank, *dest;
+    PetscInt n = 0;
+    Border border;
+    Cells own, ghost;
+
+    PetscCallMPI(MPI_Comm_rank(comm, &rank));
+    PetscCall(border_create(comm, Nvert, local, &border));
+    PetscCall(choose_owners(local, &border, rank, local->owner));
+    PetscCall(list_copies(local, &border, all, rank, size, &n, &local->copied, &dest));
+    PetscCall(PetscFree(border.vert));
+    PetscCall(PetscFree(border.pair));
+    PetscCall(SbRouteCreate(comm, n, dest, &local->ghost));
+    own =
+      (Cells){PETSC_TRUE, local->ncell, local->nvert, local->cell, local->data, local->vertex, local->owner};
+    PetscCall(send_cells(&own, &local->ghost, local->copied, dest, &ghost));
+    PetscCall(PetscFree(dest));
+    PetscCall(append_ghosts(&ghost, local));
+    PetscCall(cells_destroy(&ghost));
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -53,26 +53,6 @@ PetscErrorCode SbMeshFileGroup(const SbImport *im, PetscInt i, SbMeshGroup *grou
 
 /* ------------------------------------------------------------------ shape */
 
-static void count_shapes(const SbImport *im, SbMeshFacts *facts)
-{
-  PetscReal V, cosine[6], ratio, min_cosine = 1;
-
-  for (PetscInt c = 0; c < im->item[3].n; c++) {
-    int bin = SB_RATIO_BINS - 1;
-
-    SbTetShape(im->x, im->item[3].vert + 4 * c, &V, cosine, &ratio);
-    for (int e = 0; e < 6; e++) {
-      const PetscReal degrees = acos(PetscMax(-1, PetscMin(1, cosine[e]))) * 180 / PETSC_PI;
-
-      facts->angle[PetscMin((int)(degrees * SB_ANGLE_BINS / 180), SB_ANGLE_BINS - 1)]++;
-      min_cosine = PetscMin(min_cosine, cosine[e]);
-    }
-    while (bin && ratio < SbRatioBounds[bin]) bin--;
-    facts->ratio[bin]++;
-  }
-  facts->max_dihedral = acos(PetscMax(-1, min_cosine)) * 180 / PETSC_PI;
-}
-
 static PetscErrorCode measure_edges(const SbImport *im, SbMeshFacts *facts)
 {
   SbImportEdges edges;
@@ -119,6 +99,7 @@ PetscErrorCode SbMeshFileMeasure(SbImport *im, SbMeshFacts *facts)
 {
   SbFaces faces;
   PetscErrorCode ierr;
+  PetscReal V, cosine[6], ratio, min_cosine = 1;
 
   PetscFunctionBeginUser;
   PetscCall(PetscMemzero(facts, sizeof(*facts)));
@@ -129,6 +110,20 @@ PetscErrorCode SbMeshFileMeasure(SbImport *im, SbMeshFacts *facts)
   PetscCall(SbFacesDestroy(&faces));
   PetscCall(ierr);
   PetscCall(measure_edges(im, facts));
-  count_shapes(im, facts);
+  // dihedral angles and radius ratios of the tets
+  for (PetscInt c = 0; c < im->item[3].n; c++) {
+    int bin = SB_RATIO_BINS - 1;
+
+    SbTetShape(im->x, im->item[3].vert + 4 * c, &V, cosine, &ratio);
+    for (int e = 0; e < 6; e++) {
+      const PetscReal degrees = acos(PetscMax(-1, PetscMin(1, cosine[e]))) * 180 / PETSC_PI;
+
+      facts->angle[PetscMin((int)(degrees * SB_ANGLE_BINS / 180), SB_ANGLE_BINS - 1)]++;
+      min_cosine = PetscMin(min_cosine, cosine[e]);
+    }
+    while (bin && ratio < SbRatioBounds[bin]) bin--;
+    facts->ratio[bin]++;
+  }
+  facts->max_dihedral = acos(PetscMax(-1, min_cosine)) * 180 / PETSC_PI;
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -55,30 +55,6 @@ static void next_body(const SbBody *body, const SbImport *im, PetscInt ncell, co
   at->remote += part->nremote;
 }
 
-/* What travels with the points of body b. */
-static PetscErrorCode append_points(const SbImport *im, const SbPart *part, PetscInt b, const Begin *at,
-                                    SbMergedMesh *w)
-{
-  PetscFunctionBeginUser;
-  for (PetscInt c = 0; c < im->item[3].n; c++) {
-    SbCellData *p = &w->data[at->cell + c];
-
-    p->orig = at->orig_cell + part->first + c;
-    p->body = b;
-    p->set = part->masks.cell[c];
-    for (int f = 0; f < 4; f++) p->face[f] = part->masks.face[4 * c + f];
-  }
-  for (PetscInt v = 0; v < im->nvert; v++) {
-    SbVertexData *p = &w->vertex[at->vert + v];
-
-    p->orig = at->orig_vert + (part->orig ? part->orig[v] : v);
-    p->body = b;
-    p->set = part->masks.vert[v];
-    for (int i = 0; i < 3; i++) p->x[i] = im->x[3 * v + i];
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* All bodies one after the other. */
 static PetscErrorCode merge(PetscInt nbody, const SbBody body[], SbImport im[], SbPart part[],
                             SbMergedMesh *w)
@@ -112,45 +88,25 @@ static PetscErrorCode merge(PetscInt nbody, const SbBody body[], SbImport im[], 
   PetscCall(PetscMalloc1(w->nvert, &w->vertex));
   at = (Begin){0};
   for (PetscInt b = 0; b < nbody; b++) {
-    PetscCall(append_points(&im[b], &part[b], b, &at, w));
+    // what travels with the points of body b
+    for (PetscInt c = 0; c < im[b].item[3].n; c++) {
+      SbCellData *p = &w->data[at.cell + c];
+
+      p->orig = at.orig_cell + part[b].first + c;
+      p->body = b;
+      p->set = part[b].masks.cell[c];
+      for (int f = 0; f < 4; f++) p->face[f] = part[b].masks.face[4 * c + f];
+    }
+    for (PetscInt v = 0; v < im[b].nvert; v++) {
+      SbVertexData *p = &w->vertex[at.vert + v];
+
+      p->orig = at.orig_vert + (part[b].orig ? part[b].orig[v] : v);
+      p->body = b;
+      p->set = part[b].masks.vert[v];
+      for (int i = 0; i < 3; i++) p->x[i] = im[b].x[3 * v + i];
+    }
     next_body(&body[b], &im[b], im[b].item[3].n, &part[b], &at);
   }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Which bodies are read in slabs, alike on all ranks. */
-static PetscErrorCode find_slabs(MPI_Comm comm, SbReading reading, PetscInt nbody, const SbBody body[],
-                                 PetscBool slabs[])
-{
-  PetscMPIInt rank, size;
-  PetscInt ncell;
-
-  PetscFunctionBeginUser;
-  PetscCallMPI(MPI_Comm_rank(comm, &rank));
-  PetscCallMPI(MPI_Comm_size(comm, &size));
-  for (PetscInt b = 0; b < nbody; b++) {
-    slabs[b] = PETSC_FALSE;
-    if (size == 1 || rank || reading == SB_READING_RANK0) continue;
-    PetscCall(SbImportSlabs(&body[b], &ncell));
-    slabs[b] = (PetscBool)(ncell > (reading == SB_READING_SLABS ? 0 : FEW));
-  }
-  PetscCallMPI(MPI_Bcast(slabs, (PetscMPIInt)nbody, SB_MPI_BOOL, 0, comm));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Bodies and sets as rank 0 has them, to all ranks; a mesh in memory is each rank's own. */
-static PetscErrorCode broadcast_bodies(MPI_Comm comm, PetscInt nbody, SbBody body[], PetscInt nset,
-                                       SbSet set[])
-{
-  SbMemoryMesh **in_memory;
-
-  PetscFunctionBeginUser;
-  PetscCall(PetscMalloc1(nbody, &in_memory));
-  for (PetscInt b = 0; b < nbody; b++) in_memory[b] = body[b].in_memory;
-  PetscCallMPI(MPI_Bcast(body, (int)((size_t)nbody * sizeof(*body)), MPI_BYTE, 0, comm));
-  for (PetscInt b = 0; b < nbody; b++) body[b].in_memory = in_memory[b];
-  PetscCall(PetscFree(in_memory));
-  PetscCallMPI(MPI_Bcast(set, (int)((size_t)nset * sizeof(*set)), MPI_BYTE, 0, comm));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -178,6 +134,7 @@ static PetscErrorCode build(MPI_Comm comm, const PetscBool slabs[], PetscInt nbo
 {
   SbCaughtError caught = {0, ""};
   PetscMPIInt rank;
+  SbMemoryMesh **in_memory;
 
   PetscFunctionBeginUser;
   PetscCallMPI(MPI_Comm_rank(comm, &rank));
@@ -195,7 +152,13 @@ static PetscErrorCode build(MPI_Comm comm, const PetscBool slabs[], PetscInt nbo
   }
   if (!rank) SB_CATCH(&caught, check_all(nbody, body, im, nset, set));
   PetscCall(SbCaughtRaise(comm, &caught));
-  PetscCall(broadcast_bodies(comm, nbody, body, nset, set));
+  // bodies and sets as rank 0 has them, to all ranks; a mesh in memory is each rank's own
+  PetscCall(PetscMalloc1(nbody, &in_memory));
+  for (PetscInt b = 0; b < nbody; b++) in_memory[b] = body[b].in_memory;
+  PetscCallMPI(MPI_Bcast(body, (int)((size_t)nbody * sizeof(*body)), MPI_BYTE, 0, comm));
+  for (PetscInt b = 0; b < nbody; b++) body[b].in_memory = in_memory[b];
+  PetscCall(PetscFree(in_memory));
+  PetscCallMPI(MPI_Bcast(set, (int)((size_t)nset * sizeof(*set)), MPI_BYTE, 0, comm));
   for (PetscInt b = 0; b < nbody; b++) {
     w->Nvert += body[b].nvert;
     w->Ncell += body[b].ncell;
@@ -211,11 +174,22 @@ PetscErrorCode SbMergedMeshCreate(MPI_Comm comm, SbReading reading, PetscInt nbo
   SbPart *part;
   PetscBool *slabs;
   PetscErrorCode ierr;
+  PetscMPIInt rank, size;
+  PetscInt ncell;
 
   PetscFunctionBeginUser;
   PetscCall(PetscMemzero(w, sizeof(*w)));
   PetscCall(PetscCalloc3(nbody, &im, nbody, &part, nbody, &slabs));
-  PetscCall(find_slabs(comm, reading, nbody, body, slabs));
+  // which bodies are read in slabs, alike on all ranks
+  PetscCallMPI(MPI_Comm_rank(comm, &rank));
+  PetscCallMPI(MPI_Comm_size(comm, &size));
+  for (PetscInt b = 0; b < nbody; b++) {
+    slabs[b] = PETSC_FALSE;
+    if (size == 1 || rank || reading == SB_READING_RANK0) continue;
+    PetscCall(SbImportSlabs(&body[b], &ncell));
+    slabs[b] = (PetscBool)(ncell > (reading == SB_READING_SLABS ? 0 : FEW));
+  }
+  PetscCallMPI(MPI_Bcast(slabs, (PetscMPIInt)nbody, SB_MPI_BOOL, 0, comm));
   ierr = build(comm, slabs, nbody, body, nset, set, &shared, im, part, w);
   PetscCall(SbImportDestroy(&shared));
   for (PetscInt b = 0; b < nbody; b++) {

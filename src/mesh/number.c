@@ -89,27 +89,6 @@ static PetscErrorCode number_ghosts(Work *w, SbMesh mesh)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode fill_vertices(const Work *w, SbMesh mesh)
-{
-  PetscFunctionBeginUser;
-  PetscCall(PetscMalloc1(mesh->nvert, &mesh->gvert));
-  PetscCall(PetscMalloc1(mesh->nvert, &mesh->vert_orig));
-  PetscCall(PetscMalloc1(mesh->nvert, &mesh->vert_body));
-  PetscCall(PetscMalloc1(mesh->nvert, &mesh->vert_set));
-  PetscCall(PetscMalloc1(3 * (size_t)mesh->nvert, &mesh->x));
-  for (PetscInt v = 0; v < mesh->nvert; v++) {
-    const SbVertexData *p = &w->p->vertex[v];
-    const PetscInt l = w->local[v];
-
-    mesh->gvert[l] = w->global[v];
-    mesh->vert_orig[l] = p->orig;
-    mesh->vert_body[l] = p->body;
-    mesh->vert_set[l] = p->set;
-    for (int i = 0; i < 3; i++) mesh->x[3 * l + i] = p->x[i];
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* ------------------------------------------------------------------ cells */
 
 /* The inclusion of its body that a cell belongs to: 0 for the bulk, else one more than its position in the list. */
@@ -224,7 +203,22 @@ PetscErrorCode SbMeshNumber(SbMesh mesh, SbLocalMesh *local)
   PetscCall(PetscMalloc2(local->nvert, &w.local, local->nvert, &w.global));
   PetscCall(number_owned(&w, mesh));
   PetscCall(number_ghosts(&w, mesh));
-  PetscCall(fill_vertices(&w, mesh));
+  // the arrays of the vertices, in their new order
+  PetscCall(PetscMalloc1(mesh->nvert, &mesh->gvert));
+  PetscCall(PetscMalloc1(mesh->nvert, &mesh->vert_orig));
+  PetscCall(PetscMalloc1(mesh->nvert, &mesh->vert_body));
+  PetscCall(PetscMalloc1(mesh->nvert, &mesh->vert_set));
+  PetscCall(PetscMalloc1(3 * (size_t)mesh->nvert, &mesh->x));
+  for (PetscInt v = 0; v < mesh->nvert; v++) {
+    const SbVertexData *p = &w.p->vertex[v];
+    const PetscInt l = w.local[v];
+
+    mesh->gvert[l] = w.global[v];
+    mesh->vert_orig[l] = p->orig;
+    mesh->vert_body[l] = p->body;
+    mesh->vert_set[l] = p->set;
+    for (int i = 0; i < 3; i++) mesh->x[3 * l + i] = p->x[i];
+  }
   PetscCall(PetscFree(local->vertex));
   PetscCall(fill_cells(&w, mesh));
   PetscCall(PetscFree2(w.local, w.global));

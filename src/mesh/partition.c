@@ -105,30 +105,6 @@ static PetscErrorCode split(Tree *t, PetscInt at, PetscInt n, PetscReal (*x)[3],
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A tree with k leaves. Collective. */
-static PetscErrorCode tree_create(MPI_Comm comm, const SbMergedMesh *w, PetscInt k, Tree *t)
-{
-  const PetscInt64 wanted = PetscMax((PetscInt64)SAMPLE * k, SAMPLES);
-  const uint64_t bound = wanted >= w->Ncell ? UINT64_MAX : UINT64_MAX / (uint64_t)w->Ncell * (uint64_t)wanted;
-  PetscReal(*mine)[3], (*all)[3];
-  PetscInt n = 0, total;
-
-  PetscFunctionBeginUser;
-  for (PetscInt c = 0; c < w->ncell; c++) n += mix((uint64_t)w->data[c].orig) <= bound;
-  PetscCall(PetscMalloc1(n, &mine));
-  n = 0;
-  for (PetscInt c = 0; c < w->ncell; c++)
-    if (mix((uint64_t)w->data[c].orig) <= bound) centre(w, c, mine[n++]);
-  PetscCall(SbGatherAll(comm, MPIU_REAL, 3 * n, mine, &total, &all, NULL));
-  PetscCall(PetscFree(mine));
-  PetscCall(PetscMalloc1(2 * (size_t)k, &t->node));
-  t->nnode = 1;
-  t->nleaf = 0;
-  PetscCall(split(t, 0, total / 3, all, k));
-  PetscCall(PetscFree(all));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* ------------------------------------------------------------------ METIS */
 
 /* The part of each cell, of a graph on one rank. */
@@ -261,7 +237,27 @@ PetscErrorCode SbPartition(MPI_Comm comm, SbPartitioner type, const SbMergedMesh
   if (type == SB_PARTITION_METIS || (type == SB_PARTITION_AUTO && w->Ncell <= MOST)) {
     PetscCall(cut_graph(comm, w, sf, to));
   } else {
-    PetscCall(tree_create(comm, w, size, &tree));
+    PetscInt64 wanted;
+    uint64_t bound;
+    PetscReal(*mine)[3];
+    PetscReal(*all)[3];
+    PetscInt n = 0, total;
+
+    // a tree with a leaf for each rank, cut through a sample of the tets
+    wanted = PetscMax((PetscInt64)SAMPLE * size, SAMPLES);
+    bound = wanted >= w->Ncell ? UINT64_MAX : UINT64_MAX / (uint64_t)w->Ncell * (uint64_t)wanted;
+    for (PetscInt c = 0; c < w->ncell; c++) n += mix((uint64_t)w->data[c].orig) <= bound;
+    PetscCall(PetscMalloc1(n, &mine));
+    n = 0;
+    for (PetscInt c = 0; c < w->ncell; c++)
+      if (mix((uint64_t)w->data[c].orig) <= bound) centre(w, c, mine[n++]);
+    PetscCall(SbGatherAll(comm, MPIU_REAL, 3 * n, mine, &total, &all, NULL));
+    PetscCall(PetscFree(mine));
+    PetscCall(PetscMalloc1(2 * (size_t)size, &tree.node));
+    tree.nnode = 1;
+    tree.nleaf = 0;
+    PetscCall(split(&tree, 0, total / 3, all, size));
+    PetscCall(PetscFree(all));
     // the leaf that each cell lies in
     for (PetscInt c = 0; c < w->ncell; c++) {
       const Node *node = tree.node;

@@ -77,27 +77,6 @@ static void split(const SbImport *im, int dim, const PetscInt v[], const SbImpor
   }
 }
 
-static PetscErrorCode split_items(SbImport *im, int dim, const SbImportEdges *edges)
-{
-  static const char *const what[4] = {"points", "lines", "triangles", "tets"};
-  SbItems parent = im->item[dim], *item = &im->item[dim];
-  const PetscInt nchild = 1 << dim;
-
-  PetscFunctionBeginUser;
-  PetscCall(PetscMemzero(item, sizeof(*item)));
-  PetscCall(SbImportSetItems(im, dim, nchild * parent.n));
-  for (PetscInt i = 0; i < parent.n; i++) {
-    split(im, dim, parent.vert + (size_t)(dim + 1) * (size_t)i, edges,
-          item->vert + (size_t)(dim + 1) * (size_t)nchild * (size_t)i);
-    for (PetscInt k = 0; k < nchild; k++) item->tags[nchild * i + k] = parent.tags[i];
-    if (im->progress && !(i & 0xffff))
-      PetscCall(
-        im->progress(what[dim], (PetscInt64)nchild * i, (PetscInt64)nchild * parent.n, im->progress_ctx));
-  }
-  PetscCall(SbItemsFree(&parent));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode SbMeshFileRefine(SbImport *im)
 {
   SbImportEdges edges;
@@ -120,7 +99,24 @@ PetscErrorCode SbMeshFileRefine(SbImport *im)
   }
   for (PetscInt v = 0; v < n; v++) im->vert_number[v] = v + 1;
   im->nvert = n;
-  for (int d = 1; d < 4; d++) PetscCall(split_items(im, d, &edges));
+  // children of the items, with the tags of their parents
+  for (int d = 1; d < 4; d++) {
+    static const char *const what[4] = {"points", "lines", "triangles", "tets"};
+    SbItems parent = im->item[d], *item = &im->item[d];
+    const PetscInt nchild = 1 << d;
+
+    PetscCall(PetscMemzero(item, sizeof(*item)));
+    PetscCall(SbImportSetItems(im, d, nchild * parent.n));
+    for (PetscInt i = 0; i < parent.n; i++) {
+      split(im, d, parent.vert + (size_t)(d + 1) * (size_t)i, &edges,
+            item->vert + (size_t)(d + 1) * (size_t)nchild * (size_t)i);
+      for (PetscInt k = 0; k < nchild; k++) item->tags[nchild * i + k] = parent.tags[i];
+      if (im->progress && !(i & 0xffff))
+        PetscCall(
+          im->progress(what[d], (PetscInt64)nchild * i, (PetscInt64)nchild * parent.n, im->progress_ctx));
+    }
+    PetscCall(SbItemsFree(&parent));
+  }
   PetscCall(SbImportEdgesDestroy(&edges));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -56,30 +56,6 @@ static int parse_numbers(const char *text, int most, PetscReal p[])
   }
 }
 
-/* Norms the direction of planes (with their distance), refuses empty shapes. */
-static PetscErrorCode check_shape(const char *option, const char *text, SbSet *set)
-{
-  PetscReal *p = set->p;
-
-  PetscFunctionBeginUser;
-  if (set->shape == SB_SET_BOX) {
-    PetscCheck(p[0] <= p[3] && p[1] <= p[4] && p[2] <= p[5], PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
-               "%s '%s': the first corner must lie below the second in x, y and z", option, text);
-  } else if (set->shape == SB_SET_SPHERE) {
-    PetscCheck(p[3] > 0, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT, "%s '%s': the radius must be above 0 m",
-               option, text);
-  } else if (set->shape == SB_SET_PLANE || set->shape == SB_SET_HALFSPACE) {
-    const PetscReal length = PetscSqrtReal(p[0] * p[0] + p[1] * p[1] + p[2] * p[2]);
-
-    PetscCheck(length > 0, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
-               "%s '%s': the normal must have a length above 0", option, text);
-    PetscCheck(set->shape == SB_SET_HALFSPACE || p[4] >= 0, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
-               "%s '%s': the tolerance must not be below 0 m", option, text);
-    for (int i = 0; i < 4; i++) p[i] /= length;
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode SbSetParse(const char *option, const char *text, SbSet *set)
 {
   const char *colon = strchr(text, ':');
@@ -102,9 +78,27 @@ PetscErrorCode SbSetParse(const char *option, const char *text, SbSet *set)
                PETSC_ERR_USER_INPUT, "%s '%s': write %s", option, text, shapes[i].form);
     PetscCall(PetscStrncpy(set->group, colon + 1, sizeof(set->group)));
   } else {
+    PetscReal *p;
+
     PetscCheck(colon && parse_numbers(colon + 1, shapes[i].most, set->p) >= shapes[i].least, PETSC_COMM_SELF,
                PETSC_ERR_USER_INPUT, "%s '%s': write %s", option, text, shapes[i].form);
-    PetscCall(check_shape(option, text, set));
+    // norms the direction of planes (with their distance), refuses empty shapes
+    p = set->p;
+    if (set->shape == SB_SET_BOX) {
+      PetscCheck(p[0] <= p[3] && p[1] <= p[4] && p[2] <= p[5], PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
+                 "%s '%s': the first corner must lie below the second in x, y and z", option, text);
+    } else if (set->shape == SB_SET_SPHERE) {
+      PetscCheck(p[3] > 0, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT, "%s '%s': the radius must be above 0 m",
+                 option, text);
+    } else if (set->shape == SB_SET_PLANE || set->shape == SB_SET_HALFSPACE) {
+      const PetscReal length = PetscSqrtReal(p[0] * p[0] + p[1] * p[1] + p[2] * p[2]);
+
+      PetscCheck(length > 0, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
+                 "%s '%s': the normal must have a length above 0", option, text);
+      PetscCheck(set->shape == SB_SET_HALFSPACE || p[4] >= 0, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
+                 "%s '%s': the tolerance must not be below 0 m", option, text);
+      for (int k = 0; k < 4; k++) p[k] /= length;
+    }
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -271,37 +265,13 @@ void SbSetsCount(PetscInt nvert, PetscInt ncell, const SbMasks *m, PetscInt nset
 
 /* ------------------------------------------------------------------ sets that hold nothing */
 
-/* "liver: wall, ligament; stone: none" */
-static PetscErrorCode list_groups(PetscInt nbody, const SbBody body[], const SbImport import[], size_t size,
-                                  char text[])
-{
-  PetscFunctionBeginUser;
-  text[0] = 0;
-  for (PetscInt b = 0; b < nbody; b++) {
-    const SbImport *im = &import[b];
-
-    PetscCall(PetscStrlcat(text, b ? "; " : "", size));
-    PetscCall(PetscStrlcat(text, body[b].name, size));
-    PetscCall(PetscStrlcat(text, im->ngroup ? ": " : ": none", size));
-    for (PetscInt g = 0; g < im->ngroup; g++) {
-      PetscBool known = PETSC_FALSE;
-
-      for (PetscInt h = 0; h < g; h++)
-        known = (PetscBool)(known || !strcmp(im->group[h].name, im->group[g].name));
-      if (known) continue;
-      PetscCall(PetscStrlcat(text, g ? ", " : "", size));
-      PetscCall(PetscStrlcat(text, im->group[g].name, size));
-    }
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 static PetscErrorCode empty_group(PetscInt nbody, const SbBody body[], const SbImport import[],
                                   const SbSet *set)
 {
   const char **names, *wanted = strchr(set->group, '.') ? strchr(set->group, '.') + 1 : set->group;
   char groups[1024], near[256];
   PetscInt n = 0, exists = 0;
+  size_t size;
 
   PetscFunctionBeginUser;
   for (PetscInt b = 0; b < nbody; b++) n += import[b].ngroup;
@@ -317,7 +287,25 @@ static PetscErrorCode empty_group(PetscInt nbody, const SbBody body[], const SbI
   }
   PetscCall(SbNearestNames(wanted, n, names, sizeof(near), near));
   PetscCall(PetscFree(names));
-  PetscCall(list_groups(nbody, body, import, sizeof(groups), groups));
+  // "liver: wall, ligament; stone: none"
+  size = sizeof(groups);
+  groups[0] = 0;
+  for (PetscInt b = 0; b < nbody; b++) {
+    const SbImport *im = &import[b];
+
+    PetscCall(PetscStrlcat(groups, b ? "; " : "", size));
+    PetscCall(PetscStrlcat(groups, body[b].name, size));
+    PetscCall(PetscStrlcat(groups, im->ngroup ? ": " : ": none", size));
+    for (PetscInt g = 0; g < im->ngroup; g++) {
+      PetscBool known = PETSC_FALSE;
+
+      for (PetscInt h = 0; h < g; h++)
+        known = (PetscBool)(known || !strcmp(im->group[h].name, im->group[g].name));
+      if (known) continue;
+      PetscCall(PetscStrlcat(groups, g ? ", " : "", size));
+      PetscCall(PetscStrlcat(groups, im->group[g].name, size));
+    }
+  }
   PetscCheck(!exists, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
              "set '%s': the physical group '%s' holds no vertex, facet or tet of the mesh; the mesh and its "
              "groups do not belong together",
@@ -328,36 +316,14 @@ static PetscErrorCode empty_group(PetscInt nbody, const SbBody body[], const SbI
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A shape beside the bodies. */
-static PetscErrorCode empty_shape(PetscInt nbody, const SbBody body[], const SbSet *set)
-{
-  const char *name = NULL;
-  PetscReal box[6];
-
-  PetscFunctionBeginUser;
-  for (int i = 0; i < NSHAPE; i++) {
-    if (shapes[i].shape == set->shape) name = shapes[i].name;
-  }
-  PetscCall(PetscArraycpy(box, body[0].bbox, 6));
-  for (PetscInt b = 1; b < nbody; b++) {
-    for (int i = 0; i < 3; i++) {
-      box[i] = PetscMin(box[i], body[b].bbox[i]);
-      box[3 + i] = PetscMax(box[3 + i], body[b].bbox[3 + i]);
-    }
-  }
-  SETERRQ(PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
-          "set '%s': no vertex lies in the %s; the placed bodies reach from (%.6g, %.6g, %.6g) to (%.6g, "
-          "%.6g, %.6g) m",
-          set->name, name, (double)box[0], (double)box[1], (double)box[2], (double)box[3], (double)box[4],
-          (double)box[5]);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode SbSetsCheck(PetscInt nbody, const SbBody body[], const SbImport import[], PetscInt nset,
                            const SbSet set[])
 {
   PetscFunctionBeginUser;
   for (PetscInt k = 0; k < nset; k++) {
+    const char *name = NULL;
+    PetscReal box[6];
+
     if (set[k].nvert || set[k].nfacet || set[k].ncell) continue;
     if (set[k].shape == SB_SET_GROUP) PetscCall(empty_group(nbody, body, import, &set[k]));
     if (set[k].shape == SB_SET_BODY) {
@@ -371,7 +337,22 @@ PetscErrorCode SbSetsCheck(PetscInt nbody, const SbBody body[], const SbImport i
       SETERRQ(PETSC_COMM_SELF, PETSC_ERR_USER_INPUT, "set '%s': there is no body '%s'%s%s%s", set[k].name,
               set[k].group, near[0] ? "; did you mean " : "", near, near[0] ? "?" : "");
     }
-    PetscCall(empty_shape(nbody, body, &set[k]));
+    // a shape beside the bodies
+    for (int i = 0; i < NSHAPE; i++) {
+      if (shapes[i].shape == set[k].shape) name = shapes[i].name;
+    }
+    PetscCall(PetscArraycpy(box, body[0].bbox, 6));
+    for (PetscInt b = 1; b < nbody; b++) {
+      for (int i = 0; i < 3; i++) {
+        box[i] = PetscMin(box[i], body[b].bbox[i]);
+        box[3 + i] = PetscMax(box[3 + i], body[b].bbox[3 + i]);
+      }
+    }
+    SETERRQ(PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
+            "set '%s': no vertex lies in the %s; the placed bodies reach from (%.6g, %.6g, %.6g) to (%.6g, "
+            "%.6g, %.6g) m",
+            set[k].name, name, (double)box[0], (double)box[1], (double)box[2], (double)box[3], (double)box[4],
+            (double)box[5]);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }

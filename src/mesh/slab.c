@@ -31,21 +31,6 @@ typedef struct {
   PetscBool *shared; /* [im->nvert] other ranks use it, too */
 } Slab;
 
-static PetscErrorCode slab_destroy(Slab *s)
-{
-  PetscFunctionBeginUser;
-  PetscCall(PetscFree(s->x));
-  PetscCall(PetscFree(s->number));
-  PetscCall(PetscFree(s->mask));
-  if (s->vert.scount) PetscCall(SbRouteDestroy(&s->vert));
-  PetscCall(PetscFree(s->used));
-  PetscCall(PetscFree(s->asked));
-  PetscCall(PetscFree(s->start));
-  PetscCall(PetscFree(s->user));
-  PetscCall(PetscFree(s->shared));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 static inline PetscMPIInt keeper(const Slab *s, PetscInt vert)
 {
   return (PetscMPIInt)(vert / s->rows.block);
@@ -327,34 +312,12 @@ static PetscErrorCode count_pinched(Slab *s)
 
 /* ------------------------------------------------------------------ parts that share no vertex */
 
-/* Rank 0 joins the parts of all ranks along these pairs. */
-static PetscErrorCode join_parts(const Slab *s, PetscInt N, PetscInt npair, const PetscInt pair[],
-                                 PetscInt *npart)
-{
-  PetscInt *parent, *got;
-  PetscMPIInt *dest;
-  SbRoute route;
-
-  PetscFunctionBeginUser;
-  PetscCall(PetscCalloc1(npair, &dest));
-  PetscCall(SbRouteCreate(s->comm, npair, dest, &route));
-  PetscCall(SbRouteSend(&route, 2 * sizeof(PetscInt), pair, &got));
-  PetscCall(PetscFree(dest));
-  *npart = N;
-  PetscCall(PetscMalloc1(s->rank ? 0 : N, &parent));
-  for (PetscInt p = 0; p < N && !s->rank; p++) parent[p] = p;
-  for (PetscInt i = 0; i < route.nrecv; i++) *npart -= SbUnionJoin(parent, got[2 * i], got[2 * i + 1]);
-  PetscCall(PetscFree(parent));
-  PetscCall(PetscFree(got));
-  PetscCall(SbRouteDestroy(&route));
-  PetscCallMPI(MPI_Bcast(npart, 1, MPIU_INT, 0, s->comm));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 static PetscErrorCode count_parts(const Slab *s, PetscInt *npart)
 {
   const SbImport *im = s->im;
-  PetscInt *part, *got, *pair, *user, n, first, total, npair = 0, kept = 0;
+  PetscInt *part, *got, *pair, *user, n, first, total, npair = 0, kept = 0, *parent;
+  PetscMPIInt *dest;
+  SbRoute route;
 
   PetscFunctionBeginUser;
   /* parts of this rank, numbered over all ranks */
@@ -386,7 +349,19 @@ static PetscErrorCode count_parts(const Slab *s, PetscInt *npart)
     PetscCall(PetscArraymove(pair + 2 * kept, pair + 2 * i, 2));
     kept++;
   }
-  PetscCall(join_parts(s, total, kept, pair, npart));
+  // rank 0 joins the parts of all ranks along these pairs
+  PetscCall(PetscCalloc1(kept, &dest));
+  PetscCall(SbRouteCreate(s->comm, kept, dest, &route));
+  PetscCall(SbRouteSend(&route, 2 * sizeof(PetscInt), pair, &got));
+  PetscCall(PetscFree(dest));
+  *npart = total;
+  PetscCall(PetscMalloc1(s->rank ? 0 : total, &parent));
+  for (PetscInt p = 0; p < total && !s->rank; p++) parent[p] = p;
+  for (PetscInt i = 0; i < route.nrecv; i++) *npart -= SbUnionJoin(parent, got[2 * i], got[2 * i + 1]);
+  PetscCall(PetscFree(parent));
+  PetscCall(PetscFree(got));
+  PetscCall(SbRouteDestroy(&route));
+  PetscCallMPI(MPI_Bcast(npart, 1, MPIU_INT, 0, s->comm));
   PetscCall(PetscFree2(user, pair));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -454,37 +429,16 @@ typedef struct {
   PetscInt vert[3], tags;
 } Triangle;
 
-/* The triangles that are faces of this rank's tets become the triangles of its import; found[n]. */
-static PetscErrorCode keep_triangles(Slab *s, PetscInt n, const Triangle triangle[], PetscBool found[])
-{
-  SbImport *im = s->im;
-  PetscInt slots[2];
-
-  PetscFunctionBeginUser;
-  im->item[2].n = 0;
-  for (PetscInt i = 0; i < n; i++) {
-    PetscInt v[3];
-    PetscBool here = PETSC_TRUE;
-
-    for (int k = 0; k < 3; k++) {
-      PetscCall(PetscFindInt(triangle[i].vert[k], im->nvert, s->used, &v[k]));
-      here = (PetscBool)(here && v[k] >= 0);
-    }
-    found[i] = (PetscBool)(here && SbFacesFind(&s->part->faces, v, slots));
-    if (found[i]) PetscCall(SbImportAddItem(im, 2, v, triangle[i].tags, 0));
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* Each triangle goes to all ranks that use its lowest vertex, by way of that vertex's keeper. */
 static PetscErrorCode find_triangles(Slab *s)
 {
   const SbItems *item = &s->im->item[2];
   Triangle *mine, *got, *out, *in;
-  PetscInt n = 0, *from;
+  PetscInt n = 0, *from, slots[2];
   PetscMPIInt *dest;
   PetscBool *found, *answered;
   SbRoute there, on;
+  SbImport *im = s->im;
 
   PetscFunctionBeginUser;
   PetscCall(PetscMalloc2(item->n, &mine, item->n, &dest));
@@ -516,7 +470,19 @@ static PetscErrorCode find_triangles(Slab *s)
   PetscCall(SbRouteCreate(s->comm, n, dest, &on));
   PetscCall(SbRouteSend(&on, sizeof(Triangle), out, &in));
   PetscCall(PetscMalloc1(on.nrecv, &found));
-  PetscCall(keep_triangles(s, on.nrecv, in, found));
+  // the triangles that are faces of this rank's tets become the triangles of its import
+  im->item[2].n = 0;
+  for (PetscInt i = 0; i < on.nrecv; i++) {
+    PetscInt v[3];
+    PetscBool here = PETSC_TRUE;
+
+    for (int k = 0; k < 3; k++) {
+      PetscCall(PetscFindInt(in[i].vert[k], im->nvert, s->used, &v[k]));
+      here = (PetscBool)(here && v[k] >= 0);
+    }
+    found[i] = (PetscBool)(here && SbFacesFind(&s->part->faces, v, slots));
+    if (found[i]) PetscCall(SbImportAddItem(im, 2, v, in[i].tags, 0));
+  }
   PetscCall(SbRouteReply(&on, sizeof(PetscBool), found, answered));
   PetscCall(PetscFree(found));
   /* lost: found by none of them */
@@ -649,7 +615,15 @@ PetscErrorCode SbSlabPrepare(MPI_Comm comm, PetscInt before, PetscInt nbody, SbB
   PetscCallMPI(MPI_Comm_rank(comm, &s.rank));
   PetscCallMPI(MPI_Comm_size(comm, &s.size));
   ierr = prepare(&s, before, nbody, body, b, nset, set);
-  PetscCall(slab_destroy(&s));
+  PetscCall(PetscFree(s.x));
+  PetscCall(PetscFree(s.number));
+  PetscCall(PetscFree(s.mask));
+  if (s.vert.scount) PetscCall(SbRouteDestroy(&s.vert));
+  PetscCall(PetscFree(s.used));
+  PetscCall(PetscFree(s.asked));
+  PetscCall(PetscFree(s.start));
+  PetscCall(PetscFree(s.user));
+  PetscCall(PetscFree(s.shared));
   PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

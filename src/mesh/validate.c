@@ -128,34 +128,27 @@ static PetscErrorCode check_sums(SbMesh m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Ghost vertices carry what their owners have. */
-static PetscErrorCode check_ghosts(SbMesh m)
+PetscErrorCode SbMeshValidate(SbMesh mesh)
 {
   PetscReal *x;
   PetscInt *orig;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscMalloc2(3 * (size_t)m->nvert, &x, m->nvert, &orig));
-  PetscCall(PetscArraycpy(x, m->x, 3 * (size_t)m->nvert_owned));
-  PetscCall(PetscArraycpy(orig, m->vert_orig, m->nvert_owned));
-  PetscCall(SbMeshBroadcastVertices(m, 3, MPIU_REAL, x));
-  PetscCall(SbMeshBroadcastVertices(m, 1, MPIU_INT, orig));
-  for (PetscInt v = 0; v < m->nvert; v++) {
-    CHECK(orig[v] == m->vert_orig[v], "Ghost vertex %" PetscInt_FMT " differs from its owner's", v);
-    for (int i = 0; i < 3; i++)
-      CHECK(x[3 * v + i] == m->x[3 * v + i], "Ghost vertex %" PetscInt_FMT " lies elsewhere than its owner's",
-            v);
-  }
-  PetscCall(PetscFree2(x, orig));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode SbMeshValidate(SbMesh mesh)
-{
-  PetscFunctionBeginUser;
   PetscCall(check_vertices(mesh));
   PetscCall(check_cells(mesh));
   PetscCall(check_sums(mesh));
-  PetscCall(check_ghosts(mesh));
+  // ghost vertices carry what their owners have
+  PetscCall(PetscMalloc2(3 * (size_t)mesh->nvert, &x, mesh->nvert, &orig));
+  PetscCall(PetscArraycpy(x, mesh->x, 3 * (size_t)mesh->nvert_owned));
+  PetscCall(PetscArraycpy(orig, mesh->vert_orig, mesh->nvert_owned));
+  PetscCall(SbMeshBroadcastVertices(mesh, 3, MPIU_REAL, x));
+  PetscCall(SbMeshBroadcastVertices(mesh, 1, MPIU_INT, orig));
+  for (PetscInt v = 0; v < mesh->nvert; v++) {
+    CHECK(orig[v] == mesh->vert_orig[v], "Ghost vertex %" PetscInt_FMT " differs from its owner's", v);
+    for (int i = 0; i < 3; i++)
+      CHECK(x[3 * v + i] == mesh->x[3 * v + i],
+            "Ghost vertex %" PetscInt_FMT " lies elsewhere than its owner's", v);
+  }
+  PetscCall(PetscFree2(x, orig));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -77,25 +77,6 @@ static inline PetscInt vertex(const Box *box, PetscInt i, PetscInt j, PetscInt k
   return (k * (box->n[1] + 1) + j) * (box->n[0] + 1) + i;
 }
 
-static PetscErrorCode add_vertices(const Box *box, SbImport *im)
-{
-  PetscInt v = 0;
-
-  PetscFunctionBeginUser;
-  PetscCall(SbImportSetVertices(im, (box->n[0] + 1) * (box->n[1] + 1) * (box->n[2] + 1)));
-  for (PetscInt k = 0; k <= box->n[2]; k++) {
-    for (PetscInt j = 0; j <= box->n[1]; j++) {
-      for (PetscInt i = 0; i <= box->n[0]; i++, v++) {
-        im->x[3 * v + 0] = box->l[0] * (PetscReal)i / (PetscReal)box->n[0];
-        im->x[3 * v + 1] = box->l[1] * (PetscReal)j / (PetscReal)box->n[1];
-        im->x[3 * v + 2] = box->l[2] * (PetscReal)k / (PetscReal)box->n[2];
-        im->vert_number[v] = v + 1;
-      }
-    }
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /*
   The six tets of a cell: corners as bits (1: far in x, 2: in y, 4: in z), along the six ways from corner 0 to corner 7.
   `mirror` holds the directions in which the cell is reflected. Odd ways and odd reflections each turn the tet inverted.
@@ -153,11 +134,22 @@ static PetscErrorCode add_side(const Box *box, int side, SbImport *im)
 PetscErrorCode SbImportRead_Box(const char *text, SbImport *im)
 {
   Box box;
-  PetscInt at[3];
+  PetscInt at[3], v = 0;
 
   PetscFunctionBeginUser;
   PetscCall(parse_box(text, im->where, &box));
-  PetscCall(add_vertices(&box, im));
+  // vertices, x fastest
+  PetscCall(SbImportSetVertices(im, (box.n[0] + 1) * (box.n[1] + 1) * (box.n[2] + 1)));
+  for (PetscInt k = 0; k <= box.n[2]; k++) {
+    for (PetscInt j = 0; j <= box.n[1]; j++) {
+      for (PetscInt i = 0; i <= box.n[0]; i++, v++) {
+        im->x[3 * v + 0] = box.l[0] * (PetscReal)i / (PetscReal)box.n[0];
+        im->x[3 * v + 1] = box.l[1] * (PetscReal)j / (PetscReal)box.n[1];
+        im->x[3 * v + 2] = box.l[2] * (PetscReal)k / (PetscReal)box.n[2];
+        im->vert_number[v] = v + 1;
+      }
+    }
+  }
   for (at[2] = 0; at[2] < box.n[2]; at[2]++) {
     for (at[1] = 0; at[1] < box.n[1]; at[1]++) {
       for (at[0] = 0; at[0] < box.n[0]; at[0]++) PetscCall(add_cell(&box, at, im));

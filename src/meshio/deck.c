@@ -71,24 +71,6 @@ PetscErrorCode SbDeckAddSet(SbDeck *d, PetscInt set, PetscInt other)
 
 /* ------------------------------------------------------------------ put together */
 
-static PetscErrorCode make_vertices(SbDeck *d)
-{
-  SbImport *im = d->im;
-
-  PetscFunctionBeginUser;
-  PetscCall(SbImportSetVertices(im, d->nnode.n));
-  for (PetscInt v = 0; v < im->nvert; v++) {
-    PetscCall(PetscArraycpy(im->x + 3 * v, d->node[v].x, 3));
-    im->vert_number[v] = d->node[v].label;
-  }
-  PetscCall(SbNumbersCreate(im->nvert, im->vert_number, &im->nodes));
-  for (PetscInt v = 0; v < im->nvert && im->nodes.repeated; v++)
-    if (d->node[v].label == im->nodes.twice) im->scan.token = d->node[v].at;
-  if (im->nodes.repeated)
-    SB_SCAN_ERROR(&im->scan, "node %lld is given twice; %s", (long long)im->nodes.twice, d->cure);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* The simplices, with the groups of their properties. */
 static PetscErrorCode make_items(SbDeck *d)
 {
@@ -196,7 +178,17 @@ PetscErrorCode SbDeckBuild(SbDeck *d)
 
   PetscFunctionBeginUser;
   PetscCall(SbImportCheckTypes(im));
-  PetscCall(make_vertices(d));
+  // nodes become vertices; each label may stand once
+  PetscCall(SbImportSetVertices(im, d->nnode.n));
+  for (PetscInt v = 0; v < im->nvert; v++) {
+    PetscCall(PetscArraycpy(im->x + 3 * v, d->node[v].x, 3));
+    im->vert_number[v] = d->node[v].label;
+  }
+  PetscCall(SbNumbersCreate(im->nvert, im->vert_number, &im->nodes));
+  for (PetscInt v = 0; v < im->nvert && im->nodes.repeated; v++)
+    if (d->node[v].label == im->nodes.twice) im->scan.token = d->node[v].at;
+  if (im->nodes.repeated)
+    SB_SCAN_ERROR(&im->scan, "node %lld is given twice; %s", (long long)im->nodes.twice, d->cure);
   PetscCall(make_items(d));
   PetscCall(SbImportScratch(im, (size_t)im->nvert * sizeof(*point), &point));
   for (PetscInt v = 0; v < im->nvert; v++) point[v] = -1;

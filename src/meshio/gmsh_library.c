@@ -230,29 +230,6 @@ static PetscErrorCode collect_entity(const SbGmsh *g, int dim, int entity, Petsc
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Items in the order of their numbers: entities had torn that of the file. */
-static PetscErrorCode sort_items(int dim, SbImport *im)
-{
-  SbItems *item = &im->item[dim], old = *item;
-  Order *order;
-
-  PetscFunctionBeginUser;
-  PetscCall(PetscMalloc1(old.n, &order));
-  for (PetscInt i = 0; i < old.n; i++) order[i] = (Order){(size_t)old.number[i], (size_t)i};
-  if (old.n) qsort(order, (size_t)old.n, sizeof(*order), compare_tags);
-  PetscCall(SbImportSetItems(im, dim, old.n));
-  for (PetscInt i = 0; i < old.n; i++) {
-    const PetscInt from = (PetscInt)order[i].from;
-
-    for (int k = 0; k <= dim; k++) item->vert[(dim + 1) * i + k] = old.vert[(dim + 1) * from + k];
-    item->tags[i] = old.tags[from];
-    item->number[i] = old.number[from];
-  }
-  PetscCall(SbItemsFree(&old));
-  PetscCall(PetscFree(order));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode SbGmshCollect(const SbGmsh *g, SbGmshGroups groups, SbImport *im)
 {
   int *entity, *physical;
@@ -270,7 +247,25 @@ PetscErrorCode SbGmshCollect(const SbGmsh *g, SbGmshGroups groups, SbImport *im)
   SB_GMSH(g, ModelGetEntities, &entity, &n, -1);
   for (size_t i = 0; i + 1 < n; i += 2) PetscCall(collect_entity(g, entity[i], entity[i + 1], itself, im));
   g->Free(entity);
-  for (int d = 0; d < 4; d++) PetscCall(sort_items(d, im));
+  // items in the order of their numbers: entities had torn that of the file
+  for (int d = 0; d < 4; d++) {
+    SbItems *item = &im->item[d], old = *item;
+    Order *order;
+
+    PetscCall(PetscMalloc1(old.n, &order));
+    for (PetscInt i = 0; i < old.n; i++) order[i] = (Order){(size_t)old.number[i], (size_t)i};
+    if (old.n) qsort(order, (size_t)old.n, sizeof(*order), compare_tags);
+    PetscCall(SbImportSetItems(im, d, old.n));
+    for (PetscInt i = 0; i < old.n; i++) {
+      const PetscInt from = (PetscInt)order[i].from;
+
+      for (int k = 0; k <= d; k++) item->vert[(d + 1) * i + k] = old.vert[(d + 1) * from + k];
+      item->tags[i] = old.tags[from];
+      item->number[i] = old.number[from];
+    }
+    PetscCall(SbItemsFree(&old));
+    PetscCall(PetscFree(order));
+  }
   PetscCall(SbImportCheckTypes(im));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -11,36 +11,31 @@
 
 /* ------------------------------------------------------------------ placement */
 
-/* Rotation by `degrees` about `axis`; exact for quarter turns about the axes of the frame. */
-static PetscErrorCode rotation(const SbBody *body, PetscReal R[3][3])
-{
-  const PetscReal *w = body->rotate;
-  const PetscReal angle = body->rotate[3] * PETSC_PI / 180,
-                  length = PetscSqrtReal(w[0] * w[0] + w[1] * w[1] + w[2] * w[2]);
-  PetscReal c = PetscCosReal(angle), s = PetscSinReal(angle), a[3];
-
-  PetscFunctionBeginUser;
-  PetscCheck(length > 0 && isfinite(length) && isfinite(angle), PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
-             "body '%s': rotation by %g degrees about (%g, %g, %g): the axis must have a length above zero",
-             body->name, (double)w[3], (double)w[0], (double)w[1], (double)w[2]);
-  if (PetscAbsReal(c) < 1e-15) c = 0;
-  if (PetscAbsReal(s) < 1e-15) s = 0;
-  for (int i = 0; i < 3; i++) a[i] = w[i] / length;
-  for (int i = 0; i < 3; i++) {
-    for (int j = 0; j < 3; j++) R[i][j] = (1 - c) * a[i] * a[j] + (i == j ? c : 0);
-    R[i][(i + 1) % 3] -= s * a[(i + 2) % 3];
-    R[i][(i + 2) % 3] += s * a[(i + 1) % 3];
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 static PetscErrorCode transform_body(const SbBody *body, SbImport *im)
 {
   PetscReal R[3][3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
   char scale[SB_IMPORT_OPTION_MAX], translate[SB_IMPORT_OPTION_MAX];
 
   PetscFunctionBeginUser;
-  if (body->rotate[3] != 0) PetscCall(rotation(body, R));
+  // rotation about an axis; exact for quarter turns about the axes of the frame
+  if (body->rotate[3] != 0) {
+    const PetscReal *w = body->rotate;
+    const PetscReal angle = body->rotate[3] * PETSC_PI / 180,
+                    length = PetscSqrtReal(w[0] * w[0] + w[1] * w[1] + w[2] * w[2]);
+    PetscReal c = PetscCosReal(angle), s = PetscSinReal(angle), a[3];
+
+    PetscCheck(length > 0 && isfinite(length) && isfinite(angle), PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
+               "body '%s': rotation by %g degrees about (%g, %g, %g): the axis must have a length above zero",
+               body->name, (double)w[3], (double)w[0], (double)w[1], (double)w[2]);
+    if (PetscAbsReal(c) < 1e-15) c = 0;
+    if (PetscAbsReal(s) < 1e-15) s = 0;
+    for (int i = 0; i < 3; i++) a[i] = w[i] / length;
+    for (int i = 0; i < 3; i++) {
+      for (int j = 0; j < 3; j++) R[i][j] = (1 - c) * a[i] * a[j] + (i == j ? c : 0);
+      R[i][(i + 1) % 3] -= s * a[(i + 2) % 3];
+      R[i][(i + 2) % 3] += s * a[(i + 1) % 3];
+    }
+  }
   for (PetscInt v = 0; v < im->nvert; v++) {
     PetscReal *x = im->x + 3 * v, y[3];
 

@@ -337,18 +337,6 @@ static PetscErrorCode read_elements_41(Gmsh *g)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode read_elements(Gmsh *g)
-{
-  PetscFunctionBeginUser;
-  if (!g->im->x)
-    SB_SCAN_ERROR(&g->im->scan, "section %s before the nodes", g->version == 1 ? "$ELM" : "$Elements");
-  if (g->version <= 2)
-    PetscCall(read_elements_22(g));
-  else
-    PetscCall(read_elements_41(g));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* ------------------------------------------------------------------ tets that version 2.2 repeats */
 
 /* Whether two tets have the same vertices. */
@@ -450,9 +438,14 @@ static PetscErrorCode read_section(Gmsh *g, const char *name, PetscBool *known)
       if (g->im->nodes.repeated)
         SB_SCAN_ERROR(&g->im->scan, "node %lld is given twice; renumber the nodes",
                       (long long)g->im->nodes.twice);
-    } else if (!strcmp(name, elements))
-      PetscCall(read_elements(g));
-    else
+    } else if (!strcmp(name, elements)) {
+      if (!g->im->x)
+        SB_SCAN_ERROR(&g->im->scan, "section %s before the nodes", g->version == 1 ? "$ELM" : "$Elements");
+      if (g->version <= 2)
+        PetscCall(read_elements_22(g));
+      else
+        PetscCall(read_elements_41(g));
+    } else
       PetscCall(read_entities(g));
     s->binary = PETSC_FALSE;
   } else if (!strcmp(name, "$PartitionedEntities")) {
@@ -462,58 +455,44 @@ static PetscErrorCode read_section(Gmsh *g, const char *name, PetscBool *known)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Reads a section, or passes over it; then its closing word. */
-static PetscErrorCode read_whole_section(Gmsh *g, const char *name)
-{
-  SbScan *s = &g->im->scan;
-  char end[64], closing[72];
-  PetscBool known;
-
-  PetscFunctionBeginUser;
-  if (name[0] != '$') SB_SCAN_ERROR(s, "expected the beginning of a section, as $Nodes, found '%.20s'", name);
-  (void)snprintf(closing, sizeof(closing), g->version == 1 ? "$END%s" : "$End%s", name + 1);
-  if (!strcmp(name, "$MeshFormat")) {
-    PetscCall(read_format(g));
-    known = PETSC_TRUE;
-  } else
-    PetscCall(read_section(g, name, &known));
-  if (!known && !SbScanFind(s, closing))
-    SB_SCAN_ERROR(s, "section %s has no end; the file is truncated, write or copy it again", name);
-  PetscCall(SbScanWord(s, sizeof(end), end));
-  if (!end[0])
-    SB_SCAN_ERROR(s, "the file ends where %s is expected; it is truncated, write or copy it again", closing);
-  if (strcmp(end, closing))
-    SB_SCAN_ERROR(s, "expected %s, found '%.20s'; the section is longer than announced or damaged", closing,
-                  end);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Version 1 begins with its nodes. */
-static PetscErrorCode read_sections(Gmsh *g)
-{
-  SbScan *s = &g->im->scan;
-  char name[64];
-
-  PetscFunctionBeginUser;
-  PetscCall(SbScanWord(s, sizeof(name), name));
-  if (!strcmp(name, "$NOD"))
-    g->version = 1;
-  else if (strcmp(name, "$MeshFormat"))
-    SB_SCAN_ERROR(s, "expected $MeshFormat; this is no gmsh mesh file");
-  while (name[0]) {
-    PetscCall(read_whole_section(g, name));
-    PetscCall(SbScanWord(s, sizeof(name), name));
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode SbImportRead_Gmsh(const char *path, SbImport *im)
 {
   Gmsh g = {.im = im};
+  SbScan *s = &g.im->scan;
+  char name[64];
 
   PetscFunctionBeginUser;
   PetscCall(SbScanOpen(im->where, path, &im->scan));
-  PetscCall(read_sections(&g));
+  // version 1 begins with its nodes
+  PetscCall(SbScanWord(s, sizeof(name), name));
+  if (!strcmp(name, "$NOD"))
+    g.version = 1;
+  else if (strcmp(name, "$MeshFormat"))
+    SB_SCAN_ERROR(s, "expected $MeshFormat; this is no gmsh mesh file");
+  while (name[0]) {
+    char end[64], closing[72];
+    PetscBool known;
+
+    // a section, read or passed over, then its closing word
+    if (name[0] != '$')
+      SB_SCAN_ERROR(s, "expected the beginning of a section, as $Nodes, found '%.20s'", name);
+    (void)snprintf(closing, sizeof(closing), g.version == 1 ? "$END%s" : "$End%s", name + 1);
+    if (!strcmp(name, "$MeshFormat")) {
+      PetscCall(read_format(&g));
+      known = PETSC_TRUE;
+    } else
+      PetscCall(read_section(&g, name, &known));
+    if (!known && !SbScanFind(s, closing))
+      SB_SCAN_ERROR(s, "section %s has no end; the file is truncated, write or copy it again", name);
+    PetscCall(SbScanWord(s, sizeof(end), end));
+    if (!end[0])
+      SB_SCAN_ERROR(s, "the file ends where %s is expected; it is truncated, write or copy it again",
+                    closing);
+    if (strcmp(end, closing))
+      SB_SCAN_ERROR(s, "expected %s, found '%.20s'; the section is longer than announced or damaged", closing,
+                    end);
+    PetscCall(SbScanWord(s, sizeof(name), name));
+  }
   PetscCheck(im->x, PETSC_COMM_SELF, PETSC_ERR_FILE_UNEXPECTED,
              "%s: has no section $Nodes; it is truncated or not a mesh", im->where);
   PetscCall(SbImportCheckTypes(im));

@@ -35,32 +35,6 @@ typedef struct {
 
 /* ------------------------------------------------------------------ the file */
 
-/* Says why HDF5 cannot open it: not there, no HDF5, or cut off. */
-static PetscErrorCode open_file(const char *path, File *f)
-{
-  const hid_t access = H5Pcreate(H5P_FILE_ACCESS);
-  htri_t is_hdf5;
-  FILE *file;
-
-  PetscFunctionBeginUser;
-  PetscCall(SbScanOpenFile(f->im->where, path, &file, &f->bytes));
-  (void)fclose(file);
-  (void)H5Eset_auto2(H5E_DEFAULT, NULL, NULL); /* its stack of errors becomes one line of ours */
-  is_hdf5 = H5Fis_hdf5(path);
-  (void)H5Pset_fclose_degree(
-    access, H5F_CLOSE_STRONG); /* with the file all of its arrays are closed, also after an error */
-  f->file = is_hdf5 > 0 ? H5Fopen(path, H5F_ACC_RDONLY, access) : -1;
-  (void)H5Pclose(access);
-  if (is_hdf5 <= 0)
-    H5_ERROR(f, "is no HDF5 file (%zu bytes); give an .h5 mesh of supple-mesh, or the fields.h5 of a run",
-             f->bytes);
-  if (f->file < 0)
-    H5_ERROR(
-      f, "HDF5 cannot open it (%zu bytes); it is truncated, damaged or being written: write or copy it again",
-      f->bytes);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* Whether every group on the way to a path exists. */
 static PetscBool is_there(const File *f, const char *path)
 {
@@ -235,35 +209,26 @@ static PetscErrorCode read_groups(const File *f, PetscInt *n, PetscInt **map)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The tag sets of the file; map[] leads to their numbers here. */
-static PetscErrorCode read_sets(const File *f, PetscInt *n, PetscInt **map)
-{
-  PetscInt ngroup, nmember, nstart, *group, *member, *start;
-
-  PetscFunctionBeginUser;
-  PetscCall(read_groups(f, &ngroup, &group));
-  PetscCall(read_table(f, "/tag_sets/group", 1, ngroup, &nmember, &member));
-  PetscCall(read_table(f, "/tag_sets/start", 1, (int64_t)nmember + 1, &nstart, &start));
-  *n = PetscMax(nstart - 1, 0);
-  *map = NULL;
-  PetscCall(SbImportScratch(f->im, (size_t)*n * sizeof(**map), map));
-  for (PetscInt i = 0; i < nmember; i++) member[i] = group[member[i]];
-  for (PetscInt t = 0; t < *n; t++) {
-    if (start[t] > start[t + 1])
-      H5_ERROR(f, "/tag_sets/start falls from %lld to %lld; the file is damaged", (long long)start[t],
-               (long long)start[t + 1]);
-    PetscCall(SbImportTagSet(f->im, start[t + 1] - start[t], nmember ? member + start[t] : NULL, &(*map)[t]));
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 static PetscErrorCode read_own(const File *f)
 {
   static const char *const names[4] = {"point", "line", "triangle", "cell"};
-  PetscInt nset = 0, n, *map, *set;
+  PetscInt nset = 0, n, *map, *set, ngroup, nmember, nstart, *group, *member, *start;
 
   PetscFunctionBeginUser;
-  PetscCall(read_sets(f, &nset, &map));
+  // the tag sets of the file; map[] leads to their numbers here
+  PetscCall(read_groups(f, &ngroup, &group));
+  PetscCall(read_table(f, "/tag_sets/group", 1, ngroup, &nmember, &member));
+  PetscCall(read_table(f, "/tag_sets/start", 1, (int64_t)nmember + 1, &nstart, &start));
+  nset = PetscMax(nstart - 1, 0);
+  map = NULL;
+  PetscCall(SbImportScratch(f->im, (size_t)nset * sizeof(*map), &map));
+  for (PetscInt i = 0; i < nmember; i++) member[i] = group[member[i]];
+  for (PetscInt t = 0; t < nset; t++) {
+    if (start[t] > start[t + 1])
+      H5_ERROR(f, "/tag_sets/start falls from %lld to %lld; the file is damaged", (long long)start[t],
+               (long long)start[t + 1]);
+    PetscCall(SbImportTagSet(f->im, start[t + 1] - start[t], nmember ? member + start[t] : NULL, &map[t]));
+  }
   for (int d = 0; d < 4; d++) {
     SbItems *item = &f->im->item[d];
     char items[32], tags[32];
@@ -316,24 +281,6 @@ static herr_t visit_hundred(hid_t where, const char *name, const H5L_info_t *inf
   (void)H5Literate(group, H5_INDEX_NAME, H5_ITER_INC, NULL, visit_frame, ctx);
   (void)H5Gclose(group);
   return 0;
-}
-
-static PetscErrorCode add_displacement(const File *f)
-{
-  SbImport *im = f->im;
-  char name[96];
-  PetscInt n;
-  PetscReal *u;
-
-  PetscFunctionBeginUser;
-  (void)snprintf(name, sizeof(name), "%s/displacement", f->frame);
-  if (!is_there(f, name))
-    H5_ERROR(f, "has no displacement at the step; the run needs it among its -output_fields");
-  PetscCall(read_array(f, &(Array){.name = name, .klass = H5T_FLOAT, .ncomp = 3}, &n, &u));
-  if (n != im->nvert)
-    H5_ERROR(f, "%s has %lld rows for %lld points", name, (long long)n, (long long)im->nvert);
-  for (PetscInt i = 0; i < 3 * n; i++) im->x[i] += u[i];
-  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Points of each tet become the vertices that they lie at, in their mean position. */
@@ -405,7 +352,21 @@ static PetscErrorCode read_bodies(const File *f)
 static PetscErrorCode read_output(const File *f)
 {
   PetscFunctionBeginUser;
-  if (f->frame[0]) PetscCall(add_displacement(f));
+  // positions at the step
+  if (f->frame[0]) {
+    SbImport *im = f->im;
+    char name[96];
+    PetscInt n;
+    PetscReal *u;
+
+    (void)snprintf(name, sizeof(name), "%s/displacement", f->frame);
+    if (!is_there(f, name))
+      H5_ERROR(f, "has no displacement at the step; the run needs it among its -output_fields");
+    PetscCall(read_array(f, &(Array){.name = name, .klass = H5T_FLOAT, .ncomp = 3}, &n, &u));
+    if (n != im->nvert)
+      H5_ERROR(f, "%s has %lld rows for %lld points", name, (long long)n, (long long)im->nvert);
+    for (PetscInt i = 0; i < 3 * n; i++) im->x[i] += u[i];
+  }
   if (is_there(f, "/mesh/vertices")) PetscCall(join_points(f));
   PetscCall(read_bodies(f));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -484,9 +445,29 @@ PetscErrorCode SbImportSlab_H5(const char *path, PetscInt k, PetscInt n, SbImpor
 {
   File f = {.im = im, .file = -1, .part = k, .nparts = n};
   PetscErrorCode ierr;
+  hid_t access;
+  htri_t is_hdf5;
+  FILE *file;
 
   PetscFunctionBeginUser;
-  PetscCall(open_file(path, &f));
+  // says why HDF5 cannot open it: not there, no HDF5, or cut off
+  access = H5Pcreate(H5P_FILE_ACCESS);
+  PetscCall(SbScanOpenFile(f.im->where, path, &file, &f.bytes));
+  (void)fclose(file);
+  (void)H5Eset_auto2(H5E_DEFAULT, NULL, NULL); /* its stack of errors becomes one line of ours */
+  is_hdf5 = H5Fis_hdf5(path);
+  (void)H5Pset_fclose_degree(
+    access, H5F_CLOSE_STRONG); /* with the file all of its arrays are closed, also after an error */
+  f.file = is_hdf5 > 0 ? H5Fopen(path, H5F_ACC_RDONLY, access) : -1;
+  (void)H5Pclose(access);
+  if (is_hdf5 <= 0)
+    H5_ERROR(&f, "is no HDF5 file (%zu bytes); give an .h5 mesh of supple-mesh, or the fields.h5 of a run",
+             f.bytes);
+  if (f.file < 0)
+    H5_ERROR(
+      &f,
+      "HDF5 cannot open it (%zu bytes); it is truncated, damaged or being written: write or copy it again",
+      f.bytes);
   ierr = read_mesh(&f, rows);
   (void)H5Fclose(f.file);
   PetscFunctionReturn(ierr);

@@ -23,51 +23,35 @@ static PetscErrorCode open_msh(const SbGmsh *g, void *ctx, SbImport *im)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* gmsh knows the format by the very first letters; with a blank line or the mark of UTF-8 in front it would run the file. */
-static PetscErrorCode check_begin(const char *path, const char *where)
+PetscErrorCode SbImportRead_Msh(const char *path, SbImport *im)
 {
   static const char begin[] = "$MeshFormat";
-  char text[sizeof(begin)] = "";
-  FILE *file = fopen(path, "rb");
-
-  PetscFunctionBeginUser;
-  if (file) {
-    (void)fread(text, 1, sizeof(begin) - 1, file);
-    (void)fclose(file);
-  }
-  PetscCheck(!strcmp(text, begin), PETSC_COMM_SELF, PETSC_ERR_FILE_UNEXPECTED,
-             "%s line 1: a file of version 4.0 must begin with %s; remove what stands before it", where,
-             begin);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Whether it is of version 4.0, which the own reader does not know. */
-static PetscErrorCode foreign_msh(const char *path, const char *where, PetscBool *foreign)
-{
+  PetscBool foreign;
   SbScan s;
   char word[32] = "", version[16] = "";
-  PetscErrorCode ierr = SbScanOpen(where, path, &s);
+  PetscErrorCode ierr;
 
   PetscFunctionBeginUser;
+  // whether it is of version 4.0, which the own reader does not know
+  ierr = SbScanOpen(im->where, path, &s);
   if (!ierr) ierr = SbScanWord(&s, sizeof(word), word);
   if (!ierr) ierr = SbScanWord(&s, sizeof(version), version);
   PetscCall(SbScanClose(&s));
   PetscCall(ierr);
-  *foreign = (PetscBool)(!strcmp(word, "$MeshFormat") && (!strcmp(version, "4") || !strcmp(version, "4.0")));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode SbImportRead_Msh(const char *path, SbImport *im)
-{
-  PetscBool foreign = PETSC_FALSE;
-
-  PetscFunctionBeginUser;
-  PetscCall(foreign_msh(path, im->where, &foreign));
+  foreign = (PetscBool)(!strcmp(word, begin) && (!strcmp(version, "4") || !strcmp(version, "4.0")));
   if (foreign) {
-    char copy[PETSC_MAX_PATH_LEN];
+    char copy[PETSC_MAX_PATH_LEN], text[sizeof(begin)] = "";
     const SbGmshJob job = {im->where, "read the file", read_seconds, open_msh, copy};
+    FILE *file = fopen(path, "rb");
 
-    PetscCall(check_begin(path, im->where));
+    // gmsh knows the format by the very first letters; with a blank line or the mark of UTF-8 in front it would run the file
+    if (file) {
+      (void)fread(text, 1, sizeof(begin) - 1, file);
+      (void)fclose(file);
+    }
+    PetscCheck(!strcmp(text, begin), PETSC_COMM_SELF, PETSC_ERR_FILE_UNEXPECTED,
+               "%s line 1: a file of version 4.0 must begin with %s; remove what stands before it", im->where,
+               begin);
     PetscCall(PetscStrncpy(copy, path, sizeof(copy)));
     PetscCall(SbGmshRun(&job, im));
   } else

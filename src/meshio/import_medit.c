@@ -27,27 +27,6 @@ static const struct {
   {"EdgesP2", 8},
 };
 
-static PetscErrorCode read_vertices(SbImport *im)
-{
-  SbScan *s = &im->scan;
-  int64_t n;
-  PetscReal reference;
-
-  PetscFunctionBeginUser;
-  if (im->x) SB_SCAN_ERROR(s, "second section Vertices");
-  SbScanNext(s, '#');
-  PetscCall(SbScanText(s, "number of vertices", &n));
-  PetscCall(SbScanRoom(s, "vertices", n, 8, 8));
-  PetscCall(SbImportSetVertices(im, (PetscInt)n));
-  for (PetscInt v = 0; v < n; v++) {
-    im->vert_number[v] = v + 1;
-    SbScanNext(s, '#');
-    PetscCall(SbScanPoint(s, "coordinate", v + 1, im->x + 3 * v));
-    PetscCall(SbScanReal(s, "reference", v + 1, &reference));
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 static PetscErrorCode read_elements(SbImport *im, int type)
 {
   SbScan *s = &im->scan;
@@ -100,7 +79,23 @@ PetscErrorCode SbImportRead_Medit(const char *path, SbImport *im)
       SB_SCAN_ERROR(
         s, "the file ends where a section, or 'End', is expected; it is truncated, write or copy it again");
     if (!strcmp(word, "End")) break;
-    if (!strcmp(word, "Vertices")) PetscCall(read_vertices(im));
+    // coordinates and a reference, which is of no use
+    if (!strcmp(word, "Vertices")) {
+      int64_t n;
+      PetscReal reference;
+
+      if (im->x) SB_SCAN_ERROR(s, "second section Vertices");
+      SbScanNext(s, '#');
+      PetscCall(SbScanText(s, "number of vertices", &n));
+      PetscCall(SbScanRoom(s, "vertices", n, 8, 8));
+      PetscCall(SbImportSetVertices(im, (PetscInt)n));
+      for (PetscInt v = 0; v < n; v++) {
+        im->vert_number[v] = v + 1;
+        SbScanNext(s, '#');
+        PetscCall(SbScanPoint(s, "coordinate", v + 1, im->x + 3 * v));
+        PetscCall(SbScanReal(s, "reference", v + 1, &reference));
+      }
+    }
     if (!strcmp(word, "Dimension")) {
       SbScanNext(s, '#');
       PetscCall(SbScanText(s, "dimension", &dimension));

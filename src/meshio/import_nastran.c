@@ -244,27 +244,6 @@ static PetscErrorCode next_label(Nastran *b, const char *what, int64_t *value)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* 1.5, 1.5E-3, 1.5D-3, 1.5-3; nothing is 0. */
-static PetscErrorCode next_real(Nastran *b, int64_t node, PetscReal *value)
-{
-  char word[WORD], full[WORD + 1], *end;
-  size_t n = 0;
-  PetscBool there;
-
-  PetscFunctionBeginUser;
-  PetscCall(next_field(b, word, &there));
-  for (const char *p = word; *p && n < WORD; p++) {
-    if ((*p == '-' || *p == '+') && p > word && (isdigit((unsigned char)p[-1]) || p[-1] == '.'))
-      full[n++] = 'E';
-    full[n++] = *p == 'D' || *p == 'd' ? 'E' : *p;
-  }
-  full[PetscMin(n, WORD)] = 0;
-  *value = strtod(full, &end);
-  if (*end || full[strspn(full, "0123456789.+-Ee")] || !isfinite(*value))
-    SB_SCAN_ERROR(b->scan, "expected the coordinate of node %lld, found '%.24s'", (long long)node, word);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* ------------------------------------------------------------------ entries */
 
 static PetscErrorCode read_grid(Nastran *b)
@@ -281,7 +260,23 @@ static PetscErrorCode read_grid(Nastran *b)
                   "of GRID empty or 0)",
                   (long long)label, (long long)system);
   PetscCall(SbDeckAddNode(&b->deck, label, &x));
-  for (int i = 0; i < 3; i++) PetscCall(next_real(b, label, &x[i]));
+  // 1.5, 1.5E-3, 1.5D-3, 1.5-3; nothing is 0
+  for (int i = 0; i < 3; i++) {
+    char word[WORD], full[WORD + 1], *end;
+    size_t n = 0;
+    PetscBool there;
+
+    PetscCall(next_field(b, word, &there));
+    for (const char *p = word; *p && n < WORD; p++) {
+      if ((*p == '-' || *p == '+') && p > word && (isdigit((unsigned char)p[-1]) || p[-1] == '.'))
+        full[n++] = 'E';
+      full[n++] = *p == 'D' || *p == 'd' ? 'E' : *p;
+    }
+    full[PetscMin(n, WORD)] = 0;
+    x[i] = strtod(full, &end);
+    if (*end || full[strspn(full, "0123456789.+-Ee")] || !isfinite(x[i]))
+      SB_SCAN_ERROR(b->scan, "expected the coordinate of node %lld, found '%.24s'", (long long)label, word);
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -30,21 +30,6 @@ static PetscErrorCode on_line(SbScan *s, const char *what)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A whole number, written with or without decimals. */
-static PetscErrorCode read_mark(SbScan *s, const char *what, int64_t *mark)
-{
-  PetscReal value = 0;
-
-  PetscFunctionBeginUser;
-  PetscCall(on_line(s, what));
-  PetscCall(SbScanReal(s, what, 0, &value));
-  if (!(PetscAbsReal(value) < 1e15) || value != PetscFloorReal(value))
-    SB_SCAN_ERROR(s, "the %s is %g; supple takes it for the number of a group, which is a whole one", what,
-                  (double)value);
-  *mark = (int64_t)value;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* The number of point v, which it must have, and its position. */
 static PetscErrorCode read_point(SbImport *im, PetscInt v, int64_t number)
 {
@@ -131,7 +116,17 @@ static PetscErrorCode read_file(SbImport *im, int f)
     }
     if (dim == 0) marked = (PetscBool)(count[3] && SbScanMore(s, '#'));
     if (marked) {
-      PetscCall(read_mark(s, files[f].mark, &mark));
+      const char *what;
+      PetscReal value = 0;
+
+      // a whole number, written with or without decimals
+      what = files[f].mark;
+      PetscCall(on_line(s, what));
+      PetscCall(SbScanReal(s, what, 0, &value));
+      if (!(PetscAbsReal(value) < 1e15) || value != PetscFloorReal(value))
+        SB_SCAN_ERROR(s, "the %s is %g; supple takes it for the number of a group, which is a whole one",
+                      what, (double)value);
+      mark = (int64_t)value;
       if (mark || dim == 3) PetscCall(SbImportTagsAlone(im, dim, mark, NULL, &tags));
     }
     PetscCall(SbImportAddElement(im, types[dim], vert, tags, number));

@@ -34,34 +34,7 @@ static PetscBool is_mark(const SbScan *s)
   return PETSC_TRUE;
 }
 
-/* Whether the data set ends here: at a mark, or with the file, which is an error. */
-static PetscErrorCode at_end(SbScan *s, PetscBool *end)
-{
-  PetscFunctionBeginUser;
-  while (s->at < s->end && (*s->at == '\n' || *s->at == '\r')) s->at++;
-  s->token = s->at;
-  if (s->at >= s->end)
-    SB_SCAN_ERROR(s, "the file ends where a line of -1 is expected; it is truncated, write or copy it again");
-  *end = is_mark(s);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* ------------------------------------------------------------------ nodes and elements */
-
-/* Set 2411 has the coordinates on a line of their own, set 15 on the same one. */
-static PetscErrorCode read_node(SbDeck *d)
-{
-  SbScan *s = &d->im->scan;
-  int64_t label, other;
-  PetscReal *x;
-
-  PetscFunctionBeginUser;
-  PetscCall(SbScanText(s, "label of a node", &label));
-  PetscCall(SbDeckAddNode(d, label, &x));
-  for (int i = 0; i < 3; i++) PetscCall(SbScanText(s, "coordinate system or colour of a node", &other));
-  PetscCall(SbScanPoint(s, "coordinate", label, x));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
 
 static PetscErrorCode read_element(SbDeck *d)
 {
@@ -141,9 +114,24 @@ static PetscErrorCode read_set(SbDeck *d)
   PetscCall(SbScanEndOfLine(s));
   if (id == 2412 && !d->nnode.n) SB_SCAN_ERROR(s, "elements before the nodes");
   for (;;) {
-    PetscCall(at_end(s, &end));
+    // the data set ends at a mark; with the file it is an error
+    while (s->at < s->end && (*s->at == '\n' || *s->at == '\r')) s->at++;
+    s->token = s->at;
+    if (s->at >= s->end)
+      SB_SCAN_ERROR(s,
+                    "the file ends where a line of -1 is expected; it is truncated, write or copy it again");
+    end = is_mark(s);
     if (end) break;
-    if (id == 2411 || id == 781 || id == 15) PetscCall(read_node(d));
+    // set 2411 has the coordinates on a line of their own, set 15 on the same one
+    if (id == 2411 || id == 781 || id == 15) {
+      int64_t label, other;
+      PetscReal *x;
+
+      PetscCall(SbScanText(s, "label of a node", &label));
+      PetscCall(SbDeckAddNode(d, label, &x));
+      for (int i = 0; i < 3; i++) PetscCall(SbScanText(s, "coordinate system or colour of a node", &other));
+      PetscCall(SbScanPoint(s, "coordinate", label, x));
+    }
     if (id == 2412) PetscCall(read_element(d));
     if (id == 2429 || id == 2430 || id == 2432) PetscCall(read_group(d, 2));
     if (id == 2435 || id == 2452 || id == 2467 || id == 2477) PetscCall(read_group(d, 4));

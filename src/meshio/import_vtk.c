@@ -117,26 +117,6 @@ static PetscErrorCode split_cells(Vtk *v, int64_t size, const double all[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* From version 5 on: `n` offsets from 0 to the number of points, then the points. */
-static PetscErrorCode read_offsets(Vtk *v, int64_t n, int64_t nconnect)
-{
-  SbVtkGrid *grid = &v->grid;
-  SbVtkType type;
-  char word[32];
-
-  PetscFunctionBeginUser;
-  PetscCall(read_type(v, &type));
-  PetscCall(read_array(v, "offsets", n, type, &grid->end));
-  for (int64_t c = 0; c + 1 < n; c++) grid->end[c] = grid->end[c + 1]; /* the first is 0 */
-  PetscCall(SbScanWord(v->scan, sizeof(word), word));
-  if (strcasecmp(word, "CONNECTIVITY")) SB_SCAN_ERROR(v->scan, "expected CONNECTIVITY, found '%s'", word);
-  PetscCall(read_type(v, &type));
-  PetscCall(read_array(v, "points of cells", nconnect, type, &grid->connect));
-  grid->ncell = (PetscInt)PetscMax(n - 1, 0);
-  grid->nconnect = nconnect;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 static PetscErrorCode read_cells(Vtk *v)
 {
   SbScan *s = v->scan;
@@ -156,7 +136,19 @@ static PetscErrorCode read_cells(Vtk *v)
   at = s->at;
   PetscCall(SbScanWord(s, sizeof(word), word));
   if (!strcasecmp(word, "OFFSETS")) {
-    PetscCall(read_offsets(v, n, size));
+    SbVtkGrid *grid = &v->grid;
+    SbVtkType type;
+
+    // from version 5 on: `n` offsets from 0 to the number of points, then the points
+    PetscCall(read_type(v, &type));
+    PetscCall(read_array(v, "offsets", n, type, &grid->end));
+    for (int64_t c = 0; c + 1 < n; c++) grid->end[c] = grid->end[c + 1]; /* the first is 0 */
+    PetscCall(SbScanWord(v->scan, sizeof(word), word));
+    if (strcasecmp(word, "CONNECTIVITY")) SB_SCAN_ERROR(v->scan, "expected CONNECTIVITY, found '%s'", word);
+    PetscCall(read_type(v, &type));
+    PetscCall(read_array(v, "points of cells", size, type, &grid->connect));
+    grid->ncell = (PetscInt)PetscMax(n - 1, 0);
+    grid->nconnect = size;
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   s->at = at;

@@ -201,60 +201,16 @@ static PetscErrorCode take_blocks(Vtu *v, Bytes *b, const char *name, size_t wan
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* n binary numbers of this type. */
-static PetscErrorCode read_binary(Vtu *v, Bytes *b, const char *name, SbVtkType type, size_t n,
-                                  double value[])
-{
-  const size_t want = n * (size_t)type.size;
-  unsigned char *raw;
-  size_t length = want;
-
-  PetscFunctionBeginUser;
-  PetscCall(SbImportScratch(v->im, want, &v->raw));
-  raw = v->raw;
-  if (v->zlib)
-    PetscCall(take_blocks(v, b, name, want, raw));
-  else {
-    PetscCall(take_length(v, b, name, &length));
-    if (length != want || !take_bytes(b, want, raw))
-      SB_SCAN_ERROR(v->scan, "array '%s' has %zu bytes; expected %zu, or it is truncated, or no base64", name,
-                    length, want);
-  }
-  SbVtkConvert(type, v->swap, n, raw, value);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Where the bytes of an array are. */
-static PetscErrorCode locate(Vtu *v, const char *open, const char *close, const char *format, Bytes *b)
-{
-  int64_t offset;
-
-  PetscFunctionBeginUser;
-  *b = (Bytes){close, v->scan->end, PETSC_TRUE, {0}, 0, 0};
-  if (!strcmp(format, "appended")) {
-    PetscCall(attribute_number(v, open, close, "offset", &offset));
-    if (!v->appended || offset > v->scan->end - v->appended)
-      SB_SCAN_ERROR(v->scan, "the array lies at %lld of the appended data, which the file does not hold",
-                    (long long)offset);
-    b->at = v->appended + offset;
-    b->text = v->appended_text;
-  } else if (!strcmp(format, "binary")) {
-    b->end = (const char *)memchr(close, '<', (size_t)(v->scan->end - close));
-    if (!b->end)
-      SB_SCAN_ERROR(v->scan, "the array has no end; the file is truncated, write or copy it again");
-  } else
-    SB_SCAN_ERROR(v->scan, "an array of format '%s'; expected ascii, binary or appended", format);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* The n numbers of the array whose element stands between open and close; *value is allocated. */
 static PetscErrorCode read_array(Vtu *v, const char *open, const char *close, int64_t n, double **value)
 {
   SbVtkType type;
   Bytes b;
   char format[16], name[64];
-  size_t room;
+  size_t room, want, length;
   char kind[32];
+  unsigned char *raw;
+  int64_t offset;
 
   PetscFunctionBeginUser;
   v->scan->token = open;
@@ -291,14 +247,40 @@ static PetscErrorCode read_array(Vtu *v, const char *open, const char *close, in
     }
     PetscFunctionReturn(PETSC_SUCCESS);
   }
-  PetscCall(locate(v, open, close, format, &b));
+  // where the bytes of an array are
+  b = (Bytes){close, v->scan->end, PETSC_TRUE, {0}, 0, 0};
+  if (!strcmp(format, "appended")) {
+    PetscCall(attribute_number(v, open, close, "offset", &offset));
+    if (!v->appended || offset > v->scan->end - v->appended)
+      SB_SCAN_ERROR(v->scan, "the array lies at %lld of the appended data, which the file does not hold",
+                    (long long)offset);
+    b.at = v->appended + offset;
+    b.text = v->appended_text;
+  } else if (!strcmp(format, "binary")) {
+    b.end = (const char *)memchr(close, '<', (size_t)(v->scan->end - close));
+    if (!b.end) SB_SCAN_ERROR(v->scan, "the array has no end; the file is truncated, write or copy it again");
+  } else
+    SB_SCAN_ERROR(v->scan, "an array of format '%s'; expected ascii, binary or appended", format);
   room = (size_t)(b.end - b.at) / (size_t)type.size;
   if ((uint64_t)n > (v->zlib ? ZLIB_RATIO : 1) * (uint64_t)room)
     SB_SCAN_ERROR(v->scan,
                   "array '%s' should hold %lld numbers, which is more than the rest of the file can contain",
                   name, (long long)n);
   PetscCall(SbImportScratch(v->im, (size_t)n * sizeof(**value), value));
-  PetscCall(read_binary(v, &b, name, type, (size_t)n, *value));
+  // n binary numbers of this type
+  want = (size_t)n * (size_t)type.size;
+  length = want;
+  PetscCall(SbImportScratch(v->im, want, &v->raw));
+  raw = v->raw;
+  if (v->zlib)
+    PetscCall(take_blocks(v, &b, name, want, raw));
+  else {
+    PetscCall(take_length(v, &b, name, &length));
+    if (length != want || !take_bytes(&b, want, raw))
+      SB_SCAN_ERROR(v->scan, "array '%s' has %zu bytes; expected %zu, or it is truncated, or no base64", name,
+                    length, want);
+  }
+  SbVtkConvert(type, v->swap, (size_t)n, raw, (*value));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -336,43 +318,6 @@ static PetscErrorCode read_cell_array(Vtu *v, const char *name, int64_t n, doubl
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   SB_SCAN_ERROR(v->scan, "the element Cells has no array '%s'", name);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode read_points(Vtu *v, int64_t n)
-{
-  const char *from, *end, *open, *close;
-  double *x = NULL;
-  int64_t ncomponent = 3;
-
-  PetscFunctionBeginUser;
-  PetscCall(content(v, "Points", &from, &end));
-  v->scan->token = from;
-  if (!find_element(from, end, "DataArray", &open, &close))
-    SB_SCAN_ERROR(v->scan, "the element Points has no array");
-  PetscCall(attribute_number(v, open, close, "NumberOfComponents", &ncomponent));
-  if (ncomponent != 3)
-    SB_SCAN_ERROR(v->scan, "points of %lld coordinates; expected 3", (long long)ncomponent);
-  PetscCall(read_array(v, open, close, 3 * n, &x));
-  PetscCall(SbVtkSetPoints((PetscInt)n, x, v->im));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode read_cells(Vtu *v, int64_t n)
-{
-  SbVtkGrid *grid = &v->grid;
-  double last;
-
-  PetscFunctionBeginUser;
-  grid->ncell = (PetscInt)n;
-  PetscCall(read_cell_array(v, "offsets", n, &grid->end));
-  PetscCall(read_cell_array(v, "types", n, &grid->type));
-  last = n ? grid->end[n - 1] : 0;
-  v->scan->token = v->cells_at;
-  if (!(last >= 0 && last < 1e12) || last != PetscFloorReal(last))
-    SB_SCAN_ERROR(v->scan, "the last of the offsets is %g; expected the number of points of all cells", last);
-  grid->nconnect = (int64_t)last;
-  PetscCall(read_cell_array(v, "connectivity", grid->nconnect, &grid->connect));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -457,7 +402,11 @@ PetscErrorCode SbImportRead_VTU(const char *path, SbImport *im)
   SbScan *s = &im->scan;
   Vtu vtu = {.scan = s, .im = im}, *v = &vtu;
   const char *open, *close, *open2, *close2;
-  int64_t npoint, ncell;
+  int64_t npoint, ncell, ncomponent = 3;
+  const char *from;
+  const char *end;
+  double *x = NULL, last;
+  SbVtkGrid *grid = &v->grid;
 
   PetscFunctionBeginUser;
   PetscCall(SbScanOpen(im->where, path, s));
@@ -473,8 +422,26 @@ PetscErrorCode SbImportRead_VTU(const char *path, SbImport *im)
   if (npoint > PETSC_MAX_INT / 8 || ncell > PETSC_MAX_INT / 8)
     SB_SCAN_ERROR(s, "%lld points and %lld cells are more than this build can number", (long long)npoint,
                   (long long)ncell);
-  PetscCall(read_points(v, npoint));
-  PetscCall(read_cells(v, ncell));
+  // the one array of the element Points
+  PetscCall(content(v, "Points", &from, &end));
+  v->scan->token = from;
+  if (!find_element(from, end, "DataArray", &open, &close))
+    SB_SCAN_ERROR(v->scan, "the element Points has no array");
+  PetscCall(attribute_number(v, open, close, "NumberOfComponents", &ncomponent));
+  if (ncomponent != 3)
+    SB_SCAN_ERROR(v->scan, "points of %lld coordinates; expected 3", (long long)ncomponent);
+  PetscCall(read_array(v, open, close, 3 * npoint, &x));
+  PetscCall(SbVtkSetPoints((PetscInt)npoint, x, v->im));
+  // types of cells, where their points end, then so many points
+  grid->ncell = (PetscInt)ncell;
+  PetscCall(read_cell_array(v, "offsets", ncell, &grid->end));
+  PetscCall(read_cell_array(v, "types", ncell, &grid->type));
+  last = ncell ? grid->end[ncell - 1] : 0;
+  v->scan->token = v->cells_at;
+  if (!(last >= 0 && last < 1e12) || last != PetscFloorReal(last))
+    SB_SCAN_ERROR(v->scan, "the last of the offsets is %g; expected the number of points of all cells", last);
+  grid->nconnect = (int64_t)last;
+  PetscCall(read_cell_array(v, "connectivity", grid->nconnect, &grid->connect));
   PetscCall(read_cell_data(v));
   s->token = v->cells_at;
   PetscCall(SbVtkGridFill(&v->grid, im));

@@ -112,54 +112,6 @@ static PetscErrorCode numbers_regions(PetscInt n, const double value[], PetscBoo
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Which arrays become groups, and which of them is the one of regions. */
-static PetscErrorCode choose_arrays(const SbVtkGrid *grid, PetscBool use[], int *regions)
-{
-  int nuse = 0;
-
-  PetscFunctionBeginUser;
-  *regions = -1;
-  for (int a = 0; a < grid->narray; a++) {
-    PetscCall(numbers_regions(grid->ncell, grid->array[a].value, &use[a]));
-    nuse += use[a];
-  }
-  for (size_t k = 0; k < PETSC_STATIC_ARRAY_LENGTH(region_names) && *regions < 0; k++) {
-    for (int a = 0; a < grid->narray && *regions < 0; a++) {
-      if (use[a] && !strcasecmp(grid->array[a].name, region_names[k])) *regions = a;
-    }
-  }
-  for (int a = 0; a < grid->narray && nuse == 1; a++) {
-    if (use[a]) *regions = a;
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Tag set of one cell: a group from each array in use. */
-static PetscErrorCode cell_tags(const SbVtkGrid *grid, const PetscBool use[], int regions, PetscInt c,
-                                int dim, SbImport *im, PetscInt *tags)
-{
-  static const char *const kind[4] = {"point", "curve", "surface", "volume"};
-  PetscInt group[SB_VTK_ARRAYS], n = 0;
-
-  PetscFunctionBeginUser;
-  for (int a = 0; a < grid->narray; a++) {
-    const PetscInt known = im->ngroup;
-    const int64_t value = use[a] ? (int64_t)grid->array[a].value[c] : 0;
-
-    if (!use[a]) continue;
-    /* numbers of regions stay; those of other arrays lie apart from them */
-    PetscCall(
-      SbImportGroup(im, dim, a == regions ? value : value + ((int64_t)(a + 1) << 42), NULL, &group[n]));
-    if (im->ngroup > known)
-      (void)snprintf(im->group[group[n]].name, SB_GROUP_MAX, "%.40s%s%s_%lld",
-                     a == regions ? "" : grid->array[a].name, a == regions ? "" : "_", kind[dim],
-                     (long long)value);
-    n++;
-  }
-  PetscCall(SbImportTagSet(im, n, group, tags));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* ------------------------------------------------------------------ cells */
 
 /* What gmsh calls a cell; a type that is not known is an error. */
@@ -189,10 +141,23 @@ PetscErrorCode SbVtkGridFill(SbVtkGrid *grid, SbImport *im)
   int64_t begin = 0, end;
   PetscBool use[SB_VTK_ARRAYS];
   PetscInt vert[4] = {0, 0, 0, 0}, tags;
-  int regions, type;
+  int regions, type, nuse = 0;
 
   PetscFunctionBeginUser;
-  PetscCall(choose_arrays(grid, use, &regions));
+  // which arrays become groups, and which of them is the one of regions
+  regions = -1;
+  for (int a = 0; a < grid->narray; a++) {
+    PetscCall(numbers_regions(grid->ncell, grid->array[a].value, &use[a]));
+    nuse += use[a];
+  }
+  for (size_t k = 0; k < PETSC_STATIC_ARRAY_LENGTH(region_names) && regions < 0; k++) {
+    for (int a = 0; a < grid->narray && regions < 0; a++) {
+      if (use[a] && !strcasecmp(grid->array[a].name, region_names[k])) regions = a;
+    }
+  }
+  for (int a = 0; a < grid->narray && nuse == 1; a++) {
+    if (use[a]) regions = a;
+  }
   for (PetscInt c = 0; c < grid->ncell; c++, begin = end) {
     const double value = grid->end[c];
 
@@ -211,10 +176,29 @@ PetscErrorCode SbVtkGridFill(SbVtkGrid *grid, SbImport *im)
                       (long long)im->nvert - 1);
       if (k < 4) vert[k] = (PetscInt)point;
     }
-    /* groups of simplices, but not of a line of many pieces */
+    // a simplex, but not a line of many pieces, has a group from each array in use
     tags = 0;
-    if (end - begin == SbGmshTypes[type].dim + 1)
-      PetscCall(cell_tags(grid, use, regions, c, SbGmshTypes[type].dim, im, &tags));
+    if (end - begin == SbGmshTypes[type].dim + 1) {
+      int dim = SbGmshTypes[type].dim;
+      static const char *const kind[4] = {"point", "curve", "surface", "volume"};
+      PetscInt group[SB_VTK_ARRAYS], n = 0;
+
+      for (int a = 0; a < grid->narray; a++) {
+        const PetscInt known = im->ngroup;
+        const int64_t number = use[a] ? (int64_t)grid->array[a].value[c] : 0;
+
+        if (!use[a]) continue;
+        /* numbers of regions stay; those of other arrays lie apart from them */
+        PetscCall(
+          SbImportGroup(im, dim, a == regions ? number : number + ((int64_t)(a + 1) << 42), NULL, &group[n]));
+        if (im->ngroup > known)
+          (void)snprintf(im->group[group[n]].name, SB_GROUP_MAX, "%.40s%s%s_%lld",
+                         a == regions ? "" : grid->array[a].name, a == regions ? "" : "_", kind[dim],
+                         (long long)number);
+        n++;
+      }
+      PetscCall(SbImportTagSet(im, n, group, &tags));
+    }
     PetscCall(SbImportAddElement(im, type, vert, tags, c));
   }
   PetscCall(SbImportCheckTypes(im));

@@ -154,15 +154,19 @@ static void write_names(Out *out)
 
 /* ------------------------------------------------------------------ version 4.1 */
 
-static void box_of(const Out *out, int dim, PetscInt tags, PetscReal box[6])
+static void write_entity(Out *out, int dim, PetscInt tags)
 {
+  const SbImport *im = out->im;
+  PetscReal box[6];
+  PetscInt k = im->tags_start[tags], g;
   const SbItems *item = &out->im->item[dim];
 
+  // extent of the items of this tag set
   for (int i = 0; i < 3; i++) box[i] = PETSC_MAX_REAL, box[3 + i] = PETSC_MIN_REAL;
-  for (PetscInt k = 0; k < item->n; k++) {
-    if (item->tags[k] != tags) continue;
+  for (PetscInt j = 0; j < item->n; j++) {
+    if (item->tags[j] != tags) continue;
     for (int a = 0; a <= dim; a++) {
-      const PetscReal *x = out->im->x + 3 * item->vert[(dim + 1) * k + a];
+      const PetscReal *x = out->im->x + 3 * item->vert[(dim + 1) * j + a];
 
       for (int i = 0; i < 3; i++) {
         box[i] = PetscMin(box[i], x[i]);
@@ -172,15 +176,6 @@ static void box_of(const Out *out, int dim, PetscInt tags, PetscReal box[6])
   }
   for (int i = 0; i < 6; i++)
     if (box[i] == PETSC_MAX_REAL || box[i] == PETSC_MIN_REAL) box[i] = 0;
-}
-
-static void write_entity(Out *out, int dim, PetscInt tags)
-{
-  const SbImport *im = out->im;
-  PetscReal box[6];
-  PetscInt k = im->tags_start[tags], g;
-
-  box_of(out, dim, tags, box);
   put_int(out, tags + 1, ' ');
   for (int i = 0; i < (dim ? 6 : 3); i++) put_real(out, box[i], ' ');
   put_size(out, count_groups(im, tags, dim), ' ');
@@ -266,27 +261,6 @@ static PetscErrorCode write_elements_41(Out *out)
 
 /* ------------------------------------------------------------------ version 2.2 */
 
-/* An element, once for each of its groups; without any, once with group 0. In binary each has a header of its own. */
-static void write_item_22(Out *out, int dim, PetscInt i, int64_t *number)
-{
-  const SbItems *item = &out->im->item[dim];
-  const PetscInt *v = item->vert + (size_t)(dim + 1) * (size_t)i;
-  PetscInt k = out->im->tags_start[item->tags[i]], g = next_group(out->im, item->tags[i], dim, &k);
-
-  do {
-    if (!out->binary) put_int(out, (*number), ' ');
-    put_int(out, gmsh_type[dim], ' ');
-    if (out->binary) put_int(out, 1, ' ');
-    put_int(out, 2, ' ');
-    if (out->binary) put_int(out, (*number), ' ');
-    put_int(out, g < 0 ? 0 : out->number[g], ' ');
-    put_int(out, item->tags[i] + 1, ' ');
-    for (int a = 0; a <= dim; a++) put_int(out, v[a] + 1, a < dim ? ' ' : '\n');
-    (*number)++;
-    g = g < 0 ? -1 : next_group(out->im, item->tags[i], dim, &k);
-  } while (g >= 0);
-}
-
 static PetscErrorCode write_elements_22(Out *out)
 {
   const SbImport *im = out->im;
@@ -301,7 +275,27 @@ static PetscErrorCode write_elements_22(Out *out)
   (void)fprintf(out->file, "$Elements\n%lld\n", (long long)n);
   for (int d = 0; d < 4; d++) {
     for (PetscInt i = 0; i < im->item[d].n; i++) {
-      write_item_22(out, d, i, &number);
+      const SbItems *item = &out->im->item[d];
+      const PetscInt *v;
+      PetscInt k, g;
+
+      /* an element, once for each of its groups; without any, once with group 0. In binary each has a header
+         of its own. */
+      v = item->vert + (size_t)(d + 1) * (size_t)i;
+      k = out->im->tags_start[item->tags[i]];
+      g = next_group(out->im, item->tags[i], d, &k);
+      do {
+        if (!out->binary) put_int(out, number, ' ');
+        put_int(out, gmsh_type[d], ' ');
+        if (out->binary) put_int(out, 1, ' ');
+        put_int(out, 2, ' ');
+        if (out->binary) put_int(out, number, ' ');
+        put_int(out, g < 0 ? 0 : out->number[g], ' ');
+        put_int(out, item->tags[i] + 1, ' ');
+        for (int a = 0; a <= d; a++) put_int(out, v[a] + 1, a < d ? ' ' : '\n');
+        number++;
+        g = g < 0 ? -1 : next_group(out->im, item->tags[i], d, &k);
+      } while (g >= 0);
       PetscCall(report_progress(out));
     }
   }

@@ -13,13 +13,6 @@
 
 #define FORMAT 1
 
-static PetscErrorCode sum_ranks(MPI_Comm comm, uint64_t mine, uint64_t *sum)
-{
-  PetscFunctionBeginUser;
-  PetscCallMPI(MPI_Allreduce(&mine, sum, 1, MPI_UINT64_T, MPI_SUM, comm));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* ------------------------------------------------------------------ what of a run is in the file */
 
 typedef struct {
@@ -81,7 +74,7 @@ static PetscErrorCode checksum_of(const SbOrder *order, uint64_t salt, const Pet
   PetscFunctionBeginUser;
   for (PetscInt i = 0; i < 3 * order->n; i++)
     mine += SbMixReal(3 * (uint64_t)order->start + (uint64_t)i + (salt << 48), slice[i]);
-  PetscCall(sum_ranks(order->comm, mine, sum));
+  PetscCallMPI(MPI_Allreduce(&mine, sum, 1, MPI_UINT64_T, MPI_SUM, order->comm));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

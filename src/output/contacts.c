@@ -54,26 +54,6 @@ struct _p_SbContacts {
 
 /* ------------------------------------------------------------------ to the ranks that write them */
 
-static void fill(const SbContactPoint *p, PetscReal *r)
-{
-  const PetscReal push = SbDot3(p->force, p->normal);
-
-  r[FIRST] = (PetscReal)p->id[1];
-  r[EFFECT] = (PetscReal)p->effect;
-  r[KIND] = (PetscReal)p->id[0];
-  r[SECOND] = (PetscReal)p->id[2];
-  r[BODY] = (PetscReal)p->body[0];
-  r[OTHER] = (PetscReal)p->body[1];
-  r[GAP] = p->gap;
-  r[PUSH] = push;
-  for (int k = 0; k < 3; k++) {
-    r[X + k] = p->x[k];
-    r[NORMAL + k] = p->normal[k];
-    r[FORCE + k] = p->force[k];
-    r[DRAG + k] = p->force[k] - push * p->normal[k];
-  }
-}
-
 static int by_keys(const void *a, const void *b)
 {
   const PetscReal *p = (const PetscReal *)a, *q = (const PetscReal *)b;
@@ -98,9 +78,25 @@ static PetscErrorCode share_points(SbContacts c, PetscMPIInt size)
   PetscCall(PetscMalloc2(c->list.n, &dest, RECORD * (size_t)c->list.n, &mine));
   for (PetscInt i = 0; i < c->list.n; i++) {
     const SbContactPoint *p = &c->list.point[i];
+    PetscReal *r, push;
 
     dest[i] = (PetscMPIInt)((PetscInt64)p->id[1] * size / ((PetscInt64)bound + 1));
-    fill(p, mine + RECORD * (size_t)i);
+    r = mine + RECORD * (size_t)i;
+    push = SbDot3(p->force, p->normal);
+    r[FIRST] = (PetscReal)p->id[1];
+    r[EFFECT] = (PetscReal)p->effect;
+    r[KIND] = (PetscReal)p->id[0];
+    r[SECOND] = (PetscReal)p->id[2];
+    r[BODY] = (PetscReal)p->body[0];
+    r[OTHER] = (PetscReal)p->body[1];
+    r[GAP] = p->gap;
+    r[PUSH] = push;
+    for (int k = 0; k < 3; k++) {
+      r[X + k] = p->x[k];
+      r[NORMAL + k] = p->normal[k];
+      r[FORCE + k] = p->force[k];
+      r[DRAG + k] = p->force[k] - push * p->normal[k];
+    }
   }
   PetscCall(PetscFree(c->record));
   PetscCall(SbRouteCreate(c->share.comm, c->list.n, dest, &route));

@@ -278,33 +278,6 @@ static PetscErrorCode monitor(SbRun run, const SbStep *step, void *ctx)
 
 /* ------------------------------------------------------------------ beginning, and going on after a restart */
 
-/* Keeps the rows up to step0 of a file with the same columns; says so when there is none. Rank 0. */
-static PetscErrorCode keep_rows(SbHistory h, PetscInt step0, PetscBool *kept, size_t nmessage, char message[])
-{
-  char *text, *line, *end;
-  size_t size;
-  SbChunk chunk;
-
-  PetscFunctionBeginUser;
-  *kept = PETSC_FALSE;
-  PetscCall(SbFileRead(h->path, &text, &size));
-  if (text && size >= h->size && !strncmp(text, h->row, h->size)) {
-    // Rows are in the order of steps; one without its end was cut off by a kill.
-    for (line = text + h->size; (end = strchr(line, '\n')); line = end + 1) {
-      const long step = strtol(line, NULL, 10);
-
-      if (step > step0) break;
-      h->last_step = (PetscInt)step;
-    }
-    chunk.text = text;
-    chunk.size = (size_t)(line - text);
-    SbFileReplace(h->path, 1, &chunk, nmessage, message);
-    *kept = PETSC_TRUE;
-  }
-  PetscCall(PetscFree(text));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 static PetscErrorCode open_file(SbRun run, SbOutput out, size_t nmessage, char message[])
 {
   SbHistory h = out->hist;
@@ -313,7 +286,26 @@ static PetscErrorCode open_file(SbRun run, SbOutput out, size_t nmessage, char m
   PetscFunctionBeginUser;
   PetscCall(put_header(run, out, h));
   if (out->restarted) {
-    PetscCall(keep_rows(h, run->step0, &kept, nmessage, message));
+    char *text, *line, *end;
+    size_t size;
+    SbChunk chunk;
+
+    // rows up to step0 of a file with the same columns are kept; one without its end was cut off by a kill
+    kept = PETSC_FALSE;
+    PetscCall(SbFileRead(h->path, &text, &size));
+    if (text && size >= h->size && !strncmp(text, h->row, h->size)) {
+      for (line = text + h->size; (end = strchr(line, '\n')); line = end + 1) {
+        const long step = strtol(line, NULL, 10);
+
+        if (step > run->step0) break;
+        h->last_step = (PetscInt)step;
+      }
+      chunk.text = text;
+      chunk.size = (size_t)(line - text);
+      SbFileReplace(h->path, 1, &chunk, nmessage, message);
+      kept = PETSC_TRUE;
+    }
+    PetscCall(PetscFree(text));
 
     /* a history with other columns stays, under another name */
     if (!kept && !access(h->path, F_OK)) {

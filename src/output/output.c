@@ -66,29 +66,6 @@ PetscErrorCode SbOutputFile(SbRun run, const char *name, size_t size, char path[
 
 /* ------------------------------------------------------------------ options */
 
-/* Scenario file on the command line; empty without one. */
-static PetscErrorCode find_scenario(size_t size, char file[])
-{
-  char **args;
-  int n;
-
-  PetscFunctionBeginUser;
-  file[0] = 0;
-  PetscCall(PetscGetArgs(&n, &args));
-  for (int i = 1; i < n; i++) {
-    const PetscBool named =
-      (PetscBool)(!strcmp(args[i - 1], "-options_file") || !strcmp(args[i - 1], "-options_file_yaml"));
-    const char *dot = strrchr(args[i], '.');
-
-    if (named || (args[i][0] != '-' && args[i - 1][0] != '-' && dot &&
-                  (!strcmp(dot, ".opts") || !strcmp(dot, ".yml") || !strcmp(dot, ".yaml")))) {
-      PetscCall(PetscStrncpy(file, args[i], size));
-      break;
-    }
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* Fields asked for, those of a static run only where it is one; body always. */
 static PetscErrorCode read_fields(SbOutput out, const SbScope *scope, PetscBool dynamic)
 {
@@ -122,11 +99,26 @@ static PetscErrorCode read_options(SbOutput out, SbModel model)
 {
   SbScope scope;
   PetscInt precision;
+  char **args;
+  int n;
 
   PetscFunctionBeginUser;
   /* the folder; without a name, out/<scenario without folder and ending> */
   PetscCall(SbScopeSet(&scope, "", "", ""));
-  PetscCall(find_scenario(sizeof(out->scenario), out->scenario));
+  // the scenario file on the command line; empty without one
+  out->scenario[0] = 0;
+  PetscCall(PetscGetArgs(&n, &args));
+  for (int i = 1; i < n; i++) {
+    const PetscBool named =
+      (PetscBool)(!strcmp(args[i - 1], "-options_file") || !strcmp(args[i - 1], "-options_file_yaml"));
+    const char *dot = strrchr(args[i], '.');
+
+    if (named || (args[i][0] != '-' && args[i - 1][0] != '-' && dot &&
+                  (!strcmp(dot, ".opts") || !strcmp(dot, ".yml") || !strcmp(dot, ".yaml")))) {
+      PetscCall(PetscStrncpy(out->scenario, args[i], sizeof(out->scenario)));
+      break;
+    }
+  }
   PetscCall(SbOptionString(&scope, "output_dir", sizeof(out->dir), out->dir));
   if (!out->dir[0]) {
     const char *base = strrchr(out->scenario, '/'), *dot;
@@ -215,29 +207,6 @@ static PetscErrorCode keep_identity(SbRun run, SbOutput out, const char *text)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The complete scenario as text on rank 0 (free() it), and on all ranks the part of it that checkpoints carry. */
-static PetscErrorCode view_scenario(SbRun run, SbOutput out, char **text, size_t *size)
-{
-  PetscViewer viewer;
-  FILE *memory = out->rank ? NULL : open_memstream(text, size);
-  PetscMPIInt n = 0;
-
-  PetscFunctionBeginUser;
-  PetscCheck(out->rank || memory, PETSC_COMM_SELF, PETSC_ERR_MEM, "No memory for scenario.opts");
-  PetscCall(PetscViewerASCIIOpenWithFILE(out->comm, memory, &viewer));
-  PetscCall(SbOptionsView(viewer));
-  PetscCall(PetscViewerDestroy(&viewer));
-  if (!out->rank) {
-    (void)fclose(memory);
-    PetscCall(keep_identity(run, out, *text));
-    PetscCall(PetscMPIIntCast((PetscInt)strlen(out->identity) + 1, &n));
-  }
-  PetscCallMPI(MPI_Bcast(&n, 1, MPI_INT, 0, out->comm));
-  if (out->rank) PetscCall(PetscMalloc1(n, &out->identity));
-  PetscCallMPI(MPI_Bcast(out->identity, n, MPI_CHAR, 0, out->comm));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* ------------------------------------------------------------------ life of the output */
 
 static PetscErrorCode destroy(SbRun run)
@@ -298,6 +267,9 @@ PetscErrorCode SbOutputAttach(SbRun run)
   char *scenario = NULL, path[PETSC_MAX_PATH_LEN], message[SB_MESSAGE_MAX] = "";
   size_t size = 0;
   SbChunk chunk;
+  PetscViewer viewer;
+  FILE *memory;
+  PetscMPIInt n = 0;
 
   PetscFunctionBeginUser;
   PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_OUTPUT], 0, 0, 0, 0));
@@ -315,7 +287,20 @@ PetscErrorCode SbOutputAttach(SbRun run)
 
   /* the state to go on from; a checkpoint that is refused leaves the folder as it was */
   PetscCall(SbOutputCountNodes(run->model->space, out));
-  PetscCall(view_scenario(run, out, &scenario, &size));
+  // the complete scenario as text on rank 0, and on all ranks the part of it that checkpoints carry
+  memory = out->rank ? NULL : open_memstream(&scenario, &size);
+  PetscCheck(out->rank || memory, PETSC_COMM_SELF, PETSC_ERR_MEM, "No memory for scenario.opts");
+  PetscCall(PetscViewerASCIIOpenWithFILE(out->comm, memory, &viewer));
+  PetscCall(SbOptionsView(viewer));
+  PetscCall(PetscViewerDestroy(&viewer));
+  if (!out->rank) {
+    (void)fclose(memory);
+    PetscCall(keep_identity(run, out, scenario));
+    PetscCall(PetscMPIIntCast((PetscInt)strlen(out->identity) + 1, &n));
+  }
+  PetscCallMPI(MPI_Bcast(&n, 1, MPI_INT, 0, out->comm));
+  if (out->rank) PetscCall(PetscMalloc1(n, &out->identity));
+  PetscCallMPI(MPI_Bcast(out->identity, n, MPI_CHAR, 0, out->comm));
   if (out->restart[0]) PetscCall(SbCheckpointLoad(run, out->restart));
   if (out->restart[0]) PetscCall(SbFramesCheck(run, out));
   if (!out->rank) PetscCall(SbFolderClear(out, run->step0));

@@ -21,31 +21,26 @@ struct _p_SbPoints {
 
 /* ------------------------------------------------------------------ set-up */
 
-/* The cells around each owned vertex: all of them are local. */
-static PetscErrorCode find_around(SbMesh mesh, SbPoints p)
-{
-  PetscInt *key;
-
-  PetscFunctionBeginUser;
-  PetscCall(SbGroupByKey(4 * mesh->ncell, mesh->cell, mesh->nvert_owned, &p->start, &p->corner));
-  PetscCall(PetscMalloc1(p->start[mesh->nvert_owned], &key));
-  for (PetscInt i = 0; i < p->start[mesh->nvert_owned]; i++) key[i] = mesh->cell_orig[p->corner[i] / 4];
-  for (PetscInt v = 0; v < mesh->nvert_owned; v++)
-    PetscCall(
-      PetscSortIntWithArray(p->start[v + 1] - p->start[v], key + p->start[v], p->corner + p->start[v]));
-  PetscCall(PetscFree(key));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode SbPointsPrepare(SbRun run, SbOutput out)
 {
   const SbSpace s = run->model->space;
+  PetscInt *key;
 
   PetscFunctionBeginUser;
   if (out->points) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscNew(&out->points));
   if (s->vertices) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(find_around(s->mesh, out->points));
+  // the cells around each owned vertex: all of them are local
+  PetscCall(SbGroupByKey(4 * s->mesh->ncell, s->mesh->cell, s->mesh->nvert_owned, &out->points->start,
+                         &out->points->corner));
+  PetscCall(PetscMalloc1(out->points->start[s->mesh->nvert_owned], &key));
+  for (PetscInt i = 0; i < out->points->start[s->mesh->nvert_owned]; i++)
+    key[i] = s->mesh->cell_orig[out->points->corner[i] / 4];
+  for (PetscInt v = 0; v < s->mesh->nvert_owned; v++)
+    PetscCall(PetscSortIntWithArray(out->points->start[v + 1] - out->points->start[v],
+                                    key + out->points->start[v],
+                                    out->points->corner + out->points->start[v]));
+  PetscCall(PetscFree(key));
 
   /* weights of the means over cells */
   PetscCall(PetscMalloc1(s->mesh->ncell, &out->points->V));

@@ -47,31 +47,13 @@ static void duration(PetscReal seconds, size_t size, char text[])
     SbFormat(size, text, "%ld:%02ld", s / 60, s % 60);
 }
 
-static void format_line(SbRun run, SbProgress p, const SbStep *step, size_t size, char line[])
-{
-  const PetscReal done = step->t - p->t_start, speed = step->wall > 0. ? done / step->wall : 0.;
-  char count[32], left[16] = "-", times[16] = "-";
-
-  if (step->step_end > 0)
-    (void)snprintf(count, sizeof(count), "%" PetscInt_FMT "/%" PetscInt_FMT, step->step, step->step_end);
-  else
-    (void)snprintf(count, sizeof(count), "%" PetscInt_FMT, step->step);
-  if (speed > 0.) {
-    duration(PetscMax(step->t_end - step->t, 0.) / speed, sizeof(left), left);
-    if (run->model->dynamic) (void)snprintf(times, sizeof(times), "%.3gx", (double)speed);
-  }
-  (void)snprintf(line, size, "%13s %10.4g %6.1f %7.1f %10.3e %10.3e %8s %8s", count, (double)step->t,
-                 p->steps ? (double)p->newton / (double)p->steps : 0.,
-                 p->steps ? (double)p->linear / (double)p->steps : 0., (double)step->energies.kinetic,
-                 (double)step->energies.strain, times, left);
-}
-
 /* On rank 0 only: nobody else has anything to say. */
 static PetscErrorCode monitor(SbRun run, const SbStep *step, void *ctx)
 {
   SbProgress p = (SbProgress)ctx;
   const PetscReal wait = p->terminal ? .2 : 2.;
-  char line[160];
+  char line[160], count[32], left[16] = "-", times[16] = "-";
+  PetscReal done, speed;
 
   PetscFunctionBeginUser;
   /* it was printed before a re-meshing, or is the last one after all */
@@ -89,7 +71,21 @@ static PetscErrorCode monitor(SbRun run, const SbStep *step, void *ctx)
     if (!step->last && step->wall - p->last < wait) PetscFunctionReturn(PETSC_SUCCESS);
   }
   PetscCall(PetscLogEventBegin(p->event, 0, 0, 0, 0));
-  format_line(run, p, step, sizeof(line), line);
+  // the line: step, time, iterations, energies, speed, time left
+  done = step->t - p->t_start;
+  speed = step->wall > 0. ? done / step->wall : 0.;
+  if (step->step_end > 0)
+    (void)snprintf(count, sizeof(count), "%" PetscInt_FMT "/%" PetscInt_FMT, step->step, step->step_end);
+  else
+    (void)snprintf(count, sizeof(count), "%" PetscInt_FMT, step->step);
+  if (speed > 0.) {
+    duration(PetscMax(step->t_end - step->t, 0.) / speed, sizeof(left), left);
+    if (run->model->dynamic) (void)snprintf(times, sizeof(times), "%.3gx", (double)speed);
+  }
+  (void)snprintf(line, sizeof(line), "%13s %10.4g %6.1f %7.1f %10.3e %10.3e %8s %8s", count, (double)step->t,
+                 p->steps ? (double)p->newton / (double)p->steps : 0.,
+                 p->steps ? (double)p->linear / (double)p->steps : 0., (double)step->energies.kinetic,
+                 (double)step->energies.strain, times, left);
   PetscCall(PetscFPrintf(PETSC_COMM_SELF, PETSC_STDOUT, p->terminal ? "\r%-*s" : "%.*s\n", WIDTH, line));
   (void)fflush(PETSC_STDOUT);
   p->open = p->terminal;

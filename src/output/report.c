@@ -89,47 +89,6 @@ static PetscErrorCode print_bodies(SbModel m, SbOutput out)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode print_effects(SbModel m)
-{
-  char text[1024] = "";
-  size_t n = 0;
-
-  PetscFunctionBeginUser;
-  for (PetscInt e = 0; e < m->neffect && n < sizeof(text); e++) {
-    const SbEffect effect = m->effect[e];
-
-    n += (size_t)snprintf(text + n, sizeof(text) - n, "%s%s", e ? ", " : "", effect->name);
-    if (strcmp(effect->name, effect->type) && n < sizeof(text))
-      n += (size_t)snprintf(text + n, sizeof(text) - n, " (%s)", effect->type);
-  }
-  PetscCall(entry("effects", "%s", text[0] ? text : "none"));
-  for (PetscInt e = 0; e < m->neffect; e++) {
-    if (m->effect[e]->note[0]) PetscCall(entry("effect", "%s: %s", m->effect[e]->name, m->effect[e]->note));
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode print_time(SbRun run)
-{
-  char name[SB_NAME_MAX];
-
-  PetscFunctionBeginUser;
-  PetscCall(SbPresetName(run, sizeof(name), name));
-  if (run->arc.on)
-    PetscCall(entry("time", "%s, along the path of equilibria; load increment of the first step %g", name,
-                    1. / (double)run->static_steps));
-  else if (!run->model->dynamic)
-    PetscCall(entry("time", "%s, %" PetscInt_FMT " load step%s", name, run->static_steps,
-                    run->static_steps == 1 ? "" : "s"));
-  else if (run->fixed_step)
-    PetscCall(entry("time", "%s, t = %g to %g s in steps of %g s", name, (double)run->t0, (double)run->t_end,
-                    (double)run->dt));
-  else
-    PetscCall(entry("time", "%s, t = %g to %g s, adaptive steps, the first one %g s", name, (double)run->t0,
-                    (double)run->t_end, (double)run->dt));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 static PetscErrorCode print_output(SbOutput out)
 {
   char text[1024] = "";
@@ -171,8 +130,9 @@ static PetscErrorCode print_output(SbOutput out)
 PetscErrorCode SbReportHeader(SbRun run)
 {
   SbOutput out = (SbOutput)run->output;
-  char petsc[256], threads[64] = "one thread";
+  char petsc[256], threads[64] = "one thread", text[1024] = "", name[SB_NAME_MAX];
   int most;
+  size_t n = 0;
 
   PetscFunctionBeginUser;
   if (out->quiet || out->rank) PetscFunctionReturn(PETSC_SUCCESS);
@@ -185,8 +145,33 @@ PetscErrorCode SbReportHeader(SbRun run)
                          SB_VERSION, petsc, (int)out->size, out->size == 1 ? "" : "s", threads));
   PetscCall(print_bodies(run->model, out));
   if (out->scenario[0]) PetscCall(entry("scenario", "%s", out->scenario));
-  PetscCall(print_effects(run->model));
-  PetscCall(print_time(run));
+  // effects, and what they have to say
+  for (PetscInt e = 0; e < run->model->neffect && n < sizeof(text); e++) {
+    const SbEffect effect = run->model->effect[e];
+
+    n += (size_t)snprintf(text + n, sizeof(text) - n, "%s%s", e ? ", " : "", effect->name);
+    if (strcmp(effect->name, effect->type) && n < sizeof(text))
+      n += (size_t)snprintf(text + n, sizeof(text) - n, " (%s)", effect->type);
+  }
+  PetscCall(entry("effects", "%s", text[0] ? text : "none"));
+  for (PetscInt e = 0; e < run->model->neffect; e++) {
+    if (run->model->effect[e]->note[0])
+      PetscCall(entry("effect", "%s: %s", run->model->effect[e]->name, run->model->effect[e]->note));
+  }
+  // integrator and steps
+  PetscCall(SbPresetName(run, sizeof(name), name));
+  if (run->arc.on)
+    PetscCall(entry("time", "%s, along the path of equilibria; load increment of the first step %g", name,
+                    1. / (double)run->static_steps));
+  else if (!run->model->dynamic)
+    PetscCall(entry("time", "%s, %" PetscInt_FMT " load step%s", name, run->static_steps,
+                    run->static_steps == 1 ? "" : "s"));
+  else if (run->fixed_step)
+    PetscCall(entry("time", "%s, t = %g to %g s in steps of %g s", name, (double)run->t0, (double)run->t_end,
+                    (double)run->dt));
+  else
+    PetscCall(entry("time", "%s, t = %g to %g s, adaptive steps, the first one %g s", name, (double)run->t0,
+                    (double)run->t_end, (double)run->dt));
   if (run->solver_parts[0] && strcmp(run->solver, run->solver_parts))
     PetscCall(entry("solver", "%s (%s): %s", run->solver, run->solver_parts, run->solver_reason));
   else
@@ -222,31 +207,6 @@ PetscErrorCode SbReportRemeshed(SbRun run, const SbRemeshed *event)
 }
 
 /* ------------------------------------------------------------------ after the run */
-
-static PetscErrorCode print_phases(SbRun run, const SbPhases *p)
-{
-  const PetscReal steps = (PetscReal)run->steps_total, tets = (PetscReal)run->model->mesh->Ncell;
-  const int per_run[] = {0, 1}; // mesh and set-up are not per step
-
-  PetscFunctionBeginUser;
-  PetscCall(PetscFPrintf(PETSC_COMM_SELF, PETSC_STDOUT, "\n%-15s %10s %8s %14s %18s\n", "phase", "seconds",
-                         "share", "ms per step", "us per step, tet"));
-  for (int i = 0; i < SB_PHASE_COUNT; i++) {
-    const SbPhase *phase = &p->phase[i];
-
-    if (!strncmp(phase->name, "contact", 7) && !(phase->seconds > 0)) continue; /* none in the scene */
-    PetscCall(PetscFPrintf(PETSC_COMM_SELF, PETSC_STDOUT, "%-15s %10.3f %7.1f%%", phase->name,
-                           (double)phase->seconds,
-                           (double)(p->total > 0. ? 100. * phase->seconds / p->total : 0.)));
-    if (steps > 0. && i != per_run[0] && i != per_run[1])
-      PetscCall(PetscFPrintf(PETSC_COMM_SELF, PETSC_STDOUT, " %14.3f %18.4f",
-                             (double)(1e3 * phase->seconds / steps),
-                             (double)(1e6 * phase->seconds / steps / tets)));
-    PetscCall(PetscFPrintf(PETSC_COMM_SELF, PETSC_STDOUT, "\n"));
-  }
-  PetscCall(PetscFPrintf(PETSC_COMM_SELF, PETSC_STDOUT, "%-15s %10.3f\n\n", "total", (double)p->total));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
 
 static void size_text(PetscReal bytes, size_t size, char text[])
 {
@@ -292,7 +252,28 @@ PetscErrorCode SbReportSummary(SbRun run)
                         "they come back, see docs/reference/guarantees.md",
                         run->energies.ninverted, (double)run->energies.min_J));
   if (out->quiet) PetscFunctionReturn(PETSC_SUCCESS);
-  if (!out->rank) PetscCall(print_phases(run, &phases));
+  // seconds of the phases
+  if (!out->rank) {
+    const PetscReal steps = (PetscReal)run->steps_total, tets = (PetscReal)run->model->mesh->Ncell;
+    const int per_run[] = {0, 1};
+
+    PetscCall(PetscFPrintf(PETSC_COMM_SELF, PETSC_STDOUT, "\n%-15s %10s %8s %14s %18s\n", "phase", "seconds",
+                           "share", "ms per step", "us per step, tet"));
+    for (int i = 0; i < SB_PHASE_COUNT; i++) {
+      const SbPhase *phase = &phases.phase[i];
+
+      if (!strncmp(phase->name, "contact", 7) && !(phase->seconds > 0)) continue; /* none in the scene */
+      PetscCall(PetscFPrintf(PETSC_COMM_SELF, PETSC_STDOUT, "%-15s %10.3f %7.1f%%", phase->name,
+                             (double)phase->seconds,
+                             (double)(phases.total > 0. ? 100. * phase->seconds / phases.total : 0.)));
+      if (steps > 0. && i != per_run[0] && i != per_run[1])
+        PetscCall(PetscFPrintf(PETSC_COMM_SELF, PETSC_STDOUT, " %14.3f %18.4f",
+                               (double)(1e3 * phase->seconds / steps),
+                               (double)(1e6 * phase->seconds / steps / tets)));
+      PetscCall(PetscFPrintf(PETSC_COMM_SELF, PETSC_STDOUT, "\n"));
+    }
+    PetscCall(PetscFPrintf(PETSC_COMM_SELF, PETSC_STDOUT, "%-15s %10.3f\n\n", "total", (double)phases.total));
+  }
 
   /* what effects have to say of their work */
   for (PetscInt e = 0; e < run->model->neffect; e++) {

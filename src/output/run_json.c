@@ -50,52 +50,6 @@ static void put_real(FILE *f, const char *key, PetscReal value, const char *end)
     (void)fprintf(f, "\"%s\": %.10g%s", key, (double)value, end);
 }
 
-static void put_versions(FILE *f)
-{
-  char petsc[32], mpi[MPI_MAX_LIBRARY_VERSION_STRING];
-  int n;
-
-  put_text(f, "version", SB_VERSION);
-  (void)snprintf(petsc, sizeof(petsc), "%d.%d.%d", PETSC_VERSION_MAJOR, PETSC_VERSION_MINOR,
-                 PETSC_VERSION_SUBMINOR);
-  put_text(f, "petsc", petsc);
-  (void)MPI_Get_library_version(mpi, &n);
-  mpi[strcspn(mpi, ",\n")] = 0;
-  put_text(f, "mpi", mpi);
-  put_text(f, "hdf5", H5_VERS_INFO);
-#if defined(__clang__)
-  put_text(f, "compiler", __VERSION__);
-#else
-  put_text(f, "compiler", "GCC " __VERSION__);
-#endif
-}
-
-static void put_bodies(FILE *f, SbModel m, SbOutput out)
-{
-  (void)fprintf(f, "  \"bodies\": [");
-  for (PetscInt b = 0; b < m->nbody; b++) {
-    const SbBody *body = &m->body[b];
-    const SbMaterial material = m->material[b];
-
-    (void)fprintf(f, "%s\n    {\"name\": ", b ? "," : "");
-    put_string(f, body->name);
-    (void)fprintf(f, ", \"mesh\": ");
-    put_string(f, body->mesh);
-    (void)fprintf(f, ", \"tets\": %" PetscInt_FMT ", \"vertices\": %" PetscInt_FMT ", ", body->ncell,
-                  body->nvert);
-    put_real(f, "volume", body->volume, ", ");
-    put_real(f, "min_dihedral", body->min_dihedral, ", ");
-    put_real(f, "max_radius_ratio", body->max_radius_ratio, ",\n     ");
-    (void)fprintf(f, "\"element\": \"%s\", \"nodes\": %" PetscInt_FMT ", \"unknowns\": %" PetscInt_FMT ", ",
-                  body->element, out->body_nodes[b], 3 * out->body_nodes[b]);
-    (void)fprintf(f, "\"material\": \"%s\", ", material->law);
-    put_real(f, "young", material->E, ", ");
-    put_real(f, "poisson", material->nu, ", ");
-    put_real(f, "density", material->density, "}");
-  }
-  (void)fprintf(f, "\n  ],\n");
-}
-
 static PetscErrorCode put_settings(FILE *f, SbRun run)
 {
   char name[SB_NAME_MAX], parts[SB_NAME_MAX] = "";
@@ -145,76 +99,107 @@ static PetscErrorCode put_file(const char *name, PetscInt64 bytes, void *ctx)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode put_costs(FILE *f, SbRun run, SbOutput out, const SbPhases *p)
-{
-  FileList list = {f, 0};
-
-  PetscFunctionBeginUser;
-  (void)fprintf(f,
-                "  \"steps\": %" PetscInt_FMT ",\n  \"newton_iterations\": %" PetscInt_FMT
-                ",\n  \"linear_iterations\": %" PetscInt_FMT ",\n  \"rejected_steps\": %" PetscInt_FMT ",\n",
-                run->steps_total, run->newton_total, run->linear_total, run->rejected_total);
-  (void)fprintf(f, "  \"seconds\": {");
-  for (int i = 0; i < SB_PHASE_COUNT; i++) put_real(f, p->phase[i].name, p->phase[i].seconds, ", ");
-  put_real(f, "time loop", run->seconds_solve, ", ");
-  put_real(f, "total", p->total, "},\n  ");
-  put_real(f, "cpu_seconds_max", p->cpu, ",\n  ");
-  put_real(f, "memory_max_bytes", p->memory_max, ",\n  ");
-  put_real(f, "memory_sum_bytes", p->memory_sum, ",\n");
-  (void)fprintf(f, "  \"files\": [");
-  PetscCall(SbOutputFiles(out, put_file, &list));
-  (void)fprintf(f, "\n  ],\n");
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static void put_remeshed(FILE *f, const SbOutput out)
-{
-  if (!out->nremeshed) return;
-  (void)fprintf(f, "  \"remeshed\": [");
-  for (PetscInt i = 0; i < out->nremeshed; i++) {
-    const SbRemeshed *r = &out->remeshed[i];
-
-    (void)fprintf(f, "%s\n    {\"body\": ", i ? "," : "");
-    put_string(f, r->body);
-    (void)fprintf(f, ", \"step\": %" PetscInt_FMT ", ", r->step);
-    put_real(f, "time", r->t, ", ");
-    (void)fprintf(f,
-                  "\"tets\": [%" PetscInt_FMT ", %" PetscInt_FMT "], \"vertices\": [%" PetscInt_FMT
-                  ", %" PetscInt_FMT "], \"vertices_moved\": %" PetscInt_FMT ",\n     ",
-                  r->tets[0], r->tets[1], r->vertices[0], r->vertices[1], r->moved);
-    put_real(f, "quality_before", r->quality[0], ", ");
-    put_real(f, "quality_after", r->quality[1], ", ");
-    put_real(f, "energy_before", r->energy[0], ", ");
-    put_real(f, "energy_after", r->energy[1], ",\n     ");
-    put_real(f, "rigid_speed", r->speed, ", ");
-    put_real(f, "centre_shift", r->shift, "}");
-  }
-  (void)fprintf(f, "\n  ],\n");
-}
-
 /* The whole text, on one rank; phases is NULL when nothing was timed. */
 static PetscErrorCode write_json(SbRun run, SbOutput out, const char *status, const char *reason,
                                  const SbPhases *phases, size_t nmessage, char message[])
 {
-  char host[256] = "", path[PETSC_MAX_PATH_LEN], *text = NULL;
+  char host[256] = "", path[PETSC_MAX_PATH_LEN], *text = NULL, petsc[32], mpi[MPI_MAX_LIBRARY_VERSION_STRING];
   size_t size = 0;
   FILE *f = open_memstream(&text, &size);
   SbChunk chunk;
+  int n;
 
   PetscFunctionBeginUser;
   PetscCheck(f, PETSC_COMM_SELF, PETSC_ERR_MEM, "No memory for run.json");
   (void)fprintf(f, "{\n  \"program\": \"supple\",\n");
-  put_versions(f);
+  // versions of the program and its libraries
+  put_text(f, "version", SB_VERSION);
+  (void)snprintf(petsc, sizeof(petsc), "%d.%d.%d", PETSC_VERSION_MAJOR, PETSC_VERSION_MINOR,
+                 PETSC_VERSION_SUBMINOR);
+  put_text(f, "petsc", petsc);
+  (void)MPI_Get_library_version(mpi, &n);
+  mpi[strcspn(mpi, ",\n")] = 0;
+  put_text(f, "mpi", mpi);
+  put_text(f, "hdf5", H5_VERS_INFO);
+#if defined(__clang__)
+  put_text(f, "compiler", __VERSION__);
+#else
+  put_text(f, "compiler", "GCC " __VERSION__);
+#endif
   (void)gethostname(host, sizeof(host) - 1);
   put_text(f, "host", host);
   (void)fprintf(f, "  \"cores\": %ld,\n  \"ranks\": %d,\n  \"threads_per_rank\": %d,\n",
                 sysconf(_SC_NPROCESSORS_ONLN), (int)out->size, SbThreadsSetOne());
   put_text(f, "started", out->started);
   put_text(f, "scenario", out->scenario);
-  put_bodies(f, run->model, out);
+  // bodies with their meshes and materials
+  (void)fprintf(f, "  \"bodies\": [");
+  for (PetscInt b = 0; b < run->model->nbody; b++) {
+    const SbBody *body = &run->model->body[b];
+    const SbMaterial material = run->model->material[b];
+
+    (void)fprintf(f, "%s\n    {\"name\": ", b ? "," : "");
+    put_string(f, body->name);
+    (void)fprintf(f, ", \"mesh\": ");
+    put_string(f, body->mesh);
+    (void)fprintf(f, ", \"tets\": %" PetscInt_FMT ", \"vertices\": %" PetscInt_FMT ", ", body->ncell,
+                  body->nvert);
+    put_real(f, "volume", body->volume, ", ");
+    put_real(f, "min_dihedral", body->min_dihedral, ", ");
+    put_real(f, "max_radius_ratio", body->max_radius_ratio, ",\n     ");
+    (void)fprintf(f, "\"element\": \"%s\", \"nodes\": %" PetscInt_FMT ", \"unknowns\": %" PetscInt_FMT ", ",
+                  body->element, out->body_nodes[b], 3 * out->body_nodes[b]);
+    (void)fprintf(f, "\"material\": \"%s\", ", material->law);
+    put_real(f, "young", material->E, ", ");
+    put_real(f, "poisson", material->nu, ", ");
+    put_real(f, "density", material->density, "}");
+  }
+  (void)fprintf(f, "\n  ],\n");
   PetscCall(put_settings(f, run));
-  put_remeshed(f, out);
-  if (phases) PetscCall(put_costs(f, run, out, phases));
+  // events of re-meshing
+  if (out->nremeshed) {
+    (void)fprintf(f, "  \"remeshed\": [");
+    for (PetscInt i = 0; i < out->nremeshed; i++) {
+      const SbRemeshed *r = &out->remeshed[i];
+
+      (void)fprintf(f, "%s\n    {\"body\": ", i ? "," : "");
+      put_string(f, r->body);
+      (void)fprintf(f, ", \"step\": %" PetscInt_FMT ", ", r->step);
+      put_real(f, "time", r->t, ", ");
+      (void)fprintf(f,
+                    "\"tets\": [%" PetscInt_FMT ", %" PetscInt_FMT "], \"vertices\": [%" PetscInt_FMT
+                    ", %" PetscInt_FMT "], \"vertices_moved\": %" PetscInt_FMT ",\n     ",
+                    r->tets[0], r->tets[1], r->vertices[0], r->vertices[1], r->moved);
+      put_real(f, "quality_before", r->quality[0], ", ");
+      put_real(f, "quality_after", r->quality[1], ", ");
+      put_real(f, "energy_before", r->energy[0], ", ");
+      put_real(f, "energy_after", r->energy[1], ",\n     ");
+      put_real(f, "rigid_speed", r->speed, ", ");
+      put_real(f, "centre_shift", r->shift, "}");
+    }
+    (void)fprintf(f, "\n  ],\n");
+  }
+  // what the run took: steps, iterations, seconds, memory, files
+  if (phases) {
+    FileList list = {f, 0};
+
+    (void)fprintf(f,
+                  "  \"steps\": %" PetscInt_FMT ",\n  \"newton_iterations\": %" PetscInt_FMT
+                  ",\n  \"linear_iterations\": %" PetscInt_FMT ",\n  \"rejected_steps\": %" PetscInt_FMT
+                  ",\n",
+                  run->steps_total, run->newton_total, run->linear_total, run->rejected_total);
+    (void)fprintf(f, "  \"seconds\": {");
+    for (int i = 0; i < SB_PHASE_COUNT; i++)
+      put_real(f, phases->phase[i].name, phases->phase[i].seconds, ", ");
+    put_real(f, "time loop", run->seconds_solve, ", ");
+    put_real(f, "total", phases->total, "},\n  ");
+    put_real(f, "cpu_seconds_max", phases->cpu, ",\n  ");
+    put_real(f, "memory_max_bytes", phases->memory_max, ",\n  ");
+    put_real(f, "memory_sum_bytes", phases->memory_sum, ",\n");
+    (void)fprintf(f, "  \"files\": [");
+    PetscCall(SbOutputFiles(out, put_file, &list));
+    (void)fprintf(f, "\n  ],\n");
+  }
   put_text(f, "reason", reason);
   if (run->stopped) put_text(f, "go_on", run->seen.step > run->step0 ? "-restart latest" : "-restart auto");
   (void)fprintf(f, "  \"status\": \"%s\"\n}\n", status);

@@ -158,19 +158,6 @@ static PetscErrorCode read_other(const char *option, const char *text, const SbB
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode close_other(Other *o)
-{
-  PetscFunctionBeginUser;
-  PetscCall(PetscFree(o->x));
-  PetscCall(PetscFree(o->u));
-  PetscCall(PetscFree(o->v));
-  PetscCall(PetscFree(o->cell));
-  if (o->mesh >= 0) (void)H5Gclose(o->mesh);
-  if (o->frame >= 0) (void)H5Gclose(o->frame);
-  if (o->file >= 0) (void)H5Fclose(o->file);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* Values at the nodes of body b. */
 static PetscErrorCode take_over(SbRun run, const char *option, PetscInt b, Other *o)
 {
@@ -304,7 +291,13 @@ PetscErrorCode SbOutputTakeState(SbRun run)
     if (checkpoint) continue;
     SB_CATCH(&caught, read_other(option, m->start[b].state, &m->body[b], &o));
     if (!caught.code) PetscCall(take_over(run, option, b, &o));
-    PetscCall(close_other(&o));
+    PetscCall(PetscFree(o.x));
+    PetscCall(PetscFree(o.u));
+    PetscCall(PetscFree(o.v));
+    PetscCall(PetscFree(o.cell));
+    if (o.mesh >= 0) (void)H5Gclose(o.mesh);
+    if (o.frame >= 0) (void)H5Gclose(o.frame);
+    if (o.file >= 0) (void)H5Fclose(o.file);
     PetscCall(SbCaughtRaise(m->comm, &caught));
   }
   if (any) PetscCall(SbModelPrescribe(m, 0., run->U));

@@ -128,31 +128,6 @@ static PetscInt old_slot(const Work *w, PetscInt slot)
 
 /* ------------------------------------------------------------------ the mesh */
 
-/* Tets of another material, or of other groups, stay apart. */
-static PetscErrorCode number_regions(const Work *w, PetscInt region[])
-{
-  const SbGathered *g = w->g;
-  uint64_t(*kind)[2];
-  PetscInt nkind = 0;
-
-  PetscFunctionBeginUser;
-  PetscCall(PetscMalloc1(w->ncell, &kind));
-  for (PetscInt c = 0; c < w->ncell; c++) {
-    const uint64_t material = (uint64_t)g->cell_material[w->cell0 + c],
-                   sets = g->cell_set[5 * (w->cell0 + c)] & (w->groups | w->inclusions);
-    PetscInt k = 0;
-
-    while (k < nkind && (kind[k][0] != material || kind[k][1] != sets)) k++;
-    if (k == nkind) {
-      kind[nkind][0] = material;
-      kind[nkind++][1] = sets;
-    }
-    region[c] = k;
-  }
-  PetscCall(PetscFree(kind));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* A set that holds what lies inside as points, curves or triangles of a file would lose it. */
 static PetscErrorCode check_sets(const Work *w)
 {
@@ -189,19 +164,34 @@ static PetscErrorCode make_mesh(Work *w, const SbRemeshing *how)
   const SbGathered *g = w->g;
   char where[3 * SB_NAME_MAX];
   PetscErrorCode ierr;
-  PetscInt *region;
+  PetscInt *region, nkind = 0;
   SbOldMesh old = {.nvert = g->vert0[w->body + 1] - w->vert0,
                    .ncell = w->ncell,
                    .X = g->X + 3 * w->vert0,
                    .x = g->x + 3 * w->vert0,
                    .cell = w->cell,
                    .faces = &w->faces};
+  uint64_t(*kind)[2];
 
   PetscFunctionBeginUser;
   PetscCall(check_sets(w));
   PetscCall(PetscSNPrintf(where, sizeof(where), "body '%s', re-meshed", w->model->body[w->body].name));
   PetscCall(PetscMalloc1(w->ncell, &region));
-  PetscCall(number_regions(w, region));
+  // tets of another material, or of other groups, stay apart
+  PetscCall(PetscMalloc1(w->ncell, &kind));
+  for (PetscInt c = 0; c < w->ncell; c++) {
+    const uint64_t material = (uint64_t)g->cell_material[w->cell0 + c],
+                   sets = g->cell_set[5 * (w->cell0 + c)] & (w->groups | w->inclusions);
+    PetscInt k = 0;
+
+    while (k < nkind && (kind[k][0] != material || kind[k][1] != sets)) k++;
+    if (k == nkind) {
+      kind[nkind][0] = material;
+      kind[nkind++][1] = sets;
+    }
+    region[c] = k;
+  }
+  PetscCall(PetscFree(kind));
   old.region = region;
   ierr = SbRemeshBody(where, &old, how, &w->mesh);
   PetscCall(PetscFree(region));
@@ -226,30 +216,6 @@ static PetscInt list_triangles(const Work *w, PetscInt ncell, const PetscInt cel
     n++;
   }
   return n;
-}
-
-/* The new mesh, or the old one as it is. */
-static PetscErrorCode give_mesh(const Work *w, SbMemoryMesh **in_memory)
-{
-  const SbGathered *g = w->g;
-  const SbNewMesh *m = &w->mesh;
-  const PetscInt nold = g->vert0[w->body + 1] - w->vert0, ncell = w->done ? m->ncell : w->ncell,
-                 nvert = w->done ? m->nvert : nold, *cell = w->done ? m->cell : w->cell;
-  SbMemoryMesh *p;
-
-  PetscFunctionBeginUser;
-  PetscCall(SbMemoryMeshCreate(nvert, ncell, list_triangles(w, ncell, cell, NULL), in_memory));
-  p = *in_memory;
-  PetscCall(PetscArraycpy(p->x, w->done ? m->X : g->X + 3 * w->vert0, 3 * (size_t)nvert));
-  PetscCall(PetscArraycpy(p->cell, cell, 4 * (size_t)ncell));
-  (void)list_triangles(w, ncell, cell, p);
-  for (PetscInt v = 0; v < (w->done ? m->nkept : nold); v++)
-    p->vert_set[v] = g->vert_set[w->vert0 + (w->done ? m->kept[v] : v)] & w->groups;
-  for (PetscInt c = 0; c < ncell; c++) {
-    p->cell_set[c] = g->cell_set[5 * (w->cell0 + (w->done ? m->within[c] : c))] & (w->groups | w->inclusions);
-    for (int a = 0; a < 4; a++) p->vert_set[cell[4 * c + a]] |= p->cell_set[c] & w->groups;
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* ------------------------------------------------------------------ the values */
@@ -399,37 +365,36 @@ static PetscErrorCode keep_message(MPI_Comm comm, int line, const char *function
   return code;
 }
 
-/* Meshes one body again; what it cannot do goes to the message. */
-static PetscErrorCode try_body(Work *w, const SbRemeshing *how, SbRemeshOutcome *outcome)
-{
-  PetscErrorCode ierr;
-
-  PetscFunctionBeginUser;
-  PetscCall(PetscPushErrorHandler(keep_message, outcome));
-  ierr = make_mesh(w, how);
-  PetscCall(PetscPopErrorHandler());
-  w->done = (PetscBool)!ierr;
-  if (ierr) PetscCall(SbNewMeshDestroy(&w->mesh));
-  outcome->nvert[0] = w->g->vert0[w->body + 1] - w->vert0;
-  outcome->ncell[0] = w->ncell;
-  outcome->nvert[1] = w->done ? w->mesh.nvert : outcome->nvert[0];
-  outcome->ncell[1] = w->done ? w->mesh.ncell : w->ncell;
-  outcome->nmoved = w->mesh.nmoved;
-  outcome->quality = w->mesh.quality;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* Mesh, values and names of one body. */
 static PetscErrorCode finish_body(const Work *w, PetscInt step, SbRemeshResult *result)
 {
   SbGathered *next = &result->next;
-  SbMemoryMesh **in_memory = &result->in_memory[w->body];
+  SbMemoryMesh **in_memory = &result->in_memory[w->body], *p;
   const SbBody *body = &w->model->body[w->body];
   const size_t each = (size_t)next->width * (size_t)w->each;
   PetscReal *value = next->value + each * (size_t)next->cell0[w->body];
+  const SbGathered *g = w->g;
+  const SbNewMesh *m = &w->mesh;
+  PetscInt nold, ncell, nvert;
+  const PetscInt *cell;
 
   PetscFunctionBeginUser;
-  PetscCall(give_mesh(w, in_memory));
+  // the new mesh, or the old one as it is
+  nold = g->vert0[w->body + 1] - w->vert0;
+  ncell = w->done ? m->ncell : w->ncell;
+  nvert = w->done ? m->nvert : nold;
+  cell = w->done ? m->cell : w->cell;
+  PetscCall(SbMemoryMeshCreate(nvert, ncell, list_triangles(w, ncell, cell, NULL), in_memory));
+  p = *in_memory;
+  PetscCall(PetscArraycpy(p->x, w->done ? m->X : g->X + 3 * w->vert0, 3 * (size_t)nvert));
+  PetscCall(PetscArraycpy(p->cell, cell, 4 * (size_t)ncell));
+  (void)list_triangles(w, ncell, cell, p);
+  for (PetscInt v = 0; v < (w->done ? m->nkept : nold); v++)
+    p->vert_set[v] = g->vert_set[w->vert0 + (w->done ? m->kept[v] : v)] & w->groups;
+  for (PetscInt c = 0; c < ncell; c++) {
+    p->cell_set[c] = g->cell_set[5 * (w->cell0 + (w->done ? m->within[c] : c))] & (w->groups | w->inclusions);
+    for (int a = 0; a < 4; a++) p->vert_set[cell[4 * c + a]] |= p->cell_set[c] & w->groups;
+  }
   if (w->done) {
     for (PetscInt c = 0; c < w->mesh.ncell; c++) new_values(w, c, value + each * (size_t)c);
     (*in_memory)->step = step;
@@ -479,7 +444,22 @@ PetscErrorCode SbRemeshBodies(SbModel m, const SbGathered *g, const PetscBool du
 
     PetscCall(open_work(m, g, b, &work[b]));
     r->outcome[b] = (SbRemeshOutcome){{nvert, nvert}, {work[b].ncell, work[b].ncell}, 0, 0., ""};
-    if (due[b]) PetscCall(try_body(&work[b], how, &r->outcome[b]));
+    // meshes the body again; what it cannot do goes to the message
+    if (due[b]) {
+      PetscErrorCode ierr;
+
+      PetscCall(PetscPushErrorHandler(keep_message, &r->outcome[b]));
+      ierr = make_mesh(&work[b], how);
+      PetscCall(PetscPopErrorHandler());
+      work[b].done = (PetscBool)!ierr;
+      if (ierr) PetscCall(SbNewMeshDestroy(&work[b].mesh));
+      r->outcome[b].nvert[0] = work[b].g->vert0[work[b].body + 1] - work[b].vert0;
+      r->outcome[b].ncell[0] = work[b].ncell;
+      r->outcome[b].nvert[1] = work[b].done ? work[b].mesh.nvert : r->outcome[b].nvert[0];
+      r->outcome[b].ncell[1] = work[b].done ? work[b].mesh.ncell : work[b].ncell;
+      r->outcome[b].nmoved = work[b].mesh.nmoved;
+      r->outcome[b].quality = work[b].mesh.quality;
+    }
     r->done[b] = work[b].done;
     room += nvert + 2 * work[b].faces.nboundary + work[b].nedge;
   }

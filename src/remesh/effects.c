@@ -5,20 +5,6 @@
 */
 #include "remesh_impl.h"
 
-/* The records of all ranks, on all of them. */
-static PetscErrorCode gather_records(SbEffect e, SbSpace space, PetscInt *n, PetscReal **records)
-{
-  PetscReal *own;
-  PetscInt nown, total;
-
-  PetscFunctionBeginUser;
-  SbEffectCall(e, save, space, &nown, &own);
-  PetscCall(SbGatherAll(space->comm, MPIU_REAL, nown * e->nstate, own, &total, records, NULL));
-  *n = e->nstate ? total / e->nstate : 0;
-  PetscCall(PetscFree(own));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode SbEffectsHandOver(SbRun from, SbRun to, const SbRenamed *renamed)
 {
   const SbModel a = from->model, b = to->model;
@@ -28,11 +14,15 @@ PetscErrorCode SbEffectsHandOver(SbRun from, SbRun to, const SbRenamed *renamed)
   PetscCall(SbSpaceGetLocalRead(b->space, to->U, &u));
   for (PetscInt k = 0; k < a->neffect; k++) {
     SbEffect e = a->effect[k];
-    PetscReal *records;
-    PetscInt n;
+    PetscReal *records, *own;
+    PetscInt n, nown, total;
 
     if (!e->ops.save || !e->ops.rename) continue;
-    PetscCall(gather_records(e, a->space, &n, &records));
+    // the records of all ranks, on all of them
+    SbEffectCall(e, save, a->space, &nown, &own);
+    PetscCall(SbGatherAll(a->space->comm, MPIU_REAL, nown * e->nstate, own, &total, &records, NULL));
+    n = e->nstate ? total / e->nstate : 0;
+    PetscCall(PetscFree(own));
     PetscCall((*e->ops.rename)(e, renamed->n, renamed->from, renamed->to, &n, records));
     SbEffectCall(b->effect[k], load, b->space, from->t_now, u, n, records);
     PetscCall(PetscFree(records));

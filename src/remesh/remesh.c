@@ -68,12 +68,84 @@ PetscErrorCode SbRemeshRegister(void)
 
 /* ------------------------------------------------------------------ options */
 
-static PetscErrorCode read_times(SbRemesh r, const SbScope *scope)
+PetscErrorCode SbRemeshSetFromOptions(SbModel m, SbRemesh *remesh)
 {
+  PetscBool named, any = PETSC_FALSE, comes = PETSC_FALSE, given;
+  PetscInt from, n;
+  SbScope scope;
+  SbRemesh r;
   char(*words)[SB_NAME_MAX];
+  char(*names)[SB_NAME_MAX];
+  char wrong[SB_NAME_MAX] = "";
+  PetscReal all;
+  static const char *const keys[] = {"remesh_quality", "remesh_times", "remesh_failed"};
 
   PetscFunctionBeginUser;
-  PetscCall(SbOptionNames(scope, "remesh_times", &r->ntime, &words));
+  *remesh = NULL;
+  PetscCall(SbScopeSet(&scope, "", "", ""));
+  // whether the scenario asks for it, by any option but those that say how
+  named = PETSC_FALSE;
+  for (size_t k = 0; k < PETSC_STATIC_ARRAY_LENGTH(keys); k++) {
+    PetscCall(SbOptionGiven(&scope, keys[k], &given));
+    named = (PetscBool)(named || given);
+  }
+  for (PetscInt b = 0; b < m->nbody; b++) {
+    SbScope own;
+
+    PetscCall(SbScopeSet(&own, "body", "", m->body[b].name));
+    PetscCall(SbOptionGiven(&own, "remesh_quality", &given));
+    named = (PetscBool)(named || given);
+  }
+  for (PetscInt e = 0; e < m->neffect; e++)
+    comes = (PetscBool)(comes || (m->effect[e]->ops.prescribe &&
+                                  (m->effect[e]->from > 0. || m->effect[e]->until < PETSC_MAX_REAL)));
+  if (!named && !comes) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscNew(&r));
+  *remesh = r;
+  PetscCall(SbLogNamed("Mesh", "remesh", &r->event));
+  r->nbody = m->nbody;
+  r->tried = -1;
+  PetscCall(PetscCalloc7(m->nbody, &r->named, m->nbody, &r->due, m->nbody, &r->asked, m->nbody, &r->bound,
+                         m->nbody, &r->worst, m->nbody, &r->from, m->nbody, &r->rest));
+  // when supports come and go after the start
+  PetscCall(PetscMalloc1(2 * m->neffect, &r->change));
+  for (PetscInt e = 0; e < m->neffect; e++) {
+    const SbEffect effect = m->effect[e];
+
+    if (!effect->ops.prescribe) continue;
+    if (effect->from > 0.) r->change[r->nchange++] = effect->from;
+    if (effect->until > 0. && effect->until < PETSC_MAX_REAL) r->change[r->nchange++] = effect->until;
+  }
+  if (!named) PetscFunctionReturn(PETSC_SUCCESS);
+  // the bodies that are named; without names all of them
+  PetscCall(SbOptionNames(&scope, "remesh_bodies", &n, &names));
+  for (PetscInt b = 0; b < m->nbody; b++) r->named[b] = (PetscBool)!n;
+  for (PetscInt i = 0; i < n; i++) {
+    PetscInt b = 0;
+
+    while (b < m->nbody && strcmp(names[i], m->body[b].name)) b++;
+    if (b < m->nbody)
+      r->named[b] = PETSC_TRUE;
+    else
+      PetscCall(PetscStrncpy(wrong, names[i], sizeof(wrong)));
+  }
+  PetscCall(PetscFree(names));
+  PetscCheck(!wrong[0], PETSC_COMM_SELF, PETSC_ERR_USER,
+             "-remesh_bodies: the scenario has no body '%s'; give names of -bodies", wrong);
+  // their bounds
+  PetscCall(SbOptionReal(&scope, "remesh_quality", &all));
+  for (PetscInt b = 0; b < m->nbody; b++) {
+    SbScope own;
+
+    if (!r->named[b]) continue;
+    r->asked[b] = all;
+    PetscCall(SbScopeSet(&own, "body", "", m->body[b].name));
+    PetscCall(SbOptionReal(&own, "remesh_quality", &r->asked[b]));
+    r->bound[b] = r->asked[b];
+    any = (PetscBool)(any || r->asked[b] > 0.);
+  }
+  // times at which meshes are renewed
+  PetscCall(SbOptionNames(&scope, "remesh_times", &r->ntime, &words));
   PetscCall(PetscMalloc1(r->ntime, &r->time));
   for (PetscInt i = 0; i < r->ntime; i++) {
     char *end;
@@ -91,116 +163,6 @@ static PetscErrorCode read_times(SbRemesh r, const SbScope *scope)
     }
   }
   PetscCall(PetscFree(words));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode read_names(SbRemesh r, SbModel m, const SbScope *scope)
-{
-  char(*names)[SB_NAME_MAX], wrong[SB_NAME_MAX] = "";
-  PetscInt n;
-
-  PetscFunctionBeginUser;
-  PetscCall(SbOptionNames(scope, "remesh_bodies", &n, &names));
-  for (PetscInt b = 0; b < m->nbody; b++) r->named[b] = (PetscBool)!n;
-  for (PetscInt i = 0; i < n; i++) {
-    PetscInt b = 0;
-
-    while (b < m->nbody && strcmp(names[i], m->body[b].name)) b++;
-    if (b < m->nbody)
-      r->named[b] = PETSC_TRUE;
-    else
-      PetscCall(PetscStrncpy(wrong, names[i], sizeof(wrong)));
-  }
-  PetscCall(PetscFree(names));
-  PetscCheck(!wrong[0], PETSC_COMM_SELF, PETSC_ERR_USER,
-             "-remesh_bodies: the scenario has no body '%s'; give names of -bodies", wrong);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Bounds of the bodies that are named; whether there is one. */
-static PetscErrorCode read_bounds(SbRemesh r, SbModel m, const SbScope *scope, PetscBool *any)
-{
-  PetscReal all;
-
-  PetscFunctionBeginUser;
-  PetscCall(SbOptionReal(scope, "remesh_quality", &all));
-  for (PetscInt b = 0; b < m->nbody; b++) {
-    SbScope own;
-
-    if (!r->named[b]) continue;
-    r->asked[b] = all;
-    PetscCall(SbScopeSet(&own, "body", "", m->body[b].name));
-    PetscCall(SbOptionReal(&own, "remesh_quality", &r->asked[b]));
-    r->bound[b] = r->asked[b];
-    *any = (PetscBool)(*any || r->asked[b] > 0.);
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Whether the scenario asks for it, by any option but those that say how. */
-static PetscErrorCode is_named(SbModel m, const SbScope *scope, PetscBool *named)
-{
-  static const char *const keys[] = {"remesh_quality", "remesh_times", "remesh_failed"};
-  PetscBool in_memory;
-
-  PetscFunctionBeginUser;
-  *named = PETSC_FALSE;
-  for (size_t k = 0; k < PETSC_STATIC_ARRAY_LENGTH(keys); k++) {
-    PetscCall(SbOptionGiven(scope, keys[k], &in_memory));
-    *named = (PetscBool)(*named || in_memory);
-  }
-  for (PetscInt b = 0; b < m->nbody; b++) {
-    SbScope own;
-
-    PetscCall(SbScopeSet(&own, "body", "", m->body[b].name));
-    PetscCall(SbOptionGiven(&own, "remesh_quality", &in_memory));
-    *named = (PetscBool)(*named || in_memory);
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* When supports come and go after the start. */
-static PetscErrorCode find_changes(SbRemesh r, SbModel m)
-{
-  PetscFunctionBeginUser;
-  PetscCall(PetscMalloc1(2 * m->neffect, &r->change));
-  for (PetscInt e = 0; e < m->neffect; e++) {
-    const SbEffect effect = m->effect[e];
-
-    if (!effect->ops.prescribe) continue;
-    if (effect->from > 0.) r->change[r->nchange++] = effect->from;
-    if (effect->until > 0. && effect->until < PETSC_MAX_REAL) r->change[r->nchange++] = effect->until;
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode SbRemeshSetFromOptions(SbModel m, SbRemesh *remesh)
-{
-  PetscBool named, any = PETSC_FALSE, comes = PETSC_FALSE;
-  PetscInt from;
-  SbScope scope;
-  SbRemesh r;
-
-  PetscFunctionBeginUser;
-  *remesh = NULL;
-  PetscCall(SbScopeSet(&scope, "", "", ""));
-  PetscCall(is_named(m, &scope, &named));
-  for (PetscInt e = 0; e < m->neffect; e++)
-    comes = (PetscBool)(comes || (m->effect[e]->ops.prescribe &&
-                                  (m->effect[e]->from > 0. || m->effect[e]->until < PETSC_MAX_REAL)));
-  if (!named && !comes) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(PetscNew(&r));
-  *remesh = r;
-  PetscCall(SbLogNamed("Mesh", "remesh", &r->event));
-  r->nbody = m->nbody;
-  r->tried = -1;
-  PetscCall(PetscCalloc7(m->nbody, &r->named, m->nbody, &r->due, m->nbody, &r->asked, m->nbody, &r->bound,
-                         m->nbody, &r->worst, m->nbody, &r->from, m->nbody, &r->rest));
-  PetscCall(find_changes(r, m));
-  if (!named) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(read_names(r, m, &scope));
-  PetscCall(read_bounds(r, m, &scope, &any));
-  PetscCall(read_times(r, &scope));
   PetscCall(SbOptionBool(&scope, "remesh_failed", &r->failed));
   PetscCall(SbOptionChoice(&scope, "remesh_from", &from));
   PetscCall(SbOptionReal(&scope, "remesh_size", &r->how.size));
@@ -328,30 +290,6 @@ typedef struct {
   SbLedger ledger;
 } Scene;
 
-/* The bodies' meshes, which are on rank 0; the model owns them from now on. */
-static PetscErrorCode hand_meshes(SbModel m, SbMemoryMesh *in_memory[])
-{
-  PetscMPIInt rank;
-
-  PetscFunctionBeginUser;
-  PetscCallMPI(MPI_Comm_rank(m->comm, &rank));
-  for (PetscInt b = 0; b < m->nbody; b++) {
-    SbMemoryMesh *p = in_memory[b];
-    PetscReal numbers[2] = {p ? p->mass : 0., p ? p->bound : 0.};
-    PetscInt step = p ? p->step : 0;
-
-    if (rank) PetscCall(SbMemoryMeshCreate(0, 0, 0, &p));
-    PetscCallMPI(MPI_Bcast(numbers, 2, MPIU_REAL, 0, m->comm));
-    PetscCallMPI(MPI_Bcast(&step, 1, MPIU_INT, 0, m->comm));
-    p->mass = numbers[0];
-    p->bound = numbers[1];
-    p->step = step;
-    m->body[b].in_memory = p;
-    in_memory[b] = NULL;
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 static PetscReal distance(const PetscReal a[3], const PetscReal b[3])
 {
   return PetscSqrtReal(PetscSqr(a[0] - b[0]) + PetscSqr(a[1] - b[1]) + PetscSqr(a[2] - b[2]));
@@ -392,32 +330,6 @@ static PetscErrorCode make_meshes(SbRemesh r, SbRun run, SbRemeshResult *result,
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode report(SbRemesh r, const Scene *s, const SbRemeshResult *result, const SbEnergies e[2],
-                             PetscReal speed)
-{
-  const SbRemeshOutcome *outcome = result->outcome;
-
-  PetscFunctionBeginUser;
-  for (PetscInt b = 0; b < r->nbody; b++) {
-    SbRemeshed entry = {.step = s->run->step_now, .t = s->run->t_now};
-
-    if (!result->done[b]) continue;
-    PetscCall(PetscStrncpy(entry.body, s->model->body[b].name, sizeof(entry.body)));
-    for (int i = 0; i < 2; i++) {
-      entry.tets[i] = outcome[b].ncell[i];
-      entry.vertices[i] = outcome[b].nvert[i];
-      entry.energy[i] = e[i].kinetic + e[i].strain;
-    }
-    entry.quality[0] = r->worst[b];
-    entry.quality[1] = outcome[b].quality;
-    entry.moved = outcome[b].nmoved;
-    entry.speed = speed;
-    entry.shift = distance(e[0].centre, e[1].centre);
-    PetscCall(SbReportRemeshed(s->run, &entry));
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* The new scene, or the message why it cannot be made: then the old one goes on. */
 static PetscErrorCode replace(SbRemesh r, Scene *old, SbRemeshResult *result)
 {
@@ -427,6 +339,8 @@ static PetscErrorCode replace(SbRemesh r, Scene *old, SbRemeshResult *result)
   SbRun run;
   const SbRun before = old->run;
   PetscReal(*momenta)[6], rate;
+  PetscMPIInt rank;
+  const SbRemeshOutcome *outcome = result->outcome;
 
   PetscFunctionBeginUser;
   // everything from the options again, on the new meshes; the solver stays the one chosen before
@@ -434,7 +348,22 @@ static PetscErrorCode replace(SbRemesh r, Scene *old, SbRemeshResult *result)
   PetscCall(SbRunCreate(s.model, &s.run));
   PetscCall(PetscStrncpy(s.run->solver_choice, old->run->solver, sizeof(s.run->solver_choice)));
   PetscCall(SbLedgerSetFromOptions(s.run, &s.ledger));
-  PetscCall(hand_meshes(s.model, result->in_memory));
+  // the bodies' meshes, which are on rank 0; the model owns them from now on
+  PetscCallMPI(MPI_Comm_rank(s.model->comm, &rank));
+  for (PetscInt b = 0; b < s.model->nbody; b++) {
+    SbMemoryMesh *p = result->in_memory[b];
+    PetscReal numbers[2] = {p ? p->mass : 0., p ? p->bound : 0.};
+    PetscInt step = p ? p->step : 0;
+
+    if (rank) PetscCall(SbMemoryMeshCreate(0, 0, 0, &p));
+    PetscCallMPI(MPI_Bcast(numbers, 2, MPIU_REAL, 0, s.model->comm));
+    PetscCallMPI(MPI_Bcast(&step, 1, MPIU_INT, 0, s.model->comm));
+    p->mass = numbers[0];
+    p->bound = numbers[1];
+    p->step = step;
+    s.model->body[b].in_memory = p;
+    result->in_memory[b] = NULL;
+  }
   s.model->t_begin = old->run->t_now;
   PetscCall(SbModelSetUp(s.model));
   PetscCall(SbSceneValidate(s.model));
@@ -471,7 +400,24 @@ static PetscErrorCode replace(SbRemesh r, Scene *old, SbRemeshResult *result)
   if (s.ledger) PetscCall(SbLedgerContinue(old->ledger, s.ledger));
   PetscCall(SbRemeshAttach(r, s.run));
   if (old->run->output) PetscCall(SbOutputReattach(old->run, s.run));
-  PetscCall(report(r, &s, result, e, speed));
+  // one entry for each body that was meshed again
+  for (PetscInt b = 0; b < r->nbody; b++) {
+    SbRemeshed entry = {.step = s.run->step_now, .t = s.run->t_now};
+
+    if (!result->done[b]) continue;
+    PetscCall(PetscStrncpy(entry.body, s.model->body[b].name, sizeof(entry.body)));
+    for (int i = 0; i < 2; i++) {
+      entry.tets[i] = outcome[b].ncell[i];
+      entry.vertices[i] = outcome[b].nvert[i];
+      entry.energy[i] = e[i].kinetic + e[i].strain;
+    }
+    entry.quality[0] = r->worst[b];
+    entry.quality[1] = outcome[b].quality;
+    entry.moved = outcome[b].nmoved;
+    entry.speed = speed;
+    entry.shift = distance(e[0].centre, e[1].centre);
+    PetscCall(SbReportRemeshed(s.run, &entry));
+  }
   PetscCall(SbLedgerDestroy(&old->ledger));
   PetscCall(SbRunDestroy(&old->run));
   PetscCall(SbModelDestroy(&old->model));

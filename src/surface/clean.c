@@ -174,22 +174,6 @@ static int longest_edge(const SbTriangles *t, PetscInt f)
   return edge;
 }
 
-/* The flat triangle f and its neighbour g at edge j become two: g cut at the corner of f that lies on the edge. */
-static void cut_neighbour(SbTriangleFile *f, PetscInt flat, PetscInt middle, PetscInt g, int j)
-{
-  PetscInt *v = f->t->tri + 3 * g, *w = f->t->tri + 3 * flat;
-  const PetscInt a = v[j], b = v[(j + 1) % 3], c = v[(j + 2) % 3];
-
-  v[0] = a;
-  v[1] = middle;
-  v[2] = c;
-  w[0] = middle;
-  w[1] = b;
-  w[2] = c;
-  f->number[flat] = f->number[g];
-  if (f->tags) f->tags[flat] = f->tags[g];
-}
-
 /* One pass over the edges; a triangle takes part in one change at most. */
 static PetscErrorCode cut_flat(SbTriangleFile *f, PetscBool touched[], SbTriangleEdge edge[], PetscInt *ncut,
                                PetscInt *nflat)
@@ -213,9 +197,25 @@ static PetscErrorCode cut_flat(SbTriangleFile *f, PetscBool touched[], SbTriangl
     for (PetscInt k = 0; m == 2 && k < 2; k++) {
       const PetscInt mine = edge[i + k].slot / 3, other = edge[i + 1 - k].slot / 3;
       const int e = (int)(edge[i + k].slot % 3), j = (int)(edge[i + 1 - k].slot % 3);
+      PetscInt middle, *v, *w, a, b, c;
 
       if (!flat[mine] || touched[mine] || touched[other] || e != longest_edge(t, mine)) continue;
-      cut_neighbour(f, mine, t->tri[3 * mine + (e + 2) % 3], other, j);
+      /* two triangles become two others: the neighbour is cut at the corner of the flat one that lies on the
+         edge */
+      middle = t->tri[3 * mine + (e + 2) % 3];
+      v = f->t->tri + 3 * other;
+      w = f->t->tri + 3 * mine;
+      a = v[j];
+      b = v[(j + 1) % 3];
+      c = v[(j + 2) % 3];
+      v[0] = a;
+      v[1] = middle;
+      v[2] = c;
+      w[0] = middle;
+      w[1] = b;
+      w[2] = c;
+      f->number[mine] = f->number[other];
+      if (f->tags) f->tags[mine] = f->tags[other];
       touched[mine] = touched[other] = PETSC_TRUE;
       (*ncut)++;
     }

@@ -105,27 +105,6 @@ static PetscErrorCode write_repairs(const SbTriangles *t, const SbSurfaceRepairs
 
 /* ------------------------------------------------------------------ from file to tets */
 
-/* To metres, and nothing that is not a number. */
-static PetscErrorCode scale_file(PetscReal scale, SbTriangleFile *f)
-{
-  char option[SB_IMPORT_OPTION_MAX];
-
-  PetscFunctionBeginUser;
-  for (PetscInt i = 0; i < 3 * f->t->nvert; i++) {
-    f->t->x[i] *= scale;
-    PetscCheck(isfinite(f->t->x[i]), PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
-               "%s: vertex %" PetscInt_FMT " leaves the range of numbers when scaled by %g; check %s",
-               f->where, i / 3 + 1, (double)scale, SbImportOption(f->groups, "scale", option));
-  }
-  for (PetscInt i = 0; i < f->nhole; i++) {
-    for (int k = 0; k < 3; k++) f->hole[i].x[k] *= scale;
-  }
-  for (PetscInt i = 0; i < f->nregion; i++) {
-    for (int k = 0; k < 3; k++) f->region[i].x[k] *= scale;
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* The tolerance of joining, which must be far below the shape, and the mean edge. */
 static PetscErrorCode weld_tolerance(const SbTriangleFile *f, PetscReal given, PetscReal *tolerance,
                                      PetscReal *edge)
@@ -162,7 +141,19 @@ static PetscErrorCode make_surface(const char *path, const SbImport *im, SbTrian
   PetscCall((*SbTrianglesReader(path))(path, f));
   PetscCheck(f->t->ntri, PETSC_COMM_SELF, PETSC_ERR_FILE_UNEXPECTED,
              "%s: holds no triangles; give a closed surface of triangles, or a mesh of tetrahedra", f->where);
-  PetscCall(scale_file(im->scale, f));
+  // to metres, and nothing that is not a number
+  for (PetscInt i = 0; i < 3 * f->t->nvert; i++) {
+    f->t->x[i] *= im->scale;
+    PetscCheck(isfinite(f->t->x[i]), PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
+               "%s: vertex %" PetscInt_FMT " leaves the range of numbers when scaled by %g; check %s",
+               f->where, i / 3 + 1, (double)im->scale, SbImportOption(f->groups, "scale", option));
+  }
+  for (PetscInt i = 0; i < f->nhole; i++) {
+    for (int k = 0; k < 3; k++) f->hole[i].x[k] *= im->scale;
+  }
+  for (PetscInt i = 0; i < f->nregion; i++) {
+    for (int k = 0; k < 3; k++) f->region[i].x[k] *= im->scale;
+  }
   PetscCall(SbDropUnusedPoints(&f->t->nvert, f->t->x, 3 * f->t->ntri, f->t->tri));
   PetscCall(weld_tolerance(f, im->tet.merge_tolerance, &tolerance, &edge));
   PetscCall(SbSurfaceMergeVertices(f, tolerance, &repairs));

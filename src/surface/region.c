@@ -162,31 +162,6 @@ static PetscInt facing(const SbTriangles *t, PetscInt slot, PetscInt p, PetscBoo
   return 2 * (slot / 3) + (along == ahead ? 0 : 1);
 }
 
-/* Angles of triangles around the edge from p to q, from the first one on. */
-static void sort_spokes(const SbTriangles *t, PetscInt p, PetscInt q, PetscInt n, const SbTriangleEdge edge[],
-                        Spoke spoke[])
-{
-  const PetscReal *a = t->x + 3 * p, *b = t->x + 3 * q;
-  PetscReal axis[3], u[3], v[3], length;
-
-  for (int k = 0; k < 3; k++) axis[k] = b[k] - a[k];
-  length = PetscSqrtReal(SbDot3(axis, axis));
-  for (PetscInt i = 0; i < n; i++) {
-    const PetscInt slot = edge[i].slot;
-    const PetscReal *c = t->x + 3 * t->tri[3 * (slot / 3) + (slot % 3 + 2) % 3];
-    const PetscReal w[3] = {c[0] - a[0], c[1] - a[1], c[2] - a[2]};
-
-    if (!i) { /* v = axis x w is normal to the first one, u = v x axis points along it */
-      SbCross(axis, w, v);
-      SbCross(v, axis, u);
-      for (int k = 0; k < 3; k++) u[k] /= length;
-    }
-    spoke[i] = (Spoke){i ? atan2(SbDot3(v, w), SbDot3(u, w)) : 0, slot};
-    if (spoke[i].angle < 0) spoke[i].angle += 2 * PETSC_PI;
-  }
-  qsort(spoke, (size_t)n, sizeof(*spoke), compare_spokes);
-}
-
 /* Joins the sides that face each other around one edge. */
 static PetscErrorCode join_at_edge(const SbTriangles *t, PetscInt n, const SbTriangleEdge edge[],
                                    PetscInt up[])
@@ -197,9 +172,28 @@ static PetscErrorCode join_at_edge(const SbTriangles *t, PetscInt n, const SbTri
   PetscFunctionBeginUser;
   // the triangles in the order of their angles
   if (n > 8) PetscCall(PetscMalloc1(n, &spoke));
-  if (n > 2)
-    sort_spokes(t, p, q, n, edge, spoke);
-  else
+  // angles of triangles around the edge from p to q, from the first one on
+  if (n > 2) {
+    const PetscReal *a = t->x + 3 * p, *b = t->x + 3 * q;
+    PetscReal axis[3], u[3], v[3], length;
+
+    for (int k = 0; k < 3; k++) axis[k] = b[k] - a[k];
+    length = PetscSqrtReal(SbDot3(axis, axis));
+    for (PetscInt i = 0; i < n; i++) {
+      const PetscInt slot = edge[i].slot;
+      const PetscReal *c = t->x + 3 * t->tri[3 * (slot / 3) + (slot % 3 + 2) % 3];
+      const PetscReal w[3] = {c[0] - a[0], c[1] - a[1], c[2] - a[2]};
+
+      if (!i) { /* v = axis x w is normal to the first one, u = v x axis points along it */
+        SbCross(axis, w, v);
+        SbCross(v, axis, u);
+        for (int k = 0; k < 3; k++) u[k] /= length;
+      }
+      spoke[i] = (Spoke){i ? atan2(SbDot3(v, w), SbDot3(u, w)) : 0, slot};
+      if (spoke[i].angle < 0) spoke[i].angle += 2 * PETSC_PI;
+    }
+    qsort(spoke, (size_t)n, sizeof(*spoke), compare_spokes);
+  } else
     for (PetscInt i = 0; i < n; i++) spoke[i].slot = edge[i].slot;
   // each with the next one
   for (PetscInt i = 0; i < n; i++)
@@ -269,31 +263,6 @@ static PetscErrorCode measure_shells(Space *s)
     m = SbTrianglesAtEdge(3 * t->ntri, s->edge, i);
     if (m > 2) s->surfaces[s->surface[s->edge[i].slot / 3]].branched = PETSC_TRUE;
   }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Every shell encloses a volume, and every surface has one shell towards the outside. */
-static PetscErrorCode check_shells(Space *s)
-{
-  PetscFunctionBeginUser;
-  for (PetscInt k = 0; k < s->nshell; k++) {
-    const Shell *p = &s->shells[k];
-    const long long number = (long long)s->f->number[p->first];
-
-    PetscCheck(PetscAbsReal(p->volume) > SB_TRIANGLE_EMPTY * PetscPowReal(p->area / 6, 1.5), PETSC_COMM_SELF,
-               PETSC_ERR_USER_INPUT,
-               "%s: the part with triangle %lld encloses no volume; give it a thickness, or remove it",
-               s->f->where, number);
-    if (p->volume > 0) continue;
-    PetscCheck(s->surfaces[p->surface].outer < 0, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
-               "%s: the triangles around triangle %lld cut each other; join the parts into one", s->f->where,
-               number);
-    s->surfaces[p->surface].outer = k;
-  }
-  for (PetscInt k = 0; k < s->nsurface; k++)
-    PetscCheck(s->surfaces[k].outer >= 0, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
-               "%s: the triangles around triangle %lld cut each other; join the parts into one", s->f->where,
-               (long long)s->f->number[s->surfaces[k].first]);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -465,7 +434,25 @@ static PetscErrorCode find_regions(Space *s, SbSurface *out)
   PetscCall(orient_alike(s));
   PetscCall(find_shells(s));
   PetscCall(measure_shells(s));
-  PetscCall(check_shells(s));
+  // every shell encloses a volume, and every surface has one shell towards the outside
+  for (PetscInt k = 0; k < s->nshell; k++) {
+    const Shell *p = &s->shells[k];
+    const long long number = (long long)s->f->number[p->first];
+
+    PetscCheck(PetscAbsReal(p->volume) > SB_TRIANGLE_EMPTY * PetscPowReal(p->area / 6, 1.5), PETSC_COMM_SELF,
+               PETSC_ERR_USER_INPUT,
+               "%s: the part with triangle %lld encloses no volume; give it a thickness, or remove it",
+               s->f->where, number);
+    if (p->volume > 0) continue;
+    PetscCheck(s->surfaces[p->surface].outer < 0, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
+               "%s: the triangles around triangle %lld cut each other; join the parts into one", s->f->where,
+               number);
+    s->surfaces[p->surface].outer = k;
+  }
+  for (PetscInt k = 0; k < s->nsurface; k++)
+    PetscCheck(s->surfaces[k].outer >= 0, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
+               "%s: the triangles around triangle %lld cut each other; join the parts into one", s->f->where,
+               (long long)s->f->number[s->surfaces[k].first]);
   // the shell around each surface, from the middle of one of its triangles
   for (PetscInt k = 0; k < s->nsurface; k++) {
     const PetscInt *v = s->t->tri + 3 * s->surfaces[k].first;

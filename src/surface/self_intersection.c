@@ -71,28 +71,6 @@ static PetscErrorCode name_pairs(const SbTriangleFile *f, const Search *s, const
 
 /* ------------------------------------------------------------------ small folds are smoothed out */
 
-/* Vertices of marked triangles; then, `rings` times, of triangles that touch them. */
-static PetscErrorCode grow(const SbTriangles *t, const PetscBool crossing[], int rings, PetscBool active[])
-{
-  PetscBool *before;
-
-  PetscFunctionBeginUser;
-  for (PetscInt i = 0; i < 3 * t->ntri; i++)
-    active[t->tri[i]] = (PetscBool)(active[t->tri[i]] || crossing[i / 3]);
-  PetscCall(PetscMalloc1(t->nvert, &before));
-  for (int r = 0; r < rings; r++) {
-    PetscCall(PetscArraycpy(before, active, t->nvert));
-    for (PetscInt f = 0; f < t->ntri; f++) {
-      const PetscInt *v = t->tri + 3 * f;
-
-      if (before[v[0]] || before[v[1]] || before[v[2]])
-        active[v[0]] = active[v[1]] = active[v[2]] = PETSC_TRUE;
-    }
-  }
-  PetscCall(PetscFree(before));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* Active vertices go half the way to the mean of their neighbours; sum[nvert][4]. */
 static void smooth(SbTriangles *t, const PetscBool active[], PetscReal (*sum)[4])
 {
@@ -125,8 +103,22 @@ static PetscErrorCode untangle(SbTriangles *t, PetscReal reach, Search *s, SbSur
   PetscCall(PetscArraycpy(x0, t->x, 3 * (size_t)t->nvert));
   for (int pass = 0; pass < PASSES && s->n && m->untangled <= reach; pass++) {
     PetscReal most = 0;
+    PetscBool *before;
 
-    PetscCall(grow(t, s->crossing, pass % 4 == 3, active));
+    // vertices of triangles that cross are active; every fourth time those around them, too
+    for (PetscInt i = 0; i < 3 * t->ntri; i++)
+      active[t->tri[i]] = (PetscBool)(active[t->tri[i]] || s->crossing[i / 3]);
+    PetscCall(PetscMalloc1(t->nvert, &before));
+    for (int r = 0; r < (pass % 4 == 3); r++) {
+      PetscCall(PetscArraycpy(before, active, t->nvert));
+      for (PetscInt f = 0; f < t->ntri; f++) {
+        const PetscInt *v = t->tri + 3 * f;
+
+        if (before[v[0]] || before[v[1]] || before[v[2]])
+          active[v[0]] = active[v[1]] = active[v[2]] = PETSC_TRUE;
+      }
+    }
+    PetscCall(PetscFree(before));
     smooth(t, active, sum);
     m->nuntangled = 0;
     for (PetscInt v = 0; v < t->nvert; v++) {

@@ -102,27 +102,6 @@ static PetscErrorCode cut_surface(const SbGmsh *g, Model *m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode add_volumes(const SbGmsh *g, const Model *m)
-{
-  int *tag;
-
-  PetscFunctionBeginUser;
-  PetscCall(PetscMalloc1(m->npiece, &tag));
-  for (PetscInt r = 0; r < m->job->surface->nregion; r++) {
-    int loop = (int)r + 1;
-    size_t n = 0;
-
-    for (PetscInt k = 0; k < m->npiece; k++) {
-      if (m->piece[k].side[0] == r || m->piece[k].side[1] == r) tag[n++] = m->piece[k].tag;
-    }
-    SB_GMSH(g, ModelGeoAddSurfaceLoop, tag, n, loop);
-    SB_GMSH(g, ModelGeoAddVolume, &loop, 1, loop);
-  }
-  SB_GMSH0(g, ModelGeoSynchronize);
-  PetscCall(PetscFree(tag));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 static PetscErrorCode set_sizes(const SbGmsh *g, const SbTetJob *job)
 {
   const struct {
@@ -188,12 +167,25 @@ static PetscErrorCode work(const SbGmsh *g, void *ctx, SbImport *im)
 {
   Model m = {.job = (const SbTetJob *)ctx};
   const SbSurface *s;
-  int missing = 0;
+  int missing = 0, *tag;
 
   PetscFunctionBeginUser;
   PetscCall(add_surface(g, &m));
   if (m.job->remesh) PetscCall(cut_surface(g, &m));
-  PetscCall(add_volumes(g, &m));
+  // a volume for each region, between the pieces that have it on a side
+  PetscCall(PetscMalloc1(m.npiece, &tag));
+  for (PetscInt r = 0; r < m.job->surface->nregion; r++) {
+    int loop = (int)r + 1;
+    size_t n = 0;
+
+    for (PetscInt k = 0; k < m.npiece; k++) {
+      if (m.piece[k].side[0] == r || m.piece[k].side[1] == r) tag[n++] = m.piece[k].tag;
+    }
+    SB_GMSH(g, ModelGeoAddSurfaceLoop, tag, n, loop);
+    SB_GMSH(g, ModelGeoAddVolume, &loop, 1, loop);
+  }
+  SB_GMSH0(g, ModelGeoSynchronize);
+  PetscCall(PetscFree(tag));
   PetscCall(set_sizes(g, m.job));
   SB_GMSH(g, ModelMeshGenerate, 3);
   // optimises beyond Generate; Netgen's optimiser is not in every build of gmsh

@@ -22,45 +22,7 @@
 #define UNKNOWN (-2) /* region of a part of space that is not found yet */
 #define PATH_LENGTH (PETSC_MAX_PATH_LEN + 300)
 
-/* ------------------------------------------------------------------ the folder */
-
-static PetscErrorCode write_surface(const char *folder, const SbSurface *s)
-{
-  char path[PATH_LENGTH];
-  FILE *f;
-
-  PetscFunctionBeginUser;
-  (void)snprintf(path, sizeof(path), "%s/s.smesh", folder);
-  f = fopen(path, "w");
-  PetscCheck(f, PETSC_COMM_SELF, PETSC_ERR_FILE_OPEN, "cannot write %s (%s)", path, strerror(errno));
-  fprintf(f, "%" PetscInt_FMT " 3 0 0\n", s->nvert);
-  for (PetscInt v = 0; v < s->nvert; v++)
-    fprintf(f, "%" PetscInt_FMT " %.17g %.17g %.17g\n", v + 1, (double)s->x[3 * v], (double)s->x[3 * v + 1],
-            (double)s->x[3 * v + 2]);
-  fprintf(f, "%" PetscInt_FMT " 1\n", s->ntri);
-  for (PetscInt t = 0; t < s->ntri; t++)
-    fprintf(f, "3 %" PetscInt_FMT " %" PetscInt_FMT " %" PetscInt_FMT " %" PetscInt_FMT "\n",
-            s->tri[3 * t] + 1, s->tri[3 * t + 1] + 1, s->tri[3 * t + 2] + 1, t + 1);
-  fprintf(f, "0\n0\n");
-  PetscCheck(!fclose(f), PETSC_COMM_SELF, PETSC_ERR_FILE_OPEN, "cannot write %s (%s); is the disk full?",
-             path, strerror(errno));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* ------------------------------------------------------------------ the process */
-
-/* In the child: never returns. 127 says that there is no such program. */
-static void become_tetgen(pid_t parent, const char *folder, const char *flags, const SbTetJob *job)
-{
-  int log;
-
-  SbChildIsolate(parent, job->options.seconds);
-  if (chdir(folder)) _exit(126);
-  log = open("log", O_WRONLY | O_CREAT | O_TRUNC, 0600);
-  if (log < 0 || dup2(log, 1) < 0 || dup2(log, 2) < 0) _exit(126);
-  execlp("tetgen", "tetgen", flags, "s.smesh", (char *)NULL);
-  _exit(127);
-}
 
 static PetscErrorCode check_end(const char *folder, int status)
 {
@@ -87,24 +49,6 @@ static PetscErrorCode check_end(const char *folder, int status)
   SETERRQ(PETSC_COMM_SELF, PETSC_ERR_USER_INPUT, "it %s %d%s%s",
           WIFSIGNALED(status) ? "was ended by signal" : "gave up with code",
           WIFSIGNALED(status) ? WTERMSIG(status) : WEXITSTATUS(status), said[0] ? ", saying: " : "", said);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode run_tetgen(const char *folder, const char *flags, const SbTetJob *job)
-{
-  const pid_t self = getpid(), pid = fork();
-  int status = 0;
-  char option[SB_IMPORT_OPTION_MAX];
-
-  PetscFunctionBeginUser;
-  if (!pid) become_tetgen(self, folder, flags, job);
-  PetscCheck(pid > 0, PETSC_COMM_SELF, PETSC_ERR_SYS, "no process for tetgen (%s)", strerror(errno));
-  while (waitpid(pid, &status, 0) < 0 && errno == EINTR) {
-  }
-  PetscCheck(!WIFSIGNALED(status) || WTERMSIG(status) != SIGALRM, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
-             "it was not done after %g s (%s)", (double)job->options.seconds,
-             SbImportOption(job->body, "tet_seconds", option));
-  PetscCall(check_end(folder, status));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -152,46 +96,62 @@ static PetscErrorCode match_regions(const SbSurface *s, const SbFaces *faces, Sb
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Tets get the number of their region as tags; those of no region, a cavity, are left out. */
-static PetscErrorCode find_regions(const SbTetJob *job, SbImport *im)
-{
-  SbItems *tet = &im->item[3];
-  SbFaces faces;
-  PetscInt *region, n = 0;
-  PetscErrorCode ierr;
-
-  PetscFunctionBeginUser;
-  PetscCall(SbFacesCreate(im->nvert, tet->n, tet->vert, &faces));
-  PetscCall(PetscMalloc1(im->ntags, &region));
-  ierr = match_regions(job->surface, &faces, im, region);
-  for (PetscInt c = 0; !ierr && c < tet->n; c++) {
-    if (region[tet->tags[c]] < 0) continue;
-    PetscCall(PetscArraymove(tet->vert + 4 * n, tet->vert + 4 * c, 4));
-    tet->tags[n++] = region[tet->tags[c]];
-  }
-  tet->n = n;
-  PetscCall(PetscFree(region));
-  PetscCall(SbFacesDestroy(&faces));
-  PetscCall(ierr);
-  PetscCall(SbImportDropUnused(im));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* ------------------------------------------------------------------ the backend */
 
 static PetscErrorCode work_in(const char *folder, const SbTetJob *job, SbImport *im)
 {
   const PetscReal volume = job->size * job->size * job->size / (6 * PETSC_SQRT2);
-  char flags[96], path[PATH_LENGTH];
+  char flags[96], path[PATH_LENGTH], option[SB_IMPORT_OPTION_MAX];
   const SbSurface *s = job->surface;
-  PetscInt none;
+  PetscInt none, *region, n = 0;
+  FILE *f;
+  pid_t self, pid;
+  int status = 0;
+  SbItems *tet = &im->item[3];
+  SbFaces faces;
+  PetscErrorCode ierr;
 
   PetscFunctionBeginUser;
-  PetscCall(write_surface(folder, job->surface));
+  // the surface; each triangle has its number as a marker
+  (void)snprintf(path, sizeof(path), "%s/s.smesh", folder);
+  f = fopen(path, "w");
+  PetscCheck(f, PETSC_COMM_SELF, PETSC_ERR_FILE_OPEN, "cannot write %s (%s)", path, strerror(errno));
+  fprintf(f, "%" PetscInt_FMT " 3 0 0\n", job->surface->nvert);
+  for (PetscInt v = 0; v < job->surface->nvert; v++)
+    fprintf(f, "%" PetscInt_FMT " %.17g %.17g %.17g\n", v + 1, (double)job->surface->x[3 * v],
+            (double)job->surface->x[3 * v + 1], (double)job->surface->x[3 * v + 2]);
+  fprintf(f, "%" PetscInt_FMT " 1\n", job->surface->ntri);
+  for (PetscInt t = 0; t < job->surface->ntri; t++)
+    fprintf(f, "3 %" PetscInt_FMT " %" PetscInt_FMT " %" PetscInt_FMT " %" PetscInt_FMT "\n",
+            job->surface->tri[3 * t] + 1, job->surface->tri[3 * t + 1] + 1, job->surface->tri[3 * t + 2] + 1,
+            t + 1);
+  fprintf(f, "0\n0\n");
+  PetscCheck(!fclose(f), PETSC_COMM_SELF, PETSC_ERR_FILE_OPEN, "cannot write %s (%s); is the disk full?",
+             path, strerror(errno));
   /* Tets of the wanted size have this volume on average, so some must be allowed to be larger. */
   (void)snprintf(flags, sizeof(flags), "-p%sMQAq1.4/10a%.6f", job->remesh && job->size < job->edge ? "" : "Y",
                  (double)(1.8 * volume));
-  PetscCall(run_tetgen(folder, flags, job));
+  // the process, and how it ended
+  self = getpid();
+  pid = fork();
+  // in the child, which never returns; 127 says that there is no such program
+  if (!pid) {
+    int log;
+
+    SbChildIsolate(self, job->options.seconds);
+    if (chdir(folder)) _exit(126);
+    log = open("log", O_WRONLY | O_CREAT | O_TRUNC, 0600);
+    if (log < 0 || dup2(log, 1) < 0 || dup2(log, 2) < 0) _exit(126);
+    execlp("tetgen", "tetgen", flags, "s.smesh", (char *)NULL);
+    _exit(127);
+  }
+  PetscCheck(pid > 0, PETSC_COMM_SELF, PETSC_ERR_SYS, "no process for tetgen (%s)", strerror(errno));
+  while (waitpid(pid, &status, 0) < 0 && errno == EINTR) {
+  }
+  PetscCheck(!WIFSIGNALED(status) || WTERMSIG(status) != SIGALRM, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
+             "it was not done after %g s (%s)", (double)job->options.seconds,
+             SbImportOption(job->body, "tet_seconds", option));
+  PetscCall(check_end(folder, status));
   (void)snprintf(path, sizeof(path), "%s/s.1", folder);
   PetscCall(SbImportTagSet(im, 0, NULL, &none));
   PetscCall(SbImportRead_TetGen(path, im));
@@ -206,7 +166,20 @@ static PetscErrorCode work_in(const char *folder, const SbTetJob *job, SbImport 
       im->x[i] = s->x[i];
     }
   }
-  PetscCall(find_regions(job, im));
+  // tets get the number of their region as tags; those of no region, a cavity, are left out
+  PetscCall(SbFacesCreate(im->nvert, tet->n, tet->vert, &faces));
+  PetscCall(PetscMalloc1(im->ntags, &region));
+  ierr = match_regions(job->surface, &faces, im, region);
+  for (PetscInt c = 0; !ierr && c < tet->n; c++) {
+    if (region[tet->tags[c]] < 0) continue;
+    PetscCall(PetscArraymove(tet->vert + 4 * n, tet->vert + 4 * c, 4));
+    tet->tags[n++] = region[tet->tags[c]];
+  }
+  tet->n = n;
+  PetscCall(PetscFree(region));
+  PetscCall(SbFacesDestroy(&faces));
+  PetscCall(ierr);
+  PetscCall(SbImportDropUnused(im));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -62,50 +62,6 @@ PetscReal SbSurfaceMeasure(const SbSurface *s, PetscReal volume[])
   return s->ntri ? sum / (3 * (PetscReal)s->ntri) : 0;
 }
 
-/* ------------------------------------------------------------------ the result of a backend */
-
-/* Volume of each region against that of its surface. */
-static PetscErrorCode check_volumes(const SbTetJob *job, const SbImport *im)
-{
-  const SbSurface *s = job->surface;
-  PetscReal *want, *got;
-  char why[256] = "";
-
-  PetscFunctionBeginUser;
-  PetscCall(PetscCalloc2(s->nregion, &want, s->nregion, &got));
-  (void)SbSurfaceMeasure(s, want);
-  for (PetscInt c = 0; c < im->item[3].n; c++)
-    got[im->item[3].tags[c]] += PetscAbsReal(SbTetDeterminant(im->x, im->item[3].vert + 4 * c)) / 6;
-  for (PetscInt r = 0; r < s->nregion && !why[0]; r++) {
-    if (PetscAbsReal(got[r] - want[r]) > (job->remesh ? ROUGH : EXACT) * want[r])
-      (void)snprintf(why, sizeof(why), "its tets fill %.4g percent of the volume of region %" PetscInt_FMT,
-                     (double)(100 * got[r] / want[r]), r + 1);
-  }
-  PetscCall(PetscFree2(want, got));
-  PetscCheck(!why[0], PETSC_COMM_SELF, PETSC_ERR_USER_INPUT, "%s", why);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Numbers of regions and triangles become tag sets; triangles of no group are left out. */
-static PetscErrorCode give_groups(const SbSurface *s, SbImport *im)
-{
-  SbItems *tri = &im->item[2];
-  PetscInt n = 0;
-
-  PetscFunctionBeginUser;
-  for (PetscInt c = 0; c < im->item[3].n; c++) im->item[3].tags[c] = s->region_tags[im->item[3].tags[c]];
-  for (PetscInt i = 0; i < tri->n; i++) {
-    const PetscInt f = tri->tags[i];
-
-    if (!s->tags[f]) continue;
-    PetscCall(PetscArraymove(tri->vert + 3 * n, tri->vert + 3 * i, 3));
-    tri->tags[n] = s->tags[f];
-    tri->number[n++] = s->number[f];
-  }
-  tri->n = n;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* ------------------------------------------------------------------ backends */
 
 static const struct {
@@ -140,6 +96,8 @@ static PetscErrorCode add_note(const SbTetJob *job, int backend, PetscReal size,
 static PetscErrorCode run_checked(int backend, const SbTetJob *job, SbImport *tets)
 {
   const SbSurface *s = job->surface;
+  PetscReal *want, *got;
+  char why[256] = "";
 
   PetscFunctionBeginUser;
   PetscCall((*backends[backend].run)(job, tets));
@@ -152,7 +110,18 @@ static PetscErrorCode run_checked(int backend, const SbTetJob *job, SbImport *te
       PetscCheck(tets->x[i] == s->x[i], PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
                  "vertex %" PetscInt_FMT " of the surface was moved", i / 3 + 1);
   }
-  PetscCall(check_volumes(job, tets));
+  // volume of each region against that of its surface
+  PetscCall(PetscCalloc2(s->nregion, &want, s->nregion, &got));
+  (void)SbSurfaceMeasure(s, want);
+  for (PetscInt c = 0; c < tets->item[3].n; c++)
+    got[tets->item[3].tags[c]] += PetscAbsReal(SbTetDeterminant(tets->x, tets->item[3].vert + 4 * c)) / 6;
+  for (PetscInt r = 0; r < s->nregion && !why[0]; r++) {
+    if (PetscAbsReal(got[r] - want[r]) > (job->remesh ? ROUGH : EXACT) * want[r])
+      (void)snprintf(why, sizeof(why), "its tets fill %.4g percent of the volume of region %" PetscInt_FMT,
+                     (double)(100 * got[r] / want[r]), r + 1);
+  }
+  PetscCall(PetscFree2(want, got));
+  PetscCheck(!why[0], PETSC_COMM_SELF, PETSC_ERR_USER_INPUT, "%s", why);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -188,30 +157,6 @@ static PetscErrorCode try_backend(int backend, const SbTetJob *job, SbImport *te
   PetscCall(PetscStrlcat(reasons, backends[backend].name, size));
   PetscCall(PetscStrlcat(reasons, ": ", size));
   PetscCall(PetscStrlcat(reasons, without(job->where, caught.text), size));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* The body keeps its groups and tag sets, and gets the rest. */
-static PetscErrorCode move_mesh(PetscReal factor, SbImport *tets, SbImport *body)
-{
-  PetscFunctionBeginUser;
-  PetscCall(PetscFree(body->x));
-  PetscCall(PetscFree(body->vert_number));
-  body->nvert = tets->nvert;
-  body->x = tets->x;
-  body->vert_number = tets->vert_number;
-  tets->x = NULL;
-  tets->vert_number = NULL;
-  for (int d = 0; d < 4; d++) {
-    PetscCall(PetscFree(body->item[d].vert));
-    PetscCall(PetscFree(body->item[d].tags));
-    PetscCall(PetscFree(body->item[d].number));
-    body->item[d] = tets->item[d];
-    PetscCall(PetscMemzero(&tets->item[d], sizeof(tets->item[d])));
-  }
-  for (PetscInt i = 0; i < 3 * body->nvert; i++) body->x[i] *= factor;
-  for (PetscInt v = 0; v < body->nvert; v++) body->vert_number[v] = v + 1;
-  for (PetscInt c = 0; c < body->item[3].n; c++) body->item[3].number[c] = c + 1;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -282,12 +227,43 @@ static PetscErrorCode run_backends(const SbTetJob *job, PetscReal factor, PetscB
 
   PetscFunctionBeginUser;
   for (int backend = 0; backend < 2 && !*done; backend++) {
+    SbItems *tri = &body->item[2];
+    PetscInt n = 0;
+
     if (job->options.backend != SB_TET_AUTO && (int)job->options.backend != backend + 1) continue;
     PetscCall(try_backend(backend, job, &tets, done, size, reasons));
     if (!*done) continue;
-    PetscCall(move_mesh(1 / factor, &tets, body));
+    // the body keeps its groups and tag sets, and gets the rest
+    PetscCall(PetscFree(body->x));
+    PetscCall(PetscFree(body->vert_number));
+    body->nvert = tets.nvert;
+    body->x = tets.x;
+    body->vert_number = tets.vert_number;
+    tets.x = NULL;
+    tets.vert_number = NULL;
+    for (int d = 0; d < 4; d++) {
+      PetscCall(PetscFree(body->item[d].vert));
+      PetscCall(PetscFree(body->item[d].tags));
+      PetscCall(PetscFree(body->item[d].number));
+      body->item[d] = tets.item[d];
+      PetscCall(PetscMemzero(&tets.item[d], sizeof(tets.item[d])));
+    }
+    for (PetscInt i = 0; i < 3 * body->nvert; i++) body->x[i] *= (1 / factor);
+    for (PetscInt v = 0; v < body->nvert; v++) body->vert_number[v] = v + 1;
+    for (PetscInt c = 0; c < body->item[3].n; c++) body->item[3].number[c] = c + 1;
     PetscCall(SbImportDestroy(&tets));
-    PetscCall(give_groups(job->surface, body));
+    // numbers of regions and triangles become tag sets; triangles of no group are left out
+    for (PetscInt c = 0; c < body->item[3].n; c++)
+      body->item[3].tags[c] = job->surface->region_tags[body->item[3].tags[c]];
+    for (PetscInt i = 0; i < tri->n; i++) {
+      const PetscInt f = tri->tags[i];
+
+      if (!job->surface->tags[f]) continue;
+      PetscCall(PetscArraymove(tri->vert + 3 * n, tri->vert + 3 * i, 3));
+      tri->tags[n] = job->surface->tags[f];
+      tri->number[n++] = job->surface->number[f];
+    }
+    tri->n = n;
     PetscCall(add_note(job, backend, job->size / factor, reasons, body));
   }
   PetscFunctionReturn(PETSC_SUCCESS);

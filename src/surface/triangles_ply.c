@@ -228,60 +228,51 @@ static PetscErrorCode read_face(Ply *p, const Property *q, int64_t number)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* One vertex, face or whatever: its properties in their order. */
-static PetscErrorCode read_item(Ply *p, const Element *e, int64_t number)
-{
-  PetscReal x[3] = {0, 0, 0};
-  double value;
-
-  PetscFunctionBeginUser;
-  for (int i = 0; i < e->nproperty; i++) {
-    const Property *q = &e->property[i];
-    int64_t n = 1;
-
-    if (q->axis == 3) {
-      PetscCall(read_face(p, q, number));
-      continue;
-    }
-    if (q->count >= 0) PetscCall(read_count(p, q, &n));
-    for (int64_t k = 0; k < n; k++) PetscCall(read_value(p, q->type, "value of a property", &value));
-    if (q->axis < 0) continue;
-    if (!isfinite(value)) SB_SCAN_ERROR(p->s, "the coordinate is not a finite number; repair the file");
-    x[q->axis] = value;
-  }
-  if (!strcmp(e->name, "vertex")) PetscCall(SbTrianglesAddVertex(p->f, x));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Coordinates must be there; the least number of bytes of an item bounds how many the file can hold. */
-static PetscErrorCode check_element(Ply *p, const Element *e)
-{
-  int64_t bytes = 0;
-  int axes = 0;
-
-  PetscFunctionBeginUser;
-  for (int i = 0; i < e->nproperty; i++) {
-    const Property *q = &e->property[i];
-
-    bytes += q->count >= 0 ? types[q->count].size : types[q->type].size;
-    axes |= q->axis >= 0 ? 1 << q->axis : 0;
-  }
-  if (!strcmp(e->name, "vertex") && axes != 7)
-    SB_SCAN_ERROR(p->s, "the vertices have no properties x, y and z");
-  if (!strcmp(e->name, "face") && axes != 8) SB_SCAN_ERROR(p->s, "the faces have no list vertex_indices");
-  if (!bytes && e->n) SB_SCAN_ERROR(p->s, "the element '%s' has no properties", e->name);
-  PetscCall(check_room(p, e->name, e->n, PetscMax(1, 2 * e->nproperty), PetscMax(1, bytes)));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 static PetscErrorCode read_all(Ply *p)
 {
   PetscFunctionBeginUser;
   PetscCall(read_header(p));
   p->s->bytes = p->binary;
   for (int k = 0; k < p->nelement; k++) {
-    PetscCall(check_element(p, &p->element[k]));
-    for (int64_t i = 0; i < p->element[k].n; i++) PetscCall(read_item(p, &p->element[k], i + 1));
+    int64_t bytes = 0;
+    int axes = 0;
+
+    // coordinates must be there; the least number of bytes of an item bounds how many the file can hold
+    for (int i = 0; i < p->element[k].nproperty; i++) {
+      const Property *q = &p->element[k].property[i];
+
+      bytes += q->count >= 0 ? types[q->count].size : types[q->type].size;
+      axes |= q->axis >= 0 ? 1 << q->axis : 0;
+    }
+    if (!strcmp(p->element[k].name, "vertex") && axes != 7)
+      SB_SCAN_ERROR(p->s, "the vertices have no properties x, y and z");
+    if (!strcmp(p->element[k].name, "face") && axes != 8)
+      SB_SCAN_ERROR(p->s, "the faces have no list vertex_indices");
+    if (!bytes && p->element[k].n)
+      SB_SCAN_ERROR(p->s, "the element '%s' has no properties", p->element[k].name);
+    PetscCall(check_room(p, p->element[k].name, p->element[k].n, PetscMax(1, 2 * p->element[k].nproperty),
+                         PetscMax(1, bytes)));
+    // one vertex, face or whatever: its properties in their order
+    for (int64_t i = 0; i < p->element[k].n; i++) {
+      PetscReal x[3] = {0, 0, 0};
+      double value;
+
+      for (int j = 0; j < p->element[k].nproperty; j++) {
+        const Property *q = &p->element[k].property[j];
+        int64_t n = 1;
+
+        if (q->axis == 3) {
+          PetscCall(read_face(p, q, i + 1));
+          continue;
+        }
+        if (q->count >= 0) PetscCall(read_count(p, q, &n));
+        for (int64_t c = 0; c < n; c++) PetscCall(read_value(p, q->type, "value of a property", &value));
+        if (q->axis < 0) continue;
+        if (!isfinite(value)) SB_SCAN_ERROR(p->s, "the coordinate is not a finite number; repair the file");
+        x[q->axis] = value;
+      }
+      if (!strcmp(p->element[k].name, "vertex")) PetscCall(SbTrianglesAddVertex(p->f, x));
+    }
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }

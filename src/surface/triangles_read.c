@@ -32,31 +32,6 @@ static PetscErrorCode stl_triangle(SbTriangleFile *f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode stl_binary(SbScan *s, uint32_t n, SbTriangleFile *f)
-{
-  PetscFunctionBeginUser;
-  s->bytes = PETSC_TRUE;
-  for (uint32_t i = 0; i < n; i++) {
-    for (int k = 0; k < 3; k++) {
-      PetscReal x[3];
-
-      for (int c = 0; c < 3; c++) {
-        const uint32_t bits = little(s->token = s->data + 84 + 50 * (size_t)i + 12 + 12 * k + 4 * c);
-        float value;
-
-        memcpy(&value, &bits, sizeof(value));
-        x[c] = (PetscReal)value;
-        if (!isfinite(x[c]))
-          SB_SCAN_ERROR(s, "a coordinate of triangle %lld is not a finite number; repair the file",
-                        (long long)i + 1);
-      }
-      PetscCall(SbTrianglesAddVertex(f, x));
-    }
-    PetscCall(stl_triangle(f));
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* The next word; `end solid` is `endsolid`. */
 static PetscErrorCode stl_next(SbScan *s, char word[32])
 {
@@ -75,25 +50,6 @@ static PetscErrorCode stl_word(SbScan *s, const char *wanted)
   if (!word[0])
     SB_SCAN_ERROR(s, "the file ends where '%s' is expected; it is truncated, write or copy it again", wanted);
   if (strcasecmp(word, wanted)) SB_SCAN_ERROR(s, "expected '%s', found '%s'", wanted, word);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode stl_facet(SbScan *s, SbTriangleFile *f)
-{
-  PetscFunctionBeginUser;
-  PetscCall(SbScanEndOfLine(s)); /* the normal */
-  PetscCall(stl_word(s, "outer"));
-  PetscCall(stl_word(s, "loop"));
-  for (int k = 0; k < 3; k++) {
-    PetscReal x[3];
-
-    PetscCall(stl_word(s, "vertex"));
-    PetscCall(SbScanPoint(s, "coordinate of a vertex", 0, x));
-    PetscCall(SbTrianglesAddVertex(f, x));
-  }
-  PetscCall(stl_word(s, "endloop"));
-  PetscCall(stl_word(s, "endfacet"));
-  PetscCall(stl_triangle(f));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -129,7 +85,22 @@ static PetscErrorCode stl_text(SbScan *s, SbTriangleFile *f)
       PetscCall(SbScanEndOfLine(s));
     }
     if (!strcasecmp(word, "endsolid")) PetscCall(SbScanEndOfLine(s)); /* its name again */
-    if (open && !strcasecmp(word, "facet")) PetscCall(stl_facet(s, f));
+    // a facet: its normal, which is not read, and three vertices
+    if (open && !strcasecmp(word, "facet")) {
+      PetscCall(SbScanEndOfLine(s)); /* the normal */
+      PetscCall(stl_word(s, "outer"));
+      PetscCall(stl_word(s, "loop"));
+      for (int k = 0; k < 3; k++) {
+        PetscReal x[3];
+
+        PetscCall(stl_word(s, "vertex"));
+        PetscCall(SbScanPoint(s, "coordinate of a vertex", 0, x));
+        PetscCall(SbTrianglesAddVertex(f, x));
+      }
+      PetscCall(stl_word(s, "endloop"));
+      PetscCall(stl_word(s, "endfacet"));
+      PetscCall(stl_triangle(f));
+    }
     PetscCall(stl_next(s, word));
     if (!strcasecmp(word, "endsolid"))
       open = PETSC_FALSE;
@@ -154,7 +125,26 @@ static PetscErrorCode stl_file(SbScan *s, SbTriangleFile *f)
     if (size > known)
       PetscCall(SbWarning(PETSC_COMM_SELF, "%s: %zu bytes behind the %lld triangles are left out", f->where,
                           size - known, (long long)n));
-    PetscCall(stl_binary(s, n, f));
+    // binary: 84 bytes, then 50 for each triangle, a normal and three vertices
+    s->bytes = PETSC_TRUE;
+    for (uint32_t i = 0; i < n; i++) {
+      for (int k = 0; k < 3; k++) {
+        PetscReal x[3];
+
+        for (int c = 0; c < 3; c++) {
+          const uint32_t bits = little(s->token = s->data + 84 + 50 * (size_t)i + 12 + 12 * k + 4 * c);
+          float value;
+
+          memcpy(&value, &bits, sizeof(value));
+          x[c] = (PetscReal)value;
+          if (!isfinite(x[c]))
+            SB_SCAN_ERROR(s, "a coordinate of triangle %lld is not a finite number; repair the file",
+                          (long long)i + 1);
+        }
+        PetscCall(SbTrianglesAddVertex(f, x));
+      }
+      PetscCall(stl_triangle(f));
+    }
   } else
     PetscCall(stl_text(s, f));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -169,27 +159,6 @@ static PetscErrorCode add_vertex(SbScan *s, SbTriangleFile *f)
   PetscFunctionBeginUser;
   PetscCall(SbScanPoint(s, "coordinate of a vertex", 0, x));
   PetscCall(SbTrianglesAddVertex(f, x));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* The rest of a line f: numbers from 1, or from the last vertex back when negative; what follows a slash is not read. */
-static PetscErrorCode obj_face(SbScan *s, int64_t number, SbTriangleFile *f)
-{
-  PetscFunctionBeginUser;
-  for (;;) {
-    char *after;
-    long long v;
-
-    while (s->at < s->end && (*s->at == ' ' || *s->at == '\t' || *s->at == '\r')) s->at++;
-    if (s->at >= s->end || *s->at == '\n' || *s->at == '#') break;
-    s->token = s->at;
-    v = strtoll(s->at, &after, 10);
-    if (after == s->at || v == 0 || (*after && !strchr("/ \t\r\n", *after)))
-      SB_SCAN_ERROR(s, "expected the number of a vertex, not zero");
-    for (s->at = after; s->at < s->end && !strchr(" \t\r\n", *s->at);) s->at++;
-    PetscCall(SbTrianglesAddCorner(s, number, v > 0 ? v - 1 : f->t->nvert + v, f));
-  }
-  PetscCall(SbTrianglesAddFace(s, number, f));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -237,7 +206,26 @@ static PetscErrorCode obj_file(SbScan *s, SbTriangleFile *f)
     PetscCall(SbScanWord(s, sizeof(word), word));
     if (!word[0]) break;
     if (!strcmp(word, "v")) PetscCall(add_vertex(s, f));
-    if (!strcmp(word, "f")) PetscCall(obj_face(s, ++nface, f));
+    /* the rest of a line f: numbers from 1, or from the last vertex back when negative; what follows a slash
+       is not read */
+    if (!strcmp(word, "f")) {
+      int64_t number = ++nface;
+
+      for (;;) {
+        char *after;
+        long long v;
+
+        while (s->at < s->end && (*s->at == ' ' || *s->at == '\t' || *s->at == '\r')) s->at++;
+        if (s->at >= s->end || *s->at == '\n' || *s->at == '#') break;
+        s->token = s->at;
+        v = strtoll(s->at, &after, 10);
+        if (after == s->at || v == 0 || (*after && !strchr("/ \t\r\n", *after)))
+          SB_SCAN_ERROR(s, "expected the number of a vertex, not zero");
+        for (s->at = after; s->at < s->end && !strchr(" \t\r\n", *s->at);) s->at++;
+        PetscCall(SbTrianglesAddCorner(s, number, v > 0 ? v - 1 : f->t->nvert + v, f));
+      }
+      PetscCall(SbTrianglesAddFace(s, number, f));
+    }
     if (!strcmp(word, "g") || !strcmp(word, "o"))
       PetscCall(obj_names(s, (PetscBool)(word[0] == 'o'), &names, f));
     PetscCall(SbScanEndOfLine(s));

@@ -46,27 +46,6 @@ static PetscErrorCode groups(const SbImport *mesh)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode sizes(const SbMeshFacts *f)
-{
-  const PetscReal *b = f->body.bbox;
-  char number[32];
-
-  PetscFunctionBeginUser;
-  PetscCall(print("size (coordinates in m)\n"));
-  PetscCall(print("  from (%.6g, %.6g, %.6g) to (%.6g, %.6g, %.6g)\n", (double)b[0], (double)b[1],
-                  (double)b[2], (double)b[3], (double)b[4], (double)b[5]));
-  PetscCall(print("  %-26s %12.6g m^3\n", "volume", (double)f->body.volume));
-  PetscCall(print("  %-26s %12.6g m^2, %s facets\n", "surface", (double)f->area,
-                  SbToolNumber(f->body.nfacet, number)));
-  PetscCall(print("  %-26s %12s\n", "parts", SbToolNumber(f->body.npart, number)));
-  PetscCall(print("  %-26s %12s: shortest %.4g m, mean %.4g m, longest %.4g m\n", "edges",
-                  SbToolNumber(f->nedge, number), (double)f->edge[0], (double)f->edge[1],
-                  (double)f->edge[2]));
-  PetscCall(print("  %-26s %12s\n", "faces", SbToolNumber(f->nface, number)));
-  if (f->body.note[0]) PetscCall(print("  to know: %s\n", f->body.note));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* A line of a histogram: at most 40 signs; what is there has at least one. */
 static PetscErrorCode bar(const char *label, PetscInt64 n, PetscInt64 most)
 {
@@ -109,31 +88,14 @@ static PetscErrorCode quality(const SbMeshFacts *f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode memory(const SbMeshFacts *f)
-{
-  static const char *const elements[] = {"p1", "cr", "dg"};
-  char number[32];
-
-  PetscFunctionBeginUser;
-  PetscCall(print("a dynamic run on one rank, estimated\n  %-8s %14s %14s %14s\n", "element", "unknowns",
-                  "matrix MiB", "memory MiB"));
-  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(elements); i++) {
-    PetscInt unknowns;
-    PetscReal matrix;
-    const PetscReal bytes = SbToolMemory(f, elements[i], &unknowns, &matrix);
-
-    PetscCall(print("  %-8s %14s %14.0f %14.0f\n", elements[i], SbToolNumber(unknowns, number),
-                    (double)matrix / 1048576, (double)bytes / 1048576));
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode SbToolInfo(SbTool *tool, SbImport *mesh)
 {
   SbMeshFacts facts;
   PetscErrorCode ierr;
   PetscInt nvert, n[4];
   char number[32];
+  const PetscReal *b;
+  static const char *const elements[] = {"p1", "cr", "dg"};
 
   PetscFunctionBeginUser;
   SbMeshFileCount(mesh, &nvert, n);
@@ -149,8 +111,31 @@ PetscErrorCode SbToolInfo(SbTool *tool, SbImport *mesh)
   ierr = SbMeshFileMeasure(mesh, &facts);
   PetscCall(SbToolEnd(tool));
   PetscCall(ierr);
-  PetscCall(sizes(&facts));
+  // size and counts
+  b = facts.body.bbox;
+  PetscCall(print("size (coordinates in m)\n"));
+  PetscCall(print("  from (%.6g, %.6g, %.6g) to (%.6g, %.6g, %.6g)\n", (double)b[0], (double)b[1],
+                  (double)b[2], (double)b[3], (double)b[4], (double)b[5]));
+  PetscCall(print("  %-26s %12.6g m^3\n", "volume", (double)facts.body.volume));
+  PetscCall(print("  %-26s %12.6g m^2, %s facets\n", "surface", (double)facts.area,
+                  SbToolNumber(facts.body.nfacet, number)));
+  PetscCall(print("  %-26s %12s\n", "parts", SbToolNumber(facts.body.npart, number)));
+  PetscCall(print("  %-26s %12s: shortest %.4g m, mean %.4g m, longest %.4g m\n", "edges",
+                  SbToolNumber(facts.nedge, number), (double)facts.edge[0], (double)facts.edge[1],
+                  (double)facts.edge[2]));
+  PetscCall(print("  %-26s %12s\n", "faces", SbToolNumber(facts.nface, number)));
+  if (facts.body.note[0]) PetscCall(print("  to know: %s\n", facts.body.note));
   PetscCall(quality(&facts));
-  PetscCall(memory(&facts));
+  // what a run of it needs
+  PetscCall(print("a dynamic run on one rank, estimated\n  %-8s %14s %14s %14s\n", "element", "unknowns",
+                  "matrix MiB", "memory MiB"));
+  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(elements); i++) {
+    PetscInt unknowns;
+    PetscReal matrix;
+    const PetscReal bytes = SbToolMemory(&facts, elements[i], &unknowns, &matrix);
+
+    PetscCall(print("  %-8s %14s %14.0f %14.0f\n", elements[i], SbToolNumber(unknowns, number),
+                    (double)matrix / 1048576, (double)bytes / 1048576));
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }

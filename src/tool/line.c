@@ -138,13 +138,6 @@ PetscErrorCode SbToolCommandLine(int *argc, char *argv[], SbToolLine *line)
 
 /* ------------------------------------------------------------------ checks */
 
-/* Options of PETSc that make sense here. */
-static PetscBool is_petsc(const char *name)
-{
-  return SbBeginsWith(name, "log_ malloc options_ info on_error_ error_ memory fp_trap no_signal_handler "
-                            "start_in_debugger skip_petscrc citations");
-}
-
 static PetscErrorCode check_option(const char *name, const char *command)
 {
   const char *list[PETSC_STATIC_ARRAY_LENGTH(rows)];
@@ -154,7 +147,9 @@ static PetscErrorCode check_option(const char *name, const char *command)
   PetscFunctionBeginUser;
   for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(rows); i++) list[i] = rows[i].key;
   if (!find_row(name, &index)) {
-    if (is_petsc(name)) PetscFunctionReturn(PETSC_SUCCESS);
+    if (SbBeginsWith(name, "log_ malloc options_ info on_error_ error_ memory fp_trap no_signal_handler "
+                           "start_in_debugger skip_petscrc citations"))
+      PetscFunctionReturn(PETSC_SUCCESS);
     PetscCall(SbNearestNames(name, PETSC_STATIC_ARRAY_LENGTH(rows), list, sizeof(near), near));
     SETERRQ(PETSC_COMM_SELF, PETSC_ERR_USER, "-%s is not an option of supple-mesh%s%s%s", name,
             near[0] ? "; did you mean -" : "; supple-mesh -help lists them", near, near[0] ? "?" : "");
@@ -177,25 +172,6 @@ static PetscErrorCode find_command(const char *word, const SbToolCommand **comma
   }
   PetscCall(SbNamesAdvise(word, n, list, sizeof(all), all));
   SETERRQ(PETSC_COMM_SELF, PETSC_ERR_USER, "'%s' is no command; the commands are %s", word, all);
-}
-
-static PetscErrorCode check_words(const SbToolLine *line, const SbToolCommand **command)
-{
-  PetscMPIInt size;
-  int nfile;
-
-  PetscFunctionBeginUser;
-  PetscCallMPI(MPI_Comm_size(PETSC_COMM_WORLD, &size));
-  PetscCheck(size == 1, PETSC_COMM_WORLD, PETSC_ERR_USER, "runs on one process, not on %d; leave out mpirun",
-             (int)size);
-  PetscCheck(line->nword, PETSC_COMM_SELF, PETSC_ERR_USER,
-             "no command is given; supple-mesh -help lists them, supple-mesh info FILE describes a mesh");
-  PetscCall(find_command(line->word[0], command));
-  nfile = line->nword - 1;
-  PetscCheck(nfile == (*command)->nfile, PETSC_COMM_SELF, PETSC_ERR_USER,
-             "%s takes %d file%s, not %d: supple-mesh %s %s", (*command)->name, (*command)->nfile,
-             (*command)->nfile > 1 ? "s" : "", nfile, (*command)->name, (*command)->files);
-  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* ------------------------------------------------------------------ values */
@@ -237,10 +213,22 @@ static PetscErrorCode read_options(SbTool *tool)
 PetscErrorCode SbToolSetFromOptions(int argc, char *argv[], const SbToolLine *line, SbTool *tool)
 {
   const SbToolCommand *command = NULL;
+  PetscMPIInt size;
+  int nfile;
 
   PetscFunctionBeginUser;
   PetscCall(PetscMemzero(tool, sizeof(*tool)));
-  PetscCall(check_words(line, &command));
+  // one process, a command, and as many files as it takes
+  PetscCallMPI(MPI_Comm_size(PETSC_COMM_WORLD, &size));
+  PetscCheck(size == 1, PETSC_COMM_WORLD, PETSC_ERR_USER, "runs on one process, not on %d; leave out mpirun",
+             (int)size);
+  PetscCheck(line->nword, PETSC_COMM_SELF, PETSC_ERR_USER,
+             "no command is given; supple-mesh -help lists them, supple-mesh info FILE describes a mesh");
+  PetscCall(find_command(line->word[0], &command));
+  nfile = line->nword - 1;
+  PetscCheck(nfile == command->nfile, PETSC_COMM_SELF, PETSC_ERR_USER,
+             "%s takes %d file%s, not %d: supple-mesh %s %s", command->name, command->nfile,
+             command->nfile > 1 ? "s" : "", nfile, command->name, command->files);
   for (int i = 1; i < argc; i++) {
     PetscBool is_option;
 
