@@ -187,6 +187,8 @@ PetscErrorCode SbImportTagSet(SbImport *import, PetscInt n, PetscInt groups[], P
 /* Notes that an item belongs to a group; SbImportJoinGroups() gives every item the groups noted for it, beside those that it has. */
 PetscErrorCode SbImportAddMember(SbImport *import, PetscInt dim, PetscInt item, PetscInt group);
 PetscErrorCode SbImportJoinGroups(SbImport *import);
+/* Of simplices with the same vertices the first stays, with the groups of all; but for `all` only of those that have groups and share none. Adds how many went. */
+PetscErrorCode SbImportJoinRepeats(SbImport *import, int dim, PetscBool all, PetscInt *ndropped);
 
 /* ------------------------------------------------------------------ write_h5.c: indices of HDF5 files for ParaView */
 

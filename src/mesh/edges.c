@@ -81,17 +81,9 @@ PetscErrorCode SbImportEdgesDestroy(SbImportEdges *edges)
 
 PetscInt SbImportEdgesFind(const SbImportEdges *edges, PetscInt a, PetscInt b)
 {
-  const PetscInt low = PetscMin(a, b), high = PetscMax(a, b);
-  PetscInt begin = edges->start[low], end = edges->start[low + 1];
+  const PetscInt low = PetscMin(a, b), begin = edges->start[low];
+  PetscInt at;
 
-  while (begin < end) {
-    const PetscInt middle = begin + (end - begin) / 2;
-
-    if (edges->high[middle] == high) return middle;
-    if (edges->high[middle] < high)
-      begin = middle + 1;
-    else
-      end = middle;
-  }
-  return -1;
+  (void)PetscFindInt(PetscMax(a, b), edges->start[low + 1] - begin, edges->high + begin, &at);
+  return at < 0 ? -1 : begin + at;
 }

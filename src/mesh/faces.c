@@ -28,40 +28,28 @@ static int compare_keys(const void *a, const void *b)
   return (p->slot > q->slot) - (p->slot < q->slot);
 }
 
-static void sort_bucket(PetscInt n, SbFaceKey face[])
-{
-  if (n > 64) {
-    qsort(face, (size_t)n, sizeof(*face), compare_keys);
-    return;
-  }
-  for (PetscInt i = 1; i < n; i++) {
-    const SbFaceKey f = face[i];
-    PetscInt j = i;
-
-    for (; j > 0 && face[j - 1].key > f.key; j--) face[j] = face[j - 1];
-    face[j] = f;
-  }
-}
-
-/* Buckets of the faces by lowest vertex. */
-static PetscErrorCode fill_buckets(const PetscInt cell[], SbFaces *faces)
+PetscErrorCode SbFacesCreate(PetscInt nvert, PetscInt ncell, const PetscInt cell[], SbFaces *faces)
 {
   PetscInt *next;
   uint64_t key;
 
   PetscFunctionBeginUser;
-  PetscCall(PetscCalloc1(faces->nvert + 1, &faces->start));
-  PetscCall(PetscMalloc1(4 * (size_t)faces->ncell, &faces->face));
-  for (PetscInt c = 0; c < faces->ncell; c++) {
+  PetscCall(PetscMemzero(faces, sizeof(*faces)));
+  faces->nvert = nvert;
+  faces->ncell = ncell;
+  // buckets of the faces by lowest vertex
+  PetscCall(PetscCalloc1(nvert + 1, &faces->start));
+  PetscCall(PetscMalloc1(4 * (size_t)ncell, &faces->face));
+  for (PetscInt c = 0; c < ncell; c++) {
     const PetscInt *v = cell + 4 * c;
 
     for (int f = 0; f < 4; f++)
       faces->start[face_key(v[SbFaceVertex[f][0]], v[SbFaceVertex[f][1]], v[SbFaceVertex[f][2]], &key) + 1]++;
   }
-  for (PetscInt v = 0; v < faces->nvert; v++) faces->start[v + 1] += faces->start[v];
-  PetscCall(PetscMalloc1(faces->nvert, &next));
-  PetscCall(PetscArraycpy(next, faces->start, faces->nvert));
-  for (PetscInt c = 0; c < faces->ncell; c++) {
+  for (PetscInt v = 0; v < nvert; v++) faces->start[v + 1] += faces->start[v];
+  PetscCall(PetscMalloc1(nvert, &next));
+  PetscCall(PetscArraycpy(next, faces->start, nvert));
+  for (PetscInt c = 0; c < ncell; c++) {
     const PetscInt *v = cell + 4 * c;
 
     for (int f = 0; f < 4; f++) {
@@ -72,25 +60,25 @@ static PetscErrorCode fill_buckets(const PetscInt cell[], SbFaces *faces)
     }
   }
   PetscCall(PetscFree(next));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode SbFacesCreate(PetscInt nvert, PetscInt ncell, const PetscInt cell[], SbFaces *faces)
-{
-  PetscFunctionBeginUser;
-  PetscCall(PetscMemzero(faces, sizeof(*faces)));
-  faces->nvert = nvert;
-  faces->ncell = ncell;
-  PetscCall(fill_buckets(cell, faces));
+  // neighbours: each bucket, sorted
   PetscCall(PetscMalloc1(4 * (size_t)ncell, &faces->neighbour));
   for (PetscInt s = 0; s < 4 * ncell; s++) faces->neighbour[s] = -1;
   for (PetscInt v = 0; v < nvert; v++) {
-    const SbFaceKey *face = faces->face;
+    SbFaceKey *face = faces->face;
+    const PetscInt begin = faces->start[v], end = faces->start[v + 1];
 
-    sort_bucket(faces->start[v + 1] - faces->start[v], faces->face + faces->start[v]);
+    // short buckets by insertion: the order of their faces is that of the cells
+    if (end - begin > 64) qsort(face + begin, (size_t)(end - begin), sizeof(*face), compare_keys);
+    for (PetscInt i = begin + 1; i < end && end - begin <= 64; i++) {
+      const SbFaceKey f = face[i];
+      PetscInt j = i;
+
+      for (; j > begin && face[j - 1].key > f.key; j--) face[j] = face[j - 1];
+      face[j] = f;
+    }
     // equal keys: one is a boundary face, two are neighbours, more is an error
-    for (PetscInt i = faces->start[v], n; i < faces->start[v + 1]; i += n) {
-      for (n = 1; i + n < faces->start[v + 1] && face[i + n].key == face[i].key; n++) {
+    for (PetscInt i = begin, n; i < end; i += n) {
+      for (n = 1; i + n < end && face[i + n].key == face[i].key; n++) {
       }
       if (n == 1)
         faces->nboundary++;

@@ -54,14 +54,6 @@ static PetscErrorCode drop_marked(SbItems *item, int dim, const PetscBool drop[]
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscBool collapsed(const PetscInt v[], int dim)
-{
-  for (int i = 0; i <= dim; i++)
-    for (int j = 0; j < i; j++)
-      if (v[i] == v[j]) return PETSC_TRUE;
-  return PETSC_FALSE;
-}
-
 static PetscErrorCode drop_collapsed(SbImport *im, int dim, PetscInt *ndropped)
 {
   SbItems *item = &im->item[dim];
@@ -69,70 +61,14 @@ static PetscErrorCode drop_collapsed(SbImport *im, int dim, PetscInt *ndropped)
 
   PetscFunctionBeginUser;
   PetscCall(PetscCalloc1(item->n, &drop));
-  for (PetscInt i = 0; i < item->n; i++) drop[i] = collapsed(item->vert + (dim + 1) * (size_t)i, dim);
-  PetscCall(drop_marked(item, dim, drop, ndropped));
-  PetscCall(PetscFree(drop));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* ------------------------------------------------------------------ items that come again */
-
-static PetscBool same_vertices(const PetscInt a[], const PetscInt b[], int dim)
-{
-  for (int i = 0; i <= dim; i++) {
-    int j = 0;
-
-    while (j <= dim && a[i] != b[j]) j++;
-    if (j > dim) return PETSC_FALSE;
-  }
-  return PETSC_TRUE;
-}
-
-/* The tag set with the groups of two. */
-static PetscErrorCode join_tags(SbImport *im, PetscInt a, PetscInt b, PetscInt *joined)
-{
-  PetscInt *group, n = 0;
-
-  PetscFunctionBeginUser;
-  *joined = a;
-  if (a == b) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(PetscMalloc1(2 * (size_t)im->ngroup, &group));
-  for (PetscInt k = im->tags_start[a]; k < im->tags_start[a + 1]; k++) group[n++] = im->tags_group[k];
-  for (PetscInt k = im->tags_start[b]; k < im->tags_start[b + 1]; k++) group[n++] = im->tags_group[k];
-  PetscCall(SbImportTagSet(im, n, group, joined));
-  PetscCall(PetscFree(group));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Lists the items by their lowest vertex and compares within each list; the first of equal ones stays. */
-static PetscErrorCode drop_repeats(SbImport *im, int dim, PetscInt *ndropped)
-{
-  SbItems *item = &im->item[dim];
-  PetscInt *head, *next;
-  PetscBool *drop;
-
-  PetscFunctionBeginUser;
-  PetscCall(PetscMalloc2(im->nvert, &head, item->n, &next));
-  PetscCall(PetscCalloc1(item->n, &drop));
-  for (PetscInt v = 0; v < im->nvert; v++) head[v] = -1;
   for (PetscInt i = 0; i < item->n; i++) {
     const PetscInt *v = item->vert + (dim + 1) * (size_t)i;
-    PetscInt low = v[0], same;
 
-    for (int a = 1; a <= dim; a++) low = PetscMin(low, v[a]);
-    same = head[low];
-    while (same >= 0 && !same_vertices(v, item->vert + (dim + 1) * (size_t)same, dim)) same = next[same];
-    if (same >= 0) {
-      drop[i] = PETSC_TRUE;
-      PetscCall(join_tags(im, item->tags[same], item->tags[i], &item->tags[same]));
-    } else {
-      next[i] = head[low];
-      head[low] = i;
-    }
+    for (int a = 1; a <= dim; a++)
+      for (int b = 0; b < a; b++) drop[i] = (PetscBool)(drop[i] || v[a] == v[b]);
   }
   PetscCall(drop_marked(item, dim, drop, ndropped));
   PetscCall(PetscFree(drop));
-  PetscCall(PetscFree2(head, next));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -166,35 +102,22 @@ static PetscErrorCode drop_flat(SbImport *im, SbRepair *done)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode drop_lost(SbImport *im, const SbFaces *faces)
-{
-  SbItems *item = &im->item[2];
-  PetscBool *drop;
-  PetscInt slots[2], ndropped = 0;
-
-  PetscFunctionBeginUser;
-  PetscCall(PetscCalloc1(item->n, &drop));
-  for (PetscInt t = 0; t < item->n; t++) drop[t] = (PetscBool)!SbFacesFind(faces, item->vert + 3 * t, slots);
-  PetscCall(drop_marked(item, 2, drop, &ndropped));
-  PetscCall(PetscFree(drop));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode SbMeshFileRepair(SbImport *im, PetscReal tolerance, SbRepair *done)
 {
   SbFaces faces;
   PetscErrorCode ierr;
-  PetscInt turned, nitem = im->item[0].n + im->item[1].n + im->item[2].n, ndropped = 0;
+  PetscInt turned, nitem = im->item[0].n + im->item[1].n + im->item[2].n, ndropped = 0, slots[2];
+  PetscBool *drop;
 
   PetscFunctionBeginUser;
   PetscCall(PetscMemzero(done, sizeof(*done)));
   PetscCall(PetscMemzero(&faces, sizeof(faces)));
   PetscCall(weld(im, tolerance, done));
   PetscCall(drop_collapsed(im, 3, &done->ncollapsed));
-  PetscCall(drop_repeats(im, 3, &done->nduplicate));
+  PetscCall(SbImportJoinRepeats(im, 3, PETSC_TRUE, &done->nduplicate));
   for (int d = 0; d < 3; d++) {
     PetscCall(drop_collapsed(im, d, &ndropped));
-    PetscCall(drop_repeats(im, d, &ndropped));
+    PetscCall(SbImportJoinRepeats(im, d, PETSC_TRUE, &ndropped));
   }
   PetscCall(drop_flat(im, done));
   PetscCheck(im->item[3].n, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
@@ -205,7 +128,12 @@ PetscErrorCode SbMeshFileRepair(SbImport *im, PetscReal tolerance, SbRepair *don
   ierr = SbImportCheck(im, &faces);
   done->nturned = im->nreoriented - turned;
   done->nunused = im->nunused - done->nwelded;
-  if (!ierr) ierr = drop_lost(im, &faces);
+  // triangles that are no face of a tet
+  PetscCall(PetscCalloc1(im->item[2].n, &drop));
+  for (PetscInt i = 0; i < im->item[2].n && !ierr; i++)
+    drop[i] = (PetscBool)!SbFacesFind(&faces, im->item[2].vert + 3 * i, slots);
+  if (!ierr) ierr = drop_marked(&im->item[2], 2, drop, &ndropped);
+  PetscCall(PetscFree(drop));
   PetscCall(SbFacesDestroy(&faces));
   PetscCall(ierr);
   for (PetscInt v = 0; v < im->nvert; v++) im->vert_number[v] = v + 1;

@@ -27,18 +27,6 @@ static const struct {
 };
 enum { NSHAPE = (int)PETSC_STATIC_ARRAY_LENGTH(shapes) };
 
-static PetscErrorCode unknown_shape(const char *option, const char *text)
-{
-  const char *names[NSHAPE];
-  char all[512], word[64];
-
-  PetscFunctionBeginUser;
-  for (int i = 0; i < NSHAPE; i++) names[i] = shapes[i].name;
-  (void)snprintf(word, sizeof(word), "%.*s", (int)strcspn(text, ":"), text);
-  PetscCall(SbNamesAdvise(word, NSHAPE, names, sizeof(all), all));
-  SETERRQ(PETSC_COMM_SELF, PETSC_ERR_USER_INPUT, "%s '%s': a set begins with one of %s", option, text, all);
-}
-
 /* Numbers separated by commas; -1 when there is anything else. */
 static int parse_numbers(const char *text, int most, PetscReal p[])
 {
@@ -66,7 +54,15 @@ PetscErrorCode SbSetParse(const char *option, const char *text, SbSet *set)
   for (i = 0; i < NSHAPE; i++) {
     if (strlen(shapes[i].name) == n && !strncmp(shapes[i].name, text, n)) break;
   }
-  if (i == NSHAPE) PetscCall(unknown_shape(option, text));
+  if (i == NSHAPE) {
+    const char *names[NSHAPE];
+    char all[512], word[64];
+
+    for (int k = 0; k < NSHAPE; k++) names[k] = shapes[k].name;
+    (void)snprintf(word, sizeof(word), "%.*s", (int)strcspn(text, ":"), text);
+    PetscCall(SbNamesAdvise(word, NSHAPE, names, sizeof(all), all));
+    SETERRQ(PETSC_COMM_SELF, PETSC_ERR_USER_INPUT, "%s '%s': a set begins with one of %s", option, text, all);
+  }
   set->shape = shapes[i].shape;
   set->group[0] = 0;
   PetscCall(PetscArrayzero(set->p, 8));

@@ -58,31 +58,6 @@ static PetscErrorCode load(const char *where, void **library, int *minor)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode initialise(void *library, int minor, SbGmsh *g)
-{
-  void (*before_9)(int, char **, int, int *);
-  void (*from_9)(int, char **, int, int, int *);
-  void *address = dlsym(library, "gmshInitialize");
-  int error = 1;
-
-  PetscFunctionBeginUser;
-  if (address && minor < 9) {
-    memcpy(&before_9, &address, sizeof(address));
-    (*before_9)(0, NULL, 0, &error);
-  } else if (address) {
-    memcpy(&from_9, &address, sizeof(address));
-    (*from_9)(0, NULL, 0, 0, &error);
-  }
-  PetscCheck(!error, PETSC_COMM_SELF, PETSC_ERR_LIB, "%s: gmshInitialize() of version 4.%d failed", g->where,
-             minor);
-  SB_GMSH(g, OptionSetNumber, "General.Terminal", 0);
-  SB_GMSH(g, OptionSetNumber, "General.NumThreads", 1);
-  SB_GMSH(g, OptionSetNumber, "General.Verbosity", 4);
-  SB_GMSH0(g, LoggerStart);
-  SB_GMSH(g, ModelAdd, "supple");
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* ------------------------------------------------------------------ messages */
 
 /* The last line of the log that begins like this, without that; "" when there is none. */
@@ -276,8 +251,10 @@ static PetscErrorCode in_child(void *ctx, SbImport *im)
 {
   const SbGmshJob *job = (const SbGmshJob *)ctx;
   SbGmsh g;
-  void *library;
-  int minor;
+  void *library, (*before_9)(int, char **, int, int *);
+  int minor, error = 1;
+  void (*from_9)(int, char **, int, int, int *);
+  void *start;
 
   PetscFunctionBeginUser;
   PetscCall(PetscMemzero(&g, sizeof(g)));
@@ -292,7 +269,22 @@ static PetscErrorCode in_child(void *ctx, SbImport *im)
                functions[i].name);
     memcpy((char *)&g + functions[i].offset, &address, sizeof(address));
   }
-  PetscCall(initialise(library, minor, &g));
+  // the library starts: quiet, on one thread, with an empty model
+  start = dlsym(library, "gmshInitialize");
+  if (start && minor < 9) {
+    memcpy(&before_9, &start, sizeof(start));
+    (*before_9)(0, NULL, 0, &error);
+  } else if (start) {
+    memcpy(&from_9, &start, sizeof(start));
+    (*from_9)(0, NULL, 0, 0, &error);
+  }
+  PetscCheck(!error, PETSC_COMM_SELF, PETSC_ERR_LIB, "%s: gmshInitialize() of version 4.%d failed", g.where,
+             minor);
+  SB_GMSH(&g, OptionSetNumber, "General.Terminal", 0);
+  SB_GMSH(&g, OptionSetNumber, "General.NumThreads", 1);
+  SB_GMSH(&g, OptionSetNumber, "General.Verbosity", 4);
+  SB_GMSH0(&g, LoggerStart);
+  SB_GMSH(&g, ModelAdd, "supple");
   PetscCall((*job->work)(&g, job->ctx, im));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -68,79 +68,43 @@ static PetscErrorCode read_format(Gmsh *g)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Names are text also in binary files. */
-static PetscErrorCode read_names(Gmsh *g)
-{
-  SbScan *s = &g->im->scan;
-  int64_t n, dim, tag;
-  PetscInt group;
-  char name[SB_GROUP_MAX];
-
-  PetscFunctionBeginUser;
-  PetscCall(SbScanText(s, "number of physical names", &n));
-  PetscCall(SbScanRoom(s, "physical names", n, 6, 6));
-  for (int64_t i = 0; i < n; i++) {
-    PetscCall(SbScanText(s, "dimension of a physical name", &dim));
-    if (dim < 0 || dim > 3)
-      SB_SCAN_ERROR(s, "dimension %lld of a physical name; expected 0 to 3", (long long)dim);
-    PetscCall(SbScanText(s, "number of a physical name", &tag));
-    PetscCall(SbScanQuoted(s, "physical name in quotes", sizeof(name), name));
-    PetscCall(SbImportGroup(g->im, (PetscInt)dim, tag, name, &group));
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Physical groups of one entity. A minus sign is gmsh's sign of the orientation; it means nothing here. */
-static PetscErrorCode read_entity_groups(Gmsh *g, int dim, PetscInt *tags)
-{
-  int64_t n, tag;
-  PetscInt *group = NULL;
-
-  PetscFunctionBeginUser;
-  PetscCall(SbScanInt8(&g->im->scan, "number of physical groups of an entity", &n));
-  PetscCall(SbScanRoom(&g->im->scan, "physical groups", n, 2, 4));
-  if (n) PetscCall(SbImportScratch(g->im, (size_t)n * sizeof(*group), &group));
-  for (int64_t i = 0; i < n; i++) {
-    PetscCall(SbScanInt4(&g->im->scan, "physical group of an entity", &tag));
-    PetscCall(SbImportGroup(g->im, dim, tag < 0 ? -tag : tag, NULL, &group[i]));
-  }
-  PetscCall(SbImportTagSet(g->im, (PetscInt)n, group, tags));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode read_entity(Gmsh *g, int dim, Entity *e)
-{
-  SbScan *s = &g->im->scan;
-  PetscReal box;
-  int64_t n, border;
-
-  PetscFunctionBeginUser;
-  e->dim = dim;
-  PetscCall(SbScanInt4(s, "number of an entity", &e->tag));
-  for (int i = 0; i < (dim ? 6 : 3); i++) PetscCall(SbScanReal(s, "extent of an entity", 0, &box));
-  PetscCall(read_entity_groups(g, dim, &e->tags));
-  if (!dim) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(SbScanInt8(s, "number of bounding entities", &n));
-  PetscCall(SbScanRoom(s, "bounding entities", n, 2, 4));
-  for (int64_t i = 0; i < n; i++) PetscCall(SbScanInt4(s, "bounding entity", &border));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
+/* Entities of each dimension: number, extent, physical groups, bounding entities. */
 static PetscErrorCode read_entities(Gmsh *g)
 {
   SbScan *s = &g->im->scan;
-  int64_t n[4], total = 0;
+  int64_t count[4], total = 0, n, tag;
+  PetscInt *group = NULL;
+  PetscReal box;
 
   PetscFunctionBeginUser;
   if (g->entity) SB_SCAN_ERROR(s, "second section $Entities");
   for (int d = 0; d < 4; d++) {
-    PetscCall(SbScanInt8(s, "number of entities", &n[d]));
-    PetscCall(SbScanRoom(s, "entities", n[d], 10, 28));
-    total += n[d];
+    PetscCall(SbScanInt8(s, "number of entities", &count[d]));
+    PetscCall(SbScanRoom(s, "entities", count[d], 10, 28));
+    total += count[d];
   }
   PetscCall(SbImportScratch(g->im, (size_t)total * sizeof(*g->entity), &g->entity));
   for (int d = 0; d < 4; d++) {
-    for (int64_t i = 0; i < n[d]; i++) PetscCall(read_entity(g, d, &g->entity[g->nentity++]));
+    for (int64_t i = 0; i < count[d]; i++) {
+      Entity *e = &g->entity[g->nentity++];
+
+      e->dim = d;
+      PetscCall(SbScanInt4(s, "number of an entity", &e->tag));
+      for (int k = 0; k < (d ? 6 : 3); k++) PetscCall(SbScanReal(s, "extent of an entity", 0, &box));
+      // its groups; a minus sign is gmsh's sign of the orientation, it means nothing here
+      PetscCall(SbScanInt8(s, "number of physical groups of an entity", &n));
+      PetscCall(SbScanRoom(s, "physical groups", n, 2, 4));
+      if (n) PetscCall(SbImportScratch(g->im, (size_t)n * sizeof(*group), &group));
+      for (int64_t k = 0; k < n; k++) {
+        PetscCall(SbScanInt4(s, "physical group of an entity", &tag));
+        PetscCall(SbImportGroup(g->im, d, tag < 0 ? -tag : tag, NULL, &group[k]));
+      }
+      PetscCall(SbImportTagSet(g->im, (PetscInt)n, group, &e->tags));
+      if (!d) continue;
+      PetscCall(SbScanInt8(s, "number of bounding entities", &n));
+      PetscCall(SbScanRoom(s, "bounding entities", n, 2, 4));
+      for (int64_t k = 0; k < n; k++) PetscCall(SbScanInt4(s, "bounding entity", &tag));
+    }
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -156,49 +120,59 @@ static PetscInt entity_tags(const Gmsh *g, int64_t dim, int64_t tag)
 
 /* ------------------------------------------------------------------ nodes */
 
-static PetscErrorCode read_nodes_22(Gmsh *g)
+/* Versions 1 and 2: number and place of each. 4.1: blocks of numbers, then places, with up to three parameters on the entity. */
+static PetscErrorCode read_nodes(Gmsh *g)
 {
-  SbScan *s = &g->im->scan;
-  int64_t n;
-
-  PetscFunctionBeginUser;
-  s->binary = PETSC_FALSE; /* this one number is text also in binary files */
-  PetscCall(SbScanText(s, "number of nodes", &n));
-  if (g->binary) PetscCall(SbScanEndOfLine(s));
-  s->binary = g->binary;
-  PetscCall(SbScanRoom(s, "nodes", n, 8, 28));
-  PetscCall(SbImportSetVertices(g->im, (PetscInt)n));
-  for (PetscInt v = 0; v < n; v++) {
-    PetscCall(SbScanInt4(s, "number of a node", &g->im->vert_number[v]));
-    PetscCall(SbScanPoint(s, "coordinate", g->im->vert_number[v], g->im->x + 3 * v));
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* One block: all numbers, then all coordinates with up to three parameters on the entity. */
-static PetscErrorCode read_node_block(Gmsh *g, PetscInt *v)
-{
-  SbScan *s = &g->im->scan;
-  int64_t dim, tag, parametric, n;
+  SbImport *im = g->im;
+  SbScan *s = &im->scan;
+  int64_t nblock, n, bound, dim, tag, parametric;
+  PetscInt v = 0;
   PetscReal parameter;
 
   PetscFunctionBeginUser;
-  PetscCall(SbScanInt4(s, "dimension of a block of nodes", &dim));
-  PetscCall(SbScanInt4(s, "entity of a block of nodes", &tag));
-  PetscCall(SbScanInt4(s, "mark of parametric nodes", &parametric));
-  PetscCall(SbScanInt8(s, "number of nodes in a block", &n));
-  if (dim < 0 || dim > 3)
-    SB_SCAN_ERROR(s, "dimension %lld of a block of nodes; expected 0 to 3", (long long)dim);
-  if (n < 0 || n > g->im->nvert - *v)
-    SB_SCAN_ERROR(s, "block of %lld nodes; only %lld of those announced for the section are left",
-                  (long long)n, (long long)(g->im->nvert - *v));
-  for (PetscInt i = 0; i < n; i++) PetscCall(SbScanInt8(s, "number of a node", &g->im->vert_number[*v + i]));
-  for (PetscInt i = 0; i < n; i++) {
-    PetscCall(SbScanPoint(s, "coordinate", g->im->vert_number[*v + i], g->im->x + 3 * (*v + i)));
-    for (int k = 0; parametric && k < dim; k++)
-      PetscCall(SbScanReal(s, "parameter", g->im->vert_number[*v + i], &parameter));
+  if (im->x) SB_SCAN_ERROR(s, "second section $Nodes");
+  if (g->version <= 2) {
+    // the number of nodes is text also in binary files
+    s->binary = PETSC_FALSE;
+    PetscCall(SbScanText(s, "number of nodes", &n));
+    if (g->binary) PetscCall(SbScanEndOfLine(s));
+    s->binary = g->binary;
+    PetscCall(SbScanRoom(s, "nodes", n, 8, 28));
+    PetscCall(SbImportSetVertices(im, (PetscInt)n));
+    for (; v < n; v++) {
+      PetscCall(SbScanInt4(s, "number of a node", &im->vert_number[v]));
+      PetscCall(SbScanPoint(s, "coordinate", im->vert_number[v], im->x + 3 * v));
+    }
+  } else {
+    PetscCall(SbScanInt8(s, "number of blocks of nodes", &nblock));
+    PetscCall(SbScanInt8(s, "number of nodes", &n));
+    PetscCall(SbScanInt8(s, "lowest number of a node", &bound));
+    PetscCall(SbScanInt8(s, "highest number of a node", &bound));
+    PetscCall(SbScanRoom(s, "nodes", n, 8, 32));
+    PetscCall(SbImportSetVertices(im, (PetscInt)n));
+    for (int64_t b = 0; b < nblock; b++) {
+      PetscCall(SbScanInt4(s, "dimension of a block of nodes", &dim));
+      PetscCall(SbScanInt4(s, "entity of a block of nodes", &tag));
+      PetscCall(SbScanInt4(s, "mark of parametric nodes", &parametric));
+      PetscCall(SbScanInt8(s, "number of nodes in a block", &n));
+      if (dim < 0 || dim > 3)
+        SB_SCAN_ERROR(s, "dimension %lld of a block of nodes; expected 0 to 3", (long long)dim);
+      if (n < 0 || n > im->nvert - v)
+        SB_SCAN_ERROR(s, "block of %lld nodes; only %lld of those announced for the section are left",
+                      (long long)n, (long long)(im->nvert - v));
+      for (PetscInt i = v; i < v + n; i++) PetscCall(SbScanInt8(s, "number of a node", &im->vert_number[i]));
+      for (; n > 0; v++, n--) {
+        PetscCall(SbScanPoint(s, "coordinate", im->vert_number[v], im->x + 3 * v));
+        for (int k = 0; parametric && k < dim; k++)
+          PetscCall(SbScanReal(s, "parameter", im->vert_number[v], &parameter));
+      }
+    }
+    if (v < im->nvert)
+      SB_SCAN_ERROR(s, "%lld nodes are announced, the blocks hold %lld", (long long)im->nvert, (long long)v);
   }
-  *v += (PetscInt)n;
+  PetscCall(SbNumbersCreate(im->nvert, im->vert_number, &im->nodes));
+  if (im->nodes.repeated)
+    SB_SCAN_ERROR(s, "node %lld is given twice; renumber the nodes", (long long)im->nodes.twice);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -288,21 +262,6 @@ static PetscErrorCode read_elements_22_run(Gmsh *g, int64_t left, int64_t *nread
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode read_elements_22(Gmsh *g)
-{
-  SbScan *s = &g->im->scan;
-  int64_t n, nrun = 1;
-
-  PetscFunctionBeginUser;
-  s->binary = PETSC_FALSE;
-  PetscCall(SbScanText(s, "number of elements", &n));
-  if (g->binary) PetscCall(SbScanEndOfLine(s));
-  s->binary = g->binary;
-  PetscCall(SbScanRoom(s, "elements", n, 8, 8));
-  for (int64_t i = 0; i < n; i += nrun) PetscCall(read_elements_22_run(g, n - i, &nrun));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 static PetscErrorCode read_elements_41(Gmsh *g)
 {
   SbScan *s = &g->im->scan;
@@ -337,69 +296,6 @@ static PetscErrorCode read_elements_41(Gmsh *g)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* ------------------------------------------------------------------ tets that version 2.2 repeats */
-
-/* Whether two tets have the same vertices. */
-static PetscBool same_tet(const PetscInt a[4], const PetscInt b[4])
-{
-  for (int i = 0; i < 4; i++) {
-    if (a[i] != b[0] && a[i] != b[1] && a[i] != b[2] && a[i] != b[3]) return PETSC_FALSE;
-  }
-  return PETSC_TRUE;
-}
-
-/* Joins the groups of `from` to those of `to`, unless they share one: then the tet is given twice, for check.c to find. */
-static PetscErrorCode join_groups(SbImport *im, PetscInt from, PetscInt to, PetscBool *joined)
-{
-  PetscInt *tags = im->item[3].tags, *group, n = 0;
-
-  PetscFunctionBeginUser;
-  *joined = PETSC_FALSE;
-  for (PetscInt i = im->tags_start[tags[from]]; i < im->tags_start[tags[from] + 1]; i++) {
-    for (PetscInt j = im->tags_start[tags[to]]; j < im->tags_start[tags[to] + 1]; j++) {
-      if (im->tags_group[i] == im->tags_group[j]) PetscFunctionReturn(PETSC_SUCCESS);
-    }
-  }
-  PetscCall(PetscMalloc1(im->ngroup, &group));
-  for (PetscInt i = im->tags_start[tags[from]]; i < im->tags_start[tags[from] + 1]; i++)
-    group[n++] = im->tags_group[i];
-  *joined = (PetscBool)(n > 0);
-  for (PetscInt i = im->tags_start[tags[to]]; i < im->tags_start[tags[to] + 1]; i++)
-    group[n++] = im->tags_group[i];
-  if (*joined) PetscCall(SbImportTagSet(im, n, group, &tags[to]));
-  PetscCall(PetscFree(group));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Lists the tets by their lowest vertex and compares within each list; the first of equal tets stays. */
-static PetscErrorCode merge_repeats(SbImport *im)
-{
-  SbItems *tet = &im->item[3];
-  PetscInt *head, *next, kept = 0;
-  PetscBool joined;
-
-  PetscFunctionBeginUser;
-  PetscCall(PetscMalloc2(im->nvert, &head, tet->n, &next));
-  for (PetscInt v = 0; v < im->nvert; v++) head[v] = -1;
-  for (PetscInt c = 0; c < tet->n; c++) {
-    PetscInt *v = tet->vert + 4 * c, lo = PetscMin(PetscMin(v[0], v[1]), PetscMin(v[2], v[3])), same;
-
-    joined = PETSC_FALSE;
-    for (same = head[lo]; same >= 0 && !same_tet(v, tet->vert + 4 * same); same = next[same]) {
-    }
-    if (same >= 0) PetscCall(join_groups(im, c, same, &joined));
-    if (joined) continue;
-    PetscCall(PetscArraymove(tet->vert + 4 * kept, v, 4));
-    tet->tags[kept] = tet->tags[c];
-    tet->number[kept] = tet->number[c];
-    next[kept] = head[lo];
-    head[lo] = kept++;
-  }
-  tet->n = kept;
-  PetscCall(PetscFree2(head, next));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* ------------------------------------------------------------------ the file */
 
 /* The sections that concern us; all others are skipped. */
@@ -410,40 +306,40 @@ static PetscErrorCode read_section(Gmsh *g, const char *name, PetscBool *known)
 
   PetscFunctionBeginUser;
   *known = PETSC_TRUE;
-  if (!strcmp(name, "$PhysicalNames"))
-    PetscCall(read_names(g));
-  else if (!strcmp(name, "$Entities") || !strcmp(name, nodes) || !strcmp(name, elements)) {
+  // names of groups, as text also in binary files
+  if (!strcmp(name, "$PhysicalNames")) {
+    int64_t nname, dim, tag;
+    PetscInt group;
+    char text[SB_GROUP_MAX];
+
+    PetscCall(SbScanText(s, "number of physical names", &nname));
+    PetscCall(SbScanRoom(s, "physical names", nname, 6, 6));
+    for (int64_t i = 0; i < nname; i++) {
+      PetscCall(SbScanText(s, "dimension of a physical name", &dim));
+      if (dim < 0 || dim > 3)
+        SB_SCAN_ERROR(s, "dimension %lld of a physical name; expected 0 to 3", (long long)dim);
+      PetscCall(SbScanText(s, "number of a physical name", &tag));
+      PetscCall(SbScanQuoted(s, "physical name in quotes", sizeof(text), text));
+      PetscCall(SbImportGroup(g->im, (PetscInt)dim, tag, text, &group));
+    }
+  } else if (!strcmp(name, "$Entities") || !strcmp(name, nodes) || !strcmp(name, elements)) {
     PetscCall(SbScanEndOfLine(s));
     s->binary = g->binary;
     if (!strcmp(name, nodes)) {
-      if (g->im->x) SB_SCAN_ERROR(&g->im->scan, "second section $Nodes");
-      if (g->version <= 2)
-        PetscCall(read_nodes_22(g));
-      else {
-        int64_t nblock, n, bound;
-        PetscInt v = 0;
-
-        // blocks of nodes
-        PetscCall(SbScanInt8(s, "number of blocks of nodes", &nblock));
-        PetscCall(SbScanInt8(s, "number of nodes", &n));
-        PetscCall(SbScanInt8(s, "lowest number of a node", &bound));
-        PetscCall(SbScanInt8(s, "highest number of a node", &bound));
-        PetscCall(SbScanRoom(s, "nodes", n, 8, 32));
-        PetscCall(SbImportSetVertices(g->im, (PetscInt)n));
-        for (int64_t b = 0; b < nblock; b++) PetscCall(read_node_block(g, &v));
-        if (v < n)
-          SB_SCAN_ERROR(s, "%lld nodes are announced, the blocks hold %lld", (long long)n, (long long)v);
-      }
-      PetscCall(SbNumbersCreate(g->im->nvert, g->im->vert_number, &g->im->nodes));
-      if (g->im->nodes.repeated)
-        SB_SCAN_ERROR(&g->im->scan, "node %lld is given twice; renumber the nodes",
-                      (long long)g->im->nodes.twice);
+      PetscCall(read_nodes(g));
     } else if (!strcmp(name, elements)) {
       if (!g->im->x)
         SB_SCAN_ERROR(&g->im->scan, "section %s before the nodes", g->version == 1 ? "$ELM" : "$Elements");
-      if (g->version <= 2)
-        PetscCall(read_elements_22(g));
-      else
+      if (g->version <= 2) {
+        int64_t n, nrun = 1;
+
+        s->binary = PETSC_FALSE;
+        PetscCall(SbScanText(s, "number of elements", &n));
+        if (g->binary) PetscCall(SbScanEndOfLine(s));
+        s->binary = g->binary;
+        PetscCall(SbScanRoom(s, "elements", n, 8, 8));
+        for (int64_t i = 0; i < n; i += nrun) PetscCall(read_elements_22_run(g, n - i, &nrun));
+      } else
         PetscCall(read_elements_41(g));
     } else
       PetscCall(read_entities(g));
@@ -496,6 +392,7 @@ PetscErrorCode SbImportRead_Gmsh(const char *path, SbImport *im)
   PetscCheck(im->x, PETSC_COMM_SELF, PETSC_ERR_FILE_UNEXPECTED,
              "%s: has no section $Nodes; it is truncated or not a mesh", im->where);
   PetscCall(SbImportCheckTypes(im));
-  if (g.version <= 2 && im->ngroup > 1) PetscCall(merge_repeats(im));
+  // an element of several groups is given once for each; two of one group are for check.c to find
+  if (g.version <= 2 && im->ngroup > 1) PetscCall(SbImportJoinRepeats(im, 3, PETSC_FALSE, NULL));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -294,6 +294,60 @@ PetscErrorCode SbImportJoinGroups(SbImport *im)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscErrorCode SbImportJoinRepeats(SbImport *im, int dim, PetscBool all, PetscInt *ndropped)
+{
+  SbItems *item = &im->item[dim];
+  PetscInt *head, *next, *group, kept = 0;
+
+  PetscFunctionBeginUser;
+  // lists of items by their lowest vertex
+  PetscCall(PetscMalloc3(im->nvert, &head, item->n, &next, 2 * (size_t)im->ngroup, &group));
+  for (PetscInt v = 0; v < im->nvert; v++) head[v] = -1;
+  for (PetscInt i = 0; i < item->n; i++) {
+    const PetscInt *v = item->vert + (dim + 1) * (size_t)i;
+    PetscInt low = v[0], same, n = 0;
+    PetscBool join = PETSC_FALSE;
+
+    for (int a = 1; a <= dim; a++) low = PetscMin(low, v[a]);
+    // the one before it with the same vertices
+    for (same = head[low]; same >= 0; same = next[same]) {
+      const PetscInt *w = item->vert + (dim + 1) * (size_t)same;
+      int nequal = 0;
+
+      for (int a = 0; a <= dim; a++) {
+        int b = 0;
+
+        while (b <= dim && v[a] != w[b]) b++;
+        nequal += b <= dim;
+      }
+      if (nequal == dim + 1) break;
+    }
+    // gets the groups of both, unless they share one
+    if (same >= 0) {
+      const PetscInt *start = im->tags_start, own = item->tags[i], its = item->tags[same];
+
+      for (PetscInt k = start[own]; k < start[own + 1]; k++) group[n++] = im->tags_group[k];
+      join = (PetscBool)(all || n);
+      for (PetscInt k = start[its]; k < start[its + 1]; k++) {
+        for (PetscInt j = start[own]; j < start[own + 1]; j++)
+          join = (PetscBool)(join && (all || im->tags_group[j] != im->tags_group[k]));
+        group[n++] = im->tags_group[k];
+      }
+      if (join) PetscCall(SbImportTagSet(im, n, group, &item->tags[same]));
+    }
+    if (join) continue;
+    PetscCall(PetscArraymove(item->vert + (dim + 1) * (size_t)kept, v, dim + 1));
+    item->tags[kept] = item->tags[i];
+    item->number[kept] = item->number[i];
+    next[kept] = head[low];
+    head[low] = kept++;
+  }
+  if (ndropped) *ndropped += item->n - kept;
+  item->n = kept;
+  PetscCall(PetscFree3(head, next, group));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 const char *SbImportOption(const SbImport *im, const char *key, char name[SB_IMPORT_OPTION_MAX])
 {
   if (im->body[0])

@@ -77,50 +77,11 @@ static PetscErrorCode read_array(Vtk *v, const char *what, int64_t n, SbVtkType 
 
 /* ------------------------------------------------------------------ points and cells */
 
-static PetscErrorCode read_points(Vtk *v)
-{
-  SbVtkType type;
-  int64_t n;
-  double *x = NULL;
-
-  PetscFunctionBeginUser;
-  if (v->points) SB_SCAN_ERROR(v->scan, "second section POINTS");
-  v->points = PETSC_TRUE;
-  PetscCall(SbScanText(v->scan, "number of points", &n));
-  PetscCall(read_type(v, &type));
-  PetscCall(SbScanRoom(v->scan, "points", n, 3, 3));
-  PetscCall(read_array(v, "coordinates", 3 * n, type, &x));
-  PetscCall(SbVtkSetPoints((PetscInt)n, x, v->im));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Cells with their counts before version 5: [n, p1 ... pn] one after the other in `all`. */
-static PetscErrorCode split_cells(Vtk *v, int64_t size, const double all[])
-{
-  SbVtkGrid *grid = &v->grid;
-  int64_t at = 0;
-
-  PetscFunctionBeginUser;
-  PetscCall(SbImportScratch(v->im, (size_t)size * sizeof(double), &grid->connect));
-  PetscCall(SbImportScratch(v->im, (size_t)grid->ncell * sizeof(double), &grid->end));
-  for (PetscInt c = 0; c < grid->ncell; c++) {
-    const double n = at < size ? all[at] : 0;
-
-    if (!(n >= 1 && n <= (double)(size - at - 1)) || n != PetscFloorReal(n))
-      SB_SCAN_ERROR(v->scan,
-                    "cell %lld of %lld has %g points, more than the section announces or less than one",
-                    (long long)c, (long long)grid->ncell, n);
-    for (int64_t k = 0; k < (int64_t)n; k++) grid->connect[grid->nconnect++] = all[at + 1 + k];
-    at += 1 + (int64_t)n;
-    grid->end[c] = (double)grid->nconnect;
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 static PetscErrorCode read_cells(Vtk *v)
 {
   SbScan *s = v->scan;
-  int64_t n, size;
+  SbVtkGrid *grid = &v->grid;
+  int64_t n, size, k0 = 0;
   double *all = NULL;
   char word[32];
   const char *at;
@@ -136,7 +97,6 @@ static PetscErrorCode read_cells(Vtk *v)
   at = s->at;
   PetscCall(SbScanWord(s, sizeof(word), word));
   if (!strcasecmp(word, "OFFSETS")) {
-    SbVtkGrid *grid = &v->grid;
     SbVtkType type;
 
     // from version 5 on: `n` offsets from 0 to the number of points, then the points
@@ -152,21 +112,22 @@ static PetscErrorCode read_cells(Vtk *v)
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   s->at = at;
-  v->grid.ncell = (PetscInt)n;
+  grid->ncell = (PetscInt)n;
   PetscCall(read_array(v, "list of cells", size, (SbVtkType){'i', 4}, &all));
-  PetscCall(split_cells(v, size, all));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
+  // before version 5: [n, p1 ... pn] one cell after the other
+  PetscCall(SbImportScratch(v->im, (size_t)size * sizeof(double), &grid->connect));
+  PetscCall(SbImportScratch(v->im, (size_t)grid->ncell * sizeof(double), &grid->end));
+  for (PetscInt c = 0; c < grid->ncell; c++) {
+    const double npoint = k0 < size ? all[k0] : 0;
 
-static PetscErrorCode read_cell_types(Vtk *v)
-{
-  int64_t n;
-
-  PetscFunctionBeginUser;
-  PetscCall(SbScanText(v->scan, "number of types of cells", &n));
-  if (!v->cells || n != v->grid.ncell)
-    SB_SCAN_ERROR(v->scan, "%lld types of cells for %lld cells", (long long)n, (long long)v->grid.ncell);
-  PetscCall(read_array(v, "types of cells", n, (SbVtkType){'i', 4}, &v->grid.type));
+    if (!(npoint >= 1 && npoint <= (double)(size - k0 - 1)) || npoint != PetscFloorReal(npoint))
+      SB_SCAN_ERROR(v->scan,
+                    "cell %lld of %lld has %g points, more than the section announces or less than one",
+                    (long long)c, (long long)grid->ncell, npoint);
+    for (int64_t k = 0; k < (int64_t)npoint; k++) grid->connect[grid->nconnect++] = all[k0 + 1 + k];
+    k0 += 1 + (int64_t)npoint;
+    grid->end[c] = (double)grid->nconnect;
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -244,105 +205,68 @@ static PetscErrorCode read_field(Vtk *v)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode read_tuples(Vtk *v, int64_t ncomponent)
-{
-  SbVtkType type;
-  char name[SB_NAME_MAX];
-
-  PetscFunctionBeginUser;
-  PetscCall(SbScanWord(v->scan, sizeof(name), name));
-  PetscCall(read_type(v, &type));
-  PetscCall(read_data(v, name, ncomponent, v->ntuple, type));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* CELL_DATA n, POINT_DATA n: what the arrays that follow belong to. */
-static PetscErrorCode read_owner(Vtk *v, PetscBool on_cells)
-{
-  const int64_t expected = on_cells ? v->grid.ncell : v->im->nvert;
-
-  PetscFunctionBeginUser;
-  if (!v->points || !v->cells) SB_SCAN_ERROR(v->scan, "data before the sections POINTS and CELLS");
-  PetscCall(SbScanText(v->scan, "number of data", &v->ntuple));
-  if (v->ntuple != expected)
-    SB_SCAN_ERROR(v->scan, "data for %lld %s; there are %lld", (long long)v->ntuple,
-                  on_cells ? "cells" : "points", (long long)expected);
-  v->on_cells = on_cells;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* LOOKUP_TABLE name n: four bytes, or four numbers, for each entry */
-static PetscErrorCode read_table(Vtk *v)
-{
-  char name[SB_NAME_MAX];
-  int64_t n;
-
-  PetscFunctionBeginUser;
-  PetscCall(SbScanWord(v->scan, sizeof(name), name));
-  PetscCall(SbScanText(v->scan, "number of colours", &n));
-  PetscCall(SbScanRoom(v->scan, "colours", n, 1, 1));
-  PetscCall(read_array(v, "colours", 4 * n, (SbVtkType){'u', 1}, NULL));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* A block of lines up to an empty one. */
-static PetscErrorCode skip_metadata(Vtk *v)
-{
-  SbScan *s = v->scan;
-
-  PetscFunctionBeginUser;
-  do {
-    PetscCall(SbScanEndOfLine(s));
-  } while (SbScanMore(s, '\n'));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* ------------------------------------------------------------------ the file */
 
-static PetscErrorCode read_header(Vtk *v)
-{
-  SbScan *s = v->scan;
-  char word[32], kind[32];
-
-  PetscFunctionBeginUser;
-  if ((size_t)(s->end - s->at) < 5 || strncasecmp(s->at, "# vtk", 5))
-    SB_SCAN_ERROR(s, "expected '# vtk DataFile Version'; this is no legacy file of VTK");
-  PetscCall(SbScanEndOfLine(s));
-  PetscCall(SbScanEndOfLine(s)); /* the title */
-  PetscCall(SbScanWord(s, sizeof(kind), kind));
-  if (strcasecmp(kind, "ASCII") && strcasecmp(kind, "BINARY"))
-    SB_SCAN_ERROR(s, "expected ASCII or BINARY, found '%s'", kind);
-  v->binary = (PetscBool)!strcasecmp(kind, "BINARY");
-  s->bytes = v->binary;
-  PetscCall(SbScanWord(s, sizeof(word), word));
-  if (strcasecmp(word, "DATASET")) SB_SCAN_ERROR(s, "expected DATASET, found '%s'", word);
-  PetscCall(SbScanWord(s, sizeof(word), word));
-  if (strcasecmp(word, "UNSTRUCTURED_GRID"))
-    SB_SCAN_ERROR(s, "data set %s; expected UNSTRUCTURED_GRID with tetrahedra", word);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode read_section(Vtk *v, const char *name)
+static PetscErrorCode read_section(Vtk *v, const char *section)
 {
   static const struct {
     const char *name;
     int ncomponent;
   } tuples[] = {{"VECTORS", 3}, {"NORMALS", 3}, {"TENSORS", 9}, {"TENSORS6", 6}};
+  SbScan *s = v->scan;
+  const PetscBool on_cells = (PetscBool)!strcasecmp(section, "CELL_DATA");
+  SbVtkType type;
+  char name[SB_NAME_MAX];
+  double *x = NULL;
+  int64_t n;
+  size_t k = 0;
 
   PetscFunctionBeginUser;
-  if (!strcasecmp(name, "POINTS")) return read_points(v);
-  if (!strcasecmp(name, "CELLS")) return read_cells(v);
-  if (!strcasecmp(name, "CELL_TYPES")) return read_cell_types(v);
-  if (!strcasecmp(name, "CELL_DATA")) return read_owner(v, PETSC_TRUE);
-  if (!strcasecmp(name, "POINT_DATA")) return read_owner(v, PETSC_FALSE);
-  if (!strcasecmp(name, "SCALARS")) return read_scalars(v);
-  if (!strcasecmp(name, "FIELD")) return read_field(v);
-  if (!strcasecmp(name, "LOOKUP_TABLE")) return read_table(v);
-  if (!strcasecmp(name, "METADATA")) return skip_metadata(v);
-  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(tuples); i++) {
-    if (!strcasecmp(name, tuples[i].name)) return read_tuples(v, tuples[i].ncomponent);
-  }
-  SB_SCAN_ERROR(v->scan, "expected a section, as POINTS or CELLS, found '%s'", name);
+  while (k < PETSC_STATIC_ARRAY_LENGTH(tuples) && strcasecmp(section, tuples[k].name)) k++;
+  if (!strcasecmp(section, "POINTS")) {
+    if (v->points) SB_SCAN_ERROR(s, "second section POINTS");
+    v->points = PETSC_TRUE;
+    PetscCall(SbScanText(s, "number of points", &n));
+    PetscCall(read_type(v, &type));
+    PetscCall(SbScanRoom(s, "points", n, 3, 3));
+    PetscCall(read_array(v, "coordinates", 3 * n, type, &x));
+    PetscCall(SbVtkSetPoints((PetscInt)n, x, v->im));
+  } else if (!strcasecmp(section, "CELLS")) {
+    PetscCall(read_cells(v));
+  } else if (!strcasecmp(section, "CELL_TYPES")) {
+    PetscCall(SbScanText(s, "number of types of cells", &n));
+    if (!v->cells || n != v->grid.ncell)
+      SB_SCAN_ERROR(s, "%lld types of cells for %lld cells", (long long)n, (long long)v->grid.ncell);
+    PetscCall(read_array(v, "types of cells", n, (SbVtkType){'i', 4}, &v->grid.type));
+  } else if (on_cells || !strcasecmp(section, "POINT_DATA")) {
+    // what the arrays that follow belong to
+    n = on_cells ? v->grid.ncell : v->im->nvert;
+    if (!v->points || !v->cells) SB_SCAN_ERROR(s, "data before the sections POINTS and CELLS");
+    PetscCall(SbScanText(s, "number of data", &v->ntuple));
+    if (v->ntuple != n)
+      SB_SCAN_ERROR(s, "data for %lld %s; there are %lld", (long long)v->ntuple,
+                    on_cells ? "cells" : "points", (long long)n);
+    v->on_cells = on_cells;
+  } else if (!strcasecmp(section, "SCALARS")) {
+    PetscCall(read_scalars(v));
+  } else if (!strcasecmp(section, "FIELD")) {
+    PetscCall(read_field(v));
+  } else if (!strcasecmp(section, "LOOKUP_TABLE")) {
+    // four bytes, or four numbers, for each entry
+    PetscCall(SbScanWord(s, sizeof(name), name));
+    PetscCall(SbScanText(s, "number of colours", &n));
+    PetscCall(SbScanRoom(s, "colours", n, 1, 1));
+    PetscCall(read_array(v, "colours", 4 * n, (SbVtkType){'u', 1}, NULL));
+  } else if (!strcasecmp(section, "METADATA")) {
+    // a block of lines up to an empty one
+    do PetscCall(SbScanEndOfLine(s));
+    while (SbScanMore(s, '\n'));
+  } else if (k < PETSC_STATIC_ARRAY_LENGTH(tuples)) {
+    PetscCall(SbScanWord(s, sizeof(name), name));
+    PetscCall(read_type(v, &type));
+    PetscCall(read_data(v, name, tuples[k].ncomponent, v->ntuple, type));
+  } else
+    SB_SCAN_ERROR(s, "expected a section, as POINTS or CELLS, found '%s'", section);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -350,11 +274,25 @@ PetscErrorCode SbImportRead_VTK(const char *path, SbImport *im)
 {
   SbScan *s = &im->scan;
   Vtk v = {.scan = s, .im = im};
-  char name[32];
+  char name[32], word[32], kind[32];
 
   PetscFunctionBeginUser;
   PetscCall(SbScanOpen(im->where, path, s));
-  PetscCall(read_header(&v));
+  // the header: text or binary, an unstructured grid
+  if ((size_t)(s->end - s->at) < 5 || strncasecmp(s->at, "# vtk", 5))
+    SB_SCAN_ERROR(s, "expected '# vtk DataFile Version'; this is no legacy file of VTK");
+  PetscCall(SbScanEndOfLine(s));
+  PetscCall(SbScanEndOfLine(s)); /* the title */
+  PetscCall(SbScanWord(s, sizeof(kind), kind));
+  if (strcasecmp(kind, "ASCII") && strcasecmp(kind, "BINARY"))
+    SB_SCAN_ERROR(s, "expected ASCII or BINARY, found '%s'", kind);
+  v.binary = (PetscBool)!strcasecmp(kind, "BINARY");
+  s->bytes = v.binary;
+  PetscCall(SbScanWord(s, sizeof(word), word));
+  if (strcasecmp(word, "DATASET")) SB_SCAN_ERROR(s, "expected DATASET, found '%s'", word);
+  PetscCall(SbScanWord(s, sizeof(word), word));
+  if (strcasecmp(word, "UNSTRUCTURED_GRID"))
+    SB_SCAN_ERROR(s, "data set %s; expected UNSTRUCTURED_GRID with tetrahedra", word);
   for (;;) {
     PetscCall(SbScanWord(s, sizeof(name), name));
     if (!name[0]) break;

@@ -213,25 +213,6 @@ static PetscInt run_length(const SbItems *item, PetscInt i)
   return n;
 }
 
-static PetscErrorCode write_run_41(Out *out, int dim, PetscInt i, PetscInt n, int64_t *number)
-{
-  const SbItems *item = &out->im->item[dim];
-
-  PetscFunctionBeginUser;
-  put_int(out, dim, ' ');
-  put_int(out, item->tags[i] + 1, ' ');
-  put_int(out, gmsh_type[dim], ' ');
-  put_size(out, n, '\n');
-  for (PetscInt k = i; k < i + n; k++) {
-    const PetscInt *v = item->vert + (size_t)(dim + 1) * (size_t)k;
-
-    put_size(out, (*number)++, ' ');
-    for (int a = 0; a <= dim; a++) put_size(out, v[a] + 1, a < dim ? ' ' : '\n');
-    PetscCall(report_progress(out));
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 static PetscErrorCode write_elements_41(Out *out)
 {
   int64_t nrun = 0, number = 1;
@@ -252,7 +233,18 @@ static PetscErrorCode write_elements_41(Out *out)
 
     for (PetscInt i = 0, n; i < item->n; i += n) {
       n = run_length(item, i);
-      PetscCall(write_run_41(out, d, i, n, &number));
+      // a block of items of one tag set
+      put_int(out, d, ' ');
+      put_int(out, item->tags[i] + 1, ' ');
+      put_int(out, gmsh_type[d], ' ');
+      put_size(out, n, '\n');
+      for (PetscInt k = i; k < i + n; k++) {
+        const PetscInt *v = item->vert + (size_t)(d + 1) * (size_t)k;
+
+        put_size(out, number++, ' ');
+        for (int a = 0; a <= d; a++) put_size(out, v[a] + 1, a < d ? ' ' : '\n');
+        PetscCall(report_progress(out));
+      }
     }
   }
   (void)fprintf(out->file, "%s$EndElements\n", out->binary ? "\n" : "");

@@ -396,37 +396,11 @@ static PetscErrorCode name_regions(const Space *s, SbSurface *out)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Triangles with material on a side, and their vertices. */
-static PetscErrorCode fill_surface(const Space *s, PetscInt nregion, SbSurface *out)
-{
-  const SbTriangles *t = s->t;
-  PetscInt n = 0;
-
-  PetscFunctionBeginUser;
-  PetscCall(SbSurfaceCreate(t->nvert, t->ntri, nregion, out));
-  PetscCall(PetscArraycpy(out->x, t->x, 3 * (size_t)t->nvert));
-  for (PetscInt f = 0; f < t->ntri; f++) {
-    const PetscInt front = s->shells[s->shell[2 * f]].region, back = s->shells[s->shell[2 * f + 1]].region;
-
-    if (front == OUTSIDE && back == OUTSIDE) {
-      s->m->nidle++;
-      continue;
-    }
-    PetscCall(PetscArraycpy(out->tri + 3 * n, t->tri + 3 * f, 3));
-    out->side[2 * n] = front;
-    out->side[2 * n + 1] = back;
-    out->tags[n] = s->f->tags ? s->f->tags[f] : 0;
-    out->number[n++] = s->f->number[f];
-  }
-  out->ntri = n;
-  PetscCall(SbDropUnusedPoints(&out->nvert, out->x, 3 * n, out->tri));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* All of it, in the order of the head of this file. */
 static PetscErrorCode find_regions(Space *s, SbSurface *out)
 {
-  PetscInt n;
+  PetscInt n, kept = 0;
+  const SbTriangles *t = s->t;
 
   PetscFunctionBeginUser;
   /* orientation, shells and their volumes */
@@ -499,7 +473,24 @@ static PetscErrorCode find_regions(Space *s, SbSurface *out)
   }
   PetscCheck(n, PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
              "%s: no region is left beside its holes; remove one of them", s->f->where);
-  PetscCall(fill_surface(s, n, out));
+  // triangles with material on a side, and their vertices
+  PetscCall(SbSurfaceCreate(t->nvert, t->ntri, n, out));
+  PetscCall(PetscArraycpy(out->x, t->x, 3 * (size_t)t->nvert));
+  for (PetscInt f = 0; f < t->ntri; f++) {
+    const PetscInt front = s->shells[s->shell[2 * f]].region, back = s->shells[s->shell[2 * f + 1]].region;
+
+    if (front == OUTSIDE && back == OUTSIDE) {
+      s->m->nidle++;
+      continue;
+    }
+    PetscCall(PetscArraycpy(out->tri + 3 * kept, t->tri + 3 * f, 3));
+    out->side[2 * kept] = front;
+    out->side[2 * kept + 1] = back;
+    out->tags[kept] = s->f->tags ? s->f->tags[f] : 0;
+    out->number[kept++] = s->f->number[f];
+  }
+  out->ntri = kept;
+  PetscCall(SbDropUnusedPoints(&out->nvert, out->x, 3 * kept, out->tri));
   if (s->f->groups) PetscCall(name_regions(s, out));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

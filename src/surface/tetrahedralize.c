@@ -70,29 +70,6 @@ static const struct {
 } backends[] = {{"gmsh", SbTetRun_Gmsh},
                 {"tetgen", SbTetRun_TetGen}}; /* SB_TET_GMSH - 1, SB_TET_TETGEN - 1 */
 
-/* Appends what was made, how, and how many slivers there are; `failed`: why the first backend did not work. */
-static PetscErrorCode add_note(const SbTetJob *job, int backend, PetscReal size, const char *failed,
-                               SbImport *im)
-{
-  const char *surface = job->remesh ? "remeshed" : "kept";
-  PetscReal smallest;
-  char text[512], slivers[96] = "";
-  PetscInt n;
-
-  PetscFunctionBeginUser;
-  if (job->remesh && backend + 1 == SB_TET_TETGEN) surface = job->size < job->edge ? "split" : "kept";
-  PetscCall(SbImportSlivers(im, SLIVER, &n, &smallest));
-  if (n)
-    (void)snprintf(slivers, sizeof(slivers),
-                   ", %" PetscInt_FMT " slivers (dihedral below %g degrees, smallest %.2g)", n,
-                   (double)SLIVER, (double)smallest);
-  (void)snprintf(text, sizeof(text), "%s%" PetscInt_FMT " tets of size %.3g m by %s, surface %s%s%s%.200s%s",
-                 im->note[0] ? ", " : "", im->item[3].n, (double)size, backends[backend].name, surface,
-                 slivers, failed[0] ? " (before that " : "", failed, failed[0] ? ")" : "");
-  PetscCall(PetscStrlcat(im->note, text, sizeof(im->note)));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 static PetscErrorCode run_checked(int backend, const SbTetJob *job, SbImport *tets)
 {
   const SbSurface *s = job->surface;
@@ -228,7 +205,10 @@ static PetscErrorCode run_backends(const SbTetJob *job, PetscReal factor, PetscB
   PetscFunctionBeginUser;
   for (int backend = 0; backend < 2 && !*done; backend++) {
     SbItems *tri = &body->item[2];
-    PetscInt n = 0;
+    PetscInt n = 0, nnote;
+    const char *surface;
+    PetscReal smallest;
+    char text[512], slivers[96] = "";
 
     if (job->options.backend != SB_TET_AUTO && (int)job->options.backend != backend + 1) continue;
     PetscCall(try_backend(backend, job, &tets, done, size, reasons));
@@ -264,7 +244,19 @@ static PetscErrorCode run_backends(const SbTetJob *job, PetscReal factor, PetscB
       tri->number[n++] = job->surface->number[f];
     }
     tri->n = n;
-    PetscCall(add_note(job, backend, job->size / factor, reasons, body));
+    // a word on who made the tets
+    surface = job->remesh ? "remeshed" : "kept";
+    if (job->remesh && backend + 1 == SB_TET_TETGEN) surface = job->size < job->edge ? "split" : "kept";
+    PetscCall(SbImportSlivers(body, SLIVER, &nnote, &smallest));
+    if (nnote)
+      (void)snprintf(slivers, sizeof(slivers),
+                     ", %" PetscInt_FMT " slivers (dihedral below %g degrees, smallest %.2g)", nnote,
+                     (double)SLIVER, (double)smallest);
+    (void)snprintf(
+      text, sizeof(text), "%s%" PetscInt_FMT " tets of size %.3g m by %s, surface %s%s%s%.200s%s",
+      body->note[0] ? ", " : "", body->item[3].n, (double)(job->size / factor), backends[backend].name,
+      surface, slivers, reasons[0] ? " (before that " : "", reasons, reasons[0] ? ")" : "");
+    PetscCall(PetscStrlcat(body->note, text, sizeof(body->note)));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
