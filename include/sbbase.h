@@ -185,6 +185,8 @@ PetscErrorCode SbWarning(MPI_Comm comm, const char *format, ...) PETSC_ATTRIBUTE
 
 /* ------------------------------------------------------------------ arrays */
 
+/* Room for at least `need` elements of `unit` bytes in *array, which has *size of them; doubles, so that appending is cheap. Not collective. */
+PetscErrorCode SbReserve(PetscInt need, size_t unit, PetscInt *size, void *array);
 /*
   SbGroupByKey - positions 0..n-1 by their keys: those with key k are item[start[k]..start[k + 1]), ascending.
 

@@ -1,7 +1,16 @@
 /*
-  array.c - arrays sorted into groups, and arrays of all ranks put together.
+  array.c - arrays that grow, are sorted into groups, and are put together of all ranks.
 */
 #include "sbbase.h"
+
+PetscErrorCode SbReserve(PetscInt need, size_t unit, PetscInt *size, void *array)
+{
+  PetscFunctionBeginUser;
+  if (need <= *size) PetscFunctionReturn(PETSC_SUCCESS);
+  *size = PetscMax(PetscMax(need, 2 * *size), 16);
+  PetscCall(PetscRealloc((size_t)*size * unit, (void **)array));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
 
 PetscErrorCode SbGroupByKey(PetscInt n, const PetscInt key[], PetscInt nkey, PetscInt **start,
                             PetscInt **item)

@@ -51,10 +51,7 @@ static PetscErrorCode read_rows(const char *file, PetscInt *n, PetscReal **rows,
     if (*n && row[0] <= (*rows)[2 * (*n - 1)])
       (void)snprintf(message, size, "%s, line %d: time %g s does not come after %g s; times must ascend",
                      file, number, (double)row[0], (double)(*rows)[2 * (*n - 1)]);
-    if (*n == room) {
-      room = 2 * room + 16;
-      PetscCall(PetscRealloc((size_t)(2 * room) * sizeof(PetscReal), rows));
-    }
+    PetscCall(SbReserve(*n + 1, 2 * sizeof(PetscReal), &room, rows));
     (*rows)[2 * *n] = row[0];
     (*rows)[2 * *n + 1] = row[1];
     (*n)++;

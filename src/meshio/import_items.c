@@ -7,18 +7,6 @@
 #include <stdlib.h>
 #include "meshio_impl.h"
 
-/* Room for at least `need` elements of `unit` bytes; doubles, so that appending is cheap. */
-static PetscErrorCode reserve(PetscInt need, PetscInt *capacity, size_t unit, void *array)
-{
-  PetscInt grown = PetscMax(need, 2 * *capacity);
-
-  PetscFunctionBeginUser;
-  if (need <= *capacity) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(PetscRealloc((size_t)PetscMax(grown, 16) * unit, (void **)array));
-  *capacity = PetscMax(grown, 16);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* ------------------------------------------------------------------ arrays of readers */
 
 /* Stands before each array. */
@@ -177,7 +165,7 @@ PetscErrorCode SbImportGroup(SbImport *im, PetscInt dim, int64_t tag, const char
   g = im->slot[s];
   if (g < 0) {
     g = im->slot[s] = im->ngroup;
-    PetscCall(reserve(g + 1, &im->capacity[0], sizeof(SbGroup), &im->group));
+    PetscCall(SbReserve(g + 1, sizeof(SbGroup), &im->capacity[0], &im->group));
     im->group[g].dim = dim;
     im->group[g].tag = tag;
     im->group[g].alone = -1;
@@ -206,8 +194,8 @@ static PetscErrorCode add_tag_set(SbImport *im, PetscInt n, const PetscInt group
   const PetscInt start = im->tags_start[im->ntags];
 
   PetscFunctionBeginUser;
-  PetscCall(reserve(start + n, &im->capacity[2], sizeof(PetscInt), &im->tags_group));
-  PetscCall(reserve(im->ntags + 2, &im->capacity[1], sizeof(PetscInt), &im->tags_start));
+  PetscCall(SbReserve(start + n, sizeof(PetscInt), &im->capacity[2], &im->tags_group));
+  PetscCall(SbReserve(im->ntags + 2, sizeof(PetscInt), &im->capacity[1], &im->tags_start));
   for (PetscInt i = 0; i < n; i++) im->tags_group[start + i] = groups[i];
   *tags = im->ntags;
   im->tags_start[++im->ntags] = start + n;
@@ -233,7 +221,7 @@ PetscErrorCode SbImportTagSet(SbImport *im, PetscInt n, PetscInt groups[], Petsc
   PetscCall(PetscSortRemoveDupsInt(&n, groups));
   /* Set 0 exists from the first call on. */
   if (!im->ntags) {
-    PetscCall(reserve(2, &im->capacity[1], sizeof(PetscInt), &im->tags_start));
+    PetscCall(SbReserve(2, sizeof(PetscInt), &im->capacity[1], &im->tags_start));
     im->tags_start[0] = im->tags_start[1] = 0;
     im->ntags = 1;
   }

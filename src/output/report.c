@@ -188,10 +188,7 @@ PetscErrorCode SbReportRemeshed(SbRun run, const SbRemeshed *event)
 
   PetscFunctionBeginUser;
   if (!out) PetscFunctionReturn(PETSC_SUCCESS);
-  if (out->nremeshed == out->remeshed_size) {
-    out->remeshed_size = PetscMax(8, 2 * out->remeshed_size);
-    PetscCall(PetscRealloc((size_t)out->remeshed_size * sizeof(*event), &out->remeshed));
-  }
+  PetscCall(SbReserve(out->nremeshed + 1, sizeof(*event), &out->remeshed_size, &out->remeshed));
   out->remeshed[out->nremeshed++] = *event;
   if (out->quiet) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(SbProgressEnd(out));

@@ -79,16 +79,6 @@ PetscErrorCode SbVtkhdfRemove(SbVtkhdf v)
 
 /* ------------------------------------------------------------------ the list of what there is */
 
-/* Room for one more of `n` items. */
-static PetscErrorCode grow(PetscInt n, size_t each, PetscInt *size, void *items)
-{
-  PetscFunctionBeginUser;
-  if (n < *size) PetscFunctionReturn(PETSC_SUCCESS);
-  *size = PetscMax(16, 2 * *size);
-  PetscCall(PetscRealloc((size_t)*size * each, (void **)items));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* One more piece of the array of this name, which is made when it is new: group/dataset of fields.h5. */
 static PetscErrorCode add_piece(SbVtkhdf v, const Array *like, PetscInt block, const char *group,
                                 const char *dataset)
@@ -99,12 +89,12 @@ static PetscErrorCode add_piece(SbVtkhdf v, const Array *like, PetscInt block, c
   for (PetscInt i = 0; i < v->narray && !a; i++)
     if (!strcmp(v->array[i].name, like->name)) a = &v->array[i];
   if (!a) {
-    PetscCall(grow(v->narray, sizeof(Array), &v->array_size, &v->array));
+    PetscCall(SbReserve(v->narray + 1, sizeof(Array), &v->array_size, &v->array));
     a = &v->array[v->narray++];
     *a = *like;
   }
   a->bytes = PetscMax(a->bytes, like->bytes); // after a restart with another precision
-  PetscCall(grow(a->npiece, sizeof(Piece), &a->size, &a->piece));
+  PetscCall(SbReserve(a->npiece + 1, sizeof(Piece), &a->size, &a->piece));
   a->piece[a->npiece].block = block;
   SbFormat(sizeof(a->piece->path), a->piece[a->npiece++].path, "%s/%s", group, dataset);
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -135,7 +125,7 @@ static herr_t list_array(hid_t where, const char *name, const H5L_info_t *info, 
 static PetscErrorCode add_part(SbVtkhdf v, PetscInt npoint, PetscInt ncell, const char *group)
 {
   PetscFunctionBeginUser;
-  PetscCall(grow(v->npart, sizeof(Part), &v->part_size, &v->part));
+  PetscCall(SbReserve(v->npart + 1, sizeof(Part), &v->part_size, &v->part));
   v->part[v->npart] = (Part){.npoint = npoint, .ncell = ncell};
   SbFormat(sizeof(v->part->group), v->part[v->npart++].group, "%s", group);
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -156,7 +146,7 @@ PetscErrorCode SbVtkhdfSetMesh(SbVtkhdf v, hid_t mesh, const char *group)
 static PetscErrorCode add_frame(SbVtkhdf v, PetscReal time)
 {
   PetscFunctionBeginUser;
-  PetscCall(grow(v->nframe, sizeof(Frame), &v->frame_size, &v->frame));
+  PetscCall(SbReserve(v->nframe + 1, sizeof(Frame), &v->frame_size, &v->frame));
   v->frame[v->nframe++] = (Frame){.time = time, .part = v->npart - 1};
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -78,10 +78,7 @@ static PetscErrorCode read_file(const char *option, const char *file, PetscInt *
     PetscErrorCode ierr;
     PetscBool found;
 
-    if (*n == room) {
-      room = PetscMax(64, 2 * room);
-      PetscCall(PetscRealloc((size_t)room * sizeof(**place), place));
-    }
+    PetscCall(SbReserve(*n + 1, sizeof(**place), &room, place));
     ierr = read_line(option, file, number, line, &(*place)[*n], &found);
     if (ierr) (void)fclose(f);
     PetscCall(ierr);

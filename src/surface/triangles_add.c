@@ -9,10 +9,7 @@ PetscErrorCode SbTrianglesAddVertex(SbTriangleFile *f, const PetscReal x[3])
   SbTriangles *t = f->t;
 
   PetscFunctionBeginUser;
-  if (t->nvert == f->vert_size) {
-    f->vert_size = PetscMax(256, 2 * f->vert_size);
-    PetscCall(PetscRealloc(3 * (size_t)f->vert_size * sizeof(PetscReal), &t->x));
-  }
+  PetscCall(SbReserve(t->nvert + 1, 3 * sizeof(PetscReal), &f->vert_size, &t->x));
   for (int i = 0; i < 3; i++) t->x[3 * t->nvert + i] = x[i];
   t->nvert++;
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -24,15 +24,6 @@ typedef struct {
   PetscReal *hole; /* [nhole][3] points of holes in the facet */
 } Poly;
 
-static PetscErrorCode grow(PetscInt need, PetscInt *size, size_t unit, void *array)
-{
-  PetscFunctionBeginUser;
-  if (need <= *size) PetscFunctionReturn(PETSC_SUCCESS);
-  *size = PetscMax(16, 2 * need);
-  PetscCall(PetscRealloc((size_t)*size * unit, (void **)array));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* A count at the beginning of a part; the marks behind it, 0 where there are none. */
 static PetscErrorCode read_counts(SbScan *s, const char *what, int n, int64_t count[])
 {
@@ -108,8 +99,8 @@ static PetscErrorCode read_polygon(Poly *p, int64_t n, int64_t facet)
                   "within facets, cut the facet there",
                   (long long)facet, (long long)n);
   PetscCall(SbScanRoom(p->s, "corners", n, 2, 2));
-  PetscCall(grow(p->nloop + 2, &p->loop_size, sizeof(*p->start), &p->start));
-  PetscCall(grow(p->nvert + (PetscInt)n, &p->vert_size, sizeof(*p->vert), &p->vert));
+  PetscCall(SbReserve(p->nloop + 2, sizeof(*p->start), &p->loop_size, &p->start));
+  PetscCall(SbReserve(p->nvert + (PetscInt)n, sizeof(*p->vert), &p->vert_size, &p->vert));
   p->start[p->nloop] = p->nvert;
   for (int64_t i = 0; i < n; i++) {
     SbScanNext(p->s, '#');
@@ -156,7 +147,7 @@ static PetscErrorCode read_poly_facet(Poly *p, int64_t facet)
   for (int64_t i = 0; i < count[1]; i++) {
     SbScanNext(p->s, '#');
     PetscCall(SbScanText(p->s, "number of a hole", &number));
-    PetscCall(grow(3 * (p->nhole + 1), &p->hole_size, sizeof(*p->hole), &p->hole));
+    PetscCall(SbReserve(3 * (p->nhole + 1), sizeof(*p->hole), &p->hole_size, &p->hole));
     PetscCall(SbScanPoint(p->s, "coordinate of a hole", 0, p->hole + 3 * p->nhole));
     p->nhole++;
     PetscCall(SbScanEndOfLine(p->s));

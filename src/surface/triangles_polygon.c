@@ -158,10 +158,7 @@ PetscErrorCode SbTrianglesAddCorner(SbScan *s, int64_t number, int64_t v, SbTria
   if (v < 0 || v >= f->t->nvert)
     SB_SCAN_ERROR(s, "face %lld uses a vertex that is not there (%lld of %lld)", (long long)number,
                   (long long)v + 1, (long long)f->t->nvert);
-  if (f->ncorner == f->corner_size) {
-    f->corner_size = PetscMax(16, 2 * f->corner_size);
-    PetscCall(PetscRealloc((size_t)f->corner_size * sizeof(*f->corner), &f->corner));
-  }
+  PetscCall(SbReserve(f->ncorner + 1, sizeof(*f->corner), &f->corner_size, &f->corner));
   f->corner[f->ncorner++] = (PetscInt)v;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
