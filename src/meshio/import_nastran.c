@@ -100,24 +100,6 @@ static void trim(const char *from, const char *to, char word[WORD])
   word[n] = 0;
 }
 
-/* Tabs become blanks up to the next multiple of 8 columns. */
-static void copy_line(Nastran *b, const char *from, const char *to)
-{
-  size_t n = 0;
-
-  for (; from < to && *from != '$' && n + 1 < LINE; from++) {
-    if (*from == '\t') {
-      do {
-        b->line[n++] = ' ';
-      } while (n % 8 && n + 1 < LINE);
-    } else
-      b->line[n++] = isprint((unsigned char)*from) ? *from : ' ';
-  }
-  b->cut = (PetscBool)(from < to && *from != '$');
-  b->line[n] = 0;
-  b->length = n;
-}
-
 /* Field k of this line, 0 its name. */
 static void get_field(const Nastran *b, int k, char word[WORD])
 {
@@ -144,12 +126,20 @@ static PetscErrorCode next_line(Nastran *b, PetscBool *there)
 
   PetscFunctionBeginUser;
   for (*there = PETSC_FALSE; s->at < s->end && !*there;) {
-    const char *end = (const char *)memchr(s->at, '\n', (size_t)(s->end - s->at));
+    const char *end = (const char *)memchr(s->at, '\n', (size_t)(s->end - s->at)), *from;
+    size_t n;
 
     s->token = s->at;
     if (!end) end = s->end;
     if (*s->at == '$') PetscCall(read_comment(b, s->at, end));
-    copy_line(b, s->at, end);
+    // its text without a comment; tabs become blanks up to the next multiple of 8 columns
+    for (n = 0, from = s->at; from < end && *from != '$' && n + 1 < LINE; from++) {
+      do b->line[n++] = isprint((unsigned char)*from) ? *from : ' ';
+      while (*from == '\t' && n % 8 && n + 1 < LINE);
+    }
+    b->cut = (PetscBool)(from < end && *from != '$');
+    b->line[n] = 0;
+    b->length = n;
     *there = (PetscBool)(b->line[strspn(b->line, " ")] != 0);
     s->at = end < s->end ? end + 1 : s->end;
   }
@@ -409,23 +399,6 @@ static PetscErrorCode read_entry(Nastran *b)
 
 /* ------------------------------------------------------------------ the file */
 
-/* Behind the line BEGIN BULK, or at the start of a file that has none. */
-static void find_bulk(Nastran *b)
-{
-  SbScan *s = b->scan;
-
-  for (const char *p = s->data; p < s->end;) {
-    const char *end = (const char *)memchr(p, '\n', (size_t)(s->end - p));
-    const char *word = p + strspn(p, " \t");
-
-    if (!strncasecmp(word, "BEGIN", 5) && !strncasecmp(word + 5 + strspn(word + 5, " \t"), "BULK", 4)) {
-      s->at = end ? end + 1 : s->end;
-      return;
-    }
-    p = end ? end + 1 : s->end;
-  }
-}
-
 PetscErrorCode SbImportRead_Nastran(const char *path, SbImport *im)
 {
   Nastran b = {.scan = &im->scan, .deck = {.im = im, .compare = strcasecmp, .cure = "renumber the nodes"}};
@@ -433,7 +406,15 @@ PetscErrorCode SbImportRead_Nastran(const char *path, SbImport *im)
 
   PetscFunctionBeginUser;
   PetscCall(SbScanOpen(im->where, path, b.scan));
-  find_bulk(&b);
+  // behind the line BEGIN BULK, or at the start of a file that has none
+  for (const char *p = b.scan->data, *end; p; p = end ? end + 1 : NULL) {
+    const char *word = p + strspn(p, " \t");
+
+    end = (const char *)memchr(p, '\n', (size_t)(b.scan->end - p));
+    if (strncasecmp(word, "BEGIN", 5) || strncasecmp(word + 5 + strspn(word + 5, " \t"), "BULK", 4)) continue;
+    b.scan->at = end ? end + 1 : b.scan->end;
+    break;
+  }
   for (;;) {
     PetscCall(next_line(&b, &there));
     if (!there || !strncasecmp(b.line, "ENDDATA", 7)) break;

@@ -14,14 +14,6 @@
 #include <ctype.h>
 #include "meshio_impl.h"
 
-/* Type of an element by its dimension and number of nodes; 0 when there is none. */
-static int type_of(int dim, int64_t nnode)
-{
-  for (int t = SB_GMSH_LINE; t < SB_GMSH_NTYPES; t++)
-    if (SbGmshTypes[t].dim == dim && SbGmshTypes[t].nnode == nnode) return t;
-  return 0;
-}
-
 static PetscErrorCode read_points(SbImport *im)
 {
   SbScan *s = &im->scan;
@@ -78,20 +70,6 @@ static const Layout vol_surface = {
   .before = {"surface of an element", "boundary condition of an element", "domain on one side of an element",
              "domain on the other side of an element", "number of points of an element"}};
 
-/* Words on the rest of this line; stays where it is. */
-static int words_left(SbScan *s)
-{
-  const char *at = s->at, *token = s->token;
-  int n = 0;
-
-  for (; SbScanMore(s, '#'); n++) {
-    while (s->at < s->end && !isspace((unsigned char)*s->at)) s->at++;
-  }
-  s->at = at;
-  s->token = token;
-  return n;
-}
-
 static PetscErrorCode read_elements(SbImport *im, const Layout *l)
 {
   SbScan *s = &im->scan;
@@ -103,13 +81,20 @@ static PetscErrorCode read_elements(SbImport *im, const Layout *l)
   PetscCall(SbScanText(s, l->count, &n));
   PetscCall(SbScanRoom(s, l->title, n, l->room, l->room));
   for (int64_t i = 0; i < n; i++) {
-    int type;
+    const char *at, *token;
+    int type = SB_GMSH_LINE;
 
     SbScanNext(s, '#');
     for (int k = 0; k < 5 && l->before[k]; k++) PetscCall(SbScanText(s, l->before[k], &value[k]));
-    nnode = l->nnode < 0 ? words_left(s) : value[l->nnode];
-    type = type_of(l->dim, nnode);
-    if (!type)
+    // how many points: said before, or as many as there are words on the rest of the line
+    nnode = l->nnode < 0 ? 0 : value[l->nnode];
+    for (at = s->at, token = s->token; l->nnode < 0 && SbScanMore(s, '#'); nnode++)
+      while (s->at < s->end && !isspace((unsigned char)*s->at)) s->at++;
+    s->at = at;
+    s->token = token;
+    while (type < SB_GMSH_NTYPES && (SbGmshTypes[type].dim != l->dim || SbGmshTypes[type].nnode != nnode))
+      type++;
+    if (type == SB_GMSH_NTYPES)
       SB_SCAN_ERROR(s, "a %s element of %lld points; expected %d", l->dim == 3 ? "volume" : "surface",
                     (long long)nnode, l->dim + 1);
     for (int k = 0; k < nnode; k++) {

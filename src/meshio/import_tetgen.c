@@ -30,53 +30,13 @@ static PetscErrorCode on_line(SbScan *s, const char *what)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The number of point v, which it must have, and its position. */
-static PetscErrorCode read_point(SbImport *im, PetscInt v, int64_t number)
-{
-  SbScan *s = &im->scan;
-
-  PetscFunctionBeginUser;
-  im->vert_number[v] = number;
-  if (!v && number != 0 && number != 1)
-    SB_SCAN_ERROR(s, "the first point has number %lld; TetGen counts from 0 or 1", (long long)number);
-  if (number != im->vert_number[0] + v)
-    SB_SCAN_ERROR(s, "point %lld follows point %lld; TetGen numbers them without gaps", (long long)number,
-                  (long long)(im->vert_number[0] + v - 1));
-  for (int i = 0; i < 3; i++) {
-    PetscCall(on_line(s, "coordinate"));
-    PetscCall(SbScanReal(s, "coordinate", number, &im->x[3 * v + i]));
-    if (!isfinite(im->x[3 * v + i]))
-      SB_SCAN_ERROR(s, "coordinate of point %lld is not a finite number; repair the file", (long long)number);
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* The points of a tet, face or edge. */
-static PetscErrorCode read_corners(SbImport *im, int n, PetscInt vert[])
-{
-  SbScan *s = &im->scan;
-  const int64_t first = im->vert_number[0];
-  int64_t point;
-
-  PetscFunctionBeginUser;
-  for (int k = 0; k < n; k++) {
-    PetscCall(on_line(s, "number of a point"));
-    PetscCall(SbScanText(s, "number of a point", &point));
-    if (point < first || point - first >= im->nvert)
-      SB_SCAN_ERROR(s, "point %lld is not in the .node file, which holds %lld to %lld", (long long)point,
-                    (long long)first, (long long)(first + im->nvert - 1));
-    vert[k] = (PetscInt)(point - first);
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* One file: the line of counts, then a line for each item: number, what it is, attributes, mark. A mark of 0 is one only for tets. */
 static PetscErrorCode read_file(SbImport *im, int f)
 {
   static const int types[] = {SB_GMSH_POINT, SB_GMSH_LINE, SB_GMSH_TRIANGLE, SB_GMSH_TET};
   SbScan *s = &im->scan;
   const int dim = files[f].dim;
-  int64_t count[4] = {0, 0, 0, 0}, number, mark = 0;
+  int64_t count[4] = {0, 0, 0, 0}, number, first, mark = 0;
   PetscReal attribute;
 
   PetscFunctionBeginUser;
@@ -109,7 +69,31 @@ static PetscErrorCode read_file(SbImport *im, int f)
 
     SbScanNext(s, '#');
     PetscCall(SbScanText(s, dim ? "number of an item" : "number of a point", &number));
-    PetscCall(dim ? read_corners(im, dim + 1, vert) : read_point(im, i, number));
+    // a point has the number after the one before it, and a position; a tet, face or edge has points
+    if (dim == 0) im->vert_number[i] = number;
+    first = im->vert_number[0];
+    if (dim == 0 && first != 0 && first != 1)
+      SB_SCAN_ERROR(s, "the first point has number %lld; TetGen counts from 0 or 1", (long long)number);
+    if (dim == 0 && number != first + i)
+      SB_SCAN_ERROR(s, "point %lld follows point %lld; TetGen numbers them without gaps", (long long)number,
+                    (long long)(first + i - 1));
+    for (int k = 0; k < (dim ? dim + 1 : 3); k++) {
+      int64_t point;
+
+      PetscCall(on_line(s, dim ? "number of a point" : "coordinate"));
+      if (dim == 0) {
+        PetscCall(SbScanReal(s, "coordinate", number, &im->x[3 * i + k]));
+        if (!isfinite(im->x[3 * i + k]))
+          SB_SCAN_ERROR(s, "coordinate of point %lld is not a finite number; repair the file",
+                        (long long)number);
+        continue;
+      }
+      PetscCall(SbScanText(s, "number of a point", &point));
+      if (point < first || point - first >= im->nvert)
+        SB_SCAN_ERROR(s, "point %lld is not in the .node file, which holds %lld to %lld", (long long)point,
+                      (long long)first, (long long)(first + im->nvert - 1));
+      vert[k] = (PetscInt)(point - first);
+    }
     for (int64_t k = 0; dim == 0 && k < count[2]; k++) {
       PetscCall(on_line(s, "attribute of a point"));
       PetscCall(SbScanReal(s, "attribute of a point", 0, &attribute));

@@ -96,26 +96,21 @@ typedef struct {
   int nheld, from;
 } Bytes;
 
-static int base64_digit(char c)
-{
-  if (c >= 'A' && c <= 'Z') return c - 'A';
-  if (c >= 'a' && c <= 'z') return c - 'a' + 26;
-  if (c >= '0' && c <= '9') return c - '0' + 52;
-  return c == '+' ? 62 : c == '/' ? 63 : -1;
-}
-
 /* Four characters become up to three bytes; false at the end, or at what is no base64. */
 static PetscBool next_quad(Bytes *b)
 {
+  static const char digits[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
   uint32_t bits = 0;
   int n = 0, padding = 0;
 
   while (n < 4) {
+    const char *found;
     int digit;
 
     while (b->at < b->end && isspace((unsigned char)*b->at)) b->at++;
     if (b->at >= b->end) return PETSC_FALSE;
-    digit = base64_digit(*b->at);
+    found = *b->at ? strchr(digits, *b->at) : NULL;
+    digit = found ? (int)(found - digits) : -1;
     if (digit < 0 && !(*b->at == '=' && n >= 2)) return PETSC_FALSE;
     padding += digit < 0;
     if (digit >= 0 && padding) return PETSC_FALSE;
@@ -321,30 +316,6 @@ static PetscErrorCode read_cell_array(Vtu *v, const char *name, int64_t n, doubl
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Data of cells with one number for each: the others are passed over. */
-static PetscErrorCode read_cell_data(Vtu *v)
-{
-  SbVtkGrid *grid = &v->grid;
-  const char *from, *end, *open, *close;
-  char components[16];
-
-  PetscFunctionBeginUser;
-  if (!find_element(v->scan->data, v->xml_end, "CellData", &open, &from) || from[-2] == '/')
-    PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(content(v, "CellData", &from, &end));
-  for (; find_element(from, end, "DataArray", &open, &close) && grid->narray < SB_VTK_ARRAYS; from = close) {
-    const int a = grid->narray;
-
-    attribute(open, close, "NumberOfComponents", sizeof(components), components);
-    if (components[0] && strcmp(components, "1") != 0) continue;
-    grid->narray++;
-    grid->array[a].value = NULL;
-    attribute(open, close, "Name", sizeof(grid->array[a].name), grid->array[a].name);
-    PetscCall(read_array(v, open, close, grid->ncell, &grid->array[a].value));
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* ------------------------------------------------------------------ the file */
 
 static PetscErrorCode read_file_element(Vtu *v)
@@ -376,41 +347,29 @@ static PetscErrorCode read_file_element(Vtu *v)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Where the XML ends and the appended data begins. */
-static PetscErrorCode find_appended(Vtu *v)
-{
-  const char *open, *close, *mark;
-  char encoding[16];
-
-  PetscFunctionBeginUser;
-  v->xml_end = v->scan->end;
-  if (!find_element(v->scan->data, v->scan->end, "AppendedData", &open, &close))
-    PetscFunctionReturn(PETSC_SUCCESS);
-  v->xml_end = open;
-  attribute(open, close, "encoding", sizeof(encoding), encoding);
-  v->appended_text = (PetscBool)!strcmp(encoding, "base64");
-  v->scan->bytes = (PetscBool)!v->appended_text;
-  v->scan->token = open;
-  mark = (const char *)memchr(close, '_', (size_t)(v->scan->end - close));
-  if (!mark) SB_SCAN_ERROR(v->scan, "the appended data has no mark _ at its beginning");
-  v->appended = mark + 1;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode SbImportRead_VTU(const char *path, SbImport *im)
 {
   SbScan *s = &im->scan;
   Vtu vtu = {.scan = s, .im = im}, *v = &vtu;
-  const char *open, *close, *open2, *close2;
+  const char *open, *close, *open2, *close2, *from, *end;
+  char text[16];
   int64_t npoint, ncell, ncomponent = 3;
-  const char *from;
-  const char *end;
   double *x = NULL, last;
   SbVtkGrid *grid = &v->grid;
 
   PetscFunctionBeginUser;
   PetscCall(SbScanOpen(im->where, path, s));
-  PetscCall(find_appended(v));
+  // where the XML ends and the appended data begins
+  v->xml_end = s->end;
+  if (find_element(s->data, s->end, "AppendedData", &open, &close)) {
+    v->xml_end = s->token = open;
+    attribute(open, close, "encoding", sizeof(text), text);
+    v->appended_text = (PetscBool)!strcmp(text, "base64");
+    s->bytes = (PetscBool)!v->appended_text;
+    v->appended = (const char *)memchr(close, '_', (size_t)(s->end - close));
+    if (!v->appended) SB_SCAN_ERROR(s, "the appended data has no mark _ at its beginning");
+    v->appended++;
+  }
   PetscCall(read_file_element(v));
   if (!find_element(s->data, v->xml_end, "Piece", &open, &close))
     SB_SCAN_ERROR(s, "there is no element Piece; the file is truncated or damaged");
@@ -442,7 +401,21 @@ PetscErrorCode SbImportRead_VTU(const char *path, SbImport *im)
     SB_SCAN_ERROR(v->scan, "the last of the offsets is %g; expected the number of points of all cells", last);
   grid->nconnect = (int64_t)last;
   PetscCall(read_cell_array(v, "connectivity", grid->nconnect, &grid->connect));
-  PetscCall(read_cell_data(v));
+  // data of cells with one number for each; the others are passed over
+  if (find_element(s->data, v->xml_end, "CellData", &open, &from) && from[-2] != '/') {
+    PetscCall(content(v, "CellData", &from, &end));
+    for (; find_element(from, end, "DataArray", &open, &close) && grid->narray < SB_VTK_ARRAYS;
+         from = close) {
+      const int a = grid->narray;
+
+      attribute(open, close, "NumberOfComponents", sizeof(text), text);
+      if (text[0] && strcmp(text, "1") != 0) continue;
+      grid->narray++;
+      grid->array[a].value = NULL;
+      attribute(open, close, "Name", sizeof(grid->array[a].name), grid->array[a].name);
+      PetscCall(read_array(v, open, close, grid->ncell, &grid->array[a].value));
+    }
+  }
   s->token = v->cells_at;
   PetscCall(SbVtkGridFill(&v->grid, im));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -78,14 +78,14 @@ static PetscErrorCode report_progress(Out *out)
 
 /* ------------------------------------------------------------------ groups */
 
-/* A name that only says that there is none. */
-static PetscBool is_default_name(const SbGroup *g)
+/* Whether the name of a group says more than its number in the file. */
+static PetscBool has_name(const Out *out, PetscInt g)
 {
   static const char *const kind[4] = {"point", "curve", "surface", "volume"};
   char text[SB_GROUP_MAX];
 
-  (void)snprintf(text, sizeof(text), "%s_%lld", kind[g->dim], (long long)g->tag);
-  return (PetscBool)!strcmp(text, g->name);
+  (void)snprintf(text, sizeof(text), "%s_%lld", kind[out->im->group[g].dim], (long long)out->number[g]);
+  return (PetscBool)(strcmp(text, out->im->group[g].name) != 0);
 }
 
 /* A group of a dimension in a tag set: the next one from *k on; -1 when there is none. */
@@ -105,51 +105,6 @@ static PetscInt count_groups(const SbImport *im, PetscInt tags, int dim)
 
   while (next_group(im, tags, dim, &k) >= 0) n++;
   return n;
-}
-
-/* Numbers from 1 to INT32_MAX stay; gmsh knows no others, and these get the next ones that are free. */
-static PetscErrorCode number_groups(Out *out)
-{
-  const SbImport *im = out->im;
-  int64_t highest[4] = {0, 0, 0, 0};
-
-  PetscFunctionBeginUser;
-  PetscCall(PetscMalloc1(im->ngroup, &out->number));
-  for (PetscInt g = 0; g < im->ngroup; g++) {
-    const SbGroup *p = &im->group[g];
-
-    if (p->tag > 0 && p->tag < INT32_MAX - im->ngroup) highest[p->dim] = PetscMax(highest[p->dim], p->tag);
-  }
-  for (PetscInt g = 0; g < im->ngroup; g++) {
-    const SbGroup *p = &im->group[g];
-    const PetscBool fits = (PetscBool)(p->tag > 0 && p->tag < INT32_MAX - im->ngroup);
-
-    out->number[g] = fits ? p->tag : ++highest[p->dim];
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscBool has_name(const Out *out, PetscInt g)
-{
-  const SbGroup *p = &out->im->group[g];
-
-  return (PetscBool)(!is_default_name(p) || out->number[g] != p->tag);
-}
-
-static void write_names(Out *out)
-{
-  const SbImport *im = out->im;
-  PetscInt n = 0;
-
-  for (PetscInt g = 0; g < im->ngroup; g++) n += has_name(out, g);
-  if (!n) return;
-  (void)fprintf(out->file, "$PhysicalNames\n%lld\n", (long long)n);
-  for (PetscInt g = 0; g < im->ngroup; g++) {
-    if (has_name(out, g))
-      (void)fprintf(out->file, "%d %lld \"%s\"\n", (int)im->group[g].dim, (long long)out->number[g],
-                    im->group[g].name);
-  }
-  (void)fprintf(out->file, "$EndPhysicalNames\n");
 }
 
 /* ------------------------------------------------------------------ version 4.1 */
@@ -182,26 +137,6 @@ static void write_entity(Out *out, int dim, PetscInt tags)
   while ((g = next_group(im, tags, dim, &k)) >= 0) put_int(out, out->number[g], ' ');
   if (dim) put_size(out, 0, ' ');
   if (!out->binary) (void)fputc('\n', out->file);
-}
-
-static void write_nodes_41(Out *out)
-{
-  const SbImport *im = out->im;
-  const PetscInt n = im->nvert;
-
-  (void)fprintf(out->file, "$Nodes\n");
-  put_size(out, 1, ' ');
-  put_size(out, n, ' ');
-  put_size(out, 1, ' ');
-  put_size(out, n, '\n');
-  put_int(out, out->home_dim, ' ');
-  put_int(out, out->home + 1, ' ');
-  put_int(out, 0, ' ');
-  put_size(out, n, '\n');
-  for (PetscInt v = 0; v < n; v++) put_size(out, v + 1, '\n');
-  for (PetscInt v = 0; v < n; v++)
-    for (int i = 0; i < 3; i++) put_real(out, im->x[3 * v + i], i < 2 ? ' ' : '\n');
-  (void)fprintf(out->file, "%s$EndNodes\n", out->binary ? "\n" : "");
 }
 
 /* Items from i on that have the same tag set. */
@@ -299,7 +234,9 @@ static PetscErrorCode write_elements_22(Out *out)
 
 static PetscErrorCode write_all(Out *out, PetscBool version22)
 {
+  const SbImport *im = out->im;
   const int32_t one = 1;
+  PetscInt nname = 0;
 
   PetscFunctionBeginUser;
   (void)fprintf(out->file, "$MeshFormat\n%s %d 8\n", version22 ? "2.2" : "4.1", (int)out->binary);
@@ -308,10 +245,16 @@ static PetscErrorCode write_all(Out *out, PetscBool version22)
     (void)fputc('\n', out->file);
   }
   (void)fprintf(out->file, "$EndMeshFormat\n");
-  write_names(out);
+  // names of the groups that have one
+  for (PetscInt g = 0; g < im->ngroup; g++) nname += has_name(out, g);
+  if (nname) (void)fprintf(out->file, "$PhysicalNames\n%lld\n", (long long)nname);
+  for (PetscInt g = 0; g < im->ngroup; g++) {
+    if (has_name(out, g))
+      (void)fprintf(out->file, "%d %lld \"%s\"\n", (int)im->group[g].dim, (long long)out->number[g],
+                    im->group[g].name);
+  }
+  if (nname) (void)fprintf(out->file, "$EndPhysicalNames\n");
   if (version22) {
-    const SbImport *im = out->im;
-
     (void)fprintf(out->file, "$Nodes\n%lld\n", (long long)im->nvert);
     for (PetscInt v = 0; v < im->nvert; v++) {
       put_int(out, v + 1, ' ');
@@ -324,14 +267,27 @@ static PetscErrorCode write_all(Out *out, PetscBool version22)
 
     // entities: one for each tag set of a dimension
     for (int d = 0; d < 4; d++)
-      for (PetscInt t = 0; t < out->im->ntags; t++) n[d] += out->used[d][t];
+      for (PetscInt t = 0; t < im->ntags; t++) n[d] += out->used[d][t];
     (void)fprintf(out->file, "$Entities\n");
     for (int d = 0; d < 4; d++) put_size(out, n[d], d < 3 ? ' ' : '\n');
     for (int d = 0; d < 4; d++)
-      for (PetscInt t = 0; t < out->im->ntags; t++)
+      for (PetscInt t = 0; t < im->ntags; t++)
         if (out->used[d][t]) write_entity(out, d, t);
     (void)fprintf(out->file, "%s$EndEntities\n", out->binary ? "\n" : "");
-    write_nodes_41(out);
+    // one block of nodes: all numbers, then all coordinates
+    (void)fprintf(out->file, "$Nodes\n");
+    put_size(out, 1, ' ');
+    put_size(out, im->nvert, ' ');
+    put_size(out, 1, ' ');
+    put_size(out, im->nvert, '\n');
+    put_int(out, out->home_dim, ' ');
+    put_int(out, out->home + 1, ' ');
+    put_int(out, 0, ' ');
+    put_size(out, im->nvert, '\n');
+    for (PetscInt v = 0; v < im->nvert; v++) put_size(out, v + 1, '\n');
+    for (PetscInt v = 0; v < im->nvert; v++)
+      for (int i = 0; i < 3; i++) put_real(out, im->x[3 * v + i], i < 2 ? ' ' : '\n');
+    (void)fprintf(out->file, "%s$EndNodes\n", out->binary ? "\n" : "");
     PetscCall(write_elements_41(out));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -340,6 +296,7 @@ static PetscErrorCode write_all(Out *out, PetscBool version22)
 PetscErrorCode SbWrite_Gmsh(const SbImport *im, const char *path, SbMeshFormat format)
 {
   const PetscBool version22 = (PetscBool)(format == SB_MESH_MSH22 || format == SB_MESH_MSH22_BINARY);
+  int64_t highest[4] = {0, 0, 0, 0};
   Out out;
   PetscErrorCode ierr;
   int error;
@@ -363,7 +320,20 @@ PetscErrorCode SbWrite_Gmsh(const SbImport *im, const char *path, SbMeshFormat f
     }
     out.total += out.im->item[d].n;
   }
-  PetscCall(number_groups(&out));
+  // numbers of groups from 1 to INT32_MAX stay; gmsh knows no others, and these get the next ones that are free
+  PetscCall(PetscMalloc1(im->ngroup, &out.number));
+  for (int later = 0; later < 2; later++) {
+    for (PetscInt g = 0; g < im->ngroup; g++) {
+      const SbGroup *p = &im->group[g];
+      const PetscBool fits = (PetscBool)(p->tag > 0 && p->tag < INT32_MAX - im->ngroup);
+
+      if (fits) {
+        out.number[g] = p->tag;
+        highest[p->dim] = PetscMax(highest[p->dim], p->tag);
+      } else if (later)
+        out.number[g] = ++highest[p->dim];
+    }
+  }
   errno = 0;
   ierr = write_all(&out, version22);
   error = ferror(out.file) ? errno : 0;
