@@ -2,7 +2,8 @@
   contact_node.c - nodes of the surface against a rigid obstacle, still or on a given path, with Coulomb friction.
 
   A node at x has the gap g = signed distance from the obstacle where it is at that time, and the normal n there. Nodes are
-  those that carry the surface: vertices of P1, centroids of boundary faces of CR and DG (there g is the mean gap of the face).
+  those that carry the surface: vertices of P1, centroids of boundary faces of CR and DG (there g is the mean gap of the face), vertices and edges of P2. A uniform
+  pressure is carried by the edges of P2 alone, which exact responses find by themselves; springs have the areas of the four triangles over the six nodes of a facet.
 
   Response `projected`: touching nodes are constrained on the obstacle (src/fem/nodal_constraint.c): n . u is prescribed, and the force that this
   takes is the multiplier lambda. After each solve a pulling one leaves, a penetrated node enters, the normal is taken again on a
@@ -137,7 +138,7 @@ PetscErrorCode SbContactOptions_Node(SbEffect e, const SbScope *scope, const SbC
 static void add_share(SbSpace space, const SbFacet *facet, PetscInt a, PetscReal share, PetscInt slot[],
                       Contact *c)
 {
-  const PetscInt node = space->cell_node[4 * facet->cell + a];
+  const PetscInt node = SbSpaceCellNode(space, facet->cell, a);
   const SbMaterial m = space->material[space->mesh->cell_material[facet->cell]];
   Touch *touch;
 
@@ -165,12 +166,20 @@ static PetscErrorCode setup_contact(SbEffect e, SbSpace space)
              (double)c->damping);
   if (!e->dynamic) c->overlap.recovery = 0;
   PetscCall(SbEffectFacets(space, &c->on, &n, &facet));
-  PetscCall(PetscMalloc1(3 * n, &c->touch));
+  PetscCall(PetscMalloc1(6 * n, &c->touch));
   PetscCall(PetscMalloc1(space->nnode, &slot));
   for (PetscInt i = 0; i < space->nnode; i++) slot[i] = -1;
   for (PetscInt i = 0; i < n; i++) {
-    if (SbSpaceCellElement(space, facet[i].cell)->nodes_per[0]) {
-      for (int k = 0; k < 3; k++) add_share(space, &facet[i], facet[i].corner[k], facet[i].area / 3, slot, c);
+    const SbElement element = SbSpaceCellElement(space, facet[i].cell);
+
+    for (int k = 0; element->nodes_per[1] && k < 6; k++) {
+      if (SbTetEdge[k][0] != facet[i].face && SbTetEdge[k][1] != facet[i].face)
+        add_share(space, &facet[i], 4 + k, facet[i].area / 4, slot, c);
+    }
+    if (element->nodes_per[0]) {
+      const PetscReal share = element->nodes_per[1] ? facet[i].area / 12 : facet[i].area / 3;
+
+      for (int k = 0; k < 3; k++) add_share(space, &facet[i], facet[i].corner[k], share, slot, c);
     } else
       add_share(space, &facet[i], facet[i].face, facet[i].area, slot, c);
   }

@@ -134,15 +134,6 @@ PetscErrorCode SbModelSetUp(SbModel m)
   PetscCall(SbSpaceCreate(m->mesh, m->material, m->element, &m->space));
   m->load = 1.;
   m->linear = m->space->linear;
-  for (PetscInt e = 0; m->space->edge_node && e < m->neffect; e++) {
-    const SbEffectOps *ops = &m->effect[e]->ops;
-
-    PetscCheck(!ops->assemble_constraints, m->comm, PETSC_ERR_USER_INPUT,
-               "effect %s: scenes with a body of element p2 have contact with -effect_%s_response barrier "
-               "only: take that one, or "
-               "-body_<name>_element p1, cr or dg",
-               m->effect[e]->name, m->effect[e]->name);
-  }
   for (PetscInt e = 0; e < m->neffect; e++) {
     m->effect[e]->dynamic = m->dynamic;
     if (m->effect[e]->ops.setup) SbEffectCall(m->effect[e], setup, m->space);

@@ -38,11 +38,11 @@ static const LoadCase cases[] = {
 
 int main(int argc, char **argv)
 {
-  static const char *const elements[] = {"p1", "cr", "dg"};
+  static const char *const elements[] = {"p1", "cr", "dg", "p2"};
 
   SB_TEST_BEGIN(argc, argv);
   PetscCall(fixture_register());
-  for (int k = 0; k < 3; k++) {
+  for (int k = 0; k < 4; k++) {
     FixturePair p;
     const Fixture *x = &p.all;
 

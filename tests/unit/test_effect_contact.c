@@ -359,7 +359,9 @@ int main(int argc, char **argv)
   PetscCall(check_tangent("p1", FLOOR "-effect_floor_response penalty"));
   PetscCall(check_tangent("cr", FLOOR "-effect_floor_response augmented"));
   PetscCall(check_tangent("dg", FLOOR "-effect_floor_response augmented"));
+  PetscCall(check_tangent("p2", FLOOR "-effect_floor_response penalty"));
   PetscCall(check_friction("p1"));
+  PetscCall(check_friction("p2"));
   PetscCall(check_friction("cr"));
   PetscCall(check_scene());
   PetscCall(check_refused());

@@ -74,6 +74,7 @@ int main(int argc, char **argv)
   PetscCall(check_power("cr", "p1", PETSC_FALSE));
   PetscCall(check_power("dg", "cr", PETSC_TRUE));
   PetscCall(check_power("p1", "dg", PETSC_FALSE));
+  PetscCall(check_power("p2", "cr", PETSC_TRUE));
   fixture_use("p1", "p1", PETSC_FALSE);
   PetscCall(fixture_create(PETSC_COMM_WORLD, 2, "box:1,1,1:2", 0, NULL, &x));
   check_regions(&x, (const PetscReal[2]){0, 0}, (const PetscReal[2]){0, 0});

@@ -144,5 +144,6 @@ int main(int argc, char **argv)
   PetscCall(check_element("p1"));
   PetscCall(check_element("cr"));
   PetscCall(check_element("dg"));
+  PetscCall(check_element("p2"));
   SB_TEST_END();
 }

@@ -85,5 +85,6 @@ int main(int argc, char **argv)
   PetscCall(check_element("cr", PETSC_FALSE));
   PetscCall(check_element("dg", PETSC_FALSE));
   PetscCall(check_element("dg", PETSC_TRUE));
+  PetscCall(check_element("p2", PETSC_FALSE));
   SB_TEST_END();
 }

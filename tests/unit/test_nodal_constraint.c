@@ -192,6 +192,8 @@ int main(int argc, char **argv)
   PetscCall(check_oblique("cr", "cg_two_level"));
   PetscCall(check_oblique("dg", "cg_jacobi"));
   PetscCall(check_axes("p1"));
+  PetscCall(check_oblique("p2", "cg_two_level"));
   PetscCall(check_axes("cr"));
+  PetscCall(check_axes("p2"));
   SB_TEST_END();
 }

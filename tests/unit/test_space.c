@@ -258,5 +258,6 @@ int main(int argc, char **argv)
   PetscCall(one_element("cr", "p1"));
   PetscCall(one_element("dg", "cr"));
   PetscCall(one_element("p1", "dg"));
+  PetscCall(one_element("p2", "p1"));
   SB_TEST_END();
 }

@@ -145,6 +145,7 @@ int main(int argc, char **argv)
   PetscCallMPI(MPI_Comm_size(PETSC_COMM_WORLD, &size));
   PetscCall(check("p1", 0.001, 1e-12));
   PetscCall(check("cr", 0.001, 1e-12));
+  PetscCall(check("p2", 0.001, 1e-12));
   if (size > 1) SB_TEST_END(); /* many solves of a small system: on one rank only */
   PetscCall(check("p1", 0.0005, 1e-12));
   SB_TEST_END();

@@ -380,7 +380,7 @@ static void hertz_map(const PetscInt n[3], const PetscInt at[3], PetscReal x[3],
   4/3 E / (1 - nu^2) sqrt(R) d^(3/2). Far faces move as the half-space does under that force at a point (Boussinesq); there,
   20 a away, the rest is of the order (a/r)^2 of it.
 */
-static PetscErrorCode check_hertz(PetscInt cells, PetscReal tolerance)
+static PetscErrorCode check_hertz(const char *element, PetscInt cells, PetscReal tolerance)
 {
   const PetscReal d = HERTZ_A * HERTZ_A, E = 1e5, nu = 0.3;
   const PetscReal P = 4. / 3 * E / (1 - nu * nu) * PetscPowReal(d, 1.5);
@@ -389,7 +389,7 @@ static PetscErrorCode check_hertz(PetscInt cells, PetscReal tolerance)
   char path[512], r[64], sideways[256];
 
   PetscFunctionBeginUser;
-  verify_case("hertz, %d^3 cells", (int)cells);
+  verify_case("hertz, %s, %d^3 cells", element, (int)cells);
   PetscCall(verify_mesh_write(n, hertz_map, NULL, path));
   PetscCall(PetscSNPrintf(r, sizeof(r), "sqrt(x^2+y^2+z^2)"));
   /* radial part over the distance from the axis, and the depth is -z */
@@ -397,15 +397,17 @@ static PetscErrorCode check_hertz(PetscInt cells, PetscReal tolerance)
                           (double)(P * (1 + nu) / (2 * PETSC_PI * E)), r, (double)(1 - 2 * nu), r, r));
   PetscCall(record_run(
     &record,
-    "-bodies a -body_a_mesh %s -body_a_material linear -body_a_young %g -body_a_poisson %g -body_a_density 1 "
-    "-sets x0,y0,x1,y1,z1,top -set_x0_at plane:1,0,0,0 -set_y0_at plane:0,1,0,0 -set_x1_at plane:1,0,0,1 "
+    "-bodies a -body_a_mesh %s -body_a_element %s -body_a_material linear -body_a_young %g -body_a_poisson "
+    "%g "
+    "-body_a_density 1 -sets x0,y0,x1,y1,z1,top -set_x0_at plane:1,0,0,0 -set_y0_at plane:0,1,0,0 -set_x1_at "
+    "plane:1,0,0,1 "
     "-set_y1_at plane:0,1,0,1 -set_z1_at plane:0,0,1,-1 -set_top_at plane:0,0,1,0 -time static -ksp_rtol "
     "1e-10 -effects x,y,far,ball -effect_x_type fixed -effect_x_on x0 -effect_x_components x -effect_y_type "
     "fixed -effect_y_on y0 -effect_y_components y -effect_far_type prescribed_displacement -effect_far_on "
     "x1,y1,z1 -effect_far_displacement x*%s;y*%s;%.15g*(%.15g/%s+z^2/%s^3) -effect_ball_type contact "
     "-effect_ball_response projected "
     "-effect_ball_on top -effect_ball_obstacle sphere:0,0,%.15g,1",
-    path, (double)E, (double)nu, sideways, sideways, (double)(-P * (1 + nu) / (2 * PETSC_PI * E)),
+    path, element, (double)E, (double)nu, sideways, sideways, (double)(-P * (1 + nu) / (2 * PETSC_PI * E)),
     (double)(2 * (1 - nu)), r, r, (double)(1 - d)));
   verify_show("nodes that touch", record_last(&record, "ball_contacts"));
   VERIFY_NEAR(-4 * record_last(&record, "ball_force_z") / P, 1, tolerance, "force against that of Hertz");
@@ -426,6 +428,8 @@ int main(int argc, char **argv)
   PetscCall(check_press("p1", "multiplier", 20, 1e-10));
   PetscCall(check_press("cr", "multiplier", 20, 1e-10));
   PetscCall(check_press("dg", "multiplier", 20, 1e-10));
+  PetscCall(check_press("p2", "projected", 20, 1e-10));
+  PetscCall(check_press("p2", "multiplier", 20, 1e-10));
   PetscCall(check_press("p1", "augmented", 20, 1e-7));
   PetscCall(check_press("cr", "penalty", 1e3, 1e-6));
   PetscCall(check_fall("p1", "projected"));
@@ -437,11 +441,16 @@ int main(int argc, char **argv)
   PetscCall(check_held("projected"));
   PetscCall(check_corner("projected"));
   PetscCall(check_bounds());
-  PetscCall(check_hertz(8, 0.3));
+  PetscCall(check_hertz("p1", 8, 0.3));
+  PetscCall(check_hertz("p2", 6, 0.02));
+  PetscCall(check_incline("p2", "projected", 0.49));
   if (size == 1) { /* that other ranks agree is what the scenarios drop and indent show */
     PetscCall(check_fall("cr", "projected"));
     PetscCall(check_fall("dg", "projected"));
+    PetscCall(check_fall("p2", "projected"));
     PetscCall(check_fall("p1", "augmented"));
+    PetscCall(check_incline("p2", "augmented", 0.49));
+    PetscCall(check_incline("p2", "penalty", 0.51));
     PetscCall(check_incline("cr", "projected", 0.49));
     PetscCall(check_incline("p1", "augmented", 0.49));
     PetscCall(check_incline("p1", "penalty", 0.51));
@@ -450,7 +459,7 @@ int main(int argc, char **argv)
     PetscCall(check_corner("multiplier"));
     PetscCall(check_corner("augmented"));
     PetscCall(check_indent());
-    PetscCall(check_hertz(14, 0.05));
+    PetscCall(check_hertz("p1", 14, 0.05));
   }
   SB_TEST_END();
 }

@@ -186,10 +186,12 @@ int main(int argc, char **argv)
   /* the minimum is flat, and small waves of high modes, which each mesh has in other places, decide where it is */
   SB_CHECK_NEAR(limit[1], -1.5696, 1e-2 * 1.5696, "extrapolated first minimum");
   SB_CHECK_NEAR(limit[2], 0.7203, 1e-2 * 0.7203, "its time");
-  for (int e = 0; e < 2; e++) {
-    const char *element = e ? "dg" : "cr";
+  for (int e = 0; e < 3; e++) {
+    static const char *const elements[] = {"cr", "dg", "p2"};
+    const char *element = elements[e];
 
-    for (int k = 0; k < 2; k++) {
+    /* the lumped mass of P2 makes it 1.3 % too slow with two cells */
+    for (int k = e == 2; k < 2; k++) {
       PetscCall(check_release(element, 2 << k, f));
       SB_CHECK_NEAR(f[0], 0.68846, 5e-3 * 0.68846, element);
     }

@@ -74,7 +74,7 @@ static PetscErrorCode check(const char *element, const Inclusion *in)
 
 int main(int argc, char **argv)
 {
-  static const char *const elements[] = {"p1", "cr", "dg"};
+  static const char *const elements[] = {"p1", "cr", "dg", "p2"};
   static const Inclusion inclusions[] = {
     {"soft", 1e-2, 0.3}, {"stiff", 1e10, 0.3}, {"lambda only", 1e4, 0.4999999}};
 

@@ -11,10 +11,10 @@
 
 int main(int argc, char **argv)
 {
-  static const char *const elements[3] = {"p1", "cr", "dg"};
+  static const char *const elements[] = {"p1", "cr", "dg", "p2"};
 
   SB_TEST_BEGIN(argc, argv);
-  for (int i = 0; i < 3; i++) {
+  for (int i = 0; i < 4; i++) {
     LockingShell e;
     LockingCost cost;
     char more[256];

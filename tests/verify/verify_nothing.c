@@ -287,5 +287,6 @@ int main(int argc, char **argv)
   PetscCall(check_plain_space());
   PetscCall(check_elements("neohookean", "cr"));
   PetscCall(check_elements("corotated", "dg"));
+  PetscCall(check_elements("neohookean", "p2"));
   SB_TEST_END();
 }

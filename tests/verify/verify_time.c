@@ -176,7 +176,7 @@ static PetscErrorCode check_bar_order(const char *element, const char *options, 
 
 int main(int argc, char **argv)
 {
-  static const char *const elements[] = {"p1", "cr", "dg"};
+  static const char *const elements[] = {"p1", "cr", "dg", "p2"};
 
   SB_TEST_BEGIN(argc, argv);
   PetscCall(check_oscillator("-time euler_implicit", 0));
@@ -194,12 +194,12 @@ int main(int argc, char **argv)
   PetscCall(check_order("-time genalpha -time_spectral_radius 0.5", 0.25, 0., 0., 2));
   PetscCall(check_order("-time genalpha -time_spectral_radius 0", 0.25, 2., 0.002, 2));
   PetscCall(check_dissipation());
-  for (int e = 1; e < 3; e++) {
+  for (int e = 1; e < 4; e++) {
     PetscCall(check_bar_order(elements[e], "-time euler_implicit", 1));
     PetscCall(check_bar_order(elements[e], "-time newmark", 2));
     PetscCall(check_bar_order(elements[e], "-time newmark -mass consistent", 2));
   }
-  for (int e = 0; e < 3; e++) {
+  for (int e = 0; e < 4; e++) {
     PetscCall(check_free_fall(elements[e], "euler_implicit", -9.81 * 1e-4 * 50 * 51 / 2));
     PetscCall(check_free_fall(elements[e], "newmark", -0.5 * 9.81 * 0.25));
     PetscCall(check_free_fall(elements[e], "genalpha", -0.5 * 9.81 * 0.25));
