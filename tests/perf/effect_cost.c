@@ -1,7 +1,7 @@
 /*
   What each effect, element, law, integrator, field and other output costs on one scene, named and not named by turns.
 
-    price -mesh box:0.4,0.1,0.1:8 -rounds 3 -folder DIR [-family effect]
+    effect_cost -mesh box:0.4,0.1,0.1:8 -rounds 3 -folder DIR [-family effect]
 
   Output goes to DIR. The scene and what names each part are those of tests/parts.h, where the registries say what there is. Every run has eight
   steps; the first one, which holds what a solver sets up once, is left out. Per round and part:

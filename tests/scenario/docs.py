@@ -60,7 +60,7 @@ def links(pages):
 
 
 def sources():
-    """What sources, scripts and scenarios say to read."""
+    """What sources, scripts and scenarios say to read, and the programs that scripts/bench runs."""
     files = subprocess.run(["git", "ls-files"], cwd=TOP, capture_output=True, text=True).stdout.split() or [
         str(p.relative_to(TOP)) for folder in ("src", "include", "scripts", "scenarios", "tests") for p in (TOP / folder).rglob("*") if p.is_file()]
     for name in files + ["Makefile"]:
@@ -69,6 +69,8 @@ def sources():
             continue
         for page in re.findall(r"\bdocs/[\w/]+\.(?:md|png|csv)\b", path.read_text(errors="replace")):
             check(f"{name}: there is no {page}", (TOP / page).exists() or page.endswith("NAME.png"))
+    for name in re.findall(r'bench\.run\(\s*\w+, "(\w+)"', (TOP / "scripts/bench").read_text()):
+        check(f"scripts/bench: there is no tests/perf/{name}.c", (TOP / f"tests/perf/{name}.c").exists())
 
 
 def blocks(page):
