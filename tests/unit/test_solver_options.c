@@ -1,5 +1,4 @@
 // @ranks 1 2
-// @timeout 300
 /*
   PETSc's -ksp_type, -pc_type and -ksp_norm_type over every preset of -solver, for all elements, static and dynamic, with and without what contact
   adds: each run reaches the answer of the plain solver, or is refused before anything is computed by one line that names the option.

@@ -1,6 +1,6 @@
 // @ranks 1
 // @long
-// @timeout 1800
+// @cpu 900
 /*
   The frame of Lee, Manuel and Rossow ("Large deflections and stability of elastic frames", J. Eng. Mech. Div. ASCE 94, 1968) as a slender solid: a column and a
   beam of the length L = 120 each, section 2 deep and 3 wide, E = 720, joined rigidly at a right angle and hinged at both ends, with a load on the beam at L/5 from the

@@ -1,5 +1,4 @@
-// @ranks 1,2
-// @timeout 300
+// @ranks 1 2
 /*
   Snap-through of Williams' toggle ("An approach to the non-linear behaviour of the members of a rigid jointed plane framework with finite
   deflections", Q. J. Mech. Appl. Math. 17, 1964): two straight members of the span l = 12.943 in each, clamped at the far ends and joined rigidly in the middle, which is
