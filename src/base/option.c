@@ -278,6 +278,13 @@ PetscErrorCode SbOptionsRemember(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscBool SbOptionIsRead(const char *name)
+{
+  for (PetscInt i = 0; i < SbTheOptions.nrecord; i++)
+    if (!strcasecmp(SbTheOptions.record[i].name + 1, name)) return PETSC_TRUE;
+  return PETSC_FALSE;
+}
+
 /* Whether an option without its dash is a list of names: -effects, -body_liver_inclusions. */
 static PetscBool is_list(const char *name)
 {

@@ -45,6 +45,8 @@ extern SbOptionTable SbTheOptions; /* the registry of options */
 
 /* The row of a key in a scope; NULL when there is none. */
 const SbOption *SbOptionFind(const SbScope *scope, const char *key);
+/* Whether something has read the option of this full name, without its dash. */
+PetscBool SbOptionIsRead(const char *name);
 /* The text of an option, given for the instance or for what it inherits from, and the scope under which it is recorded: its own, or that of what it is a copy of. */
 PetscErrorCode SbOptionFindValue(const SbScope *scope, const char *key, SbScope *where, const char **value,
                                  PetscBool *given);

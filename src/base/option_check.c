@@ -49,13 +49,6 @@ static const char *class_of(const char *name)
   return NULL;
 }
 
-static PetscBool is_recorded(const char *name)
-{
-  for (PetscInt i = 0; i < SbTheOptions.nrecord; i++)
-    if (!strcasecmp(SbTheOptions.record[i].name + 1, name)) return PETSC_TRUE;
-  return PETSC_FALSE;
-}
-
 /* Near full names: everything read so far, every program-wide option, and the options of what a scenario file names. `text` is empty when none is near. */
 static PetscErrorCode near_options(const char *dashed, size_t size, char text[])
 {
@@ -82,7 +75,7 @@ static PetscErrorCode near_options(const char *dashed, size_t size, char text[])
           j / block->n < SbTheOptions.nlisted ? SbTheOptions.listed[j / block->n] : SB_OPTION_DEFAULT, key));
       else
         PetscCall(PetscSNPrintf(names[n], SB_OPTION_NAME_MAX, "-%s", key));
-      if (is_recorded(names[n] + 1)) continue;
+      if (SbOptionIsRead(names[n] + 1)) continue;
       list[n] = names[n];
       n++;
     }
@@ -259,19 +252,10 @@ static PetscErrorCode find_verdict(const char *name, size_t size, char text[], V
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Whether a name could be the misspelt form of a required option: of the same instance, and not an option itself. */
-static PetscBool may_be_misspelt(const char *name, const SbOptionRecord *r)
-{
-  const size_t before = strlen(r->name) - strlen(r->row->key) - 1; /* length of "body_liver_" */
-
-  if (strncasecmp(name, r->name + 1, before)) return PETSC_FALSE;
-  if (before) return (PetscBool)!SbOptionFind(&r->scope, name + before);
-  return (PetscBool)(!class_of(name) && !looks_like_petsc(name) && !program_row(name));
-}
-
 PetscErrorCode SbOptionMissing(const SbOptionRecord *r)
 {
   const SbOption *row = r->row;
+  const size_t before = strlen(r->name) - strlen(row->key) - 1; /* length of "body_liver_" */
   PetscInt nleft, n = 0;
   char **names, near[SB_OPTION_NAME_MAX];
   const char **list;
@@ -279,8 +263,17 @@ PetscErrorCode SbOptionMissing(const SbOptionRecord *r)
   PetscFunctionBeginUser;
   PetscCall(PetscOptionsLeftGet(NULL, &nleft, &names, NULL));
   PetscCall(PetscMalloc1(nleft, &list));
-  for (PetscInt i = 0; i < nleft; i++)
-    if (may_be_misspelt(names[i], r)) list[n++] = names[i];
+  // of the same instance, and not an option itself
+  for (PetscInt i = 0; i < nleft; i++) {
+    const char *key;
+
+    if (strncasecmp(names[i], r->name + 1, before)) continue;
+    key = names[i] + before;
+    if (before ? SbOptionFind(&r->scope, key) != NULL
+               : class_of(key) || looks_like_petsc(key) || program_row(key) != NULL)
+      continue;
+    list[n++] = names[i];
+  }
   PetscCall(SbNearestNames(r->name + 1, n, list, sizeof(near), near));
   PetscCall(PetscFree(list));
   PetscCall(PetscOptionsLeftRestore(NULL, &nleft, &names, NULL));

@@ -56,13 +56,6 @@ static PetscBool same_instance(const SbOptionRecord *a, const SbOptionRecord *b)
                      !strcmp(a->scope.instance, b->scope.instance));
 }
 
-static PetscBool is_ours(const char *name)
-{
-  for (PetscInt i = 0; i < SbTheOptions.nrecord; i++)
-    if (!strcasecmp(SbTheOptions.record[i].name + 1, name)) return PETSC_TRUE;
-  return PETSC_FALSE;
-}
-
 static PetscErrorCode print_petsc(PetscViewer viewer, PetscInt n, const SbOptionUser users[])
 {
   PetscBool any = PETSC_FALSE;
@@ -71,7 +64,7 @@ static PetscErrorCode print_petsc(PetscViewer viewer, PetscInt n, const SbOption
   for (PetscInt i = 0; i < n; i++) {
     const char *value = users[i].value;
 
-    if (is_ours(users[i].name)) continue;
+    if (SbOptionIsRead(users[i].name)) continue;
     if (!any) PetscCall(PetscViewerASCIIPrintf(viewer, "\n# for PETSc\n"));
     any = PETSC_TRUE;
     if (value && strpbrk(value, "#\"")) PetscCall(PetscViewerASCIIPrintf(viewer, "# "));

@@ -56,26 +56,6 @@ PetscErrorCode SbImportDropUnused(SbImport *im)
 
 /* ------------------------------------------------------------------ single tets */
 
-/* The error of a flat tet says why it is flat. */
-static PetscErrorCode flat(const SbImport *im, PetscInt c, PetscReal det, PetscReal L)
-{
-  const PetscInt *v = im->item[3].vert + 4 * c;
-
-  PetscFunctionBeginUser;
-  for (int i = 0; i < 4; i++) {
-    for (int j = 0; j < i; j++) {
-      PetscCheck(v[i] != v[j], PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
-                 "%s: tetrahedron %lld uses node %lld twice; remove it", im->where,
-                 (long long)im->item[3].number[c], (long long)im->vert_number[v[i]]);
-    }
-  }
-  SETERRQ(PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
-          "%s: tetrahedron %lld is flat (volume %.3g m^3 with an edge of %.3g m); repair the mesh (gmsh: "
-          "Mesh.Optimize = 1)",
-          im->where, (long long)im->item[3].number[c], (double)PetscAbsReal(det) / 6, (double)L);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 static inline PetscReal longest_edge2(const PetscReal x[], const PetscInt v[4])
 {
   PetscReal L2 = 0;
@@ -115,8 +95,21 @@ PetscErrorCode SbImportOrient(SbImport *im, PetscReal largest)
   for (PetscInt c = 0; c < im->item[3].n; c++) {
     PetscInt *v = im->item[3].vert + 4 * c;
 
-    if (SbTetFlat(im->x, v, largest, &det))
-      PetscCall(flat(im, c, det, PetscSqrtReal(longest_edge2(im->x, v))));
+    // flat, perhaps because it uses a node twice
+    if (SbTetFlat(im->x, v, largest, &det)) {
+      for (int i = 0; i < 4; i++) {
+        for (int j = 0; j < i; j++) {
+          PetscCheck(v[i] != v[j], PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
+                     "%s: tetrahedron %lld uses node %lld twice; remove it", im->where,
+                     (long long)im->item[3].number[c], (long long)im->vert_number[v[i]]);
+        }
+      }
+      SETERRQ(PETSC_COMM_SELF, PETSC_ERR_USER_INPUT,
+              "%s: tetrahedron %lld is flat (volume %.3g m^3 with an edge of %.3g m); repair the mesh (gmsh: "
+              "Mesh.Optimize = 1)",
+              im->where, (long long)im->item[3].number[c], (double)PetscAbsReal(det) / 6,
+              (double)PetscSqrtReal(longest_edge2(im->x, v)));
+    }
     if (det < 0) {
       const PetscInt keep = v[3];
 

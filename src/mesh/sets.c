@@ -203,11 +203,22 @@ static PetscErrorCode mark_shapes(const SbImport *im, const SbFaces *faces, cons
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode mark_groups(const SbImport *im, const SbFaces *faces, const uint64_t bits[], SbMasks *m)
+static void count_bits(uint64_t mask, PetscInt nset, PetscInt *count)
 {
+  for (PetscInt k = 0; mask && k < nset; k++) count[3 * k] += (mask & SB_SET_BIT(k)) != 0;
+}
+
+PetscErrorCode SbSetsMark(const SbImport *im, const SbFaces *faces, PetscInt nbody, const SbBody body[],
+                          PetscInt b, PetscInt nset, const SbSet set[], SbMasks *m)
+{
+  uint64_t *bits;
   PetscInt slots[2];
 
   PetscFunctionBeginUser;
+  PetscCall(mark_shapes(im, faces, &body[b], nset, set, m));
+  PetscCall(PetscMalloc1(im->ntags, &bits));
+  PetscCall(SbSetsBits(im, nbody, body, b, nset, set, bits));
+  // members of groups: vertices, faces of tets, tets with their faces on the boundary
   for (int d = 0; d < 4; d++) {
     const SbItems *item = &im->item[d];
 
@@ -226,24 +237,6 @@ static PetscErrorCode mark_groups(const SbImport *im, const SbFaces *faces, cons
       }
     }
   }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static void count_bits(uint64_t mask, PetscInt nset, PetscInt *count)
-{
-  for (PetscInt k = 0; mask && k < nset; k++) count[3 * k] += (mask & SB_SET_BIT(k)) != 0;
-}
-
-PetscErrorCode SbSetsMark(const SbImport *im, const SbFaces *faces, PetscInt nbody, const SbBody body[],
-                          PetscInt b, PetscInt nset, const SbSet set[], SbMasks *m)
-{
-  uint64_t *bits;
-
-  PetscFunctionBeginUser;
-  PetscCall(mark_shapes(im, faces, &body[b], nset, set, m));
-  PetscCall(PetscMalloc1(im->ntags, &bits));
-  PetscCall(SbSetsBits(im, nbody, body, b, nset, set, bits));
-  PetscCall(mark_groups(im, faces, bits, m));
   PetscCall(PetscFree(bits));
   if (body[b].in_memory) PetscCall(SbMemoryMeshMark(&body[b], faces, m));
   PetscFunctionReturn(PETSC_SUCCESS);

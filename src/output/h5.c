@@ -79,16 +79,22 @@ static PetscErrorCode agree(SbH5 *h)
     }                      \
   } while (0)
 
-static hid_t access_list(MPI_Comm comm)
+/* A file that is about to be opened, and how. */
+static PetscErrorCode begin(MPI_Comm comm, const char *path, SbH5 *h, hid_t *list)
 {
-  const hid_t list = H5Pcreate(H5P_FILE_ACCESS);
-
+  PetscFunctionBeginUser;
+  h->comm = comm;
+  h->bytes = 0;
+  h->failed = PETSC_FALSE;
+  h->reason[0] = 0;
+  PetscCall(PetscStrncpy(h->path, path, sizeof(h->path)));
+  *list = H5Pcreate(H5P_FILE_ACCESS);
   // Errors become one line of ours; HDF5 prints its whole stack otherwise.
   (void)H5Eset_auto2(H5E_DEFAULT, NULL, NULL);
-  (void)H5Pset_fapl_mpio(list, comm, MPI_INFO_NULL);
-  (void)H5Pset_alignment(list, 3000, 4096);
-  (void)H5Pset_libver_bounds(list, H5F_LIBVER_EARLIEST, H5F_LIBVER_V18);
-  return list;
+  (void)H5Pset_fapl_mpio(*list, comm, MPI_INFO_NULL);
+  (void)H5Pset_alignment(*list, 3000, 4096);
+  (void)H5Pset_libver_bounds(*list, H5F_LIBVER_EARLIEST, H5F_LIBVER_V18);
+  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode SbH5Create(MPI_Comm comm, const char *path, SbH5 *h)
@@ -96,12 +102,7 @@ PetscErrorCode SbH5Create(MPI_Comm comm, const char *path, SbH5 *h)
   hid_t list;
 
   PetscFunctionBeginUser;
-  h->comm = comm;
-  h->bytes = 0;
-  h->failed = PETSC_FALSE;
-  h->reason[0] = 0;
-  PetscCall(PetscStrncpy(h->path, path, sizeof(h->path)));
-  list = access_list(comm);
+  PetscCall(begin(comm, path, h, &list));
   h->file = H5Fcreate(path, H5F_ACC_TRUNC, H5P_DEFAULT, list);
   (void)H5Pclose(list);
   H5_CALL(h, h->file);
@@ -114,12 +115,7 @@ PetscErrorCode SbH5Open(MPI_Comm comm, const char *path, PetscBool writable, SbH
   hid_t list;
 
   PetscFunctionBeginUser;
-  h->comm = comm;
-  h->bytes = 0;
-  h->failed = PETSC_FALSE;
-  h->reason[0] = 0;
-  PetscCall(PetscStrncpy(h->path, path, sizeof(h->path)));
-  list = access_list(comm);
+  PetscCall(begin(comm, path, h, &list));
   h->file = H5Fopen(path, writable ? H5F_ACC_RDWR : H5F_ACC_RDONLY, list);
   (void)H5Pclose(list);
   here = h->file >= 0;

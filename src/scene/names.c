@@ -33,38 +33,29 @@ static const char *name_problem(const char *name)
   return NULL;
 }
 
-/* The first thing that is wrong with a list of names; "" when nothing is. */
-static PetscErrorCode names_problem(const char *what, PetscInt n, char (*names)[SB_NAME_MAX], size_t size,
-                                    char text[])
-{
-  PetscFunctionBeginUser;
-  text[0] = 0;
-  for (PetscInt i = 0; i < n && !text[0]; i++) {
-    const char *problem = name_problem(names[i]);
-
-    if (!strcmp(what, "body") && !strcasecmp(names[i], SB_OPTION_DEFAULT))
-      problem = "stands for all bodies in -body_default_young and the like";
-    if (problem) PetscCall(PetscSNPrintf(text, size, "the name '%s' %s", names[i], problem));
-    for (PetscInt j = 0; j < i && !text[0]; j++) {
-      const char *hint = strcmp(names[i], names[j]) ? " (upper and lower case count as one)" : "";
-
-      if (strcasecmp(names[i], names[j])) continue;
-      PetscCall(PetscSNPrintf(text, size, "two are named '%s'%s; every %s needs a name of its own", names[i],
-                              hint, what));
-    }
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode SbSceneReadNames(const char *key, const char *what, PetscInt *n, char (**names)[SB_NAME_MAX])
 {
   SbScope scope;
-  char problem[4 * SB_NAME_MAX];
+  char problem[4 * SB_NAME_MAX] = "";
 
   PetscFunctionBeginUser;
   PetscCall(SbScopeSet(&scope, "", "", ""));
   PetscCall(SbOptionNames(&scope, key, n, names));
-  PetscCall(names_problem(what, *n, *names, sizeof(problem), problem));
+  // the first thing that is wrong with them
+  for (PetscInt i = 0; i < *n && !problem[0]; i++) {
+    const char *name = (*names)[i], *wrong = name_problem(name);
+
+    if (!strcmp(what, "body") && !strcasecmp(name, SB_OPTION_DEFAULT))
+      wrong = "stands for all bodies in -body_default_young and the like";
+    if (wrong) PetscCall(PetscSNPrintf(problem, sizeof(problem), "the name '%s' %s", name, wrong));
+    for (PetscInt j = 0; j < i && !problem[0]; j++) {
+      const char *hint = strcmp(name, (*names)[j]) ? " (upper and lower case count as one)" : "";
+
+      if (strcasecmp(name, (*names)[j])) continue;
+      PetscCall(PetscSNPrintf(problem, sizeof(problem),
+                              "two are named '%s'%s; every %s needs a name of its own", name, hint, what));
+    }
+  }
   if (problem[0]) PetscCall(PetscFree(*names));
   PetscCheck(!problem[0], PETSC_COMM_SELF, PETSC_ERR_USER, "-%s: %s", key, problem);
   PetscFunctionReturn(PETSC_SUCCESS);

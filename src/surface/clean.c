@@ -55,43 +55,6 @@ static int compare_triples(const void *a, const void *b)
   return (p->triangle > q->triangle) - (p->triangle < q->triangle);
 }
 
-static Triple triple_of(const SbTriangles *t, PetscInt f)
-{
-  Triple p = {.triangle = f, .odd = PETSC_FALSE};
-
-  for (int k = 0; k < 3; k++) p.vert[k] = t->tri[3 * f + k];
-  for (int i = 0; i < 3; i++) {
-    const int k = i % 2;
-
-    if (p.vert[k] > p.vert[k + 1]) {
-      const PetscInt keep = p.vert[k];
-
-      p.vert[k] = p.vert[k + 1];
-      p.vert[k + 1] = keep;
-      p.odd = (PetscBool)!p.odd;
-    }
-  }
-  return p;
-}
-
-/* Triangle `to` gets the groups of triangle `from`, too. */
-static PetscErrorCode join_groups(SbTriangleFile *f, PetscInt to, PetscInt from)
-{
-  const SbImport *im = f->groups;
-  PetscInt group[64], n = 0;
-
-  PetscFunctionBeginUser;
-  if (!f->tags || f->tags[to] == f->tags[from]) PetscFunctionReturn(PETSC_SUCCESS);
-  for (int i = 0; i < 2; i++) {
-    const PetscInt set = f->tags[i ? from : to];
-
-    for (PetscInt k = im->tags_start[set]; k < im->tags_start[set + 1] && n < 64; k++)
-      group[n++] = im->tags_group[k];
-  }
-  PetscCall(SbImportTagSet(f->groups, n, group, &f->tags[to]));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* Of triangles with the same corners the first one stays; the others give it their groups. */
 static PetscErrorCode drop_doubled(SbTriangleFile *f, PetscBool keep[], SbSurfaceRepairs *m)
 {
@@ -102,7 +65,11 @@ static PetscErrorCode drop_doubled(SbTriangleFile *f, PetscBool keep[], SbSurfac
   if (!t->ntri) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscMalloc1(t->ntri, &triple));
   for (PetscInt i = 0; i < t->ntri; i++) {
-    triple[i] = triple_of(t, i);
+    const PetscInt *v = t->tri + 3 * i;
+    const int low = v[0] < v[1] ? (v[0] < v[2] ? 0 : 2) : (v[1] < v[2] ? 1 : 2);
+    const PetscInt p = v[(low + 1) % 3], q = v[(low + 2) % 3];
+
+    triple[i] = (Triple){{v[low], PetscMin(p, q), PetscMax(p, q)}, i, (PetscBool)(p > q)};
     keep[i] = PETSC_TRUE;
   }
   qsort(triple, (size_t)t->ntri, sizeof(*triple), compare_triples);
@@ -112,7 +79,19 @@ static PetscErrorCode drop_doubled(SbTriangleFile *f, PetscBool keep[], SbSurfac
     for (n = 1; i + n < t->ntri && !memcmp(triple[i].vert, triple[i + n].vert, sizeof(triple[i].vert)); n++) {
       keep[triple[i + n].triangle] = PETSC_FALSE;
       wall = (PetscBool)(wall || triple[i + n].odd != triple[i].odd);
-      PetscCall(join_groups(f, triple[i].triangle, triple[i + n].triangle));
+      // the groups of both
+      if (f->tags && f->tags[triple[i].triangle] != f->tags[triple[i + n].triangle]) {
+        const SbImport *im = f->groups;
+        PetscInt group[64], ngroup = 0;
+
+        for (PetscInt j = i; j <= i + n; j += n) {
+          const PetscInt set = f->tags[triple[j].triangle];
+
+          for (PetscInt k = im->tags_start[set]; k < im->tags_start[set + 1] && ngroup < 64; k++)
+            group[ngroup++] = im->tags_group[k];
+        }
+        PetscCall(SbImportTagSet(f->groups, ngroup, group, &f->tags[triple[i].triangle]));
+      }
     }
     m->nwall += wall;
     m->ndoubled += n - 1 - wall;
@@ -282,15 +261,31 @@ static PetscReal partner_distance(const SbTriangles *t, PetscInt n, const PetscI
   return need < 0.25 * edge ? need : 0;
 }
 
-static PetscErrorCode refuse_open(const SbTriangleFile *f, PetscInt n, const PetscInt slot[])
+/* Every edge has a triangle on both sides. */
+static PetscErrorCode check_open(const SbTriangleFile *f, SbTriangleEdge edge[])
 {
   const SbTriangles *t = f->t;
-  const PetscReal *a = t->x + 3 * t->tri[slot[0]],
-                  *b = t->x + 3 * t->tri[slot[0] % 3 == 2 ? slot[0] - 2 : slot[0] + 1];
-  const PetscReal need = partner_distance(t, n, slot);
+  const PetscInt n = 3 * t->ntri;
+  PetscInt *slot, nopen = 0, first;
+  PetscReal need;
+  const PetscReal *a, *b;
   char option[SB_IMPORT_OPTION_MAX], what[256] = "close the holes (meshlab: close holes; blender: fill)";
 
   PetscFunctionBeginUser;
+  PetscCall(PetscMalloc1(n, &slot));
+  PetscCall(SbTrianglesEdges(t, edge));
+  for (PetscInt i = 0, m; i < n; i += m) {
+    m = SbTrianglesAtEdge(n, edge, i);
+    if (m == 1) slot[nopen++] = edge[i].slot;
+  }
+  PetscCall(PetscSortInt(nopen, slot));
+  first = nopen ? slot[0] : 0;
+  need = partner_distance(t, nopen, slot);
+  PetscCall(PetscFree(slot));
+  if (!nopen) PetscFunctionReturn(PETSC_SUCCESS);
+  // what is wrong: the first open edge, and whether joining would close all of them
+  a = t->x + 3 * edge_end(t, first, 0);
+  b = t->x + 3 * edge_end(t, first, 1);
   if (need > 0 && f->groups)
     (void)snprintf(
       what, sizeof(what),
@@ -300,28 +295,8 @@ static PetscErrorCode refuse_open(const SbTriangleFile *f, PetscInt n, const Pet
           "%s: the surface is open: %" PetscInt_FMT
           " edges have a triangle on one side only, the first is that of triangle %lld from (%.6g, %.6g, "
           "%.6g) to (%.6g, %.6g, %.6g) m; %s",
-          f->where, n, (long long)f->number[slot[0] / 3], (double)a[0], (double)a[1], (double)a[2],
+          f->where, nopen, (long long)f->number[first / 3], (double)a[0], (double)a[1], (double)a[2],
           (double)b[0], (double)b[1], (double)b[2], what);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode check_open(const SbTriangleFile *f, SbTriangleEdge edge[])
-{
-  const PetscInt n = 3 * f->t->ntri;
-  PetscInt *slot, nopen = 0;
-  PetscErrorCode ierr = PETSC_SUCCESS;
-
-  PetscFunctionBeginUser;
-  PetscCall(PetscMalloc1(n, &slot));
-  PetscCall(SbTrianglesEdges(f->t, edge));
-  for (PetscInt i = 0, m; i < n; i += m) {
-    m = SbTrianglesAtEdge(n, edge, i);
-    if (m == 1) slot[nopen++] = edge[i].slot;
-  }
-  PetscCall(PetscSortInt(nopen, slot));
-  if (nopen) ierr = refuse_open(f, nopen, slot);
-  PetscCall(PetscFree(slot));
-  PetscFunctionReturn(ierr);
 }
 
 PetscErrorCode SbSurfaceRepairTriangles(SbTriangleFile *f, SbSurfaceRepairs *m)

@@ -28,42 +28,28 @@ static PetscErrorCode read_file(const char *path, PetscReal scale, const PetscRe
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Rank 0 reads; all ranks fail together. */
-static PetscErrorCode read_first(MPI_Comm comm, const char *where, const char *path, PetscReal scale,
-                                 const PetscReal at[3], SbTriangles *t, size_t size, char note[])
-{
-  SbCaughtError caught = {0, ""};
-  PetscMPIInt rank;
-
-  PetscFunctionBeginUser;
-  PetscCallMPI(MPI_Comm_rank(comm, &rank));
-  if (!rank) {
-    SbTriangleFile file = {.where = where, .t = t};
-    PetscErrorCode ierr;
-
-    PetscCall(PetscPushErrorHandler(SbCatchError, &caught));
-    ierr = read_file(path, scale, at, &file, size, note);
-    PetscCall(PetscPopErrorHandler());
-    PetscCall(PetscFree(file.number));
-    if (ierr) PetscCall(SbTrianglesDestroy(t));
-    caught.code = (int)ierr;
-  }
-  PetscCall(SbCaughtRaise(comm, &caught));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode SbTrianglesRead(MPI_Comm comm, const char *option, const char *path, PetscReal scale,
                                const PetscReal at[3], SbTriangles *t)
 {
   char where[PETSC_MAX_PATH_LEN + 3 * SB_NAME_MAX], note[512] = ""; /* of rank 0, as warnings are */
+  SbCaughtError caught = {0, ""};
   SbTriangles head;
   PetscMPIInt rank, n[2];
 
   PetscFunctionBeginUser;
   PetscCall(PetscMemzero(t, sizeof(*t)));
   (void)snprintf(where, sizeof(where), "%s: %s", option, path);
-  PetscCall(read_first(comm, where, path, scale, at, t, sizeof(note), note));
+  // rank 0 reads; all ranks fail together
   PetscCallMPI(MPI_Comm_rank(comm, &rank));
+  if (!rank) {
+    SbTriangleFile file = {.where = where, .t = t};
+
+    SB_CATCH(&caught, read_file(path, scale, at, &file, sizeof(note), note));
+    PetscCall(PetscFree(file.number));
+    if (caught.code) PetscCall(SbTrianglesDestroy(t));
+  }
+  PetscCall(SbCaughtRaise(comm, &caught));
+  // the surface goes to the others
   head = *t;
   PetscCallMPI(MPI_Bcast(&head, (int)sizeof(head), MPI_BYTE, 0, comm));
   if (rank) {

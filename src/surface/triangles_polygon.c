@@ -197,33 +197,28 @@ static PetscReal loop_area(const Loops *l, PetscInt k)
   return SbDot3(one.normal, l->p.normal);
 }
 
-/* Whether a point of the plane lies in a loop: crossings of a ray in the two coordinates that see most of the facet. */
-static PetscBool in_loop(const Loops *l, PetscInt k, const PetscReal x[3])
+/* The smallest loop around a point of the plane, not `except`; -1 when there is none. */
+static PetscInt loop_around(const Loops *l, const PetscReal x[3], PetscInt except)
 {
   const PetscReal *m = l->p.normal;
   const int most = PetscAbsReal(m[0]) > PetscAbsReal(m[1])
                      ? (PetscAbsReal(m[0]) > PetscAbsReal(m[2]) ? 0 : 2)
                      : (PetscAbsReal(m[1]) > PetscAbsReal(m[2]) ? 1 : 2);
   const int u = (most + 1) % 3, v = (most + 2) % 3;
-  PetscBool inside = PETSC_FALSE;
-
-  for (PetscInt i = l->start[k]; i < l->start[k + 1]; i++) {
-    const PetscReal *a = l->p.x + 3 * l->vert[i],
-                    *b = l->p.x + 3 * l->vert[i + 1 < l->start[k + 1] ? i + 1 : l->start[k]];
-
-    if ((a[v] > x[v]) != (b[v] > x[v]) && x[u] < a[u] + (b[u] - a[u]) * (x[v] - a[v]) / (b[v] - a[v]))
-      inside = (PetscBool)!inside;
-  }
-  return inside;
-}
-
-/* The smallest loop around a point, not `except`; -1 when there is none. */
-static PetscInt loop_around(const Loops *l, const PetscReal x[3], PetscInt except)
-{
   PetscInt best = -1;
 
   for (PetscInt k = 0; k < l->n; k++) {
-    if (k == except || !in_loop(l, k, x)) continue;
+    PetscBool inside = PETSC_FALSE;
+
+    // crossings of a ray in the two coordinates that see most of the facet
+    for (PetscInt i = l->start[k]; i < l->start[k + 1]; i++) {
+      const PetscReal *a = l->p.x + 3 * l->vert[i],
+                      *b = l->p.x + 3 * l->vert[i + 1 < l->start[k + 1] ? i + 1 : l->start[k]];
+
+      if ((a[v] > x[v]) != (b[v] > x[v]) && x[u] < a[u] + (b[u] - a[u]) * (x[v] - a[v]) / (b[v] - a[v]))
+        inside = (PetscBool)!inside;
+    }
+    if (k == except || !inside) continue;
     if (best < 0 || PetscAbsReal(loop_area(l, k)) < PetscAbsReal(loop_area(l, best))) best = k;
   }
   return best;
@@ -243,48 +238,6 @@ static PetscBool meets_edge(const Polygon *p, PetscInt a, PetscInt b, PetscInt n
   return PETSC_FALSE;
 }
 
-/* The shortest free way from a corner of the polygon (position *i) to one of loop k (position *j). */
-static PetscBool find_bridge(const Loops *l, PetscInt k, PetscInt n, const PetscInt left[], PetscInt *i,
-                             PetscInt *j)
-{
-  PetscReal best = PETSC_MAX_REAL;
-
-  for (PetscInt a = 0; a < n; a++) {
-    for (PetscInt b = 0; b < corners_of(l, k); b++) {
-      const PetscInt v = left[a], w = l->vert[l->start[k] + b];
-      const PetscReal *x = l->p.x + 3 * v, *y = l->p.x + 3 * w,
-                      d[3] = {y[0] - x[0], y[1] - x[1], y[2] - x[2]};
-      PetscBool blocked = (PetscBool)(SbDot3(d, d) >= best || meets_edge(&l->p, v, w, n, left));
-
-      for (PetscInt m = 0; m < l->n && !blocked; m++)
-        blocked = meets_edge(&l->p, v, w, corners_of(l, m), l->vert + l->start[m]);
-      if (blocked) continue;
-      best = SbDot3(d, d);
-      *i = a;
-      *j = b;
-    }
-  }
-  return (PetscBool)(best < PETSC_MAX_REAL);
-}
-
-/* Loop k, walked against the polygon, becomes part of it by two bridges. */
-static PetscErrorCode add_inner(SbScan *s, const Loops *l, PetscInt k, int64_t number, PetscInt *n,
-                                PetscInt left[])
-{
-  const PetscInt m = corners_of(l, k), *loop = l->vert + l->start[k];
-  const int step = loop_area(l, k) > 0 ? -1 : 1;
-  PetscInt i = 0, j = 0;
-
-  PetscFunctionBeginUser;
-  if (*n + m + 2 > CORNERS_MAX) PetscCall(too_many(s, *n + m + 2, number));
-  if (!find_bridge(l, k, *n, left, &i, &j))
-    SB_SCAN_ERROR(s, "the polygons of facet %lld cross each other; repair it", (long long)number);
-  PetscCall(PetscArraymove(left + i + m + 2, left + i, *n - i));
-  for (PetscInt c = 0; c <= m; c++) left[i + 1 + c] = loop[((j + step * c) % m + m) % m];
-  *n += m + 2;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* The polygon between loop k and the loops that lie directly in it. */
 static PetscErrorCode add_between(SbScan *s, const Loops *l, PetscInt k, const PetscInt parent[],
                                   int64_t number, SbTriangleFile *f)
@@ -302,8 +255,37 @@ static PetscErrorCode add_between(SbScan *s, const Loops *l, PetscInt k, const P
   }
   if (m > CORNERS_MAX) PetscCall(too_many(s, m, number));
   for (PetscInt i = 0; i < m; i++) left[i] = loop[against ? m - 1 - i : i];
-  for (PetscInt i = 0; i < l->n; i++) {
-    if (parent[i] == k) PetscCall(add_inner(s, l, i, number, &n, left));
+  for (PetscInt inner = 0; inner < l->n; inner++) {
+    const PetscInt ninner = corners_of(l, inner), *other = l->vert + l->start[inner];
+    const int step = loop_area(l, inner) > 0 ? -1 : 1;
+    PetscReal best = PETSC_MAX_REAL;
+    PetscInt i = 0, j = 0;
+
+    if (parent[inner] != k) continue;
+    if (n + ninner + 2 > CORNERS_MAX) PetscCall(too_many(s, n + ninner + 2, number));
+    // the shortest free way from a corner of the polygon (position i) to one of this loop (position j)
+    for (PetscInt a = 0; a < n; a++) {
+      for (PetscInt b = 0; b < ninner; b++) {
+        const PetscReal *x = l->p.x + 3 * left[a], *y = l->p.x + 3 * other[b],
+                        d[3] = {y[0] - x[0], y[1] - x[1], y[2] - x[2]};
+        PetscBool blocked =
+          (PetscBool)(SbDot3(d, d) >= best || meets_edge(&l->p, left[a], other[b], n, left));
+
+        for (PetscInt c = 0; c < l->n && !blocked; c++)
+          blocked = meets_edge(&l->p, left[a], other[b], corners_of(l, c), l->vert + l->start[c]);
+        if (blocked) continue;
+        best = SbDot3(d, d);
+        i = a;
+        j = b;
+      }
+    }
+    if (best == PETSC_MAX_REAL)
+      SB_SCAN_ERROR(s, "the polygons of facet %lld cross each other; repair it", (long long)number);
+    // walked against the polygon, it becomes part of it by two bridges
+    PetscCall(PetscArraymove(left + i + ninner + 2, left + i, n - i));
+    for (PetscInt c = 0; c <= ninner; c++)
+      left[i + 1 + c] = other[((j + step * c) % ninner + ninner) % ninner];
+    n += ninner + 2;
   }
   PetscCall(cut_ears(&l->p, n, left, number, f));
   PetscFunctionReturn(PETSC_SUCCESS);
