@@ -91,7 +91,7 @@ typedef struct {
 
     touching      - a run begins at t, its first step has the length dt: adds what has a gap at the local displacements u that is too small, or not much larger, of this
                     rank. first: it was that step, alike on all ranks; else nothing was done.
-    begin_guarded - a step from t to t + dt begins with the local displacements u0; when the run begins they may be changed (moved), ghosts too, where surfaces
+    begin_guarded - a step from t to t + dt begins with the local displacements u0, and the speed of guard.c, m/s; when the run begins they may be changed (moved), ghosts too, where surfaces
                     touch. What moves by order is where it is at t: `progress` 0.
     meet          - after begin_guarded, for effects with restitution: what bounces in the step, by the local displacements u0 and velocities v0 at its start.
     advance       - it is where its way from t to t + dt has the part `progress` behind it, 0..1. Not collective.
@@ -102,11 +102,15 @@ typedef struct {
                     again: it did, and the step wants one more solve.
     potential     - energy at the local displacements u, this rank's part, J; f[nnode][3] += its gradient on owned nodes, N.
     hessian       - adds the blocks of its second derivative at u, or of what stands for it (SbContactHessian).
+    gap_forces    - f[nnode][3] += on owned nodes what closes the gaps at u, to first order, as a load on body and contact, N; `bound`: half of force times gap, which bounds the energy
+                    of the error that gaps are, this rank's, J.
+    scale_width   - the gap below which it pushes becomes `factor` times what it is, if it is the program's. Smaller: at once, not below what rounding allows; changed: it did, alike on
+                    all ranks. Larger: when the next step begins, if the energy of gaps does not grow by more than `growth` with it, J, and not beyond the default. Not collective.
   */
   PetscErrorCode (*touching)(SbEffect e, SbSpace space, PetscReal t, PetscReal dt, const PetscReal u[],
                              PetscBool *first, SbTouches *list);
-  PetscErrorCode (*begin_guarded)(SbEffect e, SbSpace space, PetscReal t, PetscReal dt, PetscReal u0[],
-                                  PetscBool *moved);
+  PetscErrorCode (*begin_guarded)(SbEffect e, SbSpace space, PetscReal t, PetscReal dt, PetscReal speed,
+                                  PetscReal u0[], PetscBool *moved);
   PetscErrorCode (*meet)(SbEffect e, SbSpace space, PetscReal dt, const PetscReal u0[], const PetscReal v0[]);
   PetscErrorCode (*advance)(SbEffect e, PetscReal progress);
   PetscErrorCode (*safe)(SbEffect e, SbSpace space, const PetscReal u0[], const PetscReal u1[],
@@ -117,6 +121,9 @@ typedef struct {
                               PetscReal f[]);
   PetscErrorCode (*hessian)(SbEffect e, SbSpace space, const PetscReal u[], SbContactHessian kind,
                             SbBlocks *blocks);
+  PetscErrorCode (*gap_forces)(SbEffect e, SbSpace space, const PetscReal u[], PetscReal f[],
+                               PetscReal *bound);
+  PetscErrorCode (*scale_width)(SbEffect e, PetscReal factor, PetscReal growth, PetscBool *changed);
   /* of guarded contact: what it did to the bodies in the last accepted step, J; this rank's. Not collective. */
   PetscErrorCode (*work)(SbEffect e, PetscReal *work);
   /* after a step was accepted */

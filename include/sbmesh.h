@@ -89,6 +89,8 @@ typedef struct {
   PetscReal bbox[6];             /* xmin ymin zmin xmax ymax zmax, placed, m */
   char note[768]; /* what was repaired or is odd, "unused vertices left out: 3, ..."; "" when nothing */
 } SbBody;
+/* Diagonal of the smallest body's box, m. Not collective. */
+PetscReal SbBodySmallest(PetscInt nbody, const SbBody body[]);
 
 /*
   A named set of the scenario: where loads and supports act. From a gmsh physical group of that name (of any body, or

@@ -66,7 +66,9 @@ struct _p_SbModel {
   PetscBool linear;      /* laws and effects: the tangent depends on the shifts only */
   PetscBool may_filter;  /* some law has the tangent auto */
   PetscBool guard_apart; /* residuals that are solved leave guarded contact out: SbModelGuardGradient() */
-  PetscReal mass;        /* kg */
+  PetscReal
+    guard_speed; /* of the step that began, by which tolerances of guarded contact are judged, m/s; 0 in a static run */
+  PetscReal mass; /* kg */
   PetscBool dynamic;
   PetscReal
     load; /* load factor: 1, in a static run 0..1; multiplies loads and prescribed displacements without t in their formulas */
@@ -135,6 +137,9 @@ PetscErrorCode SbModelGuardWork(SbModel model, Vec U, PetscReal *work, Vec F);
 PetscErrorCode SbModelGuardGradient(SbModel model, Vec U, PetscReal scale, PetscBool free_only,
                                     PetscReal *energy, Vec F);
 PetscErrorCode SbModelGuardHessian(SbModel model, Vec U, SbContactHessian kind, SbBlocks *blocks);
+/* F = what closes the gaps at U, N, zero at prescribed unknowns; bound of all ranks, J. changed: some width did. Collective. */
+PetscErrorCode SbModelGapForces(SbModel model, Vec U, Vec F, PetscReal *bound);
+PetscErrorCode SbModelScaleWidths(SbModel model, PetscReal factor, PetscReal growth, PetscBool *changed);
 /* Initial displacements and velocities of bodies, with spin. Collective. */
 PetscErrorCode SbModelInitialState(SbModel model, Vec U, Vec V);
 /* Centre of mass, m, and mass, kg, of each body, centre[nbody][4]: at rest with U NULL, else now. Collective. */

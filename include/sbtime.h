@@ -189,6 +189,8 @@ struct _p_SbRun {
   step by which symplectic Euler's velocities are behind, whose error does not add up; 0 for the others.
 */
 PetscErrorCode SbRunMethodError(SbRun run, PetscInt *order, PetscReal *c, PetscReal *ahead);
+/* X = (K + H)^-1 B with the tangent K of the last direction of Newton's method and the second derivative H of guarded contact, where surfaces pushed each other there (solved). Collective. */
+PetscErrorCode SbRunSolveTangent(SbRun run, Vec B, Vec X, PetscInt *iterations, PetscBool *solved);
 PetscErrorCode SbTimeRegister(void); /* option rows and the TSType */
 PetscErrorCode SbRunCreate(SbModel model,
                            SbRun *run); /* reads the options -time, -solver, ...; nothing is computed yet */

@@ -374,12 +374,7 @@ PetscErrorCode SbContactMeshCreate(SbSpace s, PetscInt n, const SbFacet facet[],
     for (int i = 0; i < 3; i++) r[i] = m->X[3 * m->edge[2 * e] + i] - m->X[3 * m->edge[2 * e + 1] + i];
     m->shortest = PetscMin(m->shortest, PetscSqrtReal(SbDot3(r, r)));
   }
-  m->size = PETSC_MAX_REAL;
-  for (PetscInt b = 0; b < s->mesh->nbody; b++) {
-    const PetscReal *box = s->mesh->body[b].bbox, r[3] = {box[3] - box[0], box[4] - box[1], box[5] - box[2]};
-
-    m->size = PetscMin(m->size, PetscSqrtReal(SbDot3(r, r)));
-  }
+  m->size = SbBodySmallest(s->mesh->nbody, s->mesh->body);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -23,8 +23,8 @@
 #define WIDTH 1e-3       /* of the size of the smallest body: default of w */
 #define WIDTH_CUBE 3e-3  /* at most so much of the edge of a cube of its volume, as thin bodies are long */
 #define PRESSURE 0.1     /* of Young's modulus of the softer side */
-#define SLIP 1e-3        /* of the size of the smallest body per second: speed below which friction sticks */
-#define SLIP_LEAST 1e-7  /* of the size: the slip of a time step is not smaller */
+#define SLIP 1e-4        /* of the speed of a step (src/model/guard.c): below it friction sticks */
+#define SLIP_LEAST 1e-7  /* of the size of the smallest body: the slip of a time step is not smaller */
 #define SLIP_STATIC 1e-5 /* of the size: the same in a static run, as a length */
 #define LAGS 100         /* solves of a load step with the friction of the one before */
 #define MUCH \
@@ -34,6 +34,8 @@
 #define APART 0.5   /* of w: gap at the start where bodies cannot move apart by w, and in static runs */
 #define NEARBY 5.   /* of w: gaps that bodies may come to when they are moved apart */
 #define PASSES 200  /* over all pairs for that */
+#define WIDTH_LEAST \
+  1e-8 /* of the size of the smallest body, and of coordinates: with -accuracy no width is smaller, as its hundredth has to be far above rounding */
 
 /* ------------------------------------------------------------------ set-up */
 
@@ -100,7 +102,7 @@ static PetscErrorCode setup_barrier(SbEffect e, SbSpace s)
   PetscCall(PetscMalloc3(3 * s->nnode_owned, &b->u, 3 * (b->mesh->nvertex - b->mesh->nbody_vertex), &b->from,
                          3 * (b->mesh->nvertex - b->mesh->nbody_vertex), &b->to));
   b->least = PETSC_MAX_REAL;
-  b->shortest = b->stiffer = 1.;
+  b->shortest = b->stiffer = b->scale = 1.;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -335,8 +337,56 @@ static PetscReal gap_energy(const Barrier *b)
   return sum;
 }
 
-static PetscErrorCode begin_barrier(SbEffect e, SbSpace s, PetscReal t, PetscReal dt, PetscReal u0[],
-                                    PetscBool *moved)
+/* w <- scale times its default. */
+static void set_scale(SbEffect e, PetscReal scale)
+{
+  Barrier *b = (Barrier *)e->data;
+
+  for (PetscInt i = 0; i < b->mesh->space->mesh->nbody; i++) b->w[i] *= scale / b->scale;
+  e->width *= scale / b->scale;
+  b->scale = scale;
+  b->known = PETSC_FALSE;
+}
+
+static PetscErrorCode scale_width_barrier(SbEffect e, PetscReal factor, PetscReal growth, PetscBool *changed)
+{
+  Barrier *b = (Barrier *)e->data;
+  PetscReal far = b->mesh->size, least;
+
+  PetscFunctionBeginUser;
+  *changed = PETSC_FALSE;
+  if (b->width > 0. || b->overlapping) PetscFunctionReturn(PETSC_SUCCESS);
+  b->wider = factor > 1. ? factor : 0.;
+  b->growth = growth;
+  if (factor > 1.) PetscFunctionReturn(PETSC_SUCCESS);
+  for (PetscInt k = 0; k < 3 * b->mesh->nbody_vertex; k++) far = PetscMax(far, PetscAbsReal(b->mesh->X[k]));
+  least = WIDTH_LEAST * far / e->width;
+  *changed = (PetscBool)(least < 1.);
+  if (*changed) set_scale(e, PetscMax(factor, least) * b->scale);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* A step begins with the local displacements u: the width may grow, as far as the energy of gaps hardly does. */
+static PetscErrorCode widen(SbEffect e, const PetscReal u[])
+{
+  Barrier *b = (Barrier *)e->data;
+  const PetscReal old = b->scale;
+  PetscReal energy[2];
+
+  PetscFunctionBeginUser;
+  PetscCall(SbBarrierLook(b, u));
+  energy[0] = gap_energy(b);
+  set_scale(e, PetscMin(1., b->wider * old));
+  PetscCall(SbBarrierLook(b, u));
+  energy[1] = gap_energy(b);
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, energy, 2, MPIU_REAL, MPI_SUM, b->mesh->space->comm));
+  if (energy[1] - energy[0] > b->growth) set_scale(e, old);
+  b->wider = 0.;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode begin_barrier(SbEffect e, SbSpace s, PetscReal t, PetscReal dt, PetscReal speed,
+                                    PetscReal u0[], PetscBool *moved)
 {
   Barrier *b = (Barrier *)e->data;
   const SbContactMesh m = b->mesh;
@@ -358,6 +408,7 @@ static PetscErrorCode begin_barrier(SbEffect e, SbSpace s, PetscReal t, PetscRea
     if (*moved) PetscCall(SbBarrierPart(e, s, dt, PETSC_FALSE));
   }
   b->begun = PETSC_TRUE;
+  if (b->wider > 0.) PetscCall(widen(e, u0));
   PetscCall(SbBarrierLook(b, u0));
   PetscCall(PetscArraycpy(b->start, b->x, 3 * m->nvertex));
   for (PetscInt i = 0; i < b->nactive; i++) least = PetscMin(least, b->active[i].gap);
@@ -367,7 +418,7 @@ static PetscErrorCode begin_barrier(SbEffect e, SbSpace s, PetscReal t, PetscRea
   obstacle_works(b, &b->obstacle_power, &unused);
 
   /* friction with the forces of the start */
-  b->slip = dt > 0. && e->dynamic ? PetscMax(SLIP * dt, SLIP_LEAST) * m->size : SLIP_STATIC * m->size;
+  b->slip = e->dynamic ? PetscMax(SLIP * speed * dt, SLIP_LEAST * m->size) : SLIP_STATIC * m->size;
   b->nlag = 0;
   b->lag = 0.;
   PetscCall(SbBarrierFindFriction(b, PETSC_FALSE));
@@ -496,10 +547,11 @@ static PetscErrorCode save_barrier(SbEffect e, SbSpace s, PetscInt *n, PetscReal
   PetscFunctionBeginUser;
   PetscCallMPI(MPI_Comm_rank(s->comm, &rank));
   *n = 1;
-  PetscCall(PetscMalloc1(3, records));
+  PetscCall(PetscMalloc1(4, records));
   (*records)[0] = b->work;
   (*records)[1] = b->friction_loss;
   (*records)[2] = rank ? 0. : b->stiffer;
+  (*records)[3] = rank ? 0. : b->scale;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -507,6 +559,7 @@ static PetscErrorCode load_barrier(SbEffect e, SbSpace s, PetscReal t, const Pet
                                    const PetscReal records[])
 {
   Barrier *b = (Barrier *)e->data;
+  PetscReal scale = 0.;
   PetscMPIInt rank;
 
   PetscFunctionBeginUser;
@@ -515,11 +568,13 @@ static PetscErrorCode load_barrier(SbEffect e, SbSpace s, PetscReal t, const Pet
   PetscCallMPI(MPI_Comm_rank(s->comm, &rank));
   b->work = b->friction_loss = b->stiffer = 0.;
   for (PetscInt i = 0; i < n; i++) {
-    b->stiffer += records[3 * i + 2];
+    b->stiffer += records[4 * i + 2];
+    scale += records[4 * i + 3];
     if (rank) continue;
-    b->work += records[3 * i];
-    b->friction_loss += records[3 * i + 1];
+    b->work += records[4 * i];
+    b->friction_loss += records[4 * i + 1];
   }
+  if (scale > 0. && b->width == 0.) set_scale(e, scale);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -601,6 +656,8 @@ PetscErrorCode SbBarrierCreate(SbEffect e, const SbScope *scope, const SbBarrier
                   .scale_restitution = scene->restitution > 0. ? SbEffectScaleRestitution_Barrier : NULL,
                   .potential = SbEffectPotential_Barrier,
                   .hessian = SbEffectHessian_Barrier,
+                  .gap_forces = SbEffectGapForces_Barrier,
+                  .scale_width = scale_width_barrier,
                   .accept = accept_barrier,
                   .work = work_barrier,
                   .save = save_barrier,
@@ -615,7 +672,7 @@ PetscErrorCode SbBarrierCreate(SbEffect e, const SbScope *scope, const SbBarrier
   e->linear = e->steady = PETSC_FALSE;
   e->saddle = PETSC_FALSE;
   e->springs = (PetscBool)(scene->friction > 0.);
-  e->nstate = 3;
+  e->nstate = 4;
   e->column = scene->obstacle ? obstacle : bodies;
   e->ncolumn = scene->obstacle ? PETSC_STATIC_ARRAY_LENGTH(obstacle) : PETSC_STATIC_ARRAY_LENGTH(bodies);
   PetscFunctionReturn(PETSC_SUCCESS);

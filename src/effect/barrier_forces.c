@@ -120,6 +120,35 @@ static void spread(const Barrier *b, PetscInt n, const PetscInt vertex[], PetscR
   }
 }
 
+/*
+  With the width w a gap g in balance is in proportion to it, and so is by how much the state is off: (K + H) w du/dw = sum b'' g n, H the second derivative of the barrier. Its sign does
+  not matter here.
+*/
+PetscErrorCode SbEffectGapForces_Barrier(SbEffect e, SbSpace s, const PetscReal u[], PetscReal f[],
+                                         PetscReal *bound)
+{
+  Barrier *b = (Barrier *)e->data;
+
+  PetscFunctionBeginUser;
+  (void)s;
+  *bound = 0.;
+  PetscCall(SbBarrierLook(b, u));
+  for (PetscInt i = 0; i < b->nactive; i++) {
+    const Active *a = &b->active[i];
+    const SbContactPair *pair = &b->pairs->pair[a->pair];
+    PetscReal d[3], energy, gradient[12];
+    const PetscReal force = SbBarrierPush(b, a, &energy, gradient);
+
+    SbBarrier(a->gap, width_of(b, pair), pressure_of(b, pair), pair->area, d);
+    if (d[0] <= 0.) continue;
+    if (counts(b, pair)) *bound += 0.5 * force * a->gap;
+    for (int k = 0; k < 12; k++)
+      gradient[k] = energy / d[0] * d[2] * a->gap * a->at.weight[k / 3] * a->at.n[k % 3];
+    spread(b, pair->side ? 1 : 4, pair->v, 1., gradient, f);
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* f += sign times the gradient of all energies at the places known, N; their sum over the pairs that this rank counts, J. */
 PetscReal SbBarrierGradient(const Barrier *b, PetscReal sign, PetscReal f[])
 {

@@ -37,8 +37,11 @@ typedef struct {
   PetscErrorCode (*destroy)(SbEffect e);
   SbContactMesh mesh;
   SbContactPairs pairs;
-  PetscReal width, pressure;       /* as given; 0: by body */
-  PetscReal *w, *k;                /* [nbody+1] of each body, m, Pa; the obstacle's: none smaller */
+  PetscReal width, pressure; /* as given; 0: by body */
+  PetscReal *w, *k;          /* [nbody+1] of each body, m, Pa; the obstacle's: none smaller */
+  PetscReal scale;           /* of w: of what it is by default, 0..1 (-accuracy) */
+  PetscReal wider,
+    growth; /* by what factor it may grow when the next step begins, 0: it stays; and the energy of gaps with it, J */
   PetscBool verify, begun, looked; /* the run has begun; what is in each other was looked for */
   PetscReal *x, *u;        /* [nvertex][3] places, m; [nnode_owned][3] displacement that they belong to */
   PetscReal *start;        /* [nvertex][3] when the step began */
@@ -153,6 +156,8 @@ PetscErrorCode SbEffectScaleRestitution_Barrier(SbEffect e, PetscReal share);
 PetscErrorCode SbEffectForce_Barrier(SbEffect e, SbSpace s, const SbStage *stage, PetscReal f[]);
 PetscErrorCode SbEffectPotential_Barrier(SbEffect e, SbSpace s, const PetscReal u[], PetscReal *energy,
                                          PetscReal f[]);
+PetscErrorCode SbEffectGapForces_Barrier(SbEffect e, SbSpace s, const PetscReal u[], PetscReal f[],
+                                         PetscReal *bound);
 PetscErrorCode SbEffectHessian_Barrier(SbEffect e, SbSpace s, const PetscReal u[], SbContactHessian kind,
                                        SbBlocks *blocks);
 PetscErrorCode SbEffectContactForce_Barrier(SbEffect e, SbSpace s, const SbStage *stage, const PetscReal r[],

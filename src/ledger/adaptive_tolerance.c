@@ -3,6 +3,8 @@
 
   -accuracy e: steps are as long as the integrator's loss allows, which is shared out over the run (TSAdapt, error per unit of time), and the
   solves leave a tenth of e, which the estimate of each step holds them to. The mesh is as it is.
+  Contact that keeps a gap leaves half of e: the width below which surfaces push each other follows the error of its gaps, which is in proportion to it. A width becomes smaller at once, and the step is
+  solved again; it becomes larger only between steps and as far as what the gaps store hardly grows by that, as bodies would be thrown apart. Contact need not be better than a tenth of the mesh's error.
 
   -step_time_budget s: the time step is yours. Solves are looser when a step took longer than s, and tighter when it took less than half of it. What they do
   depends on the machine, and no two runs are the same.
@@ -13,6 +15,12 @@
 
 #define SOLVERS 0.1 /* of the accuracy is left to solves */
 #define STEPS 0.7   /* of it to the integrator */
+#define GAPS 0.5    /* of it to contact that keeps a gap */
+#define MESH 0.1    /* of the mesh's error, that contact may have */
+#define AIM 0.5     /* of what is allowed, that a new width goes for */
+#define ROOM 0.1    /* of what is allowed: below, a width may grow */
+#define GROWTH \
+  0.01 /* of the energy of the error that is allowed: by how much the energy of gaps may grow with a width */
 #define LOOSEST 0.3 /* relative residual */
 #define TIGHTEST 1e-12
 #define NOISE 4.      /* times what a solve leaves */
@@ -103,6 +111,39 @@ PetscErrorCode SbAdaptiveToleranceAttach(SbLedger l)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Holds the gaps of contact to their share; `again`: the step has to be solved with the new width. */
+static PetscErrorCode update_widths(SbLedger l, const SbSolvedStep *step, PetscBool *again)
+{
+  PetscReal allowed = GAPS * l->accuracy * PetscSqrtReal(l->stored), error, mesh = 0.;
+  PetscBool changed;
+
+  PetscFunctionBeginUser;
+  if (!(allowed > 0.)) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(SbEstimateGaps(l, step->U, ROOM * allowed, &error));
+  if (!(error > 0.)) PetscFunctionReturn(PETSC_SUCCESS);
+  if (error < ROOM * allowed) {
+    PetscCall(SbModelScaleWidths(l->run->model, PetscMin(3., AIM * allowed / error),
+                                 step->V ? GROWTH * PetscSqr(allowed) : PETSC_MAX_REAL, &changed));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  if (error <= allowed) PetscFunctionReturn(PETSC_SUCCESS);
+
+  /* too large, unless the mesh is worse by far */
+  PetscCall(SbSpaceEstimateCompute(l->space, step->t + step->dt, step->U, step->V, step->A));
+  for (PetscInt b = 0; b < l->run->model->nbody; b++) mesh += l->space->body2[b];
+  mesh = PetscSqrtReal(mesh);
+  allowed = PetscMax(allowed, MESH * mesh);
+  if (error <= allowed) {
+    l->mesh_bounds = PETSC_TRUE;
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  PetscCall(SbModelScaleWidths(l->run->model, AIM * allowed / error, 0., &changed));
+  l->narrowed += changed;
+  l->width_bounds = (PetscBool)(l->width_bounds || !changed);
+  *again = (PetscBool)(*again || changed);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode SbAdaptiveToleranceUpdate(SbLedger l, const SbSolvedStep *step, PetscBool *again)
 {
   const SbRun run = l->run;
@@ -117,14 +158,17 @@ PetscErrorCode SbAdaptiveToleranceUpdate(SbLedger l, const SbSolvedStep *step, P
     PetscCall(SbModelEnergies(l->run->model, step->U, step->V, &e));
     l->stored = PetscMax(l->stored, e.strain + (step->V ? e.kinetic : 0.));
   }
+  if (step->solved && run->model->npotential) PetscCall(update_widths(l, step, again));
   if (!l->may_tune || !step->solved) PetscFunctionReturn(PETSC_SUCCESS);
   allowed = SOLVERS * l->accuracy * PetscSqrtReal(l->stored) * part;
   left = left_by_solves(l);
   if (!(left > 0.) || !(allowed > 0.)) PetscFunctionReturn(PETSC_SUCCESS);
   if (left > allowed) {
     /* a little too much in one step of many is made up for by the next */
-    *again = (PetscBool)(l->rtol > TIGHTEST && left > (step->V ? 3. : 1.) * allowed);
-    l->repeats += *again;
+    if (l->rtol > TIGHTEST && left > (step->V ? 3. : 1.) * allowed) {
+      *again = PETSC_TRUE;
+      l->repeats++;
+    }
     PetscCall(SbAdaptiveToleranceSet(l, l->rtol * PetscMax(1e-3, 0.3 * allowed / left)));
   } else if (left < 0.1 * allowed)
     PetscCall(SbAdaptiveToleranceSet(l, l->rtol * PetscMin(3., 0.3 * allowed / left)));

@@ -28,8 +28,8 @@ static const SbOption rows[] = {
    "direction of ledger_quantity displacement and reaction; its length does not matter"},
   {"ledger_on", SB_OPTION_STRING, 1, "", "", "", "set whose prescribed nodes make ledger_quantity reaction"},
   {"accuracy", SB_OPTION_REAL, 1, "", "0", "[0, 1)",
-   "relative error in the norm of the energy that the run aims at: sets steps and tolerances; 0: they are "
-   "yours"},
+   "relative error in the norm of the energy that the run aims at: sets steps, tolerances and the width of "
+   "response barrier; 0: they are yours"},
   {"step_time_budget", SB_OPTION_REAL, 1, "s", "0", "[0, inf)",
    "wall time that a step may take: tolerances are as tight as it allows; 0: no limit"},
 };

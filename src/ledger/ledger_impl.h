@@ -65,9 +65,12 @@ struct _p_SbLedger {
     residuals; /* of the estimates on this rank: all, in linear solves, in residuals */
 
   /* adaptive_tolerance.c */
-  PetscBool may_tune;             /* tolerances are the program's */
-  PetscReal rtol;                 /* that the solves aim at */
-  PetscInt repeats;               /* solves that were repeated for their accuracy */
+  PetscBool may_tune; /* tolerances are the program's */
+  PetscReal rtol;     /* that the solves aim at */
+  PetscInt repeats;   /* solves that were repeated for their accuracy */
+  PetscInt narrowed;  /* widths of contact that were */
+  PetscBool mesh_bounds,
+    width_bounds; /* contact was left worse than its share: the mesh is worse by far; widths are given or as small as can be */
   PetscInt nstep, nkept;          /* of -step_time_budget: steps, and those that took no longer */
   PetscReal wall, longest, total; /* at the last step; s */
 };
@@ -91,6 +94,8 @@ PetscErrorCode SbEstimateSolver(SbLedger l, const SbSolvedStep *step);
 PetscErrorCode SbEstimateRounding(SbLedger l, PetscReal t, Vec U, PetscReal *error);
 /* estimate_contact.c: J^(1/2). Collective. */
 PetscErrorCode SbEstimateContact(SbLedger l, const SbStep *step, PetscReal *error);
+/* What the gaps of guarded contact at U are in error by, or a bound of it that is less than `enough`, J^(1/2). Collective. */
+PetscErrorCode SbEstimateGaps(SbLedger l, Vec U, PetscReal enough, PetscReal *error);
 
 /* adaptive_tolerance.c */
 PetscErrorCode SbAdaptiveToleranceSetFromOptions(SbLedger l);

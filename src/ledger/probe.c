@@ -21,11 +21,15 @@ PetscErrorCode SbProbeLength(SbLedger l, Vec D, PetscReal *length)
 PetscErrorCode SbProbeSolve(SbLedger l, PetscReal rtol, Vec B, Vec X, PetscInt *its)
 {
   PetscReal own_rtol, atol, dtol;
-  PetscInt max_it;
-  PetscBool warm;
+  PetscInt max_it, own_its;
+  PetscBool warm, solved;
   KSP ksp;
 
   PetscFunctionBeginUser;
+  l->solving -= MPI_Wtime();
+  PetscCall(SbRunSolveTangent(l->run, B, X, its ? its : &own_its, &solved));
+  l->solving += MPI_Wtime();
+  if (solved) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(SNESGetKSP(l->run->snes, &ksp));
   PetscCall(KSPGetTolerances(ksp, &own_rtol, &atol, &dtol, &max_it));
   PetscCall(KSPGetInitialGuessNonzero(ksp, &warm));

@@ -212,6 +212,12 @@ static void say_dial(SbLedger l, Words *w)
           "%stheir size. ",
           (double)(h * PetscPowReal(0.7 * l->accuracy / mesh, 1. / order_of_space(l))), (double)h,
           order_of_space(l) > 1. ? "the square of " : "");
+    if (l->narrowed)
+      say(w, "Widths of contact's barrier were made smaller for it %" PetscInt_FMT " times. ", l->narrowed);
+    if (l->mesh_bounds) say(w, "Contact was left at a tenth of the mesh's error, which hides less. ");
+    if (l->width_bounds)
+      say(w, "Contact was left worse than its share: -effect_..._barrier_width is given, or rounding allows "
+             "no smaller one. ");
   }
   if (l->budget > 0. && l->nstep) {
     say(w,

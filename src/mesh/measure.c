@@ -127,3 +127,15 @@ PetscErrorCode SbMeshFileMeasure(SbImport *im, SbMeshFacts *facts)
   facts->max_dihedral = acos(PetscMax(-1, min_cosine)) * 180 / PETSC_PI;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
+
+PetscReal SbBodySmallest(PetscInt nbody, const SbBody body[])
+{
+  PetscReal size = PETSC_MAX_REAL;
+
+  for (PetscInt b = 0; b < nbody; b++) {
+    const PetscReal *box = body[b].bbox, r[3] = {box[3] - box[0], box[4] - box[1], box[5] - box[2]};
+
+    size = PetscMin(size, PetscSqrtReal(r[0] * r[0] + r[1] * r[1] + r[2] * r[2]));
+  }
+  return size;
+}

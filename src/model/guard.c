@@ -205,6 +205,34 @@ PetscErrorCode SbModelGuardStart(SbModel m, PetscReal t, PetscReal dt, Vec U)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/*
+  The speed V of a step from t to t + dt, m/s, by which tolerances of guarded contact are judged in any units: m V^2 / 2 is the energy that bodies of the mass m have when it begins,
+  of motion and of strain, and half of what all loads together do over the size of the smallest body.
+*/
+static PetscErrorCode step_speed(SbModel m, PetscReal t, PetscReal dt, Vec U, Vec V, PetscReal *speed)
+{
+  const SbSpace s = m->space;
+  SbStage stage = {.t = t + dt, .shift_k = 1.};
+  PetscReal load = 0., *f;
+  SbEnergies energies;
+
+  PetscFunctionBeginUser;
+  PetscCall(SbModelEnergies(m, U, V, &energies));
+  if (PetscIsInfOrNanReal(energies.strain)) energies.strain = 0.;
+  PetscCall(PetscMalloc1(3 * s->nnode, &f));
+  PetscCall(SbSpaceGetLocalRead(s, U, &stage.u));
+  PetscCall(SbSpaceGetLocalRead(s, V, &stage.v));
+  PetscCall(SbModelExternalForces(m, &stage, PETSC_TRUE, 1., f));
+  PetscCall(SbSpaceRestoreLocalRead(s, V, &stage.v));
+  PetscCall(SbSpaceRestoreLocalRead(s, U, &stage.u));
+  for (PetscInt i = 0; i < s->nnode_owned; i++) load += PetscSqrtReal(SbDot3(f + 3 * i, f + 3 * i));
+  PetscCall(PetscFree(f));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &load, 1, MPIU_REAL, MPI_SUM, m->comm));
+  *speed = PetscSqrtReal(
+    (2. * (energies.kinetic + energies.strain) + load * SbBodySmallest(m->nbody, m->body)) / m->mass);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode SbModelGuardBegin(SbModel m, PetscReal t, PetscReal dt, Vec U0, Vec V0)
 {
   PetscBool moved = PETSC_FALSE;
@@ -212,11 +240,13 @@ PetscErrorCode SbModelGuardBegin(SbModel m, PetscReal t, PetscReal dt, Vec U0, V
   Vec local;
 
   PetscFunctionBeginUser;
+  m->guard_speed = 0.;
+  if (V0) PetscCall(step_speed(m, t, dt, U0, V0, &m->guard_speed));
   PetscCall(open_state(m, U0, &local, &u));
   for (PetscInt e = 0; e < m->npotential; e++) {
     PetscBool mine;
 
-    SbEffectCall(m->potential[e], begin_guarded, m->space, t, dt, u, &mine);
+    SbEffectCall(m->potential[e], begin_guarded, m->space, t, dt, m->guard_speed, u, &mine);
     moved = (PetscBool)(moved || mine);
   }
   PetscCall(close_state(m, U0, moved, &local, &u));
@@ -346,6 +376,45 @@ PetscErrorCode SbModelGuardGradient(SbModel m, Vec U, PetscReal scale, PetscBool
   PetscCall(VecRestoreArray(F, &out));
   PetscCall(PetscFree(f));
   if (energy) PetscCallMPI(MPI_Allreduce(&sum, energy, 1, MPIU_REAL, MPI_SUM, m->comm));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbModelGapForces(SbModel m, Vec U, Vec F, PetscReal *bound)
+{
+  const SbSpace s = m->space;
+  PetscReal *f;
+  const PetscReal *u;
+  PetscScalar *out;
+
+  PetscFunctionBeginUser;
+  *bound = 0.;
+  PetscCall(PetscCalloc1(3 * s->nnode, &f));
+  PetscCall(SbSpaceGetLocalRead(s, U, &u));
+  for (PetscInt e = 0; e < m->npotential; e++) {
+    PetscReal mine;
+
+    SbEffectCall(m->potential[e], gap_forces, s, u, f, &mine);
+    *bound += mine;
+  }
+  PetscCall(SbSpaceRestoreLocalRead(s, U, &u));
+  PetscCall(VecGetArray(F, &out));
+  for (PetscInt i = 0; i < 3 * s->nnode_owned; i++) out[i] = s->fixed[i / 3] & (1 << (i % 3)) ? 0. : f[i];
+  PetscCall(VecRestoreArray(F, &out));
+  PetscCall(PetscFree(f));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, bound, 1, MPIU_REAL, MPI_SUM, m->comm));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbModelScaleWidths(SbModel m, PetscReal factor, PetscReal growth, PetscBool *changed)
+{
+  PetscFunctionBeginUser;
+  *changed = PETSC_FALSE;
+  for (PetscInt e = 0; e < m->npotential; e++) {
+    PetscBool mine;
+
+    SbEffectCall(m->potential[e], scale_width, factor, growth, &mine);
+    *changed = (PetscBool)(*changed || mine);
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -4,7 +4,7 @@
   Set-up sorts the effects into one list per operation. An evaluation walks the lists; with no effects it walks empty
   ones. In a static run there is no M and no C, and loads and prescribed displacements are multiplied by the load factor.
 */
-#include "sbmodel.h"
+#include "model_impl.h"
 #include "sblog.h"
 
 PetscErrorCode SbModelDestroy(SbModel *model)
@@ -189,9 +189,8 @@ static inline PetscReal load_factor(SbModel m, SbEffect e)
   return e->steady ? m->load : 1.;
 }
 
-/* f = sign * f_ext; apart: without guarded contact. */
-static PetscErrorCode external_forces(SbModel m, const SbStage *stage, PetscBool apart, PetscReal sign,
-                                      PetscReal f[])
+PetscErrorCode SbModelExternalForces(SbModel m, const SbStage *stage, PetscBool apart, PetscReal sign,
+                                     PetscReal f[])
 {
   const PetscInt n = 3 * m->space->nnode;
 
@@ -238,7 +237,7 @@ PetscErrorCode SbModelResidual(SbModel m, PetscReal t, Vec U, Vec V, Vec A, Pets
   PetscFunctionBeginUser;
   PetscCall(stage_begin(m, t, U, V, A, &stage));
   PetscCall(SbSpaceGetLocalWrite(m->space, F, &f));
-  PetscCall(external_forces(m, &stage, (PetscBool)(constrain && m->guard_apart), -1., f));
+  PetscCall(SbModelExternalForces(m, &stage, (PetscBool)(constrain && m->guard_apart), -1., f));
   PetscCall(SbSpaceAddInternalForce(m->space, &stage, f));
   if (A || V) PetscCall(SbSpaceAddInertia(m->space, &stage, f));
   if (constrain) constrain_residual(m->space, f);
@@ -257,7 +256,7 @@ PetscErrorCode SbModelLoads(SbModel m, PetscReal t, Vec U, Vec V, Vec F)
   PetscFunctionBeginUser;
   PetscCall(stage_begin(m, t, U, V, NULL, &stage));
   PetscCall(SbSpaceGetLocalWrite(m->space, F, &f));
-  PetscCall(external_forces(m, &stage, PETSC_FALSE, 1., f));
+  PetscCall(SbModelExternalForces(m, &stage, PETSC_FALSE, 1., f));
   PetscCall(SbSpaceRestoreLocalWrite(m->space, F, &f));
   PetscCall(stage_end(m, U, V, NULL, &stage));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -36,9 +36,9 @@
 #define APPROACHES 50   /* steps in which what moves by order has to arrive */
 #define DIFFERENCE 1e-7 /* of that motion, for its derivative */
 #define SETTLED \
-  1e-3 /* of the smallest body's size per second: a step of a time step that is short enough, where surfaces push each other */
+  1e-4 /* of the speed of the time step (src/model/guard.c): a step that is short enough, where surfaces push each other */
 #define STICKING 1e-2       /* of that, with friction, whose forces follow from as small speeds */
-#define SETTLED_STATIC 1e-6 /* of that size: the same in a static run */
+#define SETTLED_STATIC 1e-6 /* of the smallest body's size: the same in a static run */
 #define SETTLED_LEAST \
   1e-8 /* of that size: no step of a whole time step need be shorter, however short these are */
 #define SETTLED_GAP \
@@ -436,35 +436,30 @@ static PetscErrorCode converged(SNES snes, PetscReal s)
 {
   Newton *n = (Newton *)snes->data;
   const SbRun run = n->run;
-  PetscReal longest, size = PETSC_MAX_REAL, width = PETSC_MAX_REAL,
-                     part = run->model->dynamic ? SETTLED * run->guard_dt : SETTLED_STATIC;
+  const SbModel m = run->model;
+  const PetscReal size = SbBodySmallest(m->nbody, m->body);
+  PetscReal longest, width = PETSC_MAX_REAL, enough;
 
   PetscFunctionBeginUser;
   if (!n->nblock) {
     PetscCall(SbSNESConverged(snes, snes->iter, snes->xnorm, snes->ynorm, snes->norm));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
-  for (PetscInt b = 0; b < run->model->nbody; b++) {
-    const PetscReal *box = run->model->body[b].bbox,
-                    r[3] = {box[3] - box[0], box[4] - box[1], box[5] - box[2]};
-
-    size = PetscMin(size, PetscSqrtReal(SbDot3(r, r)));
-  }
-  for (PetscInt e = 0; e < run->model->npotential; e++) {
-    if (run->model->potential[e]->springs) {
-      part *= STICKING;
+  enough = m->dynamic ? SETTLED * m->guard_speed * run->guard_dt : SETTLED_STATIC * size;
+  for (PetscInt e = 0; e < m->npotential; e++) {
+    if (m->potential[e]->springs) {
+      enough *= STICKING;
       break;
     }
   }
-  for (PetscInt e = 0; e < run->model->npotential; e++)
-    width = PetscMin(width, run->model->potential[e]->width);
-  if (run->model->dynamic) part = PetscMax(part, SETTLED_LEAST * run->guard_dt / run->dt);
-  size = PetscMin(size, SETTLED_GAP * width / part);
+  for (PetscInt e = 0; e < m->npotential; e++) width = PetscMin(width, m->potential[e]->width);
+  if (m->dynamic) enough = PetscMax(enough, SETTLED_LEAST * size * run->guard_dt / run->dt);
+  enough = PetscMin(enough, SETTLED_GAP * width);
   PetscCall(VecNorm(snes->vec_sol_update, NORM_INFINITY, &longest));
   PetscCall(PetscInfo(snes,
                       "iteration %" PetscInt_FMT ": the longest step is %g m, of %g m for the last one\n",
-                      snes->iter, (double)longest, (double)(part * size)));
-  if (s == 1. && longest <= part * size) snes->reason = SNES_CONVERGED_SNORM_RELATIVE;
+                      snes->iter, (double)longest, (double)enough));
+  if (s == 1. && longest <= enough) snes->reason = SNES_CONVERGED_SNORM_RELATIVE;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -535,6 +530,23 @@ static PetscErrorCode SNESSolve_Newton(SNES snes)
       PetscCall(VecNorm(F, NORM_2, &snes->norm));
     }
   }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbRunSolveTangent(SbRun run, Vec B, Vec X, PetscInt *iterations, PetscBool *solved)
+{
+  Newton *n;
+  KSPConvergedReason reason;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscObjectTypeCompare((PetscObject)run->snes, SB_SNES_NEWTON, solved));
+  if (!*solved) PetscFunctionReturn(PETSC_SUCCESS);
+  n = (Newton *)run->snes->data;
+  *solved = (PetscBool)(n->nblock > 0);
+  if (!*solved) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(SbContactSystemSolve(n->system, run->snes->jacobian_pre, &n->blocks, PETSC_FALSE, B, X, &reason,
+                                 iterations));
+  if (reason < 0) PetscCall(VecZeroEntries(X));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

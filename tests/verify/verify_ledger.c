@@ -1,8 +1,8 @@
 // @ranks 1 2
 /*
   Effectivity of the ledger's estimates, estimate over true error in the norm of the energy: of time steps on a bar that oscillates, by every
-  integrator and with damping; of solves that stop early, linear and Newton's; of springs in contact. And: a ledger changes no result, the same
-  estimates on any number of ranks, and -accuracy is met.
+  integrator and with damping; of solves that stop early, linear and Newton's; of springs and of a barrier's gaps in contact. And: a ledger changes no result, the same
+  estimates on any number of ranks, and -accuracy is met, also where contact is the largest error.
   The true error of a step size is that against the same run with steps 32 times as short by Newmark's method, of a solve that against the one
   solved to rounding.
 */
@@ -15,19 +15,17 @@
 /* The norm of the energy of the difference of two states of the model, whose law is linear or nearly so between them. */
 static PetscErrorCode distance(SbModel m, Vec U, Vec V, Vec U1, Vec V1, PetscReal *error)
 {
-  PetscReal form, mass = 0., all;
+  PetscReal form, slope[2], unused, mass = 0., all;
+  PetscInt inverted;
   const PetscScalar *v;
-  Vec D, R, R1;
+  Vec D;
 
   PetscFunctionBeginUser;
   PetscCall(VecDuplicate(U, &D));
-  PetscCall(VecDuplicate(U, &R));
-  PetscCall(VecDuplicate(U, &R1));
-  PetscCall(SbModelResidual(m, 1., U, NULL, NULL, PETSC_FALSE, R));
-  PetscCall(SbModelResidual(m, 1., U1, NULL, NULL, PETSC_FALSE, R1));
-  PetscCall(VecAXPY(R1, -1., R));
   PetscCall(VecWAXPY(D, -1., U, U1));
-  PetscCall(VecDot(D, R1, &form));
+  PetscCall(SbModelStrainEnergyAlong(m, U, D, &unused, &slope[0], &inverted));
+  PetscCall(SbModelStrainEnergyAlong(m, U1, D, &unused, &slope[1], &inverted));
+  form = slope[0] - slope[1]; /* of -D */
   if (V) {
     PetscCall(VecWAXPY(D, -1., V, V1));
     PetscCall(VecGetArrayRead(D, &v));
@@ -37,8 +35,6 @@ static PetscErrorCode distance(SbModel m, Vec U, Vec V, Vec U1, Vec V1, PetscRea
   PetscCallMPI(MPI_Allreduce(&mass, &all, 1, MPIU_REAL, MPI_SUM, m->comm));
   *error = PetscSqrtReal(0.5 * (PetscAbsReal(form) + all));
   PetscCall(VecDestroy(&D));
-  PetscCall(VecDestroy(&R));
-  PetscCall(VecDestroy(&R1));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -252,6 +248,64 @@ static PetscErrorCode dials(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/*
+  A block between rollers and a plate, which is driven by a hundredth of the height onto it: uniform strain, no error but the gaps, whose part of the way is that of force and state. And a ball that
+  is pressed into a block against the same with a tiny width: the error is what is asked for, or a tenth of the mesh's.
+*/
+static PetscErrorCode gaps(void)
+{
+  static const char plate[] =
+    "-bodies block -body_block_mesh box:0.1,0.1,0.05:4 -body_block_material linear -body_block_young 1e5 "
+    "-body_block_poisson 0.3 -sets left,front,low -set_left_at plane:1,0,0,0 -set_front_at plane:0,1,0,0 "
+    "-set_low_at plane:0,0,1,0 -effects x,y,z,tool -effect_x_type fixed -effect_x_on left "
+    "-effect_x_components x -effect_y_type fixed -effect_y_on front -effect_y_components y -effect_z_type "
+    "fixed -effect_z_on low -effect_z_components z -effect_tool_type contact -effect_tool_response barrier "
+    "-effect_tool_obstacle plane:0,0,-1,-0.0505 -effect_tool_displacement 0;0;-0.001*t -time static ";
+  static const char ball[] =
+    "-bodies block -body_block_mesh box:0.1,0.1,0.05:4 -body_block_material linear -body_block_young 1e5 "
+    "-body_block_poisson 0.3 -effects hold,tool -effect_hold_type fixed -effect_hold_on zmin "
+    "-effect_tool_type contact -effect_tool_response barrier -effect_tool_on zmax -time static "
+    "-effect_tool_obstacle sphere:0.05,0.05,0.0905,0.04 -effect_tool_displacement 0;0;-0.0035*t ";
+  static const PetscReal asked[] = {1e-2, 1e-3};
+  const PetscReal exact = 0.5 * 1e5 * 0.01 * PetscSqr(0.0005 / 0.05) * 0.05; /* strain energy, J */
+  TestScene t, reference;
+  SbEnergies energies;
+  PetscReal width = 0.;
+
+  PetscFunctionBeginUser;
+  PetscCall(verify_open(&reference, "%s -effect_tool_barrier_width 1e-6", ball));
+  PetscCall(verify_solve(&reference, "ball"));
+  for (int i = 0; i < 2; i++) {
+    PetscReal error, mesh, stored;
+
+    PetscCall(verify_open(&t, "%s -accuracy %g", plate, (double)asked[i]));
+    PetscCall(verify_solve(&t, "plate"));
+    PetscCall(SbModelEnergies(t.model, t.run->U, NULL, &energies));
+    error = PetscSqrtReal(energies.strain / exact) - 1.; /* of strain, and so of force */
+    PetscCall(PetscPrintf(PETSC_COMM_WORLD, "  plate, -accuracy %g: force off by %.1e, width %.1e m\n",
+                          (double)asked[i], (double)error, (double)t.model->potential[0]->width));
+    SB_CHECK(error > 0.02 * asked[i] && error < asked[i], "plate, -accuracy %g: force off by %g",
+             (double)asked[i], (double)error);
+    SB_CHECK(!i || t.model->potential[0]->width < 0.2 * width, "width %g, then %g m", (double)width,
+             (double)t.model->potential[0]->width);
+    width = t.model->potential[0]->width;
+    PetscCall(test_scene_close(&t));
+
+    PetscCall(verify_open(&t, "%s -accuracy %g", ball, (double)asked[i]));
+    PetscCall(verify_solve(&t, "ball"));
+    PetscCall(distance(reference.model, reference.run->U, reference.run->V, t.run->U, t.run->V, &error));
+    PetscCall(SbLedgerGet(t.ledger, SB_ERROR_SPACE, &mesh, &stored));
+    PetscCall(PetscPrintf(PETSC_COMM_WORLD, "  ball, -accuracy %g: contact off by %.1e, mesh by %.1e\n",
+                          (double)asked[i], (double)(error / PetscSqrtReal(stored)),
+                          (double)(mesh / PetscSqrtReal(stored))));
+    SB_CHECK(error < PetscMax(asked[i] * PetscSqrtReal(stored), 0.1 * mesh), "ball, -accuracy %g: %g",
+             (double)asked[i], (double)(error / PetscSqrtReal(stored)));
+    PetscCall(test_scene_close(&t));
+  }
+  PetscCall(test_scene_close(&reference));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 int main(int argc, char **argv)
 {
   SB_TEST_BEGIN(argc, argv);
@@ -263,5 +317,6 @@ int main(int argc, char **argv)
   PetscCall(spectator("-body_bar_material corotated -ts_dt 0.01 -ts_max_time 0.1"));
   PetscCall(spectator("-body_bar_material corotated -time genalpha -ts_dt 0.01 -ts_max_time 0.1"));
   PetscCall(dials());
+  PetscCall(gaps());
   SB_TEST_END();
 }

@@ -6,6 +6,8 @@
   largest (turned: 1e-9). Tolerances, initial guesses, step control and the choice of the explicit step are the
   program's own: none of them may have a unit or a direction, nor may the face terms of CR and DG. Newton's tolerance alone is made smaller: the preconditioner
   works in single precision, and what it leaves in the answer has a direction.
+
+  Contact by the barrier, a block that slides to rest with friction and two that meet in flight: as many iterations in m kg s, mm t s, m kg ms and cm g us, and the same displacements to CONTACT.
 */
 #include "verify.h"
 
@@ -143,6 +145,68 @@ static PetscErrorCode check(const char *element, const char *law, const char *ti
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+#define CONTACT \
+  1e-9 /* of the largest: rounding, which each impact and each change between sticking and sliding enlarges; seen are 1e-11 */
+
+static PetscErrorCode contact(const char *what, PetscReal speed, PetscReal friction, PetscReal seconds)
+{
+  static const Units units[] = {{"m, kg, s", 1., 1., 1., 0., 0.},
+                                {"mm, t, s", 1e3, 1e-3, 1., 0., 0.},
+                                {"m, kg, ms", 1., 1., 1e3, 0., 0.},
+                                {"cm, g, us", 1e2, 1e3, 1e6, 0., 0.}};
+  PetscReal *first = NULL, *u;
+  PetscInt newton = 0;
+
+  PetscFunctionBeginUser;
+  PetscCall(PetscPrintf(PETSC_COMM_WORLD, "  %s:", what));
+  for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(units); i++) {
+    const Units *q = &units[i];
+    const double m = q->m, s = q->s, pa = q->kg / (m * s * s), rho = q->kg / (m * m * m);
+    char text[VERIFY_TEXT] = "-bodies low,high -effects gravity,floor,meet -time euler_implicit ";
+    PetscReal difference;
+    TestScene t;
+    PetscInt n;
+
+    for (int b = 0; b < 2; b++) {
+      const char *name = b ? "high" : "low";
+
+      PetscCall(add(text,
+                    "-body_%s_mesh box:%.17g,%.17g,%.17g:2 -body_%s_young %.17g -body_%s_poisson 0.3 "
+                    "-body_%s_density %.17g -body_%s_material neohookean ",
+                    name, 0.1 * m, 0.1 * m, 0.1 * m, name, 1e5 * pa, name, name, 1e3 * rho, name));
+      PetscCall(add(text, "-body_%s_translate %.17g,%.17g,%.17g -body_%s_velocity %.17g,0,%.17g ", name,
+                    0.013 * b * m, 0.021 * b * m, (0.001 + 0.112 * b) * m, name,
+                    (b ? -0.5 : 1.) * speed * m / s, (b ? -1. : 0.) * speed * m / s));
+    }
+    PetscCall(add(text,
+                  "-effect_gravity_vector 0,0,%.17g -effect_floor_type contact -effect_meet_type contact "
+                  "-effect_floor_response barrier -effect_floor_obstacle plane:0,0,1,0 "
+                  "-effect_floor_friction %g -effect_meet_friction %g -ts_dt %.17g -ts_max_time %.17g",
+                  -9.81 * m / (s * s), (double)friction, (double)friction, 0.005 * s, seconds * s));
+    PetscCall(test_scene_open(text, &t));
+    PetscCall(verify_solve(&t, q->what));
+    n = 3 * verify_numbers(t.model);
+    PetscCall(verify_gather(t.model, t.run->U, &u));
+    for (PetscInt k = 0; k < n; k++) u[k] /= q->m;
+    difference = first ? verify_difference(n, first, u) : 0.;
+    if (!first) newton = t.run->newton_total;
+    PetscCall(PetscPrintf(PETSC_COMM_WORLD, "%s %s %d iterations, %.1e", first ? ";" : "", q->what,
+                          (int)t.run->newton_total, (double)difference));
+    SB_CHECK(t.run->newton_total == newton && t.run->rejected_total == 0,
+             "%s, %s: %d iterations, not %d; %d rejected steps", what, q->what, (int)t.run->newton_total,
+             (int)newton, (int)t.run->rejected_total);
+    SB_CHECK(difference <= CONTACT, "%s, %s: displacements differ by %g", what, q->what, (double)difference);
+    if (first)
+      PetscCall(PetscFree(u));
+    else
+      first = u;
+    PetscCall(test_scene_close(&t));
+  }
+  PetscCall(PetscPrintf(PETSC_COMM_WORLD, "\n"));
+  PetscCall(PetscFree(first));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 int main(int argc, char **argv)
 {
   SB_TEST_BEGIN(argc, argv);
@@ -160,5 +224,7 @@ int main(int argc, char **argv)
   PetscCall(check("cr", "corotated", "-time newmark -snes_rtol 1e-10 -solver direct", 0.05));
   PetscCall(check("dg", "stvk", "-time genalpha -snes_rtol 1e-10 -solver direct", 0.05));
   PetscCall(check("dg", "neohookean", "-time euler_symplectic", 0.002));
+  PetscCall(contact("friction", 0.3, 0.4, 0.1));
+  PetscCall(contact("impact", 5., 0., 0.05));
   SB_TEST_END();
 }
