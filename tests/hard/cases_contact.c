@@ -101,6 +101,7 @@ const HardCase HardCasesContact[] = {
   IMPACT("plate", "a thin plate", PLATE, "cr", 0),
   IMPACT("corner", "the floor with a corner", CORNER, "p1", 1),
   IMPACT("corner", "the floor with a corner", CORNER, "dg", 0),
+  IMPACT("plate", "a thin plate", PLATE, "p2", 0),
   {.name = "overlap.p1",
    .seconds = 600,
    .what = "two blocks begin half in each other, their sides in one plane, P1",

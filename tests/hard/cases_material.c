@@ -42,10 +42,12 @@ const HardCase HardCasesMaterial[] = {
   INCOMPRESSIBLE("p1", "neohookean", "2", "0.4", 0),
   INCOMPRESSIBLE("cr", "corotated", "1", "0.1", 0),
   INCOMPRESSIBLE("dg", "corotated", "1", "0.1 -solver pressure", 0),
+  INCOMPRESSIBLE("p2", "corotated", "1", "0.1", 0),
   INCLUSION("p1", "corotated", 1),
   INCLUSION("p1", "neohookean", 0),
   INCLUSION("cr", "corotated", 0),
   INCLUSION("dg", "corotated", 0),
+  INCLUSION("p2", "corotated", 0),
   {.name = "light.p1",
    .what = "density of 1e-9 kg/m^3 under traction, co-rotated, P1",
    .options = "-bodies a -body_a_mesh box:0.5,0.1,0.1:2 -body_a_density 1e-9 -body_a_young 1e5 "

@@ -75,5 +75,6 @@ const HardCase HardCasesRecovery[] = {
   RECOVERY("flat", FLAT, HardStartFlat, "cr", "corotated", "2", 1),
   RECOVERY("flat", FLAT, HardStartFlat, "cr", "neohookean", "2", 0),
   RECOVERY("flat", FLAT, HardStartFlat, "dg", "corotated", "2", 0),
+  RECOVERY("flat", FLAT, HardStartFlat, "p2", "corotated", "2", 0),
   {.name = NULL},
 };

@@ -175,8 +175,10 @@ const HardCase HardCasesSolver[] = {
   FREE("p1", "neohookean", 0),
   FREE("cr", "linear", 0),
   FREE("dg", "corotated", 0),
+  FREE("p2", "corotated", 0),
   PULLED("p1", "linear", 1),
   PULLED("p1", "corotated", 0),
   PULLED("cr", "linear", 0),
+  PULLED("p2", "linear", 0),
   {.name = NULL},
 };

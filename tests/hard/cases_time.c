@@ -41,6 +41,7 @@ const HardCase HardCasesTime[] = {
   COARSE("p1", "euler_implicit", "neohookean", 0),
   COARSE("cr", "euler_implicit", "corotated", 0),
   COARSE("dg", "euler_implicit", "corotated", 0),
+  COARSE("p2", "euler_implicit", "corotated", 0),
   {.name = "coarse.newmark.p1.linear",
    .what = "steps of 1 s, the period is 0.05 s; newmark, p1, linear",
    .options = CUBE TIGHT

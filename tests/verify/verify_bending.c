@@ -1,13 +1,13 @@
 // @ranks 1
 /*
-  Bending near nu = 1/2 with CR and DG, and with P1 beside them: the clamped bar under its weight and Cook's membrane
+  Bending near nu = 1/2 with CR, DG and P2, and with P1 beside them: the clamped bar under its weight and Cook's membrane
   (references: elements of high order, mixed at nu near 1/2). The penalty gamma1 is a compromise of both problems and of
   verify_locking.c; docs/reports/locking.md has finer meshes.
 */
 #include "locking.h"
 
-#define ELEMENTS 3
-static const char *const elements[ELEMENTS] = {"p1", "cr", "dg"};
+#define ELEMENTS 4
+static const char *const elements[ELEMENTS] = {"p1", "cr", "dg", "p2"};
 
 /* End displacement of the bar: n = 4 cells across, then 8 with CR alone where nu is large. */
 static PetscErrorCode check_bar(PetscReal nu, PetscReal tip, PetscReal energy)

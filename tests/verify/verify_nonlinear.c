@@ -336,12 +336,14 @@ int main(int argc, char **argv)
   PetscCall(check_orders("p1"));
   PetscCall(check_orders("cr"));
   PetscCall(check_orders("dg"));
+  PetscCall(check_orders("p2"));
   PetscCall(check_path("p1", "linear"));
   PetscCall(check_path("p1", "corotated"));
   PetscCall(check_path("p1", "stvk"));
   PetscCall(check_path("p1", "neohookean"));
   PetscCall(check_path("cr", "corotated"));
   PetscCall(check_path("dg", "neohookean"));
+  PetscCall(check_path("p2", "neohookean"));
   PetscCall(check_long_steps());
   PetscCall(check_adaptive("newmark"));
   PetscCall(check_adaptive("euler_implicit"));

@@ -1,17 +1,17 @@
 // @ranks 1
 /*
-  Large rotations with CR and DG: Turek and Hron's CSM1 and CSM2 (St. Venant-Kirchhoff, and co-rotated, which is the same to
+  Large rotations with CR, DG and P2: Turek and Hron's CSM1 and CSM2 (St. Venant-Kirchhoff, and co-rotated, which is the same to
   small strains), and the swinging bar at nu = 0.499: CR and DG agree, and approach a finer mesh. verify_twist.c has a
   twisted bar.
 */
 #include "locking.h"
 
-static const char *const elements[2] = {"cr", "dg"};
+static const char *const elements[3] = {"cr", "dg", "p2"};
 
 static PetscErrorCode check_beam(const char *what, PetscReal mu, PetscReal ux, PetscReal uy)
 {
   PetscFunctionBeginUser;
-  for (int e = 0; e < 2; e++) {
+  for (int e = 0; e < 3; e++) {
     for (int law = 0; law < 2; law++) {
       /* one mesh is enough for the laws' difference */
       for (PetscInt n = 2; n <= (law ? 2 : 4); n += 2) {
