@@ -187,6 +187,8 @@ PetscErrorCode SbSpaceGetRows(SbSpace space, Mat A, PetscInt n, const PetscInt n
   change; A itself when that is SBAIJ on one rank. Ask again after each assembly: the same matrix, with a new state.
 */
 PetscErrorCode SbProductGetSymmetric(Mat A, Mat *local);
+/* y -= the columns of other ranks of A times x. Collective. */
+PetscErrorCode SbProductSubtractOther(Mat A, Vec x, Vec y);
 /*
   SbMatRestoreRead - gives back the values of a matrix that were only read, by its own function, say MatSeqSBAIJRestoreArray.
 

@@ -111,6 +111,15 @@ PetscErrorCode SbPCCoarseGetStats(PC pc, PetscInt *naggregate, PetscInt *nsolved
                                   PetscBool *simple);
 
 /*
+  SbPCPMultigridCreate - makes pc multigrid in the degree of the polynomials for CG: Gauss-Seidel on P2, P1 on the vertices below it.
+
+  Collective. The operator is a BAIJ or SBAIJ matrix of the space, symmetric; the space is borrowed. The lower level is renewed whenever the
+  matrix has changed. An operator that is not positive definite fails the solve (KSP_DIVERGED_PC_FAILED). Options read: -pc_coarse_ (of the lower
+  level). Errors: PETSC_ERR_USER for a space without P2 bodies.
+*/
+PetscErrorCode SbPCPMultigridCreate(SbSpace space, PC pc);
+
+/*
   SbPressureOperatorCreate - the tangent of a space with CR or DG bodies, its volumetric part apart, so that a large lambda
   does no harm.
 

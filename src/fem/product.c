@@ -142,6 +142,20 @@ PetscErrorCode SbProductGetSymmetric(Mat A, Mat *local)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscErrorCode SbProductSubtractOther(Mat A, Vec x, Vec y)
+{
+  Product *p;
+
+  PetscFunctionBeginUser;
+  PetscCall(product_of(A, &p));
+  if (!p->other) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(VecScatterBegin(p->scatter, x, p->ghosts, INSERT_VALUES, SCATTER_FORWARD));
+  PetscCall(VecScatterEnd(p->scatter, x, p->ghosts, INSERT_VALUES, SCATTER_FORWARD));
+  PetscCall(VecScale(p->ghosts, -1.));
+  PetscCall(MatMultAdd(p->other, p->ghosts, y, y));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 static PetscErrorCode MatMult_Product(Mat A, Vec x, Vec y)
 {
   const PetscScalar *in;

@@ -5,10 +5,13 @@
 #include "sbassembly.h"
 #include "sbkernel.h"
 
-typedef enum { SB_GAUSS_SEIDEL_FORWARD, SB_GAUSS_SEIDEL_BACKWARD } SbGaussSeidelDirection;
-/* inverse[nnode_owned][9] of the diagonal blocks of a BAIJ or SBAIJ matrix of the space. Zero and *positive = false
-   where a determinant is not positive on this rank. Not collective. */
-PetscErrorCode SbGaussSeidelSetUp(SbSpace space, Mat A, PetscReal inverse[], PetscBool *positive);
-/* z = (D + L)^-1 r or (D + L^T)^-1 r on the part of this rank. z is not r. Not collective. */
-PetscErrorCode SbGaussSeidel(SbSpace space, Mat A, const PetscReal inverse[],
-                             SbGaussSeidelDirection direction, Vec r, Vec z);
+/* inverse[nnode_owned][9] of the diagonal blocks of a BAIJ or SBAIJ matrix of the space; with extra[nnode_owned][3], which is computed (NULL: without), on their diagonals: what
+   keeps sweeps convergent between ranks. Zero and *positive = false where a determinant is not positive on this rank. Not collective. */
+PetscErrorCode SbGaussSeidelSetUp(SbSpace space, Mat A, PetscReal inverse[], PetscReal extra[],
+                                  PetscBool *positive);
+/* z = (D + L^T)^-1 r, D and L of this rank's part, and t = r - A z. r, z and t are others. Collective. */
+PetscErrorCode SbGaussSeidelDown(SbSpace space, Mat A, const PetscReal inverse[], const PetscReal extra[],
+                                 Vec r, Vec z, Vec t);
+/* z += (D + L)^-1 (r - A z); t is for work. Collective. */
+PetscErrorCode SbGaussSeidelUp(SbSpace space, Mat A, const PetscReal inverse[], const PetscReal extra[],
+                               Vec r, Vec z, Vec t);

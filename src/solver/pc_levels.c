@@ -6,7 +6,7 @@
   only, as the energy of CR does, and d has a stiffness of its own. The two meet in the penalty of jumps alone, which is of
   the size of either: m by the cycle for CR, d by its diagonal.
 
-  CR: Gauss-Seidel forward, a correction by P1, Gauss-Seidel backward (between ranks: block Jacobi). A P1 function has at the
+  CR: Gauss-Seidel from the last row on, a correction by P1, Gauss-Seidel from the first one on (between ranks: block Jacobi). A P1 function has at the
   centroid of a face the mean of its values at the three vertices; its jumps vanish and its strains are the same, so the Galerkin
   product is P1's own matrix, which is assembled from the same blocks. A vertex of a face with a prescribed unknown is constrained.
   A DG cell that touches this rank's cells with a vertex only may have neighbours that are not here; its strain is that of its own
@@ -200,16 +200,11 @@ static PetscErrorCode cycle_faces(SbLevels v, Vec r, Vec z)
   Mat A = v->A[k];
 
   PetscFunctionBeginUser;
-  PetscCall(SbGaussSeidel(at, A, v->inverse, SB_GAUSS_SEIDEL_FORWARD, r, z));
-  PetscCall(MatMult(A, z, v->t[k]));
-  PetscCall(VecAYPX(v->t[k], -1., r));
+  PetscCall(SbGaussSeidelDown(at, A, v->inverse, NULL, r, z, v->t[k]));
   PetscCall(restrict_to_vertices(v, v->t[k]));
   PetscCall(KSPSolve(v->coarse, v->t[k + 1], v->w[k + 1]));
   PetscCall(add_from_vertices(v, z));
-  PetscCall(MatMult(A, z, v->t[k]));
-  PetscCall(VecAYPX(v->t[k], -1., r));
-  PetscCall(SbGaussSeidel(at, A, v->inverse, SB_GAUSS_SEIDEL_BACKWARD, v->t[k], v->w[k]));
-  PetscCall(VecAXPY(z, 1., v->w[k]));
+  PetscCall(SbGaussSeidelUp(at, A, v->inverse, NULL, r, z, v->t[k]));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -424,7 +419,7 @@ PetscErrorCode SbLevelsSetUp(SbLevels v, PetscBool *positive)
 {
   PetscFunctionBeginUser;
   if (v->n == 3) PetscCall(jump_stiffness(v));
-  PetscCall(SbGaussSeidelSetUp(v->at[v->n - 2], v->A[v->n - 2], v->inverse, positive));
+  PetscCall(SbGaussSeidelSetUp(v->at[v->n - 2], v->A[v->n - 2], v->inverse, NULL, positive));
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, positive, 1, SB_MPI_BOOL, MPI_LAND, v->space->comm));
   if (!*positive) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(KSPSetOperators(v->coarse, v->A[v->n - 1], v->A[v->n - 1]));

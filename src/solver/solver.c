@@ -19,6 +19,7 @@
 #define ROTATED 60000          /* turns with the nodes */
 #define ROTATED_SLIVERS 120000 /* also with slivers, up to NU_SLIVERS */
 #define DIRECT_P1 80000        /* is faster for P1 than iterations, from NU_LOCKED on */
+#define P_MULTIGRID 5000       /* is as fast as P2's multigrid, up to nu NU_SLIVERS */
 #define DIRECT_NEXT \
   200000 /* is faster with slivers, from NU_PRESSURE on, and the first to be tried after another solver */
 /* Poisson's ratio */
@@ -54,6 +55,8 @@ static const SbSolverPreset presets[] = {
   {"cg_two_level", SB_MATRIX_SBAIJ, "-ksp_type cg", .precondition = SbPCCoarseCreate,
    .help =
      "CG, incomplete Cholesky on each rank and the rigid-body modes of some hundred aggregates of nodes"},
+  {"cg_p_multigrid", SB_MATRIX_SBAIJ, "-ksp_type cg", .precondition = SbPCPMultigridCreate,
+   .help = "CG, Gauss-Seidel on P2 with P1 on the vertices below it: P2 bodies"},
   {"cg_gamg", SB_MATRIX_AIJ, "-ksp_type cg -pc_type gamg",
    .help = "CG, algebraic multigrid with the rigid-body modes of each body"},
   {"cg_hypre", SB_MATRIX_AIJ,
@@ -100,7 +103,8 @@ static const SbSolverPreset by_type[] = {
 
 static const SbOption rows[] = {
   {"solver", SB_OPTION_CHOICE, 1, "", "auto",
-   "auto|direct|cg|cg_jacobi|cg_pbjacobi|cg_icc|cg_ssor|cg_two_level|cg_gamg|cg_hypre|gauss_seidel|sor|"
+   "auto|direct|cg|cg_jacobi|cg_pbjacobi|cg_icc|cg_ssor|cg_two_level|cg_p_multigrid|cg_gamg|cg_hypre|gauss_"
+   "seidel|sor|"
    "cholmod|umfpack|mumps|rotated|realtime|pressure",
    "linear solver; auto chooses by size, ranks and material and says why, direct takes the fastest "
    "factorisation that this PETSc has for the problem. PETSc's -ksp_ and -pc_ options refine it"},
@@ -282,15 +286,25 @@ PetscErrorCode SbSolverChoose(SbSpace s, PetscBool dynamic, PetscBool linear, Pe
                             "dynamic, %" PetscInt_FMT
                             " unknowns: one factorisation turns with the nodes and serves many steps",
                             unknowns));
+  } else if (s->edge_node && !s->faces && hard.nu <= (hard.slivers ? NU_PRESSURE : NU_SLIVERS) &&
+             unknowns > (indefinite || hard.slivers ? SB_DIRECT_SMALL : P_MULTIGRID)) {
+    /* docs/reports/solver_choice.md */
+    name = "cg_p_multigrid";
+    PetscCall(PetscSNPrintf(
+      reason, size,
+      "%s, %" PetscInt_FMT " unknowns of p2, nu up to %g: with P1 on the vertices below it iterations do not "
+      "grow with the mesh",
+      dynamic ? "dynamic" : "static", unknowns, (double)hard.nu));
   } else if (unknowns <= SB_DIRECT_SMALL && package) {
     name = package;
     PetscCall(PetscSNPrintf(
       reason, size, "%" PetscInt_FMT " unknowns: a factorisation is fast and holds at any Poisson's ratio%s",
       unknowns, indefinite ? "; the exact tangent may be indefinite" : ""));
   } else if (!dynamic && package &&
-             unknowns <= (hard.nu > NU_PRESSURE && hard.slivers ? DIRECT_NEXT
-                          : !s->faces && hard.nu > NU_LOCKED    ? DIRECT_P1
-                                                                : 0)) {
+             unknowns <= (hard.nu > NU_PRESSURE && hard.slivers               ? DIRECT_NEXT
+                          : s->edge_node && !s->faces && hard.nu > NU_SLIVERS ? DIRECT_NEXT
+                          : !s->faces && hard.nu > NU_LOCKED                  ? DIRECT_P1
+                                                                              : 0)) {
     /* docs/reports/solver_choice.md */
     name = package;
     PetscCall(PetscSNPrintf(reason, size,

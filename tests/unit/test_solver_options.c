@@ -47,10 +47,10 @@ static const Case cases[] = {
 static const char *const methods[] = {"cg", "fcg", "minres", "gmres", "fgmres", "bcgs", "preonly"};
 static const char *const types[] = {"jacobi",   "bjacobi", "icc", "gamg", "hypre",
                                     "cholesky", "lu",      "asm", "none"};
-static const char *const presets[] = {"auto",         "direct",   "cg",           "cg_jacobi", "cg_pbjacobi",
-                                      "cg_icc",       "cg_ssor",  "cg_two_level", "cg_gamg",   "cg_hypre",
-                                      "gauss_seidel", "sor",      "cholmod",      "umfpack",   "mumps",
-                                      "rotated",      "realtime", "pressure"};
+static const char *const presets[] = {
+  "auto",         "direct",  "cg",       "cg_jacobi",    "cg_pbjacobi",   "cg_icc",  "cg_ssor",
+  "cg_two_level", "cg_gamg", "cg_hypre", "gauss_seidel", "sor",           "cholmod", "umfpack",
+  "mumps",        "rotated", "realtime", "pressure",     "cg_p_multigrid"};
 /* Norms that a method can be judged by, of PETSc's manual. */
 static const char *const norms[][2] = {
   {"cg", "none preconditioned unpreconditioned natural"},
@@ -141,6 +141,7 @@ static const char *refused_preset(const Case *c, const char *method, const char 
                                        !strcmp(preset, "umfpack") || !strcmp(preset, "direct"));
 
   if (!strcmp(preset, "realtime")) return "-solver realtime";
+  if (!strcmp(preset, "cg_p_multigrid")) return "-solver cg_p_multigrid";
   if (!strcmp(preset, "pressure") && !strstr(c->options, "element")) return "-solver pressure";
   if (!strcmp(method, "minres") && !strcmp(preset, "rotated")) return "-ksp_type minres";
   if (strcmp(method, "preonly")) return NULL;
