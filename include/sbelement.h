@@ -96,8 +96,9 @@ extern const SbPointRule SbRuleCubic;     /* degree 3 */
 /* u[12] at the vertices of the P1 cell that has the gradient of U[30] at L. And the transpose: F[30] += what f[12] on that cell is. */
 void SbQuadraticAt(const PetscReal L[4], const SbLane U[30], SbLane u[12]);
 void SbQuadraticAdd(const PetscReal L[4], const SbLane f[12], SbLane F[30]);
-/* K[p] for p = 0..54 from the ten blocks of P1 at the four points of SbRuleQuadratic. */
-void SbQuadraticBlocks(const SbLane B[4][10][9], SbLane K[SB_PAIRS][9]);
+/* K[p] for p = 0..54 from the ten blocks of P1 at the four points of SbRuleQuadratic, and factor b_a b_b^T. */
+void SbQuadraticBlocks(const SbLane B[4][10][9], const SbLane factor, const SbLane b[30],
+                       SbLane K[SB_PAIRS][9]);
 /* K += weight d^2(det F)/du^2 at L; g as for P1, F there. */
 void SbQuadraticAddJacobian(const PetscReal L[4], const SbLane g[9], const SbLane F[9], const SbLane weight,
                             SbLane K[SB_PAIRS][9]);

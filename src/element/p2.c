@@ -79,9 +79,15 @@ SB_INLINE int gradient_of(int a, const PetscReal L[4], int vertex[2], PetscReal 
   return 2;
 }
 
-SB_KERNEL void SbQuadraticBlocks(const SbLane B[restrict 4][10][9], SbLane K[restrict SB_PAIRS][9])
+SB_KERNEL void SbQuadraticBlocks(const SbLane B[restrict 4][10][9], const SbLane factor,
+                                 const SbLane b[restrict 30], SbLane K[restrict SB_PAIRS][9])
 {
   static const int pair[4][4] = {{0, 1, 2, 3}, {1, 4, 5, 6}, {2, 5, 7, 8}, {3, 6, 8, 9}};
+  SbLane scaled[30];
+
+  for (int k = 0; k < 30; k++) {
+    for (int l = 0; l < SB_BATCH; l++) scaled[k][l] = factor[l] * b[k][l];
+  }
 
   for (int p = 0; p < SB_PAIRS; p++) {
     PetscReal weight[16];
@@ -105,8 +111,10 @@ SB_KERNEL void SbQuadraticBlocks(const SbLane B[restrict 4][10][9], SbLane K[res
     }
     for (int e = 0; e < 9; e++) {
       const int other = 3 * (e % 3) + e / 3;
-      SbLane sum = {0};
+      const PetscReal *x = scaled[3 * SbPairA[p] + e / 3], *y = b[3 * SbPairB[p] + e % 3];
+      SbLane sum;
 
+      for (int l = 0; l < SB_BATCH; l++) sum[l] = x[l] * y[l];
       for (int k = 0; k < n; k++) {
         const PetscReal *from = block[k][turned[k] ? other : e];
 

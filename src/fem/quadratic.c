@@ -33,6 +33,7 @@ void SbQuadraticVolume(const struct _p_SbMaterial *m, const SbLane g[9], const S
                        const SbLane F[4][9], SbLane pressure, SbLane b[30])
 {
   const SbPointRule *rule = m->jacobian ? &SbRuleCubic : &SbRuleQuadratic;
+  const PetscReal lambda = m->ops.volumetric_modulus(m);
 
   for (int l = 0; l < SB_BATCH; l++) pressure[l] = 0.;
   if (b) memset(b, 0, 30 * sizeof(SbLane));
@@ -45,10 +46,19 @@ void SbQuadraticVolume(const struct _p_SbMaterial *m, const SbLane g[9], const S
       SbCellGradient(g, (const SbLane *)u, here);
       at = (const SbLane *)here;
     }
-    m->ops.pressure(m, at, p);
+    if (m->linear || m->ops.frame || m->ops.spin) {
+      // theta = R : F - 3, with its derivative at once
+      m->ops.volumetric(m, at, D);
+      for (int l = 0; l < SB_BATCH; l++) p[l] = 3. * lambda;
+      for (int k = 0; k < 9; k++) {
+        for (int l = 0; l < SB_BATCH; l++) p[l] -= lambda * D[k][l] * at[k][l];
+      }
+    } else {
+      m->ops.pressure(m, at, p);
+      if (b) m->ops.volumetric(m, at, D);
+    }
     for (int l = 0; l < SB_BATCH; l++) pressure[l] -= rule->weight[q] * p[l];
     if (!b) continue;
-    m->ops.volumetric(m, at, D);
     for (int l = 0; l < SB_BATCH; l++) W[l] = rule->weight[q] * V[l];
     SbCellForce(g, W, (const SbLane *)D, f);
     SbQuadraticAdd(rule->L[q], (const SbLane *)f, b);

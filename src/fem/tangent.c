@@ -254,7 +254,7 @@ static void quadratic_blocks(SbSpace s, const SbRegion *region, const PetscReal 
   const SbMaterial m = region->material, law = region->pointwise;
   const SbLane *g = s->batch_g + 9 * batch, *V = s->batch_V + batch;
   const PetscBool mean = (PetscBool)(law != m), one_D = (PetscBool)(m->linear || m->ops.frame || m->ops.spin);
-  SbLane U[30], F[4][9], B[4][10][9] __attribute__((aligned(64))), quarter, p, factor, b[30];
+  SbLane U[30], F[4][9], B[4][10][9] __attribute__((aligned(64))), quarter, p, factor, b[30] = {{0}};
   Factors at = *x;
 
   if (m->linear)
@@ -269,11 +269,10 @@ static void quadratic_blocks(SbSpace s, const SbRegion *region, const PetscReal 
   }
   scaled_volumes(*V, 0.25, quarter);
   for (int q = 0; q < 4; q++) law_blocks(law, g, quarter, &at, (const SbLane *)F[q], NULL, B[q]);
-  SbQuadraticBlocks((const SbLane(*)[10][9])B, K);
-  if (!mean) return;
   for (int l = 0; l < SB_BATCH; l++)
     factor[l] = (*V)[l] > 0. ? x->lambda * (x->stiffness + (one_D ? x->damping : 0.)) / (*V)[l] : 0.;
-  add_dyad(factor, (const SbLane *)b, K);
+  SbQuadraticBlocks((const SbLane(*)[10][9])B, factor, (const SbLane *)b, K);
+  if (!mean) return;
   if (m->jacobian && law->tangent != SB_TANGENT_EXACT_SPD) {
     for (int q = 0; q < SbRuleCubic.n; q++) {
       SbLane u[12], here[9];

@@ -4,7 +4,8 @@
 
     elements -element cr -mesh box:0.4,0.1,0.1:8 -rounds 5
 
-  Matrix: the symmetric one on one rank, blocks on several. The displacement bends and twists the bar.
+  Matrix: the symmetric one on one rank, blocks on several. The displacement bends and twists the bar. For p2 also the bare kernel: gradients, law and blocks of P1 at
+  the four points, and the 55 blocks of each tet of them, written to the same small buffer again and again; without the mean volume.
 */
 #include "perf.h"
 
@@ -37,6 +38,34 @@ static PetscErrorCode residual(Case *c)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+static void bare_kernel(Case *c, const PetscReal u[])
+{
+  static SbLane K[SB_PAIRS][9] __attribute__((aligned(64)));
+  const SbSpace s = c->s;
+
+  for (PetscInt b = 0; b < s->nbatch; b++) {
+    const SbMaterial m = s->region[0].pointwise;
+    const PetscInt *node = s->batch_clique + s->width * SB_BATCH * b;
+    const SbLane *g = s->batch_g + 9 * b;
+    SbLane B[4][10][9] __attribute__((aligned(64))), U[30], W, none[30] = {{0}};
+
+    for (int k = 0; k < 30 * SB_BATCH; k++)
+      U[k / SB_BATCH][k % SB_BATCH] =
+        u[3 * node[k / (3 * SB_BATCH) * SB_BATCH + k % SB_BATCH] + k / SB_BATCH % 3];
+    for (int l = 0; l < SB_BATCH; l++) W[l] = 0.25 * s->batch_V[b][l];
+    for (int q = 0; q < 4; q++) {
+      SbLane at[12], F[9], R[9];
+
+      SbQuadraticAt(SbRuleQuadratic.L[q], (const SbLane *)U, at);
+      SbCellGradient(g, (const SbLane *)at, F);
+      m->ops.frame(m, (const SbLane *)F, R);
+      SbCellBlocksIsotropic(g, W, m->ops.volumetric_modulus(m), m->ops.shear_modulus(m), (const SbLane *)R,
+                            B[q]);
+    }
+    SbQuadraticBlocks((const SbLane(*)[10][9])B, W, (const SbLane *)none, K);
+  }
+}
+
 static PetscErrorCode measure(Case *c, PetscInt rounds)
 {
   const double tets = (double)c->scene.model->mesh->Ncell;
@@ -53,6 +82,10 @@ static PetscErrorCode measure(Case *c, PetscInt rounds)
       PetscCall(SbSpaceFinishTangent(c->s, c->A));
     }
     PetscCall(perf_sample("tangent", "us/tet", 1e6 * perf_stop(start).cpu / (3. * tets)));
+    if (!c->s->edge_node) continue;
+    start = perf_start();
+    for (int i = 0; i < 3; i++) bare_kernel(c, c->stage.u);
+    PetscCall(perf_sample("kernel", "us/tet", 1e6 * perf_stop(start).cpu / (3. * tets)));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
