@@ -323,7 +323,7 @@ PetscErrorCode SbSolverChoose(SbSpace s, PetscBool dynamic, PetscBool linear, Pe
       dynamic ? "dynamic" : "static", unknowns, (double)hard.face_nu));
   } else {
     /* 192k tets, CPU s of one rank. Static: 0.36 (cg_gamg 1.7, cg_icc 1.4), at nu 0.45 0.7 (2.3), at 0.499 4.2 (18); dynamic, h = 0.01 s: 0.22 (1.7, 0.40) */
-    name = "cg_two_level";
+    name = s->edge_node && !s->faces ? "cg_p_multigrid" : "cg_two_level";
     PetscCall(
       PetscSNPrintf(reason, size,
                     "%s, %" PetscInt_FMT
