@@ -237,10 +237,9 @@ PetscErrorCode SbFormulaDestroy(SbFormula *formula);
 /*
   Live formulas (src/base/live.c): places that somebody moves while a run goes on, where an option of an effect with three formulas is the word `live`.
 
-  Create: the three formulas of an option; destroy each. SetUp: the file with the places, the largest speed, m/s, and how many simulated seconds may pass per second, 0: any; before the first step. Place: of
+  SetUp: the file with the places, the largest speed, m/s, and how many simulated seconds may pass per second, 0: any; before the first step. Place: of
   number i = 0 .. SbLiveCount() - 1 at time t of the present step, m, and the name of its effect; SetPlace puts it there. Advance: a step that ended at t was accepted, from now on they go to where the file says. Collective.
 */
-PetscErrorCode SbLiveCreate(const char *where, SbFormula formula[3]);
 PetscErrorCode SbLiveSetUp(const char *file, PetscReal speed, PetscReal pace);
 PetscInt SbLiveCount(void);
 const char *SbLivePlace(PetscInt i, PetscReal t, PetscReal place[3]);

@@ -6,6 +6,7 @@
   a forbidden end belongs into the help text of the row.
 */
 #include <ctype.h>
+#include "formula.h"
 #include "option.h"
 
 /* ------------------------------------------------------------------ pieces of text */
