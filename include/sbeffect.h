@@ -101,7 +101,8 @@ typedef struct {
     lag           - a solve of the step ended (solved), or is, at the local displacements u: friction, whose normal forces and directions are those of before, may take those of u;
                     again: it did, and the step wants one more solve.
     potential     - energy at the local displacements u, this rank's part, J; f[nnode][3] += its gradient on owned nodes, N.
-    hessian       - adds the blocks of its second derivative at u, or of what stands for it (SbContactHessian).
+    hessian       - adds the blocks of its second derivative at u, or of what stands for it (SbContactHessian), and to r[nnode][3] on owned nodes, N, what the gradient of
+                    the quadratic energy that they belong to has more than the gradient.
     gap_forces    - f[nnode][3] += on owned nodes what closes the gaps at u, to first order, as a load on body and contact, N; `bound`: half of force times gap, which bounds the energy
                     of the error that gaps are, this rank's, J.
     scale_width   - the gap below which it pushes becomes `factor` times what it is, if it is the program's. Smaller: at once, not below what rounding allows; changed: it did, alike on
@@ -120,7 +121,7 @@ typedef struct {
   PetscErrorCode (*potential)(SbEffect e, SbSpace space, const PetscReal u[], PetscReal *energy,
                               PetscReal f[]);
   PetscErrorCode (*hessian)(SbEffect e, SbSpace space, const PetscReal u[], SbContactHessian kind,
-                            SbBlocks *blocks);
+                            SbBlocks *blocks, PetscReal r[]);
   PetscErrorCode (*gap_forces)(SbEffect e, SbSpace space, const PetscReal u[], PetscReal f[],
                                PetscReal *bound);
   PetscErrorCode (*scale_width)(SbEffect e, PetscReal factor, PetscReal growth, PetscBool *changed);

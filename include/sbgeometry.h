@@ -162,7 +162,7 @@ void SbSymmetricClamp(int n, PetscReal A[]);
   SbTimeOfImpact - how much of a step a pair may go before the gap between its sides is used up; never later than the true time.
 
   Not collective. The vertices go on straight lines from x0[4][3] to x1[4][3], m. The gap is their distance less the radius. Let g be the gap at
-  the start, and least = min(separation, g / 2). At the time returned the gap is between least + 0.9 keep (g - least) and least + keep (g - least), and
+  the start, and least = min(separation, g / 2). At the time returned the gap is between least + 0.9 k and least + k with k = min(keep (g - least), most), and
   nowhere before is it smaller. Much rotation at a small gap takes many steps; after 1024 the time reached is returned, at which more is left.
 
   least is not below SB_CCD_ROUNDING eps |x|, what coordinates may be rounded to; the same of |x1 - x0| is added in the course of the step. A gap
@@ -175,6 +175,7 @@ typedef struct {
   PetscReal radius;     /* sum of the radii of the balls or capsules around vertices and edges, m */
   PetscReal separation; /* gap that is not used up, m */
   PetscReal keep;       /* part of the rest that is not used up, above 0 and below 1; 0.1 is usual */
+  PetscReal most;       /* of a gap to be kept, m; 0: any */
 } SbCCDLimits;
 #define SB_CCD_ROUNDING 32
 PetscBool SbTimeOfImpact(SbPairKind kind, const PetscReal x0[], const PetscReal x1[],

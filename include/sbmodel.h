@@ -136,7 +136,7 @@ PetscErrorCode SbModelGuardWork(SbModel model, Vec U, PetscReal *work, Vec F);
 /* F += scale times the gradient of the energy at U, N; free_only: not at prescribed unknowns. energy of all ranks, J (NULL: not wanted). */
 PetscErrorCode SbModelGuardGradient(SbModel model, Vec U, PetscReal scale, PetscBool free_only,
                                     PetscReal *energy, Vec F);
-PetscErrorCode SbModelGuardHessian(SbModel model, Vec U, SbContactHessian kind, SbBlocks *blocks);
+PetscErrorCode SbModelGuardHessian(SbModel model, Vec U, SbContactHessian kind, SbBlocks *blocks, Vec R);
 /* F = what closes the gaps at U, N, zero at prescribed unknowns; bound of all ranks, J. changed: some width did. Collective. */
 PetscErrorCode SbModelGapForces(SbModel model, Vec U, Vec F, PetscReal *bound);
 PetscErrorCode SbModelScaleWidths(SbModel model, PetscReal factor, PetscReal growth, PetscBool *changed);

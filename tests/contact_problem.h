@@ -44,7 +44,7 @@ static inline PetscErrorCode contact_problem_open(PetscInt cells, const char *el
   PetscCall(SbSpaceCreateMatrix(s, size == 1 ? SB_MATRIX_SBAIJ : SB_MATRIX_BAIJ, &p->K));
   PetscCall(SbSpaceCreateVec(s, &zero));
   PetscCall(SbModelGuardBegin(p->scene.model, 0., h, zero, NULL));
-  PetscCall(SbModelGuardHessian(p->scene.model, zero, SB_HESSIAN_CLAMPED, &p->blocks));
+  PetscCall(SbModelGuardHessian(p->scene.model, zero, SB_HESSIAN_CLAMPED, &p->blocks, NULL));
   PetscCall(SbSpaceGetLocalRead(s, zero, &u));
   stage.u = u;
   PetscCall(SbSpaceAssembleTangent(s, &stage, p->K));

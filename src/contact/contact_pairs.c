@@ -13,6 +13,8 @@
 #include "sblog.h"
 
 #define LEFT 0.1 /* of its gap that a pair keeps at least */
+#define LEFT_MOST \
+  0.5 /* of the reach: no more need be left, so that what comes from far away comes within it at once */
 
 static inline void places(const SbContactPair *pair, const PetscReal x[], PetscReal at[12])
 {
@@ -348,7 +350,7 @@ static PetscReal first_root(PetscReal a, PetscReal b, PetscReal c)
 }
 
 /* The part of the way that is safe for one pair. */
-static PetscReal safe_part(SbContactMesh m, const SbContactPair *pair, const PetscReal x0[],
+static PetscReal safe_part(SbContactMesh m, const SbContactPair *pair, PetscReal most, const PetscReal x0[],
                            const PetscReal x1[])
 {
   PetscReal a[12], b[12], r0[3], dr[3], n0[3], dn[3], left, part = 1.;
@@ -357,12 +359,12 @@ static PetscReal safe_part(SbContactMesh m, const SbContactPair *pair, const Pet
   places(pair, x0, a);
   places(pair, x1, b);
   if (!pair->side) {
-    const SbCCDLimits limits = {.radius = radius_of(m, pair), .keep = LEFT};
+    const SbCCDLimits limits = {.radius = radius_of(m, pair), .keep = LEFT, .most = most};
 
     (void)SbTimeOfImpact(pair->kind, a, b, &limits, &part);
     return part;
   }
-  left = LEFT * SbContactPairGap(m, pair, x0, &g);
+  left = PetscMin(LEFT * SbContactPairGap(m, pair, x0, &g), most);
   for (int i = 0; i < 3; i++) {
     r0[i] = a[i] - a[3 + i];
     dr[i] = b[i] - b[3 + i] - r0[i];
@@ -402,7 +404,7 @@ PetscErrorCode SbContactPairsSafe(SbContactPairs p, const PetscReal x0[], const 
 
     if (!m->own[pair->v[0]] && !(pair->v[0] >= m->nbody_vertex && m->own[pair->v[1]])) continue;
     if (SbContactPairApart(m, pair, x0, x1, p->reach)) continue;
-    t = safe_part(m, pair, x0, x1);
+    t = safe_part(m, pair, LEFT_MOST * p->reach, x0, x1);
     if (t < *part) {
       *part = t;
       *worst = i;

@@ -201,6 +201,14 @@ PetscErrorCode SbEffectPotential_Barrier(SbEffect e, SbSpace s, const PetscReal 
   if (!b->begun) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(SbBarrierLook(b, u));
   *energy = SbBarrierGradient(b, 1., f);
+
+  /* what slips the other way than Newton's method thought */
+  for (PetscInt i = 0; i < b->nrub; i++) {
+    PetscReal slip[3];
+
+    (void)SbBarrierSlip(b, &b->rub[i], slip);
+    if (SbDot3(slip, b->rub[i].slip) < 0.) b->rub[i].turns = PETSC_TRUE;
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -226,7 +234,7 @@ static PetscErrorCode add_blocks(Barrier *b, const SbContactPair *pair, const Pe
 }
 
 PetscErrorCode SbEffectHessian_Barrier(SbEffect e, SbSpace s, const PetscReal u[], SbContactHessian kind,
-                                       SbBlocks *blocks)
+                                       SbBlocks *blocks, PetscReal r[])
 {
   Barrier *b = (Barrier *)e->data;
   PetscReal energy, gradient[12], H[144];
@@ -244,18 +252,31 @@ PetscErrorCode SbEffectHessian_Barrier(SbEffect e, SbSpace s, const PetscReal u[
     PetscCall(add_blocks(b, pair, NULL, H));
   }
 
-  /* friction: mu N (f0'/u (I - n n - u u/u^2) + f0'' u u/u^2); the parabola that touches f0 from above has f0'/u in the place of f0'' */
+  /*
+    friction: mu N (f0'/u (I - n n - u u/u^2) + f0'' u u/u^2); the parabola that touches f0 from above has f0'/u in the place of f0''. What slides, but went the other way with the last
+    step that was tried, sticks: a spring in the place of mu N f0' that has the force mu N at the slip e. A whole step that leaves it beyond e says that it slides.
+  */
   for (PetscInt i = 0; i < b->nrub; i++) {
-    const Rub *rub = &b->rub[i];
-    PetscReal d[3], T[9];
-    const PetscReal y = SbBarrierSlip(b, rub, d), w = b->slip, slope = SbBarrierSlope(b, y),
-                    curve = kind == SB_HESSIAN_ABOVE ? slope
-                            : y < w                  ? 2. / w - 2. * y / (w * w)
-                                                     : 0.;
+    Rub *rub = &b->rub[i];
+    PetscReal T[9];
+    const PetscReal y = SbBarrierSlip(b, rub, rub->slip), w = b->slip;
+    PetscReal slope = SbBarrierSlope(b, y), curve = y < w ? 2. / w - 2. * y / (w * w) : 0.;
 
+    rub->sticks = (PetscBool)(y > w && kind != SB_HESSIAN_ABOVE &&
+                              (rub->turns || (rub->sticks && kind != SB_HESSIAN_EXACT)));
+    rub->turns = PETSC_FALSE;
+    if (rub->sticks) {
+      PetscReal force[12];
+
+      for (int k = 0; k < 12; k++)
+        force[k] = rub->force * (1. / w - slope) * rub->weight[k / 3] * rub->slip[k % 3];
+      spread(b, rub->pair.side ? 1 : 4, rub->pair.v, 1., force, r);
+      slope = curve = 1. / w;
+    } else if (kind == SB_HESSIAN_ABOVE)
+      curve = slope;
     for (int k = 0; k < 9; k++) {
       T[k] = slope * ((k % 4 ? 0. : 1.) - rub->n[k / 3] * rub->n[k % 3]);
-      if (y > 0.) T[k] += (curve - slope) * d[k / 3] * d[k % 3] / (y * y);
+      if (y > 0.) T[k] += (curve - slope) * rub->slip[k / 3] * rub->slip[k % 3] / (y * y);
       T[k] *= rub->force;
     }
     PetscCall(add_blocks(b, &rub->pair, rub->weight, T));

@@ -19,6 +19,9 @@ typedef struct {
   PetscReal weight[4], n[3], force; /* mu N, N */
   PetscReal carry
     [3]; /* by which the obstacle's point there moves on in the step beyond its vertices: rotation, m; with the sign of its weights */
+  PetscReal slip[3]; /* where the second derivative was asked for last, m */
+  PetscBool turns,
+    sticks; /* slip went the other way since, so Newton's method takes it for one that sticks */
 } Rub;
 
 /* What pushes one way along a direction in this step: what overlaps, or bounces. */
@@ -159,7 +162,7 @@ PetscErrorCode SbEffectPotential_Barrier(SbEffect e, SbSpace s, const PetscReal 
 PetscErrorCode SbEffectGapForces_Barrier(SbEffect e, SbSpace s, const PetscReal u[], PetscReal f[],
                                          PetscReal *bound);
 PetscErrorCode SbEffectHessian_Barrier(SbEffect e, SbSpace s, const PetscReal u[], SbContactHessian kind,
-                                       SbBlocks *blocks);
+                                       SbBlocks *blocks, PetscReal r[]);
 PetscErrorCode SbEffectContactForce_Barrier(SbEffect e, SbSpace s, const SbStage *stage, const PetscReal r[],
                                             PetscReal f[]);
 PetscErrorCode SbEffectHistory_Barrier(SbEffect e, SbSpace s, const SbStage *stage, const PetscReal r[],

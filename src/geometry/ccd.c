@@ -68,8 +68,10 @@ PetscBool SbTimeOfImpact(SbPairKind kind, const PetscReal x0[], const PetscReal 
         *time = 0;
         return PETSC_TRUE;
       }
-      stop = least + limits->keep * (gap - least);
-      aim = least + AIM * limits->keep * (gap - least);
+      stop = limits->keep * (gap - least);
+      if (limits->most > 0) stop = PetscMin(stop, limits->most);
+      aim = least + AIM * stop;
+      stop += least;
     } else if (!(gap - at * fast > stop))
       break;
 

@@ -339,15 +339,24 @@ PetscErrorCode SbModelGuardLag(SbModel m, Vec X, PetscBool solved, PetscBool *ag
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbModelGuardHessian(SbModel m, Vec U, SbContactHessian kind, SbBlocks *blocks)
+PetscErrorCode SbModelGuardHessian(SbModel m, Vec U, SbContactHessian kind, SbBlocks *blocks, Vec R)
 {
+  const SbSpace s = m->space;
   const PetscReal *u;
+  PetscScalar *out;
+  PetscReal *r;
 
   PetscFunctionBeginUser;
-  PetscCall(SbSpaceGetLocalRead(m->space, U, &u));
-  for (PetscInt e = 0; e < m->npotential; e++)
-    SbEffectCall(m->potential[e], hessian, m->space, u, kind, blocks);
-  PetscCall(SbSpaceRestoreLocalRead(m->space, U, &u));
+  PetscCall(PetscCalloc1(3 * s->nnode, &r));
+  PetscCall(SbSpaceGetLocalRead(s, U, &u));
+  for (PetscInt e = 0; e < m->npotential; e++) SbEffectCall(m->potential[e], hessian, s, u, kind, blocks, r);
+  PetscCall(SbSpaceRestoreLocalRead(s, U, &u));
+  if (R) {
+    PetscCall(VecGetArray(R, &out));
+    for (PetscInt i = 0; i < 3 * s->nnode_owned; i++) out[i] = s->fixed[i / 3] & (1 << (i % 3)) ? 0. : r[i];
+    PetscCall(VecRestoreArray(R, &out));
+  }
+  PetscCall(PetscFree(r));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

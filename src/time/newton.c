@@ -20,9 +20,14 @@
   Tangent. With -body_NAME_tangent auto it is the exact one. When the linear solver meets a direction of negative curvature or counts negative pivots, or p goes up, the eigenvalues of
   the cells are raised to zero and the system is solved once more (Longva et al. 2023, "Pitfalls of projection"); after a full step the exact one is tried again.
 
-  Where surfaces push each other, the second derivative of contact is the positive part of each pair's, and the exact one after a full step, as near the end only that converges
-  faster than linearly. When energy cut the last step, that of friction is bounded from above. A tangent that is not definite is shifted by a multiple of the mass, as small a one as will do (Nocedal and Wright,
-  algorithm 3.3), before cells are filtered: in a collapse nearly all cells have a negative eigenvalue, though their sum has but a few, and filtered ones make steps of a hundredth.
+  Where surfaces push each other, the second derivative of contact is the positive part of each pair's, and the exact one after a whole step, as near the end only that converges
+  faster than linearly. Friction that slipped the other way than expected is taken for one that sticks (src/effect/barrier_forces.c), and where p goes up, bounded from above. A tangent that is not
+  definite is shifted by a multiple of the mass, as small a one as will do (Nocedal and Wright, algorithm 3.3), before cells are filtered: in a collapse nearly all cells have a negative eigenvalue,
+  though their sum has but a few, and filtered ones make steps of a hundredth.
+
+  Lengths of steps, there. E is that of the model up to a barrier that the model does not know yet, and rises steeply behind it. A step that Armijo's rule stops in front of
+  it has nothing new for the next tangent: so the search goes on between the longest part that is good enough and the shortest that is not, until the slope has halved. Where
+  E still falls half as steeply behind a whole step, which has too stiff a model, longer ones are tried.
 */
 #include <petsc/private/snesimpl.h> /* PETSc has no public way to write a SNESType */
 #include "sbsolver.h"
@@ -48,12 +53,17 @@
 #define SHIFT_STIFF 1e-4 /* the same, of the mean stiffness by mass */
 #define SHIFTS 8         /* so often by SHIFT_MORE before cells are filtered */
 #define SHIFT_MORE 4.
+#define WALL 0.5      /* of the slope of E at first: where more of it is left, a longer step is tried */
+#define SHORTER 0.1   /* a step than the one before, where the method converges */
+#define FARTHER 4.    /* so many times, behind a whole one */
+#define TRIES 5       /* of these */
 #define PROVISIONAL 1 /* steps that may follow each other while E is above where they began */
 
 /* What a solve keeps from iteration to iteration. */
 typedef struct {
   SbRun run;
   Vec W, G;        /* trial iterate and its residual */
+  Vec kept[2];     /* guarded contact: the same of the longest trial that is good enough */
   Vec contact;     /* guarded contact: its forces */
   Vec start, step; /* where provisional steps began; the first of them led to start - step */
   PetscReal least; /* rounding of the strain energy of a body that has turned: E V to the last digit, J */
@@ -64,15 +74,18 @@ typedef struct {
   SbBlocks blocks;        /* its second derivative, when the last direction was solved for */
   PetscInt nblock;        /* of all ranks */
   SbContactHessian kind;
-  PetscReal shift; /* of the last direction: times the mass added to the tangent, 1/s^2 */
+  PetscReal longest; /* step of the last iteration, if it was a whole one, else 0, m */
+  PetscReal shift;   /* of the last direction: times the mass added to the tangent, 1/s^2 */
 } Newton;
 
 /* The potential at an iterate, as far as lengths of steps ask. */
 typedef struct {
-  PetscReal norm; /* of the residual, N */
-  PetscReal psi;  /* strain energy, J */
-  PetscReal rest; /* slope of all but strain along the step, J */
-  PetscReal gaps; /* energy of guarded contact, J: part of psi */
+  PetscReal norm;      /* of the residual, N */
+  PetscReal psi;       /* strain energy, J */
+  PetscReal rest;      /* slope of all but strain along the step, J */
+  PetscReal gaps;      /* energy of guarded contact, J: part of psi */
+  PetscReal slope;     /* of E along the step, J */
+  PetscReal s, change; /* part of the step, and of E over it, J */
   PetscInt ninverted;
 } Iterate;
 
@@ -93,6 +106,7 @@ static PetscErrorCode evaluate_at(Newton *n, Vec X, Vec F, Vec Y, Iterate *at)
     SbModelStrainEnergyAlong(run->model, run->stage ? run->stage : X, Y, &at->psi, &elastic, &at->ninverted));
   PetscCall(VecDot(F, Y, &slope));
   at->psi /= PetscSqr(part);
+  at->slope = -slope;
   at->rest = -slope - elastic / part;
   /* that of contact is at X */
   if (run->model->npotential) {
@@ -118,7 +132,8 @@ static PetscErrorCode solve_linear(SNES snes, KSPConvergedReason *reason)
   PetscFunctionBeginUser;
   n->blocks.n = n->nblock = 0;
   if (m->npotential) {
-    PetscCall(SbModelGuardHessian(m, snes->vec_sol, n->kind, &n->blocks));
+    PetscCall(SbModelGuardHessian(m, snes->vec_sol, n->kind, &n->blocks, n->contact));
+    PetscCall(VecAYPX(n->contact, n->run->guard_weight, snes->vec_func));
     for (PetscInt k = 0; k < n->blocks.n; k++) {
       for (int i = 0; i < 9; i++) n->blocks.block[k][i] *= n->run->guard_weight;
     }
@@ -126,7 +141,7 @@ static PetscErrorCode solve_linear(SNES snes, KSPConvergedReason *reason)
   }
   if (n->nblock) {
     if (!n->system) PetscCall(SbContactSystemCreate(m->space, n->run->contact_choice, &n->system));
-    PetscCall(SbContactSystemSolve(n->system, snes->jacobian_pre, &n->blocks, PETSC_TRUE, snes->vec_func,
+    PetscCall(SbContactSystemSolve(n->system, snes->jacobian_pre, &n->blocks, PETSC_TRUE, n->contact,
                                    snes->vec_sol_update, reason, &iterations));
   } else {
     PetscCall(KSPSetOperators(snes->ksp, snes->jacobian, snes->jacobian_pre));
@@ -194,8 +209,8 @@ static PetscErrorCode find_direction(SNES snes, PetscBool *filtered, PetscReal *
     PetscCall(solve_linear(snes, &reason));
     PetscCall(VecDot(F, Y, slope));
     *slope = -*slope;
-    if (n->nblock && n->kind == SB_HESSIAN_EXACT && (reason < 0 || *slope >= 0.)) {
-      n->kind = SB_HESSIAN_CLAMPED;
+    if (n->nblock && n->kind != SB_HESSIAN_ABOVE && (reason < 0 || *slope >= 0.)) {
+      n->kind = n->kind == SB_HESSIAN_EXACT ? SB_HESSIAN_CLAMPED : SB_HESSIAN_ABOVE;
       continue;
     }
     if (n->nblock && m->may_filter && !*filtered && (reason < 0 || *slope >= 0.) && shifts++ < SHIFTS) {
@@ -258,10 +273,12 @@ static PetscErrorCode search(SNES snes, PetscReal slope, PetscReal *s)
   const SbModel m = n->run->model;
   const Vec X = snes->vec_sol, F = snes->vec_func, Y = snes->vec_sol_update;
   PetscBool enough, provisional, better,
+    flat = PETSC_FALSE, guarded,
     plain = (PetscBool)(n->nblock > 0 || *s < 1.); /* a barrier is nothing to come back from */
   PetscReal change, noise, total, goal;
-  PetscInt nactive;
-  Iterate from, to;
+  PetscReal low = 0., high = 0.; /* parts of the step between which E is lowest; 0: not known yet */
+  PetscInt nactive, tries = 0;
+  Iterate from, to, best = {0};
 
   PetscFunctionBeginUser;
   PetscCall(evaluate_at(n, X, F, Y, &from));
@@ -294,6 +311,48 @@ static PetscErrorCode search(SNES snes, PetscReal slope, PetscReal *s)
     provisional =
       (PetscBool)(!enough && !plain && slope < 0. && n->provisional < PROVISIONAL &&
                   change < PETSC_INFINITY && to.ninverted <= from.ninverted && to.gaps <= from.gaps);
+
+    /* with a barrier on the way E is lowest in front of it, and where it hardly curves far behind a whole step: between what is known by slopes */
+    guarded = (PetscBool)(m->npotential && plain);
+    if (guarded && enough && to.slope < 0.)
+      low = *s;
+    else if (guarded && slope < 0. && (to.gaps > from.gaps || best.s > 0.))
+      high = *s;
+    if (guarded && enough) {
+      flat = (PetscBool)(to.slope >= WALL * slope);
+      if (best.s == 0. || change < best.change) {
+        PetscCall(VecSwap(n->W, n->kept[0]));
+        PetscCall(VecSwap(n->G, n->kept[1]));
+        best = to;
+        best.s = *s;
+        best.change = change;
+      }
+    }
+    if (best.s > 0.) {
+      PetscReal far = 0.;
+
+      if (!flat && tries++ < TRIES) {
+        if (high > 0.)
+          far = 0.5 * (low + high);
+        else if (*s >= 1.) {
+          PetscCall(VecScale(Y, FARTHER * *s));
+          PetscCall(SbModelGuardSafe(m, X, Y, 1., &far, &nactive));
+          PetscCall(VecScale(Y, 1. / (FARTHER * *s)));
+          if (far < 1.) tries = TRIES;
+          far = far > 1.5 / FARTHER ? FARTHER * far * *s : 0.;
+        }
+      }
+      if (far > 0.) {
+        *s = far;
+        continue;
+      }
+      PetscCall(VecSwap(n->W, n->kept[0]));
+      PetscCall(VecSwap(n->G, n->kept[1]));
+      to = best;
+      *s = best.s;
+      change = best.change;
+      enough = PETSC_TRUE;
+    }
     if (enough || provisional) break;
 
     /* to come back from far above takes more than a loose solve: what it leaves may be more than E has to fall by */
@@ -319,7 +378,7 @@ static PetscErrorCode search(SNES snes, PetscReal slope, PetscReal *s)
       *s = 1.; /* the first one was whole; surfaces may have shortened the one from there */
     }
     plain = PETSC_TRUE;
-    *s *= PetscMax(0.1, PetscMin(0.5, -slope * *s / (2. * (change - slope * *s))));
+    *s *= PetscMax(high > 0. ? 0.3 : 0.1, PetscMin(0.5, -slope * *s / (2. * (change - slope * *s))));
     if (*s < SHORTEST) {
       snes->reason = SNES_DIVERGED_LINE_SEARCH;
       PetscFunctionReturn(PETSC_SUCCESS);
@@ -438,7 +497,7 @@ static PetscErrorCode converged(SNES snes, PetscReal s)
   const SbRun run = n->run;
   const SbModel m = run->model;
   const PetscReal size = SbBodySmallest(m->nbody, m->body);
-  PetscReal longest, width = PETSC_MAX_REAL, enough;
+  PetscReal longest, shorter, width = PETSC_MAX_REAL, enough;
 
   PetscFunctionBeginUser;
   if (!n->nblock) {
@@ -459,7 +518,11 @@ static PetscErrorCode converged(SNES snes, PetscReal s)
   PetscCall(PetscInfo(snes,
                       "iteration %" PetscInt_FMT ": the longest step is %g m, of %g m for the last one\n",
                       snes->iter, (double)longest, (double)enough));
-  if (s == 1. && longest <= enough) snes->reason = SNES_CONVERGED_SNORM_RELATIVE;
+  /* what is left after a whole step is no more than it is shorter than the one before, times its length */
+  shorter = n->longest > 0. ? longest / n->longest : 1.;
+  n->longest = s >= 1. ? longest : 0.;
+  if (s >= 1. && longest * (shorter < SHORTER ? shorter : 1.) <= enough)
+    snes->reason = SNES_CONVERGED_SNORM_RELATIVE;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -469,7 +532,7 @@ static PetscErrorCode SNESSolve_Newton(SNES snes)
   const Vec X = snes->vec_sol, F = snes->vec_func, Y = snes->vec_sol_update;
   const PetscBool guarded = (PetscBool)(n->run->model->npotential > 0);
   PetscBool filtered = PETSC_FALSE;
-  PetscReal slope = 0., s = 1., safe;
+  PetscReal slope = 0., s = 1.;
   PetscInt nactive, first = 0;
 
   PetscFunctionBeginUser;
@@ -477,6 +540,7 @@ static PetscErrorCode SNESSolve_Newton(SNES snes)
   snes->reason = SNES_CONVERGED_ITERATING;
   snes->iter = 0;
   n->provisional = 0;
+  n->longest = 0.;
   n->nblock = 0;
   n->kind = SB_HESSIAN_CLAMPED;
   n->shift = 0.;
@@ -502,11 +566,10 @@ static PetscErrorCode SNESSolve_Newton(SNES snes)
     PetscCall(find_direction(snes, &filtered, &slope));
     s = 1.;
     if (guarded && !snes->reason) PetscCall(SbModelGuardSafe(n->run->model, X, Y, 1., &s, &nactive));
-    safe = s;
     if (!snes->reason) PetscCall(search(snes, slope, &s));
     if (snes->reason) break;
-    if (s == 1.) filtered = PETSC_FALSE;
-    n->kind = s < safe ? SB_HESSIAN_ABOVE : s < 1. ? SB_HESSIAN_CLAMPED : SB_HESSIAN_EXACT;
+    if (s >= 1.) filtered = PETSC_FALSE;
+    n->kind = s < 1. ? SB_HESSIAN_CLAMPED : SB_HESSIAN_EXACT;
 
     /* whether that is near enough */
     snes->iter++;
@@ -526,6 +589,7 @@ static PetscErrorCode SNESSolve_Newton(SNES snes)
       if (!again) continue;
       snes->reason = SNES_CONVERGED_ITERATING;
       first = snes->iter;
+      n->longest = 0.;
       PetscCall(SNESComputeFunction(snes, X, F));
       PetscCall(VecNorm(F, NORM_2, &snes->norm));
     }
@@ -560,7 +624,10 @@ static PetscErrorCode SNESSetUp_Newton(SNES snes)
   PetscCall(VecDuplicate(snes->vec_sol, &n->G));
   PetscCall(VecDuplicate(snes->vec_sol, &n->start));
   PetscCall(VecDuplicate(snes->vec_sol, &n->step));
-  if (n->run->model->npotential) PetscCall(VecDuplicate(snes->vec_sol, &n->contact));
+  if (n->run->model->npotential) {
+    PetscCall(VecDuplicate(snes->vec_sol, &n->contact));
+    for (int k = 0; k < 2; k++) PetscCall(VecDuplicate(snes->vec_sol, &n->kept[k]));
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -574,6 +641,7 @@ static PetscErrorCode SNESReset_Newton(SNES snes)
   PetscCall(VecDestroy(&n->start));
   PetscCall(VecDestroy(&n->step));
   PetscCall(VecDestroy(&n->contact));
+  for (int k = 0; k < 2; k++) PetscCall(VecDestroy(&n->kept[k]));
   PetscCall(SbContactSystemDestroy(&n->system));
   PetscCall(SbBlocksFree(&n->blocks));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -7,7 +7,7 @@
 
 #define NRANDOM 300000
 
-static const SbCCDLimits usual = {0, 0, 0.1};
+static const SbCCDLimits usual = {0, 0, 0.1, 0};
 
 /* ------------------------------------------------------------------ truth */
 
@@ -266,7 +266,8 @@ static void check_levels(void)
   for (int i = 0; i < 12000; i++) {
     const SbPairKind kind = (SbPairKind)(i % 4);
     const PetscReal radius = i % 3 == 0 ? 0 : 0.2 * PetscAbsReal(pair_random());
-    const SbCCDLimits limits = {radius, i % 5 ? 1e-3 * PetscAbsReal(pair_random()) : 0.5, i % 7 ? 0.1 : 0.5};
+    const SbCCDLimits limits = {radius, i % 5 ? 1e-3 * PetscAbsReal(pair_random()) : 0.5, i % 7 ? 0.1 : 0.5,
+                                i % 11 ? 0 : 0.01};
     PetscReal x0[12], x1[12], t;
     long double gap, least, keep, from, to;
     PetscBool impact;
@@ -288,6 +289,7 @@ static void check_levels(void)
     }
     least = fminl(limits.separation, gap / 2);
     keep = limits.keep * (gap - least);
+    if (limits.most > 0) keep = fminl(keep, limits.most);
     from = first_below(&m, radius + least + keep, 0, 1);
     to = first_below(&m, radius + least + 0.899L * keep, 0, 1);
     impacts += impact;
@@ -478,7 +480,7 @@ static const Named named[] = {
 
 static void check_named(void)
 {
-  const SbCCDLimits limits = {0, 0, 1e-4};
+  const SbCCDLimits limits = {0, 0, 1e-4, 0};
 
   for (size_t i = 0; i < PETSC_STATIC_ARRAY_LENGTH(named); i++) {
     const Named *c = &named[i];
