@@ -54,7 +54,6 @@
 #define SHIFTS 8         /* so often by SHIFT_MORE before cells are filtered */
 #define SHIFT_MORE 4.
 #define WALL 0.5      /* of the slope of E at first: where more of it is left, a longer step is tried */
-#define SHORTER 0.1   /* a step than the one before, where the method converges */
 #define FARTHER 4.    /* so many times, behind a whole one */
 #define TRIES 5       /* of these */
 #define PROVISIONAL 1 /* steps that may follow each other while E is above where they began */
@@ -74,8 +73,7 @@ typedef struct {
   SbBlocks blocks;        /* its second derivative, when the last direction was solved for */
   PetscInt nblock;        /* of all ranks */
   SbContactHessian kind;
-  PetscReal longest; /* step of the last iteration, if it was a whole one, else 0, m */
-  PetscReal shift;   /* of the last direction: times the mass added to the tangent, 1/s^2 */
+  PetscReal shift; /* of the last direction: times the mass added to the tangent, 1/s^2 */
 } Newton;
 
 /* The potential at an iterate, as far as lengths of steps ask. */
@@ -497,7 +495,7 @@ static PetscErrorCode converged(SNES snes, PetscReal s)
   const SbRun run = n->run;
   const SbModel m = run->model;
   const PetscReal size = SbBodySmallest(m->nbody, m->body);
-  PetscReal longest, shorter, width = PETSC_MAX_REAL, enough;
+  PetscReal longest, width = PETSC_MAX_REAL, enough;
 
   PetscFunctionBeginUser;
   if (!n->nblock) {
@@ -518,11 +516,7 @@ static PetscErrorCode converged(SNES snes, PetscReal s)
   PetscCall(PetscInfo(snes,
                       "iteration %" PetscInt_FMT ": the longest step is %g m, of %g m for the last one\n",
                       snes->iter, (double)longest, (double)enough));
-  /* what is left after a whole step is no more than it is shorter than the one before, times its length */
-  shorter = n->longest > 0. ? longest / n->longest : 1.;
-  n->longest = s >= 1. ? longest : 0.;
-  if (s >= 1. && longest * (shorter < SHORTER ? shorter : 1.) <= enough)
-    snes->reason = SNES_CONVERGED_SNORM_RELATIVE;
+  if (s >= 1. && longest <= enough) snes->reason = SNES_CONVERGED_SNORM_RELATIVE;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -540,7 +534,6 @@ static PetscErrorCode SNESSolve_Newton(SNES snes)
   snes->reason = SNES_CONVERGED_ITERATING;
   snes->iter = 0;
   n->provisional = 0;
-  n->longest = 0.;
   n->nblock = 0;
   n->kind = SB_HESSIAN_CLAMPED;
   n->shift = 0.;
@@ -589,7 +582,6 @@ static PetscErrorCode SNESSolve_Newton(SNES snes)
       if (!again) continue;
       snes->reason = SNES_CONVERGED_ITERATING;
       first = snes->iter;
-      n->longest = 0.;
       PetscCall(SNESComputeFunction(snes, X, F));
       PetscCall(VecNorm(F, NORM_2, &snes->norm));
     }
