@@ -6,8 +6,8 @@
   Z has the unknowns of the nodes of contact themselves, and six rigid-body modes for each aggregate of the other nodes: what contact makes stiff is
   solved exactly, in one coarse space with what is slow. Either alone takes five to twenty times the iterations. M is Chebyshev's iteration of
   DEGREE with the blocks D on the diagonal, on the nodes without contact, where A is K. There D^-1 A has no eigenvalue above four, the nodes of a cell (Wathen, "Realistic eigenvalue
-  bounds for the Galerkin mass matrix", 1987, whose argument holds for sums of any semi-definite matrices of cells), so nothing is estimated, and nothing depends
-  on the number of ranks or on what contact makes stiff. After a guess that makes Z^T r zero it stays so, and the right factor is 1, as in pc_coarse.c.
+  bounds for the Galerkin mass matrix", 1987, whose argument holds for sums of any semi-definite matrices; those of terms at faces, c [P, -P; -P, P] with P = 1 - 1/3 (1, 1, 1) (1, 1, 1)^T
+  for jumps and c [1, -1; -1, 1] for their mean, have three and two), so nothing is estimated, and nothing depends on the number of ranks or on what contact makes stiff. After a guess that makes Z^T r zero it stays so, and the right factor is 1, as in pc_coarse.c.
 
   E consists of 3x3 blocks: one row for a node of contact, two for an aggregate, translation and rotation. One rank factors it (block_solver.c). Modes that vanish
   on what is left of an aggregate get the mean diagonal, as in coarse_operator.c.
@@ -17,13 +17,14 @@
 #include "solver_impl.h"
 #include <petscblaslapack.h>
 
-#define NODES 60         /* of an aggregate */
-#define LARGEST 4.       /* eigenvalue of D^-1 A: nodes of a cell */
-#define LARGEST_FACES 8. /* with terms at faces, which join the nodes of two cells */
-#define RANGE 8.         /* eigenvalues that the smoother reduces, largest over smallest */
-#define DEGREE 2         /* of the smoother */
-#define IN_SPAN 1e-5     /* share of the residual in the span of Z that rounding may leave */
-#define VANISHING 1e-8   /* squared size of a mode over that of the largest one of its aggregate */
+#define NODES 60        /* of an aggregate */
+#define NODES_FACES 15  /* the same where nodes are at faces: a tet has two of them, not a fifth */
+#define AGGREGATES 1500 /* at most of these, unless they have NODES: one rank factors them */
+#define LARGEST 4.      /* eigenvalue of D^-1 A */
+#define RANGE 8.        /* eigenvalues that the smoother reduces, largest over smallest */
+#define DEGREE 2        /* of the smoother */
+#define IN_SPAN 1e-5    /* share of the residual in the span of Z that rounding may leave */
+#define VANISHING 1e-8  /* squared size of a mode over that of the largest one of its aggregate */
 
 typedef struct {
   SbSpace space;
@@ -506,8 +507,7 @@ static PetscErrorCode advance(Contact *p, PetscReal factor, PetscReal other, Vec
 /* z = M r (Saad, Iterative Methods for Sparse Linear Systems, 2003, algorithm 12.1). */
 static PetscErrorCode smooth(Contact *p, Mat A, Vec r, Vec z)
 {
-  const PetscReal largest = p->space->plan->face_term[0] ? LARGEST_FACES : LARGEST,
-                  middle = 0.5 * largest * (1. + 1. / RANGE), half = 0.5 * largest * (1. - 1. / RANGE);
+  const PetscReal middle = 0.5 * LARGEST * (1. + 1. / RANGE), half = 0.5 * LARGEST * (1. - 1. / RANGE);
   PetscReal rho = half / middle;
 
   PetscFunctionBeginUser;
@@ -602,6 +602,7 @@ static PetscErrorCode PCView_Contact(PC pc, PetscViewer viewer)
 
 PetscErrorCode SbPCContactCreate(SbSpace s, const SbContactRows *rows, PC pc)
 {
+  PetscInt nodes;
   Contact *p;
 
   PetscFunctionBeginUser;
@@ -610,7 +611,8 @@ PetscErrorCode SbPCContactCreate(SbSpace s, const SbContactRows *rows, PC pc)
   p->rows = rows;
   p->stale[0] = p->stale[1] = PETSC_TRUE;
   PetscCall(PetscMalloc1(s->nnode_owned, &p->body));
-  PetscCall(SbAggregate(s, (s->nnode_owned + NODES - 1) / NODES, &p->nagg, p->body));
+  nodes = s->plan->face_term[0] ? PetscClipInterval(s->Nnode / AGGREGATES, NODES_FACES, NODES) : NODES;
+  PetscCall(SbAggregate(s, (s->nnode_owned + nodes - 1) / nodes, &p->nagg, p->body));
   PetscCall(SbBlockSolverCreate(s->comm, &p->solver));
   PetscCall(PCSetType(pc, PCSHELL));
   PetscCall(PCShellSetContext(pc, p));

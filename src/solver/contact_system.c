@@ -15,7 +15,7 @@
 #define KEEP 20         /* solves for which a place without values stays */
 #define SMALL 5000      /* unknowns that are factored */
 #define SHARE (1. / 3.) /* of nodes of contact, above which all are */
-#define FORCING 1e-3    /* of the preconditioned residual */
+#define FORCING 1e-2    /* of the preconditioned residual */
 #define MOST 300        /* iterations */
 
 struct _p_SbContactSystem {

@@ -221,8 +221,8 @@ static PetscErrorCode factor_front(PetscScalar *front, PetscInt size, PetscInt n
   PetscCallBLAS("BLAStrsm", BLAStrsm_("R", "L", "T", "N", &m, &n, &one, front, &ld, front + n, &ld));
   // the update: A22 - L21 L21^T
   for (PetscInt j = 0; j < m; j++)
-    PetscCall(
-      PetscArraycpy(update + (size_t)j * (size_t)m, front + (size_t)(n + j) * (size_t)ld + n, (size_t)m));
+    PetscCall(PetscArraycpy(update + (size_t)j * (size_t)m + j, front + (size_t)(n + j) * (size_t)ld + n + j,
+                            (size_t)(m - j)));
   PetscCallBLAS("BLASsyrk", BLASsyrk_("L", "N", &m, &n, &minus, front + n, &ld, &one, update, &m));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -238,7 +238,8 @@ static PetscErrorCode eliminate(SbFactor f, PetscInt g, const PetscInt ia[], con
   PetscFunctionBeginUser;
   // the front begins with the entries of A in the columns of the supernode
   for (PetscInt k = 0; k < nall; k++) work->position[list[k]] = k;
-  PetscCall(PetscArrayzero(work->front, 9 * (size_t)nall * (size_t)nall));
+  for (size_t j = 0, n = 3 * (size_t)nall; j < n; j++)
+    PetscCall(PetscArrayzero(work->front + n * j + j / 3 * 3, n - j / 3 * 3));
   add_entries(f, g, ia, ja, block, work, 3 * nall);
   // the updates of the children join it and are freed
   for (PetscInt c = work->child[g]; c >= 0; c = work->sibling[c]) {
