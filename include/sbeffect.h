@@ -55,11 +55,10 @@ typedef struct {
      t + dt, m; v0 are the velocities at t, m/s, NULL unless an effect has `restitution`. Collective. */
   PetscErrorCode (*begin_step)(SbEffect e, SbSpace space, PetscReal t, PetscReal dt, const PetscReal u0[],
                                const PetscReal v0[], const PetscReal u[]);
-  /* adds the constraints of contact by SbSpaceAddNodalConstraint() and SbSpaceAddConstraint(). Not collective. */
-  PetscErrorCode (*assemble_constraints)(SbEffect e, SbSpace space);
-  /* after a solve, with the residual r without constraints, N: sets `changed` when another solve is needed. Collective. */
-  PetscErrorCode (*update_active_set)(SbEffect e, SbSpace space, const PetscReal u[], const PetscReal r[],
-                                      PetscBool *changed);
+  /* adds the constraints of contact by SbSpaceAddConstraint(): called for all effects first for those along normals, then for those across. Not collective. */
+  PetscErrorCode (*assemble_constraints)(SbEffect e, SbSpace space, PetscBool across);
+  /* after a solve, for whose solution SbConstraintsComputeForces() has been called: sets `changed` when another solve is needed. Collective. */
+  PetscErrorCode (*update_active_set)(SbEffect e, SbSpace space, const PetscReal u[], PetscBool *changed);
   /* after the first solve of an attempt, for effects that want steps cut where points come into contact: the part of the step, 0..1, after which
      the first point that was apart before touches, as the motion without it says; 1: none does. This rank's. Not collective. */
   PetscErrorCode (*time_of_impact)(SbEffect e, PetscReal *part);
@@ -68,13 +67,11 @@ typedef struct {
   PetscErrorCode (*restitution)(SbEffect e, PetscReal *work);
   /* its coefficients have `share` left of them in this step, 0..1: what bounces is constrained accordingly from now on. Not collective. */
   PetscErrorCode (*scale_restitution)(SbEffect e, PetscReal share);
-  /* contact, when a step of Newmark that ends at t has been solved: at what speed that moves to which it constrains something, at the end, by
-     SbSpaceSetNodalConstraintVelocity() and SbSpaceSetConstraintVelocity(); bodies' constraints have none. Not collective. */
+  /* contact, when a step of Newmark that ends at t has been solved: at what velocity that moves to which it constrains something, at the end
+     (SbConstraint.velocity). Not collective. */
   PetscErrorCode (*target_velocity)(SbEffect e, SbSpace space, const SbStage *stage);
-  /* f[nnode][3] += what contact pushes owned nodes with, N, residual r as for history(). For output only; constraints between nodes add
-     theirs without it. Not collective. */
-  PetscErrorCode (*contact_force)(SbEffect e, SbSpace space, const SbStage *stage, const PetscReal r[],
-                                  PetscReal f[]);
+  /* f[nnode][3] += what contact pushes owned nodes with, N. For output only; constraints add theirs without it. Not collective. */
+  PetscErrorCode (*contact_force)(SbEffect e, SbSpace space, const SbStage *stage, PetscReal f[]);
   /* gap[nnode] of owned nodes, m, and normal[nnode][3] towards them, where something that they may touch is nearer than the gap says so
      far. For output only. Not collective. */
   PetscErrorCode (*gap)(SbEffect e, SbSpace space, const SbStage *stage, PetscReal gap[], PetscReal normal[]);
@@ -83,7 +80,7 @@ typedef struct {
   /* A -= shift_k d force / d u + shift_v d force / d v by SbSpaceAddCellBlock(), called for (a, b) and for (b, a) */
   PetscErrorCode (*tangent)(SbEffect e, SbSpace space, const SbStage *stage, Mat A);
   /* y[nnode][3] -= shift_k (d force / d u) x, N, of forces whose derivative is far from symmetric and which tangent() leaves out, for the
-     direction x[nnode][3], m; must be right on owned nodes without communication; not with constraints between nodes */
+     direction x[nnode][3], m; must be right on owned nodes without communication; not with constraints beside the matrix */
   PetscErrorCode (*nonsymmetric)(SbEffect e, SbSpace space, const SbStage *stage, const PetscReal x[],
                                  PetscReal y[]);
   /*
@@ -144,9 +141,8 @@ typedef struct {
      which on prescribed unknowns is the reaction. Values are this rank's part and are summed. */
   PetscErrorCode (*history)(SbEffect e, SbSpace space, const SbStage *stage, const PetscReal residual[],
                             PetscReal values[]);
-  /* adds the points where it pushes the bodies, those of this rank, residual as for history(); for output only. Not collective. */
-  PetscErrorCode (*contact_points)(SbEffect e, SbSpace space, const SbStage *stage,
-                                   const PetscReal residual[], SbContactPoints *list);
+  /* adds the points where it pushes the bodies, those of this rank; for output only. Not collective. */
+  PetscErrorCode (*contact_points)(SbEffect e, SbSpace space, const SbStage *stage, SbContactPoints *list);
   /* for the summary when a run ends: a line on its work, "": nothing. Collective. */
   PetscErrorCode (*summary)(SbEffect e, SbSpace space, size_t size, char text[]);
   PetscErrorCode (*destroy)(SbEffect e);

@@ -39,8 +39,7 @@ typedef struct {
   that this rank owns.
 */
 typedef struct _p_SbJump *SbJump;
-typedef struct _p_SbNodalConstraints *SbNodalConstraints; /* src/fem/nodal_constraint.c */
-typedef struct _p_SbConstraints *SbConstraints;           /* src/fem/constraint.c */
+typedef struct _p_SbConstraints *SbConstraints; /* sbconstraint.h */
 
 typedef struct _p_SbSpace *SbSpace;
 struct _p_SbSpace {
@@ -81,8 +80,7 @@ struct _p_SbSpace {
   SbLane *
     batch_weight; /* [nbatch][4] weight of a cell's own node in the mean of the two; NULL without a DG body */
   SbJump jump;    /* NULL without face nodes */
-  SbNodalConstraints nodal;  /* NULL unless an effect may constrain nodes along directions of their own */
-  SbConstraints constraints; /* NULL unless an effect may join nodes by constraints */
+  SbConstraints constraints; /* NULL unless an effect may constrain nodes along directions of their own */
   PetscBool coupled;         /* an effect may couple nodes that share no cell, in an assembled tangent */
   SbLane *batch_g;           /* [nbatch][9] basis gradients of nodes 1..3, 1/m; 64-byte aligned */
   SbLane *batch_V;           /* [nbatch] volumes, m^3; 0 in padding; 64-byte aligned */
@@ -157,83 +155,6 @@ PetscErrorCode SbSpaceFix(SbSpace space, PetscInt node, int components);
 PetscErrorCode SbSpaceFixDone(SbSpace space);
 /* Index into fixed_node of a node, or -1. */
 PetscInt SbSpaceFixedIndex(SbSpace space, PetscInt node);
-
-/*
-  Nodes constrained along directions of their own for the moment (contact). SbSpaceCreateNodalConstraints() during set-up of an effect that may
-  need it. Then, as often as the directions change: SbSpaceClearNodalConstraints(), SbSpaceAddNodalConstraint() for owned nodes on each rank,
-  SbSpaceAssembleNodalConstraints() (collective). SbModelPrescribe(), residuals and tangents follow.
-*/
-PetscErrorCode SbSpaceCreateNodalConstraints(SbSpace space);
-void SbSpaceClearNodalConstraints(SbSpace space);
-/* n . u = value (m) at an owned node, n of length one. Returns the number of the direction at the node, 0..2, or -1 when the
-   node's earlier directions or prescribed unknowns contain it already: nothing is done then. */
-PetscInt SbSpaceAddNodalConstraint(SbSpace space, PetscInt node, const PetscReal n[3], PetscReal value);
-PetscErrorCode SbSpaceAssembleNodalConstraints(SbSpace space);
-/* u <- (I - Q) u + d, and f <- (I - Q) f, on owned nodes [nnode_owned][3]. Not collective. */
-void SbNodalConstraintsPrescribe(SbSpace space, PetscReal u[]);
-void SbNodalConstraintsProject(SbSpace space, PetscReal f[]);
-/* Leaves of a residual what the constraints must exert: Q f, and f at prescribed unknowns. */
-void SbNodalConstraintsReaction(SbSpace space, PetscReal f[]);
-/* Speed along direction k of an owned node at the end of the step, m/s; 0 unless set. Then v <- the nearest velocity with these speeds,
-   on owned nodes [nnode_owned][3]. Not collective. */
-void SbSpaceSetNodalConstraintVelocity(SbSpace space, PetscInt node, PetscInt k, PetscReal rate);
-void SbNodalConstraintsVelocity(SbSpace space, PetscReal v[]);
-/* Force along direction k of an owned node that the residual r (N, unconstrained) there asks for, N. */
-PetscReal SbSpaceGetNodalConstraintForce(SbSpace space, PetscInt node, PetscInt k, const PetscReal r[3]);
-
-/*
-  Constraints that join nodes of any rank (contact with obstacles by friction and springs, src/fem/constraint.c): sum_k coef_k . u_k = value, exactly or by a spring.
-
-  SbSpaceCreateConstraints() during set-up of an effect that may need them. Then, as often as they change: SbSpaceClearConstraints(), constraints on
-  any rank, SbSpaceAssembleConstraints() (collective). SbModelPrescribe(), residuals and solves follow: solves run in the null space of
-  the exact constraints, or find their multipliers as unknowns. nonsymmetric: constraints may push along other coefficients than those of their sums; then
-  solves are not symmetric.
-*/
-/* How solves treat the exact constraints: in their null space, or as [K F^T; G 0] by a factorisation. */
-typedef enum { SB_SADDLE_NONE, SB_SADDLE_DIRECT } SbSaddle;
-/* Alike on all ranks. */
-PetscErrorCode SbSpaceCreateConstraints(SbSpace space, PetscBool nonsymmetric);
-/* Whether solves of this space are not symmetric. Not collective. */
-PetscBool SbSpaceHasNonsymmetricConstraints(SbSpace space);
-/* Not collective. */
-void SbSpaceClearConstraints(SbSpace space);
-/* gnode[n]: global numbers of nodes; coef[n][3] of the sum; push[n][3] of the force, NULL: the same; value in m; id: constraints that say
-   what those of lower ids say rest, so that no partition changes which. Output: constraint, its number on this rank. Not collective. */
-PetscErrorCode SbSpaceAddConstraint(SbSpace space, PetscInt id, PetscInt n, const PetscInt gnode[],
-                                    const PetscReal coef[], const PetscReal push[], PetscReal value,
-                                    PetscInt *constraint);
-/* A force of constant + stiffness (value - sum_k coef_k . u_k) along the constraint, N; stiffness >= 0, N/m. Not collective. */
-PetscErrorCode SbSpaceAddPenaltyConstraint(SbSpace space, PetscInt n, const PetscInt gnode[],
-                                           const PetscReal coef[], const PetscReal push[], PetscReal value,
-                                           PetscReal stiffness, PetscReal constant, PetscInt *constraint);
-/* Makes matrices of the constraints; without constraints on any rank it exchanges no more than their number. Collective. */
-PetscErrorCode SbSpaceAssembleConstraints(SbSpace space);
-/* What constraints exert and where they are, for the displacement U and its residual R without constraints (N). R <- R less the
-   forces of the exact constraints: what is left is for supports and obstacles. Collective. */
-PetscErrorCode SbSpaceComputeConstraintForces(SbSpace space, Vec U, Vec R);
-/* R += what constraints push free unknowns with, N, after SbSpaceComputeConstraintForces(). Collective. */
-PetscErrorCode SbSpaceAddConstraintReactions(SbSpace space, Vec R);
-/* Whether an exact constraint rests: others say it, or it has no free direction. It has no force, and its sum is not looked after. */
-PetscBool SbSpaceIsConstraintRedundant(SbSpace space, PetscInt constraint);
-/* What SbSpaceComputeConstraintForces() found: force (N, positive: it raises the sum) and sum_k coef_k . u_k (m). Not collective. */
-void SbSpaceGetConstraint(SbSpace space, PetscInt constraint, PetscReal *force, PetscReal *sum);
-/* F += what all constraints exert at the displacement U, as SbSpaceComputeConstraintForces() has found it. Collective. */
-PetscErrorCode SbSpaceAddConstraintForces(SbSpace space, Vec U, Vec F);
-/* U <- nearest displacement on which the exact constraints hold. Collective. */
-PetscErrorCode SbConstraintsPrescribe(SbSpace space, Vec U);
-/*
-  Velocities of what exact constraints tie (src/fem/constraint_velocity.c). Rate: of the sum of a constraint at the end of the step, m/s, 0 unless set; not
-  collective. Velocity: V <- the nearest one in the norm of the lumped mass that has these rates, and the impulses that this takes over
-  the length dt of the step (s) are added to the forces of the constraints. Collective.
-*/
-PetscErrorCode SbSpaceSetConstraintVelocity(SbSpace space, PetscInt constraint, PetscReal rate);
-PetscErrorCode SbConstraintsProjectVelocity(SbSpace space, PetscReal dt, Vec V);
-/* z <- the part of it that moves nothing that is prescribed, constrained, or tied by exact constraints. Collective. */
-PetscErrorCode SbSpaceProjectAdmissible(SbSpace space, Vec z);
-/* F <- F less the springs' forces, and without what the exact constraints take when `constrain`. Collective. */
-PetscErrorCode SbConstraintsResidual(SbSpace space, Vec U, PetscBool constrain, Vec F);
-/* Whether any node of any rank is constrained, or any constraint there, since the last Done. Not collective, alike on all ranks. */
-PetscBool SbSpaceIsConstrained(SbSpace space);
 
 /* Per owned cell: Cauchy stress sigma[6] = xx yy zz xy yz xz (Pa), J, energy density (J/m^3, rest). Outputs may be NULL. */
 PetscErrorCode SbSpaceCellState(SbSpace space, const PetscReal u[], PetscReal sigma[], PetscReal J[],

@@ -105,17 +105,16 @@ PetscErrorCode SbModelContactResume(SbModel model);
 /* After the first Settle of a step: the part of it after which the first point arrives at what it did not touch before, 1: none
    does; effects that do not ask for it are not examined. Collective. */
 PetscErrorCode SbModelContactTimeOfImpact(SbModel model, PetscReal *part);
-/* V <- the nearest velocity in the norm of the lumped mass with which what touches stays so, after a step of the length dt that ended at
-   t with the displacement U; the forces of constraints are raised by the impulses over dt. Collective. */
+/* V <- the nearest velocity with which what touches stays so, after a step of the length dt that ended at t with the displacement U. Collective. */
 PetscErrorCode SbModelContactVelocity(SbModel model, PetscReal t, PetscReal dt, Vec U, Vec V);
 /* G = gap of each node along the normal of the nearest thing that it may touch, m, after the step that ended at t with the displacement U;
    0 where nothing is near. Collective. */
 PetscErrorCode SbModelContactGap(SbModel model, PetscReal t, Vec U, Vec G);
-/* F = what contact pushes the nodes with, N, after the step that ended at t with the displacement U and the residual R without
-   constraints. Collective. */
-PetscErrorCode SbModelContactForce(SbModel model, PetscReal t, Vec U, Vec R, Vec F);
+/* F = what contact pushes the nodes with, N, after the step that ended at t with the displacement U, for which SbRunReactions() has been called.
+   Collective. */
+PetscErrorCode SbModelContactForce(SbModel model, PetscReal t, Vec U, Vec F);
 /* Appends the points of this rank where contact pushes bodies, after the same step. Collective. */
-PetscErrorCode SbModelContactPoints(SbModel model, PetscReal t, Vec U, Vec R, SbContactPoints *list);
+PetscErrorCode SbModelContactPoints(SbModel model, PetscReal t, Vec U, SbContactPoints *list);
 /*
   Guarded contact, where model->npotential > 0; operations of the same names in sbeffect.h. Collective.
 

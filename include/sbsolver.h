@@ -2,7 +2,7 @@
   sbsolver.h - layer 2: linear solvers by name, and the choice of one by problem and rank count.
 */
 #pragma once
-#include "sbfem.h"
+#include "sbconstraint.h"
 
 /* A row of the solver table: a matrix type and PETSc options that are set where the user is silent. */
 typedef struct _SbSolverPreset {
@@ -159,8 +159,6 @@ PetscErrorCode SbPCRotatedGetWork(PC pc, PetscInt64 *interior, PetscInt64 *inter
 /* The operator of solves: K, its springs, projected. singular: K may be so, because only constraints support some body: it is made regular for
    preconditioners, but for the operator; SB_SADDLE_DIRECT needs none of that. Collective; the caller destroys it; K is borrowed until then. */
 PetscErrorCode SbConstraintsCreateOperator(SbSpace space, Mat K, PetscBool singular, SbSaddle saddle, Mat *A);
-/* Another matrix instead of K; borrowed. Not collective. */
-PetscErrorCode SbConstraintsSetMatrix(SbSpace space, Mat K);
 
 /* ------------------------------------------------------------------ contact_system.c: a tangent with blocks between any nodes */
 

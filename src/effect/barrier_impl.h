@@ -163,11 +163,10 @@ PetscErrorCode SbEffectGapForces_Barrier(SbEffect e, SbSpace s, const PetscReal 
                                          PetscReal *bound);
 PetscErrorCode SbEffectHessian_Barrier(SbEffect e, SbSpace s, const PetscReal u[], SbContactHessian kind,
                                        SbBlocks *blocks, PetscReal r[]);
-PetscErrorCode SbEffectContactForce_Barrier(SbEffect e, SbSpace s, const SbStage *stage, const PetscReal r[],
-                                            PetscReal f[]);
+PetscErrorCode SbEffectContactForce_Barrier(SbEffect e, SbSpace s, const SbStage *stage, PetscReal f[]);
 PetscErrorCode SbEffectHistory_Barrier(SbEffect e, SbSpace s, const SbStage *stage, const PetscReal r[],
                                        PetscReal values[]);
-PetscErrorCode SbEffectContactPoints_Barrier(SbEffect e, SbSpace s, const SbStage *stage, const PetscReal r[],
+PetscErrorCode SbEffectContactPoints_Barrier(SbEffect e, SbSpace s, const SbStage *stage,
                                              SbContactPoints *list);
 PetscErrorCode SbEffectGap_Barrier(SbEffect e, SbSpace s, const SbStage *stage, PetscReal gap[],
                                    PetscReal normal[]);

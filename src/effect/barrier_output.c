@@ -3,14 +3,12 @@
 */
 #include "barrier_impl.h"
 
-PetscErrorCode SbEffectContactForce_Barrier(SbEffect e, SbSpace s, const SbStage *stage, const PetscReal r[],
-                                            PetscReal f[])
+PetscErrorCode SbEffectContactForce_Barrier(SbEffect e, SbSpace s, const SbStage *stage, PetscReal f[])
 {
   Barrier *b = (Barrier *)e->data;
 
   PetscFunctionBeginUser;
   (void)s;
-  (void)r;
   if (!b->begun) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(SbBarrierLook(b, stage->u));
   (void)SbBarrierGradient(b, -1., f);
@@ -192,7 +190,7 @@ static void push_point(const Barrier *b, const SbContactPair *pair, const PetscR
   }
 }
 
-PetscErrorCode SbEffectContactPoints_Barrier(SbEffect e, SbSpace s, const SbStage *stage, const PetscReal r[],
+PetscErrorCode SbEffectContactPoints_Barrier(SbEffect e, SbSpace s, const SbStage *stage,
                                              SbContactPoints *list)
 {
   Barrier *b = (Barrier *)e->data;
@@ -201,7 +199,6 @@ PetscErrorCode SbEffectContactPoints_Barrier(SbEffect e, SbSpace s, const SbStag
   PetscBool *told;
 
   PetscFunctionBeginUser;
-  (void)r;
   if (!b->begun) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(SbBarrierLook(b, stage->u));
   PetscCall(PetscCalloc1(b->nrub, &told));

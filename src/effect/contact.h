@@ -3,7 +3,6 @@
 */
 #pragma once
 #include "barrier.h"
-#include "friction.h"
 #include "overlap.h"
 #include "rebound.h"
 
@@ -14,6 +13,16 @@ static inline PetscBool SbResponseIsExact(SbResponse response)
 {
   return (PetscBool)(response == PROJECTED || response == MULTIPLIER);
 }
+
+/* Coefficients of an effect, and how its friction settles in a step (friction.c). */
+typedef struct {
+  PetscReal mu, mu_kinetic;
+  PetscBool exact;     /* what sticks has exact constraints; else springs */
+  int updates;         /* within the step */
+  PetscReal unsettled; /* largest error of friction after the last solve, as a part of the largest friction */
+  PetscBool said;      /* that friction did not settle */
+  PetscReal loss;      /* since the start, this rank, J */
+} SbFriction;
 
 /* Options of all responses. */
 typedef struct {

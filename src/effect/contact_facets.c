@@ -6,7 +6,7 @@
   normal with which forces balance in the valley, and it is constrained along that till the step ends; else the one that pulls is left. On
   two facets it slides along the valley, and maybe behind a third one, which then takes the place of that which pushes less.
 
-  Elsewhere (ridges, and where nodes are constrained by rows) normals of facets are averaged from search to search, and after many of them the plane is kept.
+  Elsewhere (ridges, and with friction) normals of facets are averaged from search to search, and after many of them the plane is kept.
 */
 #include "contact_node.h"
 
@@ -44,7 +44,7 @@ PetscBool SbContactFlip(const Contact *c, const PetscReal X[3], const PetscReal 
   for (int i = 0; i < 3; i++) last[i] = touch->surface[i];
   set_plane(n, level, touch->surface, &touch->level);
   if (flips) touch->flips++;
-  if (flips && touch->along >= 0 && !c->rows && c->bounce.e <= 0 && touch->flips > VALLEY &&
+  if (flips && touch->along >= 0 && c->friction.mu <= 0 && c->bounce.e <= 0 && touch->flips > VALLEY &&
       touch->flips <= GIVEN_UP && gap - touch->rest < -TOLERANCE * c->size) {
     touch->valley = touch->undecided = PETSC_TRUE;
     set_plane(n, level, touch->n, &touch->value);

@@ -33,7 +33,7 @@ PetscReal SbContactGap(const Contact *c, const SbPose *pose, const PetscReal x[3
 static PetscReal normal_force(const Contact *c, const SbPose *pose, const Touch *touch, const PetscReal x[3],
                               PetscReal n[3])
 {
-  if (exact(c) || c->rows) {
+  if (c->held) {
     for (int k = 0; k < 3; k++) n[k] = touch->n[k];
     return touch->on && touch->along >= 0 ? SbContactForce(c, touch) : 0;
   }
@@ -88,16 +88,6 @@ void SbContactStretch(const SbPose *pose, Touch *touch)
   }
 }
 
-/* What friction leaves for the next step. */
-static void accept_friction(Contact *c, SbSpace space, const SbPose *pose, Touch *touch)
-{
-  const SbFrictionPair p = pair_of(space, touch);
-
-  SbFrictionAccept(&c->friction, &p,
-                   (PetscBool)(touch->on && touch->along >= 0 && SbContactForce(c, touch) > 0));
-  SbContactStretch(pose, touch);
-}
-
 PetscErrorCode SbEffectAccept_Contact(SbEffect e, SbSpace space, const SbStage *stage)
 {
   Contact *c = (Contact *)e->data;
@@ -112,51 +102,27 @@ PetscErrorCode SbEffectAccept_Contact(SbEffect e, SbSpace space, const SbStage *
 
     place(space, touch->node, stage->u, x);
     if (!exact(c)) touch->on = (PetscBool)(normal_force(c, &pose, touch, x, n) > 0);
-    if (c->friction.mu > 0) accept_friction(c, space, &pose, touch);
+    if (c->friction.mu > 0) { /* what it leaves for the next step */
+      SbFrictionAccept(&c->friction, touch,
+                       (PetscBool)(touch->on && touch->along >= 0 && SbContactForce(c, touch) > 0));
+      SbContactStretch(&pose, touch);
+    }
     touch->was = (PetscBool)(touch->on && touch->rest <= 0);
     touch->kept = PetscMin(0, touch->rest);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscReal SbContactMultiplier(const Contact *c, SbSpace space, const Touch *touch, const PetscReal r[3])
-{
-  PetscReal force, at;
-
-  if (!touch->on || touch->along < 0) return 0;
-  if (!c->rows) return SbSpaceGetNodalConstraintForce(space, touch->node, touch->along, r);
-  SbSpaceGetConstraint(space, touch->along, &force, &at);
-  return force;
-}
-
 /* Force of the obstacle on a node at x, N. */
 static void force_on(const Contact *c, const SbPose *pose, SbSpace space, const Touch *touch,
-                     const PetscReal x[3], const PetscReal residual[], PetscReal f[3])
+                     const PetscReal x[3], PetscReal f[3])
 {
   PetscReal n[3], normal = normal_force(c, pose, touch, x, n);
 
   f[0] = f[1] = f[2] = 0;
   if (normal <= 0) return;
-  if (exact(c) || c->rows) normal = SbContactMultiplier(c, space, touch, residual + 3 * touch->node);
+  if (c->held) normal = SbSpaceGetConstraint(space, touch->along)->force;
   for (int k = 0; k < 3; k++) f[k] = normal * n[k] + (c->friction.mu > 0 ? touch->grip.drag[k] : 0);
-}
-
-PetscErrorCode SbEffectContactForce_Contact(SbEffect e, SbSpace space, const SbStage *stage,
-                                            const PetscReal residual[], PetscReal f[])
-{
-  const Contact *c = (const Contact *)e->data;
-  SbPose pose;
-
-  PetscFunctionBeginUser;
-  SbContactPose(c, stage->t, &pose);
-  for (PetscInt i = 0; i < c->n; i++) {
-    PetscReal x[3], force[3];
-
-    place(space, c->touch[i].node, stage->u, x);
-    force_on(c, &pose, space, &c->touch[i], x, residual, force);
-    for (int k = 0; k < 3; k++) f[3 * c->touch[i].node + k] += force[k];
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode SbEffectGap_Contact(SbEffect e, SbSpace space, const SbStage *stage, PetscReal gap[],
@@ -181,7 +147,7 @@ PetscErrorCode SbEffectGap_Contact(SbEffect e, SbSpace space, const SbStage *sta
 }
 
 PetscErrorCode SbEffectContactPoints_Contact(SbEffect e, SbSpace space, const SbStage *stage,
-                                             const PetscReal residual[], SbContactPoints *list)
+                                             SbContactPoints *list)
 {
   const Contact *c = (const Contact *)e->data;
   SbPose pose;
@@ -195,7 +161,7 @@ PetscErrorCode SbEffectContactPoints_Contact(SbEffect e, SbSpace space, const Sb
 
     place(space, touch->node, stage->u, p.x);
     if (normal_force(c, &pose, touch, p.x, p.normal) <= 0) continue;
-    force_on(c, &pose, space, touch, p.x, residual, p.force);
+    force_on(c, &pose, space, touch, p.x, p.force);
     p.gap = SbContactGap(c, &pose, p.x, p.normal);
     if (exact(c)) PetscCall(PetscArraycpy(p.normal, touch->n, 3)); /* that it is constrained along */
     PetscCall(SbContactPointsAdd(list, &p));
@@ -214,6 +180,7 @@ PetscErrorCode SbEffectHistory_Contact(SbEffect e, SbSpace space, const SbStage 
 
   PetscFunctionBeginUser;
   SbContactPose(c, stage->t, &pose);
+  (void)residual;
   for (int k = 0; k < 8; k++) values[k] = 0;
   for (PetscInt i = 0; i < c->n; i++) {
     const Touch *touch = &c->touch[i];
@@ -222,7 +189,7 @@ PetscErrorCode SbEffectHistory_Contact(SbEffect e, SbSpace space, const SbStage 
     place(space, touch->node, stage->u, x);
     deepest[0] = PetscMax(deepest[0], -SbContactGap(c, &pose, x, n));
     if (normal_force(c, &pose, touch, x, n) <= 0) continue;
-    force_on(c, &pose, space, touch, x, residual, f);
+    force_on(c, &pose, space, touch, x, f);
     for (int k = 0; k < 3; k++) arm[k] = x[k] - c->point[k] - pose.d[k];
     SbCross(arm, f, moment);
     for (int k = 0; k < 3; k++) {

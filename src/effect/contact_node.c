@@ -5,16 +5,16 @@
   those that carry the surface: vertices of P1, centroids of boundary faces of CR and DG (there g is the mean gap of the face), vertices and edges of P2. A uniform
   pressure is carried by the edges of P2 alone, which exact responses find by themselves; springs have the areas of the four triangles over the six nodes of a facet.
 
-  Response `projected`: touching nodes are constrained on the obstacle (src/fem/nodal_constraint.c): n . u is prescribed, and the force that this
+  Response `projected`: touching nodes are constrained on the obstacle (src/fem/constraint.c): n . u is prescribed, and the force that this
   takes is the multiplier lambda. After each solve a pulling one leaves, a penetrated node enters, the normal is taken again on a
   curved obstacle, and the solve is repeated until nothing changes (Kikuchi and Oden 1988; Hueeber and Wohlmuth 2005). A node that
-  has left and come back several times within a step stays: the loop ends. `multiplier`: the same with rows n . u = c (src/fem/constraint.c),
-  whose forces are unknowns of the solves.
+  has left and come back several times within a step stays: the loop ends. `multiplier`: the same with the forces as
+  unknowns of the solves.
 
   Response `penalty`: springs, N = k <-g>, with k from the stiffness of the cell behind. `augmented`: the penalty with a multiplier,
   N = <lambda - k g>, which is raised after each solve until the penetration is within the tolerance (Simo and Laursen 1992).
 
-  Friction (friction.c) is solved for with N. It needs rows: with it all responses write their nodes as such, `projected` exact ones in whose
+  Friction (friction.c) is solved for with N. It needs constraints: with it all responses write their nodes as such, `projected` exact ones in whose
   null space the solves run, `penalty` and `augmented` springs, linear while normals and who touches stay, which is examined after each
   solve. A node sticks to the place of the obstacle where it was when the step began, and moves with it.
 
@@ -29,9 +29,6 @@
 #define TOGGLES 3    /* how often a node may come within a step before it stays */
 #define PULLING 1e-6 /* of the largest contact force: what a node must pull with to leave */
 #define SETTLED 1e-4 /* of the largest contact force: what that of a spring may be off */
-
-/* Identities of the rows: normals of all obstacles before what holds nodes across them. */
-#define NORMALS (PETSC_MIN_INT / 2)
 
 static PetscErrorCode read_path(SbEffect e, const SbScope *scope)
 {
@@ -121,16 +118,15 @@ PetscErrorCode SbContactOptions_Node(SbEffect e, const SbScope *scope, const SbC
   c->damping = o->damping;
   c->bounce.e = o->restitution;
   SbOverlapSet(&c->overlap, o->separation_steps);
-  c->rows = (PetscBool)(c->response == MULTIPLIER || c->friction.mu > 0);
-  if (exact(c) || c->rows) {
-    e->ops.force = NULL;
+  c->held = (PetscBool)(exact(c) || c->friction.mu > 0);
+  if (c->held) {
+    e->ops.force = e->ops.contact_force = NULL; /* constraints push without it */
     e->ops.tangent = NULL;
   } else {
     e->ops.assemble_constraints = NULL;
     e->linear = PETSC_FALSE;
     if (c->response == PENALTY && !c->cut) e->ops.update_active_set = NULL;
   }
-  if (c->rows) e->ops.contact_force = NULL; /* they push without it */
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -145,7 +141,7 @@ static void add_share(SbSpace space, const SbFacet *facet, PetscInt a, PetscReal
   if (node >= space->nnode_owned) return;
   if (slot[node] < 0) {
     slot[node] = c->n++;
-    c->touch[slot[node]] = (Touch){.node = node, .cell = facet->cell, .a = a};
+    c->touch[slot[node]] = (Touch){.node = node, .cell = facet->cell, .a = a, .along = -1};
   }
   touch = &c->touch[slot[node]];
   touch->k += c->stiffness * SbMaterialWaveModulus(m) * share / facet->height;
@@ -190,10 +186,9 @@ static PetscErrorCode setup_contact(SbEffect e, SbSpace space)
       box[k] = PetscMax(box[k], space->mesh->body[b].bbox[3 + k] - space->mesh->body[b].bbox[k]);
   }
   c->size = PetscSqrtReal(SbDot3(box, box));
-  if (c->rows)
-    PetscCall(SbSpaceCreateConstraints(space, (PetscBool)(c->friction.mu > 0)));
-  else if (exact(c))
-    PetscCall(SbSpaceCreateNodalConstraints(space));
+  if (c->held)
+    PetscCall(SbSpaceCreateConstraints(space, (PetscBool)(c->response == MULTIPLIER),
+                                       (PetscBool)(c->friction.mu > 0)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -244,13 +239,9 @@ static void set_damper(const Contact *c, const SbPose *from, PetscReal dt, const
 }
 
 /* A node is behind the obstacle: from now on it is constrained. */
-static void enter(const Contact *c, SbSpace space, Touch *touch)
+static void enter(const Contact *c, Touch *touch)
 {
-  if (!touch->on && c->friction.mu > 0) {
-    const SbFrictionPair p = pair_of(space, touch);
-
-    SbFrictionEnter(&c->friction, &p, -touch->gap);
-  }
+  if (!touch->on && c->friction.mu > 0) SbFrictionEnter(&c->friction, touch, -touch->gap);
   touch->on = PETSC_TRUE;
   if (c->bounce.e > 0) SbContactHit(c, touch);
 }
@@ -290,7 +281,6 @@ static void start_friction(const Contact *c, SbSpace space, const SbPose *from, 
     touch->start[k] = x1[k] - X[k];
     touch->grip.stretch[k] = SbDot3(c->to.R + 3 * k, touch->stretch);
   }
-  touch->rests = PETSC_FALSE;
   SbFrictionBegin(&touch->grip, touch->on);
 }
 
@@ -329,113 +319,88 @@ static PetscErrorCode touch_contact(SbEffect e, SbSpace space, PetscReal t, Pets
     touch->gap = look(c, space, x, touch);
     watch_arrival(c, touch);
     for (int k = 0; k < 3; k++) touch->now[k] = u[3 * touch->node + k];
-    if ((touch->gap < 0 || comes) && exact(c)) enter(c, space, touch);
-    if (!c->rows || exact(c)) continue;
+    if ((touch->gap < 0 || comes) && exact(c)) enter(c, touch);
+    if (!c->held || exact(c)) continue;
     if (spring(touch, touch->gap) > 0)
-      enter(c, space, touch);
+      enter(c, touch);
     else
       touch->on = PETSC_FALSE;
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The rows of a node that touches. */
-static PetscErrorCode hold_rows(const Contact *c, SbSpace space, Touch *touch)
-{
-  const PetscInt id = space->node_orig[touch->node];
-  const SbFrictionPair p = pair_of(space, touch);
-  PetscBool oblique = PETSC_FALSE;
-  PetscReal push[3];
-
-  PetscFunctionBeginUser;
-  if (c->friction.mu > 0) SbFrictionDirection(&c->friction, &p, push, &oblique);
-  if (exact(c))
-    PetscCall(SbSpaceAddConstraint(space, NORMALS - 1 - id, 1, &p.node, touch->n, oblique ? push : NULL,
-                                   touch->value, &touch->along));
-  else
-    PetscCall(SbSpaceAddPenaltyConstraint(space, 1, &p.node, touch->n, oblique ? push : NULL, touch->value,
-                                          touch->stiff, touch->lambda + touch->before, &touch->along));
-  if (c->friction.mu > 0) PetscCall(SbFrictionHold(&c->friction, space, &p, -2 - 2 * id));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode hold_contact(SbEffect e, SbSpace space)
+/* The constraints of touching nodes: along their normals, or across them. */
+static PetscErrorCode hold_contact(SbEffect e, SbSpace space, PetscBool across)
 {
   Contact *c = (Contact *)e->data;
 
   PetscFunctionBeginUser;
   for (PetscInt i = 0; i < c->n; i++) {
     Touch *touch = &c->touch[i];
+    SbConstraint row = {.node = touch->node, .value = touch->value};
 
+    if (across) {
+      if (touch->along >= 0 && c->friction.mu > 0) PetscCall(SbFrictionHold(&c->friction, space, touch));
+      continue;
+    }
     touch->along = touch->other_along = touch->grip.slide[0] = touch->grip.slide[1] = -1;
     if (!touch->on) continue;
-    if (c->rows)
-      PetscCall(hold_rows(c, space, touch));
-    else
-      touch->along = SbSpaceAddNodalConstraint(space, touch->node, touch->n, touch->value);
-    if (touch->valley)
-      touch->other_along = SbSpaceAddNodalConstraint(space, touch->node, touch->other, touch->other_value);
+    for (int k = 0; k < 3; k++) row.n[k] = row.push[k] = touch->n[k];
+    if (c->friction.mu > 0) SbFrictionDirection(&c->friction, touch, row.push);
+    if (!exact(c)) {
+      row.spring = PETSC_TRUE;
+      row.stiffness = touch->stiff;
+      row.constant = touch->lambda + touch->before;
+    }
+    PetscCall(SbSpaceAddConstraint(space, &row, &touch->along));
+    if (!touch->valley) continue;
+    for (int k = 0; k < 3; k++) row.n[k] = row.push[k] = touch->other[k];
+    row.value = touch->other_value;
+    PetscCall(SbSpaceAddConstraint(space, &row, &touch->other_along));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* What a solve made of the rows of a node, at the displacement u; f: their normal force, N. */
-static void read_rows(const Contact *c, SbSpace space, const PetscReal u[3], Touch *touch, PetscReal f[3])
-{
-  const SbFrictionPair p = pair_of(space, touch);
-  PetscReal force, along;
-
-  touch->rests = PETSC_FALSE;
-  for (int k = 0; k < 3; k++) f[k] = 0;
-  for (int k = 0; k < 3; k++) touch->now[k] = u[k];
-  if (touch->along < 0) return;
-  SbSpaceGetConstraint(space, touch->along, &force, &along);
-  touch->rests = SbSpaceIsConstraintRedundant(space, touch->along);
-  if (touch->rests) {
-    touch->along = -1;
-    force = 0;
-  }
-  for (int k = 0; k < 3; k++) f[k] = force * touch->n[k];
-  if (c->friction.mu <= 0) return;
-  SbFrictionRead(&c->friction, space, &p, force, along);
-  for (int k = 0; k < 3; k++) touch->now[k] = u[k];
-}
-
 /* Gap and multiplier of every node after a solve; the largest multiplier of all ranks. */
-static PetscErrorCode measure(const Contact *c, SbSpace space, const PetscReal u[], const PetscReal r[],
-                              PetscReal *largest)
+static PetscErrorCode measure(const Contact *c, SbSpace space, const PetscReal u[], PetscReal *largest)
 {
   PetscFunctionBeginUser;
   *largest = 0;
   for (PetscInt i = 0; i < c->n; i++) {
     Touch *touch = &c->touch[i];
-    const PetscInt node = touch->node;
-    PetscReal x[3], f[3] = {0}, force;
+    const PetscReal pushed = touch->along < 0 ? 0 : SbSpaceGetConstraint(space, touch->along)->force;
+    PetscReal x[3], wrong[3];
 
-    if (c->rows) read_rows(c, space, u + 3 * node, touch, f);
-    if (exact(c)) touch->lambda = SbContactMultiplier(c, space, touch, r + 3 * node);
+    for (int k = 0; k < 3; k++) {
+      touch->now[k] = u[3 * touch->node + k];
+      wrong[k] = pushed * touch->n[k];
+    }
+    if (touch->along >= 0 && c->friction.mu > 0) SbFrictionRead(&c->friction, space, touch, pushed);
+    if (exact(c)) touch->lambda = touch->on ? pushed : 0;
     if (touch->valley)
-      touch->other_lambda = touch->other_along < 0
-                              ? 0
-                              : SbSpaceGetNodalConstraintForce(space, node, touch->other_along, r + 3 * node);
-    place(space, node, u, x);
+      touch->other_lambda =
+        touch->other_along < 0 ? 0 : SbSpaceGetConstraint(space, touch->other_along)->force;
+    place(space, touch->node, u, x);
     touch->gap = look(c, space, x, touch);
     *largest = PetscMax(*largest, SbContactForce(c, touch));
-    if (exact(c) || !c->rows) continue;
-    force = touch->on && touch->toggles >= TOGGLES ? pull(touch, touch->gap) : SbContactForce(c, touch);
-    for (int k = 0; k < 3; k++) f[k] -= force * touch->n[k];
-    touch->wrong = PetscSqrtReal(SbDot3(f, f));
+    if (!exact(c) && c->held) {
+      const PetscReal force =
+        touch->on && touch->toggles >= TOGGLES ? pull(touch, touch->gap) : SbContactForce(c, touch);
+
+      for (int k = 0; k < 3; k++) wrong[k] -= force * touch->n[k];
+      touch->wrong = PetscSqrtReal(SbDot3(wrong, wrong));
+    }
   }
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, largest, 1, MPIU_REAL, MPI_MAX, space->comm));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Whether a node is constrained, or not, as it should be; changes it if not. */
-static PetscBool settle_held(const Contact *c, SbSpace space, PetscReal largest, Touch *touch)
+static PetscBool settle_held(const Contact *c, PetscReal largest, Touch *touch)
 {
   if (!touch->on) {
     if (touch->gap >= -TOLERANCE * c->size) return PETSC_TRUE;
-    enter(c, space, touch);
+    enter(c, touch);
     touch->toggles++;
     return PETSC_FALSE;
   }
@@ -452,14 +417,14 @@ static PetscBool settle_held(const Contact *c, SbSpace space, PetscReal largest,
 
 /* Whether a spring pushes with what its place asks for, and for `augmented`, whose multiplier is raised, until the remainder of the penetration
    does not matter. */
-static PetscBool settle_spring(const Contact *c, SbSpace space, PetscReal largest, Touch *touch)
+static PetscBool settle_spring(const Contact *c, PetscReal largest, Touch *touch)
 {
   const PetscReal force = spring(touch, touch->gap);
   PetscBool right = PETSC_TRUE;
 
-  if (c->rows) {
+  if (c->held) {
     if (!touch->on && force > 0) {
-      enter(c, space, touch);
+      enter(c, touch);
       touch->toggles++;
     } else if (force <= 0 && touch->toggles < TOGGLES)
       touch->on = PETSC_FALSE;
@@ -471,7 +436,7 @@ static PetscBool settle_spring(const Contact *c, SbSpace space, PetscReal larges
   return PETSC_FALSE;
 }
 
-/* Springs that have stayed as rows and pull when all else is settled: they go, a few times. */
+/* Springs that have stayed as constraints and pull when all else is settled: they go, a few times. */
 static PetscErrorCode let_go(const Contact *c, SbSpace space, PetscReal largest, PetscBool *changed)
 {
   PetscBool wait = *changed;
@@ -490,18 +455,15 @@ static PetscErrorCode let_go(const Contact *c, SbSpace space, PetscReal largest,
 }
 
 /* Which nodes stick and which slide from now on. */
-static void settle_friction(Contact *c, SbSpace space, PetscReal largest, PetscBool *changed)
+static void settle_friction(Contact *c, PetscReal largest, PetscBool *changed)
 {
   PetscReal worst = 0;
 
   for (PetscInt i = 0; i < c->n; i++) {
     Touch *touch = &c->touch[i];
-    const SbFrictionPair p = pair_of(space, touch);
-    PetscReal error;
 
     if (!touch->on || touch->along < 0) continue;
-    error = SbFrictionSettle(&c->friction, &p, SbContactForce(c, touch));
-    worst = PetscMax(worst, error);
+    worst = PetscMax(worst, SbFrictionSettle(&c->friction, touch, SbContactForce(c, touch)));
   }
   SbFrictionJudge(&c->friction, worst, largest, changed);
 }
@@ -521,26 +483,24 @@ static PetscBool wake(Contact *c)
   return pushes;
 }
 
-static PetscErrorCode settle_contact(SbEffect e, SbSpace space, const PetscReal u[], const PetscReal r[],
-                                     PetscBool *changed)
+static PetscErrorCode settle_contact(SbEffect e, SbSpace space, const PetscReal u[], PetscBool *changed)
 {
   Contact *c = (Contact *)e->data;
   PetscReal largest;
   PetscBool mine = PETSC_FALSE;
 
   PetscFunctionBeginUser;
-  PetscCall(measure(c, space, u, r, &largest));
+  PetscCall(measure(c, space, u, &largest));
   if (c->first && c->cut && wake(c)) mine = PETSC_TRUE;
   c->first = PETSC_FALSE;
   for (PetscInt i = 0; i < c->n; i++) {
     Touch *touch = &c->touch[i];
-    const PetscBool right =
-      exact(c) ? settle_held(c, space, largest, touch) : settle_spring(c, space, largest, touch);
+    const PetscBool right = exact(c) ? settle_held(c, largest, touch) : settle_spring(c, largest, touch);
 
     if (!right) mine = PETSC_TRUE;
   }
-  if (c->friction.mu > 0) settle_friction(c, space, largest, &mine);
-  if (c->rows && !exact(c)) PetscCall(let_go(c, space, largest, &mine));
+  if (c->friction.mu > 0) settle_friction(c, largest, &mine);
+  if (c->held && !exact(c)) PetscCall(let_go(c, space, largest, &mine));
   if (mine) *changed = PETSC_TRUE;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -580,7 +540,7 @@ PetscErrorCode SbContactCreate_Node(SbEffect e)
   e->ops.force = SbEffectForce_Contact;
   e->ops.tangent = SbEffectTangent_Contact;
   e->ops.accept = SbEffectAccept_Contact;
-  e->ops.contact_force = SbEffectContactForce_Contact;
+  e->ops.contact_force = SbEffectForce_Contact;
   e->ops.gap = SbEffectGap_Contact;
   e->ops.contact_points = SbEffectContactPoints_Contact;
   e->ops.history = SbEffectHistory_Contact;

@@ -1,11 +1,25 @@
 /*
-  contact_node.h - nodes of the surface against a rigid obstacle: what contact_node.c, contact_facets.c, contact_force.c and contact_rebound.c share.
+  contact_node.h - nodes of the surface against a rigid obstacle: what contact_node.c, contact_facets.c, contact_force.c, contact_rebound.c and friction.c share.
 */
 #pragma once
 #include "contact.h"
 #include "sbcontact.h"
 
 #define TOLERANCE 1e-7 /* of the size of the bodies: largest penetration that counts as touching */
+
+/* What friction knows of a node. */
+typedef struct {
+  PetscInt slide[2];       /* constraints across the normal, -1: none */
+  PetscBool slides;        /* in the solve; else it sticks */
+  PetscBool slid;          /* in the last step */
+  PetscBool crowded;       /* others hold the node as well: it sticks by springs as long as it touches */
+  int flips;               /* how often that or its direction has turned within the step */
+  PetscReal tangent[2][3]; /* across the normal; the first one is where it slides to */
+  PetscReal turning;       /* stiffness across where it slides to, N/m */
+  PetscReal stretch[3];    /* of the springs that stick, at the start of the step, m */
+  PetscReal drag[3];       /* force of friction on the node in the last solve, N */
+  PetscReal pressing;      /* normal force of the solve before, N */
+} SbFrictionState;
 
 /* A node of the surface that this rank owns. */
 typedef struct {
@@ -16,12 +30,11 @@ typedef struct {
   PetscBool idle;         /* its spring waits for the first solve of the step */
   PetscReal gap0;         /* gap when the step began, m; with `time_of_impact yes` or restitution */
   int toggles, flips;     /* how often it came within the step, and while held changed facets */
-  PetscInt along;  /* number of its direction at the node, or of its row; -1: constrained by something else */
-  PetscBool rests; /* other rows say what its own does */
-  PetscReal surface[3]; /* normal of the obstacle at the last search */
-  PetscReal level;      /* n . u on the plane of that facet, m */
-  PetscBool valley;     /* it is constrained on two facets for the time of a solve (contact_facets.c) */
-  PetscBool undecided;  /* the solves go on for that */
+  PetscInt along;         /* its constraint; -1: others say it, or it does not touch */
+  PetscReal surface[3];   /* normal of the obstacle at the last search */
+  PetscReal level;        /* n . u on the plane of that facet, m */
+  PetscBool valley;       /* it is constrained on two facets for the time of a solve (contact_facets.c) */
+  PetscBool undecided;    /* the solves go on for that */
   PetscReal other[3], other_value; /* the second one, as n and value */
   PetscInt other_along;            /* as along */
   PetscReal other_lambda;          /* N */
@@ -33,10 +46,10 @@ typedef struct {
   PetscReal gap;  /* after the last solve, beyond `rest`, m */
   PetscReal
     arrives; /* restitution: speed towards the obstacle when the step began, m/s; 0: it does not bounce */
-  PetscReal stiff;      /* of the spring in this step with its damper, N/m */
-  PetscReal before;     /* damper: force for where the node was when the step began, N */
-  PetscReal lambda;     /* multiplier of the last solve, N */
-  PetscReal wrong;      /* rows as springs: force that its place asks for, less that of the last solve, N */
+  PetscReal stiff;  /* of the spring in this step with its damper, N/m */
+  PetscReal before; /* damper: force for where the node was when the step began, N */
+  PetscReal lambda; /* multiplier of the last solve, N */
+  PetscReal wrong; /* constraints as springs: force that its place asks for, less that of the last solve, N */
   SbFrictionState grip; /* friction */
   PetscReal start[3];   /* displacement with which it would stick, m */
   PetscReal now[3];     /* that of the last solve, m */
@@ -48,7 +61,7 @@ typedef struct {
   SbEffectOn on;
   SbObstacle obstacle;
   SbResponse response;
-  PetscBool rows;   /* touching nodes are constrained by rows, not by directions of their own */
+  PetscBool held;   /* touching nodes are constrained; else they are pushed by force() */
   PetscBool facets; /* the obstacle is a mesh */
   SbFriction friction;
   PetscReal stiffness, damping; /* s */
@@ -100,19 +113,6 @@ static inline PetscReal SbContactForce(const Contact *c, const Touch *touch)
   return exact(c) ? touch->lambda : spring(touch, touch->gap);
 }
 
-/* A node as friction sees it; held by rows. */
-static inline SbFrictionPair pair_of(SbSpace space, Touch *touch)
-{
-  return (SbFrictionPair){.node = space->gnode[touch->node],
-                          .normal = touch->n,
-                          .start = touch->start,
-                          .now = touch->now,
-                          .k = touch->k,
-                          .rests = touch->rests,
-                          .fixed = space->fixed[touch->node],
-                          .grip = &touch->grip};
-}
-
 /*
   contact_facets.c: where a held node goes that has been solved for and is at x now, X at rest, by `gap` (m) off the facet with the normal n; its planes
   for the next solve. Flip: it was constrained on one facet; whether it goes on on another one. Valley: it was on two. Not collective.
@@ -124,8 +124,28 @@ void SbContactValley(const Contact *c, SbSpace space, const PetscReal x[3], Pets
 /* Whether a node is constrained on the plane that it has till the step ends. */
 PetscBool SbContactKept(const Touch *touch);
 
-/* What a solve has made of the force that holds a node, N; r: the residual there. */
-PetscReal SbContactMultiplier(const Contact *c, SbSpace space, const Touch *touch, const PetscReal r[3]);
+/*
+  Friction (friction.c). Not collective but for Warn. Begin: a step; touches: the node did when the last one ended. Enter: it touches from now on: it sticks or slides as its motion
+  without touching says, by which it is `depth` (m) behind. Direction: of the normal force. Hold: adds its constraints across the
+  normal. Read: what a solve made of them, N being the normal force.
+*/
+void SbFrictionBegin(SbFrictionState *grip, PetscBool touches);
+void SbFrictionEnter(const SbFriction *f, Touch *touch, PetscReal depth);
+void SbFrictionDirection(const SbFriction *f, const Touch *touch, PetscReal push[3]);
+PetscErrorCode SbFrictionHold(const SbFriction *f, SbSpace space, Touch *touch);
+void SbFrictionRead(const SbFriction *f, SbSpace space, Touch *touch, PetscReal N);
+/* Whether a node sticks or slides from now on. Returns the error of its friction in the last solve, N. N: its normal force. */
+PetscReal SbFrictionSettle(const SbFriction *f, Touch *touch, PetscReal N);
+/* After all nodes: worst of their errors on this rank and largest normal force of all ranks, N; changed: the solve was not right. */
+void SbFrictionJudge(SbFriction *f, PetscReal worst, PetscReal largest, PetscBool *changed);
+/* Ends a step for a node; presses: its normal force is positive. */
+void SbFrictionAccept(SbFriction *f, Touch *touch, PetscBool presses);
+/* Ends a step: says once that friction was taken as it was. Collective. */
+PetscErrorCode SbFrictionWarn(SbFriction *f, const char effect[], SbSpace space, PetscReal t);
+/* What it takes from step to step, for checkpoints: state[SB_FRICTION_STATE]. */
+#define SB_FRICTION_STATE 9
+void SbFrictionSave(const SbFrictionState *grip, PetscReal state[]);
+void SbFrictionLoad(const PetscReal state[], SbFrictionState *grip);
 
 /*
   Restitution (contact_rebound.c), of a node at x0 with the velocity v0 (m/s; NULL: not known) when the step begins. Comes: it will be
@@ -142,12 +162,10 @@ PetscErrorCode SbEffectTargetVelocity_Contact(SbEffect e, SbSpace space, const S
 PetscErrorCode SbEffectRestitution_Contact(SbEffect e, PetscReal *work);
 PetscErrorCode SbEffectScaleRestitution_Contact(SbEffect e, PetscReal share);
 PetscErrorCode SbEffectAccept_Contact(SbEffect e, SbSpace space, const SbStage *stage);
-PetscErrorCode SbEffectContactForce_Contact(SbEffect e, SbSpace space, const SbStage *stage,
-                                            const PetscReal residual[], PetscReal f[]);
 PetscErrorCode SbEffectGap_Contact(SbEffect e, SbSpace space, const SbStage *stage, PetscReal gap[],
                                    PetscReal normal[]);
 PetscErrorCode SbEffectContactPoints_Contact(SbEffect e, SbSpace space, const SbStage *stage,
-                                             const PetscReal residual[], SbContactPoints *list);
+                                             SbContactPoints *list);
 PetscErrorCode SbEffectHistory_Contact(SbEffect e, SbSpace space, const SbStage *stage,
                                        const PetscReal residual[], PetscReal values[]);
 #define SB_CONTACT_STATE (14 + SB_FRICTION_STATE) /* numbers in a record */

@@ -83,10 +83,7 @@ PetscErrorCode SbEffectTargetVelocity_Contact(SbEffect e, SbSpace space, const S
     SbPoseApply(&before, X, from);
     SbPoseApply(&now, X, to);
     for (int k = 0; k < 3; k++) v[k] = (to[k] - from[k]) / (INSTANT * stage->dt);
-    if (!c->rows)
-      SbSpaceSetNodalConstraintVelocity(space, touch->node, touch->along, SbDot3(touch->n, v));
-    else
-      PetscCall(SbSpaceSetConstraintVelocity(space, touch->along, SbDot3(touch->n, v)));
+    SbSpaceGetConstraint(space, touch->along)->velocity = SbDot3(touch->n, v);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }

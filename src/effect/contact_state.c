@@ -2,7 +2,7 @@
   contact_state.c - what a node that touches an obstacle takes from step to step, for checkpoints.
 
   A record is a node by its original number: whether it touches and did so, what it is constrained at and along, multiplier, gap, and its
-  friction. With that the rows of the last solve can be written again, and the next step begins as if the run had not stopped.
+  friction. With that the constraints of the last solve can be written again, and the next step begins as if the run had not stopped.
 */
 #include "contact_node.h"
 
@@ -58,7 +58,7 @@ static void forget(Contact *c, const PetscReal u[])
   for (PetscInt i = 0; i < c->n; i++) {
     Touch *touch = &c->touch[i];
 
-    touch->on = touch->was = touch->idle = touch->rests = PETSC_FALSE;
+    touch->on = touch->was = touch->idle = PETSC_FALSE;
     touch->along = -1;
     touch->rest = touch->kept = touch->lambda = touch->gap = touch->arrives = 0;
     touch->grip = (SbFrictionState){.slide = {-1, -1}};

@@ -12,8 +12,7 @@
   A node in the corner of two obstacles cannot stick to both by exact constraints: they would say the same twice, and take from each other's
   normal force. Such a pair sticks by springs as long as it touches.
 */
-#include "friction.h"
-#include "sbbase.h"
+#include "contact_node.h"
 
 #define SETTLED 1e-4 /* of the largest friction: error that is left */
 #define LATE 1e-2    /* the same after UPDATES solves, with a warning; what does not get there is cut */
@@ -60,17 +59,17 @@ static PetscReal across(const PetscReal n[3], PetscReal v[3])
 }
 
 /* Slip of the step and what springs were stretched by before, across the normal, m; returns its length. */
-static PetscReal slip(const SbFrictionPair *p, PetscReal s[3])
+static PetscReal slip(const Touch *touch, PetscReal s[3])
 {
-  for (int k = 0; k < 3; k++) s[k] = p->grip->stretch[k] + p->now[k] - p->start[k];
-  return across(p->normal, s);
+  for (int k = 0; k < 3; k++) s[k] = touch->grip.stretch[k] + touch->now[k] - touch->start[k];
+  return across(touch->n, s);
 }
 
 /* Turns the two directions across the normal, the first one along v or the remainder of it. */
-static void turn(const SbFrictionPair *p, const PetscReal v[3])
+static void turn(Touch *touch, const PetscReal v[3])
 {
-  const PetscReal *n = p->normal;
-  SbFrictionState *g = p->grip;
+  const PetscReal *n = touch->n;
+  SbFrictionState *g = &touch->grip;
   PetscReal t[3] = {v[0], v[1], v[2]}, length = across(n, t);
 
   if (length <= 1e-12 * PetscSqrtReal(SbDot3(v, v))) {
@@ -83,108 +82,92 @@ static void turn(const SbFrictionPair *p, const PetscReal v[3])
   SbCross(n, g->tangent[0], g->tangent[1]);
 }
 
-/* Turns them for a pair that sticks: a prescribed component has no say, and the other direction is to be one that is free. */
-static void turn_free(const SbFrictionPair *p)
+void SbFrictionEnter(const SbFriction *f, Touch *touch, PetscReal depth)
 {
-  PetscReal fixed[3] = {p->fixed == 1, p->fixed == 2, p->fixed == 4}, v[3];
-
-  SbCross(p->normal, fixed, v);
-  turn(p, SbDot3(v, v) > 1e-12 ? v : p->grip->tangent[0]);
-}
-
-void SbFrictionEnter(const SbFriction *f, const SbFrictionPair *p, PetscReal depth)
-{
-  SbFrictionState *g = p->grip;
+  SbFrictionState *g = &touch->grip;
   PetscReal s[3];
-  const PetscReal length = slip(p, s), most = coefficient(f, g) * PetscMax(0, depth);
+  const PetscReal length = slip(touch, s), most = coefficient(f, g) * PetscMax(0, depth);
 
   g->slides = (PetscBool)(length > most);
   if (!g->slides) return;
-  g->turning = p->k * most / length;
-  turn(p, s);
+  g->turning = touch->k * most / length;
+  turn(touch, s);
 }
 
-void SbFrictionDirection(const SbFriction *f, const SbFrictionPair *p, PetscReal direction[3],
-                         PetscBool *oblique)
+void SbFrictionDirection(const SbFriction *f, const Touch *touch, PetscReal push[3])
 {
-  const SbFrictionState *g = p->grip;
-  const PetscReal mu = coefficient(f, g);
-  PetscReal t[3], length;
+  const SbFrictionState *g = &touch->grip;
+  PetscReal t[3], length, part;
 
-  *oblique = (PetscBool)(g->slides && !careful(g));
-  if (!*oblique) return;
   for (int k = 0; k < 3; k++) t[k] = g->tangent[0][k];
-  length = across(p->normal, t);
-  for (int k = 0; k < 3; k++) direction[k] = p->normal[k] - (length > 0 ? mu / length * t[k] : 0);
+  length = across(touch->n, t);
+  part = g->slides && !careful(g) && length > 0 ? coefficient(f, g) / length : 0;
+  for (int k = 0; k < 3; k++) push[k] = touch->n[k] - part * t[k];
 }
 
-PetscErrorCode SbFrictionHold(const SbFriction *f, SbSpace space, const SbFrictionPair *p, PetscInt id)
+PetscErrorCode SbFrictionHold(const SbFriction *f, SbSpace space, Touch *touch)
 {
-  SbFrictionState *g = p->grip;
+  SbFrictionState *g = &touch->grip;
 
   PetscFunctionBeginUser;
-  if (p->rests) PetscFunctionReturn(PETSC_SUCCESS);
   if (g->slides)
-    turn(p, g->tangent[0]);
-  else
-    turn_free(p);
-  for (int q = 0; q < 2; q++) {
-    const PetscReal *t = g->tangent[q], rest = SbDot3(t, p->start) - SbDot3(t, g->stretch);
-    PetscReal stiffness = p->k;
+    turn(touch, g->tangent[0]);
+  else { /* a prescribed component has no say, and the other direction is to be one that is free */
+    const uint8_t bits = space->fixed[touch->node];
+    const PetscReal fixed[3] = {bits == 1, bits == 2, bits == 4};
+    PetscReal v[3];
 
-    if (!g->slides && !springs(f, g) && !careful(g)) { /* normals of all pairs come first */
-      PetscCall(SbSpaceAddConstraint(space, id + q, 1, &p->node, t, NULL, rest, &g->slide[q]));
-      continue;
+    SbCross(touch->n, fixed, v);
+    turn(touch, SbDot3(v, v) > 1e-12 ? v : g->tangent[0]);
+  }
+  for (int q = 0; q < 2; q++) {
+    const PetscReal *t = g->tangent[q];
+    SbConstraint row = {.node = touch->node, .value = SbDot3(t, touch->start) - SbDot3(t, g->stretch)};
+
+    for (int k = 0; k < 3; k++) row.n[k] = row.push[k] = t[k];
+    if (!g->slides && !springs(f, g) && !careful(g)) {
+      PetscCall(SbSpaceAddConstraint(space, &row, &g->slide[q]));
+      if (g->slide[q] >= 0) continue;
+      g->crowded = PETSC_TRUE; /* others hold it there */
     }
+    row.spring = PETSC_TRUE;
     if (careful(g))
-      stiffness = g->turning;
+      row.stiffness = g->turning;
     else if (g->slides)
-      stiffness = q ? g->turning : 0;
-    PetscCall(SbSpaceAddPenaltyConstraint(space, 1, &p->node, t, NULL, rest, stiffness, 0, &g->slide[q]));
+      row.stiffness = q ? g->turning : 0;
+    else
+      row.stiffness = touch->k;
+    PetscCall(SbSpaceAddConstraint(space, &row, &g->slide[q]));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-void SbFrictionRead(const SbFriction *f, SbSpace space, const SbFrictionPair *p, PetscReal N, PetscReal along)
+void SbFrictionRead(const SbFriction *f, SbSpace space, Touch *touch, PetscReal N)
 {
-  SbFrictionState *g = p->grip;
+  SbFrictionState *g = &touch->grip;
 
-  N = PetscMax(0, N);
-  for (int k = 0; k < 3; k++) g->drag[k] = 0;
-  if (g->slide[0] < 0) return;
-  for (int k = 0; k < 3; k++) {
-    if (!p->rests) p->now[k] = along * p->normal[k];
-    if (g->slides && !careful(g)) g->drag[k] = -coefficient(f, g) * N * g->tangent[0][k];
-  }
+  for (int k = 0; k < 3; k++)
+    g->drag[k] = g->slides && !careful(g) ? -coefficient(f, g) * PetscMax(0, N) * g->tangent[0][k] : 0;
   for (int q = 0; q < 2; q++) {
-    PetscReal force, at;
+    const PetscReal force = SbSpaceGetConstraint(space, g->slide[q])->force;
 
-    SbSpaceGetConstraint(space, g->slide[q], &force, &at);
-    if (SbSpaceIsConstraintRedundant(space, g->slide[q])) { /* others hold it there */
-      force = 0;
-      at = SbDot3(g->tangent[q], p->start) - SbDot3(g->tangent[q], g->stretch);
-      if (!p->rests) g->crowded = PETSC_TRUE; /* its error in settle() is that of a spring without force */
-    }
-    for (int k = 0; k < 3; k++) {
-      g->drag[k] += force * g->tangent[q][k];
-      if (!p->rests) p->now[k] += at * g->tangent[q][k];
-    }
+    for (int k = 0; k < 3; k++) g->drag[k] += force * g->tangent[q][k];
   }
 }
 
 /* The same with springs for a pair that cannot decide; N is halfway between this solve's and the one before. */
-static PetscReal settle_carefully(const SbFriction *f, PetscReal before, const SbFrictionPair *p)
+static PetscReal settle_carefully(const SbFriction *f, PetscReal before, Touch *touch)
 {
-  SbFrictionState *g = p->grip;
+  SbFrictionState *g = &touch->grip;
   const PetscReal mu = coefficient(f, g), most = mu * PetscMax(0, g->pressing);
   PetscReal s[3], wrong[3];
-  const PetscReal length = slip(p, s), part = length > 0 ? PetscMin(p->k, most / length) : p->k;
+  const PetscReal length = slip(touch, s), part = length > 0 ? PetscMin(touch->k, most / length) : touch->k;
 
   for (int k = 0; k < 3; k++) wrong[k] = g->drag[k] + part * s[k];
-  g->slides = (PetscBool)(p->k * length > most);
+  g->slides = (PetscBool)(touch->k * length > most);
   g->pressing = 0.5 * (before + g->pressing);
-  g->turning = length > 0 ? PetscMin(p->k, mu * PetscMax(0, g->pressing) / length) : p->k;
-  if (g->slides) turn(p, s);
+  g->turning = length > 0 ? PetscMin(touch->k, mu * PetscMax(0, g->pressing) / length) : touch->k;
+  if (g->slides) turn(touch, s);
   return PetscSqrtReal(SbDot3(wrong, wrong));
 }
 
@@ -193,15 +176,15 @@ static PetscReal settle_carefully(const SbFriction *f, PetscReal before, const S
   is T + k s, or with springs k s alone. It slides where that is longer than mu N, with T = mu N along it; the derivative of that
   direction is the stiffness across it.
 */
-static PetscReal settle(const SbFriction *f, const SbFrictionPair *p)
+static PetscReal settle(const SbFriction *f, Touch *touch)
 {
-  SbFrictionState *g = p->grip;
+  SbFrictionState *g = &touch->grip;
   const PetscReal most = coefficient(f, g) * PetscMax(0, g->pressing);
   const PetscBool slid = g->slides;
   PetscReal s[3], trial[3], wrong[3] = {0}, size;
 
-  slip(p, s);
-  for (int k = 0; k < 3; k++) trial[k] = p->k * s[k] - (springs(f, g) ? 0 : g->drag[k]);
+  slip(touch, s);
+  for (int k = 0; k < 3; k++) trial[k] = touch->k * s[k] - (springs(f, g) ? 0 : g->drag[k]);
   size = PetscSqrtReal(SbDot3(trial, trial));
   /* what slid backwards went too far */
   g->slides = (PetscBool)(size > most && (!slid || SbDot3(trial, g->tangent[0]) >= 0));
@@ -210,27 +193,27 @@ static PetscReal settle(const SbFriction *f, const SbFrictionPair *p)
 
     if (!slid || SbDot3(trial, g->tangent[0]) < 0.5 * size) g->flips++;
     for (int k = 0; k < 3; k++) wrong[k] = g->drag[k] + most / size * trial[k];
-    g->turning = p->k * most / over;
-    turn(p, trial);
+    g->turning = touch->k * most / over;
+    turn(touch, trial);
   } else if (slid) {
     g->flips++;
-    for (int k = 0; k < 3; k++) wrong[k] = p->k * s[k];
+    for (int k = 0; k < 3; k++) wrong[k] = touch->k * s[k];
   }
   return PetscSqrtReal(SbDot3(wrong, wrong));
 }
 
-PetscReal SbFrictionSettle(const SbFriction *f, const SbFrictionPair *p, PetscReal N)
+PetscReal SbFrictionSettle(const SbFriction *f, Touch *touch, PetscReal N)
 {
-  SbFrictionState *g = p->grip;
+  SbFrictionState *g = &touch->grip;
   const PetscReal before = g->pressing;
   PetscReal error;
 
   g->pressing = N;
   if (g->slide[0] < 0) return 0;
-  error = careful(g) ? settle_carefully(f, before, p) : settle(f, p);
+  error = careful(g) ? settle_carefully(f, before, touch) : settle(f, touch);
   if (careful(g) && g->flips < 2 * FLIPS) { /* begins now */
     g->flips = 2 * FLIPS;
-    g->turning = p->k;
+    g->turning = touch->k;
   }
   return error;
 }
@@ -242,9 +225,9 @@ void SbFrictionJudge(SbFriction *f, PetscReal worst, PetscReal largest, PetscBoo
   if (f->unsettled > (f->updates > UPDATES ? LATE : SETTLED)) *changed = PETSC_TRUE;
 }
 
-void SbFrictionAccept(SbFriction *f, const SbFrictionPair *p, PetscBool presses)
+void SbFrictionAccept(SbFriction *f, Touch *touch, PetscBool presses)
 {
-  SbFrictionState *g = p->grip;
+  SbFrictionState *g = &touch->grip;
 
   if (!presses) { /* nothing holds it where it was */
     for (int k = 0; k < 3; k++) g->stretch[k] = g->drag[k] = 0;
@@ -253,8 +236,8 @@ void SbFrictionAccept(SbFriction *f, const SbFrictionPair *p, PetscBool presses)
   }
   g->slid = g->slides;
   for (int k = 0; k < 3; k++) {
-    f->loss -= g->drag[k] * (p->now[k] - p->start[k]);
-    g->stretch[k] = springs(f, g) ? -g->drag[k] / p->k : 0;
+    f->loss -= g->drag[k] * (touch->now[k] - touch->start[k]);
+    g->stretch[k] = springs(f, g) ? -g->drag[k] / touch->k : 0;
   }
 }
 

@@ -1,76 +1,47 @@
 /*
-  Constraints on nodes anywhere: what contact with obstacles needs where it has friction or springs. G u = c exactly, S u = s by springs.
+  Constraints of single nodes beside prescribed unknowns: what contact with rigid obstacles needs. n . u = c exactly, or by a spring.
 
-  Solves run in the null space of G (Gould, Hribar, Nocedal 2001, On the solution of equality constrained quadratic programming
-  problems arising in optimization): with D a diagonal, one number per node, about the inverse of K's,
+  A node has up to three exact constraints, the lines of G, with the values c. Forces along the lines of F keep them: F = G but where the
+  node slides with friction mu, which pushes along n - mu d, d the direction of the slip. All of it is of the node alone: with
 
-    P = I - D G^T (G D G^T)^-1 G,   A = P^T (K + S^T k S) P,   M_A^-1 = P M^-1 P^T
+    Q = F^T (G F^T)^-1 G,   P = I - Q
 
-  D makes the projection blind to units and to stiffness. Every preconditioner M
-  of K serves, and neither the matrix nor M are renewed when constraints come and go. What the constraints exert is the least-squares
-  multiplier lambda = (G D G^T)^-1 G D r of the residual r. Constraints that repeat others (a node in the corner of two obstacles) leave
-  P right; constraint_select.c leaves most of them out.
+  lambda = (G F^T)^-1 G r are the forces that a residual r asks for, P r is what they leave of it, P x keeps every sum, and
+  u + F^T (G F^T)^-1 (c - G u) is where they hold. Components that a support prescribes have no say in G and F. The solution is put where the
+  constraints hold before a solve; the solve then changes the rest only. Constraints that earlier ones of the node say already are left out.
 
-  G D G^T has the constraints of all ranks, which are few, and is factored on each of them.
+  Solves see them in one of two ways.
 
-  A constraint may push along other coefficients F than those of its sum: what slides with friction mu is pushed along n - mu d, d the
-  direction of the slip. Then P = I - D F^T (G D F^T)^-1 G, forces are projected by I - F^T (G D F^T)^-1 G D, springs give F^T k G,
-  and A is not symmetric.
+  Projected into the matrix, where F = G (Baraff and Witkin 1998), with s the size of the diagonal block:
 
-  Where an effect asks for it, the saddle-point system itself is factored instead of A: saddle_factor.c.
+    A_ij <- P_i A_ij P_j,   A_ii += s_i Q_i
 
-  Nodes that are prescribed or constrained (nodal_constraint.c) have no say: their columns are cleared or projected.
+  Beside the matrix K, with springs F^T k G and where F is not G (Gould, Hribar, Nocedal 2001, On the solution of equality constrained
+  quadratic programming problems arising in optimization): A = P (K + F^T k G) P, M_A^-1 = P M^-1 P. Every preconditioner M of K serves, and neither K nor M are renewed when
+  constraints come and go. (src/solver/constraint_operator.c; by a factorisation: saddle_factor.c.)
 */
 #include "fem_impl.h"
 #include "sbconstraint.h"
+#include "sbkernel.h"
 
-#define NOTHING \
-  1e-20 /* of the largest on that diagonal: constraints below it have no free node but for rounding */
+#define SAID \
+  1e-6 /* squared part of a constraint outside the span of the node's others; below it they say it already */
+#define NO_SAY 1e-12 /* squared length of what supports leave of a direction; below it nothing is left */
 
-PetscErrorCode SbSpaceCreateConstraints(SbSpace s, PetscBool nonsymmetric)
+PetscErrorCode SbSpaceCreateConstraints(SbSpace s, PetscBool beside, PetscBool nonsymmetric)
 {
   SbConstraints c = s->constraints;
 
   PetscFunctionBeginUser;
   if (!c) {
     PetscCall(PetscNew(&c));
-    PetscCall(PetscCalloc1(1, &c->start));
+    PetscCall(PetscMalloc1(s->nnode_owned, &c->first));
+    for (PetscInt i = 0; i < s->nnode_owned; i++) c->first[i] = -1;
+    PetscCall(PetscCalloc1(9 * s->nnode, &c->Q));
     s->constraints = c;
   }
+  c->beside = (PetscBool)(c->beside || beside || nonsymmetric);
   c->nonsymmetric = (PetscBool)(c->nonsymmetric || nonsymmetric);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscBool SbSpaceHasNonsymmetricConstraints(SbSpace s)
-{
-  return (PetscBool)(s->constraints && s->constraints->nonsymmetric);
-}
-
-static PetscErrorCode destroy_matrix(SbConstraintMatrix *r)
-{
-  PetscFunctionBeginUser;
-  PetscCall(MatDestroy(&r->full));
-  PetscCall(MatDestroy(&r->free));
-  PetscCall(MatDestroy(&r->push));
-  PetscCall(MatDestroy(&r->push_free));
-  PetscCall(VecDestroy(&r->value));
-  PetscCall(VecDestroy(&r->force));
-  PetscCall(VecDestroy(&r->work));
-  PetscCall(VecDestroy(&r->step));
-  r->n = r->N = 0;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode destroy_matrices(SbConstraints c)
-{
-  PetscFunctionBeginUser;
-  PetscCall(destroy_matrix(&c->exact));
-  PetscCall(destroy_matrix(&c->spring));
-  PetscCall(VecDestroy(&c->k));
-  PetscCall(VecDestroy(&c->constants));
-  PetscCall(MatDestroy(&c->DFt));
-  PetscCall(MatDestroy(&c->gram));
-  PetscCall(KSPDestroy(&c->solver));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -80,28 +51,11 @@ PetscErrorCode SbConstraintsDestroy(SbConstraints *constraints)
 
   PetscFunctionBeginUser;
   if (!c) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(destroy_matrices(c));
   if (c->factored) PetscCall((c->destroy_factored)(&c->factored));
-  PetscCall(VecDestroy(&c->anchor));
-  PetscCall(VecDestroy(&c->added));
-  PetscCall(VecDestroy(&c->free));
-  PetscCall(VecDestroy(&c->d));
-  PetscCall(VecDestroy(&c->w[0]));
-  PetscCall(VecDestroy(&c->w[1]));
-  PetscCall(VecDestroy(&c->w[2]));
-  PetscCall(PetscFree(c->redundant));
-  PetscCall(PetscFree(c->rate));
-  PetscCall(PetscFree(c->start));
-  PetscCall(PetscFree(c->gnode));
-  PetscCall(PetscFree(c->coef));
-  PetscCall(PetscFree(c->along));
-  PetscCall(PetscFree(c->value));
-  PetscCall(PetscFree(c->stiffness));
-  PetscCall(PetscFree(c->constant));
-  PetscCall(PetscFree(c->position));
-  PetscCall(PetscFree(c->force));
-  PetscCall(PetscFree(c->sum));
-  PetscCall(PetscFree(c->id));
+  PetscCall(PetscFree(c->constraint));
+  PetscCall(PetscFree(c->first));
+  PetscCall(PetscFree(c->Q));
+  PetscCall(PetscFree(c->added));
   PetscCall(PetscFree(*constraints));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -110,426 +64,171 @@ PetscErrorCode SbConstraintsDestroy(SbConstraints *constraints)
 
 void SbSpaceClearConstraints(SbSpace s)
 {
-  s->constraints->n = 0;
-  s->constraints->nentry = 0;
-  s->constraints->tilted = PETSC_FALSE;
-  s->constraints->nrate = 0;
+  SbConstraints c = s->constraints;
+
+  for (PetscInt i = 0; i < c->n; i++) {
+    const PetscInt node = c->constraint[i].node;
+
+    c->first[node] = -1;
+    memset(c->Q + 9 * node, 0, 9 * sizeof(*c->Q));
+  }
+  c->n = 0;
 }
 
-static PetscErrorCode make_room(SbConstraints c, PetscInt more)
+/* v without what a support prescribes. */
+static void free_part(SbSpace s, PetscInt node, const PetscReal v[3], PetscReal part[3])
 {
+  for (int k = 0; k < 3; k++) part[k] = s->fixed[node] & (1 << k) ? 0. : v[k];
+}
+
+/* The exact constraints of a node: their numbers, the free parts of their directions (NULL: not wanted). Returns how many, 0..3. */
+static int exact_constraints(SbSpace s, PetscInt node, PetscInt number[3], PetscReal G[9], PetscReal F[9])
+{
+  const SbConstraints c = s->constraints;
+  int n = 0;
+
+  for (PetscInt i = c->first[node]; i >= 0; i = c->constraint[i].next) {
+    if (c->constraint[i].spring) continue;
+    number[n] = i;
+    free_part(s, node, c->constraint[i].n, G + 3 * n);
+    if (F) free_part(s, node, c->constraint[i].push, F + 3 * n);
+    n++;
+  }
+  return n;
+}
+
+/* x = (G F^T)^-1 b of the n exact constraints of a node. */
+static void solve_forces(int n, const PetscReal G[9], const PetscReal F[9], const PetscReal b[3],
+                         PetscReal x[3])
+{
+  PetscReal A[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1}, C[9], det;
+
+  for (int k = 0; k < n; k++) {
+    for (int l = 0; l < n; l++) A[3 * k + l] = SbDot3(G + 3 * k, F + 3 * l);
+  }
+  SbMatCofactor(A, C);
+  det = SbDot3(A, C);
+  for (int k = 0; k < n; k++) {
+    x[k] = 0.;
+    for (int l = 0; l < n; l++) x[k] += C[3 * l + k] * b[l] / det;
+  }
+}
+
+PetscErrorCode SbSpaceAddConstraint(SbSpace s, const SbConstraint *constraint, PetscInt *number)
+{
+  const PetscInt node = constraint->node;
+  SbConstraints c = s->constraints;
+
   PetscFunctionBeginUser;
+  *number = -1;
+  if (!constraint->spring) {
+    PetscInt others[3];
+    PetscReal G[9], g[3], b[3] = {0}, x[3], full;
+    const int n = exact_constraints(s, node, others, G, NULL);
+
+    /* what the node's others leave of it */
+    free_part(s, node, constraint->n, g);
+    full = SbDot3(g, g);
+    if (n == 3 || full < NO_SAY) PetscFunctionReturn(PETSC_SUCCESS);
+    for (int k = 0; k < n; k++) b[k] = SbDot3(G + 3 * k, g);
+    solve_forces(n, G, G, b, x);
+    for (int k = 0; k < 3 * n; k++) g[k % 3] -= x[k / 3] * G[k];
+    if (SbDot3(g, g) < SAID * full) PetscFunctionReturn(PETSC_SUCCESS);
+  }
   if (c->n == c->size) {
-    const PetscInt size = PetscMax(64, 2 * c->size);
-    void *const numbers[] = {&c->value, &c->stiffness, &c->constant, &c->force, &c->sum};
-    void *const whole[] = {&c->position, &c->id};
-
-    for (size_t k = 0; k < PETSC_STATIC_ARRAY_LENGTH(numbers); k++)
-      PetscCall(PetscRealloc((size_t)size * sizeof(PetscReal), (void **)numbers[k]));
-    for (size_t k = 0; k < PETSC_STATIC_ARRAY_LENGTH(whole); k++)
-      PetscCall(PetscRealloc((size_t)size * sizeof(PetscInt), (void **)whole[k]));
-    PetscCall(PetscRealloc((size_t)size * sizeof(PetscBool), &c->redundant));
-    c->size = size;
-    PetscCall(PetscRealloc((size_t)(size + 1) * sizeof(PetscInt), &c->start));
+    c->size = PetscMax(64, 2 * c->size);
+    PetscCall(PetscRealloc((size_t)c->size * sizeof(*c->constraint), &c->constraint));
   }
-  if (c->nentry + more > c->entry_size) {
-    c->entry_size = PetscMax(256, 2 * (c->nentry + more));
-    PetscCall(PetscRealloc((size_t)c->entry_size * sizeof(PetscInt), &c->gnode));
-    PetscCall(PetscRealloc(3 * (size_t)c->entry_size * sizeof(PetscReal), &c->coef));
-    PetscCall(PetscRealloc(3 * (size_t)c->entry_size * sizeof(PetscReal), &c->along));
-  }
+  c->constraint[c->n] = *constraint;
+  c->constraint[c->n].next = c->first[node];
+  c->first[node] = *number = c->n++;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbSpaceAddPenaltyConstraint(SbSpace s, PetscInt n, const PetscInt gnode[],
-                                           const PetscReal coef[], const PetscReal push[], PetscReal value,
-                                           PetscReal stiffness, PetscReal constant, PetscInt *constraint)
+SbConstraint *SbSpaceGetConstraint(SbSpace s, PetscInt number)
 {
-  SbConstraints c = s->constraints;
-
-  PetscFunctionBeginUser;
-  PetscCall(make_room(c, n));
-  PetscCall(PetscArraycpy(c->gnode + c->nentry, gnode, n));
-  PetscCall(PetscArraycpy(c->coef + 3 * c->nentry, coef, 3 * n));
-  PetscCall(PetscArraycpy(c->along + 3 * c->nentry, push ? push : coef, 3 * n));
-  if (push) c->tilted = PETSC_TRUE;
-  c->start[c->n] = c->nentry;
-  c->value[c->n] = value;
-  c->stiffness[c->n] = stiffness;
-  c->constant[c->n] = constant;
-  c->force[c->n] = c->sum[c->n] = 0.;
-  c->id[c->n] = 0;
-  c->nentry += n;
-  c->start[c->n + 1] = c->nentry;
-  *constraint = c->n++;
-  PetscFunctionReturn(PETSC_SUCCESS);
+  return &s->constraints->constraint[number];
 }
 
-PetscErrorCode SbSpaceAddConstraint(SbSpace s, PetscInt id, PetscInt n, const PetscInt gnode[],
-                                    const PetscReal coef[], const PetscReal push[], PetscReal value,
-                                    PetscInt *constraint)
+PetscBool SbSpaceIsConstrained(SbSpace s)
 {
-  PetscFunctionBeginUser;
-  PetscCall(SbSpaceAddPenaltyConstraint(s, n, gnode, coef, push, value, -1., 0., constraint));
-  s->constraints->id[*constraint] = id;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static inline PetscBool of_kind(SbConstraints c, PetscInt i, PetscBool exact)
-{
-  return (PetscBool)((c->stiffness[i] < 0.) == exact && !c->redundant[i]);
-}
-
-/* The constraints of one kind as a matrix, with the coefficients coef[][3]. */
-static PetscErrorCode create_matrix(SbSpace s, PetscBool exact, const SbConstraintMatrix *r, PetscInt widest,
-                                    const PetscReal coef[], Mat *A)
-{
-  SbConstraints c = s->constraints;
-  PetscInt first;
-
-  PetscFunctionBeginUser;
-  PetscCall(MatCreateAIJ(s->comm, r->n, 3 * s->nnode_owned, PETSC_DETERMINE, 3 * s->Nnode, widest, NULL,
-                         widest, NULL, A));
-  PetscCall(MatGetOwnershipRange(*A, &first, NULL));
-  for (PetscInt i = 0; i < c->n; i++) {
-    if (!of_kind(c, i, exact)) continue;
-    for (PetscInt e = c->start[i]; e < c->start[i + 1]; e++) {
-      const PetscInt row = first + c->position[i], g = 3 * c->gnode[e], column[3] = {g, g + 1, g + 2};
-
-      PetscCall(MatSetValues(*A, 1, &row, 3, column, coef + 3 * e, ADD_VALUES));
-    }
-  }
-  PetscCall(MatAssemblyBegin(*A, MAT_FINAL_ASSEMBLY));
-  PetscCall(MatAssemblyEnd(*A, MAT_FINAL_ASSEMBLY));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* The constraints of one kind; c->tilted is alike on all ranks. */
-static PetscErrorCode create_kind(SbSpace s, PetscBool exact, SbConstraintMatrix *r)
-{
-  SbConstraints c = s->constraints;
-  PetscInt widest = 1;
-  PetscScalar *value;
-
-  PetscFunctionBeginUser;
-  r->n = 0;
-  for (PetscInt i = 0; i < c->n; i++) {
-    if (!of_kind(c, i, exact)) continue;
-    widest = PetscMax(widest, 3 * (c->start[i + 1] - c->start[i]));
-    c->position[i] = r->n++;
-  }
-  PetscCallMPI(MPI_Allreduce(&r->n, &r->N, 1, MPIU_INT, MPI_SUM, s->comm));
-  if (!r->N) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(create_matrix(s, exact, r, widest, c->coef, &r->full));
-  if (c->tilted)
-    PetscCall(create_matrix(s, exact, r, widest, c->along, &r->push));
-  else {
-    PetscCall(PetscObjectReference((PetscObject)r->full));
-    r->push = r->full;
-  }
-  PetscCall(MatCreateVecs(r->full, NULL, &r->value));
-  PetscCall(VecDuplicate(r->value, &r->force));
-  PetscCall(VecDuplicate(r->value, &r->work));
-  PetscCall(VecDuplicate(r->value, &r->step));
-  PetscCall(VecGetArrayWrite(r->value, &value));
-  for (PetscInt i = 0; i < c->n; i++) {
-    if (of_kind(c, i, exact)) value[c->position[i]] = c->value[i];
-  }
-  PetscCall(VecRestoreArrayWrite(r->value, &value));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* I - Q on the nodes' blocks. */
-static PetscErrorCode create_projector(SbSpace s, Mat *H)
-{
-  PetscInt first;
-
-  PetscFunctionBeginUser;
-  PetscCall(MatCreateAIJ(s->comm, 3 * s->nnode_owned, 3 * s->nnode_owned, 3 * s->Nnode, 3 * s->Nnode, 3, NULL,
-                         0, NULL, H));
-  PetscCall(MatGetOwnershipRange(*H, &first, NULL));
-  for (PetscInt i = 0; i < s->nnode_owned; i++) {
-    const PetscReal *Q = SbNodalConstraintsProjector(s, i);
-    PetscScalar block[9];
-    PetscInt at[3];
-
-    for (PetscInt k = 0; k < 9; k++) block[k] = (k % 4 ? 0. : 1.) - Q[k];
-    for (PetscInt k = 0; k < 3; k++) at[k] = first + 3 * i + k;
-    PetscCall(MatSetValues(*H, 3, at, 3, at, block, INSERT_VALUES));
-  }
-  PetscCall(MatAssemblyBegin(*H, MAT_FINAL_ASSEMBLY));
-  PetscCall(MatAssemblyEnd(*H, MAT_FINAL_ASSEMBLY));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Clears what prescribed unknowns and constrained directions (I - Q in H, NULL: none) would say in a matrix of constraints. */
-static PetscErrorCode create_free(SbSpace s, Mat full, Mat H, Mat *free)
-{
-  PetscFunctionBeginUser;
-  if (H)
-    PetscCall(MatMatMult(full, H, MAT_INITIAL_MATRIX, PETSC_DEFAULT, free));
-  else
-    PetscCall(MatDuplicate(full, MAT_COPY_VALUES, free));
-  PetscCall(MatDiagonalScale(*free, NULL, s->constraints->free));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode create_free_parts(SbSpace s, SbConstraintMatrix *r)
-{
-  Mat H = NULL;
-
-  PetscFunctionBeginUser;
-  if (!r->N) PetscFunctionReturn(PETSC_SUCCESS);
-  if (SbNodalConstraintsExist(s)) PetscCall(create_projector(s, &H));
-  PetscCall(create_free(s, r->full, H, &r->free));
-  if (r->push == r->full) {
-    PetscCall(PetscObjectReference((PetscObject)r->free));
-    r->push_free = r->free;
-  } else
-    PetscCall(create_free(s, r->push, H, &r->push_free));
-  PetscCall(MatDestroy(&H));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* ------------------------------------------------------------------ the projection */
-
-/* One vector each that the solves work with, and which unknowns are free. */
-static PetscErrorCode create_vectors(SbSpace s)
-{
-  SbConstraints c = s->constraints;
-  PetscScalar *x;
-
-  PetscFunctionBeginUser;
-  if (c->free) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(SbSpaceCreateVec(s, &c->free));
-  PetscCall(VecDuplicate(c->free, &c->d));
-  PetscCall(VecDuplicate(c->free, &c->w[0]));
-  PetscCall(VecDuplicate(c->free, &c->w[1]));
-  PetscCall(VecDuplicate(c->free, &c->w[2]));
-  PetscCall(VecGetArray(c->free, &x));
-  for (PetscInt i = 0; i < 3 * s->nnode_owned; i++) x[i] = s->fixed[i / 3] & (1 << (i % 3)) ? 0. : 1.;
-  PetscCall(VecRestoreArray(c->free, &x));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* D: inverse of the mean of K's diagonal at each node; before there is a K, of the mass, which keeps momentum. */
-static PetscErrorCode weigh_nodes(SbSpace s)
-{
-  SbConstraints c = s->constraints;
-  PetscReal largest = 0.;
-  PetscBool known;
-  PetscScalar *d;
-
-  PetscFunctionBeginUser;
-  if (c->K) { /* it begins as zero */
-    PetscCall(MatGetDiagonal(c->K, c->d));
-    PetscCall(VecNorm(c->d, NORM_INFINITY, &largest));
-  }
-  known = (PetscBool)(largest > 0.);
-  PetscCall(VecGetArray(c->d, &d));
-  for (PetscInt i = 0; i < s->nnode_owned; i++) {
-    PetscReal mean = known ? 0. : s->node_mass[i];
-
-    for (PetscInt k = 0; k < 3 && known; k++) mean += PetscAbsScalar(d[3 * i + k]) / 3.;
-    for (PetscInt k = 0; k < 3; k++) d[3 * i + k] = mean > 0. ? 1. / mean : 0.;
-  }
-  PetscCall(VecRestoreArray(c->d, &d));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Keeps the factorisation solvable: constraints that depend on others. Constraints without a free direction can do nothing and are redundant. */
-static PetscErrorCode regularise(SbConstraints c)
-{
-  PetscReal largest;
-  PetscScalar *x;
-  Vec d;
-
-  PetscFunctionBeginUser;
-  PetscCall(MatCreateVecs(c->gram, &d, NULL));
-  PetscCall(MatGetDiagonal(c->gram, d));
-  PetscCall(VecNorm(d, NORM_INFINITY, &largest));
-  PetscCall(VecGetArray(d, &x));
-  for (PetscInt i = 0; i < c->n; i++) {
-    if (!of_kind(c, i, PETSC_TRUE)) continue;
-    if (x[c->position[i]] > NOTHING * largest)
-      x[c->position[i]] *= 1. + SB_CONSTRAINT_REGULARIZATION;
-    else {
-      x[c->position[i]] = largest > 0. ? largest : 1.;
-      c->redundant[i] = PETSC_TRUE;
-    }
-  }
-  PetscCall(VecRestoreArray(d, &x));
-  PetscCall(MatDiagonalSet(c->gram, d, INSERT_VALUES));
-  PetscCall(VecDestroy(&d));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/*
-  A body that only constraints support makes K singular, which no factorisation takes. In a static run the matrix gets s_i times the squares
-  of the constraints' coefficients on its diagonal, s_i the size of the node's block; the operator takes it away again, so that only M
-  knows of it.
-*/
-static PetscErrorCode find_anchors(SbSpace s)
-{
-  SbConstraints c = s->constraints;
-
-  PetscFunctionBeginUser;
-  if (!c->anchor) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(VecZeroEntries(c->anchor));
-  for (PetscInt e = 0; e < 3 * c->nentry; e++)
-    PetscCall(VecSetValue(c->anchor, 3 * c->gnode[e / 3] + e % 3, c->coef[e] * c->coef[e], ADD_VALUES));
-  PetscCall(VecAssemblyBegin(c->anchor));
-  PetscCall(VecAssemblyEnd(c->anchor));
-  PetscCall(VecPointwiseMult(c->anchor, c->anchor, c->free));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode SbConstraintsRegularize(SbSpace s, const SbValues *x)
-{
-  SbConstraints c = s->constraints;
-  const PetscScalar *a;
-  PetscScalar *added;
-
-  PetscFunctionBeginUser;
-  if (!c->anchor) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(VecGetArrayRead(c->anchor, &a));
-  PetscCall(VecGetArray(c->added, &added));
-  for (PetscInt i = 0; i < s->nnode_owned; i++) {
-    size_t rs, cs;
-    PetscScalar *v;
-    PetscReal size;
-
-    for (PetscInt k = 0; k < 3; k++) added[3 * i + k] = 0.;
-    if (a[3 * i] + a[3 * i + 1] + a[3 * i + 2] == 0.) continue;
-    v = sb_block(x, s->plan, i, s->plan->diagonal[i], &rs, &cs);
-    size = (PetscAbsReal(v[0]) + PetscAbsReal(v[rs + cs]) + PetscAbsReal(v[2 * (rs + cs)])) / 3.;
-    for (size_t k = 0; k < 3; k++) {
-      added[3 * (size_t)i + k] = size * a[3 * (size_t)i + k];
-      v[k * (rs + cs)] += added[3 * (size_t)i + k];
-    }
-  }
-  PetscCall(VecRestoreArray(c->added, &added));
-  PetscCall(VecRestoreArrayRead(c->anchor, &a));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* G D F^T of the exact constraints, and its factorisation. */
-static PetscErrorCode create_gram(SbSpace s)
-{
-  SbConstraints c = s->constraints;
-
-  PetscFunctionBeginUser;
-  if (!c->exact.N) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(weigh_nodes(s));
-  PetscCall(MatTranspose(c->exact.push_free, MAT_INITIAL_MATRIX, &c->DFt));
-  PetscCall(MatDiagonalScale(c->DFt, c->d, NULL));
-  PetscCall(MatMatMult(c->exact.free, c->DFt, MAT_INITIAL_MATRIX, PETSC_DEFAULT, &c->gram));
-  PetscCall(regularise(c));
-  PetscCall(SbConstraintsCreateGramSolver(s, c->gram, &c->solver));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Stiffness and constant force of the springs. */
-static PetscErrorCode create_springs(SbConstraints c)
-{
-  PetscScalar *k, *constant;
-
-  PetscFunctionBeginUser;
-  if (!c->spring.N) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(VecDuplicate(c->spring.value, &c->k));
-  PetscCall(VecDuplicate(c->spring.value, &c->constants));
-  PetscCall(VecGetArray(c->k, &k));
-  PetscCall(VecGetArray(c->constants, &constant));
-  for (PetscInt i = 0; i < c->n; i++) {
-    if (c->stiffness[i] < 0.) continue;
-    k[c->position[i]] = c->stiffness[i];
-    constant[c->position[i]] = c->constant[i];
-  }
-  PetscCall(VecRestoreArray(c->k, &k));
-  PetscCall(VecRestoreArray(c->constants, &constant));
-  PetscFunctionReturn(PETSC_SUCCESS);
+  return (PetscBool)(s->constraints && s->constraints->ntotal);
 }
 
 PetscErrorCode SbSpaceAssembleConstraints(SbSpace s)
 {
   SbConstraints c = s->constraints;
-  PetscInt count[2];
+  PetscInt count[3] = {c->n, 0, 0};
 
   PetscFunctionBeginUser;
-  PetscCall(destroy_matrices(c));
   c->version++;
-  count[0] = c->n;
-  count[1] = c->tilted;
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, count, 2, MPIU_INT, MPI_SUM, s->comm));
+  for (PetscInt i = 0; i < c->n; i++) {
+    const SbConstraint *a = &c->constraint[i];
+
+    count[1] += !a->spring;
+    count[2] += a->push[0] != a->n[0] || a->push[1] != a->n[1] || a->push[2] != a->n[2];
+  }
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, count, 3, MPIU_INT, MPI_SUM, s->comm));
   c->ntotal = count[0];
-  c->tilted = (PetscBool)(count[1] > 0);
-  if (!c->ntotal) { /* bodies are apart: nothing more is exchanged or made */
-    if (c->anchor) PetscCall(VecZeroEntries(c->anchor));
-    PetscFunctionReturn(PETSC_SUCCESS);
+  c->nexact = count[1];
+  c->tilted = (PetscBool)(count[2] > 0);
+  if (!c->nexact) PetscFunctionReturn(PETSC_SUCCESS);
+
+  /* Q of each node, column by column */
+  for (PetscInt i = 0; i < c->n; i++) {
+    const PetscInt node = c->constraint[i].node;
+    PetscInt number[3];
+    PetscReal G[9], F[9];
+    int n;
+
+    if (c->first[node] != i) continue; /* once for each node */
+    n = exact_constraints(s, node, number, G, F);
+    for (int j = 0; j < 3 && n; j++) {
+      const PetscReal b[3] = {G[j], n > 1 ? G[3 + j] : 0., n > 2 ? G[6 + j] : 0.};
+      PetscReal x[3];
+
+      solve_forces(n, G, F, b, x);
+      for (int k = 0; k < n; k++) {
+        for (int l = 0; l < 3; l++) c->Q[9 * node + 3 * l + j] += F[3 * k + l] * x[k];
+      }
+    }
   }
-  PetscCall(create_vectors(s));
-  PetscCall(SbConstraintsFindRedundant(s));
-  PetscCall(find_anchors(s));
-  PetscCall(create_kind(s, PETSC_TRUE, &c->exact));
-  PetscCall(create_kind(s, PETSC_FALSE, &c->spring));
-  PetscCall(create_free_parts(s, &c->exact));
-  PetscCall(create_free_parts(s, &c->spring));
-  PetscCall(create_gram(s));
-  PetscCall(create_springs(c));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
 
-/* y = (G D F^T)^-1 w, but for SB_CONSTRAINT_REGULARIZATION; every use is repeated with what the first left. */
-static PetscErrorCode solve_gram(SbConstraints c)
-{
-  PetscFunctionBeginUser;
-  PetscCall(KSPSolve(c->solver, c->exact.work, c->exact.step));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
+  /* that of other ranks' nodes, for the columns of a matrix */
+  if (s->ghosted) {
+    PetscReal *row;
 
-PetscErrorCode SbConstraintsProject(SbConstraints c, Vec x)
-{
-  PetscFunctionBeginUser;
-  for (int pass = 0; c->exact.N && pass < c->passes; pass++) {
-    PetscCall(MatMult(c->exact.free, x, c->exact.work));
-    PetscCall(VecScale(c->exact.work, -1.));
-    PetscCall(solve_gram(c));
-    PetscCall(MatMultAdd(c->DFt, c->exact.step, x, x));
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/*
-  r <- r - F^T lambda, lambda into c->exact.force. They may be much larger than what is left: the later passes also take away
-  their rounding, which would be a residual that no iteration lowers.
-*/
-PetscErrorCode SbConstraintsProjectForce(SbConstraints c, Vec r)
-{
-  PetscFunctionBeginUser;
-  if (c->exact.N) PetscCall(VecZeroEntries(c->exact.force));
-  for (int pass = 0; c->exact.N && pass < c->passes; pass++) {
-    PetscCall(VecPointwiseMult(c->w[2], c->d, r));
-    PetscCall(MatMult(c->exact.free, c->w[2], c->exact.work));
-    PetscCall(VecScale(c->exact.work, -1.));
-    PetscCall(solve_gram(c));
-    PetscCall(MatMultTransposeAdd(c->exact.push_free, c->exact.step, r, r));
-    PetscCall(VecAXPY(c->exact.force, -1., c->exact.step));
+    PetscCall(PetscMalloc1(3 * s->nnode, &row));
+    for (int r = 0; r < 3; r++) {
+      for (PetscInt i = 0; i < 3 * s->nnode_owned; i++) row[i] = c->Q[9 * (i / 3) + 3 * r + i % 3];
+      PetscCall(SbSpaceUpdateGhosts(s, row));
+      for (PetscInt i = 3 * s->nnode_owned; i < 3 * s->nnode; i++) c->Q[9 * (i / 3) + 3 * r + i % 3] = row[i];
+    }
+    PetscCall(PetscFree(row));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbConstraintsPrescribe(SbSpace s, Vec U)
-{
-  SbConstraints c = s->constraints;
+/* ------------------------------------------------------------------ displacements, residuals, velocities */
 
-  PetscFunctionBeginUser;
-  for (int pass = 0; c->exact.N && pass < c->passes; pass++) {
-    PetscCall(MatMult(c->exact.full, U, c->exact.work));
-    PetscCall(VecAYPX(c->exact.work, -1., c->exact.value));
-    PetscCall(solve_gram(c));
-    PetscCall(MatMultAdd(c->DFt, c->exact.step, U, U));
+/* Q x of a node. */
+static inline void taken(const PetscReal Q[9], const PetscReal x[3], PetscReal y[3])
+{
+  for (int k = 0; k < 3; k++) y[k] = SbDot3(Q + 3 * k, x);
+}
+
+void SbConstraintsProject(SbSpace s, PetscReal x[])
+{
+  const SbConstraints c = s->constraints;
+
+  for (PetscInt i = 0; i < c->n; i++) {
+    const PetscInt node = c->constraint[i].node;
+    PetscReal y[3];
+
+    if (c->first[node] != i) continue;
+    taken(c->Q + 9 * node, x + 3 * node, y);
+    for (int k = 0; k < 3; k++) x[3 * node + k] -= y[k];
   }
-  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode SbSpaceProjectAdmissible(SbSpace s, Vec z)
@@ -538,107 +237,237 @@ PetscErrorCode SbSpaceProjectAdmissible(SbSpace s, Vec z)
 
   PetscFunctionBeginUser;
   PetscCall(VecGetArray(z, &x));
-  for (PetscInt i = 0; i < 3 * s->nnode_owned; i++) {
-    if (s->fixed[i / 3] & (1 << (i % 3))) x[i] = 0.;
-  }
-  if (s->nodal) SbNodalConstraintsProject(s, x);
+  for (PetscInt i = 0; i < s->nnode_owned; i++) free_part(s, i, x + 3 * i, x + 3 * i);
+  if (s->constraints) SbConstraintsProject(s, x);
   PetscCall(VecRestoreArray(z, &x));
-  if (s->constraints) PetscCall(SbConstraintsProject(s->constraints, z));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Forces of the springs into c->spring.force, where they are into c->spring.work. */
-static PetscErrorCode stretch(SbConstraints c, Vec U)
+/* x <- where the sums of the exact constraints are the values, or the velocities. */
+static void move(SbSpace s, PetscBool velocities, PetscReal x[])
 {
-  PetscFunctionBeginUser;
-  PetscCall(MatMult(c->spring.full, U, c->spring.work));
-  PetscCall(VecWAXPY(c->spring.force, -1., c->spring.work, c->spring.value));
-  PetscCall(VecPointwiseMult(c->spring.force, c->spring.force, c->k));
-  PetscCall(VecAXPY(c->spring.force, 1., c->constants));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
+  const SbConstraints c = s->constraints;
 
-PetscErrorCode SbConstraintsResidual(SbSpace s, Vec U, PetscBool constrain, Vec F)
-{
-  SbConstraints c = s->constraints;
-
-  PetscFunctionBeginUser;
-  if (c->spring.N) {
-    PetscCall(stretch(c, U));
-    PetscCall(VecScale(c->spring.force, -1.));
-    PetscCall(MatMultTransposeAdd(constrain ? c->spring.push_free : c->spring.push, c->spring.force, F, F));
-  }
-  if (constrain) PetscCall(SbConstraintsProjectForce(c, F));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Values of a kind's constraints for the effect that made them. */
-static PetscErrorCode hand_out(SbConstraints c, PetscBool exact, Vec from, PetscReal to[])
-{
-  const PetscScalar *x;
-
-  PetscFunctionBeginUser;
-  PetscCall(VecGetArrayRead(from, &x));
   for (PetscInt i = 0; i < c->n; i++) {
-    if (of_kind(c, i, exact)) to[i] = x[c->position[i]];
+    const PetscInt node = c->constraint[i].node;
+    PetscInt number[3];
+    PetscReal G[9], F[9], b[3], step[3];
+    int n;
+
+    if (c->first[node] != i) continue;
+    n = exact_constraints(s, node, number, G, F);
+    for (int k = 0; k < n; k++) {
+      const SbConstraint *a = &c->constraint[number[k]];
+
+      b[k] = (velocities ? a->velocity : a->value) - SbDot3(a->n, x + 3 * node);
+    }
+    solve_forces(n, G, F, b, step);
+    for (int k = 0; k < 3 * n; k++) x[3 * node + k % 3] += step[k / 3] * F[k];
   }
-  PetscCall(VecRestoreArrayRead(from, &x));
-  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbSpaceComputeConstraintForces(SbSpace s, Vec U, Vec R)
+void SbConstraintsPrescribe(SbSpace s, PetscReal u[])
 {
-  SbConstraints c = s->constraints;
+  move(s, PETSC_FALSE, u);
+}
 
-  PetscFunctionBeginUser;
-  if (c->exact.N) {
-    PetscCall(VecPointwiseMult(c->w[0], R, c->free));
-    PetscCall(SbConstraintsProjectForce(c, c->w[0]));
-    PetscCall(hand_out(c, PETSC_TRUE, c->exact.force, c->force));
-    /* the rest is what supports and obstacles exert */
-    PetscCall(VecAXPBY(c->exact.work, -1., 0., c->exact.force));
-    PetscCall(MatMultTransposeAdd(c->exact.push, c->exact.work, R, R));
-    PetscCall(MatMult(c->exact.full, U, c->exact.work));
-    PetscCall(hand_out(c, PETSC_TRUE, c->exact.work, c->sum));
+void SbConstraintsVelocity(SbSpace s, PetscReal v[])
+{
+  move(s, PETSC_TRUE, v);
+}
+
+/* Force of a spring at the displacement u of its node, N. */
+static inline PetscReal spring_force(const SbConstraint *a, const PetscReal u[3])
+{
+  return a->constant + a->stiffness * (a->value - SbDot3(a->n, u));
+}
+
+void SbConstraintsResidual(SbSpace s, const PetscReal u[], PetscBool constrain, PetscReal f[])
+{
+  const SbConstraints c = s->constraints;
+
+  for (PetscInt i = 0; i < c->n; i++) {
+    const SbConstraint *a = &c->constraint[i];
+    PetscReal push[3], force;
+
+    if (!a->spring) continue;
+    force = spring_force(a, u + 3 * a->node);
+    free_part(s, a->node, a->push, push);
+    for (int k = 0; k < 3; k++) f[3 * a->node + k] -= force * (constrain ? push[k] : a->push[k]);
   }
-  if (c->spring.N) {
-    PetscCall(stretch(c, U));
-    PetscCall(hand_out(c, PETSC_FALSE, c->spring.force, c->force));
-    PetscCall(hand_out(c, PETSC_FALSE, c->spring.work, c->sum));
+  if (constrain) SbConstraintsProject(s, f);
+}
+
+/* ------------------------------------------------------------------ forces */
+
+void SbConstraintsComputeForces(SbSpace s, const PetscReal u[], const PetscReal r[])
+{
+  const SbConstraints c = s->constraints;
+
+  for (PetscInt i = 0; i < c->n; i++) {
+    SbConstraint *a = &c->constraint[i];
+    PetscInt number[3];
+    PetscReal G[9], F[9], b[3], x[3];
+    int n;
+
+    a->sum = SbDot3(a->n, u + 3 * a->node);
+    if (a->spring) a->force = spring_force(a, u + 3 * a->node);
+    if (c->first[a->node] != i) continue;
+    n = exact_constraints(s, a->node, number, G, F);
+    for (int k = 0; k < n; k++) b[k] = SbDot3(G + 3 * k, r + 3 * a->node);
+    solve_forces(n, G, F, b, x);
+    for (int k = 0; k < n; k++) c->constraint[number[k]].force = x[k];
   }
-  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbSpaceAddConstraintReactions(SbSpace s, Vec R)
+void SbConstraintsAddForces(SbSpace s, PetscReal f[])
 {
-  SbConstraints c = s->constraints;
+  const SbConstraints c = s->constraints;
 
-  PetscFunctionBeginUser;
-  if (c->exact.N) PetscCall(MatMultTransposeAdd(c->exact.push_free, c->exact.force, R, R));
-  if (c->spring.N) PetscCall(MatMultTransposeAdd(c->spring.push_free, c->spring.force, R, R));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
+  for (PetscInt i = 0; i < c->n; i++) {
+    const SbConstraint *a = &c->constraint[i];
 
-PetscErrorCode SbSpaceAddConstraintForces(SbSpace s, Vec U, Vec F)
-{
-  SbConstraints c = s->constraints;
-
-  PetscFunctionBeginUser;
-  if (c->exact.N) PetscCall(MatMultTransposeAdd(c->exact.push, c->exact.force, F, F));
-  if (c->spring.N) {
-    PetscCall(stretch(c, U));
-    PetscCall(MatMultTransposeAdd(c->spring.push, c->spring.force, F, F));
+    for (int k = 0; k < 3; k++) f[3 * a->node + k] += a->force * a->push[k];
   }
-  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscBool SbSpaceIsConstraintRedundant(SbSpace s, PetscInt constraint)
+void SbConstraintsReactions(SbSpace s, PetscReal r[])
 {
-  return s->constraints->redundant[constraint];
+  const SbConstraints c = s->constraints;
+
+  for (PetscInt i = 0; i < 3 * s->nnode_owned; i++) {
+    if (!(s->fixed[i / 3] & (1 << i % 3))) r[i] = 0.;
+  }
+  for (PetscInt i = 0; i < c->n; i++) {
+    const SbConstraint *a = &c->constraint[i];
+
+    for (int k = 0; k < 3; k++) {
+      const PetscReal force = a->force * a->push[k];
+
+      if (!(s->fixed[a->node] & (1 << k)))
+        r[3 * a->node + k] += force;
+      else if (!a->spring) /* the residual has the springs' */
+        r[3 * a->node + k] -= force;
+    }
+  }
 }
 
-void SbSpaceGetConstraint(SbSpace s, PetscInt constraint, PetscReal *force, PetscReal *sum)
+/* ------------------------------------------------------------------ matrices */
+
+/* B <- P_i B P_j, rows rs apart, columns cs; Q NULL: not constrained. */
+static void project_block(const PetscReal *Qi, const PetscReal *Qj, size_t rs, size_t cs, PetscScalar *v)
 {
-  *force = s->constraints->force[constraint];
-  *sum = s->constraints->sum[constraint];
+  PetscReal B[9], X[9];
+
+  for (size_t k = 0; k < 9; k++) B[k] = v[k / 3 * rs + k % 3 * cs];
+  if (Qi) {
+    SbMatMul(Qi, B, X);
+    for (int k = 0; k < 9; k++) B[k] -= X[k];
+  }
+  if (Qj) {
+    SbMatMul(B, Qj, X);
+    for (int k = 0; k < 9; k++) B[k] -= X[k];
+  }
+  for (size_t k = 0; k < 9; k++) v[k / 3 * rs + k % 3 * cs] = B[k];
+}
+
+/* Size of a diagonal block. */
+static inline PetscReal block_size(const PetscScalar v[], size_t rs, size_t cs)
+{
+  return (PetscAbsReal(v[0]) + PetscAbsReal(v[rs + cs]) + PetscAbsReal(v[2 * (rs + cs)])) / 3.;
+}
+
+void SbConstraintsProjectBlock(SbSpace s, PetscInt i, PetscInt j, size_t rs, size_t cs, PetscScalar *v)
+{
+  const PetscReal *Qi = s->constraints->Q + 9 * i, *Qj = s->constraints->Q + 9 * j;
+  PetscReal size;
+
+  if (Qi[0] + Qi[4] + Qi[8] < 0.5) Qi = NULL;
+  if (Qj[0] + Qj[4] + Qj[8] < 0.5) Qj = NULL;
+  if (!Qi && !Qj) return;
+  size = block_size(v, rs, cs);
+  project_block(Qi, Qj, rs, cs, v);
+  for (size_t k = 0; k < 9 && i == j; k++) v[k / 3 * rs + k % 3 * cs] += size * Qi[k];
+}
+
+/*
+  A body that only constraints support makes K singular, which no factorisation takes. In a static run K gets s_i times the squares of
+  the directions' components on its diagonal, s_i the size of the node's block; solves take it away again, so that only M knows of it.
+*/
+static void anchor(SbSpace s, const SbValues *x)
+{
+  const SbConstraints c = s->constraints;
+
+  memset(c->added, 0, 3 * (size_t)s->nnode_owned * sizeof(*c->added));
+  for (PetscInt i = 0; i < c->n; i++) {
+    const SbConstraint *a = &c->constraint[i];
+    PetscReal n[3];
+
+    free_part(s, a->node, a->n, n);
+    for (int k = 0; k < 3; k++) c->added[3 * a->node + k] += n[k] * n[k];
+  }
+  for (PetscInt i = 0; i < s->nnode_owned; i++) {
+    size_t rs, cs;
+    PetscReal size;
+    PetscScalar *v;
+
+    if (c->first[i] < 0) continue;
+    v = sb_block(x, s->plan, i, s->plan->diagonal[i], &rs, &cs);
+    size = block_size(v, rs, cs);
+    for (size_t k = 0; k < 3; k++) {
+      c->added[3 * (size_t)i + k] *= size;
+      v[k * (rs + cs)] += c->added[3 * (size_t)i + k];
+    }
+  }
+}
+
+void SbConstraintsFinishTangent(SbSpace s, const SbValues *x)
+{
+  const SbConstraints c = s->constraints;
+  const SbPlan p = s->plan;
+
+  if (c->added) anchor(s, x);
+  if (c->beside || !c->nexact) return;
+  for (PetscInt i = 0; i < s->nnode_owned; i++) {
+    for (int q = 0; q < (x->value[1] ? 2 : 1); q++) {
+      const PetscInt *ptr = q ? p->oi : p->di, *col = q ? p->oj : p->dj;
+
+      for (PetscInt k = x->kind == SB_MATRIX_SBAIJ ? p->diagonal[i] : ptr[i]; k < ptr[i + 1]; k++) {
+        size_t rs, cs;
+        PetscScalar *v = sb_block(x, p, i, q ? ~k : k, &rs, &cs);
+
+        SbConstraintsProjectBlock(s, i, col[k], rs, cs, v);
+      }
+    }
+  }
+}
+
+void SbConstraintsAddSprings(SbSpace s, PetscInt node, PetscReal block[9])
+{
+  const SbConstraints c = s->constraints;
+
+  for (PetscInt i = c->first[node]; i >= 0; i = c->constraint[i].next) {
+    const SbConstraint *a = &c->constraint[i];
+    PetscReal n[3], push[3];
+
+    if (!a->spring) continue;
+    free_part(s, node, a->n, n);
+    free_part(s, node, a->push, push);
+    for (int k = 0; k < 9; k++) block[k] += a->stiffness * push[k / 3] * n[k % 3];
+  }
+}
+
+void SbConstraintsAddTangent(SbSpace s, const PetscReal x[], PetscReal y[])
+{
+  const SbConstraints c = s->constraints;
+
+  for (PetscInt i = 0; i < 3 * s->nnode_owned && c->added; i++) y[i] -= c->added[i] * x[i];
+  for (PetscInt i = 0; i < c->n; i++) {
+    const PetscInt node = c->constraint[i].node;
+    PetscReal block[9] = {0};
+
+    if (c->first[node] != i) continue;
+    SbConstraintsAddSprings(s, node, block);
+    for (int k = 0; k < 3; k++) y[3 * node + k] += SbDot3(block + 3 * k, x + 3 * node);
+  }
 }

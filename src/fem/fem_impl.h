@@ -86,26 +86,12 @@ void SbInsertQuadratic(SbSpace space, const SbValues *x, PetscInt b, const SbLan
 /* The same for DG cells, whose blocks stand between the means of their faces. */
 void SbInsertBroken(SbSpace space, const SbValues *x, PetscInt b, const SbLane K[10][9]);
 
-/* nodal_constraint.c. Not collective; arrays of owned nodes. */
-PetscErrorCode SbNodalConstraintsDestroy(SbNodalConstraints *nodal);
-/* Projects an assembled matrix. */
-void SbNodalConstraintsProjectMatrix(SbSpace space, const SbValues *x);
-/* Whether nodes are constrained on any rank: the same on all of them. */
-PetscBool SbNodalConstraintsExist(SbSpace space);
-/* The 3x3 projector of a node's constrained directions; NULL when nothing is constrained anywhere. */
-const PetscReal *SbNodalConstraintsProjector(SbSpace space, PetscInt node);
-/* constraint.c: adds what makes an assembled matrix regular. Not collective. */
-PetscErrorCode SbConstraintsRegularize(SbSpace space, const SbValues *x);
+/* constraint.c: projects an assembled matrix, or makes it regular. Not collective. */
+void SbConstraintsFinishTangent(SbSpace space, const SbValues *x);
 PetscErrorCode SbConstraintsDestroy(SbConstraints *constraints);
 
 /* Gives a BAIJ or SBAIJ matrix of the space the fast product of product.c. Collective. */
 PetscErrorCode SbProductAttach(SbSpace space, SbMatrixKind kind, Mat A);
-
-/* A direct solver for a matrix of rows by rows, G D F^T, on every rank; the caller destroys it. Collective. */
-PetscErrorCode SbConstraintsCreateGramSolver(SbSpace space, Mat gram, KSP *solver);
-
-/* Finds the exact constraints that rest: c->rests. Collective. */
-PetscErrorCode SbConstraintsFindRedundant(SbSpace space);
 
 /* The part of it that a matrix-free operator does. */
 PetscErrorCode SbMatrixFreeAddRows(Mat A, PetscInt n, const PetscInt node[], const PetscInt ia[],

@@ -191,7 +191,6 @@ PetscErrorCode SbSpaceDestroy(SbSpace *space)
   if (!s) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(SbPlanDestroy(&s->plan));
   PetscCall(VecDestroy(&s->template_vec));
-  PetscCall(SbNodalConstraintsDestroy(&s->nodal));
   PetscCall(SbConstraintsDestroy(&s->constraints));
   PetscCall(SbJumpDestroy(&s->jump));
   PetscCall(SbLayoutDestroy(s));

@@ -557,8 +557,7 @@ PetscErrorCode SbSpaceFinishTangent(SbSpace s, Mat A)
   }
   PetscCall(SbValuesBegin(A, &x));
   clear_fixed(s, &x);
-  if (s->nodal) SbNodalConstraintsProjectMatrix(s, &x);
-  if (s->constraints) PetscCall(SbConstraintsRegularize(s, &x));
+  if (s->constraints) SbConstraintsFinishTangent(s, &x);
   PetscCall(SbValuesEnd(&x));
   /* the parts' cached diagonals are stale: their own (local) assembly drops them; the outer matrix only needs its state raised */
   for (int q = 0; q < 2 && x.part[q]; q++) {

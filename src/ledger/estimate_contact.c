@@ -86,7 +86,7 @@ PetscErrorCode SbEstimateContact(SbLedger l, const SbStep *step, PetscReal *erro
   }
   /* half the force times gap of all points, J */
   energy = 0.;
-  PetscCall(SbModelContactPoints(m, step->t, step->U, step->R, &list));
+  PetscCall(SbModelContactPoints(m, step->t, step->U, &list));
   for (PetscInt i = 0; i < list.n; i++)
     energy += 0.5 * PetscAbsReal(list.point[i].gap * SbDot3(list.point[i].force, list.point[i].normal));
   PetscCall(PetscFree(list.point));
@@ -96,7 +96,7 @@ PetscErrorCode SbEstimateContact(SbLedger l, const SbStep *step, PetscReal *erro
     Vec F;
 
     PetscCall(VecDuplicate(step->U, &F));
-    PetscCall(SbModelContactForce(m, step->t, step->U, step->R, F));
+    PetscCall(SbModelContactForce(m, step->t, step->U, F));
     PetscCall(moved_energy(l, step->U, F, &strained));
     PetscCall(VecDestroy(&F));
     energy = PetscMin(energy, strained);

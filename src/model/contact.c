@@ -4,35 +4,28 @@
 #include "model_impl.h"
 #include "sblog.h"
 
-/* The constraints of all effects, assembled. */
-static PetscErrorCode assemble_constraints(SbModel m)
+PetscErrorCode SbModelContactResume(SbModel m)
 {
   SbSpace s = m->space;
 
   PetscFunctionBeginUser;
-  if (s->nodal) SbSpaceClearNodalConstraints(s);
-  if (s->constraints) SbSpaceClearConstraints(s);
-  for (PetscInt e = 0; e < m->nassemble_constraints; e++)
-    SbEffectCall(m->assemble_constraints[e], assemble_constraints, s);
-  if (s->nodal) PetscCall(SbSpaceAssembleNodalConstraints(s));
-  if (s->constraints) PetscCall(SbSpaceAssembleConstraints(s));
+  if (!s->constraints) PetscFunctionReturn(PETSC_SUCCESS);
+  SbSpaceClearConstraints(s);
+  for (int across = 0; across < 2; across++) { /* normals of all effects first */
+    for (PetscInt e = 0; e < m->nassemble_constraints; e++)
+      SbEffectCall(m->assemble_constraints[e], assemble_constraints, s, (PetscBool)across);
+  }
+  PetscCall(SbSpaceAssembleConstraints(s));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The same, and U is moved to where they hold. */
+/* The constraints of all effects, and U is moved to where they hold. */
 static PetscErrorCode constrain(SbModel m, PetscReal t, Vec U)
 {
   PetscFunctionBeginUser;
   if (!m->nassemble_constraints) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(assemble_constraints(m));
+  PetscCall(SbModelContactResume(m));
   PetscCall(SbModelPrescribe(m, t, U));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode SbModelContactResume(SbModel m)
-{
-  PetscFunctionBeginUser;
-  if (m->nassemble_constraints) PetscCall(assemble_constraints(m));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -66,12 +59,12 @@ PetscErrorCode SbModelContactUpdateActiveSet(SbModel m, PetscReal t, Vec U, Vec 
   *again = PETSC_FALSE;
   if (!m->nupdate_active_set) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_CONTACT], 0, 0, 0, 0));
-  if (m->space->constraints) PetscCall(SbSpaceComputeConstraintForces(m->space, U, R));
   PetscCall(SbSpaceGetLocalRead(m->space, U, &u));
-  PetscCall(SbSpaceGetLocalRead(m->space, R, &r));
+  PetscCall(VecGetArrayRead(R, &r));
+  if (m->space->constraints) SbConstraintsComputeForces(m->space, u, r);
+  PetscCall(VecRestoreArrayRead(R, &r));
   for (PetscInt e = 0; e < m->nupdate_active_set; e++)
-    SbEffectCall(m->update_active_set[e], update_active_set, m->space, u, r, again);
-  PetscCall(SbSpaceRestoreLocalRead(m->space, R, &r));
+    SbEffectCall(m->update_active_set[e], update_active_set, m->space, u, again);
   PetscCall(SbSpaceRestoreLocalRead(m->space, U, &u));
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, again, 1, SB_MPI_BOOL, MPI_LOR, m->comm));
   if (m->nrestitution && !*again && !m->space->rough) PetscCall(SbModelRestitutionUpdate(m, U, again));
@@ -107,12 +100,9 @@ PetscErrorCode SbModelContactVelocity(SbModel m, PetscReal t, PetscReal dt, Vec 
       SbEffectCall(m->begin_step[e], target_velocity, m->space, &stage);
   }
   PetscCall(SbSpaceRestoreLocalRead(m->space, U, &stage.u));
-  if (m->space->nodal) {
-    PetscCall(VecGetArray(V, &v));
-    SbNodalConstraintsVelocity(m->space, v);
-    PetscCall(VecRestoreArray(V, &v));
-  }
-  if (m->space->constraints) PetscCall(SbConstraintsProjectVelocity(m->space, dt, V));
+  PetscCall(VecGetArray(V, &v));
+  SbConstraintsVelocity(m->space, v);
+  PetscCall(VecRestoreArray(V, &v));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -139,43 +129,37 @@ PetscErrorCode SbModelContactGap(SbModel m, PetscReal t, Vec U, Vec G)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbModelContactForce(SbModel m, PetscReal t, Vec U, Vec R, Vec F)
+PetscErrorCode SbModelContactForce(SbModel m, PetscReal t, Vec U, Vec F)
 {
   SbStage stage = {.t = t, .shift_k = 1.};
-  const PetscReal *r;
   PetscReal *f;
 
   PetscFunctionBeginUser;
   PetscCall(SbSpaceGetLocalRead(m->space, U, &stage.u));
-  PetscCall(SbSpaceGetLocalRead(m->space, R, &r));
   PetscCall(SbSpaceGetLocalWrite(m->space, F, &f));
   PetscCall(PetscArrayzero(f, 3 * m->space->nnode));
   for (PetscInt e = 0; e < m->neffect; e++) {
-    if (m->effect[e]->ops.contact_force) SbEffectCall(m->effect[e], contact_force, m->space, &stage, r, f);
+    if (m->effect[e]->ops.contact_force) SbEffectCall(m->effect[e], contact_force, m->space, &stage, f);
   }
+  if (m->space->constraints) SbConstraintsAddForces(m->space, f);
   PetscCall(SbSpaceRestoreLocalWrite(m->space, F, &f));
-  PetscCall(SbSpaceRestoreLocalRead(m->space, R, &r));
   PetscCall(SbSpaceRestoreLocalRead(m->space, U, &stage.u));
-  if (m->space->constraints) PetscCall(SbSpaceAddConstraintForces(m->space, U, F));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode SbModelContactPoints(SbModel m, PetscReal t, Vec U, Vec R, SbContactPoints *list)
+PetscErrorCode SbModelContactPoints(SbModel m, PetscReal t, Vec U, SbContactPoints *list)
 {
   SbStage stage = {.t = t, .shift_k = 1.};
-  const PetscReal *r;
 
   PetscFunctionBeginUser;
   PetscCall(SbSpaceGetLocalRead(m->space, U, &stage.u));
-  PetscCall(SbSpaceGetLocalRead(m->space, R, &r));
   for (PetscInt e = 0; e < m->neffect; e++) {
     const PetscInt before = list->n;
 
     if (!m->effect[e]->ops.contact_points) continue;
-    SbEffectCall(m->effect[e], contact_points, m->space, &stage, r, list);
+    SbEffectCall(m->effect[e], contact_points, m->space, &stage, list);
     for (PetscInt i = before; i < list->n; i++) list->point[i].effect = e;
   }
-  PetscCall(SbSpaceRestoreLocalRead(m->space, R, &r));
   PetscCall(SbSpaceRestoreLocalRead(m->space, U, &stage.u));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

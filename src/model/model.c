@@ -241,10 +241,9 @@ PetscErrorCode SbModelResidual(SbModel m, PetscReal t, Vec U, Vec V, Vec A, Pets
   PetscCall(SbSpaceAddInternalForce(m->space, &stage, f));
   if (A || V) PetscCall(SbSpaceAddInertia(m->space, &stage, f));
   if (constrain) constrain_residual(m->space, f);
-  if (constrain && m->space->nodal) SbNodalConstraintsProject(m->space, f);
+  if (m->space->constraints) SbConstraintsResidual(m->space, stage.u, constrain, f);
   PetscCall(SbSpaceRestoreLocalWrite(m->space, F, &f));
   PetscCall(stage_end(m, U, V, A, &stage));
-  if (m->space->constraints) PetscCall(SbConstraintsResidual(m->space, U, constrain, F));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -300,7 +299,7 @@ PetscErrorCode SbModelNonsymmetric(SbModel m, PetscReal t, Vec U, Vec X, Vec Y)
     SbEffectCall(m->nonsymmetric[e], nonsymmetric, m->space, &stage, x, y);
   }
   constrain_residual(m->space, y);
-  if (m->space->nodal) SbNodalConstraintsProject(m->space, y);
+  if (m->space->constraints) SbConstraintsProject(m->space, y);
   PetscCall(SbSpaceRestoreLocalWrite(m->space, Y, &y));
   PetscCall(SbSpaceRestoreLocalRead(m->space, X, &x));
   PetscCall(stage_end(m, U, NULL, NULL, &stage));
@@ -324,7 +323,7 @@ PetscErrorCode SbModelPrescribe(SbModel m, PetscReal t, Vec U)
   PetscScalar *u;
 
   PetscFunctionBeginUser;
-  if (!m->nprescribe && !s->nodal && !s->constraints) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!m->nprescribe && !s->constraints) PetscFunctionReturn(PETSC_SUCCESS);
   for (PetscInt e = 0; e < m->nprescribe; e++) {
     if (m->prescribe[e]->steady) SbEffectCall(m->prescribe[e], prescribe, s, t);
   }
@@ -340,9 +339,8 @@ PetscErrorCode SbModelPrescribe(SbModel m, PetscReal t, Vec U)
       if (s->fixed[node] & (1 << c)) u[3 * node + c] = s->fixed_value[3 * k + c];
     }
   }
-  if (s->nodal) SbNodalConstraintsPrescribe(s, u);
+  if (s->constraints) SbConstraintsPrescribe(s, u);
   PetscCall(VecRestoreArray(U, &u));
-  if (s->constraints) PetscCall(SbConstraintsPrescribe(s, U));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -119,7 +119,7 @@ PetscErrorCode SbContactsFind(SbRun run, SbOutput out, const SbStep *step, Petsc
              "The residual was asked for but not given to the monitors");
   PetscCall(PetscLogEventBegin(out->event.contacts, 0, 0, 0, 0));
   c->list.n = 0;
-  PetscCall(SbModelContactPoints(run->model, step->t, step->U, step->R, &c->list));
+  PetscCall(SbModelContactPoints(run->model, step->t, step->U, &c->list));
   PetscCall(share_points(c, out->size));
   PetscCall(PetscFree(c->column));
   PetscCall(PetscMalloc(3 * sizeof(double) * (size_t)c->share.n, &c->column));

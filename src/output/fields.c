@@ -58,7 +58,7 @@ static PetscErrorCode contact_force(const SbField *f, SbRun run, const SbStep *s
   PetscCheck(step->R, PETSC_COMM_SELF, PETSC_ERR_PLIB,
              "The residual was asked for but not given to the monitors");
   PetscCall(VecDuplicate(step->U, &F));
-  PetscCall(SbModelContactForce(run->model, step->t, step->U, step->R, F));
+  PetscCall(SbModelContactForce(run->model, step->t, step->U, F));
   PetscCall(SbPointsForces(run, (SbOutput)run->output, PETSC_FALSE, F, values));
   PetscCall(VecDestroy(&F));
   PetscFunctionReturn(PETSC_SUCCESS);

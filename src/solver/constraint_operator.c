@@ -1,59 +1,44 @@
 /*
-  What solves see of the constraints of constraint.c: the operator A = P^T (K + S^T k S) P, and M_A^-1 = P M^-1 P^T around any preconditioner M.
+  What solves see of constraints that stand beside the matrix K (src/fem/constraint.c): the operator A = P (K + F^T k G) P, and M_A^-1 = P M^-1 P around
+  any preconditioner M.
 
-  With SB_SADDLE_DIRECT the part of M is taken by the solution of the saddle-point system, which is A's inverse in the null space: one
+  With SB_SADDLE_DIRECT the part of M is taken by a factorisation of the projected matrix, which is A's inverse in the null space: one
   iteration and what rounding asks for. Where nothing touches, M itself is used.
 */
 #include "solver_impl.h"
-#include "sbconstraint.h"
 #include "sbsolver.h"
 #include "sblog.h"
 
-/* y = (K + F^T k G) x, what was added to K taken away. */
-static PetscErrorCode multiply_stiffness(SbConstraints c, Vec x, Vec y)
+/* x <- P x, timed. */
+static PetscErrorCode project(SbSpace s, Vec x)
 {
-  PetscFunctionBeginUser;
-  PetscCall(MatMult(c->K, x, y));
-  if (c->added && c->w[0]) { /* before the first constraints there is neither */
-    PetscCall(VecPointwiseMult(c->w[0], c->added, x));
-    PetscCall(VecAXPY(y, -1., c->w[0]));
-  }
-  if (c->spring.N) {
-    PetscCall(MatMult(c->spring.free, x, c->spring.work));
-    PetscCall(VecPointwiseMult(c->spring.work, c->spring.work, c->k));
-    PetscCall(MatMultTransposeAdd(c->spring.push_free, c->spring.work, y, y));
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
+  PetscScalar *a;
 
-/* The projections of a solve, timed. */
-static PetscErrorCode project_force(SbConstraints c, Vec r)
-{
   PetscFunctionBeginUser;
   PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_PROJECT], 0, 0, 0, 0));
-  PetscCall(SbConstraintsProjectForce(c, r));
+  PetscCall(VecGetArray(x, &a));
+  SbConstraintsProject(s, a);
+  PetscCall(VecRestoreArray(x, &a));
   PetscCall(PetscLogEventEnd(SbEvents[SB_EVENT_PROJECT], 0, 0, 0, 0));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode project(SbConstraints c, Vec x)
-{
-  PetscFunctionBeginUser;
-  PetscCall(PetscLogEventBegin(SbEvents[SB_EVENT_PROJECT], 0, 0, 0, 0));
-  PetscCall(SbConstraintsProject(c, x));
-  PetscCall(PetscLogEventEnd(SbEvents[SB_EVENT_PROJECT], 0, 0, 0, 0));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* y = P^T (K + S^T k S) x for x in the null space, where the iteration stays. */
+/* y = P (K + F^T k G) x for x in the null space, where the iteration stays. */
 static PetscErrorCode multiply(Mat A, Vec x, Vec y)
 {
+  const PetscScalar *from;
+  PetscScalar *to;
   SbSpace s;
 
   PetscFunctionBeginUser;
   PetscCall(MatShellGetContext(A, &s));
-  PetscCall(multiply_stiffness(s->constraints, x, y));
-  PetscCall(project_force(s->constraints, y));
+  PetscCall(MatMult(s->constraints->K, x, y));
+  PetscCall(VecGetArrayRead(x, &from));
+  PetscCall(VecGetArray(y, &to));
+  SbConstraintsAddTangent(s, from, to);
+  PetscCall(VecRestoreArray(y, &to));
+  PetscCall(VecRestoreArrayRead(x, &from));
+  PetscCall(project(s, y));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -69,17 +54,8 @@ PetscErrorCode SbConstraintsCreateOperator(SbSpace s, Mat K, PetscBool singular,
   PetscCall(MatSetOption(*A, MAT_SYMMETRIC, (PetscBool)!s->constraints->nonsymmetric));
   s->constraints->K = K;
   s->constraints->saddle = saddle;
-  if (singular && saddle != SB_SADDLE_DIRECT) {
-    PetscCall(SbSpaceCreateVec(s, &s->constraints->anchor));
-    PetscCall(SbSpaceCreateVec(s, &s->constraints->added));
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode SbConstraintsSetMatrix(SbSpace s, Mat K)
-{
-  PetscFunctionBeginUser;
-  s->constraints->K = K;
+  if (singular && saddle != SB_SADDLE_DIRECT)
+    PetscCall(PetscCalloc1(3 * s->nnode_owned, &s->constraints->added));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -88,12 +64,13 @@ PetscErrorCode SbConstraintsSetMatrix(SbSpace s, Mat K)
 typedef struct {
   SbSpace space;
   PC inner;
+  Vec r; /* a projected residual */
 } Wrapped;
 
 /* Whether solves go by a factorisation of the saddle-point system now. */
 static PetscBool is_factored(SbSpace s)
 {
-  return (PetscBool)(s->constraints->saddle == SB_SADDLE_DIRECT && s->constraints->exact.N);
+  return (PetscBool)(s->constraints->saddle == SB_SADDLE_DIRECT && s->constraints->nexact);
 }
 
 static PetscErrorCode setup_wrapped(PC pc)
@@ -118,32 +95,26 @@ static PetscErrorCode setup_wrapped(PC pc)
 static PetscErrorCode apply_wrapped(PC pc, Vec r, Vec z)
 {
   PCFailedReason reason;
+  PetscBool factored;
   Wrapped *w;
-  SbConstraints c;
 
   PetscFunctionBeginUser;
   PetscCall(PCShellGetContext(pc, &w));
-  c = w->space->constraints;
-  if (is_factored(w->space)) {
-    PetscBool ok;
-
-    PetscCall(VecCopy(r, c->w[1]));
-    PetscCall(project_force(c, c->w[1]));
-    PetscCall(SbSaddleFactorSolve(w->space, c->w[1], z, &ok));
-    if (ok) PetscCall(project(c, z));
-    PetscCall(PCSetFailedReason(pc, ok ? PC_NOERROR : PC_FACTOR_NUMERIC_ZEROPIVOT));
-    PetscFunctionReturn(PETSC_SUCCESS);
+  factored = is_factored(w->space);
+  if (w->space->constraints->nexact) {
+    if (!w->r) PetscCall(VecDuplicate(r, &w->r));
+    PetscCall(VecCopy(r, w->r));
+    PetscCall(project(w->space, w->r));
+    r = w->r;
   }
-  if (!c->exact.N)
-    PetscCall(PCApply(w->inner, r, z));
+  if (factored)
+    PetscCall(SbSaddleFactorSolve(w->space, r, z, &reason));
   else {
-    PetscCall(VecCopy(r, c->w[1]));
-    PetscCall(project_force(c, c->w[1]));
-    PetscCall(PCApply(w->inner, c->w[1], z));
-    PetscCall(project(c, z));
+    PetscCall(PCApply(w->inner, r, z));
+    PetscCall(PCGetFailedReason(w->inner, &reason));
   }
-  PetscCall(PCGetFailedReason(w->inner, &reason));
-  if (reason) PetscCall(PCSetFailedReason(pc, reason));
+  if (w->space->constraints->nexact && !reason) PetscCall(project(w->space, z));
+  if (reason || factored) PetscCall(PCSetFailedReason(pc, reason));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -165,6 +136,7 @@ static PetscErrorCode destroy_wrapped(PC pc)
   PetscFunctionBeginUser;
   PetscCall(PCShellGetContext(pc, &w));
   PetscCall(PCDestroy(&w->inner));
+  PetscCall(VecDestroy(&w->r));
   PetscCall(PetscFree(w));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -176,7 +148,7 @@ PetscErrorCode SbPCConstrainedCreate(SbSpace s, PC pc, PC *inner)
 
   PetscFunctionBeginUser;
   *inner = pc;
-  if (!s->constraints) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!SbConstraintsBeside(s)) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscNew(&w));
   w->space = s;
   PetscCall(PCCreate(s->comm, &w->inner));

@@ -312,7 +312,7 @@ PetscErrorCode SbSolverChoose(SbSpace s, PetscBool dynamic, PetscBool linear, Pe
                             " unknowns, nu up to %g, %.2g %% of the tets slivers (angles below %g degrees): "
                             "a factorisation, iterations hardly get there",
                             unknowns, (double)hard.nu, 100. * (double)hard.sliver_part, SB_SLIVER));
-  } else if (s->faces && !s->edge_node && !s->nodal && !s->constraints && !s->coupled &&
+  } else if (s->faces && !s->edge_node && !s->constraints && !s->coupled &&
              (hard.face_nu > NU_PRESSURE || (!hard.slivers && (!dynamic || hard.dg)))) {
     /* docs/reports/solver_choice.md; 24k tets of CR, dynamic, CPU s of this and cg_two_level at nu 0.3 12 and 7, at 0.45 15 and 11, at 0.49 17 and 17 */
     name = "pressure";
@@ -374,8 +374,7 @@ static PetscErrorCode find_other(SbSpace s, const char *name, PetscBool indefini
     if (*preset && tried & 1U << (*preset - presets)) *preset = NULL;
   }
   if (*preset && tried & 1U << (*preset - presets)) *preset = NULL;
-  if (*preset && (*preset)->create && (!s->faces || s->edge_node || s->nodal || s->constraints))
-    *preset = NULL;
+  if (*preset && (*preset)->create && (!s->faces || s->edge_node || s->constraints)) *preset = NULL;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -512,11 +511,16 @@ PetscErrorCode SbSolverSetUp(SNES snes, SbSpace s, const SbSolverPreset *preset)
 
   PetscFunctionBeginUser;
   PetscCall(SNESGetKSP(snes, &ksp));
-  if (s->constraints) s->constraints->general = PETSC_FALSE;
+  if (s->constraints && s->constraints->general) { /* another solver begins as the first one did */
+    PetscCall(KSPSetNormType(ksp, s->constraints->norm));
+    PetscCall(KSPSetPCSide(ksp, s->constraints->side));
+    s->constraints->general = PETSC_FALSE;
+  }
   PetscCall(KSPGetPC(ksp, &pc));
   PetscCall(KSPSetTolerances(ksp, 1e-8, PETSC_DEFAULT, PETSC_DEFAULT, 5000));
   /* in a null space the residual of CG may grow a long way before it falls */
-  if (s->constraints) PetscCall(KSPSetTolerances(ksp, PETSC_DEFAULT, PETSC_DEFAULT, 1e10, PETSC_DEFAULT));
+  if (SbConstraintsBeside(s))
+    PetscCall(KSPSetTolerances(ksp, PETSC_DEFAULT, PETSC_DEFAULT, 1e10, PETSC_DEFAULT));
   PetscCall(SbPCConstrainedCreate(s, pc, &pc));
   /* the row, and over it the types of the user's */
   PetscCall(preset_value(preset, "-ksp_type", sizeof(method), method));
@@ -627,8 +631,8 @@ static PetscErrorCode check_method(SbSpace s, KSP ksp, PC pc, const SbSolverPres
              "-ksp_type preonly takes the preconditioner for the inverse, which %s %s is not: choose "
              "-pc_type cholesky or lu, or a -ksp_type that iterates (cg, minres, gmres)",
              strcmp(type, PCSHELL) ? "-pc_type" : "-solver", strcmp(type, PCSHELL) ? type : preset->name);
-  PetscCheck(!s->constraints || s->constraints->saddle == SB_SADDLE_DIRECT, s->comm, PETSC_ERR_USER,
-             "-ksp_type preonly does not hold the contact constraints, which join nodes beside the matrix: "
+  PetscCheck(!SbConstraintsBeside(s) || s->constraints->saddle == SB_SADDLE_DIRECT, s->comm, PETSC_ERR_USER,
+             "-ksp_type preonly does not hold the contact constraints, which stand beside the matrix: "
              "choose -ksp_type cg or fgmres");
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -646,7 +650,7 @@ PetscErrorCode SbSolverFinish(SNES snes, SbSpace s, const SbSolverPreset *preset
   PetscCall(SNESGetKSP(snes, &ksp));
   PetscCall(KSPGetPC(ksp, &pc));
   PetscCall(SbPCConstrainedGetInner(pc, &pc));
-  if (s->constraints) {
+  if (SbConstraintsBeside(s)) {
     PetscCall(PCSetOperators(pc, P, P));
     PetscCall(PCSetFromOptions(pc));
   }
@@ -658,7 +662,7 @@ PetscErrorCode SbSolverFinish(SNES snes, SbSpace s, const SbSolverPreset *preset
   PetscCall(SNESGetJacobian(snes, &A, NULL, NULL, NULL));
   PetscCall(is_symmetric(ksp, &symmetric));
   PetscCall(PetscObjectTypeCompareAny((PetscObject)ksp, &single, KSPRICHARDSON, KSPPREONLY, ""));
-  if (A && A != P && !s->constraints && (symmetric || single)) {
+  if (A && A != P && !SbConstraintsBeside(s) && (symmetric || single)) {
     PetscCall(KSPSetType(ksp, KSPFGMRES));
     PetscCall(PetscOptionsGetInt(NULL, NULL, "-ksp_gmres_restart", &restart, NULL));
     PetscCall(KSPGMRESSetRestart(ksp, restart));
@@ -668,7 +672,7 @@ PetscErrorCode SbSolverFinish(SNES snes, SbSpace s, const SbSolverPreset *preset
   PetscCall(PetscObjectTypeCompare((PetscObject)snes, SNESKSPONLY, &single));
   if (s->constraints && s->constraints->saddle == SB_SADDLE_DIRECT) direct = PETSC_TRUE;
   PetscCall(SbKSPCheckTrueResidual(ksp, direct, single));
-  if (s->constraints || s->nodal) PetscCall(SbKSPSetForceTolerance(ksp));
+  if (s->constraints) PetscCall(SbKSPSetForceTolerance(ksp));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -3,7 +3,6 @@
 */
 #pragma once
 #include "sbsolver.h"
-#include "sbconstraint.h"
 
 /* Errors: PETSC_ERR_USER for a norm or side that the type of ksp does not have. After KSPSetFromOptions(). Not collective. */
 PetscErrorCode SbKSPCheckNorm(KSP ksp);
@@ -28,10 +27,10 @@ PetscErrorCode SbKSPPreferTrueResidual(KSP ksp);
 PetscErrorCode SbKSPSetForceTolerance(KSP ksp);
 
 /*
-  SbPCConstrainedCreate - for a space with constraints between nodes: makes pc a preconditioner in the null space of the exact ones, P^-1 = P M^-1 P^T.
+  SbPCConstrainedCreate - for a space with constraints beside the matrix: makes pc a preconditioner in the null space of the exact ones, P M^-1 P.
 
   Collective. Output: inner, M; borrowed. It takes the options of pc, which gives up its prefix. inner is pc itself for a space
-  without such rows.
+  without such constraints.
 */
 PetscErrorCode SbPCConstrainedCreate(SbSpace space, PC pc, PC *inner);
 
@@ -52,11 +51,11 @@ PetscErrorCode SbPCDirectGathered(PC pc, const char **package);
 PetscErrorCode SbPCPressureCreate(SbSpace space, PC pc);
 
 /*
-  z of [K + F^T k G, F^T; G, 0] [z; m] = [r; 0] by a factorisation, which is renewed when K or the rows have changed. Collective.
+  z of [K + F^T k G, F^T; G, 0] [z; m] = [r; 0] by a factorisation, which is renewed when K or the constraints have changed; r is projected already. Collective.
 
-  Output: ok, false when the matrix could not be factored; z is not a number then.
+  Output: failed, why the matrix could not be factored; z is not a number then.
 */
-PetscErrorCode SbSaddleFactorSolve(SbSpace space, Vec r, Vec z, PetscBool *ok);
+PetscErrorCode SbSaddleFactorSolve(SbSpace space, Vec r, Vec z, PCFailedReason *failed);
 /* Negative eigenvalues of K + F^T k G in the null space of the constraints, from that factorisation; -1: it is unknown. Collective. */
 PetscErrorCode SbSaddleFactorCountNegative(SbSpace space, PetscInt *negative);
 

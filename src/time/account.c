@@ -9,28 +9,20 @@
 
 PetscErrorCode SbRunReactions(SbRun run, PetscReal t, Vec R)
 {
+  const SbSpace s = run->model->space;
+  const PetscReal *u;
+  PetscScalar *r;
+
   PetscFunctionBeginUser;
   PetscCall(SbModelResidual(run->model, t, run->U, run->V, run->A, PETSC_FALSE, R));
-  if (run->model->space->constraints) PetscCall(SbSpaceComputeConstraintForces(run->model->space, run->U, R));
-  if (run->model->space->nodal) {
-    PetscScalar *r;
-
+  if (s->constraints) {
+    /* what is on prescribed unknowns, and what contact has exerted */
+    PetscCall(SbSpaceGetLocalRead(s, run->U, &u));
     PetscCall(VecGetArray(R, &r));
-    SbNodalConstraintsReaction(run->model->space, r);
+    SbConstraintsComputeForces(s, u, r);
+    SbConstraintsReactions(s, r);
     PetscCall(VecRestoreArray(R, &r));
-  }
-  if (run->model->space->constraints) {
-    /* only what is on prescribed unknowns, and what contact has exerted */
-    if (!run->model->space->nodal) {
-      PetscScalar *r;
-
-      PetscCall(VecGetArray(R, &r));
-      for (PetscInt i = 0; i < 3 * run->model->space->nnode_owned; i++) {
-        if (!(run->model->space->fixed[i / 3] & (1 << i % 3))) r[i] = 0.;
-      }
-      PetscCall(VecRestoreArray(R, &r));
-    }
-    PetscCall(SbSpaceAddConstraintReactions(run->model->space, R));
+    PetscCall(SbSpaceRestoreLocalRead(s, run->U, &u));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -39,7 +31,7 @@ PetscErrorCode SbRunReactions(SbRun run, PetscReal t, Vec R)
 static PetscErrorCode works(SbRun run, Vec loads, Vec reaction, PetscReal sums[2])
 {
   SbSpace s = run->model->space;
-  const PetscBool obstacles = (PetscBool)(s->nodal || s->constraints);
+  const PetscBool obstacles = (PetscBool)(s->constraints != NULL);
   const PetscScalar *u, *u0, *f, *f0, *r, *r0;
 
   PetscFunctionBeginUser;

@@ -43,6 +43,7 @@ PetscErrorCode SbRunSolveContact(SbRun run, const SbAttempt *step, SNESConverged
   const SNES snes = run->snes;
   const PetscReal t = step->t, dt = step->dt;
   const Vec U0 = step->U0, U = step->U;
+  const PetscBool projected = (PetscBool)(m->space->constraints && !SbConstraintsBeside(m->space));
   PetscBool again = PETSC_TRUE, given_up, rough, constrained;
   PetscReal size, least = 0;
   Aim aim;
@@ -62,7 +63,7 @@ PetscErrorCode SbRunSolveContact(SbRun run, const SbAttempt *step, SNESConverged
   constrained = SbSpaceIsConstrained(m->space);
   rough = (PetscBool)(constrained && m->dynamic);
   /* the matrix holds what was constrained before */
-  if (m->space->nodal || !m->dynamic) run->tangent_known = PETSC_FALSE;
+  if (projected || !m->dynamic) run->tangent_known = PETSC_FALSE;
   if (constrained) {
     /* a body at rest has no residual but for rounding: then contact and supports carry all there is */
     PetscCall((*step->residual)(step->ctx, U, run->R));
@@ -93,7 +94,7 @@ PetscErrorCode SbRunSolveContact(SbRun run, const SbAttempt *step, SNESConverged
     }
     if ((!again && !rough) || !*reason) break;
     if (!again || round == ROUGH_ROUNDS) rough = PETSC_FALSE;
-    if (m->space->nodal || !m->dynamic) run->tangent_known = PETSC_FALSE;
+    if (projected || !m->dynamic) run->tangent_known = PETSC_FALSE;
     PetscCall(SbRunGiveUp(run, &given_up));
     if (given_up || round == SB_CONTACT_ROUNDS) {
       *reason = SNES_DIVERGED_MAX_IT;
@@ -104,14 +105,5 @@ PetscErrorCode SbRunSolveContact(SbRun run, const SbAttempt *step, SNESConverged
     PetscCall((*step->solve)(step->ctx, U, reason));
   }
   PetscCall(set_aim(snes, &aim, 0, 0, PETSC_FALSE));
-
-  /* a solve that failed may leave the tangent of a wild state, from whose diagonal constraints take their weights: the next attempt has that of the start again */
-  if (*reason < 0 && run->model->space->constraints) {
-    Mat A, P;
-
-    run->tangent_known = PETSC_FALSE;
-    PetscCall(SNESGetJacobian(snes, &A, &P, NULL, NULL));
-    PetscCall(SNESComputeJacobian(snes, U0, A, P));
-  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }

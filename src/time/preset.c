@@ -53,8 +53,10 @@ static const SbOption rows[] = {
    "up, and the run ends "
    "with the step before"},
   {"saddle_solver", SB_OPTION_CHOICE, 1, "", "auto", "auto|direct|iterative",
-   "how effects with response multiplier solve for displacements and multipliers: by a factorisation of "
-   "both, or by the solver in the null space of the constraints; auto goes by size"},
+   "how effects with response multiplier solve for displacements and multipliers: by a factorisation in "
+   "which the multipliers are eliminated, or by the solver in the null space of the constraints; auto goes "
+   "by "
+   "size"},
   {"contact_solver", SB_OPTION_CHOICE, 1, "", "auto", "auto|direct|iterative",
    "how systems with response barrier are solved: by a factorisation, or by CG with a coarse space of what "
    "touches; auto goes by size and by the share of nodes that touch"},
@@ -574,10 +576,10 @@ PetscErrorCode SbRunSetUp(SbRun run)
     PetscCall(PetscStrlcat(run->solver_reason, reason, sizeof(run->solver_reason)));
   }
 
-  /* the matrix, and what solves see of it when constraints join nodes */
+  /* the matrix, and what solves see of it when constraints stand beside it */
   if (!explicit) {
     PetscCall(SbSolverCreateOperator(m->space, run->solver_used, &run->J));
-    if (m->space->constraints)
+    if (SbConstraintsBeside(m->space))
       PetscCall(SbConstraintsCreateOperator(m->space, run->J, (PetscBool)!m->dynamic, run->saddle_used,
                                             &run->operator));
     else if (m->nnonsymmetric)

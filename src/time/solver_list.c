@@ -138,8 +138,8 @@ static PetscErrorCode replace(SbSolverList l, KSP ksp, const SbSolverPreset *nex
 
     PetscCall(MatDestroy(&run->J));
     PetscCall(SbSolverCreateOperator(s, next, &run->J));
-    if (s->constraints)
-      PetscCall(SbConstraintsSetMatrix(s, run->J));
+    if (SbConstraintsBeside(s))
+      s->constraints->K = run->J;
     else if (!run->nonsymmetric.U) { /* the nonsymmetric operator multiplies by run->J in any case */
       PetscCall(MatDestroy(&run->operator));
       PetscCall(PetscObjectReference((PetscObject)run->J));

@@ -50,7 +50,7 @@ static PetscErrorCode check_options(void)
   }
   PetscCall(effect_create(&x, "floor", FLOOR, &e));
   SB_CHECK(e->linear && !e->steady && !e->ops.tangent && e->ops.assemble_constraints &&
-             e->ops.update_active_set && x.space->nodal,
+             e->ops.update_active_set && x.space->constraints && !SbConstraintsBeside(x.space),
            "projected, without friction");
   SB_CHECK(e->ncolumn == 8, "columns");
   PetscCall(SbEffectDestroy(&e));
@@ -59,8 +59,8 @@ static PetscErrorCode check_options(void)
 
   PetscCall(fixture_create(PETSC_COMM_WORLD, 1, "box:1,1,1:2", 1, hull, &x));
   PetscCall(effect_create(&x, "floor", FLOOR "-effect_floor_response multiplier", &e));
-  SB_CHECK(e->linear && e->saddle && !e->ops.tangent && e->ops.assemble_constraints && !x.space->nodal &&
-             x.space->constraints,
+  SB_CHECK(e->linear && e->saddle && !e->ops.tangent && e->ops.assemble_constraints &&
+             SbConstraintsBeside(x.space),
            "multiplier, without friction");
   PetscCall(SbEffectDestroy(&e));
   PetscCall(PetscOptionsClear(NULL));
@@ -69,14 +69,14 @@ static PetscErrorCode check_options(void)
   PetscCall(fixture_create(PETSC_COMM_WORLD, 1, "box:1,1,1:2", 1, hull, &x));
   PetscCall(effect_create(&x, "floor", FLOOR "-effect_floor_response penalty", &e));
   SB_CHECK(!e->linear && e->ops.tangent && !e->ops.assemble_constraints && !e->ops.update_active_set &&
-             !x.space->nodal,
+             !x.space->constraints,
            "penalty");
   PetscCall(SbEffectDestroy(&e));
   PetscCall(PetscOptionsClear(NULL));
   PetscCall(effect_create(&x, "floor", FLOOR "-effect_floor_friction 0.2", &e));
-  SB_CHECK(e->linear && !e->ops.tangent && e->ops.assemble_constraints && !x.space->nodal &&
-             x.space->constraints && SbSpaceHasNonsymmetricConstraints(x.space),
-           "friction has rows");
+  SB_CHECK(e->linear && !e->ops.tangent && e->ops.assemble_constraints && SbConstraintsBeside(x.space) &&
+             x.space->constraints->nonsymmetric,
+           "friction has constraints");
   PetscCall(SbEffectDestroy(&e));
   PetscCall(PetscOptionsClear(NULL));
   PetscCall(fixture_destroy(&x));
@@ -107,7 +107,7 @@ static PetscErrorCode press(Fixture *x, SbEffect e)
   PetscCall(PetscCalloc1(3 * x->space->nnode, &u0));
   PetscCall((*e->ops.begin_step)(e, x->space, 0, 0.1, u0, NULL, u0));
   push(x, 1);
-  if (e->ops.update_active_set) PetscCall((*e->ops.update_active_set)(e, x->space, x->u, x->f, &changed));
+  if (e->ops.update_active_set) PetscCall((*e->ops.update_active_set)(e, x->space, x->u, &changed));
   PetscCall(PetscFree(u0));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -120,17 +120,6 @@ static PetscErrorCode to_vec(const Fixture *x, const PetscReal values[], Vec v)
   PetscCall(VecGetArray(v, &a));
   for (PetscInt i = 0; i < 3 * x->space->nnode_owned; i++) a[i] = values[i];
   PetscCall(VecRestoreArray(v, &a));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode from_vec(Vec v, Fixture *x)
-{
-  const PetscScalar *a;
-
-  PetscFunctionBeginUser;
-  PetscCall(VecGetArrayRead(v, &a));
-  for (PetscInt i = 0; i < 3 * x->space->nnode_owned; i++) x->f[i] = a[i];
-  PetscCall(VecRestoreArrayRead(v, &a));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -208,37 +197,30 @@ static PetscErrorCode check_tangent(const char *element, const char *options)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* What the rows of friction push with at a displacement, after who slides has been settled for it. */
+/* What the constraints of friction push with at a displacement, after who slides has been settled for it. */
 static PetscErrorCode rub(Fixture *x, const char *options)
 {
   SbEffect e;
   PetscBool changed;
   PetscReal *u0;
-  Vec U, R;
 
   PetscFunctionBeginUser;
   PetscCall(effect_create(x, "floor", options, &e));
   PetscCall(SbSpaceFixDone(x->space));
-  PetscCall(SbSpaceCreateVec(x->space, &U));
-  PetscCall(VecDuplicate(U, &R));
   PetscCall(PetscCalloc1(3 * x->space->nnode, &u0));
   push(x, 0.15);
-  PetscCall(to_vec(x, x->u, U));
   PetscCall((*e->ops.begin_step)(e, x->space, 0, 0.1, u0, NULL, x->u));
   for (int solve = 0; solve < 3; solve++) {
     SbSpaceClearConstraints(x->space);
-    PetscCall((*e->ops.assemble_constraints)(e, x->space));
+    for (int across = 0; across < 2; across++)
+      PetscCall((*e->ops.assemble_constraints)(e, x->space, (PetscBool)across));
     PetscCall(SbSpaceAssembleConstraints(x->space));
-    PetscCall(VecZeroEntries(R));
-    PetscCall(SbSpaceComputeConstraintForces(x->space, U, R));
-    PetscCall((*e->ops.update_active_set)(e, x->space, x->u, x->f, &changed));
+    SbConstraintsComputeForces(x->space, x->u, x->f);
+    PetscCall((*e->ops.update_active_set)(e, x->space, x->u, &changed));
   }
-  PetscCall(VecZeroEntries(R));
-  PetscCall(SbSpaceAddConstraintForces(x->space, U, R));
-  PetscCall(from_vec(R, x));
+  PetscCall(PetscArrayzero(x->f, 3 * x->space->nnode));
+  SbConstraintsAddForces(x->space, x->f);
   PetscCall(PetscFree(u0));
-  PetscCall(VecDestroy(&U));
-  PetscCall(VecDestroy(&R));
   PetscCall(SbEffectDestroy(&e));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -309,7 +291,7 @@ static PetscErrorCode check_scene(void)
   PetscCall(PetscLogDefaultBegin());
   PetscCall(test_scene_open(BLOCK "-effects gravity,floor " FLOOR, &t));
   SB_CHECK(t.model->nbegin_step == 1 && t.model->nassemble_constraints == 1 &&
-             t.model->nupdate_active_set == 1 && t.model->space->nodal,
+             t.model->nupdate_active_set == 1 && t.model->space->constraints,
            "a scene with contact");
   PetscCall(SbRunSolve(t.run));
   PetscCall(PetscLogEventGetPerfInfo(PETSC_DETERMINE, SbEvents[SB_EVENT_CONTACT], &before));
@@ -317,7 +299,7 @@ static PetscErrorCode check_scene(void)
   PetscCall(test_scene_close(&t));
   PetscCall(test_scene_open(BLOCK "-effects gravity", &t));
   SB_CHECK(!t.model->nbegin_step && !t.model->nassemble_constraints && !t.model->nupdate_active_set &&
-             !t.model->space->nodal,
+             !t.model->space->constraints,
            "a scene without contact has nothing of it");
   PetscCall(SbRunSolve(t.run));
   PetscCall(PetscLogEventGetPerfInfo(PETSC_DETERMINE, SbEvents[SB_EVENT_CONTACT], &info));

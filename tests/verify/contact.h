@@ -91,7 +91,7 @@ static inline PetscErrorCode contact_body_forces(SbRun run, PetscReal t, PetscRe
 
   PetscFunctionBeginUser;
   PetscCall(VecDuplicate(run->U, &F));
-  PetscCall(SbModelContactForce(run->model, t, run->U, run->reaction, F));
+  PetscCall(SbModelContactForce(run->model, t, run->U, F));
   PetscCall(contact_body_sums(run->model, F, PETSC_FALSE, force));
   PetscCall(VecDestroy(&F));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -86,7 +86,7 @@ static PetscErrorCode run(const char *options, Trace *trace)
   PetscCall(PetscMallocGetCurrentUsage(&trace->live));
   trace->live -= before;
   trace->neffect = t.model->neffect;
-  trace->bare = (PetscBool)(!t.model->space->nodal && !t.model->space->constraints && !t.model->space->jump &&
+  trace->bare = (PetscBool)(!t.model->space->constraints && !t.model->space->jump &&
                             !t.model->space->nfixed && !t.run->nmonitor);
   trace->n = 3 * verify_numbers(t.model);
   PetscCall(verify_gather(t.model, t.run->U, &trace->u));
