@@ -461,9 +461,11 @@ static void settle_friction(Contact *c, PetscReal largest, PetscBool *changed)
 
   for (PetscInt i = 0; i < c->n; i++) {
     Touch *touch = &c->touch[i];
+    PetscReal error;
 
     if (!touch->on || touch->along < 0) continue;
-    worst = PetscMax(worst, SbFrictionSettle(&c->friction, touch, SbContactForce(c, touch)));
+    error = SbFrictionSettle(&c->friction, touch, SbContactForce(c, touch));
+    worst = PetscMax(worst, error); /* a macro: its arguments are evaluated twice */
   }
   SbFrictionJudge(&c->friction, worst, largest, changed);
 }

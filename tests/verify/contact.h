@@ -25,6 +25,7 @@ static inline PetscErrorCode contact_columns(SbRun run, PetscReal t, Vec R, SbEf
   PetscFunctionBeginUser;
   PetscCall(SbSpaceGetLocalRead(m->space, R, &r));
   PetscCall(SbSpaceGetLocalRead(m->space, run->U, &stage.u));
+  if (m->space->constraints) SbConstraintsComputeForces(m->space, stage.u, r);
   PetscCall((*e->ops.history)(e, m->space, &stage, r, value));
   PetscCall(SbSpaceRestoreLocalRead(m->space, run->U, &stage.u));
   PetscCall(SbSpaceRestoreLocalRead(m->space, R, &r));
