@@ -277,6 +277,7 @@ int main(int argc, char **argv)
   PetscCall(check_oblique("p1", "rotated", PROJECTED, 0));
   PetscCall(check_oblique("cr", "cg_two_level", PROJECTED, 0));
   PetscCall(check_oblique("dg", "cg_jacobi", PROJECTED, 0));
+  PetscCall(check_oblique("p2", "cg_two_level", PROJECTED, 0));
   PetscCall(check_oblique("p1", "cg_icc", BESIDE, 0));
   PetscCall(check_oblique("p1", "cg_icc", BESIDE, 0.4));
   PetscCall(check_oblique("cr", "cg_two_level", BESIDE, 0.4));
@@ -284,6 +285,7 @@ int main(int argc, char **argv)
   PetscCall(check_oblique("cr", "cg_two_level", FACTORED, 0.4));
   PetscCall(check_axes("p1", PROJECTED));
   PetscCall(check_axes("cr", PROJECTED));
+  PetscCall(check_axes("p2", PROJECTED));
   PetscCall(check_axes("p1", BESIDE));
   PetscCall(check_axes("cr", FACTORED));
 
