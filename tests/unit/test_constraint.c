@@ -300,7 +300,7 @@ int main(int argc, char **argv)
   PetscCall(check_carried("cg_icc", FACTORED, -1, 5, PETSC_FALSE, &clamped));
   PetscCall(check_carried("direct", FACTORED, -1, 5, PETSC_FALSE, &clamped));
   PetscCall(check_carried("cg_gamg", FACTORED, -1, 5, PETSC_FALSE, &clamped));
-  PetscCall(check_carried("cg_icc", BESIDE, 1e9, 1000, PETSC_FALSE, &clamped));
+  PetscCall(check_carried("cg_icc", BESIDE, 1e9, 2000, PETSC_FALSE, &clamped));
   for (size_t k = 0; k < PETSC_STATIC_ARRAY_LENGTH(packages); k++) {
     PetscBool has;
 
