@@ -42,8 +42,9 @@
 #define DIFFERENCE 1e-7 /* of that motion, for its derivative */
 #define SETTLED \
   1e-4 /* of the speed of the time step (src/model/guard.c): a step that is short enough, where surfaces push each other */
-#define STICKING 1e-2       /* of that, with friction, whose forces follow from as small speeds */
-#define SETTLED_STATIC 1e-7 /* of the smallest body's size: the same in a static run, whose forces are all that is asked for */
+#define STICKING 1e-2 /* of that, with friction, whose forces follow from as small speeds */
+#define SETTLED_STATIC \
+  1e-7 /* of the smallest body's size: the same in a static run, whose forces are all that is asked for */
 #define SETTLED_LEAST \
   1e-8 /* of that size: no step of a whole time step need be shorter, however short these are */
 #define SETTLED_GAP \
