@@ -207,7 +207,7 @@ PetscErrorCode SbModelGuardStart(SbModel m, PetscReal t, PetscReal dt, Vec U)
 
 /*
   The speed V of a step from t to t + dt, m/s, by which tolerances of guarded contact are judged in any units: m V^2 / 2 is the energy that bodies of the mass m have when it begins,
-  of motion and of strain, and half of what all loads together do over the size of the smallest body.
+  of motion and of strain, and half of what all loads and supports together do over the size of the smallest body.
 */
 static PetscErrorCode step_speed(SbModel m, PetscReal t, PetscReal dt, Vec U, Vec V, PetscReal *speed)
 {
@@ -223,9 +223,17 @@ static PetscErrorCode step_speed(SbModel m, PetscReal t, PetscReal dt, Vec U, Ve
   PetscCall(SbSpaceGetLocalRead(s, U, &stage.u));
   PetscCall(SbSpaceGetLocalRead(s, V, &stage.v));
   PetscCall(SbModelExternalForces(m, &stage, PETSC_TRUE, 1., f));
+  for (PetscInt i = 0; i < s->nnode_owned; i++) load += PetscSqrtReal(SbDot3(f + 3 * i, f + 3 * i));
+
+  /* what supports bear: forces of the strains at nodes of theirs */
+  if (m->nprescribe) {
+    PetscCall(PetscArrayzero(f, 3 * s->nnode));
+    PetscCall(SbSpaceAddInternalForce(s, &stage, f));
+    for (PetscInt i = 0; i < s->nnode_owned; i++)
+      if (s->fixed[i]) load += PetscSqrtReal(SbDot3(f + 3 * i, f + 3 * i));
+  }
   PetscCall(SbSpaceRestoreLocalRead(s, V, &stage.v));
   PetscCall(SbSpaceRestoreLocalRead(s, U, &stage.u));
-  for (PetscInt i = 0; i < s->nnode_owned; i++) load += PetscSqrtReal(SbDot3(f + 3 * i, f + 3 * i));
   PetscCall(PetscFree(f));
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &load, 1, MPIU_REAL, MPI_SUM, m->comm));
   *speed = PetscSqrtReal(

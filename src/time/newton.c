@@ -57,6 +57,7 @@
 #define WALL 0.5      /* of the slope of E at first: where more of it is left, a longer step is tried */
 #define FARTHER 4.    /* so many times, behind a whole one */
 #define TRIES 5       /* of these */
+#define STEEP 0.01    /* of the slope of the quadratic model: the least of E along a direction */
 #define PROVISIONAL 1 /* steps that may follow each other while E is above where they began */
 
 /* What a solve keeps from iteration to iteration. */
@@ -192,7 +193,7 @@ static PetscErrorCode find_direction(SNES snes, PetscBool *filtered, PetscReal *
   const Vec X = snes->vec_sol, F = snes->vec_func, Y = snes->vec_sol_update;
   const SbModel m = n->run->model;
   KSPConvergedReason reason;
-  PetscReal shift = n->shift / SHIFT_MORE, least = 0.;
+  PetscReal shift = n->shift / SHIFT_MORE, least = 0., modelled = 0.;
   PetscInt negative, shifts = 0;
 
   PetscFunctionBeginUser;
@@ -208,7 +209,10 @@ static PetscErrorCode find_direction(SNES snes, PetscBool *filtered, PetscReal *
     PetscCall(solve_linear(snes, &reason));
     PetscCall(VecDot(F, Y, slope));
     *slope = -*slope;
-    if (n->nblock && n->kind != SB_HESSIAN_ABOVE && (reason < 0 || *slope >= 0.)) {
+    /* friction that is taken for one that sticks has a right-hand side of its own: the direction has to go down E as well */
+    if (n->nblock) PetscCall(VecDot(n->contact, Y, &modelled));
+    if (n->nblock && n->kind != SB_HESSIAN_ABOVE &&
+        (reason < 0 || *slope >= -STEEP * PetscMax(modelled, 0.))) {
       n->kind = n->kind == SB_HESSIAN_EXACT ? SB_HESSIAN_CLAMPED : SB_HESSIAN_ABOVE;
       continue;
     }
