@@ -2,7 +2,7 @@
   contact_blocks.c - the second derivative of contact, summed up by pairs of surface vertices and then spread over the nodes.
 
   A vertex of the surface is at x_v = X_v + sum_j w_vj u_j, so the derivative by the nodes is S^T H S with S = (w_vj). H is summed first, in blocks of two
-  vertices: pairs of features share them, and a vertex of CR and DG has seven to nine nodes. Then come the rows of T = H S, and those of S^T T, in which each
+  vertices: pairs of features share them, and a vertex of CR and DG has some twenty nodes. Then come the rows of T = H S, and those of S^T T, in which each
   column stands once.
 
   Sums run in the order of the pairs of features and in that of the vertices' numbers: neither depends on the partition.

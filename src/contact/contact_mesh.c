@@ -1,10 +1,8 @@
 /*
   contact_mesh.c - the surfaces of bodies and of an obstacle as vertices, edges and triangles, whole on every rank.
 
-  A vertex of a body follows its nodes: with P1 the one that it is; with CR and DG, whose displacement jumps from cell to cell, those of the facets around it, by
-  weights that reproduce linear fields, so that the surface is closed and patch tests hold. Where it is not in their plane, or is far out of them, the nodes of one of the cells behind join
-  in, chosen so that the number of nodes times the sum of the squares of their weights is least: few nodes make small blocks, small weights a vertex that does not yield on its own.
-  A facet of P2 is four flat triangles over its six nodes: its corners and
+  A vertex of a body follows its nodes: with P1 the one that it is; with CR and DG, whose displacement jumps from cell to cell, the mean over the cells
+  behind the facets around it, so that the surface is closed and linear fields are reproduced. A facet of P2 is four flat triangles over its six nodes: its corners and
   the middles of its sides are vertices. The rank that owns the vertex in the
   mesh knows all facets around it (the overlap), makes its list of nodes and moves it; positions are gathered by all ranks, 24 bytes per
   vertex of the surface. Numbers follow the original ones of the mesh: nothing below depends on the partition.
@@ -14,10 +12,6 @@
 */
 #include "contact_mesh.h"
 #include "obstacle.h"
-
-#define PLANE 1e-4  /* of their distance from a vertex: nodes that are so near a plane are in it */
-#define EXACT 1e-10 /* of that distance: error of a linear field */
-#define TIE 1e-6    /* of what decides on nodes: so much is none */
 
 /* Points of a facet: its three corners; with P2 the middles of its sides too, 3 + k between the corners k and k + 1. */
 static inline PetscInt npoint_of(SbSpace s, const SbFacet *f)
@@ -44,89 +38,6 @@ static PetscInt own_point(SbSpace s, const SbFacet *f, PetscInt k)
   if (k >= npoint_of(s, f)) return -1;
   node = middle_of(s, f, k - 3);
   return node < s->nnode_owned ? s->mesh->nvert_owned + node : -1;
-}
-
-/*
-  Weights w[n], with sum one and the least sum of squares, with which nodes reproduce linear fields at X: what is left of (1, .., 1) when it is made orthogonal to the nodes' coordinates
-  about X. Returns n times the sum of their squares; PETSC_MAX_REAL: there are none. w has room for 4 n.
-*/
-static PetscReal least_weights(SbSpace s, const PetscReal X[3], PetscInt n, const PetscInt node[],
-                               PetscReal w[])
-{
-  PetscReal size = 0., square = 0.;
-
-  for (PetscInt j = 0; j < 3 * n; j++)
-    size = PetscMax(size, PetscAbsReal(s->node_x[3 * node[j / 3] + j % 3] - X[j % 3]));
-  for (int i = 2; i >= -1; i--) {
-    PetscReal *q = w + (i + 1) * n;
-
-    /* coordinate i, and at last ones: twice against rounding */
-    for (PetscInt j = 0; j < n; j++) q[j] = i < 0 ? 1. : (s->node_x[3 * node[j] + i] - X[i]) / size;
-    for (int k = 0; k < 2 * (2 - i); k++) {
-      const PetscReal *p = w + (3 - k % (2 - i)) * n;
-      PetscReal dot = 0.;
-
-      for (PetscInt j = 0; j < n; j++) dot += p[j] * q[j];
-      for (PetscInt j = 0; j < n; j++) q[j] -= dot * p[j];
-    }
-    square = 0.;
-    for (PetscInt j = 0; j < n; j++) square += q[j] * q[j];
-    for (PetscInt j = 0; j < n; j++)
-      q[j] *= square < PetscSqr(PLANE) ? 0. : 1. / (i < 0 ? square : PetscSqrtReal(square));
-  }
-  /* nodes that are nearly in a plane are taken to be in it: not if that is an error */
-  for (int i = 0; i < 3; i++) {
-    PetscReal moment = 0.;
-
-    for (PetscInt j = 0; j < n; j++) moment += w[j] * (s->node_x[3 * node[j] + i] - X[i]);
-    if (PetscAbsReal(moment) > EXACT * size) return PETSC_MAX_REAL;
-  }
-  return square < PetscSqr(PLANE) ? PETSC_MAX_REAL : (PetscReal)n / square;
-}
-
-/*
-  The nodes of a vertex of CR or DG: nnode, node[] (global) and weight[] are those of all cells behind on entry. corner[n]: facets around, 6 facet + point.
-*/
-static PetscErrorCode fewer_nodes(SbSpace s, const PetscReal X[3], PetscInt n, const PetscInt corner[],
-                                  const SbFacet facet[], PetscInt *nnode, PetscInt node[], PetscReal weight[])
-{
-  PetscReal least = 0., *w;
-  PetscInt first = PETSC_MAX_INT, *local;
-
-  PetscFunctionBeginUser;
-  for (PetscInt j = 0; j < *nnode; j++) least += *nnode * weight[j] * weight[j];
-  PetscCall(PetscMalloc2(n + 3, &local, 4 * (n + 3), &w));
-  for (PetscInt i = -1; i < n; i++) {
-    PetscInt m = n, id = -1;
-    PetscReal value;
-
-    /* of the facets, and of one cell */
-    for (PetscInt k = 0; k < n; k++)
-      local[k] = s->cell_node[4 * facet[corner[k] / 6].cell + facet[corner[k] / 6].face];
-    if (i >= 0) {
-      const PetscInt cell = facet[corner[i] / 6].cell;
-
-      id = s->mesh->cell_orig[cell];
-      for (int a = 0; a < 4; a++) {
-        PetscInt k = 0;
-
-        while (k < n && local[k] != s->cell_node[4 * cell + a]) k++;
-        if (k == n) local[m++] = s->cell_node[4 * cell + a];
-      }
-    }
-    /* of equal ones, up to rounding, the first cell */
-    value = least_weights(s, X, m, local, w);
-    if (value > least * (1. + (id < first ? TIE : -TIE))) continue;
-    least = value;
-    first = id;
-    *nnode = m;
-    for (PetscInt j = 0; j < m; j++) {
-      node[j] = s->gnode[local[j]];
-      weight[j] = w[j];
-    }
-  }
-  PetscCall(PetscFree2(local, w));
-  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Nodes and weights of the own vertices, ascending; records of 3 + 2 count numbers: id, part, count, nodes, and weights apart. */
@@ -208,8 +119,7 @@ static PetscErrorCode list_own(SbContactMesh m, PetscInt n, const SbFacet facet[
     if (middle >= 0) {
       node[nnode] = s->gnode[middle];
       weight[4 + nnode++] = 1.;
-    } else if (SbSpaceCellElement(s, facet[ring[first] / 6].cell)->ops.vertex[0][1] != 0.)
-      PetscCall(fewer_nodes(s, X, last - first, ring + first, facet, &nnode, node, weight + 4));
+    }
     record[2] = nnode;
     PetscCall(PetscSortIntWithScalarArray(nnode, node, weight + 4));
     for (int i = 0; i < 3; i++) weight[i] = X[i];

@@ -31,7 +31,6 @@ NEWTON = 60      # most iterations of a step
 MEDIAN = 10      # and in the middle
 EXCESS = 1e-3    # energy above what there was, of the largest
 GRAVITY = 9.81
-PRESSED = {"p1": {}, "cr": dict(element="cr", gamma1=5)}  # CR under pressures of several shear moduli (docs/reference/theory.md): 5 of them
 
 
 class Scene:
@@ -151,7 +150,7 @@ for pair, (low, high, gap) in PAIRS.items():
 # 2. speed
 
 def plate(s, speed, element="p1"):
-    s.body("block", "box:0.1,0.1,0.1:3", young=1e6, translate="-0.05,-0.05,0.02", velocity=f"0,0,{-speed}", **PRESSED[element])
+    s.body("block", "box:0.1,0.1,0.1:3", young=1e6, translate="-0.05,-0.05,0.02", velocity=f"0,0,{-speed}", element=element)
     s.obstacle("plate", "box:-0.2,-0.2,-0.01,0.2,0.2,0", lambda p, t: p[:, 2])
     s.time(0.005, 0.06)
 

@@ -54,16 +54,9 @@ def crossings(x, edges, triangles):
     return found
 
 
-def least_weights(p):
-    """Weights with sum one and the least sum of squares that make the mean of the points p zero; None: there are none."""
-    a = np.column_stack([np.ones(len(p)), p / np.abs(p).max()]).T
-    w = np.linalg.lstsq(a, [1, 0, 0, 0], rcond=1e-5)[0]
-    return w if np.abs(a @ w - [1, 0, 0, 0]).max() < 1e-9 else None
-
-
 def weld(path):
-    """A run whose tets have points of their own: the matrix that takes these to the surface that touches, as rows (vertex, point, weight); with triangles and the body of each vertex.
-    A vertex goes with the middles of the boundary facets around it, where it has to with those of the faces of one cell behind as well: as few and as small weights as will do."""
+    """A run whose tets have points of their own: the matrix that takes these to the surface that touches, means over the boundary facets around each
+    vertex, as rows (vertex, point, weight); with triangles and the body of each vertex."""
     with h5py.File(path) as f:
         x, cells, body = f["mesh/x"][...], f["mesh/cells"][...], f["mesh/body"][...]
     size = np.ptp(x, axis=0).max()
@@ -72,39 +65,10 @@ def weld(path):
     _, vertex = np.unique(key, axis=0, return_inverse=True)
     vertex = vertex.ravel()
     triangles, points = surface(vertex[cells], also=cells)
+    count = np.bincount(triangles.ravel(), minlength=vertex.max() + 1)
     vertex_body = np.zeros(vertex.max() + 1, int)
     vertex_body[vertex] = key[:, 3]
-    cell_of = np.empty(len(x), int)
-    cell_of[cells] = np.arange(len(cells))[:, None]
-    around = {}
-    for corners, facet in zip(triangles, points):
-        for v, p in zip(corners, facet):
-            around.setdefault(v, []).append((facet, p))
-    rows = []
-    for v, facets in around.items():
-        here = x[facets[0][1]]
-        own = {tuple(sorted(vertex[facet])): facet for facet, _ in facets}
-        # the mean of the cells' corners, in terms of middles: 1 for the faces at the corner, -2 for the one opposite
-        mean = {}
-        for _, p in facets:
-            for q in cells[cell_of[p]]:
-                face = tuple(sorted(vertex[cells[cell_of[p]][cells[cell_of[p]] != q]]))
-                mean[face] = mean.get(face, 0) + (-2 if q == p else 1) / len(facets)
-        least, chosen = len(mean) * sum(w * w for w in mean.values()), ([p for _, p in facets], np.full(len(facets), 1 / len(facets)), 1)
-        for cell in [None, *sorted({cell_of[p] for _, p in facets})]:
-            faces = dict(own)
-            if cell is not None:
-                for q in cells[cell]:
-                    face = cells[cell][cells[cell] != q]
-                    faces.setdefault(tuple(sorted(vertex[face])), face)
-            middles = list(faces.values())
-            w = least_weights(np.array([x[face].mean(axis=0) for face in middles]) - here)
-            if w is not None and len(w) * (w @ w) < least * (1 + (1e-6 if cell is None else -1e-6)):
-                least, chosen = len(w) * (w @ w), (middles, w, 3)
-        for p, w in zip(chosen[0], chosen[1]):
-            rows += [(v, q, w / chosen[2]) for q in np.atleast_1d(p)]
-    number, point, weight = map(np.array, zip(*rows))
-    return triangles, vertex_body, number, point, weight
+    return triangles, vertex_body, triangles.ravel(), points.ravel(), 1 / count[triangles.ravel()]
 
 
 def frames(path, most, to=None):

@@ -65,8 +65,7 @@ static PetscErrorCode check_stack(const char *element, int upper, PetscReal tole
   VERIFY_NEAR(record_last(&r, "meet_normal_force"), LOAD * 0.01, 0.01 * LOAD * 0.01,
               "load on the lower block, N");
   VERIFY_NEAR(record_last(&r, "meet_penetration"), 0, 1e-7 * 0.2, "penetration, m");
-  /* the last step leaves gaps right to a hundredth of the width, forces to the square of that at worst */
-  VERIFY_NEAR(force[5], LOAD * 0.01, 1e-5 * LOAD * 0.01, "contact force on the upper block, N");
+  VERIFY_NEAR(force[5], LOAD * 0.01, 1e-6 * LOAD * 0.01, "contact force on the upper block, N");
   VERIFY_NEAR(force[2] + force[5], 0, 1e-9 * LOAD * 0.01, "contact forces of both blocks, N");
   PetscCall(record_free(&r));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -171,7 +170,8 @@ int main(int argc, char **argv)
   PetscCall(check_stack("p1", 2, 0.2));
   PetscCall(check_bars("cr"));
   PetscCall(check_momentum("p1", 0));
-  PetscCall(check_slope(0.51, 1e-4));
+  /* friction sticks below 1e-4 of the step's speed, some m/s with what weight and supports do */
+  PetscCall(check_slope(0.51, 2e-4));
   PetscCall(check_slope(0.49, 0.08 * 0.01 * 1.755));
   PetscCall(check_slope(0.2, 0.01 * 0.3 * 1.755));
   SB_TEST_END();
