@@ -218,7 +218,7 @@ static PetscErrorCode take_checkpoint(SbRun run, const char *option, PetscInt b,
 
   PetscFunctionBeginUser;
   *is = (PetscBool)(!stat(path, &info) && S_ISREG(info.st_mode));
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, is, 1, MPIU_BOOL, MPI_LAND, out->comm));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, is, 1, SB_MPI_BOOL, MPI_LAND, out->comm));
   if (!*is) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(SbH5Open(out->comm, path, PETSC_FALSE, &h, is));
   if (!*is) PetscFunctionReturn(PETSC_SUCCESS);
