@@ -5,7 +5,6 @@
   0 reads it, and the effect goes from where it is towards the new place in a straight line, at -live_speed at most: three tables of two rows. So a step that is tried again is the same one.
   A run that is faster than -live_pace simulated seconds per second waits; one that is slower does not hurry afterwards.
 */
-#include <unistd.h>
 #include "formula.h"
 
 #define MOVED_MAX 16 /* effects that are moved */

@@ -214,7 +214,7 @@ static PetscErrorCode take_checkpoint(SbRun run, const char *option, PetscInt b,
   int64_t hash = 0;
   PetscBool ok = PETSC_TRUE;
   PetscReal *slice, *owned;
-  char *options;
+  char *options = NULL;
 
   PetscFunctionBeginUser;
   *is = (PetscBool)(!stat(path, &info) && S_ISREG(info.st_mode));
@@ -229,7 +229,6 @@ static PetscErrorCode take_checkpoint(SbRun run, const char *option, PetscInt b,
   }
 
   /* its bodies have the meshes and elements of these */
-  PetscCall(SbOutputCountNodes(s, out));
   PetscCall(SbOutputOrder(run, out));
   PetscCall(SbH5GetInt(h.file, "mesh_hash", &hash, &ok));
   ok = (PetscBool)(ok && (uint64_t)hash == out->mesh_hash);
@@ -242,7 +241,7 @@ static PetscErrorCode take_checkpoint(SbRun run, const char *option, PetscInt b,
              body->element);
     ok = (PetscBool)(strstr(options, line) != NULL);
   }
-  if (hash == (int64_t)out->mesh_hash) PetscCall(PetscFree(options));
+  PetscCall(PetscFree(options));
 
   /* displacement and velocity of its nodes */
   PetscCall(PetscMalloc2(3 * out->node.n, &slice, 3 * s->nnode_owned, &owned));
