@@ -57,18 +57,25 @@ shutil.rmtree(OUT, ignore_errors=True)
 # Down into the block, and when force is there sideways: what it does next depends on what came.
 put("live", "# x y z\nnobody 1 1 1\ntool 0 0 -0.02\n")
 begun = time.monotonic()
-run = subprocess.Popen(command(2, "live", "-effect_tool_displacement", "live", "-live_speed", "0.1", "-live_pace", "0.4", "-ts_max_time", "0.6", "-checkpoint_every_steps", "20", "-checkpoint_keep", "9"))
-while run.poll() is None:
+run = subprocess.Popen(command(2, "live", "-effect_tool_displacement", "live", "-live_speed", "0.1", "-live_pace", "0.4", "-ts_max_time", "1000", "-checkpoint_every_steps", "20", "-checkpoint_keep", "1000"))
+# However busy the machine is: it is stopped when the tool has been where it was wanted last for some steps.
+there = 0
+while run.poll() is None and time.monotonic() - begun < 600:
     try:
         h = history("live")
-        if len(h["time"]) > 1 and abs(h["tool_force_z"][-1]) > 0:
+        if abs(h["tool_force_z"][-1]) > 0:
             put("live", "tool 0.01, 0, -0.02 and more\n")
+        there = (numpy.abs(h["tool_live_x"] - 0.01) < 1e-12).sum()
+        if there > 5 and len(h["time"]) > 45:
+            run.terminate()
+            run.wait()
     except (OSError, ValueError, IndexError):
         pass
     time.sleep(0.05)
 elapsed = time.monotonic() - begun
-if run.returncode:
-    fail(f"exit code {run.returncode}")
+if run.returncode != 75:
+    run.kill()
+    fail(f"exit code {run.returncode}, {there} steps at the place that was wanted")
 h = history("live")
 place = numpy.stack([h[f"tool_live_{k}"] for k in "xyz"], 1)
 speed = numpy.linalg.norm(numpy.diff(place, axis=0), axis=1) / numpy.diff(h["time"])
@@ -76,14 +83,15 @@ if not (abs(place[-1] - [0.01, 0, -0.02]).max() < 1e-12 and abs(speed.max() - 0.
     fail(f"the tool is at {place[-1]}, and was {speed.max()} m/s fast")
 if not h["tool_force_z"].max() - h["tool_force_z"].min() > 0.1:
     fail("nothing was pressed")
-if elapsed < 0.6 / 0.4:
-    fail(f"0.6 s at 0.4 of real time took {elapsed} s")
+end = h["time"][-1]
+if elapsed < end / 0.4:
+    fail(f"{end} s at 0.4 of real time took {elapsed} s")
 
 # The same once more: the places of the history as tables, on another number of ranks.
 for k in "xyz":
     (OUT / f"{k}.txt").write_text("".join(f"{t!r} {x!r}\n" for t, x in zip(h["time"].tolist(), h[f"tool_live_{k}"].tolist())))
 path = ";".join(f"table:{OUT}/{k}.txt" for k in "xyz")
-subprocess.run(command(1, "again", "-effect_tool_displacement", path, "-ts_max_time", "0.6"), check=True)
+subprocess.run(command(1, "again", "-effect_tool_displacement", path, "-ts_max_time", repr(float(end))), check=True)
 g = history("again")
 for column in ("strain", "tool_force_z", "tool_force_x"):
     if not abs(h[column] - g[column]).max() < 1e-6 * abs(h[column]).max():
@@ -92,7 +100,7 @@ for column in ("strain", "tool_force_z", "tool_force_x"):
 # A restart begins where the tool was, and goes to where it is wanted now.
 shutil.copytree(OUT / "live", OUT / "on")
 put("on", "tool 0 0 0\n")
-subprocess.run(command(2, "on", "-effect_tool_displacement", "live", "-live_pace", "0", "-ts_max_time", "0.6", "-restart", str(OUT / "on" / "checkpoint_000040.h5")), check=True)
+subprocess.run(command(2, "on", "-effect_tool_displacement", "live", "-live_pace", "0", "-ts_max_time", "0.6", "-output_overwrite", "yes", "-restart", str(OUT / "on" / "checkpoint_000040.h5")), check=True)
 g = history("on")
 if not (abs(g["tool_live_x"][40] - h["tool_live_x"][40]) < 1e-15 and abs(g["tool_live_z"][-1]) < 1e-12 and g["tool_live_z"][41] < -0.01):
     fail("a restart does not go on where the tool was")
