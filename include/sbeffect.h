@@ -49,8 +49,6 @@ typedef struct {
   PetscErrorCode (*setup)(SbEffect e, SbSpace space);
   /* writes prescribed displacements at time t into space->fixed_value (rows from SbSpaceFixedIndex()). Not collective. */
   PetscErrorCode (*prescribe)(SbEffect e, SbSpace space, PetscReal t);
-  /* once before each attempt at a step */
-  PetscErrorCode (*prestep)(SbEffect e, SbSpace space, PetscReal t, PetscReal dt);
   /* contact, before the first solve of an attempt at a step from t to t + dt: local displacements u0 at t and u as predicted at
      t + dt, m; v0 are the velocities at t, m/s, NULL unless an effect has `restitution`. Collective. */
   PetscErrorCode (*begin_step)(SbEffect e, SbSpace space, PetscReal t, PetscReal dt, const PetscReal u0[],

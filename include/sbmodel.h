@@ -53,9 +53,9 @@ struct _p_SbModel {
   PetscInt neffect;
   SbEffect *effect;
   /* one list per operation, holding only the effects that implement it */
-  PetscInt nprescribe, nprestep, nforce, ntangent, nnonsymmetric, naccept, nhistory, nbegin_step,
+  PetscInt nprescribe, nforce, ntangent, nnonsymmetric, naccept, nhistory, nbegin_step,
     nassemble_constraints, nupdate_active_set, ntime_of_impact, nrestitution, npotential;
-  SbEffect *prescribe, *prestep, *begin_step, *assemble_constraints, *update_active_set, *force, *tangent,
+  SbEffect *prescribe, *begin_step, *assemble_constraints, *update_active_set, *force, *tangent,
     *nonsymmetric, *accept, *history, *time_of_impact, *restitution, *potential;
   struct {
     Vec U0, V0;     /* state when the step began; borrowed */

@@ -16,7 +16,6 @@ PetscErrorCode SbModelDestroy(SbModel *model)
   for (PetscInt e = 0; e < m->neffect; e++) PetscCall(SbEffectDestroy(&m->effect[e]));
   PetscCall(PetscFree(m->effect));
   PetscCall(PetscFree(m->prescribe));
-  PetscCall(PetscFree(m->prestep));
   PetscCall(PetscFree(m->force));
   PetscCall(PetscFree(m->begin_step));
   PetscCall(PetscFree(m->assemble_constraints));
@@ -141,7 +140,6 @@ PetscErrorCode SbModelSetUp(SbModel m)
   }
   PetscCall(SbSpaceFixDone(m->space));
   SORT_INTO_LIST(m, prescribe);
-  SORT_INTO_LIST(m, prestep);
   SORT_INTO_LIST(m, begin_step);
   SORT_INTO_LIST(m, assemble_constraints);
   SORT_INTO_LIST(m, update_active_set);

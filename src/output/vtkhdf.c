@@ -5,14 +5,16 @@
   mesh (there are several in a run that was re-meshed); steps name the part that they show and where their values begin. Their points are the field
   `position`, so that bodies move; frames without it show the rest shape. Contact points are PolyData, one part per frame.
 
-  The file is made in memory and replaced as a whole. Its size and time grow with the number of frames, so it is made again after each of the first
-  frames, later when their number has grown by a quarter, and at the end of the run.
+  The file is made in memory and replaced as a whole. That takes the longer the more frames there are, so it is made again when the run has worked
+  BETWEEN times as long as the last time took, and at the end of the run: a twentieth of the run at most, however often it writes frames.
 
   Reference: VTKHDF file format, version 2.0 (docs.vtk.org, "VTK File Formats"): Steps of UnstructuredGrid and PolyData. Symmetric tensors
   have the order xx yy zz xy yz xz there.
 */
 #include <unistd.h>
 #include "output_impl.h"
+
+#define BETWEEN 20
 
 /* A run of values in fields.h5: rows of one dataset, in one frame or one mesh. */
 typedef struct {
@@ -47,6 +49,7 @@ struct _p_SbVtkhdf {
   Frame *frame;
   Array *array;
   PetscInt nwritten; /* frames that the file on disk has */
+  double next;       /* when it is made again, in s of MPI_Wtime() */
 };
 
 PetscErrorCode SbVtkhdfCreate(const char *path, PetscBool points, SbVtkhdf *v)
@@ -422,10 +425,11 @@ void SbVtkhdfWrite(SbVtkhdf v, PetscBool last, size_t nmessage, char message[])
   PetscBool ok = PETSC_TRUE;
   int64_t *work;
   SbChunk image = {NULL, 0};
+  const double begun = MPI_Wtime();
   void *text = NULL;
   hid_t file;
 
-  if (v->nframe == v->nwritten || (!last && v->nframe > 20 && 4 * (v->nframe - v->nwritten) < v->nwritten)) {
+  if (v->nframe == v->nwritten || (!last && begun < v->next)) {
     (void)H5Pclose(list);
     return;
   }
@@ -449,6 +453,7 @@ void SbVtkhdfWrite(SbVtkhdf v, PetscBool last, size_t nmessage, char message[])
   else
     SbFileReplace(v->path, 1, &image, nmessage, message);
   v->nwritten = v->nframe;
+  v->next = MPI_Wtime() + BETWEEN * (MPI_Wtime() - begun);
   free(text);
   free(work);
   (void)H5Pclose(list);

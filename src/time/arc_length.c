@@ -379,7 +379,6 @@ PetscErrorCode SbArcLengthSolve(SbRun run)
     }
 
     /* a step along it, half as long where that fails */
-    PetscCall(SbRunStepBegin(run, factor, 0.));
     PetscCall(attempt(&p, factor, l, sign, &its, &ok));
     if (!ok) {
       run->rejected_step++;

@@ -1,21 +1,10 @@
 /*
   One step, dynamic or static, from its start to its acceptance. second_order.c and static.c say what a step's unknowns are and how long it is.
 
-    attempt: effects move, a first guess, Newton's method with the loop of contact around it, who examines solutions, what is refused
+    attempt: a first guess, Newton's method with the loop of contact around it, who examines solutions, what is refused
     accepted: effects keep their history, the account of energies is closed (account.c), monitors look
 */
 #include "time_impl.h"
-
-#define SHORT 0.13 /* of the length asked for: three halvings */
-
-PetscErrorCode SbRunStepBegin(SbRun run, PetscReal t, PetscReal dt)
-{
-  SbModel m = run->model;
-
-  PetscFunctionBeginUser;
-  for (PetscInt e = 0; e < m->nprestep; e++) SbEffectCall(m->prestep[e], prestep, m->space, t, dt);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
 
 PetscErrorCode SbRunAttempt(SbRun run, const SbAttempt *a, PetscBool *ok)
 {
@@ -23,8 +12,6 @@ PetscErrorCode SbRunAttempt(SbRun run, const SbAttempt *a, PetscBool *ok)
   PetscBool again = PETSC_TRUE;
 
   PetscFunctionBeginUser;
-  /* effects move to the end of the step */
-  PetscCall(SbRunStepBegin(run, a->t, a->dt));
   for (int solves = 0; again; solves++) {
     SbSolvedStep step;
 
@@ -57,16 +44,7 @@ PetscErrorCode SbRunAttempt(SbRun run, const SbAttempt *a, PetscBool *ok)
   /* what moves by order is where it was when the step began, if the run ends there */
   if (!*ok && run->model->npotential) PetscCall(SbModelGuardAdvance(run->model, 0.));
 
-  /* steps that become much shorter than asked for are slow, and a sign of trouble */
-  if (!*ok && run->stop_reason[0] && !run->stopped && !run->shortened && a->dt <= SHORT * run->dt) {
-    run->shortened = PETSC_TRUE;
-    PetscCall(SbWarning(
-      run->model->comm,
-      "steps had to be halved to %.2g of their length, and more: %s. It goes on; if it gets slow, try %s, or "
-      "loads and motions that begin gently (docs/guides/when_it_fails.md)",
-      (double)(a->dt / run->dt), run->stop_reason,
-      run->model->dynamic ? "a shorter -ts_dt from the start" : "more -static_steps"));
-  }
+  if (!*ok) PetscCall(SbRunWarnShorter(run, a->dt));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

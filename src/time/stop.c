@@ -12,6 +12,7 @@
 #include <unistd.h>
 #include "time_impl.h"
 
+#define SHORT 0.13         /* of the length asked for: three halvings */
 #define WALL_TIME 1000      /* as the number of a signal */
 #define RESERVE_PART 0.05   /* of -wall_time, for the last files, */
 #define RESERVE_LONGEST 60. /* but no more than so many s; twice what files have taken so far comes on top */
@@ -36,6 +37,21 @@ PetscErrorCode SbRunFail(SbRun run, const char *format, ...)
   PetscCall(PetscVSNPrintf(run->stop_reason, sizeof(run->stop_reason), format, NULL, args));
   va_end(args);
   PetscCall(PetscInfo(NULL, "%s\n", run->stop_reason));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode SbRunWarnShorter(SbRun run, PetscReal dt)
+{
+  PetscFunctionBeginUser;
+  if (!run->stop_reason[0] || run->stopped || run->shortened || dt > SHORT * run->dt)
+    PetscFunctionReturn(PETSC_SUCCESS);
+  run->shortened = PETSC_TRUE;
+  PetscCall(SbWarning(
+    run->model->comm,
+    "steps had to be halved to %.2g of their length, and more: %s. It goes on; if it gets slow, try %s, or "
+    "loads and motions that begin gently (docs/guides/when_it_fails.md)",
+    (double)(dt / run->dt), run->stop_reason,
+    run->model->dynamic ? "a shorter -ts_dt from the start" : "more -static_steps"));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -33,7 +33,6 @@ PetscErrorCode SbSecondOrderRegister(void);
 PetscErrorCode SbSecondOrderSet(TS ts, SbRun run, const SbMethodSettings *settings);
 
 /* step.c: what happens in a step. */
-PetscErrorCode SbRunStepBegin(SbRun run, PetscReal t, PetscReal dt); /* before an attempt */
 /* How a step from t to t + dt is attempted; vectors and ctx are borrowed. Static runs: t is the load factor. */
 typedef struct {
   PetscReal t, dt;                      /* s */
@@ -65,6 +64,8 @@ PetscErrorCode SbRunStopAsked(SbRun run, PetscInt step, PetscReal t, PetscBool w
 /* While a step is solved: whether it is to be given up. Collective. */
 PetscErrorCode SbRunGiveUp(SbRun run, PetscBool *given_up);
 PetscErrorCode SbRunFail(SbRun run, const char *format, ...) __attribute__((format(printf, 2, 3)));
+/* A step of length dt, s, was refused: a warning, once until steps are whole again, when that is much less than was asked for. */
+PetscErrorCode SbRunWarnShorter(SbRun run, PetscReal dt);
 /* Whether the last step was refused by inverted.c, and one of this length is not worth trying. */
 PetscBool SbRunTooShort(SbRun run, PetscReal dt);
 

@@ -81,7 +81,7 @@ static PetscErrorCode run(const char *options, PetscBool storm, Trace *trace)
   if (!strstr(options, "-effects")) {
     const SbModel m = t.model;
 
-    SB_CHECK(!m->neffect && !m->nprescribe && !m->nprestep && !m->nforce && !m->ntangent && !m->naccept &&
+    SB_CHECK(!m->neffect && !m->nprescribe && !m->nforce && !m->ntangent && !m->naccept &&
                !m->nhistory,
              "a scene without effects has entries in its lists");
     SB_CHECK(!m->space->nfixed && !t.run->damped && !t.run->nmonitor && !t.run->output && !t.run->loads &&
