@@ -111,12 +111,20 @@ static PetscErrorCode check_choice(void)
            {4, 0, "-contact_pc_type bjacobi -contact_ksp_max_it 5000 ", 20, 5000},
            {4, 2, "-contact_ksp_type minres -contact_ksp_norm_type preconditioned ", 2, 60}};
 
+  PetscMPIInt size;
+  PetscBool mumps;
+
   PetscFunctionBeginUser;
+  PetscCallMPI(MPI_Comm_size(PETSC_COMM_WORLD, &size));
+  PetscCall(PetscHasExternalPackage("mumps", &mumps));
   for (size_t k = 0; k < PETSC_STATIC_ARRAY_LENGTH(c); k++) {
     char more[256];
     ContactProblem p;
     SbContactSystem system;
     PetscInt its;
+
+    /* several ranks have PETSc's cholesky with MUMPS only, and say so */
+    if (size > 1 && !mumps && strstr(c[k].more, "cholesky")) continue;
 
     PetscCall(PetscSNPrintf(more, sizeof(more), TIGHT "%s", c[k].more));
     PetscCall(contact_problem_open(c[k].cells, "p1", 0.01, more, &p));
