@@ -116,7 +116,7 @@ static PetscErrorCode check_choice(void)
 
   PetscFunctionBeginUser;
   PetscCallMPI(MPI_Comm_size(PETSC_COMM_WORLD, &size));
-  PetscCall(PetscHasExternalPackage("mumps", &mumps));
+  PetscCall(SbHasPackage("mumps", &mumps));
   for (size_t k = 0; k < PETSC_STATIC_ARRAY_LENGTH(c); k++) {
     char more[256];
     ContactProblem p;
